@@ -1,0 +1,62 @@
+//! The errors a caller can tell apart. Each carries what failed, where, and what to do about it.
+use std::path::{Path, PathBuf};
+
+/// Result of everything that can fail for a reason outside the program.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// What went wrong, by who can mend it. [`Error::exit_code`] is what the command line returns.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// An option or a setting out of range, alone or together with another.
+    #[error("{0}")]
+    Usage(String),
+    /// A file that cannot be read, or does not hold what it should.
+    #[error("{}{}: {what}", path.display(), place.as_deref().map(|p| format!(", {p}")).unwrap_or_default())]
+    Input {
+        /// The file.
+        path: PathBuf,
+        /// Where in the file: a line, a key, a mesh.
+        place: Option<String>,
+        /// What is wrong and how to mend it.
+        what: String,
+    },
+    /// No Vulkan loader, no usable device, a missing feature, out of memory, or the device was lost.
+    #[error("{0}")]
+    Device(String),
+    /// A file that cannot be written.
+    #[error("{}: {what}", path.display())]
+    Output {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong and how to mend it.
+        what: String,
+    },
+}
+
+impl Error {
+    /// An [`Error::Input`] about the whole of a file.
+    pub fn input(path: impl AsRef<Path>, what: impl ToString) -> Self {
+        Self::Input { path: path.as_ref().to_owned(), place: None, what: what.to_string() }
+    }
+
+    /// An [`Error::Input`] about one place in a file, such as `line 12` or `mesh "floor"`.
+    pub fn input_at(path: impl AsRef<Path>, place: impl ToString, what: impl ToString) -> Self {
+        Self::Input { path: path.as_ref().to_owned(), place: Some(place.to_string()), what: what.to_string() }
+    }
+
+    /// An [`Error::Output`].
+    pub fn output(path: impl AsRef<Path>, what: impl ToString) -> Self {
+        Self::Output { path: path.as_ref().to_owned(), what: what.to_string() }
+    }
+
+    /// 2 usage, 3 input, 4 device, 5 output.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Usage(_) => 2,
+            Self::Input { .. } => 3,
+            Self::Device(_) => 4,
+            Self::Output { .. } => 5,
+        }
+    }
+}

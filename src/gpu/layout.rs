@@ -1,0 +1,398 @@
+//! Every struct that crosses the line between host and shader, written once. The crate compiles this file;
+//! `build.rs` includes it by `#[path]` and serves [`GLSL`] to the shaders as `layout.glsl`.
+//!
+//! Structs are laid out as GLSL `scalar` does: members of four bytes, no padding anywhere. Structs that kernels
+//! read through texel buffers are multiples of 16 bytes, so that one fetch returns four words.
+#![allow(non_camel_case_types)]
+
+use bytemuck::{Pod, Zeroable};
+
+/// GLSL's names for the member types.
+pub type uint = u32;
+/// 32-bit float.
+pub type float = f32;
+/// Two unsigned words.
+pub type uvec2 = [u32; 2];
+/// Two floats.
+pub type vec2 = [f32; 2];
+/// Three floats without padding (`scalar` layout).
+pub type vec3 = [f32; 3];
+/// Four floats.
+pub type vec4 = [f32; 4];
+/// Three unsigned words.
+pub type uvec3 = [u32; 3];
+/// Four unsigned words.
+pub type uvec4 = [u32; 4];
+
+macro_rules! gpu_structs {
+    ($($(#[$doc:meta])* struct $name:ident { $($(#[$unit:meta])* $field:ident: $ty:ident,)+ })+) => {
+        $(
+            $(#[$doc])*
+            #[repr(C)]
+            #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+            pub struct $name { $($(#[$unit])* pub $field: $ty,)+ }
+        )+
+        /// The same structs as GLSL text.
+        pub const GLSL_STRUCTS: &str = concat!($("struct ", stringify!($name), " {\n",
+            $("    ", stringify!($ty), " ", stringify!($field), ";\n",)+ "};\n",)+);
+    };
+}
+
+macro_rules! constants {
+    ($($(#[$doc:meta])* $name:ident = $value:literal;)+) => {
+        $($(#[$doc])* pub const $name: u32 = $value;)+
+        /// The same constants as GLSL text.
+        pub const GLSL_CONSTANTS: &str =
+            concat!($("const uint ", stringify!($name), " = ", stringify!($value), "u;\n",)+);
+    };
+}
+
+constants! {
+    /// "No texture", "no material override", "no hit".
+    NONE = 0xffffffff;
+    /// [`Material::kind`]: Lambertian reflection, `base_color / pi`.
+    BSDF_DIFFUSE = 0;
+    /// [`Material::kind`]: microfacet conductor with exact Fresnel from `eta`, `k`; `alpha` below 0.01 is a mirror.
+    BSDF_CONDUCTOR = 1;
+    /// [`Material::kind`]: microfacet dielectric, reflection and refraction, `eta[0]` = interior / exterior index.
+    BSDF_DIELECTRIC = 2;
+    /// [`Material::kind`]: diffuse base under a dielectric coat of index `eta[0]`, roughness `alpha`.
+    BSDF_COATED = 3;
+    /// [`Material::flags`]: the GGX distribution instead of Beckmann.
+    MATERIAL_GGX = 1;
+    /// [`Material::flags`]: both sides scatter alike (dielectrics ignore it: their sides differ by definition).
+    MATERIAL_TWO_SIDED = 2;
+    /// [`Material::flags`]: `bump_texture` is a tangent-space normal map, not a height map.
+    MATERIAL_NORMAL_MAP = 4;
+    /// [`Material::flags`]: hits are subject to an alpha mask (`opacity_texture` or `opacity` below 1).
+    MATERIAL_MASKED = 8;
+    /// [`Texture::flags`]: RGB is stored with the sRGB curve and decoded when read.
+    TEXTURE_SRGB = 1;
+    /// [`Texture::flags`]: coordinates outside [0, 1] clamp to the border texel; otherwise they repeat.
+    TEXTURE_CLAMP = 2;
+    /// [`Light::kind`]: emissive triangle `a`, `b`, `c` (vertices in world units), radiance `value`.
+    LIGHT_TRIANGLE = 0;
+    /// [`Light::kind`]: point at `a`, radiant intensity `value` in W/sr.
+    LIGHT_POINT = 1;
+    /// [`Light::kind`]: spot at `a` along unit `b`; `c` = (cos of the full-intensity angle, cos of the cut-off angle, 0).
+    LIGHT_SPOT = 2;
+    /// [`Light::kind`]: directional along unit `b` (the way light travels), irradiance `value` on a facing plane.
+    LIGHT_DIRECTIONAL = 3;
+    /// [`Light::kind`]: the environment; rows of the rotation environment_from_world in `a`, `b`, `c`; radiance scale `value`.
+    LIGHT_ENVIRONMENT = 4;
+}
+
+gpu_structs! {
+    /// Camera rays start at `position` (pinhole) or on a disk of `lens_radius` around it. For film coordinates
+    /// `sx`, `sy` in [-1, 1] (right, up): `direction = forward + sx * right + sy * up`, all in world space; `right`
+    /// and `up` are already scaled by the tangent of half the field of view, so they need not be unit, nor
+    /// right-handed (a mirrored camera).
+    struct Camera {
+        /// World units.
+        position: vec3,
+        /// World units; 0 is a pinhole.
+        lens_radius: float,
+        /// Scaled by tan(horizontal fov / 2).
+        right: vec3,
+        /// Distance along `forward` to the plane in focus, world units.
+        focus_distance: float,
+        /// Scaled by tan(vertical fov / 2).
+        up: vec3,
+        /// Near clip distance along the ray, world units; 0 clips nothing.
+        near: float,
+        /// Unit.
+        forward: vec3,
+    }
+
+    /// One eight-way compressed node (Ylitie et al. 2017) as obvhs lays it out; child and triangle indices are
+    /// global. 5 texels. `words[0..3]` = origin, `[3]` = exponents and inner mask, `[4]` = first child,
+    /// `[5]` = first primitive, `[6..8]` = child meta, then 8 bytes each of min x, max x, min y, max y, min z, max z.
+    struct BvhNode {
+        /// Origin of the quantisation grid, world (or object) units.
+        p: vec3,
+        /// Exponents of x, y, z in the low three bytes, mask of inner children in the high byte.
+        e_imask: uint,
+        /// Index of the first inner child.
+        child_base: uint,
+        /// Index of the first primitive: a triangle, or an instance in the top level.
+        primitive_base: uint,
+        /// Eight bytes: kind and offset of each child.
+        meta: uvec2,
+        /// Quantised bounds of the children.
+        min_x: uvec2,
+        /// See `min_x`.
+        max_x: uvec2,
+        /// See `min_x`.
+        min_y: uvec2,
+        /// See `min_x`.
+        max_y: uvec2,
+        /// See `min_x`.
+        min_z: uvec2,
+        /// See `min_x`.
+        max_z: uvec2,
+    }
+
+    /// What traversal reads of a triangle, in leaf order. 3 texels.
+    struct Triangle {
+        /// World units, or object units below an instance.
+        v0: vec3,
+        /// Index of the triangle in its mesh file, for reports.
+        primitive: uint,
+        /// See `v0`.
+        v1: vec3,
+        /// Index into the materials.
+        material: uint,
+        /// See `v0`.
+        v2: vec3,
+        /// Index of the object (shape), the `id` layer of the outputs.
+        object: uint,
+    }
+
+    /// What shading reads of a triangle beyond its positions; same index as its [`Triangle`]. 3 texels.
+    /// Present only when a mesh of the scene has vertex normals or texture coordinates.
+    struct Shading {
+        /// Octahedral unit normals of the three vertices, snorm 2 x 16, x in the low half. All three 0xffffffff: flat.
+        normal: uvec3,
+        /// Texture coordinates of vertex 0; v points up, so row 0 of an image is v = 1.
+        uv0: vec2,
+        /// Of vertex 1.
+        uv1: vec2,
+        /// Of vertex 2.
+        uv2: vec2,
+        /// Unused words, zero.
+        pad: uvec3,
+    }
+
+    /// A placed mesh. 7 texels. Matrices are three rows of four, `x_world = rows * (x_object, 1)`.
+    struct Instance {
+        /// Row 0 of world_from_object.
+        world0: vec4,
+        /// Row 1.
+        world1: vec4,
+        /// Row 2.
+        world2: vec4,
+        /// Row 0 of object_from_world.
+        object0: vec4,
+        /// Row 1.
+        object1: vec4,
+        /// Row 2.
+        object2: vec4,
+        /// Index of the mesh's root node.
+        root: uint,
+        /// Material for the whole instance, or [`NONE`] to keep those of the triangles.
+        material: uint,
+        /// Added to the triangles' object index.
+        object: uint,
+        /// 1 when the transform mirrors (negative determinant): the geometric normal flips.
+        mirrored: uint,
+    }
+
+    /// Surface appearance. 8 texels. Colours are linear Rec. 709 in [0, 1] unless said otherwise.
+    struct Material {
+        /// Diffuse albedo; multiplies `base_texture`.
+        base_color: vec3,
+        /// Microfacet roughness (alpha itself, not its root); below 0.01 the interface is smooth.
+        alpha: float,
+        /// Emitted radiance of the front side, W/(m^2 sr); 0 emits nothing.
+        emission: vec3,
+        /// One of the BSDF_ constants.
+        kind: uint,
+        /// Index of refraction per channel (conductor), or interior / exterior in `x` (dielectric, coated).
+        eta: vec3,
+        /// Constant opacity in [0, 1]; multiplies `opacity_texture`.
+        opacity: float,
+        /// Extinction per channel (conductor).
+        k: vec3,
+        /// MATERIAL_ bits.
+        flags: uint,
+        /// Tint of specular reflection; multiplies `specular_texture`.
+        specular: vec3,
+        /// Height of a bump map in world units per unit of texture value.
+        bump_scale: float,
+        /// Tint of specular transmission (dielectric).
+        transmission: vec3,
+        /// Texture index or [`NONE`].
+        base_texture: uint,
+        /// Tint; texture index or [`NONE`].
+        specular_texture: uint,
+        /// Alpha mask (its red channel, or its alpha channel where it has one).
+        opacity_texture: uint,
+        /// Height map, or normal map with MATERIAL_NORMAL_MAP.
+        bump_texture: uint,
+        /// Perceptual roughness r in its red channel, multiplies sqrt(alpha).
+        roughness_texture: uint,
+        /// Multiplies `emission`.
+        emission_texture: uint,
+        /// Diffuse reflectance of the interface seen from inside (coated): mean internal Fresnel reflectance.
+        internal_fresnel: float,
+        /// Luminance of the mean emission; emissive triangles are chosen in proportion to it times their area.
+        emission_weight: float,
+        /// Unused, zero.
+        pad: uint,
+    }
+
+    /// A picture in the texel buffer: RGBA8 texels (R in the low byte), row 0 at the top, mip levels one after another,
+    /// level l being max(1, width >> l) x max(1, height >> l). 1 fetch plus.
+    struct Texture {
+        /// Index of the first texel of level 0.
+        first: uint,
+        /// Texels.
+        width: uint,
+        /// Texels.
+        height: uint,
+        /// TEXTURE_ bits; the number of mip levels in bits 8 to 15.
+        flags: uint,
+    }
+
+    /// A light. 4 texels; what the vectors mean depends on `kind`.
+    struct Light {
+        /// See the LIGHT_ constants.
+        a: vec3,
+        /// One of the LIGHT_ constants.
+        kind: uint,
+        /// See the LIGHT_ constants.
+        b: vec3,
+        /// Probability that the alias table returns this light.
+        probability: float,
+        /// See the LIGHT_ constants.
+        c: vec3,
+        /// Index of the triangle in leaf order (LIGHT_TRIANGLE with an emission texture), else [`NONE`].
+        triangle: uint,
+        /// Radiance, intensity or irradiance, linear Rec. 709.
+        value: vec3,
+        /// Index of the material (LIGHT_TRIANGLE), else [`NONE`].
+        material: uint,
+    }
+
+    /// One slot of an alias table (Walker 1977, Vose 1991) over n entries. From a 32-bit random word r, the slot is
+    /// the high word of r * n; the low word picks the slot itself when below `threshold`, its alias otherwise.
+    struct AliasEntry {
+        /// Probability of staying, in units of 2^-32; 0xffffffff always stays.
+        threshold: uint,
+        /// The other entry.
+        alias: uint,
+    }
+
+    /// The primary hit at the pixel centre. Zero where the ray leaves the scene, with `object` = [`NONE`].
+    struct Guide {
+        /// Shading normal in world space, unit, towards the camera.
+        normal: vec3,
+        /// Distance from the camera position along the unit ray, world units; 0 on a miss.
+        depth: float,
+        /// Hit in world units.
+        position: vec3,
+        /// Object index, or [`NONE`].
+        object: uint,
+        /// Reflectance of the first hit that indirect light is divided by, linear Rec. 709.
+        albedo: vec3,
+        /// Index of the material, or [`NONE`].
+        material: uint,
+    }
+
+    /// Running statistics of one pixel (Welford 1962), linear Rec. 709.
+    struct PixelStats {
+        /// Mean radiance, W/(m^2 sr).
+        mean: vec3,
+        /// Samples behind `mean`.
+        count: uint,
+        /// Sum of squared deviations from the mean; the variance of one sample is m2 / (count - 1).
+        m2: vec3,
+    }
+
+    /// Running means of one pixel that the filters read; the count is that of its [`PixelStats`].
+    struct PixelLight {
+        /// Radiance that needs no filter: emission, direct light, and all that a smooth first hit shows.
+        direct: vec3,
+        /// Incident indirect irradiance over pi at the first hit: indirect radiance before its albedo.
+        indirect: vec3,
+    }
+
+    /// What one path returns.
+    struct PathSample {
+        /// See [`PixelLight::direct`].
+        direct: vec3,
+        /// Radiance by one or more bounces after a rough first hit.
+        indirect: vec3,
+        /// Reflectance of that first hit, which `indirect` is divided by where it is not zero.
+        albedo: vec3,
+    }
+}
+
+macro_rules! effects {
+    ($($(#[$doc:meta])* $field:ident = $id:literal, $glsl:ident;)+) => {
+        /// What a scene and its settings call for: one specialisation constant each. Kernels drop the rest when they are
+        /// compiled. `scene/effects.rs` fills it in and says which object asked.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+        pub struct Effects { $($(#[$doc])* pub $field: bool,)+ }
+        impl Effects {
+            /// Every effect switched on (`--effects all`).
+            pub const ALL: Self = Self { $($field: true,)+ };
+            /// (name, specialisation constant id, on) of every effect, in order of id.
+            pub fn entries(&self) -> Vec<(&'static str, u32, bool)> {
+                vec![$((stringify!($field), $id, self.$field),)+]
+            }
+        }
+        /// The constants as GLSL text.
+        pub const GLSL_EFFECTS: &str = concat!($("layout(constant_id = ", $id, ") const bool ",
+            stringify!($glsl), " = true;\n",)+);
+    };
+}
+
+effects! {
+    /// A colour, specular, roughness or emission texture.
+    textures = 0, FX_TEXTURES;
+    /// Vertex normals that differ from the face's.
+    smooth_normals = 1, FX_SMOOTH_NORMALS;
+    /// A height map.
+    bump_maps = 2, FX_BUMP_MAPS;
+    /// A tangent-space normal map.
+    normal_maps = 3, FX_NORMAL_MAPS;
+    /// Opacity below 1, constant or by texture.
+    alpha_masks = 4, FX_ALPHA_MASKS;
+    /// A diffuse lobe (diffuse or coated material).
+    diffuse = 5, FX_DIFFUSE;
+    /// A conductor, rough or smooth.
+    conductor = 6, FX_CONDUCTOR;
+    /// A dielectric, rough or smooth.
+    dielectric = 7, FX_DIELECTRIC;
+    /// A diffuse base under a coat.
+    coated = 8, FX_COATED;
+    /// An interface with alpha of at least 0.01.
+    rough = 9, FX_ROUGH;
+    /// An interface with alpha below 0.01.
+    smooth_interface = 10, FX_SMOOTH;
+    /// The Beckmann distribution.
+    beckmann = 11, FX_BECKMANN;
+    /// The GGX distribution.
+    ggx = 12, FX_GGX;
+    /// Emissive triangles.
+    emissive = 13, FX_EMISSIVE;
+    /// Point lights.
+    point_lights = 14, FX_POINT;
+    /// Spot lights.
+    spot_lights = 15, FX_SPOT;
+    /// Directional lights.
+    directional_lights = 16, FX_DIRECTIONAL;
+    /// An environment, constant or an image.
+    environment = 17, FX_ENVIRONMENT;
+    /// An environment given by an image.
+    environment_map = 18, FX_ENVIRONMENT_MAP;
+    /// A lens of finite radius.
+    lens = 19, FX_LENS;
+    /// Instances: a second BVH level.
+    instances = 20, FX_INSTANCES;
+    /// Light beyond direct (max_depth over 2).
+    indirect = 21, FX_INDIRECT;
+    /// Russian roulette.
+    roulette = 22, FX_ROULETTE;
+    /// A clamp of indirect light.
+    clamp = 23, FX_CLAMP;
+    /// A pixel filter other than the box.
+    pixel_filter = 24, FX_PIXEL_FILTER;
+    /// Direct and indirect light wanted apart.
+    split_light = 25, FX_SPLIT;
+    /// Independent PCG numbers instead of Owen-scrambled Sobol.
+    independent_sampler = 26, FX_INDEPENDENT;
+    /// Ray and node counters.
+    counters = 27, FX_COUNTERS;
+}

@@ -1,0 +1,3 @@
+//! The only `unsafe`, the only `vk::`.
+#![allow(unsafe_code)]
+pub mod layout;

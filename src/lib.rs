@@ -1,0 +1,6 @@
+//! Tallow: a Vulkan-native path tracer.
+pub mod cli;
+pub mod error;
+pub mod gpu;
+pub mod scene;
+pub mod settings;

@@ -1,0 +1,4 @@
+//! The `tallow` command.
+fn main() -> std::process::ExitCode {
+    tallow::cli::main()
+}
