@@ -215,7 +215,7 @@ gpu_structs! {
         base_texture: uint,
         /// Tint; texture index or [`NONE`].
         specular_texture: uint,
-        /// Alpha mask (its red channel, or its alpha channel where it has one).
+        /// Opacity in its red channel (the loader moves an alpha channel there); texture index or [`NONE`].
         opacity_texture: uint,
         /// Height map, or normal map with MATERIAL_NORMAL_MAP.
         bump_texture: uint,
@@ -307,14 +307,52 @@ gpu_structs! {
         indirect: vec3,
     }
 
-    /// What one path returns.
-    struct PathSample {
-        /// See [`PixelLight::direct`].
-        direct: vec3,
-        /// Radiance by one or more bounces after a rough first hit.
-        indirect: vec3,
-        /// Reflectance of that first hit, which `indirect` is divided by where it is not zero.
-        albedo: vec3,
+    /// Push constants of `path.comp` and `guide.comp`.
+    struct PathPush {
+        /// Where rays start.
+        camera: Camera,
+        /// Film in pixels.
+        size: uvec2,
+        /// First pixel of the batch, row-major.
+        first_pixel: uint,
+        /// Pixels of the batch.
+        pixels: uint,
+        /// Index of the batch's first sample of every pixel.
+        first_sample: uint,
+        /// Samples of every pixel in the batch.
+        samples: uint,
+        /// Chooses the random sequence.
+        seed: uint,
+        /// Path edges, at least 1.
+        max_depth: uint,
+        /// Edges after which roulette starts.
+        roulette_depth: uint,
+        /// Limit of an indirect sample's largest channel.
+        clamp_indirect: float,
+        /// 0 = tent, 1 = Gaussian (the box is compiled, not chosen here).
+        pixel_filter: uint,
+        /// Lights in the alias table.
+        light_count: uint,
+        /// Area pdf of an emissive triangle = this * its material's emission_weight.
+        triangle_pdf_scale: float,
+        /// Index of the environment among the lights, or NONE.
+        environment: uint,
+        /// Texels of the environment image, width in the low half, height in the high half.
+        environment_size: uint,
+        /// Node where traversal starts.
+        root: uint,
+    }
+
+    /// Push constants of `fold.comp` and `compose.comp`.
+    struct FoldPush {
+        /// First pixel of the batch.
+        first_pixel: uint,
+        /// Pixels of the batch.
+        pixels: uint,
+        /// Samples of every pixel in the batch.
+        samples: uint,
+        /// 1 when these are the first samples of the pixels: earlier statistics are forgotten.
+        restart: uint,
     }
 }
 

@@ -1,0 +1,51 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "effects.glsl"
+
+// Adds a batch of samples to the statistics of their pixels. One thread folds one pixel, in order of sample index, so
+// the result does not depend on how samples were batched (Welford 1962).
+layout(local_size_x = 64) in;
+layout(scalar, binding = 0) readonly buffer Samples { vec3 samples[]; };
+layout(scalar, binding = 1) buffer Stats { PixelStats stats[]; };
+layout(scalar, binding = 2) buffer Lights { PixelLight light[]; };
+layout(scalar, push_constant) uniform Push { FoldPush push; };
+
+// A channel whose albedo is below this cannot be divided out; its light stays with the direct light.
+const float SMALLEST_ALBEDO = 1e-6;
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i >= push.pixels) return; // safe: no barrier() follows
+    uint pixel = push.first_pixel + i;
+    PixelStats s = PixelStats(vec3(0.0), 0u, vec3(0.0));
+    PixelLight l = PixelLight(vec3(0.0), vec3(0.0));
+    if (push.restart == 0u) {
+        s = stats[pixel];
+        if (FX_SPLIT) l = light[pixel];
+    }
+    for (uint k = 0u; k < push.samples; k++) {
+        uint at = k * push.pixels + i;
+        vec3 radiance;
+        s.count++;
+        float share = 1.0 / float(s.count);
+        if (FX_SPLIT) {
+            vec3 direct = samples[3u * at], indirect = samples[3u * at + 1u];
+            vec3 albedo = samples[3u * at + 2u];
+            bvec3 divides = greaterThan(albedo, vec3(SMALLEST_ALBEDO));
+            vec3 irradiance = mix(vec3(0.0), indirect / max(albedo, vec3(SMALLEST_ALBEDO)), divides);
+            vec3 kept = direct + mix(indirect, vec3(0.0), divides);
+            radiance = direct + indirect;
+            l.direct += (kept - l.direct) * share;
+            l.indirect += (irradiance - l.indirect) * share;
+        } else {
+            radiance = samples[at];
+        }
+        vec3 off = radiance - s.mean;
+        s.mean += off * share;
+        s.m2 += off * (radiance - s.mean);
+    }
+    stats[pixel] = s;
+    if (FX_SPLIT) light[pixel] = l;
+}

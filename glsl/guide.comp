@@ -1,0 +1,46 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "effects.glsl"
+#include "shared/scene.glsl"
+
+// The primary hit through the centre of every pixel, from the middle of the lens: what filters and allocation steer by.
+layout(local_size_x_id = 100) in;
+layout(scalar, binding = 11) writeonly buffer Guides { Guide guides[]; };
+layout(scalar, push_constant) uniform Push { PathPush push; };
+
+uint nodes_visited = 0u;
+
+#include "shared/sampler.glsl"
+#include "shared/warp.glsl"
+#include "shared/fresnel.glsl"
+#include "shared/microfacet.glsl"
+#include "shared/bsdf.glsl"
+#include "shared/texture.glsl"
+#include "shared/camera.glsl"
+#include "shared/traverse.glsl"
+#include "shared/surface.glsl"
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i >= push.pixels) return; // safe: no barrier() follows
+    uint pixel = push.first_pixel + i;
+    vec2 centre = vec2(pixel % push.size.x, pixel / push.size.x) + 0.5;
+    Camera camera = push.camera;
+    camera.lens_radius = 0.0;
+    Ray ray = camera_ray(camera, film_from_pixel(centre, push.size), vec2(0.5));
+    Hit hit = traverse(ray.origin, ray.direction, 3e38, false, push.root, hash_word(pixel));
+    Guide guide = Guide(vec3(0.0), 0.0, vec3(0.0), NONE, vec3(0.0), NONE);
+    if (hit.triangle != NONE) {
+        float pixel_angle = 2.0 * length(camera.up) / float(push.size.y);
+        Surface s = surface_at(hit, ray.direction, pixel_angle * hit.t);
+        guide.normal = dot(s.normal, ray.direction) > 0.0 ? -s.normal : s.normal;
+        guide.depth = hit.t + camera.near;
+        guide.position = s.position;
+        guide.object = s.object;
+        guide.albedo = bsdf_albedo(surface_bsdf(s));
+        guide.material = s.material;
+    }
+    guides[pixel] = guide;
+}

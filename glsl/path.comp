@@ -1,0 +1,204 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "effects.glsl"
+#include "shared/scene.glsl"
+
+// One camera path per thread: next event estimation and BSDF sampling joined by the balance heuristic (Veach 1997).
+// Thread i traces sample first_sample + i / pixels of pixel first_pixel + i % pixels and writes 1 vec3 (radiance), or
+// with FX_SPLIT 3 (direct, indirect, the albedo that indirect is to be divided by).
+layout(local_size_x_id = 100) in;
+layout(scalar, binding = 11) writeonly buffer Samples { vec3 samples[]; };
+layout(scalar, binding = 12) buffer Counters { uint counters[]; };
+layout(scalar, push_constant) uniform Push { PathPush push; };
+
+uint nodes_visited = 0u, closest_rays = 0u, any_rays = 0u;
+
+#include "shared/sampler.glsl"
+#include "shared/warp.glsl"
+#include "shared/fresnel.glsl"
+#include "shared/microfacet.glsl"
+#include "shared/bsdf.glsl"
+#include "shared/texture.glsl"
+#include "shared/camera.glsl"
+#include "shared/traverse.glsl"
+#include "shared/surface.glsl"
+#include "shared/light.glsl"
+
+// Dimension pairs: two for the camera, then these for every scattering event.
+const uint PAIR_FILM = 0u, PAIR_LENS = 1u, PAIR_FIRST_BOUNCE = 2u, PAIRS_PER_BOUNCE = 4u;
+const uint PAIR_CHOICE = 0u, PAIR_LIGHT = 1u, PAIR_BSDF = 2u, PAIR_ROULETTE = 3u;
+
+vec2 film_sample(uint pixel, Sampler random) {
+    vec2 at = vec2(pixel % push.size.x, pixel / push.size.x);
+    vec2 u = sample_2d(random, PAIR_FILM);
+    if (FX_PIXEL_FILTER && push.pixel_filter == 0u) u = 0.5 + vec2(warp_tent(u.x), warp_tent(u.y));
+    else if (FX_PIXEL_FILTER) u = 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y));
+    return film_from_pixel(at + u, push.size);
+}
+
+// Joins the two strategies; a density that overflowed takes everything.
+float balance(float taken, float other) { return taken / (taken + other); }
+
+struct Path {
+    vec3 origin;
+    vec3 direction;
+    vec3 throughput;
+    float bsdf_pdf;   // of `direction`; 0 after a smooth interface or from the camera
+    float cone_width; // ray cone at the origin, world units
+    float cone_spread;
+    bool delta;       // no light sampling competes for what `direction` hits
+};
+
+struct Light2 {
+    vec3 direct;
+    vec3 indirect;
+};
+
+void add_light(inout Light2 sum, vec3 light, bool indirect) {
+    if (!FX_INDIRECT || !indirect) {
+        sum.direct += light;
+        return;
+    }
+    if (FX_CLAMP) {
+        float largest = max(light.r, max(light.g, light.b));
+        light *= push.clamp_indirect > 0.0 && largest > push.clamp_indirect ? push.clamp_indirect / largest : 1.0;
+    }
+    sum.indirect += light;
+}
+
+vec3 light_from_miss(Path path) {
+    if (!FX_ENVIRONMENT || push.environment == NONE) return vec3(0.0);
+    float pdf;
+    vec3 radiance = environment_radiance(path.direction, pdf);
+    return radiance * (path.delta ? 1.0 : balance(path.bsdf_pdf, pdf));
+}
+
+vec3 light_from_hit(Path path, Surface s, float t) {
+    float cosine = -dot(s.geometric, path.direction);
+    if (!FX_EMISSIVE || cosine <= 0.0) return vec3(0.0);
+    float weight = path.delta ? 1.0 : balance(path.bsdf_pdf, triangle_light_pdf(s.material, t, cosine));
+    return surface_emission(s) * weight;
+}
+
+// Direct light at `s` by light sampling. `basis` columns are the shading frame, `side` turns it to the viewer.
+vec3 light_from_nee(Path path, Surface s, Bsdf bsdf, mat3 basis, vec3 wo, Sampler random, uint pair, uint mask_seed) {
+    uint word = sample_2d_bits(random, pair + PAIR_CHOICE).x;
+    LightSample light = light_sample(s.position, word, sample_2d(random, pair + PAIR_LIGHT));
+    if (all(equal(light.radiance, vec3(0.0)))) return vec3(0.0);
+    vec3 wi = light.direction * basis; // row vector times matrix: into the frame
+    vec4 f = bsdf_evaluate(bsdf, wo, wi);
+    vec3 contribution = f.rgb * light.radiance * (light.pdf > 0.0 ? balance(light.pdf, f.w) : 1.0);
+    if (max(contribution.r, max(contribution.g, contribution.b)) <= 0.0) return vec3(0.0);
+    vec3 normal = dot(light.direction, s.geometric) < 0.0 ? -s.geometric : s.geometric;
+    vec3 origin = offset_origin(s.position, normal);
+    vec3 direction = light.direction;
+    float distance = light.distance;
+    if (distance < INFINITE_DISTANCE) { // aim again from the offset origin, so that the segment ends on the light
+        vec3 target = s.position + light.distance * light.direction;
+        direction = target - origin;
+        distance = length(direction);
+        direction /= distance;
+        distance *= 1.0 - 1e-6;
+    }
+    if (FX_COUNTERS) any_rays++;
+    Hit blocker = traverse(origin, direction, distance, true, push.root, mask_seed);
+    return blocker.triangle == NONE ? contribution : vec3(0.0);
+}
+
+// Chooses the next direction. False when the path ends.
+bool scatter(inout Path path, Surface s, Bsdf bsdf, mat3 basis, vec3 wo, float t, Sampler random, uint pair) {
+    BsdfSample next;
+    float lobe = sample_2d(random, pair + PAIR_CHOICE).y;
+    if (!bsdf_sample(bsdf, wo, lobe, sample_2d(random, pair + PAIR_BSDF), next)) return false;
+    path.throughput *= next.weight;
+    path.direction = normalize(basis * next.wi);
+    vec3 normal = dot(path.direction, s.geometric) < 0.0 ? -s.geometric : s.geometric;
+    path.origin = offset_origin(s.position, normal);
+    path.bsdf_pdf = next.pdf;
+    path.delta = next.delta;
+    path.cone_width += path.cone_spread * t;
+    float rough = bsdf.kind == BSDF_DIFFUSE ? 0.3 : bsdf.alpha; // how far a lobe opens the cone, radians
+    path.cone_spread = next.delta ? path.cone_spread : max(path.cone_spread, rough);
+    return max(path.throughput.r, max(path.throughput.g, path.throughput.b)) > 0.0;
+}
+
+bool survives_roulette(inout Path path, Sampler random, uint pair) {
+    float q = min(max(path.throughput.r, max(path.throughput.g, path.throughput.b)), 0.95);
+    if (sample_2d(random, pair + PAIR_ROULETTE).x >= q) return false;
+    path.throughput /= q;
+    return true;
+}
+
+Light2 trace_path(Path path, Sampler random, uint path_seed, out vec3 albedo) {
+    Light2 sum = Light2(vec3(0.0), vec3(0.0));
+    bool smooth_first = false;
+    albedo = vec3(0.0);
+    for (uint bounce = 0u;; bounce++) {
+        uint pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
+        if (FX_COUNTERS) closest_rays++;
+        uint mask_seed = hash_word(path_seed + 2u * bounce);
+        Hit hit = traverse(path.origin, path.direction, INFINITE_DISTANCE, false, push.root, mask_seed);
+        bool indirect = bounce >= 2u && !smooth_first;
+        if (hit.triangle == NONE) {
+            add_light(sum, path.throughput * light_from_miss(path), indirect);
+            break;
+        }
+        Surface s = surface_at(hit, path.direction, path.cone_width + path.cone_spread * hit.t);
+        add_light(sum, path.throughput * light_from_hit(path, s, hit.t), indirect);
+        if (bounce + 1u >= push.max_depth) break;
+
+        vec3 normal = s.normal;
+        if (dot(normal, path.direction) > 0.0) {
+            if ((s.flags & MATERIAL_TWO_SIDED) != 0u) normal = -normal;
+        }
+        mat3 basis = orthonormal_basis(normal);
+        vec3 wo = -path.direction * basis;
+        Bsdf bsdf = surface_bsdf(s);
+        bool smooth_here = bsdf_is_delta(bsdf);
+        if (bounce == 0u) {
+            albedo = bsdf_albedo(bsdf);
+            smooth_first = smooth_here;
+        }
+        if (push.light_count > 0u && !smooth_here) {
+            vec3 light = light_from_nee(path, s, bsdf, basis, wo, random, pair, mask_seed + 1u);
+            add_light(sum, path.throughput * light, bounce >= 1u && !smooth_first);
+        }
+        if (!scatter(path, s, bsdf, basis, wo, hit.t, random, pair)) break;
+        if (FX_ROULETTE && bounce + 1u >= push.roulette_depth && !survives_roulette(path, random, pair)) break;
+    }
+    return sum;
+}
+
+// 64-bit counters out of pairs of words: 64-bit atomics are not a required feature.
+void count(uint slot, uint n) {
+    uint before = atomicAdd(counters[2u * slot], n);
+    if (before + n < before) atomicAdd(counters[2u * slot + 1u], 1u);
+}
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i >= push.pixels * push.samples) return; // safe: no barrier() follows
+    uint pixel = push.first_pixel + i % push.pixels;
+    uint index = push.first_sample + i / push.pixels;
+    Sampler random = sampler_start(pixel, index, push.seed);
+    Ray ray = camera_ray(push.camera, film_sample(pixel, random), FX_LENS ? sample_2d(random, PAIR_LENS) : vec2(0.0));
+    float pixel_angle = 2.0 * length(push.camera.up) / float(push.size.y);
+    Path path = Path(ray.origin, ray.direction, vec3(1.0), 0.0, 0.0, pixel_angle, true);
+    uint path_seed = hash_word(hash_word(pixel ^ push.seed) + index);
+    vec3 albedo;
+    Light2 light = trace_path(path, random, path_seed, albedo);
+    if (FX_SPLIT) {
+        samples[3u * i] = light.direct;
+        samples[3u * i + 1u] = light.indirect;
+        samples[3u * i + 2u] = albedo;
+    } else {
+        samples[i] = light.direct + light.indirect;
+    }
+    if (FX_COUNTERS) {
+        count(0u, closest_rays);
+        count(1u, any_rays);
+        count(2u, nodes_visited);
+    }
+}

@@ -1,0 +1,144 @@
+// Lights: choice by an alias table in proportion to power, sampling, and the densities that weigh both strategies.
+
+struct LightSample {
+    vec3 direction; // unit, from the surface to the light
+    float distance; // to the offset point on the light, world units; huge for lights at infinity
+    vec3 radiance;  // already divided by the probability of the sample
+    float pdf;      // per solid angle, for MIS; 0 for lights that no BSDF sample can hit
+};
+
+const float INFINITE_DISTANCE = 3e38;
+
+uvec4 light_texel(uint light, uint i) { return texelFetch(lights, int(4u * light + i)); }
+
+uint alias_choose(usamplerBuffer table, uint n, uint random) {
+    uint slot, low;
+    umulExtended(random, n, slot, low);
+    uint threshold = texelFetch(table, int(2u * slot)).x;
+    return low < threshold ? slot : texelFetch(table, int(2u * slot + 1u)).x;
+}
+
+// Environment direction: u = atan(x, -z) / 2pi, v = acos(y) / pi in the environment's own frame (row 0 is +y).
+vec2 environment_uv(vec3 d) {
+    return vec2(atan(d.x, -d.z) * (0.5 / PI), acos(clamp(d.y, -1.0, 1.0)) / PI);
+}
+
+mat3 environment_rotation(uint light) { // environment_from_world
+    return transpose(mat3(uintBitsToFloat(light_texel(light, 0u).xyz), uintBitsToFloat(light_texel(light, 1u).xyz),
+                          uintBitsToFloat(light_texel(light, 2u).xyz)));
+}
+
+uvec2 environment_extent() { return uvec2(push.environment_size & 0xffffu, push.environment_size >> 16); }
+
+vec3 environment_lookup(vec2 uv) {
+    ivec2 size = ivec2(environment_extent());
+    vec2 at = uv * vec2(size) - 0.5;
+    ivec2 p = ivec2(floor(at));
+    vec2 f = at - vec2(p);
+    int x0 = p.x < 0 ? p.x + size.x : p.x >= size.x ? p.x - size.x : p.x;
+    int x1 = x0 + 1 == size.x ? 0 : x0 + 1;
+    int y0 = clamp(p.y, 0, size.y - 1) * size.x, y1 = clamp(p.y + 1, 0, size.y - 1) * size.x;
+    vec3 top = mix(texelFetch(environment, y0 + x0).rgb, texelFetch(environment, y0 + x1).rgb, f.x);
+    vec3 low = mix(texelFetch(environment, y1 + x0).rgb, texelFetch(environment, y1 + x1).rgb, f.x);
+    return mix(top, low, f.y);
+}
+
+// Radiance from `direction` and the density with which light_sample would choose it (solid angle).
+vec3 environment_radiance(vec3 direction, out float pdf) {
+    uvec4 words = light_texel(push.environment, 3u);
+    float chosen = uintBitsToFloat(light_texel(push.environment, 1u).w);
+    vec3 scale = uintBitsToFloat(words.xyz);
+    pdf = chosen * (0.25 / PI);
+    if (!FX_ENVIRONMENT_MAP) return scale;
+    uvec2 size = environment_extent();
+    if (push.environment_size == 0u) return scale;
+    vec3 d = environment_rotation(push.environment) * direction;
+    vec2 uv = environment_uv(d);
+    uv.x -= floor(uv.x);
+    ivec2 texel = min(ivec2(uv * vec2(size)), ivec2(size) - 1);
+    float sine = sqrt(max(1.0 - d.y * d.y, 1e-12));
+    float p = texelFetch(environment, texel.y * int(size.x) + texel.x).w;
+    pdf = chosen * p * float(size.x) * float(size.y) / (2.0 * PI * PI * sine);
+    return scale * environment_lookup(uv);
+}
+
+void sample_environment(uint light, float chosen, uint word, vec2 u, inout LightSample s) {
+    s.distance = INFINITE_DISTANCE;
+    if (!FX_ENVIRONMENT_MAP || push.environment_size == 0u) {
+        s.direction = warp_sphere(u);
+    } else {
+        uvec2 size = environment_extent();
+        // The word chose the light; its hash chooses the texel, so that the two choices are independent.
+        uint texel = alias_choose(environment_table, size.x * size.y, hash_word(word));
+        vec2 uv = (vec2(texel % size.x, texel / size.x) + u) / vec2(size);
+        float phi = 2.0 * PI * uv.x, theta = PI * uv.y;
+        vec3 d = vec3(sin(phi) * sin(theta), cos(theta), -cos(phi) * sin(theta));
+        s.direction = transpose(environment_rotation(light)) * d;
+    }
+    s.radiance = environment_radiance(s.direction, s.pdf);
+    s.radiance = s.pdf > 0.0 ? s.radiance / s.pdf : vec3(0.0);
+}
+
+void sample_triangle_light(vec3 p, vec3 a, vec3 b, vec3 c, float chosen, vec2 u, uvec4 words, uint light, inout LightSample s) {
+    vec2 bary = warp_triangle(u);
+    vec3 e1 = b - a, e2 = c - a;
+    vec3 scaled = cross(e1, e2);
+    float doubled_area = length(scaled);
+    vec3 n = scaled / doubled_area;
+    vec3 on_light = a + bary.x * e1 + bary.y * e2;
+    vec3 to_light = offset_origin(on_light, n) - p; // the front side is the only one that emits
+    float d2 = dot(to_light, to_light);
+    s.distance = sqrt(d2);
+    s.direction = to_light / s.distance;
+    float cosine = -dot(n, s.direction);
+    vec3 radiance = uintBitsToFloat(words.xyz);
+    if (FX_TEXTURES) {
+        uint triangle = light_texel(light, 2u).w;
+        if (triangle != NONE) {
+            uint image = material_texel(words.w, 7u).x;
+            radiance = uintBitsToFloat(material_texel(words.w, 1u).xyz) *
+                       texture_sample(image, texture_coordinates(triangle, bary), 0.0).rgb;
+        }
+    }
+    bool lit = cosine > 0.0 && d2 > 0.0;
+    s.pdf = lit ? chosen * 2.0 * d2 / (cosine * doubled_area) : 0.0;
+    s.radiance = lit ? radiance / s.pdf : vec3(0.0);
+}
+
+// One light for the surface point `p`. Radiance is 0 when the light cannot reach the point.
+LightSample light_sample(vec3 p, uint word, vec2 u) {
+    LightSample s = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0);
+    uint light = push.light_count == 1u ? 0u : alias_choose(light_table, push.light_count, word);
+    uvec4 w0 = light_texel(light, 0u), w1 = light_texel(light, 1u), w2 = light_texel(light, 2u), w3 = light_texel(light, 3u);
+    vec3 a = uintBitsToFloat(w0.xyz), b = uintBitsToFloat(w1.xyz), c = uintBitsToFloat(w2.xyz);
+    vec3 value = uintBitsToFloat(w3.xyz);
+    float chosen = uintBitsToFloat(w1.w);
+    uint kind = w0.w;
+    if (FX_EMISSIVE && kind == LIGHT_TRIANGLE) {
+        sample_triangle_light(p, a, b, c, chosen, u, w3, light, s);
+    } else if ((FX_POINT && kind == LIGHT_POINT) || (FX_SPOT && kind == LIGHT_SPOT)) {
+        vec3 to_light = a - p;
+        float d2 = max(dot(to_light, to_light), 1e-30);
+        s.distance = sqrt(d2);
+        s.direction = to_light / s.distance;
+        s.radiance = value / (d2 * chosen);
+        if (FX_SPOT && kind == LIGHT_SPOT) { // smooth fall-off between the two angles, linear in the angle
+            float angle = acos(clamp(-dot(b, s.direction), -1.0, 1.0));
+            float full = acos(c.x), cut = acos(c.y);
+            s.radiance *= clamp((cut - angle) / max(cut - full, 1e-6), 0.0, 1.0);
+        }
+    } else if (FX_DIRECTIONAL && kind == LIGHT_DIRECTIONAL) {
+        s.direction = -b;
+        s.distance = INFINITE_DISTANCE;
+        s.radiance = value / chosen;
+    } else if (FX_ENVIRONMENT && kind == LIGHT_ENVIRONMENT) {
+        sample_environment(light, chosen, word, u, s);
+    }
+    return s;
+}
+
+// Density per solid angle with which light_sample chooses a point of an emissive triangle hit by a ray.
+float triangle_light_pdf(uint material, float t, float cosine) {
+    float weight = uintBitsToFloat(material_texel(material, 7u).z);
+    return push.triangle_pdf_scale * weight * t * t / max(cosine, 1e-20);
+}
