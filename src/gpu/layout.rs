@@ -307,6 +307,14 @@ gpu_structs! {
         indirect: vec3,
     }
 
+    /// Push block of the kernels under glsl/test.
+    struct TestPush {
+        /// Threads with work to do.
+        count: uint,
+        /// Seed of the sampler.
+        seed: uint,
+    }
+
     /// What one path returns.
     struct PathSample {
         /// See [`PixelLight::direct`].
