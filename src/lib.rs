@@ -2,5 +2,6 @@
 pub mod cli;
 pub mod error;
 pub mod gpu;
+pub mod reference;
 pub mod scene;
 pub mod settings;

@@ -354,6 +354,14 @@ gpu_structs! {
         /// 1 when these are the first samples of the pixels: earlier statistics are forgotten.
         restart: uint,
     }
+
+    /// Push block of the kernels under glsl/test.
+    struct TestPush {
+        /// Threads with work to do.
+        count: uint,
+        /// Seed of the sampler.
+        seed: uint,
+    }
 }
 
 macro_rules! effects {
@@ -368,6 +376,14 @@ macro_rules! effects {
             /// (name, specialisation constant id, on) of every effect, in order of id.
             pub fn entries(&self) -> Vec<(&'static str, u32, bool)> {
                 vec![$((stringify!($field), $id, self.$field),)+]
+            }
+            /// The same with the effect of this id switched.
+            pub fn toggled(mut self, id: u32) -> Self {
+                match id {
+                    $($id => self.$field = !self.$field,)+
+                    _ => {}
+                }
+                self
             }
         }
         /// The constants as GLSL text.
