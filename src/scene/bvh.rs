@@ -90,11 +90,10 @@ fn build<T: Boundable>(items: &[T], first: u32, nodes: &mut Vec<BvhNode>) -> (u3
         nodes.push(BvhNode::default()); // eight empty children: every ray misses
         return (root, Vec::new());
     }
-    let bvh = std::thread::scope(|scope| {
-        let worker = std::thread::Builder::new().stack_size(STACK);
-        let handle = worker.spawn_scoped(scope, || compressed(items)).expect("a thread can be started");
-        handle.join().expect("the builder does not panic")
-    });
+    // A pool of its own, not a thread to join: a worker of the common pool that blocks here would keep the builder's own
+    // parallel work waiting for ever once all workers do.
+    let workers = rayon::ThreadPoolBuilder::new().stack_size(STACK).build().expect("threads can be started");
+    let bvh = workers.install(|| compressed(items));
     nodes.reserve_exact(bvh.nodes.len());
     nodes.extend(bvh.nodes.iter().map(|node| {
         // The two structs agree byte for byte; only the indices become global.
