@@ -11,6 +11,9 @@ struct Hit {
 
 const uint STACK_SIZE = 32; // obvhs never builds deeper; two levels share it
 
+// Distances to planes round at 2^-24 in four steps each, near and far; boxes that share a face must not part (Ize 2013).
+const float SLAB_ROUNDING = 1.0 + 8.0 / 16777216.0;
+
 // Watertight: all triangles project a shared vertex to the same point of the plane across the ray, and the two
 // edge functions of a shared edge are exact negatives of each other (precise forbids fused multiply-adds).
 // The idea is that of Woop, Benthin, Wald, JCGT 2013; a rotation replaces their permutation and shear.
@@ -74,7 +77,7 @@ uint intersect_children(uint meta, uint octant, uvec3 near_q, uvec3 far_q, vec3 
         vec3 t_far = vec3((far_q >> i) & 0xffu) * scale + origin;
         float enter = max(max(t_near.x, t_near.y), max(t_near.z, 0.0));
         float leave = min(min(t_far.x, t_far.y), min(t_far.z, t_max));
-        mask |= enter <= leave ? ((child_bits >> i) & 0xffu) << ((bit_index >> i) & 0xffu) : 0u;
+        mask |= enter <= leave * SLAB_ROUNDING ? ((child_bits >> i) & 0xffu) << ((bit_index >> i) & 0xffu) : 0u;
     }
     return mask;
 }

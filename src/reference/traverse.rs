@@ -26,6 +26,7 @@ impl Hit {
 }
 
 const STACK_SIZE: usize = 32;
+const SLAB_ROUNDING: f32 = 1.0 + 8.0 / (1 << 24) as f32;
 
 /// A ray as the triangle and box tests want it.
 #[derive(Clone, Copy, Debug)]
@@ -90,7 +91,7 @@ fn intersect_children(
         let (t_near, t_far) = (planes(near), planes(far));
         let enter = t_near.x.max(t_near.y).max(t_near.z.max(0.0));
         let leave = t_far.x.min(t_far.y).min(t_far.z.min(t_max));
-        if enter <= leave {
+        if enter <= leave * SLAB_ROUNDING {
             mask |= ((child_bits >> i) & 0xff) << ((bit_index >> i) & 0xff);
         }
     }

@@ -1,0 +1,123 @@
+//! Scenes made in a test, and the mean of their picture by the CPU twin.
+use glam::Vec3;
+use rayon::prelude::*;
+use std::fmt::Write;
+use tallow::gpu::layout::{Effects, LIGHT_ENVIRONMENT, NONE, PathPush};
+use tallow::reference::path::{Strategy, Tracer};
+use tallow::scene::Scene;
+use tallow::settings::Sampler;
+
+/// Uniform numbers (an LCG of Knuth's, high bits).
+pub struct Random(pub u64);
+
+impl Random {
+    /// Number `i` of many sequences.
+    pub fn stream(i: usize) -> Self {
+        let mut random = Self((i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) + 1);
+        random.unit();
+        random
+    }
+
+    /// In [0, 1).
+    pub fn unit(&mut self) -> f32 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 40) as f32 / (1u64 << 24) as f32
+    }
+
+    /// In [-1, 1)^3.
+    pub fn point(&mut self) -> Vec3 {
+        Vec3::from([0; 3].map(|_| 2.0 * self.unit() - 1.0))
+    }
+}
+
+/// A folder for the files of one scene.
+pub struct Workplace(tempfile::TempDir);
+
+impl Workplace {
+    pub fn new() -> Self {
+        Self(tempfile::tempdir().expect("a temporary folder"))
+    }
+
+    pub fn obj(self, name: &str, triangles: &[[Vec3; 3]]) -> Self {
+        let mut text = String::new();
+        for v in triangles.iter().flatten() {
+            writeln!(text, "v {} {} {}", v.x, v.y, v.z).unwrap();
+        }
+        (0..triangles.len()).for_each(|i| writeln!(text, "f {} {} {}", 3 * i + 1, 3 * i + 2, 3 * i + 3).unwrap());
+        std::fs::write(self.0.path().join(name), text).unwrap();
+        self
+    }
+
+    /// A grey environment image.
+    pub fn sky(self, name: &str, width: u32, height: u32, light: impl Fn(u32, u32) -> f32) -> Self {
+        let image = image::Rgb32FImage::from_fn(width, height, |x, y| image::Rgb([light(x, y); 3]));
+        image.save(self.0.path().join(name)).unwrap();
+        self
+    }
+
+    pub fn scene(&self, text: &str) -> Scene {
+        let path = self.0.path().join("scene.toml");
+        Scene::parse(&path, text, &|_| {}).unwrap_or_else(|e| panic!("{e}"))
+    }
+}
+
+/// What the renderer hands to the kernels.
+pub fn path_push(scene: &Scene) -> PathPush {
+    let environment = scene.lights.iter().position(|l| l.kind == LIGHT_ENVIRONMENT);
+    let s = &scene.settings;
+    PathPush {
+        camera: scene.camera,
+        size: [s.width, s.height],
+        seed: s.seed,
+        max_depth: s.max_depth,
+        roulette_depth: s.roulette_depth,
+        clamp_indirect: s.clamp_indirect,
+        pixel_filter: s.filter as u32,
+        light_count: scene.lights.len() as u32,
+        triangle_pdf_scale: scene.triangle_pdf_scale,
+        environment: environment.map_or(NONE, |i| i as u32),
+        environment_size: scene.environment.as_ref().map_or(0, |e| e.width | e.height << 16),
+        root: scene.root,
+        ..PathPush::default()
+    }
+}
+
+/// Mean of the picture's channels and the standard error of that mean.
+#[derive(Clone, Copy, Debug)]
+pub struct Estimate {
+    pub mean: f64,
+    pub error: f64,
+}
+
+impl Estimate {
+    /// Within three standard errors, or the rounding of a picture without noise.
+    pub fn is(&self, exact: f64) -> bool {
+        (self.mean - exact).abs() < (3.0 * self.error).max(1e-5 * exact)
+    }
+
+    /// Within three standard errors of the difference.
+    pub fn agrees(&self, other: &Self) -> bool {
+        (self.mean - other.mean).abs() < 3.0 * self.error.hypot(other.error)
+    }
+}
+
+/// The picture's mean over `samples` independent samples per pixel (Sobol points would hide the error).
+pub fn mean(scene: &Scene, strategy: Strategy, samples: u32) -> Estimate {
+    let mut scene = scene.clone();
+    scene.settings.sampler = Sampler::Independent;
+    let tracer = Tracer { scene: &scene, push: path_push(&scene), effects: Effects::ALL, strategy };
+    let pixels = scene.settings.pixels() as u32;
+    // Per pixel, the mean over samples and its variance: pixels differ, which is no error of the picture's mean.
+    let of_pixel = |pixel| {
+        let values: Vec<f64> =
+            (0..samples).map(|index| f64::from(tracer.sample(pixel, index).radiance().element_sum()) / 3.0).collect();
+        assert!(values.iter().all(|v| v.is_finite()), "pixel {pixel}: {values:?}");
+        let mean = values.iter().sum::<f64>() / f64::from(samples);
+        let square = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+        (mean, square / f64::from(samples - 1) / f64::from(samples))
+    };
+    let sums: Vec<_> = (0..pixels).into_par_iter().map(of_pixel).collect();
+    let (mean, variance) = sums.iter().fold((0.0, 0.0), |(m, v), s| (m + s.0, v + s.1));
+    let n = f64::from(pixels);
+    Estimate { mean: mean / n, error: variance.sqrt() / n }
+}
