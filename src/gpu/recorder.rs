@@ -18,6 +18,7 @@ pub struct Recorder<'a> {
 impl<'a> Recorder<'a> {
     /// Records into the frame's own command buffer.
     pub(super) fn own(gpu: &'a Gpu, frame: &'a mut FrameResources) -> Result<Self> {
+        gpu.owns("the frame", frame.gpu())?;
         let commands = frame.begin()?;
         Ok(Self::start(gpu, frame, commands))
     }
@@ -39,6 +40,7 @@ impl<'a> Recorder<'a> {
         if command_buffer == 0 {
             return Err(Error::Device("a null command buffer was handed over".into()));
         }
+        gpu.owns("the frame", frame.gpu())?;
         frame.reset()?;
         Ok(Self::start(gpu, frame, vk::CommandBuffer::from_raw(command_buffer)))
     }
@@ -62,6 +64,7 @@ impl<'a> Recorder<'a> {
         groups: [u32; 3],
     ) -> Result<()> {
         check_groups(B::NAME, groups, self.gpu.0.limits.max_compute_work_group_count)?;
+        self.gpu.owns(B::NAME, &kernel.parts.gpu)?;
         let buffers = bind.buffers();
         let set = self.frame.descriptors.set(&kernel.parts, B::SLOTS, &buffers)?;
         let accesses: Vec<_> = buffers.into_iter().zip(B::SLOTS.iter().map(|slot| slot.access)).collect();
@@ -119,6 +122,7 @@ impl<'a> Recorder<'a> {
         accesses: &[(&Arc<Untyped>, Access)],
         record: impl FnOnce(&ash::Device, vk::CommandBuffer),
     ) -> Result<()> {
+        accesses.iter().try_for_each(|(buffer, _)| self.gpu.owns(&buffer.name, &buffer.gpu))?;
         let times = self.frame.timer.open(name)?;
         let (inner, commands) = (&self.gpu.0, self.commands);
         // Both stamps wait for all earlier work, so that a pass is not charged with another's tail.
