@@ -66,6 +66,7 @@ impl<'a> Recorder<'a> {
         check_groups(B::NAME, groups, self.gpu.0.limits.max_compute_work_group_count)?;
         self.gpu.owns(B::NAME, &kernel.parts.gpu)?;
         let buffers = bind.buffers();
+        self.owns(&buffers)?;
         let set = self.frame.descriptors.set(&kernel.parts, B::SLOTS, &buffers)?;
         let accesses: Vec<_> = buffers.into_iter().zip(B::SLOTS.iter().map(|slot| slot.access)).collect();
         self.frame.keep(kernel);
@@ -90,6 +91,7 @@ impl<'a> Recorder<'a> {
             let (from, to, m, n) = (&from.name, &to.name, src.len(), dst.len());
             return Err(Error::Device(format!("\"{from}\" of {m} elements cannot be copied to \"{to}\" of {n}")));
         }
+        self.owns(&[from, to])?;
         let region = [vk::BufferCopy { src_offset: 0, dst_offset: 0, size: from.size }];
         let accesses = [(from, Access::CopySource), (to, Access::CopyTarget)];
         // SAFETY: two live buffers of one size, kept by the frame.
@@ -104,6 +106,7 @@ impl<'a> Recorder<'a> {
     /// [`Error::Device`] when memory is out.
     pub fn fill<T: Pod>(&mut self, buffer: &Buffer<T>, value: u32) -> Result<()> {
         let target = buffer.untyped();
+        self.owns(&[target])?;
         // SAFETY: a live buffer whose size is a multiple of four, kept by the frame.
         self.pass("fill", &[(target, Access::CopyTarget)], |device, commands| unsafe {
             device.cmd_fill_buffer(commands, target.raw, 0, vk::WHOLE_SIZE, value);
@@ -116,13 +119,16 @@ impl<'a> Recorder<'a> {
         self.barriers = false;
     }
 
+    fn owns(&self, buffers: &[&Arc<Untyped>]) -> Result<()> {
+        buffers.iter().try_for_each(|buffer| self.gpu.owns(&buffer.name, &buffer.gpu))
+    }
+
     fn pass(
         &mut self,
         name: &'static str,
         accesses: &[(&Arc<Untyped>, Access)],
         record: impl FnOnce(&ash::Device, vk::CommandBuffer),
     ) -> Result<()> {
-        accesses.iter().try_for_each(|(buffer, _)| self.gpu.owns(&buffer.name, &buffer.gpu))?;
         let times = self.frame.timer.open(name)?;
         let (inner, commands) = (&self.gpu.0, self.commands);
         // Both stamps wait for all earlier work, so that a pass is not charged with another's tail.
