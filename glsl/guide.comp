@@ -30,7 +30,7 @@ void main() {
     Camera camera = push.camera;
     camera.lens_radius = 0.0;
     Ray ray = camera_ray(camera, film_from_pixel(centre, push.size), vec2(0.5));
-    Hit hit = traverse(ray.origin, ray.direction, 3e38, false, push.root, hash_word(pixel));
+    Hit hit = traverse(ray.origin, ray.direction, 3e38, false, push.root, pcg(pixel));
     Guide guide = Guide(vec3(0.0), 0.0, vec3(0.0), NONE, vec3(0.0), NONE);
     if (hit.triangle != NONE) {
         float pixel_angle = 2.0 * length(camera.up) / float(push.size.y);

@@ -138,7 +138,7 @@ Light2 trace_path(Path path, Sampler random, uint path_seed, out vec3 albedo) {
     for (uint bounce = 0u;; bounce++) {
         uint pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
         if (FX_COUNTERS) closest_rays++;
-        uint mask_seed = hash_word(path_seed + 2u * bounce);
+        uint mask_seed = pcg(path_seed + 2u * bounce);
         Hit hit = traverse(path.origin, path.direction, INFINITE_DISTANCE, false, push.root, mask_seed);
         bool indirect = bounce >= 2u && !smooth_first;
         if (hit.triangle == NONE) {
@@ -153,7 +153,7 @@ Light2 trace_path(Path path, Sampler random, uint path_seed, out vec3 albedo) {
         if (dot(normal, path.direction) > 0.0) {
             if ((s.flags & MATERIAL_TWO_SIDED) != 0u) normal = -normal;
         }
-        mat3 basis = orthonormal_basis(normal);
+        mat3 basis = basis_from_normal(normal);
         vec3 wo = -path.direction * basis;
         Bsdf bsdf = surface_bsdf(s);
         bool smooth_here = bsdf_is_delta(bsdf);
@@ -186,7 +186,7 @@ void main() {
     Ray ray = camera_ray(push.camera, film_sample(pixel, random), FX_LENS ? sample_2d(random, PAIR_LENS) : vec2(0.0));
     float pixel_angle = 2.0 * length(push.camera.up) / float(push.size.y);
     Path path = Path(ray.origin, ray.direction, vec3(1.0), 0.0, 0.0, pixel_angle, true);
-    uint path_seed = hash_word(hash_word(pixel ^ push.seed) + index);
+    uint path_seed = pcg(pcg(pixel ^ push.seed) + index);
     vec3 albedo;
     Light2 light = trace_path(path, random, path_seed, albedo);
     if (FX_SPLIT) {

@@ -69,7 +69,7 @@ void sample_environment(uint light, float chosen, uint word, vec2 u, inout Light
     } else {
         uvec2 size = environment_extent();
         // The word chose the light; its hash chooses the texel, so that the two choices are independent.
-        uint texel = alias_choose(environment_table, size.x * size.y, hash_word(word));
+        uint texel = alias_choose(environment_table, size.x * size.y, pcg(word));
         vec2 uv = (vec2(texel % size.x, texel / size.x) + u) / vec2(size);
         float phi = 2.0 * PI * uv.x, theta = PI * uv.y;
         vec3 d = vec3(sin(phi) * sin(theta), cos(theta), -cos(phi) * sin(theta));
