@@ -354,6 +354,14 @@ gpu_structs! {
         /// 1 when these are the first samples of the pixels: earlier statistics are forgotten.
         restart: uint,
     }
+
+    /// Push block of the kernels under glsl/test.
+    struct TestPush {
+        /// Threads with work to do.
+        count: uint,
+        /// Seed of the sampler.
+        seed: uint,
+    }
 }
 
 macro_rules! effects {

@@ -1,0 +1,31 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "effects.glsl"
+#include "shared/bsdf.glsl"
+
+// Case i: its Material, and inputs[3 i ..] = wo, wi, (u_lobe, u). results[5 i ..] = bsdf_evaluate; sampled wi and
+// success; weight and pdf; albedo and "is delta"; evaluate of the sampled wi.
+layout(local_size_x = 64) in;
+layout(scalar, binding = 0) readonly buffer Materials { Material materials[]; };
+layout(scalar, binding = 1) readonly buffer Inputs { vec3 inputs[]; };
+layout(scalar, binding = 2) writeonly buffer Results { vec4 results[]; };
+layout(scalar, push_constant) uniform Push { TestPush push; };
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i >= push.count) return;
+    Material m = materials[i];
+    Bsdf b = Bsdf(m.kind, m.base_color, m.alpha, m.eta, m.k, m.specular, m.transmission, m.internal_fresnel,
+                  (m.flags & MATERIAL_GGX) != 0u);
+    vec3 wo = inputs[3 * i];
+    vec3 u = inputs[3 * i + 2];
+    BsdfSample s;
+    bool sampled = bsdf_sample(b, wo, u.x, u.yz, s);
+    results[5 * i] = bsdf_evaluate(b, wo, inputs[3 * i + 1]);
+    results[5 * i + 1] = vec4(s.wi, sampled ? 1.0 : 0.0);
+    results[5 * i + 2] = vec4(s.weight, s.pdf);
+    results[5 * i + 3] = vec4(bsdf_albedo(b), bsdf_is_delta(b) ? 1.0 : 0.0);
+    results[5 * i + 4] = bsdf_evaluate(b, wo, s.wi);
+}

@@ -1,0 +1,22 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "effects.glsl"
+#include "shared/sampler.glsl"
+
+// Raw words and floats of sample_2d for query i = (pixel, index, pair).
+layout(local_size_x = 64) in;
+layout(scalar, binding = 0) readonly buffer Queries { uvec3 queries[]; };
+layout(scalar, binding = 1) writeonly buffer Words { uvec2 words[]; };
+layout(scalar, binding = 2) writeonly buffer Floats { vec2 floats[]; };
+layout(scalar, push_constant) uniform Push { TestPush push; };
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i >= push.count) return;
+    uvec3 q = queries[i];
+    Sampler s = sampler_start(q.x, q.y, push.seed);
+    words[i] = sample_2d_bits(s, q.z);
+    floats[i] = sample_2d(s, q.z);
+}
