@@ -5,7 +5,7 @@ use crate::frame::{self, Batch, DeviceScene, FilmBuffers, Stages};
 use crate::gpu::layout::{Camera, Effects, PathPush, LIGHT_ENVIRONMENT, NONE};
 use crate::gpu::{FrameResources, Gpu, PassTime, RawBuffer, Recorder};
 use crate::scene::{Scene, effects};
-use crate::settings::{PixelFilter, Settings};
+use crate::settings::{PixelFilter, Sampler, Settings};
 use crate::stage::{fold, guide, path};
 
 /// What a render leaves in buffers besides radiance and its variance.
@@ -17,8 +17,6 @@ pub struct Outputs {
     pub guides: bool,
     /// Rays and nodes counted.
     pub counters: bool,
-    /// Every effect compiled in, called for or not.
-    pub all_effects: bool,
 }
 
 /// A result buffer for the caller: pixel `i` (row-major, row 0 at the top) starts at `offset + i * stride`.
@@ -59,16 +57,24 @@ pub struct Counters {
 }
 
 impl Renderer {
-    /// Uploads the scene and compiles its kernels. `settings` may differ from the scene file's own, except that the
-    /// camera was made for the aspect ratio of `scene.settings`.
+    /// Uploads the scene and compiles its kernels for what it calls for.
     ///
     /// # Errors
-    /// [`crate::error::Error::Usage`] for settings out of range, [`crate::error::Error::Device`] when the device refuses something.
+    /// [`crate::error::Error::Usage`] for settings out of range, [`crate::error::Error::Device`] when the device
+    /// refuses something.
     pub fn new(gpu: &Gpu, scene: &Scene, outputs: Outputs) -> Result<Self> {
+        Self::specialised(gpu, scene, outputs, called_for(scene, outputs))
+    }
+
+    /// [`Renderer::new`] with other effects compiled in: more of them change nothing but the speed, fewer leave things
+    /// out of the picture. The effects that the outputs stand for are taken from `outputs`.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn specialised(gpu: &Gpu, scene: &Scene, outputs: Outputs, effects: Effects) -> Result<Self> {
         let settings = scene.settings.clone();
         settings.validate()?;
-        let called_for = effects::effects(scene, outputs.split_light, outputs.counters).0;
-        let effects = if outputs.all_effects { all_but_outputs(&called_for) } else { called_for };
+        let effects = Effects { split_light: outputs.split_light, counters: outputs.counters, ..effects };
         let workgroup = gpu.info().workgroup_size();
         let stages = Stages {
             guide: guide::Guides::new(gpu, &effects, workgroup)?,
@@ -184,14 +190,14 @@ fn view(buffer: RawBuffer, offset: u64, stride: usize, channels: u32) -> OutputV
     OutputView { buffer, offset, stride: stride as u32, channels }
 }
 
-/// All effects of light and matter; which buffers exist stays a matter of the outputs, and the sampler of choice.
-fn all_but_outputs(called_for: &Effects) -> Effects {
-    Effects {
-        split_light: called_for.split_light,
-        counters: called_for.counters,
-        independent_sampler: called_for.independent_sampler,
-        ..Effects::ALL
-    }
+/// The effects that a scene, its settings and the outputs call for.
+pub fn called_for(scene: &Scene, outputs: Outputs) -> Effects {
+    effects::effects(scene, outputs.split_light, outputs.counters).0
+}
+
+/// Every effect of light and matter; the random numbers stay those that the settings chose.
+pub fn all_effects(scene: &Scene) -> Effects {
+    Effects { independent_sampler: scene.settings.sampler == Sampler::Independent, ..Effects::ALL }
 }
 
 /// Paths per dispatch: enough to fill the device, few enough that a batch ends within a fraction of a second, and
