@@ -1,27 +1,26 @@
 //! OpenEXR, scan lines, lossless: ours out, anybody's in.
 use super::film::{Channel, Film, Samples};
-use exr::image::{AnyChannel, AnyChannels, Encoding, FlatImage, FlatSamples, Image, Layer};
+use exr::image::{AnyChannel, AnyChannels, Blocks, Encoding, FlatImage, FlatSamples, Image, Layer};
+use exr::math::Vec2;
+use exr::meta::MetaData;
 use exr::meta::attribute::{AttributeValue, IntegerBounds, Text};
 use exr::meta::header::{ImageAttributes, LayerAttributes};
-use exr::meta::MetaData;
-use exr::prelude::{Compression, ReadChannels, ReadLayers, WritableImage};
+use exr::prelude::{Compression, LineOrder, ReadChannels, ReadLayers, WritableImage};
 use std::io::Cursor;
 
-/// 4 GiB of 32-bit samples.
-const MAX_SAMPLES: u64 = 1 << 30;
-/// Deflate packs at most 1032 to 1 and PXR24 drops one byte in four; a header that asks for more than this times
-/// the length of its file is damaged, and must not make us allocate what it asks for.
-const MAX_RATIO: u64 = 4096;
+/// Before the names of our attributes, as many names (`version`, `comments`...) are taken by the standard.
+const PREFIX: &str = "tallow:";
 
 pub(super) fn encode(film: &Film) -> Result<Vec<u8>, String> {
     let channel = |c: &Channel| AnyChannel::new(text(&c.name), flat_samples(&c.samples));
     let channels = AnyChannels::sort(film.channels.iter().map(channel).collect());
     let size = (film.width as usize, film.height as usize);
-    let encoding = Encoding { compression: Compression::ZIP16, ..Encoding::default() };
-    let encoding = Encoding { blocks: exr::image::Blocks::ScanLines, ..encoding };
+    let (compression, blocks, line_order) = (Compression::ZIP16, Blocks::ScanLines, LineOrder::Increasing);
+    let encoding = Encoding { compression, blocks, line_order };
     let layer = Layer::new(size, LayerAttributes::default(), encoding, channels);
     let mut attributes = ImageAttributes::with_size(size);
-    attributes.other = film.metadata.iter().map(|(k, v)| (text(k), AttributeValue::Text(text(v)))).collect();
+    let attribute = |(key, value): (&String, &String)| (text(&format!("{PREFIX}{key}")), text(value));
+    attributes.other = film.metadata.iter().map(attribute).map(|(k, v)| (k, AttributeValue::Text(v))).collect();
     let mut out = Cursor::new(Vec::new());
     Image::empty(attributes)
         .with_layer(layer)
@@ -50,7 +49,7 @@ fn flat_samples(samples: &Samples) -> FlatSamples {
 pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
     let damaged = |e: exr::error::Error| format!("cannot be decoded: {e}; is it complete?");
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
-    check_size(&meta, bytes.len() as u64)?;
+    check_size(&meta, bytes.len())?;
     let image: FlatImage = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -62,19 +61,15 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
     film_from(image)
 }
 
-fn check_size(meta: &MetaData, file_len: u64) -> Result<(), String> {
-    let area = |w: usize, h: usize| (w as u64).saturating_mul(h as u64);
-    let samples = |size: exr::math::Vec2<usize>, channels: usize| area(size.0, size.1).saturating_mul(channels as u64);
-    let (mut stored, mut shown) = (0_u64, 0_u64);
+fn check_size(meta: &MetaData, file_len: usize) -> Result<(), String> {
+    let mut claimed = 0_u64;
     for header in &meta.headers {
-        let channels = header.channels.list.len();
-        stored = stored.saturating_add(samples(header.layer_size, channels));
-        shown = shown.saturating_add(samples(header.shared_attributes.display_window.size, channels));
+        let window = header.shared_attributes.display_window.size;
+        let samples = |size: Vec2<usize>| (size.0 as u64).saturating_mul(size.1 as u64);
+        let plane = samples(header.layer_size).max(samples(window));
+        claimed = claimed.saturating_add(plane.saturating_mul(header.channels.list.len() as u64));
     }
-    if stored.max(shown) > MAX_SAMPLES || stored > file_len.saturating_mul(MAX_RATIO) {
-        return Err(format!("claims {} samples, which a file of {file_len} bytes cannot hold", stored.max(shown)));
-    }
-    Ok(())
+    super::check_claim(claimed, file_len)
 }
 
 /// All parts in one film, channels of a second part and on under the name of their part.
@@ -89,7 +84,7 @@ fn film_from(image: FlatImage) -> Result<Film, String> {
         let part_name = part.attributes.layer_name.as_ref().filter(|_| many).map(string);
         for channel in part.channel_data.list {
             let name = channel_name(part_name.as_deref(), &string(&channel.name));
-            if channel.sampling != exr::math::Vec2(1, 1) {
+            if channel.sampling != Vec2(1, 1) {
                 return Err(format!("channel {name} is subsampled, which is not supported: save it at full size"));
             }
             let data = IntegerBounds::new(part.attributes.layer_position, part.size);
@@ -105,7 +100,7 @@ fn texts<'a>(
     attributes: impl IntoIterator<Item = (&'a Text, &'a AttributeValue)>,
 ) -> impl Iterator<Item = (String, String)> {
     attributes.into_iter().filter_map(|(name, value)| match value {
-        AttributeValue::Text(value) => Some((string(name), string(value))),
+        AttributeValue::Text(value) => Some((string(name).trim_start_matches(PREFIX).to_owned(), string(value))),
         _ => None,
     })
 }

@@ -28,7 +28,8 @@ pub struct Film {
     pub height: u32,
     /// In the order they were added.
     pub channels: Vec<Channel>,
-    /// Named texts: scene, settings, seed, device... Stored in EXR files as attributes.
+    /// Named texts: scene, settings, seed, device... In EXR files the attributes `tallow:scene` and so on; of files of
+    /// other programs, their text attributes.
     pub metadata: BTreeMap<String, String>,
 }
 
@@ -119,7 +120,8 @@ impl Film {
 
     fn colour_planes(&self) -> Option<[&Samples; 3]> {
         const USUAL: [&str; 6] = ["", "combined", "beauty", "rgba", "rgb", "color"];
-        let coloured: Vec<_> = self.layers().into_iter().filter(|l| self.triple(l, ["R", "G", "B"]).is_some()).collect();
+        let coloured: Vec<_> =
+            self.layers().into_iter().filter(|l| self.triple(l, ["R", "G", "B"]).is_some()).collect();
         let usual = |l: &&&str| USUAL.contains(&split(l).1.to_lowercase().as_str());
         let only = || coloured.first().filter(|_| coloured.len() == 1);
         match coloured.iter().find(usual).or_else(only) {
@@ -130,23 +132,24 @@ impl Film {
 
     fn layer_planes(&self, wanted: &str) -> Option<[&Samples; 3]> {
         let same = |name: &str| name.eq_ignore_ascii_case(wanted) || split(name).1.eq_ignore_ascii_case(wanted);
-        let mut found: Vec<_> = self.layers().into_iter().filter(|l| !l.is_empty() && same(l)).collect();
-        found.sort_by_key(|l| *l != wanted);
-        let exact = found.first().filter(|l| found.len() == 1 || **l == wanted);
-        match exact {
-            Some(layer) => self.triple(layer, ["R", "G", "B"]).or_else(|| self.triple(layer, ["X", "Y", "Z"])),
-            None => None,
+        let found: Vec<_> = self.layers().into_iter().filter(|l| !l.is_empty() && same(l)).collect();
+        let exact = found.iter().find(|l| **l == wanted);
+        let only = || found.first().filter(|_| found.len() == 1);
+        match exact.or_else(only) {
+            Some(layer) => self
+                .triple(layer, ["R", "G", "B"])
+                .or_else(|| self.triple(layer, ["X", "Y", "Z"]))
+                .or_else(|| self.grey(|c| split(&c.name).0 == *layer && split(&c.name).1 != "A")),
+            None => self.grey(|c| c.name.eq_ignore_ascii_case(wanted)),
         }
-        .or_else(|| self.only_channel(exact.copied().unwrap_or_default(), wanted))
     }
 
-    /// A layer's only channel (alpha aside), or the channel that has the wanted name itself, such as `Z`.
-    fn only_channel(&self, layer: &str, wanted: &str) -> Option<[&Samples; 3]> {
-        let of_layer = |c: &&Channel| split(&c.name).0 == layer && !layer.is_empty() && split(&c.name).1 != "A";
-        let mut channels = self.channels.iter().filter(of_layer);
+    /// The only channel that passes the test, three times.
+    fn grey(&self, test: impl Fn(&&Channel) -> bool) -> Option<[&Samples; 3]> {
+        let mut channels = self.channels.iter().filter(test);
         match (channels.next(), channels.next()) {
             (Some(only), None) => Some([&only.samples; 3]),
-            _ => self.channel(wanted).map(|samples| [samples; 3]),
+            _ => None,
         }
     }
 

@@ -79,6 +79,21 @@ pub fn read(path: &Path) -> Result<Film> {
     decode(&std::fs::read(path).map_err(about)?).map_err(|what| Error::input(path, what))
 }
 
+/// More 32-bit samples than this, 4 GiB of them, are refused.
+const MAX_SAMPLES: u64 = 1 << 30;
+/// Deflate packs at most 1032 to 1, and PXR24 (in EXR) drops one byte in four first. A header that asks for more samples
+/// than this times the length of its file is damaged, and must not make us allocate them.
+const MAX_RATIO: u64 = 4096;
+
+fn check_claim(samples: u64, file_len: usize) -> std::result::Result<(), String> {
+    match samples > MAX_SAMPLES.min(MAX_RATIO.saturating_mul(file_len as u64)) {
+        true => {
+            Err(format!("claims {samples} samples, more than a file of {file_len} bytes can hold; is it complete?"))
+        }
+        false => Ok(()),
+    }
+}
+
 /// [`read`] for a file that is already in memory.
 ///
 /// # Errors

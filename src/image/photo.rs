@@ -1,14 +1,12 @@
 //! PNG, JPEG and Radiance HDR.
+use super::WriteOptions;
 use super::film::{Film, Picture, Samples};
 use super::tone;
-use super::WriteOptions;
 use image::codecs::{hdr::HdrEncoder, png::PngEncoder};
-use image::{ColorType, DynamicImage, ExtendedColorType, ImageEncoder, ImageReader, Limits, Rgb};
+use image::{
+    ColorType, DynamicImage, ExtendedColorType, ImageEncoder, ImageError, ImageFormat, ImageReader, Limits, Rgb,
+};
 use std::io::Cursor;
-
-/// More than any screen or camera; keeps a damaged header from asking for all memory.
-const MAX_EDGE: u32 = 65_536;
-const MAX_BYTES: u64 = 4 << 30;
 
 pub(super) fn encode_png(picture: &Picture, options: &WriteOptions) -> Result<Vec<u8>, String> {
     let code = |v: &f32| (tone::display(*v, options.exposure, options.tone_map) * 255.0).round() as u8;
@@ -32,17 +30,29 @@ pub(super) fn encode_hdr(picture: &Picture) -> Result<Vec<u8>, String> {
 }
 
 pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
-    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
-    if reader.format().is_none() {
+    let reader = || ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string());
+    let damaged = |e: ImageError| format!("cannot be decoded: {e}; is it complete?");
+    let Some(format) = reader()?.format() else {
         return Err("is no EXR, PNG, JPEG or HDR file".to_owned());
+    };
+    if format == ImageFormat::Jpeg && jpeg_is_cut(bytes) {
+        return Err("is a JPEG without its end: get the complete file".to_owned());
     }
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(MAX_EDGE);
-    limits.max_image_height = Some(MAX_EDGE);
-    limits.max_alloc = Some(MAX_BYTES);
-    reader.limits(limits);
-    let image = reader.decode().map_err(|e| format!("cannot be decoded: {e}; is it complete?"))?;
-    Ok(film_from(image))
+    let (width, height) = reader()?.into_dimensions().map_err(damaged)?;
+    // Four: alpha, or what a decoder adds for it.
+    super::check_claim(4 * u64::from(width) * u64::from(height), bytes.len())?;
+    let mut reader = reader()?;
+    reader.limits(Limits::no_limits());
+    reader.decode().map(film_from).map_err(damaged)
+}
+
+/// The decoder fills what is missing with grey. A complete file has an end marker behind its last start of scan; the
+/// thumbnail that a camera embeds before it does not count.
+fn jpeg_is_cut(bytes: &[u8]) -> bool {
+    let last = |marker: [u8; 2]| bytes.windows(2).rposition(|w| w == marker);
+    const START_OF_SCAN: [u8; 2] = [0xff, 0xda];
+    const END_OF_IMAGE: [u8; 2] = [0xff, 0xd9];
+    last(END_OF_IMAGE) < last(START_OF_SCAN)
 }
 
 /// Integers are taken for sRGB code values, floats for radiance. Alpha, always linear, is kept as the channel A.
