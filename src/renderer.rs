@@ -46,7 +46,7 @@ pub struct Renderer {
 }
 
 /// Ray counts since the renderer was made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Counters {
     /// Rays that look for the closest hit.
     pub closest: u64,
@@ -54,6 +54,13 @@ pub struct Counters {
     pub any: u64,
     /// BVH nodes that the rays visited.
     pub nodes: u64,
+}
+
+impl Counters {
+    /// All rays.
+    pub fn rays(&self) -> u64 {
+        self.closest + self.any
+    }
 }
 
 impl Renderer {

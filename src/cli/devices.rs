@@ -1,6 +1,7 @@
 //! `tallow devices`: what Vulkan offers here, and what is missing.
 use super::{Exit, print, print_json};
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::gpu;
 use crate::report::table;
 use serde::Serialize;
 
@@ -34,7 +35,7 @@ pub struct Device {
 /// Runs the subcommand.
 ///
 /// # Errors
-/// [`Error::Device`] when there is no Vulkan loader or no device.
+/// [`crate::error::Error::Device`] when there is no Vulkan loader or no device.
 pub fn run(args: &Args) -> Result<Exit> {
     let devices = survey()?;
     if args.json {
@@ -46,7 +47,28 @@ pub fn run(args: &Args) -> Result<Exit> {
 }
 
 fn survey() -> Result<Vec<Device>> {
-    Err(Error::Device("this build has no Vulkan layer".to_owned()))
+    Ok(gpu::survey()?.into_iter().enumerate().map(|(index, info)| device(index, info)).collect())
+}
+
+fn device(index: usize, info: gpu::DeviceInfo) -> Device {
+    let limits = [
+        ("max storage buffer range, bytes", info.max_storage_range),
+        ("max texel buffer elements", info.max_texel_elements),
+        ("max buffer size, bytes", info.max_buffer_size),
+        ("max allocation, bytes", info.max_allocation),
+        ("largest device heap, bytes", info.memory_heap),
+        ("subgroup size", info.subgroup_size.into()),
+        ("timestamp valid bits", info.timestamp_bits.into()),
+    ];
+    Device {
+        index,
+        name: info.name,
+        kind: info.kind.to_owned(),
+        driver: format!("{} {}", info.driver_name, info.driver_info),
+        api: info.api_version,
+        limits: limits.map(|(name, value)| (name.to_owned(), value)).into(),
+        missing: info.missing.into_iter().map(str::to_owned).collect(),
+    }
 }
 
 /// A table of the devices, then the limits and what is missing, device by device.

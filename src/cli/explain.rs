@@ -1,7 +1,12 @@
 //! `tallow explain`: what a scene calls for, and what that costs.
 use super::{Exit, print, print_json};
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::gpu::layout::Effects;
+use crate::gpu::{DeviceOptions, FrameResources, Gpu};
+use crate::renderer::{Outputs, Renderer};
 use crate::report::table::{self, milliseconds};
+use crate::scene::{Scene, effects};
+use crate::settings::Settings;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -52,8 +57,76 @@ pub fn run(args: &Args) -> Result<Exit> {
 }
 
 fn rows(args: &Args) -> Result<Vec<Row>> {
-    let scene = args.scene.display();
-    Err(Error::Device(format!("{scene}: this build has no renderer")))
+    let scene = Scene::load(&args.scene, &shrink)?;
+    let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), validation: false })?;
+    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    let (base, reasons) = effects::effects(&scene, outputs.split_light, outputs.counters);
+    let sizes = Renderer::new(&gpu, &scene, outputs)?.scene().sizes();
+    let usual = cost(&gpu, &scene, outputs, base)?;
+    let mut rows = Vec::new();
+    for (effect, id, on) in base.entries() {
+        let other_effects = base.toggled(id);
+        let (split_light, counters) = (other_effects.split_light, other_effects.counters);
+        let other = cost(&gpu, &scene, Outputs { split_light, counters, ..outputs }, other_effects)?;
+        let (with, without) = if on { (usual, other) } else { (other, usual) };
+        let reason = reasons.iter().find(|(name, _)| *name == effect);
+        rows.push(Row {
+            effect,
+            on,
+            called_for_by: reason.map_or_else(String::new, |(_, object)| object.clone()),
+            gpu_ms_with: Some(with.gpu_ms),
+            gpu_ms_without: Some(without.gpu_ms),
+            compile_ms: Some(with.compile_ms - without.compile_ms),
+            bytes: bytes_of(effect, &sizes).filter(|_| on),
+        });
+    }
+    Ok(rows)
+}
+
+/// A small film tells enough about cost, and 28 kernels are timed.
+fn shrink(settings: &mut Settings) {
+    let scale = (65_536.0 / settings.pixels() as f64).sqrt().min(1.0);
+    let shrunk = |edge: u32| ((f64::from(edge) * scale) as u32).max(1);
+    (settings.width, settings.height) = (shrunk(settings.width), shrunk(settings.height));
+    settings.spp = 1;
+}
+
+#[derive(Clone, Copy)]
+struct Cost {
+    gpu_ms: f64,
+    compile_ms: f64,
+}
+
+/// GPU time of one sample per pixel, best of three after the first; what the first took longer is compilation that the
+/// driver put off.
+fn cost(gpu: &Gpu, scene: &Scene, outputs: Outputs, effects: Effects) -> Result<Cost> {
+    let renderer = Renderer::specialised(gpu, scene, outputs, effects)?;
+    let mut frame = FrameResources::new(gpu)?;
+    let mut runs = Vec::new();
+    for _ in 0..4 {
+        let mut ns = 0;
+        for batch in renderer.batches() {
+            let times = renderer.run(&mut frame, &batch)?;
+            ns += times.iter().filter(|t| t.name == "path").map(|t| t.end_ns - t.begin_ns).sum::<u64>();
+        }
+        runs.push(ns as f64 * 1e-6);
+    }
+    let best = runs[1..].iter().copied().fold(f64::INFINITY, f64::min);
+    let created: f64 = renderer.compile_times().iter().map(|(_, ms)| ms).sum();
+    Ok(Cost { gpu_ms: best, compile_ms: created + (runs[0] - best).max(0.0) })
+}
+
+/// Device memory of the arrays that exist only for this effect.
+fn bytes_of(effect: &str, sizes: &[(&'static str, u64)]) -> Option<u64> {
+    let part = match effect {
+        "textures" => "texels",
+        "smooth_normals" => "shading",
+        "instances" => "instances",
+        "environment_map" => "environment",
+        "emissive" => "lights",
+        _ => return None,
+    };
+    sizes.iter().find(|(name, _)| *name == part).map(|(_, bytes)| *bytes)
 }
 
 /// The rows as a table; a dash stands for what was not measured.

@@ -3,6 +3,7 @@ pub mod compare;
 pub mod devices;
 pub mod explain;
 pub mod interrupt;
+pub mod layers;
 pub mod progress;
 pub mod render;
 

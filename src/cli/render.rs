@@ -1,12 +1,19 @@
 //! `tallow render`: a scene becomes image files.
 use super::progress::Progress;
-use super::{Exit, finite, interrupt};
+use super::{Exit, finite, interrupt, layers, print, print_json};
 use crate::error::{Error, Result};
-use crate::image::{self, WriteOptions, tone::ToneMap};
-use crate::report::table::PassRow;
+use crate::gpu::{self, DeviceOptions, FrameResources, Gpu, PassTime};
+use crate::image::{self, Film, WriteOptions, output, tone::ToneMap};
+use crate::renderer::{self, Counters, Outputs, Renderer};
+use crate::report::table::{self, PassRow};
+use crate::report::trace::chrome_trace;
+use crate::scene::Scene;
 use crate::settings::{PixelFilter, Sampler, Settings};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::SystemTime;
 
 /// Which effects are compiled into the kernels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -144,8 +151,12 @@ pub struct Summary {
     pub height: u32,
     /// Samples taken, over all pixels.
     pub samples: u64,
-    /// Rays traced; none without `--counters`.
-    pub rays: Option<u64>,
+    /// Rays and nodes; none without `--counters`.
+    pub counters: Option<Counters>,
+    /// Wall time of reading the scene and building its hierarchy.
+    pub load_seconds: f64,
+    /// Wall time of the upload and of making pipelines.
+    pub compile_seconds: f64,
     /// Wall time of the render without loading and writing.
     pub seconds: f64,
     /// Name of the device.
@@ -163,16 +174,154 @@ pub struct Summary {
 pub fn run(args: &Args) -> Result<Exit> {
     check_outputs(args)?;
     let stop = interrupt::flag();
-    let mut settings = Settings::default();
-    args.overrides.apply(&mut settings);
-    settings.validate()?;
-    let total = settings.pixels() as u64 * u64::from(settings.spp);
-    let progress = Progress::new(total, args.quiet || args.json);
-    progress.finish();
-    if stop.load(std::sync::atomic::Ordering::SeqCst) {
-        return Ok(Exit::Interrupted);
+    let mut host = Spans::default();
+    let scene = host.time("load scene", || Scene::load(&args.scene, &|s| args.overrides.apply(s)))?;
+    let talkative = !args.quiet && !args.json;
+    if talkative {
+        scene.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
     }
-    Err(Error::Device(format!("{}: this build has no renderer", args.scene.display())))
+    let options = DeviceOptions { device: args.device.clone(), validation: args.validation };
+    let gpu = host.time("open device", || Gpu::open(&options))?;
+    let wanted = Outputs { split_light: true, guides: true, counters: args.counters };
+    let effects = match args.effects {
+        EffectChoice::Auto => renderer::called_for(&scene, wanted),
+        EffectChoice::All => renderer::all_effects(&scene),
+    };
+    let renderer = host.time("upload and compile", || Renderer::specialised(&gpu, &scene, wanted, effects))?;
+    let mut frame = FrameResources::new(&gpu)?;
+    let Some(times) = host.time("render", || render(&renderer, &mut frame, stop, !talkative))? else {
+        return Ok(Exit::Interrupted);
+    };
+    let mut film = host.time("read back", || layers::film(&renderer))?;
+    let seconds = host.seconds("render");
+    film.metadata = metadata(args, &renderer, &gpu, seconds)?;
+    host.time("write", || write(args, &film))?;
+    fail_on_messages(&gpu)?;
+    report(args, &renderer, &gpu, &scene, &host, &times)?;
+    Ok(Exit::Done)
+}
+
+/// Times of all passes, or none when the user stopped it.
+fn render(
+    renderer: &Renderer,
+    frame: &mut FrameResources,
+    stop: &AtomicBool,
+    quiet: bool,
+) -> Result<Option<Vec<PassTime>>> {
+    let settings = renderer.settings();
+    let total = settings.pixels() as u64 * u64::from(settings.spp);
+    let mut progress = Progress::new(total, quiet);
+    let (mut times, mut rays) = (Vec::new(), 0);
+    for batch in renderer.batches() {
+        if stop.load(Ordering::SeqCst) {
+            progress.finish();
+            return Ok(None);
+        }
+        times.extend(renderer.run(frame, &batch)?);
+        let counters = if renderer.outputs().counters { renderer.counters()? } else { Counters::default() };
+        progress.add(u64::from(batch.pixels) * u64::from(batch.samples), counters.rays() - rays);
+        rays = counters.rays();
+    }
+    progress.finish();
+    Ok(Some(times))
+}
+
+/// Host-side stages, for the trace.
+#[derive(Default)]
+struct Spans(Vec<PassTime>);
+
+impl Spans {
+    fn time<T>(&mut self, name: &'static str, work: impl FnOnce() -> Result<T>) -> Result<T> {
+        let begin_ns = gpu::host_ns();
+        let result = work();
+        self.0.push(PassTime { name, begin_ns, end_ns: gpu::host_ns() });
+        result
+    }
+
+    fn seconds(&self, name: &str) -> f64 {
+        let spans = self.0.iter().filter(|s| s.name == name);
+        spans.map(|s| s.end_ns.saturating_sub(s.begin_ns) as f64 * 1e-9).sum()
+    }
+}
+
+fn metadata(args: &Args, renderer: &Renderer, gpu: &Gpu, seconds: f64) -> Result<BTreeMap<String, String>> {
+    let info = gpu.info();
+    let settings = serde_json::to_string(renderer.settings()).map_err(|e| Error::Usage(e.to_string()))?;
+    let since_epoch = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    let entries = [
+        ("software", format!("tallow {}", env!("CARGO_PKG_VERSION"))),
+        ("scene", args.scene.display().to_string()),
+        ("settings", settings),
+        ("seed", renderer.settings().seed.to_string()),
+        ("device", info.name.clone()),
+        ("driver", format!("{} {} {}", info.driver_name, info.driver_version, info.driver_info)),
+        ("renderSeconds", format!("{seconds:.3}")),
+        ("dateUnix", since_epoch.as_secs().to_string()),
+    ];
+    Ok(entries.map(|(k, v)| (k.to_owned(), v)).into())
+}
+
+/// A broken pixel is a bug, and is told; the file is written all the same, so that it can be looked at.
+fn write(args: &Args, film: &Film) -> Result<()> {
+    let broken = film.picture(None).map_or(0, |p| p.non_finite());
+    if broken > 0 {
+        eprintln!("warning: {broken} pixels are not finite");
+    }
+    args.output_files().iter().try_for_each(|path| image::write(path, film, &args.write_options()))
+}
+
+fn fail_on_messages(gpu: &Gpu) -> Result<()> {
+    match gpu.validation_messages().first() {
+        Some(message) => Err(Error::Device(format!("validation: {message}"))),
+        None => Ok(()),
+    }
+}
+
+fn report(
+    args: &Args,
+    renderer: &Renderer,
+    gpu: &Gpu,
+    scene: &Scene,
+    host: &Spans,
+    times: &[PassTime],
+) -> Result<()> {
+    if let Some(path) = &args.profile {
+        let offset = gpu.calibrate().map(|(gpu_ns, host_ns)| host_ns as i64 - gpu_ns as i64);
+        output::write(path, chrome_trace(&host.0, times, offset).as_bytes())?;
+    }
+    let settings = renderer.settings();
+    let counters = if args.counters { Some(renderer.counters()?) } else { None };
+    let summary = Summary {
+        files: args.output_files(),
+        width: settings.width,
+        height: settings.height,
+        samples: settings.pixels() as u64 * u64::from(settings.spp),
+        counters,
+        load_seconds: host.seconds("load scene"),
+        compile_seconds: host.seconds("upload and compile"),
+        seconds: host.seconds("render"),
+        device: gpu.info().name.clone(),
+        passes: table::summarise(times),
+        warnings: scene.warnings.clone(),
+    };
+    match (args.json, args.quiet) {
+        (true, _) => print_json(&summary),
+        (false, true) => Ok(()),
+        (false, false) => print(&text(&summary)),
+    }
+}
+
+fn text(s: &Summary) -> String {
+    let speed = s.samples as f64 * 1e-6 / s.seconds.max(1e-9);
+    let mut text = format!(
+        "{} x {}, {} samples in {:.2} s ({speed:.2} Msamples/s) on {}; loaded in {:.2} s, compiled in {:.2} s\n",
+        s.width, s.height, s.samples, s.seconds, s.device, s.load_seconds, s.compile_seconds
+    );
+    if let Some(c) = &s.counters {
+        let per_ray = c.nodes as f64 / c.rays().max(1) as f64;
+        text += &format!("{} closest-hit rays, {} any-hit rays, {per_ray:.1} nodes each\n", c.closest, c.any);
+    }
+    text + &table::timing_table(&s.passes)
 }
 
 /// A render may take hours; what cannot be written is told before.

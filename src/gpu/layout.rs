@@ -377,6 +377,14 @@ macro_rules! effects {
             pub fn entries(&self) -> Vec<(&'static str, u32, bool)> {
                 vec![$((stringify!($field), $id, self.$field),)+]
             }
+            /// The same with the effect of this id switched.
+            pub fn toggled(mut self, id: u32) -> Self {
+                match id {
+                    $($id => self.$field = !self.$field,)+
+                    _ => {}
+                }
+                self
+            }
         }
         /// The constants as GLSL text.
         pub const GLSL_EFFECTS: &str = concat!($("layout(constant_id = ", $id, ") const bool ",
