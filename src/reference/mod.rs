@@ -1,0 +1,8 @@
+//! Plain CPU twins of the functions under `glsl/shared`: same names, same order of operations, `f32`. Tests compare the
+//! kernels with them, and run the statistics that a GPU would only slow down. Nothing here is used in a render, but for
+//! [`fresnel::internal_fresnel`].
+pub mod bsdf;
+pub mod fresnel;
+pub mod microfacet;
+pub mod sampler;
+pub mod warp;
