@@ -115,12 +115,26 @@ fn edits() -> impl Strategy<Value = Vec<(prop::sample::Index, u8)>> {
     prop::collection::vec((any::<prop::sample::Index>(), byte), 1..8)
 }
 
+/// Panics that [`image::decode`] turns into errors would otherwise fill the output.
+fn silence_decoders() {
+    static ONCE: std::sync::Once = std::sync::Once::new();
+    ONCE.call_once(|| {
+        let tell = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            if !image::is_decoding() {
+                tell(panic);
+            }
+        }));
+    });
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn mutated_files_never_panic(
         file in 0..FILES.len(), edits in edits(), header_only: bool, cut in prop::option::weighted(0.2, any::<prop::sample::Index>())
     ) {
+        silence_decoders();
         let mut bytes = FILES[file].clone();
         // Half of the mutations hit the first 400 bytes, where the sizes are.
         let reach = if header_only { bytes.len().min(400) } else { bytes.len() };

@@ -52,6 +52,12 @@ pub enum Exit {
 
 /// Runs the command line and returns its exit code. What fails is told in one line on stderr.
 pub fn main() -> ExitCode {
+    let tell = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if !crate::image::is_decoding() {
+            tell(panic);
+        }
+    }));
     let result = match Cli::try_parse() {
         Ok(cli) => run(cli.command),
         Err(e) => usage(&e),

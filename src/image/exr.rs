@@ -50,12 +50,15 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
     let damaged = |e: exr::error::Error| format!("cannot be decoded: {e}; is it complete?");
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
     check_size(&meta, bytes.len())?;
+    check_sampling(&meta)?;
     let image: FlatImage = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
         .all_channels()
         .all_layers()
         .all_attributes()
+        // A panic on one of its own threads would abort the process, see `contained`.
+        .non_parallel()
         .from_buffered(Cursor::new(bytes))
         .map_err(damaged)?;
     film_from(image)
@@ -72,6 +75,15 @@ fn check_size(meta: &MetaData, file_len: usize) -> Result<(), String> {
     super::check_claim(claimed, file_len)
 }
 
+/// The crate's reader asserts this.
+fn check_sampling(meta: &MetaData) -> Result<(), String> {
+    let mut channels = meta.headers.iter().flat_map(|h| &h.channels.list);
+    match channels.find(|c| c.sampling != Vec2(1, 1)) {
+        Some(c) => Err(format!("channel {} is subsampled, which is not supported: save it at full size", c.name)),
+        None => Ok(()),
+    }
+}
+
 /// All parts in one film, channels of a second part and on under the name of their part.
 fn film_from(image: FlatImage) -> Result<Film, String> {
     let window = image.attributes.display_window;
@@ -84,9 +96,6 @@ fn film_from(image: FlatImage) -> Result<Film, String> {
         let part_name = part.attributes.layer_name.as_ref().filter(|_| many).map(string);
         for channel in part.channel_data.list {
             let name = channel_name(part_name.as_deref(), &string(&channel.name));
-            if channel.sampling != Vec2(1, 1) {
-                return Err(format!("channel {name} is subsampled, which is not supported: save it at full size"));
-            }
             let data = IntegerBounds::new(part.attributes.layer_position, part.size);
             film.channels.push(Channel { name, samples: shown_samples(channel.sample_data, data, window) });
         }

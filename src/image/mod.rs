@@ -9,6 +9,8 @@ pub mod tone;
 
 use crate::error::{Error, Result};
 pub use film::{Channel, Film, Picture, Samples};
+use std::cell::Cell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use tone::ToneMap;
 
@@ -100,6 +102,35 @@ fn check_claim(samples: u64, file_len: usize) -> std::result::Result<(), String>
 /// What is wrong with the data, in one line.
 pub fn decode(bytes: &[u8]) -> std::result::Result<Film, String> {
     const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
-    let film = if bytes.starts_with(&EXR_MAGIC) { exr::decode(bytes) } else { photo::decode(bytes) };
-    film.map_err(|what| what.replace('\n', " "))
+    let decoder = if bytes.starts_with(&EXR_MAGIC) { exr::decode } else { photo::decode };
+    contained(|| decoder(bytes)).map_err(|what| what.replace('\n', " "))
+}
+
+thread_local! {
+    static DECODING: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Whether this thread is inside a decoder, whose panics are caught and become errors: a panic hook keeps silent then.
+pub fn is_decoding() -> bool {
+    DECODING.get()
+}
+
+/// The decoders are other people's, and some assert what a damaged file may break (exr 1.74: the level of a tile, sums
+/// in B44 blocks). They keep no state between calls, so that nothing is left broken behind an unwound one.
+fn contained<T>(decode: impl FnOnce() -> std::result::Result<T, String>) -> std::result::Result<T, String> {
+    DECODING.set(true);
+    let result = catch_unwind(AssertUnwindSafe(decode));
+    DECODING.set(false);
+    result.unwrap_or_else(|_| Err("cannot be decoded: its data contradict its header; is it complete?".to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{contained, is_decoding};
+
+    #[test]
+    fn a_panic_in_a_decoder_is_an_error() {
+        let line = contained(|| -> Result<(), String> { panic!("planted: {}", is_decoding()) }).unwrap_err();
+        assert!(line.contains("contradict") && !is_decoding());
+    }
 }

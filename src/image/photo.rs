@@ -21,7 +21,8 @@ pub(super) fn encode_png(picture: &Picture, options: &WriteOptions) -> Result<Ve
 /// RGBE has no sign and no infinities: negative values and NaN become 0, huge ones the largest that it holds.
 pub(super) fn encode_hdr(picture: &Picture) -> Result<Vec<u8>, String> {
     const LARGEST: f32 = 1.7e38;
-    let pixels: Vec<_> = picture.pixels.iter().map(|p| Rgb(p.map(|v| v.max(0.0).min(LARGEST)))).collect();
+    let pixels: Vec<_> =
+        picture.pixels.iter().map(|p| Rgb(p.map(|v| if v > 0.0 { v.min(LARGEST) } else { 0.0 }))).collect();
     let mut out = Vec::new();
     HdrEncoder::new(&mut out)
         .encode(&pixels, picture.width as usize, picture.height as usize)
@@ -42,7 +43,9 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
     // Four: alpha, or what a decoder adds for it.
     super::check_claim(4 * u64::from(width) * u64::from(height), bytes.len())?;
     let mut reader = reader()?;
-    reader.limits(Limits::no_limits());
+    let mut limits = Limits::no_limits();
+    limits.max_alloc = Some(8 * super::MAX_SAMPLES);
+    reader.limits(limits);
     reader.decode().map(film_from).map_err(damaged)
 }
 

@@ -28,8 +28,9 @@ fn aces(x: f32) -> f32 {
 
 /// Exposes, tone-maps and encodes one value; the result is in [0, 1], and NaN is 0.
 pub fn display(radiance: f32, exposure: f32, tone_map: ToneMap) -> f32 {
-    // Cutting at a large finite value keeps the rational curve from inf / inf; `max` also turns NaN into 0.
-    let exposed = (radiance * exposure.exp2()).max(0.0).min(1e9);
+    let exposed = radiance * exposure.exp2();
+    // A large finite value instead of infinity keeps the rational curve from inf / inf.
+    let exposed = if exposed > 0.0 { exposed.min(1e9) } else { 0.0 };
     match tone_map {
         ToneMap::None => srgb_from_linear(exposed),
         ToneMap::Aces => srgb_from_linear(aces(exposed)),
