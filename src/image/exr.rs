@@ -8,6 +8,8 @@ use exr::meta::header::{ImageAttributes, LayerAttributes};
 use exr::prelude::{Compression, LineOrder, ReadChannels, ReadLayers, WritableImage};
 use std::io::Cursor;
 
+/// Flat areas in DWA blocks: one value in 64, deflated 1032 to 1.
+const MAX_RATIO: u64 = 1 << 16;
 /// Before the names of our attributes, as many names (`version`, `comments`...) are taken by the standard.
 const PREFIX: &str = "tallow:";
 
@@ -72,7 +74,7 @@ fn check_size(meta: &MetaData, file_len: usize) -> Result<(), String> {
         let plane = samples(header.layer_size).max(samples(window));
         claimed = claimed.saturating_add(plane.saturating_mul(header.channels.list.len() as u64));
     }
-    super::check_claim(claimed, file_len)
+    super::check_claim(claimed, file_len, MAX_RATIO)
 }
 
 /// The crate's reader asserts this.

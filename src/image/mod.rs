@@ -83,12 +83,11 @@ pub fn read(path: &Path) -> Result<Film> {
 
 /// More 32-bit samples than this, 4 GiB of them, are refused.
 const MAX_SAMPLES: u64 = 1 << 30;
-/// Deflate packs at most 1032 to 1, and PXR24 (in EXR) drops one byte in four first. A header that asks for more samples
-/// than this times the length of its file is damaged, and must not make us allocate them.
-const MAX_RATIO: u64 = 4096;
 
-fn check_claim(samples: u64, file_len: usize) -> std::result::Result<(), String> {
-    match samples > MAX_SAMPLES.min(MAX_RATIO.saturating_mul(file_len as u64)) {
+/// Refuses a header that asks for more samples than `ratio` times the bytes of its file: it is damaged, and must not make
+/// us allocate them.
+fn check_claim(samples: u64, file_len: usize, ratio: u64) -> std::result::Result<(), String> {
+    match samples > MAX_SAMPLES.min(ratio.saturating_mul(file_len as u64)) {
         true => {
             Err(format!("claims {samples} samples, more than a file of {file_len} bytes can hold; is it complete?"))
         }

@@ -8,6 +8,9 @@ use image::{
 };
 use std::io::Cursor;
 
+/// Deflate, in PNG, packs at most 1032 to 1; each pixel counts as four samples.
+const MAX_RATIO: u64 = 4 * 1032;
+
 pub(super) fn encode_png(picture: &Picture, options: &WriteOptions) -> Result<Vec<u8>, String> {
     let code = |v: &f32| (tone::display(*v, options.exposure, options.tone_map) * 255.0).round() as u8;
     let bytes: Vec<u8> = picture.pixels.iter().flatten().map(code).collect();
@@ -41,7 +44,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
     }
     let (width, height) = reader()?.into_dimensions().map_err(damaged)?;
     // Four: alpha, or what a decoder adds for it.
-    super::check_claim(4 * u64::from(width) * u64::from(height), bytes.len())?;
+    super::check_claim(4 * u64::from(width) * u64::from(height), bytes.len(), MAX_RATIO)?;
     let mut reader = reader()?;
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(8 * super::MAX_SAMPLES);

@@ -90,3 +90,33 @@ fn line(cells: &[String], layout: &[(usize, bool)]) -> String {
     let joined = cells.iter().zip(layout).map(cell).collect::<Vec<_>>().join("  ");
     format!("{}\n", joined.trim_end())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn times(durations: &[(&'static str, u64)]) -> Vec<PassTime> {
+        durations.iter().map(|&(name, ns)| PassTime { name, begin_ns: 1_000, end_ns: 1_000 + ns }).collect()
+    }
+
+    #[test]
+    fn rows_are_medians_maxima_and_shares_in_order_of_first_call() {
+        let ms = 1_000_000;
+        let rows = summarise(&times(&[("path", 5 * ms), ("fold", ms), ("path", 3 * ms), ("path", 11 * ms)]));
+        let path = PassRow { pass: "path", calls: 3, median_ms: 5.0, max_ms: 11.0, share: 0.95 };
+        let fold = PassRow { pass: "fold", calls: 1, median_ms: 1.0, max_ms: 1.0, share: 0.05 };
+        assert_eq!(rows, [path, fold]);
+    }
+
+    #[test]
+    fn a_clock_that_runs_backwards_and_no_passes_at_all_are_survived() {
+        assert_eq!(summarise(&[PassTime { name: "odd", begin_ns: 9, end_ns: 3 }])[0].max_ms, 0.0);
+        assert_eq!(timing_table(&summarise(&[])), "pass  calls  median ms  max ms  share\n");
+    }
+
+    #[test]
+    fn numbers_are_flush_right_and_words_flush_left() {
+        let rows = [vec!["a".to_owned(), "7".to_owned()], vec!["long".to_owned(), "123".to_owned()]];
+        assert_eq!(text(&["name", "n"], &rows), "name    n\na       7\nlong  123\n");
+    }
+}
