@@ -1,6 +1,32 @@
 //! Scene files become flat arrays, ready to be copied to the device as they are. Nothing here talks to a GPU.
+use crate::error::{Error, Result};
 use crate::gpu::layout::{AliasEntry, BvhNode, Camera, Instance, Light, Material, Shading, Texture, Triangle};
 use crate::settings::Settings;
+use std::path::Path;
+
+mod alias;
+mod assemble;
+mod bvh;
+mod camera;
+mod description;
+mod effects;
+mod environment;
+mod fresnel;
+mod geometry;
+mod light;
+mod material;
+mod mtl;
+mod obj;
+mod obj_lines;
+mod place;
+mod shape;
+mod texture;
+mod value;
+
+pub use effects::effects;
+
+/// Largest coordinate a scene may have: squares of distances still fit a 32-bit float.
+pub const MAX_COORDINATE: f64 = 1e18;
 
 /// Everything a render reads, in the form that kernels read it.
 #[derive(Clone, Debug, Default)]
@@ -29,6 +55,10 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// Alias table over `lights`, in proportion to power; same length.
     pub light_table: Vec<AliasEntry>,
+    /// For emissive triangles, `Light::probability / area = Material::emission_weight * triangle_pdf_scale`: the density
+    /// per square world unit of drawing a point by [`Scene::light_table`] that a path has hit otherwise. 0 without
+    /// emissive triangles. Exact up to the rounding of the table (2^-32 / lights) and of 32-bit floats.
+    pub triangle_pdf_scale: f32,
     /// The environment image, when the environment is not a constant.
     pub environment: Option<Environment>,
     /// World-space bounds of all geometry; zero when there is none.
@@ -39,7 +69,9 @@ pub struct Scene {
     pub warnings: Vec<String>,
 }
 
-/// Latitude-longitude image: row 0 is straight up (+y), column 0 starts at direction -z turning towards -x… see `light.rs`.
+/// Latitude-longitude image: row 0 is straight up (+y), column 0 begins at direction -z, columns turn towards +x. For a
+/// unit direction d in environment space `u = atan2(d.x, -d.z) / (2 pi)`, `v = acos(d.y) / pi`; texel centres lie at
+/// half-integers. The density per solid angle of texel i is `texels[i].w * width * height / (2 pi^2 sin(theta))`.
 #[derive(Clone, Debug, Default)]
 pub struct Environment {
     /// Texels across (longitude).
@@ -59,4 +91,56 @@ pub struct Names {
     pub objects: Vec<String>,
     /// By material index.
     pub materials: Vec<String>,
+}
+
+impl Scene {
+    /// Reads a scene file (`.toml`) or a model (`.obj`). `overrides` changes the file's settings before the camera is
+    /// built, which depends on the shape of the film. A model alone gets a camera that frames it and, when nothing in it
+    /// emits light, a sky of radiance 1.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with file, place and remedy; [`Error::Usage`] for settings out of range after `overrides`.
+    pub fn load(path: &Path, overrides: &dyn Fn(&mut Settings)) -> Result<Self> {
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_lowercase();
+        match extension.as_str() {
+            "toml" => {
+                let text = std::fs::read_to_string(path);
+                Self::parse(path, &text.map_err(|e| Error::input(path, format!("cannot be read: {e}")))?, overrides)
+            }
+            "obj" => Self::from_description(path, &model(path), true, overrides),
+            other => Err(Error::input(path, format!("is no scene: \"{other}\" is neither toml nor obj"))),
+        }
+    }
+
+    /// Reads a scene file's text; `path` is for messages and for what it names.
+    ///
+    /// # Errors
+    /// See [`Scene::load`].
+    pub fn parse(path: &Path, text: &str, overrides: &dyn Fn(&mut Settings)) -> Result<Self> {
+        Self::from_description(path, &description::parse(path, text)?, false, overrides)
+    }
+
+    fn from_description(
+        path: &Path,
+        description: &description::Description,
+        sky: bool,
+        overrides: &dyn Fn(&mut Settings),
+    ) -> Result<Self> {
+        let mut scene = Self { settings: description.settings(), ..Self::default() };
+        scene.settings.validate().map_err(|e| Error::input(path, e))?;
+        overrides(&mut scene.settings);
+        scene.settings.validate()?;
+        assemble::assemble(path, description, sky, &mut scene)?;
+        let camera = description.camera.build(&scene.settings, scene.bounds);
+        scene.camera = camera.map_err(|what| Error::input_at(path, "[camera]", what))?;
+        Ok(scene)
+    }
+}
+
+/// A scene of one file.
+fn model(path: &Path) -> description::Description {
+    let file = path.file_name().map(Into::into);
+    let name = path.file_stem().map(|s| s.to_string_lossy().into_owned());
+    let mesh = description::MeshTable { name, file, ..Default::default() };
+    description::Description { mesh: vec![mesh], ..Default::default() }
 }

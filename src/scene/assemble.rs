@@ -1,0 +1,237 @@
+//! From a description to the flat arrays: files are read, meshes placed, BVHs built and textures decoded.
+use super::description::{self, Description};
+use super::geometry::Geometry;
+use super::obj::{self, Library, ObjFile};
+use super::place::{Job, Plan, instance, mesh_name};
+use super::{Scene, bvh, environment, light};
+use crate::error::{Error, Result};
+use crate::gpu::layout::{LIGHT_ENVIRONMENT, NONE};
+use glam::{DAffine3, Vec3};
+use std::collections::HashMap;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// Height of an MTL's bump map without `-bm`, as a share of the scene's diagonal.
+const DEFAULT_BUMP: f32 = 0.0005;
+
+/// A mesh in the triangle array: where, and how it is called.
+struct Stored {
+    mesh: Option<usize>,
+    range: Range<usize>,
+    objects: Vec<String>,
+}
+
+/// One scene in the making.
+pub struct Assembly<'a> {
+    path: &'a Path,
+    /// What to build.
+    pub description: &'a Description,
+    /// Materials and warnings so far.
+    pub library: Library,
+    /// Parsed files that meshes still need.
+    pub files: HashMap<PathBuf, ObjFile>,
+    /// Triangles so far.
+    pub geometry: Geometry,
+}
+
+/// Fills a scene's arrays. `sky`: a scene without any light gets a constant environment of radiance 1.
+///
+/// # Errors
+/// [`Error::Input`] for what cannot be repaired.
+pub fn assemble(path: &Path, description: &Description, sky: bool, scene: &mut Scene) -> Result<()> {
+    let (library, files, geometry) = Default::default();
+    let mut a = Assembly { path, description, library, files, geometry };
+    a.materials()?;
+    a.read_files()?;
+    a.lights(sky, scene)?;
+    let plan = a.plan()?;
+    let stored = a.store(&plan)?;
+    let textures = std::mem::take(&mut a.library.materials.textures);
+    let (decoded, built) = rayon::join(|| textures.decode(), || a.build(&plan, stored, scene));
+    let ranges = built?;
+    (scene.textures, scene.texels) = decoded.map(|d| (d.textures, d.texels))?;
+    a.finish(&ranges, scene);
+    Ok(())
+}
+
+impl Assembly<'_> {
+    /// An error at a place in the scene file.
+    pub fn at(&self, place: impl std::fmt::Display, what: impl std::fmt::Display) -> Error {
+        Error::input_at(self.path, place, what)
+    }
+
+    /// What paths are relative to.
+    pub fn directory(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+
+    fn materials(&mut self) -> Result<()> {
+        for table in &self.description.material {
+            let place = format!("material \"{}\"", table.name);
+            let Library { materials, warnings, .. } = &mut self.library;
+            let directory = self.path.parent().unwrap_or(Path::new(""));
+            let index = materials.push_table(table, directory, warnings).map_err(|what| self.at(&place, what))?;
+            if table.name.is_empty() {
+                return Err(self.at("[[material]]", "has no name: meshes could not refer to it"));
+            }
+            if self.library.tables.insert(table.name.clone(), index).is_some() {
+                return Err(self.at(place, "is defined twice: rename one"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Index of a `[[material]]`.
+    ///
+    /// # Errors
+    /// With the nearest name, when there is none of that name.
+    pub fn material(&self, name: &str, place: &str) -> Result<u32> {
+        let known = self.library.tables.keys().map(String::as_str);
+        match (self.library.tables.get(name), description::nearest(name, known)) {
+            (Some(&index), _) => Ok(index),
+            (None, Some(near)) => Err(self.at(place, format!("no material \"{name}\": did you mean \"{near}\"?"))),
+            (None, None) => Err(self.at(place, format!("no material \"{name}\": add a [[material]] table"))),
+        }
+    }
+
+    /// Parses every file before geometry is placed: whether texture coordinates are kept depends on all materials.
+    fn read_files(&mut self) -> Result<()> {
+        for mesh in &self.description.mesh {
+            if mesh.file.is_some() == mesh.shape.is_some() {
+                let place = format!("mesh \"{}\"", mesh_name(mesh));
+                return Err(self.at(place, "needs either a file or a shape"));
+            }
+            let Some(path) = self.file_of(mesh) else { continue };
+            if !self.files.contains_key(&path) {
+                let parsed = obj::load(&path, &mut self.library)?;
+                self.files.insert(path, parsed);
+            }
+        }
+        Ok(())
+    }
+
+    /// Lights without surface, and the environment.
+    fn lights(&mut self, sky: bool, scene: &mut Scene) -> Result<()> {
+        for (i, table) in self.description.light.iter().enumerate() {
+            let light = table.build().map_err(|what| self.at(format!("light {}", i + 1), what))?;
+            scene.lights.push(light);
+        }
+        let emits = self.library.materials.list.iter().any(|m| m.emission != [0.0; 3]);
+        if sky && !emits && scene.lights.is_empty() {
+            scene.lights.push(light::environment([1.0; 3], glam::DMat3::IDENTITY));
+        }
+        let Some(table) = &self.description.environment else { return Ok(()) };
+        let scale = table.scale.map_or([1.0; 3], |s| s.0);
+        let constant = table.radiance.map_or([1.0; 3], |r| r.0);
+        let radiance: [f32; 3] = std::array::from_fn(|c| scale[c] * constant[c]);
+        if !radiance.iter().all(|v| (0.0..=1e18).contains(v)) || !table.rotation.is_finite() {
+            return Err(self.at("[environment]", "radiance times scale must lie from 0 to 1e18, rotation be finite"));
+        }
+        let rotation = environment::rotation(table.rotation, table.world_from_environment);
+        let light = light::environment(radiance, rotation.map_err(|what| self.at("[environment]", what))?);
+        match &table.file {
+            Some(_) if table.radiance.is_some() => {
+                return Err(self.at("[environment]", "has both radiance and file: choose one"));
+            }
+            Some(file) => {
+                let path = self.directory().join(file.to_string_lossy().replace('\\', "/"));
+                scene.environment = environment::load(&path, &mut self.library.warnings)?;
+                scene.lights.extend(scene.environment.is_some().then_some(light));
+            }
+            None => scene.lights.push(light),
+        }
+        Ok(())
+    }
+
+    /// Puts all triangles into the array: first those in world space, then one mesh after another.
+    fn store(&mut self, plan: &Plan) -> Result<Vec<Stored>> {
+        let jobs: Vec<&Job> = plan.baked.iter().chain(&plan.stored).collect();
+        let file = |job: &Job| self.description.mesh[job.mesh].file.clone();
+        let last: Vec<bool> =
+            (0..jobs.len()).map(|i| jobs[i + 1..].iter().all(|later| file(later) != file(jobs[i]))).collect();
+        let mut stored = vec![Stored { mesh: None, range: 0..0, objects: Vec::new() }];
+        for (i, job) in jobs.into_iter().enumerate() {
+            let start = self.geometry.triangles.len();
+            if i < plan.baked.len() {
+                let objects = self.add(job, stored[0].objects.len() as u32, last[i])?;
+                stored[0].objects.extend(objects);
+                stored[0].range.end = self.geometry.triangles.len();
+            } else {
+                let objects = self.add(job, 0, last[i])?;
+                let range = start..self.geometry.triangles.len();
+                stored.push(Stored { mesh: Some(job.mesh), range, objects });
+            }
+        }
+        self.files.clear();
+        Ok(stored)
+    }
+
+    /// Builds the BVHs; returns the triangles below each root that instances name.
+    fn build(&mut self, plan: &Plan, stored: Vec<Stored>, scene: &mut Scene) -> Result<HashMap<u32, Range<usize>>> {
+        let mut ranges = HashMap::new();
+        if plan.copies.is_empty() {
+            let world = stored.into_iter().next().expect("world space is always there");
+            scene.root = bvh::build_mesh(&mut self.geometry, world.range, &mut scene.nodes);
+            scene.names.objects = world.objects;
+            scene.bounds = bvh::bounds(&self.geometry.triangles).unwrap_or_default();
+            return Ok(ranges);
+        }
+        let mut boxes = HashMap::new();
+        for mesh in stored {
+            let Some(bounds) = bvh::bounds(&self.geometry.triangles[mesh.range.clone()]) else { continue };
+            let root = bvh::build_mesh(&mut self.geometry, mesh.range.clone(), &mut scene.nodes);
+            ranges.insert(root, mesh.range.clone());
+            boxes.insert(root, bounds);
+            let copies = plan.copies.iter().filter(|c| Some(c.mesh) == mesh.mesh);
+            let identity = Job { mesh: 0, affine: DAffine3::IDENTITY, material: None };
+            let baked = mesh.mesh.is_none().then_some(&identity);
+            for copy in copies.chain(baked) {
+                let (material, object) = (copy.material.unwrap_or(NONE), scene.names.objects.len() as u32);
+                scene.instances.push(crate::gpu::layout::Instance { material, object, ..instance(&copy.affine, root) });
+                scene.names.objects.extend(mesh.objects.iter().cloned());
+            }
+        }
+        self.top_level(&boxes, scene)?;
+        Ok(ranges)
+    }
+
+    fn top_level(&self, boxes: &HashMap<u32, bvh::Bounds>, scene: &mut Scene) -> Result<()> {
+        let object_bounds: Vec<_> = scene.instances.iter().map(|i| boxes[&i.root]).collect();
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for (instance, &bounds) in scene.instances.iter().zip(&object_bounds) {
+            let [l, h] = bvh::world_bounds(instance, bounds).map(Vec3::from);
+            (low, high) = (low.min(l), high.max(h));
+        }
+        if scene.instances.is_empty() {
+            (low, high) = (Vec3::ZERO, Vec3::ZERO);
+        }
+        if !(low.abs().max(high.abs()).max_element() <= super::MAX_COORDINATE as f32) {
+            return Err(self.at("instances", format!("reach beyond the limit of {:e}", super::MAX_COORDINATE)));
+        }
+        scene.bounds = [low.to_array(), high.to_array()];
+        scene.root = bvh::build_top(&mut scene.instances, &object_bounds, &mut scene.nodes);
+        Ok(())
+    }
+
+    /// Moves what is left into the scene and chooses among its lights.
+    fn finish(mut self, ranges: &HashMap<u32, Range<usize>>, scene: &mut Scene) {
+        let [low, high] = scene.bounds.map(Vec3::from);
+        if self.library.materials.list.is_empty() {
+            self.library.grey();
+        }
+        let Library { mut materials, mut warnings, .. } = self.library;
+        for i in materials.default_bumps {
+            materials.list[i as usize].bump_scale = (high - low).length() * DEFAULT_BUMP;
+        }
+        (scene.materials, scene.names.materials) = (materials.list, materials.names);
+        (scene.triangles, scene.shading) = (self.geometry.triangles, self.geometry.shading);
+        light::finish(scene, ranges);
+        if !scene.lights.iter().any(|l| l.kind == LIGHT_ENVIRONMENT) {
+            scene.environment = None;
+        }
+        if scene.lights.is_empty() {
+            warnings.push("the scene has no light: its image will be black".into());
+        }
+        scene.warnings = warnings;
+    }
+}

@@ -1,0 +1,174 @@
+//! A plain traversal of our nodes against brute force, both in 64-bit arithmetic.
+use super::*;
+use glam::{DAffine3, DVec3};
+
+struct Random(u64);
+
+impl Random {
+    /// Uniform in [-1, 1] (an LCG of Knuth's, high bits).
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+    fn point(&mut self) -> DVec3 {
+        DVec3::new(self.next(), self.next(), self.next())
+    }
+}
+
+/// Distance along the ray (Möller and Trumbore 1997).
+fn hit(t: &Triangle, origin: DVec3, direction: DVec3) -> Option<f64> {
+    let [a, b, c] = [t.v0, t.v1, t.v2].map(|p| Vec3::from(p).as_dvec3());
+    let (e1, e2) = (b - a, c - a);
+    let p = direction.cross(e2);
+    let det = e1.dot(p);
+    let s = origin - a;
+    let q = s.cross(e1);
+    let (u, v, distance) = (s.dot(p) / det, direction.dot(q) / det, e2.dot(q) / det);
+    (det != 0.0 && u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0).then_some(distance)
+}
+
+fn bytes(words: [u32; 2]) -> [u8; 8] {
+    bytemuck::cast(words)
+}
+
+/// Box of child `i`, as the kernel decodes it.
+fn child_box(n: &BvhNode, i: usize) -> (DVec3, DVec3) {
+    let e = n.e_imask.to_le_bytes();
+    let scale = DVec3::from([0, 1, 2].map(|a| f64::from(f32::from_bits(u32::from(e[a]) << 23))));
+    let q = |words: [[u32; 2]; 3]| DVec3::from(words.map(|w| f64::from(bytes(w)[i])));
+    let p = Vec3::from(n.p).as_dvec3();
+    (p + q([n.min_x, n.min_y, n.min_z]) * scale, p + q([n.max_x, n.max_y, n.max_z]) * scale)
+}
+
+fn crosses((low, high): (DVec3, DVec3), origin: DVec3, direction: DVec3) -> bool {
+    let (a, b) = ((low - origin) / direction, (high - origin) / direction);
+    a.min(b).max_element().max(0.0) <= a.max(b).min_element()
+}
+
+/// Calls `leaf` with every primitive whose box the ray crosses.
+fn traverse(nodes: &[BvhNode], root: u32, origin: DVec3, direction: DVec3, leaf: &mut dyn FnMut(u32)) {
+    let mut stack = vec![root];
+    while let Some(index) = stack.pop() {
+        let node = &nodes[index as usize];
+        let inner_mask = node.e_imask >> 24;
+        for (i, meta) in bytes(node.meta).into_iter().enumerate() {
+            if meta == 0 || !crosses(child_box(node, i), origin, direction) {
+                continue;
+            }
+            if inner_mask >> i & 1 == 1 {
+                stack.push(node.child_base + (inner_mask & ((1 << i) - 1)).count_ones());
+            } else {
+                let first = node.primitive_base + u32::from(meta & 31);
+                (first..first + (meta >> 5).count_ones()).for_each(&mut *leaf);
+            }
+        }
+    }
+}
+
+fn random_geometry(count: usize, size: f64, random: &mut Random) -> Geometry {
+    let mut geometry = Geometry::default();
+    for primitive in 0..count as u32 {
+        let center = random.point();
+        let [v0, v1, v2] = [0; 3].map(|_| (center + random.point() * size).as_vec3().to_array());
+        geometry.triangles.push(Triangle { v0, v1, v2, primitive, ..Triangle::default() });
+    }
+    geometry
+}
+
+fn closest(hits: impl Iterator<Item = f64>) -> f64 {
+    hits.fold(f64::INFINITY, f64::min)
+}
+
+fn compare(geometry: &Geometry, nodes: &[BvhNode], root: u32, range: Range<usize>, random: &mut Random) -> usize {
+    let mut wrong = 0;
+    for _ in 0..500 {
+        let (origin, direction) = (random.point() * 2.0, random.point());
+        let found = &mut f64::INFINITY;
+        traverse(nodes, root, origin, direction, &mut |i| {
+            let distance = hit(&geometry.triangles[i as usize], origin, direction).unwrap_or(f64::INFINITY);
+            *found = found.min(distance);
+        });
+        let all = geometry.triangles[range.clone()].iter().filter_map(|t| hit(t, origin, direction));
+        wrong += usize::from(*found != closest(all));
+    }
+    wrong
+}
+
+#[test]
+fn every_size_agrees_with_brute_force() {
+    let mut random = Random(1);
+    for count in [1, 2, 3, 4, 9, 100, 5000] {
+        let mut geometry = random_geometry(count, 0.2, &mut random);
+        let mut nodes = Vec::new();
+        let root = build_mesh(&mut geometry, 0..count, &mut nodes);
+        assert_eq!(compare(&geometry, &nodes, root, 0..count, &mut random), 0, "{count} triangles");
+        let mut seen: Vec<_> = geometry.triangles.iter().map(|t| t.primitive).collect();
+        seen.sort_unstable();
+        assert!(seen.into_iter().eq(0..count as u32), "reordering loses nothing");
+    }
+}
+
+#[test]
+fn the_comparison_can_fail() {
+    let mut random = Random(2);
+    let mut geometry = random_geometry(1000, 0.3, &mut random);
+    let mut nodes = Vec::new();
+    let root = build_mesh(&mut geometry, 0..1000, &mut nodes);
+    let shrink = |words: [u32; 2]| bytemuck::cast(bytes(words).map(|b| b.saturating_sub(60)));
+    nodes.iter_mut().for_each(|n| n.max_x = shrink(n.max_x));
+    assert!(compare(&geometry, &nodes, root, 0..1000, &mut random) > 0);
+}
+
+#[test]
+fn two_meshes_share_the_arrays() {
+    let mut random = Random(3);
+    let mut geometry = random_geometry(300, 0.3, &mut random);
+    let mut nodes = Vec::new();
+    let roots = [build_mesh(&mut geometry, 0..100, &mut nodes), build_mesh(&mut geometry, 100..300, &mut nodes)];
+    assert_eq!(compare(&geometry, &nodes, roots[0], 0..100, &mut random), 0);
+    assert_eq!(compare(&geometry, &nodes, roots[1], 100..300, &mut random), 0);
+    assert!(compare(&geometry, &nodes, roots[1], 0..300, &mut random) > 0, "control: the second BVH lacks the first");
+}
+
+#[test]
+fn instances_are_found_through_the_top_level() {
+    let mut random = Random(4);
+    let mut geometry = random_geometry(50, 0.5, &mut random);
+    let mut nodes = Vec::new();
+    let root = build_mesh(&mut geometry, 0..50, &mut nodes);
+    let object = bounds(&geometry.triangles).unwrap();
+    let places: Vec<_> = (0..40).map(|_| DAffine3::from_scale(random.point() * 0.2)).collect();
+    let mut instances: Vec<_> = places
+        .iter()
+        .map(|a| crate::scene::place::instance(&(DAffine3::from_translation(random.point()) * *a), root))
+        .collect();
+    let top = build_top(&mut instances, &vec![object; 40], &mut nodes);
+    for _ in 0..300 {
+        let (origin, direction) = (random.point() * 2.0, random.point());
+        let in_object = |i: &Instance| {
+            let rows = [i.object0, i.object1, i.object2].map(|r| Vec4::from(r).as_dvec4());
+            let p = |v: DVec3, w: f64| DVec3::from(rows.map(|r| r.truncate().dot(v) + r.w * w));
+            (p(origin, 1.0), p(direction, 0.0))
+        };
+        let nearest = |i: &Instance| {
+            let (o, d) = in_object(i);
+            closest(geometry.triangles.iter().filter_map(|t| hit(t, o, d)))
+        };
+        let found = &mut f64::INFINITY;
+        traverse(&nodes, top, origin, direction, &mut |i| *found = found.min(nearest(&instances[i as usize])));
+        assert_eq!(*found, closest(instances.iter().map(nearest)));
+    }
+}
+
+#[test]
+fn coincident_and_empty_geometry_builds() {
+    let mut geometry = Geometry::default();
+    let same = Triangle { v1: [1.0, 0.0, 0.0], v2: [0.0, 1.0, 0.0], ..Triangle::default() };
+    geometry.triangles = vec![same; 20_000];
+    let mut nodes = Vec::new();
+    build_mesh(&mut geometry, 0..20_000, &mut nodes);
+    let root = build_mesh(&mut geometry, 0..0, &mut nodes);
+    let mut leaves = 0;
+    traverse(&nodes, root, DVec3::ZERO, DVec3::ONE, &mut |_| leaves += 1);
+    assert_eq!(leaves, 0);
+}

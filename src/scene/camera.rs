@@ -1,0 +1,183 @@
+//! From the `[camera]` table and the film's shape to the camera that kernels read.
+use crate::gpu::layout;
+use crate::settings::Settings;
+use glam::{DMat4, DVec3};
+use serde::Deserialize;
+
+/// Which film edge the field of view spans.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FovAxis {
+    /// Height (vertical field of view).
+    #[default]
+    Y,
+    /// Width.
+    X,
+    /// The shorter edge.
+    Smaller,
+    /// The longer edge.
+    Larger,
+}
+
+/// The `[camera]` table. Positions and lengths in world units. Without `position` and `world_from_camera` the camera
+/// looks at `target` (default: the middle of the scene) from where the whole scene is in view.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Camera {
+    /// Where rays start.
+    pub position: Option<[f64; 3]>,
+    /// A point in the middle of the image.
+    pub target: Option<[f64; 3]>,
+    /// A direction that is up in the image; default +y.
+    pub up: Option<[f64; 3]>,
+    /// Row-major 4 x 4; the camera looks along -z, +x is right, +y is up. Scales are dropped, a mirror is kept.
+    pub world_from_camera: Option<[f64; 16]>,
+    /// Degrees along `fov_axis`, above 0 and below 180; default 40.
+    pub fov: Option<f64>,
+    /// Edge that `fov` spans.
+    pub fov_axis: FovAxis,
+    /// Radius of the lens; 0 (default) is a pinhole.
+    pub lens_radius: f32,
+    /// Distance along the view direction that is in focus; default the distance to `target`, or 1.
+    pub focus_distance: Option<f32>,
+    /// Nothing nearer than this along a ray is seen; default 0.
+    pub near: f32,
+}
+
+/// Position and orthonormal axes (right, up, forward).
+type Frame = (DVec3, [DVec3; 3]);
+
+impl Camera {
+    /// The device's camera for a film of `settings`' shape, looking at a scene of these bounds if nothing else is said.
+    ///
+    /// # Errors
+    /// A sentence that names the key at fault.
+    pub fn build(&self, settings: &Settings, bounds: [[f32; 3]; 2]) -> Result<layout::Camera, String> {
+        let (tan_x, tan_y) = self.half_tangents(settings)?;
+        let (position, [right, up, forward]) = match &self.world_from_camera {
+            Some(rows) => frame_from_matrix(rows)?,
+            None => self.frame_from_target(bounds, tan_x.min(tan_y))?,
+        };
+        let positive = |name: &str, v: f32| match v {
+            v if v.is_finite() && v >= 0.0 => Ok(v),
+            v => Err(format!("{name} is {v}: choose 0 or a positive number")),
+        };
+        let to_target = self.target.map_or(1.0, |t| (DVec3::from(t) - position).dot(forward).max(1e-6));
+        let focus_distance = positive("focus_distance", self.focus_distance.unwrap_or(to_target as f32))?;
+        if focus_distance == 0.0 {
+            return Err("focus_distance is 0: choose a positive number".into());
+        }
+        Ok(layout::Camera {
+            position: position.as_vec3().to_array(),
+            lens_radius: positive("lens_radius", self.lens_radius)?,
+            right: (right * tan_x).as_vec3().to_array(),
+            focus_distance,
+            up: (up * tan_y).as_vec3().to_array(),
+            near: positive("near", self.near)?,
+            forward: forward.as_vec3().to_array(),
+        })
+    }
+
+    /// Tangents of half the horizontal and the vertical field of view.
+    fn half_tangents(&self, settings: &Settings) -> Result<(f64, f64), String> {
+        let fov = self.fov.unwrap_or(40.0);
+        if !(fov > 0.0 && fov < 180.0) {
+            return Err(format!("fov is {fov}: choose degrees above 0 and below 180"));
+        }
+        let tan = (fov.to_radians() / 2.0).tan();
+        let aspect = f64::from(settings.width) / f64::from(settings.height);
+        let along_x = match self.fov_axis {
+            FovAxis::X => true,
+            FovAxis::Y => false,
+            FovAxis::Smaller => aspect < 1.0,
+            FovAxis::Larger => aspect > 1.0,
+        };
+        Ok(if along_x { (tan, tan / aspect) } else { (tan * aspect, tan) })
+    }
+
+    fn frame_from_target(&self, bounds: [[f32; 3]; 2], tan: f64) -> Result<Frame, String> {
+        let [low, high] = bounds.map(|b| DVec3::from(b.map(f64::from)));
+        let target = self.target.map_or((low + high) / 2.0, DVec3::from);
+        let position = self.position.map_or_else(|| overview(target, low, high, tan), DVec3::from);
+        let up = self.up.map_or(DVec3::Y, DVec3::from);
+        let forward = (target - position).try_normalize().ok_or("position and target are the same point")?;
+        // A camera that looks straight along `up` still needs a right: any one will do when nothing was said.
+        let side = forward.cross(up).try_normalize();
+        let right = match (side.filter(|_| forward.cross(up.normalize_or_zero()).length() > 1e-9), self.up) {
+            (Some(right), _) => right,
+            (None, None) => forward.cross(DVec3::NEG_Z * forward.y.signum()).normalize(),
+            (None, Some(_)) => return Err("up is parallel to the view direction: choose another".into()),
+        };
+        finite(position)?;
+        Ok((position, [right, right.cross(forward), forward]))
+    }
+}
+
+/// A point from which a sphere around the bounds fills the view, above and to the side.
+fn overview(target: DVec3, low: DVec3, high: DVec3, tan: f64) -> DVec3 {
+    let radius = ((high - low).length() / 2.0).max(1e-6);
+    let sin = tan / (1.0 + tan * tan).sqrt();
+    target + DVec3::new(0.45, 0.35, 1.0).normalize() * (radius / sin)
+}
+
+fn frame_from_matrix(rows: &[f64; 16]) -> Result<Frame, String> {
+    let m = DMat4::from_cols_array(rows).transpose();
+    if !m.is_finite() || m.row(3).truncate() != DVec3::ZERO || m.determinant().abs() < 1e-30 {
+        return Err("world_from_camera is not an invertible row-major affine matrix (last row 0 0 0 1)".into());
+    }
+    let axis = |i: usize| m.col(i).truncate().normalize();
+    let (position, forward) = (m.w_axis.truncate() / m.w_axis.w, -axis(2));
+    finite(position)?;
+    Ok((position, [axis(0), axis(1), forward]))
+}
+
+fn finite(position: DVec3) -> Result<(), String> {
+    match position.abs().max_element() <= super::MAX_COORDINATE {
+        true => Ok(()),
+        false => Err(format!("position {position} is not within {:e}", super::MAX_COORDINATE)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn film(width: u32, height: u32) -> Settings {
+        Settings { width, height, ..Settings::default() }
+    }
+
+    #[test]
+    fn looks_at_its_target_with_a_vertical_fov() {
+        let camera =
+            Camera { position: Some([0.0, 0.0, 5.0]), target: Some([0.0; 3]), fov: Some(90.0), ..Camera::default() };
+        let found = camera.build(&film(200, 100), [[0.0; 3]; 2]).unwrap();
+        assert_eq!(found.forward, [0.0, 0.0, -1.0]);
+        assert!((found.right[0] - 2.0).abs() < 1e-6 && (found.up[1] - 1.0).abs() < 1e-6);
+        assert_eq!(found.focus_distance, 5.0);
+        let wide = Camera { fov_axis: FovAxis::Larger, ..camera }.build(&film(200, 100), [[0.0; 3]; 2]).unwrap();
+        assert!((wide.right[0] - 1.0).abs() < 1e-6 && (wide.up[1] - 0.5).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_matrix_may_mirror() {
+        #[rustfmt::skip]
+        let rows = [-2.0, 0.0, 0.0, 1.0,  0.0, 1.0, 0.0, 2.0,  0.0, 0.0, 1.0, 3.0,  0.0, 0.0, 0.0, 1.0];
+        let camera = Camera { world_from_camera: Some(rows), fov: Some(90.0), ..Camera::default() };
+        let found = camera.build(&film(64, 64), [[0.0; 3]; 2]).unwrap();
+        assert_eq!(found.position, [1.0, 2.0, 3.0]);
+        assert!((found.right[0] + 1.0).abs() < 1e-6, "the mirrored right axis points along -x");
+        assert_eq!(found.forward, [0.0, 0.0, -1.0]);
+    }
+
+    #[test]
+    fn bad_cameras_are_named() {
+        let build = |c: Camera| c.build(&film(8, 8), [[0.0; 3], [1.0; 3]]);
+        assert!(build(Camera::default()).is_ok());
+        assert!(build(Camera { fov: Some(180.0), ..Camera::default() }).unwrap_err().contains("fov"));
+        assert!(build(Camera { near: f32::NAN, ..Camera::default() }).unwrap_err().contains("near"));
+        let flat = Camera { world_from_camera: Some([0.0; 16]), ..Camera::default() };
+        assert!(build(flat).unwrap_err().contains("world_from_camera"));
+        let along_up = Camera { position: Some([0.5, 9.0, 0.5]), ..Camera::default() };
+        assert!(build(along_up).is_ok(), "looking straight down needs no `up`");
+    }
+}

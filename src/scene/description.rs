@@ -1,0 +1,213 @@
+//! The scene file: TOML tables, every key with a default, paths relative to the file.
+//!
+//! A `[[mesh]]` is drawn where its own `transform` puts it, unless an `[[instance]]` names it: then it is drawn once per
+//! instance and nowhere else, `world_from_object = instance transform * mesh transform`.
+use super::camera::Camera;
+use super::light::LightTable;
+use super::material::MaterialTable;
+use super::shape::Shape;
+use super::value::{Rgb, Transform};
+use crate::error::{Error, Result};
+use crate::settings::{PixelFilter, Sampler, Settings};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// A whole scene file.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Description {
+    /// Size and filter.
+    pub film: Film,
+    /// Where from.
+    pub camera: Camera,
+    /// How.
+    pub render: Render,
+    /// Light from infinitely far; none when absent.
+    pub environment: Option<EnvironmentTable>,
+    /// Geometry.
+    pub mesh: Vec<MeshTable>,
+    /// Placed copies.
+    pub instance: Vec<InstanceTable>,
+    /// Surfaces.
+    pub material: Vec<MaterialTable>,
+    /// Lights without surface.
+    pub light: Vec<LightTable>,
+}
+
+/// The `[film]` table; see [`Settings`].
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Film {
+    /// Pixels.
+    pub width: Option<u32>,
+    /// Pixels.
+    pub height: Option<u32>,
+    /// Pixel filter.
+    pub filter: Option<PixelFilter>,
+}
+
+/// The `[render]` table; see [`Settings`].
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Render {
+    /// Samples per pixel.
+    pub spp: Option<u32>,
+    /// Path edges.
+    pub max_depth: Option<u32>,
+    /// 0 is off.
+    pub roulette_depth: Option<u32>,
+    /// 0 is off.
+    pub clamp_indirect: Option<f32>,
+    /// Random sequence.
+    pub seed: Option<u32>,
+    /// Random numbers.
+    pub sampler: Option<Sampler>,
+}
+
+/// The `[environment]` table; orientation: see `environment.rs`.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct EnvironmentTable {
+    /// Constant radiance, W/(m^2 sr); default 1.
+    pub radiance: Option<Rgb>,
+    /// Latitude-longitude image (HDR, EXR, PNG, JPEG), instead of `radiance`.
+    pub file: Option<PathBuf>,
+    /// Multiplies either; default 1.
+    pub scale: Option<Rgb>,
+    /// Degrees about +y.
+    pub rotation: f64,
+    /// Nine row-major numbers, instead of `rotation`.
+    pub world_from_environment: Option<[f64; 9]>,
+}
+
+/// A `[[mesh]]` table: an OBJ file or a shape.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MeshTable {
+    /// For instances and reports; default the file's or the shape's.
+    pub name: Option<String>,
+    /// OBJ.
+    pub file: Option<PathBuf>,
+    /// Only this object or group of the file.
+    pub group: Option<String>,
+    /// Instead of a file.
+    pub shape: Option<Shape>,
+    /// Sphere and disk: edges around; default 64.
+    pub segments: Option<u32>,
+    /// world_from_object.
+    pub transform: Transform,
+    /// A `[[material]]` for all of it.
+    pub material: Option<String>,
+    /// Ignore vertex normals.
+    pub flat: bool,
+    /// Turn inside out.
+    pub flip_normals: bool,
+}
+
+/// An `[[instance]]` table.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InstanceTable {
+    /// Name of a `[[mesh]]`.
+    pub mesh: String,
+    /// Applied after the mesh's own.
+    #[serde(default)]
+    pub transform: Transform,
+    /// A `[[material]]` for all of it.
+    pub material: Option<String>,
+}
+
+/// Reads a scene file.
+///
+/// # Errors
+/// [`Error::Input`] with line, key and, for an unknown key, the nearest known one.
+pub fn parse(path: &Path, text: &str) -> Result<Description> {
+    toml::from_str(text).map_err(|e| {
+        let start = e.span().map_or(0, |s| s.start).min(text.len());
+        let line = 1 + text.as_bytes()[..start].iter().filter(|&&b| b == b'\n').count();
+        Error::input_at(path, format!("line {line}"), explain(e.message()))
+    })
+}
+
+impl Description {
+    /// The file's settings over the defaults.
+    pub fn settings(&self) -> Settings {
+        let (d, film, render) = (Settings::default(), &self.film, &self.render);
+        Settings {
+            width: film.width.unwrap_or(d.width),
+            height: film.height.unwrap_or(d.height),
+            filter: film.filter.unwrap_or(d.filter),
+            spp: render.spp.unwrap_or(d.spp),
+            max_depth: render.max_depth.unwrap_or(d.max_depth),
+            roulette_depth: render.roulette_depth.unwrap_or(d.roulette_depth),
+            clamp_indirect: render.clamp_indirect.unwrap_or(d.clamp_indirect),
+            seed: render.seed.unwrap_or(d.seed),
+            sampler: render.sampler.unwrap_or(d.sampler),
+        }
+    }
+}
+
+/// "unknown field `widht`, expected one of `width`, `height`" becomes one line with the nearest name first.
+fn explain(message: &str) -> String {
+    let quoted: Vec<_> = message.split('`').skip(1).step_by(2).collect();
+    let kind = match message {
+        m if m.starts_with("unknown field") => "key",
+        m if m.starts_with("unknown variant") => "value",
+        m => return m.replace('\n', " "),
+    };
+    let (unknown, known) = quoted.split_first().unwrap_or((&"", &[]));
+    match nearest(unknown, known.iter().copied()) {
+        Some(near) => format!("unknown {kind} \"{unknown}\": did you mean \"{near}\"? Known: {}", known.join(", ")),
+        None => format!("unknown {kind} \"{unknown}\""),
+    }
+}
+
+/// The name that is most like `word`.
+pub fn nearest<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let like = |name: &str| (strsim::jaro_winkler(word, name) * 1e6) as u32;
+    names.max_by_key(|name| like(name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error(text: &str) -> String {
+        parse(Path::new("s.toml"), text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn unknown_keys_name_line_and_neighbour() {
+        let found = error("[film]\nwidth = 4\nheigth = 4\n");
+        assert!(found.starts_with("s.toml, line 3: unknown key \"heigth\": did you mean \"height\"?"), "{found}");
+        assert!(error("[fim]\n").contains("did you mean \"film\""));
+        assert!(error("[[mesh]]\nshape = \"sphre\"").contains("unknown value \"sphre\": did you mean \"sphere\""));
+        assert!(
+            error("[[material]]\nname = \"a\"\ncolour = 1")
+                .contains("line 3: unknown key \"colour\": did you mean \"color\"")
+        );
+        assert!(error("[[mesh]]\ntransform = { scael = 2 }").contains("did you mean \"scale\""));
+    }
+
+    #[test]
+    fn wrong_types_name_their_line() {
+        assert!(error("[film]\n\nwidth = \"wide\"").starts_with("s.toml, line 3: invalid type: string"));
+        assert!(error("[film]\nwidth = -1").contains("line 2"));
+        assert!(error("[[light]]\nposition = [1, 2, 3]").contains("missing field `type`"));
+        assert!(error("[film\n").starts_with("s.toml, line 1"));
+        for text in ["[film]\nwidth = \"wide\"", "a = 1", "[[", "\u{0}"] {
+            assert!(!error(text).contains('\n'), "{}", error(text));
+        }
+    }
+
+    #[test]
+    fn everything_has_a_default_and_numbers_may_be_integers() {
+        let empty = parse(Path::new("s.toml"), "").unwrap();
+        assert_eq!(empty.settings(), Settings::default());
+        let text = "[film]\nwidth = 8\nfilter = \"tent\"\n[environment]\nradiance = 2\n[[material]]\nname = \"a\"\ncolor = [1, 0.5, 0]";
+        let d = parse(Path::new("s.toml"), text).unwrap();
+        assert_eq!((d.settings().width, d.settings().filter), (8, PixelFilter::Tent));
+        assert_eq!(d.environment.unwrap().radiance, Some(Rgb([2.0; 3])));
+        assert_eq!(d.material[0].color, Some(Rgb([1.0, 0.5, 0.0])));
+    }
+}

@@ -1,0 +1,136 @@
+//! What a scene and its settings call for, and who calls: kernels are compiled without the rest.
+use super::{Scene, geometry};
+use crate::gpu::layout::*;
+use crate::settings::{PixelFilter, Sampler};
+
+/// Roughness below which an interface is smooth; kernels draw the same line.
+const SMOOTH: f32 = 0.01;
+
+/// The effects of a scene with its settings, and for each one that is on the first object, material, light or setting
+/// that calls for it. `split_light`: direct and indirect light are wanted apart. `counters`: rays are counted.
+pub fn effects(scene: &Scene, split_light: bool, counters: bool) -> (Effects, Vec<(&'static str, String)>) {
+    let mut reasons = Vec::new();
+    let used = used_materials(scene);
+    let mut material = |name, calls: &dyn Fn(&Material) -> bool| {
+        let first = (0..scene.materials.len()).find(|&i| used[i] && calls(&scene.materials[i]));
+        first.inspect(|&i| reasons.push((name, format!("material \"{}\"", scene.names.materials[i])))).is_some()
+    };
+    let interface = |m: &Material| m.kind != BSDF_DIFFUSE;
+    let bumped =
+        |m: &Material, normal_map| m.bump_texture != NONE && (m.flags & MATERIAL_NORMAL_MAP != 0) == normal_map;
+    // A roughness map may take any part of the surface below the line.
+    let smooth = |m: &Material| interface(m) && (m.alpha < SMOOTH || m.roughness_texture != NONE);
+    let rough = |m: &Material| interface(m) && m.alpha >= SMOOTH;
+    let mut found = Effects {
+        textures: material("textures", &|m| {
+            [m.base_texture, m.specular_texture, m.roughness_texture, m.emission_texture].iter().any(|&t| t != NONE)
+        }),
+        bump_maps: material("bump_maps", &|m| bumped(m, false)),
+        normal_maps: material("normal_maps", &|m| bumped(m, true)),
+        alpha_masks: material("alpha_masks", &|m| m.flags & MATERIAL_MASKED != 0),
+        diffuse: material("diffuse", &|m| matches!(m.kind, BSDF_DIFFUSE | BSDF_COATED)),
+        conductor: material("conductor", &|m| m.kind == BSDF_CONDUCTOR),
+        dielectric: material("dielectric", &|m| m.kind == BSDF_DIELECTRIC),
+        coated: material("coated", &|m| m.kind == BSDF_COATED),
+        rough: material("rough", &rough),
+        smooth_interface: material("smooth_interface", &smooth),
+        beckmann: material("beckmann", &|m| rough(m) && m.flags & MATERIAL_GGX == 0),
+        ggx: material("ggx", &|m| rough(m) && m.flags & MATERIAL_GGX != 0),
+        ..Effects::default()
+    };
+    light_effects(scene, &mut found, &mut reasons);
+    other_effects(scene, split_light, counters, &mut found, &mut reasons);
+    let order: Vec<_> = found.entries().into_iter().map(|e| e.0).collect();
+    reasons.sort_by_key(|r| order.iter().position(|&name| name == r.0));
+    (found, reasons)
+}
+
+/// Materials that a triangle or an instance wears.
+fn used_materials(scene: &Scene) -> Vec<bool> {
+    let mut used = vec![false; scene.materials.len()];
+    let triangles = scene.triangles.iter().map(|t| t.material);
+    let worn = triangles.chain(scene.instances.iter().map(|i| i.material).filter(|&m| m != NONE));
+    worn.for_each(|m| used[m as usize] = true);
+    used
+}
+
+fn light_effects(scene: &Scene, found: &mut Effects, reasons: &mut Vec<(&'static str, String)>) {
+    let mut light = |name, kind| {
+        let first = scene.lights.iter().position(|l| l.kind == kind);
+        first.inspect(|&i| reasons.push((name, light_name(scene, i)))).is_some()
+    };
+    found.emissive = light("emissive", LIGHT_TRIANGLE);
+    found.point_lights = light("point_lights", LIGHT_POINT);
+    found.spot_lights = light("spot_lights", LIGHT_SPOT);
+    found.directional_lights = light("directional_lights", LIGHT_DIRECTIONAL);
+    found.environment = light("environment", LIGHT_ENVIRONMENT);
+    found.environment_map = scene.environment.is_some() && light("environment_map", LIGHT_ENVIRONMENT);
+}
+
+fn light_name(scene: &Scene, index: usize) -> String {
+    let light = &scene.lights[index];
+    match scene.names.materials.get(light.material as usize) {
+        Some(name) => format!("material \"{name}\""),
+        None if light.kind == LIGHT_ENVIRONMENT => "environment".into(),
+        None => format!("light {index}"),
+    }
+}
+
+fn other_effects(
+    scene: &Scene,
+    split_light: bool,
+    counters: bool,
+    found: &mut Effects,
+    reasons: &mut Vec<(&'static str, String)>,
+) {
+    let s = &scene.settings;
+    let mut because = |name, on: bool, why: String| {
+        if on {
+            reasons.push((name, why));
+        }
+        on
+    };
+    let bent = scene.shading.iter().position(|s| s.normal != geometry::FLAT);
+    let object = bent.map(|i| scene.triangles[i].object as usize).and_then(|o| scene.names.objects.get(o));
+    let named = format!("object \"{}\"", object.map_or("", |o| o));
+    found.smooth_normals = because("smooth_normals", bent.is_some(), named);
+    found.lens = because("lens", scene.camera.lens_radius > 0.0, "camera lens_radius".into());
+    let instances = scene.instances.len();
+    found.instances = because("instances", instances > 0, format!("{instances} instances"));
+    found.indirect = because("indirect", s.max_depth > 2, format!("max_depth {}", s.max_depth));
+    found.roulette = because("roulette", s.roulette_depth > 0, format!("roulette_depth {}", s.roulette_depth));
+    found.clamp = because("clamp", s.clamp_indirect > 0.0, format!("clamp_indirect {}", s.clamp_indirect));
+    found.pixel_filter = because("pixel_filter", s.filter != PixelFilter::Box, format!("filter {:?}", s.filter));
+    found.split_light =
+        because("split_light", split_light, "an output that keeps direct and indirect light apart".into());
+    let independent = s.sampler == Sampler::Independent;
+    found.independent_sampler = because("independent_sampler", independent, "sampler independent".into());
+    found.counters = because("counters", counters, "ray counters".into());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::material::Materials;
+
+    #[test]
+    fn only_what_is_worn_calls() {
+        let mut scene = Scene::default();
+        let mut mirror = Materials::plain([0.0; 3]);
+        mirror.kind = BSDF_CONDUCTOR;
+        scene.materials = vec![Materials::plain([0.5; 3]), mirror];
+        scene.names.materials = vec!["wall".into(), "mirror".into()];
+        scene.names.objects = vec!["box".into()];
+        scene.triangles = vec![Triangle::default()];
+        scene.settings.max_depth = 2;
+        let (found, reasons) = effects(&scene, false, false);
+        assert_eq!(found, Effects { diffuse: true, ..Effects::default() });
+        assert_eq!(reasons, [("diffuse", "material \"wall\"".to_owned())]);
+        scene.triangles[0].material = 1;
+        let (found, reasons) = effects(&scene, true, false);
+        let expected = Effects { conductor: true, smooth_interface: true, split_light: true, ..Effects::default() };
+        assert_eq!(found, expected);
+        assert_eq!(reasons[0], ("conductor", "material \"mirror\"".to_owned()));
+        assert_eq!(reasons.len(), 3);
+    }
+}

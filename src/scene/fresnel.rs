@@ -1,0 +1,111 @@
+//! Optical constants: metals by name, indices from a reflectance, mean Fresnel reflectance of a dielectric.
+
+/// Names, then index of refraction and extinction for linear Rec. 709 red, green, blue.
+type Metal = (&'static [&'static str], [f32; 3], [f32; 3]);
+
+/// Spectral measurements integrated against the CIE 1931 observer and converted to Rec. 709, the table that the
+/// Tungsten renderer (Bitterli 2014) ships and other renderers have taken over.
+const METALS: &[Metal] = &[
+    (&["silver", "ag"], [0.155_264_65, 0.116_723_3, 0.138_380_7], [4.828_343_4, 3.122_246, 2.146_950_5]),
+    (&["aluminium", "aluminum", "al"], [1.657_46, 0.880_368_95, 0.521_228_73], [9.223_869, 6.269_523, 4.837_001]),
+    (&["gold", "au"], [0.143_118_95, 0.374_957_04, 1.442_478_5], [3.983_160_5, 2.385_720_7, 1.603_215_3]),
+    (&["chromium", "cr"], [4.369_683, 2.916_702_5, 1.654_700_5], [5.206_434, 4.231_364_7, 3.754_946_7]),
+    (&["copper", "cu"], [0.200_437_7, 0.924_033_46, 1.102_212], [3.912_948_6, 2.452_847_7, 2.142_188]),
+];
+
+/// Index of refraction and extinction of a metal.
+///
+/// # Errors
+/// A sentence with the names that are known.
+pub fn metal(name: &str) -> Result<([f32; 3], [f32; 3]), String> {
+    let lower = name.to_lowercase();
+    match METALS.iter().find(|(names, ..)| names.contains(&lower.as_str())) {
+        Some(&(_, eta, k)) => Ok((eta, k)),
+        None => {
+            let known: Vec<_> = METALS.iter().map(|m| m.0[0]).collect();
+            Err(format!("metal \"{name}\" is not known: choose {}, or give eta and k", known.join(", ")))
+        }
+    }
+}
+
+/// One channel's (eta, k) with reflectance `r` at normal incidence and full edge tint (Gulbrandsen 2014, "Artist
+/// Friendly Metallic Fresnel", with edge tint 1, where his formulas reduce to these). r = 1 gives (0, 1), whose
+/// Fresnel reflectance is 1 at every angle: the mirror.
+pub fn metal_from_reflectance(r: f32) -> (f32, f32) {
+    let r = r.clamp(0.0, 1.0);
+    ((1.0 - r) / (1.0 + r), 2.0 * r.sqrt() / (1.0 + r))
+}
+
+/// Reflectance at normal incidence of a dielectric of relative index `eta`.
+pub fn normal_reflectance(eta: f32) -> f32 {
+    ((eta - 1.0) / (eta + 1.0)).powi(2)
+}
+
+/// Unpolarised Fresnel reflectance for relative index `eta` (transmitted / incident side).
+fn dielectric(cos: f64, eta: f64) -> f64 {
+    let sin2 = (1.0 - cos * cos) / (eta * eta);
+    if sin2 >= 1.0 {
+        return 1.0;
+    }
+    let inner = (1.0 - sin2).sqrt();
+    let parallel = (eta * cos - inner) / (eta * cos + inner);
+    let perpendicular = (cos - eta * inner) / (cos + eta * inner);
+    (parallel * parallel + perpendicular * perpendicular) / 2.0
+}
+
+/// Mean over cosine-weighted directions inside a medium of index `eta` of the reflectance of its interface: what a
+/// diffuse base under a coat gets back. From the outside mean by reciprocity, `1 - (1 - outside) / eta^2`.
+pub fn mean_internal(eta: f32) -> f32 {
+    let (eta, steps) = (f64::from(eta), 2048);
+    let outside: f64 = (0..steps)
+        .map(|i| (f64::from(i) + 0.5) / f64::from(steps))
+        .map(|cos| 2.0 * cos * dielectric(cos, eta) / f64::from(steps))
+        .sum();
+    (1.0 - (1.0 - outside) / (eta * eta)).clamp(0.0, 1.0) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Exact unpolarised reflectance of a conductor (Born and Wolf), for the checks below.
+    fn conductor(cos: f64, eta: f64, k: f64) -> f64 {
+        let (sin2, cos2) = (1.0 - cos * cos, cos * cos);
+        let t0 = eta * eta - k * k - sin2;
+        let ab = (t0 * t0 + 4.0 * eta * eta * k * k).sqrt();
+        let a = ((ab + t0) / 2.0).max(0.0).sqrt();
+        let rs = (ab + cos2 - 2.0 * a * cos) / (ab + cos2 + 2.0 * a * cos);
+        let (t3, t4) = (cos2 * ab + sin2 * sin2, 2.0 * a * cos * sin2);
+        (rs + rs * (t3 - t4) / (t3 + t4)) / 2.0
+    }
+
+    #[test]
+    fn the_mirror_reflects_everything_at_every_angle() {
+        for cos in [0.01, 0.3, 0.7, 1.0] {
+            assert_eq!(conductor(cos, 0.0, 1.0), 1.0);
+            assert!(conductor(cos, 0.1, 1.0) < 1.0, "control: a lossy index does not");
+        }
+    }
+
+    #[test]
+    fn reflectance_gives_its_own_index_back() {
+        for r in [0.0, 0.2, 0.5, 0.95, 1.0] {
+            let (eta, k) = metal_from_reflectance(r);
+            assert!((conductor(1.0, eta.into(), k.into()) - f64::from(r)).abs() < 1e-6, "{r}");
+        }
+    }
+
+    #[test]
+    fn internal_mean_matches_the_published_values() {
+        // d'Eon and Irving 2011, as Mitsuba tabulates it: 0.5963 for 1.5; water 1.333: 0.4718.
+        assert!((mean_internal(1.5) - 0.5963).abs() < 5e-4, "{}", mean_internal(1.5));
+        assert!((mean_internal(1.333) - 0.472).abs() < 2e-3, "{}", mean_internal(1.333));
+        assert_eq!(mean_internal(1.0), 0.0);
+    }
+
+    #[test]
+    fn metals_have_names() {
+        assert_eq!(metal("Gold").unwrap(), metal("au").unwrap());
+        assert!(metal("unobtainium").unwrap_err().contains("gold"));
+    }
+}

@@ -1,0 +1,258 @@
+//! The growing triangle arrays: placement, repair of what can be repaired, packing of normals.
+use crate::gpu::layout::{NONE, Shading, Triangle};
+use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
+
+/// Triangles and, once one of them needs it, their shading records. All meshes of a scene share one.
+#[derive(Debug, Default)]
+pub struct Geometry {
+    /// In the order of input until the BVH sorts them.
+    pub triangles: Vec<Triangle>,
+    /// Empty, or as long as `triangles`.
+    pub shading: Vec<Shading>,
+}
+
+/// How a mesh enters the scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Placement {
+    /// To the space the triangles are stored in. Invertible.
+    pub affine: DAffine3,
+    /// Ignore vertex normals.
+    pub flat: bool,
+    /// Turn every triangle and its normals around.
+    pub flip: bool,
+    /// Keep texture coordinates.
+    pub uvs: bool,
+}
+
+/// One triangle of a file, in file space.
+#[derive(Clone, Copy, Debug)]
+pub struct Corners {
+    /// Positions.
+    pub p: [Vec3; 3],
+    /// Vertex normals of any length.
+    pub n: Option<[Vec3; 3]>,
+    /// Texture coordinates, v up.
+    pub uv: Option<[Vec2; 3]>,
+}
+
+/// What a triangle is called in reports and shaded with.
+#[derive(Clone, Copy, Debug)]
+pub struct Tag {
+    /// Index in the file.
+    pub primitive: u32,
+    /// Index into the materials.
+    pub material: u32,
+    /// Index of the object.
+    pub object: u32,
+}
+
+/// What was dropped or mended, counted for the warnings.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Repairs {
+    /// Triangles dropped for a NaN or infinite coordinate.
+    pub not_finite: usize,
+    /// Triangles dropped for having no area.
+    pub no_area: usize,
+    /// Triangles whose vertex normals are unusable: shaded flat.
+    pub bad_normals: usize,
+    /// Triangles whose texture coordinates are not finite: set to zero.
+    pub bad_uvs: usize,
+}
+
+impl Repairs {
+    /// One line, or `None` when nothing was wrong.
+    pub fn warning(&self, mesh: &str) -> Option<String> {
+        let rows = [
+            (self.not_finite, "with NaN or infinite coordinates dropped"),
+            (self.no_area, "without area dropped"),
+            (self.bad_normals, "with unusable vertex normals shaded flat"),
+            (self.bad_uvs, "with NaN or infinite texture coordinates set to zero"),
+        ];
+        let said: Vec<_> = rows.iter().filter(|r| r.0 > 0).map(|(n, what)| format!("{n} {what}")).collect();
+        (!said.is_empty()).then(|| format!("{mesh}: triangles repaired: {}", said.join(", ")))
+    }
+}
+
+/// A coordinate beyond [`super::MAX_COORDINATE`].
+#[derive(Clone, Copy, Debug)]
+pub struct TooFar(pub f32);
+
+impl Geometry {
+    /// Adds one triangle, placed, or counts why not.
+    pub fn push(&mut self, c: &Corners, tag: Tag, at: &Placement, repairs: &mut Repairs) -> Result<(), TooFar> {
+        if !c.p.iter().all(|p| p.is_finite()) {
+            repairs.not_finite += 1;
+            return Ok(());
+        }
+        let mut p = c.p.map(|p| at.affine.transform_point3(p.as_dvec3()).as_vec3());
+        let far = p.iter().map(|p| p.abs().max_element()).fold(0.0, f32::max);
+        if !(far <= super::MAX_COORDINATE as f32) {
+            return Err(TooFar(far));
+        }
+        // A mirror turns windings around; swapping two corners keeps the outside of the mesh outside.
+        let swap = (at.affine.matrix3.determinant() < 0.0) != at.flip;
+        if swap {
+            p.swap(1, 2);
+        }
+        let Some(face) = face_normal(p) else {
+            repairs.no_area += 1;
+            return Ok(());
+        };
+        let normal = self.normals(c, at, swap, face, repairs);
+        let uv = c.uv.filter(|_| at.uvs).map(|uv| sane_uvs(uv, swap, repairs));
+        self.shade(normal, uv);
+        let Tag { primitive, material, object } = tag;
+        let [v0, v1, v2] = p.map(|p| p.to_array());
+        self.triangles.push(Triangle { v0, primitive, v1, material, v2, object });
+        Ok(())
+    }
+
+    /// Packed vertex normals; `FLAT` where they say no more than the face does.
+    fn normals(&self, c: &Corners, at: &Placement, swap: bool, face: Vec3, repairs: &mut Repairs) -> [u32; 3] {
+        let Some(mut n) = c.n.filter(|_| !at.flat) else { return FLAT };
+        if swap {
+            n.swap(1, 2);
+        }
+        let to_normal: DMat3 = at.affine.matrix3.inverse().transpose();
+        let sign = if at.flip { -1.0 } else { 1.0 };
+        let n = n.map(|n| (to_normal * n.as_dvec3() * sign).try_normalize().map(|n| n.as_vec3()));
+        let [Some(a), Some(b), Some(c)] = n else {
+            repairs.bad_normals += 1;
+            return FLAT;
+        };
+        match [a, b, c].map(encode_normal) {
+            codes if codes == [encode_normal(face); 3] => FLAT,
+            codes => codes,
+        }
+    }
+
+    fn shade(&mut self, normal: [u32; 3], uv: Option<[Vec2; 3]>) {
+        if self.shading.is_empty() {
+            if normal == FLAT && uv.is_none() {
+                return;
+            }
+            let flat = Shading { normal: FLAT, ..Shading::default() };
+            self.shading = vec![flat; self.triangles.len()];
+        }
+        let [uv0, uv1, uv2] = uv.unwrap_or_default().map(|uv| uv.to_array());
+        self.shading.push(Shading { normal, uv0, uv1, uv2, pad: [0; 3] });
+    }
+}
+
+/// The code of a triangle without vertex normals.
+pub const FLAT: [u32; 3] = [NONE; 3];
+
+/// Unit normal by the right-hand rule, or `None` where rounding leaves no area (below 1e-12 of the longest edge squared).
+fn face_normal(p: [Vec3; 3]) -> Option<Vec3> {
+    let [a, b, c] = p.map(|p| p.as_dvec3());
+    let cross = (b - a).cross(c - a);
+    let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
+    let area = cross.length();
+    (area > longest * 1e-12 && area > f64::from(f32::MIN_POSITIVE)).then(|| (cross / area).as_vec3())
+}
+
+/// Area in square world units, of the triangle as stored.
+pub fn area(t: [[f32; 3]; 3]) -> f64 {
+    let [a, b, c] = t.map(|p| DVec3::from(p.map(f64::from)));
+    (b - a).cross(c - a).length() / 2.0
+}
+
+fn sane_uvs(mut uv: [Vec2; 3], swap: bool, repairs: &mut Repairs) -> [Vec2; 3] {
+    if !uv.iter().all(|uv| uv.is_finite()) {
+        repairs.bad_uvs += 1;
+        return [Vec2::ZERO; 3];
+    }
+    if swap {
+        uv.swap(1, 2);
+    }
+    uv
+}
+
+/// Octahedral map of a unit vector (Cigolle et al. 2014), snorm 2 x 16, x in the low half.
+pub fn encode_normal(n: Vec3) -> u32 {
+    let p = n.truncate() / (n.x.abs() + n.y.abs() + n.z.abs());
+    let sign = Vec2::new(1f32.copysign(p.x), 1f32.copysign(p.y));
+    let p = if n.z < 0.0 { (1.0 - Vec2::new(p.y, p.x).abs()) * sign } else { p };
+    let snorm = |v: f32| u32::from((v.clamp(-1.0, 1.0) * 32767.0).round() as i16 as u16);
+    match snorm(p.x) | snorm(p.y) << 16 {
+        NONE => NONE << 16, // means "flat": the neighbouring code is 4e-5 radians away
+        code => code,
+    }
+}
+
+/// Inverse of [`encode_normal`], as kernels compute it.
+#[cfg(test)]
+pub fn decode_normal(code: u32) -> Vec3 {
+    let unpack = |v: u32| f32::from(v as u16 as i16) / 32767.0;
+    let p = Vec2::new(unpack(code), unpack(code >> 16));
+    let z = 1.0 - p.x.abs() - p.y.abs();
+    let fold = (-z).max(0.0);
+    Vec3::new(p.x - fold.copysign(p.x), p.y - fold.copysign(p.y), z).normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLAIN: Placement = Placement { affine: DAffine3::IDENTITY, flat: false, flip: false, uvs: true };
+    const TAG: Tag = Tag { primitive: 0, material: 0, object: 0 };
+    const P: [Vec3; 3] = [Vec3::ZERO, Vec3::X, Vec3::Y];
+
+    fn push(c: Corners, at: Placement) -> (Geometry, Repairs) {
+        let (mut g, mut r) = Default::default();
+        Geometry::push(&mut g, &c, TAG, &at, &mut r).unwrap();
+        (g, r)
+    }
+
+    #[test]
+    fn normals_survive_packing() {
+        let mut worst = 0f32;
+        for i in 0..10_000 {
+            let (z, phi) = (1.0 - (i as f32 + 0.5) / 5000.0, i as f32 * 2.399_963);
+            let n = Vec3::new(phi.cos(), phi.sin(), 0.0) * (1.0 - z * z).sqrt() + Vec3::Z * z;
+            worst = worst.max(decode_normal(encode_normal(n)).distance(n));
+        }
+        assert!(worst < 6e-5, "{worst}");
+        for n in [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z] {
+            assert_eq!(decode_normal(encode_normal(n)), n);
+        }
+    }
+
+    #[test]
+    fn normals_equal_to_the_face_are_flat_and_others_are_not() {
+        let face = Corners { p: P, n: Some([Vec3::Z * 3.0; 3]), uv: None };
+        assert!(push(face, PLAIN).0.shading.is_empty());
+        let bent = Corners { n: Some([Vec3::Z, Vec3::Z, Vec3::new(0.1, 0.0, 1.0)]), ..face };
+        assert_eq!(push(bent, PLAIN).0.shading.len(), 1);
+        assert!(push(bent, Placement { flat: true, ..PLAIN }).0.shading.is_empty());
+    }
+
+    #[test]
+    fn a_mirror_keeps_the_outside_outside() {
+        let affine = DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
+        let face = Corners { p: P, n: Some([Vec3::Z; 3]), uv: Some([Vec2::ZERO, Vec2::X, Vec2::Y]) };
+        let (g, _) = push(face, Placement { affine, ..PLAIN });
+        let t = g.triangles[0];
+        assert_eq!(face_normal([t.v0, t.v1, t.v2].map(Vec3::from)), Some(Vec3::Z));
+        assert_eq!((t.v1, g.shading[0].uv1), ([0.0, 1.0, 0.0], [0.0, 1.0]), "corner and coordinate move together");
+        let (g, _) = push(face, Placement { flip: true, ..PLAIN });
+        let t = g.triangles[0];
+        assert_eq!(face_normal([t.v0, t.v1, t.v2].map(Vec3::from)), Some(-Vec3::Z));
+    }
+
+    #[test]
+    fn what_cannot_be_kept_is_counted() {
+        let plain = Corners { p: P, n: None, uv: None };
+        let nan = Corners { p: [Vec3::ZERO, Vec3::NAN, Vec3::Y], ..plain };
+        let line = Corners { p: [Vec3::ZERO, Vec3::X, Vec3::X * 2.0], ..plain };
+        assert_eq!(push(nan, PLAIN).1, Repairs { not_finite: 1, ..Repairs::default() });
+        assert_eq!(push(line, PLAIN).1, Repairs { no_area: 1, ..Repairs::default() });
+        assert_eq!(push(plain, PLAIN).1.warning("mesh"), None);
+        assert!(push(line, PLAIN).1.warning("mesh").unwrap().contains("1 without area"));
+        let zero = Corners { n: Some([Vec3::ZERO; 3]), uv: Some([Vec2::NAN; 3]), ..plain };
+        assert_eq!(push(zero, PLAIN).1, Repairs { bad_normals: 1, bad_uvs: 1, ..Repairs::default() });
+        let far = Corners { p: P.map(|p| p * 1e19), ..plain };
+        let (mut g, mut r) = <(Geometry, Repairs)>::default();
+        assert!(g.push(&far, TAG, &PLAIN, &mut r).is_err());
+    }
+}

@@ -1,0 +1,198 @@
+//! The list of lights and the table that chooses one in proportion to its power.
+//!
+//! Power, by luminance, in watts up to a common factor: emissive triangle `pi * area * L` (front side, L the mean over
+//! its texture), point `4 pi I`, spot `2 pi I (1 - mean of the two cosines)`, directional `pi R^2 E`, environment
+//! `4 pi^2 R^2` times its mean, R the radius of the scene.
+use super::environment::{luminance, mean_luminance};
+use super::value::Rgb;
+use super::{Scene, alias, geometry, texture};
+use crate::gpu::layout::*;
+use glam::{DMat3, Mat4, Vec3, Vec4};
+use serde::Deserialize;
+use std::collections::HashMap;
+use std::f64::consts::PI;
+use std::ops::Range;
+
+/// Which light a `[[light]]` table is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Type {
+    /// In all directions from `position`.
+    Point,
+    /// In a cone from `position`.
+    Spot,
+    /// Parallel light.
+    Directional,
+}
+
+/// A `[[light]]` table. Positions in world units.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LightTable {
+    /// Which.
+    #[serde(rename = "type")]
+    pub kind: Type,
+    /// Point, spot.
+    pub position: Option<[f32; 3]>,
+    /// Spot, directional: the way light travels; any length.
+    pub direction: Option<[f32; 3]>,
+    /// Spot: a point on its axis, instead of `direction`.
+    pub target: Option<[f32; 3]>,
+    /// Point, spot (on its axis): W/sr.
+    pub intensity: Option<Rgb>,
+    /// Directional: W/m^2 on a facing plane.
+    pub irradiance: Option<Rgb>,
+    /// Spot: degrees from the axis up to which intensity is full; default three quarters of `cutoff`.
+    pub cone: Option<f32>,
+    /// Spot: degrees from the axis beyond which there is none; default 20.
+    pub cutoff: Option<f32>,
+}
+
+impl LightTable {
+    /// The device's light.
+    ///
+    /// # Errors
+    /// A sentence that names the key at fault.
+    pub fn build(&self) -> Result<Light, String> {
+        let position = || finite(self.position.ok_or("needs a position")?, "position");
+        let light = Light { triangle: NONE, material: NONE, ..Light::default() };
+        match self.kind {
+            Type::Point => {
+                let value = emitted(self.intensity, "intensity")?;
+                Ok(Light { kind: LIGHT_POINT, a: position()?, value, ..light })
+            }
+            Type::Directional => {
+                let value = emitted(self.irradiance, "irradiance")?;
+                Ok(Light { kind: LIGHT_DIRECTIONAL, b: self.axis(Vec3::ZERO)?, value, ..light })
+            }
+            Type::Spot => {
+                let a = position()?;
+                let cutoff = self.cutoff.unwrap_or(20.0);
+                let cone = self.cone.unwrap_or(cutoff * 0.75);
+                if !(0.0..=cutoff).contains(&cone) || !(cutoff > 0.0 && cutoff <= 180.0) {
+                    return Err(format!("cone {cone} and cutoff {cutoff}: need 0 <= cone <= cutoff <= 180 degrees"));
+                }
+                let c = [cone.to_radians().cos(), cutoff.to_radians().cos(), 0.0];
+                let value = emitted(self.intensity, "intensity")?;
+                Ok(Light { kind: LIGHT_SPOT, a, b: self.axis(a.into())?, c, value, ..light })
+            }
+        }
+    }
+
+    /// Unit direction of travel.
+    fn axis(&self, from: Vec3) -> Result<[f32; 3], String> {
+        let direction = match (self.direction, self.target) {
+            (Some(d), None) => Vec3::from(d),
+            (None, Some(t)) if self.kind == Type::Spot => Vec3::from(t) - from,
+            _ => return Err("needs a direction (spot: or a target), not both".into()),
+        };
+        let unit = direction.as_dvec3().try_normalize().ok_or("the direction has no length")?;
+        Ok(unit.as_vec3().to_array())
+    }
+}
+
+fn finite(v: [f32; 3], key: &str) -> Result<[f32; 3], String> {
+    match v.iter().all(|v| v.abs() <= super::MAX_COORDINATE as f32) {
+        true => Ok(v),
+        false => Err(format!("{key} {v:?} is not within {:e}", super::MAX_COORDINATE)),
+    }
+}
+
+fn emitted(v: Option<Rgb>, key: &str) -> Result<[f32; 3], String> {
+    let v = v.ok_or_else(|| format!("needs {key}"))?.0;
+    match v.iter().all(|v| (0.0..=1e30).contains(v)) {
+        true => Ok(v),
+        false => Err(format!("{key} {v:?} is negative, NaN or above 1e30")),
+    }
+}
+
+/// The environment's light; `radiance` is its constant, or what its image is multiplied by.
+pub fn environment(radiance: [f32; 3], world_from_environment: DMat3) -> Light {
+    // Rows of the inverse of a rotation are its columns.
+    let [a, b, c] = [0, 1, 2].map(|i| world_from_environment.col(i).as_vec3().to_array());
+    Light { kind: LIGHT_ENVIRONMENT, a, b, c, triangle: NONE, value: radiance, material: NONE, ..Light::default() }
+}
+
+/// Adds the emissive triangles to the scene's lights (which hold the others), drops lights without power, and builds
+/// the table. Sets [`Material::emission_weight`], [`Light::probability`] and [`Scene::triangle_pdf_scale`].
+pub fn finish(scene: &mut Scene, ranges: &HashMap<u32, Range<usize>>) {
+    for material in &mut scene.materials {
+        let mean = match scene.textures.get(material.emission_texture as usize) {
+            Some(t) => texture::mean(t, &scene.texels),
+            None => [1.0; 3],
+        };
+        let emission: [f32; 3] = std::array::from_fn(|c| material.emission[c] * mean[c]);
+        material.emission_weight = luminance(emission);
+    }
+    let mut lights = std::mem::take(&mut scene.lights);
+    add_triangles(scene, ranges, &mut lights);
+    let mut powers: Vec<f64> = lights.iter().map(|l| power(scene, l)).collect();
+    let mut kept = powers.iter();
+    lights.retain(|_| kept.next().is_some_and(|&p| p > 0.0));
+    powers.retain(|&p| p > 0.0);
+    let total: f64 = powers.iter().sum();
+    scene.triangle_pdf_scale = if total > 0.0 { (PI / total) as f32 } else { 0.0 };
+    scene.light_table = alias::build(&powers);
+    let probabilities = alias::probabilities(&scene.light_table);
+    lights.iter_mut().zip(probabilities).for_each(|(l, p)| l.probability = p as f32);
+    scene.lights = lights;
+}
+
+/// Emissive triangles in world space: of the only level, or of every instance. `ranges` are the triangles below
+/// each root that instances name.
+fn add_triangles(scene: &Scene, ranges: &HashMap<u32, Range<usize>>, lights: &mut Vec<Light>) {
+    if scene.instances.is_empty() {
+        let whole = 0..scene.triangles.len();
+        add_range(scene, whole, |p| p, None, false, lights);
+    }
+    for instance in &scene.instances {
+        let range = &ranges[&instance.root];
+        let rows = [instance.world0, instance.world1, instance.world2].map(Vec4::from);
+        let world = Mat4::from_cols(rows[0], rows[1], rows[2], Vec4::W).transpose();
+        let place = |p: Vec3| world.transform_point3(p);
+        let material = (instance.material != NONE).then_some(instance.material);
+        add_range(scene, range.clone(), place, material, instance.mirrored == 1, lights);
+    }
+}
+
+fn add_range(
+    scene: &Scene,
+    range: Range<usize>,
+    place: impl Fn(Vec3) -> Vec3,
+    material: Option<u32>,
+    mirrored: bool,
+    lights: &mut Vec<Light>,
+) {
+    for index in range {
+        let t = &scene.triangles[index];
+        let material = material.unwrap_or(t.material);
+        let m = &scene.materials[material as usize];
+        if m.emission_weight <= 0.0 {
+            continue;
+        }
+        let [a, mut b, mut c] = [t.v0, t.v1, t.v2].map(|p| place(p.into()).to_array());
+        if mirrored {
+            std::mem::swap(&mut b, &mut c); // the front of the mesh stays in front
+        }
+        let triangle = if m.emission_texture == NONE { NONE } else { index as u32 };
+        let light = Light { kind: LIGHT_TRIANGLE, a, b, c, triangle, value: m.emission, material, ..Light::default() };
+        lights.push(light);
+    }
+}
+
+/// See the module documentation.
+fn power(scene: &Scene, light: &Light) -> f64 {
+    let [low, high] = scene.bounds.map(|b| Vec3::from(b).as_dvec3());
+    let radius = ((high - low).length() / 2.0).max(if scene.triangles.is_empty() { 1.0 } else { 0.0 });
+    let value = f64::from(luminance(light.value));
+    match light.kind {
+        LIGHT_TRIANGLE => {
+            let weight = scene.materials[light.material as usize].emission_weight;
+            PI * geometry::area([light.a, light.b, light.c]) * f64::from(weight)
+        }
+        LIGHT_POINT => 4.0 * PI * value,
+        LIGHT_SPOT => 2.0 * PI * value * (1.0 - f64::from(light.c[0] + light.c[1]) / 2.0),
+        LIGHT_DIRECTIONAL => PI * radius * radius * value,
+        _ => 4.0 * PI * PI * radius * radius * value * scene.environment.as_ref().map_or(1.0, mean_luminance),
+    }
+}

@@ -1,0 +1,249 @@
+//! OBJ files through tobj, behind a reader that repairs what tobj does not and knows the line of every mistake.
+use super::material::Materials;
+use super::mtl::{self, Mtl};
+use super::obj_lines::ObjLines;
+use crate::error::{Error, Result};
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+/// A parsed OBJ file.
+#[derive(Debug, Default)]
+pub struct ObjFile {
+    /// Single-indexed triangle meshes; within one, either every corner has a normal (coordinate) or none has.
+    pub models: Vec<tobj::Model>,
+    /// Scene material of each model.
+    pub materials: Vec<u32>,
+}
+
+/// What all OBJ files of a scene share.
+#[derive(Debug, Default)]
+pub struct Library {
+    /// The scene's materials so far.
+    pub materials: Materials,
+    /// `[[material]]` tables by name: they win over MTL materials.
+    pub tables: HashMap<String, u32>,
+    /// MTL files already read.
+    mtls: HashMap<PathBuf, Vec<(String, u32)>>,
+    /// The grey of triangles without a material.
+    grey: Option<u32>,
+    /// What was repaired.
+    pub warnings: Vec<String>,
+}
+
+impl Library {
+    /// Index of the grey that stands in for missing materials.
+    pub fn grey(&mut self) -> u32 {
+        let materials = &mut self.materials;
+        *self.grey.get_or_insert_with(|| materials.push("(default)", Materials::plain([0.6; 3])))
+    }
+
+    /// Names and indices of the materials of an MTL file, read once.
+    fn mtl(&mut self, path: &Path) -> Result<Vec<(String, u32)>> {
+        if let Some(known) = self.mtls.get(path) {
+            return Ok(known.clone());
+        }
+        let bytes = std::fs::read(path).map_err(|e| Error::input(path, format!("cannot be read: {e}")))?;
+        let blocks = mtl::parse(path, &String::from_utf8_lossy(&bytes))?;
+        let names = blocks.iter().map(|b| Ok((b.name.clone(), self.block(path, b)?))).collect::<Result<Vec<_>>>()?;
+        self.mtls.insert(path.to_owned(), names.clone());
+        Ok(names)
+    }
+
+    fn block(&mut self, path: &Path, block: &Mtl) -> Result<u32> {
+        if let Some(&index) = self.tables.get(&block.name) {
+            return Ok(index);
+        }
+        let place = || format!("material \"{}\"", block.name);
+        self.materials.push_mtl(block, &mut self.warnings).map_err(|what| Error::input_at(path, place(), what))
+    }
+
+    /// Materials of an `mtllib` statement: one file whose name may hold spaces, or several files.
+    fn mtllib(&mut self, obj: &Path, statement: &str) -> Result<Vec<(String, u32)>> {
+        let directory = obj.parent().unwrap_or(Path::new(""));
+        let written = statement.trim().replace('\\', "/");
+        let files = match mtl::find_file(directory, &written) {
+            Some(_) => vec![written],
+            None => split_files(&written),
+        };
+        let mut names = Vec::new();
+        for file in files {
+            match mtl::find_file(directory, &file) {
+                Some((path, _)) => names.extend(self.mtl(&path)?),
+                None => {
+                    let what = format!("{}: material library {file} not found: grey is used", obj.display());
+                    self.warnings.push(what);
+                }
+            }
+        }
+        Ok(names)
+    }
+}
+
+/// Words joined until one ends in `.mtl`.
+fn split_files(statement: &str) -> Vec<String> {
+    let mut files = vec![String::new()];
+    for word in statement.split_whitespace() {
+        let last = files.last_mut().expect("never empty");
+        if !last.is_empty() {
+            last.push(' ');
+        }
+        last.push_str(word);
+        if word.to_lowercase().ends_with(".mtl") {
+            files.push(String::new());
+        }
+    }
+    files.retain(|f| !f.is_empty());
+    files
+}
+
+/// Reads an OBJ file and the MTL files it names.
+///
+/// # Errors
+/// [`Error::Input`] with file, line, what is wrong and what to do.
+pub fn load(path: &Path, library: &mut Library) -> Result<ObjFile> {
+    let file = File::open(path).map_err(|e| Error::input(path, format!("cannot be read: {e}")))?;
+    parse(path, BufReader::with_capacity(1 << 18, file), library)
+}
+
+/// [`load`] from any reader; `path` is for messages and for finding the MTL files.
+///
+/// # Errors
+/// See [`load`].
+pub fn parse(path: &Path, reader: impl std::io::BufRead, library: &mut Library) -> Result<ObjFile> {
+    let mut lines = ObjLines::new(reader);
+    // tobj numbers materials in the order its loader returns them; this is the same list with scene indices.
+    let found: RefCell<Vec<u32>> = RefCell::default();
+    let failure: RefCell<Option<Error>> = RefCell::default();
+    let shared = RefCell::new(&mut *library);
+    let loader = |statement: &Path| {
+        let mut library = shared.borrow_mut();
+        let names = match statement.to_str() {
+            Some(ObjLines::<&[u8]>::TABLES) => Ok(library.tables.iter().map(|(n, &i)| (n.clone(), i)).collect()),
+            _ => library.mtllib(path, &statement.to_string_lossy()),
+        };
+        let names = names.unwrap_or_else(|e| {
+            failure.borrow_mut().get_or_insert(e);
+            Vec::new()
+        });
+        found.borrow_mut().extend(names.iter().map(|n| n.1));
+        let blocks = names.iter().map(|n| tobj::Material { name: n.0.clone(), ..Default::default() }).collect();
+        Ok((blocks, names.into_iter().enumerate().map(|(i, n)| (n.0, i)).collect()))
+    };
+    let options = tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
+    let outcome = tobj::load_obj_buf(&mut lines, &options, loader);
+    if let Some(error) = failure.take() {
+        return Err(error);
+    }
+    let models = match (lines.error.take(), outcome) {
+        (Some((line, what)), _) => return Err(Error::input_at(path, format!("line {line}"), what)),
+        (None, Err(e)) => return Err(Error::input_at(path, format!("line {}", lines.line), remedy(e))),
+        (None, Ok((models, _))) => models,
+    };
+    let found = found.into_inner();
+    let index = |m: &tobj::Model| m.mesh.material_id.and_then(|i| found.get(i).copied());
+    let unknown = models.iter().filter(|m| index(m).is_none() && !m.mesh.indices.is_empty()).count();
+    if unknown > 0 {
+        let what = format!("{}: {unknown} objects have no known material: grey is used", path.display());
+        library.warnings.push(what);
+    }
+    let materials = models.iter().map(|m| index(m).unwrap_or_else(|| library.grey())).collect();
+    Ok(ObjFile { models, materials })
+}
+
+fn remedy(error: tobj::LoadError) -> String {
+    use tobj::LoadError as E;
+    let what = match error {
+        E::PositionParseError => "a vertex needs three numbers after v",
+        E::ScalingByZeroError => "the fourth number of a vertex (w) is 0",
+        E::NormalParseError => "a normal needs three numbers after vn",
+        E::TexcoordParseError => "a texture coordinate needs two numbers after vt",
+        E::MaterialParseError => "usemtl names no material",
+        E::ReadError => "the file could not be read to its end",
+        _ => return format!("{error}: export the file again"),
+    };
+    format!("{what}: mend the line or export the file again")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n";
+
+    fn read(text: &str) -> Result<ObjFile> {
+        parse(Path::new("a.obj"), format!("{SQUARE}{text}").as_bytes(), &mut Library::default())
+    }
+
+    fn error(text: &str) -> String {
+        read(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn polygons_become_fans_and_negative_indices_count_back() {
+        let quad = read("f -4 -3 -2 -1").unwrap();
+        assert_eq!(quad.models[0].mesh.indices, [0, 1, 2, 0, 2, 3]);
+        assert_eq!(quad.models[0].mesh.positions[..6], [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+        let penta = read("v 0.5 2 0\nf 1 2 3 5 4").unwrap();
+        assert_eq!(penta.models[0].mesh.indices.len(), 9);
+        assert!(read("l 1 2\np 1\nf 1 2").unwrap().models.iter().all(|m| m.mesh.indices.is_empty()));
+    }
+
+    #[test]
+    fn corners_with_and_without_normals_stay_apart() {
+        let file = read("o box\nf 1//1 2//1 3//1\nf 1 3 4\nf 1/1/1 2/2/1 3/3/1\nf 1/1 2 3").unwrap();
+        let shape: Vec<_> =
+            file.models.iter().map(|m| (m.name.as_str(), m.mesh.normals.len(), m.mesh.texcoords.len())).collect();
+        assert_eq!(shape, [("box", 9, 0), ("box", 0, 0), ("box", 9, 6), ("box", 0, 0)]);
+    }
+
+    #[test]
+    fn lines_may_continue_and_carry_colours_or_foreign_letters() {
+        let bytes = [SQUARE.as_bytes(), b"# caf\xe9\nv 9 9 9 1 0 0\nf 1 2 \\\n 3\n"].concat();
+        let file = parse(Path::new("a.obj"), &bytes[..], &mut Library::default()).unwrap();
+        assert_eq!(file.models[0].mesh.indices.len(), 3);
+    }
+
+    #[test]
+    fn mistakes_name_their_line() {
+        assert_eq!(
+            error("f 1 2 5"),
+            "a.obj, line 10: the face uses vertex 5, but 4 are defined above it: export the file again"
+        );
+        assert!(error("f 1/9 2/9 3/9").contains("line 10: the face uses texture coordinate 9, but 4"));
+        assert!(error("f 1//2 2//2 3//2").contains("normal 2, but 1"));
+        assert!(error("\n\nf 1 2 -5").contains("line 12: the face uses vertex -5"));
+        assert!(error("f 1 0 2").contains("vertex 0"));
+        assert!(error("f 1 2 6148914691236517205").contains("vertex 6148914691236517205"));
+        assert!(error("f 1 2 x").contains("line 10"));
+        assert!(error("f").contains("line 10"));
+        assert!(error("v 1 2").contains("line 10: a vertex needs three numbers"));
+        assert!(read("f 1 2 3").is_ok(), "control");
+    }
+
+    #[test]
+    fn tables_stand_in_for_materials_and_unknown_ones_are_grey() {
+        let mut library = Library::default();
+        let red = library.materials.push("red", Materials::plain([1.0, 0.0, 0.0]));
+        library.tables.insert("red".into(), red);
+        let text = format!("mtllib none.mtl\n{SQUARE}usemtl red\nf 1 2 3\nusemtl what\nf 1 2 3");
+        let file = parse(Path::new("a.obj"), text.as_bytes(), &mut library).unwrap();
+        assert_eq!(file.materials, [red, library.grey()]);
+        assert!(library.warnings[0].contains("none.mtl not found"), "{:?}", library.warnings);
+        assert!(library.warnings[1].contains("1 objects have no known material"));
+    }
+
+    #[test]
+    fn several_libraries_and_names_with_spaces() {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("one a.mtl"), "newmtl a\nKd 1 0 0").unwrap();
+        std::fs::write(dir.path().join("two.mtl"), "newmtl b c\nKd 0 1 0").unwrap();
+        let text = format!("mtllib one a.mtl two.mtl\n{SQUARE}usemtl b c\nf 1 2 3\nusemtl a\nf 1 2 3");
+        let mut library = Library::default();
+        let file = parse(&dir.path().join("x.obj"), text.as_bytes(), &mut library).unwrap();
+        let colors: Vec<_> = file.materials.iter().map(|&i| library.materials.list[i as usize].base_color).collect();
+        assert_eq!((colors, library.warnings.len()), (vec![[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]], 0));
+    }
+}

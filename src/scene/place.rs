@@ -1,0 +1,223 @@
+//! Which mesh goes where: baked into world space, or stored in its own space for instances.
+use super::assemble::Assembly;
+use super::description::{self, MeshTable};
+use super::geometry::{Corners, Geometry, Placement, Repairs, Tag, TooFar};
+use super::obj::ObjFile;
+use crate::error::Result;
+use crate::gpu::layout::{Instance, NONE};
+use glam::{DAffine3, Vec2, Vec3};
+use std::path::PathBuf;
+
+/// A mesh and where it goes.
+#[derive(Clone, Copy, Debug)]
+pub struct Job {
+    /// Index of the `[[mesh]]`.
+    pub mesh: usize,
+    /// From its file to the space it is stored in; of a copy, from there to the world.
+    pub affine: DAffine3,
+    /// Instead of all its materials.
+    pub material: Option<u32>,
+}
+
+/// What is baked into world space, stored for instances, and placed.
+#[derive(Debug, Default)]
+pub struct Plan {
+    /// Triangles in world space.
+    pub baked: Vec<Job>,
+    /// Triangles in object space; every one is placed by a copy.
+    pub stored: Vec<Job>,
+    /// In the order of the file.
+    pub copies: Vec<Job>,
+}
+
+/// `mesh "name"`, by its own name, its file's or its shape's.
+pub fn mesh_name(mesh: &MeshTable) -> String {
+    match (&mesh.name, &mesh.file, mesh.shape) {
+        (Some(name), ..) => name.clone(),
+        (_, Some(file), _) => file.display().to_string(),
+        (_, _, Some(shape)) => format!("{shape:?}").to_lowercase(),
+        _ => "unnamed".into(),
+    }
+}
+
+/// The device's form of a placement; the caller sets `material` and `object`.
+pub fn instance(affine: &DAffine3, root: u32) -> Instance {
+    let rows = |a: &DAffine3| {
+        [0, 1, 2].map(|i| {
+            let row = a.matrix3.row(i);
+            [row.x as f32, row.y as f32, row.z as f32, a.translation[i] as f32]
+        })
+    };
+    let ([world0, world1, world2], [object0, object1, object2]) = (rows(affine), rows(&affine.inverse()));
+    let mirrored = u32::from(affine.matrix3.determinant() < 0.0);
+    Instance { world0, world1, world2, object0, object1, object2, root, material: NONE, object: 0, mirrored }
+}
+
+impl Assembly<'_> {
+    /// Sorts meshes into baked and stored ones.
+    ///
+    /// # Errors
+    /// For unknown names and transforms without inverse.
+    pub fn plan(&self) -> Result<Plan> {
+        let meshes = &self.description.mesh;
+        let mut plan = Plan::default();
+        let mut instanced = vec![false; meshes.len()];
+        for (number, table) in self.description.instance.iter().enumerate() {
+            let place = format!("instance {} of mesh \"{}\"", number + 1, table.mesh);
+            let names = || meshes.iter().filter_map(|m| m.name.as_deref());
+            let Some(mesh) = meshes.iter().position(|m| m.name.as_deref() == Some(&table.mesh)) else {
+                let near = description::nearest(&table.mesh, names()).unwrap_or("(none has a name)");
+                return Err(self.at(place, format!("no such mesh: did you mean \"{near}\"?")));
+            };
+            instanced[mesh] = true;
+            let affine = self.invertible(table.transform.0, &place)?;
+            let material = table.material.as_ref().map(|m| self.material(m, &place)).transpose()?;
+            let own = self.invertible(meshes[mesh].transform.0, &place)?;
+            // Emission textures are looked up by the corners' order, which a mirrored light has to swap: bake it.
+            match affine.matrix3.determinant() < 0.0 && self.emits_by_texture(mesh, material)? {
+                true => plan.baked.push(Job { mesh, affine: affine * own, material }),
+                false => plan.copies.push(Job { mesh, affine, material }),
+            }
+        }
+        for (mesh, table) in meshes.iter().enumerate() {
+            let affine = self.invertible(table.transform.0, &format!("mesh \"{}\"", mesh_name(table)))?;
+            let job = Job { mesh, affine, material: None };
+            if !instanced[mesh] {
+                plan.baked.push(job);
+            } else if plan.copies.iter().any(|c| c.mesh == mesh) {
+                plan.stored.push(job);
+            }
+        }
+        Ok(plan)
+    }
+
+    fn invertible(&self, affine: DAffine3, place: &str) -> Result<DAffine3> {
+        let det = affine.matrix3.determinant();
+        match affine.is_finite() && det.abs() > 1e-60 && affine.inverse().is_finite() {
+            true => Ok(affine),
+            false => Err(self.at(place, "its transform has no inverse: choose scales other than 0")),
+        }
+    }
+
+    /// The material that replaces all of a mesh's own.
+    fn override_of(&self, job: &Job) -> Result<Option<u32>> {
+        let table = &self.description.mesh[job.mesh];
+        let place = || format!("mesh \"{}\"", mesh_name(table));
+        let own = table.material.as_ref().map(|m| self.material(m, &place())).transpose()?;
+        Ok(job.material.or(own))
+    }
+
+    fn emits_by_texture(&self, mesh: usize, material: Option<u32>) -> Result<bool> {
+        let list = &self.library.materials.list;
+        let textured = |i: u32| list[i as usize].emission_texture != NONE;
+        let job = Job { mesh, affine: DAffine3::IDENTITY, material };
+        Ok(
+            match (self.override_of(&job)?, self.file_of(&self.description.mesh[mesh]).and_then(|p| self.files.get(&p)))
+            {
+                (Some(index), _) => textured(index),
+                (None, Some(file)) => file.materials.iter().any(|&i| textured(i)),
+                (None, None) => false,
+            },
+        )
+    }
+
+    /// Path of a mesh's OBJ file.
+    pub fn file_of(&self, table: &MeshTable) -> Option<PathBuf> {
+        Some(self.directory().join(table.file.as_ref()?.to_string_lossy().replace('\\', "/")))
+    }
+
+    /// The parsed file, taken out of the store, or a shape.
+    fn take_source(&mut self, table: &MeshTable) -> ObjFile {
+        if let Some(file) = self.file_of(table).and_then(|path| self.files.remove(&path)) {
+            return file;
+        }
+        let mesh = table.shape.map(|s| s.mesh(table.segments.unwrap_or(64).min(4096))).unwrap_or_default();
+        ObjFile { models: vec![tobj::Model { mesh, name: String::new() }], materials: vec![self.library.grey()] }
+    }
+
+    /// Adds a mesh's triangles; their object indices count from `first` on. Returns the names of its objects. The file
+    /// is dropped after its last use.
+    ///
+    /// # Errors
+    /// For an unknown group or material, and coordinates that are too large.
+    pub fn add(&mut self, job: &Job, first: u32, last_use: bool) -> Result<Vec<String>> {
+        let table = &self.description.mesh[job.mesh];
+        let material = self.override_of(job)?;
+        let file = self.take_source(table);
+        let place = format!("mesh \"{}\"", mesh_name(table));
+        if let Some(group) = table.group.as_ref().filter(|g| !file.models.iter().any(|m| m.name == **g)) {
+            let near = description::nearest(group, file.models.iter().map(|m| m.name.as_str())).unwrap_or("(none)");
+            return Err(self.at(place, format!("no group \"{group}\": did you mean \"{near}\"?")));
+        }
+        let before = self.geometry.triangles.len();
+        let mut repairs = Repairs::default();
+        let objects = self.add_models(table, &file, job, material, first, &mut repairs);
+        let objects = objects.map_err(|TooFar(v)| {
+            self.at(&place, format!("has a coordinate of {v:e}: the limit is {:e}", super::MAX_COORDINATE))
+        })?;
+        self.library.warnings.extend(repairs.warning(&place));
+        if self.geometry.triangles.len() == before {
+            self.library.warnings.push(format!("{place} has no triangles"));
+        }
+        if let (Some(path), false) = (self.file_of(table), last_use) {
+            self.files.insert(path, file);
+        }
+        Ok(objects)
+    }
+
+    /// tobj splits an object at every change of material; the parts keep one name and one index.
+    fn add_models(
+        &mut self,
+        table: &MeshTable,
+        file: &ObjFile,
+        job: &Job,
+        material: Option<u32>,
+        first: u32,
+        repairs: &mut Repairs,
+    ) -> std::result::Result<Vec<String>, TooFar> {
+        let uvs = !self.library.materials.textures.is_empty();
+        let at = Placement { affine: job.affine, flat: table.flat, flip: table.flip_normals, uvs };
+        let (mut names, mut previous, mut primitive) = (Vec::new(), None, 0);
+        for (model, &own) in file.models.iter().zip(&file.materials) {
+            if table.group.as_ref().is_none_or(|g| *g == model.name) {
+                if previous != Some(&model.name) {
+                    names.push(object_name(&mesh_name(table), &model.name));
+                    previous = Some(&model.name);
+                }
+                let object = first + names.len() as u32 - 1;
+                let tag = Tag { primitive, material: material.unwrap_or(own), object };
+                add_model(&mut self.geometry, &model.mesh, tag, &at, repairs)?;
+            }
+            primitive += (model.mesh.indices.len() / 3) as u32;
+        }
+        Ok(names)
+    }
+}
+
+fn object_name(mesh: &str, object: &str) -> String {
+    if object.is_empty() || object == "unnamed_object" { mesh.to_owned() } else { format!("{mesh}/{object}") }
+}
+
+fn add_model(
+    geometry: &mut Geometry,
+    mesh: &tobj::Mesh,
+    first: Tag,
+    at: &Placement,
+    repairs: &mut Repairs,
+) -> std::result::Result<(), TooFar> {
+    let count = mesh.indices.len() / 3;
+    geometry.triangles.reserve(count);
+    let vec3 = |from: &[f32], i: u32| Vec3::from_slice(&from[3 * i as usize..]);
+    for (t, corners) in mesh.indices.chunks_exact(3).enumerate() {
+        let corners = [corners[0], corners[1], corners[2]];
+        let c = Corners {
+            p: corners.map(|i| vec3(&mesh.positions, i)),
+            n: (!mesh.normals.is_empty()).then(|| corners.map(|i| vec3(&mesh.normals, i))),
+            uv: (!mesh.texcoords.is_empty())
+                .then(|| corners.map(|i| Vec2::from_slice(&mesh.texcoords[2 * i as usize..]))),
+        };
+        let tag = Tag { primitive: first.primitive + t as u32, ..first };
+        geometry.push(&c, tag, at, repairs)?;
+    }
+    Ok(())
+}

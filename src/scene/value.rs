@@ -1,0 +1,153 @@
+//! Values of the scene file that may be written in more than one way.
+use glam::{DAffine3, DMat4, DQuat, DVec3, EulerRot};
+use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor, value};
+use std::fmt;
+
+/// Three channels, written as `[r, g, b]` or as one number for all of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rgb(pub [f32; 3]);
+
+impl<'de> Deserialize<'de> for Rgb {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Channels;
+        impl<'de> Visitor<'de> for Channels {
+            type Value = Rgb;
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("a number or [r, g, b]")
+            }
+            fn visit_f64<E: Error>(self, v: f64) -> Result<Rgb, E> {
+                Ok(Rgb([v as f32; 3]))
+            }
+            fn visit_i64<E: Error>(self, v: i64) -> Result<Rgb, E> {
+                Ok(Rgb([v as f32; 3]))
+            }
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Rgb, A::Error> {
+                Deserialize::deserialize(value::SeqAccessDeserializer::new(seq)).map(Rgb)
+            }
+        }
+        deserializer.deserialize_any(Channels)
+    }
+}
+
+/// Numbers in order: a fixed count, or an error that says how many were given.
+fn numbers<'de, const N: usize, A: SeqAccess<'de>>(mut seq: A, what: &str) -> Result<[f64; N], A::Error> {
+    let mut found = Vec::with_capacity(N);
+    while let Some(v) = seq.next_element()? {
+        found.push(v);
+    }
+    let count = found.len();
+    found.try_into().map_err(|_| A::Error::custom(format!("{what} takes {N} numbers, not {count}")))
+}
+
+/// `{ translate, rotate, scale }`: scaled first, then rotated, then moved.
+#[derive(Clone, Debug, Default, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct Steps {
+    translate: [f64; 3],
+    rotate: Rotation,
+    scale: Option<Scale>,
+}
+
+/// Degrees: `[x, y, z]` turns about x, then y, then z (fixed axes); `[x, y, z, angle]` turns about that axis.
+#[derive(Clone, Debug, Default)]
+struct Rotation(DQuat);
+
+impl<'de> Deserialize<'de> for Rotation {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let v = Vec::<f64>::deserialize(deserializer)?;
+        match v[..] {
+            [x, y, z] => {
+                let [x, y, z] = [x, y, z].map(f64::to_radians);
+                Ok(Self(DQuat::from_euler(EulerRot::ZYX, z, y, x)))
+            }
+            [x, y, z, angle] => match DVec3::new(x, y, z).try_normalize() {
+                Some(axis) => Ok(Self(DQuat::from_axis_angle(axis, angle.to_radians()))),
+                None => Err(D::Error::custom("the axis of rotate is zero")),
+            },
+            _ => Err(D::Error::custom(format!("rotate takes 3 angles or axis and angle, not {} numbers", v.len()))),
+        }
+    }
+}
+
+/// One factor, or one per axis.
+#[derive(Clone, Debug)]
+struct Scale(DVec3);
+
+impl<'de> Deserialize<'de> for Scale {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Rgb::deserialize(deserializer).map(|Rgb(v)| Self(DVec3::from(v.map(f64::from))))
+    }
+}
+
+/// A placement: 16 row-major numbers (column vectors, last row 0 0 0 1) or `{ translate, rotate, scale }`.
+/// Not checked for being invertible: whoever uses it names the mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Transform(pub DAffine3);
+
+impl<'de> Deserialize<'de> for Transform {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> Visitor<'de> for Either {
+            type Value = Transform;
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("16 numbers or a table of translate, rotate, scale")
+            }
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Transform, A::Error> {
+                let m = DMat4::from_cols_array(&numbers::<16, A>(seq, "transform")?).transpose();
+                match m.row(3).to_array() {
+                    [0.0, 0.0, 0.0, w] if w != 0.0 => Ok(Transform(DAffine3::from_mat4(m * (1.0 / w)))),
+                    row => Err(A::Error::custom(format!("the last row of transform is {row:?}, not 0 0 0 1"))),
+                }
+            }
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Transform, A::Error> {
+                let steps = Steps::deserialize(value::MapAccessDeserializer::new(map))?;
+                let scale = steps.scale.map_or(DVec3::ONE, |s| s.0);
+                let affine =
+                    DAffine3::from_scale_rotation_translation(scale, steps.rotate.0, DVec3::from(steps.translate));
+                Ok(Transform(affine))
+            }
+        }
+        deserializer.deserialize_any(Either)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, serde::Deserialize)]
+    struct Row {
+        t: Transform,
+    }
+
+    fn place(text: &str, p: [f64; 3]) -> [f64; 3] {
+        let row: Row = toml::from_str(&format!("t = {text}")).unwrap();
+        row.t.0.transform_point3(p.into()).to_array().map(|v| (v * 1e9).round() / 1e9)
+    }
+
+    #[test]
+    fn steps_scale_then_rotate_then_move() {
+        assert_eq!(place("{ translate = [1, 2, 3], scale = 2 }", [1.0, 0.0, 0.0]), [3.0, 2.0, 3.0]);
+        assert_eq!(place("{ rotate = [0, 0, 90] }", [1.0, 0.0, 0.0]), [0.0, 1.0, 0.0]);
+        assert_eq!(place("{ rotate = [0, 0, 1, 90], scale = [2, 1, 1] }", [1.0, 0.0, 0.0]), [0.0, 2.0, 0.0]);
+        // x first, then z: y goes to z and stays there. The other order would leave -x.
+        assert_eq!(place("{ rotate = [90, 0, 90] }", [0.0, 1.0, 0.0]), [0.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn matrices_are_row_major() {
+        let found = place("[1,0,0,5, 0,1,0,6, 0,0,1,7, 0,0,0,1]", [0.0, 0.0, 0.0]);
+        assert_eq!(found, [5.0, 6.0, 7.0]);
+        let error = |text: &str| toml::from_str::<Row>(text).unwrap_err().message().to_owned();
+        assert!(error("t = [0, 0]").contains("16 numbers, not 2"));
+        assert!(error("t = [1,0,0,5, 0,1,0,6, 0,0,1,7, 0,0,1,1]").contains("last row"));
+    }
+
+    #[test]
+    fn wrong_types_and_keys_are_named() {
+        let error = |text: &str| toml::from_str::<Row>(text).unwrap_err().message().to_owned();
+        assert!(error("t = 5").contains("16 numbers or a table"));
+        assert!(error("t = { move = [1, 2, 3] }").contains("unknown field `move`"));
+        assert!(error("t = { rotate = [1, 2] }").contains("rotate takes 3 angles"));
+    }
+}
