@@ -19,10 +19,15 @@ struct Place<'a> {
     out: &'a Path,
 }
 
-/// The scene file that says the same as the JSON description at `json`.
-pub fn scene(name: &str, json: &Path, out: &Path) -> anyhow::Result<Table> {
+/// The scene file that says the same as the JSON description at `json`; `fov` replaces its vertical field of view, in
+/// degrees.
+pub fn scene(name: &str, json: &Path, out: &Path, fov: Option<f64>) -> anyhow::Result<Table> {
     let place = Place { name, folder: json.parent().unwrap_or(Path::new(".")), out };
-    build(&place, json).with_context(|| format!("{}", json.display()))
+    let mut scene = build(&place, json).with_context(|| format!("{}", json.display()))?;
+    if let (Some(fov), Some(camera)) = (fov, scene["camera"].as_table_mut()) {
+        camera.insert("fov".into(), fov.into());
+    }
+    Ok(scene)
 }
 
 fn build(place: &Place, json: &Path) -> anyhow::Result<Table> {
