@@ -102,8 +102,8 @@ pub fn difference(image: &Picture, reference: &Picture) -> Picture {
 /// to the image's in darker blocks: else the rim of one bright light would outweigh the picture.
 fn structure(image: &Picture, reference: &Picture) -> f64 {
     let floor = mean(reference.rgb.iter().map(|&v| grey(v)));
-    let differences = blocks(&difference(image, reference));
-    let excess = differences.iter().zip(&blocks(reference)).map(|(block, wanted)| {
+    let (differences, references) = (blocks(&difference(image, reference)), blocks(reference));
+    let excess = differences.iter().zip(&references).map(|(block, wanted)| {
         let (n, d) = (block.len() as f64, mean(block.iter().copied()));
         let variance = block.iter().map(|v| (v - d).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
         (d * d - variance / n) / mean(wanted.iter().copied()).max(floor).powi(2)
