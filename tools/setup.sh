@@ -4,6 +4,7 @@
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)
+# shellcheck disable=SC2034 # read by the scripts that source this
 target=$root/target
 
 say() { printf 'tallow: %s\n' "$*" >&2; }
