@@ -1,3 +1,65 @@
-//! The only `unsafe`, the only `vk::`.
+//! The only `unsafe`, the only `vk::`. Everything above this module is safe Rust that names buffers and kernels.
+//!
+//! What the layer promises to its callers:
+//! - A handle that a call uses is alive: buffers and pipelines are kept by the frame that recorded them until that
+//!   frame is reset, and everything keeps the device by a counted [`Gpu`].
+//! - Barriers are derived from the accesses that a kernel declares in its GLSL; no caller writes one.
+//! - Device memory is plain data (`Pod`), so that any bits are a value.
+//!
+//! What it relies on: kernels stay inside their buffers, and whoever hands over raw handles keeps the contract of
+//! [`Gpu::from_raw`] and [`Recorder::external`].
 #![allow(unsafe_code)]
+mod access;
+mod buffer;
+mod cache;
+mod commands;
+mod descriptors;
+mod device;
+mod external;
+mod frame;
+mod info;
+mod instance;
+mod kernel;
 pub mod layout;
+mod recorder;
+mod timing;
+
+pub use access::Access;
+pub use buffer::{Buffer, Location, RawBuffer, Untyped};
+pub use device::{DeviceOptions, Gpu};
+pub use external::RawDevice;
+pub use frame::FrameResources;
+pub use info::{DeviceInfo, Feature, REQUIRED_FEATURES, survey};
+pub use kernel::{Bindings, Kernel, Slot, SlotKind};
+pub use recorder::Recorder;
+pub use timing::{PassTime, host_ns};
+
+use crate::error::{Error, Result};
+use ash::vk;
+
+/// Says what was being done when Vulkan refused.
+trait At<T> {
+    fn at(self, what: &str) -> Result<T>;
+}
+
+impl<T> At<T> for std::result::Result<T, vk::Result> {
+    fn at(self, what: &str) -> Result<T> {
+        self.map_err(|code| explain(what, code))
+    }
+}
+
+fn explain(what: &str, code: vk::Result) -> Error {
+    Error::Device(match code {
+        vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
+            format!("{what}: out of memory: choose a smaller film or scene, or a device with more memory")
+        }
+        vk::Result::ERROR_DEVICE_LOST => format!(
+            "{what}: the device was lost (a driver reset, often because one pass ran too long): run again, \
+             with a smaller film or fewer samples at a time if it happens again"
+        ),
+        vk::Result::ERROR_INITIALIZATION_FAILED => {
+            format!("{what}: the driver failed to start: check that it matches the running system")
+        }
+        other => format!("{what}: Vulkan returned {other:?}"),
+    })
+}

@@ -1,0 +1,305 @@
+//! Device memory with a type and a name.
+use super::commands::Commands;
+use super::{At, Gpu, SlotKind, access};
+use crate::error::{Error, Result};
+use ash::vk;
+use ash::vk::Handle;
+use bytemuck::Pod;
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+use std::marker::PhantomData;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Uploads and read-backs go through a staging buffer of at most this many bytes.
+const STAGING: usize = 64 << 20;
+
+/// Where a buffer lies. On devices with unified memory all three are the same memory, mapped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Location {
+    /// Fastest for kernels.
+    Device,
+    /// Written by the host, read by kernels or copies.
+    Upload,
+    /// Written by kernels or copies, read by the host.
+    Readback,
+}
+
+/// A buffer as Vulkan knows it, for code that binds it elsewhere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RawBuffer {
+    /// `VkBuffer`.
+    pub handle: u64,
+    /// Bytes from the start of the buffer.
+    pub offset: u64,
+    /// Bytes.
+    pub size: u64,
+}
+
+/// `len` values of `T`, readable by kernels as storage and as texels, and copied from and to.
+pub struct Buffer<T> {
+    untyped: Arc<Untyped>,
+    len: usize,
+    of: PhantomData<fn() -> T>,
+}
+
+/// What a buffer is without its type. Public for the generated code alone.
+#[doc(hidden)]
+pub struct Untyped {
+    gpu: Gpu,
+    pub(super) name: String,
+    pub(super) raw: vk::Buffer,
+    /// Bytes, a multiple of 4.
+    pub(super) size: u64,
+    /// Bytes of one element.
+    stride: usize,
+    /// `None` only while being made. The lock also keeps host accesses apart.
+    memory: Mutex<Option<Allocation>>,
+    views: Mutex<Vec<(vk::Format, vk::BufferView)>>,
+}
+
+impl<T: Pod> Buffer<T> {
+    /// Room for `len` values, contents undefined; `name` appears in messages and captures. A length of 0 becomes 1,
+    /// since there is no empty Vulkan buffer.
+    ///
+    /// # Errors
+    /// [`Error::Device`] with the name, the size and the limit when the device cannot hold it.
+    pub fn new(gpu: &Gpu, name: &str, len: usize, location: Location) -> Result<Self> {
+        let len = len.max(1);
+        let size = len
+            .checked_mul(size_of::<T>())
+            .and_then(|bytes| bytes.checked_next_multiple_of(4))
+            .ok_or_else(|| Error::Device(format!("buffer \"{name}\": {len} elements are more than memory can hold")))?;
+        let untyped = Arc::new(Untyped::new(gpu, name, size as u64, size_of::<T>(), location)?);
+        Ok(Self { untyped, len, of: PhantomData })
+    }
+
+    /// A [`Location::Device`] buffer that holds `values`. No values become a single zero, so that absent data can be
+    /// bound like any other.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn from_slice(gpu: &Gpu, name: &str, values: &[T]) -> Result<Self> {
+        let buffer = Self::new(gpu, name, values.len(), Location::Device)?;
+        match values {
+            [] => buffer.write(0, &[T::zeroed()])?,
+            values => buffer.write(0, values)?,
+        }
+        Ok(buffer)
+    }
+
+    /// Elements, at least 1.
+    #[allow(clippy::len_without_is_empty)]
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Replaces elements from `offset` on. The device must not be using them.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when they do not fit, or the copy fails.
+    pub fn write(&self, offset: usize, values: &[T]) -> Result<()> {
+        if offset.checked_add(values.len()).is_none_or(|end| end > self.len) {
+            let (name, count, len) = (&self.untyped.name, values.len(), self.len);
+            return Err(Error::Device(format!("buffer \"{name}\": {count} elements at {offset} exceed its {len}")));
+        }
+        self.untyped.write(offset * size_of::<T>(), bytemuck::cast_slice(values))
+    }
+
+    /// All elements. The device must not be writing them.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when the copy fails.
+    pub fn read(&self) -> Result<Vec<T>> {
+        let mut values = vec![T::zeroed(); self.len];
+        self.untyped.read(bytemuck::cast_slice_mut(&mut values))?;
+        Ok(values)
+    }
+
+    /// The Vulkan buffer behind this one. It is alive as long as this one is.
+    pub fn raw(&self) -> RawBuffer {
+        RawBuffer { handle: self.untyped.raw.as_raw(), offset: 0, size: (self.len * size_of::<T>()) as u64 }
+    }
+}
+
+impl<T> Buffer<T> {
+    /// For the generated code alone.
+    #[doc(hidden)]
+    pub fn untyped(&self) -> &Arc<Untyped> {
+        &self.untyped
+    }
+}
+
+impl Untyped {
+    fn new(gpu: &Gpu, name: &str, size: u64, stride: usize, location: Location) -> Result<Self> {
+        let limit = gpu.0.info.max_buffer_size.min(gpu.0.info.max_allocation);
+        if size > limit {
+            return Err(too_big(name, size, "bytes", limit, "of one buffer"));
+        }
+        let usage = vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
+            | vk::BufferUsageFlags::TRANSFER_SRC
+            | vk::BufferUsageFlags::TRANSFER_DST;
+        let info = vk::BufferCreateInfo::default().size(size).usage(usage);
+        let what = format!("buffer \"{name}\" of {size} bytes");
+        // SAFETY: `info` is complete; the device outlives every buffer.
+        let raw = unsafe { gpu.0.device.create_buffer(&info, None) }.at(&what)?;
+        gpu.0.name(raw, name);
+        let (memory, views) = Default::default();
+        // From here on Drop cleans up, whichever line below fails.
+        let buffer = Self { gpu: gpu.clone(), name: name.to_owned(), raw, size, stride, memory, views };
+        buffer.allocate(location).map_err(|e| Error::Device(format!("{what}: {e}")))?;
+        Ok(buffer)
+    }
+
+    fn allocate(&self, location: Location) -> std::result::Result<(), Box<dyn std::error::Error>> {
+        let device = &self.gpu.0.device;
+        // SAFETY: a live buffer of this device.
+        let requirements = unsafe { device.get_buffer_memory_requirements(self.raw) };
+        let location = match location {
+            // A CPU or an integrated GPU has one memory: ask for the kind that is mapped.
+            Location::Device if matches!(self.gpu.0.info.kind, "CPU" | "integrated GPU") => MemoryLocation::CpuToGpu,
+            Location::Device => MemoryLocation::GpuOnly,
+            Location::Upload => MemoryLocation::CpuToGpu,
+            Location::Readback => MemoryLocation::GpuToCpu,
+        };
+        let mut allocator = self.gpu.0.lock_allocator();
+        let memory = allocator.as_mut().ok_or("the device is closing")?.allocate(&AllocationCreateDesc {
+            name: &self.name,
+            requirements,
+            location,
+            linear: true,
+            allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+        })?;
+        // SAFETY: fresh memory that fits the requirements, kept until the buffer is destroyed.
+        let bound = unsafe { device.bind_buffer_memory(self.raw, memory.memory(), memory.offset()) };
+        *self.memory.lock().unwrap_or_else(PoisonError::into_inner) = Some(memory);
+        Ok(bound?)
+    }
+
+    /// Hands `access` the mapped bytes, or returns `None` where the memory is not mapped and coherent.
+    fn mapped<R>(&self, access: impl FnOnce(&mut [u8]) -> R) -> Option<R> {
+        let mut memory = self.memory.lock().unwrap_or_else(PoisonError::into_inner);
+        let memory = memory.as_mut()?;
+        let coherent = memory.memory_properties().contains(vk::MemoryPropertyFlags::HOST_COHERENT);
+        memory.mapped_slice_mut().filter(|_| coherent).map(access)
+    }
+
+    fn write(&self, offset: usize, bytes: &[u8]) -> Result<()> {
+        if self.mapped(|all| all[offset..offset + bytes.len()].copy_from_slice(bytes)).is_some() {
+            return Ok(());
+        }
+        let staging = Staging::new(&self.gpu, bytes.len(), Location::Upload)?;
+        for (index, chunk) in bytes.chunks(STAGING).enumerate() {
+            staging.access(|all| all[..chunk.len()].copy_from_slice(chunk))?;
+            staging.copy(&staging.buffer, self, region(0, offset + index * STAGING, chunk.len()))?;
+        }
+        Ok(())
+    }
+
+    fn read(&self, bytes: &mut [u8]) -> Result<()> {
+        let length = bytes.len();
+        if self.mapped(|all| bytes.copy_from_slice(&all[..length])).is_some() {
+            return Ok(());
+        }
+        let staging = Staging::new(&self.gpu, length, Location::Readback)?;
+        for (index, chunk) in bytes.chunks_mut(STAGING).enumerate() {
+            staging.copy(self, &staging.buffer, region(index * STAGING, 0, chunk.len()))?;
+            staging.access(|all| chunk.copy_from_slice(&all[..chunk.len()]))?;
+        }
+        Ok(())
+    }
+
+    /// # Errors
+    /// When the buffer is larger than one storage binding may be.
+    pub(super) fn storage(&self) -> Result<vk::DescriptorBufferInfo> {
+        let limit = self.gpu.0.info.max_storage_range;
+        if self.size > limit {
+            return Err(too_big(&self.name, self.size, "bytes", limit, "of one storage binding"));
+        }
+        Ok(vk::DescriptorBufferInfo::default().buffer(self.raw).range(vk::WHOLE_SIZE))
+    }
+
+    /// A view as texels of 16 bytes where elements are a multiple of that, else of 4. Made once, then kept.
+    ///
+    /// # Errors
+    /// When the buffer has more texels than one view may have.
+    pub(super) fn texels(&self, kind: SlotKind) -> Result<vk::BufferView> {
+        let wide = self.stride.is_multiple_of(16);
+        let format = match (kind, wide) {
+            (SlotKind::FloatTexels, true) => vk::Format::R32G32B32A32_SFLOAT,
+            (SlotKind::FloatTexels, false) => vk::Format::R32_SFLOAT,
+            (_, true) => vk::Format::R32G32B32A32_UINT,
+            (_, false) => vk::Format::R32_UINT,
+        };
+        let (texels, limit) = (self.size / if wide { 16 } else { 4 }, self.gpu.0.info.max_texel_elements);
+        if texels > limit {
+            return Err(too_big(&self.name, texels, "texels", limit, "of one texel buffer"));
+        }
+        let mut views = self.views.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, view)) = views.iter().find(|(made, _)| *made == format) {
+            return Ok(*view);
+        }
+        let info = vk::BufferViewCreateInfo::default().buffer(self.raw).format(format).range(vk::WHOLE_SIZE);
+        // SAFETY: a live buffer with texel usage; every device supports these formats for it.
+        let view = unsafe { self.gpu.0.device.create_buffer_view(&info, None) }.at(&self.name)?;
+        views.push((format, view));
+        Ok(view)
+    }
+}
+
+impl Drop for Untyped {
+    fn drop(&mut self) {
+        let views = std::mem::take(self.views.get_mut().unwrap_or_else(PoisonError::into_inner));
+        let memory = self.memory.get_mut().unwrap_or_else(PoisonError::into_inner).take();
+        // SAFETY: not in use, since whoever records a buffer keeps it until the work is complete; destroyed once.
+        unsafe {
+            views.iter().for_each(|(_, view)| self.gpu.0.device.destroy_buffer_view(*view, None));
+            self.gpu.0.device.destroy_buffer(self.raw, None);
+        }
+        if let (Some(memory), Some(allocator)) = (memory, self.gpu.0.lock_allocator().as_mut()) {
+            // It fails only for memory of another allocator.
+            let _ = allocator.free(memory);
+        }
+    }
+}
+
+/// A mapped buffer and the commands that copy through it, for devices whose own memory is not mapped.
+struct Staging {
+    buffer: Untyped,
+    commands: Commands,
+}
+
+impl Staging {
+    fn new(gpu: &Gpu, bytes: usize, location: Location) -> Result<Self> {
+        let size = bytes.min(STAGING).next_multiple_of(4);
+        Ok(Self { buffer: Untyped::new(gpu, "staging", size as u64, 4, location)?, commands: Commands::new(gpu)? })
+    }
+
+    fn access(&self, access: impl FnOnce(&mut [u8])) -> Result<()> {
+        self.buffer.mapped(access).ok_or_else(|| Error::Device("the device has no memory that the host can map".into()))
+    }
+
+    /// Copies and waits.
+    fn copy(&self, from: &Untyped, to: &Untyped, region: vk::BufferCopy) -> Result<()> {
+        self.commands.begin()?;
+        // SAFETY: both buffers live through the submission, which is waited for, and hold the region.
+        unsafe {
+            let device = &self.buffer.gpu.0.device;
+            access::whole_barrier(device, self.commands.buffer);
+            device.cmd_copy_buffer(self.commands.buffer, from.raw, to.raw, &[region]);
+            access::whole_barrier(device, self.commands.buffer);
+        }
+        self.commands.submit_and_wait(|| Some("copy"))
+    }
+}
+
+fn region(from: usize, to: usize, length: usize) -> vk::BufferCopy {
+    vk::BufferCopy { src_offset: from as u64, dst_offset: to as u64, size: length as u64 }
+}
+
+fn too_big(name: &str, size: u64, unit: &str, limit: u64, of: &str) -> Error {
+    Error::Device(format!(
+        "buffer \"{name}\" has {size} {unit}, over the device's limit {of}, {limit}: choose a smaller film or scene, or \
+         another device"
+    ))
+}

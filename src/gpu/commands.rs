@@ -1,0 +1,62 @@
+//! One command buffer with its pool and fence: record, submit, wait.
+use super::{At, Gpu, explain};
+use crate::error::{Error, Result};
+use ash::vk;
+
+pub(super) struct Commands {
+    gpu: Gpu,
+    pool: vk::CommandPool,
+    fence: vk::Fence,
+    pub buffer: vk::CommandBuffer,
+}
+
+impl Commands {
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        let (pool, fence, buffer) = Default::default();
+        // From here on Drop cleans up, whichever line below fails; null handles may be destroyed.
+        let mut commands = Self { gpu: gpu.clone(), pool, fence, buffer };
+        let device = &gpu.0.device;
+        let info = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.0.queue_family);
+        // SAFETY: complete infos, and handles made just before.
+        unsafe {
+            commands.pool = device.create_command_pool(&info, None).at("command pool")?;
+            commands.fence = device.create_fence(&vk::FenceCreateInfo::default(), None).at("fence")?;
+            let info = vk::CommandBufferAllocateInfo::default().command_pool(commands.pool).command_buffer_count(1);
+            commands.buffer = device.allocate_command_buffers(&info).at("command buffer")?[0];
+        }
+        Ok(commands)
+    }
+
+    /// Starts anew; what was recorded before is dropped.
+    pub fn begin(&self) -> Result<()> {
+        let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: the buffer is not executing, since every submission is waited for.
+        unsafe {
+            let device = &self.gpu.0.device;
+            device.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty()).at("command pool")?;
+            device.begin_command_buffer(self.buffer, &info).at("command buffer")
+        }
+    }
+
+    /// Ends, submits, waits. `last_pass` names what was running when the device was lost, if anybody can tell.
+    pub fn submit_and_wait(&self, last_pass: impl FnOnce() -> Option<&'static str>) -> Result<()> {
+        // SAFETY: the buffer is recording.
+        unsafe { self.gpu.0.device.end_command_buffer(self.buffer) }.at("recording")?;
+        self.gpu.0.submit_and_wait(self.buffer, self.fence).map_err(|code| match (code, last_pass()) {
+            (vk::Result::ERROR_DEVICE_LOST, Some(pass)) => {
+                Error::Device(format!("{}; the last pass to start was \"{pass}\"", explain("running", code)))
+            }
+            _ => explain("running", code),
+        })
+    }
+}
+
+impl Drop for Commands {
+    fn drop(&mut self) {
+        // SAFETY: made on this device, not executing, destroyed once. Freeing the pool frees the buffer.
+        unsafe {
+            self.gpu.0.device.destroy_command_pool(self.pool, None);
+            self.gpu.0.device.destroy_fence(self.fence, None);
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! The descriptor sets of one frame: taken from pools that are reset, not from new ones.
+use super::kernel::Parts;
+use super::{At, Gpu, Slot, SlotKind, Untyped};
+use crate::error::Result;
+use ash::vk;
+use std::sync::Arc;
+
+/// Sets per pool, and descriptors of each kind per set on average.
+const SETS: u32 = 128;
+const PER_SET: u32 = 8;
+
+pub(super) struct Descriptors {
+    gpu: Gpu,
+    pools: Vec<vk::DescriptorPool>,
+    /// Pools before this one are used up.
+    current: usize,
+}
+
+/// What a slot is bound to; arrays of one, since Vulkan wants slices.
+enum Resource {
+    Storage([vk::DescriptorBufferInfo; 1]),
+    Texels([vk::BufferView; 1]),
+}
+
+impl Descriptors {
+    pub fn new(gpu: &Gpu) -> Self {
+        Self { gpu: gpu.clone(), pools: Vec::new(), current: 0 }
+    }
+
+    /// Takes all sets back; the work that used them is complete.
+    ///
+    /// # Errors
+    /// None on any known driver: the specification lets resetting fail.
+    pub fn reset(&mut self) -> Result<()> {
+        let flags = vk::DescriptorPoolResetFlags::empty();
+        for pool in &self.pools {
+            // SAFETY: no set of it is in use.
+            unsafe { self.gpu.0.device.reset_descriptor_pool(*pool, flags) }.at("descriptors")?;
+        }
+        self.current = 0;
+        Ok(())
+    }
+
+    /// A set of `kernel` that holds `buffers`, one for each of `slots`.
+    ///
+    /// # Errors
+    /// When a buffer is too large to be bound in its slot, or memory is out.
+    pub fn set(&mut self, kernel: &Parts, slots: &[Slot], buffers: &[&Arc<Untyped>]) -> Result<vk::DescriptorSet> {
+        let resource = |(slot, buffer): (&Slot, &&Arc<Untyped>)| {
+            Ok(match slot.kind {
+                SlotKind::Storage => Resource::Storage([buffer.storage()?]),
+                kind => Resource::Texels([buffer.texels(kind)?]),
+            })
+        };
+        let resources = slots.iter().zip(buffers).map(resource).collect::<Result<Vec<_>>>()?;
+        let set = self.allocate(kernel.set_layout)?;
+        let writes: Vec<_> = slots
+            .iter()
+            .zip(&resources)
+            .map(|(slot, resource)| {
+                let write = vk::WriteDescriptorSet::default()
+                    .dst_set(set)
+                    .dst_binding(slot.binding)
+                    .descriptor_type(slot.kind.descriptor());
+                match resource {
+                    Resource::Storage(info) => write.buffer_info(info),
+                    Resource::Texels(view) => write.texel_buffer_view(view).descriptor_count(1),
+                }
+            })
+            .collect();
+        // SAFETY: a fresh set; the buffers are kept by the frame that owns this.
+        unsafe { self.gpu.0.device.update_descriptor_sets(&writes, &[]) };
+        Ok(set)
+    }
+
+    fn allocate(&mut self, layout: vk::DescriptorSetLayout) -> Result<vk::DescriptorSet> {
+        let layouts = [layout];
+        loop {
+            let fresh = self.current == self.pools.len();
+            if fresh {
+                self.pools.push(create_pool(&self.gpu)?);
+            }
+            let info = vk::DescriptorSetAllocateInfo::default()
+                .descriptor_pool(self.pools[self.current])
+                .set_layouts(&layouts);
+            // SAFETY: a live pool of this thread and a live layout.
+            match unsafe { self.gpu.0.device.allocate_descriptor_sets(&info) } {
+                Ok(sets) => return Ok(sets[0]),
+                Err(vk::Result::ERROR_OUT_OF_POOL_MEMORY | vk::Result::ERROR_FRAGMENTED_POOL) if !fresh => {
+                    self.current += 1;
+                }
+                Err(code) => return Err(code).at("descriptors"),
+            }
+        }
+    }
+}
+
+impl Drop for Descriptors {
+    fn drop(&mut self) {
+        // SAFETY: made on this device, not in use (the frame's contract), destroyed once.
+        self.pools.iter().for_each(|pool| unsafe { self.gpu.0.device.destroy_descriptor_pool(*pool, None) });
+    }
+}
+
+fn create_pool(gpu: &Gpu) -> Result<vk::DescriptorPool> {
+    let size = |ty| vk::DescriptorPoolSize { ty, descriptor_count: SETS * PER_SET };
+    let sizes = [size(vk::DescriptorType::STORAGE_BUFFER), size(vk::DescriptorType::UNIFORM_TEXEL_BUFFER)];
+    let info = vk::DescriptorPoolCreateInfo::default().max_sets(SETS).pool_sizes(&sizes);
+    // SAFETY: a complete info.
+    unsafe { gpu.0.device.create_descriptor_pool(&info, None) }.at("descriptors")
+}

@@ -1,0 +1,267 @@
+//! Opening a device, and what the rest of the layer needs of it.
+use super::cache::PipelineCache;
+use super::info::{self, Candidate, DeviceInfo, Features};
+use super::instance::{Instance, Messages};
+use super::{At, FrameResources, PassTime, Recorder, timing};
+use crate::error::{Error, Result};
+use ash::vk::Handle;
+use ash::{ext, vk};
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use std::ffi::CString;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Which device, and whether to watch it.
+#[derive(Clone, Debug, Default)]
+pub struct DeviceOptions {
+    /// Index in [`super::survey`], or a part of the device's name in any case. `None` prefers discrete over
+    /// integrated over virtual GPUs over CPUs, among those that lack nothing.
+    pub device: Option<String>,
+    /// Run under the validation layers with synchronization validation; see [`Gpu::validation_messages`].
+    pub validation: bool,
+}
+
+/// An open device. Clones share it; it closes when the last buffer, kernel and frame made with it is gone.
+#[derive(Clone)]
+pub struct Gpu(pub(super) Arc<Inner>);
+
+/// Fields drop in order, after [`Drop::drop`] has destroyed what they hold: the instance goes last.
+pub(super) struct Inner {
+    pub device: ash::Device,
+    pub physical: vk::PhysicalDevice,
+    pub queue_family: u32,
+    pub limits: vk::PhysicalDeviceLimits,
+    pub cache: PipelineCache,
+    pub debug: Option<ext::debug_utils::Device>,
+    pub info: DeviceInfo,
+    calibrated: Option<ext::calibrated_timestamps::Device>,
+    queue: Mutex<vk::Queue>,
+    /// `None` only while dropping.
+    allocator: Mutex<Option<Allocator>>,
+    owned: bool,
+    instance: Instance,
+}
+
+impl Gpu {
+    /// Opens a device of this machine.
+    ///
+    /// # Errors
+    /// [`Error::Device`] naming the remedy: no loader, no driver, no device of that name, a required feature is
+    /// missing, or the validation layers are asked for and not installed.
+    pub fn open(options: &DeviceOptions) -> Result<Self> {
+        let instance = Instance::new(options.validation)?;
+        let candidate = choose(info::candidates(&instance.raw)?, options.device.as_deref())?;
+        let queue_family = usable(&candidate)?;
+        let calibrated = can_calibrate(&instance, candidate.physical)?;
+        let device = create_device(&instance.raw, candidate.physical, queue_family, calibrated)?;
+        // SAFETY: the device was made with one queue of this family.
+        let queue = unsafe { device.get_device_queue(queue_family, 0) };
+        let debug = instance.debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &device));
+        let calibrated = calibrated.then(|| ext::calibrated_timestamps::Device::new(&instance.raw, &device));
+        Self::assemble(instance, candidate, queue_family, device, queue, (debug, calibrated))
+    }
+
+    /// Puts the parts together; on failure an owned device is destroyed.
+    pub(super) fn assemble(
+        instance: Instance,
+        candidate: Candidate,
+        queue_family: u32,
+        device: ash::Device,
+        queue: vk::Queue,
+        (debug, calibrated): (Option<ext::debug_utils::Device>, Option<ext::calibrated_timestamps::Device>),
+    ) -> Result<Self> {
+        let cache = PipelineCache::new(&device, &candidate);
+        let gpu = Self(Arc::new(Inner {
+            physical: candidate.physical,
+            queue_family,
+            limits: candidate.limits,
+            cache: cache?,
+            debug,
+            info: candidate.info,
+            calibrated,
+            queue: Mutex::new(queue),
+            allocator: Mutex::new(None),
+            owned: instance.owned,
+            device,
+            instance,
+        }));
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: gpu.0.instance.raw.clone(),
+            device: gpu.0.device.clone(),
+            physical_device: gpu.0.physical,
+            debug_settings: Default::default(),
+            buffer_device_address: false,
+            allocation_sizes: Default::default(),
+        });
+        *gpu.0.lock_allocator() = Some(allocator.map_err(|e| Error::Device(format!("memory allocator: {e}")))?);
+        Ok(gpu)
+    }
+
+    /// What the device is and can do.
+    pub fn info(&self) -> &DeviceInfo {
+        &self.0.info
+    }
+
+    /// Records work with `record`, submits it, waits for it, and returns what each pass took, in order. The times are
+    /// empty where the queue has no timestamps. Everything that earlier runs wrote is visible to this one, and what
+    /// this one writes to the host.
+    ///
+    /// # Errors
+    /// Those of `record`, in which case nothing was submitted, and [`Error::Device`] when the device fails.
+    pub fn run(
+        &self,
+        frame: &mut FrameResources,
+        record: impl FnOnce(&mut Recorder<'_>) -> Result<()>,
+    ) -> Result<Vec<PassTime>> {
+        let mut recorder = Recorder::own(self, frame)?;
+        record(&mut recorder)?;
+        drop(recorder);
+        frame.submit_and_wait()?;
+        frame.times()
+    }
+
+    /// What the validation layers have said so far, oldest first; empty without [`DeviceOptions::validation`].
+    pub fn validation_messages(&self) -> Vec<String> {
+        self.0.instance.messages.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// The messages themselves, which outlive the device and so tell what it forgot to destroy.
+    #[doc(hidden)]
+    pub fn validation_log(&self) -> Messages {
+        self.0.instance.messages.clone()
+    }
+
+    /// One moment on both clocks: (GPU ns as in [`PassTime`], host ns as in [`super::host_ns`]). `None` where the
+    /// device cannot tell (VK_EXT_calibrated_timestamps).
+    pub fn calibrate(&self) -> Option<(u64, u64)> {
+        let extension = self.0.calibrated.as_ref()?;
+        let domain = [vk::CalibratedTimestampInfoEXT::default().time_domain(vk::TimeDomainEXT::DEVICE)];
+        // The host's clock is read on both sides of the device's; the tightest of a few tries is kept.
+        let tries = (0..5).filter_map(|_| {
+            let before = timing::host_ns();
+            // SAFETY: the extension is enabled and knows the device's own domain (checked when opened).
+            let (ticks, _) = unsafe { extension.get_calibrated_timestamps(&domain) }.ok()?;
+            let after = timing::host_ns();
+            Some((after - before, ticks[0], before + (after - before) / 2))
+        });
+        let (_, ticks, host) = tries.min()?;
+        Some((self.0.clock().absolute(ticks), host))
+    }
+}
+
+impl Inner {
+    /// The allocator, which is there as long as the device is open.
+    pub fn lock_allocator(&self) -> MutexGuard<'_, Option<Allocator>> {
+        self.allocator.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Submits one command buffer and waits for `fence`.
+    pub fn submit_and_wait(
+        &self,
+        commands: vk::CommandBuffer,
+        fence: vk::Fence,
+    ) -> std::result::Result<(), vk::Result> {
+        let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
+        let submit = [vk::SubmitInfo2::default().command_buffer_infos(&buffers)];
+        // SAFETY: the buffer is complete, the fence unsignalled, and the lock keeps the queue to this thread.
+        unsafe {
+            self.device.reset_fences(&[fence])?;
+            let queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
+            self.device.queue_submit2(*queue, &submit, fence)?;
+            drop(queue);
+            self.device.wait_for_fences(&[fence], true, u64::MAX)
+        }
+    }
+
+    /// Names an object for validation messages and capture tools.
+    pub fn name(&self, object: impl Handle, name: &str) {
+        let (Some(debug), Ok(name)) = (&self.debug, CString::new(name)) else { return };
+        let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
+        // SAFETY: a live object of this device. A name that cannot be set is no loss.
+        let _ = unsafe { debug.set_debug_utils_object_name(&info) };
+    }
+
+    pub fn clock(&self) -> timing::Clock {
+        timing::Clock { bits: self.info.timestamp_bits, period: self.info.timestamp_period }
+    }
+}
+
+impl Drop for Inner {
+    fn drop(&mut self) {
+        // SAFETY: nothing made on the device is left (all of it keeps this), and none of it is in use: whoever
+        // submits through the layer waits, and `Recorder::external` makes its caller promise so.
+        unsafe {
+            self.cache.store_and_destroy(&self.device);
+            *self.lock_allocator() = None;
+            if self.owned {
+                self.device.destroy_device(None);
+            }
+        }
+    }
+}
+
+fn choose(mut candidates: Vec<Candidate>, wanted: Option<&str>) -> Result<Candidate> {
+    let list = candidates.iter().enumerate().map(|(i, c)| format!("\n  {i}: {}", c.info.name)).collect::<String>();
+    let index = match wanted {
+        None => (0..candidates.len()).min_by_key(|&i| (!candidates[i].info.missing.is_empty(), candidates[i].rank)),
+        Some(wanted) => find(&candidates, wanted),
+    };
+    let index = index.ok_or_else(|| {
+        Error::Device(match wanted {
+            Some(wanted) if !list.is_empty() => format!("no device is called \"{wanted}\"; choose one of{list}"),
+            _ => "no Vulkan device: install the driver of the graphics card, or the package mesa-vulkan-drivers for a \
+                  software device"
+                .into(),
+        })
+    })?;
+    Ok(candidates.swap_remove(index))
+}
+
+fn find(candidates: &[Candidate], wanted: &str) -> Option<usize> {
+    let by_index = wanted.parse().ok().filter(|&index: &usize| index < candidates.len());
+    let wanted = wanted.to_lowercase();
+    by_index.or_else(|| candidates.iter().position(|c| c.info.name.to_lowercase().contains(&wanted)))
+}
+
+/// The queue family, if the device has all that is required.
+pub(super) fn usable(candidate: &Candidate) -> Result<u32> {
+    let DeviceInfo { name, missing, driver_name, driver_version, .. } = &candidate.info;
+    if !missing.is_empty() {
+        return Err(Error::Device(format!(
+            "{name} (driver {driver_name} {driver_version}) lacks {}: update its driver, or choose another device \
+             (`tallow devices` lists them)",
+            missing.join(", ")
+        )));
+    }
+    candidate.queue_family.ok_or_else(|| Error::Device(format!("{name} has no compute queue: choose another device")))
+}
+
+fn can_calibrate(instance: &Instance, physical: vk::PhysicalDevice) -> Result<bool> {
+    // SAFETY: `physical` belongs to `instance`; the second call follows only where the extension is present.
+    let extensions = unsafe { instance.raw.enumerate_device_extension_properties(physical) }.at("device extensions")?;
+    let named = |e: &vk::ExtensionProperties| e.extension_name_as_c_str() == Ok(ext::calibrated_timestamps::NAME);
+    if !extensions.iter().any(named) {
+        return Ok(false);
+    }
+    let loader = ext::calibrated_timestamps::Instance::new(&instance._entry, &instance.raw);
+    let domains = unsafe { loader.get_physical_device_calibrateable_time_domains(physical) }.at("time domains")?;
+    Ok(domains.contains(&vk::TimeDomainEXT::DEVICE))
+}
+
+fn create_device(
+    instance: &ash::Instance,
+    physical: vk::PhysicalDevice,
+    queue_family: u32,
+    calibrated: bool,
+) -> Result<ash::Device> {
+    let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&[1.0])];
+    let extensions: Vec<_> = calibrated.then_some(ext::calibrated_timestamps::NAME.as_ptr()).into_iter().collect();
+    let mut features = Features::required();
+    let info = vk::DeviceCreateInfo::default()
+        .queue_create_infos(&queues)
+        .enabled_extension_names(&extensions)
+        .enabled_features(&features.core)
+        .push_next(&mut features.v12)
+        .push_next(&mut features.v13);
+    // SAFETY: `physical` was found to have the features and the extension; `info` lives through the call.
+    unsafe { instance.create_device(physical, &info, None) }.at("opening the device")
+}

@@ -1,0 +1,83 @@
+//! A device that an engine made, handed over as raw handles so that Vulkan bindings and their versions need not match.
+use super::Gpu;
+use super::device::usable;
+use super::info;
+use super::instance::Instance;
+use crate::error::{Error, Result};
+use ash::vk::Handle;
+use ash::{ext, vk};
+use std::ffi::c_void;
+
+/// The caller's handles, as the numbers that Vulkan's C interface uses (pointers for dispatchable handles).
+#[derive(Clone, Copy, Debug)]
+pub struct RawDevice {
+    /// `vkGetInstanceProcAddr` of the loader that made the rest.
+    pub get_instance_proc_addr: *const c_void,
+    /// `VkInstance`, made for Vulkan 1.3 or later.
+    pub instance: u64,
+    /// `VkPhysicalDevice`.
+    pub physical_device: u64,
+    /// `VkDevice`, made with all of [`super::REQUIRED_FEATURES`] enabled.
+    pub device: u64,
+    /// `VkQueue` of `queue_family`, used for uploads and by [`Gpu::run`].
+    pub queue: u64,
+    /// Index of a family with compute.
+    pub queue_family: u32,
+}
+
+impl Gpu {
+    /// Works on a device made elsewhere. Destroys nothing that it did not make. Passes carry debug labels when the
+    /// instance has VK_EXT_debug_utils enabled.
+    ///
+    /// # Safety
+    /// - The handles are valid, belong together, and outlive everything made from the returned `Gpu`.
+    /// - The device was made with every one of [`super::REQUIRED_FEATURES`] enabled.
+    /// - Nobody else uses the queue while [`Gpu::run`] or a [`super::Buffer`]'s reads and writes do.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when a handle is null, the device cannot do what is required, or the family cannot compute.
+    pub unsafe fn from_raw(raw: RawDevice) -> Result<Self> {
+        let handles = [raw.instance, raw.physical_device, raw.device, raw.queue];
+        if raw.get_instance_proc_addr.is_null() || handles.contains(&0) {
+            return Err(Error::Device(format!("a null handle was handed over: {raw:?}")));
+        }
+        // SAFETY: a valid `vkGetInstanceProcAddr` by contract; function pointers have the size of data pointers on
+        // every platform that has Vulkan.
+        let get_instance_proc_addr =
+            unsafe { std::mem::transmute::<*const c_void, vk::PFN_vkGetInstanceProcAddr>(raw.get_instance_proc_addr) };
+        let table = ash::StaticFn { get_instance_proc_addr };
+        // SAFETY: valid handles that belong together, by contract.
+        let (entry, instance) = unsafe {
+            (
+                ash::Entry::from_static_fn(table.clone()),
+                ash::Instance::load(&table, vk::Instance::from_raw(raw.instance)),
+            )
+        };
+        let device = unsafe { ash::Device::load(instance.fp_v1_0(), vk::Device::from_raw(raw.device)) };
+        let physical = vk::PhysicalDevice::from_raw(raw.physical_device);
+        check_family(&instance, physical, raw.queue_family)?;
+        let candidate = info::describe(&instance, physical, Some(raw.queue_family));
+        usable(&candidate)?;
+        let debug = has_labels(&instance, &device).then(|| ext::debug_utils::Device::new(&instance, &device));
+        let queue = vk::Queue::from_raw(raw.queue);
+        let instance = Instance::borrowed(entry, instance);
+        Self::assemble(instance, candidate, raw.queue_family, device, queue, (debug, None))
+    }
+}
+
+fn check_family(instance: &ash::Instance, physical: vk::PhysicalDevice, family: u32) -> Result<()> {
+    // SAFETY: valid handles by the contract of `from_raw`.
+    let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
+    match families.get(family as usize) {
+        Some(f) if f.queue_flags.contains(vk::QueueFlags::COMPUTE) => Ok(()),
+        Some(_) => Err(Error::Device(format!("queue family {family} has no compute: hand over one that has"))),
+        None => Err(Error::Device(format!("queue family {family} does not exist: there are {}", families.len()))),
+    }
+}
+
+/// The loader returns these only when the extension is enabled.
+fn has_labels(instance: &ash::Instance, device: &ash::Device) -> bool {
+    let names = [c"vkCmdBeginDebugUtilsLabelEXT", c"vkCmdEndDebugUtilsLabelEXT", c"vkSetDebugUtilsObjectNameEXT"];
+    // SAFETY: valid handles by the contract of `from_raw`.
+    names.iter().all(|name| unsafe { instance.get_device_proc_addr(device.handle(), name.as_ptr()) }.is_some())
+}

@@ -1,0 +1,216 @@
+//! What a device is, what it can do, and what Tallow requires of it.
+use super::At;
+use super::instance::Instance;
+use crate::error::Result;
+use ash::vk;
+use serde::Serialize;
+
+/// One line of [`REQUIRED_FEATURES`].
+#[derive(Clone, Copy)]
+pub struct Feature {
+    /// As the Vulkan specification spells it.
+    pub name: &'static str,
+    /// Where it lies among all features, for asking and for enabling alike.
+    field: fn(&mut Features) -> &mut vk::Bool32,
+}
+
+/// All that Tallow requires of a device. Whoever hands over a device ([`super::Gpu::from_raw`]) enables these.
+pub const REQUIRED_FEATURES: &[Feature] = &[
+    Feature { name: "Vulkan 1.3", field: |f| &mut f.vulkan_1_3 },
+    Feature { name: "synchronization2", field: |f| &mut f.v13.synchronization2 },
+    Feature { name: "maintenance4", field: |f| &mut f.v13.maintenance4 },
+    Feature { name: "scalarBlockLayout", field: |f| &mut f.v12.scalar_block_layout },
+    Feature { name: "shaderInt64", field: |f| &mut f.core.shader_int64 },
+    Feature { name: "hostQueryReset", field: |f| &mut f.v12.host_query_reset },
+];
+
+/// The feature structs that [`REQUIRED_FEATURES`] looks into.
+#[derive(Default)]
+pub(super) struct Features {
+    vulkan_1_3: vk::Bool32,
+    pub core: vk::PhysicalDeviceFeatures,
+    pub v12: vk::PhysicalDeviceVulkan12Features<'static>,
+    pub v13: vk::PhysicalDeviceVulkan13Features<'static>,
+}
+
+impl Features {
+    /// Exactly the required ones.
+    pub fn required() -> Self {
+        let mut features = Self::default();
+        REQUIRED_FEATURES.iter().for_each(|feature| *(feature.field)(&mut features) = vk::TRUE);
+        features
+    }
+
+    fn supported(instance: &ash::Instance, device: vk::PhysicalDevice, api_version: u32) -> Self {
+        let mut features = Self::default();
+        // Asking an older device for the structs of 1.3 is not allowed; it lacks everything.
+        if api_version >= vk::API_VERSION_1_3 {
+            let mut all =
+                vk::PhysicalDeviceFeatures2::default().push_next(&mut features.v12).push_next(&mut features.v13);
+            // SAFETY: `device` belongs to `instance`.
+            unsafe { instance.get_physical_device_features2(device, &mut all) };
+            features.core = all.features;
+            features.vulkan_1_3 = vk::TRUE;
+        }
+        // The chain pointed into locals.
+        features.v12.p_next = std::ptr::null_mut();
+        features.v13.p_next = std::ptr::null_mut();
+        features
+    }
+
+    fn missing(&mut self) -> Vec<&'static str> {
+        REQUIRED_FEATURES.iter().filter(|feature| *(feature.field)(self) == vk::FALSE).map(|f| f.name).collect()
+    }
+}
+
+/// A device as `tallow devices` prints it.
+#[derive(Clone, Debug, Serialize)]
+pub struct DeviceInfo {
+    /// As the driver calls it.
+    pub name: String,
+    /// "discrete GPU", "integrated GPU", "virtual GPU", "CPU" or "other".
+    pub kind: &'static str,
+    /// Short name of the driver.
+    pub driver_name: String,
+    /// The driver's own words about its build.
+    pub driver_info: String,
+    /// Decoded as its vendor encodes it.
+    pub driver_version: String,
+    /// Highest Vulkan version, such as "1.3.224".
+    pub api_version: String,
+    /// Bytes of one storage buffer binding.
+    pub max_storage_range: u64,
+    /// Texels of one texel buffer view.
+    pub max_texel_elements: u64,
+    /// Bytes of one buffer.
+    pub max_buffer_size: u64,
+    /// Bytes of one allocation.
+    pub max_allocation: u64,
+    /// Bytes of the largest device-local heap.
+    pub memory_heap: u64,
+    /// Invocations of a subgroup.
+    pub subgroup_size: u32,
+    /// Meaningful bits of a timestamp; 0 means that passes cannot be timed.
+    pub timestamp_bits: u32,
+    /// Nanoseconds per tick.
+    pub timestamp_period: f32,
+    /// Names of required features that the device lacks.
+    pub missing: Vec<&'static str>,
+}
+
+/// A device, its description and what is needed to open it.
+pub(super) struct Candidate {
+    pub physical: vk::PhysicalDevice,
+    pub info: DeviceInfo,
+    pub limits: vk::PhysicalDeviceLimits,
+    pub cache_uuid: [u8; vk::UUID_SIZE],
+    pub vendor: u32,
+    pub id: u32,
+    /// First family with compute, with timestamps if there is one.
+    pub queue_family: Option<u32>,
+    /// Place in the order of preference, lowest first.
+    pub rank: u32,
+}
+
+/// Every device of this machine, in the loader's order; the index is what `DeviceOptions::device` takes.
+///
+/// # Errors
+/// No loader or no driver.
+pub fn survey() -> Result<Vec<DeviceInfo>> {
+    let instance = Instance::new(false)?;
+    Ok(candidates(&instance.raw)?.into_iter().map(|candidate| candidate.info).collect())
+}
+
+pub(super) fn candidates(instance: &ash::Instance) -> Result<Vec<Candidate>> {
+    // SAFETY: a live instance.
+    let devices = unsafe { instance.enumerate_physical_devices() }.at("list of devices")?;
+    Ok(devices.into_iter().map(|physical| describe(instance, physical, None)).collect())
+}
+
+/// Describes a device as seen from `queue_family`, or from the best family for compute.
+pub(super) fn describe(instance: &ash::Instance, physical: vk::PhysicalDevice, queue_family: Option<u32>) -> Candidate {
+    // SAFETY: `physical` belongs to `instance`, here and below.
+    let basic = unsafe { instance.get_physical_device_properties(physical) };
+    let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
+    let memory = unsafe { instance.get_physical_device_memory_properties(physical) };
+    let queue_family = queue_family.or_else(|| best_family(&families));
+    let (v11, v12, v13) = newer_properties(instance, physical, basic.api_version);
+    let text = |bytes: Option<&std::ffi::CStr>| bytes.unwrap_or_default().to_string_lossy().into_owned();
+    let (kind, rank) = kind(basic.device_type);
+    let info = DeviceInfo {
+        name: text(basic.device_name_as_c_str().ok()),
+        kind,
+        driver_name: text(v12.driver_name_as_c_str().ok()),
+        driver_info: text(v12.driver_info_as_c_str().ok()),
+        driver_version: driver_version(basic.vendor_id, basic.driver_version),
+        api_version: version(basic.api_version),
+        max_storage_range: basic.limits.max_storage_buffer_range.into(),
+        max_texel_elements: basic.limits.max_texel_buffer_elements.into(),
+        max_buffer_size: v13.max_buffer_size,
+        max_allocation: v11.max_memory_allocation_size,
+        memory_heap: largest_heap(&memory),
+        subgroup_size: v11.subgroup_size,
+        timestamp_bits: queue_family
+            .and_then(|f| families.get(f as usize))
+            .map_or(0, |family| family.timestamp_valid_bits),
+        timestamp_period: basic.limits.timestamp_period,
+        missing: Features::supported(instance, physical, basic.api_version).missing(),
+    };
+    let (cache_uuid, limits) = (basic.pipeline_cache_uuid, basic.limits);
+    let (vendor, id) = (basic.vendor_id, basic.device_id);
+    Candidate { physical, info, limits, cache_uuid, vendor, id, queue_family, rank }
+}
+
+/// Zero for a device below 1.3, which cannot be used and must not be asked.
+fn newer_properties(
+    instance: &ash::Instance,
+    physical: vk::PhysicalDevice,
+    api_version: u32,
+) -> (
+    vk::PhysicalDeviceVulkan11Properties<'static>,
+    vk::PhysicalDeviceVulkan12Properties<'static>,
+    vk::PhysicalDeviceVulkan13Properties<'static>,
+) {
+    let (mut v11, mut v12, mut v13) = Default::default();
+    if api_version >= vk::API_VERSION_1_3 {
+        let mut all =
+            vk::PhysicalDeviceProperties2::default().push_next(&mut v11).push_next(&mut v12).push_next(&mut v13);
+        // SAFETY: `physical` belongs to `instance` and knows these structs.
+        unsafe { instance.get_physical_device_properties2(physical, &mut all) };
+    }
+    (v11, v12, v13)
+}
+
+fn best_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
+    let computes = |f: &vk::QueueFamilyProperties| f.queue_flags.contains(vk::QueueFlags::COMPUTE);
+    let timed = families.iter().position(|f| computes(f) && f.timestamp_valid_bits > 0);
+    timed.or_else(|| families.iter().position(computes)).map(|index| index as u32)
+}
+
+fn largest_heap(memory: &vk::PhysicalDeviceMemoryProperties) -> u64 {
+    let local = memory.memory_heaps_as_slice().iter().filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL));
+    local.map(|heap| heap.size).max().unwrap_or(0)
+}
+
+fn kind(device: vk::PhysicalDeviceType) -> (&'static str, u32) {
+    match device {
+        vk::PhysicalDeviceType::DISCRETE_GPU => ("discrete GPU", 0),
+        vk::PhysicalDeviceType::INTEGRATED_GPU => ("integrated GPU", 1),
+        vk::PhysicalDeviceType::VIRTUAL_GPU => ("virtual GPU", 2),
+        vk::PhysicalDeviceType::CPU => ("CPU", 3),
+        _ => ("other", 4),
+    }
+}
+
+fn version(v: u32) -> String {
+    format!("{}.{}.{}", vk::api_version_major(v), vk::api_version_minor(v), vk::api_version_patch(v))
+}
+
+/// NVIDIA packs 10, 8, 8 and 6 bits; the others pack as the API version does.
+fn driver_version(vendor: u32, v: u32) -> String {
+    const NVIDIA: u32 = 0x10de;
+    match vendor {
+        NVIDIA => format!("{}.{:02}.{:02}", v >> 22, v >> 14 & 0xff, v >> 6 & 0xff),
+        _ => version(v),
+    }
+}

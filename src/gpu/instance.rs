@@ -1,0 +1,149 @@
+//! The Vulkan loader and instance, with the validation layers when asked for.
+use super::At;
+use crate::error::{Error, Result};
+use ash::{ext, vk};
+use std::ffi::{CStr, c_void};
+use std::sync::{Arc, Mutex, PoisonError};
+
+const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+
+/// What the validation layers said, shared with the callback and with whoever outlives the device.
+pub(super) type Messages = Arc<Mutex<Vec<String>>>;
+
+/// An instance; destroys itself when it made itself.
+pub(super) struct Instance {
+    /// Keeps the loader's library open.
+    pub _entry: ash::Entry,
+    pub raw: ash::Instance,
+    pub owned: bool,
+    /// Whether VK_EXT_debug_utils is enabled.
+    pub debug_utils: bool,
+    pub messages: Messages,
+    messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+}
+
+impl Instance {
+    /// # Errors
+    /// No loader, no Vulkan 1.3, or `validation` without the layers installed.
+    pub fn new(validation: bool) -> Result<Self> {
+        let entry = load()?;
+        let debug_utils = has_debug_utils(&entry)?;
+        if validation && !(debug_utils && has_validation(&entry)?) {
+            return Err(Error::Device(
+                "the Vulkan validation layers are missing: install the package vulkan-validationlayers, or run \
+                 without validation"
+                    .into(),
+            ));
+        }
+        let raw = create(&entry, debug_utils, validation)?;
+        let mut instance =
+            Self { _entry: entry, raw, owned: true, debug_utils, messages: Messages::default(), messenger: None };
+        if validation {
+            instance.listen()?;
+        }
+        Ok(instance)
+    }
+
+    /// An instance made by somebody else, who also destroys it.
+    pub fn borrowed(entry: ash::Entry, raw: ash::Instance) -> Self {
+        let messages = Messages::default();
+        Self { _entry: entry, raw, owned: false, debug_utils: false, messages, messenger: None }
+    }
+
+    /// Collects warnings and errors of the validation layers.
+    fn listen(&mut self) -> Result<()> {
+        use vk::{DebugUtilsMessageSeverityFlagsEXT as Severity, DebugUtilsMessageTypeFlagsEXT as Type};
+        let loader = ext::debug_utils::Instance::new(&self._entry, &self.raw);
+        let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
+            .message_severity(Severity::WARNING | Severity::ERROR)
+            .message_type(Type::VALIDATION)
+            .pfn_user_callback(Some(collect))
+            .user_data(Arc::as_ptr(&self.messages).cast_mut().cast());
+        // SAFETY: the callback's data is kept by `self.messages`, which is dropped after the messenger.
+        let messenger = unsafe { loader.create_debug_utils_messenger(&info, None) }.at("validation messages")?;
+        self.messenger = Some((loader, messenger));
+        Ok(())
+    }
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        if let Some((loader, messenger)) = &self.messenger {
+            // SAFETY: made by `listen` on this instance, destroyed once.
+            unsafe { loader.destroy_debug_utils_messenger(*messenger, None) };
+        }
+        if self.owned {
+            // SAFETY: the device, the only other child, is destroyed before its instance is dropped.
+            unsafe { self.raw.destroy_instance(None) };
+        }
+    }
+}
+
+/// SAFETY: called by the layers with valid data and the `Messages` that `listen` gave them.
+unsafe extern "system" fn collect(
+    _: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    messages: *mut c_void,
+) -> vk::Bool32 {
+    let (data, messages) = unsafe { (&*data, &*messages.cast::<Mutex<Vec<String>>>()) };
+    let text = unsafe { data.message_as_c_str() }.unwrap_or(c"(no text)").to_string_lossy().into_owned();
+    messages.lock().unwrap_or_else(PoisonError::into_inner).push(text);
+    vk::FALSE
+}
+
+fn load() -> Result<ash::Entry> {
+    // SAFETY: loads the system's Vulkan loader, whose initialisers are trusted.
+    let entry = unsafe { ash::Entry::load() }.map_err(|e| {
+        Error::Device(format!(
+            "no Vulkan loader ({e}): install the packages libvulkan1 and, for a software device, mesa-vulkan-drivers"
+        ))
+    })?;
+    // SAFETY: no preconditions.
+    let version = unsafe { entry.try_enumerate_instance_version() }.at("Vulkan version")?;
+    if version.is_none_or(|v| v < vk::API_VERSION_1_3) {
+        return Err(Error::Device("the Vulkan loader is older than 1.3: update the package libvulkan1".into()));
+    }
+    Ok(entry)
+}
+
+fn has_debug_utils(entry: &ash::Entry) -> Result<bool> {
+    // SAFETY: no preconditions.
+    let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }.at("instance extensions")?;
+    Ok(extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME)))
+}
+
+fn has_validation(entry: &ash::Entry) -> Result<bool> {
+    // SAFETY: no preconditions.
+    let layers = unsafe { entry.enumerate_instance_layer_properties() }.at("instance layers")?;
+    Ok(layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION_LAYER)))
+}
+
+fn create(entry: &ash::Entry, debug_utils: bool, validation: bool) -> Result<ash::Instance> {
+    let app = vk::ApplicationInfo::default().application_name(c"tallow").api_version(vk::API_VERSION_1_3);
+    let mut extensions = Vec::new();
+    let mut layers = Vec::new();
+    extensions.extend(debug_utils.then_some(ext::debug_utils::NAME.as_ptr()));
+    if validation {
+        extensions.push(ext::validation_features::NAME.as_ptr());
+        layers.push(VALIDATION_LAYER.as_ptr());
+    }
+    let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+    let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
+    let mut info = vk::InstanceCreateInfo::default()
+        .application_info(&app)
+        .enabled_extension_names(&extensions)
+        .enabled_layer_names(&layers);
+    if validation {
+        info = info.push_next(&mut features);
+    }
+    // SAFETY: `info` and all it points to live through the call.
+    unsafe { entry.create_instance(&info, None) }.map_err(|code| match code {
+        vk::Result::ERROR_INCOMPATIBLE_DRIVER => Error::Device(
+            "no Vulkan driver is installed: install the driver of the graphics card, or the package \
+             mesa-vulkan-drivers for a software device"
+                .into(),
+        ),
+        code => super::explain("Vulkan instance", code),
+    })
+}

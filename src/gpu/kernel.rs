@@ -1,0 +1,170 @@
+//! A compute pipeline and what it binds.
+use super::access::Access;
+use super::layout::Effects;
+use super::{At, Gpu, Untyped};
+use crate::error::{Error, Result};
+use ash::vk;
+use bytemuck::Pod;
+use std::marker::PhantomData;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// How a kernel sees a buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SlotKind {
+    /// Storage buffer.
+    Storage,
+    /// `usamplerBuffer`.
+    UintTexels,
+    /// `samplerBuffer`.
+    FloatTexels,
+}
+
+impl SlotKind {
+    pub(super) fn descriptor(self) -> vk::DescriptorType {
+        match self {
+            Self::Storage => vk::DescriptorType::STORAGE_BUFFER,
+            Self::UintTexels | Self::FloatTexels => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+        }
+    }
+}
+
+/// One binding of a kernel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Slot {
+    /// Name in the GLSL.
+    pub name: &'static str,
+    /// Number in set 0.
+    pub binding: u32,
+    /// How the kernel sees it.
+    pub kind: SlotKind,
+    /// What the kernel does to it.
+    pub access: Access,
+}
+
+/// What a kernel binds; the build script implements it for the `Bind` struct of every kernel.
+pub trait Bindings {
+    /// The push constants, at most 128 bytes.
+    type Push: Pod;
+    /// Basename of the GLSL file, label of the pass.
+    const NAME: &'static str;
+    /// The compiled code.
+    const SPIRV: &'static [u8];
+    /// In the order of the fields.
+    const SLOTS: &'static [Slot];
+    /// One for each of [`Self::SLOTS`].
+    fn buffers(&self) -> Vec<&Arc<Untyped>>;
+}
+
+/// A compiled kernel, specialised for a set of effects. `B` is the kernel's `Bind` struct.
+pub struct Kernel<B> {
+    pub(super) parts: Arc<Parts>,
+    compile_time: Duration,
+    /// Covariant, so that a kernel kept as `Kernel<Bind<'static>>` takes shorter borrows.
+    of: PhantomData<fn() -> B>,
+}
+
+/// The Vulkan objects of a kernel.
+pub(super) struct Parts {
+    gpu: Gpu,
+    pub set_layout: vk::DescriptorSetLayout,
+    pub layout: vk::PipelineLayout,
+    pub pipeline: vk::Pipeline,
+}
+
+impl<B: Bindings> Kernel<B> {
+    /// Compiles the kernel with every effect's specialisation constant, and `numbers` as (constant id, value), such as
+    /// the workgroup size.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when the driver refuses, or an id is given twice.
+    pub fn new(gpu: &Gpu, effects: &Effects, numbers: &[(u32, u32)]) -> Result<Self> {
+        let begun = Instant::now();
+        let (set_layout, layout, pipeline) = Default::default();
+        // From here on Drop cleans up, whichever line below fails; null handles may be destroyed.
+        let mut parts = Parts { gpu: gpu.clone(), set_layout, layout, pipeline };
+        parts.create_layouts(B::SLOTS, size_of::<B::Push>() as u32).at(B::NAME)?;
+        parts.create_pipeline(B::NAME, B::SPIRV, &constants(B::NAME, effects, numbers)?)?;
+        gpu.0.name(parts.pipeline, B::NAME);
+        Ok(Self { parts: Arc::new(parts), compile_time: begun.elapsed(), of: PhantomData })
+    }
+
+    /// What creating the pipeline took. Some drivers (lavapipe) compile more on the first dispatch.
+    pub fn compile_time(&self) -> Duration {
+        self.compile_time
+    }
+}
+
+/// (id, value) of every specialisation constant; an id that the kernel does not have is ignored by Vulkan.
+fn constants(kernel: &str, effects: &Effects, numbers: &[(u32, u32)]) -> Result<Vec<(u32, u32)>> {
+    let switches = effects.entries().into_iter().map(|(_, id, on)| (id, u32::from(on)));
+    let mut all: Vec<_> = switches.chain(numbers.iter().copied()).collect();
+    all.sort_unstable();
+    match all.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+        Some(pair) => Err(Error::Device(format!("{kernel}: specialisation constant {} is given twice", pair[0].0))),
+        None => Ok(all),
+    }
+}
+
+impl Parts {
+    fn create_layouts(&mut self, slots: &[Slot], push_bytes: u32) -> std::result::Result<(), vk::Result> {
+        let binding = |slot: &Slot| {
+            vk::DescriptorSetLayoutBinding::default()
+                .binding(slot.binding)
+                .descriptor_type(slot.kind.descriptor())
+                .descriptor_count(1)
+                .stage_flags(vk::ShaderStageFlags::COMPUTE)
+        };
+        let bindings: Vec<_> = slots.iter().map(binding).collect();
+        let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+        let push = [vk::PushConstantRange { stage_flags: vk::ShaderStageFlags::COMPUTE, offset: 0, size: push_bytes }];
+        // SAFETY: complete infos; the build script checked that binding numbers differ and that the push fits.
+        unsafe {
+            let device = &self.gpu.0.device;
+            self.set_layout = device.create_descriptor_set_layout(&info, None)?;
+            let sets = [self.set_layout];
+            let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets).push_constant_ranges(&push);
+            self.layout = device.create_pipeline_layout(&info, None)?;
+        }
+        Ok(())
+    }
+
+    fn create_pipeline(&mut self, name: &str, spirv: &[u8], constants: &[(u32, u32)]) -> Result<()> {
+        let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv))
+            .map_err(|e| Error::Device(format!("{name}: its code is damaged ({e}): build again")))?;
+        let values: Vec<u32> = constants.iter().map(|(_, value)| *value).collect();
+        let entry = |(index, (id, _)): (usize, &(u32, u32))| {
+            vk::SpecializationMapEntry::default().constant_id(*id).offset(4 * index as u32).size(4)
+        };
+        let entries: Vec<_> = constants.iter().enumerate().map(entry).collect();
+        let special = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&values));
+        let device = &self.gpu.0.device;
+        // SAFETY: the code was compiled for Vulkan 1.3 by the build script; the module is needed only for this call.
+        unsafe {
+            let module =
+                device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None).at(name)?;
+            let stage = vk::PipelineShaderStageCreateInfo::default()
+                .stage(vk::ShaderStageFlags::COMPUTE)
+                .module(module)
+                .name(c"main")
+                .specialization_info(&special);
+            let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout)];
+            let made = device.create_compute_pipelines(self.gpu.0.cache.raw, &info, None);
+            device.destroy_shader_module(module, None);
+            self.pipeline = made.map_err(|(_, code)| code).at(name)?[0];
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Parts {
+    fn drop(&mut self) {
+        // SAFETY: made on this device; whoever recorded them keeps this until the work is complete.
+        unsafe {
+            let device = &self.gpu.0.device;
+            device.destroy_pipeline(self.pipeline, None);
+            device.destroy_pipeline_layout(self.layout, None);
+            device.destroy_descriptor_set_layout(self.set_layout, None);
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! The one place that records work: barrier, label, timestamps, bind, push, dispatch.
+use super::{Access, Bindings, Buffer, FrameResources, Gpu, Kernel, Untyped, access};
+use crate::error::{Error, Result};
+use ash::vk;
+use ash::vk::Handle;
+use bytemuck::Pod;
+use std::ffi::CString;
+use std::sync::Arc;
+
+/// Records passes, in order, into a frame. Dropping it completes the recording.
+pub struct Recorder<'a> {
+    gpu: &'a Gpu,
+    frame: &'a mut FrameResources,
+    commands: vk::CommandBuffer,
+    barriers: bool,
+}
+
+impl<'a> Recorder<'a> {
+    /// Records into the frame's own command buffer.
+    pub(super) fn own(gpu: &'a Gpu, frame: &'a mut FrameResources) -> Result<Self> {
+        let commands = frame.begin()?;
+        Ok(Self::start(gpu, frame, commands))
+    }
+
+    /// Records into a `VkCommandBuffer` of the caller's, given as the number that it is in Vulkan's C interface. What
+    /// the caller recorded or submitted before is visible to the passes, and what they write is visible, once this
+    /// recorder is dropped, to all that follows and to the host. The bound compute pipeline, descriptor set 0 and push
+    /// constants are changed.
+    ///
+    /// # Safety
+    /// - The command buffer was made for the device and queue family of `gpu`, is recording outside a render pass, and
+    ///   nobody else records into it meanwhile.
+    /// - It is submitted at most once, to a queue of that device.
+    /// - `frame` is neither recorded into again nor dropped before that submission is complete.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when the handle is null or the device is out of memory.
+    pub unsafe fn external(gpu: &'a Gpu, frame: &'a mut FrameResources, command_buffer: u64) -> Result<Self> {
+        if command_buffer == 0 {
+            return Err(Error::Device("a null command buffer was handed over".into()));
+        }
+        frame.reset()?;
+        Ok(Self::start(gpu, frame, vk::CommandBuffer::from_raw(command_buffer)))
+    }
+
+    fn start(gpu: &'a Gpu, frame: &'a mut FrameResources, commands: vk::CommandBuffer) -> Self {
+        // SAFETY: recording, by the caller's contract or because `begin` has just started it.
+        unsafe { access::whole_barrier(&gpu.0.device, commands) };
+        Self { gpu, frame, commands, barriers: true }
+    }
+
+    /// Runs `kernel` on what `bind` names, with `groups` workgroups.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when a group count is 0 or over the device's limit, a buffer is too large for its slot, or
+    /// memory is out.
+    pub fn dispatch<B: Bindings>(
+        &mut self,
+        kernel: &Kernel<B>,
+        bind: B,
+        push: &B::Push,
+        groups: [u32; 3],
+    ) -> Result<()> {
+        check_groups(B::NAME, groups, self.gpu.0.limits.max_compute_work_group_count)?;
+        let buffers = bind.buffers();
+        let set = self.frame.descriptors.set(&kernel.parts, B::SLOTS, &buffers)?;
+        let accesses: Vec<_> = buffers.into_iter().zip(B::SLOTS.iter().map(|slot| slot.access)).collect();
+        self.frame.keep(kernel);
+        let (pipeline, layout, push) = (kernel.parts.pipeline, kernel.parts.layout, bytemuck::bytes_of(push));
+        let compute = vk::PipelineBindPoint::COMPUTE;
+        // SAFETY: the frame keeps the kernel, the set and every buffer until the work is complete.
+        self.pass(B::NAME, &accesses, |device, commands| unsafe {
+            device.cmd_bind_pipeline(commands, compute, pipeline);
+            device.cmd_bind_descriptor_sets(commands, compute, layout, 0, &[set], &[]);
+            device.cmd_push_constants(commands, layout, vk::ShaderStageFlags::COMPUTE, 0, push);
+            device.cmd_dispatch(commands, groups[0], groups[1], groups[2]);
+        })
+    }
+
+    /// Copies all of `src` over `dst`, which has the same length.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when the lengths differ, both are one buffer, or memory is out.
+    pub fn copy<T: Pod>(&mut self, src: &Buffer<T>, dst: &Buffer<T>) -> Result<()> {
+        let (from, to) = (src.untyped(), dst.untyped());
+        if src.len() != dst.len() || Arc::ptr_eq(from, to) {
+            let (from, to, m, n) = (&from.name, &to.name, src.len(), dst.len());
+            return Err(Error::Device(format!("\"{from}\" of {m} elements cannot be copied to \"{to}\" of {n}")));
+        }
+        let region = [vk::BufferCopy { src_offset: 0, dst_offset: 0, size: from.size }];
+        let accesses = [(from, Access::CopySource), (to, Access::CopyTarget)];
+        // SAFETY: two live buffers of one size, kept by the frame.
+        self.pass("copy", &accesses, |device, commands| unsafe {
+            device.cmd_copy_buffer(commands, from.raw, to.raw, &region);
+        })
+    }
+
+    /// Sets every 32-bit word of `buffer` to `value`.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when memory is out.
+    pub fn fill<T: Pod>(&mut self, buffer: &Buffer<T>, value: u32) -> Result<()> {
+        let target = buffer.untyped();
+        // SAFETY: a live buffer whose size is a multiple of four, kept by the frame.
+        self.pass("fill", &[(target, Access::CopyTarget)], |device, commands| unsafe {
+            device.cmd_fill_buffer(commands, target.raw, 0, vk::WHOLE_SIZE, value);
+        })
+    }
+
+    /// From here on no barriers come between passes: a fault to plant, for tests of the validation that would find it.
+    #[doc(hidden)]
+    pub fn suppress_barriers(&mut self) {
+        self.barriers = false;
+    }
+
+    fn pass(
+        &mut self,
+        name: &'static str,
+        accesses: &[(&Arc<Untyped>, Access)],
+        record: impl FnOnce(&ash::Device, vk::CommandBuffer),
+    ) -> Result<()> {
+        let times = self.frame.timer.open(name)?;
+        let (inner, commands) = (&self.gpu.0, self.commands);
+        // Both stamps wait for all earlier work, so that a pass is not charged with another's tail.
+        let stamp = |offset: u32| {
+            if let Some((pool, query)) = times {
+                let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
+                // SAFETY: the command buffer is recording; the query was reset and is used once.
+                unsafe { inner.device.cmd_write_timestamp2(commands, stage, pool, query + offset) };
+            }
+        };
+        if self.frame.hazards.note(accesses) && self.barriers {
+            // SAFETY: the command buffer is recording.
+            unsafe { access::pass_barrier(&inner.device, commands) };
+        }
+        self.label(name, || {
+            stamp(0);
+            record(&inner.device, commands);
+            stamp(1);
+        });
+        Ok(())
+    }
+
+    /// Puts `record` under a label for capture tools, where there are labels.
+    fn label(&self, name: &str, record: impl FnOnce()) {
+        let (Some(debug), Ok(name)) = (&self.gpu.0.debug, CString::new(name)) else { return record() };
+        let label = vk::DebugUtilsLabelEXT::default().label_name(&name);
+        // SAFETY: the command buffer is recording; the label is closed below.
+        unsafe { debug.cmd_begin_debug_utils_label(self.commands, &label) };
+        record();
+        unsafe { debug.cmd_end_debug_utils_label(self.commands) };
+    }
+}
+
+impl Drop for Recorder<'_> {
+    fn drop(&mut self) {
+        // SAFETY: the command buffer is still recording.
+        unsafe { access::whole_barrier(&self.gpu.0.device, self.commands) };
+    }
+}
+
+fn check_groups(name: &str, groups: [u32; 3], limit: [u32; 3]) -> Result<()> {
+    if groups.contains(&0) {
+        return Err(Error::Device(format!("{name}: an empty dispatch of {groups:?} workgroups")));
+    }
+    if groups.iter().zip(limit).any(|(count, most)| *count > most) {
+        let what = format!("{name}: {groups:?} workgroups are over the device's limit of {limit:?}");
+        return Err(Error::Device(format!("{what}: choose a smaller film")));
+    }
+    Ok(())
+}

@@ -1,0 +1,160 @@
+//! When each pass began and ended, by timestamps of the device.
+use super::{At, Gpu};
+use crate::error::{Error, Result};
+use ash::vk;
+use std::sync::OnceLock;
+use std::time::Instant;
+
+/// Queries per pool; a pass takes two.
+const POOL: u32 = 1024;
+
+/// One pass of a frame. Both times are on the device's clock, which [`super::Gpu::calibrate`] ties to the host's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PassTime {
+    /// The kernel's name, or `copy` or `fill`.
+    pub name: &'static str,
+    /// Nanoseconds.
+    pub begin_ns: u64,
+    /// Nanoseconds, not before `begin_ns`.
+    pub end_ns: u64,
+}
+
+/// Nanoseconds since this was first called, on a clock that never goes back.
+pub fn host_ns() -> u64 {
+    static START: OnceLock<Instant> = OnceLock::new();
+    START.get_or_init(Instant::now).elapsed().as_nanos() as u64
+}
+
+/// How to read a timestamp: its meaningful low bits (`timestampValidBits`, 0 to 64) and nanoseconds per tick.
+#[derive(Clone, Copy)]
+pub(super) struct Clock {
+    pub bits: u32,
+    pub period: f32,
+}
+
+impl Clock {
+    /// Nanoseconds from `begin` to `end`; the counter may wrap once between them.
+    fn between(self, begin: u64, end: u64) -> u64 {
+        let mask = u64::MAX.checked_shr(64 - self.bits).unwrap_or(0);
+        scale(end.wrapping_sub(begin) & mask, self.period)
+    }
+
+    /// Nanoseconds since the counter was 0.
+    pub fn absolute(self, ticks: u64) -> u64 {
+        self.between(0, ticks)
+    }
+}
+
+/// Exact for a period of 1, and good to 2^-24 for others: in 40-bit fixed point, since 64-bit ticks exceed a double.
+fn scale(ticks: u64, period: f32) -> u64 {
+    let fixed = (f64::from(period) * (1u64 << 40) as f64) as u128;
+    ((u128::from(ticks) * fixed) >> 40) as u64
+}
+
+/// The queries of one frame.
+pub(super) struct Timer {
+    gpu: Gpu,
+    pools: Vec<vk::QueryPool>,
+    passes: Vec<&'static str>,
+}
+
+impl Timer {
+    pub fn new(gpu: &Gpu) -> Self {
+        Self { gpu: gpu.clone(), pools: Vec::new(), passes: Vec::new() }
+    }
+
+    /// Forgets the passes; the work that they timed is complete.
+    pub fn reset(&mut self) {
+        // SAFETY: the queries are not in use, and hostQueryReset is a required feature.
+        self.pools.iter().for_each(|pool| unsafe { self.gpu.0.device.reset_query_pool(*pool, 0, POOL) });
+        self.passes.clear();
+    }
+
+    /// Where the next pass writes its two timestamps; `None` where the queue has none.
+    pub fn open(&mut self, name: &'static str) -> Result<Option<(vk::QueryPool, u32)>> {
+        if self.gpu.0.info.timestamp_bits == 0 {
+            return Ok(None);
+        }
+        let first = 2 * self.passes.len() as u32;
+        if first as usize / POOL as usize == self.pools.len() {
+            self.grow()?;
+        }
+        self.passes.push(name);
+        Ok(Some((self.pools[(first / POOL) as usize], first % POOL)))
+    }
+
+    fn grow(&mut self) -> Result<()> {
+        let device = &self.gpu.0.device;
+        let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(POOL);
+        // SAFETY: a complete info, a fresh pool, and hostQueryReset is a required feature.
+        unsafe {
+            let pool = device.create_query_pool(&info, None).at("timestamps")?;
+            device.reset_query_pool(pool, 0, POOL);
+            self.pools.push(pool);
+        }
+        Ok(())
+    }
+
+    /// # Errors
+    /// When the work is not complete.
+    pub fn times(&self) -> Result<Vec<PassTime>> {
+        let clock = self.gpu.0.clock();
+        let ticks = self.ticks().ok_or_else(|| {
+            Error::Device("the times of a frame were asked for before its work was complete: wait for it".into())
+        })?;
+        let Some(&[first, _]) = ticks.first() else { return Ok(Vec::new()) };
+        let at = |ticks| clock.absolute(first) + clock.between(first, ticks);
+        let pass = |(name, [begin, end]): (&&'static str, &[u64; 2])| PassTime {
+            name,
+            begin_ns: at(*begin),
+            end_ns: at(*begin) + clock.between(*begin, *end),
+        };
+        Ok(self.passes.iter().zip(&ticks).map(pass).collect())
+    }
+
+    /// The last pass that began, for a message about a lost device; it still answers on most drivers.
+    pub fn last_started(&self) -> Option<&'static str> {
+        let started = |index: &usize| matches!(self.query(2 * index), Some([_, available]) if available != 0);
+        (0..self.passes.len()).rev().find(started).map(|index| self.passes[index])
+    }
+
+    /// Begin and end of every pass; `None` when one is not there yet.
+    fn ticks(&self) -> Option<Vec<[u64; 2]>> {
+        let read = |index| self.query(index).filter(|[_, available]| *available != 0).map(|[ticks, _]| ticks);
+        (0..self.passes.len()).map(|pass| Some([read(2 * pass)?, read(2 * pass + 1)?])).collect()
+    }
+
+    /// (ticks, whether they are there) of one query.
+    fn query(&self, index: usize) -> Option<[u64; 2]> {
+        let (pool, query) = (self.pools[index / POOL as usize], (index % POOL as usize) as u32);
+        let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WITH_AVAILABILITY;
+        let mut result = [[0u64; 2]];
+        // SAFETY: a live pool; the result has two words per query, as the flags say.
+        let asked = unsafe { self.gpu.0.device.get_query_pool_results(pool, query, &mut result, flags) };
+        asked.ok().map(|()| result[0])
+    }
+}
+
+impl Drop for Timer {
+    fn drop(&mut self) {
+        // SAFETY: made on this device, not in use (the frame's contract), destroyed once.
+        self.pools.iter().for_each(|pool| unsafe { self.gpu.0.device.destroy_query_pool(*pool, None) });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_counter_wraps_and_scales() {
+        let clock = Clock { bits: 36, period: 1.0 };
+        assert_eq!(clock.between(5, 12), 7);
+        assert_eq!(clock.between((1 << 36) - 3, 4), 7, "wrapped once");
+        assert_eq!(clock.between(1 << 40, (1 << 50) + 7), 7, "bits above the valid ones mean nothing");
+        assert_eq!(Clock { bits: 64, period: 1.0 }.between(u64::MAX, 6), 7);
+        assert_eq!(Clock { bits: 64, period: 2.5 }.between(0, 1000), 2500);
+        assert_eq!(Clock { bits: 0, period: 1.0 }.between(0, 1000), 0);
+        assert_eq!(Clock { bits: 64, period: 1.0 }.absolute(u64::MAX), u64::MAX, "no rounding at period 1");
+    }
+}
