@@ -97,15 +97,15 @@ impl DeviceScene {
     /// Bytes of each part, largest first.
     pub fn sizes(&self) -> Vec<(&'static str, u64)> {
         let mut sizes = vec![
-            ("nodes", self.nodes.bytes()),
-            ("triangles", self.triangles.bytes()),
-            ("shading", self.shading.bytes()),
-            ("instances", self.instances.bytes()),
-            ("materials", self.materials.bytes()),
-            ("textures", self.textures.bytes()),
-            ("texels", self.texels.bytes()),
-            ("lights", self.lights.bytes() + self.light_table.bytes()),
-            ("environment", self.environment.bytes() + self.environment_table.bytes()),
+            ("nodes", self.nodes.raw().size),
+            ("triangles", self.triangles.raw().size),
+            ("shading", self.shading.raw().size),
+            ("instances", self.instances.raw().size),
+            ("materials", self.materials.raw().size),
+            ("textures", self.textures.raw().size),
+            ("texels", self.texels.raw().size),
+            ("lights", self.lights.raw().size + self.light_table.raw().size),
+            ("environment", self.environment.raw().size + self.environment_table.raw().size),
         ];
         sizes.sort_by_key(|s| std::cmp::Reverse(s.1));
         sizes

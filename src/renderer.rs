@@ -4,9 +4,9 @@ use crate::error::Result;
 use crate::frame::{self, Batch, DeviceScene, FilmBuffers, Stages};
 use crate::gpu::layout::{Camera, Effects, PathPush, LIGHT_ENVIRONMENT, NONE};
 use crate::gpu::{FrameResources, Gpu, PassTime, RawBuffer, Recorder};
-use crate::scene::{Scene, effects};
+use crate::scene::{self, Scene};
 use crate::settings::{PixelFilter, Sampler, Settings};
-use crate::stage::{fold, guide, path};
+use crate::stage::{self, fold, guide, path};
 
 /// What a render leaves in buffers besides radiance and its variance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -82,7 +82,7 @@ impl Renderer {
         let settings = scene.settings.clone();
         settings.validate()?;
         let effects = Effects { split_light: outputs.split_light, counters: outputs.counters, ..effects };
-        let workgroup = gpu.info().workgroup_size();
+        let workgroup = if gpu.info().kind == "CPU" { stage::WORKGROUP_CPU } else { stage::WORKGROUP_GPU };
         let stages = Stages {
             guide: guide::Guides::new(gpu, &effects, workgroup)?,
             path: path::Path::new(gpu, &effects, workgroup)?,
@@ -199,7 +199,7 @@ fn view(buffer: RawBuffer, offset: u64, stride: usize, channels: u32) -> OutputV
 
 /// The effects that a scene, its settings and the outputs call for.
 pub fn called_for(scene: &Scene, outputs: Outputs) -> Effects {
-    effects::effects(scene, outputs.split_light, outputs.counters).0
+    scene::effects(scene, outputs.split_light, outputs.counters).0
 }
 
 /// Every effect of light and matter; the random numbers stay those that the settings chose.
@@ -210,7 +210,7 @@ pub fn all_effects(scene: &Scene) -> Effects {
 /// Paths per dispatch: enough to fill the device, few enough that a batch ends within a fraction of a second, and
 /// that the samples fit a storage buffer.
 fn paths_in_flight(gpu: &Gpu, settings: &Settings, effects: &Effects) -> u32 {
-    let wanted: u64 = if gpu.info().is_cpu() { 1 << 18 } else { 1 << 22 };
+    let wanted: u64 = if gpu.info().kind == "CPU" { 1 << 18 } else { 1 << 22 };
     let bytes = if effects.split_light { 36 } else { 12 };
     let room = gpu.info().max_storage_range / bytes;
     let all = settings.pixels() as u64 * u64::from(settings.spp);

@@ -5,7 +5,7 @@ use crate::gpu::layout::Effects;
 use crate::gpu::{DeviceOptions, FrameResources, Gpu};
 use crate::renderer::{Outputs, Renderer};
 use crate::report::table::{self, milliseconds};
-use crate::scene::{Scene, effects};
+use crate::scene::{self, Scene};
 use crate::settings::Settings;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -60,7 +60,7 @@ fn rows(args: &Args) -> Result<Vec<Row>> {
     let scene = Scene::load(&args.scene, &shrink)?;
     let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), validation: false })?;
     let outputs = Outputs { split_light: true, guides: true, counters: false };
-    let (base, reasons) = effects::effects(&scene, outputs.split_light, outputs.counters);
+    let (base, reasons) = scene::effects(&scene, outputs.split_light, outputs.counters);
     let sizes = Renderer::new(&gpu, &scene, outputs)?.scene().sizes();
     let usual = cost(&gpu, &scene, outputs, base)?;
     let mut rows = Vec::new();

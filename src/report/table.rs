@@ -1,16 +1,6 @@
 //! Text tables, and the one of the passes of a render.
+use crate::gpu::PassTime;
 use serde::Serialize;
-
-/// One timed interval: a pass on the GPU, or a stage of work on the host.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PassTime {
-    /// Name of the pass.
-    pub name: &'static str,
-    /// Nanoseconds on the clock of whoever timed it.
-    pub begin_ns: u64,
-    /// Not before `begin_ns`.
-    pub end_ns: u64,
-}
 
 /// All calls of one pass.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -1,5 +1,5 @@
 //! Chrome's trace-event format, which Perfetto and chrome://tracing open.
-use super::table::PassTime;
+use crate::gpu::PassTime;
 use serde_json::{Value, json};
 
 const CPU: u32 = 1;

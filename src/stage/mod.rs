@@ -4,8 +4,13 @@ pub mod guide;
 pub mod path;
 
 /// Threads per workgroup of the one-dimensional kernels that leave it open (`local_size_x_id = 100`).
-/// Tracing on a CPU device runs fastest at 32 (measured on lavapipe against 16 and 64); GPUs want whole subgroups.
 pub const WORKGROUP_ID: u32 = 100;
+
+/// Tracing on lavapipe runs fastest at 32 (against 16 and 64).
+pub const WORKGROUP_CPU: u32 = 32;
+
+/// Two subgroups of the most common width.
+pub const WORKGROUP_GPU: u32 = 64;
 
 /// Workgroups of `size` threads that cover `threads`.
 pub fn groups(threads: u32, size: u32) -> [u32; 3] {
