@@ -7,7 +7,7 @@ use glam::{DVec3, Vec2, Vec3, dvec3, vec3};
 use statistics::{chi_square, sidak};
 use std::f64::consts::{PI, TAU};
 use tallow::gpu::layout::{BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE};
-use tallow::reference::bsdf::{Bsdf, BsdfSample, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
+use tallow::reference::bsdf::{Bsdf, BsdfSample, SMOOTH_ALPHA, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
 use tallow::reference::fresnel::internal_fresnel;
 use tallow::reference::sampler::{sample_2d, sampler_start};
 
@@ -131,14 +131,11 @@ impl Grid {
 
 /// The grid of the reflected lobe, and of the refracted one where there is one.
 fn grids(b: &Bsdf, wo: Vec3) -> Vec<Grid> {
-    let alpha = f64::from(if b.kind == BSDF_DIFFUSE { 1.0 } else { b.alpha.max(0.5 * f32::from(bsdf_is_smooth(b))) });
+    // A diffuse lobe without a rough coat spreads over all slopes.
+    let alpha = f64::from(if b.alpha < SMOOTH_ALPHA { 1.0 } else { b.alpha });
     let eta = f64::from(if wo.z < 0.0 { 1.0 / b.eta.x } else { b.eta.x });
     let indices = if b.kind == BSDF_DIELECTRIC { vec![1.0, eta] } else { vec![1.0] };
     indices.into_iter().map(|n| Grid { wo: wo.as_dvec3(), n, alpha }).collect()
-}
-
-fn bsdf_is_smooth(b: &Bsdf) -> bool {
-    b.alpha < tallow::reference::bsdf::SMOOTH_ALPHA
 }
 
 /// Observed and expected counts; the last cell holds what is absorbed or a delta.
@@ -295,9 +292,8 @@ fn a_rough_mirror_loses_what_single_scattering_loses() {
 fn rough_kinds_make_no_light() {
     for (name, b, wo) in rough_cases() {
         let e = energy(b, wo, 1 << 12);
-        // The coat's diffuse base passes a SMOOTH interface: together with a rough reflection it may gain a little.
-        let limit = if b.kind == BSDF_COATED { 1.03 } else { 1.006 };
-        assert!(e < limit && e > 0.05, "{name}: {e}");
+        // Walter's fit adds up to 0.4 %; a coat whose base passes a smooth interface stays within the same margin.
+        assert!(e < 1.006 && e > 0.05, "{name}: {e}");
     }
 }
 
