@@ -1,0 +1,279 @@
+//! The GPU layer on a real device, under validation: any message fails.
+mod support;
+use support::kernels::{mix, next};
+use support::{assert_silent, hash, words};
+use tallow::gpu::layout::{Effects, uvec2, uvec3, uvec4, vec4};
+use tallow::gpu::{Buffer, FrameResources, Gpu, Location, PassTime};
+
+const SIZES: [usize; 5] = [1, 31, 64, 65, 1_000_001];
+const WIDTH: u32 = 64;
+
+fn groups(count: usize) -> [u32; 3] {
+    [(count as u32).div_ceil(WIDTH), 1, 1]
+}
+
+#[test]
+fn buffers_return_what_was_written() {
+    let gpu = support::gpu();
+    for count in SIZES {
+        let values = words(count, 1);
+        let buffer = Buffer::from_slice(&gpu, "round trip", &values).unwrap();
+        assert_eq!((buffer.len(), buffer.raw().size), (count, 4 * count as u64));
+        assert!(buffer.read().unwrap() == values, "{count} words");
+        buffer.write(count - 1, &[7]).unwrap();
+        assert_eq!(*buffer.read().unwrap().last().unwrap(), 7);
+        assert!(buffer.read().unwrap() != values, "the comparison tells a changed word");
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn absent_data_is_one_zero() {
+    let gpu = support::gpu();
+    let buffer = Buffer::<uvec3>::from_slice(&gpu, "absent", &[]).unwrap();
+    assert_eq!((buffer.len(), buffer.read().unwrap()), (1, vec![[0; 3]]));
+    assert_silent(&gpu);
+}
+
+#[test]
+fn bad_sizes_are_errors_that_name_the_buffer() {
+    let gpu = support::gpu();
+    let buffer = Buffer::from_slice(&gpu, "small", &[1u32, 2, 3]).unwrap();
+    for (offset, count) in [(3, 1), (0, 4), (usize::MAX, 1)] {
+        let message = buffer.write(offset, &vec![0; count]).unwrap_err().to_string();
+        assert!(message.contains("small"), "{message}");
+    }
+    let other = Buffer::from_slice(&gpu, "other", &[1u32]).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let message = gpu.run(&mut frame, |rec| rec.copy(&buffer, &other)).unwrap_err().to_string();
+    assert!(message.contains("small") && message.contains("other"), "{message}");
+    for len in [usize::MAX, 1 << 50] {
+        let message = Buffer::<u32>::new(&gpu, "huge", len, Location::Device).err().unwrap().to_string();
+        assert!(message.contains("huge"), "{message}");
+    }
+    assert_silent(&gpu);
+}
+
+/// Inputs of the kernel `mix` on the host.
+struct Inputs {
+    wide: Vec<uvec4>,
+    narrow: Vec<uvec3>,
+    floats: Vec<vec4>,
+    scalars: Vec<f32>,
+    words: Vec<uvec3>,
+    sums: Vec<u32>,
+}
+
+/// Finite floats of any bits, so that no unit may quieten a NaN.
+fn float(bits: u32) -> f32 {
+    f32::from_bits(bits & 0xbf7f_ffff)
+}
+
+impl Inputs {
+    fn new(count: usize) -> Self {
+        let three = |seed| words(3 * count, seed).chunks_exact(3).map(|w| [w[0], w[1], w[2]]).collect();
+        let four = |seed| words(4 * count, seed).chunks_exact(4).map(|w| [w[0], w[1], w[2], w[3]]).collect::<Vec<_>>();
+        Self {
+            wide: four(1),
+            narrow: three(2),
+            floats: four(3).iter().map(|v| v.map(float)).collect(),
+            scalars: words(count, 4).into_iter().map(float).collect(),
+            words: three(5),
+            sums: words(count, 6),
+        }
+    }
+
+    /// The CPU twin: (sums, result).
+    fn mix(&self, textures: bool, addend: u32, salt: u32) -> (Vec<u32>, Vec<uvec2>) {
+        let sum = |i: usize| {
+            let first = if textures { self.wide[i][3] } else { 1 };
+            self.sums[i].wrapping_add(first).wrapping_add(addend)
+        };
+        let mixed = |i: usize| {
+            let floats = self.floats[i][3].to_bits() ^ self.scalars[i].to_bits();
+            hash(self.wide[i][0] ^ self.narrow[i][1] ^ floats ^ self.words[i][2] ^ salt)
+        };
+        let all = 0..self.sums.len();
+        (all.clone().map(sum).collect(), all.map(|i| [mixed(i), sum(i)]).collect())
+    }
+}
+
+/// The same on the device.
+fn run_mix(gpu: &Gpu, inputs: &Inputs, effects: &Effects, numbers: &[(u32, u32)], salt: u32) -> (Vec<u32>, Vec<uvec2>) {
+    let count = inputs.sums.len();
+    let kernel = mix::Kernel::new(gpu, effects, numbers).unwrap();
+    let wide = Buffer::from_slice(gpu, "wide", &inputs.wide).unwrap();
+    let narrow = Buffer::from_slice(gpu, "narrow", &inputs.narrow).unwrap();
+    let floats = Buffer::from_slice(gpu, "floats", &inputs.floats).unwrap();
+    let scalars = Buffer::from_slice(gpu, "scalars", &inputs.scalars).unwrap();
+    let words = Buffer::from_slice(gpu, "words", &inputs.words).unwrap();
+    let sums = Buffer::from_slice(gpu, "sums", &inputs.sums).unwrap();
+    let result = Buffer::new(gpu, "result", count, Location::Device).unwrap();
+    let mut frame = FrameResources::new(gpu).unwrap();
+    let bind = mix::Bind {
+        wide: &wide,
+        narrow: &narrow,
+        floats: &floats,
+        scalars: &scalars,
+        words: &words,
+        sums: &sums,
+        result: &result,
+    };
+    let push = [count as u32, salt, 0, 0];
+    gpu.run(&mut frame, |rec| rec.dispatch(&kernel, bind, &push, groups(count))).unwrap();
+    (sums.read().unwrap(), result.read().unwrap())
+}
+
+#[test]
+fn every_kind_of_binding_agrees_with_the_twin() {
+    let gpu = support::gpu();
+    for count in SIZES {
+        let inputs = Inputs::new(count);
+        let (sums, result) = run_mix(&gpu, &inputs, &Effects::ALL, &[(100, WIDTH), (101, 5)], 99);
+        assert!((sums.clone(), result.clone()) == inputs.mix(true, 5, 99), "{count} elements");
+        assert!((sums, result) != inputs.mix(true, 5, 98), "the comparison tells a changed push constant");
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn specialisation_constants_take_effect() {
+    let gpu = support::gpu();
+    let inputs = Inputs::new(65);
+    for (textures, addend, width) in [(false, 0, 1), (true, 7, 32), (false, 7, 128)] {
+        let effects = Effects { textures, ..Effects::default() };
+        let run = run_mix(&gpu, &inputs, &effects, &[(100, width), (101, addend)], 0);
+        // Workgroups of another width than `groups` assumes cover a known part; the rest keeps its input.
+        let reached = 65.min(65usize.div_ceil(WIDTH as usize) * width as usize);
+        let twin = inputs.mix(textures, addend, 0);
+        assert_eq!(run.0[..reached], twin.0[..reached], "{textures} {addend} {width}");
+        assert_eq!(run.0[reached..], inputs.sums[reached..]);
+        assert_ne!(run.0[..reached], inputs.mix(!textures, addend, 0).0[..reached], "told apart");
+        assert_ne!(run.0[..reached], inputs.mix(textures, addend + 1, 0).0[..reached], "told apart");
+    }
+    let message = mix::Kernel::new(&gpu, &Effects::ALL, &[(0, 1)]).err().unwrap().to_string();
+    assert!(message.contains("mix") && message.contains("twice"), "{message}");
+    assert_silent(&gpu);
+}
+
+/// A chain of passes that each read what the one before wrote: fill, `next` three times, copy.
+fn chain(gpu: &Gpu, frame: &mut FrameResources, count: usize, barriers: bool) -> (Vec<u32>, Vec<PassTime>) {
+    let kernel = next::Kernel::new(gpu, &Effects::ALL, &[]).unwrap();
+    let make = |name| Buffer::<u32>::new(gpu, name, count, Location::Device).unwrap();
+    let (a, b, end) = (make("a"), make("b"), make("end"));
+    let times = gpu.run(frame, |rec| {
+        if !barriers {
+            rec.suppress_barriers();
+        }
+        rec.fill(&a, 5)?;
+        for (from, to) in [(&a, &b), (&b, &a), (&a, &b)] {
+            rec.dispatch(&kernel, next::Bind { from, to }, &(count as u32), groups(count))?;
+        }
+        rec.copy(&b, &end)
+    });
+    (end.read().unwrap(), times.unwrap())
+}
+
+#[test]
+fn dependent_passes_wait_and_are_timed() {
+    let gpu = support::gpu();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    for count in SIZES {
+        let begun = std::time::Instant::now();
+        let (values, times) = chain(&gpu, &mut frame, count, true);
+        let elapsed = begun.elapsed().as_nanos() as u64;
+        // 5, 16, 49, 148.
+        assert!(values == vec![148; count], "{count}");
+        assert_eq!(times.iter().map(|t| t.name).collect::<Vec<_>>(), ["fill", "next", "next", "next", "copy"]);
+        assert!(times.iter().all(|t| t.begin_ns <= t.end_ns), "{times:?}");
+        assert!(times.windows(2).all(|t| t[0].end_ns <= t[1].begin_ns), "one after another: {times:?}");
+        assert!(times[4].end_ns - times[0].begin_ns <= elapsed, "{times:?} in {elapsed} ns");
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn frames_of_any_length_are_timed_and_reused() {
+    let gpu = support::gpu();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let kernel = next::Kernel::new(&gpu, &Effects::ALL, &[]).unwrap();
+    let (a, b) = (Buffer::from_slice(&gpu, "a", &[1u32]).unwrap(), Buffer::from_slice(&gpu, "b", &[1u32]).unwrap());
+    // Beyond one query pool (512 passes) and several descriptor pools, then few, then many again.
+    for passes in [1300, 1, 1300] {
+        let times = gpu.run(&mut frame, |rec| {
+            (0..passes).try_for_each(|_| rec.dispatch(&kernel, next::Bind { from: &a, to: &b }, &1, [1; 3]))
+        });
+        assert_eq!(times.unwrap().len(), passes);
+        assert_eq!(frame.times().unwrap().len(), passes);
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn a_missing_barrier_is_reported() {
+    let gpu = support::gpu();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    chain(&gpu, &mut frame, 64, true);
+    assert_silent(&gpu);
+    chain(&gpu, &mut frame, 64, false);
+    let messages = gpu.validation_messages();
+    for hazard in ["SYNC-HAZARD-READ-AFTER-WRITE", "SYNC-HAZARD-WRITE-AFTER-READ"] {
+        assert!(messages.iter().any(|m| m.contains(hazard)), "{hazard} in {messages:#?}");
+    }
+    assert!(messages.iter().any(|m| m.contains("\"a\"") || m.contains("[a]")), "objects are named: {messages:#?}");
+}
+
+#[test]
+fn bad_dispatches_are_errors_and_leave_the_frame_usable() {
+    let gpu = support::gpu();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let kernel = next::Kernel::new(&gpu, &Effects::ALL, &[]).unwrap();
+    let (a, b) = (Buffer::from_slice(&gpu, "a", &[1u32]).unwrap(), Buffer::from_slice(&gpu, "b", &[0u32]).unwrap());
+    for groups in [[0, 1, 1], [1, 1, 0], [1, u32::MAX, 1]] {
+        let run = gpu.run(&mut frame, |rec| rec.dispatch(&kernel, next::Bind { from: &a, to: &b }, &1, groups));
+        let message = run.unwrap_err().to_string();
+        assert!(message.starts_with("next: "), "{message}");
+    }
+    gpu.run(&mut frame, |rec| rec.dispatch(&kernel, next::Bind { from: &a, to: &b }, &1, [1; 3])).unwrap();
+    assert_eq!(b.read().unwrap(), [4]);
+    assert_silent(&gpu);
+}
+
+#[test]
+fn recorded_buffers_and_kernels_live_until_the_work_is_done() {
+    let gpu = support::gpu();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let end = Buffer::from_slice(&gpu, "end", &[0u32]).unwrap();
+    gpu.run(&mut frame, |rec| {
+        let kernel = next::Kernel::new(&gpu, &Effects::ALL, &[])?;
+        let start = Buffer::from_slice(&gpu, "start", &[1u32])?;
+        rec.dispatch(&kernel, next::Bind { from: &start, to: &end }, &1, [1; 3])
+    })
+    .unwrap();
+    assert_eq!(end.read().unwrap(), [4]);
+    assert_silent(&gpu);
+}
+
+#[test]
+fn nothing_is_left_when_the_device_closes() {
+    let gpu = support::gpu();
+    let log = gpu.validation_log();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    chain(&gpu, &mut frame, 64, true);
+    drop((gpu, frame));
+    assert_eq!(*log.lock().unwrap(), Vec::<String>::new());
+}
+
+#[test]
+fn both_clocks_advance_together() {
+    let gpu = support::gpu();
+    let Some((gpu_before, host_before)) = gpu.calibrate() else { return println!("no calibrated timestamps here") };
+    std::thread::sleep(std::time::Duration::from_millis(50));
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let (_, times) = chain(&gpu, &mut frame, 64, true);
+    let (gpu_after, host_after) = gpu.calibrate().unwrap();
+    let (gpu_passed, host_passed) = (gpu_after - gpu_before, host_after - host_before);
+    assert!(host_passed >= 50_000_000 && gpu_passed.abs_diff(host_passed) < 5_000_000, "{gpu_passed} {host_passed}");
+    assert!(times.iter().all(|t| (gpu_before..gpu_after).contains(&t.begin_ns)), "passes are on that clock");
+    assert_silent(&gpu);
+}

@@ -1,0 +1,35 @@
+//! What the tests share.
+#![allow(dead_code)]
+use tallow::gpu::{DeviceOptions, Gpu};
+
+/// The kernels of `glsl/test`.
+pub mod kernels {
+    include!(concat!(env!("OUT_DIR"), "/test_shaders.rs"));
+}
+
+/// A device under core and synchronization validation. `TALLOW_DEVICE` chooses one by index or name.
+///
+/// # Panics
+/// With the remedy when there is no device or the layers are missing: a test that needs a GPU never passes without.
+pub fn gpu() -> Gpu {
+    Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), validation: true })
+        .unwrap_or_else(|e| panic!("this test needs a Vulkan device and the validation layers: {e}"))
+}
+
+/// # Panics
+/// When the validation layers have said anything.
+pub fn assert_silent(gpu: &Gpu) {
+    assert_eq!(gpu.validation_messages(), Vec::<String>::new());
+}
+
+/// Words that depend on nothing but `seed`.
+pub fn words(count: usize, seed: u32) -> Vec<u32> {
+    (0..count as u32).map(|i| hash(i ^ seed.rotate_left(16))).collect()
+}
+
+/// The same as `glsl/test/hash.glsl`.
+pub fn hash(v: u32) -> u32 {
+    let state = v.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
+    (word >> 22) ^ word
+}
