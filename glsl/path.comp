@@ -33,13 +33,13 @@ const uint PAIR_CHOICE = 0u, PAIR_LIGHT = 1u, PAIR_BSDF = 2u, PAIR_ROULETTE = 3u
 vec2 film_sample(uint pixel, Sampler random) {
     vec2 at = vec2(pixel % push.size.x, pixel / push.size.x);
     vec2 u = sample_2d(random, PAIR_FILM);
-    if (FX_PIXEL_FILTER && push.pixel_filter == 0u) u = 0.5 + vec2(warp_tent(u.x), warp_tent(u.y));
-    else if (FX_PIXEL_FILTER) u = 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y));
+    if (FX_PIXEL_FILTER && push.pixel_filter == 1u) u = 0.5 + vec2(warp_tent(u.x), warp_tent(u.y));
+    else if (FX_PIXEL_FILTER && push.pixel_filter == 2u) u = 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y));
     return film_from_pixel(at + u, push.size);
 }
 
-// Joins the two strategies; a density that overflowed takes everything.
-float balance(float taken, float other) { return taken / (taken + other); }
+// Joins the two strategies. Two densities that vanished give 0, not 0 / 0.
+float balance(float taken, float other) { return taken / max(taken + other, 1e-37); }
 
 struct Path {
     vec3 origin;
@@ -90,7 +90,7 @@ vec3 light_from_nee(Path path, Surface s, Bsdf bsdf, mat3 basis, vec3 wo, Sample
     vec3 wi = light.direction * basis; // row vector times matrix: into the frame
     vec4 f = bsdf_evaluate(bsdf, wo, wi);
     vec3 contribution = f.rgb * light.radiance * (light.pdf > 0.0 ? balance(light.pdf, f.w) : 1.0);
-    if (max(contribution.r, max(contribution.g, contribution.b)) <= 0.0) return vec3(0.0);
+    if (!(max(contribution.r, max(contribution.g, contribution.b)) > 0.0)) return vec3(0.0);
     vec3 normal = dot(light.direction, s.geometric) < 0.0 ? -s.geometric : s.geometric;
     vec3 origin = offset_origin(s.position, normal);
     vec3 direction = light.direction;
@@ -166,7 +166,8 @@ Light2 trace_path(Path path, Sampler random, uint path_seed, out vec3 albedo) {
             add_light(sum, path.throughput * light, bounce >= 1u && !smooth_first);
         }
         if (!scatter(path, s, bsdf, basis, wo, hit.t, random, pair)) break;
-        if (FX_ROULETTE && bounce + 1u >= push.roulette_depth && !survives_roulette(path, random, pair)) break;
+        bool roulette = FX_ROULETTE && push.roulette_depth > 0u && bounce + 1u >= push.roulette_depth;
+        if (roulette && !survives_roulette(path, random, pair)) break;
     }
     return sum;
 }

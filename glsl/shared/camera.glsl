@@ -18,7 +18,7 @@ Ray camera_ray(Camera camera, vec2 film, vec2 lens) {
         vec2 disk = camera.lens_radius * warp_disk(lens);
         vec3 shift = disk.x * normalize(camera.right) + disk.y * normalize(camera.up);
         origin += shift;
-        through = camera.focus_distance * through - shift;
+        through -= shift / max(camera.focus_distance, 1e-20); // a lens of radius 0 changes no bit
     }
     vec3 direction = normalize(through);
     return Ray(origin + camera.near * direction, direction);

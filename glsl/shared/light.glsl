@@ -18,9 +18,10 @@ uint alias_choose(usamplerBuffer table, uint n, uint random) {
     return low < threshold ? slot : texelFetch(table, int(2u * slot + 1u)).x;
 }
 
-// Environment direction: u = atan(x, -z) / 2pi, v = acos(y) / pi in the environment's own frame (row 0 is +y).
-vec2 environment_uv(vec3 d) {
-    return vec2(atan(d.x, -d.z) * (0.5 / PI), acos(clamp(d.y, -1.0, 1.0)) / PI);
+// Environment direction: u = atan(x, -z) / 2pi, v = acos(y) / pi in the environment's own frame (row 0 is +y). acos would
+// lose rows near the poles; `sine` = length(d.xz).
+vec2 environment_uv(vec3 d, float sine) {
+    return vec2(atan(d.x, -d.z) * (0.5 / PI), atan(sine, d.y) / PI);
 }
 
 mat3 environment_rotation(uint light) { // environment_from_world
@@ -43,39 +44,47 @@ vec3 environment_lookup(vec2 uv) {
     return mix(top, low, f.y);
 }
 
+// Density per solid angle of a texel, given the sine of the polar angle.
+float environment_pdf(uint light, uint texel, float sine) {
+    uvec2 size = environment_extent();
+    float chosen = uintBitsToFloat(light_texel(light, 1u).w);
+    float p = texelFetch(environment, int(texel)).w;
+    return chosen * p * float(size.x) * float(size.y) / (2.0 * PI * PI * max(sine, 1e-6));
+}
+
 // Radiance from `direction` and the density with which light_sample would choose it (solid angle).
 vec3 environment_radiance(vec3 direction, out float pdf) {
-    uvec4 words = light_texel(push.environment, 3u);
-    float chosen = uintBitsToFloat(light_texel(push.environment, 1u).w);
-    vec3 scale = uintBitsToFloat(words.xyz);
-    pdf = chosen * (0.25 / PI);
-    if (!FX_ENVIRONMENT_MAP) return scale;
+    vec3 scale = uintBitsToFloat(light_texel(push.environment, 3u).xyz);
+    pdf = uintBitsToFloat(light_texel(push.environment, 1u).w) * (0.25 / PI);
+    if (!FX_ENVIRONMENT_MAP || push.environment_size == 0u) return scale;
     uvec2 size = environment_extent();
-    if (push.environment_size == 0u) return scale;
     vec3 d = environment_rotation(push.environment) * direction;
-    vec2 uv = environment_uv(d);
+    float sine = length(d.xz);
+    vec2 uv = environment_uv(d, sine);
     uv.x -= floor(uv.x);
-    ivec2 texel = min(ivec2(uv * vec2(size)), ivec2(size) - 1);
-    float sine = sqrt(max(1.0 - d.y * d.y, 1e-12));
-    float p = texelFetch(environment, texel.y * int(size.x) + texel.x).w;
-    pdf = chosen * p * float(size.x) * float(size.y) / (2.0 * PI * PI * sine);
+    uvec2 texel = min(uvec2(uv * vec2(size)), size - 1u);
+    pdf = environment_pdf(push.environment, texel.y * size.x + texel.x, sine);
     return scale * environment_lookup(uv);
 }
 
 void sample_environment(uint light, float chosen, uint word, vec2 u, inout LightSample s) {
     s.distance = INFINITE_DISTANCE;
+    s.radiance = uintBitsToFloat(light_texel(light, 3u).xyz);
     if (!FX_ENVIRONMENT_MAP || push.environment_size == 0u) {
         s.direction = warp_sphere(u);
+        s.pdf = chosen * (0.25 / PI);
     } else {
         uvec2 size = environment_extent();
         // The word chose the light; its hash chooses the texel, so that the two choices are independent.
         uint texel = alias_choose(environment_table, size.x * size.y, pcg(word));
         vec2 uv = (vec2(texel % size.x, texel / size.x) + u) / vec2(size);
         float phi = 2.0 * PI * uv.x, theta = PI * uv.y;
-        vec3 d = vec3(sin(phi) * sin(theta), cos(theta), -cos(phi) * sin(theta));
-        s.direction = transpose(environment_rotation(light)) * d;
+        float sine = sin(theta);
+        s.direction = transpose(environment_rotation(light)) * vec3(sin(phi) * sine, cos(theta), -cos(phi) * sine);
+        // The density of the texel that was drawn: looking it up by the direction could round into its neighbour.
+        s.pdf = environment_pdf(light, texel, sine);
+        s.radiance *= environment_lookup(uv);
     }
-    s.radiance = environment_radiance(s.direction, s.pdf);
     s.radiance = s.pdf > 0.0 ? s.radiance / s.pdf : vec3(0.0);
 }
 
@@ -118,7 +127,7 @@ LightSample light_sample(vec3 p, uint word, vec2 u) {
         sample_triangle_light(p, a, b, c, chosen, u, w3, light, s);
     } else if ((FX_POINT && kind == LIGHT_POINT) || (FX_SPOT && kind == LIGHT_SPOT)) {
         vec3 to_light = a - p;
-        float d2 = max(dot(to_light, to_light), 1e-30);
+        float d2 = max(dot(to_light, to_light), 1e-20);
         s.distance = sqrt(d2);
         s.direction = to_light / s.distance;
         s.radiance = value / (d2 * chosen);

@@ -47,7 +47,7 @@ vec3 perturbed_normal(Surface s, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
         n = dot(n, s.normal) < 0.0 ? -n : n;
     }
     float len = dot(n, n);
-    return len > 1e-30 ? n * inversesqrt(len) : s.normal;
+    return len > 1e-30 && len < 1e38 ? n * inversesqrt(len) : s.normal; // not where uv spans no or all of space
 }
 
 // `width` is the ray cone's width at the hit, in world units.
@@ -73,7 +73,7 @@ Surface surface_at(Hit hit, vec3 direction, float width) {
     s.flags = material_texel(s.material, 3u).w;
     s.position = p0 + hit.barycentric.x * e1 + hit.barycentric.y * e2;
     vec3 scaled = mirrored ? cross(e2, e1) : cross(e1, e2);
-    float doubled_area = length(scaled);
+    float doubled_area = max(length(scaled), 1e-30); // a needle that rounds to no area scatters nothing
     s.geometric = scaled / doubled_area;
     s.normal = s.geometric;
     s.uv = vec2(0.0);

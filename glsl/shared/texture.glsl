@@ -51,5 +51,7 @@ bool mask_blocks(uint triangle, uint instance, vec2 barycentric, uint seed) {
     if (image != NONE) {
         opacity *= texture_sample(image, texture_coordinates(triangle, barycentric), 0.0).r;
     }
-    return opacity > float(pcg(seed ^ (triangle * 0x9e3779b9u)) >> 8) * 5.9604644775390625e-8;
+    // Two copies of a triangle on one ray decide independently.
+    uint surface = triangle * 0x9e3779b9u ^ instance * 0x85ebca6bu;
+    return opacity > float(pcg(seed ^ surface) >> 8) * 5.9604644775390625e-8;
 }

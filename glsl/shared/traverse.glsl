@@ -35,8 +35,8 @@ RaySpace ray_space(vec3 origin, vec3 direction) {
     float b = d.x * d.y * a;
     r.across_x = vec3(1.0 + s * d.x * d.x * a, s * b, -s * d.x);
     r.across_y = vec3(b, s + d.y * d.y * a, -d.y);
-    // A zero component must not make 0 * inf in the slab test.
-    vec3 safe = mix(direction, vec3(1e-30), lessThan(abs(direction), vec3(1e-30)));
+    // A zero component must not make 0 * inf in the slab test, for boxes of up to 1e18.
+    vec3 safe = mix(direction, vec3(1e-20), lessThan(abs(direction), vec3(1e-20)));
     r.inverse = 1.0 / safe;
     uvec3 positive = uvec3(greaterThanEqual(safe, vec3(0.0)));
     r.octant = (positive.x * 4u + positive.y * 2u + positive.z) * 0x01010101u;
@@ -98,8 +98,8 @@ uint intersect_node(RaySpace r, uint index, float t_max, out uvec3 children) {
            intersect_children(n1.w, r.octant, uvec3(x.y, y.y, z.y), uvec3(x.w, y.w, z.w), scale, origin, t_max);
 }
 
-// Traverses from `root`. With `any_hit`, stops at the first triangle; otherwise returns the closest.
-// `mask_seed` decides hits on partly transparent surfaces.
+// Traverses from `root` (with ROOT_OF_INSTANCES, a level of instances). With `any_hit`, stops at the first triangle;
+// otherwise returns the closest. `mask_seed` decides hits on partly transparent surfaces.
 Hit traverse(vec3 origin, vec3 direction, float t_max, bool any_hit, uint root, uint mask_seed) {
     Hit hit = Hit(t_max, NONE, NONE, vec2(0.0));
     RaySpace ray = ray_space(origin, direction);
@@ -107,7 +107,9 @@ Hit traverse(vec3 origin, vec3 direction, float t_max, bool any_hit, uint root, 
     uint depth = 0u;
     uint bottom = 0u;       // stack depth at which the current instance was entered
     uint instance = NONE;   // NONE in the top (or only) level
-    uvec2 group = uvec2(root, 0x80000000u); // inner children: base, hit bits and inner mask; or triangles: base, bits
+    bool two_levels = FX_INSTANCES && (root & ROOT_OF_INSTANCES) != 0u;
+    // Inner children: base, hit bits and inner mask; or triangles: base, bits.
+    uvec2 group = uvec2(root & ~ROOT_OF_INSTANCES, 0x80000000u);
     while (true) {
         uvec2 leaves = uvec2(0u);
         if (group.y > 0x00ffffffu) {
@@ -122,11 +124,11 @@ Hit traverse(vec3 origin, vec3 direction, float t_max, bool any_hit, uint root, 
             if (FX_COUNTERS) nodes_visited++;
             group = uvec2(children.x, (mask & 0xff000000u) | children.z);
             leaves = uvec2(children.y, mask & 0x00ffffffu);
-        } else if (FX_INSTANCES) { // instances that an earlier node left on the stack
+        } else if (two_levels) { // instances that an earlier node left on the stack
             leaves = group;
             group = uvec2(0u);
         }
-        if (FX_INSTANCES && instance == NONE && leaves.y != 0u) {
+        if (two_levels && instance == NONE && leaves.y != 0u) {
             uint bit = uint(findMSB(leaves.y));
             leaves.y &= ~(1u << bit);
             if (group.y > 0x00ffffffu) stack[depth++] = group;

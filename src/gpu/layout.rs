@@ -50,6 +50,8 @@ macro_rules! constants {
 constants! {
     /// "No texture", "no material override", "no hit".
     NONE = 0xffffffff;
+    /// Set in [`PathPush::root`] when the leaves of that level are instances.
+    ROOT_OF_INSTANCES = 0x80000000;
     /// [`Material::kind`]: Lambertian reflection, `base_color / pi`.
     BSDF_DIFFUSE = 0;
     /// [`Material::kind`]: microfacet conductor with exact Fresnel from `eta`, `k`; `alpha` below 0.01 is a mirror.
@@ -325,11 +327,11 @@ gpu_structs! {
         seed: uint,
         /// Path edges, at least 1.
         max_depth: uint,
-        /// Edges after which roulette starts.
+        /// Edges after which roulette starts; 0 is off.
         roulette_depth: uint,
-        /// Limit of an indirect sample's largest channel.
+        /// Limit of an indirect sample's largest channel; 0 is off.
         clamp_indirect: float,
-        /// 0 = tent, 1 = Gaussian (the box is compiled, not chosen here).
+        /// 0 = box, 1 = tent, 2 = Gaussian.
         pixel_filter: uint,
         /// Lights in the alias table.
         light_count: uint,
@@ -339,7 +341,7 @@ gpu_structs! {
         environment: uint,
         /// Texels of the environment image, width in the low half, height in the high half.
         environment_size: uint,
-        /// Node where traversal starts.
+        /// Node where traversal starts, with ROOT_OF_INSTANCES.
         root: uint,
     }
 
