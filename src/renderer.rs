@@ -2,7 +2,7 @@
 //! it, and frames recorded batch by batch into command buffers.
 use crate::error::Result;
 use crate::frame::{self, Batch, DeviceScene, FilmBuffers, Stages};
-use crate::gpu::layout::{Camera, Effects, PathPush, LIGHT_ENVIRONMENT, NONE};
+use crate::gpu::layout::{Camera, Effects, LIGHT_ENVIRONMENT, NONE, PathPush, ROOT_OF_INSTANCES};
 use crate::gpu::{FrameResources, Gpu, PassTime, RawBuffer, Recorder};
 use crate::scene::{self, Scene};
 use crate::settings::{PixelFilter, Sampler, Settings};
@@ -243,12 +243,16 @@ fn path_push(scene: &Scene, settings: &Settings) -> PathPush {
         max_depth: settings.max_depth,
         roulette_depth: settings.roulette_depth,
         clamp_indirect: settings.clamp_indirect,
-        pixel_filter: u32::from(settings.filter == PixelFilter::Gaussian),
+        pixel_filter: match settings.filter {
+            PixelFilter::Box => 0,
+            PixelFilter::Tent => 1,
+            PixelFilter::Gaussian => 2,
+        },
         light_count: scene.lights.len() as u32,
         triangle_pdf_scale: scene.triangle_pdf_scale,
         environment: environment.map_or(NONE, |i| i as u32),
         environment_size: scene.environment.as_ref().map_or(0, |e| e.width | e.height << 16),
-        root: scene.root,
+        root: scene.root | if scene.instances.is_empty() { 0 } else { ROOT_OF_INSTANCES },
         ..PathPush::default()
     }
 }

@@ -67,7 +67,15 @@ fn sidak_quantile(tests: usize) -> f64 {
 fn libm_erfc(x: f64) -> f64 {
     let t = 1.0 / (1.0 + 0.5 * x);
     let c = [
-        -1.26551223, 1.00002368, 0.37409196, 0.09678418, -0.18628806, 0.27886807, -1.13520398, 1.48851587, -0.82215223,
+        -1.26551223,
+        1.00002368,
+        0.37409196,
+        0.09678418,
+        -0.18628806,
+        0.27886807,
+        -1.13520398,
+        1.48851587,
+        -0.82215223,
         0.17087277,
     ];
     let poly = c.iter().rev().fold(0.0, |sum, &c| sum * t + c);
@@ -154,7 +162,10 @@ fn first_hits_match_at_pixel_centres() {
     let guide = renderer.film().guide.read().unwrap();
     let centre = reference("center_diffuse.exr");
     let (t, shape) = (plane(&centre, "t.T"), plane(&centre, "shape.I"));
-    let (n, albedo) = (["n.X", "n.Y", "n.Z"].map(|c| plane(&centre, c)), ["R", "G", "B"].map(|c| plane(&centre, &format!("albedo.{c}"))));
+    let (n, albedo) = (
+        ["n.X", "n.Y", "n.Z"].map(|c| plane(&centre, c)),
+        ["R", "G", "B"].map(|c| plane(&centre, &format!("albedo.{c}"))),
+    );
     let mut at_edges = 0;
     for (i, g) in guide.iter().enumerate() {
         let miss = t[i] < 0.0;

@@ -277,14 +277,7 @@ fn fail_on_messages(gpu: &Gpu) -> Result<()> {
     }
 }
 
-fn report(
-    args: &Args,
-    renderer: &Renderer,
-    gpu: &Gpu,
-    scene: &Scene,
-    host: &Spans,
-    times: &[PassTime],
-) -> Result<()> {
+fn report(args: &Args, renderer: &Renderer, gpu: &Gpu, scene: &Scene, host: &Spans, times: &[PassTime]) -> Result<()> {
     if let Some(path) = &args.profile {
         let offset = gpu.calibrate().map(|(gpu_ns, host_ns)| host_ns as i64 - gpu_ns as i64);
         output::write(path, chrome_trace(&host.0, times, offset).as_bytes())?;

@@ -22,7 +22,14 @@ impl Path {
     }
 
     /// scene -> samples\[batch\]
-    pub fn record(&self, rec: &mut Recorder, s: &DeviceScene, f: &FilmBuffers, push: &PathPush, b: &Batch) -> Result<()> {
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        s: &DeviceScene,
+        f: &FilmBuffers,
+        push: &PathPush,
+        b: &Batch,
+    ) -> Result<()> {
         let push = PathPush {
             first_pixel: b.first_pixel,
             pixels: b.pixels,
