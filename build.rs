@@ -37,7 +37,14 @@ struct Interface {
     bindings: Vec<Binding>,
 }
 
-fn main() -> Result<()> {
+fn main() {
+    if let Err(error) = build() {
+        eprintln!("{error:#}");
+        std::process::exit(1);
+    }
+}
+
+fn build() -> Result<()> {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=src/gpu/layout.rs");
     println!("cargo:rerun-if-changed=glsl");
@@ -229,7 +236,7 @@ pub mod {name} {{
         }}
     }}
     // 128 bytes is what every Vulkan device has.
-    const _: () = assert!(size_of::<{push}>() <= 128 && size_of::<{push}>() % 4 == 0);
+    const _: () = assert!(size_of::<{push}>() <= 128 && size_of::<{push}>().is_multiple_of(4));
 }}
 "#
     ))

@@ -1,9 +1,9 @@
 //! The GPU layer on a real device, under validation: any message fails.
 mod support;
-use support::kernels::{mix, next};
+use support::kernels::{far, mix, next};
 use support::{assert_silent, hash, words};
 use tallow::gpu::layout::{Effects, uvec2, uvec3, uvec4, vec4};
-use tallow::gpu::{Buffer, FrameResources, Gpu, Location, PassTime};
+use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Location, PassTime};
 
 const SIZES: [usize; 5] = [1, 31, 64, 65, 1_000_001];
 const WIDTH: u32 = 64;
@@ -276,4 +276,75 @@ fn both_clocks_advance_together() {
     assert!(host_passed >= 50_000_000 && gpu_passed.abs_diff(host_passed) < 5_000_000, "{gpu_passed} {host_passed}");
     assert!(times.iter().all(|t| (gpu_before..gpu_after).contains(&t.begin_ns)), "passes are on that clock");
     assert_silent(&gpu);
+}
+
+/// Fetches texel `index` of `texels` on the device.
+fn fetch(gpu: &Gpu, texels: &Buffer<uvec4>, index: usize) -> tallow::error::Result<uvec4> {
+    let kernel = far::Kernel::new(gpu, &Effects::ALL, &[])?;
+    let found = Buffer::from_slice(gpu, "found", &[[0; 4]])?;
+    let mut frame = FrameResources::new(gpu)?;
+    gpu.run(&mut frame, |rec| rec.dispatch(&kernel, far::Bind { texels, found: &found }, &(index as u32), [1; 3]))?;
+    Ok(found.read()?[0])
+}
+
+#[test]
+fn the_largest_texel_buffer_is_read_to_its_end() {
+    let gpu = support::gpu();
+    let info = gpu.info();
+    let bytes = info.max_buffer_size.min(info.max_allocation).min(info.memory_heap).min(2 << 30);
+    let count = info.max_texel_elements.min(bytes / 16) as usize;
+    println!("{count} texels of 16 bytes of {info:?}");
+    let texels = Buffer::<uvec4>::new(&gpu, "largest", count, Location::Device).unwrap();
+    texels.write(count - 2, &[[1, 2, 3, 4], [5, 6, 7, 8]]).unwrap();
+    assert_eq!(fetch(&gpu, &texels, count - 1).unwrap(), [5, 6, 7, 8]);
+    assert_eq!(fetch(&gpu, &texels, count - 2).unwrap(), [1, 2, 3, 4], "another texel differs");
+    assert_silent(&gpu);
+}
+
+#[test]
+fn a_buffer_too_large_for_its_slot_is_an_error_with_the_limit() {
+    let gpu = support::gpu();
+    let limit = gpu.info().max_storage_range;
+    if limit + 4 > gpu.info().max_buffer_size.min(gpu.info().max_allocation).min(gpu.info().memory_heap) {
+        return println!("no buffer can exceed this device's storage range");
+    }
+    let large = Buffer::<u32>::new(&gpu, "large", (limit / 4) as usize + 1, Location::Device).unwrap();
+    let small = Buffer::from_slice(&gpu, "small", &[0u32]).unwrap();
+    let kernel = next::Kernel::new(&gpu, &Effects::ALL, &[]).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let bind = next::Bind { from: &small, to: &large };
+    let message = gpu.run(&mut frame, |rec| rec.dispatch(&kernel, bind, &1, [1; 3])).unwrap_err().to_string();
+    assert!(message.contains("large") && message.contains(&limit.to_string()), "{message}");
+    assert_silent(&gpu);
+}
+
+#[test]
+fn unusable_choices_of_device_say_what_there_is() {
+    let all = tallow::gpu::survey().unwrap();
+    let open = |device: &str| Gpu::open(&DeviceOptions { device: Some(device.into()), validation: false });
+    let message = open("no such device").err().unwrap().to_string();
+    assert!(all.iter().all(|info| message.contains(&info.name)), "{message}");
+    let by_name = open(&all[0].name.to_uppercase()).unwrap();
+    assert_eq!((&by_name.info().name, open("0").unwrap().info().name.as_str()), (&all[0].name, &*all[0].name));
+    assert!(by_name.info().missing.is_empty() && by_name.info().max_texel_elements >= 65536, "{:?}", by_name.info());
+}
+
+#[test]
+fn parts_of_another_device_are_refused() {
+    let (gpu, other) = (support::gpu(), support::gpu());
+    let kernel = next::Kernel::new(&gpu, &Effects::ALL, &[]).unwrap();
+    let make = |gpu| Buffer::from_slice(gpu, "buffer", &[1u32]).unwrap();
+    let (here, there) = (make(&gpu), make(&other));
+    let run = |frame: &Gpu, from, kernel: &next::Kernel| {
+        let mut frame = FrameResources::new(frame).unwrap();
+        let to = make(&gpu);
+        gpu.run(&mut frame, |rec| rec.dispatch(kernel, next::Bind { from, to: &to }, &1, [1; 3])).map(|_| ())
+    };
+    let foreign = next::Kernel::new(&other, &Effects::ALL, &[]).unwrap();
+    for refused in [run(&other, &here, &kernel), run(&gpu, &there, &kernel), run(&gpu, &here, &foreign)] {
+        assert!(refused.unwrap_err().to_string().contains("another device"));
+    }
+    run(&gpu, &here, &kernel).unwrap();
+    assert_silent(&gpu);
+    assert_silent(&other);
 }

@@ -1,6 +1,5 @@
 //! Device memory with a type and a name.
-use super::commands::Commands;
-use super::{At, Gpu, SlotKind, access};
+use super::{At, Gpu, SlotKind, staging};
 use crate::error::{Error, Result};
 use ash::vk;
 use ash::vk::Handle;
@@ -9,9 +8,6 @@ use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 use std::marker::PhantomData;
 use std::sync::{Arc, Mutex, PoisonError};
-
-/// Uploads and read-backs go through a staging buffer of at most this many bytes.
-const STAGING: usize = 64 << 20;
 
 /// Where a buffer lies. On devices with unified memory all three are the same memory, mapped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,7 +41,7 @@ pub struct Buffer<T> {
 /// What a buffer is without its type. Public for the generated code alone.
 #[doc(hidden)]
 pub struct Untyped {
-    gpu: Gpu,
+    pub(super) gpu: Gpu,
     pub(super) name: String,
     pub(super) raw: vk::Buffer,
     /// Bytes, a multiple of 4.
@@ -130,7 +126,7 @@ impl<T> Buffer<T> {
 }
 
 impl Untyped {
-    fn new(gpu: &Gpu, name: &str, size: u64, stride: usize, location: Location) -> Result<Self> {
+    pub(super) fn new(gpu: &Gpu, name: &str, size: u64, stride: usize, location: Location) -> Result<Self> {
         let limit = gpu.0.info.max_buffer_size.min(gpu.0.info.max_allocation);
         if size > limit {
             return Err(too_big(name, size, "bytes", limit, "of one buffer"));
@@ -156,8 +152,8 @@ impl Untyped {
         // SAFETY: a live buffer of this device.
         let requirements = unsafe { device.get_buffer_memory_requirements(self.raw) };
         let location = match location {
-            // A CPU or an integrated GPU has one memory: ask for the kind that is mapped.
-            Location::Device if matches!(self.gpu.0.info.kind, "CPU" | "integrated GPU") => MemoryLocation::CpuToGpu,
+            // Of the one memory there is, ask for the kind that is mapped.
+            Location::Device if self.gpu.0.info.unified => MemoryLocation::CpuToGpu,
             Location::Device => MemoryLocation::GpuOnly,
             Location::Upload => MemoryLocation::CpuToGpu,
             Location::Readback => MemoryLocation::GpuToCpu,
@@ -177,7 +173,7 @@ impl Untyped {
     }
 
     /// Hands `access` the mapped bytes, or returns `None` where the memory is not mapped and coherent.
-    fn mapped<R>(&self, access: impl FnOnce(&mut [u8]) -> R) -> Option<R> {
+    pub(super) fn mapped<R>(&self, access: impl FnOnce(&mut [u8]) -> R) -> Option<R> {
         let mut memory = self.memory.lock().unwrap_or_else(PoisonError::into_inner);
         let memory = memory.as_mut()?;
         let coherent = memory.memory_properties().contains(vk::MemoryPropertyFlags::HOST_COHERENT);
@@ -185,28 +181,18 @@ impl Untyped {
     }
 
     fn write(&self, offset: usize, bytes: &[u8]) -> Result<()> {
-        if self.mapped(|all| all[offset..offset + bytes.len()].copy_from_slice(bytes)).is_some() {
-            return Ok(());
+        match self.mapped(|all| all[offset..offset + bytes.len()].copy_from_slice(bytes)) {
+            Some(()) => Ok(()),
+            None => staging::upload(self, offset, bytes),
         }
-        let staging = Staging::new(&self.gpu, bytes.len(), Location::Upload)?;
-        for (index, chunk) in bytes.chunks(STAGING).enumerate() {
-            staging.access(|all| all[..chunk.len()].copy_from_slice(chunk))?;
-            staging.copy(&staging.buffer, self, region(0, offset + index * STAGING, chunk.len()))?;
-        }
-        Ok(())
     }
 
     fn read(&self, bytes: &mut [u8]) -> Result<()> {
         let length = bytes.len();
-        if self.mapped(|all| bytes.copy_from_slice(&all[..length])).is_some() {
-            return Ok(());
+        match self.mapped(|all| bytes.copy_from_slice(&all[..length])) {
+            Some(()) => Ok(()),
+            None => staging::download(self, bytes),
         }
-        let staging = Staging::new(&self.gpu, length, Location::Readback)?;
-        for (index, chunk) in bytes.chunks_mut(STAGING).enumerate() {
-            staging.copy(self, &staging.buffer, region(index * STAGING, 0, chunk.len()))?;
-            staging.access(|all| chunk.copy_from_slice(&all[..chunk.len()]))?;
-        }
-        Ok(())
     }
 
     /// # Errors
@@ -261,40 +247,6 @@ impl Drop for Untyped {
             let _ = allocator.free(memory);
         }
     }
-}
-
-/// A mapped buffer and the commands that copy through it, for devices whose own memory is not mapped.
-struct Staging {
-    buffer: Untyped,
-    commands: Commands,
-}
-
-impl Staging {
-    fn new(gpu: &Gpu, bytes: usize, location: Location) -> Result<Self> {
-        let size = bytes.min(STAGING).next_multiple_of(4);
-        Ok(Self { buffer: Untyped::new(gpu, "staging", size as u64, 4, location)?, commands: Commands::new(gpu)? })
-    }
-
-    fn access(&self, access: impl FnOnce(&mut [u8])) -> Result<()> {
-        self.buffer.mapped(access).ok_or_else(|| Error::Device("the device has no memory that the host can map".into()))
-    }
-
-    /// Copies and waits.
-    fn copy(&self, from: &Untyped, to: &Untyped, region: vk::BufferCopy) -> Result<()> {
-        self.commands.begin()?;
-        // SAFETY: both buffers live through the submission, which is waited for, and hold the region.
-        unsafe {
-            let device = &self.buffer.gpu.0.device;
-            access::whole_barrier(device, self.commands.buffer);
-            device.cmd_copy_buffer(self.commands.buffer, from.raw, to.raw, &[region]);
-            access::whole_barrier(device, self.commands.buffer);
-        }
-        self.commands.submit_and_wait(|| Some("copy"))
-    }
-}
-
-fn region(from: usize, to: usize, length: usize) -> vk::BufferCopy {
-    vk::BufferCopy { src_offset: from as u64, dst_offset: to as u64, size: length as u64 }
 }
 
 fn too_big(name: &str, size: u64, unit: &str, limit: u64, of: &str) -> Error {

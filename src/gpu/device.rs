@@ -119,6 +119,15 @@ impl Gpu {
         frame.times()
     }
 
+    /// # Errors
+    /// When `what` was made on another device: its handles mean nothing on this one.
+    pub(super) fn owns(&self, what: &str, maker: &Gpu) -> Result<()> {
+        match Arc::ptr_eq(&self.0, &maker.0) {
+            true => Ok(()),
+            false => Err(Error::Device(format!("{what} was made on another device: make it on the one that runs it"))),
+        }
+    }
+
     /// What the validation layers have said so far, oldest first; empty without [`DeviceOptions::validation`].
     pub fn validation_messages(&self) -> Vec<String> {
         self.0.instance.messages.lock().unwrap_or_else(PoisonError::into_inner).clone()

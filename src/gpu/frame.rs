@@ -40,6 +40,10 @@ impl FrameResources {
         self.timer.times()
     }
 
+    pub(super) fn gpu(&self) -> &Gpu {
+        self.timer.gpu()
+    }
+
     /// Ready for the next recording. The work of the last one is complete: `Gpu::run` waits, and
     /// `Recorder::external` makes its caller promise so.
     pub(super) fn reset(&mut self) -> Result<()> {

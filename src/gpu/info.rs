@@ -70,6 +70,8 @@ pub struct DeviceInfo {
     pub name: String,
     /// "discrete GPU", "integrated GPU", "virtual GPU", "CPU" or "other".
     pub kind: &'static str,
+    /// Whether host and device share one memory, so that buffers are written in place.
+    pub unified: bool,
     /// Short name of the driver.
     pub driver_name: String,
     /// The driver's own words about its build.
@@ -140,6 +142,7 @@ pub(super) fn describe(instance: &ash::Instance, physical: vk::PhysicalDevice, q
     let info = DeviceInfo {
         name: text(basic.device_name_as_c_str().ok()),
         kind,
+        unified: matches!(basic.device_type, vk::PhysicalDeviceType::CPU | vk::PhysicalDeviceType::INTEGRATED_GPU),
         driver_name: text(v12.driver_name_as_c_str().ok()),
         driver_info: text(v12.driver_info_as_c_str().ok()),
         driver_version: driver_version(basic.vendor_id, basic.driver_version),

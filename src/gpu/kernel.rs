@@ -66,7 +66,7 @@ pub struct Kernel<B> {
 
 /// The Vulkan objects of a kernel.
 pub(super) struct Parts {
-    gpu: Gpu,
+    pub gpu: Gpu,
     pub set_layout: vk::DescriptorSetLayout,
     pub layout: vk::PipelineLayout,
     pub pipeline: vk::Pipeline,

@@ -22,6 +22,7 @@ mod instance;
 mod kernel;
 pub mod layout;
 mod recorder;
+mod staging;
 mod timing;
 
 pub use access::Access;

@@ -18,6 +18,7 @@ pub struct Recorder<'a> {
 impl<'a> Recorder<'a> {
     /// Records into the frame's own command buffer.
     pub(super) fn own(gpu: &'a Gpu, frame: &'a mut FrameResources) -> Result<Self> {
+        gpu.owns("the frame", frame.gpu())?;
         let commands = frame.begin()?;
         Ok(Self::start(gpu, frame, commands))
     }
@@ -39,6 +40,7 @@ impl<'a> Recorder<'a> {
         if command_buffer == 0 {
             return Err(Error::Device("a null command buffer was handed over".into()));
         }
+        gpu.owns("the frame", frame.gpu())?;
         frame.reset()?;
         Ok(Self::start(gpu, frame, vk::CommandBuffer::from_raw(command_buffer)))
     }
@@ -62,7 +64,9 @@ impl<'a> Recorder<'a> {
         groups: [u32; 3],
     ) -> Result<()> {
         check_groups(B::NAME, groups, self.gpu.0.limits.max_compute_work_group_count)?;
+        self.gpu.owns(B::NAME, &kernel.parts.gpu)?;
         let buffers = bind.buffers();
+        self.owns(&buffers)?;
         let set = self.frame.descriptors.set(&kernel.parts, B::SLOTS, &buffers)?;
         let accesses: Vec<_> = buffers.into_iter().zip(B::SLOTS.iter().map(|slot| slot.access)).collect();
         self.frame.keep(kernel);
@@ -87,6 +91,7 @@ impl<'a> Recorder<'a> {
             let (from, to, m, n) = (&from.name, &to.name, src.len(), dst.len());
             return Err(Error::Device(format!("\"{from}\" of {m} elements cannot be copied to \"{to}\" of {n}")));
         }
+        self.owns(&[from, to])?;
         let region = [vk::BufferCopy { src_offset: 0, dst_offset: 0, size: from.size }];
         let accesses = [(from, Access::CopySource), (to, Access::CopyTarget)];
         // SAFETY: two live buffers of one size, kept by the frame.
@@ -101,6 +106,7 @@ impl<'a> Recorder<'a> {
     /// [`Error::Device`] when memory is out.
     pub fn fill<T: Pod>(&mut self, buffer: &Buffer<T>, value: u32) -> Result<()> {
         let target = buffer.untyped();
+        self.owns(&[target])?;
         // SAFETY: a live buffer whose size is a multiple of four, kept by the frame.
         self.pass("fill", &[(target, Access::CopyTarget)], |device, commands| unsafe {
             device.cmd_fill_buffer(commands, target.raw, 0, vk::WHOLE_SIZE, value);
@@ -111,6 +117,10 @@ impl<'a> Recorder<'a> {
     #[doc(hidden)]
     pub fn suppress_barriers(&mut self) {
         self.barriers = false;
+    }
+
+    fn owns(&self, buffers: &[&Arc<Untyped>]) -> Result<()> {
+        buffers.iter().try_for_each(|buffer| self.gpu.owns(&buffer.name, &buffer.gpu))
     }
 
     fn pass(

@@ -63,6 +63,10 @@ impl Timer {
         Self { gpu: gpu.clone(), pools: Vec::new(), passes: Vec::new() }
     }
 
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
     /// Forgets the passes; the work that they timed is complete.
     pub fn reset(&mut self) {
         // SAFETY: the queries are not in use, and hostQueryReset is a required feature.

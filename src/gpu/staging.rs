@@ -1,0 +1,85 @@
+//! Uploads and read-backs for devices whose own memory the host cannot map: copies through a mapped buffer.
+use super::commands::Commands;
+use super::{Gpu, Location, Untyped, access};
+use crate::error::{Error, Result};
+use ash::vk;
+
+/// Bytes of the mapped buffer, at most.
+const CHUNK: usize = 64 << 20;
+
+/// Writes `bytes` over `target` from byte `offset` on, and waits.
+pub(super) fn upload(target: &Untyped, offset: usize, bytes: &[u8]) -> Result<()> {
+    let staging = Staging::new(&target.gpu, bytes.len(), Location::Upload)?;
+    for (index, chunk) in bytes.chunks(CHUNK).enumerate() {
+        staging.access(|all| all[..chunk.len()].copy_from_slice(chunk))?;
+        staging.copy(&staging.buffer, target, region(0, offset + index * CHUNK, chunk.len()))?;
+    }
+    Ok(())
+}
+
+/// Reads `source` from its start.
+pub(super) fn download(source: &Untyped, bytes: &mut [u8]) -> Result<()> {
+    let staging = Staging::new(&source.gpu, bytes.len(), Location::Readback)?;
+    for (index, chunk) in bytes.chunks_mut(CHUNK).enumerate() {
+        staging.copy(source, &staging.buffer, region(index * CHUNK, 0, chunk.len()))?;
+        staging.access(|all| chunk.copy_from_slice(&all[..chunk.len()]))?;
+    }
+    Ok(())
+}
+
+/// The mapped buffer and the commands that copy through it.
+struct Staging {
+    buffer: Untyped,
+    commands: Commands,
+}
+
+impl Staging {
+    fn new(gpu: &Gpu, bytes: usize, location: Location) -> Result<Self> {
+        let size = bytes.clamp(1, CHUNK).next_multiple_of(4);
+        Ok(Self { buffer: Untyped::new(gpu, "staging", size as u64, 4, location)?, commands: Commands::new(gpu)? })
+    }
+
+    fn access(&self, access: impl FnOnce(&mut [u8])) -> Result<()> {
+        self.buffer.mapped(access).ok_or_else(|| Error::Device("the device has no memory that the host can map".into()))
+    }
+
+    /// Copies and waits.
+    fn copy(&self, from: &Untyped, to: &Untyped, region: vk::BufferCopy) -> Result<()> {
+        self.commands.begin()?;
+        // SAFETY: both buffers live through the submission, which is waited for, and hold the region.
+        unsafe {
+            let device = &self.buffer.gpu.0.device;
+            access::whole_barrier(device, self.commands.buffer);
+            device.cmd_copy_buffer(self.commands.buffer, from.raw, to.raw, &[region]);
+            access::whole_barrier(device, self.commands.buffer);
+        }
+        self.commands.submit_and_wait(|| Some("copy"))
+    }
+}
+
+fn region(from: usize, to: usize, length: usize) -> vk::BufferCopy {
+    vk::BufferCopy { src_offset: from as u64, dst_offset: to as u64, size: length as u64 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::{Buffer, DeviceOptions};
+
+    /// Devices with unified memory never come here by themselves.
+    #[test]
+    fn copies_cross_chunks_both_ways() {
+        let gpu = Gpu::open(&DeviceOptions { device: None, validation: true }).unwrap();
+        for count in [1, 1000, CHUNK / 4 + 3] {
+            let values: Vec<u32> = (0..count as u32).map(|i| i.wrapping_mul(2_654_435_761)).collect();
+            let buffer = Buffer::from_slice(&gpu, "staged", &vec![7u32; count + 2]).unwrap();
+            upload(buffer.untyped(), 4, bytemuck::cast_slice(&values)).unwrap();
+            let mut back = vec![0u32; count + 2];
+            download(buffer.untyped(), bytemuck::cast_slice_mut(&mut back)).unwrap();
+            assert!(back[1..=count] == values, "{count} words");
+            assert_eq!((back[0], back[count + 1]), (7, 7), "the rest is kept");
+            assert!(back == buffer.read().unwrap(), "as the mapped way reads it");
+        }
+        assert_eq!(gpu.validation_messages(), Vec::<String>::new());
+    }
+}
