@@ -1,0 +1,156 @@
+//! Twin of `glsl/shared/light.glsl`.
+use crate::gpu::layout::*;
+use crate::reference::sampler::pcg;
+use crate::reference::scene::texture_coordinates;
+use crate::reference::surface::offset_origin;
+use crate::reference::texture::texture_sample;
+use crate::reference::warp::{warp_sphere, warp_triangle};
+use crate::scene::{Environment, Scene};
+use glam::{Mat3, Vec2, Vec3, Vec3Swizzles, vec2, vec3};
+use std::f32::consts::PI;
+
+/// One light, seen from a surface point.
+#[derive(Clone, Copy, Debug)]
+pub struct LightSample {
+    /// Unit, from the surface to the light.
+    pub direction: Vec3,
+    /// To the offset point on the light, world units; [`INFINITE_DISTANCE`] for lights at infinity.
+    pub distance: f32,
+    /// Already divided by the probability of the sample.
+    pub radiance: Vec3,
+    /// Per solid angle; 0 for lights that no BSDF sample can hit.
+    pub pdf: f32,
+}
+
+/// Of lights at infinity.
+pub const INFINITE_DISTANCE: f32 = 3e38;
+
+/// The entry that a random word stands for.
+pub fn alias_choose(table: &[AliasEntry], random: u32) -> u32 {
+    let product = u64::from(random) * table.len() as u64;
+    let (slot, low) = ((product >> 32) as u32, product as u32);
+    let entry = table[slot as usize];
+    if low < entry.threshold { slot } else { entry.alias }
+}
+
+fn environment_uv(d: Vec3, sine: f32) -> Vec2 {
+    vec2(d.x.atan2(-d.z) * (0.5 / PI), sine.atan2(d.y) / PI)
+}
+
+/// world_from_environment.
+fn environment_rotation(light: &Light) -> Mat3 {
+    Mat3::from_cols(light.a.into(), light.b.into(), light.c.into())
+}
+
+fn environment_lookup(e: &Environment, uv: Vec2) -> Vec3 {
+    let (width, height) = (e.width as i32, e.height as i32);
+    let at = uv * vec2(width as f32, height as f32) - 0.5;
+    let p = at.floor().as_ivec2();
+    let f = at - p.as_vec2();
+    let x0 = p.x.rem_euclid(width);
+    let x1 = if x0 + 1 == width { 0 } else { x0 + 1 };
+    let texel = |x: i32, y: i32| {
+        let [r, g, b, _] = e.texels[(y.clamp(0, height - 1) * width + x) as usize];
+        vec3(r, g, b)
+    };
+    let top = texel(x0, p.y).lerp(texel(x1, p.y), f.x);
+    let low = texel(x0, p.y + 1).lerp(texel(x1, p.y + 1), f.x);
+    top.lerp(low, f.y)
+}
+
+fn environment_pdf(e: &Environment, light: &Light, texel: u32, sine: f32) -> f32 {
+    let p = e.texels[texel as usize][3];
+    light.probability * p * e.width as f32 * e.height as f32 / (2.0 * PI * PI * sine.max(1e-6))
+}
+
+/// Radiance from `direction`, and the density with which [`light_sample`] would choose it (solid angle).
+pub fn environment_radiance(scene: &Scene, light: &Light, direction: Vec3) -> (Vec3, f32) {
+    let scale = Vec3::from(light.value);
+    let Some(e) = &scene.environment else { return (scale, light.probability * (0.25 / PI)) };
+    let d = environment_rotation(light).transpose() * direction;
+    let sine = d.xz().length();
+    let mut uv = environment_uv(d, sine);
+    uv.x -= uv.x.floor();
+    let x = ((uv.x * e.width as f32) as u32).min(e.width - 1);
+    let y = ((uv.y * e.height as f32) as u32).min(e.height - 1);
+    (scale * environment_lookup(e, uv), environment_pdf(e, light, y * e.width + x, sine))
+}
+
+fn sample_environment(scene: &Scene, light: &Light, word: u32, u: Vec2) -> LightSample {
+    let (direction, radiance, pdf) = match &scene.environment {
+        None => (warp_sphere(u), light.value.into(), light.probability * (0.25 / PI)),
+        Some(e) => {
+            let texel = alias_choose(&e.table, pcg(word));
+            let corner = vec2((texel % e.width) as f32, (texel / e.width) as f32);
+            let uv = (corner + u) / vec2(e.width as f32, e.height as f32);
+            let (phi, theta) = (2.0 * PI * uv.x, PI * uv.y);
+            let sine = theta.sin();
+            let d = vec3(phi.sin() * sine, theta.cos(), -phi.cos() * sine);
+            let radiance = Vec3::from(light.value) * environment_lookup(e, uv);
+            (environment_rotation(light) * d, radiance, environment_pdf(e, light, texel, sine))
+        }
+    };
+    let radiance = if pdf > 0.0 { radiance / pdf } else { Vec3::ZERO };
+    LightSample { direction, distance: INFINITE_DISTANCE, radiance, pdf }
+}
+
+fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> LightSample {
+    let [a, b, c] = [light.a, light.b, light.c].map(Vec3::from);
+    let bary = warp_triangle(u);
+    let (e1, e2) = (b - a, c - a);
+    let scaled = e1.cross(e2);
+    let doubled_area = scaled.length();
+    let n = scaled / doubled_area;
+    let on_light = a + bary.x * e1 + bary.y * e2;
+    let to_light = offset_origin(on_light, n) - p;
+    let d2 = to_light.dot(to_light);
+    let distance = d2.sqrt();
+    let direction = to_light / distance;
+    let cosine = -n.dot(direction);
+    let mut radiance = Vec3::from(light.value);
+    if light.triangle != NONE {
+        let material = &scene.materials[light.material as usize];
+        let uv = texture_coordinates(scene, light.triangle, bary);
+        radiance = Vec3::from(material.emission) * texture_sample(scene, material.emission_texture, uv, 0.0).truncate();
+    }
+    let lit = cosine > 0.0 && d2 > 0.0;
+    let pdf = if lit { light.probability * 2.0 * d2 / (cosine * doubled_area) } else { 0.0 };
+    LightSample { direction, distance, radiance: if lit { radiance / pdf } else { Vec3::ZERO }, pdf }
+}
+
+fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
+    let to_light = Vec3::from(light.a) - p;
+    let d2 = to_light.dot(to_light).max(1e-20);
+    let distance = d2.sqrt();
+    let direction = to_light / distance;
+    let mut radiance = Vec3::from(light.value) / (d2 * light.probability);
+    if light.kind == LIGHT_SPOT {
+        let angle = (-Vec3::from(light.b).dot(direction)).clamp(-1.0, 1.0).acos();
+        let (full, cut) = (light.c[0].acos(), light.c[1].acos());
+        radiance *= ((cut - angle) / (cut - full).max(1e-6)).clamp(0.0, 1.0);
+    }
+    LightSample { direction, distance, radiance, pdf: 0.0 }
+}
+
+/// One light for the surface point `p`. Radiance is 0 when the light cannot reach the point.
+pub fn light_sample(scene: &Scene, p: Vec3, word: u32, u: Vec2) -> LightSample {
+    let chosen = if scene.lights.len() == 1 { 0 } else { alias_choose(&scene.light_table, word) };
+    let light = &scene.lights[chosen as usize];
+    match light.kind {
+        LIGHT_TRIANGLE => sample_triangle_light(scene, light, p, u),
+        LIGHT_POINT | LIGHT_SPOT => sample_point_light(light, p),
+        LIGHT_DIRECTIONAL => LightSample {
+            direction: -Vec3::from(light.b),
+            distance: INFINITE_DISTANCE,
+            radiance: Vec3::from(light.value) / light.probability,
+            pdf: 0.0,
+        },
+        _ => sample_environment(scene, light, word, u),
+    }
+}
+
+/// Density per solid angle with which [`light_sample`] chooses a point of an emissive triangle hit by a ray.
+pub fn triangle_light_pdf(scene: &Scene, material: u32, t: f32, cosine: f32) -> f32 {
+    let weight = scene.materials[material as usize].emission_weight;
+    scene.triangle_pdf_scale * weight * t * t / cosine.max(1e-20)
+}

@@ -1,0 +1,249 @@
+//! Twin of `glsl/path.comp`.
+use crate::gpu::layout::{BSDF_DIFFUSE, Effects, MATERIAL_TWO_SIDED, NONE, PathPush};
+use crate::reference::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
+use crate::reference::camera::{camera_ray, film_from_pixel};
+use crate::reference::light::*;
+use crate::reference::sampler::{Sampler, pcg, sample_2d, sample_2d_bits, sampler_start};
+use crate::reference::surface::{Surface, offset_origin, surface_at, surface_bsdf, surface_emission};
+use crate::reference::traverse::traverse;
+use crate::reference::warp::{basis_from_normal, warp_gaussian, warp_tent};
+use crate::scene::Scene;
+use glam::{Mat3, Vec2, Vec3, vec2};
+
+const PAIR_FILM: u32 = 0;
+const PAIR_LENS: u32 = 1;
+const PAIR_FIRST_BOUNCE: u32 = 2;
+const PAIRS_PER_BOUNCE: u32 = 4;
+const PAIR_CHOICE: u32 = 0;
+const PAIR_LIGHT: u32 = 1;
+const PAIR_BSDF: u32 = 2;
+const PAIR_ROULETTE: u32 = 3;
+
+/// What one path returns, linear Rec. 709. Without [`Effects::indirect`] all light is in `direct`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PathSample {
+    /// See [`crate::gpu::layout::PixelLight::direct`].
+    pub direct: Vec3,
+    /// Radiance that arrived by more than one bounce.
+    pub indirect: Vec3,
+    /// Reflectance of the first hit.
+    pub albedo: Vec3,
+}
+
+impl PathSample {
+    /// All of it.
+    pub fn radiance(&self) -> Vec3 {
+        self.direct + self.indirect
+    }
+}
+
+/// Which of the two ways to find light are used. The kernel has only `Both`; the others test that either is enough.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Strategy {
+    /// Joined by the balance heuristic.
+    Both,
+    /// Light sampling, wherever a light can be sampled.
+    Light,
+    /// BSDF sampling: point, spot and directional lights are lost.
+    Bsdf,
+}
+
+struct Path {
+    origin: Vec3,
+    direction: Vec3,
+    throughput: Vec3,
+    bsdf_pdf: f32,
+    cone_width: f32,
+    cone_spread: f32,
+    delta: bool,
+}
+
+/// A path tracer for one scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Tracer<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// As the kernel's; the batch does not matter.
+    pub push: PathPush,
+    /// Roulette, clamp, pixel filter, sampler and the split of light; the rest follows from the scene.
+    pub effects: Effects,
+    /// [`Strategy::Both`] for the kernel's answer.
+    pub strategy: Strategy,
+}
+
+/// The point being shaded.
+struct Shade {
+    surface: Surface,
+    bsdf: Bsdf,
+    basis: Mat3,
+    wo: Vec3,
+    pair: u32,
+}
+
+impl Tracer<'_> {
+    fn film_sample(&self, pixel: u32, random: Sampler) -> Vec2 {
+        let at = vec2((pixel % self.push.size[0]) as f32, (pixel / self.push.size[0]) as f32);
+        let u = sample_2d(random, PAIR_FILM);
+        let u = match self.push.pixel_filter {
+            1 if self.effects.pixel_filter => 0.5 + vec2(warp_tent(u.x), warp_tent(u.y)),
+            2 if self.effects.pixel_filter => 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y)),
+            _ => u,
+        };
+        film_from_pixel(at + u, self.push.size)
+    }
+
+    fn balance(&self, taken: f32, other: f32, strategy: Strategy) -> f32 {
+        match self.strategy {
+            Strategy::Both => taken / (taken + other).max(1e-37),
+            only => f32::from(only == strategy),
+        }
+    }
+
+    fn add_light(&self, sum: &mut PathSample, mut light: Vec3, indirect: bool) {
+        if !self.effects.indirect || !indirect {
+            sum.direct += light;
+            return;
+        }
+        let (largest, limit) = (light.max_element(), self.push.clamp_indirect);
+        if self.effects.clamp && limit > 0.0 && largest > limit {
+            light *= limit / largest;
+        }
+        sum.indirect += light;
+    }
+
+    fn light_from_miss(&self, path: &Path) -> Vec3 {
+        if self.push.environment == NONE {
+            return Vec3::ZERO;
+        }
+        let light = &self.scene.lights[self.push.environment as usize];
+        let (radiance, pdf) = environment_radiance(self.scene, light, path.direction);
+        radiance * if path.delta { 1.0 } else { self.balance(path.bsdf_pdf, pdf, Strategy::Bsdf) }
+    }
+
+    fn light_from_hit(&self, path: &Path, s: &Surface, t: f32) -> Vec3 {
+        let cosine = -s.geometric.dot(path.direction);
+        if cosine <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let pdf = triangle_light_pdf(self.scene, s.material, t, cosine);
+        let weight = if path.delta { 1.0 } else { self.balance(path.bsdf_pdf, pdf, Strategy::Bsdf) };
+        surface_emission(self.scene, s) * weight
+    }
+
+    fn light_from_nee(&self, p: &Shade, random: Sampler, mask_seed: u32) -> Vec3 {
+        let s = &p.surface;
+        let word = sample_2d_bits(random, p.pair + PAIR_CHOICE)[0];
+        let light = light_sample(self.scene, s.position, word, sample_2d(random, p.pair + PAIR_LIGHT));
+        if light.radiance == Vec3::ZERO {
+            return Vec3::ZERO;
+        }
+        let f = bsdf_evaluate(&p.bsdf, p.wo, p.basis.transpose() * light.direction);
+        let weight = if light.pdf > 0.0 { self.balance(light.pdf, f.w, Strategy::Light) } else { 1.0 };
+        let contribution = f.truncate() * light.radiance * weight;
+        if !(contribution.max_element() > 0.0) {
+            return Vec3::ZERO;
+        }
+        let normal = if light.direction.dot(s.geometric) < 0.0 { -s.geometric } else { s.geometric };
+        let origin = offset_origin(s.position, normal);
+        let (mut direction, mut distance) = (light.direction, light.distance);
+        if distance < INFINITE_DISTANCE {
+            direction = s.position + light.distance * light.direction - origin;
+            distance = direction.length();
+            direction /= distance;
+            distance *= 1.0 - 1e-6;
+        }
+        let blocker = traverse(self.scene, origin, direction, distance, true, mask_seed);
+        if blocker.any() { Vec3::ZERO } else { contribution }
+    }
+
+    fn scatter(&self, path: &mut Path, p: &Shade, t: f32, random: Sampler) -> bool {
+        let lobe = sample_2d(random, p.pair + PAIR_CHOICE).y;
+        let (scattered, next) = bsdf_sample(&p.bsdf, p.wo, lobe, sample_2d(random, p.pair + PAIR_BSDF));
+        if !scattered {
+            return false;
+        }
+        let geometric = p.surface.geometric;
+        path.throughput *= next.weight;
+        path.direction = (p.basis * next.wi).normalize();
+        let normal = if path.direction.dot(geometric) < 0.0 { -geometric } else { geometric };
+        path.origin = offset_origin(p.surface.position, normal);
+        path.bsdf_pdf = next.pdf;
+        path.delta = next.delta;
+        path.cone_width += path.cone_spread * t;
+        let rough = if p.bsdf.kind == BSDF_DIFFUSE { 0.3 } else { p.bsdf.alpha };
+        path.cone_spread = if next.delta { path.cone_spread } else { path.cone_spread.max(rough) };
+        path.throughput.max_element() > 0.0
+    }
+
+    fn survives_roulette(&self, path: &mut Path, random: Sampler, pair: u32) -> bool {
+        let q = path.throughput.max_element().min(0.95);
+        if sample_2d(random, pair + PAIR_ROULETTE).x >= q {
+            return false;
+        }
+        path.throughput /= q;
+        true
+    }
+
+    fn shade(&self, surface: Surface, direction: Vec3, pair: u32) -> Shade {
+        let away = surface.normal.dot(direction) > 0.0;
+        let flip = away && surface.flags & MATERIAL_TWO_SIDED != 0;
+        let basis = basis_from_normal(if flip { -surface.normal } else { surface.normal });
+        Shade { bsdf: surface_bsdf(self.scene, &surface), surface, basis, wo: basis.transpose() * -direction, pair }
+    }
+
+    fn trace_path(&self, mut path: Path, random: Sampler, path_seed: u32) -> PathSample {
+        let mut sum = PathSample::default();
+        let mut smooth_first = false;
+        for bounce in 0u32.. {
+            let pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
+            let mask_seed = pcg(path_seed.wrapping_add(2 * bounce));
+            let hit = traverse(self.scene, path.origin, path.direction, INFINITE_DISTANCE, false, mask_seed);
+            let indirect = bounce >= 2 && !smooth_first;
+            if !hit.any() {
+                self.add_light(&mut sum, path.throughput * self.light_from_miss(&path), indirect);
+                break;
+            }
+            let s = surface_at(self.scene, &hit, path.direction, path.cone_width + path.cone_spread * hit.t);
+            self.add_light(&mut sum, path.throughput * self.light_from_hit(&path, &s, hit.t), indirect);
+            if bounce + 1 >= self.push.max_depth {
+                break;
+            }
+            let p = self.shade(s, path.direction, pair);
+            let smooth_here = bsdf_is_delta(&p.bsdf);
+            if bounce == 0 {
+                sum.albedo = bsdf_albedo(&p.bsdf);
+                smooth_first = smooth_here;
+            }
+            if self.push.light_count > 0 && !smooth_here {
+                let light = self.light_from_nee(&p, random, mask_seed.wrapping_add(1));
+                self.add_light(&mut sum, path.throughput * light, bounce >= 1 && !smooth_first);
+            }
+            if !self.scatter(&mut path, &p, hit.t, random) {
+                break;
+            }
+            let from = self.push.roulette_depth;
+            let roulette = self.effects.roulette && from > 0 && bounce + 1 >= from;
+            if roulette && !self.survives_roulette(&mut path, random, pair) {
+                break;
+            }
+        }
+        sum
+    }
+
+    /// Sample `index` of `pixel` (row-major).
+    pub fn sample(&self, pixel: u32, index: u32) -> PathSample {
+        let random = sampler_start(pixel, index, self.push.seed, self.effects.independent_sampler);
+        let lens = if self.effects.lens { sample_2d(random, PAIR_LENS) } else { Vec2::ZERO };
+        let ray = camera_ray(&self.push.camera, self.film_sample(pixel, random), lens);
+        let path = Path {
+            origin: ray.origin,
+            direction: ray.direction,
+            throughput: Vec3::ONE,
+            bsdf_pdf: 0.0,
+            cone_width: 0.0,
+            cone_spread: 2.0 * Vec3::from(self.push.camera.up).length() / self.push.size[1] as f32,
+            delta: true,
+        };
+        self.trace_path(path, random, pcg(pcg(pixel ^ self.push.seed).wrapping_add(index)))
+    }
+}
