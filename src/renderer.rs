@@ -210,7 +210,7 @@ pub fn all_effects(scene: &Scene) -> Effects {
 /// Paths per dispatch: enough to fill the device, few enough that a batch ends within a fraction of a second, and
 /// that the samples fit a storage buffer.
 fn paths_in_flight(gpu: &Gpu, settings: &Settings, effects: &Effects) -> u32 {
-    let wanted: u64 = if gpu.info().kind == "CPU" { 1 << 18 } else { 1 << 22 };
+    let wanted: u64 = if gpu.info().kind == "CPU" { 1 << 20 } else { 1 << 22 };
     let bytes = if effects.split_light { 36 } else { 12 };
     let room = gpu.info().max_storage_range / bytes;
     let all = settings.pixels() as u64 * u64::from(settings.spp);

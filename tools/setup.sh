@@ -27,8 +27,7 @@ has() {
     loader) PATH=$PATH:/usr/sbin:/sbin ldconfig -p 2>/dev/null | grep -F libvulkan.so.1 >/dev/null ;;
     driver) [[ -n ${VK_DRIVER_FILES:-${VK_ICD_FILENAMES:-}} ]] || any_file {/usr/share,/usr/local/share,/etc}/vulkan/icd.d/*.json ;;
     layers) any_file {/usr/share,/usr/local/share,/etc}/vulkan/explicit_layer.d/*validation*.json ;;
-    shaderc) pkg-config --exists shaderc 2>/dev/null ;;
-    pkg-config) command -v pkg-config >/dev/null ;;
+    glslc) command -v glslc >/dev/null ;;
     compiler) command -v cc >/dev/null && command -v c++ >/dev/null ;;
     esac
 }
@@ -44,13 +43,8 @@ package() {
     zypper:driver) echo libvulkan_lvp ;;
     apt-get:layers | zypper:layers) echo vulkan-validationlayers ;;
     dnf:layers | pacman:layers) echo vulkan-validation-layers ;;
-    apt-get:shaderc) echo libshaderc-dev ;;
-    dnf:shaderc) echo libshaderc-devel ;;
-    pacman:shaderc) echo shaderc ;;
-    zypper:shaderc) echo shaderc-devel ;;
-    apt-get:pkg-config | zypper:pkg-config) echo pkg-config ;;
-    dnf:pkg-config) echo pkgconf-pkg-config ;;
-    pacman:pkg-config) echo pkgconf ;;
+    apt-get:glslc | dnf:glslc) echo glslc ;;
+    pacman:glslc | zypper:glslc) echo shaderc ;;
     apt-get:compiler) echo g++ ;;
     dnf:compiler | zypper:compiler) echo gcc-c++ ;;
     pacman:compiler) echo gcc ;;
@@ -76,7 +70,7 @@ require() {
         if command -v "$manager" >/dev/null; then break; fi
     done
     [[ -n $manager ]] || die "missing: ${missing[*]}. Install the Vulkan loader and a Vulkan 1.3 driver (Mesa's lavapipe" \
-        "needs no GPU), the shaderc library with headers, pkg-config, and a C and C++ compiler; then run this again."
+        "needs no GPU), glslc of shaderc, and a C and C++ compiler; then run this again."
     for need in "${missing[@]}"; do packages+=("$(package "$manager" "$need")"); done
     if [[ $manager != apt-get || $EUID != 0 ]]; then
         say "missing: ${missing[*]}. Run this line, then try again:"
@@ -98,6 +92,5 @@ find_cargo() {
     cargo=$(command -v cargo || true)
     [[ -n $cargo || ! -x $HOME/.cargo/bin/cargo ]] || cargo=$HOME/.cargo/bin/cargo
     [[ -n $cargo ]] && return
-    say "cargo is missing; Tallow needs Rust 1.88 or newer. Run this line, then try again:"
-    die "    curl --proto '=https' --tlsv1.2 -sSf https://sh.rustup.rs | sh -s -- -y"
+    die "cargo is missing: install Rust 1.88 or newer with rustup (see rust-lang.org), then try again"
 }
