@@ -4,6 +4,7 @@ use crate::gpu::layout::*;
 use crate::gpu::{Buffer, Gpu, Location, Recorder};
 use crate::scene::Scene;
 use crate::stage::{fold, guide, path};
+use std::borrow::Cow;
 
 /// The kernels of a frame, specialised for one scene.
 pub struct Stages {
@@ -73,16 +74,16 @@ pub struct DeviceScene {
 }
 
 impl DeviceScene {
-    /// Copies `scene` to the device.
+    /// Copies `scene` to the device, for kernels with these effects.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when it does not fit.
-    pub fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &Scene, effects: &Effects) -> Result<Self> {
         let environment = scene.environment.as_ref();
         Ok(Self {
             nodes: Buffer::from_slice(gpu, "nodes", &scene.nodes)?,
             triangles: Buffer::from_slice(gpu, "triangles", &scene.triangles)?,
-            shading: Buffer::from_slice(gpu, "shading", &scene.shading)?,
+            shading: Buffer::from_slice(gpu, "shading", &shading(scene, effects))?,
             instances: Buffer::from_slice(gpu, "instances", &scene.instances)?,
             materials: Buffer::from_slice(gpu, "materials", &scene.materials)?,
             textures: Buffer::from_slice(gpu, "textures", &scene.textures)?,
@@ -110,6 +111,15 @@ impl DeviceScene {
         sizes.sort_by_key(|s| std::cmp::Reverse(s.1));
         sizes
     }
+}
+
+/// The scene's own records, or flat ones where kernels read what the scene does not have (`--effects all`).
+fn shading<'a>(scene: &'a Scene, effects: &Effects) -> Cow<'a, [Shading]> {
+    let read = effects.smooth_normals || effects.textures || effects.bump_maps || effects.normal_maps;
+    if read && scene.shading.is_empty() {
+        return vec![Shading { normal: [u32::MAX; 3], ..Shading::default() }; scene.triangles.len()].into();
+    }
+    Cow::Borrowed(&scene.shading)
 }
 
 /// What a frame writes. Buffers that the outputs do not call for hold one element.

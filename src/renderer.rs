@@ -1,7 +1,8 @@
 //! The renderer that an engine embeds and that the command line drives: a scene on a device, kernels specialised for
 //! it, and frames recorded batch by batch into command buffers.
 use crate::error::Result;
-use crate::frame::{self, Batch, DeviceScene, FilmBuffers, Stages};
+use crate::frame::{self, Stages};
+pub use crate::frame::{Batch, DeviceScene, FilmBuffers};
 use crate::gpu::layout::{Camera, Effects, LIGHT_ENVIRONMENT, NONE, PathPush, ROOT_OF_INSTANCES};
 use crate::gpu::{FrameResources, Gpu, PassTime, RawBuffer, Recorder};
 use crate::scene::{self, Scene};
@@ -91,7 +92,7 @@ impl Renderer {
         let paths = paths_in_flight(gpu, &settings, &effects);
         let film = FilmBuffers::new(gpu, settings.pixels(), paths as usize, &effects, outputs.guides)?;
         let push = path_push(scene, &settings);
-        let scene = DeviceScene::new(gpu, scene)?;
+        let scene = DeviceScene::new(gpu, scene, &effects)?;
         Ok(Self { gpu: gpu.clone(), scene, stages, film, effects, outputs, settings, push, paths })
     }
 

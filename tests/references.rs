@@ -89,8 +89,9 @@ fn share_passing(ours: &Estimate, mean: &Picture, error: &Picture) -> f64 {
         (0..3).all(|c| {
             let (a, b) = (f64::from(ours.mean[i][c]), f64::from(mean.pixels[i][c]));
             let spread = f64::from(ours.error2[i][c]) + f64::from(error.pixels[i][c]).powi(2);
-            // Where nothing varies (the light itself, black), single precision is all that may differ.
-            (a - b).abs() <= limit * spread.sqrt() + 1e-5 * b.abs()
+            // Where nothing varies (the light itself), single precision is all that may differ; and where a lobe's
+            // tail is below 1e-12 of the image's mean, the reference has cut it off.
+            (a - b).abs() <= limit * spread.sqrt() + 1e-5 * b.abs() + 1e-13
         })
     };
     (0..mean.pixels.len()).filter(|&i| passes(i)).count() as f64 / mean.pixels.len() as f64
