@@ -4,6 +4,8 @@ use tallow::gpu::layout::PixelStats;
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu};
 use tallow::renderer::{Batch, Renderer};
 
+pub mod engine;
+
 /// The kernels of `glsl/test`.
 pub mod kernels {
     include!(concat!(env!("OUT_DIR"), "/test_shaders.rs"));
