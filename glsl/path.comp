@@ -149,13 +149,12 @@ Light2 trace_path(Path path, Sampler random, uint path_seed, out vec3 albedo) {
         add_light(sum, path.throughput * light_from_hit(path, s, hit.t), indirect);
         if (bounce + 1u >= push.max_depth) break;
 
-        vec3 normal = s.normal;
-        if (dot(normal, path.direction) > 0.0) {
-            if ((s.flags & MATERIAL_TWO_SIDED) != 0u) normal = -normal;
-        }
+        Bsdf bsdf = surface_bsdf(s);
+        // The two sides of a dielectric differ: its normal stays on the outside.
+        bool turns = (s.flags & MATERIAL_TWO_SIDED) != 0u && !is_kind(FX_DIELECTRIC, bsdf, BSDF_DIELECTRIC);
+        vec3 normal = turns && dot(s.normal, path.direction) > 0.0 ? -s.normal : s.normal;
         mat3 basis = basis_from_normal(normal);
         vec3 wo = -path.direction * basis;
-        Bsdf bsdf = surface_bsdf(s);
         bool smooth_here = bsdf_is_delta(bsdf);
         if (bounce == 0u) {
             albedo = bsdf_albedo(bsdf);

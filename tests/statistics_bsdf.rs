@@ -7,7 +7,7 @@ use glam::{DVec3, Vec2, Vec3, dvec3, vec3};
 use statistics::{chi_square, sidak};
 use std::f64::consts::{PI, TAU};
 use tallow::gpu::layout::{BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE};
-use tallow::reference::bsdf::{Bsdf, BsdfSample, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
+use tallow::reference::bsdf::{Bsdf, BsdfSample, SMOOTH_ALPHA, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
 use tallow::reference::fresnel::internal_fresnel;
 use tallow::reference::sampler::{sample_2d, sampler_start};
 
@@ -36,7 +36,9 @@ fn conductor(alpha: f32, ggx: bool) -> Bsdf {
 /// Every rough kind, glass from both sides, and a bubble (index below 1); `inside` means wo.z < 0.
 fn rough_cases() -> Vec<(String, Bsdf, Vec3)> {
     let mut cases = Vec::new();
-    for (alpha, ggx, degrees) in ALPHAS.iter().flat_map(|&a| [false, true].map(|g| (a, g))).flat_map(|(a, g)| DEGREES.map(|d| (a, g, d))) {
+    for (alpha, ggx, degrees) in
+        ALPHAS.iter().flat_map(|&a| [false, true].map(|g| (a, g))).flat_map(|(a, g)| DEGREES.map(|d| (a, g, d)))
+    {
         let (s, c) = degrees.to_radians().sin_cos();
         // Away from the x axis, so that a wrong azimuth shows.
         let wo = vec3(0.8 * s, -0.6 * s, c);
@@ -49,7 +51,11 @@ fn rough_cases() -> Vec<(String, Bsdf, Vec3)> {
             ("bubble", bsdf(BSDF_DIELECTRIC, alpha, ggx, 0.75), wo),
             ("coated", bsdf(BSDF_COATED, alpha, ggx, 1.5), wo),
         ] {
-            cases.push((format!("{name} alpha {alpha} {} {degrees} degrees", if ggx { "GGX" } else { "Beckmann" }), b, wo));
+            cases.push((
+                format!("{name} alpha {alpha} {} {degrees} degrees", if ggx { "GGX" } else { "Beckmann" }),
+                b,
+                wo,
+            ));
         }
     }
     cases
@@ -125,14 +131,11 @@ impl Grid {
 
 /// The grid of the reflected lobe, and of the refracted one where there is one.
 fn grids(b: &Bsdf, wo: Vec3) -> Vec<Grid> {
-    let alpha = f64::from(if b.kind == BSDF_DIFFUSE { 1.0 } else { b.alpha.max(0.5 * f32::from(bsdf_is_smooth(b))) });
+    // A diffuse lobe without a rough coat spreads over all slopes.
+    let alpha = f64::from(if b.alpha < SMOOTH_ALPHA { 1.0 } else { b.alpha });
     let eta = f64::from(if wo.z < 0.0 { 1.0 / b.eta.x } else { b.eta.x });
     let indices = if b.kind == BSDF_DIELECTRIC { vec![1.0, eta] } else { vec![1.0] };
     indices.into_iter().map(|n| Grid { wo: wo.as_dvec3(), n, alpha }).collect()
-}
-
-fn bsdf_is_smooth(b: &Bsdf) -> bool {
-    b.alpha < tallow::reference::bsdf::SMOOTH_ALPHA
 }
 
 /// Observed and expected counts; the last cell holds what is absorbed or a delta.
@@ -145,7 +148,8 @@ fn counts(b: &Bsdf, wo: Vec3, count: u32, seed: u32) -> (Vec<f64>, Vec<f64>) {
     let mut observed = vec![0.0; expected.len()];
     for (sampled, s) in samples(*b, wo, count, true, seed) {
         let refracted = usize::from(s.wi.z * wo.z < 0.0);
-        let cell = if sampled && !s.delta { refracted * cells + grids[refracted].cell(s.wi) } else { grids.len() * cells };
+        let cell =
+            if sampled && !s.delta { refracted * cells + grids[refracted].cell(s.wi) } else { grids.len() * cells };
         observed[cell] += 1.0;
     }
     (observed, expected)
@@ -171,7 +175,13 @@ fn samples_follow_the_pdf() {
         let planted: Vec<f64> = expected.iter().map(|e| 1.05 * e).collect();
         assert!(chi_square(&observed, &planted) < level, "{name}: the test cannot see a pdf that is 5 % off");
     }
-    assert!(failures.is_empty(), "{} of {} rejected at level {level:.1e}:\n{}", failures.len(), cases.len(), failures.join("\n"));
+    assert!(
+        failures.is_empty(),
+        "{} of {} rejected at level {level:.1e}:\n{}",
+        failures.len(),
+        cases.len(),
+        failures.join("\n")
+    );
 }
 
 #[test]
@@ -217,7 +227,8 @@ fn reciprocal() {
 fn energy(b: Bsdf, wo: Vec3, count: u32) -> f64 {
     let eta = if wo.z < 0.0 { 1.0 / b.eta.x } else { b.eta.x };
     let flux = |s: &BsdfSample| f64::from(s.weight.x * if s.wi.z * wo.z < 0.0 { eta * eta } else { 1.0 });
-    samples(b, wo, count, false, 11).filter(|(sampled, _)| *sampled).map(|(_, s)| flux(&s)).sum::<f64>() / f64::from(count)
+    samples(b, wo, count, false, 11).filter(|(sampled, _)| *sampled).map(|(_, s)| flux(&s)).sum::<f64>()
+        / f64::from(count)
 }
 
 #[test]
@@ -225,11 +236,17 @@ fn smooth_kinds_conserve_energy() {
     for degrees in DEGREES {
         let (s, c) = degrees.to_radians().sin_cos();
         let wo = vec3(s, 0.0, c);
-        for b in [bsdf(BSDF_DIELECTRIC, 0.0, false, 1.5), bsdf(BSDF_COATED, 0.0, false, 1.5), conductor(0.0, false), bsdf(BSDF_DIFFUSE, 0.0, false, 1.5)] {
+        for b in [
+            bsdf(BSDF_DIELECTRIC, 0.0, false, 1.5),
+            bsdf(BSDF_COATED, 0.0, false, 1.5),
+            conductor(0.0, false),
+            bsdf(BSDF_DIFFUSE, 0.0, false, 1.5),
+        ] {
             assert!(bsdf_is_delta(&b) == matches!(b.kind, BSDF_CONDUCTOR | BSDF_DIELECTRIC));
             let e = energy(b, wo, 1 << 15);
             assert!((e - 1.0).abs() < 1e-3, "kind {} at {degrees} degrees: {e}", b.kind);
-            let planted = Bsdf { albedo: Vec3::splat(0.99), specular: Vec3::splat(0.99), transmission: Vec3::splat(0.99), ..b };
+            let planted =
+                Bsdf { albedo: Vec3::splat(0.99), specular: Vec3::splat(0.99), transmission: Vec3::splat(0.99), ..b };
             assert!((energy(planted, wo, 1 << 15) - 1.0).abs() > 1e-3, "control");
         }
     }
@@ -275,9 +292,8 @@ fn a_rough_mirror_loses_what_single_scattering_loses() {
 fn rough_kinds_make_no_light() {
     for (name, b, wo) in rough_cases() {
         let e = energy(b, wo, 1 << 12);
-        // The coat's diffuse base passes a SMOOTH interface: together with a rough reflection it may gain a little.
-        let limit = if b.kind == BSDF_COATED { 1.03 } else { 1.006 };
-        assert!(e < limit && e > 0.05, "{name}: {e}");
+        // Walter's fit adds up to 0.4 %; a coat whose base passes a smooth interface stays within the same margin.
+        assert!(e < 1.006 && e > 0.05, "{name}: {e}");
     }
 }
 
@@ -286,14 +302,19 @@ fn finite_for_every_input() {
     let numbers = [0.0, 0.3, 0.5, 0.9, 1.0 - f32::EPSILON / 2.0];
     for (kind, alpha) in (BSDF_DIFFUSE..=BSDF_COATED).flat_map(|k| [0.0, 0.01, 0.3, 1.0].map(|a| (k, a))) {
         for (eta, k) in [0.4, 0.999, 1.0, 1.0003, 1.5, 4.0].iter().flat_map(|&e| [0.0, 0.3, 7.0].map(|k| (e, k))) {
-            for (cos, ggx) in [0.0, 1e-30, 1e-8, 1e-7, 1e-4, 0.5, 1.0, -1e-7, -0.7].iter().flat_map(|&c| [(c, false), (c, true)]) {
+            for (cos, ggx) in
+                [0.0, 1e-30, 1e-8, 1e-7, 1e-4, 0.5, 1.0, -1e-7, -0.7].iter().flat_map(|&c| [(c, false), (c, true)])
+            {
                 let b = Bsdf { k: Vec3::splat(k), ..bsdf(kind, alpha, ggx, eta) };
                 let wo = vec3((1.0f32 - cos * cos).sqrt(), 0.0, cos);
                 for u in numbers.iter().flat_map(|&x| numbers.map(|y| Vec2::new(x, y))) {
                     let (sampled, s) = bsdf_sample(&b, wo, u.y, u);
                     let all = [s.weight.x, s.pdf, s.wi.x, s.wi.y, s.wi.z];
                     assert!(!sampled || all.iter().all(|v| v.is_finite()), "{b:?} {wo} {u}: {s:?}");
-                    assert!(!sampled || (s.weight.min_element() >= 0.0 && (s.wi.length() - 1.0).abs() < 1e-3), "{b:?} {wo} {u}: {s:?}");
+                    assert!(
+                        !sampled || (s.weight.min_element() >= 0.0 && (s.wi.length() - 1.0).abs() < 1e-3),
+                        "{b:?} {wo} {u}: {s:?}"
+                    );
                     for wi in [s.wi, -wo, vec3(-wo.x, 0.0, wo.z), vec3(0.6, 0.0, -0.8), vec3(-1.0, 0.0, 1e-7)] {
                         let value = bsdf_evaluate(&b, wo, wi);
                         assert!(value.is_finite() && value.min_element() >= 0.0, "{b:?} {wo} {wi}: {value}");

@@ -25,7 +25,9 @@ fn is_stratified(points: &[[u32; 2]]) -> bool {
 fn every_pair_fills_every_elementary_interval() {
     for (pixel, pair, seed) in [(0, 0, 0), (1, 0, 0), (0, 1, 0), (123_456, 77, 9), (u32::MAX, 4095, u32::MAX)] {
         let points = |first: u32, k: u32, independent: bool| -> Vec<[u32; 2]> {
-            (first..first + (1 << k)).map(|i| sample_2d_bits(sampler_start(pixel, i, seed, independent), pair)).collect()
+            (first..first + (1 << k))
+                .map(|i| sample_2d_bits(sampler_start(pixel, i, seed, independent), pair))
+                .collect()
         };
         for k in 0..=12 {
             // The first 2^k points, and any later block of that length: samples can be resumed.
@@ -49,8 +51,12 @@ fn families(independent: bool) -> Vec<(String, Vec<[f64; 2]>)> {
     let mut add = |name: String, point: &dyn Fn(u32) -> [f64; 2]| all.push((name, (0..COUNT).map(point).collect()));
     for (a, b) in [(0, 1), (0, 2), (1, 5), (7, 8), (2, 1000)] {
         for axes in 0..4 {
-            add(format!("pairs {a}, {b}, axes {axes}, over pixels"), &|p| [at(p, 0, a, 0)[axes & 1], at(p, 0, b, 0)[axes >> 1]]);
-            add(format!("pairs {a}, {b}, axes {axes}, over samples"), &|i| [at(9, i, a, 0)[axes & 1], at(9, i, b, 0)[axes >> 1]]);
+            add(format!("pairs {a}, {b}, axes {axes}, over pixels"), &|p| {
+                [at(p, 0, a, 0)[axes & 1], at(p, 0, b, 0)[axes >> 1]]
+            });
+            add(format!("pairs {a}, {b}, axes {axes}, over samples"), &|i| {
+                [at(9, i, a, 0)[axes & 1], at(9, i, b, 0)[axes >> 1]]
+            });
         }
     }
     for index in [0, 1, 2, 63] {
@@ -59,7 +65,9 @@ fn families(independent: bool) -> Vec<(String, Vec<[f64; 2]>)> {
         add(format!("sample {index} over seeds"), &|seed| at(5, index, 3, seed));
         for stride in [1, 512] {
             for axis in 0..2 {
-                add(format!("sample {index}, pixels {stride} apart, axis {axis}"), &|p| [at(p, index, 3, 0)[axis], at(p + stride, index, 3, 0)[axis]]);
+                add(format!("sample {index}, pixels {stride} apart, axis {axis}"), &|p| {
+                    [at(p, index, 3, 0)[axis], at(p + stride, index, 3, 0)[axis]]
+                });
             }
         }
     }
@@ -91,7 +99,8 @@ fn points_within_a_pixel_do_not_bias_their_mean() {
     let moments = |independent: bool| {
         let means: Vec<f64> = (0..1 << 14)
             .map(|pixel| {
-                let sum: f32 = (0..16).map(|i| sample_2d(sampler_start(pixel, i, 1, independent), 4)).map(|u| u.x * u.y).sum();
+                let sum: f32 =
+                    (0..16).map(|i| sample_2d(sampler_start(pixel, i, 1, independent), 4)).map(|u| u.x * u.y).sum();
                 f64::from(sum) / 16.0
             })
             .collect();

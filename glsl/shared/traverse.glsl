@@ -101,8 +101,8 @@ uint intersect_node(RaySpace r, uint index, float t_max, out uvec3 children) {
            intersect_children(n1.w, r.octant, uvec3(x.y, y.y, z.y), uvec3(x.w, y.w, z.w), scale, origin, t_max);
 }
 
-// Traverses from `root` (with ROOT_OF_INSTANCES, a level of instances). With `any_hit`, stops at the first triangle; otherwise returns the closest.
-// `mask_seed` decides hits on partly transparent surfaces.
+// Traverses from `root` (with ROOT_OF_INSTANCES, a level of instances). With `any_hit`, stops at the first triangle;
+// otherwise returns the closest. `mask_seed` decides hits on partly transparent surfaces.
 Hit traverse(vec3 origin, vec3 direction, float t_max, bool any_hit, uint root, uint mask_seed) {
     Hit hit = Hit(t_max, NONE, NONE, vec2(0.0));
     RaySpace ray = ray_space(origin, direction);
@@ -111,7 +111,8 @@ Hit traverse(vec3 origin, vec3 direction, float t_max, bool any_hit, uint root, 
     uint bottom = 0u;       // stack depth at which the current instance was entered
     uint instance = NONE;   // NONE in the top (or only) level
     bool two_levels = FX_INSTANCES && (root & ROOT_OF_INSTANCES) != 0u;
-    uvec2 group = uvec2(root & ~ROOT_OF_INSTANCES, 0x80000000u); // inner children: base, hit bits and inner mask; or triangles: base, bits
+    // Inner children: base, hit bits and inner mask; or triangles: base, bits.
+    uvec2 group = uvec2(root & ~ROOT_OF_INSTANCES, 0x80000000u);
     while (true) {
         uvec2 leaves = uvec2(0u);
         if (group.y > 0x00ffffffu) {

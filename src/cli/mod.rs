@@ -1,6 +1,130 @@
-//! The command line.
+//! The command line: one file per subcommand.
+pub mod compare;
+pub mod devices;
+pub mod explain;
+pub mod interrupt;
+pub mod layers;
+pub mod progress;
+pub mod render;
 
-/// Runs the command line and returns its exit code.
-pub fn main() -> std::process::ExitCode {
-    std::process::ExitCode::SUCCESS
+use crate::error::{Error, Result};
+use clap::error::ErrorKind;
+use clap::{Parser, Subcommand};
+use std::io::Write;
+use std::process::ExitCode;
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0    done
+  1    a limit given with --max-... or --min-... is exceeded
+  2    usage: an option or a setting is wrong
+  3    input: a file cannot be read or is damaged
+  4    device: no Vulkan, no usable device, or it was lost
+  5    output: a file cannot be written
+  130  interrupted (Ctrl-C)";
+
+/// A path tracer for Vulkan.
+#[derive(Parser)]
+#[command(name = "tallow", version, about, after_help = EXIT_CODES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Render(Box<render::Args>),
+    Compare(compare::Args),
+    Explain(explain::Args),
+    Devices(devices::Args),
+}
+
+/// How a command ended when nothing failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exit {
+    /// All done.
+    Done = 0,
+    /// A limit of the user's is exceeded.
+    LimitExceeded = 1,
+    /// Stopped by Ctrl-C.
+    Interrupted = 130,
+}
+
+/// Runs the command line and returns its exit code. What fails is told in one line on stderr.
+pub fn main() -> ExitCode {
+    let tell = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if !crate::image::is_decoding() {
+            tell(panic);
+        }
+    }));
+    let result = match Cli::try_parse() {
+        Ok(cli) => run(cli.command),
+        Err(e) => usage(&e),
+    };
+    match result {
+        Ok(exit) => ExitCode::from(exit as u8),
+        Err(e) => {
+            complain(&format!("error: {e}"));
+            ExitCode::from(e.exit_code())
+        }
+    }
+}
+
+fn run(command: Command) -> Result<Exit> {
+    match command {
+        Command::Render(args) => render::run(&args),
+        Command::Compare(args) => compare::run(&args),
+        Command::Explain(args) => explain::run(&args),
+        Command::Devices(args) => devices::run(&args),
+    }
+}
+
+/// clap's help and version are no errors; of its messages, the problem and the tip are kept and made one line.
+fn usage(e: &clap::Error) -> Result<Exit> {
+    let text = e.render().to_string();
+    if !e.use_stderr() {
+        return print(&text).map(|()| Exit::Done);
+    }
+    if e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        return Err(Error::Usage("name a command: render, compare, explain or devices (see tallow --help)".to_owned()));
+    }
+    let one_line = |paragraph: &str| paragraph.split_whitespace().collect::<Vec<_>>().join(" ");
+    let parts = text.split("\n\n").map(one_line).filter(|p| !p.starts_with("Usage:") && !p.starts_with("For more"));
+    let message = parts.collect::<Vec<_>>().join("; ");
+    Err(Error::Usage(format!("{} (see tallow --help)", message.trim_start_matches("error: "))))
+}
+
+/// Writes one line to stderr, whatever line breaks a message brought along. A closed stderr is no reason to fail.
+fn complain(message: &str) {
+    let _ = writeln!(std::io::stderr(), "{}", message.replace(['\n', '\r'], " "));
+}
+
+/// Writes results to stdout. A reader that has seen enough (`| head`) is no error; a full disk behind it is one.
+///
+/// # Errors
+/// [`Error::Output`].
+pub fn print(text: &str) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::output("standard output", format!("{e}"))),
+        _ => Ok(()),
+    }
+}
+
+/// Prints a value as one line of JSON; numbers that JSON does not know (infinities) become null.
+///
+/// # Errors
+/// As [`print()`].
+pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
+    let text = serde_json::to_string(value).map_err(|e| Error::output("standard output", e))?;
+    print(&(text + "\n"))
+}
+
+/// A finite number, for options where NaN would switch a check off.
+fn finite(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err("expected a finite number".to_owned()),
+    }
 }

@@ -357,6 +357,40 @@ gpu_structs! {
         restart: uint,
     }
 
+    /// A ray for `traverse.comp`.
+    struct RayQuery {
+        /// World units.
+        origin: vec3,
+        /// World units.
+        t_max: float,
+        /// Unit.
+        direction: vec3,
+        /// Decides hits on partly transparent surfaces.
+        mask_seed: uint,
+    }
+
+    /// What `traverse.comp` finds.
+    struct RayHit {
+        /// World units; the ray's `t_max` on a miss.
+        t: float,
+        /// In leaf order, or [`NONE`].
+        triangle: uint,
+        /// Leaf order of the top level, or [`NONE`].
+        instance: uint,
+        /// Weights of vertices 1 and 2.
+        barycentric: vec2,
+    }
+
+    /// Push constants of `traverse.comp`.
+    struct TraversePush {
+        /// Rays.
+        count: uint,
+        /// As [`PathPush::root`].
+        root: uint,
+        /// 1 = any hit, 0 = the closest.
+        any_hit: uint,
+    }
+
     /// Push block of the kernels under glsl/test.
     struct TestPush {
         /// Threads with work to do.

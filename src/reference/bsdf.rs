@@ -77,11 +77,13 @@ fn evaluate_diffuse(b: &Bsdf, wi: Vec3) -> Vec4 {
     b.albedo.extend(1.0) * (wi.z * INV_PI)
 }
 
+/// G1(wo) G1(wi) area(wo) / wo.z: the weight of a visible-normal sample before its Fresnel factor.
 fn visible_weight(b: &Bsdf, wo: Vec3, wi: Vec3, area: f32) -> f32 {
     let g = microfacet_g1(b.ggx, wo, b.alpha) * microfacet_g1(b.ggx, vec3(wi.x, wi.y, wi.z.abs()), b.alpha);
     g * area / wo.z
 }
 
+/// Torrance-Sparrow reflection without its Fresnel factor: x = f cos, y = pdf.
 fn evaluate_reflection(b: &Bsdf, wo: Vec3, wi: Vec3, m: Vec3) -> Vec2 {
     let area = microfacet_area(b.ggx, wo, b.alpha);
     let pdf = microfacet_d(b.ggx, m, b.alpha) / (4.0 * area);
@@ -110,11 +112,13 @@ fn sample_conductor(b: &Bsdf, wo: Vec3, u: Vec2) -> (bool, BsdfSample) {
     (s.wi.z > GRAZING && wo.dot(m) > 0.0, s)
 }
 
+/// Index beyond / index on the side of wo; a rough interface needs the two to differ.
 fn relative_index(b: &Bsdf, wo_z: f32) -> f32 {
     let eta = if !is_smooth(b) && (b.eta.x - 1.0).abs() < 1e-3 { 1.001 } else { b.eta.x };
     if wo_z < 0.0 { 1.0 / eta } else { eta }
 }
 
+/// Density of wi over solid angle times area(wo) (Walter et al. 2007, eq. 17); n = index on wi's side / on wo's.
 fn scattered_density(b: &Bsdf, m: Vec3, n: f32, co: f32, ci: f32) -> f32 {
     let q = co + n * ci;
     microfacet_d(b.ggx, m, b.alpha) * co * ci.abs() * n * n / (q * q).max(1e-30)
@@ -161,6 +165,7 @@ fn sample_dielectric(b: &Bsdf, mut wo: Vec3, u_lobe: f32, u: Vec2) -> (bool, Bsd
     (wo.z >= GRAZING && co > 0.0 && (if reflected { wi.z > GRAZING } else { wi.z < -GRAZING }), s)
 }
 
+/// Probability of the coat's own reflection.
 fn coat_probability(b: &Bsdf, f: f32) -> f32 {
     let specular = f * mean3(b.specular);
     specular / (specular + (1.0 - f) * mean3(b.albedo)).max(1e-10)

@@ -24,6 +24,7 @@ pub fn microfacet_g1(ggx: bool, w: Vec3, alpha: f32) -> f32 {
     if w.z < 1.6 * t { fit } else { 1.0 }
 }
 
+/// c (1 + erf(c / s)) + s exp(-(c / s)^2) / sqrt(pi).
 fn beckmann_area(c: f32, s: f32) -> f32 {
     let cot = (c / s.max(1e-10)).min(8.0);
     let e = (-cot * cot).exp();
@@ -36,11 +37,13 @@ pub fn microfacet_area(ggx: bool, w: Vec3, alpha: f32) -> f32 {
     if ggx { 0.5 * (w.z + (w.z * w.z + t * t).sqrt()) } else { 0.5 * beckmann_area(w.z, t) }
 }
 
+/// Spherical caps (Dupuy and Benyoub 2023); `w` stretched to alpha 1.
 fn ggx_visible_normal(w: Vec3, u: Vec2) -> Vec3 {
     let t = u.y * (1.0 + w.z);
     ((t * (2.0 - t)).sqrt() * circle_point(u.x) + w.xy()).extend((1.0 - t + w.z).max(1e-6))
 }
 
+/// One Halley step towards the slope whose visible area is `target`; `mass` = 1 + erf(b).
 fn beckmann_step(b: f32, mass: f32, c: f32, s: f32, target: f32) -> f32 {
     let e = INV_SQRT_PI * (-b * b).exp();
     let visible = (c - s * b).max(1e-6);

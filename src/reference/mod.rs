@@ -1,6 +1,7 @@
 //! Plain CPU twins of the kernels and of the functions under `glsl/shared`: same names, same order of operations, `f32`.
 //! Tests compare the kernels with them, and run the statistics that a GPU would only slow down. Nothing here is used in
 //! a render, but for [`fresnel::internal_fresnel`].
+#![allow(clippy::excessive_precision, clippy::approx_constant, reason = "constants as the GLSL writes them")]
 pub mod bsdf;
 pub mod camera;
 pub mod fold;

@@ -1,5 +1,5 @@
 //! Twin of `glsl/path.comp`.
-use crate::gpu::layout::{BSDF_DIFFUSE, Effects, MATERIAL_TWO_SIDED, NONE, PathPush};
+use crate::gpu::layout::{BSDF_DIELECTRIC, BSDF_DIFFUSE, Effects, MATERIAL_TWO_SIDED, NONE, PathPush};
 use crate::reference::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
 use crate::reference::camera::{camera_ray, film_from_pixel};
 use crate::reference::light::*;
@@ -186,9 +186,10 @@ impl Tracer<'_> {
 
     fn shade(&self, surface: Surface, direction: Vec3, pair: u32) -> Shade {
         let away = surface.normal.dot(direction) > 0.0;
-        let flip = away && surface.flags & MATERIAL_TWO_SIDED != 0;
-        let basis = basis_from_normal(if flip { -surface.normal } else { surface.normal });
-        Shade { bsdf: surface_bsdf(self.scene, &surface), surface, basis, wo: basis.transpose() * -direction, pair }
+        let bsdf = surface_bsdf(self.scene, &surface);
+        let turns = surface.flags & MATERIAL_TWO_SIDED != 0 && bsdf.kind != BSDF_DIELECTRIC;
+        let basis = basis_from_normal(if turns && away { -surface.normal } else { surface.normal });
+        Shade { bsdf, surface, basis, wo: basis.transpose() * -direction, pair }
     }
 
     fn trace_path(&self, mut path: Path, random: Sampler, path_seed: u32) -> PathSample {

@@ -16,7 +16,7 @@ const LEAF: u32 = 3;
 /// errors from opening gaps between boxes that share a face.
 const GROWTH: f32 = 1.0 / (1 << 21) as f32;
 /// The builder recurses, one frame per level; coincident geometry makes thousands of levels.
-const STACK: usize = 1 << 29;
+const STACK: usize = 1 << 28;
 
 /// Bounds of a set of points, `[low, high]`.
 pub type Bounds = [[f32; 3]; 2];
@@ -90,10 +90,9 @@ fn build<T: Boundable>(items: &[T], first: u32, nodes: &mut Vec<BvhNode>) -> (u3
         nodes.push(BvhNode::default()); // eight empty children: every ray misses
         return (root, Vec::new());
     }
-    // A pool of its own, not a thread to join: a worker of the common pool that blocks here would keep the builder's own
-    // parallel work waiting for ever once all workers do.
-    let workers = rayon::ThreadPoolBuilder::new().stack_size(STACK).build().expect("threads can be started");
-    let bvh = workers.install(|| compressed(items));
+    // A pool of its own rather than a thread that others wait for: waiting inside a shared pool could starve it.
+    let pool = rayon::ThreadPoolBuilder::new().stack_size(STACK).build().expect("threads can be started");
+    let bvh = pool.install(|| compressed(items));
     nodes.reserve_exact(bvh.nodes.len());
     nodes.extend(bvh.nodes.iter().map(|node| {
         // The two structs agree byte for byte; only the indices become global.

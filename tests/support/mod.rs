@@ -1,6 +1,10 @@
 //! What the tests share.
 #![allow(dead_code)]
-use tallow::gpu::{DeviceOptions, Gpu};
+use tallow::gpu::layout::PixelStats;
+use tallow::gpu::{DeviceOptions, FrameResources, Gpu};
+use tallow::renderer::{Batch, Renderer};
+
+pub mod engine;
 
 /// The kernels of `glsl/test`.
 pub mod kernels {
@@ -32,4 +36,18 @@ pub fn hash(v: u32) -> u32 {
     let state = v.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
     let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
     (word >> 22) ^ word
+}
+
+/// Runs the whole of a render.
+pub fn render(gpu: &Gpu, renderer: &Renderer) -> Vec<PixelStats> {
+    render_batches(gpu, renderer, &renderer.batches())
+}
+
+/// Runs a render cut as the caller likes.
+pub fn render_batches(gpu: &Gpu, renderer: &Renderer, batches: &[Batch]) -> Vec<PixelStats> {
+    let mut frame = FrameResources::new(gpu).unwrap();
+    for batch in batches {
+        renderer.run(&mut frame, batch).unwrap();
+    }
+    renderer.film().stats.read().unwrap()
 }

@@ -83,13 +83,13 @@ fn compare(geometry: &Geometry, nodes: &[BvhNode], root: u32, range: Range<usize
     let mut wrong = 0;
     for _ in 0..500 {
         let (origin, direction) = (random.point() * 2.0, random.point());
-        let found = &mut f64::INFINITY;
+        let mut found = f64::INFINITY;
         traverse(nodes, root, origin, direction, &mut |i| {
             let distance = hit(&geometry.triangles[i as usize], origin, direction).unwrap_or(f64::INFINITY);
-            *found = found.min(distance);
+            found = found.min(distance);
         });
         let all = geometry.triangles[range.clone()].iter().filter_map(|t| hit(t, origin, direction));
-        wrong += usize::from(*found != closest(all));
+        wrong += usize::from(found != closest(all));
     }
     wrong
 }
@@ -154,9 +154,9 @@ fn instances_are_found_through_the_top_level() {
             let (o, d) = in_object(i);
             closest(geometry.triangles.iter().filter_map(|t| hit(t, o, d)))
         };
-        let found = &mut f64::INFINITY;
-        traverse(&nodes, top, origin, direction, &mut |i| *found = found.min(nearest(&instances[i as usize])));
-        assert_eq!(*found, closest(instances.iter().map(nearest)));
+        let mut found = f64::INFINITY;
+        traverse(&nodes, top, origin, direction, &mut |i| found = found.min(nearest(&instances[i as usize])));
+        assert_eq!(found, closest(instances.iter().map(nearest)));
     }
 }
 

@@ -1,0 +1,155 @@
+//! `tallow compare`: how far an image is from its reference.
+use super::{Exit, complain, finite, print, print_json};
+use crate::error::{Error, Result};
+use crate::image::difference::{WIDER, heat_map};
+use crate::image::metrics::{self, Metrics};
+use crate::image::{self, Film, Picture, WriteOptions};
+use crate::report::table;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Compare an image with its reference: MSE, relMSE, PSNR, SSIM and FLIP
+///
+/// MSE and relMSE, the mean of (a - b)^2 / (b^2 + 0.01), are taken on linear values; PSNR (peak 1), SSIM and FLIP on
+/// the sRGB-encoded images cut to [0, 1].
+#[derive(clap::Args)]
+pub struct Args {
+    /// Image to judge (EXR, PNG, JPEG or HDR)
+    a: PathBuf,
+    /// Its reference
+    b: PathBuf,
+    /// Layer to compare, such as albedo, N or Z [default: the colour]
+    #[arg(long, value_name = "NAME")]
+    layer: Option<String>,
+    /// Write |A - B| in false colours to a .png
+    #[arg(long, value_name = "FILE")]
+    diff: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    limits: Limits,
+}
+
+/// What each limit does when it is passed: a line on stderr, and exit code 1.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Limits (exit code 1 when exceeded)")]
+struct Limits {
+    /// Largest mean squared error
+    #[arg(long, value_name = "N", value_parser = finite)]
+    max_mse: Option<f64>,
+    /// Largest relative mean squared error
+    #[arg(long, value_name = "N", value_parser = finite)]
+    max_relmse: Option<f64>,
+    /// Largest mean FLIP error, 0 to 1
+    #[arg(long, value_name = "N", value_parser = finite)]
+    max_flip: Option<f64>,
+    /// Smallest peak signal-to-noise ratio in dB
+    #[arg(long, value_name = "DB", value_parser = finite)]
+    min_psnr: Option<f64>,
+    /// Smallest structural similarity, up to 1
+    #[arg(long, value_name = "N", value_parser = finite)]
+    min_ssim: Option<f64>,
+}
+
+/// Runs the subcommand.
+///
+/// # Errors
+/// When a file cannot be read or written, has no such layer, holds NaN or infinities, or sizes differ.
+pub fn run(args: &Args) -> Result<Exit> {
+    if let Some(diff) = &args.diff {
+        check_diff_path(diff)?;
+    }
+    let (a, b) = (load(&args.a, args.layer.as_deref())?, load(&args.b, args.layer.as_deref())?);
+    check_sizes(args, &a, &b)?;
+    let metrics = metrics::compare(&a, &b);
+    let exceeded = args.limits.exceeded(&metrics)?;
+    let scale = args.diff.as_ref().map(|path| write_diff(path, &a, &b)).transpose()?;
+    report(args, &metrics, scale, &exceeded)?;
+    for line in &exceeded {
+        complain(line);
+    }
+    Ok(if exceeded.is_empty() { Exit::Done } else { Exit::LimitExceeded })
+}
+
+fn check_diff_path(path: &Path) -> Result<()> {
+    match path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
+        true => image::check_writable(path),
+        false => Err(Error::Usage(format!("--diff {}: the error map is a .png", path.display()))),
+    }
+}
+
+fn load(path: &Path, layer: Option<&str>) -> Result<Picture> {
+    let picture = image::read(path)?.picture(layer).map_err(|what| Error::input(path, what))?;
+    match picture.non_finite() {
+        0 => Ok(picture),
+        n => Err(Error::input(
+            path,
+            format!("{n} of {} pixels are NaN or infinite, which no metric can weigh", picture.pixels.len()),
+        )),
+    }
+}
+
+fn check_sizes(args: &Args, a: &Picture, b: &Picture) -> Result<()> {
+    if (a.width, a.height) == (b.width, b.height) {
+        return Ok(());
+    }
+    let size = |p: &Picture| format!("{}x{}", p.width, p.height);
+    let what = format!("is {}, but {} is {}: compare images of one size", size(a), args.b.display(), size(b));
+    Err(Error::input(&args.a, what))
+}
+
+impl Limits {
+    fn exceeded(&self, m: &Metrics) -> Result<Vec<String>> {
+        if self.min_ssim.is_some() && m.ssim.is_none() {
+            return Err(Error::Usage("--min-ssim needs images of at least 11x11 pixels".to_owned()));
+        }
+        let upper =
+            [("mse", m.mse, self.max_mse), ("relmse", m.relmse, self.max_relmse), ("flip", m.flip, self.max_flip)];
+        let lower = [("psnr", m.psnr, self.min_psnr), ("ssim", m.ssim.unwrap_or(1.0), self.min_ssim)];
+        let above = upper.into_iter().filter_map(|(name, value, limit)| {
+            limit
+                .filter(|&l| value > l)
+                .map(|l| format!("limit exceeded: {name} {value:.4e} is above --max-{name} {l}"))
+        });
+        let below = lower.into_iter().filter_map(|(name, value, limit)| {
+            limit.filter(|&l| value < l).map(|l| format!("limit exceeded: {name} {value:.4} is below --min-{name} {l}"))
+        });
+        Ok(above.chain(below).collect())
+    }
+}
+
+/// Returns the value at the top of the colour scale.
+fn write_diff(path: &Path, a: &Picture, b: &Picture) -> Result<f32> {
+    let (map, top) = heat_map(a, b);
+    let mut film = Film::new(a.width + WIDER, a.height);
+    film.add_vec3("", ["R", "G", "B"], &map.pixels);
+    image::write(path, &film, &WriteOptions::default())?;
+    Ok(top)
+}
+
+fn report(args: &Args, m: &Metrics, scale: Option<f32>, exceeded: &[String]) -> Result<()> {
+    if args.json {
+        let diff = args.diff.as_ref().zip(scale).map(|(path, top)| json!({ "file": path, "scale": [0.0, top] }));
+        let (a, b, layer) = (&args.a, &args.b, &args.layer);
+        return print_json(
+            &json!({ "a": a, "b": b, "layer": layer, "metrics": m, "diff": diff, "exceeded": exceeded }),
+        );
+    }
+    let ssim = m.ssim.map_or("- (under 11x11 pixels)".to_owned(), |s| format!("{s:.6}"));
+    let rows = [
+        ("MSE", format!("{:.6e}", m.mse)),
+        ("relMSE", format!("{:.6e}", m.relmse)),
+        ("PSNR", format!("{:.3} dB", m.psnr)),
+        ("SSIM", ssim),
+        ("FLIP", format!("{:.6}", m.flip)),
+    ];
+    print(&table::text(&["metric", "value"], &rows.map(|(name, value)| vec![name.to_owned(), value])))?;
+    match args.diff.as_ref().zip(scale) {
+        Some((path, top)) => print(&format!(
+            "{}: |A - B|, mean of the channels; black is 0, the palest colour {top:.6} and above\n",
+            path.display()
+        )),
+        None => Ok(()),
+    }
+}

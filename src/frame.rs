@@ -1,0 +1,155 @@
+//! One frame, in the order the GPU runs it, and the buffers it runs over. `P` pixels, `B` paths in flight.
+use crate::error::Result;
+use crate::gpu::layout::*;
+use crate::gpu::{Buffer, Gpu, Location, Recorder};
+use crate::scene::Scene;
+use crate::stage::{fold, guide, path};
+use std::borrow::Cow;
+
+/// The kernels of a frame, specialised for one scene.
+pub struct Stages {
+    /// Primary hits at pixel centres.
+    pub guide: guide::Guides,
+    /// Paths.
+    pub path: path::Path,
+    /// Statistics.
+    pub fold: fold::Fold,
+}
+
+/// A rectangle of work: some samples of a run of pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Batch {
+    /// Row-major index.
+    pub first_pixel: u32,
+    /// At least 1.
+    pub pixels: u32,
+    /// Index in each pixel's sequence.
+    pub first_sample: u32,
+    /// At least 1.
+    pub samples: u32,
+}
+
+/// Records the primary hits: once per camera.
+pub fn record_guide(rec: &mut Recorder, st: &Stages, s: &DeviceScene, f: &FilmBuffers, push: &PathPush) -> Result<()> {
+    st.guide.record(rec, s, &f.guide, push) //              camera  -> guide[P]
+}
+
+/// Records one batch of paths.
+pub fn record_batch(
+    rec: &mut Recorder,
+    st: &Stages,
+    s: &DeviceScene,
+    f: &FilmBuffers,
+    push: &PathPush,
+    batch: &Batch,
+) -> Result<()> {
+    st.path.record(rec, s, f, push, batch)?; //             batch   -> samples[B]
+    st.fold.record(rec, f, batch) //                        samples -> stats[P], light[P]
+}
+
+/// The scene on the device. Absent parts are buffers of one element that no kernel reads.
+pub struct DeviceScene {
+    /// See [`Scene::nodes`]; likewise the others.
+    pub nodes: Buffer<BvhNode>,
+    /// See [`Scene`].
+    pub triangles: Buffer<Triangle>,
+    /// See [`Scene`].
+    pub shading: Buffer<Shading>,
+    /// See [`Scene`].
+    pub instances: Buffer<Instance>,
+    /// See [`Scene`].
+    pub materials: Buffer<Material>,
+    /// See [`Scene`].
+    pub textures: Buffer<Texture>,
+    /// See [`Scene`].
+    pub texels: Buffer<u32>,
+    /// See [`Scene`].
+    pub lights: Buffer<Light>,
+    /// See [`Scene`].
+    pub light_table: Buffer<AliasEntry>,
+    /// See [`crate::scene::Environment`].
+    pub environment: Buffer<vec4>,
+    /// See [`crate::scene::Environment`].
+    pub environment_table: Buffer<AliasEntry>,
+}
+
+impl DeviceScene {
+    /// Copies `scene` to the device, for kernels with these effects.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when it does not fit.
+    pub fn new(gpu: &Gpu, scene: &Scene, effects: &Effects) -> Result<Self> {
+        let environment = scene.environment.as_ref();
+        Ok(Self {
+            nodes: Buffer::from_slice(gpu, "nodes", &scene.nodes)?,
+            triangles: Buffer::from_slice(gpu, "triangles", &scene.triangles)?,
+            shading: Buffer::from_slice(gpu, "shading", &shading(scene, effects))?,
+            instances: Buffer::from_slice(gpu, "instances", &scene.instances)?,
+            materials: Buffer::from_slice(gpu, "materials", &scene.materials)?,
+            textures: Buffer::from_slice(gpu, "textures", &scene.textures)?,
+            texels: Buffer::from_slice(gpu, "texels", &scene.texels)?,
+            lights: Buffer::from_slice(gpu, "lights", &scene.lights)?,
+            light_table: Buffer::from_slice(gpu, "light_table", &scene.light_table)?,
+            environment: Buffer::from_slice(gpu, "environment", environment.map_or(&[], |e| &e.texels[..]))?,
+            environment_table: Buffer::from_slice(gpu, "environment_table", environment.map_or(&[], |e| &e.table[..]))?,
+        })
+    }
+
+    /// Bytes of each part, largest first.
+    pub fn sizes(&self) -> Vec<(&'static str, u64)> {
+        let mut sizes = vec![
+            ("nodes", self.nodes.raw().size),
+            ("triangles", self.triangles.raw().size),
+            ("shading", self.shading.raw().size),
+            ("instances", self.instances.raw().size),
+            ("materials", self.materials.raw().size),
+            ("textures", self.textures.raw().size),
+            ("texels", self.texels.raw().size),
+            ("lights", self.lights.raw().size + self.light_table.raw().size),
+            ("environment", self.environment.raw().size + self.environment_table.raw().size),
+        ];
+        sizes.sort_by_key(|s| std::cmp::Reverse(s.1));
+        sizes
+    }
+}
+
+/// The scene's own records, or flat ones where kernels read what the scene does not have (`--effects all`).
+fn shading<'a>(scene: &'a Scene, effects: &Effects) -> Cow<'a, [Shading]> {
+    let read = effects.smooth_normals || effects.textures || effects.bump_maps || effects.normal_maps;
+    if read && scene.shading.is_empty() {
+        return vec![Shading { normal: [u32::MAX; 3], ..Shading::default() }; scene.triangles.len()].into();
+    }
+    Cow::Borrowed(&scene.shading)
+}
+
+/// What a frame writes. Buffers that the outputs do not call for hold one element.
+pub struct FilmBuffers {
+    /// vec3 per sample in flight, three with direct and indirect light apart; overwritten by every batch.
+    pub samples: Buffer<vec3>,
+    /// Per pixel.
+    pub stats: Buffer<PixelStats>,
+    /// Per pixel, where direct and indirect light are wanted apart.
+    pub light: Buffer<PixelLight>,
+    /// Per pixel, where guides are wanted.
+    pub guide: Buffer<Guide>,
+    /// Closest-hit rays, any-hit rays, nodes visited: pairs of words, low first.
+    pub counters: Buffer<u32>,
+}
+
+impl FilmBuffers {
+    /// Room for `pixels` pixels and `paths` paths in flight.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when it does not fit.
+    pub fn new(gpu: &Gpu, pixels: usize, paths: usize, effects: &Effects, guides: bool) -> Result<Self> {
+        let at = Location::Device;
+        let wanted = |on: bool, n: usize| if on { n } else { 1 };
+        Ok(Self {
+            samples: Buffer::new(gpu, "samples", paths * if effects.split_light { 3 } else { 1 }, at)?,
+            stats: Buffer::new(gpu, "stats", pixels, at)?,
+            light: Buffer::new(gpu, "light", wanted(effects.split_light, pixels), at)?,
+            guide: Buffer::new(gpu, "guide", wanted(guides, pixels), at)?,
+            counters: Buffer::from_slice(gpu, "counters", &[0; 6])?,
+        })
+    }
+}

@@ -1,0 +1,49 @@
+//! A picture of where two pictures differ.
+use super::film::Picture;
+
+/// Columns of the scale bar and of the gap before it.
+const BAR: usize = 12;
+const GAP: usize = 4;
+
+/// Mean over the channels of `|test - reference|`, linear, in the colour map magma (perceptually uniform; the one that
+/// FLIP uses), with the scale as a bar at the right edge, 0 at its foot.
+///
+/// Returns the picture, [`WIDER`] columns wider than its arguments, and the value at the top of the scale: the 99.9th
+/// percentile of the differences that are not 0, so that a few fireflies do not hide the rest; those above are cut.
+///
+/// # Panics
+/// When the sizes differ.
+pub fn heat_map(test: &Picture, reference: &Picture) -> (Picture, f32) {
+    assert_eq!((test.width, test.height), (reference.width, reference.height), "pictures of one size");
+    let error = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).map(|c| (a[c] - b[c]).abs()).sum::<f32>() / 3.0;
+    let errors: Vec<f32> = test.pixels.iter().zip(&reference.pixels).map(error).collect();
+    let top = scale_top(&errors);
+    let magma = magma();
+    let colour = |fraction: f32| magma[(fraction * 255.0).round().min(255.0) as usize];
+    let (width, height) = (test.width as usize, test.height as usize);
+    let mut pixels = Vec::with_capacity((width + GAP + BAR) * height);
+    for (y, row) in errors.chunks_exact(width).enumerate() {
+        pixels.extend(row.iter().map(|e| colour(e / top)));
+        pixels.extend([[1.0; 3]; GAP]);
+        pixels.extend([colour((height - 1 - y) as f32 / (height - 1).max(1) as f32); BAR]);
+    }
+    (Picture { width: test.width + WIDER, height: test.height, pixels }, top)
+}
+
+/// Columns that [`heat_map`] adds.
+pub const WIDER: u32 = (BAR + GAP) as u32;
+
+/// 1 when nothing differs.
+fn scale_top(errors: &[f32]) -> f32 {
+    let mut some: Vec<f32> = errors.iter().copied().filter(|&e| e > 0.0).collect();
+    some.sort_by(f32::total_cmp);
+    let last = some.len().saturating_sub(1);
+    some.get(last - last / 1000).copied().unwrap_or(1.0)
+}
+
+/// 256 linear colours from black through purple and orange to pale yellow.
+fn magma() -> Vec<[f32; 3]> {
+    let codes = nv_flip::magma_lut().to_vec();
+    let linear = |c: u8| super::tone::linear_from_srgb(f32::from(c) / 255.0);
+    codes.chunks_exact(3).map(|c| [linear(c[0]), linear(c[1]), linear(c[2])]).collect()
+}

@@ -1,0 +1,192 @@
+//! What a render returns and what an image file holds: planes of samples under dotted names, as EXR has them.
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The samples of one channel, row-major, row 0 at the top.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Samples {
+    /// Radiance, distances, directions.
+    F32(Vec<f32>),
+    /// Counts and indices.
+    U32(Vec<u32>),
+}
+
+/// One plane of a [`Film`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Channel {
+    /// Layer and component, `direct.R`; the colour itself is `R`, `G`, `B` without a layer.
+    pub name: String,
+    /// `width * height` values.
+    pub samples: Samples,
+}
+
+/// A picture with named layers.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Film {
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// In the order they were added.
+    pub channels: Vec<Channel>,
+    /// Named texts: scene, settings, seed, device... In EXR files the attributes `tallow:scene` and so on; of files of
+    /// other programs, their text attributes.
+    pub metadata: BTreeMap<String, String>,
+}
+
+/// Three values per pixel: what metrics, PNG and HDR work on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// `width * height`, row-major, row 0 at the top. Colours are linear Rec. 709.
+    pub pixels: Vec<[f32; 3]>,
+}
+
+impl Picture {
+    /// Pixels with a NaN or an infinity in any component.
+    pub fn non_finite(&self) -> usize {
+        self.pixels.iter().filter(|p| !p.iter().all(|v| v.is_finite())).count()
+    }
+}
+
+impl Film {
+    /// An empty film.
+    pub fn new(width: u32, height: u32) -> Self {
+        Self { width, height, ..Self::default() }
+    }
+
+    /// Pixels.
+    pub fn pixels(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// Adds one channel.
+    ///
+    /// # Panics
+    /// When the number of samples is not that of the pixels.
+    pub fn add(&mut self, name: impl Into<String>, samples: Samples) {
+        let (name, len) = (name.into(), samples.len());
+        assert_eq!(len, self.pixels(), "channel {name}: one sample per pixel");
+        self.channels.push(Channel { name, samples });
+    }
+
+    /// Adds three channels, such as `direct.R`, `direct.G`, `direct.B` for the layer `direct` with components `RGB`.
+    /// The empty layer is the colour itself.
+    ///
+    /// # Panics
+    /// When the number of values is not that of the pixels.
+    pub fn add_vec3(&mut self, layer: &str, components: [&str; 3], values: &[[f32; 3]]) {
+        for (i, component) in components.iter().enumerate() {
+            let name = if layer.is_empty() { (*component).to_owned() } else { format!("{layer}.{component}") };
+            self.add(name, Samples::F32(values.iter().map(|v| v[i]).collect()));
+        }
+    }
+
+    /// The channel of this exact name.
+    pub fn channel(&self, name: &str) -> Option<&Samples> {
+        self.channels.iter().find(|c| c.name == name).map(|c| &c.samples)
+    }
+
+    /// Every layer name, sorted; the colour without a layer is the empty name.
+    pub fn layers(&self) -> BTreeSet<&str> {
+        self.channels.iter().map(|c| split(&c.name).0).collect()
+    }
+
+    /// Three values per pixel of one layer, of its R, G, B or X, Y, Z, or its only channel three times.
+    ///
+    /// Without a name it is the colour: the channels R, G, B, or what other programs call it (`ViewLayer.Combined`,
+    /// `rgba`), or the only layer with R, G, B, or grey (Y). A name matches ignoring case, in full or by its last part.
+    ///
+    /// # Errors
+    /// When there is no such layer, or more than one; lists those there are.
+    pub fn picture(&self, layer: Option<&str>) -> Result<Picture, String> {
+        let planes = match layer {
+            None => self.colour_planes(),
+            Some(name) => self.layer_planes(name),
+        };
+        let planes = planes.ok_or_else(|| self.no_such_layer(layer))?;
+        let [a, b, c] = planes.map(Samples::to_f32);
+        let pixels = a.iter().zip(&b).zip(&c).map(|((&a, &b), &c)| [a, b, c]).collect();
+        Ok(Picture { width: self.width, height: self.height, pixels })
+    }
+
+    fn no_such_layer(&self, layer: Option<&str>) -> String {
+        let wanted = layer.map_or("no colour (R, G, B)".to_owned(), |name| format!("no single layer {name:?}"));
+        let names: Vec<_> = self.channels.iter().map(|c| c.name.as_str()).collect();
+        format!("holds {wanted}; its channels are {}", names.join(", "))
+    }
+
+    fn colour_planes(&self) -> Option<[&Samples; 3]> {
+        const USUAL: [&str; 6] = ["", "combined", "beauty", "rgba", "rgb", "color"];
+        let coloured: Vec<_> =
+            self.layers().into_iter().filter(|l| self.triple(l, ["R", "G", "B"]).is_some()).collect();
+        let usual = |l: &&&str| USUAL.contains(&split(l).1.to_lowercase().as_str());
+        let only = || coloured.first().filter(|_| coloured.len() == 1);
+        match coloured.iter().find(usual).or_else(only) {
+            Some(layer) => self.triple(layer, ["R", "G", "B"]),
+            None => self.channel("Y").map(|grey| [grey; 3]),
+        }
+    }
+
+    fn layer_planes(&self, wanted: &str) -> Option<[&Samples; 3]> {
+        let same = |name: &str| name.eq_ignore_ascii_case(wanted) || split(name).1.eq_ignore_ascii_case(wanted);
+        let found: Vec<_> = self.layers().into_iter().filter(|l| !l.is_empty() && same(l)).collect();
+        let exact = found.iter().find(|l| **l == wanted);
+        let only = || found.first().filter(|_| found.len() == 1);
+        match exact.or_else(only) {
+            Some(layer) => self
+                .triple(layer, ["R", "G", "B"])
+                .or_else(|| self.triple(layer, ["X", "Y", "Z"]))
+                .or_else(|| self.grey(|c| split(&c.name).0 == *layer && split(&c.name).1 != "A")),
+            None => self.grey(|c| c.name.eq_ignore_ascii_case(wanted)),
+        }
+    }
+
+    /// The only channel that passes the test, three times.
+    fn grey(&self, test: impl Fn(&&Channel) -> bool) -> Option<[&Samples; 3]> {
+        let mut channels = self.channels.iter().filter(test);
+        match (channels.next(), channels.next()) {
+            (Some(only), None) => Some([&only.samples; 3]),
+            _ => None,
+        }
+    }
+
+    fn triple(&self, layer: &str, components: [&str; 3]) -> Option<[&Samples; 3]> {
+        let plane = |component: &str| {
+            let is = |c: &&Channel| split(&c.name).0 == layer && split(&c.name).1.eq_ignore_ascii_case(component);
+            self.channels.iter().find(is).map(|c| &c.samples)
+        };
+        let [a, b, c] = components.map(plane);
+        Some([a?, b?, c?])
+    }
+}
+
+impl Samples {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::F32(v) => v.len(),
+            Self::U32(v) => v.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// As floats; counts above 2^24 are rounded.
+    pub fn to_f32(&self) -> Vec<f32> {
+        match self {
+            Self::F32(v) => v.clone(),
+            Self::U32(v) => v.iter().map(|&u| u as f32).collect(),
+        }
+    }
+}
+
+/// Layer and component of a channel name: `a.b.R` is (`a.b`, `R`), `Z` is (``, `Z`).
+fn split(name: &str) -> (&str, &str) {
+    name.rsplit_once('.').unwrap_or(("", name))
+}

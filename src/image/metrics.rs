@@ -1,0 +1,70 @@
+//! How far a picture is from its reference. Sums run over all pixels and channels in `f64`.
+use super::film::Picture;
+use super::tone::srgb_from_linear;
+use serde::Serialize;
+
+/// In the denominator of relMSE, so that black reference pixels do not divide by 0.
+const RELMSE_EPSILON: f64 = 0.01;
+
+/// Every metric of one comparison.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Metrics {
+    /// Mean of `(a - b)^2`, linear.
+    pub mse: f64,
+    /// Mean of `(a - b)^2 / (b^2 + 0.01)`, linear; `b` is the reference.
+    pub relmse: f64,
+    /// `-10 log10(MSE)` in dB of the sRGB-encoded pictures cut to [0, 1], so the peak is 1; infinite when they are equal.
+    pub psnr: f64,
+    /// Mean structural similarity of the sRGB-encoded pictures; none when an edge is under 11 pixels.
+    pub ssim: Option<f64>,
+    /// Mean FLIP error of the 8-bit sRGB pictures, 0 to 1.
+    pub flip: f64,
+}
+
+/// Compares `test` with `reference`.
+///
+/// # Panics
+/// When their sizes differ.
+pub fn compare(test: &Picture, reference: &Picture) -> Metrics {
+    assert_eq!((test.width, test.height), (reference.width, reference.height), "pictures of one size");
+    Metrics {
+        mse: mean(test, reference, |a, b| (a - b) * (a - b)),
+        relmse: mean(test, reference, |a, b| (a - b) * (a - b) / (b * b + RELMSE_EPSILON)),
+        psnr: psnr(test, reference),
+        ssim: ssim(test, reference),
+        flip: flip(test, reference),
+    }
+}
+
+fn values(picture: &Picture) -> impl Iterator<Item = f32> + '_ {
+    picture.pixels.iter().flatten().copied()
+}
+
+fn mean(test: &Picture, reference: &Picture, error: impl Fn(f64, f64) -> f64) -> f64 {
+    let sum: f64 = values(test).zip(values(reference)).map(|(a, b)| error(a.into(), b.into())).sum();
+    sum / (3 * test.pixels.len()) as f64
+}
+
+fn psnr(test: &Picture, reference: &Picture) -> f64 {
+    let shown = |v: f64| f64::from(srgb_from_linear(v as f32));
+    -10.0 * mean(test, reference, |a, b| (shown(a) - shown(b)).powi(2)).log10()
+}
+
+/// Wang, Bovik, Sheikh and Simoncelli 2004: Gaussian window of 11x11 pixels and standard deviation 1.5, K1 = 0.01,
+/// K2 = 0.03, mean over all windows inside the picture and over R, G, B. scikit-image returns the same with
+/// `gaussian_weights=True, sigma=1.5, use_sample_covariance=False`.
+fn ssim(test: &Picture, reference: &Picture) -> Option<f64> {
+    let codes = |p: &Picture| values(p).map(|v| (srgb_from_linear(v) * 65_535.0).round() as u16).collect();
+    let image = |p: &Picture| iqa::Image::srgb16(p.width, p.height, codes(p));
+    // The crate's only error left is a picture smaller than its window.
+    iqa::ssim(&image(reference).ok()?, &image(test).ok()?, iqa::SsimOptions::default()).ok()
+}
+
+/// Andersson et al. 2020, "FLIP: A Difference Evaluator for Alternating Images", at its default of 67 pixels per degree
+/// (a 4K screen of 0.7 m width seen from 0.7 m).
+fn flip(test: &Picture, reference: &Picture) -> f64 {
+    let codes = |p: &Picture| -> Vec<u8> { values(p).map(|v| (srgb_from_linear(v) * 255.0).round() as u8).collect() };
+    let image = |p: &Picture| nv_flip::FlipImageRgb8::with_data(p.width, p.height, &codes(p));
+    let map = nv_flip::flip(image(reference), image(test), nv_flip::DEFAULT_PIXELS_PER_DEGREE).to_vec();
+    map.iter().map(|&e| f64::from(e)).sum::<f64>() / map.len() as f64
+}

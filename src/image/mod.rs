@@ -1,0 +1,135 @@
+//! Pictures and files: a [`Film`] of named channels, its readers and writers, and the metrics between two of them.
+pub mod difference;
+mod exr;
+mod film;
+pub mod metrics;
+pub mod output;
+mod photo;
+pub mod tone;
+
+use crate::error::{Error, Result};
+pub use film::{Channel, Film, Picture, Samples};
+use std::cell::Cell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use tone::ToneMap;
+
+/// How radiance becomes what a PNG stores. EXR and HDR files hold radiance as it is and ignore both.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WriteOptions {
+    /// In stops: radiance is multiplied by 2 to this power.
+    pub exposure: f32,
+    /// Curve between exposure and the sRGB transfer function.
+    pub tone_map: ToneMap,
+}
+
+#[derive(Clone, Copy)]
+enum Format {
+    Exr,
+    Png,
+    Hdr,
+}
+
+fn format_of(path: &Path) -> Result<Format> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    match extension.as_str() {
+        "exr" => Ok(Format::Exr),
+        "png" => Ok(Format::Png),
+        "hdr" => Ok(Format::Hdr),
+        _ => Err(Error::Usage(format!(
+            "{}: an image file ends in .exr (all layers), .png or .hdr (colour only)",
+            path.display()
+        ))),
+    }
+}
+
+/// Writes a film in the format its extension names: `.exr` holds every channel and the metadata, `.png` (8-bit sRGB)
+/// and `.hdr` (Radiance RGBE, negative values as 0) the colour alone.
+///
+/// The file appears complete or not at all (see [`output::write`]).
+///
+/// # Errors
+/// [`Error::Usage`] for another extension, [`Error::Output`] when the film has no colour or the file cannot be written.
+pub fn write(path: &Path, film: &Film, options: &WriteOptions) -> Result<()> {
+    let colour = || film.picture(None).map_err(|what| Error::output(path, what));
+    let bytes = match format_of(path)? {
+        Format::Exr => exr::encode(film),
+        Format::Png => photo::encode_png(&colour()?, options),
+        Format::Hdr => photo::encode_hdr(&colour()?),
+    };
+    output::write(path, &bytes.map_err(|what| Error::output(path, what))?)
+}
+
+/// Checks before a long render that [`write`] has a known extension and a folder it may write in.
+///
+/// # Errors
+/// As [`write`].
+pub fn check_writable(path: &Path) -> Result<()> {
+    format_of(path)?;
+    output::check(path)
+}
+
+/// Reads an EXR, PNG, JPEG or HDR file, told apart by content, into linear Rec. 709.
+///
+/// # Errors
+/// [`Error::Input`] when the file cannot be read, is of another kind, or is damaged.
+pub fn read(path: &Path) -> Result<Film> {
+    let about = |e: std::io::Error| Error::input(path, format!("cannot be read: {e}"));
+    if std::fs::metadata(path).map_err(about)?.is_dir() {
+        return Err(Error::input(path, "is a folder: name an image file"));
+    }
+    decode(&std::fs::read(path).map_err(about)?).map_err(|what| Error::input(path, what))
+}
+
+/// More 32-bit samples than this, 4 GiB of them, are refused.
+const MAX_SAMPLES: u64 = 1 << 30;
+
+/// Refuses a header that asks for more samples than `ratio` times the bytes of its file: it is damaged, and must not make
+/// us allocate them.
+fn check_claim(samples: u64, file_len: usize, ratio: u64) -> std::result::Result<(), String> {
+    match samples > MAX_SAMPLES.min(ratio.saturating_mul(file_len as u64)) {
+        true => {
+            Err(format!("claims {samples} samples, more than a file of {file_len} bytes can hold; is it complete?"))
+        }
+        false => Ok(()),
+    }
+}
+
+/// [`read`] for a file that is already in memory.
+///
+/// # Errors
+/// What is wrong with the data, in one line.
+pub fn decode(bytes: &[u8]) -> std::result::Result<Film, String> {
+    const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+    let decoder = if bytes.starts_with(&EXR_MAGIC) { exr::decode } else { photo::decode };
+    contained(|| decoder(bytes)).map_err(|what| what.replace('\n', " "))
+}
+
+thread_local! {
+    static DECODING: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Whether this thread is inside a decoder, whose panics are caught and become errors: a panic hook keeps silent then.
+pub fn is_decoding() -> bool {
+    DECODING.get()
+}
+
+/// The decoders are other people's, and some assert what a damaged file may break (exr 1.74: the level of a tile, sums
+/// in B44 blocks). They keep no state between calls, so that nothing is left broken behind an unwound one.
+fn contained<T>(decode: impl FnOnce() -> std::result::Result<T, String>) -> std::result::Result<T, String> {
+    DECODING.set(true);
+    let result = catch_unwind(AssertUnwindSafe(decode));
+    DECODING.set(false);
+    result.unwrap_or_else(|_| Err("cannot be decoded: its data contradict its header; is it complete?".to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{contained, is_decoding};
+
+    #[test]
+    fn a_panic_in_a_decoder_is_an_error() {
+        let line = contained(|| -> Result<(), String> { panic!("planted: {}", is_decoding()) }).unwrap_err();
+        assert!(line.contains("contradict") && !is_decoding());
+    }
+}

@@ -1,0 +1,112 @@
+//! Text tables, and the one of the passes of a render.
+use crate::gpu::PassTime;
+use serde::Serialize;
+
+/// All calls of one pass.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PassRow {
+    /// Name of the pass.
+    pub pass: &'static str,
+    /// How often it ran.
+    pub calls: usize,
+    /// Median duration; the lower one of the middle two when there are two.
+    pub median_ms: f64,
+    /// Longest duration.
+    pub max_ms: f64,
+    /// Its part of the time of all passes, 0 to 1.
+    pub share: f64,
+}
+
+/// One row per pass, in the order in which they first ran.
+pub fn summarise(times: &[PassTime]) -> Vec<PassRow> {
+    let mut passes: Vec<(&'static str, Vec<u64>)> = Vec::new();
+    for time in times {
+        let duration = time.end_ns.saturating_sub(time.begin_ns);
+        match passes.iter_mut().find(|(name, _)| *name == time.name) {
+            Some((_, durations)) => durations.push(duration),
+            None => passes.push((time.name, vec![duration])),
+        }
+    }
+    let total: u64 = passes.iter().flat_map(|(_, durations)| durations).sum();
+    passes.into_iter().map(|(name, durations)| row(name, durations, total)).collect()
+}
+
+fn row(pass: &'static str, mut durations: Vec<u64>, total: u64) -> PassRow {
+    durations.sort_unstable();
+    let ms = |ns: u64| ns as f64 * 1e-6;
+    PassRow {
+        pass,
+        calls: durations.len(),
+        median_ms: ms(durations[(durations.len() - 1) / 2]),
+        max_ms: ms(durations[durations.len() - 1]),
+        share: durations.iter().sum::<u64>() as f64 / total.max(1) as f64,
+    }
+}
+
+/// The rows as text.
+pub fn timing_table(rows: &[PassRow]) -> String {
+    let cells = |r: &PassRow| {
+        let share = format!("{:.1} %", 100.0 * r.share);
+        vec![r.pass.to_owned(), r.calls.to_string(), milliseconds(r.median_ms), milliseconds(r.max_ms), share]
+    };
+    text(&["pass", "calls", "median ms", "max ms", "share"], &rows.iter().map(cells).collect::<Vec<_>>())
+}
+
+/// Three digits after the point, as the clocks of GPUs resolve about a microsecond.
+pub fn milliseconds(ms: f64) -> String {
+    format!("{ms:.3}")
+}
+
+/// Aligned columns under a header; a column whose cells all start with a digit or a dash is set flush right. Every line
+/// ends in a newline.
+pub fn text(header: &[&str], rows: &[Vec<String>]) -> String {
+    let is_number = |cell: &String| cell.starts_with(|c: char| c.is_ascii_digit() || c == '-');
+    let column = |i: usize| rows.iter().map(move |r| &r[i]);
+    let layout: Vec<(usize, bool)> = (0..header.len())
+        .map(|i| {
+            let width = column(i).map(|c| c.chars().count()).chain([header[i].chars().count()]).max();
+            (width.unwrap_or(0), !rows.is_empty() && column(i).all(is_number))
+        })
+        .collect();
+    let header: Vec<String> = header.iter().map(|h| (*h).to_owned()).collect();
+    [header].iter().chain(rows).map(|cells| line(cells, &layout)).collect()
+}
+
+fn line(cells: &[String], layout: &[(usize, bool)]) -> String {
+    let cell = |(cell, &(width, right)): (&String, &(usize, bool))| match right {
+        true => format!("{cell:>width$}"),
+        false => format!("{cell:<width$}"),
+    };
+    let joined = cells.iter().zip(layout).map(cell).collect::<Vec<_>>().join("  ");
+    format!("{}\n", joined.trim_end())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn times(durations: &[(&'static str, u64)]) -> Vec<PassTime> {
+        durations.iter().map(|&(name, ns)| PassTime { name, begin_ns: 1_000, end_ns: 1_000 + ns }).collect()
+    }
+
+    #[test]
+    fn rows_are_medians_maxima_and_shares_in_order_of_first_call() {
+        let ms = 1_000_000;
+        let rows = summarise(&times(&[("path", 5 * ms), ("fold", ms), ("path", 3 * ms), ("path", 11 * ms)]));
+        let path = PassRow { pass: "path", calls: 3, median_ms: 5.0, max_ms: 11.0, share: 0.95 };
+        let fold = PassRow { pass: "fold", calls: 1, median_ms: 1.0, max_ms: 1.0, share: 0.05 };
+        assert_eq!(rows, [path, fold]);
+    }
+
+    #[test]
+    fn a_clock_that_runs_backwards_and_no_passes_at_all_are_survived() {
+        assert_eq!(summarise(&[PassTime { name: "odd", begin_ns: 9, end_ns: 3 }])[0].max_ms, 0.0);
+        assert_eq!(timing_table(&summarise(&[])), "pass  calls  median ms  max ms  share\n");
+    }
+
+    #[test]
+    fn numbers_are_flush_right_and_words_flush_left() {
+        let rows = [vec!["a".to_owned(), "7".to_owned()], vec!["long".to_owned(), "123".to_owned()]];
+        assert_eq!(text(&["name", "n"], &rows), "name    n\na       7\nlong  123\n");
+    }
+}

@@ -1,0 +1,143 @@
+//! The command line through the built program: exit codes, and one readable line for what goes wrong.
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use tallow::image::{self, Film, WriteOptions};
+use tempfile::TempDir;
+
+fn tallow(folder: &TempDir, words: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_tallow")).args(words).current_dir(folder.path()).output().unwrap()
+}
+
+fn write(folder: &TempDir, name: &str, size: u32, value: f32) -> PathBuf {
+    let mut film = Film::new(size, size);
+    film.add_vec3("", ["R", "G", "B"], &vec![[value, value, 0.5]; film.pixels()]);
+    film.add_vec3("albedo", ["R", "G", "B"], &vec![[0.5; 3]; film.pixels()]);
+    let path = folder.path().join(name);
+    image::write(&path, &film, &WriteOptions::default()).unwrap();
+    path
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+/// Checks the exit code and that stderr is one line which holds all of `parts`.
+#[track_caller]
+fn complains(output: &Output, code: i32, parts: &[&str]) {
+    let text = String::from_utf8(output.stderr.clone()).unwrap();
+    assert_eq!(output.status.code(), Some(code), "{text}");
+    assert_eq!(text.lines().count(), 1, "{text}");
+    assert!(parts.iter().all(|p| text.contains(p)), "{text}");
+}
+
+#[test]
+fn help_lists_the_exit_codes_and_every_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let help = tallow(&folder, &["--help"]);
+    assert_eq!(help.status.code(), Some(0));
+    for word in ["render", "compare", "explain", "devices", "130  interrupted", "3    input"] {
+        assert!(stdout(&help).contains(word), "{word}");
+    }
+    assert!(stdout(&tallow(&folder, &["--version"])).starts_with("tallow "));
+}
+
+#[test]
+fn usage_errors_are_one_line_and_exit_2() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |words: &[&str]| tallow(&folder, words);
+    complains(&run(&[]), 2, &["error: name a command"]);
+    complains(&run(&["compare", "a.exr"]), 2, &["<B>"]);
+    complains(&run(&["compare", "a.exr", "b.exr", "--max-mes", "1"]), 2, &["'--max-mes'", "tip:", "'--max-mse'"]);
+    complains(&run(&["compare", "a.exr", "b.exr", "--max-mse", "nan"]), 2, &["finite"]);
+    complains(&run(&["compare", "a.exr", "b.exr", "--diff", "d.exr"]), 2, &["d.exr", ".png"]);
+    complains(&run(&["render", "s.toml", "-o", "a.tif"]), 2, &["a.tif", ".exr", ".png", ".hdr"]);
+    complains(&run(&["render", "s.toml", "--sampler", "x"]), 2, &["sobol"]);
+    complains(&run(&["render", "s.toml", "--width", "wide"]), 2, &["--width"]);
+}
+
+#[test]
+fn input_errors_name_the_file_and_exit_3() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "a.exr", 12, 0.5);
+    write(&folder, "small.exr", 11, 0.5);
+    write(&folder, "nan.exr", 12, f32::NAN);
+    std::fs::write(folder.path().join("text.png"), "not a picture").unwrap();
+    let compare = |b: &str| tallow(&folder, &["compare", "a.exr", b]);
+    complains(&compare("missing.exr"), 3, &["error: missing.exr", "No such file"]);
+    complains(&compare("."), 3, &["folder"]);
+    complains(&compare("text.png"), 3, &["text.png", "PNG"]);
+    complains(&compare("small.exr"), 3, &["12x12", "11x11"]);
+    complains(&compare("nan.exr"), 3, &["nan.exr", "144 of 144 pixels"]);
+    complains(&tallow(&folder, &["compare", "a.exr", "a.exr", "--layer", "N"]), 3, &["\"N\"", "albedo.R"]);
+    // Control: what is right gives no line.
+    let good = compare("a.exr");
+    assert_eq!((good.status.code(), good.stderr.len()), (Some(0), 0));
+}
+
+#[test]
+fn limits_set_the_exit_code() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "a.exr", 12, 0.5);
+    write(&folder, "b.exr", 12, 0.6);
+    // Two channels of three differ by 0.1: MSE 0.00667.
+    let run = |limit: &[&str]| tallow(&folder, &[&["compare", "a.exr", "b.exr"], limit].concat());
+    complains(&run(&["--max-mse", "0.006"]), 1, &["limit exceeded: mse", "--max-mse 0.006"]);
+    complains(&run(&["--max-relmse", "0.001"]), 1, &["relmse"]);
+    complains(&run(&["--max-flip", "0"]), 1, &["flip"]);
+    complains(&run(&["--min-psnr", "90"]), 1, &["psnr"]);
+    complains(&run(&["--min-ssim", "0.9999"]), 1, &["ssim"]);
+    let within = ["--max-mse", "0.007", "--max-relmse", "1", "--max-flip", "1", "--min-psnr", "5", "--min-ssim", "0.5"];
+    assert_eq!(run(&within).status.code(), Some(0));
+    assert_eq!(run(&["--max-mse", "0", "--layer", "albedo"]).status.code(), Some(0), "the albedo is the same");
+}
+
+#[test]
+fn compare_prints_json_and_writes_the_difference() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "a.exr", 12, 0.5);
+    write(&folder, "b.exr", 12, 0.6);
+    let output = tallow(&folder, &["compare", "a.exr", "b.exr", "--json", "--diff", "d.png"]);
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!((json["metrics"]["mse"].as_f64().unwrap() - 0.02 / 3.0).abs() < 1e-6, "{json}");
+    assert!((json["diff"]["scale"][1].as_f64().unwrap() - 0.2 / 3.0).abs() < 1e-6, "{json}");
+    assert_eq!(image::read(&folder.path().join("d.png")).unwrap().height, 12);
+}
+
+#[test]
+fn output_errors_exit_5_and_the_old_file_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "a.exr", 64, 0.5);
+    complains(&tallow(&folder, &["render", "s.toml", "-o", "missing/a.exr"]), 5, &["missing", "create it"]);
+    complains(&tallow(&folder, &["compare", "a.exr", "a.exr", "--diff", "missing/d.png"]), 5, &["create it"]);
+    #[cfg(target_os = "linux")]
+    full_disk(&folder);
+}
+
+/// A limit of 0 bytes per file stands in for a full disk: the temporary file opens, and writing to it fails.
+#[cfg(target_os = "linux")]
+fn full_disk(folder: &TempDir) {
+    let old = folder.path().join("d.png");
+    std::fs::write(&old, "old").unwrap();
+    let shell = |setup: &str| {
+        let script = format!("{setup} exec \"$0\" compare a.exr a.exr --diff d.png");
+        let mut command = Command::new("sh");
+        command.args(["-c", &script, env!("CARGO_BIN_EXE_tallow")]).current_dir(folder.path()).output().unwrap()
+    };
+    complains(&shell("trap '' XFSZ; ulimit -f 0;"), 5, &["d.png", "free some space"]);
+    assert_eq!(std::fs::read(&old).unwrap(), b"old");
+    assert_eq!(names(folder.path()), ["a.exr", "d.png"], "no temporary file stays");
+    // Control: without the limit the file is replaced.
+    assert_eq!(shell("").status.code(), Some(0));
+    assert_ne!(std::fs::read(&old).unwrap(), b"old");
+    let mut to_full = Command::new("sh");
+    to_full.args(["-c", "exec \"$0\" compare a.exr a.exr > /dev/full", env!("CARGO_BIN_EXE_tallow")]);
+    complains(&to_full.current_dir(folder.path()).output().unwrap(), 5, &["standard output"]);
+}
+
+#[cfg(target_os = "linux")]
+fn names(folder: &Path) -> Vec<String> {
+    let entry = |e: std::io::Result<std::fs::DirEntry>| e.unwrap().file_name().into_string().unwrap();
+    let mut names: Vec<_> = std::fs::read_dir(folder).unwrap().map(entry).collect();
+    names.sort();
+    names
+}

@@ -1,0 +1,267 @@
+//! Films to files and back.
+use std::path::Path;
+use tallow::error::Error;
+use tallow::image::{self, Film, Samples, WriteOptions, output, tone::ToneMap};
+
+/// Bit patterns that a lossy or converting writer would change: negative zero, denormals, infinities, a NaN with payload.
+fn awkward(i: usize) -> f32 {
+    const SOME: [u32; 6] = [0x8000_0000, 0x0000_0001, 0x7f80_0000, 0xff80_0000, 0x7fc0_1234, 0x7f7f_ffff];
+    f32::from_bits(SOME.get(i % 11).copied().unwrap_or((i as u32).wrapping_mul(2_654_435_761) >> 2))
+}
+
+/// Every layer that a render writes.
+fn full_film(width: u32, height: u32) -> Film {
+    let mut film = Film::new(width, height);
+    let n = film.pixels();
+    let vectors =
+        |salt: usize| -> Vec<[f32; 3]> { (0..n).map(|i| [0, 1, 2].map(|c| awkward(salt + 3 * i + c))).collect() };
+    for (salt, layer) in ["", "direct", "indirect", "albedo", "variance"].into_iter().enumerate() {
+        film.add_vec3(layer, ["R", "G", "B"], &vectors(salt));
+    }
+    film.add_vec3("N", ["X", "Y", "Z"], &vectors(7));
+    film.add_vec3("P", ["X", "Y", "Z"], &vectors(8));
+    film.add("Z", Samples::F32((0..n).map(awkward).collect()));
+    film.add("samples", Samples::U32((0..n as u32).map(|i| i.wrapping_mul(0x9e37_79b9)).collect()));
+    film.add("id", Samples::U32((0..n as u32).map(|i| u32::MAX - i).collect()));
+    film
+}
+
+fn bits(samples: &Samples) -> Vec<u32> {
+    match samples {
+        Samples::F32(v) => v.iter().map(|f| f.to_bits()).collect(),
+        Samples::U32(v) => v.clone(),
+    }
+}
+
+fn same_bits(a: &Film, b: &Film) -> bool {
+    let same = |name: &str| match (a.channel(name), b.channel(name)) {
+        (Some(a), Some(b)) => std::mem::discriminant(a) == std::mem::discriminant(b) && bits(a) == bits(b),
+        _ => false,
+    };
+    a.channels.len() == b.channels.len() && a.channels.iter().all(|c| same(&c.name))
+}
+
+#[test]
+fn exr_keeps_every_bit_of_every_layer() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("film.exr");
+    for (width, height) in [(1, 1), (31, 1), (1, 31), (65, 33), (16, 16)] {
+        let film = full_film(width, height);
+        image::write(&path, &film, &WriteOptions::default()).unwrap();
+        let back = image::read(&path).unwrap();
+        assert_eq!((back.width, back.height), (width, height));
+        assert!(same_bits(&film, &back), "{width}x{height}");
+        // Control: one bit in one channel must be noticed.
+        let mut other = back.clone();
+        if let Samples::F32(v) = &mut other.channels[0].samples {
+            v[0] = f32::from_bits(v[0].to_bits() ^ 1);
+        }
+        assert!(!same_bits(&film, &other));
+    }
+}
+
+#[test]
+fn exr_keeps_metadata_in_any_script_and_length() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("film.exr");
+    let mut film = full_film(3, 2);
+    let long = "x".repeat(4000);
+    let entries = [
+        ("scene", "scènes/дом 家.toml"),
+        ("settings", r#"{"width":3,"spp":64}"#),
+        ("seed", "4294967295"),
+        ("device", "llvmpipe (LLVM 15.0.6, 256 bits)"),
+        ("driver", "llvmpipe Mesa 22.3.6"),
+        ("version", "0.1.0"),
+        ("renderSeconds", "1.5"),
+        ("date", "2025-01-31T12:00:00Z"),
+        ("warnings", &long),
+        ("aNameOfMoreThanThirtyOneCharactersInAll", ""),
+    ];
+    film.metadata = entries.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+    image::write(&path, &film, &WriteOptions::default()).unwrap();
+    assert_eq!(image::read(&path).unwrap().metadata, film.metadata);
+}
+
+mod foreign {
+    //! Files as other programs write them.
+    use exr::prelude::*;
+    use tallow::image::{Film, Samples, decode};
+
+    fn plane(name: &str, samples: FlatSamples) -> AnyChannel<FlatSamples> {
+        AnyChannel::new(name, samples)
+    }
+
+    fn part(
+        name: &str,
+        position: (i32, i32),
+        size: (usize, usize),
+        encoding: Encoding,
+        channels: Vec<AnyChannel<FlatSamples>>,
+    ) -> Layer<AnyChannels<FlatSamples>> {
+        let attributes = LayerAttributes { layer_position: position.into(), ..LayerAttributes::named(name) };
+        Layer::new(size, attributes, encoding, AnyChannels::sort(channels.into()))
+    }
+
+    fn film(window: ((i32, i32), (usize, usize)), parts: Vec<Layer<AnyChannels<FlatSamples>>>) -> Film {
+        let window = IntegerBounds::new(window.0, window.1);
+        let image = Image::from_layers(ImageAttributes::new(window), parts);
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        image.write().to_buffered(&mut bytes).unwrap();
+        decode(&bytes.into_inner()).unwrap()
+    }
+
+    #[test]
+    fn half_float_and_integer_channels_in_tiles_are_read() {
+        let half = FlatSamples::F16((0..6).map(|i| f16::from_f32(0.5 * i as f32)).collect());
+        let tiles = Encoding { blocks: Blocks::Tiles(Vec2(2, 2)), ..Encoding::FAST_LOSSLESS };
+        let channels = vec![
+            plane("Y", half),
+            plane("Z", FlatSamples::F32(vec![0.1; 6])),
+            plane("id", FlatSamples::U32(vec![7; 6])),
+        ];
+        let film = film(((0, 0), (3, 2)), vec![part("any", (0, 0), (3, 2), tiles, channels)]);
+        let grey = film.picture(None).unwrap();
+        assert_eq!(grey.pixels[5], [2.5; 3]);
+        assert_eq!(film.picture(Some("z")).unwrap().pixels[0], [0.1; 3]);
+        assert_eq!(film.channel("id"), Some(&Samples::U32(vec![7; 6])));
+    }
+
+    #[test]
+    fn every_part_of_a_file_is_a_layer() {
+        let rgb = |v: f32| ["R", "G", "B"].map(|c| plane(c, FlatSamples::F32(vec![v; 4]))).to_vec();
+        let encoding = Encoding::SMALL_LOSSLESS;
+        let prefixed = vec![plane("depth.Z", FlatSamples::F32(vec![3.0; 4]))];
+        let parts = vec![
+            part("rgba", (0, 0), (2, 2), encoding, rgb(1.0)),
+            part("albedo", (0, 0), (2, 2), encoding, rgb(2.0)),
+            part("depth", (0, 0), (2, 2), encoding, prefixed),
+        ];
+        let film = film(((0, 0), (2, 2)), parts);
+        for (layer, value) in [(None, 1.0), (Some("albedo"), 2.0), (Some("Depth"), 3.0)] {
+            assert_eq!(film.picture(layer).unwrap().pixels, [[value; 3]; 4], "{layer:?}");
+        }
+        let lines = film.picture(Some("normals")).unwrap_err();
+        assert!(lines.contains("depth.Z") && lines.contains("normals"), "{lines}");
+    }
+
+    #[test]
+    fn the_picture_is_the_display_window() {
+        // Data window (-1, 0) to (1, 2), display window (0, 0) to (2, 1): a column and a row are cut, one column is black.
+        let data = FlatSamples::F32(vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]);
+        let layer = part("y", (-1, 0), (3, 3), Encoding::UNCOMPRESSED, vec![plane("Y", data)]);
+        let film = film(((0, 0), (3, 2)), vec![layer]);
+        assert_eq!(film.channel("Y"), Some(&Samples::F32(vec![2.0, 3.0, 0.0, 5.0, 6.0, 0.0])));
+    }
+}
+
+#[test]
+fn the_colour_is_found_under_the_names_of_other_programs() {
+    let film = |layers: &[&str]| {
+        let mut film = Film::new(1, 1);
+        for (i, layer) in layers.iter().enumerate() {
+            film.add_vec3(layer, ["R", "G", "B"], &[[i as f32; 3]]);
+        }
+        film
+    };
+    let colour = |layers: &[&str]| film(layers).picture(None).map(|p| p.pixels[0][0]);
+    assert_eq!(colour(&["ViewLayer.DiffCol", "ViewLayer.Combined"]), Ok(1.0));
+    assert_eq!(colour(&["albedo", ""]), Ok(1.0));
+    assert_eq!(colour(&["light"]), Ok(0.0));
+    assert!(colour(&["light", "albedo"]).is_err(), "two candidates and no usual name");
+    // Two layers match by their last part, so that neither is meant.
+    assert!(film(&["a.light", "b.light"]).picture(Some("light")).is_err());
+    assert_eq!(film(&["a.light", "light"]).picture(Some("light")).unwrap().pixels[0][0], 1.0);
+}
+
+fn write_and_read(name: &str, pixels: &[[f32; 3]], options: &WriteOptions) -> Vec<[f32; 3]> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    let mut film = Film::new(pixels.len() as u32, 1);
+    film.add_vec3("", ["R", "G", "B"], pixels);
+    image::write(&path, &film, options).unwrap();
+    image::read(&path).unwrap().picture(None).unwrap().pixels
+}
+
+/// 8-bit code values of a PNG written with these options.
+fn codes(radiance: f32, options: &WriteOptions) -> u8 {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.png");
+    let mut film = Film::new(1, 1);
+    film.add_vec3("", ["R", "G", "B"], &[[radiance; 3]]);
+    image::write(&path, &film, options).unwrap();
+    ::image::open(&path).unwrap().to_rgb8()[(0, 0)][0]
+}
+
+#[test]
+fn png_holds_srgb_code_values() {
+    // By the formula of IEC 61966-2-1: 1.055 * 0.5^(1/2.4) - 0.055 = 0.73536, times 255 = 187.5.
+    let plain = WriteOptions::default();
+    let table = [(0.0, 0), (0.002, 7), (0.18, 118), (0.5, 188), (1.0, 255), (7.0, 255), (-1.0, 0)];
+    for (radiance, code) in table {
+        assert_eq!(codes(radiance, &plain), code, "{radiance}");
+    }
+    assert_eq!(codes(f32::NAN, &plain), 0);
+    assert_eq!(codes(0.045, &WriteOptions { exposure: 2.0, ..plain }), 118, "two stops are a factor of 4");
+    // Narkowicz at 1: 2.54 / 3.16 = 0.8038, whose code value is 0.9080 * 255 = 231.5; without the sRGB curve 205.
+    let aces = WriteOptions { tone_map: ToneMap::Aces, ..plain };
+    assert!((231..=232).contains(&codes(1.0, &aces)), "{}", codes(1.0, &aces));
+    assert_eq!(codes(f32::INFINITY, &aces), 255);
+}
+
+#[test]
+fn png_and_hdr_come_back_as_linear_values() {
+    let pixels = [[0.0, 0.18, 1.0], [0.5, 0.25, 0.75]];
+    let png = write_and_read("a.png", &pixels, &WriteOptions::default());
+    let hdr = write_and_read("a.hdr", &pixels.map(|p| p.map(|v| 100.0 * v)), &WriteOptions::default());
+    for ((png, hdr), pixel) in png.iter().zip(&hdr).zip(&pixels) {
+        for c in 0..3 {
+            // Half an 8-bit code near white is 0.0045 in linear terms; RGBE has 8 bits for the largest channel.
+            assert!((png[c] - pixel[c]).abs() < 0.005, "{png:?} {pixel:?}");
+            assert!((hdr[c] / 100.0 - pixel[c]).abs() < 1.0 / 256.0, "{hdr:?} {pixel:?}");
+        }
+    }
+    // Control: an exposure must show.
+    let brighter = write_and_read("a.png", &pixels, &WriteOptions { exposure: 0.5, ..WriteOptions::default() });
+    assert!((brighter[1][0] - 0.5).abs() > 0.1);
+}
+
+fn what(result: tallow::error::Result<()>) -> String {
+    match result.unwrap_err() {
+        Error::Output { what, .. } => what,
+        other => panic!("not an output error: {other}"),
+    }
+}
+
+#[test]
+fn a_failing_write_leaves_the_old_file_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let inside = |name: &str| folder.path().join(name);
+    // A folder where the file should go makes the renaming fail, after everything has been written.
+    std::fs::create_dir(inside("taken.exr")).unwrap();
+    assert!(what(output::write(&inside("taken.exr"), b"new")).contains("is a folder"));
+    assert!(what(image::check_writable(&inside("taken.exr"))).contains("is a folder"));
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file stays");
+    assert!(what(image::check_writable(&inside("missing/a.exr"))).contains("create it"));
+    assert!(matches!(image::check_writable(&inside("a.tif")), Err(Error::Usage(text)) if text.contains(".exr")));
+    image::check_writable(&inside("a.exr")).unwrap();
+    assert!(!inside("a.exr").exists(), "a check leaves nothing behind");
+    // The same call succeeds where nothing is in the way, and replaces what was there.
+    for text in [b"one", b"two"] {
+        output::write(&inside("a.exr"), text).unwrap();
+        assert_eq!(std::fs::read(inside("a.exr")).unwrap(), text);
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn devices_are_written_to_and_links_are_followed() {
+    assert!(what(output::write(Path::new("/dev/full"), b"x")).contains("free some space"));
+    let folder = tempfile::tempdir().unwrap();
+    let (file, link) = (folder.path().join("file.exr"), folder.path().join("link.exr"));
+    std::fs::write(&file, "old").unwrap();
+    std::os::unix::fs::symlink(&file, &link).unwrap();
+    output::write(&link, b"new").unwrap();
+    assert_eq!(std::fs::read(&file).unwrap(), b"new");
+    assert!(link.is_symlink());
+}

@@ -1,0 +1,187 @@
+//! The path tracer against images of an independent renderer (Mitsuba 3, `tests/data/references/README.md`): every
+//! pixel by a z-test with both standard errors, and the image means.
+mod support;
+
+use std::path::{Path, PathBuf};
+use tallow::image::{self, Film, Picture};
+use tallow::renderer::{Outputs, Renderer};
+use tallow::scene::Scene;
+use tallow::settings::Settings;
+
+const SIZE: u32 = 128;
+const SPP: u32 = 1024;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn reference(name: &str) -> Film {
+    image::read(&root().join("tests/data/references").join(name)).unwrap()
+}
+
+fn colour(name: &str) -> Picture {
+    reference(name).picture(None).unwrap()
+}
+
+/// (mean, squared standard error) of every pixel.
+struct Estimate {
+    mean: Vec<[f32; 3]>,
+    error2: Vec<[f32; 3]>,
+}
+
+fn scene(file: &str, depth: u32) -> Scene {
+    let path: PathBuf = root().join("scenes/cornell-box").join(file);
+    let size = |s: &mut Settings| {
+        (s.width, s.height, s.spp, s.max_depth) = (SIZE, SIZE, SPP, depth);
+        s.roulette_depth = 0;
+    };
+    Scene::load(&path, &size).unwrap()
+}
+
+fn render(file: &str, depth: u32) -> Estimate {
+    let gpu = support::gpu();
+    let renderer = Renderer::new(&gpu, &scene(file, depth), Outputs::default()).unwrap();
+    let stats = support::render(&gpu, &renderer);
+    support::assert_silent(&gpu);
+    let error2 = |m2: f32, n: f32| m2 / (n * (n - 1.0));
+    Estimate {
+        mean: stats.iter().map(|s| s.mean).collect(),
+        error2: stats.iter().map(|s| s.m2.map(|m2| error2(m2, s.count as f32))).collect(),
+    }
+}
+
+/// Two-sided quantile of the normal distribution at which `tests` independent tests together fail once in a hundred
+/// times (Sidak 1967): 1 - (1 - 0.01)^(1 / tests).
+fn sidak_quantile(tests: usize) -> f64 {
+    let level = 1.0 - (1.0f64 - 0.01).powf(1.0 / tests as f64);
+    let tail = |z: f64| libm_erfc(z / 2f64.sqrt());
+    let (mut low, mut high) = (0.0, 40.0);
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        if tail(middle) > level { low = middle } else { high = middle }
+    }
+    high
+}
+
+/// Complementary error function for x >= 0, relative error below 1.2e-7 (Numerical Recipes, erfcc).
+fn libm_erfc(x: f64) -> f64 {
+    let t = 1.0 / (1.0 + 0.5 * x);
+    let c = [
+        -1.26551223,
+        1.00002368,
+        0.37409196,
+        0.09678418,
+        -0.18628806,
+        0.27886807,
+        -1.13520398,
+        1.48851587,
+        -0.82215223,
+        0.17087277,
+    ];
+    let poly = c.iter().rev().fold(0.0, |sum, &c| sum * t + c);
+    t * (-x * x + poly).exp()
+}
+
+/// Share of pixels whose three channels all pass.
+fn share_passing(ours: &Estimate, mean: &Picture, error: &Picture) -> f64 {
+    let limit = sidak_quantile(3 * mean.pixels.len());
+    let passes = |i: usize| {
+        (0..3).all(|c| {
+            let (a, b) = (f64::from(ours.mean[i][c]), f64::from(mean.pixels[i][c]));
+            let spread = f64::from(ours.error2[i][c]) + f64::from(error.pixels[i][c]).powi(2);
+            // Where nothing varies (the light itself), single precision is all that may differ; and where a lobe's
+            // tail is below 1e-12 of the image's mean, the reference has cut it off.
+            (a - b).abs() <= limit * spread.sqrt() + 1e-5 * b.abs() + 1e-13
+        })
+    };
+    (0..mean.pixels.len()).filter(|&i| passes(i)).count() as f64 / mean.pixels.len() as f64
+}
+
+/// Per channel: (ratio of the means, their difference in standard errors).
+fn means(ours: &Estimate, mean: &Picture, error: &Picture) -> [(f64, f64); 3] {
+    std::array::from_fn(|c| {
+        let (mut a, mut b, mut spread) = (0.0, 0.0, 0.0);
+        for i in 0..mean.pixels.len() {
+            a += f64::from(ours.mean[i][c]);
+            b += f64::from(mean.pixels[i][c]);
+            spread += f64::from(ours.error2[i][c]) + f64::from(error.pixels[i][c]).powi(2);
+        }
+        (a / b, (a - b) / spread.sqrt())
+    })
+}
+
+fn agrees(ours: &Estimate, mean: &Picture, error: &Picture) -> Result<(), String> {
+    let share = share_passing(ours, mean, error);
+    let means = means(ours, mean, error);
+    println!("{:.4} % of pixels pass; means (ratio, z) {means:.4?}", 100.0 * share);
+    let mean_ok = means.iter().all(|(ratio, z)| (ratio - 1.0).abs() <= 2e-3 || z.abs() <= 3.0);
+    if share >= 0.9975 && mean_ok { Ok(()) } else { Err(format!("{share} of pixels pass, means {means:?}")) }
+}
+
+fn check(file: &str, variant: &str, depth: u32) {
+    let mean = colour(&format!("ref_{variant}_d{depth}.exr"));
+    let error = colour(&format!("ref_{variant}_d{depth}_se.exr"));
+    let mut ours = render(file, depth);
+    agrees(&ours, &mean, &error).unwrap_or_else(|e| panic!("{variant} depth {depth}: {e}"));
+    // Control: light that is 2 % too strong must be noticed.
+    ours.mean.iter_mut().for_each(|p| *p = p.map(|v| v * 1.02));
+    assert!(agrees(&ours, &mean, &error).is_err(), "{variant} depth {depth}: the check cannot fail");
+}
+
+#[test]
+fn diffuse_box_matches_at_every_depth() {
+    (2..=4).for_each(|depth| check("scene.toml", "diffuse", depth));
+}
+
+#[test]
+fn conductor_box_matches_at_every_depth() {
+    (2..=4).for_each(|depth| check("conductor.toml", "conductor", depth));
+}
+
+#[test]
+fn point_light_box_matches_at_every_depth() {
+    (2..=4).for_each(|depth| check("point.toml", "point", depth));
+}
+
+fn plane(film: &Film, name: &str) -> Vec<f32> {
+    film.channel(name).unwrap_or_else(|| panic!("no channel {name}")).to_f32()
+}
+
+/// True where the pixel's neighbours show the same shape, so that no edge is near.
+fn interior(shape: &[f32], i: usize) -> bool {
+    let (w, x, y) = (SIZE as usize, i % SIZE as usize, i / SIZE as usize);
+    let near = [(x > 0, -1), (x + 1 < w, 1), (y > 0, -(w as isize)), (y + 1 < w, w as isize)];
+    near.iter().all(|&(inside, step)| !inside || shape[i.wrapping_add_signed(step)] == shape[i])
+}
+
+#[test]
+fn first_hits_match_at_pixel_centres() {
+    let gpu = support::gpu();
+    let outputs = Outputs { guides: true, ..Outputs::default() };
+    let renderer = Renderer::new(&gpu, &scene("scene.toml", 1), outputs).unwrap();
+    support::render(&gpu, &renderer);
+    let guide = renderer.film().guide.read().unwrap();
+    let centre = reference("center_diffuse.exr");
+    let (t, shape) = (plane(&centre, "t.T"), plane(&centre, "shape.I"));
+    let (n, albedo) = (
+        ["n.X", "n.Y", "n.Z"].map(|c| plane(&centre, c)),
+        ["R", "G", "B"].map(|c| plane(&centre, &format!("albedo.{c}"))),
+    );
+    let mut at_edges = 0;
+    for (i, g) in guide.iter().enumerate() {
+        let miss = t[i] < 0.0;
+        let same = if miss {
+            g.depth == 0.0
+        } else {
+            let normals: f32 = (0..3).map(|c| g.normal[c] * n[c][i]).sum();
+            let colours = (0..3).all(|c| (g.albedo[c] - albedo[c][i]).abs() < 1e-4);
+            (g.depth - t[i]).abs() <= 1e-4 * t[i] && normals > 0.9999 && colours
+        };
+        if !same {
+            assert!(!interior(&shape, i), "pixel {i}: {g:?}, expected t {} shape {}", t[i], shape[i]);
+            at_edges += 1;
+        }
+    }
+    println!("{at_edges} pixels differ, all of them beside an edge");
+    assert!(at_edges <= 8, "{at_edges} pixels beside edges differ: more than ties can explain");
+}

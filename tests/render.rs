@@ -1,0 +1,190 @@
+//! Whole renders: the same bits however the work is cut and whatever is compiled in, furnaces whose answer is known,
+//! and no broken pixel anywhere.
+mod support;
+
+use std::path::Path;
+use tallow::gpu::Gpu;
+use tallow::gpu::layout::{Effects, PixelStats};
+use tallow::renderer::{self, Batch, Outputs, Renderer};
+use tallow::scene::Scene;
+use tallow::settings::{PixelFilter, Sampler, Settings};
+
+fn scene(file: &str, change: impl Fn(&mut Settings)) -> Scene {
+    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file), &change).unwrap()
+}
+
+fn small(s: &mut Settings) {
+    (s.width, s.height, s.spp) = (33, 17, 4);
+}
+
+fn bits(stats: &[PixelStats]) -> Vec<u32> {
+    bytemuck::cast_slice(stats).to_vec()
+}
+
+/// Every scene that the repository ships.
+fn scenes() -> Vec<String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let files = |folder: std::fs::DirEntry| {
+        let name = folder.file_name().into_string().unwrap();
+        let inside = std::fs::read_dir(folder.path()).unwrap();
+        inside.map(move |f| format!("{name}/{}", f.unwrap().file_name().into_string().unwrap()))
+    };
+    let folders = std::fs::read_dir(root).unwrap().map(Result::unwrap).filter(|f| f.path().is_dir());
+    let mut all: Vec<_> = folders.flat_map(files).filter(|f| f.ends_with(".toml")).collect();
+    all.sort();
+    assert!(all.len() >= 12, "{all:?}");
+    all
+}
+
+/// The effects that change the picture when they are compiled in alone, for the message of a failure.
+fn culprits(gpu: &Gpu, scene: &Scene, expected: &[PixelStats]) -> String {
+    let called_for = renderer::called_for(scene, Outputs::default());
+    let off = called_for.entries().into_iter().filter(|(name, _, on)| !on && *name != "independent_sampler");
+    let changes = |id| {
+        let other = Renderer::specialised(gpu, scene, Outputs::default(), called_for.toggled(id)).unwrap();
+        bits(&support::render(gpu, &other)) != bits(expected)
+    };
+    off.filter(|(_, id, _)| changes(*id)).map(|(name, _, _)| name).collect::<Vec<_>>().join(", ")
+}
+
+#[test]
+fn every_scene_renders_finite_pixels_and_the_same_bits_with_all_effects() {
+    let gpu = support::gpu();
+    for file in scenes() {
+        let scene = scene(&file, small);
+        let outputs = Outputs { split_light: true, guides: true, counters: false };
+        let plain = Renderer::new(&gpu, &scene, outputs).unwrap();
+        let all = Renderer::specialised(&gpu, &scene, outputs, renderer::all_effects(&scene)).unwrap();
+        let (a, b) = (support::render(&gpu, &plain), support::render(&gpu, &all));
+        assert!(a.iter().all(|s| s.mean.iter().chain(&s.m2).all(|v| v.is_finite())), "{file}: broken pixels");
+        assert!(a.iter().any(|s| s.mean != [0.0; 3]), "{file}: black");
+        assert!(bits(&a) == bits(&b), "{file}: compiled-in effects change it: {}", culprits(&gpu, &scene, &a));
+        let light = plain.film().light.read().unwrap();
+        assert!(light.iter().all(|l| l.direct.iter().chain(&l.indirect).all(|v| v.is_finite())), "{file}");
+    }
+    support::assert_silent(&gpu);
+}
+
+#[test]
+fn the_cut_into_batches_changes_no_bit() {
+    let gpu = support::gpu();
+    let scene = scene("cornell-box/scene.toml", small);
+    let renderer = Renderer::new(&gpu, &scene, Outputs::default()).unwrap();
+    let whole = support::render(&gpu, &renderer);
+    let pixels = 33 * 17;
+    for (run, depth) in [(1, 4), (31, 1), (64, 3), (65, 2), (pixels, 1)] {
+        let mut batches = Vec::new();
+        for first_sample in (0..4).step_by(depth as usize) {
+            for first_pixel in (0..pixels).step_by(run as usize) {
+                let (pixels, samples) = (run.min(pixels - first_pixel), depth.min(4 - first_sample));
+                batches.push(Batch { first_pixel, pixels, first_sample, samples });
+            }
+        }
+        assert!(bits(&support::render_batches(&gpu, &renderer, &batches)) == bits(&whole), "{run} x {depth}");
+    }
+    // Control: one sample left out must show.
+    let batches: Vec<_> = renderer.batches_of(0, 3);
+    assert!(bits(&support::render_batches(&gpu, &renderer, &batches)) != bits(&whole));
+    support::assert_silent(&gpu);
+}
+
+/// Mean over the film and its standard error, per channel.
+fn mean(stats: &[PixelStats]) -> [(f64, f64); 3] {
+    let n = stats.len() as f64;
+    std::array::from_fn(|c| {
+        let sum: f64 = stats.iter().map(|s| f64::from(s.mean[c])).sum();
+        let spread: f64 =
+            stats.iter().map(|s| f64::from(s.m2[c]) / (f64::from(s.count) * f64::from(s.count - 1))).sum();
+        (sum / n, spread.sqrt() / n)
+    })
+}
+
+fn furnace(file: &str, depth: u32, spp: u32) -> [(f64, f64); 3] {
+    let gpu = support::gpu();
+    let scene = scene(file, |s| {
+        (s.width, s.height, s.spp, s.max_depth, s.roulette_depth) = (64, 64, spp, depth, 0);
+    });
+    let renderer = Renderer::new(&gpu, &scene, Outputs::default()).unwrap();
+    let stats = support::render(&gpu, &renderer);
+    support::assert_silent(&gpu);
+    mean(&stats)
+}
+
+/// An object that absorbs nothing, in a constant environment of radiance 1, cannot be seen: every path that leaves
+/// carries 1. Cut at d edges, a diffuse body loses what its paths would have carried on; a convex one loses nothing.
+fn is_invisible(file: &str, depth: u32) {
+    for (mean, error) in furnace(file, depth, 64) {
+        println!("{file}: {mean:.6} +- {error:.6}");
+        assert!((mean - 1.0).abs() <= 1e-3, "{file}: {mean} +- {error}");
+    }
+}
+
+#[test]
+fn a_white_body_vanishes_in_the_furnace() {
+    is_invisible("furnace/scene.toml", 8);
+}
+
+#[test]
+fn a_coated_white_body_vanishes_in_the_furnace() {
+    is_invisible("furnace/coated.toml", 8);
+}
+
+#[test]
+fn a_mirror_vanishes_in_the_furnace() {
+    is_invisible("furnace/mirror.toml", 8);
+}
+
+#[test]
+fn glass_vanishes_in_the_furnace() {
+    // The tessellated ball holds some light by total reflection from facet to facet: 64 edges lose 0.27 %.
+    is_invisible("furnace/glass.toml", 512);
+}
+
+/// A closed box that emits E = 1 everywhere and reflects rho = 0.5: after d edges the radiance is
+/// E (1 + rho + ... + rho^(d - 1)) = E (1 - rho^d) / (1 - rho).
+#[test]
+fn a_closed_box_holds_the_geometric_series() {
+    for depth in 1..=6 {
+        let expected = (1.0 - 0.5f64.powi(depth as i32)) / 0.5;
+        for (mean, error) in furnace("furnace/box.toml", depth, 64) {
+            println!("depth {depth}: {mean:.5} +- {error:.5}, expected {expected:.5}");
+            assert!((mean - expected).abs() <= 4.0 * error + 1e-4 * expected, "depth {depth}: {mean}, not {expected}");
+        }
+    }
+}
+
+#[test]
+fn filters_and_samplers_agree_on_the_mean() {
+    let gpu = support::gpu();
+    let render = |filter: PixelFilter, sampler: Sampler| {
+        let scene = scene("cornell-box/scene.toml", |s| {
+            (s.width, s.height, s.spp, s.max_depth, s.filter, s.sampler) = (64, 64, 64, 3, filter, sampler);
+        });
+        mean(&support::render(&gpu, &Renderer::new(&gpu, &scene, Outputs::default()).unwrap()))
+    };
+    let reference = render(PixelFilter::Box, Sampler::Sobol);
+    let independent = render(PixelFilter::Box, Sampler::Independent);
+    for ((a, _), (b, error)) in reference.iter().zip(&independent) {
+        // Sobol's own error is far below what its samples' variance says.
+        assert!((a - b).abs() < 4.0 * error, "sampler: {a} {b} +- {error}");
+    }
+    for filter in [PixelFilter::Tent, PixelFilter::Gaussian] {
+        for ((a, _), (b, error)) in reference.iter().zip(&render(filter, Sampler::Sobol)) {
+            // The filters look past the film's border, which here is black on all sides.
+            assert!((a - b).abs() < 0.03 * a + 4.0 * error, "{filter:?}: {a} {b}");
+        }
+    }
+    support::assert_silent(&gpu);
+}
+
+#[test]
+fn an_effect_that_is_called_for_and_left_out_shows() {
+    // Control of the bit comparison above: without indirect light the box must differ.
+    let gpu = support::gpu();
+    let scene = scene("cornell-box/scene.toml", small);
+    let effects = renderer::called_for(&scene, Outputs::default());
+    let without = Effects { emissive: false, ..effects };
+    let a = support::render(&gpu, &Renderer::new(&gpu, &scene, Outputs::default()).unwrap());
+    let b = support::render(&gpu, &Renderer::specialised(&gpu, &scene, Outputs::default(), without).unwrap());
+    assert!(bits(&a) != bits(&b));
+}

@@ -1,0 +1,212 @@
+//! Scene files end to end: what they become, and what is said about mistakes.
+use std::path::Path;
+use tallow::gpu::layout::*;
+use tallow::scene::{Scene, effects};
+
+const BOX: &str = "
+[film]
+width = 32
+height = 16
+[camera]
+position = [0, 0, 5]
+target = [0, 0, 0]
+[render]
+spp = 4
+max_depth = 2
+[[material]]
+name = \"wall\"
+color = [0.1, 0.2, 0.3]
+[[material]]
+name = \"lamp\"
+emission = 5
+[[mesh]]
+name = \"floor\"
+shape = \"rectangle\"
+material = \"wall\"
+[[mesh]]
+name = \"lamp\"
+shape = \"rectangle\"
+transform = { translate = [0, 0, 2], scale = 0.5 }
+material = \"lamp\"
+";
+
+fn parse(text: &str) -> tallow::error::Result<Scene> {
+    Scene::parse(Path::new("scene.toml"), text, &|_| {})
+}
+
+fn error(text: &str) -> String {
+    let found = parse(text).unwrap_err();
+    assert_eq!(found.exit_code(), 3);
+    assert!(!found.to_string().contains('\n'), "one line: {found}");
+    found.to_string()
+}
+
+#[test]
+fn a_small_scene_becomes_arrays() {
+    let scene = parse(BOX).unwrap();
+    assert_eq!((scene.settings.width, scene.settings.spp), (32, 4));
+    assert_eq!((scene.triangles.len(), scene.shading.len(), scene.instances.len()), (4, 0, 0));
+    assert_eq!(scene.bounds, [[-1.0, -1.0, 0.0], [1.0, 1.0, 2.0]]);
+    assert_eq!(scene.names.objects, ["floor", "lamp"]);
+    assert_eq!(scene.camera.right[0], scene.camera.up[1] * 2.0, "twice as wide as high");
+    assert_eq!((scene.lights.len(), scene.warnings.len()), (2, 0));
+    let (found, why) = effects(&scene, false, false);
+    assert_eq!(found, Effects { diffuse: true, emissive: true, ..Effects::default() });
+    assert_eq!(why[1].1, "material \"lamp\"");
+    let wide = Scene::parse(Path::new("s.toml"), BOX, &|s| s.width = 64).unwrap();
+    assert_eq!(wide.camera.right[0], wide.camera.up[1] * 4.0, "the camera follows the override");
+}
+
+/// Area of a light's triangle.
+fn area(l: &Light) -> f32 {
+    let [a, b, c] = [l.a, l.b, l.c].map(glam::Vec3::from);
+    (b - a).cross(c - a).length() / 2.0
+}
+
+#[test]
+fn one_constant_turns_emission_into_the_density_of_every_emissive_triangle() {
+    let more = "
+[[material]]\nname = \"blue\"\nemission = [0, 0, 0.3]
+[[mesh]]\nshape = \"sphere\"\nmaterial = \"blue\"\nsegments = 24
+[[light]]\ntype = \"point\"\nposition = [0, 1, 1]\nintensity = 3
+[[light]]\ntype = \"spot\"\nposition = [0, 1, 1]\ntarget = [0, 0, 0]\nintensity = [1, 2, 3]
+[[light]]\ntype = \"directional\"\ndirection = [0, -1, 0]\nirradiance = 1
+[environment]\nradiance = 0.1";
+    let scene = parse(&format!("{BOX}{more}")).unwrap();
+    let (mut triangles, mut sum) = (0, 0.0);
+    for l in &scene.lights {
+        sum += f64::from(l.probability);
+        if l.kind == LIGHT_TRIANGLE {
+            triangles += 1;
+            let weight = scene.materials[l.material as usize].emission_weight;
+            let ratio = l.probability / area(l) / (weight * scene.triangle_pdf_scale);
+            assert!((ratio - 1.0).abs() < 2e-5, "{ratio}");
+        }
+    }
+    assert_eq!((triangles, scene.lights.len() - triangles), (2 + 24 * 22, 4));
+    assert!((sum - 1.0).abs() < 1e-5);
+    // The lamp: 2 triangles of 0.5 square units and radiance 5, so pi * 0.5 * 5 W each; the point light 4 pi * 3 W.
+    let by_kind = |kind| scene.lights.iter().find(|l| l.kind == kind).unwrap();
+    let lamp = scene.lights.iter().find(|l| l.value == [5.0; 3]).unwrap();
+    assert!((by_kind(LIGHT_POINT).probability / lamp.probability - 12.0 / 2.5).abs() < 1e-4);
+    assert_eq!(by_kind(LIGHT_DIRECTIONAL).b, [0.0, -1.0, 0.0]);
+}
+
+#[test]
+fn instances_make_two_levels_and_carry_their_lights() {
+    let more = "
+[[mesh]]\nname = \"ball\"\nshape = \"sphere\"\nsegments = 8\nmaterial = \"lamp\"
+[[instance]]\nmesh = \"ball\"\ntransform = { translate = [5, 0, 0] }
+[[instance]]\nmesh = \"ball\"\ntransform = { translate = [-5, 0, 0], scale = [-1, 1, 1] }
+[[instance]]\nmesh = \"ball\"\nmaterial = \"wall\"";
+    let scene = parse(&format!("{BOX}{more}")).unwrap();
+    assert_eq!((scene.instances.len(), scene.triangles.len()), (4, 4 + 48), "three balls share their triangles");
+    assert_eq!(scene.instances.iter().filter(|i| i.mirrored == 1).count(), 1);
+    assert_eq!(scene.names.objects.len(), 2 + 3);
+    let lamps: Vec<_> = scene.lights.iter().filter(|l| l.kind == LIGHT_TRIANGLE).collect();
+    assert_eq!(lamps.len(), 2 + 2 * 48, "the third ball wears the wall");
+    for l in lamps.iter().filter(|l| l.a[0].abs() > 3.0) {
+        // Outward of its ball, mirrored or not.
+        let [a, b, c] = [l.a, l.b, l.c].map(glam::Vec3::from);
+        let center = glam::Vec3::X * 5.0 * a.x.signum();
+        assert!((b - a).cross(c - a).dot(a - center) > 0.0);
+    }
+    assert!(scene.bounds[0][0] < -5.9 && scene.bounds[1][0] > 5.9);
+    assert!(effects(&scene, false, false).0.instances);
+}
+
+#[test]
+fn mistakes_are_one_line_with_place_and_remedy() {
+    for (text, expected) in [
+        ("[film]\nwidth = 0", "scene.toml: width is 0: choose a value from 1 to 16384"),
+        ("[render]\nspp = 99999999999", "line 2"),
+        ("[[mesh]]\nshape = \"cube\"\ntransform = { scale = 0 }", "mesh \"cube\": its transform has no inverse"),
+        ("[[mesh]]\nshape = \"cube\"\ntransform = { scale = 1e30 }", "coordinate of 1e30: the limit is 1e18"),
+        ("[[mesh]]\nshape = \"cube\"\ntransform = { translate = [nan, 0, 0] }", "no inverse"),
+        ("[[mesh]]\nname = \"a\"", "mesh \"a\": needs either a file or a shape"),
+        ("[[mesh]]\nfile = \"nowhere.obj\"", "nowhere.obj: cannot be read"),
+        ("[[mesh]]\nshape = \"cube\"\nmaterial = \"a\"", "mesh \"cube\": no material \"a\": add a [[material]] table"),
+        ("[[instance]]\nmesh = \"a\"", "instance 1 of mesh \"a\": no such mesh"),
+        ("[[material]]\nname = \"a\"\nemission = nan", "material \"a\": emission [NaN, NaN, NaN] is negative, NaN"),
+        ("[[material]]\nname = \"a\"\nalpha = 2", "alpha is 2: choose a value from 0 to 1"),
+        ("[[material]]\nname = \"a\"\n[[material]]\nname = \"a\"", "is defined twice"),
+        ("[[material]]\ncolor = 1", "has no name"),
+        ("[[material]]\nname = \"a\"\ntype = \"conductor\"\nmetal = \"wood\"", "metal \"wood\" is not known"),
+        ("[[light]]\ntype = \"point\"\nintensity = 1", "light 1: needs a position"),
+        ("[[light]]\ntype = \"directional\"\ndirection = [0, 0, 0]\nirradiance = 1", "the direction has no length"),
+        ("[environment]\nfile = \"sky.hdr\"", "sky.hdr: cannot be read"),
+        ("[environment]\nradiance = -1", "[environment]"),
+        ("[camera]\nfov = 200", "[camera]: fov is 200"),
+        ("film = 3", "line 1: invalid type"),
+    ] {
+        let found = error(text);
+        assert!(found.contains(expected), "{text}\n  gave {found}\n  not  {expected}");
+    }
+    assert!(parse(BOX).is_ok(), "control");
+}
+
+#[test]
+fn what_is_legal_but_odd_is_a_warning() {
+    let empty = parse("").unwrap();
+    assert_eq!((empty.triangles.len(), empty.nodes.len(), empty.materials.len()), (0, 1, 1));
+    assert_eq!(empty.warnings, ["the scene has no light: its image will be black"]);
+    let bright = parse("[[material]]\nname = \"a\"\ncolor = 1.5").unwrap();
+    assert!(bright.warnings[0].contains("outside [0, 1]: clamped"), "{:?}", bright.warnings);
+    let missing = parse("[[material]]\nname = \"a\"\ncolor_texture = \"no.png\"").unwrap();
+    assert!(missing.warnings[0].contains("no.png: no such file"), "{:?}", missing.warnings);
+}
+
+#[test]
+fn models_alone_get_a_camera_and_a_sky() {
+    let dir = tempfile::tempdir().unwrap();
+    let load = |name: &str, text: &str| {
+        std::fs::write(dir.path().join(name), text).unwrap();
+        Scene::load(&dir.path().join(name), &|_| {})
+    };
+    load("m.mtl", "newmtl lamp\nKe 1 1 1\n").unwrap_err(); // no scene, but now the file is there
+    let triangle = "v 0 0 0\nv 4 0 0\nv 0 4 0\nv nan 0 0\n";
+    let scene = load("a.obj", &format!("{triangle}f 1 2 3\nf 1 2 2\nf 1 2 4\n")).unwrap();
+    assert_eq!((scene.triangles.len(), scene.lights[0].kind), (1, LIGHT_ENVIRONMENT));
+    let repaired = &scene.warnings[1];
+    assert!(repaired.contains("1 with NaN or infinite coordinates dropped, 1 without area dropped"), "{repaired}");
+    let eye = glam::Vec3::from(scene.camera.position) - glam::Vec3::new(2.0, 2.0, 0.0);
+    assert!(eye.normalize().dot(glam::Vec3::from(scene.camera.forward)) < -0.999, "it looks at the middle");
+    let lit = load("b.obj", &format!("mtllib m.mtl\n{triangle}usemtl lamp\nf 1 2 3\n")).unwrap();
+    assert_eq!((lit.lights.len(), lit.lights[0].kind), (1, LIGHT_TRIANGLE), "no sky over a lamp");
+    let far = load("c.obj", "v 0 0 0\nv 2e18 0 0\nv 0 1 0\nf 1 2 3").unwrap_err().to_string();
+    assert!(far.contains("coordinate of 2e18"), "{far}");
+    assert!(load("d.obj", "v 0 0 0\n").unwrap().warnings.iter().any(|w| w.contains("has no triangles")));
+}
+
+#[test]
+fn mtl_rules_by_example() {
+    let dir = tempfile::tempdir().unwrap();
+    let blocks = [
+        ("diffuse", "Kd 0.5 0.4 0.3\nKs 0.5 0.5 0.5\nillum 1"),
+        ("coated", "Kd 0.5 0.5 0.5\nKs 0.04 0.04 0.02\nNs 198\nNi 1.5\nillum 2"),
+        ("metal", "Kd 0.9 0.5 0.1\nPm 1\nPr 0.5"),
+        ("mirror", "Kd 0 0 0\nKs 0.8 0.8 0.8\nillum 3"),
+        ("glass", "Kd 0 0 0\nTf 0.9 1 0.9\nNi 1.33\nillum 7\nd 0.3"),
+        ("tinted", "Kd 1 1 1\nTf 1 0 0\nNi 1.4\nd 0.5"),
+        ("veil", "Kd 1 1 1\nd 0.5"),
+    ];
+    let mtl: String = blocks.iter().map(|(name, text)| format!("newmtl {name}\n{text}\n")).collect();
+    let faces: String = blocks.iter().map(|(name, _)| format!("usemtl {name}\nf 1 2 3\n")).collect();
+    std::fs::write(dir.path().join("m.mtl"), mtl).unwrap();
+    std::fs::write(dir.path().join("m.obj"), format!("mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{faces}")).unwrap();
+    let scene = Scene::load(&dir.path().join("m.obj"), &|_| {}).unwrap();
+    let [diffuse, coated, metal, mirror, glass, tinted, veil] = scene.materials[..] else { panic!("seven materials") };
+    assert_eq!((diffuse.kind, diffuse.base_color), (BSDF_DIFFUSE, [0.5, 0.4, 0.3]));
+    assert_eq!((coated.kind, coated.eta[0]), (BSDF_COATED, 1.5));
+    assert!((coated.alpha - 0.1).abs() < 1e-6 && (coated.specular[0] - 1.0).abs() < 1e-4);
+    assert!((coated.specular[2] - 0.5).abs() < 1e-4 && (coated.internal_fresnel - 0.5963).abs() < 1e-3);
+    // Reflectance 0.9 at normal incidence: n = 0.1 / 1.9, k = 2 sqrt(0.9) / 1.9.
+    assert_eq!((metal.kind, metal.alpha), (BSDF_CONDUCTOR, 0.25));
+    assert!((metal.eta[0] - 0.052632).abs() < 1e-5 && (metal.k[0] - 0.998614).abs() < 1e-5);
+    assert_eq!((mirror.kind, mirror.alpha, mirror.specular), (BSDF_CONDUCTOR, 0.0, [0.8; 3]));
+    assert_eq!((mirror.eta, mirror.k), ([0.0; 3], [1.0; 3]));
+    assert_eq!((glass.kind, glass.eta[0], glass.alpha, glass.opacity), (BSDF_DIELECTRIC, 1.33, 0.0, 1.0));
+    assert_eq!((glass.transmission, glass.flags & MATERIAL_MASKED), ([0.9, 1.0, 0.9], 0));
+    assert_eq!((tinted.kind, tinted.transmission), (BSDF_DIELECTRIC, [1.0, 0.0, 0.0]));
+    assert_eq!((veil.kind, veil.opacity, veil.flags & MATERIAL_MASKED), (BSDF_DIFFUSE, 0.5, MATERIAL_MASKED));
+}

@@ -1,0 +1,128 @@
+//! An engine that embeds the renderer: own instance, device and command buffers, made with plain ash.
+#![allow(unsafe_code, reason = "an engine's side of the contract is raw Vulkan")]
+use ash::vk;
+use ash::vk::Handle;
+use std::ffi::c_void;
+use std::sync::Mutex;
+use tallow::gpu::RawDevice;
+
+/// What an engine has: everything here is made and destroyed with plain ash.
+pub struct Engine {
+    /// Keeps the loader open.
+    _entry: ash::Entry,
+    instance: ash::Instance,
+    physical: vk::PhysicalDevice,
+    pub device: ash::Device,
+    queue: vk::Queue,
+    pool: vk::CommandPool,
+    messenger: (ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT),
+    messages: Box<Mutex<Vec<String>>>,
+}
+
+unsafe extern "system" fn collect(
+    _: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    messages: *mut c_void,
+) -> vk::Bool32 {
+    let (text, messages) = unsafe { ((*data).message_as_c_str(), &*messages.cast::<Mutex<Vec<String>>>()) };
+    messages.lock().unwrap().push(text.unwrap_or_default().to_string_lossy().into_owned());
+    vk::FALSE
+}
+
+unsafe fn instance(entry: &ash::Entry) -> ash::Instance {
+    let app = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
+    let extensions = [ash::ext::debug_utils::NAME.as_ptr(), ash::ext::validation_features::NAME.as_ptr()];
+    let layers = [c"VK_LAYER_KHRONOS_validation".as_ptr()];
+    let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+    let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
+    let info = vk::InstanceCreateInfo::default()
+        .application_info(&app)
+        .enabled_extension_names(&extensions)
+        .enabled_layer_names(&layers)
+        .push_next(&mut features);
+    unsafe { entry.create_instance(&info, None) }.expect("install vulkan-validationlayers and mesa-vulkan-drivers")
+}
+
+unsafe fn device(instance: &ash::Instance, physical: vk::PhysicalDevice) -> ash::Device {
+    let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
+    let core = vk::PhysicalDeviceFeatures::default().shader_int64(true);
+    let mut v12 = vk::PhysicalDeviceVulkan12Features::default().scalar_block_layout(true).host_query_reset(true);
+    let mut v13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).maintenance4(true);
+    let info = vk::DeviceCreateInfo::default()
+        .queue_create_infos(&queues)
+        .enabled_features(&core)
+        .push_next(&mut v12)
+        .push_next(&mut v13);
+    unsafe { instance.create_device(physical, &info, None) }.unwrap()
+}
+
+impl Engine {
+    /// A device under core and synchronization validation.
+    pub fn new() -> Self {
+        unsafe {
+            let entry = ash::Entry::load().expect("install libvulkan1");
+            let instance = instance(&entry);
+            let messages = Box::new(Mutex::new(Vec::new()));
+            let utils = ash::ext::debug_utils::Instance::new(&entry, &instance);
+            let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
+                .message_severity(
+                    vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
+                )
+                .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
+                .pfn_user_callback(Some(collect))
+                .user_data((&raw const *messages).cast_mut().cast());
+            let messenger = utils.create_debug_utils_messenger(&info, None).unwrap();
+            let physical = instance.enumerate_physical_devices().unwrap()[0];
+            let device = device(&instance, physical);
+            let queue = device.get_device_queue(0, 0);
+            let pool = device.create_command_pool(&vk::CommandPoolCreateInfo::default(), None).unwrap();
+            Self { _entry: entry, instance, physical, device, queue, pool, messenger: (utils, messenger), messages }
+        }
+    }
+
+    /// What the engine hands over.
+    pub fn raw(&self) -> RawDevice {
+        RawDevice {
+            get_instance_proc_addr: self._entry.static_fn().get_instance_proc_addr as *const c_void,
+            instance: self.instance.handle().as_raw(),
+            physical_device: self.physical.as_raw(),
+            device: self.device.handle().as_raw(),
+            queue: self.queue.as_raw(),
+            queue_family: 0,
+        }
+    }
+
+    /// Begins a command buffer, hands it to `record`, submits it and waits.
+    pub fn run(&self, record: impl FnOnce(vk::CommandBuffer)) {
+        unsafe {
+            let info = vk::CommandBufferAllocateInfo::default().command_pool(self.pool).command_buffer_count(1);
+            let commands = self.device.allocate_command_buffers(&info).unwrap();
+            self.device.begin_command_buffer(commands[0], &vk::CommandBufferBeginInfo::default()).unwrap();
+            record(commands[0]);
+            self.device.end_command_buffer(commands[0]).unwrap();
+            let submit = [vk::SubmitInfo::default().command_buffers(&commands)];
+            self.device.queue_submit(self.queue, &submit, vk::Fence::null()).unwrap();
+            self.device.queue_wait_idle(self.queue).unwrap();
+        }
+    }
+
+    /// What the layers have said so far.
+    pub fn messages(&self) -> Vec<String> {
+        self.messages.lock().unwrap().clone()
+    }
+}
+
+impl Drop for Engine {
+    fn drop(&mut self) {
+        unsafe {
+            self.device.destroy_command_pool(self.pool, None);
+            self.device.destroy_device(None);
+            // Whatever the layer above forgot is reported here.
+            let left = self.messages();
+            self.messenger.0.destroy_debug_utils_messenger(self.messenger.1, None);
+            self.instance.destroy_instance(None);
+            assert!(left.is_empty() || std::thread::panicking(), "{left:#?}");
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! Reads two images of the same scene and measures how far apart they are, with the noise of both set aside.
+use anyhow::{Context, ensure};
+use exr::prelude::*;
+use std::path::Path;
+
+/// Linear RGB, row 0 at the top.
+pub struct Picture {
+    pub width: usize,
+    pub height: usize,
+    pub rgb: Vec<[f32; 3]>,
+}
+
+/// What a pair of images is judged by.
+#[derive(Debug)]
+pub struct Comparison {
+    /// Image mean over reference mean, per channel.
+    pub ratio: [f64; 3],
+    /// Median over pixels of image over reference, where the reference is brighter than a thousandth of its mean.
+    pub median: f64,
+    /// Root mean square over blocks of the relative difference of their means, beyond what noise explains. A misplaced
+    /// shadow, a mirrored texture or a wrong lobe shows here even when the image means agree.
+    pub structure: f64,
+    /// Mean absolute difference of the absolute values per pixel and channel.
+    pub absolute: f64,
+}
+
+/// Reads three channels by name, wherever in the file they are.
+///
+/// # Errors
+/// When the file cannot be read, a channel is missing, or a value is not finite.
+pub fn read(path: &Path, channels: [&str; 3]) -> anyhow::Result<Picture> {
+    let file =
+        exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
+    let image = file.from_file(path).with_context(|| format!("{}", path.display()))?;
+    let planes = channels.map(|name| plane(&image, name));
+    let [Some(r), Some(g), Some(b)] = planes else {
+        anyhow::bail!("{}: the channels {} are not all there", path.display(), channels.join(", "));
+    };
+    ensure!(r.0 == g.0 && g.0 == b.0, "{}: the channels differ in size", path.display());
+    let rgb: Vec<[f32; 3]> = (0..r.1.len()).map(|i| [r.1[i], g.1[i], b.1[i]]).collect();
+    ensure!(rgb.iter().flatten().all(|v| v.is_finite()), "{}: a pixel is not finite", path.display());
+    Ok(Picture { width: r.0.0, height: r.0.1, rgb })
+}
+
+/// Size and values of the channel of this full name: `R`, or `N.X` in a layer `N` or without layers.
+fn plane(image: &FlatImage, name: &str) -> Option<(Vec2<usize>, Vec<f32>)> {
+    image.layer_data.iter().find_map(|layer| {
+        let prefix = layer.attributes.layer_name.as_ref().map(|n| format!("{n}."));
+        layer.channel_data.list.iter().find_map(|channel| {
+            let own = channel.name.to_string();
+            let full = format!("{}{own}", prefix.as_deref().unwrap_or_default());
+            (own == name || full == name).then(|| (layer.size, channel.sample_data.values_as_f32().collect()))
+        })
+    })
+}
+
+/// Mean of the three channels: no colour matters more than another here.
+fn grey(rgb: [f32; 3]) -> f64 {
+    rgb.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0
+}
+
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len().max(1) as f64;
+    values.sum::<f64>() / count
+}
+
+/// # Errors
+/// When the sizes differ.
+pub fn compare(image: &Picture, reference: &Picture) -> anyhow::Result<Comparison> {
+    let (size, wanted) = ((image.width, image.height), (reference.width, reference.height));
+    ensure!(size == wanted, "the image is {} x {}, the reference {} x {}", size.0, size.1, wanted.0, wanted.1);
+    let channel = |p: &Picture, c: usize| mean(p.rgb.iter().map(|v| f64::from(v[c])));
+    // Black against black is agreement.
+    let ratio = |a: f64, b: f64| if a == b { 1.0 } else { a / b };
+    let absolute = image.rgb.iter().flatten().zip(reference.rgb.iter().flatten());
+    Ok(Comparison {
+        ratio: std::array::from_fn(|c| ratio(channel(image, c), channel(reference, c))),
+        median: median_ratio(image, reference),
+        structure: structure(image, reference),
+        absolute: absolute.map(|(a, b)| f64::from((a.abs() - b.abs()).abs())).sum::<f64>()
+            / (3 * image.rgb.len()) as f64,
+    })
+}
+
+fn median_ratio(image: &Picture, reference: &Picture) -> f64 {
+    let floor = 1e-3 * mean(reference.rgb.iter().map(|&v| grey(v)));
+    let pairs = image.rgb.iter().zip(&reference.rgb).map(|(&a, &b)| (grey(a), grey(b)));
+    let mut ratios: Vec<f64> = pairs.filter(|&(_, b)| b > floor).map(|(a, b)| a / b).collect();
+    ratios.sort_by(f64::total_cmp);
+    ratios.get(ratios.len() / 2).copied().unwrap_or(1.0)
+}
+
+/// Image minus reference.
+pub fn difference(image: &Picture, reference: &Picture) -> Picture {
+    let pairs = image.rgb.iter().zip(&reference.rgb);
+    let rgb = pairs.map(|(a, b)| std::array::from_fn(|c| a[c] - b[c])).collect();
+    Picture { width: image.width, height: image.height, rgb }
+}
+
+/// A block's mean difference d has variance v / n from noise alone, v being the variance of the pixels inside; over all
+/// blocks, mean(d^2) - mean(v / n) is what noise does not explain. Differences are relative to the block's own mean, and
+/// to the image's in darker blocks: else the rim of one bright light would outweigh the picture.
+fn structure(image: &Picture, reference: &Picture) -> f64 {
+    let floor = mean(reference.rgb.iter().map(|&v| grey(v)));
+    let (differences, references) = (blocks(&difference(image, reference)), blocks(reference));
+    let excess = differences.iter().zip(&references).map(|(block, wanted)| {
+        let (n, d) = (block.len() as f64, mean(block.iter().copied()));
+        let variance = block.iter().map(|v| (v - d).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+        (d * d - variance / n) / mean(wanted.iter().copied()).max(floor).powi(2)
+    });
+    mean(excess).max(0.0).sqrt()
+}
+
+/// The grey values of square blocks, about 32 along the shorter side, of at least 16 pixels but for those at the rim.
+fn blocks(picture: &Picture) -> Vec<Vec<f64>> {
+    let edge = (picture.width.min(picture.height) / 32).clamp(4, 32);
+    let columns = picture.width.div_ceil(edge);
+    let mut blocks = vec![Vec::new(); columns * picture.height.div_ceil(edge)];
+    for (i, &pixel) in picture.rgb.iter().enumerate() {
+        let (x, y) = (i % picture.width, i / picture.width);
+        blocks[y / edge * columns + x / edge].push(grey(pixel));
+    }
+    blocks
+}
+
+/// Writes the difference as `STEM.exr` and as `STEM.png`, where middle grey is agreement and black or white is off by
+/// the reference's mean.
+pub fn write_difference(difference: &Picture, reference: &Picture, stem: &Path) -> anyhow::Result<()> {
+    let at = |x: usize, y: usize| difference.rgb[y * difference.width + x];
+    let exr = stem.with_extension("exr");
+    let rgb = |x, y| <(f32, f32, f32)>::from(at(x, y));
+    write_rgb_file(&exr, difference.width, difference.height, rgb).with_context(|| format!("{}", exr.display()))?;
+    let scale = 0.5 / mean(reference.rgb.iter().map(|&v| grey(v))).max(f64::MIN_POSITIVE);
+    let byte = |v: f32| ((0.5 + f64::from(v) * scale).clamp(0.0, 1.0) * 255.0).round() as u8;
+    let png = image::RgbImage::from_fn(difference.width as u32, difference.height as u32, |x, y| {
+        image::Rgb(at(x as usize, y as usize).map(byte))
+    });
+    png.save(stem.with_extension("png")).with_context(|| format!("{}.png", stem.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A horizontal ramp with independent noise.
+    fn ramp(seed: u32, noise: f32, brightness: f32) -> Picture {
+        let random = |i: u32| {
+            let h = (i ^ seed.wrapping_mul(0x9e37_79b9)).wrapping_mul(0x85eb_ca6b);
+            let h = (h ^ (h >> 13)).wrapping_mul(0xc2b2_ae35);
+            (h >> 8) as f32 / (1 << 24) as f32 - 0.5
+        };
+        let pixel = |i: u32| [brightness * ((i % 128) as f32 / 127.0 + 0.1) + noise * random(i); 3];
+        Picture { width: 128, height: 128, rgb: (0..128 * 128).map(pixel).collect() }
+    }
+
+    #[test]
+    fn noise_alone_passes() {
+        let c = compare(&ramp(1, 0.3, 1.0), &ramp(2, 0.3, 1.0)).unwrap();
+        assert!(c.ratio.iter().all(|r| (r - 1.0).abs() < 5e-3) && c.structure < 5e-3, "{c:?}");
+    }
+
+    #[test]
+    fn faults_show() {
+        let reference = ramp(2, 0.3, 1.0);
+        let brighter = compare(&ramp(1, 0.3, 1.02), &reference).unwrap();
+        assert!((brighter.ratio[0] - 1.02).abs() < 5e-3 && (brighter.median - 1.02).abs() < 1e-2, "{brighter:?}");
+        // Mirrored left to right: every mean agrees, nothing is in its place.
+        let mut mirrored = ramp(1, 0.3, 1.0);
+        mirrored.rgb.chunks_mut(128).for_each(<[_]>::reverse);
+        let mirrored = compare(&mirrored, &reference).unwrap();
+        assert!((mirrored.ratio[0] - 1.0).abs() < 5e-3 && mirrored.structure > 0.5, "{mirrored:?}");
+        let small = Picture { width: 64, height: 256, rgb: reference.rgb.clone() };
+        assert!(compare(&small, &reference).is_err());
+    }
+}

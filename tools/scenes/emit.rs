@@ -1,0 +1,263 @@
+//! From a JSON description to the tables of a scene file.
+use super::description::{Bitmap, Bsdf, Camera, Color, Description, Emitter, Index, Integrator, Material, Shape};
+use anyhow::{Context, bail, ensure};
+use std::path::{Path, PathBuf};
+use toml::{Table, Value};
+
+/// Paths without a limit go on until roulette ends them; this is Tallow's own limit.
+const UNLIMITED: i64 = 1024;
+/// Long enough that roulette adds little noise.
+const ROULETTE_DEPTH: i64 = 16;
+
+/// What the conversion of a material needs to know beside the description.
+struct Place<'a> {
+    /// The scene's name, for files made beside the scene file.
+    name: &'a str,
+    /// Folder that file names are relative to.
+    folder: &'a Path,
+    /// Folder of the scene file.
+    out: &'a Path,
+}
+
+/// The scene file that says the same as the JSON description at `json`; `fov` replaces its vertical field of view, in
+/// degrees.
+pub fn scene(name: &str, json: &Path, out: &Path, fov: Option<f64>) -> anyhow::Result<Table> {
+    let place = Place { name, folder: json.parent().unwrap_or(Path::new(".")), out };
+    let mut scene = build(&place, json).with_context(|| format!("{}", json.display()))?;
+    if let (Some(fov), Some(camera)) = (fov, scene["camera"].as_table_mut()) {
+        camera.insert("fov".into(), fov.into());
+    }
+    Ok(scene)
+}
+
+fn build(place: &Place, json: &Path) -> anyhow::Result<Table> {
+    let text = std::fs::read_to_string(json).context("cannot be read")?;
+    let description: Description = serde_json::from_str(&text).context("says something that is not modelled")?;
+    let mut scene = film_and_camera(&description.camera)?;
+    scene.insert("render".into(), render(&description.integrator).into());
+    let mut lights = vec![];
+    for emitter in &description.emitters {
+        match emitter {
+            Emitter::Constant { .. } | Emitter::Envmap { .. } => {
+                let environment = environment(place, emitter)?;
+                let before = scene.insert("environment".into(), environment.into());
+                ensure!(before.is_none(), "two environments: only one is modelled");
+            }
+            _ => lights.push(Value::Table(light(emitter)?)),
+        }
+    }
+    if !lights.is_empty() {
+        scene.insert("light".into(), lights.into());
+    }
+    let materials = description
+        .materials
+        .iter()
+        .map(|(name, m)| material(place, name, m).map(Value::Table).with_context(|| format!("material `{name}`")));
+    scene.insert("material".into(), materials.collect::<anyhow::Result<Vec<_>>>()?.into());
+    let meshes = description
+        .shapes
+        .iter()
+        .map(|shape| mesh(place, shape).map(Value::Table).with_context(|| format!("shape `{}`", shape.id)));
+    scene.insert("mesh".into(), meshes.collect::<anyhow::Result<Vec<_>>>()?.into());
+    Ok(scene)
+}
+
+/// A table from pairs.
+fn table<const N: usize>(pairs: [(&str, Value); N]) -> Table {
+    pairs.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+}
+
+fn numbers(values: impl IntoIterator<Item = f64>) -> Value {
+    // Negative zeros are only noise to a reader.
+    Value::Array(values.into_iter().map(|v| Value::Float(v + 0.0)).collect())
+}
+
+fn film_and_camera(camera: &Camera) -> anyhow::Result<Table> {
+    let Camera::Perspective { origin, forward, up, right, fov_y_deg, width, height, rfilter, .. } = camera;
+    ensure!(["box", "tent", "gaussian"].contains(&rfilter.as_str()), "the pixel filter `{rfilter}` is not modelled");
+    let film = table([
+        ("width", i64::from(*width).into()),
+        ("height", i64::from(*height).into()),
+        ("filter", rfilter.as_str().into()),
+    ]);
+    let rows = (0..3).flat_map(|i| [right[i], up[i], -forward[i], origin[i]]).chain([0.0, 0.0, 0.0, 1.0]);
+    let camera = table([("world_from_camera", numbers(rows)), ("fov", (*fov_y_deg).into())]);
+    Ok(table([("film", film.into()), ("camera", camera.into())]))
+}
+
+fn render(integrator: &Integrator) -> Table {
+    let depth = match integrator {
+        Integrator::Direct {} => 2,
+        Integrator::Path { max_depth: -1 } => UNLIMITED,
+        Integrator::Path { max_depth } => *max_depth,
+    };
+    let roulette = if depth > ROULETTE_DEPTH { ROULETTE_DEPTH } else { 0 };
+    table([("max_depth", depth.into()), ("roulette_depth", roulette.into())])
+}
+
+/// Absolute and there.
+fn file(place: &Place, name: &str) -> anyhow::Result<Value> {
+    let path = place.folder.join(name);
+    ensure!(path.is_file(), "{} is missing", path.display());
+    Ok(path.display().to_string().into())
+}
+
+fn environment(place: &Place, emitter: &Emitter) -> anyhow::Result<Table> {
+    match emitter {
+        Emitter::Constant { radiance, .. } => Ok(table([("radiance", numbers(*radiance))])),
+        Emitter::Envmap { filename } => Ok(table([("file", file(place, filename)?)])),
+        _ => bail!("not an environment"),
+    }
+}
+
+fn light(emitter: &Emitter) -> anyhow::Result<Table> {
+    Ok(match emitter {
+        Emitter::Point { position, intensity } => {
+            table([("type", "point".into()), ("position", numbers(*position)), ("intensity", numbers(*intensity))])
+        }
+        Emitter::Directional { direction, irradiance } => table([
+            ("type", "directional".into()),
+            ("direction", numbers(*direction)),
+            ("irradiance", numbers(*irradiance)),
+        ]),
+        _ => bail!("not a light"),
+    })
+}
+
+fn mesh(place: &Place, shape: &Shape) -> anyhow::Result<Table> {
+    let mut mesh = table([("name", shape.id.as_str().into()), ("material", shape.material.as_str().into())]);
+    match shape.kind.as_str() {
+        "obj" => {
+            let name = shape.file.as_deref().context("names no OBJ file")?;
+            mesh.insert("file".into(), file(place, name)?);
+        }
+        "rectangle" | "cube" | "sphere" => _ = mesh.insert("shape".into(), shape.kind.as_str().into()),
+        kind => bail!("the shape type `{kind}` is not modelled; convert it to OBJ"),
+    }
+    if let Some(transform) = transform(shape)? {
+        mesh.insert("transform".into(), numbers(transform));
+    }
+    Ok(mesh)
+}
+
+/// The transform of the unit shape or file, row-major; none where it is the identity.
+fn transform(shape: &Shape) -> anyhow::Result<Option<Vec<f64>>> {
+    let mut m = shape.to_world_row_major.unwrap_or(std::array::from_fn(|i| std::array::from_fn(|j| f64::from(i == j))));
+    ensure!(m[3] == [0.0, 0.0, 0.0, 1.0], "its transform is not affine");
+    if let (Some(center), Some(radius)) = (shape.center, shape.radius) {
+        for row in m.iter_mut().take(3) {
+            row[3] += (0..3).map(|k| row[k] * center[k]).sum::<f64>();
+            row.iter_mut().take(3).for_each(|v| *v *= radius);
+        }
+    }
+    let identity = (0..4).all(|i| (0..4).all(|j| m[i][j] == f64::from(i == j)));
+    Ok((!identity).then(|| m.concat()))
+}
+
+fn material(place: &Place, name: &str, material: &Material) -> anyhow::Result<Table> {
+    let mut out = table([("name", name.into()), ("two_sided", false.into())]);
+    bsdf(place, &material.bsdf, &mut out)?;
+    if let Some(radiance) = material.emission {
+        out.insert("emission".into(), numbers(radiance));
+    }
+    Ok(out)
+}
+
+/// Adds what the BSDF says to `out`.
+fn bsdf(place: &Place, model: &Bsdf, out: &mut Table) -> anyhow::Result<()> {
+    let mut kind = |name: &str| _ = out.insert("type".into(), name.into());
+    match model {
+        Bsdf::Twosided { bsdf: inner, .. } => {
+            out.insert("two_sided".into(), true.into());
+            bsdf(place, inner, out)?;
+        }
+        Bsdf::Mask { opacity, bsdf: inner } => {
+            mask(place, opacity, out)?;
+            bsdf(place, inner, out)?;
+        }
+        Bsdf::Diffuse { reflectance, .. } => {
+            kind("diffuse");
+            color(place, reflectance.as_ref().unwrap_or(&Color::Constant([0.5; 3])), out)?;
+        }
+        Bsdf::Conductor { eta, k } => {
+            kind("conductor");
+            out.extend(table([("alpha", 0.0.into()), ("eta", numbers(*eta)), ("k", numbers(*k))]));
+        }
+        Bsdf::RoughConductor { alpha, distribution, eta, k, specular_reflectance } => {
+            kind("conductor");
+            rough(*alpha, distribution, out)?;
+            out.extend(table([("eta", numbers(*eta)), ("k", numbers(*k))]));
+            out.extend(specular_reflectance.map(|s| ("specular".into(), numbers(s))));
+        }
+        Bsdf::Dielectric { int_ior, ext_ior } => {
+            kind("dielectric");
+            out.extend(table([("alpha", 0.0.into()), ("ior", ratio(int_ior, ext_ior)?)]));
+        }
+        Bsdf::RoughDielectric { alpha, distribution, int_ior, ext_ior } => {
+            kind("dielectric");
+            rough(*alpha, distribution, out)?;
+            out.insert("ior".into(), ratio(int_ior, ext_ior)?);
+        }
+        Bsdf::Plastic { diffuse_reflectance, int_ior, ext_ior } => {
+            kind("coated");
+            out.extend(table([("alpha", 0.0.into()), ("ior", ratio(int_ior, ext_ior)?)]));
+            color(place, diffuse_reflectance, out)?;
+        }
+        Bsdf::RoughPlastic { alpha, distribution, diffuse_reflectance, int_ior, ext_ior } => {
+            kind("coated");
+            rough(*alpha, distribution, out)?;
+            out.insert("ior".into(), ratio(int_ior, ext_ior)?);
+            color(place, diffuse_reflectance, out)?;
+        }
+    }
+    Ok(())
+}
+
+fn rough(alpha: f64, distribution: &str, out: &mut Table) -> anyhow::Result<()> {
+    ensure!(["beckmann", "ggx"].contains(&distribution), "the distribution `{distribution}` is not modelled");
+    out.extend(table([("alpha", alpha.into()), ("distribution", distribution.into())]));
+    Ok(())
+}
+
+fn ratio(interior: &Index, exterior: &Index) -> anyhow::Result<Value> {
+    Ok((interior.value()? / exterior.value()?).into())
+}
+
+fn color(place: &Place, color: &Color, out: &mut Table) -> anyhow::Result<()> {
+    match color {
+        Color::Constant(rgb) => out.insert("color".into(), numbers(*rgb)),
+        Color::Bitmap(Bitmap::Bitmap { filename, .. }) => {
+            out.insert("color".into(), numbers([1.0; 3]));
+            out.insert("color_texture".into(), file(place, filename)?)
+        }
+    };
+    Ok(())
+}
+
+fn mask(place: &Place, opacity: &Color, out: &mut Table) -> anyhow::Result<()> {
+    match opacity {
+        Color::Constant(_) => bail!("a constant opacity is not modelled"),
+        Color::Bitmap(Bitmap::Bitmap { filename, .. }) => {
+            let path = grey_mask(place, filename)?;
+            out.insert("opacity_texture".into(), path.display().to_string().into());
+        }
+    }
+    Ok(())
+}
+
+/// Mitsuba masks with an image's decoded luminance and ignores its alpha; Tallow takes the alpha, and linear values. So
+/// a grey image of those values is written beside the scene file.
+fn grey_mask(place: &Place, filename: &str) -> anyhow::Result<PathBuf> {
+    let source = place.folder.join(filename);
+    let image = image::open(&source).with_context(|| format!("cannot read {}", source.display()))?;
+    let mut grey = image.to_luma8();
+    for pixel in grey.pixels_mut() {
+        let s = f32::from(pixel.0[0]) / 255.0;
+        let linear = if s <= 0.04045 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) };
+        pixel.0[0] = (linear * 255.0).round() as u8;
+    }
+    let stem = source.file_stem().unwrap_or_default().to_string_lossy();
+    let path = place.out.canonicalize()?.join(format!("{}-{stem}.png", place.name));
+    grey.save(&path).with_context(|| format!("cannot write {}", path.display()))?;
+    Ok(path)
+}
