@@ -33,8 +33,7 @@ void main() {
     Hit hit = traverse(ray.origin, ray.direction, 3e38, false, push.root, pcg(pixel));
     Guide guide = Guide(vec3(0.0), 0.0, vec3(0.0), NONE, vec3(0.0), NONE);
     if (hit.triangle != NONE) {
-        float pixel_angle = 2.0 * length(camera.up) / float(push.size.y);
-        Surface s = surface_at(hit, ray.direction, pixel_angle * hit.t);
+        Surface s = surface_at(hit);
         guide.normal = dot(s.normal, ray.direction) > 0.0 ? -s.normal : s.normal;
         guide.depth = hit.t + camera.near;
         guide.position = s.position;

@@ -45,10 +45,8 @@ struct Path {
     vec3 origin;
     vec3 direction;
     vec3 throughput;
-    float bsdf_pdf;   // of `direction`; 0 after a smooth interface or from the camera
-    float cone_width; // ray cone at the origin, world units
-    float cone_spread;
-    bool delta;       // no light sampling competes for what `direction` hits
+    float bsdf_pdf; // of `direction`; 0 after a smooth interface or from the camera
+    bool delta;     // no light sampling competes for what `direction` hits
 };
 
 struct Light2 {
@@ -108,7 +106,7 @@ vec3 light_from_nee(Path path, Surface s, Bsdf bsdf, mat3 basis, vec3 wo, Sample
 }
 
 // Chooses the next direction. False when the path ends.
-bool scatter(inout Path path, Surface s, Bsdf bsdf, mat3 basis, vec3 wo, float t, Sampler random, uint pair) {
+bool scatter(inout Path path, Surface s, Bsdf bsdf, mat3 basis, vec3 wo, Sampler random, uint pair) {
     BsdfSample next;
     float lobe = sample_2d(random, pair + PAIR_CHOICE).y;
     if (!bsdf_sample(bsdf, wo, lobe, sample_2d(random, pair + PAIR_BSDF), next)) return false;
@@ -118,9 +116,6 @@ bool scatter(inout Path path, Surface s, Bsdf bsdf, mat3 basis, vec3 wo, float t
     path.origin = offset_origin(s.position, normal);
     path.bsdf_pdf = next.pdf;
     path.delta = next.delta;
-    path.cone_width += path.cone_spread * t;
-    float rough = bsdf.kind == BSDF_DIFFUSE ? 0.3 : bsdf.alpha; // how far a lobe opens the cone, radians
-    path.cone_spread = next.delta ? path.cone_spread : max(path.cone_spread, rough);
     return max(path.throughput.r, max(path.throughput.g, path.throughput.b)) > 0.0;
 }
 
@@ -145,7 +140,7 @@ Light2 trace_path(Path path, Sampler random, uint path_seed, out vec3 albedo) {
             add_light(sum, path.throughput * light_from_miss(path), indirect);
             break;
         }
-        Surface s = surface_at(hit, path.direction, path.cone_width + path.cone_spread * hit.t);
+        Surface s = surface_at(hit);
         add_light(sum, path.throughput * light_from_hit(path, s, hit.t), indirect);
         if (bounce + 1u >= push.max_depth) break;
 
@@ -164,7 +159,7 @@ Light2 trace_path(Path path, Sampler random, uint path_seed, out vec3 albedo) {
             vec3 light = light_from_nee(path, s, bsdf, basis, wo, random, pair, mask_seed + 1u);
             add_light(sum, path.throughput * light, bounce >= 1u && !smooth_first);
         }
-        if (!scatter(path, s, bsdf, basis, wo, hit.t, random, pair)) break;
+        if (!scatter(path, s, bsdf, basis, wo, random, pair)) break;
         bool roulette = FX_ROULETTE && push.roulette_depth > 0u && bounce + 1u >= push.roulette_depth;
         if (roulette && !survives_roulette(path, random, pair)) break;
     }
@@ -184,8 +179,7 @@ void main() {
     uint index = push.first_sample + i / push.pixels;
     Sampler random = sampler_start(pixel, index, push.seed);
     Ray ray = camera_ray(push.camera, film_sample(pixel, random), FX_LENS ? sample_2d(random, PAIR_LENS) : vec2(0.0));
-    float pixel_angle = 2.0 * length(push.camera.up) / float(push.size.y);
-    Path path = Path(ray.origin, ray.direction, vec3(1.0), 0.0, 0.0, pixel_angle, true);
+    Path path = Path(ray.origin, ray.direction, vec3(1.0), 0.0, true);
     uint path_seed = pcg(pcg(pixel ^ push.seed) + index);
     vec3 albedo;
     Light2 light = trace_path(path, random, path_seed, albedo);

@@ -148,7 +148,7 @@ const PLACES: [&str; 4] = [
 fn differences(a: &Scene, b: &Scene, rays: &[(Vec3, Vec3)]) -> (usize, usize) {
     let judge = |&(origin, direction): &(Vec3, Vec3)| {
         let hits = [a, b].map(|s| (s, closest(s, origin, direction)));
-        let [p, q] = hits.map(|(scene, hit)| hit.any().then(|| surface_at(scene, &hit, direction, 0.0)));
+        let [p, q] = hits.map(|(scene, hit)| hit.any().then(|| surface_at(scene, &hit)));
         let (Some(p), Some(q)) = (p, q) else { return (hits[0].1.any() != hits[1].1.any(), false) };
         let same = p.object == q.object
             && p.material == q.material
@@ -157,7 +157,6 @@ fn differences(a: &Scene, b: &Scene, rays: &[(Vec3, Vec3)]) -> (usize, usize) {
             && p.normal.dot(q.normal) > 0.999
             && (p.uv - q.uv).length() < 1e-3
             && occluded(a, origin, direction, FAR)
-            && (p.lod - q.lod).abs() < 0.01;
         (!same, true)
     };
     let judged: Vec<_> = rays.par_iter().map(judge).collect();

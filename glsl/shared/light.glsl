@@ -106,7 +106,7 @@ void sample_triangle_light(vec3 p, vec3 a, vec3 b, vec3 c, float chosen, vec2 u,
         if (triangle != NONE) {
             uint image = material_texel(words.w, 7u).x;
             radiance = uintBitsToFloat(material_texel(words.w, 1u).xyz) *
-                       texture_sample(image, texture_coordinates(triangle, bary), 0.0).rgb;
+                       texture_sample(image, texture_coordinates(triangle, bary)).rgb;
         }
     }
     bool lit = cosine > 0.0 && d2 > 0.0;

@@ -8,7 +8,6 @@ struct Surface {
     uint flags;     // of the material
     uint object;
     vec2 uv;
-    float lod;      // log2 of the ray cone's footprint in units of uv; add the texture's size
 };
 
 vec3 octahedral_decode(uint bits) {
@@ -28,7 +27,7 @@ vec3 perturbed_normal(Surface s, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
     vec3 dpdv = (d1.x * e2 - d2.x * e1) / det;
     vec3 n;
     if (FX_NORMAL_MAPS && (!FX_BUMP_MAPS || (s.flags & MATERIAL_NORMAL_MAP) != 0u)) {
-        vec3 m = 2.0 * texture_sample(image, s.uv, s.lod + texture_size_log2(image)).xyz - 1.0;
+        vec3 m = 2.0 * texture_sample(image, s.uv).xyz - 1.0;
         vec3 t = dpdu - s.normal * dot(s.normal, dpdu);
         t *= inversesqrt(max(dot(t, t), 1e-30));
         vec3 b = cross(s.normal, t);
@@ -36,11 +35,10 @@ vec3 perturbed_normal(Surface s, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
     } else {
         float height = uintBitsToFloat(material_texel(s.material, 4u).w);
         uvec4 words = texelFetch(textures, int(image));
-        float lod = s.lod + texture_size_log2(image);
-        vec2 texel = exp2(max(lod, 0.0)) / vec2(words.yz);
-        float h = texture_sample(image, s.uv, lod).r;
-        float hu = (texture_sample(image, s.uv + vec2(texel.x, 0.0), lod).r - h) / texel.x;
-        float hv = (texture_sample(image, s.uv + vec2(0.0, texel.y), lod).r - h) / texel.y;
+        vec2 texel = 1.0 / vec2(words.yz);
+        float h = texture_sample(image, s.uv).r;
+        float hu = (texture_sample(image, s.uv + vec2(texel.x, 0.0)).r - h) / texel.x;
+        float hv = (texture_sample(image, s.uv + vec2(0.0, texel.y)).r - h) / texel.y;
         vec3 pu = dpdu + s.normal * (height * hu - dot(s.normal, dpdu));
         vec3 pv = dpdv + s.normal * (height * hv - dot(s.normal, dpdv));
         n = cross(pu, pv);
@@ -50,8 +48,7 @@ vec3 perturbed_normal(Surface s, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
     return len > 1e-30 && len < 1e38 ? n * inversesqrt(len) : s.normal; // not where uv spans no or all of space
 }
 
-// `width` is the ray cone's width at the hit, in world units.
-Surface surface_at(Hit hit, vec3 direction, float width) {
+Surface surface_at(Hit hit) {
     Surface s;
     vec3 p0 = triangle_vertex(hit.triangle, 0);
     vec3 e1 = triangle_vertex(hit.triangle, 1) - p0;
@@ -77,7 +74,6 @@ Surface surface_at(Hit hit, vec3 direction, float width) {
     s.geometric = scaled / doubled_area;
     s.normal = s.geometric;
     s.uv = vec2(0.0);
-    s.lod = 0.0;
     if (!(FX_SMOOTH_NORMALS || FX_TEXTURES || FX_BUMP_MAPS || FX_NORMAL_MAPS)) return s;
 
     int at = int(3u * hit.triangle);
@@ -95,9 +91,6 @@ Surface surface_at(Hit hit, vec3 direction, float width) {
         vec2 d1 = uintBitsToFloat(w1.yz) - uv0;
         vec2 d2 = uintBitsToFloat(uvec2(w1.w, w2)) - uv0;
         s.uv = uv0 + hit.barycentric.x * d1 + hit.barycentric.y * d2;
-        float uv_area = abs(d1.x * d2.y - d2.x * d1.y);
-        float facing = max(abs(dot(s.geometric, direction)), 1e-3);
-        s.lod = 0.5 * log2(max(uv_area, 1e-30) / doubled_area) + log2(max(width, 1e-30) / facing);
         if (FX_BUMP_MAPS || FX_NORMAL_MAPS) s.normal = perturbed_normal(s, e1, e2, d1, d2);
     }
     return s;
@@ -105,15 +98,15 @@ Surface surface_at(Hit hit, vec3 direction, float width) {
 
 vec3 textured(vec3 constant, uint image, Surface s) {
     if (!FX_TEXTURES || image == NONE) return constant;
-    return constant * texture_sample(image, s.uv, s.lod + texture_size_log2(image)).rgb;
+    return constant * texture_sample(image, s.uv).rgb;
 }
 
-// Radiance that the surface emits from its front side; at full resolution, as light sampling sees it.
+// Radiance that the surface emits from its front side.
 vec3 surface_emission(Surface s) {
     vec3 emission = uintBitsToFloat(material_texel(s.material, 1u).xyz);
     if (!FX_TEXTURES) return emission;
     uint image = material_texel(s.material, 7u).x;
-    return image == NONE ? emission : emission * texture_sample(image, s.uv, 0.0).rgb;
+    return image == NONE ? emission : emission * texture_sample(image, s.uv).rgb;
 }
 
 Bsdf surface_bsdf(Surface s) {
@@ -136,7 +129,7 @@ Bsdf surface_bsdf(Surface s) {
         b.specular = textured(uintBitsToFloat(material_texel(s.material, 4u).xyz), m6.x, s);
         if (FX_COATED) b.internal_fresnel = uintBitsToFloat(material_texel(s.material, 7u).y);
         if (FX_TEXTURES && m6.w != NONE) {
-            float r = texture_sample(m6.w, s.uv, s.lod + texture_size_log2(m6.w)).r; // perceptual: alpha = r^2
+            float r = texture_sample(m6.w, s.uv).r; // perceptual: alpha = r^2
             b.alpha *= r * r;
         }
     }

@@ -7,7 +7,7 @@ use crate::reference::sampler::pcg;
 use crate::reference::surface::{surface_at, surface_bsdf};
 use crate::reference::traverse::traverse;
 use crate::scene::Scene;
-use glam::{Vec2, Vec3, vec2};
+use glam::{Vec2, vec2};
 
 /// The primary hit through the centre of `pixel` (row-major), from the middle of the lens.
 pub fn guide(scene: &Scene, push: &PathPush, pixel: u32) -> Guide {
@@ -18,8 +18,7 @@ pub fn guide(scene: &Scene, push: &PathPush, pixel: u32) -> Guide {
     if !hit.any() {
         return Guide { object: NONE, material: NONE, ..Guide::default() };
     }
-    let pixel_angle = 2.0 * Vec3::from(camera.up).length() / push.size[1] as f32;
-    let s = surface_at(scene, &hit, ray.direction, pixel_angle * hit.t);
+    let s = surface_at(scene, &hit);
     let normal = if s.normal.dot(ray.direction) > 0.0 { -s.normal } else { s.normal };
     Guide {
         normal: normal.into(),

@@ -111,7 +111,7 @@ fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> Ligh
     if light.triangle != NONE {
         let material = &scene.materials[light.material as usize];
         let uv = texture_coordinates(scene, light.triangle, bary);
-        radiance = Vec3::from(material.emission) * texture_sample(scene, material.emission_texture, uv, 0.0).truncate();
+        radiance = Vec3::from(material.emission) * texture_sample(scene, material.emission_texture, uv).truncate();
     }
     let lit = cosine > 0.0 && d2 > 0.0;
     let pdf = if lit { light.probability * 2.0 * d2 / (cosine * doubled_area) } else { 0.0 };

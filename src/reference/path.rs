@@ -1,5 +1,5 @@
 //! Twin of `glsl/path.comp`.
-use crate::gpu::layout::{BSDF_DIELECTRIC, BSDF_DIFFUSE, Effects, MATERIAL_TWO_SIDED, NONE, PathPush};
+use crate::gpu::layout::{BSDF_DIELECTRIC, Effects, MATERIAL_TWO_SIDED, NONE, PathPush};
 use crate::reference::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
 use crate::reference::camera::{camera_ray, film_from_pixel};
 use crate::reference::light::*;
@@ -53,8 +53,6 @@ struct Path {
     direction: Vec3,
     throughput: Vec3,
     bsdf_pdf: f32,
-    cone_width: f32,
-    cone_spread: f32,
     delta: bool,
 }
 
@@ -156,7 +154,7 @@ impl Tracer<'_> {
         if blocker.any() { Vec3::ZERO } else { contribution }
     }
 
-    fn scatter(&self, path: &mut Path, p: &Shade, t: f32, random: Sampler) -> bool {
+    fn scatter(&self, path: &mut Path, p: &Shade, random: Sampler) -> bool {
         let lobe = sample_2d(random, p.pair + PAIR_CHOICE).y;
         let (scattered, next) = bsdf_sample(&p.bsdf, p.wo, lobe, sample_2d(random, p.pair + PAIR_BSDF));
         if !scattered {
@@ -169,9 +167,6 @@ impl Tracer<'_> {
         path.origin = offset_origin(p.surface.position, normal);
         path.bsdf_pdf = next.pdf;
         path.delta = next.delta;
-        path.cone_width += path.cone_spread * t;
-        let rough = if p.bsdf.kind == BSDF_DIFFUSE { 0.3 } else { p.bsdf.alpha };
-        path.cone_spread = if next.delta { path.cone_spread } else { path.cone_spread.max(rough) };
         path.throughput.max_element() > 0.0
     }
 
@@ -204,7 +199,7 @@ impl Tracer<'_> {
                 self.add_light(&mut sum, path.throughput * self.light_from_miss(&path), indirect);
                 break;
             }
-            let s = surface_at(self.scene, &hit, path.direction, path.cone_width + path.cone_spread * hit.t);
+            let s = surface_at(self.scene, &hit);
             self.add_light(&mut sum, path.throughput * self.light_from_hit(&path, &s, hit.t), indirect);
             if bounce + 1 >= self.push.max_depth {
                 break;
@@ -219,7 +214,7 @@ impl Tracer<'_> {
                 let light = self.light_from_nee(&p, random, mask_seed.wrapping_add(1));
                 self.add_light(&mut sum, path.throughput * light, bounce >= 1 && !smooth_first);
             }
-            if !self.scatter(&mut path, &p, hit.t, random) {
+            if !self.scatter(&mut path, &p, random) {
                 break;
             }
             let from = self.push.roulette_depth;
@@ -236,15 +231,8 @@ impl Tracer<'_> {
         let random = sampler_start(pixel, index, self.push.seed, self.effects.independent_sampler);
         let lens = if self.effects.lens { sample_2d(random, PAIR_LENS) } else { Vec2::ZERO };
         let ray = camera_ray(&self.push.camera, self.film_sample(pixel, random), lens);
-        let path = Path {
-            origin: ray.origin,
-            direction: ray.direction,
-            throughput: Vec3::ONE,
-            bsdf_pdf: 0.0,
-            cone_width: 0.0,
-            cone_spread: 2.0 * Vec3::from(self.push.camera.up).length() / self.push.size[1] as f32,
-            delta: true,
-        };
+        let path =
+            Path { origin: ray.origin, direction: ray.direction, throughput: Vec3::ONE, bsdf_pdf: 0.0, delta: true };
         self.trace_path(path, random, pcg(pcg(pixel ^ self.push.seed).wrapping_add(index)))
     }
 }

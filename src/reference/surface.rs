@@ -2,7 +2,7 @@
 use crate::gpu::layout::{MATERIAL_NORMAL_MAP, Material, NONE};
 use crate::reference::bsdf::Bsdf;
 use crate::reference::scene::{material_of, object_from_world, triangle_vertices, world_from_object};
-use crate::reference::texture::{texture_sample, texture_size_log2};
+use crate::reference::texture::texture_sample;
 use crate::reference::traverse::Hit;
 use crate::scene::Scene;
 use glam::{Vec2, Vec3, vec2, vec3};
@@ -24,8 +24,6 @@ pub struct Surface {
     pub object: u32,
     /// Texture coordinates.
     pub uv: Vec2,
-    /// log2 of the ray cone's footprint in units of uv.
-    pub lod: f32,
 }
 
 /// Unit normal from two snorm words of 16 bits.
@@ -47,7 +45,7 @@ struct Edges {
 }
 
 fn normal_from_map(scene: &Scene, s: &Surface, image: u32, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
-    let m = 2.0 * texture_sample(scene, image, s.uv, s.lod + texture_size_log2(scene, image)).truncate() - 1.0;
+    let m = 2.0 * texture_sample(scene, image, s.uv).truncate() - 1.0;
     let t = dpdu - s.normal * s.normal.dot(dpdu);
     let t = t * (1.0 / t.dot(t).max(1e-30).sqrt());
     let b = s.normal.cross(t);
@@ -57,9 +55,8 @@ fn normal_from_map(scene: &Scene, s: &Surface, image: u32, dpdu: Vec3, dpdv: Vec
 fn normal_from_height(scene: &Scene, s: &Surface, material: &Material, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
     let image = material.bump_texture;
     let texture = &scene.textures[image as usize];
-    let lod = s.lod + texture_size_log2(scene, image);
-    let texel = lod.max(0.0).exp2() / vec2(texture.width as f32, texture.height as f32);
-    let height = |offset| texture_sample(scene, image, s.uv + offset, lod).x;
+    let texel = 1.0 / vec2(texture.width as f32, texture.height as f32);
+    let height = |offset| texture_sample(scene, image, s.uv + offset).x;
     let h = height(Vec2::ZERO);
     let hu = (height(vec2(texel.x, 0.0)) - h) / texel.x;
     let hv = (height(vec2(0.0, texel.y)) - h) / texel.y;
@@ -86,8 +83,8 @@ fn perturbed_normal(scene: &Scene, s: &Surface, e: &Edges) -> Vec3 {
     if len > 1e-30 && len < 1e38 { n * (1.0 / len.sqrt()) } else { s.normal }
 }
 
-/// Position, normals and footprint. `width` is the ray cone's width at the hit, in world units.
-pub fn surface_at(scene: &Scene, hit: &Hit, direction: Vec3, width: f32) -> Surface {
+/// Position and normals.
+pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
     let [mut p0, p1, p2] = triangle_vertices(scene, hit.triangle);
     let (mut e1, mut e2) = (p1 - p0, p2 - p0);
     let mut object = scene.triangles[hit.triangle as usize].object;
@@ -110,7 +107,6 @@ pub fn surface_at(scene: &Scene, hit: &Hit, direction: Vec3, width: f32) -> Surf
         flags: scene.materials[material as usize].flags,
         object,
         uv: Vec2::ZERO,
-        lod: 0.0,
     };
     let Some(shading) = scene.shading.get(hit.triangle as usize) else { return s };
     if shading.normal != [0xffffffff; 3] {
@@ -123,9 +119,6 @@ pub fn surface_at(scene: &Scene, hit: &Hit, direction: Vec3, width: f32) -> Surf
     let [uv0, uv1, uv2] = [shading.uv0, shading.uv1, shading.uv2].map(Vec2::from);
     let (d1, d2) = (uv1 - uv0, uv2 - uv0);
     s.uv = uv0 + hit.barycentric.x * d1 + hit.barycentric.y * d2;
-    let uv_area = (d1.x * d2.y - d2.x * d1.y).abs();
-    let facing = geometric.dot(direction).abs().max(1e-3);
-    s.lod = 0.5 * (uv_area.max(1e-30) / doubled_area).log2() + (width.max(1e-30) / facing).log2();
     s.normal = perturbed_normal(scene, &s, &Edges { e1, e2, d1, d2 });
     s
 }
@@ -134,7 +127,7 @@ fn textured(scene: &Scene, constant: [f32; 3], image: u32, s: &Surface) -> Vec3 
     let constant = Vec3::from(constant);
     match image {
         NONE => constant,
-        _ => constant * texture_sample(scene, image, s.uv, s.lod + texture_size_log2(scene, image)).truncate(),
+        _ => constant * texture_sample(scene, image, s.uv).truncate(),
     }
 }
 
@@ -143,7 +136,7 @@ pub fn surface_emission(scene: &Scene, s: &Surface) -> Vec3 {
     let material = &scene.materials[s.material as usize];
     match material.emission_texture {
         NONE => material.emission.into(),
-        image => Vec3::from(material.emission) * texture_sample(scene, image, s.uv, 0.0).truncate(),
+        image => Vec3::from(material.emission) * texture_sample(scene, image, s.uv).truncate(),
     }
 }
 
@@ -154,8 +147,7 @@ pub fn surface_bsdf(scene: &Scene, s: &Surface) -> Bsdf {
     b.albedo = textured(scene, material.base_color, material.base_texture, s);
     b.specular = textured(scene, material.specular, material.specular_texture, s);
     if material.roughness_texture != NONE {
-        let lod = s.lod + texture_size_log2(scene, material.roughness_texture);
-        let r = texture_sample(scene, material.roughness_texture, s.uv, lod).x;
+        let r = texture_sample(scene, material.roughness_texture, s.uv).x;
         b.alpha *= r * r;
     }
     b

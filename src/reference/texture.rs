@@ -1,9 +1,9 @@
 //! Twin of `glsl/shared/texture.glsl`.
-use crate::gpu::layout::{MATERIAL_MASKED, NONE, TEXTURE_CLAMP, TEXTURE_SRGB};
+use crate::gpu::layout::{MATERIAL_MASKED, NONE, TEXTURE_CLAMP, TEXTURE_SRGB, Texture};
 use crate::reference::sampler::pcg;
 use crate::reference::scene::{material_of, texture_coordinates};
 use crate::scene::Scene;
-use glam::{IVec2, UVec2, Vec2, Vec3, Vec4, ivec2, uvec2, vec2};
+use glam::{IVec2, Vec2, Vec3, Vec4, ivec2, vec2};
 
 fn linear_from_srgb(c: Vec3) -> Vec3 {
     c.map(|c| if c > 0.04045 { ((c + 0.055) / 1.055).powf(2.4) } else { c / 12.92 })
@@ -19,38 +19,25 @@ fn into_range(at: i32, edge: i32, clamp: bool) -> i32 {
     }
 }
 
-fn texture_texel(scene: &Scene, flags: u32, first: u32, size: UVec2, at: IVec2) -> Vec4 {
-    let (edge, clamp) = (size.as_ivec2(), flags & TEXTURE_CLAMP != 0);
+fn texture_texel(scene: &Scene, image: &Texture, at: IVec2) -> Vec4 {
+    let (edge, clamp) = (ivec2(image.width as i32, image.height as i32), image.flags & TEXTURE_CLAMP != 0);
     let (x, y) = (into_range(at.x, edge.x, clamp), into_range(at.y, edge.y, clamp));
-    let bytes = scene.texels[first as usize + (y * edge.x + x) as usize].to_le_bytes();
+    let bytes = scene.texels[image.first as usize + (y * edge.x + x) as usize].to_le_bytes();
     let c = Vec4::from(bytes.map(|b| f32::from(b) / 255.0));
-    if flags & TEXTURE_SRGB != 0 { linear_from_srgb(c.truncate()).extend(c.w) } else { c }
+    if image.flags & TEXTURE_SRGB != 0 { linear_from_srgb(c.truncate()).extend(c.w) } else { c }
 }
 
-/// Bilinear within one mip level; `lod` in levels of this texture, 0 = full resolution.
-pub fn texture_sample(scene: &Scene, index: u32, uv: Vec2, lod: f32) -> Vec4 {
+/// Bilinear.
+pub fn texture_sample(scene: &Scene, index: u32, uv: Vec2) -> Vec4 {
     let image = &scene.textures[index as usize];
-    let levels = (image.flags >> 8) & 0xff;
-    let level = (lod + 0.5).clamp(0.0, (levels - 1) as f32) as u32;
-    let (mut first, mut size) = (image.first, uvec2(image.width, image.height));
-    for _ in 0..level {
-        first += size.x * size.y;
-        size = uvec2((size.x >> 1).max(1), (size.y >> 1).max(1));
-    }
     let wrapped = if image.flags & TEXTURE_CLAMP != 0 { uv.clamp(Vec2::ZERO, Vec2::ONE) } else { uv - uv.floor() };
-    let at = vec2(wrapped.x, 1.0 - wrapped.y) * size.as_vec2() - 0.5;
+    let at = vec2(wrapped.x, 1.0 - wrapped.y) * vec2(image.width as f32, image.height as f32) - 0.5;
     let corner = at.floor().as_ivec2();
     let f = at - corner.as_vec2();
-    let texel = |dx, dy| texture_texel(scene, image.flags, first, size, corner + ivec2(dx, dy));
+    let texel = |dx, dy| texture_texel(scene, image, corner + ivec2(dx, dy));
     let top = texel(0, 0).lerp(texel(1, 0), f.x);
     let low = texel(0, 1).lerp(texel(1, 1), f.x);
     top.lerp(low, f.y)
-}
-
-/// Half the binary logarithm of the number of texels.
-pub fn texture_size_log2(scene: &Scene, index: u32) -> f32 {
-    let image = &scene.textures[index as usize];
-    0.5 * (image.width as f32 * image.height as f32).log2()
 }
 
 /// Whether a partly transparent surface stops a ray, decided by a hash of `seed`.
@@ -62,7 +49,7 @@ pub fn mask_blocks(scene: &Scene, triangle: u32, instance: u32, barycentric: Vec
     let mut opacity = material.opacity;
     if material.opacity_texture != NONE {
         let uv = texture_coordinates(scene, triangle, barycentric);
-        opacity *= texture_sample(scene, material.opacity_texture, uv, 0.0).x;
+        opacity *= texture_sample(scene, material.opacity_texture, uv).x;
     }
     let surface = triangle.wrapping_mul(0x9e3779b9) ^ instance.wrapping_mul(0x85ebca6b);
     opacity > (pcg(seed ^ surface) >> 8) as f32 * 5.9604645e-8
