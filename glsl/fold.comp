@@ -7,7 +7,7 @@
 // Adds a batch of samples to the statistics of their pixels. One thread folds one pixel, in order of sample index, so
 // the result does not depend on how samples were batched (Welford 1962).
 layout(local_size_x = 64) in;
-layout(scalar, binding = 0) readonly buffer Samples { vec3 samples[]; };
+layout(binding = 0) uniform samplerBuffer samples; // of vec4
 layout(scalar, binding = 1) buffer Stats { PixelStats stats[]; };
 layout(scalar, binding = 2) buffer Lights { PixelLight light[]; };
 layout(scalar, push_constant) uniform Push { FoldPush push; };
@@ -26,13 +26,13 @@ void main() {
         if (FX_SPLIT) l = light[pixel];
     }
     for (uint k = 0u; k < push.samples; k++) {
-        uint at = k * push.pixels + i;
+        int at = int(k * push.pixels + i);
         vec3 radiance;
         s.count++;
         float share = 1.0 / float(s.count);
         if (FX_SPLIT) {
-            vec3 direct = samples[3u * at], indirect = samples[3u * at + 1u];
-            vec3 albedo = samples[3u * at + 2u];
+            vec3 direct = texelFetch(samples, 3 * at).rgb, indirect = texelFetch(samples, 3 * at + 1).rgb;
+            vec3 albedo = texelFetch(samples, 3 * at + 2).rgb;
             bvec3 divides = greaterThan(albedo, vec3(SMALLEST_ALBEDO));
             vec3 irradiance = mix(vec3(0.0), indirect / max(albedo, vec3(SMALLEST_ALBEDO)), divides);
             vec3 kept = direct + mix(indirect, vec3(0.0), divides);
@@ -40,7 +40,7 @@ void main() {
             l.direct += (kept - l.direct) * share;
             l.indirect += (irradiance - l.indirect) * share;
         } else {
-            radiance = samples[at];
+            radiance = texelFetch(samples, at).rgb;
         }
         vec3 off = radiance - s.mean;
         s.mean += off * share;

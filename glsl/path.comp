@@ -6,10 +6,10 @@
 #include "shared/scene.glsl"
 
 // One camera path per thread: next event estimation and BSDF sampling joined by the balance heuristic (Veach 1997).
-// Thread i traces sample first_sample + i / pixels of pixel first_pixel + i % pixels and writes 1 vec3 (radiance), or
-// with FX_SPLIT 3 (direct, indirect, the albedo that indirect is to be divided by).
+// Thread i traces sample first_sample + i / pixels of pixel first_pixel + i % pixels and writes 1 vec4 (radiance), or
+// with FX_SPLIT 3 (direct, indirect, the albedo that indirect is to be divided by); w is 0.
 layout(local_size_x_id = 100) in;
-layout(scalar, binding = 11) writeonly buffer Samples { vec3 samples[]; };
+layout(scalar, binding = 11) writeonly buffer Samples { vec4 samples[]; };
 layout(scalar, binding = 12) buffer Counters { uint counters[]; };
 layout(scalar, push_constant) uniform Push { PathPush push; };
 
@@ -184,11 +184,11 @@ void main() {
     vec3 albedo;
     Light2 light = trace_path(path, random, path_seed, albedo);
     if (FX_SPLIT) {
-        samples[3u * i] = light.direct;
-        samples[3u * i + 1u] = light.indirect;
-        samples[3u * i + 2u] = albedo;
+        samples[3u * i] = vec4(light.direct, 0.0);
+        samples[3u * i + 1u] = vec4(light.indirect, 0.0);
+        samples[3u * i + 2u] = vec4(albedo, 0.0);
     } else {
-        samples[i] = light.direct + light.indirect;
+        samples[i] = vec4(light.direct + light.indirect, 0.0);
     }
     if (FX_COUNTERS) {
         count(0u, closest_rays);

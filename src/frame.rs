@@ -124,8 +124,8 @@ fn shading<'a>(scene: &'a Scene, effects: &Effects) -> Cow<'a, [Shading]> {
 
 /// What a frame writes. Buffers that the outputs do not call for hold one element.
 pub struct FilmBuffers {
-    /// vec3 per sample in flight, three with direct and indirect light apart; overwritten by every batch.
-    pub samples: Buffer<vec3>,
+    /// vec4 per sample in flight, three with direct and indirect light apart; overwritten by every batch.
+    pub samples: Buffer<vec4>,
     /// Per pixel.
     pub stats: Buffer<PixelStats>,
     /// Per pixel, where direct and indirect light are wanted apart.

@@ -212,7 +212,7 @@ pub fn all_effects(scene: &Scene) -> Effects {
 /// that the samples fit a storage buffer.
 fn paths_in_flight(gpu: &Gpu, settings: &Settings, effects: &Effects) -> u32 {
     let wanted: u64 = if gpu.info().kind == "CPU" { 1 << 20 } else { 1 << 22 };
-    let bytes = if effects.split_light { 36 } else { 12 };
+    let bytes = if effects.split_light { 48 } else { 16 };
     let room = gpu.info().max_storage_range / bytes;
     let all = settings.pixels() as u64 * u64::from(settings.spp);
     wanted.min(room).min(all).max(1) as u32

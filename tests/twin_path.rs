@@ -156,7 +156,7 @@ fn differences(a: &Scene, b: &Scene, rays: &[(Vec3, Vec3)]) -> (usize, usize) {
             && p.geometric.dot(q.geometric) > 0.9999
             && p.normal.dot(q.normal) > 0.999
             && (p.uv - q.uv).length() < 1e-3
-            && occluded(a, origin, direction, FAR)
+            && occluded(a, origin, direction, FAR);
         (!same, true)
     };
     let judged: Vec<_> = rays.par_iter().map(judge).collect();
