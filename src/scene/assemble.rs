@@ -201,7 +201,8 @@ impl Assembly<'_> {
         if scene.instances.is_empty() {
             (low, high) = (Vec3::ZERO, Vec3::ZERO);
         }
-        if !(low.abs().max(high.abs()).max_element() <= super::MAX_COORDINATE as f32) {
+        let far = low.abs().max(high.abs()).max_element();
+        if far.is_nan() || far > super::MAX_COORDINATE as f32 {
             return Err(self.at("instances", format!("reach beyond the limit of {:e}", super::MAX_COORDINATE)));
         }
         scene.bounds = [low.to_array(), high.to_array()];
