@@ -167,7 +167,7 @@ fn models_alone_get_a_camera_and_a_sky() {
     let triangle = "v 0 0 0\nv 4 0 0\nv 0 4 0\nv nan 0 0\n";
     let scene = load("a.obj", &format!("{triangle}f 1 2 3\nf 1 2 2\nf 1 2 4\n")).unwrap();
     assert_eq!((scene.triangles.len(), scene.lights[0].kind), (1, LIGHT_ENVIRONMENT));
-    let repaired = &scene.warnings[1];
+    let repaired = &scene.warnings[0];
     assert!(repaired.contains("1 with NaN or infinite coordinates dropped, 1 without area dropped"), "{repaired}");
     let eye = glam::Vec3::from(scene.camera.position) - glam::Vec3::new(2.0, 2.0, 0.0);
     assert!(eye.normalize().dot(glam::Vec3::from(scene.camera.forward)) < -0.999, "it looks at the middle");

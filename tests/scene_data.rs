@@ -66,3 +66,42 @@ fn sponza_is_ready_in_two_seconds() {
         assert!(best < 2.0);
     }
 }
+
+/// A grid of bumps written as quads, without normals.
+fn write_grid(path: &Path, side: u32) -> std::io::Result<()> {
+    use std::io::Write;
+    let mut out = std::io::BufWriter::new(std::fs::File::create(path)?);
+    for y in 0..=side {
+        for x in 0..=side {
+            writeln!(out, "v {x} {} {y}", ((x * 7 + y * 13) % 17) as f32 * 0.1)?;
+        }
+    }
+    for y in 0..side {
+        for x in 0..side {
+            let first = y * (side + 1) + x + 1;
+            writeln!(out, "f {first} {} {} {}", first + side + 1, first + side + 2, first + 1)?;
+        }
+    }
+    out.flush()
+}
+
+/// Most memory this process ever held, in bytes (Linux).
+fn peak_memory() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM"))?;
+    line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib * 1024)
+}
+
+#[test]
+#[ignore = "takes a minute, 4 GiB of memory and 300 MB of disk"]
+fn ten_million_triangles_load_within_four_gibibytes() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("grid.obj");
+    write_grid(&path, 2237).unwrap();
+    let start = Instant::now();
+    let scene = Scene::load(&path, &|_| {}).unwrap();
+    assert!(scene.triangles.len() > 10_000_000);
+    let peak = peak_memory().expect("Linux tells") as f64 / f64::from(1 << 30);
+    println!("{} triangles in {:.1} s, peak {peak:.2} GiB", scene.triangles.len(), start.elapsed().as_secs_f64());
+    assert!(peak < 4.0);
+}

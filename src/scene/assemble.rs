@@ -43,14 +43,14 @@ pub fn assemble(path: &Path, description: &Description, sky: bool, scene: &mut S
     let mut a = Assembly { path, description, library, files, geometry };
     a.materials()?;
     a.read_files()?;
-    a.lights(sky, scene)?;
+    a.lights(scene)?;
     let plan = a.plan()?;
     let stored = a.store(&plan)?;
     let textures = std::mem::take(&mut a.library.materials.textures);
     let (decoded, built) = rayon::join(|| textures.decode(), || a.build(&plan, stored, scene));
     let ranges = built?;
     (scene.textures, scene.texels) = decoded.map(|d| (d.textures, d.texels))?;
-    a.finish(&ranges, scene);
+    a.finish(&ranges, sky, scene);
     Ok(())
 }
 
@@ -111,14 +111,10 @@ impl Assembly<'_> {
     }
 
     /// Lights without surface, and the environment.
-    fn lights(&mut self, sky: bool, scene: &mut Scene) -> Result<()> {
+    fn lights(&mut self, scene: &mut Scene) -> Result<()> {
         for (i, table) in self.description.light.iter().enumerate() {
             let light = table.build().map_err(|what| self.at(format!("light {}", i + 1), what))?;
             scene.lights.push(light);
-        }
-        let emits = self.library.materials.list.iter().any(|m| m.emission != [0.0; 3]);
-        if sky && !emits && scene.lights.is_empty() {
-            scene.lights.push(light::environment([1.0; 3], glam::DMat3::IDENTITY));
         }
         let Some(table) = &self.description.environment else { return Ok(()) };
         let scale = table.scale.map_or([1.0; 3], |s| s.0);
@@ -205,7 +201,8 @@ impl Assembly<'_> {
         if scene.instances.is_empty() {
             (low, high) = (Vec3::ZERO, Vec3::ZERO);
         }
-        if !(low.abs().max(high.abs()).max_element() <= super::MAX_COORDINATE as f32) {
+        let far = low.abs().max(high.abs()).max_element();
+        if far.is_nan() || far > super::MAX_COORDINATE as f32 {
             return Err(self.at("instances", format!("reach beyond the limit of {:e}", super::MAX_COORDINATE)));
         }
         scene.bounds = [low.to_array(), high.to_array()];
@@ -214,7 +211,7 @@ impl Assembly<'_> {
     }
 
     /// Moves what is left into the scene and chooses among its lights.
-    fn finish(mut self, ranges: &HashMap<u32, Range<usize>>, scene: &mut Scene) {
+    fn finish(mut self, ranges: &HashMap<u32, Range<usize>>, sky: bool, scene: &mut Scene) {
         let [low, high] = scene.bounds.map(Vec3::from);
         if self.library.materials.list.is_empty() {
             self.library.grey();
@@ -225,6 +222,10 @@ impl Assembly<'_> {
         }
         (scene.materials, scene.names.materials) = (materials.list, materials.names);
         (scene.triangles, scene.shading) = (self.geometry.triangles, self.geometry.shading);
+        let emits = |t: &crate::gpu::layout::Triangle| scene.materials[t.material as usize].emission != [0.0; 3];
+        if sky && scene.lights.is_empty() && !scene.triangles.iter().any(emits) {
+            scene.lights.push(light::environment([1.0; 3], glam::DMat3::IDENTITY));
+        }
         light::finish(scene, ranges);
         if !scene.lights.iter().any(|l| l.kind == LIGHT_ENVIRONMENT) {
             scene.environment = None;

@@ -104,15 +104,17 @@ fn build<T: Boundable>(items: &[T], first: u32, nodes: &mut Vec<BvhNode>) -> (u3
     (root, bvh.primitive_indices)
 }
 
-/// Search distance 6 and 2 % reinsertion: measured on Crytek Sponza, the next preset builds twice as long for 2 % fewer
-/// nodes visited.
+/// Search distance 6, then reinsertion. On Crytek Sponza, reinserting 10 % of the nodes instead of 2 % builds in 0.42 s
+/// instead of 0.21 s and visits 5 % fewer nodes per ray (Sibenik 4 %, a 100k dragon 3 %); larger search distances visit
+/// no fewer. Meshes so large that loading takes seconds keep to 2 %.
 fn compressed<T: Boundable>(items: &[T]) -> obvhs::cwbvh::CwBvh {
     let indices = (0..items.len() as u32).collect();
     let mut bvh2 = {
         let mut builder = PlocBuilder::with_capacity(items.len());
         builder.build(PlocSearchDistance::Low, items, indices, SortPrecision::U64, 2)
     };
-    ReinsertionOptimizer::default().run(&mut bvh2, 0.02, None);
+    let share = if items.len() > 1_000_000 { 0.02 } else { 0.1 };
+    ReinsertionOptimizer::default().run(&mut bvh2, share, None);
     bvh2.parents = Vec::new();
     bvh2_to_cwbvh(&bvh2, LEAF, true, false)
 }

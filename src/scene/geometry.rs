@@ -86,7 +86,7 @@ impl Geometry {
         }
         let mut p = c.p.map(|p| at.affine.transform_point3(p.as_dvec3()).as_vec3());
         let far = p.iter().map(|p| p.abs().max_element()).fold(0.0, f32::max);
-        if !(far <= super::MAX_COORDINATE as f32) {
+        if far > super::MAX_COORDINATE as f32 {
             return Err(TooFar(far));
         }
         // A mirror turns windings around; swapping two corners keeps the outside of the mesh outside.

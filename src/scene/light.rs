@@ -69,7 +69,7 @@ impl LightTable {
                 let a = position()?;
                 let cutoff = self.cutoff.unwrap_or(20.0);
                 let cone = self.cone.unwrap_or(cutoff * 0.75);
-                if !(0.0..=cutoff).contains(&cone) || !(cutoff > 0.0 && cutoff <= 180.0) {
+                if !((0.0..=cutoff).contains(&cone) && cutoff > 0.0 && cutoff <= 180.0) {
                     return Err(format!("cone {cone} and cutoff {cutoff}: need 0 <= cone <= cutoff <= 180 degrees"));
                 }
                 let c = [cone.to_radians().cos(), cutoff.to_radians().cos(), 0.0];

@@ -90,9 +90,7 @@ fn statement(mtl: &mut Mtl, key: &str, rest: &str) -> std::result::Result<(), St
         let (name, value) = if name == "Tr" { ("d", 1.0 - value) } else { (name, value) };
         mtl.numbers.insert(name, value);
     } else if let Some(&(_, name)) = MAPS.iter().find(|(k, _)| k.eq_ignore_ascii_case(key)) {
-        if let Some(map) = map(rest) {
-            mtl.maps.insert(name, map);
-        }
+        mtl.maps.extend(map(rest).map(|map| (name, map)));
     }
     Ok(())
 }

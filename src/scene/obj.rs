@@ -4,7 +4,7 @@ use super::mtl::{self, Mtl};
 use super::obj_lines::ObjLines;
 use crate::error::{Error, Result};
 use std::cell::RefCell;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -116,6 +116,7 @@ pub fn parse(path: &Path, reader: impl std::io::BufRead, library: &mut Library) 
     let mut lines = ObjLines::new(reader);
     // tobj numbers materials in the order its loader returns them; this is the same list with scene indices.
     let found: RefCell<Vec<u32>> = RefCell::default();
+    let known: RefCell<HashSet<String>> = RefCell::default();
     let failure: RefCell<Option<Error>> = RefCell::default();
     let shared = RefCell::new(&mut *library);
     let loader = |statement: &Path| {
@@ -129,6 +130,7 @@ pub fn parse(path: &Path, reader: impl std::io::BufRead, library: &mut Library) 
             Vec::new()
         });
         found.borrow_mut().extend(names.iter().map(|n| n.1));
+        known.borrow_mut().extend(names.iter().map(|n| n.0.clone()));
         let blocks = names.iter().map(|n| tobj::Material { name: n.0.clone(), ..Default::default() }).collect();
         Ok((blocks, names.into_iter().enumerate().map(|(i, n)| (n.0, i)).collect()))
     };
@@ -144,9 +146,9 @@ pub fn parse(path: &Path, reader: impl std::io::BufRead, library: &mut Library) 
     };
     let found = found.into_inner();
     let index = |m: &tobj::Model| m.mesh.material_id.and_then(|i| found.get(i).copied());
-    let unknown = models.iter().filter(|m| index(m).is_none() && !m.mesh.indices.is_empty()).count();
-    if unknown > 0 {
-        let what = format!("{}: {unknown} objects have no known material: grey is used", path.display());
+    let unknown: Vec<_> = lines.worn.iter().filter(|name| !known.borrow().contains(*name)).cloned().collect();
+    if !unknown.is_empty() {
+        let what = format!("{}: grey is used for materials defined nowhere: {}", path.display(), unknown.join(", "));
         library.warnings.push(what);
     }
     let materials = models.iter().map(|m| index(m).unwrap_or_else(|| library.grey())).collect();
@@ -232,7 +234,7 @@ mod tests {
         let file = parse(Path::new("a.obj"), text.as_bytes(), &mut library).unwrap();
         assert_eq!(file.materials, [red, library.grey()]);
         assert!(library.warnings[0].contains("none.mtl not found"), "{:?}", library.warnings);
-        assert!(library.warnings[1].contains("1 objects have no known material"));
+        assert!(library.warnings[1].ends_with("defined nowhere: what"));
     }
 
     #[test]

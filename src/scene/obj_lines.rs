@@ -2,6 +2,7 @@
 //! colours dropped, and every face index is checked against what is defined above it, so that errors have a line.
 //! Where faces with and without normals (texture coordinates) alternate, a group statement is slipped in between:
 //! tobj would otherwise lend a corner the normal of its neighbour.
+use std::collections::BTreeSet;
 use std::io::{BufRead, Read};
 
 /// A `BufRead` over the mended lines.
@@ -16,6 +17,8 @@ pub struct ObjLines<R> {
     /// Has texture coordinates, has normals; of the last face.
     format: Option<[bool; 2]>,
     group: String,
+    /// Names after `usemtl`.
+    pub worn: BTreeSet<String>,
     /// Number of the last line read, from 1.
     pub line: usize,
     /// What is wrong with a face, and its line.
@@ -32,8 +35,8 @@ impl<R: BufRead> ObjLines<R> {
     pub fn new(inner: R) -> Self {
         let out = format!("mtllib {}\n", Self::TABLES).into_bytes();
         let group = "unnamed_object".to_owned();
-        let (raw, defined, format) = (Vec::new(), [0; 3], None);
-        Self { inner, out, used: 0, raw, defined, format, group, line: 0, error: None }
+        let (raw, defined, format, worn) = (Vec::new(), [0; 3], None, BTreeSet::new());
+        Self { inner, out, used: 0, raw, defined, format, group, worn, line: 0, error: None }
     }
 
     /// Reads the next line, with its continuations, into `raw`; false at the end.
@@ -88,6 +91,9 @@ impl<R: BufRead> ObjLines<R> {
             "o" | "g" => {
                 self.group = rest.trim().to_owned();
                 self.format = None;
+            }
+            "usemtl" if !self.worn.contains(rest.trim()) => {
+                self.worn.insert(rest.trim().to_owned());
             }
             // Lines carry nothing that a path tracer shows, and tobj would check their indices late.
             "l" | "p" => return Ok(()),

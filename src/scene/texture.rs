@@ -131,10 +131,10 @@ fn dimensions(path: &Path) -> Result<(u32, u32)> {
 fn load(path: &Path, kind: Kind, t: Texture, space: &mut [u32]) -> Result<()> {
     let picture = reader(path)?.decode().map_err(|e| damaged(path, e))?;
     let has_alpha = picture.color().has_alpha();
-    let rgba = picture.into_rgba8();
-    if (rgba.width(), rgba.height()) != (t.width, t.height) {
+    if (picture.width(), picture.height()) != (t.width, t.height) {
         return Err(Error::input(path, "has another size than its header says: save it again"));
     }
+    let rgba = picture.into_rgba8();
     let same = |v: u8| u32::from_le_bytes([v; 4]);
     for (texel, p) in space.iter_mut().zip(rgba.pixels()) {
         *texel = match kind {
@@ -159,26 +159,46 @@ fn shrink(width: u32, height: u32, srgb: bool, mut space: &mut [u32]) {
 }
 
 fn halve(above: &[u32], (w, h): (u32, u32), below: &mut [u32], (bw, bh): (u32, u32), srgb: bool) {
-    let linear = |v: u8, color: bool| if color { u32::from(CURVES.linear[v as usize]) } else { u32::from(v) * 257 };
-    for y in 0..bh {
-        let rows = span(y, bh, h);
-        for x in 0..bw {
-            let (mut sum, mut count) = ([0u32; 4], 0);
-            for row in rows.clone() {
-                for column in span(x, bw, w) {
-                    let texel = above[(row * w + column) as usize].to_le_bytes();
-                    for c in 0..4 {
-                        sum[c] += linear(texel[c], srgb && c < 3);
-                    }
-                    count += 1;
-                }
-            }
-            let mean = sum.map(|s| (s + count / 2) / count);
-            let byte =
-                |c: usize| if srgb && c < 3 { CURVES.srgb[mean[c] as usize] } else { ((mean[c] + 128) / 257) as u8 };
-            below[(y * bw + x) as usize] = u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)]);
+    let even = w == 2 * bw && h == 2 * bh;
+    for (y, out) in below[..(bw * bh) as usize].chunks_exact_mut(bw as usize).enumerate() {
+        let rows = span(y as u32, bh, h);
+        if even {
+            let (upper, lower) = above[(rows.start * w) as usize..].split_at(w as usize);
+            let pairs = upper.chunks_exact(2).zip(lower.chunks_exact(2));
+            out.iter_mut().zip(pairs).for_each(|(o, (a, b))| *o = average([a[0], a[1], b[0], b[1]], srgb));
+        } else {
+            let cell =
+                |x: u32| rows.clone().flat_map(move |r| span(x, bw, w).map(move |c| above[(r * w + c) as usize]));
+            (0..bw).for_each(|x| out[x as usize] = average_any(cell(x), srgb));
         }
     }
+}
+
+/// Mean of four texels: the usual case, without division.
+fn average(texels: [u32; 4], srgb: bool) -> u32 {
+    let bytes = texels.map(u32::to_le_bytes);
+    let data = |c: usize| ((bytes.iter().map(|b| u32::from(b[c])).sum::<u32>() + 2) >> 2) as u8;
+    let light = |c: usize| bytes.iter().map(|b| u32::from(CURVES.linear[b[c] as usize])).sum::<u32>();
+    let color = |c: usize| CURVES.srgb[((light(c) + 2) >> 2) as usize];
+    u32::from_le_bytes(match srgb {
+        true => [color(0), color(1), color(2), data(3)],
+        false => [data(0), data(1), data(2), data(3)],
+    })
+}
+
+/// Mean of any number of texels (at most nine: an odd edge's).
+fn average_any(texels: impl Iterator<Item = u32>, srgb: bool) -> u32 {
+    let (mut sum, mut count) = ([0u32; 4], 0);
+    for texel in texels {
+        let bytes = texel.to_le_bytes();
+        for c in 0..4 {
+            sum[c] += if srgb && c < 3 { CURVES.linear[bytes[c] as usize].into() } else { u32::from(bytes[c]) };
+        }
+        count += 1;
+    }
+    let mean = sum.map(|s| (s + count / 2) / count);
+    let byte = |c: usize| if srgb && c < 3 { CURVES.srgb[mean[c] as usize] } else { mean[c] as u8 };
+    u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)])
 }
 
 /// Texels of the level above that texel `i` of `count` covers.
