@@ -1,0 +1,200 @@
+//! Rays per second: the traversal kernel on the device against obvhs's own traversal on two threads, over the same tree
+//! and the same 512 x 512 incoherent rays of Crytek Sponza, in turn.
+//!   TALLOW_DATA=../shared cargo run --release --example bench-traverse [ROUNDS]
+#![allow(missing_docs)]
+use anyhow::{Context, Result, ensure};
+use glam::{Vec3, Vec3A, vec2};
+use obvhs::cwbvh::CwBvh;
+use obvhs::ray::{Ray, RayHit as HostHit};
+use obvhs::rt_triangle::RtTriangle;
+use rayon::prelude::*;
+use std::path::Path;
+use std::time::Instant;
+use tallow::gpu::layout::{self, Effects, NONE, RayHit, RayQuery, TraversePush};
+use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Kernel, Location};
+use tallow::reference::light::INFINITE_DISTANCE;
+use tallow::reference::sampler::{sample_2d, sampler_start};
+use tallow::reference::surface::{offset_origin, surface_at};
+use tallow::reference::traverse::traverse;
+use tallow::reference::warp::{basis_from_normal, warp_cosine_hemisphere};
+use tallow::renderer::{Outputs, Renderer};
+use tallow::scene::Scene;
+use tallow::settings::Settings;
+use tallow::shaders::traverse::Bind;
+
+const RAYS: usize = 512 * 512;
+const THREADS: usize = 2;
+/// Rays that a thread takes at a time.
+const CHUNK: usize = 4096;
+/// Threads of a workgroup, as path.comp has; then the id of its specialisation constant.
+const WORKGROUP: u32 = 32;
+const WORKGROUP_ID: u32 = 100;
+
+/// What either side finds: distance and triangle in leaf order (any hit: any value for a hit), [`NONE`] on a miss.
+type Found = (f32, u32);
+
+/// The bounce of camera ray `i`, from the hall of Sponza towards its far end; `None` where that leaves the scene.
+fn bounce(scene: &Scene, i: u32) -> Option<RayQuery> {
+    let [low, high] = scene.bounds.map(Vec3::from);
+    let eye = low + (high - low) * Vec3::new(0.2, 0.3, 0.5);
+    let random = sampler_start(i, 0, 1, true);
+    let film = 2.0 * sample_2d(random, 0) - vec2(1.0, 1.0);
+    let direction = Vec3::new(1.0, film.y, film.x).normalize();
+    let hit = traverse(scene, eye, direction, INFINITE_DISTANCE, false, 0);
+    if !hit.any() {
+        return None;
+    }
+    let s = surface_at(scene, &hit, direction, 0.0);
+    let normal = if s.geometric.dot(direction) > 0.0 { -s.geometric } else { s.geometric };
+    let direction = basis_from_normal(normal) * warp_cosine_hemisphere(sample_2d(random, 1));
+    let origin = offset_origin(s.position, normal).to_array();
+    let direction = direction.normalize().to_array();
+    Some(RayQuery { origin, t_max: INFINITE_DISTANCE, direction, mask_seed: 0 })
+}
+
+/// obvhs over the nodes that Tallow built with it.
+struct Host {
+    bvh: CwBvh,
+    triangles: Vec<RtTriangle>,
+    rays: Vec<Ray>,
+    threads: rayon::ThreadPool,
+}
+
+impl Host {
+    fn new(scene: &Scene, rays: &[RayQuery]) -> Result<Self> {
+        let triangle = |t: &layout::Triangle| RtTriangle::new(t.v0.into(), t.v1.into(), t.v2.into());
+        let ray = |r: &RayQuery| Ray::new_inf(Vec3A::from(r.origin), Vec3A::from(r.direction));
+        let nodes = scene.nodes.iter().map(|n| bytemuck::cast(*n)).collect();
+        Ok(Self {
+            bvh: CwBvh { nodes, ..CwBvh::default() },
+            triangles: scene.triangles.iter().map(triangle).collect(),
+            rays: rays.iter().map(ray).collect(),
+            threads: rayon::ThreadPoolBuilder::new().num_threads(THREADS).build()?,
+        })
+    }
+
+    fn closest(&self, ray: &Ray) -> Found {
+        let mut hit = HostHit::none();
+        self.bvh.ray_traverse(*ray, &mut hit, |ray, i| self.triangles[i].intersect(ray));
+        (hit.t, hit.primitive_id)
+    }
+
+    fn any(&self, ray: &Ray) -> Found {
+        let miss = self.bvh.ray_traverse_miss(*ray, |ray, i| self.triangles[i].intersect(ray));
+        (0.0, if miss { NONE } else { 0 })
+    }
+
+    /// Seconds, and what was found.
+    fn run(&self, any_hit: bool) -> (f64, Vec<Found>) {
+        let begun = Instant::now();
+        let rays = || self.rays.par_iter().with_min_len(CHUNK);
+        let found = self.threads.install(|| match any_hit {
+            true => rays().map(|r| self.any(r)).collect(),
+            false => rays().map(|r| self.closest(r)).collect(),
+        });
+        (begun.elapsed().as_secs_f64(), found)
+    }
+}
+
+/// The traversal kernel and what it reads.
+struct Device {
+    gpu: Gpu,
+    frame: FrameResources,
+    kernel: Kernel<Bind<'static>>,
+    renderer: Renderer,
+    rays: Buffer<RayQuery>,
+    hits: Buffer<RayHit>,
+    root: u32,
+}
+
+impl Device {
+    fn new(scene: &Scene, rays: &[RayQuery]) -> Result<Self> {
+        let gpu = Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), validation: false })?;
+        // obvhs knows no masks, so neither side tests them.
+        let effects = Effects::default();
+        Ok(Self {
+            frame: FrameResources::new(&gpu)?,
+            kernel: Kernel::new(&gpu, &effects, &[(WORKGROUP_ID, WORKGROUP)])?,
+            renderer: Renderer::specialised(&gpu, scene, Outputs::default(), effects)?,
+            rays: Buffer::from_slice(&gpu, "rays", rays)?,
+            hits: Buffer::new(&gpu, "hits", rays.len(), Location::Device)?,
+            root: scene.root,
+            gpu,
+        })
+    }
+
+    /// Seconds by the device's timestamps, and what was found.
+    fn run(&mut self, any_hit: bool) -> Result<(f64, Vec<Found>)> {
+        let count = self.rays.len() as u32;
+        let push = TraversePush { count, root: self.root, any_hit: u32::from(any_hit) };
+        let s = self.renderer.scene();
+        let times = self.gpu.run(&mut self.frame, |rec| {
+            let bind = Bind {
+                nodes: &s.nodes,
+                triangles: &s.triangles,
+                shading: &s.shading,
+                instances: &s.instances,
+                materials: &s.materials,
+                textures: &s.textures,
+                texels: &s.texels,
+                lights: &s.lights,
+                light_table: &s.light_table,
+                environment: &s.environment,
+                environment_table: &s.environment_table,
+                rays: &self.rays,
+                hits: &self.hits,
+            };
+            rec.dispatch(&self.kernel, bind, &push, [count.div_ceil(WORKGROUP), 1, 1])
+        })?;
+        let pass = times.first().context("the device has no timestamps")?;
+        let found = self.hits.read()?.iter().map(|h| (h.t, h.triangle)).collect();
+        Ok(((pass.end_ns - pass.begin_ns) as f64 * 1e-9, found))
+    }
+}
+
+/// Rays on which the two sides differ: in whether they hit or, for closest hits, in the distance.
+fn differing(a: &[Found], b: &[Found], any_hit: bool) -> usize {
+    let differs = |(a, b): (&Found, &Found)| {
+        let near = any_hit || a.1 == b.1 || (a.0 - b.0).abs() <= 1e-4 * a.0;
+        (a.1 == NONE) != (b.1 == NONE) || !near
+    };
+    a.iter().zip(b).filter(|&pair| differs(pair)).count()
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Prints a row per side and their ratio.
+fn compare(name: &str, host: &Host, device: &mut Device, rounds: usize, any_hit: bool) -> Result<()> {
+    let differ = differing(&host.run(any_hit).1, &device.run(any_hit)?.1, any_hit); // and warm both up
+    let share = differ as f64 / host.rays.len() as f64;
+    ensure!(share < 1e-3, "{name}: the two sides differ on {differ} rays");
+    let (mut ours, mut theirs) = (Vec::new(), Vec::new());
+    for _ in 0..rounds {
+        theirs.push(host.rays.len() as f64 / host.run(any_hit).0 * 1e-6);
+        ours.push(host.rays.len() as f64 / device.run(any_hit)?.0 * 1e-6);
+    }
+    let (ours, theirs) = (median(&mut ours), median(&mut theirs));
+    println!("{name:8} {ours:8.2} Mray/s, obvhs {theirs:8.2} Mray/s, ratio {:.2}; {differ} rays differ", ours / theirs);
+    Ok(())
+}
+
+fn main() -> Result<()> {
+    let Some(data) = std::env::var_os("TALLOW_DATA") else {
+        println!("skipped: TALLOW_DATA names no folder of outside data");
+        return Ok(());
+    };
+    let rounds = std::env::args().nth(1).map_or(Ok(7), |n| n.parse()).context("ROUNDS is a number")?;
+    let small = |s: &mut Settings| (s.width, s.height, s.spp) = (16, 16, 1);
+    let scene = Scene::load(&Path::new(&data).join("scenes/crytek-sponza/sponza.obj"), &small)?;
+    let mut rays: Vec<_> = (0..2 * RAYS as u32).into_par_iter().filter_map(|i| bounce(&scene, i)).collect();
+    ensure!(rays.len() >= RAYS, "the camera sees little of the scene");
+    rays.truncate(RAYS);
+    let host = Host::new(&scene, &rays)?;
+    let mut device = Device::new(&scene, &rays)?;
+    println!("{}: {} triangles, {RAYS} rays, median of {rounds}", device.gpu.info().name, scene.triangles.len());
+    compare("closest", &host, &mut device, rounds, false)?;
+    compare("any", &host, &mut device, rounds, true)
+}
