@@ -233,16 +233,15 @@ gpu_structs! {
         pad: uint,
     }
 
-    /// A picture in the texel buffer: RGBA8 texels (R in the low byte), row 0 at the top, mip levels one after another,
-    /// level l being max(1, width >> l) x max(1, height >> l). 1 fetch plus.
+    /// A picture in the texel buffer: RGBA8 texels (R in the low byte), row 0 at the top. 1 texel.
     struct Texture {
-        /// Index of the first texel of level 0.
+        /// Index of the first texel.
         first: uint,
         /// Texels.
         width: uint,
         /// Texels.
         height: uint,
-        /// TEXTURE_ bits; the number of mip levels in bits 8 to 15.
+        /// TEXTURE_ bits.
         flags: uint,
     }
 

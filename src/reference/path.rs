@@ -138,7 +138,7 @@ impl Tracer<'_> {
         let f = bsdf_evaluate(&p.bsdf, p.wo, p.basis.transpose() * light.direction);
         let weight = if light.pdf > 0.0 { self.balance(light.pdf, f.w, Strategy::Light) } else { 1.0 };
         let contribution = f.truncate() * light.radiance * weight;
-        if !(contribution.max_element() > 0.0) {
+        if contribution.max_element() <= 0.0 || contribution.is_nan() {
             return Vec3::ZERO;
         }
         let normal = if light.direction.dot(s.geometric) < 0.0 { -s.geometric } else { s.geometric };

@@ -44,7 +44,7 @@ fn bounce(scene: &Scene, i: u32) -> Option<RayQuery> {
     if !hit.any() {
         return None;
     }
-    let s = surface_at(scene, &hit, direction, 0.0);
+    let s = surface_at(scene, &hit);
     let normal = if s.geometric.dot(direction) > 0.0 { -s.geometric } else { s.geometric };
     let direction = basis_from_normal(normal) * warp_cosine_hemisphere(sample_2d(random, 1));
     let origin = offset_origin(s.position, normal).to_array();
