@@ -7,7 +7,7 @@ use super::{Scene, bvh, environment, light};
 use crate::error::{Error, Result};
 use crate::gpu::layout::{LIGHT_ENVIRONMENT, NONE};
 use glam::{DAffine3, Vec3};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -42,14 +42,13 @@ pub fn assemble(path: &Path, description: &Description, sky: bool, scene: &mut S
     let (library, files, geometry) = Default::default();
     let mut a = Assembly { path, description, library, files, geometry };
     a.materials()?;
-    a.read_files()?;
-    a.lights(scene)?;
-    let plan = a.plan()?;
-    let stored = a.store(&plan)?;
-    let textures = std::mem::take(&mut a.library.materials.textures);
-    let (decoded, built) = rayon::join(|| textures.decode(), || a.build(&plan, stored, scene));
-    let ranges = built?;
-    (scene.textures, scene.texels) = decoded.map(|d| (d.textures, d.texels))?;
+    // Textures are decoded while geometry is read: on two cores Crytek Sponza is ready a quarter sooner.
+    a.read_libraries()?;
+    let early = a.library.materials.textures.clone();
+    let (decoded, built) = rayon::join(|| early.decode(), || a.geometry(scene));
+    let (ranges, textures) = (built?, &a.library.materials.textures);
+    let decoded = if textures.len() == early.len() { decoded? } else { textures.decode()? };
+    (scene.textures, scene.texels) = (decoded.textures, decoded.texels);
     a.finish(&ranges, sky, scene);
     Ok(())
 }
@@ -92,6 +91,21 @@ impl Assembly<'_> {
             (None, Some(near)) => Err(self.at(place, format!("no material \"{name}\": did you mean \"{near}\"?"))),
             (None, None) => Err(self.at(place, format!("no material \"{name}\": add a [[material]] table"))),
         }
+    }
+
+    /// Reads the MTL files that OBJ files name near their beginning; others are read when they turn up.
+    fn read_libraries(&mut self) -> Result<()> {
+        let paths: BTreeSet<_> = self.description.mesh.iter().filter_map(|m| self.file_of(m)).collect();
+        paths.iter().try_for_each(|path| obj::read_libraries(path, &mut self.library))
+    }
+
+    /// Everything but textures; returns the triangles below each root that instances name.
+    fn geometry(&mut self, scene: &mut Scene) -> Result<HashMap<u32, Range<usize>>> {
+        self.read_files()?;
+        self.lights(scene)?;
+        let plan = self.plan()?;
+        let stored = self.store(&plan)?;
+        self.build(&plan, stored, scene)
     }
 
     /// Parses every file before geometry is placed: whether texture coordinates are kept depends on all materials.

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
 /// A parsed OBJ file.
@@ -61,7 +61,7 @@ impl Library {
     }
 
     /// Materials of an `mtllib` statement: one file whose name may hold spaces, or several files.
-    fn mtllib(&mut self, obj: &Path, statement: &str) -> Result<Vec<(String, u32)>> {
+    fn mtllib(&mut self, obj: &Path, statement: &str, report: bool) -> Result<Vec<(String, u32)>> {
         let directory = obj.parent().unwrap_or(Path::new(""));
         let written = statement.trim().replace('\\', "/");
         let files = match mtl::find_file(directory, &written) {
@@ -72,6 +72,7 @@ impl Library {
         for file in files {
             match mtl::find_file(directory, &file) {
                 Some((path, _)) => names.extend(self.mtl(&path)?),
+                None if !report => {}
                 None => {
                     let what = format!("{}: material library {file} not found: grey is used", obj.display());
                     self.warnings.push(what);
@@ -99,6 +100,23 @@ fn split_files(statement: &str) -> Vec<String> {
     files
 }
 
+/// Reads the MTL files named within an OBJ file's first 64 KiB. A file that cannot be opened is left to [`load`].
+///
+/// # Errors
+/// [`Error::Input`] for a malformed MTL file.
+pub fn read_libraries(path: &Path, library: &mut Library) -> Result<()> {
+    let Ok(file) = File::open(path) else { return Ok(()) };
+    let mut head = Vec::new();
+    let _ = file.take(1 << 16).read_to_end(&mut head); // what could be read is enough
+    let head = String::from_utf8_lossy(&head);
+    let statements = head.lines().filter_map(|l| l.trim_start().strip_prefix("mtllib "));
+    for statement in statements {
+        // One that is missing is reported when the whole file is read.
+        library.mtllib(path, statement, false)?;
+    }
+    Ok(())
+}
+
 /// Reads an OBJ file and the MTL files it names.
 ///
 /// # Errors
@@ -123,7 +141,7 @@ pub fn parse(path: &Path, reader: impl std::io::BufRead, library: &mut Library) 
         let mut library = shared.borrow_mut();
         let names = match statement.to_str() {
             Some(ObjLines::<&[u8]>::TABLES) => Ok(library.tables.iter().map(|(n, &i)| (n.clone(), i)).collect()),
-            _ => library.mtllib(path, &statement.to_string_lossy()),
+            _ => library.mtllib(path, &statement.to_string_lossy(), true),
         };
         let names = names.unwrap_or_else(|e| {
             failure.borrow_mut().get_or_insert(e);

@@ -175,7 +175,7 @@ impl Assembly<'_> {
         first: u32,
         repairs: &mut Repairs,
     ) -> std::result::Result<Vec<String>, TooFar> {
-        let uvs = !self.library.materials.textures.is_empty();
+        let uvs = self.library.materials.textures.len() > 0;
         let at = Placement { affine: job.affine, flat: table.flat, flip: table.flip_normals, uvs };
         let (mut names, mut previous, mut primitive) = (Vec::new(), None, 0);
         for (model, &own) in file.models.iter().zip(&file.materials) {

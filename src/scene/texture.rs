@@ -21,7 +21,7 @@ pub enum Kind {
 }
 
 /// The pictures that materials asked for, each once per kind.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct TextureSet {
     wanted: Vec<(PathBuf, Kind, bool)>,
     index: HashMap<(PathBuf, Kind, bool), u32>,
@@ -54,9 +54,9 @@ impl TextureSet {
         })
     }
 
-    /// No picture was asked for.
-    pub fn is_empty(&self) -> bool {
-        self.wanted.is_empty()
+    /// Pictures asked for so far.
+    pub fn len(&self) -> usize {
+        self.wanted.len()
     }
 
     /// Reads every picture.
