@@ -3,6 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "layout.glsl"
 #include "effects.glsl"
+#include "shared/thread.glsl"
 
 // Adds a batch of samples to the statistics of their pixels. One thread folds one pixel, in order of sample index, so
 // the result does not depend on how samples were batched (Welford 1962).
@@ -16,7 +17,7 @@ layout(scalar, push_constant) uniform Push { FoldPush push; };
 const float SMALLEST_ALBEDO = 1e-6;
 
 void main() {
-    uint i = gl_GlobalInvocationID.x;
+    uint i = thread_index();
     if (i >= push.pixels) return; // safe: no barrier() follows
     uint pixel = push.first_pixel + i;
     PixelStats s = PixelStats(vec3(0.0), 0u, vec3(0.0));

@@ -3,6 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "layout.glsl"
 #include "effects.glsl"
+#include "shared/thread.glsl"
 #include "shared/scene.glsl"
 
 // The primary hit through the centre of every pixel, from the middle of the lens: what filters and allocation steer by.
@@ -23,7 +24,7 @@ uint nodes_visited = 0u;
 #include "shared/surface.glsl"
 
 void main() {
-    uint i = gl_GlobalInvocationID.x;
+    uint i = thread_index();
     if (i >= push.pixels) return; // safe: no barrier() follows
     uint pixel = push.first_pixel + i;
     vec2 centre = vec2(pixel % push.size.x, pixel / push.size.x) + 0.5;

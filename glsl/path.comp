@@ -3,6 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "layout.glsl"
 #include "effects.glsl"
+#include "shared/thread.glsl"
 #include "shared/scene.glsl"
 
 // One camera path per thread: next event estimation and BSDF sampling joined by the balance heuristic (Veach 1997).
@@ -173,7 +174,7 @@ void count(uint slot, uint n) {
 }
 
 void main() {
-    uint i = gl_GlobalInvocationID.x;
+    uint i = thread_index();
     if (i >= push.pixels * push.samples) return; // safe: no barrier() follows
     uint pixel = push.first_pixel + i % push.pixels;
     uint index = push.first_sample + i / push.pixels;
