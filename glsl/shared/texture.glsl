@@ -21,10 +21,12 @@ vec4 texture_sample(uint index, vec2 uv, float lod) {
     uint level = uint(clamp(lod + 0.5, 0.0, float(levels - 1u)));
     uint first = image.x;
     uvec2 size = image.yz;
+    // No vector is carried around the loop: Mesa 22.3's lavapipe mixes up lanes that leave such a loop at different times.
     for (uint l = 0u; l < level; l++) {
-        first += size.x * size.y;
-        size = max(size >> 1, uvec2(1u));
+        uvec2 skipped = max(size >> l, uvec2(1u));
+        first += skipped.x * skipped.y;
     }
+    size = max(size >> level, uvec2(1u));
     vec2 wrapped = (image.w & TEXTURE_CLAMP) != 0u ? clamp(uv, 0.0, 1.0) : fract(uv);
     vec2 at = vec2(wrapped.x, 1.0 - wrapped.y) * vec2(size) - 0.5; // v points up, rows go down
     ivec2 corner = ivec2(floor(at));
