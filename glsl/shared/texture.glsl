@@ -1,6 +1,5 @@
 // Textures out of one texel buffer, filtered here (bilinear): lavapipe has no descriptor indexing. There are no mip levels:
-// the pixel's own samples average a texture without bias, where levels chosen by isotropic ray cones were off by up to
-// 3.5 % in the mean of a wooden ball, whose poles stretch the texture, and cost a third more memory.
+// the samples of a pixel average a texture without the bias of a blur, and levels would cost a third more memory.
 
 vec3 linear_from_srgb(vec3 c) {
     return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045)));

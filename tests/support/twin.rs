@@ -1,8 +1,9 @@
 //! Scenes made in a test, and the mean of their picture by the CPU twin.
+#![allow(dead_code)]
 use glam::Vec3;
 use rayon::prelude::*;
 use std::fmt::Write;
-use tallow::gpu::layout::{Effects, LIGHT_ENVIRONMENT, NONE, PathPush};
+use tallow::gpu::layout::{Effects, LIGHT_ENVIRONMENT, NONE, PathPush, ROOT_OF_INSTANCES};
 use tallow::reference::path::{Strategy, Tracer};
 use tallow::scene::Scene;
 use tallow::settings::Sampler;
@@ -55,6 +56,13 @@ impl Workplace {
         self
     }
 
+    /// A square colour picture.
+    pub fn picture(self, name: &str, side: u32, texel: impl Fn(u32, u32) -> [u8; 3]) -> Self {
+        let image = image::RgbImage::from_fn(side, side, |x, y| image::Rgb(texel(x, y)));
+        image.save(self.0.path().join(name)).unwrap();
+        self
+    }
+
     pub fn scene(&self, text: &str) -> Scene {
         let path = self.0.path().join("scene.toml");
         Scene::parse(&path, text, &|_| {}).unwrap_or_else(|e| panic!("{e}"))
@@ -77,7 +85,7 @@ pub fn path_push(scene: &Scene) -> PathPush {
         triangle_pdf_scale: scene.triangle_pdf_scale,
         environment: environment.map_or(NONE, |i| i as u32),
         environment_size: scene.environment.as_ref().map_or(0, |e| e.width | e.height << 16),
-        root: scene.root,
+        root: scene.root | if scene.instances.is_empty() { 0 } else { ROOT_OF_INSTANCES },
         ..PathPush::default()
     }
 }

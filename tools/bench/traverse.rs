@@ -22,7 +22,7 @@ use tallow::scene::Scene;
 use tallow::settings::Settings;
 use tallow::shaders::traverse::Bind;
 
-const RAYS: usize = 512 * 512;
+const SIDE: u32 = 512;
 const THREADS: usize = 2;
 /// Rays that a thread takes at a time.
 const CHUNK: usize = 4096;
@@ -33,13 +33,13 @@ const WORKGROUP_ID: u32 = 100;
 /// What either side finds: distance and triangle in leaf order (any hit: any value for a hit), [`NONE`] on a miss.
 type Found = (f32, u32);
 
-/// The bounce of camera ray `i`, from the hall of Sponza towards its far end; `None` where that leaves the scene.
+/// The bounce of the ray through pixel `i`, from the hall of Sponza towards its far end; `None` where that leaves the scene.
 fn bounce(scene: &Scene, i: u32) -> Option<RayQuery> {
     let [low, high] = scene.bounds.map(Vec3::from);
     let eye = low + (high - low) * Vec3::new(0.2, 0.3, 0.5);
     let random = sampler_start(i, 0, 1, true);
-    let film = 2.0 * sample_2d(random, 0) - vec2(1.0, 1.0);
-    let direction = Vec3::new(1.0, film.y, film.x).normalize();
+    let film = 2.0 * (vec2((i % SIDE) as f32, (i / SIDE) as f32) + 0.5) / SIDE as f32 - vec2(1.0, 1.0);
+    let direction = Vec3::new(1.0, -film.y, film.x).normalize();
     let hit = traverse(scene, eye, direction, INFINITE_DISTANCE, false, 0);
     if !hit.any() {
         return None;
@@ -189,12 +189,11 @@ fn main() -> Result<()> {
     let rounds = std::env::args().nth(1).map_or(Ok(7), |n| n.parse()).context("ROUNDS is a number")?;
     let small = |s: &mut Settings| (s.width, s.height, s.spp) = (16, 16, 1);
     let scene = Scene::load(&Path::new(&data).join("scenes/crytek-sponza/sponza.obj"), &small)?;
-    let mut rays: Vec<_> = (0..2 * RAYS as u32).into_par_iter().filter_map(|i| bounce(&scene, i)).collect();
-    ensure!(rays.len() >= RAYS, "the camera sees little of the scene");
-    rays.truncate(RAYS);
+    let rays: Vec<_> = (0..SIDE * SIDE).into_par_iter().filter_map(|i| bounce(&scene, i)).collect();
+    ensure!(rays.len() as u32 > SIDE * SIDE * 9 / 10, "the camera sees little of the scene");
     let host = Host::new(&scene, &rays)?;
     let mut device = Device::new(&scene, &rays)?;
-    println!("{}: {} triangles, {RAYS} rays, median of {rounds}", device.gpu.info().name, scene.triangles.len());
+    println!("{}: {} triangles, {} rays, median of {rounds}", device.gpu.info().name, host.triangles.len(), rays.len());
     compare("closest", &host, &mut device, rounds, false)?;
     compare("any", &host, &mut device, rounds, true)
 }

@@ -1,0 +1,251 @@
+//! The kernels on the device against their CPU twins. Rounding sends a few paths another way (an edge met or missed, a mip
+//! level up or down), and a driver's arc tangent moves lookups beside a small sun: nearly all samples must agree closely,
+//! none needs to.
+mod support;
+#[path = "support/twin.rs"]
+mod twin;
+
+use glam::Vec3;
+use rayon::prelude::*;
+use std::path::Path;
+use support::{assert_silent, gpu};
+use tallow::gpu::layout::*;
+use tallow::gpu::{Buffer, FrameResources, Gpu, Kernel, Location};
+use tallow::reference::fold::fold;
+use tallow::reference::guide::guide;
+use tallow::reference::path::{Strategy, Tracer};
+use tallow::reference::traverse::traverse;
+use tallow::renderer::{Batch, Outputs, Renderer, all_effects, called_for};
+use tallow::scene::Scene;
+use tallow::settings::{PixelFilter, Settings};
+use tallow::shaders;
+use twin::{Random, Workplace, path_push};
+
+const SIDE: u32 = 48;
+const SAMPLES: u32 = 3;
+
+/// Scenes of the repository that between them use every effect that needs no picture file, and one that is all pictures.
+const SCENES: [&str; 9] = [
+    "cornell-box/scene.toml",
+    "cornell-box/glossy.toml",
+    "cornell-box/mirror.toml",
+    "cornell-box/glass.toml",
+    "cornell-box/point.toml",
+    "cornell-box/directional.toml",
+    "veach-mis/scene.toml",
+    "grass/scene.toml",
+    "bust/scene.toml",
+];
+
+fn small(s: &mut Settings) {
+    (s.width, s.height, s.spp, s.max_depth) = (SIDE, SIDE, SAMPLES, s.max_depth.min(4));
+}
+
+fn shipped(file: &str) -> Scene {
+    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file), &small).unwrap()
+}
+
+/// Textures of every use, masks, a normal map, an environment image, a lens, a mirrored instance, roulette and a clamp.
+fn pictures() -> Scene {
+    let checks = |x: u32, y: u32| if (x / 4 + y / 4) % 2 == 0 { [230, 120, 40] } else { [60, 150, 220] };
+    let bumps = |x: u32, y: u32| [128 + (x * 7 % 60) as u8, 128 + (y * 5 % 60) as u8, 235];
+    let place = Workplace::new()
+        .sky("sky.exr", 32, 16, |x, y| if (x, y) == (20, 3) { 60.0 } else { 0.4 + 0.01 * x as f32 })
+        .picture("checks.png", 32, checks)
+        .picture("bumps.png", 32, bumps);
+    let mut scene = place.scene(
+        "[camera]\nposition = [0.0, 1.4, 5.0]\ntarget = [0.0, 0.7, 0.0]\nfov = 45.0\nlens_radius = 0.05\n\
+         focus_distance = 5.0\n[render]\nmax_depth = 4\nroulette_depth = 2\nclamp_indirect = 3.0\n\
+         [environment]\nfile = 'sky.exr'\nrotation = 40.0\n\
+         [[material]]\nname = 'floor'\ncolor_texture = 'checks.png'\nbump = 'checks.png'\nbump_scale = 0.05\n\
+         [[material]]\nname = 'ball'\ntype = 'coated'\nalpha = 0.3\nroughness_texture = 'checks.png'\n\
+         normal_map = 'bumps.png'\nspecular_texture = 'checks.png'\n\
+         [[material]]\nname = 'leaf'\nopacity = 0.6\nopacity_texture = 'checks.png'\n\
+         [[material]]\nname = 'lamp'\nemission = 3.0\nemission_texture = 'checks.png'\n\
+         [[mesh]]\nname = 'floor'\nshape = 'rectangle'\nmaterial = 'floor'\n\
+         transform = { rotate = [-90.0, 0.0, 0.0], scale = 4.0 }\n\
+         [[mesh]]\nname = 'ball'\nshape = 'sphere'\nsegments = 32\nmaterial = 'ball'\n\
+         [[mesh]]\nname = 'leaf'\nshape = 'rectangle'\nmaterial = 'leaf'\ntransform = { translate = [0.0, 1.2, 1.2] }\n\
+         [[mesh]]\nname = 'lamp'\nshape = 'rectangle'\nmaterial = 'lamp'\n\
+         transform = { translate = [0.0, 3.0, 0.5], rotate = [90.0, 0.0, 0.0], scale = 0.6 }\n\
+         [[instance]]\nmesh = 'ball'\ntransform = { translate = [-1.2, 0.7, 0.0], scale = [0.7, 0.7, -0.7] }\n\
+         [[instance]]\nmesh = 'ball'\ntransform = { translate = [1.2, 0.8, -0.5], rotate = [20.0, 50.0, 0.0], scale = 0.8 }\n",
+    );
+    scene.settings.filter = PixelFilter::Gaussian;
+    small(&mut scene.settings);
+    scene
+}
+
+/// Everything that a render leaves behind, and the twin's answers to the same questions.
+struct Pair {
+    samples: [Vec<Vec3>; 2],
+    guides: [Vec<Guide>; 2],
+    stats: [Vec<PixelStats>; 2],
+    light: [Vec<PixelLight>; 2],
+}
+
+fn run(gpu: &Gpu, scene: &Scene, effects: Effects) -> Pair {
+    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    let renderer = Renderer::specialised(gpu, scene, outputs, effects).unwrap();
+    let mut frame = FrameResources::new(gpu).unwrap();
+    let pixels = SIDE * SIDE;
+    let batch = Batch { first_pixel: 0, pixels, first_sample: 0, samples: SAMPLES };
+    renderer.run(&mut frame, &batch).unwrap();
+    let film = renderer.film();
+    let words = film.samples.read().unwrap();
+    let device: Vec<Vec3> = words[..3 * (pixels * SAMPLES) as usize].iter().map(|&v| v.into()).collect();
+
+    let (push, effects) = (path_push(scene), *renderer.effects());
+    let tracer = Tracer { scene, push, effects, strategy: Strategy::Both };
+    let sample = |i: u32| {
+        let s = tracer.sample(i % pixels, i / pixels);
+        [s.direct, s.indirect, s.albedo]
+    };
+    let host: Vec<Vec3> = (0..pixels * SAMPLES).into_par_iter().flat_map_iter(sample).collect();
+    let (mut stats, mut light) =
+        (vec![PixelStats::default(); pixels as usize], vec![PixelLight::default(); pixels as usize]);
+    let push_fold = FoldPush { first_pixel: 0, pixels, samples: SAMPLES, restart: 1 };
+    fold(&push_fold, true, &words, &mut stats, &mut light); // of the device's samples: only rounding may differ
+    Pair {
+        samples: [device, host],
+        guides: [film.guide.read().unwrap(), (0..pixels).into_par_iter().map(|p| guide(scene, &push, p)).collect()],
+        stats: [film.stats.read().unwrap(), stats],
+        light: [film.light.read().unwrap(), light],
+    }
+}
+
+fn near(a: impl Into<Vec3>, b: impl Into<Vec3>, tolerance: f32) -> bool {
+    let (a, b): (Vec3, Vec3) = (a.into(), b.into());
+    (a - b).abs().max_element() <= tolerance * (1.0 + a.abs().max_element())
+}
+
+/// Share of samples whose direct and indirect light and albedo agree.
+fn agreement(samples: &[Vec<Vec3>; 2]) -> f64 {
+    let pairs = samples[0].chunks(3).zip(samples[1].chunks(3));
+    let agree = pairs.filter(|(a, b)| a.iter().zip(*b).all(|(a, b)| near(*a, *b, 2e-3))).count();
+    agree as f64 / (samples[0].len() / 3) as f64
+}
+
+fn guides_agree(a: &Guide, b: &Guide) -> bool {
+    a.object == b.object
+        && a.material == b.material
+        && near(a.normal, b.normal, 1e-3)
+        && near(a.position, b.position, 1e-4)
+        && near(a.albedo, b.albedo, 1e-2)
+        && (a.depth - b.depth).abs() <= 1e-4 * (1.0 + a.depth)
+}
+
+fn check(name: &str, pair: &Pair) {
+    let share = agreement(&pair.samples);
+    assert!(share > 0.99, "{name}: {share} of samples agree");
+    let [device, host] = &pair.samples;
+    let sums = [device, host].map(|s| s.iter().map(|v| f64::from(v.element_sum())).sum::<f64>());
+    assert!((sums[0] / sums[1] - 1.0).abs() < 0.01, "{name}: {sums:?}");
+
+    let wrong = pair.guides[0].iter().zip(&pair.guides[1]).filter(|(a, b)| !guides_agree(a, b)).count();
+    assert!(wrong <= pair.guides[0].len() / 500, "{name}: {wrong} guides differ");
+
+    for (a, b) in pair.stats[0].iter().zip(&pair.stats[1]) {
+        assert!(a.count == b.count && near(a.mean, b.mean, 1e-5) && near(a.m2, b.m2, 1e-4), "{name}: {a:?} {b:?}");
+    }
+    for (a, b) in pair.light[0].iter().zip(&pair.light[1]) {
+        assert!(near(a.direct, b.direct, 1e-5) && near(a.indirect, b.indirect, 1e-5), "{name}: {a:?} {b:?}");
+    }
+}
+
+#[test]
+fn renders_agree_with_their_twins() {
+    let gpu = gpu();
+    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    for file in SCENES {
+        let scene = shipped(file);
+        check(file, &run(&gpu, &scene, called_for(&scene, outputs)));
+    }
+    let scene = pictures();
+    let mut pair = run(&gpu, &scene, called_for(&scene, outputs));
+    check("pictures", &pair);
+    check("pictures, all effects", &run(&gpu, &scene, all_effects(&scene)));
+    // Control: the twin's samples of the neighbouring pixels.
+    pair.samples[1].rotate_right(3);
+    assert!(agreement(&pair.samples) < 0.5, "control: other samples are told apart");
+    pair.guides[1].rotate_right(1);
+    assert!(!pair.guides[0].iter().zip(&pair.guides[1]).all(|(a, b)| guides_agree(a, b)));
+    assert_silent(&gpu);
+}
+
+/// What the kernel finds.
+fn traversed(gpu: &Gpu, scene: &Scene, effects: Effects, rays: &[RayQuery], any_hit: bool) -> Vec<RayHit> {
+    let renderer = Renderer::specialised(gpu, scene, Outputs::default(), effects).unwrap();
+    let kernel = Kernel::new(gpu, &effects, &[(100, 32)]).unwrap();
+    let s = renderer.scene();
+    let queries = Buffer::from_slice(gpu, "rays", rays).unwrap();
+    let hits = Buffer::new(gpu, "hits", rays.len(), Location::Device).unwrap();
+    let push = TraversePush { count: rays.len() as u32, root: path_push(scene).root, any_hit: u32::from(any_hit) };
+    let mut frame = FrameResources::new(gpu).unwrap();
+    gpu.run(&mut frame, |rec| {
+        let bind = shaders::traverse::Bind {
+            nodes: &s.nodes,
+            triangles: &s.triangles,
+            shading: &s.shading,
+            instances: &s.instances,
+            materials: &s.materials,
+            textures: &s.textures,
+            texels: &s.texels,
+            lights: &s.lights,
+            light_table: &s.light_table,
+            environment: &s.environment,
+            environment_table: &s.environment_table,
+            rays: &queries,
+            hits: &hits,
+        };
+        rec.dispatch(&kernel, bind, &push, [rays.len().div_ceil(32) as u32, 1, 1])
+    })
+    .unwrap();
+    hits.read().unwrap()
+}
+
+fn queries(scene: &Scene, count: usize) -> Vec<RayQuery> {
+    let [low, high] = scene.bounds.map(Vec3::from);
+    let mut random = Random::stream(11);
+    let mut query = |i: usize| {
+        let origin = low + (high - low) * (0.5 + 0.7 * random.point());
+        let axis = [Vec3::X, Vec3::NEG_Y, Vec3::NEG_Z][i % 3];
+        let direction = if i % 4 == 0 { axis } else { random.point().normalize() };
+        let t_max = if i % 5 == 0 { 0.3 * (high - low).length() } else { 3e38 };
+        RayQuery { origin: origin.into(), t_max, direction: direction.into(), mask_seed: i as u32 }
+    };
+    (0..count).map(&mut query).collect()
+}
+
+/// Rays on which kernel and twin differ.
+fn differing(scene: &Scene, rays: &[RayQuery], hits: &[RayHit], any_hit: bool) -> usize {
+    let differs = |(ray, hit): (&RayQuery, &RayHit)| {
+        let twin = traverse(scene, ray.origin.into(), ray.direction.into(), ray.t_max, any_hit, ray.mask_seed);
+        let same = twin.triangle == hit.triangle && twin.instance == hit.instance;
+        let near = |a: f32, b: f32, scale: f32| (a - b).abs() <= 1e-4 * scale;
+        let [u, v] = hit.barycentric;
+        !(same && near(twin.t, hit.t, twin.t) && near(twin.barycentric.x, u, 1.0) && near(twin.barycentric.y, v, 1.0))
+    };
+    rays.iter().zip(hits).filter(|&pair| differs(pair)).count()
+}
+
+#[test]
+fn traversal_agrees_with_its_twin() {
+    let gpu = gpu();
+    let mut scenes = SCENES.map(|file| (file, shipped(file))).to_vec();
+    scenes.push(("pictures", pictures()));
+    for (name, scene) in &scenes {
+        let rays = queries(scene, 5000);
+        for effects in [called_for(scene, Outputs::default()), all_effects(scene)] {
+            for any_hit in [false, true] {
+                let mut hits = traversed(&gpu, scene, effects, &rays, any_hit);
+                let found = hits.iter().filter(|h| h.triangle != NONE).count();
+                let wrong = differing(scene, &rays, &hits, any_hit);
+                assert!(wrong <= 10 && found > 300, "{name} any_hit {any_hit}: {wrong} differ, {found} hit");
+                hits.rotate_right(1);
+                assert!(differing(scene, &rays, &hits, any_hit) > 300, "{name} control: other rays' hits");
+            }
+        }
+    }
+    assert_silent(&gpu);
+}
