@@ -42,5 +42,5 @@ void main() {
         guide.albedo = bsdf_albedo(surface_bsdf(s));
         guide.material = s.material;
     }
-    guides[pixel] = guide;
+    guides[i] = guide;
 }

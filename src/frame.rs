@@ -5,6 +5,7 @@ use crate::gpu::{Buffer, Gpu, Location, Recorder};
 use crate::scene::Scene;
 use crate::stage::{fold, guide, path};
 use std::borrow::Cow;
+use std::ops::Range;
 
 /// The kernels of a frame, specialised for one scene.
 pub struct Stages {
@@ -31,7 +32,7 @@ pub struct Batch {
 
 /// Records the primary hits: once per camera.
 pub fn record_guide(rec: &mut Recorder, st: &Stages, s: &DeviceScene, f: &FilmBuffers, push: &PathPush) -> Result<()> {
-    st.guide.record(rec, s, &f.guide, push) //              camera  -> guide[P]
+    f.tiles.iter().try_for_each(|tile| st.guide.record(rec, s, tile, push)) // camera -> guide[P]
 }
 
 /// Records one batch of paths.
@@ -122,16 +123,46 @@ fn shading<'a>(scene: &'a Scene, effects: &Effects) -> Cow<'a, [Shading]> {
     Cow::Borrowed(&scene.shading)
 }
 
-/// What a frame writes. Buffers that the outputs do not call for hold one element.
-pub struct FilmBuffers {
-    /// vec4 per sample in flight, three with direct and indirect light apart; overwritten by every batch.
-    pub samples: Buffer<vec4>,
+/// A run of the film's pixels, row-major, that fits the device's storage buffers.
+pub struct FilmTile {
+    /// Index of its first pixel in the film.
+    pub first_pixel: u32,
+    /// Its pixels.
+    pub pixels: u32,
     /// Per pixel.
     pub stats: Buffer<PixelStats>,
     /// Per pixel, where direct and indirect light are wanted apart.
     pub light: Buffer<PixelLight>,
     /// Per pixel, where guides are wanted.
     pub guide: Buffer<Guide>,
+}
+
+impl FilmTile {
+    /// Pixels of the largest tile, given the device's limit in bytes of one storage buffer.
+    pub fn capacity(max_storage_range: u64) -> u32 {
+        let widest = size_of::<Guide>().max(size_of::<PixelStats>()).max(size_of::<PixelLight>());
+        (max_storage_range / widest as u64).clamp(1, 1 << 28) as u32
+    }
+
+    fn new(gpu: &Gpu, range: Range<u32>, effects: &Effects, guides: bool) -> Result<Self> {
+        let pixels = range.end - range.start;
+        let room = |on: bool| if on { pixels as usize } else { 1 };
+        Ok(Self {
+            first_pixel: range.start,
+            pixels,
+            stats: Buffer::new(gpu, "stats", pixels as usize, Location::Device)?,
+            light: Buffer::new(gpu, "light", room(effects.split_light), Location::Device)?,
+            guide: Buffer::new(gpu, "guide", room(guides), Location::Device)?,
+        })
+    }
+}
+
+/// What a frame writes. Buffers that the outputs do not call for hold one element.
+pub struct FilmBuffers {
+    /// vec4 per sample in flight, three with direct and indirect light apart; overwritten by every batch.
+    pub samples: Buffer<vec4>,
+    /// The film, in order; one tile unless a device's storage buffers are too small for that.
+    pub tiles: Vec<FilmTile>,
     /// Closest-hit rays, any-hit rays, nodes visited: pairs of words, low first.
     pub counters: Buffer<u32>,
 }
@@ -141,15 +172,21 @@ impl FilmBuffers {
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when it does not fit.
-    pub fn new(gpu: &Gpu, pixels: usize, paths: usize, effects: &Effects, guides: bool) -> Result<Self> {
-        let at = Location::Device;
-        let wanted = |on: bool, n: usize| if on { n } else { 1 };
+    pub fn new(gpu: &Gpu, pixels: u32, paths: u32, effects: &Effects, guides: bool) -> Result<Self> {
+        let records = paths as usize * if effects.split_light { 3 } else { 1 };
+        let capacity = FilmTile::capacity(gpu.info().max_storage_range);
+        let starts = (0..pixels).step_by(capacity as usize);
+        let tile = |first: u32| FilmTile::new(gpu, first..pixels.min(first + capacity), effects, guides);
         Ok(Self {
-            samples: Buffer::new(gpu, "samples", paths * if effects.split_light { 3 } else { 1 }, at)?,
-            stats: Buffer::new(gpu, "stats", pixels, at)?,
-            light: Buffer::new(gpu, "light", wanted(effects.split_light, pixels), at)?,
-            guide: Buffer::new(gpu, "guide", wanted(guides, pixels), at)?,
+            samples: Buffer::new(gpu, "samples", records, Location::Device)?,
+            tiles: starts.map(tile).collect::<Result<_>>()?,
             counters: Buffer::from_slice(gpu, "counters", &[0; 6])?,
         })
+    }
+
+    /// The tile that holds a batch's pixels; a batch never spans two.
+    pub fn tile_of(&self, batch: &Batch) -> &FilmTile {
+        let after = self.tiles.partition_point(|tile| tile.first_pixel <= batch.first_pixel);
+        &self.tiles[after - 1]
     }
 }

@@ -2,8 +2,8 @@
 //! it, and frames recorded batch by batch into command buffers.
 use crate::error::Result;
 use crate::frame::{self, Stages};
-pub use crate::frame::{Batch, DeviceScene, FilmBuffers};
-use crate::gpu::layout::{Camera, Effects, LIGHT_ENVIRONMENT, NONE, PathPush, ROOT_OF_INSTANCES};
+pub use crate::frame::{Batch, DeviceScene, FilmBuffers, FilmTile};
+use crate::gpu::layout::{Camera, Effects, LIGHT_ENVIRONMENT, NONE, PathPush, PixelStats, ROOT_OF_INSTANCES};
 use crate::gpu::{FrameResources, Gpu, PassTime, RawBuffer, Recorder};
 use crate::scene::{self, Scene};
 use crate::settings::{PixelFilter, Sampler, Settings};
@@ -20,7 +20,7 @@ pub struct Outputs {
     pub counters: bool,
 }
 
-/// A result buffer for the caller: pixel `i` (row-major, row 0 at the top) starts at `offset + i * stride`.
+/// A result buffer for the caller: pixel `i` of the view (row-major, row 0 at the top) starts at `offset + i * stride`.
 #[derive(Clone, Copy, Debug)]
 pub struct OutputView {
     /// The Vulkan handle, valid as long as the renderer.
@@ -31,6 +31,8 @@ pub struct OutputView {
     pub stride: u32,
     /// 32-bit floats of one pixel.
     pub channels: u32,
+    /// Pixels in this view.
+    pub pixels: u32,
 }
 
 /// A scene on a device and the kernels to render it. Everything is created in [`Renderer::new`], nothing later.
@@ -90,7 +92,7 @@ impl Renderer {
             fold: fold::Fold::new(gpu, &effects)?,
         };
         let paths = paths_in_flight(gpu, &settings, &effects);
-        let film = FilmBuffers::new(gpu, settings.pixels(), paths as usize, &effects, outputs.guides)?;
+        let film = FilmBuffers::new(gpu, settings.pixels() as u32, paths, &effects, outputs.guides)?;
         let push = path_push(scene, &settings);
         let scene = DeviceScene::new(gpu, scene, &effects)?;
         Ok(Self { gpu: gpu.clone(), scene, stages, film, effects, outputs, settings, push, paths })
@@ -104,7 +106,8 @@ impl Renderer {
 
     /// The work of samples `first .. first + samples` of every pixel.
     pub fn batches_of(&self, first: u32, samples: u32) -> Vec<Batch> {
-        cut(self.settings.pixels() as u32, first, samples, self.paths)
+        let tile = FilmTile::capacity(self.gpu.info().max_storage_range);
+        cut(self.settings.pixels() as u32, tile, first, samples, self.paths)
     }
 
     /// Records the primary hits; nothing when the outputs do not call for guides.
@@ -144,9 +147,16 @@ impl Renderer {
         self.push.camera = camera;
     }
 
-    /// Linear radiance (Rec. 709), 3 floats a pixel.
-    pub fn radiance(&self) -> OutputView {
-        view(self.film.stats.raw(), 0, size_of::<crate::gpu::layout::PixelStats>(), 3)
+    /// Linear radiance (Rec. 709), 3 floats a pixel: one view for each of [`FilmBuffers::tiles`], in order.
+    pub fn radiance(&self) -> Vec<OutputView> {
+        let view = |tile: &FilmTile| OutputView {
+            buffer: tile.stats.raw(),
+            offset: 0,
+            stride: size_of::<PixelStats>() as u32,
+            channels: 3,
+            pixels: tile.pixels,
+        };
+        self.film.tiles.iter().map(view).collect()
     }
 
     /// The buffers, for reading back and for stages of the caller's own.
@@ -194,10 +204,6 @@ impl Renderer {
     }
 }
 
-fn view(buffer: RawBuffer, offset: u64, stride: usize, channels: u32) -> OutputView {
-    OutputView { buffer, offset, stride: stride as u32, channels }
-}
-
 /// The effects that a scene, its settings and the outputs call for.
 pub fn called_for(scene: &Scene, outputs: Outputs) -> Effects {
     scene::effects(scene, outputs.split_light, outputs.counters).0
@@ -218,17 +224,20 @@ fn paths_in_flight(gpu: &Gpu, settings: &Settings, effects: &Effects) -> u32 {
     wanted.min(room).min(all).max(1) as u32
 }
 
-/// Cuts samples `first .. first + samples` of `pixels` pixels into batches of at most `paths` paths.
-fn cut(pixels: u32, first: u32, samples: u32, paths: u32) -> Vec<Batch> {
-    let run = pixels.min(paths);
+/// Cuts samples `first .. first + samples` of `pixels` pixels into batches of at most `paths` paths, none across a
+/// multiple of `tile` pixels.
+fn cut(pixels: u32, tile: u32, first: u32, samples: u32, paths: u32) -> Vec<Batch> {
+    let run = pixels.min(paths).min(tile);
     let depth = (paths / run).max(1);
     let mut batches = Vec::new();
     let mut sample = 0;
     while sample < samples {
         let n = depth.min(samples - sample);
-        for first_pixel in (0..pixels).step_by(run as usize) {
-            let pixels = run.min(pixels - first_pixel);
+        let mut first_pixel = 0;
+        while first_pixel < pixels {
+            let pixels = run.min(pixels - first_pixel).min(tile - first_pixel % tile);
             batches.push(Batch { first_pixel, pixels, first_sample: first + sample, samples: n });
+            first_pixel += pixels;
         }
         sample += n;
     }
@@ -263,10 +272,11 @@ mod tests {
     use super::*;
 
     /// Every sample of every pixel appears exactly once, and in order within its pixel.
-    fn covers(pixels: u32, samples: u32, paths: u32) -> bool {
+    fn covers(pixels: u32, tile: u32, samples: u32, paths: u32) -> bool {
         let mut next = vec![0; pixels as usize];
-        for b in cut(pixels, 0, samples, paths) {
-            if b.pixels * b.samples > paths.max(1) {
+        for b in cut(pixels, tile, 0, samples, paths) {
+            let crosses = b.first_pixel / tile != (b.first_pixel + b.pixels - 1) / tile;
+            if crosses || b.pixels * b.samples > paths.max(1) {
                 return false;
             }
             for p in b.first_pixel..b.first_pixel + b.pixels {
@@ -284,7 +294,9 @@ mod tests {
         for pixels in [1, 31, 64, 65] {
             for samples in [1, 2, 7] {
                 for paths in [1, 3, 64, 100, 1000] {
-                    assert!(covers(pixels, samples, paths), "{pixels} {samples} {paths}");
+                    for tile in [1, 30, 64, 1000] {
+                        assert!(covers(pixels, tile, samples, paths), "{pixels} {tile} {samples} {paths}");
+                    }
                 }
             }
         }

@@ -74,7 +74,7 @@ fn an_engine_gets_the_bits_of_the_command_line_frame_after_frame() {
                 renderer.record_batch(&mut rec, &batch).unwrap();
             }
             drop(rec);
-            gather(&engine.device, commands, renderer.radiance(), &download);
+            gather(&engine.device, commands, renderer.radiance()[0], &download);
         });
         download.read().unwrap()
     };

@@ -160,7 +160,7 @@ fn first_hits_match_at_pixel_centres() {
     let outputs = Outputs { guides: true, ..Outputs::default() };
     let renderer = Renderer::new(&gpu, &scene("scene.toml", 1), outputs).unwrap();
     support::render(&gpu, &renderer);
-    let guide = renderer.film().guide.read().unwrap();
+    let guide = renderer.film().tiles[0].guide.read().unwrap();
     let centre = reference("center_diffuse.exr");
     let (t, shape) = (plane(&centre, "t.T"), plane(&centre, "shape.I"));
     let (n, albedo) = (

@@ -59,7 +59,7 @@ fn every_scene_renders_finite_pixels_and_the_same_bits_with_all_effects() {
         assert!(a.iter().all(|s| s.mean.iter().chain(&s.m2).all(|v| v.is_finite())), "{file}: broken pixels");
         assert!(a.iter().any(|s| s.mean != [0.0; 3]), "{file}: black");
         assert!(bits(&a) == bits(&b), "{file}: compiled-in effects change it: {}", culprits(&gpu, &scene, &a));
-        let light = plain.film().light.read().unwrap();
+        let light = plain.film().tiles[0].light.read().unwrap();
         assert!(light.iter().all(|l| l.direct.iter().chain(&l.indirect).all(|v| v.is_finite())), "{file}");
     }
     support::assert_silent(&gpu);

@@ -92,7 +92,8 @@ fn run(gpu: &Gpu, scene: &Scene, effects: Effects) -> Pair {
     let batch = Batch { first_pixel: 0, pixels, first_sample: 0, samples: SAMPLES };
     renderer.run(&mut frame, &batch).unwrap();
     let film = renderer.film();
-    let words = film.samples.read().unwrap();
+    let words: Vec<[f32; 3]> = film.samples.read().unwrap().iter().map(|&[x, y, z, _]| [x, y, z]).collect();
+    let tile = &film.tiles[0];
     let device: Vec<Vec3> = words[..3 * (pixels * SAMPLES) as usize].iter().map(|&v| v.into()).collect();
 
     let (push, effects) = (path_push(scene), *renderer.effects());
@@ -108,9 +109,9 @@ fn run(gpu: &Gpu, scene: &Scene, effects: Effects) -> Pair {
     fold(&push_fold, true, &words, &mut stats, &mut light); // of the device's samples: only rounding may differ
     Pair {
         samples: [device, host],
-        guides: [film.guide.read().unwrap(), (0..pixels).into_par_iter().map(|p| guide(scene, &push, p)).collect()],
-        stats: [film.stats.read().unwrap(), stats],
-        light: [film.light.read().unwrap(), light],
+        guides: [tile.guide.read().unwrap(), (0..pixels).into_par_iter().map(|p| guide(scene, &push, p)).collect()],
+        stats: [tile.stats.read().unwrap(), stats],
+        light: [tile.light.read().unwrap(), light],
     }
 }
 

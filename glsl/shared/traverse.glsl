@@ -30,8 +30,9 @@ RaySpace ray_space(vec3 origin, vec3 direction) {
     RaySpace r;
     r.origin = origin;
     r.direction = direction;
-    // Duff et al., JCGT 2017. Only rays in the space of an instance are not of unit length.
-    vec3 d = FX_INSTANCES ? normalize(direction) : direction;
+    // Duff et al., JCGT 2017. Rays in the space of an instance are not of unit length.
+    float len = length(direction);
+    vec3 d = direction / len;
     float s = d.z >= 0.0 ? 1.0 : -1.0;
     float a = -1.0 / (s + d.z);
     float b = d.x * d.y * a;
@@ -59,7 +60,7 @@ bool intersect_triangle(RaySpace r, uint index, float t_max, out float t, out ve
     bool inside = min(min(u, v), w) >= 0.0 || max(max(u, v), w) <= 0.0;
     float inv = 1.0 / det;
     // Distances along the ray in units of its direction's length.
-    float scale = FX_INSTANCES ? 1.0 / dot(r.direction, r.direction) : 1.0;
+    float scale = 1.0 / dot(r.direction, r.direction);
     t = (u * dot(r.direction, a) + v * dot(r.direction, b) + w * dot(r.direction, c)) * inv * scale;
     barycentric = vec2(v, w) * inv;
     return inside && det != 0.0 && t > 0.0 && t < t_max;

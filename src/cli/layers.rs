@@ -1,8 +1,10 @@
 //! What a renderer's buffers hold, as the channels of an image file.
 use crate::error::Result;
+use crate::gpu::Buffer;
 use crate::gpu::layout::{Guide, PixelLight, PixelStats};
 use crate::image::{Film, Samples};
-use crate::renderer::Renderer;
+use crate::renderer::{FilmTile, Renderer};
+use bytemuck::Pod;
 
 const RGB: [&str; 3] = ["R", "G", "B"];
 const XYZ: [&str; 3] = ["X", "Y", "Z"];
@@ -14,15 +16,21 @@ const XYZ: [&str; 3] = ["X", "Y", "Z"];
 pub fn film(renderer: &Renderer) -> Result<Film> {
     let settings = renderer.settings();
     let mut film = Film::new(settings.width, settings.height);
-    let buffers = renderer.film();
-    add_stats(&mut film, &buffers.stats.read()?);
+    let tiles = &renderer.film().tiles;
+    add_stats(&mut film, &gather(tiles, |tile| &tile.stats)?);
     if renderer.outputs().split_light {
-        add_light(&mut film, &buffers.light.read()?);
+        add_light(&mut film, &gather(tiles, |tile| &tile.light)?);
     }
     if renderer.outputs().guides {
-        add_guide(&mut film, &buffers.guide.read()?);
+        add_guide(&mut film, &gather(tiles, |tile| &tile.guide)?);
     }
     Ok(film)
+}
+
+/// One array out of all tiles.
+fn gather<T: Pod>(tiles: &[FilmTile], buffer: impl Fn(&FilmTile) -> &Buffer<T>) -> Result<Vec<T>> {
+    let parts: Vec<Vec<T>> = tiles.iter().map(|tile| buffer(tile).read()).collect::<Result<_>>()?;
+    Ok(parts.concat())
 }
 
 fn add_stats(film: &mut Film, stats: &[PixelStats]) {

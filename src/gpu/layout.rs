@@ -346,7 +346,7 @@ gpu_structs! {
 
     /// Push constants of `fold.comp` and `compose.comp`.
     struct FoldPush {
-        /// First pixel of the batch.
+        /// First pixel of the batch, counted from the tile's first.
         first_pixel: uint,
         /// Pixels of the batch.
         pixels: uint,

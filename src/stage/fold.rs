@@ -21,8 +21,10 @@ impl Fold {
     /// samples\[batch\] -> stats\[P\], light\[P\]
     pub fn record(&self, rec: &mut Recorder, f: &FilmBuffers, b: &Batch) -> Result<()> {
         let restart = u32::from(b.first_sample == 0);
-        let push = FoldPush { first_pixel: b.first_pixel, pixels: b.pixels, samples: b.samples, restart };
-        let bind = Bind { samples: &f.samples, stats: &f.stats, light: &f.light };
+        let tile = f.tile_of(b);
+        let first_pixel = b.first_pixel - tile.first_pixel;
+        let push = FoldPush { first_pixel, pixels: b.pixels, samples: b.samples, restart };
+        let bind = Bind { samples: &f.samples, stats: &tile.stats, light: &tile.light };
         rec.dispatch(&self.0, bind, &push, groups(b.pixels, 64))
     }
 

@@ -1,9 +1,9 @@
 //! Primary hits at pixel centres. Kernel: `glsl/guide.comp`. Twin: [`crate::reference::guide`].
-use super::{WORKGROUP_ID, groups};
+use super::{groups, workgroup_constants};
 use crate::error::Result;
-use crate::frame::DeviceScene;
-use crate::gpu::layout::{Effects, Guide, PathPush};
-use crate::gpu::{Buffer, Gpu, Kernel, Recorder};
+use crate::frame::{DeviceScene, FilmTile};
+use crate::gpu::layout::{Effects, PathPush};
+use crate::gpu::{Gpu, Kernel, Recorder};
 use crate::shaders::guide::Bind;
 
 /// The specialised kernel.
@@ -18,13 +18,12 @@ impl Guides {
     /// # Errors
     /// [`crate::error::Error::Device`] when the driver refuses it.
     pub fn new(gpu: &Gpu, effects: &Effects, workgroup: u32) -> Result<Self> {
-        Ok(Self { kernel: Kernel::new(gpu, effects, &[(WORKGROUP_ID, workgroup)])?, workgroup })
+        Ok(Self { kernel: Kernel::new(gpu, effects, &workgroup_constants(workgroup))?, workgroup })
     }
 
-    /// camera -> guide\[P\]
-    pub fn record(&self, rec: &mut Recorder, s: &DeviceScene, out: &Buffer<Guide>, push: &PathPush) -> Result<()> {
-        let pixels = push.size[0] * push.size[1];
-        let push = PathPush { first_pixel: 0, pixels, ..*push };
+    /// camera -> guide\[tile\]
+    pub fn record(&self, rec: &mut Recorder, s: &DeviceScene, tile: &FilmTile, push: &PathPush) -> Result<()> {
+        let push = PathPush { first_pixel: tile.first_pixel, pixels: tile.pixels, ..*push };
         let bind = Bind {
             nodes: &s.nodes,
             triangles: &s.triangles,
@@ -37,9 +36,9 @@ impl Guides {
             light_table: &s.light_table,
             environment: &s.environment,
             environment_table: &s.environment_table,
-            guides: out,
+            guides: &tile.guide,
         };
-        rec.dispatch(&self.kernel, bind, &push, groups(pixels, self.workgroup))
+        rec.dispatch(&self.kernel, bind, &push, groups(tile.pixels, self.workgroup))
     }
 
     /// Milliseconds that the pipeline took to create.

@@ -3,8 +3,11 @@ pub mod fold;
 pub mod guide;
 pub mod path;
 
-/// Threads per workgroup of the one-dimensional kernels that leave it open (`local_size_x_id = 100`).
-pub const WORKGROUP_ID: u32 = 100;
+/// Specialisation constants of the kernels that leave their workgroup open: `local_size_x_id`, and the same for
+/// `thread_index()`.
+pub fn workgroup_constants(size: u32) -> [(u32, u32); 2] {
+    [(100, size), (101, size)]
+}
 
 /// Tracing on lavapipe runs fastest at 32 (against 16 and 64).
 pub const WORKGROUP_CPU: u32 = 32;

@@ -1,5 +1,5 @@
 //! Traces one path per thread. Kernel: `glsl/path.comp`. Twin: [`crate::reference::path`].
-use super::{WORKGROUP_ID, groups};
+use super::{groups, workgroup_constants};
 use crate::error::Result;
 use crate::frame::{Batch, DeviceScene, FilmBuffers};
 use crate::gpu::layout::{Effects, PathPush};
@@ -18,7 +18,7 @@ impl Path {
     /// # Errors
     /// [`crate::error::Error::Device`] when the driver refuses it.
     pub fn new(gpu: &Gpu, effects: &Effects, workgroup: u32) -> Result<Self> {
-        Ok(Self { kernel: Kernel::new(gpu, effects, &[(WORKGROUP_ID, workgroup)])?, workgroup })
+        Ok(Self { kernel: Kernel::new(gpu, effects, &workgroup_constants(workgroup))?, workgroup })
     }
 
     /// scene -> samples\[batch\]

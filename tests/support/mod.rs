@@ -49,5 +49,5 @@ pub fn render_batches(gpu: &Gpu, renderer: &Renderer, batches: &[Batch]) -> Vec<
     for batch in batches {
         renderer.run(&mut frame, batch).unwrap();
     }
-    renderer.film().stats.read().unwrap()
+    renderer.film().tiles.iter().flat_map(|tile| tile.stats.read().unwrap()).collect()
 }
