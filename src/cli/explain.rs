@@ -1,7 +1,6 @@
 //! `tallow explain`: what a scene calls for, and what that costs.
 use super::{Exit, print, print_json};
 use crate::error::Result;
-use crate::gpu::layout::Effects;
 use crate::gpu::{DeviceOptions, FrameResources, Gpu};
 use crate::renderer::{Outputs, Renderer};
 use crate::report::table::{self, milliseconds};
@@ -61,22 +60,28 @@ fn rows(args: &Args) -> Result<Vec<Row>> {
     let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), validation: false })?;
     let outputs = Outputs { split_light: true, guides: true, counters: false };
     let (base, reasons) = scene::effects(&scene, outputs.split_light, outputs.counters);
-    let sizes = Renderer::new(&gpu, &scene, outputs)?.scene().sizes();
-    let usual = cost(&gpu, &scene, outputs, base)?;
+    let usual = Renderer::new(&gpu, &scene, outputs)?;
+    let sizes = usual.scene().sizes();
+    let mut frame = FrameResources::new(&gpu)?;
+    let usual_compile_ms = compile_ms(&usual, gpu_ms(&usual, &mut frame)?, gpu_ms(&usual, &mut frame)?);
     let mut rows = Vec::new();
     for (effect, id, on) in base.entries() {
         let other_effects = base.toggled(id);
         let (split_light, counters) = (other_effects.split_light, other_effects.counters);
-        let other = cost(&gpu, &scene, Outputs { split_light, counters, ..outputs }, other_effects)?;
+        let other = Renderer::specialised(&gpu, &scene, Outputs { split_light, counters, ..outputs }, other_effects)?;
+        let first_ms = gpu_ms(&other, &mut frame)?;
+        let (usual_ms, other_ms) = in_turn(&usual, &other, &mut frame)?;
+        let usual = (usual_ms, usual_compile_ms);
+        let other = (other_ms, compile_ms(&other, first_ms, other_ms));
         let (with, without) = if on { (usual, other) } else { (other, usual) };
         let reason = reasons.iter().find(|(name, _)| *name == effect);
         rows.push(Row {
             effect,
             on,
             called_for_by: reason.map_or_else(String::new, |(_, object)| object.clone()),
-            gpu_ms_with: Some(with.gpu_ms),
-            gpu_ms_without: Some(without.gpu_ms),
-            compile_ms: Some(with.compile_ms - without.compile_ms),
+            gpu_ms_with: Some(with.0),
+            gpu_ms_without: Some(without.0),
+            compile_ms: Some(with.1 - without.1),
             bytes: bytes_of(effect, &sizes).filter(|_| on),
         });
     }
@@ -91,29 +96,30 @@ fn shrink(settings: &mut Settings) {
     settings.spp = 1;
 }
 
-#[derive(Clone, Copy)]
-struct Cost {
-    gpu_ms: f64,
-    compile_ms: f64,
+/// GPU time of the paths of one sample per pixel.
+fn gpu_ms(renderer: &Renderer, frame: &mut FrameResources) -> Result<f64> {
+    let mut ns = 0;
+    for batch in renderer.batches() {
+        let times = renderer.run(frame, &batch)?;
+        ns += times.iter().filter(|t| t.name == "path").map(|t| t.end_ns - t.begin_ns).sum::<u64>();
+    }
+    Ok(ns as f64 * 1e-6)
 }
 
-/// GPU time of one sample per pixel, best of three after the first; what the first took longer is compilation that the
-/// driver put off.
-fn cost(gpu: &Gpu, scene: &Scene, outputs: Outputs, effects: Effects) -> Result<Cost> {
-    let renderer = Renderer::specialised(gpu, scene, outputs, effects)?;
-    let mut frame = FrameResources::new(gpu)?;
-    let mut runs = Vec::new();
-    for _ in 0..4 {
-        let mut ns = 0;
-        for batch in renderer.batches() {
-            let times = renderer.run(&mut frame, &batch)?;
-            ns += times.iter().filter(|t| t.name == "path").map(|t| t.end_ns - t.begin_ns).sum::<u64>();
-        }
-        runs.push(ns as f64 * 1e-6);
+/// Best of three each, in turn, so that a machine that changes its speed changes both.
+fn in_turn(a: &Renderer, b: &Renderer, frame: &mut FrameResources) -> Result<(f64, f64)> {
+    let (mut best_a, mut best_b) = (f64::INFINITY, f64::INFINITY);
+    for _ in 0..3 {
+        best_a = best_a.min(gpu_ms(a, frame)?);
+        best_b = best_b.min(gpu_ms(b, frame)?);
     }
-    let best = runs[1..].iter().copied().fold(f64::INFINITY, f64::min);
-    let created: f64 = renderer.compile_times().iter().map(|(_, ms)| ms).sum();
-    Ok(Cost { gpu_ms: best, compile_ms: created + (runs[0] - best).max(0.0) })
+    Ok((best_a, best_b))
+}
+
+/// Creation of the pipelines, and what the first run took longer than a later one: compilation that the driver put off.
+/// A driver that keeps its own cache on disk (Mesa's: MESA_SHADER_CACHE_DISABLE=true) hides what it has compiled before.
+fn compile_ms(renderer: &Renderer, first_ms: f64, later_ms: f64) -> f64 {
+    renderer.compile_times().iter().map(|(_, ms)| ms).sum::<f64>() + (first_ms - later_ms).max(0.0)
 }
 
 /// Device memory of the arrays that exist only for this effect.
