@@ -9,8 +9,6 @@ struct Hit {
     vec2 barycentric; // weights of vertices 1 and 2
 };
 
-const uint STACK_SIZE = 32; // obvhs never builds deeper; two levels share it
-
 // Distances to planes round at 2^-24 in four steps each, near and far; boxes that share a face must not part (Ize 2013).
 const float SLAB_ROUNDING = 1.0 + 8.0 / 16777216.0;
 
@@ -106,7 +104,7 @@ uint intersect_node(RaySpace r, uint index, float t_max, out uvec3 children) {
 Hit traverse(vec3 origin, vec3 direction, float t_max, bool any_hit, uint root, uint mask_seed) {
     Hit hit = Hit(t_max, NONE, NONE, vec2(0.0));
     RaySpace ray = ray_space(origin, direction);
-    uvec2 stack[STACK_SIZE];
+    uvec2 stack[TRAVERSAL_STACK];
     uint depth = 0u;
     uint bottom = 0u;       // stack depth at which the current instance was entered
     uint instance = NONE;   // NONE in the top (or only) level

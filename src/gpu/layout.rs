@@ -50,6 +50,8 @@ macro_rules! constants {
 constants! {
     /// "No texture", "no material override", "no hit".
     NONE = 0xffffffff;
+    /// Groups of nodes that a traversal can put aside; scenes that need more are refused when they are loaded.
+    TRAVERSAL_STACK = 32;
     /// Set in [`PathPush::root`] when the leaves of that level are instances.
     ROOT_OF_INSTANCES = 0x80000000;
     /// [`Material::kind`]: Lambertian reflection, `base_color / pi`.

@@ -1,5 +1,5 @@
 //! Twin of `glsl/shared/traverse.glsl`.
-use crate::gpu::layout::{BvhNode, NONE};
+use crate::gpu::layout::{BvhNode, NONE, TRAVERSAL_STACK};
 use crate::reference::scene::{object_from_world, triangle_vertices};
 use crate::reference::texture::mask_blocks;
 use crate::scene::Scene;
@@ -25,7 +25,7 @@ impl Hit {
     }
 }
 
-const STACK_SIZE: usize = 32;
+const STACK_SIZE: usize = TRAVERSAL_STACK as usize;
 const SLAB_ROUNDING: f32 = 1.0 + 8.0 / (1 << 24) as f32;
 
 /// A ray as the triangle and box tests want it.

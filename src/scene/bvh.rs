@@ -1,13 +1,14 @@
 //! Eight-way compressed BVHs (Ylitie et al. 2017) by obvhs: PLOC (Meister and Bittner 2018) and reinsertion. Triangles
 //! and their shading are put in leaf order; child and primitive indices are made global, so one array holds all levels.
 use super::geometry::Geometry;
-use crate::gpu::layout::{BvhNode, Instance, Triangle};
+use crate::gpu::layout::{BvhNode, Instance, TRAVERSAL_STACK, Triangle};
 use glam::{Mat4, Vec3, Vec4};
 use obvhs::Boundable;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+use std::collections::HashSet;
 use std::ops::Range;
 
 /// Triangles in a leaf; the node format holds up to 3.
@@ -81,6 +82,26 @@ pub fn world_bounds(instance: &Instance, [low, high]: Bounds) -> Bounds {
     let seed = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     let (low, high) = corners.fold(seed, |(low, high), p| (low.min(p), high.max(p)));
     [low.to_array(), high.to_array()]
+}
+
+/// Levels of inner nodes below and with `root`: what a traversal may have to keep on its stack.
+pub fn depth(nodes: &[BvhNode], root: u32) -> usize {
+    let (mut deepest, mut open) = (0, vec![(root, 1)]);
+    while let Some((index, level)) = open.pop() {
+        let node = &nodes[index as usize];
+        deepest = deepest.max(level);
+        let inner = (node.e_imask >> 24).count_ones();
+        open.extend((node.child_base..node.child_base + inner).map(|child| (child, level + 1)));
+    }
+    deepest
+}
+
+/// Whether the kernels' stack ([`TRAVERSAL_STACK`]) holds what a ray leaves behind: a group a level, and with instances the
+/// groups of nodes and of instances around the one it enters.
+pub fn fits_the_stack(nodes: &[BvhNode], root: u32, instances: &[Instance]) -> bool {
+    let roots: HashSet<u32> = instances.iter().map(|i| i.root).collect();
+    let below = roots.iter().map(|&mesh| depth(nodes, mesh) + 2).max().unwrap_or(0);
+    depth(nodes, root) + below <= TRAVERSAL_STACK as usize
 }
 
 /// Appends the nodes over `items`, numbered from `first` on; returns the root and the leaf order.

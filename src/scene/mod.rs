@@ -131,6 +131,11 @@ impl Scene {
         overrides(&mut scene.settings);
         scene.settings.validate()?;
         assemble::assemble(path, description, sky, &mut scene)?;
+        if !bvh::fits_the_stack(&scene.nodes, scene.root, &scene.instances) {
+            let what =
+                "lies so densely on itself that no hierarchy of a usable depth holds it: remove copies of triangles";
+            return Err(Error::input_at(path, "geometry", what));
+        }
         let camera = description.camera.build(&scene.settings, scene.bounds);
         scene.camera = camera.map_err(|what| Error::input_at(path, "[camera]", what))?;
         Ok(scene)

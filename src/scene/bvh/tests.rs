@@ -166,8 +166,10 @@ fn coincident_and_empty_geometry_builds() {
     let same = Triangle { v1: [1.0, 0.0, 0.0], v2: [0.0, 1.0, 0.0], ..Triangle::default() };
     geometry.triangles = vec![same; 20_000];
     let mut nodes = Vec::new();
-    build_mesh(&mut geometry, 0..20_000, &mut nodes);
+    let deep = build_mesh(&mut geometry, 0..20_000, &mut nodes);
+    assert!(!fits_the_stack(&nodes, deep, &[]), "{} levels would overflow the kernels' stack", depth(&nodes, deep));
     let root = build_mesh(&mut geometry, 0..0, &mut nodes);
+    assert!(fits_the_stack(&nodes, root, &[]) && depth(&nodes, root) == 1);
     let mut leaves = 0;
     traverse(&nodes, root, DVec3::ZERO, DVec3::ONE, &mut |_| leaves += 1);
     assert_eq!(leaves, 0);
