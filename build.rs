@@ -1,4 +1,5 @@
 //! `glsl/*.comp` becomes SPIR-V and `$OUT_DIR/shaders.rs`, one module per kernel with a typed field per binding.
+//! Bindings that a shared file declares are one struct, a module of that file's name, and one field of its kernels.
 //! `glsl/test/*.comp` becomes `$OUT_DIR/test_shaders.rs` for the integration tests. Any error stops the build with
 //! file and line. The compiler is `glslc`, as a program: Debian 12's libshaderc cannot be linked (undefined symbols).
 //!
@@ -9,6 +10,7 @@
 //! layout(scalar, push_constant) uniform Push { PathPush push; };    // once per kernel
 //! ```
 use anyhow::{Context, Result, bail, ensure};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -22,7 +24,10 @@ mod layout;
 /// A file that a kernel is made of: name for messages, text.
 type Source = (String, String);
 
+#[derive(Clone)]
 struct Binding {
+    /// Basename of the shared file that declares it; none in the kernel itself.
+    group: Option<String>,
     number: u32,
     field: String,
     /// Name of a type in layout.rs.
@@ -35,6 +40,17 @@ struct Binding {
 struct Interface {
     push: String,
     bindings: Vec<Binding>,
+}
+
+impl Interface {
+    /// Shared files with bindings.
+    fn groups(&self) -> impl Iterator<Item = &str> {
+        self.bindings.iter().filter_map(|b| b.group.as_deref()).collect::<BTreeSet<_>>().into_iter()
+    }
+
+    fn of(&self, group: Option<&str>) -> Vec<Binding> {
+        self.bindings.iter().filter(|b| b.group.as_deref() == group).cloned().collect()
+    }
 }
 
 fn main() {
@@ -62,13 +78,21 @@ fn generate(folder: &Path, root: &str, target: &Path) -> Result<()> {
     files.retain(|file| file.extension().is_some_and(|e| e == "comp"));
     files.sort();
     let (mut code, mut hash) = (String::new(), FNV_BASIS);
+    let mut groups = BTreeMap::new();
     for file in &files {
         let name = file.file_stem().and_then(|s| s.to_str()).context("kernel names are ASCII")?;
         let (spirv, sources) = compile(file)?;
         hash = fnv(hash, &spirv);
         let binary = target.with_extension(format!("{name}.spv"));
         fs::write(&binary, &spirv)?;
-        code += &module(name, file, &interface(&sources)?, root, &binary)?;
+        let interface = interface(&sources)?;
+        code += &module(name, file, &interface, root, &binary)?;
+        groups.extend(interface.groups().map(|group| (group.to_owned(), interface.of(Some(group)))));
+    }
+    if root == "crate" {
+        for (name, bindings) in &groups {
+            code += &group_module(name, bindings)?;
+        }
     }
     writeln!(code, "/// FNV-1a over the SPIR-V of every kernel, part of the pipeline cache's name.")?;
     writeln!(code, "pub const HASH: u64 = {hash:#018x};")?;
@@ -135,7 +159,8 @@ fn interface(sources: &[Source]) -> Result<Interface> {
                 ensure!(push.is_none(), "{}\na second push constant block", place());
                 push = Some(parse_push(line).with_context(place)?);
             } else if line.contains("binding") {
-                let new = parse_binding(line).with_context(place)?;
+                let group = (file != &sources[0].0).then(|| basename(file));
+                let new = Binding { group, ..parse_binding(line).with_context(place)? };
                 let taken = bindings.iter().any(|old| old.number == new.number || old.field == new.field);
                 ensure!(!taken, "{}\nits binding or its name is taken", place());
                 bindings.push(new);
@@ -148,6 +173,10 @@ fn interface(sources: &[Source]) -> Result<Interface> {
         format!("{file}: every kernel has `layout(scalar, push_constant) uniform Push {{ SomePush push; }};`")
     })?;
     Ok(Interface { push, bindings })
+}
+
+fn basename(file: &str) -> String {
+    Path::new(file).file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// The words between braces, without the semicolon: a type and a name.
@@ -180,7 +209,14 @@ fn parse_storage(line: &str) -> Option<Binding> {
     };
     let (element, field) = member(rest)?;
     let field = field.strip_suffix("[]")?.to_owned();
-    Some(Binding { number: number.parse().ok()?, field, element: element.to_owned(), kind: "Storage", access })
+    Some(Binding {
+        group: None,
+        number: number.parse().ok()?,
+        field,
+        element: element.to_owned(),
+        kind: "Storage",
+        access,
+    })
 }
 
 fn parse_texels(line: &str) -> Option<Binding> {
@@ -193,22 +229,65 @@ fn parse_texels(line: &str) -> Option<Binding> {
     };
     let (field, element) = rest.split_once("; // of ")?;
     let element = element.split_whitespace().next()?.to_owned();
-    Some(Binding { number: number.parse().ok()?, field: field.trim().to_owned(), element, kind, access: "TexelRead" })
+    Some(Binding {
+        group: None,
+        number: number.parse().ok()?,
+        field: field.trim().to_owned(),
+        element,
+        kind,
+        access: "TexelRead",
+    })
+}
+
+/// Fields of a struct, and the list of their buffers.
+fn members(bindings: &[Binding]) -> Result<(String, String)> {
+    let (mut fields, mut list) = (String::new(), String::new());
+    for Binding { number, field, element, kind, access, .. } in bindings {
+        writeln!(fields, "        /// Binding {number}, {kind}, {access}.")?;
+        writeln!(fields, "        pub {field}: &'a Buffer<{element}>,")?;
+        write!(list, "self.{field}.untyped(), ")?;
+    }
+    Ok((fields, list))
+}
+
+/// The Rust module of a shared file with bindings.
+fn group_module(name: &str, bindings: &[Binding]) -> Result<String> {
+    let (fields, list) = members(bindings)?;
+    Ok(format!(
+        r#"/// What `glsl/shared/{name}.glsl` binds.
+pub mod {name} {{
+    use crate::gpu::{{Buffer, Untyped, layout::*}};
+    /// One field of every kernel that includes the file.
+    #[derive(Clone, Copy)]
+    pub struct Bind<'a> {{
+{fields}    }}
+    impl Bind<'_> {{
+        /// In the order of the fields.
+        pub fn buffers(&self) -> Vec<&std::sync::Arc<Untyped>> {{
+            vec![{list}]
+        }}
+    }}
+}}
+"#
+    ))
 }
 
 /// The Rust module of one kernel.
 fn module(name: &str, file: &Path, interface: &Interface, root: &str, binary: &Path) -> Result<String> {
-    let (push, mut fields, mut slots, mut list) = (&interface.push, String::new(), String::new(), String::new());
-    for Binding { number, field, element, kind, access } in &interface.bindings {
-        writeln!(
-            fields,
-            "        /// Binding {number}, {kind}, {access}.\n        pub {field}: &'a Buffer<{element}>,"
-        )?;
+    let push = &interface.push;
+    let (mut fields, list) = members(&interface.of(None))?;
+    let (mut slots, mut groups, mut order) = (String::new(), String::new(), interface.of(None));
+    for group in interface.groups() {
+        writeln!(fields, "        /// What the file of this name binds.")?;
+        writeln!(fields, "        pub {group}: {root}::shaders::{group}::Bind<'a>,")?;
+        writeln!(groups, "            all.extend(self.{group}.buffers());")?;
+        order.extend(interface.of(Some(group)));
+    }
+    for Binding { number, field, kind, access, .. } in order {
         writeln!(
             slots,
             "            Slot {{ name: {field:?}, binding: {number}, kind: SlotKind::{kind}, access: Access::{access} }},"
         )?;
-        write!(list, "self.{field}.untyped(), ")?;
     }
     let file = file.display();
     Ok(format!(
@@ -232,7 +311,9 @@ pub mod {name} {{
         const SLOTS: &'static [Slot] = &[
 {slots}        ];
         fn buffers(&self) -> Vec<&std::sync::Arc<Untyped>> {{
-            vec![{list}]
+            #[allow(unused_mut)]
+            let mut all = vec![{list}];
+{groups}            all
         }}
     }}
     // 128 bytes is what every Vulkan device has.

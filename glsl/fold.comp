@@ -7,7 +7,7 @@
 
 // Adds a batch of samples to the statistics of their pixels. One thread folds one pixel, in order of sample index, so
 // the result does not depend on how samples were batched (Welford 1962).
-layout(local_size_x = 64) in;
+layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer samples; // of vec4
 layout(scalar, binding = 1) buffer Stats { PixelStats stats[]; };
 layout(scalar, binding = 2) buffer Lights { PixelLight light[]; };

@@ -32,7 +32,7 @@ pub struct Batch {
 
 /// Records the primary hits: once per camera.
 pub fn record_guide(rec: &mut Recorder, st: &Stages, s: &DeviceScene, f: &FilmBuffers, push: &PathPush) -> Result<()> {
-    f.tiles.iter().try_for_each(|tile| st.guide.record(rec, s, tile, push)) // camera -> guide[P]
+    f.tiles.iter().try_for_each(|tile| guide::record(&st.guide, rec, s, tile, push)) // camera -> guide[P]
 }
 
 /// Records one batch of paths.
@@ -44,8 +44,8 @@ pub fn record_batch(
     push: &PathPush,
     batch: &Batch,
 ) -> Result<()> {
-    st.path.record(rec, s, f, push, batch)?; //             batch   -> samples[B]
-    st.fold.record(rec, f, batch) //                        samples -> stats[P], light[P]
+    path::record(&st.path, rec, s, f, push, batch)?; //     batch   -> samples[B]
+    fold::record(&st.fold, rec, f, batch) //                samples -> stats[P], light[P]
 }
 
 /// The scene on the device. Absent parts are buffers of one element that no kernel reads.
@@ -94,6 +94,23 @@ impl DeviceScene {
             environment: Buffer::from_slice(gpu, "environment", environment.map_or(&[], |e| &e.texels[..]))?,
             environment_table: Buffer::from_slice(gpu, "environment_table", environment.map_or(&[], |e| &e.table[..]))?,
         })
+    }
+
+    /// What the kernels bind.
+    pub fn bind(&self) -> crate::shaders::scene::Bind<'_> {
+        crate::shaders::scene::Bind {
+            nodes: &self.nodes,
+            triangles: &self.triangles,
+            shading: &self.shading,
+            instances: &self.instances,
+            materials: &self.materials,
+            textures: &self.textures,
+            texels: &self.texels,
+            lights: &self.lights,
+            light_table: &self.light_table,
+            environment: &self.environment,
+            environment_table: &self.environment_table,
+        }
     }
 
     /// Bytes of each part, largest first.

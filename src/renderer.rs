@@ -7,7 +7,7 @@ use crate::gpu::layout::{Camera, Effects, LIGHT_ENVIRONMENT, NONE, PathPush, Pix
 use crate::gpu::{FrameResources, Gpu, PassTime, RawBuffer, Recorder};
 use crate::scene::{self, Scene};
 use crate::settings::{PixelFilter, Sampler, Settings};
-use crate::stage::{self, fold, guide, path};
+use crate::stage::{PerThread, WORKGROUP_CPU, WORKGROUP_GPU};
 
 /// What a render leaves in buffers besides radiance and its variance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -85,15 +85,15 @@ impl Renderer {
         let settings = scene.settings.clone();
         settings.validate()?;
         let effects = Effects { split_light: outputs.split_light, counters: outputs.counters, ..effects };
-        let workgroup = if gpu.info().kind == "CPU" { stage::WORKGROUP_CPU } else { stage::WORKGROUP_GPU };
+        let workgroup = if gpu.info().kind == "CPU" { WORKGROUP_CPU } else { WORKGROUP_GPU };
         let stages = Stages {
-            guide: guide::Guides::new(gpu, &effects, workgroup)?,
-            path: path::Path::new(gpu, &effects, workgroup)?,
-            fold: fold::Fold::new(gpu, &effects)?,
+            guide: PerThread::new(gpu, &effects, workgroup)?,
+            path: PerThread::new(gpu, &effects, workgroup)?,
+            fold: PerThread::new(gpu, &effects, workgroup)?,
         };
         let paths = paths_in_flight(gpu, &settings, &effects);
         let film = FilmBuffers::new(gpu, settings.pixels() as u32, paths, &effects, outputs.guides)?;
-        let push = path_push(scene, &settings);
+        let push = path_push(scene);
         let scene = DeviceScene::new(gpu, scene, &effects)?;
         Ok(Self { gpu: gpu.clone(), scene, stages, film, effects, outputs, settings, push, paths })
     }
@@ -244,7 +244,9 @@ fn cut(pixels: u32, tile: u32, first: u32, samples: u32, paths: u32) -> Vec<Batc
     batches
 }
 
-fn path_push(scene: &Scene, settings: &Settings) -> PathPush {
+/// What the kernels are told of a scene; the batch is still to be filled in.
+pub fn path_push(scene: &Scene) -> PathPush {
+    let settings = &scene.settings;
     let environment = scene.lights.iter().position(|l| l.kind == LIGHT_ENVIRONMENT);
     PathPush {
         camera: scene.camera,

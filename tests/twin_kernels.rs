@@ -15,11 +15,11 @@ use tallow::reference::fold::fold;
 use tallow::reference::guide::guide;
 use tallow::reference::path::{Strategy, Tracer};
 use tallow::reference::traverse::traverse;
-use tallow::renderer::{Batch, Outputs, Renderer, all_effects, called_for};
+use tallow::renderer::{Batch, Outputs, Renderer, all_effects, called_for, path_push};
 use tallow::scene::Scene;
 use tallow::settings::{PixelFilter, Settings};
 use tallow::shaders;
-use twin::{Random, Workplace, path_push};
+use twin::{Random, Workplace};
 
 const SIDE: u32 = 48;
 const SAMPLES: u32 = 3;
@@ -185,21 +185,7 @@ fn traversed(gpu: &Gpu, scene: &Scene, effects: Effects, rays: &[RayQuery], any_
     let push = TraversePush { count: rays.len() as u32, root: path_push(scene).root, any_hit: u32::from(any_hit) };
     let mut frame = FrameResources::new(gpu).unwrap();
     gpu.run(&mut frame, |rec| {
-        let bind = shaders::traverse::Bind {
-            nodes: &s.nodes,
-            triangles: &s.triangles,
-            shading: &s.shading,
-            instances: &s.instances,
-            materials: &s.materials,
-            textures: &s.textures,
-            texels: &s.texels,
-            lights: &s.lights,
-            light_table: &s.light_table,
-            environment: &s.environment,
-            environment_table: &s.environment_table,
-            rays: &queries,
-            hits: &hits,
-        };
+        let bind = shaders::traverse::Bind { scene: s.bind(), rays: &queries, hits: &hits };
         rec.dispatch(&kernel, bind, &push, [rays.len().div_ceil(32) as u32, 1, 1])
     })
     .unwrap();

@@ -1,13 +1,11 @@
 //! One file per kernel: what it reads and writes, and how it is recorded. Stages never call stages; `frame.rs` lists them.
+use crate::error::Result;
+use crate::gpu::layout::Effects;
+use crate::gpu::{Bindings, Gpu, Kernel, Recorder};
+
 pub mod fold;
 pub mod guide;
 pub mod path;
-
-/// Specialisation constants of the kernels that leave their workgroup open: `local_size_x_id`, and the same for
-/// `thread_index()`.
-pub fn workgroup_constants(size: u32) -> [(u32, u32); 2] {
-    [(100, size), (101, size)]
-}
 
 /// Tracing on lavapipe runs fastest at 32 (against 16 and 64).
 pub const WORKGROUP_CPU: u32 = 32;
@@ -18,8 +16,38 @@ pub const WORKGROUP_GPU: u32 = 64;
 /// Workgroups along one axis that every Vulkan device can run.
 const ROW: u32 = 65_535;
 
+/// A kernel whose threads each do one item, and whose workgroup is chosen when it is made.
+pub struct PerThread<B> {
+    kernel: Kernel<B>,
+    workgroup: u32,
+}
+
+impl<B: Bindings> PerThread<B> {
+    /// Compiles the kernel for what `effects` call for.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when the driver refuses it.
+    pub fn new(gpu: &Gpu, effects: &Effects, workgroup: u32) -> Result<Self> {
+        // local_size_x_id, and the same for `thread_index()`.
+        Ok(Self { kernel: Kernel::new(gpu, effects, &[(100, workgroup), (101, workgroup)])?, workgroup })
+    }
+
+    /// Records it over `threads` items.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub fn record(&self, rec: &mut Recorder, bind: B, push: &B::Push, threads: u32) -> Result<()> {
+        rec.dispatch(&self.kernel, bind, push, groups(threads, self.workgroup))
+    }
+
+    /// Milliseconds that the pipeline took to create.
+    pub fn compile_ms(&self) -> f64 {
+        self.kernel.compile_time().as_secs_f64() * 1e3
+    }
+}
+
 /// Workgroups of `size` threads that cover `threads`, folded into rows; `thread_index()` unfolds them.
-pub fn groups(threads: u32, size: u32) -> [u32; 3] {
+fn groups(threads: u32, size: u32) -> [u32; 3] {
     let groups = threads.div_ceil(size);
     [groups.min(ROW), groups.div_ceil(ROW), 1]
 }

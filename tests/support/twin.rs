@@ -3,8 +3,9 @@
 use glam::Vec3;
 use rayon::prelude::*;
 use std::fmt::Write;
-use tallow::gpu::layout::{Effects, LIGHT_ENVIRONMENT, NONE, PathPush, ROOT_OF_INSTANCES};
+use tallow::gpu::layout::Effects;
 use tallow::reference::path::{Strategy, Tracer};
+use tallow::renderer::path_push;
 use tallow::scene::Scene;
 use tallow::settings::Sampler;
 
@@ -66,27 +67,6 @@ impl Workplace {
     pub fn scene(&self, text: &str) -> Scene {
         let path = self.0.path().join("scene.toml");
         Scene::parse(&path, text, &|_| {}).unwrap_or_else(|e| panic!("{e}"))
-    }
-}
-
-/// What the renderer hands to the kernels.
-pub fn path_push(scene: &Scene) -> PathPush {
-    let environment = scene.lights.iter().position(|l| l.kind == LIGHT_ENVIRONMENT);
-    let s = &scene.settings;
-    PathPush {
-        camera: scene.camera,
-        size: [s.width, s.height],
-        seed: s.seed,
-        max_depth: s.max_depth,
-        roulette_depth: s.roulette_depth,
-        clamp_indirect: s.clamp_indirect,
-        pixel_filter: s.filter as u32,
-        light_count: scene.lights.len() as u32,
-        triangle_pdf_scale: scene.triangle_pdf_scale,
-        environment: environment.map_or(NONE, |i| i as u32),
-        environment_size: scene.environment.as_ref().map_or(0, |e| e.width | e.height << 16),
-        root: scene.root | if scene.instances.is_empty() { 0 } else { ROOT_OF_INSTANCES },
-        ..PathPush::default()
     }
 }
 

@@ -129,21 +129,7 @@ impl Device {
         let push = TraversePush { count, root: self.root, any_hit: u32::from(any_hit) };
         let s = self.renderer.scene();
         let times = self.gpu.run(&mut self.frame, |rec| {
-            let bind = Bind {
-                nodes: &s.nodes,
-                triangles: &s.triangles,
-                shading: &s.shading,
-                instances: &s.instances,
-                materials: &s.materials,
-                textures: &s.textures,
-                texels: &s.texels,
-                lights: &s.lights,
-                light_table: &s.light_table,
-                environment: &s.environment,
-                environment_table: &s.environment_table,
-                rays: &self.rays,
-                hits: &self.hits,
-            };
+            let bind = Bind { scene: s.bind(), rays: &self.rays, hits: &self.hits };
             rec.dispatch(&self.kernel, bind, &push, [count.div_ceil(WORKGROUP), 1, 1])
         })?;
         let pass = times.first().context("the device has no timestamps")?;
