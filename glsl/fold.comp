@@ -1,9 +1,11 @@
 #version 460
 #extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #extension GL_GOOGLE_include_directive : require
 #include "layout.glsl"
 #include "effects.glsl"
 #include "shared/thread.glsl"
+#include "shared/wide.glsl"
 
 // Adds a batch of samples to the statistics of their pixels. One thread folds one pixel, in order of sample index, so
 // the result does not depend on how samples were batched (Welford 1962).
@@ -11,23 +13,33 @@ layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer samples; // of vec4
 layout(scalar, binding = 1) buffer Stats { PixelStats stats[]; };
 layout(scalar, binding = 2) buffer Lights { PixelLight light[]; };
+layout(binding = 3) uniform usamplerBuffer offset; // of uvec2
 layout(scalar, push_constant) uniform Push { FoldPush push; };
+
+#include "shared/offset.glsl"
 
 // A channel whose albedo is below this cannot be divided out; its light stays with the direct light.
 const float SMALLEST_ALBEDO = 1e-6;
+
+// Where a pixel's samples lie in the batch: (first, step, number).
+uvec3 samples_of(uint i, uint pixel) {
+    if (!FX_ADAPTIVE || push.samples > 0u) return uvec3(i, push.pixels, push.samples);
+    uint64_t begin = wide(push.first_path), end = begin + push.paths;
+    uint64_t from = max(offset_of(pixel), begin), to = min(offset_of(pixel + 1u), end);
+    return uvec3(uint(from - begin), 1u, to > from ? uint(to - from) : 0u);
+}
 
 void main() {
     uint i = thread_index();
     if (i >= push.pixels) return; // safe: no barrier() follows
     uint pixel = push.first_pixel + i;
-    PixelStats s = PixelStats(vec3(0.0), 0u, vec3(0.0));
+    uvec3 at_step_count = samples_of(i, pixel);
+    if (at_step_count.z == 0u) return;
+    PixelStats s = stats[pixel];
     PixelLight l = PixelLight(vec3(0.0), vec3(0.0));
-    if (push.restart == 0u) {
-        s = stats[pixel];
-        if (FX_SPLIT) l = light[pixel];
-    }
-    for (uint k = 0u; k < push.samples; k++) {
-        int at = int(k * push.pixels + i);
+    if (FX_SPLIT) l = light[pixel];
+    for (uint k = 0u; k < at_step_count.z; k++) {
+        int at = int(at_step_count.x + k * at_step_count.y);
         vec3 radiance;
         s.count++;
         float share = 1.0 / float(s.count);

@@ -7,11 +7,12 @@
 #include "shared/scene.glsl"
 
 // One camera path per thread: next event estimation and BSDF sampling joined by the balance heuristic (Veach 1997).
-// Thread i traces sample first_sample + i / pixels of pixel first_pixel + i % pixels and writes 1 vec4 (radiance), or
+// Thread i traces sample first_sample + i / pixels of pixel first_pixel + i % pixels, or path i of a list, and writes 1 vec4 (radiance), or
 // with FX_SPLIT 3 (direct, indirect, the albedo that indirect is to be divided by); w is 0.
 layout(local_size_x_id = 100) in;
 layout(scalar, binding = 11) writeonly buffer Samples { vec4 samples[]; };
 layout(scalar, binding = 12) buffer Counters { uint counters[]; };
+layout(binding = 13) uniform usamplerBuffer paths; // of uvec2
 layout(scalar, push_constant) uniform Push { PathPush push; };
 
 uint nodes_visited = 0u, closest_rays = 0u, any_rays = 0u;
@@ -36,6 +37,7 @@ vec2 film_sample(uint pixel, Sampler random) {
     vec2 u = sample_2d(random, PAIR_FILM);
     if (FX_PIXEL_FILTER && push.pixel_filter == 1u) u = 0.5 + vec2(warp_tent(u.x), warp_tent(u.y));
     else if (FX_PIXEL_FILTER && push.pixel_filter == 2u) u = 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y));
+    else if (FX_PIXEL_FILTER && push.pixel_filter == 3u) u = vec2(0.5);
     return film_from_pixel(at + u, push.size);
 }
 
@@ -175,9 +177,14 @@ void count(uint slot, uint n) {
 
 void main() {
     uint i = thread_index();
-    if (i >= push.pixels * push.samples) return; // safe: no barrier() follows
+    bool listed = FX_ADAPTIVE && push.samples == 0u;
+    if (i >= push.pixels * (listed ? 1u : push.samples)) return; // safe: no barrier() follows
     uint pixel = push.first_pixel + i % push.pixels;
     uint index = push.first_sample + i / push.pixels;
+    if (listed) {
+        pixel = texelFetch(paths, int(2u * i)).x;
+        index = texelFetch(paths, int(2u * i + 1u)).x;
+    }
     Sampler random = sampler_start(pixel, index, push.seed);
     Ray ray = camera_ray(push.camera, film_sample(pixel, random), FX_LENS ? sample_2d(random, PAIR_LENS) : vec2(0.0));
     Path path = Path(ray.origin, ray.direction, vec3(1.0), 0.0, true);

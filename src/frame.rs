@@ -1,9 +1,13 @@
 //! One frame, in the order the GPU runs it, and the buffers it runs over. `P` pixels, `B` paths in flight.
+use crate::allocate::{Inputs, Policy};
 use crate::error::Result;
 use crate::gpu::layout::*;
 use crate::gpu::{Buffer, Gpu, Location, Recorder};
 use crate::scene::Scene;
-use crate::stage::{fold, guide, path};
+use crate::schedule::{Batch, PathRange, Plan};
+use crate::stage::apportion::{Apportion, Counts};
+use crate::stage::scan::Scan;
+use crate::stage::{batch, fold, guide, path};
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -17,26 +21,32 @@ pub struct Stages {
     pub fold: fold::Fold,
 }
 
-/// A rectangle of work: some samples of a run of pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Batch {
-    /// Row-major index.
-    pub first_pixel: u32,
-    /// At least 1.
-    pub pixels: u32,
-    /// Index in each pixel's sequence.
-    pub first_sample: u32,
-    /// At least 1.
-    pub samples: u32,
+/// The kernels that decide where samples go, for renders that do not spread them evenly.
+pub struct Allocation {
+    /// What makes a pixel worth samples.
+    pub policy: Box<dyn Policy>,
+    /// Priorities to counts.
+    pub apportion: Apportion,
+    /// Counts to offsets.
+    pub scan: Scan,
+    /// Offsets to paths.
+    pub batch: batch::Batches,
 }
 
-/// Records the primary hits: once per camera.
-pub fn record_guide(rec: &mut Recorder, st: &Stages, s: &DeviceScene, f: &FilmBuffers, push: &PathPush) -> Result<()> {
-    f.tiles.iter().try_for_each(|tile| guide::record(&st.guide, rec, s, tile, push)) // camera -> guide[P]
+/// Forgets all samples, and finds the primary hits where they are wanted: once per camera.
+pub fn record_start(rec: &mut Recorder, st: &Stages, s: &DeviceScene, f: &FilmBuffers, push: &PathPush) -> Result<()> {
+    for tile in &f.tiles {
+        rec.fill(&tile.stats, 0)?;
+        rec.fill(&tile.light, 0)?;
+        if tile.guide.len() == tile.pixels as usize {
+            guide::record(&st.guide, rec, s, tile, push)?; //   camera  -> guide[P]
+        }
+    }
+    Ok(())
 }
 
-/// Records one batch of paths.
-pub fn record_batch(
+/// Records one batch with the same number of paths for every pixel of a run.
+pub fn record_uniform(
     rec: &mut Recorder,
     st: &Stages,
     s: &DeviceScene,
@@ -44,8 +54,38 @@ pub fn record_batch(
     push: &PathPush,
     batch: &Batch,
 ) -> Result<()> {
-    path::record(&st.path, rec, s, f, push, batch)?; //     batch   -> samples[B]
-    fold::record(&st.fold, rec, f, batch) //                samples -> stats[P], light[P]
+    path::record(&st.path, rec, s, f, push, batch)?; //         batch   -> samples[B]
+    fold::record(&st.fold, rec, f, batch) //                    samples -> stats[P], light[P]
+}
+
+/// Records the decision of how many samples each pixel gets next.
+pub fn record_allocation(
+    rec: &mut Recorder,
+    a: &Allocation,
+    f: &FilmBuffers,
+    push: &PriorityPush,
+    plan: &Plan,
+) -> Result<()> {
+    let tile = &f.tiles[0];
+    let inputs = Inputs { guide: &tile.guide, stats: &tile.stats, priority: &f.priority };
+    a.policy.record(rec, &inputs, push)?; //                                guide[P], stats[P] -> priority[P]
+    a.apportion.record(rec, &f.priority, &tile.stats, &f.counts, plan)?; // priority -> count[P], sum = budget
+    a.scan.record(rec, &f.counts) //                                        count    -> offset[P + 1]
+}
+
+/// Records one batch of what was allocated.
+pub fn record_listed(
+    rec: &mut Recorder,
+    st: &Stages,
+    a: &Allocation,
+    s: &DeviceScene,
+    f: &FilmBuffers,
+    push: &PathPush,
+    range: &PathRange,
+) -> Result<()> {
+    batch::record(&a.batch, rec, &f.counts.key, &f.tiles[0].stats, &f.paths, range)?; // offset  -> paths[B]
+    path::record_listed(&st.path, rec, s, f, push, range.paths)?; //                     paths   -> samples[B]
+    fold::record_listed(&st.fold, rec, f, range) //                                      samples -> stats[P], light[P]
 }
 
 /// The scene on the device. Absent parts are buffers of one element that no kernel reads.
@@ -182,6 +222,12 @@ pub struct FilmBuffers {
     pub tiles: Vec<FilmTile>,
     /// Closest-hit rays, any-hit rays, nodes visited: pairs of words, low first.
     pub counters: Buffer<u32>,
+    /// (pixel, sample index) of the paths in flight, where samples are placed.
+    pub paths: Buffer<uvec2>,
+    /// Per pixel, where samples are placed.
+    pub priority: Buffer<f32>,
+    /// Per pixel, where samples are placed.
+    pub counts: Counts,
 }
 
 impl FilmBuffers {
@@ -194,7 +240,11 @@ impl FilmBuffers {
         let capacity = FilmTile::capacity(gpu.info().max_storage_range);
         let starts = (0..pixels).step_by(capacity as usize);
         let tile = |first: u32| FilmTile::new(gpu, first..pixels.min(first + capacity), effects, guides);
+        let placed = |n: u32| if effects.adaptive { n } else { 1 };
         Ok(Self {
+            paths: Buffer::new(gpu, "paths", placed(paths) as usize, Location::Device)?,
+            priority: Buffer::new(gpu, "priority", placed(pixels) as usize, Location::Device)?,
+            counts: Counts::new(gpu, placed(pixels))?,
             samples: Buffer::new(gpu, "samples", records, Location::Device)?,
             tiles: starts.map(tile).collect::<Result<_>>()?,
             counters: Buffer::from_slice(gpu, "counters", &[0; 6])?,

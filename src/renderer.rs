@@ -1,12 +1,20 @@
 //! The renderer that an engine embeds and that the command line drives: a scene on a device, kernels specialised for
 //! it, and frames recorded batch by batch into command buffers.
-use crate::error::Result;
-use crate::frame::{self, Stages};
-pub use crate::frame::{Batch, DeviceScene, FilmBuffers, FilmTile};
-use crate::gpu::layout::{Camera, Effects, LIGHT_ENVIRONMENT, NONE, PathPush, PixelStats, ROOT_OF_INSTANCES};
-use crate::gpu::{FrameResources, Gpu, PassTime, RawBuffer, Recorder};
+use crate::allocate::{self, Row};
+use crate::error::{Error, Result};
+use crate::frame::{self, Allocation, Stages};
+pub use crate::frame::{DeviceScene, FilmBuffers, FilmTile};
+use crate::gpu::layout::{
+    Apportionment, Camera, Effects, LIGHT_ENVIRONMENT, NONE, PathPush, PixelLight, PixelStats, PriorityPush,
+    ROOT_OF_INSTANCES,
+};
+use crate::gpu::{FrameResources, Gpu, Kernel, PassTime, RawBuffer, Recorder};
 use crate::scene::{self, Scene};
+use crate::schedule::{self, Cut};
+pub use crate::schedule::{Batch, PathRange, Plan, Progress, Step};
 use crate::settings::{PixelFilter, Sampler, Settings};
+use crate::stage::apportion::Apportion;
+use crate::stage::scan::Scan;
 use crate::stage::{PerThread, WORKGROUP_CPU, WORKGROUP_GPU};
 
 /// What a render leaves in buffers besides radiance and its variance.
@@ -40,11 +48,13 @@ pub struct Renderer {
     gpu: Gpu,
     scene: DeviceScene,
     stages: Stages,
+    allocation: Option<Allocation>,
     film: FilmBuffers,
     effects: Effects,
     outputs: Outputs,
     settings: Settings,
     push: PathPush,
+    priority: PriorityPush,
     paths: u32,
 }
 
@@ -91,58 +101,113 @@ impl Renderer {
             path: PerThread::new(gpu, &effects, workgroup)?,
             fold: PerThread::new(gpu, &effects, workgroup)?,
         };
+        let policy = policy_of(&settings)?;
+        let pixels = settings.pixels() as u32;
+        let allocation = effects.adaptive.then(|| allocation(gpu, policy, pixels, workgroup)).transpose()?;
         let paths = paths_in_flight(gpu, &settings, &effects);
-        let film = FilmBuffers::new(gpu, settings.pixels() as u32, paths, &effects, outputs.guides)?;
-        let push = path_push(scene);
-        let scene = DeviceScene::new(gpu, scene, &effects)?;
-        Ok(Self { gpu: gpu.clone(), scene, stages, film, effects, outputs, settings, push, paths })
-    }
-
-    /// The work of a whole render, in an order that refines the picture evenly: every pixel gets its first samples
-    /// before any gets the next. The result does not depend on how the work is cut.
-    pub fn batches(&self) -> Vec<Batch> {
-        self.batches_of(0, self.settings.spp)
-    }
-
-    /// The work of samples `first .. first + samples` of every pixel.
-    pub fn batches_of(&self, first: u32, samples: u32) -> Vec<Batch> {
-        let tile = FilmTile::capacity(self.gpu.info().max_storage_range);
-        cut(self.settings.pixels() as u32, tile, first, samples, self.paths)
-    }
-
-    /// Records the primary hits; nothing when the outputs do not call for guides.
-    ///
-    /// # Errors
-    /// [`crate::error::Error::Device`].
-    pub fn record_guide(&self, rec: &mut Recorder) -> Result<()> {
-        match self.outputs.guides {
-            true => frame::record_guide(rec, &self.stages, &self.scene, &self.film, &self.push),
-            false => Ok(()),
+        let film = FilmBuffers::new(gpu, pixels, paths, &effects, outputs.guides || policy.guides)?;
+        if settings.allocate.policy != "uniform" && film.tiles.len() > 1 {
+            let most = film.tiles[0].pixels;
+            return Err(Error::Usage(format!(
+                "a film of {pixels} pixels is too large to place samples on this device: choose at most {most} pixels, \
+                 or --allocate uniform"
+            )));
         }
-    }
-
-    /// Records one batch. Batches of a pixel must be recorded in order of their samples.
-    ///
-    /// # Errors
-    /// [`crate::error::Error::Device`].
-    pub fn record_batch(&self, rec: &mut Recorder, batch: &Batch) -> Result<()> {
-        frame::record_batch(rec, &self.stages, &self.scene, &self.film, &self.push, batch)
-    }
-
-    /// Runs one batch on the renderer's own queue and waits; with the guides first when it is the first one.
-    ///
-    /// # Errors
-    /// [`crate::error::Error::Device`].
-    pub fn run(&self, frame: &mut FrameResources, batch: &Batch) -> Result<Vec<PassTime>> {
-        self.gpu.run(frame, |rec| {
-            if batch.first_sample == 0 && batch.first_pixel == 0 {
-                self.record_guide(rec)?;
-            }
-            self.record_batch(rec, batch)
+        let (push, priority) = (path_push(scene), priority_push(scene));
+        let scene = DeviceScene::new(gpu, scene, &effects)?;
+        Ok(Self {
+            gpu: gpu.clone(),
+            scene,
+            stages,
+            allocation,
+            film,
+            effects,
+            outputs,
+            settings,
+            push,
+            priority,
+            paths,
         })
     }
 
-    /// Moves the camera; what was accumulated belongs to the old one, so start again from sample 0.
+    /// The work of a whole render, in the order that it must be recorded in. The result does not depend on how the work
+    /// is cut into batches.
+    pub fn steps(&self) -> Vec<Step> {
+        schedule::steps(&self.settings, self.learns(), &self.cut())
+    }
+
+    /// The rest of the work, once [`Renderer::resume`] has put back what there was.
+    pub fn rest(&self, progress: Progress) -> Vec<Step> {
+        schedule::rest(&self.settings, self.learns(), &self.cut(), progress)
+    }
+
+    fn learns(&self) -> bool {
+        allocate::policy(&self.settings.allocate.policy).is_some_and(|row| row.learns)
+    }
+
+    fn cut(&self) -> Cut {
+        let tile = FilmTile::capacity(self.gpu.info().max_storage_range);
+        Cut { pixels: self.settings.pixels() as u32, tile, paths: self.paths }
+    }
+
+    /// Records one step.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Usage`] for a step of another kind of render, [`crate::error::Error::Device`].
+    pub fn record(&self, rec: &mut Recorder, step: &Step) -> Result<()> {
+        let (st, s, f, push) = (&self.stages, &self.scene, &self.film, &self.push);
+        match (step, &self.allocation) {
+            (Step::Start, _) => frame::record_start(rec, st, s, f, push),
+            (Step::Uniform(batch), _) => frame::record_uniform(rec, st, s, f, push, batch),
+            (Step::Allocate(plan), Some(a)) => frame::record_allocation(rec, a, f, &self.priority, plan),
+            (Step::Listed(range), Some(a)) => frame::record_listed(rec, st, a, s, f, push, range),
+            _ => Err(Error::Usage("this renderer was made without the effect \"adaptive\"".into())),
+        }
+    }
+
+    /// Runs one step on the renderer's own queue and waits.
+    ///
+    /// # Errors
+    /// As [`Renderer::record`].
+    pub fn run(&self, frame: &mut FrameResources, step: &Step) -> Result<Vec<PassTime>> {
+        self.gpu.run(frame, |rec| self.record(rec, step))
+    }
+
+    /// Puts back what an earlier render had: statistics, light (empty unless it is kept apart), and how many samples
+    /// each pixel still lacks of what it was to have. Follow it with [`Renderer::rest`]. Needs the effect `adaptive`.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Usage`] when there is no such effect, [`crate::error::Error::Device`] when the lengths
+    /// are not those of the film.
+    pub fn resume(
+        &self,
+        frame: &mut FrameResources,
+        stats: &[PixelStats],
+        light: &[PixelLight],
+        pending: &[u32],
+    ) -> Result<()> {
+        let Some(a) = &self.allocation else {
+            return Err(Error::Usage("this renderer was made without the effect \"adaptive\"".into()));
+        };
+        self.run(frame, &Step::Start)?;
+        self.film.tiles[0].stats.write(0, stats)?;
+        if self.effects.split_light {
+            self.film.tiles[0].light.write(0, light)?;
+        }
+        self.film.counts.count.write(0, pending)?;
+        self.gpu.run(frame, |rec| a.scan.record(rec, &self.film.counts))?;
+        Ok(())
+    }
+
+    /// How the last allocation went.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub fn apportionment(&self) -> Result<Apportionment> {
+        Ok(self.film.counts.state.read()?[0])
+    }
+
+    /// Moves the camera; what was accumulated belongs to the old one, so begin with [`Step::Start`].
     pub fn set_camera(&mut self, camera: Camera) {
         self.push.camera = camera;
     }
@@ -224,24 +289,35 @@ fn paths_in_flight(gpu: &Gpu, settings: &Settings, effects: &Effects) -> u32 {
     wanted.min(room).min(all).max(1) as u32
 }
 
-/// Cuts samples `first .. first + samples` of `pixels` pixels into batches of at most `paths` paths, none across a
-/// multiple of `tile` pixels.
-fn cut(pixels: u32, tile: u32, first: u32, samples: u32, paths: u32) -> Vec<Batch> {
-    let run = pixels.min(paths).min(tile);
-    let depth = (paths / run).max(1);
-    let mut batches = Vec::new();
-    let mut sample = 0;
-    while sample < samples {
-        let n = depth.min(samples - sample);
-        let mut first_pixel = 0;
-        while first_pixel < pixels {
-            let pixels = run.min(pixels - first_pixel).min(tile - first_pixel % tile);
-            batches.push(Batch { first_pixel, pixels, first_sample: first + sample, samples: n });
-            first_pixel += pixels;
-        }
-        sample += n;
+fn policy_of(settings: &Settings) -> Result<&'static Row> {
+    let name = &settings.allocate.policy;
+    allocate::policy(name).ok_or_else(|| Error::Usage(format!("no policy \"{name}\"")))
+}
+
+fn allocation(gpu: &Gpu, policy: &Row, pixels: u32, workgroup: u32) -> Result<Allocation> {
+    Ok(Allocation {
+        policy: (policy.make)(gpu, pixels, workgroup)?,
+        apportion: Apportion::new(gpu)?,
+        scan: Scan::new(gpu)?,
+        batch: Kernel::new(gpu, &Effects::default(), &[])?,
+    })
+}
+
+/// What the policies are told of a scene.
+pub fn priority_push(scene: &Scene) -> PriorityPush {
+    let (s, a) = (&scene.settings, &scene.settings.allocate);
+    let [low, high] = scene.bounds.map(glam::Vec3::from);
+    let sigma = (a.sigma_position * high.distance(low)).max(f32::MIN_POSITIVE.sqrt());
+    PriorityPush {
+        size: [s.width, s.height],
+        window: a.window,
+        normal_scale: a.sigma_normal.powi(-2),
+        position_scale: sigma.powi(-2),
+        luminance_floor: a.luminance_floor,
+        limit: schedule::limit(s),
+        threshold: a.noise_threshold,
+        filtered: a.filtered,
     }
-    batches
 }
 
 /// What the kernels are told of a scene; the batch is still to be filled in.
@@ -259,6 +335,7 @@ pub fn path_push(scene: &Scene) -> PathPush {
             PixelFilter::Box => 0,
             PixelFilter::Tent => 1,
             PixelFilter::Gaussian => 2,
+            PixelFilter::Point => 3,
         },
         light_count: scene.lights.len() as u32,
         triangle_pdf_scale: scene.triangle_pdf_scale,
@@ -266,41 +343,5 @@ pub fn path_push(scene: &Scene) -> PathPush {
         environment_size: scene.environment.as_ref().map_or(0, |e| e.width | e.height << 16),
         root: scene.root | if scene.instances.is_empty() { 0 } else { ROOT_OF_INSTANCES },
         ..PathPush::default()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Every sample of every pixel appears exactly once, and in order within its pixel.
-    fn covers(pixels: u32, tile: u32, samples: u32, paths: u32) -> bool {
-        let mut next = vec![0; pixels as usize];
-        for b in cut(pixels, tile, 0, samples, paths) {
-            let crosses = b.first_pixel / tile != (b.first_pixel + b.pixels - 1) / tile;
-            if crosses || b.pixels * b.samples > paths.max(1) {
-                return false;
-            }
-            for p in b.first_pixel..b.first_pixel + b.pixels {
-                if next[p as usize] != b.first_sample {
-                    return false;
-                }
-                next[p as usize] += b.samples;
-            }
-        }
-        next.iter().all(|&n| n == samples)
-    }
-
-    #[test]
-    fn batches_cover_all_work_once() {
-        for pixels in [1, 31, 64, 65] {
-            for samples in [1, 2, 7] {
-                for paths in [1, 3, 64, 100, 1000] {
-                    for tile in [1, 30, 64, 1000] {
-                        assert!(covers(pixels, tile, samples, paths), "{pixels} {tile} {samples} {paths}");
-                    }
-                }
-            }
-        }
     }
 }

@@ -14,6 +14,8 @@ pub enum PixelFilter {
     Tent,
     /// Gaussian of standard deviation 0.5, cut at radius 2.
     Gaussian,
+    /// The pixel's centre: samples differ in what happens beyond the first hit only.
+    Point,
 }
 
 /// Where the random numbers come from.
@@ -25,6 +27,86 @@ pub enum Sampler {
     Sobol,
     /// Independent numbers (PCG), the control.
     Independent,
+}
+
+/// Where samples go. The `[allocate]` table of a scene file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Allocate {
+    /// Name of a row of [`crate::allocate::POLICIES`].
+    pub policy: String,
+    /// Samples that every pixel gets before any is placed, if the budget allows; at least 0.
+    pub min_spp: u32,
+    /// Samples that no pixel exceeds; 0: no limit but [`Settings::MAX_SPP`].
+    pub max_spp: u32,
+    /// Rounds that the budget is spread over, 1 to 4096; policies that learn do so before each.
+    pub rounds: u32,
+    /// Edge of the square of pixels that geometry compares, 2 to 10.
+    pub window: u32,
+    /// Difference of unit normals at which they count as e^-1 alike, above 0.
+    pub sigma_normal: f32,
+    /// Distance of hits at which they count as e^-1 alike, in diagonals of the scene's bounds, above 0.
+    pub sigma_position: f32,
+    /// Luminance that is added before noise is compared with it, W/(m^2 sr): below it noise counts by itself. Negative:
+    /// noise always counts by itself.
+    pub luminance_floor: f32,
+    /// Stop when the relative error of every pixel's mean is estimated below this; 0 is off. `spp` is then the limit of a
+    /// pixel, if `max_spp` is not.
+    pub noise_threshold: f32,
+    /// Share of the variance that the filter to come removes where all neighbours are alike, 0 (no filter) to 1.
+    pub filtered: f32,
+}
+
+impl Default for Allocate {
+    fn default() -> Self {
+        Self {
+            policy: "uniform".into(),
+            min_spp: 2,
+            max_spp: 0,
+            rounds: 4,
+            window: 4,
+            sigma_normal: 0.35,
+            sigma_position: 0.01,
+            luminance_floor: 0.05,
+            noise_threshold: 0.0,
+            filtered: 0.5,
+        }
+    }
+}
+
+impl Allocate {
+    /// Names of all policies, for messages.
+    fn names() -> String {
+        let names: Vec<_> = crate::allocate::POLICIES.iter().map(|row| row.name).collect();
+        names.join(", ")
+    }
+
+    fn validate(&self) -> Result<()> {
+        let Some(row) = crate::allocate::policy(&self.policy) else {
+            return Err(Error::Usage(format!("no policy \"{}\": choose one of {}", self.policy, Self::names())));
+        };
+        if self.noise_threshold > 0.0 && !row.learns {
+            let name = row.name;
+            return Err(Error::Usage(format!(
+                "noise-threshold needs a policy that learns, variance or both: not {name}"
+            )));
+        }
+        let checks = [
+            ("rounds", (1..=4096).contains(&self.rounds), "choose 1 to 4096"),
+            ("window", (2..=10).contains(&self.window), "choose 2 to 10"),
+            ("sigma-normal", self.sigma_normal > 0.0, "choose a number above 0"),
+            ("sigma-position", self.sigma_position > 0.0, "choose a number above 0"),
+            ("luminance-floor", !self.luminance_floor.is_nan(), "choose a number"),
+            ("noise-threshold", self.noise_threshold >= 0.0, "choose 0 (off) or a number above"),
+            ("filtered", (0.0..=1.0).contains(&self.filtered), "choose 0 to 1"),
+            ("max-spp", self.max_spp <= Settings::MAX_SPP, "choose at most 16777216"),
+            ("min-spp", self.max_spp == 0 || self.min_spp <= self.max_spp, "it must not exceed max-spp"),
+        ];
+        match checks.iter().find(|(_, good, _)| !good) {
+            Some((name, _, remedy)) => Err(Error::Usage(format!("{name} is out of range: {remedy}"))),
+            None => Ok(()),
+        }
+    }
 }
 
 /// The settings of a render.
@@ -48,6 +130,8 @@ pub struct Settings {
     pub filter: PixelFilter,
     /// Random numbers.
     pub sampler: Sampler,
+    /// Where samples go.
+    pub allocate: Allocate,
 }
 
 impl Default for Settings {
@@ -62,6 +146,7 @@ impl Default for Settings {
             seed: 0,
             filter: PixelFilter::Box,
             sampler: Sampler::Sobol,
+            allocate: Allocate::default(),
         }
     }
 }
@@ -85,6 +170,7 @@ impl Settings {
         range("height", self.height, Self::MAX_EDGE)?;
         range("spp", self.spp, Self::MAX_SPP)?;
         range("max-depth", self.max_depth, Self::MAX_DEPTH)?;
+        self.allocate.validate()?;
         match self.clamp_indirect {
             c if c.is_finite() && c >= 0.0 => Ok(()),
             c => Err(Error::Usage(format!("clamp-indirect is {c}: choose 0 (off) or a positive number"))),

@@ -69,9 +69,8 @@ fn an_engine_gets_the_bits_of_the_command_line_frame_after_frame() {
     let mut record = |renderer: &Renderer| {
         engine.run(|commands| unsafe {
             let mut rec = Recorder::external(&gpu, &mut frame, commands.as_raw()).unwrap();
-            renderer.record_guide(&mut rec).unwrap();
-            for batch in renderer.batches() {
-                renderer.record_batch(&mut rec, &batch).unwrap();
+            for step in renderer.steps() {
+                renderer.record(&mut rec, &step).unwrap();
             }
             drop(rec);
             gather(&engine.device, commands, renderer.radiance()[0], &download);

@@ -5,7 +5,7 @@ mod support;
 use std::path::Path;
 use tallow::gpu::Gpu;
 use tallow::gpu::layout::{Effects, PixelStats};
-use tallow::renderer::{self, Batch, Outputs, Renderer};
+use tallow::renderer::{self, Batch, Outputs, Renderer, Step};
 use tallow::scene::Scene;
 use tallow::settings::{PixelFilter, Sampler, Settings};
 
@@ -73,18 +73,18 @@ fn the_cut_into_batches_changes_no_bit() {
     let whole = support::render(&gpu, &renderer);
     let pixels = 33 * 17;
     for (run, depth) in [(1, 4), (31, 1), (64, 3), (65, 2), (pixels, 1)] {
-        let mut batches = Vec::new();
+        let mut steps = vec![Step::Start];
         for first_sample in (0..4).step_by(depth as usize) {
             for first_pixel in (0..pixels).step_by(run as usize) {
                 let (pixels, samples) = (run.min(pixels - first_pixel), depth.min(4 - first_sample));
-                batches.push(Batch { first_pixel, pixels, first_sample, samples });
+                steps.push(Step::Uniform(Batch { first_pixel, pixels, first_sample, samples }));
             }
         }
-        assert!(bits(&support::render_batches(&gpu, &renderer, &batches)) == bits(&whole), "{run} x {depth}");
+        assert!(bits(&support::render_steps(&gpu, &renderer, &steps)) == bits(&whole), "{run} x {depth}");
     }
     // Control: one sample left out must show.
-    let batches: Vec<_> = renderer.batches_of(0, 3);
-    assert!(bits(&support::render_batches(&gpu, &renderer, &batches)) != bits(&whole));
+    let part = Step::Uniform(Batch { first_pixel: 0, pixels, first_sample: 0, samples: 3 });
+    assert!(bits(&support::render_steps(&gpu, &renderer, &[Step::Start, part])) != bits(&whole));
     support::assert_silent(&gpu);
 }
 

@@ -15,7 +15,7 @@ use tallow::reference::fold::fold;
 use tallow::reference::guide::guide;
 use tallow::reference::path::{Strategy, Tracer};
 use tallow::reference::traverse::traverse;
-use tallow::renderer::{Batch, Outputs, Renderer, all_effects, called_for, path_push};
+use tallow::renderer::{Batch, Outputs, Renderer, Step, all_effects, called_for, path_push};
 use tallow::scene::Scene;
 use tallow::settings::{PixelFilter, Settings};
 use tallow::shaders;
@@ -90,7 +90,7 @@ fn run(gpu: &Gpu, scene: &Scene, effects: Effects) -> Pair {
     let mut frame = FrameResources::new(gpu).unwrap();
     let pixels = SIDE * SIDE;
     let batch = Batch { first_pixel: 0, pixels, first_sample: 0, samples: SAMPLES };
-    renderer.run(&mut frame, &batch).unwrap();
+    [Step::Start, Step::Uniform(batch)].iter().for_each(|step| drop(renderer.run(&mut frame, step).unwrap()));
     let film = renderer.film();
     let words: Vec<[f32; 3]> = film.samples.read().unwrap().iter().map(|&[x, y, z, _]| [x, y, z]).collect();
     let tile = &film.tiles[0];
@@ -105,7 +105,7 @@ fn run(gpu: &Gpu, scene: &Scene, effects: Effects) -> Pair {
     let host: Vec<Vec3> = (0..pixels * SAMPLES).into_par_iter().flat_map_iter(sample).collect();
     let (mut stats, mut light) =
         (vec![PixelStats::default(); pixels as usize], vec![PixelLight::default(); pixels as usize]);
-    let push_fold = FoldPush { first_pixel: 0, pixels, samples: SAMPLES, restart: 1 };
+    let push_fold = FoldPush { pixels, samples: SAMPLES, ..FoldPush::default() };
     fold(&push_fold, true, &words, &mut stats, &mut light); // of the device's samples: only rounding may differ
     Pair {
         samples: [device, host],

@@ -99,8 +99,8 @@ fn shrink(settings: &mut Settings) {
 /// GPU time of the paths of one sample per pixel.
 fn gpu_ms(renderer: &Renderer, frame: &mut FrameResources) -> Result<f64> {
     let mut ns = 0;
-    for batch in renderer.batches() {
-        let times = renderer.run(frame, &batch)?;
+    for step in renderer.steps() {
+        let times = renderer.run(frame, &step)?;
         ns += times.iter().filter(|t| t.name == "path").map(|t| t.end_ns - t.begin_ns).sum::<u64>();
     }
     Ok(ns as f64 * 1e-6)

@@ -103,8 +103,18 @@ pub struct Overrides {
 impl Overrides {
     /// Replaces those settings that were given.
     pub fn apply(&self, settings: &mut Settings) {
-        let Settings { width, height, spp, max_depth, roulette_depth, clamp_indirect, seed, filter, sampler } =
-            settings;
+        let Settings {
+            width,
+            height,
+            spp,
+            max_depth,
+            roulette_depth,
+            clamp_indirect,
+            seed,
+            filter,
+            sampler,
+            allocate: _,
+        } = settings;
         set(width, self.width);
         set(height, self.height);
         set(spp, self.spp);
@@ -212,14 +222,14 @@ fn render(
     let total = settings.pixels() as u64 * u64::from(settings.spp);
     let mut progress = Progress::new(total, quiet);
     let (mut times, mut rays) = (Vec::new(), 0);
-    for batch in renderer.batches() {
+    for step in renderer.steps() {
         if stop.load(Ordering::SeqCst) {
             progress.finish();
             return Ok(None);
         }
-        times.extend(renderer.run(frame, &batch)?);
+        times.extend(renderer.run(frame, &step)?);
         let counters = if renderer.outputs().counters { renderer.counters()? } else { Counters::default() };
-        progress.add(u64::from(batch.pixels) * u64::from(batch.samples), counters.rays() - rays);
+        progress.add(step.paths(), counters.rays() - rays);
         rays = counters.rays();
     }
     progress.finish();

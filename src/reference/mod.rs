@@ -2,8 +2,10 @@
 //! Tests compare the kernels with them, and run the statistics that a GPU would only slow down. Nothing here is used in
 //! a render, but for [`fresnel::internal_fresnel`].
 #![allow(clippy::excessive_precision, clippy::approx_constant, reason = "constants as the GLSL writes them")]
+pub mod apportion;
 pub mod bsdf;
 pub mod camera;
+pub mod exact;
 pub mod fold;
 pub mod fresnel;
 pub mod guide;

@@ -85,6 +85,7 @@ impl Tracer<'_> {
         let u = match self.push.pixel_filter {
             1 if self.effects.pixel_filter => 0.5 + vec2(warp_tent(u.x), warp_tent(u.y)),
             2 if self.effects.pixel_filter => 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y)),
+            3 if self.effects.pixel_filter => Vec2::splat(0.5),
             _ => u,
         };
         film_from_pixel(at + u, self.push.size)

@@ -8,7 +8,7 @@ use super::material::MaterialTable;
 use super::shape::Shape;
 use super::value::{Rgb, Transform};
 use crate::error::{Error, Result};
-use crate::settings::{PixelFilter, Sampler, Settings};
+use crate::settings::{Allocate, PixelFilter, Sampler, Settings};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -22,6 +22,8 @@ pub struct Description {
     pub camera: Camera,
     /// How.
     pub render: Render,
+    /// Where samples go.
+    pub allocate: Allocate,
     /// Light from infinitely far; none when absent.
     pub environment: Option<EnvironmentTable>,
     /// Geometry.
@@ -143,6 +145,7 @@ impl Description {
             clamp_indirect: render.clamp_indirect.unwrap_or(d.clamp_indirect),
             seed: render.seed.unwrap_or(d.seed),
             sampler: render.sampler.unwrap_or(d.sampler),
+            allocate: self.allocate.clone(),
         }
     }
 }

@@ -105,6 +105,8 @@ fn other_effects(
         because("split_light", split_light, "an output that keeps direct and indirect light apart".into());
     let independent = s.sampler == Sampler::Independent;
     found.independent_sampler = because("independent_sampler", independent, "sampler independent".into());
+    let policy = &s.allocate.policy;
+    found.adaptive = because("adaptive", policy != "uniform", format!("allocate {policy}"));
     found.counters = because("counters", counters, "ray counters".into());
 }
 

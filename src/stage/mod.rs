@@ -3,9 +3,12 @@ use crate::error::Result;
 use crate::gpu::layout::Effects;
 use crate::gpu::{Bindings, Gpu, Kernel, Recorder};
 
+pub mod apportion;
+pub mod batch;
 pub mod fold;
 pub mod guide;
 pub mod path;
+pub mod scan;
 
 /// Tracing on lavapipe runs fastest at 32 (against 16 and 64).
 pub const WORKGROUP_CPU: u32 = 32;
@@ -50,6 +53,24 @@ impl<B: Bindings> PerThread<B> {
 fn groups(threads: u32, size: u32) -> [u32; 3] {
     let groups = threads.div_ceil(size);
     [groups.min(ROW), groups.div_ceil(ROW), 1]
+}
+
+/// Pixels that one workgroup of the scanning kernels owns: `BLOCK_THREADS * THREAD_ITEMS` of `glsl/shared/block.glsl`.
+pub const BLOCK: u32 = 4096;
+
+/// Workgroups of those kernels for a film of `pixels`; at most 2^28 of them, so that one row is enough.
+fn blocks(pixels: u32) -> [u32; 3] {
+    [pixels.div_ceil(BLOCK), 1, 1]
+}
+
+/// Of the kernels that close what the blocks began.
+fn one_workgroup() -> [u32; 3] {
+    [1; 3]
+}
+
+/// A 64-bit number as buffers and push constants hold it, low word first.
+fn pair(n: u64) -> [u32; 2] {
+    [n as u32, (n >> 32) as u32]
 }
 
 #[cfg(test)]

@@ -1,9 +1,10 @@
 //! Traces one path per thread. Kernel: `glsl/path.comp`. Twin: [`crate::reference::path`].
 use super::PerThread;
 use crate::error::Result;
-use crate::frame::{Batch, DeviceScene, FilmBuffers};
+use crate::frame::{DeviceScene, FilmBuffers};
 use crate::gpu::Recorder;
 use crate::gpu::layout::PathPush;
+use crate::schedule::Batch;
 use crate::shaders::path::Bind;
 
 /// The specialised kernel.
@@ -25,6 +26,22 @@ pub fn record(
         samples: b.samples,
         ..*push
     };
-    let bind = Bind { scene: s.bind(), samples: &f.samples, counters: &f.counters };
-    k.record(rec, bind, &push, b.pixels * b.samples)
+    k.record(rec, bind(s, f), &push, b.pixels * b.samples)
+}
+
+fn bind<'a>(s: &'a DeviceScene, f: &'a FilmBuffers) -> Bind<'a> {
+    Bind { scene: s.bind(), samples: &f.samples, counters: &f.counters, paths: &f.paths }
+}
+
+/// scene, paths\[batch\] -> samples\[batch\]
+pub fn record_listed(
+    k: &Path,
+    rec: &mut Recorder,
+    s: &DeviceScene,
+    f: &FilmBuffers,
+    push: &PathPush,
+    paths: u32,
+) -> Result<()> {
+    let push = PathPush { pixels: paths, samples: 0, ..*push };
+    k.record(rec, bind(s, f), &push, paths)
 }

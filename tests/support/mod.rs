@@ -2,7 +2,7 @@
 #![allow(dead_code)]
 use tallow::gpu::layout::PixelStats;
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu};
-use tallow::renderer::{Batch, Renderer};
+use tallow::renderer::{Renderer, Step};
 
 pub mod engine;
 
@@ -40,14 +40,14 @@ pub fn hash(v: u32) -> u32 {
 
 /// Runs the whole of a render.
 pub fn render(gpu: &Gpu, renderer: &Renderer) -> Vec<PixelStats> {
-    render_batches(gpu, renderer, &renderer.batches())
+    render_steps(gpu, renderer, &renderer.steps())
 }
 
 /// Runs a render cut as the caller likes.
-pub fn render_batches(gpu: &Gpu, renderer: &Renderer, batches: &[Batch]) -> Vec<PixelStats> {
+pub fn render_steps(gpu: &Gpu, renderer: &Renderer, steps: &[Step]) -> Vec<PixelStats> {
     let mut frame = FrameResources::new(gpu).unwrap();
-    for batch in batches {
-        renderer.run(&mut frame, batch).unwrap();
+    for step in steps {
+        renderer.run(&mut frame, step).unwrap();
     }
     renderer.film().tiles.iter().flat_map(|tile| tile.stats.read().unwrap()).collect()
 }

@@ -1,0 +1,34 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/wide.glsl"
+#include "shared/block.glsl"
+
+// The sample-to-pixel buffer of one batch: (pixel, index of the sample in the pixel's sequence), pixel by pixel.
+layout(local_size_x = 256) in;
+layout(binding = 0) uniform usamplerBuffer offset; // of uvec2
+layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
+layout(scalar, binding = 2) writeonly buffer Paths { uvec2 paths[]; };
+layout(scalar, push_constant) uniform Push { BatchPush push; };
+
+#include "shared/offset.glsl"
+
+void main() {
+    uint first = first_item();
+    if (first >= push.pixels) return; // safe: no barrier() follows
+    uint64_t begin = wide(push.first_path), end = begin + push.paths;
+    uint64_t from = offset_of(first);
+    for (uint k = 0u; k < THREAD_ITEMS; k++) {
+        uint i = first + k;
+        if (i >= push.pixels || from >= end) break;
+        uint64_t to = offset_of(i + 1u);
+        if (to > begin && to > from) {
+            uint64_t low = max(from, begin), high = min(to, end);
+            uint index = texelFetch(stats, int(7u * i + 3u)).x; // earlier batches of this round are in it
+            for (uint64_t at = low; at < high; at++) paths[uint(at - begin)] = uvec2(i, index + uint(at - low));
+        }
+        from = to;
+    }
+}

@@ -1,0 +1,35 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/wide.glsl"
+#include "shared/block.glsl"
+
+// Turns wanted shares of all samples, past and next, into what a pixel lacks: max(0, floor(total * w / W) - count).
+layout(local_size_x = 256) in;
+layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
+layout(scalar, binding = 1) readonly buffer States { Apportionment state[]; };
+layout(scalar, binding = 2) buffer Weights { uint weight[]; };
+layout(scalar, binding = 3) writeonly buffer Sums { BlockSums sums[]; };
+layout(scalar, push_constant) uniform Push { ApportionPush push; };
+
+void main() {
+    uint first = first_item();
+    bool equal = state[0].equal != 0u;
+    uint64_t all = wide(state[0].weights), total = 0UL;
+    for (uint k = 0u; k < THREAD_ITEMS; k++) {
+        uint i = first + k;
+        if (i >= push.pixels) continue;
+        uint64_t share, rest;
+        multiply_divide(wide(push.total), equal ? 1u : weight[i], all, share, rest);
+        uint have = texelFetch(stats, int(7u * i + 3u)).x;
+        uint lack = share > have ? uint(min(share - have, 0xffffffffUL)) : 0u;
+        weight[i] = lack;
+        total += lack;
+    }
+    uint64_t weights = block_sum(total);
+    if (gl_LocalInvocationIndex == 0u) {
+        sums[gl_WorkGroupID.x] = BlockSums(unpackUint2x32(weights), uvec2(0u), uvec2(0u), 0u, 0u);
+    }
+}

@@ -1,0 +1,36 @@
+// How alike a pixel's surroundings are. Needs `push` (PriorityPush) and `guides`.
+#include "shared/exact.glsl"
+
+const float SIMILARITY_UNIT = 65536.0;
+
+uvec4 guide_texel(uint pixel, uint part) { return texelFetch(guides, int(3u * pixel + part)); }
+
+// G_n * G_x of GEO's equation 2, without colour, in units of 2^-16; 0 between a hit and a miss.
+uint similarity(uint p, uint q) {
+    uvec4 a = guide_texel(p, 1u), b = guide_texel(q, 1u);
+    if ((a.w == NONE) != (b.w == NONE)) return 0u;
+    float normals = squared_distance(uintBitsToFloat(guide_texel(p, 0u).xyz), uintBitsToFloat(guide_texel(q, 0u).xyz));
+    float positions = squared_distance(uintBitsToFloat(a.xyz), uintBitsToFloat(b.xyz));
+    precise float x = normals * push.normal_scale + positions * push.position_scale;
+    return uint(exp_negative(x) * SIMILARITY_UNIT);
+}
+
+// q = 1 - W_p: mean dissimilarity over the window, which for an even edge reaches one pixel further up and left. Pixels
+// beyond the film do not count.
+float importance(uint p) {
+    ivec2 size = ivec2(push.size), at = ivec2(p % push.size.x, p / push.size.x);
+    int reach = int(push.window) / 2;
+    uint sum = 0u, count = 0u;
+    for (int dy = -reach; dy < int(push.window) - reach; dy++) {
+        for (int dx = -reach; dx < int(push.window) - reach; dx++) {
+            ivec2 q = at + ivec2(dx, dy);
+            bool inside = all(greaterThanEqual(q, ivec2(0))) && all(lessThan(q, size));
+            ivec2 safe = clamp(q, ivec2(0), size - 1);
+            uint alike = similarity(p, uint(safe.y * size.x + safe.x));
+            sum += inside ? alike : 0u;
+            count += inside ? 1u : 0u;
+        }
+    }
+    uint unlike = (count << 16) - sum;
+    return float(unlike / count) / SIMILARITY_UNIT;
+}

@@ -1,0 +1,66 @@
+//! What makes a pixel worth samples: one file per policy, one row in [`POLICIES`]. A policy writes a priority per pixel;
+//! `stage::apportion` turns priorities into counts that sum to the budget exactly.
+use crate::error::Result;
+use crate::gpu::layout::{Guide, PixelStats, PriorityPush};
+use crate::gpu::{Buffer, Gpu, Recorder};
+
+pub mod both;
+pub mod geometry;
+pub mod uniform;
+pub mod variance;
+
+/// A policy, ready to be recorded.
+pub trait Policy {
+    /// guide\[P\], stats\[P\] -> priority\[P\]
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    fn record(&self, rec: &mut Recorder, buffers: &Inputs, push: &PriorityPush) -> Result<()>;
+}
+
+/// What a policy reads, and the priorities it writes.
+#[derive(Clone, Copy)]
+pub struct Inputs<'a> {
+    /// Primary hits; of the policies that do not ask for them, one unused element.
+    pub guide: &'a Buffer<Guide>,
+    /// What the samples so far have said.
+    pub stats: &'a Buffer<PixelStats>,
+    /// Shares of the samples, at least 0, in any unit up to 4095.
+    pub priority: &'a Buffer<f32>,
+}
+
+/// The same on the host, for the twins.
+#[derive(Clone, Copy, Debug)]
+pub struct HostInputs<'a> {
+    /// Of every pixel.
+    pub guide: &'a [Guide],
+    /// Of every pixel.
+    pub stats: &'a [PixelStats],
+    /// What the kernel gets.
+    pub push: PriorityPush,
+}
+
+/// One policy.
+pub struct Row {
+    /// Name on the command line and basename of its files.
+    pub name: &'static str,
+    /// One line for the help.
+    pub about: &'static str,
+    /// Whether it reads primary hits.
+    pub guides: bool,
+    /// Whether it reads statistics: its priorities are then shares of all samples, past and next, and are found anew
+    /// for every round. Those of the others are found once, for the whole budget.
+    pub learns: bool,
+    /// Compiles it for a film of so many pixels, with so many threads per workgroup.
+    pub make: fn(&Gpu, pixels: u32, workgroup: u32) -> Result<Box<dyn Policy>>,
+    /// The kernel's twin.
+    pub reference: fn(&HostInputs) -> Vec<f32>,
+}
+
+/// Every policy, in the order of the help.
+pub const POLICIES: &[Row] = &[uniform::ROW, geometry::ROW, variance::ROW, both::ROW];
+
+/// The policy of this name.
+pub fn policy(name: &str) -> Option<&'static Row> {
+    POLICIES.iter().find(|row| row.name == name)
+}

@@ -1,0 +1,26 @@
+//! The same for every pixel: what the others are measured against.
+use super::{HostInputs, Inputs, Policy, Row};
+use crate::error::Result;
+use crate::gpu::Recorder;
+use crate::gpu::layout::PriorityPush;
+
+pub(super) const ROW: Row = Row {
+    name: "uniform",
+    about: "the same number for every pixel",
+    guides: false,
+    learns: false,
+    make: |_, _, _| Ok(Box::new(Uniform)),
+    reference,
+};
+
+struct Uniform;
+
+impl Policy for Uniform {
+    fn record(&self, rec: &mut Recorder, b: &Inputs, _: &PriorityPush) -> Result<()> {
+        rec.fill(b.priority, 1.0_f32.to_bits())
+    }
+}
+
+fn reference(inputs: &HostInputs) -> Vec<f32> {
+    vec![1.0; (inputs.push.size[0] * inputs.push.size[1]) as usize]
+}

@@ -1,0 +1,102 @@
+//! RAS, kept up to date: the noise that the samples show. Kernel: `glsl/variance.comp`.
+use super::{HostInputs, Inputs, Policy, Row};
+use crate::error::Result;
+use crate::gpu::Recorder;
+use crate::gpu::layout::{Effects, PixelStats, PriorityPush};
+use crate::shaders::variance::Bind;
+use crate::stage::PerThread;
+
+pub(super) const ROW: Row = Row {
+    name: "variance",
+    about: "more where samples differ, relative to their luminance, estimated anew every round (RAS)",
+    guides: false,
+    learns: true,
+    make: |gpu, _, workgroup| Ok(Box::new(Variance(PerThread::new(gpu, &Effects::default(), workgroup)?))),
+    reference,
+};
+
+/// Samples' worth of trust in the noise of the surroundings.
+const PRIOR_SAMPLES: f32 = 4.0;
+
+struct Variance(PerThread<Bind<'static>>);
+
+impl Policy for Variance {
+    fn record(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
+        self.0.record(rec, Bind { stats: b.stats, priority: b.priority }, push, push.size[0] * push.size[1])
+    }
+}
+
+/// Squared deviations summed (mean over channels), degrees of freedom, luminance times samples, samples.
+fn moments(s: &PixelStats) -> [f32; 4] {
+    if s.count == 0 {
+        return [0.0; 4];
+    }
+    let n = s.count as f32;
+    let luminance = 0.2126 * s.mean[0] + 0.7152 * s.mean[1] + 0.0722 * s.mean[2];
+    [(s.m2[0] + s.m2[1] + s.m2[2]) / 3.0, n - 1.0, luminance * n, n]
+}
+
+fn noise(inputs: &HostInputs, x: i32, y: i32) -> f32 {
+    let [width, height] = inputs.push.size.map(|n| n as i32);
+    let at = |x: i32, y: i32| {
+        let (x, y) = (x.clamp(0, width - 1), y.clamp(0, height - 1));
+        moments(&inputs.stats[(y * width + x) as usize])
+    };
+    let (own, mut around) = (at(x, y), [0.0; 4]);
+    for (dy, dx) in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dy, dx))) {
+        around = std::array::from_fn(|i| around[i] + at(x + dx, y + dy)[i]);
+    }
+    if around[1] == 0.0 {
+        return 1.0;
+    }
+    let variance = (own[0] + PRIOR_SAMPLES * around[0] / around[1]) / (own[1] + PRIOR_SAMPLES);
+    let floor = inputs.push.luminance_floor;
+    let scale = if floor < 0.0 { 1.0 } else { around[2] / around[3] + floor };
+    let relative = variance.sqrt() / scale.max(1e-20);
+    let good = own[3] > 0.0 && relative < inputs.push.threshold * own[3].sqrt();
+    if good || own[3] >= inputs.push.limit as f32 { 0.0 } else { relative }
+}
+
+pub(super) fn reference(inputs: &HostInputs) -> Vec<f32> {
+    let [width, height] = inputs.push.size.map(|n| n as i32);
+    (0..width * height).map(|i| noise(inputs, i % width, i / width)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PUSH: PriorityPush = PriorityPush {
+        size: [1, 1],
+        window: 4,
+        normal_scale: 1.0,
+        position_scale: 1.0,
+        luminance_floor: 1.0,
+        limit: 100,
+        threshold: 0.0,
+        filtered: 0.0,
+    };
+
+    fn of_one(stats: PixelStats, push: PriorityPush) -> f32 {
+        reference(&HostInputs { guide: &[], stats: &[stats], push })[0]
+    }
+
+    #[test]
+    fn noise_is_the_deviation_over_the_luminance() {
+        // Samples 2 and 6: mean 4, m2 = 8, variance 8 from one degree of freedom, and so around; sqrt 8 / (4 + 1).
+        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3] };
+        assert!((of_one(stats, PUSH) - 8.0_f32.sqrt() / 5.0).abs() < 1e-6);
+        let plain = PriorityPush { luminance_floor: -1.0, ..PUSH };
+        assert!((of_one(stats, plain) - 8.0_f32.sqrt()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_mean_below_the_threshold_wants_nothing_and_an_unknown_one_something() {
+        // Relative error of the mean: sqrt 8 / 5 / sqrt 2 = 0.4.
+        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3] };
+        assert_eq!(of_one(stats, PriorityPush { threshold: 0.41, ..PUSH }), 0.0);
+        assert!(of_one(stats, PriorityPush { threshold: 0.39, ..PUSH }) > 0.0);
+        assert_eq!(of_one(PixelStats::default(), PUSH), 1.0);
+        assert_eq!(of_one(PixelStats { count: 1, ..stats }, PriorityPush { threshold: 9.0, ..PUSH }), 1.0);
+    }
+}

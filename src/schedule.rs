@@ -1,0 +1,255 @@
+//! The order of a render: which samples, when, and when to look where they count. Plain arithmetic, known beforehand.
+use crate::settings::Settings;
+pub use crate::stage::apportion::Plan;
+pub use crate::stage::batch::PathRange;
+
+/// A rectangle of work: some samples of a run of pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Batch {
+    /// Row-major index.
+    pub first_pixel: u32,
+    /// At least 1.
+    pub pixels: u32,
+    /// Index in each pixel's sequence.
+    pub first_sample: u32,
+    /// At least 1.
+    pub samples: u32,
+}
+
+/// A piece of a render.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Forgets all samples; finds the primary hits, if anybody reads them.
+    Start,
+    /// The same number of samples for a run of pixels.
+    Uniform(Batch),
+    /// Decides how many samples each pixel gets next.
+    Allocate(Plan),
+    /// Traces some of what was allocated.
+    Listed(PathRange),
+}
+
+impl Step {
+    /// Paths that it traces.
+    pub fn paths(&self) -> u64 {
+        match self {
+            Self::Start | Self::Allocate(_) => 0,
+            Self::Uniform(b) => u64::from(b.pixels) * u64::from(b.samples),
+            Self::Listed(r) => u64::from(r.paths),
+        }
+    }
+}
+
+/// How the work may be cut. It changes no bit of the result.
+#[derive(Clone, Copy, Debug)]
+pub struct Cut {
+    /// Of the film.
+    pub pixels: u32,
+    /// Pixels of one tile; batches never cross its multiples.
+    pub tile: u32,
+    /// Paths of one batch at most.
+    pub paths: u32,
+}
+
+/// Where a render that stopped early goes on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Progress {
+    /// Allocations that were made.
+    pub allocations: u32,
+    /// Samples that all pixels together still lack of what they were to have by then.
+    pub pending: u64,
+}
+
+/// The whole of a render: first `min_spp` samples for every pixel, in an order that refines the picture evenly, then
+/// rounds that place the rest.
+pub fn steps(settings: &Settings, learns: bool, cut: &Cut) -> Vec<Step> {
+    let mut steps = vec![Step::Start];
+    steps.extend(uniform(cut, 0, first_spp(settings)).into_iter().map(Step::Uniform));
+    steps.extend(rounds(settings, learns, cut, 0));
+    steps
+}
+
+/// The rest of a render whose pixels, their statistics and what they lack were handed back.
+pub fn rest(settings: &Settings, learns: bool, cut: &Cut, progress: Progress) -> Vec<Step> {
+    let mut steps = deal(progress.pending, 1, cut.paths);
+    steps.extend(rounds(settings, learns, cut, progress.allocations));
+    steps
+}
+
+/// Samples that every pixel gets before any is placed.
+pub fn first_spp(settings: &Settings) -> u32 {
+    match settings.allocate.policy.as_str() {
+        "uniform" => settings.spp,
+        _ => settings.allocate.min_spp.min(settings.spp),
+    }
+}
+
+/// Largest number of samples of a pixel.
+pub fn limit(settings: &Settings) -> u32 {
+    match (settings.allocate.max_spp, settings.allocate.noise_threshold > 0.0) {
+        (0, true) => settings.spp,
+        (0, false) => Settings::MAX_SPP,
+        (max, _) => max,
+    }
+}
+
+/// Samples of the whole render, unless it is good enough before.
+fn budget(settings: &Settings, pixels: u32) -> u64 {
+    let spp = if settings.allocate.noise_threshold > 0.0 { limit(settings) } else { settings.spp };
+    u64::from(spp) * u64::from(pixels)
+}
+
+/// Number of allocations that share the budget. A threshold needs looks that are no rarer than every 4 samples a pixel.
+fn allocations(settings: &Settings, learns: bool) -> u32 {
+    match (learns, settings.allocate.noise_threshold > 0.0) {
+        (false, _) => 1,
+        (true, false) => settings.allocate.rounds,
+        (true, true) => settings.allocate.rounds.max((limit(settings) - first_spp(settings)).div_ceil(4)),
+    }
+}
+
+fn rounds(settings: &Settings, learns: bool, cut: &Cut, done: u32) -> Vec<Step> {
+    let first = u64::from(first_spp(settings)) * u64::from(cut.pixels);
+    let rest = budget(settings, cut.pixels).saturating_sub(first);
+    if rest == 0 {
+        return Vec::new();
+    }
+    let all = allocations(settings, learns);
+    let limit = limit(settings);
+    let room = u64::from(limit) * u64::from(cut.pixels);
+    let upto = |round: u32| ((rest as u128 * u128::from(round) / u128::from(all)) as u64 + first).min(room);
+    let mut steps = Vec::new();
+    for round in done..all {
+        let (taken, total) = (upto(round), upto(round + 1));
+        if total == taken {
+            continue;
+        }
+        let fills = u64::from(limit) < total; // one pixel might take them all
+        steps.push(Step::Allocate(Plan {
+            pixels: cut.pixels,
+            budget: total - taken,
+            limit,
+            total: learns.then_some(total),
+            rounds: if fills { 16 } else { 1 },
+        }));
+        let dealt = if learns { 1 } else { settings.allocate.rounds };
+        steps.extend(deal(total - taken, dealt, cut.paths));
+    }
+    steps
+}
+
+/// Deals `paths` listed paths to rounds, path j to round j mod `rounds`, and cuts each round into batches.
+fn deal(paths: u64, rounds: u32, batch: u32) -> Vec<Step> {
+    let mut steps = Vec::new();
+    for round in 0..rounds {
+        let mine = (paths + u64::from(rounds - 1 - round)) / u64::from(rounds);
+        for first in (0..mine).step_by(batch as usize) {
+            let paths = u64::from(batch).min(mine - first) as u32;
+            steps.push(Step::Listed(PathRange { first, paths, round, rounds }));
+        }
+    }
+    steps
+}
+
+/// Cuts samples `first .. first + samples` of every pixel into batches.
+pub fn uniform(cut: &Cut, first: u32, samples: u32) -> Vec<Batch> {
+    let Cut { pixels, tile, paths } = *cut;
+    let run = pixels.min(paths).min(tile);
+    let depth = (paths / run).max(1);
+    let mut batches = Vec::new();
+    let mut sample = 0;
+    while sample < samples {
+        let n = depth.min(samples - sample);
+        let mut first_pixel = 0;
+        while first_pixel < pixels {
+            let pixels = run.min(pixels - first_pixel).min(tile - first_pixel % tile);
+            batches.push(Batch { first_pixel, pixels, first_sample: first + sample, samples: n });
+            first_pixel += pixels;
+        }
+        sample += n;
+    }
+    batches
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Allocate;
+
+    /// Every sample of every pixel appears exactly once, and in order within its pixel.
+    fn covers(cut: &Cut, samples: u32) -> bool {
+        let mut next = vec![0; cut.pixels as usize];
+        for b in uniform(cut, 0, samples) {
+            let crosses = b.first_pixel / cut.tile != (b.first_pixel + b.pixels - 1) / cut.tile;
+            if crosses || b.pixels * b.samples > cut.paths.max(1) {
+                return false;
+            }
+            for p in b.first_pixel..b.first_pixel + b.pixels {
+                if next[p as usize] != b.first_sample {
+                    return false;
+                }
+                next[p as usize] += b.samples;
+            }
+        }
+        next.iter().all(|&n| n == samples)
+    }
+
+    #[test]
+    fn batches_cover_all_work_once() {
+        for pixels in [1, 31, 64, 65] {
+            for samples in [1, 2, 7] {
+                for paths in [1, 3, 64, 100, 1000] {
+                    for tile in [1, 30, 64, 1000] {
+                        let cut = Cut { pixels, tile, paths };
+                        assert!(covers(&cut, samples), "{cut:?} {samples}");
+                    }
+                }
+            }
+        }
+    }
+
+    fn settings(policy: &str, spp: u32, min_spp: u32, max_spp: u32, rounds: u32) -> Settings {
+        let allocate = Allocate { policy: policy.into(), min_spp, max_spp, rounds, ..Allocate::default() };
+        Settings { spp, allocate, ..Settings::default() }
+    }
+
+    const CUT: Cut = Cut { pixels: 65, tile: 100, paths: 17 };
+
+    fn sums(steps: &[Step]) -> (u64, u64) {
+        let budget = |s: &Step| if let Step::Allocate(plan) = s { plan.budget } else { 0 };
+        (steps.iter().map(Step::paths).sum(), steps.iter().map(budget).sum())
+    }
+
+    #[test]
+    fn all_of_the_budget_is_traced_and_no_more() {
+        for (policy, learns) in [("geometry", false), ("variance", true)] {
+            for (spp, min, rounds) in [(4, 1, 1), (4, 4, 3), (1, 2, 1), (7, 0, 5), (3, 1, 300)] {
+                let all = steps(&settings(policy, spp, min, 0, rounds), learns, &CUT);
+                let (traced, allocated) = sums(&all);
+                assert_eq!(traced, 65 * u64::from(spp), "{policy} {spp} {min} {rounds}");
+                assert_eq!(allocated, 65 * u64::from(spp - min.min(spp)));
+            }
+        }
+        let capped = steps(&settings("variance", 8, 2, 5, 4), true, &CUT);
+        assert_eq!(sums(&capped), (65 * 5, 65 * 3), "no more than there is room");
+        assert_eq!(sums(&steps(&settings("uniform", 3, 2, 0, 4), false, &CUT)), (65 * 3, 0));
+    }
+
+    #[test]
+    fn what_is_left_is_the_rest() {
+        let s = settings("variance", 8, 2, 0, 3);
+        let whole = steps(&s, true, &CUT);
+        let first_round = rounds(&s, true, &CUT, 0);
+        assert!(whole.ends_with(&first_round));
+        let rest = rest(&s, true, &CUT, Progress { allocations: 1, pending: 40 });
+        assert_eq!(rest.iter().take(3).map(Step::paths).collect::<Vec<_>>(), [17, 17, 6]);
+        assert_eq!(rest[3..], rounds(&s, true, &CUT, 1)[..]);
+    }
+
+    #[test]
+    fn budgets_beyond_32_bits_are_kept() {
+        let cut = Cut { pixels: 1 << 20, tile: 1 << 28, paths: 1 << 30 };
+        let all = steps(&settings("geometry", 1 << 16, 0, 0, 2), false, &cut);
+        assert_eq!(sums(&all), (1 << 36, 1 << 36));
+    }
+}

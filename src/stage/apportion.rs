@@ -1,0 +1,159 @@
+//! Turns priorities into counts that sum to a budget exactly, by Hamilton's method, with radix selection and no sort.
+//! Kernels: `glsl/{weigh,total,deficit,quota,settle,digit,pick,ties,blocks,spread}.comp`. Twin:
+//! [`crate::reference::apportion`].
+use super::scan::Blocks;
+use super::{blocks, one_workgroup};
+use crate::error::Result;
+use crate::gpu::layout::{ApportionPush, Apportionment, BlockSums, Effects, PixelStats, uvec2};
+use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
+use crate::shaders::{deficit, digit, pick, quota, settle, spread, ties, total, weigh};
+
+/// Digits of 11 bits in a remainder: it is below the sum of the weights, under 2^32 for each of at most 2^28 pixels.
+const DIGITS: u32 = 6;
+const BINS: usize = 2048;
+
+/// What is to be apportioned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Plan {
+    /// Of the film.
+    pub pixels: u32,
+    /// Samples to place.
+    pub budget: u64,
+    /// Largest number of samples of a pixel, those it has included.
+    pub limit: u32,
+    /// When priorities are shares of all samples: those that pixels have and those to place, together.
+    pub total: Option<u64>,
+    /// Times at most that the samples of full pixels are apportioned again; 1 when none can be full.
+    pub rounds: u32,
+}
+
+/// The counts, and what finding them takes: 16 bytes per pixel, the offsets of the scan included.
+pub struct Counts {
+    /// 12.20 fixed point; then, for shares of all samples, what a pixel lacks.
+    pub weight: Buffer<u32>,
+    /// Samples of every pixel.
+    pub count: Buffer<u32>,
+    /// Remainders while apportioning; later the scan's offsets, one more than pixels.
+    pub key: Buffer<uvec2>,
+    /// One: read it for what was not finite.
+    pub state: Buffer<Apportionment>,
+    sums: Buffer<BlockSums>,
+    blocks: Buffer<uvec2>,
+    histogram: Buffer<u32>,
+}
+
+impl Counts {
+    /// For a film of `pixels`.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when it does not fit.
+    pub fn new(gpu: &Gpu, pixels: u32) -> Result<Self> {
+        let (n, of_blocks) = (pixels as usize, blocks(pixels)[0] as usize);
+        Ok(Self {
+            weight: Buffer::new(gpu, "weight", n, Location::Device)?,
+            count: Buffer::new(gpu, "count", n, Location::Device)?,
+            key: Buffer::new(gpu, "offset", n + 1, Location::Device)?,
+            state: Buffer::new(gpu, "apportionment", 1, Location::Device)?,
+            sums: Buffer::new(gpu, "sums", of_blocks, Location::Device)?,
+            blocks: Buffer::new(gpu, "blocks", of_blocks, Location::Device)?,
+            histogram: Buffer::from_slice(gpu, "histogram", &[0; BINS])?,
+        })
+    }
+
+    pub(super) fn blocks(&self) -> &Buffer<uvec2> {
+        &self.blocks
+    }
+}
+
+/// The kernels.
+pub struct Apportion {
+    weigh: Kernel<weigh::Bind<'static>>,
+    total: Kernel<total::Bind<'static>>,
+    deficit: Kernel<deficit::Bind<'static>>,
+    quota: Kernel<quota::Bind<'static>>,
+    settle: Kernel<settle::Bind<'static>>,
+    digit: Kernel<digit::Bind<'static>>,
+    pick: Kernel<pick::Bind<'static>>,
+    ties: Kernel<ties::Bind<'static>>,
+    blocks: Blocks,
+    spread: Kernel<spread::Bind<'static>>,
+}
+
+impl Apportion {
+    /// Compiles them.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when the driver refuses one.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        let none = Effects::default();
+        Ok(Self {
+            weigh: Kernel::new(gpu, &none, &[])?,
+            total: Kernel::new(gpu, &none, &[])?,
+            deficit: Kernel::new(gpu, &none, &[])?,
+            quota: Kernel::new(gpu, &none, &[])?,
+            settle: Kernel::new(gpu, &none, &[])?,
+            digit: Kernel::new(gpu, &none, &[])?,
+            pick: Kernel::new(gpu, &none, &[])?,
+            ties: Kernel::new(gpu, &none, &[])?,
+            blocks: Blocks::new(gpu)?,
+            spread: Kernel::new(gpu, &none, &[])?,
+        })
+    }
+
+    /// priority\[P\], stats\[P\] -> count\[P\]
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        priority: &Buffer<f32>,
+        stats: &Buffer<PixelStats>,
+        c: &Counts,
+        plan: &Plan,
+    ) -> Result<()> {
+        let push = |round| push(plan, round);
+        let all = blocks(plan.pixels);
+        rec.dispatch(&self.weigh, weigh::Bind { priority, weight: &c.weight, sums: &c.sums }, &push(0), all)?;
+        rec.dispatch(&self.total, total::Bind { sums: &c.sums, state: &c.state }, &push(0), one_workgroup())?;
+        if plan.total.is_some() {
+            let bind = deficit::Bind { stats, state: &c.state, weight: &c.weight, sums: &c.sums };
+            rec.dispatch(&self.deficit, bind, &push(0), all)?;
+            rec.dispatch(&self.total, total::Bind { sums: &c.sums, state: &c.state }, &push(1), one_workgroup())?;
+        }
+        for round in 0..plan.rounds {
+            let bind =
+                quota::Bind { weight: &c.weight, stats, state: &c.state, count: &c.count, key: &c.key, sums: &c.sums };
+            rec.dispatch(&self.quota, bind, &push(round), all)?;
+            let bind = settle::Bind { sums: &c.sums, state: &c.state };
+            rec.dispatch(&self.settle, bind, &push(round), one_workgroup())?;
+        }
+        self.record_remainders(rec, stats, c, plan)
+    }
+
+    fn record_remainders(&self, rec: &mut Recorder, stats: &Buffer<PixelStats>, c: &Counts, plan: &Plan) -> Result<()> {
+        let (push, all) = (push(plan, 0), blocks(plan.pixels));
+        for _ in 0..DIGITS {
+            let bind = digit::Bind { key: &c.key, state: &c.state, histogram: &c.histogram };
+            rec.dispatch(&self.digit, bind, &push, all)?;
+            let bind = pick::Bind { state: &c.state, histogram: &c.histogram };
+            rec.dispatch(&self.pick, bind, &push, one_workgroup())?;
+        }
+        let bind = ties::Bind { key: &c.key, quotas: &c.count, stats, state: &c.state, blocks: &c.blocks };
+        rec.dispatch(&self.ties, bind, &push, all)?;
+        self.blocks.record(rec, &c.blocks, plan.pixels)?;
+        let bind = spread::Bind { key: &c.key, stats, state: &c.state, blocks: &c.blocks, count: &c.count };
+        rec.dispatch(&self.spread, bind, &push, all)
+    }
+}
+
+fn push(plan: &Plan, round: u32) -> ApportionPush {
+    ApportionPush {
+        pixels: plan.pixels,
+        limit: plan.limit,
+        round,
+        rounds: plan.rounds,
+        budget: super::pair(plan.budget),
+        total: super::pair(plan.total.unwrap_or(0)),
+    }
+}

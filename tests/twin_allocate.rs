@@ -1,0 +1,248 @@
+//! The kernels that place samples against their CPU twins, with `==` where they work in integers, and what must hold of
+//! every allocation: the counts sum to the budget, whatever the priorities.
+mod support;
+
+use proptest::prelude::*;
+use proptest::test_runner::{Config, TestRunner};
+use support::{assert_silent, gpu, words};
+use tallow::allocate::{HostInputs, Inputs, POLICIES};
+use tallow::gpu::layout::*;
+use tallow::gpu::{Buffer, FrameResources, Gpu, Kernel, Location};
+use tallow::reference::apportion as twin;
+use tallow::stage::apportion::{Apportion, Counts, Plan};
+use tallow::stage::batch::{self, Batches, PathRange};
+use tallow::stage::scan::Scan;
+
+/// Around a thread's items, a workgroup's threads and a block.
+const SIZES: [usize; 9] = [1, 15, 31, 64, 65, 4095, 4096, 4097, 9001];
+
+struct Bench {
+    gpu: Gpu,
+    apportion: Apportion,
+    scan: Scan,
+    batch: Batches,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let gpu = gpu();
+        let (apportion, scan) = (Apportion::new(&gpu).unwrap(), Scan::new(&gpu).unwrap());
+        let batch = Kernel::new(&gpu, &Effects::default(), &[]).unwrap();
+        Self { gpu, apportion, scan, batch }
+    }
+
+    fn stats(&self, have: &[u32]) -> Buffer<PixelStats> {
+        let stats: Vec<_> = have.iter().map(|&count| PixelStats { count, ..PixelStats::default() }).collect();
+        Buffer::from_slice(&self.gpu, "stats", &stats).unwrap()
+    }
+
+    fn counts(&self, priority: &[f32], have: &[u32], plan: &Plan) -> Counts {
+        let counts = Counts::new(&self.gpu, plan.pixels).unwrap();
+        let (priority, stats) = (Buffer::from_slice(&self.gpu, "priority", priority).unwrap(), self.stats(have));
+        let mut frame = FrameResources::new(&self.gpu).unwrap();
+        self.gpu
+            .run(&mut frame, |rec| {
+                self.apportion.record(rec, &priority, &stats, &counts, plan)?;
+                self.scan.record(rec, &counts)
+            })
+            .unwrap();
+        counts
+    }
+
+    /// Compares every buffer with the twins and returns the counts.
+    fn check(&self, priority: &[f32], have: &[u32], plan: &Plan) -> Vec<u32> {
+        let counts = self.counts(priority, have, plan);
+        let (weights, broken) = twin::weigh(priority);
+        let wanting = weights.iter().filter(|&&w| w > 0).count() as u32;
+        let weights = plan.total.map_or(weights.clone(), |total| twin::deficit(&weights, have, total));
+        assert_eq!(counts.weight.read().unwrap(), weights, "weights, {plan:?}");
+        let state = counts.state.read().unwrap()[0];
+        assert_eq!((state.non_finite, state.wanting), (broken, wanting), "{plan:?}");
+        let room: Vec<u32> = have.iter().map(|&n| plan.limit.saturating_sub(n)).collect();
+        let expected = twin::apportion(&weights, &room, plan.budget, plan.rounds);
+        let found = counts.count.read().unwrap();
+        assert_eq!(found, expected, "counts, {plan:?}");
+        let most: u64 = room.iter().map(|&n| u64::from(n)).sum();
+        assert_eq!(found.iter().map(|&n| u64::from(n)).sum::<u64>(), plan.budget.min(most), "sum, {plan:?}");
+        assert!(found.iter().zip(&room).all(|(n, room)| n <= room), "room, {plan:?}");
+        let offsets = counts.key.read().unwrap().into_iter().map(|[low, high]| u64::from(low) | u64::from(high) << 32);
+        assert_eq!(offsets.collect::<Vec<_>>(), twin::offsets(&found), "offsets, {plan:?}");
+        found
+    }
+}
+
+fn plan(pixels: usize, budget: u64) -> Plan {
+    Plan { pixels: pixels as u32, budget, limit: u32::MAX, total: None, rounds: 1 }
+}
+
+fn priorities(count: usize, seed: u32) -> Vec<f32> {
+    words(count, seed).into_iter().map(|w| (w >> 8) as f32 / 4e6).collect()
+}
+
+#[test]
+fn counts_agree_with_hamilton_at_awkward_sizes() {
+    let bench = Bench::new();
+    for size in SIZES {
+        for budget in [0, 1, size as u64 / 2, 4 * size as u64, 1_000_003] {
+            bench.check(&priorities(size, 1), &vec![0; size], &plan(size, budget));
+        }
+    }
+    assert_silent(&bench.gpu);
+}
+
+#[test]
+fn extreme_priorities_still_sum_to_the_budget() {
+    let bench = Bench::new();
+    let n = 5000;
+    let one = |value: f32| (0..n).map(|i| if i == 4321 { value } else { 0.0 }).collect::<Vec<_>>();
+    let odd = |i: usize| [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.0, f32::MAX, 1e-30, 1.0][i % 7];
+    let cases: [Vec<f32>; 7] = [
+        vec![0.0; n],
+        vec![1.0; n],
+        vec![f32::MAX; n], // the largest weight everywhere
+        vec![f32::NAN; n],
+        one(1.0),
+        one(f32::INFINITY),
+        (0..n).map(odd).collect(),
+    ];
+    for priority in &cases {
+        for budget in [1, 3 * n as u64 + 1, 1 << 31] {
+            let counts = bench.check(priority, &vec![0; n], &plan(n, budget));
+            assert!(priority[4321] != 1.0 || priority[0] != 0.0 || u64::from(counts[4321]) == budget);
+        }
+        // Beyond 32 bits in all and in the products, over many pixels.
+        let large = Plan { rounds: 16, ..plan(n, 20_000_000_000_000) };
+        bench.check(priority, &vec![0; n], &large);
+    }
+    assert_silent(&bench.gpu);
+}
+
+#[test]
+fn full_pixels_hand_on_what_they_leave() {
+    let bench = Bench::new();
+    for size in SIZES {
+        let have: Vec<u32> = words(size, 9).into_iter().map(|w| w % 20).collect();
+        for (limit, budget) in [(16, 3), (16, 8), (3, 100), (25, 12), (0, 1)] {
+            let budget = budget * size as u64;
+            for (rounds, total) in
+                [(16, None), (2, None), (16, Some(have.iter().map(|&n| u64::from(n)).sum::<u64>() + budget))]
+            {
+                let plan = Plan { limit, total, rounds, ..plan(size, budget) };
+                bench.check(&priorities(size, 2).iter().map(|p| p * p * p).collect::<Vec<_>>(), &have, &plan);
+            }
+        }
+    }
+    assert_silent(&bench.gpu);
+}
+
+#[test]
+fn random_images_agree() {
+    let bench = Bench::new();
+    let mut runner = TestRunner::new(Config { cases: 150, failure_persistence: None, ..Config::default() });
+    let pixel = (prop_oneof![Just(0.0_f32), Just(1.0), Just(f32::NAN), 0.0_f32..1e-5, 0.0_f32..9e3], 0_u32..40);
+    let input = (prop::collection::vec(pixel, 1..600), 0_u64..100_000, 0_u32..60, 1_u32..5, any::<bool>());
+    let result = runner.run(&input, |(pixels, budget, limit, rounds, learns)| {
+        let (priority, have): (Vec<f32>, Vec<u32>) = pixels.into_iter().unzip();
+        let total = learns.then(|| have.iter().map(|&n| u64::from(n)).sum::<u64>() + budget);
+        bench.check(&priority, &have, &Plan { limit, rounds, total, ..plan(priority.len(), budget) });
+        Ok(())
+    });
+    result.unwrap();
+    assert_silent(&bench.gpu);
+}
+
+#[test]
+fn every_path_of_every_batch_is_listed_once() {
+    let bench = Bench::new();
+    for size in [1, 65, 4097] {
+        let have: Vec<u32> = words(size, 3).into_iter().map(|w| w % 5).collect();
+        let budget = 3 * size as u64 + 1;
+        let counts = bench.counts(&priorities(size, 4), &have, &plan(size, budget));
+        let (stats, offsets) = (bench.stats(&have), twin::offsets(&counts.count.read().unwrap()));
+        let mut frame = FrameResources::new(&bench.gpu).unwrap();
+        for rounds in [1, 3] {
+            for paths in [1_u32, 31, 64, 4096] {
+                let mine: Vec<_> = (0..rounds).map(|round| twin::dealt(&offsets, round, rounds)).collect();
+                assert_eq!(mine.iter().map(|m| m[size]).sum::<u64>(), budget);
+                for (round, dealt) in mine.iter().enumerate() {
+                    // All batches where they are few, else the first and the last.
+                    let firsts: Vec<u64> = (0..dealt[size]).step_by(paths as usize).collect();
+                    let some = firsts
+                        .iter()
+                        .filter(|&&f| firsts.len() < 20 || f == 0 || f + 2 * u64::from(paths) > dealt[size]);
+                    for &first in some {
+                        let n = u64::from(paths).min(dealt[size] - first) as u32;
+                        let range = PathRange { first, paths: n, round: round as u32, rounds };
+                        let list = Buffer::new(&bench.gpu, "paths", n as usize, Location::Device).unwrap();
+                        let (b, offset) = (&bench.batch, &counts.key);
+                        bench.gpu.run(&mut frame, |rec| batch::record(b, rec, offset, &stats, &list, &range)).unwrap();
+                        assert_eq!(list.read().unwrap(), twin::batch(dealt, &have, first, n), "{size} {range:?}");
+                    }
+                }
+            }
+        }
+    }
+    assert_silent(&bench.gpu);
+}
+
+/// A bumpy surface with misses and broken normals, and noisy statistics with untouched pixels.
+fn surroundings(pixels: usize, width: usize) -> (Vec<Guide>, Vec<PixelStats>) {
+    let random = words(4 * pixels, 77);
+    let unit = |i: usize| (random[i] >> 8) as f32 / 16_777_216.0;
+    let guide = |i: usize| {
+        let (x, y) = ((i % width) as f32, (i / width) as f32);
+        let normal = glam::Vec3::new(0.3 * unit(4 * i), 0.3 * unit(4 * i + 1), 1.0).normalize();
+        match i % 13 {
+            7 => Guide { object: NONE, ..Guide::default() },
+            11 => Guide { normal: [f32::NAN; 3], ..Guide::default() },
+            _ => Guide {
+                normal: normal.into(),
+                position: [x * 0.01, y * 0.01, unit(4 * i + 2) * 0.02],
+                ..Guide::default()
+            },
+        }
+    };
+    let stats = |i: usize| match i % 5 {
+        0 => PixelStats::default(),
+        n => PixelStats { mean: [unit(i), 2.0 * unit(i), 0.1], count: n as u32 + 1, m2: [unit(4 * i); 3] },
+    };
+    ((0..pixels).map(guide).collect(), (0..pixels).map(stats).collect())
+}
+
+#[test]
+fn policies_agree_with_their_references() {
+    let gpu = gpu();
+    for [width, height] in [[1, 1], [31, 1], [1, 65], [31, 17], [64, 9]] {
+        let pixels = (width * height) as usize;
+        let (guide, stats) = surroundings(pixels, width as usize);
+        let (guides, statistics) =
+            (Buffer::from_slice(&gpu, "guide", &guide).unwrap(), Buffer::from_slice(&gpu, "stats", &stats).unwrap());
+        let priority = Buffer::new(&gpu, "priority", pixels, Location::Device).unwrap();
+        let mut frame = FrameResources::new(&gpu).unwrap();
+        for (window, luminance_floor, threshold) in [(2, 0.05, 0.0), (4, -1.0, 0.0), (5, 0.1, 0.3), (10, 1.0, 0.1)] {
+            let push = PriorityPush {
+                size: [width, height],
+                window,
+                normal_scale: 9.0,
+                position_scale: 2e3,
+                luminance_floor,
+                limit: 5,
+                threshold,
+                filtered: 0.9,
+            };
+            for row in POLICIES {
+                let policy = (row.make)(&gpu, pixels as u32, 32).unwrap();
+                let inputs = Inputs { guide: &guides, stats: &statistics, priority: &priority };
+                gpu.run(&mut frame, |rec| policy.record(rec, &inputs, &push)).unwrap();
+                let (found, expected) =
+                    (priority.read().unwrap(), (row.reference)(&HostInputs { guide: &guide, stats: &stats, push }));
+                for (i, (a, b)) in found.iter().zip(&expected).enumerate() {
+                    // Importance is exact on every device; roots and quotients are not.
+                    let same = if row.learns { (a - b).abs() <= 1e-5 * b } else { a == b };
+                    assert!(same && a.is_finite(), "{} {width}x{height} pixel {i}: {a} {b}", row.name);
+                }
+            }
+        }
+    }
+    assert_silent(&gpu);
+}
