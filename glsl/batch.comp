@@ -26,7 +26,7 @@ void main() {
         uint64_t to = offset_of(i + 1u);
         if (to > begin && to > from) {
             uint64_t low = max(from, begin), high = min(to, end);
-            uint index = texelFetch(stats, int(7u * i + 3u)).x; // earlier batches of this round are in it
+            uint index = push.first_sample + texelFetch(stats, int(7u * i + 3u)).x; // earlier batches of this round are in it
             for (uint64_t at = low; at < high; at++) paths[uint(at - begin)] = uvec2(i, index + uint(at - low));
         }
         from = to;

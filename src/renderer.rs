@@ -1,6 +1,6 @@
 //! The renderer that an engine embeds and that the command line drives: a scene on a device, kernels specialised for
 //! it, and frames recorded batch by batch into command buffers.
-use crate::allocate::{self, Row};
+use crate::allocate::{self, HostInputs, Row};
 use crate::error::{Error, Result};
 use crate::frame::{self, Allocation, Stages};
 pub use crate::frame::{DeviceScene, FilmBuffers, FilmTile};
@@ -199,6 +199,17 @@ impl Renderer {
         Ok(())
     }
 
+    /// The priorities that the policy gives to pixels of these statistics, found on the host, if no pixel were full
+    /// before `limit` samples.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub fn priorities_of(&self, stats: &[PixelStats], limit: u32) -> Result<Vec<f32>> {
+        let push = PriorityPush { limit, ..self.priority };
+        let guide = self.film.tiles[0].guide.read()?;
+        Ok((policy_of(&self.settings)?.reference)(&HostInputs { guide: &guide, stats, push }))
+    }
+
     /// How the last allocation went.
     ///
     /// # Errors
@@ -327,6 +338,7 @@ pub fn path_push(scene: &Scene) -> PathPush {
     PathPush {
         camera: scene.camera,
         size: [settings.width, settings.height],
+        first_sample: settings.first_sample,
         seed: settings.seed,
         max_depth: settings.max_depth,
         roulette_depth: settings.roulette_depth,

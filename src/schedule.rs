@@ -64,7 +64,7 @@ pub struct Progress {
 /// rounds that place the rest.
 pub fn steps(settings: &Settings, learns: bool, cut: &Cut) -> Vec<Step> {
     let mut steps = vec![Step::Start];
-    steps.extend(uniform(cut, 0, first_spp(settings)).into_iter().map(Step::Uniform));
+    steps.extend(uniform(cut, settings.first_sample, first_spp(settings)).into_iter().map(Step::Uniform));
     steps.extend(rounds(settings, learns, cut, 0));
     steps
 }
@@ -136,6 +136,25 @@ fn rounds(settings: &Settings, learns: bool, cut: &Cut, done: u32) -> Vec<Step> 
         steps.extend(deal(total - taken, dealt, cut.paths));
     }
     steps
+}
+
+/// What every pixel still lacks of its allocated `count` once all paths up to the end of `done` are traced.
+pub fn pending(count: &[u32], done: &PathRange) -> Vec<u32> {
+    let rounds = u64::from(done.rounds);
+    // Of the first `paths` of the list, those that belong to a round.
+    let in_round = |paths: u64, round: u32| (paths + rounds - 1 - u64::from(round)) / rounds;
+    let end = done.first + u64::from(done.paths);
+    let traced = |paths: u64| {
+        let before: u64 = (0..done.round).map(|round| in_round(paths, round)).sum();
+        before + in_round(paths, done.round).min(end)
+    };
+    let mut listed = 0;
+    let lacks = |&n: &u32| {
+        let before = traced(listed);
+        listed += u64::from(n);
+        n - (traced(listed) - before) as u32
+    };
+    count.iter().map(lacks).collect()
 }
 
 /// Deals `paths` listed paths to rounds, path j to round j mod `rounds`, and cuts each round into batches.
@@ -244,6 +263,17 @@ mod tests {
         let rest = rest(&s, true, &CUT, Progress { allocations: 1, pending: 40 });
         assert_eq!(rest.iter().take(3).map(Step::paths).collect::<Vec<_>>(), [17, 17, 6]);
         assert_eq!(rest[3..], rounds(&s, true, &CUT, 1)[..]);
+    }
+
+    #[test]
+    fn pending_is_what_was_not_dealt_yet() {
+        // Paths 0 1 2 | 3 | 4 5 6 of pixels 0, 1, 2 and 3 (which has none), dealt to two rounds: 0 2 4 6, then 1 3 5.
+        let count = [3, 1, 3, 0];
+        let done = |first, paths, round| pending(&count, &PathRange { first, paths, round, rounds: 2 });
+        assert_eq!(done(0, 0, 0), count);
+        assert_eq!(done(1, 2, 0), [1, 1, 2, 0], "0, 2 and 4 are traced");
+        assert_eq!(done(0, 1, 1), [0, 1, 1, 0]);
+        assert_eq!(done(2, 1, 1), [0; 4]);
     }
 
     #[test]

@@ -116,8 +116,10 @@ pub struct Settings {
     pub width: u32,
     /// Film height in pixels, 1 to 16384.
     pub height: u32,
-    /// Samples per pixel, 1 to 16777216.
+    /// Samples per pixel, 1 to 16777216; their mean, where they are placed.
     pub spp: u32,
+    /// Index of every pixel's first sample in its sequence, at most 16777216: renders of disjoint ranges are independent.
+    pub first_sample: u32,
     /// Path edges: 1 = emission only, 2 = direct light, 3 = one bounce of indirect light. 1 to 1024.
     pub max_depth: u32,
     /// Paths longer than this many edges survive with the probability of their throughput; 0 is off.
@@ -140,6 +142,7 @@ impl Default for Settings {
             width: 512,
             height: 512,
             spp: 64,
+            first_sample: 0,
             max_depth: 8,
             roulette_depth: 0,
             clamp_indirect: 0.0,
@@ -170,6 +173,10 @@ impl Settings {
         range("height", self.height, Self::MAX_EDGE)?;
         range("spp", self.spp, Self::MAX_SPP)?;
         range("max-depth", self.max_depth, Self::MAX_DEPTH)?;
+        if self.first_sample > Self::MAX_SPP {
+            let (n, max) = (self.first_sample, Self::MAX_SPP);
+            return Err(Error::Usage(format!("first-sample is {n}: choose a value up to {max}")));
+        }
         self.allocate.validate()?;
         match self.clamp_indirect {
             c if c.is_finite() && c >= 0.0 => Ok(()),

@@ -156,6 +156,7 @@ fn every_path_of_every_batch_is_listed_once() {
     let bench = Bench::new();
     for size in [1, 65, 4097] {
         let have: Vec<u32> = words(size, 3).into_iter().map(|w| w % 5).collect();
+        let next: Vec<u32> = have.iter().map(|n| n + 7).collect();
         let budget = 3 * size as u64 + 1;
         let counts = bench.counts(&priorities(size, 4), &have, &plan(size, budget));
         let (stats, offsets) = (bench.stats(&have), twin::offsets(&counts.count.read().unwrap()));
@@ -175,8 +176,11 @@ fn every_path_of_every_batch_is_listed_once() {
                         let range = PathRange { first, paths: n, round: round as u32, rounds };
                         let list = Buffer::new(&bench.gpu, "paths", n as usize, Location::Device).unwrap();
                         let (b, offset) = (&bench.batch, &counts.key);
-                        bench.gpu.run(&mut frame, |rec| batch::record(b, rec, offset, &stats, &list, &range)).unwrap();
-                        assert_eq!(list.read().unwrap(), twin::batch(dealt, &have, first, n), "{size} {range:?}");
+                        bench
+                            .gpu
+                            .run(&mut frame, |rec| batch::record(b, rec, offset, &stats, &list, &range, 7))
+                            .unwrap();
+                        assert_eq!(list.read().unwrap(), twin::batch(dealt, &next, first, n), "{size} {range:?}");
                     }
                 }
             }

@@ -1,5 +1,5 @@
 //! `tallow compare`: how far an image is from its reference.
-use super::{Exit, complain, finite, print, print_json};
+use super::{Exit, check_png, complain, finite, print, print_json};
 use crate::error::{Error, Result};
 use crate::image::difference::{WIDER, heat_map};
 use crate::image::metrics::{self, Metrics};
@@ -58,7 +58,7 @@ struct Limits {
 /// When a file cannot be read or written, has no such layer, holds NaN or infinities, or sizes differ.
 pub fn run(args: &Args) -> Result<Exit> {
     if let Some(diff) = &args.diff {
-        check_diff_path(diff)?;
+        check_png("--diff", diff)?;
     }
     let (a, b) = (load(&args.a, args.layer.as_deref())?, load(&args.b, args.layer.as_deref())?);
     check_sizes(args, &a, &b)?;
@@ -70,13 +70,6 @@ pub fn run(args: &Args) -> Result<Exit> {
         complain(line);
     }
     Ok(if exceeded.is_empty() { Exit::Done } else { Exit::LimitExceeded })
-}
-
-fn check_diff_path(path: &Path) -> Result<()> {
-    match path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
-        true => image::check_writable(path),
-        false => Err(Error::Usage(format!("--diff {}: the error map is a .png", path.display()))),
-    }
 }
 
 fn load(path: &Path, layer: Option<&str>) -> Result<Picture> {

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 static FLAG: AtomicBool = AtomicBool::new(false);
 
 /// Set once the user has asked to stop, by Ctrl-C or a termination signal. Whoever works in steps looks at it between
-/// two of them, and returns [`super::Exit::Interrupted`] without writing.
+/// two of them, and returns [`super::Exit::Interrupted`] with what there is.
 ///
 /// The first call installs the handler. A second signal ends the process at once; files are safe even then, as they are
 /// renamed only when complete.

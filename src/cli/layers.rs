@@ -1,27 +1,33 @@
-//! What a renderer's buffers hold, as the channels of an image file.
+//! What a renderer's buffers hold, as the channels of an image file, and back.
 use crate::error::Result;
 use crate::gpu::Buffer;
-use crate::gpu::layout::{Guide, PixelLight, PixelStats};
+use crate::gpu::layout::{Guide, PixelLight, PixelStats, vec3};
 use crate::image::{Film, Samples};
 use crate::renderer::{FilmTile, Renderer};
+use crate::statistics::{Pixel, variance_of_mean};
 use bytemuck::Pod;
 
 const RGB: [&str; 3] = ["R", "G", "B"];
 const XYZ: [&str; 3] = ["X", "Y", "Z"];
+
+/// Samples that a pixel still lacks of what it was to have: only in files of renders that were interrupted.
+pub const PENDING: &str = "pending";
 
 /// Reads the buffers back into a film with the layers that the renderer was asked for.
 ///
 /// # Errors
 /// [`crate::error::Error::Device`].
 pub fn film(renderer: &Renderer) -> Result<Film> {
-    let settings = renderer.settings();
+    let (settings, outputs) = (renderer.settings(), renderer.outputs());
     let mut film = Film::new(settings.width, settings.height);
     let tiles = &renderer.film().tiles;
-    add_stats(&mut film, &gather(tiles, |tile| &tile.stats)?);
-    if renderer.outputs().split_light {
-        add_light(&mut film, &gather(tiles, |tile| &tile.light)?);
+    let stats = gather(tiles, |tile| &tile.stats)?;
+    let light = if outputs.split_light { gather(tiles, |tile| &tile.light)? } else { Vec::new() };
+    add_pixels(&mut film, &stats, &light);
+    if settings.allocate.policy != "uniform" {
+        film.add("priority", Samples::F32(renderer.film().priority.read()?));
     }
-    if renderer.outputs().guides {
+    if outputs.guides {
         add_guide(&mut film, &gather(tiles, |tile| &tile.guide)?);
     }
     Ok(film)
@@ -33,21 +39,55 @@ fn gather<T: Pod>(tiles: &[FilmTile], buffer: impl Fn(&FilmTile) -> &Buffer<T>) 
     Ok(parts.concat())
 }
 
-fn add_stats(film: &mut Film, stats: &[PixelStats]) {
-    film.add_vec3("", RGB, &stats.iter().map(|s| s.mean).collect::<Vec<_>>());
-    film.add_vec3("variance", RGB, &stats.iter().map(variance_of_mean).collect::<Vec<_>>());
+/// Adds what the samples say. `light` is empty where direct and indirect light are not kept apart.
+fn add_pixels(film: &mut Film, stats: &[PixelStats], light: &[PixelLight]) {
+    let vec3s = |of: fn(&PixelStats) -> vec3| stats.iter().map(of).collect::<Vec<_>>();
+    film.add_vec3("", RGB, &vec3s(|s| s.mean));
+    film.add_vec3("variance", RGB, &vec3s(variance_of_mean));
+    film.add_vec3("m2", RGB, &vec3s(|s| s.m2));
     film.add("samples", Samples::U32(stats.iter().map(|s| s.count).collect()));
+    if !light.is_empty() {
+        film.add_vec3("direct", RGB, &light.iter().map(|l| l.direct).collect::<Vec<_>>());
+        film.add_vec3("indirect", RGB, &light.iter().map(|l| l.indirect).collect::<Vec<_>>());
+    }
 }
 
-/// Squared standard error of a pixel: m2 / (n (n - 1)); 0 for fewer than two samples, which tell nothing.
-fn variance_of_mean(s: &PixelStats) -> [f32; 3] {
-    let n = s.count as f32;
-    s.m2.map(|m2| if s.count > 1 { m2 / (n * (n - 1.0)) } else { 0.0 })
+/// What the samples say, out of a film that [`film()`] made.
+///
+/// # Errors
+/// Which layer is missing.
+pub fn pixels(film: &Film) -> std::result::Result<Vec<Pixel>, String> {
+    let layer = |name: Option<&str>| film.picture(name).map(|p| p.pixels);
+    let (mean, m2, count) = (layer(None)?, layer(Some("m2"))?, counts(film, "samples")?);
+    let dark = vec![[0.0; 3]; mean.len()];
+    let direct = layer(Some("direct")).unwrap_or_else(|_| dark.clone());
+    let indirect = layer(Some("indirect")).unwrap_or(dark);
+    let pixel = |i: usize| Pixel {
+        stats: PixelStats { mean: mean[i], count: count[i], m2: m2[i] },
+        light: PixelLight { direct: direct[i], indirect: indirect[i] },
+    };
+    Ok((0..mean.len()).map(pixel).collect())
 }
 
-fn add_light(film: &mut Film, light: &[PixelLight]) {
-    film.add_vec3("direct", RGB, &light.iter().map(|l| l.direct).collect::<Vec<_>>());
-    film.add_vec3("indirect", RGB, &light.iter().map(|l| l.indirect).collect::<Vec<_>>());
+/// Replaces what the samples say; the other layers stay.
+pub fn replace_pixels(film: &mut Film, pixels: &[Pixel]) {
+    let split = film.channel("direct.R").is_some();
+    let mut fresh = Film::new(film.width, film.height);
+    let light: Vec<_> = pixels.iter().filter(|_| split).map(|p| p.light).collect();
+    add_pixels(&mut fresh, &pixels.iter().map(|p| p.stats).collect::<Vec<_>>(), &light);
+    film.channels.retain(|c| fresh.channel(&c.name).is_none());
+    film.channels.extend(fresh.channels);
+}
+
+/// A layer of counts.
+///
+/// # Errors
+/// When there is no such layer of integers.
+pub fn counts(film: &Film, name: &str) -> std::result::Result<Vec<u32>, String> {
+    match film.channel(name) {
+        Some(Samples::U32(counts)) => Ok(counts.clone()),
+        _ => Err(format!("has no layer of counts \"{name}\": it must be an EXR file that tallow rendered")),
+    }
 }
 
 fn add_guide(film: &mut Film, guide: &[Guide]) {

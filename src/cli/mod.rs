@@ -3,14 +3,19 @@ pub mod compare;
 pub mod devices;
 pub mod explain;
 pub mod interrupt;
+pub mod job;
 pub mod layers;
+pub mod merge;
+pub mod overrides;
 pub mod progress;
 pub mod render;
+pub mod resume;
 
 use crate::error::{Error, Result};
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use std::io::Write;
+use std::path::Path;
 use std::process::ExitCode;
 
 const EXIT_CODES: &str = "\
@@ -35,6 +40,7 @@ struct Cli {
 enum Command {
     Render(Box<render::Args>),
     Compare(compare::Args),
+    Merge(merge::Args),
     Explain(explain::Args),
     Devices(devices::Args),
 }
@@ -75,6 +81,7 @@ fn run(command: Command) -> Result<Exit> {
     match command {
         Command::Render(args) => render::run(&args),
         Command::Compare(args) => compare::run(&args),
+        Command::Merge(args) => merge::run(&args),
         Command::Explain(args) => explain::run(&args),
         Command::Devices(args) => devices::run(&args),
     }
@@ -87,7 +94,9 @@ fn usage(e: &clap::Error) -> Result<Exit> {
         return print(&text).map(|()| Exit::Done);
     }
     if e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        return Err(Error::Usage("name a command: render, compare, explain or devices (see tallow --help)".to_owned()));
+        return Err(Error::Usage(
+            "name a command: render, compare, merge, explain or devices (see tallow --help)".to_owned(),
+        ));
     }
     let one_line = |paragraph: &str| paragraph.split_whitespace().collect::<Vec<_>>().join(" ");
     let parts = text.split("\n\n").map(one_line).filter(|p| !p.starts_with("Usage:") && !p.starts_with("For more"));
@@ -119,6 +128,14 @@ pub fn print(text: &str) -> Result<()> {
 pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
     let text = serde_json::to_string(value).map_err(|e| Error::output("standard output", e))?;
     print(&(text + "\n"))
+}
+
+/// Checks that a picture in false colours can be written.
+fn check_png(option: &str, path: &Path) -> Result<()> {
+    match path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
+        true => crate::image::check_writable(path),
+        false => Err(Error::Usage(format!("{option} {}: false colours go to a .png", path.display()))),
+    }
 }
 
 /// A finite number, for options where NaN would switch a check off.

@@ -1,18 +1,19 @@
 //! `tallow render`: a scene becomes image files.
-use super::progress::Progress;
+use super::job::{End, Job, Why};
+use super::overrides::Overrides;
+use super::resume::{self, Earlier};
 use super::{Exit, finite, interrupt, layers, print, print_json};
 use crate::error::{Error, Result};
 use crate::gpu::{self, DeviceOptions, FrameResources, Gpu, PassTime};
-use crate::image::{self, Film, WriteOptions, output, tone::ToneMap};
+use crate::image::difference::false_colours;
+use crate::image::{self, Film, Samples, WriteOptions, output, tone::ToneMap};
 use crate::renderer::{self, Counters, Outputs, Renderer};
 use crate::report::table::{self, PassRow};
 use crate::report::trace::chrome_trace;
 use crate::scene::Scene;
-use crate::settings::{PixelFilter, Sampler, Settings};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 /// Which effects are compiled into the kernels.
@@ -50,6 +51,12 @@ pub struct Args {
     /// Write a trace of CPU and GPU for Perfetto
     #[arg(long, value_name = "FILE")]
     pub profile: Option<PathBuf>,
+    /// Continue a render from the .exr file that it wrote when it was interrupted, or that has fewer samples
+    #[arg(long, value_name = "FILE")]
+    pub resume: Option<PathBuf>,
+    /// Write the samples per pixel in false colours to a .png
+    #[arg(long, value_name = "FILE")]
+    pub heatmap: Option<PathBuf>,
     /// Count rays and visited nodes
     #[arg(long)]
     pub counters: bool,
@@ -65,72 +72,6 @@ pub struct Args {
     /// Replace the scene's own settings.
     #[command(flatten)]
     pub overrides: Overrides,
-}
-
-/// Settings given on the command line.
-#[derive(clap::Args, Clone, Debug, Default)]
-#[command(next_help_heading = "Settings")]
-pub struct Overrides {
-    /// Film width in pixels
-    #[arg(long, value_name = "N")]
-    pub width: Option<u32>,
-    /// Film height in pixels
-    #[arg(long, value_name = "N")]
-    pub height: Option<u32>,
-    /// Samples per pixel
-    #[arg(long, value_name = "N")]
-    pub spp: Option<u32>,
-    /// Path edges: 2 is direct light, 3 one bounce of indirect light
-    #[arg(long, value_name = "N")]
-    pub max_depth: Option<u32>,
-    /// Edges after which Russian roulette starts; 0 is off
-    #[arg(long, value_name = "N")]
-    pub roulette_depth: Option<u32>,
-    /// Largest value of an indirect sample; 0 is off, others bias the image
-    #[arg(long, value_name = "N")]
-    pub clamp_indirect: Option<f32>,
-    /// Chooses the random sequence
-    #[arg(long, value_name = "N")]
-    pub seed: Option<u32>,
-    /// Pixel filter
-    #[arg(long, value_enum)]
-    pub filter: Option<PixelFilter>,
-    /// Random numbers
-    #[arg(long, value_enum)]
-    pub sampler: Option<Sampler>,
-}
-
-impl Overrides {
-    /// Replaces those settings that were given.
-    pub fn apply(&self, settings: &mut Settings) {
-        let Settings {
-            width,
-            height,
-            spp,
-            max_depth,
-            roulette_depth,
-            clamp_indirect,
-            seed,
-            filter,
-            sampler,
-            allocate: _,
-        } = settings;
-        set(width, self.width);
-        set(height, self.height);
-        set(spp, self.spp);
-        set(max_depth, self.max_depth);
-        set(roulette_depth, self.roulette_depth);
-        set(clamp_indirect, self.clamp_indirect);
-        set(seed, self.seed);
-        set(filter, self.filter);
-        set(sampler, self.sampler);
-    }
-}
-
-fn set<T>(setting: &mut T, given: Option<T>) {
-    if let Some(value) = given {
-        *setting = value;
-    }
 }
 
 impl Args {
@@ -159,8 +100,16 @@ pub struct Summary {
     pub width: u32,
     /// Pixels.
     pub height: u32,
-    /// Samples taken, over all pixels.
+    /// Samples of all pixels, those of a resumed file included.
     pub samples: u64,
+    /// Samples traced now.
+    pub traced: u64,
+    /// Of any pixel.
+    pub least_samples: u32,
+    /// Of any pixel.
+    pub most_samples: u32,
+    /// Why it ended.
+    pub stopped: Why,
     /// Rays and nodes; none without `--counters`.
     pub counters: Option<Counters>,
     /// Wall time of reading the scene and building its hierarchy.
@@ -186,6 +135,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let stop = interrupt::flag();
     let mut host = Spans::default();
     let scene = host.time("load scene", || Scene::load(&args.scene, &|s| args.overrides.apply(s)))?;
+    let earlier = args.resume.as_deref().map(|path| Earlier::read(path, &scene.settings)).transpose()?;
     let talkative = !args.quiet && !args.json;
     if talkative {
         scene.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
@@ -193,47 +143,26 @@ pub fn run(args: &Args) -> Result<Exit> {
     let options = DeviceOptions { device: args.device.clone(), validation: args.validation };
     let gpu = host.time("open device", || Gpu::open(&options))?;
     let wanted = Outputs { split_light: true, guides: true, counters: args.counters };
-    let effects = match args.effects {
+    let mut effects = match args.effects {
         EffectChoice::Auto => renderer::called_for(&scene, wanted),
         EffectChoice::All => renderer::all_effects(&scene),
     };
+    effects.adaptive |= earlier.is_some();
     let renderer = host.time("upload and compile", || Renderer::specialised(&gpu, &scene, wanted, effects))?;
     let mut frame = FrameResources::new(&gpu)?;
-    let Some(times) = host.time("render", || render(&renderer, &mut frame, stop, !talkative))? else {
-        return Ok(Exit::Interrupted);
-    };
+    let job = Job { renderer: &renderer, stop, quiet: !talkative };
+    let end = host.time("render", || job.run(&mut frame, earlier.as_ref()))?;
     let mut film = host.time("read back", || layers::film(&renderer))?;
     let seconds = host.seconds("render");
-    film.metadata = metadata(args, &renderer, &gpu, seconds)?;
+    film.metadata = metadata(args, &renderer, &gpu, seconds, end.allocations)?;
+    if end.why == Why::Interrupted {
+        let pending = resume::pending(&renderer, &film, &end)?;
+        film.add(layers::PENDING, Samples::U32(pending));
+    }
     host.time("write", || write(args, &film))?;
     fail_on_messages(&gpu)?;
-    report(args, &renderer, &gpu, &scene, &host, &times)?;
-    Ok(Exit::Done)
-}
-
-/// Times of all passes, or none when the user stopped it.
-fn render(
-    renderer: &Renderer,
-    frame: &mut FrameResources,
-    stop: &AtomicBool,
-    quiet: bool,
-) -> Result<Option<Vec<PassTime>>> {
-    let settings = renderer.settings();
-    let total = settings.pixels() as u64 * u64::from(settings.spp);
-    let mut progress = Progress::new(total, quiet);
-    let (mut times, mut rays) = (Vec::new(), 0);
-    for step in renderer.steps() {
-        if stop.load(Ordering::SeqCst) {
-            progress.finish();
-            return Ok(None);
-        }
-        times.extend(renderer.run(frame, &step)?);
-        let counters = if renderer.outputs().counters { renderer.counters()? } else { Counters::default() };
-        progress.add(step.paths(), counters.rays() - rays);
-        rays = counters.rays();
-    }
-    progress.finish();
-    Ok(Some(times))
+    report(args, &renderer, &gpu, &scene, &film, &host, &end)?;
+    Ok(if end.why == Why::Interrupted { Exit::Interrupted } else { Exit::Done })
 }
 
 /// Host-side stages, for the trace.
@@ -254,7 +183,13 @@ impl Spans {
     }
 }
 
-fn metadata(args: &Args, renderer: &Renderer, gpu: &Gpu, seconds: f64) -> Result<BTreeMap<String, String>> {
+fn metadata(
+    args: &Args,
+    renderer: &Renderer,
+    gpu: &Gpu,
+    seconds: f64,
+    allocations: u32,
+) -> Result<BTreeMap<String, String>> {
     let info = gpu.info();
     let settings = serde_json::to_string(renderer.settings()).map_err(|e| Error::Usage(e.to_string()))?;
     let since_epoch = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
@@ -263,6 +198,7 @@ fn metadata(args: &Args, renderer: &Renderer, gpu: &Gpu, seconds: f64) -> Result
         ("scene", args.scene.display().to_string()),
         ("settings", settings),
         ("seed", renderer.settings().seed.to_string()),
+        (resume::ALLOCATIONS, allocations.to_string()),
         ("device", info.name.clone()),
         ("driver", format!("{} {} {}", info.driver_name, info.driver_version, info.driver_info)),
         ("renderSeconds", format!("{seconds:.3}")),
@@ -277,7 +213,19 @@ fn write(args: &Args, film: &Film) -> Result<()> {
     if broken > 0 {
         eprintln!("warning: {broken} pixels are not finite");
     }
-    args.output_files().iter().try_for_each(|path| image::write(path, film, &args.write_options()))
+    args.output_files().iter().try_for_each(|path| image::write(path, film, &args.write_options()))?;
+    args.heatmap.iter().try_for_each(|path| write_heatmap(path, film))
+}
+
+/// Samples per pixel from 0 (dark) to the largest number (bright).
+fn write_heatmap(path: &Path, film: &Film) -> Result<()> {
+    let counts = layers::counts(film, "samples").map_err(|what| Error::output(path, what))?;
+    let most = counts.iter().copied().max().unwrap_or(0).max(1);
+    let values: Vec<f32> = counts.iter().map(|&n| n as f32).collect();
+    let picture = false_colours(film.width, &values, most as f32);
+    let mut map = Film::new(picture.width, picture.height);
+    map.add_vec3("", ["R", "G", "B"], &picture.pixels);
+    image::write(path, &map, &WriteOptions::default())
 }
 
 fn fail_on_messages(gpu: &Gpu) -> Result<()> {
@@ -287,24 +235,38 @@ fn fail_on_messages(gpu: &Gpu) -> Result<()> {
     }
 }
 
-fn report(args: &Args, renderer: &Renderer, gpu: &Gpu, scene: &Scene, host: &Spans, times: &[PassTime]) -> Result<()> {
+fn report(
+    args: &Args,
+    renderer: &Renderer,
+    gpu: &Gpu,
+    scene: &Scene,
+    film: &Film,
+    host: &Spans,
+    end: &End,
+) -> Result<()> {
     if let Some(path) = &args.profile {
         let offset = gpu.calibrate().map(|(gpu_ns, host_ns)| host_ns as i64 - gpu_ns as i64);
-        output::write(path, chrome_trace(&host.0, times, offset).as_bytes())?;
+        output::write(path, chrome_trace(&host.0, &end.times, offset).as_bytes())?;
     }
     let settings = renderer.settings();
     let counters = if args.counters { Some(renderer.counters()?) } else { None };
+    let counts = layers::counts(film, "samples").unwrap_or_default();
+    let least_most = (counts.iter().copied().min().unwrap_or(0), counts.iter().copied().max().unwrap_or(0));
     let summary = Summary {
         files: args.output_files(),
         width: settings.width,
         height: settings.height,
-        samples: settings.pixels() as u64 * u64::from(settings.spp),
+        samples: counts.iter().map(|&n| u64::from(n)).sum(),
+        traced: end.traced,
+        least_samples: least_most.0,
+        most_samples: least_most.1,
+        stopped: end.why,
         counters,
         load_seconds: host.seconds("load scene"),
         compile_seconds: host.seconds("upload and compile"),
         seconds: host.seconds("render"),
         device: gpu.info().name.clone(),
-        passes: table::summarise(times),
+        passes: table::summarise(&end.times),
         warnings: scene.warnings.clone(),
     };
     match (args.json, args.quiet) {
@@ -315,11 +277,16 @@ fn report(args: &Args, renderer: &Renderer, gpu: &Gpu, scene: &Scene, host: &Spa
 }
 
 fn text(s: &Summary) -> String {
-    let speed = s.samples as f64 * 1e-6 / s.seconds.max(1e-9);
+    let speed = s.traced as f64 * 1e-6 / s.seconds.max(1e-9);
     let mut text = format!(
         "{} x {}, {} samples in {:.2} s ({speed:.2} Msamples/s) on {}; loaded in {:.2} s, compiled in {:.2} s\n",
-        s.width, s.height, s.samples, s.seconds, s.device, s.load_seconds, s.compile_seconds
+        s.width, s.height, s.traced, s.seconds, s.device, s.load_seconds, s.compile_seconds
     );
+    if s.least_samples != s.most_samples {
+        let mean = s.samples as f64 / (f64::from(s.width) * f64::from(s.height));
+        text += &format!("{} to {} samples per pixel, {mean:.2} on average\n", s.least_samples, s.most_samples);
+    }
+    text += &s.stopped.line();
     if let Some(c) = &s.counters {
         let per_ray = c.nodes as f64 / c.rays().max(1) as f64;
         text += &format!("{} closest-hit rays, {} any-hit rays, {per_ray:.1} nodes each\n", c.closest, c.any);
@@ -330,6 +297,7 @@ fn text(s: &Summary) -> String {
 /// A render may take hours; what cannot be written is told before.
 fn check_outputs(args: &Args) -> Result<()> {
     args.output_files().iter().try_for_each(|path| image::check_writable(path))?;
+    args.heatmap.iter().try_for_each(|path| super::check_png("--heatmap", path))?;
     args.profile.iter().try_for_each(|path| image::output::check(path))
 }
 
@@ -337,7 +305,6 @@ fn check_outputs(args: &Args) -> Result<()> {
 mod tests {
     use super::*;
     use clap::Parser;
-    use std::path::Path;
 
     #[derive(Parser)]
     struct Command {
@@ -347,28 +314,6 @@ mod tests {
 
     fn parse(words: &[&str]) -> Args {
         Command::parse_from([&["render"], words].concat()).args
-    }
-
-    #[test]
-    fn every_setting_given_replaces_that_of_the_scene_and_no_other() {
-        let mut settings = Settings { spp: 7, ..Settings::default() };
-        parse(&["a.toml"]).overrides.apply(&mut settings);
-        assert_eq!(settings, Settings { spp: 7, ..Settings::default() });
-        let words = "a.toml --width 1 --height 2 --spp 3 --max-depth 4 --roulette-depth 5 --clamp-indirect 6 --seed 8 \
-            --filter tent --sampler independent";
-        parse(&words.split_whitespace().collect::<Vec<_>>()).overrides.apply(&mut settings);
-        let expected = Settings {
-            width: 1,
-            height: 2,
-            spp: 3,
-            max_depth: 4,
-            roulette_depth: 5,
-            clamp_indirect: 6.0,
-            seed: 8,
-            filter: PixelFilter::Tent,
-            sampler: Sampler::Independent,
-        };
-        assert_eq!(settings, expected);
     }
 
     #[test]

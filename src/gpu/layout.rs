@@ -460,6 +460,8 @@ gpu_structs! {
         round: uint,
         /// Rounds that the list is dealt to, at least 1.
         rounds: uint,
+        /// Index of every pixel's first sample in its sequence.
+        first_sample: uint,
     }
 
     /// A ray for `traverse.comp`.

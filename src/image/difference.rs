@@ -18,16 +18,22 @@ pub fn heat_map(test: &Picture, reference: &Picture) -> (Picture, f32) {
     let error = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).map(|c| (a[c] - b[c]).abs()).sum::<f32>() / 3.0;
     let errors: Vec<f32> = test.pixels.iter().zip(&reference.pixels).map(error).collect();
     let top = scale_top(&errors);
+    (false_colours(test.width, &errors, top), top)
+}
+
+/// Values from 0 to `top` in the colour map of [`heat_map`], with its scale; [`WIDER`] columns wider.
+pub fn false_colours(width: u32, values: &[f32], top: f32) -> Picture {
     let magma = magma();
     let colour = |fraction: f32| magma[(fraction * 255.0).round().min(255.0) as usize];
-    let (width, height) = (test.width as usize, test.height as usize);
+    let width = width as usize;
+    let height = values.len() / width;
     let mut pixels = Vec::with_capacity((width + GAP + BAR) * height);
-    for (y, row) in errors.chunks_exact(width).enumerate() {
+    for (y, row) in values.chunks_exact(width).enumerate() {
         pixels.extend(row.iter().map(|e| colour(e / top)));
         pixels.extend([[1.0; 3]; GAP]);
         pixels.extend([colour((height - 1 - y) as f32 / (height - 1).max(1) as f32); BAR]);
     }
-    (Picture { width: test.width + WIDER, height: test.height, pixels }, top)
+    Picture { width: width as u32 + WIDER, height: height as u32, pixels }
 }
 
 /// Columns that [`heat_map`] adds.

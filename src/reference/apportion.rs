@@ -79,13 +79,13 @@ pub fn dealt(offsets: &[u64], round: u32, rounds: u32) -> Vec<u64> {
     offsets.iter().map(|o| (o + u64::from(rounds - 1 - round)) / u64::from(rounds)).collect()
 }
 
-/// (pixel, sample index) of paths `first .. first + paths`; `have` are the pixels' samples before the batch.
-pub fn batch(offsets: &[u64], have: &[u32], first: u64, paths: u32) -> Vec<[u32; 2]> {
+/// (pixel, sample index) of paths `first .. first + paths`; `next` are the pixels' next samples before the batch.
+pub fn batch(offsets: &[u64], next: &[u32], first: u64, paths: u32) -> Vec<[u32; 2]> {
     let mut list = vec![[NONE; 2]; paths as usize];
     for (i, range) in offsets.windows(2).enumerate() {
         let (low, high) = (range[0].max(first), range[1].min(first + u64::from(paths)));
         for at in low..high.max(low) {
-            list[(at - first) as usize] = [i as u32, have[i] + (at - low) as u32];
+            list[(at - first) as usize] = [i as u32, next[i] + (at - low) as u32];
         }
     }
     list

@@ -140,6 +140,7 @@ impl Description {
             height: film.height.unwrap_or(d.height),
             filter: film.filter.unwrap_or(d.filter),
             spp: render.spp.unwrap_or(d.spp),
+            first_sample: d.first_sample,
             max_depth: render.max_depth.unwrap_or(d.max_depth),
             roulette_depth: render.roulette_depth.unwrap_or(d.roulette_depth),
             clamp_indirect: render.clamp_indirect.unwrap_or(d.clamp_indirect),

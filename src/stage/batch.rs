@@ -30,9 +30,10 @@ pub fn record(
     stats: &Buffer<PixelStats>,
     paths: &Buffer<uvec2>,
     range: &PathRange,
+    first_sample: u32,
 ) -> Result<()> {
     let pixels = offset.len() as u32 - 1;
     let PathRange { first, paths: n, round, rounds } = *range;
-    let push = BatchPush { pixels, paths: n, first_path: pair(first), round, rounds };
+    let push = BatchPush { pixels, paths: n, first_path: pair(first), round, rounds, first_sample };
     rec.dispatch(k, Bind { offset, stats, paths }, &push, blocks(pixels))
 }

@@ -1,0 +1,125 @@
+//! Runs the steps of a render until they end, the image is good enough, or the user has seen enough.
+use super::progress::Progress;
+use super::resume::Earlier;
+use crate::error::Result;
+use crate::gpu::{FrameResources, PassTime};
+use crate::renderer::{Counters, PathRange, Renderer, Step};
+use serde::Serialize;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A render to run.
+pub struct Job<'a> {
+    /// What runs it.
+    pub renderer: &'a Renderer,
+    /// Set when the user wants it to stop.
+    pub stop: &'a AtomicBool,
+    /// Whether to hide the progress bar.
+    pub quiet: bool,
+}
+
+/// Why a render ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Why {
+    /// All samples are taken.
+    Done,
+    /// No pixel wants more: its error is below the threshold, or it has as many samples as it may have.
+    Threshold {
+        /// Pixels whose estimated error is still above the threshold.
+        above: u64,
+    },
+    /// The user stopped it.
+    Interrupted,
+}
+
+impl Why {
+    /// What is worth saying, with a line break; nothing when all went as planned.
+    pub fn line(self) -> String {
+        match self {
+            Self::Done => String::new(),
+            Self::Threshold { above: 0 } => {
+                "stopped: the error of every pixel is estimated below the threshold\n".into()
+            }
+            Self::Threshold { above } => format!("stopped: {above} pixels are above the threshold at their limit\n"),
+            Self::Interrupted => "interrupted: what there is was written; --resume continues it\n".into(),
+        }
+    }
+}
+
+/// How it ended.
+pub struct End {
+    /// Of all passes.
+    pub times: Vec<PassTime>,
+    /// Samples taken.
+    pub traced: u64,
+    /// Allocations made, those of a resumed render included.
+    pub allocations: u32,
+    /// What was traced last of the last allocation; none before the first.
+    pub last: Option<PathRange>,
+    /// Why it ended.
+    pub why: Why,
+}
+
+impl Job<'_> {
+    /// Runs it, from where `earlier` stopped if there is one.
+    ///
+    /// # Errors
+    /// As [`Renderer::run`].
+    pub fn run(&self, frame: &mut FrameResources, earlier: Option<&Earlier>) -> Result<End> {
+        let (r, mut rays) = (self.renderer, 0);
+        let steps = match earlier {
+            Some(earlier) => earlier.put_back(r, frame)?,
+            None => r.steps(),
+        };
+        let allocations = earlier.map_or(0, |e| e.progress.allocations);
+        let mut end = End { times: Vec::new(), traced: 0, allocations, last: None, why: Why::Done };
+        if earlier.is_some() {
+            end.last = Some(nothing_yet(&steps));
+        }
+        let threshold = r.settings().allocate.noise_threshold > 0.0;
+        let mut progress = Progress::new(steps.iter().map(Step::paths).sum(), self.quiet);
+        for (i, step) in steps.iter().enumerate() {
+            if self.stop.load(Ordering::SeqCst) {
+                end.why = Why::Interrupted;
+                break;
+            }
+            end.times.extend(r.run(frame, step)?);
+            end.traced += step.paths();
+            match step {
+                Step::Allocate(_) => {
+                    end.allocations += 1;
+                    end.last = Some(nothing_yet(&steps[i + 1..]));
+                    if threshold && r.apportionment()?.wanting == 0 {
+                        end.why = Why::Threshold { above: 0 };
+                        break;
+                    }
+                }
+                Step::Listed(range) => end.last = Some(*range),
+                Step::Start | Step::Uniform(_) => {}
+            }
+            let counters = if r.outputs().counters { r.counters()? } else { Counters::default() };
+            progress.add(step.paths(), counters.rays() - rays);
+            rays = counters.rays();
+        }
+        progress.finish();
+        if threshold && end.why != Why::Interrupted {
+            end.why = Why::Threshold { above: above_threshold(r)? };
+        }
+        Ok(end)
+    }
+}
+
+/// The beginning of the first round that the steps deal to.
+fn nothing_yet(steps: &[Step]) -> PathRange {
+    match steps.first() {
+        Some(Step::Listed(range)) => PathRange { first: 0, paths: 0, ..*range },
+        _ => PathRange { first: 0, paths: 0, round: 0, rounds: 1 },
+    }
+}
+
+/// Pixels whose error is estimated above the threshold, however many samples they have.
+fn above_threshold(renderer: &Renderer) -> Result<u64> {
+    let stats = renderer.film().tiles[0].stats.read()?;
+    let wanting = renderer.priorities_of(&stats, u32::MAX)?;
+    Ok(wanting.iter().filter(|&&p| p > 0.0).count() as u64)
+}

@@ -1,0 +1,95 @@
+//! `tallow merge`: renders of the same picture by different samples become one.
+use super::{Exit, layers};
+use crate::error::{Error, Result};
+use crate::image::{self, Film, WriteOptions};
+use crate::statistics::{Pixel, join};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Merge renders of disjoint sample ranges into one
+///
+/// The files must come from renders that differ in nothing but --first-sample and --spp, or in --seed. Means and
+/// variances are joined by the rule of Chan, Golub and LeVeque (1979): within rounding, the result is that of one render.
+#[derive(clap::Args)]
+pub struct Args {
+    /// EXR files that tallow rendered
+    #[arg(required = true, num_args = 2..)]
+    files: Vec<PathBuf>,
+    /// EXR file to write
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+}
+
+/// Settings in which merged renders may differ.
+const FREE: [&str; 3] = ["spp", "first_sample", "seed"];
+
+struct Part {
+    film: Film,
+    pixels: Vec<Pixel>,
+    /// All but [`FREE`].
+    settings: Value,
+    seed: u64,
+    /// Sample indices of all pixels.
+    range: std::ops::Range<u64>,
+}
+
+impl Part {
+    fn read(path: &Path) -> Result<Self> {
+        let film = image::read(path)?;
+        Self::of(film).map_err(|what| Error::input(path, what))
+    }
+
+    fn of(film: Film) -> std::result::Result<Self, String> {
+        let said = film.metadata.get("settings").ok_or("says nothing of its settings: it must be of tallow render")?;
+        let mut settings: Value = serde_json::from_str(said).map_err(|e| format!("settings: {e}"))?;
+        let [_, first, seed] = FREE.map(|key| {
+            let value = settings.as_object_mut().and_then(|s| s.remove(key));
+            value.and_then(|v| v.as_u64()).unwrap_or(0)
+        });
+        let pixels = layers::pixels(&film)?;
+        let most = pixels.iter().map(|p| u64::from(p.stats.count)).max().unwrap_or(0);
+        Ok(Self { film, pixels, settings, seed, range: first..first + most })
+    }
+
+    /// Why they cannot be merged.
+    fn conflict(&self, other: &Self) -> Option<String> {
+        let (a, b) = (&self.range, &other.range);
+        if self.film.metadata.get("scene") != other.film.metadata.get("scene") || self.settings != other.settings {
+            return Some("shows another scene, or was rendered with other settings".into());
+        }
+        let both = self.seed == other.seed && a.start < b.end && b.start < a.end;
+        both.then(|| {
+            format!("has samples {} to {} of seed {} as well: they would count twice", b.start, b.end, self.seed)
+        })
+    }
+}
+
+/// Runs the subcommand.
+///
+/// # Errors
+/// [`Error::Input`] when a file cannot be read or does not belong to the others, [`Error::Output`].
+pub fn run(args: &Args) -> Result<Exit> {
+    image::check_writable(&args.output)?;
+    let parts: Vec<Part> = args.files.iter().map(|path| Part::read(path)).collect::<Result<_>>()?;
+    for (i, (part, path)) in parts.iter().zip(&args.files).enumerate() {
+        if let Some(what) = parts[..i].iter().find_map(|earlier| earlier.conflict(part)) {
+            return Err(Error::input(path, what));
+        }
+    }
+    image::write(&args.output, &merged(parts)?, &WriteOptions::default())?;
+    Ok(Exit::Done)
+}
+
+/// The first film, with everybody's samples.
+fn merged(parts: Vec<Part>) -> Result<Film> {
+    let mut parts = parts.into_iter();
+    let Some(Part { mut film, mut pixels, .. }) = parts.next() else {
+        return Err(Error::Usage("name files to merge".into()));
+    };
+    for part in parts {
+        pixels.iter_mut().zip(&part.pixels).for_each(|(a, b)| *a = join(a, b));
+    }
+    layers::replace_pixels(&mut film, &pixels);
+    film.channels.retain(|c| c.name != layers::PENDING && c.name != "priority");
+    Ok(film)
+}

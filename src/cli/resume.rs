@@ -1,0 +1,84 @@
+//! Taking up a render where it stopped: everything that it needs is in the EXR file that it wrote.
+use super::job::End;
+use super::layers;
+use crate::error::{Error, Result};
+use crate::gpu::FrameResources;
+use crate::gpu::layout::{PixelLight, PixelStats};
+use crate::image::{self, Film};
+use crate::renderer::{Progress, Renderer, Step};
+use crate::schedule;
+use crate::settings::Settings;
+use crate::statistics::Pixel;
+use std::path::Path;
+
+/// Metadata that tells how many allocations a render had made.
+pub const ALLOCATIONS: &str = "allocations";
+
+/// What an earlier render left.
+pub struct Earlier {
+    /// Where it stopped.
+    pub progress: Progress,
+    pixels: Vec<Pixel>,
+    pending: Vec<u32>,
+}
+
+impl Earlier {
+    /// Reads the file of a render with these settings; one that spread its samples evenly may have had fewer of them.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when it is no such file.
+    pub fn read(path: &Path, settings: &Settings) -> Result<Self> {
+        let film = image::read(path)?;
+        Self::of(&film, settings).map_err(|what| Error::input(path, what))
+    }
+
+    fn of(film: &Film, settings: &Settings) -> std::result::Result<Self, String> {
+        let said = film.metadata.get("settings").ok_or("says nothing of its settings: it must be of tallow render")?;
+        let uniform = settings.allocate.policy == "uniform";
+        let mut wanted = serde_json::to_value(settings).map_err(|e| e.to_string())?;
+        let mut had: serde_json::Value = serde_json::from_str(said).map_err(|e| format!("settings: {e}"))?;
+        if uniform {
+            for settings in [&mut wanted, &mut had] {
+                settings.as_object_mut().map(|s| s.remove("spp"));
+            }
+        }
+        if wanted != had {
+            let free = if uniform { "; only spp may differ" } else { "" };
+            return Err(format!("was rendered with other settings{free}: {said}"));
+        }
+        let pixels = layers::pixels(film)?;
+        let count = |p: &Pixel| p.stats.count;
+        let pending = match layers::counts(film, layers::PENDING) {
+            _ if uniform => pixels.iter().map(|p| settings.spp.saturating_sub(count(p))).collect(),
+            Ok(pending) => pending,
+            Err(_) => vec![0; pixels.len()],
+        };
+        let allocations = film.metadata.get(ALLOCATIONS).and_then(|n| n.parse().ok()).unwrap_or(0);
+        let progress = Progress { allocations, pending: pending.iter().map(|&n| u64::from(n)).sum() };
+        Ok(Self { progress, pixels, pending })
+    }
+
+    /// Puts it into the renderer's buffers and returns the steps that are left.
+    ///
+    /// # Errors
+    /// As [`Renderer::resume`].
+    pub fn put_back(&self, renderer: &Renderer, frame: &mut FrameResources) -> Result<Vec<Step>> {
+        let stats: Vec<PixelStats> = self.pixels.iter().map(|p| p.stats).collect();
+        let light: Vec<PixelLight> = self.pixels.iter().map(|p| p.light).collect();
+        renderer.resume(frame, &stats, &light, &self.pending)?;
+        Ok(renderer.rest(self.progress))
+    }
+}
+
+/// What the pixels of an interrupted render still lack of what they were to have by then.
+///
+/// # Errors
+/// [`Error::Device`].
+pub fn pending(renderer: &Renderer, film: &Film, end: &End) -> Result<Vec<u32>> {
+    let Some(last) = &end.last else {
+        let first = schedule::first_spp(renderer.settings());
+        let counts = layers::counts(film, "samples").map_err(Error::Usage)?;
+        return Ok(counts.iter().map(|n| first - n).collect());
+    };
+    Ok(schedule::pending(&renderer.film().counts.count.read()?, last))
+}

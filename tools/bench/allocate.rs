@@ -1,0 +1,59 @@
+//! What placing samples costs, pass by pass: medians of 9 runs over a film of random priorities, and the same for other
+//! budgets, on which it must not depend. `cargo run --release --example bench-allocate [width height]`
+use anyhow::Result;
+use std::collections::BTreeMap;
+use tallow::gpu::layout::PixelStats;
+use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Kernel, Location};
+use tallow::report::table;
+use tallow::stage::apportion::{Apportion, Counts, Plan};
+use tallow::stage::batch::{self, PathRange};
+use tallow::stage::scan::Scan;
+
+const RUNS: usize = 9;
+
+fn main() -> Result<()> {
+    let sizes: Vec<u32> = std::env::args().skip(1).map(|a| a.parse()).collect::<Result<_, _>>()?;
+    let (width, height) = (sizes.first().copied().unwrap_or(1024), sizes.get(1).copied().unwrap_or(1024));
+    let pixels = width * height;
+    let gpu = Gpu::open(&DeviceOptions::default())?;
+    println!("{width} x {height} on {}", gpu.info().name);
+    let mut state = 1_u64;
+    let mut random = || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 40) as f32 / 16_777_216.0
+    };
+    let priority: Vec<f32> = (0..pixels).map(|_| random()).collect();
+    let priority = Buffer::from_slice(&gpu, "priority", &priority)?;
+    let stats = Buffer::from_slice(&gpu, "stats", &vec![PixelStats::default(); pixels as usize])?;
+    let paths = Buffer::new(&gpu, "paths", pixels as usize, Location::Device)?;
+    let counts = Counts::new(&gpu, pixels)?;
+    let (apportion, scan) = (Apportion::new(&gpu)?, Scan::new(&gpu)?);
+    let lists = Kernel::new(&gpu, &Default::default(), &[])?;
+    let mut frame = FrameResources::new(&gpu)?;
+    for spp in [1, 4, 64] {
+        let plan = Plan { pixels, budget: u64::from(pixels) * spp, limit: u32::MAX, total: None, rounds: 1 };
+        let range = PathRange { first: 0, paths: pixels, round: 0, rounds: 1 };
+        let mut passes: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+        for _ in 0..=RUNS {
+            let times = gpu.run(&mut frame, |rec| {
+                apportion.record(rec, &priority, &stats, &counts, &plan)?;
+                scan.record(rec, &counts)?;
+                batch::record(&lists, rec, &counts.key, &stats, &paths, &range, 0)
+            })?;
+            let mut sums: BTreeMap<&str, f64> = BTreeMap::new();
+            for t in &times {
+                let ms = (t.end_ns - t.begin_ns) as f64 * 1e-6;
+                *sums.entry(t.name).or_default() += ms;
+                *sums.entry("all").or_default() += ms;
+            }
+            sums.into_iter().for_each(|(name, ms)| passes.entry(name).or_default().push(ms));
+        }
+        let row = |(name, ms): (&&str, &Vec<f64>)| {
+            let mut later = ms[1..].to_vec(); // the first run compiles
+            later.sort_by(f64::total_cmp);
+            vec![(*name).to_owned(), format!("{:.2}", later[later.len() / 2])]
+        };
+        println!("\n{spp} samples per pixel\n{}", table::text(&["pass", "ms"], &passes.iter().map(row).collect::<Vec<_>>()));
+    }
+    Ok(())
+}
