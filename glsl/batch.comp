@@ -7,7 +7,7 @@
 #include "shared/block.glsl"
 
 // The sample-to-pixel buffer of one batch: (pixel, index of the sample in the pixel's sequence), pixel by pixel.
-layout(local_size_x = 256) in;
+layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer offset; // of uvec2
 layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
 layout(scalar, binding = 2) writeonly buffer Paths { uvec2 paths[]; };
@@ -16,7 +16,7 @@ layout(scalar, push_constant) uniform Push { BatchPush push; };
 #include "shared/offset.glsl"
 
 void main() {
-    uint first = first_item();
+    uint first = first_item(), items = item_count(first, push.pixels);
     if (first >= push.pixels) return; // safe: no barrier() follows
     uint64_t begin = wide(push.first_path), end = begin + push.paths;
     uint64_t from = offset_of(first);

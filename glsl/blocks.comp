@@ -7,7 +7,7 @@
 #include "shared/block.glsl"
 
 // Exclusive scan of the blocks' sums, in place. One workgroup.
-layout(local_size_x = 256) in;
+layout(local_size_x = 64) in;
 layout(scalar, binding = 0) buffer Blocks { uvec2 blocks[]; };
 layout(scalar, push_constant) uniform Push { ScanPush push; };
 

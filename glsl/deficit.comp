@@ -5,9 +5,10 @@
 #include "layout.glsl"
 #include "shared/wide.glsl"
 #include "shared/block.glsl"
+#include "shared/proportion.glsl"
 
 // Turns wanted shares of all samples, past and next, into what a pixel lacks: max(0, floor(total * w / W) - count).
-layout(local_size_x = 256) in;
+layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
 layout(scalar, binding = 1) readonly buffer States { Apportionment state[]; };
 layout(scalar, binding = 2) buffer Weights { uint weight[]; };
@@ -15,14 +16,14 @@ layout(scalar, binding = 3) writeonly buffer Sums { BlockSums sums[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
 
 void main() {
-    uint first = first_item();
+    uint first = first_item(), items = item_count(first, push.pixels);
     bool equal = state[0].equal != 0u;
-    uint64_t all = wide(state[0].weights), total = 0UL;
-    for (uint k = 0u; k < THREAD_ITEMS; k++) {
+    Proportion share_of = proportion_of(state[0]);
+    uint64_t total = 0UL;
+    for (uint k = 0u; k < items; k++) {
         uint i = first + k;
-        if (i >= push.pixels) continue;
         uint64_t share, rest;
-        multiply_divide(wide(push.total), equal ? 1u : weight[i], all, share, rest);
+        multiply_divide(share_of, equal ? 1u : weight[i], share, rest);
         uint have = texelFetch(stats, int(7u * i + 3u)).x;
         uint lack = share > have ? uint(min(share - have, 0xffffffffUL)) : 0u;
         weight[i] = lack;

@@ -7,32 +7,36 @@
 #include "shared/block.glsl"
 
 // Counts one digit of the remainders that still share the prefix of the one sought (radix selection).
-layout(local_size_x = 256) in;
-layout(binding = 0) uniform usamplerBuffer key; // of uvec2
-layout(scalar, binding = 1) readonly buffer States { Apportionment state[]; };
-layout(scalar, binding = 2) buffer Histogram { uint histogram[]; };
+layout(local_size_x = 64) in;
+layout(binding = 0) uniform usamplerBuffer weight; // of uint
+layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
+layout(binding = 2) uniform usamplerBuffer counts; // of uint
+layout(scalar, binding = 3) readonly buffer States { Apportionment state[]; };
+layout(scalar, binding = 4) buffer Histogram { uint histogram[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
 
-shared uint bins[2048];
+#include "shared/share.glsl"
+
+shared uint bins[256];
 
 void main() {
     Apportionment s = state[0];
     if (s.selected != 0u) return; // safe: the same for all threads
-    for (uint b = gl_LocalInvocationIndex; b < 2048u; b += BLOCK_THREADS) bins[b] = 0u;
+    for (uint b = gl_LocalInvocationIndex; b < 256u; b += BLOCK_THREADS) bins[b] = 0u;
     barrier();
-    uint first = first_item();
-    uint64_t prefix = wide(s.prefix);
-    uint mask = (1u << s.digit_bits) - 1u;
-    for (uint k = 0u; k < THREAD_ITEMS; k++) {
+    uint first = first_item(), items = item_count(first, push.pixels);
+    uint shift = 24u - 8u * (push.round % 4u);
+    bool high = push.round < 4u; // the high word has the first four digits
+    for (uint k = 0u; k < items; k++) {
         uint i = first + k;
-        if (i >= push.pixels) continue;
-        uvec2 words = uvec2(texelFetch(key, int(2u * i)).x, texelFetch(key, int(2u * i + 1u)).x);
-        if (words == uvec2(NONE)) continue;
-        uint64_t digits = wide(words) >> s.shift;
-        if (digits >> s.digit_bits == prefix) atomicAdd(bins[uint(digits) & mask], 1u);
+        if (push.limit != NONE && texelFetch(counts, int(i)).x != NONE) continue;
+        uint64_t quota;
+        uvec2 key;
+        share_of(s, i, quota, key);
+        if ((key & s.mask) == s.prefix) atomicAdd(bins[((high ? key.y : key.x) >> shift) & 255u], 1u);
     }
     barrier();
-    for (uint b = gl_LocalInvocationIndex; b < 2048u; b += BLOCK_THREADS) {
+    for (uint b = gl_LocalInvocationIndex; b < 256u; b += BLOCK_THREADS) {
         if (bins[b] > 0u) atomicAdd(histogram[b], bins[b]);
     }
 }

@@ -7,23 +7,19 @@
 #include "shared/block.glsl"
 
 // Second pass of the scan: the first path of every pixel; element `pixels` is the number of all.
-layout(local_size_x = 256) in;
+layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer counts; // of uint
 layout(scalar, binding = 1) readonly buffer Blocks { uvec2 blocks[]; };
 layout(scalar, binding = 2) writeonly buffer Offsets { uvec2 offset[]; };
 layout(scalar, push_constant) uniform Push { ScanPush push; };
 
 void main() {
-    uint first = first_item();
+    uint first = first_item(), items = item_count(first, push.pixels);
     uint64_t mine = 0UL, total;
-    for (uint k = 0u; k < THREAD_ITEMS; k++) {
-        uint i = first + k;
-        if (i < push.pixels) mine += texelFetch(counts, int(i)).x;
-    }
+    for (uint k = 0u; k < items; k++) mine += texelFetch(counts, int(first + k)).x;
     uint64_t at = block_scan(mine, total) + wide(blocks[gl_WorkGroupID.x]);
-    for (uint k = 0u; k < THREAD_ITEMS; k++) {
+    for (uint k = 0u; k < items; k++) {
         uint i = first + k;
-        if (i >= push.pixels) continue;
         offset[i] = unpackUint2x32(at);
         at += texelFetch(counts, int(i)).x;
         if (i + 1u == push.pixels) offset[i + 1u] = unpackUint2x32(at);

@@ -6,39 +6,36 @@
 #include "shared/wide.glsl"
 #include "shared/block.glsl"
 
-// Hamilton's first step: every open pixel's quota, floor(budget * weight / weights), and the remainder as its key. A
-// pixel whose quota is no less than its room is settled at its room; what it leaves is apportioned again.
-layout(local_size_x = 256) in;
+// Hamilton's first step: every open pixel's quota, floor(budget * weight / weights). A pixel whose quota is no less than
+// its room is settled at its room; what it leaves is apportioned again. `count` holds NONE for open pixels.
+layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer weight; // of uint
 layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
 layout(scalar, binding = 2) readonly buffer States { Apportionment state[]; };
-layout(scalar, binding = 3) writeonly buffer Counts { uint count[]; };
-layout(scalar, binding = 4) buffer Keys { uvec2 key[]; };
-layout(scalar, binding = 5) writeonly buffer Sums { BlockSums sums[]; };
+layout(scalar, binding = 3) buffer Counts { uint count[]; };
+layout(scalar, binding = 4) writeonly buffer Sums { BlockSums sums[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
+
+#include "shared/share.glsl"
 
 void main() {
     if (state[0].settled != 0u) return; // safe: the same for all threads
-    uint first = first_item();
-    uint64_t budget = wide(state[0].budget), all = wide(state[0].weights);
-    bool equal = state[0].equal != 0u;
+    uint first = first_item(), items = item_count(first, push.pixels);
+    Apportionment s = state[0];
     uint64_t weights = 0UL, filled = 0UL, floors = 0UL;
     uint settled = 0u, open = 0u;
-    for (uint k = 0u; k < THREAD_ITEMS; k++) {
+    for (uint k = 0u; k < items; k++) {
         uint i = first + k;
-        if (i >= push.pixels) continue;
-        if (push.round > 0u && key[i] == uvec2(NONE)) continue;
-        uint have = texelFetch(stats, int(7u * i + 3u)).x;
-        uint room = have < push.limit ? push.limit - have : 0u;
-        uint w = equal ? 1u : texelFetch(weight, int(i)).x;
-        uint64_t quota = 0UL, rest = 0UL;
-        if (w > 0u) multiply_divide(budget, w, all, quota, rest);
+        if (push.round > 0u && count[i] != NONE) continue;
+        uint64_t quota;
+        uvec2 key;
+        share_of(s, i, quota, key);
+        uint room = room_of(i);
         bool full = quota >= room;
-        count[i] = full ? room : uint(quota);
-        key[i] = full ? uvec2(NONE) : unpackUint2x32(rest);
+        if (full) count[i] = room;
         filled += full ? room : 0u;
         floors += full ? 0UL : quota;
-        weights += full ? 0u : w;
+        weights += full ? 0u : weight_of(s, i);
         settled += full ? 1u : 0u;
         open += full ? 0u : 1u;
     }

@@ -7,18 +7,15 @@
 #include "shared/block.glsl"
 
 // Samples of each block, the first pass of the scan (reduce, then scan).
-layout(local_size_x = 256) in;
+layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer counts; // of uint
 layout(scalar, binding = 1) writeonly buffer Blocks { uvec2 blocks[]; };
 layout(scalar, push_constant) uniform Push { ScanPush push; };
 
 void main() {
-    uint first = first_item();
+    uint first = first_item(), items = item_count(first, push.pixels);
     uint64_t sum = 0UL;
-    for (uint k = 0u; k < THREAD_ITEMS; k++) {
-        uint i = first + k;
-        if (i < push.pixels) sum += texelFetch(counts, int(i)).x;
-    }
+    for (uint k = 0u; k < items; k++) sum += texelFetch(counts, int(first + k)).x;
     sum = block_sum(sum);
     if (gl_LocalInvocationIndex == 0u) blocks[gl_WorkGroupID.x] = unpackUint2x32(sum);
 }

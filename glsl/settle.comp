@@ -5,14 +5,13 @@
 #include "layout.glsl"
 #include "shared/wide.glsl"
 #include "shared/block.glsl"
+#include "shared/proportion.glsl"
 
 // After the quotas: either apportion again what full pixels left, or start the search for the largest remainders.
-layout(local_size_x = 256) in;
+layout(local_size_x = 64) in;
 layout(scalar, binding = 0) readonly buffer Sums { BlockSums sums[]; };
 layout(scalar, binding = 1) buffer States { Apportionment state[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
-
-const uint DIGIT_BITS = 11u;
 
 void main() {
     if (state[0].settled != 0u) return; // safe: the same for all threads
@@ -32,25 +31,23 @@ void main() {
     Apportionment s = state[0];
     uint64_t left = wide(s.budget) - filled;
     if (pixels.x > 0u && push.round + 1u < push.rounds) {
-        s.budget = unpackUint2x32(left);
         if (weights == 0UL && s.equal == 0u) { // who wanted more is full: the rest alike
             s.equal = 1u;
             weights = pixels.y;
         }
-        s.weights = unpackUint2x32(weights);
+        set_proportion(s, left, weights);
     } else {
         s.settled = 1u;
         s.forced = pixels.x > 0u ? 1u : 0u;
         s.needed = unpackUint2x32(left - floors);
-        uint64_t all = wide(s.weights);
-        uint bits = all >> 32 != 0UL ? 33u + findMSB(uint(all >> 32)) : 1u + findMSB(uint(all));
-        s.shift = bits > DIGIT_BITS ? bits - DIGIT_BITS : 0u;
-        s.digit_bits = DIGIT_BITS;
         s.prefix = uvec2(0u);
+        s.mask = uvec2(0u);
         s.selected = 0u;
-        if (left == floors || s.forced != 0u) { // no remainder, or room decides instead
+        s.whole_edge = 0u;
+        if (left == floors || s.forced != 0u) { // no remainder, or room decides instead: above all keys
             s.selected = 1u;
-            s.shift = 0u;
+            s.whole_edge = 1u - s.forced;
+            s.mask = uvec2(NONE);
             s.prefix = uvec2(NONE);
         }
     }

@@ -6,36 +6,38 @@
 #include "shared/wide.glsl"
 #include "shared/block.glsl"
 
-// Hamilton's second step: one more sample to the largest remainders, ties to the lower pixel index. `blocks` holds the
-// exclusive scan of `ties`.
-layout(local_size_x = 256) in;
-layout(binding = 0) uniform usamplerBuffer key; // of uvec2
+// Writes the counts of open pixels: their quotas and, Hamilton's second step, one more sample for the largest remainders,
+// ties to the lower pixel index. `blocks` holds the exclusive scan of `ties`.
+layout(local_size_x = 64) in;
+layout(binding = 0) uniform usamplerBuffer weight; // of uint
 layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
 layout(scalar, binding = 2) readonly buffer States { Apportionment state[]; };
 layout(scalar, binding = 3) readonly buffer Blocks { uvec2 blocks[]; };
 layout(scalar, binding = 4) buffer Counts { uint count[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
 
-#include "shared/tie.glsl"
+#include "shared/share.glsl"
+
+// What is certain of a pixel's count, and how much more it could take in order of index.
+uvec2 certain_possible(Apportionment s, uint pixel) {
+    if (push.limit != NONE && count[pixel] != NONE) return uvec2(count[pixel], 0u);
+    uint64_t quota;
+    uvec2 key;
+    share_of(s, pixel, quota, key);
+    uvec2 more = selected_tied(s, key);
+    return s.forced != 0u ? uvec2(quota, room_of(pixel) - uint(quota)) : uvec2(uint(quota) + more.x, more.y);
+}
 
 void main() {
     Apportionment s = state[0];
-    uint first = first_item();
+    uint first = first_item(), items = item_count(first, push.pixels);
     uint64_t mine = 0UL, total;
-    for (uint k = 0u; k < THREAD_ITEMS; k++) {
-        uint i = first + k;
-        if (i >= push.pixels) continue;
-        uvec2 words = uvec2(texelFetch(key, int(2u * i)).x, texelFetch(key, int(2u * i + 1u)).x);
-        mine += beyond_quota(s, i, count[i], words).y;
-    }
+    for (uint k = 0u; k < (s.whole_edge != 0u ? 0u : items); k++) mine += certain_possible(s, first + k).y;
     uint64_t before = block_scan(mine, total) + wide(blocks[gl_WorkGroupID.x]), needed = wide(s.needed);
-    for (uint k = 0u; k < THREAD_ITEMS; k++) {
+    for (uint k = 0u; k < items; k++) {
         uint i = first + k;
-        if (i >= push.pixels) continue;
-        uvec2 words = uvec2(texelFetch(key, int(2u * i)).x, texelFetch(key, int(2u * i + 1u)).x);
-        uvec2 more = beyond_quota(s, i, count[i], words);
-        uint taken = before < needed ? uint(min(needed - before, uint64_t(more.y))) : 0u;
-        count[i] += more.x + taken;
-        before += more.y;
+        uvec2 counts = certain_possible(s, i);
+        count[i] = counts.x + (before < needed ? uint(min(needed - before, uint64_t(counts.y))) : 0u);
+        before += counts.y;
     }
 }

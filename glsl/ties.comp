@@ -6,26 +6,30 @@
 #include "shared/wide.glsl"
 #include "shared/block.glsl"
 
-// Per block, how much its pixels could take in order of index: the equal remainders at the edge of the selection.
-layout(local_size_x = 256) in;
-layout(binding = 0) uniform usamplerBuffer key; // of uvec2
-layout(binding = 1) uniform usamplerBuffer quotas; // of uint
-layout(binding = 2) uniform usamplerBuffer stats; // of PixelStats
+// Per block, how much its pixels could take in order of index: the equal remainders at the edge of the selection, or, when
+// the repetitions ran out, all the room there is.
+layout(local_size_x = 64) in;
+layout(binding = 0) uniform usamplerBuffer weight; // of uint
+layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
+layout(binding = 2) uniform usamplerBuffer counts; // of uint
 layout(scalar, binding = 3) readonly buffer States { Apportionment state[]; };
 layout(scalar, binding = 4) writeonly buffer Blocks { uvec2 blocks[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
 
-#include "shared/tie.glsl"
+#include "shared/share.glsl"
 
 void main() {
     Apportionment s = state[0];
-    uint first = first_item();
+    uint first = first_item(), items = item_count(first, push.pixels);
     uint64_t sum = 0UL;
-    for (uint k = 0u; k < THREAD_ITEMS; k++) {
+    if (s.whole_edge != 0u) items = 0u; // nobody's order decides
+    for (uint k = 0u; k < items; k++) {
         uint i = first + k;
-        if (i >= push.pixels) continue;
-        uvec2 words = uvec2(texelFetch(key, int(2u * i)).x, texelFetch(key, int(2u * i + 1u)).x);
-        sum += beyond_quota(s, i, texelFetch(quotas, int(i)).x, words).y;
+        if (push.limit != NONE && texelFetch(counts, int(i)).x != NONE) continue;
+        uint64_t quota;
+        uvec2 key;
+        share_of(s, i, quota, key);
+        sum += s.forced != 0u ? room_of(i) - uint(quota) : selected_tied(s, key).y;
     }
     sum = block_sum(sum);
     if (gl_LocalInvocationIndex == 0u) blocks[gl_WorkGroupID.x] = unpackUint2x32(sum);

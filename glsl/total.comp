@@ -5,9 +5,10 @@
 #include "layout.glsl"
 #include "shared/wide.glsl"
 #include "shared/block.glsl"
+#include "shared/proportion.glsl"
 
 // Adds the sums of all blocks and starts an apportionment with them. One workgroup.
-layout(local_size_x = 256) in;
+layout(local_size_x = 64) in;
 layout(scalar, binding = 0) readonly buffer Sums { BlockSums sums[]; };
 layout(scalar, binding = 1) buffer States { Apportionment state[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
@@ -23,9 +24,9 @@ void main() {
     counts = block_sum(counts);
     if (gl_LocalInvocationIndex != 0u) return; // safe: no barrier() follows
     Apportionment s = state[0];
-    s.budget = push.budget;
     s.equal = weights == 0UL ? 1u : 0u; // nothing is wanted more than the rest: all pixels alike
-    s.weights = weights == 0UL ? uvec2(push.pixels, 0u) : unpackUint2x32(weights);
+    bool deficit_next = push.round == 0u && push.total != uvec2(0u);
+    set_proportion(s, wide(deficit_next ? push.total : push.budget), weights == 0UL ? uint64_t(push.pixels) : weights);
     if (push.round == 0u) { // of weigh, not of deficit
         s.non_finite = unpackUint2x32(counts).x;
         s.wanting = unpackUint2x32(counts).y;

@@ -8,7 +8,7 @@
 
 // Turns priorities into integer weights, 12.20 fixed point, so that all that follows is exact. A priority that is not
 // finite weighs nothing and is counted. One workgroup sums one block.
-layout(local_size_x = 256) in;
+layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer priority; // of float
 layout(scalar, binding = 1) writeonly buffer Weights { uint weight[]; };
 layout(scalar, binding = 2) writeonly buffer Sums { BlockSums sums[]; };
@@ -18,12 +18,11 @@ const float FIXED_POINT = 1048576.0; // 2^20: the product is exact
 const float LARGEST = 4095.0;
 
 void main() {
-    uint first = first_item();
+    uint first = first_item(), items = item_count(first, push.pixels);
     uint64_t total = 0UL;
     uint broken = 0u, positive = 0u;
-    for (uint k = 0u; k < THREAD_ITEMS; k++) {
+    for (uint k = 0u; k < items; k++) {
         uint i = first + k;
-        if (i >= push.pixels) continue;
         float p = texelFetch(priority, int(i)).x;
         bool finite = (floatBitsToUint(p) & 0x7f800000u) != 0x7f800000u;
         uint w = finite && p > 0.0 ? uint(min(p, LARGEST) * FIXED_POINT) : 0u;

@@ -128,7 +128,7 @@ fn rounds(settings: &Settings, learns: bool, cut: &Cut, done: u32) -> Vec<Step> 
         steps.push(Step::Allocate(Plan {
             pixels: cut.pixels,
             budget: total - taken,
-            limit,
+            limit: fills.then_some(limit),
             total: learns.then_some(total),
             rounds: if fills { 16 } else { 1 },
         }));

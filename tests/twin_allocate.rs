@@ -14,7 +14,7 @@ use tallow::stage::batch::{self, Batches, PathRange};
 use tallow::stage::scan::Scan;
 
 /// Around a thread's items, a workgroup's threads and a block.
-const SIZES: [usize; 9] = [1, 15, 31, 64, 65, 4095, 4096, 4097, 9001];
+const SIZES: [usize; 9] = [1, 15, 31, 64, 65, 1023, 1024, 1025, 70_001];
 
 struct Bench {
     gpu: Gpu,
@@ -58,21 +58,22 @@ impl Bench {
         assert_eq!(counts.weight.read().unwrap(), weights, "weights, {plan:?}");
         let state = counts.state.read().unwrap()[0];
         assert_eq!((state.non_finite, state.wanting), (broken, wanting), "{plan:?}");
-        let room: Vec<u32> = have.iter().map(|&n| plan.limit.saturating_sub(n)).collect();
+        let room: Vec<u32> = have.iter().map(|&n| plan.limit.unwrap_or(u32::MAX).saturating_sub(n)).collect();
         let expected = twin::apportion(&weights, &room, plan.budget, plan.rounds);
         let found = counts.count.read().unwrap();
         assert_eq!(found, expected, "counts, {plan:?}");
         let most: u64 = room.iter().map(|&n| u64::from(n)).sum();
         assert_eq!(found.iter().map(|&n| u64::from(n)).sum::<u64>(), plan.budget.min(most), "sum, {plan:?}");
         assert!(found.iter().zip(&room).all(|(n, room)| n <= room), "room, {plan:?}");
-        let offsets = counts.key.read().unwrap().into_iter().map(|[low, high]| u64::from(low) | u64::from(high) << 32);
+        let offsets =
+            counts.offset.read().unwrap().into_iter().map(|[low, high]| u64::from(low) | u64::from(high) << 32);
         assert_eq!(offsets.collect::<Vec<_>>(), twin::offsets(&found), "offsets, {plan:?}");
         found
     }
 }
 
 fn plan(pixels: usize, budget: u64) -> Plan {
-    Plan { pixels: pixels as u32, budget, limit: u32::MAX, total: None, rounds: 1 }
+    Plan { pixels: pixels as u32, budget, limit: None, total: None, rounds: 1 }
 }
 
 fn priorities(count: usize, seed: u32) -> Vec<f32> {
@@ -111,9 +112,12 @@ fn extreme_priorities_still_sum_to_the_budget() {
             assert!(priority[4321] != 1.0 || priority[0] != 0.0 || u64::from(counts[4321]) == budget);
         }
         // Beyond 32 bits in all and in the products, over many pixels.
-        let large = Plan { rounds: 16, ..plan(n, 20_000_000_000_000) };
+        let large = Plan { limit: Some(1 << 24), rounds: 16, ..plan(n, 50_000_000_000) };
         bench.check(priority, &vec![0; n], &large);
     }
+    // Weights 2^31, 2^31, 4095 * 2^20 and 2^20 - 1 sum to W = 2^33 - 1; with W - 4 to place the first two remainders are
+    // W - 1, all bits set, and must not be taken for the mark of a full pixel.
+    bench.check(&[2048.0, 2048.0, 4095.0, 1.0 - 0.5_f32.powi(20)], &[0; 4], &plan(4, 8_589_934_587));
     assert_silent(&bench.gpu);
 }
 
@@ -127,7 +131,7 @@ fn full_pixels_hand_on_what_they_leave() {
             for (rounds, total) in
                 [(16, None), (2, None), (16, Some(have.iter().map(|&n| u64::from(n)).sum::<u64>() + budget))]
             {
-                let plan = Plan { limit, total, rounds, ..plan(size, budget) };
+                let plan = Plan { limit: Some(limit), total, rounds, ..plan(size, budget) };
                 bench.check(&priorities(size, 2).iter().map(|p| p * p * p).collect::<Vec<_>>(), &have, &plan);
             }
         }
@@ -144,7 +148,7 @@ fn random_images_agree() {
     let result = runner.run(&input, |(pixels, budget, limit, rounds, learns)| {
         let (priority, have): (Vec<f32>, Vec<u32>) = pixels.into_iter().unzip();
         let total = learns.then(|| have.iter().map(|&n| u64::from(n)).sum::<u64>() + budget);
-        bench.check(&priority, &have, &Plan { limit, rounds, total, ..plan(priority.len(), budget) });
+        bench.check(&priority, &have, &Plan { limit: Some(limit), rounds, total, ..plan(priority.len(), budget) });
         Ok(())
     });
     result.unwrap();
@@ -175,7 +179,7 @@ fn every_path_of_every_batch_is_listed_once() {
                         let n = u64::from(paths).min(dealt[size] - first) as u32;
                         let range = PathRange { first, paths: n, round: round as u32, rounds };
                         let list = Buffer::new(&bench.gpu, "paths", n as usize, Location::Device).unwrap();
-                        let (b, offset) = (&bench.batch, &counts.key);
+                        let (b, offset) = (&bench.batch, &counts.offset);
                         bench
                             .gpu
                             .run(&mut frame, |rec| batch::record(b, rec, offset, &stats, &list, &range, 7))

@@ -1,10 +1,14 @@
-// A workgroup of 256 threads owns a block of 4096 items; each thread 16 that follow one another, so that scans need one
-// step across threads. See stage::BLOCK.
-const uint BLOCK_THREADS = 256u, THREAD_ITEMS = 16u;
+// A workgroup of 64 threads owns a block of 1024 items; each thread 16 that follow one another, so that scans need one
+// step across threads. Larger groups pay more for barriers on lavapipe. See stage::BLOCK.
+const uint BLOCK_THREADS = 64u, THREAD_ITEMS = 16u;
 
 shared uint64_t block_words[BLOCK_THREADS];
 
 uint first_item() { return (gl_WorkGroupID.x * BLOCK_THREADS + gl_LocalInvocationIndex) * THREAD_ITEMS; }
+
+// Items that a thread has. A count that is not constant also keeps loops over them from being unrolled and run under a mask
+// by compilers for CPUs.
+uint item_count(uint first, uint all) { return first < all ? min(THREAD_ITEMS, all - first) : 0u; }
 
 // Sum over the workgroup, in every thread. All threads must call it.
 uint64_t block_sum(uint64_t value) {

@@ -388,9 +388,10 @@ gpu_structs! {
     struct ApportionPush {
         /// Pixels of the film.
         pixels: uint,
-        /// Largest number of samples of a pixel, those it has included.
+        /// Largest number of samples of a pixel, those it has included; NONE when the budget can fill none.
         limit: uint,
-        /// Counts the repetitions for what full pixels leave; in `total` 0 after `weigh`, 1 after `deficit`.
+        /// Counts the repetitions for what full pixels leave, and the digits of remainders from the highest; in `total` 0
+        /// after `weigh`, 1 after `deficit`.
         round: uint,
         /// Repetitions at most.
         rounds: uint,
@@ -418,16 +419,22 @@ gpu_structs! {
     struct Apportionment {
         /// Samples for the open pixels, 64 bits.
         budget: uvec2,
-        /// Sum of the open pixels' weights, 64 bits.
+        /// Sum of the open pixels' weights, at least 1, 64 bits.
         weights: uvec2,
+        /// floor(budget * 2^32 / weights) for budgets of 32 bits, 64 bits.
+        ratio: uvec2,
+        /// budget / weights for larger ones, 64 bits.
+        whole: uvec2,
+        /// budget mod weights for larger ones, 64 bits.
+        part: uvec2,
+        /// Bits that remainders are moved up by, to the highest but one, so that all sums of weights have the same digits.
+        up: uint,
         /// Samples that go to the largest remainders, then those among the ones with `prefix`, 64 bits.
         needed: uvec2,
         /// Leading digits of the smallest remainder that still gets a sample, 64 bits.
         prefix: uvec2,
-        /// Bits below the prefix.
-        shift: uint,
-        /// Bits of the digit above `shift` that is counted next.
-        digit_bits: uint,
+        /// Bits of the remainders that `prefix` decides, 64 bits.
+        mask: uvec2,
         /// 1 when all weigh the same, since no open pixel has a weight.
         equal: uint,
         /// 1 when the quotas are final.
@@ -436,6 +443,8 @@ gpu_structs! {
         forced: uint,
         /// 1 when `prefix` and `needed` decide every pixel.
         selected: uint,
+        /// 1 when all remainders with `prefix` get a sample.
+        whole_edge: uint,
         /// Priorities that were not finite.
         non_finite: uint,
         /// Pixels of positive weight.

@@ -4,13 +4,13 @@
 use super::scan::Blocks;
 use super::{blocks, one_workgroup};
 use crate::error::Result;
-use crate::gpu::layout::{ApportionPush, Apportionment, BlockSums, Effects, PixelStats, uvec2};
+use crate::gpu::layout::{ApportionPush, Apportionment, BlockSums, Effects, NONE, PixelStats, uvec2};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::shaders::{deficit, digit, pick, quota, settle, spread, ties, total, weigh};
 
-/// Digits of 11 bits in a remainder: it is below the sum of the weights, under 2^32 for each of at most 2^28 pixels.
-const DIGITS: u32 = 6;
-const BINS: usize = 2048;
+/// Digits of a remainder, and the values of each.
+const DIGITS: u32 = 8;
+const BINS: usize = 256;
 
 /// What is to be apportioned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,8 +19,8 @@ pub struct Plan {
     pub pixels: u32,
     /// Samples to place.
     pub budget: u64,
-    /// Largest number of samples of a pixel, those it has included.
-    pub limit: u32,
+    /// Largest number of samples of a pixel, those it has included; none when no pixel can be filled.
+    pub limit: Option<u32>,
     /// When priorities are shares of all samples: those that pixels have and those to place, together.
     pub total: Option<u64>,
     /// Times at most that the samples of full pixels are apportioned again; 1 when none can be full.
@@ -33,8 +33,8 @@ pub struct Counts {
     pub weight: Buffer<u32>,
     /// Samples of every pixel.
     pub count: Buffer<u32>,
-    /// Remainders while apportioning; later the scan's offsets, one more than pixels.
-    pub key: Buffer<uvec2>,
+    /// First path of every pixel, and the number of all: 64 bits, low word first.
+    pub offset: Buffer<uvec2>,
     /// One: read it for what was not finite.
     pub state: Buffer<Apportionment>,
     sums: Buffer<BlockSums>,
@@ -52,7 +52,7 @@ impl Counts {
         Ok(Self {
             weight: Buffer::new(gpu, "weight", n, Location::Device)?,
             count: Buffer::new(gpu, "count", n, Location::Device)?,
-            key: Buffer::new(gpu, "offset", n + 1, Location::Device)?,
+            offset: Buffer::new(gpu, "offset", n + 1, Location::Device)?,
             state: Buffer::new(gpu, "apportionment", 1, Location::Device)?,
             sums: Buffer::new(gpu, "sums", of_blocks, Location::Device)?,
             blocks: Buffer::new(gpu, "blocks", of_blocks, Location::Device)?,
@@ -121,9 +121,9 @@ impl Apportion {
             rec.dispatch(&self.deficit, bind, &push(0), all)?;
             rec.dispatch(&self.total, total::Bind { sums: &c.sums, state: &c.state }, &push(1), one_workgroup())?;
         }
+        rec.fill(&c.count, NONE)?;
         for round in 0..plan.rounds {
-            let bind =
-                quota::Bind { weight: &c.weight, stats, state: &c.state, count: &c.count, key: &c.key, sums: &c.sums };
+            let bind = quota::Bind { weight: &c.weight, stats, state: &c.state, count: &c.count, sums: &c.sums };
             rec.dispatch(&self.quota, bind, &push(round), all)?;
             let bind = settle::Bind { sums: &c.sums, state: &c.state };
             rec.dispatch(&self.settle, bind, &push(round), one_workgroup())?;
@@ -132,17 +132,20 @@ impl Apportion {
     }
 
     fn record_remainders(&self, rec: &mut Recorder, stats: &Buffer<PixelStats>, c: &Counts, plan: &Plan) -> Result<()> {
-        let (push, all) = (push(plan, 0), blocks(plan.pixels));
-        for _ in 0..DIGITS {
-            let bind = digit::Bind { key: &c.key, state: &c.state, histogram: &c.histogram };
+        let all = blocks(plan.pixels);
+        for round in 0..DIGITS {
+            let push = push(plan, round);
+            let (state, histogram) = (&c.state, &c.histogram);
+            let bind = digit::Bind { weight: &c.weight, stats, counts: &c.count, state, histogram };
             rec.dispatch(&self.digit, bind, &push, all)?;
             let bind = pick::Bind { state: &c.state, histogram: &c.histogram };
             rec.dispatch(&self.pick, bind, &push, one_workgroup())?;
         }
-        let bind = ties::Bind { key: &c.key, quotas: &c.count, stats, state: &c.state, blocks: &c.blocks };
+        let push = push(plan, 0);
+        let bind = ties::Bind { weight: &c.weight, stats, counts: &c.count, state: &c.state, blocks: &c.blocks };
         rec.dispatch(&self.ties, bind, &push, all)?;
         self.blocks.record(rec, &c.blocks, plan.pixels)?;
-        let bind = spread::Bind { key: &c.key, stats, state: &c.state, blocks: &c.blocks, count: &c.count };
+        let bind = spread::Bind { weight: &c.weight, stats, state: &c.state, blocks: &c.blocks, count: &c.count };
         rec.dispatch(&self.spread, bind, &push, all)
     }
 }
@@ -150,7 +153,7 @@ impl Apportion {
 fn push(plan: &Plan, round: u32) -> ApportionPush {
     ApportionPush {
         pixels: plan.pixels,
-        limit: plan.limit,
+        limit: plan.limit.unwrap_or(NONE),
         round,
         rounds: plan.rounds,
         budget: super::pair(plan.budget),

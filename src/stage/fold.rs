@@ -20,7 +20,7 @@ pub fn record(k: &Fold, rec: &mut Recorder, f: &FilmBuffers, b: &Batch) -> Resul
 }
 
 fn bind<'a>(f: &'a FilmBuffers, tile: &'a FilmTile) -> Bind<'a> {
-    Bind { samples: &f.samples, stats: &tile.stats, light: &tile.light, offset: &f.counts.key }
+    Bind { samples: &f.samples, stats: &tile.stats, light: &tile.light, offset: &f.counts.offset }
 }
 
 /// samples\[batch\], offset\[P + 1\] -> stats\[P\], light\[P\]

@@ -53,7 +53,7 @@ impl Scan {
         let (push, all) = (&ScanPush { pixels }, blocks(pixels));
         rec.dispatch(&self.reduce, reduce::Bind { counts: &c.count, blocks: c.blocks() }, push, all)?;
         self.blocks.record(rec, c.blocks(), pixels)?;
-        let bind = offsets::Bind { counts: &c.count, blocks: c.blocks(), offset: &c.key };
+        let bind = offsets::Bind { counts: &c.count, blocks: c.blocks(), offset: &c.offset };
         rec.dispatch(&self.offsets, bind, push, all)
     }
 }

@@ -31,14 +31,14 @@ fn main() -> Result<()> {
     let lists = Kernel::new(&gpu, &Default::default(), &[])?;
     let mut frame = FrameResources::new(&gpu)?;
     for spp in [1, 4, 64] {
-        let plan = Plan { pixels, budget: u64::from(pixels) * spp, limit: u32::MAX, total: None, rounds: 1 };
+        let plan = Plan { pixels, budget: u64::from(pixels) * spp, limit: None, total: None, rounds: 1 };
         let range = PathRange { first: 0, paths: pixels, round: 0, rounds: 1 };
         let mut passes: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
         for _ in 0..=RUNS {
             let times = gpu.run(&mut frame, |rec| {
                 apportion.record(rec, &priority, &stats, &counts, &plan)?;
                 scan.record(rec, &counts)?;
-                batch::record(&lists, rec, &counts.key, &stats, &paths, &range, 0)
+                batch::record(&lists, rec, &counts.offset, &stats, &paths, &range, 0)
             })?;
             let mut sums: BTreeMap<&str, f64> = BTreeMap::new();
             for t in &times {
@@ -53,7 +53,10 @@ fn main() -> Result<()> {
             later.sort_by(f64::total_cmp);
             vec![(*name).to_owned(), format!("{:.2}", later[later.len() / 2])]
         };
-        println!("\n{spp} samples per pixel\n{}", table::text(&["pass", "ms"], &passes.iter().map(row).collect::<Vec<_>>()));
+        println!(
+            "\n{spp} samples per pixel\n{}",
+            table::text(&["pass", "ms"], &passes.iter().map(row).collect::<Vec<_>>())
+        );
     }
     Ok(())
 }
