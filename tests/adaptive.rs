@@ -1,0 +1,253 @@
+//! Renders that place their samples: the same bits however they are cut, interrupted or dealt to rounds, the right mean,
+//! and pixels without a sample stay well defined.
+mod support;
+
+use std::path::Path;
+use support::{assert_silent, gpu};
+use tallow::gpu::layout::{PixelLight, PixelStats};
+use tallow::gpu::{FrameResources, Gpu};
+use tallow::renderer::{Outputs, PathRange, Progress, Renderer, Step};
+use tallow::scene::Scene;
+use tallow::schedule::{self, Cut};
+use tallow::settings::Settings;
+use tallow::statistics::{Pixel, join};
+
+const POLICIES: [&str; 3] = ["geometry", "variance", "both"];
+const SIZE: [u32; 2] = [33, 17];
+
+fn scene(change: impl Fn(&mut Settings)) -> Scene {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml");
+    let small = |s: &mut Settings| {
+        [s.width, s.height] = SIZE;
+        (s.spp, s.max_depth) = (8, 3);
+        change(s);
+    };
+    Scene::load(&file, &small).unwrap()
+}
+
+fn split() -> Outputs {
+    Outputs { split_light: true, guides: false, counters: false }
+}
+
+fn bits(pixels: &[Pixel]) -> Vec<u32> {
+    let words =
+        |p: &Pixel| bytemuck::cast_slice(&[p.stats]).iter().chain(bytemuck::cast_slice(&[p.light])).copied().collect();
+    pixels.iter().flat_map(|p: &Pixel| -> Vec<u32> { words(p) }).collect()
+}
+
+fn read(renderer: &Renderer) -> Vec<Pixel> {
+    let tile = &renderer.film().tiles[0];
+    let (stats, light) = (tile.stats.read().unwrap(), tile.light.read().unwrap());
+    stats.into_iter().zip(light).map(|(stats, light)| Pixel { stats, light }).collect()
+}
+
+fn run(renderer: &Renderer, frame: &mut FrameResources, steps: &[Step]) -> Vec<Pixel> {
+    steps.iter().for_each(|step| drop(renderer.run(frame, step).unwrap()));
+    read(renderer)
+}
+
+fn render(gpu: &Gpu, scene: &Scene) -> Vec<Pixel> {
+    let renderer = Renderer::new(gpu, scene, split()).unwrap();
+    run(&renderer, &mut FrameResources::new(gpu).unwrap(), &renderer.steps())
+}
+
+fn total(pixels: &[Pixel]) -> u64 {
+    pixels.iter().map(|p| u64::from(p.stats.count)).sum()
+}
+
+#[test]
+fn the_budget_is_met_and_no_cut_changes_a_bit() {
+    let gpu = gpu();
+    for policy in POLICIES {
+        let scene = scene(|s| s.allocate.policy = policy.into());
+        let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
+        let mut frame = FrameResources::new(&gpu).unwrap();
+        let whole = run(&renderer, &mut frame, &renderer.steps());
+        assert_eq!(total(&whole), 8 * 33 * 17, "{policy}");
+        let counts: Vec<u32> = whole.iter().map(|p| p.stats.count).collect();
+        assert!(
+            counts.iter().min() < counts.iter().max() && *counts.iter().min().unwrap() >= 2,
+            "{policy}: {counts:?}"
+        );
+        let pixels = SIZE[0] * SIZE[1];
+        for paths in [31, 64, 65, 500, pixels] {
+            let learns = policy != "geometry";
+            let steps = schedule::steps(&scene.settings, learns, &Cut { pixels, tile: 1 << 20, paths });
+            assert!(steps.len() > renderer.steps().len());
+            assert!(bits(&run(&renderer, &mut frame, &steps)) == bits(&whole), "{policy}, batches of {paths}");
+        }
+        // Control: one path fewer shows.
+        let mut steps = renderer.steps();
+        if let Some(Step::Listed(range)) = steps.last_mut() {
+            range.paths -= 1;
+        }
+        assert!(bits(&run(&renderer, &mut frame, &steps)) != bits(&whole), "{policy}");
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn batches_of_one_path_and_rounds_in_any_number_or_order_change_no_bit() {
+    let gpu = gpu();
+    let with = |rounds| {
+        scene(move |s| {
+            (s.width, s.height, s.spp) = (7, 5, 6);
+            (s.allocate.policy, s.allocate.rounds) = ("geometry".into(), rounds);
+        })
+    };
+    let whole = render(&gpu, &with(1));
+    for rounds in [2, 3, 100] {
+        assert!(bits(&render(&gpu, &with(rounds))) == bits(&whole), "{rounds} rounds");
+    }
+    let (scene, cut) = (with(4), Cut { pixels: 35, tile: 1 << 20, paths: 1 });
+    let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    assert!(
+        bits(&run(&renderer, &mut frame, &schedule::steps(&scene.settings, false, &cut))) == bits(&whole),
+        "one path"
+    );
+    // The rounds backwards: a pixel's next sample is its next, whichever round asks for it.
+    let mut steps = renderer.steps();
+    let first = steps.iter().position(|s| matches!(s, Step::Listed(_))).unwrap();
+    steps[first..].reverse();
+    assert!(bits(&run(&renderer, &mut frame, &steps)) == bits(&whole), "backwards");
+    assert_silent(&gpu);
+}
+
+/// What an interrupted render hands over: pixels, and what each still lacks.
+fn interrupted(renderer: &Renderer, frame: &mut FrameResources, steps: &[Step]) -> (Vec<Pixel>, Vec<u32>, u32) {
+    let pixels = run(renderer, frame, steps);
+    let allocations = steps.iter().filter(|s| matches!(s, Step::Allocate(_))).count() as u32;
+    let last = steps.iter().rev().find_map(|step| match step {
+        Step::Listed(range) => Some(Some(*range)),
+        Step::Allocate(_) => Some(None),
+        _ => None,
+    });
+    let Some(last) = last else {
+        let first = schedule::first_spp(renderer.settings());
+        let lacks = pixels.iter().map(|p| first - p.stats.count).collect();
+        return (pixels, lacks, 0);
+    };
+    let rounds =
+        if renderer.settings().allocate.policy == "geometry" { renderer.settings().allocate.rounds } else { 1 };
+    let none = PathRange { first: 0, paths: 0, round: 0, rounds };
+    let lacks = schedule::pending(&renderer.film().counts.count.read().unwrap(), &last.unwrap_or(none));
+    (pixels, lacks, allocations)
+}
+
+#[test]
+fn a_render_resumed_anywhere_has_the_bits_of_one_that_never_stopped() {
+    let gpu = gpu();
+    for policy in ["uniform", "geometry", "variance", "both"] {
+        let scene = scene(|s| s.allocate.policy = policy.into());
+        let whole = render(&gpu, &scene);
+        let effects = tallow::gpu::layout::Effects { adaptive: true, ..tallow::renderer::called_for(&scene, split()) };
+        let renderer = Renderer::specialised(&gpu, &scene, split(), effects).unwrap();
+        let mut frame = FrameResources::new(&gpu).unwrap();
+        let cut = Cut { pixels: SIZE[0] * SIZE[1], tile: 1 << 20, paths: 300 };
+        let steps = schedule::steps(&scene.settings, matches!(policy, "variance" | "both"), &cut);
+        for stop in [1, 2, 3, steps.len() / 2, steps.len() - 2, steps.len()] {
+            let (pixels, lacks, allocations) = interrupted(&renderer, &mut frame, &steps[..stop]);
+            let stats: Vec<PixelStats> = pixels.iter().map(|p| p.stats).collect();
+            let light: Vec<PixelLight> = pixels.iter().map(|p| p.light).collect();
+            let pending = lacks.iter().map(|&n| u64::from(n)).sum();
+            renderer.resume(&mut frame, &stats, &light, &lacks).unwrap();
+            let rest = renderer.rest(Progress { allocations, pending });
+            assert!(bits(&run(&renderer, &mut frame, &rest)) == bits(&whole), "{policy}, stopped after step {stop}");
+        }
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn disjoint_sample_ranges_join_to_one_render() {
+    let gpu = gpu();
+    let part = |first, spp| render(&gpu, &scene(move |s| (s.first_sample, s.spp) = (first, spp)));
+    let (whole, a, b) = (part(0, 24), part(0, 7), part(7, 17));
+    let joined: Vec<Pixel> = a.iter().zip(&b).map(|(a, b)| join(a, b)).collect();
+    // Each of n = 24 additions of a running mean rounds to 2^-24 of it, and of M2 to as much of M2 and of its change,
+    // n 2^-24 = 1.5e-6 in all; both sides may be off by it.
+    let close =
+        |x: &[f32; 3], y: &[f32; 3]| x.iter().zip(y).all(|(x, y)| (x - y).abs() <= 3e-6 * x.abs().max(y.abs()) + 1e-9);
+    for (one, two) in whole.iter().zip(&joined) {
+        assert_eq!(one.stats.count, two.stats.count);
+        assert!(close(&one.stats.mean, &two.stats.mean) && close(&one.light.indirect, &two.light.indirect));
+        assert!(
+            one.stats.m2.iter().zip(&two.stats.m2).all(|(x, y)| (x - y).abs() <= 1e-5 * x + 1e-6),
+            "{one:?} {two:?}"
+        );
+    }
+    // Control: parts that overlap are not the whole.
+    let wrong: Vec<Pixel> = a.iter().zip(&part(0, 17)).map(|(a, b)| join(a, b)).collect();
+    assert!(!whole.iter().zip(&wrong).all(|(one, two)| close(&one.stats.mean, &two.stats.mean)));
+}
+
+/// Mean of the picture's luminance and its standard error.
+fn mean(pixels: &[Pixel]) -> (f64, f64) {
+    let n = pixels.len() as f64;
+    let of = |p: &Pixel| f64::from(p.stats.mean.iter().sum::<f32>()) / 3.0;
+    let variance = |p: &Pixel| {
+        let count = f64::from(p.stats.count);
+        f64::from(p.stats.m2.iter().sum::<f32>()) / 3.0 / (count * (count - 1.0))
+    };
+    (pixels.iter().map(of).sum::<f64>() / n, pixels.iter().map(variance).sum::<f64>().sqrt() / n)
+}
+
+#[test]
+fn geometry_is_unbiased_and_learning_nearly_so() {
+    let gpu = gpu();
+    let picture = |policy: &str, spp, min_spp| {
+        let of = |seed| {
+            render(
+                &gpu,
+                &scene(|s| {
+                    (s.spp, s.seed, s.allocate.policy, s.allocate.min_spp) = (spp, seed, policy.to_owned(), min_spp);
+                }),
+            )
+        };
+        let means: Vec<_> = (1..=8).map(|seed| mean(&of(seed))).collect();
+        let spread: f64 = means.iter().map(|m| m.1 * m.1).sum::<f64>().sqrt() / 8.0;
+        (means.iter().map(|m| m.0).sum::<f64>() / 8.0, spread)
+    };
+    let reference = picture("uniform", 512, 2);
+    for (policy, min_spp, bias) in [("geometry", 2, 0.0), ("variance", 4, 0.02), ("both", 4, 0.02)] {
+        let (mean, error) = picture(policy, 32, min_spp);
+        let off = (mean - reference.0).abs();
+        println!("{policy}: {mean:.5} +- {error:.5}, uniform {:.5} +- {:.5}", reference.0, reference.1);
+        assert!(off < 4.0 * error.hypot(reference.1) + bias * reference.0, "{policy}: {mean} {error} {reference:?}");
+    }
+}
+
+#[test]
+fn pixels_without_a_sample_are_well_defined() {
+    let gpu = gpu();
+    for policy in POLICIES {
+        let scene =
+            scene(|s| (s.spp, s.allocate.policy, s.allocate.min_spp, s.allocate.rounds) = (1, policy.into(), 0, 1));
+        let pixels = render(&gpu, &scene);
+        assert_eq!(total(&pixels), 33 * 17, "{policy}");
+        let finite = |p: &Pixel| {
+            bytemuck::cast_slice::<_, f32>(&[p.light])
+                .iter()
+                .chain(&p.stats.mean)
+                .chain(&p.stats.m2)
+                .all(|v| v.is_finite())
+        };
+        assert!(pixels.iter().all(finite), "{policy}");
+        let untouched = pixels.iter().filter(|p| p.stats.count == 0);
+        assert!(untouched.clone().all(|p| *p == Pixel::default()), "{policy}");
+        assert!(policy != "geometry" || untouched.count() > 0, "no pixel was left out: the test tests nothing");
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn no_pixel_exceeds_the_largest_number() {
+    let gpu = gpu();
+    for policy in POLICIES {
+        let scene = scene(|s| (s.allocate.policy, s.allocate.max_spp) = (policy.into(), 9));
+        let pixels = render(&gpu, &scene);
+        assert_eq!((total(&pixels), pixels.iter().map(|p| p.stats.count).max()), (8 * 33 * 17, Some(9)), "{policy}");
+    }
+    assert_silent(&gpu);
+}
