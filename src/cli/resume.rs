@@ -9,6 +9,7 @@ use crate::renderer::{Progress, Renderer, Step};
 use crate::schedule;
 use crate::settings::Settings;
 use crate::statistics::Pixel;
+use serde_json::Value;
 use std::path::Path;
 
 /// Metadata that tells how many allocations a render had made.
@@ -35,8 +36,9 @@ impl Earlier {
     fn of(film: &Film, settings: &Settings) -> std::result::Result<Self, String> {
         let said = film.metadata.get("settings").ok_or("says nothing of its settings: it must be of tallow render")?;
         let uniform = settings.allocate.policy == "uniform";
-        let mut wanted = serde_json::to_value(settings).map_err(|e| e.to_string())?;
-        let mut had: serde_json::Value = serde_json::from_str(said).map_err(|e| format!("settings: {e}"))?;
+        let parsed = |text: &str| serde_json::from_str::<Value>(text).map_err(|e| format!("settings: {e}"));
+        let mut wanted = parsed(&serde_json::to_string(settings).map_err(|e| e.to_string())?)?;
+        let mut had = parsed(said)?;
         if uniform {
             for settings in [&mut wanted, &mut had] {
                 settings.as_object_mut().map(|s| s.remove("spp"));

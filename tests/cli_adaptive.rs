@@ -1,0 +1,159 @@
+//! Placed samples from the command line: interrupting, resuming, merging, thresholds, and what is said when they fail.
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+use tallow::image::{self, Film, Samples};
+use tempfile::TempDir;
+
+fn scene() -> String {
+    format!("{}/scenes/cornell-box/scene.toml", env!("CARGO_MANIFEST_DIR"))
+}
+
+fn command(folder: &TempDir, words: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tallow"));
+    command.current_dir(folder.path()).args(words.split_whitespace());
+    command
+}
+
+fn run(folder: &TempDir, words: &str) -> Output {
+    command(folder, words).output().unwrap()
+}
+
+#[track_caller]
+fn render(folder: &TempDir, words: &str) -> String {
+    let small = "--width 40 --height 30 --max-depth 3";
+    let output = run(folder, &format!("render {} {small} {words}", scene()));
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn film(folder: &TempDir, name: &str) -> Film {
+    image::read(&folder.path().join(name)).unwrap()
+}
+
+fn same(a: &Film, b: &Film, layers: &[&str]) -> bool {
+    let planes = |film: &Film, layer: &str| film.picture(Some(layer).filter(|l| !l.is_empty())).unwrap().pixels;
+    layers.iter().all(|layer| planes(a, layer) == planes(b, layer))
+}
+
+const LAYERS: [&str; 6] = ["", "m2", "variance", "direct", "indirect", "samples"];
+
+fn counts(film: &Film) -> Vec<u32> {
+    match film.channel("samples") {
+        Some(Samples::U32(counts)) => counts.clone(),
+        _ => panic!("no counts"),
+    }
+}
+
+#[test]
+fn priorities_counts_and_a_heat_map_are_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let said =
+        render(&folder, "--allocate geometry --budget-spp 4 --min-spp 1 --heatmap map.png -o a.exr --validation");
+    assert!(said.contains("samples per pixel, 4.00 on average"), "{said}");
+    let film = film(&folder, "a.exr");
+    assert_eq!(counts(&film).iter().sum::<u32>(), 4 * 40 * 30);
+    assert!(matches!(film.channel("priority"), Some(Samples::F32(p)) if p.iter().any(|&p| p > 0.0)));
+    assert_eq!(image::read(&folder.path().join("map.png")).unwrap().height, 30);
+    render(&folder, "--spp 1 -o plain.exr");
+    assert!(image::read(&folder.path().join("plain.exr")).unwrap().channel("priority").is_none());
+}
+
+#[test]
+fn a_threshold_stops_and_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = render(&folder, "--noise-threshold 0.08 --max-spp 4000 -o easy.exr");
+    assert!(said.contains("every pixel is estimated below the threshold"), "{said}");
+    let easy = counts(&film(&folder, "easy.exr"));
+    assert!(easy.iter().max().unwrap() < &4000 && easy.iter().min() < easy.iter().max());
+    let said = render(&folder, "--noise-threshold 0.0001 --max-spp 6 -o hard.exr");
+    assert!(said.contains("pixels are above the threshold at their limit"), "{said}");
+    assert_eq!(counts(&film(&folder, "hard.exr")).iter().max(), Some(&6));
+}
+
+#[test]
+fn resuming_with_more_samples_is_one_render() {
+    let folder = tempfile::tempdir().unwrap();
+    render(&folder, "--spp 5 -o part.exr");
+    render(&folder, "--spp 9 -o whole.exr");
+    render(&folder, "--spp 9 --resume part.exr -o resumed.exr");
+    let (whole, resumed) = (film(&folder, "whole.exr"), film(&folder, "resumed.exr"));
+    assert!(same(&whole, &resumed, &LAYERS));
+    assert!(!same(&whole, &film(&folder, "part.exr"), &[""]), "the comparison cannot fail");
+}
+
+/// Starts a long render, interrupts it, and resumes it.
+fn interrupted(words: &str, spp: u32) {
+    let folder = tempfile::tempdir().unwrap();
+    let words = format!("--width 192 --height 160 --max-depth 4 --spp {spp} --quiet {words}");
+    let mut child = command(&folder, &format!("render {} {words} -o part.exr", scene()))
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    // Long enough to be past compilation on any machine that renders this in more than that; short ones are seen below.
+    std::thread::sleep(Duration::from_millis(1500));
+    assert!(child.try_wait().unwrap().is_none(), "the render was over before it could be interrupted: raise its spp");
+    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let begun = Instant::now();
+    let status = child.wait().unwrap();
+    assert_eq!(status.code(), Some(130), "after {:?}", begun.elapsed());
+    let part = film(&folder, "part.exr");
+    let taken: u64 = counts(&part).iter().map(|&n| u64::from(n)).sum();
+    assert!(taken < u64::from(spp) * 192 * 160 && part.channel("pending").is_some(), "{taken} samples");
+    for end in [" --resume part.exr -o resumed.exr", " -o whole.exr"] {
+        assert!(run(&folder, &format!("render {} {words}{end}", scene())).status.success());
+    }
+    assert!(same(&film(&folder, "whole.exr"), &film(&folder, "resumed.exr"), &LAYERS));
+    assert!(film(&folder, "resumed.exr").channel("pending").is_none());
+}
+
+#[test]
+fn ctrl_c_writes_what_there_is_and_resuming_completes_it() {
+    interrupted("", 200);
+    interrupted("--allocate variance --rounds 20", 200);
+}
+
+#[test]
+fn disjoint_ranges_merge_and_others_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    render(&folder, "--spp 9 -o whole.exr");
+    render(&folder, "--spp 4 -o a.exr");
+    render(&folder, "--spp 5 --first-sample 4 -o b.exr");
+    assert!(run(&folder, "merge a.exr b.exr -o c.exr").status.success());
+    let (whole, merged) = (film(&folder, "whole.exr"), film(&folder, "c.exr"));
+    assert_eq!(counts(&whole), counts(&merged));
+    let [a, b] = [&whole, &merged].map(|f| f.picture(None).unwrap().pixels.concat());
+    assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() <= 3e-6 * a + 1e-9));
+    complains(&run(&folder, "merge a.exr whole.exr -o d.exr"), 3, &["whole.exr", "count twice"]);
+    render(&folder, "--spp 4 --clamp-indirect 3 -o other.exr");
+    complains(&run(&folder, "merge a.exr other.exr -o d.exr"), 3, &["other.exr", "other settings"]);
+    assert!(!folder.path().join("d.exr").exists());
+}
+
+#[track_caller]
+fn complains(output: &Output, code: i32, parts: &[&str]) {
+    let text = String::from_utf8(output.stderr.clone()).unwrap();
+    assert_eq!(output.status.code(), Some(code), "{text}");
+    assert_eq!(text.lines().count(), 1, "{text}");
+    assert!(parts.iter().all(|p| text.contains(p)), "{text}");
+}
+
+#[test]
+fn what_cannot_be_done_is_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let fails =
+        |words: &str| run(&folder, &format!("render {} --width 8 --height 8 --spp 2 {words} -o x.exr", scene()));
+    complains(&fails("--allocate everywhere"), 2, &["everywhere", "geometry"]);
+    complains(&fails("--allocate both --window 11"), 2, &["window", "2 to 10"]);
+    complains(&fails("--allocate both --min-spp 5 --max-spp 4"), 2, &["min-spp", "max-spp"]);
+    complains(&fails("--noise-threshold 0.1 --allocate uniform"), 2, &["noise-threshold", "variance or both"]);
+    complains(&fails("--resume none.exr"), 3, &["none.exr"]);
+    assert!(fails("").status.success());
+    complains(&fails("--resume x.exr --seed 3"), 3, &["x.exr", "other settings"]);
+    let mut bare = Film::new(8, 8);
+    bare.add_vec3("", ["R", "G", "B"], &[[0.0; 3]; 64]);
+    image::write(&folder.path().join("bare.exr"), &bare, &Default::default()).unwrap();
+    complains(&fails("--resume bare.exr"), 3, &["bare.exr", "settings"]);
+    assert!(!Path::new("x.exr.tmp").exists());
+}
