@@ -1,6 +1,7 @@
 //! Tallow: a Vulkan-native path tracer.
 pub mod cli;
 pub mod error;
+pub mod filter;
 mod frame;
 pub mod gpu;
 pub mod image;
