@@ -1,4 +1,5 @@
 //! Images for the filters' tests: a floor and a wall with a step in depth, lit from one side.
+#![allow(dead_code)]
 use crate::support::hash;
 use tallow::filter::{AtrousForm, FilterInput, FilterSettings};
 use tallow::gpu::layout::{Guide, NONE};
