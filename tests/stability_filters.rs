@@ -23,7 +23,8 @@ fn outputs(gpu: &Gpu, row: &Row, input: &FilterInput, more: &[FilterSettings]) -
 fn extremes() -> Vec<FilterSettings> {
     let base = FilterSettings::default();
     let sigmas = |s: f32| FilterSettings { sigma_rt: s, sigma_n: s, sigma_x: s, ..base };
-    vec![sigmas(0.0), sigmas(f32::INFINITY), sigmas(1e-30), sigmas(1e30)]
+    let wide = FilterSettings { eps: [0.0; 4], radius: 100, levels: 10, ..sigmas(f32::INFINITY) };
+    vec![FilterSettings { radius: 0, ..sigmas(0.0) }, wide, sigmas(1e-30), sigmas(1e30)]
 }
 
 /// Every known pixel of every output holds `value` to `tolerance`, and at least the input's known pixels are known.
@@ -145,7 +146,8 @@ fn edges_of_the_geometry_hold() {
             *c = if left { [0.0, 0.0, 0.0, 1.0] } else { [4.0, 4.0, 4.0, 1.0] };
         }
         // Narrow weights; what a filter of linear fits lets through is its eps against the contrast of the guide.
-        let narrow = FilterSettings { sigma_n: 0.1, ..FilterSettings::default() }.scaled_to(&input);
+        let narrow = FilterSettings { sigma_n: 0.1, eps: [1e-4; 4], ..FilterSettings::default() };
+        let narrow = narrow.scaled_to(&input);
         for output in [run(&gpu, row, &input, &narrow).unwrap().0, (row.reference)(&input, &narrow)] {
             let worst = output.iter().zip(&input.radiance).map(|(a, b)| (a[0] - b[0]).abs()).fold(0.0, f32::max);
             assert!(worst < 0.25, "{}: {worst} crossed the edge", row.name);

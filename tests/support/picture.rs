@@ -62,6 +62,12 @@ pub fn settings(filter: &str) -> Vec<FilterSettings> {
             FilterSettings { form: AtrousForm::Squared, sigma_x: off, levels: 10, ..base },
             FilterSettings { sigma_rt: off, sigma_n: off, ..base },
         ],
+        "guided" => vec![
+            FilterSettings { radius: 5, ..base },
+            FilterSettings { radius: 1, channels: 3, eps: [1e-4; 4], ..base },
+            FilterSettings { radius: 40, channels: 1, ..base },
+            FilterSettings { radius: 9, eps: [0.0; 4], ..base },
+        ],
         _ => vec![base],
     }
 }
