@@ -71,6 +71,7 @@ pub fn settings(filter: &str) -> Vec<FilterSettings> {
             FilterSettings { basis: WaveletBasis::RedBlack, ..base },
             FilterSettings { levels: 3, sigma_rt: off, sigma_n: off, sigma_x: off, ..base },
         ],
+        "auto" => vec![FilterSettings { radius: 6, ..base }],
         "svgf" => vec![base, FilterSettings { sigma_l: 1.0, levels: 3, ..base }],
         "guided" => vec![
             FilterSettings { radius: 5, ..base },

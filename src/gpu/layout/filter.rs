@@ -84,4 +84,20 @@ gpu_structs! {
         /// How much brighter than its surroundings a pixel may be.
         factor: float,
     }
+
+    /// Push constants of `auto_error.comp`.
+    struct AutoErrorPush {
+        /// Pixels.
+        count: uint,
+        /// Squared luminance below which errors count as absolute.
+        floor: float,
+    }
+
+    /// Push constants of `auto_smooth.comp`.
+    struct AutoSmoothPush {
+        /// Image in pixels.
+        size: uvec2,
+        /// Pixels from one tap to the next.
+        spacing: uint,
+    }
 }
