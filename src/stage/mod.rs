@@ -50,7 +50,7 @@ impl<B: Bindings> PerThread<B> {
 }
 
 /// Workgroups of `size` threads that cover `threads`, folded into rows; `thread_index()` unfolds them.
-fn groups(threads: u32, size: u32) -> [u32; 3] {
+pub fn groups(threads: u32, size: u32) -> [u32; 3] {
     let groups = threads.div_ceil(size);
     [groups.min(ROW), groups.div_ceil(ROW), 1]
 }
