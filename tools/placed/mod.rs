@@ -1,0 +1,140 @@
+//! Renders of a scene by one policy, their references, and how far they are apart.
+use crate::{Args, scenes};
+use std::path::{Path, PathBuf};
+use tallow::gpu::layout::{Guide, PixelStats, vec3, vec4};
+use tallow::gpu::{FrameResources, Gpu};
+use tallow::image::{self, Film, WriteOptions};
+use tallow::renderer::{Outputs, Renderer, Step};
+use tallow::scene::Scene;
+use tallow::settings::Settings;
+use tallow::statistics::Pixel;
+
+pub mod geometry;
+pub mod overhead;
+pub mod policies;
+pub mod spread;
+
+/// A scene as it is rendered here: small, so that a software device needs minutes.
+pub struct View {
+    /// For files and tables.
+    pub name: &'static str,
+    /// A name known to the converter, or a scene file of the repository.
+    pub scene: &'static str,
+    /// Pixels.
+    pub size: [u32; 2],
+    /// Path edges.
+    pub depth: u32,
+    /// Samples per pixel of the reference.
+    pub reference: u32,
+}
+
+/// What a render leaves, and the device's own time for all passes in milliseconds.
+pub struct Rendered {
+    /// Radiance, direct and indirect light.
+    pub pixels: Vec<Pixel>,
+    /// Primary hits.
+    pub guide: Vec<Guide>,
+    /// Of everything but the primary hits.
+    pub ms: f64,
+    /// Of tracing and folding alone.
+    pub path_ms: f64,
+}
+
+impl View {
+    fn scene_file(&self, args: &Args) -> anyhow::Result<PathBuf> {
+        Ok(match self.scene.ends_with(".toml") {
+            true => Path::new(env!("CARGO_MANIFEST_DIR")).join(self.scene),
+            false => scenes::convert(self.scene, &args.data, &args.output)?,
+        })
+    }
+
+    /// The scene with these settings.
+    pub fn load(&self, args: &Args, change: impl Fn(&mut Settings)) -> anyhow::Result<Scene> {
+        let all = |s: &mut Settings| {
+            ([s.width, s.height], s.max_depth, s.roulette_depth) = (self.size, self.depth, 0);
+            change(s);
+        };
+        Ok(Scene::load(&self.scene_file(args)?, &all)?)
+    }
+
+    /// Means of radiance and of indirect irradiance over many samples of another seed, kept in a file.
+    pub fn reference(&self, gpu: &Gpu, args: &Args, change: impl Fn(&mut Settings)) -> anyhow::Result<[Vec<vec3>; 2]> {
+        let scene = self.load(args, |s| {
+            change(s);
+            (s.spp, s.seed, s.allocate.policy) = (self.reference, 1, "uniform".into());
+        })?;
+        let [width, height] = self.size;
+        let kind = format!("{:?}", scene.settings.filter).to_lowercase();
+        let file = args.output.join(format!("{}-{width}x{height}-{kind}-{}spp.exr", self.name, self.reference));
+        if !file.exists() {
+            eprintln!("rendering {}", file.display());
+            let pixels = render(gpu, &scene)?.pixels;
+            let mut film = Film::new(width, height);
+            film.add_vec3("", ["R", "G", "B"], &pixels.iter().map(|p| p.stats.mean).collect::<Vec<_>>());
+            film.add_vec3("indirect", ["R", "G", "B"], &pixels.iter().map(|p| p.light.indirect).collect::<Vec<_>>());
+            image::write(&file, &film, &WriteOptions::default())?;
+        }
+        let film = image::read(&file)?;
+        let layer = |name| film.picture(name).map(|p| p.pixels).map_err(anyhow::Error::msg);
+        Ok([layer(None)?, layer(Some("indirect"))?])
+    }
+}
+
+/// Renders a scene by its settings, after one run of each kernel that does not count: drivers compile on it.
+pub fn render(gpu: &Gpu, scene: &Scene) -> anyhow::Result<Rendered> {
+    let renderer = Renderer::new(gpu, scene, Outputs { split_light: true, guides: true, counters: false })?;
+    let mut frame = FrameResources::new(gpu)?;
+    let steps = renderer.steps();
+    let of_kind = |kind: fn(&Step) -> bool| steps.iter().find(move |s| kind(s));
+    let kinds: [fn(&Step) -> bool; 4] = [
+        |s| matches!(s, Step::Start),
+        |s| matches!(s, Step::Uniform(_)),
+        |s| matches!(s, Step::Allocate(_)),
+        |s| matches!(s, Step::Listed(_)),
+    ];
+    for step in kinds.into_iter().filter_map(of_kind) {
+        renderer.run(&mut frame, step)?;
+    }
+    let (mut ns, mut path_ns) = (0, 0);
+    for step in &steps {
+        for pass in renderer.run(&mut frame, step)?.iter().filter(|p| p.name != "guide") {
+            let took = pass.end_ns - pass.begin_ns;
+            ns += took;
+            path_ns += if matches!(pass.name, "path" | "fold") { took } else { 0 };
+        }
+    }
+    let tile = &renderer.film().tiles[0];
+    let (stats, light) = (tile.stats.read()?, tile.light.read()?);
+    let pixels = stats.into_iter().zip(light).map(|(stats, light)| Pixel { stats, light }).collect();
+    Ok(Rendered { pixels, guide: tile.guide.read()?, ms: ns as f64 * 1e-6, path_ms: path_ns as f64 * 1e-6 })
+}
+
+/// Mean over the channels of the squared difference, pixel by pixel.
+pub fn squared_errors(image: &[vec3], reference: &[vec3]) -> Vec<f64> {
+    let of = |(a, b): (&vec3, &vec3)| (0..3).map(|c| f64::from(a[c] - b[c]).powi(2)).sum::<f64>() / 3.0;
+    image.iter().zip(reference).map(of).collect()
+}
+
+/// The same over the reference's square (relMSE, eps 0.01).
+pub fn relative_errors(image: &[vec3], reference: &[vec3]) -> Vec<f64> {
+    let of = |(a, b): (&vec3, &vec3)| {
+        (0..3).map(|c| f64::from(a[c] - b[c]).powi(2) / (f64::from(b[c]).powi(2) + 0.01)).sum::<f64>() / 3.0
+    };
+    image.iter().zip(reference).map(of).collect()
+}
+
+/// Mean.
+pub fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Radiance of every pixel.
+pub fn radiance(pixels: &[Pixel]) -> Vec<vec3> {
+    pixels.iter().map(|p| p.stats.mean).collect()
+}
+
+/// Indirect irradiance with the samples behind it, as filters take it.
+pub fn indirect(pixels: &[Pixel]) -> Vec<vec4> {
+    let of = |PixelStats { count, .. }: PixelStats, [r, g, b]: vec3| [r, g, b, count as f32];
+    pixels.iter().map(|p| of(p.stats, p.light.indirect)).collect()
+}

@@ -1,0 +1,129 @@
+//! What placing costs beside tracing: GEO's tables 1 and 2.
+use super::View;
+use crate::Args;
+use std::collections::BTreeMap;
+use tallow::gpu::{FrameResources, Gpu, PassTime};
+use tallow::renderer::{Outputs, Renderer, Step};
+use tallow::report::table;
+
+const VIEW: View = View { name: "sponza", scene: "crytek-sponza", size: [1024, 768], depth: 4, reference: 0 };
+const RUNS: usize = 5;
+
+/// Milliseconds of GEO's table 1 (1024 x 768, GTX 285): importance and rates.
+const WINDOWS: [(u32, f64); 5] = [(2, 8.3), (4, 26.2), (6, 50.7), (8, 84.9), (10, 128.7)];
+/// Of its table 2: generating and storing.
+const SAMPLES: [(u32, f64); 3] = [(4, 2.3), (16, 3.6), (64, 8.5)];
+
+/// Median milliseconds of every pass of a step.
+fn passes(gpu: &Gpu, renderer: &Renderer, steps: &[Step]) -> anyhow::Result<BTreeMap<&'static str, f64>> {
+    let mut frame = FrameResources::new(gpu)?;
+    let mut times: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for run in 0..=RUNS {
+        let mut sums: BTreeMap<&str, f64> = BTreeMap::new();
+        for step in steps {
+            let ms = |t: &PassTime| (t.end_ns - t.begin_ns) as f64 * 1e-6;
+            renderer.run(&mut frame, step)?.iter().for_each(|t| *sums.entry(t.name).or_default() += ms(t));
+        }
+        if run > 0 {
+            // the first compiles
+            sums.into_iter().for_each(|(name, ms)| times.entry(name).or_default().push(ms));
+        }
+    }
+    let median = |mut ms: Vec<f64>| {
+        ms.sort_by(f64::total_cmp);
+        ms[ms.len() / 2]
+    };
+    Ok(times.into_iter().map(|(name, ms)| (name, median(ms))).collect())
+}
+
+/// Prints both tables and the share of tracing.
+pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
+    let renderer = |window, spp| -> anyhow::Result<Renderer> {
+        let scene = VIEW.load(args, |s| {
+            (s.spp, s.allocate.policy, s.allocate.min_spp, s.allocate.rounds) = (spp, "geometry".into(), 1, 1);
+            s.allocate.window = window;
+        })?;
+        Ok(Renderer::new(gpu, &scene, Outputs { split_light: true, guides: true, counters: false })?)
+    };
+    let allocation = |r: &Renderer| -> anyhow::Result<(f64, f64)> {
+        let steps: Vec<Step> = r.steps().into_iter().filter(|s| matches!(s, Step::Allocate(_))).collect();
+        r.run(&mut FrameResources::new(gpu)?, &Step::Start)?;
+        let all = passes(gpu, r, &steps)?;
+        let geometry = all["geometry"];
+        Ok((geometry, all.values().sum::<f64>() - geometry))
+    };
+    let mut rows = Vec::new();
+    for (window, published) in WINDOWS {
+        let (importance, counts) = allocation(&renderer(window, 4)?)?;
+        let cells = [importance, counts, importance + counts, published].map(|ms| format!("{ms:.1}"));
+        rows.push([vec![format!("{window} x {window}")], cells.to_vec()].concat());
+    }
+    println!("Importance and counts, Sponza {} x {} (GEO's table 1: GTX 285)\n", VIEW.size[0], VIEW.size[1]);
+    println!("{}", table::text(&["window", "importance ms", "counts ms", "both ms", "published ms"], &rows));
+    samples(gpu, args, &renderer, &allocation)
+}
+
+fn samples(
+    gpu: &Gpu,
+    args: &Args,
+    renderer: &dyn Fn(u32, u32) -> anyhow::Result<Renderer>,
+    allocation: &dyn Fn(&Renderer) -> anyhow::Result<(f64, f64)>,
+) -> anyhow::Result<()> {
+    let mut rows = Vec::new();
+    for (spp, published) in SAMPLES {
+        let r = renderer(4, spp)?;
+        let (importance, counts) = allocation(&r)?;
+        let mut frame = FrameResources::new(gpu)?;
+        let mut lists = 0.0;
+        for step in r.steps().iter().filter(|s| matches!(s, Step::Allocate(_))) {
+            r.run(&mut frame, step)?;
+        }
+        // The first list; the others are as long.
+        let listed: Vec<Step> = r.steps().into_iter().filter(|s| matches!(s, Step::Listed(_))).collect();
+        let first = passes(gpu, &r, &listed[..1])?;
+        lists += first["batch"] * listed.len() as f64;
+        rows.push(vec![
+            spp.to_string(),
+            format!("{:.1}", importance + counts),
+            format!("{lists:.1}"),
+            format!("{published:.1}"),
+        ]);
+    }
+    println!("Placing by budget, window 4 x 4 (GEO's table 2: generating and storing)\n");
+    println!("{}", table::text(&["samples per pixel", "importance and counts ms", "lists ms", "published ms"], &rows));
+    share(gpu, args, renderer, allocation)
+}
+
+/// All of placing over all of tracing, at 4 samples per pixel.
+fn share(
+    gpu: &Gpu,
+    args: &Args,
+    renderer: &dyn Fn(u32, u32) -> anyhow::Result<Renderer>,
+    allocation: &dyn Fn(&Renderer) -> anyhow::Result<(f64, f64)>,
+) -> anyhow::Result<()> {
+    let placed = renderer(4, 4)?;
+    let (importance, counts) = allocation(&placed)?;
+    let mut frame = FrameResources::new(gpu)?;
+    let (mut lists, mut traced) = (0.0, 0.0);
+    for step in placed.steps() {
+        for t in placed.run(&mut frame, &step)? {
+            let ms = (t.end_ns - t.begin_ns) as f64 * 1e-6;
+            lists += if t.name == "batch" { ms } else { 0.0 };
+            traced += if matches!(t.name, "path" | "fold") { ms } else { 0.0 };
+        }
+    }
+    let scene = VIEW.load(args, |s| s.spp = 4)?;
+    let uniform = super::render(gpu, &scene)?;
+    let all = importance + counts + lists;
+    println!(
+        "Placing 4 samples per pixel at depth {}: importance {importance:.1} + counts {counts:.1} + lists {lists:.1} =",
+        VIEW.depth
+    );
+    println!(
+        "{all:.1} ms, {:.2} % of the {:.0} ms that tracing them uniformly takes",
+        100.0 * all / uniform.path_ms,
+        uniform.path_ms
+    );
+    println!("({traced:.0} ms where they are placed)\n");
+    Ok(())
+}

@@ -1,0 +1,63 @@
+//! Every policy on five scenes: relative error at equal samples, and what it comes to at equal time.
+use super::{View, mean, radiance, relative_errors, render};
+use crate::Args;
+use tallow::allocate::POLICIES;
+use tallow::gpu::Gpu;
+use tallow::report::table;
+
+const SPP: u32 = 32;
+const SEEDS: [u32; 3] = [0, 2, 3];
+const VIEWS: [View; 5] = [
+    View { name: "cornell", scene: "scenes/cornell-box/scene.toml", size: [96, 96], depth: 4, reference: 1024 },
+    View { name: "sponza", scene: "crytek-sponza", size: [112, 63], depth: 4, reference: 1024 },
+    View { name: "bust", scene: "scenes/bust/scene.toml", size: [90, 120], depth: 4, reference: 1024 },
+    View { name: "grass", scene: "scenes/grass/scene.toml", size: [112, 63], depth: 4, reference: 1024 },
+    View {
+        name: "directional",
+        scene: "scenes/cornell-box/directional.toml",
+        size: [128, 128],
+        depth: 4,
+        reference: 2048,
+    },
+];
+
+/// Prints the table. Error falls as 1 / samples, so that at equal time it is the error times the time, over that of the
+/// uniform render.
+pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
+    let mut rows = Vec::new();
+    for view in &VIEWS {
+        let reference = &view.reference(gpu, args, |_| {})?[0];
+        let mut found = Vec::new();
+        for policy in POLICIES {
+            let (mut error, mut ms) = (0.0, f64::INFINITY);
+            for seed in SEEDS {
+                let scene = view.load(args, |s| {
+                    (s.spp, s.seed, s.allocate.policy, s.allocate.min_spp) = (SPP, seed, policy.name.into(), 4);
+                    s.allocate.filtered = 0.0;
+                })?;
+                let rendered = render(gpu, &scene)?;
+                error += mean(&relative_errors(&radiance(&rendered.pixels), reference)) / SEEDS.len() as f64;
+                ms = ms.min(rendered.ms);
+            }
+            found.push((policy.name, error, ms));
+        }
+        let (_, base, base_ms) = found[0];
+        for (name, error, ms) in found {
+            rows.push(vec![
+                view.name.to_owned(),
+                name.to_owned(),
+                format!("{error:.2e}"),
+                format!("{ms:.0}"),
+                format!("{:.2}", error / base),
+                format!("{:.2}", error * ms / (base * base_ms)),
+            ]);
+        }
+    }
+    println!(
+        "relMSE (eps 0.01), {SPP} samples per pixel, least 4, mean of {} seeds; `both` expects no filter\n",
+        SEEDS.len()
+    );
+    let header = ["scene", "policy", "relMSE", "ms", "of uniform, equal samples", "equal time"];
+    println!("{}", table::text(&header, &rows));
+    Ok(())
+}
