@@ -1,7 +1,5 @@
 //! The order of a render: which samples, when, and when to look where they count. Plain arithmetic, known beforehand.
 use crate::settings::Settings;
-pub use crate::stage::apportion::Plan;
-pub use crate::stage::batch::PathRange;
 
 /// A rectangle of work: some samples of a run of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,6 +12,34 @@ pub struct Batch {
     pub first_sample: u32,
     /// At least 1.
     pub samples: u32,
+}
+
+/// Paths of a round.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PathRange {
+    /// Place of the first one in the round.
+    pub first: u64,
+    /// At least 1.
+    pub paths: u32,
+    /// Of the rounds that the list of paths is dealt to, this one, from 0.
+    pub round: u32,
+    /// Rounds that the list is dealt to, at least 1.
+    pub rounds: u32,
+}
+
+/// What is to be apportioned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Plan {
+    /// Of the film.
+    pub pixels: u32,
+    /// Samples to place.
+    pub budget: u64,
+    /// Largest number of samples of a pixel, those it has included; none when no pixel can be filled.
+    pub limit: Option<u32>,
+    /// When priorities are shares of all samples: those that pixels have and those to place, together.
+    pub total: Option<u64>,
+    /// Times at most that the samples of full pixels are apportioned again; 1 when none can be full.
+    pub rounds: u32,
 }
 
 /// A piece of a render.

@@ -9,8 +9,9 @@ use tallow::allocate::{HostInputs, Inputs, POLICIES};
 use tallow::gpu::layout::*;
 use tallow::gpu::{Buffer, FrameResources, Gpu, Kernel, Location};
 use tallow::reference::apportion as twin;
-use tallow::stage::apportion::{Apportion, Counts, Plan};
-use tallow::stage::batch::{self, Batches, PathRange};
+use tallow::schedule::{PathRange, Plan};
+use tallow::stage::apportion::{Apportion, Counts};
+use tallow::stage::batch::{self, Batches};
 use tallow::stage::scan::Scan;
 
 /// Around a thread's items, a workgroup's threads and a block.

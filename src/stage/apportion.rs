@@ -6,26 +6,12 @@ use super::{blocks, one_workgroup};
 use crate::error::Result;
 use crate::gpu::layout::{ApportionPush, Apportionment, BlockSums, Effects, NONE, PixelStats, uvec2};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
+use crate::schedule::Plan;
 use crate::shaders::{deficit, digit, pick, quota, settle, spread, ties, total, weigh};
 
 /// Digits of a remainder, and the values of each.
 const DIGITS: u32 = 8;
 const BINS: usize = 256;
-
-/// What is to be apportioned.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Plan {
-    /// Of the film.
-    pub pixels: u32,
-    /// Samples to place.
-    pub budget: u64,
-    /// Largest number of samples of a pixel, those it has included; none when no pixel can be filled.
-    pub limit: Option<u32>,
-    /// When priorities are shares of all samples: those that pixels have and those to place, together.
-    pub total: Option<u64>,
-    /// Times at most that the samples of full pixels are apportioned again; 1 when none can be full.
-    pub rounds: u32,
-}
 
 /// The counts, and what finding them takes: 16 bytes per pixel, the offsets of the scan included.
 pub struct Counts {

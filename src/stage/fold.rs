@@ -1,11 +1,10 @@
 //! Folds a batch of samples into the pixels' statistics. Kernel: `glsl/fold.comp`. Twin: [`crate::reference::fold`].
-use super::batch::PathRange;
 use super::{PerThread, pair};
 use crate::error::Result;
 use crate::frame::{FilmBuffers, FilmTile};
 use crate::gpu::Recorder;
 use crate::gpu::layout::FoldPush;
-use crate::schedule::Batch;
+use crate::schedule::{Batch, PathRange};
 use crate::shaders::fold::Bind;
 
 /// The specialised kernel.

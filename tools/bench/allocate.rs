@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use tallow::gpu::layout::PixelStats;
 use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Kernel, Location};
 use tallow::report::table;
-use tallow::stage::apportion::{Apportion, Counts, Plan};
-use tallow::stage::batch::{self, PathRange};
+use tallow::schedule::{PathRange, Plan};
+use tallow::stage::apportion::{Apportion, Counts};
+use tallow::stage::batch;
 use tallow::stage::scan::Scan;
 
 const RUNS: usize = 9;
