@@ -66,6 +66,13 @@ fn rows(args: &Args) -> Result<Vec<Row>> {
     let usual_compile_ms = compile_ms(&usual, gpu_ms(&usual, &mut frame)?, gpu_ms(&usual, &mut frame)?);
     let mut rows = Vec::new();
     for (effect, id, on) in base.entries() {
+        let reason = reasons.iter().find(|(name, _)| *name == effect);
+        let called_for_by = reason.map_or_else(String::new, |(_, object)| object.clone());
+        if effect == "adaptive" {
+            // With and without it are different renders, not one picture at two prices: tools/adaptive compares those.
+            rows.push(Row { effect, on, called_for_by, ..Row::default() });
+            continue;
+        }
         let other_effects = base.toggled(id);
         let (split_light, counters) = (other_effects.split_light, other_effects.counters);
         let other = Renderer::specialised(&gpu, &scene, Outputs { split_light, counters, ..outputs }, other_effects)?;
@@ -74,11 +81,10 @@ fn rows(args: &Args) -> Result<Vec<Row>> {
         let usual = (usual_ms, usual_compile_ms);
         let other = (other_ms, compile_ms(&other, first_ms, other_ms));
         let (with, without) = if on { (usual, other) } else { (other, usual) };
-        let reason = reasons.iter().find(|(name, _)| *name == effect);
         rows.push(Row {
             effect,
             on,
-            called_for_by: reason.map_or_else(String::new, |(_, object)| object.clone()),
+            called_for_by,
             gpu_ms_with: Some(with.0),
             gpu_ms_without: Some(without.0),
             compile_ms: Some(with.1 - without.1),
@@ -88,7 +94,7 @@ fn rows(args: &Args) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// A small film tells enough about cost, and 28 kernels are timed.
+/// A small film tells enough about cost, and a kernel per effect is timed.
 fn shrink(settings: &mut Settings) {
     let scale = (65_536.0 / settings.pixels() as f64).sqrt().min(1.0);
     let shrunk = |edge: u32| ((f64::from(edge) * scale) as u32).max(1);
