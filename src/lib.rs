@@ -1,5 +1,6 @@
 //! Tallow: a Vulkan-native path tracer.
 pub mod cli;
+//pub mod composition;
 pub mod error;
 mod frame;
 pub mod gpu;

@@ -1,0 +1,134 @@
+//! What of an image is filtered, and how it becomes an image again: `colour = sharp + factor * filtered`.
+//!
+//! | image | filtered | factor | sharp |
+//! |---|---|---|---|
+//! | Tallow's | indirect light before albedo | that albedo | direct light, emission, what smooth surfaces show |
+//! | with albedo | colour / albedo | albedo | pixels that reflect nothing |
+//! | any, plain | colour | 1 | nothing |
+mod guide;
+
+use crate::filter::FilterInput;
+use crate::gpu::layout::{vec3, vec4};
+use crate::image::aov::{Aov, Aovs};
+
+/// A channel of smaller albedo is divided by this instead; a pixel with no larger one is left as it is.
+const SMALLEST_ALBEDO: f32 = 0.01;
+
+/// An image taken apart.
+pub struct Parts {
+    /// What goes through the filter.
+    pub input: FilterInput,
+    sharp: Vec<vec3>,
+    factor: Vec<vec3>,
+    /// How it was taken apart, and what was made up: one line each.
+    pub notes: Vec<String>,
+}
+
+/// Takes an image apart; with `demodulate`, surface colour is kept away from the filter where the image tells it.
+pub fn split(aovs: &Aovs, demodulate: bool) -> Parts {
+    let colour = aovs.get(Aov::Colour).unwrap_or_default();
+    let counts = counts(aovs, colour);
+    let mut notes = Vec::new();
+    let light = match (demodulate, aovs.get(Aov::Albedo), layers(aovs, &counts)) {
+        (true, Some(albedo), Some(layers)) => split_light(colour, albedo, layers),
+        (true, Some(albedo), None) => by_albedo(colour, albedo),
+        _ => plain(colour),
+    };
+    notes.push(light.note.to_owned());
+    let radiance = light.filtered.iter().zip(&counts).zip(&light.factor).map(with_count).collect();
+    let variance = variance(aovs, &counts).map(|v| v.iter().zip(&light.factor).map(demodulated_variance).collect());
+    let guide = guide::guides(aovs, &mut notes);
+    let input = FilterInput { width: aovs.film.width, height: aovs.film.height, radiance, guide, variance };
+    Parts { input, sharp: light.sharp, factor: light.factor, notes }
+}
+
+impl Parts {
+    /// Puts the image together from what the filter returned.
+    ///
+    /// # Panics
+    /// When that has another number of pixels.
+    pub fn join(&self, filtered: &[vec4]) -> Vec<vec3> {
+        assert_eq!(filtered.len(), self.sharp.len(), "one filtered value per pixel");
+        let pixel = |i: usize| std::array::from_fn(|c| self.sharp[i][c] + self.factor[i][c] * filtered[i][c]);
+        (0..filtered.len()).map(pixel).collect()
+    }
+}
+
+struct Light {
+    filtered: Vec<vec3>,
+    factor: Vec<vec3>,
+    sharp: Vec<vec3>,
+    note: &'static str,
+}
+
+/// Samples behind each pixel: as the file says, per pixel or for all; 1 where it does not; 0 where there is nothing.
+fn counts(aovs: &Aovs, colour: &[vec3]) -> Vec<f32> {
+    let of_all = ["samplesPerPixel"].iter().find_map(|key| aovs.film.metadata.get(*key)?.parse::<f32>().ok());
+    let count = |i: usize| aovs.scalar(Aov::Samples, i).or(of_all).unwrap_or(1.0);
+    let known = |i: usize| aovs.holds(i) && colour[i].iter().all(|v| v.is_finite());
+    (0..colour.len()).map(|i| if known(i) { count(i) } else { 0.0 }).collect()
+}
+
+/// Direct and indirect light, unless a pixel without samples lacks its direct light.
+fn layers<'a>(aovs: &'a Aovs, counts: &[f32]) -> Option<[&'a [vec3]; 2]> {
+    let all = counts.iter().all(|&n| n > 0.0);
+    Some([aovs.get(Aov::Direct)?, aovs.get(Aov::Indirect)?]).filter(|_| all)
+}
+
+/// The albedo that indirect light is multiplied by is that of the samples, `(colour - direct) / indirect`, so that edges
+/// and textures stay as smooth as the samples made them; that of the pixel's centre where no sample met light.
+fn split_light(colour: &[vec3], albedo: &[vec3], [direct, indirect]: [&[vec3]; 2]) -> Light {
+    let factor = |i: usize| {
+        std::array::from_fn(|c| {
+            let of_samples = (colour[i][c] - direct[i][c]) / indirect[i][c];
+            if of_samples.is_finite() && indirect[i][c] > 0.0 { of_samples.clamp(0.0, 1.0) } else { albedo[i][c] }
+        })
+    };
+    Light {
+        filtered: indirect.to_vec(),
+        factor: (0..colour.len()).map(factor).collect(),
+        sharp: direct.to_vec(),
+        note: "filtered: indirect light before albedo; direct light stays as it is",
+    }
+}
+
+fn by_albedo(colour: &[vec3], albedo: &[vec3]) -> Light {
+    let reflects = |a: &vec3| a.iter().any(|&v| v > SMALLEST_ALBEDO && v.is_finite());
+    let factor = |a: &vec3| if reflects(a) { a.map(|v| v.max(SMALLEST_ALBEDO)) } else { [0.0; 3] };
+    let factor: Vec<vec3> = albedo.iter().map(factor).collect();
+    let lit = |(c, f): (&vec3, &vec3)| if f[0] > 0.0 { std::array::from_fn(|k| c[k] / f[k]) } else { [0.0; 3] };
+    let dark = |(c, f): (&vec3, &vec3)| if f[0] > 0.0 { [0.0; 3] } else { *c };
+    Light {
+        filtered: colour.iter().zip(&factor).map(lit).collect(),
+        sharp: colour.iter().zip(&factor).map(dark).collect(),
+        factor,
+        note: "filtered: colour / albedo; pixels without albedo stay as they are",
+    }
+}
+
+fn plain(colour: &[vec3]) -> Light {
+    Light {
+        filtered: colour.to_vec(),
+        factor: vec![[1.0; 3]; colour.len()],
+        sharp: vec![[0.0; 3]; colour.len()],
+        note: "filtered: the colour, without demodulation",
+    }
+}
+
+/// Pixels whose filtered part is not used must not reach others.
+fn with_count(((c, count), factor): ((&vec3, &f32), &vec3)) -> vec4 {
+    let used = factor.iter().any(|&f| f > 0.0);
+    [c[0], c[1], c[2], if used { *count } else { 0.0 }]
+}
+
+/// Of each pixel's mean. pbrt stores that of one sample.
+fn variance(aovs: &Aovs, counts: &[f32]) -> Option<Vec<vec3>> {
+    let stored = aovs.get(Aov::Variance)?;
+    let of_one_sample = aovs.film.channels.iter().any(|c| c.name.starts_with("RelativeVariance."));
+    let mean = |(v, n): (&vec3, &f32)| if of_one_sample { v.map(|v| v / n.max(1.0)) } else { *v };
+    Some(stored.iter().zip(counts).map(mean).collect())
+}
+
+fn demodulated_variance((v, f): (&vec3, &vec3)) -> vec3 {
+    std::array::from_fn(|c| if f[c] > 0.0 { v[c] / (f[c] * f[c]) } else { 0.0 })
+}
