@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::{env, fs};
 
-#[allow(dead_code)]
+#[allow(dead_code, unused_imports)]
 #[path = "src/gpu/layout.rs"]
 mod layout;
 
@@ -47,6 +47,7 @@ fn main() {
 fn build() -> Result<()> {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=src/gpu/layout.rs");
+    println!("cargo:rerun-if-changed=src/gpu/layout");
     println!("cargo:rerun-if-changed=glsl");
     let out = PathBuf::from(env::var("OUT_DIR")?);
     generate(Path::new("glsl"), "crate", &out.join("shaders.rs"))?;
@@ -120,7 +121,7 @@ fn expand(file: &str, text: &str, sources: &mut Vec<Source>) -> Result<String> {
 
 fn read(name: &str, path: &str) -> Result<String> {
     Ok(match name {
-        "layout.glsl" => [layout::GLSL_CONSTANTS, layout::GLSL_STRUCTS].concat(),
+        "layout.glsl" => [layout::GLSL_CONSTANTS, layout::GLSL_STRUCTS, layout::filter::GLSL_STRUCTS].concat(),
         "effects.glsl" => layout::GLSL_EFFECTS.to_owned(),
         _ => fs::read_to_string(path).with_context(|| path.to_owned())?,
     })

@@ -2,6 +2,7 @@
 pub mod cli;
 //pub mod composition;
 pub mod error;
+pub mod filter;
 mod frame;
 pub mod gpu;
 pub mod image;

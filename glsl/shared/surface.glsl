@@ -1,4 +1,5 @@
 // From a hit to what shading needs: position, normals, a resolved BSDF, emission.
+#include "shared/octahedral.glsl"
 
 struct Surface {
     vec3 position;  // world, interpolated from the vertices: more exact than origin + t * direction
@@ -9,14 +10,6 @@ struct Surface {
     uint object;
     vec2 uv;
 };
-
-vec3 octahedral_decode(uint bits) {
-    vec2 e = unpackSnorm2x16(bits);
-    vec3 n = vec3(e, 1.0 - abs(e.x) - abs(e.y));
-    float t = max(-n.z, 0.0);
-    n.xy += mix(vec2(t), vec2(-t), greaterThanEqual(n.xy, vec2(0.0)));
-    return normalize(n);
-}
 
 // Height map (Blinn 1978) or tangent-space normal map. `e1`, `e2` are edges, `d1`, `d2` their extents in uv.
 vec3 perturbed_normal(Surface s, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {

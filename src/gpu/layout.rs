@@ -47,6 +47,10 @@ macro_rules! constants {
     };
 }
 
+#[path = "layout/filter.rs"]
+pub mod filter;
+pub use filter::*;
+
 constants! {
     /// "No texture", "no material override", "no hit".
     NONE = 0xffffffff;

@@ -1,0 +1,92 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/pixel.glsl"
+
+// One level of the edge-avoiding A-Trous wavelet transform (Dammertz et al. 2010, section 2.2): 5x5 taps that are
+// push.spacing pixels apart, each weighted by how alike the two pixels are. A thread filters ROWS pixels of a column,
+// push.spacing apart, because they share most of their taps; neighbouring threads take neighbouring columns, so that
+// every level reads runs of memory.
+layout(local_size_x = 32) in;
+layout(binding = 0) uniform samplerBuffer colour; // of vec4
+layout(binding = 1) uniform samplerBuffer place; // of vec4
+layout(scalar, binding = 2) writeonly buffer Output { vec4 filtered[]; };
+layout(scalar, push_constant) uniform Push { AtrousPush push; };
+
+layout(constant_id = 110) const bool WEIGHT_RT = true;
+layout(constant_id = 111) const bool WEIGHT_N = true;
+layout(constant_id = 112) const bool WEIGHT_X = true;
+layout(constant_id = 113) const bool SQUARED = true;   // false: the norms as equation 5 prints them
+layout(constant_id = 114) const bool CONSERVE = false; // what a neighbour is refused stays with the centre
+
+const int ROWS = 4;
+const float LEAST = -80.0; // weights below 2^LEAST are 0, on every device
+
+struct Pixel {
+    vec4 colour;
+    vec3 normal;
+    vec3 position;
+};
+
+float b3_spline(int offset) {
+    int by = abs(offset);
+    return by == 0 ? 3.0 / 8.0 : by == 1 ? 1.0 / 4.0 : by == 2 ? 1.0 / 16.0 : 0.0;
+}
+
+Pixel pixel_at(int at) {
+    vec4 p = texelFetch(place, at);
+    return Pixel(texelFetch(colour, at), WEIGHT_N ? unpacked_normal(floatBitsToUint(p.w)) : vec3(0.0), p.xyz);
+}
+
+float difference(vec3 d) {
+    float squared = dot(d, d);
+    return SQUARED ? squared : sqrt(squared);
+}
+
+float edge_weight(Pixel p, Pixel q) {
+    float exponent = 0.0;
+    if (WEIGHT_RT && p.colour.w > 0.0) exponent -= push.rate_rt * difference(q.colour.rgb - p.colour.rgb);
+    if (WEIGHT_N) exponent -= push.rate_n * difference(q.normal - p.normal);
+    if (WEIGHT_X) exponent -= push.rate_x * difference(q.position - p.position);
+    return q.colour.w > 0.0 && exponent > LEAST ? exp2(exponent) : 0.0;
+}
+
+void main() {
+    ivec2 size = ivec2(push.size);
+    int spacing = int(push.spacing), x = int(gl_GlobalInvocationID.x), column = int(gl_GlobalInvocationID.y);
+    int first = column / spacing * (ROWS * spacing) + column % spacing;
+    if (x >= size.x || first >= size.y) return; // safe: no barrier() follows
+    Pixel centre[ROWS];
+    vec3 sum[ROWS];
+    float total[ROWS];
+    [[unroll]] for (int k = 0; k < ROWS; k++) {
+        centre[k] = pixel_at(min(first + k * spacing, size.y - 1) * size.x + x);
+        sum[k] = vec3(0.0);
+        total[k] = 0.0;
+    }
+    for (int i = -2; i <= 2; i++) {
+        int tap_x = x + i * spacing;
+        float across = tap_x >= 0 && tap_x < size.x ? b3_spline(i) : 0.0;
+        tap_x = clamp(tap_x, 0, size.x - 1);
+        [[unroll]] for (int j = -2; j < ROWS + 2; j++) {
+            int y = first + j * spacing;
+            float h = y >= 0 && y < size.y ? across : 0.0; // nothing is known outside
+            Pixel q = pixel_at(clamp(y, 0, size.y - 1) * size.x + tap_x);
+            [[unroll]] for (int k = max(j - 2, 0); k <= min(j + 2, ROWS - 1); k++) {
+                float w = h * b3_spline(j - k) * edge_weight(centre[k], q);
+                sum[k] += w * (q.colour.rgb - centre[k].colour.rgb);
+                total[k] += w;
+            }
+        }
+    }
+    [[unroll]] for (int k = 0; k < ROWS; k++) {
+        int y = first + k * spacing;
+        vec4 c = centre[k].colour;
+        // Relative to the centre, so that a constant image comes back exactly.
+        bool keep = CONSERVE && c.w > 0.0;
+        if (total[k] > 0.0) c = vec4(c.rgb + sum[k] / (keep ? 1.0 : total[k]), c.w > 0.0 ? c.w : 1.0);
+        if (y < size.y) filtered[y * size.x + x] = c;
+    }
+}

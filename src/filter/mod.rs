@@ -1,0 +1,94 @@
+//! Reconstructing the light between the samples. A filter is a row of [`FILTERS`]: a Rust file that records its kernels
+//! and has their CPU twin, and GLSL files of the same names.
+mod atrous;
+mod input;
+mod none;
+mod pack;
+mod pixel;
+mod settings;
+
+pub use input::FilterInput;
+pub use settings::{AtrousForm, FilterSettings};
+
+use crate::error::Result;
+use crate::gpu::layout::{Guide, vec3, vec4};
+use crate::gpu::{Buffer, FrameResources, Gpu, Location, PassTime, Recorder};
+
+/// Every filter, in the order of `--help`; the twin and stability tests run each row.
+pub const FILTERS: &[Row] = &[none::ROW, atrous::ROW];
+
+/// One filter.
+pub struct Row {
+    /// What a user types.
+    pub name: &'static str,
+    /// One line of help.
+    pub about: &'static str,
+    /// Compiles its kernels and makes its own buffers for images of (width, height).
+    pub make: fn(&Gpu, &FilterSettings, [u32; 2]) -> Result<Box<dyn Filter>>,
+    /// The same on the host, in plain Rust.
+    pub reference: fn(&FilterInput, &FilterSettings) -> Vec<vec4>,
+}
+
+/// A filter on a device, for one size and one set of settings.
+pub trait Filter {
+    /// radiance\[P\], guide\[P\], variance\[P\] -> output\[P\]
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when the image is too large for the device.
+    fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()>;
+}
+
+/// The images a filter reads and the one it writes, row-major. What they hold is said at [`FilterInput`].
+pub struct Planes {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// rgb, and the samples behind it.
+    pub radiance: Buffer<vec4>,
+    /// Centre-ray hits.
+    pub guide: Buffer<Guide>,
+    /// One element where there is none.
+    pub variance: Option<Buffer<vec3>>,
+    /// rgb, and the samples behind it: 1 where a pixel was in-painted, 0 where nothing reached it.
+    pub output: Buffer<vec4>,
+}
+
+impl Planes {
+    /// Copies `input` to the device.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when it does not fit.
+    pub fn new(gpu: &Gpu, input: &FilterInput) -> Result<Self> {
+        let variance = input.variance.as_ref();
+        Ok(Self {
+            size: [input.width, input.height],
+            radiance: Buffer::from_slice(gpu, "radiance", &input.radiance)?,
+            guide: Buffer::from_slice(gpu, "guide", &input.guide)?,
+            variance: variance.map(|v| Buffer::from_slice(gpu, "variance", v)).transpose()?,
+            output: Buffer::new(gpu, "filtered", input.radiance.len(), Location::Device)?,
+        })
+    }
+
+    /// Pixels.
+    pub fn pixels(&self) -> u32 {
+        self.size[0] * self.size[1]
+    }
+}
+
+/// The row of this name.
+pub fn find(name: &str) -> Option<&'static Row> {
+    FILTERS.iter().find(|row| row.name == name)
+}
+
+/// Filters one image: uploads it, runs `row` on it and reads the result; also what each pass took.
+///
+/// # Errors
+/// [`crate::error::Error::Usage`] when the settings or the planes' sizes are wrong, [`crate::error::Error::Device`] when
+/// the image is too large or the device fails.
+pub fn run(gpu: &Gpu, row: &Row, input: &FilterInput, settings: &FilterSettings) -> Result<(Vec<vec4>, Vec<PassTime>)> {
+    settings.validate()?;
+    input.validate()?;
+    let planes = Planes::new(gpu, input)?;
+    let filter = (row.make)(gpu, settings, planes.size)?;
+    let times = gpu.run(&mut FrameResources::new(gpu)?, |rec| filter.record(rec, &planes))?;
+    Ok((planes.output.read()?, times))
+}

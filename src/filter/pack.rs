@@ -1,0 +1,73 @@
+//! Makes the two planes that most filters' taps read. Kernel: `glsl/pack.comp`. Twin: [`Packed::reference`].
+use super::pixel::{known_normal, known_position, known_radiance};
+use super::{FilterInput, Planes};
+use crate::error::Result;
+use crate::gpu::layout::{Effects, PackPush, vec4};
+use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
+use crate::shaders::pack::Bind;
+use crate::stage::groups;
+use glam::Vec3;
+
+/// The kernel and its planes.
+pub struct Pack {
+    kernel: Kernel<Bind<'static>>,
+    /// Radiance and the samples behind it, all zero where nothing is known.
+    pub colour: Buffer<vec4>,
+    /// Position, and the bits of the normal.
+    pub place: Buffer<vec4>,
+}
+
+impl Pack {
+    /// For images of (width, height).
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when they do not fit.
+    pub fn new(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<Self> {
+        let plane = |name| Buffer::new(gpu, name, width as usize * height as usize, Location::Device);
+        Ok(Self {
+            kernel: Kernel::new(gpu, &Effects::default(), &[])?,
+            colour: plane("colour")?,
+            place: plane("place")?,
+        })
+    }
+
+    /// radiance\[P\], guide\[P\] -> colour\[P\], place\[P\]
+    pub fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
+        let bind = Bind { radiance: &planes.radiance, guide: &planes.guide, colour: &self.colour, place: &self.place };
+        rec.dispatch(&self.kernel, bind, &PackPush { count: planes.pixels() }, groups(planes.pixels(), 64))
+    }
+}
+
+/// A pixel as the taps see it.
+#[derive(Clone, Copy, Debug)]
+pub struct Packed {
+    /// Zero where nothing is known.
+    pub colour: Vec3,
+    /// Samples behind `colour`; 0 where nothing is known.
+    pub count: f32,
+    /// Unit, or zero.
+    pub normal: Vec3,
+    /// World units.
+    pub position: Vec3,
+}
+
+impl Packed {
+    /// Every pixel of an image.
+    pub fn reference(input: &FilterInput) -> Vec<Self> {
+        let pack = |(c, g): (&vec4, &crate::gpu::layout::Guide)| {
+            let colour = known_radiance(*c);
+            Self {
+                colour: colour.unwrap_or_default(),
+                count: colour.map_or(0.0, |_| c[3]),
+                normal: known_normal(g.normal),
+                position: known_position(g.position),
+            }
+        };
+        input.radiance.iter().zip(&input.guide).map(pack).collect()
+    }
+
+    /// As a result.
+    pub fn output(&self) -> vec4 {
+        self.colour.extend(self.count).into()
+    }
+}

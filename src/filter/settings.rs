@@ -1,0 +1,102 @@
+//! Every filter's parameters: default, unit and range in one place.
+use super::FilterInput;
+use super::pixel::known_radiance;
+use crate::error::{Error, Result};
+use glam::Vec3;
+
+/// How EAW's edge-stopping weights are computed: the paper's listing and its equations differ.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum AtrousForm {
+    /// As the listing: squared differences, that of normals divided by the squared distance between taps.
+    #[default]
+    Listing,
+    /// Squared differences, alike on every level.
+    Squared,
+    /// As equation 5 prints it: the norm of the difference, not squared.
+    Printed,
+}
+
+/// The parameters of all filters. A sigma of infinity switches its weight off.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilterSettings {
+    /// The radiance that `sigma_rt` counts in: the scale of the image's largest. Above 0; default 1.
+    pub intensity: f32,
+    /// World units that positions and depths are divided by: the extent of the scene. Above 0; default 1.
+    pub extent: f32,
+    /// Levels of the wavelet filters, 1 to 10; the footprint is 5 * 2^levels pixels wide. Default 5.
+    pub levels: u32,
+    /// Radiance difference that counts as an edge, in `intensity`; halved on every level. At least 0; default 1.
+    pub sigma_rt: f32,
+    /// Difference of unit normals that counts as an edge. At least 0; default 0.3.
+    pub sigma_n: f32,
+    /// Distance between hits that counts as an edge, in `extent`. At least 0; default 0.05.
+    pub sigma_x: f32,
+    /// Which of EAW's two descriptions `atrous` follows.
+    pub form: AtrousForm,
+    /// First level on which `atrous` uses the radiance weight, 0 to 10: EAW's 1 or 2 for images of which every 2nd or 4th
+    /// pixel is known. Default 0: unknown pixels do without it anyway.
+    pub rt_from_level: u32,
+    /// Whether what a neighbour's weight falls short of stays with the centre pixel, so that no light is lost or gained.
+    /// Default false, as published.
+    pub conserve_energy: bool,
+}
+
+impl Default for FilterSettings {
+    fn default() -> Self {
+        Self {
+            intensity: 1.0,
+            extent: 1.0,
+            levels: 5,
+            sigma_rt: 1.0,
+            sigma_n: 0.3,
+            sigma_x: 0.05,
+            form: AtrousForm::Listing,
+            rt_from_level: 0,
+            conserve_energy: false,
+        }
+    }
+}
+
+impl FilterSettings {
+    /// The most levels of a wavelet filter.
+    pub const MAX_LEVELS: u32 = 10;
+
+    /// # Errors
+    /// [`Error::Usage`] with the parameter, its value and its range.
+    pub fn validate(&self) -> Result<()> {
+        let within = |name: &str, value: u32, [low, high]: [u32; 2]| match (low..=high).contains(&value) {
+            true => Ok(()),
+            false => Err(Error::Usage(format!("{name} is {value}: choose a value from {low} to {high}"))),
+        };
+        let not_negative = |name: &str, value: f32| match value >= 0.0 {
+            true => Ok(()),
+            false => Err(Error::Usage(format!("{name} is {value}: choose 0 or more"))),
+        };
+        let scale = |name: &str, value: f32| match value > 0.0 && value.is_finite() {
+            true => Ok(()),
+            false => Err(Error::Usage(format!("{name} is {value}: choose a finite number above 0"))),
+        };
+        within("levels", self.levels, [1, Self::MAX_LEVELS])?;
+        within("rt-from-level", self.rt_from_level, [0, Self::MAX_LEVELS])?;
+        scale("intensity", self.intensity)?;
+        scale("extent", self.extent)?;
+        not_negative("sigma-rt", self.sigma_rt)?;
+        not_negative("sigma-n", self.sigma_n)?;
+        not_negative("sigma-x", self.sigma_x)
+    }
+
+    /// The same with `intensity` and `extent` taken from an image: its largest known channel, and the diagonal of the
+    /// box around the hits, or where there are no positions the largest depth. 1 where there is nothing to measure.
+    pub fn scaled_to(mut self, input: &FilterInput) -> Self {
+        let usable = |v: f32| if v.is_normal() && v > 0.0 { v } else { 1.0 };
+        let channels = input.radiance.iter().filter_map(|c| known_radiance(*c).map(|c| c.max_element()));
+        self.intensity = usable(channels.fold(0.0, f32::max));
+        let hits = || input.guide.iter().filter(|g| g.depth > 0.0 || g.position != [0.0; 3]);
+        let places = || hits().map(|g| Vec3::from(g.position)).filter(|p| p.is_finite());
+        let low = places().fold(Vec3::INFINITY, Vec3::min);
+        let diagonal = (places().fold(low, Vec3::max) - low).length();
+        let deepest = hits().map(|g| g.depth).filter(|d| d.is_finite()).fold(0.0, f32::max);
+        self.extent = usable(if diagonal > 0.0 { diagonal } else { deepest });
+        self
+    }
+}

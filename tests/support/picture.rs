@@ -1,0 +1,66 @@
+//! Images for the filters' tests: a floor and a wall with a step in depth, lit from one side.
+use crate::support::hash;
+use tallow::filter::{AtrousForm, FilterInput, FilterSettings};
+use tallow::gpu::layout::{Guide, NONE};
+
+/// Around the workgroups' sizes, and one pixel.
+pub const SIZES: [(u32, u32); 7] = [(1, 1), (31, 1), (1, 65), (31, 17), (64, 65), (33, 40), (130, 7)];
+
+pub struct Picture {
+    pub input: FilterInput,
+}
+
+impl Picture {
+    /// Without noise; a fifth of the columns at the right see nothing.
+    pub fn new(width: u32, height: u32) -> Self {
+        let pixel = |i: u32| {
+            let (x, y) = (i % width, i / width);
+            let (u, v) = (x as f32 / width as f32, y as f32 / height as f32);
+            let light = 0.2 + u * u + if v > 0.5 { 0.5 } else { 0.0 };
+            let floor = v > 0.6;
+            let depth = if floor { 6.0 - 4.0 * v } else { 5.0 + u };
+            let normal = if floor { [0.0, 1.0, 0.0] } else { [0.0, 0.1 * u, 1.0] };
+            let position = [4.0 * u - 2.0, 2.0 - 4.0 * v, -depth];
+            let guide = Guide { normal, depth, position, object: u32::from(floor), albedo: [0.5; 3], material: 0 };
+            let sky = Guide { object: NONE, material: NONE, ..Guide::default() };
+            ([light, 0.7 * light, 0.4 * light, 4.0], if u > 0.8 { sky } else { guide })
+        };
+        let (radiance, guide) = (0..width * height).map(pixel).unzip();
+        Self { input: FilterInput { width, height, radiance, guide, variance: None } }
+    }
+
+    /// Every pixel on one plane that faces the eye.
+    pub fn flat(mut self) -> Self {
+        let wall = Guide { normal: [0.0, 0.0, 1.0], depth: 1.0, position: [0.0, 0.0, -1.0], ..Guide::default() };
+        self.input.guide.fill(wall);
+        self
+    }
+
+    /// Exponential noise of the mean's size, the samples' variance beside it, and every 13th pixel without samples.
+    pub fn noisy(mut self) -> Self {
+        let mut variance = Vec::new();
+        for (i, c) in self.input.radiance.iter_mut().enumerate() {
+            variance.push([c[0] * c[0], c[1] * c[1], c[2] * c[2]]);
+            let u = (hash(i as u32) as f32 + 0.5) / 4_294_967_296.0;
+            let scale = -u.max(1e-6).ln();
+            *c = [c[0] * scale, c[1] * scale, c[2] * scale, if i % 13 == 12 { 0.0 } else { 4.0 }];
+        }
+        self.input.variance = Some(variance);
+        self
+    }
+}
+
+/// What each filter is tested with: its default and every switch of it.
+pub fn settings(filter: &str) -> Vec<FilterSettings> {
+    let (base, off) = (FilterSettings::default(), f32::INFINITY);
+    match filter {
+        "atrous" => vec![
+            base,
+            FilterSettings { sigma_rt: 0.3, conserve_energy: true, ..base },
+            FilterSettings { form: AtrousForm::Printed, levels: 3, rt_from_level: 2, ..base },
+            FilterSettings { form: AtrousForm::Squared, sigma_x: off, levels: 10, ..base },
+            FilterSettings { sigma_rt: off, sigma_n: off, ..base },
+        ],
+        _ => vec![base],
+    }
+}
