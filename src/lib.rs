@@ -1,6 +1,6 @@
 //! Tallow: a Vulkan-native path tracer.
 pub mod cli;
-//pub mod composition;
+pub mod composition;
 pub mod error;
 pub mod filter;
 mod frame;

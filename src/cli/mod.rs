@@ -2,12 +2,14 @@
 pub mod compare;
 pub mod devices;
 pub mod explain;
+pub mod filter;
 pub mod interrupt;
 pub mod layers;
 pub mod progress;
 pub mod render;
 
 use crate::error::{Error, Result};
+use crate::gpu::Gpu;
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use std::io::Write;
@@ -34,6 +36,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::Args>),
+    Filter(Box<filter::Args>),
     Compare(compare::Args),
     Explain(explain::Args),
     Devices(devices::Args),
@@ -74,6 +77,7 @@ pub fn main() -> ExitCode {
 fn run(command: Command) -> Result<Exit> {
     match command {
         Command::Render(args) => render::run(&args),
+        Command::Filter(args) => filter::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Explain(args) => explain::run(&args),
         Command::Devices(args) => devices::run(&args),
@@ -87,7 +91,9 @@ fn usage(e: &clap::Error) -> Result<Exit> {
         return print(&text).map(|()| Exit::Done);
     }
     if e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        return Err(Error::Usage("name a command: render, compare, explain or devices (see tallow --help)".to_owned()));
+        return Err(Error::Usage(
+            "name a command: render, filter, compare, explain or devices (see tallow --help)".to_owned(),
+        ));
     }
     let one_line = |paragraph: &str| paragraph.split_whitespace().collect::<Vec<_>>().join(" ");
     let parts = text.split("\n\n").map(one_line).filter(|p| !p.starts_with("Usage:") && !p.starts_with("For more"));
@@ -119,6 +125,14 @@ pub fn print(text: &str) -> Result<()> {
 pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
     let text = serde_json::to_string(value).map_err(|e| Error::output("standard output", e))?;
     print(&(text + "\n"))
+}
+
+/// With `--validation`, any message is a failure.
+fn fail_on_messages(gpu: &Gpu) -> Result<()> {
+    match gpu.validation_messages().first() {
+        Some(message) => Err(Error::Device(format!("validation: {message}"))),
+        None => Ok(()),
+    }
 }
 
 /// A finite number, for options where NaN would switch a check off.

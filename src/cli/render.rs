@@ -1,6 +1,6 @@
 //! `tallow render`: a scene becomes image files.
 use super::progress::Progress;
-use super::{Exit, finite, interrupt, layers, print, print_json};
+use super::{Exit, fail_on_messages, finite, interrupt, layers, print, print_json};
 use crate::error::{Error, Result};
 use crate::gpu::{self, DeviceOptions, FrameResources, Gpu, PassTime};
 use crate::image::{self, Film, WriteOptions, output, tone::ToneMap};
@@ -268,13 +268,6 @@ fn write(args: &Args, film: &Film) -> Result<()> {
         eprintln!("warning: {broken} pixels are not finite");
     }
     args.output_files().iter().try_for_each(|path| image::write(path, film, &args.write_options()))
-}
-
-fn fail_on_messages(gpu: &Gpu) -> Result<()> {
-    match gpu.validation_messages().first() {
-        Some(message) => Err(Error::Device(format!("validation: {message}"))),
-        None => Ok(()),
-    }
 }
 
 fn report(args: &Args, renderer: &Renderer, gpu: &Gpu, scene: &Scene, host: &Spans, times: &[PassTime]) -> Result<()> {

@@ -52,7 +52,8 @@ fn places(aovs: &Aovs, normals: &[Vec3], notes: &mut Vec<String>) -> (Vec<Vec3>,
             (positions, depths)
         }
         (false, true) => {
-            notes.push("position: made of the depth, as if seen with a vertical field of view of 40 degrees".to_owned());
+            notes
+                .push("position: made of the depth, as if seen with a vertical field of view of 40 degrees".to_owned());
             let depths: Vec<f32> = (0..pixels).map(depth).collect();
             ((0..pixels).map(|i| seen(aovs, i, depths[i])).collect(), depths)
         }

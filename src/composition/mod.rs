@@ -3,16 +3,14 @@
 //! | image | filtered | factor | sharp |
 //! |---|---|---|---|
 //! | Tallow's | indirect light before albedo | that albedo | direct light, emission, what smooth surfaces show |
-//! | with albedo | colour / albedo | albedo | pixels that reflect nothing |
+//! | with albedo | colour / albedo | albedo | what reflects nothing: lamps, sky |
 //! | any, plain | colour | 1 | nothing |
+mod albedo;
 mod guide;
 
 use crate::filter::FilterInput;
 use crate::gpu::layout::{vec3, vec4};
 use crate::image::aov::{Aov, Aovs};
-
-/// A channel of smaller albedo is divided by this instead; a pixel with no larger one is left as it is.
-const SMALLEST_ALBEDO: f32 = 0.01;
 
 /// An image taken apart.
 pub struct Parts {
@@ -31,7 +29,7 @@ pub fn split(aovs: &Aovs, demodulate: bool) -> Parts {
     let mut notes = Vec::new();
     let light = match (demodulate, aovs.get(Aov::Albedo), layers(aovs, &counts)) {
         (true, Some(albedo), Some(layers)) => split_light(colour, albedo, layers),
-        (true, Some(albedo), None) => by_albedo(colour, albedo),
+        (true, Some(albedo), None) => albedo::split(colour, albedo, aovs.film.width as usize),
         _ => plain(colour),
     };
     notes.push(light.note.to_owned());
@@ -89,20 +87,6 @@ fn split_light(colour: &[vec3], albedo: &[vec3], [direct, indirect]: [&[vec3]; 2
         factor: (0..colour.len()).map(factor).collect(),
         sharp: direct.to_vec(),
         note: "filtered: indirect light before albedo; direct light stays as it is",
-    }
-}
-
-fn by_albedo(colour: &[vec3], albedo: &[vec3]) -> Light {
-    let reflects = |a: &vec3| a.iter().any(|&v| v > SMALLEST_ALBEDO && v.is_finite());
-    let factor = |a: &vec3| if reflects(a) { a.map(|v| v.max(SMALLEST_ALBEDO)) } else { [0.0; 3] };
-    let factor: Vec<vec3> = albedo.iter().map(factor).collect();
-    let lit = |(c, f): (&vec3, &vec3)| if f[0] > 0.0 { std::array::from_fn(|k| c[k] / f[k]) } else { [0.0; 3] };
-    let dark = |(c, f): (&vec3, &vec3)| if f[0] > 0.0 { [0.0; 3] } else { *c };
-    Light {
-        filtered: colour.iter().zip(&factor).map(lit).collect(),
-        sharp: colour.iter().zip(&factor).map(dark).collect(),
-        factor,
-        note: "filtered: colour / albedo; pixels without albedo stay as they are",
     }
 }
 

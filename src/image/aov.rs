@@ -250,13 +250,8 @@ mod tests {
             "R G B Albedo.R Albedo.G Albedo.B P.X P.Y P.Z dzdx dzdy N.X N.Y N.Z Ns.X Ns.Y Ns.Z u v Variance.R Variance.G \
              Variance.B RelativeVariance.R RelativeVariance.G RelativeVariance.B",
         );
-        let expected = [
-            (Aov::Colour, 0.0),
-            (Aov::Albedo, 3.0),
-            (Aov::Normal, 14.0),
-            (Aov::Position, 6.0),
-            (Aov::Variance, 19.0),
-        ];
+        let expected =
+            [(Aov::Colour, 0.0), (Aov::Albedo, 3.0), (Aov::Normal, 14.0), (Aov::Position, 6.0), (Aov::Variance, 19.0)];
         assert_eq!(found(&file), expected);
     }
 
@@ -267,7 +262,11 @@ mod tests {
         let aovs = Aovs::find(&file, &names).unwrap();
         assert_eq!(aovs.scalar(Aov::Albedo, 0), Some(3.0));
         assert!(aovs.notes.contains(&"albedo: kd.R kd.G kd.B".to_owned()), "{:?}", aovs.notes);
-        assert!(aovs.notes.contains(&"normal: not there".to_owned()), "a single channel is no vector: {:?}", aovs.notes);
+        assert!(
+            aovs.notes.contains(&"normal: not there".to_owned()),
+            "a single channel is no vector: {:?}",
+            aovs.notes
+        );
         let wrong = Names::from([(Aov::Depth, "far".to_owned())]);
         let line = Aovs::find(&file, &wrong).map(|_| ()).unwrap_err();
         assert!(line.contains("depth") && line.contains("\"far\"") && line.contains("kd.R"), "{line}");
