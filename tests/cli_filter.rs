@@ -89,6 +89,7 @@ fn direct_light_of_our_own_files_stays_as_it_is_and_other_layers_too() {
         assert_eq!(clean.channel(&channel.name), Some(&channel.samples), "{}", channel.name);
     }
     assert_eq!(clean.metadata, film.metadata);
+    assert!(error(&filter(&folder, &["--filter", "atrous", "--filter-direct"]), lit) > 0.2);
     // Control: taken for a file of another renderer, direct light is filtered along.
     let mut foreign = film.clone();
     foreign.metadata.clear();
@@ -125,8 +126,8 @@ fn lamps_do_not_leak_through_their_rims() {
     let folder = tempfile::tempdir().unwrap();
     let mut film = noisy(false);
     // A lamp of radiance 50 without albedo, in the middle; the pixel beside it shows it by nine tenths.
-    let lamp = |i: u32| (14..18).contains(&(i % SIZE)) && (14..18).contains(&(i / SIZE));
-    let rim = 15 * SIZE + 18;
+    let lamp = |i: u32| (12..20).contains(&(i % SIZE)) && (12..20).contains(&(i / SIZE));
+    let rim = 15 * SIZE + 20;
     for channel in film.channels.iter_mut().filter(|c| ["R", "G", "B"].iter().any(|n| c.name.ends_with(n))) {
         let Samples::F32(values) = &mut channel.samples else { continue };
         let (own, part) = if channel.name.starts_with("albedo") { (0.0, 0.1) } else { (50.0, 45.0) };
@@ -140,7 +141,7 @@ fn lamps_do_not_leak_through_their_rims() {
         _ => checker(x, y),
     };
     let after = error(&filter(&folder, &["--filter", "atrous"]), expected);
-    assert!(after < 0.05, "{after}");
+    assert!(after < 0.04, "{after}");
 }
 
 #[test]

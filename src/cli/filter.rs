@@ -3,7 +3,7 @@ mod options;
 
 use super::compare::{self, check_sizes};
 use super::{Exit, fail_on_messages, finite, print, print_json};
-use crate::composition::{self, Parts};
+use crate::composition::{self, Demodulation, Parts};
 use crate::error::{Error, Result};
 use crate::filter::{self, FILTERS, Row};
 use crate::gpu::{DeviceOptions, Gpu, PassTime};
@@ -36,6 +36,9 @@ pub struct Args {
     /// Print how far the image is from this one, before and after
     #[arg(long, value_name = "FILE")]
     pub reference: Option<PathBuf>,
+    /// Filter direct light too, where the file holds it apart (Tallow's own do)
+    #[arg(long)]
+    pub filter_direct: bool,
     /// Filter the colour as it is: textures blur too
     #[arg(long)]
     pub no_demodulate: bool,
@@ -106,7 +109,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let reference = reference(args, &source)?;
     let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), validation: args.validation })?;
     let start = Instant::now();
-    let parts = composition::split(&aovs, !args.no_demodulate);
+    let parts = composition::split(&aovs, demodulation(args));
     let (colour, times) = filtered(args, &gpu, &parts)?;
     let seconds = start.elapsed().as_secs_f64();
     let clean = replaced(&source, &aovs, &colour)?;
@@ -128,6 +131,14 @@ pub fn run(args: &Args) -> Result<Exit> {
     };
     report(args, &summary)?;
     Ok(Exit::Done)
+}
+
+fn demodulation(args: &Args) -> Demodulation {
+    match (args.no_demodulate, args.filter_direct) {
+        (true, _) => Demodulation::Off,
+        (false, true) => Demodulation::Albedo,
+        (false, false) => Demodulation::Light,
+    }
 }
 
 fn filtered(args: &Args, gpu: &Gpu, parts: &Parts) -> Result<(Vec<[f32; 3]>, Vec<PassTime>)> {

@@ -12,6 +12,18 @@ use crate::filter::FilterInput;
 use crate::gpu::layout::{vec3, vec4};
 use crate::image::aov::{Aov, Aovs};
 
+/// What is kept away from the filter, where an image tells it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Demodulation {
+    /// Surface colour and direct light.
+    #[default]
+    Light,
+    /// Surface colour.
+    Albedo,
+    /// Nothing.
+    Off,
+}
+
 /// An image taken apart.
 pub struct Parts {
     /// What goes through the filter.
@@ -22,15 +34,15 @@ pub struct Parts {
     pub notes: Vec<String>,
 }
 
-/// Takes an image apart; with `demodulate`, surface colour is kept away from the filter where the image tells it.
-pub fn split(aovs: &Aovs, demodulate: bool) -> Parts {
+/// Takes an image apart.
+pub fn split(aovs: &Aovs, demodulation: Demodulation) -> Parts {
     let colour = aovs.get(Aov::Colour).unwrap_or_default();
     let counts = counts(aovs, colour);
     let mut notes = Vec::new();
-    let light = match (demodulate, aovs.get(Aov::Albedo), layers(aovs, &counts)) {
-        (true, Some(albedo), Some(layers)) => split_light(colour, albedo, layers),
-        (true, Some(albedo), None) => albedo::split(colour, albedo, aovs.film.width as usize),
-        _ => plain(colour),
+    let light = match (demodulation, aovs.get(Aov::Albedo), layers(aovs, &counts)) {
+        (Demodulation::Off, ..) | (_, None, _) => plain(colour),
+        (Demodulation::Light, Some(albedo), Some(layers)) => split_light(colour, albedo, layers),
+        (_, Some(albedo), _) => albedo::split(colour, albedo, aovs.film.width as usize),
     };
     notes.push(light.note.to_owned());
     let radiance = light.filtered.iter().zip(&counts).zip(&light.factor).map(with_count).collect();

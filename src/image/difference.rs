@@ -14,10 +14,16 @@ const GAP: usize = 4;
 /// # Panics
 /// When the sizes differ.
 pub fn heat_map(test: &Picture, reference: &Picture) -> (Picture, f32) {
-    assert_eq!((test.width, test.height), (reference.width, reference.height), "pictures of one size");
-    let error = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).map(|c| (a[c] - b[c]).abs()).sum::<f32>() / 3.0;
-    let errors: Vec<f32> = test.pixels.iter().zip(&reference.pixels).map(error).collect();
-    let top = scale_top(&errors);
+    let top = scale_top(&errors(test, reference));
+    (heat_map_to(test, reference, top), top)
+}
+
+/// The same with the top of the scale given, for pictures that are to be compared with each other.
+///
+/// # Panics
+/// When the sizes differ.
+pub fn heat_map_to(test: &Picture, reference: &Picture, top: f32) -> Picture {
+    let errors = errors(test, reference);
     let magma = magma();
     let colour = |fraction: f32| magma[(fraction * 255.0).round().min(255.0) as usize];
     let (width, height) = (test.width as usize, test.height as usize);
@@ -27,7 +33,13 @@ pub fn heat_map(test: &Picture, reference: &Picture) -> (Picture, f32) {
         pixels.extend([[1.0; 3]; GAP]);
         pixels.extend([colour((height - 1 - y) as f32 / (height - 1).max(1) as f32); BAR]);
     }
-    (Picture { width: test.width + WIDER, height: test.height, pixels }, top)
+    Picture { width: test.width + WIDER, height: test.height, pixels }
+}
+
+fn errors(test: &Picture, reference: &Picture) -> Vec<f32> {
+    assert_eq!((test.width, test.height), (reference.width, reference.height), "pictures of one size");
+    let error = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).map(|c| (a[c] - b[c]).abs()).sum::<f32>() / 3.0;
+    test.pixels.iter().zip(&reference.pixels).map(error).collect()
 }
 
 /// Columns that [`heat_map`] adds.

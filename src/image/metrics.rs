@@ -45,7 +45,12 @@ fn mean(test: &Picture, reference: &Picture, error: impl Fn(f64, f64) -> f64) ->
     sum / (3 * test.pixels.len()) as f64
 }
 
-fn psnr(test: &Picture, reference: &Picture) -> f64 {
+/// See [`Metrics::psnr`].
+///
+/// # Panics
+/// When their sizes differ.
+pub fn psnr(test: &Picture, reference: &Picture) -> f64 {
+    assert_eq!((test.width, test.height), (reference.width, reference.height), "pictures of one size");
     let shown = |v: f64| f64::from(srgb_from_linear(v as f32));
     -10.0 * mean(test, reference, |a, b| (shown(a) - shown(b)).powi(2)).log10()
 }

@@ -1,0 +1,66 @@
+//! The best settings of a filter for one image, by search.
+use tallow::filter::{FilterSettings, Row};
+
+/// One setting and the values that are tried.
+pub struct Knob {
+    name: &'static str,
+    values: &'static [f32],
+    set: fn(&mut FilterSettings, f32),
+}
+
+const OFF: f32 = f32::INFINITY;
+
+const LEVELS: Knob = Knob { name: "levels", values: &[2.0, 3.0, 4.0, 5.0, 6.0], set: |s, v| s.levels = v as u32 };
+const SIGMA_RT: Knob = Knob { name: "sigma_rt", values: &[0.03, 0.1, 0.3, 1.0, 3.0, OFF], set: |s, v| s.sigma_rt = v };
+const SIGMA_N: Knob = Knob { name: "sigma_n", values: &[0.1, 0.2, 0.4, 0.8, OFF], set: |s, v| s.sigma_n = v };
+const SIGMA_X: Knob = Knob { name: "sigma_x", values: &[0.01, 0.03, 0.1, 0.3, 1.0, OFF], set: |s, v| s.sigma_x = v };
+
+/// What is searched for a filter. A new one goes here.
+fn knobs(filter: &str) -> Vec<Knob> {
+    match filter {
+        "atrous" => vec![LEVELS, SIGMA_RT, SIGMA_N, SIGMA_X],
+        _ => vec![],
+    }
+}
+
+/// A filter at its best.
+pub struct Best {
+    /// The least error found.
+    pub error: f64,
+    /// Where it was found.
+    pub settings: FilterSettings,
+    /// The same as text.
+    pub text: String,
+}
+
+/// Descends along one setting after the other, twice, from the defaults; `error` judges.
+///
+/// # Errors
+/// Those of `error`.
+pub fn best(
+    row: &Row,
+    start: FilterSettings,
+    mut error: impl FnMut(&FilterSettings) -> anyhow::Result<f64>,
+) -> anyhow::Result<Best> {
+    let knobs = knobs(row.name);
+    let mut best = Best { error: error(&start)?, settings: start, text: String::new() };
+    let mut chosen = vec![None; knobs.len()];
+    for _ in 0..2 {
+        for (i, knob) in knobs.iter().enumerate() {
+            let before = chosen[i];
+            for &value in knob.values.iter().filter(|&&v| before != Some(v)) {
+                let mut settings = best.settings;
+                (knob.set)(&mut settings, value);
+                let found = error(&settings)?;
+                if found < best.error {
+                    (best.error, best.settings, chosen[i]) = (found, settings, Some(value));
+                }
+            }
+        }
+    }
+    let name = |(knob, value): (&Knob, &Option<f32>)| {
+        format!("{} {}", knob.name, value.map_or("default".to_owned(), |v| v.to_string()))
+    };
+    best.text = knobs.iter().zip(&chosen).map(name).collect::<Vec<_>>().join(", ");
+    Ok(best)
+}
