@@ -141,7 +141,7 @@ fn lamps_do_not_leak_through_their_rims() {
         _ => checker(x, y),
     };
     let after = error(&filter(&folder, &["--filter", "atrous"]), expected);
-    assert!(after < 0.04, "{after}");
+    assert!(after < 0.06, "{after}");
 }
 
 #[test]

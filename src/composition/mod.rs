@@ -128,3 +128,82 @@ fn variance(aovs: &Aovs, counts: &[f32]) -> Option<Vec<vec3>> {
 fn demodulated_variance((v, f): (&vec3, &vec3)) -> vec3 {
     std::array::from_fn(|c| if f[c] > 0.0 { v[c] / (f[c] * f[c]) } else { 0.0 })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::aov::Names;
+    use crate::image::{Film, Samples};
+
+    const RGB: [&str; 3] = ["R", "G", "B"];
+
+    /// One row: a wall of albedo 0.5 lit by 2, the rim of a lamp, the lamp.
+    fn film() -> Film {
+        let mut film = Film::new(4, 1);
+        film.add_vec3("", RGB, &[[1.0; 3], [1.0; 3], [25.0; 3], [50.0; 3]]);
+        film.add_vec3("albedo", RGB, &[[0.5; 3], [0.5; 3], [0.25; 3], [0.0; 3]]);
+        film
+    }
+
+    fn take_apart(film: &Film, demodulation: Demodulation) -> Parts {
+        split(&Aovs::find(film, &Names::new()).unwrap(), demodulation)
+    }
+
+    #[test]
+    fn lamps_and_their_rims_reach_no_other_pixel() {
+        let parts = take_apart(&film(), Demodulation::Light);
+        assert_eq!(parts.input.radiance, [[2.0, 2.0, 2.0, 1.0], [2.0, 2.0, 2.0, 1.0], [0.0; 4], [0.0; 4]]);
+        let joined = parts.join(&[[3.0, 3.0, 3.0, 1.0]; 4]);
+        assert_eq!(joined, [[1.5; 3], [1.5; 3], [25.0; 3], [50.0; 3]]);
+        // Control: in plain order all of it is filtered.
+        assert!(take_apart(&film(), Demodulation::Off).input.radiance.iter().all(|c| c[3] == 1.0));
+    }
+
+    #[test]
+    fn direct_light_is_left_out_only_where_every_pixel_has_some() {
+        let mut film = film();
+        film.metadata.insert("software".to_owned(), "tallow 0.1.0".to_owned());
+        film.add_vec3("direct", RGB, &[[0.5; 3], [0.5; 3], [25.0; 3], [50.0; 3]]);
+        film.add_vec3("indirect", RGB, &[[1.0; 3], [1.0; 3], [0.0; 3], [0.0; 3]]);
+        let counts = |counts: [u32; 4]| {
+            let mut film = film.clone();
+            film.add("samples", Samples::U32(counts.to_vec()));
+            take_apart(&film, Demodulation::Light).input.radiance
+        };
+        assert_eq!(counts([4; 4])[0], [1.0, 1.0, 1.0, 4.0]);
+        assert_eq!(counts([4, 0, 4, 4])[..2], [[2.0, 2.0, 2.0, 4.0], [2.0, 2.0, 2.0, 0.0]]);
+    }
+
+    #[test]
+    fn the_variance_of_a_pbrt_file_is_that_of_one_sample() {
+        let mut film = film();
+        film.add_vec3("Variance", RGB, &[[8.0; 3]; 4]);
+        let first = |film: &Film| take_apart(film, Demodulation::Light).input.variance.unwrap()[0][0];
+        assert_eq!(first(&film), 32.0, "of the mean, over the squared albedo");
+        film.add_vec3("RelativeVariance", RGB, &[[8.0; 3]; 4]);
+        film.metadata.insert("samplesPerPixel".to_owned(), "16".to_owned());
+        assert_eq!(first(&film), 2.0);
+    }
+
+    #[test]
+    fn positions_and_depths_are_made_of_each_other_and_it_is_said() {
+        let guides = |change: &dyn Fn(&mut Film)| {
+            let mut film = film();
+            film.add_vec3("N", ["X", "Y", "Z"], &[[0.0, 0.0, 0.5]; 4]);
+            change(&mut film);
+            let parts = take_apart(&film, Demodulation::Light);
+            (parts.input.guide, parts.notes.join("\n"))
+        };
+        let (guide, notes) = guides(&|film| film.add("Z", Samples::F32(vec![1.0, 2.0, 1e10, f32::INFINITY])));
+        assert_eq!([guide[0].depth, guide[2].depth, guide[3].depth], [1.0, 0.0, 0.0], "1e10 is Blender's sky");
+        assert!(guide[0].position[0] < 0.0 && guide[1].position[2] < guide[0].position[2], "{guide:?}");
+        assert_eq!(guide[0].normal, [0.0, 0.0, 1.0], "means of normals are made unit");
+        assert!(notes.contains("position: made of the depth"), "{notes}");
+        let hits = [[0.0, 1.0, 5.0], [0.0, 1.0, 4.0], [0.0, 1.0, 3.0], [0.0; 3]];
+        let (guide, notes) = guides(&|film| film.add_vec3("P", ["X", "Y", "Z"], &hits));
+        let depths: Vec<f32> = guide.iter().map(|g| g.depth).collect();
+        assert!(depths[0] > 0.0 && depths[1] == depths[0] + 1.0 && depths[2] == depths[0] + 2.0, "{depths:?}");
+        assert_eq!(depths[3], 0.0, "no hit");
+        assert!(notes.contains("depth: made of the position"), "{notes}");
+    }
+}
