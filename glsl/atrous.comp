@@ -74,10 +74,12 @@ void main() {
             int y = first + j * spacing;
             float h = y >= 0 && y < size.y ? across : 0.0; // nothing is known outside
             Pixel q = pixel_at(clamp(y, 0, size.y - 1) * size.x + tap_x);
-            [[unroll]] for (int k = max(j - 2, 0); k <= min(j + 2, ROWS - 1); k++) {
-                float w = h * b3_spline(j - k) * edge_weight(centre[k], q);
-                sum[k] += w * (q.colour.rgb - centre[k].colour.rgb);
-                total[k] += w;
+            [[unroll]] for (int k = 0; k < ROWS; k++) { // constant bounds, or it would not be unrolled
+                if (abs(j - k) <= 2) {
+                    float w = h * b3_spline(j - k) * edge_weight(centre[k], q);
+                    sum[k] += w * (q.colour.rgb - centre[k].colour.rgb);
+                    total[k] += w;
+                }
             }
         }
     }

@@ -2,8 +2,9 @@
 #include "shared/octahedral.glsl"
 
 const uint NO_NORMAL = 0x80008000u; // packSnorm2x16 never returns -32768
-const float LARGEST = 1e30;         // radiance beyond it is cut, so that differences and sums stay finite
+const float LARGEST = 1e24;         // radiance beyond it is cut, so that differences and sums stay finite
 const float FARTHEST = 1e18;        // the same for positions, whose squares are summed
+const float WIDEST = 1e7;           // the same for the guided filter's channels
 
 bool finite(float v) {
     return (floatBitsToUint(v) & 0x7f800000u) != 0x7f800000u; // by bits: isinf may be optimised away
@@ -26,4 +27,8 @@ uint packed_normal(vec3 n) {
 
 vec3 unpacked_normal(uint bits) {
     return bits == NO_NORMAL ? vec3(0.0) : octahedral_decode(bits);
+}
+
+float known_channel(float v) {
+    return finite(v) ? clamp(v, -WIDEST, WIDEST) : 0.0;
 }

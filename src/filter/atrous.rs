@@ -16,7 +16,7 @@ pub const ROW: Row = Row {
     reference,
 };
 
-/// Pixels that a thread filters, and threads of a workgroup, as in the kernel.
+/// Pixels of a column that a thread filters, and threads of a workgroup, as in the kernel.
 const ROWS: u32 = 4;
 const WORKGROUP: u32 = 32;
 /// Weights below 2^LEAST are 0.

@@ -1,6 +1,7 @@
 //! Reconstructing the light between the samples. A filter is a row of [`FILTERS`]: a Rust file that records its kernels
 //! and has their CPU twin, and GLSL files of the same names.
 mod atrous;
+mod guided;
 mod input;
 mod none;
 mod pack;
@@ -15,7 +16,7 @@ use crate::gpu::layout::{Guide, vec3, vec4};
 use crate::gpu::{Buffer, FrameResources, Gpu, Location, PassTime, Recorder};
 
 /// Every filter, in the order of `--help`; the twin and stability tests run each row.
-pub const FILTERS: &[Row] = &[none::ROW, atrous::ROW];
+pub const FILTERS: &[Row] = &[none::ROW, atrous::ROW, guided::ROW];
 
 /// One filter.
 pub struct Row {

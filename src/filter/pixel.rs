@@ -3,9 +3,12 @@ use crate::gpu::layout::{vec3, vec4};
 use glam::{Vec2, Vec3, vec2};
 
 /// Radiance beyond it is cut, so that differences and sums stay finite.
-pub const LARGEST: f32 = 1e30;
+pub const LARGEST: f32 = 1e24;
 /// The same for positions, whose squares are summed.
 pub const FARTHEST: f32 = 1e18;
+
+/// The same for the guided filter's channels.
+pub const WIDEST: f32 = 1e7;
 
 /// Radiance that some samples stand behind.
 pub fn known_radiance([r, g, b, count]: vec4) -> Option<Vec3> {
@@ -40,4 +43,9 @@ fn decode(e: Vec2) -> Vec3 {
     let t = (-n.z).max(0.0);
     let toward = |v: f32| if v >= 0.0 { v - t } else { v + t };
     Vec3::new(toward(n.x), toward(n.y), n.z).normalize()
+}
+
+/// Channel of a guide in single precision that squares and products can be taken of; 0 where there is none.
+pub fn known_channel(value: f32) -> f32 {
+    if value.is_finite() { value.clamp(-WIDEST, WIDEST) } else { 0.0 }
 }

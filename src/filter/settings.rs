@@ -2,6 +2,7 @@
 use super::FilterInput;
 use super::pixel::known_radiance;
 use crate::error::{Error, Result};
+use crate::gpu::layout::vec4;
 use glam::Vec3;
 
 /// How EAW's edge-stopping weights are computed: the paper's listing and its equations differ.
@@ -39,6 +40,13 @@ pub struct FilterSettings {
     /// Whether what a neighbour's weight falls short of stays with the centre pixel, so that no light is lost or gained.
     /// Default false, as published.
     pub conserve_energy: bool,
+    /// Pixels from the centre of a window of `guided` or `bilateral` to its border, 0 to 4096. Default 24.
+    pub radius: u32,
+    /// Channels of `guided`'s guide: 1 (grey normal), 3 (normal) or 4 (normal and depth). Default 4.
+    pub channels: u32,
+    /// Variance of each channel (normal, depth) below which `guided` sees no edge; normals halved, depths in `extent`. At
+    /// least 0; default 0.01, depth 0.02.
+    pub eps: vec4,
 }
 
 impl Default for FilterSettings {
@@ -53,6 +61,9 @@ impl Default for FilterSettings {
             form: AtrousForm::Listing,
             rt_from_level: 0,
             conserve_energy: false,
+            radius: 24,
+            channels: 4,
+            eps: [0.01, 0.01, 0.01, 0.02],
         }
     }
 }
@@ -77,6 +88,14 @@ impl FilterSettings {
             false => Err(Error::Usage(format!("{name} is {value}: choose a finite number above 0"))),
         };
         within("levels", self.levels, [1, Self::MAX_LEVELS])?;
+        within("radius", self.radius, [0, 4096])?;
+        if ![1, 3, 4].contains(&self.channels) {
+            return Err(Error::Usage(format!("channels is {}: choose 1, 3 or 4", self.channels)));
+        }
+        self.eps.iter().try_for_each(|eps| match eps.is_finite() {
+            true => not_negative("eps", *eps),
+            false => Err(Error::Usage(format!("eps is {eps}: choose a finite number of 0 or more"))),
+        })?;
         within("rt-from-level", self.rt_from_level, [0, Self::MAX_LEVELS])?;
         scale("intensity", self.intensity)?;
         scale("extent", self.extent)?;

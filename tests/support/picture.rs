@@ -1,4 +1,5 @@
 //! Images for the filters' tests: a floor and a wall with a step in depth, lit from one side.
+#![allow(dead_code)]
 use crate::support::hash;
 use tallow::filter::{AtrousForm, FilterInput, FilterSettings};
 use tallow::gpu::layout::{Guide, NONE};
@@ -60,6 +61,12 @@ pub fn settings(filter: &str) -> Vec<FilterSettings> {
             FilterSettings { form: AtrousForm::Printed, levels: 3, rt_from_level: 2, ..base },
             FilterSettings { form: AtrousForm::Squared, sigma_x: off, levels: 10, ..base },
             FilterSettings { sigma_rt: off, sigma_n: off, ..base },
+        ],
+        "guided" => vec![
+            FilterSettings { radius: 5, ..base },
+            FilterSettings { radius: 1, channels: 3, eps: [1e-4; 4], ..base },
+            FilterSettings { radius: 40, channels: 1, ..base },
+            FilterSettings { radius: 9, eps: [0.0; 4], ..base },
         ],
         _ => vec![base],
     }

@@ -1,5 +1,5 @@
 //! Push constants of the filters' kernels.
-use super::{float, uint, uvec2};
+use super::{float, uint, uvec2, vec4};
 use bytemuck::{Pod, Zeroable};
 
 gpu_structs! {
@@ -21,5 +21,27 @@ gpu_structs! {
         rate_n: float,
         /// The same of positions.
         rate_x: float,
+    }
+
+    /// Push constants of `guided_pack.comp`.
+    struct GuidedPackPush {
+        /// Pixels.
+        count: uint,
+        /// 1 / extent.
+        depth_scale: float,
+    }
+
+    /// Push constants of the passes of the guided filter, over a strip of rows.
+    struct GuidedPush {
+        /// Image in pixels.
+        size: uvec2,
+        /// First row of the strip.
+        first_row: uint,
+        /// Rows of the strip.
+        rows: uint,
+        /// Pixels from a window's centre to its border, along the pass.
+        radius: uint,
+        /// Added to the variance of each channel of the guide.
+        eps: vec4,
     }
 }

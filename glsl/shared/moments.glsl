@@ -1,0 +1,84 @@
+// Count, means and co-moments of the guide I (four channels) and the noisy N (three) over a set of pixels, merged by
+// Chan's rule (Chan, Golub, LeVeque 1979): about the sets' own means, so that nothing cancels, and without ever
+// subtracting a pixel, so that nothing is left behind by one that has gone.
+
+struct Moments {
+    vec4 head; // count, mean N
+    vec4 mean; // of I
+    vec4 xx;   // co-moments of I.x with I
+    vec3 yy;   // of I.y with I.yzw
+    vec3 zz;   // of I.z with I.zw, then of I.w
+    vec4 r;    // of N.r with I
+    vec4 g;
+    vec4 b;
+};
+
+const int MOMENTS = 8; // vec4s of a record
+const Moments NO_MOMENTS = Moments(vec4(0.0), vec4(0.0), vec4(0.0), vec3(0.0), vec3(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
+
+#define MOMENTS_LOAD(at, FETCH) \
+    Moments(FETCH(at), FETCH((at) + 1), FETCH((at) + 2), FETCH((at) + 3).xyz, FETCH((at) + 4).xyz, FETCH((at) + 5), \
+            FETCH((at) + 6), FETCH((at) + 7))
+#define MOMENTS_STORE(to, at, m) \
+    to[at] = m.head; to[(at) + 1] = m.mean; to[(at) + 2] = m.xx; to[(at) + 3] = vec4(m.yy, 0.0); \
+    to[(at) + 4] = vec4(m.zz, 0.0); to[(at) + 5] = m.r; to[(at) + 6] = m.g; to[(at) + 7] = m.b
+
+// `m` with a set of these means and `count` pixels that do not vary.
+void absorb_means(inout Moments m, float count, vec3 n, vec4 i) {
+    vec3 off_n = n - m.head.yzw;
+    vec4 off_i = i - m.mean;
+    float all = m.head.x + count, share = count / max(all, 1.0);
+    vec4 scaled = m.head.x * share * off_i;
+    m.head = vec4(all, m.head.yzw + share * off_n);
+    m.mean += share * off_i;
+    m.xx += scaled.x * off_i;
+    m.yy += scaled.y * off_i.yzw;
+    m.zz += scaled.zzw * off_i.zww;
+    m.r += off_n.r * scaled;
+    m.g += off_n.g * scaled;
+    m.b += off_n.b * scaled;
+}
+
+void absorb(inout Moments m, Moments other) {
+    absorb_means(m, other.head.x, other.head.yzw, other.mean);
+    m.xx += other.xx;
+    m.yy += other.yy;
+    m.zz += other.zz;
+    m.r += other.r;
+    m.g += other.g;
+    m.b += other.b;
+}
+
+float reciprocal_pivot(float pivot, float diagonal) {
+    // A channel that the others explain, or that is constant, takes no part.
+    return pivot > 1e-5 * diagonal && pivot > 1e-20 ? 1.0 / pivot : 0.0;
+}
+
+// Solves (I-I co-moments + ridge) a = co-moments of N with I, for the three channels, by L D L^T.
+void solve(Moments m, vec4 ridge, out vec4 r, out vec4 g, out vec4 b) {
+    vec4 diagonal = vec4(m.xx.x, m.yy.x, m.zz.x, m.zz.z) + ridge, d;
+    d.x = reciprocal_pivot(diagonal.x, diagonal.x);
+    vec3 l0 = m.xx.yzw * d.x; // column 0 of L, below the diagonal
+    d.y = reciprocal_pivot(diagonal.y - l0.x * m.xx.y, diagonal.y);
+    vec2 u1 = m.yy.yz - l0.x * m.xx.zw;
+    vec2 l1 = u1 * d.y;
+    d.z = reciprocal_pivot(diagonal.z - l0.y * m.xx.z - l1.x * u1.x, diagonal.z);
+    float u2 = m.zz.y - l0.y * m.xx.w - l1.x * u1.y;
+    float l2 = u2 * d.z;
+    d.w = reciprocal_pivot(diagonal.w - l0.z * m.xx.w - l1.y * u1.y - l2 * u2, diagonal.w);
+    mat3x4 rhs = mat3x4(m.r, m.g, m.b);
+    for (int c = 0; c < 3; c++) {
+        vec4 v = rhs[c];
+        v.y -= l0.x * v.x;
+        v.z -= l0.y * v.x + l1.x * v.y;
+        v.w -= l0.z * v.x + l1.y * v.y + l2 * v.z;
+        v *= d;
+        v.z -= l2 * v.w;
+        v.y -= l1.x * v.z + l1.y * v.w;
+        v.x -= l0.x * v.y + l0.y * v.z + l0.z * v.w;
+        rhs[c] = v;
+    }
+    r = rhs[0];
+    g = rhs[1];
+    b = rhs[2];
+}

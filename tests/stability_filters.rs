@@ -1,0 +1,198 @@
+//! What no input may do to a filter. Every check runs over every row of the table, on the device and on its twin.
+#[path = "support/picture.rs"]
+mod picture;
+mod support;
+
+use picture::Picture;
+use support::{assert_silent, gpu};
+use tallow::filter::{FILTERS, FilterInput, FilterSettings, Row, find, run};
+use tallow::gpu::Gpu;
+use tallow::gpu::layout::{Guide, vec4};
+
+/// Device and twin, under every setting that the filter is tested with and these besides.
+fn outputs(gpu: &Gpu, row: &Row, input: &FilterInput, more: &[FilterSettings]) -> Vec<Vec<vec4>> {
+    let all = picture::settings(row.name).into_iter().chain(more.iter().copied());
+    all.flat_map(|s| {
+        let s = s.scaled_to(input);
+        [run(gpu, row, input, &s).unwrap().0, (row.reference)(input, &s)]
+    })
+    .collect()
+}
+
+/// Settings at the ends of their ranges.
+fn extremes() -> Vec<FilterSettings> {
+    let base = FilterSettings::default();
+    let sigmas = |s: f32| FilterSettings { sigma_rt: s, sigma_n: s, sigma_x: s, ..base };
+    let wide = FilterSettings { eps: [0.0; 4], radius: 100, levels: 10, ..sigmas(f32::INFINITY) };
+    vec![FilterSettings { radius: 0, ..sigmas(0.0) }, wide, sigmas(1e-30), sigmas(1e30)]
+}
+
+/// Every known pixel of every output holds `value` to `tolerance`, and at least the input's known pixels are known.
+fn assert_all(name: &str, outputs: &[Vec<vec4>], input: &FilterInput, value: f32, tolerance: f32) {
+    for (case, output) in outputs.iter().enumerate() {
+        for (i, (out, c)) in output.iter().zip(&input.radiance).enumerate() {
+            let near = out[..3].iter().all(|v| (v - value).abs() <= tolerance * value.abs());
+            let lost = out[3] == 0.0 && !(c[3] > 0.0 && c.iter().all(|v| v.is_finite()));
+            assert!(near || lost, "{name} case {case} pixel {i}: {out:?}, not {value}");
+        }
+    }
+}
+
+fn constant(width: u32, height: u32, value: f32) -> FilterInput {
+    let mut input = Picture::new(width, height).input;
+    input.radiance.fill([value, value, value, 1.0]);
+    input.variance = Some(vec![[0.0; 3]; input.radiance.len()]);
+    input
+}
+
+#[test]
+fn constant_images_come_back() {
+    let gpu = gpu();
+    for row in FILTERS {
+        let sizes = [(1, 1), (40, 1)].map(|size| (size, 0.5));
+        let values = [0.0, 1e-30, 65504.0, 1e20].map(|value| ((33, 18), value));
+        for ((width, height), value) in sizes.into_iter().chain(values) {
+            let input = constant(width, height, value);
+            let outputs = outputs(&gpu, row, &input, &extremes());
+            assert_all(row.name, &outputs, &input, value, 2e-6);
+            let mut wrong = outputs[0].clone();
+            wrong[0][0] += 1e-5 * value + 1e-35;
+            let caught = std::panic::catch_unwind(|| assert_all("", &[wrong], &input, value, 2e-6)).is_err();
+            assert!(caught, "control: a pixel is 1e-5 off");
+        }
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn a_constant_image_stands_any_guide() {
+    let gpu = gpu();
+    let bad = |v: f32| Guide { normal: [v; 3], depth: v, position: [v; 3], albedo: [v; 3], ..Guide::default() };
+    let fills = [0.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, 1e-38].map(bad);
+    for row in FILTERS {
+        let mut mixed = constant(21, 13, 3.0);
+        for (i, fill) in fills.iter().enumerate() {
+            let mut input = constant(21, 13, 3.0);
+            input.guide.fill(*fill);
+            assert_all(row.name, &outputs(&gpu, row, &input, &extremes()), &input, 3.0, 2e-6);
+            mixed.guide.iter_mut().skip(i).step_by(11).for_each(|g| *g = *fill);
+        }
+        assert_all(row.name, &outputs(&gpu, row, &mixed, &extremes()), &mixed, 3.0, 2e-6);
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn bad_radiance_reaches_no_other_pixel() {
+    let gpu = gpu();
+    for row in FILTERS {
+        let mut input = constant(33, 18, 0.25);
+        let bad = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+        for (i, c) in input.radiance.iter_mut().enumerate().filter(|(i, _)| i % 7 == 3) {
+            *c = match i % 4 {
+                3 => [9.0, 9.0, 9.0, [0.0, -1.0, f32::NAN, f32::INFINITY][i / 4 % 4]],
+                j => [0.25, bad[j], 0.25, 1.0],
+            };
+        }
+        for (i, v) in input.variance.as_mut().unwrap().iter_mut().enumerate().filter(|(i, _)| i % 5 == 1) {
+            *v = [bad[i % 3], -1.0, 1e38];
+        }
+        assert_all(row.name, &outputs(&gpu, row, &input, &extremes()), &input, 0.25, 2e-6);
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn one_known_pixel_is_all_there_is() {
+    let gpu = gpu();
+    for row in FILTERS {
+        let mut input = constant(19, 23, 7.0);
+        input.radiance.iter_mut().enumerate().filter(|(i, _)| *i != 200).for_each(|(_, c)| *c = [5.0, 5.0, 5.0, 0.0]);
+        let outputs = outputs(&gpu, row, &input, &extremes());
+        for output in &outputs {
+            let odd = output.iter().find(|c| **c != [0.0; 4] && c[..3].iter().any(|v| (v - 7.0).abs() > 1e-5));
+            assert!(odd.is_none() && output[200][3] > 0.0, "{}: {odd:?}", row.name);
+        }
+    }
+    assert_silent(&gpu);
+}
+
+/// Extreme values side by side: whatever comes out is a number within the range of what went in.
+#[test]
+fn no_nan_leaves_a_filter() {
+    let gpu = gpu();
+    for row in FILTERS {
+        let mut input = Picture::new(35, 20).noisy().input;
+        let values = [0.0, 1e-38, 1e-30, 65504.0, 1e20, 3e38, -1.0, -3e38];
+        for (i, c) in input.radiance.iter_mut().enumerate().filter(|(i, _)| i % 3 == 0) {
+            *c = [values[i / 3 % 8], values[i / 24 % 8], values[i % 8], 1.0];
+        }
+        for output in outputs(&gpu, row, &input, &extremes()) {
+            assert!(output.iter().flatten().all(|v| v.is_finite()), "{}: a NaN or an infinity", row.name);
+        }
+    }
+    assert_silent(&gpu);
+}
+
+/// Two planes at right angles, lit apart: neither takes light from the other.
+#[test]
+fn edges_of_the_geometry_hold() {
+    let gpu = gpu();
+    for row in FILTERS {
+        let mut input = constant(64, 40, 1.0);
+        for (i, (c, g)) in input.radiance.iter_mut().zip(&mut input.guide).enumerate() {
+            let left = i % 64 < 30;
+            *g = Guide { normal: [f32::from(left), f32::from(!left), 0.0], depth: 1.0, ..Guide::default() };
+            *c = if left { [0.0, 0.0, 0.0, 1.0] } else { [4.0, 4.0, 4.0, 1.0] };
+        }
+        // Narrow weights; what a filter of linear fits lets through is its eps against the contrast of the guide.
+        let narrow = FilterSettings { sigma_n: 0.1, eps: [1e-4; 4], ..FilterSettings::default() };
+        let narrow = narrow.scaled_to(&input);
+        for output in [run(&gpu, row, &input, &narrow).unwrap().0, (row.reference)(&input, &narrow)] {
+            let worst = output.iter().zip(&input.radiance).map(|(a, b)| (a[0] - b[0]).abs()).fold(0.0, f32::max);
+            assert!(worst < 0.25, "{}: {worst} crossed the edge", row.name);
+        }
+    }
+    assert_silent(&gpu);
+}
+
+fn mean(pixels: &[vec4]) -> f64 {
+    pixels.iter().map(|c| f64::from(c[0] + c[1] + c[2])).sum::<f64>() / pixels.len() as f64
+}
+
+#[test]
+fn energy_is_kept() {
+    let gpu = gpu();
+    let row = find("atrous").unwrap();
+    let mut input = Picture::new(96, 80).noisy().input;
+    input.radiance.iter_mut().for_each(|c| c[3] = 4.0);
+    let narrow = FilterSettings { sigma_rt: 0.05, ..FilterSettings::default() }.scaled_to(&input);
+    let ratio = |s: &FilterSettings| mean(&run(&gpu, row, &input, s).unwrap().0) / mean(&input.radiance);
+    let kept = ratio(&FilterSettings { conserve_energy: true, ..narrow });
+    assert!((kept - 1.0).abs() < 1e-5, "{kept}");
+    let lost = ratio(&narrow);
+    assert!((lost - 1.0).abs() > 1e-3, "control: as published, {lost} of the light is left");
+    assert_silent(&gpu);
+}
+
+#[test]
+fn settings_and_images_out_of_range_are_refused() {
+    let gpu = gpu();
+    let (row, input, base) = (find("atrous").unwrap(), constant(4, 4, 1.0), FilterSettings::default());
+    let refused = [
+        FilterSettings { levels: 0, ..base },
+        FilterSettings { levels: 11, ..base },
+        FilterSettings { sigma_n: -1.0, ..base },
+        FilterSettings { sigma_x: f32::NAN, ..base },
+        FilterSettings { extent: 0.0, ..base },
+        FilterSettings { intensity: f32::INFINITY, ..base },
+    ];
+    for settings in refused {
+        let error = run(&gpu, row, &input, &settings).map(|_| ()).unwrap_err();
+        assert_eq!(error.exit_code(), 2, "{error}");
+    }
+    let short = FilterInput { guide: vec![Guide::default(); 15], ..input.clone() };
+    let error = run(&gpu, row, &short, &base).map(|_| ()).unwrap_err();
+    assert!(error.to_string().contains("guide has 15 pixels"), "{error}");
+    assert!(run(&gpu, row, &FilterInput::default(), &base).is_err());
+}

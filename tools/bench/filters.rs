@@ -1,0 +1,55 @@
+//! Milliseconds of the filters on the device: medians over rounds, after a first run that compiles the kernels.
+//!   cargo run --release --example bench-filters -- [NAME WIDTH HEIGHT ROUNDS]
+#![allow(missing_docs)]
+use anyhow::{Context, Result};
+use tallow::filter::{FilterInput, FilterSettings, Planes, find};
+use tallow::gpu::layout::Guide;
+use tallow::gpu::{DeviceOptions, FrameResources, Gpu, PassTime};
+
+/// A checkered floor under exponential noise, as opencv_bench.py makes it, with positions.
+fn picture(width: u32, height: u32) -> FilterInput {
+    let mut state = 1u32;
+    let mut noise = || {
+        state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+        -0.2 * ((state >> 8) as f32 / 16_777_216.0 + 1e-7).ln()
+    };
+    let mut pixel = |i: u32| {
+        let (x, y) = (i % width, i / width);
+        let (u, v) = (x as f32 / width as f32, y as f32 / height as f32);
+        let normal = if (x / 64 + y / 64) % 2 == 0 { [0.0, 0.6, 0.8] } else { [0.0, 0.0, 1.0] };
+        let guide =
+            Guide { normal, depth: 2.0 + u + v, position: [u, v, -2.0 - u], albedo: [0.5; 3], ..Guide::default() };
+        ([0.1 + normal[1] + noise(), 0.1 + 0.8 * u + noise(), 0.1 + 0.8 * v + noise(), 1.0], guide)
+    };
+    let (radiance, guide) = (0..width * height).map(&mut pixel).unzip();
+    FilterInput { width, height, radiance, guide, variance: None }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+fn main() -> Result<()> {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let name = args.first().map_or("atrous", String::as_str);
+    let number = |i: usize, or: u32| args.get(i).map_or(Ok(or), |a| a.parse());
+    let (width, height, rounds) = (number(1, 512)?, number(2, 512)?, number(3, 11)?);
+    let gpu = Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), validation: false })?;
+    let input = picture(width, height);
+    let row = find(name).context("no such filter")?;
+    let settings = FilterSettings::default().scaled_to(&input);
+    let planes = Planes::new(&gpu, &input)?;
+    let filter = (row.make)(&gpu, &settings, planes.size)?;
+    let mut frame = FrameResources::new(&gpu)?;
+    let mut round = || gpu.run(&mut frame, |rec| filter.record(rec, &planes));
+    round()?;
+    let runs = (0..rounds).map(|_| round()).collect::<tallow::error::Result<Vec<_>>>()?;
+    let ms = |p: &PassTime| (p.end_ns - p.begin_ns) as f64 * 1e-6;
+    for pass in 0..runs[0].len() {
+        println!("{:24} {:8.2} ms", runs[0][pass].name, median(runs.iter().map(|r| ms(&r[pass])).collect()));
+    }
+    let total = median(runs.iter().map(|r| r.iter().map(ms).sum()).collect());
+    println!("{name} {width}x{height}: {total:.2} ms, median of {rounds}, on {}", gpu.info().name);
+    Ok(())
+}
