@@ -15,10 +15,21 @@ const SIGMA_RT: Knob = Knob { name: "sigma_rt", values: &[0.03, 0.1, 0.3, 1.0, 3
 const SIGMA_N: Knob = Knob { name: "sigma_n", values: &[0.1, 0.2, 0.4, 0.8, OFF], set: |s, v| s.sigma_n = v };
 const SIGMA_X: Knob = Knob { name: "sigma_x", values: &[0.01, 0.03, 0.1, 0.3, 1.0, OFF], set: |s, v| s.sigma_x = v };
 
+const RADIUS: Knob =
+    Knob { name: "radius", values: &[4.0, 8.0, 12.0, 16.0, 24.0, 32.0], set: |s, v| s.radius = v as u32 };
+const EPS_N: Knob = Knob {
+    name: "eps of the normal",
+    values: &[1e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1],
+    set: |s, v| s.eps = [v, v, v, s.eps[3]],
+};
+const EPS_Z: Knob =
+    Knob { name: "eps of the depth", values: &[1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.03], set: |s, v| s.eps[3] = v };
+
 /// What is searched for a filter. A new one goes here.
 fn knobs(filter: &str) -> Vec<Knob> {
     match filter {
         "atrous" => vec![LEVELS, SIGMA_RT, SIGMA_N, SIGMA_X],
+        "guided" => vec![RADIUS, EPS_N, EPS_Z],
         _ => vec![],
     }
 }

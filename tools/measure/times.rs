@@ -23,9 +23,15 @@ struct Line {
 }
 
 const GIF: &[Line] = &[
+    Line { filter: "bilateral", what: "radius 16", published: 447.0, set: |s| s.radius = 16 },
+    Line { filter: "bilateral", what: "radius 24", published: 1001.0, set: |s| s.radius = 24 },
+    Line { filter: "bilateral", what: "radius 32", published: 1768.0, set: |s| s.radius = 32 },
     Line { filter: "atrous", what: "4 levels", published: 54.0, set: |s| s.levels = 4 },
     Line { filter: "atrous", what: "5 levels", published: 68.0, set: |s| s.levels = 5 },
     Line { filter: "atrous", what: "6 levels", published: 82.0, set: |s| s.levels = 6 },
+    Line { filter: "guided", what: "1 channel", published: 16.0, set: |s| s.channels = 1 },
+    Line { filter: "guided", what: "3 channels", published: 71.0, set: |s| s.channels = 3 },
+    Line { filter: "guided", what: "4 channels", published: 80.0, set: |s| s.channels = 4 },
 ];
 
 /// # Errors

@@ -77,6 +77,25 @@ pub struct Overrides {
     /// Leave rejected weight with the centre pixel
     #[arg(long)]
     pub conserve_energy: bool,
+    /// Pixels from the centre of a window of guided or bilateral to its border
+    #[arg(long, value_name = "N")]
+    pub radius: Option<u32>,
+    /// Channels of guided's guide: 1 (grey normal), 3 (normal) or 4 (normal and depth)
+    #[arg(long, value_name = "N")]
+    pub channels: Option<u32>,
+    /// Variance of the guide below which guided sees no edge: one number, or one per channel
+    #[arg(long, value_name = "N[,N,N,N]", value_parser = per_channel)]
+    pub eps: Option<[f32; 4]>,
+}
+
+/// One number for all channels, or four.
+fn per_channel(text: &str) -> Result<[f32; 4], String> {
+    let numbers: Result<Vec<f32>, _> = text.split(',').map(str::parse).collect();
+    match numbers.as_deref() {
+        Ok([n]) => Ok([*n; 4]),
+        Ok(&[a, b, c, d]) => Ok([a, b, c, d]),
+        _ => Err("expected one number, or four with commas between them".to_owned()),
+    }
 }
 
 impl Overrides {
@@ -93,6 +112,9 @@ impl Overrides {
             form: self.form.unwrap_or(own.form),
             rt_from_level: self.rt_from_level.unwrap_or(own.rt_from_level),
             conserve_energy: self.conserve_energy || own.conserve_energy,
+            radius: self.radius.unwrap_or(own.radius),
+            channels: self.channels.unwrap_or(own.channels),
+            eps: self.eps.unwrap_or(own.eps),
         }
     }
 }
