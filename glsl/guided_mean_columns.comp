@@ -11,10 +11,13 @@ layout(binding = 1) uniform samplerBuffer slope_g; // of vec4
 layout(binding = 2) uniform samplerBuffer slope_b; // of vec4
 layout(binding = 3) uniform samplerBuffer value; // of vec4
 layout(binding = 4) uniform samplerBuffer channels; // of vec4
-layout(scalar, binding = 5) buffer Columns { vec4 columns[]; };
+layout(binding = 5) uniform samplerBuffer ends; // of vec4
+layout(scalar, binding = 6) writeonly buffer Sums { vec4 sums[]; };
 layout(scalar, push_constant) uniform Push { GuidedPush push; };
 
-#define STORED(at) columns[at]
+layout(constant_id = 110) const bool BACKWARD = false; // the first of two dispatches: ends of blocks only
+
+#define FETCH_END(at) texelFetch(ends, at)
 
 int pixel_at(int x, int y) {
     return clamp(y, 0, int(push.size.y) - 1) * int(push.size.x) + x;
@@ -37,21 +40,23 @@ void main() {
     int middle = int(push.first_row) + first, rows = min(window, int(push.rows) - first);
     Fit f = NO_FIT;
     vec4 point = vec4(0.0);
-    for (int i = window - 1; i >= 0; i--) {
-        absorb_pixel(f, point, x, middle - radius + i);
-        if (i < rows) {
-            Fit moved = f;
-            move(moved, texelFetch(channels, pixel_at(x, middle + i)) - point);
-            FIT_STORE(columns, FIT * ((first + i) * width + x), moved);
+    if (BACKWARD) {
+        for (int i = window - 1; i >= 0; i--) {
+            absorb_pixel(f, point, x, middle - radius + i);
+            if (i < rows) {
+                Fit moved = f;
+                move(moved, texelFetch(channels, pixel_at(x, middle + i)) - point);
+                FIT_STORE(sums, FIT * ((first + i) * width + x), moved);
+            }
         }
+        return;
     }
-    f = NO_FIT;
-    for (int i = 1; i < rows; i++) {
-        absorb_pixel(f, point, x, middle + radius + i);
+    for (int i = 0; i < rows; i++) {
+        if (i > 0) absorb_pixel(f, point, x, middle + radius + i);
         int at = FIT * ((first + i) * width + x);
-        Fit whole = FIT_LOAD(at, STORED), moved = f;
+        Fit whole = FIT_LOAD(at, FETCH_END), moved = f;
         move(moved, texelFetch(channels, pixel_at(x, middle + i)) - point);
         absorb(whole, moved);
-        FIT_STORE(columns, at, whole);
+        FIT_STORE(sums, at, whole);
     }
 }

@@ -11,12 +11,15 @@ layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer columns; // of vec4
 layout(binding = 1) uniform samplerBuffer channels; // of vec4
 layout(binding = 2) uniform samplerBuffer colour; // of vec4
-layout(scalar, binding = 3) buffer Ends { vec4 ends[]; };
-layout(scalar, binding = 4) writeonly buffer Output { vec4 filtered[]; };
+layout(binding = 3) uniform samplerBuffer ends; // of vec4
+layout(scalar, binding = 4) writeonly buffer Sums { vec4 sums[]; };
+layout(scalar, binding = 5) writeonly buffer Output { vec4 filtered[]; };
 layout(scalar, push_constant) uniform Push { GuidedPush push; };
 
-#define FETCHED(at) texelFetch(columns, at)
-#define STORED(at) ends[at]
+layout(constant_id = 110) const bool BACKWARD = false; // the first of two dispatches: ends of blocks only
+
+#define FETCH_COLUMN(at) texelFetch(columns, at)
+#define FETCH_END(at) texelFetch(ends, at)
 
 vec4 point_at(int row, int x) {
     return texelFetch(channels, (int(push.first_row) + row) * int(push.size.x) + x);
@@ -28,7 +31,7 @@ void absorb_column(inout Fit f, inout vec4 point, int row, int x) {
     vec4 here = point_at(row, x);
     move(f, here - point);
     point = here;
-    Fit column = FIT_LOAD(FIT * (row * int(push.size.x) + x), FETCHED);
+    Fit column = FIT_LOAD(FIT * (row * int(push.size.x) + x), FETCH_COLUMN);
     absorb(f, column);
 }
 
@@ -38,18 +41,20 @@ void main() {
     int window = 2 * radius + 1, first = int(gl_GlobalInvocationID.y) * window, count = min(window, width - first);
     Fit f = NO_FIT;
     vec4 point = vec4(0.0);
-    for (int i = window - 1; i >= 0; i--) {
-        absorb_column(f, point, row, first - radius + i);
-        if (i < count) {
-            Fit moved = f;
-            move(moved, point_at(row, first + i) - point);
-            FIT_STORE(ends, FIT * (row * width + first + i), moved);
+    if (BACKWARD) {
+        for (int i = window - 1; i >= 0; i--) {
+            absorb_column(f, point, row, first - radius + i);
+            if (i < count) {
+                Fit moved = f;
+                move(moved, point_at(row, first + i) - point);
+                FIT_STORE(sums, FIT * (row * width + first + i), moved);
+            }
         }
+        return;
     }
-    f = NO_FIT;
     for (int i = 0; i < count; i++) {
         if (i > 0) absorb_column(f, point, row, first + radius + i);
-        Fit whole = FIT_LOAD(FIT * (row * width + first + i), STORED), moved = f;
+        Fit whole = FIT_LOAD(FIT * (row * width + first + i), FETCH_END), moved = f;
         move(moved, point_at(row, first + i) - point);
         absorb(whole, moved);
         int pixel = (int(push.first_row) + row) * width + first + i;

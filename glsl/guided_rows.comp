@@ -9,19 +9,22 @@
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer columns; // of vec4
 layout(binding = 1) uniform samplerBuffer channels; // of vec4
-layout(scalar, binding = 2) buffer Ends { vec4 ends[]; };
-layout(scalar, binding = 3) writeonly buffer SlopeR { vec4 slope_r[]; };
-layout(scalar, binding = 4) writeonly buffer SlopeG { vec4 slope_g[]; };
-layout(scalar, binding = 5) writeonly buffer SlopeB { vec4 slope_b[]; };
-layout(scalar, binding = 6) writeonly buffer Values { vec4 value[]; };
+layout(binding = 2) uniform samplerBuffer ends; // of vec4
+layout(scalar, binding = 3) writeonly buffer Sums { vec4 sums[]; };
+layout(scalar, binding = 4) writeonly buffer SlopeR { vec4 slope_r[]; };
+layout(scalar, binding = 5) writeonly buffer SlopeG { vec4 slope_g[]; };
+layout(scalar, binding = 6) writeonly buffer SlopeB { vec4 slope_b[]; };
+layout(scalar, binding = 7) writeonly buffer Values { vec4 value[]; };
 layout(scalar, push_constant) uniform Push { GuidedPush push; };
 
-#define FETCHED(at) texelFetch(columns, at)
-#define STORED(at) ends[at]
+layout(constant_id = 110) const bool BACKWARD = false; // the first of two dispatches: ends of blocks only
+
+#define FETCH_COLUMN(at) texelFetch(columns, at)
+#define FETCH_END(at) texelFetch(ends, at)
 
 void absorb_column(inout Moments m, int row, int x) {
     if (x < 0 || x >= int(push.size.x)) return;
-    Moments column = MOMENTS_LOAD(MOMENTS * (row * int(push.size.x) + x), FETCHED);
+    Moments column = MOMENTS_LOAD(MOMENTS * (row * int(push.size.x) + x), FETCH_COLUMN);
     absorb(m, column);
 }
 
@@ -31,14 +34,16 @@ void main() {
     int window = 2 * int(push.radius) + 1, first = int(gl_GlobalInvocationID.y) * window;
     int left = first - int(push.radius), count = min(window, width - first);
     Moments m = NO_MOMENTS;
-    for (int i = window - 1; i >= 0; i--) {
-        absorb_column(m, row, left + i);
-        if (i < count) { MOMENTS_STORE(ends, MOMENTS * (row * width + first + i), m); }
+    if (BACKWARD) {
+        for (int i = window - 1; i >= 0; i--) {
+            absorb_column(m, row, left + i);
+            if (i < count) { MOMENTS_STORE(sums, MOMENTS * (row * width + first + i), m); }
+        }
+        return;
     }
-    m = NO_MOMENTS;
     for (int i = 0; i < count; i++) {
         if (i > 0) absorb_column(m, row, left + window + i - 1);
-        Moments whole = MOMENTS_LOAD(MOMENTS * (row * width + first + i), STORED);
+        Moments whole = MOMENTS_LOAD(MOMENTS * (row * width + first + i), FETCH_END);
         absorb(whole, m);
         vec4 r, g, b;
         solve(whole, whole.head.x * push.eps, r, g, b);

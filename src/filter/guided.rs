@@ -4,7 +4,7 @@ use super::pixel::{known_channel, known_radiance};
 use super::{Filter, FilterInput, FilterSettings, Planes, Row};
 use crate::error::Result;
 use crate::gpu::layout::{Effects, Guide, GuidedPackPush, GuidedPush, vec4};
-use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
+use crate::gpu::{Bindings, Buffer, Gpu, Kernel, Location, Recorder};
 use crate::shaders::{guided_columns, guided_mean_columns, guided_mean_rows, guided_pack, guided_rows};
 use crate::stage::groups;
 use glam::{DVec3, DVec4};
@@ -26,12 +26,14 @@ const RECORD: u64 = 128;
 const STRIP_CPU: u64 = 8 << 20;
 const STRIP_GPU: u64 = 256 << 20;
 
+/// Each pass over the strips is two dispatches of one kernel.
 struct Guided {
     pack: Kernel<guided_pack::Bind<'static>>,
-    columns: Kernel<guided_columns::Bind<'static>>,
-    rows: Kernel<guided_rows::Bind<'static>>,
-    mean_columns: Kernel<guided_mean_columns::Bind<'static>>,
-    mean_rows: Kernel<guided_mean_rows::Bind<'static>>,
+    // Backward, then forward.
+    columns: [Kernel<guided_columns::Bind<'static>>; 2],
+    rows: [Kernel<guided_rows::Bind<'static>>; 2],
+    mean_columns: [Kernel<guided_mean_columns::Bind<'static>>; 2],
+    mean_rows: [Kernel<guided_mean_rows::Bind<'static>>; 2],
     colour: Buffer<vec4>,
     channels: Buffer<vec4>,
     /// Slopes of the three colours, then the value at the window's centre with the number of its windows.
@@ -48,13 +50,12 @@ impl Guided {
         let strip_rows = strip_rows(gpu, settings.radius, width, height);
         let plane = |name| Buffer::new(gpu, name, pixels, Location::Device);
         let strip = |name| Buffer::new(gpu, name, strip_rows as usize * width as usize * 8, Location::Device);
-        let effects = Effects::default();
         Ok(Self {
-            pack: Kernel::new(gpu, &effects, &[(110, settings.channels)])?,
-            columns: Kernel::new(gpu, &effects, &[])?,
-            rows: Kernel::new(gpu, &effects, &[])?,
-            mean_columns: Kernel::new(gpu, &effects, &[])?,
-            mean_rows: Kernel::new(gpu, &effects, &[])?,
+            pack: Kernel::new(gpu, &Effects::default(), &[(110, settings.channels)])?,
+            columns: both(gpu)?,
+            rows: both(gpu)?,
+            mean_columns: both(gpu)?,
+            mean_rows: both(gpu)?,
             colour: plane("colour")?,
             channels: plane("channels")?,
             model: [plane("slope_r")?, plane("slope_g")?, plane("slope_b")?, plane("value")?],
@@ -88,9 +89,13 @@ impl Guided {
         let ([columns, ends], [slope_r, slope_g, slope_b, value]) = (&self.strip, &self.model);
         let (colour, channels) = (&self.colour, &self.channels);
         for [(down, groups_down), (along, groups_along)] in self.strips(size) {
-            rec.dispatch(&self.columns, guided_columns::Bind { colour, channels, columns }, &down, groups_down)?;
-            let bind = guided_rows::Bind { columns, channels, ends, slope_r, slope_g, slope_b, value };
-            rec.dispatch(&self.rows, bind, &along, groups_along)?;
+            for (kernel, [ends, sums]) in self.columns.iter().zip([[columns, ends], [ends, columns]]) {
+                rec.dispatch(kernel, guided_columns::Bind { colour, channels, ends, sums }, &down, groups_down)?;
+            }
+            for (kernel, [ends, sums]) in self.rows.iter().zip([[columns, ends], [ends, columns]]) {
+                let bind = guided_rows::Bind { columns, channels, ends, sums, slope_r, slope_g, slope_b, value };
+                rec.dispatch(kernel, bind, &along, groups_along)?;
+            }
         }
         Ok(())
     }
@@ -99,13 +104,23 @@ impl Guided {
         let ([columns, ends], [slope_r, slope_g, slope_b, value]) = (&self.strip, &self.model);
         let (colour, channels, filtered) = (&self.colour, &self.channels, &planes.output);
         for [(down, groups_down), (along, groups_along)] in self.strips(planes.size) {
-            let bind = guided_mean_columns::Bind { slope_r, slope_g, slope_b, value, channels, columns };
-            rec.dispatch(&self.mean_columns, bind, &down, groups_down)?;
-            let bind = guided_mean_rows::Bind { columns, channels, colour, ends, filtered };
-            rec.dispatch(&self.mean_rows, bind, &along, groups_along)?;
+            for (kernel, [ends, sums]) in self.mean_columns.iter().zip([[columns, ends], [ends, columns]]) {
+                let bind = guided_mean_columns::Bind { slope_r, slope_g, slope_b, value, channels, ends, sums };
+                rec.dispatch(kernel, bind, &down, groups_down)?;
+            }
+            for (kernel, [ends, sums]) in self.mean_rows.iter().zip([[columns, ends], [ends, columns]]) {
+                let bind = guided_mean_rows::Bind { columns, channels, colour, ends, sums, filtered };
+                rec.dispatch(kernel, bind, &along, groups_along)?;
+            }
         }
         Ok(())
     }
+}
+
+/// A kernel for walking blocks backward, and the same for walking them forward.
+fn both<B: Bindings>(gpu: &Gpu) -> Result<[Kernel<B>; 2]> {
+    let kernel = |backward| Kernel::new(gpu, &Effects::default(), &[(110, backward)]);
+    Ok([kernel(1)?, kernel(0)?])
 }
 
 /// A multiple of the window where memory allows it, so that no block is cut.

@@ -2,6 +2,7 @@
 //!   cargo run --release --example bench-filters -- [NAME WIDTH HEIGHT ROUNDS]
 #![allow(missing_docs)]
 use anyhow::{Context, Result};
+use std::collections::BTreeSet;
 use tallow::filter::{FilterInput, FilterSettings, Planes, find};
 use tallow::gpu::layout::Guide;
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu, PassTime};
@@ -46,10 +47,17 @@ fn main() -> Result<()> {
     round()?;
     let runs = (0..rounds).map(|_| round()).collect::<tallow::error::Result<Vec<_>>>()?;
     let ms = |p: &PassTime| (p.end_ns - p.begin_ns) as f64 * 1e-6;
-    for pass in 0..runs[0].len() {
-        println!("{:24} {:8.2} ms", runs[0][pass].name, median(runs.iter().map(|r| ms(&r[pass])).collect()));
+    let total = |kernel: Option<&str>| {
+        let of = |run: &Vec<PassTime>| run.iter().filter(|p| kernel.is_none_or(|k| k == p.name)).map(ms).sum::<f64>();
+        let times: Vec<f64> = runs.iter().map(of).collect();
+        (times.iter().copied().fold(f64::INFINITY, f64::min), median(times))
+    };
+    let kernels: BTreeSet<&str> = runs[0].iter().map(|p| p.name).collect();
+    for kernel in kernels {
+        let (best, median) = total(Some(kernel));
+        println!("{kernel:24} best {best:8.2} ms, median {median:8.2} ms");
     }
-    let total = median(runs.iter().map(|r| r.iter().map(ms).sum()).collect());
-    println!("{name} {width}x{height}: {total:.2} ms, median of {rounds}, on {}", gpu.info().name);
+    let (best, median) = total(None);
+    println!("{name} {width}x{height}: best {best:.2} ms, median {median:.2} ms of {rounds}, on {}", gpu.info().name);
     Ok(())
 }
