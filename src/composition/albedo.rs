@@ -6,6 +6,8 @@ use crate::gpu::layout::vec3;
 const SMALLEST_ALBEDO: f32 = 0.01;
 /// A pixel with less than this part of its neighbours' albedo may show a piece of something that has none.
 const WHOLE: f32 = 0.98;
+/// And one with this many times the light of its neighbours.
+const OUTLIER: f32 = 2.0;
 
 /// Lamps and sky, and the pixels at their rims, are not filtered: a rim's light divided by its little albedo would
 /// outshine everything around it.
@@ -35,12 +37,18 @@ fn largest(v: &vec3) -> f32 {
     v.iter().copied().filter(|v| v.is_finite()).fold(0.0, f32::max)
 }
 
-/// Beside something brighter that reflects nothing, with less albedo than another neighbour.
+/// Beside something brighter that reflects nothing, and partly of it: with less albedo than another neighbour, or, where
+/// albedo is that of pixel centres, far brighter than most neighbours.
 fn is_rim(colour: &[vec3], albedo: &[vec3], width: usize, i: usize) -> bool {
-    let own = largest(&albedo[i]);
+    let neighbours = || neighbours(colour.len(), width, i);
     let outshone = |q: usize| !reflects(&albedo[q]) && largest(&colour[q]) > largest(&colour[i]);
-    neighbours(colour.len(), width, i).any(outshone)
-        && neighbours(colour.len(), width, i).any(|q| own < WHOLE * largest(&albedo[q]))
+    if !neighbours().any(outshone) {
+        return false;
+    }
+    let mut others: Vec<f32> = neighbours().filter(|&q| reflects(&albedo[q])).map(|q| largest(&colour[q])).collect();
+    others.sort_by(f32::total_cmp);
+    let median = others.get(others.len() / 2).copied().unwrap_or(0.0);
+    largest(&colour[i]) > OUTLIER * median || neighbours().any(|q| largest(&albedo[i]) < WHOLE * largest(&albedo[q]))
 }
 
 /// Up to eight.

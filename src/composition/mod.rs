@@ -155,6 +155,11 @@ mod tests {
         assert_eq!(parts.input.radiance, [[2.0, 2.0, 2.0, 1.0], [2.0, 2.0, 2.0, 1.0], [0.0; 4], [0.0; 4]]);
         let joined = parts.join(&[[3.0, 3.0, 3.0, 1.0]; 4]);
         assert_eq!(joined, [[1.5; 3], [1.5; 3], [25.0; 3], [50.0; 3]]);
+        // The albedo of pixel centres does not show that the third pixel is a rim; its light does.
+        let mut centre = film();
+        centre.channels.truncate(3);
+        centre.add_vec3("albedo", RGB, &[[0.5; 3], [0.5; 3], [0.5; 3], [0.0; 3]]);
+        assert_eq!(take_apart(&centre, Demodulation::Light).input.radiance[2], [0.0; 4]);
         // Control: in plain order all of it is filtered.
         assert!(take_apart(&film(), Demodulation::Off).input.radiance.iter().all(|c| c[3] == 1.0));
     }

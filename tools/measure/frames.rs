@@ -35,7 +35,8 @@ impl View {
 
     /// Where a render of it lies.
     pub fn file(&self, args: &Args, spp: u32) -> PathBuf {
-        args.output.join(format!("{}-{spp}spp.exr", self.name))
+        let [width, height] = self.size;
+        args.output.join(format!("{}-{width}x{height}-{spp}spp.exr", self.name))
     }
 }
 

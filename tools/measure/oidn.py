@@ -1,4 +1,4 @@
-"""Open Image Denoise on an EXR of Tallow's: python oidn.py NOISY.exr FOLDER
+"""Open Image Denoise on an EXR of Tallow's or of cornell_mitsuba.py's: python oidn.py NOISY.exr FOLDER
 Prints QUALITY MILLISECONDS FILE per line, the time being the best of 5 after one that prepares the filter."""
 import os, sys, time
 import mitsuba as mi, numpy as np
@@ -18,7 +18,7 @@ def plane(name):
     return np.ascontiguousarray(np.stack([values[..., names.index(c)] for c in order], -1))
 
 
-colour, albedo, normal = plane("<root>"), plane("albedo"), plane("N")
+colour, albedo, normal = plane("<root>"), plane("albedo"), plane("N" if "N" in parts else "nn")
 for name in ("High", "Balanced", "Fast"):
     quality = getattr(oidn.Quality, name)
     times = []
@@ -26,6 +26,6 @@ for name in ("High", "Balanced", "Fast"):
         start = time.perf_counter()
         out = oidn.denoise(colour, albedo, normal, hdr=True, quality=quality)
         times.append(1e3 * (time.perf_counter() - start))
-    path = os.path.join(sys.argv[2], f"cornell-oidn-{name}.exr")
+    path = os.path.join(sys.argv[2], f"{os.path.basename(sys.argv[1])}-oidn-{name}.exr")
     mi.Bitmap(np.asarray(out)).write(path)
     print(name, f"{min(times[1:]):.2f}", path)

@@ -13,9 +13,9 @@ use tallow::report::table;
 const DEPTH: u32 = 4;
 
 const VIEWS: &[View] = &[
-    View { name: "bust-room", scene: "scenes/bust/room.toml", size: [240, 320], depth: DEPTH },
+    View { name: "bust-room", scene: "scenes/bust/room.toml", size: [180, 240], depth: DEPTH },
     View { name: "dragon", scene: "stanford-dragon", size: [256, 256], depth: DEPTH },
-    View { name: "sibenik", scene: "sibenik", size: [320, 180], depth: DEPTH },
+    View { name: "sibenik", scene: "sibenik", size: [256, 144], depth: DEPTH },
 ];
 
 /// Scene, samples per pixel, and the published errors of cross bilateral, À-Trous and guided.
