@@ -43,11 +43,13 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
 
 fn one(gpu: &Gpu, args: &Args, view: &View, spp: u32) -> anyhow::Result<()> {
     let case = Case::new(&view.render(args, spp)?, &view.render(args, REFERENCE)?, Demodulation::Light)?;
-    let mut rows = Vec::new();
+    let (mut rows, mut errors, mut sweeps) = (Vec::new(), Vec::new(), String::new());
     let mut tiles = vec![Tile::new("noisy", &case.noisy)];
     for row in FILTERS {
         let best = search(gpu, &case, row)?;
         let picture = case.whole(&case.run(gpu, row, &best.settings)?);
+        errors.push((row.name, best.error));
+        sweeps += &best.around;
         rows.push(vec![
             row.name.to_owned(),
             format!("{:.2}", best.error),
@@ -59,8 +61,21 @@ fn one(gpu: &Gpu, args: &Args, view: &View, spp: u32) -> anyhow::Result<()> {
     }
     println!("{}, {}x{}, {spp} samples per pixel", view.name, view.size[0], view.size[1]);
     println!("{}", table::text(&["filter", "light", "image", "published", "best settings"], &rows));
-    let file = args.output.join(format!("{}-{spp}spp-sheet.png", view.name));
-    sheet::write(&file, &tiles, &case.reference)
+    print!("{}", ratios(view.name, spp, &errors));
+    let file = |suffix| args.output.join(format!("{}-{spp}spp-{suffix}", view.name));
+    std::fs::write(file("sweep.txt"), sweeps)?;
+    sheet::write(&file("sheet.png"), &tiles, &case.reference)
+}
+
+/// What is compared with what the paper found, scenes being different.
+fn ratios(scene: &str, spp: u32, errors: &[(&str, f64)]) -> String {
+    let ours = |name: &str| errors.iter().find(|(known, _)| *known == name).map(|(_, error)| *error);
+    let theirs = |name| published(scene, spp, name).parse::<f64>().ok();
+    let ratio = |other: &str| {
+        let (ours, theirs) = (ours("guided")? / ours(other)?, theirs("guided")? / theirs(other)?);
+        Some(format!("guided / {other}: {ours:.2}, published {theirs:.2}\n"))
+    };
+    ["bilateral", "atrous"].into_iter().filter_map(ratio).collect()
 }
 
 fn search(gpu: &Gpu, case: &Case, row: &Row) -> anyhow::Result<Best> {

@@ -42,6 +42,8 @@ pub struct Best {
     pub settings: FilterSettings,
     /// The same as text.
     pub text: String,
+    /// The errors around it, a line per setting, the others being at their best.
+    pub around: String,
 }
 
 /// Descends along one setting after the other, twice, from the defaults; `error` judges.
@@ -54,19 +56,13 @@ pub fn best(
     mut error: impl FnMut(&FilterSettings) -> anyhow::Result<f64>,
 ) -> anyhow::Result<Best> {
     let knobs = knobs(row.name);
-    let mut best = Best { error: error(&start)?, settings: start, text: String::new() };
+    let mut best = Best { error: error(&start)?, settings: start, text: String::new(), around: String::new() };
     let mut chosen = vec![None; knobs.len()];
     for _ in 0..2 {
-        for (i, knob) in knobs.iter().enumerate() {
-            let before = chosen[i];
-            for &value in knob.values.iter().filter(|&&v| before != Some(v)) {
-                let mut settings = best.settings;
-                (knob.set)(&mut settings, value);
-                let found = error(&settings)?;
-                if found < best.error {
-                    (best.error, best.settings, chosen[i]) = (found, settings, Some(value));
-                }
-            }
+        best.around.clear();
+        for (knob, chosen) in knobs.iter().zip(&mut chosen) {
+            let line = along(knob, &mut best, chosen, &mut error)?;
+            best.around += &format!("{} {}:{line}\n", row.name, knob.name);
         }
     }
     let name = |(knob, value): (&Knob, &Option<f32>)| {
@@ -74,4 +70,24 @@ pub fn best(
     };
     best.text = knobs.iter().zip(&chosen).map(name).collect::<Vec<_>>().join(", ");
     Ok(best)
+}
+
+/// Tries every value of one setting, and returns what came out.
+fn along(
+    knob: &Knob,
+    best: &mut Best,
+    chosen: &mut Option<f32>,
+    error: &mut impl FnMut(&FilterSettings) -> anyhow::Result<f64>,
+) -> anyhow::Result<String> {
+    let mut line = String::new();
+    for &value in knob.values {
+        let mut settings = best.settings;
+        (knob.set)(&mut settings, value);
+        let found = if *chosen == Some(value) { best.error } else { error(&settings)? };
+        if found < best.error {
+            (best.error, best.settings, *chosen) = (found, settings, Some(value));
+        }
+        line += &format!(" {value} -> {found:.4};");
+    }
+    Ok(line)
 }
