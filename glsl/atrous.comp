@@ -3,7 +3,7 @@
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_GOOGLE_include_directive : require
 #include "layout.glsl"
-#include "shared/pixel.glsl"
+#include "shared/edge.glsl"
 
 // One level of the edge-avoiding A-Trous wavelet transform (Dammertz et al. 2010, section 2.2): 5x5 taps that are
 // push.spacing pixels apart, each weighted by how alike the two pixels are. A thread filters ROWS pixels of a column,
@@ -15,20 +15,9 @@ layout(binding = 1) uniform samplerBuffer place; // of vec4
 layout(scalar, binding = 2) writeonly buffer Output { vec4 filtered[]; };
 layout(scalar, push_constant) uniform Push { AtrousPush push; };
 
-layout(constant_id = 110) const bool WEIGHT_RT = true;
-layout(constant_id = 111) const bool WEIGHT_N = true;
-layout(constant_id = 112) const bool WEIGHT_X = true;
-layout(constant_id = 113) const bool SQUARED = true;   // false: the norms as equation 5 prints them
 layout(constant_id = 114) const bool CONSERVE = false; // what a neighbour is refused stays with the centre
 
 const int ROWS = 4;
-const float LEAST = -80.0; // weights below 2^LEAST are 0, on every device
-
-struct Pixel {
-    vec4 colour;
-    vec3 normal;
-    vec3 position;
-};
 
 float b3_spline(int offset) {
     int by = abs(offset);
@@ -36,21 +25,7 @@ float b3_spline(int offset) {
 }
 
 Pixel pixel_at(int at) {
-    vec4 p = texelFetch(place, at);
-    return Pixel(texelFetch(colour, at), WEIGHT_N ? unpacked_normal(floatBitsToUint(p.w)) : vec3(0.0), p.xyz);
-}
-
-float difference(vec3 d) {
-    float squared = dot(d, d);
-    return SQUARED ? squared : sqrt(squared);
-}
-
-float edge_weight(Pixel p, Pixel q) {
-    float exponent = 0.0;
-    if (WEIGHT_RT && p.colour.w > 0.0) exponent -= push.rate_rt * difference(q.colour.rgb - p.colour.rgb);
-    if (WEIGHT_N) exponent -= push.rate_n * difference(q.normal - p.normal);
-    if (WEIGHT_X) exponent -= push.rate_x * difference(q.position - p.position);
-    return q.colour.w > 0.0 && exponent > LEAST ? exp2(exponent) : 0.0;
+    return unpack_pixel(texelFetch(colour, at), texelFetch(place, at));
 }
 
 void main() {
@@ -76,7 +51,7 @@ void main() {
             Pixel q = pixel_at(clamp(y, 0, size.y - 1) * size.x + tap_x);
             [[unroll]] for (int k = 0; k < ROWS; k++) { // constant bounds, or it would not be unrolled
                 if (abs(j - k) <= 2) {
-                    float w = h * b3_spline(j - k) * edge_weight(centre[k], q);
+                    float w = h * b3_spline(j - k) * edge_weight(q, edge_exponent(centre[k], q, push.rates));
                     sum[k] += w * (q.colour.rgb - centre[k].colour.rgb);
                     total[k] += w;
                 }

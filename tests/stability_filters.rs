@@ -22,7 +22,7 @@ fn outputs(gpu: &Gpu, row: &Row, input: &FilterInput, more: &[FilterSettings]) -
 /// Settings at the ends of their ranges.
 fn extremes() -> Vec<FilterSettings> {
     let base = FilterSettings::default();
-    let sigmas = |s: f32| FilterSettings { sigma_rt: s, sigma_n: s, sigma_x: s, ..base };
+    let sigmas = |s: f32| FilterSettings { sigma_rt: s, sigma_n: s, sigma_x: s, sigma_l: s, ..base };
     let wide = FilterSettings { eps: [0.0; 4], radius: 100, levels: 10, ..sigmas(f32::INFINITY) };
     vec![FilterSettings { radius: 0, ..sigmas(0.0) }, wide, sigmas(1e-30), sigmas(1e30)]
 }

@@ -5,7 +5,7 @@ mod support;
 
 use picture::{Picture, SIZES};
 use support::{assert_silent, gpu};
-use tallow::filter::{FILTERS, FilterInput, FilterSettings, find, run};
+use tallow::filter::{FILTERS, FilterInput, FilterSettings, find, firefly, run};
 use tallow::gpu::layout::vec4;
 
 /// The largest difference of a channel, relative to the pixel's largest where that is above `scale`.
@@ -78,4 +78,31 @@ fn atrous_solves_the_worked_example() {
     // An unknown pixel between 2 and 4 takes their mean, whatever the radiance weight, and counts as one sample.
     let painted = reference(&line(&[2.0, f32::NAN, 4.0]), &FilterSettings { sigma_rt: 0.1, ..plain });
     assert_eq!(painted[1], [3.0, 3.0, 3.0, 1.0]);
+}
+
+#[test]
+fn fireflies_are_cut_and_accounted_for() {
+    let gpu = gpu();
+    // A lone 9 over a floor of 1 is cut to twice that; two together keep each other.
+    let mut input = Picture::new(20, 6).flat().input;
+    input.radiance.fill([1.0, 1.0, 1.0, 1.0]);
+    input.radiance[2 * 20 + 4] = [9.0, 9.0, 9.0, 1.0];
+    input.radiance[2 * 20 + 14] = [9.0, 9.0, 9.0, 1.0];
+    input.radiance[3 * 20 + 14] = [9.0, 9.0, 9.0, 1.0];
+    input.radiance[3 * 20 + 15] = [9.0, 9.0, 9.0, 1.0];
+    let host = firefly::reference(&input, 2.0);
+    let before = input.clone();
+    let removed = firefly::remove_fireflies(&gpu, &mut input, 2.0).unwrap();
+    assert!(apart(&input.radiance, &host, 1.0) < 1e-6);
+    assert!((input.radiance[2 * 20 + 4][0] - 2.0).abs() < 1e-6 && input.radiance[2 * 20 + 14][0] == 9.0);
+    assert_eq!((removed.pixels, removed.radiance[1].round()), (1, 7.0));
+    assert!((removed.share - 7.0 / (120.0 + 4.0 * 8.0)).abs() < 1e-6, "{removed:?}");
+    assert_eq!(firefly::removed(&before.radiance, &before.radiance).pixels, 0, "control: nothing was cut");
+    assert!(firefly::remove_fireflies(&gpu, &mut input, 0.5).is_err());
+
+    let mut noisy = Picture::new(33, 18).noisy().input;
+    let host = firefly::reference(&noisy, 1.5);
+    assert!(firefly::remove_fireflies(&gpu, &mut noisy, 1.5).unwrap().pixels > 3);
+    assert!(apart(&noisy.radiance, &host, 1e-3) < 1e-5);
+    assert_silent(&gpu);
 }

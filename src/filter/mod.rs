@@ -1,22 +1,29 @@
 //! Reconstructing the light between the samples. A filter is a row of [`FILTERS`]: a Rust file that records its kernels
 //! and has their CPU twin, and GLSL files of the same names.
 mod atrous;
+mod auto;
+mod bilateral;
+mod edge;
+pub mod firefly;
 mod guided;
 mod input;
 mod none;
 mod pack;
 mod pixel;
 mod settings;
+mod svgf;
+mod variance;
+mod wavelet;
 
 pub use input::FilterInput;
-pub use settings::{AtrousForm, FilterSettings};
+pub use settings::{AtrousForm, FilterSettings, WaveletBasis};
 
 use crate::error::Result;
 use crate::gpu::layout::{Guide, vec3, vec4};
 use crate::gpu::{Buffer, FrameResources, Gpu, Location, PassTime, Recorder};
 
 /// Every filter, in the order of `--help`; the twin and stability tests run each row.
-pub const FILTERS: &[Row] = &[none::ROW, atrous::ROW, guided::ROW];
+pub const FILTERS: &[Row] = &[none::ROW, atrous::ROW, bilateral::ROW, guided::ROW, wavelet::ROW, svgf::ROW, auto::ROW];
 
 /// One filter.
 pub struct Row {

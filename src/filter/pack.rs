@@ -66,6 +66,13 @@ impl Packed {
         input.radiance.iter().zip(&input.guide).map(pack).collect()
     }
 
+    /// This pixel with the mean of weighted differences added, and in-painted if it was unknown; itself where nothing
+    /// had weight.
+    pub fn moved_by(self, sum: Vec3, total: f32) -> Self {
+        let count = if self.count > 0.0 { self.count } else { 1.0 };
+        if total > 0.0 { Self { colour: self.colour + sum / total, count, ..self } } else { self }
+    }
+
     /// As a result.
     pub fn output(&self) -> vec4 {
         self.colour.extend(self.count).into()

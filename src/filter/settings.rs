@@ -17,6 +17,16 @@ pub enum AtrousForm {
     Printed,
 }
 
+/// The lattices of the decimated wavelets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum WaveletBasis {
+    /// CDF(2,2), along rows and columns.
+    #[default]
+    Cdf22,
+    /// Red-black, on the quincunx.
+    RedBlack,
+}
+
 /// The parameters of all filters. A sigma of infinity switches its weight off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilterSettings {
@@ -47,6 +57,10 @@ pub struct FilterSettings {
     /// Variance of each channel (normal, depth) below which `guided` sees no edge; normals halved, depths in `extent`. At
     /// least 0; default 0.01, depth 0.02.
     pub eps: vec4,
+    /// Standard deviations of a pixel's luminance that count as an edge for `svgf`. At least 0; default 4.
+    pub sigma_l: f32,
+    /// The wavelets of `wavelet`.
+    pub basis: WaveletBasis,
 }
 
 impl Default for FilterSettings {
@@ -64,6 +78,8 @@ impl Default for FilterSettings {
             radius: 24,
             channels: 4,
             eps: [0.01, 0.01, 0.01, 0.02],
+            sigma_l: 4.0,
+            basis: WaveletBasis::Cdf22,
         }
     }
 }
@@ -99,6 +115,7 @@ impl FilterSettings {
         within("rt-from-level", self.rt_from_level, [0, Self::MAX_LEVELS])?;
         scale("intensity", self.intensity)?;
         scale("extent", self.extent)?;
+        not_negative("sigma-l", self.sigma_l)?;
         not_negative("sigma-rt", self.sigma_rt)?;
         not_negative("sigma-n", self.sigma_n)?;
         not_negative("sigma-x", self.sigma_x)

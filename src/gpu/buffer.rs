@@ -38,6 +38,13 @@ pub struct Buffer<T> {
     of: PhantomData<fn() -> T>,
 }
 
+/// Another handle to the same memory.
+impl<T> Clone for Buffer<T> {
+    fn clone(&self) -> Self {
+        Self { untyped: self.untyped.clone(), len: self.len, of: PhantomData }
+    }
+}
+
 /// What a buffer is without its type. Public for the generated code alone.
 #[doc(hidden)]
 pub struct Untyped {

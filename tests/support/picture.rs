@@ -1,7 +1,7 @@
 //! Images for the filters' tests: a floor and a wall with a step in depth, lit from one side.
 #![allow(dead_code)]
 use crate::support::hash;
-use tallow::filter::{AtrousForm, FilterInput, FilterSettings};
+use tallow::filter::{AtrousForm, FilterInput, FilterSettings, WaveletBasis};
 use tallow::gpu::layout::{Guide, NONE};
 
 /// Around the workgroups' sizes, and one pixel.
@@ -62,6 +62,17 @@ pub fn settings(filter: &str) -> Vec<FilterSettings> {
             FilterSettings { form: AtrousForm::Squared, sigma_x: off, levels: 10, ..base },
             FilterSettings { sigma_rt: off, sigma_n: off, ..base },
         ],
+        "bilateral" => vec![
+            FilterSettings { radius: 5, ..base },
+            FilterSettings { radius: 12, sigma_n: off, sigma_x: off, sigma_rt: 0.3, ..base },
+        ],
+        "wavelet" => vec![
+            base,
+            FilterSettings { basis: WaveletBasis::RedBlack, ..base },
+            FilterSettings { levels: 3, sigma_rt: off, sigma_n: off, sigma_x: off, ..base },
+        ],
+        "auto" => vec![FilterSettings { radius: 6, ..base }],
+        "svgf" => vec![base, FilterSettings { sigma_l: 1.0, levels: 3, ..base }],
         "guided" => vec![
             FilterSettings { radius: 5, ..base },
             FilterSettings { radius: 1, channels: 3, eps: [1e-4; 4], ..base },

@@ -1,5 +1,5 @@
 //! Push constants of the filters' kernels.
-use super::{float, uint, uvec2, vec4};
+use super::{float, uint, uvec2, vec3, vec4};
 use bytemuck::{Pod, Zeroable};
 
 gpu_structs! {
@@ -15,12 +15,8 @@ gpu_structs! {
         size: uvec2,
         /// Pixels from one tap to the next.
         spacing: uint,
-        /// Exponents of the weights, in base 2, per squared (or plain) difference of radiance.
-        rate_rt: float,
-        /// The same of unit normals.
-        rate_n: float,
-        /// The same of positions.
-        rate_x: float,
+        /// Exponents of the weights of radiance, normal and position, in base 2, per squared (or plain) difference.
+        rates: vec3,
     }
 
     /// Push constants of `guided_pack.comp`.
@@ -43,5 +39,65 @@ gpu_structs! {
         radius: uint,
         /// Added to the variance of each channel of the guide.
         eps: vec4,
+    }
+
+    /// Push constants of `bilateral.comp`.
+    struct BilateralPush {
+        /// Image in pixels.
+        size: uvec2,
+        /// Pixels from the centre to the border of the window.
+        radius: uint,
+        /// As in [`AtrousPush`], per squared pixel.
+        rate_space: float,
+        /// As in [`AtrousPush`].
+        rates: vec3,
+    }
+
+    /// Push constants of `variance.comp` and `svgf.comp`.
+    struct SvgfPush {
+        /// Image in pixels.
+        size: uvec2,
+        /// Pixels from one tap to the next.
+        spacing: uint,
+        /// Standard deviations of luminance that count as an edge.
+        sigma_l: float,
+        /// As in [`AtrousPush`]; that of radiance is 0.
+        rates: vec3,
+    }
+
+    /// Push constants of `wavelet.comp`.
+    struct WaveletPush {
+        /// Image in pixels.
+        size: uvec2,
+        /// Pixels between neighbours on the lattice of this level.
+        spacing: uint,
+        /// 0 = along rows, 1 = along columns, 2 = four neighbours side by side, 3 = four neighbours diagonally.
+        stencil: uint,
+        /// As in [`AtrousPush`].
+        rates: vec3,
+    }
+
+    /// Push constants of `firefly.comp`.
+    struct FireflyPush {
+        /// Image in pixels.
+        size: uvec2,
+        /// How much brighter than its surroundings a pixel may be.
+        factor: float,
+    }
+
+    /// Push constants of `auto_error.comp`.
+    struct AutoErrorPush {
+        /// Pixels.
+        count: uint,
+        /// Squared luminance below which errors count as absolute.
+        floor: float,
+    }
+
+    /// Push constants of `auto_smooth.comp`.
+    struct AutoSmoothPush {
+        /// Image in pixels.
+        size: uvec2,
+        /// Pixels from one tap to the next.
+        spacing: uint,
     }
 }

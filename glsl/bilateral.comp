@@ -1,0 +1,55 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/edge.glsl"
+
+// The bilateral filter (Tomasi and Manduchi 1998) as it is defined, joint where normals or positions have weights. A
+// thread filters ROWS pixels of a column, which share nearly all their taps.
+layout(local_size_x = 32) in;
+layout(binding = 0) uniform samplerBuffer colour; // of vec4
+layout(binding = 1) uniform samplerBuffer place; // of vec4
+layout(scalar, binding = 2) writeonly buffer Output { vec4 filtered[]; };
+layout(scalar, push_constant) uniform Push { BilateralPush push; };
+
+const int ROWS = 4;
+
+Pixel pixel_at(int at) {
+    return unpack_pixel(texelFetch(colour, at), texelFetch(place, at));
+}
+
+void main() {
+    ivec2 size = ivec2(push.size);
+    int x = int(gl_GlobalInvocationID.x), first = ROWS * int(gl_GlobalInvocationID.y), radius = int(push.radius);
+    if (x >= size.x) return; // safe: no barrier() follows
+    Pixel centre[ROWS];
+    vec3 sum[ROWS];
+    float total[ROWS];
+    [[unroll]] for (int k = 0; k < ROWS; k++) {
+        centre[k] = pixel_at(min(first + k, size.y - 1) * size.x + x);
+        sum[k] = vec3(0.0);
+        total[k] = 0.0;
+    }
+    int top = max(first - radius, 0), bottom = min(first + ROWS - 1 + radius, size.y - 1);
+    for (int y = top; y <= bottom; y++) {
+        for (int i = -radius; i <= radius; i++) {
+            int tap_x = x + i;
+            bool inside = tap_x >= 0 && tap_x < size.x;
+            Pixel q = pixel_at(y * size.x + clamp(tap_x, 0, size.x - 1));
+            if (!inside) q.colour.w = 0.0;
+            [[unroll]] for (int k = 0; k < ROWS; k++) {
+                int j = y - first - k;
+                float exponent = edge_exponent(centre[k], q, push.rates) - push.rate_space * float(i * i + j * j);
+                float w = abs(j) <= radius ? edge_weight(q, exponent) : 0.0;
+                sum[k] += w * (q.colour.rgb - centre[k].colour.rgb);
+                total[k] += w;
+            }
+        }
+    }
+    [[unroll]] for (int k = 0; k < ROWS; k++) {
+        vec4 c = centre[k].colour;
+        if (total[k] > 0.0) c = vec4(c.rgb + sum[k] / total[k], c.w > 0.0 ? c.w : 1.0);
+        if (first + k < size.y) filtered[(first + k) * size.x + x] = c;
+    }
+}

@@ -1,0 +1,56 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/edge.glsl"
+#include "shared/luminance.glsl"
+
+// Radiance with the variance of its luminance, or -1 where nothing is known. Few samples say little about their own
+// variance: there it is the spread over alike pixels of a 7x7 window (Schied et al. 2017, section 4.2).
+layout(local_size_x = 32) in;
+layout(binding = 0) uniform samplerBuffer colour; // of vec4
+layout(binding = 1) uniform samplerBuffer place; // of vec4
+layout(binding = 2) uniform samplerBuffer variance; // of vec3
+layout(scalar, binding = 3) writeonly buffer Estimates { vec4 estimate[]; };
+layout(scalar, push_constant) uniform Push { SvgfPush push; };
+
+layout(constant_id = 114) const bool MEASURED = true; // `variance` has a pixel for every pixel
+const float ENOUGH = 4.0;                             // samples whose own variance is trusted
+const int REACH = 3;
+
+Pixel pixel_at(int at) {
+    return unpack_pixel(texelFetch(colour, at), texelFetch(place, at));
+}
+
+float spread(ivec2 at, Pixel p) {
+    ivec2 size = ivec2(push.size);
+    float total = 0.0, squares = 0.0, mean = 0.0, m2 = 0.0;
+    for (int j = -REACH; j <= REACH; j++) {
+        for (int i = -REACH; i <= REACH; i++) {
+            ivec2 tap = at + ivec2(i, j), inside = clamp(tap, ivec2(0), size - 1);
+            Pixel q = pixel_at(inside.y * size.x + inside.x);
+            float w = tap == inside ? edge_weight(q, edge_exponent(p, q, push.rates)) : 0.0;
+            float off = contrast(q.colour.rgb, p.colour.rgb);
+            total += w;
+            squares += w * w;
+            mean += w * off;
+            m2 += w * off * off;
+        }
+    }
+    mean /= total;
+    // Unbiased for unequal weights; one pixel alone has no spread.
+    float others = 1.0 - squares / (total * total);
+    return others > 1e-3 ? max(m2 / total - mean * mean, 0.0) / others : 0.0;
+}
+
+void main() {
+    ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(at, size))) return; // safe: no barrier() follows
+    int i = at.y * size.x + at.x;
+    Pixel p = pixel_at(i);
+    vec3 v = MEASURED ? vec3(texelFetch(variance, 3 * i).x, texelFetch(variance, 3 * i + 1).x, texelFetch(variance, 3 * i + 2).x) : vec3(-1.0);
+    bool measured = p.colour.w >= ENOUGH && finite(v) && all(greaterThanEqual(v, vec3(0.0)));
+    // Channels of one path rise and fall together: their deviations add, not their variances.
+    float deviation = min(luminance(sqrt(max(v, 0.0))), STRONGEST);
+    estimate[i] = vec4(p.colour.rgb, p.colour.w > 0.0 ? (measured ? deviation * deviation : spread(at, p)) : -1.0);
+}
