@@ -122,6 +122,23 @@ fn broken_pixels_are_filled_in_from_their_neighbours() {
 }
 
 #[test]
+fn fireflies_are_cut_only_when_asked_and_it_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut film = noisy(false);
+    for channel in &mut film.channels[..3] {
+        let Samples::F32(values) = &mut channel.samples else { continue };
+        values[(16 * SIZE + 16) as usize] = 400.0;
+    }
+    write(&folder, "noisy.exr", &film);
+    let kept = error(&filter(&folder, &["--filter", "atrous"]), checker);
+    let cut = error(&filter(&folder, &["--filter", "atrous", "--fireflies", "2"]), checker);
+    assert!(cut < 0.1 && kept > 2.0 * cut, "{kept} {cut}");
+    let words = ["filter", "noisy.exr", "-o", "clean.exr", "--filter", "none", "--fireflies", "2"];
+    let text = stdout(&tallow(&folder, &words));
+    assert!(text.contains("fireflies: 1 pixels cut"), "{text}");
+}
+
+#[test]
 fn lamps_do_not_leak_through_their_rims() {
     let folder = tempfile::tempdir().unwrap();
     let mut film = noisy(false);

@@ -28,7 +28,7 @@ pub struct Args {
     /// Image to filter (EXR; PNG, JPEG and HDR hold no layers)
     pub image: PathBuf,
     /// Filter to apply
-    #[arg(long, value_parser = filter_names(), default_value = "atrous")]
+    #[arg(long, value_parser = filter_names(), default_value = "auto")]
     pub filter: &'static Row,
     /// Image to write: .exr (all layers, the colour filtered), .png or .hdr; may be given several times
     #[arg(short, long = "output", value_name = "FILE", required = true)]
@@ -42,6 +42,9 @@ pub struct Args {
     /// Filter the colour as it is: textures blur too
     #[arg(long)]
     pub no_demodulate: bool,
+    /// First cut pixels that are more than N times brighter than all but one around them, and say what that took away
+    #[arg(long, value_name = "N")]
+    pub fireflies: Option<f32>,
     /// Device, by index or part of its name [default: the best one]
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
@@ -109,7 +112,8 @@ pub fn run(args: &Args) -> Result<Exit> {
     let reference = reference(args, &source)?;
     let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), validation: args.validation })?;
     let start = Instant::now();
-    let parts = composition::split(&aovs, demodulation(args));
+    let mut parts = composition::split(&aovs, demodulation(args));
+    cut_fireflies(args, &gpu, &mut parts)?;
     let (colour, times) = filtered(args, &gpu, &parts)?;
     let seconds = start.elapsed().as_secs_f64();
     let clean = replaced(&source, &aovs, &colour)?;
@@ -139,6 +143,13 @@ fn demodulation(args: &Args) -> Demodulation {
         (false, true) => Demodulation::Albedo,
         (false, false) => Demodulation::Light,
     }
+}
+
+fn cut_fireflies(args: &Args, gpu: &Gpu, parts: &mut Parts) -> Result<()> {
+    let Some(factor) = args.fireflies else { return Ok(()) };
+    let cut = filter::firefly::remove_fireflies(gpu, &mut parts.input, factor)?;
+    parts.notes.push(format!("fireflies: {} pixels cut, {:.3} % of what is filtered", cut.pixels, 100.0 * cut.share));
+    Ok(())
 }
 
 fn filtered(args: &Args, gpu: &Gpu, parts: &Parts) -> Result<(Vec<[f32; 3]>, Vec<PassTime>)> {

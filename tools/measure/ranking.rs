@@ -70,7 +70,7 @@ fn one(gpu: &Gpu, args: &Args, view: &View, spp: u32) -> anyhow::Result<()> {
 /// What is compared with what the paper found, scenes being different.
 fn ratios(scene: &str, spp: u32, errors: &[(&str, f64)]) -> String {
     let ours = |name: &str| errors.iter().find(|(known, _)| *known == name).map(|(_, error)| *error);
-    let theirs = |name| published(scene, spp, name).parse::<f64>().ok();
+    let theirs = |name: &str| published(scene, spp, name).parse::<f64>().ok();
     let ratio = |other: &str| {
         let (ours, theirs) = (ours("guided")? / ours(other)?, theirs("guided")? / theirs(other)?);
         Some(format!("guided / {other}: {ours:.2}, published {theirs:.2}\n"))

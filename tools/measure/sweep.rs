@@ -1,5 +1,5 @@
 //! The best settings of a filter for one image, by search.
-use tallow::filter::{FilterSettings, Row};
+use tallow::filter::{FilterSettings, Row, WaveletBasis};
 
 /// One setting and the values that are tried.
 pub struct Knob {
@@ -25,10 +25,20 @@ const EPS_N: Knob = Knob {
 const EPS_Z: Knob =
     Knob { name: "eps of the depth", values: &[1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.03], set: |s, v| s.eps[3] = v };
 
+const SIGMA_L: Knob = Knob { name: "sigma_l", values: &[0.5, 1.0, 2.0, 4.0, 8.0, 16.0], set: |s, v| s.sigma_l = v };
+const BASIS: Knob = Knob {
+    name: "basis",
+    values: &[0.0, 1.0],
+    set: |s, v| s.basis = if v == 0.0 { WaveletBasis::Cdf22 } else { WaveletBasis::RedBlack },
+};
+
 /// What is searched for a filter. A new one goes here.
 fn knobs(filter: &str) -> Vec<Knob> {
     match filter {
         "atrous" => vec![LEVELS, SIGMA_RT, SIGMA_N, SIGMA_X],
+        "bilateral" => vec![RADIUS, SIGMA_RT, SIGMA_N, SIGMA_X],
+        "wavelet" => vec![BASIS, LEVELS, SIGMA_RT, SIGMA_N, SIGMA_X],
+        "svgf" => vec![LEVELS, SIGMA_L, SIGMA_N, SIGMA_X],
         "guided" => vec![RADIUS, EPS_N, EPS_Z],
         _ => vec![],
     }
