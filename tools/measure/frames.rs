@@ -15,10 +15,9 @@ pub struct View {
     pub size: [u32; 2],
     /// Path edges.
     pub depth: u32,
+    /// Samples per pixel of the reference.
+    pub reference: u32,
 }
-
-/// Samples per pixel of a reference.
-pub const REFERENCE: u32 = 1024;
 
 impl View {
     /// Renders it, unless an earlier run has.
@@ -49,7 +48,7 @@ fn run(view: &View, args: &Args, spp: u32, file: &Path) -> anyhow::Result<()> {
     let [width, height] = view.size.map(|n| n.to_string());
     let (spp, depth) = (spp.to_string(), view.depth.to_string());
     // Another seed than the default for references: their samples must not be those of the noisy image.
-    let seed = if spp == REFERENCE.to_string() { "1" } else { "0" };
+    let seed = if spp == view.reference.to_string() { "1" } else { "0" };
     let mut command = Command::new(&args.tallow);
     command.arg("render").arg(scene).arg("-o").arg(file).arg("--quiet");
     command.args(["--width", &width, "--height", &height, "--spp", &spp, "--max-depth", &depth, "--seed", seed]);

@@ -1,6 +1,6 @@
 //! The Cornell box against Open Image Denoise: the same image, albedo and normals, in one run.
 use super::case::{self, Case};
-use super::frames::{REFERENCE, View};
+use super::frames::View;
 use super::{sweep, times};
 use crate::Args;
 use anyhow::{Context, bail};
@@ -13,14 +13,15 @@ use tallow::image::source::Source;
 use tallow::image::{self, Picture, metrics};
 use tallow::report::table;
 
-const VIEW: View = View { name: "cornell", scene: "scenes/cornell-box/scene.toml", size: [256, 256], depth: 3 };
+const VIEW: View =
+    View { name: "cornell", scene: "scenes/cornell-box/scene.toml", size: [256, 256], depth: 3, reference: 1024 };
 const SPP: u32 = 16;
 
 /// # Errors
 /// When the scene cannot be rendered, or the device or a peer fails.
 pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
-    println!("Cornell box, 256x256, {SPP} samples per pixel, depth 3, against {REFERENCE} samples per pixel\n");
-    let (noisy, reference) = (VIEW.render(args, SPP)?, VIEW.render(args, REFERENCE)?);
+    println!("Cornell box, 256x256, {SPP} samples per pixel, depth 3, against {} samples per pixel\n", VIEW.reference);
+    let (noisy, reference) = (VIEW.render(args, SPP)?, VIEW.render(args, VIEW.reference)?);
     let indirect = Case::new(&noisy, &reference, Demodulation::Light)?;
     let all = Case::new(&noisy, &reference, Demodulation::Albedo)?;
     let cases = [("indirect light", indirect), ("all light", all)];
@@ -29,8 +30,8 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
         println!("(no --peers: Open Image Denoise and Mitsuba's image are left out)\n");
         return Ok(());
     };
-    let files = [SPP, REFERENCE].map(|spp| args.output.join(format!("cornell-mitsuba-{spp}spp.exr")));
-    for (spp, file) in [SPP, REFERENCE].iter().zip(&files).filter(|(_, file)| !file.exists()) {
+    let files = [SPP, VIEW.reference].map(|spp| args.output.join(format!("cornell-mitsuba-{spp}spp.exr")));
+    for (spp, file) in [SPP, VIEW.reference].iter().zip(&files).filter(|(_, file)| !file.exists()) {
         let scene = args.data.join("references/cornell_diffuse.xml");
         python(peers, "cornell_mitsuba.py", &[&scene, Path::new(&spp.to_string()), file])?;
     }

@@ -20,12 +20,13 @@ impl<'a> Tile<'a> {
     }
 }
 
-/// Writes it, with the reference as the last column, and prints its legend. The scale is that of the first tile's error.
+/// Writes it, with the reference as the last column, and prints its legend. The first tile is unfiltered; the scale fits
+/// the largest error of the others.
 ///
 /// # Errors
 /// When it cannot be written.
 pub fn write(path: &Path, tiles: &[Tile], reference: &Picture) -> anyhow::Result<()> {
-    let (_, top) = heat_map(&tiles[0].picture, reference);
+    let top = tiles[1..].iter().map(|t| heat_map(&t.picture, reference).1).fold(0.0, f32::max);
     let pictures: Vec<_> = tiles.iter().map(|t| &t.picture).chain([reference]).collect();
     let maps: Vec<_> = pictures.iter().map(|p| heat_map_to(p, reference, top)).collect();
     // A map has a scale bar at its right edge: columns are as wide as maps.

@@ -1,19 +1,19 @@
 //! Sponza's textures with and without demodulation.
 use super::case::Case;
-use super::frames::{REFERENCE, View};
+use super::frames::View;
 use super::sheet::{self, Tile};
 use crate::Args;
 use tallow::composition::Demodulation;
 use tallow::filter;
 use tallow::gpu::Gpu;
 
-const VIEW: View = View { name: "sponza", scene: "crytek-sponza", size: [320, 180], depth: 4 };
+const VIEW: View = View { name: "sponza", scene: "crytek-sponza", size: [256, 144], depth: 4, reference: 256 };
 const SPP: u32 = 4;
 
 /// # Errors
 /// When the scene cannot be rendered, or the device fails.
 pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
-    let (noisy, reference) = (VIEW.render(args, SPP)?, VIEW.render(args, REFERENCE)?);
+    let (noisy, reference) = (VIEW.render(args, SPP)?, VIEW.render(args, VIEW.reference)?);
     let row = filter::find("atrous").expect("a row of the table");
     let kinds = [
         ("direct light and albedo kept", Demodulation::Light),
