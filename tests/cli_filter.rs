@@ -203,6 +203,7 @@ fn what_cannot_be_filtered_is_told_in_one_line() {
     complains(&run(&["noisy.exr", "-o", "missing/a.exr"]), 5, &["missing", "create it"]);
     complains(&run(&["missing.exr", "-o", "a.exr"]), 3, &["missing.exr"]);
     complains(&run(&["noisy.exr", "-o", "a.exr", "--normal", "bump"]), 3, &["noisy.exr", "normal", "\"bump\"", "N.X"]);
+    complains(&run(&["noisy.exr", "-o", "a.exr", "--colour", "rgb"]), 3, &["noisy.exr", "\"rgb\"", "N.X"]);
     let mut guides = Film::new(SIZE, SIZE);
     guides.add_vec3("N", ["X", "Y", "Z"], &vec![[0.0; 3]; guides.pixels()]);
     write(&folder, "guides.exr", &guides);

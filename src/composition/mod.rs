@@ -39,7 +39,7 @@ pub fn split(aovs: &Aovs, demodulation: Demodulation) -> Parts {
     let colour = aovs.get(Aov::Colour).unwrap_or_default();
     let counts = counts(aovs, colour);
     let mut notes = Vec::new();
-    let light = match (demodulation, aovs.get(Aov::Albedo), layers(aovs, &counts)) {
+    let light = match (demodulation, aovs.get(Aov::Albedo), layers(aovs)) {
         (Demodulation::Off, ..) | (_, None, _) => plain(colour),
         (Demodulation::Light, Some(albedo), Some(layers)) => split_light(colour, albedo, layers),
         (_, Some(albedo), _) => albedo::split(colour, albedo, aovs.film.width as usize),
@@ -73,16 +73,16 @@ struct Light {
 
 /// Samples behind each pixel: as the file says, per pixel or for all; 1 where it does not; 0 where there is nothing.
 fn counts(aovs: &Aovs, colour: &[vec3]) -> Vec<f32> {
-    let of_all = ["samplesPerPixel"].iter().find_map(|key| aovs.film.metadata.get(*key)?.parse::<f32>().ok());
+    let of_all = aovs.film.metadata.get("samplesPerPixel").and_then(|n| n.parse::<f32>().ok()); // pbrt's
     let count = |i: usize| aovs.scalar(Aov::Samples, i).or(of_all).unwrap_or(1.0);
     let known = |i: usize| aovs.holds(i) && colour[i].iter().all(|v| v.is_finite());
     (0..colour.len()).map(|i| if known(i) { count(i) } else { 0.0 }).collect()
 }
 
 /// Direct and indirect light, unless a pixel without samples lacks its direct light.
-fn layers<'a>(aovs: &'a Aovs, counts: &[f32]) -> Option<[&'a [vec3]; 2]> {
-    let all = counts.iter().all(|&n| n > 0.0);
-    Some([aovs.get(Aov::Direct)?, aovs.get(Aov::Indirect)?]).filter(|_| all)
+fn layers<'a>(aovs: &'a Aovs) -> Option<[&'a [vec3]; 2]> {
+    let sampled = (0..aovs.film.pixels()).all(|i| aovs.scalar(Aov::Samples, i) != Some(0.0));
+    Some([aovs.get(Aov::Direct)?, aovs.get(Aov::Indirect)?]).filter(|_| sampled)
 }
 
 /// The albedo that indirect light is multiplied by is that of the samples, `(colour - direct) / indirect`, so that edges
@@ -97,7 +97,7 @@ fn split_light(colour: &[vec3], albedo: &[vec3], [direct, indirect]: [&[vec3]; 2
     Light {
         filtered: indirect.to_vec(),
         factor: (0..colour.len()).map(factor).collect(),
-        sharp: direct.to_vec(),
+        sharp: direct.iter().map(|v| v.map(|v| if v.is_finite() { v } else { 0.0 })).collect(),
         note: "filtered: indirect light before albedo; direct light stays as it is",
     }
 }
@@ -177,6 +177,12 @@ mod tests {
         };
         assert_eq!(counts([4; 4])[0], [1.0, 1.0, 1.0, 4.0]);
         assert_eq!(counts([4, 0, 4, 4])[..2], [[2.0, 2.0, 2.0, 4.0], [2.0, 2.0, 2.0, 0.0]]);
+        // A broken pixel is in-painted by itself.
+        let red = film.channels.iter_mut().filter(|c| ["R", "direct.R"].contains(&c.name.as_str()));
+        red.for_each(|c| c.samples = Samples::F32(vec![1.0, f32::NAN, 25.0, 50.0]));
+        let parts = take_apart(&film, Demodulation::Light);
+        assert_eq!(parts.input.radiance.iter().map(|c| c[3]).collect::<Vec<_>>(), [1.0, 0.0, 1.0, 0.0]);
+        assert_eq!(parts.join(&[[1.0; 4]; 4])[1], [0.5, 1.0, 1.0]);
     }
 
     #[test]

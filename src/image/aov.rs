@@ -71,9 +71,8 @@ impl<'a> Aovs<'a> {
     /// # Errors
     /// When there is no colour, or not what the user named, or when the file holds other pixels of it than of the colour.
     pub fn find(film: &'a Film, names: &Names) -> Result<Self, String> {
-        let missing = || film.picture(None).err().unwrap_or_default();
-        let given = names.get(&Aov::Colour);
-        let shown = film.find(given.map(String::as_str)).ok_or_else(missing)?;
+        let given = names.get(&Aov::Colour).map(String::as_str);
+        let shown = film.find(given).ok_or_else(|| film.picture(given).err().unwrap_or_default())?;
         let view = split(split(&shown[0].name).0).0;
         let mut found = Self {
             film,
