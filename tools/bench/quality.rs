@@ -11,7 +11,13 @@ use tallow::scene::Scene;
 use tallow::settings::Settings;
 
 /// Guides, statistics and light of a whole render.
-fn render(gpu: &Gpu, file: &str, side: u32, spp: u32, seed: u32) -> Result<(Vec<Guide>, Vec<PixelStats>, Vec<PixelLight>)> {
+fn render(
+    gpu: &Gpu,
+    file: &str,
+    side: u32,
+    spp: u32,
+    seed: u32,
+) -> Result<(Vec<Guide>, Vec<PixelStats>, Vec<PixelLight>)> {
     let settings = |s: &mut Settings| (s.width, s.height, s.spp, s.seed, s.max_depth) = (side, side, spp, seed, 4);
     let scene = Scene::load(Path::new(file), &settings)?;
     let outputs = Outputs { split_light: true, guides: true, counters: false };
@@ -49,10 +55,9 @@ fn sweep(filter: &str, base: FilterSettings) -> Vec<FilterSettings> {
             .collect(),
         "svgf" => levels.iter().flat_map(|s| [2.0, 4.0, 8.0].map(|l| FilterSettings { sigma_l: l, ..*s })).collect(),
         "bilateral" => radii[..2].iter().map(|s| FilterSettings { sigma_rt: f32::INFINITY, ..*s }).collect(),
-        "guided" => radii
-            .iter()
-            .flat_map(|s| [0.001, 0.01].map(|e| FilterSettings { eps: [e, e, e, 2.0 * e], ..*s }))
-            .collect(),
+        "guided" => {
+            radii.iter().flat_map(|s| [0.001, 0.01].map(|e| FilterSettings { eps: [e, e, e, 2.0 * e], ..*s })).collect()
+        }
         _ => vec![base],
     }
 }
