@@ -13,7 +13,8 @@ layout(binding = 1) uniform samplerBuffer place; // of vec4
 layout(scalar, binding = 2) writeonly buffer Output { vec4 filtered[]; };
 layout(scalar, push_constant) uniform Push { BilateralPush push; };
 
-const int ROWS = 4;
+const int ROWS = 8;
+const float REFUSED = -1e30; // an exponent whose weight is 0
 
 Pixel pixel_at(int at) {
     return unpack_pixel(texelFetch(colour, at), texelFetch(place, at));
@@ -22,7 +23,7 @@ Pixel pixel_at(int at) {
 void main() {
     ivec2 size = ivec2(push.size);
     int x = int(gl_GlobalInvocationID.x), first = ROWS * int(gl_GlobalInvocationID.y), radius = int(push.radius);
-    if (x >= size.x) return; // safe: no barrier() follows
+    if (x >= size.x || first >= size.y) return; // safe: no barrier() follows
     Pixel centre[ROWS];
     vec3 sum[ROWS];
     float total[ROWS];
@@ -35,13 +36,14 @@ void main() {
     for (int y = top; y <= bottom; y++) {
         for (int i = -radius; i <= radius; i++) {
             int tap_x = x + i;
-            bool inside = tap_x >= 0 && tap_x < size.x;
             Pixel q = pixel_at(y * size.x + clamp(tap_x, 0, size.x - 1));
-            if (!inside) q.colour.w = 0.0;
+            bool counts = tap_x >= 0 && tap_x < size.x && q.colour.w > 0.0;
+            float across = counts ? -push.rate_space * float(i * i) : REFUSED;
             [[unroll]] for (int k = 0; k < ROWS; k++) {
                 int j = y - first - k;
-                float exponent = edge_exponent(centre[k], q, push.rates) - push.rate_space * float(i * i + j * j);
-                float w = abs(j) <= radius ? edge_weight(q, exponent) : 0.0;
+                float along = abs(j) <= radius ? -push.rate_space * float(j * j) : REFUSED;
+                float exponent = edge_exponent(centre[k], q, push.rates) + (across + along);
+                float w = exponent > LEAST ? exp2(exponent) : 0.0;
                 sum[k] += w * (q.colour.rgb - centre[k].colour.rgb);
                 total[k] += w;
             }

@@ -19,31 +19,40 @@ layout(constant_id = 110) const bool BACKWARD = false; // the first of two dispa
 
 #define FETCH_END(at) texelFetch(ends, at)
 
-void absorb_pixel(inout Moments m, int x, int y) {
-    ivec2 size = ivec2(push.size);
-    int at = clamp(y, 0, size.y - 1) * size.x + x;
-    vec4 c = texelFetch(colour, at);
-    absorb_means(m, y >= 0 && y < size.y && c.w > 0.0 ? 1.0 : 0.0, c.rgb, texelFetch(channels, at));
+int pixel_at(int x, int y) {
+    return clamp(y, 0, int(push.size.y) - 1) * int(push.size.x) + x;
+}
+
+// Leaves `m` about the pixel that it absorbs; `point` is that of the last one.
+void absorb_pixel(inout Moments m, inout vec4 point, int x, int y) {
+    vec4 c = texelFetch(colour, pixel_at(x, y)), here = texelFetch(channels, pixel_at(x, y));
+    m = moved(m, here - point);
+    point = here;
+    absorb_means(m, y >= 0 && y < int(push.size.y) && c.w > 0.0 ? 1.0 : 0.0, c.rgb, vec4(0.0));
 }
 
 void main() {
     int x = int(gl_GlobalInvocationID.x), width = int(push.size.x);
     if (x >= width) return; // safe: no barrier() follows
     int window = 2 * int(push.radius) + 1, first = int(gl_GlobalInvocationID.y) * window;
-    int top = int(push.first_row) + first - int(push.radius), rows = min(window, int(push.rows) - first);
+    int middle = int(push.first_row) + first, top = middle - int(push.radius), rows = min(window, int(push.rows) - first);
     Moments m = NO_MOMENTS;
+    vec4 point = vec4(0.0);
     if (BACKWARD) {
         for (int i = window - 1; i >= 0; i--) {
-            absorb_pixel(m, x, top + i);
-            if (i < rows) { MOMENTS_STORE(sums, MOMENTS * ((first + i) * width + x), m); }
+            absorb_pixel(m, point, x, top + i);
+            if (i < rows) {
+                Moments end = moved(m, texelFetch(channels, pixel_at(x, middle + i)) - point);
+                MOMENTS_STORE(sums, MOMENTS * ((first + i) * width + x), end);
+            }
         }
         return;
     }
     for (int i = 0; i < rows; i++) {
-        if (i > 0) absorb_pixel(m, x, top + window + i - 1);
+        if (i > 0) absorb_pixel(m, point, x, top + window + i - 1);
         int at = MOMENTS * ((first + i) * width + x);
         Moments whole = MOMENTS_LOAD(at, FETCH_END);
-        absorb(whole, m);
+        absorb(whole, moved(m, texelFetch(channels, pixel_at(x, middle + i)) - point));
         MOMENTS_STORE(sums, at, whole);
     }
 }

@@ -22,8 +22,16 @@ layout(constant_id = 110) const bool BACKWARD = false; // the first of two dispa
 #define FETCH_COLUMN(at) texelFetch(columns, at)
 #define FETCH_END(at) texelFetch(ends, at)
 
-void absorb_column(inout Moments m, int row, int x) {
+vec4 point_at(int row, int x) {
+    return texelFetch(channels, (int(push.first_row) + row) * int(push.size.x) + x);
+}
+
+// Leaves `m` about the pixel that it absorbs; `point` is that of the last one.
+void absorb_column(inout Moments m, inout vec4 point, int row, int x) {
     if (x < 0 || x >= int(push.size.x)) return;
+    vec4 here = point_at(row, x);
+    m = moved(m, here - point);
+    point = here;
     Moments column = MOMENTS_LOAD(MOMENTS * (row * int(push.size.x) + x), FETCH_COLUMN);
     absorb(m, column);
 }
@@ -34,24 +42,27 @@ void main() {
     int window = 2 * int(push.radius) + 1, first = int(gl_GlobalInvocationID.y) * window;
     int left = first - int(push.radius), count = min(window, width - first);
     Moments m = NO_MOMENTS;
+    vec4 point = vec4(0.0);
     if (BACKWARD) {
         for (int i = window - 1; i >= 0; i--) {
-            absorb_column(m, row, left + i);
-            if (i < count) { MOMENTS_STORE(sums, MOMENTS * (row * width + first + i), m); }
+            absorb_column(m, point, row, left + i);
+            if (i < count) {
+                Moments end = moved(m, point_at(row, first + i) - point);
+                MOMENTS_STORE(sums, MOMENTS * (row * width + first + i), end);
+            }
         }
         return;
     }
     for (int i = 0; i < count; i++) {
-        if (i > 0) absorb_column(m, row, left + window + i - 1);
+        if (i > 0) absorb_column(m, point, row, left + window + i - 1);
         Moments whole = MOMENTS_LOAD(MOMENTS * (row * width + first + i), FETCH_END);
-        absorb(whole, m);
+        absorb(whole, moved(m, point_at(row, first + i) - point));
         vec4 r, g, b;
         solve(whole, whole.head.x * push.eps, r, g, b);
         int pixel = (int(push.first_row) + row) * width + first + i;
-        vec4 off = texelFetch(channels, pixel) - whole.mean;
         slope_r[pixel] = r;
         slope_g[pixel] = g;
         slope_b[pixel] = b;
-        value[pixel] = vec4(whole.head.yzw + vec3(dot(r, off), dot(g, off), dot(b, off)), min(whole.head.x, 1.0));
+        value[pixel] = vec4(whole.head.yzw - vec3(dot(r, whole.mean), dot(g, whole.mean), dot(b, whole.mean)), min(whole.head.x, 1.0));
     }
 }

@@ -1,6 +1,7 @@
 //! Tallow: a Vulkan-native path tracer.
 pub mod allocate;
 pub mod cli;
+pub mod composition;
 pub mod error;
 pub mod filter;
 mod frame;

@@ -1,12 +1,12 @@
 //! The command line through the built program: exit codes, and one readable line for what goes wrong.
+#[path = "support/command.rs"]
+mod command;
+
+use command::{complains, stdout, tallow};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 use tallow::image::{self, Film, WriteOptions};
 use tempfile::TempDir;
-
-fn tallow(folder: &TempDir, words: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_tallow")).args(words).current_dir(folder.path()).output().unwrap()
-}
 
 fn write(folder: &TempDir, name: &str, size: u32, value: f32) -> PathBuf {
     let mut film = Film::new(size, size);
@@ -17,25 +17,12 @@ fn write(folder: &TempDir, name: &str, size: u32, value: f32) -> PathBuf {
     path
 }
 
-fn stdout(output: &Output) -> String {
-    String::from_utf8(output.stdout.clone()).unwrap()
-}
-
-/// Checks the exit code and that stderr is one line which holds all of `parts`.
-#[track_caller]
-fn complains(output: &Output, code: i32, parts: &[&str]) {
-    let text = String::from_utf8(output.stderr.clone()).unwrap();
-    assert_eq!(output.status.code(), Some(code), "{text}");
-    assert_eq!(text.lines().count(), 1, "{text}");
-    assert!(parts.iter().all(|p| text.contains(p)), "{text}");
-}
-
 #[test]
 fn help_lists_the_exit_codes_and_every_command() {
     let folder = tempfile::tempdir().unwrap();
     let help = tallow(&folder, &["--help"]);
     assert_eq!(help.status.code(), Some(0));
-    for word in ["render", "compare", "explain", "devices", "130  interrupted", "3    input"] {
+    for word in ["render", "filter", "compare", "explain", "devices", "130  interrupted", "3    input"] {
         assert!(stdout(&help).contains(word), "{word}");
     }
     assert!(stdout(&tallow(&folder, &["--version"])).starts_with("tallow "));

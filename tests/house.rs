@@ -29,6 +29,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("filter", &["error", "gpu", "reference", "shaders", "stage"]),
     ("scene", &["error", "gpu::layout", "image", "reference::fresnel", "settings"]),
     ("reference", &["gpu::layout", "scene", "settings"]),
+    ("composition", &["filter", "gpu::layout", "image"]),
     ("image", &["error", "gpu::layout"]),
     ("report", &["error", "gpu"]),
     ("schedule", &["settings"]),

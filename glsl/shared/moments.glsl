@@ -1,10 +1,11 @@
 // Count, means and co-moments of the guide I (four channels) and the noisy N (three) over a set of pixels, merged by
 // Chan's rule (Chan, Golub, LeVeque 1979): about the sets' own means, so that nothing cancels, and without ever
-// subtracting a pixel, so that nothing is left behind by one that has gone.
+// subtracting a pixel, so that nothing is left behind by one that has gone. The guide's means are counted from that of
+// the pixel that is looked at, so that far-away guides keep their digits.
 
 struct Moments {
     vec4 head; // count, mean N
-    vec4 mean; // of I
+    vec4 mean; // of I, less I at one point
     vec4 xx;   // co-moments of I.x with I
     vec3 yy;   // of I.y with I.yzw
     vec3 zz;   // of I.z with I.zw, then of I.w
@@ -22,6 +23,11 @@ const Moments NO_MOMENTS = Moments(vec4(0.0), vec4(0.0), vec4(0.0), vec3(0.0), v
 #define MOMENTS_STORE(to, at, m) \
     to[at] = m.head; to[(at) + 1] = m.mean; to[(at) + 2] = m.xx; to[(at) + 3] = vec4(m.yy, 0.0); \
     to[(at) + 4] = vec4(m.zz, 0.0); to[(at) + 5] = m.r; to[(at) + 6] = m.g; to[(at) + 7] = m.b
+
+Moments moved(Moments m, vec4 by) {
+    m.mean = m.head.x > 0.0 ? m.mean - by : vec4(0.0);
+    return m;
+}
 
 // `m` with a set of these means and `count` pixels that do not vary.
 void absorb_means(inout Moments m, float count, vec3 n, vec4 i) {

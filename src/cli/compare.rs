@@ -61,7 +61,7 @@ pub fn run(args: &Args) -> Result<Exit> {
         check_png("--diff", diff)?;
     }
     let (a, b) = (load(&args.a, args.layer.as_deref())?, load(&args.b, args.layer.as_deref())?);
-    check_sizes(args, &a, &b)?;
+    check_sizes((&args.a, &a), (&args.b, &b))?;
     let metrics = metrics::compare(&a, &b);
     let exceeded = args.limits.exceeded(&metrics)?;
     let scale = args.diff.as_ref().map(|path| write_diff(path, &a, &b)).transpose()?;
@@ -72,7 +72,11 @@ pub fn run(args: &Args) -> Result<Exit> {
     Ok(if exceeded.is_empty() { Exit::Done } else { Exit::LimitExceeded })
 }
 
-fn load(path: &Path, layer: Option<&str>) -> Result<Picture> {
+/// Reads what metrics can compare: every pixel is finite.
+///
+/// # Errors
+/// [`Error::Input`].
+pub fn load(path: &Path, layer: Option<&str>) -> Result<Picture> {
     let picture = image::read(path)?.picture(layer).map_err(|what| Error::input(path, what))?;
     match picture.non_finite() {
         0 => Ok(picture),
@@ -83,13 +87,29 @@ fn load(path: &Path, layer: Option<&str>) -> Result<Picture> {
     }
 }
 
-fn check_sizes(args: &Args, a: &Picture, b: &Picture) -> Result<()> {
+/// # Errors
+/// [`Error::Input`] about the first file.
+pub fn check_sizes((a_path, a): (&Path, &Picture), (b_path, b): (&Path, &Picture)) -> Result<()> {
     if (a.width, a.height) == (b.width, b.height) {
         return Ok(());
     }
     let size = |p: &Picture| format!("{}x{}", p.width, p.height);
-    let what = format!("is {}, but {} is {}: compare images of one size", size(a), args.b.display(), size(b));
-    Err(Error::input(&args.a, what))
+    let what = format!("is {}, but {} is {}: compare images of one size", size(a), b_path.display(), size(b));
+    Err(Error::input(a_path, what))
+}
+
+/// What the metrics are called.
+pub const NAMES: [&str; 5] = ["MSE", "relMSE", "PSNR", "SSIM", "FLIP"];
+
+/// In the order of [`NAMES`].
+pub fn values(m: &Metrics) -> [String; 5] {
+    [
+        format!("{:.6e}", m.mse),
+        format!("{:.6e}", m.relmse),
+        format!("{:.3} dB", m.psnr),
+        m.ssim.map_or("- (under 11x11 pixels)".to_owned(), |s| format!("{s:.6}")),
+        format!("{:.6}", m.flip),
+    ]
 }
 
 impl Limits {
@@ -129,15 +149,8 @@ fn report(args: &Args, m: &Metrics, scale: Option<f32>, exceeded: &[String]) -> 
             &json!({ "a": a, "b": b, "layer": layer, "metrics": m, "diff": diff, "exceeded": exceeded }),
         );
     }
-    let ssim = m.ssim.map_or("- (under 11x11 pixels)".to_owned(), |s| format!("{s:.6}"));
-    let rows = [
-        ("MSE", format!("{:.6e}", m.mse)),
-        ("relMSE", format!("{:.6e}", m.relmse)),
-        ("PSNR", format!("{:.3} dB", m.psnr)),
-        ("SSIM", ssim),
-        ("FLIP", format!("{:.6}", m.flip)),
-    ];
-    print(&table::text(&["metric", "value"], &rows.map(|(name, value)| vec![name.to_owned(), value])))?;
+    let rows: Vec<_> = NAMES.iter().zip(values(m)).map(|(name, value)| vec![(*name).to_owned(), value]).collect();
+    print(&table::text(&["metric", "value"], &rows))?;
     match args.diff.as_ref().zip(scale) {
         Some((path, top)) => print(&format!(
             "{}: |A - B|, mean of the channels; black is 0, the palest colour {top:.6} and above\n",

@@ -2,6 +2,7 @@
 pub mod compare;
 pub mod devices;
 pub mod explain;
+pub mod filter;
 pub mod interrupt;
 pub mod job;
 pub mod layers;
@@ -12,6 +13,7 @@ pub mod render;
 pub mod resume;
 
 use crate::error::{Error, Result};
+use crate::gpu::Gpu;
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use std::io::Write;
@@ -39,6 +41,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::Args>),
+    Filter(Box<filter::Args>),
     Compare(compare::Args),
     Merge(merge::Args),
     Explain(explain::Args),
@@ -80,6 +83,7 @@ pub fn main() -> ExitCode {
 fn run(command: Command) -> Result<Exit> {
     match command {
         Command::Render(args) => render::run(&args),
+        Command::Filter(args) => filter::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Merge(args) => merge::run(&args),
         Command::Explain(args) => explain::run(&args),
@@ -95,7 +99,7 @@ fn usage(e: &clap::Error) -> Result<Exit> {
     }
     if e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         return Err(Error::Usage(
-            "name a command: render, compare, merge, explain or devices (see tallow --help)".to_owned(),
+            "name a command: render, filter, compare, merge, explain or devices (see tallow --help)".to_owned(),
         ));
     }
     let one_line = |paragraph: &str| paragraph.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -128,6 +132,14 @@ pub fn print(text: &str) -> Result<()> {
 pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
     let text = serde_json::to_string(value).map_err(|e| Error::output("standard output", e))?;
     print(&(text + "\n"))
+}
+
+/// With `--validation`, any message is a failure.
+fn fail_on_messages(gpu: &Gpu) -> Result<()> {
+    match gpu.validation_messages().first() {
+        Some(message) => Err(Error::Device(format!("validation: {message}"))),
+        None => Ok(()),
+    }
 }
 
 /// Checks that a picture in false colours can be written.

@@ -2,7 +2,7 @@
 use super::job::{End, Job, Why};
 use super::overrides::Overrides;
 use super::resume::{self, Earlier};
-use super::{Exit, finite, interrupt, layers, print, print_json};
+use super::{Exit, fail_on_messages, finite, interrupt, layers, print, print_json};
 use crate::error::{Error, Result};
 use crate::gpu::{self, DeviceOptions, FrameResources, Gpu, PassTime};
 use crate::image::difference::false_colours;
@@ -226,13 +226,6 @@ fn write_heatmap(path: &Path, film: &Film) -> Result<()> {
     let mut map = Film::new(picture.width, picture.height);
     map.add_vec3("", ["R", "G", "B"], &picture.pixels);
     image::write(path, &map, &WriteOptions::default())
-}
-
-fn fail_on_messages(gpu: &Gpu) -> Result<()> {
-    match gpu.validation_messages().first() {
-        Some(message) => Err(Error::Device(format!("validation: {message}"))),
-        None => Ok(()),
-    }
 }
 
 fn report(

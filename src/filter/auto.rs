@@ -25,9 +25,13 @@ const SMOOTHING: u32 = 3;
 const WORST: f32 = 1e6;
 const UNKNOWN: f32 = 2.0 * WORST;
 
-/// The filters beside none, strongest first. EAW goes without the radiance weight, which noise would steer.
+/// The filters beside none. EAW goes without the radiance weight, which noise would steer, and like the guided filter
+/// over a smaller footprint than alone: where that is too small, the third reaches further.
 fn candidates(s: &FilterSettings) -> [(Row, FilterSettings); 3] {
-    [(atrous::ROW, FilterSettings { sigma_rt: f32::INFINITY, ..*s }), (guided::ROW, *s), (svgf::ROW, *s)]
+    let fine = FilterSettings { levels: s.levels.min(3), sigma_rt: f32::INFINITY, ..*s };
+    let local = FilterSettings { radius: s.radius.div_ceil(2), eps: s.eps.map(|eps| 0.1 * eps), ..*s };
+    let wide = FilterSettings { sigma_l: 2.0 * s.sigma_l, ..*s };
+    [(atrous::ROW, fine), (guided::ROW, local), (svgf::ROW, wide)]
 }
 
 /// A filter, and what it makes of the image and of the probed image.

@@ -18,7 +18,7 @@ pub const ROW: Row = Row {
 };
 
 /// Pixels of a column that a thread filters, and threads of a workgroup, as in the kernel.
-const ROWS: u32 = 4;
+const ROWS: u32 = 8;
 const WORKGROUP: u32 = 32;
 
 struct Bilateral {

@@ -14,11 +14,16 @@ const GAP: usize = 4;
 /// # Panics
 /// When the sizes differ.
 pub fn heat_map(test: &Picture, reference: &Picture) -> (Picture, f32) {
-    assert_eq!((test.width, test.height), (reference.width, reference.height), "pictures of one size");
-    let error = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).map(|c| (a[c] - b[c]).abs()).sum::<f32>() / 3.0;
-    let errors: Vec<f32> = test.pixels.iter().zip(&reference.pixels).map(error).collect();
-    let top = scale_top(&errors);
-    (false_colours(test.width, &errors, top), top)
+    let top = scale_top(&errors(test, reference));
+    (heat_map_to(test, reference, top), top)
+}
+
+/// The same with the top of the scale given, for pictures that are to be compared with each other.
+///
+/// # Panics
+/// When the sizes differ.
+pub fn heat_map_to(test: &Picture, reference: &Picture, top: f32) -> Picture {
+    false_colours(test.width, &errors(test, reference), top)
 }
 
 /// Values from 0 to `top` in the colour map of [`heat_map`], with its scale; [`WIDER`] columns wider.
@@ -34,6 +39,12 @@ pub fn false_colours(width: u32, values: &[f32], top: f32) -> Picture {
         pixels.extend([colour((height - 1 - y) as f32 / (height - 1).max(1) as f32); BAR]);
     }
     Picture { width: width as u32 + WIDER, height: height as u32, pixels }
+}
+
+fn errors(test: &Picture, reference: &Picture) -> Vec<f32> {
+    assert_eq!((test.width, test.height), (reference.width, reference.height), "pictures of one size");
+    let error = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).map(|c| (a[c] - b[c]).abs()).sum::<f32>() / 3.0;
+    test.pixels.iter().zip(&reference.pixels).map(error).collect()
 }
 
 /// Columns that [`heat_map`] adds.

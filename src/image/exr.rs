@@ -1,5 +1,5 @@
 //! OpenEXR, scan lines, lossless: ours out, anybody's in.
-use super::film::{Channel, Film, Samples};
+use super::film::{Channel, Film, Samples, Window};
 use exr::image::{AnyChannel, AnyChannels, Blocks, Encoding, FlatImage, FlatSamples, Image, Layer};
 use exr::math::Vec2;
 use exr::meta::MetaData;
@@ -10,16 +10,18 @@ use std::io::Cursor;
 
 /// Flat areas in DWA blocks: one value in 64, deflated 1032 to 1.
 const MAX_RATIO: u64 = 1 << 16;
+const ENCODING: Encoding =
+    Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
 /// Before the names of our attributes, as many names (`version`, `comments`...) are taken by the standard.
 const PREFIX: &str = "tallow:";
+
+type FlatPart = Layer<AnyChannels<FlatSamples>>;
 
 pub(super) fn encode(film: &Film) -> Result<Vec<u8>, String> {
     let channel = |c: &Channel| AnyChannel::new(text(&c.name), flat_samples(&c.samples));
     let channels = AnyChannels::sort(film.channels.iter().map(channel).collect());
     let size = (film.width as usize, film.height as usize);
-    let (compression, blocks, line_order) = (Compression::ZIP16, Blocks::ScanLines, LineOrder::Increasing);
-    let encoding = Encoding { compression, blocks, line_order };
-    let layer = Layer::new(size, LayerAttributes::default(), encoding, channels);
+    let layer = Layer::new(size, LayerAttributes::default(), ENCODING, channels);
     let mut attributes = ImageAttributes::with_size(size);
     let attribute = |(key, value): (&String, &String)| (text(&format!("{PREFIX}{key}")), text(value));
     attributes.other = film.metadata.iter().map(attribute).map(|(k, v)| (k, AttributeValue::Text(v))).collect();
@@ -48,12 +50,72 @@ fn flat_samples(samples: &Samples) -> FlatSamples {
     }
 }
 
-pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
+/// Which pixels of a file make its film.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Frame {
+    /// Those that are shown: the display window.
+    Display,
+    /// Those that are stored: the union of the data windows of all parts.
+    Data,
+}
+
+pub(super) fn decode(bytes: &[u8], frame: Frame) -> Result<Film, String> {
+    let image = read(bytes)?;
+    let window = match frame {
+        Frame::Display => image.attributes.display_window,
+        Frame::Data => stored(&image),
+    };
+    film_from(image, window)
+}
+
+/// The file again with other samples in some channels, given by their names in the film of [`Frame::Data`]. All else is
+/// kept, but for the compression, which is lossless.
+pub(super) fn replace(bytes: &[u8], channels: &[(&str, &[f32])]) -> Result<Vec<u8>, String> {
+    let mut image = read(bytes)?;
+    let frame = stored(&image);
+    let many = image.layer_data.len() > 1;
+    for part in &mut image.layer_data {
+        let data = window(part);
+        let part_name = part.attributes.layer_name.as_ref().filter(|_| many).map(string);
+        part.encoding = ENCODING;
+        for channel in &mut part.channel_data.list {
+            let name = channel_name(part_name.as_deref(), &string(&channel.name));
+            if let Some((_, samples)) = channels.iter().find(|(wanted, _)| *wanted == name) {
+                channel.sample_data = FlatSamples::F32(shown(samples.to_vec(), frame, data));
+            }
+        }
+    }
+    let mut out = Cursor::new(Vec::new());
+    image.write().to_buffered(&mut out).map_err(|e| format!("cannot be encoded: {e}"))?;
+    Ok(out.into_inner())
+}
+
+fn window(part: &FlatPart) -> IntegerBounds {
+    IntegerBounds::new(part.attributes.layer_position, part.size)
+}
+
+/// The smallest rectangle that holds the data windows of all parts.
+fn stored(image: &FlatImage) -> IntegerBounds {
+    let windows = image.layer_data.iter().map(window);
+    windows.reduce(union).unwrap_or(image.attributes.display_window)
+}
+
+fn union(a: IntegerBounds, b: IntegerBounds) -> IntegerBounds {
+    let edges = |a: i32, a_size: usize, b: i32, b_size: usize| {
+        let end = (i64::from(a) + a_size as i64).max(i64::from(b) + b_size as i64);
+        (a.min(b), (end - i64::from(a.min(b))) as usize)
+    };
+    let (x, width) = edges(a.position.0, a.size.0, b.position.0, b.size.0);
+    let (y, height) = edges(a.position.1, a.size.1, b.position.1, b.size.1);
+    IntegerBounds::new((x, y), (width, height))
+}
+
+fn read(bytes: &[u8]) -> Result<FlatImage, String> {
     let damaged = |e: exr::error::Error| format!("cannot be decoded: {e}; is it complete?");
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
     check_size(&meta, bytes.len())?;
     check_sampling(&meta)?;
-    let image: FlatImage = exr::prelude::read()
+    exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
         .all_channels()
@@ -62,16 +124,17 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
         // A panic on one of its own threads would abort the process, see `contained`.
         .non_parallel()
         .from_buffered(Cursor::new(bytes))
-        .map_err(damaged)?;
-    film_from(image)
+        .map_err(damaged)
 }
 
 fn check_size(meta: &MetaData, file_len: usize) -> Result<(), String> {
+    let data = meta.headers.iter().map(|h| IntegerBounds::new(h.own_attributes.layer_position, h.layer_size));
+    let all = data.reduce(union).map_or(Vec2(0, 0), |b| b.size);
     let mut claimed = 0_u64;
     for header in &meta.headers {
-        let window = header.shared_attributes.display_window.size;
+        let display = header.shared_attributes.display_window.size;
         let samples = |size: Vec2<usize>| (size.0 as u64).saturating_mul(size.1 as u64);
-        let plane = samples(header.layer_size).max(samples(window));
+        let plane = samples(all).max(samples(display));
         claimed = claimed.saturating_add(plane.saturating_mul(header.channels.list.len() as u64));
     }
     super::check_claim(claimed, file_len, MAX_RATIO)
@@ -87,19 +150,19 @@ fn check_sampling(meta: &MetaData) -> Result<(), String> {
 }
 
 /// All parts in one film, channels of a second part and on under the name of their part.
-fn film_from(image: FlatImage) -> Result<Film, String> {
-    let window = image.attributes.display_window;
-    let mut film = Film::new(window.size.0 as u32, window.size.1 as u32);
+fn film_from(image: FlatImage, frame: IntegerBounds) -> Result<Film, String> {
+    let mut film = Film::new(frame.size.0 as u32, frame.size.1 as u32);
     if film.pixels() == 0 {
         return Err("has no pixels: its display window is empty".to_owned());
     }
     let many = image.layer_data.len() > 1;
     for part in image.layer_data {
         let part_name = part.attributes.layer_name.as_ref().filter(|_| many).map(string);
+        let data = window(&part);
         for channel in part.channel_data.list {
             let name = channel_name(part_name.as_deref(), &string(&channel.name));
-            let data = IntegerBounds::new(part.attributes.layer_position, part.size);
-            film.channels.push(Channel { name, samples: shown_samples(channel.sample_data, data, window) });
+            let samples = shown_samples(channel.sample_data, data, frame);
+            film.channels.push(Channel { name, samples, window: held(data, frame) });
         }
         film.metadata.extend(texts(&part.attributes.other));
     }
@@ -107,11 +170,25 @@ fn film_from(image: FlatImage) -> Result<Film, String> {
     Ok(film)
 }
 
+/// The part of `frame` that is stored, unless it is all.
+fn held(data: IntegerBounds, frame: IntegerBounds) -> Option<Window> {
+    let edges = |at: i32, size: usize, start: i32, length: usize| {
+        let first = (i64::from(at) - i64::from(start)).clamp(0, length as i64);
+        let end = (i64::from(at) - i64::from(start) + size as i64).clamp(first, length as i64);
+        (first as u32, (end - first) as u32)
+    };
+    let (x, width) = edges(data.position.0, data.size.0, frame.position.0, frame.size.0);
+    let (y, height) = edges(data.position.1, data.size.1, frame.position.1, frame.size.1);
+    let all = (width as usize, height as usize) == (frame.size.0, frame.size.1);
+    (!all).then_some(Window { first: [x, y], size: [width, height] })
+}
+
 fn texts<'a>(
     attributes: impl IntoIterator<Item = (&'a Text, &'a AttributeValue)>,
 ) -> impl Iterator<Item = (String, String)> {
     attributes.into_iter().filter_map(|(name, value)| match value {
         AttributeValue::Text(value) => Some((string(name).trim_start_matches(PREFIX).to_owned(), string(value))),
+        AttributeValue::I32(value) => Some((string(name), value.to_string())),
         _ => None,
     })
 }

@@ -17,6 +17,17 @@ pub struct Channel {
     pub name: String,
     /// `width * height` values.
     pub samples: Samples,
+    /// The pixels that the file held, where these are not all; the others are 0.
+    pub window: Option<Window>,
+}
+
+/// A rectangle of a film's pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// First column and row.
+    pub first: [u32; 2],
+    /// Columns and rows.
+    pub size: [u32; 2],
 }
 
 /// A picture with named layers.
@@ -69,7 +80,7 @@ impl Film {
     pub fn add(&mut self, name: impl Into<String>, samples: Samples) {
         let (name, len) = (name.into(), samples.len());
         assert_eq!(len, self.pixels(), "channel {name}: one sample per pixel");
-        self.channels.push(Channel { name, samples });
+        self.channels.push(Channel { name, samples, window: None });
     }
 
     /// Adds three channels, such as `direct.R`, `direct.G`, `direct.B` for the layer `direct` with components `RGB`.
@@ -102,14 +113,18 @@ impl Film {
     /// # Errors
     /// When there is no such layer, or more than one; lists those there are.
     pub fn picture(&self, layer: Option<&str>) -> Result<Picture, String> {
-        let planes = match layer {
-            None => self.colour_planes(),
-            Some(name) => self.layer_planes(name),
-        };
-        let planes = planes.ok_or_else(|| self.no_such_layer(layer))?;
-        let [a, b, c] = planes.map(Samples::to_f32);
+        let channels = self.find(layer).ok_or_else(|| self.no_such_layer(layer))?;
+        let [a, b, c] = channels.map(|c| c.samples.to_f32());
         let pixels = a.iter().zip(&b).zip(&c).map(|((&a, &b), &c)| [a, b, c]).collect();
         Ok(Picture { width: self.width, height: self.height, pixels })
+    }
+
+    /// The channels that [`Film::picture`] takes, the same one three times for grey.
+    pub fn find(&self, layer: Option<&str>) -> Option<[&Channel; 3]> {
+        match layer {
+            None => self.colour(),
+            Some(name) => self.layer(name),
+        }
     }
 
     fn no_such_layer(&self, layer: Option<&str>) -> String {
@@ -118,7 +133,7 @@ impl Film {
         format!("holds {wanted}; its channels are {}", names.join(", "))
     }
 
-    fn colour_planes(&self) -> Option<[&Samples; 3]> {
+    fn colour(&self) -> Option<[&Channel; 3]> {
         const USUAL: [&str; 6] = ["", "combined", "beauty", "rgba", "rgb", "color"];
         let coloured: Vec<_> =
             self.layers().into_iter().filter(|l| self.triple(l, ["R", "G", "B"]).is_some()).collect();
@@ -126,11 +141,11 @@ impl Film {
         let only = || coloured.first().filter(|_| coloured.len() == 1);
         match coloured.iter().find(usual).or_else(only) {
             Some(layer) => self.triple(layer, ["R", "G", "B"]),
-            None => self.channel("Y").map(|grey| [grey; 3]),
+            None => self.grey(|c| c.name == "Y"),
         }
     }
 
-    fn layer_planes(&self, wanted: &str) -> Option<[&Samples; 3]> {
+    fn layer(&self, wanted: &str) -> Option<[&Channel; 3]> {
         let same = |name: &str| name.eq_ignore_ascii_case(wanted) || split(name).1.eq_ignore_ascii_case(wanted);
         let found: Vec<_> = self.layers().into_iter().filter(|l| !l.is_empty() && same(l)).collect();
         let exact = found.iter().find(|l| **l == wanted);
@@ -145,20 +160,20 @@ impl Film {
     }
 
     /// The only channel that passes the test, three times.
-    fn grey(&self, test: impl Fn(&&Channel) -> bool) -> Option<[&Samples; 3]> {
+    fn grey(&self, test: impl Fn(&&Channel) -> bool) -> Option<[&Channel; 3]> {
         let mut channels = self.channels.iter().filter(test);
         match (channels.next(), channels.next()) {
-            (Some(only), None) => Some([&only.samples; 3]),
+            (Some(only), None) => Some([only; 3]),
             _ => None,
         }
     }
 
-    fn triple(&self, layer: &str, components: [&str; 3]) -> Option<[&Samples; 3]> {
-        let plane = |component: &str| {
+    fn triple(&self, layer: &str, components: [&str; 3]) -> Option<[&Channel; 3]> {
+        let channel = |component: &str| {
             let is = |c: &&Channel| split(&c.name).0 == layer && split(&c.name).1.eq_ignore_ascii_case(component);
-            self.channels.iter().find(is).map(|c| &c.samples)
+            self.channels.iter().find(is)
         };
-        let [a, b, c] = components.map(plane);
+        let [a, b, c] = components.map(channel);
         Some([a?, b?, c?])
     }
 }
@@ -187,6 +202,6 @@ impl Samples {
 }
 
 /// Layer and component of a channel name: `a.b.R` is (`a.b`, `R`), `Z` is (``, `Z`).
-fn split(name: &str) -> (&str, &str) {
+pub(super) fn split(name: &str) -> (&str, &str) {
     name.rsplit_once('.').unwrap_or(("", name))
 }

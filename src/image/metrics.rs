@@ -26,10 +26,9 @@ pub struct Metrics {
 /// # Panics
 /// When their sizes differ.
 pub fn compare(test: &Picture, reference: &Picture) -> Metrics {
-    assert_eq!((test.width, test.height), (reference.width, reference.height), "pictures of one size");
     Metrics {
         mse: mean(test, reference, |a, b| (a - b) * (a - b)),
-        relmse: mean(test, reference, |a, b| (a - b) * (a - b) / (b * b + RELMSE_EPSILON)),
+        relmse: relmse(test, reference),
         psnr: psnr(test, reference),
         ssim: ssim(test, reference),
         flip: flip(test, reference),
@@ -41,11 +40,24 @@ fn values(picture: &Picture) -> impl Iterator<Item = f32> + '_ {
 }
 
 fn mean(test: &Picture, reference: &Picture, error: impl Fn(f64, f64) -> f64) -> f64 {
+    assert_eq!((test.width, test.height), (reference.width, reference.height), "pictures of one size");
     let sum: f64 = values(test).zip(values(reference)).map(|(a, b)| error(a.into(), b.into())).sum();
     sum / (3 * test.pixels.len()) as f64
 }
 
-fn psnr(test: &Picture, reference: &Picture) -> f64 {
+/// See [`Metrics::relmse`].
+///
+/// # Panics
+/// When their sizes differ.
+pub fn relmse(test: &Picture, reference: &Picture) -> f64 {
+    mean(test, reference, |a, b| (a - b) * (a - b) / (b * b + RELMSE_EPSILON))
+}
+
+/// See [`Metrics::psnr`].
+///
+/// # Panics
+/// When their sizes differ.
+pub fn psnr(test: &Picture, reference: &Picture) -> f64 {
     let shown = |v: f64| f64::from(srgb_from_linear(v as f32));
     -10.0 * mean(test, reference, |a, b| (shown(a) - shown(b)).powi(2)).log10()
 }

@@ -1,14 +1,16 @@
 //! Pictures and files: a [`Film`] of named channels, its readers and writers, and the metrics between two of them.
+pub mod aov;
 pub mod difference;
 mod exr;
 mod film;
 pub mod metrics;
 pub mod output;
 mod photo;
+pub mod source;
 pub mod tone;
 
 use crate::error::{Error, Result};
-pub use film::{Channel, Film, Picture, Samples};
+pub use film::{Channel, Film, Picture, Samples, Window};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -74,11 +76,15 @@ pub fn check_writable(path: &Path) -> Result<()> {
 /// # Errors
 /// [`Error::Input`] when the file cannot be read, is of another kind, or is damaged.
 pub fn read(path: &Path) -> Result<Film> {
+    decode(&read_bytes(path)?).map_err(|what| Error::input(path, what))
+}
+
+fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     let about = |e: std::io::Error| Error::input(path, format!("cannot be read: {e}"));
     if std::fs::metadata(path).map_err(about)?.is_dir() {
         return Err(Error::input(path, "is a folder: name an image file"));
     }
-    decode(&std::fs::read(path).map_err(about)?).map_err(|what| Error::input(path, what))
+    std::fs::read(path).map_err(about)
 }
 
 /// More 32-bit samples than this, 4 GiB of them, are refused.
@@ -100,9 +106,15 @@ fn check_claim(samples: u64, file_len: usize, ratio: u64) -> std::result::Result
 /// # Errors
 /// What is wrong with the data, in one line.
 pub fn decode(bytes: &[u8]) -> std::result::Result<Film, String> {
-    const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
-    let decoder = if bytes.starts_with(&EXR_MAGIC) { exr::decode } else { photo::decode };
-    contained(|| decoder(bytes)).map_err(|what| what.replace('\n', " "))
+    decode_frame(bytes, exr::Frame::Display)
+}
+
+fn decode_frame(bytes: &[u8], frame: exr::Frame) -> std::result::Result<Film, String> {
+    contained(|| if is_exr(bytes) { exr::decode(bytes, frame) } else { photo::decode(bytes) })
+}
+
+fn is_exr(bytes: &[u8]) -> bool {
+    bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01])
 }
 
 thread_local! {
@@ -120,7 +132,8 @@ fn contained<T>(decode: impl FnOnce() -> std::result::Result<T, String>) -> std:
     DECODING.set(true);
     let result = catch_unwind(AssertUnwindSafe(decode));
     DECODING.set(false);
-    result.unwrap_or_else(|_| Err("cannot be decoded: its data contradict its header; is it complete?".to_owned()))
+    let broken = |_| Err("cannot be decoded: its data contradict its header; is it complete?".to_owned());
+    result.unwrap_or_else(broken).map_err(|what| what.replace('\n', " "))
 }
 
 #[cfg(test)]

@@ -39,7 +39,10 @@ fn main() -> Result<()> {
     let gpu = Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), validation: false })?;
     let input = picture(width, height);
     let row = find(name).context("no such filter")?;
-    let settings = FilterSettings::default().scaled_to(&input);
+    let mut settings = FilterSettings::default().scaled_to(&input);
+    if name == "bilateral" {
+        settings.sigma_rt = f32::INFINITY; // joint: by the guide alone, as OpenCV's jointBilateralFilter and GIF's
+    }
     let planes = Planes::new(&gpu, &input)?;
     let filter = (row.make)(&gpu, &settings, planes.size)?;
     let mut frame = FrameResources::new(&gpu)?;

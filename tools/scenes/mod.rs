@@ -44,6 +44,7 @@ const SCENES: &[(&str, Source)] = &[
     ("furnace-box", Source::Written(include_str!("furnace-box.toml"))),
     ("crytek-sponza", Source::Written(include_str!("crytek-sponza.toml"))),
     ("sibenik", Source::Written(include_str!("sibenik.toml"))),
+    ("sibenik-lamps", Source::Written(include_str!("sibenik-lamps.toml"))),
     ("forest", Source::Written(include_str!("forest.toml"))),
     ("pine-grove", Source::Written(include_str!("pine-grove.toml"))),
     ("stanford-bunny", Source::Written(include_str!("stanford-bunny.toml"))),

@@ -1,0 +1,214 @@
+//! `tallow filter`: a noisy image becomes a clean one.
+mod options;
+
+use super::compare::{self, check_sizes};
+use super::{Exit, fail_on_messages, finite, print, print_json};
+use crate::composition::{self, Demodulation, Parts};
+use crate::error::{Error, Result};
+use crate::filter::{self, FILTERS, Row};
+use crate::gpu::{DeviceOptions, Gpu, PassTime};
+use crate::image::aov::Aovs;
+use crate::image::metrics::{self, Metrics};
+use crate::image::source::Source;
+use crate::image::{self, Picture, WriteOptions, tone::ToneMap};
+use crate::report::table::{self, PassRow};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use options::{Layers, Overrides};
+use serde::Serialize;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Filter a noisy image, of this renderer or another
+///
+/// Takes albedo, normals, positions, depth and variance from the layers of an EXR file, as Tallow, Blender, Mitsuba 3 and
+/// pbrt-v4 name them, and does without those that are missing. Surface colour is divided out before and multiplied back
+/// after; in Tallow's own files, direct light stays as it is.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Image to filter (EXR; PNG, JPEG and HDR hold no layers)
+    pub image: PathBuf,
+    /// Filter to apply
+    #[arg(long, value_parser = filter_names(), default_value = "auto")]
+    pub filter: &'static Row,
+    /// Image to write: .exr (all layers, the colour filtered), .png or .hdr; may be given several times
+    #[arg(short, long = "output", value_name = "FILE", required = true)]
+    pub outputs: Vec<PathBuf>,
+    /// Print how far the image is from this one, before and after
+    #[arg(long, value_name = "FILE")]
+    pub reference: Option<PathBuf>,
+    /// Filter direct light too, where the file holds it apart (Tallow's own do)
+    #[arg(long)]
+    pub filter_direct: bool,
+    /// Filter the colour as it is: textures blur too
+    #[arg(long)]
+    pub no_demodulate: bool,
+    /// First cut pixels that are more than N times brighter than all but one around them, and say what that took away
+    #[arg(long, value_name = "N")]
+    pub fireflies: Option<f32>,
+    /// Device, by index or part of its name [default: the best one]
+    #[arg(long, value_name = "NAME")]
+    pub device: Option<String>,
+    /// Exposure of PNG files in stops
+    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = finite, allow_negative_numbers = true)]
+    pub exposure: f64,
+    /// Tone curve of PNG files
+    #[arg(long, value_enum, default_value_t)]
+    pub tonemap: ToneMap,
+    /// Run under the Vulkan validation layers and fail on any message
+    #[arg(long)]
+    pub validation: bool,
+    /// Print one JSON object at the end
+    #[arg(long)]
+    pub json: bool,
+    /// Print nothing
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Where the layers are.
+    #[command(flatten)]
+    pub layers: Layers,
+    /// Replace the filters' own settings.
+    #[command(flatten)]
+    pub overrides: Overrides,
+}
+
+fn filter_names() -> impl TypedValueParser<Value = &'static Row> {
+    let names = FILTERS.iter().map(|row| PossibleValue::new(row.name).help(row.about));
+    PossibleValuesParser::new(names).try_map(|name| filter::find(&name).ok_or("no such filter"))
+}
+
+/// What `--json` prints.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// Files written.
+    pub files: Vec<PathBuf>,
+    /// Name of the filter.
+    pub filter: &'static str,
+    /// Pixels, stored ones, shown or not.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// What was found in the file, what was missing and what was made of it.
+    pub notes: Vec<String>,
+    /// Wall time of filtering without reading and writing.
+    pub seconds: f64,
+    /// Name of the device.
+    pub device: String,
+    /// GPU time by pass.
+    pub passes: Vec<PassRow>,
+    /// Distance from the reference; none without `--reference`, or where a pixel is NaN or infinite.
+    pub before: Option<Metrics>,
+    /// The same of the result.
+    pub after: Option<Metrics>,
+}
+
+/// Runs the subcommand.
+///
+/// # Errors
+/// Of every kind; nothing is written then.
+pub fn run(args: &Args) -> Result<Exit> {
+    args.outputs.iter().try_for_each(|path| image::check_writable(path))?;
+    let source = Source::read(&args.image)?;
+    let aovs = Aovs::find(&source.film, &args.layers.names()).map_err(|what| Error::input(&args.image, what))?;
+    let reference = reference(args, &source)?;
+    let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), validation: args.validation })?;
+    let start = Instant::now();
+    let mut parts = composition::split(&aovs, demodulation(args));
+    cut_fireflies(args, &gpu, &mut parts)?;
+    let (colour, times) = filtered(args, &gpu, &parts)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let clean = replaced(&source, &aovs, &colour)?;
+    fail_on_messages(&gpu)?;
+    let options = WriteOptions { exposure: args.exposure as f32, tone_map: args.tonemap };
+    args.outputs.iter().try_for_each(|path| clean.write(path, &options))?;
+    let distance = |image: &Source| reference.as_ref().map_or(Ok(None), |r| distance(args, image, r));
+    let summary = Summary {
+        files: args.outputs.clone(),
+        filter: args.filter.name,
+        width: source.film.width,
+        height: source.film.height,
+        notes: [aovs.notes, parts.notes].concat(),
+        seconds,
+        device: gpu.info().name.clone(),
+        passes: table::summarise(&times),
+        before: distance(&source)?,
+        after: distance(&clean)?,
+    };
+    report(args, &summary)?;
+    Ok(Exit::Done)
+}
+
+fn demodulation(args: &Args) -> Demodulation {
+    match (args.no_demodulate, args.filter_direct) {
+        (true, _) => Demodulation::Off,
+        (false, true) => Demodulation::Albedo,
+        (false, false) => Demodulation::Light,
+    }
+}
+
+fn cut_fireflies(args: &Args, gpu: &Gpu, parts: &mut Parts) -> Result<()> {
+    let Some(factor) = args.fireflies else { return Ok(()) };
+    let cut = filter::firefly::remove_fireflies(gpu, &mut parts.input, factor)?;
+    parts.notes.push(format!("fireflies: {} pixels cut, {:.3} % of what is filtered", cut.pixels, 100.0 * cut.share));
+    Ok(())
+}
+
+fn filtered(args: &Args, gpu: &Gpu, parts: &Parts) -> Result<(Vec<[f32; 3]>, Vec<PassTime>)> {
+    let settings = args.overrides.settings(&parts.input);
+    let (light, times) = filter::run(gpu, args.filter, &parts.input, &settings)?;
+    Ok((parts.join(&light), times))
+}
+
+/// The file with the filtered colour. Where its three channels are one, that holds their mean.
+fn replaced(source: &Source, aovs: &Aovs, colour: &[[f32; 3]]) -> Result<Source> {
+    let grey = aovs.colour[0] == aovs.colour[1];
+    let plane = |c: usize| colour.iter().map(|v| if grey { (v[0] + v[1] + v[2]) / 3.0 } else { v[c] }).collect();
+    let planes: Vec<Vec<f32>> = (0..3).map(plane).collect();
+    let channels: Vec<_> = aovs.colour.into_iter().zip(planes.iter().map(Vec::as_slice)).collect();
+    source.replaced(&channels)
+}
+
+/// Read before anything long, and of the size of the image.
+fn reference(args: &Args, source: &Source) -> Result<Option<Picture>> {
+    let Some(path) = &args.reference else { return Ok(None) };
+    let reference = compare::load(path, None)?;
+    check_sizes((&args.image, &shown(args, source)?), (path, &reference))?;
+    Ok(Some(reference))
+}
+
+fn shown(args: &Args, image: &Source) -> Result<Picture> {
+    image.shown()?.picture(args.layers.colour.as_deref()).map_err(|what| Error::input(&args.image, what))
+}
+
+fn distance(args: &Args, image: &Source, reference: &Picture) -> Result<Option<Metrics>> {
+    let picture = shown(args, image)?;
+    Ok((picture.non_finite() == 0).then(|| metrics::compare(&picture, reference)))
+}
+
+fn report(args: &Args, summary: &Summary) -> Result<()> {
+    match (args.json, args.quiet) {
+        (true, _) => print_json(summary),
+        (false, true) => Ok(()),
+        (false, false) => print(&text(args, summary)),
+    }
+}
+
+fn text(args: &Args, s: &Summary) -> String {
+    let mut text = s.notes.iter().map(|note| format!("{note}\n")).collect::<String>();
+    text += &format!("{} x {}, {} in {:.3} s on {}\n", s.width, s.height, s.filter, s.seconds, s.device);
+    text += &table::timing_table(&s.passes);
+    if args.reference.is_some() {
+        text += &metrics_table(&s.before, &s.after);
+    }
+    text
+}
+
+/// A column is dashes where no metric can weigh the image.
+fn metrics_table(before: &Option<Metrics>, after: &Option<Metrics>) -> String {
+    let column = |m: &Option<Metrics>| m.as_ref().map(compare::values);
+    let (before, after) = (column(before), column(after));
+    let cell = |column: &Option<[String; 5]>, i: usize| {
+        column.as_ref().map_or("- (not finite)".to_owned(), |rows| rows[i].clone())
+    };
+    let row = |i: usize| vec![compare::NAMES[i].to_owned(), cell(&before, i), cell(&after, i)];
+    table::text(&["metric", "before", "after"], &(0..compare::NAMES.len()).map(row).collect::<Vec<_>>())
+}

@@ -1,0 +1,220 @@
+//! What of an image is filtered, and how it becomes an image again: `colour = sharp + factor * filtered`.
+//!
+//! | image | filtered | factor | sharp |
+//! |---|---|---|---|
+//! | Tallow's | indirect light before albedo | that albedo | direct light, emission, what smooth surfaces show |
+//! | with albedo | colour / albedo | albedo | what reflects nothing: lamps, sky |
+//! | any, plain | colour | 1 | nothing |
+mod albedo;
+mod guide;
+
+use crate::filter::FilterInput;
+use crate::gpu::layout::{vec3, vec4};
+use crate::image::aov::{Aov, Aovs};
+
+/// What is kept away from the filter, where an image tells it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Demodulation {
+    /// Surface colour and direct light.
+    #[default]
+    Light,
+    /// Surface colour.
+    Albedo,
+    /// Nothing.
+    Off,
+}
+
+/// An image taken apart.
+pub struct Parts {
+    /// What goes through the filter.
+    pub input: FilterInput,
+    sharp: Vec<vec3>,
+    factor: Vec<vec3>,
+    /// How it was taken apart, and what was made up: one line each.
+    pub notes: Vec<String>,
+}
+
+/// Takes an image apart.
+pub fn split(aovs: &Aovs, demodulation: Demodulation) -> Parts {
+    let colour = aovs.get(Aov::Colour).unwrap_or_default();
+    let counts = counts(aovs, colour);
+    let mut notes = Vec::new();
+    let light = match (demodulation, aovs.get(Aov::Albedo), layers(aovs)) {
+        (Demodulation::Off, ..) | (_, None, _) => plain(colour),
+        (Demodulation::Light, Some(albedo), Some(layers)) => split_light(colour, albedo, layers),
+        (_, Some(albedo), _) => albedo::split(colour, albedo, aovs.film.width as usize),
+    };
+    notes.push(light.note.to_owned());
+    let radiance = light.filtered.iter().zip(&counts).zip(&light.factor).map(with_count).collect();
+    let variance = variance(aovs, &counts).map(|v| v.iter().zip(&light.factor).map(demodulated_variance).collect());
+    let guide = guide::guides(aovs, &mut notes);
+    let input = FilterInput { width: aovs.film.width, height: aovs.film.height, radiance, guide, variance };
+    Parts { input, sharp: light.sharp, factor: light.factor, notes }
+}
+
+impl Parts {
+    /// Puts the image together from what the filter returned.
+    ///
+    /// # Panics
+    /// When that has another number of pixels.
+    pub fn join(&self, filtered: &[vec4]) -> Vec<vec3> {
+        assert_eq!(filtered.len(), self.sharp.len(), "one filtered value per pixel");
+        let pixel = |i: usize| std::array::from_fn(|c| self.sharp[i][c] + self.factor[i][c] * filtered[i][c]);
+        (0..filtered.len()).map(pixel).collect()
+    }
+}
+
+struct Light {
+    filtered: Vec<vec3>,
+    factor: Vec<vec3>,
+    sharp: Vec<vec3>,
+    note: &'static str,
+}
+
+/// Samples behind each pixel: as the file says, per pixel or for all; 1 where it does not; 0 where there is nothing.
+fn counts(aovs: &Aovs, colour: &[vec3]) -> Vec<f32> {
+    let of_all = aovs.film.metadata.get("samplesPerPixel").and_then(|n| n.parse::<f32>().ok()); // pbrt's
+    let count = |i: usize| aovs.scalar(Aov::Samples, i).or(of_all).unwrap_or(1.0);
+    let known = |i: usize| aovs.holds(i) && colour[i].iter().all(|v| v.is_finite());
+    (0..colour.len()).map(|i| if known(i) { count(i) } else { 0.0 }).collect()
+}
+
+/// Direct and indirect light, unless a pixel without samples lacks its direct light.
+fn layers<'a>(aovs: &'a Aovs) -> Option<[&'a [vec3]; 2]> {
+    let sampled = (0..aovs.film.pixels()).all(|i| aovs.scalar(Aov::Samples, i) != Some(0.0));
+    Some([aovs.get(Aov::Direct)?, aovs.get(Aov::Indirect)?]).filter(|_| sampled)
+}
+
+/// The albedo that indirect light is multiplied by is that of the samples, `(colour - direct) / indirect`, so that edges
+/// and textures stay as smooth as the samples made them; that of the pixel's centre where no sample met light.
+fn split_light(colour: &[vec3], albedo: &[vec3], [direct, indirect]: [&[vec3]; 2]) -> Light {
+    let factor = |i: usize| {
+        std::array::from_fn(|c| {
+            let of_samples = (colour[i][c] - direct[i][c]) / indirect[i][c];
+            if of_samples.is_finite() && indirect[i][c] > 0.0 { of_samples.clamp(0.0, 1.0) } else { albedo[i][c] }
+        })
+    };
+    Light {
+        filtered: indirect.to_vec(),
+        factor: (0..colour.len()).map(factor).collect(),
+        sharp: direct.iter().map(|v| v.map(|v| if v.is_finite() { v } else { 0.0 })).collect(),
+        note: "filtered: indirect light before albedo; direct light stays as it is",
+    }
+}
+
+fn plain(colour: &[vec3]) -> Light {
+    Light {
+        filtered: colour.to_vec(),
+        factor: vec![[1.0; 3]; colour.len()],
+        sharp: vec![[0.0; 3]; colour.len()],
+        note: "filtered: the colour, without demodulation",
+    }
+}
+
+/// Pixels whose filtered part is not used must not reach others.
+fn with_count(((c, count), factor): ((&vec3, &f32), &vec3)) -> vec4 {
+    let used = factor.iter().any(|&f| f > 0.0);
+    [c[0], c[1], c[2], if used { *count } else { 0.0 }]
+}
+
+/// Of each pixel's mean. pbrt stores that of one sample.
+fn variance(aovs: &Aovs, counts: &[f32]) -> Option<Vec<vec3>> {
+    let stored = aovs.get(Aov::Variance)?;
+    let of_one_sample = aovs.film.channels.iter().any(|c| c.name.starts_with("RelativeVariance."));
+    let mean = |(v, n): (&vec3, &f32)| if of_one_sample { v.map(|v| v / n.max(1.0)) } else { *v };
+    Some(stored.iter().zip(counts).map(mean).collect())
+}
+
+fn demodulated_variance((v, f): (&vec3, &vec3)) -> vec3 {
+    std::array::from_fn(|c| if f[c] > 0.0 { v[c] / (f[c] * f[c]) } else { 0.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::aov::Names;
+    use crate::image::{Film, Samples};
+
+    const RGB: [&str; 3] = ["R", "G", "B"];
+
+    /// One row: a wall of albedo 0.5 lit by 2, the rim of a lamp, the lamp.
+    fn film() -> Film {
+        let mut film = Film::new(4, 1);
+        film.add_vec3("", RGB, &[[1.0; 3], [1.0; 3], [25.0; 3], [50.0; 3]]);
+        film.add_vec3("albedo", RGB, &[[0.5; 3], [0.5; 3], [0.25; 3], [0.0; 3]]);
+        film
+    }
+
+    fn take_apart(film: &Film, demodulation: Demodulation) -> Parts {
+        split(&Aovs::find(film, &Names::new()).unwrap(), demodulation)
+    }
+
+    #[test]
+    fn lamps_and_their_rims_reach_no_other_pixel() {
+        let parts = take_apart(&film(), Demodulation::Light);
+        assert_eq!(parts.input.radiance, [[2.0, 2.0, 2.0, 1.0], [2.0, 2.0, 2.0, 1.0], [0.0; 4], [0.0; 4]]);
+        let joined = parts.join(&[[3.0, 3.0, 3.0, 1.0]; 4]);
+        assert_eq!(joined, [[1.5; 3], [1.5; 3], [25.0; 3], [50.0; 3]]);
+        // The albedo of pixel centres does not show that the third pixel is a rim; its light does.
+        let mut centre = film();
+        centre.channels.truncate(3);
+        centre.add_vec3("albedo", RGB, &[[0.5; 3], [0.5; 3], [0.5; 3], [0.0; 3]]);
+        assert_eq!(take_apart(&centre, Demodulation::Light).input.radiance[2], [0.0; 4]);
+        // Control: in plain order all of it is filtered.
+        assert!(take_apart(&film(), Demodulation::Off).input.radiance.iter().all(|c| c[3] == 1.0));
+    }
+
+    #[test]
+    fn direct_light_is_left_out_only_where_every_pixel_has_some() {
+        let mut film = film();
+        film.metadata.insert("software".to_owned(), "tallow 0.1.0".to_owned());
+        film.add_vec3("direct", RGB, &[[0.5; 3], [0.5; 3], [25.0; 3], [50.0; 3]]);
+        film.add_vec3("indirect", RGB, &[[1.0; 3], [1.0; 3], [0.0; 3], [0.0; 3]]);
+        let counts = |counts: [u32; 4]| {
+            let mut film = film.clone();
+            film.add("samples", Samples::U32(counts.to_vec()));
+            take_apart(&film, Demodulation::Light).input.radiance
+        };
+        assert_eq!(counts([4; 4])[0], [1.0, 1.0, 1.0, 4.0]);
+        assert_eq!(counts([4, 0, 4, 4])[..2], [[2.0, 2.0, 2.0, 4.0], [2.0, 2.0, 2.0, 0.0]]);
+        // A broken pixel is in-painted by itself.
+        let red = film.channels.iter_mut().filter(|c| ["R", "direct.R"].contains(&c.name.as_str()));
+        red.for_each(|c| c.samples = Samples::F32(vec![1.0, f32::NAN, 25.0, 50.0]));
+        let parts = take_apart(&film, Demodulation::Light);
+        assert_eq!(parts.input.radiance.iter().map(|c| c[3]).collect::<Vec<_>>(), [1.0, 0.0, 1.0, 0.0]);
+        assert_eq!(parts.join(&[[1.0; 4]; 4])[1], [0.5, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn the_variance_of_a_pbrt_file_is_that_of_one_sample() {
+        let mut film = film();
+        film.add_vec3("Variance", RGB, &[[8.0; 3]; 4]);
+        let first = |film: &Film| take_apart(film, Demodulation::Light).input.variance.unwrap()[0][0];
+        assert_eq!(first(&film), 32.0, "of the mean, over the squared albedo");
+        film.add_vec3("RelativeVariance", RGB, &[[8.0; 3]; 4]);
+        film.metadata.insert("samplesPerPixel".to_owned(), "16".to_owned());
+        assert_eq!(first(&film), 2.0);
+    }
+
+    #[test]
+    fn positions_and_depths_are_made_of_each_other_and_it_is_said() {
+        let guides = |change: &dyn Fn(&mut Film)| {
+            let mut film = film();
+            film.add_vec3("N", ["X", "Y", "Z"], &[[0.0, 0.0, 0.5]; 4]);
+            change(&mut film);
+            let parts = take_apart(&film, Demodulation::Light);
+            (parts.input.guide, parts.notes.join("\n"))
+        };
+        let (guide, notes) = guides(&|film| film.add("Z", Samples::F32(vec![1.0, 2.0, 1e10, f32::INFINITY])));
+        assert_eq!([guide[0].depth, guide[2].depth, guide[3].depth], [1.0, 0.0, 0.0], "1e10 is Blender's sky");
+        assert!(guide[0].position[0] < 0.0 && guide[1].position[2] < guide[0].position[2], "{guide:?}");
+        assert_eq!(guide[0].normal, [0.0, 0.0, 1.0], "means of normals are made unit");
+        assert!(notes.contains("position: made of the depth"), "{notes}");
+        let hits = [[0.0, 1.0, 5.0], [0.0, 1.0, 4.0], [0.0, 1.0, 3.0], [0.0; 3]];
+        let (guide, notes) = guides(&|film| film.add_vec3("P", ["X", "Y", "Z"], &hits));
+        let depths: Vec<f32> = guide.iter().map(|g| g.depth).collect();
+        assert!(depths[0] > 0.0 && depths[1] == depths[0] + 1.0 && depths[2] == depths[0] + 2.0, "{depths:?}");
+        assert_eq!(depths[3], 0.0, "no hit");
+        assert!(notes.contains("depth: made of the position"), "{notes}");
+    }
+}

@@ -1,0 +1,274 @@
+//! What filters can use of an image, found by the channel names of Tallow, Blender (Cycles), Mitsuba 3 and pbrt-v4.
+use super::film::{Channel, Film, Window, split};
+use std::collections::BTreeMap;
+
+/// One kind of arbitrary output variable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Aov {
+    /// Radiance; the only one that an image must have.
+    Colour,
+    /// Tallow's own: radiance that needs no filter.
+    Direct,
+    /// Tallow's own: indirect radiance before albedo.
+    Indirect,
+    /// Reflectance of the first hit.
+    Albedo,
+    /// Shading normal, in any fixed space.
+    Normal,
+    /// First hit, in any fixed space.
+    Position,
+    /// Distance of the first hit.
+    Depth,
+    /// Squared standard error of the radiance.
+    Variance,
+    /// Number of samples.
+    Samples,
+}
+
+/// An AOV, what users call it, and the names that renderers give it, the best first.
+struct Known {
+    aov: Aov,
+    label: &'static str,
+    names: &'static [&'static str],
+}
+
+/// Blender: `ViewLayer.NAME.R`; its "Denoising" passes are made for filters. Mitsuba: the user chooses the names; these
+/// are those of its documentation. pbrt: `Albedo.R`, `Ns.X`, `P.X`, `Variance.R`.
+const KNOWN: &[Known] = &[
+    Known { aov: Aov::Colour, label: "colour", names: &["noisy image"] },
+    Known { aov: Aov::Direct, label: "direct light", names: &["direct"] },
+    Known { aov: Aov::Indirect, label: "indirect light", names: &["indirect"] },
+    Known { aov: Aov::Albedo, label: "albedo", names: &["denoising albedo", "albedo", "diffcol", "diffuse color"] },
+    Known {
+        aov: Aov::Normal,
+        label: "normal",
+        names: &["denoising normal", "ns", "n", "sh_normal", "normal", "normals", "nn", "geo_normal", "ng"],
+    },
+    Known { aov: Aov::Position, label: "position", names: &["p", "position", "pos"] },
+    Known { aov: Aov::Depth, label: "depth", names: &["denoising depth", "z", "depth", "dd.y", "dd"] },
+    Known { aov: Aov::Variance, label: "variance", names: &["variance"] },
+    Known { aov: Aov::Samples, label: "samples", names: &["samples", "debug sample count", "sample count"] },
+];
+
+/// Names that the user gives, for those of other renderers.
+pub type Names = BTreeMap<Aov, String>;
+
+/// The AOVs of a film, each three values per pixel.
+pub struct Aovs<'a> {
+    /// Where they are from.
+    pub film: &'a Film,
+    /// The channels of the colour, which a filter replaces.
+    pub colour: [&'a str; 3],
+    planes: BTreeMap<Aov, Vec<[f32; 3]>>,
+    window: Option<Window>,
+    /// What was found under which name, and what is missing: one line each.
+    pub notes: Vec<String>,
+}
+
+impl<'a> Aovs<'a> {
+    /// Looks for everything there is to know about.
+    ///
+    /// # Errors
+    /// When there is no colour, or not what the user named, or when the file holds other pixels of it than of the colour.
+    pub fn find(film: &'a Film, names: &Names) -> Result<Self, String> {
+        let given = names.get(&Aov::Colour).map(String::as_str);
+        let shown = film.find(given).ok_or_else(|| film.picture(given).err().unwrap_or_default())?;
+        let view = split(split(&shown[0].name).0).0;
+        let mut found = Self {
+            film,
+            colour: shown.map(|c| c.name.as_str()),
+            planes: BTreeMap::new(),
+            window: shown[0].window,
+            notes: Vec::new(),
+        };
+        for known in KNOWN {
+            let channels = match names.get(&known.aov) {
+                Some(name) => Some(film.find(Some(name)).ok_or_else(|| absent(film, known, name))?),
+                None if known.is_tallow_s_own() && !is_tallow_s(film) => None,
+                None => known.names.iter().find_map(|name| find(film, view, name).filter(|c| known.fits(c))),
+            };
+            let channels = channels.or_else(|| (known.aov == Aov::Colour).then_some(shown));
+            found.take(known, channels)?;
+        }
+        Ok(found)
+    }
+
+    fn take(&mut self, known: &Known, channels: Option<[&Channel; 3]>) -> Result<(), String> {
+        let Some(channels) = channels else {
+            if !known.is_tallow_s_own() {
+                self.notes.push(format!("{}: not there", known.label));
+            }
+            return Ok(());
+        };
+        if let Some(c) = channels.iter().find(|c| c.window != self.window) {
+            return Err(format!(
+                "{} ({}) covers {}, but the colour {}: render both at one size",
+                known.label,
+                c.name,
+                extent(self.film, c.window),
+                extent(self.film, self.window)
+            ));
+        }
+        let [a, b, c] = channels.map(|c| c.samples.to_f32());
+        self.planes.insert(known.aov, a.iter().zip(&b).zip(&c).map(|((&a, &b), &c)| [a, b, c]).collect());
+        self.notes.push(format!("{}: {}", known.label, channel_names(channels)));
+        Ok(())
+    }
+
+    /// Three values per pixel, the same three times where the file has one.
+    pub fn get(&self, aov: Aov) -> Option<&[[f32; 3]]> {
+        self.planes.get(&aov).map(Vec::as_slice)
+    }
+
+    /// The first of the three.
+    pub fn scalar(&self, aov: Aov, pixel: usize) -> Option<f32> {
+        self.get(aov).map(|plane| plane[pixel][0])
+    }
+
+    /// Whether the file holds this pixel.
+    pub fn holds(&self, pixel: usize) -> bool {
+        let at = [pixel as u32 % self.film.width, pixel as u32 / self.film.width];
+        self.window.is_none_or(|w| (0..2).all(|i| at[i] >= w.first[i] && at[i] - w.first[i] < w.size[i]))
+    }
+}
+
+impl Known {
+    /// A vector needs three channels; a single one of that name is something else.
+    fn fits(&self, channels: &[&Channel; 3]) -> bool {
+        !matches!(self.aov, Aov::Normal | Aov::Position) || channels[0].name != channels[1].name
+    }
+
+    fn is_tallow_s_own(&self) -> bool {
+        matches!(self.aov, Aov::Direct | Aov::Indirect)
+    }
+}
+
+/// Other programs may use the same names for something else.
+fn is_tallow_s(film: &Film) -> bool {
+    film.metadata.get("software").is_some_and(|name| name.starts_with("tallow "))
+}
+
+/// In the view layer of the colour, or else anywhere.
+fn find<'a>(film: &'a Film, view: &str, name: &str) -> Option<[&'a Channel; 3]> {
+    let own = (!view.is_empty()).then(|| film.find(Some(&format!("{view}.{name}")))).flatten();
+    own.or_else(|| film.find(Some(name)))
+}
+
+fn absent(film: &Film, known: &Known, name: &str) -> String {
+    let why = film.picture(Some(name)).err().unwrap_or_default();
+    format!("{}: {why}", known.label)
+}
+
+fn extent(film: &Film, window: Option<Window>) -> String {
+    let w = window.unwrap_or(Window { first: [0, 0], size: [film.width, film.height] });
+    format!("{}x{} pixels from ({}, {})", w.size[0], w.size[1], w.first[0], w.first[1])
+}
+
+/// `N.X N.Y N.Z`, or one name.
+fn channel_names(channels: [&Channel; 3]) -> String {
+    let mut names = channels.map(|c| c.name.as_str()).to_vec();
+    names.dedup();
+    names.join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Samples;
+
+    /// One pixel whose channels hold 0, 1, 2... in the order given.
+    fn film(names: &str) -> Film {
+        let mut film = Film::new(1, 1);
+        for (i, name) in names.split(' ').enumerate() {
+            film.add(name.replace('_', " "), Samples::F32(vec![i as f32]));
+        }
+        film
+    }
+
+    /// (AOV, value of its first channel).
+    fn found(film: &Film) -> Vec<(Aov, f32)> {
+        let aovs = Aovs::find(film, &Names::new()).unwrap();
+        KNOWN.iter().filter_map(|k| Some((k.aov, aovs.scalar(k.aov, 0)?))).collect()
+    }
+
+    #[test]
+    fn tallow_s_own_layers_are_found() {
+        let mut film = film(
+            "R G B variance.R variance.G variance.B samples direct.R direct.G direct.B indirect.R indirect.G indirect.B \
+             albedo.R albedo.G albedo.B N.X N.Y N.Z P.X P.Y P.Z Z id",
+        );
+        let others = [
+            (Aov::Colour, 0.0),
+            (Aov::Albedo, 13.0),
+            (Aov::Normal, 16.0),
+            (Aov::Position, 19.0),
+            (Aov::Depth, 22.0),
+            (Aov::Variance, 3.0),
+            (Aov::Samples, 6.0),
+        ];
+        assert_eq!(found(&film), others, "layers called direct may be anything in the files of others");
+        film.metadata.insert("software".to_owned(), "tallow 0.1.0".to_owned());
+        assert_eq!(found(&film)[1..3], [(Aov::Direct, 7.0), (Aov::Indirect, 10.0)]);
+    }
+
+    #[test]
+    fn blender_s_layers_are_found_in_the_view_layer_of_the_colour() {
+        let file = film(
+            "View.Combined.R View.Combined.G View.Combined.B View.Depth.Z View.Normal.X View.Normal.Y View.Normal.Z \
+             View.Position.X View.Position.Y View.Position.Z View.DiffCol.R View.DiffCol.G View.DiffCol.B \
+             View.Debug_Sample_Count.X Other.Normal.X Other.Normal.Y Other.Normal.Z",
+        );
+        let depth = [(Aov::Normal, 4.0), (Aov::Position, 7.0), (Aov::Depth, 3.0), (Aov::Samples, 13.0)];
+        assert_eq!(found(&file), [&[(Aov::Colour, 0.0), (Aov::Albedo, 10.0)], &depth[..]].concat());
+    }
+
+    #[test]
+    fn blender_s_denoising_data_are_preferred_and_its_combined_layer_is_replaced() {
+        let file = film(
+            "V.Combined.R V.Combined.G V.Combined.B V.Noisy_Image.R V.Noisy_Image.G V.Noisy_Image.B V.DiffCol.R V.DiffCol.G \
+             V.DiffCol.B V.Denoising_Albedo.R V.Denoising_Albedo.G V.Denoising_Albedo.B V.Denoising_Normal.X \
+             V.Denoising_Normal.Y V.Denoising_Normal.Z V.Denoising_Depth.Z",
+        );
+        let expected = [(Aov::Colour, 3.0), (Aov::Albedo, 9.0), (Aov::Normal, 12.0), (Aov::Depth, 15.0)];
+        assert_eq!(found(&file), expected);
+        assert_eq!(Aovs::find(&file, &Names::new()).unwrap().colour[0], "V.Combined.R");
+    }
+
+    #[test]
+    fn mitsuba_s_layers_are_found_under_the_names_of_its_documentation() {
+        let file = film(
+            "R G B img.R img.G img.B albedo.R albedo.G albedo.B nn.X nn.Y nn.Z dd.y.T position.X position.Y position.Z",
+        );
+        let geometry = [(Aov::Normal, 9.0), (Aov::Position, 13.0), (Aov::Depth, 12.0)];
+        assert_eq!(found(&file), [&[(Aov::Colour, 0.0), (Aov::Albedo, 6.0)], &geometry[..]].concat());
+    }
+
+    #[test]
+    fn pbrt_s_layers_are_found_and_the_shading_normal_is_taken() {
+        let file = film(
+            "R G B Albedo.R Albedo.G Albedo.B P.X P.Y P.Z dzdx dzdy N.X N.Y N.Z Ns.X Ns.Y Ns.Z u v Variance.R Variance.G \
+             Variance.B RelativeVariance.R RelativeVariance.G RelativeVariance.B",
+        );
+        let expected =
+            [(Aov::Colour, 0.0), (Aov::Albedo, 3.0), (Aov::Normal, 14.0), (Aov::Position, 6.0), (Aov::Variance, 19.0)];
+        assert_eq!(found(&file), expected);
+    }
+
+    #[test]
+    fn names_of_the_user_count_and_what_is_missing_is_said() {
+        let file = film("R G B kd.R kd.G kd.B normal");
+        let names = Names::from([(Aov::Albedo, "kd".to_owned())]);
+        let aovs = Aovs::find(&file, &names).unwrap();
+        assert_eq!(aovs.scalar(Aov::Albedo, 0), Some(3.0));
+        assert!(aovs.notes.contains(&"albedo: kd.R kd.G kd.B".to_owned()), "{:?}", aovs.notes);
+        assert!(
+            aovs.notes.contains(&"normal: not there".to_owned()),
+            "a single channel is no vector: {:?}",
+            aovs.notes
+        );
+        let wrong = Names::from([(Aov::Depth, "far".to_owned())]);
+        let line = Aovs::find(&file, &wrong).map(|_| ()).unwrap_err();
+        assert!(line.contains("depth") && line.contains("\"far\"") && line.contains("kd.R"), "{line}");
+        assert!(Aovs::find(&film("a.X b.Y"), &Names::new()).is_err(), "no colour");
+    }
+}

@@ -1,0 +1,60 @@
+//! An image file that is changed in some channels and kept in all others.
+use super::film::Film;
+use super::{WriteOptions, exr, output};
+use crate::error::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// An image file in memory.
+pub struct Source {
+    path: PathBuf,
+    /// As EXR, whatever the file was.
+    bytes: Vec<u8>,
+    /// Every pixel that is stored, shown or not, row 0 at the top.
+    pub film: Film,
+}
+
+impl Source {
+    /// Reads an EXR, PNG, JPEG or HDR file.
+    ///
+    /// # Errors
+    /// As [`super::read`].
+    pub fn read(path: &Path) -> Result<Self> {
+        let about = |what| Error::input(path, what);
+        let mut bytes = super::read_bytes(path)?;
+        let film = super::decode_frame(&bytes, exr::Frame::Data).map_err(about)?;
+        if !super::is_exr(&bytes) {
+            bytes = exr::encode(&film).map_err(about)?;
+        }
+        Ok(Self { path: path.to_owned(), bytes, film })
+    }
+
+    /// The part of it that is shown.
+    ///
+    /// # Errors
+    /// [`Error::Input`].
+    pub fn shown(&self) -> Result<Film> {
+        super::decode(&self.bytes).map_err(|what| Error::input(&self.path, what))
+    }
+
+    /// The file with other samples, one per pixel of `film`, in the channels of these names.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when it holds what cannot be written again.
+    pub fn replaced(&self, channels: &[(&str, &[f32])]) -> Result<Self> {
+        let about = |what| Error::input(&self.path, what);
+        let bytes = super::contained(|| exr::replace(&self.bytes, channels)).map_err(about)?;
+        let film = super::decode_frame(&bytes, exr::Frame::Data).map_err(about)?;
+        Ok(Self { path: self.path.clone(), bytes, film })
+    }
+
+    /// Writes it: to `.exr` all of it, to others the colour that is shown.
+    ///
+    /// # Errors
+    /// As [`super::write`].
+    pub fn write(&self, path: &Path, options: &WriteOptions) -> Result<()> {
+        match super::format_of(path)? {
+            super::Format::Exr => output::write(path, &self.bytes),
+            _ => super::write(path, &self.shown()?, options),
+        }
+    }
+}

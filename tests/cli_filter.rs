@@ -1,0 +1,219 @@
+//! `tallow filter` through the built program: what becomes of the image, what is printed, and what is refused.
+#[path = "support/command.rs"]
+mod command;
+
+use command::{complains, stdout, tallow};
+use tallow::image::{self, Film, Samples, WriteOptions};
+use tempfile::TempDir;
+
+const SIZE: u32 = 32;
+
+/// A plane facing the camera. Its albedo is a checkerboard of single pixels, 0.2 and 0.8; the light that falls on it is
+/// 1 with noise of standard deviation 0.29; `direct` is another checkerboard, of 2x2 pixels.
+fn noisy(is_tallow_s: bool) -> Film {
+    let mut film = Film::new(SIZE, SIZE);
+    let pixels: Vec<(u32, u32)> = (0..SIZE * SIZE).map(|i| (i % SIZE, i / SIZE)).collect();
+    let each = |value: &dyn Fn(u32, u32) -> f32| pixels.iter().map(|&(x, y)| [value(x, y); 3]).collect::<Vec<_>>();
+    let light = |x, y| 0.5 + random(x, y);
+    let direct = |x, y| if is_tallow_s { ((x / 2 + y / 2) % 2) as f32 } else { 0.0 };
+    film.add_vec3("", ["R", "G", "B"], &each(&|x, y| direct(x, y) + checker(x, y) * light(x, y)));
+    film.add_vec3("albedo", ["R", "G", "B"], &each(&checker));
+    film.add_vec3("N", ["X", "Y", "Z"], &vec![[0.0, 0.0, 1.0]; pixels.len()]);
+    film.add("Z", Samples::F32(vec![5.0; pixels.len()]));
+    if is_tallow_s {
+        film.metadata.insert("software".to_owned(), "tallow 0.1.0".to_owned());
+        film.add_vec3("direct", ["R", "G", "B"], &each(&direct));
+        film.add_vec3("indirect", ["R", "G", "B"], &each(&light));
+    }
+    film
+}
+
+fn checker(x: u32, y: u32) -> f32 {
+    if (x + y) % 2 == 0 { 0.2 } else { 0.8 }
+}
+
+/// In [0, 1).
+fn random(x: u32, y: u32) -> f32 {
+    let h = (x * 7919 + y * 104_729).wrapping_mul(0x9e37_79b9);
+    ((h ^ (h >> 15)).wrapping_mul(0x85eb_ca6b) >> 8) as f32 / (1 << 24) as f32
+}
+
+fn write(folder: &TempDir, name: &str, film: &Film) {
+    image::write(&folder.path().join(name), film, &WriteOptions::default()).unwrap();
+}
+
+fn read(folder: &TempDir, name: &str) -> Film {
+    image::read(&folder.path().join(name)).unwrap()
+}
+
+/// Filters `noisy.exr` to `clean.exr` under the validation layers.
+fn filter(folder: &TempDir, options: &[&str]) -> Film {
+    let words = [&["filter", "noisy.exr", "-o", "clean.exr", "--validation", "--quiet"], options].concat();
+    let output = tallow(folder, &words);
+    assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &b""[..]));
+    assert_eq!(stdout(&output), "");
+    read(folder, "clean.exr")
+}
+
+/// Root mean square distance of the red channel from `expected`, over the pixels 4 or more from the border.
+fn error(film: &Film, expected: impl Fn(u32, u32) -> f32) -> f32 {
+    let red = film.channel("R").unwrap().to_f32();
+    let inner = 4..SIZE - 4;
+    let square = |(x, y): (u32, u32)| (red[(y * SIZE + x) as usize] - expected(x, y)).powi(2);
+    let sum: f32 = inner.clone().flat_map(|y| inner.clone().map(move |x| (x, y))).map(square).sum();
+    (sum / (inner.len() * inner.len()) as f32).sqrt()
+}
+
+#[test]
+fn textures_stay_sharp_while_noise_goes() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "noisy.exr", &noisy(false));
+    let before = error(&noisy(false), checker);
+    let after = error(&filter(&folder, &["--filter", "atrous"]), checker);
+    assert!(after < 0.3 * before, "{before} {after}");
+    // Control: without demodulation the checkerboard fades towards grey, 0.3 off everywhere.
+    let plain = error(&filter(&folder, &["--filter", "atrous", "--no-demodulate"]), checker);
+    assert!(plain > 4.0 * after, "{plain} {after}");
+}
+
+#[test]
+fn direct_light_of_our_own_files_stays_as_it_is_and_other_layers_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let film = noisy(true);
+    write(&folder, "noisy.exr", &film);
+    let lit = |x, y| ((x / 2 + y / 2) % 2) as f32 + checker(x, y);
+    let (before, clean) = (error(&film, lit), filter(&folder, &["--filter", "atrous"]));
+    let after = error(&clean, lit);
+    assert!(after < 0.3 * before, "{before} {after}");
+    for channel in film.channels.iter().filter(|c| c.name.len() > 1 || c.name == "Z") {
+        assert_eq!(clean.channel(&channel.name), Some(&channel.samples), "{}", channel.name);
+    }
+    assert_eq!(clean.metadata, film.metadata);
+    assert!(error(&filter(&folder, &["--filter", "atrous", "--filter-direct"]), lit) > 0.2);
+    // Control: taken for a file of another renderer, direct light is filtered along.
+    let mut foreign = film.clone();
+    foreign.metadata.clear();
+    write(&folder, "noisy.exr", &foreign);
+    assert!(error(&filter(&folder, &["--filter", "atrous"]), lit) > 0.2);
+}
+
+#[test]
+fn the_filter_none_returns_every_kind_of_image() {
+    let folder = tempfile::tempdir().unwrap();
+    for film in [noisy(true), noisy(false)] {
+        write(&folder, "noisy.exr", &film);
+        let red = film.channel("R").unwrap().to_f32();
+        let clean = filter(&folder, &["--filter", "none"]).channel("R").unwrap().to_f32();
+        let same = red.iter().zip(&clean).all(|(a, b)| (a - b).abs() <= 1e-6 * a.abs());
+        assert!(same, "taking apart and putting together loses nothing");
+    }
+}
+
+#[test]
+fn broken_pixels_are_filled_in_from_their_neighbours() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut film = noisy(false);
+    if let Samples::F32(red) = &mut film.channels[0].samples {
+        red[(16 * SIZE + 16) as usize] = f32::NAN;
+    }
+    write(&folder, "noisy.exr", &film);
+    let after = error(&filter(&folder, &["--filter", "atrous"]), checker);
+    assert!(after < 0.1, "{after}");
+}
+
+#[test]
+fn fireflies_are_cut_only_when_asked_and_it_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut film = noisy(false);
+    for channel in &mut film.channels[..3] {
+        let Samples::F32(values) = &mut channel.samples else { continue };
+        values[(16 * SIZE + 16) as usize] = 400.0;
+    }
+    write(&folder, "noisy.exr", &film);
+    let kept = error(&filter(&folder, &["--filter", "atrous"]), checker);
+    let cut = error(&filter(&folder, &["--filter", "atrous", "--fireflies", "2"]), checker);
+    assert!(cut < 0.1 && kept > 2.0 * cut, "{kept} {cut}");
+    let words = ["filter", "noisy.exr", "-o", "clean.exr", "--filter", "none", "--fireflies", "2"];
+    let text = stdout(&tallow(&folder, &words));
+    assert!(text.contains("fireflies: 1 pixels cut"), "{text}");
+}
+
+#[test]
+fn lamps_do_not_leak_through_their_rims() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut film = noisy(false);
+    // A lamp of radiance 50 without albedo, in the middle; the pixel beside it shows it by nine tenths.
+    let lamp = |i: u32| (12..20).contains(&(i % SIZE)) && (12..20).contains(&(i / SIZE));
+    let rim = 15 * SIZE + 20;
+    for channel in film.channels.iter_mut().filter(|c| ["R", "G", "B"].iter().any(|n| c.name.ends_with(n))) {
+        let Samples::F32(values) = &mut channel.samples else { continue };
+        let (own, part) = if channel.name.starts_with("albedo") { (0.0, 0.1) } else { (50.0, 45.0) };
+        (0..SIZE * SIZE).filter(|&i| lamp(i)).for_each(|i| values[i as usize] = own);
+        values[rim as usize] = part;
+    }
+    write(&folder, "noisy.exr", &film);
+    let expected = |x, y| match y * SIZE + x {
+        i if lamp(i) => 50.0,
+        i if i == rim => 45.0,
+        _ => checker(x, y),
+    };
+    let after = error(&filter(&folder, &["--filter", "atrous"]), expected);
+    assert!(after < 0.06, "{after}");
+}
+
+#[test]
+fn a_reference_gives_metrics_before_and_after() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "noisy.exr", &noisy(false));
+    let mut clean = Film::new(SIZE, SIZE);
+    clean.add_vec3(
+        "",
+        ["R", "G", "B"],
+        &(0..SIZE * SIZE).map(|i| [checker(i % SIZE, i / SIZE); 3]).collect::<Vec<_>>(),
+    );
+    write(&folder, "reference.exr", &clean);
+    let run = |options: &[&str]| {
+        let words = ["filter", "noisy.exr", "--filter", "atrous", "-o", "a.exr", "-o", "a.png", "--reference"];
+        stdout(&tallow(&folder, &[&words[..], &["reference.exr"], options].concat()))
+    };
+    let json: serde_json::Value = serde_json::from_str(&run(&["--json"])).unwrap();
+    let mse = |when: &str| json[when]["mse"].as_f64().unwrap();
+    assert!(mse("after") < 0.1 * mse("before"), "{json}");
+    assert_eq!(json["passes"].as_array().unwrap().last().unwrap()["pass"], "atrous", "{json}");
+    let compared = stdout(&tallow(&folder, &["compare", "a.exr", "reference.exr", "--json"]));
+    let compared: serde_json::Value = serde_json::from_str(&compared).unwrap();
+    assert_eq!(compared["metrics"]["mse"], json["after"]["mse"], "what is printed is what is written");
+    let text = run(&[]);
+    let expected =
+        ["albedo: albedo.R albedo.G albedo.B", "variance: not there", "position: made of the depth", "median ms"];
+    assert!(expected.iter().all(|part| text.contains(part)), "{text}");
+    assert_eq!(read(&folder, "a.png").width, SIZE);
+}
+
+#[test]
+fn what_cannot_be_filtered_is_told_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "noisy.exr", &noisy(false));
+    let run = |words: &[&str]| tallow(&folder, &[&["filter"], words].concat());
+    complains(&run(&["noisy.exr"]), 2, &["--output"]);
+    complains(&run(&["noisy.exr", "-o", "a.tif"]), 2, &["a.tif", ".exr"]);
+    complains(&run(&["noisy.exr", "-o", "a.exr", "--filter", "median"]), 2, &["'median'", "atrous"]);
+    complains(&run(&["noisy.exr", "-o", "a.exr", "--filter", "atrous", "--levels", "11"]), 2, &["levels", "11"]);
+    complains(&run(&["noisy.exr", "-o", "a.exr", "--device", "no such"]), 4, &["no such"]);
+    complains(&run(&["noisy.exr", "-o", "missing/a.exr"]), 5, &["missing", "create it"]);
+    complains(&run(&["missing.exr", "-o", "a.exr"]), 3, &["missing.exr"]);
+    complains(&run(&["noisy.exr", "-o", "a.exr", "--normal", "bump"]), 3, &["noisy.exr", "normal", "\"bump\"", "N.X"]);
+    complains(&run(&["noisy.exr", "-o", "a.exr", "--colour", "rgb"]), 3, &["noisy.exr", "\"rgb\"", "N.X"]);
+    let mut guides = Film::new(SIZE, SIZE);
+    guides.add_vec3("N", ["X", "Y", "Z"], &vec![[0.0; 3]; guides.pixels()]);
+    write(&folder, "guides.exr", &guides);
+    complains(&run(&["guides.exr", "-o", "a.exr"]), 3, &["guides.exr", "no colour", "N.X"]);
+    let whole = std::fs::read(folder.path().join("noisy.exr")).unwrap();
+    std::fs::write(folder.path().join("cut.exr"), &whole[..whole.len() / 2]).unwrap();
+    complains(&run(&["cut.exr", "-o", "a.exr"]), 3, &["cut.exr", "complete?"]);
+    let mut small = Film::new(8, 8);
+    small.add_vec3("", ["R", "G", "B"], &[[0.5; 3]; 64]);
+    write(&folder, "small.exr", &small);
+    complains(&run(&["noisy.exr", "-o", "a.exr", "--reference", "small.exr"]), 3, &["32x32", "8x8"]);
+    assert!(!folder.path().join("a.exr").exists(), "nothing is written");
+}

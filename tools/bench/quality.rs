@@ -1,0 +1,94 @@
+//! Mean squared error of every filter on the indirect light of a scene, at its default settings and over a small sweep.
+//!   cargo run --release --example bench-quality -- SCENE [SIDE SPP REFERENCE_SPP]
+#![allow(missing_docs)]
+use anyhow::{Context, Result};
+use std::path::Path;
+use tallow::filter::{FILTERS, FilterInput, FilterSettings, run};
+use tallow::gpu::layout::{Guide, PixelLight, PixelStats, vec4};
+use tallow::gpu::{DeviceOptions, FrameResources, Gpu};
+use tallow::renderer::{Outputs, Renderer};
+use tallow::scene::Scene;
+use tallow::settings::Settings;
+
+/// Guides, statistics and light of a whole render.
+fn render(
+    gpu: &Gpu,
+    file: &str,
+    side: u32,
+    spp: u32,
+    seed: u32,
+) -> Result<(Vec<Guide>, Vec<PixelStats>, Vec<PixelLight>)> {
+    let settings = |s: &mut Settings| (s.width, s.height, s.spp, s.seed, s.max_depth) = (side, side, spp, seed, 4);
+    let scene = Scene::load(Path::new(file), &settings)?;
+    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    let renderer = Renderer::new(gpu, &scene, outputs)?;
+    let mut frame = FrameResources::new(gpu)?;
+    for batch in renderer.batches() {
+        renderer.run(&mut frame, &batch)?;
+    }
+    let tile = renderer.film().tiles.first().context("a film has a tile")?;
+    Ok((tile.guide.read()?, tile.stats.read()?, tile.light.read()?))
+}
+
+/// (MSE, relative MSE with an epsilon of 0.01) over all channels.
+fn errors(image: &[vec4], reference: &[PixelLight]) -> (f64, f64) {
+    let (mut mse, mut relative) = (0.0, 0.0);
+    for (a, b) in image.iter().zip(reference) {
+        for c in 0..3 {
+            let (off, level) = (f64::from(a[c] - b.indirect[c]).powi(2), f64::from(b.indirect[c]).powi(2));
+            mse += off;
+            relative += off / (level + 0.01);
+        }
+    }
+    let share = 1.0 / (3 * image.len()) as f64;
+    (mse * share, relative * share)
+}
+
+/// The settings that matter most to a filter.
+fn sweep(filter: &str, base: FilterSettings) -> Vec<FilterSettings> {
+    let levels = [3, 4, 5].map(|levels| FilterSettings { levels, ..base });
+    let radii = [6, 12, 24].map(|radius| FilterSettings { radius, ..base });
+    match filter {
+        "atrous" => levels
+            .iter()
+            .flat_map(|s| [0.5, 1.0, f32::INFINITY].map(|sigma_rt| FilterSettings { sigma_rt, ..*s }))
+            .collect(),
+        "svgf" => levels.iter().flat_map(|s| [2.0, 4.0, 8.0].map(|l| FilterSettings { sigma_l: l, ..*s })).collect(),
+        "bilateral" => radii[..2].iter().map(|s| FilterSettings { sigma_rt: f32::INFINITY, ..*s }).collect(),
+        "guided" => {
+            radii.iter().flat_map(|s| [0.001, 0.01].map(|e| FilterSettings { eps: [e, e, e, 2.0 * e], ..*s })).collect()
+        }
+        _ => vec![base],
+    }
+}
+
+fn main() -> Result<()> {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let file = args.first().context("name a scene file")?;
+    let number = |i: usize, or: u32| args.get(i).map_or(Ok(or), |a| a.parse());
+    let (side, spp, many) = (number(1, 256)?, number(2, 4)?, number(3, 1024)?);
+    let gpu = Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), validation: false })?;
+    let (_, _, reference) = render(&gpu, file, side, many, 1)?;
+    let (guide, stats, light) = render(&gpu, file, side, spp, 0)?;
+    // The statistics are of direct and indirect light together, so the variance is left to be estimated.
+    let radiance = light.iter().zip(&stats).map(|(l, s)| [l.indirect[0], l.indirect[1], l.indirect[2], s.count as f32]);
+    let input = FilterInput { width: side, height: side, radiance: radiance.collect(), guide, variance: None };
+    let base = FilterSettings::default().scaled_to(&input);
+    println!("{file}, {side}x{side}, {spp} spp against {many}: MSE, relMSE at default settings; least MSE of a sweep");
+    for row in FILTERS {
+        let default = errors(&run(&gpu, row, &input, &base)?.0, &reference);
+        let mut best = (f64::INFINITY, 0.0, base);
+        for settings in sweep(row.name, base) {
+            let (mse, relative) = errors(&run(&gpu, row, &input, &settings)?.0, &reference);
+            if mse < best.0 {
+                best = (mse, relative, settings);
+            }
+        }
+        let (mse, relative, s) = best;
+        println!(
+            "{:10} {:10.3e} {:9.5}   {mse:10.3e} {relative:9.5}  levels {} sigma_rt {} sigma_l {} radius {} eps {}",
+            row.name, default.0, default.1, s.levels, s.sigma_rt, s.sigma_l, s.radius, s.eps[0]
+        );
+    }
+    Ok(())
+}

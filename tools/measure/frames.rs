@@ -1,0 +1,61 @@
+//! Noisy images and their references.
+use crate::{Args, scenes};
+use anyhow::{Context, bail};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use tallow::image::source::Source;
+
+/// A scene as it is rendered here.
+pub struct View {
+    /// For files and tables.
+    pub name: &'static str,
+    /// A name known to the converter, or a scene file of the repository.
+    pub scene: &'static str,
+    /// Pixels; small, so that a software device needs minutes.
+    pub size: [u32; 2],
+    /// Path edges.
+    pub depth: u32,
+    /// Samples per pixel of the reference.
+    pub reference: u32,
+}
+
+impl View {
+    /// Renders it, unless an earlier run has.
+    ///
+    /// # Errors
+    /// When the scene cannot be found or rendered.
+    pub fn render(&self, args: &Args, spp: u32) -> anyhow::Result<Source> {
+        let file = self.file(args, spp);
+        if !file.exists() {
+            run(self, args, spp, &file)?;
+        }
+        Ok(Source::read(&file)?)
+    }
+
+    /// Where a render of it lies.
+    pub fn file(&self, args: &Args, spp: u32) -> PathBuf {
+        let [width, height] = self.size;
+        args.output.join(format!("{}-{width}x{height}-{spp}spp.exr", self.name))
+    }
+}
+
+fn run(view: &View, args: &Args, spp: u32, file: &Path) -> anyhow::Result<()> {
+    let scene = match view.scene.ends_with(".toml") {
+        true => Path::new(env!("CARGO_MANIFEST_DIR")).join(view.scene),
+        false => scenes::convert(view.scene, &args.data, &args.output)?,
+    };
+    eprintln!("rendering {} with {spp} samples per pixel", view.name);
+    let [width, height] = view.size.map(|n| n.to_string());
+    let (spp, depth) = (spp.to_string(), view.depth.to_string());
+    // Another seed than the default for references: their samples must not be those of the noisy image.
+    let seed = if spp == view.reference.to_string() { "1" } else { "0" };
+    let mut command = Command::new(&args.tallow);
+    command.arg("render").arg(scene).arg("-o").arg(file).arg("--quiet");
+    command.args(["--width", &width, "--height", &height, "--spp", &spp, "--max-depth", &depth, "--seed", seed]);
+    command.args(["--roulette-depth", "0"]);
+    let output = command.output().with_context(|| format!("cannot start {}", args.tallow.display()))?;
+    if !output.status.success() {
+        bail!("{}: {}", output.status, String::from_utf8_lossy(&output.stderr).trim());
+    }
+    Ok(())
+}

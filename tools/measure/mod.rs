@@ -1,0 +1,9 @@
+//! What `tools/filters` measures, a file per table.
+mod case;
+mod frames;
+pub mod neural;
+pub mod ranking;
+mod sheet;
+mod sweep;
+pub mod textures;
+pub mod times;

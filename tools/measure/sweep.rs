@@ -1,0 +1,103 @@
+//! The best settings of a filter for one image, by search.
+use tallow::filter::{FilterSettings, Row, WaveletBasis};
+
+/// One setting and the values that are tried.
+pub struct Knob {
+    name: &'static str,
+    values: &'static [f32],
+    set: fn(&mut FilterSettings, f32),
+}
+
+const OFF: f32 = f32::INFINITY;
+
+const LEVELS: Knob = Knob { name: "levels", values: &[2.0, 3.0, 4.0, 5.0, 6.0], set: |s, v| s.levels = v as u32 };
+const SIGMA_RT: Knob = Knob { name: "sigma_rt", values: &[0.03, 0.1, 0.3, 1.0, 3.0, OFF], set: |s, v| s.sigma_rt = v };
+const SIGMA_N: Knob = Knob { name: "sigma_n", values: &[0.1, 0.2, 0.4, 0.8, OFF], set: |s, v| s.sigma_n = v };
+const SIGMA_X: Knob = Knob { name: "sigma_x", values: &[0.01, 0.03, 0.1, 0.3, 1.0, OFF], set: |s, v| s.sigma_x = v };
+
+const RADIUS: Knob =
+    Knob { name: "radius", values: &[4.0, 8.0, 12.0, 16.0, 24.0, 32.0], set: |s, v| s.radius = v as u32 };
+const EPS_N: Knob = Knob {
+    name: "eps of the normal",
+    values: &[1e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1],
+    set: |s, v| s.eps = [v, v, v, s.eps[3]],
+};
+const EPS_Z: Knob =
+    Knob { name: "eps of the depth", values: &[1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.03], set: |s, v| s.eps[3] = v };
+
+const SIGMA_L: Knob = Knob { name: "sigma_l", values: &[0.5, 1.0, 2.0, 4.0, 8.0, 16.0], set: |s, v| s.sigma_l = v };
+const BASIS: Knob = Knob {
+    name: "basis",
+    values: &[0.0, 1.0],
+    set: |s, v| s.basis = if v == 0.0 { WaveletBasis::Cdf22 } else { WaveletBasis::RedBlack },
+};
+
+/// What is searched for a filter. A new one goes here.
+fn knobs(filter: &str) -> Vec<Knob> {
+    match filter {
+        "atrous" => vec![LEVELS, SIGMA_RT, SIGMA_N, SIGMA_X],
+        "bilateral" => vec![RADIUS, SIGMA_RT, SIGMA_N, SIGMA_X],
+        "wavelet" => vec![BASIS, LEVELS, SIGMA_RT, SIGMA_N, SIGMA_X],
+        "svgf" => vec![LEVELS, SIGMA_L, SIGMA_N, SIGMA_X],
+        "guided" => vec![RADIUS, EPS_N, EPS_Z],
+        _ => vec![],
+    }
+}
+
+/// A filter at its best.
+pub struct Best {
+    /// The least error found.
+    pub error: f64,
+    /// Where it was found.
+    pub settings: FilterSettings,
+    /// The same as text.
+    pub text: String,
+    /// The errors around it, a line per setting, the others being at their best.
+    pub around: String,
+}
+
+/// Descends along one setting after the other, twice, from the defaults; `error` judges.
+///
+/// # Errors
+/// Those of `error`.
+pub fn best(
+    row: &Row,
+    start: FilterSettings,
+    mut error: impl FnMut(&FilterSettings) -> anyhow::Result<f64>,
+) -> anyhow::Result<Best> {
+    let knobs = knobs(row.name);
+    let mut best = Best { error: error(&start)?, settings: start, text: String::new(), around: String::new() };
+    let mut chosen = vec![None; knobs.len()];
+    for _ in 0..2 {
+        best.around.clear();
+        for (knob, chosen) in knobs.iter().zip(&mut chosen) {
+            let line = along(knob, &mut best, chosen, &mut error)?;
+            best.around += &format!("{} {}:{line}\n", row.name, knob.name);
+        }
+    }
+    let name = |(knob, value): (&Knob, &Option<f32>)| {
+        format!("{} {}", knob.name, value.map_or("default".to_owned(), |v| v.to_string()))
+    };
+    best.text = knobs.iter().zip(&chosen).map(name).collect::<Vec<_>>().join(", ");
+    Ok(best)
+}
+
+/// Tries every value of one setting, and returns what came out.
+fn along(
+    knob: &Knob,
+    best: &mut Best,
+    chosen: &mut Option<f32>,
+    error: &mut impl FnMut(&FilterSettings) -> anyhow::Result<f64>,
+) -> anyhow::Result<String> {
+    let mut line = String::new();
+    for &value in knob.values {
+        let mut settings = best.settings;
+        (knob.set)(&mut settings, value);
+        let found = if *chosen == Some(value) { best.error } else { error(&settings)? };
+        if found < best.error {
+            (best.error, best.settings, *chosen) = (found, settings, Some(value));
+        }
+        line += &format!(" {value} -> {found:.4};");
+    }
+    Ok(line)
+}

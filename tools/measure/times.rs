@@ -1,0 +1,119 @@
+//! Times beside those of EAW's table 2 and GIF's table 2, both on an NVIDIA GTX 285.
+use tallow::filter::{self, FilterInput, FilterSettings, Planes, Row};
+use tallow::gpu::layout::Guide;
+use tallow::gpu::{FrameResources, Gpu};
+use tallow::report::table;
+
+const RUNS: usize = 3;
+
+/// EAW, table 2: for 0 to 3 weights, milliseconds of 1, 5 and 10 levels at each resolution.
+const EAW: [([u32; 2], [[f64; 3]; 4]); 3] = [
+    ([512, 512], [[0.3, 1.5, 2.9], [0.5, 2.4, 4.7], [0.8, 3.5, 6.9], [1.2, 5.6, 11.0]]),
+    ([1024, 1024], [[1.0, 5.0, 11.3], [1.8, 8.7, 17.2], [2.7, 12.9, 26.6], [4.2, 20.9, 41.6]]),
+    ([1920, 1080], [[1.9, 9.6, 22.4], [3.5, 16.9, 33.6], [5.0, 25.1, 52.1], [8.2, 42.6, 86.0]]),
+];
+const LEVELS: [u32; 3] = [1, 5, 10];
+
+/// A line of GIF's table 2, at 1024x768.
+struct Line {
+    filter: &'static str,
+    what: &'static str,
+    published: f64,
+    set: fn(&mut FilterSettings),
+}
+
+const GIF: &[Line] = &[
+    Line { filter: "bilateral", what: "radius 16", published: 447.0, set: |s| s.radius = 16 },
+    Line { filter: "bilateral", what: "radius 24", published: 1001.0, set: |s| s.radius = 24 },
+    Line { filter: "bilateral", what: "radius 32", published: 1768.0, set: |s| s.radius = 32 },
+    Line { filter: "atrous", what: "4 levels", published: 54.0, set: |s| s.levels = 4 },
+    Line { filter: "atrous", what: "5 levels", published: 68.0, set: |s| s.levels = 5 },
+    Line { filter: "atrous", what: "6 levels", published: 82.0, set: |s| s.levels = 6 },
+    Line { filter: "guided", what: "1 channel", published: 16.0, set: |s| s.channels = 1 },
+    Line { filter: "guided", what: "3 channels", published: 71.0, set: |s| s.channels = 3 },
+    Line { filter: "guided", what: "4 channels", published: 80.0, set: |s| s.channels = 4 },
+];
+
+/// # Errors
+/// Those of the device.
+pub fn print(gpu: &Gpu) -> anyhow::Result<()> {
+    println!(
+        "EAW, table 2 (and the 5 levels with 3 weights at 512x512 of its table 1): milliseconds, ours / published"
+    );
+    let atrous = filter::find("atrous").expect("a row of the table");
+    for (size, published) in EAW {
+        let input = input(size);
+        let mut rows = Vec::new();
+        for (weights, published) in published.iter().enumerate() {
+            let mut row = vec![weights.to_string()];
+            for (levels, published) in LEVELS.into_iter().zip(published) {
+                let ms = milliseconds(gpu, atrous, &weighted(weights, levels), &input)?;
+                row.push(format!("{ms:.1} / {published:.1}"));
+            }
+            rows.push(row);
+        }
+        println!("\n{}x{}", size[0], size[1]);
+        print!("{}", table::text(&["weights", "1 level", "5 levels", "10 levels"], &rows));
+    }
+    println!("\nGIF, table 2, 1024x768: milliseconds");
+    print!("{}\n", table::text(&["filter", "settings", "ours", "published"], &gif(gpu)?));
+    Ok(())
+}
+
+fn gif(gpu: &Gpu) -> anyhow::Result<Vec<Vec<String>>> {
+    let input = input([1024, 768]);
+    let mut rows = Vec::new();
+    for line in GIF {
+        let Some(row) = filter::find(line.filter) else { continue };
+        let mut settings = FilterSettings::default();
+        (line.set)(&mut settings);
+        let ms = milliseconds(gpu, row, &settings, &input)?;
+        rows.push(vec![line.filter.into(), line.what.into(), format!("{ms:.1}"), format!("{:.0}", line.published)]);
+    }
+    Ok(rows)
+}
+
+/// In the order of EAW's figure 4: radiance, normal, position.
+fn weighted(weights: usize, levels: u32) -> FilterSettings {
+    let on = |i: usize, sigma: f32| if i < weights { sigma } else { f32::INFINITY };
+    let own = FilterSettings::default();
+    FilterSettings {
+        levels,
+        sigma_rt: on(0, own.sigma_rt),
+        sigma_n: on(1, own.sigma_n),
+        sigma_x: on(2, own.sigma_x),
+        ..own
+    }
+}
+
+/// Time of all passes: the median of some runs after one that compiles.
+///
+/// # Errors
+/// Those of the device.
+pub fn milliseconds(gpu: &Gpu, row: &Row, settings: &FilterSettings, input: &FilterInput) -> anyhow::Result<f64> {
+    let planes = Planes::new(gpu, input)?;
+    let filter = (row.make)(gpu, settings, planes.size)?;
+    let mut frame = FrameResources::new(gpu)?;
+    let mut times = Vec::new();
+    for _ in 0..=RUNS {
+        let passes = gpu.run(&mut frame, |rec| filter.record(rec, &planes))?;
+        times.push(passes.iter().map(|p| p.end_ns.saturating_sub(p.begin_ns)).sum::<u64>() as f64 * 1e-6);
+    }
+    times.remove(0);
+    times.sort_by(f64::total_cmp);
+    Ok(times[RUNS / 2])
+}
+
+/// Noise over a sphere on a floor: EAW says, and it holds here, that the content does not change the time.
+fn input([width, height]: [u32; 2]) -> FilterInput {
+    let noise = |i: u32| (i.wrapping_mul(0x9e37_79b9) >> 8) as f32 / (1 << 24) as f32;
+    let guide = |i: u32| {
+        let (x, y) = ((i % width) as f32 / width as f32 - 0.5, (i / width) as f32 / height as f32 - 0.5);
+        let ball = 0.1 - x * x - y * y;
+        let (normal, depth) = if ball > 0.0 { ([x, y, ball.sqrt()], 2.0 - ball) } else { ([0.0, 1.0, 0.0], 3.0 - y) };
+        Guide { normal, depth, position: [x, y, depth], object: 0, albedo: [0.5; 3], material: 0 }
+    };
+    let pixels = 0..width * height;
+    let radiance = pixels.clone().map(|i| [noise(3 * i), noise(3 * i + 1), noise(3 * i + 2), 1.0]).collect();
+    FilterInput { width, height, radiance, guide: pixels.map(guide).collect(), variance: None }
+}
