@@ -30,7 +30,8 @@ void main() {
             s.mask[word] |= 255u << shift;
             s.needed = unpackUint2x32(needed - above);
             s.whole_edge = needed - above == here ? 1u : 0u;
-            s.selected = push.round == 7u ? 1u : s.whole_edge;
+            bool last = 56u - 8u * push.round <= s.up; // all lower bits are 0
+            s.selected = last ? 1u : s.whole_edge;
             state[0] = s;
         }
         above += here;

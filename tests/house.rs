@@ -10,6 +10,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
         "cli",
         &[
             "allocate",
+            "composition",
             "error",
             "filter",
             "gpu",
@@ -29,6 +30,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("filter", &["error", "gpu", "reference", "shaders", "stage"]),
     ("scene", &["error", "gpu::layout", "image", "reference::fresnel", "settings"]),
     ("reference", &["gpu::layout", "scene", "settings"]),
+    ("composition", &["filter", "gpu::layout", "image"]),
     ("composition", &["filter", "gpu::layout", "image"]),
     ("image", &["error", "gpu::layout"]),
     ("report", &["error", "gpu"]),

@@ -1,6 +1,6 @@
-// A workgroup of 64 threads owns a block of 1024 items; each thread 16 that follow one another, so that scans need one
+// A workgroup of 64 threads owns a block of 4096 items; each thread 64 that follow one another, so that scans need one
 // step across threads. Larger groups pay more for barriers on lavapipe. See stage::BLOCK.
-const uint BLOCK_THREADS = 64u, THREAD_ITEMS = 16u;
+const uint BLOCK_THREADS = 64u, THREAD_ITEMS = 64u;
 
 shared uint64_t block_words[BLOCK_THREADS];
 

@@ -56,7 +56,7 @@ pub fn groups(threads: u32, size: u32) -> [u32; 3] {
 }
 
 /// Pixels that one workgroup of the scanning kernels owns: `BLOCK_THREADS * THREAD_ITEMS` of `glsl/shared/block.glsl`.
-pub const BLOCK: u32 = 1024;
+pub const BLOCK: u32 = 4096;
 
 /// Workgroups of those kernels for a film of `pixels`; at most 2^28 of them, so that one row is enough.
 fn blocks(pixels: u32) -> [u32; 3] {
