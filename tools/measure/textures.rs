@@ -2,6 +2,7 @@
 use super::case::Case;
 use super::frames::View;
 use super::sheet::{self, Tile};
+use super::sweep;
 use crate::Args;
 use tallow::composition::Demodulation;
 use tallow::filter;
@@ -32,8 +33,10 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
             println!("{:<30} {:8.2}", "noisy", case.mse(&case.noisy));
             tiles.push(Tile::new("noisy", &case.noisy));
         }
-        let picture = case.whole(&case.run(gpu, row, &case.start())?);
-        println!("{name:<30} {:8.2}", case.mse(&picture));
+        let error = |settings: &_| Ok(case.mse(&case.whole(&case.run(gpu, row, settings)?)));
+        let best = sweep::best(row, case.start(), error)?;
+        let picture = case.whole(&case.run(gpu, row, &best.settings)?);
+        println!("{name:<30} {:8.2}  {}", best.error, best.text);
         tiles.push(Tile::new(name, &picture));
         reference_picture = Some(case.reference);
     }
