@@ -23,8 +23,8 @@ fn render(
     let outputs = Outputs { split_light: true, guides: true, counters: false };
     let renderer = Renderer::new(gpu, &scene, outputs)?;
     let mut frame = FrameResources::new(gpu)?;
-    for batch in renderer.batches() {
-        renderer.run(&mut frame, &batch)?;
+    for step in renderer.steps() {
+        renderer.run(&mut frame, &step)?;
     }
     let tile = renderer.film().tiles.first().context("a film has a tile")?;
     Ok((tile.guide.read()?, tile.stats.read()?, tile.light.read()?))
