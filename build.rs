@@ -145,8 +145,11 @@ fn expand(file: &str, text: &str, sources: &mut Vec<Source>) -> Result<String> {
 
 fn read(name: &str, path: &str) -> Result<String> {
     Ok(match name {
-        "layout.glsl" => [layout::GLSL_CONSTANTS, layout::GLSL_STRUCTS, layout::filter::GLSL_STRUCTS].concat(),
-        "effects.glsl" => layout::GLSL_EFFECTS.to_owned(),
+        "layout.glsl" => {
+            use layout::{allocate, filter};
+            [layout::GLSL_CONSTANTS, layout::GLSL_STRUCTS, allocate::GLSL_STRUCTS, filter::GLSL_STRUCTS].concat()
+        }
+        "effects.glsl" => layout::effects::GLSL_EFFECTS.to_owned(),
         _ => fs::read_to_string(path).with_context(|| path.to_owned())?,
     })
 }

@@ -5,20 +5,23 @@
 #include "layout.glsl"
 #include "shared/wide.glsl"
 #include "shared/block.glsl"
-#include "shared/proportion.glsl"
 
 // Turns wanted shares of all samples, past and next, into what a pixel lacks: max(0, floor(total * w / W) - count).
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
-layout(scalar, binding = 1) readonly buffer States { Apportionment state[]; };
+layout(binding = 1) uniform usamplerBuffer state; // of Apportionment
 layout(scalar, binding = 2) buffer Weights { uint weight[]; };
 layout(scalar, binding = 3) writeonly buffer Sums { BlockSums sums[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
 
+#include "shared/state.glsl"
+#include "shared/proportion.glsl"
+
 void main() {
     uint first = first_item(), items = item_count(first, push.pixels);
-    bool equal = state[0].equal != 0u;
-    Proportion share_of = proportion_of(state[0]);
+    Apportionment s = load_state();
+    bool equal = s.equal != 0u;
+    Proportion share_of = proportion_of(s);
     uint64_t total = 0UL;
     for (uint k = 0u; k < items; k++) {
         uint i = first + k;

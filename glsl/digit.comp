@@ -11,7 +11,7 @@ layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer weight; // of uint
 layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
 layout(binding = 2) uniform usamplerBuffer counts; // of uint
-layout(scalar, binding = 3) readonly buffer States { Apportionment state[]; };
+layout(binding = 3) uniform usamplerBuffer state; // of Apportionment
 layout(scalar, binding = 4) buffer Histogram { uint histogram[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
 
@@ -20,7 +20,7 @@ layout(scalar, push_constant) uniform Push { ApportionPush push; };
 shared uint bins[256];
 
 void main() {
-    Apportionment s = state[0];
+    Apportionment s = load_state();
     if (s.selected != 0u) return; // safe: the same for all threads
     for (uint b = gl_LocalInvocationIndex; b < 256u; b += BLOCK_THREADS) bins[b] = 0u;
     barrier();

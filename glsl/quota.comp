@@ -11,7 +11,7 @@
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer weight; // of uint
 layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
-layout(scalar, binding = 2) readonly buffer States { Apportionment state[]; };
+layout(binding = 2) uniform usamplerBuffer state; // of Apportionment
 layout(scalar, binding = 3) buffer Counts { uint count[]; };
 layout(scalar, binding = 4) writeonly buffer Sums { BlockSums sums[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
@@ -19,9 +19,9 @@ layout(scalar, push_constant) uniform Push { ApportionPush push; };
 #include "shared/share.glsl"
 
 void main() {
-    if (state[0].settled != 0u) return; // safe: the same for all threads
+    Apportionment s = load_state();
+    if (s.settled != 0u) return; // safe: the same for all threads
     uint first = first_item(), items = item_count(first, push.pixels);
-    Apportionment s = state[0];
     uint64_t weights = 0UL, filled = 0UL, floors = 0UL;
     uint settled = 0u, open = 0u;
     for (uint k = 0u; k < items; k++) {

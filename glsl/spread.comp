@@ -11,7 +11,7 @@
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer weight; // of uint
 layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
-layout(scalar, binding = 2) readonly buffer States { Apportionment state[]; };
+layout(binding = 2) uniform usamplerBuffer state; // of Apportionment
 layout(scalar, binding = 3) readonly buffer Blocks { uvec2 blocks[]; };
 layout(scalar, binding = 4) buffer Counts { uint count[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
@@ -29,7 +29,7 @@ uvec2 certain_possible(Apportionment s, uint pixel) {
 }
 
 void main() {
-    Apportionment s = state[0];
+    Apportionment s = load_state();
     uint first = first_item(), items = item_count(first, push.pixels);
     uint64_t mine = 0UL, total;
     for (uint k = 0u; k < (s.whole_edge != 0u ? 0u : items); k++) mine += certain_possible(s, first + k).y;

@@ -12,14 +12,14 @@ layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer weight; // of uint
 layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
 layout(binding = 2) uniform usamplerBuffer counts; // of uint
-layout(scalar, binding = 3) readonly buffer States { Apportionment state[]; };
+layout(binding = 3) uniform usamplerBuffer state; // of Apportionment
 layout(scalar, binding = 4) writeonly buffer Blocks { uvec2 blocks[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
 
 #include "shared/share.glsl"
 
 void main() {
-    Apportionment s = state[0];
+    Apportionment s = load_state();
     uint first = first_item(), items = item_count(first, push.pixels);
     uint64_t sum = 0UL;
     if (s.whole_edge != 0u) items = 0u; // nobody's order decides

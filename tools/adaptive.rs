@@ -7,6 +7,7 @@ use tallow::gpu::{DeviceOptions, Gpu};
 
 mod placed;
 mod scenes;
+mod view;
 
 use placed::{geometry, overhead, policies, spread};
 

@@ -7,6 +7,7 @@ use tallow::gpu::{DeviceOptions, Gpu};
 
 mod measure;
 mod scenes;
+mod view;
 
 use measure::{neural, ranking, textures, times};
 

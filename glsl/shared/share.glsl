@@ -1,6 +1,7 @@
 // A pixel's share of the budget. Found again wherever it is needed, which costs no more than to store and load it. Needs
-// `weight`, `stats` and `push`.
+// `weight`, `stats`, `state` and `push`.
 #include "shared/proportion.glsl"
+#include "shared/state.glsl"
 
 uint weight_of(Apportionment s, uint pixel) { return s.equal != 0u ? 1u : texelFetch(weight, int(pixel)).x; }
 

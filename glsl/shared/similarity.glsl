@@ -12,7 +12,8 @@ uint similarity(uint p, uint q) {
     float normals = squared_distance(uintBitsToFloat(guide_texel(p, 0u).xyz), uintBitsToFloat(guide_texel(q, 0u).xyz));
     float positions = squared_distance(uintBitsToFloat(a.xyz), uintBitsToFloat(b.xyz));
     precise float x = normals * push.normal_scale + positions * push.position_scale;
-    return uint(exp_negative(x) * SIMILARITY_UNIT);
+    precise float rounded = exp_negative(x) * SIMILARITY_UNIT + 0.5;
+    return uint(rounded);
 }
 
 // q = 1 - W_p: mean dissimilarity over the window, which for an even edge reaches one pixel further up and left. Pixels

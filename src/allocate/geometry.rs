@@ -37,7 +37,7 @@ fn similarity(a: &Guide, b: &Guide, push: &PriorityPush) -> u32 {
     }
     let x = squared_distance(a.normal, b.normal) * push.normal_scale
         + squared_distance(a.position, b.position) * push.position_scale;
-    (exp_negative(x) * 65536.0) as u32
+    (exp_negative(x) * 65536.0 + 0.5) as u32
 }
 
 fn importance(inputs: &HostInputs, x: i32, y: i32) -> f32 {

@@ -1,16 +1,17 @@
 //! `tallow filter`: a noisy image becomes a clean one.
 mod options;
 
+use super::common::Common;
 use super::compare::{self, check_sizes};
-use super::{Exit, fail_on_messages, finite, print, print_json};
+use super::{Exit, fail_on_messages, print, print_json};
 use crate::composition::{self, Demodulation, Parts};
 use crate::error::{Error, Result};
 use crate::filter::{self, FILTERS, Row};
-use crate::gpu::{DeviceOptions, Gpu, PassTime};
+use crate::gpu::{Gpu, PassTime};
 use crate::image::aov::Aovs;
 use crate::image::metrics::{self, Metrics};
 use crate::image::source::Source;
-use crate::image::{self, Picture, WriteOptions, tone::ToneMap};
+use crate::image::{self, Picture};
 use crate::report::table::{self, PassRow};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use options::{Layers, Overrides};
@@ -45,24 +46,9 @@ pub struct Args {
     /// First cut pixels that are more than N times brighter than all but one around them, and say what that took away
     #[arg(long, value_name = "N")]
     pub fireflies: Option<f32>,
-    /// Device, by index or part of its name [default: the best one]
-    #[arg(long, value_name = "NAME")]
-    pub device: Option<String>,
-    /// Exposure of PNG files in stops
-    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = finite, allow_negative_numbers = true)]
-    pub exposure: f64,
-    /// Tone curve of PNG files
-    #[arg(long, value_enum, default_value_t)]
-    pub tonemap: ToneMap,
-    /// Run under the Vulkan validation layers and fail on any message
-    #[arg(long)]
-    pub validation: bool,
-    /// Print one JSON object at the end
-    #[arg(long)]
-    pub json: bool,
-    /// Print nothing
-    #[arg(short, long)]
-    pub quiet: bool,
+    /// Device and output.
+    #[command(flatten)]
+    pub common: Common,
     /// Where the layers are.
     #[command(flatten)]
     pub layers: Layers,
@@ -110,7 +96,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let source = Source::read(&args.image)?;
     let aovs = Aovs::find(&source.film, &args.layers.names()).map_err(|what| Error::input(&args.image, what))?;
     let reference = reference(args, &source)?;
-    let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), validation: args.validation })?;
+    let gpu = args.common.open()?;
     let start = Instant::now();
     let mut parts = composition::split(&aovs, demodulation(args));
     cut_fireflies(args, &gpu, &mut parts)?;
@@ -118,7 +104,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let seconds = start.elapsed().as_secs_f64();
     let clean = replaced(&source, &aovs, &colour)?;
     fail_on_messages(&gpu)?;
-    let options = WriteOptions { exposure: args.exposure as f32, tone_map: args.tonemap };
+    let options = args.common.write_options();
     args.outputs.iter().try_for_each(|path| clean.write(path, &options))?;
     let distance = |image: &Source| reference.as_ref().map_or(Ok(None), |r| distance(args, image, r));
     let summary = Summary {
@@ -185,7 +171,7 @@ fn distance(args: &Args, image: &Source, reference: &Picture) -> Result<Option<M
 }
 
 fn report(args: &Args, summary: &Summary) -> Result<()> {
-    match (args.json, args.quiet) {
+    match (args.common.json, args.common.quiet) {
         (true, _) => print_json(summary),
         (false, true) => Ok(()),
         (false, false) => print(&text(args, summary)),

@@ -54,6 +54,8 @@ pub struct End {
     pub traced: u64,
     /// Allocations made, those of a resumed render included.
     pub allocations: u32,
+    /// Most priorities of one allocation that were not finite, and so counted for nothing.
+    pub broken_priorities: u32,
     /// What was traced last of the last allocation; none before the first.
     pub last: Option<PathRange>,
     /// Why it ended.
@@ -72,7 +74,8 @@ impl Job<'_> {
             None => r.steps(),
         };
         let allocations = earlier.map_or(0, |e| e.progress.allocations);
-        let mut end = End { times: Vec::new(), traced: 0, allocations, last: None, why: Why::Done };
+        let mut end =
+            End { times: Vec::new(), traced: 0, allocations, broken_priorities: 0, last: None, why: Why::Done };
         if earlier.is_some() {
             end.last = Some(nothing_yet(&steps));
         }
@@ -89,7 +92,9 @@ impl Job<'_> {
                 Step::Allocate(_) => {
                     end.allocations += 1;
                     end.last = Some(nothing_yet(&steps[i + 1..]));
-                    if threshold && r.apportionment()?.wanting == 0 {
+                    let state = r.apportionment()?;
+                    end.broken_priorities = end.broken_priorities.max(state.non_finite);
+                    if threshold && state.wanting == 0 {
                         end.why = Why::Threshold { above: 0 };
                         break;
                     }

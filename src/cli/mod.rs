@@ -1,4 +1,5 @@
 //! The command line: one file per subcommand.
+pub mod common;
 pub mod compare;
 pub mod devices;
 pub mod explain;

@@ -1,12 +1,13 @@
 //! `tallow render`: a scene becomes image files.
+use super::common::Common;
 use super::job::{End, Job, Why};
 use super::overrides::Overrides;
 use super::resume::{self, Earlier};
-use super::{Exit, fail_on_messages, finite, interrupt, layers, print, print_json};
+use super::{Exit, fail_on_messages, interrupt, layers, print, print_json};
 use crate::error::{Error, Result};
-use crate::gpu::{self, DeviceOptions, FrameResources, Gpu, PassTime};
+use crate::gpu::{self, FrameResources, Gpu, PassTime};
 use crate::image::difference::false_colours;
-use crate::image::{self, Film, Samples, WriteOptions, output, tone::ToneMap};
+use crate::image::{self, Film, Samples, WriteOptions, output};
 use crate::renderer::{self, Counters, Outputs, Renderer};
 use crate::report::table::{self, PassRow};
 use crate::report::trace::chrome_trace;
@@ -36,18 +37,9 @@ pub struct Args {
     /// Image to write: .exr (all layers), .png or .hdr; may be given several times [default: the scene's name + .exr]
     #[arg(short, long = "output", value_name = "FILE")]
     pub outputs: Vec<PathBuf>,
-    /// Device, by index or part of its name [default: the best one]
-    #[arg(long, value_name = "NAME")]
-    pub device: Option<String>,
     /// Effects to compile in
     #[arg(long, value_enum, default_value_t)]
     pub effects: EffectChoice,
-    /// Exposure of PNG files in stops
-    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = finite, allow_negative_numbers = true)]
-    pub exposure: f64,
-    /// Tone curve of PNG files
-    #[arg(long, value_enum, default_value_t)]
-    pub tonemap: ToneMap,
     /// Write a trace of CPU and GPU for Perfetto
     #[arg(long, value_name = "FILE")]
     pub profile: Option<PathBuf>,
@@ -60,15 +52,9 @@ pub struct Args {
     /// Count rays and visited nodes
     #[arg(long)]
     pub counters: bool,
-    /// Run under the Vulkan validation layers and fail on any message
-    #[arg(long)]
-    pub validation: bool,
-    /// Print one JSON object at the end
-    #[arg(long)]
-    pub json: bool,
-    /// No progress bar and no table
-    #[arg(short, long)]
-    pub quiet: bool,
+    /// Device and output.
+    #[command(flatten)]
+    pub common: Common,
     /// Replace the scene's own settings.
     #[command(flatten)]
     pub overrides: Overrides,
@@ -83,11 +69,6 @@ impl Args {
         let mut name = self.scene.file_stem().unwrap_or_default().to_owned();
         name.push(".exr");
         vec![name.into()]
-    }
-
-    /// How PNG files are made.
-    pub fn write_options(&self) -> WriteOptions {
-        WriteOptions { exposure: self.exposure as f32, tone_map: self.tonemap }
     }
 }
 
@@ -110,6 +91,8 @@ pub struct Summary {
     pub most_samples: u32,
     /// Why it ended.
     pub stopped: Why,
+    /// Most priorities of one allocation that were not finite.
+    pub broken_priorities: u32,
     /// Rays and nodes; none without `--counters`.
     pub counters: Option<Counters>,
     /// Wall time of reading the scene and building its hierarchy.
@@ -136,12 +119,10 @@ pub fn run(args: &Args) -> Result<Exit> {
     let mut host = Spans::default();
     let scene = host.time("load scene", || Scene::load(&args.scene, &|s| args.overrides.apply(s)))?;
     let earlier = args.resume.as_deref().map(|path| Earlier::read(path, &scene.settings)).transpose()?;
-    let talkative = !args.quiet && !args.json;
-    if talkative {
+    if args.common.talkative() {
         scene.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
     }
-    let options = DeviceOptions { device: args.device.clone(), validation: args.validation };
-    let gpu = host.time("open device", || Gpu::open(&options))?;
+    let gpu = host.time("open device", || args.common.open())?;
     let wanted = Outputs { split_light: true, guides: true, counters: args.counters };
     let mut effects = match args.effects {
         EffectChoice::Auto => renderer::called_for(&scene, wanted),
@@ -150,7 +131,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     effects.adaptive |= earlier.is_some();
     let renderer = host.time("upload and compile", || Renderer::specialised(&gpu, &scene, wanted, effects))?;
     let mut frame = FrameResources::new(&gpu)?;
-    let job = Job { renderer: &renderer, stop, quiet: !talkative };
+    let job = Job { renderer: &renderer, stop, quiet: !args.common.talkative() };
     let end = host.time("render", || job.run(&mut frame, earlier.as_ref()))?;
     let mut film = host.time("read back", || layers::film(&renderer))?;
     let seconds = host.seconds("render");
@@ -213,7 +194,7 @@ fn write(args: &Args, film: &Film) -> Result<()> {
     if broken > 0 {
         eprintln!("warning: {broken} pixels are not finite");
     }
-    args.output_files().iter().try_for_each(|path| image::write(path, film, &args.write_options()))?;
+    args.output_files().iter().try_for_each(|path| image::write(path, film, &args.common.write_options()))?;
     args.heatmap.iter().try_for_each(|path| write_heatmap(path, film))
 }
 
@@ -254,6 +235,7 @@ fn report(
         least_samples: least_most.0,
         most_samples: least_most.1,
         stopped: end.why,
+        broken_priorities: end.broken_priorities,
         counters,
         load_seconds: host.seconds("load scene"),
         compile_seconds: host.seconds("upload and compile"),
@@ -262,7 +244,7 @@ fn report(
         passes: table::summarise(&end.times),
         warnings: scene.warnings.clone(),
     };
-    match (args.json, args.quiet) {
+    match (args.common.json, args.common.quiet) {
         (true, _) => print_json(&summary),
         (false, true) => Ok(()),
         (false, false) => print(&text(&summary)),
@@ -280,6 +262,9 @@ fn text(s: &Summary) -> String {
         text += &format!("{} to {} samples per pixel, {mean:.2} on average\n", s.least_samples, s.most_samples);
     }
     text += &s.stopped.line();
+    if s.broken_priorities > 0 {
+        text += &format!("warning: {} priorities were not finite and counted for nothing\n", s.broken_priorities);
+    }
     if let Some(c) = &s.counters {
         let per_ray = c.nodes as f64 / c.rays().max(1) as f64;
         text += &format!("{} closest-hit rays, {} any-hit rays, {per_ray:.1} nodes each\n", c.closest, c.any);
@@ -314,6 +299,6 @@ mod tests {
         assert_eq!(parse(&["scenes/box/room.toml"]).output_files(), [Path::new("room.exr")]);
         assert_eq!(parse(&["room.toml", "-o", "a.png", "-o", "b.exr"]).output_files().len(), 2);
         assert_eq!(parse(&["room.v2.obj"]).output_files(), [Path::new("room.v2.exr")]);
-        assert_eq!(parse(&["room.toml", "--exposure", "-1.5"]).write_options().exposure, -1.5);
+        assert_eq!(parse(&["room.toml", "--exposure", "-1.5"]).common.write_options().exposure, -1.5);
     }
 }

@@ -47,8 +47,14 @@ macro_rules! constants {
     };
 }
 
+#[path = "layout/allocate.rs"]
+pub mod allocate;
+#[path = "layout/effects.rs"]
+pub mod effects;
 #[path = "layout/filter.rs"]
 pub mod filter;
+pub use allocate::*;
+pub use effects::*;
 pub use filter::*;
 
 constants! {
@@ -368,115 +374,6 @@ gpu_structs! {
         rounds: uint,
     }
 
-    /// Push constants of the kernels under `src/allocate`: what makes a pixel worth samples.
-    struct PriorityPush {
-        /// Film in pixels.
-        size: uvec2,
-        /// Edge of the square of pixels that geometry compares, 2 to 10.
-        window: uint,
-        /// 1 / sigma^2 of the difference of unit normals.
-        normal_scale: float,
-        /// 1 / sigma^2 of the distance of positions, world units^-2.
-        position_scale: float,
-        /// Added to the luminance that noise is compared with, W/(m^2 sr); negative: noise counts by itself.
-        luminance_floor: float,
-        /// Samples at which a pixel has enough whatever its noise.
-        limit: uint,
-        /// Relative error of the mean below which a pixel needs no samples; 0 is off.
-        threshold: float,
-        /// Share of the variance that a filter takes away where all neighbours are alike, 0 to 1.
-        filtered: float,
-    }
-
-    /// Push constants of the kernels that apportion.
-    struct ApportionPush {
-        /// Pixels of the film.
-        pixels: uint,
-        /// Largest number of samples of a pixel, those it has included; NONE when the budget can fill none.
-        limit: uint,
-        /// Counts the repetitions for what full pixels leave, and the digits of remainders from the highest; in `total` 0
-        /// after `weigh`, 1 after `deficit`.
-        round: uint,
-        /// Repetitions at most.
-        rounds: uint,
-        /// Samples to place, 64 bits.
-        budget: uvec2,
-        /// Samples that all pixels have once these are placed, 64 bits.
-        total: uvec2,
-    }
-
-    /// Sums over a block of pixels.
-    struct BlockSums {
-        /// Of the weights of open pixels, 64 bits.
-        weights: uvec2,
-        /// Samples given to pixels that became full, 64 bits.
-        filled: uvec2,
-        /// Of the quotas of open pixels, 64 bits.
-        floors: uvec2,
-        /// Pixels that became full; of `weigh`: priorities that were not finite.
-        settled: uint,
-        /// Pixels still open; of `weigh`: pixels of positive weight.
-        open: uint,
-    }
-
-    /// How far an apportionment is.
-    struct Apportionment {
-        /// Samples for the open pixels, 64 bits.
-        budget: uvec2,
-        /// Sum of the open pixels' weights, at least 1, 64 bits.
-        weights: uvec2,
-        /// floor(budget * 2^32 / weights) for budgets of 32 bits, 64 bits.
-        ratio: uvec2,
-        /// budget / weights for larger ones, 64 bits.
-        whole: uvec2,
-        /// budget mod weights for larger ones, 64 bits.
-        part: uvec2,
-        /// Bits that remainders are moved up by, to the highest but one, so that all sums of weights have the same digits.
-        up: uint,
-        /// Samples that go to the largest remainders, then those among the ones with `prefix`, 64 bits.
-        needed: uvec2,
-        /// Leading digits of the smallest remainder that still gets a sample, 64 bits.
-        prefix: uvec2,
-        /// Bits of the remainders that `prefix` decides, 64 bits.
-        mask: uvec2,
-        /// 1 when all weigh the same, since no open pixel has a weight.
-        equal: uint,
-        /// 1 when the quotas are final.
-        settled: uint,
-        /// 1 when pixels were still filling up in the last repetition.
-        forced: uint,
-        /// 1 when `prefix` and `needed` decide every pixel.
-        selected: uint,
-        /// 1 when all remainders with `prefix` get a sample.
-        whole_edge: uint,
-        /// Priorities that were not finite.
-        non_finite: uint,
-        /// Pixels of positive weight.
-        wanting: uint,
-    }
-
-    /// Push constants of the kernels that scan.
-    struct ScanPush {
-        /// Pixels of the film.
-        pixels: uint,
-    }
-
-    /// Push constants of `batch.comp`.
-    struct BatchPush {
-        /// Pixels of the film.
-        pixels: uint,
-        /// Paths in the batch.
-        paths: uint,
-        /// Index of the batch's first path in the round, 64 bits.
-        first_path: uvec2,
-        /// Of the rounds that the list of paths is dealt to, this one, from 0.
-        round: uint,
-        /// Rounds that the list is dealt to, at least 1.
-        rounds: uint,
-        /// Index of every pixel's first sample in its sequence.
-        first_sample: uint,
-    }
-
     /// A ray for `traverse.comp`.
     struct RayQuery {
         /// World units.
@@ -518,93 +415,4 @@ gpu_structs! {
         /// Seed of the sampler.
         seed: uint,
     }
-}
-
-macro_rules! effects {
-    ($($(#[$doc:meta])* $field:ident = $id:literal, $glsl:ident;)+) => {
-        /// What a scene and its settings call for: one specialisation constant each. Kernels drop the rest when they are
-        /// compiled. `scene/effects.rs` fills it in and says which object asked.
-        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-        pub struct Effects { $($(#[$doc])* pub $field: bool,)+ }
-        impl Effects {
-            /// Every effect switched on (`--effects all`).
-            pub const ALL: Self = Self { $($field: true,)+ };
-            /// (name, specialisation constant id, on) of every effect, in order of id.
-            pub fn entries(&self) -> Vec<(&'static str, u32, bool)> {
-                vec![$((stringify!($field), $id, self.$field),)+]
-            }
-            /// The same with the effect of this id switched.
-            pub fn toggled(mut self, id: u32) -> Self {
-                match id {
-                    $($id => self.$field = !self.$field,)+
-                    _ => {}
-                }
-                self
-            }
-        }
-        /// The constants as GLSL text.
-        pub const GLSL_EFFECTS: &str = concat!($("layout(constant_id = ", $id, ") const bool ",
-            stringify!($glsl), " = true;\n",)+);
-    };
-}
-
-effects! {
-    /// A colour, specular, roughness or emission texture.
-    textures = 0, FX_TEXTURES;
-    /// Vertex normals that differ from the face's.
-    smooth_normals = 1, FX_SMOOTH_NORMALS;
-    /// A height map.
-    bump_maps = 2, FX_BUMP_MAPS;
-    /// A tangent-space normal map.
-    normal_maps = 3, FX_NORMAL_MAPS;
-    /// Opacity below 1, constant or by texture.
-    alpha_masks = 4, FX_ALPHA_MASKS;
-    /// A diffuse lobe (diffuse or coated material).
-    diffuse = 5, FX_DIFFUSE;
-    /// A conductor, rough or smooth.
-    conductor = 6, FX_CONDUCTOR;
-    /// A dielectric, rough or smooth.
-    dielectric = 7, FX_DIELECTRIC;
-    /// A diffuse base under a coat.
-    coated = 8, FX_COATED;
-    /// An interface with alpha of at least 0.01.
-    rough = 9, FX_ROUGH;
-    /// An interface with alpha below 0.01.
-    smooth_interface = 10, FX_SMOOTH;
-    /// The Beckmann distribution.
-    beckmann = 11, FX_BECKMANN;
-    /// The GGX distribution.
-    ggx = 12, FX_GGX;
-    /// Emissive triangles.
-    emissive = 13, FX_EMISSIVE;
-    /// Point lights.
-    point_lights = 14, FX_POINT;
-    /// Spot lights.
-    spot_lights = 15, FX_SPOT;
-    /// Directional lights.
-    directional_lights = 16, FX_DIRECTIONAL;
-    /// An environment, constant or an image.
-    environment = 17, FX_ENVIRONMENT;
-    /// An environment given by an image.
-    environment_map = 18, FX_ENVIRONMENT_MAP;
-    /// A lens of finite radius.
-    lens = 19, FX_LENS;
-    /// Instances: a second BVH level.
-    instances = 20, FX_INSTANCES;
-    /// Light beyond direct (max_depth over 2).
-    indirect = 21, FX_INDIRECT;
-    /// Russian roulette.
-    roulette = 22, FX_ROULETTE;
-    /// A clamp of indirect light.
-    clamp = 23, FX_CLAMP;
-    /// A pixel filter other than the box.
-    pixel_filter = 24, FX_PIXEL_FILTER;
-    /// Direct and indirect light wanted apart.
-    split_light = 25, FX_SPLIT;
-    /// Independent PCG numbers instead of Owen-scrambled Sobol.
-    independent_sampler = 26, FX_INDEPENDENT;
-    /// Ray and node counters.
-    counters = 27, FX_COUNTERS;
-    /// Samples placed where they count: a list of paths instead of so many per pixel.
-    adaptive = 28, FX_ADAPTIVE;
 }

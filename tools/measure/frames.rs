@@ -1,23 +1,10 @@
 //! Noisy images and their references.
-use crate::{Args, scenes};
+use crate::Args;
+pub use crate::view::View;
 use anyhow::{Context, bail};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use tallow::image::source::Source;
-
-/// A scene as it is rendered here.
-pub struct View {
-    /// For files and tables.
-    pub name: &'static str,
-    /// A name known to the converter, or a scene file of the repository.
-    pub scene: &'static str,
-    /// Pixels; small, so that a software device needs minutes.
-    pub size: [u32; 2],
-    /// Path edges.
-    pub depth: u32,
-    /// Samples per pixel of the reference.
-    pub reference: u32,
-}
 
 impl View {
     /// Renders it, unless an earlier run has.
@@ -40,10 +27,7 @@ impl View {
 }
 
 fn run(view: &View, args: &Args, spp: u32, file: &Path) -> anyhow::Result<()> {
-    let scene = match view.scene.ends_with(".toml") {
-        true => Path::new(env!("CARGO_MANIFEST_DIR")).join(view.scene),
-        false => scenes::convert(view.scene, &args.data, &args.output)?,
-    };
+    let scene = view.scene_file(&args.data, &args.output)?;
     eprintln!("rendering {} with {spp} samples per pixel", view.name);
     let [width, height] = view.size.map(|n| n.to_string());
     let (spp, depth) = (spp.to_string(), view.depth.to_string());

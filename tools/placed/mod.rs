@@ -1,6 +1,6 @@
 //! Renders of a scene by one policy, their references, and how far they are apart.
-use crate::{Args, scenes};
-use std::path::{Path, PathBuf};
+use crate::Args;
+pub use crate::view::View;
 use tallow::gpu::layout::{Guide, PixelStats, vec3, vec4};
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::image::{self, Film, WriteOptions};
@@ -13,20 +13,6 @@ pub mod geometry;
 pub mod overhead;
 pub mod policies;
 pub mod spread;
-
-/// A scene as it is rendered here: small, so that a software device needs minutes.
-pub struct View {
-    /// For files and tables.
-    pub name: &'static str,
-    /// A name known to the converter, or a scene file of the repository.
-    pub scene: &'static str,
-    /// Pixels.
-    pub size: [u32; 2],
-    /// Path edges.
-    pub depth: u32,
-    /// Samples per pixel of the reference.
-    pub reference: u32,
-}
 
 /// What a render leaves, and the device's own time for all passes in milliseconds.
 pub struct Rendered {
@@ -41,20 +27,13 @@ pub struct Rendered {
 }
 
 impl View {
-    fn scene_file(&self, args: &Args) -> anyhow::Result<PathBuf> {
-        Ok(match self.scene.ends_with(".toml") {
-            true => Path::new(env!("CARGO_MANIFEST_DIR")).join(self.scene),
-            false => scenes::convert(self.scene, &args.data, &args.output)?,
-        })
-    }
-
     /// The scene with these settings.
     pub fn load(&self, args: &Args, change: impl Fn(&mut Settings)) -> anyhow::Result<Scene> {
         let all = |s: &mut Settings| {
             ([s.width, s.height], s.max_depth, s.roulette_depth) = (self.size, self.depth, 0);
             change(s);
         };
-        Ok(Scene::load(&self.scene_file(args)?, &all)?)
+        Ok(Scene::load(&self.scene_file(&args.data, &args.output)?, &all)?)
     }
 
     /// Means of radiance and of indirect irradiance over many samples of another seed, kept in a file.

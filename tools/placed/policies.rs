@@ -8,16 +8,16 @@ use tallow::report::table;
 const SPP: u32 = 32;
 const SEEDS: [u32; 3] = [0, 2, 3];
 const VIEWS: [View; 5] = [
-    View { name: "cornell", scene: "scenes/cornell-box/scene.toml", size: [96, 96], depth: 4, reference: 1024 },
+    View { name: "cornell", scene: "scenes/cornell-box/scene.toml", size: [192, 192], depth: 4, reference: 1024 },
     View { name: "sponza", scene: "crytek-sponza", size: [112, 63], depth: 4, reference: 1024 },
-    View { name: "bust", scene: "scenes/bust/scene.toml", size: [90, 120], depth: 4, reference: 1024 },
-    View { name: "grass", scene: "scenes/grass/scene.toml", size: [112, 63], depth: 4, reference: 1024 },
+    View { name: "bust", scene: "scenes/bust/scene.toml", size: [180, 240], depth: 4, reference: 1024 },
+    View { name: "grass", scene: "scenes/grass/scene.toml", size: [224, 126], depth: 4, reference: 1024 },
     View {
         name: "directional",
         scene: "scenes/cornell-box/directional.toml",
-        size: [128, 128],
+        size: [192, 192],
         depth: 4,
-        reference: 2048,
+        reference: 1024,
     },
 ];
 
