@@ -66,7 +66,7 @@ impl Default for Allocate {
             rounds: 4,
             window: 4,
             sigma_normal: 0.35,
-            sigma_position: 0.01,
+            sigma_position: 0.003,
             luminance_floor: 0.05,
             noise_threshold: 0.0,
             filtered: 0.5,
