@@ -25,9 +25,9 @@ void main() {
         if (i >= push.pixels || from >= end) break;
         uint64_t to = offset_of(i + 1u);
         if (to > begin && to > from) {
-            uint64_t low = max(from, begin), high = min(to, end);
+            uint at = uint(max(from, begin) - begin), stop = uint(min(to, end) - begin);
             uint index = push.first_sample + texelFetch(stats, int(7u * i + 3u)).x; // earlier batches of this round are in it
-            for (uint64_t at = low; at < high; at++) paths[uint(at - begin)] = uvec2(i, index + uint(at - low));
+            for (; at < stop; at++) paths[at] = uvec2(i, index++);
         }
         from = to;
     }

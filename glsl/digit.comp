@@ -6,16 +6,14 @@
 #include "shared/wide.glsl"
 #include "shared/block.glsl"
 
-// Counts one digit of the remainders that still share the prefix of the one sought (radix selection).
+// Counts one digit of the keys that still share the prefix of the one sought (radix selection).
 layout(local_size_x = 64) in;
-layout(binding = 0) uniform usamplerBuffer weight; // of uint
-layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
-layout(binding = 2) uniform usamplerBuffer counts; // of uint
-layout(binding = 3) uniform usamplerBuffer state; // of Apportionment
-layout(scalar, binding = 4) buffer Histogram { uint histogram[]; };
+layout(binding = 0) uniform usamplerBuffer key; // of uvec2
+layout(binding = 1) uniform usamplerBuffer state; // of Apportionment
+layout(scalar, binding = 2) buffer Histogram { uint histogram[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
 
-#include "shared/share.glsl"
+#include "shared/state.glsl"
 
 shared uint bins[256];
 
@@ -28,12 +26,8 @@ void main() {
     uint shift = 24u - 8u * (push.round % 4u);
     bool high = push.round < 4u; // the high word has the first four digits
     for (uint k = 0u; k < items; k++) {
-        uint i = first + k;
-        if (push.limit != NONE && texelFetch(counts, int(i)).x != NONE) continue;
-        uint64_t quota;
-        uvec2 key;
-        share_of(s, i, quota, key);
-        if ((key & s.mask) == s.prefix) atomicAdd(bins[((high ? key.y : key.x) >> shift) & 255u], 1u);
+        uvec2 word = texelFetch(key, int(first + k)).xy;
+        if ((word & s.mask) == s.prefix) atomicAdd(bins[((high ? word.y : word.x) >> shift) & 255u], 1u);
     }
     barrier();
     for (uint b = gl_LocalInvocationIndex; b < 256u; b += BLOCK_THREADS) {

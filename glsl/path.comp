@@ -182,8 +182,9 @@ void main() {
     uint pixel = push.first_pixel + i % push.pixels;
     uint index = push.first_sample + i / push.pixels;
     if (listed) {
-        pixel = texelFetch(paths, int(2u * i)).x;
-        index = texelFetch(paths, int(2u * i + 1u)).x;
+        uvec2 path = texelFetch(paths, int(i)).xy;
+        pixel = path.x;
+        index = path.y;
     }
     Sampler random = sampler_start(pixel, index, push.seed);
     Ray ray = camera_ray(push.camera, film_sample(pixel, random), FX_LENS ? sample_2d(random, PAIR_LENS) : vec2(0.0));

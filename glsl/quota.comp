@@ -6,36 +6,42 @@
 #include "shared/wide.glsl"
 #include "shared/block.glsl"
 
-// Hamilton's first step: every open pixel's quota, floor(budget * weight / weights). A pixel whose quota is no less than
-// its room is settled at its room; what it leaves is apportioned again. `count` holds NONE for open pixels.
+// Hamilton's first step: every open pixel's quota, floor(budget * weight / weights), and its remainder as a key. A pixel
+// whose quota is no less than its room is full: it gets the room, and what it leaves is apportioned again.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer weight; // of uint
 layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
 layout(binding = 2) uniform usamplerBuffer state; // of Apportionment
-layout(scalar, binding = 3) buffer Counts { uint count[]; };
-layout(scalar, binding = 4) writeonly buffer Sums { BlockSums sums[]; };
+layout(scalar, binding = 3) buffer Keys { uvec2 key[]; };
+layout(scalar, binding = 4) writeonly buffer Counts { uint count[]; };
+layout(scalar, binding = 5) writeonly buffer Sums { BlockSums sums[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
 
-#include "shared/share.glsl"
+#include "shared/state.glsl"
+#include "shared/proportion.glsl"
+#include "shared/room.glsl"
+#include "shared/key.glsl"
 
 void main() {
     Apportionment s = load_state();
     if (s.settled != 0u) return; // safe: the same for all threads
     uint first = first_item(), items = item_count(first, push.pixels);
+    Proportion share_of = proportion_of(s);
+    bool equal = s.equal != 0u;
     uint64_t weights = 0UL, filled = 0UL, floors = 0UL;
     uint settled = 0u, open = 0u;
     for (uint k = 0u; k < items; k++) {
         uint i = first + k;
-        if (push.round > 0u && count[i] != NONE) continue;
-        uint64_t quota;
-        uvec2 key;
-        share_of(s, i, quota, key);
-        uint room = room_of(i);
+        if (push.round > 0u && is_full(key[i])) continue;
+        uint w = equal ? 1u : texelFetch(weight, int(i)).x, room = room_of(i);
+        uint64_t quota, rest;
+        multiply_divide(share_of, w, quota, rest);
         bool full = quota >= room;
-        if (full) count[i] = room;
+        count[i] = full ? room : uint(quota);
+        key[i] = full ? FULL : unpackUint2x32(rest << s.up);
         filled += full ? room : 0u;
         floors += full ? 0UL : quota;
-        weights += full ? 0u : weight_of(s, i);
+        weights += full ? 0u : w;
         settled += full ? 1u : 0u;
         open += full ? 0u : 1u;
     }

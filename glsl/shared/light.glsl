@@ -14,8 +14,8 @@ uvec4 light_texel(uint light, uint i) { return texelFetch(lights, int(4u * light
 uint alias_choose(usamplerBuffer table, uint n, uint random) {
     uint slot, low;
     umulExtended(random, n, slot, low);
-    uint threshold = texelFetch(table, int(2u * slot)).x;
-    return low < threshold ? slot : texelFetch(table, int(2u * slot + 1u)).x;
+    uvec2 entry = texelFetch(table, int(slot)).xy; // threshold, alias
+    return low < entry.x ? slot : entry.y;
 }
 
 // Environment direction: u = atan(x, -z) / 2pi, v = acos(y) / pi in the environment's own frame (row 0 is +y). acos would

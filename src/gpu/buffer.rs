@@ -212,19 +212,21 @@ impl Untyped {
         Ok(vk::DescriptorBufferInfo::default().buffer(self.raw).range(vk::WHOLE_SIZE))
     }
 
-    /// A view as texels of 16 bytes where elements are a multiple of that, else of 4. Made once, then kept.
+    /// A view as texels of 16 bytes where elements are a multiple of that, of 8 where they have 8, else of 4. Made once,
+    /// then kept.
     ///
     /// # Errors
     /// When the buffer has more texels than one view may have.
     pub(super) fn texels(&self, kind: SlotKind) -> Result<vk::BufferView> {
-        let wide = self.stride.is_multiple_of(16);
-        let format = match (kind, wide) {
-            (SlotKind::FloatTexels, true) => vk::Format::R32G32B32A32_SFLOAT,
-            (SlotKind::FloatTexels, false) => vk::Format::R32_SFLOAT,
-            (_, true) => vk::Format::R32G32B32A32_UINT,
-            (_, false) => vk::Format::R32_UINT,
+        let (format, bytes) = match (kind, self.stride) {
+            (SlotKind::FloatTexels, n) if n.is_multiple_of(16) => (vk::Format::R32G32B32A32_SFLOAT, 16),
+            (SlotKind::FloatTexels, 8) => (vk::Format::R32G32_SFLOAT, 8),
+            (SlotKind::FloatTexels, _) => (vk::Format::R32_SFLOAT, 4),
+            (_, n) if n.is_multiple_of(16) => (vk::Format::R32G32B32A32_UINT, 16),
+            (_, 8) => (vk::Format::R32G32_UINT, 8),
+            (_, _) => (vk::Format::R32_UINT, 4),
         };
-        let (texels, limit) = (self.size / if wide { 16 } else { 4 }, self.gpu.0.info.max_texel_elements);
+        let (texels, limit) = (self.size / bytes, self.gpu.0.info.max_texel_elements);
         if texels > limit {
             return Err(too_big(&self.name, texels, "texels", limit, "of one texel buffer"));
         }

@@ -2,7 +2,7 @@
 //! `build.rs` includes it by `#[path]` and serves [`GLSL`] to the shaders as `layout.glsl`.
 //!
 //! Structs are laid out as GLSL `scalar` does: members of four bytes, no padding anywhere. Structs that kernels
-//! read through texel buffers are multiples of 16 bytes, so that one fetch returns four words.
+//! read through texel buffers are multiples of 16 bytes, or 8, so that one fetch returns all that it can.
 #![allow(non_camel_case_types)]
 
 use bytemuck::{Pod, Zeroable};

@@ -19,7 +19,7 @@ pub struct Counts {
     pub weight: Buffer<u32>,
     /// Samples of every pixel.
     pub count: Buffer<u32>,
-    /// First path of every pixel, and the number of all: 64 bits, low word first.
+    /// First path of every pixel, and the number of all: 64 bits, low word first. Before the scan, the remainders.
     pub offset: Buffer<uvec2>,
     /// One: read it for what was not finite.
     pub state: Buffer<Apportionment>,
@@ -107,9 +107,15 @@ impl Apportion {
             rec.dispatch(&self.deficit, bind, &push(0), all)?;
             rec.dispatch(&self.total, total::Bind { sums: &c.sums, state: &c.state }, &push(1), one_workgroup())?;
         }
-        rec.fill(&c.count, NONE)?;
         for round in 0..plan.rounds {
-            let bind = quota::Bind { weight: &c.weight, stats, state: &c.state, count: &c.count, sums: &c.sums };
+            let bind = quota::Bind {
+                weight: &c.weight,
+                stats,
+                state: &c.state,
+                key: &c.offset,
+                count: &c.count,
+                sums: &c.sums,
+            };
             rec.dispatch(&self.quota, bind, &push(round), all)?;
             let bind = settle::Bind { sums: &c.sums, state: &c.state };
             rec.dispatch(&self.settle, bind, &push(round), one_workgroup())?;
@@ -121,17 +127,16 @@ impl Apportion {
         let all = blocks(plan.pixels);
         for round in 0..DIGITS {
             let push = push(plan, round);
-            let (state, histogram) = (&c.state, &c.histogram);
-            let bind = digit::Bind { weight: &c.weight, stats, counts: &c.count, state, histogram };
+            let bind = digit::Bind { key: &c.offset, state: &c.state, histogram: &c.histogram };
             rec.dispatch(&self.digit, bind, &push, all)?;
             let bind = pick::Bind { state: &c.state, histogram: &c.histogram };
             rec.dispatch(&self.pick, bind, &push, one_workgroup())?;
         }
         let push = push(plan, 0);
-        let bind = ties::Bind { weight: &c.weight, stats, counts: &c.count, state: &c.state, blocks: &c.blocks };
+        let bind = ties::Bind { key: &c.offset, stats, counts: &c.count, state: &c.state, blocks: &c.blocks };
         rec.dispatch(&self.ties, bind, &push, all)?;
         self.blocks.record(rec, &c.blocks, plan.pixels)?;
-        let bind = spread::Bind { weight: &c.weight, stats, state: &c.state, blocks: &c.blocks, count: &c.count };
+        let bind = spread::Bind { key: &c.offset, stats, state: &c.state, blocks: &c.blocks, count: &c.count };
         rec.dispatch(&self.spread, bind, &push, all)
     }
 }
