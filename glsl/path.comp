@@ -185,6 +185,7 @@ void main() {
         uvec2 path = texelFetch(paths, int(i)).xy;
         pixel = path.x;
         index = path.y;
+        if (pixel == NONE) return; // safe: no barrier() follows
     }
     Sampler random = sampler_start(pixel, index, push.seed);
     Ray ray = camera_ray(push.camera, film_sample(pixel, random), FX_LENS ? sample_2d(random, PAIR_LENS) : vec2(0.0));

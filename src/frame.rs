@@ -4,10 +4,10 @@ use crate::error::Result;
 use crate::gpu::layout::*;
 use crate::gpu::{Buffer, Gpu, Location, Recorder};
 use crate::scene::Scene;
-use crate::schedule::{Batch, PathRange, Plan};
+use crate::schedule::{Batch, Choice, PathRange, Plan};
 use crate::stage::apportion::{Apportion, Counts};
 use crate::stage::scan::Scan;
-use crate::stage::{batch, fold, guide, path};
+use crate::stage::{batch, choose, fold, guide, path};
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -27,6 +27,8 @@ pub struct Allocation {
     pub policy: Box<dyn Policy>,
     /// Priorities to counts.
     pub apportion: Apportion,
+    /// The same, one sample at most.
+    pub choose: choose::Choose,
     /// Counts to offsets.
     pub scan: Scan,
     /// Offsets to paths.
@@ -73,6 +75,22 @@ pub fn record_allocation(
     a.scan.record(rec, &f.counts) //                                        count    -> offset[P + 1]
 }
 
+/// Records the decision of who gets one sample next.
+pub fn record_choice(
+    rec: &mut Recorder,
+    a: &Allocation,
+    f: &FilmBuffers,
+    push: &PriorityPush,
+    choice: &Choice,
+    seed: u32,
+) -> Result<()> {
+    let tile = &f.tiles[0];
+    let inputs = Inputs { guide: &tile.guide, stats: &tile.stats, priority: &f.priority };
+    a.policy.record(rec, &inputs, &PriorityPush { round: choice.round, ..*push })?; // stats[P] -> priority[P]
+    choose::record(&a.choose, rec, &f.priority, &f.counts, choice, seed)?; //       priority -> count[P], 0 or 1
+    a.scan.record(rec, &f.counts) //                                                count    -> offset[P + 1]
+}
+
 /// Records one batch of what was allocated.
 pub fn record_listed(
     rec: &mut Recorder,
@@ -83,6 +101,7 @@ pub fn record_listed(
     push: &PathPush,
     range: &PathRange,
 ) -> Result<()> {
+    rec.fill(&f.paths, NONE)?; // the list may end earlier
     batch::record(&a.batch, rec, &f.counts.offset, &f.tiles[0].stats, &f.paths, range, push.first_sample)?; // offset -> paths[B]
     path::record_listed(&st.path, rec, s, f, push, range.paths)?; //                     paths   -> samples[B]
     fold::record_listed(&st.fold, rec, f, range) //                                      samples -> stats[P], light[P]

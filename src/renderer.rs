@@ -11,7 +11,7 @@ use crate::gpu::layout::{
 use crate::gpu::{FrameResources, Gpu, Kernel, PassTime, RawBuffer, Recorder};
 use crate::scene::{self, Scene};
 use crate::schedule::{self, Cut};
-pub use crate::schedule::{Batch, PathRange, Plan, Progress, Step};
+pub use crate::schedule::{Batch, Choice, PathRange, Plan, Progress, Step};
 use crate::settings::{PixelFilter, Sampler, Settings};
 use crate::stage::apportion::Apportion;
 use crate::stage::scan::Scan;
@@ -133,16 +133,12 @@ impl Renderer {
     /// The work of a whole render, in the order that it must be recorded in. The result does not depend on how the work
     /// is cut into batches.
     pub fn steps(&self) -> Vec<Step> {
-        schedule::steps(&self.settings, self.learns(), &self.cut())
+        schedule::steps(&self.settings, &self.cut())
     }
 
     /// The rest of the work, once [`Renderer::resume`] has put back what there was.
     pub fn rest(&self, progress: Progress) -> Vec<Step> {
-        schedule::rest(&self.settings, self.learns(), &self.cut(), progress)
-    }
-
-    fn learns(&self) -> bool {
-        allocate::policy(&self.settings.allocate.policy).is_some_and(|row| row.learns)
+        schedule::rest(&self.settings, &self.cut(), progress)
     }
 
     fn cut(&self) -> Cut {
@@ -160,6 +156,7 @@ impl Renderer {
             (Step::Start, _) => frame::record_start(rec, st, s, f, push),
             (Step::Uniform(batch), _) => frame::record_uniform(rec, st, s, f, push, batch),
             (Step::Allocate(plan), Some(a)) => frame::record_allocation(rec, a, f, &self.priority, plan),
+            (Step::Choose(choice), Some(a)) => frame::record_choice(rec, a, f, &self.priority, choice, push.seed),
             (Step::Listed(range), Some(a)) => frame::record_listed(rec, st, a, s, f, push, range),
             _ => Err(Error::Usage("this renderer was made without the effect \"adaptive\"".into())),
         }
@@ -173,8 +170,8 @@ impl Renderer {
         self.gpu.run(frame, |rec| self.record(rec, step))
     }
 
-    /// Puts back what an earlier render had: statistics, light (empty unless it is kept apart), and how many samples
-    /// each pixel still lacks of what it was to have. Follow it with [`Renderer::rest`]. Needs the effect `adaptive`.
+    /// Puts back what an earlier render had: statistics, light (empty unless it is kept apart), priorities (empty unless
+    /// the policy keeps them from round to round), and how many samples each pixel still lacks of what it was to have. Follow it with [`Renderer::rest`]. Needs the effect `adaptive`.
     ///
     /// # Errors
     /// [`crate::error::Error::Usage`] when there is no such effect, [`crate::error::Error::Device`] when the lengths
@@ -184,6 +181,7 @@ impl Renderer {
         frame: &mut FrameResources,
         stats: &[PixelStats],
         light: &[PixelLight],
+        priority: &[f32],
         pending: &[u32],
     ) -> Result<()> {
         let Some(a) = &self.allocation else {
@@ -194,6 +192,7 @@ impl Renderer {
         if self.effects.split_light {
             self.film.tiles[0].light.write(0, light)?;
         }
+        self.film.priority.write(0, priority)?;
         self.film.counts.count.write(0, pending)?;
         self.gpu.run(frame, |rec| a.scan.record(rec, &self.film.counts))?;
         Ok(())
@@ -207,7 +206,7 @@ impl Renderer {
     pub fn priorities_of(&self, stats: &[PixelStats], limit: u32) -> Result<Vec<f32>> {
         let push = PriorityPush { limit, ..self.priority };
         let guide = self.film.tiles[0].guide.read()?;
-        Ok((policy_of(&self.settings)?.reference)(&HostInputs { guide: &guide, stats, push }))
+        Ok((policy_of(&self.settings)?.reference)(&HostInputs { guide: &guide, stats, priority: &[], push }))
     }
 
     /// How the last allocation went.
@@ -216,6 +215,14 @@ impl Renderer {
     /// [`crate::error::Error::Device`].
     pub fn apportionment(&self) -> Result<Apportionment> {
         Ok(self.film.counts.state.read()?[0])
+    }
+
+    /// Paths of the list that the last [`Step::Allocate`] or [`Step::Choose`] made.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub fn listed(&self) -> Result<u64> {
+        Ok(self.film.counts.count.read()?.iter().map(|&n| u64::from(n)).sum())
     }
 
     /// Moves the camera; what was accumulated belongs to the old one, so begin with [`Step::Start`].
@@ -309,6 +316,7 @@ fn allocation(gpu: &Gpu, policy: &Row, pixels: u32, workgroup: u32) -> Result<Al
     Ok(Allocation {
         policy: (policy.make)(gpu, pixels, workgroup)?,
         apportion: Apportion::new(gpu)?,
+        choose: PerThread::new(gpu, &Effects::default(), workgroup)?,
         scan: Scan::new(gpu)?,
         batch: Kernel::new(gpu, &Effects::default(), &[])?,
     })
@@ -328,6 +336,7 @@ pub fn priority_push(scene: &Scene) -> PriorityPush {
         limit: schedule::limit(s),
         threshold: a.noise_threshold,
         filtered: a.filtered,
+        round: 0,
     }
 }
 

@@ -1,5 +1,5 @@
 //! The order of a render: which samples, when, and when to look where they count. Plain arithmetic, known beforehand.
-use crate::settings::Settings;
+use crate::settings::{Placing, Settings};
 
 /// A rectangle of work: some samples of a run of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,8 +42,27 @@ pub struct Plan {
     pub rounds: u32,
 }
 
+/// Who gets one more sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Choice {
+    /// Of the film.
+    pub pixels: u32,
+    /// Samples that every pixel has had a chance of.
+    pub round: u32,
+    /// Least priority that gets one, above 0; 0: priorities are probabilities.
+    pub threshold: f32,
+}
+
+impl PathRange {
+    /// What of it there is in a list of `paths`, which only the device knew the length of.
+    pub fn within(self, paths: u64) -> Option<Self> {
+        let left = paths.saturating_sub(self.first).min(u64::from(self.paths)) as u32;
+        (left > 0).then_some(Self { paths: left, ..self })
+    }
+}
+
 /// A piece of a render.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
     /// Forgets all samples; finds the primary hits, if anybody reads them.
     Start,
@@ -51,15 +70,17 @@ pub enum Step {
     Uniform(Batch),
     /// Decides how many samples each pixel gets next.
     Allocate(Plan),
-    /// Traces some of what was allocated.
+    /// Decides who gets one.
+    Choose(Choice),
+    /// Traces some of what was allocated: after [`Step::Choose`] at most so much.
     Listed(PathRange),
 }
 
 impl Step {
-    /// Paths that it traces.
+    /// Paths that it traces, at most.
     pub fn paths(&self) -> u64 {
         match self {
-            Self::Start | Self::Allocate(_) => 0,
+            Self::Start | Self::Allocate(_) | Self::Choose(_) => 0,
             Self::Uniform(b) => u64::from(b.pixels) * u64::from(b.samples),
             Self::Listed(r) => u64::from(r.paths),
         }
@@ -88,17 +109,17 @@ pub struct Progress {
 
 /// The whole of a render: first `min_spp` samples for every pixel, in an order that refines the picture evenly, then
 /// rounds that place the rest.
-pub fn steps(settings: &Settings, learns: bool, cut: &Cut) -> Vec<Step> {
+pub fn steps(settings: &Settings, cut: &Cut) -> Vec<Step> {
     let mut steps = vec![Step::Start];
     steps.extend(uniform(cut, settings.first_sample, first_spp(settings)).into_iter().map(Step::Uniform));
-    steps.extend(rounds(settings, learns, cut, 0));
+    steps.extend(rounds(settings, cut, 0));
     steps
 }
 
 /// The rest of a render whose pixels, their statistics and what they lack were handed back.
-pub fn rest(settings: &Settings, learns: bool, cut: &Cut, progress: Progress) -> Vec<Step> {
+pub fn rest(settings: &Settings, cut: &Cut, progress: Progress) -> Vec<Step> {
     let mut steps = deal(progress.pending, 1, cut.paths);
-    steps.extend(rounds(settings, learns, cut, progress.allocations));
+    steps.extend(rounds(settings, cut, progress.allocations));
     steps
 }
 
@@ -110,9 +131,10 @@ pub fn first_spp(settings: &Settings) -> u32 {
     }
 }
 
-/// Largest number of samples of a pixel.
+/// Largest number of samples of a pixel; where samples are chosen, of those that a threshold decides.
 pub fn limit(settings: &Settings) -> u32 {
-    match (settings.allocate.max_spp, settings.allocate.noise_threshold > 0.0) {
+    let chosen = settings.allocate.placing() == Placing::Chosen;
+    match (settings.allocate.max_spp, settings.allocate.noise_threshold > 0.0 || chosen) {
         (0, true) => settings.spp,
         (0, false) => Settings::MAX_SPP,
         (max, _) => max,
@@ -134,7 +156,27 @@ fn allocations(settings: &Settings, learns: bool) -> u32 {
     }
 }
 
-fn rounds(settings: &Settings, learns: bool, cut: &Cut, done: u32) -> Vec<Step> {
+fn rounds(settings: &Settings, cut: &Cut, done: u32) -> Vec<Step> {
+    match settings.allocate.placing() {
+        Placing::Chosen => choices(settings, cut, done),
+        placing => allocated(settings, placing == Placing::Learning, cut, done),
+    }
+}
+
+/// As the paper has it: the threshold is 1 after the least number of samples and falls to 0 at the largest.
+fn choices(settings: &Settings, cut: &Cut, done: u32) -> Vec<Step> {
+    let (least, most) = (first_spp(settings), limit(settings));
+    let mut steps = Vec::new();
+    for round in least + done..settings.spp {
+        let falling = 1.0 - (round - least) as f32 / most.saturating_sub(least).max(1) as f32;
+        let threshold = if round < most { falling } else { 0.0 };
+        steps.push(Step::Choose(Choice { pixels: cut.pixels, round, threshold }));
+        steps.extend(deal(u64::from(cut.pixels), 1, cut.paths));
+    }
+    steps
+}
+
+fn allocated(settings: &Settings, learns: bool, cut: &Cut, done: u32) -> Vec<Step> {
     let first = u64::from(first_spp(settings)) * u64::from(cut.pixels);
     let rest = budget(settings, cut.pixels).saturating_sub(first);
     if rest == 0 {
@@ -267,28 +309,28 @@ mod tests {
 
     #[test]
     fn all_of_the_budget_is_traced_and_no_more() {
-        for (policy, learns) in [("geometry", false), ("variance", true)] {
+        for policy in ["geometry", "variance"] {
             for (spp, min, rounds) in [(4, 1, 1), (4, 4, 3), (1, 2, 1), (7, 0, 5), (3, 1, 300)] {
-                let all = steps(&settings(policy, spp, min, 0, rounds), learns, &CUT);
+                let all = steps(&settings(policy, spp, min, 0, rounds), &CUT);
                 let (traced, allocated) = sums(&all);
                 assert_eq!(traced, 65 * u64::from(spp), "{policy} {spp} {min} {rounds}");
                 assert_eq!(allocated, 65 * u64::from(spp - min.min(spp)));
             }
         }
-        let capped = steps(&settings("variance", 8, 2, 5, 4), true, &CUT);
+        let capped = steps(&settings("variance", 8, 2, 5, 4), &CUT);
         assert_eq!(sums(&capped), (65 * 5, 65 * 3), "no more than there is room");
-        assert_eq!(sums(&steps(&settings("uniform", 3, 2, 0, 4), false, &CUT)), (65 * 3, 0));
+        assert_eq!(sums(&steps(&settings("uniform", 3, 2, 0, 4), &CUT)), (65 * 3, 0));
     }
 
     #[test]
     fn what_is_left_is_the_rest() {
         let s = settings("variance", 8, 2, 0, 3);
-        let whole = steps(&s, true, &CUT);
-        let first_round = rounds(&s, true, &CUT, 0);
+        let whole = steps(&s, &CUT);
+        let first_round = rounds(&s, &CUT, 0);
         assert!(whole.ends_with(&first_round));
-        let rest = rest(&s, true, &CUT, Progress { allocations: 1, pending: 40 });
+        let rest = rest(&s, &CUT, Progress { allocations: 1, pending: 40 });
         assert_eq!(rest.iter().take(3).map(Step::paths).collect::<Vec<_>>(), [17, 17, 6]);
-        assert_eq!(rest[3..], rounds(&s, true, &CUT, 1)[..]);
+        assert_eq!(rest[3..], rounds(&s, &CUT, 1)[..]);
     }
 
     #[test]
@@ -303,9 +345,22 @@ mod tests {
     }
 
     #[test]
+    fn a_threshold_falls_from_one_and_is_followed_by_chance() {
+        let all = steps(&settings("threshold", 8, 2, 6, 4), &CUT);
+        let chosen = |s: &Step| if let Step::Choose(c) = s { Some((c.round, c.threshold)) } else { None };
+        let rounds: Vec<_> = all.iter().filter_map(chosen).collect();
+        assert_eq!(rounds, [(2, 1.0), (3, 0.75), (4, 0.5), (5, 0.25), (6, 0.0), (7, 0.0)]);
+        assert_eq!(sums(&all), (65 * 8, 0), "everyone may be chosen every time");
+        let rest = rest(&settings("threshold", 8, 2, 6, 4), &CUT, Progress { allocations: 5, pending: 0 });
+        assert_eq!(rest.iter().filter_map(chosen).collect::<Vec<_>>(), [(7, 0.0)]);
+        let range = PathRange { first: 17, paths: 17, round: 0, rounds: 1 };
+        assert_eq!([0, 17, 18, 99].map(|n| range.within(n).map(|r| r.paths)), [None, None, Some(1), Some(17)]);
+    }
+
+    #[test]
     fn budgets_beyond_32_bits_are_kept() {
         let cut = Cut { pixels: 1 << 20, tile: 1 << 28, paths: 1 << 30 };
-        let all = steps(&settings("geometry", 1 << 16, 0, 0, 2), false, &cut);
+        let all = steps(&settings("geometry", 1 << 16, 0, 0, 2), &cut);
         assert_eq!(sums(&all), (1 << 36, 1 << 36));
     }
 }

@@ -1,5 +1,6 @@
 //! Every choice a user makes about a render: default, unit and range in one place. The command line and the `[render]`
 //! table of a scene file fill the same struct; [`Settings::validate`] is the only check.
+pub use crate::allocate::Placing;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -81,11 +82,16 @@ impl Allocate {
         names.join(", ")
     }
 
+    /// What becomes of the policy's priorities.
+    pub fn placing(&self) -> Placing {
+        crate::allocate::policy(&self.policy).map_or(Placing::Once, |row| row.placing)
+    }
+
     fn validate(&self) -> Result<()> {
         let Some(row) = crate::allocate::policy(&self.policy) else {
             return Err(Error::Usage(format!("no policy \"{}\": choose one of {}", self.policy, Self::names())));
         };
-        if self.noise_threshold > 0.0 && !row.learns {
+        if self.noise_threshold > 0.0 && row.placing != Placing::Learning {
             let name = row.name;
             return Err(Error::Usage(format!(
                 "noise-threshold needs a policy that learns, variance or both: not {name}"

@@ -71,8 +71,7 @@ fn the_budget_is_met_and_no_cut_changes_a_bit() {
         );
         let pixels = SIZE[0] * SIZE[1];
         for paths in [31, 64, 65, 500, pixels] {
-            let learns = policy != "geometry";
-            let steps = schedule::steps(&scene.settings, learns, &Cut { pixels, tile: 1 << 20, paths });
+            let steps = schedule::steps(&scene.settings, &Cut { pixels, tile: 1 << 20, paths });
             assert!(steps.len() > renderer.steps().len());
             assert!(bits(&run(&renderer, &mut frame, &steps)) == bits(&whole), "{policy}, batches of {paths}");
         }
@@ -82,6 +81,42 @@ fn the_budget_is_met_and_no_cut_changes_a_bit() {
             range.paths -= 1;
         }
         assert!(bits(&run(&renderer, &mut frame, &steps)) != bits(&whole), "{policy}");
+    }
+    assert_silent(&gpu);
+}
+
+/// RAS as published: at most one sample a round, the same bits for every batch size, and by chance in the end.
+#[test]
+fn a_falling_threshold_gives_at_most_one_sample_a_round() {
+    let gpu = gpu();
+    let with = |spp| {
+        scene(move |s| {
+            (s.spp, s.allocate.policy, s.allocate.min_spp, s.allocate.max_spp) = (spp, "threshold".into(), 2, 16);
+        })
+    };
+    let counts = |pixels: &[Pixel]| pixels.iter().map(|p| p.stats.count).collect::<Vec<_>>();
+    let (frozen, scene) = (counts(&render(&gpu, &with(16))), with(80));
+    assert!(frozen.iter().all(|n| (2..=16).contains(n)), "{frozen:?}");
+    let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let whole = run(&renderer, &mut frame, &renderer.steps());
+    let later: Vec<u32> = counts(&whole).iter().zip(&frozen).map(|(all, before)| all - before).collect();
+    // Each of 64 rounds is a chance of n / 16: binomial, and independent from pixel to pixel. The sum of squared
+    // deviations over their variances is chi-square; pixels with all 16 samples get one every time.
+    let certain = frozen.iter().zip(&later).filter(|&(&n, _)| n == 16);
+    assert!(certain.clone().all(|(_, &n)| n == 64));
+    let (mut chi, mut freedom) = (0.0, 0.0);
+    for (&n, &got) in frozen.iter().zip(&later).filter(|&(&n, _)| n < 16) {
+        let p = f64::from(n) / 16.0;
+        chi += (f64::from(got) - 64.0 * p).powi(2) / (64.0 * p * (1.0 - p));
+        freedom += 1.0;
+    }
+    assert!(freedom > 100.0 && certain.count() > 0, "all alike: the test tests nothing");
+    assert!((chi - freedom).abs() < 5.0 * f64::sqrt(2.0 * freedom), "chi-square {chi} of {freedom}");
+    for paths in [64, 65, SIZE[0] * SIZE[1]] {
+        let cut = Cut { pixels: SIZE[0] * SIZE[1], tile: 1 << 20, paths };
+        let steps = schedule::steps(&scene.settings, &cut);
+        assert!(bits(&run(&renderer, &mut frame, &steps)) == bits(&whole), "batches of {paths}");
     }
     assert_silent(&gpu);
 }
@@ -102,10 +137,7 @@ fn batches_of_one_path_and_rounds_in_any_number_or_order_change_no_bit() {
     let (scene, cut) = (with(4), Cut { pixels: 35, tile: 1 << 20, paths: 1 });
     let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
-    assert!(
-        bits(&run(&renderer, &mut frame, &schedule::steps(&scene.settings, false, &cut))) == bits(&whole),
-        "one path"
-    );
+    assert!(bits(&run(&renderer, &mut frame, &schedule::steps(&scene.settings, &cut))) == bits(&whole), "one path");
     // The rounds backwards: a pixel's next sample is its next, whichever round asks for it.
     let mut steps = renderer.steps();
     let first = steps.iter().position(|s| matches!(s, Step::Listed(_))).unwrap();
@@ -117,10 +149,11 @@ fn batches_of_one_path_and_rounds_in_any_number_or_order_change_no_bit() {
 /// What an interrupted render hands over: pixels, and what each still lacks.
 fn interrupted(renderer: &Renderer, frame: &mut FrameResources, steps: &[Step]) -> (Vec<Pixel>, Vec<u32>, u32) {
     let pixels = run(renderer, frame, steps);
-    let allocations = steps.iter().filter(|s| matches!(s, Step::Allocate(_))).count() as u32;
+    let decides = |s: &&Step| matches!(s, Step::Allocate(_) | Step::Choose(_));
+    let allocations = steps.iter().filter(decides).count() as u32;
     let last = steps.iter().rev().find_map(|step| match step {
         Step::Listed(range) => Some(Some(*range)),
-        Step::Allocate(_) => Some(None),
+        Step::Allocate(_) | Step::Choose(_) => Some(None),
         _ => None,
     });
     let Some(last) = last else {
@@ -138,20 +171,25 @@ fn interrupted(renderer: &Renderer, frame: &mut FrameResources, steps: &[Step]) 
 #[test]
 fn a_render_resumed_anywhere_has_the_bits_of_one_that_never_stopped() {
     let gpu = gpu();
-    for policy in ["uniform", "geometry", "variance", "both"] {
-        let scene = scene(|s| s.allocate.policy = policy.into());
+    for policy in ["uniform", "geometry", "variance", "both", "threshold"] {
+        let scene = scene(|s| {
+            s.allocate.policy = policy.into();
+            // The last three of 8 rounds are left to chance.
+            s.allocate.max_spp = if policy == "threshold" { 5 } else { 0 };
+        });
         let whole = render(&gpu, &scene);
         let effects = tallow::gpu::layout::Effects { adaptive: true, ..tallow::renderer::called_for(&scene, split()) };
         let renderer = Renderer::specialised(&gpu, &scene, split(), effects).unwrap();
         let mut frame = FrameResources::new(&gpu).unwrap();
         let cut = Cut { pixels: SIZE[0] * SIZE[1], tile: 1 << 20, paths: 300 };
-        let steps = schedule::steps(&scene.settings, matches!(policy, "variance" | "both"), &cut);
+        let steps = schedule::steps(&scene.settings, &cut);
         for stop in [1, 2, 3, steps.len() / 2, steps.len() - 2, steps.len()] {
             let (pixels, lacks, allocations) = interrupted(&renderer, &mut frame, &steps[..stop]);
             let stats: Vec<PixelStats> = pixels.iter().map(|p| p.stats).collect();
             let light: Vec<PixelLight> = pixels.iter().map(|p| p.light).collect();
             let pending = lacks.iter().map(|&n| u64::from(n)).sum();
-            renderer.resume(&mut frame, &stats, &light, &lacks).unwrap();
+            let priority = if allocations > 0 { renderer.film().priority.read().unwrap() } else { Vec::new() };
+            renderer.resume(&mut frame, &stats, &light, &priority, &lacks).unwrap();
             let rest = renderer.rest(Progress { allocations, pending });
             assert!(bits(&run(&renderer, &mut frame, &rest)) == bits(&whole), "{policy}, stopped after step {stop}");
         }

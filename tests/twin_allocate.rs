@@ -5,13 +5,15 @@ mod support;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 use support::{assert_silent, gpu, words};
-use tallow::allocate::{HostInputs, Inputs, POLICIES};
+use tallow::allocate::{HostInputs, Inputs, POLICIES, Placing, policy};
 use tallow::gpu::layout::*;
 use tallow::gpu::{Buffer, FrameResources, Gpu, Kernel, Location};
 use tallow::reference::apportion as twin;
-use tallow::schedule::{PathRange, Plan};
+use tallow::schedule::{Choice, PathRange, Plan};
+use tallow::stage::PerThread;
 use tallow::stage::apportion::{Apportion, Counts};
 use tallow::stage::batch::{self, Batches};
+use tallow::stage::choose::{self, Choose};
 use tallow::stage::scan::Scan;
 
 /// Around a thread's items, a workgroup's threads and a block.
@@ -238,20 +240,70 @@ fn policies_agree_with_their_references() {
                 limit: 5,
                 threshold,
                 filtered: 0.9,
+                round: 0,
             };
             for row in POLICIES {
                 let policy = (row.make)(&gpu, pixels as u32, 32).unwrap();
                 let inputs = Inputs { guide: &guides, stats: &statistics, priority: &priority };
                 gpu.run(&mut frame, |rec| policy.record(rec, &inputs, &push)).unwrap();
-                let (found, expected) =
-                    (priority.read().unwrap(), (row.reference)(&HostInputs { guide: &guide, stats: &stats, push }));
+                let (found, expected) = (
+                    priority.read().unwrap(),
+                    (row.reference)(&HostInputs { guide: &guide, stats: &stats, priority: &[], push }),
+                );
                 for (i, (a, b)) in found.iter().zip(&expected).enumerate() {
                     // Importance is exact on every device; roots and quotients are not.
-                    let same = if row.learns { (a - b).abs() <= 1e-5 * b } else { a == b };
+                    let same = if row.placing != Placing::Once { (a - b).abs() <= 1e-5 * b } else { a == b };
                     assert!(same && a.is_finite(), "{} {width}x{height} pixel {i}: {a} {b}", row.name);
                 }
             }
         }
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn one_sample_or_none_agrees_with_its_reference() {
+    let gpu = gpu();
+    let choose: Choose = PerThread::new(&gpu, &Effects::default(), 32).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    for size in SIZES {
+        let odd = |i: usize| [f32::NAN, f32::INFINITY, -1.0, 0.0, 1.0, 0.999_999_94, 0.5, 1e-30][i % 8];
+        let priority: Vec<f32> = priorities(size, 2)
+            .iter()
+            .enumerate()
+            .map(|(i, p)| if i % 3 == 0 { odd(i / 3) } else { p / 1100.0 })
+            .collect();
+        let on_device = Buffer::from_slice(&gpu, "priority", &priority).unwrap();
+        let counts = Counts::new(&gpu, size as u32).unwrap();
+        for (round, threshold) in [(3, 1.0), (4, 0.25), (17, 0.0), (u32::MAX, 0.0)] {
+            let choice = Choice { pixels: size as u32, round, threshold };
+            gpu.run(&mut frame, |rec| choose::record(&choose, rec, &on_device, &counts, &choice, 7)).unwrap();
+            assert_eq!(counts.count.read().unwrap(), twin::choose(&priority, round, 7, threshold), "{size} {choice:?}");
+        }
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn a_frozen_probability_is_the_share_of_samples_and_stays() {
+    let gpu = gpu();
+    let row = policy("threshold").unwrap();
+    let stats: Vec<_> = (0..65).map(|count| PixelStats { count, ..PixelStats::default() }).collect();
+    let kept: Vec<f32> = (0..65).map(|i| i as f32).collect();
+    let buffers = (
+        Buffer::from_slice(&gpu, "stats", &stats).unwrap(),
+        Buffer::from_slice(&gpu, "priority", &kept).unwrap(),
+        Buffer::new(&gpu, "guide", 1, Location::Device).unwrap(),
+    );
+    let policy = (row.make)(&gpu, 65, 32).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    for round in [64, 63, 65] {
+        let push = PriorityPush { size: [65, 1], limit: 64, round, ..PriorityPush::default() };
+        let before = buffers.1.read().unwrap();
+        let inputs = Inputs { guide: &buffers.2, stats: &buffers.0, priority: &buffers.1 };
+        gpu.run(&mut frame, |rec| policy.record(rec, &inputs, &push)).unwrap();
+        let host = HostInputs { guide: &[], stats: &stats, priority: &before, push };
+        assert_eq!(buffers.1.read().unwrap(), (row.reference)(&host), "round {round}");
     }
     assert_silent(&gpu);
 }

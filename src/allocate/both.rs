@@ -1,6 +1,6 @@
 //! Geometry first, noise as it becomes known, less what a filter will remove. Kernel: `glsl/both.comp`.
 use super::geometry::Geometry;
-use super::{HostInputs, Inputs, Policy, Row, geometry, variance};
+use super::{HostInputs, Inputs, Placing, Policy, Row, geometry, variance};
 use crate::error::Result;
 use crate::gpu::layout::{Effects, PriorityPush};
 use crate::gpu::{Buffer, Gpu, Location, Recorder};
@@ -11,7 +11,7 @@ pub(super) const ROW: Row = Row {
     name: "both",
     about: "noise that the samples show, less what a geometry-aware filter will remove; geometry until samples tell",
     guides: true,
-    learns: true,
+    placing: Placing::Learning,
     make: |gpu, pixels, workgroup| Ok(Box::new(Both::new(gpu, pixels, workgroup)?)),
     reference,
 };

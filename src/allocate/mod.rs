@@ -1,11 +1,12 @@
 //! What makes a pixel worth samples: one file per policy, one row in [`POLICIES`]. A policy writes a priority per pixel;
-//! `stage::apportion` turns priorities into counts that sum to the budget exactly.
+//! `stage::apportion` turns priorities into counts that sum to the budget exactly, `stage::choose` into one sample or none.
 use crate::error::Result;
 use crate::gpu::layout::{Guide, PixelStats, PriorityPush};
 use crate::gpu::{Buffer, Gpu, Recorder};
 
 pub mod both;
 pub mod geometry;
+pub mod threshold;
 pub mod uniform;
 pub mod variance;
 
@@ -36,8 +37,22 @@ pub struct HostInputs<'a> {
     pub guide: &'a [Guide],
     /// Of every pixel.
     pub stats: &'a [PixelStats],
+    /// Those of the round before.
+    pub priority: &'a [f32],
     /// What the kernel gets.
     pub push: PriorityPush,
+}
+
+/// What priorities mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Placing {
+    /// Shares of the budget, found once.
+    Once,
+    /// Shares of all samples, past and next, found anew for every round.
+    Learning,
+    /// Every round, pixels whose priority reaches a threshold get a sample; after the last threshold priorities are
+    /// probabilities.
+    Chosen,
 }
 
 /// One policy.
@@ -48,9 +63,8 @@ pub struct Row {
     pub about: &'static str,
     /// Whether it reads primary hits.
     pub guides: bool,
-    /// Whether it reads statistics: its priorities are then shares of all samples, past and next, and are found anew
-    /// for every round. Those of the others are found once, for the whole budget.
-    pub learns: bool,
+    /// What becomes of its priorities.
+    pub placing: Placing,
     /// Compiles it for a film of so many pixels, with so many threads per workgroup.
     pub make: fn(&Gpu, pixels: u32, workgroup: u32) -> Result<Box<dyn Policy>>,
     /// The kernel's twin.
@@ -58,7 +72,7 @@ pub struct Row {
 }
 
 /// Every policy, in the order of the help.
-pub const POLICIES: &[Row] = &[uniform::ROW, geometry::ROW, variance::ROW, both::ROW];
+pub const POLICIES: &[Row] = &[uniform::ROW, geometry::ROW, variance::ROW, both::ROW, threshold::ROW];
 
 /// The policy of this name.
 pub fn policy(name: &str) -> Option<&'static Row> {

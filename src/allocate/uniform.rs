@@ -1,5 +1,5 @@
 //! The same for every pixel: what the others are measured against.
-use super::{HostInputs, Inputs, Policy, Row};
+use super::{HostInputs, Inputs, Placing, Policy, Row};
 use crate::error::Result;
 use crate::gpu::Recorder;
 use crate::gpu::layout::PriorityPush;
@@ -8,7 +8,7 @@ pub(super) const ROW: Row = Row {
     name: "uniform",
     about: "the same number for every pixel",
     guides: false,
-    learns: false,
+    placing: Placing::Once,
     make: |_, _, _| Ok(Box::new(Uniform)),
     reference,
 };

@@ -1,5 +1,5 @@
 //! RAS, kept up to date: the noise that the samples show. Kernel: `glsl/variance.comp`.
-use super::{HostInputs, Inputs, Policy, Row};
+use super::{HostInputs, Inputs, Placing, Policy, Row};
 use crate::error::Result;
 use crate::gpu::Recorder;
 use crate::gpu::layout::{Effects, PixelStats, PriorityPush};
@@ -10,7 +10,7 @@ pub(super) const ROW: Row = Row {
     name: "variance",
     about: "more where samples differ, relative to their luminance, estimated anew every round (RAS)",
     guides: false,
-    learns: true,
+    placing: Placing::Learning,
     make: |gpu, _, workgroup| Ok(Box::new(Variance(PerThread::new(gpu, &Effects::default(), workgroup)?))),
     reference,
 };
@@ -27,7 +27,7 @@ impl Policy for Variance {
 }
 
 /// Squared deviations summed (mean over channels), degrees of freedom, luminance times samples, samples.
-fn moments(s: &PixelStats) -> [f32; 4] {
+pub(super) fn moments(s: &PixelStats) -> [f32; 4] {
     if s.count == 0 {
         return [0.0; 4];
     }
@@ -75,10 +75,11 @@ mod tests {
         limit: 100,
         threshold: 0.0,
         filtered: 0.0,
+        round: 0,
     };
 
     fn of_one(stats: PixelStats, push: PriorityPush) -> f32 {
-        reference(&HostInputs { guide: &[], stats: &[stats], push })[0]
+        reference(&HostInputs { guide: &[], stats: &[stats], priority: &[], push })[0]
     }
 
     #[test]

@@ -81,17 +81,26 @@ impl Job<'_> {
         }
         let threshold = r.settings().allocate.noise_threshold > 0.0;
         let mut progress = Progress::new(steps.iter().map(Step::paths).sum(), self.quiet);
-        for (i, step) in steps.iter().enumerate() {
+        let mut listed = u64::MAX;
+        for (i, &planned) in steps.iter().enumerate() {
             if self.stop.load(Ordering::SeqCst) {
                 end.why = Why::Interrupted;
                 break;
             }
-            end.times.extend(r.run(frame, step)?);
-            end.traced += step.paths();
+            let step = match planned {
+                Step::Listed(range) => range.within(listed).map(Step::Listed),
+                step => Some(step),
+            };
+            if let Some(step) = &step {
+                end.times.extend(r.run(frame, step)?);
+                end.traced += step.paths();
+            }
+            if let Some(Step::Allocate(_) | Step::Choose(_)) = step {
+                end.allocations += 1;
+                end.last = Some(nothing_yet(&steps[i + 1..]));
+            }
             match step {
-                Step::Allocate(_) => {
-                    end.allocations += 1;
-                    end.last = Some(nothing_yet(&steps[i + 1..]));
+                Some(Step::Allocate(_)) => {
                     let state = r.apportionment()?;
                     end.broken_priorities = end.broken_priorities.max(state.non_finite);
                     if threshold && state.wanting == 0 {
@@ -99,11 +108,12 @@ impl Job<'_> {
                         break;
                     }
                 }
-                Step::Listed(range) => end.last = Some(*range),
-                Step::Start | Step::Uniform(_) => {}
+                Some(Step::Choose(_)) => listed = r.listed()?,
+                Some(Step::Listed(range)) => end.last = Some(range),
+                Some(Step::Start | Step::Uniform(_)) | None => {}
             }
             let counters = if r.outputs().counters { r.counters()? } else { Counters::default() };
-            progress.add(step.paths(), counters.rays() - rays);
+            progress.add(planned.paths(), counters.rays() - rays);
             rays = counters.rays();
         }
         progress.finish();

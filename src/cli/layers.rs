@@ -10,6 +10,9 @@ use bytemuck::Pod;
 const RGB: [&str; 3] = ["R", "G", "B"];
 const XYZ: [&str; 3] = ["X", "Y", "Z"];
 
+/// What the policy said last: only in files of renders that place samples.
+pub const PRIORITY: &str = "priority";
+
 /// Samples that a pixel still lacks of what it was to have: only in files of renders that were interrupted.
 pub const PENDING: &str = "pending";
 
@@ -25,7 +28,7 @@ pub fn film(renderer: &Renderer) -> Result<Film> {
     let light = if outputs.split_light { gather(tiles, |tile| &tile.light)? } else { Vec::new() };
     add_pixels(&mut film, &stats, &light);
     if settings.allocate.policy != "uniform" {
-        film.add("priority", Samples::F32(renderer.film().priority.read()?));
+        film.add(PRIORITY, Samples::F32(renderer.film().priority.read()?));
     }
     if outputs.guides {
         add_guide(&mut film, &gather(tiles, |tile| &tile.guide)?);

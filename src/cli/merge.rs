@@ -90,6 +90,6 @@ fn merged(parts: Vec<Part>) -> Result<Film> {
         pixels.iter_mut().zip(&part.pixels).for_each(|(a, b)| *a = join(a, b));
     }
     layers::replace_pixels(&mut film, &pixels);
-    film.channels.retain(|c| c.name != layers::PENDING && c.name != "priority");
+    film.channels.retain(|c| c.name != layers::PENDING && c.name != layers::PRIORITY);
     Ok(film)
 }

@@ -1,5 +1,5 @@
 //! Settings that the command line gives over those of the scene file.
-use crate::allocate::{POLICIES, policy};
+use crate::allocate::{POLICIES, Placing};
 use crate::settings::{Allocate, PixelFilter, Sampler, Settings};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 
@@ -84,7 +84,7 @@ fn policies() -> PossibleValuesParser {
 
 impl AllocateOverrides {
     fn apply(&self, settings: &mut Allocate) {
-        let learns = policy(&settings.policy).is_some_and(|row| row.learns);
+        let learns = settings.placing() == Placing::Learning;
         if self.allocate.is_none() && self.noise_threshold.is_some_and(|e| e > 0.0) && !learns {
             settings.policy = "variance".into();
         }

@@ -4,7 +4,7 @@ use super::layers;
 use crate::error::{Error, Result};
 use crate::gpu::FrameResources;
 use crate::gpu::layout::{PixelLight, PixelStats};
-use crate::image::{self, Film};
+use crate::image::{self, Film, Samples};
 use crate::renderer::{Progress, Renderer, Step};
 use crate::schedule;
 use crate::settings::Settings;
@@ -20,6 +20,7 @@ pub struct Earlier {
     /// Where it stopped.
     pub progress: Progress,
     pixels: Vec<Pixel>,
+    priority: Vec<f32>,
     pending: Vec<u32>,
 }
 
@@ -57,7 +58,11 @@ impl Earlier {
         };
         let allocations = film.metadata.get(ALLOCATIONS).and_then(|n| n.parse().ok()).unwrap_or(0);
         let progress = Progress { allocations, pending: pending.iter().map(|&n| u64::from(n)).sum() };
-        Ok(Self { progress, pixels, pending })
+        let priority = match film.channel(layers::PRIORITY) {
+            Some(Samples::F32(priority)) => priority.clone(),
+            _ => Vec::new(),
+        };
+        Ok(Self { progress, pixels, priority, pending })
     }
 
     /// Puts it into the renderer's buffers and returns the steps that are left.
@@ -67,7 +72,7 @@ impl Earlier {
     pub fn put_back(&self, renderer: &Renderer, frame: &mut FrameResources) -> Result<Vec<Step>> {
         let stats: Vec<PixelStats> = self.pixels.iter().map(|p| p.stats).collect();
         let light: Vec<PixelLight> = self.pixels.iter().map(|p| p.light).collect();
-        renderer.resume(frame, &stats, &light, &self.pending)?;
+        renderer.resume(frame, &stats, &light, &self.priority, &self.pending)?;
         Ok(renderer.rest(self.progress))
     }
 }

@@ -1,11 +1,21 @@
 //! Twins of the kernels that apportion, scan and batch: plain, with 128-bit products and a sort. They agree with `==`.
 use crate::gpu::layout::NONE;
+use crate::reference::sampler::pcg;
 
 /// Priorities as 12.20 fixed point, and how many of them are not finite (they weigh nothing).
 pub fn weigh(priority: &[f32]) -> (Vec<u32>, u32) {
     let weight = |p: &f32| if p.is_finite() && *p > 0.0 { (p.min(4095.0) * 1_048_576.0) as u32 } else { 0 };
     let broken = priority.iter().filter(|p| !p.is_finite()).count();
     (priority.iter().map(weight).collect(), broken as u32)
+}
+
+/// One sample or none for every pixel, in a round: where the priority reaches the threshold, or, without one, by chance.
+pub fn choose(priority: &[f32], round: u32, seed: u32, threshold: f32) -> Vec<u32> {
+    let chosen = |(i, &p): (usize, &f32)| match threshold > 0.0 {
+        true => p >= threshold,
+        false => f64::from(pcg(pcg(i as u32 ^ seed).wrapping_add(round))) < (f64::from(p) * 4_294_967_296.0).floor(),
+    };
+    priority.iter().enumerate().map(chosen).map(u32::from).collect()
 }
 
 /// What pixels lack of their shares of `total` samples: max(0, floor(total * w / W) - have).

@@ -5,6 +5,7 @@ use crate::gpu::{Bindings, Gpu, Kernel, Recorder};
 
 pub mod apportion;
 pub mod batch;
+pub mod choose;
 pub mod fold;
 pub mod guide;
 pub mod path;

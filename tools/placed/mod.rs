@@ -65,18 +65,28 @@ pub fn render(gpu: &Gpu, scene: &Scene) -> anyhow::Result<Rendered> {
     let mut frame = FrameResources::new(gpu)?;
     let steps = renderer.steps();
     let of_kind = |kind: fn(&Step) -> bool| steps.iter().find(move |s| kind(s));
-    let kinds: [fn(&Step) -> bool; 4] = [
+    let kinds: [fn(&Step) -> bool; 5] = [
         |s| matches!(s, Step::Start),
         |s| matches!(s, Step::Uniform(_)),
         |s| matches!(s, Step::Allocate(_)),
+        |s| matches!(s, Step::Choose(_)),
         |s| matches!(s, Step::Listed(_)),
     ];
     for step in kinds.into_iter().filter_map(of_kind) {
         renderer.run(&mut frame, step)?;
     }
-    let (mut ns, mut path_ns) = (0, 0);
-    for step in &steps {
-        for pass in renderer.run(&mut frame, step)?.iter().filter(|p| p.name != "guide") {
+    let (mut ns, mut path_ns, mut listed) = (0, 0, u64::MAX);
+    for &step in &steps {
+        let step = match step {
+            Step::Listed(range) => range.within(listed).map(Step::Listed),
+            step => Some(step),
+        };
+        let Some(step) = step else { continue };
+        let passes = renderer.run(&mut frame, &step)?;
+        if matches!(step, Step::Choose(_)) {
+            listed = renderer.listed()?;
+        }
+        for pass in passes.iter().filter(|p| p.name != "guide") {
             let took = pass.end_ns - pass.begin_ns;
             ns += took;
             path_ns += if matches!(pass.name, "path" | "fold") { took } else { 0 };

@@ -10,18 +10,19 @@ const VIEWS: [View; 2] = [
     View { name: "cornell", scene: "scenes/cornell-box/scene.toml", size: [96, 96], depth: 4, reference: 1024 },
     View { name: "sponza", scene: "crytek-sponza", size: [112, 63], depth: 4, reference: 1024 },
 ];
-const BUDGETS: [u32; 4] = [4, 8, 16, 32];
-/// (name, policy, least, most); most 0 is unlimited.
-const POLICIES: [(&str, &str, u32, u32); 8] = [
-    ("uniform", "uniform", 0, 0),
-    ("min 2", "variance", 2, 0),
-    ("min 2, max 16", "variance", 2, 16),
-    ("min 2, max 32", "variance", 2, 32),
-    ("min 4, max 16", "variance", 4, 16),
-    ("min 4, max 32", "variance", 4, 32),
-    ("min 8, max 32", "variance", 8, 32),
-    ("min 4, max 64", "variance", 4, 64),
-];
+/// Samples per pixel on average; of the published scheme, rounds of one sample at most.
+const BUDGETS: [u32; 4] = [8, 16, 32, 64];
+/// The least and the most samples, as published.
+const LIMITS: [(u32, u32); 6] = [(2, 16), (4, 16), (8, 16), (2, 32), (4, 32), (8, 32)];
+
+/// (name, policy, least, most); most 0 is unlimited. Ours needs no largest number: it is held to the published ones too.
+fn policies() -> Vec<(String, &'static str, u32, u32)> {
+    let plain = [("uniform", "uniform", 0, 0), ("ours: min 4", "variance", 4, 0)];
+    let limited = |(kind, policy)| move |(min, max)| (format!("{kind}: min {min}, max {max}"), policy, min, max);
+    let plain = plain.map(|(name, policy, min, max)| (name.to_owned(), policy, min, max)).into_iter();
+    let all = [("published", "threshold"), ("ours", "variance")];
+    plain.chain(all.into_iter().flat_map(|of| LIMITS.map(limited(of)))).collect()
+}
 
 /// Variance over the pixels of the distance between colour and reference.
 fn spread(image: &[vec3], reference: &[vec3]) -> f64 {
@@ -36,9 +37,10 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
     for view in &VIEWS {
         let reference = &view.reference(gpu, args, |_| {})?[0];
         let mut lines = Vec::new();
-        for (name, policy, min, max) in POLICIES {
+        for (name, policy, min, max) in policies() {
             let mut line = Vec::new();
-            for spp in BUDGETS.into_iter().filter(|&spp| max == 0 || spp <= max) {
+            let possible = |&spp: &u32| policy == "threshold" || max == 0 || spp <= max;
+            for spp in BUDGETS.into_iter().filter(possible) {
                 let scene = view.load(args, |s| {
                     (s.spp, s.allocate.policy) = (spp, policy.into());
                     (s.allocate.min_spp, s.allocate.max_spp) = (min, max);
@@ -48,16 +50,16 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
             }
             lines.push((name, line));
         }
-        let row = |(name, line): &(&str, Vec<(f64, f64)>)| {
+        let row = |(name, line): &(String, Vec<(f64, f64)>)| {
             let cells = line.iter().map(|(ms, spread)| format!("{spread:.2e} in {ms:.0} ms"));
             let empty = std::iter::repeat_n(String::new(), BUDGETS.len() - line.len());
-            std::iter::once((*name).to_owned()).chain(cells).chain(empty).collect()
+            std::iter::once(name.clone()).chain(cells).chain(empty).collect()
         };
         println!(
             "Spread of the error (variance of the distance to the reference), {} {}x{}\n",
             view.name, view.size[0], view.size[1]
         );
-        let header = ["samples", "4 on average", "8", "16", "32"];
+        let header = ["samples", "8 on average", "16", "32", "64"];
         println!("{}", table::text(&header, &lines.iter().map(row).collect::<Vec<_>>()));
         let file = args.output.join(format!("spread-{}.svg", view.name));
         plot(&file, view.name, &lines).map_err(|e| anyhow::anyhow!("{}: {e}", file.display()))?;
@@ -66,7 +68,7 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-type Lines<'a> = [(&'a str, Vec<(f64, f64)>)];
+type Lines = [(String, Vec<(f64, f64)>)];
 
 fn plot(file: &std::path::Path, scene: &str, lines: &Lines) -> Result<(), Box<dyn std::error::Error>> {
     let points = || lines.iter().flat_map(|(_, line)| line.iter().copied());
@@ -87,7 +89,7 @@ fn plot(file: &std::path::Path, scene: &str, lines: &Lines) -> Result<(), Box<dy
         let colour = Palette99::pick(i).to_rgba();
         chart
             .draw_series(LineSeries::new(line.iter().copied(), colour.stroke_width(2)).point_size(3))?
-            .label(*name)
+            .label(name)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 20, y)], colour));
     }
     chart.configure_series_labels().border_style(BLACK).background_style(WHITE).draw()?;

@@ -21,6 +21,20 @@ gpu_structs! {
         threshold: float,
         /// Share of the variance that a filter takes away where all neighbours are alike, 0 to 1.
         filtered: float,
+        /// Samples that a pixel has had a chance of.
+        round: uint,
+    }
+
+    /// Push constants of the kernel that gives pixels one sample or none.
+    struct ChoosePush {
+        /// Pixels of the film.
+        pixels: uint,
+        /// Samples that a pixel has had a chance of.
+        round: uint,
+        /// Chooses the random sequence.
+        seed: uint,
+        /// Least priority that gets a sample, above 0; 0: priorities are probabilities.
+        threshold: float,
     }
 
     /// Push constants of the kernels that apportion.
