@@ -23,18 +23,22 @@ fn scene_file() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml")
 }
 
-fn small(s: &mut Settings) {
+/// One that decides nothing, one that apportions, and one whose lists are of a length that only the device knows.
+const POLICIES: [&str; 3] = ["uniform", "both", "threshold"];
+
+fn small(s: &mut Settings, policy: &str) {
     (s.width, s.height, s.spp, s.max_depth) = (WIDTH, HEIGHT, SPP, 4);
+    s.allocate.policy = policy.to_owned();
 }
 
 /// The image that the command line writes for the same settings.
-fn command_line() -> Vec<[f32; 3]> {
+fn command_line(policy: &str) -> Vec<[f32; 3]> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("box.exr");
     let [width, height, spp] = [WIDTH, HEIGHT, SPP].map(|n| n.to_string());
     let mut command = Command::new(env!("CARGO_BIN_EXE_tallow"));
     command.arg("render").arg(scene_file()).arg("-o").arg(&file).arg("--quiet").args(["--max-depth", "4"]);
-    command.args(["--width", &width, "--height", &height, "--spp", &spp]);
+    command.args(["--width", &width, "--height", &height, "--spp", &spp, "--allocate", policy]);
     if let Ok(device) = std::env::var("TALLOW_DEVICE") {
         command.args(["--device", &device]);
     }
@@ -60,15 +64,20 @@ fn an_engine_gets_the_bits_of_the_command_line_frame_after_frame() {
     let engine = Engine::new();
     // SAFETY: the engine's handles are valid and outlive what is made from them.
     let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
-    let scene = Scene::load(&scene_file(), &small).unwrap();
+    POLICIES.iter().for_each(|policy| agrees(&engine, &gpu, policy));
+    assert_eq!(engine.messages(), Vec::<String>::new());
+}
+
+fn agrees(engine: &Engine, gpu: &Gpu, policy: &str) {
+    let scene = Scene::load(&scene_file(), &|s| small(s, policy)).unwrap();
     let outputs = Outputs { split_light: true, guides: true, counters: false };
-    let mut renderer = Renderer::new(&gpu, &scene, outputs).unwrap();
-    let mut frame = FrameResources::new(&gpu).unwrap();
+    let mut renderer = Renderer::new(gpu, &scene, outputs).unwrap();
+    let mut frame = FrameResources::new(gpu).unwrap();
     let pixels = (WIDTH * HEIGHT) as usize;
-    let download = Buffer::<vec3>::new(&gpu, "download", pixels, Location::Readback).unwrap();
+    let download = Buffer::<vec3>::new(gpu, "download", pixels, Location::Readback).unwrap();
     let mut record = |renderer: &Renderer| {
         engine.run(|commands| unsafe {
-            let mut rec = Recorder::external(&gpu, &mut frame, commands.as_raw()).unwrap();
+            let mut rec = Recorder::external(gpu, &mut frame, commands.as_raw()).unwrap();
             for step in renderer.steps() {
                 renderer.record(&mut rec, &step).unwrap();
             }
@@ -77,14 +86,13 @@ fn an_engine_gets_the_bits_of_the_command_line_frame_after_frame() {
         });
         download.read().unwrap()
     };
-    let expected = command_line();
+    let expected = command_line(policy);
     for _ in 0..3 {
-        assert!(record(&renderer) == expected, "the engine's pixels are not those of the command line");
+        assert!(record(&renderer) == expected, "{policy}: the engine's pixels are not those of the command line");
     }
     // Control: another camera must change the picture.
     let mut camera = scene.camera;
     camera.position[0] += 0.1;
     renderer.set_camera(camera);
-    assert!(record(&renderer) != expected, "the comparison cannot fail");
-    assert_eq!(engine.messages(), Vec::<String>::new());
+    assert!(record(&renderer) != expected, "{policy}: the comparison cannot fail");
 }

@@ -39,12 +39,13 @@ impl View {
     /// Means of radiance and of indirect irradiance over many samples of another seed, kept in a file.
     pub fn reference(&self, gpu: &Gpu, args: &Args, change: impl Fn(&mut Settings)) -> anyhow::Result<[Vec<vec3>; 2]> {
         let scene = self.load(args, |s| {
-            change(s);
             (s.spp, s.seed, s.allocate.policy) = (self.reference, 1, "uniform".into());
+            change(s);
         })?;
         let [width, height] = self.size;
         let kind = format!("{:?}", scene.settings.filter).to_lowercase();
-        let file = args.output.join(format!("{}-{width}x{height}-{kind}-{}spp.exr", self.name, self.reference));
+        let samples = format!("{}spp-from-{}", self.reference, scene.settings.first_sample);
+        let file = args.output.join(format!("{}-{width}x{height}-{kind}-{samples}.exr", self.name));
         if !file.exists() {
             eprintln!("rendering {}", file.display());
             let pixels = render(gpu, &scene)?.pixels;
@@ -98,13 +99,7 @@ pub fn render(gpu: &Gpu, scene: &Scene) -> anyhow::Result<Rendered> {
     Ok(Rendered { pixels, guide: tile.guide.read()?, ms: ns as f64 * 1e-6, path_ms: path_ns as f64 * 1e-6 })
 }
 
-/// Mean over the channels of the squared difference, pixel by pixel.
-pub fn squared_errors(image: &[vec3], reference: &[vec3]) -> Vec<f64> {
-    let of = |(a, b): (&vec3, &vec3)| (0..3).map(|c| f64::from(a[c] - b[c]).powi(2)).sum::<f64>() / 3.0;
-    image.iter().zip(reference).map(of).collect()
-}
-
-/// The same over the reference's square (relMSE, eps 0.01).
+/// Mean over the channels of the squared difference over the reference's square (relMSE, eps 0.01), pixel by pixel.
 pub fn relative_errors(image: &[vec3], reference: &[vec3]) -> Vec<f64> {
     let of = |(a, b): (&vec3, &vec3)| {
         (0..3).map(|c| f64::from(a[c] - b[c]).powi(2) / (f64::from(b[c]).powi(2) + 0.01)).sum::<f64>() / 3.0
