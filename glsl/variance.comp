@@ -15,5 +15,14 @@ layout(scalar, push_constant) uniform Push { PriorityPush push; };
 
 void main() {
     uint i = thread_index();
-    if (i < push.size.x * push.size.y) priority[i] = noise(i);
+    if (i >= push.size.x * push.size.y) return; // safe: no barrier() follows
+    ivec2 size = ivec2(push.size), at = ivec2(i % push.size.x, i / push.size.x);
+    vec4 around = vec4(0.0);
+    for (int dy = -1; dy <= 1; dy++) {
+        for (int dx = -1; dx <= 1; dx++) {
+            ivec2 q = clamp(at + ivec2(dx, dy), ivec2(0), size - 1);
+            around += moments(uint(q.y * size.x + q.x));
+        }
+    }
+    priority[i] = noise(moments(i), around);
 }

@@ -1,7 +1,7 @@
 // What the samples say of a pixel's noise. Needs `push` (PriorityPush) and `stats`.
 
 // Samples' worth of trust in the noise of the surroundings.
-const float PRIOR_SAMPLES = 4.0;
+const float PRIOR_SAMPLES = 32.0;
 
 float stat(uint pixel, int word) { return uintBitsToFloat(texelFetch(stats, int(7u * pixel) + word).x); }
 
@@ -14,17 +14,9 @@ vec4 moments(uint pixel) {
     return count > 0u ? m : vec4(0.0);
 }
 
-// Standard deviation of one sample over the luminance (RAS), both steadied by the eight neighbours, of which a few
-// samples say more than of the pixel alone: 1 while nothing is known, 0 where the mean is good enough or the pixel full.
-float noise(uint p) {
-    ivec2 size = ivec2(push.size), at = ivec2(p % push.size.x, p / push.size.x);
-    vec4 own = moments(p), around = vec4(0.0);
-    for (int dy = -1; dy <= 1; dy++) {
-        for (int dx = -1; dx <= 1; dx++) {
-            ivec2 q = clamp(at + ivec2(dx, dy), ivec2(0), size - 1);
-            around += moments(uint(q.y * size.x + q.x));
-        }
-    }
+// Standard deviation of one sample over the luminance (RAS), both steadied by the surroundings, `own` included, of which a
+// few samples say more than of the pixel alone: 1 while nothing is known, 0 where the mean is good enough or the pixel full.
+float noise(vec4 own, vec4 around) {
     if (around.y == 0.0) return 1.0;
     float variance = (own.x + PRIOR_SAMPLES * around.x / around.y) / (own.y + PRIOR_SAMPLES);
     float scale = push.luminance_floor < 0.0 ? 1.0 : around.z / around.w + push.luminance_floor;

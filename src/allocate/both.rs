@@ -1,9 +1,12 @@
-//! Geometry first, noise as it becomes known, less what a filter will remove. Kernel: `glsl/both.comp`.
+//! Geometry first, noise as it becomes known, estimated among neighbours that look alike, less what a filter will remove.
+//! Kernel: `glsl/both.comp`.
 use super::geometry::Geometry;
-use super::{HostInputs, Inputs, Placing, Policy, Row, geometry, variance};
+use super::variance::{moments, noise, square};
+use super::{HostInputs, Inputs, Placing, Policy, Row, geometry};
 use crate::error::Result;
-use crate::gpu::layout::{Effects, PriorityPush};
+use crate::gpu::layout::{Effects, Guide, NONE, PriorityPush, vec3};
 use crate::gpu::{Buffer, Gpu, Location, Recorder};
+use crate::reference::exact::{exp_negative, squared_distance};
 use crate::shaders::both::Bind;
 use crate::stage::PerThread;
 
@@ -34,14 +37,58 @@ impl Both {
 
 impl Policy for Both {
     fn record(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
-        self.geometry.record(rec, &Inputs { priority: &self.importance, ..*b }, push)?;
-        let bind = Bind { stats: b.stats, importances: &self.importance, priority: b.priority };
+        if push.filtered > 0.0 {
+            self.geometry.record(rec, &Inputs { priority: &self.importance, ..*b }, push)?;
+        }
+        let bind = Bind { guides: b.guide, stats: b.stats, importances: &self.importance, priority: b.priority };
         self.join.record(rec, bind, push, push.size[0] * push.size[1])
     }
 }
 
+const REACH: i32 = 2;
+
+/// How much a neighbour's noise says of a pixel's, 0 to 1.
+fn kinship(a: &Guide, b: &Guide, push: &PriorityPush) -> f32 {
+    let apart = |of: fn(&Guide) -> vec3| squared_distance(of(a), of(b));
+    let positions = apart(|g| g.position) * push.position_scale * 0.01;
+    let x = apart(|g| g.normal) * push.normal_scale + positions + apart(|g| g.albedo) * 25.0;
+    if (a.object == NONE) == (b.object == NONE) { exp_negative(x) } else { 0.0 }
+}
+
 fn reference(inputs: &HostInputs) -> Vec<f32> {
-    let left = |q: f32| (1.0 - inputs.push.filtered * (1.0 - q)).max(0.0).sqrt();
-    let noise = variance::reference(inputs);
-    geometry::reference(inputs).into_iter().zip(noise).map(|(q, noise)| noise * left(q)).collect()
+    let HostInputs { guide, stats, push, .. } = inputs;
+    let width = push.size[0] as i32;
+    let of = |(i, q): (usize, f32)| {
+        let own = moments(&stats[i]);
+        let mut around = own;
+        for j in square(push, i as i32 % width, i as i32 / width, REACH).filter(|&j| j != i) {
+            let (kin, m) = (kinship(&guide[i], &guide[j], push), moments(&stats[j]));
+            around = std::array::from_fn(|k| around[k] + kin * m[k]);
+        }
+        noise(push, own, around) * (1.0 - push.filtered * (1.0 - q)).max(0.0).sqrt()
+    };
+    geometry::reference(inputs).into_iter().enumerate().map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::layout::PixelStats;
+
+    #[test]
+    fn noise_is_that_of_neighbours_that_look_alike() {
+        // Two pixels of 2 samples, m2 = 8 and 0, in one row: of its 5 x 5 places, those beyond the film hold the nearest
+        // pixel, so that each sees the other 10 times and itself once. Alike, the mean variances around are 8 / 11 and
+        // 80 / 11, worth 32 samples beside the pixel's own degree of freedom. Of other albedo, each knows its own only.
+        let stats = [8.0, 0.0].map(|m2| PixelStats { mean: [1.0; 3], count: 2, m2: [m2; 3] });
+        let push = PriorityPush { size: [2, 1], window: 2, luminance_floor: 0.0, limit: 99, ..PriorityPush::default() };
+        let of = |albedo| {
+            let guide = [0.0, albedo].map(|albedo| Guide { albedo: [albedo; 3], ..Guide::default() });
+            reference(&HostInputs { guide: &guide, stats: &stats, priority: &[], push })
+        };
+        let close = |found: Vec<f32>, expected: [f32; 2]| found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6);
+        let expected = |own: f32, around: f32| ((own + 32.0 * around) / 33.0).sqrt();
+        assert!(close(of(0.0), [expected(8.0, 8.0 / 11.0), expected(0.0, 80.0 / 11.0)]), "{:?}", of(0.0));
+        assert!(close(of(9.0), [expected(8.0, 8.0), 0.0]), "{:?}", of(9.0));
+    }
 }

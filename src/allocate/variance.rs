@@ -16,7 +16,7 @@ pub(super) const ROW: Row = Row {
 };
 
 /// Samples' worth of trust in the noise of the surroundings.
-const PRIOR_SAMPLES: f32 = 4.0;
+const PRIOR_SAMPLES: f32 = 32.0;
 
 struct Variance(PerThread<Bind<'static>>);
 
@@ -36,30 +36,36 @@ pub(super) fn moments(s: &PixelStats) -> [f32; 4] {
     [(s.m2[0] + s.m2[1] + s.m2[2]) / 3.0, n - 1.0, luminance * n, n]
 }
 
-fn noise(inputs: &HostInputs, x: i32, y: i32) -> f32 {
-    let [width, height] = inputs.push.size.map(|n| n as i32);
-    let at = |x: i32, y: i32| {
-        let (x, y) = (x.clamp(0, width - 1), y.clamp(0, height - 1));
-        moments(&inputs.stats[(y * width + x) as usize])
-    };
-    let (own, mut around) = (at(x, y), [0.0; 4]);
-    for (dy, dx) in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dy, dx))) {
-        around = std::array::from_fn(|i| around[i] + at(x + dx, y + dy)[i]);
-    }
+/// The pixels of a square, those beyond the border replaced by the nearest of the film, row by row.
+pub(super) fn square(push: &PriorityPush, x: i32, y: i32, reach: i32) -> impl Iterator<Item = usize> {
+    let [width, height] = push.size.map(|n| n as i32);
+    let row = move |dy: i32| (y + dy).clamp(0, height - 1) * width;
+    (-reach..=reach)
+        .flat_map(move |dy| (-reach..=reach).map(move |dx| (row(dy) + (x + dx).clamp(0, width - 1)) as usize))
+}
+
+/// Twin of the function in `glsl/shared/noise.glsl`.
+pub(super) fn noise(push: &PriorityPush, own: [f32; 4], around: [f32; 4]) -> f32 {
     if around[1] == 0.0 {
         return 1.0;
     }
     let variance = (own[0] + PRIOR_SAMPLES * around[0] / around[1]) / (own[1] + PRIOR_SAMPLES);
-    let floor = inputs.push.luminance_floor;
+    let floor = push.luminance_floor;
     let scale = if floor < 0.0 { 1.0 } else { around[2] / around[3] + floor };
     let relative = variance.sqrt() / scale.max(1e-20);
-    let good = own[3] > 0.0 && relative < inputs.push.threshold * own[3].sqrt();
-    if good || own[3] >= inputs.push.limit as f32 { 0.0 } else { relative }
+    let good = own[3] > 0.0 && relative < push.threshold * own[3].sqrt();
+    if good || own[3] >= push.limit as f32 { 0.0 } else { relative }
 }
 
 pub(super) fn reference(inputs: &HostInputs) -> Vec<f32> {
     let [width, height] = inputs.push.size.map(|n| n as i32);
-    (0..width * height).map(|i| noise(inputs, i % width, i / width)).collect()
+    let moments = |pixel: usize| moments(&inputs.stats[pixel]);
+    let of = |i: i32| {
+        let around = square(&inputs.push, i % width, i / width, 1).map(moments);
+        let sum = around.fold([0.0; 4], |sum: [f32; 4], m| std::array::from_fn(|k| sum[k] + m[k]));
+        noise(&inputs.push, moments(i as usize), sum)
+    };
+    (0..width * height).map(of).collect()
 }
 
 #[cfg(test)]
