@@ -65,7 +65,7 @@ fn a_threshold_stops_and_says_why() {
     let said = render(&folder, "--noise-threshold 0.08 --max-spp 4000 -o easy.exr");
     assert!(said.contains("every pixel is estimated below the threshold"), "{said}");
     let easy = counts(&film(&folder, "easy.exr"));
-    assert!(easy.iter().max().unwrap() < &4000 && easy.iter().min() < easy.iter().max());
+    assert!(easy.iter().sum::<u32>() < 400 * 40 * 30 && easy.iter().min() < easy.iter().max(), "it went on to the limit");
     let said = render(&folder, "--noise-threshold 0.0001 --max-spp 6 -o hard.exr");
     assert!(said.contains("pixels are above the threshold at their limit"), "{said}");
     assert_eq!(counts(&film(&folder, "hard.exr")).iter().max(), Some(&6));
@@ -112,6 +112,7 @@ fn interrupted(words: &str, spp: u32) {
 fn ctrl_c_writes_what_there_is_and_resuming_completes_it() {
     interrupted("", 200);
     interrupted("--allocate variance --rounds 20", 200);
+    interrupted("--allocate threshold --min-spp 2 --max-spp 24", 200);
 }
 
 #[test]
