@@ -65,7 +65,10 @@ fn a_threshold_stops_and_says_why() {
     let said = render(&folder, "--noise-threshold 0.08 --max-spp 4000 -o easy.exr");
     assert!(said.contains("every pixel is estimated below the threshold"), "{said}");
     let easy = counts(&film(&folder, "easy.exr"));
-    assert!(easy.iter().sum::<u32>() < 400 * 40 * 30 && easy.iter().min() < easy.iter().max(), "it went on to the limit");
+    assert!(
+        easy.iter().sum::<u32>() < 400 * 40 * 30 && easy.iter().min() < easy.iter().max(),
+        "it went on to the limit"
+    );
     let said = render(&folder, "--noise-threshold 0.0001 --max-spp 6 -o hard.exr");
     assert!(said.contains("pixels are above the threshold at their limit"), "{said}");
     assert_eq!(counts(&film(&folder, "hard.exr")).iter().max(), Some(&6));
