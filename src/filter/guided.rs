@@ -20,8 +20,12 @@ pub const ROW: Row = Row {
 };
 
 const WORKGROUP: u32 = 32;
-/// Bytes of a pixel's record in a strip.
-const RECORD: u64 = 128;
+/// Windows whose sums a thread counts from one point, and columns that lie beside each other, as in
+/// `glsl/shared/tiles.glsl`.
+const TILE: u32 = 8;
+const COLUMNS: u32 = 8;
+/// `vec4`s of a pixel's record in a strip.
+const RECORD: u64 = 8;
 /// Bytes of a strip on a CPU, whose caches should hold two; a GPU is filled by larger ones.
 const STRIP_CPU: u64 = 8 << 20;
 const STRIP_GPU: u64 = 256 << 20;
@@ -38,18 +42,24 @@ struct Guided {
     channels: Buffer<vec4>,
     /// Slopes of the three colours, then the value at the window's centre with the number of its windows.
     model: [Buffer<vec4>; 4],
-    /// A strip's sums over columns, and over the ends of blocks.
-    strip: [Buffer<vec4>; 2],
+    /// A strip's sums over columns.
+    strip: Buffer<vec4>,
+    /// A strip's sums over the ends of blocks, for every tile.
+    ends: Buffer<vec4>,
     strip_rows: u32,
     settings: FilterSettings,
 }
 
 impl Guided {
     fn new(gpu: &Gpu, settings: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
-        let pixels = width as usize * height as usize;
+        let pixels = width.next_multiple_of(COLUMNS) as usize * height as usize;
         let strip_rows = strip_rows(gpu, settings.radius, width, height);
         let plane = |name| Buffer::new(gpu, name, pixels, Location::Device);
-        let strip = |name| Buffer::new(gpu, name, strip_rows as usize * width as usize * 8, Location::Device);
+        let records = |name, count: u32| Buffer::new(gpu, name, count as usize * RECORD as usize, Location::Device);
+        // Tiles of a line of this many pixels: each block may cut one.
+        let tiles = |edge: u32, radius: u32| edge.div_ceil(TILE) + edge.div_ceil(2 * radius + 1);
+        let down = tiles(strip_rows, settings.radius.min(height - 1)) * width;
+        let along = tiles(width, settings.radius.min(width - 1)) * strip_rows;
         Ok(Self {
             pack: Kernel::new(gpu, &Effects::default(), &[(110, settings.channels)])?,
             columns: both(gpu)?,
@@ -59,7 +69,8 @@ impl Guided {
             colour: plane("colour")?,
             channels: plane("channels")?,
             model: [plane("slope_r")?, plane("slope_g")?, plane("slope_b")?, plane("value")?],
-            strip: [strip("columns")?, strip("ends")?],
+            strip: records("columns", strip_rows * width)?,
+            ends: records("ends", down.max(along))?,
             strip_rows,
             settings: *settings,
         })
@@ -86,12 +97,13 @@ impl Guided {
     }
 
     fn record_models(&self, rec: &mut Recorder, size: [u32; 2]) -> Result<()> {
-        let ([columns, ends], [slope_r, slope_g, slope_b, value]) = (&self.strip, &self.model);
-        let (colour, channels) = (&self.colour, &self.channels);
+        let [slope_r, slope_g, slope_b, value] = &self.model;
+        let (colour, channels, columns, ends) = (&self.colour, &self.channels, &self.strip, &self.ends);
         for [(down, groups_down), (along, groups_along)] in self.strips(size) {
             for (kernel, [ends, sums]) in self.columns.iter().zip([[columns, ends], [ends, columns]]) {
                 rec.dispatch(kernel, guided_columns::Bind { colour, channels, ends, sums }, &down, groups_down)?;
             }
+            // The second writes models alone, and no sums.
             for (kernel, [ends, sums]) in self.rows.iter().zip([[columns, ends], [ends, columns]]) {
                 let bind = guided_rows::Bind { columns, channels, ends, sums, slope_r, slope_g, slope_b, value };
                 rec.dispatch(kernel, bind, &along, groups_along)?;
@@ -101,8 +113,9 @@ impl Guided {
     }
 
     fn record_means(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
-        let ([columns, ends], [slope_r, slope_g, slope_b, value]) = (&self.strip, &self.model);
-        let (colour, channels, filtered) = (&self.colour, &self.channels, &planes.output);
+        let [slope_r, slope_g, slope_b, value] = &self.model;
+        let (colour, channels, columns, ends) = (&self.colour, &self.channels, &self.strip, &self.ends);
+        let filtered = &planes.output;
         for [(down, groups_down), (along, groups_along)] in self.strips(planes.size) {
             for (kernel, [ends, sums]) in self.mean_columns.iter().zip([[columns, ends], [ends, columns]]) {
                 let bind = guided_mean_columns::Bind { slope_r, slope_g, slope_b, value, channels, ends, sums };
@@ -126,7 +139,7 @@ fn both<B: Bindings>(gpu: &Gpu) -> Result<[Kernel<B>; 2]> {
 /// A multiple of the window where memory allows it, so that no block is cut.
 fn strip_rows(gpu: &Gpu, radius: u32, width: u32, height: u32) -> u32 {
     let (info, window) = (gpu.info(), u64::from(2 * radius.min(height - 1) + 1));
-    let row = RECORD * u64::from(width);
+    let row = RECORD * 16 * u64::from(width);
     let target = if info.kind == "CPU" { STRIP_CPU } else { STRIP_GPU };
     let wanted = (target / (row * window)).max(1) * window;
     wanted.min((info.max_storage_range / row).max(1)).min(u64::from(height)) as u32
@@ -140,7 +153,7 @@ impl Filter for Guided {
             colour: &self.colour,
             channels: &self.channels,
         };
-        let push = GuidedPackPush { count: planes.pixels(), depth_scale: 1.0 / self.settings.extent };
+        let push = GuidedPackPush { size: planes.size, depth_scale: 1.0 / self.settings.extent };
         rec.dispatch(&self.pack, bind, &push, groups(planes.pixels(), 64))?;
         self.record_models(rec, planes.size)?;
         self.record_means(rec, planes)
