@@ -18,11 +18,11 @@ layout(scalar, push_constant) uniform Push { GuidedPackPush push; };
 layout(constant_id = 110) const uint CHANNELS = 4u; // 1: the grey normal, 3: the normal, 4: and the depth
 
 void main() {
-    uint i = thread_index();
-    if (i >= push.size.x * push.size.y) return; // safe: no barrier() follows
-    int at = blocked(int(i % push.size.x), int(i / push.size.x), int(push.size.y));
-    colour[at] = paired(known_radiance(texelFetch(radiance, int(i))));
-    vec4 hit = texelFetch(guide, 3 * int(i));
+    int at = int(thread_index()), rows = int(push.size.y), x = at / (8 * rows) * 8 + at % 8;
+    if (x >= int(push.size.x)) return; // safe: no barrier() follows
+    int pixel = at / 8 % rows * int(push.size.x) + x;
+    colour[at] = paired(known_radiance(texelFetch(radiance, pixel)));
+    vec4 hit = texelFetch(guide, 3 * pixel);
     // Normals span [0, 1] once they are halved; where that interval begins does not matter to a covariance.
     vec3 normal = 0.5 * vec3(known_channel(hit.x), known_channel(hit.y), known_channel(hit.z));
     float grey = (normal.x + normal.y + normal.z) / 3.0, depth = known_channel(hit.w * push.depth_scale);

@@ -3,7 +3,7 @@
 // block backward and keeps its ends, another walks the next block forward and adds them. Storing is what costs most on
 // lavapipe, so that only the ends at every TILE-th window are kept; those between are summed anew. Sums of a tile count
 // from one point, the pixel in the middle of its windows' centres, which is within each of them.
-const int TILE = 8;
+layout(constant_id = 111) const int TILE = 8; // a part of w that wastes little, at most 8
 
 // One of the blocks that a line is cut into.
 struct Block {

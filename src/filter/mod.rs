@@ -7,6 +7,7 @@ mod edge;
 mod estimate;
 pub mod firefly;
 mod guided;
+mod guided_table;
 mod input;
 mod none;
 mod pack;
@@ -16,7 +17,7 @@ mod svgf;
 mod wavelet;
 
 pub use input::FilterInput;
-pub use settings::{AtrousForm, FilterSettings, WaveletBasis};
+pub use settings::{AtrousForm, FilterSettings, GuidedSums, WaveletBasis};
 
 use crate::error::Result;
 use crate::gpu::layout::{Guide, vec3, vec4};
