@@ -3,9 +3,10 @@
 //! `glsl/test/*.comp` becomes `$OUT_DIR/test_shaders.rs` for the integration tests. Any error stops the build with
 //! file and line. The compiler is `glslc`, as a program: Debian 12's libshaderc cannot be linked (undefined symbols).
 //!
-//! Bindings are read from lines of exactly three forms, in a kernel or in a file that it includes:
+//! Bindings are read from lines of exactly these forms, in a kernel or in a file that it includes:
 //! ```glsl
 //! layout(scalar, binding = 3) readonly buffer Src { vec3 src[]; };  // or writeonly, or neither
+//! layout(scalar, binding = 3) writeonly buffer Dst { u64vec2 dst[]; }; // of vec4, which it stores two floats at a time
 //! layout(binding = 0) uniform usamplerBuffer nodes; // of BvhNode   // or samplerBuffer
 //! layout(scalar, push_constant) uniform Push { PathPush push; };    // once per kernel
 //! ```
@@ -213,6 +214,7 @@ fn parse_storage(line: &str) -> Option<Binding> {
     };
     let (element, field) = member(rest)?;
     let field = field.strip_suffix("[]")?.to_owned();
+    let element = rest.split_once("// of ").map_or(element, |(_, of)| of.trim());
     Some(Binding {
         group: None,
         number: number.parse().ok()?,

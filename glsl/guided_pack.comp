@@ -4,24 +4,27 @@
 #include "layout.glsl"
 #include "shared/thread.glsl"
 #include "shared/pixel.glsl"
+#include "shared/paired.glsl"
+#include "shared/tiles.glsl"
 
 // What the guided filter reads: radiance with its count, and the channels of its guide.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer radiance; // of vec4
 layout(binding = 1) uniform samplerBuffer guide; // of Guide
-layout(scalar, binding = 2) writeonly buffer Colours { vec4 colour[]; };
-layout(scalar, binding = 3) writeonly buffer Channels { vec4 channels[]; };
+layout(scalar, binding = 2) writeonly buffer Colours { u64vec2 colour[]; }; // of vec4
+layout(scalar, binding = 3) writeonly buffer Channels { u64vec2 channels[]; }; // of vec4
 layout(scalar, push_constant) uniform Push { GuidedPackPush push; };
 
 layout(constant_id = 110) const uint CHANNELS = 4u; // 1: the grey normal, 3: the normal, 4: and the depth
 
 void main() {
-    uint i = thread_index();
-    if (i >= push.count) return; // safe: no barrier() follows
-    colour[i] = known_radiance(texelFetch(radiance, int(i)));
-    vec4 hit = texelFetch(guide, 3 * int(i));
+    int at = int(thread_index()), rows = int(push.size.y), x = at / (8 * rows) * 8 + at % 8;
+    if (x >= int(push.size.x)) return; // safe: no barrier() follows
+    int pixel = at / 8 % rows * int(push.size.x) + x;
+    colour[at] = paired(known_radiance(texelFetch(radiance, pixel)));
+    vec4 hit = texelFetch(guide, 3 * pixel);
     // Normals span [0, 1] once they are halved; where that interval begins does not matter to a covariance.
     vec3 normal = 0.5 * vec3(known_channel(hit.x), known_channel(hit.y), known_channel(hit.z));
     float grey = (normal.x + normal.y + normal.z) / 3.0, depth = known_channel(hit.w * push.depth_scale);
-    channels[i] = CHANNELS == 1u ? vec4(grey, 0.0, 0.0, 0.0) : vec4(normal, CHANNELS == 4u ? depth : 0.0);
+    channels[at] = paired(CHANNELS == 1u ? vec4(grey, 0.0, 0.0, 0.0) : vec4(normal, CHANNELS == 4u ? depth : 0.0));
 }

@@ -29,7 +29,7 @@ fn noisy(is_tallow_s: bool) -> Film {
 }
 
 fn checker(x: u32, y: u32) -> f32 {
-    if (x + y) % 2 == 0 { 0.2 } else { 0.8 }
+    if (x + y).is_multiple_of(2) { 0.2 } else { 0.8 }
 }
 
 /// In [0, 1).

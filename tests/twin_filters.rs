@@ -5,7 +5,7 @@ mod support;
 
 use picture::{Picture, SIZES};
 use support::{assert_silent, gpu};
-use tallow::filter::{FILTERS, FilterInput, FilterSettings, WaveletBasis, find, firefly, run};
+use tallow::filter::{FILTERS, FilterInput, FilterSettings, GuidedSums, WaveletBasis, find, firefly, run};
 use tallow::gpu::layout::vec4;
 
 /// The largest difference of a channel, relative to the pixel's largest where that is above `scale`.
@@ -165,6 +165,30 @@ fn guided_holds_in_single_precision() {
     assert!(apart(&device, &(row.reference)(&input, &settings), 1e-3) < 1e-4);
     let other = FilterSettings { radius: 8, ..settings };
     assert!(apart(&device, &(row.reference)(&input, &other), 1e-3) > 1e-3, "control: another radius");
+    assert_silent(&gpu);
+}
+
+/// The published sums agree where they can, and lose digits where the others do not.
+#[test]
+fn guided_tables_agree_near_by_and_lose_digits_far_away() {
+    let gpu = gpu();
+    let row = find("guided").unwrap();
+    let base = FilterSettings { radius: 5, eps: [0.01; 4], ..FilterSettings::default() };
+    let table = FilterSettings { sums: GuidedSums::Table, ..base };
+    let off = |input: &FilterInput, s: &FilterSettings| {
+        let s = s.scaled_to(input);
+        apart(&run(&gpu, row, input, &s).unwrap().0, &(row.reference)(input, &s), 1.0)
+    };
+    for (width, height) in SIZES {
+        let input = Picture::new(width, height).noisy().input;
+        for s in [table, FilterSettings { radius: 40, channels: 1, ..table }] {
+            assert!(off(&input, &s) < 2e-3, "{width}x{height}: {}", off(&input, &s));
+        }
+    }
+    let mut far = Picture::new(70, 50).noisy().input;
+    (0..).zip(&mut far.guide).for_each(|(i, g)| g.depth = 1e4 + (i % 70) as f32);
+    let (table, blocks) = (off(&far, &table), off(&far, &base));
+    assert!(table > 100.0 * blocks, "{table}, {blocks}");
     assert_silent(&gpu);
 }
 

@@ -1,5 +1,6 @@
 // The mean of linear models over a set of windows: slopes of the three channels, and the value at one point of the
 // guide. The point moves with the pixel that is looked at, so that far-away guides keep their digits.
+#include "shared/paired.glsl"
 
 struct Fit {
     vec4 r;
@@ -12,15 +13,17 @@ const int FIT = 4; // vec4s of a record
 const Fit NO_FIT = Fit(vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
 
 #define FIT_LOAD(at, FETCH) Fit(FETCH(at), FETCH((at) + 1), FETCH((at) + 2), FETCH((at) + 3))
-#define FIT_STORE(to, at, f) to[at] = f.r; to[(at) + 1] = f.g; to[(at) + 2] = f.b; to[(at) + 3] = f.value
+#define FIT_STORE(to, at, f) \
+    to[at] = paired(f.r); to[(at) + 1] = paired(f.g); to[(at) + 2] = paired(f.b); to[(at) + 3] = paired(f.value)
 
-void move(inout Fit f, vec4 by) {
+Fit moved(Fit f, vec4 by) {
     f.value.rgb += vec3(dot(f.r, by), dot(f.g, by), dot(f.b, by));
+    return f;
 }
 
-// Both about the same point.
-void absorb(inout Fit f, Fit other) {
-    float all = f.value.w + other.value.w, share = other.value.w / max(all, 1.0);
+// `f` with `other` if `is` is 1, and as it was if it is 0. Both about the same point.
+void absorb(inout Fit f, Fit other, float is) {
+    float count = is * other.value.w, all = f.value.w + count, share = count / max(all, 1.0);
     f.r += share * (other.r - f.r);
     f.g += share * (other.g - f.g);
     f.b += share * (other.b - f.b);

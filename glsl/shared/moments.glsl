@@ -1,7 +1,8 @@
 // Count, means and co-moments of the guide I (four channels) and the noisy N (three) over a set of pixels, merged by
 // Chan's rule (Chan, Golub, LeVeque 1979): about the sets' own means, so that nothing cancels, and without ever
-// subtracting a pixel, so that nothing is left behind by one that has gone. The guide's means are counted from that of
-// the pixel that is looked at, so that far-away guides keep their digits.
+// subtracting a pixel, so that nothing is left behind by one that has gone. The guide's means are counted from a point
+// within the window, so that far-away guides keep their digits.
+#include "shared/paired.glsl"
 
 struct Moments {
     vec4 head; // count, mean N
@@ -18,11 +19,12 @@ const int MOMENTS = 8; // vec4s of a record
 const Moments NO_MOMENTS = Moments(vec4(0.0), vec4(0.0), vec4(0.0), vec3(0.0), vec3(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
 
 #define MOMENTS_LOAD(at, FETCH) \
-    Moments(FETCH(at), FETCH((at) + 1), FETCH((at) + 2), FETCH((at) + 3).xyz, FETCH((at) + 4).xyz, FETCH((at) + 5), \
-            FETCH((at) + 6), FETCH((at) + 7))
+    Moments(FETCH(at), FETCH((at) + 1), FETCH((at) + 2), FETCH((at) + 3).xyz, \
+            vec3(FETCH((at) + 3).w, FETCH((at) + 4).xy), FETCH((at) + 5), FETCH((at) + 6), FETCH((at) + 7))
 #define MOMENTS_STORE(to, at, m) \
-    to[at] = m.head; to[(at) + 1] = m.mean; to[(at) + 2] = m.xx; to[(at) + 3] = vec4(m.yy, 0.0); \
-    to[(at) + 4] = vec4(m.zz, 0.0); to[(at) + 5] = m.r; to[(at) + 6] = m.g; to[(at) + 7] = m.b
+    to[at] = paired(m.head); to[(at) + 1] = paired(m.mean); to[(at) + 2] = paired(m.xx); \
+    to[(at) + 3] = paired(vec4(m.yy, m.zz.x)); to[(at) + 4].x = paired(m.zz.yzzz).x; \
+    to[(at) + 5] = paired(m.r); to[(at) + 6] = paired(m.g); to[(at) + 7] = paired(m.b)
 
 Moments moved(Moments m, vec4 by) {
     m.mean = m.head.x > 0.0 ? m.mean - by : vec4(0.0);
@@ -45,14 +47,15 @@ void absorb_means(inout Moments m, float count, vec3 n, vec4 i) {
     m.b += off_n.b * scaled;
 }
 
-void absorb(inout Moments m, Moments other) {
-    absorb_means(m, other.head.x, other.head.yzw, other.mean);
-    m.xx += other.xx;
-    m.yy += other.yy;
-    m.zz += other.zz;
-    m.r += other.r;
-    m.g += other.g;
-    m.b += other.b;
+// `m` with `other` if `is` is 1, and as it was if it is 0. Both about the same point.
+void absorb(inout Moments m, Moments other, float is) {
+    absorb_means(m, is * other.head.x, other.head.yzw, other.mean);
+    m.xx += is * other.xx;
+    m.yy += is * other.yy;
+    m.zz += is * other.zz;
+    m.r += is * other.r;
+    m.g += is * other.g;
+    m.b += is * other.b;
 }
 
 float reciprocal_pivot(float pivot, float diagonal) {

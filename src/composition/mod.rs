@@ -185,6 +185,30 @@ mod tests {
         assert_eq!(parts.join(&[[1.0; 4]; 4])[1], [0.5, 1.0, 1.0]);
     }
 
+    /// However the image is taken apart, and whatever its other layers hold.
+    #[test]
+    fn a_pixel_that_is_no_number_counts_as_not_sampled() {
+        for demodulation in [Demodulation::Light, Demodulation::Albedo, Demodulation::Off] {
+            let whole = {
+                let mut film = film();
+                film.add_vec3("direct", RGB, &[[0.5; 3], [0.5; 3], [25.0; 3], [50.0; 3]]);
+                film.add_vec3("indirect", RGB, &[[1.0; 3], [1.0; 3], [0.0; 3], [0.0; 3]]);
+                film.add("samples", Samples::U32(vec![4; 4]));
+                film
+            };
+            let clean = take_apart(&whole, demodulation).input.radiance;
+            assert!(clean[1][3] == 4.0, "control: as it is, the pixel is sampled");
+            for (bad, name) in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY].into_iter().zip(RGB) {
+                let mut film = whole.clone();
+                let channel = film.channels.iter_mut().find(|c| c.name == name).unwrap();
+                channel.samples = Samples::F32(vec![1.0, bad, 25.0, 50.0]);
+                let broken = take_apart(&film, demodulation).input.radiance;
+                assert_eq!(broken[1][3], 0.0, "{demodulation:?}, {bad} in {name}");
+                assert_eq!([broken[0], broken[2], broken[3]], [clean[0], clean[2], clean[3]], "{demodulation:?}");
+            }
+        }
+    }
+
     #[test]
     fn the_variance_of_a_pbrt_file_is_that_of_one_sample() {
         let mut film = film();

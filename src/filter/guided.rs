@@ -1,7 +1,8 @@
 //! Guided image filter (He, Sun, Tang, ECCV 2010) on normals and depth, as Bauszat, Eisemann and Magnor (EGSR 2011) use
 //! it. Kernels: `glsl/guided_*.comp`. Its time does not depend on the radius.
+use super::guided_table::GuidedTable;
 use super::pixel::{known_channel, known_radiance};
-use super::{Filter, FilterInput, FilterSettings, Planes, Row};
+use super::{Filter, FilterInput, FilterSettings, GuidedSums, Planes, Row};
 use crate::error::Result;
 use crate::gpu::layout::{Effects, Guide, GuidedPackPush, GuidedPush, vec4};
 use crate::gpu::{Bindings, Buffer, Gpu, Kernel, Location, Recorder};
@@ -15,53 +16,94 @@ use std::ops::Range;
 pub const ROW: Row = Row {
     name: "guided",
     about: "guided image filter: light as a local linear function of normal and depth",
-    make: |gpu, settings, size| Ok(Box::new(Guided::new(gpu, settings, size)?)),
+    make: |gpu, settings, size| {
+        Ok(match settings.sums {
+            GuidedSums::Blocks => Box::new(Guided::new(gpu, settings, size)?),
+            GuidedSums::Table => Box::new(GuidedTable::new(gpu, settings, size)?),
+        })
+    },
     reference,
 };
 
 const WORKGROUP: u32 = 32;
-/// Bytes of a pixel's record in a strip.
-const RECORD: u64 = 128;
+/// Columns that lie beside each other, as in `glsl/shared/tiles.glsl`.
+const COLUMNS: u32 = 8;
+/// Most windows whose sums a thread counts from one point: its registers are 240 floats then.
+const LARGEST_TILE: u32 = 8;
+/// `vec4`s of a pixel's record in a strip.
+const RECORD: u64 = 8;
 /// Bytes of a strip on a CPU, whose caches should hold two; a GPU is filled by larger ones.
 const STRIP_CPU: u64 = 8 << 20;
 const STRIP_GPU: u64 = 256 << 20;
 
+/// What the kernels read of an image.
+pub struct Packed {
+    kernel: Kernel<guided_pack::Bind<'static>>,
+    /// Radiance and the samples behind it, all zero where nothing is known.
+    pub colour: Buffer<vec4>,
+    /// The guide.
+    pub channels: Buffer<vec4>,
+}
+
+impl Packed {
+    /// For images of (width, height).
+    pub fn new(gpu: &Gpu, settings: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
+        let pixels = width.next_multiple_of(COLUMNS) as usize * height as usize;
+        Ok(Self {
+            kernel: Kernel::new(gpu, &Effects::default(), &[(110, settings.channels)])?,
+            colour: Buffer::new(gpu, "colour", pixels, Location::Device)?,
+            channels: Buffer::new(gpu, "channels", pixels, Location::Device)?,
+        })
+    }
+
+    /// radiance\[P\], guide\[P\] -> colour\[P\], channels\[P\]
+    pub fn record(&self, rec: &mut Recorder, planes: &Planes, settings: &FilterSettings) -> Result<()> {
+        let (radiance, guide) = (&planes.radiance, &planes.guide);
+        let bind = guided_pack::Bind { radiance, guide, colour: &self.colour, channels: &self.channels };
+        let push = GuidedPackPush { size: planes.size, depth_scale: 1.0 / settings.extent };
+        rec.dispatch(&self.kernel, bind, &push, groups(self.colour.len() as u32, 64))
+    }
+}
+
 /// Each pass over the strips is two dispatches of one kernel.
 struct Guided {
-    pack: Kernel<guided_pack::Bind<'static>>,
+    pack: Packed,
     // Backward, then forward.
     columns: [Kernel<guided_columns::Bind<'static>>; 2],
     rows: [Kernel<guided_rows::Bind<'static>>; 2],
     mean_columns: [Kernel<guided_mean_columns::Bind<'static>>; 2],
     mean_rows: [Kernel<guided_mean_rows::Bind<'static>>; 2],
-    colour: Buffer<vec4>,
-    channels: Buffer<vec4>,
     /// Slopes of the three colours, then the value at the window's centre with the number of its windows.
     model: [Buffer<vec4>; 4],
-    /// A strip's sums over columns, and over the ends of blocks.
-    strip: [Buffer<vec4>; 2],
+    /// A strip's sums over columns.
+    strip: Buffer<vec4>,
+    /// A strip's sums over the ends of blocks, for every tile.
+    ends: Buffer<vec4>,
     strip_rows: u32,
     settings: FilterSettings,
 }
 
 impl Guided {
     fn new(gpu: &Gpu, settings: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
-        let pixels = width as usize * height as usize;
+        let [down, along] = [height, width].map(|edge| 2 * settings.radius.min(edge - 1) + 1);
+        let pack = Packed::new(gpu, settings, [width, height])?;
         let strip_rows = strip_rows(gpu, settings.radius, width, height);
-        let plane = |name| Buffer::new(gpu, name, pixels, Location::Device);
-        let strip = |name| Buffer::new(gpu, name, strip_rows as usize * width as usize * 8, Location::Device);
+        let plane = |name| Buffer::new(gpu, name, pack.colour.len(), Location::Device);
+        let records = |name, count: u32| Buffer::new(gpu, name, count as usize * RECORD as usize, Location::Device);
+        // Tiles of a line of this many pixels: each block may cut one.
+        let tiles = |edge: u32, window: u32| edge.div_ceil(tile(window)) + edge.div_ceil(window);
+        let most_ends = (tiles(strip_rows, down) * width).max(tiles(width, along) * strip_rows);
         Ok(Self {
-            pack: Kernel::new(gpu, &Effects::default(), &[(110, settings.channels)])?,
-            columns: both(gpu)?,
-            rows: both(gpu)?,
-            mean_columns: both(gpu)?,
-            mean_rows: both(gpu)?,
-            colour: plane("colour")?,
-            channels: plane("channels")?,
+            columns: both(gpu, down)?,
+            rows: both(gpu, along)?,
+            mean_columns: both(gpu, down)?,
+            mean_rows: both(gpu, along)?,
             model: [plane("slope_r")?, plane("slope_g")?, plane("slope_b")?, plane("value")?],
-            strip: [strip("columns")?, strip("ends")?],
+            strip: records("columns", strip_rows * width)?,
+            ends: records("ends", most_ends)?,
             strip_rows,
             settings: *settings,
+            pack,
         })
     }
 
@@ -86,12 +128,13 @@ impl Guided {
     }
 
     fn record_models(&self, rec: &mut Recorder, size: [u32; 2]) -> Result<()> {
-        let ([columns, ends], [slope_r, slope_g, slope_b, value]) = (&self.strip, &self.model);
-        let (colour, channels) = (&self.colour, &self.channels);
+        let [slope_r, slope_g, slope_b, value] = &self.model;
+        let (colour, channels, columns, ends) = (&self.pack.colour, &self.pack.channels, &self.strip, &self.ends);
         for [(down, groups_down), (along, groups_along)] in self.strips(size) {
             for (kernel, [ends, sums]) in self.columns.iter().zip([[columns, ends], [ends, columns]]) {
                 rec.dispatch(kernel, guided_columns::Bind { colour, channels, ends, sums }, &down, groups_down)?;
             }
+            // The second writes models alone, and no sums.
             for (kernel, [ends, sums]) in self.rows.iter().zip([[columns, ends], [ends, columns]]) {
                 let bind = guided_rows::Bind { columns, channels, ends, sums, slope_r, slope_g, slope_b, value };
                 rec.dispatch(kernel, bind, &along, groups_along)?;
@@ -101,8 +144,9 @@ impl Guided {
     }
 
     fn record_means(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
-        let ([columns, ends], [slope_r, slope_g, slope_b, value]) = (&self.strip, &self.model);
-        let (colour, channels, filtered) = (&self.colour, &self.channels, &planes.output);
+        let [slope_r, slope_g, slope_b, value] = &self.model;
+        let (colour, channels, columns, ends) = (&self.pack.colour, &self.pack.channels, &self.strip, &self.ends);
+        let filtered = &planes.output;
         for [(down, groups_down), (along, groups_along)] in self.strips(planes.size) {
             for (kernel, [ends, sums]) in self.mean_columns.iter().zip([[columns, ends], [ends, columns]]) {
                 let bind = guided_mean_columns::Bind { slope_r, slope_g, slope_b, value, channels, ends, sums };
@@ -117,16 +161,21 @@ impl Guided {
     }
 }
 
+/// Windows that a thread sums from one point: as equal parts of a block as there can be.
+fn tile(window: u32) -> u32 {
+    window.div_ceil(window.div_ceil(LARGEST_TILE))
+}
+
 /// A kernel for walking blocks backward, and the same for walking them forward.
-fn both<B: Bindings>(gpu: &Gpu) -> Result<[Kernel<B>; 2]> {
-    let kernel = |backward| Kernel::new(gpu, &Effects::default(), &[(110, backward)]);
+fn both<B: Bindings>(gpu: &Gpu, window: u32) -> Result<[Kernel<B>; 2]> {
+    let kernel = |backward| Kernel::new(gpu, &Effects::default(), &[(110, backward), (111, tile(window))]);
     Ok([kernel(1)?, kernel(0)?])
 }
 
 /// A multiple of the window where memory allows it, so that no block is cut.
 fn strip_rows(gpu: &Gpu, radius: u32, width: u32, height: u32) -> u32 {
     let (info, window) = (gpu.info(), u64::from(2 * radius.min(height - 1) + 1));
-    let row = RECORD * u64::from(width);
+    let row = RECORD * 16 * u64::from(width);
     let target = if info.kind == "CPU" { STRIP_CPU } else { STRIP_GPU };
     let wanted = (target / (row * window)).max(1) * window;
     wanted.min((info.max_storage_range / row).max(1)).min(u64::from(height)) as u32
@@ -134,14 +183,7 @@ fn strip_rows(gpu: &Gpu, radius: u32, width: u32, height: u32) -> u32 {
 
 impl Filter for Guided {
     fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
-        let bind = guided_pack::Bind {
-            radiance: &planes.radiance,
-            guide: &planes.guide,
-            colour: &self.colour,
-            channels: &self.channels,
-        };
-        let push = GuidedPackPush { count: planes.pixels(), depth_scale: 1.0 / self.settings.extent };
-        rec.dispatch(&self.pack, bind, &push, groups(planes.pixels(), 64))?;
+        self.pack.record(rec, planes, &self.settings)?;
         self.record_models(rec, planes.size)?;
         self.record_means(rec, planes)
     }

@@ -7,6 +7,7 @@ mod edge;
 mod estimate;
 pub mod firefly;
 mod guided;
+mod guided_table;
 mod input;
 mod none;
 mod pack;
@@ -16,7 +17,7 @@ mod svgf;
 mod wavelet;
 
 pub use input::FilterInput;
-pub use settings::{AtrousForm, FilterSettings, WaveletBasis};
+pub use settings::{AtrousForm, FilterSettings, GuidedSums, WaveletBasis};
 
 use crate::error::Result;
 use crate::gpu::layout::{Guide, vec3, vec4};
@@ -25,14 +26,17 @@ use crate::gpu::{Buffer, FrameResources, Gpu, Location, PassTime, Recorder};
 /// Every filter, in the order of `--help`; the twin and stability tests run each row.
 pub const FILTERS: &[Row] = &[none::ROW, atrous::ROW, bilateral::ROW, guided::ROW, wavelet::ROW, svgf::ROW, auto::ROW];
 
+/// Compiles a filter's kernels and makes its own buffers, for images of (width, height).
+pub type Make = fn(&Gpu, &FilterSettings, [u32; 2]) -> Result<Box<dyn Filter>>;
+
 /// One filter.
 pub struct Row {
     /// What a user types.
     pub name: &'static str,
     /// One line of help.
     pub about: &'static str,
-    /// Compiles its kernels and makes its own buffers for images of (width, height).
-    pub make: fn(&Gpu, &FilterSettings, [u32; 2]) -> Result<Box<dyn Filter>>,
+    /// On a device.
+    pub make: Make,
     /// The same on the host, in plain Rust.
     pub reference: fn(&FilterInput, &FilterSettings) -> Vec<vec4>,
 }

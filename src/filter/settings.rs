@@ -17,6 +17,17 @@ pub enum AtrousForm {
     Printed,
 }
 
+/// How `guided` sums over windows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum GuidedSums {
+    /// Block by block, about local means: nothing cancels.
+    #[default]
+    Blocks,
+    /// Summed-area tables, as published: digits are lost where images are large or guides far away. Images of one
+    /// million pixels at most where storage buffers hold 128 MiB.
+    Table,
+}
+
 /// The lattices of the decimated wavelets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum WaveletBasis {
@@ -48,7 +59,8 @@ pub struct FilterSettings {
     /// pixel is known. Default 0: unknown pixels do without it anyway.
     pub rt_from_level: u32,
     /// Whether what a neighbour's weight falls short of stays with the centre pixel, so that no light is lost or gained.
-    /// Default false, as published.
+    /// Default false, as published. EAW's own proposal, a channel of weights that normalises the last level alone, kept
+    /// 0.79 to 1.04 of the light of five images where this keeps all of it, and less than no measure at all.
     pub conserve_energy: bool,
     /// Pixels from the centre of a window of `guided` or `bilateral` to its border, 0 to 4096. Default 24.
     pub radius: u32,
@@ -57,6 +69,8 @@ pub struct FilterSettings {
     /// Variance of each channel (normal, depth) below which `guided` sees no edge; normals halved, depths in `extent`. At
     /// least 0; default 0.01, depth 0.02.
     pub eps: vec4,
+    /// How `guided` sums over windows.
+    pub sums: GuidedSums,
     /// Standard deviations of a pixel's luminance that count as an edge for `svgf`. At least 0; default 4.
     pub sigma_l: f32,
     /// The wavelets of `wavelet`.
@@ -78,6 +92,7 @@ impl Default for FilterSettings {
             radius: 24,
             channels: 4,
             eps: [0.01, 0.01, 0.01, 0.02],
+            sums: GuidedSums::Blocks,
             sigma_l: 4.0,
             basis: WaveletBasis::Cdf22,
         }

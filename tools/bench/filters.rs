@@ -1,14 +1,51 @@
-//! Milliseconds of the filters on the device: medians over rounds, after a first run that compiles the kernels.
-//!   cargo run --release --example bench-filters -- [NAME WIDTH HEIGHT ROUNDS]
+//! Milliseconds of a filter on the device beside those of the program that a user would pick instead, in turn within one
+//! run; the ratio is that of the medians, after a first run of each that prepares it.
+//!   cargo run --release --example bench-filters -- atrous|guided|bilateral [ROUNDS] [PEERS]
+//! PEERS is the folder that $TALLOW_DATA/peers/setup.sh installed into; without it our filter runs alone.
 #![allow(missing_docs)]
-use anyhow::{Context, Result};
-use std::collections::BTreeSet;
-use tallow::filter::{FilterInput, FilterSettings, Planes, find};
+use anyhow::{Context, Result, bail};
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use tallow::filter::{self, Filter, FilterInput, FilterSettings, GuidedSums, Planes, Row};
 use tallow::gpu::layout::Guide;
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu, PassTime};
 
-/// A checkered floor under exponential noise, as opencv_bench.py makes it, with positions.
-fn picture(width: u32, height: u32) -> FilterInput {
+/// What is timed: our settings, and what the peer is asked for.
+struct Case {
+    size: [u32; 2],
+    /// The first is the one that the peer is compared with.
+    settings: Vec<(&'static str, FilterSettings)>,
+    peer: &'static str,
+}
+
+fn case(name: &str) -> Result<Case> {
+    let base = FilterSettings::default();
+    let radius = |radius| FilterSettings { radius, ..base };
+    Ok(match name {
+        "atrous" => Case { size: [512, 512], settings: vec![("5 levels, 3 weights", base)], peer: "oidn" },
+        "guided" => Case {
+            size: [1024, 768],
+            settings: vec![
+                ("radius 24", radius(24)),
+                ("radius 8", radius(8)),
+                ("radius 64", radius(64)),
+                ("radius 24, tables", FilterSettings { sums: GuidedSums::Table, ..radius(24) }),
+            ],
+            peer: "guided 24",
+        },
+        // Joint: by the guide alone, as OpenCV's jointBilateralFilter and GIF's.
+        "bilateral" => Case {
+            size: [1024, 768],
+            settings: vec![("radius 24", FilterSettings { sigma_rt: f32::INFINITY, ..base })],
+            peer: "bilateral 24",
+        },
+        _ => bail!("{name}: choose atrous, guided or bilateral"),
+    })
+}
+
+/// A checkered floor under exponential noise, as peers.py makes it, with positions.
+fn picture([width, height]: [u32; 2]) -> FilterInput {
     let mut state = 1u32;
     let mut noise = || {
         state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
@@ -26,6 +63,89 @@ fn picture(width: u32, height: u32) -> FilterInput {
     FilterInput { width, height, radiance, guide, variance: None }
 }
 
+/// Largest difference of guided's two kinds of sums from the definition in double precision, in units of the image's
+/// mean; the depths begin at `near`.
+fn errors(gpu: &Gpu, row: &Row, near: f32) -> Result<()> {
+    let mut input = picture([512, 384]);
+    input.guide.iter_mut().for_each(|g| g.depth += near);
+    let base = FilterSettings { radius: 8, ..FilterSettings::default() }.scaled_to(&input);
+    let truth = (row.reference)(&input, &base);
+    let mean = truth.iter().map(|c| c[1]).sum::<f32>() / truth.len() as f32;
+    let error = |sums| -> Result<f32> {
+        let (image, _) = filter::run(gpu, row, &input, &FilterSettings { sums, ..base })?;
+        let channels = image.iter().flatten().zip(truth.iter().flatten());
+        Ok(channels.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) / mean)
+    };
+    let (blocks, table) = (error(GuidedSums::Blocks)?, error(GuidedSums::Table)?);
+    println!("512x384, radius 8, depths from {near}: largest error {blocks:.1e} by blocks, {table:.1e} by tables");
+    Ok(())
+}
+
+/// The peers' process.
+struct Peer {
+    child: Child,
+    ask: ChildStdin,
+    answers: BufReader<ChildStdout>,
+}
+
+impl Peer {
+    fn start(folder: &Path, [width, height]: [u32; 2]) -> Result<Self> {
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/bench/peers.py");
+        let shell = r#". "$0/env.sh" && exec "$0/venv/bin/python" "$@""#;
+        let mut command = Command::new("bash");
+        command.args(["-c", shell]).arg(folder).arg(script).args([width, height].map(|n| n.to_string()));
+        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().context("cannot start bash")?;
+        let (ask, answers) = (child.stdin.take(), child.stdout.take());
+        Ok(Self { child, ask: ask.context("no input")?, answers: BufReader::new(answers.context("no output")?) })
+    }
+
+    fn milliseconds(&mut self, what: &str) -> Result<f64> {
+        writeln!(self.ask, "{what}")?;
+        let mut line = String::new();
+        self.answers.read_line(&mut line)?;
+        line.trim().parse().context("the peer has stopped")
+    }
+}
+
+impl Drop for Peer {
+    fn drop(&mut self) {
+        // Nothing depends on how it ends.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// One of our settings, and the passes of every round.
+struct Ours {
+    name: &'static str,
+    filter: Box<dyn Filter>,
+    runs: Vec<Vec<PassTime>>,
+}
+
+impl Ours {
+    fn milliseconds(&self, of: impl Fn(usize, &PassTime) -> bool) -> f64 {
+        let ms = |p: &PassTime| (p.end_ns - p.begin_ns) as f64 * 1e-6;
+        let run = |run: &Vec<PassTime>| run.iter().enumerate().filter(|(i, p)| of(*i, p)).map(|(_, p)| ms(p)).sum();
+        median(self.runs.iter().map(run).collect())
+    }
+
+    /// Every pass of filters of few passes, every kernel of others.
+    fn print(&self) {
+        let passes: Vec<&str> = self.runs[0].iter().map(|p| p.name).collect();
+        let mut kernels = passes.clone();
+        kernels.sort_unstable();
+        kernels.dedup();
+        if passes.len() < 10 {
+            passes
+                .iter()
+                .enumerate()
+                .for_each(|(i, name)| println!("  {name:24} {:8.2}", self.milliseconds(|j, _| i == j)));
+        } else {
+            kernels.iter().for_each(|name| println!("  {name:24} {:8.2}", self.milliseconds(|_, p| p.name == *name)));
+        }
+    }
+}
+
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values[values.len() / 2]
@@ -33,34 +153,47 @@ fn median(mut values: Vec<f64>) -> f64 {
 
 fn main() -> Result<()> {
     let args: Vec<String> = std::env::args().skip(1).collect();
-    let name = args.first().map_or("atrous", String::as_str);
-    let number = |i: usize, or: u32| args.get(i).map_or(Ok(or), |a| a.parse());
-    let (width, height, rounds) = (number(1, 512)?, number(2, 512)?, number(3, 11)?);
+    let name = args.first().context("name a filter: atrous, guided or bilateral")?;
+    let rounds: usize = args.get(1).map_or(Ok(7), |a| a.parse())?;
+    let (row, case): (&Row, _) = (filter::find(name).context("no such filter")?, case(name)?);
     let gpu = Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), validation: false })?;
-    let input = picture(width, height);
-    let row = find(name).context("no such filter")?;
-    let mut settings = FilterSettings::default().scaled_to(&input);
-    if name == "bilateral" {
-        settings.sigma_rt = f32::INFINITY; // joint: by the guide alone, as OpenCV's jointBilateralFilter and GIF's
-    }
+    let input = picture(case.size);
     let planes = Planes::new(&gpu, &input)?;
-    let filter = (row.make)(&gpu, &settings, planes.size)?;
-    let mut frame = FrameResources::new(&gpu)?;
-    let mut round = || gpu.run(&mut frame, |rec| filter.record(rec, &planes));
-    round()?;
-    let runs = (0..rounds).map(|_| round()).collect::<tallow::error::Result<Vec<_>>>()?;
-    let ms = |p: &PassTime| (p.end_ns - p.begin_ns) as f64 * 1e-6;
-    let total = |kernel: Option<&str>| {
-        let of = |run: &Vec<PassTime>| run.iter().filter(|p| kernel.is_none_or(|k| k == p.name)).map(ms).sum::<f64>();
-        let times: Vec<f64> = runs.iter().map(of).collect();
-        (times.iter().copied().fold(f64::INFINITY, f64::min), median(times))
+    let make = |(name, s): &(&'static str, FilterSettings)| {
+        let filter = (row.make)(&gpu, &s.scaled_to(&input), case.size)?;
+        Ok(Ours { name, filter, runs: Vec::new() })
     };
-    let kernels: BTreeSet<&str> = runs[0].iter().map(|p| p.name).collect();
-    for kernel in kernels {
-        let (best, median) = total(Some(kernel));
-        println!("{kernel:24} best {best:8.2} ms, median {median:8.2} ms");
+    let mut ours: Vec<Ours> = case.settings.iter().map(make).collect::<Result<_>>()?;
+    let mut peer = args.get(2).map(|folder| Peer::start(Path::new(folder), case.size)).transpose()?;
+    let (mut frame, mut theirs) = (FrameResources::new(&gpu)?, Vec::new());
+    for round in 0..=rounds {
+        let peer = peer.as_mut().map(|peer| peer.milliseconds(case.peer)).transpose()?;
+        for ours in &mut ours {
+            let times = gpu.run(&mut frame, |rec| ours.filter.record(rec, &planes))?;
+            if round > 0 {
+                ours.runs.push(times);
+            }
+        }
+        theirs.extend(peer.filter(|_| round > 0));
     }
-    let (best, median) = total(None);
-    println!("{name} {width}x{height}: best {best:.2} ms, median {median:.2} ms of {rounds}, on {}", gpu.info().name);
+    println!(
+        "{name}, {}x{}, on {}; milliseconds, medians of {rounds} rounds",
+        case.size[0],
+        case.size[1],
+        gpu.info().name
+    );
+    ours[0].print();
+    if name == "guided" {
+        [0.0, 1e2, 1e4].iter().try_for_each(|near| errors(&gpu, row, *near))?;
+    }
+    let first = ours[0].milliseconds(|_, _| true);
+    for ours in &ours {
+        let ms = ours.milliseconds(|_, _| true);
+        println!("{:26} {ms:8.2}, {:.3} of the first", ours.name, ms / first);
+    }
+    if !theirs.is_empty() {
+        let theirs = median(theirs);
+        println!("peer ({})  {theirs:.2}; ours / theirs {:.2}", case.peer, first / theirs);
+    }
     Ok(())
 }

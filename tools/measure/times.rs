@@ -56,7 +56,7 @@ pub fn print(gpu: &Gpu) -> anyhow::Result<()> {
         print!("{}", table::text(&["weights", "1 level", "5 levels", "10 levels"], &rows));
     }
     println!("\nGIF, table 2, 1024x768: milliseconds");
-    print!("{}\n", table::text(&["filter", "settings", "ours", "published"], &gif(gpu)?));
+    println!("{}", table::text(&["filter", "settings", "ours", "published"], &gif(gpu)?));
     Ok(())
 }
 

@@ -1,5 +1,5 @@
 //! What can be set about layers and filters.
-use crate::filter::{AtrousForm, FilterInput, FilterSettings, WaveletBasis};
+use crate::filter::{AtrousForm, FilterInput, FilterSettings, GuidedSums, WaveletBasis};
 use crate::image::aov::{Aov, Names};
 
 /// Names of layers, for those that are not found, or not the right ones.
@@ -86,6 +86,9 @@ pub struct Overrides {
     /// Variance of the guide below which guided sees no edge: one number, or one per channel
     #[arg(long, value_name = "N[,N,N,N]", value_parser = per_channel)]
     pub eps: Option<[f32; 4]>,
+    /// How guided sums over windows
+    #[arg(long, value_enum)]
+    pub sums: Option<GuidedSums>,
     /// Standard deviations of a pixel's luminance that count as an edge for svgf
     #[arg(long, value_name = "N")]
     pub sigma_l: Option<f32>,
@@ -121,6 +124,7 @@ impl Overrides {
             radius: self.radius.unwrap_or(own.radius),
             channels: self.channels.unwrap_or(own.channels),
             eps: self.eps.unwrap_or(own.eps),
+            sums: self.sums.unwrap_or(own.sums),
             sigma_l: self.sigma_l.unwrap_or(own.sigma_l),
             basis: self.basis.unwrap_or(own.basis),
         }

@@ -21,8 +21,8 @@ gpu_structs! {
 
     /// Push constants of `guided_pack.comp`.
     struct GuidedPackPush {
-        /// Pixels.
-        count: uint,
+        /// Image in pixels.
+        size: uvec2,
         /// 1 / extent.
         depth_scale: float,
     }
