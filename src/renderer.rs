@@ -97,8 +97,8 @@ impl Renderer {
         let effects = Effects { split_light: outputs.split_light, counters: outputs.counters, ..effects };
         let workgroup = if gpu.info().kind == "CPU" { WORKGROUP_CPU } else { WORKGROUP_GPU };
         let stages = Stages {
-            guide: PerThread::new(gpu, &effects, workgroup)?,
-            path: PerThread::new(gpu, &effects, workgroup)?,
+            guide: PerThread::with_stack(gpu, &effects, workgroup, scene.stack)?,
+            path: PerThread::with_stack(gpu, &effects, workgroup, scene.stack)?,
             fold: PerThread::new(gpu, &effects, workgroup)?,
         };
         let policy = policy_of(&settings)?;

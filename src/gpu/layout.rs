@@ -378,9 +378,9 @@ gpu_structs! {
     struct RayQuery {
         /// World units.
         origin: vec3,
-        /// World units.
+        /// In lengths of `direction`.
         t_max: float,
-        /// Unit.
+        /// Not 0.
         direction: vec3,
         /// Decides hits on partly transparent surfaces.
         mask_seed: uint,
@@ -388,7 +388,7 @@ gpu_structs! {
 
     /// What `traverse.comp` finds.
     struct RayHit {
-        /// World units; the ray's `t_max` on a miss.
+        /// In lengths of the ray's direction; its `t_max` on a miss.
         t: float,
         /// In leaf order, or [`NONE`].
         triangle: uint,

@@ -147,9 +147,7 @@ impl Tracer<'_> {
         let (mut direction, mut distance) = (light.direction, light.distance);
         if distance < INFINITE_DISTANCE {
             direction = s.position + light.distance * light.direction - origin;
-            distance = direction.length();
-            direction /= distance;
-            distance *= 1.0 - 1e-6;
+            distance = 1.0 - 1e-6;
         }
         let blocker = traverse(self.scene, origin, direction, distance, true, mask_seed);
         if blocker.any() { Vec3::ZERO } else { contribution }
@@ -163,7 +161,7 @@ impl Tracer<'_> {
         }
         let geometric = p.surface.geometric;
         path.throughput *= next.weight;
-        path.direction = (p.basis * next.wi).normalize();
+        path.direction = p.basis * next.wi;
         let normal = if path.direction.dot(geometric) < 0.0 { -geometric } else { geometric };
         path.origin = offset_origin(p.surface.position, normal);
         path.bsdf_pdf = next.pdf;
