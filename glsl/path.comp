@@ -121,6 +121,7 @@ Light2 trace_path(Path path, Sampler random, uint path_seed, out vec3 albedo) {
     Light2 sum = Light2(vec3(0.0), vec3(0.0));
     bool smooth_first = false, shadowed = false, alive = true;
     Segment shadow = Segment(vec3(0.0), vec3(0.0), 0.0, 0u);
+    uvec2 from = uvec2(NONE);
     vec3 sampled = vec3(0.0); // light along `shadow`, which waits for the next ray: see traverse_both
     albedo = vec3(0.0);
     for (uint bounce = 0u; alive || shadowed; bounce++) {
@@ -132,7 +133,7 @@ Light2 trace_path(Path path, Sampler random, uint path_seed, out vec3 albedo) {
         uint mask_seed = pcg(path_seed + 2u * bounce);
         Segment ray = Segment(path.origin, path.direction, INFINITE_DISTANCE, mask_seed);
         bool lit = shadowed;
-        Hit hit = traverse_both(shadow, shadowed, ray, alive, push.root);
+        Hit hit = traverse_both(shadow, shadowed, ray, alive, push.root, from);
         bool indirect = bounce >= 2u && !smooth_first;
         add_light(sum, lit && !shadowed ? sampled : vec3(0.0), indirect);
         if (!alive) break;
@@ -140,6 +141,7 @@ Light2 trace_path(Path path, Sampler random, uint path_seed, out vec3 albedo) {
             add_light(sum, path.throughput * light_from_miss(path), indirect);
             break;
         }
+        from = uvec2(hit.triangle, hit.instance);
         Surface s = surface_at(hit);
         add_light(sum, path.throughput * light_from_hit(path, s, hit.t), indirect);
         if (bounce + 1u >= push.max_depth) break;

@@ -35,7 +35,9 @@ void main() {
         RaySpace space = ray_space(ray.origin, ray.direction);
         if (done) t = traversal_start(ray.t_max, push.root);
         done = false;
-        for (uint k = 0u; k < STEPS && !done; k++) done = traversal_step(t, space, any_hit, push.root, ray.mask_seed);
+        for (uint k = 0u; k < STEPS && !done; k++) {
+            done = traversal_step(t, space, any_hit, push.root, ray.mask_seed, uvec2(NONE));
+        }
         if (done) {
             hits[i] = RayHit(t.hit.t, t.hit.triangle, t.hit.instance, t.hit.barycentric);
             i += gl_NumWorkGroups.x * gl_NumWorkGroups.y * WORKGROUP;

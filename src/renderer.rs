@@ -352,7 +352,7 @@ pub fn path_push(scene: &Scene) -> PathPush {
         light_count: scene.lights.len() as u32,
         triangle_pdf_scale: scene.triangle_pdf_scale,
         environment: environment.map_or(NONE, |i| i as u32),
-        environment_size: scene.environment.as_ref().map_or(0, |e| e.width | e.height << 16),
+        environment_width: scene.environment.as_ref().map_or(0, |e| e.width),
         root: scene.root | if scene.instances.is_empty() { 0 } else { ROOT_OF_INSTANCES },
         ..PathPush::default()
     }

@@ -73,6 +73,17 @@ fn pictures() -> Scene {
          [[instance]]\nmesh = 'ball'\ntransform = { translate = [1.2, 0.8, -0.5], rotate = [20.0, 50.0, 0.0], scale = 0.8 }\n",
     );
     scene.settings.filter = PixelFilter::Gaussian;
+    (scene.textures[0].scale, scene.textures[0].offset) = ([2.0, -0.7], [0.3, 0.1]);
+    small(&mut scene.settings);
+    scene
+}
+
+/// A ball under a sky whose columns need more than 16 bits to count.
+fn wide_sky() -> Scene {
+    let mut scene = Workplace::new().sky("sky.exr", 70_000, 2, |x, _| if x < 20_000 { 3.0 } else { 0.1 }).scene(
+        "[camera]\nposition = [0.0, 0.0, 4.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 45.0\n[environment]\nfile = 'sky.exr'\n\
+         [[mesh]]\nshape = 'sphere'\nsegments = 16\n",
+    );
     small(&mut scene.settings);
     scene
 }
@@ -164,6 +175,7 @@ fn renders_agree_with_their_twins() {
         let scene = shipped(file);
         check(file, &run(&gpu, &scene, called_for(&scene, outputs)));
     }
+    check("wide sky", &run(&gpu, &wide_sky(), called_for(&wide_sky(), outputs)));
     let scene = pictures();
     let mut pair = run(&gpu, &scene, called_for(&scene, outputs));
     check("pictures", &pair);

@@ -165,12 +165,13 @@ void enter_instance(inout Traversal t, RaySpace world, uvec2 leaves) {
     t.group = uvec2(instance_root(t.instance), 0x80000000u);
 }
 
-void intersect_leaves(inout Traversal t, RaySpace ray, uvec2 leaves, bool any_hit, uint mask_seed) {
+void intersect_leaves(inout Traversal t, RaySpace ray, uvec2 leaves, bool any_hit, uint mask_seed, uvec2 from) {
     while (leaves.y != 0u) {
         uint index = leaves.x + take_highest(leaves.y);
         float distance;
         vec2 barycentric;
-        bool meets = intersect_triangle(ray, index, t.hit.t, distance, barycentric);
+        bool meets = intersect_triangle(ray, index, t.hit.t, distance, barycentric) &&
+                     (index != from.x || (FX_INSTANCES && t.instance != from.y));
         if (FX_ALPHA_MASKS && meets) meets = mask_blocks(index, t.instance, barycentric, mask_seed);
         if (meets) {
             t.hit = Hit(distance, index, t.instance, barycentric);
@@ -179,9 +180,10 @@ void intersect_leaves(inout Traversal t, RaySpace ray, uvec2 leaves, bool any_hi
     }
 }
 
-// Visits one node below `root` (with ROOT_OF_INSTANCES, a level of instances) and its triangles; true when nothing is left to visit, or
-// with `any_hit` a triangle is found.
-bool traversal_step(inout Traversal t, RaySpace world, bool any_hit, uint root, uint mask_seed) {
+// Visits one node below `root` (with ROOT_OF_INSTANCES, a level of instances) and its triangles; true when nothing is
+// left to visit, or with `any_hit` a triangle is found. `from` is the triangle that the ray leaves, and its instance: a
+// plane is not met twice, but the offset of the origin can be smaller than the error of a large triangle's distance.
+bool traversal_step(inout Traversal t, RaySpace world, bool any_hit, uint root, uint mask_seed, uvec2 from) {
     bool two_levels = FX_INSTANCES && (root & ROOT_OF_INSTANCES) != 0u;
     RaySpace ray = world;
     if (FX_INSTANCES) ray = either(t.instance != NONE, t.inside, world);
@@ -202,7 +204,7 @@ bool traversal_step(inout Traversal t, RaySpace world, bool any_hit, uint root, 
         enter_instance(t, world, leaves);
         leaves.y = 0u;
     }
-    intersect_leaves(t, ray, leaves, any_hit, mask_seed);
+    intersect_leaves(t, ray, leaves, any_hit, mask_seed, from);
     bool done = any_hit && t.hit.triangle != NONE;
     if (!done && t.group.y <= 0x00ffffffu) {
         if (FX_INSTANCES && t.depth == t.bottom) {
@@ -215,24 +217,24 @@ bool traversal_step(inout Traversal t, RaySpace world, bool any_hit, uint root, 
     return done;
 }
 
-// The closest hit.
+// The closest hit of a ray that leaves no triangle.
 Hit traverse(Segment ray, uint root) {
     RaySpace space = ray_space(ray.origin, ray.direction);
     Traversal t = traversal_start(ray.t_max, root);
-    while (!traversal_step(t, space, false, root, ray.mask_seed)) {}
+    while (!traversal_step(t, space, false, root, ray.mask_seed, uvec2(NONE))) {}
     return t.hit;
 }
 
 // First, where `shadowed`, whether anything blocks `shadow` (the answer replaces `shadowed`); then, where `alive`, the
-// closest hit of `ray`. In one loop no lane waits for the slowest shadow ray, and the code is there once.
-Hit traverse_both(Segment shadow, inout bool shadowed, Segment ray, bool alive, uint root) {
+// closest hit of `ray`. Both leave the same triangle. In one loop no lane waits for the slowest shadow ray, and the code is there once.
+Hit traverse_both(Segment shadow, inout bool shadowed, Segment ray, bool alive, uint root, uvec2 from) {
     RaySpace first = ray_space(shadow.origin, shadow.direction), second = ray_space(ray.origin, ray.direction);
     bool any_hit = shadowed, done = false;
     shadowed = false;
     Traversal t = traversal_start(any_hit ? shadow.t_max : ray.t_max, root);
     while (!done) {
         uint mask_seed = any_hit ? shadow.mask_seed : ray.mask_seed;
-        done = traversal_step(t, either(any_hit, first, second), any_hit, root, mask_seed);
+        done = traversal_step(t, either(any_hit, first, second), any_hit, root, mask_seed, from);
         if (done && any_hit) {
             shadowed = t.hit.triangle != NONE;
             t = traversal_start(ray.t_max, root);

@@ -245,7 +245,7 @@ gpu_structs! {
         pad: uint,
     }
 
-    /// A picture in the texel buffer: RGBA8 texels (R in the low byte), row 0 at the top. 1 texel.
+    /// A picture in the texel buffer: RGBA8 texels (R in the low byte), row 0 at the top. 2 texels.
     struct Texture {
         /// Index of the first texel.
         first: uint,
@@ -255,6 +255,10 @@ gpu_structs! {
         height: uint,
         /// TEXTURE_ bits.
         flags: uint,
+        /// It is read at `uv * scale + offset`.
+        scale: vec2,
+        /// See `scale`.
+        offset: vec2,
     }
 
     /// A light. 4 texels; what the vectors mean depends on `kind`.
@@ -350,8 +354,8 @@ gpu_structs! {
         triangle_pdf_scale: float,
         /// Index of the environment among the lights, or NONE.
         environment: uint,
-        /// Texels of the environment image, width in the low half, height in the high half.
-        environment_size: uint,
+        /// Columns of the environment image; 0 without one.
+        environment_width: uint,
         /// Node where traversal starts, with ROOT_OF_INSTANCES.
         root: uint,
     }

@@ -136,6 +136,7 @@ struct Traversal<'a> {
     hit: Hit,
     instance: u32,
     mask_seed: u32,
+    from: [u32; 2],
 }
 
 impl Traversal<'_> {
@@ -178,6 +179,9 @@ impl Traversal<'_> {
     fn test(&mut self, mut leaves: Group, any_hit: bool) -> bool {
         while leaves.1 != 0 {
             let index = leaves.0 + take_highest(&mut leaves.1);
+            if [index, self.instance] == self.from {
+                continue;
+            }
             let vertices = triangle_vertices(self.scene, index);
             let Some((t, barycentric)) = intersect_triangle(&self.ray, vertices, self.hit.t) else { continue };
             if mask_blocks(self.scene, index, self.instance, barycentric, self.mask_seed) {
@@ -193,9 +197,22 @@ impl Traversal<'_> {
 
 /// The closest hit before `t_max`, or with `any_hit` the first one found.
 pub fn traverse(scene: &Scene, origin: Vec3, direction: Vec3, t_max: f32, any_hit: bool, mask_seed: u32) -> Hit {
+    traverse_from(scene, [NONE; 2], origin, direction, t_max, any_hit, mask_seed)
+}
+
+/// [`traverse`] for a ray that leaves the triangle `from[0]` of the instance `from[1]`, and does not meet it again.
+pub fn traverse_from(
+    scene: &Scene,
+    from: [u32; 2],
+    origin: Vec3,
+    direction: Vec3,
+    t_max: f32,
+    any_hit: bool,
+    mask_seed: u32,
+) -> Hit {
     let hit = Hit { t: t_max, triangle: NONE, instance: NONE, barycentric: Vec2::ZERO };
     let ray = ray_space(origin, direction);
-    let mut t = Traversal { scene, ray, stack: Vec::with_capacity(STACK_SIZE), hit, instance: NONE, mask_seed };
+    let mut t = Traversal { scene, ray, stack: Vec::with_capacity(STACK_SIZE), hit, instance: NONE, mask_seed, from };
     let two_levels = !scene.instances.is_empty();
     let mut bottom = 0; // stack depth at which the current instance was entered
     let mut group = (scene.root, 0x80000000);

@@ -1,6 +1,8 @@
 //! Scene files become flat arrays, ready to be copied to the device as they are. Nothing here talks to a GPU.
 use crate::error::{Error, Result};
-use crate::gpu::layout::{AliasEntry, BvhNode, Camera, Instance, Light, Material, Shading, TRAVERSAL_STACK, Texture, Triangle};
+use crate::gpu::layout::{
+    AliasEntry, BvhNode, Camera, Instance, Light, Material, Shading, TRAVERSAL_STACK, Texture, Triangle,
+};
 use crate::settings::Settings;
 use std::path::Path;
 
@@ -19,6 +21,7 @@ mod mtl;
 mod obj;
 mod obj_lines;
 mod place;
+mod polygon;
 mod shape;
 mod texture;
 mod value;

@@ -20,8 +20,8 @@ use tallow::reference::warp::{basis_from_normal, warp_cosine_hemisphere};
 use tallow::renderer::{Outputs, Renderer};
 use tallow::scene::Scene;
 use tallow::settings::Settings;
-use tallow::stage::{PerThread, WORKGROUP_CPU};
 use tallow::shaders::traverse::Bind;
+use tallow::stage::{PerThread, WORKGROUP_CPU};
 
 const SIDE: u32 = 512;
 const THREADS: usize = 2;
