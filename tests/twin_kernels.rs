@@ -48,7 +48,7 @@ fn shipped(file: &str) -> Scene {
 
 /// Textures of every use, masks, a normal map, an environment image, a lens, a mirrored instance, roulette and a clamp.
 fn pictures() -> Scene {
-    let checks = |x: u32, y: u32| if (x / 4 + y / 4) % 2 == 0 { [230, 120, 40] } else { [60, 150, 220] };
+    let checks = |x: u32, y: u32| if (x / 4 + y / 4).is_multiple_of(2) { [230, 120, 40] } else { [60, 150, 220] };
     let bumps = |x: u32, y: u32| [128 + (x * 7 % 60) as u8, 128 + (y * 5 % 60) as u8, 235];
     let place = Workplace::new()
         .sky("sky.exr", 32, 16, |x, y| if (x, y) == (20, 3) { 60.0 } else { 0.4 + 0.01 * x as f32 })
@@ -211,8 +211,8 @@ fn queries(scene: &Scene, count: usize) -> Vec<RayQuery> {
     let mut query = |i: usize| {
         let origin = low + (high - low) * (0.5 + 0.7 * random.point());
         let axis = [Vec3::X, Vec3::NEG_Y, Vec3::NEG_Z][i % 3];
-        let direction = if i % 4 == 0 { axis } else { random.point().normalize() };
-        let t_max = if i % 5 == 0 { 0.3 * (high - low).length() } else { 3e38 };
+        let direction = if i.is_multiple_of(4) { axis } else { random.point().normalize() };
+        let t_max = if i.is_multiple_of(5) { 0.3 * (high - low).length() } else { 3e38 };
         RayQuery { origin: origin.into(), t_max, direction: direction.into(), mask_seed: i as u32 }
     };
     (0..count).map(&mut query).collect()

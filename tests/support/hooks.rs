@@ -20,7 +20,9 @@ pub fn between(raw: RawDevice) -> (RawDevice, MutexGuard<'static, ()>) {
     static TURN: Mutex<()> = Mutex::new(());
     let guard = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     // SAFETY: the engine's own pointer.
-    INSTANCE_LOADER.get_or_init(|| unsafe { transmute::<*const c_void, _>(raw.get_instance_proc_addr) });
+    INSTANCE_LOADER.get_or_init(|| unsafe {
+        transmute::<*const c_void, vk::PFN_vkGetInstanceProcAddr>(raw.get_instance_proc_addr)
+    });
     (RawDevice { get_instance_proc_addr: get_instance_proc_addr as *const c_void, ..raw }, guard)
 }
 
@@ -38,8 +40,8 @@ unsafe extern "system" fn get_instance_proc_addr(
         if CStr::from_ptr(name) != c"vkGetDeviceProcAddr" {
             return found;
         }
-        DEVICE_LOADER.get_or_init(|| transmute::<vk::PFN_vkVoidFunction, _>(found));
-        Some(transmute::<*const c_void, _>(get_device_proc_addr as *const c_void))
+        DEVICE_LOADER.get_or_init(|| transmute::<vk::PFN_vkVoidFunction, vk::PFN_vkGetDeviceProcAddr>(found));
+        Some(transmute::<*const c_void, unsafe extern "system" fn()>(get_device_proc_addr as *const c_void))
     }
 }
 
@@ -59,8 +61,8 @@ macro_rules! between {
                             }
                             unsafe { REAL.get().expect("found first")($($arg),+) }
                         }
-                        REAL.get_or_init(|| transmute::<vk::PFN_vkVoidFunction, _>(found));
-                        return Some(transmute::<*const c_void, _>(ours as *const c_void));
+                        REAL.get_or_init(|| transmute::<vk::PFN_vkVoidFunction, vk::$pfn>(found));
+                        return Some(transmute::<*const c_void, unsafe extern "system" fn()>(ours as *const c_void));
                     }
                 )+
                 found
