@@ -31,7 +31,7 @@ void main() {
     Camera camera = push.camera;
     camera.lens_radius = 0.0;
     Ray ray = camera_ray(camera, film_from_pixel(centre, push.size), vec2(0.5));
-    Hit hit = traverse(ray.origin, ray.direction, 3e38, false, push.root, pcg(pixel));
+    Hit hit = traverse(Segment(ray.origin, ray.direction, 3e38, pcg(pixel)), push.root);
     Guide guide = Guide(vec3(0.0), 0.0, vec3(0.0), NONE, vec3(0.0), NONE);
     if (hit.triangle != NONE) {
         Surface s = surface_at(hit);

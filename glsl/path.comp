@@ -58,15 +58,13 @@ struct Light2 {
 };
 
 void add_light(inout Light2 sum, vec3 light, bool indirect) {
-    if (!FX_INDIRECT || !indirect) {
-        sum.direct += light;
-        return;
-    }
+    bool apart = FX_INDIRECT && indirect;
+    sum.direct += apart ? vec3(0.0) : light;
     if (FX_CLAMP) {
         float largest = max(light.r, max(light.g, light.b));
         light *= push.clamp_indirect > 0.0 && largest > push.clamp_indirect ? push.clamp_indirect / largest : 1.0;
     }
-    sum.indirect += light;
+    sum.indirect += apart ? light : vec3(0.0);
 }
 
 vec3 light_from_miss(Path path) {
@@ -78,48 +76,38 @@ vec3 light_from_miss(Path path) {
 
 vec3 light_from_hit(Path path, Surface s, float t) {
     float cosine = -dot(s.geometric, path.direction);
-    if (!FX_EMISSIVE || cosine <= 0.0) return vec3(0.0);
     float weight = path.delta ? 1.0 : balance(path.bsdf_pdf, triangle_light_pdf(s.material, t, cosine));
-    return surface_emission(s) * weight;
+    return FX_EMISSIVE && cosine > 0.0 ? surface_emission(s) * weight : vec3(0.0);
 }
 
-// Direct light at `s` by light sampling. `basis` columns are the shading frame, `side` turns it to the viewer.
-vec3 light_from_nee(Path path, Surface s, Bsdf bsdf, mat3 basis, vec3 wo, Sampler random, uint pair, uint mask_seed) {
+// Direct light at `s` by light sampling, unless something blocks `shadow`; 0 needs no ray. `basis` columns are the
+// shading frame.
+vec3 light_from_nee(Surface s, Bsdf bsdf, mat3 basis, vec3 wo, Sampler random, uint pair, uint mask_seed, out Segment shadow) {
     uint word = sample_2d_bits(random, pair + PAIR_CHOICE).x;
     LightSample light = light_sample(s.position, word, sample_2d(random, pair + PAIR_LIGHT));
-    if (all(equal(light.radiance, vec3(0.0)))) return vec3(0.0);
     vec3 wi = light.direction * basis; // row vector times matrix: into the frame
     vec4 f = bsdf_evaluate(bsdf, wo, wi);
-    vec3 contribution = f.rgb * light.radiance * (light.pdf > 0.0 ? balance(light.pdf, f.w) : 1.0);
-    if (!(max(contribution.r, max(contribution.g, contribution.b)) > 0.0)) return vec3(0.0);
     vec3 normal = dot(light.direction, s.geometric) < 0.0 ? -s.geometric : s.geometric;
-    vec3 origin = offset_origin(s.position, normal);
-    vec3 direction = light.direction;
-    float distance = light.distance;
-    if (distance < INFINITE_DISTANCE) { // aim again from the offset origin, so that the segment ends on the light
-        vec3 target = s.position + light.distance * light.direction;
-        direction = target - origin;
-        distance = length(direction);
-        direction /= distance;
-        distance *= 1.0 - 1e-6;
+    shadow = Segment(offset_origin(s.position, normal), light.direction, light.distance, mask_seed);
+    if (light.distance < INFINITE_DISTANCE) { // aim again from the offset origin, so that the segment ends on the light
+        shadow.direction = s.position + light.distance * light.direction - shadow.origin;
+        shadow.t_max = 1.0 - 1e-6;
     }
-    if (FX_COUNTERS) any_rays++;
-    Hit blocker = traverse(origin, direction, distance, true, push.root, mask_seed);
-    return blocker.triangle == NONE ? contribution : vec3(0.0);
+    return f.rgb * light.radiance * (light.pdf > 0.0 ? balance(light.pdf, f.w) : 1.0);
 }
 
 // Chooses the next direction. False when the path ends.
 bool scatter(inout Path path, Surface s, Bsdf bsdf, mat3 basis, vec3 wo, Sampler random, uint pair) {
     BsdfSample next;
     float lobe = sample_2d(random, pair + PAIR_CHOICE).y;
-    if (!bsdf_sample(bsdf, wo, lobe, sample_2d(random, pair + PAIR_BSDF), next)) return false;
+    bool scattered = bsdf_sample(bsdf, wo, lobe, sample_2d(random, pair + PAIR_BSDF), next);
     path.throughput *= next.weight;
-    path.direction = normalize(basis * next.wi);
+    path.direction = basis * next.wi;
     vec3 normal = dot(path.direction, s.geometric) < 0.0 ? -s.geometric : s.geometric;
     path.origin = offset_origin(s.position, normal);
     path.bsdf_pdf = next.pdf;
     path.delta = next.delta;
-    return max(path.throughput.r, max(path.throughput.g, path.throughput.b)) > 0.0;
+    return scattered && max(path.throughput.r, max(path.throughput.g, path.throughput.b)) > 0.0;
 }
 
 bool survives_roulette(inout Path path, Sampler random, uint pair) {
@@ -131,18 +119,29 @@ bool survives_roulette(inout Path path, Sampler random, uint pair) {
 
 Light2 trace_path(Path path, Sampler random, uint path_seed, out vec3 albedo) {
     Light2 sum = Light2(vec3(0.0), vec3(0.0));
-    bool smooth_first = false;
+    bool smooth_first = false, shadowed = false, alive = true;
+    Segment shadow = Segment(vec3(0.0), vec3(0.0), 0.0, 0u);
+    uvec2 from = uvec2(NONE);
+    vec3 sampled = vec3(0.0); // light along `shadow`, which waits for the next ray: see traverse_both
     albedo = vec3(0.0);
-    for (uint bounce = 0u;; bounce++) {
+    for (uint bounce = 0u; alive || shadowed; bounce++) {
         uint pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
-        if (FX_COUNTERS) closest_rays++;
+        if (FX_COUNTERS) {
+            closest_rays += uint(alive);
+            any_rays += uint(shadowed);
+        }
         uint mask_seed = pcg(path_seed + 2u * bounce);
-        Hit hit = traverse(path.origin, path.direction, INFINITE_DISTANCE, false, push.root, mask_seed);
+        Segment ray = Segment(path.origin, path.direction, INFINITE_DISTANCE, mask_seed);
+        bool lit = shadowed;
+        Hit hit = traverse_both(shadow, shadowed, ray, alive, push.root, from);
         bool indirect = bounce >= 2u && !smooth_first;
+        add_light(sum, lit && !shadowed ? sampled : vec3(0.0), indirect);
+        if (!alive) break;
         if (hit.triangle == NONE) {
             add_light(sum, path.throughput * light_from_miss(path), indirect);
             break;
         }
+        from = uvec2(hit.triangle, hit.instance);
         Surface s = surface_at(hit);
         add_light(sum, path.throughput * light_from_hit(path, s, hit.t), indirect);
         if (bounce + 1u >= push.max_depth) break;
@@ -158,13 +157,11 @@ Light2 trace_path(Path path, Sampler random, uint path_seed, out vec3 albedo) {
             albedo = bsdf_albedo(bsdf);
             smooth_first = smooth_here;
         }
-        if (push.light_count > 0u && !smooth_here) {
-            vec3 light = light_from_nee(path, s, bsdf, basis, wo, random, pair, mask_seed + 1u);
-            add_light(sum, path.throughput * light, bounce >= 1u && !smooth_first);
-        }
-        if (!scatter(path, s, bsdf, basis, wo, random, pair)) break;
+        sampled = path.throughput * light_from_nee(s, bsdf, basis, wo, random, pair, mask_seed + 1u, shadow);
+        shadowed = push.light_count > 0u && !smooth_here && max(sampled.r, max(sampled.g, sampled.b)) > 0.0;
+        alive = scatter(path, s, bsdf, basis, wo, random, pair);
         bool roulette = FX_ROULETTE && push.roulette_depth > 0u && bounce + 1u >= push.roulette_depth;
-        if (roulette && !survives_roulette(path, random, pair)) break;
+        if (roulette) alive = survives_roulette(path, random, pair) && alive;
     }
     return sum;
 }

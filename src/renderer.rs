@@ -97,8 +97,8 @@ impl Renderer {
         let effects = Effects { split_light: outputs.split_light, counters: outputs.counters, ..effects };
         let workgroup = if gpu.info().kind == "CPU" { WORKGROUP_CPU } else { WORKGROUP_GPU };
         let stages = Stages {
-            guide: PerThread::new(gpu, &effects, workgroup)?,
-            path: PerThread::new(gpu, &effects, workgroup)?,
+            guide: PerThread::with_stack(gpu, &effects, workgroup, scene.stack)?,
+            path: PerThread::with_stack(gpu, &effects, workgroup, scene.stack)?,
             fold: PerThread::new(gpu, &effects, workgroup)?,
         };
         let policy = policy_of(&settings)?;
@@ -361,7 +361,7 @@ pub fn path_push(scene: &Scene) -> PathPush {
         light_count: scene.lights.len() as u32,
         triangle_pdf_scale: scene.triangle_pdf_scale,
         environment: environment.map_or(NONE, |i| i as u32),
-        environment_size: scene.environment.as_ref().map_or(0, |e| e.width | e.height << 16),
+        environment_width: scene.environment.as_ref().map_or(0, |e| e.width),
         root: scene.root | if scene.instances.is_empty() { 0 } else { ROOT_OF_INSTANCES },
         ..PathPush::default()
     }

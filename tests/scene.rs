@@ -1,6 +1,7 @@
 //! Scene files end to end: what they become, and what is said about mistakes.
 use std::path::Path;
 use tallow::gpu::layout::*;
+use tallow::reference::texture::texture_sample;
 use tallow::scene::{Scene, effects};
 
 const BOX: &str = "
@@ -209,4 +210,23 @@ fn mtl_rules_by_example() {
     assert_eq!((glass.transmission, glass.flags & MATERIAL_MASKED), ([0.9, 1.0, 0.9], 0));
     assert_eq!((tinted.kind, tinted.transmission), (BSDF_DIELECTRIC, [1.0, 0.0, 0.0]));
     assert_eq!((veil.kind, veil.opacity, veil.flags & MATERIAL_MASKED), (BSDF_DIFFUSE, 0.5, MATERIAL_MASKED));
+}
+
+#[test]
+fn maps_are_scaled_and_moved() {
+    let dir = tempfile::tempdir().unwrap();
+    let picture = image::RgbImage::from_fn(8, 8, |x, y| image::Rgb([(x * 31) as u8, (y * 31) as u8, 99]));
+    picture.save(dir.path().join("a.png")).unwrap();
+    let mtl = "newmtl plain\nmap_Kd a.png\nnewmtl moved\nmap_Kd -s 2 -3 -o 0.25 0.5 a.png\n";
+    std::fs::write(dir.path().join("m.mtl"), mtl).unwrap();
+    let text = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl plain\nf 1 2 3\nusemtl moved\nf 1 2 3\n";
+    std::fs::write(dir.path().join("m.obj"), text).unwrap();
+    let scene = Scene::load(&dir.path().join("m.obj"), &|_| {}).unwrap();
+    let [plain, moved] = [0, 1].map(|i| scene.materials[i].base_texture);
+    let sample = |texture, u, v| texture_sample(&scene, texture, glam::vec2(u, v));
+    for (u, v) in [(0.0, 0.0), (0.3, 0.2), (0.9, 0.7), (-0.4, 1.6)] {
+        let expected = sample(plain, 2.0 * u + 0.25, -3.0 * v + 0.5);
+        assert!((sample(moved, u, v) - expected).abs().max_element() < 1e-5, "{u} {v}");
+    }
+    assert!((sample(moved, 0.3, 0.2) - sample(plain, 0.3, 0.2)).abs().max_element() > 0.1, "control");
 }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use std::path::Path;
 use support::{assert_silent, gpu};
 use tallow::gpu::layout::*;
-use tallow::gpu::{Buffer, FrameResources, Gpu, Kernel, Location};
+use tallow::gpu::{Buffer, FrameResources, Gpu, Location};
 use tallow::reference::fold::fold;
 use tallow::reference::guide::guide;
 use tallow::reference::path::{Strategy, Tracer};
@@ -19,6 +19,7 @@ use tallow::renderer::{Batch, Outputs, Renderer, Step, all_effects, called_for, 
 use tallow::scene::Scene;
 use tallow::settings::{PixelFilter, Settings};
 use tallow::shaders;
+use tallow::stage::PerThread;
 use twin::{Random, Workplace};
 
 const SIDE: u32 = 48;
@@ -47,7 +48,7 @@ fn shipped(file: &str) -> Scene {
 
 /// Textures of every use, masks, a normal map, an environment image, a lens, a mirrored instance, roulette and a clamp.
 fn pictures() -> Scene {
-    let checks = |x: u32, y: u32| if (x / 4 + y / 4) % 2 == 0 { [230, 120, 40] } else { [60, 150, 220] };
+    let checks = |x: u32, y: u32| if (x / 4 + y / 4).is_multiple_of(2) { [230, 120, 40] } else { [60, 150, 220] };
     let bumps = |x: u32, y: u32| [128 + (x * 7 % 60) as u8, 128 + (y * 5 % 60) as u8, 235];
     let place = Workplace::new()
         .sky("sky.exr", 32, 16, |x, y| if (x, y) == (20, 3) { 60.0 } else { 0.4 + 0.01 * x as f32 })
@@ -72,6 +73,17 @@ fn pictures() -> Scene {
          [[instance]]\nmesh = 'ball'\ntransform = { translate = [1.2, 0.8, -0.5], rotate = [20.0, 50.0, 0.0], scale = 0.8 }\n",
     );
     scene.settings.filter = PixelFilter::Gaussian;
+    (scene.textures[0].scale, scene.textures[0].offset) = ([2.0, -0.7], [0.3, 0.1]);
+    small(&mut scene.settings);
+    scene
+}
+
+/// A ball under a sky whose columns need more than 16 bits to count.
+fn wide_sky() -> Scene {
+    let mut scene = Workplace::new().sky("sky.exr", 70_000, 2, |x, _| if x < 20_000 { 3.0 } else { 0.1 }).scene(
+        "[camera]\nposition = [0.0, 0.0, 4.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 45.0\n[environment]\nfile = 'sky.exr'\n\
+         [[mesh]]\nshape = 'sphere'\nsegments = 16\n",
+    );
     small(&mut scene.settings);
     scene
 }
@@ -163,6 +175,7 @@ fn renders_agree_with_their_twins() {
         let scene = shipped(file);
         check(file, &run(&gpu, &scene, called_for(&scene, outputs)));
     }
+    check("wide sky", &run(&gpu, &wide_sky(), called_for(&wide_sky(), outputs)));
     let scene = pictures();
     let mut pair = run(&gpu, &scene, called_for(&scene, outputs));
     check("pictures", &pair);
@@ -178,7 +191,7 @@ fn renders_agree_with_their_twins() {
 /// What the kernel finds.
 fn traversed(gpu: &Gpu, scene: &Scene, effects: Effects, rays: &[RayQuery], any_hit: bool) -> Vec<RayHit> {
     let renderer = Renderer::specialised(gpu, scene, Outputs::default(), effects).unwrap();
-    let kernel = Kernel::new(gpu, &effects, &[(100, 32)]).unwrap();
+    let kernel = PerThread::with_stack(gpu, &effects, 32, scene.stack).unwrap();
     let s = renderer.scene();
     let queries = Buffer::from_slice(gpu, "rays", rays).unwrap();
     let hits = Buffer::new(gpu, "hits", rays.len(), Location::Device).unwrap();
@@ -186,7 +199,7 @@ fn traversed(gpu: &Gpu, scene: &Scene, effects: Effects, rays: &[RayQuery], any_
     let mut frame = FrameResources::new(gpu).unwrap();
     gpu.run(&mut frame, |rec| {
         let bind = shaders::traverse::Bind { scene: s.bind(), rays: &queries, hits: &hits };
-        rec.dispatch(&kernel, bind, &push, [rays.len().div_ceil(32) as u32, 1, 1])
+        kernel.record(rec, bind, &push, rays.len().div_ceil(3) as u32) // some threads have fewer than 3
     })
     .unwrap();
     hits.read().unwrap()
@@ -198,8 +211,8 @@ fn queries(scene: &Scene, count: usize) -> Vec<RayQuery> {
     let mut query = |i: usize| {
         let origin = low + (high - low) * (0.5 + 0.7 * random.point());
         let axis = [Vec3::X, Vec3::NEG_Y, Vec3::NEG_Z][i % 3];
-        let direction = if i % 4 == 0 { axis } else { random.point().normalize() };
-        let t_max = if i % 5 == 0 { 0.3 * (high - low).length() } else { 3e38 };
+        let direction = if i.is_multiple_of(4) { axis } else { random.point().normalize() };
+        let t_max = if i.is_multiple_of(5) { 0.3 * (high - low).length() } else { 3e38 };
         RayQuery { origin: origin.into(), t_max, direction: direction.into(), mask_seed: i as u32 }
     };
     (0..count).map(&mut query).collect()

@@ -10,6 +10,20 @@ pub struct Picture {
     pub rgb: Vec<[f32; 3]>,
 }
 
+impl Picture {
+    /// Means of squares of `factor` pixels each way; what is left over at the right and below is dropped.
+    pub fn reduced(&self, factor: usize) -> Self {
+        let (width, height) = (self.width / factor, self.height / factor);
+        let pixel = |i: usize| {
+            let square =
+                (0..factor * factor).map(|k| (i % width * factor + k % factor, i / width * factor + k / factor));
+            let sum = square.map(|(x, y)| glam::Vec3::from(self.rgb[y * self.width + x])).sum::<glam::Vec3>();
+            (sum / (factor * factor) as f32).to_array()
+        };
+        Self { width, height, rgb: (0..width * height).map(pixel).collect() }
+    }
+}
+
 /// What a pair of images is judged by.
 #[derive(Debug)]
 pub struct Comparison {
@@ -157,6 +171,13 @@ mod tests {
     fn noise_alone_passes() {
         let c = compare(&ramp(1, 0.3, 1.0), &ramp(2, 0.3, 1.0)).unwrap();
         assert!(c.ratio.iter().all(|r| (r - 1.0).abs() < 5e-3) && c.structure < 5e-3, "{c:?}");
+    }
+
+    #[test]
+    fn reducing_averages_squares() {
+        let rgb = (0..15).map(|i| [i as f32, 0.0, 1.0]).collect();
+        let small = Picture { width: 5, height: 3, rgb }.reduced(2);
+        assert_eq!((small.width, small.height, small.rgb), (2, 1, vec![[3.0, 0.0, 1.0], [5.0, 0.0, 1.0]]));
     }
 
     #[test]

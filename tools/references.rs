@@ -7,8 +7,9 @@ use std::process::{Command, ExitCode};
 
 mod compare;
 mod scenes;
+mod visibility;
 
-use Reference::{Constant, Mean, Normals};
+use Reference::{Constant, Mean, Normals, Visibility};
 
 /// What a render is compared with. Paths are below the data's folder.
 #[derive(Clone, Copy)]
@@ -19,6 +20,8 @@ enum Reference {
     Constant(f32),
     /// An image of the absolute values of the shading normal.
     Normals(&'static str),
+    /// An image of the average visibility within so many world units.
+    Visibility(&'static str, f32),
 }
 
 /// One line of the table.
@@ -28,17 +31,19 @@ struct Row {
     /// Path edges, where they are not those of the scene file. Square renders of 128 pixels go with it.
     depth: Option<u32>,
     spp: u32,
+    /// Both images are this many times smaller each way than the reference file: for scenes of long paths.
+    reduce: usize,
     reference: Reference,
     /// Relative; structure may be three times as large.
     tolerance: f64,
 }
 
 const fn row(scene: &'static str, spp: u32, reference: Reference, tolerance: f64) -> Row {
-    Row { scene, depth: None, spp, reference, tolerance }
+    Row { scene, depth: None, spp, reduce: 1, reference, tolerance }
 }
 
 const fn cornell(scene: &'static str, depth: u32, reference: &'static str) -> Row {
-    Row { scene, depth: Some(depth), spp: 1024, reference: Mean(reference), tolerance: 5e-3 }
+    Row { depth: Some(depth), ..row(scene, 1024, Mean(reference), 5e-3) }
 }
 
 const CORNELL: &str = "scenes/cornell-box/scene.toml";
@@ -59,9 +64,10 @@ const ROWS: &[Row] = &[
     row("cornell-box-ignis", 256, Mean("scenes/cornell-box/ignis/ref-cbox-d6-4096.exr"), 0.01),
     row("bitterli-cornell-box", 64, Mean("scenes/bitterli-cornell-box/TungstenRender.exr"), 0.01),
     row("bitterli-veach-mis", 64, Mean("scenes/bitterli-veach-mis/TungstenRender.exr"), 0.02),
-    row("nori-table", 256, Mean("scenes/nori-table/table_path_mis_512spp.exr"), 0.01),
+    Row { reduce: 4, ..row("nori-table", 1024, Mean("scenes/nori-table/table_path_mis_512spp.exr"), 0.01) },
     row("bunny-normals", 16, Normals("scenes/nori-bunny-normals/bunny_normals_ref.exr"), 0.01),
     row("dabrovic-direct", 16, Mean("scenes/dabrovic-sponza/reference/sponza-direct-4spp.exr"), 0.01),
+    row("dabrovic-direct", 16, Visibility("scenes/dabrovic-sponza/reference/sponza-av-1024spp.exr", 5.0), 0.01),
     row("mitsuba-arealight", 8192, Mean("scenes/mitsuba-tests/refs/test_arealight_ref_rgb.exr"), 0.02),
     row("mitsuba-constant", 4096, Mean("scenes/mitsuba-tests/refs/test_constant_ref_rgb.exr"), 0.01),
     row("mitsuba-directional", 4096, Mean("scenes/mitsuba-tests/refs/test_directional_ref_rgb.exr"), 0.01),
@@ -138,7 +144,11 @@ fn report(row: &Row, args: &Args) -> bool {
 /// The scene's name, with the depth where the row sets it.
 fn title(row: &Row) -> String {
     let short = row.scene.trim_start_matches("scenes/").trim_end_matches(".toml");
-    row.depth.map_or(short.to_owned(), |depth| format!("{short} d{depth}"))
+    match (row.depth, row.reference) {
+        (Some(depth), _) => format!("{short} d{depth}"),
+        (_, Visibility(..)) => format!("{short} visibility"),
+        _ => short.to_owned(),
+    }
 }
 
 fn passes(row: &Row, c: &compare::Comparison) -> bool {
@@ -148,23 +158,24 @@ fn passes(row: &Row, c: &compare::Comparison) -> bool {
 
 /// Renders, writes the difference, and measures.
 fn judge(row: &Row, args: &Args) -> anyhow::Result<compare::Comparison> {
-    let file = |suffix| args.output.join(title(row).replace(['/', ' '], "-") + suffix);
+    let file = |suffix| args.output.join(title(row).replace('/', "_").replace(' ', "-") + suffix);
     let scene = match row.scene.ends_with(".toml") {
         true => Path::new(env!("CARGO_MANIFEST_DIR")).join(row.scene),
         false => scenes::convert(row.scene, &args.data, &args.output)?,
     };
     let render = file(".exr");
-    if !args.again {
+    if !args.again && !matches!(row.reference, Visibility(..)) {
         run(row, &scene, &render, &args.tallow)?;
     }
     let data = |path: &str, channels| compare::read(&args.data.join(path), channels);
     let rgb = ["R", "G", "B"];
     let image = match row.reference {
         Normals(_) => absolute(compare::read(&render, ["N.X", "N.Y", "N.Z"])?),
+        Visibility(_, reach) => visibility::render(&scene, row.spp, reach)?,
         _ => compare::read(&render, rgb)?,
     };
     let reference = match row.reference {
-        Mean(path) => data(path, rgb)?,
+        Mean(path) | Visibility(path, _) => data(path, rgb)?.reduced(row.reduce),
         Normals(path) => absolute(data(path, rgb)?),
         Constant(value) => compare::Picture { rgb: vec![[value; 3]; image.rgb.len()], ..image },
     };
@@ -184,9 +195,21 @@ fn run(row: &Row, scene: &Path, render: &Path, tallow: &Path) -> anyhow::Result<
     if let Some(depth) = row.depth {
         command.args(["--width", "128", "--height", "128", "--max-depth"]).arg(depth.to_string());
     }
+    if row.reduce > 1 {
+        command.args(reduced_film(scene, row.reduce)?);
+    }
     let output = command.output().with_context(|| format!("cannot start {}", tallow.display()))?;
     if !output.status.success() {
         bail!("{}: {}", output.status, String::from_utf8_lossy(&output.stderr).trim());
     }
     Ok(())
+}
+
+/// Options for a film so many times smaller than that of the scene file.
+fn reduced_film(scene: &Path, factor: usize) -> anyhow::Result<[String; 4]> {
+    let scene: toml::Table = std::fs::read_to_string(scene)?.parse()?;
+    let extent = |key: &str| scene.get("film").and_then(|film| film.get(key)).and_then(toml::Value::as_integer);
+    let [width, height] = ["width", "height"].map(|key| extent(key).map(|n| (n as usize / factor).to_string()));
+    let silent = "the scene file does not say how large its film is";
+    Ok(["--width".into(), width.context(silent)?, "--height".into(), height.context(silent)?])
 }

@@ -29,7 +29,9 @@ mat3 environment_rotation(uint light) { // environment_from_world
                           uintBitsToFloat(light_texel(light, 2u).xyz)));
 }
 
-uvec2 environment_extent() { return uvec2(push.environment_size & 0xffffu, push.environment_size >> 16); }
+uvec2 environment_extent() {
+    return uvec2(push.environment_width, uint(textureSize(environment)) / push.environment_width);
+}
 
 vec3 environment_lookup(vec2 uv) {
     ivec2 size = ivec2(environment_extent());
@@ -56,7 +58,7 @@ float environment_pdf(uint light, uint texel, float sine) {
 vec3 environment_radiance(vec3 direction, out float pdf) {
     vec3 scale = uintBitsToFloat(light_texel(push.environment, 3u).xyz);
     pdf = uintBitsToFloat(light_texel(push.environment, 1u).w) * (0.25 / PI);
-    if (!FX_ENVIRONMENT_MAP || push.environment_size == 0u) return scale;
+    if (!FX_ENVIRONMENT_MAP || push.environment_width == 0u) return scale;
     uvec2 size = environment_extent();
     vec3 d = environment_rotation(push.environment) * direction;
     float sine = length(d.xz);
@@ -70,7 +72,7 @@ vec3 environment_radiance(vec3 direction, out float pdf) {
 void sample_environment(uint light, float chosen, uint word, vec2 u, inout LightSample s) {
     s.distance = INFINITE_DISTANCE;
     s.radiance = uintBitsToFloat(light_texel(light, 3u).xyz);
-    if (!FX_ENVIRONMENT_MAP || push.environment_size == 0u) {
+    if (!FX_ENVIRONMENT_MAP || push.environment_width == 0u) {
         s.direction = warp_sphere(u);
         s.pdf = chosen * (0.25 / PI);
     } else {

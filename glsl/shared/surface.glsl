@@ -27,8 +27,9 @@ vec3 perturbed_normal(Surface s, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
         n = m.x * t + m.y * (dot(b, dpdv) < 0.0 ? -b : b) + m.z * s.normal;
     } else {
         float height = uintBitsToFloat(material_texel(s.material, 4u).w);
-        uvec4 words = texelFetch(textures, int(image));
-        vec2 texel = 1.0 / vec2(words.yz);
+        uvec4 words = texelFetch(textures, int(2u * image));
+        vec2 scale = uintBitsToFloat(texelFetch(textures, int(2u * image + 1u)).xy);
+        vec2 texel = 1.0 / (vec2(words.yz) * max(abs(scale), 1e-6));
         float h = texture_sample(image, s.uv).r;
         float hu = (texture_sample(image, s.uv + vec2(texel.x, 0.0)).r - h) / texel.x;
         float hv = (texture_sample(image, s.uv + vec2(0.0, texel.y)).r - h) / texel.y;

@@ -15,7 +15,9 @@ vec4 texture_texel(uvec4 image, ivec2 at) {
 }
 
 vec4 texture_sample(uint index, vec2 uv) {
-    uvec4 image = texelFetch(textures, int(index));
+    uvec4 image = texelFetch(textures, int(2u * index));
+    vec4 mapping = uintBitsToFloat(texelFetch(textures, int(2u * index + 1u)));
+    uv = uv * mapping.xy + mapping.zw;
     vec2 wrapped = (image.w & TEXTURE_CLAMP) != 0u ? clamp(uv, 0.0, 1.0) : fract(uv);
     vec2 at = vec2(wrapped.x, 1.0 - wrapped.y) * vec2(image.yz) - 0.5; // v points up, rows go down
     ivec2 corner = ivec2(floor(at));

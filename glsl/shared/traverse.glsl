@@ -1,81 +1,103 @@
 // Closest hit and any hit through eight-way compressed nodes (Ylitie, Karras, Laine, HPG 2017), as obvhs builds them,
 // and a triangle test whose edges are watertight. The including kernel binds `nodes`, `triangles`, `instances`,
-// and for masks `shading`, `materials`, `textures`, `texels`.
+// and for masks `shading`, `materials`, `textures`, `texels`. A device that masks lanes (lavapipe) executes all of it for
+// every node: fewer variables that live from step to step, and fewer instructions, count for more than early exits.
 
 struct Hit {
-    float t;          // world units along the unit ray
+    float t;          // in lengths of the ray's direction
     uint triangle;    // leaf order; NONE on a miss
     uint instance;    // NONE without instances
     vec2 barycentric; // weights of vertices 1 and 2
 };
 
-// Distances to planes round at 2^-24 in four steps each, near and far; boxes that share a face must not part (Ize 2013).
-const float SLAB_ROUNDING = 1.0 + 8.0 / 16777216.0;
-
-// Watertight: all triangles project a shared vertex to the same point of the plane across the ray, and the two
-// edge functions of a shared edge are exact negatives of each other (precise forbids fused multiply-adds).
-// The idea is that of Woop, Benthin, Wald, JCGT 2013; a rotation replaces their permutation and shear.
-struct RaySpace {
+// A ray and what it asks for: hits before `t_max`, in lengths of `direction`.
+struct Segment {
     vec3 origin;
     vec3 direction;
-    vec3 across_x;
-    vec3 across_y;
-    vec3 inverse;
-    uint octant; // in every byte, 7 minus the octant that the ray points to
+    float t_max;
+    uint mask_seed; // decides hits on partly transparent surfaces
 };
+
+// Groups that a ray of this scene can leave behind (scene::bvh::stack_size). With one, it stays in registers.
+layout(constant_id = 102) const uint STACK = TRAVERSAL_STACK;
+uvec2 stack[STACK];
+
+uint stack_at(uint depth) { return STACK == 1u ? 0u : depth; }
+
+// Watertight (Woop, Benthin, Wald, JCGT 2013): all triangles project a shared vertex to the same point of the plane across
+// the ray, and the two edge functions of a shared edge are exact negatives of each other (precise forbids fused
+// multiply-adds). Two axes change places where the paper permutes three: that mirrors triangles, and both windings hit.
+struct RaySpace {
+    vec3 origin;
+    vec3 direction; // world rays only: what an instance transforms
+    vec3 inverse;   // of the direction
+    vec3 shear;     // takes the direction to (0, 0, 1) once its largest component is the last
+    bool along_x;   // the largest component is x
+    bool along_y;
+    uint octant;    // in every byte, 7 minus the octant that the ray points to
+};
+
+vec3 largest_last(bool along_x, bool along_y, vec3 v) {
+    return vec3(along_x ? v.z : v.x, along_y ? v.z : v.y, along_x ? v.x : along_y ? v.y : v.z);
+}
 
 RaySpace ray_space(vec3 origin, vec3 direction) {
     RaySpace r;
     r.origin = origin;
     r.direction = direction;
-    // Duff et al., JCGT 2017. Rays in the space of an instance are not of unit length.
-    float len = length(direction);
-    vec3 d = direction / len;
-    float s = d.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + d.z);
-    float b = d.x * d.y * a;
-    r.across_x = vec3(1.0 + s * d.x * d.x * a, s * b, -s * d.x);
-    r.across_y = vec3(b, s + d.y * d.y * a, -d.y);
     // A zero component must not make 0 * inf in the slab test, for boxes of up to 1e18.
     vec3 safe = mix(direction, vec3(1e-20), lessThan(abs(direction), vec3(1e-20)));
     r.inverse = 1.0 / safe;
+    vec3 size = abs(direction);
+    r.along_x = size.x > max(size.y, size.z);
+    r.along_y = !r.along_x && size.y > size.z;
+    r.shear.z = largest_last(r.along_x, r.along_y, r.inverse).z;
+    r.shear.xy = largest_last(r.along_x, r.along_y, direction).xy * r.shear.z;
     uvec3 positive = uvec3(greaterThanEqual(safe, vec3(0.0)));
     r.octant = (positive.x * 4u + positive.y * 2u + positive.z) * 0x01010101u;
     return r;
 }
 
+RaySpace either(bool first, RaySpace a, RaySpace b) {
+    bvec3 all = bvec3(first);
+    return RaySpace(mix(b.origin, a.origin, all), mix(b.direction, a.direction, all), mix(b.inverse, a.inverse, all),
+                    mix(b.shear, a.shear, all), first ? a.along_x : b.along_x, first ? a.along_y : b.along_y,
+                    first ? a.octant : b.octant);
+}
+
 bool intersect_triangle(RaySpace r, uint index, float t_max, out float t, out vec2 barycentric) {
-    vec3 a = triangle_vertex(index, 0) - r.origin;
-    vec3 b = triangle_vertex(index, 1) - r.origin;
-    vec3 c = triangle_vertex(index, 2) - r.origin;
-    precise float ax = dot(r.across_x, a), ay = dot(r.across_y, a);
-    precise float bx = dot(r.across_x, b), by = dot(r.across_y, b);
-    precise float cx = dot(r.across_x, c), cy = dot(r.across_y, c);
-    precise float u = cx * by - cy * bx;
-    precise float v = ax * cy - ay * cx;
-    precise float w = bx * ay - by * ax;
+    vec3 a = largest_last(r.along_x, r.along_y, triangle_vertex(index, 0) - r.origin);
+    vec3 b = largest_last(r.along_x, r.along_y, triangle_vertex(index, 1) - r.origin);
+    vec3 c = largest_last(r.along_x, r.along_y, triangle_vertex(index, 2) - r.origin);
+    precise vec2 p = a.xy - r.shear.xy * a.z, q = b.xy - r.shear.xy * b.z, s = c.xy - r.shear.xy * c.z;
+    precise float u = s.x * q.y - s.y * q.x;
+    precise float v = p.x * s.y - p.y * s.x;
+    precise float w = q.x * p.y - q.y * p.x;
     float det = u + v + w;
-    bool inside = min(min(u, v), w) >= 0.0 || max(max(u, v), w) <= 0.0;
+    // Comparisons, where minima and maxima would each have to look for NaN.
+    bool inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
     float inv = 1.0 / det;
-    // Distances along the ray in units of its direction's length.
-    float scale = 1.0 / dot(r.direction, r.direction);
-    t = (u * dot(r.direction, a) + v * dot(r.direction, b) + w * dot(r.direction, c)) * inv * scale;
+    t = (u * a.z + v * b.z + w * c.z) * (inv * r.shear.z);
     barycentric = vec2(v, w) * inv;
     return inside && det != 0.0 && t > 0.0 && t < t_max;
 }
 
+// Distances to planes round at 2^-24 in four steps each, near and far; boxes that share a face must not part (Ize 2013).
+const int SLAB_ROUNDING = 8; // units in the last place
+
 // Tests four children; the result has one bit per inner child (24..31, in order of visit) and one per triangle (0..23).
-uint intersect_children(uint meta, uint octant, uvec3 near_q, uvec3 far_q, vec3 scale, vec3 origin, float t_max) {
+// Distances are compared as integers, which order floats alike as long as one of the two is not negative.
+uint intersect_children(uint meta, uint octant, uvec3 near_q, uvec3 far_q, vec3 scale, vec3 origin, int t_max) {
     uint inner = ((meta & (meta << 1)) & 0x10101010u) >> 4;
     uint bit_index = (meta ^ (octant & (inner * 0xffu))) & 0x1f1f1f1fu;
     uint child_bits = (meta >> 5) & 0x07070707u;
     uint mask = 0u;
     for (int i = 0; i < 32; i += 8) {
-        vec3 t_near = vec3((near_q >> i) & 0xffu) * scale + origin;
-        vec3 t_far = vec3((far_q >> i) & 0xffu) * scale + origin;
-        float enter = max(max(t_near.x, t_near.y), max(t_near.z, 0.0));
-        float leave = min(min(t_far.x, t_far.y), min(t_far.z, t_max));
-        mask |= enter <= leave * SLAB_ROUNDING ? ((child_bits >> i) & 0xffu) << ((bit_index >> i) & 0xffu) : 0u;
+        ivec3 t_near = floatBitsToInt(vec3((near_q >> i) & 0xffu) * scale + origin);
+        ivec3 t_far = floatBitsToInt(vec3((far_q >> i) & 0xffu) * scale + origin);
+        int enter = max(max(t_near.x, t_near.y), max(t_near.z, 0));
+        int leave = min(min(t_far.x, t_far.y), min(t_far.z, t_max));
+        mask |= enter <= leave + SLAB_ROUNDING ? ((child_bits >> i) & 0xffu) << ((bit_index >> i) & 0xffu) : 0u;
     }
     return mask;
 }
@@ -95,73 +117,130 @@ uint intersect_node(RaySpace r, uint index, float t_max, out uvec3 children) {
     x = r.inverse.x < 0.0 ? x.zwxy : x;
     y = r.inverse.y < 0.0 ? y.zwxy : y;
     z = r.inverse.z < 0.0 ? z.zwxy : z;
-    return intersect_children(n1.z, r.octant, uvec3(x.x, y.x, z.x), uvec3(x.z, y.z, z.z), scale, origin, t_max) |
-           intersect_children(n1.w, r.octant, uvec3(x.y, y.y, z.y), uvec3(x.w, y.w, z.w), scale, origin, t_max);
+    int t = floatBitsToInt(t_max);
+    return intersect_children(n1.z, r.octant, uvec3(x.x, y.x, z.x), uvec3(x.z, y.z, z.z), scale, origin, t) |
+           intersect_children(n1.w, r.octant, uvec3(x.y, y.y, z.y), uvec3(x.w, y.w, z.w), scale, origin, t);
 }
 
-// Traverses from `root` (with ROOT_OF_INSTANCES, a level of instances). With `any_hit`, stops at the first triangle;
-// otherwise returns the closest. `mask_seed` decides hits on partly transparent surfaces.
-Hit traverse(vec3 origin, vec3 direction, float t_max, bool any_hit, uint root, uint mask_seed) {
-    Hit hit = Hit(t_max, NONE, NONE, vec2(0.0));
-    RaySpace ray = ray_space(origin, direction);
-    uvec2 stack[TRAVERSAL_STACK];
-    uint depth = 0u;
-    uint bottom = 0u;       // stack depth at which the current instance was entered
-    uint instance = NONE;   // NONE in the top (or only) level
-    bool two_levels = FX_INSTANCES && (root & ROOT_OF_INSTANCES) != 0u;
-    // Inner children: base, hit bits and inner mask; or triangles: base, bits.
-    uvec2 group = uvec2(root & ~ROOT_OF_INSTANCES, 0x80000000u);
-    while (true) {
-        uvec2 leaves = uvec2(0u);
-        if (group.y > 0x00ffffffu) {
-            uint bit = uint(findMSB(group.y));
-            uint hits = group.y;
-            group.y &= ~(1u << bit);
-            if (group.y > 0x00ffffffu) stack[depth++] = group;
-            uint slot = (bit - 24u) ^ (ray.octant & 0xffu);
-            uint child = group.x + uint(bitCount(hits & ~(0xffffffffu << slot)));
-            uvec3 children;
-            uint mask = intersect_node(ray, child, hit.t, children);
-            if (FX_COUNTERS) nodes_visited++;
-            group = uvec2(children.x, (mask & 0xff000000u) | children.z);
-            leaves = uvec2(children.y, mask & 0x00ffffffu);
-        } else if (two_levels) { // instances that an earlier node left on the stack
-            leaves = group;
-            group = uvec2(0u);
-        }
-        if (two_levels && instance == NONE && leaves.y != 0u) {
-            uint bit = uint(findMSB(leaves.y));
-            leaves.y &= ~(1u << bit);
-            if (group.y > 0x00ffffffu) stack[depth++] = group;
-            if (leaves.y != 0u) stack[depth++] = leaves;
-            instance = leaves.x + bit;
-            bottom = depth;
-            mat4x3 object_from_world = instance_matrix(instance, 3);
-            ray = ray_space(object_from_world * vec4(origin, 1.0), mat3(object_from_world) * direction);
-            group = uvec2(instance_root(instance), 0x80000000u);
-            continue;
-        }
-        while (leaves.y != 0u) {
-            uint bit = uint(findMSB(leaves.y));
-            leaves.y &= ~(1u << bit);
-            float t;
-            vec2 barycentric;
-            uint index = leaves.x + bit;
-            if (intersect_triangle(ray, index, hit.t, t, barycentric)) {
-                if (FX_ALPHA_MASKS && !mask_blocks(index, instance, barycentric, mask_seed)) continue;
-                hit = Hit(t, index, instance, barycentric);
-                if (any_hit) return hit;
-            }
-        }
-        if (group.y <= 0x00ffffffu) {
-            if (FX_INSTANCES && instance != NONE && depth == bottom) {
-                instance = NONE;
-                bottom = 0u;
-                ray = ray_space(origin, direction);
-            }
-            if (depth == 0u) break;
-            group = stack[--depth];
+// Takes the highest of `bits`, which are below 2^24: by the exponent of a float, where findMSB is a long sequence.
+uint take_highest(inout uint bits) {
+    uint f = floatBitsToUint(float(int(bits)));
+    bits ^= uint(int(uintBitsToFloat(f & 0xff800000u)));
+    return (f >> 23) - 127u;
+}
+
+// Bits set in a byte: each copied to a place of its own, the nibbles summed by the second product.
+uint count_bits(uint byte) {
+    return ((((byte * 0x08040201u) >> 3) & 0x11111111u) * 0x11111111u) >> 28;
+}
+
+// Where a ray stands.
+struct Traversal {
+    Hit hit;         // the closest so far
+    uvec2 group;     // inner children: base; hit bits (24..31) and inner mask. Or instances: base; bits below 24
+    uint depth;      // groups on the stack
+    uint bottom;     // depth at which `instance` was entered
+    uint instance;   // NONE in the top (or only) level
+    RaySpace inside; // the ray in the space of `instance`
+};
+
+Traversal traversal_start(float t_max, uint root) {
+    Traversal t;
+    t.hit = Hit(t_max, NONE, NONE, vec2(0.0));
+    t.group = uvec2(root & ~ROOT_OF_INSTANCES, 0x80000000u);
+    t.depth = 0u;
+    t.bottom = 0u;
+    t.instance = NONE;
+    return t;
+}
+
+void enter_instance(inout Traversal t, RaySpace world, uvec2 leaves) {
+    uint bit = take_highest(leaves.y);
+    if (t.group.y > 0x00ffffffu) stack[t.depth++] = t.group;
+    if (leaves.y != 0u) stack[t.depth++] = leaves;
+    t.instance = leaves.x + bit;
+    t.bottom = t.depth;
+    mat4x3 object_from_world = instance_matrix(t.instance, 3);
+    t.inside = ray_space(object_from_world * vec4(world.origin, 1.0), mat3(object_from_world) * world.direction);
+    t.group = uvec2(instance_root(t.instance), 0x80000000u);
+}
+
+void intersect_leaves(inout Traversal t, RaySpace ray, uvec2 leaves, bool any_hit, uint mask_seed, uvec2 from) {
+    while (leaves.y != 0u) {
+        uint index = leaves.x + take_highest(leaves.y);
+        float distance;
+        vec2 barycentric;
+        bool meets = intersect_triangle(ray, index, t.hit.t, distance, barycentric) &&
+                     (index != from.x || (FX_INSTANCES && t.instance != from.y));
+        if (FX_ALPHA_MASKS && meets) meets = mask_blocks(index, t.instance, barycentric, mask_seed);
+        if (meets) {
+            t.hit = Hit(distance, index, t.instance, barycentric);
+            if (any_hit) leaves.y = 0u;
         }
     }
-    return hit;
+}
+
+// Visits one node below `root` (with ROOT_OF_INSTANCES, a level of instances) and its triangles; true when nothing is
+// left to visit, or with `any_hit` a triangle is found. `from` is the triangle that the ray leaves, and its instance: a
+// plane is not met twice, but the offset of the origin can be smaller than the error of a large triangle's distance.
+bool traversal_step(inout Traversal t, RaySpace world, bool any_hit, uint root, uint mask_seed, uvec2 from) {
+    bool two_levels = FX_INSTANCES && (root & ROOT_OF_INSTANCES) != 0u;
+    RaySpace ray = world;
+    if (FX_INSTANCES) ray = either(t.instance != NONE, t.inside, world);
+    uvec2 leaves = t.group; // instances that an earlier node left on the stack
+    if (!two_levels || t.group.y > 0x00ffffffu) {
+        uint hits = t.group.y >> 24, inner = t.group.y & 0xffu;
+        uint slot = take_highest(hits) ^ (ray.octant & 0xffu);
+        if (hits != 0u) stack[stack_at(t.depth++)] = uvec2(t.group.x, (hits << 24) | inner);
+        uvec3 children;
+        uint mask = intersect_node(ray, t.group.x + count_bits(inner & ~(0xffffffffu << slot)), t.hit.t, children);
+        if (FX_COUNTERS) nodes_visited++;
+        t.group = uvec2(children.x, (mask & 0xff000000u) | children.z);
+        leaves = uvec2(children.y, mask & 0x00ffffffu);
+    } else {
+        t.group = uvec2(0u);
+    }
+    if (two_levels && t.instance == NONE && leaves.y != 0u) {
+        enter_instance(t, world, leaves);
+        leaves.y = 0u;
+    }
+    intersect_leaves(t, ray, leaves, any_hit, mask_seed, from);
+    bool done = any_hit && t.hit.triangle != NONE;
+    if (!done && t.group.y <= 0x00ffffffu) {
+        if (FX_INSTANCES && t.depth == t.bottom) {
+            t.instance = NONE;
+            t.bottom = 0u;
+        }
+        done = t.depth == 0u;
+        if (!done) t.group = stack[stack_at(--t.depth)];
+    }
+    return done;
+}
+
+// The closest hit of a ray that leaves no triangle.
+Hit traverse(Segment ray, uint root) {
+    RaySpace space = ray_space(ray.origin, ray.direction);
+    Traversal t = traversal_start(ray.t_max, root);
+    while (!traversal_step(t, space, false, root, ray.mask_seed, uvec2(NONE))) {}
+    return t.hit;
+}
+
+// First, where `shadowed`, whether anything blocks `shadow` (the answer replaces `shadowed`); then, where `alive`, the
+// closest hit of `ray`. Both leave the same triangle. In one loop no lane waits for the slowest shadow ray, and the code is there once.
+Hit traverse_both(Segment shadow, inout bool shadowed, Segment ray, bool alive, uint root, uvec2 from) {
+    RaySpace first = ray_space(shadow.origin, shadow.direction), second = ray_space(ray.origin, ray.direction);
+    bool any_hit = shadowed, done = false;
+    shadowed = false;
+    Traversal t = traversal_start(any_hit ? shadow.t_max : ray.t_max, root);
+    while (!done) {
+        uint mask_seed = any_hit ? shadow.mask_seed : ray.mask_seed;
+        done = traversal_step(t, either(any_hit, first, second), any_hit, root, mask_seed, from);
+        if (done && any_hit) {
+            shadowed = t.hit.triangle != NONE;
+            t = traversal_start(ray.t_max, root);
+            any_hit = false;
+            done = !alive;
+        }
+    }
+    return t.hit;
 }

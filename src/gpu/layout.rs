@@ -245,7 +245,7 @@ gpu_structs! {
         pad: uint,
     }
 
-    /// A picture in the texel buffer: RGBA8 texels (R in the low byte), row 0 at the top. 1 texel.
+    /// A picture in the texel buffer: RGBA8 texels (R in the low byte), row 0 at the top. 2 texels.
     struct Texture {
         /// Index of the first texel.
         first: uint,
@@ -255,6 +255,10 @@ gpu_structs! {
         height: uint,
         /// TEXTURE_ bits.
         flags: uint,
+        /// It is read at `uv * scale + offset`.
+        scale: vec2,
+        /// See `scale`.
+        offset: vec2,
     }
 
     /// A light. 4 texels; what the vectors mean depends on `kind`.
@@ -350,8 +354,8 @@ gpu_structs! {
         triangle_pdf_scale: float,
         /// Index of the environment among the lights, or NONE.
         environment: uint,
-        /// Texels of the environment image, width in the low half, height in the high half.
-        environment_size: uint,
+        /// Columns of the environment image; 0 without one.
+        environment_width: uint,
         /// Node where traversal starts, with ROOT_OF_INSTANCES.
         root: uint,
     }
@@ -378,9 +382,9 @@ gpu_structs! {
     struct RayQuery {
         /// World units.
         origin: vec3,
-        /// World units.
+        /// In lengths of `direction`.
         t_max: float,
-        /// Unit.
+        /// Not 0.
         direction: vec3,
         /// Decides hits on partly transparent surfaces.
         mask_seed: uint,
@@ -388,7 +392,7 @@ gpu_structs! {
 
     /// What `traverse.comp` finds.
     struct RayHit {
-        /// World units; the ray's `t_max` on a miss.
+        /// In lengths of the ray's direction; its `t_max` on a miss.
         t: float,
         /// In leaf order, or [`NONE`].
         triangle: uint,

@@ -5,7 +5,7 @@ use crate::reference::camera::{camera_ray, film_from_pixel};
 use crate::reference::light::*;
 use crate::reference::sampler::{Sampler, pcg, sample_2d, sample_2d_bits, sampler_start};
 use crate::reference::surface::{Surface, offset_origin, surface_at, surface_bsdf, surface_emission};
-use crate::reference::traverse::traverse;
+use crate::reference::traverse::traverse_from;
 use crate::reference::warp::{basis_from_normal, warp_gaussian, warp_tent};
 use crate::scene::Scene;
 use glam::{Mat3, Vec2, Vec3, vec2};
@@ -76,6 +76,8 @@ struct Shade {
     basis: Mat3,
     wo: Vec3,
     pair: u32,
+    /// Triangle and instance.
+    from: [u32; 2],
 }
 
 impl Tracer<'_> {
@@ -147,11 +149,9 @@ impl Tracer<'_> {
         let (mut direction, mut distance) = (light.direction, light.distance);
         if distance < INFINITE_DISTANCE {
             direction = s.position + light.distance * light.direction - origin;
-            distance = direction.length();
-            direction /= distance;
-            distance *= 1.0 - 1e-6;
+            distance = 1.0 - 1e-6;
         }
-        let blocker = traverse(self.scene, origin, direction, distance, true, mask_seed);
+        let blocker = traverse_from(self.scene, p.from, origin, direction, distance, true, mask_seed);
         if blocker.any() { Vec3::ZERO } else { contribution }
     }
 
@@ -163,7 +163,7 @@ impl Tracer<'_> {
         }
         let geometric = p.surface.geometric;
         path.throughput *= next.weight;
-        path.direction = (p.basis * next.wi).normalize();
+        path.direction = p.basis * next.wi;
         let normal = if path.direction.dot(geometric) < 0.0 { -geometric } else { geometric };
         path.origin = offset_origin(p.surface.position, normal);
         path.bsdf_pdf = next.pdf;
@@ -180,32 +180,34 @@ impl Tracer<'_> {
         true
     }
 
-    fn shade(&self, surface: Surface, direction: Vec3, pair: u32) -> Shade {
+    fn shade(&self, surface: Surface, direction: Vec3, pair: u32, from: [u32; 2]) -> Shade {
         let away = surface.normal.dot(direction) > 0.0;
         let bsdf = surface_bsdf(self.scene, &surface);
         let turns = surface.flags & MATERIAL_TWO_SIDED != 0 && bsdf.kind != BSDF_DIELECTRIC;
         let basis = basis_from_normal(if turns && away { -surface.normal } else { surface.normal });
-        Shade { bsdf, surface, basis, wo: basis.transpose() * -direction, pair }
+        Shade { bsdf, surface, basis, wo: basis.transpose() * -direction, pair, from }
     }
 
     fn trace_path(&self, mut path: Path, random: Sampler, path_seed: u32) -> PathSample {
         let mut sum = PathSample::default();
         let mut smooth_first = false;
+        let mut from = [NONE; 2];
         for bounce in 0u32.. {
             let pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
             let mask_seed = pcg(path_seed.wrapping_add(2 * bounce));
-            let hit = traverse(self.scene, path.origin, path.direction, INFINITE_DISTANCE, false, mask_seed);
+            let hit = traverse_from(self.scene, from, path.origin, path.direction, INFINITE_DISTANCE, false, mask_seed);
             let indirect = bounce >= 2 && !smooth_first;
             if !hit.any() {
                 self.add_light(&mut sum, path.throughput * self.light_from_miss(&path), indirect);
                 break;
             }
+            from = [hit.triangle, hit.instance];
             let s = surface_at(self.scene, &hit);
             self.add_light(&mut sum, path.throughput * self.light_from_hit(&path, &s, hit.t), indirect);
             if bounce + 1 >= self.push.max_depth {
                 break;
             }
-            let p = self.shade(s, path.direction, pair);
+            let p = self.shade(s, path.direction, pair, from);
             let smooth_here = bsdf_is_delta(&p.bsdf);
             if bounce == 0 {
                 sum.albedo = bsdf_albedo(&p.bsdf);

@@ -55,7 +55,8 @@ fn normal_from_map(scene: &Scene, s: &Surface, image: u32, dpdu: Vec3, dpdv: Vec
 fn normal_from_height(scene: &Scene, s: &Surface, material: &Material, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
     let image = material.bump_texture;
     let texture = &scene.textures[image as usize];
-    let texel = 1.0 / vec2(texture.width as f32, texture.height as f32);
+    let scale = Vec2::from(texture.scale).abs().max(Vec2::splat(1e-6));
+    let texel = 1.0 / (vec2(texture.width as f32, texture.height as f32) * scale);
     let height = |offset| texture_sample(scene, image, s.uv + offset).x;
     let h = height(Vec2::ZERO);
     let hu = (height(vec2(texel.x, 0.0)) - h) / texel.x;

@@ -30,6 +30,7 @@ fn texture_texel(scene: &Scene, image: &Texture, at: IVec2) -> Vec4 {
 /// Bilinear.
 pub fn texture_sample(scene: &Scene, index: u32, uv: Vec2) -> Vec4 {
     let image = &scene.textures[index as usize];
+    let uv = uv * Vec2::from(image.scale) + Vec2::from(image.offset);
     let wrapped = if image.flags & TEXTURE_CLAMP != 0 { uv.clamp(Vec2::ZERO, Vec2::ONE) } else { uv - uv.floor() };
     let at = vec2(wrapped.x, 1.0 - wrapped.y) * vec2(image.width as f32, image.height as f32) - 0.5;
     let corner = at.floor().as_ivec2();

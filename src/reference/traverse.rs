@@ -8,7 +8,7 @@ use glam::{Vec2, Vec3, vec2, vec3};
 /// Where a ray meets the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// World units along the unit ray; the ray's end on a miss.
+    /// In lengths of the ray's direction; the ray's end on a miss.
     pub t: f32,
     /// In leaf order; [`NONE`] on a miss.
     pub triangle: u32,
@@ -26,49 +26,55 @@ impl Hit {
 }
 
 const STACK_SIZE: usize = TRAVERSAL_STACK as usize;
-const SLAB_ROUNDING: f32 = 1.0 + 8.0 / (1 << 24) as f32;
+const SLAB_ROUNDING: i32 = 8;
 
 /// A ray as the triangle and box tests want it.
 #[derive(Clone, Copy, Debug)]
 pub struct RaySpace {
     origin: Vec3,
-    direction: Vec3,
-    across_x: Vec3,
-    across_y: Vec3,
     inverse: Vec3,
+    shear: Vec3,
+    along_x: bool,
+    along_y: bool,
     octant: u32,
+}
+
+impl RaySpace {
+    fn largest_last(&self, v: Vec3) -> Vec3 {
+        match (self.along_x, self.along_y) {
+            (true, _) => vec3(v.z, v.y, v.x),
+            (_, true) => vec3(v.x, v.z, v.y),
+            _ => v,
+        }
+    }
 }
 
 /// Any length of `direction` but 0.
 pub fn ray_space(origin: Vec3, direction: Vec3) -> RaySpace {
-    let d = direction / direction.length();
-    let s = if d.z >= 0.0 { 1.0 } else { -1.0 };
-    let a = -1.0 / (s + d.z);
-    let b = d.x * d.y * a;
     let safe = direction.map(|d| if d.abs() < 1e-20 { 1e-20 } else { d });
+    let size = direction.abs();
+    let along_x = size.x > size.y.max(size.z);
+    let along_y = !along_x && size.y > size.z;
     let positive = safe.to_array().map(|d| u32::from(d >= 0.0));
-    RaySpace {
-        origin,
-        direction,
-        across_x: vec3(1.0 + s * d.x * d.x * a, s * b, -s * d.x),
-        across_y: vec3(b, s + d.y * d.y * a, -d.y),
-        inverse: 1.0 / safe,
-        octant: (positive[0] * 4 + positive[1] * 2 + positive[2]) * 0x01010101,
-    }
+    let octant = (positive[0] * 4 + positive[1] * 2 + positive[2]) * 0x01010101;
+    let mut r = RaySpace { origin, inverse: 1.0 / safe, shear: Vec3::ZERO, along_x, along_y, octant };
+    let along = r.largest_last(r.inverse).z;
+    let d = r.largest_last(direction);
+    r.shear = vec3(d.x * along, d.y * along, along);
+    r
 }
 
 /// Distance in lengths of the ray's direction, and barycentric weights; nothing at or beyond `t_max`.
 pub fn intersect_triangle(r: &RaySpace, vertices: [Vec3; 3], t_max: f32) -> Option<(f32, Vec2)> {
-    let [a, b, c] = vertices.map(|v| v - r.origin);
-    let [p, q, s] = [a, b, c].map(|v| vec2(r.across_x.dot(v), r.across_y.dot(v)));
+    let [a, b, c] = vertices.map(|v| r.largest_last(v - r.origin));
+    let [p, q, s] = [a, b, c].map(|v| vec2(v.x - r.shear.x * v.z, v.y - r.shear.y * v.z));
     let u = s.x * q.y - s.y * q.x;
     let v = p.x * s.y - p.y * s.x;
     let w = q.x * p.y - q.y * p.x;
     let det = u + v + w;
     let inside = u.min(v).min(w) >= 0.0 || u.max(v).max(w) <= 0.0;
     let inv = 1.0 / det;
-    let scale = 1.0 / r.direction.dot(r.direction);
-    let t = (u * r.direction.dot(a) + v * r.direction.dot(b) + w * r.direction.dot(c)) * inv * scale;
+    let t = (u * a.z + v * b.z + w * c.z) * (inv * r.shear.z);
     (inside && det != 0.0 && t > 0.0 && t < t_max).then_some((t, vec2(v, w) * inv))
 }
 
@@ -87,11 +93,12 @@ fn intersect_children(
     let child_bits = (meta >> 5) & 0x07070707;
     let mut mask = 0;
     for i in [0, 8, 16, 24] {
-        let planes = |q: [u32; 3]| Vec3::from(q.map(|q| ((q >> i) & 0xff) as f32)) * scale + origin;
+        let plane = |q: u32| ((q >> i) & 0xff) as f32;
+        let planes = |q: [u32; 3]| (Vec3::from(q.map(plane)) * scale + origin).to_array().map(|t| t.to_bits() as i32);
         let (t_near, t_far) = (planes(near), planes(far));
-        let enter = t_near.x.max(t_near.y).max(t_near.z.max(0.0));
-        let leave = t_far.x.min(t_far.y).min(t_far.z.min(t_max));
-        if enter <= leave * SLAB_ROUNDING {
+        let enter = t_near.into_iter().fold(0, i32::max);
+        let leave = t_far.into_iter().fold(t_max.to_bits() as i32, i32::min);
+        if enter <= leave + SLAB_ROUNDING {
             mask |= ((child_bits >> i) & 0xff) << ((bit_index >> i) & 0xff);
         }
     }
@@ -129,6 +136,7 @@ struct Traversal<'a> {
     hit: Hit,
     instance: u32,
     mask_seed: u32,
+    from: [u32; 2],
 }
 
 impl Traversal<'_> {
@@ -171,6 +179,9 @@ impl Traversal<'_> {
     fn test(&mut self, mut leaves: Group, any_hit: bool) -> bool {
         while leaves.1 != 0 {
             let index = leaves.0 + take_highest(&mut leaves.1);
+            if [index, self.instance] == self.from {
+                continue;
+            }
             let vertices = triangle_vertices(self.scene, index);
             let Some((t, barycentric)) = intersect_triangle(&self.ray, vertices, self.hit.t) else { continue };
             if mask_blocks(self.scene, index, self.instance, barycentric, self.mask_seed) {
@@ -184,11 +195,24 @@ impl Traversal<'_> {
     }
 }
 
-/// The closest hit before `t_max` of a unit ray, or with `any_hit` the first one found.
+/// The closest hit before `t_max`, or with `any_hit` the first one found.
 pub fn traverse(scene: &Scene, origin: Vec3, direction: Vec3, t_max: f32, any_hit: bool, mask_seed: u32) -> Hit {
+    traverse_from(scene, [NONE; 2], origin, direction, t_max, any_hit, mask_seed)
+}
+
+/// [`traverse`] for a ray that leaves the triangle `from[0]` of the instance `from[1]`, and does not meet it again.
+pub fn traverse_from(
+    scene: &Scene,
+    from: [u32; 2],
+    origin: Vec3,
+    direction: Vec3,
+    t_max: f32,
+    any_hit: bool,
+    mask_seed: u32,
+) -> Hit {
     let hit = Hit { t: t_max, triangle: NONE, instance: NONE, barycentric: Vec2::ZERO };
     let ray = ray_space(origin, direction);
-    let mut t = Traversal { scene, ray, stack: Vec::with_capacity(STACK_SIZE), hit, instance: NONE, mask_seed };
+    let mut t = Traversal { scene, ray, stack: Vec::with_capacity(STACK_SIZE), hit, instance: NONE, mask_seed, from };
     let two_levels = !scene.instances.is_empty();
     let mut bottom = 0; // stack depth at which the current instance was entered
     let mut group = (scene.root, 0x80000000);

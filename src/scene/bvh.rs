@@ -1,7 +1,7 @@
 //! Eight-way compressed BVHs (Ylitie et al. 2017) by obvhs: PLOC (Meister and Bittner 2018) and reinsertion. Triangles
 //! and their shading are put in leaf order; child and primitive indices are made global, so one array holds all levels.
 use super::geometry::Geometry;
-use crate::gpu::layout::{BvhNode, Instance, TRAVERSAL_STACK, Triangle};
+use crate::gpu::layout::{BvhNode, Instance, Triangle};
 use glam::{Mat4, Vec3, Vec4};
 use obvhs::Boundable;
 use obvhs::aabb::Aabb;
@@ -96,12 +96,12 @@ pub fn depth(nodes: &[BvhNode], root: u32) -> usize {
     deepest
 }
 
-/// Whether the kernels' stack ([`TRAVERSAL_STACK`]) holds what a ray leaves behind: a group a level, and with instances the
-/// groups of nodes and of instances around the one it enters.
-pub fn fits_the_stack(nodes: &[BvhNode], root: u32, instances: &[Instance]) -> bool {
+/// Groups that a ray leaves behind at most: one a level below the root, and with instances the groups of nodes and of
+/// instances around the one it enters. At least 1, and in kernels at most [`TRAVERSAL_STACK`](crate::gpu::layout::TRAVERSAL_STACK).
+pub fn stack_size(nodes: &[BvhNode], root: u32, instances: &[Instance]) -> u32 {
     let roots: HashSet<u32> = instances.iter().map(|i| i.root).collect();
-    let below = roots.iter().map(|&mesh| depth(nodes, mesh) + 2).max().unwrap_or(0);
-    depth(nodes, root) + below <= TRAVERSAL_STACK as usize
+    let below = roots.iter().map(|&mesh| depth(nodes, mesh) + 1).max().unwrap_or(0);
+    (depth(nodes, root) - 1 + below).max(1) as u32
 }
 
 /// Appends the nodes over `items`, numbered from `first` on; returns the root and the leaf order.
@@ -128,6 +128,8 @@ fn build<T: Boundable>(items: &[T], first: u32, nodes: &mut Vec<BvhNode>) -> (u3
 /// Search distance 6, then reinsertion. On Crytek Sponza, reinserting 10 % of the nodes instead of 2 % builds in 0.42 s
 /// instead of 0.21 s and visits 5 % fewer nodes per ray (Sibenik 4 %, a 100k dragon 3 %); larger search distances visit
 /// no fewer. Meshes so large that loading takes seconds keep to 2 %.
+/// Boxes that coincide all cost the same to merge, and a round of PLOC then pairs few of them: time grows with the square
+/// of their number (a minute for 50,000 copies of a triangle).
 fn compressed<T: Boundable>(items: &[T]) -> obvhs::cwbvh::CwBvh {
     let indices = (0..items.len() as u32).collect();
     let mut bvh2 = {

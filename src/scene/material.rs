@@ -15,7 +15,7 @@
 //! units; without -bm, 0.0005 of the scene's diagonal. A black Kd under a map_Kd counts as white.
 use super::fresnel;
 use super::mtl::{Map, Mtl};
-use super::texture::{Kind, TextureSet};
+use super::texture::{Kind, Mapping, TextureSet};
 use super::value::Rgb;
 use crate::gpu::layout::{self, *};
 use serde::Deserialize;
@@ -222,7 +222,7 @@ impl Materials {
             return Err("has both bump and normal_map: choose one".into());
         }
         let mut ask = |file: Option<&PathBuf>, kind| match file.map(|f| f.to_string_lossy().replace('\\', "/")) {
-            Some(file) => self.textures.request(directory, &file, kind, false, warn),
+            Some(file) => self.textures.request(directory, &file, kind, Mapping::default(), warn),
             None => NONE,
         };
         if body {
@@ -280,7 +280,7 @@ impl Materials {
     fn mtl_textures(&mut self, m: &mut layout::Material, mtl: &Mtl, kind: Type, warn: &mut Vec<String>) {
         let textures = &mut self.textures;
         let mut ask = |map: Option<&Map>, kind| match map {
-            Some(map) => textures.request(&mtl.directory, &map.file, kind, map.clamp, warn),
+            Some(map) => textures.request(&mtl.directory, &map.file, kind, map.mapping, warn),
             None => NONE,
         };
         match kind {

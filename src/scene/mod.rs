@@ -1,6 +1,8 @@
 //! Scene files become flat arrays, ready to be copied to the device as they are. Nothing here talks to a GPU.
 use crate::error::{Error, Result};
-use crate::gpu::layout::{AliasEntry, BvhNode, Camera, Instance, Light, Material, Shading, Texture, Triangle};
+use crate::gpu::layout::{
+    AliasEntry, BvhNode, Camera, Instance, Light, Material, Shading, TRAVERSAL_STACK, Texture, Triangle,
+};
 use crate::settings::Settings;
 use std::path::Path;
 
@@ -19,6 +21,7 @@ mod mtl;
 mod obj;
 mod obj_lines;
 mod place;
+mod polygon;
 mod shape;
 mod texture;
 mod value;
@@ -39,6 +42,8 @@ pub struct Scene {
     pub nodes: Vec<BvhNode>,
     /// Node where traversal starts: the top level with instances, else the only one.
     pub root: u32,
+    /// Groups of nodes that a ray puts aside at most; at least 1.
+    pub stack: u32,
     /// In leaf order.
     pub triangles: Vec<Triangle>,
     /// Same order as `triangles`; empty when no mesh has vertex normals or texture coordinates.
@@ -131,7 +136,8 @@ impl Scene {
         overrides(&mut scene.settings);
         scene.settings.validate()?;
         assemble::assemble(path, description, sky, &mut scene)?;
-        if !bvh::fits_the_stack(&scene.nodes, scene.root, &scene.instances) {
+        scene.stack = bvh::stack_size(&scene.nodes, scene.root, &scene.instances);
+        if scene.stack > TRAVERSAL_STACK {
             let what =
                 "lies so densely on itself that no hierarchy of a usable depth holds it: remove copies of triangles";
             return Err(Error::input_at(path, "geometry", what));

@@ -1,5 +1,6 @@
 //! MTL files as they are written: numbers, map statements with their options, file names with spaces. What the
 //! statements mean for a material is decided in `material.rs`.
+use super::texture::Mapping;
 use crate::error::{Error, Result};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -11,8 +12,8 @@ pub struct Map {
     pub file: String,
     /// `-bm`: height of a bump map.
     pub bump: Option<f32>,
-    /// `-clamp on`.
-    pub clamp: bool,
+    /// `-clamp on`, `-s` and `-o`.
+    pub mapping: Mapping,
 }
 
 /// One `newmtl` block. `None` is what the file does not say.
@@ -115,7 +116,7 @@ fn color(key: &str, rest: &str) -> std::result::Result<[f32; 3], String> {
 
 /// Options first, then the file name, which may hold spaces.
 fn map(rest: &str) -> Option<Map> {
-    let mut found = Map { file: String::new(), bump: None, clamp: false };
+    let mut found = Map { file: String::new(), bump: None, mapping: Mapping::default() };
     let mut rest = rest;
     while rest.starts_with('-') {
         let (option, after) = next_word(rest);
@@ -128,7 +129,9 @@ fn map(rest: &str) -> Option<Map> {
             }
             match name {
                 "-bm" => found.bump = word.parse().ok().filter(|v: &f32| v.is_finite()),
-                "-clamp" => found.clamp = word == "on",
+                "-clamp" => found.mapping.clamp = word == "on",
+                "-s" => place(&mut found.mapping.scale, i, word),
+                "-o" => place(&mut found.mapping.offset, i, word),
                 _ => {}
             }
             rest = after;
@@ -136,6 +139,13 @@ fn map(rest: &str) -> Option<Map> {
     }
     found.file = rest.trim().trim_matches('"').replace('\\', "/");
     (!found.file.is_empty()).then_some(found)
+}
+
+/// Number `i` of `-s` or `-o`. Beyond a million, coordinates have no digits left for a place in the picture.
+fn place(numbers: &mut [f32; 2], i: usize, word: &str) {
+    if let (Some(number), Ok(value)) = (numbers.get_mut(i), word.parse::<f32>()) {
+        *number = if value.abs() <= 1e6 { value } else { *number };
+    }
 }
 
 fn next_word(text: &str) -> (&str, &str) {
@@ -187,10 +197,13 @@ mod tests {
 
     #[test]
     fn maps_have_options_spaces_and_backslashes() {
-        let m = one("map_Kd -s 2 2 -clamp on -o 0.5 tex\\my wood.png\nmap_Bump -bm 0.02 b.png\nnorm \"n 1.png\"");
-        assert_eq!(m.maps["map_Kd"], Map { file: "tex/my wood.png".into(), bump: None, clamp: true });
+        let mapping = Mapping { clamp: true, scale: [2.0, -3.0], offset: [0.5, 0.0] };
+        let m = one("map_Kd -s 2 -3 1 -clamp on -o 0.5 tex\\my wood.png\nmap_Bump -bm 0.02 b.png\nnorm \"n 1.png\"");
+        assert_eq!(m.maps["map_Kd"], Map { file: "tex/my wood.png".into(), bump: None, mapping });
         assert_eq!((m.maps["bump"].file.as_str(), m.maps["bump"].bump), ("b.png", Some(0.02)));
         assert_eq!(m.maps["norm"].file, "n 1.png");
+        let odd = &one("map_Ks -s nan 1e30 -o inf a.png").maps["map_Ks"];
+        assert_eq!((odd.file.as_str(), odd.mapping), ("a.png", Mapping::default()));
         assert!(!one("map_Kd -s 1 1 1").maps.contains_key("map_Kd"));
     }
 

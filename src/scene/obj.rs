@@ -2,6 +2,7 @@
 use super::material::Materials;
 use super::mtl::{self, Mtl};
 use super::obj_lines::ObjLines;
+use super::polygon;
 use crate::error::{Error, Result};
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
@@ -152,16 +153,20 @@ pub fn parse(path: &Path, reader: impl std::io::BufRead, library: &mut Library) 
         let blocks = names.iter().map(|n| tobj::Material { name: n.0.clone(), ..Default::default() }).collect();
         Ok((blocks, names.into_iter().enumerate().map(|(i, n)| (n.0, i)).collect()))
     };
-    let options = tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
+    let options = tobj::LoadOptions { single_index: true, triangulate: false, ignore_points: true, ignore_lines: true };
     let outcome = tobj::load_obj_buf(&mut lines, &options, loader);
     if let Some(error) = failure.take() {
         return Err(error);
     }
-    let models = match (lines.error.take(), outcome) {
+    let mut models = match (lines.error.take(), outcome) {
         (Some((line, what)), _) => return Err(Error::input_at(path, format!("line {line}"), what)),
         (None, Err(e)) => return Err(Error::input_at(path, format!("line {}", lines.line), remedy(e))),
         (None, Ok((models, _))) => models,
     };
+    for mesh in models.iter_mut().map(|m| &mut m.mesh).filter(|mesh| !mesh.face_arities.is_empty()) {
+        mesh.indices = polygon::triangulate(&mesh.positions, &mesh.face_arities, &mesh.indices);
+        mesh.face_arities.clear();
+    }
     let found = found.into_inner();
     let index = |m: &tobj::Model| m.mesh.material_id.and_then(|i| found.get(i).copied());
     let unknown: Vec<_> = lines.worn.iter().filter(|name| !known.borrow().contains(*name)).cloned().collect();

@@ -20,11 +20,35 @@ pub enum Kind {
     Roughness,
 }
 
-/// The pictures that materials asked for, each once per kind.
+/// How texture coordinates become places in a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mapping {
+    /// Coordinates outside [0, 1] stay at the border; otherwise they repeat.
+    pub clamp: bool,
+    /// It is read at `uv * scale + offset`.
+    pub scale: [f32; 2],
+    /// See `scale`.
+    pub offset: [f32; 2],
+}
+
+impl Default for Mapping {
+    fn default() -> Self {
+        Self { clamp: false, scale: [1.0; 2], offset: [0.0; 2] }
+    }
+}
+
+impl Mapping {
+    fn bits(self) -> [u32; 5] {
+        let [[a, b], [c, d]] = [self.scale, self.offset].map(|v| v.map(f32::to_bits));
+        [u32::from(self.clamp), a, b, c, d]
+    }
+}
+
+/// The pictures that materials asked for, each once per kind and mapping.
 #[derive(Clone, Debug, Default)]
 pub struct TextureSet {
-    wanted: Vec<(PathBuf, Kind, bool)>,
-    index: HashMap<(PathBuf, Kind, bool), u32>,
+    wanted: Vec<(PathBuf, Kind, Mapping)>,
+    index: HashMap<(PathBuf, Kind, [u32; 5]), u32>,
 }
 
 /// Device arrays of all pictures.
@@ -38,7 +62,7 @@ pub struct Decoded {
 
 impl TextureSet {
     /// Index of the picture, or [`NONE`] with a warning when there is no such file.
-    pub fn request(&mut self, dir: &Path, file: &str, kind: Kind, clamp: bool, warn: &mut Vec<String>) -> u32 {
+    pub fn request(&mut self, dir: &Path, file: &str, kind: Kind, mapping: Mapping, warn: &mut Vec<String>) -> u32 {
         let Some((path, mended)) = find_file(dir, file) else {
             warn.push(format!("texture {}: no such file; its constant colour is used", dir.join(file).display()));
             return NONE;
@@ -46,10 +70,9 @@ impl TextureSet {
         if mended {
             warn.push(format!("texture {}: found as {}", dir.join(file).display(), path.display()));
         }
-        let key = (path, kind, clamp);
         let next = self.wanted.len() as u32;
-        *self.index.entry(key).or_insert_with_key(|key| {
-            self.wanted.push(key.clone());
+        *self.index.entry((path, kind, mapping.bits())).or_insert_with_key(|(path, ..)| {
+            self.wanted.push((path.clone(), kind, mapping));
             next
         })
     }
@@ -67,12 +90,13 @@ impl TextureSet {
         let sizes: Vec<_> = self.wanted.par_iter().map(|(path, ..)| dimensions(path)).collect::<Result<_>>()?;
         let mut textures = Vec::with_capacity(sizes.len());
         let mut total = 0u64;
-        for ((path, kind, clamp), &(width, height)) in self.wanted.iter().zip(&sizes) {
+        for ((path, kind, mapping), &(width, height)) in self.wanted.iter().zip(&sizes) {
             let first = u32::try_from(total).map_err(|_| too_many(path))?;
             total += u64::from(width) * u64::from(height);
-            let bits = [(*kind == Kind::Color, TEXTURE_SRGB), (*clamp, TEXTURE_CLAMP)];
+            let bits = [(*kind == Kind::Color, TEXTURE_SRGB), (mapping.clamp, TEXTURE_CLAMP)];
             let bits: u32 = bits.iter().filter(|b| b.0).map(|b| b.1).sum();
-            textures.push(Texture { first, width, height, flags: bits });
+            let Mapping { scale, offset, .. } = *mapping;
+            textures.push(Texture { first, width, height, flags: bits, scale, offset });
         }
         if total > u64::from(u32::MAX) {
             return Err(too_many(&self.wanted[0].0));
@@ -164,9 +188,9 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         std::fs::write(dir.path().join(name), bytes).unwrap();
         let (mut set, mut warnings) = (TextureSet::default(), Vec::new());
-        let index = set.request(dir.path(), name, kind, false, &mut warnings);
+        let index = set.request(dir.path(), name, kind, Mapping::default(), &mut warnings);
         assert_eq!((index, warnings.len()), (0, 0));
-        assert_eq!(set.request(dir.path(), name, kind, false, &mut warnings), 0, "each picture once");
+        assert_eq!(set.request(dir.path(), name, kind, Mapping::default(), &mut warnings), 0, "each picture once");
         set.decode()
     }
 
@@ -212,10 +236,10 @@ mod tests {
         std::fs::create_dir(dir.path().join("Tex")).unwrap();
         std::fs::write(dir.path().join("Tex/Wood.PNG"), png(1, 1, &[1, 2, 3])).unwrap();
         let (mut set, mut warnings) = (TextureSet::default(), Vec::new());
-        assert_eq!(set.request(dir.path(), "no.png", Kind::Color, false, &mut warnings), NONE);
+        assert_eq!(set.request(dir.path(), "no.png", Kind::Color, Mapping::default(), &mut warnings), NONE);
         for name in ["tex/wood.png", "C:/elsewhere/../Tex/wood.png"] {
             assert_eq!(
-                set.request(dir.path(), name, Kind::Color, false, &mut warnings),
+                set.request(dir.path(), name, Kind::Color, Mapping::default(), &mut warnings),
                 if name.starts_with('C') { NONE } else { 0 }
             );
         }

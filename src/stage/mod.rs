@@ -1,6 +1,6 @@
 //! One file per kernel: what it reads and writes, and how it is recorded. Stages never call stages; `frame.rs` lists them.
 use crate::error::Result;
-use crate::gpu::layout::Effects;
+use crate::gpu::layout::{Effects, TRAVERSAL_STACK};
 use crate::gpu::{Bindings, Gpu, Kernel, Recorder};
 
 pub mod apportion;
@@ -32,8 +32,17 @@ impl<B: Bindings> PerThread<B> {
     /// # Errors
     /// [`crate::error::Error::Device`] when the driver refuses it.
     pub fn new(gpu: &Gpu, effects: &Effects, workgroup: u32) -> Result<Self> {
-        // local_size_x_id, and the same for `thread_index()`.
-        Ok(Self { kernel: Kernel::new(gpu, effects, &[(100, workgroup), (101, workgroup)])?, workgroup })
+        Self::with_stack(gpu, effects, workgroup, TRAVERSAL_STACK)
+    }
+
+    /// [`PerThread::new`] of a kernel that traces rays of a scene with this [`Scene::stack`](crate::scene::Scene::stack).
+    ///
+    /// # Errors
+    /// As [`PerThread::new`].
+    pub fn with_stack(gpu: &Gpu, effects: &Effects, workgroup: u32, stack: u32) -> Result<Self> {
+        // local_size_x_id, the same for `thread_index()`, and the stack of `shared/traverse.glsl`.
+        let numbers = [(100, workgroup), (101, workgroup), (102, stack)];
+        Ok(Self { kernel: Kernel::new(gpu, effects, &numbers)?, workgroup })
     }
 
     /// Records it over `threads` items.

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::path::Path;
 use std::time::Instant;
 use tallow::gpu::layout::{self, Effects, NONE, RayHit, RayQuery, TraversePush};
-use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Kernel, Location};
+use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Location};
 use tallow::reference::light::INFINITE_DISTANCE;
 use tallow::reference::sampler::{sample_2d, sampler_start};
 use tallow::reference::surface::{offset_origin, surface_at};
@@ -21,14 +21,14 @@ use tallow::renderer::{Outputs, Renderer};
 use tallow::scene::Scene;
 use tallow::settings::Settings;
 use tallow::shaders::traverse::Bind;
+use tallow::stage::{PerThread, WORKGROUP_CPU};
 
 const SIDE: u32 = 512;
 const THREADS: usize = 2;
 /// Rays that a thread takes at a time.
 const CHUNK: usize = 4096;
-/// Threads of a workgroup, as path.comp has; then the id of its specialisation constant.
-const WORKGROUP: u32 = 32;
-const WORKGROUP_ID: u32 = 100;
+/// Rays that a thread of the device traces one after the other.
+const RAYS: u32 = 16;
 
 /// What either side finds: distance and triangle in leaf order (any hit: any value for a hit), [`NONE`] on a miss.
 type Found = (f32, u32);
@@ -100,7 +100,7 @@ impl Host {
 struct Device {
     gpu: Gpu,
     frame: FrameResources,
-    kernel: Kernel<Bind<'static>>,
+    kernel: PerThread<Bind<'static>>,
     renderer: Renderer,
     rays: Buffer<RayQuery>,
     hits: Buffer<RayHit>,
@@ -114,7 +114,7 @@ impl Device {
         let effects = Effects::default();
         Ok(Self {
             frame: FrameResources::new(&gpu)?,
-            kernel: Kernel::new(&gpu, &effects, &[(WORKGROUP_ID, WORKGROUP)])?,
+            kernel: PerThread::with_stack(&gpu, &effects, WORKGROUP_CPU, scene.stack)?,
             renderer: Renderer::specialised(&gpu, scene, Outputs::default(), effects)?,
             rays: Buffer::from_slice(&gpu, "rays", rays)?,
             hits: Buffer::new(&gpu, "hits", rays.len(), Location::Device)?,
@@ -130,7 +130,7 @@ impl Device {
         let s = self.renderer.scene();
         let times = self.gpu.run(&mut self.frame, |rec| {
             let bind = Bind { scene: s.bind(), rays: &self.rays, hits: &self.hits };
-            rec.dispatch(&self.kernel, bind, &push, [count.div_ceil(WORKGROUP), 1, 1])
+            self.kernel.record(rec, bind, &push, count.div_ceil(RAYS))
         })?;
         let pass = times.first().context("the device has no timestamps")?;
         let found = self.hits.read()?.iter().map(|h| (h.t, h.triangle)).collect();

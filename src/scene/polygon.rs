@@ -1,0 +1,171 @@
+//! Faces of more than three corners as triangles. Convex ones become fans; others are clipped ear by ear (Meisters 1975),
+//! in the plane of their Newell normal.
+use glam::{DVec2, DVec3};
+
+/// Corners of a face that is still clipped, in time that grows with their square; a larger one becomes a fan.
+const MOST_CORNERS: usize = 10_000;
+
+/// Triangle corners out of faces of `arities` corners each, windings kept. `positions`: three floats a vertex.
+/// Corners that form no area may be left with triangles of none.
+pub fn triangulate(positions: &[f32], arities: &[u32], indices: &[u32]) -> Vec<u32> {
+    let mut triangles = Vec::with_capacity(3 * (indices.len() - 2 * arities.len().min(indices.len() / 2)));
+    let mut rest = indices;
+    for &arity in arities {
+        let (face, after) = rest.split_at(arity as usize);
+        rest = after;
+        match face.len() {
+            0..3 => {}
+            3 => triangles.extend(face),
+            _ => polygon(positions, face, &mut triangles),
+        }
+    }
+    triangles
+}
+
+fn polygon(positions: &[f32], face: &[u32], triangles: &mut Vec<u32>) {
+    let flat = flattened(positions, face);
+    let mut left: Vec<usize> = (0..face.len()).collect();
+    let convex = (0..left.len()).all(|i| turn(&flat, &left, i) > 0.0);
+    let mut at = 0;
+    // Without an ear (a face that crosses itself, or has no area) what is left becomes a fan.
+    let mut without = if convex || face.len() > MOST_CORNERS { left.len() } else { 0 };
+    while left.len() > 3 && without < left.len() {
+        at %= left.len();
+        if is_ear(&flat, &left, at) {
+            triangles.extend(corners(&left, at).map(|c| face[c]));
+            left.remove(at);
+            without = 0;
+        } else {
+            at += 1;
+            without += 1;
+        }
+    }
+    triangles.extend(left.windows(2).skip(1).flat_map(|w| [face[left[0]], face[w[0]], face[w[1]]]));
+}
+
+/// The corners seen along the face's normal, counter-clockwise as a whole.
+fn flattened(positions: &[f32], face: &[u32]) -> Vec<DVec2> {
+    let point = |&i: &u32| DVec3::from([0, 1, 2].map(|a| f64::from(positions[3 * i as usize + a])));
+    let points: Vec<DVec3> = face.iter().map(point).collect();
+    let next = points.iter().cycle().skip(1);
+    let normal: DVec3 = points.iter().zip(next).map(|(a, b)| (a - points[0]).cross(b - points[0])).sum();
+    let size = normal.abs();
+    let drop_axis = |p: &DVec3| match size.max_element() {
+        m if m == size.x => DVec2::new(p.y, p.z * normal.x.signum()),
+        m if m == size.y => DVec2::new(p.z, p.x * normal.y.signum()),
+        _ => DVec2::new(p.x, p.y * normal.z.signum()),
+    };
+    points.iter().map(drop_axis).collect()
+}
+
+/// Before, at and after place `at` of the corners that are left.
+fn corners(left: &[usize], at: usize) -> [usize; 3] {
+    let n = left.len();
+    [left[(at + n - 1) % n], left[at], left[(at + 1) % n]]
+}
+
+/// Twice the signed area of a triangle.
+fn area(a: DVec2, b: DVec2, c: DVec2) -> f64 {
+    (b - a).perp_dot(c - a)
+}
+
+fn turn(flat: &[DVec2], left: &[usize], at: usize) -> f64 {
+    let [a, b, c] = corners(left, at).map(|c| flat[c]);
+    area(a, b, c)
+}
+
+/// A convex corner whose triangle holds none of the other corners, not even on its border.
+fn is_ear(flat: &[DVec2], left: &[usize], at: usize) -> bool {
+    let [a, b, c] = corners(left, at).map(|c| flat[c]);
+    let holds = |p: DVec2| {
+        // A corner that two parts of a face share stands for no other.
+        p != a && p != b && p != c && area(a, b, p) >= 0.0 && area(b, c, p) >= 0.0 && area(c, a, p) >= 0.0
+    };
+    area(a, b, c) > 0.0 && !left.iter().any(|&i| holds(flat[i]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sum of the areas, and how many triangles face against `normal`.
+    fn measure(positions: &[f32], triangles: &[u32], normal: DVec3) -> (f64, usize) {
+        let point = |i: u32| DVec3::from([0, 1, 2].map(|a| f64::from(positions[3 * i as usize + a])));
+        let areas: Vec<f64> = triangles
+            .chunks(3)
+            .map(|t| 0.5 * (point(t[1]) - point(t[0])).cross(point(t[2]) - point(t[0])).dot(normal))
+            .collect();
+        (areas.iter().map(|a| a.abs()).sum(), areas.iter().filter(|&&a| a < -1e-9).count())
+    }
+
+    fn fan(corners: u32) -> Vec<u32> {
+        (2..corners).flat_map(|i| [0, i - 1, i]).collect()
+    }
+
+    /// Corners (x, y) placed on a plane, and its unit normal.
+    fn placed(points: &[(f64, f64)], x: DVec3, y: DVec3) -> (Vec<f32>, DVec3) {
+        let at = |&(u, v): &(f64, f64)| (DVec3::new(3.0, -2.0, 5.0) + u * x + v * y).as_vec3().to_array();
+        (points.iter().flat_map(at).collect(), x.cross(y))
+    }
+
+    const L: [(f64, f64); 6] = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (0.0, 2.0)];
+
+    #[test]
+    fn concave_faces_keep_their_area_on_every_plane_and_in_both_windings() {
+        let tilted = DVec3::new(1.0, 2.0, 2.0) / 3.0;
+        let planes = [(DVec3::X, DVec3::Y), (DVec3::Z, DVec3::X), (DVec3::Y, DVec3::Z), (DVec3::Z, DVec3::Y)];
+        for (x, y) in planes.into_iter().chain([(tilted, tilted.any_orthonormal_vector())]) {
+            for start in 0..6 {
+                let mut points = L;
+                points.rotate_left(start);
+                let (positions, normal) = placed(&points, x, y);
+                let triangles = triangulate(&positions, &[6], &[0, 1, 2, 3, 4, 5]);
+                let (area, against) = measure(&positions, &triangles, normal);
+                assert!((area - 3.0).abs() < 1e-5 && against == 0 && triangles.len() == 12, "{x} {y} {start}: {area}");
+                let reversed = triangulate(&positions, &[6], &[5, 4, 3, 2, 1, 0]);
+                assert_eq!(measure(&positions, &reversed, -normal).1, 0, "{x} {y} {start}");
+            }
+        }
+        let (positions, normal) = placed(&[L[1], L[2], L[3], L[4], L[5], L[0]], DVec3::X, DVec3::Y);
+        let (area, against) = measure(&positions, &fan(6), normal);
+        assert!(area > 3.1 && against > 0, "control: a fan covers too much");
+    }
+
+    #[test]
+    fn random_stars_keep_their_area() {
+        let mut state = 1u64;
+        let mut unit = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        for n in 4..60 {
+            let point = |i: usize, r: f64| {
+                let angle = std::f64::consts::TAU * i as f64 / n as f64;
+                (r * angle.cos(), r * angle.sin())
+            };
+            let points: Vec<_> = (0..n).map(|i| point(i, 0.1 + unit())).collect();
+            let exact = (0..n).map(|i| (points[i], points[(i + 1) % n])).map(|(a, b)| 0.5 * (a.0 * b.1 - a.1 * b.0));
+            let exact: f64 = exact.sum();
+            let (positions, normal) = placed(&points, DVec3::Y, DVec3::Z);
+            let triangles = triangulate(&positions, &[n as u32], &(0..n as u32).collect::<Vec<_>>());
+            let (area, against) = measure(&positions, &triangles, normal);
+            assert!((area / exact - 1.0).abs() < 1e-5 && against == 0, "{n} corners: {area} of {exact}");
+            assert_eq!(triangles.len(), 3 * (n - 2));
+        }
+    }
+
+    #[test]
+    fn convex_faces_are_fans_and_broken_ones_come_to_an_end() {
+        let square = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+        let (positions, _) = placed(&square, DVec3::X, DVec3::Y);
+        assert_eq!(triangulate(&positions, &[4, 3], &[0, 1, 2, 3, 0, 1, 2]), [0, 1, 2, 0, 2, 3, 0, 1, 2]);
+        assert_eq!(triangulate(&positions, &[4], &[0, 2, 1, 3]).len(), 6, "a face that crosses itself");
+        assert_eq!(triangulate(&positions, &[5], &[1, 1, 1, 1, 1]).len(), 9, "a face without area");
+        assert_eq!(triangulate(&[f32::NAN; 12], &[4], &[0, 1, 2, 3]).len(), 6);
+        // A corner in the middle of an edge: nothing is lost, whichever comes first.
+        let (positions, normal) =
+            placed(&[(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)], DVec3::X, DVec3::Y);
+        let (area, against) = measure(&positions, &triangulate(&positions, &[5], &[0, 1, 2, 3, 4]), normal);
+        assert!((area - 2.0).abs() < 1e-6 && against == 0, "{area}");
+    }
+}

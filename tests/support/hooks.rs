@@ -1,0 +1,94 @@
+//! Vulkan's entry points with ours in between: they count what is created, and lose the device when they are told to.
+#![allow(unsafe_code, reason = "stands between the renderer and the driver")]
+use ash::vk;
+use std::collections::HashMap;
+use std::ffi::{CStr, c_char, c_void};
+use std::mem::transmute;
+use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
+use std::sync::{LazyLock, Mutex, MutexGuard, OnceLock, PoisonError};
+use tallow::gpu::RawDevice;
+
+/// While set, whatever is submitted loses the device.
+pub static LOSE: AtomicBool = AtomicBool::new(false);
+
+static INSTANCE_LOADER: OnceLock<vk::PFN_vkGetInstanceProcAddr> = OnceLock::new();
+static DEVICE_LOADER: OnceLock<vk::PFN_vkGetDeviceProcAddr> = OnceLock::new();
+static CALLS: LazyLock<Mutex<HashMap<&'static str, usize>>> = LazyLock::new(Mutex::default);
+
+/// The engine's handles, with our entry points. Tests that use it take turns: hold the guard.
+pub fn between(raw: RawDevice) -> (RawDevice, MutexGuard<'static, ()>) {
+    static TURN: Mutex<()> = Mutex::new(());
+    let guard = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    // SAFETY: the engine's own pointer.
+    INSTANCE_LOADER.get_or_init(|| unsafe {
+        transmute::<*const c_void, vk::PFN_vkGetInstanceProcAddr>(raw.get_instance_proc_addr)
+    });
+    (RawDevice { get_instance_proc_addr: get_instance_proc_addr as *const c_void, ..raw }, guard)
+}
+
+/// How often each entry point was called since the last time that somebody asked.
+pub fn take_calls() -> HashMap<&'static str, usize> {
+    std::mem::take(&mut CALLS.lock().unwrap())
+}
+
+unsafe extern "system" fn get_instance_proc_addr(
+    instance: vk::Instance,
+    name: *const c_char,
+) -> vk::PFN_vkVoidFunction {
+    unsafe {
+        let found = INSTANCE_LOADER.get().expect("set before it is handed out")(instance, name);
+        if CStr::from_ptr(name) != c"vkGetDeviceProcAddr" {
+            return found;
+        }
+        DEVICE_LOADER.get_or_init(|| transmute::<vk::PFN_vkVoidFunction, vk::PFN_vkGetDeviceProcAddr>(found));
+        Some(transmute::<*const c_void, unsafe extern "system" fn()>(get_device_proc_addr as *const c_void))
+    }
+}
+
+/// For each entry point, one of its type that counts and passes on.
+macro_rules! between {
+    ($($name:ident: $pfn:ident($($arg:ident: $type:ty),+);)+) => {
+        unsafe extern "system" fn get_device_proc_addr(device: vk::Device, name: *const c_char) -> vk::PFN_vkVoidFunction {
+            unsafe {
+                let found = DEVICE_LOADER.get().expect("set before it is handed out")(device, name);
+                $(
+                    if CStr::from_ptr(name).to_str() == Ok(stringify!($name)) {
+                        static REAL: OnceLock<vk::$pfn> = OnceLock::new();
+                        unsafe extern "system" fn ours($($arg: $type),+) -> vk::Result {
+                            *CALLS.lock().unwrap().entry(stringify!($name)).or_default() += 1;
+                            if LOSE.load(SeqCst) && stringify!($name).starts_with("vkQueueSubmit") {
+                                return vk::Result::ERROR_DEVICE_LOST;
+                            }
+                            unsafe { REAL.get().expect("found first")($($arg),+) }
+                        }
+                        REAL.get_or_init(|| transmute::<vk::PFN_vkVoidFunction, vk::$pfn>(found));
+                        return Some(transmute::<*const c_void, unsafe extern "system" fn()>(ours as *const c_void));
+                    }
+                )+
+                found
+            }
+        }
+    };
+}
+
+type Alloc<'a> = *const vk::AllocationCallbacks<'a>;
+
+between! {
+    vkCreateBuffer: PFN_vkCreateBuffer(d: vk::Device, i: *const vk::BufferCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::Buffer);
+    vkCreateBufferView: PFN_vkCreateBufferView(d: vk::Device, i: *const vk::BufferViewCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::BufferView);
+    vkAllocateMemory: PFN_vkAllocateMemory(d: vk::Device, i: *const vk::MemoryAllocateInfo<'_>, a: Alloc<'_>, o: *mut vk::DeviceMemory);
+    vkMapMemory: PFN_vkMapMemory(d: vk::Device, m: vk::DeviceMemory, at: vk::DeviceSize, n: vk::DeviceSize, f: vk::MemoryMapFlags, o: *mut *mut c_void);
+    vkCreateShaderModule: PFN_vkCreateShaderModule(d: vk::Device, i: *const vk::ShaderModuleCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::ShaderModule);
+    vkCreateComputePipelines: PFN_vkCreateComputePipelines(d: vk::Device, c: vk::PipelineCache, n: u32, i: *const vk::ComputePipelineCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::Pipeline);
+    vkCreatePipelineLayout: PFN_vkCreatePipelineLayout(d: vk::Device, i: *const vk::PipelineLayoutCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::PipelineLayout);
+    vkCreateDescriptorSetLayout: PFN_vkCreateDescriptorSetLayout(d: vk::Device, i: *const vk::DescriptorSetLayoutCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::DescriptorSetLayout);
+    vkCreateDescriptorPool: PFN_vkCreateDescriptorPool(d: vk::Device, i: *const vk::DescriptorPoolCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::DescriptorPool);
+    vkCreateQueryPool: PFN_vkCreateQueryPool(d: vk::Device, i: *const vk::QueryPoolCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::QueryPool);
+    vkCreateCommandPool: PFN_vkCreateCommandPool(d: vk::Device, i: *const vk::CommandPoolCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::CommandPool);
+    vkAllocateCommandBuffers: PFN_vkAllocateCommandBuffers(d: vk::Device, i: *const vk::CommandBufferAllocateInfo<'_>, o: *mut vk::CommandBuffer);
+    vkCreateFence: PFN_vkCreateFence(d: vk::Device, i: *const vk::FenceCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::Fence);
+    vkCreateSemaphore: PFN_vkCreateSemaphore(d: vk::Device, i: *const vk::SemaphoreCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::Semaphore);
+    vkCreateEvent: PFN_vkCreateEvent(d: vk::Device, i: *const vk::EventCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::Event);
+    vkCreateImage: PFN_vkCreateImage(d: vk::Device, i: *const vk::ImageCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::Image);
+    vkQueueSubmit2: PFN_vkQueueSubmit2(q: vk::Queue, n: u32, i: *const vk::SubmitInfo2<'_>, f: vk::Fence);
+}

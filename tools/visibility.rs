@@ -1,0 +1,46 @@
+//! The average visibility of Nori's first assignment: the share of the hemisphere, all directions alike, in which nothing
+//! lies within a given distance of the first hit. No light transport, so the twins of the kernels compute it.
+use crate::compare::Picture;
+use glam::{Vec3, vec2};
+use rayon::prelude::*;
+use std::path::Path;
+use tallow::gpu::layout::NONE;
+use tallow::reference::camera::{camera_ray, film_from_pixel};
+use tallow::reference::light::INFINITE_DISTANCE;
+use tallow::reference::sampler::{sample_2d, sampler_start};
+use tallow::reference::surface::{offset_origin, surface_at};
+use tallow::reference::traverse::traverse_from;
+use tallow::reference::warp::warp_sphere;
+use tallow::scene::Scene;
+
+/// Of the scene's film, with `spp` samples a pixel; `reach` in world units.
+///
+/// # Errors
+/// When the scene cannot be loaded.
+pub fn render(scene: &Path, spp: u32, reach: f32) -> anyhow::Result<Picture> {
+    let scene = Scene::load(scene, &|_| {})?;
+    let (width, height) = (scene.settings.width, scene.settings.height);
+    let mean = |pixel: u32| (0..spp).map(|i| sample(&scene, pixel, i, reach)).sum::<f32>() / spp as f32;
+    let rgb = (0..width * height).into_par_iter().map(|pixel| [mean(pixel); 3]).collect();
+    Ok(Picture { width: width as usize, height: height as usize, rgb })
+}
+
+/// 1 where nothing is met, as Nori has it for rays that leave the scene.
+fn sample(scene: &Scene, pixel: u32, index: u32, reach: f32) -> f32 {
+    let size = [scene.settings.width, scene.settings.height];
+    let random = sampler_start(pixel, index, 0, false);
+    let at = vec2((pixel % size[0]) as f32, (pixel / size[0]) as f32) + sample_2d(random, 0);
+    let ray = camera_ray(&scene.camera, film_from_pixel(at, size), vec2(0.5, 0.5));
+    let meets =
+        |from, origin: Vec3, direction, t_max, any| traverse_from(scene, from, origin, direction, t_max, any, 0);
+    let hit = meets([NONE; 2], ray.origin, ray.direction, INFINITE_DISTANCE, false);
+    if !hit.any() {
+        return 1.0;
+    }
+    let s = surface_at(scene, &hit);
+    let normal = if s.geometric.dot(ray.direction) > 0.0 { -s.geometric } else { s.geometric };
+    let sphere = warp_sphere(sample_2d(random, 1));
+    let direction = if sphere.dot(normal) < 0.0 { -sphere } else { sphere };
+    let blocker = meets([hit.triangle, hit.instance], offset_origin(s.position, normal), direction, reach, true);
+    f32::from(!blocker.any())
+}
