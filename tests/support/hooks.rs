@@ -19,6 +19,7 @@ static CALLS: LazyLock<Mutex<HashMap<&'static str, usize>>> = LazyLock::new(Mute
 pub fn between(raw: RawDevice) -> (RawDevice, MutexGuard<'static, ()>) {
     static TURN: Mutex<()> = Mutex::new(());
     let guard = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    take_calls(); // of the test before
     // SAFETY: the engine's own pointer.
     INSTANCE_LOADER.get_or_init(|| unsafe {
         transmute::<*const c_void, vk::PFN_vkGetInstanceProcAddr>(raw.get_instance_proc_addr)
