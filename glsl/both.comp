@@ -17,32 +17,37 @@ layout(scalar, push_constant) uniform Push { PriorityPush push; };
 #include "shared/noise.glsl"
 #include "shared/similarity.glsl"
 
-const int REACH = 2;
 // Noise goes on where shape does: positions may be ten times as far apart as for importance. 1 / 0.2^2 of albedos.
 const float POSITION_SHARE = 0.01;
 const float ALBEDO_SCALE = 25.0;
 
+struct Place {
+    uvec4 normal, position, albedo;
+};
+
+Place place_at(uint pixel) { return Place(guide_texel(pixel, 0u), guide_texel(pixel, 1u), guide_texel(pixel, 2u)); }
+
 // How much a neighbour's noise says of a pixel's, 0 to 1.
-float kinship(uint p, uint q) {
-    uvec4 a = guide_texel(p, 1u), b = guide_texel(q, 1u);
-    vec3 normals = uintBitsToFloat(guide_texel(p, 0u).xyz) - uintBitsToFloat(guide_texel(q, 0u).xyz);
-    vec3 positions = uintBitsToFloat(a.xyz) - uintBitsToFloat(b.xyz);
-    vec3 albedos = uintBitsToFloat(guide_texel(p, 2u).xyz) - uintBitsToFloat(guide_texel(q, 2u).xyz);
+float kinship(Place a, Place b) {
+    vec3 normals = uintBitsToFloat(a.normal.xyz) - uintBitsToFloat(b.normal.xyz);
+    vec3 positions = uintBitsToFloat(a.position.xyz) - uintBitsToFloat(b.position.xyz);
+    vec3 albedos = uintBitsToFloat(a.albedo.xyz) - uintBitsToFloat(b.albedo.xyz);
     float x = dot(normals, normals) * push.normal_scale + dot(positions, positions) * push.position_scale * POSITION_SHARE +
               dot(albedos, albedos) * ALBEDO_SCALE;
-    return (a.w == NONE) == (b.w == NONE) ? exp_negative(x) : 0.0;
+    return (a.position.w == NONE) == (b.position.w == NONE) ? exp_negative(x) : 0.0;
 }
 
 void main() {
     uint i = thread_index();
     if (i >= push.size.x * push.size.y) return; // safe: no barrier() follows
     ivec2 size = ivec2(push.size), at = ivec2(i % push.size.x, i / push.size.x);
+    Place here = place_at(i);
     vec4 own = moments(i), around = own;
-    for (int dy = -REACH; dy <= REACH; dy++) {
-        for (int dx = -REACH; dx <= REACH; dx++) {
+    for (int dy = -1; dy <= 1; dy++) {
+        for (int dx = -1; dx <= 1; dx++) {
             ivec2 q = clamp(at + ivec2(dx, dy), ivec2(0), size - 1);
             uint neighbour = uint(q.y * size.x + q.x);
-            around += neighbour == i ? vec4(0.0) : kinship(i, neighbour) * moments(neighbour);
+            around += neighbour == i ? vec4(0.0) : kinship(here, place_at(neighbour)) * moments(neighbour);
         }
     }
     float gathered = push.filtered > 0.0 ? 1.0 - texelFetch(importances, int(i)).x : 0.0;

@@ -101,7 +101,6 @@ pub fn record_listed(
     push: &PathPush,
     range: &PathRange,
 ) -> Result<()> {
-    rec.fill(&f.paths, NONE)?; // the list may end earlier
     batch::record(&a.batch, rec, &f.counts.offset, &f.tiles[0].stats, &f.paths, range, push.first_sample)?; // offset -> paths[B]
     path::record_listed(&st.path, rec, s, f, push, range.paths)?; //                     paths   -> samples[B]
     fold::record_listed(&st.fold, rec, f, range) //                                      samples -> stats[P], light[P]

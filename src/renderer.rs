@@ -12,7 +12,7 @@ use crate::gpu::{FrameResources, Gpu, Kernel, PassTime, RawBuffer, Recorder};
 use crate::scene::{self, Scene};
 use crate::schedule::{self, Cut};
 pub use crate::schedule::{Batch, Choice, PathRange, Plan, Progress, Step};
-use crate::settings::{PixelFilter, Sampler, Settings};
+use crate::settings::{PixelFilter, Placing, Sampler, Settings};
 use crate::stage::apportion::Apportion;
 use crate::stage::scan::Scan;
 use crate::stage::{PerThread, WORKGROUP_CPU, WORKGROUP_GPU};
@@ -157,7 +157,12 @@ impl Renderer {
             (Step::Uniform(batch), _) => frame::record_uniform(rec, st, s, f, push, batch),
             (Step::Allocate(plan), Some(a)) => frame::record_allocation(rec, a, f, &self.priority, plan),
             (Step::Choose(choice), Some(a)) => frame::record_choice(rec, a, f, &self.priority, choice, push.seed),
-            (Step::Listed(range), Some(a)) => frame::record_listed(rec, st, a, s, f, push, range),
+            (Step::Listed(range), Some(a)) => {
+                if self.settings.allocate.placing() == Placing::Chosen {
+                    rec.fill(&f.paths, NONE)?; // the list may end before the range
+                }
+                frame::record_listed(rec, st, a, s, f, push, range)
+            }
             _ => Err(Error::Usage("this renderer was made without the effect \"adaptive\"".into())),
         }
     }
