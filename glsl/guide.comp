@@ -22,6 +22,7 @@ uint nodes_visited = 0u;
 #include "shared/camera.glsl"
 #include "shared/traverse.glsl"
 #include "shared/surface.glsl"
+#include "shared/first_hit.glsl"
 
 void main() {
     uint i = thread_index();
@@ -31,16 +32,6 @@ void main() {
     Camera camera = push.camera;
     camera.lens_radius = 0.0;
     Ray ray = camera_ray(camera, film_from_pixel(centre, push.size), vec2(0.5));
-    Hit hit = traverse(Segment(ray.origin, ray.direction, 3e38, pcg(pixel)), push.root);
-    Guide guide = Guide(vec3(0.0), 0.0, vec3(0.0), NONE, vec3(0.0), NONE);
-    if (hit.triangle != NONE) {
-        Surface s = surface_at(hit);
-        guide.normal = dot(s.normal, ray.direction) > 0.0 ? -s.normal : s.normal;
-        guide.depth = hit.t + camera.near;
-        guide.position = s.position;
-        guide.object = s.object;
-        guide.albedo = bsdf_albedo(surface_bsdf(s));
-        guide.material = s.material;
-    }
-    guides[i] = guide;
+    bool delta;
+    guides[i] = first_hit(ray, pcg(pixel), delta);
 }

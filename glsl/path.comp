@@ -28,18 +28,9 @@ uint nodes_visited = 0u, closest_rays = 0u, any_rays = 0u;
 #include "shared/surface.glsl"
 #include "shared/light.glsl"
 
-// Dimension pairs: two for the camera, then these for every scattering event.
-const uint PAIR_FILM = 0u, PAIR_LENS = 1u, PAIR_FIRST_BOUNCE = 2u, PAIRS_PER_BOUNCE = 4u;
+// Dimension pairs: those of the camera, then these for every scattering event.
+const uint PAIR_FIRST_BOUNCE = 2u, PAIRS_PER_BOUNCE = 4u;
 const uint PAIR_CHOICE = 0u, PAIR_LIGHT = 1u, PAIR_BSDF = 2u, PAIR_ROULETTE = 3u;
-
-vec2 film_sample(uint pixel, Sampler random) {
-    vec2 at = vec2(pixel % push.size.x, pixel / push.size.x);
-    vec2 u = sample_2d(random, PAIR_FILM);
-    if (FX_PIXEL_FILTER && push.pixel_filter == 1u) u = 0.5 + vec2(warp_tent(u.x), warp_tent(u.y));
-    else if (FX_PIXEL_FILTER && push.pixel_filter == 2u) u = 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y));
-    else if (FX_PIXEL_FILTER && push.pixel_filter == 3u) u = vec2(0.5);
-    return film_from_pixel(at + u, push.size);
-}
 
 // Joins the two strategies. Two densities that vanished give 0, not 0 / 0.
 float balance(float taken, float other) { return taken / max(taken + other, 1e-37); }
@@ -117,7 +108,7 @@ bool survives_roulette(inout Path path, Sampler random, uint pair) {
     return true;
 }
 
-Light2 trace_path(Path path, Sampler random, uint path_seed, out vec3 albedo) {
+Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
     Light2 sum = Light2(vec3(0.0), vec3(0.0));
     bool smooth_first = false, shadowed = false, alive = true;
     Segment shadow = Segment(vec3(0.0), vec3(0.0), 0.0, 0u);
@@ -130,7 +121,7 @@ Light2 trace_path(Path path, Sampler random, uint path_seed, out vec3 albedo) {
             closest_rays += uint(alive);
             any_rays += uint(shadowed);
         }
-        uint mask_seed = pcg(path_seed + 2u * bounce);
+        uint mask_seed = pcg(seed + 2u * bounce);
         Segment ray = Segment(path.origin, path.direction, INFINITE_DISTANCE, mask_seed);
         bool lit = shadowed;
         Hit hit = traverse_both(shadow, shadowed, ray, alive, push.root, from);
@@ -185,11 +176,10 @@ void main() {
         if (pixel == NONE) return; // safe: no barrier() follows
     }
     Sampler random = sampler_start(pixel, index, push.seed);
-    Ray ray = camera_ray(push.camera, film_sample(pixel, random), FX_LENS ? sample_2d(random, PAIR_LENS) : vec2(0.0));
+    Ray ray = eye_ray(film_sample(pixel, random), random);
     Path path = Path(ray.origin, ray.direction, vec3(1.0), 0.0, true);
-    uint path_seed = pcg(pcg(pixel ^ push.seed) + index);
     vec3 albedo;
-    Light2 light = trace_path(path, random, path_seed, albedo);
+    Light2 light = trace_path(path, random, path_seed(pixel, index), albedo);
     if (FX_SPLIT) {
         samples[3u * i] = vec4(light.direct, 0.0);
         samples[3u * i + 1u] = vec4(light.indirect, 0.0);

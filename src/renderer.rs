@@ -1,5 +1,7 @@
 //! The renderer that an engine embeds and that the command line drives: a scene on a device, kernels specialised for
 //! it, and frames recorded batch by batch into command buffers.
+mod lookup;
+
 use crate::allocate::{self, HostInputs, Row};
 use crate::error::{Error, Result};
 use crate::frame::{self, Allocation, Stages};
@@ -95,7 +97,7 @@ impl Renderer {
         let settings = scene.settings.clone();
         settings.validate()?;
         let effects = Effects { split_light: outputs.split_light, counters: outputs.counters, ..effects };
-        let workgroup = if gpu.info().kind == "CPU" { WORKGROUP_CPU } else { WORKGROUP_GPU };
+        let workgroup = workgroup(gpu);
         let stages = Stages {
             guide: PerThread::with_stack(gpu, &effects, workgroup, scene.stack)?,
             path: PerThread::with_stack(gpu, &effects, workgroup, scene.stack)?,
@@ -310,6 +312,11 @@ fn paths_in_flight(gpu: &Gpu, settings: &Settings, effects: &Effects) -> u32 {
     let room = gpu.info().max_storage_range / bytes;
     let all = settings.pixels() as u64 * u64::from(settings.spp);
     wanted.min(room).min(all).max(1) as u32
+}
+
+/// Threads of a workgroup that traces.
+fn workgroup(gpu: &Gpu) -> u32 {
+    if gpu.info().kind == "CPU" { WORKGROUP_CPU } else { WORKGROUP_GPU }
 }
 
 fn policy_of(settings: &Settings) -> Result<&'static Row> {

@@ -116,7 +116,7 @@ impl Allocate {
 }
 
 /// The settings of a render.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// Film width in pixels, 1 to 16384.
     pub width: u32,

@@ -217,3 +217,29 @@ fn what_cannot_be_filtered_is_told_in_one_line() {
     complains(&run(&["noisy.exr", "-o", "a.exr", "--reference", "small.exr"]), 3, &["32x32", "8x8"]);
     assert!(!folder.path().join("a.exr").exists(), "nothing is written");
 }
+
+/// Direct light stays, and indirect light is that of the render, noise and edges apart.
+#[test]
+fn filtered_light_is_looked_up_in_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/scene.toml");
+    let size = SIZE.to_string();
+    let words = ["render", scene, "-o", "noisy.exr", "--width", &size, "--height", &size, "--spp", "64", "--quiet"];
+    assert_eq!(tallow(&folder, &words).status.code(), Some(0));
+    let before = read(&folder, "noisy.exr").channel("R").unwrap().to_f32();
+    let looked_up = filter(&folder, &["--filter", "atrous", "--scene", scene, "--eye-rays", "8"]);
+    let plain = filter(&folder, &["--filter", "atrous"]);
+    let distance = |film: &Film| {
+        let after = film.channel("R").unwrap().to_f32();
+        before.iter().zip(&after).map(|(a, b)| (a - b).abs()).sum::<f32>() / before.iter().sum::<f32>()
+    };
+    assert!(distance(&looked_up) < 0.05, "{}", distance(&looked_up));
+    assert_ne!(looked_up.channel("R").unwrap().to_f32(), plain.channel("R").unwrap().to_f32(), "control");
+
+    let run = |words: &[&str]| tallow(&folder, &[&["filter", "-o", "clean.exr"], words].concat());
+    complains(&run(&["noisy.exr", "--scene", "no.toml"]), 3, &["no.toml"]);
+    assert_eq!(run(&["noisy.exr", "--eye-rays", "4"]).status.code(), Some(2));
+    assert_eq!(run(&["noisy.exr", "--scene", scene, "--no-demodulate"]).status.code(), Some(2));
+    write(&folder, "foreign.exr", &noisy(true));
+    complains(&run(&["foreign.exr", "--scene", scene]), 3, &["foreign.exr", "tallow render"]);
+}

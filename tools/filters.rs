@@ -9,7 +9,7 @@ mod measure;
 mod scenes;
 mod view;
 
-use measure::{neural, ranking, textures, times};
+use measure::{lookup, neural, ranking, textures, times};
 
 /// One table or set of pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -22,6 +22,8 @@ enum Part {
     Neural,
     /// Sponza's textures with and without demodulation.
     Textures,
+    /// GIF's supersampling: filtered light looked up along eye rays.
+    Lookup,
 }
 
 #[derive(Parser)]
@@ -60,6 +62,7 @@ fn main() -> anyhow::Result<()> {
             Part::Ranking => ranking::print(&gpu, &args)?,
             Part::Neural => neural::print(&gpu, &args)?,
             Part::Textures => textures::print(&gpu, &args)?,
+            Part::Lookup => lookup::print(&gpu, &args)?,
         }
     }
     Ok(())

@@ -1,4 +1,4 @@
-// Camera rays. Needs sampler.glsl and warp.glsl before it.
+// Camera rays. Needs `push` (PathPush), sampler.glsl and warp.glsl before it.
 
 struct Ray {
     vec3 origin;
@@ -23,3 +23,25 @@ Ray camera_ray(Camera camera, vec2 film, vec2 lens) {
     vec3 direction = normalize(through);
     return Ray(origin + camera.near * direction, direction);
 }
+
+// Dimension pairs of the camera; scattering events have those after them.
+const uint PAIR_FILM = 0u, PAIR_LENS = 1u;
+
+// Where in the film a sample of `pixel` falls, in pixels.
+vec2 film_sample(uint pixel, Sampler random) {
+    vec2 at = vec2(pixel % push.size.x, pixel / push.size.x);
+    vec2 u = sample_2d(random, PAIR_FILM);
+    if (FX_PIXEL_FILTER && push.pixel_filter == 1u) u = 0.5 + vec2(warp_tent(u.x), warp_tent(u.y));
+    else if (FX_PIXEL_FILTER && push.pixel_filter == 2u) u = 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y));
+    else if (FX_PIXEL_FILTER && push.pixel_filter == 3u) u = vec2(0.5);
+    return at + u;
+}
+
+// The first ray of a sample's path, through `film` in pixels.
+Ray eye_ray(vec2 film, Sampler random) {
+    vec2 lens = FX_LENS ? sample_2d(random, PAIR_LENS) : vec2(0.0);
+    return camera_ray(push.camera, film_from_pixel(film, push.size), lens);
+}
+
+// Alpha masks along a path draw from this.
+uint path_seed(uint pixel, uint index) { return pcg(pcg(pixel ^ push.seed) + index); }

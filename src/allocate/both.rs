@@ -59,7 +59,7 @@ fn reference(inputs: &HostInputs) -> Vec<f32> {
     let of = |(i, q): (usize, f32)| {
         let own = moments(&stats[i]);
         let mut around = own;
-        for j in square(push, i as i32 % width, i as i32 / width, 1).filter(|&j| j != i) {
+        for j in square(push, i as i32 % width, i as i32 / width).filter(|&j| j != i) {
             let (kin, m) = (kinship(&guide[i], &guide[j], push), moments(&stats[j]));
             around = std::array::from_fn(|k| around[k] + kin * m[k]);
         }

@@ -36,12 +36,11 @@ pub(super) fn moments(s: &PixelStats) -> [f32; 4] {
     [(s.m2[0] + s.m2[1] + s.m2[2]) / 3.0, n - 1.0, luminance * n, n]
 }
 
-/// The pixels of a square, those beyond the border replaced by the nearest of the film, row by row.
-pub(super) fn square(push: &PriorityPush, x: i32, y: i32, reach: i32) -> impl Iterator<Item = usize> {
+/// The 3 x 3 pixels around one, those beyond the border replaced by the nearest of the film, row by row.
+pub(super) fn square(push: &PriorityPush, x: i32, y: i32) -> impl Iterator<Item = usize> {
     let [width, height] = push.size.map(|n| n as i32);
     let row = move |dy: i32| (y + dy).clamp(0, height - 1) * width;
-    (-reach..=reach)
-        .flat_map(move |dy| (-reach..=reach).map(move |dx| (row(dy) + (x + dx).clamp(0, width - 1)) as usize))
+    (-1..=1).flat_map(move |dy| (-1..=1).map(move |dx| (row(dy) + (x + dx).clamp(0, width - 1)) as usize))
 }
 
 /// Twin of the function in `glsl/shared/noise.glsl`.
@@ -61,7 +60,7 @@ pub(super) fn reference(inputs: &HostInputs) -> Vec<f32> {
     let [width, height] = inputs.push.size.map(|n| n as i32);
     let moments = |pixel: usize| moments(&inputs.stats[pixel]);
     let of = |i: i32| {
-        let around = square(&inputs.push, i % width, i / width, 1).map(moments);
+        let around = square(&inputs.push, i % width, i / width).map(moments);
         let sum = around.fold([0.0; 4], |sum: [f32; 4], m| std::array::from_fn(|k| sum[k] + m[k]));
         noise(&inputs.push, moments(i as usize), sum)
     };

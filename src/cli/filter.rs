@@ -1,5 +1,6 @@
 //! `tallow filter`: a noisy image becomes a clean one.
 mod options;
+mod supersampling;
 
 use super::common::Common;
 use super::compare::{self, check_sizes};
@@ -18,6 +19,7 @@ use options::{Layers, Overrides};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
+use supersampling::Supersampling;
 
 /// Filter a noisy image, of this renderer or another
 ///
@@ -52,6 +54,9 @@ pub struct Args {
     /// Where the layers are.
     #[command(flatten)]
     pub layers: Layers,
+    /// Filtered light along eye rays.
+    #[command(flatten)]
+    pub supersampling: Supersampling,
     /// Replace the filters' own settings.
     #[command(flatten)]
     pub overrides: Overrides,
@@ -100,7 +105,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let start = Instant::now();
     let mut parts = composition::split(&aovs, demodulation(args));
     cut_fireflies(args, &gpu, &mut parts)?;
-    let (colour, times) = filtered(args, &gpu, &parts)?;
+    let (colour, times) = filtered(args, &gpu, &aovs, &parts)?;
     let seconds = start.elapsed().as_secs_f64();
     let clean = replaced(&source, &aovs, &colour)?;
     fail_on_messages(&gpu)?;
@@ -138,10 +143,13 @@ fn cut_fireflies(args: &Args, gpu: &Gpu, parts: &mut Parts) -> Result<()> {
     Ok(())
 }
 
-fn filtered(args: &Args, gpu: &Gpu, parts: &Parts) -> Result<(Vec<[f32; 3]>, Vec<PassTime>)> {
+fn filtered(args: &Args, gpu: &Gpu, aovs: &Aovs, parts: &Parts) -> Result<(Vec<[f32; 3]>, Vec<PassTime>)> {
     let settings = args.overrides.settings(&parts.input);
     let (light, times) = filter::run(gpu, args.filter, &parts.input, &settings)?;
-    Ok((parts.join(&light), times))
+    Ok(match args.supersampling.look_up(gpu, &args.image, aovs, parts, &light)? {
+        Some((indirect, more)) => (parts.join_reflected(&indirect), [times, more].concat()),
+        None => (parts.join(&light), times),
+    })
 }
 
 /// The file with the filtered colour. Where its three channels are one, that holds their mean.

@@ -62,6 +62,16 @@ impl Parts {
         let pixel = |i: usize| std::array::from_fn(|c| self.sharp[i][c] + self.factor[i][c] * filtered[i][c]);
         (0..filtered.len()).map(pixel).collect()
     }
+
+    /// Puts the image together from light that has been multiplied by surface colour already, as a look-up returns it.
+    ///
+    /// # Panics
+    /// When that has another number of pixels.
+    pub fn join_reflected(&self, light: &[vec3]) -> Vec<vec3> {
+        assert_eq!(light.len(), self.sharp.len(), "one value per pixel");
+        let pixel = |(sharp, light): (&vec3, &vec3)| std::array::from_fn(|c| sharp[c] + light[c]);
+        self.sharp.iter().zip(light).map(pixel).collect()
+    }
 }
 
 struct Light {

@@ -1,7 +1,11 @@
 //! Twin of `glsl/shared/camera.glsl`.
-use crate::gpu::layout::Camera;
-use crate::reference::warp::warp_disk;
+use crate::gpu::layout::{Camera, Effects, PathPush};
+use crate::reference::sampler::{Sampler, pcg, sample_2d};
+use crate::reference::warp::{warp_disk, warp_gaussian, warp_tent};
 use glam::{Vec2, Vec3, vec2};
+
+const PAIR_FILM: u32 = 0;
+const PAIR_LENS: u32 = 1;
 
 /// A ray.
 #[derive(Clone, Copy, Debug)]
@@ -30,4 +34,27 @@ pub fn camera_ray(camera: &Camera, film: Vec2, lens: Vec2) -> Ray {
     }
     let direction = through.normalize();
     Ray { origin: origin + camera.near * direction, direction }
+}
+
+/// Where in the film a sample of `pixel` falls, in pixels.
+pub fn film_sample(push: &PathPush, effects: &Effects, pixel: u32, random: Sampler) -> Vec2 {
+    let at = vec2((pixel % push.size[0]) as f32, (pixel / push.size[0]) as f32);
+    let u = sample_2d(random, PAIR_FILM);
+    at + match push.pixel_filter {
+        1 if effects.pixel_filter => 0.5 + vec2(warp_tent(u.x), warp_tent(u.y)),
+        2 if effects.pixel_filter => 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y)),
+        3 if effects.pixel_filter => Vec2::splat(0.5),
+        _ => u,
+    }
+}
+
+/// The first ray of a sample's path, through `film` in pixels.
+pub fn eye_ray(push: &PathPush, effects: &Effects, film: Vec2, random: Sampler) -> Ray {
+    let lens = if effects.lens { sample_2d(random, PAIR_LENS) } else { Vec2::ZERO };
+    camera_ray(&push.camera, film_from_pixel(film, push.size), lens)
+}
+
+/// Alpha masks along a path draw from this.
+pub fn path_seed(push: &PathPush, pixel: u32, index: u32) -> u32 {
+    pcg(pcg(pixel ^ push.seed).wrapping_add(index))
 }

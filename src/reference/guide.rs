@@ -1,7 +1,7 @@
-//! Twin of `glsl/guide.comp`.
+//! Twin of `glsl/guide.comp` and of `glsl/shared/first_hit.glsl`.
 use crate::gpu::layout::{Camera, Guide, NONE, PathPush};
-use crate::reference::bsdf::bsdf_albedo;
-use crate::reference::camera::{camera_ray, film_from_pixel};
+use crate::reference::bsdf::{bsdf_albedo, bsdf_is_delta};
+use crate::reference::camera::{Ray, camera_ray, film_from_pixel};
 use crate::reference::light::INFINITE_DISTANCE;
 use crate::reference::sampler::pcg;
 use crate::reference::surface::{surface_at, surface_bsdf};
@@ -14,18 +14,25 @@ pub fn guide(scene: &Scene, push: &PathPush, pixel: u32) -> Guide {
     let centre = vec2((pixel % push.size[0]) as f32, (pixel / push.size[0]) as f32) + 0.5;
     let camera = Camera { lens_radius: 0.0, ..push.camera };
     let ray = camera_ray(&camera, film_from_pixel(centre, push.size), Vec2::splat(0.5));
-    let hit = traverse(scene, ray.origin, ray.direction, INFINITE_DISTANCE, false, pcg(pixel));
+    first_hit(scene, push, ray, pcg(pixel)).0
+}
+
+/// What a primary ray meets, and whether that is a smooth surface, all of whose light counts as direct.
+pub fn first_hit(scene: &Scene, push: &PathPush, ray: Ray, mask_seed: u32) -> (Guide, bool) {
+    let hit = traverse(scene, ray.origin, ray.direction, INFINITE_DISTANCE, false, mask_seed);
     if !hit.any() {
-        return Guide { object: NONE, material: NONE, ..Guide::default() };
+        return (Guide { object: NONE, material: NONE, ..Guide::default() }, false);
     }
     let s = surface_at(scene, &hit);
+    let bsdf = surface_bsdf(scene, &s);
     let normal = if s.normal.dot(ray.direction) > 0.0 { -s.normal } else { s.normal };
-    Guide {
+    let guide = Guide {
         normal: normal.into(),
-        depth: hit.t + camera.near,
+        depth: hit.t + push.camera.near,
         position: s.position.into(),
         object: s.object,
-        albedo: bsdf_albedo(&surface_bsdf(scene, &s)).into(),
+        albedo: bsdf_albedo(&bsdf).into(),
         material: s.material,
-    }
+    };
+    (guide, bsdf_is_delta(&bsdf))
 }

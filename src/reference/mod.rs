@@ -10,6 +10,7 @@ pub mod fold;
 pub mod fresnel;
 pub mod guide;
 pub mod light;
+pub mod lookup;
 pub mod microfacet;
 pub mod path;
 pub mod sampler;

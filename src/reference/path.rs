@@ -1,17 +1,15 @@
 //! Twin of `glsl/path.comp`.
 use crate::gpu::layout::{BSDF_DIELECTRIC, Effects, MATERIAL_TWO_SIDED, NONE, PathPush};
 use crate::reference::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
-use crate::reference::camera::{camera_ray, film_from_pixel};
+use crate::reference::camera::{eye_ray, film_sample, path_seed};
 use crate::reference::light::*;
 use crate::reference::sampler::{Sampler, pcg, sample_2d, sample_2d_bits, sampler_start};
 use crate::reference::surface::{Surface, offset_origin, surface_at, surface_bsdf, surface_emission};
 use crate::reference::traverse::traverse_from;
-use crate::reference::warp::{basis_from_normal, warp_gaussian, warp_tent};
+use crate::reference::warp::basis_from_normal;
 use crate::scene::Scene;
-use glam::{Mat3, Vec2, Vec3, vec2};
+use glam::{Mat3, Vec3};
 
-const PAIR_FILM: u32 = 0;
-const PAIR_LENS: u32 = 1;
 const PAIR_FIRST_BOUNCE: u32 = 2;
 const PAIRS_PER_BOUNCE: u32 = 4;
 const PAIR_CHOICE: u32 = 0;
@@ -81,18 +79,6 @@ struct Shade {
 }
 
 impl Tracer<'_> {
-    fn film_sample(&self, pixel: u32, random: Sampler) -> Vec2 {
-        let at = vec2((pixel % self.push.size[0]) as f32, (pixel / self.push.size[0]) as f32);
-        let u = sample_2d(random, PAIR_FILM);
-        let u = match self.push.pixel_filter {
-            1 if self.effects.pixel_filter => 0.5 + vec2(warp_tent(u.x), warp_tent(u.y)),
-            2 if self.effects.pixel_filter => 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y)),
-            3 if self.effects.pixel_filter => Vec2::splat(0.5),
-            _ => u,
-        };
-        film_from_pixel(at + u, self.push.size)
-    }
-
     fn balance(&self, taken: f32, other: f32, strategy: Strategy) -> f32 {
         match self.strategy {
             Strategy::Both => taken / (taken + other).max(1e-37),
@@ -188,13 +174,13 @@ impl Tracer<'_> {
         Shade { bsdf, surface, basis, wo: basis.transpose() * -direction, pair, from }
     }
 
-    fn trace_path(&self, mut path: Path, random: Sampler, path_seed: u32) -> PathSample {
+    fn trace_path(&self, mut path: Path, random: Sampler, seed: u32) -> PathSample {
         let mut sum = PathSample::default();
         let mut smooth_first = false;
         let mut from = [NONE; 2];
         for bounce in 0u32.. {
             let pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
-            let mask_seed = pcg(path_seed.wrapping_add(2 * bounce));
+            let mask_seed = pcg(seed.wrapping_add(2 * bounce));
             let hit = traverse_from(self.scene, from, path.origin, path.direction, INFINITE_DISTANCE, false, mask_seed);
             let indirect = bounce >= 2 && !smooth_first;
             if !hit.any() {
@@ -232,10 +218,10 @@ impl Tracer<'_> {
     /// Sample `index` of `pixel` (row-major).
     pub fn sample(&self, pixel: u32, index: u32) -> PathSample {
         let random = sampler_start(pixel, index, self.push.seed, self.effects.independent_sampler);
-        let lens = if self.effects.lens { sample_2d(random, PAIR_LENS) } else { Vec2::ZERO };
-        let ray = camera_ray(&self.push.camera, self.film_sample(pixel, random), lens);
+        let film = film_sample(&self.push, &self.effects, pixel, random);
+        let ray = eye_ray(&self.push, &self.effects, film, random);
         let path =
             Path { origin: ray.origin, direction: ray.direction, throughput: Vec3::ONE, bsdf_pdf: 0.0, delta: true };
-        self.trace_path(path, random, pcg(pcg(pixel ^ self.push.seed).wrapping_add(index)))
+        self.trace_path(path, random, path_seed(&self.push, pixel, index))
     }
 }

@@ -8,6 +8,7 @@ pub mod batch;
 pub mod choose;
 pub mod fold;
 pub mod guide;
+pub mod lookup;
 pub mod path;
 pub mod scan;
 

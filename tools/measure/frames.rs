@@ -12,11 +12,25 @@ impl View {
     /// # Errors
     /// When the scene cannot be found or rendered.
     pub fn render(&self, args: &Args, spp: u32) -> anyhow::Result<Source> {
-        let file = self.file(args, spp);
+        // Another seed than the default for references: their samples must not be those of the noisy image.
+        let seed = if spp == self.reference { "1" } else { "0" };
+        self.once(args, spp, &self.file(args, spp), &["--seed", seed])
+    }
+
+    /// The same with all samples at the pixels' centres, and other samples than [`View::render`] takes.
+    ///
+    /// # Errors
+    /// As [`View::render`].
+    pub fn render_centres(&self, args: &Args, spp: u32) -> anyhow::Result<Source> {
+        let file = self.file(args, spp).with_extension("centres.exr");
+        self.once(args, spp, &file, &["--seed", "2", "--filter", "point"])
+    }
+
+    fn once(&self, args: &Args, spp: u32, file: &Path, options: &[&str]) -> anyhow::Result<Source> {
         if !file.exists() {
-            run(self, args, spp, &file)?;
+            run(self, args, spp, file, options)?;
         }
-        Ok(Source::read(&file)?)
+        Ok(Source::read(file)?)
     }
 
     /// Where a render of it lies.
@@ -26,17 +40,15 @@ impl View {
     }
 }
 
-fn run(view: &View, args: &Args, spp: u32, file: &Path) -> anyhow::Result<()> {
+fn run(view: &View, args: &Args, spp: u32, file: &Path, options: &[&str]) -> anyhow::Result<()> {
     let scene = view.scene_file(&args.data, &args.output)?;
     eprintln!("rendering {} with {spp} samples per pixel", view.name);
     let [width, height] = view.size.map(|n| n.to_string());
     let (spp, depth) = (spp.to_string(), view.depth.to_string());
-    // Another seed than the default for references: their samples must not be those of the noisy image.
-    let seed = if spp == view.reference.to_string() { "1" } else { "0" };
     let mut command = Command::new(&args.tallow);
     command.arg("render").arg(scene).arg("-o").arg(file).arg("--quiet");
-    command.args(["--width", &width, "--height", &height, "--spp", &spp, "--max-depth", &depth, "--seed", seed]);
-    command.args(["--roulette-depth", "0"]);
+    command.args(["--width", &width, "--height", &height, "--spp", &spp, "--max-depth", &depth]);
+    command.args(["--roulette-depth", "0"]).args(options);
     let output = command.output().with_context(|| format!("cannot start {}", args.tallow.display()))?;
     if !output.status.success() {
         bail!("{}: {}", output.status, String::from_utf8_lossy(&output.stderr).trim());

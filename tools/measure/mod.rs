@@ -1,6 +1,7 @@
 //! What `tools/filters` measures, a file per table.
 mod case;
 mod frames;
+pub mod lookup;
 pub mod neural;
 pub mod ranking;
 mod sheet;

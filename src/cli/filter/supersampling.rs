@@ -1,0 +1,56 @@
+//! `--scene`: filtered light is looked up along eye rays.
+use crate::composition::Parts;
+use crate::error::{Error, Result};
+use crate::gpu::layout::{vec3, vec4};
+use crate::gpu::{Gpu, PassTime};
+use crate::image::aov::{Aov, Aovs};
+use crate::renderer::{Outputs, Renderer};
+use crate::scene::Scene;
+use crate::settings::{Allocate, Settings};
+use std::path::{Path, PathBuf};
+
+/// Which scene, and how many rays.
+#[derive(clap::Args, Clone, Debug)]
+#[command(next_help_heading = "Supersampling (of images that tallow rendered)")]
+pub struct Supersampling {
+    /// Look the filtered light up along eye rays through this scene, the one that the image shows
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["filter_direct", "no_demodulate"])]
+    pub scene: Option<PathBuf>,
+    /// Eye rays per pixel, 1 to 4096
+    #[arg(long, value_name = "N", requires = "scene", default_value_t = 16,
+        value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub eye_rays: u32,
+}
+
+impl Supersampling {
+    /// Indirect light of every pixel, if a scene is named; `image` is for messages.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when tallow did not render the image, and those of scene and device.
+    pub fn look_up(
+        &self,
+        gpu: &Gpu,
+        image: &Path,
+        aovs: &Aovs,
+        parts: &Parts,
+        filtered: &[vec4],
+    ) -> Result<Option<(Vec<vec3>, Vec<PassTime>)>> {
+        let Some(path) = &self.scene else { return Ok(None) };
+        let settings = settings(aovs).map_err(|what| Error::input(image, what))?;
+        let scene = Scene::load(path, &|s| *s = settings.clone())?;
+        let renderer = Renderer::new(gpu, &scene, Outputs::default())?;
+        renderer.look_up(&parts.input.guide, filtered, self.eye_rays).map(Some)
+    }
+}
+
+/// Of the render, without what placed its samples.
+fn settings(aovs: &Aovs) -> std::result::Result<Settings, String> {
+    let said = aovs.film.metadata.get("settings").filter(|_| aovs.get(Aov::Direct).is_some());
+    let said = said.ok_or("has no settings or no direct light: --scene needs an .exr file of tallow render")?;
+    let settings: Settings = serde_json::from_str(said).map_err(|e| format!("settings: {e}"))?;
+    let [width, height] = [aovs.film.width, aovs.film.height];
+    if [settings.width, settings.height] != [width, height] {
+        return Err(format!("is {width}x{height}, but was rendered as {}x{}", settings.width, settings.height));
+    }
+    Ok(Settings { allocate: Allocate::default(), ..settings })
+}

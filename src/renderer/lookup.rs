@@ -1,0 +1,39 @@
+//! Supersampling of filtered light (GIF, section 3.2).
+use super::{Renderer, workgroup};
+use crate::error::{Error, Result};
+use crate::gpu::layout::{Guide, PathPush, vec3, vec4};
+use crate::gpu::{Buffer, FrameResources, Location, PassTime};
+use crate::stage::{PerThread, lookup};
+
+impl Renderer {
+    /// Indirect light of every pixel, row-major, and what each pass took. The guide rays through the pixels' centres, which
+    /// meet `guide`, carry `filtered` (light before albedo; w = 0 where there is none); `eye_rays` further rays per pixel,
+    /// those of the pixel's first samples, take the light of the guide ray that is most alike in normal and depth among
+    /// the four nearest, times the albedo that they meet themselves. Rays to the sky and to smooth surfaces bring none.
+    ///
+    /// Source: Bauszat, Eisemann and Magnor, "Guided Image Filtering for Interactive High-quality Global Illumination",
+    /// EGSR 2011.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when there are no eye rays or not as many guide rays as pixels, [`Error::Device`].
+    pub fn look_up(&self, guide: &[Guide], filtered: &[vec4], eye_rays: u32) -> Result<(Vec<vec3>, Vec<PassTime>)> {
+        let pixels = self.settings.pixels();
+        if eye_rays == 0 || guide.len() != pixels || filtered.len() != pixels {
+            let (guides, lights) = (guide.len(), filtered.len());
+            return Err(Error::Usage(format!(
+                "{eye_rays} eye rays look up {guides} guide rays with {lights} filtered values: choose at least 1, and \
+                 as many guide rays as the film has pixels, {pixels}"
+            )));
+        }
+        let gpu = &self.gpu;
+        let kernel = PerThread::new(gpu, &self.effects, workgroup(gpu))?;
+        let guide = Buffer::from_slice(gpu, "guide rays", guide)?;
+        let filtered = Buffer::from_slice(gpu, "filtered", filtered)?;
+        let indirect = Buffer::new(gpu, "indirect", pixels, Location::Device)?;
+        let push = PathPush { pixels: pixels as u32, samples: eye_rays, ..self.push };
+        let times = gpu.run(&mut FrameResources::new(gpu)?, |rec| {
+            lookup::record(&kernel, rec, &self.scene, &guide, &filtered, &indirect, &push)
+        })?;
+        Ok((indirect.read()?, times))
+    }
+}

@@ -1,0 +1,24 @@
+//! Filtered light of guide rays as further eye rays see it. Kernel: `glsl/lookup.comp`. Twin:
+//! [`crate::reference::lookup`].
+use super::PerThread;
+use crate::error::Result;
+use crate::frame::DeviceScene;
+use crate::gpu::layout::{Guide, PathPush, vec3, vec4};
+use crate::gpu::{Buffer, Recorder};
+use crate::shaders::lookup::Bind;
+
+/// The specialised kernel.
+pub type Lookup = PerThread<Bind<'static>>;
+
+/// scene, guide\[P\], filtered\[P\] -> indirect\[P\]; `push.samples` eye rays per pixel
+pub fn record(
+    k: &Lookup,
+    rec: &mut Recorder,
+    s: &DeviceScene,
+    guides: &Buffer<Guide>,
+    filtered: &Buffer<vec4>,
+    indirect: &Buffer<vec3>,
+    push: &PathPush,
+) -> Result<()> {
+    k.record(rec, Bind { scene: s.bind(), guides, filtered, indirect }, push, push.pixels)
+}

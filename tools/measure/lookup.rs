@@ -1,0 +1,117 @@
+//! GIF's supersampling: the image out of one guide ray per pixel, and with filtered light looked up along eye rays; and its
+//! failing case, eye rays that meet what none of the guide rays around them meets.
+use super::case::Case;
+use super::frames::View;
+use super::sweep;
+use crate::Args;
+use anyhow::anyhow;
+use rayon::prelude::*;
+use tallow::composition::Demodulation;
+use tallow::filter;
+use tallow::gpu::Gpu;
+use tallow::gpu::layout::{Effects, Guide, PathPush, vec3, vec4};
+use tallow::image::Picture;
+use tallow::reference::lookup::{GuideRays, eye_hit};
+use tallow::renderer::{Outputs, Renderer, path_push};
+use tallow::report::table;
+use tallow::scene::Scene;
+
+const VIEWS: &[View] = &[
+    View { name: "sponza", scene: "crytek-sponza", size: [256, 144], depth: 4, reference: 256 },
+    View { name: "grass", scene: "scenes/grass/scene.toml", size: [224, 126], depth: 4, reference: 256 },
+    View { name: "grass", scene: "scenes/grass/scene.toml", size: [112, 63], depth: 4, reference: 256 },
+];
+const EYE_RAYS: [u32; 2] = [4, 16];
+/// A guide ray stands for an eye ray whose normal is at most 30 degrees and whose depth is at most 5 % off.
+const ALIKE: (f32, f32) = (0.866, 0.05);
+/// Share of a pixel's eye rays above which it counts among those that nothing stands for.
+const LOST: f32 = 0.25;
+
+/// # Errors
+/// When a scene cannot be rendered, or the device fails.
+pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
+    println!(
+        "GIF's supersampling: mean squared error in 8-bit sRGB code values against 256 samples per pixel, with the"
+    );
+    println!(
+        "reference's direct light. Lost: no guide ray stands for more than a quarter of the pixel's eye rays (normal"
+    );
+    println!("more than 30 degrees off, or depth more than 5 %).\n");
+    VIEWS.iter().try_for_each(|view| one(gpu, args, view))
+}
+
+fn one(gpu: &Gpu, args: &Args, view: &View) -> anyhow::Result<()> {
+    let reference = view.render(args, view.reference)?;
+    let direct = reference.film.picture(Some("direct")).map_err(|what| anyhow!(what))?.pixels;
+    let case = |spp| Case::new(&view.render_centres(args, spp)?, &reference, Demodulation::Light);
+    let (noisy, settled) = (case(1)?, case(view.reference)?);
+    let row = filter::find("guided").expect("a row of the table");
+    let error = |settings: &_| Ok(noisy.mse(&noisy.filtered_light(&noisy.run(gpu, row, settings)?)));
+    let best = sweep::best(row, noisy.start(), error)?;
+    let filtered = noisy.run(gpu, row, &best.settings)?;
+
+    let scene = Scene::load(&view.scene_file(&args.data, &args.output)?, &|s| {
+        [s.width, s.height] = view.size;
+        s.max_depth = view.depth;
+    })?;
+    let renderer = Renderer::new(gpu, &scene, Outputs::default())?;
+    let lost = lost(&scene, renderer.effects(), &noisy.parts.input.guide, &filtered);
+    let lost_pixels: Vec<bool> = lost.iter().map(|&share| share > LOST).collect();
+
+    println!("{}, {}x{}; guided: {}", view.name, view.size[0], view.size[1], best.text);
+    let share = 100.0 * lost.iter().sum::<f32>() / lost.len() as f32;
+    let pixels = 100.0 * lost_pixels.iter().filter(|&&l| l).count() as f32 / lost.len() as f32;
+    println!("{share:.1} % of eye rays and {pixels:.1} % of pixels are lost");
+    let mut rows = Vec::new();
+    for (light, case, filtered) in
+        [("1 path, guided", &noisy, &filtered), ("noise-free", &settled, &settled.parts.input.radiance)]
+    {
+        let guide = &case.parts.input.guide;
+        let centre = guide.iter().zip(filtered).map(reflected).collect();
+        rows.push(line(light, "guide ray alone", case, &lost_pixels, &lit(case, &direct, centre)));
+        rows.push(line(light, "own light, mean albedo", case, &lost_pixels, &case.filtered_light(filtered)));
+        for eye_rays in EYE_RAYS {
+            let (indirect, _) = renderer.look_up(guide, filtered, eye_rays)?;
+            let name = format!("look-up, {eye_rays} eye rays");
+            rows.push(line(light, &name, case, &lost_pixels, &lit(case, &direct, indirect)));
+        }
+    }
+    println!("{}", table::text(&["light of the guide rays", "image", "all", "lost", "others"], &rows));
+    Ok(())
+}
+
+fn reflected((guide, light): (&Guide, &vec4)) -> vec3 {
+    std::array::from_fn(|c| guide.albedo[c] * light[c])
+}
+
+fn lit(case: &Case, direct: &[vec3], indirect: Vec<vec3>) -> Picture {
+    let pixel = |(direct, indirect): (&vec3, vec3)| std::array::from_fn(|c| direct[c] + indirect[c]);
+    Picture { pixels: direct.iter().zip(indirect).map(pixel).collect(), ..case.reference.clone() }
+}
+
+fn line(light: &str, image: &str, case: &Case, lost: &[bool], picture: &Picture) -> Vec<String> {
+    let over = |wanted: bool| {
+        let mut part = case.reference.clone();
+        let pixels = part.pixels.iter_mut().zip(&picture.pixels).zip(lost).filter(|(_, l)| **l == wanted);
+        let count = pixels.map(|((to, from), _)| *to = *from).count();
+        if count == 0 { "-".to_owned() } else { format!("{:.2}", case.mse(&part) * lost.len() as f64 / count as f64) }
+    };
+    vec![light.to_owned(), image.to_owned(), format!("{:.2}", case.mse(picture)), over(true), over(false)]
+}
+
+/// Per pixel, the share of its eye rays for which none of the guide rays stands that they may choose from.
+fn lost(scene: &Scene, effects: &Effects, guide: &[Guide], filtered: &[vec4]) -> Vec<f32> {
+    let push = PathPush { samples: EYE_RAYS[1], ..path_push(scene) };
+    let guides = GuideRays { size: push.size, guide, filtered };
+    let is_lost = |pixel: u32, index: u32| {
+        let Some((eye, film)) = eye_hit(scene, &push, effects, pixel, index) else { return false };
+        guides.most_similar(&eye, film).is_none_or(|q| !stands_for(&guide[q], &eye))
+    };
+    let share = |pixel| (0..push.samples).filter(|&k| is_lost(pixel, k)).count() as f32 / push.samples as f32;
+    (0..guide.len() as u32).into_par_iter().map(share).collect()
+}
+
+fn stands_for(guide: &Guide, eye: &Guide) -> bool {
+    let cosine: f32 = (0..3).map(|c| guide.normal[c] * eye.normal[c]).sum();
+    cosine >= ALIKE.0 && (guide.depth - eye.depth).abs() <= ALIKE.1 * eye.depth
+}
