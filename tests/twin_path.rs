@@ -106,7 +106,7 @@ fn leaks(scene: &Scene, count: usize, origin: impl Fn(&mut Random) -> Vec3 + Syn
         let mut random = Random::stream(i);
         let t = scene.triangles[(random.unit() * scene.triangles.len() as f32) as usize];
         let [a, b] = [t.v0, t.v1].map(Vec3::from);
-        let target = if i % 2 == 0 { a } else { a.lerp(b, random.unit()) };
+        let target = if i.is_multiple_of(2) { a } else { a.lerp(b, random.unit()) };
         let from = origin(&mut random);
         let distance = (target - from).length();
         let direction = (target - from) / distance;

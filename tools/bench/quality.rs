@@ -34,8 +34,8 @@ fn render(
 fn errors(image: &[vec4], reference: &[PixelLight]) -> (f64, f64) {
     let (mut mse, mut relative) = (0.0, 0.0);
     for (a, b) in image.iter().zip(reference) {
-        for c in 0..3 {
-            let (off, level) = (f64::from(a[c] - b.indirect[c]).powi(2), f64::from(b.indirect[c]).powi(2));
+        for (a, b) in a.iter().zip(b.indirect) {
+            let (off, level) = (f64::from(a - b).powi(2), f64::from(b).powi(2));
             mse += off;
             relative += off / (level + 0.01);
         }
