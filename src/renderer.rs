@@ -178,7 +178,8 @@ impl Renderer {
     }
 
     /// Puts back what an earlier render had: statistics, light (empty unless it is kept apart), priorities (empty unless
-    /// the policy keeps them from round to round), and how many samples each pixel still lacks of what it was to have. Follow it with [`Renderer::rest`]. Needs the effect `adaptive`.
+    /// the policy keeps them from round to round), and how many samples each pixel still lacks of what it was to have.
+    /// Follow it with [`Renderer::rest`]. Needs the effect `adaptive`.
     ///
     /// # Errors
     /// [`crate::error::Error::Usage`] when there is no such effect, [`crate::error::Error::Device`] when the lengths

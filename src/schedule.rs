@@ -53,14 +53,6 @@ pub struct Choice {
     pub threshold: f32,
 }
 
-impl PathRange {
-    /// What of it there is in a list of `paths`, which only the device knew the length of.
-    pub fn within(self, paths: u64) -> Option<Self> {
-        let left = paths.saturating_sub(self.first).min(u64::from(self.paths)) as u32;
-        (left > 0).then_some(Self { paths: left, ..self })
-    }
-}
-
 /// A piece of a render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
@@ -77,6 +69,13 @@ pub enum Step {
 }
 
 impl Step {
+    /// What there is to do of it when the list has `listed` paths, which after [`Step::Choose`] only the device knows.
+    pub fn within(self, listed: u64) -> Option<Self> {
+        let Self::Listed(range) = self else { return Some(self) };
+        let paths = listed.saturating_sub(range.first).min(u64::from(range.paths)) as u32;
+        (paths > 0).then_some(Self::Listed(PathRange { paths, ..range }))
+    }
+
     /// Paths that it traces, at most.
     pub fn paths(&self) -> u64 {
         match self {
@@ -353,8 +352,8 @@ mod tests {
         assert_eq!(sums(&all), (65 * 8, 0), "everyone may be chosen every time");
         let rest = rest(&settings("threshold", 8, 2, 6, 4), &CUT, Progress { allocations: 5, pending: 0 });
         assert_eq!(rest.iter().filter_map(chosen).collect::<Vec<_>>(), [(7, 0.0)]);
-        let range = PathRange { first: 17, paths: 17, round: 0, rounds: 1 };
-        assert_eq!([0, 17, 18, 99].map(|n| range.within(n).map(|r| r.paths)), [None, None, Some(1), Some(17)]);
+        let step = Step::Listed(PathRange { first: 17, paths: 17, round: 0, rounds: 1 });
+        assert_eq!([0, 17, 18, 99].map(|n| step.within(n).map(|s| s.paths())), [None, None, Some(1), Some(17)]);
     }
 
     #[test]

@@ -38,7 +38,8 @@ pub struct Allocate {
     pub policy: String,
     /// Samples that every pixel gets before any is placed, if the budget allows; at least 0.
     pub min_spp: u32,
-    /// Samples that no pixel exceeds; 0: no limit but [`Settings::MAX_SPP`].
+    /// Samples that no pixel exceeds; 0: no limit but [`Settings::MAX_SPP`]. Of the policy `threshold`: rounds until its
+    /// threshold is 0 and chance decides; 0: `spp`.
     pub max_spp: u32,
     /// Rounds that the budget is spread over, 1 to 4096; policies that learn do so before each.
     pub rounds: u32,

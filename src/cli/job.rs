@@ -87,10 +87,7 @@ impl Job<'_> {
                 end.why = Why::Interrupted;
                 break;
             }
-            let step = match planned {
-                Step::Listed(range) => range.within(listed).map(Step::Listed),
-                step => Some(step),
-            };
+            let step = planned.within(listed);
             if let Some(step) = &step {
                 end.times.extend(r.run(frame, step)?);
                 end.traced += step.paths();

@@ -52,7 +52,7 @@ pub struct AllocateOverrides {
     /// Samples that every pixel gets before any is placed
     #[arg(long, value_name = "N")]
     pub min_spp: Option<u32>,
-    /// Samples that no pixel exceeds; 0 is off
+    /// Samples that no pixel exceeds; 0 is off. Of threshold: the rounds until chance decides; 0 is --spp
     #[arg(long, value_name = "N")]
     pub max_spp: Option<u32>,
     /// Rounds that the budget is spread over

@@ -77,12 +77,8 @@ pub fn render(gpu: &Gpu, scene: &Scene) -> anyhow::Result<Rendered> {
         renderer.run(&mut frame, step)?;
     }
     let (mut ns, mut path_ns, mut listed) = (0, 0, u64::MAX);
-    for &step in &steps {
-        let step = match step {
-            Step::Listed(range) => range.within(listed).map(Step::Listed),
-            step => Some(step),
-        };
-        let Some(step) = step else { continue };
+    for step in &steps {
+        let Some(step) = step.within(listed) else { continue };
         let passes = renderer.run(&mut frame, &step)?;
         if matches!(step, Step::Choose(_)) {
             listed = renderer.listed()?;
