@@ -26,7 +26,7 @@ void main() {
         uint64_t to = offset_of(i + 1u);
         if (to > begin && to > from) {
             uint at = uint(max(from, begin) - begin), stop = uint(min(to, end) - begin);
-            uint index = push.first_sample + texelFetch(stats, int(7u * i + 3u)).x; // earlier batches of this round are in it
+            uint index = push.first_sample + texelFetch(stats, int(2u * i)).w; // earlier batches of this round are in it
             for (; at < stop; at++) paths[at] = uvec2(i, index++);
         }
         from = to;

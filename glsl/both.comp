@@ -17,24 +17,24 @@ layout(scalar, push_constant) uniform Push { PriorityPush push; };
 #include "shared/noise.glsl"
 #include "shared/similarity.glsl"
 
-// Noise goes on where shape does: positions may be ten times as far apart as for importance. 1 / 0.2^2 of albedos.
-const float POSITION_SHARE = 0.01;
-const float ALBEDO_SCALE = 25.0;
+// 1 / 0.2^2 of albedos. Pixels that look unlike still count a little: where all are, as in grass, there is no better source.
+const float ALBEDO_SCALE = 25.0, LEAST_KINSHIP = 0.2;
 
 struct Place {
-    uvec4 normal, position, albedo;
+    vec3 normal, albedo;
+    bool hit;
 };
 
-Place place_at(uint pixel) { return Place(guide_texel(pixel, 0u), guide_texel(pixel, 1u), guide_texel(pixel, 2u)); }
+Place place_at(uint pixel) {
+    uvec4 albedo = guide_texel(pixel, 2u);
+    return Place(uintBitsToFloat(guide_texel(pixel, 0u).xyz), uintBitsToFloat(albedo.xyz), albedo.w != NONE);
+}
 
 // How much a neighbour's noise says of a pixel's, 0 to 1.
 float kinship(Place a, Place b) {
-    vec3 normals = uintBitsToFloat(a.normal.xyz) - uintBitsToFloat(b.normal.xyz);
-    vec3 positions = uintBitsToFloat(a.position.xyz) - uintBitsToFloat(b.position.xyz);
-    vec3 albedos = uintBitsToFloat(a.albedo.xyz) - uintBitsToFloat(b.albedo.xyz);
-    float x = dot(normals, normals) * push.normal_scale + dot(positions, positions) * push.position_scale * POSITION_SHARE +
-              dot(albedos, albedos) * ALBEDO_SCALE;
-    return (a.position.w == NONE) == (b.position.w == NONE) ? exp_negative(x) : 0.0;
+    vec3 normals = a.normal - b.normal, albedos = a.albedo - b.albedo;
+    float x = dot(normals, normals) * push.normal_scale + dot(albedos, albedos) * ALBEDO_SCALE;
+    return a.hit == b.hit ? max(exp_negative(x), LEAST_KINSHIP) : LEAST_KINSHIP;
 }
 
 void main() {
@@ -42,14 +42,14 @@ void main() {
     if (i >= push.size.x * push.size.y) return; // safe: no barrier() follows
     ivec2 size = ivec2(push.size), at = ivec2(i % push.size.x, i / push.size.x);
     Place here = place_at(i);
-    vec4 own = moments(i), around = own;
+    vec4 around = vec4(0.0);
     for (int dy = -1; dy <= 1; dy++) {
         for (int dx = -1; dx <= 1; dx++) {
             ivec2 q = clamp(at + ivec2(dx, dy), ivec2(0), size - 1);
             uint neighbour = uint(q.y * size.x + q.x);
-            around += neighbour == i ? vec4(0.0) : kinship(here, place_at(neighbour)) * moments(neighbour);
+            around += kinship(here, place_at(neighbour)) * moments(neighbour);
         }
     }
     float gathered = push.filtered > 0.0 ? 1.0 - texelFetch(importances, int(i)).x : 0.0;
-    priority[i] = noise(own, around) * sqrt(max(1.0 - push.filtered * gathered, 0.0));
+    priority[i] = noise(moments(i), around) * sqrt(max(1.0 - push.filtered * gathered, 0.0));
 }

@@ -27,7 +27,7 @@ void main() {
         uint i = first + k;
         uint64_t share, rest;
         multiply_divide(share_of, equal ? 1u : weight[i], share, rest);
-        uint have = texelFetch(stats, int(7u * i + 3u)).x;
+        uint have = texelFetch(stats, int(2u * i)).w;
         uint lack = share > have ? uint(min(share - have, 0xffffffffUL)) : 0u;
         weight[i] = lack;
         total += lack;

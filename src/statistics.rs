@@ -27,7 +27,12 @@ pub fn join(a: &Pixel, b: &Pixel) -> Pixel {
         (f64::from(a.stats.m2[i]) + f64::from(b.stats.m2[i]) + d * d * na * nb / n) as f32
     });
     Pixel {
-        stats: PixelStats { mean: mean(a.stats.mean, b.stats.mean), count: a.stats.count + b.stats.count, m2 },
+        stats: PixelStats {
+            mean: mean(a.stats.mean, b.stats.mean),
+            count: a.stats.count + b.stats.count,
+            m2,
+            unused: 0,
+        },
         light: PixelLight {
             direct: mean(a.light.direct, b.light.direct),
             indirect: mean(a.light.indirect, b.light.indirect),
@@ -49,7 +54,7 @@ mod tests {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let m2 = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
-        let stats = PixelStats { mean: [mean as f32; 3], count: n as u32, m2: [m2 as f32; 3] };
+        let stats = PixelStats { mean: [mean as f32; 3], count: n as u32, m2: [m2 as f32; 3], unused: 0 };
         Pixel { stats, light: PixelLight { direct: stats.mean, indirect: [0.0; 3] } }
     }
 

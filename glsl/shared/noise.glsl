@@ -1,17 +1,16 @@
 // What the samples say of a pixel's noise. Needs `push` (PriorityPush) and `stats`.
+#include "shared/luminance.glsl"
 
 // Samples' worth of trust in the noise of the surroundings.
 const float PRIOR_SAMPLES = 32.0;
 
-float stat(uint pixel, int word) { return uintBitsToFloat(texelFetch(stats, int(7u * pixel) + word).x); }
-
 // (squared deviations summed, mean over channels; degrees of freedom; luminance times samples; samples)
 vec4 moments(uint pixel) {
-    uint count = texelFetch(stats, int(7u * pixel + 3u)).x; // a float fetch may flush it to 0
-    float n = float(count);
-    float luminance = 0.2126 * stat(pixel, 0) + 0.7152 * stat(pixel, 1) + 0.0722 * stat(pixel, 2);
-    vec4 m = vec4((stat(pixel, 4) + stat(pixel, 5) + stat(pixel, 6)) / 3.0, n - 1.0, luminance * n, n);
-    return count > 0u ? m : vec4(0.0);
+    uvec4 mean = texelFetch(stats, int(2u * pixel)), m2 = texelFetch(stats, int(2u * pixel + 1u));
+    vec3 squares = uintBitsToFloat(m2.rgb);
+    float n = float(mean.w);
+    vec4 m = vec4((squares.r + squares.g + squares.b) / 3.0, n - 1.0, luminance(uintBitsToFloat(mean.rgb)) * n, n);
+    return mean.w > 0u ? m : vec4(0.0);
 }
 
 // Standard deviation of one sample over the luminance (RAS), both steadied by the surroundings, `own` included, of which a

@@ -45,25 +45,26 @@ impl Policy for Both {
     }
 }
 
+/// Of pixels that look nothing alike.
+const LEAST_KINSHIP: f32 = 0.2;
+
 /// How much a neighbour's noise says of a pixel's, 0 to 1.
 fn kinship(a: &Guide, b: &Guide, push: &PriorityPush) -> f32 {
     let apart = |of: fn(&Guide) -> vec3| squared_distance(of(a), of(b));
-    let positions = apart(|g| g.position) * push.position_scale * 0.01;
-    let x = apart(|g| g.normal) * push.normal_scale + positions + apart(|g| g.albedo) * 25.0;
-    if (a.object == NONE) == (b.object == NONE) { exp_negative(x) } else { 0.0 }
+    let x = apart(|g| g.normal) * push.normal_scale + apart(|g| g.albedo) * 25.0;
+    let alike = (a.material == NONE) == (b.material == NONE);
+    if alike { exp_negative(x).max(LEAST_KINSHIP) } else { LEAST_KINSHIP }
 }
 
 fn reference(inputs: &HostInputs) -> Vec<f32> {
     let HostInputs { guide, stats, push, .. } = inputs;
-    let width = push.size[0] as i32;
     let of = |(i, q): (usize, f32)| {
-        let own = moments(&stats[i]);
-        let mut around = own;
-        for j in square(push, i as i32 % width, i as i32 / width).filter(|&j| j != i) {
+        let mut around = [0.0; 4];
+        for j in square(push, i) {
             let (kin, m) = (kinship(&guide[i], &guide[j], push), moments(&stats[j]));
             around = std::array::from_fn(|k| around[k] + kin * m[k]);
         }
-        noise(push, own, around) * (1.0 - push.filtered * (1.0 - q)).max(0.0).sqrt()
+        noise(push, moments(&stats[i]), around) * (1.0 - push.filtered * (1.0 - q)).max(0.0).sqrt()
     };
     geometry::reference(inputs).into_iter().enumerate().map(of).collect()
 }
@@ -75,10 +76,11 @@ mod tests {
 
     #[test]
     fn noise_is_that_of_neighbours_that_look_alike() {
-        // Two pixels of 2 samples, m2 = 8 and 0, in one row: of its 3 x 3 places, those beyond the film hold the nearest
-        // pixel, so that each sees the other 3 times and itself once. Alike, the mean variances around are 8 / 4 and
-        // 24 / 4, worth 32 samples beside the pixel's own degree of freedom. Of other albedo, each knows its own only.
-        let stats = [8.0, 0.0].map(|m2| PixelStats { mean: [1.0; 3], count: 2, m2: [m2; 3] });
+        // Two pixels of 2 samples, m2 = 8 and 0, in one row: of the 3 columns around a pixel the one beyond the film holds the
+        // pixel itself, so that it counts 2 and the other 1. Every pixel has one degree of freedom; the mean variance
+        // around, 16/3 and 8/3, is worth 32 samples beside the pixel's own. Of other albedo, the other pixel counts a
+        // fifth: 16 / 2.2 and 1.6 / 2.2.
+        let stats = [8.0, 0.0].map(|m2| PixelStats { mean: [1.0; 3], count: 2, m2: [m2; 3], unused: 0 });
         let push = PriorityPush { size: [2, 1], window: 2, luminance_floor: 0.0, limit: 99, ..PriorityPush::default() };
         let of = |albedo| {
             let guide = [0.0, albedo].map(|albedo| Guide { albedo: [albedo; 3], ..Guide::default() });
@@ -86,7 +88,7 @@ mod tests {
         };
         let close = |found: Vec<f32>, expected: [f32; 2]| found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6);
         let expected = |own: f32, around: f32| ((own + 32.0 * around) / 33.0).sqrt();
-        assert!(close(of(0.0), [expected(8.0, 2.0), expected(0.0, 6.0)]), "{:?}", of(0.0));
-        assert!(close(of(9.0), [expected(8.0, 8.0), 0.0]), "{:?}", of(9.0));
+        assert!(close(of(0.0), [expected(8.0, 16.0 / 3.0), expected(0.0, 8.0 / 3.0)]), "{:?}", of(0.0));
+        assert!(close(of(9.0), [expected(8.0, 16.0 / 2.2), expected(0.0, 1.6 / 2.2)]), "{:?}", of(9.0));
     }
 }

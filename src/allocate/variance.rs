@@ -37,8 +37,9 @@ pub(super) fn moments(s: &PixelStats) -> [f32; 4] {
 }
 
 /// The 3 x 3 pixels around one, those beyond the border replaced by the nearest of the film, row by row.
-pub(super) fn square(push: &PriorityPush, x: i32, y: i32) -> impl Iterator<Item = usize> {
+pub(super) fn square(push: &PriorityPush, pixel: usize) -> impl Iterator<Item = usize> {
     let [width, height] = push.size.map(|n| n as i32);
+    let [x, y] = [pixel as i32 % width, pixel as i32 / width];
     let row = move |dy: i32| (y + dy).clamp(0, height - 1) * width;
     (-1..=1).flat_map(move |dy| (-1..=1).map(move |dx| (row(dy) + (x + dx).clamp(0, width - 1)) as usize))
 }
@@ -57,14 +58,13 @@ pub(super) fn noise(push: &PriorityPush, own: [f32; 4], around: [f32; 4]) -> f32
 }
 
 pub(super) fn reference(inputs: &HostInputs) -> Vec<f32> {
-    let [width, height] = inputs.push.size.map(|n| n as i32);
-    let moments = |pixel: usize| moments(&inputs.stats[pixel]);
-    let of = |i: i32| {
-        let around = square(&inputs.push, i % width, i / width).map(moments);
+    let HostInputs { stats, push, .. } = inputs;
+    let of = |i: usize| {
+        let around = square(push, i).map(|j| moments(&stats[j]));
         let sum = around.fold([0.0; 4], |sum: [f32; 4], m| std::array::from_fn(|k| sum[k] + m[k]));
-        noise(&inputs.push, moments(i as usize), sum)
+        noise(push, moments(&stats[i]), sum)
     };
-    (0..width * height).map(of).collect()
+    (0..stats.len()).map(of).collect()
 }
 
 #[cfg(test)]
@@ -90,7 +90,7 @@ mod tests {
     #[test]
     fn noise_is_the_deviation_over_the_luminance() {
         // Samples 2 and 6: mean 4, m2 = 8, variance 8 from one degree of freedom, and so around; sqrt 8 / (4 + 1).
-        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3] };
+        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3], unused: 0 };
         assert!((of_one(stats, PUSH) - 8.0_f32.sqrt() / 5.0).abs() < 1e-6);
         let plain = PriorityPush { luminance_floor: -1.0, ..PUSH };
         assert!((of_one(stats, plain) - 8.0_f32.sqrt()).abs() < 1e-6);
@@ -99,7 +99,7 @@ mod tests {
     #[test]
     fn a_mean_below_the_threshold_wants_nothing_and_an_unknown_one_something() {
         // Relative error of the mean: sqrt 8 / 5 / sqrt 2 = 0.4.
-        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3] };
+        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3], unused: 0 };
         assert_eq!(of_one(stats, PriorityPush { threshold: 0.41, ..PUSH }), 0.0);
         assert!(of_one(stats, PriorityPush { threshold: 0.39, ..PUSH }) > 0.0);
         assert_eq!(of_one(PixelStats::default(), PUSH), 1.0);

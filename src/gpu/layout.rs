@@ -306,7 +306,7 @@ gpu_structs! {
         material: uint,
     }
 
-    /// Running statistics of one pixel (Welford 1962), linear Rec. 709.
+    /// Running statistics of one pixel (Welford 1962), linear Rec. 709. 2 texels.
     struct PixelStats {
         /// Mean radiance, W/(m^2 sr).
         mean: vec3,
@@ -314,6 +314,8 @@ gpu_structs! {
         count: uint,
         /// Sum of squared deviations from the mean; the variance of one sample is m2 / (count - 1).
         m2: vec3,
+        /// Fills the second texel.
+        unused: uint,
     }
 
     /// Running means of one pixel that the filters read; the count is that of its [`PixelStats`].
