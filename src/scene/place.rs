@@ -131,7 +131,7 @@ impl Assembly<'_> {
         if let Some(file) = self.file_of(table).and_then(|path| self.files.remove(&path)) {
             return file;
         }
-        let mesh = table.shape.map(|s| s.mesh(table.segments.unwrap_or(64).min(4096))).unwrap_or_default();
+        let mesh = table.shape.map(|s| s.mesh(table.segments.unwrap_or(64))).unwrap_or_default();
         ObjFile { models: vec![tobj::Model { mesh, name: String::new() }], materials: vec![self.library.grey()] }
     }
 
