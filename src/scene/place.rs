@@ -155,6 +155,7 @@ impl Assembly<'_> {
         let objects = objects.map_err(|TooFar(v)| {
             self.at(&place, format!("has a coordinate of {v:e}: the limit is {:e}", super::MAX_COORDINATE))
         })?;
+        repairs.copies = self.geometry.drop_copies(before);
         self.library.warnings.extend(repairs.warning(&place));
         if self.geometry.triangles.len() == before {
             self.library.warnings.push(format!("{place} has no triangles"));
