@@ -62,6 +62,27 @@ fn input_errors_name_the_file_and_exit_3() {
 }
 
 #[test]
+#[cfg(target_os = "linux")]
+fn pipes_and_folders_are_refused_and_odd_names_are_not() {
+    use std::os::unix::ffi::OsStringExt;
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "a.exr", 12, 0.5);
+    for name in ["p.toml", "p.obj", "b.exr"] {
+        assert!(Command::new("mkfifo").arg(folder.path().join(name)).status().unwrap().success());
+    }
+    complains(&tallow(&folder, &["render", "p.toml"]), 3, &["p.toml", "pipe", "save"]);
+    complains(&tallow(&folder, &["render", "p.obj"]), 3, &["p.obj", "pipe"]);
+    complains(&tallow(&folder, &["compare", "a.exr", "b.exr"]), 3, &["b.exr", "pipe"]);
+    complains(&tallow(&folder, &["render", "."]), 3, &["error: .", "toml nor obj"]);
+    let odd = std::ffi::OsString::from_vec(b"caf\xe9.exr".to_vec());
+    let mut filter = Command::new(env!("CARGO_BIN_EXE_tallow"));
+    filter.args(["filter", "a.exr", "--filter", "none", "--json", "-o"]).arg(&odd).current_dir(folder.path());
+    let output = filter.output().unwrap();
+    assert!(serde_json::from_slice::<serde_json::Value>(&output.stdout).is_ok(), "{output:?}");
+    assert!(folder.path().join(odd).exists());
+}
+
+#[test]
 fn limits_set_the_exit_code() {
     let folder = tempfile::tempdir().unwrap();
     write(&folder, "a.exr", 12, 0.5);

@@ -31,7 +31,6 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("scene", &["error", "gpu::layout", "image", "reference::fresnel", "settings"]),
     ("reference", &["gpu::layout", "scene", "settings"]),
     ("composition", &["filter", "gpu::layout", "image"]),
-    ("composition", &["filter", "gpu::layout", "image"]),
     ("image", &["error", "gpu::layout"]),
     ("report", &["error", "gpu"]),
     ("schedule", &["settings"]),

@@ -70,8 +70,8 @@ fn filter_names() -> impl TypedValueParser<Value = &'static Row> {
 /// What `--json` prints.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
-    /// Files written.
-    pub files: Vec<PathBuf>,
+    /// Files written; what is not UTF-8 in their names is replaced.
+    pub files: Vec<String>,
     /// Name of the filter.
     pub filter: &'static str,
     /// Pixels, stored ones, shown or not.
@@ -113,7 +113,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     args.outputs.iter().try_for_each(|path| clean.write(path, &options))?;
     let distance = |image: &Source| reference.as_ref().map_or(Ok(None), |r| distance(args, image, r));
     let summary = Summary {
-        files: args.outputs.clone(),
+        files: args.outputs.iter().map(|f| f.display().to_string()).collect(),
         filter: args.filter.name,
         width: source.film.width,
         height: source.film.height,

@@ -66,7 +66,8 @@ impl Args {
         if !self.outputs.is_empty() {
             return self.outputs.clone();
         }
-        let mut name = self.scene.file_stem().unwrap_or_default().to_owned();
+        // A folder has no name of its own to give: `.` and `..`.
+        let mut name = self.scene.file_stem().unwrap_or("image".as_ref()).to_owned();
         name.push(".exr");
         vec![name.into()]
     }
@@ -75,8 +76,8 @@ impl Args {
 /// What `--json` prints.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
-    /// Files written.
-    pub files: Vec<PathBuf>,
+    /// Files written; what is not UTF-8 in their names is replaced.
+    pub files: Vec<String>,
     /// Pixels.
     pub width: u32,
     /// Pixels.
@@ -115,7 +116,6 @@ pub struct Summary {
 /// Of every kind; nothing is written then.
 pub fn run(args: &Args) -> Result<Exit> {
     check_outputs(args)?;
-    let stop = interrupt::flag();
     let mut host = Spans::default();
     let scene = host.time("load scene", || Scene::load(&args.scene, &|s| args.overrides.apply(s)))?;
     let earlier = args.resume.as_deref().map(|path| Earlier::read(path, &scene.settings)).transpose()?;
@@ -131,8 +131,15 @@ pub fn run(args: &Args) -> Result<Exit> {
     effects.adaptive |= earlier.is_some();
     let renderer = host.time("upload and compile", || Renderer::specialised(&gpu, &scene, wanted, effects))?;
     let mut frame = FrameResources::new(&gpu)?;
-    let job = Job { renderer: &renderer, stop, quiet: !args.common.talkative() };
+    // Until here there is nothing to keep, and Ctrl-C ends the process as it does any other.
+    let job = Job { renderer: &renderer, stop: interrupt::flag(), quiet: !args.common.talkative() };
     let end = host.time("render", || job.run(&mut frame, earlier.as_ref()))?;
+    if end.why == Why::Interrupted && end.traced == 0 {
+        if args.common.talkative() {
+            eprintln!("interrupted before the first sample: nothing is written");
+        }
+        return Ok(Exit::Interrupted);
+    }
     let mut film = host.time("read back", || layers::film(&renderer))?;
     let seconds = host.seconds("render");
     film.metadata = metadata(args, &renderer, &gpu, seconds, end.allocations)?;
@@ -227,7 +234,7 @@ fn report(
     let counts = layers::counts(film, "samples").unwrap_or_default();
     let least_most = (counts.iter().copied().min().unwrap_or(0), counts.iter().copied().max().unwrap_or(0));
     let summary = Summary {
-        files: args.output_files(),
+        files: args.output_files().iter().map(|f| f.display().to_string()).collect(),
         width: settings.width,
         height: settings.height,
         samples: counts.iter().map(|&n| u64::from(n)).sum(),

@@ -150,7 +150,8 @@ impl Untyped {
         let (memory, views) = Default::default();
         // From here on Drop cleans up, whichever line below fails.
         let buffer = Self { gpu: gpu.clone(), name: name.to_owned(), raw, size, stride, memory, views };
-        buffer.allocate(location).map_err(|e| Error::Device(format!("{what}: {e}")))?;
+        let remedy = "choose a smaller film or scene, or a device with more memory";
+        buffer.allocate(location).map_err(|e| Error::Device(format!("{what}: {e}: {remedy}")))?;
         Ok(buffer)
     }
 

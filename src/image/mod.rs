@@ -3,6 +3,7 @@ pub mod aov;
 pub mod difference;
 mod exr;
 mod film;
+pub mod input;
 pub mod metrics;
 pub mod output;
 mod photo;
@@ -76,15 +77,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
 /// # Errors
 /// [`Error::Input`] when the file cannot be read, is of another kind, or is damaged.
 pub fn read(path: &Path) -> Result<Film> {
-    decode(&read_bytes(path)?).map_err(|what| Error::input(path, what))
-}
-
-fn read_bytes(path: &Path) -> Result<Vec<u8>> {
-    let about = |e: std::io::Error| Error::input(path, format!("cannot be read: {e}"));
-    if std::fs::metadata(path).map_err(about)?.is_dir() {
-        return Err(Error::input(path, "is a folder: name an image file"));
-    }
-    std::fs::read(path).map_err(about)
+    decode(&input::read(path)?).map_err(|what| Error::input(path, what))
 }
 
 /// More 32-bit samples than this, 4 GiB of them, are refused.
@@ -128,7 +121,10 @@ pub fn is_decoding() -> bool {
 
 /// The decoders are other people's, and some assert what a damaged file may break (exr 1.74: the level of a tile, sums
 /// in B44 blocks). They keep no state between calls, so that nothing is left broken behind an unwound one.
-fn contained<T>(decode: impl FnOnce() -> std::result::Result<T, String>) -> std::result::Result<T, String> {
+///
+/// # Errors
+/// The decoder's own in one line, or that it broke off.
+pub fn contained<T>(decode: impl FnOnce() -> std::result::Result<T, String>) -> std::result::Result<T, String> {
     DECODING.set(true);
     let result = catch_unwind(AssertUnwindSafe(decode));
     DECODING.set(false);

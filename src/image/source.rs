@@ -20,7 +20,7 @@ impl Source {
     /// As [`super::read`].
     pub fn read(path: &Path) -> Result<Self> {
         let about = |what| Error::input(path, what);
-        let mut bytes = super::read_bytes(path)?;
+        let mut bytes = super::input::read(path)?;
         let film = super::decode_frame(&bytes, exr::Frame::Data).map_err(about)?;
         if !super::is_exr(&bytes) {
             bytes = exr::encode(&film).map_err(about)?;

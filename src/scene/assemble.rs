@@ -111,9 +111,12 @@ impl Assembly<'_> {
     /// Parses every file before geometry is placed: whether texture coordinates are kept depends on all materials.
     fn read_files(&mut self) -> Result<()> {
         for mesh in &self.description.mesh {
+            let place = || format!("mesh \"{}\"", mesh_name(mesh));
             if mesh.file.is_some() == mesh.shape.is_some() {
-                let place = format!("mesh \"{}\"", mesh_name(mesh));
-                return Err(self.at(place, "needs either a file or a shape"));
+                return Err(self.at(place(), "needs either a file or a shape"));
+            }
+            if let Some(n) = mesh.segments.filter(|n| !(3..=4096).contains(n)) {
+                return Err(self.at(place(), format!("segments is {n}: choose a value from 3 to 4096")));
             }
             let Some(path) = self.file_of(mesh) else { continue };
             if !self.files.contains_key(&path) {

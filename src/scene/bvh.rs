@@ -2,6 +2,7 @@
 //! and their shading are put in leaf order; child and primitive indices are made global, so one array holds all levels.
 use super::geometry::Geometry;
 use crate::gpu::layout::{BvhNode, Instance, Triangle};
+use clusters::Clusters;
 use glam::{Mat4, Vec3, Vec4};
 use obvhs::Boundable;
 use obvhs::aabb::Aabb;
@@ -11,12 +12,14 @@ use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use std::collections::HashSet;
 use std::ops::Range;
 
+mod clusters;
+
 /// Triangles in a leaf; the node format holds up to 3.
 const LEAF: u32 = 3;
 /// Relative growth of every box. Quantisation in the builder and slabs in the kernel round at 2^-24: this keeps their
 /// errors from opening gaps between boxes that share a face.
 const GROWTH: f32 = 1.0 / (1 << 21) as f32;
-/// The builder recurses, one frame per level; coincident geometry makes thousands of levels.
+/// The builder recurses, one frame per level; boxes inside boxes make thousands of levels.
 const STACK: usize = 1 << 28;
 
 /// Bounds of a set of points, `[low, high]`.
@@ -105,7 +108,7 @@ pub fn stack_size(nodes: &[BvhNode], root: u32, instances: &[Instance]) -> u32 {
 }
 
 /// Appends the nodes over `items`, numbered from `first` on; returns the root and the leaf order.
-fn build<T: Boundable>(items: &[T], first: u32, nodes: &mut Vec<BvhNode>) -> (u32, Vec<u32>) {
+fn build<T: Boundable + Sync>(items: &[T], first: u32, nodes: &mut Vec<BvhNode>) -> (u32, Vec<u32>) {
     let root = nodes.len() as u32;
     if items.is_empty() {
         nodes.push(BvhNode::default()); // eight empty children: every ray misses
@@ -128,17 +131,18 @@ fn build<T: Boundable>(items: &[T], first: u32, nodes: &mut Vec<BvhNode>) -> (u3
 /// Search distance 6, then reinsertion. On Crytek Sponza, reinserting 10 % of the nodes instead of 2 % builds in 0.42 s
 /// instead of 0.21 s and visits 5 % fewer nodes per ray (Sibenik 4 %, a 100k dragon 3 %); larger search distances visit
 /// no fewer. Meshes so large that loading takes seconds keep to 2 %.
-/// Boxes that coincide all cost the same to merge, and a round of PLOC then pairs few of them: time grows with the square
-/// of their number (a minute for 50,000 copies of a triangle).
-fn compressed<T: Boundable>(items: &[T]) -> obvhs::cwbvh::CwBvh {
-    let indices = (0..items.len() as u32).collect();
+fn compressed<T: Boundable + Sync>(items: &[T]) -> obvhs::cwbvh::CwBvh {
+    let clusters = Clusters::new(items);
     let mut bvh2 = {
-        let mut builder = PlocBuilder::with_capacity(items.len());
-        builder.build(PlocSearchDistance::Low, items, indices, SortPrecision::U64, 2)
+        let boxes = clusters.boxes(items);
+        let indices = (0..boxes.len() as u32).collect();
+        let mut builder = PlocBuilder::with_capacity(boxes.len());
+        builder.build(PlocSearchDistance::Low, &boxes, indices, SortPrecision::U64, 2)
     };
     let share = if items.len() > 1_000_000 { 0.02 } else { 0.1 };
     ReinsertionOptimizer::default().run(&mut bvh2, share, None);
     bvh2.parents = Vec::new();
+    clusters.unfold(&mut bvh2, items);
     bvh2_to_cwbvh(&bvh2, LEAF, true, false)
 }
 

@@ -100,6 +100,7 @@ impl Camera {
         let target = self.target.map_or((low + high) / 2.0, DVec3::from);
         let position = self.position.map_or_else(|| overview(target, low, high, tan), DVec3::from);
         let up = self.up.map_or(DVec3::Y, DVec3::from);
+        finite(position).and(finite(target))?;
         let forward = (target - position).try_normalize().ok_or("position and target are the same point")?;
         // A camera that looks straight along `up` still needs a right: any one will do when nothing was said.
         let side = forward.cross(up).try_normalize();
@@ -108,7 +109,6 @@ impl Camera {
             (None, None) => forward.cross(DVec3::NEG_Z * forward.y.signum()).normalize(),
             (None, Some(_)) => return Err("up is parallel to the view direction: choose another".into()),
         };
-        finite(position)?;
         Ok((position, [right, right.cross(forward), forward]))
     }
 }
@@ -132,9 +132,9 @@ fn frame_from_matrix(rows: &[f64; 16]) -> Result<Frame, String> {
 }
 
 fn finite(position: DVec3) -> Result<(), String> {
-    match position.abs().max_element() <= super::MAX_COORDINATE {
+    match position.is_finite() && position.abs().max_element() <= super::MAX_COORDINATE {
         true => Ok(()),
-        false => Err(format!("position {position} is not within {:e}", super::MAX_COORDINATE)),
+        false => Err(format!("point {position} is not within {:e}", super::MAX_COORDINATE)),
     }
 }
 

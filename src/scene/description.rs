@@ -94,7 +94,7 @@ pub struct MeshTable {
     pub group: Option<String>,
     /// Instead of a file.
     pub shape: Option<Shape>,
-    /// Sphere and disk: edges around; default 64.
+    /// Sphere and disk: edges around, 3 to 4096; default 64.
     pub segments: Option<u32>,
     /// world_from_object.
     pub transform: Transform,

@@ -24,8 +24,7 @@ fn row_sine(row: u32, height: u32) -> f64 {
 /// # Errors
 /// [`Error::Input`] for a file that cannot be read or decoded.
 pub fn load(path: &Path, warn: &mut Vec<String>) -> Result<Option<Environment>> {
-    let bytes = std::fs::read(path).map_err(|e| Error::input(path, format!("cannot be read: {e}")))?;
-    decode(path, &bytes, warn)
+    decode(path, &crate::image::input::read(path)?, warn)
 }
 
 /// [`load`] from bytes; `path` is for messages.
@@ -33,18 +32,16 @@ pub fn load(path: &Path, warn: &mut Vec<String>) -> Result<Option<Environment>> 
 /// # Errors
 /// See [`load`].
 pub fn decode(path: &Path, bytes: &[u8], warn: &mut Vec<String>) -> Result<Option<Environment>> {
-    let unusable = |e: &dyn std::fmt::Display| {
-        let what = e.to_string().replace('\n', " ");
-        Error::input(path, format!("is no usable environment image ({what}): save it again as HDR or EXR"))
-    };
-    let reader = image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format();
-    let picture = reader.map_err(|e| unusable(&e))?.decode().map_err(|e| unusable(&e))?;
+    let unusable =
+        |what| Error::input(path, format!("is no usable environment image ({what}): save it again as HDR or EXR"));
+    let picture = || image::load_from_memory(bytes).map_err(|e| e.to_string());
+    let picture = crate::image::contained(picture).map_err(unusable)?;
     // 8- and 16-bit forms store the sRGB curve; HDR and EXR are linear.
     let encoded = !matches!(picture.color(), image::ColorType::Rgb32F | image::ColorType::Rgba32F);
     let rgb = picture.into_rgb32f();
     let (width, height) = rgb.dimensions();
     if width == 0 || height == 0 {
-        return Err(unusable(&"it has no pixels"));
+        return Err(unusable("it has no pixels".into()));
     }
     let mut repaired = 0usize;
     let texels = rgb.pixels().map(|p| sane(p.0, encoded, &mut repaired)).collect();

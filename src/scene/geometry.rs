@@ -1,6 +1,8 @@
 //! The growing triangle arrays: placement, repair of what can be repaired, packing of normals.
 use crate::gpu::layout::{NONE, Shading, Triangle};
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
+use rayon::prelude::*;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// Triangles and, once one of them needs it, their shading records. All meshes of a scene share one.
 #[derive(Debug, Default)]
@@ -53,6 +55,8 @@ pub struct Repairs {
     pub not_finite: usize,
     /// Triangles dropped for having no area.
     pub no_area: usize,
+    /// Triangles dropped for equalling an earlier one.
+    pub copies: usize,
     /// Triangles whose vertex normals are unusable: shaded flat.
     pub bad_normals: usize,
     /// Triangles whose texture coordinates are not finite: set to zero.
@@ -65,6 +69,7 @@ impl Repairs {
         let rows = [
             (self.not_finite, "with NaN or infinite coordinates dropped"),
             (self.no_area, "without area dropped"),
+            (self.copies, "that repeat an earlier one dropped"),
             (self.bad_normals, "with unusable vertex normals shaded flat"),
             (self.bad_uvs, "with NaN or infinite texture coordinates set to zero"),
         ];
@@ -107,6 +112,27 @@ impl Geometry {
         Ok(())
     }
 
+    /// Drops triangles from `start` on that equal an earlier one of them in all but number and object; returns how many.
+    /// A lamp that is there twice would be sampled twice as often as rays meet it.
+    pub fn drop_copies(&mut self, start: usize) -> usize {
+        let all = |i: usize| (Triangle { primitive: 0, object: 0, ..self.triangles[i] }, self.shading.get(i).copied());
+        let key = |i: usize| {
+            let ((triangle, shading), mut hasher) = (all(i), DefaultHasher::new());
+            (bytemuck::bytes_of(&triangle), shading.as_ref().map(bytemuck::bytes_of)).hash(&mut hasher);
+            (hasher.finish(), i as u32)
+        };
+        let mut keys: Vec<_> = (start..self.triangles.len()).into_par_iter().map(key).collect();
+        keys.par_sort_unstable();
+        let mut keep = vec![true; self.triangles.len()];
+        for alike in keys.chunk_by(|a, b| a.0 == b.0) {
+            let first = all(alike[0].1 as usize);
+            alike[1..].iter().for_each(|&(_, i)| keep[i as usize] = all(i as usize) != first);
+        }
+        retain(&mut self.triangles, &keep);
+        retain(&mut self.shading, &keep);
+        keep.iter().filter(|keep| !**keep).count()
+    }
+
     /// Packed vertex normals; `FLAT` where they say no more than the face does.
     fn normals(&self, c: &Corners, at: &Placement, swap: bool, face: Vec3, repairs: &mut Repairs) -> [u32; 3] {
         let Some(mut n) = c.n.filter(|_| !at.flat) else { return FLAT };
@@ -137,6 +163,12 @@ impl Geometry {
         let [uv0, uv1, uv2] = uv.unwrap_or_default().map(|uv| uv.to_array());
         self.shading.push(Shading { normal, uv0, uv1, uv2, pad: [0; 3] });
     }
+}
+
+/// `items` may be empty.
+fn retain<T>(items: &mut Vec<T>, keep: &[bool]) {
+    let mut keep = keep.iter();
+    items.retain(|_| *keep.next().expect("one for each"));
 }
 
 /// The code of a triangle without vertex normals.
@@ -254,5 +286,23 @@ mod tests {
         let far = Corners { p: P.map(|p| p * 1e19), ..plain };
         let (mut g, mut r) = <(Geometry, Repairs)>::default();
         assert!(g.push(&far, TAG, &PLAIN, &mut r).is_err());
+    }
+    #[test]
+    fn copies_are_dropped_and_what_differs_is_kept() {
+        let plain = Corners { p: P, n: None, uv: None };
+        let bent = Corners { n: Some([Vec3::Z, Vec3::Z, Vec3::X]), ..plain };
+        let turned = Corners { p: [P[1], P[2], P[0]], ..plain };
+        let (mut g, mut r) = <(Geometry, Repairs)>::default();
+        let glass = Tag { material: 1, ..TAG };
+        let pushed =
+            [(plain, TAG), (plain, TAG), (plain, glass), (bent, TAG), (turned, TAG), (bent, TAG), (plain, TAG)];
+        for (primitive, (corners, tag)) in (0..).zip(pushed) {
+            g.push(&corners, Tag { primitive, object: primitive, ..tag }, &PLAIN, &mut r).unwrap();
+        }
+        assert_eq!(g.drop_copies(1), 2, "what lies before the start does not count");
+        assert_eq!(g.drop_copies(0), 1);
+        let left: Vec<_> = g.triangles.iter().map(|t| t.primitive).collect();
+        assert_eq!((left, g.shading.len()), (vec![0, 2, 3, 4], 4));
+        assert_eq!((g.shading[1].normal, g.shading[2].normal == FLAT), (FLAT, false));
     }
 }

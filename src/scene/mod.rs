@@ -3,6 +3,7 @@ use crate::error::{Error, Result};
 use crate::gpu::layout::{
     AliasEntry, BvhNode, Camera, Instance, Light, Material, Shading, TRAVERSAL_STACK, Texture, Triangle,
 };
+use crate::image::input;
 use crate::settings::Settings;
 use std::path::Path;
 
@@ -109,8 +110,9 @@ impl Scene {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_lowercase();
         match extension.as_str() {
             "toml" => {
-                let text = std::fs::read_to_string(path);
-                Self::parse(path, &text.map_err(|e| Error::input(path, format!("cannot be read: {e}")))?, overrides)
+                let text = String::from_utf8(input::read(path)?);
+                let text = text.map_err(|_| Error::input(path, "is no text: write it in UTF-8"))?;
+                Self::parse(path, &text, overrides)
             }
             "obj" => Self::from_description(path, &model(path), true, overrides),
             other => Err(Error::input(path, format!("is no scene: \"{other}\" is neither toml nor obj"))),

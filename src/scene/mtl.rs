@@ -69,7 +69,7 @@ const OPTIONS: [(&str, usize); 13] = [
 pub fn parse(path: &Path, text: &str) -> Result<Vec<Mtl>> {
     let directory = path.parent().unwrap_or(Path::new("")).to_owned();
     let mut found: Vec<Mtl> = Vec::new();
-    for (number, line) in text.lines().enumerate() {
+    for (number, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
         let line = line.trim();
         let (key, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         if key.eq_ignore_ascii_case("newmtl") {
@@ -188,6 +188,7 @@ mod tests {
 
     #[test]
     fn statements_are_read_in_any_case_and_form() {
+        assert_eq!(parse(Path::new("a.mtl"), "\u{feff}newmtl a").unwrap().len(), 1);
         let m = one("  Kd 0.1 0.2 0.3\r\nKs 0.5\nNs 10\nTr 0.25\nillum 2\nkE 1 2 3\nunknown x\n# Kd 9 9 9");
         assert_eq!((m.name.as_str(), m.directory.as_path()), ("a b", Path::new("dir")));
         assert_eq!(m.colors["Kd"], [0.1, 0.2, 0.3]);

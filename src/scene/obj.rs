@@ -4,9 +4,9 @@ use super::mtl::{self, Mtl};
 use super::obj_lines::ObjLines;
 use super::polygon;
 use crate::error::{Error, Result};
+use crate::image::input;
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
-use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
@@ -46,7 +46,7 @@ impl Library {
         if let Some(known) = self.mtls.get(path) {
             return Ok(known.clone());
         }
-        let bytes = std::fs::read(path).map_err(|e| Error::input(path, format!("cannot be read: {e}")))?;
+        let bytes = input::read(path)?;
         let blocks = mtl::parse(path, &String::from_utf8_lossy(&bytes))?;
         let names = blocks.iter().map(|b| Ok((b.name.clone(), self.block(path, b)?))).collect::<Result<Vec<_>>>()?;
         self.mtls.insert(path.to_owned(), names.clone());
@@ -106,7 +106,7 @@ fn split_files(statement: &str) -> Vec<String> {
 /// # Errors
 /// [`Error::Input`] for a malformed MTL file.
 pub fn read_libraries(path: &Path, library: &mut Library) -> Result<()> {
-    let Ok(file) = File::open(path) else { return Ok(()) };
+    let Ok(file) = input::open(path) else { return Ok(()) };
     let mut head = Vec::new();
     let _ = file.take(1 << 16).read_to_end(&mut head); // what could be read is enough
     let head = String::from_utf8_lossy(&head);
@@ -123,8 +123,7 @@ pub fn read_libraries(path: &Path, library: &mut Library) -> Result<()> {
 /// # Errors
 /// [`Error::Input`] with file, line, what is wrong and what to do.
 pub fn load(path: &Path, library: &mut Library) -> Result<ObjFile> {
-    let file = File::open(path).map_err(|e| Error::input(path, format!("cannot be read: {e}")))?;
-    parse(path, BufReader::with_capacity(1 << 18, file), library)
+    parse(path, BufReader::with_capacity(1 << 18, input::open(path)?), library)
 }
 
 /// [`load`] from any reader; `path` is for messages and for finding the MTL files.
@@ -213,6 +212,8 @@ mod tests {
         assert_eq!(quad.models[0].mesh.positions[..6], [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
         let penta = read("v 0.5 2 0\nf 1 2 3 5 4").unwrap();
         assert_eq!(penta.models[0].mesh.indices.len(), 9);
+        let marked = parse(Path::new("a.obj"), format!("\u{feff}{SQUARE}f 1 2 4").as_bytes(), &mut Library::default());
+        assert_eq!(marked.unwrap().models[0].mesh.indices.len(), 3, "a byte order mark is no part of the first line");
         assert!(read("l 1 2\np 1\nf 1 2").unwrap().models.iter().all(|m| m.mesh.indices.is_empty()));
     }
 

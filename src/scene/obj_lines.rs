@@ -48,6 +48,9 @@ impl<R: BufRead> ObjLines<R> {
                 return Ok(!self.raw.is_empty());
             }
             self.line += 1;
+            if self.line == 1 && self.raw.starts_with("\u{feff}".as_bytes()) {
+                self.raw.drain(..3);
+            }
             while matches!(self.raw.last(), Some(b'\n' | b'\r')) {
                 self.raw.pop();
             }

@@ -131,7 +131,7 @@ impl Assembly<'_> {
         if let Some(file) = self.file_of(table).and_then(|path| self.files.remove(&path)) {
             return file;
         }
-        let mesh = table.shape.map(|s| s.mesh(table.segments.unwrap_or(64).min(4096))).unwrap_or_default();
+        let mesh = table.shape.map(|s| s.mesh(table.segments.unwrap_or(64))).unwrap_or_default();
         ObjFile { models: vec![tobj::Model { mesh, name: String::new() }], materials: vec![self.library.grey()] }
     }
 
@@ -155,6 +155,7 @@ impl Assembly<'_> {
         let objects = objects.map_err(|TooFar(v)| {
             self.at(&place, format!("has a coordinate of {v:e}: the limit is {:e}", super::MAX_COORDINATE))
         })?;
+        repairs.copies = self.geometry.drop_copies(before);
         self.library.warnings.extend(repairs.warning(&place));
         if self.geometry.triangles.len() == before {
             self.library.warnings.push(format!("{place} has no triangles"));

@@ -17,9 +17,8 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// Triangles of the shape; `segments` around (sphere: half as many from pole to pole), at least 3.
+    /// Triangles of the shape; `segments` around, at least 3 (sphere: half as many from pole to pole).
     pub fn mesh(self, segments: u32) -> tobj::Mesh {
-        let segments = segments.max(3);
         match self {
             Self::Sphere => sphere(segments),
             Self::Rectangle => rectangle(),

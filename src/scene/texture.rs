@@ -2,6 +2,7 @@
 use super::mtl::find_file;
 use crate::error::{Error, Result};
 use crate::gpu::layout::{NONE, TEXTURE_CLAMP, TEXTURE_SRGB, Texture};
+use crate::image::{contained, input};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -127,17 +128,17 @@ fn too_many(path: &Path) -> Error {
 }
 
 fn reader(path: &Path) -> Result<image::ImageReader<std::io::BufReader<std::fs::File>>> {
-    let open = image::ImageReader::open(path).map_err(|e| Error::input(path, format!("cannot be read: {e}")))?;
-    open.with_guessed_format().map_err(|e| Error::input(path, format!("cannot be read: {e}")))
+    let reader = image::ImageReader::new(std::io::BufReader::new(input::open(path)?));
+    reader.with_guessed_format().map_err(|e| damaged(path, e.to_string()))
 }
 
-fn damaged(path: &Path, error: image::ImageError) -> Error {
-    let remedy = "save it again as PNG or JPEG";
-    Error::input(path, format!("is no usable picture ({}): {remedy}", error.to_string().replace('\n', " ")))
+fn damaged(path: &Path, what: String) -> Error {
+    Error::input(path, format!("is no usable picture ({what}): save it again as PNG or JPEG"))
 }
 
 fn dimensions(path: &Path) -> Result<(u32, u32)> {
-    match reader(path)?.into_dimensions().map_err(|e| damaged(path, e))? {
+    let reader = reader(path)?;
+    match contained(|| reader.into_dimensions().map_err(|e| e.to_string())).map_err(|what| damaged(path, what))? {
         (w, h) if (1..=1 << 16).contains(&w) && (1..=1 << 16).contains(&h) => Ok((w, h)),
         (w, h) => Err(Error::input(path, format!("is {w} x {h} texels: 1 to 65536 each way can be used"))),
     }
@@ -145,7 +146,8 @@ fn dimensions(path: &Path) -> Result<(u32, u32)> {
 
 /// Decodes one picture into `space`.
 fn load(path: &Path, kind: Kind, t: Texture, space: &mut [u32]) -> Result<()> {
-    let picture = reader(path)?.decode().map_err(|e| damaged(path, e))?;
+    let reader = reader(path)?;
+    let picture = contained(|| reader.decode().map_err(|e| e.to_string())).map_err(|what| damaged(path, what))?;
     let has_alpha = picture.color().has_alpha();
     if (picture.width(), picture.height()) != (t.width, t.height) {
         return Err(Error::input(path, "has another size than its header says: save it again"));

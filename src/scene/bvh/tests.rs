@@ -162,16 +162,65 @@ fn instances_are_found_through_the_top_level() {
 }
 
 #[test]
-fn coincident_and_empty_geometry_builds() {
-    let mut geometry = Geometry::default();
-    let same = Triangle { v1: [1.0, 0.0, 0.0], v2: [0.0, 1.0, 0.0], ..Triangle::default() };
-    geometry.triangles = vec![same; 20_000];
-    let mut nodes = Vec::new();
-    let deep = build_mesh(&mut geometry, 0..20_000, &mut nodes);
-    assert!(stack_size(&nodes, deep, &[]) > TRAVERSAL_STACK, "{} levels fit", depth(&nodes, deep));
+fn empty_geometry_builds() {
+    let (mut geometry, mut nodes) = (Geometry::default(), Vec::new());
     let root = build_mesh(&mut geometry, 0..0, &mut nodes);
     assert_eq!((stack_size(&nodes, root, &[]), depth(&nodes, root)), (1, 1));
     let mut leaves = 0;
     traverse(&nodes, root, DVec3::ZERO, DVec3::ONE, &mut |_| leaves += 1);
     assert_eq!(leaves, 0);
+}
+
+/// A triangle of the unit size times `size` around `center`; `turn` rolls its corners.
+fn around(center: DVec3, size: f64, turn: usize, primitive: u32) -> Triangle {
+    let mut v = [DVec3::new(-1.0, -1.0, 0.3), DVec3::new(1.0, -1.0, -0.3), DVec3::new(0.0, 1.0, 0.0)];
+    v.rotate_left(turn);
+    let [v0, v1, v2] = v.map(|p| (center + p * size).as_vec3().to_array());
+    Triangle { v0, v1, v2, primitive, ..Triangle::default() }
+}
+
+fn builds_flat(geometry: &mut Geometry) -> (Vec<BvhNode>, u32) {
+    let (count, mut nodes) = (geometry.triangles.len(), Vec::new());
+    let root = build_mesh(geometry, 0..count, &mut nodes);
+    // Eight-way, ten levels hold 8^10 leaves; twice that is far from a chain.
+    assert!(depth(&nodes, root) <= 20, "{} levels", depth(&nodes, root));
+    assert!(stack_size(&nodes, root, &[]) <= TRAVERSAL_STACK);
+    let mut seen: Vec<_> = geometry.triangles.iter().map(|t| t.primitive).collect();
+    seen.sort_unstable();
+    assert!(seen.into_iter().eq(0..count as u32), "nothing is lost");
+    (nodes, root)
+}
+
+#[test]
+fn coincident_triangles_make_a_flat_tree() {
+    let triangles = (0..200_000).map(|i| around(DVec3::ONE, 0.5, i as usize % 3, i)).collect();
+    let mut geometry = Geometry { triangles, ..Geometry::default() };
+    let (nodes, root) = builds_flat(&mut geometry);
+    let mut leaves = 0;
+    traverse(&nodes, root, DVec3::new(1.0, 1.0, 9.0), DVec3::new(1e-9, 1e-9, -1.0), &mut |_| leaves += 1);
+    assert_eq!(leaves, 200_000, "a ray through the middle meets them all");
+}
+
+#[test]
+fn concentric_and_coincident_triangles_among_others_are_found() {
+    let mut random = Random(5);
+    let mut geometry = random_geometry(2000, 0.1, &mut random);
+    for i in 0..3000 {
+        let (center, size) = if i % 2 == 0 { (DVec3::ZERO, 1e-3 * f64::from(i)) } else { (DVec3::splat(0.5), 0.2) };
+        geometry.triangles.push(around(center, size + 1e-4, 0, 2000 + i));
+    }
+    let (nodes, root) = builds_flat(&mut geometry);
+    assert_eq!(compare(&geometry, &nodes, root, 0..5000, &mut random), 0);
+}
+
+#[test]
+fn coincident_instances_make_a_flat_tree() {
+    let mut random = Random(6);
+    let mut geometry = random_geometry(9, 0.5, &mut random);
+    let mut nodes = Vec::new();
+    let root = build_mesh(&mut geometry, 0..9, &mut nodes);
+    let mut instances = vec![crate::scene::place::instance(&DAffine3::IDENTITY, root); 50_000];
+    let object = bounds(&geometry.triangles).unwrap();
+    let top = build_top(&mut instances, &vec![object; 50_000], &mut nodes);
+    assert!(stack_size(&nodes, top, &instances) <= TRAVERSAL_STACK);
 }

@@ -1,0 +1,70 @@
+//! What the built program says without a Vulkan loader or driver, and when it loses its device in the middle.
+#![cfg(target_os = "linux")]
+#[path = "support/command.rs"]
+#[allow(dead_code)]
+mod command;
+
+use command::complains;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use tallow::gpu::{DeviceOptions, Gpu};
+use tempfile::TempDir;
+
+/// Renders over an old file, with a folder in front of those that libraries are looked for in.
+fn render(folder: &TempDir, environment: &[(&str, &str)]) -> Output {
+    std::fs::write(folder.path().join("a.exr"), "old").unwrap();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/scene.toml");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tallow"));
+    command.args(["render", scene, "-o", "a.exr", "--width", "32", "--height", "32", "--spp", "4", "--quiet"]);
+    command.current_dir(folder.path()).env("LD_LIBRARY_PATH", folder.path());
+    command.envs(environment.iter().copied()).output().unwrap()
+}
+
+#[track_caller]
+fn fails(folder: &TempDir, environment: &[(&str, &str)], parts: &[&str]) {
+    complains(&render(folder, environment), 4, parts);
+    assert_eq!(std::fs::read(folder.path().join("a.exr")).unwrap(), b"old");
+    let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert!(left.iter().all(|name| name == "a.exr" || name == "libvulkan.so.1"), "{left:?}");
+}
+
+#[test]
+fn no_loader_and_no_driver_are_told_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let nothing = [("VK_DRIVER_FILES", "/nothing.json"), ("VK_ICD_FILENAMES", "/nothing.json")];
+    fails(&folder, &nothing, &["no Vulkan driver", "mesa-vulkan-drivers"]);
+    std::fs::write(folder.path().join("libvulkan.so.1"), "no library").unwrap();
+    fails(&folder, &[], &["no Vulkan loader", "libvulkan1"]);
+}
+
+/// The Vulkan loader that programs get.
+fn loader() -> PathBuf {
+    let _gpu = Gpu::open(&DeviceOptions::default()).unwrap();
+    let maps = std::fs::read_to_string("/proc/self/maps").unwrap();
+    let line = maps.lines().find(|line| line.contains("/libvulkan.so")).expect("a loaded loader");
+    PathBuf::from(&line[line.find('/').unwrap()..])
+}
+
+fn compile(source: &Path, library: &Path) {
+    // Cargo says where it lies itself; the compiler lies beside it.
+    let rustc = Path::new(env!("CARGO")).with_file_name("rustc");
+    let mut command = Command::new(if rustc.exists() { rustc } else { "rustc".into() });
+    command.args(["--edition=2024", "--crate-type=cdylib", "-O"]).arg(source).arg("-o").arg(library);
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn a_lost_device_is_one_line_and_keeps_the_old_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/support/lost_loader.rs");
+    compile(&source, &folder.path().join("libvulkan.so.1"));
+    let (real, lost) = (loader(), ["the device was lost", "run again"]);
+    let real = ("REAL_LOADER", real.to_str().unwrap());
+    // There are two submissions: what begins a render, and its only batch.
+    fails(&folder, &[real, ("LOSE_AT", "1")], &lost);
+    fails(&folder, &[real, ("LOSE_AT", "2")], &lost);
+    let control = render(&folder, &[real]);
+    assert!(control.status.success(), "nothing fails without the loss: {control:?}");
+    assert_ne!(std::fs::read(folder.path().join("a.exr")).unwrap(), b"old");
+}

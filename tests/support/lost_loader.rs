@@ -1,0 +1,61 @@
+//! Stands in for Vulkan's loader in front of a program that opens it: `REAL_LOADER` names the real one, and submission
+//! number `LOSE_AT`, counted from 1, loses the device. `tests/cli_device.rs` compiles it, with std alone.
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::mem::transmute;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering::SeqCst};
+
+type Find = unsafe extern "system" fn(*mut c_void, *const c_char) -> *const c_void;
+type Submit = unsafe extern "system" fn(*mut c_void, u32, *const c_void, u64) -> c_int;
+
+const ERROR_DEVICE_LOST: c_int = -4;
+
+static DEVICE: OnceLock<Find> = OnceLock::new();
+static SUBMIT: OnceLock<Submit> = OnceLock::new();
+static SUBMITTED: AtomicUsize = AtomicUsize::new(0);
+
+unsafe extern "C" {
+    fn dlopen(name: *const c_char, flags: c_int) -> *mut c_void;
+    fn dlsym(library: *mut c_void, name: *const c_char) -> *const c_void;
+}
+
+fn real() -> Find {
+    static REAL: OnceLock<Find> = OnceLock::new();
+    *REAL.get_or_init(|| unsafe {
+        let path = CString::new(std::env::var("REAL_LOADER").unwrap()).unwrap();
+        let library = dlopen(path.as_ptr(), 2); // RTLD_NOW
+        assert!(!library.is_null(), "{path:?}");
+        transmute::<*const c_void, Find>(dlsym(library, c"vkGetInstanceProcAddr".as_ptr()))
+    })
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "system" fn vkGetInstanceProcAddr(instance: *mut c_void, name: *const c_char) -> *const c_void {
+    unsafe {
+        let found = real()(instance, name);
+        if found.is_null() || CStr::from_ptr(name) != c"vkGetDeviceProcAddr" {
+            return found;
+        }
+        DEVICE.get_or_init(|| transmute::<*const c_void, Find>(found));
+        device as *const c_void
+    }
+}
+
+unsafe extern "system" fn device(device: *mut c_void, name: *const c_char) -> *const c_void {
+    unsafe {
+        let found = DEVICE.get().unwrap()(device, name);
+        if found.is_null() || CStr::from_ptr(name) != c"vkQueueSubmit2" {
+            return found;
+        }
+        SUBMIT.get_or_init(|| transmute::<*const c_void, Submit>(found));
+        submit as *const c_void
+    }
+}
+
+unsafe extern "system" fn submit(queue: *mut c_void, count: u32, what: *const c_void, fence: u64) -> c_int {
+    let lose_at = std::env::var("LOSE_AT").ok().and_then(|n| n.parse().ok());
+    match SUBMITTED.fetch_add(1, SeqCst) + 1 {
+        number if lose_at.is_some_and(|at: usize| number >= at) => ERROR_DEVICE_LOST,
+        _ => unsafe { SUBMIT.get().unwrap()(queue, count, what, fence) },
+    }
+}
