@@ -38,6 +38,11 @@ fn assert_all(name: &str, outputs: &[Vec<vec4>], input: &FilterInput, value: f32
     }
 }
 
+/// Which pixels have a value.
+fn reached(output: &[vec4]) -> Vec<bool> {
+    output.iter().map(|c| c[3] > 0.0).collect()
+}
+
 fn constant(width: u32, height: u32, value: f32) -> FilterInput {
     let mut input = Picture::new(width, height).input;
     input.radiance.fill([value, value, value, 1.0]);
@@ -68,11 +73,17 @@ fn constant_images_come_back() {
 fn a_constant_image_stands_any_guide() {
     let gpu = gpu();
     let bad = |v: f32| Guide { normal: [v; 3], depth: v, position: [v; 3], albedo: [v; 3], ..Guide::default() };
-    let fills = [0.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, 1e-38].map(bad);
+    let fills = [0.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, 1e-38, 1e7].map(bad);
+    // Holes, so that a pixel may have nothing alike in reach.
+    let holed = || {
+        let mut input = constant(21, 13, 3.0);
+        input.radiance.iter_mut().step_by(3).for_each(|c| *c = [f32::NAN, 3.0, 3.0, 1.0]);
+        input
+    };
     for row in FILTERS {
-        let mut mixed = constant(21, 13, 3.0);
+        let mut mixed = holed();
         for (i, fill) in fills.iter().enumerate() {
-            let mut input = constant(21, 13, 3.0);
+            let mut input = holed();
             input.guide.fill(*fill);
             assert_all(row.name, &outputs(&gpu, row, &input, &extremes()), &input, 3.0, 2e-6);
             mixed.guide.iter_mut().skip(i).step_by(11).for_each(|g| *g = *fill);
@@ -109,6 +120,9 @@ fn one_known_pixel_is_all_there_is() {
         let mut input = constant(19, 23, 7.0);
         input.radiance.iter_mut().enumerate().filter(|(i, _)| *i != 200).for_each(|(_, c)| *c = [5.0, 5.0, 5.0, 0.0]);
         let outputs = outputs(&gpu, row, &input, &extremes());
+        for (case, pair) in outputs.chunks(2).enumerate() {
+            assert_eq!(reached(&pair[0]), reached(&pair[1]), "{} case {case}: in-painted by one alone", row.name);
+        }
         for output in &outputs {
             let odd = output.iter().find(|c| **c != [0.0; 4] && c[..3].iter().any(|v| (v - 7.0).abs() > 1e-5));
             assert!(odd.is_none() && output[200][3] > 0.0, "{}: {odd:?}", row.name);
@@ -117,7 +131,8 @@ fn one_known_pixel_is_all_there_is() {
     assert_silent(&gpu);
 }
 
-/// Extreme values side by side: whatever comes out is a number within the range of what went in.
+/// Extreme values side by side, of radiance, its variance and guides, and nothing known in a corner: whatever comes out is
+/// a number.
 #[test]
 fn no_nan_leaves_a_filter() {
     let gpu = gpu();
@@ -125,7 +140,17 @@ fn no_nan_leaves_a_filter() {
         let mut input = Picture::new(35, 20).noisy().input;
         let values = [0.0, 1e-38, 1e-30, 65504.0, 1e20, 3e38, -1.0, -3e38];
         for (i, c) in input.radiance.iter_mut().enumerate().filter(|(i, _)| i % 3 == 0) {
-            *c = [values[i / 3 % 8], values[i / 24 % 8], values[i % 8], 1.0];
+            *c = [values[i / 3 % 8], values[i / 24 % 8], values[i % 8], [1.0, 4.0][i / 3 % 2]];
+        }
+        let corner = (0..).zip(&mut input.radiance).filter(|(i, _)| i % 35 < 17 && i / 35 < 14);
+        corner.for_each(|(_, c)| c[3] = 0.0);
+        for (i, v) in input.variance.iter_mut().flatten().enumerate().filter(|(i, _)| i % 5 < 2) {
+            *v = [[0.0, 3e38][i % 2]; 3];
+        }
+        // Channels of very different contrast.
+        for (i, g) in input.guide.iter_mut().enumerate().filter(|(i, _)| i % 35 > 20) {
+            g.normal = [1e-9 * (i % 7) as f32, [-2e7, 2e7][i % 2], 1e-9 * (i % 5) as f32];
+            g.position = [[-3e38, 3e38][i % 2], 0.0, 1e-30];
         }
         for output in outputs(&gpu, row, &input, &extremes()) {
             assert!(output.iter().flatten().all(|v| v.is_finite()), "{}: a NaN or an infinity", row.name);

@@ -58,23 +58,24 @@ void absorb(inout Moments m, Moments other, float is) {
     m.b += is * other.b;
 }
 
-float reciprocal_pivot(float pivot, float diagonal) {
+// Of a sum over `count` pixels.
+float reciprocal_pivot(float pivot, float diagonal, float count) {
     // A channel that the others explain, or that is constant, takes no part.
-    return pivot > 1e-5 * diagonal && pivot > 1e-20 ? 1.0 / pivot : 0.0;
+    return pivot > 1e-5 * diagonal && pivot > 1e-20 * count ? 1.0 / pivot : 0.0;
 }
 
 // Solves (I-I co-moments + ridge) a = co-moments of N with I, for the three channels, by L D L^T.
 void solve(Moments m, vec4 ridge, out vec4 r, out vec4 g, out vec4 b) {
     vec4 diagonal = vec4(m.xx.x, m.yy.x, m.zz.x, m.zz.z) + ridge, d;
-    d.x = reciprocal_pivot(diagonal.x, diagonal.x);
+    d.x = reciprocal_pivot(diagonal.x, diagonal.x, m.head.x);
     vec3 l0 = m.xx.yzw * d.x; // column 0 of L, below the diagonal
-    d.y = reciprocal_pivot(diagonal.y - l0.x * m.xx.y, diagonal.y);
+    d.y = reciprocal_pivot(diagonal.y - l0.x * m.xx.y, diagonal.y, m.head.x);
     vec2 u1 = m.yy.yz - l0.x * m.xx.zw;
     vec2 l1 = u1 * d.y;
-    d.z = reciprocal_pivot(diagonal.z - l0.y * m.xx.z - l1.x * u1.x, diagonal.z);
+    d.z = reciprocal_pivot(diagonal.z - l0.y * m.xx.z - l1.x * u1.x, diagonal.z, m.head.x);
     float u2 = m.zz.y - l0.y * m.xx.w - l1.x * u1.y;
     float l2 = u2 * d.z;
-    d.w = reciprocal_pivot(diagonal.w - l0.z * m.xx.w - l1.y * u1.y - l2 * u2, diagonal.w);
+    d.w = reciprocal_pivot(diagonal.w - l0.z * m.xx.w - l1.y * u1.y - l2 * u2, diagonal.w, m.head.x);
     mat3x4 rhs = mat3x4(m.r, m.g, m.b);
     for (int c = 0; c < 3; c++) {
         vec4 v = rhs[c];

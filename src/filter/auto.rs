@@ -1,10 +1,11 @@
 //! Per pixel, the candidate with the least estimated error, blended: it spares the user the sweep. Kernels:
 //! `glsl/auto*.comp`.
+use super::edge::{Rates, edge_weight};
 use super::estimate::{self, Estimate, contrast};
 use super::pack::{Pack, Packed};
-use super::{Filter, FilterInput, FilterSettings, Planes, Row, atrous, guided, svgf};
+use super::{Filter, FilterInput, FilterSettings, Planes, Row, guided, svgf};
 use crate::error::Result;
-use crate::gpu::layout::{AutoErrorPush, AutoSmoothPush, Effects, PackPush, vec4};
+use crate::gpu::layout::{AutoPush, AutoSmoothPush, Effects, PackPush, vec4};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::reference::sampler::pcg;
 use crate::shaders::{auto, auto_error, auto_probe, auto_smooth};
@@ -14,24 +15,40 @@ use glam::{Vec3, Vec4, Vec4Swizzles};
 /// See [`super::FILTERS`].
 pub const ROW: Row = Row {
     name: "auto",
-    about: "per pixel the best of none, À-Trous, variance-steered À-Trous and guided, by estimated error",
+    about: "per pixel the best of none, guided by large and small windows, and svgf, by estimated error",
     make: |gpu, settings, size| Ok(Box::new(Auto::new(gpu, settings, size)?)),
     reference,
 };
 
-/// Levels of smoothing of the error estimates: a footprint of 29 pixels.
-const SMOOTHING: u32 = 3;
-/// Largest relative error, and what stands for none.
-const WORST: f32 = 1e6;
-const UNKNOWN: f32 = 2.0 * WORST;
+/// Levels of smoothing of the error estimates: a footprint of 61 pixels.
+const SMOOTHING: u32 = 4;
+/// Samples whose own variance is trusted.
+const ENOUGH: f32 = 4.0;
+/// Of a pixel that a filter keeps: beyond it, too little is left to judge by.
+const MOST: f32 = 0.9;
+/// Of luminance and its differences, so that their squares are finite.
+const LIMIT: f32 = 1e9;
+/// Stands for an error that no candidate may be chosen with.
+const WORST: f32 = 1e24;
 
-/// The filters beside none. EAW goes without the radiance weight, which noise would steer, and like the guided filter
-/// over a smaller footprint than alone: where that is too small, the third reaches further.
+/// The filters beside none. At their defaults: windows of 33 and of 9 pixels, which depth holds more tightly than alone,
+/// and 3 levels of `svgf`, which normals and positions hold less tightly.
 fn candidates(s: &FilterSettings) -> [(Row, FilterSettings); 3] {
-    let fine = FilterSettings { levels: s.levels.min(3), sigma_rt: f32::INFINITY, ..*s };
-    let local = FilterSettings { radius: s.radius.div_ceil(2), eps: s.eps.map(|eps| 0.1 * eps), ..*s };
-    let wide = FilterSettings { sigma_l: 2.0 * s.sigma_l, ..*s };
-    [(atrous::ROW, fine), (guided::ROW, local), (svgf::ROW, wide)]
+    let windows = |radius: u32, share: f32| {
+        let [x, y, z, depth] = s.eps.map(|eps| share * eps);
+        FilterSettings { radius, eps: [x, y, z, 0.01 * depth], ..*s }
+    };
+    let near = FilterSettings { levels: s.levels.min(3), ..alike(s) };
+    [
+        (guided::ROW, windows((2 * s.radius).div_ceil(3), 0.3)),
+        (guided::ROW, windows(s.radius.div_ceil(6), 0.1)),
+        (svgf::ROW, near),
+    ]
+}
+
+/// What counts as one surface.
+fn alike(s: &FilterSettings) -> FilterSettings {
+    FilterSettings { sigma_n: 2.0 * s.sigma_n, sigma_x: 3.0 * s.sigma_x, ..*s }
 }
 
 /// A filter, and what it makes of the image and of the probed image.
@@ -66,7 +83,7 @@ impl Auto {
             estimate: Estimate::new(gpu, settings, size)?,
             probe: Kernel::new(gpu, &effects, &[])?,
             error: Kernel::new(gpu, &effects, &[])?,
-            smooth: Kernel::new(gpu, &effects, &[])?,
+            smooth: Kernel::new(gpu, &effects, &Rates::of_surfaces(&alike(settings)).constants())?,
             blend: Kernel::new(gpu, &effects, &[])?,
             candidates: candidates(settings).into_iter().map(candidate).collect::<Result<_>>()?,
             probed: plane("probed")?,
@@ -76,15 +93,19 @@ impl Auto {
         })
     }
 
-    fn record_candidates(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
-        for Candidate { filter, results: [filtered, probed] } in &self.candidates {
-            for (radiance, output) in [(&planes.radiance, filtered), (&self.probed, probed)] {
-                let (radiance, output) = (radiance.clone(), output.clone());
-                let (guide, variance) = (planes.guide.clone(), planes.variance.clone());
-                filter.record(rec, &Planes { size: planes.size, radiance, guide, variance, output })?;
-            }
-        }
-        Ok(())
+    /// radiance\[P\] -> what every candidate makes of it, or of the probed image
+    fn record_candidates(
+        &self,
+        rec: &mut Recorder,
+        planes: &Planes,
+        radiance: &Buffer<vec4>,
+        which: usize,
+    ) -> Result<()> {
+        self.candidates.iter().try_for_each(|Candidate { filter, results }| {
+            let (radiance, output) = (radiance.clone(), results[which].clone());
+            let (guide, variance) = (planes.guide.clone(), planes.variance.clone());
+            filter.record(rec, &Planes { size: planes.size, radiance, guide, variance, output })
+        })
     }
 }
 
@@ -94,20 +115,31 @@ impl Filter for Auto {
         let (colour, estimate) = (&self.pack.colour, &self.estimate.plane);
         self.pack.record(rec, planes)?;
         self.estimate.record(rec, planes, &self.pack, &self.settings)?;
-        let bind = auto_probe::Bind { estimate, colour, probed: &self.probed };
-        rec.dispatch(&self.probe, bind, &PackPush { count }, groups(count, 64))?;
-        self.record_candidates(rec, planes)?;
+        self.record_candidates(rec, planes, &planes.radiance, 0)?;
+        let push = AutoPush { count, floor: floor(&self.settings) };
+        let bind = auto_probe::Bind { colour, around: &self.candidates[0].results[0], probed: &self.probed };
+        rec.dispatch(&self.probe, bind, &push, groups(count, 64))?;
+        self.record_candidates(rec, planes, &self.probed, 1)?;
         let [[filtered_1, probed_1], [filtered_2, probed_2], [filtered_3, probed_3]] =
             [0, 1, 2].map(|i| self.candidates[i].results.each_ref());
         let [errors, smoothed] = self.errors.each_ref();
-        let bind =
-            auto_error::Bind { estimate, filtered_1, probed_1, filtered_2, probed_2, filtered_3, probed_3, errors };
-        let push = AutoErrorPush { count, floor: floor(&self.settings) };
+        let bind = auto_error::Bind {
+            estimate,
+            colour,
+            filtered_1,
+            probed_1,
+            filtered_2,
+            probed_2,
+            filtered_3,
+            probed_3,
+            errors,
+        };
         rec.dispatch(&self.error, bind, &push, groups(count, 64))?;
         let (mut from, mut to) = (errors, smoothed);
         for level in 0..SMOOTHING {
-            let push = AutoSmoothPush { size: planes.size, spacing: 1 << level };
-            let bind = auto_smooth::Bind { errors: from, smoothed: to };
+            let rates = Rates::of_surfaces(&alike(&self.settings)).as_array();
+            let push = AutoSmoothPush { size: planes.size, spacing: 1 << level, rates };
+            let bind = auto_smooth::Bind { errors: from, colour, place: &self.pack.place, smoothed: to };
             rec.dispatch(&self.smooth, bind, &push, [width.div_ceil(32), height, 1])?;
             (from, to) = (to, from);
         }
@@ -116,73 +148,75 @@ impl Filter for Auto {
     }
 }
 
-/// Squared luminance below which errors count as absolute: a thousandth of the image's intensity.
+/// Luminance below which errors count as absolute: a thousandth of the image's intensity.
 fn floor(settings: &FilterSettings) -> f32 {
-    (1e-3 * settings.intensity).powi(2).clamp(1e-36, 1e36)
+    (1e-3 * settings.intensity).clamp(1e-30, 1e24)
 }
 
 fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
-    let image = Packed::reference(input);
+    let (image, floor) = (Packed::reference(input), floor(settings));
     let noise = estimate::reference(input, &image, settings);
-    let added: Vec<f32> = (0..image.len()).map(|i| probe(i, &image[i], noise[i])).collect();
+    let run = |input: &FilterInput| candidates(settings).map(|(row, s)| (row.reference)(input, &s));
+    let results = run(input);
+    let colour = |c: &vec4| Vec4::from(*c).xyz();
+    let added: Vec<f32> = results[0].iter().enumerate().map(|(i, c)| probe(i, colour(c), floor)).collect();
     let probed = |(p, added): (&Packed, &f32)| (p.colour + *added).extend(p.count).into();
     let probed = FilterInput { radiance: image.iter().zip(&added).map(probed).collect(), ..input.clone() };
-    let results = candidates(settings).map(|(row, s)| [input, &probed].map(|input| (row.reference)(input, &s)));
-    let colour = |c: &vec4| Vec4::from(*c).xyz();
+    let probed = run(&probed);
+    let scaled = |a: Vec3, b: Vec3| (contrast(a, b) / floor).clamp(-LIMIT, LIMIT);
     let errors = |i: usize| {
-        let level = contrast(results.iter().map(|r| colour(&r[0][i])).sum::<Vec3>() / 3.0, Vec3::ZERO);
-        let risk = |[filtered, probed]: &[Vec<vec4>; 2]| {
-            let off = contrast(colour(&filtered[i]), image[i].colour);
-            let kept = (contrast(colour(&probed[i]), colour(&filtered[i])) / added[i]).clamp(0.0, 1.0);
-            off * off + noise[i] * (2.0 * kept - 1.0)
+        let missed = |k: usize| {
+            let filtered = colour(&results[k][i]);
+            let kept = (contrast(colour(&probed[k][i]), filtered) / added[i]).clamp(0.0, MOST);
+            (scaled(filtered, image[i].colour) / (1.0 - kept)).powi(2)
         };
-        let risks = Vec4::new(noise[i], risk(&results[0]), risk(&results[1]), risk(&results[2]));
-        let relative = risks / (level * level + floor(settings));
-        let known = noise[i] >= 0.0;
-        if known { relative.clamp(Vec4::splat(-WORST), Vec4::splat(WORST)) } else { Vec4::splat(UNKNOWN) }
+        let level = scaled(results.iter().map(|r| colour(&r[i])).sum::<Vec3>() / 3.0, Vec3::ZERO);
+        let unfiltered = 2.0 * (noise[i].max(0.0).sqrt() / floor).min(LIMIT).powi(2);
+        let relative = Vec4::new(unfiltered, missed(0), missed(1), missed(2)) / (level * level + 1.0).sqrt();
+        if image[i].count < ENOUGH { Vec4::new(WORST, relative.y, relative.z, WORST) } else { relative }
     };
     let mut smoothed: Vec<Vec4> = (0..image.len()).map(errors).collect();
+    let rates = Rates::of_surfaces(&alike(settings));
     for level in 0..SMOOTHING {
-        smoothed = smooth(&smoothed, [i64::from(input.width), i64::from(input.height)], 1 << level);
+        smoothed = smooth(&smoothed, &image, [input.width, input.height].map(i64::from), 1 << level, &rates);
     }
-    let blended = |i: usize| blend(&image[i], smoothed[i], results.each_ref().map(|r| r[0][i].into()));
+    let blended = |i: usize| blend(&image[i], smoothed[i], results.each_ref().map(|r| r[i].into()));
     (0..image.len()).map(blended).collect()
 }
 
 /// As `glsl/shared/probe.glsl`.
-fn probe(pixel: usize, p: &Packed, noise: f32) -> f32 {
-    let size = 0.1 * noise.max(0.0).sqrt() + 1e-3 * contrast(p.colour, Vec3::ZERO).abs() + 1e-20;
+fn probe(pixel: usize, around: Vec3, least: f32) -> f32 {
+    let size = 0.02 * (contrast(around, Vec3::ZERO).abs() + least);
     if pcg(pixel as u32) >> 31 == 0 { size } else { -size }
 }
 
-fn smooth(errors: &[Vec4], [width, height]: [i64; 2], spacing: i64) -> Vec<Vec4> {
+fn smooth(errors: &[Vec4], image: &[Packed], [width, height]: [i64; 2], spacing: i64, rates: &Rates) -> Vec<Vec4> {
     const B3: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
     let pixel = |at: i64| {
         let (mut sum, mut total) = (Vec4::ZERO, 0.0);
         for (i, j) in (-2..=2i64).flat_map(|j| (-2..=2i64).map(move |i| (i, j))) {
             let u = (at % width + i * spacing).clamp(0, width - 1);
             let v = (at / width + j * spacing).clamp(0, height - 1);
-            let e = errors[(v * width + u) as usize];
-            let w = if e.x < UNKNOWN { B3[i.unsigned_abs() as usize] * B3[j.unsigned_abs() as usize] } else { 0.0 };
-            sum += w * e;
+            let (p, q) = (&image[at as usize], &image[(v * width + u) as usize]);
+            let w = B3[i.unsigned_abs() as usize] * B3[j.unsigned_abs() as usize];
+            let w = w * edge_weight(q, rates.exponent(p, q));
+            sum += w * errors[(v * width + u) as usize];
             total += w;
         }
-        if total > 0.0 { sum / total } else { Vec4::splat(UNKNOWN) }
+        if total > 0.0 { sum / total } else { Vec4::ZERO }
     };
     (0..width * height).map(pixel).collect()
 }
 
 fn blend(p: &Packed, errors: Vec4, filtered: [Vec4; 3]) -> vec4 {
-    let e = errors.max(Vec4::ZERO);
-    let w = (e + 0.005 * e.x + 1e-6).recip();
-    let w = w * w * w;
-    let base = if p.count > 0.0 { p.colour } else { filtered[0].xyz() };
-    let mut total = if p.count > 0.0 { w.x } else { 0.0 };
-    let mut off = Vec3::ZERO;
-    for (f, w) in filtered.iter().zip([w.y, w.z, w.w]).filter(|(f, _)| f.w > 0.0) {
-        total += w;
-        off += w * (f.xyz() - base);
-    }
-    let count = if p.count > 0.0 { p.count } else { 1.0 };
+    let [a, b, d] = filtered;
+    let usable = Vec4::new(p.count, a.w, b.w, d.w).cmpgt(Vec4::ZERO);
+    let e = Vec4::select(usable, errors, Vec4::splat(WORST));
+    let slack = 0.02 * e.min_element() + 1e-6;
+    let w = slack / (e - e.min_element() + slack);
+    let w = Vec4::select(usable, w * w * w, Vec4::ZERO);
+    let base = if p.count > 0.0 { p.colour } else { a.xyz() };
+    let off = w.y * (a.xyz() - base) + w.z * (b.xyz() - base) + w.w * (d.xyz() - base);
+    let (count, total) = (if p.count > 0.0 { p.count } else { 1.0 }, w.element_sum());
     if total > 0.0 { (base + off / total).extend(count).into() } else { [0.0; 4] }
 }

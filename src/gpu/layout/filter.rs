@@ -85,11 +85,11 @@ gpu_structs! {
         factor: float,
     }
 
-    /// Push constants of `auto_error.comp`.
-    struct AutoErrorPush {
+    /// Push constants of `auto_probe.comp` and `auto_error.comp`.
+    struct AutoPush {
         /// Pixels.
         count: uint,
-        /// Squared luminance below which errors count as absolute.
+        /// Luminance below which errors count as absolute.
         floor: float,
     }
 
@@ -99,5 +99,7 @@ gpu_structs! {
         size: uvec2,
         /// Pixels from one tap to the next.
         spacing: uint,
+        /// As in [`AtrousPush`]; that of radiance is 0.
+        rates: vec3,
     }
 }
