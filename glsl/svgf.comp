@@ -27,8 +27,7 @@ bool outside(ivec2 at) {
     return any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, ivec2(push.size)));
 }
 
-// The variance of one pixel is itself uncertain: a Gaussian of 3x3 steadies it. No number around a pixel without known
-// neighbours, which has no use for it.
+// The variance of one pixel is itself uncertain: a Gaussian of 3x3 steadies it.
 float deviation(ivec2 at) {
     float sum = 0.0, total = 0.0;
     for (int j = -1; j <= 1; j++) {
@@ -40,7 +39,7 @@ float deviation(ivec2 at) {
             total += w;
         }
     }
-    return sqrt(sum / total);
+    return total > 0.0 ? sqrt(sum / total) : 0.0;
 }
 
 void main() {
@@ -49,7 +48,8 @@ void main() {
     vec4 here = texelFetch(estimate, index(at)), there_place = texelFetch(place, index(at));
     bool known = here.w >= 0.0;
     Pixel p = unpack_pixel(vec4(here.rgb, known ? 1.0 : 0.0), there_place);
-    float scale = 1.0 / (push.sigma_l * deviation(at) + 1e-30); // finite where nothing varies
+    // A relative floor stands for rounding, so that equal pixels are alike where nothing varies.
+    float scale = 1.0 / (push.sigma_l * deviation(at) + 1e-6 * abs(luminance(here.rgb)) + 1e-30);
     vec3 sum = vec3(0.0);
     float total = 0.0, spread = 0.0;
     for (int i = -2; i <= 2; i++) {

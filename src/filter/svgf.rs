@@ -1,7 +1,7 @@
 //! À-Trous wavelets steered by each pixel's variance: the spatial half of SVGF (Schied et al., HPG 2017). Kernel:
 //! `glsl/svgf.comp`.
 use super::edge::{Rates, edge_weight};
-use super::estimate::{self, Estimate, contrast};
+use super::estimate::{self, Estimate, contrast, luminance};
 use super::pack::{Pack, Packed};
 use super::{Filter, FilterInput, FilterSettings, Planes, Row};
 use crate::error::Result;
@@ -97,9 +97,9 @@ fn filtered(image: &[Noisy], [width, height]: [i64; 2], at: usize, spacing: i64,
     let (total, sum) = near
         .filter(|((_, variance), _)| *variance >= 0.0)
         .fold((0.0, 0.0), |(total, sum), ((_, variance), w)| (total + w, sum + w * variance));
-    let deviation = f32::sqrt(sum / total); // unused where nothing is known
+    let deviation = if total > 0.0 { f32::sqrt(sum / total) } else { 0.0 };
     let sigma = settings.sigma_l.min(WIDEST_SIGMA);
-    let scale = 1.0 / (sigma * deviation + 1e-30);
+    let scale = 1.0 / (sigma * deviation + 1e-6 * luminance(p.colour).abs() + 1e-30);
     let rates = Rates::of_surfaces(settings);
     let (mut sum, mut total, mut spread) = (Vec3::ZERO, 0.0, 0.0);
     for (i, j) in around(2) {
