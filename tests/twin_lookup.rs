@@ -104,7 +104,7 @@ fn twin(scene: &Scene, effects: &Effects, guide: &[Guide], filtered: &[vec4]) ->
 }
 
 fn differing(a: &[vec3], b: &[vec3]) -> usize {
-    let differs = |(a, b): (&vec3, &vec3)| (0..3).any(|c| !((a[c] - b[c]).abs() <= 1e-4));
+    let differs = |(a, b): (&vec3, &vec3)| (0..3).any(|c| (a[c] - b[c]).abs() > 1e-4 || a[c].is_nan() != b[c].is_nan());
     a.iter().zip(b).filter(|&pair| differs(pair)).count()
 }
 
