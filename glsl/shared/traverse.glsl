@@ -123,10 +123,11 @@ uint intersect_node(RaySpace r, uint index, float t_max, out uvec3 children) {
 }
 
 // Takes the highest of `bits`, which are below 2^24: by the exponent of a float, where findMSB is a long sequence.
+// 0 for no bits: see `intersect_leaves`.
 uint take_highest(inout uint bits) {
     uint f = floatBitsToUint(float(int(bits)));
     bits ^= uint(int(uintBitsToFloat(f & 0xff800000u)));
-    return (f >> 23) - 127u;
+    return max(f >> 23, 127u) - 127u;
 }
 
 // Bits set in a byte: each copied to a place of its own, the nibbles summed by the second product.
@@ -165,6 +166,8 @@ void enter_instance(inout Traversal t, RaySpace world, uvec2 leaves) {
     t.group = uvec2(instance_root(t.instance), 0x80000000u);
 }
 
+// lavapipe fetches for masked lanes too. So that those miss no cache, a lane without triangles stays at the one that it
+// tested last, or at the first of the scene.
 void intersect_leaves(inout Traversal t, RaySpace ray, uvec2 leaves, bool any_hit, uint mask_seed, uvec2 from) {
     while (leaves.y != 0u) {
         uint index = leaves.x + take_highest(leaves.y);
@@ -196,7 +199,8 @@ bool traversal_step(inout Traversal t, RaySpace world, bool any_hit, uint root, 
         uint mask = intersect_node(ray, t.group.x + count_bits(inner & ~(0xffffffffu << slot)), t.hit.t, children);
         if (FX_COUNTERS) nodes_visited++;
         t.group = uvec2(children.x, (mask & 0xff000000u) | children.z);
-        leaves = uvec2(children.y, mask & 0x00ffffffu);
+        leaves.y = mask & 0x00ffffffu;
+        leaves.x = leaves.y != 0u ? children.y : 0u;
     } else {
         t.group = uvec2(0u);
     }
