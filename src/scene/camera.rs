@@ -181,8 +181,8 @@ mod tests {
         assert!(build(along_up).is_ok(), "looking straight down needs no `up`");
         let nowhere = [[f64::NAN, 0.0, 0.0], [0.0, f64::NAN, 0.0], [0.0, 0.0, f64::NAN], [f64::INFINITY; 3]];
         for point in nowhere.map(Some) {
-            assert!(build(Camera { position: point, ..Camera::default() }).unwrap_err().contains("point"));
-            assert!(build(Camera { target: point, ..Camera::default() }).unwrap_err().contains("point"));
+            assert!(build(Camera { position: point, ..Camera::default() }).unwrap_err().contains("is not within"));
+            assert!(build(Camera { target: point, ..Camera::default() }).unwrap_err().contains("is not within"));
         }
     }
 }
