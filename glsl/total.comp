@@ -26,8 +26,10 @@ void main() {
     Apportionment s = state[0];
     s.equal = weights == 0UL ? 1u : 0u; // nothing is wanted more than the rest: all pixels alike
     bool deficit_next = push.round == 0u && push.total != uvec2(0u);
-    set_proportion(s, wide(deficit_next ? push.total : push.budget), weights == 0UL ? uint64_t(push.pixels) : weights);
-    if (push.round == 0u) { // of weigh, not of deficit
+    uint64_t budget = wide(deficit_next ? push.total : push.budget);
+    if (push.round == 1u && push.threshold != 0u) budget = min(budget, weights); // no more than is needed
+    set_proportion(s, budget, weights == 0UL ? uint64_t(push.pixels) : weights);
+    if (push.round == 0u) { // of weigh
         s.non_finite = unpackUint2x32(counts).x;
         s.wanting = unpackUint2x32(counts).y;
     }

@@ -13,7 +13,7 @@ use crate::gpu::layout::{
 use crate::gpu::{FrameResources, Gpu, Kernel, PassTime, RawBuffer, Recorder};
 use crate::scene::{self, Scene};
 use crate::schedule::{self, Cut};
-pub use crate::schedule::{Batch, Choice, PathRange, Plan, Progress, Step};
+pub use crate::schedule::{Batch, Choice, PathRange, Plan, Progress, Share, Step};
 use crate::settings::{PixelFilter, Placing, Sampler, Settings};
 use crate::stage::apportion::Apportion;
 use crate::stage::scan::Scan;
@@ -160,13 +160,19 @@ impl Renderer {
             (Step::Allocate(plan), Some(a)) => frame::record_allocation(rec, a, f, &self.priority, plan),
             (Step::Choose(choice), Some(a)) => frame::record_choice(rec, a, f, &self.priority, choice, push.seed),
             (Step::Listed(range), Some(a)) => {
-                if self.settings.allocate.placing() == Placing::Chosen {
-                    rec.fill(&f.paths, NONE)?; // the list may end before the range
+                if self.list_may_be_short() {
+                    rec.fill(&f.paths, NONE)?;
                 }
                 frame::record_listed(rec, st, a, s, f, push, range)
             }
             _ => Err(Error::Usage("this renderer was made without the effect \"adaptive\"".into())),
         }
+    }
+
+    /// Whether only the device knows how many paths [`Renderer::listed`] are listed.
+    pub fn list_may_be_short(&self) -> bool {
+        let allocate = &self.settings.allocate;
+        allocate.placing() == Placing::Chosen || allocate.noise_threshold > 0.0
     }
 
     /// Runs one step on the renderer's own queue and waits.

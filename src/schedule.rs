@@ -27,17 +27,34 @@ pub struct PathRange {
     pub rounds: u32,
 }
 
+/// What priorities ask for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Share {
+    /// Shares of the samples to place.
+    Next,
+    /// Shares of all samples: those that pixels have and those to place, together so many.
+    All(u64),
+    /// As many samples n as bring priority / sqrt(n), the error of the mean, below the threshold, but no more than
+    /// `limit` in all, nor than double: what is known of the noise comes from the samples there are.
+    Need {
+        /// Above 0.
+        threshold: f32,
+        /// Samples of a pixel.
+        limit: u32,
+    },
+}
+
 /// What is to be apportioned.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
     /// Of the film.
     pub pixels: u32,
-    /// Samples to place.
+    /// Samples to place; of [`Share::Need`] at most.
     pub budget: u64,
     /// Largest number of samples of a pixel, those it has included; none when no pixel can be filled.
     pub limit: Option<u32>,
-    /// When priorities are shares of all samples: those that pixels have and those to place, together.
-    pub total: Option<u64>,
+    /// What of.
+    pub share: Share,
     /// Times at most that the samples of full pixels are apportioned again; 1 when none can be full.
     pub rounds: u32,
 }
@@ -64,12 +81,13 @@ pub enum Step {
     Allocate(Plan),
     /// Decides who gets one.
     Choose(Choice),
-    /// Traces some of what was allocated: after [`Step::Choose`] at most so much.
+    /// Traces some of what was allocated: after [`Step::Choose`] and for [`Share::Need`] at most so much.
     Listed(PathRange),
 }
 
 impl Step {
-    /// What there is to do of it when the list has `listed` paths, which after [`Step::Choose`] only the device knows.
+    /// What there is to do of it when the list has `listed` paths, which after [`Step::Choose`] and for
+    /// [`Share::Need`] only the device knows.
     pub fn within(self, listed: u64) -> Option<Self> {
         let Self::Listed(range) = self else { return Some(self) };
         let paths = listed.saturating_sub(range.first).min(u64::from(range.paths)) as u32;
@@ -140,24 +158,10 @@ pub fn limit(settings: &Settings) -> u32 {
     }
 }
 
-/// Samples of the whole render, unless it is good enough before.
-fn budget(settings: &Settings, pixels: u32) -> u64 {
-    let spp = if settings.allocate.noise_threshold > 0.0 { limit(settings) } else { settings.spp };
-    u64::from(spp) * u64::from(pixels)
-}
-
-/// Number of allocations that share the budget. A threshold needs looks that are no rarer than every 4 samples a pixel.
-fn allocations(settings: &Settings, learns: bool) -> u32 {
-    match (learns, settings.allocate.noise_threshold > 0.0) {
-        (false, _) => 1,
-        (true, false) => settings.allocate.rounds,
-        (true, true) => settings.allocate.rounds.max((limit(settings) - first_spp(settings)).div_ceil(4)),
-    }
-}
-
 fn rounds(settings: &Settings, cut: &Cut, done: u32) -> Vec<Step> {
     match settings.allocate.placing() {
         Placing::Chosen => choices(settings, cut, done),
+        Placing::Learning if settings.allocate.noise_threshold > 0.0 => needed(settings, cut, done),
         placing => allocated(settings, placing == Placing::Learning, cut, done),
     }
 }
@@ -175,13 +179,31 @@ fn choices(settings: &Settings, cut: &Cut, done: u32) -> Vec<Step> {
     steps
 }
 
+/// Samples a pixel, on average, between two looks at what a threshold still needs.
+const LOOK: u32 = 4;
+
+/// Rounds of at most [`LOOK`] samples a pixel, and as many more as a pixel that always gets its need can double its samples.
+fn needed(settings: &Settings, cut: &Cut, done: u32) -> Vec<Step> {
+    let limit = limit(settings);
+    let rest = limit.saturating_sub(first_spp(settings));
+    let look = rest.div_ceil(settings.allocate.rounds).min(LOOK);
+    let rounds = if rest == 0 { 0 } else { rest.div_ceil(look) + u32::BITS };
+    let budget = u64::from(look) * u64::from(cut.pixels);
+    let share = Share::Need { threshold: settings.allocate.noise_threshold, limit };
+    let round = |_| {
+        let plan = Plan { pixels: cut.pixels, budget, limit: None, share, rounds: 1 };
+        std::iter::once(Step::Allocate(plan)).chain(deal(budget, 1, cut.paths))
+    };
+    (done..rounds).flat_map(round).collect()
+}
+
 fn allocated(settings: &Settings, learns: bool, cut: &Cut, done: u32) -> Vec<Step> {
     let first = u64::from(first_spp(settings)) * u64::from(cut.pixels);
-    let rest = budget(settings, cut.pixels).saturating_sub(first);
+    let rest = (u64::from(settings.spp) * u64::from(cut.pixels)).saturating_sub(first);
     if rest == 0 {
         return Vec::new();
     }
-    let all = allocations(settings, learns);
+    let all = if learns { settings.allocate.rounds } else { 1 };
     let limit = limit(settings);
     let room = u64::from(limit) * u64::from(cut.pixels);
     let upto = |round: u32| ((rest as u128 * u128::from(round) / u128::from(all)) as u64 + first).min(room);
@@ -196,7 +218,7 @@ fn allocated(settings: &Settings, learns: bool, cut: &Cut, done: u32) -> Vec<Ste
             pixels: cut.pixels,
             budget: total - taken,
             limit: fills.then_some(limit),
-            total: learns.then_some(total),
+            share: if learns { Share::All(total) } else { Share::Next },
             rounds: if fills { 16 } else { 1 },
         }));
         let dealt = if learns { 1 } else { settings.allocate.rounds };
@@ -319,6 +341,31 @@ mod tests {
         let capped = steps(&settings("variance", 8, 2, 5, 4), &CUT);
         assert_eq!(sums(&capped), (65 * 5, 65 * 3), "no more than there is room");
         assert_eq!(sums(&steps(&settings("uniform", 3, 2, 0, 4), &CUT)), (65 * 3, 0));
+    }
+
+    #[test]
+    fn a_noise_threshold_looks_often_and_for_long_enough() {
+        let of = |spp, min, rounds| {
+            let mut s = settings("variance", spp, min, 0, rounds);
+            s.allocate.noise_threshold = 0.1;
+            s
+        };
+        let looks = |s: &Settings| {
+            let all = steps(s, &CUT);
+            all.into_iter().filter_map(|step| if let Step::Allocate(plan) = step { Some(plan) } else { None }).collect()
+        };
+        // 32 doublings fill any count; before, every round may be spent to the end.
+        for (spp, min, rounds, look, count) in [(16, 4, 1, 4, 3), (16, 4, 6, 2, 6), (7, 4, 1, 3, 1), (15, 4, 1, 4, 3)] {
+            let plans: Vec<Plan> = looks(&of(spp, min, rounds));
+            assert_eq!(plans.len(), count + 32, "{spp} {min} {rounds}");
+            let share = Share::Need { threshold: 0.1, limit: spp };
+            let round = Plan { pixels: 65, budget: 65 * look, limit: None, share, rounds: 1 };
+            assert!(plans.iter().all(|&p| p == round), "{plans:?}");
+        }
+        assert!(looks(&of(4, 4, 1)).is_empty());
+        let s = of(16, 4, 1);
+        assert_eq!(rest(&s, &CUT, Progress { allocations: 34, pending: 0 }), needed(&s, &CUT, 34));
+        assert_eq!(needed(&s, &CUT, 34).len(), 1 + 65 * 4 / 17 + 1);
     }
 
     #[test]

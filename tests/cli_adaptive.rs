@@ -116,6 +116,7 @@ fn ctrl_c_writes_what_there_is_and_resuming_completes_it() {
     interrupted("", 200);
     interrupted("--allocate variance --rounds 20", 200);
     interrupted("--allocate threshold --min-spp 2 --max-spp 24", 200);
+    interrupted("--noise-threshold 0.001", 200);
 }
 
 #[test]

@@ -9,9 +9,9 @@ use tallow::allocate::{HostInputs, Inputs, POLICIES, Placing, policy};
 use tallow::gpu::layout::*;
 use tallow::gpu::{Buffer, FrameResources, Gpu, Kernel, Location};
 use tallow::reference::apportion as twin;
-use tallow::schedule::{Choice, PathRange, Plan};
+use tallow::schedule::{Choice, PathRange, Plan, Share};
 use tallow::stage::PerThread;
-use tallow::stage::apportion::{Apportion, Counts};
+use tallow::stage::apportion::{Apportion, Counts, fixed_threshold};
 use tallow::stage::batch::{self, Batches};
 use tallow::stage::choose::{self, Choose};
 use tallow::stage::scan::Scan;
@@ -57,16 +57,24 @@ impl Bench {
         let counts = self.counts(priority, have, plan);
         let (weights, broken) = twin::weigh(priority);
         let wanting = weights.iter().filter(|&&w| w > 0).count() as u32;
-        let weights = plan.total.map_or(weights.clone(), |total| twin::deficit(&weights, have, total));
+        let weights = match plan.share {
+            Share::Next => weights,
+            Share::All(total) => twin::deficit(&weights, have, total),
+            Share::Need { threshold, limit } => twin::need(&weights, have, fixed_threshold(threshold), limit),
+        };
         assert_eq!(counts.weight.read().unwrap(), weights, "weights, {plan:?}");
         let state = counts.state.read().unwrap()[0];
         assert_eq!((state.non_finite, state.wanting), (broken, wanting), "{plan:?}");
         let room: Vec<u32> = have.iter().map(|&n| plan.limit.unwrap_or(u32::MAX).saturating_sub(n)).collect();
-        let expected = twin::apportion(&weights, &room, plan.budget, plan.rounds);
+        let budget = match plan.share {
+            Share::Need { .. } => plan.budget.min(weights.iter().map(|&w| u64::from(w)).sum()),
+            _ => plan.budget,
+        };
+        let expected = twin::apportion(&weights, &room, budget, plan.rounds);
         let found = counts.count.read().unwrap();
         assert_eq!(found, expected, "counts, {plan:?}");
         let most: u64 = room.iter().map(|&n| u64::from(n)).sum();
-        assert_eq!(found.iter().map(|&n| u64::from(n)).sum::<u64>(), plan.budget.min(most), "sum, {plan:?}");
+        assert_eq!(found.iter().map(|&n| u64::from(n)).sum::<u64>(), budget.min(most), "sum, {plan:?}");
         assert!(found.iter().zip(&room).all(|(n, room)| n <= room), "room, {plan:?}");
         let offsets =
             counts.offset.read().unwrap().into_iter().map(|[low, high]| u64::from(low) | u64::from(high) << 32);
@@ -76,7 +84,7 @@ impl Bench {
 }
 
 fn plan(pixels: usize, budget: u64) -> Plan {
-    Plan { pixels: pixels as u32, budget, limit: None, total: None, rounds: 1 }
+    Plan { pixels: pixels as u32, budget, limit: None, share: Share::Next, rounds: 1 }
 }
 
 fn priorities(count: usize, seed: u32) -> Vec<f32> {
@@ -131,11 +139,29 @@ fn full_pixels_hand_on_what_they_leave() {
         let have: Vec<u32> = words(size, 9).into_iter().map(|w| w % 20).collect();
         for (limit, budget) in [(16, 3), (16, 8), (3, 100), (25, 12), (0, 1)] {
             let budget = budget * size as u64;
-            for (rounds, total) in
-                [(16, None), (2, None), (16, Some(have.iter().map(|&n| u64::from(n)).sum::<u64>() + budget))]
-            {
-                let plan = Plan { limit: Some(limit), total, rounds, ..plan(size, budget) };
+            let total = have.iter().map(|&n| u64::from(n)).sum::<u64>() + budget;
+            for (rounds, share) in [(16, Share::Next), (2, Share::Next), (16, Share::All(total))] {
+                let plan = Plan { limit: Some(limit), share, rounds, ..plan(size, budget) };
                 bench.check(&priorities(size, 2).iter().map(|p| p * p * p).collect::<Vec<_>>(), &have, &plan);
+            }
+        }
+    }
+    assert_silent(&bench.gpu);
+}
+
+#[test]
+fn a_threshold_is_given_what_it_needs_and_no_more() {
+    let bench = Bench::new();
+    for size in SIZES {
+        let have: Vec<u32> = words(size, 5).into_iter().map(|w| w % 40).collect();
+        let priority: Vec<f32> = priorities(size, 6).into_iter().map(|p| if p < 1.0 { 0.0 } else { p }).collect();
+        for (threshold, limit) in [(1e-9, 30), (0.3, 1 << 20), (0.3, 30), (2.0, 0), (1e9, 1 << 20)] {
+            let share = Share::Need { threshold, limit };
+            for budget in [0, 3, size as u64, 1 << 40] {
+                let counts = bench.check(&priority, &have, &Plan { share, ..plan(size, budget) });
+                let fits = |i: usize| counts[i] == 0 || counts[i] <= have[i].max(4) && have[i] + counts[i] <= limit;
+                assert!((0..size).all(fits), "{share:?}");
+                assert!((0..size).all(|i| priority[i] > 0.0 || counts[i] == 0), "{share:?}");
             }
         }
     }
@@ -147,11 +173,19 @@ fn random_images_agree() {
     let bench = Bench::new();
     let mut runner = TestRunner::new(Config { cases: 150, failure_persistence: None, ..Config::default() });
     let pixel = (prop_oneof![Just(0.0_f32), Just(1.0), Just(f32::NAN), 0.0_f32..1e-5, 0.0_f32..9e3], 0_u32..40);
-    let input = (prop::collection::vec(pixel, 1..600), 0_u64..100_000, 0_u32..60, 1_u32..5, any::<bool>());
-    let result = runner.run(&input, |(pixels, budget, limit, rounds, learns)| {
+    let input = (prop::collection::vec(pixel, 1..600), 0_u64..100_000, 0_u32..60, 1_u32..5, 0..3);
+    let result = runner.run(&input, |(pixels, budget, limit, rounds, share)| {
         let (priority, have): (Vec<f32>, Vec<u32>) = pixels.into_iter().unzip();
-        let total = learns.then(|| have.iter().map(|&n| u64::from(n)).sum::<u64>() + budget);
-        bench.check(&priority, &have, &Plan { limit: Some(limit), rounds, total, ..plan(priority.len(), budget) });
+        let plan = plan(priority.len(), budget);
+        let plan = match share {
+            0 => Plan { limit: Some(limit), rounds, ..plan },
+            1 => {
+                let total = have.iter().map(|&n| u64::from(n)).sum::<u64>() + budget;
+                Plan { limit: Some(limit), rounds, share: Share::All(total), ..plan }
+            }
+            _ => Plan { share: Share::Need { threshold: 0.01 * rounds as f32, limit }, ..plan },
+        };
+        bench.check(&priority, &have, &plan);
         Ok(())
     });
     result.unwrap();

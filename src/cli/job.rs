@@ -95,6 +95,9 @@ impl Job<'_> {
             if let Some(Step::Allocate(_) | Step::Choose(_)) = step {
                 end.allocations += 1;
                 end.last = Some(nothing_yet(&steps[i + 1..]));
+                if r.list_may_be_short() {
+                    listed = r.listed()?;
+                }
             }
             match step {
                 Some(Step::Allocate(_)) => {
@@ -105,9 +108,8 @@ impl Job<'_> {
                         break;
                     }
                 }
-                Some(Step::Choose(_)) => listed = r.listed()?,
                 Some(Step::Listed(range)) => end.last = Some(range),
-                Some(Step::Start | Step::Uniform(_)) | None => {}
+                Some(Step::Start | Step::Uniform(_) | Step::Choose(_)) | None => {}
             }
             let counters = if r.outputs().counters { r.counters()? } else { Counters::default() };
             progress.add(planned.paths(), counters.rays() - rays);

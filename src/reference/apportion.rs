@@ -29,6 +29,18 @@ pub fn deficit(weights: &[u32], have: &[u32], total: u64) -> Vec<u32> {
     weights.iter().zip(have).map(lack).collect()
 }
 
+/// What pixels lack of the samples that bring weight / sqrt(n) to the threshold, both 12.20 fixed point:
+/// ceil((w / t)^2) - have, at least 1 and at most max(have, 4) and what is left of `enough`; 0 of a weight of 0.
+pub fn need(weights: &[u32], have: &[u32], threshold: u32, enough: u32) -> Vec<u32> {
+    let lack = |(&w, &have): (&u32, &u32)| {
+        let wanted = (u64::from(w) * u64::from(w)).div_ceil(u64::from(threshold) * u64::from(threshold));
+        let most = have.max(4).min(enough.saturating_sub(have));
+        let lacks = wanted.saturating_sub(u64::from(have)).clamp(1, 1 << 31) as u32;
+        if w == 0 { 0 } else { lacks.min(most) }
+    };
+    weights.iter().zip(have).map(lack).collect()
+}
+
 /// Hamilton's method with room: quotas in proportion to the weights, rounded down; pixels whose quota is no less than
 /// their room get the room, and what they leave is apportioned again among the others, up to `rounds` times in all; then
 /// one more to the largest remainders, ties to the lower index. Weights of zero everywhere (left) count as equal. What
@@ -139,6 +151,9 @@ mod tests {
     fn shares_are_less_what_is_there() {
         assert_eq!(deficit(&[3, 1, 0], &[2, 5, 1], 8), [4, 0, 0]);
         assert_eq!(deficit(&[0, 0], &[1, 0], 5), [1, 2]);
+        // (w / t)^2: 4, 6.25 (7), 100; the third has 9 and may double, the fourth has 18 of 20; the fifth has enough,
+        // the sixth too, but is asked for one more all the same: its weight says that its error is above the threshold.
+        assert_eq!(need(&[4, 5, 20, 20, 0, 2], &[1, 1, 9, 18, 3, 5], 2, 20), [3, 4, 9, 2, 0, 1]);
         assert_eq!(weigh(&[0.5, f32::NAN, f32::INFINITY, -1.0]), (vec![1 << 19, 0, 0, 0], 2));
     }
 }

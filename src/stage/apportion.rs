@@ -1,13 +1,13 @@
 //! Turns priorities into counts that sum to a budget exactly, by Hamilton's method, with radix selection and no sort.
-//! Kernels: `glsl/{weigh,total,deficit,quota,settle,digit,pick,ties,blocks,spread}.comp`. Twin:
+//! Kernels: `glsl/{weigh,total,deficit,need,quota,settle,digit,pick,ties,blocks,spread}.comp`. Twin:
 //! [`crate::reference::apportion`].
 use super::scan::Blocks;
 use super::{blocks, one_workgroup};
 use crate::error::Result;
 use crate::gpu::layout::{ApportionPush, Apportionment, BlockSums, Effects, NONE, PixelStats, uvec2};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::schedule::Plan;
-use crate::shaders::{deficit, digit, pick, quota, settle, spread, ties, total, weigh};
+use crate::schedule::{Plan, Share};
+use crate::shaders::{deficit, digit, need, pick, quota, settle, spread, ties, total, weigh};
 
 /// Digits of a remainder, and the values of each.
 const DIGITS: u32 = 8;
@@ -15,7 +15,7 @@ const BINS: usize = 256;
 
 /// The counts, and what finding them takes: 16 bytes per pixel, the offsets of the scan included.
 pub struct Counts {
-    /// 12.20 fixed point; then, for shares of all samples, what a pixel lacks.
+    /// 12.20 fixed point; then, unless they are shares of the next samples, what a pixel lacks.
     pub weight: Buffer<u32>,
     /// Samples of every pixel.
     pub count: Buffer<u32>,
@@ -56,6 +56,7 @@ pub struct Apportion {
     weigh: Kernel<weigh::Bind<'static>>,
     total: Kernel<total::Bind<'static>>,
     deficit: Kernel<deficit::Bind<'static>>,
+    need: Kernel<need::Bind<'static>>,
     quota: Kernel<quota::Bind<'static>>,
     settle: Kernel<settle::Bind<'static>>,
     digit: Kernel<digit::Bind<'static>>,
@@ -76,6 +77,7 @@ impl Apportion {
             weigh: Kernel::new(gpu, &none, &[])?,
             total: Kernel::new(gpu, &none, &[])?,
             deficit: Kernel::new(gpu, &none, &[])?,
+            need: Kernel::new(gpu, &none, &[])?,
             quota: Kernel::new(gpu, &none, &[])?,
             settle: Kernel::new(gpu, &none, &[])?,
             digit: Kernel::new(gpu, &none, &[])?,
@@ -102,9 +104,18 @@ impl Apportion {
         let all = blocks(plan.pixels);
         rec.dispatch(&self.weigh, weigh::Bind { priority, weight: &c.weight, sums: &c.sums }, &push(0), all)?;
         rec.dispatch(&self.total, total::Bind { sums: &c.sums, state: &c.state }, &push(0), one_workgroup())?;
-        if plan.total.is_some() {
-            let bind = deficit::Bind { stats, state: &c.state, weight: &c.weight, sums: &c.sums };
-            rec.dispatch(&self.deficit, bind, &push(0), all)?;
+        match plan.share {
+            Share::Next => {}
+            Share::All(_) => {
+                let bind = deficit::Bind { stats, state: &c.state, weight: &c.weight, sums: &c.sums };
+                rec.dispatch(&self.deficit, bind, &push(0), all)?;
+            }
+            Share::Need { .. } => {
+                let bind = need::Bind { stats, weight: &c.weight, sums: &c.sums };
+                rec.dispatch(&self.need, bind, &push(0), all)?;
+            }
+        }
+        if plan.share != Share::Next {
             rec.dispatch(&self.total, total::Bind { sums: &c.sums, state: &c.state }, &push(1), one_workgroup())?;
         }
         for round in 0..plan.rounds {
@@ -141,13 +152,25 @@ impl Apportion {
     }
 }
 
+/// As priorities are counted in weights, 12.20 fixed point; at least the least.
+pub fn fixed_threshold(threshold: f32) -> u32 {
+    ((threshold.min(4095.0) * 1_048_576.0) as u32).max(1)
+}
+
 fn push(plan: &Plan, round: u32) -> ApportionPush {
+    let total = if let Share::All(total) = plan.share { total } else { 0 };
+    let (threshold, enough) = match plan.share {
+        Share::Need { threshold, limit } => (fixed_threshold(threshold), limit),
+        _ => (0, 0),
+    };
     ApportionPush {
         pixels: plan.pixels,
         limit: plan.limit.unwrap_or(NONE),
         round,
         rounds: plan.rounds,
         budget: super::pair(plan.budget),
-        total: super::pair(plan.total.unwrap_or(0)),
+        total: super::pair(total),
+        threshold,
+        enough,
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use tallow::gpu::layout::PixelStats;
 use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Kernel, Location};
 use tallow::report::table;
-use tallow::schedule::{PathRange, Plan};
+use tallow::schedule::{PathRange, Plan, Share};
 use tallow::stage::apportion::{Apportion, Counts};
 use tallow::stage::batch;
 use tallow::stage::scan::Scan;
@@ -32,7 +32,7 @@ fn main() -> Result<()> {
     let lists = Kernel::new(&gpu, &Default::default(), &[])?;
     let mut frame = FrameResources::new(&gpu)?;
     for spp in [1, 4, 64] {
-        let plan = Plan { pixels, budget: u64::from(pixels) * spp, limit: None, total: None, rounds: 1 };
+        let plan = Plan { pixels, budget: u64::from(pixels) * spp, limit: None, share: Share::Next, rounds: 1 };
         let range = PathRange { first: 0, paths: pixels, round: 0, rounds: 1 };
         let mut passes: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
         for _ in 0..=RUNS {

@@ -44,7 +44,7 @@ gpu_structs! {
         /// Largest number of samples of a pixel, those it has included; NONE when the budget can fill none.
         limit: uint,
         /// Counts the repetitions for what full pixels leave, and the digits of remainders from the highest; in `total` 0
-        /// after `weigh`, 1 after `deficit`.
+        /// after `weigh`, 1 after `deficit` or `need`.
         round: uint,
         /// Repetitions at most.
         rounds: uint,
@@ -52,6 +52,10 @@ gpu_structs! {
         budget: uvec2,
         /// Samples that all pixels have once these are placed, 64 bits.
         total: uvec2,
+        /// Error that is good enough, 12.20 fixed point as weights: the budget is an upper bound; 0: it is spent.
+        threshold: uint,
+        /// Samples at which a pixel has enough whatever its error.
+        enough: uint,
     }
 
     /// Sums over a block of pixels.
