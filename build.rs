@@ -251,7 +251,7 @@ fn members(bindings: &[Binding]) -> Result<(String, String)> {
     for Binding { number, field, element, kind, access, .. } in bindings {
         writeln!(fields, "        /// Binding {number}, {kind}, {access}.")?;
         writeln!(fields, "        pub {field}: &'a Buffer<{element}>,")?;
-        write!(list, "self.{field}.untyped(), ")?;
+        write!(list, "self.{field}.bound(), ")?;
     }
     Ok((fields, list))
 }
@@ -262,14 +262,14 @@ fn group_module(name: &str, bindings: &[Binding]) -> Result<String> {
     Ok(format!(
         r#"/// What `glsl/shared/{name}.glsl` binds.
 pub mod {name} {{
-    use crate::gpu::{{Buffer, Untyped, layout::*}};
+    use crate::gpu::{{Bound, Buffer, layout::*}};
     /// One field of every kernel that includes the file.
     #[derive(Clone, Copy)]
     pub struct Bind<'a> {{
 {fields}    }}
     impl Bind<'_> {{
         /// In the order of the fields.
-        pub fn buffers(&self) -> Vec<&std::sync::Arc<Untyped>> {{
+        pub fn buffers(&self) -> Vec<Bound<'_>> {{
             vec![{list}]
         }}
     }}
@@ -300,7 +300,7 @@ fn module(name: &str, file: &Path, interface: &Interface, root: &str, binary: &P
         r#"/// The kernel `{file}`.
 pub mod {name} {{
     #[allow(unused_imports)]
-    use {root}::gpu::{{Access, Bindings, Buffer, Slot, SlotKind, Untyped, layout::*}};
+    use {root}::gpu::{{Access, Bindings, Bound, Buffer, Slot, SlotKind, layout::*}};
     /// Basename of the file, label of the pass.
     pub const NAME: &str = {name:?};
     /// The compiled code.
@@ -316,7 +316,7 @@ pub mod {name} {{
         const SPIRV: &'static [u8] = SPIRV;
         const SLOTS: &'static [Slot] = &[
 {slots}        ];
-        fn buffers(&self) -> Vec<&std::sync::Arc<Untyped>> {{
+        fn buffers(&self) -> Vec<Bound<'_>> {{
             #[allow(unused_mut)]
             let mut all = vec![{list}];
 {groups}            all

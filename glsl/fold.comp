@@ -32,9 +32,9 @@ uvec3 samples_of(uint i, uint pixel) {
 void main() {
     uint i = thread_index();
     if (i >= push.pixels) return; // safe: no barrier() follows
-    uint pixel = push.first_pixel + i;
-    uvec3 at_step_count = samples_of(i, pixel);
+    uvec3 at_step_count = samples_of(i, push.first_pixel + i);
     if (at_step_count.z == 0u) return;
+    uint pixel = push.first_pixel - push.window + i;
     PixelStats s = stats[pixel];
     PixelLight l = PixelLight(vec3(0.0), vec3(0.0));
     if (FX_SPLIT) l = light[pixel];

@@ -2,7 +2,7 @@
 use crate::allocate::{Inputs, Policy};
 use crate::error::Result;
 use crate::gpu::layout::*;
-use crate::gpu::{Buffer, Gpu, Location, Recorder};
+use crate::gpu::{Buffer, DeviceInfo, Gpu, Location, PART, Recorder};
 use crate::scene::Scene;
 use crate::schedule::{Batch, Choice, PathRange, Plan};
 use crate::stage::apportion::{Apportion, Counts};
@@ -47,6 +47,15 @@ pub fn record_start(rec: &mut Recorder, st: &Stages, s: &DeviceScene, f: &FilmBu
     Ok(())
 }
 
+/// What a policy finds out before there are samples: once per camera.
+pub fn record_preparation(rec: &mut Recorder, a: &Allocation, f: &FilmBuffers, push: &PriorityPush) -> Result<()> {
+    a.policy.prepare(rec, &inputs(f), push) //                  guide[P] -> a policy's own
+}
+
+fn inputs(f: &FilmBuffers) -> Inputs<'_> {
+    Inputs { guide: &f.tiles[0].guide, stats: &f.tiles[0].stats, priority: &f.priority }
+}
+
 /// Records one batch with the same number of paths for every pixel of a run.
 pub fn record_uniform(
     rec: &mut Recorder,
@@ -68,10 +77,8 @@ pub fn record_allocation(
     push: &PriorityPush,
     plan: &Plan,
 ) -> Result<()> {
-    let tile = &f.tiles[0];
-    let inputs = Inputs { guide: &tile.guide, stats: &tile.stats, priority: &f.priority };
-    a.policy.record(rec, &inputs, push)?; //                                guide[P], stats[P] -> priority[P]
-    a.apportion.record(rec, &f.priority, &tile.stats, &f.counts, plan)?; // priority -> count[P], sum = budget
+    a.policy.record(rec, &inputs(f), push)?; //                             guide[P], stats[P] -> priority[P]
+    a.apportion.record(rec, &f.priority, &f.tiles[0].stats, &f.counts, plan)?; // priority -> count[P], sum = budget
     a.scan.record(rec, &f.counts) //                                        count    -> offset[P + 1]
 }
 
@@ -84,9 +91,7 @@ pub fn record_choice(
     choice: &Choice,
     seed: u32,
 ) -> Result<()> {
-    let tile = &f.tiles[0];
-    let inputs = Inputs { guide: &tile.guide, stats: &tile.stats, priority: &f.priority };
-    a.policy.record(rec, &inputs, &PriorityPush { round: choice.round, ..*push })?; // stats[P] -> priority[P]
+    a.policy.record(rec, &inputs(f), &PriorityPush { round: choice.round, ..*push })?; // stats[P] -> priority[P]
     choose::record(&a.choose, rec, &f.priority, &f.counts, choice, seed)?; //       priority -> count[P], 0 or 1
     a.scan.record(rec, &f.counts) //                                                count    -> offset[P + 1]
 }
@@ -198,12 +203,18 @@ fn shading<'a>(scene: &'a Scene, effects: &Effects) -> Cow<'a, [Shading]> {
     Cow::Borrowed(&scene.shading)
 }
 
-/// A run of the film's pixels, row-major, that fits the device's storage buffers.
+/// Bytes of the largest record of a pixel.
+const WIDEST: u64 = size_of::<Guide>() as u64;
+const _: () = assert!(size_of::<PixelStats>() as u64 <= WIDEST && size_of::<PixelLight>() as u64 <= WIDEST);
+
+/// A run of the film's pixels, row-major, that fits the device's buffers.
 pub struct FilmTile {
     /// Index of its first pixel in the film.
     pub first_pixel: u32,
     /// Its pixels.
     pub pixels: u32,
+    /// Pixels that a kernel can write at once, see [`FilmTile::windows`].
+    pub window: u32,
     /// Per pixel.
     pub stats: Buffer<PixelStats>,
     /// Per pixel, where direct and indirect light are wanted apart.
@@ -213,10 +224,23 @@ pub struct FilmTile {
 }
 
 impl FilmTile {
-    /// Pixels of the largest tile, given the device's limit in bytes of one storage buffer.
-    pub fn capacity(max_storage_range: u64) -> u32 {
-        let widest = size_of::<Guide>().max(size_of::<PixelStats>()).max(size_of::<PixelLight>());
-        (max_storage_range / widest as u64).clamp(1, 1 << 28) as u32
+    /// Pixels whose records fit one storage binding, a multiple of [`PART`]: batches never cross its multiples.
+    pub fn window(info: &DeviceInfo) -> u32 {
+        let most = info.max_storage_range / WIDEST / PART as u64;
+        (most.clamp(1, 1 << 22) * PART as u64) as u32
+    }
+
+    /// Pixels of the largest tile, whole windows, whose records fit one buffer and one view of texels.
+    fn capacity(info: &DeviceInfo) -> u32 {
+        let bytes = info.max_allocation.min(info.max_buffer_size).min(info.max_texel_elements.saturating_mul(16));
+        let window = Self::window(info);
+        (bytes / WIDEST).clamp(1, 1 << 28) as u32 / window.max(1) * window
+    }
+
+    /// The tile's pixels, cut into runs whose records fit one storage binding.
+    pub fn windows(&self) -> impl Iterator<Item = Range<u32>> + use<> {
+        let (pixels, window) = (self.pixels, self.window);
+        (0..pixels).step_by(window as usize).map(move |first| first..pixels.min(first + window))
     }
 
     fn new(gpu: &Gpu, range: Range<u32>, effects: &Effects, guides: bool) -> Result<Self> {
@@ -225,6 +249,7 @@ impl FilmTile {
         Ok(Self {
             first_pixel: range.start,
             pixels,
+            window: Self::window(gpu.info()),
             stats: Buffer::new(gpu, "stats", pixels as usize, Location::Device)?,
             light: Buffer::new(gpu, "light", room(effects.split_light), Location::Device)?,
             guide: Buffer::new(gpu, "guide", room(guides), Location::Device)?,
@@ -236,7 +261,7 @@ impl FilmTile {
 pub struct FilmBuffers {
     /// vec4 per sample in flight, three with direct and indirect light apart; overwritten by every batch.
     pub samples: Buffer<vec4>,
-    /// The film, in order; one tile unless a device's storage buffers are too small for that.
+    /// The film, in order; one tile unless a device's buffers are too small for that.
     pub tiles: Vec<FilmTile>,
     /// Closest-hit rays, any-hit rays, nodes visited: pairs of words, low first.
     pub counters: Buffer<u32>,
@@ -255,7 +280,7 @@ impl FilmBuffers {
     /// [`crate::error::Error::Device`] when it does not fit.
     pub fn new(gpu: &Gpu, pixels: u32, paths: u32, effects: &Effects, guides: bool) -> Result<Self> {
         let records = paths as usize * if effects.split_light { 3 } else { 1 };
-        let capacity = FilmTile::capacity(gpu.info().max_storage_range);
+        let capacity = FilmTile::capacity(gpu.info());
         let starts = (0..pixels).step_by(capacity as usize);
         let tile = |first: u32| FilmTile::new(gpu, first..pixels.min(first + capacity), effects, guides);
         let placed = |n: u32| if effects.adaptive { n } else { 1 };

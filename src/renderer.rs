@@ -108,8 +108,9 @@ impl Renderer {
         let allocation = effects.adaptive.then(|| allocation(gpu, policy, pixels, workgroup)).transpose()?;
         let paths = paths_in_flight(gpu, &settings, &effects);
         let film = FilmBuffers::new(gpu, pixels, paths, &effects, outputs.guides || policy.guides)?;
-        if settings.allocate.policy != "uniform" && film.tiles.len() > 1 {
-            let most = film.tiles[0].pixels;
+        // Offsets are the widest records that are bound whole.
+        let most = (gpu.info().max_storage_range / 8 - 1).min(film.tiles[0].pixels.into());
+        if settings.allocate.policy != "uniform" && u64::from(pixels) > most {
             return Err(Error::Usage(format!(
                 "a film of {pixels} pixels is too large to place samples on this device: choose at most {most} pixels, \
                  or --allocate uniform"
@@ -144,7 +145,7 @@ impl Renderer {
     }
 
     fn cut(&self) -> Cut {
-        let tile = FilmTile::capacity(self.gpu.info().max_storage_range);
+        let tile = FilmTile::window(self.gpu.info());
         Cut { pixels: self.settings.pixels() as u32, tile, paths: self.paths }
     }
 
@@ -155,7 +156,10 @@ impl Renderer {
     pub fn record(&self, rec: &mut Recorder, step: &Step) -> Result<()> {
         let (st, s, f, push) = (&self.stages, &self.scene, &self.film, &self.push);
         match (step, &self.allocation) {
-            (Step::Start, _) => frame::record_start(rec, st, s, f, push),
+            (Step::Start, allocation) => {
+                frame::record_start(rec, st, s, f, push)?;
+                allocation.as_ref().map_or(Ok(()), |a| frame::record_preparation(rec, a, f, &self.priority))
+            }
             (Step::Uniform(batch), _) => frame::record_uniform(rec, st, s, f, push, batch),
             (Step::Allocate(plan), Some(a)) => frame::record_allocation(rec, a, f, &self.priority, plan),
             (Step::Choose(choice), Some(a)) => frame::record_choice(rec, a, f, &self.priority, choice, push.seed),

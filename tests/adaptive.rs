@@ -6,7 +6,7 @@ use std::path::Path;
 use support::{assert_silent, gpu};
 use tallow::gpu::layout::{PixelLight, PixelStats};
 use tallow::gpu::{FrameResources, Gpu};
-use tallow::renderer::{Outputs, PathRange, Progress, Renderer, Step};
+use tallow::renderer::{Outputs, PathRange, Progress, Renderer, Step, path_push};
 use tallow::scene::Scene;
 use tallow::schedule::{self, Cut};
 use tallow::settings::Settings;
@@ -287,5 +287,32 @@ fn no_pixel_exceeds_the_largest_number() {
         let pixels = render(&gpu, &scene);
         assert_eq!((total(&pixels), pixels.iter().map(|p| p.stats.count).max()), (8 * 33 * 17, Some(9)), "{policy}");
     }
+    assert_silent(&gpu);
+}
+
+/// The records of this film are more than one storage binding of the reference device may hold: 1366 rows and no more.
+#[test]
+fn a_film_of_several_storage_bindings_is_placed() {
+    let gpu = gpu();
+    let sized = |policy: &'static str| {
+        scene(move |s| {
+            ([s.width, s.height], s.spp, s.max_depth) = ([2048, 1400], 2, 2);
+            (s.allocate.policy, s.allocate.min_spp) = (policy.into(), 1);
+        })
+    };
+    let outputs = Outputs { guides: true, ..split() };
+    let placed = Renderer::new(&gpu, &sized("both"), outputs).unwrap();
+    let windows = placed.film().tiles[0].windows().count();
+    assert!(windows == 2 || gpu.info().max_storage_range > 1 << 27, "{windows} windows");
+    let pixels = run(&placed, &mut FrameResources::new(&gpu).unwrap(), &placed.steps());
+    assert_eq!(total(&pixels), 2 * 2048 * 1400);
+    let alike = render(&gpu, &sized("uniform"));
+    let two: Vec<usize> = (0..pixels.len()).filter(|&i| pixels[i].stats.count == 2).collect();
+    assert!(two.iter().filter(|&&i| i >= 2048 * 1370).count() > 1000, "the last rows have too few to compare");
+    assert!(two.iter().all(|&i| bits(&pixels[i..=i]) == bits(&alike[i..=i])), "a pixel of two samples has other light");
+    let (scene, guide) = (sized("both"), placed.film().tiles[0].guide.read().unwrap());
+    let push = path_push(&scene);
+    let wrong = |&p: &u32| tallow::reference::guide::guide(&scene, &push, p).object != guide[p as usize].object;
+    assert!((0..2048 * 1400).step_by(997).filter(wrong).count() < 10, "primary hits");
     assert_silent(&gpu);
 }

@@ -302,6 +302,36 @@ fn the_largest_texel_buffer_is_read_to_its_end() {
 }
 
 #[test]
+fn a_part_is_bound_read_and_written_in_its_place() {
+    let gpu = support::gpu();
+    let values: Vec<u32> = (0..1000).collect();
+    let all = Buffer::from_slice(&gpu, "all", &values).unwrap();
+    let part = all.part(128..1000).unwrap();
+    assert_eq!((part.len(), part.raw().offset, part.raw().size), (872, 512, 4 * 872));
+    assert_eq!(part.read().unwrap(), values[128..]);
+    part.part(64..65).unwrap().write(0, &[7]).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    gpu.run(&mut frame, |rec| rec.fill(&all.part(960..990)?, 5)).unwrap();
+    let expected = |i: u32| {
+        if i == 192 {
+            7
+        } else if (960..990).contains(&i) {
+            5
+        } else {
+            i
+        }
+    };
+    assert_eq!(all.read().unwrap(), (0..1000).map(expected).collect::<Vec<_>>());
+    for range in [1..64, 64..64, 64..1001] {
+        assert!(all.part(range).err().unwrap().to_string().contains("\"all\""));
+    }
+    let texels = Buffer::<uvec4>::new(&gpu, "texels", 200, Location::Device).unwrap();
+    let message = fetch(&gpu, &texels.part(64..128).unwrap(), 0).unwrap_err().to_string();
+    assert!(message.contains("a part of it cannot be read as texels"), "{message}");
+    assert_silent(&gpu);
+}
+
+#[test]
 fn a_buffer_too_large_for_its_slot_is_an_error_with_the_limit() {
     let gpu = support::gpu();
     let limit = gpu.info().max_storage_range;

@@ -279,7 +279,11 @@ fn policies_agree_with_their_references() {
             for row in POLICIES {
                 let policy = (row.make)(&gpu, pixels as u32, 32).unwrap();
                 let inputs = Inputs { guide: &guides, stats: &statistics, priority: &priority };
-                gpu.run(&mut frame, |rec| policy.record(rec, &inputs, &push)).unwrap();
+                gpu.run(&mut frame, |rec| {
+                    policy.prepare(rec, &inputs, &push)?;
+                    policy.record(rec, &inputs, &push)
+                })
+                .unwrap();
                 let (found, expected) = (
                     priority.read().unwrap(),
                     (row.reference)(&HostInputs { guide: &guide, stats: &stats, priority: &[], push }),

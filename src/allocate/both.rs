@@ -36,10 +36,14 @@ impl Both {
 }
 
 impl Policy for Both {
-    fn record(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
+    fn prepare(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
         if push.filtered > 0.0 {
             self.geometry.record(rec, &Inputs { priority: &self.importance, ..*b }, push)?;
         }
+        Ok(())
+    }
+
+    fn record(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
         let bind = Bind { guides: b.guide, stats: b.stats, importances: &self.importance, priority: b.priority };
         self.join.record(rec, bind, push, push.size[0] * push.size[1])
     }

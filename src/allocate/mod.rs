@@ -12,6 +12,14 @@ pub mod variance;
 
 /// A policy, ready to be recorded.
 pub trait Policy {
+    /// guide\[P\] -> what stays the same from round to round, if there is any; once per camera.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    fn prepare(&self, _rec: &mut Recorder, _buffers: &Inputs, _push: &PriorityPush) -> Result<()> {
+        Ok(())
+    }
+
     /// guide\[P\], stats\[P\] -> priority\[P\]
     ///
     /// # Errors

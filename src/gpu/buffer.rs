@@ -7,7 +7,12 @@ use bytemuck::Pod;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 use std::marker::PhantomData;
+use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
+
+/// Parts of buffers begin at multiples of so many elements, each of 4 bytes at least: no device asks for storage offsets
+/// that are multiples of more than 256 bytes.
+pub const PART: usize = 64;
 
 /// Where a buffer lies. On devices with unified memory all three are the same memory, mapped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,6 +39,8 @@ pub struct RawBuffer {
 /// `len` values of `T`, readable by kernels as storage and as texels, and copied from and to.
 pub struct Buffer<T> {
     untyped: Arc<Untyped>,
+    /// Index of the first element; 0 but in a part.
+    first: usize,
     len: usize,
     of: PhantomData<fn() -> T>,
 }
@@ -41,8 +48,19 @@ pub struct Buffer<T> {
 /// Another handle to the same memory.
 impl<T> Clone for Buffer<T> {
     fn clone(&self) -> Self {
-        Self { untyped: self.untyped.clone(), len: self.len, of: PhantomData }
+        Self { untyped: self.untyped.clone(), first: self.first, len: self.len, of: PhantomData }
     }
+}
+
+/// What a kernel gets of a buffer. Public for the generated code alone.
+#[doc(hidden)]
+#[derive(Clone, Copy)]
+pub struct Bound<'a> {
+    pub(super) buffer: &'a Arc<Untyped>,
+    /// Bytes to the first element.
+    pub(super) offset: u64,
+    /// Bytes.
+    pub(super) size: u64,
 }
 
 /// What a buffer is without its type. Public for the generated code alone.
@@ -73,7 +91,20 @@ impl<T: Pod> Buffer<T> {
             .and_then(|bytes| bytes.checked_next_multiple_of(4))
             .ok_or_else(|| Error::Device(format!("buffer \"{name}\": {len} elements are more than memory can hold")))?;
         let untyped = Arc::new(Untyped::new(gpu, name, size as u64, size_of::<T>(), location)?);
-        Ok(Self { untyped, len, of: PhantomData })
+        Ok(Self { untyped, first: 0, len, of: PhantomData })
+    }
+
+    /// Elements `range`, in the same memory, to be bound as storage where all are too many for one binding. It begins at a
+    /// multiple of [`PART`].
+    ///
+    /// # Errors
+    /// [`Error::Device`] when there is no such part.
+    pub fn part(&self, range: Range<usize>) -> Result<Self> {
+        if !range.start.is_multiple_of(PART) || range.is_empty() || range.end > self.len {
+            let (name, len) = (&self.untyped.name, self.len);
+            return Err(Error::Device(format!("buffer \"{name}\": {range:?} is no part of its {len} elements")));
+        }
+        Ok(Self { first: self.first + range.start, len: range.len(), ..self.clone() })
     }
 
     /// A [`Location::Device`] buffer that holds `values`. No values become a single zero, so that absent data can be
@@ -105,7 +136,7 @@ impl<T: Pod> Buffer<T> {
             let (name, count, len) = (&self.untyped.name, values.len(), self.len);
             return Err(Error::Device(format!("buffer \"{name}\": {count} elements at {offset} exceed its {len}")));
         }
-        self.untyped.write(offset * size_of::<T>(), bytemuck::cast_slice(values))
+        self.untyped.write((self.first + offset) * size_of::<T>(), bytemuck::cast_slice(values))
     }
 
     /// All elements. The device must not be writing them.
@@ -114,21 +145,68 @@ impl<T: Pod> Buffer<T> {
     /// [`Error::Device`] when the copy fails.
     pub fn read(&self) -> Result<Vec<T>> {
         let mut values = vec![T::zeroed(); self.len];
-        self.untyped.read(bytemuck::cast_slice_mut(&mut values))?;
+        self.untyped.read(self.first * size_of::<T>(), bytemuck::cast_slice_mut(&mut values))?;
         Ok(values)
     }
 
     /// The Vulkan buffer behind this one. It is alive as long as this one is.
     pub fn raw(&self) -> RawBuffer {
-        RawBuffer { handle: self.untyped.raw.as_raw(), offset: 0, size: (self.len * size_of::<T>()) as u64 }
+        let Bound { buffer, offset, size } = self.bound();
+        RawBuffer { handle: buffer.raw.as_raw(), offset, size }
     }
 }
 
 impl<T> Buffer<T> {
     /// For the generated code alone.
     #[doc(hidden)]
-    pub fn untyped(&self) -> &Arc<Untyped> {
-        &self.untyped
+    pub fn bound(&self) -> Bound<'_> {
+        let bytes = |elements: usize| (elements * self.untyped.stride) as u64;
+        Bound { buffer: &self.untyped, offset: bytes(self.first), size: bytes(self.len) }
+    }
+}
+
+impl Bound<'_> {
+    /// # Errors
+    /// When it is larger than one storage binding may be.
+    pub(super) fn storage(&self) -> Result<vk::DescriptorBufferInfo> {
+        let (Untyped { name, raw, .. }, limit) = (&**self.buffer, self.buffer.gpu.0.info.max_storage_range);
+        if self.size > limit {
+            return Err(too_big(name, self.size, "bytes", limit, "of one storage binding"));
+        }
+        Ok(vk::DescriptorBufferInfo::default().buffer(*raw).offset(self.offset).range(self.size))
+    }
+
+    /// A view as texels of 16 bytes where elements are a multiple of that, of 8 where they have 8, else of 4. Made once,
+    /// then kept.
+    ///
+    /// # Errors
+    /// When the buffer has more texels than one view may have, or this is but a part of it.
+    pub(super) fn texels(&self, kind: SlotKind) -> Result<vk::BufferView> {
+        let whole = &**self.buffer;
+        if self.offset > 0 || self.size.next_multiple_of(4) < whole.size {
+            return Err(Error::Device(format!("buffer \"{}\": a part of it cannot be read as texels", whole.name)));
+        }
+        let (format, bytes) = match (kind, whole.stride) {
+            (SlotKind::FloatTexels, n) if n.is_multiple_of(16) => (vk::Format::R32G32B32A32_SFLOAT, 16),
+            (SlotKind::FloatTexels, 8) => (vk::Format::R32G32_SFLOAT, 8),
+            (SlotKind::FloatTexels, _) => (vk::Format::R32_SFLOAT, 4),
+            (_, n) if n.is_multiple_of(16) => (vk::Format::R32G32B32A32_UINT, 16),
+            (_, 8) => (vk::Format::R32G32_UINT, 8),
+            (_, _) => (vk::Format::R32_UINT, 4),
+        };
+        let (texels, limit) = (whole.size / bytes, whole.gpu.0.info.max_texel_elements);
+        if texels > limit {
+            return Err(too_big(&whole.name, texels, "texels", limit, "of one texel buffer"));
+        }
+        let mut views = whole.views.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, view)) = views.iter().find(|(made, _)| *made == format) {
+            return Ok(*view);
+        }
+        let info = vk::BufferViewCreateInfo::default().buffer(whole.raw).format(format).range(vk::WHOLE_SIZE);
+        // SAFETY: a live buffer with texel usage; every device supports these formats for it.
+        let view = unsafe { whole.gpu.0.device.create_buffer_view(&info, None) }.at(&whole.name)?;
+        views.push((format, view));
+        Ok(view)
     }
 }
 
@@ -195,51 +273,12 @@ impl Untyped {
         }
     }
 
-    fn read(&self, bytes: &mut [u8]) -> Result<()> {
+    fn read(&self, offset: usize, bytes: &mut [u8]) -> Result<()> {
         let length = bytes.len();
-        match self.mapped(|all| bytes.copy_from_slice(&all[..length])) {
+        match self.mapped(|all| bytes.copy_from_slice(&all[offset..offset + length])) {
             Some(()) => Ok(()),
-            None => staging::download(self, bytes),
+            None => staging::download(self, offset, bytes),
         }
-    }
-
-    /// # Errors
-    /// When the buffer is larger than one storage binding may be.
-    pub(super) fn storage(&self) -> Result<vk::DescriptorBufferInfo> {
-        let limit = self.gpu.0.info.max_storage_range;
-        if self.size > limit {
-            return Err(too_big(&self.name, self.size, "bytes", limit, "of one storage binding"));
-        }
-        Ok(vk::DescriptorBufferInfo::default().buffer(self.raw).range(vk::WHOLE_SIZE))
-    }
-
-    /// A view as texels of 16 bytes where elements are a multiple of that, of 8 where they have 8, else of 4. Made once,
-    /// then kept.
-    ///
-    /// # Errors
-    /// When the buffer has more texels than one view may have.
-    pub(super) fn texels(&self, kind: SlotKind) -> Result<vk::BufferView> {
-        let (format, bytes) = match (kind, self.stride) {
-            (SlotKind::FloatTexels, n) if n.is_multiple_of(16) => (vk::Format::R32G32B32A32_SFLOAT, 16),
-            (SlotKind::FloatTexels, 8) => (vk::Format::R32G32_SFLOAT, 8),
-            (SlotKind::FloatTexels, _) => (vk::Format::R32_SFLOAT, 4),
-            (_, n) if n.is_multiple_of(16) => (vk::Format::R32G32B32A32_UINT, 16),
-            (_, 8) => (vk::Format::R32G32_UINT, 8),
-            (_, _) => (vk::Format::R32_UINT, 4),
-        };
-        let (texels, limit) = (self.size / bytes, self.gpu.0.info.max_texel_elements);
-        if texels > limit {
-            return Err(too_big(&self.name, texels, "texels", limit, "of one texel buffer"));
-        }
-        let mut views = self.views.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, view)) = views.iter().find(|(made, _)| *made == format) {
-            return Ok(*view);
-        }
-        let info = vk::BufferViewCreateInfo::default().buffer(self.raw).format(format).range(vk::WHOLE_SIZE);
-        // SAFETY: a live buffer with texel usage; every device supports these formats for it.
-        let view = unsafe { self.gpu.0.device.create_buffer_view(&info, None) }.at(&self.name)?;
-        views.push((format, view));
-        Ok(view)
     }
 }
 

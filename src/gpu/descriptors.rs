@@ -1,9 +1,8 @@
 //! The descriptor sets of one frame: taken from pools that are reset, not from new ones.
 use super::kernel::Parts;
-use super::{At, Gpu, Slot, SlotKind, Untyped};
+use super::{At, Bound, Gpu, Slot, SlotKind};
 use crate::error::Result;
 use ash::vk;
-use std::sync::Arc;
 
 /// Sets per pool, and descriptors of each kind per set on average.
 const SETS: u32 = 128;
@@ -45,11 +44,11 @@ impl Descriptors {
     ///
     /// # Errors
     /// When a buffer is too large to be bound in its slot, or memory is out.
-    pub fn set(&mut self, kernel: &Parts, slots: &[Slot], buffers: &[&Arc<Untyped>]) -> Result<vk::DescriptorSet> {
-        let resource = |(slot, buffer): (&Slot, &&Arc<Untyped>)| {
+    pub fn set(&mut self, kernel: &Parts, slots: &[Slot], buffers: &[Bound]) -> Result<vk::DescriptorSet> {
+        let resource = |(slot, bound): (&Slot, &Bound)| {
             Ok(match slot.kind {
-                SlotKind::Storage => Resource::Storage([buffer.storage()?]),
-                kind => Resource::Texels([buffer.texels(kind)?]),
+                SlotKind::Storage => Resource::Storage([bound.storage()?]),
+                kind => Resource::Texels([bound.texels(kind)?]),
             })
         };
         let resources = slots.iter().zip(buffers).map(resource).collect::<Result<Vec<_>>>()?;

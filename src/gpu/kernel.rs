@@ -1,7 +1,7 @@
 //! A compute pipeline and what it binds.
 use super::access::Access;
 use super::layout::Effects;
-use super::{At, Gpu, Untyped};
+use super::{At, Bound, Gpu};
 use crate::error::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;
@@ -53,7 +53,7 @@ pub trait Bindings {
     /// In the order of the fields.
     const SLOTS: &'static [Slot];
     /// One for each of [`Self::SLOTS`].
-    fn buffers(&self) -> Vec<&Arc<Untyped>>;
+    fn buffers(&self) -> Vec<Bound<'_>>;
 }
 
 /// A compiled kernel, specialised for a set of effects. `B` is the kernel's `Bind` struct.

@@ -364,10 +364,12 @@ gpu_structs! {
 
     /// Push constants of `fold.comp`.
     struct FoldPush {
-        /// First pixel of the batch, counted from the tile's first.
+        /// First pixel to fold, counted from the tile's first.
         first_pixel: uint,
-        /// Pixels of the batch.
+        /// Pixels to fold.
         pixels: uint,
+        /// First pixel of those that are bound, counted likewise.
+        window: uint,
         /// Samples of every pixel in the batch; 0 when the round's offsets say how many.
         samples: uint,
         /// With `samples` = 0: paths in the batch.

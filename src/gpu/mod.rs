@@ -26,7 +26,8 @@ mod staging;
 mod timing;
 
 pub use access::Access;
-pub use buffer::{Buffer, Location, RawBuffer, Untyped};
+use buffer::Untyped;
+pub use buffer::{Bound, Buffer, Location, PART, RawBuffer};
 pub use device::{DeviceOptions, Gpu};
 pub use external::RawDevice;
 pub use frame::FrameResources;

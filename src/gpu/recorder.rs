@@ -1,5 +1,5 @@
 //! The one place that records work: barrier, label, timestamps, bind, push, dispatch.
-use super::{Access, Bindings, Buffer, FrameResources, Gpu, Kernel, Untyped, access};
+use super::{Access, Bindings, Bound, Buffer, FrameResources, Gpu, Kernel, Untyped, access};
 use crate::error::{Error, Result};
 use ash::vk;
 use ash::vk::Handle;
@@ -68,7 +68,7 @@ impl<'a> Recorder<'a> {
         let buffers = bind.buffers();
         self.owns(&buffers)?;
         let set = self.frame.descriptors.set(&kernel.parts, B::SLOTS, &buffers)?;
-        let accesses: Vec<_> = buffers.into_iter().zip(B::SLOTS.iter().map(|slot| slot.access)).collect();
+        let accesses: Vec<_> = buffers.iter().map(|b| b.buffer).zip(B::SLOTS.iter().map(|slot| slot.access)).collect();
         self.frame.keep(kernel);
         let (pipeline, layout, push) = (kernel.parts.pipeline, kernel.parts.layout, bytemuck::bytes_of(push));
         let compute = vk::PipelineBindPoint::COMPUTE;
@@ -86,13 +86,14 @@ impl<'a> Recorder<'a> {
     /// # Errors
     /// [`Error::Device`] when the lengths differ, both are one buffer, or memory is out.
     pub fn copy<T: Pod>(&mut self, src: &Buffer<T>, dst: &Buffer<T>) -> Result<()> {
-        let (from, to) = (src.untyped(), dst.untyped());
+        let [source, target] = [src.bound(), dst.bound()];
+        let (from, to) = (source.buffer, target.buffer);
         if src.len() != dst.len() || Arc::ptr_eq(from, to) {
             let (from, to, m, n) = (&from.name, &to.name, src.len(), dst.len());
             return Err(Error::Device(format!("\"{from}\" of {m} elements cannot be copied to \"{to}\" of {n}")));
         }
-        self.owns(&[from, to])?;
-        let region = [vk::BufferCopy { src_offset: 0, dst_offset: 0, size: from.size }];
+        self.owns(&[source, target])?;
+        let region = [vk::BufferCopy { src_offset: source.offset, dst_offset: target.offset, size: source.size }];
         let accesses = [(from, Access::CopySource), (to, Access::CopyTarget)];
         // SAFETY: two live buffers of one size, kept by the frame.
         self.pass("copy", &accesses, |device, commands| unsafe {
@@ -105,11 +106,11 @@ impl<'a> Recorder<'a> {
     /// # Errors
     /// [`Error::Device`] when memory is out.
     pub fn fill<T: Pod>(&mut self, buffer: &Buffer<T>, value: u32) -> Result<()> {
-        let target = buffer.untyped();
-        self.owns(&[target])?;
+        let Bound { buffer: target, offset, size } = buffer.bound();
+        self.owns(&[buffer.bound()])?;
         // SAFETY: a live buffer whose size is a multiple of four, kept by the frame.
         self.pass("fill", &[(target, Access::CopyTarget)], |device, commands| unsafe {
-            device.cmd_fill_buffer(commands, target.raw, 0, vk::WHOLE_SIZE, value);
+            device.cmd_fill_buffer(commands, target.raw, offset, size, value);
         })
     }
 
@@ -119,8 +120,8 @@ impl<'a> Recorder<'a> {
         self.barriers = false;
     }
 
-    fn owns(&self, buffers: &[&Arc<Untyped>]) -> Result<()> {
-        buffers.iter().try_for_each(|buffer| self.gpu.owns(&buffer.name, &buffer.gpu))
+    fn owns(&self, buffers: &[Bound]) -> Result<()> {
+        buffers.iter().try_for_each(|bound| self.gpu.owns(&bound.buffer.name, &bound.buffer.gpu))
     }
 
     fn pass(

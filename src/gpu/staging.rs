@@ -17,11 +17,11 @@ pub(super) fn upload(target: &Untyped, offset: usize, bytes: &[u8]) -> Result<()
     Ok(())
 }
 
-/// Reads `source` from its start.
-pub(super) fn download(source: &Untyped, bytes: &mut [u8]) -> Result<()> {
+/// Reads `source` from byte `offset` on.
+pub(super) fn download(source: &Untyped, offset: usize, bytes: &mut [u8]) -> Result<()> {
     let staging = Staging::new(&source.gpu, bytes.len(), Location::Readback)?;
     for (index, chunk) in bytes.chunks_mut(CHUNK).enumerate() {
-        staging.copy(source, &staging.buffer, region(index * CHUNK, 0, chunk.len()))?;
+        staging.copy(source, &staging.buffer, region(offset + index * CHUNK, 0, chunk.len()))?;
         staging.access(|all| chunk.copy_from_slice(&all[..chunk.len()]))?;
     }
     Ok(())
@@ -73,12 +73,16 @@ mod tests {
         for count in [1, 1000, CHUNK / 4 + 3] {
             let values: Vec<u32> = (0..count as u32).map(|i| i.wrapping_mul(2_654_435_761)).collect();
             let buffer = Buffer::from_slice(&gpu, "staged", &vec![7u32; count + 2]).unwrap();
-            upload(buffer.untyped(), 4, bytemuck::cast_slice(&values)).unwrap();
+            let untyped = buffer.bound().buffer;
+            upload(untyped, 4, bytemuck::cast_slice(&values)).unwrap();
             let mut back = vec![0u32; count + 2];
-            download(buffer.untyped(), bytemuck::cast_slice_mut(&mut back)).unwrap();
+            download(untyped, 0, bytemuck::cast_slice_mut(&mut back)).unwrap();
             assert!(back[1..=count] == values, "{count} words");
             assert_eq!((back[0], back[count + 1]), (7, 7), "the rest is kept");
             assert!(back == buffer.read().unwrap(), "as the mapped way reads it");
+            let mut tail = vec![0u32; count];
+            download(untyped, 8, bytemuck::cast_slice_mut(&mut tail)).unwrap();
+            assert!(tail == back[2..], "from the third word on");
         }
         assert_eq!(gpu.validation_messages(), Vec::<String>::new());
     }

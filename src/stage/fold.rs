@@ -6,6 +6,7 @@ use crate::gpu::Recorder;
 use crate::gpu::layout::FoldPush;
 use crate::schedule::{Batch, PathRange};
 use crate::shaders::fold::Bind;
+use std::ops::Range;
 
 /// The specialised kernel.
 pub type Fold = PerThread<Bind<'static>>;
@@ -14,18 +15,32 @@ pub type Fold = PerThread<Bind<'static>>;
 pub fn record(k: &Fold, rec: &mut Recorder, f: &FilmBuffers, b: &Batch) -> Result<()> {
     let tile = f.tile_of(b);
     let first_pixel = b.first_pixel - tile.first_pixel;
-    let push = FoldPush { first_pixel, pixels: b.pixels, samples: b.samples, ..FoldPush::default() };
-    k.record(rec, bind(f, tile), &push, b.pixels)
-}
-
-fn bind<'a>(f: &'a FilmBuffers, tile: &'a FilmTile) -> Bind<'a> {
-    Bind { samples: &f.samples, stats: &tile.stats, light: &tile.light, offset: &f.counts.offset }
+    let window = first_pixel / tile.window * tile.window;
+    let push = FoldPush { first_pixel, pixels: b.pixels, window, samples: b.samples, ..FoldPush::default() };
+    fold(k, rec, f, tile, window..tile.pixels.min(window + tile.window), &push)
 }
 
 /// samples\[batch\], offset\[P + 1\] -> stats\[P\], light\[P\]
 pub fn record_listed(k: &Fold, rec: &mut Recorder, f: &FilmBuffers, range: &PathRange) -> Result<()> {
-    let tile = &f.tiles[0];
     let PathRange { first, paths, round, rounds } = *range;
-    let push = FoldPush { pixels: tile.pixels, paths, first_path: pair(first), round, rounds, ..FoldPush::default() };
-    k.record(rec, bind(f, tile), &push, tile.pixels)
+    f.tiles[0].windows().try_for_each(|w| {
+        let (first_pixel, pixels, first_path) = (w.start, w.end - w.start, pair(first));
+        let push = FoldPush { first_pixel, pixels, window: w.start, samples: 0, paths, first_path, round, rounds };
+        fold(k, rec, f, &f.tiles[0], w, &push)
+    })
+}
+
+fn fold(
+    k: &Fold,
+    rec: &mut Recorder,
+    f: &FilmBuffers,
+    tile: &FilmTile,
+    window: Range<u32>,
+    push: &FoldPush,
+) -> Result<()> {
+    let bound = window.start as usize..window.end as usize;
+    let stats = &tile.stats.part(bound.clone())?;
+    let apart = tile.light.len() == tile.pixels as usize; // else one unused element
+    let light = &if apart { tile.light.part(bound)? } else { tile.light.clone() };
+    k.record(rec, Bind { samples: &f.samples, stats, light, offset: &f.counts.offset }, push, push.pixels)
 }

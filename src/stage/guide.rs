@@ -11,6 +11,9 @@ pub type Guides = PerThread<Bind<'static>>;
 
 /// camera -> guide\[tile\]
 pub fn record(k: &Guides, rec: &mut Recorder, s: &DeviceScene, tile: &FilmTile, push: &PathPush) -> Result<()> {
-    let push = PathPush { first_pixel: tile.first_pixel, pixels: tile.pixels, ..*push };
-    k.record(rec, Bind { scene: s.bind(), guides: &tile.guide }, &push, tile.pixels)
+    tile.windows().try_for_each(|w| {
+        let (first_pixel, pixels) = (tile.first_pixel + w.start, w.end - w.start);
+        let guides = &tile.guide.part(w.start as usize..w.end as usize)?;
+        k.record(rec, Bind { scene: s.bind(), guides }, &PathPush { first_pixel, pixels, ..*push }, pixels)
+    })
 }
