@@ -2,13 +2,12 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
 #include "layout.glsl"
-#include "shared/thread.glsl"
 #include "shared/pixel.glsl"
 #include "shared/paired.glsl"
-#include "shared/tiles.glsl"
+#include "shared/blocked.glsl"
 
 // What the guided filter reads: radiance with its count, and the channels of its guide.
-layout(local_size_x = 64) in;
+layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0) uniform samplerBuffer radiance; // of vec4
 layout(binding = 1) uniform samplerBuffer guide; // of Guide
 layout(scalar, binding = 2) writeonly buffer Colours { u64vec2 colour[]; }; // of vec4
@@ -18,9 +17,9 @@ layout(scalar, push_constant) uniform Push { GuidedPackPush push; };
 layout(constant_id = 110) const uint CHANNELS = 4u; // 1: the grey normal, 3: the normal, 4: and the depth
 
 void main() {
-    int at = int(thread_index()), rows = int(push.size.y), x = at / (8 * rows) * 8 + at % 8;
-    if (x >= int(push.size.x)) return; // safe: no barrier() follows
-    int pixel = at / 8 % rows * int(push.size.x) + x;
+    ivec2 size = ivec2(push.size), p = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(p, size))) return; // safe: no barrier() follows
+    int at = blocked(p.x, p.y, size.y), pixel = p.y * size.x + p.x;
     colour[at] = paired(known_radiance(texelFetch(radiance, pixel)));
     vec4 hit = texelFetch(guide, 3 * pixel);
     // Normals span [0, 1] once they are halved; where that interval begins does not matter to a covariance.

@@ -3,7 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "layout.glsl"
 #include "shared/fit.glsl"
-#include "shared/tiles.glsl"
+#include "shared/blocked.glsl"
 
 // Rows of the summed-area table of the models.
 layout(local_size_x = 32) in;
@@ -11,7 +11,7 @@ layout(binding = 0) uniform samplerBuffer slope_r; // of vec4
 layout(binding = 1) uniform samplerBuffer slope_g; // of vec4
 layout(binding = 2) uniform samplerBuffer slope_b; // of vec4
 layout(binding = 3) uniform samplerBuffer value; // of vec4
-layout(scalar, binding = 4) writeonly buffer Table { u64vec2 table[]; }; // of vec4
+layout(scalar, binding = 4) writeonly buffer Table { u64vec4 table[]; }; // of vec4
 layout(scalar, push_constant) uniform Push { GuidedPush push; };
 
 void main() {
@@ -24,6 +24,6 @@ void main() {
         f.g += texelFetch(slope_g, at);
         f.b += texelFetch(slope_b, at);
         f.value += texelFetch(value, at);
-        FIT_STORE(table, FIT * (y * width + x), f);
+        FIT_STORE(table, FIT / 2 * (y * width + x), 1, f);
     }
 }

@@ -4,7 +4,7 @@
 #include "layout.glsl"
 #include "shared/moments.glsl"
 #include "shared/corners.glsl"
-#include "shared/tiles.glsl"
+#include "shared/blocked.glsl"
 
 // The linear model of every window, from the corners of a summed-area table: E[I I] - E[I] E[I], which cancels.
 layout(local_size_x = 32) in;
@@ -29,7 +29,7 @@ void main() {
     ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(at, size))) return; // safe: no barrier() follows
     ivec4 c = corners(at, size, int(push.radius));
-    Moments m = MOMENTS_LOAD(0, SUM);
+    Moments m = MOMENTS_LOAD(0, 1, SUM);
     float count = round(m.head.x), share = 1.0 / max(count, 1.0);
     vec3 n = share * m.head.yzw;
     vec4 i = share * m.mean;

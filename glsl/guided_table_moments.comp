@@ -3,14 +3,14 @@
 #extension GL_GOOGLE_include_directive : require
 #include "layout.glsl"
 #include "shared/moments.glsl"
-#include "shared/tiles.glsl"
+#include "shared/blocked.glsl"
 
 // Rows of the summed-area table of N, I and their products (Crow 1984), as Bauszat et al. 2011 (section 3.3) have it:
 // plain sums about 0.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform samplerBuffer channels; // of vec4
-layout(scalar, binding = 2) writeonly buffer Table { u64vec2 table[]; }; // of vec4
+layout(scalar, binding = 2) writeonly buffer Table { u64vec4 table[]; }; // of vec4
 layout(scalar, push_constant) uniform Push { GuidedPush push; };
 
 void main() {
@@ -28,6 +28,6 @@ void main() {
         m.r += c.r * i;
         m.g += c.g * i;
         m.b += c.b * i;
-        MOMENTS_STORE(table, MOMENTS * (y * width + x), m);
+        MOMENTS_STORE(table, MOMENTS / 2 * (y * width + x), 1, m);
     }
 }

@@ -5,7 +5,7 @@
 #include "shared/fit.glsl"
 #include "shared/corners.glsl"
 #include "shared/pixel.glsl"
-#include "shared/tiles.glsl"
+#include "shared/blocked.glsl"
 
 // The guided filter's result: the mean model of all windows that cover a pixel, from the corners of a summed-area table.
 layout(local_size_x = 32) in;
@@ -30,7 +30,7 @@ void main() {
     if (any(greaterThanEqual(at, size))) return; // safe: no barrier() follows
     ivec4 c = corners(at, size, int(push.radius));
     int from = blocked(at.x, at.y, size.y);
-    Fit f = moved(FIT_LOAD(0, SUM), texelFetch(channels, from));
+    Fit f = moved(FIT_LOAD(0, 1, SUM), texelFetch(channels, from));
     vec4 here = texelFetch(colour, from);
     vec3 result = f.value.rgb / max(round(f.value.w), 1.0);
     // A model that no float can hold, or no known pixel in reach: the pixel stays as it is.

@@ -1,5 +1,5 @@
-// The mean of linear models over a set of windows: slopes of the three channels, and the value at one point of the
-// guide. The point moves with the pixel that is looked at, so that far-away guides keep their digits.
+// The mean of linear models over a set of windows: slopes of the three channels, and the value at one point of the guide.
+// The point moves with the pixel that is looked at, so that far-away guides keep their digits.
 #include "shared/paired.glsl"
 
 struct Fit {
@@ -9,12 +9,15 @@ struct Fit {
     vec4 value; // rgb, windows
 };
 
-const int FIT = 4; // vec4s of a record
+const int FIT = 4; // vec4s of a record, which are kept in pairs
 const Fit NO_FIT = Fit(vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
 
-#define FIT_LOAD(at, FETCH) Fit(FETCH(at), FETCH((at) + 1), FETCH((at) + 2), FETCH((at) + 3))
-#define FIT_STORE(to, at, f) \
-    to[at] = paired(f.r); to[(at) + 1] = paired(f.g); to[(at) + 2] = paired(f.b); to[(at) + 3] = paired(f.value)
+// `at` counts pairs, and `step` is from one of a record to its next.
+#define FIT_LOAD(at, step, FETCH) \
+    Fit(FETCH(2 * (at)), FETCH(2 * (at) + 1), FETCH(2 * ((at) + step)), FETCH(2 * ((at) + step) + 1))
+#define FIT_STORE(to, at, step, f) \
+    to[at] = paired(f.r, f.g); \
+    to[(at) + step] = paired(f.b, f.value)
 
 Fit moved(Fit f, vec4 by) {
     f.value.rgb += vec3(dot(f.r, by), dot(f.g, by), dot(f.b, by));

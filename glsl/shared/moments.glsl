@@ -15,16 +15,23 @@ struct Moments {
     vec4 b;
 };
 
-const int MOMENTS = 8; // vec4s of a record
+const int MOMENTS = 8; // vec4s of a record, which are kept in pairs
 const Moments NO_MOMENTS = Moments(vec4(0.0), vec4(0.0), vec4(0.0), vec3(0.0), vec3(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
 
-#define MOMENTS_LOAD(at, FETCH) \
-    Moments(FETCH(at), FETCH((at) + 1), FETCH((at) + 2), FETCH((at) + 3).xyz, \
-            vec3(FETCH((at) + 3).w, FETCH((at) + 4).xy), FETCH((at) + 5), FETCH((at) + 6), FETCH((at) + 7))
-#define MOMENTS_STORE(to, at, m) \
-    to[at] = paired(m.head); to[(at) + 1] = paired(m.mean); to[(at) + 2] = paired(m.xx); \
-    to[(at) + 3] = paired(vec4(m.yy, m.zz.x)); to[(at) + 4].x = paired(m.zz.yzzz).x; \
-    to[(at) + 5] = paired(m.r); to[(at) + 6] = paired(m.g); to[(at) + 7] = paired(m.b)
+Moments unpacked(vec4 head, vec4 mean, vec4 xx, vec4 y, vec4 zr, vec4 rg, vec4 gb, vec4 b) {
+    return Moments(head, mean, xx, y.xyz, vec3(y.w, zr.xy), vec4(zr.zw, rg.xy), vec4(rg.zw, gb.xy), vec4(gb.zw, b.xy));
+}
+
+// `at` counts pairs, and `step` is from one of a record to its next.
+#define MOMENTS_LOAD(at, step, FETCH) \
+    unpacked(FETCH(2 * (at)), FETCH(2 * (at) + 1), FETCH(2 * ((at) + step)), FETCH(2 * ((at) + step) + 1), \
+             FETCH(2 * ((at) + 2 * step)), FETCH(2 * ((at) + 2 * step) + 1), \
+             FETCH(2 * ((at) + 3 * step)), FETCH(2 * ((at) + 3 * step) + 1))
+#define MOMENTS_STORE(to, at, step, m) \
+    to[at] = paired(m.head, m.mean); \
+    to[(at) + step] = paired(m.xx, vec4(m.yy, m.zz.x)); \
+    to[(at) + 2 * step] = paired(vec4(m.zz.yz, m.r.xy), vec4(m.r.zw, m.g.xy)); \
+    to[(at) + 3 * step].xyz = paired(vec4(m.g.zw, m.b.xy), m.b.zwzw).xyz
 
 Moments moved(Moments m, vec4 by) {
     m.mean = m.head.x > 0.0 ? m.mean - by : vec4(0.0);

@@ -1,5 +1,5 @@
 //! Guided image filter (He, Sun, Tang, ECCV 2010) on normals and depth, as Bauszat, Eisemann and Magnor (EGSR 2011) use
-//! it. Kernels: `glsl/guided_*.comp`. Its time does not depend on the radius.
+//! it. Kernels: `glsl/guided_*.comp`. Its time hardly depends on the radius.
 use super::guided_table::GuidedTable;
 use super::pixel::{known_channel, known_radiance};
 use super::{Filter, FilterInput, FilterSettings, GuidedSums, Planes, Row};
@@ -7,7 +7,6 @@ use crate::error::Result;
 use crate::gpu::layout::{Effects, Guide, GuidedPackPush, GuidedPush, vec4};
 use crate::gpu::{Bindings, Buffer, Gpu, Kernel, Location, Recorder};
 use crate::shaders::{guided_columns, guided_mean_columns, guided_mean_rows, guided_pack, guided_rows};
-use crate::stage::groups;
 use glam::{DVec3, DVec4};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -25,15 +24,12 @@ pub const ROW: Row = Row {
     reference,
 };
 
-const WORKGROUP: u32 = 32;
-/// Columns that lie beside each other, as in `glsl/shared/tiles.glsl`.
-const COLUMNS: u32 = 8;
-/// Most windows whose sums a thread counts from one point: its registers are 240 floats then.
-const LARGEST_TILE: u32 = 8;
+/// Columns of a plane that lie beside each other, and rows of a strip, as in `glsl/shared/blocked.glsl`.
+const BESIDE: u32 = 8;
 /// `vec4`s of a pixel's record in a strip.
 const RECORD: u64 = 8;
-/// Bytes of a strip on a CPU, whose caches should hold two; a GPU is filled by larger ones.
-const STRIP_CPU: u64 = 8 << 20;
+/// Bytes of a strip on a CPU, so that caches hold much of it; a GPU is filled by larger ones.
+const STRIP_CPU: u64 = 32 << 20;
 const STRIP_GPU: u64 = 256 << 20;
 
 /// What the kernels read of an image.
@@ -48,7 +44,7 @@ pub struct Packed {
 impl Packed {
     /// For images of (width, height).
     pub fn new(gpu: &Gpu, settings: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
-        let pixels = width.next_multiple_of(COLUMNS) as usize * height as usize;
+        let pixels = width.next_multiple_of(BESIDE) as usize * height as usize;
         Ok(Self {
             kernel: Kernel::new(gpu, &Effects::default(), &[(110, settings.channels)])?,
             colour: Buffer::new(gpu, "colour", pixels, Location::Device)?,
@@ -61,123 +57,135 @@ impl Packed {
         let (radiance, guide) = (&planes.radiance, &planes.guide);
         let bind = guided_pack::Bind { radiance, guide, colour: &self.colour, channels: &self.channels };
         let push = GuidedPackPush { size: planes.size, depth_scale: 1.0 / settings.extent };
-        rec.dispatch(&self.kernel, bind, &push, groups(self.colour.len() as u32, 64))
+        let [across, down] = planes.size.map(|edge| edge.div_ceil(BESIDE));
+        rec.dispatch(&self.kernel, bind, &push, [across, down, 1])
     }
 }
 
-/// Each pass over the strips is two dispatches of one kernel.
 struct Guided {
     pack: Packed,
-    // Backward, then forward.
-    columns: [Kernel<guided_columns::Bind<'static>>; 2],
-    rows: [Kernel<guided_rows::Bind<'static>>; 2],
-    mean_columns: [Kernel<guided_mean_columns::Bind<'static>>; 2],
-    mean_rows: [Kernel<guided_mean_rows::Bind<'static>>; 2],
+    columns: Kernel<guided_columns::Bind<'static>>,
+    rows: Kernel<guided_rows::Bind<'static>>,
+    mean_columns: Kernel<guided_mean_columns::Bind<'static>>,
+    mean_rows: Kernel<guided_mean_rows::Bind<'static>>,
     /// Slopes of the three colours, then the value at the window's centre with the number of its windows.
     model: [Buffer<vec4>; 4],
     /// A strip's sums over columns.
     strip: Buffer<vec4>,
-    /// A strip's sums over the ends of blocks, for every tile.
-    ends: Buffer<vec4>,
+    down: Walk,
+    along: Walk,
     strip_rows: u32,
     settings: FilterSettings,
 }
 
+/// How windows along a line are summed, by `glsl/shared/windows.glsl`.
+#[derive(Clone, Copy)]
+struct Walk {
+    /// Elements of a window.
+    window: u32,
+    /// Windows that a thread takes in turn.
+    segment: u32,
+    /// Lines of a workgroup.
+    lines: u32,
+}
+
+impl Walk {
+    fn new(gpu: &Gpu, radius: u32, edge: u32) -> Self {
+        let window = 2 * radius.min(edge - 1) + 1;
+        // Every segment sums the first window's elements anew, so that a CPU takes a whole line at once; a GPU needs
+        // the threads.
+        match gpu.info().kind {
+            "CPU" => Self { window, segment: edge, lines: 8 },
+            _ => Self { window, segment: window, lines: 32 },
+        }
+    }
+
+    /// Windows that are taken at a time, each of which costs registers. Wide windows are worth more, lest their groups
+    /// become many.
+    fn tile(self) -> u32 {
+        let most = if self.window > 64 { 16 } else { 8 };
+        // Elements and groups, per window, that are added besides those of the tile itself.
+        let besides = |tile: u32| {
+            let whole = ((self.window - 1) / tile).max(1);
+            f64::from(self.window - whole * (tile - 1)) / f64::from(tile)
+        };
+        let tiles = (most / 2 + 1).min(self.window)..=most.min(self.window);
+        tiles.min_by(|a, b| besides(*a).total_cmp(&besides(*b))).unwrap_or(1)
+    }
+
+    fn kernel<B: Bindings>(self, gpu: &Gpu) -> Result<Kernel<B>> {
+        let numbers = [(100, self.lines), (110, self.window), (111, self.tile()), (112, self.segment)];
+        Kernel::new(gpu, &Effects::default(), &numbers)
+    }
+
+    /// Workgroups for `windows` of each of `lines`.
+    fn groups(self, lines: u32, windows: u32) -> [u32; 3] {
+        [lines.div_ceil(self.lines), windows.div_ceil(self.segment), 1]
+    }
+}
+
 impl Guided {
     fn new(gpu: &Gpu, settings: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
-        let [down, along] = [height, width].map(|edge| 2 * settings.radius.min(edge - 1) + 1);
+        let [down, along] = [height, width].map(|edge| Walk::new(gpu, settings.radius, edge));
         let pack = Packed::new(gpu, settings, [width, height])?;
-        let strip_rows = strip_rows(gpu, settings.radius, width, height);
+        let strip_rows = strip_rows(gpu, down.window, width, height);
         let plane = |name| Buffer::new(gpu, name, pack.colour.len(), Location::Device);
-        let records = |name, count: u32| Buffer::new(gpu, name, count as usize * RECORD as usize, Location::Device);
-        // Tiles of a line of this many pixels: each block may cut one.
-        let tiles = |edge: u32, window: u32| edge.div_ceil(tile(window)) + edge.div_ceil(window);
-        let most_ends = (tiles(strip_rows, down) * width).max(tiles(width, along) * strip_rows);
+        let records = u64::from(strip_rows.next_multiple_of(BESIDE)) * u64::from(width) * RECORD;
         Ok(Self {
-            columns: both(gpu, down)?,
-            rows: both(gpu, along)?,
-            mean_columns: both(gpu, down)?,
-            mean_rows: both(gpu, along)?,
+            columns: down.kernel(gpu)?,
+            rows: along.kernel(gpu)?,
+            mean_columns: down.kernel(gpu)?,
+            mean_rows: along.kernel(gpu)?,
             model: [plane("slope_r")?, plane("slope_g")?, plane("slope_b")?, plane("value")?],
-            strip: records("columns", strip_rows * width)?,
-            ends: records("ends", most_ends)?,
+            strip: Buffer::new(gpu, "columns", records as usize, Location::Device)?,
+            down,
+            along,
             strip_rows,
             settings: *settings,
             pack,
         })
     }
 
-    /// Columns, then rows of every strip: (first row, pushes of the two, workgroups of the two).
-    fn strips(&self, size: [u32; 2]) -> impl Iterator<Item = [(GuidedPush, [u32; 3]); 2]> {
+    /// Columns, then rows of every strip: (push, workgroups of the two).
+    fn strips(&self, size: [u32; 2]) -> impl Iterator<Item = (GuidedPush, [[u32; 3]; 2])> {
         let ([width, height], settings, strip) = (size, self.settings, self.strip_rows);
         (0..height).step_by(strip as usize).map(move |first_row| {
             let rows = strip.min(height - first_row);
-            let push = |edge: u32| GuidedPush {
-                size,
-                first_row,
-                rows,
-                radius: settings.radius.min(edge - 1),
-                eps: settings.eps,
-            };
-            let (down, along) = (push(height), push(width));
-            let blocks = |count: u32, push: &GuidedPush| count.div_ceil(2 * push.radius + 1);
-            let groups_down = [width.div_ceil(WORKGROUP), blocks(rows, &down), 1];
-            let groups_along = [rows.div_ceil(WORKGROUP), blocks(width, &along), 1];
-            [(down, groups_down), (along, groups_along)]
+            let push = GuidedPush { size, first_row, rows, radius: settings.radius, eps: settings.eps };
+            (push, [self.down.groups(width, rows), self.along.groups(rows, width)])
         })
     }
 
     fn record_models(&self, rec: &mut Recorder, size: [u32; 2]) -> Result<()> {
         let [slope_r, slope_g, slope_b, value] = &self.model;
-        let (colour, channels, columns, ends) = (&self.pack.colour, &self.pack.channels, &self.strip, &self.ends);
-        for [(down, groups_down), (along, groups_along)] in self.strips(size) {
-            for (kernel, [ends, sums]) in self.columns.iter().zip([[columns, ends], [ends, columns]]) {
-                rec.dispatch(kernel, guided_columns::Bind { colour, channels, ends, sums }, &down, groups_down)?;
-            }
-            // The second writes models alone, and no sums.
-            for (kernel, [ends, sums]) in self.rows.iter().zip([[columns, ends], [ends, columns]]) {
-                let bind = guided_rows::Bind { columns, channels, ends, sums, slope_r, slope_g, slope_b, value };
-                rec.dispatch(kernel, bind, &along, groups_along)?;
-            }
+        let (colour, channels, columns) = (&self.pack.colour, &self.pack.channels, &self.strip);
+        for (push, [down, along]) in self.strips(size) {
+            rec.dispatch(&self.columns, guided_columns::Bind { colour, channels, sums: columns }, &push, down)?;
+            let bind = guided_rows::Bind { columns, channels, slope_r, slope_g, slope_b, value };
+            rec.dispatch(&self.rows, bind, &push, along)?;
         }
         Ok(())
     }
 
     fn record_means(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
         let [slope_r, slope_g, slope_b, value] = &self.model;
-        let (colour, channels, columns, ends) = (&self.pack.colour, &self.pack.channels, &self.strip, &self.ends);
-        let filtered = &planes.output;
-        for [(down, groups_down), (along, groups_along)] in self.strips(planes.size) {
-            for (kernel, [ends, sums]) in self.mean_columns.iter().zip([[columns, ends], [ends, columns]]) {
-                let bind = guided_mean_columns::Bind { slope_r, slope_g, slope_b, value, channels, ends, sums };
-                rec.dispatch(kernel, bind, &down, groups_down)?;
-            }
-            for (kernel, [ends, sums]) in self.mean_rows.iter().zip([[columns, ends], [ends, columns]]) {
-                let bind = guided_mean_rows::Bind { columns, channels, colour, ends, sums, filtered };
-                rec.dispatch(kernel, bind, &along, groups_along)?;
-            }
+        let (colour, channels, columns) = (&self.pack.colour, &self.pack.channels, &self.strip);
+        for (push, [down, along]) in self.strips(planes.size) {
+            let bind = guided_mean_columns::Bind { slope_r, slope_g, slope_b, value, channels, sums: columns };
+            rec.dispatch(&self.mean_columns, bind, &push, down)?;
+            let bind = guided_mean_rows::Bind { columns, channels, colour, filtered: &planes.output };
+            rec.dispatch(&self.mean_rows, bind, &push, along)?;
         }
         Ok(())
     }
 }
 
-/// Windows that a thread sums from one point: as equal parts of a block as there can be.
-fn tile(window: u32) -> u32 {
-    window.div_ceil(window.div_ceil(LARGEST_TILE))
-}
-
-/// A kernel for walking blocks backward, and the same for walking them forward.
-fn both<B: Bindings>(gpu: &Gpu, window: u32) -> Result<[Kernel<B>; 2]> {
-    let kernel = |backward| Kernel::new(gpu, &Effects::default(), &[(110, backward), (111, tile(window))]);
-    Ok([kernel(1)?, kernel(0)?])
-}
-
-/// A multiple of the window where memory allows it, so that no block is cut.
-fn strip_rows(gpu: &Gpu, radius: u32, width: u32, height: u32) -> u32 {
-    let (info, window) = (gpu.info(), u64::from(2 * radius.min(height - 1) + 1));
+/// At least a few windows where memory allows it, since the first rows of a strip are summed anew.
+fn strip_rows(gpu: &Gpu, window: u32, width: u32, height: u32) -> u32 {
+    let info = gpu.info();
     let row = RECORD * 16 * u64::from(width);
     let target = if info.kind == "CPU" { STRIP_CPU } else { STRIP_GPU };
-    let wanted = (target / (row * window)).max(1) * window;
+    let wanted = (target / row).max(4 * u64::from(window));
     wanted.min((info.max_storage_range / row).max(1)).min(u64::from(height)) as u32
 }
 

@@ -35,7 +35,7 @@ gpu_structs! {
         first_row: uint,
         /// Rows of the strip.
         rows: uint,
-        /// Pixels from a window's centre to its border, along the pass.
+        /// Pixels from a window's centre to its border; only the tables' kernels read it.
         radius: uint,
         /// Added to the variance of each channel of the guide.
         eps: vec4,
