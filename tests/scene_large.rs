@@ -1,6 +1,5 @@
 //! A mesh of ten million triangles, alone in its process, so that its memory can be measured.
 #![cfg(target_os = "linux")]
-#[allow(dead_code)]
 mod support;
 
 use std::path::Path;
