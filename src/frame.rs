@@ -207,6 +207,19 @@ fn shading<'a>(scene: &'a Scene, effects: &Effects) -> Cow<'a, [Shading]> {
 const WIDEST: u64 = size_of::<Guide>() as u64;
 const _: () = assert!(size_of::<PixelStats>() as u64 <= WIDEST && size_of::<PixelLight>() as u64 <= WIDEST);
 
+/// Pixels of the largest tile, whose records fit one buffer and one view of texels, and of a window.
+fn extents(info: &DeviceInfo) -> [u32; 2] {
+    let texels = info.max_texel_elements.saturating_mul(16);
+    whole_windows(info.max_allocation.min(info.max_buffer_size).min(texels), info.max_storage_range)
+}
+
+/// The same for bytes of a tile and of a storage binding.
+fn whole_windows(tile: u64, binding: u64) -> [u32; 2] {
+    let pixels = |bytes: u64| ((bytes / WIDEST / PART as u64).clamp(1, 1 << 22) * PART as u64) as u32;
+    let window = pixels(binding.min(tile));
+    [pixels(tile) / window * window, window]
+}
+
 /// A run of the film's pixels, row-major, that fits the device's buffers.
 pub struct FilmTile {
     /// Index of its first pixel in the film.
@@ -226,15 +239,8 @@ pub struct FilmTile {
 impl FilmTile {
     /// Pixels whose records fit one storage binding, a multiple of [`PART`]: batches never cross its multiples.
     pub fn window(info: &DeviceInfo) -> u32 {
-        let most = info.max_storage_range / WIDEST / PART as u64;
-        (most.clamp(1, 1 << 22) * PART as u64) as u32
-    }
-
-    /// Pixels of the largest tile, whole windows, whose records fit one buffer and one view of texels.
-    fn capacity(info: &DeviceInfo) -> u32 {
-        let bytes = info.max_allocation.min(info.max_buffer_size).min(info.max_texel_elements.saturating_mul(16));
-        let window = Self::window(info);
-        (bytes / WIDEST).clamp(1, 1 << 28) as u32 / window.max(1) * window
+        let [_, window] = extents(info);
+        window
     }
 
     /// The tile's pixels, cut into runs whose records fit one storage binding.
@@ -280,7 +286,7 @@ impl FilmBuffers {
     /// [`crate::error::Error::Device`] when it does not fit.
     pub fn new(gpu: &Gpu, pixels: u32, paths: u32, effects: &Effects, guides: bool) -> Result<Self> {
         let records = paths as usize * if effects.split_light { 3 } else { 1 };
-        let capacity = FilmTile::capacity(gpu.info());
+        let [capacity, _] = extents(gpu.info());
         let starts = (0..pixels).step_by(capacity as usize);
         let tile = |first: u32| FilmTile::new(gpu, first..pixels.min(first + capacity), effects, guides);
         let placed = |n: u32| if effects.adaptive { n } else { 1 };
@@ -298,5 +304,20 @@ impl FilmBuffers {
     pub fn tile_of(&self, batch: &Batch) -> &FilmTile {
         let after = self.tiles.partition_point(|tile| tile.first_pixel <= batch.first_pixel);
         &self.tiles[after - 1]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_are_whole_windows_whichever_limit_is_the_least() {
+        // 48 bytes a pixel, 64 pixels at a time.
+        let pixels = |bytes: u64| (bytes / 48 / 64 * 64) as u32;
+        assert_eq!(whole_windows(1 << 31, 1 << 27), [16 * pixels(1 << 27), pixels(1 << 27)], "lavapipe");
+        assert_eq!(whole_windows(1 << 31, 1 << 32), [pixels(1 << 31); 2], "buffers end before bindings do");
+        assert_eq!(whole_windows(u64::MAX, u64::MAX), [1 << 28; 2]);
+        assert_eq!(whole_windows(1, 1), [64; 2]);
     }
 }
