@@ -186,7 +186,8 @@ fn strip_rows(gpu: &Gpu, window: u32, width: u32, height: u32) -> u32 {
     let row = RECORD * 16 * u64::from(width);
     let target = if info.kind == "CPU" { STRIP_CPU } else { STRIP_GPU };
     let wanted = (target / row).max(4 * u64::from(window));
-    wanted.min((info.max_storage_range / row).max(1)).min(u64::from(height)) as u32
+    let beside = u64::from(BESIDE); // a strip's last rows take the room of so many
+    wanted.min((info.max_storage_range / row / beside).max(1) * beside).min(u64::from(height)) as u32
 }
 
 impl Filter for Guided {
