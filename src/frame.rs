@@ -226,7 +226,7 @@ pub struct FilmTile {
     pub first_pixel: u32,
     /// Its pixels.
     pub pixels: u32,
-    /// Pixels that a kernel can write at once, see [`FilmTile::windows`].
+    /// Pixels whose records fit one storage binding, a multiple of [`PART`]: batches never cross its multiples.
     pub window: u32,
     /// Per pixel.
     pub stats: Buffer<PixelStats>,
@@ -237,25 +237,19 @@ pub struct FilmTile {
 }
 
 impl FilmTile {
-    /// Pixels whose records fit one storage binding, a multiple of [`PART`]: batches never cross its multiples.
-    pub fn window(info: &DeviceInfo) -> u32 {
-        let [_, window] = extents(info);
-        window
-    }
-
     /// The tile's pixels, cut into runs whose records fit one storage binding.
     pub fn windows(&self) -> impl Iterator<Item = Range<u32>> + use<> {
         let (pixels, window) = (self.pixels, self.window);
         (0..pixels).step_by(window as usize).map(move |first| first..pixels.min(first + window))
     }
 
-    fn new(gpu: &Gpu, range: Range<u32>, effects: &Effects, guides: bool) -> Result<Self> {
+    fn new(gpu: &Gpu, range: Range<u32>, window: u32, effects: &Effects, guides: bool) -> Result<Self> {
         let pixels = range.end - range.start;
         let room = |on: bool| if on { pixels as usize } else { 1 };
         Ok(Self {
             first_pixel: range.start,
             pixels,
-            window: Self::window(gpu.info()),
+            window,
             stats: Buffer::new(gpu, "stats", pixels as usize, Location::Device)?,
             light: Buffer::new(gpu, "light", room(effects.split_light), Location::Device)?,
             guide: Buffer::new(gpu, "guide", room(guides), Location::Device)?,
@@ -286,9 +280,9 @@ impl FilmBuffers {
     /// [`crate::error::Error::Device`] when it does not fit.
     pub fn new(gpu: &Gpu, pixels: u32, paths: u32, effects: &Effects, guides: bool) -> Result<Self> {
         let records = paths as usize * if effects.split_light { 3 } else { 1 };
-        let [capacity, _] = extents(gpu.info());
+        let [capacity, window] = extents(gpu.info());
         let starts = (0..pixels).step_by(capacity as usize);
-        let tile = |first: u32| FilmTile::new(gpu, first..pixels.min(first + capacity), effects, guides);
+        let tile = |first: u32| FilmTile::new(gpu, first..pixels.min(first + capacity), window, effects, guides);
         let placed = |n: u32| if effects.adaptive { n } else { 1 };
         Ok(Self {
             paths: Buffer::new(gpu, "paths", placed(paths) as usize, Location::Device)?,

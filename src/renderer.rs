@@ -145,8 +145,7 @@ impl Renderer {
     }
 
     fn cut(&self) -> Cut {
-        let tile = FilmTile::window(self.gpu.info());
-        Cut { pixels: self.settings.pixels() as u32, tile, paths: self.paths }
+        Cut { pixels: self.settings.pixels() as u32, tile: self.film.tiles[0].window, paths: self.paths }
     }
 
     /// Records one step.

@@ -128,7 +128,8 @@ impl Guided {
     fn new(gpu: &Gpu, settings: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
         let [down, along] = [height, width].map(|edge| Walk::new(gpu, settings.radius, edge));
         let pack = Packed::new(gpu, settings, [width, height])?;
-        let strip_rows = strip_rows(gpu, down.window, width, height);
+        let target = if gpu.info().kind == "CPU" { STRIP_CPU } else { STRIP_GPU };
+        let strip_rows = strip_rows(target, gpu.info().max_storage_range, down.window, [width, height]);
         let plane = |name| Buffer::new(gpu, name, pack.colour.len(), Location::Device);
         let records = u64::from(strip_rows.next_multiple_of(BESIDE)) * u64::from(width) * RECORD;
         Ok(Self {
@@ -180,14 +181,12 @@ impl Guided {
     }
 }
 
-/// At least a few windows where memory allows it, since the first rows of a strip are summed anew.
-fn strip_rows(gpu: &Gpu, window: u32, width: u32, height: u32) -> u32 {
-    let info = gpu.info();
-    let row = RECORD * 16 * u64::from(width);
-    let target = if info.kind == "CPU" { STRIP_CPU } else { STRIP_GPU };
+/// At least a few windows where memory allows it, since the first rows of a strip are summed anew. `limit`: bytes of one
+/// storage binding; a strip's last rows take the room of [`BESIDE`].
+fn strip_rows(target: u64, limit: u64, window: u32, [width, height]: [u32; 2]) -> u32 {
+    let (row, beside) = (RECORD * 16 * u64::from(width), u64::from(BESIDE));
     let wanted = (target / row).max(4 * u64::from(window));
-    let beside = u64::from(BESIDE); // a strip's last rows take the room of so many
-    wanted.min((info.max_storage_range / row / beside).max(1) * beside).min(u64::from(height)) as u32
+    wanted.min((limit / row / beside).max(1) * beside).min(u64::from(height)) as u32
 }
 
 impl Filter for Guided {
@@ -290,4 +289,27 @@ fn solve(mut a: [[f64; 4]; 4], mut rhs: DVec4) -> DVec4 {
         x[i] = if usable(i, a[i][i]) { (rhs[i] - rest) / a[i][i] } else { 0.0 };
     }
     x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strips_fit_a_storage_binding() {
+        let limit = 1 << 27; // lavapipe's
+        for size in [[1200, 1200], [3840, 2160], [1, 1], [31, 70_001], [100_000, 9]] {
+            for window in [1, 49, 601, 1181] {
+                let rows = strip_rows(STRIP_CPU, limit, window, size);
+                let records = u64::from(rows.next_multiple_of(BESIDE)) * u64::from(size[0]);
+                assert!(
+                    rows > 0 && rows <= size[1] && records * RECORD * 16 <= limit,
+                    "{size:?} {window}: {rows} rows"
+                );
+            }
+        }
+        // 128 bytes a pixel: 213 rows of 32 MiB, 4 windows, or what the binding holds of rows, in eights.
+        let rows = [1, 60, 300].map(|window| strip_rows(32 << 20, limit, window, [1228, 1200]));
+        assert_eq!(rows, [213, 240, 848]);
+    }
 }
