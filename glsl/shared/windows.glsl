@@ -12,7 +12,24 @@ layout(constant_id = 112) const int SEGMENT = 64; // windows that a thread takes
 
 const int GROUPS = WINDOW > TILE ? (WINDOW - 1) / TILE - 1 : 0;
 const int REST = WINDOW - (GROUPS + 1) * TILE;
+
 const int SLOTS = GROUPS > 0 ? GROUPS : 1;
+
+// Few groups are added one by one, out of registers. Many would make the code long and slow: they are added as two sums,
+// of those that are left of the GROUPS when the turn began, and of those that came since.
+const bool MANY = GROUPS > 8;
+const int TURN = MANY ? GROUPS : 1; // tiles
+
+// A sum of groups and the point that it is counted from.
+struct Part {
+    SUM sum;
+    vec4 point;
+};
+
+// Few: the oldest first. Many: the one that leaves with tile `at` of the turn, with all after it, or, from that tile on,
+// the one that came instead.
+Part group[SLOTS];
+Part recent; // sum of many that came in this turn
 
 // The guide at a place on the line, or at the nearest pixel to it. Guides are counted from one that is within all windows
 // that a sum is used for, so that far outliers cost no digits.
@@ -24,50 +41,76 @@ void absorb_element(inout SUM sum, vec4 point, int line, int at);
 // Takes the sum over the window around a place.
 void put(int line, int at, SUM whole, vec4 point);
 
-// The oldest of the whole groups leaves, and `sum` enters.
-void append(inout SUM group[SLOTS], inout vec4 origin[SLOTS], SUM sum, vec4 begin) {
-    [[unroll]] for (int g = 0; g + 1 < SLOTS; g++) {
-        group[g] = group[g + 1];
-        origin[g] = origin[g + 1];
+void absorb_part(inout SUM sum, vec4 point, Part part) {
+    absorb(sum, moved(part.sum, point - part.point), 1.0);
+}
+
+// For tile `at` of the turn.
+SUM whole_groups(vec4 point, int at) {
+    SUM sum = NO_SUM;
+    if (MANY) {
+        absorb_part(sum, point, group[at]);
+        absorb_part(sum, point, recent);
+    } else {
+        [[unroll]] for (int g = 0; g < GROUPS; g++) absorb_part(sum, point, group[g]);
     }
-    group[SLOTS - 1] = sum;
-    origin[SLOTS - 1] = begin;
+    return sum;
+}
+
+// The oldest of the groups leaves, and `next` enters.
+void append(Part next, int at) {
+    if (MANY) {
+        group[at] = next;
+        absorb_part(recent.sum, recent.point, next);
+    } else {
+        [[unroll]] for (int g = 0; g + 1 < SLOTS; g++) group[g] = group[g + 1];
+        group[SLOTS - 1] = next;
+    }
+}
+
+// Adds to every group all after it. `point`: what the next to come is counted from.
+void begin_turn(vec4 point) {
+    for (int g = GROUPS - 2; g >= 0; g--) {
+        Part part = group[g];
+        absorb_part(part.sum, part.point, group[g + 1]);
+        group[g] = part;
+    }
+    recent = Part(NO_SUM, point);
+}
+
+// Windows around `tile` to `end` - 1, no more than TILE, the first of which begins at `left`.
+void walk_tile(int line, int tile, int end, int left, int at) {
+    vec4 here = point_at(line, min(tile + TILE / 2, end - 1));
+    SUM sum = whole_groups(here, at), tail[TILE];
+    [[unroll]] for (int j = TILE - 1; j >= 0; j--) {
+        absorb_element(sum, here, line, left + j);
+        tail[j] = sum;
+    }
+    int next = left + (GROUPS + 1) * TILE;
+    Part ahead = Part(NO_SUM, point_at(line, next));
+    [[unroll]] for (int i = 0; i < REST - 1; i++) absorb_element(ahead.sum, ahead.point, line, next + i);
+    [[unroll]] for (int j = 0; j < TILE; j++) {
+        int last = REST + j - 1; // of the window, from `next`
+        if (last >= 0) absorb_element(ahead.sum, ahead.point, line, next + last);
+        if (last == TILE - 1) append(ahead, at);
+        SUM whole = tail[j];
+        absorb_part(whole, here, ahead);
+        if (tile + j < end) put(line, tile + j, whole, here);
+    }
 }
 
 // Windows around `first` to `end` - 1.
 void walk(int line, int first, int end) {
-    SUM group[SLOTS];
-    vec4 origin[SLOTS]; // what each is counted from
     int left = first - WINDOW / 2;
-    [[unroll]] for (int g = 0; g < SLOTS; g++) {
-        group[g] = NO_SUM;
-        origin[g] = vec4(0.0);
+    for (int g = 0; g < GROUPS; g++) {
+        int begin = left + (g + 1) * TILE;
+        Part part = Part(NO_SUM, point_at(line, begin));
+        for (int i = 0; i < TILE; i++) absorb_element(part.sum, part.point, line, begin + i);
+        append(part, g);
     }
-    for (int g = 1; g <= GROUPS; g++) {
-        vec4 begin = point_at(line, left + g * TILE);
-        SUM sum = NO_SUM;
-        for (int i = 0; i < TILE; i++) absorb_element(sum, begin, line, left + g * TILE + i);
-        append(group, origin, sum, begin);
-    }
-    for (int tile = first; tile < end; tile += TILE, left += TILE) {
-        vec4 here = point_at(line, min(tile + TILE / 2, end - 1));
-        SUM sum = NO_SUM, tail[TILE];
-        [[unroll]] for (int g = 0; g < GROUPS; g++) absorb(sum, moved(group[g], here - origin[g]), 1.0);
-        [[unroll]] for (int j = TILE - 1; j >= 0; j--) {
-            absorb_element(sum, here, line, left + j);
-            tail[j] = sum;
-        }
-        int next = left + (GROUPS + 1) * TILE;
-        vec4 begin = point_at(line, next);
-        sum = NO_SUM;
-        [[unroll]] for (int i = 0; i < REST - 1; i++) absorb_element(sum, begin, line, next + i);
-        [[unroll]] for (int j = 0; j < TILE; j++) {
-            int ahead = REST + j - 1; // the last element of the window
-            if (ahead >= 0) absorb_element(sum, begin, line, next + ahead);
-            if (ahead == TILE - 1) append(group, origin, sum, begin);
-            SUM whole = tail[j];
-            absorb(whole, moved(sum, here - begin), 1.0);
-            if (tile + j < end) put(line, tile + j, whole, here);
-        }
+    for (int tile = first, at = 0; tile < end; tile += TILE, left += TILE) {
+        if (MANY && at == 0) begin_turn(point_at(line, left + (GROUPS + 1) * TILE));
+        walk_tile(line, tile, end, left, at);
+        at = (at + 1) % TURN;
     }
 }

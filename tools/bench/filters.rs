@@ -30,6 +30,7 @@ fn case(name: &str) -> Result<Case> {
                 ("radius 24", radius(24)),
                 ("radius 8", radius(8)),
                 ("radius 64", radius(64)),
+                ("radius 200", radius(200)),
                 ("radius 24, tables", FilterSettings { sums: GuidedSums::Table, ..radius(24) }),
             ],
             peer: "guided 24",
