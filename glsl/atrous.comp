@@ -21,7 +21,7 @@ const int ROWS = 4;
 
 float b3_spline(int offset) {
     int by = abs(offset);
-    return by == 0 ? 3.0 / 8.0 : by == 1 ? 1.0 / 4.0 : by == 2 ? 1.0 / 16.0 : 0.0;
+    return by == 0 ? 3.0 / 8.0 : by == 1 ? 1.0 / 4.0 : 1.0 / 16.0;
 }
 
 Pixel pixel_at(int at) {

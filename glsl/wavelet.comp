@@ -84,7 +84,7 @@ void main() {
     vec4 predicted = prediction(at, p);
     if ((INVERSE && odd == 1 || !INVERSE && odd == 0 && !known) && predicted.w > 0.0) {
         c = vec4(c.rgb + predicted.rgb, known ? c.w : 1.0);
-    } else if (!INVERSE && odd == 0 && known) {
+    } else if (!INVERSE && odd == 0) { // by nothing where all around is unlike
         c.rgb += update(at, p);
     }
     filtered[at.y * size.x + at.x] = c;

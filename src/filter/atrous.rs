@@ -98,6 +98,6 @@ fn filtered(
             total += w;
         }
     }
-    let kept = settings.conserve_energy && p.count > 0.0 && total > 0.0;
+    let kept = settings.conserve_energy && p.count > 0.0;
     p.moved_by(sum, if kept { 1.0 } else { total })
 }
