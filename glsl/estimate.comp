@@ -38,9 +38,9 @@ float spread(ivec2 at, Pixel p) {
         }
     }
     mean /= total;
-    // Unbiased for unequal weights; one pixel alone has no spread.
+    // Unbiased for unequal weights; one pixel alone has no spread. Not negative: the pixel is one of at most 49, at 0.
     float others = 1.0 - squares / (total * total);
-    return others > 1e-3 ? max(m2 / total - mean * mean, 0.0) / others : 0.0;
+    return others > 1e-3 ? (m2 / total - mean * mean) / others : 0.0;
 }
 
 void main() {
@@ -51,6 +51,6 @@ void main() {
     vec3 v = MEASURED ? vec3(texelFetch(variance, 3 * i).x, texelFetch(variance, 3 * i + 1).x, texelFetch(variance, 3 * i + 2).x) : vec3(-1.0);
     bool measured = p.colour.w >= ENOUGH && finite(v) && all(greaterThanEqual(v, vec3(0.0)));
     // Channels of one path rise and fall together: their deviations add, not their variances.
-    float deviation = min(luminance(sqrt(max(v, 0.0))), STRONGEST);
+    float deviation = luminance(sqrt(v));
     estimate[i] = vec4(p.colour.rgb, p.colour.w > 0.0 ? (measured ? deviation * deviation : spread(at, p)) : -1.0);
 }

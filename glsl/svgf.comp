@@ -19,50 +19,50 @@ layout(constant_id = 114) const bool LAST = false;
 const float B3[3] = float[](3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0); // by |offset|
 
 int index(ivec2 at) {
-    ivec2 inside = clamp(at, ivec2(0), ivec2(push.size) - 1);
-    return inside.y * int(push.size.x) + inside.x;
+    return at.y * int(push.size.x) + at.x;
 }
 
-bool outside(ivec2 at) {
-    return any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, ivec2(push.size)));
+// The pixel at `at`, or the nearest one, which does not count.
+ivec2 nearest(ivec2 at) {
+    return clamp(at, ivec2(0), ivec2(push.size) - 1);
 }
 
-// The variance of one pixel is itself uncertain: a Gaussian of 3x3 steadies it.
+// The variance of one pixel is itself uncertain: a Gaussian of 3x3 steadies it. Of a known pixel, which counts itself.
 float deviation(ivec2 at) {
     float sum = 0.0, total = 0.0;
     for (int j = -1; j <= 1; j++) {
         for (int i = -1; i <= 1; i++) {
-            ivec2 tap = at + ivec2(i, j);
-            float v = texelFetch(estimate, index(tap)).w, w = 1.0 / float(1 << (2 + abs(i) + abs(j)));
-            if (v < 0.0 || outside(tap)) w = 0.0;
-            sum += w * max(v, 0.0);
+            ivec2 tap = at + ivec2(i, j), inside = nearest(tap);
+            float v = texelFetch(estimate, index(inside)).w, w = 1.0 / float(1 << (2 + abs(i) + abs(j)));
+            if (v < 0.0 || tap != inside) w = 0.0;
+            sum += w * v;
             total += w;
         }
     }
-    return total > 0.0 ? sqrt(sum / total) : 0.0;
+    return sqrt(sum / total);
 }
 
 void main() {
     ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(at, size))) return; // safe: no barrier() follows
-    vec4 here = texelFetch(estimate, index(at)), there_place = texelFetch(place, index(at));
+    vec4 here = texelFetch(estimate, index(at));
     bool known = here.w >= 0.0;
-    Pixel p = unpack_pixel(vec4(here.rgb, known ? 1.0 : 0.0), there_place);
-    // A relative floor stands for rounding, so that equal pixels are alike where nothing varies.
-    float scale = 1.0 / (push.sigma_l * deviation(at) + 1e-6 * abs(luminance(here.rgb)) + 1e-30);
+    Pixel p = unpack_pixel(here, texelFetch(place, index(at)));
+    float rate = push.rate_l / (deviation(at) + 1e-30); // finite, so that equal pixels are alike where nothing varies
     vec3 sum = vec3(0.0);
     float total = 0.0, spread = 0.0;
     for (int i = -2; i <= 2; i++) {
         [[unroll]] for (int j = -2; j <= 2; j++) {
-            ivec2 tap = at + int(push.spacing) * ivec2(i, j);
-            vec4 there = texelFetch(estimate, index(tap));
-            Pixel q = unpack_pixel(vec4(there.rgb, there.w >= 0.0 && !outside(tap) ? 1.0 : 0.0), texelFetch(place, index(tap)));
+            ivec2 tap = at + int(push.spacing) * ivec2(i, j), inside = nearest(tap);
+            vec4 there = texelFetch(estimate, index(inside));
+            float counts = there.w >= 0.0 && tap == inside ? 1.0 : 0.0;
+            Pixel q = unpack_pixel(vec4(there.rgb, counts), texelFetch(place, index(inside)));
             float exponent = edge_exponent(p, q, push.rates);
-            if (known) exponent -= 1.442695 * abs(contrast(q.colour.rgb, p.colour.rgb)) * scale;
+            if (known) exponent -= rate * abs(contrast(q.colour.rgb, p.colour.rgb));
             float w = B3[abs(i)] * B3[abs(j)] * edge_weight(q, exponent);
             sum += w * (q.colour.rgb - p.colour.rgb);
             total += w;
-            spread += w * w * max(there.w, 0.0);
+            spread += w * w * there.w;
         }
     }
     if (total > 0.0) here = vec4(here.rgb + sum / total, spread / (total * total));

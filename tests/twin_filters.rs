@@ -6,6 +6,7 @@ mod support;
 use picture::{Picture, SIZES};
 use support::{assert_silent, gpu};
 use tallow::filter::{FILTERS, FilterInput, FilterSettings, GuidedSums, WaveletBasis, find, firefly, run};
+use tallow::gpu::Gpu;
 use tallow::gpu::layout::vec4;
 
 /// The largest difference of a channel, relative to the pixel's largest where that is above `scale`.
@@ -54,6 +55,15 @@ fn red(pixels: &[vec4]) -> Vec<f32> {
     pixels.iter().map(|p| p[0]).collect()
 }
 
+/// What the device makes of an image, and its twin to rounding.
+fn both(gpu: &Gpu, filter: &str, input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
+    let row = find(filter).unwrap();
+    let device = run(gpu, row, input, settings).unwrap().0;
+    let host = (row.reference)(input, settings);
+    assert!(apart(&device, &host, 1.0) < 1e-5, "{filter}: {device:?} and {host:?} with {settings:?}");
+    device
+}
+
 #[test]
 fn atrous_solves_the_worked_example() {
     let off = f32::INFINITY;
@@ -79,6 +89,11 @@ fn atrous_solves_the_worked_example() {
     // An unknown pixel between 2 and 4 takes their mean, whatever the radiance weight, and counts as one sample.
     let painted = reference(&line(&[2.0, f32::NAN, 4.0]), &FilterSettings { sigma_rt: 0.1, ..plain });
     assert_eq!(painted[1], [3.0, 3.0, 3.0, 1.0]);
+    // A weight that is off does not count where the square of a difference is infinite: 4/16 beside 6/16.
+    let gpu = gpu();
+    let bright = red(&both(&gpu, "atrous", &line(&[0.0, 1e20]), &plain));
+    assert!((bright[0] / 1e20 - 0.4).abs() < 1e-6 && (bright[1] / 1e20 - 0.6).abs() < 1e-6, "{bright:?}");
+    assert_silent(&gpu);
 }
 
 #[test]
@@ -100,6 +115,17 @@ fn fireflies_are_cut_and_accounted_for() {
     assert!((removed.share - 7.0 / (120.0 + 4.0 * 8.0)).abs() < 1e-6, "{removed:?}");
     assert_eq!(firefly::removed(&before.radiance, &before.radiance).pixels, 0, "control: nothing was cut");
     assert!(firefly::remove_fireflies(&gpu, &mut input, 0.5).is_err());
+
+    // Fewer than two known neighbours are no company to judge by; light below 0 counts as none.
+    let none = f32::NAN;
+    let rows = [([none, 9.0, none], 9.0), ([1.0, 9.0, none], 9.0), ([1.0, 9.0, 3.0], 2.0), ([-0.5, 9.0, -0.5], 0.0)];
+    for (values, kept) in rows {
+        let mut input = line(&values);
+        let host = firefly::reference(&input, 2.0);
+        firefly::remove_fireflies(&gpu, &mut input, 2.0).unwrap();
+        let found = [host[1][0], input.radiance[1][0]];
+        assert!(found.iter().all(|v| (v - kept).abs() < 1e-6), "{values:?}: {found:?}");
+    }
 
     let mut noisy = Picture::new(33, 18).noisy().input;
     let host = firefly::reference(&noisy, 1.5);
@@ -230,19 +256,87 @@ fn bilateral_and_wavelets_solve_the_worked_examples() {
     assert!(square.iter().all(|v| (v - 8.0 / 3.0).abs() < 1e-5), "{square:?}");
 }
 
+/// What the left of 0 | 1 takes of the right, which weighs 4/16 beside 6/16, less what it is unlike.
+fn taken(unlike: f32) -> f32 {
+    let w = (-unlike).exp() * 4.0 / 16.0;
+    w / (w + 6.0 / 16.0)
+}
+
+#[test]
+fn guides_that_are_none_are_alike() {
+    let gpu = gpu();
+    let off = f32::INFINITY;
+    let left = |normals: [[f32; 3]; 2], positions: [[f32; 3]; 2], sigma_x: f32| {
+        let mut input = line(&[0.0, 1.0]);
+        for (g, (normal, position)) in input.guide.iter_mut().zip(normals.into_iter().zip(positions)) {
+            (g.normal, g.position) = (normal, position);
+        }
+        let settings = FilterSettings { levels: 1, sigma_rt: off, sigma_n: 1.0, sigma_x, ..FilterSettings::default() };
+        both(&gpu, "atrous", &input, &settings)[0][0]
+    };
+    // Too short, and too long to be measured; every normal differs from none by 1.
+    for none in [[0.0; 3], [1e-11; 3], [0.0, 0.0, 1e30], [0.0, f32::INFINITY, 0.0], [f32::NAN, 0.0, 1.0]] {
+        for (other, unlike) in [([0.0; 3], 0.0), ([0.0, 0.0, -1.0], 1.0), ([0.6, 0.0, 0.8], 1.0)] {
+            let found = left([none, other], [[0.0; 3]; 2], off);
+            assert!((found - taken(unlike)).abs() < 1e-5, "normals {none:?}, {other:?}: {found}");
+        }
+    }
+    // No position is 0, and the farthest is 1e18.
+    for (a, b, sigma_x, unlike) in [
+        ([f32::NAN, 2.0, 2.0], [0.0; 3], 1.0, 0.0),
+        ([2.0, f32::NEG_INFINITY, 2.0], [0.0; 3], 1.0, 0.0),
+        ([-3e38, 0.0, 0.0], [3e38, 0.0, 0.0], 4e18, 0.25),
+    ] {
+        let found = left([[0.0; 3]; 2], [a, b], sigma_x);
+        assert!((found - taken(unlike)).abs() < 1e-5, "positions {a:?}, {b:?}: {found}");
+    }
+    assert_silent(&gpu);
+}
+
 #[test]
 fn svgf_counts_in_deviations() {
-    let reference = find("svgf").unwrap().reference;
+    let gpu = gpu();
     let off = f32::INFINITY;
     let plain = FilterSettings { sigma_n: off, sigma_x: off, levels: 1, sigma_l: 1.0, ..FilterSettings::default() };
-    // 0 | 1 with four samples each: under a variance of 1 the step is one deviation, under 1e-6 a thousand.
-    let mut input = line(&[0.0, 1.0]);
-    input.radiance.iter_mut().for_each(|c| c[3] = 4.0);
-    let with = |v: f32| {
-        let input = FilterInput { variance: Some(vec![[v; 3]; 2]), ..input.clone() };
-        red(&reference(&input, &plain))[0]
+    // Fewer than four samples, or a variance that is none, are not trusted: the window's 0 and 1 have 1/2, unbiased.
+    let spread = std::f32::consts::SQRT_2;
+    let pair = |[a, b]: [[f32; 3]; 2], samples: f32, variance: [f32; 3]| {
+        let mut input = line(&[0.0; 2]);
+        input.radiance = [a, b].map(|[r, g, b]| [r, g, b, samples]).to_vec();
+        FilterInput { variance: Some(vec![variance; 2]), ..input }
     };
-    let w = (-1.0f32).exp() * 4.0 / 16.0;
-    assert!((with(1.0) - w / (w + 6.0 / 16.0)).abs() < 1e-5);
-    assert_eq!(with(1e-6), 0.0);
+    let step = [[0.0; 3], [1.0; 3]];
+    for (samples, variance, deviations) in [
+        (4.0, [1.0; 3], 1.0),
+        (4.0, [1e-6; 3], 1e3),
+        (3.0, [1.0; 3], spread),
+        (4.0, [1.0, f32::NAN, 1.0], spread),
+        (4.0, [1.0, f32::INFINITY, 1.0], spread),
+        (4.0, [1.0, 1.0, -1.0], spread),
+        (4.0, [f32::MAX; 3], 0.0),
+    ] {
+        let left = both(&gpu, "svgf", &pair(step, samples, variance), &plain)[0][0];
+        assert!((left - taken(deviations)).abs() < 1e-5, "{samples} samples, variance {variance:?}: {left}");
+    }
+    // An infinite sigma switches the weight off, also where nothing varies: that counts as a deviation of 1e-30.
+    for (sigma_l, left) in [(off, taken(0.0)), (1e30, taken(1.0)), (1.0, 0.0), (0.0, 0.0)] {
+        let settings = FilterSettings { sigma_l, ..plain };
+        let found = both(&gpu, "svgf", &pair(step, 4.0, [0.0; 3]), &settings)[0][0];
+        assert!((found - left).abs() < 1e-6, "sigma {sigma_l}: {found}");
+        // Red and blue of one luminance, 0.2126 to the last bit, are no step at all.
+        let alike = [[1.0, 0.0, 0.0], [0.0, 0.0, 2.944_598_2]];
+        let red = red(&both(&gpu, "svgf", &pair(alike, 4.0, [0.0; 3]), &settings));
+        assert!((red[0] - 0.6).abs() < 1e-6 && (red[1] - 0.4).abs() < 1e-6, "sigma {sigma_l}: {red:?}");
+    }
+    // A hole that one level does not fill has no variance yet.
+    let mut holed = Picture::new(31, 1).noisy().input;
+    holed.radiance[12..24].iter_mut().for_each(|c| c[3] = 0.0);
+    both(&gpu, "svgf", &holed, &FilterSettings::default().scaled_to(&holed));
+    // Contrast is cut at 1e18: one in a window of 7 has a variance of 1/7 of its square, so that it is one deviation away
+    // from the 4 4 1 1 sixteenths around its own 6.
+    let mut values = [0.0; 9];
+    values[4] = 8e23;
+    let cut = red(&both(&gpu, "svgf", &line(&values), &FilterSettings { sigma_l: 7f32.sqrt(), ..plain }))[4] / 8e23;
+    assert!((cut - 6.0 / (6.0 + 10.0 * (-1.0f32).exp())).abs() < 1e-5, "{cut}");
+    assert_silent(&gpu);
 }

@@ -7,7 +7,7 @@ layout(constant_id = 111) const bool WEIGHT_N = true;
 layout(constant_id = 112) const bool WEIGHT_X = true;
 layout(constant_id = 113) const bool SQUARED = true; // false: the norms as equation 5 prints them
 
-const float LEAST = -80.0; // weights below 2^LEAST are 0, on every device
+const float LEAST = -50.0; // weights below 2^LEAST are 0, on every device; squares of the others are not
 
 struct Pixel {
     vec4 colour; // w: 0 where nothing is known

@@ -1,6 +1,6 @@
 // One number for a radiance.
 
-const float STRONGEST = 1e18; // differences and deviations are cut there, so that their squares are finite
+const float STRONGEST = 1e18; // differences are cut there, so that their squares are finite
 
 float luminance(vec3 c) {
     return dot(c, vec3(0.2126, 0.7152, 0.0722)); // Rec. 709

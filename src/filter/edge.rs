@@ -5,8 +5,8 @@ use crate::gpu::layout::vec3;
 use glam::Vec3;
 use std::f32::consts::LOG2_E;
 
-/// Weights below 2^LEAST are 0.
-const LEAST: f32 = -80.0;
+/// Weights below 2^LEAST are 0, squares of the others are not.
+const LEAST: f32 = -50.0;
 
 /// Exponents of the edge-stopping weights, in base 2, per squared (or plain) difference; 0 switches a weight off.
 #[derive(Clone, Copy, Debug)]

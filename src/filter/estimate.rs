@@ -12,7 +12,7 @@ use glam::Vec3;
 const ENOUGH: f32 = 4.0;
 /// Pixels from the centre to the border of the window over which the others' is taken.
 const REACH: i64 = 3;
-/// Differences and deviations are cut there, so that their squares are finite.
+/// Differences are cut there, so that their squares are finite.
 const STRONGEST: f32 = 1e18;
 
 /// The kernel, with and without a variance to read, and its plane.
@@ -45,7 +45,7 @@ impl Estimate {
     pub fn record(&self, rec: &mut Recorder, planes: &Planes, pack: &Pack, settings: &FilterSettings) -> Result<()> {
         let [width, height] = planes.size;
         let rates = Rates::of_surfaces(settings).as_array();
-        let push = SvgfPush { size: planes.size, spacing: 1, sigma_l: 0.0, rates };
+        let push = SvgfPush { size: planes.size, spacing: 1, rate_l: 0.0, rates };
         let variance = planes.variance.as_ref().unwrap_or(&self.nothing);
         let bind = Bind { colour: &pack.colour, place: &pack.place, variance, estimate: &self.plane };
         let kernel = &self.kernels[usize::from(planes.variance.is_some())];
@@ -70,7 +70,7 @@ pub fn reference(input: &FilterInput, image: &[Packed], settings: &FilterSetting
         let measured = input.variance.as_ref().map(|v| Vec3::from(v[at]));
         match measured.filter(|v| v.is_finite() && v.min_element() >= 0.0) {
             _ if image[at].count == 0.0 => -1.0,
-            Some(v) if image[at].count >= ENOUGH => luminance(v.map(f32::sqrt)).min(STRONGEST).powi(2),
+            Some(v) if image[at].count >= ENOUGH => luminance(v.map(f32::sqrt)).powi(2),
             _ => spread(input, image, at, &rates),
         }
     };
@@ -94,5 +94,5 @@ fn spread(input: &FilterInput, image: &[Packed], at: usize, rates: &Rates) -> f3
     }
     mean /= total;
     let others = 1.0 - squares / (total * total);
-    if others > 1e-3 { (m2 / total - mean * mean).max(0.0) / others } else { 0.0 }
+    if others > 1e-3 { (m2 / total - mean * mean) / others } else { 0.0 }
 }

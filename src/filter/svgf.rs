@@ -1,7 +1,7 @@
 //! À-Trous wavelets steered by each pixel's variance: the spatial half of SVGF (Schied et al., HPG 2017). Kernel:
 //! `glsl/svgf.comp`.
 use super::edge::{Rates, edge_weight};
-use super::estimate::{self, Estimate, contrast, luminance};
+use super::estimate::{self, Estimate, contrast};
 use super::pack::{Pack, Packed};
 use super::{Filter, FilterInput, FilterSettings, Planes, Row};
 use crate::error::Result;
@@ -9,6 +9,7 @@ use crate::gpu::layout::{Effects, SvgfPush, vec4};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::shaders::svgf::Bind;
 use glam::Vec3;
+use std::f32::consts::LOG2_E;
 
 /// See [`super::FILTERS`].
 pub const ROW: Row = Row {
@@ -18,8 +19,13 @@ pub const ROW: Row = Row {
     reference,
 };
 
-/// Above it a deviation no longer matters, and products stay finite.
-const WIDEST_SIGMA: f32 = 1e18;
+/// Per standard deviation, in base 2; finite also over a deviation of [`LEAST_DEVIATION`].
+fn rate_l(settings: &FilterSettings) -> f32 {
+    (LOG2_E / settings.sigma_l).min(1e8)
+}
+
+/// Stands for 0, so that equal pixels are alike where nothing varies.
+const LEAST_DEVIATION: f32 = 1e-30;
 
 struct Svgf {
     pack: Pack,
@@ -60,7 +66,7 @@ impl Filter for Svgf {
             let push = SvgfPush {
                 size: planes.size,
                 spacing: 1 << level,
-                sigma_l: self.settings.sigma_l.min(WIDEST_SIGMA),
+                rate_l: rate_l(&self.settings),
                 rates: Rates::of_surfaces(&self.settings).as_array(),
             };
             let bind = Bind { estimate: from, place: &self.pack.place, colour: &self.pack.colour, filtered: to };
@@ -97,19 +103,17 @@ fn filtered(image: &[Noisy], [width, height]: [i64; 2], at: usize, spacing: i64,
     let (total, sum) = near
         .filter(|((_, variance), _)| *variance >= 0.0)
         .fold((0.0, 0.0), |(total, sum), ((_, variance), w)| (total + w, sum + w * variance));
-    let deviation = if total > 0.0 { f32::sqrt(sum / total) } else { 0.0 };
-    let sigma = settings.sigma_l.min(WIDEST_SIGMA);
-    let scale = 1.0 / (sigma * deviation + 1e-6 * luminance(p.colour).abs() + 1e-30);
+    let rate = rate_l(settings) / (f32::sqrt(sum / total) + LEAST_DEVIATION);
     let rates = Rates::of_surfaces(settings);
     let (mut sum, mut total, mut spread) = (Vec3::ZERO, 0.0, 0.0);
     for (i, j) in around(2) {
         let Some((q, variance)) = tap(i * spacing, j * spacing) else { continue };
-        let steps = contrast(q.colour, p.colour).abs() * scale * std::f32::consts::LOG2_E;
-        let exponent = rates.exponent(&p, q) - if noise >= 0.0 { steps } else { 0.0 };
+        let steps = if noise >= 0.0 { rate * contrast(q.colour, p.colour).abs() } else { 0.0 };
+        let exponent = rates.exponent(&p, q) - steps;
         let w = B3[i.unsigned_abs() as usize] * B3[j.unsigned_abs() as usize] * edge_weight(q, exponent);
         sum += w * (q.colour - p.colour);
         total += w;
-        spread += w * w * variance.max(0.0);
+        spread += w * w * variance;
     }
     (p.moved_by(sum, total), if total > 0.0 { spread / (total * total) } else { noise })
 }

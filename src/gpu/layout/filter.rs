@@ -59,8 +59,8 @@ gpu_structs! {
         size: uvec2,
         /// Pixels from one tap to the next.
         spacing: uint,
-        /// Standard deviations of luminance that count as an edge.
-        sigma_l: float,
+        /// Exponent, in base 2, per standard deviation of luminance.
+        rate_l: float,
         /// As in [`AtrousPush`]; that of radiance is 0.
         rates: vec3,
     }
