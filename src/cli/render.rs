@@ -290,6 +290,7 @@ fn check_outputs(args: &Args) -> Result<()> {
 mod tests {
     use super::*;
     use clap::Parser;
+    use std::sync::atomic::Ordering;
 
     #[derive(Parser)]
     struct Command {
@@ -307,5 +308,23 @@ mod tests {
         assert_eq!(parse(&["room.toml", "-o", "a.png", "-o", "b.exr"]).output_files().len(), 2);
         assert_eq!(parse(&["room.v2.obj"]).output_files(), [Path::new("room.v2.exr")]);
         assert_eq!(parse(&["room.toml", "--exposure", "-1.5"]).common.write_options().exposure, -1.5);
+    }
+
+    #[test]
+    fn an_interrupt_before_the_first_sample_keeps_the_old_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let image = folder.path().join("box.exr");
+        std::fs::write(&image, "old").unwrap();
+        let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/scene.toml");
+        let small = ["--width", "8", "--height", "8", "--spp", "1", "--quiet", "-o", image.to_str().unwrap()];
+        let args = parse(&[&[scene], &small[..]].concat());
+        let exit_after = |asked| {
+            interrupt::flag().store(asked, Ordering::SeqCst);
+            run(&args).unwrap()
+        };
+        assert_eq!(exit_after(true), Exit::Interrupted);
+        assert_eq!(std::fs::read(&image).unwrap(), b"old");
+        assert_eq!(exit_after(false), Exit::Done);
+        assert_ne!(std::fs::read(&image).unwrap(), b"old");
     }
 }
