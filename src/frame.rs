@@ -294,6 +294,13 @@ impl FilmBuffers {
         })
     }
 
+    /// What a pixel takes where all outputs are wanted, samples in flight not counted.
+    pub fn bytes_per_pixel(placed: bool) -> u64 {
+        const PLACED: usize = Counts::BYTES_PER_PIXEL + size_of::<[f32; 2]>(); // priority, and a policy's own
+        let records = size_of::<PixelStats>() + size_of::<PixelLight>() + size_of::<Guide>();
+        (records + if placed { PLACED } else { 0 }) as u64
+    }
+
     /// The tile that holds a batch's pixels; a batch never spans two.
     pub fn tile_of(&self, batch: &Batch) -> &FilmTile {
         let after = self.tiles.partition_point(|tile| tile.first_pixel <= batch.first_pixel);

@@ -7,6 +7,7 @@ pub mod filter;
 mod frame;
 pub mod gpu;
 pub mod image;
+mod memory;
 pub mod reference;
 pub mod renderer;
 pub mod report;

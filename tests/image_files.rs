@@ -61,6 +61,23 @@ fn exr_keeps_every_bit_of_every_layer() {
 }
 
 #[test]
+fn a_film_filled_part_by_part_is_the_film() {
+    let (whole, mut filled) = (full_film(5, 3), Film::new(5, 3));
+    for range in [0..4, 4..5, 5..15] {
+        let mut part = Film::new(range.len() as u32, 1);
+        for channel in &whole.channels {
+            let samples = match &channel.samples {
+                Samples::F32(v) => Samples::F32(v[range.clone()].to_vec()),
+                Samples::U32(v) => Samples::U32(v[range.clone()].to_vec()),
+            };
+            part.add(channel.name.clone(), samples);
+        }
+        filled.append(part);
+    }
+    assert!(same_bits(&whole, &filled));
+}
+
+#[test]
 fn exr_keeps_metadata_in_any_script_and_length() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("film.exr");

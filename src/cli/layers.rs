@@ -1,11 +1,9 @@
 //! What a renderer's buffers hold, as the channels of an image file, and back.
 use crate::error::Result;
-use crate::gpu::Buffer;
 use crate::gpu::layout::{Guide, PixelLight, PixelStats, vec3};
 use crate::image::{Film, Samples};
-use crate::renderer::{FilmTile, Renderer};
+use crate::renderer::Renderer;
 use crate::statistics::{Pixel, variance_of_mean};
-use bytemuck::Pod;
 
 const RGB: [&str; 3] = ["R", "G", "B"];
 const XYZ: [&str; 3] = ["X", "Y", "Z"];
@@ -16,30 +14,38 @@ pub const PRIORITY: &str = "priority";
 /// Samples that a pixel still lacks of what it was to have: only in files of renders that were interrupted.
 pub const PENDING: &str = "pending";
 
-/// Reads the buffers back into a film with the layers that the renderer was asked for.
+/// Of a film with everything.
+const CHANNELS: usize = 27;
+
+/// What a pixel takes in a film with everything.
+pub fn bytes_per_pixel(placed: bool) -> u64 {
+    (size_of::<f32>() * (CHANNELS + if placed { 2 } else { 0 })) as u64 // priority, pending
+}
+
+/// Reads the buffers back into a film with the layers that the renderer was asked for, a window at a time: whole buffers
+/// beside the film would be as large again.
 ///
 /// # Errors
 /// [`crate::error::Error::Device`].
 pub fn film(renderer: &Renderer) -> Result<Film> {
     let (settings, outputs) = (renderer.settings(), renderer.outputs());
     let mut film = Film::new(settings.width, settings.height);
-    let tiles = &renderer.film().tiles;
-    let stats = gather(tiles, |tile| &tile.stats)?;
-    let light = if outputs.split_light { gather(tiles, |tile| &tile.light)? } else { Vec::new() };
-    add_pixels(&mut film, &stats, &light);
+    for tile in &renderer.film().tiles {
+        for range in tile.windows() {
+            let window = range.start as usize..range.end as usize;
+            let mut part = Film::new(window.len() as u32, 1);
+            let light = if outputs.split_light { tile.light.part(window.clone())?.read()? } else { Vec::new() };
+            add_pixels(&mut part, &tile.stats.part(window.clone())?.read()?, &light);
+            if outputs.guides {
+                add_guide(&mut part, &tile.guide.part(window)?.read()?);
+            }
+            film.append(part);
+        }
+    }
     if settings.allocate.policy != "uniform" {
         film.add(PRIORITY, Samples::F32(renderer.film().priority.read()?));
     }
-    if outputs.guides {
-        add_guide(&mut film, &gather(tiles, |tile| &tile.guide)?);
-    }
     Ok(film)
-}
-
-/// One array out of all tiles.
-fn gather<T: Pod>(tiles: &[FilmTile], buffer: impl Fn(&FilmTile) -> &Buffer<T>) -> Result<Vec<T>> {
-    let parts: Vec<Vec<T>> = tiles.iter().map(|tile| buffer(tile).read()).collect::<Result<_>>()?;
-    Ok(parts.concat())
 }
 
 /// Adds what the samples say. `light` is empty where direct and indirect light are not kept apart.
@@ -99,4 +105,17 @@ fn add_guide(film: &mut Film, guide: &[Guide]) {
     film.add_vec3("P", XYZ, &guide.iter().map(|g| g.position).collect::<Vec<_>>());
     film.add("Z", Samples::F32(guide.iter().map(|g| g.depth).collect()));
     film.add("id", Samples::U32(guide.iter().map(|g| g.object).collect()));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_film_with_everything_has_so_many_channels() {
+        let mut film = Film::new(1, 1);
+        add_pixels(&mut film, &[PixelStats::default()], &[PixelLight::default()]);
+        add_guide(&mut film, &[Guide::default()]);
+        assert_eq!(film.channels.len(), CHANNELS);
+    }
 }

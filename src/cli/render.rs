@@ -8,10 +8,12 @@ use crate::error::{Error, Result};
 use crate::gpu::{self, FrameResources, Gpu, PassTime};
 use crate::image::difference::false_colours;
 use crate::image::{self, Film, Samples, WriteOptions, output};
-use crate::renderer::{self, Counters, Outputs, Renderer};
+use crate::memory;
+use crate::renderer::{self, Counters, FilmBuffers, Outputs, Renderer};
 use crate::report::table::{self, PassRow};
 use crate::report::trace::chrome_trace;
 use crate::scene::Scene;
+use crate::settings::Settings;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -124,6 +126,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     }
     let gpu = host.time("open device", || args.common.open())?;
     let wanted = Outputs { split_light: true, guides: true, counters: args.counters };
+    check_memory(&scene.settings, &gpu)?;
     let mut effects = match args.effects {
         EffectChoice::Auto => renderer::called_for(&scene, wanted),
         EffectChoice::All => renderer::all_effects(&scene),
@@ -147,9 +150,12 @@ pub fn run(args: &Args) -> Result<Exit> {
         let pending = resume::pending(&renderer, &film, &end)?;
         film.add(layers::PENDING, Samples::U32(pending));
     }
+    let counters = args.counters.then(|| renderer.counters()).transpose()?;
+    // The film is all that is left to write, and large films need the memory.
+    drop(renderer);
     host.time("write", || write(args, &film))?;
     fail_on_messages(&gpu)?;
-    report(args, &renderer, &gpu, &scene, &film, &host, &end)?;
+    report(args, counters, &gpu, &scene, &film, &host, &end)?;
     Ok(if end.why == Why::Interrupted { Exit::Interrupted } else { Exit::Done })
 }
 
@@ -218,7 +224,7 @@ fn write_heatmap(path: &Path, film: &Film) -> Result<()> {
 
 fn report(
     args: &Args,
-    renderer: &Renderer,
+    counters: Option<Counters>,
     gpu: &Gpu,
     scene: &Scene,
     film: &Film,
@@ -229,14 +235,12 @@ fn report(
         let offset = gpu.calibrate().map(|(gpu_ns, host_ns)| host_ns as i64 - gpu_ns as i64);
         output::write(path, chrome_trace(&host.0, &end.times, offset).as_bytes())?;
     }
-    let settings = renderer.settings();
-    let counters = if args.counters { Some(renderer.counters()?) } else { None };
     let counts = layers::counts(film, "samples").unwrap_or_default();
     let least_most = (counts.iter().copied().min().unwrap_or(0), counts.iter().copied().max().unwrap_or(0));
     let summary = Summary {
         files: args.output_files().iter().map(|f| f.display().to_string()).collect(),
-        width: settings.width,
-        height: settings.height,
+        width: film.width,
+        height: film.height,
         samples: counts.iter().map(|&n| u64::from(n)).sum(),
         traced: end.traced,
         least_samples: least_most.0,
@@ -279,6 +283,19 @@ fn text(s: &Summary) -> String {
     text + &table::timing_table(&s.passes)
 }
 
+/// A system that is out of memory ends the process hours later without a word.
+fn check_memory(settings: &Settings, gpu: &Gpu) -> Result<()> {
+    let refused = |what| format!("a film of {} x {} {what}: choose a smaller film", settings.width, settings.height);
+    memory::check(bytes_of_film(settings, gpu.info().unified)).map_err(|what| Error::Device(refused(what)))
+}
+
+/// Of host memory, at the moment when it is read back.
+fn bytes_of_film(settings: &Settings, unified: bool) -> u64 {
+    let placed = settings.allocate.policy != "uniform";
+    let device = if unified { FilmBuffers::bytes_per_pixel(placed) } else { 0 };
+    settings.pixels() as u64 * (device + layers::bytes_per_pixel(placed))
+}
+
 /// A render may take hours; what cannot be written is told before.
 fn check_outputs(args: &Args) -> Result<()> {
     args.output_files().iter().try_for_each(|path| image::check_writable(path))?;
@@ -308,6 +325,16 @@ mod tests {
         assert_eq!(parse(&["room.toml", "-o", "a.png", "-o", "b.exr"]).output_files().len(), 2);
         assert_eq!(parse(&["room.v2.obj"]).output_files(), [Path::new("room.v2.exr")]);
         assert_eq!(parse(&["room.toml", "--exposure", "-1.5"]).common.write_options().exposure, -1.5);
+    }
+
+    #[test]
+    fn a_film_takes_its_records_and_its_channels() {
+        // 32 bytes of statistics, 24 of light, 48 of guide; 27 channels. Placed: 24 more, and 2 channels.
+        let mut settings = Settings { width: 3, height: 2, ..Settings::default() };
+        assert_eq!(bytes_of_film(&settings, true), 6 * (104 + 4 * 27));
+        settings.allocate.policy = "both".into();
+        assert_eq!(bytes_of_film(&settings, false), 6 * 4 * 29);
+        assert_eq!(bytes_of_film(&settings, true), 6 * (104 + 24 + 4 * 29));
     }
 
     #[test]

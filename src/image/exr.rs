@@ -1,12 +1,16 @@
 //! OpenEXR, scan lines, lossless: ours out, anybody's in.
 use super::film::{Channel, Film, Samples, Window};
+use super::output::Stream;
+use exr::block::lines::LineRefMut;
+use exr::image::write::samples::{SamplesWriter, WritableSamples};
 use exr::image::{AnyChannel, AnyChannels, Blocks, Encoding, FlatImage, FlatSamples, Image, Layer};
+use exr::math::RoundingMode;
 use exr::math::Vec2;
 use exr::meta::MetaData;
-use exr::meta::attribute::{AttributeValue, IntegerBounds, Text};
-use exr::meta::header::{ImageAttributes, LayerAttributes};
+use exr::meta::attribute::{AttributeValue, IntegerBounds, LevelMode, SampleType, Text};
+use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
 use exr::prelude::{Compression, LineOrder, ReadChannels, ReadLayers, WritableImage};
-use std::io::Cursor;
+use std::io::{Cursor, ErrorKind};
 
 /// Flat areas in DWA blocks: one value in 64, deflated 1032 to 1.
 const MAX_RATIO: u64 = 1 << 16;
@@ -17,21 +21,21 @@ const PREFIX: &str = "tallow:";
 
 type FlatPart = Layer<AnyChannels<FlatSamples>>;
 
-pub(super) fn encode(film: &Film) -> Result<Vec<u8>, String> {
-    let channel = |c: &Channel| AnyChannel::new(text(&c.name), flat_samples(&c.samples));
+pub(super) fn encode(film: &Film, out: &mut dyn Stream) -> std::io::Result<()> {
+    fn channel(c: &Channel) -> AnyChannel<&Samples> {
+        AnyChannel::new(text(&c.name), &c.samples)
+    }
     let channels = AnyChannels::sort(film.channels.iter().map(channel).collect());
     let size = (film.width as usize, film.height as usize);
     let layer = Layer::new(size, LayerAttributes::default(), ENCODING, channels);
     let mut attributes = ImageAttributes::with_size(size);
     let attribute = |(key, value): (&String, &String)| (text(&format!("{PREFIX}{key}")), text(value));
     attributes.other = film.metadata.iter().map(attribute).map(|(k, v)| (k, AttributeValue::Text(v))).collect();
-    let mut out = Cursor::new(Vec::new());
-    Image::empty(attributes)
-        .with_layer(layer)
-        .write()
-        .to_buffered(&mut out)
-        .map_err(|e| format!("cannot be encoded: {e}"))?;
-    Ok(out.into_inner())
+    let image = Image::empty(attributes).with_layer(layer);
+    image.write().to_buffered(out).map_err(|e| match e {
+        exr::error::Error::Io(e) => e,
+        other => std::io::Error::new(ErrorKind::InvalidData, other.to_string()),
+    })
 }
 
 /// UTF-8 as it is, which is what OpenEXR's own library writes; the crate's conversions allow Latin-1 only.
@@ -43,10 +47,41 @@ fn string(t: &Text) -> String {
     String::from_utf8_lossy(t.as_slice()).into_owned()
 }
 
-fn flat_samples(samples: &Samples) -> FlatSamples {
-    match samples {
-        Samples::F32(v) => FlatSamples::F32(v.clone()),
-        Samples::U32(v) => FlatSamples::U32(v.clone()),
+/// Planes are written from where they lie: a copy of all would be most of what a large render takes.
+impl<'slf, 'a: 'slf> WritableSamples<'slf> for &'a Samples {
+    type Writer = Lines<'a>;
+
+    fn sample_type(&self) -> SampleType {
+        match self {
+            Samples::F32(_) => SampleType::F32,
+            Samples::U32(_) => SampleType::U32,
+        }
+    }
+
+    fn infer_level_modes(&self) -> (LevelMode, RoundingMode) {
+        (LevelMode::Singular, RoundingMode::Down)
+    }
+
+    fn create_samples_writer(&'slf self, header: &Header) -> Lines<'a> {
+        Lines { samples: self, width: header.layer_size.width() }
+    }
+}
+
+/// A plane as the writer asks for it.
+pub struct Lines<'a> {
+    samples: &'a Samples,
+    width: usize,
+}
+
+impl SamplesWriter for Lines<'_> {
+    fn extract_line(&self, line: LineRefMut<'_>) {
+        let first = line.location.position.y() * self.width + line.location.position.x();
+        let range = first..first + line.location.sample_count;
+        let written = match self.samples {
+            Samples::F32(samples) => line.write_samples_from_slice(&samples[range]),
+            Samples::U32(samples) => line.write_samples_from_slice(&samples[range]),
+        };
+        written.expect("a line has room for its samples");
     }
 }
 

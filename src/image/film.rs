@@ -95,6 +95,25 @@ impl Film {
         }
     }
 
+    /// Adds the next pixels, row-major, of a film that is filled part by part: the channels are those of the first part.
+    ///
+    /// # Panics
+    /// When the channels are others.
+    pub fn append(&mut self, part: Self) {
+        if self.channels.is_empty() {
+            self.channels = part.channels.iter().map(|c| c.empty(self.pixels())).collect();
+        }
+        assert_eq!(self.channels.len(), part.channels.len(), "channels of the first part");
+        for (to, from) in self.channels.iter_mut().zip(part.channels) {
+            assert_eq!(to.name, from.name, "channels of the first part");
+            match (&mut to.samples, from.samples) {
+                (Samples::F32(to), Samples::F32(mut from)) => to.append(&mut from),
+                (Samples::U32(to), Samples::U32(mut from)) => to.append(&mut from),
+                _ => panic!("channel {}: samples of another kind", to.name),
+            }
+        }
+    }
+
     /// The channel of this exact name.
     pub fn channel(&self, name: &str) -> Option<&Samples> {
         self.channels.iter().find(|c| c.name == name).map(|c| &c.samples)
@@ -175,6 +194,17 @@ impl Film {
         };
         let [a, b, c] = components.map(channel);
         Some([a?, b?, c?])
+    }
+}
+
+impl Channel {
+    /// One of the same name and kind without samples yet, with room for so many.
+    fn empty(&self, capacity: usize) -> Self {
+        let samples = match self.samples {
+            Samples::F32(_) => Samples::F32(Vec::with_capacity(capacity)),
+            Samples::U32(_) => Samples::U32(Vec::with_capacity(capacity)),
+        };
+        Self { name: self.name.clone(), samples, window: None }
     }
 }
 

@@ -11,6 +11,7 @@ pub mod source;
 pub mod tone;
 
 use crate::error::{Error, Result};
+use crate::memory;
 pub use film::{Channel, Film, Picture, Samples, Window};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -55,12 +56,14 @@ fn format_of(path: &Path) -> Result<Format> {
 /// [`Error::Usage`] for another extension, [`Error::Output`] when the film has no colour or the file cannot be written.
 pub fn write(path: &Path, film: &Film, options: &WriteOptions) -> Result<()> {
     let colour = || film.picture(None).map_err(|what| Error::output(path, what));
-    let bytes = match format_of(path)? {
-        Format::Exr => exr::encode(film),
-        Format::Png => photo::encode_png(&colour()?, options),
-        Format::Hdr => photo::encode_hdr(&colour()?),
+    let whole = |bytes: std::result::Result<Vec<u8>, String>| {
+        output::write(path, &bytes.map_err(|what| Error::output(path, what))?)
     };
-    output::write(path, &bytes.map_err(|what| Error::output(path, what))?)
+    match format_of(path)? {
+        Format::Exr => output::write_with(path, |stream| exr::encode(film, stream)),
+        Format::Png => whole(photo::encode_png(&colour()?, options)),
+        Format::Hdr => whole(photo::encode_hdr(&colour()?)),
+    }
 }
 
 /// Checks before a long render that [`write`] has a known extension and a folder it may write in.
@@ -80,18 +83,15 @@ pub fn read(path: &Path) -> Result<Film> {
     decode(&input::read(path)?).map_err(|what| Error::input(path, what))
 }
 
-/// More 32-bit samples than this, 4 GiB of them, are refused.
-const MAX_SAMPLES: u64 = 1 << 30;
-
-/// Refuses a header that asks for more samples than `ratio` times the bytes of its file: it is damaged, and must not make
-/// us allocate them.
+/// Refuses a header that asks for more samples of 32 bits than `ratio` times the bytes of its file, which is damaged, or
+/// than memory can hold twice, as decoded and as a film.
 fn check_claim(samples: u64, file_len: usize, ratio: u64) -> std::result::Result<(), String> {
-    match samples > MAX_SAMPLES.min(ratio.saturating_mul(file_len as u64)) {
-        true => {
-            Err(format!("claims {samples} samples, more than a file of {file_len} bytes can hold; is it complete?"))
-        }
-        false => Ok(()),
+    if samples > ratio.saturating_mul(file_len as u64) {
+        return Err(format!(
+            "claims {samples} samples, more than a file of {file_len} bytes can hold; is it complete?"
+        ));
     }
+    memory::check(samples.saturating_mul(8))
 }
 
 /// [`read`] for a file that is already in memory.

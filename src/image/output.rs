@@ -1,16 +1,28 @@
 //! Writing files so that they appear complete or not at all.
 use crate::error::{Error, Result};
-use std::io::{ErrorKind, Write};
+use std::io::{BufWriter, Cursor, ErrorKind, Seek, Write};
 use std::path::{Path, PathBuf};
 
-/// Replaces `path` by `bytes`: they go to a temporary name in the same folder, which is then renamed, so that a run
+/// Where the bytes of a file go.
+pub trait Stream: Write + Seek {}
+impl<T: Write + Seek> Stream for T {}
+
+/// Replaces `path` by `bytes`: see [`write_with`].
+///
+/// # Errors
+/// As [`write_with`].
+pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_with(path, |stream| stream.write_all(bytes))
+}
+
+/// Replaces `path` by what `fill` writes: it goes to a temporary name in the same folder, which is then renamed, so that a run
 /// that is interrupted, or a disk that fills up, leaves the old file. Links are followed. What exists and is no regular
 /// file (a pipe, `/dev/stdout`) is written to as it is.
 ///
 /// # Errors
-/// [`Error::Output`] with what to do about it.
-pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    let result = if is_special(path) { write_through(path, bytes) } else { write_renamed(&target(path), bytes) };
+/// [`Error::Output`] with what to do about it. Of `fill`, [`ErrorKind::InvalidData`] says that there is no way to write this.
+pub fn write_with(path: &Path, fill: impl FnOnce(&mut dyn Stream) -> std::io::Result<()>) -> Result<()> {
+    let result = if is_special(path) { write_through(path, fill) } else { write_renamed(&target(path), fill) };
     result.map_err(|e| Error::output(path, remedy(path, &e)))
 }
 
@@ -41,15 +53,21 @@ fn folder(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-fn write_through(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+/// Pipes cannot go back, as some formats must.
+fn write_through(path: &Path, fill: impl FnOnce(&mut dyn Stream) -> std::io::Result<()>) -> std::io::Result<()> {
+    let mut bytes = Cursor::new(Vec::new());
+    fill(&mut bytes)?;
     let mut file = std::fs::OpenOptions::new().write(true).open(path)?;
-    file.write_all(bytes)?;
+    file.write_all(bytes.get_ref())?;
     file.flush()
 }
 
-fn write_renamed(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+fn write_renamed(path: &Path, fill: impl FnOnce(&mut dyn Stream) -> std::io::Result<()>) -> std::io::Result<()> {
     let mut file = temporary(path)?;
-    file.write_all(bytes)?;
+    let mut stream = BufWriter::new(&mut file);
+    fill(&mut stream)?;
+    stream.flush()?;
+    drop(stream);
     // Without this a crash of the system soon after the renaming could leave an empty file.
     file.as_file().sync_all()?;
     file.persist(path).map(drop).map_err(|e| e.error)
@@ -74,6 +92,7 @@ fn remedy(path: &Path, e: &std::io::Error) -> String {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
             format!("cannot be written: {e}; free some space or choose another folder")
         }
+        ErrorKind::InvalidData => format!("cannot be encoded: {e}"),
         _ => format!("cannot be written: {e}; choose another folder"),
     }
 }

@@ -10,6 +10,8 @@ use std::io::Cursor;
 
 /// Deflate, in PNG, packs at most 1032 to 1; each pixel counts as four samples.
 const MAX_RATIO: u64 = 4 * 1032;
+/// Bytes that colour profiles and texts beside the pixels may take.
+const TEXTS: u64 = 1 << 26;
 
 pub(super) fn encode_png(picture: &Picture, options: &WriteOptions) -> Result<Vec<u8>, String> {
     let code = |v: &f32| (tone::display(*v, options.exposure, options.tone_map) * 255.0).round() as u8;
@@ -44,10 +46,11 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
     }
     let (width, height) = reader()?.into_dimensions().map_err(damaged)?;
     // Four: alpha, or what a decoder adds for it.
-    super::check_claim(4 * u64::from(width) * u64::from(height), bytes.len(), MAX_RATIO)?;
+    let samples = 4 * u64::from(width) * u64::from(height);
+    super::check_claim(samples, bytes.len(), MAX_RATIO)?;
     let mut reader = reader()?;
     let mut limits = Limits::no_limits();
-    limits.max_alloc = Some(8 * super::MAX_SAMPLES);
+    limits.max_alloc = Some(TEXTS + 8 * samples);
     reader.limits(limits);
     reader.decode().map(film_from).map_err(damaged)
 }

@@ -2,6 +2,7 @@
 use super::film::Film;
 use super::{WriteOptions, exr, output};
 use crate::error::{Error, Result};
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 /// An image file in memory.
@@ -19,11 +20,13 @@ impl Source {
     /// # Errors
     /// As [`super::read`].
     pub fn read(path: &Path) -> Result<Self> {
-        let about = |what| Error::input(path, what);
+        let about = |what: String| Error::input(path, what);
         let mut bytes = super::input::read(path)?;
         let film = super::decode_frame(&bytes, exr::Frame::Data).map_err(about)?;
         if !super::is_exr(&bytes) {
-            bytes = exr::encode(&film).map_err(about)?;
+            let mut encoded = Cursor::new(Vec::new());
+            exr::encode(&film, &mut encoded).map_err(|e| about(e.to_string()))?;
+            bytes = encoded.into_inner();
         }
         Ok(Self { path: path.to_owned(), bytes, film })
     }

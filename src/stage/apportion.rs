@@ -13,7 +13,7 @@ use crate::shaders::{deficit, digit, need, pick, quota, settle, spread, ties, to
 const DIGITS: u32 = 8;
 const BINS: usize = 256;
 
-/// The counts, and what finding them takes: 16 bytes per pixel, the offsets of the scan included.
+/// The counts, and what finding them takes, the offsets of the scan included.
 pub struct Counts {
     /// 12.20 fixed point; then, unless they are shares of the next samples, what a pixel lacks.
     pub weight: Buffer<u32>,
@@ -29,6 +29,9 @@ pub struct Counts {
 }
 
 impl Counts {
+    /// Weight, count and offset.
+    pub const BYTES_PER_PIXEL: usize = 16;
+
     /// For a film of `pixels`.
     ///
     /// # Errors
