@@ -52,11 +52,13 @@ impl Gpu {
         let candidate = choose(info::candidates(&instance.raw)?, options.device.as_deref())?;
         let queue_family = usable(&candidate)?;
         let calibrated = can_calibrate(&instance, candidate.physical)?;
+        let alone = one_at_a_time();
         let device = create_device(&instance.raw, candidate.physical, queue_family, calibrated)?;
-        // SAFETY: the device was made with one queue of this family.
-        let queue = unsafe { device.get_device_queue(queue_family, 0) };
         let debug = instance.debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &device));
         let calibrated = calibrated.then(|| ext::calibrated_timestamps::Device::new(&instance.raw, &device));
+        drop(alone);
+        // SAFETY: the device was made with one queue of this family.
+        let queue = unsafe { device.get_device_queue(queue_family, 0) };
         Self::assemble(instance, candidate, queue_family, device, queue, (debug, calibrated))
     }
 
@@ -202,10 +204,18 @@ impl Drop for Inner {
             self.cache.store_and_destroy(&self.device);
             *self.lock_allocator() = None;
             if self.owned {
+                let _alone = one_at_a_time();
                 self.device.destroy_device(None);
             }
         }
     }
+}
+
+/// Hold it while a device is made, destroyed or asked for its functions: the loader walks its list of devices for the last
+/// while another thread may change it (Vulkan-Loader's issue 2018).
+pub(super) fn one_at_a_time() -> MutexGuard<'static, ()> {
+    static DEVICES: Mutex<()> = Mutex::new(());
+    DEVICES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn choose(mut candidates: Vec<Candidate>, wanted: Option<&str>) -> Result<Candidate> {

@@ -1,6 +1,6 @@
 //! A device that an engine made, handed over as raw handles so that Vulkan bindings and their versions need not match.
 use super::Gpu;
-use super::device::usable;
+use super::device::{one_at_a_time, usable};
 use super::info;
 use super::instance::Instance;
 use crate::error::{Error, Result};
@@ -53,12 +53,14 @@ impl Gpu {
                 ash::Instance::load(&table, vk::Instance::from_raw(raw.instance)),
             )
         };
+        let alone = one_at_a_time();
         let device = unsafe { ash::Device::load(instance.fp_v1_0(), vk::Device::from_raw(raw.device)) };
         let physical = vk::PhysicalDevice::from_raw(raw.physical_device);
         check_family(&instance, physical, raw.queue_family)?;
         let candidate = info::describe(&instance, physical, Some(raw.queue_family));
         usable(&candidate)?;
         let debug = has_labels(&instance, &device).then(|| ext::debug_utils::Device::new(&instance, &device));
+        drop(alone);
         let queue = vk::Queue::from_raw(raw.queue);
         let instance = Instance::borrowed(entry, instance);
         Self::assemble(instance, candidate, raw.queue_family, device, queue, (debug, None))

@@ -27,7 +27,7 @@ impl Instance {
     /// No loader, no Vulkan 1.3, or `validation` without the layers installed.
     pub fn new(validation: bool) -> Result<Self> {
         let entry = load()?;
-        let debug_utils = has_debug_utils(&entry)?;
+        let debug_utils = offers(&entry, None, ext::debug_utils::NAME)?;
         if validation && !(debug_utils && has_validation(&entry)?) {
             return Err(Error::Device(
                 "the Vulkan validation layers are missing: install the package vulkan-validationlayers, or run \
@@ -107,10 +107,11 @@ fn load() -> Result<ash::Entry> {
     Ok(entry)
 }
 
-fn has_debug_utils(entry: &ash::Entry) -> Result<bool> {
+/// Whether the loader and the drivers, or a layer, have an extension of the instance.
+fn offers(entry: &ash::Entry, layer: Option<&CStr>, extension: &CStr) -> Result<bool> {
     // SAFETY: no preconditions.
-    let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }.at("instance extensions")?;
-    Ok(extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME)))
+    let extensions = unsafe { entry.enumerate_instance_extension_properties(layer) }.at("instance extensions")?;
+    Ok(extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(extension)))
 }
 
 fn has_validation(entry: &ash::Entry) -> Result<bool> {
@@ -119,23 +120,36 @@ fn has_validation(entry: &ash::Entry) -> Result<bool> {
     Ok(layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION_LAYER)))
 }
 
+fn switched_on(name: &CStr) -> vk::LayerSettingEXT<'_> {
+    static ON: vk::Bool32 = vk::TRUE;
+    // By hand: `values` would count bytes.
+    vk::LayerSettingEXT { value_count: 1, p_values: (&raw const ON).cast(), ..Default::default() }
+        .layer_name(VALIDATION_LAYER)
+        .setting_name(name)
+        .ty(vk::LayerSettingTypeEXT::BOOL32)
+}
+
 fn create(entry: &ash::Entry, debug_utils: bool, validation: bool) -> Result<ash::Instance> {
     let app = vk::ApplicationInfo::default().application_name(c"tallow").api_version(vk::API_VERSION_1_3);
     let mut extensions = Vec::new();
     let mut layers = Vec::new();
     extensions.extend(debug_utils.then_some(ext::debug_utils::NAME.as_ptr()));
+    let configurable = validation && offers(entry, Some(VALIDATION_LAYER), ext::layer_settings::NAME)?;
     if validation {
-        extensions.push(ext::validation_features::NAME.as_ptr());
         layers.push(VALIDATION_LAYER.as_ptr());
+        extensions.push(if configurable { ext::layer_settings::NAME } else { ext::validation_features::NAME }.as_ptr());
     }
     let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
     let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
+    // Since July 2024 the layers (pull request 8279) take no notice of what shaders access unless they are told to.
+    let switches = [c"validate_sync", c"syncval_shader_accesses_heuristic"].map(switched_on);
+    let mut settings = vk::LayerSettingsCreateInfoEXT::default().settings(&switches);
     let mut info = vk::InstanceCreateInfo::default()
         .application_info(&app)
         .enabled_extension_names(&extensions)
         .enabled_layer_names(&layers);
     if validation {
-        info = info.push_next(&mut features);
+        info = if configurable { info.push_next(&mut settings) } else { info.push_next(&mut features) };
     }
     // SAFETY: `info` and all it points to live through the call.
     unsafe { entry.create_instance(&info, None) }.map_err(|code| match code {

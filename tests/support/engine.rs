@@ -2,8 +2,8 @@
 #![allow(unsafe_code, reason = "an engine's side of the contract is raw Vulkan")]
 use ash::vk;
 use ash::vk::Handle;
-use std::ffi::c_void;
-use std::sync::Mutex;
+use std::ffi::{CStr, c_void};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use tallow::gpu::RawDevice;
 
 /// What an engine has: everything here is made and destroyed with plain ash.
@@ -17,7 +17,14 @@ pub struct Engine {
     pool: vk::CommandPool,
     messenger: (ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT),
     messages: Box<Mutex<Vec<String>>>,
+    /// The loader may read its list of devices while another thread changes it (Vulkan-Loader's issue 2018); it is for
+    /// whoever makes devices to see to that, and the tests of one program run side by side.
+    _alone: MutexGuard<'static, ()>,
 }
+
+static ENGINES: Mutex<()> = Mutex::new(());
+
+const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
 unsafe extern "system" fn collect(
     _: vk::DebugUtilsMessageSeverityFlagsEXT,
@@ -32,15 +39,24 @@ unsafe extern "system" fn collect(
 
 unsafe fn instance(entry: &ash::Entry) -> ash::Instance {
     let app = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
-    let extensions = [ash::ext::debug_utils::NAME.as_ptr(), ash::ext::validation_features::NAME.as_ptr()];
-    let layers = [c"VK_LAYER_KHRONOS_validation".as_ptr()];
+    let mut extensions = vec![ash::ext::debug_utils::NAME.as_ptr(), ash::ext::validation_features::NAME.as_ptr()];
+    let layers = [LAYER.as_ptr()];
     let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
     let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
-    let info = vk::InstanceCreateInfo::default()
-        .application_info(&app)
-        .enabled_extension_names(&extensions)
-        .enabled_layer_names(&layers)
-        .push_next(&mut features);
+    // Newer layers are told here to look at what shaders access.
+    static ON: vk::Bool32 = vk::TRUE;
+    let heuristic = [vk::LayerSettingEXT { value_count: 1, p_values: (&raw const ON).cast(), ..Default::default() }
+        .layer_name(LAYER)
+        .setting_name(c"syncval_shader_accesses_heuristic")];
+    let mut settings = vk::LayerSettingsCreateInfoEXT::default().settings(&heuristic);
+    let offered = unsafe { entry.enumerate_instance_extension_properties(Some(LAYER)) }.unwrap_or_default();
+    let configurable = offered.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::ext::layer_settings::NAME));
+    extensions.extend(configurable.then_some(ash::ext::layer_settings::NAME.as_ptr()));
+    let mut info = vk::InstanceCreateInfo::default().application_info(&app).push_next(&mut features);
+    if configurable {
+        info = info.push_next(&mut settings);
+    }
+    info = info.enabled_extension_names(&extensions).enabled_layer_names(&layers);
     unsafe { entry.create_instance(&info, None) }.expect("install vulkan-validationlayers and mesa-vulkan-drivers")
 }
 
@@ -60,6 +76,7 @@ unsafe fn device(instance: &ash::Instance, physical: vk::PhysicalDevice) -> ash:
 impl Engine {
     /// A device under core and synchronization validation.
     pub fn new() -> Self {
+        let alone = ENGINES.lock().unwrap_or_else(PoisonError::into_inner);
         unsafe {
             let entry = ash::Entry::load().expect("install libvulkan1");
             let instance = instance(&entry);
@@ -77,7 +94,8 @@ impl Engine {
             let device = device(&instance, physical);
             let queue = device.get_device_queue(0, 0);
             let pool = device.create_command_pool(&vk::CommandPoolCreateInfo::default(), None).unwrap();
-            Self { _entry: entry, instance, physical, device, queue, pool, messenger: (utils, messenger), messages }
+            let messenger = (utils, messenger);
+            Self { _entry: entry, instance, physical, device, queue, pool, messenger, messages, _alone: alone }
         }
     }
 

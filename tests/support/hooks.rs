@@ -5,14 +5,27 @@ use std::collections::HashMap;
 use std::ffi::{CStr, c_char, c_void};
 use std::mem::transmute;
 use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
-use std::sync::{LazyLock, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 use tallow::gpu::RawDevice;
 
 /// While set, whatever is submitted loses the device.
 pub static LOSE: AtomicBool = AtomicBool::new(false);
 
-static INSTANCE_LOADER: OnceLock<vk::PFN_vkGetInstanceProcAddr> = OnceLock::new();
-static DEVICE_LOADER: OnceLock<vk::PFN_vkGetDeviceProcAddr> = OnceLock::new();
+/// A function of the loader or the driver; another one for every engine, since both may be unloaded between two.
+struct Real<F>(Mutex<Option<F>>);
+
+impl<F: Copy> Real<F> {
+    fn set(&self, f: F) {
+        *self.0.lock().unwrap() = Some(f);
+    }
+
+    fn get(&self) -> F {
+        self.0.lock().unwrap().expect("set before it is handed out")
+    }
+}
+
+static INSTANCE_LOADER: Real<vk::PFN_vkGetInstanceProcAddr> = Real(Mutex::new(None));
+static DEVICE_LOADER: Real<vk::PFN_vkGetDeviceProcAddr> = Real(Mutex::new(None));
 static CALLS: LazyLock<Mutex<HashMap<&'static str, usize>>> = LazyLock::new(Mutex::default);
 
 /// The engine's handles, with our entry points. Tests that use it take turns: hold the guard.
@@ -21,9 +34,8 @@ pub fn between(raw: RawDevice) -> (RawDevice, MutexGuard<'static, ()>) {
     let guard = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     take_calls(); // of the test before
     // SAFETY: the engine's own pointer.
-    INSTANCE_LOADER.get_or_init(|| unsafe {
-        transmute::<*const c_void, vk::PFN_vkGetInstanceProcAddr>(raw.get_instance_proc_addr)
-    });
+    INSTANCE_LOADER
+        .set(unsafe { transmute::<*const c_void, vk::PFN_vkGetInstanceProcAddr>(raw.get_instance_proc_addr) });
     (RawDevice { get_instance_proc_addr: get_instance_proc_addr as *const c_void, ..raw }, guard)
 }
 
@@ -37,11 +49,11 @@ unsafe extern "system" fn get_instance_proc_addr(
     name: *const c_char,
 ) -> vk::PFN_vkVoidFunction {
     unsafe {
-        let found = INSTANCE_LOADER.get().expect("set before it is handed out")(instance, name);
+        let found = INSTANCE_LOADER.get()(instance, name);
         if CStr::from_ptr(name) != c"vkGetDeviceProcAddr" {
             return found;
         }
-        DEVICE_LOADER.get_or_init(|| transmute::<vk::PFN_vkVoidFunction, vk::PFN_vkGetDeviceProcAddr>(found));
+        DEVICE_LOADER.set(transmute::<vk::PFN_vkVoidFunction, vk::PFN_vkGetDeviceProcAddr>(found));
         Some(transmute::<*const c_void, unsafe extern "system" fn()>(get_device_proc_addr as *const c_void))
     }
 }
@@ -51,18 +63,18 @@ macro_rules! between {
     ($($name:ident: $pfn:ident($($arg:ident: $type:ty),+);)+) => {
         unsafe extern "system" fn get_device_proc_addr(device: vk::Device, name: *const c_char) -> vk::PFN_vkVoidFunction {
             unsafe {
-                let found = DEVICE_LOADER.get().expect("set before it is handed out")(device, name);
+                let found = DEVICE_LOADER.get()(device, name);
                 $(
                     if CStr::from_ptr(name).to_str() == Ok(stringify!($name)) {
-                        static REAL: OnceLock<vk::$pfn> = OnceLock::new();
+                        static REAL: Real<vk::$pfn> = Real(Mutex::new(None));
                         unsafe extern "system" fn ours($($arg: $type),+) -> vk::Result {
                             *CALLS.lock().unwrap().entry(stringify!($name)).or_default() += 1;
                             if LOSE.load(SeqCst) && stringify!($name).starts_with("vkQueueSubmit") {
                                 return vk::Result::ERROR_DEVICE_LOST;
                             }
-                            unsafe { REAL.get().expect("found first")($($arg),+) }
+                            unsafe { REAL.get()($($arg),+) }
                         }
-                        REAL.get_or_init(|| transmute::<vk::PFN_vkVoidFunction, vk::$pfn>(found));
+                        REAL.set(transmute::<vk::PFN_vkVoidFunction, vk::$pfn>(found));
                         return Some(transmute::<*const c_void, unsafe extern "system" fn()>(ours as *const c_void));
                     }
                 )+
