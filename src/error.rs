@@ -21,9 +21,12 @@ pub enum Error {
         /// What is wrong and how to mend it.
         what: String,
     },
-    /// No Vulkan loader, no usable device, a missing feature, out of memory, or the device was lost.
+    /// No Vulkan loader, no usable device, a missing feature, or out of memory.
     #[error("{0}")]
     Device(String),
+    /// The device was lost: nothing made on it works any more, and a new one must be opened.
+    #[error("{0}")]
+    DeviceLost(String),
     /// A file that cannot be written.
     #[error("{}: {what}", path.display())]
     Output {
@@ -55,7 +58,7 @@ impl Error {
         match self {
             Self::Usage(_) => 2,
             Self::Input { .. } => 3,
-            Self::Device(_) => 4,
+            Self::Device(_) | Self::DeviceLost(_) => 4,
             Self::Output { .. } => 5,
         }
     }

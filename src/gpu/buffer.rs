@@ -144,8 +144,20 @@ impl<T: Pod> Buffer<T> {
     /// # Errors
     /// [`Error::Device`] when the copy fails.
     pub fn read(&self) -> Result<Vec<T>> {
-        let mut values = vec![T::zeroed(); self.len];
-        self.untyped.read(self.first * size_of::<T>(), bytemuck::cast_slice_mut(&mut values))?;
+        self.read_range(0..self.len)
+    }
+
+    /// Some elements. The device must not be writing them.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when there are not so many, or the copy fails.
+    pub fn read_range(&self, range: Range<usize>) -> Result<Vec<T>> {
+        if range.start > range.end || range.end > self.len {
+            let (name, len) = (&self.untyped.name, self.len);
+            return Err(Error::Device(format!("buffer \"{name}\": {range:?} is no part of its {len} elements")));
+        }
+        let mut values = vec![T::zeroed(); range.len()];
+        self.untyped.read((self.first + range.start) * size_of::<T>(), bytemuck::cast_slice_mut(&mut values))?;
         Ok(values)
     }
 
@@ -258,16 +270,17 @@ impl Untyped {
         Ok(bound?)
     }
 
-    /// Hands `access` the mapped bytes, or returns `None` where the memory is not mapped and coherent.
-    pub(super) fn mapped<R>(&self, access: impl FnOnce(&mut [u8]) -> R) -> Option<R> {
+    /// Hands `access` the mapped bytes, or returns `None` where the memory is not mapped, coherent and all that.
+    pub(super) fn mapped<R>(&self, also: vk::MemoryPropertyFlags, access: impl FnOnce(&mut [u8]) -> R) -> Option<R> {
         let mut memory = self.memory.lock().unwrap_or_else(PoisonError::into_inner);
         let memory = memory.as_mut()?;
-        let coherent = memory.memory_properties().contains(vk::MemoryPropertyFlags::HOST_COHERENT);
-        memory.mapped_slice_mut().filter(|_| coherent).map(access)
+        let fits = memory.memory_properties().contains(vk::MemoryPropertyFlags::HOST_COHERENT | also);
+        memory.mapped_slice_mut().filter(|_| fits).map(access)
     }
 
     fn write(&self, offset: usize, bytes: &[u8]) -> Result<()> {
-        match self.mapped(|all| all[offset..offset + bytes.len()].copy_from_slice(bytes)) {
+        let any = vk::MemoryPropertyFlags::empty();
+        match self.mapped(any, |all| all[offset..offset + bytes.len()].copy_from_slice(bytes)) {
             Some(()) => Ok(()),
             None => staging::upload(self, offset, bytes),
         }
@@ -275,7 +288,10 @@ impl Untyped {
 
     fn read(&self, offset: usize, bytes: &mut [u8]) -> Result<()> {
         let length = bytes.len();
-        match self.mapped(|all| bytes.copy_from_slice(&all[offset..offset + length])) {
+        // Integrated GPUs map memory that only writes are quick to.
+        match self
+            .mapped(vk::MemoryPropertyFlags::HOST_CACHED, |all| bytes.copy_from_slice(&all[offset..offset + length]))
+        {
             Some(()) => Ok(()),
             None => staging::download(self, offset, bytes),
         }

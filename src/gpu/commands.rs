@@ -44,7 +44,7 @@ impl Commands {
         unsafe { self.gpu.0.device.end_command_buffer(self.buffer) }.at("recording")?;
         self.gpu.0.submit_and_wait(self.buffer, self.fence).map_err(|code| match (code, last_pass()) {
             (vk::Result::ERROR_DEVICE_LOST, Some(pass)) => {
-                Error::Device(format!("{}; the last pass to start was \"{pass}\"", explain("running", code)))
+                Error::DeviceLost(format!("{}; the last pass to start was \"{pass}\"", explain("running", code)))
             }
             _ => explain("running", code),
         })

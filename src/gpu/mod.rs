@@ -51,14 +51,16 @@ impl<T> At<T> for std::result::Result<T, vk::Result> {
 }
 
 fn explain(what: &str, code: vk::Result) -> Error {
+    if code == vk::Result::ERROR_DEVICE_LOST {
+        return Error::DeviceLost(format!(
+            "{what}: the device was lost (a driver reset, often because one pass ran too long): run again, with a \
+             smaller film if it happens again"
+        ));
+    }
     Error::Device(match code {
         vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
             format!("{what}: out of memory: choose a smaller film or scene, or a device with more memory")
         }
-        vk::Result::ERROR_DEVICE_LOST => format!(
-            "{what}: the device was lost (a driver reset, often because one pass ran too long): run again, \
-             with a smaller film or fewer samples at a time if it happens again"
-        ),
         vk::Result::ERROR_INITIALIZATION_FAILED => {
             format!("{what}: the driver failed to start: check that it matches the running system")
         }

@@ -40,7 +40,9 @@ impl Staging {
     }
 
     fn access(&self, access: impl FnOnce(&mut [u8])) -> Result<()> {
-        self.buffer.mapped(access).ok_or_else(|| Error::Device("the device has no memory that the host can map".into()))
+        self.buffer
+            .mapped(vk::MemoryPropertyFlags::empty(), access)
+            .ok_or_else(|| Error::Device("the device has no memory that the host can map".into()))
     }
 
     /// Copies and waits.
