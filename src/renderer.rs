@@ -135,12 +135,12 @@ impl Renderer {
 
     /// The work of a whole render, in the order that it must be recorded in. The result does not depend on how the work
     /// is cut into batches.
-    pub fn steps(&self) -> Vec<Step> {
+    pub fn steps(&self) -> impl Iterator<Item = Step> + use<> {
         schedule::steps(&self.settings, &self.cut())
     }
 
     /// The rest of the work, once [`Renderer::resume`] has put back what there was.
-    pub fn rest(&self, progress: Progress) -> Vec<Step> {
+    pub fn rest(&self, progress: Progress) -> impl Iterator<Item = Step> + use<> {
         schedule::rest(&self.settings, &self.cut(), progress)
     }
 
@@ -151,8 +151,11 @@ impl Renderer {
     /// Records one step.
     ///
     /// # Errors
-    /// [`crate::error::Error::Usage`] for a step of another kind of render, [`crate::error::Error::Device`].
+    /// [`crate::error::Error::Usage`] for a step of another renderer, [`crate::error::Error::Device`].
     pub fn record(&self, rec: &mut Recorder, step: &Step) -> Result<()> {
+        if !self.cut().has_room_for(step) {
+            return Err(Error::Usage(format!("{step:?} is of another renderer: take those of Renderer::steps")));
+        }
         let (st, s, f, push) = (&self.stages, &self.scene, &self.film, &self.push);
         match (step, &self.allocation) {
             (Step::Start, allocation) => {
@@ -239,7 +242,9 @@ impl Renderer {
     /// # Errors
     /// [`crate::error::Error::Device`].
     pub fn listed(&self) -> Result<u64> {
-        Ok(self.film.counts.count.read()?.iter().map(|&n| u64::from(n)).sum())
+        let pixels = self.settings.pixels();
+        let [low, high] = self.film.counts.offset.read_range(pixels..pixels + 1)?[0];
+        Ok(u64::from(low) | u64::from(high) << 32)
     }
 
     /// Moves the camera; what was accumulated belongs to the old one, so begin with [`Step::Start`].

@@ -1,5 +1,6 @@
 //! The order of a render: which samples, when, and when to look where they count. Plain arithmetic, known beforehand.
 use crate::settings::{Placing, Settings};
+use std::iter::{once, successors};
 
 /// A rectangle of work: some samples of a run of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,6 +116,25 @@ pub struct Cut {
     pub paths: u32,
 }
 
+impl Cut {
+    /// Whether a renderer that cuts its work so has the buffers for a step.
+    pub fn has_room_for(&self, step: &Step) -> bool {
+        match *step {
+            Step::Start => true,
+            Step::Uniform(b) => {
+                let end = u64::from(b.first_pixel) + u64::from(b.pixels);
+                let within = b.pixels > 0 && end <= u64::from(self.pixels);
+                within
+                    && (1..=u64::from(self.paths)).contains(&step.paths())
+                    && u64::from(b.first_pixel / self.tile) == (end - 1) / u64::from(self.tile)
+            }
+            Step::Allocate(plan) => plan.pixels == self.pixels,
+            Step::Choose(choice) => choice.pixels == self.pixels,
+            Step::Listed(range) => (1..=self.paths).contains(&range.paths) && range.round < range.rounds,
+        }
+    }
+}
+
 /// Where a render that stopped early goes on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Progress {
@@ -126,18 +146,14 @@ pub struct Progress {
 
 /// The whole of a render: first `min_spp` samples for every pixel, in an order that refines the picture evenly, then
 /// rounds that place the rest.
-pub fn steps(settings: &Settings, cut: &Cut) -> Vec<Step> {
-    let mut steps = vec![Step::Start];
-    steps.extend(uniform(cut, settings.first_sample, first_spp(settings)).into_iter().map(Step::Uniform));
-    steps.extend(rounds(settings, cut, 0));
-    steps
+pub fn steps(settings: &Settings, cut: &Cut) -> impl Iterator<Item = Step> + use<> {
+    let even = uniform(cut, settings.first_sample, first_spp(settings)).map(Step::Uniform);
+    once(Step::Start).chain(even).chain(rounds(settings, cut, 0))
 }
 
 /// The rest of a render whose pixels, their statistics and what they lack were handed back.
-pub fn rest(settings: &Settings, cut: &Cut, progress: Progress) -> Vec<Step> {
-    let mut steps = deal(progress.pending, 1, cut.paths);
-    steps.extend(rounds(settings, cut, progress.allocations));
-    steps
+pub fn rest(settings: &Settings, cut: &Cut, progress: Progress) -> impl Iterator<Item = Step> + use<> {
+    deal(progress.pending, 1, cut.paths).chain(rounds(settings, cut, progress.allocations))
 }
 
 /// Samples that every pixel gets before any is placed.
@@ -158,73 +174,61 @@ pub fn limit(settings: &Settings) -> u32 {
     }
 }
 
-fn rounds(settings: &Settings, cut: &Cut, done: u32) -> Vec<Step> {
+fn rounds(settings: &Settings, cut: &Cut, done: u32) -> Box<dyn Iterator<Item = Step>> {
     match settings.allocate.placing() {
-        Placing::Chosen => choices(settings, cut, done),
-        Placing::Learning if settings.allocate.noise_threshold > 0.0 => needed(settings, cut, done),
-        placing => allocated(settings, placing == Placing::Learning, cut, done),
+        Placing::Chosen => Box::new(choices(settings, cut, done)),
+        Placing::Learning if settings.allocate.noise_threshold > 0.0 => Box::new(needed(settings, cut, done)),
+        placing => Box::new(allocated(settings, placing == Placing::Learning, cut, done)),
     }
 }
 
 /// As the paper has it: the threshold is 1 after the least number of samples and falls to 0 at the largest.
-fn choices(settings: &Settings, cut: &Cut, done: u32) -> Vec<Step> {
+fn choices(settings: &Settings, cut: &Cut, done: u32) -> impl Iterator<Item = Step> + use<> {
     let (least, most) = (first_spp(settings), limit(settings));
-    let mut steps = Vec::new();
-    for round in least + done..settings.spp {
+    let Cut { pixels, paths, .. } = *cut;
+    (least + done..settings.spp).flat_map(move |round| {
         let falling = 1.0 - (round - least) as f32 / most.saturating_sub(least).max(1) as f32;
         let threshold = if round < most { falling } else { 0.0 };
-        steps.push(Step::Choose(Choice { pixels: cut.pixels, round, threshold }));
-        steps.extend(deal(u64::from(cut.pixels), 1, cut.paths));
-    }
-    steps
+        once(Step::Choose(Choice { pixels, round, threshold })).chain(deal(u64::from(pixels), 1, paths))
+    })
 }
 
 /// Samples a pixel, on average, between two looks at what a threshold still needs.
 const LOOK: u32 = 4;
 
 /// Rounds of at most [`LOOK`] samples a pixel, and as many more as a pixel that always gets its need can double its samples.
-fn needed(settings: &Settings, cut: &Cut, done: u32) -> Vec<Step> {
+fn needed(settings: &Settings, cut: &Cut, done: u32) -> impl Iterator<Item = Step> + use<> {
     let limit = limit(settings);
     let rest = limit.saturating_sub(first_spp(settings));
     let look = rest.div_ceil(settings.allocate.rounds).min(LOOK);
     let rounds = if rest == 0 { 0 } else { rest.div_ceil(look) + u32::BITS };
-    let budget = u64::from(look) * u64::from(cut.pixels);
+    let Cut { pixels, paths, .. } = *cut;
+    let budget = u64::from(look) * u64::from(pixels);
     let share = Share::Need { threshold: settings.allocate.noise_threshold, limit };
-    let round = |_| {
-        let plan = Plan { pixels: cut.pixels, budget, limit: None, share, rounds: 1 };
-        std::iter::once(Step::Allocate(plan)).chain(deal(budget, 1, cut.paths))
-    };
-    (done..rounds).flat_map(round).collect()
+    let plan = Plan { pixels, budget, limit: None, share, rounds: 1 };
+    (done..rounds).flat_map(move |_| once(Step::Allocate(plan)).chain(deal(budget, 1, paths)))
 }
 
-fn allocated(settings: &Settings, learns: bool, cut: &Cut, done: u32) -> Vec<Step> {
-    let first = u64::from(first_spp(settings)) * u64::from(cut.pixels);
-    let rest = (u64::from(settings.spp) * u64::from(cut.pixels)).saturating_sub(first);
-    if rest == 0 {
-        return Vec::new();
-    }
-    let all = if learns { settings.allocate.rounds } else { 1 };
+fn allocated(settings: &Settings, learns: bool, cut: &Cut, done: u32) -> impl Iterator<Item = Step> + use<> {
+    let Cut { pixels, paths, .. } = *cut;
+    let first = u64::from(first_spp(settings)) * u64::from(pixels);
+    let rest = (u64::from(settings.spp) * u64::from(pixels)).saturating_sub(first);
+    let (all, dealt) = if learns { (settings.allocate.rounds, 1) } else { (1, settings.allocate.rounds) };
     let limit = limit(settings);
-    let room = u64::from(limit) * u64::from(cut.pixels);
-    let upto = |round: u32| ((rest as u128 * u128::from(round) / u128::from(all)) as u64 + first).min(room);
-    let mut steps = Vec::new();
-    for round in done..all {
-        let (taken, total) = (upto(round), upto(round + 1));
-        if total == taken {
-            continue;
-        }
+    let room = u64::from(limit) * u64::from(pixels);
+    let upto = move |round: u32| ((rest as u128 * u128::from(round) / u128::from(all)) as u64 + first).min(room);
+    let budgets = (done..all).map(move |round| (upto(round + 1) - upto(round), upto(round + 1)));
+    budgets.filter(|&(budget, _)| budget > 0).flat_map(move |(budget, total)| {
         let fills = u64::from(limit) < total; // one pixel might take them all
-        steps.push(Step::Allocate(Plan {
-            pixels: cut.pixels,
-            budget: total - taken,
+        let plan = Plan {
+            pixels,
+            budget,
             limit: fills.then_some(limit),
             share: if learns { Share::All(total) } else { Share::Next },
             rounds: if fills { 16 } else { 1 },
-        }));
-        let dealt = if learns { 1 } else { settings.allocate.rounds };
-        steps.extend(deal(total - taken, dealt, cut.paths));
-    }
-    steps
+        };
+        once(Step::Allocate(plan)).chain(deal(budget, dealt, paths))
+    })
 }
 
 /// What every pixel still lacks of its allocated `count` once all paths up to the end of `done` are traced.
@@ -247,36 +251,30 @@ pub fn pending(count: &[u32], done: &PathRange) -> Vec<u32> {
 }
 
 /// Deals `paths` listed paths to rounds, path j to round j mod `rounds`, and cuts each round into batches.
-fn deal(paths: u64, rounds: u32, batch: u32) -> Vec<Step> {
-    let mut steps = Vec::new();
-    for round in 0..rounds {
+fn deal(paths: u64, rounds: u32, batch: u32) -> impl Iterator<Item = Step> + use<> {
+    (0..rounds).flat_map(move |round| {
         let mine = (paths + u64::from(rounds - 1 - round)) / u64::from(rounds);
-        for first in (0..mine).step_by(batch as usize) {
+        (0..mine).step_by(batch as usize).map(move |first| {
             let paths = u64::from(batch).min(mine - first) as u32;
-            steps.push(Step::Listed(PathRange { first, paths, round, rounds }));
-        }
-    }
-    steps
+            Step::Listed(PathRange { first, paths, round, rounds })
+        })
+    })
 }
 
 /// Cuts samples `first .. first + samples` of every pixel into batches.
-pub fn uniform(cut: &Cut, first: u32, samples: u32) -> Vec<Batch> {
+pub fn uniform(cut: &Cut, first: u32, samples: u32) -> impl Iterator<Item = Batch> + use<> {
     let Cut { pixels, tile, paths } = *cut;
     let run = pixels.min(paths).min(tile);
     let depth = (paths / run).max(1);
-    let mut batches = Vec::new();
-    let mut sample = 0;
-    while sample < samples {
-        let n = depth.min(samples - sample);
-        let mut first_pixel = 0;
-        while first_pixel < pixels {
-            let pixels = run.min(pixels - first_pixel).min(tile - first_pixel % tile);
-            batches.push(Batch { first_pixel, pixels, first_sample: first + sample, samples: n });
-            first_pixel += pixels;
-        }
-        sample += n;
-    }
-    batches
+    let runs = move |first: &u32| Some(first + run.min(tile - first % tile)).filter(|&next| next < pixels);
+    (0..samples).step_by(depth as usize).flat_map(move |sample| {
+        successors(Some(0), runs).map(move |first_pixel| Batch {
+            first_pixel,
+            pixels: run.min(tile - first_pixel % tile).min(pixels - first_pixel),
+            first_sample: first + sample,
+            samples: depth.min(samples - sample),
+        })
+    })
 }
 
 #[cfg(test)]
@@ -323,6 +321,35 @@ mod tests {
 
     const CUT: Cut = Cut { pixels: 65, tile: 100, paths: 17 };
 
+    fn list(settings: &Settings, cut: &Cut) -> Vec<Step> {
+        steps(settings, cut).collect()
+    }
+
+    #[test]
+    fn a_renderer_has_room_for_its_own_steps_alone() {
+        let cut = Cut { tile: 30, ..CUT };
+        for policy in ["uniform", "geometry", "variance", "threshold"] {
+            assert!(steps(&settings(policy, 8, 2, 6, 4), &cut).all(|step| cut.has_room_for(&step)), "{policy}");
+        }
+        let batch =
+            |first_pixel, pixels, samples| Step::Uniform(Batch { first_pixel, pixels, first_sample: 0, samples });
+        let of = |steps: &[Step], kind: fn(&Step) -> bool| *steps.iter().find(|s| kind(s)).unwrap();
+        let (plan, wide) = (Cut { pixels: 64, ..cut }, Cut { paths: 18, ..cut });
+        let others = [
+            batch(0, 18, 1), // more paths than are in flight
+            batch(0, u32::MAX, u32::MAX),
+            batch(0, 0, 1),
+            batch(0, 1, 0),
+            batch(60, 6, 1), // beyond the film
+            batch(u32::MAX, 2, 1),
+            batch(20, 11, 1), // two tiles
+            of(&list(&settings("geometry", 4, 1, 0, 1), &plan), |s| matches!(s, Step::Allocate(_))),
+            of(&list(&settings("threshold", 4, 1, 0, 1), &plan), |s| matches!(s, Step::Choose(_))),
+            of(&list(&settings("geometry", 4, 1, 0, 1), &wide), |s| matches!(s, Step::Listed(_))),
+        ];
+        others.iter().for_each(|step| assert!(!cut.has_room_for(step), "{step:?}"));
+    }
+
     fn sums(steps: &[Step]) -> (u64, u64) {
         let budget = |s: &Step| if let Step::Allocate(plan) = s { plan.budget } else { 0 };
         (steps.iter().map(Step::paths).sum(), steps.iter().map(budget).sum())
@@ -332,15 +359,15 @@ mod tests {
     fn all_of_the_budget_is_traced_and_no_more() {
         for policy in ["geometry", "variance"] {
             for (spp, min, rounds) in [(4, 1, 1), (4, 4, 3), (1, 2, 1), (7, 0, 5), (3, 1, 300)] {
-                let all = steps(&settings(policy, spp, min, 0, rounds), &CUT);
+                let all = list(&settings(policy, spp, min, 0, rounds), &CUT);
                 let (traced, allocated) = sums(&all);
                 assert_eq!(traced, 65 * u64::from(spp), "{policy} {spp} {min} {rounds}");
                 assert_eq!(allocated, 65 * u64::from(spp - min.min(spp)));
             }
         }
-        let capped = steps(&settings("variance", 8, 2, 5, 4), &CUT);
+        let capped = list(&settings("variance", 8, 2, 5, 4), &CUT);
         assert_eq!(sums(&capped), (65 * 5, 65 * 3), "no more than there is room");
-        assert_eq!(sums(&steps(&settings("uniform", 3, 2, 0, 4), &CUT)), (65 * 3, 0));
+        assert_eq!(sums(&list(&settings("uniform", 3, 2, 0, 4), &CUT)), (65 * 3, 0));
     }
 
     #[test]
@@ -351,8 +378,7 @@ mod tests {
             s
         };
         let looks = |s: &Settings| {
-            let all = steps(s, &CUT);
-            all.into_iter().filter_map(|step| if let Step::Allocate(plan) = step { Some(plan) } else { None }).collect()
+            steps(s, &CUT).filter_map(|step| if let Step::Allocate(plan) = step { Some(plan) } else { None }).collect()
         };
         // 32 doublings fill any count; before, every round may be spent to the end.
         for (spp, min, rounds, look, count) in [(16, 4, 1, 4, 3), (16, 4, 6, 2, 6), (7, 4, 1, 3, 1), (15, 4, 1, 4, 3)] {
@@ -364,19 +390,18 @@ mod tests {
         }
         assert!(looks(&of(4, 4, 1)).is_empty());
         let s = of(16, 4, 1);
-        assert_eq!(rest(&s, &CUT, Progress { allocations: 34, pending: 0 }), needed(&s, &CUT, 34));
-        assert_eq!(needed(&s, &CUT, 34).len(), 1 + 65 * 4 / 17 + 1);
+        assert!(rest(&s, &CUT, Progress { allocations: 34, pending: 0 }).eq(needed(&s, &CUT, 34)));
+        assert_eq!(needed(&s, &CUT, 34).count(), 1 + 65 * 4 / 17 + 1);
     }
 
     #[test]
     fn what_is_left_is_the_rest() {
         let s = settings("variance", 8, 2, 0, 3);
-        let whole = steps(&s, &CUT);
-        let first_round = rounds(&s, &CUT, 0);
-        assert!(whole.ends_with(&first_round));
-        let rest = rest(&s, &CUT, Progress { allocations: 1, pending: 40 });
+        let first_round: Vec<_> = rounds(&s, &CUT, 0).collect();
+        assert!(list(&s, &CUT).ends_with(&first_round));
+        let rest: Vec<_> = rest(&s, &CUT, Progress { allocations: 1, pending: 40 }).collect();
         assert_eq!(rest.iter().take(3).map(Step::paths).collect::<Vec<_>>(), [17, 17, 6]);
-        assert_eq!(rest[3..], rounds(&s, &CUT, 1)[..]);
+        assert_eq!(rest[3..], rounds(&s, &CUT, 1).collect::<Vec<_>>());
     }
 
     #[test]
@@ -392,13 +417,13 @@ mod tests {
 
     #[test]
     fn a_threshold_falls_from_one_and_is_followed_by_chance() {
-        let all = steps(&settings("threshold", 8, 2, 6, 4), &CUT);
+        let all = list(&settings("threshold", 8, 2, 6, 4), &CUT);
         let chosen = |s: &Step| if let Step::Choose(c) = s { Some((c.round, c.threshold)) } else { None };
         let rounds: Vec<_> = all.iter().filter_map(chosen).collect();
         assert_eq!(rounds, [(2, 1.0), (3, 0.75), (4, 0.5), (5, 0.25), (6, 0.0), (7, 0.0)]);
         assert_eq!(sums(&all), (65 * 8, 0), "everyone may be chosen every time");
         let rest = rest(&settings("threshold", 8, 2, 6, 4), &CUT, Progress { allocations: 5, pending: 0 });
-        assert_eq!(rest.iter().filter_map(chosen).collect::<Vec<_>>(), [(7, 0.0)]);
+        assert_eq!(rest.filter_map(|step| chosen(&step)).collect::<Vec<_>>(), [(7, 0.0)]);
         let step = Step::Listed(PathRange { first: 17, paths: 17, round: 0, rounds: 1 });
         assert_eq!([0, 17, 18, 99].map(|n| step.within(n).map(|s| s.paths())), [None, None, Some(1), Some(17)]);
     }
@@ -406,7 +431,7 @@ mod tests {
     #[test]
     fn budgets_beyond_32_bits_are_kept() {
         let cut = Cut { pixels: 1 << 20, tile: 1 << 28, paths: 1 << 30 };
-        let all = steps(&settings("geometry", 1 << 16, 0, 0, 2), &cut);
+        let all = list(&settings("geometry", 1 << 16, 0, 0, 2), &cut);
         assert_eq!(sums(&all), (1 << 36, 1 << 36));
     }
 }

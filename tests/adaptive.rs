@@ -41,6 +41,10 @@ fn read(renderer: &Renderer) -> Vec<Pixel> {
     stats.into_iter().zip(light).map(|(stats, light)| Pixel { stats, light }).collect()
 }
 
+fn list(steps: impl Iterator<Item = Step>) -> Vec<Step> {
+    steps.collect()
+}
+
 fn run(renderer: &Renderer, frame: &mut FrameResources, steps: &[Step]) -> Vec<Pixel> {
     steps.iter().for_each(|step| drop(renderer.run(frame, step).unwrap()));
     read(renderer)
@@ -48,7 +52,7 @@ fn run(renderer: &Renderer, frame: &mut FrameResources, steps: &[Step]) -> Vec<P
 
 fn render(gpu: &Gpu, scene: &Scene) -> Vec<Pixel> {
     let renderer = Renderer::new(gpu, scene, split()).unwrap();
-    run(&renderer, &mut FrameResources::new(gpu).unwrap(), &renderer.steps())
+    run(&renderer, &mut FrameResources::new(gpu).unwrap(), &list(renderer.steps()))
 }
 
 fn total(pixels: &[Pixel]) -> u64 {
@@ -62,7 +66,7 @@ fn the_budget_is_met_and_no_cut_changes_a_bit() {
         let scene = scene(|s| s.allocate.policy = policy.into());
         let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
         let mut frame = FrameResources::new(&gpu).unwrap();
-        let whole = run(&renderer, &mut frame, &renderer.steps());
+        let whole = run(&renderer, &mut frame, &list(renderer.steps()));
         assert_eq!(total(&whole), 8 * 33 * 17, "{policy}");
         let counts: Vec<u32> = whole.iter().map(|p| p.stats.count).collect();
         assert!(
@@ -71,12 +75,12 @@ fn the_budget_is_met_and_no_cut_changes_a_bit() {
         );
         let pixels = SIZE[0] * SIZE[1];
         for paths in [31, 64, 65, 500, pixels] {
-            let steps = schedule::steps(&scene.settings, &Cut { pixels, tile: 1 << 20, paths });
-            assert!(steps.len() > renderer.steps().len());
+            let steps = list(schedule::steps(&scene.settings, &Cut { pixels, tile: 1 << 20, paths }));
+            assert!(steps.len() > renderer.steps().count());
             assert!(bits(&run(&renderer, &mut frame, &steps)) == bits(&whole), "{policy}, batches of {paths}");
         }
         // Control: one path fewer shows.
-        let mut steps = renderer.steps();
+        let mut steps = list(renderer.steps());
         if let Some(Step::Listed(range)) = steps.last_mut() {
             range.paths -= 1;
         }
@@ -99,7 +103,7 @@ fn a_falling_threshold_gives_at_most_one_sample_a_round() {
     assert!(frozen.iter().all(|n| (2..=16).contains(n)), "{frozen:?}");
     let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
-    let whole = run(&renderer, &mut frame, &renderer.steps());
+    let whole = run(&renderer, &mut frame, &list(renderer.steps()));
     let later: Vec<u32> = counts(&whole).iter().zip(&frozen).map(|(all, before)| all - before).collect();
     // Each of 64 rounds is a chance of n / 16: binomial, and independent from pixel to pixel. The sum of squared
     // deviations over their variances is chi-square; pixels with all 16 samples get one every time.
@@ -115,7 +119,7 @@ fn a_falling_threshold_gives_at_most_one_sample_a_round() {
     assert!((chi - freedom).abs() < 5.0 * f64::sqrt(2.0 * freedom), "chi-square {chi} of {freedom}");
     for paths in [64, 65, SIZE[0] * SIZE[1]] {
         let cut = Cut { pixels: SIZE[0] * SIZE[1], tile: 1 << 20, paths };
-        let steps = schedule::steps(&scene.settings, &cut);
+        let steps = list(schedule::steps(&scene.settings, &cut));
         assert!(bits(&run(&renderer, &mut frame, &steps)) == bits(&whole), "batches of {paths}");
     }
     assert_silent(&gpu);
@@ -137,9 +141,12 @@ fn batches_of_one_path_and_rounds_in_any_number_or_order_change_no_bit() {
     let (scene, cut) = (with(4), Cut { pixels: 35, tile: 1 << 20, paths: 1 });
     let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
-    assert!(bits(&run(&renderer, &mut frame, &schedule::steps(&scene.settings, &cut))) == bits(&whole), "one path");
+    assert!(
+        bits(&run(&renderer, &mut frame, &list(schedule::steps(&scene.settings, &cut)))) == bits(&whole),
+        "one path"
+    );
     // The rounds backwards: a pixel's next sample is its next, whichever round asks for it.
-    let mut steps = renderer.steps();
+    let mut steps = list(renderer.steps());
     let first = steps.iter().position(|s| matches!(s, Step::Listed(_))).unwrap();
     steps[first..].reverse();
     assert!(bits(&run(&renderer, &mut frame, &steps)) == bits(&whole), "backwards");
@@ -182,7 +189,7 @@ fn a_render_resumed_anywhere_has_the_bits_of_one_that_never_stopped() {
         let renderer = Renderer::specialised(&gpu, &scene, split(), effects).unwrap();
         let mut frame = FrameResources::new(&gpu).unwrap();
         let cut = Cut { pixels: SIZE[0] * SIZE[1], tile: 1 << 20, paths: 300 };
-        let steps = schedule::steps(&scene.settings, &cut);
+        let steps = list(schedule::steps(&scene.settings, &cut));
         for stop in [1, 2, 3, steps.len() / 2, steps.len() - 2, steps.len()] {
             let (pixels, lacks, allocations) = interrupted(&renderer, &mut frame, &steps[..stop]);
             let stats: Vec<PixelStats> = pixels.iter().map(|p| p.stats).collect();
@@ -190,7 +197,7 @@ fn a_render_resumed_anywhere_has_the_bits_of_one_that_never_stopped() {
             let pending = lacks.iter().map(|&n| u64::from(n)).sum();
             let priority = if allocations > 0 { renderer.film().priority.read().unwrap() } else { Vec::new() };
             renderer.resume(&mut frame, &stats, &light, &priority, &lacks).unwrap();
-            let rest = renderer.rest(Progress { allocations, pending });
+            let rest = list(renderer.rest(Progress { allocations, pending }));
             assert!(bits(&run(&renderer, &mut frame, &rest)) == bits(&whole), "{policy}, stopped after step {stop}");
         }
     }
@@ -304,7 +311,7 @@ fn a_film_of_several_storage_bindings_is_placed() {
     let placed = Renderer::new(&gpu, &sized("both"), outputs).unwrap();
     let windows = placed.film().tiles[0].windows().count();
     assert!(windows == 2 || gpu.info().max_storage_range > 1 << 27, "{windows} windows");
-    let pixels = run(&placed, &mut FrameResources::new(&gpu).unwrap(), &placed.steps());
+    let pixels = run(&placed, &mut FrameResources::new(&gpu).unwrap(), &list(placed.steps()));
     assert_eq!(total(&pixels), 2 * 2048 * 1400);
     let alike = render(&gpu, &sized("uniform"));
     let two: Vec<usize> = (0..pixels.len()).filter(|&i| pixels[i].stats.count == 2).collect();

@@ -3,8 +3,8 @@
 mod support;
 
 use std::path::Path;
-use tallow::gpu::Gpu;
 use tallow::gpu::layout::{Effects, PixelStats};
+use tallow::gpu::{FrameResources, Gpu};
 use tallow::renderer::{self, Batch, Outputs, Renderer, Step};
 use tallow::scene::Scene;
 use tallow::settings::{PixelFilter, Sampler, Settings};
@@ -82,6 +82,10 @@ fn the_cut_into_batches_changes_no_bit() {
         }
         assert!(bits(&support::render_steps(&gpu, &renderer, &steps)) == bits(&whole), "{run} x {depth}");
     }
+    // A step of a larger renderer would be written beyond this one's buffers.
+    let foreign = Step::Uniform(Batch { first_pixel: 1, pixels, first_sample: 0, samples: 1 });
+    let refused = renderer.run(&mut FrameResources::new(&gpu).unwrap(), &foreign).unwrap_err();
+    assert!(refused.to_string().contains("of another renderer"), "{refused}");
     // Control: one sample left out must show.
     let part = Step::Uniform(Batch { first_pixel: 0, pixels, first_sample: 0, samples: 3 });
     assert!(bits(&support::render_steps(&gpu, &renderer, &[Step::Start, part])) != bits(&whole));

@@ -11,7 +11,7 @@ pub mod uniform;
 pub mod variance;
 
 /// A policy, ready to be recorded.
-pub trait Policy {
+pub trait Policy: Send + Sync {
     /// guide\[P\] -> what stays the same from round to round, if there is any; once per camera.
     ///
     /// # Errors

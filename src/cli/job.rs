@@ -69,20 +69,23 @@ impl Job<'_> {
     /// As [`Renderer::run`].
     pub fn run(&self, frame: &mut FrameResources, earlier: Option<&Earlier>) -> Result<End> {
         let (r, mut rays) = (self.renderer, 0);
-        let steps = match earlier {
-            Some(earlier) => earlier.put_back(r, frame)?,
-            None => r.steps(),
+        earlier.map_or(Ok(()), |earlier| earlier.put_back(r, frame))?;
+        let steps = || -> Box<dyn Iterator<Item = Step>> {
+            match earlier {
+                Some(earlier) => Box::new(r.rest(earlier.progress)),
+                None => Box::new(r.steps()),
+            }
         };
         let allocations = earlier.map_or(0, |e| e.progress.allocations);
         let mut end =
             End { times: Vec::new(), traced: 0, allocations, broken_priorities: 0, last: None, why: Why::Done };
         if earlier.is_some() {
-            end.last = Some(nothing_yet(&steps));
+            end.last = Some(nothing_yet(steps().next()));
         }
         let threshold = r.settings().allocate.noise_threshold > 0.0;
-        let mut progress = Progress::new(steps.iter().map(Step::paths).sum(), self.quiet);
-        let mut listed = u64::MAX;
-        for (i, &planned) in steps.iter().enumerate() {
+        let mut progress = Progress::new(steps().map(|step| step.paths()).sum(), self.quiet);
+        let (mut listed, mut to_do) = (u64::MAX, steps().peekable());
+        while let Some(planned) = to_do.next() {
             if self.stop.load(Ordering::SeqCst) {
                 end.why = Why::Interrupted;
                 break;
@@ -94,7 +97,7 @@ impl Job<'_> {
             }
             if let Some(Step::Allocate(_) | Step::Choose(_)) = step {
                 end.allocations += 1;
-                end.last = Some(nothing_yet(&steps[i + 1..]));
+                end.last = Some(nothing_yet(to_do.peek().copied()));
                 if r.list_may_be_short() {
                     listed = r.listed()?;
                 }
@@ -123,10 +126,10 @@ impl Job<'_> {
     }
 }
 
-/// The beginning of the first round that the steps deal to.
-fn nothing_yet(steps: &[Step]) -> PathRange {
-    match steps.first() {
-        Some(Step::Listed(range)) => PathRange { first: 0, paths: 0, ..*range },
+/// The beginning of the round that the next step deals to.
+fn nothing_yet(next: Option<Step>) -> PathRange {
+    match next {
+        Some(Step::Listed(range)) => PathRange { first: 0, paths: 0, ..range },
         _ => PathRange { first: 0, paths: 0, round: 0, rounds: 1 },
     }
 }

@@ -34,10 +34,10 @@ pub fn film(renderer: &Renderer) -> Result<Film> {
         for range in tile.windows() {
             let window = range.start as usize..range.end as usize;
             let mut part = Film::new(window.len() as u32, 1);
-            let light = if outputs.split_light { tile.light.part(window.clone())?.read()? } else { Vec::new() };
-            add_pixels(&mut part, &tile.stats.part(window.clone())?.read()?, &light);
+            let light = if outputs.split_light { tile.light.read_range(window.clone())? } else { Vec::new() };
+            add_pixels(&mut part, &tile.stats.read_range(window.clone())?, &light);
             if outputs.guides {
-                add_guide(&mut part, &tile.guide.part(window)?.read()?);
+                add_guide(&mut part, &tile.guide.read_range(window)?);
             }
             film.append(part);
         }

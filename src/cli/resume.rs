@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::gpu::FrameResources;
 use crate::gpu::layout::{PixelLight, PixelStats};
 use crate::image::{self, Film, Samples};
-use crate::renderer::{Progress, Renderer, Step};
+use crate::renderer::{Progress, Renderer};
 use crate::schedule;
 use crate::settings::Settings;
 use crate::statistics::Pixel;
@@ -69,11 +69,10 @@ impl Earlier {
     ///
     /// # Errors
     /// As [`Renderer::resume`].
-    pub fn put_back(&self, renderer: &Renderer, frame: &mut FrameResources) -> Result<Vec<Step>> {
+    pub fn put_back(&self, renderer: &Renderer, frame: &mut FrameResources) -> Result<()> {
         let stats: Vec<PixelStats> = self.pixels.iter().map(|p| p.stats).collect();
         let light: Vec<PixelLight> = self.pixels.iter().map(|p| p.light).collect();
-        renderer.resume(frame, &stats, &light, &self.priority, &self.pending)?;
-        Ok(renderer.rest(self.progress))
+        renderer.resume(frame, &stats, &light, &self.priority, &self.pending)
     }
 }
 

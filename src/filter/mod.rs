@@ -42,7 +42,7 @@ pub struct Row {
 }
 
 /// A filter on a device, for one size and one set of settings.
-pub trait Filter {
+pub trait Filter: Send + Sync {
     /// radiance\[P\], guide\[P\], variance\[P\] -> output\[P\]
     ///
     /// # Errors

@@ -40,7 +40,7 @@ pub fn hash(v: u32) -> u32 {
 
 /// Runs the whole of a render.
 pub fn render(gpu: &Gpu, renderer: &Renderer) -> Vec<PixelStats> {
-    render_steps(gpu, renderer, &renderer.steps())
+    render_steps(gpu, renderer, &renderer.steps().collect::<Vec<_>>())
 }
 
 /// Runs a render cut as the caller likes.

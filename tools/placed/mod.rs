@@ -64,7 +64,7 @@ impl View {
 pub fn render(gpu: &Gpu, scene: &Scene) -> anyhow::Result<Rendered> {
     let renderer = Renderer::new(gpu, scene, Outputs { split_light: true, guides: true, counters: false })?;
     let mut frame = FrameResources::new(gpu)?;
-    let steps = renderer.steps();
+    let steps: Vec<Step> = renderer.steps().collect();
     let of_kind = |kind: fn(&Step) -> bool| steps.iter().find(move |s| kind(s));
     let kinds: [fn(&Step) -> bool; 5] = [
         |s| matches!(s, Step::Start),

@@ -46,7 +46,7 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
         Ok(Renderer::new(gpu, &scene, Outputs { split_light: true, guides: true, counters: false })?)
     };
     let allocation = |r: &Renderer| -> anyhow::Result<(f64, f64)> {
-        let steps: Vec<Step> = r.steps().into_iter().filter(|s| matches!(s, Step::Allocate(_))).collect();
+        let steps: Vec<Step> = r.steps().filter(|s| matches!(s, Step::Allocate(_))).collect();
         r.run(&mut FrameResources::new(gpu)?, &Step::Start)?;
         let all = passes(gpu, r, &steps)?;
         let geometry = all["geometry"];
@@ -75,11 +75,11 @@ fn samples(
         let (importance, counts) = allocation(&r)?;
         let mut frame = FrameResources::new(gpu)?;
         let mut lists = 0.0;
-        for step in r.steps().iter().filter(|s| matches!(s, Step::Allocate(_))) {
-            r.run(&mut frame, step)?;
+        for step in r.steps().filter(|s| matches!(s, Step::Allocate(_))) {
+            r.run(&mut frame, &step)?;
         }
         // The first list; the others are as long.
-        let listed: Vec<Step> = r.steps().into_iter().filter(|s| matches!(s, Step::Listed(_))).collect();
+        let listed: Vec<Step> = r.steps().filter(|s| matches!(s, Step::Listed(_))).collect();
         let first = passes(gpu, &r, &listed[..1])?;
         lists += first["batch"] * listed.len() as f64;
         rows.push(vec![
