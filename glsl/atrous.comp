@@ -11,7 +11,7 @@
 // every level reads runs of memory.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
-layout(binding = 1) uniform samplerBuffer place; // of vec4
+layout(binding = 1) uniform usamplerBuffer place; // of uvec4
 layout(scalar, binding = 2) writeonly buffer Output { vec4 filtered[]; };
 layout(scalar, push_constant) uniform Push { AtrousPush push; };
 

@@ -9,7 +9,7 @@
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer errors; // of vec4
 layout(binding = 1) uniform samplerBuffer colour; // of vec4
-layout(binding = 2) uniform samplerBuffer place; // of vec4
+layout(binding = 2) uniform usamplerBuffer place; // of uvec4
 layout(scalar, binding = 3) writeonly buffer Output { vec4 smoothed[]; };
 layout(scalar, push_constant) uniform Push { AutoSmoothPush push; };
 

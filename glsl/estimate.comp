@@ -9,7 +9,7 @@
 // variance: there it is the spread over alike pixels of a 7x7 window (Schied et al. 2017, section 4.2).
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
-layout(binding = 1) uniform samplerBuffer place; // of vec4
+layout(binding = 1) uniform usamplerBuffer place; // of uvec4
 layout(binding = 2) uniform samplerBuffer variance; // of vec3
 layout(scalar, binding = 3) writeonly buffer Estimates { vec4 estimate[]; };
 layout(scalar, push_constant) uniform Push { SvgfPush push; };

@@ -10,7 +10,7 @@ layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer radiance; // of vec4
 layout(binding = 1) uniform samplerBuffer guide; // of Guide
 layout(scalar, binding = 2) writeonly buffer Colours { vec4 colour[]; };
-layout(scalar, binding = 3) writeonly buffer Places { vec4 place[]; };
+layout(scalar, binding = 3) writeonly buffer Places { uvec4 place[]; };
 layout(scalar, push_constant) uniform Push { PackPush push; };
 
 void main() {
@@ -19,5 +19,5 @@ void main() {
     colour[i] = known_radiance(texelFetch(radiance, int(i)));
     vec3 normal = texelFetch(guide, 3 * int(i)).xyz, position = texelFetch(guide, 3 * int(i) + 1).xyz;
     position = finite(position) ? clamp(position, -FARTHEST, FARTHEST) : vec3(0.0);
-    place[i] = vec4(position, uintBitsToFloat(packed_normal(normal)));
+    place[i] = uvec4(floatBitsToUint(position), packed_normal(normal));
 }

@@ -10,7 +10,7 @@
 // section 4.4); the variance is filtered along. The last level puts the number of samples in its place.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer estimate; // of vec4
-layout(binding = 1) uniform samplerBuffer place; // of vec4
+layout(binding = 1) uniform usamplerBuffer place; // of uvec4
 layout(binding = 2) uniform samplerBuffer colour; // of vec4
 layout(scalar, binding = 3) writeonly buffer Output { vec4 filtered[]; };
 layout(scalar, push_constant) uniform Push { SvgfPush push; };

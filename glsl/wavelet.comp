@@ -10,7 +10,7 @@
 // these are Fattal's (2009). All neighbours' differences are taken from the pixel itself: a constant comes back exactly.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
-layout(binding = 1) uniform samplerBuffer place; // of vec4
+layout(binding = 1) uniform usamplerBuffer place; // of uvec4
 layout(scalar, binding = 2) writeonly buffer Output { vec4 filtered[]; };
 layout(scalar, push_constant) uniform Push { WaveletPush push; };
 

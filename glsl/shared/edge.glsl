@@ -16,8 +16,8 @@ struct Pixel {
 };
 
 // From the two texels that pack.comp writes.
-Pixel unpack_pixel(vec4 colour, vec4 place) {
-    return Pixel(colour, WEIGHT_N ? unpacked_normal(floatBitsToUint(place.w)) : vec3(0.0), place.xyz);
+Pixel unpack_pixel(vec4 colour, uvec4 place) {
+    return Pixel(colour, WEIGHT_N ? unpacked_normal(place.w) : vec3(0.0), uintBitsToFloat(place.xyz));
 }
 
 float difference(vec3 d) {

@@ -2,7 +2,7 @@
 use super::pixel::{known_normal, known_position, known_radiance};
 use super::{FilterInput, Planes};
 use crate::error::Result;
-use crate::gpu::layout::{Effects, PackPush, vec4};
+use crate::gpu::layout::{Effects, PackPush, uvec4, vec4};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::shaders::pack::Bind;
 use crate::stage::groups;
@@ -13,8 +13,8 @@ pub struct Pack {
     kernel: Kernel<Bind<'static>>,
     /// Radiance and the samples behind it, all zero where nothing is known.
     pub colour: Buffer<vec4>,
-    /// Position, and the bits of the normal.
-    pub place: Buffer<vec4>,
+    /// The bits of the position and of the packed normal: as floats, small ones might be fetched as 0.
+    pub place: Buffer<uvec4>,
 }
 
 impl Pack {
@@ -23,11 +23,11 @@ impl Pack {
     /// # Errors
     /// [`crate::error::Error::Device`] when they do not fit.
     pub fn new(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<Self> {
-        let plane = |name| Buffer::new(gpu, name, width as usize * height as usize, Location::Device);
+        let pixels = width as usize * height as usize;
         Ok(Self {
             kernel: Kernel::new(gpu, &Effects::default(), &[])?,
-            colour: plane("colour")?,
-            place: plane("place")?,
+            colour: Buffer::new(gpu, "colour", pixels, Location::Device)?,
+            place: Buffer::new(gpu, "place", pixels, Location::Device)?,
         })
     }
 
