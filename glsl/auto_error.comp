@@ -42,7 +42,7 @@ void main() {
     vec4 e = texelFetch(estimate, at);
     vec3 a = texelFetch(filtered_1, at).rgb, b = texelFetch(filtered_2, at).rgb, c = texelFetch(filtered_3, at).rgb;
     float added = probe(i, a, push.floor), level = scaled((a + b + c) / 3.0, vec3(0.0));
-    float deviation = min(sqrt(max(e.w, 0.0)) / push.floor, LIMIT);
+    float deviation = min(sqrt(e.w) / push.floor, LIMIT);
     vec4 missed = vec4(2.0 * deviation * deviation, missed(e, added, a, texelFetch(probed_1, at).rgb),
         missed(e, added, b, texelFetch(probed_2, at).rgb), missed(e, added, c, texelFetch(probed_3, at).rgb));
     vec4 relative = missed / sqrt(level * level + 1.0);

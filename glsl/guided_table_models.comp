@@ -30,7 +30,7 @@ void main() {
     if (any(greaterThanEqual(at, size))) return; // safe: no barrier() follows
     ivec4 c = corners(at, size, int(push.radius));
     Moments m = MOMENTS_LOAD(0, 1, SUM);
-    float count = round(m.head.x), share = 1.0 / max(count, 1.0);
+    float count = m.head.x, share = 1.0 / max(count, 1.0);
     vec3 n = share * m.head.yzw;
     vec4 i = share * m.mean;
     m.xx -= m.mean.x * i;

@@ -32,8 +32,8 @@ void main() {
     int from = blocked(at.x, at.y, size.y);
     Fit f = moved(FIT_LOAD(0, 1, SUM), texelFetch(channels, from));
     vec4 here = texelFetch(colour, from);
-    vec3 result = f.value.rgb / max(round(f.value.w), 1.0);
+    vec3 result = f.value.rgb / f.value.w;
     // A model that no float can hold, or no known pixel in reach: the pixel stays as it is.
-    bool usable = f.value.w > 0.5 && finite(result);
+    bool usable = f.value.w > 0.0 && finite(result);
     filtered[at.y * size.x + at.x] = paired(usable ? vec4(result, here.w > 0.0 ? here.w : 1.0) : here);
 }

@@ -3,22 +3,11 @@
 mod picture;
 mod support;
 
-use picture::{Picture, SIZES};
+use picture::{Picture, SIZES, apart, line, red};
 use support::{assert_silent, gpu};
-use tallow::filter::{FILTERS, FilterInput, FilterSettings, GuidedSums, WaveletBasis, find, firefly, run};
+use tallow::filter::{FILTERS, FilterInput, FilterSettings, WaveletBasis, find, firefly, run};
 use tallow::gpu::Gpu;
 use tallow::gpu::layout::vec4;
-
-/// The largest difference of a channel, relative to the pixel's largest where that is above `scale`.
-fn apart(a: &[vec4], b: &[vec4], scale: f32) -> f32 {
-    assert_eq!(a.len(), b.len());
-    let largest = |c: &vec4| c[..3].iter().fold(scale, |m, v| m.max(v.abs()));
-    let pair = |(a, b): (&vec4, &vec4)| {
-        let off = (0..4).map(|i| (a[i] - b[i]).abs()).fold(0.0, f32::max);
-        if off.is_nan() { f32::INFINITY } else { off / largest(b) }
-    };
-    a.iter().zip(b).map(pair).fold(0.0, f32::max)
-}
 
 #[test]
 fn kernels_agree_with_their_twins() {
@@ -42,17 +31,6 @@ fn kernels_agree_with_their_twins() {
         }
     }
     assert_silent(&gpu);
-}
-
-/// One row of pixels on one plane, without edges.
-fn line(values: &[f32]) -> FilterInput {
-    let mut input = Picture::new(values.len() as u32, 1).flat().input;
-    input.radiance = values.iter().map(|v| [*v, *v, *v, if v.is_nan() { 0.0 } else { 1.0 }]).collect();
-    input
-}
-
-fn red(pixels: &[vec4]) -> Vec<f32> {
-    pixels.iter().map(|p| p[0]).collect()
 }
 
 /// What the device makes of an image, and its twin to rounding.
@@ -131,98 +109,6 @@ fn fireflies_are_cut_and_accounted_for() {
     let host = firefly::reference(&noisy, 1.5);
     assert!(firefly::remove_fireflies(&gpu, &mut noisy, 1.5).unwrap().pixels > 3);
     assert!(apart(&noisy.radiance, &host, 1e-3) < 1e-5);
-    assert_silent(&gpu);
-}
-
-/// A constant guide leaves `guided` nothing but box means, and box means of those.
-#[test]
-fn guided_solves_the_worked_examples() {
-    let reference = find("guided").unwrap().reference;
-    let base = FilterSettings { radius: 1, ..FilterSettings::default() };
-    // Windows of 0 0 6 0 0: means 0 2 2 2 0; an end has a window of two. Their means: 1 4/3 2 4/3 1.
-    let box_means = red(&reference(&line(&[0.0, 0.0, 6.0, 0.0, 0.0]), &base));
-    let expected = [1.0, 4.0 / 3.0, 2.0, 4.0 / 3.0, 1.0];
-    assert!(box_means.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6), "{box_means:?}");
-    // Light that is a linear function of the guide is its own best fit, whatever the window.
-    let mut input = line(&[1.0, 3.0, 5.0, 7.0, 9.0]);
-    (0..5).for_each(|i| input.guide[i].depth = i as f32);
-    let exact = FilterSettings { eps: [0.0; 4], ..base };
-    let fitted = red(&reference(&input, &exact));
-    assert!(fitted.iter().zip([1.0, 3.0, 5.0, 7.0, 9.0]).all(|(a, b)| (a - b).abs() < 1e-5), "{fitted:?}");
-    // With eps the slope shrinks by var / (var + eps): over depths 0 1 2 by (2/3) / (2/3 + 2/3); the middle stays.
-    let half = red(&reference(&input, &FilterSettings { eps: [2.0 / 3.0; 4], ..exact }));
-    assert!((half[2] - 5.0).abs() < 1e-6 && half[0] > 1.5, "{half:?}");
-}
-
-/// Single precision against double, on guides that break sums of squares.
-#[test]
-fn guided_holds_in_single_precision() {
-    let gpu = gpu();
-    let row = find("guided").unwrap();
-    let (width, height) = (70, 50);
-    let base = FilterSettings { eps: [1e-4; 4], ..FilterSettings::default() };
-    for (name, depth, bright) in [
-        ("flat", [5.0, 0.0, 0.0], 1.0),
-        ("tilted", [5.0, 0.01, 0.02], 1.0),
-        ("far away", [1e6, 0.25, 0.5], 1.0),
-        ("high dynamic range", [5.0, 0.01, 0.02], 1e6),
-    ] {
-        // The last two have more groups than are kept one by one, and lines of several of their turns.
-        let (size, long, tall) = ((width, height), (600, 3), (3, 600));
-        for (size, radius, channels) in
-            [(size, 3, 4), (size, 12, 4), (size, 60, 4), (size, 12, 3), (size, 12, 1), (long, 100, 4), (tall, 100, 4)]
-        {
-            let mut input = Picture::new(size.0, size.1).noisy().input;
-            for (i, (c, g)) in input.radiance.iter_mut().zip(&mut input.guide).enumerate() {
-                let (x, y) = (i as u32 % size.0, i as u32 / size.0);
-                g.depth = depth[0] + depth[1] * x as f32 + depth[2] * y as f32;
-                if i % 97 == 0 {
-                    *c = [bright, bright, bright, 1.0];
-                }
-            }
-            let settings = FilterSettings { radius, channels, ..base };
-            let device = run(&gpu, row, &input, &settings).unwrap().0;
-            let host = (row.reference)(&input, &settings);
-            let off = apart(&device, &host, 1e-3);
-            assert!(off < 1e-4, "{name}, {size:?}, radius {radius}, {channels} channels: {off}");
-        }
-    }
-    // Two equal channels and a constant one, with an eps of 0: a matrix of rank 1.
-    let mut input = Picture::new(width, height).noisy().input;
-    input.guide.iter_mut().for_each(|g| g.normal = [g.normal[1], g.normal[1], 0.5]);
-    let settings = FilterSettings { radius: 9, channels: 3, eps: [0.0; 4], ..base };
-    let device = run(&gpu, row, &input, &settings).unwrap().0;
-    assert!(apart(&device, &(row.reference)(&input, &settings), 1e-3) < 1e-4);
-    let other = FilterSettings { radius: 8, ..settings };
-    assert!(apart(&device, &(row.reference)(&input, &other), 1e-3) > 1e-3, "control: another radius");
-    // A channel that varies less than rounding counts as constant.
-    input.guide.iter_mut().zip(0..).for_each(|(g, i)| g.normal[2] = 1e-11 * (i % 70) as f32);
-    let faint = run(&gpu, row, &input, &settings).unwrap().0;
-    assert!(apart(&faint, &(row.reference)(&input, &settings), 1e-3) < 1e-4);
-    assert_silent(&gpu);
-}
-
-/// The published sums agree where they can, and lose digits where the others do not.
-#[test]
-fn guided_tables_agree_near_by_and_lose_digits_far_away() {
-    let gpu = gpu();
-    let row = find("guided").unwrap();
-    let base = FilterSettings { radius: 5, eps: [0.01; 4], ..FilterSettings::default() };
-    let table = FilterSettings { sums: GuidedSums::Table, ..base };
-    let off = |input: &FilterInput, s: &FilterSettings| {
-        let s = s.scaled_to(input);
-        apart(&run(&gpu, row, input, &s).unwrap().0, &(row.reference)(input, &s), 1.0)
-    };
-    for (width, height) in SIZES {
-        let input = Picture::new(width, height).noisy().input;
-        for s in [table, FilterSettings { radius: 40, channels: 1, ..table }] {
-            assert!(off(&input, &s) < 2e-3, "{width}x{height}: {}", off(&input, &s));
-        }
-    }
-    let mut far = Picture::new(70, 50).noisy().input;
-    (0..).zip(&mut far.guide).for_each(|(i, g)| g.depth = 1e4 + (i % 70) as f32);
-    let (table, blocks) = (off(&far, &table), off(&far, &base));
-    assert!(table > 100.0 * blocks, "{table}, {blocks}");
     assert_silent(&gpu);
 }
 
@@ -338,5 +224,33 @@ fn svgf_counts_in_deviations() {
     values[4] = 8e23;
     let cut = red(&both(&gpu, "svgf", &line(&values), &FilterSettings { sigma_l: 7f32.sqrt(), ..plain }))[4] / 8e23;
     assert!((cut - 6.0 / (6.0 + 10.0 * (-1.0f32).exp())).abs() < 1e-5, "{cut}");
+    assert_silent(&gpu);
+}
+
+/// 0 and a value beside it, on two surfaces that only `guided` takes for one: its windows make half of the value of both.
+#[test]
+fn auto_trusts_variances_of_four_samples() {
+    let gpu = gpu();
+    let settings = FilterSettings { sigma_n: 0.1, eps: [1e30; 4], ..FilterSettings::default() };
+    for (samples, variance, value, taken) in [
+        // Left out, each pixel is missed: none and svgf, which changes nothing, are better.
+        (4.0, 0.0, 1.0, 0.0),
+        // A pixel that stands alone seems not to vary: of few samples that is no proof.
+        (3.0, 0.0, 1.0, 0.5),
+        // Squares stay finite: of deviations, and of values 1e23 times the luminance below which errors are absolute.
+        (4.0, f32::MAX, 1.0, 0.0),
+        (4.0, 0.0, 4e20, 0.0),
+    ] {
+        let mut input = line(&[0.0, value]);
+        input.guide[1].normal = [0.0, 1.0, 0.0];
+        input.radiance.iter_mut().for_each(|c| c[3] = samples);
+        input.variance = Some(vec![[variance; 3]; 2]);
+        let found = red(&both(&gpu, "auto", &input, &settings));
+        let right = [taken, 1.0 - taken].map(|share| share * value);
+        assert!(
+            found.iter().zip(right).all(|(a, b)| (a - b).abs() < 1e-6 * value),
+            "{samples} {variance} {value}: {found:?}"
+        );
+    }
     assert_silent(&gpu);
 }

@@ -34,7 +34,7 @@ Moments unpacked(vec4 head, vec4 mean, vec4 xx, vec4 y, vec4 zr, vec4 rg, vec4 g
     to[(at) + 3 * step].xyz = paired(vec4(m.g.zw, m.b.xy), m.b.zwzw).xyz
 
 Moments moved(Moments m, vec4 by) {
-    m.mean = m.head.x > 0.0 ? m.mean - by : vec4(0.0);
+    m.mean -= by;
     return m;
 }
 

@@ -171,7 +171,7 @@ fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
             (scaled(filtered, image[i].colour) / (1.0 - kept)).powi(2)
         };
         let level = scaled(results.iter().map(|r| colour(&r[i])).sum::<Vec3>() / 3.0, Vec3::ZERO);
-        let unfiltered = 2.0 * (noise[i].max(0.0).sqrt() / floor).min(LIMIT).powi(2);
+        let unfiltered = 2.0 * (noise[i].sqrt() / floor).min(LIMIT).powi(2);
         let relative = Vec4::new(unfiltered, missed(0), missed(1), missed(2)) / (level * level + 1.0).sqrt();
         if image[i].count < ENOUGH { Vec4::new(WORST, relative.y, relative.z, WORST) } else { relative }
     };

@@ -229,8 +229,13 @@ fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
             m.mean + DVec3::from(m.slopes.map(|slope| slope.dot(off)))
         });
         let (count, sum) = values.fold((0.0, DVec3::ZERO), |(n, sum), v| (n + 1.0, sum + v));
-        let count_out = if pixels[at].colour.is_some() { input.radiance[at][3] } else { 1.0 };
-        if count > 0.0 { (sum / count).as_vec3().extend(count_out).into() } else { [0.0; 4] }
+        let own = pixels[at].colour.map(|c| c.as_vec3().extend(input.radiance[at][3]));
+        let value = (sum / count).as_vec3();
+        // A model that no float can hold, or no known pixel in reach: the pixel stays as it is.
+        match value.is_finite() {
+            true => value.extend(own.map_or(1.0, |own| own.w)).into(),
+            false => own.unwrap_or_default().into(),
+        }
     };
     (0..pixels.len()).into_par_iter().map(mean).collect()
 }

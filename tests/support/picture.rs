@@ -2,7 +2,7 @@
 #![allow(dead_code)]
 use crate::support::hash;
 use tallow::filter::{AtrousForm, FilterInput, FilterSettings, WaveletBasis};
-use tallow::gpu::layout::{Guide, NONE};
+use tallow::gpu::layout::{Guide, NONE, vec4};
 
 /// Around the workgroups' sizes, and one pixel.
 pub const SIZES: [(u32, u32); 7] = [(1, 1), (31, 1), (1, 65), (31, 17), (64, 65), (33, 40), (130, 7)];
@@ -81,4 +81,26 @@ pub fn settings(filter: &str) -> Vec<FilterSettings> {
         ],
         _ => vec![base],
     }
+}
+
+/// The largest difference of a channel, relative to the pixel's largest where that is above `scale`.
+pub fn apart(a: &[vec4], b: &[vec4], scale: f32) -> f32 {
+    assert_eq!(a.len(), b.len());
+    let largest = |c: &vec4| c[..3].iter().fold(scale, |m, v| m.max(v.abs()));
+    let pair = |(a, b): (&vec4, &vec4)| {
+        let off = (0..4).map(|i| (a[i] - b[i]).abs()).fold(0.0, f32::max);
+        if off.is_nan() { f32::INFINITY } else { off / largest(b) }
+    };
+    a.iter().zip(b).map(pair).fold(0.0, f32::max)
+}
+
+/// One row of pixels on one plane, without edges.
+pub fn line(values: &[f32]) -> FilterInput {
+    let mut input = Picture::new(values.len() as u32, 1).flat().input;
+    input.radiance = values.iter().map(|v| [*v, *v, *v, if v.is_nan() { 0.0 } else { 1.0 }]).collect();
+    input
+}
+
+pub fn red(pixels: &[vec4]) -> Vec<f32> {
+    pixels.iter().map(|p| p[0]).collect()
 }
