@@ -137,6 +137,33 @@ fn disjoint_ranges_merge_and_others_are_refused() {
     assert!(!folder.path().join("d.exr").exists());
 }
 
+#[test]
+fn a_merged_file_still_knows_every_sample_that_it_holds() {
+    let folder = tempfile::tempdir().unwrap();
+    let merges = |words: &str| assert!(run(&folder, &format!("merge {words}")).status.success(), "{words}");
+    let refuses = |words: &str, parts: &[&str]| {
+        complains(&run(&folder, &format!("merge {words} -o not.exr")), 3, parts);
+        assert!(!folder.path().join("not.exr").exists());
+    };
+    render(&folder, "--spp 4 -o a.exr");
+    render(&folder, "--spp 5 --first-sample 4 -o b.exr");
+    render(&folder, "--spp 2 --first-sample 9 -o c.exr");
+    render(&folder, "--spp 3 --seed 1 -o other.exr");
+    merges("b.exr a.exr -o ba.exr");
+    refuses("ba.exr a.exr", &["a.exr", "0 to 4 of seed 0", "count twice"]);
+    merges("ba.exr other.exr c.exr -o all.exr");
+    for again in ["a", "b", "c", "other", "ba", "all"] {
+        refuses(&format!("all.exr {again}.exr"), &[&format!("{again}.exr"), "count twice"]);
+        refuses(&format!("{again}.exr all.exr"), &["all.exr", "count twice"]);
+    }
+    assert_eq!(counts(&film(&folder, "all.exr")), [14; 40 * 30]);
+    let small = "--width 40 --height 30 --max-depth 3";
+    for first in ["--resume ba.exr --first-sample 4", "--resume all.exr --first-sample 4"] {
+        let resumed = run(&folder, &format!("render {} {small} --spp 20 {first} -o not.exr", scene()));
+        complains(&resumed, 3, &["was merged", "--first-sample"]);
+    }
+}
+
 #[track_caller]
 fn complains(output: &Output, code: i32, parts: &[&str]) {
     let text = String::from_utf8(output.stderr.clone()).unwrap();

@@ -1,6 +1,7 @@
 //! Taking up a render where it stopped: everything that it needs is in the EXR file that it wrote.
 use super::job::End;
 use super::layers;
+use super::origin::Origin;
 use crate::error::{Error, Result};
 use crate::gpu::FrameResources;
 use crate::gpu::layout::{PixelLight, PixelStats};
@@ -35,20 +36,9 @@ impl Earlier {
     }
 
     fn of(film: &Film, settings: &Settings) -> std::result::Result<Self, String> {
-        let said = film.metadata.get("settings").ok_or("says nothing of its settings: it must be of tallow render")?;
+        let origin = Origin::of(film)?;
+        check(&origin, settings)?;
         let uniform = settings.allocate.policy == "uniform";
-        let parsed = |text: &str| serde_json::from_str::<Value>(text).map_err(|e| format!("settings: {e}"));
-        let mut wanted = parsed(&serde_json::to_string(settings).map_err(|e| e.to_string())?)?;
-        let mut had = parsed(said)?;
-        if uniform {
-            for settings in [&mut wanted, &mut had] {
-                settings.as_object_mut().map(|s| s.remove("spp"));
-            }
-        }
-        if wanted != had {
-            let free = if uniform { "; only spp may differ" } else { "" };
-            return Err(format!("was rendered with other settings{free}: {said}"));
-        }
         let pixels = layers::pixels(film)?;
         let count = |p: &Pixel| p.stats.count;
         let pending = match layers::counts(film, layers::PENDING) {
@@ -74,6 +64,29 @@ impl Earlier {
         let light: Vec<PixelLight> = self.pixels.iter().map(|p| p.light).collect();
         renderer.resume(frame, &stats, &light, &self.priority, &self.pending)?;
         Ok(renderer.rest(self.progress))
+    }
+}
+
+/// Whether a render with these settings can go on where the file's ended.
+fn check(origin: &Origin, settings: &Settings) -> std::result::Result<(), String> {
+    let uniform = settings.allocate.policy == "uniform";
+    // By way of text: a number's shortest decimal is not its value in double precision.
+    let text = serde_json::to_string(settings).map_err(|e| e.to_string())?;
+    let mut wanted: Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
+    let mut had = origin.settings.clone();
+    if uniform {
+        for settings in [&mut wanted, &mut had] {
+            settings.as_object_mut().map(|s| s.remove("spp"));
+        }
+    }
+    if wanted != had {
+        let free = if uniform { "; only spp may differ" } else { "" };
+        return Err(format!("was rendered with other settings{free}: {}", origin.settings));
+    }
+    // A pixel goes on at the index of its first sample plus their number.
+    match &origin.samples[..] {
+        [one] if (one.seed, one.first) == (settings.seed, settings.first_sample) => Ok(()),
+        _ => Err("was merged, and cannot be resumed: render more samples with --first-sample, and merge those".into()),
     }
 }
 
