@@ -46,10 +46,11 @@ impl Part {
 
     /// Why they cannot be merged.
     fn conflict(&self, other: &Self) -> Option<String> {
-        if self.film.metadata.get("scene") != other.film.metadata.get("scene")
-            || self.origin.settings != other.origin.settings
-        {
-            return Some("shows another scene, or was rendered with other settings".into());
+        if self.origin.settings != other.origin.settings {
+            return Some("was rendered with other settings".into());
+        }
+        if self.origin.scene != other.origin.scene {
+            return Some("shows another scene, or the same one changed".into());
         }
         let again = other.origin.samples.iter().find(|b| self.origin.samples.iter().any(|a| a.overlaps(b)))?;
         let SampleRange { seed, first, .. } = again;

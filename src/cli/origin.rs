@@ -2,12 +2,13 @@
 use super::layers;
 use crate::error::{Error, Result};
 use crate::image::Film;
-use crate::settings::Settings;
+use crate::scene::Scene;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 const SETTINGS: &str = "settings";
+const SCENE: &str = "sceneFingerprint";
 const SAMPLES: &str = "sampleRanges";
 
 /// Samples of one render. A pixel has no others, and may lack some at the end.
@@ -37,6 +38,8 @@ impl SampleRange {
 pub struct Origin {
     /// Of the render; of a merged file, those of the first that went into it.
     pub settings: Value,
+    /// [`Scene::fingerprint`].
+    pub scene: String,
     /// One for each render that went into it. Adjacent ones stay apart: pixels that lack samples at the end of the former
     /// have a gap there.
     pub samples: Vec<SampleRange>,
@@ -48,14 +51,18 @@ impl Origin {
     /// # Errors
     /// What is missing or damaged.
     pub fn of(film: &Film) -> std::result::Result<Self, String> {
-        Ok(Self { settings: parsed(film, SETTINGS)?, samples: parsed(film, SAMPLES)? })
+        let settings = parsed(film, SETTINGS)?;
+        Ok(Self { settings, scene: said(film, SCENE)?.to_owned(), samples: parsed(film, SAMPLES)? })
     }
 }
 
+fn said<'a>(film: &'a Film, key: &str) -> std::result::Result<&'a str, String> {
+    let missing = || format!("has no metadata \"{key}\": it must be of tallow render or merge, of this version");
+    film.metadata.get(key).map(String::as_str).ok_or_else(missing)
+}
+
 fn parsed<T: DeserializeOwned>(film: &Film, key: &str) -> std::result::Result<T, String> {
-    let missing = || format!("has no metadata \"{key}\": it must be of this version of tallow render, or merge");
-    let said = film.metadata.get(key).ok_or_else(missing)?;
-    serde_json::from_str(said).map_err(|e| format!("{key}: {e}"))
+    serde_json::from_str(said(film, key)?).map_err(|e| format!("{key}: {e}"))
 }
 
 fn json(what: &impl Serialize) -> Result<String> {
@@ -66,17 +73,18 @@ fn json(what: &impl Serialize) -> Result<String> {
 ///
 /// # Errors
 /// [`Error::Usage`] when the film has no layer of counts.
-pub fn metadata(settings: &Settings, film: &Film) -> Result<[(&'static str, String); 2]> {
+pub fn metadata(scene: &Scene, film: &Film) -> Result<[(&'static str, String); 3]> {
+    let settings = &scene.settings;
     let counts = layers::counts(film, "samples").map_err(Error::Usage)?;
     let count = counts.into_iter().max().unwrap_or(0);
     let range = SampleRange { seed: settings.seed, first: settings.first_sample, count };
-    Ok([(SETTINGS, json(settings)?), (SAMPLES, json(&[range])?)])
+    Ok([(SETTINGS, json(settings)?), (SCENE, scene.fingerprint.to_string()), (SAMPLES, json(&[range])?)])
 }
 
 /// Says that a film is of these samples.
 ///
 /// # Errors
-/// None: the result is that of every text made here.
+/// [`Error::Usage`] when JSON cannot say it (a bug).
 pub fn set_samples(film: &mut Film, samples: &[SampleRange]) -> Result<()> {
     film.metadata.insert(SAMPLES.to_owned(), json(&samples)?);
     Ok(())

@@ -120,7 +120,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     check_outputs(args)?;
     let mut host = Spans::default();
     let scene = host.time("load scene", || Scene::load(&args.scene, &|s| args.overrides.apply(s)))?;
-    let earlier = args.resume.as_deref().map(|path| Earlier::read(path, &scene.settings)).transpose()?;
+    let earlier = args.resume.as_deref().map(|path| Earlier::read(path, &scene)).transpose()?;
     if args.common.talkative() {
         scene.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
     }
@@ -146,7 +146,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let mut film = host.time("read back", || layers::film(&renderer))?;
     let seconds = host.seconds("render");
     film.metadata = metadata(args, &gpu, seconds, end.allocations);
-    film.metadata.extend(origin::metadata(renderer.settings(), &film)?.map(|(k, v)| (k.to_owned(), v)));
+    film.metadata.extend(origin::metadata(&scene, &film)?.map(|(k, v)| (k.to_owned(), v)));
     if end.why == Why::Interrupted {
         let pending = resume::pending(&renderer, &film, &end)?;
         film.add(layers::PENDING, Samples::U32(pending));

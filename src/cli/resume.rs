@@ -7,8 +7,8 @@ use crate::gpu::FrameResources;
 use crate::gpu::layout::{PixelLight, PixelStats};
 use crate::image::{self, Film, Samples};
 use crate::renderer::{Progress, Renderer, Step};
+use crate::scene::Scene;
 use crate::schedule;
-use crate::settings::Settings;
 use crate::statistics::Pixel;
 use serde_json::Value;
 use std::path::Path;
@@ -26,18 +26,19 @@ pub struct Earlier {
 }
 
 impl Earlier {
-    /// Reads the file of a render with these settings; one that spread its samples evenly may have had fewer of them.
+    /// Reads the file of a render of this scene with its settings; one that spread its samples evenly may have had fewer
+    /// of them.
     ///
     /// # Errors
     /// [`Error::Input`] when it is no such file.
-    pub fn read(path: &Path, settings: &Settings) -> Result<Self> {
+    pub fn read(path: &Path, scene: &Scene) -> Result<Self> {
         let film = image::read(path)?;
-        Self::of(&film, settings).map_err(|what| Error::input(path, what))
+        Self::of(&film, scene).map_err(|what| Error::input(path, what))
     }
 
-    fn of(film: &Film, settings: &Settings) -> std::result::Result<Self, String> {
-        let origin = Origin::of(film)?;
-        check(&origin, settings)?;
+    fn of(film: &Film, scene: &Scene) -> std::result::Result<Self, String> {
+        check(&Origin::of(film)?, scene)?;
+        let settings = &scene.settings;
         let uniform = settings.allocate.policy == "uniform";
         let pixels = layers::pixels(film)?;
         let count = |p: &Pixel| p.stats.count;
@@ -67,8 +68,9 @@ impl Earlier {
     }
 }
 
-/// Whether a render with these settings can go on where the file's ended.
-fn check(origin: &Origin, settings: &Settings) -> std::result::Result<(), String> {
+/// Whether a render of this scene can go on where the file's ended.
+fn check(origin: &Origin, scene: &Scene) -> std::result::Result<(), String> {
+    let settings = &scene.settings;
     let uniform = settings.allocate.policy == "uniform";
     // By way of text: a number's shortest decimal is not its value in double precision.
     let text = serde_json::to_string(settings).map_err(|e| e.to_string())?;
@@ -82,6 +84,9 @@ fn check(origin: &Origin, settings: &Settings) -> std::result::Result<(), String
     if wanted != had {
         let free = if uniform { "; only spp may differ" } else { "" };
         return Err(format!("was rendered with other settings{free}: {}", origin.settings));
+    }
+    if origin.scene != scene.fingerprint.to_string() {
+        return Err("shows another scene, or this one before it was changed".into());
     }
     // A pixel goes on at the index of its first sample plus their number.
     match &origin.samples[..] {
