@@ -137,6 +137,64 @@ fn disjoint_ranges_merge_and_others_are_refused() {
     assert!(!folder.path().join("d.exr").exists());
 }
 
+#[test]
+fn a_merged_file_still_knows_every_sample_that_it_holds() {
+    let folder = tempfile::tempdir().unwrap();
+    let merges = |words: &str| assert!(run(&folder, &format!("merge {words}")).status.success(), "{words}");
+    let refuses = |words: &str, parts: &[&str]| {
+        complains(&run(&folder, &format!("merge {words} -o not.exr")), 3, parts);
+        assert!(!folder.path().join("not.exr").exists());
+    };
+    render(&folder, "--spp 4 -o a.exr");
+    render(&folder, "--spp 5 --first-sample 4 -o b.exr");
+    render(&folder, "--spp 2 --first-sample 9 -o c.exr");
+    render(&folder, "--spp 3 --seed 1 -o other.exr");
+    merges("b.exr a.exr -o ba.exr");
+    refuses("ba.exr a.exr", &["a.exr", "0 to 4 of seed 0", "count twice"]);
+    merges("ba.exr other.exr c.exr -o all.exr");
+    for again in ["a", "b", "c", "other", "ba", "all"] {
+        refuses(&format!("all.exr {again}.exr"), &[&format!("{again}.exr"), "count twice"]);
+        refuses(&format!("{again}.exr all.exr"), &["all.exr", "count twice"]);
+    }
+    assert_eq!(counts(&film(&folder, "all.exr")), [14; 40 * 30]);
+    let small = "--width 40 --height 30 --max-depth 3";
+    for first in ["--resume ba.exr --first-sample 4", "--resume all.exr --first-sample 4"] {
+        let resumed = run(&folder, &format!("render {} {small} --spp 20 {first} -o not.exr", scene()));
+        complains(&resumed, 3, &["was merged", "--first-sample"]);
+    }
+}
+
+#[test]
+fn samples_are_added_to_those_of_the_same_scene_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(scene()).unwrap();
+    let mesh = Path::new(&scene()).parent().unwrap().display().to_string();
+    let text = text.replace("file = \"", &format!("file = \"{mesh}/"));
+    std::fs::write(folder.path().join("s.toml"), &text).unwrap();
+    std::fs::create_dir(folder.path().join("moved")).unwrap();
+    std::fs::write(folder.path().join("moved/t.toml"), &text).unwrap();
+    let small = "--width 16 --height 12 --max-depth 3";
+    let render = |words: &str| run(&folder, &format!("render {small} {words}"));
+    let well = |output: Output| assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    well(render("s.toml --spp 2 -o a.exr"));
+    well(render("moved/t.toml --spp 2 --first-sample 2 -o b.exr"));
+    well(run(&folder, "merge a.exr b.exr -o ab.exr"));
+    well(render("moved/t.toml --spp 4 --resume a.exr -o more.exr"));
+
+    assert!(text.contains("fov = 39.3077"), "another edit is needed");
+    std::fs::write(folder.path().join("s.toml"), text.replace("fov = 39.3077", "fov = 39.3")).unwrap();
+    complains(&render("s.toml --spp 4 --resume a.exr -o not.exr"), 3, &["a.exr", "another scene"]);
+    well(render("s.toml --spp 2 --first-sample 2 -o edited.exr"));
+    complains(&run(&folder, "merge a.exr edited.exr -o not.exr"), 3, &["edited.exr", "another scene"]);
+
+    let mut old = film(&folder, "a.exr");
+    old.metadata.remove("sceneFingerprint").unwrap();
+    image::write(&folder.path().join("old.exr"), &old, &Default::default()).unwrap();
+    complains(&render("moved/t.toml --spp 4 --resume old.exr -o not.exr"), 3, &["old.exr", "sceneFingerprint"]);
+    complains(&run(&folder, "merge b.exr old.exr -o not.exr"), 3, &["old.exr", "sceneFingerprint"]);
+    assert!(!folder.path().join("not.exr").exists());
+}
+
 #[track_caller]
 fn complains(output: &Output, code: i32, parts: &[&str]) {
     let text = String::from_utf8(output.stderr.clone()).unwrap();

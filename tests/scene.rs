@@ -58,6 +58,62 @@ fn a_small_scene_becomes_arrays() {
     assert_eq!(wide.camera.right[0], wide.camera.up[1] * 4.0, "the camera follows the override");
 }
 
+#[test]
+fn the_fingerprint_is_that_of_what_is_seen() {
+    let more = "
+[[mesh]]\nname = \"ball\"\nshape = \"sphere\"\nsegments = 24
+[[instance]]\nmesh = \"ball\"\ntransform = { translate = [1, 2, 3] }
+[[instance]]\nmesh = \"ball\"\ntransform = { translate = [3, 2, 1] }
+[[light]]\ntype = \"point\"\nposition = [0, 1, 1]\nintensity = 3
+[environment]\nradiance = 0.1";
+    let text = format!("{BOX}{more}");
+    let of = |text: &str| parse(text).unwrap().fingerprint;
+    for threads in [1, 2, 5] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        assert_eq!(pool.install(|| of(&text)), of(&text), "by {threads} threads");
+    }
+    let edited = |from: &str, to: &str| {
+        assert!(text.contains(from), "{from}");
+        of(&text.replacen(from, to, 1))
+    };
+    let seen = [
+        ("position = [0, 0, 5]", "position = [0, 0, 5.1]"),
+        ("width = 32", "width = 33"), // the camera's aspect
+        ("0.2, 0.3]", "0.2, 0.31]"),
+        ("emission = 5", "emission = 5.1"),
+        ("shape = \"rectangle\"", "shape = \"disk\""),
+        ("scale = 0.5", "scale = 0.51"),
+        ("material = \"wall\"", "material = \"lamp\""),
+        ("segments = 24", "segments = 25"),
+        ("[3, 2, 1]", "[3, 2, 1.1]"),
+        ("mesh = \"ball\"", "mesh = \"lamp\""),
+        ("position = [0, 1, 1]", "position = [0, 1, 1.1]"),
+        ("intensity = 3", "intensity = 3.1"),
+        ("radiance = 0.1", "radiance = 0.11"),
+    ];
+    let found: std::collections::HashSet<_> = seen.iter().map(|(from, to)| edited(from, to).to_string()).collect();
+    assert_eq!(found.len(), seen.len());
+    assert!(!found.contains(&of(&text).to_string()));
+    for (from, to) in [("spp = 4", "spp = 5"), ("name = \"floor\"", "name = \"ground\"")] {
+        assert_eq!(edited(from, to), of(&text), "{to}");
+    }
+}
+
+#[test]
+fn a_texel_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |blue: u8| {
+        let picture = image::RgbImage::from_raw(2, 1, vec![1, 2, 3, 4, 5, blue]).unwrap();
+        picture.save(folder.path().join("a.png")).unwrap();
+        let text = BOX.replacen("color = [0.1, 0.2, 0.3]", "color_texture = \"a.png\"", 1);
+        let scene = Scene::parse(&folder.path().join("scene.toml"), &text, &|_| {}).unwrap();
+        assert_eq!(scene.texels.len(), 2);
+        scene.fingerprint
+    };
+    assert_eq!(of(6), of(6));
+    assert_ne!(of(6), of(7));
+}
+
 /// Area of a light's triangle.
 fn area(l: &Light) -> f32 {
     let [a, b, c] = [l.a, l.b, l.c].map(glam::Vec3::from);

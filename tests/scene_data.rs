@@ -3,12 +3,11 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tallow::scene::Scene;
 
-fn data() -> Option<PathBuf> {
-    let found = std::env::var_os("TALLOW_DATA").map(PathBuf::from);
-    if found.is_none() {
-        println!("skipped: TALLOW_DATA is not set, so the large scenes are not there");
-    }
-    found
+/// # Panics
+/// When there is none: these tests are ignored unless asked for.
+fn data() -> PathBuf {
+    let found = std::env::var_os("TALLOW_DATA").expect("TALLOW_DATA must name the folder of the outside data");
+    found.into()
 }
 
 fn objs(directory: &Path, found: &mut Vec<PathBuf>) {
@@ -22,8 +21,9 @@ fn objs(directory: &Path, found: &mut Vec<PathBuf>) {
 }
 
 #[test]
+#[ignore = "needs TALLOW_DATA"]
 fn every_obj_loads() {
-    let Some(data) = data() else { return };
+    let data = data();
     let mut paths = Vec::new();
     objs(&data.join("scenes"), &mut paths);
     assert!(paths.len() >= 50, "only {} OBJ files below {}", paths.len(), data.display());
@@ -45,8 +45,9 @@ fn every_obj_loads() {
 }
 
 #[test]
+#[ignore = "needs TALLOW_DATA"]
 fn sponza_loads_with_its_textures() {
-    let Some(data) = data() else { return };
+    let data = data();
     let path = data.join("scenes/crytek-sponza/sponza.obj");
     let mut best = f64::INFINITY;
     for _ in 0..3 {

@@ -1,9 +1,9 @@
 //! `tallow merge`: renders of the same picture by different samples become one.
+use super::origin::{self, Origin, SampleRange};
 use super::{Exit, layers};
 use crate::error::{Error, Result};
 use crate::image::{self, Film, WriteOptions};
 use crate::statistics::{Pixel, join};
-use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Merge renders of disjoint sample ranges into one
@@ -26,11 +26,8 @@ const FREE: [&str; 3] = ["spp", "first_sample", "seed"];
 struct Part {
     film: Film,
     pixels: Vec<Pixel>,
-    /// All but [`FREE`].
-    settings: Value,
-    seed: u64,
-    /// Sample indices of all pixels.
-    range: std::ops::Range<u64>,
+    /// Its settings are all but [`FREE`].
+    origin: Origin,
 }
 
 impl Part {
@@ -40,27 +37,24 @@ impl Part {
     }
 
     fn of(film: Film) -> std::result::Result<Self, String> {
-        let said = film.metadata.get("settings").ok_or("says nothing of its settings: it must be of tallow render")?;
-        let mut settings: Value = serde_json::from_str(said).map_err(|e| format!("settings: {e}"))?;
-        let [_, first, seed] = FREE.map(|key| {
-            let value = settings.as_object_mut().and_then(|s| s.remove(key));
-            value.and_then(|v| v.as_u64()).unwrap_or(0)
-        });
-        let pixels = layers::pixels(&film)?;
-        let most = pixels.iter().map(|p| u64::from(p.stats.count)).max().unwrap_or(0);
-        Ok(Self { film, pixels, settings, seed, range: first..first + most })
+        let mut origin = Origin::of(&film)?;
+        if let Some(settings) = origin.settings.as_object_mut() {
+            settings.retain(|key, _| !FREE.contains(&key.as_str()));
+        }
+        Ok(Self { pixels: layers::pixels(&film)?, film, origin })
     }
 
     /// Why they cannot be merged.
     fn conflict(&self, other: &Self) -> Option<String> {
-        let (a, b) = (&self.range, &other.range);
-        if self.film.metadata.get("scene") != other.film.metadata.get("scene") || self.settings != other.settings {
-            return Some("shows another scene, or was rendered with other settings".into());
+        if self.origin.settings != other.origin.settings {
+            return Some("was rendered with other settings".into());
         }
-        let both = self.seed == other.seed && a.start < b.end && b.start < a.end;
-        both.then(|| {
-            format!("has samples {} to {} of seed {} as well: they would count twice", b.start, b.end, self.seed)
-        })
+        if self.origin.scene != other.origin.scene {
+            return Some("shows another scene, or the same one changed".into());
+        }
+        let again = other.origin.samples.iter().find(|b| self.origin.samples.iter().any(|a| a.overlaps(b)))?;
+        let SampleRange { seed, first, .. } = again;
+        Some(format!("has samples {first} to {} of seed {seed} as well: they would count twice", again.end()))
     }
 }
 
@@ -83,13 +77,15 @@ pub fn run(args: &Args) -> Result<Exit> {
 /// The first film, with everybody's samples.
 fn merged(parts: Vec<Part>) -> Result<Film> {
     let mut parts = parts.into_iter();
-    let Some(Part { mut film, mut pixels, .. }) = parts.next() else {
+    let Some(Part { mut film, mut pixels, mut origin }) = parts.next() else {
         return Err(Error::Usage("name files to merge".into()));
     };
     for part in parts {
         pixels.iter_mut().zip(&part.pixels).for_each(|(a, b)| *a = join(a, b));
+        origin.samples.extend(part.origin.samples);
     }
     layers::replace_pixels(&mut film, &pixels);
     film.channels.retain(|c| c.name != layers::PENDING && c.name != layers::PRIORITY);
+    origin::set_samples(&mut film, &origin.samples)?;
     Ok(film)
 }

@@ -8,6 +8,7 @@ pub mod interrupt;
 pub mod job;
 pub mod layers;
 pub mod merge;
+pub mod origin;
 pub mod overrides;
 pub mod progress;
 pub mod render;

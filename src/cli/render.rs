@@ -3,7 +3,7 @@ use super::common::Common;
 use super::job::{End, Job, Why};
 use super::overrides::Overrides;
 use super::resume::{self, Earlier};
-use super::{Exit, fail_on_messages, interrupt, layers, print, print_json};
+use super::{Exit, fail_on_messages, interrupt, layers, origin, print, print_json};
 use crate::error::{Error, Result};
 use crate::gpu::{self, FrameResources, Gpu, PassTime};
 use crate::image::difference::false_colours;
@@ -120,7 +120,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     check_outputs(args)?;
     let mut host = Spans::default();
     let scene = host.time("load scene", || Scene::load(&args.scene, &|s| args.overrides.apply(s)))?;
-    let earlier = args.resume.as_deref().map(|path| Earlier::read(path, &scene.settings)).transpose()?;
+    let earlier = args.resume.as_deref().map(|path| Earlier::read(path, &scene)).transpose()?;
     if args.common.talkative() {
         scene.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
     }
@@ -145,7 +145,8 @@ pub fn run(args: &Args) -> Result<Exit> {
     }
     let mut film = host.time("read back", || layers::film(&renderer))?;
     let seconds = host.seconds("render");
-    film.metadata = metadata(args, &renderer, &gpu, seconds, end.allocations)?;
+    film.metadata = metadata(args, &gpu, seconds, end.allocations);
+    film.metadata.extend(origin::metadata(&scene, &film)?.map(|(k, v)| (k.to_owned(), v)));
     if end.why == Why::Interrupted {
         let pending = resume::pending(&renderer, &film, &end)?;
         film.add(layers::PENDING, Samples::U32(pending));
@@ -177,28 +178,19 @@ impl Spans {
     }
 }
 
-fn metadata(
-    args: &Args,
-    renderer: &Renderer,
-    gpu: &Gpu,
-    seconds: f64,
-    allocations: u32,
-) -> Result<BTreeMap<String, String>> {
+fn metadata(args: &Args, gpu: &Gpu, seconds: f64, allocations: u32) -> BTreeMap<String, String> {
     let info = gpu.info();
-    let settings = serde_json::to_string(renderer.settings()).map_err(|e| Error::Usage(e.to_string()))?;
     let since_epoch = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     let entries = [
         ("software", format!("tallow {}", env!("CARGO_PKG_VERSION"))),
         ("scene", args.scene.display().to_string()),
-        ("settings", settings),
-        ("seed", renderer.settings().seed.to_string()),
         (resume::ALLOCATIONS, allocations.to_string()),
         ("device", info.name.clone()),
         ("driver", format!("{} {} {}", info.driver_name, info.driver_version, info.driver_info)),
         ("renderSeconds", format!("{seconds:.3}")),
         ("dateUnix", since_epoch.as_secs().to_string()),
     ];
-    Ok(entries.map(|(k, v)| (k.to_owned(), v)).into())
+    entries.map(|(k, v)| (k.to_owned(), v)).into()
 }
 
 /// A broken pixel is a bug, and is told; the file is written all the same, so that it can be looked at.

@@ -1,13 +1,14 @@
 //! Taking up a render where it stopped: everything that it needs is in the EXR file that it wrote.
 use super::job::End;
 use super::layers;
+use super::origin::Origin;
 use crate::error::{Error, Result};
 use crate::gpu::FrameResources;
 use crate::gpu::layout::{PixelLight, PixelStats};
 use crate::image::{self, Film, Samples};
 use crate::renderer::{Progress, Renderer};
+use crate::scene::Scene;
 use crate::schedule;
-use crate::settings::Settings;
 use crate::statistics::Pixel;
 use serde_json::Value;
 use std::path::Path;
@@ -25,30 +26,20 @@ pub struct Earlier {
 }
 
 impl Earlier {
-    /// Reads the file of a render with these settings; one that spread its samples evenly may have had fewer of them.
+    /// Reads the file of a render of this scene with its settings; one that spread its samples evenly may have had fewer
+    /// of them.
     ///
     /// # Errors
     /// [`Error::Input`] when it is no such file.
-    pub fn read(path: &Path, settings: &Settings) -> Result<Self> {
+    pub fn read(path: &Path, scene: &Scene) -> Result<Self> {
         let film = image::read(path)?;
-        Self::of(&film, settings).map_err(|what| Error::input(path, what))
+        Self::of(&film, scene).map_err(|what| Error::input(path, what))
     }
 
-    fn of(film: &Film, settings: &Settings) -> std::result::Result<Self, String> {
-        let said = film.metadata.get("settings").ok_or("says nothing of its settings: it must be of tallow render")?;
+    fn of(film: &Film, scene: &Scene) -> std::result::Result<Self, String> {
+        check(&Origin::of(film)?, scene)?;
+        let settings = &scene.settings;
         let uniform = settings.allocate.policy == "uniform";
-        let parsed = |text: &str| serde_json::from_str::<Value>(text).map_err(|e| format!("settings: {e}"));
-        let mut wanted = parsed(&serde_json::to_string(settings).map_err(|e| e.to_string())?)?;
-        let mut had = parsed(said)?;
-        if uniform {
-            for settings in [&mut wanted, &mut had] {
-                settings.as_object_mut().map(|s| s.remove("spp"));
-            }
-        }
-        if wanted != had {
-            let free = if uniform { "; only spp may differ" } else { "" };
-            return Err(format!("was rendered with other settings{free}: {said}"));
-        }
         let pixels = layers::pixels(film)?;
         let count = |p: &Pixel| p.stats.count;
         let pending = match layers::counts(film, layers::PENDING) {
@@ -73,6 +64,33 @@ impl Earlier {
         let stats: Vec<PixelStats> = self.pixels.iter().map(|p| p.stats).collect();
         let light: Vec<PixelLight> = self.pixels.iter().map(|p| p.light).collect();
         renderer.resume(frame, &stats, &light, &self.priority, &self.pending)
+    }
+}
+
+/// Whether a render of this scene can go on where the file's ended.
+fn check(origin: &Origin, scene: &Scene) -> std::result::Result<(), String> {
+    let settings = &scene.settings;
+    let uniform = settings.allocate.policy == "uniform";
+    // By way of text: a number's shortest decimal is not its value in double precision.
+    let text = serde_json::to_string(settings).map_err(|e| e.to_string())?;
+    let mut wanted: Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
+    let mut had = origin.settings.clone();
+    if uniform {
+        for settings in [&mut wanted, &mut had] {
+            settings.as_object_mut().map(|s| s.remove("spp"));
+        }
+    }
+    if wanted != had {
+        let free = if uniform { "; only spp may differ" } else { "" };
+        return Err(format!("was rendered with other settings{free}: {}", origin.settings));
+    }
+    if origin.scene != scene.fingerprint.to_string() {
+        return Err("shows another scene, or this one before it was changed".into());
+    }
+    // A pixel goes on at the index of its first sample plus their number.
+    match &origin.samples[..] {
+        [one] if (one.seed, one.first) == (settings.seed, settings.first_sample) => Ok(()),
+        _ => Err("was merged, and cannot be resumed: render more samples with --first-sample, and merge those".into()),
     }
 }
 

@@ -5,7 +5,7 @@ use super::obj::{self, Library, ObjFile};
 use super::place::{Job, Plan, instance, mesh_name};
 use super::{Scene, bvh, environment, light};
 use crate::error::{Error, Result};
-use crate::gpu::layout::{LIGHT_ENVIRONMENT, NONE};
+use crate::gpu::layout::{Instance, LIGHT_ENVIRONMENT, NONE};
 use glam::{DAffine3, Vec3};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
@@ -105,6 +105,8 @@ impl Assembly<'_> {
         self.lights(scene)?;
         let plan = self.plan()?;
         let stored = self.store(&plan)?;
+        scene.fingerprint.add(&self.geometry.triangles);
+        scene.fingerprint.add(&self.geometry.shading);
         self.build(&plan, stored, scene)
     }
 
@@ -200,7 +202,11 @@ impl Assembly<'_> {
             let baked = mesh.mesh.is_none().then_some(&identity);
             for copy in copies.chain(baked) {
                 let (material, object) = (copy.material.unwrap_or(NONE), scene.names.objects.len() as u32);
-                scene.instances.push(crate::gpu::layout::Instance { material, object, ..instance(&copy.affine, root) });
+                let placed = Instance { material, object, ..instance(&copy.affine, root) };
+                // Nodes are counted differently by another builder, triangles are not.
+                scene.fingerprint.add(&[Instance { root: mesh.range.start as u32, ..placed }]);
+                scene.fingerprint.add(&[mesh.range.end as u32]);
+                scene.instances.push(placed);
                 scene.names.objects.extend(mesh.objects.iter().cloned());
             }
         }
@@ -243,6 +249,7 @@ impl Assembly<'_> {
         if sky && scene.lights.is_empty() && !scene.triangles.iter().any(emits) {
             scene.lights.push(light::environment([1.0; 3], glam::DMat3::IDENTITY));
         }
+        add_appearance(scene);
         light::finish(scene, ranges);
         if !scene.lights.iter().any(|l| l.kind == LIGHT_ENVIRONMENT) {
             scene.environment = None;
@@ -251,5 +258,18 @@ impl Assembly<'_> {
             warnings.push("the scene has no light: its image will be black".into());
         }
         scene.warnings = warnings;
+    }
+}
+
+/// Adds to the fingerprint what surfaces and lights look like; the rest of them is derived from that.
+fn add_appearance(scene: &mut Scene) {
+    let fingerprint = &mut scene.fingerprint;
+    fingerprint.add(&scene.materials);
+    fingerprint.add(&scene.textures);
+    fingerprint.add(&scene.texels);
+    fingerprint.add(&scene.lights);
+    if let Some(environment) = &scene.environment {
+        fingerprint.add(&[environment.width, environment.height]);
+        fingerprint.add(&environment.texels);
     }
 }

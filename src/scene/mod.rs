@@ -14,6 +14,7 @@ mod camera;
 mod description;
 mod effects;
 mod environment;
+mod fingerprint;
 mod fresnel;
 mod geometry;
 mod light;
@@ -28,6 +29,7 @@ mod texture;
 mod value;
 
 pub use effects::effects;
+pub use fingerprint::Fingerprint;
 
 /// Largest coordinate a scene may have: squares of distances still fit a 32-bit float.
 pub const MAX_COORDINATE: f64 = 1e18;
@@ -67,6 +69,9 @@ pub struct Scene {
     pub triangle_pdf_scale: f32,
     /// The environment image, when the environment is not a constant.
     pub environment: Option<Environment>,
+    /// Of all that decides the picture but the settings, in the order of the files: triangles are added before the
+    /// hierarchy sorts them, which may do so otherwise in another version or on another machine.
+    pub fingerprint: Fingerprint,
     /// World-space bounds of all geometry; zero when there is none.
     pub bounds: [[f32; 3]; 2],
     /// What calls for what, for `tallow explain`: names by index of object and material.
@@ -146,6 +151,7 @@ impl Scene {
         }
         let camera = description.camera.build(&scene.settings, scene.bounds);
         scene.camera = camera.map_err(|what| Error::input_at(path, "[camera]", what))?;
+        scene.fingerprint.add(&[scene.camera]);
         Ok(scene)
     }
 }
