@@ -46,7 +46,7 @@ fn shipped(file: &str) -> Scene {
     Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file), &small).unwrap()
 }
 
-/// Textures of every use, masks, a normal map, an environment image, a lens, a mirrored instance, roulette and a clamp.
+/// Textures of every use, masks (of the lamp too), a normal map, an environment image, a lens, a mirrored instance, roulette and a clamp.
 fn pictures() -> Scene {
     let checks = |x: u32, y: u32| if (x / 4 + y / 4).is_multiple_of(2) { [230, 120, 40] } else { [60, 150, 220] };
     let bumps = |x: u32, y: u32| [128 + (x * 7 % 60) as u8, 128 + (y * 5 % 60) as u8, 235];
@@ -63,6 +63,7 @@ fn pictures() -> Scene {
          normal_map = 'bumps.png'\nspecular_texture = 'checks.png'\n\
          [[material]]\nname = 'leaf'\nopacity = 0.6\nopacity_texture = 'checks.png'\n\
          [[material]]\nname = 'lamp'\nemission = 3.0\nemission_texture = 'checks.png'\n\
+         opacity = 0.8\nopacity_texture = 'checks.png'\n\
          [[mesh]]\nname = 'floor'\nshape = 'rectangle'\nmaterial = 'floor'\n\
          transform = { rotate = [-90.0, 0.0, 0.0], scale = 4.0 }\n\
          [[mesh]]\nname = 'ball'\nshape = 'sphere'\nsegments = 32\nmaterial = 'ball'\n\
