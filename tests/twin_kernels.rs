@@ -56,7 +56,7 @@ fn pictures() -> Scene {
         .picture("bumps.png", 32, bumps);
     let mut scene = place.scene(
         "[camera]\nposition = [0.0, 1.4, 5.0]\ntarget = [0.0, 0.7, 0.0]\nfov = 45.0\nlens_radius = 0.05\n\
-         focus_distance = 5.0\n[render]\nmax_depth = 4\nroulette_depth = 2\nclamp_indirect = 3.0\n\
+         focus_distance = 5.0\n[render]\nmax_depth = 4\nroulette_depth = 2\nclamp_indirect = 1.0\n\
          [environment]\nfile = 'sky.exr'\nrotation = 40.0\n\
          [[material]]\nname = 'floor'\ncolor_texture = 'checks.png'\nbump = 'checks.png'\nbump_scale = 0.05\n\
          [[material]]\nname = 'ball'\ntype = 'coated'\nalpha = 0.3\nroughness_texture = 'checks.png'\n\
@@ -180,6 +180,10 @@ fn renders_agree_with_their_twins() {
     let scene = pictures();
     let mut pair = run(&gpu, &scene, called_for(&scene, outputs));
     check("pictures", &pair);
+    for samples in &pair.samples {
+        let largest = samples.chunks(3).map(|s| s[1].max_element()).fold(0.0, f32::max);
+        assert!((largest - 1.0).abs() < 1e-5, "indirect light of {largest}, clamped to 1");
+    }
     check("pictures, all effects", &run(&gpu, &scene, all_effects(&scene)));
     // Control: the twin's samples of the neighbouring pixels.
     pair.samples[1].rotate_right(3);
