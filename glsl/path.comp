@@ -51,11 +51,13 @@ struct Light2 {
 void add_light(inout Light2 sum, vec3 light, bool indirect) {
     bool apart = FX_INDIRECT && indirect;
     sum.direct += apart ? vec3(0.0) : light;
-    if (FX_CLAMP) {
-        float largest = max(light.r, max(light.g, light.b));
-        light *= push.clamp_indirect > 0.0 && largest > push.clamp_indirect ? push.clamp_indirect / largest : 1.0;
-    }
     sum.indirect += apart ? light : vec3(0.0);
+}
+
+// The whole sample is clamped, in place of what each bounce adds: the limit is that of what a pixel averages.
+vec3 clamped(vec3 light) {
+    float largest = max(light.r, max(light.g, light.b));
+    return light * (push.clamp_indirect > 0.0 && largest > push.clamp_indirect ? push.clamp_indirect / largest : 1.0);
 }
 
 vec3 light_from_miss(Path path) {
@@ -154,6 +156,7 @@ Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         bool roulette = FX_ROULETTE && push.roulette_depth > 0u && bounce + 1u >= push.roulette_depth;
         if (roulette) alive = survives_roulette(path, random, pair) && alive;
     }
+    if (FX_CLAMP) sum.indirect = clamped(sum.indirect);
     return sum;
 }
 

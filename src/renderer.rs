@@ -248,8 +248,16 @@ impl Renderer {
     }
 
     /// Moves the camera; what was accumulated belongs to the old one, so begin with [`Step::Start`].
-    pub fn set_camera(&mut self, camera: Camera) {
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Usage`] for a lens when the scene was loaded with a pinhole: the kernels have no lens then.
+    /// Ask [`Renderer::specialised`] for the effect `lens`, or load the scene with one.
+    pub fn set_camera(&mut self, camera: Camera) -> Result<()> {
+        if camera.lens_radius > 0.0 && !self.effects.lens {
+            return Err(Error::Usage("this renderer was made without the effect \"lens\"".into()));
+        }
         self.push.camera = camera;
+        Ok(())
     }
 
     /// Linear radiance (Rec. 709), 3 floats a pixel: one view for each of [`FilmBuffers::tiles`], in order.

@@ -1,7 +1,10 @@
 //! Every choice a user makes about a render: default, unit and range in one place. The command line and the `[render]`
 //! table of a scene file fill the same struct; [`Settings::validate`] is the only check.
+pub mod entry;
+
 pub use crate::allocate::Placing;
 use crate::error::{Error, Result};
+use entry::Entry;
 use serde::{Deserialize, Serialize};
 
 /// How a pixel's samples are spread over its surroundings. Widths are in pixels.
@@ -36,7 +39,7 @@ pub enum Sampler {
 pub struct Allocate {
     /// Name of a row of [`crate::allocate::POLICIES`].
     pub policy: String,
-    /// Samples that every pixel gets before any is placed, if the budget allows; at least 0.
+    /// Samples that every pixel gets before any is placed, if the budget allows; 0 to 16777216.
     pub min_spp: u32,
     /// Samples that no pixel exceeds; 0: no limit but [`Settings::MAX_SPP`]. Of the policy `threshold`: rounds until its
     /// threshold is 0 and chance decides; 0: `spp`.
@@ -98,21 +101,29 @@ impl Allocate {
                 "noise-threshold needs a policy that learns, variance or both: not {name}"
             )));
         }
-        let checks = [
-            ("rounds", (1..=4096).contains(&self.rounds), "choose 1 to 4096"),
-            ("window", (2..=10).contains(&self.window), "choose 2 to 10"),
-            ("sigma-normal", self.sigma_normal > 0.0, "choose a number above 0"),
-            ("sigma-position", self.sigma_position > 0.0, "choose a number above 0"),
-            ("luminance-floor", !self.luminance_floor.is_nan(), "choose a number"),
-            ("noise-threshold", self.noise_threshold >= 0.0, "choose 0 (off) or a number above"),
-            ("filtered", (0.0..=1.0).contains(&self.filtered), "choose 0 to 1"),
-            ("max-spp", self.max_spp <= Settings::MAX_SPP, "choose at most 16777216"),
-            ("min-spp", self.max_spp == 0 || self.min_spp <= self.max_spp, "it must not exceed max-spp"),
-        ];
-        match checks.iter().find(|(_, good, _)| !good) {
-            Some((name, _, remedy)) => Err(Error::Usage(format!("{name} is out of range: {remedy}"))),
-            None => Ok(()),
+        entry::check(&self.entries())?;
+        match self.max_spp {
+            max if max > 0 && self.min_spp > max => {
+                Err(Error::Usage(format!("min-spp is {}: it must not exceed max-spp, {max}", self.min_spp)))
+            }
+            _ => Ok(()),
         }
+    }
+
+    /// All but the policy, whose default depends on other options.
+    fn entries(&self) -> [Entry; 9] {
+        let above_0 = |name, value: f32| Entry::within(name, value, "a number above 0", value > 0.0);
+        [
+            Entry::whole("min-spp", self.min_spp, [0, Settings::MAX_SPP]),
+            Entry::whole("max-spp", self.max_spp, [0, Settings::MAX_SPP]),
+            Entry::whole("rounds", self.rounds, [1, 4096]),
+            Entry::whole("window", self.window, [2, 10]),
+            above_0("sigma-normal", self.sigma_normal),
+            above_0("sigma-position", self.sigma_position),
+            Entry::within("luminance-floor", self.luminance_floor, "a number", !self.luminance_floor.is_nan()),
+            Entry::within("noise-threshold", self.noise_threshold, "0 or more", self.noise_threshold >= 0.0),
+            Entry::within("filtered", self.filtered, "0 to 1", (0.0..=1.0).contains(&self.filtered)),
+        ]
     }
 }
 
@@ -131,7 +142,8 @@ pub struct Settings {
     pub max_depth: u32,
     /// Paths longer than this many edges survive with the probability of their throughput; 0 is off.
     pub roulette_depth: u32,
-    /// Upper limit of an indirect sample's largest channel, W/(m^2 sr); 0 is off. Biases the image.
+    /// Upper limit of the largest channel of all indirect light in a sample, W/(m^2 sr), finite; 0 is off. Biases the
+    /// image.
     pub clamp_indirect: f32,
     /// Chooses the random sequence.
     pub seed: u32,
@@ -172,23 +184,26 @@ impl Settings {
     /// # Errors
     /// [`Error::Usage`] with the setting, its value and its range.
     pub fn validate(&self) -> Result<()> {
-        let range = |name: &str, value: u32, max: u32| match value {
-            v if (1..=max).contains(&v) => Ok(()),
-            v => Err(Error::Usage(format!("{name} is {v}: choose a value from 1 to {max}"))),
-        };
-        range("width", self.width, Self::MAX_EDGE)?;
-        range("height", self.height, Self::MAX_EDGE)?;
-        range("spp", self.spp, Self::MAX_SPP)?;
-        range("max-depth", self.max_depth, Self::MAX_DEPTH)?;
-        if self.first_sample > Self::MAX_SPP {
-            let (n, max) = (self.first_sample, Self::MAX_SPP);
-            return Err(Error::Usage(format!("first-sample is {n}: choose a value up to {max}")));
-        }
-        self.allocate.validate()?;
-        match self.clamp_indirect {
-            c if c.is_finite() && c >= 0.0 => Ok(()),
-            c => Err(Error::Usage(format!("clamp-indirect is {c}: choose 0 (off) or a positive number"))),
-        }
+        entry::check(&self.entries())?;
+        self.allocate.validate()
+    }
+
+    /// Every setting but the policy.
+    pub fn entries(&self) -> Vec<Entry> {
+        let clamp = self.clamp_indirect;
+        let own = [
+            Entry::whole("width", self.width, [1, Self::MAX_EDGE]),
+            Entry::whole("height", self.height, [1, Self::MAX_EDGE]),
+            Entry::whole("spp", self.spp, [1, Self::MAX_SPP]),
+            Entry::whole("first-sample", self.first_sample, [0, Self::MAX_SPP]),
+            Entry::whole("max-depth", self.max_depth, [1, Self::MAX_DEPTH]),
+            Entry::any("roulette-depth", self.roulette_depth),
+            Entry::within("clamp-indirect", clamp, "a finite number of 0 or more", clamp.is_finite() && clamp >= 0.0),
+            Entry::any("seed", self.seed),
+            Entry::one_of("filter", &self.filter),
+            Entry::one_of("sampler", &self.sampler),
+        ];
+        own.into_iter().chain(self.allocate.entries()).collect()
     }
 
     /// Pixels of the film.

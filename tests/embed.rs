@@ -8,7 +8,7 @@ use ash::vk::Handle;
 use std::path::Path;
 use std::process::Command;
 use support::engine::Engine;
-use tallow::gpu::layout::vec3;
+use tallow::gpu::layout::{Camera, Effects, vec3};
 use tallow::gpu::{Buffer, FrameResources, Gpu, Location, Recorder};
 use tallow::image;
 use tallow::renderer::{OutputView, Outputs, Renderer};
@@ -93,6 +93,10 @@ fn agrees(engine: &Engine, gpu: &Gpu, policy: &str) {
     // Control: another camera must change the picture.
     let mut camera = scene.camera;
     camera.position[0] += 0.1;
-    renderer.set_camera(camera);
+    renderer.set_camera(camera).unwrap();
     assert!(record(&renderer) != expected, "{policy}: the comparison cannot fail");
+    let lens = Camera { lens_radius: 0.1, ..camera };
+    assert_eq!(renderer.set_camera(lens).unwrap_err().exit_code(), 2, "the kernels were compiled for a pinhole");
+    let effects = Effects { lens: true, ..*renderer.effects() };
+    Renderer::specialised(gpu, &scene, outputs, effects).unwrap().set_camera(lens).unwrap();
 }

@@ -28,7 +28,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("frame", &["allocate", "error", "gpu", "scene", "schedule", "shaders", "stage"]),
     ("stage", &["error", "frame", "gpu", "reference", "schedule", "shaders"]),
     ("allocate", &["error", "gpu", "reference", "shaders", "stage"]),
-    ("filter", &["error", "gpu", "reference", "shaders", "stage"]),
+    ("filter", &["error", "gpu", "reference", "settings::entry", "shaders", "stage"]),
     ("scene", &["error", "gpu::layout", "image", "reference::fresnel", "settings"]),
     ("reference", &["gpu::layout", "scene", "settings"]),
     ("composition", &["filter", "gpu::layout", "image"]),

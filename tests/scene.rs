@@ -175,7 +175,7 @@ fn instances_make_two_levels_and_carry_their_lights() {
 #[test]
 fn mistakes_are_one_line_with_place_and_remedy() {
     for (text, expected) in [
-        ("[film]\nwidth = 0", "scene.toml: width is 0: choose a value from 1 to 16384"),
+        ("[film]\nwidth = 0", "scene.toml: width is 0: choose 1 to 16384"),
         ("[render]\nspp = 99999999999", "line 2"),
         ("[[mesh]]\nshape = \"cube\"\ntransform = { scale = 0 }", "mesh \"cube\": its transform has no inverse"),
         ("[[mesh]]\nshape = \"cube\"\ntransform = { scale = 1e30 }", "coordinate of 1e30: the limit is 1e18"),

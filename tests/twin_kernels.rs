@@ -46,7 +46,7 @@ fn shipped(file: &str) -> Scene {
     Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file), &small).unwrap()
 }
 
-/// Textures of every use, masks, a normal map, an environment image, a lens, a mirrored instance, roulette and a clamp.
+/// Textures of every use, masks (of the lamp too), a normal map, an environment image, a lens, a mirrored instance, roulette and a clamp.
 fn pictures() -> Scene {
     let checks = |x: u32, y: u32| if (x / 4 + y / 4).is_multiple_of(2) { [230, 120, 40] } else { [60, 150, 220] };
     let bumps = |x: u32, y: u32| [128 + (x * 7 % 60) as u8, 128 + (y * 5 % 60) as u8, 235];
@@ -56,13 +56,14 @@ fn pictures() -> Scene {
         .picture("bumps.png", 32, bumps);
     let mut scene = place.scene(
         "[camera]\nposition = [0.0, 1.4, 5.0]\ntarget = [0.0, 0.7, 0.0]\nfov = 45.0\nlens_radius = 0.05\n\
-         focus_distance = 5.0\n[render]\nmax_depth = 4\nroulette_depth = 2\nclamp_indirect = 3.0\n\
+         focus_distance = 5.0\n[render]\nmax_depth = 4\nroulette_depth = 2\nclamp_indirect = 1.0\n\
          [environment]\nfile = 'sky.exr'\nrotation = 40.0\n\
          [[material]]\nname = 'floor'\ncolor_texture = 'checks.png'\nbump = 'checks.png'\nbump_scale = 0.05\n\
          [[material]]\nname = 'ball'\ntype = 'coated'\nalpha = 0.3\nroughness_texture = 'checks.png'\n\
          normal_map = 'bumps.png'\nspecular_texture = 'checks.png'\n\
          [[material]]\nname = 'leaf'\nopacity = 0.6\nopacity_texture = 'checks.png'\n\
          [[material]]\nname = 'lamp'\nemission = 3.0\nemission_texture = 'checks.png'\n\
+         opacity = 0.8\nopacity_texture = 'checks.png'\n\
          [[mesh]]\nname = 'floor'\nshape = 'rectangle'\nmaterial = 'floor'\n\
          transform = { rotate = [-90.0, 0.0, 0.0], scale = 4.0 }\n\
          [[mesh]]\nname = 'ball'\nshape = 'sphere'\nsegments = 32\nmaterial = 'ball'\n\
@@ -179,6 +180,10 @@ fn renders_agree_with_their_twins() {
     let scene = pictures();
     let mut pair = run(&gpu, &scene, called_for(&scene, outputs));
     check("pictures", &pair);
+    for samples in &pair.samples {
+        let largest = samples.chunks(3).map(|s| s[1].max_element()).fold(0.0, f32::max);
+        assert!((largest - 1.0).abs() < 1e-5, "indirect light of {largest}, clamped to 1");
+    }
     check("pictures, all effects", &run(&gpu, &scene, all_effects(&scene)));
     // Control: the twin's samples of the neighbouring pixels.
     pair.samples[1].rotate_right(3);

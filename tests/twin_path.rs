@@ -234,30 +234,39 @@ fn white_convex_object_vanishes_in_a_white_sky() {
     assert!(!grey.is(1.0), "control: 2 % of absorption are seen, {grey:?}");
 }
 
-/// A room with a slanted area light, a coat, glossy metal and, behind a gap, a sky with a sun in it.
-fn room() -> Scene {
+/// A room with a slanted area light (`lamp` goes on with its material, `width` below 0 mirrors it), a coat, glossy metal and, behind a gap, a sky with a sun in it.
+fn room(lamp: &str, width: f32) -> Scene {
     let place = Workplace::new().sky("sky.exr", 64, 32, |x, y| if (x, y) == (20, 6) { 200.0 } else { 0.5 });
-    place.scene(
+    let place = place.picture("mask.png", 16, |x, y| [if x + y < 16 { 255 } else { 20 }; 3]);
+    place.scene(&format!(
         "[film]\nwidth = 16\nheight = 16\n[camera]\nposition = [0.0, 1.0, 5.0]\ntarget = [0.0, 0.8, 0.0]\nfov = 40.0\n\
          [render]\nmax_depth = 4\n[environment]\nfile = 'sky.exr'\nrotation = 70.0\n\
          [[material]]\nname = 'coat'\ntype = 'coated'\nalpha = 0.2\ncolor = [0.6, 0.3, 0.2]\n\
          [[material]]\nname = 'metal'\ntype = 'conductor'\nmetal = 'Al'\nalpha = 0.3\ndistribution = 'ggx'\n\
-         [[material]]\nname = 'lamp'\nemission = [4.0, 5.0, 6.0]\n[[material]]\nname = 'grey'\ncolor = 0.6\n\
-         [[mesh]]\nshape = 'rectangle'\ntransform = { rotate = [-90.0, 0.0, 0.0], scale = 4.0 }\nmaterial = 'grey'\n\
-         [[mesh]]\nshape = 'sphere'\nsegments = 48\ntransform = { translate = [-0.8, 0.7, 0.0], scale = 0.7 }\n\
+         [[material]]\nname = 'lamp'\nemission = [4.0, 5.0, 6.0]\n{lamp}[[material]]\nname = 'grey'\ncolor = 0.6\n\
+         [[mesh]]\nshape = 'rectangle'\ntransform = {{ rotate = [-90.0, 0.0, 0.0], scale = 4.0 }}\nmaterial = 'grey'\n\
+         [[mesh]]\nshape = 'sphere'\nsegments = 48\ntransform = {{ translate = [-0.8, 0.7, 0.0], scale = 0.7 }}\n\
          material = 'coat'\n[[mesh]]\nshape = 'cube'\nmaterial = 'metal'\n\
-         transform = { translate = [0.9, 0.5, 0.0], rotate = [0.0, 30.0, 0.0], scale = 0.5 }\n\
-         [[mesh]]\nshape = 'rectangle'\nmaterial = 'lamp'\n\
-         transform = { translate = [0.0, 3.0, 0.5], rotate = [75.0, 0.0, 0.0], scale = 0.8 }\n",
-    )
+         transform = {{ translate = [0.9, 0.5, 0.0], rotate = [0.0, 30.0, 0.0], scale = 0.5 }}\n\
+         [[mesh]]\nname = 'lamp'\nshape = 'rectangle'\nmaterial = 'lamp'\n[[instance]]\nmesh = 'lamp'\n\
+         transform = {{ translate = [0.0, 3.0, 0.5], rotate = [75.0, 0.0, 0.0], scale = [{width}, 0.8, 0.8] }}\n",
+    ))
 }
 
 #[test]
 fn either_way_to_find_light_gives_the_same_picture() {
-    let mut scene = room();
-    let [both, light, bsdf] =
-        [Strategy::Both, Strategy::Light, Strategy::Bsdf].map(|strategy| mean(&scene, strategy, 1024));
-    assert!(both.agrees(&light) && both.agrees(&bsdf), "both {both:?}\nlight {light:?}\nBSDF {bsdf:?}");
+    let compared = |scene: &Scene| {
+        let strategies = [Strategy::Both, Strategy::Light, Strategy::Bsdf];
+        let [both, light, bsdf] = strategies.map(|strategy| mean(scene, strategy, 1024));
+        assert!(both.agrees(&light) && both.agrees(&bsdf), "both {both:?}\nlight {light:?}\nBSDF {bsdf:?}");
+        [both, light, bsdf]
+    };
+    let masked = "opacity = 0.8\nopacity_texture = 'mask.png'\n";
+    let [dimmed, ..] = compared(&room(masked, 0.8));
+    compared(&room(masked, -0.8));
+    let mut scene = room("", 0.8);
+    let [both, light, bsdf] = compared(&scene);
+    assert!(!both.agrees(&dimmed), "control: the mask is seen");
     assert!(both.error < light.error.min(bsdf.error), "joined, they are the least noisy: {both:?} {light:?} {bsdf:?}");
     // Control: densities that do not belong together count some light twice.
     scene.triangle_pdf_scale *= 0.25;

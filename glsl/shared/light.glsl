@@ -103,14 +103,13 @@ void sample_triangle_light(vec3 p, vec3 a, vec3 b, vec3 c, float chosen, vec2 u,
     s.direction = to_light / s.distance;
     float cosine = -dot(n, s.direction);
     vec3 radiance = uintBitsToFloat(words.xyz);
+    uint triangle = light_texel(light, 2u).w;
     if (FX_TEXTURES) {
-        uint triangle = light_texel(light, 2u).w;
-        if (triangle != NONE) {
-            uint image = material_texel(words.w, 7u).x;
-            radiance = uintBitsToFloat(material_texel(words.w, 1u).xyz) *
-                       texture_sample(image, texture_coordinates(triangle, bary)).rgb;
-        }
+        uint image = material_texel(words.w, 7u).x;
+        if (image != NONE) radiance *= texture_sample(image, texture_coordinates(triangle, bary)).rgb;
     }
+    // The shadow ray ends before the light, whose mask would stop it with this probability.
+    if (FX_ALPHA_MASKS) radiance *= surface_opacity(words.w, triangle, bary);
     bool lit = cosine > 0.0 && d2 > 0.0;
     s.pdf = lit ? chosen * 2.0 * d2 / (cosine * doubled_area) : 0.0;
     s.radiance = lit ? radiance / s.pdf : vec3(0.0);

@@ -28,17 +28,18 @@ vec4 texture_sample(uint index, vec2 uv) {
     return mix(top, low, f.y);
 }
 
+// The share of rays that a surface stops at a point of a triangle.
+float surface_opacity(uint material, uint triangle, vec2 barycentric) {
+    if ((material_texel(material, 3u).w & MATERIAL_MASKED) == 0u) return 1.0;
+    float opacity = uintBitsToFloat(material_texel(material, 2u).w);
+    uint image = material_texel(material, 6u).y;
+    return image == NONE ? opacity : opacity * texture_sample(image, texture_coordinates(triangle, barycentric)).r;
+}
+
 // Partly transparent surfaces let a ray pass with the probability 1 - opacity, decided by a hash, so the light that
 // gets through is right on average and a cut-out mask (0 or 1) is exact.
 bool mask_blocks(uint triangle, uint instance, vec2 barycentric, uint seed) {
-    uint material = material_of(triangle, instance);
-    uvec4 k = material_texel(material, 3u);
-    if ((k.w & MATERIAL_MASKED) == 0u) return true;
-    float opacity = uintBitsToFloat(material_texel(material, 2u).w);
-    uint image = material_texel(material, 6u).y;
-    if (image != NONE) {
-        opacity *= texture_sample(image, texture_coordinates(triangle, barycentric)).r;
-    }
+    float opacity = surface_opacity(material_of(triangle, instance), triangle, barycentric);
     // Two copies of a triangle on one ray decide independently.
     uint surface = triangle * 0x9e3779b9u ^ instance * 0x85ebca6bu;
     return opacity > float(pcg(seed ^ surface) >> 8) * 5.9604644775390625e-8;

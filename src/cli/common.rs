@@ -3,6 +3,22 @@ use super::finite;
 use crate::error::Result;
 use crate::gpu::{DeviceOptions, Gpu};
 use crate::image::{WriteOptions, tone::ToneMap};
+use crate::settings::entry::Entry;
+use clap::Arg;
+
+/// Adds range and default to the help of the options that set `defaults`. Options that say what their default depends
+/// on keep it.
+pub fn with_ranges(defaults: Vec<Entry>) -> impl FnMut(Arg) -> Arg {
+    move |arg| {
+        let entry = defaults.iter().find(|e| arg.get_long() == Some(e.name));
+        let (Some(Entry { value, range, .. }), Some(help)) = (entry, arg.get_help()) else { return arg };
+        let range = if range.is_empty() { String::new() } else { format!(" [{range}]") };
+        let own = help.to_string().contains("[default");
+        let default = if own { String::new() } else { format!(" [default: {value}]") };
+        let help = format!("{help}{range}{default}");
+        arg.help(help)
+    }
+}
 
 /// The options.
 #[derive(clap::Args)]

@@ -1,11 +1,12 @@
 //! Settings that the command line gives over those of the scene file.
+use super::common::with_ranges;
 use crate::allocate::{POLICIES, Placing};
 use crate::settings::{Allocate, PixelFilter, Sampler, Settings};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 
 /// Settings given on the command line.
 #[derive(clap::Args, Clone, Debug, Default)]
-#[command(next_help_heading = "Settings")]
+#[command(next_help_heading = "Settings", mut_args(with_ranges(Settings::default().entries())))]
 pub struct Overrides {
     /// Film width in pixels
     #[arg(long, value_name = "N")]
@@ -25,7 +26,7 @@ pub struct Overrides {
     /// Edges after which Russian roulette starts; 0 is off
     #[arg(long, value_name = "N")]
     pub roulette_depth: Option<u32>,
-    /// Largest value of an indirect sample; 0 is off, others bias the image
+    /// Limit of a sample's indirect light, largest channel; 0 is off, others bias the image
     #[arg(long, value_name = "N")]
     pub clamp_indirect: Option<f32>,
     /// Chooses the random sequence
@@ -58,7 +59,7 @@ pub struct AllocateOverrides {
     /// Rounds that the budget is spread over
     #[arg(long, value_name = "N")]
     pub rounds: Option<u32>,
-    /// Edge of the square of pixels whose geometry is compared, 2 to 10
+    /// Edge of the square of pixels whose geometry is compared
     #[arg(long, value_name = "N")]
     pub window: Option<u32>,
     /// Difference of unit normals that counts as e^-1 alike
@@ -70,10 +71,10 @@ pub struct AllocateOverrides {
     /// Luminance added before noise is compared with it; negative: noise counts by itself
     #[arg(long, value_name = "X", allow_negative_numbers = true)]
     pub luminance_floor: Option<f32>,
-    /// Stop when every pixel's relative error is estimated below this, or at --max-spp (else --spp)
+    /// Stop when every pixel's relative error is estimated below this, or at --max-spp (else --spp); 0 is off
     #[arg(long, value_name = "E")]
     pub noise_threshold: Option<f32>,
-    /// Share of the variance that a filter will remove where neighbours are alike, 0 (none) to 1
+    /// Share of the variance that a filter will remove where neighbours are alike; 0 is none
     #[arg(long, value_name = "X")]
     pub filtered: Option<f32>,
 }
@@ -127,7 +128,7 @@ fn set<T>(setting: &mut T, given: Option<T>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::Parser;
+    use clap::{CommandFactory, Parser};
 
     #[derive(Parser)]
     struct Command {
@@ -177,6 +178,19 @@ mod tests {
         };
         assert_eq!(settings, expected);
         assert!(settings.validate().is_ok());
+    }
+
+    #[test]
+    fn help_gives_range_and_default_of_every_option() {
+        let command = Command::command();
+        let help = |name: &str| command.get_arguments().find(|a| a.get_long() == Some(name)).unwrap().get_help();
+        assert_eq!(help("width").unwrap().to_string(), "Film width in pixels [1 to 16384] [default: 512]");
+        assert!(help("sigma-normal").unwrap().to_string().ends_with(" [a number above 0] [default: 0.35]"));
+        assert!(help("filter").unwrap().to_string().ends_with(" [default: box]"));
+        for name in command.get_arguments().filter_map(|a| a.get_long()).filter(|&name| name != "help") {
+            let text = help(name).unwrap().to_string();
+            assert_eq!(text.matches("[default: ").count(), 1, "{name}: {text}");
+        }
     }
 
     #[test]

@@ -31,7 +31,7 @@ pub enum EffectChoice {
 
 /// Render a scene to image files
 ///
-/// Options override the settings of the scene file.
+/// Options override the settings of the scene file; defaults are for what it does not set.
 #[derive(clap::Args)]
 pub struct Args {
     /// Scene file (.toml) or model (.obj)

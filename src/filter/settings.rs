@@ -1,8 +1,9 @@
 //! Every filter's parameters: default, unit and range in one place.
 use super::FilterInput;
 use super::pixel::known_radiance;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::layout::vec4;
+use crate::settings::entry::{self, Entry};
 use glam::Vec3;
 
 /// How EAW's edge-stopping weights are computed: the paper's listing and its equations differ.
@@ -104,36 +105,33 @@ impl FilterSettings {
     pub const MAX_LEVELS: u32 = 10;
 
     /// # Errors
-    /// [`Error::Usage`] with the parameter, its value and its range.
+    /// [`crate::error::Error::Usage`] with the parameter, its value and its range.
     pub fn validate(&self) -> Result<()> {
-        let within = |name: &str, value: u32, [low, high]: [u32; 2]| match (low..=high).contains(&value) {
-            true => Ok(()),
-            false => Err(Error::Usage(format!("{name} is {value}: choose a value from {low} to {high}"))),
-        };
-        let not_negative = |name: &str, value: f32| match value >= 0.0 {
-            true => Ok(()),
-            false => Err(Error::Usage(format!("{name} is {value}: choose 0 or more"))),
-        };
-        let scale = |name: &str, value: f32| match value > 0.0 && value.is_finite() {
-            true => Ok(()),
-            false => Err(Error::Usage(format!("{name} is {value}: choose a finite number above 0"))),
-        };
-        within("levels", self.levels, [1, Self::MAX_LEVELS])?;
-        within("radius", self.radius, [0, 4096])?;
-        if ![1, 3, 4].contains(&self.channels) {
-            return Err(Error::Usage(format!("channels is {}: choose 1, 3 or 4", self.channels)));
-        }
-        self.eps.iter().try_for_each(|eps| match eps.is_finite() {
-            true => not_negative("eps", *eps),
-            false => Err(Error::Usage(format!("eps is {eps}: choose a finite number of 0 or more"))),
-        })?;
-        within("rt-from-level", self.rt_from_level, [0, Self::MAX_LEVELS])?;
-        scale("intensity", self.intensity)?;
-        scale("extent", self.extent)?;
-        not_negative("sigma-l", self.sigma_l)?;
-        not_negative("sigma-rt", self.sigma_rt)?;
-        not_negative("sigma-n", self.sigma_n)?;
-        not_negative("sigma-x", self.sigma_x)
+        entry::check(&self.entries())
+    }
+
+    /// Every parameter that is not a switch.
+    pub fn entries(&self) -> [Entry; 14] {
+        let scale = |name, v: f32| Entry::within(name, v, "a finite number above 0", v > 0.0 && v.is_finite());
+        let sigma = |name, v: f32| Entry::within(name, v, "0 or more", v >= 0.0);
+        let eps = self.eps.map(|e| e.to_string()).join(",");
+        let usable = self.eps.iter().all(|e| e.is_finite() && *e >= 0.0);
+        [
+            scale("intensity", self.intensity),
+            scale("extent", self.extent),
+            Entry::whole("levels", self.levels, [1, Self::MAX_LEVELS]),
+            sigma("sigma-rt", self.sigma_rt),
+            sigma("sigma-n", self.sigma_n),
+            sigma("sigma-x", self.sigma_x),
+            Entry::one_of("form", &self.form),
+            Entry::whole("rt-from-level", self.rt_from_level, [0, Self::MAX_LEVELS]),
+            Entry::whole("radius", self.radius, [0, 4096]),
+            Entry::within("channels", self.channels, "1, 3 or 4", [1, 3, 4].contains(&self.channels)),
+            Entry::within("eps", eps, "finite numbers of 0 or more", usable),
+            Entry::one_of("sums", &self.sums),
+            sigma("sigma-l", self.sigma_l),
+            Entry::one_of("basis", &self.basis),
+        ]
     }
 
     /// The same with `intensity` and `extent` taken from an image: its largest known channel, and the diagonal of the

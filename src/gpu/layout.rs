@@ -239,7 +239,7 @@ gpu_structs! {
         emission_texture: uint,
         /// Diffuse reflectance of the interface seen from inside (coated): mean internal Fresnel reflectance.
         internal_fresnel: float,
-        /// Luminance of the mean emission; emissive triangles are chosen in proportion to it times their area.
+        /// Luminance of the mean emission, times the mean opacity; emissive triangles are chosen in proportion to it times their area.
         emission_weight: float,
         /// Unused, zero.
         pad: uint,
@@ -273,7 +273,7 @@ gpu_structs! {
         probability: float,
         /// See the LIGHT_ constants.
         c: vec3,
-        /// Index of the triangle in leaf order (LIGHT_TRIANGLE with an emission texture), else [`NONE`].
+        /// Index of the triangle in leaf order (LIGHT_TRIANGLE), else [`NONE`].
         triangle: uint,
         /// Radiance, intensity or irradiance, linear Rec. 709.
         value: vec3,

@@ -3,7 +3,7 @@ use crate::gpu::layout::*;
 use crate::reference::sampler::pcg;
 use crate::reference::scene::texture_coordinates;
 use crate::reference::surface::offset_origin;
-use crate::reference::texture::texture_sample;
+use crate::reference::texture::{surface_opacity, texture_sample};
 use crate::reference::warp::{warp_sphere, warp_triangle};
 use crate::scene::{Environment, Scene};
 use glam::{Mat3, Vec2, Vec3, Vec3Swizzles, vec2, vec3};
@@ -108,11 +108,12 @@ fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> Ligh
     let direction = to_light / distance;
     let cosine = -n.dot(direction);
     let mut radiance = Vec3::from(light.value);
-    if light.triangle != NONE {
-        let material = &scene.materials[light.material as usize];
+    let image = scene.materials[light.material as usize].emission_texture;
+    if image != NONE {
         let uv = texture_coordinates(scene, light.triangle, bary);
-        radiance = Vec3::from(material.emission) * texture_sample(scene, material.emission_texture, uv).truncate();
+        radiance *= texture_sample(scene, image, uv).truncate();
     }
+    radiance *= surface_opacity(scene, light.material, light.triangle, bary);
     let lit = cosine > 0.0 && d2 > 0.0;
     let pdf = if lit { light.probability * 2.0 * d2 / (cosine * doubled_area) } else { 0.0 };
     LightSample { direction, distance, radiance: if lit { radiance / pdf } else { Vec3::ZERO }, pdf }

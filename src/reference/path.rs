@@ -86,16 +86,17 @@ impl Tracer<'_> {
         }
     }
 
-    fn add_light(&self, sum: &mut PathSample, mut light: Vec3, indirect: bool) {
-        if !self.effects.indirect || !indirect {
-            sum.direct += light;
-            return;
+    fn add_light(&self, sum: &mut PathSample, light: Vec3, indirect: bool) {
+        match self.effects.indirect && indirect {
+            true => sum.indirect += light,
+            false => sum.direct += light,
         }
+    }
+
+    fn clamped(&self, light: Vec3) -> Vec3 {
         let (largest, limit) = (light.max_element(), self.push.clamp_indirect);
-        if self.effects.clamp && limit > 0.0 && largest > limit {
-            light *= limit / largest;
-        }
-        sum.indirect += light;
+        let clamps = self.effects.clamp && limit > 0.0 && largest > limit;
+        if clamps { light * (limit / largest) } else { light }
     }
 
     fn light_from_miss(&self, path: &Path) -> Vec3 {
@@ -212,7 +213,7 @@ impl Tracer<'_> {
                 break;
             }
         }
-        sum
+        PathSample { indirect: self.clamped(sum.indirect), ..sum }
     }
 
     /// Sample `index` of `pixel` (row-major).

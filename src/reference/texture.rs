@@ -41,17 +41,22 @@ pub fn texture_sample(scene: &Scene, index: u32, uv: Vec2) -> Vec4 {
     top.lerp(low, f.y)
 }
 
+/// The share of rays that a surface stops at a point of a triangle.
+pub fn surface_opacity(scene: &Scene, material: u32, triangle: u32, barycentric: Vec2) -> f32 {
+    let material = &scene.materials[material as usize];
+    match material.opacity_texture {
+        _ if material.flags & MATERIAL_MASKED == 0 => 1.0,
+        NONE => material.opacity,
+        image => {
+            let uv = texture_coordinates(scene, triangle, barycentric);
+            material.opacity * texture_sample(scene, image, uv).x
+        }
+    }
+}
+
 /// Whether a partly transparent surface stops a ray, decided by a hash of `seed`.
 pub fn mask_blocks(scene: &Scene, triangle: u32, instance: u32, barycentric: Vec2, seed: u32) -> bool {
-    let material = &scene.materials[material_of(scene, triangle, instance) as usize];
-    if material.flags & MATERIAL_MASKED == 0 {
-        return true;
-    }
-    let mut opacity = material.opacity;
-    if material.opacity_texture != NONE {
-        let uv = texture_coordinates(scene, triangle, barycentric);
-        opacity *= texture_sample(scene, material.opacity_texture, uv).x;
-    }
+    let opacity = surface_opacity(scene, material_of(scene, triangle, instance), triangle, barycentric);
     let surface = triangle.wrapping_mul(0x9e3779b9) ^ instance.wrapping_mul(0x85ebca6b);
     opacity > (pcg(seed ^ surface) >> 8) as f32 * 5.9604645e-8
 }

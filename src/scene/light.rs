@@ -1,8 +1,8 @@
 //! The list of lights and the table that chooses one in proportion to its power.
 //!
 //! Power, by luminance, in watts up to a common factor: emissive triangle `pi * area * L` (front side, L the mean over
-//! its texture), point `4 pi I`, spot `2 pi I (1 - mean of the two cosines)`, directional `pi R^2 E`, environment
-//! `4 pi^2 R^2` times its mean, R the radius of the scene.
+//! its texture times the mean opacity), point `4 pi I`, spot `2 pi I (1 - mean of the two cosines)`, directional
+//! `pi R^2 E`, environment `4 pi^2 R^2` times its mean, R the radius of the scene.
 use super::environment::{luminance, mean_luminance};
 use super::value::Rgb;
 use super::{Scene, alias, geometry, texture};
@@ -116,13 +116,13 @@ pub fn environment(radiance: [f32; 3], world_from_environment: DMat3) -> Light {
 /// Adds the emissive triangles to the scene's lights (which hold the others), drops lights without power, and builds
 /// the table. Sets [`Material::emission_weight`], [`Light::probability`] and [`Scene::triangle_pdf_scale`].
 pub fn finish(scene: &mut Scene, ranges: &HashMap<u32, Range<usize>>) {
-    for material in &mut scene.materials {
-        let mean = match scene.textures.get(material.emission_texture as usize) {
-            Some(t) => texture::mean(t, &scene.texels),
-            None => [1.0; 3],
-        };
-        let emission: [f32; 3] = std::array::from_fn(|c| material.emission[c] * mean[c]);
-        material.emission_weight = luminance(emission);
+    let mean = |image: u32| scene.textures.get(image as usize).map_or([1.0; 3], |t| texture::mean(t, &scene.texels));
+    for m in &mut scene.materials {
+        let mean_emission = mean(m.emission_texture);
+        let emission: [f32; 3] = std::array::from_fn(|c| m.emission[c] * mean_emission[c]);
+        let masked = m.flags & MATERIAL_MASKED != 0;
+        let opacity = if masked { m.opacity * mean(m.opacity_texture)[0] } else { 1.0 };
+        m.emission_weight = luminance(emission) * opacity;
     }
     let mut lights = std::mem::take(&mut scene.lights);
     add_triangles(scene, ranges, &mut lights);
@@ -174,9 +174,8 @@ fn add_range(
         if mirrored {
             std::mem::swap(&mut b, &mut c); // the front of the mesh stays in front
         }
-        let triangle = if m.emission_texture == NONE { NONE } else { index as u32 };
-        let light = Light { kind: LIGHT_TRIANGLE, a, b, c, triangle, value: m.emission, material, ..Light::default() };
-        lights.push(light);
+        let (triangle, value) = (index as u32, m.emission);
+        lights.push(Light { kind: LIGHT_TRIANGLE, a, b, c, triangle, value, material, ..Light::default() });
     }
 }
 

@@ -73,8 +73,8 @@ impl Assembly<'_> {
             let affine = self.invertible(table.transform.0, &place)?;
             let material = table.material.as_ref().map(|m| self.material(m, &place)).transpose()?;
             let own = self.invertible(meshes[mesh].transform.0, &place)?;
-            // Emission textures are looked up by the corners' order, which a mirrored light has to swap: bake it.
-            match affine.matrix3.determinant() < 0.0 && self.emits_by_texture(mesh, material)? {
+            // Textures of a light are looked up by the corners' order, which a mirrored light has to swap: bake it.
+            match affine.matrix3.determinant() < 0.0 && self.is_textured_light(mesh, material)? {
                 true => plan.baked.push(Job { mesh, affine: affine * own, material }),
                 false => plan.copies.push(Job { mesh, affine, material }),
             }
@@ -107,9 +107,12 @@ impl Assembly<'_> {
         Ok(job.material.or(own))
     }
 
-    fn emits_by_texture(&self, mesh: usize, material: Option<u32>) -> Result<bool> {
+    fn is_textured_light(&self, mesh: usize, material: Option<u32>) -> Result<bool> {
         let list = &self.library.materials.list;
-        let textured = |i: u32| list[i as usize].emission_texture != NONE;
+        let textured = |i: u32| {
+            let m = &list[i as usize];
+            m.emission != [0.0; 3] && (m.emission_texture != NONE || m.opacity_texture != NONE)
+        };
         let job = Job { mesh, affine: DAffine3::IDENTITY, material };
         Ok(
             match (self.override_of(&job)?, self.file_of(&self.description.mesh[mesh]).and_then(|p| self.files.get(&p)))

@@ -170,10 +170,12 @@ fn linear_from_byte(byte: u8) -> f64 {
     if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Mean linear colour of a colour picture.
+/// Mean linear colour.
 pub fn mean(texture: &Texture, texels: &[u32]) -> [f32; 3] {
     let count = texture.width as usize * texture.height as usize;
-    let curve: [f64; 256] = std::array::from_fn(|byte| linear_from_byte(byte as u8));
+    let srgb = texture.flags & TEXTURE_SRGB != 0;
+    let curve: [f64; 256] =
+        std::array::from_fn(|byte| if srgb { linear_from_byte(byte as u8) } else { byte as f64 / 255.0 });
     let mut sum = [0.0; 3];
     for texel in &texels[texture.first as usize..][..count] {
         let bytes = texel.to_le_bytes();

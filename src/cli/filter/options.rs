@@ -1,4 +1,5 @@
 //! What can be set about layers and filters.
+use crate::cli::common::with_ranges;
 use crate::filter::{AtrousForm, FilterInput, FilterSettings, GuidedSums, WaveletBasis};
 use crate::image::aov::{Aov, Names};
 
@@ -48,7 +49,7 @@ impl Layers {
 
 /// Settings given on the command line; see [`FilterSettings`] for ranges and defaults.
 #[derive(clap::Args, Clone, Debug, Default)]
-#[command(next_help_heading = "Filter settings")]
+#[command(next_help_heading = "Filter settings", mut_args(with_ranges(FilterSettings::default().entries().into())))]
 pub struct Overrides {
     /// Scale of radiance [default: the image's largest]
     #[arg(long, value_name = "N")]
@@ -56,7 +57,7 @@ pub struct Overrides {
     /// Scale of distances in world units [default: the diagonal of what is seen]
     #[arg(long, value_name = "N")]
     pub extent: Option<f32>,
-    /// Levels of the wavelet filters, 1 to 10
+    /// Levels of the wavelet filters
     #[arg(long, value_name = "N")]
     pub levels: Option<u32>,
     /// Radiance difference that counts as an edge, in units of --intensity; inf switches it off
@@ -128,5 +129,21 @@ impl Overrides {
             sigma_l: self.sigma_l.unwrap_or(own.sigma_l),
             basis: self.basis.unwrap_or(own.basis),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::{Args, Command};
+
+    #[test]
+    fn help_gives_the_default_of_every_option_that_takes_a_value() {
+        let command = Overrides::augment_args(Command::new("filter"));
+        let all = command.get_arguments().filter(|a| a.get_action().takes_values());
+        let texts: Vec<_> = all.map(|a| a.get_help().unwrap().to_string()).collect();
+        assert_eq!(texts.iter().filter(|t| t.matches("[default: ").count() == 1).count(), 14, "{texts:#?}");
+        assert_eq!(texts[2], "Levels of the wavelet filters [1 to 10] [default: 5]");
+        assert!(texts[0].ends_with("[default: the image's largest] [a finite number above 0]"), "{}", texts[0]);
     }
 }
