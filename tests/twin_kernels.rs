@@ -62,7 +62,7 @@ fn pictures() -> Scene {
          [[material]]\nname = 'ball'\ntype = 'coated'\nalpha = 0.3\nroughness_texture = 'checks.png'\n\
          normal_map = 'bumps.png'\nspecular_texture = 'checks.png'\n\
          [[material]]\nname = 'leaf'\nopacity = 0.6\nopacity_texture = 'checks.png'\n\
-         [[material]]\nname = 'lamp'\nemission = 3.0\nemission_texture = 'checks.png'\n\
+         [[material]]\nname = 'lamp'\nemission = 100.0\nemission_texture = 'checks.png'\n\
          opacity = 0.8\nopacity_texture = 'checks.png'\n\
          [[mesh]]\nname = 'floor'\nshape = 'rectangle'\nmaterial = 'floor'\n\
          transform = { rotate = [-90.0, 0.0, 0.0], scale = 4.0 }\n\
