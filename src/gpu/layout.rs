@@ -1,5 +1,5 @@
 //! Every struct that crosses the line between host and shader, written once. The crate compiles this file;
-//! `build.rs` includes it by `#[path]` and serves [`GLSL`] to the shaders as `layout.glsl`.
+//! `build.rs` includes it by `#[path]` and serves `GLSL` to the shaders as `layout.glsl`.
 //!
 //! Structs are laid out as GLSL `scalar` does: members of four bytes, no padding anywhere. Structs that kernels
 //! read through texel buffers are multiples of 16 bytes, or 8, so that one fetch returns all that it can.

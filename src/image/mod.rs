@@ -66,10 +66,10 @@ pub fn write(path: &Path, film: &Film, options: &WriteOptions) -> Result<()> {
     }
 }
 
-/// Checks before a long render that [`write`] has a known extension and a folder it may write in.
+/// Checks before a long render that [`write()`] has a known extension and a folder it may write in.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn check_writable(path: &Path) -> Result<()> {
     format_of(path)?;
     output::check(path)

@@ -26,10 +26,10 @@ pub fn write_with(path: &Path, fill: impl FnOnce(&mut dyn Stream) -> std::io::Re
     result.map_err(|e| Error::output(path, remedy(path, &e)))
 }
 
-/// Checks that [`write`] could start: the folder exists and accepts a file, and `path` is not a folder itself.
+/// Checks that [`write()`] could start: the folder exists and accepts a file, and `path` is not a folder itself.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn check(path: &Path) -> Result<()> {
     let result = match () {
         () if path.is_dir() => Err(ErrorKind::IsADirectory.into()),

@@ -6,7 +6,7 @@ const ODD: [u64; 4] = [0x9e37_79b9_7f4a_7c15, 0xbf58_476d_1ce4_e5b9, 0x94d0_49bb
 
 /// Of all that was added, in order, the same on every machine and in every run. Against accidents, not against attacks.
 ///
-/// A word w takes a lane h to [`fold`]`(h ^ w)`, as FNV-1a does with bytes and a plain product; four lanes, each
+/// A word w takes a lane h to `fold(h ^ w)`, as FNV-1a does with bytes and a plain product; four lanes, each
 /// independent of the others, keep up with memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fingerprint([u64; 4]);
