@@ -26,7 +26,7 @@ fn scene() -> Scene {
 #[test]
 fn nothing_is_created_after_the_first_frame() {
     let engine = Engine::new();
-    let (raw, _turn) = hooks::between(engine.raw());
+    let raw = hooks::between(engine.raw());
     // SAFETY: the engine's handles are valid and outlive what is made from them.
     let gpu = unsafe { Gpu::from_raw(raw) }.unwrap();
     let scene = scene();
@@ -52,7 +52,7 @@ fn nothing_is_created_after_the_first_frame() {
 #[test]
 fn a_lost_device_is_one_line_and_exit_code_4() {
     let engine = Engine::new();
-    let (raw, _turn) = hooks::between(engine.raw());
+    let raw = hooks::between(engine.raw());
     // SAFETY: the engine's handles are valid and outlive what is made from them.
     let gpu = unsafe { Gpu::from_raw(raw) }.unwrap();
     let renderer = Renderer::new(&gpu, &scene(), Outputs::default()).unwrap();

@@ -101,8 +101,7 @@ impl<T: Pod> Buffer<T> {
     /// [`Error::Device`] when there is no such part.
     pub fn part(&self, range: Range<usize>) -> Result<Self> {
         if !range.start.is_multiple_of(PART) || range.is_empty() || range.end > self.len {
-            let (name, len) = (&self.untyped.name, self.len);
-            return Err(Error::Device(format!("buffer \"{name}\": {range:?} is no part of its {len} elements")));
+            return Err(self.no_part(&range));
         }
         Ok(Self { first: self.first + range.start, len: range.len(), ..self.clone() })
     }
@@ -153,12 +152,16 @@ impl<T: Pod> Buffer<T> {
     /// [`Error::Device`] when there are not so many, or the copy fails.
     pub fn read_range(&self, range: Range<usize>) -> Result<Vec<T>> {
         if range.start > range.end || range.end > self.len {
-            let (name, len) = (&self.untyped.name, self.len);
-            return Err(Error::Device(format!("buffer \"{name}\": {range:?} is no part of its {len} elements")));
+            return Err(self.no_part(&range));
         }
         let mut values = vec![T::zeroed(); range.len()];
         self.untyped.read((self.first + range.start) * size_of::<T>(), bytemuck::cast_slice_mut(&mut values))?;
         Ok(values)
+    }
+
+    fn no_part(&self, range: &Range<usize>) -> Error {
+        let (name, len) = (&self.untyped.name, self.len);
+        Error::Device(format!("buffer \"{name}\": {range:?} is no part of its {len} elements"))
     }
 
     /// The Vulkan buffer behind this one. It is alive as long as this one is.
@@ -287,11 +290,9 @@ impl Untyped {
     }
 
     fn read(&self, offset: usize, bytes: &mut [u8]) -> Result<()> {
-        let length = bytes.len();
         // Integrated GPUs map memory that only writes are quick to.
-        match self
-            .mapped(vk::MemoryPropertyFlags::HOST_CACHED, |all| bytes.copy_from_slice(&all[offset..offset + length]))
-        {
+        let (length, cached) = (bytes.len(), vk::MemoryPropertyFlags::HOST_CACHED);
+        match self.mapped(cached, |all| bytes.copy_from_slice(&all[offset..offset + length])) {
             Some(()) => Ok(()),
             None => staging::download(self, offset, bytes),
         }

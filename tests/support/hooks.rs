@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::ffi::{CStr, c_char, c_void};
 use std::mem::transmute;
 use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
-use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
+use std::sync::{LazyLock, Mutex};
 use tallow::gpu::RawDevice;
 
 /// While set, whatever is submitted loses the device.
@@ -28,15 +28,13 @@ static INSTANCE_LOADER: Real<vk::PFN_vkGetInstanceProcAddr> = Real(Mutex::new(No
 static DEVICE_LOADER: Real<vk::PFN_vkGetDeviceProcAddr> = Real(Mutex::new(None));
 static CALLS: LazyLock<Mutex<HashMap<&'static str, usize>>> = LazyLock::new(Mutex::default);
 
-/// The engine's handles, with our entry points. Tests that use it take turns: hold the guard.
-pub fn between(raw: RawDevice) -> (RawDevice, MutexGuard<'static, ()>) {
-    static TURN: Mutex<()> = Mutex::new(());
-    let guard = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+/// The engine's handles, with our entry points. Engines take turns, and so do these.
+pub fn between(raw: RawDevice) -> RawDevice {
     take_calls(); // of the test before
     // SAFETY: the engine's own pointer.
     INSTANCE_LOADER
         .set(unsafe { transmute::<*const c_void, vk::PFN_vkGetInstanceProcAddr>(raw.get_instance_proc_addr) });
-    (RawDevice { get_instance_proc_addr: get_instance_proc_addr as *const c_void, ..raw }, guard)
+    RawDevice { get_instance_proc_addr: get_instance_proc_addr as *const c_void, ..raw }
 }
 
 /// How often each entry point was called since the last time that somebody asked.
