@@ -144,7 +144,7 @@ fn point_light_box_matches_at_every_depth() {
 }
 
 fn plane(film: &Film, name: &str) -> Vec<f32> {
-    film.channel(name).unwrap_or_else(|| panic!("no channel {name}")).to_f32()
+    film.channel(name).unwrap_or_else(|| panic!("no channel {name}")).to_f32().into_owned()
 }
 
 /// True where the pixel's neighbours show the same shape, so that no edge is near.

@@ -1,7 +1,9 @@
 //! Reads two images of the same scene and measures how far apart they are, with the noise of both set aside.
 use anyhow::{Context, ensure};
-use exr::prelude::*;
+use image::codecs::png::PngEncoder;
+use std::fs::File;
 use std::path::Path;
+use tallow::image::{Film, Samples, WriteOptions};
 
 /// Linear RGB, row 0 at the top.
 pub struct Picture {
@@ -43,29 +45,14 @@ pub struct Comparison {
 /// # Errors
 /// When the file cannot be read, a channel is missing, or a value is not finite.
 pub fn read(path: &Path, channels: [&str; 3]) -> anyhow::Result<Picture> {
-    let file =
-        exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
-    let image = file.from_file(path).with_context(|| format!("{}", path.display()))?;
-    let planes = channels.map(|name| plane(&image, name));
+    let film = tallow::image::read(path)?;
+    let planes = channels.map(|name| film.channel(name).map(Samples::to_f32));
     let [Some(r), Some(g), Some(b)] = planes else {
         anyhow::bail!("{}: the channels {} are not all there", path.display(), channels.join(", "));
     };
-    ensure!(r.0 == g.0 && g.0 == b.0, "{}: the channels differ in size", path.display());
-    let rgb: Vec<[f32; 3]> = (0..r.1.len()).map(|i| [r.1[i], g.1[i], b.1[i]]).collect();
+    let rgb: Vec<[f32; 3]> = (0..film.pixels()).map(|i| [r[i], g[i], b[i]]).collect();
     ensure!(rgb.iter().flatten().all(|v| v.is_finite()), "{}: a pixel is not finite", path.display());
-    Ok(Picture { width: r.0.0, height: r.0.1, rgb })
-}
-
-/// Size and values of the channel of this full name: `R`, or `N.X` in a layer `N` or without layers.
-fn plane(image: &FlatImage, name: &str) -> Option<(Vec2<usize>, Vec<f32>)> {
-    image.layer_data.iter().find_map(|layer| {
-        let prefix = layer.attributes.layer_name.as_ref().map(|n| format!("{n}."));
-        layer.channel_data.list.iter().find_map(|channel| {
-            let own = channel.name.to_string();
-            let full = format!("{}{own}", prefix.as_deref().unwrap_or_default());
-            (own == name || full == name).then(|| (layer.size, channel.sample_data.values_as_f32().collect()))
-        })
-    })
+    Ok(Picture { width: film.width as usize, height: film.height as usize, rgb })
 }
 
 /// Mean of the three channels: no colour matters more than another here.
@@ -140,16 +127,17 @@ fn blocks(picture: &Picture) -> Vec<Vec<f64>> {
 /// Writes the difference as `STEM.exr` and as `STEM.png`, where middle grey is agreement and black or white is off by
 /// the reference's mean.
 pub fn write_difference(difference: &Picture, reference: &Picture, stem: &Path) -> anyhow::Result<()> {
-    let at = |x: usize, y: usize| difference.rgb[y * difference.width + x];
-    let exr = stem.with_extension("exr");
-    let rgb = |x, y| <(f32, f32, f32)>::from(at(x, y));
-    write_rgb_file(&exr, difference.width, difference.height, rgb).with_context(|| format!("{}", exr.display()))?;
+    let (width, height) = (difference.width as u32, difference.height as u32);
+    let mut film = Film::new(width, height);
+    film.add_vec3("", ["R", "G", "B"], &difference.rgb);
+    tallow::image::write(&stem.with_extension("exr"), &film, &WriteOptions::default())?;
     let scale = 0.5 / mean(reference.rgb.iter().map(|&v| grey(v))).max(f64::MIN_POSITIVE);
     let byte = |v: f32| ((0.5 + f64::from(v) * scale).clamp(0.0, 1.0) * 255.0).round() as u8;
-    let png = image::RgbImage::from_fn(difference.width as u32, difference.height as u32, |x, y| {
-        image::Rgb(at(x as usize, y as usize).map(byte))
-    });
-    png.save(stem.with_extension("png")).with_context(|| format!("{}.png", stem.display()))
+    let bytes = difference.rgb.iter().flatten().map(|&v| byte(v)).collect();
+    let png = image::RgbImage::from_raw(width, height, bytes).context("three values per pixel")?;
+    let path = stem.with_extension("png");
+    let file = File::create(&path).with_context(|| format!("{}", path.display()))?;
+    png.write_with_encoder(PngEncoder::new(file)).with_context(|| format!("{}", path.display()))
 }
 
 #[cfg(test)]

@@ -110,7 +110,7 @@ impl<'a> Aovs<'a> {
             ));
         }
         let [a, b, c] = channels.map(|c| c.samples.to_f32());
-        self.planes.insert(known.aov, a.iter().zip(&b).zip(&c).map(|((&a, &b), &c)| [a, b, c]).collect());
+        self.planes.insert(known.aov, a.iter().zip(b.iter()).zip(c.iter()).map(|((&a, &b), &c)| [a, b, c]).collect());
         self.notes.push(format!("{}: {}", known.label, channel_names(channels)));
         Ok(())
     }

@@ -121,7 +121,8 @@ pub(super) fn replace(bytes: &[u8], channels: &[(&str, &[f32])]) -> Result<Vec<u
         }
     }
     let mut out = Cursor::new(Vec::new());
-    image.write().to_buffered(&mut out).map_err(|e| format!("cannot be encoded: {e}"))?;
+    let stream: &mut dyn Stream = &mut out;
+    image.write().to_buffered(stream).map_err(|e| format!("cannot be encoded: {e}"))?;
     Ok(out.into_inner())
 }
 
@@ -147,9 +148,9 @@ fn union(a: IntegerBounds, b: IntegerBounds) -> IntegerBounds {
 
 fn read(bytes: &[u8]) -> Result<FlatImage, String> {
     let damaged = |e: exr::error::Error| format!("cannot be decoded: {e}; is it complete?");
-    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
-    check_size(&meta, bytes.len())?;
-    check_sampling(&meta)?;
+    let chunks = exr::block::read(Cursor::new(bytes), false).map_err(damaged)?;
+    check_size(chunks.meta_data(), bytes.len())?;
+    check_sampling(chunks.meta_data())?;
     exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -158,7 +159,7 @@ fn read(bytes: &[u8]) -> Result<FlatImage, String> {
         .all_attributes()
         // A panic on one of its own threads would abort the process, see `contained`.
         .non_parallel()
-        .from_buffered(Cursor::new(bytes))
+        .from_chunks(chunks)
         .map_err(damaged)
 }
 

@@ -1,4 +1,5 @@
 //! What a render returns and what an image file holds: planes of samples under dotted names, as EXR has them.
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The samples of one channel, row-major, row 0 at the top.
@@ -134,7 +135,7 @@ impl Film {
     pub fn picture(&self, layer: Option<&str>) -> Result<Picture, String> {
         let channels = self.find(layer).ok_or_else(|| self.no_such_layer(layer))?;
         let [a, b, c] = channels.map(|c| c.samples.to_f32());
-        let pixels = a.iter().zip(&b).zip(&c).map(|((&a, &b), &c)| [a, b, c]).collect();
+        let pixels = a.iter().zip(b.iter()).zip(c.iter()).map(|((&a, &b), &c)| [a, b, c]).collect();
         Ok(Picture { width: self.width, height: self.height, pixels })
     }
 
@@ -223,9 +224,9 @@ impl Samples {
     }
 
     /// As floats; counts above 2^24 are rounded.
-    pub fn to_f32(&self) -> Vec<f32> {
+    pub fn to_f32(&self) -> Cow<'_, [f32]> {
         match self {
-            Self::F32(v) => v.clone(),
+            Self::F32(v) => v.into(),
             Self::U32(v) => v.iter().map(|&u| u as f32).collect(),
         }
     }

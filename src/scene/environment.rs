@@ -6,6 +6,7 @@
 //! first and last lie on the poles: half a texel apart at most).
 use super::{Environment, alias};
 use crate::error::{Error, Result};
+use crate::image::{self, Picture};
 use glam::DMat3;
 use std::path::Path;
 
@@ -24,7 +25,7 @@ fn row_sine(row: u32, height: u32) -> f64 {
 /// # Errors
 /// [`Error::Input`] for a file that cannot be read or decoded.
 pub fn load(path: &Path, warn: &mut Vec<String>) -> Result<Option<Environment>> {
-    decode(path, &crate::image::input::read(path)?, warn)
+    decode(path, &image::input::read(path)?, warn)
 }
 
 /// [`load`] from bytes; `path` is for messages.
@@ -34,34 +35,25 @@ pub fn load(path: &Path, warn: &mut Vec<String>) -> Result<Option<Environment>> 
 pub fn decode(path: &Path, bytes: &[u8], warn: &mut Vec<String>) -> Result<Option<Environment>> {
     let unusable =
         |what| Error::input(path, format!("is no usable environment image ({what}): save it again as HDR or EXR"));
-    let picture = || image::load_from_memory(bytes).map_err(|e| e.to_string());
-    let picture = crate::image::contained(picture).map_err(unusable)?;
-    // 8- and 16-bit forms store the sRGB curve; HDR and EXR are linear.
-    let encoded = !matches!(picture.color(), image::ColorType::Rgb32F | image::ColorType::Rgba32F);
-    let rgb = picture.into_rgb32f();
-    let (width, height) = rgb.dimensions();
-    if width == 0 || height == 0 {
+    let Picture { width, height, pixels } =
+        image::decode(bytes).and_then(|film| film.picture(None)).map_err(unusable)?;
+    if pixels.is_empty() {
         return Err(unusable("it has no pixels".into()));
     }
     let mut repaired = 0usize;
-    let texels = rgb.pixels().map(|p| sane(p.0, encoded, &mut repaired)).collect();
+    let texels = pixels.into_iter().map(|p| sane(p, &mut repaired)).collect();
     if repaired > 0 {
         warn.push(format!("{}: {repaired} NaN, infinite or negative channels set to 0", path.display()));
     }
     Ok(with_table(width, height, texels))
 }
 
-fn sane(rgb: [f32; 3], encoded: bool, repaired: &mut usize) -> [f32; 4] {
-    let channel = |v: f32| match v {
-        v if !(v.is_finite() && v >= 0.0) => {
-            *repaired += 1;
-            0.0
-        }
-        v if !encoded => v,
-        v if v <= 0.04045 => v / 12.92,
-        v => ((v + 0.055) / 1.055).powf(2.4),
-    };
-    let [r, g, b] = rgb.map(channel);
+fn sane(rgb: [f32; 3], repaired: &mut usize) -> [f32; 4] {
+    let [r, g, b] = rgb.map(|v| {
+        let usable = v.is_finite() && v >= 0.0;
+        *repaired += usize::from(!usable);
+        if usable { v } else { 0.0 }
+    });
     [r, g, b, 0.0]
 }
 
@@ -156,7 +148,7 @@ mod tests {
         assert!(error.starts_with("a.hdr: is no usable environment image") && !error.contains('\n'), "{error}");
         assert!(with_table(2, 1, vec![[0.0; 4]; 2]).is_none());
         let mut repaired = 0;
-        assert_eq!(sane([f32::NAN, -1.0, 2.0], false, &mut repaired), [0.0, 0.0, 2.0, 0.0]);
+        assert_eq!(sane([f32::NAN, -1.0, 2.0], &mut repaired), [0.0, 0.0, 2.0, 0.0]);
         assert_eq!(repaired, 2);
     }
 }

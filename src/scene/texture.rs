@@ -5,6 +5,7 @@ use crate::gpu::layout::{NONE, TEXTURE_CLAMP, TEXTURE_SRGB, Texture};
 use crate::image::{contained, input};
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 /// What a picture holds, which decides how it is read and which channels are kept.
@@ -88,10 +89,10 @@ impl TextureSet {
     /// # Errors
     /// [`Error::Input`] with the file that is truncated, damaged, or in a form other than PNG or JPEG.
     pub fn decode(&self) -> Result<Decoded> {
-        let sizes: Vec<_> = self.wanted.par_iter().map(|(path, ..)| dimensions(path)).collect::<Result<_>>()?;
-        let mut textures = Vec::with_capacity(sizes.len());
+        let files: Vec<_> = self.wanted.par_iter().map(|(path, ..)| File::read(path)).collect::<Result<_>>()?;
+        let mut textures = Vec::with_capacity(files.len());
         let mut total = 0u64;
-        for ((path, kind, mapping), &(width, height)) in self.wanted.iter().zip(&sizes) {
+        for ((path, kind, mapping), &File { width, height, .. }) in self.wanted.iter().zip(&files) {
             let first = u32::try_from(total).map_err(|_| too_many(path))?;
             total += u64::from(width) * u64::from(height);
             let bits = [(*kind == Kind::Color, TEXTURE_SRGB), (mapping.clamp, TEXTURE_CLAMP)];
@@ -103,65 +104,75 @@ impl TextureSet {
             return Err(too_many(&self.wanted[0].0));
         }
         let mut texels = vec![0u32; total as usize];
-        self.jobs(&textures, &mut texels).into_par_iter().try_for_each(|(i, t, space)| {
-            let (path, kind, _) = &self.wanted[i];
-            load(path, *kind, t, space)
-        })?;
+        jobs(files, &mut texels).into_par_iter().zip(&self.wanted).try_for_each(
+            |((file, space), (path, kind, _))| {
+                let decoded = contained(|| file.decode(*kind, space));
+                decoded.map_err(|what| damaged(path, what))
+            },
+        )?;
         Ok(Decoded { textures, texels })
     }
+}
 
-    /// Each picture with its own part of the texel array.
-    fn jobs<'a>(&self, textures: &[Texture], mut texels: &'a mut [u32]) -> Vec<(usize, Texture, &'a mut [u32])> {
-        let mut jobs = Vec::with_capacity(textures.len());
-        for (i, t) in textures.iter().enumerate() {
-            let size = t.width as usize * t.height as usize;
-            let (own, rest) = texels.split_at_mut(size);
-            jobs.push((i, *t, own));
-            texels = rest;
-        }
-        jobs
+/// Each picture with its own part of the texel array.
+fn jobs(files: Vec<File>, mut texels: &mut [u32]) -> Vec<(File, &mut [u32])> {
+    let mut jobs = Vec::with_capacity(files.len());
+    for file in files {
+        let (own, rest) = texels.split_at_mut(file.width as usize * file.height as usize);
+        jobs.push((file, own));
+        texels = rest;
     }
+    jobs
 }
 
 fn too_many(path: &Path) -> Error {
     Error::input(path, "the textures of this scene have more than 2^32 texels together: reduce them")
 }
 
-fn reader(path: &Path) -> Result<image::ImageReader<std::io::BufReader<std::fs::File>>> {
-    let reader = image::ImageReader::new(std::io::BufReader::new(input::open(path)?));
-    reader.with_guessed_format().map_err(|e| damaged(path, e.to_string()))
-}
-
 fn damaged(path: &Path, what: String) -> Error {
     Error::input(path, format!("is no usable picture ({what}): save it again as PNG or JPEG"))
 }
 
-fn dimensions(path: &Path) -> Result<(u32, u32)> {
-    let reader = reader(path)?;
-    match contained(|| reader.into_dimensions().map_err(|e| e.to_string())).map_err(|what| damaged(path, what))? {
-        (w, h) if (1..=1 << 16).contains(&w) && (1..=1 << 16).contains(&h) => Ok((w, h)),
-        (w, h) => Err(Error::input(path, format!("is {w} x {h} texels: 1 to 65536 each way can be used"))),
+/// A picture's file in memory, and the size that its header says.
+struct File {
+    bytes: Vec<u8>,
+    width: u32,
+    height: u32,
+}
+
+impl File {
+    fn read(path: &Path) -> Result<Self> {
+        let bytes = input::read(path)?;
+        let size = contained(|| reader(&bytes)?.into_dimensions().map_err(|e| e.to_string()));
+        match size.map_err(|what| damaged(path, what))? {
+            (width, height) if (1..=1 << 16).contains(&width) && (1..=1 << 16).contains(&height) => {
+                Ok(Self { bytes, width, height })
+            }
+            (w, h) => Err(Error::input(path, format!("is {w} x {h} texels: 1 to 65536 each way can be used"))),
+        }
+    }
+
+    fn decode(self, kind: Kind, space: &mut [u32]) -> std::result::Result<(), String> {
+        let picture = reader(&self.bytes)?.decode().map_err(|e| e.to_string())?;
+        let has_alpha = picture.color().has_alpha();
+        if (picture.width(), picture.height()) != (self.width, self.height) {
+            return Err("its header says another size".to_owned());
+        }
+        let rgba = picture.into_rgba8();
+        let same = |v: u8| u32::from_le_bytes([v; 4]);
+        for (texel, p) in space.iter_mut().zip(rgba.pixels()) {
+            *texel = match kind {
+                Kind::Color | Kind::Data => u32::from_le_bytes(p.0),
+                Kind::Mask => same(if has_alpha { p.0[3] } else { p.0[0] }),
+                Kind::Roughness => same(p.0[1]),
+            };
+        }
+        Ok(())
     }
 }
 
-/// Decodes one picture into `space`.
-fn load(path: &Path, kind: Kind, t: Texture, space: &mut [u32]) -> Result<()> {
-    let reader = reader(path)?;
-    let picture = contained(|| reader.decode().map_err(|e| e.to_string())).map_err(|what| damaged(path, what))?;
-    let has_alpha = picture.color().has_alpha();
-    if (picture.width(), picture.height()) != (t.width, t.height) {
-        return Err(Error::input(path, "has another size than its header says: save it again"));
-    }
-    let rgba = picture.into_rgba8();
-    let same = |v: u8| u32::from_le_bytes([v; 4]);
-    for (texel, p) in space.iter_mut().zip(rgba.pixels()) {
-        *texel = match kind {
-            Kind::Color | Kind::Data => u32::from_le_bytes(p.0),
-            Kind::Mask => same(if has_alpha { p.0[3] } else { p.0[0] }),
-            Kind::Roughness => same(p.0[1]),
-        };
-    }
-    Ok(())
+fn reader(bytes: &[u8]) -> std::result::Result<image::ImageReader<Cursor<&[u8]>>, String> {
+    image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())
 }
 
 /// The sRGB curve (IEC 61966-2-1), from a byte to linear light.

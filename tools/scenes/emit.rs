@@ -1,6 +1,8 @@
 //! From a JSON description to the tables of a scene file.
 use super::description::{Bitmap, Bsdf, Camera, Color, Description, Emitter, Index, Integrator, Material, Shape};
 use anyhow::{Context, bail, ensure};
+use image::codecs::png::PngEncoder;
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
@@ -249,7 +251,8 @@ fn mask(place: &Place, opacity: &Color, out: &mut Table) -> anyhow::Result<()> {
 /// a grey image of those values is written beside the scene file.
 fn grey_mask(place: &Place, filename: &str) -> anyhow::Result<PathBuf> {
     let source = place.folder.join(filename);
-    let image = image::open(&source).with_context(|| format!("cannot read {}", source.display()))?;
+    let bytes = std::fs::read(&source).with_context(|| format!("cannot read {}", source.display()))?;
+    let image = image::load_from_memory(&bytes).with_context(|| format!("cannot decode {}", source.display()))?;
     let mut grey = image.to_luma8();
     for pixel in grey.pixels_mut() {
         let s = f32::from(pixel.0[0]) / 255.0;
@@ -258,6 +261,7 @@ fn grey_mask(place: &Place, filename: &str) -> anyhow::Result<PathBuf> {
     }
     let stem = source.file_stem().unwrap_or_default().to_string_lossy();
     let path = place.out.canonicalize()?.join(format!("{}-{stem}.png", place.name));
-    grey.save(&path).with_context(|| format!("cannot write {}", path.display()))?;
+    let file = File::create(&path).with_context(|| format!("cannot write {}", path.display()))?;
+    grey.write_with_encoder(PngEncoder::new(file)).with_context(|| format!("cannot write {}", path.display()))?;
     Ok(path)
 }

@@ -39,7 +39,7 @@ fn rewritten(source: &Source, folder: &TempDir) -> (Film, PathBuf) {
 }
 
 fn values(film: &Film, name: &str) -> Vec<f32> {
-    film.channel(name).unwrap_or_else(|| panic!("no channel {name}")).to_f32()
+    film.channel(name).unwrap_or_else(|| panic!("no channel {name}")).to_f32().into_owned()
 }
 
 #[test]

@@ -1,0 +1,5 @@
+//! Pictures and files.
+mod damage;
+mod files;
+mod metrics;
+mod source;
