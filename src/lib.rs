@@ -2,6 +2,7 @@
 pub mod allocate;
 pub mod cli;
 pub mod composition;
+pub mod denoiser;
 pub mod error;
 pub mod filter;
 mod frame;

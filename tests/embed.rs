@@ -5,12 +5,17 @@ mod support;
 
 use ash::vk;
 use ash::vk::Handle;
+use bytemuck::Pod;
 use std::path::Path;
 use std::process::Command;
 use support::engine::Engine;
-use tallow::gpu::layout::{Camera, Effects, vec3};
+use tallow::composition::{self, Demodulation};
+use tallow::denoiser::Denoiser;
+use tallow::filter::{self, FilterSettings};
+use tallow::gpu::layout::{Camera, Effects, vec3, vec4};
 use tallow::gpu::{Buffer, FrameResources, Gpu, Location, Recorder};
-use tallow::image;
+use tallow::image::aov::{Aovs, Names};
+use tallow::image::{self, Film};
 use tallow::renderer::{OutputView, Outputs, Renderer};
 use tallow::scene::Scene;
 use tallow::settings::Settings;
@@ -31,8 +36,8 @@ fn small(s: &mut Settings, policy: &str) {
     s.allocate.policy = policy.to_owned();
 }
 
-/// The image that the command line writes for the same settings.
-fn command_line(policy: &str) -> Vec<[f32; 3]> {
+/// The film that the command line writes for the same settings.
+fn command_line(policy: &str) -> Film {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("box.exr");
     let [width, height, spp] = [WIDTH, HEIGHT, SPP].map(|n| n.to_string());
@@ -43,11 +48,11 @@ fn command_line(policy: &str) -> Vec<[f32; 3]> {
         command.args(["--device", &device]);
     }
     assert!(command.status().unwrap().success());
-    image::read(&file).unwrap().picture(None).unwrap().pixels
+    image::read(&file).unwrap()
 }
 
 /// The engine copies every pixel's radiance out of the strided result, in its own command buffer.
-unsafe fn gather(device: &ash::Device, commands: vk::CommandBuffer, from: OutputView, to: &Buffer<vec3>) {
+unsafe fn gather<T: Pod>(device: &ash::Device, commands: vk::CommandBuffer, from: OutputView, to: &Buffer<T>) {
     let size = 4 * u64::from(from.channels);
     let region = |i: usize| vk::BufferCopy {
         src_offset: from.buffer.offset + from.offset + i as u64 * u64::from(from.stride),
@@ -86,7 +91,7 @@ fn agrees(engine: &Engine, gpu: &Gpu, policy: &str) {
         });
         download.read().unwrap()
     };
-    let expected = command_line(policy);
+    let expected = command_line(policy).picture(None).unwrap().pixels;
     for _ in 0..3 {
         assert!(record(&renderer) == expected, "{policy}: the engine's pixels are not those of the command line");
     }
@@ -99,4 +104,44 @@ fn agrees(engine: &Engine, gpu: &Gpu, policy: &str) {
     assert_eq!(renderer.set_camera(lens).unwrap_err().exit_code(), 2, "the kernels were compiled for a pinhole");
     let effects = Effects { lens: true, ..*renderer.effects() };
     Renderer::specialised(gpu, &scene, outputs, effects).unwrap().set_camera(lens).unwrap();
+}
+
+/// Steps and filter in one command buffer, against the command line's file taken apart, filtered and put together.
+#[test]
+fn an_engine_filters_its_frames_where_they_are() {
+    let engine = Engine::new();
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
+    let scene = Scene::load(&scene_file(), &|s| small(s, "uniform")).unwrap();
+    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    let renderer = Renderer::new(&gpu, &scene, outputs).unwrap();
+    let film = command_line("uniform");
+    let aovs = Aovs::find(&film, &Names::new()).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let download = Buffer::<vec4>::new(&gpu, "download", film.pixels(), Location::Readback).unwrap();
+    let settings = FilterSettings { extent: 5.0, radius: 8, ..FilterSettings::default() };
+    for (name, demodulation) in [("guided", Demodulation::Light), ("auto", Demodulation::Albedo)] {
+        let row = filter::find(name).unwrap();
+        let denoiser = Denoiser::new(&gpu, &renderer, row, &settings, demodulation).unwrap();
+        for _ in 0..2 {
+            engine.run(|commands| unsafe {
+                let mut rec = Recorder::external(&gpu, &mut frame, commands.as_raw()).unwrap();
+                renderer.steps().for_each(|step| renderer.record(&mut rec, &step).unwrap());
+                denoiser.record(&mut rec).unwrap();
+                drop(rec);
+                gather(&engine.device, commands, denoiser.radiance(), &download);
+            });
+        }
+        assert!(frame.times().unwrap().iter().any(|pass| pass.name == "split"), "the filter's passes are timed");
+        let parts = composition::split(&aovs, demodulation);
+        let expected = parts.join(&filter::run(&gpu, row, &parts.input, &settings).unwrap().0);
+        let off = download.read().unwrap().iter().zip(&expected).fold(0f32, |worst, (found, expected)| {
+            (0..3).fold(worst, |worst, c| worst.max((found[c] - expected[c]).abs() / expected[c].abs().max(1e-2)))
+        });
+        assert!(off < 1e-3, "{name}: {off}");
+        let plain = film.picture(None).unwrap().pixels;
+        let moved = expected.iter().zip(&plain).filter(|(a, b)| (a[0] - b[0]).abs() > 1e-2 * b[0].abs()).count();
+        assert!(moved > plain.len() / 4, "control: {moved} pixels are filtered");
+    }
+    assert_eq!(engine.messages(), Vec::<String>::new());
 }

@@ -8,7 +8,10 @@ use ash::vk::Handle;
 use std::path::Path;
 use std::sync::atomic::Ordering::SeqCst;
 use support::engine::Engine;
+use tallow::composition::Demodulation;
+use tallow::denoiser::Denoiser;
 use tallow::error::Error;
+use tallow::filter::{self, FilterSettings};
 use tallow::gpu::{FrameResources, Gpu, Recorder};
 use tallow::renderer::{Outputs, Renderer, Step};
 use tallow::scene::Scene;
@@ -32,6 +35,8 @@ fn nothing_is_created_after_the_first_frame() {
     let scene = scene();
     let outputs = Outputs { split_light: true, guides: true, counters: true };
     let renderer = Renderer::new(&gpu, &scene, outputs).unwrap();
+    let (row, settings) = (filter::find("auto").unwrap(), FilterSettings::default());
+    let denoiser = Denoiser::new(&gpu, &renderer, row, &settings, Demodulation::Light).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
     let made = hooks::take_calls();
     for name in ["vkCreateBuffer", "vkAllocateMemory", "vkCreateComputePipelines"] {
@@ -42,6 +47,7 @@ fn nothing_is_created_after_the_first_frame() {
             // SAFETY: recording, on this device.
             let mut rec = unsafe { Recorder::external(&gpu, &mut frame, commands.as_raw()) }.unwrap();
             renderer.steps().for_each(|step| renderer.record(&mut rec, &step).unwrap());
+            denoiser.record(&mut rec).unwrap();
         });
         assert!(frame.times().is_ok());
         let calls = hooks::take_calls();

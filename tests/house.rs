@@ -24,6 +24,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
             "statistics",
         ],
     ),
+    ("denoiser", &["composition", "error", "filter", "gpu", "renderer", "shaders", "stage"]),
     ("renderer", &["allocate", "error", "frame", "gpu", "scene", "schedule", "settings", "stage"]),
     ("frame", &["allocate", "error", "gpu", "scene", "schedule", "shaders", "stage"]),
     ("stage", &["error", "frame", "gpu", "reference", "schedule", "shaders"]),

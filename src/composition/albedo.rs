@@ -1,5 +1,5 @@
 //! Colour divided by albedo, for images that do not hold direct light apart.
-use super::Light;
+use super::{Light, finite};
 use crate::gpu::layout::vec3;
 
 /// A channel of smaller albedo is divided by this instead; a pixel with no larger one is left as it is.
@@ -14,12 +14,12 @@ const OUTLIER: f32 = 2.0;
 pub(super) fn split(colour: &[vec3], albedo: &[vec3], width: usize) -> Light {
     let is_rim = |i: usize| is_rim(colour, albedo, width, i);
     let factor = |i: usize| match reflects(&albedo[i]) && !is_rim(i) {
-        true => albedo[i].map(|v| v.max(SMALLEST_ALBEDO)),
+        true => albedo[i].map(|v| finite(v).max(SMALLEST_ALBEDO)),
         false => [0.0; 3],
     };
     let factor: Vec<vec3> = (0..colour.len()).map(factor).collect();
     let lit = |(c, f): (&vec3, &vec3)| if f[0] > 0.0 { std::array::from_fn(|k| c[k] / f[k]) } else { [0.0; 3] };
-    let dark = |(c, f): (&vec3, &vec3)| if f[0] > 0.0 { [0.0; 3] } else { *c };
+    let dark = |(c, f): (&vec3, &vec3)| if f[0] > 0.0 { [0.0; 3] } else { c.map(finite) };
     Light {
         filtered: colour.iter().zip(&factor).map(lit).collect(),
         sharp: colour.iter().zip(&factor).map(dark).collect(),

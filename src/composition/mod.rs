@@ -101,15 +101,21 @@ fn split_light(colour: &[vec3], albedo: &[vec3], [direct, indirect]: [&[vec3]; 2
     let factor = |i: usize| {
         std::array::from_fn(|c| {
             let of_samples = (colour[i][c] - direct[i][c]) / indirect[i][c];
-            if of_samples.is_finite() && indirect[i][c] > 0.0 { of_samples.clamp(0.0, 1.0) } else { albedo[i][c] }
+            let known = of_samples.is_finite() && indirect[i][c] > 0.0;
+            if known { of_samples.clamp(0.0, 1.0) } else { finite(albedo[i][c]) }
         })
     };
     Light {
         filtered: indirect.to_vec(),
         factor: (0..colour.len()).map(factor).collect(),
-        sharp: direct.iter().map(|v| v.map(|v| if v.is_finite() { v } else { 0.0 })).collect(),
+        sharp: direct.iter().map(|v| v.map(finite)).collect(),
         note: "filtered: indirect light before albedo; direct light stays as it is",
     }
+}
+
+/// 0 for what is no number: nothing would mend it later.
+fn finite(v: f32) -> f32 {
+    if v.is_finite() { v } else { 0.0 }
 }
 
 fn plain(colour: &[vec3]) -> Light {

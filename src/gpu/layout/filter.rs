@@ -3,6 +3,12 @@ use super::{float, uint, uvec2, vec3, vec4};
 use bytemuck::{Pod, Zeroable};
 
 gpu_structs! {
+    /// Push constants of `split.comp` and `join.comp`.
+    struct SplitPush {
+        /// Film in pixels.
+        size: uvec2,
+    }
+
     /// Push constants of `pack.comp`.
     struct PackPush {
         /// Pixels.
