@@ -1,5 +1,5 @@
 //! From a description to the flat arrays: files are read, meshes placed, BVHs built and textures decoded.
-use super::description::{self, Description};
+use super::description::{self, Description, Mesh};
 use super::geometry::Geometry;
 use super::obj::{self, Library, ObjFile};
 use super::place::{Job, Plan, instance, mesh_name};
@@ -41,6 +41,7 @@ pub struct Assembly<'a> {
 pub fn assemble(path: &Path, description: &Description, sky: bool, scene: &mut Scene) -> Result<()> {
     let (library, files, geometry) = Default::default();
     let mut a = Assembly { path, description, library, files, geometry };
+    a.bitmaps()?;
     a.materials()?;
     // Textures are decoded while geometry is read: on two cores Crytek Sponza is ready a quarter sooner.
     a.read_libraries()?;
@@ -53,22 +54,30 @@ pub fn assemble(path: &Path, description: &Description, sky: bool, scene: &mut S
     Ok(())
 }
 
-impl Assembly<'_> {
+impl<'a> Assembly<'a> {
+    /// What paths are relative to.
+    pub fn directory(&self) -> &'a Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+
     /// An error at a place in the scene file.
     pub fn at(&self, place: impl std::fmt::Display, what: impl std::fmt::Display) -> Error {
         Error::input_at(self.path, place, what)
     }
 
-    /// What paths are relative to.
-    pub fn directory(&self) -> &Path {
-        self.path.parent().unwrap_or(Path::new(""))
+    fn bitmaps(&mut self) -> Result<()> {
+        for bitmap in &self.description.bitmap {
+            let taken = self.library.materials.textures.add_bitmap(bitmap);
+            taken.map_err(|what| self.at(format!("bitmap \"{}\"", bitmap.name.display()), what))?;
+        }
+        Ok(())
     }
 
     fn materials(&mut self) -> Result<()> {
         for table in &self.description.material {
             let place = format!("material \"{}\"", table.name);
+            let directory = self.directory();
             let Library { materials, warnings, .. } = &mut self.library;
-            let directory = self.path.parent().unwrap_or(Path::new(""));
             let index = materials.push_table(table, directory, warnings).map_err(|what| self.at(&place, what))?;
             if table.name.is_empty() {
                 return Err(self.at("[[material]]", "has no name: meshes could not refer to it"));
@@ -114,9 +123,11 @@ impl Assembly<'_> {
     fn read_files(&mut self) -> Result<()> {
         for mesh in &self.description.mesh {
             let place = || format!("mesh \"{}\"", mesh_name(mesh));
-            if mesh.file.is_some() == mesh.shape.is_some() {
-                return Err(self.at(place(), "needs either a file or a shape"));
+            let sources = [mesh.file.is_some(), mesh.shape.is_some(), mesh.data.is_some()];
+            if sources.into_iter().filter(|there| *there).count() != 1 {
+                return Err(self.at(place(), "needs either a file or a shape (or, in memory, data)"));
             }
+            mesh.data.as_ref().map_or(Ok(()), Mesh::check).map_err(|what| self.at(place(), what))?;
             if let Some(n) = mesh.segments.filter(|n| !(3..=4096).contains(n)) {
                 return Err(self.at(place(), format!("segments is {n}: choose a value from 3 to 4096")));
             }
@@ -144,17 +155,22 @@ impl Assembly<'_> {
         }
         let rotation = environment::rotation(table.rotation, table.world_from_environment);
         let light = light::environment(radiance, rotation.map_err(|what| self.at("[environment]", what))?);
-        match &table.file {
-            Some(_) if table.radiance.is_some() => {
+        let (directory, warnings) = (self.directory(), &mut self.library.warnings);
+        scene.environment = match (&table.file, &table.picture) {
+            (None, None) => {
+                scene.lights.push(light);
+                return Ok(());
+            }
+            _ if table.radiance.is_some() => {
                 return Err(self.at("[environment]", "has both radiance and file: choose one"));
             }
-            Some(file) => {
-                let path = self.directory().join(file.to_string_lossy().replace('\\', "/"));
-                scene.environment = environment::load(&path, &mut self.library.warnings)?;
-                scene.lights.extend(scene.environment.is_some().then_some(light));
+            (Some(file), None) => {
+                environment::load(&directory.join(file.to_string_lossy().replace('\\', "/")), warnings)?
             }
-            None => scene.lights.push(light),
-        }
+            (None, Some(picture)) => environment::from_picture(self.path, picture, warnings)?,
+            (Some(_), Some(_)) => return Err(self.at("[environment]", "has both file and picture: choose one")),
+        };
+        scene.lights.extend(scene.environment.is_some().then_some(light));
         Ok(())
     }
 

@@ -2,12 +2,17 @@
 //!
 //! A `[[mesh]]` is drawn where its own `transform` puts it, unless an `[[instance]]` names it: then it is drawn once per
 //! instance and nowhere else, `world_from_object = instance transform * mesh transform`.
-use super::camera::Camera;
-use super::light::LightTable;
-use super::material::MaterialTable;
-use super::shape::Shape;
-use super::value::{Rgb, Transform};
+//!
+//! An engine fills in the same tables for [`Scene::build`](super::Scene::build), with [`MeshTable::data`],
+//! [`Description::bitmap`] and [`EnvironmentTable::picture`] in place of files.
+pub use super::camera::{Camera, FovAxis};
+pub use super::light::{LightTable, Type as LightType};
+pub use super::material::{Distribution, MaterialTable, Type as MaterialType};
+pub use super::mesh::{Bitmap, Mesh};
+pub use super::shape::Shape;
+pub use super::value::{Rgb, Transform};
 use crate::error::{Error, Result};
+use crate::image::Picture;
 use crate::settings::{Allocate, PixelFilter, Sampler, Settings};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -34,6 +39,9 @@ pub struct Description {
     pub material: Vec<MaterialTable>,
     /// Lights without surface.
     pub light: Vec<LightTable>,
+    /// Textures in memory.
+    #[serde(skip)]
+    pub bitmap: Vec<Bitmap>,
 }
 
 /// The `[film]` table; see [`Settings`].
@@ -74,6 +82,9 @@ pub struct EnvironmentTable {
     pub radiance: Option<Rgb>,
     /// Latitude-longitude image (HDR, EXR, PNG, JPEG), instead of `radiance`.
     pub file: Option<PathBuf>,
+    /// The same in memory: linear Rec. 709.
+    #[serde(skip)]
+    pub picture: Option<Picture>,
     /// Multiplies either; default 1.
     pub scale: Option<Rgb>,
     /// Degrees about +y.
@@ -82,7 +93,7 @@ pub struct EnvironmentTable {
     pub world_from_environment: Option<[f64; 9]>,
 }
 
-/// A `[[mesh]]` table: an OBJ file or a shape.
+/// A `[[mesh]]` table: an OBJ file, a shape, or triangles in memory.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MeshTable {
@@ -94,6 +105,9 @@ pub struct MeshTable {
     pub group: Option<String>,
     /// Instead of a file.
     pub shape: Option<Shape>,
+    /// Instead of either.
+    #[serde(skip)]
+    pub data: Option<Mesh>,
     /// Sphere and disk: edges around, 3 to 4096; default 64.
     pub segments: Option<u32>,
     /// world_from_object.
@@ -107,7 +121,7 @@ pub struct MeshTable {
 }
 
 /// An `[[instance]]` table.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InstanceTable {
     /// Name of a `[[mesh]]`.

@@ -33,19 +33,29 @@ pub fn load(path: &Path, warn: &mut Vec<String>) -> Result<Option<Environment>> 
 /// # Errors
 /// See [`load`].
 pub fn decode(path: &Path, bytes: &[u8], warn: &mut Vec<String>) -> Result<Option<Environment>> {
-    let unusable =
-        |what| Error::input(path, format!("is no usable environment image ({what}): save it again as HDR or EXR"));
-    let Picture { width, height, pixels } =
-        image::decode(bytes).and_then(|film| film.picture(None)).map_err(unusable)?;
-    if pixels.is_empty() {
-        return Err(unusable("it has no pixels".into()));
+    let picture = image::decode(bytes).and_then(|film| film.picture(None));
+    from_picture(path, &picture.map_err(|what| unusable(path, &what))?, warn)
+}
+
+/// [`load`] of linear radiance; `path` is for messages.
+///
+/// # Errors
+/// [`Error::Input`] for a picture without pixels, or with others than its size says.
+pub fn from_picture(path: &Path, picture: &Picture, warn: &mut Vec<String>) -> Result<Option<Environment>> {
+    let &Picture { width, height, ref pixels } = picture;
+    if pixels.is_empty() || pixels.len() != width as usize * height as usize {
+        return Err(unusable(path, &format!("it has {} pixels for {width} x {height}", pixels.len())));
     }
     let mut repaired = 0usize;
-    let texels = pixels.into_iter().map(|p| sane(p, &mut repaired)).collect();
+    let texels = pixels.iter().map(|&p| sane(p, &mut repaired)).collect();
     if repaired > 0 {
         warn.push(format!("{}: {repaired} NaN, infinite or negative channels set to 0", path.display()));
     }
     Ok(with_table(width, height, texels))
+}
+
+fn unusable(path: &Path, what: &str) -> Error {
+    Error::input(path, format!("is no usable environment image ({what}): save it again as HDR or EXR"))
 }
 
 fn sane(rgb: [f32; 3], repaired: &mut usize) -> [f32; 4] {

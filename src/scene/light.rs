@@ -14,10 +14,11 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 /// Which light a `[[light]]` table is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Type {
     /// In all directions from `position`.
+    #[default]
     Point,
     /// In a cone from `position`.
     Spot,
@@ -26,7 +27,7 @@ pub enum Type {
 }
 
 /// A `[[light]]` table. Positions in world units.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LightTable {
     /// Which.

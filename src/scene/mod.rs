@@ -5,13 +5,14 @@ use crate::gpu::layout::{
 };
 use crate::image::input;
 use crate::settings::Settings;
+use description::Description;
 use std::path::Path;
 
 mod alias;
 mod assemble;
 mod bvh;
 mod camera;
-mod description;
+pub mod description;
 mod effects;
 mod environment;
 mod fingerprint;
@@ -19,6 +20,7 @@ mod fresnel;
 mod geometry;
 mod light;
 mod material;
+mod mesh;
 mod mtl;
 mod obj;
 mod obj_lines;
@@ -132,9 +134,18 @@ impl Scene {
         Self::from_description(path, &description::parse(path, text)?, false, overrides)
     }
 
+    /// A scene from memory: the tables of a scene file, whose meshes, textures and environment may be data. What files they
+    /// name is relative to the working folder; messages call the scene "scene".
+    ///
+    /// # Errors
+    /// See [`Scene::load`].
+    pub fn build(description: &Description, overrides: &dyn Fn(&mut Settings)) -> Result<Self> {
+        Self::from_description(Path::new("scene"), description, false, overrides)
+    }
+
     fn from_description(
         path: &Path,
-        description: &description::Description,
+        description: &Description,
         sky: bool,
         overrides: &dyn Fn(&mut Settings),
     ) -> Result<Self> {
@@ -157,9 +168,9 @@ impl Scene {
 }
 
 /// A scene of one file.
-fn model(path: &Path) -> description::Description {
+fn model(path: &Path) -> Description {
     let file = path.file_name().map(Into::into);
     let name = path.file_stem().map(|s| s.to_string_lossy().into_owned());
     let mesh = description::MeshTable { name, file, ..Default::default() };
-    description::Description { mesh: vec![mesh], ..Default::default() }
+    Description { mesh: vec![mesh], ..Default::default() }
 }

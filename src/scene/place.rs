@@ -1,6 +1,6 @@
 //! Which mesh goes where: baked into world space, or stored in its own space for instances.
 use super::assemble::Assembly;
-use super::description::{self, MeshTable};
+use super::description::{self, Mesh, MeshTable};
 use super::geometry::{Corners, Geometry, Placement, Repairs, Tag, TooFar};
 use super::obj::ObjFile;
 use crate::error::Result;
@@ -129,12 +129,13 @@ impl Assembly<'_> {
         Some(self.directory().join(table.file.as_ref()?.to_string_lossy().replace('\\', "/")))
     }
 
-    /// The parsed file, taken out of the store, or a shape.
+    /// The parsed file, taken out of the store, or a shape, or a copy of what is in memory.
     fn take_source(&mut self, table: &MeshTable) -> ObjFile {
         if let Some(file) = self.file_of(table).and_then(|path| self.files.remove(&path)) {
             return file;
         }
-        let mesh = table.shape.map(|s| s.mesh(table.segments.unwrap_or(64))).unwrap_or_default();
+        let shape = || table.shape.map(|s| s.mesh(table.segments.unwrap_or(64)));
+        let mesh = table.data.as_ref().map(Mesh::to_tobj).or_else(shape).unwrap_or_default();
         ObjFile { models: vec![tobj::Model { mesh, name: String::new() }], materials: vec![self.library.grey()] }
     }
 

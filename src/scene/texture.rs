@@ -1,4 +1,5 @@
 //! Pictures to RGBA8 texels, decoded on all cores straight into the one texel array.
+use super::mesh::Bitmap;
 use super::mtl::find_file;
 use crate::error::{Error, Result};
 use crate::gpu::layout::{NONE, TEXTURE_CLAMP, TEXTURE_SRGB, Texture};
@@ -49,6 +50,7 @@ impl Mapping {
 /// The pictures that materials asked for, each once per kind and mapping.
 #[derive(Clone, Debug, Default)]
 pub struct TextureSet {
+    bitmaps: HashMap<PathBuf, Bitmap>,
     wanted: Vec<(PathBuf, Kind, Mapping)>,
     index: HashMap<(PathBuf, Kind, [u32; 5]), u32>,
 }
@@ -63,9 +65,26 @@ pub struct Decoded {
 }
 
 impl TextureSet {
+    /// Offers a picture in memory under its name.
+    ///
+    /// # Errors
+    /// A sentence that says what is wrong with it.
+    pub fn add_bitmap(&mut self, bitmap: &Bitmap) -> std::result::Result<(), String> {
+        let &Bitmap { width, height, ref rgba, .. } = bitmap;
+        check_size(width, height)?;
+        if rgba.len() != width as usize * height as usize {
+            return Err(format!("has {} texels for {width} x {height}", rgba.len()));
+        }
+        match self.bitmaps.insert(bitmap.name.clone(), bitmap.clone()) {
+            Some(_) => Err("is there twice: rename one".to_owned()),
+            None => Ok(()),
+        }
+    }
+
     /// Index of the picture, or [`NONE`] with a warning when there is no such file.
     pub fn request(&mut self, dir: &Path, file: &str, kind: Kind, mapping: Mapping, warn: &mut Vec<String>) -> u32 {
-        let Some((path, mended)) = find_file(dir, file) else {
+        let in_memory = self.bitmaps.contains_key(Path::new(file)).then(|| (file.into(), false));
+        let Some((path, mended)) = in_memory.or_else(|| find_file(dir, file)) else {
             warn.push(format!("texture {}: no such file; its constant colour is used", dir.join(file).display()));
             return NONE;
         };
@@ -89,10 +108,11 @@ impl TextureSet {
     /// # Errors
     /// [`Error::Input`] with the file that is truncated, damaged, or in a form other than PNG or JPEG.
     pub fn decode(&self) -> Result<Decoded> {
-        let files: Vec<_> = self.wanted.par_iter().map(|(path, ..)| File::read(path)).collect::<Result<_>>()?;
-        let mut textures = Vec::with_capacity(files.len());
+        let sources: Vec<_> = self.wanted.par_iter().map(|(path, ..)| self.source(path)).collect::<Result<_>>()?;
+        let mut textures = Vec::with_capacity(sources.len());
         let mut total = 0u64;
-        for ((path, kind, mapping), &File { width, height, .. }) in self.wanted.iter().zip(&files) {
+        for ((path, kind, mapping), source) in self.wanted.iter().zip(&sources) {
+            let [width, height] = source.size();
             let first = u32::try_from(total).map_err(|_| too_many(path))?;
             total += u64::from(width) * u64::from(height);
             let bits = [(*kind == Kind::Color, TEXTURE_SRGB), (mapping.clamp, TEXTURE_CLAMP)];
@@ -104,22 +124,27 @@ impl TextureSet {
             return Err(too_many(&self.wanted[0].0));
         }
         let mut texels = vec![0u32; total as usize];
-        jobs(files, &mut texels).into_par_iter().zip(&self.wanted).try_for_each(
-            |((file, space), (path, kind, _))| {
-                let decoded = contained(|| file.decode(*kind, space));
-                decoded.map_err(|what| damaged(path, what))
-            },
-        )?;
+        jobs(sources, &mut texels).into_par_iter().zip(&self.wanted).try_for_each(|((source, space), wanted)| {
+            contained(|| source.decode(wanted.1, space)).map_err(|what| damaged(&wanted.0, what))
+        })?;
         Ok(Decoded { textures, texels })
+    }
+
+    fn source(&self, path: &Path) -> Result<Source> {
+        match self.bitmaps.get(path) {
+            Some(bitmap) => Ok(Source::Bitmap(bitmap.clone())),
+            None => Source::read(path),
+        }
     }
 }
 
 /// Each picture with its own part of the texel array.
-fn jobs(files: Vec<File>, mut texels: &mut [u32]) -> Vec<(File, &mut [u32])> {
-    let mut jobs = Vec::with_capacity(files.len());
-    for file in files {
-        let (own, rest) = texels.split_at_mut(file.width as usize * file.height as usize);
-        jobs.push((file, own));
+fn jobs(sources: Vec<Source>, mut texels: &mut [u32]) -> Vec<(Source, &mut [u32])> {
+    let mut jobs = Vec::with_capacity(sources.len());
+    for source in sources {
+        let [width, height] = source.size();
+        let (own, rest) = texels.split_at_mut(width as usize * height as usize);
+        jobs.push((source, own));
         texels = rest;
     }
     jobs
@@ -133,41 +158,62 @@ fn damaged(path: &Path, what: String) -> Error {
     Error::input(path, format!("is no usable picture ({what}): save it again as PNG or JPEG"))
 }
 
-/// A picture's file in memory, and the size that its header says.
-struct File {
-    bytes: Vec<u8>,
-    width: u32,
-    height: u32,
+fn check_size(width: u32, height: u32) -> std::result::Result<(), String> {
+    match [width, height].iter().all(|n| (1..=1 << 16).contains(n)) {
+        true => Ok(()),
+        false => Err(format!("is {width} x {height} texels: 1 to 65536 each way can be used")),
+    }
 }
 
-impl File {
+/// A picture to be decoded.
+enum Source {
+    /// The bytes of a file, and the size that its header says.
+    File(Vec<u8>, [u32; 2]),
+    Bitmap(Bitmap),
+}
+
+impl Source {
     fn read(path: &Path) -> Result<Self> {
         let bytes = input::read(path)?;
         let size = contained(|| reader(&bytes)?.into_dimensions().map_err(|e| e.to_string()));
-        match size.map_err(|what| damaged(path, what))? {
-            (width, height) if (1..=1 << 16).contains(&width) && (1..=1 << 16).contains(&height) => {
-                Ok(Self { bytes, width, height })
-            }
-            (w, h) => Err(Error::input(path, format!("is {w} x {h} texels: 1 to 65536 each way can be used"))),
+        let (width, height) = size.map_err(|what| damaged(path, what))?;
+        check_size(width, height).map_err(|what| Error::input(path, what))?;
+        Ok(Self::File(bytes, [width, height]))
+    }
+
+    fn size(&self) -> [u32; 2] {
+        match self {
+            Self::File(_, size) => *size,
+            Self::Bitmap(bitmap) => [bitmap.width, bitmap.height],
         }
     }
 
     fn decode(self, kind: Kind, space: &mut [u32]) -> std::result::Result<(), String> {
-        let picture = reader(&self.bytes)?.decode().map_err(|e| e.to_string())?;
-        let has_alpha = picture.color().has_alpha();
-        if (picture.width(), picture.height()) != (self.width, self.height) {
+        let (bytes, size) = match self {
+            Self::Bitmap(bitmap) => {
+                fill(space, bitmap.rgba.iter().copied(), kind, true);
+                return Ok(());
+            }
+            Self::File(bytes, size) => (bytes, size),
+        };
+        let picture = reader(&bytes)?.decode().map_err(|e| e.to_string())?;
+        if [picture.width(), picture.height()] != size {
             return Err("its header says another size".to_owned());
         }
-        let rgba = picture.into_rgba8();
-        let same = |v: u8| u32::from_le_bytes([v; 4]);
-        for (texel, p) in space.iter_mut().zip(rgba.pixels()) {
-            *texel = match kind {
-                Kind::Color | Kind::Data => u32::from_le_bytes(p.0),
-                Kind::Mask => same(if has_alpha { p.0[3] } else { p.0[0] }),
-                Kind::Roughness => same(p.0[1]),
-            };
-        }
+        let has_alpha = picture.color().has_alpha();
+        fill(space, picture.into_rgba8().pixels().map(|p| p.0), kind, has_alpha);
         Ok(())
+    }
+}
+
+fn fill(space: &mut [u32], texels: impl Iterator<Item = [u8; 4]>, kind: Kind, has_alpha: bool) {
+    let same = |v: u8| u32::from_le_bytes([v; 4]);
+    for (texel, rgba) in space.iter_mut().zip(texels) {
+        *texel = match kind {
+            Kind::Color | Kind::Data => u32::from_le_bytes(rgba),
+            Kind::Mask => same(if has_alpha { rgba[3] } else { rgba[0] }),
+            Kind::Roughness => same(rgba[1]),
+        };
     }
 }
 

@@ -1,0 +1,60 @@
+//! Geometry and pictures that an engine has in memory, in place of files.
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Triangles in memory. Everything is per vertex, as in OBJ files after tessellation.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Object units.
+    pub positions: Vec<[f32; 3]>,
+    /// Empty, or one per position: of any length, outward.
+    pub normals: Vec<[f32; 3]>,
+    /// Empty, or one per position: v is up, so that row 0 of a picture is v = 1.
+    pub uvs: Vec<[f32; 2]>,
+    /// Three per triangle, counter-clockwise seen from outside.
+    pub indices: Vec<u32>,
+}
+
+impl Mesh {
+    /// # Errors
+    /// A sentence that says what does not fit together.
+    pub(super) fn check(&self) -> Result<(), String> {
+        let vertices = self.positions.len();
+        let extras = [("normals", self.normals.len()), ("uvs", self.uvs.len())];
+        if let Some((name, count)) = extras.iter().find(|(_, count)| ![0, vertices].contains(count)) {
+            return Err(format!("has {vertices} positions but {count} {name}: give one per position, or none"));
+        }
+        if !self.indices.len().is_multiple_of(3) {
+            return Err(format!("has {} indices: give three per triangle", self.indices.len()));
+        }
+        match self.indices.iter().find(|&&i| i as usize >= vertices) {
+            Some(i) => Err(format!("has an index of {i}, but {vertices} positions: count from 0")),
+            None => Ok(()),
+        }
+    }
+
+    /// As the loader of files returns them.
+    pub(super) fn to_tobj(&self) -> tobj::Mesh {
+        tobj::Mesh {
+            positions: self.positions.as_flattened().to_vec(),
+            normals: self.normals.as_flattened().to_vec(),
+            texcoords: self.uvs.as_flattened().to_vec(),
+            indices: self.indices.clone(),
+            ..tobj::Mesh::default()
+        }
+    }
+}
+
+/// A picture in memory: a texture that materials name as they name a file.
+#[derive(Clone, Debug)]
+pub struct Bitmap {
+    /// What materials call it; wins over a file of that name.
+    pub name: PathBuf,
+    /// Texels, 1 to 65536.
+    pub width: u32,
+    /// Texels, 1 to 65536.
+    pub height: u32,
+    /// `width * height` texels, row-major, row 0 at the top: sRGB where a material's texture is a colour, else linear;
+    /// alpha, always linear, is what masks read.
+    pub rgba: Arc<[[u8; 4]]>,
+}

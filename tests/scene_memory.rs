@@ -1,0 +1,200 @@
+//! Scenes that an engine has in memory: the same as from files, and what is said about mistakes.
+use image::codecs::png::PngEncoder;
+use std::fs::File;
+use std::path::PathBuf;
+use tallow::image::{Picture, WriteOptions};
+use tallow::scene::Scene;
+use tallow::scene::description::*;
+
+const FILES: &str = "
+[film]
+width = 32
+height = 16
+[camera]
+position = [1, 2, 9]
+target = [0, 0, 0]
+[environment]
+file = \"sky.exr\"
+scale = 0.5
+[[material]]
+name = \"wall\"
+color_texture = \"checks.png\"
+opacity_texture = \"checks.png\"
+[[material]]
+name = \"lamp\"
+emission = [4, 3, 2]
+[[mesh]]
+name = \"wall\"
+file = \"wall.obj\"
+material = \"wall\"
+[[mesh]]
+name = \"lamp\"
+file = \"lamp.obj\"
+material = \"lamp\"
+[[instance]]
+mesh = \"lamp\"
+transform = { translate = [0, 0, 2] }
+[[instance]]
+mesh = \"lamp\"
+transform = { translate = [2, 0, 2] }
+[[light]]
+type = \"point\"
+position = [0, 3, 0]
+intensity = 10
+";
+
+const CORNERS: [[f32; 3]; 4] = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.25], [-1.0, 1.0, 0.0]];
+const NORMALS: [[f32; 3]; 4] = [[0.0, 0.0, 1.0], [0.0, 0.6, 0.8], [0.6, 0.0, 0.8], [0.0, 0.0, 1.0]];
+const UVS: [[f32; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+const INDICES: [u32; 6] = [0, 1, 2, 0, 2, 3];
+
+fn texel(i: u32) -> [u8; 4] {
+    [(40 * i) as u8, (250 - 30 * i) as u8, 7, (60 * i) as u8]
+}
+
+fn sky() -> Picture {
+    Picture { width: 4, height: 2, pixels: (0..8).map(|i| [i as f32, 1.0, 0.5 * i as f32]).collect() }
+}
+
+/// OBJ text of the same corners.
+fn obj(extras: bool) -> String {
+    let line = |key: &str, v: &[f32]| format!("{key} {}\n", v.iter().map(f32::to_string).collect::<Vec<_>>().join(" "));
+    let mut text: String = CORNERS.iter().map(|v| line("v", v)).collect();
+    if extras {
+        text += &NORMALS.iter().map(|v| line("vn", v)).collect::<String>();
+        text += &UVS.iter().map(|v| line("vt", v)).collect::<String>();
+    }
+    let corner = |i: u32| if extras { format!("{0}/{0}/{0}", i + 1) } else { (i + 1).to_string() };
+    for t in INDICES.chunks(3) {
+        text += &format!("f {} {} {}\n", corner(t[0]), corner(t[1]), corner(t[2]));
+    }
+    text
+}
+
+fn from_files() -> Scene {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("wall.obj"), obj(true)).unwrap();
+    std::fs::write(at("lamp.obj"), obj(false)).unwrap();
+    let picture = image::RgbaImage::from_raw(3, 2, (0..6).flat_map(texel).collect()).unwrap();
+    picture.write_with_encoder(PngEncoder::new(File::create(at("checks.png")).unwrap())).unwrap();
+    let mut film = tallow::image::Film::new(4, 2);
+    film.add_vec3("", ["R", "G", "B"], &sky().pixels);
+    tallow::image::write(&at("sky.exr"), &film, &WriteOptions::default()).unwrap();
+    Scene::parse(&at("scene.toml"), FILES, &|s| s.spp = 7).unwrap()
+}
+
+fn described() -> Description {
+    let wall =
+        Mesh { positions: CORNERS.to_vec(), normals: NORMALS.to_vec(), uvs: UVS.to_vec(), indices: INDICES.to_vec() };
+    let lamp = Mesh { normals: Vec::new(), uvs: Vec::new(), ..wall.clone() };
+    let mesh = |name: &str, data| MeshTable {
+        name: Some(name.to_owned()),
+        material: Some(name.to_owned()),
+        data: Some(data),
+        ..MeshTable::default()
+    };
+    let instance = |x: f64| InstanceTable {
+        mesh: "lamp".to_owned(),
+        transform: Transform(glam::DAffine3::from_translation(glam::DVec3::new(x, 0.0, 2.0))),
+        ..InstanceTable::default()
+    };
+    let checks = Some(PathBuf::from("checks"));
+    Description {
+        film: Film { width: Some(32), height: Some(16), ..Film::default() },
+        camera: Camera { position: Some([1.0, 2.0, 9.0]), target: Some([0.0; 3]), ..Camera::default() },
+        environment: Some(EnvironmentTable {
+            picture: Some(sky()),
+            scale: Some(Rgb([0.5; 3])),
+            ..EnvironmentTable::default()
+        }),
+        material: vec![
+            MaterialTable {
+                name: "wall".to_owned(),
+                color_texture: checks.clone(),
+                opacity_texture: checks,
+                ..MaterialTable::default()
+            },
+            MaterialTable { name: "lamp".to_owned(), emission: Some(Rgb([4.0, 3.0, 2.0])), ..MaterialTable::default() },
+        ],
+        mesh: vec![mesh("wall", wall), mesh("lamp", lamp)],
+        instance: vec![instance(0.0), instance(2.0)],
+        light: vec![LightTable {
+            kind: LightType::Point,
+            position: Some([0.0, 3.0, 0.0]),
+            intensity: Some(Rgb([10.0; 3])),
+            ..LightTable::default()
+        }],
+        bitmap: vec![Bitmap { name: "checks".into(), width: 3, height: 2, rgba: (0..6).map(texel).collect() }],
+        ..Description::default()
+    }
+}
+
+fn build(description: &Description) -> tallow::error::Result<Scene> {
+    Scene::build(description, &|s| s.spp = 7)
+}
+
+#[test]
+fn a_scene_in_memory_is_that_of_the_files() {
+    let (files, memory) = (from_files(), build(&described()).unwrap());
+    assert_eq!(files.fingerprint.to_string(), memory.fingerprint.to_string());
+    assert_eq!((&files.nodes, &files.instances), (&memory.nodes, &memory.instances));
+    assert_eq!((&files.triangles, &files.shading), (&memory.triangles, &memory.shading));
+    assert_eq!((&files.materials, &files.textures), (&memory.materials, &memory.textures));
+    assert_eq!((&files.texels, &files.lights), (&memory.texels, &memory.lights));
+    assert_eq!((files.camera, files.settings.spp), (memory.camera, memory.settings.spp));
+    assert_eq!(files.environment.unwrap().texels, memory.environment.unwrap().texels);
+    assert_eq!((files.texels.len(), files.triangles.len(), files.instances.len()), (12, 4, 3), "control: all is there");
+    assert_eq!(memory.warnings, Vec::<String>::new());
+    let mut other = described();
+    other.mesh[0].data.as_mut().unwrap().positions[2][2] = 0.5;
+    assert_ne!(files.fingerprint.to_string(), build(&other).unwrap().fingerprint.to_string(), "control");
+}
+
+/// The one line that is said when `change` is made.
+fn error(change: impl Fn(&mut Description)) -> String {
+    let mut description = described();
+    change(&mut description);
+    let found = build(&description).unwrap_err();
+    assert!(found.exit_code() == 3 && !found.to_string().contains('\n'), "{found}");
+    found.to_string()
+}
+
+#[test]
+fn mistakes_are_one_line_with_place_and_remedy() {
+    let mesh = |change: &dyn Fn(&mut Mesh)| error(|d| change(d.mesh[0].data.as_mut().unwrap()));
+    let has = |found: String, words: &[&str]| assert!(words.iter().all(|w| found.contains(w)), "{found}: {words:?}");
+    has(mesh(&|m| m.indices[5] = 4), &["scene, mesh \"wall\"", "index of 4", "4 positions"]);
+    has(mesh(&|m| m.indices.truncate(5)), &["mesh \"wall\"", "5 indices"]);
+    has(mesh(&|m| m.normals.truncate(3)), &["mesh \"wall\"", "4 positions but 3 normals"]);
+    has(mesh(&|m| m.uvs.push([0.0; 2])), &["mesh \"wall\"", "4 positions but 5 uvs"]);
+    has(error(|d| d.mesh[0].shape = Some(Shape::Cube)), &["mesh \"wall\"", "either"]);
+    has(error(|d| d.mesh[0].data = None), &["mesh \"wall\"", "either"]);
+    has(error(|d| d.bitmap[0].width = 4), &["bitmap \"checks\"", "6 texels for 4 x 2"]);
+    has(error(|d| d.bitmap[0].height = 0), &["bitmap \"checks\"", "3 x 0"]);
+    has(error(|d| d.bitmap.push(d.bitmap[0].clone())), &["bitmap \"checks\"", "twice"]);
+    let sky = |change: &dyn Fn(&mut EnvironmentTable)| error(|d| change(d.environment.as_mut().unwrap()));
+    has(sky(&|e| e.radiance = Some(Rgb([1.0; 3]))), &["[environment]", "both"]);
+    has(sky(&|e| e.file = Some("a.exr".into())), &["[environment]", "both"]);
+    has(sky(&|e| e.picture.as_mut().unwrap().pixels.truncate(7)), &["environment", "7 pixels for 4 x 2"]);
+    has(error(|d| d.material[0].name = "wal".to_owned()), &["no material \"wall\"", "did you mean \"wal\""]);
+}
+
+#[test]
+fn what_can_be_mended_is_counted() {
+    let mut description = described();
+    let data = description.mesh[0].data.as_mut().unwrap();
+    data.positions[3][0] = f32::NAN;
+    data.normals[0] = [0.0; 3];
+    let scene = build(&description).unwrap();
+    assert_eq!(scene.triangles.len(), 3);
+    let said = scene.warnings.join("\n");
+    assert!(said.contains("1 with NaN") && said.contains("1 with unusable vertex normals"), "{said}");
+}
+
+#[test]
+fn an_empty_scene_is_black_and_says_so() {
+    let empty = Scene::build(&Description::default(), &|_| {}).unwrap();
+    assert_eq!((empty.triangles.len(), empty.settings.width), (0, tallow::settings::Settings::default().width));
+    assert!(empty.warnings.iter().any(|w| w.contains("no light")), "{:?}", empty.warnings);
+}
