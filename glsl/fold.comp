@@ -40,11 +40,13 @@ void main() {
     if (FX_SPLIT) l = light[pixel];
     for (uint k = 0u; k < at_step_count.z; k++) {
         int at = int(at_step_count.x + k * at_step_count.y);
-        vec3 radiance;
+        vec4 first = texelFetch(samples, FX_SPLIT ? 3 * at : at); // w is the rays of the sample
+        vec3 radiance = first.rgb;
         s.count++;
+        s.rays += uint(first.w);
         float share = 1.0 / float(s.count);
         if (FX_SPLIT) {
-            vec3 direct = texelFetch(samples, 3 * at).rgb, indirect = texelFetch(samples, 3 * at + 1).rgb;
+            vec3 direct = first.rgb, indirect = texelFetch(samples, 3 * at + 1).rgb;
             vec3 albedo = texelFetch(samples, 3 * at + 2).rgb;
             bvec3 divides = greaterThan(albedo, vec3(SMALLEST_ALBEDO));
             vec3 irradiance = mix(vec3(0.0), indirect / max(albedo, vec3(SMALLEST_ALBEDO)), divides);
@@ -52,8 +54,6 @@ void main() {
             radiance = direct + indirect;
             l.direct += (kept - l.direct) * share;
             l.indirect += (irradiance - l.indirect) * share;
-        } else {
-            radiance = texelFetch(samples, at).rgb;
         }
         vec3 off = radiance - s.mean;
         s.mean += off * share;

@@ -119,10 +119,8 @@ Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
     albedo = vec3(0.0);
     for (uint bounce = 0u; alive || shadowed; bounce++) {
         uint pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
-        if (FX_COUNTERS) {
-            closest_rays += uint(alive);
-            any_rays += uint(shadowed);
-        }
+        closest_rays += uint(alive);
+        any_rays += uint(shadowed);
         uint mask_seed = pcg(seed + 2u * bounce);
         Segment ray = Segment(path.origin, path.direction, INFINITE_DISTANCE, mask_seed);
         bool lit = shadowed;
@@ -183,12 +181,13 @@ void main() {
     Path path = Path(ray.origin, ray.direction, vec3(1.0), 0.0, true);
     vec3 albedo;
     Light2 light = trace_path(path, random, path_seed(pixel, index), albedo);
+    float rays = float(closest_rays + any_rays);
     if (FX_SPLIT) {
-        samples[3u * i] = vec4(light.direct, 0.0);
+        samples[3u * i] = vec4(light.direct, rays);
         samples[3u * i + 1u] = vec4(light.indirect, 0.0);
         samples[3u * i + 2u] = vec4(albedo, 0.0);
     } else {
-        samples[i] = vec4(light.direct + light.indirect, 0.0);
+        samples[i] = vec4(light.direct + light.indirect, rays);
     }
     if (FX_COUNTERS) {
         count(0u, closest_rays);

@@ -31,7 +31,7 @@ pub fn join(a: &Pixel, b: &Pixel) -> Pixel {
             mean: mean(a.stats.mean, b.stats.mean),
             count: a.stats.count + b.stats.count,
             m2,
-            unused: 0,
+            rays: a.stats.rays + b.stats.rays,
         },
         light: PixelLight {
             direct: mean(a.light.direct, b.light.direct),
@@ -54,7 +54,7 @@ mod tests {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let m2 = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
-        let stats = PixelStats { mean: [mean as f32; 3], count: n as u32, m2: [m2 as f32; 3], unused: 0 };
+        let stats = PixelStats { mean: [mean as f32; 3], count: n as u32, m2: [m2 as f32; 3], rays: 0 };
         Pixel { stats, light: PixelLight { direct: stats.mean, indirect: [0.0; 3] } }
     }
 

@@ -36,6 +36,27 @@ fn scenes() -> Vec<String> {
     all
 }
 
+/// The statistics' rays against the counters, which atomics make.
+#[test]
+fn pixels_know_the_rays_of_their_samples() {
+    let gpu = support::gpu();
+    for (file, policy) in [("cornell-box/scene.toml", "uniform"), ("cornell-box/glass.toml", "both")] {
+        for split_light in [false, true] {
+            let scene = scene(file, |s| {
+                small(s);
+                s.allocate.policy = policy.to_owned();
+            });
+            let outputs = Outputs { split_light, guides: false, counters: true };
+            let renderer = Renderer::new(&gpu, &scene, outputs).unwrap();
+            let stats = support::render(&gpu, &renderer);
+            let rays: u64 = stats.iter().map(|s| u64::from(s.rays)).sum();
+            assert_eq!(rays, renderer.counters().unwrap().rays(), "{file} {policy}");
+            assert!(rays > 2 * 33 * 17 * 4, "control: {rays}");
+        }
+    }
+    support::assert_silent(&gpu);
+}
+
 /// The effects that change the picture when they are compiled in alone, for the message of a failure.
 fn culprits(gpu: &Gpu, scene: &Scene, expected: &[PixelStats]) -> String {
     let called_for = renderer::called_for(scene, Outputs::default());

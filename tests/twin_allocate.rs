@@ -249,7 +249,7 @@ fn surroundings(pixels: usize, width: usize) -> (Vec<Guide>, Vec<PixelStats>) {
     };
     let stats = |i: usize| match i % 5 {
         0 => PixelStats::default(),
-        n => PixelStats { mean: [unit(i), 2.0 * unit(i), 0.1], count: n as u32 + 1, m2: [unit(4 * i); 3], unused: 0 },
+        n => PixelStats { mean: [unit(i), 2.0 * unit(i), 0.1], count: n as u32 + 1, m2: [unit(4 * i); 3], rays: 0 },
     };
     ((0..pixels).map(guide).collect(), (0..pixels).map(stats).collect())
 }

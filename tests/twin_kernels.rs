@@ -5,7 +5,7 @@ mod support;
 #[path = "support/twin.rs"]
 mod twin;
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use std::path::Path;
 use support::{assert_silent, gpu};
@@ -105,9 +105,10 @@ fn run(gpu: &Gpu, scene: &Scene, effects: Effects) -> Pair {
     let batch = Batch { first_pixel: 0, pixels, first_sample: 0, samples: SAMPLES };
     [Step::Start, Step::Uniform(batch)].iter().for_each(|step| drop(renderer.run(&mut frame, step).unwrap()));
     let film = renderer.film();
-    let words: Vec<[f32; 3]> = film.samples.read().unwrap().iter().map(|&[x, y, z, _]| [x, y, z]).collect();
+    let words = film.samples.read().unwrap();
     let tile = &film.tiles[0];
-    let device: Vec<Vec3> = words[..3 * (pixels * SAMPLES) as usize].iter().map(|&v| v.into()).collect();
+    let device: Vec<_> = words[..3 * (pixels * SAMPLES) as usize].iter().map(|&v| Vec4::from(v).truncate()).collect();
+    let rays: f32 = words[..device.len()].iter().map(|v| v[3]).sum();
 
     let (push, effects) = (path_push(scene), *renderer.effects());
     let tracer = Tracer { scene, push, effects, strategy: Strategy::Both };
@@ -115,6 +116,8 @@ fn run(gpu: &Gpu, scene: &Scene, effects: Effects) -> Pair {
         let s = tracer.sample(i % pixels, i / pixels);
         [s.direct, s.indirect, s.albedo]
     };
+    let traced: u32 = (0..pixels * SAMPLES).into_par_iter().map(|i| tracer.sample(i % pixels, i / pixels).rays).sum();
+    assert!((rays / traced as f32 - 1.0).abs() < 0.01, "the device traced {rays} rays, the twin {traced}");
     let host: Vec<Vec3> = (0..pixels * SAMPLES).into_par_iter().flat_map_iter(sample).collect();
     let (mut stats, mut light) =
         (vec![PixelStats::default(); pixels as usize], vec![PixelLight::default(); pixels as usize]);

@@ -84,7 +84,7 @@ mod tests {
         // pixel itself, so that it counts 2 and the other 1. Every pixel has one degree of freedom; the mean variance
         // around, 16/3 and 8/3, is worth 32 samples beside the pixel's own. Of other albedo, the other pixel counts a
         // fifth: 16 / 2.2 and 1.6 / 2.2.
-        let stats = [8.0, 0.0].map(|m2| PixelStats { mean: [1.0; 3], count: 2, m2: [m2; 3], unused: 0 });
+        let stats = [8.0, 0.0].map(|m2| PixelStats { mean: [1.0; 3], count: 2, m2: [m2; 3], rays: 0 });
         let push = PriorityPush { size: [2, 1], window: 2, luminance_floor: 0.0, limit: 99, ..PriorityPush::default() };
         let of = |albedo| {
             let guide = [0.0, albedo].map(|albedo| Guide { albedo: [albedo; 3], ..Guide::default() });

@@ -90,7 +90,7 @@ mod tests {
     #[test]
     fn noise_is_the_deviation_over_the_luminance() {
         // Samples 2 and 6: mean 4, m2 = 8, variance 8 from one degree of freedom, and so around; sqrt 8 / (4 + 1).
-        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3], unused: 0 };
+        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3], rays: 0 };
         assert!((of_one(stats, PUSH) - 8.0_f32.sqrt() / 5.0).abs() < 1e-6);
         let plain = PriorityPush { luminance_floor: -1.0, ..PUSH };
         assert!((of_one(stats, plain) - 8.0_f32.sqrt()).abs() < 1e-6);
@@ -99,7 +99,7 @@ mod tests {
     #[test]
     fn a_mean_below_the_threshold_wants_nothing_and_an_unknown_one_something() {
         // Relative error of the mean: sqrt 8 / 5 / sqrt 2 = 0.4.
-        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3], unused: 0 };
+        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3], rays: 0 };
         assert_eq!(of_one(stats, PriorityPush { threshold: 0.41, ..PUSH }), 0.0);
         assert!(of_one(stats, PriorityPush { threshold: 0.39, ..PUSH }) > 0.0);
         assert_eq!(of_one(PixelStats::default(), PUSH), 1.0);

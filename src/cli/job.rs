@@ -3,7 +3,7 @@ use super::progress::Progress;
 use super::resume::Earlier;
 use crate::error::Result;
 use crate::gpu::{FrameResources, PassTime};
-use crate::renderer::{Counters, PathRange, Renderer, Step};
+use crate::renderer::{PathRange, Renderer, Step};
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -68,7 +68,7 @@ impl Job<'_> {
     /// # Errors
     /// As [`Renderer::run`].
     pub fn run(&self, frame: &mut FrameResources, earlier: Option<&Earlier>) -> Result<End> {
-        let (r, mut rays) = (self.renderer, 0);
+        let r = self.renderer;
         earlier.map_or(Ok(()), |earlier| earlier.put_back(r, frame))?;
         let steps = || -> Box<dyn Iterator<Item = Step>> {
             match earlier {
@@ -84,6 +84,8 @@ impl Job<'_> {
         }
         let threshold = r.settings().allocate.noise_threshold > 0.0;
         let mut progress = Progress::new(steps().map(|step| step.paths()).sum(), self.quiet);
+        // The samples of an earlier render come without their rays.
+        let before = if earlier.is_some() { rays_of_a_few(r)? } else { [0; 2] };
         let (mut listed, mut to_do) = (u64::MAX, steps().peekable());
         while let Some(planned) = to_do.next() {
             if self.stop.load(Ordering::SeqCst) {
@@ -114,9 +116,10 @@ impl Job<'_> {
                 Some(Step::Listed(range)) => end.last = Some(range),
                 Some(Step::Start | Step::Uniform(_) | Step::Choose(_)) | None => {}
             }
-            let counters = if r.outputs().counters { r.counters()? } else { Counters::default() };
-            progress.add(planned.paths(), counters.rays() - rays);
-            rays = counters.rays();
+            if !progress.is_hidden() {
+                let now = rays_of_a_few(r)?;
+                progress.add(planned.paths(), [now[0] - before[0], now[1] - before[1]]);
+            }
         }
         progress.finish();
         if threshold && end.why != Why::Interrupted {
@@ -124,6 +127,20 @@ impl Job<'_> {
         }
         Ok(end)
     }
+}
+
+/// Rays and samples since the renderer was made, of 16 runs of 64 pixels spread over the film.
+fn rays_of_a_few(renderer: &Renderer) -> Result<[u64; 2]> {
+    const RUNS: usize = 16;
+    const PIXELS: usize = 64;
+    let stats = &renderer.film().tiles[0].stats;
+    let mut sums = [0; 2];
+    for first in (0..RUNS).map(|i| i * stats.len() / RUNS) {
+        for s in stats.read_range(first..stats.len().min(first + PIXELS))? {
+            sums = [sums[0] + u64::from(s.rays), sums[1] + u64::from(s.count)];
+        }
+    }
+    Ok(sums)
 }
 
 /// The beginning of the round that the next step deals to.

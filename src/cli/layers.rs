@@ -72,7 +72,7 @@ pub fn pixels(film: &Film) -> std::result::Result<Vec<Pixel>, String> {
     let direct = layer(Some("direct")).unwrap_or_else(|_| dark.clone());
     let indirect = layer(Some("indirect")).unwrap_or(dark);
     let pixel = |i: usize| Pixel {
-        stats: PixelStats { mean: mean[i], count: count[i], m2: m2[i], unused: 0 },
+        stats: PixelStats { mean: mean[i], count: count[i], m2: m2[i], rays: 0 },
         light: PixelLight { direct: direct[i], indirect: indirect[i] },
     };
     Ok((0..mean.len()).map(pixel).collect())

@@ -7,7 +7,6 @@ use std::time::Instant;
 pub struct Progress {
     bar: ProgressBar,
     start: Instant,
-    rays: u64,
 }
 
 impl Progress {
@@ -19,15 +18,18 @@ impl Progress {
         let template = "{percent:>3} % [{wide_bar}] {msg}, {eta} left";
         let style = ProgressStyle::with_template(template).expect("a constant template");
         bar.set_style(style.progress_chars("=> "));
-        Self { bar, start: Instant::now(), rays: 0 }
+        Self { bar, start: Instant::now() }
     }
 
-    /// Counts samples that are done, and the rays behind them: 0 when rays are not counted, and then samples per second
-    /// are shown instead.
-    pub fn add(&mut self, samples: u64, rays: u64) {
-        self.rays += rays;
+    /// Whether nobody sees it.
+    pub fn is_hidden(&self) -> bool {
+        self.bar.is_hidden()
+    }
+
+    /// Counts samples that are done; `rays_of` some of all samples so far, (rays, samples), tells how many rays they took.
+    pub fn add(&mut self, samples: u64, rays_of: [u64; 2]) {
         self.bar.inc(samples);
-        self.bar.set_message(speed(self.bar.position(), self.rays, self.start.elapsed().as_secs_f64()));
+        self.bar.set_message(speed(self.bar.position(), rays_of, self.start.elapsed().as_secs_f64()));
     }
 
     /// Removes the bar, so that what is printed next starts on a clean line.
@@ -36,9 +38,9 @@ impl Progress {
     }
 }
 
-fn speed(samples: u64, rays: u64, seconds: f64) -> String {
-    let (count, unit) = if rays > 0 { (rays, "Mray/s") } else { (samples, "Msamples/s") };
-    format!("{:.2} {unit}", count as f64 * 1e-6 / seconds.max(1e-9))
+fn speed(samples: u64, [rays, of]: [u64; 2], seconds: f64) -> String {
+    let rays = samples as f64 * rays as f64 / of.max(1) as f64;
+    format!("{:.2} Mray/s", rays * 1e-6 / seconds.max(1e-9))
 }
 
 #[cfg(test)]
@@ -46,8 +48,8 @@ mod tests {
     use super::speed;
 
     #[test]
-    fn speed_is_millions_per_second_of_rays_where_they_are_counted() {
-        assert_eq!(speed(3_000_000, 0, 2.0), "1.50 Msamples/s");
-        assert_eq!(speed(3_000_000, 8_000_000, 2.0), "4.00 Mray/s");
+    fn speed_is_millions_of_rays_per_second() {
+        assert_eq!(speed(3_000_000, [80, 20], 2.0), "6.00 Mray/s");
+        assert_eq!(speed(0, [0, 0], 0.0), "0.00 Mray/s");
     }
 }

@@ -314,8 +314,8 @@ gpu_structs! {
         count: uint,
         /// Sum of squared deviations from the mean; the variance of one sample is m2 / (count - 1).
         m2: vec3,
-        /// Fills the second texel.
-        unused: uint,
+        /// Rays of its samples, of both kinds; those of an earlier render that was resumed do not count.
+        rays: uint,
     }
 
     /// Running means of one pixel that the filters read; the count is that of its [`PixelStats`].

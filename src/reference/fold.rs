@@ -1,6 +1,6 @@
 //! Twin of `glsl/fold.comp`: Welford's running mean and variance (1962), in order of sample index.
-use crate::gpu::layout::{FoldPush, PixelLight, PixelStats, vec3};
-use glam::Vec3;
+use crate::gpu::layout::{FoldPush, PixelLight, PixelStats, vec4};
+use glam::{Vec3, Vec4};
 
 /// A channel whose albedo is below this cannot be divided out.
 const SMALLEST_ALBEDO: f32 = 1e-6;
@@ -12,27 +12,29 @@ fn split(direct: Vec3, indirect: Vec3, albedo: Vec3) -> (Vec3, Vec3) {
     (direct + Vec3::select(divides, Vec3::ZERO, indirect), irradiance)
 }
 
-/// Adds a batch to the statistics of all pixels. `samples`: sample k of pixel i at `k * push.pixels + i`, one vec3, or
-/// with `split_light` three (direct, indirect, albedo); `light` is left alone without it.
-pub fn fold(push: &FoldPush, split_light: bool, samples: &[vec3], stats: &mut [PixelStats], light: &mut [PixelLight]) {
+/// Adds a batch to the statistics of all pixels. `samples`: sample k of pixel i at `k * push.pixels + i`, one vec4, or
+/// with `split_light` three (direct, indirect, albedo), and in w of the first the sample's rays; `light` is left alone
+/// without it.
+pub fn fold(push: &FoldPush, split_light: bool, samples: &[vec4], stats: &mut [PixelStats], light: &mut [PixelLight]) {
     for i in 0..push.pixels as usize {
         let pixel = push.first_pixel as usize + i;
         for k in 0..push.samples as usize {
             let at = k * push.pixels as usize + i;
             if split_light {
-                let [direct, indirect, albedo] = [0, 1, 2].map(|j| Vec3::from(samples[3 * at + j]));
-                fold_radiance(&mut stats[pixel], direct + indirect);
+                let [direct, indirect, albedo] = [0, 1, 2].map(|j| Vec4::from(samples[3 * at + j]).truncate());
+                fold_radiance(&mut stats[pixel], direct + indirect, samples[3 * at][3]);
                 let share = 1.0 / stats[pixel].count as f32;
                 fold_light(&mut light[pixel], split(direct, indirect, albedo), share);
             } else {
-                fold_radiance(&mut stats[pixel], samples[at].into());
+                fold_radiance(&mut stats[pixel], Vec4::from(samples[at]).truncate(), samples[at][3]);
             }
         }
     }
 }
 
-fn fold_radiance(s: &mut PixelStats, radiance: Vec3) {
+fn fold_radiance(s: &mut PixelStats, radiance: Vec3, rays: f32) {
     s.count += 1;
+    s.rays += rays as u32;
     let mean = Vec3::from(s.mean);
     let off = radiance - mean;
     let mean = mean + off * (1.0 / s.count as f32);
@@ -55,9 +57,9 @@ mod tests {
         // 1, 2 then 3, 6: mean 3, squared deviations 4 + 1 + 0 + 9 = 14.
         let mut stats = [PixelStats::default()];
         let batch = FoldPush { pixels: 1, samples: 2, ..FoldPush::default() };
-        fold(&batch, false, &[[1.0; 3], [2.0; 3]], &mut stats, &mut []);
-        fold(&batch, false, &[[3.0; 3], [6.0; 3]], &mut stats, &mut []);
-        assert_eq!((stats[0].count, stats[0].mean[1], stats[0].m2[2]), (4, 3.0, 14.0));
+        fold(&batch, false, &[[1.0, 1.0, 1.0, 3.0], [2.0; 4]], &mut stats, &mut []);
+        fold(&batch, false, &[[3.0; 4], [6.0; 4]], &mut stats, &mut []);
+        assert_eq!((stats[0].count, stats[0].mean[1], stats[0].m2[2], stats[0].rays), (4, 3.0, 14.0, 14));
     }
 
     #[test]

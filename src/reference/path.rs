@@ -26,6 +26,8 @@ pub struct PathSample {
     pub indirect: Vec3,
     /// Reflectance of the first hit.
     pub albedo: Vec3,
+    /// Rays of both kinds.
+    pub rays: u32,
 }
 
 impl PathSample {
@@ -118,18 +120,19 @@ impl Tracer<'_> {
         surface_emission(self.scene, s) * weight
     }
 
-    fn light_from_nee(&self, p: &Shade, random: Sampler, mask_seed: u32) -> Vec3 {
+    /// None where there is nothing to ask a shadow ray for.
+    fn light_from_nee(&self, p: &Shade, random: Sampler, mask_seed: u32) -> Option<Vec3> {
         let s = &p.surface;
         let word = sample_2d_bits(random, p.pair + PAIR_CHOICE)[0];
         let light = light_sample(self.scene, s.position, word, sample_2d(random, p.pair + PAIR_LIGHT));
         if light.radiance == Vec3::ZERO {
-            return Vec3::ZERO;
+            return None;
         }
         let f = bsdf_evaluate(&p.bsdf, p.wo, p.basis.transpose() * light.direction);
         let weight = if light.pdf > 0.0 { self.balance(light.pdf, f.w, Strategy::Light) } else { 1.0 };
         let contribution = f.truncate() * light.radiance * weight;
         if contribution.max_element() <= 0.0 || contribution.is_nan() {
-            return Vec3::ZERO;
+            return None;
         }
         let normal = if light.direction.dot(s.geometric) < 0.0 { -s.geometric } else { s.geometric };
         let origin = offset_origin(s.position, normal);
@@ -139,7 +142,7 @@ impl Tracer<'_> {
             distance = 1.0 - 1e-6;
         }
         let blocker = traverse_from(self.scene, p.from, origin, direction, distance, true, mask_seed);
-        if blocker.any() { Vec3::ZERO } else { contribution }
+        Some(if blocker.any() { Vec3::ZERO } else { contribution })
     }
 
     fn scatter(&self, path: &mut Path, p: &Shade, random: Sampler) -> bool {
@@ -182,6 +185,7 @@ impl Tracer<'_> {
         for bounce in 0u32.. {
             let pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
             let mask_seed = pcg(seed.wrapping_add(2 * bounce));
+            sum.rays += 1;
             let hit = traverse_from(self.scene, from, path.origin, path.direction, INFINITE_DISTANCE, false, mask_seed);
             let indirect = bounce >= 2 && !smooth_first;
             if !hit.any() {
@@ -202,7 +206,8 @@ impl Tracer<'_> {
             }
             if self.push.light_count > 0 && !smooth_here {
                 let light = self.light_from_nee(&p, random, mask_seed.wrapping_add(1));
-                self.add_light(&mut sum, path.throughput * light, bounce >= 1 && !smooth_first);
+                sum.rays += u32::from(light.is_some());
+                self.add_light(&mut sum, path.throughput * light.unwrap_or_default(), bounce >= 1 && !smooth_first);
             }
             if !self.scatter(&mut path, &p, random) {
                 break;
