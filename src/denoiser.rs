@@ -2,7 +2,7 @@
 //! `glsl/split.comp` and `glsl/join.comp`. Twin: [`composition`](crate::composition).
 use crate::composition::Demodulation;
 use crate::error::{Error, Result};
-use crate::filter::{Filter, FilterSettings, Planes, Row};
+use crate::filter::{self, Filter, FilterSettings, Planes, Row};
 use crate::gpu::layout::{Effects, PixelLight, PixelStats, SplitPush, vec4};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::renderer::{OutputView, Renderer};
@@ -41,6 +41,7 @@ impl Denoiser {
         settings.validate()?;
         check(renderer, demodulation)?;
         let (film, size) = (&renderer.film().tiles[0], [renderer.settings().width, renderer.settings().height]);
+        filter::check_size(gpu, size)?;
         let pixels = film.pixels as usize;
         let plane = |name| Buffer::new(gpu, name, pixels, Location::Device);
         let planes = Planes {

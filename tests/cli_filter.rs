@@ -243,3 +243,39 @@ fn filtered_light_is_looked_up_in_the_scene() {
     write(&folder, "foreign.exr", &noisy(true));
     complains(&run(&["foreign.exr", "--scene", scene]), 3, &["foreign.exr", "tallow render"]);
 }
+
+#[test]
+fn a_denoised_render_is_the_filtered_file_and_keeps_its_samples() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/scene.toml");
+    let size = SIZE.to_string();
+    let render = |name: &str, more: &[&str]| {
+        let words = ["render", scene, "-o", name, "--width", &size, "--height", &size, "--quiet", "--validation"];
+        let output = tallow(&folder, &[&words, more].concat());
+        assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &b""[..]));
+        read(&folder, name)
+    };
+    let layer = |film: &Film, name: Option<&str>| film.picture(name).unwrap().pixels;
+    let noisy = render("noisy.exr", &["--spp", "4"]);
+    let filtered = filter(&folder, &["--filter", "guided"]);
+    let denoised = render("denoised.exr", &["--spp", "4", "--denoise", "guided"]);
+    assert_eq!(layer(&denoised, None), layer(&filtered, None));
+    assert_eq!(layer(&denoised, Some("Noisy Image")), layer(&noisy, None));
+    assert_ne!(layer(&denoised, None), layer(&noisy, None), "control");
+
+    // Resumed and merged, it is the render that it was.
+    let resumed = render("resumed.exr", &["--spp", "8", "--resume", "denoised.exr"]);
+    assert_eq!(layer(&resumed, None), layer(&render("whole.exr", &["--spp", "8"]), None));
+    render("rest.exr", &["--spp", "4", "--first-sample", "4"]);
+    let merged = ["noisy", "denoised"].map(|name| {
+        let words = ["merge", &format!("{name}.exr"), "rest.exr", "-o", "merged.exr"];
+        assert_eq!(tallow(&folder, &words).status.code(), Some(0));
+        read(&folder, "merged.exr")
+    });
+    assert_eq!(layer(&merged[0], None), layer(&merged[1], None));
+    assert!(merged[1].picture(Some("Noisy Image")).is_err(), "nothing is left of the filter");
+    // Filtered again, the noisy image is what is filtered.
+    std::fs::copy(folder.path().join("denoised.exr"), folder.path().join("noisy.exr")).unwrap();
+    assert_eq!(layer(&filter(&folder, &["--filter", "guided"]), None), layer(&filtered, None));
+    complains(&tallow(&folder, &["render", scene, "--denoise", "gided"]), 2, &["gided", "guided"]);
+}

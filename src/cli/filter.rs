@@ -62,7 +62,8 @@ pub struct Args {
     pub overrides: Overrides,
 }
 
-fn filter_names() -> impl TypedValueParser<Value = &'static Row> {
+/// The values of an option that names a filter.
+pub fn filter_names() -> impl TypedValueParser<Value = &'static Row> {
     let names = FILTERS.iter().map(|row| PossibleValue::new(row.name).help(row.about));
     PossibleValuesParser::new(names).try_map(|name| filter::find(&name).ok_or("no such filter"))
 }

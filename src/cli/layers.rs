@@ -14,6 +14,9 @@ pub const PRIORITY: &str = "priority";
 /// Samples that a pixel still lacks of what it was to have: only in files of renders that were interrupted.
 pub const PENDING: &str = "pending";
 
+/// The mean of the samples, where the colour is filtered: only in files of `--denoise`. Blender's name for it.
+const NOISY: &str = "Noisy Image";
+
 /// Of a film with everything.
 const CHANNELS: usize = 27;
 
@@ -67,7 +70,8 @@ fn add_pixels(film: &mut Film, stats: &[PixelStats], light: &[PixelLight]) {
 /// Which layer is missing.
 pub fn pixels(film: &Film) -> std::result::Result<Vec<Pixel>, String> {
     let layer = |name: Option<&str>| film.picture(name).map(|p| p.pixels);
-    let (mean, m2, count) = (layer(None)?, layer(Some("m2"))?, counts(film, "samples")?);
+    let mean = layer(Some(NOISY)).or_else(|_| layer(None))?;
+    let (m2, count) = (layer(Some("m2"))?, counts(film, "samples")?);
     let dark = vec![[0.0; 3]; mean.len()];
     let direct = layer(Some("direct")).unwrap_or_else(|_| dark.clone());
     let indirect = layer(Some("indirect")).unwrap_or(dark);
@@ -78,13 +82,21 @@ pub fn pixels(film: &Film) -> std::result::Result<Vec<Pixel>, String> {
     Ok((0..mean.len()).map(pixel).collect())
 }
 
-/// Replaces what the samples say; the other layers stay.
+/// Puts a filtered colour in the place of the samples' mean, which stays as a layer.
+pub fn denoise(film: &mut Film, colour: &[vec3]) {
+    for channel in film.channels.iter_mut().filter(|c| RGB.contains(&c.name.as_str())) {
+        channel.name = format!("{NOISY}.{}", channel.name);
+    }
+    film.add_vec3("", RGB, colour);
+}
+
+/// Replaces what the samples say; the other layers stay, but for a filtered colour.
 pub fn replace_pixels(film: &mut Film, pixels: &[Pixel]) {
     let split = film.channel("direct.R").is_some();
     let mut fresh = Film::new(film.width, film.height);
     let light: Vec<_> = pixels.iter().filter(|_| split).map(|p| p.light).collect();
     add_pixels(&mut fresh, &pixels.iter().map(|p| p.stats).collect::<Vec<_>>(), &light);
-    film.channels.retain(|c| fresh.channel(&c.name).is_none());
+    film.channels.retain(|c| fresh.channel(&c.name).is_none() && !c.name.starts_with(NOISY));
     film.channels.extend(fresh.channels);
 }
 

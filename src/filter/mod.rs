@@ -19,7 +19,7 @@ mod wavelet;
 pub use input::FilterInput;
 pub use settings::{AtrousForm, FilterSettings, GuidedSums, WaveletBasis};
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::layout::{Guide, vec3, vec4};
 use crate::gpu::{Buffer, FrameResources, Gpu, Location, PassTime, Recorder};
 
@@ -91,6 +91,20 @@ pub fn find(name: &str) -> Option<&'static Row> {
     FILTERS.iter().find(|row| row.name == name)
 }
 
+/// Refuses images whose planes one storage binding cannot hold.
+///
+/// # Errors
+/// [`Error::Device`].
+pub fn check_size(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<()> {
+    let most = gpu.info().max_storage_range / size_of::<vec4>() as u64;
+    match u64::from(width) * u64::from(height) <= most {
+        true => Ok(()),
+        false => Err(Error::Device(format!(
+            "an image of {width} x {height} is too large to filter on this device: choose at most {most} pixels"
+        ))),
+    }
+}
+
 /// Filters one image: uploads it, runs `row` on it and reads the result; also what each pass took.
 ///
 /// # Errors
@@ -99,6 +113,7 @@ pub fn find(name: &str) -> Option<&'static Row> {
 pub fn run(gpu: &Gpu, row: &Row, input: &FilterInput, settings: &FilterSettings) -> Result<(Vec<vec4>, Vec<PassTime>)> {
     settings.validate()?;
     input.validate()?;
+    check_size(gpu, [input.width, input.height])?;
     let planes = Planes::new(gpu, input)?;
     let filter = (row.make)(gpu, settings, planes.size)?;
     let times = gpu.run(&mut FrameResources::new(gpu)?, |rec| filter.record(rec, &planes))?;
