@@ -8,7 +8,7 @@ use std::path::Path;
 use support::{assert_silent, gpu, hash};
 use tallow::composition::{Demodulation, split};
 use tallow::denoiser::Denoiser;
-use tallow::filter::{FilterSettings, find};
+use tallow::filter::{FilterSettings, check_size, find};
 use tallow::gpu::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::image::aov::{Aovs, Names};
@@ -166,4 +166,13 @@ fn a_frame_without_what_the_filter_needs_is_refused() {
         "extent",
     );
     assert_silent(&gpu);
+}
+
+#[test]
+fn what_no_binding_holds_is_refused_beforehand() {
+    let gpu = gpu();
+    let most = (gpu.info().max_storage_range / 16) as u32;
+    check_size(&gpu, [most, 1]).unwrap();
+    let refused = check_size(&gpu, [most, 2]).unwrap_err();
+    assert!(refused.exit_code() == 4 && refused.to_string().contains(&most.to_string()), "{refused}");
 }
