@@ -1,6 +1,7 @@
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#extension GL_EXT_control_flow_attributes : require
 #extension GL_GOOGLE_include_directive : require
 #include "layout.glsl"
 #include "shared/wide.glsl"
@@ -14,6 +15,9 @@ layout(scalar, binding = 2) writeonly buffer Paths { uvec2 paths[]; };
 layout(scalar, push_constant) uniform Push { BatchPush push; };
 
 #include "shared/offset.glsl"
+#include "shared/rounds.glsl"
+
+const uint PLAIN = 32u; // of each of a thread's 64 pixels
 
 void main() {
     uint first = first_item(), items = item_count(first, push.pixels);
@@ -27,7 +31,12 @@ void main() {
         if (to > begin && to > from) {
             uint at = uint(max(from, begin) - begin), stop = uint(min(to, end) - begin);
             uint index = push.first_sample + texelFetch(stats, int(2u * i)).w; // earlier batches of this round are in it
-            for (; at < stop; at++) paths[at] = uvec2(i, index++);
+            for (uint plain = min(stop, at + PLAIN); at < plain; at++) paths[at] = uvec2(i, index++);
+            for (; at < stop; at += STRIDE, index += STRIDE) {
+                [[unroll]] for (uint j = 0u; j < STRIDE; j++) {
+                    if (at + j < stop) paths[at + j] = uvec2(i, index + j);
+                }
+            }
         }
         from = to;
     }

@@ -11,7 +11,11 @@ layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
 layout(scalar, binding = 2) writeonly buffer Output { vec4 filtered[]; };
+layout(scalar, binding = 3) buffer Sums { vec4 sums[]; };
 layout(scalar, push_constant) uniform Push { BilateralPush push; };
+// Whether the window is cut into bands of rows, a dispatch each, which adds to `sums` (weighted differences, weights):
+// see shared/rounds.glsl.
+layout(constant_id = 115) const bool BANDS = false;
 
 const int ROWS = 8;
 const float REFUSED = -1e30; // an exponent whose weight is 0
@@ -31,8 +35,20 @@ void main() {
         centre[k] = pixel_at(min(first + k, size.y - 1) * size.x + x);
         sum[k] = vec3(0.0);
         total[k] = 0.0;
+        if (BANDS && push.band > 0u && first + k < size.y) {
+            vec4 before = sums[(first + k) * size.x + x];
+            sum[k] = before.rgb;
+            total[k] = before.w;
+        }
     }
     int top = max(first - radius, 0), bottom = min(first + ROWS - 1 + radius, size.y - 1);
+    bool last = true;
+    if (BANDS) {
+        int begin = first - radius + int(push.band * push.band_rows), end = begin + int(push.band_rows);
+        last = end > first + ROWS - 1 + radius;
+        top = max(top, begin);
+        bottom = min(bottom, end - 1);
+    }
     for (int y = top; y <= bottom; y++) {
         for (int i = -radius; i <= radius; i++) {
             int tap_x = x + i;
@@ -50,8 +66,13 @@ void main() {
         }
     }
     [[unroll]] for (int k = 0; k < ROWS; k++) {
+        if (first + k >= size.y) continue;
+        if (BANDS && !last) {
+            sums[(first + k) * size.x + x] = vec4(sum[k], total[k]);
+            continue;
+        }
         vec4 c = centre[k].colour;
         if (total[k] > 0.0) c = vec4(c.rgb + sum[k] / total[k], c.w > 0.0 ? c.w : 1.0);
-        if (first + k < size.y) filtered[(first + k) * size.x + x] = c;
+        filtered[(first + k) * size.x + x] = c;
     }
 }

@@ -1,6 +1,7 @@
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#extension GL_EXT_control_flow_attributes : require
 #extension GL_GOOGLE_include_directive : require
 #include "layout.glsl"
 #include "effects.glsl"
@@ -17,6 +18,9 @@ layout(binding = 3) uniform usamplerBuffer offset; // of uvec2
 layout(scalar, push_constant) uniform Push { FoldPush push; };
 
 #include "shared/offset.glsl"
+#include "shared/rounds.glsl"
+
+const uint PLAIN = 2048u;
 
 // A channel whose albedo is below this cannot be divided out; its light stays with the direct light.
 const float SMALLEST_ALBEDO = 1e-6;
@@ -29,35 +33,43 @@ uvec3 samples_of(uint i, uint pixel) {
     return uvec3(uint(from - begin), 1u, to > from ? uint(to - from) : 0u);
 }
 
+void fold(inout PixelStats s, inout PixelLight l, int at) {
+    vec4 first = texelFetch(samples, FX_SPLIT ? 3 * at : at); // w is the rays of the sample
+    vec3 radiance = first.rgb;
+    s.count++;
+    s.rays += uint(first.w);
+    float share = 1.0 / float(s.count);
+    if (FX_SPLIT) {
+        vec3 direct = first.rgb, indirect = texelFetch(samples, 3 * at + 1).rgb;
+        vec3 albedo = texelFetch(samples, 3 * at + 2).rgb;
+        bvec3 divides = greaterThan(albedo, vec3(SMALLEST_ALBEDO));
+        vec3 irradiance = mix(vec3(0.0), indirect / max(albedo, vec3(SMALLEST_ALBEDO)), divides);
+        vec3 kept = direct + mix(indirect, vec3(0.0), divides);
+        radiance = direct + indirect;
+        l.direct += (kept - l.direct) * share;
+        l.indirect += (irradiance - l.indirect) * share;
+    }
+    vec3 off = radiance - s.mean;
+    s.mean += off * share;
+    s.m2 += off * (radiance - s.mean);
+}
+
 void main() {
     uint i = thread_index();
     if (i >= push.pixels) return; // safe: no barrier() follows
     uvec3 at_step_count = samples_of(i, push.first_pixel + i);
-    if (at_step_count.z == 0u) return;
+    uint at = at_step_count.x, step = at_step_count.y, count = at_step_count.z;
+    if (count == 0u) return;
     uint pixel = push.first_pixel - push.window + i;
     PixelStats s = stats[pixel];
     PixelLight l = PixelLight(vec3(0.0), vec3(0.0));
     if (FX_SPLIT) l = light[pixel];
-    for (uint k = 0u; k < at_step_count.z; k++) {
-        int at = int(at_step_count.x + k * at_step_count.y);
-        vec4 first = texelFetch(samples, FX_SPLIT ? 3 * at : at); // w is the rays of the sample
-        vec3 radiance = first.rgb;
-        s.count++;
-        s.rays += uint(first.w);
-        float share = 1.0 / float(s.count);
-        if (FX_SPLIT) {
-            vec3 direct = first.rgb, indirect = texelFetch(samples, 3 * at + 1).rgb;
-            vec3 albedo = texelFetch(samples, 3 * at + 2).rgb;
-            bvec3 divides = greaterThan(albedo, vec3(SMALLEST_ALBEDO));
-            vec3 irradiance = mix(vec3(0.0), indirect / max(albedo, vec3(SMALLEST_ALBEDO)), divides);
-            vec3 kept = direct + mix(indirect, vec3(0.0), divides);
-            radiance = direct + indirect;
-            l.direct += (kept - l.direct) * share;
-            l.indirect += (irradiance - l.indirect) * share;
+    uint plain = FX_ADAPTIVE ? min(count, PLAIN) : count; // see SAMPLES_AT_ONCE in schedule.rs
+    for (uint k = 0u; k < plain; k++) fold(s, l, int(at + k * step));
+    for (uint k = plain; FX_ADAPTIVE && k < count; k += STRIDE) {
+        [[unroll]] for (uint j = 0u; j < STRIDE; j++) {
+            if (k + j < count) fold(s, l, int(at + (k + j) * step));
         }
-        vec3 off = radiance - s.mean;
-        s.mean += off * share;
-        s.m2 += off * (radiance - s.mean);
     }
     stats[pixel] = s;
     if (FX_SPLIT) light[pixel] = l;

@@ -12,7 +12,7 @@
 layout(local_size_x_id = 100) in;
 layout(binding = 11) uniform usamplerBuffer guides; // of Guide
 layout(binding = 12) uniform samplerBuffer filtered; // of vec4
-layout(scalar, binding = 13) writeonly buffer Indirect { vec3 indirect[]; };
+layout(scalar, binding = 13) buffer Indirect { vec3 indirect[]; };
 layout(scalar, push_constant) uniform Push { PathPush push; };
 
 uint nodes_visited = 0u;
@@ -81,5 +81,5 @@ void main() {
         uint chosen = most_similar(eye, film);
         if (chosen != NONE) sum += eye.albedo * known_radiance(texelFetch(filtered, int(chosen))).rgb;
     }
-    indirect[pixel] = sum / float(push.samples);
+    indirect[pixel] += sum;
 }

@@ -145,17 +145,21 @@ impl DeviceScene {
     pub fn new(gpu: &Gpu, scene: &Scene, effects: &Effects) -> Result<Self> {
         let environment = scene.environment.as_ref();
         Ok(Self {
-            nodes: Buffer::from_slice(gpu, "nodes", &scene.nodes)?,
-            triangles: Buffer::from_slice(gpu, "triangles", &scene.triangles)?,
-            shading: Buffer::from_slice(gpu, "shading", &shading(scene, effects))?,
-            instances: Buffer::from_slice(gpu, "instances", &scene.instances)?,
-            materials: Buffer::from_slice(gpu, "materials", &scene.materials)?,
-            textures: Buffer::from_slice(gpu, "textures", &scene.textures)?,
-            texels: Buffer::from_slice(gpu, "texels", &scene.texels)?,
-            lights: Buffer::from_slice(gpu, "lights", &scene.lights)?,
-            light_table: Buffer::from_slice(gpu, "light_table", &scene.light_table)?,
-            environment: Buffer::from_slice(gpu, "environment", environment.map_or(&[], |e| &e.texels[..]))?,
-            environment_table: Buffer::from_slice(gpu, "environment_table", environment.map_or(&[], |e| &e.table[..]))?,
+            nodes: Buffer::from_texels(gpu, "nodes", &scene.nodes)?,
+            triangles: Buffer::from_texels(gpu, "triangles", &scene.triangles)?,
+            shading: Buffer::from_texels(gpu, "shading", &shading(scene, effects))?,
+            instances: Buffer::from_texels(gpu, "instances", &scene.instances)?,
+            materials: Buffer::from_texels(gpu, "materials", &scene.materials)?,
+            textures: Buffer::from_texels(gpu, "textures", &scene.textures)?,
+            texels: Buffer::from_texels(gpu, "texels of textures", &scene.texels)?,
+            lights: Buffer::from_texels(gpu, "lights", &scene.lights)?,
+            light_table: Buffer::from_texels(gpu, "light_table", &scene.light_table)?,
+            environment: Buffer::from_texels(gpu, "environment", environment.map_or(&[], |e| &e.texels[..]))?,
+            environment_table: Buffer::from_texels(
+                gpu,
+                "environment_table",
+                environment.map_or(&[], |e| &e.table[..]),
+            )?,
         })
     }
 

@@ -105,6 +105,9 @@ impl Step {
     }
 }
 
+/// Samples of a pixel in a batch at most: a software device ends loops early (`glsl/shared/rounds.glsl`).
+const SAMPLES_AT_ONCE: u32 = 1 << 15;
+
 /// How the work may be cut. It changes no bit of the result.
 #[derive(Clone, Copy, Debug)]
 pub struct Cut {
@@ -126,6 +129,7 @@ impl Cut {
                 let within = b.pixels > 0 && end <= u64::from(self.pixels);
                 within
                     && (1..=u64::from(self.paths)).contains(&step.paths())
+                    && b.samples <= SAMPLES_AT_ONCE
                     && u64::from(b.first_pixel / self.tile) == (end - 1) / u64::from(self.tile)
             }
             Step::Allocate(plan) => plan.pixels == self.pixels,
@@ -265,7 +269,7 @@ fn deal(paths: u64, rounds: u32, batch: u32) -> impl Iterator<Item = Step> + use
 pub fn uniform(cut: &Cut, first: u32, samples: u32) -> impl Iterator<Item = Batch> + use<> {
     let Cut { pixels, tile, paths } = *cut;
     let run = pixels.min(paths).min(tile);
-    let depth = (paths / run).max(1);
+    let depth = (paths / run).clamp(1, SAMPLES_AT_ONCE);
     let runs = move |first: &u32| Some(first + run.min(tile - first % tile)).filter(|&next| next < pixels);
     (0..samples).step_by(depth as usize).flat_map(move |sample| {
         successors(Some(0), runs).map(move |first_pixel| Batch {
@@ -338,6 +342,7 @@ mod tests {
         let others = [
             batch(0, 18, 1), // more paths than are in flight
             batch(0, u32::MAX, u32::MAX),
+            batch(0, 1, SAMPLES_AT_ONCE + 1),
             batch(0, 0, 1),
             batch(0, 1, 0),
             batch(60, 6, 1), // beyond the film

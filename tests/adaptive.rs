@@ -59,6 +59,26 @@ fn total(pixels: &[Pixel]) -> u64 {
     pixels.iter().map(|p| u64::from(p.stats.count)).sum()
 }
 
+/// A software device ends a thread's loops after 65,535 rounds, silently, and one pixel may have more samples in a batch.
+#[test]
+fn a_pixel_may_have_any_number_of_samples() {
+    let gpu = gpu();
+    for policy in ["uniform", "variance"] {
+        let scene = scene(|s| {
+            ([s.width, s.height], s.spp, s.max_depth) = ([2, 1], 200_000, 2);
+            s.allocate.policy = policy.into();
+        });
+        let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
+        let mut frame = FrameResources::new(&gpu).unwrap();
+        let whole = run(&renderer, &mut frame, &list(renderer.steps()));
+        assert_eq!(total(&whole), 400_000, "{policy}");
+        assert!(whole.iter().any(|p| p.stats.count >= 200_000), "{policy}: {whole:?}");
+        let steps = list(schedule::steps(&scene.settings, &Cut { pixels: 2, tile: 1 << 20, paths: 9_001 }));
+        assert!(bits(&run(&renderer, &mut frame, &steps)) == bits(&whole), "{policy}");
+    }
+    assert_silent(&gpu);
+}
+
 #[test]
 fn the_budget_is_met_and_no_cut_changes_a_bit() {
     let gpu = gpu();

@@ -112,6 +112,19 @@ fn fireflies_are_cut_and_accounted_for() {
     assert_silent(&gpu);
 }
 
+/// A window of 644,000 taps: a software device ends a thread's loops after 65,535 rounds, silently.
+#[test]
+fn the_widest_windows_of_bilateral_are_whole() {
+    let gpu = gpu();
+    let input = Picture::new(8, 400).noisy().input;
+    let off = f32::INFINITY;
+    let settings = FilterSettings { radius: 399, sigma_n: off, sigma_x: off, ..FilterSettings::default() };
+    let wide = both(&gpu, "bilateral", &input, &settings);
+    let narrow = both(&gpu, "bilateral", &input, &FilterSettings { radius: 30, ..settings });
+    assert!(apart(&wide, &narrow, 1.0) > 1e-2, "control: the window counts");
+    assert_silent(&gpu);
+}
+
 #[test]
 fn bilateral_and_wavelets_solve_the_worked_examples() {
     let off = f32::INFINITY;

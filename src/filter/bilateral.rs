@@ -5,7 +5,7 @@ use super::pack::{Pack, Packed};
 use super::{Filter, FilterInput, FilterSettings, Planes, Row};
 use crate::error::Result;
 use crate::gpu::layout::{BilateralPush, Effects, vec4};
-use crate::gpu::{Gpu, Kernel, Recorder};
+use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::shaders::bilateral::Bind;
 use glam::Vec3;
 
@@ -21,17 +21,36 @@ pub const ROW: Row = Row {
 const ROWS: u32 = 8;
 const WORKGROUP: u32 = 32;
 
+/// Taps of a thread in one dispatch: software devices end loops early (`glsl/shared/rounds.glsl`), and drivers kill what runs
+/// for seconds.
+const TAPS: u32 = 60_000;
+
 struct Bilateral {
     pack: Pack,
     kernel: Kernel<Bind<'static>>,
+    /// One element where one dispatch is enough.
+    sums: Buffer<vec4>,
+    radius: u32,
     settings: FilterSettings,
 }
 
 impl Bilateral {
     fn new(gpu: &Gpu, settings: &FilterSettings, size: [u32; 2]) -> Result<Self> {
-        let kernel = Kernel::new(gpu, &Effects::default(), &Rates::new(settings).constants())?;
-        Ok(Self { pack: Pack::new(gpu, size)?, kernel, settings: *settings })
+        let (pack, radius) = (Pack::new(gpu, size)?, settings.radius.min(size[0].max(size[1]) - 1));
+        let banded = bands(radius).0 > 1;
+        let mut constants = Rates::new(settings).constants();
+        constants.push((115, u32::from(banded)));
+        let kernel = Kernel::new(gpu, &Effects::default(), &constants)?;
+        let sums = Buffer::new(gpu, "sums", if banded { pack.colour.len() } else { 1 }, Location::Device)?;
+        Ok(Self { pack, kernel, sums, radius, settings: *settings })
     }
+}
+
+/// How many bands a thread's window is cut into, and the rows of each.
+fn bands(radius: u32) -> (u32, u32) {
+    let (columns, rows) = (2 * radius + 1, 2 * radius + ROWS);
+    let band = (TAPS / columns).clamp(1, rows);
+    (rows.div_ceil(band), band)
 }
 
 /// Of a Gaussian whose standard deviation is half the radius.
@@ -43,14 +62,21 @@ impl Filter for Bilateral {
     fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
         self.pack.record(rec, planes)?;
         let [width, height] = planes.size;
+        let (bands, band_rows) = bands(self.radius);
         let push = BilateralPush {
             size: planes.size,
-            radius: self.settings.radius.min(width.max(height) - 1),
+            radius: self.radius,
             rate_space: rate_space(&self.settings),
             rates: Rates::new(&self.settings).as_array(),
+            band: 0,
+            band_rows,
         };
-        let bind = Bind { colour: &self.pack.colour, place: &self.pack.place, filtered: &planes.output };
-        rec.dispatch(&self.kernel, bind, &push, [width.div_ceil(WORKGROUP), height.div_ceil(ROWS), 1])
+        let (colour, place) = (&self.pack.colour, &self.pack.place);
+        (0..bands).try_for_each(|band| {
+            let bind = Bind { colour, place, filtered: &planes.output, sums: &self.sums };
+            let groups = [width.div_ceil(WORKGROUP), height.div_ceil(ROWS), 1];
+            rec.dispatch(&self.kernel, bind, &BilateralPush { band, ..push }, groups)
+        })
     }
 }
 

@@ -91,16 +91,19 @@ pub fn find(name: &str) -> Option<&'static Row> {
     FILTERS.iter().find(|row| row.name == name)
 }
 
-/// Refuses images whose planes one storage binding cannot hold.
+/// Refuses images whose planes one storage binding cannot hold, and edges along which threads would walk longer than software
+/// devices let them (`glsl/shared/rounds.glsl`).
 ///
 /// # Errors
 /// [`Error::Device`].
 pub fn check_size(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<()> {
+    const LONGEST: u32 = 60_000;
     let most = gpu.info().max_storage_range / size_of::<vec4>() as u64;
-    match u64::from(width) * u64::from(height) <= most {
+    match u64::from(width) * u64::from(height) <= most && width.max(height) <= LONGEST {
         true => Ok(()),
         false => Err(Error::Device(format!(
-            "an image of {width} x {height} is too large to filter on this device: choose at most {most} pixels"
+            "an image of {width} x {height} is too large to filter on this device: choose at most {most} pixels, and \
+             {LONGEST} along an edge"
         ))),
     }
 }

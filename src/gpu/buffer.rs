@@ -120,6 +120,15 @@ impl<T: Pod> Buffer<T> {
         Ok(buffer)
     }
 
+    /// [`Self::from_slice`] of what kernels read as texels: more than they can see is told before it is uploaded.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn from_texels(gpu: &Gpu, name: &str, values: &[T]) -> Result<Self> {
+        check_texels(name, size_of_val(values) as u64, size_of::<T>(), gpu.0.info.max_texel_elements)?;
+        Self::from_slice(gpu, name, values)
+    }
+
     /// Elements, at least 1.
     #[allow(clippy::len_without_is_empty)]
     pub fn len(&self) -> usize {
@@ -201,18 +210,15 @@ impl Bound<'_> {
         if self.offset > 0 || self.size.next_multiple_of(4) < whole.size {
             return Err(Error::Device(format!("buffer \"{}\": a part of it cannot be read as texels", whole.name)));
         }
-        let (format, bytes) = match (kind, whole.stride) {
-            (SlotKind::FloatTexels, n) if n.is_multiple_of(16) => (vk::Format::R32G32B32A32_SFLOAT, 16),
-            (SlotKind::FloatTexels, 8) => (vk::Format::R32G32_SFLOAT, 8),
-            (SlotKind::FloatTexels, _) => (vk::Format::R32_SFLOAT, 4),
-            (_, n) if n.is_multiple_of(16) => (vk::Format::R32G32B32A32_UINT, 16),
-            (_, 8) => (vk::Format::R32G32_UINT, 8),
-            (_, _) => (vk::Format::R32_UINT, 4),
+        let format = match (kind, texel_bytes(whole.stride)) {
+            (SlotKind::FloatTexels, 16) => vk::Format::R32G32B32A32_SFLOAT,
+            (SlotKind::FloatTexels, 8) => vk::Format::R32G32_SFLOAT,
+            (SlotKind::FloatTexels, _) => vk::Format::R32_SFLOAT,
+            (_, 16) => vk::Format::R32G32B32A32_UINT,
+            (_, 8) => vk::Format::R32G32_UINT,
+            (_, _) => vk::Format::R32_UINT,
         };
-        let (texels, limit) = (whole.size / bytes, whole.gpu.0.info.max_texel_elements);
-        if texels > limit {
-            return Err(too_big(&whole.name, texels, "texels", limit, "of one texel buffer"));
-        }
+        check_texels(&whole.name, whole.size, whole.stride, whole.gpu.0.info.max_texel_elements)?;
         let mut views = whole.views.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, view)) = views.iter().find(|(made, _)| *made == format) {
             return Ok(*view);
@@ -315,9 +321,40 @@ impl Drop for Untyped {
     }
 }
 
+/// Of one texel of a view of elements of `stride` bytes.
+fn texel_bytes(stride: usize) -> u64 {
+    match stride {
+        n if n.is_multiple_of(16) => 16,
+        8 => 8,
+        _ => 4,
+    }
+}
+
+fn check_texels(name: &str, size: u64, stride: usize, limit: u64) -> Result<()> {
+    match size / texel_bytes(stride) {
+        texels if texels > limit => Err(too_big(name, texels, "texels", limit, "of one texel buffer")),
+        _ => Ok(()),
+    }
+}
+
 fn too_big(name: &str, size: u64, unit: &str, limit: u64, of: &str) -> Error {
     Error::Device(format!(
         "buffer \"{name}\" has {size} {unit}, over the device's limit {of}, {limit}: choose a smaller film or scene, or \
          another device"
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::check_texels;
+
+    #[test]
+    fn texels_are_as_wide_as_elements_allow() {
+        // Elements of 48, 24 and 8 bytes are read 16, 4 and 8 at a time.
+        for (stride, texels) in [(48, 6), (24, 24), (8, 12)] {
+            assert!(check_texels("a", 96, stride, texels).is_ok());
+            let line = check_texels("a", 96, stride, texels - 1).unwrap_err().to_string();
+            assert!(line.contains(&format!("{texels} texels")) && line.contains("choose"), "{line}");
+        }
+    }
 }

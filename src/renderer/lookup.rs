@@ -5,6 +5,10 @@ use crate::gpu::layout::{Guide, PathPush, vec3, vec4};
 use crate::gpu::{Buffer, FrameResources, Location, PassTime};
 use crate::stage::{PerThread, lookup};
 
+/// Eye rays of a pixel in a dispatch: drivers kill what runs for seconds, and software devices end loops early
+/// (`glsl/shared/rounds.glsl`).
+const RAYS_AT_ONCE: u32 = 32;
+
 impl Renderer {
     /// Indirect light of every pixel, row-major, and what each pass took. The guide rays through the pixels' centres, which
     /// meet `guide`, carry `filtered` (light before albedo; w = 0 where there is none); `eye_rays` further rays per pixel,
@@ -30,10 +34,17 @@ impl Renderer {
         let guide = Buffer::from_slice(gpu, "guide rays", guide)?;
         let filtered = Buffer::from_slice(gpu, "filtered", filtered)?;
         let indirect = Buffer::new(gpu, "indirect", pixels, Location::Device)?;
-        let push = PathPush { pixels: pixels as u32, samples: eye_rays, ..self.push };
-        let times = gpu.run(&mut FrameResources::new(gpu)?, |rec| {
-            lookup::record(&kernel, rec, &self.scene, &guide, &filtered, &indirect, &push)
-        })?;
-        Ok((indirect.read()?, times))
+        let (mut frame, mut times) = (FrameResources::new(gpu)?, Vec::new());
+        times.extend(gpu.run(&mut frame, |rec| rec.fill(&indirect, 0))?);
+        for first_sample in (0..eye_rays).step_by(RAYS_AT_ONCE as usize) {
+            let samples = RAYS_AT_ONCE.min(eye_rays - first_sample);
+            let push = PathPush { first_sample: self.push.first_sample + first_sample, samples, ..self.push };
+            let push = PathPush { pixels: pixels as u32, ..push };
+            times.extend(gpu.run(&mut frame, |rec| {
+                lookup::record(&kernel, rec, &self.scene, &guide, &filtered, &indirect, &push)
+            })?);
+        }
+        let light = indirect.read()?.into_iter().map(|sum| sum.map(|v| v / eye_rays as f32));
+        Ok((light.collect(), times))
     }
 }

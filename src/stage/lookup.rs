@@ -10,7 +10,7 @@ use crate::shaders::lookup::Bind;
 /// The specialised kernel.
 pub type Lookup = PerThread<Bind<'static>>;
 
-/// scene, guide\[P\], filtered\[P\] -> indirect\[P\]; `push.samples` eye rays per pixel
+/// Adds the light of `push.samples` eye rays to the push's pixels: scene, guide\[P\], filtered\[P\] -> indirect\[P\]
 pub fn record(
     k: &Lookup,
     rec: &mut Recorder,

@@ -57,6 +57,10 @@ gpu_structs! {
         rate_space: float,
         /// As in [`AtrousPush`].
         rates: vec3,
+        /// Which band of the window's rows, from its top.
+        band: uint,
+        /// Rows of a band.
+        band_rows: uint,
     }
 
     /// Push constants of `estimate.comp` and `svgf.comp`.
