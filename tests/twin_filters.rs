@@ -38,7 +38,8 @@ fn both(gpu: &Gpu, filter: &str, input: &FilterInput, settings: &FilterSettings)
     let row = find(filter).unwrap();
     let device = run(gpu, row, input, settings).unwrap().0;
     let host = (row.reference)(input, settings);
-    assert!(apart(&device, &host, 1.0) < 1e-5, "{filter}: {device:?} and {host:?} with {settings:?}");
+    let off = apart(&device, &host, 1.0);
+    assert!(off < 1e-5, "{filter}: {off} apart with {settings:?}");
     device
 }
 
