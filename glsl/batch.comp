@@ -17,7 +17,7 @@ layout(scalar, push_constant) uniform Push { BatchPush push; };
 #include "shared/offset.glsl"
 #include "shared/rounds.glsl"
 
-const uint PLAIN = 32u; // of each of a thread's 64 pixels
+const uint PLAIN = 32u; // of each of a thread's 64 pixels: see shared/rounds.glsl
 
 void main() {
     uint first = first_item(), items = item_count(first, push.pixels);

@@ -20,7 +20,7 @@ layout(scalar, push_constant) uniform Push { FoldPush push; };
 #include "shared/offset.glsl"
 #include "shared/rounds.glsl"
 
-const uint PLAIN = 2048u;
+const uint PLAIN = 2048u; // see shared/rounds.glsl
 
 // A channel whose albedo is below this cannot be divided out; its light stays with the direct light.
 const float SMALLEST_ALBEDO = 1e-6;

@@ -8,7 +8,7 @@
 
 // One camera path per thread: next event estimation and BSDF sampling joined by the balance heuristic (Veach 1997).
 // Thread i traces sample first_sample + i / pixels of pixel first_pixel + i % pixels, or path i of a list, and writes 1 vec4 (radiance), or
-// with FX_SPLIT 3 (direct, indirect, the albedo that indirect is to be divided by); w is 0.
+// with FX_SPLIT 3 (direct, indirect, the albedo that indirect is to be divided by); w of the first is the number of its rays.
 layout(local_size_x_id = 100) in;
 layout(scalar, binding = 11) writeonly buffer Samples { vec4 samples[]; };
 layout(scalar, binding = 12) buffer Counters { uint counters[]; };

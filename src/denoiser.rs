@@ -9,6 +9,9 @@ use crate::renderer::{OutputView, Renderer};
 use crate::shaders::{join, split};
 use crate::stage::groups;
 
+/// Of a pixel's [`PixelLight`].
+const TEXELS_OF_LIGHT: u64 = 6;
+
 /// A filter over the films of one renderer. Everything is created in [`Denoiser::new`], nothing later.
 pub struct Denoiser {
     split: Kernel<split::Bind<'static>>,
@@ -25,8 +28,9 @@ pub struct Denoiser {
 impl Denoiser {
     /// Compiles a row of [`FILTERS`](crate::filter::FILTERS) for the films of `renderer`, which was made with
     /// [`Outputs::guides`](crate::renderer::Outputs::guides), and for [`Demodulation::Light`] with
-    /// [`Outputs::split_light`](crate::renderer::Outputs::split_light). Lengths in the settings are in units of `extent`:
-    /// give the diagonal of [`Scene::bounds`](crate::scene::Scene::bounds).
+    /// [`Outputs::split_light`](crate::renderer::Outputs::split_light). Distances in the settings
+    /// are in units of `extent`: give the diagonal of [`Scene::bounds`](crate::scene::Scene::bounds), or of what is seen;
+    /// `sigma_rt` is in units of `intensity`: give the radiance of what is white in your frames.
     ///
     /// # Errors
     /// [`Error::Usage`] for settings out of range and for a renderer without what the filter needs, [`Error::Device`] when
@@ -41,7 +45,7 @@ impl Denoiser {
         settings.validate()?;
         check(renderer, demodulation)?;
         let (film, size) = (&renderer.film().tiles[0], [renderer.settings().width, renderer.settings().height]);
-        filter::check_size(gpu, size)?;
+        filter::check_size(gpu, size, TEXELS_OF_LIGHT)?;
         let pixels = film.pixels as usize;
         let plane = |name| Buffer::new(gpu, name, pixels, Location::Device);
         let planes = Planes {

@@ -263,7 +263,8 @@ impl FilmTile {
 
 /// What a frame writes. Buffers that the outputs do not call for hold one element.
 pub struct FilmBuffers {
-    /// vec4 per sample in flight, three with direct and indirect light apart; overwritten by every batch.
+    /// vec4 per sample in flight, three with direct and indirect light apart; w of the first is the number of its rays.
+    /// Overwritten by every batch.
     pub samples: Buffer<vec4>,
     /// The film, in order; one tile unless a device's buffers are too small for that.
     pub tiles: Vec<FilmTile>,

@@ -33,7 +33,7 @@ pub struct Outputs {
 /// A result buffer for the caller: pixel `i` of the view (row-major, row 0 at the top) starts at `offset + i * stride`.
 #[derive(Clone, Copy, Debug)]
 pub struct OutputView {
-    /// The Vulkan handle, valid as long as the renderer.
+    /// The Vulkan handle, valid as long as what returned the view.
     pub buffer: RawBuffer,
     /// Bytes to the first pixel's first value.
     pub offset: u64,

@@ -11,7 +11,7 @@ pub struct Batch {
     pub pixels: u32,
     /// Index in each pixel's sequence.
     pub first_sample: u32,
-    /// At least 1.
+    /// 1 to 32768.
     pub samples: u32,
 }
 

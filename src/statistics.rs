@@ -31,7 +31,7 @@ pub fn join(a: &Pixel, b: &Pixel) -> Pixel {
             mean: mean(a.stats.mean, b.stats.mean),
             count: a.stats.count + b.stats.count,
             m2,
-            rays: a.stats.rays + b.stats.rays,
+            rays: a.stats.rays.wrapping_add(b.stats.rays),
         },
         light: PixelLight {
             direct: mean(a.light.direct, b.light.direct),

@@ -88,7 +88,9 @@ fn direct_light_of_our_own_files_stays_as_it_is_and_other_layers_too() {
     for channel in film.channels.iter().filter(|c| c.name.len() > 1 || c.name == "Z") {
         assert_eq!(clean.channel(&channel.name), Some(&channel.samples), "{}", channel.name);
     }
-    assert_eq!(clean.metadata, film.metadata);
+    let mut metadata = film.metadata.clone();
+    metadata.insert("filtered".to_owned(), "atrous".to_owned());
+    assert_eq!(clean.metadata, metadata);
     assert!(error(&filter(&folder, &["--filter", "atrous", "--filter-direct"]), lit) > 0.2);
     // Control: taken for a file of another renderer, direct light is filtered along.
     let mut foreign = film.clone();
@@ -278,4 +280,11 @@ fn a_denoised_render_is_the_filtered_file_and_keeps_its_samples() {
     std::fs::copy(folder.path().join("denoised.exr"), folder.path().join("noisy.exr")).unwrap();
     assert_eq!(layer(&filter(&folder, &["--filter", "guided"]), None), layer(&filtered, None));
     complains(&tallow(&folder, &["render", scene, "--denoise", "gided"]), 2, &["gided", "guided"]);
+    // That file is still whole; one without the noisy layer has lost its samples' mean.
+    let merge = |name: &str| tallow(&folder, &["merge", name, "rest.exr", "-o", "merged.exr"]);
+    assert_eq!(merge("clean.exr").status.code(), Some(0));
+    assert_eq!(layer(&read(&folder, "merged.exr"), None), layer(&merged[0], None));
+    render("noisy.exr", &["--spp", "4"]);
+    filter(&folder, &["--filter", "guided"]);
+    complains(&merge("clean.exr"), 3, &["clean.exr", "was filtered (guided)", "before"]);
 }

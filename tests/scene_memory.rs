@@ -96,10 +96,10 @@ fn described() -> Description {
     };
     let instance = |x: f64| InstanceTable {
         mesh: "lamp".to_owned(),
-        transform: Transform(glam::DAffine3::from_translation(glam::DVec3::new(x, 0.0, 2.0))),
+        transform: [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 0.0, 1.0].into(),
         ..InstanceTable::default()
     };
-    let checks = Some(PathBuf::from("checks"));
+    let checks = Some(PathBuf::from("pictures/checks"));
     Description {
         film: Film { width: Some(32), height: Some(16), ..Film::default() },
         camera: Camera { position: Some([1.0, 2.0, 9.0]), target: Some([0.0; 3]), ..Camera::default() },
@@ -125,7 +125,12 @@ fn described() -> Description {
             intensity: Some(Rgb([10.0; 3])),
             ..LightTable::default()
         }],
-        bitmap: vec![Bitmap { name: "checks".into(), width: 3, height: 2, rgba: (0..6).map(texel).collect() }],
+        bitmap: vec![Bitmap {
+            name: "pictures\\checks".into(),
+            width: 3,
+            height: 2,
+            rgba: (0..6).map(texel).collect(),
+        }],
         ..Description::default()
     }
 }
@@ -170,9 +175,9 @@ fn mistakes_are_one_line_with_place_and_remedy() {
     has(mesh(&|m| m.uvs.push([0.0; 2])), &["mesh \"wall\"", "4 positions but 5 uvs"]);
     has(error(|d| d.mesh[0].shape = Some(Shape::Cube)), &["mesh \"wall\"", "either"]);
     has(error(|d| d.mesh[0].data = None), &["mesh \"wall\"", "either"]);
-    has(error(|d| d.bitmap[0].width = 4), &["bitmap \"checks\"", "6 texels for 4 x 2"]);
-    has(error(|d| d.bitmap[0].height = 0), &["bitmap \"checks\"", "3 x 0"]);
-    has(error(|d| d.bitmap.push(d.bitmap[0].clone())), &["bitmap \"checks\"", "twice"]);
+    has(error(|d| d.bitmap[0].width = 4), &["bitmap \"pictures", "6 texels for 4 x 2"]);
+    has(error(|d| d.bitmap[0].height = 0), &["bitmap \"pictures", "3 x 0"]);
+    has(error(|d| d.bitmap.push(d.bitmap[0].clone())), &["bitmap \"pictures", "twice"]);
     let sky = |change: &dyn Fn(&mut EnvironmentTable)| error(|d| change(d.environment.as_mut().unwrap()));
     has(sky(&|e| e.radiance = Some(Rgb([1.0; 3]))), &["[environment]", "both"]);
     has(sky(&|e| e.file = Some("a.exr".into())), &["[environment]", "both"]);

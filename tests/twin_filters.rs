@@ -5,7 +5,7 @@ mod support;
 
 use picture::{Picture, SIZES, apart, line, red};
 use support::{assert_silent, gpu};
-use tallow::filter::{FILTERS, FilterInput, FilterSettings, WaveletBasis, find, firefly, run};
+use tallow::filter::{FILTERS, FilterInput, FilterSettings, GuidedSums, WaveletBasis, find, firefly, run};
 use tallow::gpu::Gpu;
 use tallow::gpu::layout::vec4;
 
@@ -123,6 +123,26 @@ fn the_widest_windows_of_bilateral_are_whole() {
     let wide = both(&gpu, "bilateral", &input, &settings);
     let narrow = both(&gpu, "bilateral", &input, &FilterSettings { radius: 30, ..settings });
     assert!(apart(&wide, &narrow, 1.0) > 1e-2, "control: the window counts");
+    assert_silent(&gpu);
+}
+
+/// Threads of some filters walk along whole lines: see `check_size`.
+#[test]
+fn the_longest_lines_are_whole() {
+    let gpu = gpu();
+    let narrow = FilterSettings { radius: 0, ..FilterSettings::default() };
+    let table = FilterSettings { sums: GuidedSums::Table, eps: [0.1; 4], radius: 3, ..FilterSettings::default() };
+    let rows = [("guided", FilterSettings::default()), ("guided", narrow), ("guided", table), ("atrous", narrow)];
+    for [width, height] in [[60_000, 1], [1, 60_000]] {
+        let input = Picture::new(width, height).noisy().input;
+        for (name, settings) in &rows {
+            let settings = settings.scaled_to(&input);
+            let device = run(&gpu, find(name).unwrap(), &input, &settings).unwrap().0;
+            let host = (find(name).unwrap().reference)(&input, &settings);
+            let off = apart(&device, &host, 1.0);
+            assert!(off < 1e-2, "{name} {width}x{height}: {off} apart with {settings:?}");
+        }
+    }
     assert_silent(&gpu);
 }
 

@@ -105,12 +105,12 @@ fn twin(scene: &Scene, effects: &Effects, guide: &[Guide], filtered: &[vec4]) ->
 
 /// A software device ends loops early, silently: all rays of a pixel in one loop brought a twentieth of the light.
 #[test]
-fn hundreds_of_thousands_of_eye_rays_bring_what_a_few_do() {
+fn tens_of_thousands_of_eye_rays_bring_what_a_few_do() {
     let gpu = gpu();
     let scene = scene("cornell-box/scene.toml", [4, 2], PixelFilter::Box);
     let (guide, filtered) = guides(&scene);
     let renderer = Renderer::new(&gpu, &scene, Outputs::default()).unwrap();
-    let [few, many] = [4096, 1 << 18].map(|n| renderer.look_up(&guide, &filtered, n).unwrap().0);
+    let [few, many] = [4096, 1 << 16].map(|n| renderer.look_up(&guide, &filtered, n).unwrap().0);
     let apart =
         |a: &[vec3], b: &[vec3]| a.iter().zip(b).map(|(a, b)| (a[1] - b[1]).abs() / b[1].max(0.01)).fold(0.0, f32::max);
     assert!(apart(&few, &many) < 0.03, "{few:?} {many:?}");

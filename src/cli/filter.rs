@@ -4,7 +4,7 @@ mod supersampling;
 
 use super::common::Common;
 use super::compare::{self, check_sizes};
-use super::{Exit, fail_on_messages, print, print_json};
+use super::{Exit, fail_on_messages, layers, print, print_json};
 use crate::composition::{self, Demodulation, Parts};
 use crate::error::{Error, Result};
 use crate::filter::{self, FILTERS, Row};
@@ -108,7 +108,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     cut_fireflies(args, &gpu, &mut parts)?;
     let (colour, times) = filtered(args, &gpu, &aovs, &parts)?;
     let seconds = start.elapsed().as_secs_f64();
-    let clean = replaced(&source, &aovs, &colour)?;
+    let clean = replaced(args, &source, &aovs, &colour)?;
     fail_on_messages(&gpu)?;
     let options = args.common.write_options();
     args.outputs.iter().try_for_each(|path| clean.write(path, &options))?;
@@ -154,12 +154,12 @@ fn filtered(args: &Args, gpu: &Gpu, aovs: &Aovs, parts: &Parts) -> Result<(Vec<[
 }
 
 /// The file with the filtered colour. Where its three channels are one, that holds their mean.
-fn replaced(source: &Source, aovs: &Aovs, colour: &[[f32; 3]]) -> Result<Source> {
+fn replaced(args: &Args, source: &Source, aovs: &Aovs, colour: &[[f32; 3]]) -> Result<Source> {
     let grey = aovs.colour[0] == aovs.colour[1];
     let plane = |c: usize| colour.iter().map(|v| if grey { (v[0] + v[1] + v[2]) / 3.0 } else { v[c] }).collect();
     let planes: Vec<Vec<f32>> = (0..3).map(plane).collect();
     let channels: Vec<_> = aovs.colour.into_iter().zip(planes.iter().map(Vec::as_slice)).collect();
-    source.replaced(&channels)
+    source.replaced(&channels, (layers::FILTERED, args.filter.name))
 }
 
 /// Read before anything long, and of the size of the image.

@@ -116,9 +116,10 @@ impl Job<'_> {
                 Some(Step::Listed(range)) => end.last = Some(range),
                 Some(Step::Start | Step::Uniform(_) | Step::Choose(_)) | None => {}
             }
-            if !progress.is_hidden() {
+            progress.add(planned.paths());
+            if progress.wants_speed() {
                 let now = rays_of_a_few(r)?;
-                progress.add(planned.paths(), [now[0] - before[0], now[1] - before[1]]);
+                progress.set_speed([now[0] - before[0], now[1] - before[1]]);
             }
         }
         progress.finish();

@@ -17,6 +17,9 @@ pub const PENDING: &str = "pending";
 /// The mean of the samples, where the colour is filtered: only in files of `--denoise`. Blender's name for it.
 const NOISY: &str = "Noisy Image";
 
+/// Metadata of what `tallow filter` wrote: the filter.
+pub const FILTERED: &str = "filtered";
+
 /// Of a film with everything.
 const CHANNELS: usize = 27;
 
@@ -70,7 +73,15 @@ fn add_pixels(film: &mut Film, stats: &[PixelStats], light: &[PixelLight]) {
 /// Which layer is missing.
 pub fn pixels(film: &Film) -> std::result::Result<Vec<Pixel>, String> {
     let layer = |name: Option<&str>| film.picture(name).map(|p| p.pixels);
-    let mean = layer(Some(NOISY)).or_else(|_| layer(None))?;
+    let mean = match (layer(Some(NOISY)), film.metadata.get(FILTERED)) {
+        (Ok(mean), _) => mean,
+        (Err(_), None) => layer(None)?,
+        (Err(_), Some(filter)) => {
+            return Err(format!(
+                "was filtered ({filter}), and the mean of its samples is gone: take the file before that"
+            ));
+        }
+    };
     let (m2, count) = (layer(Some("m2"))?, counts(film, "samples")?);
     let dark = vec![[0.0; 3]; mean.len()];
     let direct = layer(Some("direct")).unwrap_or_else(|_| dark.clone());
@@ -97,6 +108,7 @@ pub fn replace_pixels(film: &mut Film, pixels: &[Pixel]) {
     let light: Vec<_> = pixels.iter().filter(|_| split).map(|p| p.light).collect();
     add_pixels(&mut fresh, &pixels.iter().map(|p| p.stats).collect::<Vec<_>>(), &light);
     film.channels.retain(|c| fresh.channel(&c.name).is_none() && !c.name.starts_with(NOISY));
+    film.metadata.remove(FILTERED);
     film.channels.extend(fresh.channels);
 }
 

@@ -1,12 +1,13 @@
 //! The progress bar of a render, on stderr.
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Percent, speed and time left. Silent when stderr is no terminal.
 pub struct Progress {
     bar: ProgressBar,
     start: Instant,
+    shown: Option<Instant>,
 }
 
 impl Progress {
@@ -18,17 +19,22 @@ impl Progress {
         let template = "{percent:>3} % [{wide_bar}] {msg}, {eta} left";
         let style = ProgressStyle::with_template(template).expect("a constant template");
         bar.set_style(style.progress_chars("=> "));
-        Self { bar, start: Instant::now() }
+        Self { bar, start: Instant::now(), shown: None }
     }
 
-    /// Whether nobody sees it.
-    pub fn is_hidden(&self) -> bool {
-        self.bar.is_hidden()
-    }
-
-    /// Counts samples that are done; `rays_of` some of all samples so far, (rays, samples), tells how many rays they took.
-    pub fn add(&mut self, samples: u64, rays_of: [u64; 2]) {
+    /// Counts samples that are done.
+    pub fn add(&mut self, samples: u64) {
         self.bar.inc(samples);
+    }
+
+    /// Whether somebody sees it, and has seen the last speed for a while.
+    pub fn wants_speed(&self) -> bool {
+        !self.bar.is_hidden() && self.shown.is_none_or(|shown| shown.elapsed() > Duration::from_millis(200))
+    }
+
+    /// Shows the speed, by the rays of some of all samples so far: (rays, samples).
+    pub fn set_speed(&mut self, rays_of: [u64; 2]) {
+        self.shown = Some(Instant::now());
         self.bar.set_message(speed(self.bar.position(), rays_of, self.start.elapsed().as_secs_f64()));
     }
 
@@ -39,7 +45,10 @@ impl Progress {
 }
 
 fn speed(samples: u64, [rays, of]: [u64; 2], seconds: f64) -> String {
-    let rays = samples as f64 * rays as f64 / of.max(1) as f64;
+    if of == 0 {
+        return String::new();
+    }
+    let rays = samples as f64 * rays as f64 / of as f64;
     format!("{:.2} Mray/s", rays * 1e-6 / seconds.max(1e-9))
 }
 
@@ -50,6 +59,6 @@ mod tests {
     #[test]
     fn speed_is_millions_of_rays_per_second() {
         assert_eq!(speed(3_000_000, [80, 20], 2.0), "6.00 Mray/s");
-        assert_eq!(speed(0, [0, 0], 0.0), "0.00 Mray/s");
+        assert_eq!((speed(0, [2, 1], 0.0).as_str(), speed(9, [0, 0], 1.0).as_str()), ("0.00 Mray/s", ""));
     }
 }

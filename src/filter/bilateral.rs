@@ -21,8 +21,7 @@ pub const ROW: Row = Row {
 const ROWS: u32 = 8;
 const WORKGROUP: u32 = 32;
 
-/// Taps of a thread in one dispatch: software devices end loops early (`glsl/shared/rounds.glsl`), and drivers kill what runs
-/// for seconds.
+/// Taps of a thread in one dispatch: software devices end loops early (`glsl/shared/rounds.glsl`).
 const TAPS: u32 = 60_000;
 
 struct Bilateral {

@@ -91,22 +91,28 @@ pub fn find(name: &str) -> Option<&'static Row> {
     FILTERS.iter().find(|row| row.name == name)
 }
 
-/// Refuses images whose planes one storage binding cannot hold, and edges along which threads would walk longer than software
-/// devices let them (`glsl/shared/rounds.glsl`).
+/// Refuses images whose planes a binding cannot hold, with `texels` texels a pixel in the widest that is read, and edges along
+/// which threads would walk longer than a software device lets them (`glsl/shared/rounds.glsl`).
 ///
 /// # Errors
 /// [`Error::Device`].
-pub fn check_size(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<()> {
-    const LONGEST: u32 = 60_000;
-    let most = gpu.info().max_storage_range / size_of::<vec4>() as u64;
-    match u64::from(width) * u64::from(height) <= most && width.max(height) <= LONGEST {
+pub fn check_size(gpu: &Gpu, [width, height]: [u32; 2], texels: u64) -> Result<()> {
+    let info = gpu.info();
+    let longest = if info.kind == "CPU" { 60_000 } else { u32::MAX };
+    let most = (info.max_storage_range / size_of::<vec4>() as u64).min(info.max_texel_elements / texels);
+    // `guided` pads its rows.
+    let padded = u64::from(width).next_multiple_of(8) * u64::from(height);
+    match padded <= most && width.max(height) <= longest {
         true => Ok(()),
         false => Err(Error::Device(format!(
             "an image of {width} x {height} is too large to filter on this device: choose at most {most} pixels, and \
-             {LONGEST} along an edge"
+             {longest} along an edge"
         ))),
     }
 }
+
+/// Of a pixel's guide, or of its variance.
+pub const TEXELS: u64 = 3;
 
 /// Filters one image: uploads it, runs `row` on it and reads the result; also what each pass took.
 ///
@@ -116,7 +122,7 @@ pub fn check_size(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<()> {
 pub fn run(gpu: &Gpu, row: &Row, input: &FilterInput, settings: &FilterSettings) -> Result<(Vec<vec4>, Vec<PassTime>)> {
     settings.validate()?;
     input.validate()?;
-    check_size(gpu, [input.width, input.height])?;
+    check_size(gpu, [input.width, input.height], TEXELS)?;
     let planes = Planes::new(gpu, input)?;
     let filter = (row.make)(gpu, settings, planes.size)?;
     let times = gpu.run(&mut FrameResources::new(gpu)?, |rec| filter.record(rec, &planes))?;

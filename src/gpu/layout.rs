@@ -314,7 +314,7 @@ gpu_structs! {
         count: uint,
         /// Sum of squared deviations from the mean; the variance of one sample is m2 / (count - 1).
         m2: vec3,
-        /// Rays of its samples, of both kinds; those of an earlier render that was resumed do not count.
+        /// Rays of its samples, of both kinds, modulo 2^32; those of an earlier render that was resumed do not count.
         rays: uint,
     }
 

@@ -103,10 +103,15 @@ pub(super) fn decode(bytes: &[u8], frame: Frame) -> Result<Film, String> {
     film_from(image, window)
 }
 
-/// The file again with other samples in some channels, given by their names in the film of [`Frame::Data`]. All else is
-/// kept, but for the compression, which is lossless.
-pub(super) fn replace(bytes: &[u8], channels: &[(&str, &[f32])]) -> Result<Vec<u8>, String> {
+/// The file again with other samples in some channels, given by their names in the film of [`Frame::Data`], and with an entry
+/// of metadata. All else is kept, but for the compression, which is lossless.
+pub(super) fn replace(
+    bytes: &[u8],
+    channels: &[(&str, &[f32])],
+    (key, value): (&str, &str),
+) -> Result<Vec<u8>, String> {
     let mut image = read(bytes)?;
+    image.attributes.other.insert(text(&format!("{PREFIX}{key}")), AttributeValue::Text(text(value)));
     let frame = stored(&image);
     let many = image.layer_data.len() > 1;
     for part in &mut image.layer_data {

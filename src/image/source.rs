@@ -39,13 +39,14 @@ impl Source {
         super::decode(&self.bytes).map_err(|what| Error::input(&self.path, what))
     }
 
-    /// The file with other samples, one per pixel of `film`, in the channels of these names.
+    /// The file with other samples, one per pixel of `film`, in the channels of these names, and with an entry of metadata
+    /// that says so.
     ///
     /// # Errors
     /// [`Error::Input`] when it holds what cannot be written again.
-    pub fn replaced(&self, channels: &[(&str, &[f32])]) -> Result<Self> {
+    pub fn replaced(&self, channels: &[(&str, &[f32])], entry: (&str, &str)) -> Result<Self> {
         let about = |what| Error::input(&self.path, what);
-        let bytes = super::contained(|| exr::replace(&self.bytes, channels)).map_err(about)?;
+        let bytes = super::contained(|| exr::replace(&self.bytes, channels, entry)).map_err(about)?;
         let film = super::decode_frame(&bytes, exr::Frame::Data).map_err(about)?;
         Ok(Self { path: self.path.clone(), bytes, film })
     }

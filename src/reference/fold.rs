@@ -34,7 +34,7 @@ pub fn fold(push: &FoldPush, split_light: bool, samples: &[vec4], stats: &mut [P
 
 fn fold_radiance(s: &mut PixelStats, radiance: Vec3, rays: f32) {
     s.count += 1;
-    s.rays += rays as u32;
+    s.rays = s.rays.wrapping_add(rays as u32);
     let mean = Vec3::from(s.mean);
     let off = radiance - mean;
     let mean = mean + off * (1.0 / s.count as f32);

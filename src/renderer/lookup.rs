@@ -5,9 +5,10 @@ use crate::gpu::layout::{Guide, PathPush, vec3, vec4};
 use crate::gpu::{Buffer, FrameResources, Location, PassTime};
 use crate::stage::{PerThread, lookup};
 
-/// Eye rays of a pixel in a dispatch: drivers kill what runs for seconds, and software devices end loops early
-/// (`glsl/shared/rounds.glsl`).
-const RAYS_AT_ONCE: u32 = 32;
+/// Eye rays of a dispatch, unless there are more pixels: drivers kill what runs for seconds.
+const RAYS_AT_ONCE: u32 = 1 << 22;
+/// And of a pixel: software devices end loops early (`glsl/shared/rounds.glsl`).
+const RAYS_OF_A_PIXEL: u32 = 8;
 
 impl Renderer {
     /// Indirect light of every pixel, row-major, and what each pass took. The guide rays through the pixels' centres, which
@@ -36,8 +37,9 @@ impl Renderer {
         let indirect = Buffer::new(gpu, "indirect", pixels, Location::Device)?;
         let (mut frame, mut times) = (FrameResources::new(gpu)?, Vec::new());
         times.extend(gpu.run(&mut frame, |rec| rec.fill(&indirect, 0))?);
-        for first_sample in (0..eye_rays).step_by(RAYS_AT_ONCE as usize) {
-            let samples = RAYS_AT_ONCE.min(eye_rays - first_sample);
+        let at_once = (RAYS_AT_ONCE / pixels as u32).clamp(1, RAYS_OF_A_PIXEL);
+        for first_sample in (0..eye_rays).step_by(at_once as usize) {
+            let samples = at_once.min(eye_rays - first_sample);
             let push = PathPush { first_sample: self.push.first_sample + first_sample, samples, ..self.push };
             let push = PathPush { pixels: pixels as u32, ..push };
             times.extend(gpu.run(&mut frame, |rec| {

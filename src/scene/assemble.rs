@@ -162,12 +162,13 @@ impl<'a> Assembly<'a> {
                 return Ok(());
             }
             _ if table.radiance.is_some() => {
-                return Err(self.at("[environment]", "has both radiance and file: choose one"));
+                return Err(self.at("[environment]", "has both radiance and an image: choose one"));
             }
             (Some(file), None) => {
                 environment::load(&directory.join(file.to_string_lossy().replace('\\', "/")), warnings)?
             }
-            (None, Some(picture)) => environment::from_picture(self.path, picture, warnings)?,
+            (None, Some(picture)) => environment::from_picture("[environment]", picture, warnings)
+                .map_err(|what| self.at("[environment]", format!("its picture is unusable: {what}")))?,
             (Some(_), Some(_)) => return Err(self.at("[environment]", "has both file and picture: choose one")),
         };
         scene.lights.extend(scene.environment.is_some().then_some(light));

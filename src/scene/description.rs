@@ -137,7 +137,7 @@ pub struct InstanceTable {
 ///
 /// # Errors
 /// [`Error::Input`] with line, key and, for an unknown key, the nearest known one.
-pub fn parse(path: &Path, text: &str) -> Result<Description> {
+pub(super) fn parse(path: &Path, text: &str) -> Result<Description> {
     toml::from_str(text).map_err(|e| {
         let start = e.span().map_or(0, |s| s.start).min(text.len());
         let line = 1 + text.as_bytes()[..start].iter().filter(|&&b| b == b'\n').count();
@@ -181,7 +181,7 @@ fn explain(message: &str) -> String {
 }
 
 /// The name that is most like `word`.
-pub fn nearest<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+pub(super) fn nearest<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     let like = |name: &str| (strsim::jaro_winkler(word, name) * 1e6) as u32;
     names.max_by_key(|name| like(name))
 }

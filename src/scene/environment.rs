@@ -33,29 +33,31 @@ pub fn load(path: &Path, warn: &mut Vec<String>) -> Result<Option<Environment>> 
 /// # Errors
 /// See [`load`].
 pub fn decode(path: &Path, bytes: &[u8], warn: &mut Vec<String>) -> Result<Option<Environment>> {
-    let picture = image::decode(bytes).and_then(|film| film.picture(None));
-    from_picture(path, &picture.map_err(|what| unusable(path, &what))?, warn)
+    let unusable =
+        |what| Error::input(path, format!("is no usable environment image ({what}): save it again as HDR or EXR"));
+    let picture = image::decode(bytes).and_then(|film| film.picture(None)).map_err(unusable)?;
+    from_picture(&path.display().to_string(), &picture, warn).map_err(unusable)
 }
 
-/// [`load`] of linear radiance; `path` is for messages.
+/// [`load`] of linear radiance; `name` is for warnings.
 ///
 /// # Errors
-/// [`Error::Input`] for a picture without pixels, or with others than its size says.
-pub fn from_picture(path: &Path, picture: &Picture, warn: &mut Vec<String>) -> Result<Option<Environment>> {
+/// A sentence, for a picture without pixels, or with others than its size says.
+pub fn from_picture(
+    name: &str,
+    picture: &Picture,
+    warn: &mut Vec<String>,
+) -> std::result::Result<Option<Environment>, String> {
     let &Picture { width, height, ref pixels } = picture;
     if pixels.is_empty() || pixels.len() != width as usize * height as usize {
-        return Err(unusable(path, &format!("it has {} pixels for {width} x {height}", pixels.len())));
+        return Err(format!("it has {} pixels for {width} x {height}", pixels.len()));
     }
     let mut repaired = 0usize;
     let texels = pixels.iter().map(|&p| sane(p, &mut repaired)).collect();
     if repaired > 0 {
-        warn.push(format!("{}: {repaired} NaN, infinite or negative channels set to 0", path.display()));
+        warn.push(format!("{name}: {repaired} NaN, infinite or negative channels set to 0"));
     }
     Ok(with_table(width, height, texels))
-}
-
-fn unusable(path: &Path, what: &str) -> Error {
-    Error::input(path, format!("is no usable environment image ({what}): save it again as HDR or EXR"))
 }
 
 fn sane(rgb: [f32; 3], repaired: &mut usize) -> [f32; 4] {

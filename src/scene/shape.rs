@@ -18,7 +18,7 @@ pub enum Shape {
 
 impl Shape {
     /// Triangles of the shape; `segments` around, at least 3 (sphere: half as many from pole to pole).
-    pub fn mesh(self, segments: u32) -> tobj::Mesh {
+    pub(super) fn mesh(self, segments: u32) -> tobj::Mesh {
         match self {
             Self::Sphere => sphere(segments),
             Self::Rectangle => rectangle(),

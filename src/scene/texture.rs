@@ -75,7 +75,8 @@ impl TextureSet {
         if rgba.len() != width as usize * height as usize {
             return Err(format!("has {} texels for {width} x {height}", rgba.len()));
         }
-        match self.bitmaps.insert(bitmap.name.clone(), bitmap.clone()) {
+        let name = bitmap.name.to_string_lossy().replace('\\', "/"); // as materials ask for it
+        match self.bitmaps.insert(name.into(), bitmap.clone()) {
             Some(_) => Err("is there twice: rename one".to_owned()),
             None => Ok(()),
         }

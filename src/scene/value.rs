@@ -84,6 +84,13 @@ impl<'de> Deserialize<'de> for Scale {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Transform(pub DAffine3);
 
+/// Row-major, as in a scene file; the last row counts as 0 0 0 1.
+impl From<[f64; 16]> for Transform {
+    fn from(rows: [f64; 16]) -> Self {
+        Self(DAffine3::from_mat4(DMat4::from_cols_array(&rows).transpose()))
+    }
+}
+
 impl<'de> Deserialize<'de> for Transform {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Either;
