@@ -9,8 +9,8 @@ use crate::renderer::{OutputView, Renderer};
 use crate::shaders::{join, split};
 use crate::stage::groups;
 
-/// Of a pixel's [`PixelLight`].
-const TEXELS_OF_LIGHT: u64 = 6;
+/// Texels of a pixel's [`PixelLight`].
+const LIGHT_TEXELS: u64 = 6;
 
 /// A filter over the films of one renderer. Everything is created in [`Denoiser::new`], nothing later.
 pub struct Denoiser {
@@ -45,7 +45,7 @@ impl Denoiser {
         settings.validate()?;
         check(renderer, demodulation)?;
         let (film, size) = (&renderer.film().tiles[0], [renderer.settings().width, renderer.settings().height]);
-        filter::check_size(gpu, size, TEXELS_OF_LIGHT)?;
+        filter::check_size(gpu, size, LIGHT_TEXELS)?;
         let pixels = film.pixels as usize;
         let plane = |name| Buffer::new(gpu, name, pixels, Location::Device);
         let planes = Planes {

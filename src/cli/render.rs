@@ -134,8 +134,9 @@ pub fn run(args: &Args) -> Result<Exit> {
     let gpu = host.time("open device", || args.common.open())?;
     let wanted = Outputs { split_light: true, guides: true, counters: args.counters };
     check_memory(args, &scene.settings, &gpu)?;
-    args.denoise
-        .map_or(Ok(()), |_| filter::check_size(&gpu, [scene.settings.width, scene.settings.height], filter::TEXELS))?;
+    args.denoise.map_or(Ok(()), |_| {
+        filter::check_size(&gpu, [scene.settings.width, scene.settings.height], filter::GUIDE_TEXELS)
+    })?;
     let mut effects = match args.effects {
         EffectChoice::Auto => renderer::called_for(&scene, wanted),
         EffectChoice::All => renderer::all_effects(&scene),

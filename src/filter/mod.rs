@@ -98,11 +98,11 @@ pub fn find(name: &str) -> Option<&'static Row> {
 /// [`Error::Device`].
 pub fn check_size(gpu: &Gpu, [width, height]: [u32; 2], texels: u64) -> Result<()> {
     let info = gpu.info();
-    let longest = if info.kind == "CPU" { 60_000 } else { u32::MAX };
     let most = (info.max_storage_range / size_of::<vec4>() as u64).min(info.max_texel_elements / texels);
+    let longest = if info.kind == "CPU" { 60_000 } else { most };
     // `guided` pads its rows.
     let padded = u64::from(width).next_multiple_of(8) * u64::from(height);
-    match padded <= most && width.max(height) <= longest {
+    match padded <= most && u64::from(width.max(height)) <= longest {
         true => Ok(()),
         false => Err(Error::Device(format!(
             "an image of {width} x {height} is too large to filter on this device: choose at most {most} pixels, and \
@@ -111,8 +111,8 @@ pub fn check_size(gpu: &Gpu, [width, height]: [u32; 2], texels: u64) -> Result<(
     }
 }
 
-/// Of a pixel's guide, or of its variance.
-pub const TEXELS: u64 = 3;
+/// Texels of a pixel's guide, or of its variance.
+pub const GUIDE_TEXELS: u64 = 3;
 
 /// Filters one image: uploads it, runs `row` on it and reads the result; also what each pass took.
 ///
@@ -122,7 +122,7 @@ pub const TEXELS: u64 = 3;
 pub fn run(gpu: &Gpu, row: &Row, input: &FilterInput, settings: &FilterSettings) -> Result<(Vec<vec4>, Vec<PassTime>)> {
     settings.validate()?;
     input.validate()?;
-    check_size(gpu, [input.width, input.height], TEXELS)?;
+    check_size(gpu, [input.width, input.height], GUIDE_TEXELS)?;
     let planes = Planes::new(gpu, input)?;
     let filter = (row.make)(gpu, settings, planes.size)?;
     let times = gpu.run(&mut FrameResources::new(gpu)?, |rec| filter.record(rec, &planes))?;

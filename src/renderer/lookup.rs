@@ -40,8 +40,8 @@ impl Renderer {
         let at_once = (RAYS_AT_ONCE / pixels as u32).clamp(1, RAYS_OF_A_PIXEL);
         for first_sample in (0..eye_rays).step_by(at_once as usize) {
             let samples = at_once.min(eye_rays - first_sample);
-            let push = PathPush { first_sample: self.push.first_sample + first_sample, samples, ..self.push };
-            let push = PathPush { pixels: pixels as u32, ..push };
+            let first_sample = self.push.first_sample + first_sample;
+            let push = PathPush { pixels: pixels as u32, first_sample, samples, ..self.push };
             times.extend(gpu.run(&mut frame, |rec| {
                 lookup::record(&kernel, rec, &self.scene, &guide, &filtered, &indirect, &push)
             })?);
