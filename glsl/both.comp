@@ -8,48 +8,46 @@
 // remove of it. A filter that gathers a share W of its window divides the variance by about 1 + W (pixels - 1): the
 // deviation that is left is what needs samples. Where nothing is known of the noise yet, geometry alone decides.
 layout(local_size_x_id = 100) in;
-layout(binding = 0) uniform usamplerBuffer guides; // of Guide
-layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
-layout(binding = 2) uniform samplerBuffer importances; // of float
-layout(scalar, binding = 3) writeonly buffer Priorities { float priority[]; };
+layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
+layout(binding = 1) uniform usamplerBuffer kinships; // of uint
+layout(scalar, binding = 2) writeonly buffer Priorities { float priority[]; };
 layout(scalar, push_constant) uniform Push { PriorityPush push; };
 
+#include "shared/kinship.glsl"
 #include "shared/noise.glsl"
-#include "shared/similarity.glsl"
 
-// 1 / 0.2^2 of albedos. Pixels that look unlike still count a little: where all are, as in grass, there is no better source.
-const float ALBEDO_SCALE = 25.0, LEAST_KINSHIP = 0.2;
-
-struct Place {
-    vec3 normal, albedo;
-    bool hit;
-};
-
-Place place_at(uint pixel) {
-    uvec4 albedo = guide_texel(pixel, 2u);
-    return Place(uintBitsToFloat(guide_texel(pixel, 0u).xyz), uintBitsToFloat(albedo.xyz), albedo.w != NONE);
-}
-
-// How much a neighbour's noise says of a pixel's, 0 to 1.
-float kinship(Place a, Place b) {
-    vec3 normals = a.normal - b.normal, albedos = a.albedo - b.albedo;
-    float x = dot(normals, normals) * push.normal_scale + dot(albedos, albedos) * ALBEDO_SCALE;
-    return a.hit == b.hit ? max(exp_negative(x), LEAST_KINSHIP) : LEAST_KINSHIP;
+vec3 mean_of(uint pixel) {
+    return uintBitsToFloat(texelFetch(stats, int(2u * pixel)).rgb);
 }
 
 void main() {
     uint i = thread_index();
     if (i >= push.size.x * push.size.y) return; // safe: no barrier() follows
     ivec2 size = ivec2(push.size), at = ivec2(i % push.size.x, i / push.size.x);
-    Place here = place_at(i);
-    vec4 around = vec4(0.0);
-    for (int dy = -1; dy <= 1; dy++) {
-        for (int dx = -1; dx <= 1; dx++) {
-            ivec2 q = clamp(at + ivec2(dx, dy), ivec2(0), size - 1);
-            uint neighbour = uint(q.y * size.x + q.x);
-            around += kinship(here, place_at(neighbour)) * moments(neighbour);
+    ivec2 first = max(at - 1, ivec2(0)), last = min(at + 1, size - 1);
+    uint word = texelFetch(kinships, int(i)).x;
+    vec3 own = mean_of(i);
+    vec4 around = vec4(0.0), offsets = vec4(0.0);
+    float squares = 0.0, weights = 0.0, freedom = 0.0;
+    for (int y = first.y; y <= last.y; y++) {
+        for (int x = first.x; x <= last.x; x++) {
+            uint neighbour = uint(y * size.x + x);
+            vec4 m = moments(neighbour);
+            if (m.w == 0.0) continue;
+            float kin = kinship_of(word, 3 * (y - at.y) + x - at.x + 4);
+            vec3 offset = mean_of(neighbour) - own; // small numbers: their squares keep their digits
+            around += kin * m;
+            offsets += kin * vec4(offset, 1.0);
+            squares += kin * dot(offset, offset);
+            weights += kin * kin;
+            freedom += kin / m.w;
         }
     }
-    float gathered = push.filtered > 0.0 ? 1.0 - texelFetch(importances, int(i)).x : 0.0;
-    priority[i] = noise(moments(i), around) * sqrt(max(1.0 - push.filtered * gathered, 0.0));
+    // Pixels that look alike should be equally bright: how far their means are apart is noise as well, and all that shows it
+    // after one sample a pixel. Of n samples it counts 1/n, since the more there are, the more of it is no noise.
+    if (offsets.w > 0.0) {
+        around.x += max(squares - dot(offsets.rgb, offsets.rgb) / offsets.w, 0.0) / 3.0;
+        around.y += freedom * (1.0 - weights / (offsets.w * offsets.w));
+    }
+    priority[i] = noise(moments(i), around) * sqrt(max(1.0 - push.filtered * gathered_of(word), 0.0));
 }

@@ -17,12 +17,10 @@ void main() {
     uint i = thread_index();
     if (i >= push.size.x * push.size.y) return; // safe: no barrier() follows
     ivec2 size = ivec2(push.size), at = ivec2(i % push.size.x, i / push.size.x);
+    ivec2 first = max(at - 1, ivec2(0)), last = min(at + 1, size - 1);
     vec4 around = vec4(0.0);
-    for (int dy = -1; dy <= 1; dy++) {
-        for (int dx = -1; dx <= 1; dx++) {
-            ivec2 q = clamp(at + ivec2(dx, dy), ivec2(0), size - 1);
-            around += moments(uint(q.y * size.x + q.x));
-        }
+    for (int y = first.y; y <= last.y; y++) {
+        for (int x = first.x; x <= last.x; x++) around += moments(uint(y * size.x + x));
     }
     priority[i] = noise(moments(i), around);
 }

@@ -243,13 +243,17 @@ fn surroundings(pixels: usize, width: usize) -> (Vec<Guide>, Vec<PixelStats>) {
             _ => Guide {
                 normal: normal.into(),
                 position: [x * 0.01, y * 0.01, unit(4 * i + 2) * 0.02],
+                albedo: [0.2, 0.3, unit(4 * i + 3)],
                 ..Guide::default()
             },
         }
     };
     let stats = |i: usize| match i % 5 {
         0 => PixelStats::default(),
-        n => PixelStats { mean: [unit(i), 2.0 * unit(i), 0.1], count: n as u32 + 1, m2: [unit(4 * i); 3], rays: 0 },
+        n => {
+            let m2 = if n == 1 { 0.0 } else { unit(4 * i) };
+            PixelStats { mean: [unit(i), 2.0 * unit(i), 0.1], count: n as u32, m2: [m2; 3], rays: 0 }
+        }
     };
     ((0..pixels).map(guide).collect(), (0..pixels).map(stats).collect())
 }

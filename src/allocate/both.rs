@@ -1,5 +1,5 @@
-//! Geometry first, noise as it becomes known, estimated among neighbours that look alike, less what a filter will remove.
-//! Kernel: `glsl/both.comp`.
+//! Geometry first, noise as it becomes known, less what a filter will remove. Noise is estimated among neighbours that look
+//! alike: from their samples, and from how far their means are apart. Kernels: `glsl/kinship.comp`, `glsl/both.comp`.
 use super::geometry::Geometry;
 use super::variance::{moments, noise, square};
 use super::{HostInputs, Inputs, Placing, Policy, Row, geometry};
@@ -7,8 +7,9 @@ use crate::error::Result;
 use crate::gpu::layout::{Effects, Guide, NONE, PriorityPush, vec3};
 use crate::gpu::{Buffer, Gpu, Location, Recorder};
 use crate::reference::exact::{exp_negative, squared_distance};
-use crate::shaders::both::Bind;
+use crate::shaders::{both, kinship};
 use crate::stage::PerThread;
+use glam::Vec3;
 
 pub(super) const ROW: Row = Row {
     name: "both",
@@ -21,16 +22,19 @@ pub(super) const ROW: Row = Row {
 
 struct Both {
     geometry: Geometry,
-    join: PerThread<Bind<'static>>,
-    importance: Buffer<f32>,
+    kinship: PerThread<kinship::Bind<'static>>,
+    join: PerThread<both::Bind<'static>>,
+    /// What [`kinship`] and importance come to, a word a pixel.
+    words: Buffer<u32>,
 }
 
 impl Both {
     fn new(gpu: &Gpu, pixels: u32, workgroup: u32) -> Result<Self> {
         Ok(Self {
             geometry: Geometry::new(gpu, workgroup)?,
+            kinship: PerThread::new(gpu, &Effects::default(), workgroup)?,
             join: PerThread::new(gpu, &Effects::default(), workgroup)?,
-            importance: Buffer::new(gpu, "importance", pixels as usize, Location::Device)?,
+            words: Buffer::new(gpu, "kinship", pixels as usize, Location::Device)?,
         })
     }
 }
@@ -38,17 +42,21 @@ impl Both {
 impl Policy for Both {
     fn prepare(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
         if push.filtered > 0.0 {
-            self.geometry.record(rec, &Inputs { priority: &self.importance, ..*b }, push)?;
+            self.geometry.record(rec, b, push)?;
         }
-        Ok(())
+        let bind = kinship::Bind { guides: b.guide, importances: b.priority, kinships: &self.words };
+        self.kinship.record(rec, bind, push, push.size[0] * push.size[1])
     }
 
     fn record(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
-        let bind = Bind { guides: b.guide, stats: b.stats, importances: &self.importance, priority: b.priority };
+        let bind = both::Bind { stats: b.stats, kinships: &self.words, priority: b.priority };
         self.join.record(rec, bind, push, push.size[0] * push.size[1])
     }
 }
 
+/// In this many steps, as the kernels pack it.
+const SEVENTHS: f32 = 7.0;
+const GATHERED_UNIT: f32 = 31.0;
 /// Of pixels that look nothing alike.
 const LEAST_KINSHIP: f32 = 0.2;
 
@@ -57,18 +65,38 @@ fn kinship(a: &Guide, b: &Guide, push: &PriorityPush) -> f32 {
     let apart = |of: fn(&Guide) -> vec3| squared_distance(of(a), of(b));
     let x = apart(|g| g.normal) * push.normal_scale + apart(|g| g.albedo) * 25.0;
     let alike = (a.material == NONE) == (b.material == NONE);
-    if alike { exp_negative(x).max(LEAST_KINSHIP) } else { LEAST_KINSHIP }
+    let sevenths = if alike { (exp_negative(x) * SEVENTHS + 0.5).floor() } else { 0.0 };
+    (sevenths / SEVENTHS).max(LEAST_KINSHIP)
+}
+
+/// What pixels around one say of its noise, as [`moments`] does; each by its kinship.
+fn surroundings(inputs: &HostInputs, pixel: usize) -> [f32; 4] {
+    let HostInputs { guide, stats, push, .. } = inputs;
+    let mut around = [0.0; 4];
+    let (mut offsets, mut kin_of_all) = (Vec3::ZERO, 0.0);
+    let (mut squares, mut weights, mut freedom) = (0.0, 0.0, 0.0);
+    for j in square(push, pixel).filter(|&j| stats[j].count > 0) {
+        let (kin, m) = (kinship(&guide[pixel], &guide[j], push), moments(&stats[j]));
+        let offset = Vec3::from(stats[j].mean) - Vec3::from(stats[pixel].mean);
+        around = std::array::from_fn(|k| around[k] + kin * m[k]);
+        offsets += kin * offset;
+        kin_of_all += kin;
+        squares += kin * offset.length_squared();
+        weights += kin * kin;
+        freedom += kin / m[3];
+    }
+    if kin_of_all > 0.0 {
+        around[0] += (squares - offsets.length_squared() / kin_of_all).max(0.0) / 3.0;
+        around[1] += freedom * (1.0 - weights / (kin_of_all * kin_of_all));
+    }
+    around
 }
 
 fn reference(inputs: &HostInputs) -> Vec<f32> {
-    let HostInputs { guide, stats, push, .. } = inputs;
+    let HostInputs { stats, push, .. } = inputs;
     let of = |(i, q): (usize, f32)| {
-        let mut around = [0.0; 4];
-        for j in square(push, i) {
-            let (kin, m) = (kinship(&guide[i], &guide[j], push), moments(&stats[j]));
-            around = std::array::from_fn(|k| around[k] + kin * m[k]);
-        }
-        noise(push, moments(&stats[i]), around) * (1.0 - push.filtered * (1.0 - q)).max(0.0).sqrt()
+        let gathered = ((1.0 - q) * GATHERED_UNIT + 0.5).floor() / GATHERED_UNIT;
+        noise(push, moments(&stats[i]), surroundings(inputs, i)) * (1.0 - push.filtered * gathered).max(0.0).sqrt()
     };
     geometry::reference(inputs).into_iter().enumerate().map(of).collect()
 }
@@ -78,21 +106,38 @@ mod tests {
     use super::*;
     use crate::gpu::layout::PixelStats;
 
+    /// Two pixels in one row, of one albedo or not.
+    fn pair(stats: [PixelStats; 2], albedo: f32) -> [f32; 2] {
+        let push = PriorityPush { size: [2, 1], window: 2, luminance_floor: 0.0, limit: 99, ..PriorityPush::default() };
+        let guide = [0.0, albedo].map(|albedo| Guide { albedo: [albedo; 3], ..Guide::default() });
+        reference(&HostInputs { guide: &guide, stats: &stats, priority: &[], push }).try_into().unwrap()
+    }
+
+    fn assert_close(found: [f32; 2], expected: [f32; 2]) {
+        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6), "{found:?} {expected:?}");
+    }
+
+    fn pixel(mean: f32, count: u32, m2: f32) -> PixelStats {
+        PixelStats { mean: [mean; 3], count, m2: [m2; 3], rays: 0 }
+    }
+
     #[test]
     fn noise_is_that_of_neighbours_that_look_alike() {
-        // Two pixels of 2 samples, m2 = 8 and 0, in one row: of the 3 columns around a pixel the one beyond the film holds the
-        // pixel itself, so that it counts 2 and the other 1. Every pixel has one degree of freedom; the mean variance
-        // around, 16/3 and 8/3, is worth 32 samples beside the pixel's own. Of other albedo, the other pixel counts a
-        // fifth: 16 / 2.2 and 1.6 / 2.2.
-        let stats = [8.0, 0.0].map(|m2| PixelStats { mean: [1.0; 3], count: 2, m2: [m2; 3], rays: 0 });
-        let push = PriorityPush { size: [2, 1], window: 2, luminance_floor: 0.0, limit: 99, ..PriorityPush::default() };
-        let of = |albedo| {
-            let guide = [0.0, albedo].map(|albedo| Guide { albedo: [albedo; 3], ..Guide::default() });
-            reference(&HostInputs { guide: &guide, stats: &stats, priority: &[], push })
-        };
-        let close = |found: Vec<f32>, expected: [f32; 2]| found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6);
+        // Of 2 samples each, m2 = 8 and 0, the same mean: one degree of freedom each, and half of one, as each mean counts half
+        // and one of both says nothing. The variance around, 8 / 2.5, is worth 32 samples beside the pixel's own.
+        let stats = [pixel(1.0, 2, 8.0), pixel(1.0, 2, 0.0)];
         let expected = |own: f32, around: f32| ((own + 32.0 * around) / 33.0).sqrt();
-        assert!(close(of(0.0), [expected(8.0, 16.0 / 3.0), expected(0.0, 8.0 / 3.0)]), "{:?}", of(0.0));
-        assert!(close(of(9.0), [expected(8.0, 16.0 / 2.2), expected(0.0, 1.6 / 2.2)]), "{:?}", of(9.0));
+        assert_close(pair(stats, 0.0), [expected(8.0, 8.0 / 2.5), expected(0.0, 8.0 / 2.5)]);
+        // Of other albedo, the other pixel counts a fifth: of the means' freedom 1.2 / 2 * (1 - 1.04 / 1.44) = 1/6 is left.
+        let freedom = 1.2 + 1.0 / 6.0;
+        assert_close(pair(stats, 9.0), [expected(8.0, 8.0 / freedom), expected(0.0, 1.6 / freedom)]);
+    }
+
+    #[test]
+    fn after_one_sample_each_the_means_tell_of_noise() {
+        // Samples 1 and 3: m2 about their mean is 2, of one degree of freedom; the luminance around is 2. Nothing else is
+        // known: 32 * 2 / 32.
+        assert_close(pair([pixel(1.0, 1, 0.0), pixel(3.0, 1, 0.0)], 0.0), [2.0_f32.sqrt() / 2.0; 2]);
+        assert_eq!(pair([pixel(1.0, 1, 0.0), PixelStats::default()], 0.0), [1.0; 2], "one sample alone says nothing");
     }
 }

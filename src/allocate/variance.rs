@@ -36,12 +36,12 @@ pub(super) fn moments(s: &PixelStats) -> [f32; 4] {
     [(s.m2[0] + s.m2[1] + s.m2[2]) / 3.0, n - 1.0, luminance * n, n]
 }
 
-/// The 3 x 3 pixels around one, those beyond the border replaced by the nearest of the film, row by row.
+/// Of the 3 x 3 pixels around one, those on the film, row by row.
 pub(super) fn square(push: &PriorityPush, pixel: usize) -> impl Iterator<Item = usize> {
-    let [width, height] = push.size.map(|n| n as i32);
-    let [x, y] = [pixel as i32 % width, pixel as i32 / width];
-    let row = move |dy: i32| (y + dy).clamp(0, height - 1) * width;
-    (-1..=1).flat_map(move |dy| (-1..=1).map(move |dx| (row(dy) + (x + dx).clamp(0, width - 1)) as usize))
+    let [width, height] = push.size.map(|n| n as usize);
+    let [x, y] = [pixel % width, pixel / width];
+    let beside = |at: usize, end: usize| at.saturating_sub(1)..=(at + 1).min(end - 1);
+    beside(y, height).flat_map(move |y| beside(x, width).map(move |x| y * width + x))
 }
 
 /// Twin of the function in `glsl/shared/noise.glsl`.

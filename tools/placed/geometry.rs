@@ -119,13 +119,17 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
             let rendered = render(gpu, &scene)?;
             Ok(Image { light: indirect(&rendered.pixels), guide: rendered.guide })
         };
-        let images = SEEDS.map(|seed| [image("uniform", seed), image("geometry", seed)]);
-        let images = images.into_iter().map(|[a, b]| Ok([a?, b?])).collect::<anyhow::Result<Vec<_>>>()?;
-        let surface = images[0][0].guide.iter().map(|g| g.depth > 0.0).collect();
+        let of_policy = |policy| SEEDS.iter().map(|&seed| image(policy, seed)).collect::<anyhow::Result<Vec<_>>>();
+        let uniform = of_policy("uniform")?;
+        let surface = uniform[0].guide.iter().map(|g| g.depth > 0.0).collect();
         let truth = Truth { halves, surface };
-        for (kind, normals) in [("importance's", &[SIGMA_NORMAL][..]), ("searched", &[0.1, 0.2, 0.3, 0.5])] {
-            let settings = best(gpu, &images[0][0], &truth, view.size, normals)?;
-            rows.push(row(gpu, case, &truth, &images, kind, &settings)?);
+        for policy in ["geometry", "both"] {
+            let placed = of_policy(policy)?;
+            for (kind, normals) in [("importance's", &[SIGMA_NORMAL][..]), ("searched", &[0.1, 0.2, 0.3, 0.5])] {
+                let settings = best(gpu, &uniform[0], &truth, view.size, normals)?;
+                let compared = Compared { uniform: &uniform, placed: &placed, truth: &truth };
+                rows.push(row(gpu, case, &compared, [policy, kind], &settings)?);
+            }
         }
     }
     println!(
@@ -135,32 +139,40 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
         "and by geometry (window 4, sigmas {SIGMA_NORMAL} and {SIGMA_POSITION}); À-Trous has the settings that are"
     );
     println!("best for uniform samples, its sigma of normals that of importance or searched for as well.\n");
-    let header = ["scene", "sigma_n", "unfiltered", "filtered", "ratio", "published", "outliers ratio", "À-Trous"];
+    let header =
+        ["scene", "policy", "sigma_n", "unfiltered", "filtered", "ratio", "published", "outliers ratio", "À-Trous"];
     println!("{}", table::text(&header, &rows));
     Ok(())
+}
+
+/// Images of all seeds.
+struct Compared<'a> {
+    uniform: &'a [Image],
+    placed: &'a [Image],
+    truth: &'a Truth,
 }
 
 fn row(
     gpu: &Gpu,
     Case { view, published, .. }: &Case,
-    truth: &Truth,
-    images: &[[Image; 2]],
-    kind: &str,
+    Compared { uniform, placed, truth }: &Compared,
+    [policy, kind]: [&str; 2],
     s: &FilterSettings,
 ) -> anyhow::Result<Vec<String>> {
     let (mut plain, mut after, mut outside) = ([0.0; 2], [0.0; 2], [0; 2]);
-    for pair in images {
+    for pair in uniform.iter().zip(*placed).map(|(a, b)| [a, b]) {
         let errors = |image: &Image| Ok(truth.errors(&filtered(gpu, image, view.size, s)?));
-        let errors = pair.iter().map(errors).collect::<anyhow::Result<Vec<_>>>()?;
+        let errors = pair.into_iter().map(errors).collect::<anyhow::Result<Vec<_>>>()?;
         for i in 0..2 {
-            plain[i] += mean(&truth.errors(&pair[i].light)) / images.len() as f64;
-            after[i] += mean(&errors[i]) / images.len() as f64;
+            plain[i] += mean(&truth.errors(&pair[i].light)) / SEEDS.len() as f64;
+            after[i] += mean(&errors[i]) / SEEDS.len() as f64;
             outside[i] += outliers(&errors[i], &errors[0]);
         }
     }
     let ratio = |a: f64, b: f64| format!("{:.2}", a / b);
     Ok(vec![
         format!("{} {}x{}", view.name, view.size[0], view.size[1]),
+        policy.to_owned(),
         kind.to_owned(),
         format!("{:.0} {:.0}", plain[0], plain[1]),
         format!("{:.1} {:.1}", after[0], after[1]),

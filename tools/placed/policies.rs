@@ -5,7 +5,8 @@ use tallow::allocate::{POLICIES, Placing};
 use tallow::gpu::Gpu;
 use tallow::report::table;
 
-const SPP: u32 = 32;
+/// Samples per pixel, and the least of a pixel.
+const BUDGETS: [[u32; 2]; 2] = [[8, 1], [32, 4]];
 const SEEDS: [u32; 3] = [0, 2, 3];
 /// Each seed six times: the shortest time counts.
 const RUNS: usize = 18;
@@ -23,43 +24,45 @@ const VIEWS: [View; 5] = [
     },
 ];
 
-/// Prints the table. Error falls as 1 / samples, so that at equal time it is the error times the time, over that of the
+/// Prints the tables. Error falls as 1 / samples, so that at equal time it is the error times the time, over that of the
 /// uniform render.
 pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
-    let mut rows = Vec::new();
-    for view in &VIEWS {
-        let reference = &view.reference(gpu, args, |_| {})?[0];
-        let rows_of = POLICIES.iter().filter(|row| row.placing != Placing::Chosen);
-        let mut found: Vec<_> = rows_of.map(|policy| (policy.name, 0.0, f64::INFINITY)).collect();
-        for seed in SEEDS.iter().cycle().take(RUNS) {
-            // In turn, so that what else the machine does meets all alike.
-            for (policy, error, ms) in &mut found {
-                let scene = view.load(args, |s| {
-                    (s.spp, s.seed, s.allocate.policy, s.allocate.min_spp) = (SPP, *seed, (*policy).into(), 4);
-                    s.allocate.filtered = 0.0;
-                })?;
-                let rendered = render(gpu, &scene)?;
-                *error += mean(&relative_errors(&radiance(&rendered.pixels), reference)) / RUNS as f64;
-                *ms = ms.min(rendered.ms);
-            }
+    println!("relMSE (eps 0.01), mean of {} seeds; `both` expects no filter\n", SEEDS.len());
+    for [spp, least] in BUDGETS {
+        let mut rows = Vec::new();
+        for view in &VIEWS {
+            rows.extend(of_view(gpu, args, view, [spp, least])?);
         }
-        let (_, base, base_ms) = found[0];
-        for (name, error, ms) in found {
-            rows.push(vec![
-                view.name.to_owned(),
-                name.to_owned(),
-                format!("{error:.2e}"),
-                format!("{ms:.0}"),
-                format!("{:.2}", error / base),
-                format!("{:.2}", error * ms / (base * base_ms)),
-            ]);
+        println!("{spp} samples per pixel, least {least}\n");
+        let header = ["scene", "policy", "relMSE", "ms", "of uniform, equal samples", "equal time"];
+        println!("{}", table::text(&header, &rows));
+    }
+    Ok(())
+}
+
+/// Of one scene, a row for every policy.
+fn of_view(gpu: &Gpu, args: &Args, view: &View, [spp, least]: [u32; 2]) -> anyhow::Result<Vec<Vec<String>>> {
+    let reference = &view.reference(gpu, args, |_| {})?[0];
+    let rows_of = POLICIES.iter().filter(|row| row.placing != Placing::Chosen);
+    let mut found: Vec<_> = rows_of.map(|policy| (policy.name, 0.0, f64::INFINITY)).collect();
+    for seed in SEEDS.iter().cycle().take(RUNS) {
+        // In turn, so that what else the machine does meets all alike.
+        for (policy, error, ms) in &mut found {
+            let scene = view.load(args, |s| {
+                (s.spp, s.seed, s.allocate.policy, s.allocate.min_spp) = (spp, *seed, (*policy).into(), least);
+                s.allocate.filtered = 0.0;
+            })?;
+            let rendered = render(gpu, &scene)?;
+            *error += mean(&relative_errors(&radiance(&rendered.pixels), reference)) / RUNS as f64;
+            *ms = ms.min(rendered.ms);
         }
     }
-    println!(
-        "relMSE (eps 0.01), {SPP} samples per pixel, least 4, mean of {} seeds; `both` expects no filter\n",
-        SEEDS.len()
-    );
-    let header = ["scene", "policy", "relMSE", "ms", "of uniform, equal samples", "equal time"];
-    println!("{}", table::text(&header, &rows));
-    Ok(())
+    let (_, base, base_ms) = found[0];
+    let row = |(name, error, ms): (&str, f64, f64)| {
+        let of_uniform = [error / base, error * ms / (base * base_ms)].map(|ratio| format!("{ratio:.2}"));
+        [view.name.to_owned(), name.to_owned(), format!("{error:.2e}"), format!("{ms:.0}")]
+            .into_iter()
+            .chain(of_uniform)
+    };
+    Ok(found.into_iter().map(|f| row(f).collect()).collect())
 }
