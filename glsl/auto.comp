@@ -25,8 +25,8 @@ void main() {
     vec4 usable = vec4(greaterThan(vec4(c.w, a.w, b.w, d.w), vec4(0.0))); // 0: a filter could not in-paint it
     vec4 e = mix(vec4(WORST), texelFetch(errors, at), usable);
     float least = min(min(e.x, e.y), min(e.z, e.w));
-    // Differences below a fortieth, the noise included, cannot be told from none.
-    float slack = 0.025 * least + 1e-6;
+    // Differences below a thirtieth, the noise included, cannot be told from none.
+    float slack = 0.035 * least + 1e-6;
     vec4 w = slack / (e - least + slack);
     w *= usable * w * w;
     vec3 base = c.w > 0.0 ? c.rgb : a.rgb; // differences from it: a constant comes back exactly

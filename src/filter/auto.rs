@@ -31,25 +31,26 @@ const LIMIT: f32 = 1e9;
 /// Stands for an error that no candidate may be chosen with.
 const WORST: f32 = 1e24;
 
-/// The filters beside none, found by searching six noisy images of three scenes and two of the Cornell box for what leaves
-/// `auto` nearest to the best filter of each. At their defaults: windows of 33 and of 13 pixels, both held more tightly than
-/// alone, depth above all; and 4 levels of `svgf`, which positions hold more tightly and normals hardly.
+/// The filters beside none, found by searching six noisy images of three scenes and three of the Cornell box for what leaves
+/// `auto` nearest to the best filter of each. At their defaults: windows of 33 and of 9 pixels, both held more tightly than
+/// alone, depth above all; and 3 levels of `svgf`, which light and positions hold more tightly and normals hardly.
 fn candidates(s: &FilterSettings) -> [(Row, FilterSettings); 3] {
-    let windows = |radius: u32, normals: f32, depth: f32| {
+    let windows = |radius: u32, depth: f32| {
         let [x, y, z, w] = s.eps;
-        FilterSettings { radius, eps: [normals * x, normals * y, normals * z, depth * w], ..*s }
+        FilterSettings { radius, eps: [0.1 * x, 0.1 * y, 0.1 * z, depth * w], ..*s }
     };
-    let near = FilterSettings { levels: s.levels.min(4), sigma_n: 4.0 * s.sigma_n, sigma_x: 0.6 * s.sigma_x, ..*s };
+    let (sigma_l, sigma_n, sigma_x) = (0.75 * s.sigma_l, 4.0 * s.sigma_n, 0.6 * s.sigma_x);
     [
-        (guided::ROW, windows((2 * s.radius).div_ceil(3), 0.1, 0.005)),
-        (guided::ROW, windows(s.radius.div_ceil(4), 0.03, 0.0005)),
-        (svgf::ROW, near),
+        (guided::ROW, windows((2 * s.radius).div_ceil(3), 5e-3)),
+        // Fewer than 5 x 5 pixels do not determine a model of four channels: little of a pixel is left to judge it by.
+        (guided::ROW, windows(s.radius.div_ceil(6).max(2), 1.5e-4)),
+        (svgf::ROW, FilterSettings { levels: s.levels.min(3), sigma_l, sigma_n, sigma_x, ..*s }),
     ]
 }
 
 /// What counts as one surface to the estimates of errors.
 fn alike(s: &FilterSettings) -> FilterSettings {
-    FilterSettings { sigma_n: 2.0 * s.sigma_n, sigma_x: 1.2 * s.sigma_x, ..*s }
+    FilterSettings { sigma_n: 2.5 * s.sigma_n, sigma_x: 1.2 * s.sigma_x, ..*s }
 }
 
 /// A filter, and what it makes of the image and of the probed image.
@@ -213,7 +214,7 @@ fn blend(p: &Packed, errors: Vec4, filtered: [Vec4; 3]) -> vec4 {
     let [a, b, d] = filtered;
     let usable = Vec4::new(p.count, a.w, b.w, d.w).cmpgt(Vec4::ZERO);
     let e = Vec4::select(usable, errors, Vec4::splat(WORST));
-    let slack = 0.025 * e.min_element() + 1e-6;
+    let slack = 0.035 * e.min_element() + 1e-6;
     let w = slack / (e - e.min_element() + slack);
     let w = Vec4::select(usable, w * w * w, Vec4::ZERO);
     let base = if p.count > 0.0 { p.colour } else { a.xyz() };
