@@ -123,21 +123,20 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
         let uniform = of_policy("uniform")?;
         let surface = uniform[0].guide.iter().map(|g| g.depth > 0.0).collect();
         let truth = Truth { halves, surface };
+        let kinds = [("importance's", &[SIGMA_NORMAL][..]), ("searched", &[0.1, 0.2, 0.3, 0.5])];
+        let search = |(kind, normals)| Ok((kind, best(gpu, &uniform[0], &truth, view.size, normals)?));
+        let filters = kinds.into_iter().map(search).collect::<anyhow::Result<Vec<_>>>()?;
         for policy in ["geometry", "both"] {
-            let placed = of_policy(policy)?;
-            for (kind, normals) in [("importance's", &[SIGMA_NORMAL][..]), ("searched", &[0.1, 0.2, 0.3, 0.5])] {
-                let settings = best(gpu, &uniform[0], &truth, view.size, normals)?;
-                let compared = Compared { uniform: &uniform, placed: &placed, truth: &truth };
-                rows.push(row(gpu, case, &compared, [policy, kind], &settings)?);
+            let compared = Compared { uniform: &uniform, placed: &of_policy(policy)?, truth: &truth };
+            for (kind, settings) in &filters {
+                rows.push(row(gpu, case, &compared, [policy, kind], settings)?);
             }
         }
     }
     println!(
         "MSE of incident indirect light in 8-bit sRGB code values, {SPP} samples per pixel, mean of 3 seeds, uniform"
     );
-    println!(
-        "and by geometry (window 4, sigmas {SIGMA_NORMAL} and {SIGMA_POSITION}); À-Trous has the settings that are"
-    );
+    println!("and placed (window 4, sigmas {SIGMA_NORMAL} and {SIGMA_POSITION}); À-Trous has the settings that are");
     println!("best for uniform samples, its sigma of normals that of importance or searched for as well.\n");
     let header =
         ["scene", "policy", "sigma_n", "unfiltered", "filtered", "ratio", "published", "outliers ratio", "À-Trous"];
