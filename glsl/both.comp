@@ -9,7 +9,7 @@
 // deviation that is left is what needs samples. Where nothing is known of the noise yet, geometry alone decides.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
-layout(binding = 1) uniform usamplerBuffer kinships; // of uint
+layout(binding = 1) uniform usamplerBuffer words; // of float
 layout(scalar, binding = 2) writeonly buffer Priorities { float priority[]; };
 layout(scalar, push_constant) uniform Push { PriorityPush push; };
 
@@ -25,7 +25,7 @@ void main() {
     if (i >= push.size.x * push.size.y) return; // safe: no barrier() follows
     ivec2 size = ivec2(push.size), at = ivec2(i % push.size.x, i / push.size.x);
     ivec2 first = max(at - 1, ivec2(0)), last = min(at + 1, size - 1);
-    uint word = texelFetch(kinships, int(i)).x;
+    uint word = texelFetch(words, int(i)).x;
     vec3 own = mean_of(i);
     vec4 around = vec4(0.0), offsets = vec4(0.0);
     float squares = 0.0, weights = 0.0, freedom = 0.0;

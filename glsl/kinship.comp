@@ -5,11 +5,10 @@
 #include "shared/thread.glsl"
 
 // What the geometry alone says of a pixel, in one word: what a filter will gather around it, and how much the noise of each
-// of the eight neighbours says of its own.
+// of the eight neighbours says of its own. Where a filter will follow, the word comes in as the pixel's importance, a float.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform usamplerBuffer guides; // of Guide
-layout(binding = 1) uniform samplerBuffer importances; // of float, read only if a filter will follow
-layout(scalar, binding = 2) writeonly buffer Kinships { uint kinships[]; };
+layout(scalar, binding = 1) buffer Words { uint words[]; }; // of float
 layout(scalar, push_constant) uniform Push { PriorityPush push; };
 
 #include "shared/kinship.glsl"
@@ -40,7 +39,7 @@ void main() {
     uint i = thread_index();
     if (i >= push.size.x * push.size.y) return; // safe: no barrier() follows
     ivec2 size = ivec2(push.size), at = ivec2(i % push.size.x, i / push.size.x);
-    float gathered = push.filtered > 0.0 ? 1.0 - texelFetch(importances, int(i)).x : 0.0;
+    float gathered = push.filtered > 0.0 ? 1.0 - uintBitsToFloat(words[i]) : 0.0;
     precise float rounded = gathered * GATHERED_UNIT + 0.5;
     uint word = uint(rounded);
     Place here = place_at(i);
@@ -48,5 +47,5 @@ void main() {
         ivec2 q = clamp(at + ivec2(n % 3, n / 3) - 1, ivec2(0), size - 1);
         word |= kinship(here, place_at(uint(q.y * size.x + q.x))) << kinship_bit(n);
     }
-    kinships[i] = word;
+    words[i] = word;
 }

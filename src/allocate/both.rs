@@ -24,8 +24,8 @@ struct Both {
     geometry: Geometry,
     kinship: PerThread<kinship::Bind<'static>>,
     join: PerThread<both::Bind<'static>>,
-    /// What [`kinship`] and importance come to, a word a pixel.
-    words: Buffer<u32>,
+    /// Importance, then what it and [`kinship`] come to, a word a pixel: priorities of a render that goes on stay as they are.
+    words: Buffer<f32>,
 }
 
 impl Both {
@@ -42,14 +42,14 @@ impl Both {
 impl Policy for Both {
     fn prepare(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
         if push.filtered > 0.0 {
-            self.geometry.record(rec, b, push)?;
+            self.geometry.record(rec, &Inputs { priority: &self.words, ..*b }, push)?;
         }
-        let bind = kinship::Bind { guides: b.guide, importances: b.priority, kinships: &self.words };
+        let bind = kinship::Bind { guides: b.guide, words: &self.words };
         self.kinship.record(rec, bind, push, push.size[0] * push.size[1])
     }
 
     fn record(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
-        let bind = both::Bind { stats: b.stats, kinships: &self.words, priority: b.priority };
+        let bind = both::Bind { stats: b.stats, words: &self.words, priority: b.priority };
         self.join.record(rec, bind, push, push.size[0] * push.size[1])
     }
 }
