@@ -224,6 +224,23 @@ fn a_render_resumed_anywhere_has_the_bits_of_one_that_never_stopped() {
     assert_silent(&gpu);
 }
 
+/// What policies find once per camera is no priority yet: a file that is written before the first round would show it.
+#[test]
+fn a_start_leaves_priorities_as_they_are() {
+    let gpu = gpu();
+    let pixels = (SIZE[0] * SIZE[1]) as usize;
+    let (stats, light) = (vec![PixelStats::default(); pixels], vec![PixelLight::default(); pixels]);
+    let (priority, lacks) = (vec![7.0; pixels], vec![0; pixels]);
+    for policy in ["geometry", "variance", "both", "threshold"] {
+        let scene = scene(|s| s.allocate.policy = policy.into());
+        let (renderer, mut frame) = (Renderer::new(&gpu, &scene, split()).unwrap(), FrameResources::new(&gpu).unwrap());
+        renderer.resume(&mut frame, &stats, &light, &priority, &lacks).unwrap();
+        renderer.run(&mut frame, &Step::Start).unwrap();
+        assert_eq!(renderer.film().priority.read().unwrap(), priority, "{policy}");
+    }
+    assert_silent(&gpu);
+}
+
 #[test]
 fn disjoint_sample_ranges_join_to_one_render() {
     let gpu = gpu();

@@ -143,6 +143,10 @@ fn the_longest_lines_are_whole() {
             assert!(off < 1e-2, "{name} {width}x{height}: {off} apart with {settings:?}");
         }
     }
+    if gpu.info().kind == "CPU" {
+        let wider = run(&gpu, find("none").unwrap(), &Picture::new(60_001, 1).noisy().input, &narrow);
+        assert!(wider.unwrap_err().to_string().contains("60000 along an edge"));
+    }
     assert_silent(&gpu);
 }
 
