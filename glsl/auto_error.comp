@@ -4,35 +4,34 @@
 #include "layout.glsl"
 #include "shared/thread.glsl"
 #include "shared/luminance.glsl"
-#include "shared/probe.glsl"
-#include "shared/candidates.glsl"
 
-// What four candidates miss a pixel's luminance by when it is left out of their sums (cross-validation: Stone 1974,
-// Craven and Wahba 1979), squared, over the luminance: a filter that keeps a part h of a pixel misses it by
-// (filtered - pixel) / (1 - h), whose square is its error and the pixel's own noise. No filter would miss it by twice that.
+// What three filters miss a pixel's luminance by when it is left out of their sums (cross-validation: Stone 1974, Craven
+// and Wahba 1979): one of leverage h misses it by (filtered - pixel) / (1 - h). The mean square of that is its error and
+// the pixel's noise; of a blend, which misses by the blend of these, it follows from their products (stacking: Wolpert
+// 1992, Breiman 1996). No filter would miss by twice the noise.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer estimate; // of vec4
 layout(binding = 1) uniform samplerBuffer colour; // of vec4
 layout(binding = 2) uniform samplerBuffer filtered_1; // of vec4
-layout(binding = 3) uniform samplerBuffer probed_1; // of vec4
-layout(binding = 4) uniform samplerBuffer filtered_2; // of vec4
-layout(binding = 5) uniform samplerBuffer probed_2; // of vec4
-layout(binding = 6) uniform samplerBuffer filtered_3; // of vec4
-layout(binding = 7) uniform samplerBuffer probed_3; // of vec4
-layout(scalar, binding = 8) writeonly buffer Errors { vec4 errors[]; };
+layout(binding = 3) uniform samplerBuffer filtered_2; // of vec4
+layout(binding = 4) uniform samplerBuffer filtered_3; // of vec4
+layout(binding = 5) uniform samplerBuffer leverages; // of vec4
+layout(binding = 6) uniform samplerBuffer surroundings; // of vec4
+layout(scalar, binding = 7) writeonly buffer Squares { vec4 squares[]; };   // none, 1, 2, 3
+layout(scalar, binding = 8) writeonly buffer Products { vec4 products[]; }; // 1 2, 1 3, 2 3, -
 layout(scalar, push_constant) uniform Push { AutoPush push; };
 
 const float ENOUGH = 4.0; // samples whose own variance is trusted
-const float MOST = 0.9;   // of a pixel that a filter keeps: beyond it, too little is left to judge by
-const float LIMIT = 1e9;  // of luminance and its differences, so that their squares are finite
+const float MOST = 0.9;   // leverage: beyond it, too little is left to judge by
+// Of what the leverage of a pixel of one sample is above that of the pixels around it, which alone is not too noisy. Where a
+// pixel's is high, its noise often is: filters that keep much would seem good where noise is hundreds of times their error,
+// as it is with few samples.
+const float OWN = 0.7;
+const float LIMIT = 1e9;  // of luminance and its differences, so that their products are finite
+const float WORST = 1e24; // stands for an error that no filter may be chosen with
 
 float scaled(vec3 a, vec3 b) {
     return clamp(contrast(a, b) / push.floor, -LIMIT, LIMIT);
-}
-
-float missed(vec4 e, float added, vec3 filtered, vec3 probed) {
-    float kept = clamp(contrast(probed, filtered) / added, 0.0, MOST), off = scaled(filtered, e.rgb) / (1.0 - kept);
-    return off * off;
 }
 
 void main() {
@@ -41,12 +40,16 @@ void main() {
     int at = int(i);
     vec4 e = texelFetch(estimate, at);
     vec3 a = texelFetch(filtered_1, at).rgb, b = texelFetch(filtered_2, at).rgb, c = texelFetch(filtered_3, at).rgb;
-    float added = probe(i, a, push.floor), level = scaled((a + b + c) / 3.0, vec3(0.0));
+    vec3 own = texelFetch(leverages, at).xyz, around = texelFetch(surroundings, at).xyz;
+    float count = texelFetch(colour, at).w;
+    vec3 leverage = clamp(around + OWN / sqrt(max(count, 1.0)) * max(own - around, 0.0), 0.0, MOST);
+    vec3 missed = vec3(scaled(a, e.rgb), scaled(b, e.rgb), scaled(c, e.rgb)) / (1.0 - leverage);
     float deviation = min(sqrt(e.w) / push.floor, LIMIT);
-    vec4 missed = vec4(2.0 * deviation * deviation, missed(e, added, a, texelFetch(probed_1, at).rgb),
-        missed(e, added, b, texelFetch(probed_2, at).rgb), missed(e, added, c, texelFetch(probed_3, at).rgb));
-    vec4 relative = missed / sqrt(level * level + 1.0);
+    // Between errors relative to luminance (^1), which are what is seen, and equal trust in bright and dark pixels (^2).
+    float level = scaled((a + b + c) / 3.0, vec3(0.0)), root = sqrt(level * level + 1.0), weight = 1.0 / (root * sqrt(root));
+    vec4 square = weight * vec4(2.0 * deviation * deviation, missed * missed);
     // What few samples tell of their own variance follows their values: whoever relies on it seems better than it is.
-    if (texelFetch(colour, at).w < ENOUGH) relative.xw = vec2(WORST);
-    errors[i] = relative;
+    if (count < ENOUGH) square.xw = vec2(WORST);
+    squares[i] = square;
+    products[i] = vec4(weight * missed.xxy * missed.yzz, 0.0);
 }

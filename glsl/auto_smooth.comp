@@ -4,10 +4,10 @@
 #include "layout.glsl"
 #include "shared/edge.glsl"
 
-// One level of A-Trous smoothing of error estimates, among alike surfaces: cross-validation is right on average only.
-// Unknown pixels have no error to estimate; they take their neighbours'.
+// One level of A-Trous smoothing of estimates, among alike surfaces: they are right on average only.
+// Unknown pixels have nothing to estimate; they take their neighbours'.
 layout(local_size_x = 32) in;
-layout(binding = 0) uniform samplerBuffer errors; // of vec4
+layout(binding = 0) uniform samplerBuffer estimates; // of vec4
 layout(binding = 1) uniform samplerBuffer colour; // of vec4
 layout(binding = 2) uniform usamplerBuffer place; // of uvec4
 layout(scalar, binding = 3) writeonly buffer Output { vec4 smoothed[]; };
@@ -30,7 +30,7 @@ void main() {
             ivec2 tap = clamp(at + int(push.spacing) * ivec2(i, j), ivec2(0), size - 1); // borders repeat
             Pixel q = pixel_at(tap.y * size.x + tap.x);
             float w = B3[abs(i)] * B3[abs(j)] * edge_weight(q, edge_exponent(p, q, push.rates));
-            sum += w * texelFetch(errors, tap.y * size.x + tap.x);
+            sum += w * texelFetch(estimates, tap.y * size.x + tap.x);
             total += w;
         }
     }

@@ -17,6 +17,14 @@ impl View {
         self.once(args, spp, &self.file(args, spp), &["--seed", seed])
     }
 
+    /// The same with other samples than [`View::render`] takes.
+    ///
+    /// # Errors
+    /// As [`View::render`].
+    pub fn render_again(&self, args: &Args, spp: u32) -> anyhow::Result<Source> {
+        self.once(args, spp, &self.file(args, spp).with_extension("again.exr"), &["--seed", "3"])
+    }
+
     /// The same with all samples at the pixels' centres, and other samples than [`View::render`] takes.
     ///
     /// # Errors

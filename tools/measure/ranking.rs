@@ -32,7 +32,8 @@ const PUBLISHED: &[(&str, u32, [f64; 3])] = &[
 pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
     println!("GIF's ranking: mean squared error in 8-bit sRGB code values against 1024 samples per pixel.");
     println!("light: filtered indirect light with the reference's direct light and albedo, which the settings are");
-    println!("searched for; image: with the noisy image's own. Published: other scenes of the same kind.\n");
+    println!("searched for; image: with the noisy image's own; again: light of another seed at the same settings.");
+    println!("Published: other scenes of the same kind.\n");
     for view in VIEWS {
         for spp in [1, 4] {
             one(gpu, args, view, spp)?;
@@ -42,7 +43,9 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
 }
 
 fn one(gpu: &Gpu, args: &Args, view: &View, spp: u32) -> anyhow::Result<()> {
-    let case = Case::new(&view.render(args, spp)?, &view.render(args, view.reference)?, Demodulation::Light)?;
+    let reference = view.render(args, view.reference)?;
+    let case = Case::new(&view.render(args, spp)?, &reference, Demodulation::Light)?;
+    let again = Case::new(&view.render_again(args, spp)?, &reference, Demodulation::Light)?;
     let (mut rows, mut errors, mut sweeps) = (Vec::new(), Vec::new(), String::new());
     let mut tiles = vec![Tile::new("noisy", &case.noisy)];
     for row in FILTERS {
@@ -54,6 +57,7 @@ fn one(gpu: &Gpu, args: &Args, view: &View, spp: u32) -> anyhow::Result<()> {
             row.name.to_owned(),
             format!("{:.2}", best.error),
             format!("{:.2}", case.mse(&picture)),
+            format!("{:.2}", again.mse(&again.filtered_light(&again.run(gpu, row, &best.settings)?))),
             published(view.name, spp, row.name),
             best.text,
         ]);
@@ -62,7 +66,7 @@ fn one(gpu: &Gpu, args: &Args, view: &View, spp: u32) -> anyhow::Result<()> {
         }
     }
     println!("{}, {}x{}, {spp} samples per pixel", view.name, view.size[0], view.size[1]);
-    println!("{}", table::text(&["filter", "light", "image", "published", "best settings"], &rows));
+    println!("{}", table::text(&["filter", "light", "image", "again", "published", "best settings"], &rows));
     print!("{}", ratios(view.name, spp, &errors));
     let file = |suffix| args.output.join(format!("{}-{spp}spp-{suffix}", view.name));
     std::fs::write(file("sweep.txt"), sweeps)?;
