@@ -16,6 +16,8 @@ layout(scalar, push_constant) uniform Push { PriorityPush push; };
 #include "shared/kinship.glsl"
 #include "shared/noise.glsl"
 
+const float LEAST_LEFT = 0.01; // of two pixels at least .27
+
 vec3 mean_of(uint pixel) {
     return uintBitsToFloat(texelFetch(stats, int(2u * pixel)).rgb);
 }
@@ -45,9 +47,11 @@ void main() {
     }
     // Pixels that look alike should be equally bright: how far their means are apart is noise as well, and all that shows it
     // after one sample a pixel. Of n samples it counts 1/n, since the more there are, the more of it is no noise.
-    if (offsets.w > 0.0) {
+    // The share of it that is left when the mean is taken off: 0 of one pixel, but for what division rounds.
+    float left = 1.0 - weights / (offsets.w * offsets.w);
+    if (offsets.w > 0.0 && left > LEAST_LEFT) {
         around.x += max(squares - dot(offsets.rgb, offsets.rgb) / offsets.w, 0.0) / 3.0;
-        around.y += freedom * (1.0 - weights / (offsets.w * offsets.w));
+        around.y += freedom * left;
     }
     priority[i] = noise(moments(i), around) * sqrt(max(1.0 - push.filtered * gathered_of(word), 0.0));
 }

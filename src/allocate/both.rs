@@ -59,6 +59,8 @@ const SEVENTHS: f32 = 7.0;
 const GATHERED_UNIT: f32 = 31.0;
 /// Of pixels that look nothing alike.
 const LEAST_KINSHIP: f32 = 0.2;
+/// What the mean leaves of a pixel's own deviation: 0 of one alone, but for rounding, and of two at least .27.
+const LEAST_LEFT: f32 = 0.01;
 
 /// How much a neighbour's noise says of a pixel's, 0 to 1.
 fn kinship(a: &Guide, b: &Guide, push: &PriorityPush) -> f32 {
@@ -85,9 +87,10 @@ fn surroundings(inputs: &HostInputs, pixel: usize) -> [f32; 4] {
         weights += kin * kin;
         freedom += kin / m[3];
     }
-    if kin_of_all > 0.0 {
+    let left = 1.0 - weights / (kin_of_all * kin_of_all);
+    if kin_of_all > 0.0 && left > LEAST_LEFT {
         around[0] += (squares - offsets.length_squared() / kin_of_all).max(0.0) / 3.0;
-        around[1] += freedom * (1.0 - weights / (kin_of_all * kin_of_all));
+        around[1] += freedom * left;
     }
     around
 }

@@ -52,7 +52,7 @@ fn main() -> Result<()> {
         let row = |(name, ms): (&&str, &Vec<f64>)| {
             let mut later = ms[1..].to_vec(); // the first run compiles
             later.sort_by(f64::total_cmp);
-            vec![(*name).to_owned(), format!("{:.2}", later[later.len() / 2])]
+            vec![(*name).to_owned(), format!("{:.3}", later[later.len() / 2])]
         };
         println!(
             "\n{spp} samples per pixel\n{}",

@@ -140,9 +140,9 @@ impl Ours {
             passes
                 .iter()
                 .enumerate()
-                .for_each(|(i, name)| println!("  {name:24} {:8.2}", self.milliseconds(|j, _| i == j)));
+                .for_each(|(i, name)| println!("  {name:24} {:8.3}", self.milliseconds(|j, _| i == j)));
         } else {
-            kernels.iter().for_each(|name| println!("  {name:24} {:8.2}", self.milliseconds(|_, p| p.name == *name)));
+            kernels.iter().for_each(|name| println!("  {name:24} {:8.3}", self.milliseconds(|_, p| p.name == *name)));
         }
     }
 }
@@ -190,7 +190,7 @@ fn main() -> Result<()> {
     let first = ours[0].milliseconds(|_, _| true);
     for ours in &ours {
         let ms = ours.milliseconds(|_, _| true);
-        println!("{:26} {ms:8.2}, {:.3} of the first", ours.name, ms / first);
+        println!("{:26} {ms:8.3}, {:.3} of the first", ours.name, ms / first);
     }
     if !theirs.is_empty() {
         let theirs = median(theirs);

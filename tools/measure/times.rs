@@ -48,7 +48,7 @@ pub fn print(gpu: &Gpu) -> anyhow::Result<()> {
             let mut row = vec![weights.to_string()];
             for (levels, published) in LEVELS.into_iter().zip(published) {
                 let ms = milliseconds(gpu, atrous, &weighted(weights, levels), &input)?;
-                row.push(format!("{ms:.1} / {published:.1}"));
+                row.push(format!("{ms:.2} / {published:.1}"));
             }
             rows.push(row);
         }
@@ -68,7 +68,7 @@ fn gif(gpu: &Gpu) -> anyhow::Result<Vec<Vec<String>>> {
         let mut settings = FilterSettings::default();
         (line.set)(&mut settings);
         let ms = milliseconds(gpu, row, &settings, &input)?;
-        rows.push(vec![line.filter.into(), line.what.into(), format!("{ms:.1}"), format!("{:.0}", line.published)]);
+        rows.push(vec![line.filter.into(), line.what.into(), format!("{ms:.2}"), format!("{:.0}", line.published)]);
     }
     Ok(rows)
 }

@@ -55,7 +55,7 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
     let mut rows = Vec::new();
     for (window, published) in WINDOWS {
         let (importance, counts) = allocation(&renderer(window, 4)?)?;
-        let cells = [importance, counts, importance + counts, published].map(|ms| format!("{ms:.1}"));
+        let cells = [importance, counts, importance + counts, published].map(|ms| format!("{ms:.2}"));
         rows.push([vec![format!("{window} x {window}")], cells.to_vec()].concat());
     }
     println!("Importance and counts, Sponza {} x {} (GEO's table 1: GTX 285)\n", VIEW.size[0], VIEW.size[1]);
@@ -116,11 +116,11 @@ fn share(
     let uniform = super::render(gpu, &scene)?;
     let all = importance + counts + lists;
     println!(
-        "Placing 4 samples per pixel at depth {}: importance {importance:.1} + counts {counts:.1} + lists {lists:.1} =",
+        "Placing 4 samples per pixel at depth {}: importance {importance:.2} + counts {counts:.2} + lists {lists:.2} =",
         VIEW.depth
     );
     println!(
-        "{all:.1} ms, {:.2} % of the {:.0} ms that tracing them uniformly takes",
+        "{all:.2} ms, {:.2} % of the {:.0} ms that tracing them uniformly takes",
         100.0 * all / uniform.path_ms,
         uniform.path_ms
     );
