@@ -27,7 +27,7 @@ void main() {
     int at = int(i);
     vec4 c = texelFetch(colour, at);
     vec4 a = texelFetch(filtered_1, at), b = texelFetch(filtered_2, at), d = texelFetch(filtered_3, at);
-    vec4 usable = vec4(greaterThan(vec4(c.w, a.w, b.w, d.w), vec4(0.0))); // 0: a filter could not in-paint it
+    bvec4 usable = greaterThan(vec4(c.w, a.w, b.w, d.w), vec4(0.0)); // false: a filter could not in-paint it
     vec4 square = mix(vec4(WORST), texelFetch(squares, at), usable);
     vec3 product = texelFetch(products, at).xyz;
     // An independent copy of the pixel misses it by both copies' noise, and has the pixel's in common with what a filter misses.
@@ -45,8 +45,7 @@ void main() {
             [[unroll]] for (int k = j + 1; k < 4; k++) {
                 float bend = missed[j][j] + missed[k][k] - 2.0 * missed[j][k];
                 float gain = dot(missed[k], w) - dot(missed[j], w);
-                float moved = bend > 0.0 ? clamp(gain / bend, -w[j], w[k]) : 0.0;
-                moved *= usable[j] * usable[k];
+                float moved = bend > 0.0 && usable[j] && usable[k] ? clamp(gain / bend, -w[j], w[k]) : 0.0;
                 w[j] += moved;
                 w[k] -= moved;
             }
@@ -54,5 +53,5 @@ void main() {
     }
     vec3 base = c.w > 0.0 ? c.rgb : a.rgb; // differences from it: a constant comes back exactly
     vec3 off = w.y * (a.rgb - base) + w.z * (b.rgb - base) + w.w * (d.rgb - base);
-    filtered[i] = dot(usable, vec4(1.0)) > 0.0 ? vec4(base + off, c.w > 0.0 ? c.w : 1.0) : vec4(0.0);
+    filtered[i] = any(usable) ? vec4(base + off, c.w > 0.0 ? c.w : 1.0) : vec4(0.0);
 }
