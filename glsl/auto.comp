@@ -4,6 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "layout.glsl"
 #include "shared/thread.glsl"
+#include "shared/candidates.glsl"
 
 // The blend of the image and three filters whose mean square of what it misses a left-out pixel by is least, with weights
 // of at least 0. From the best one on, pairs trade weight until nothing is gained.
@@ -19,7 +20,6 @@ layout(scalar, push_constant) uniform Push { PackPush push; };
 
 const uint ROUNDS = 8u;     // of trades
 const float RIDGE = 0.01;   // of every square, added: weights that the estimates cannot tell apart become alike
-const float WORST = 1e24;   // stands for an error that no filter may be chosen with
 
 void main() {
     uint i = thread_index();

@@ -4,6 +4,7 @@
 #include "layout.glsl"
 #include "shared/thread.glsl"
 #include "shared/luminance.glsl"
+#include "shared/candidates.glsl"
 
 // What three filters miss a pixel's luminance by when it is left out of their sums (cross-validation: Stone 1974, Craven
 // and Wahba 1979): one of leverage h misses it by (filtered - pixel) / (1 - h). The mean square of that is its error and
@@ -27,8 +28,7 @@ const float MOST = 0.9;   // leverage: beyond it, too little is left to judge by
 // pixel's is high, its noise often is: filters that keep much would seem good where noise is hundreds of times their error,
 // as it is with few samples.
 const float OWN = 0.7;
-const float LIMIT = 1e9;  // of luminance and its differences, so that their products are finite
-const float WORST = 1e24; // stands for an error that no filter may be chosen with
+const float LIMIT = 1e9; // of luminance and its differences, so that their products are finite
 
 float scaled(vec3 a, vec3 b) {
     return clamp(contrast(a, b) / push.floor, -LIMIT, LIMIT);

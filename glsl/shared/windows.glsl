@@ -99,21 +99,18 @@ void walk_tile(int line, int tile, int end, int left, int at) {
     }
 }
 
-Part group_at(int line, int begin) {
-    Part part = Part(NO_SUM, point_at(line, begin));
-    for (int i = 0; i < TILE; i++) absorb_element(part.sum, part.point, line, begin + i);
-    return part;
-}
-
-// Windows around `first` to `end` - 1. The first groups are put where they belong: appended one by one, past groups that had
-// no value yet, an NVIDIA H100 (driver 580.159) made wrong sums of three and more.
+// Windows around `first` to `end` - 1.
 void walk(int line, int first, int end) {
     int left = first - WINDOW / 2;
-    int begin = left + TILE;
-    if (MANY) {
-        for (int g = 0; g < GROUPS; g++) group[g] = group_at(line, begin + g * TILE);
-    } else {
-        [[unroll]] for (int g = 0; g < GROUPS; g++) group[g] = group_at(line, begin + g * TILE);
+    // Groups are moved along before all have a value: without one, an NVIDIA H100 (driver 580.159) made wrong sums of three and more.
+    if (!MANY) {
+        [[unroll]] for (int g = 0; g < SLOTS; g++) group[g] = Part(NO_SUM, vec4(0.0));
+    }
+    for (int g = 0; g < GROUPS; g++) {
+        int begin = left + (g + 1) * TILE;
+        Part part = Part(NO_SUM, point_at(line, begin));
+        for (int i = 0; i < TILE; i++) absorb_element(part.sum, part.point, line, begin + i);
+        append(part, g);
     }
     for (int tile = first, at = 0; tile < end; tile += TILE, left += TILE) {
         if (MANY && at == 0) begin_turn(point_at(line, left + (GROUPS + 1) * TILE));

@@ -1,4 +1,4 @@
-//! What placing samples costs, pass by pass: medians of 99 runs over a film of random priorities, and the same for other
+//! What placing samples costs, pass by pass: medians of 9 runs over a film of random priorities, and the same for other
 //! budgets, on which it must not depend. `cargo run --release --example bench-allocate [width height]`
 use anyhow::Result;
 use std::collections::BTreeMap;
@@ -10,8 +10,7 @@ use tallow::stage::apportion::{Apportion, Counts};
 use tallow::stage::batch;
 use tallow::stage::scan::Scan;
 
-/// Enough for a GPU to raise its clocks: the medians are those of the later ones.
-const RUNS: usize = 99;
+const RUNS: usize = 9;
 
 fn main() -> Result<()> {
     let sizes: Vec<u32> = std::env::args().skip(1).map(|a| a.parse()).collect::<Result<_, _>>()?;
