@@ -42,6 +42,18 @@ fn write(folder: &TempDir, name: &str, film: &Film) {
     image::write(&folder.path().join(name), film, &WriteOptions::default()).unwrap();
 }
 
+/// Parts of so many pixels square with so many channels.
+fn write_parts(folder: &TempDir, name: &str, parts: [(usize, &str, &[&str]); 2]) {
+    use exr::prelude::*;
+    let part = |(size, name, channels): (usize, &str, &[&str])| {
+        let plane = |c: &&str| AnyChannel::new(*c, FlatSamples::F32(vec![0.5; size * size]));
+        let planes = AnyChannels::sort(channels.iter().map(plane).collect());
+        Layer::new((size, size), LayerAttributes::named(name), Encoding::FAST_LOSSLESS, planes)
+    };
+    let image = Image::from_layers(ImageAttributes::with_size((parts[0].0, parts[0].0)), parts.map(part).to_vec());
+    image.write().to_file(folder.path().join(name)).unwrap();
+}
+
 fn read(folder: &TempDir, name: &str) -> Film {
     image::read(&folder.path().join(name)).unwrap()
 }
@@ -97,6 +109,69 @@ fn direct_light_of_our_own_files_stays_as_it_is_and_other_layers_too() {
     foreign.metadata.clear();
     write(&folder, "noisy.exr", &foreign);
     assert!(error(&filter(&folder, &["--filter", "atrous"]), lit) > 0.2);
+}
+
+/// Direct light of 1.5 and 2.5 in 2x2 squares, before the albedo; a fifth of the pixels has no sample.
+#[test]
+fn pixels_without_samples_take_direct_light_from_the_others_which_keep_theirs() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut film = noisy(true);
+    let pixels = || (0..SIZE * SIZE).map(|i| (i % SIZE, i / SIZE));
+    let unsampled = |x: u32, y: u32| (x + 2 * y).is_multiple_of(5);
+    let direct = |x: u32, y: u32| checker(x, y) * (1.5 + ((x / 2 + y / 2) % 2) as f32);
+    let indirect = film.channel("indirect.R").unwrap().to_f32().into_owned();
+    for channel in film.channels.iter_mut().filter(|c| c.name.len() == 1 && c.name != "Z" || c.name.contains("direct")) {
+        let value = |(i, (x, y)): (usize, (u32, u32))| match channel.name.as_str() {
+            _ if unsampled(x, y) => 0.0,
+            name if name.starts_with("indirect") => indirect[i],
+            name if name.starts_with("direct") => direct(x, y),
+            _ => direct(x, y) + checker(x, y) * indirect[i],
+        };
+        channel.samples = Samples::F32(pixels().enumerate().map(value).collect());
+    }
+    film.add("samples", Samples::U32(pixels().map(|(x, y)| if unsampled(x, y) { 0 } else { 4 }).collect()));
+    write(&folder, "noisy.exr", &film);
+    let clean = filter(&folder, &["--filter", "atrous"]).channel("R").unwrap().to_f32().into_owned();
+    for (i, (x, y)) in pixels().enumerate() {
+        let lit = clean[i] / checker(x, y);
+        let [low, high] = match unsampled(x, y) {
+            true => [1.6 + 0.7, 2.4 + 1.3],
+            false => [direct(x, y) / checker(x, y) + 0.7, direct(x, y) / checker(x, y) + 1.3],
+        };
+        assert!((low..high).contains(&lit), "pixel {x} {y}: {lit}, not within {low} and {high}");
+    }
+    let text = stdout(&tallow(&folder, &["filter", "noisy.exr", "-o", "clean.exr"]));
+    assert!(text.contains("direct light of pixels without a sample"), "{text}");
+}
+
+#[test]
+fn layers_of_any_name_are_taken_when_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut film = noisy(false);
+    for channel in &mut film.channels {
+        channel.name = channel.name.replace("albedo.", "paint.").replace("N.", "bent.");
+    }
+    write(&folder, "noisy.exr", &film);
+    let found = error(&filter(&folder, &["--filter", "atrous", "--albedo", "paint", "--normal", "bent"]), checker);
+    let missed = error(&filter(&folder, &["--filter", "atrous"]), checker);
+    assert!(missed > 4.0 * found && found < 0.1, "{found}; not named: {missed}");
+}
+
+/// What a smooth surface shows is no light that falls on it: it comes back to the bit.
+#[test]
+fn mirrors_stay_sharp() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/mirror.toml");
+    let size = SIZE.to_string();
+    let words = ["render", scene, "-o", "noisy.exr", "--width", &size, "--height", &size, "--spp", "2", "--quiet"];
+    assert_eq!(tallow(&folder, &words).status.code(), Some(0));
+    let (noisy, clean) = (read(&folder, "noisy.exr"), filter(&folder, &["--filter", "atrous"]));
+    let [before, after] = [&noisy, &clean].map(|film| film.picture(None).unwrap().pixels);
+    // The front of the tall box, without its edges.
+    let front = |i: usize| (10..15).contains(&(i % 32)) && (16..24).contains(&(i / 32));
+    let changed = |i: &usize| before[*i] != after[*i];
+    assert_eq!((0..before.len()).filter(|&i| front(i)).find(changed), None);
+    assert!((0..before.len()).filter(changed).count() > 500, "control: walls are filtered");
 }
 
 #[test]
@@ -210,6 +285,8 @@ fn what_cannot_be_filtered_is_told_in_one_line() {
     guides.add_vec3("N", ["X", "Y", "Z"], &vec![[0.0; 3]; guides.pixels()]);
     write(&folder, "guides.exr", &guides);
     complains(&run(&["guides.exr", "-o", "a.exr"]), 3, &["guides.exr", "no colour", "N.X"]);
+    write_parts(&folder, "parts.exr", [(8, "rgba", &["R", "G", "B"]), (4, "albedo", &["R", "G", "B"])]);
+    complains(&run(&["parts.exr", "-o", "a.exr"]), 3, &["parts.exr", "albedo", "4x4", "8x8", "at one size"]);
     let whole = std::fs::read(folder.path().join("noisy.exr")).unwrap();
     std::fs::write(folder.path().join("cut.exr"), &whole[..whole.len() / 2]).unwrap();
     complains(&run(&["cut.exr", "-o", "a.exr"]), 3, &["cut.exr", "complete?"]);

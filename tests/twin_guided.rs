@@ -4,7 +4,7 @@ mod picture;
 mod support;
 
 use picture::{Picture, SIZES, apart, line, red};
-use support::{assert_silent, gpu};
+use support::{assert_silent, gpu, hash};
 use tallow::filter::{FilterInput, FilterSettings, GuidedSums, find, run};
 use tallow::gpu::Gpu;
 use tallow::gpu::layout::vec4;
@@ -40,7 +40,8 @@ fn guided_holds_in_single_precision() {
         ("flat", [5.0, 0.0, 0.0], 1.0),
         ("tilted", [5.0, 0.01, 0.02], 1.0),
         ("far away", [1e6, 0.25, 0.5], 1.0),
-        ("high dynamic range", [5.0, 0.01, 0.02], 1e6),
+        ("light of high dynamic range", [5.0, 0.01, 0.02], 1e6),
+        ("guide of high dynamic range", [0.0; 3], 1.0),
     ] {
         // The last two have more groups than are kept one by one, and lines of several of their turns.
         let (size, long, tall) = ((width, height), (600, 3), (3, 600));
@@ -51,6 +52,9 @@ fn guided_holds_in_single_precision() {
             for (i, (c, g)) in input.radiance.iter_mut().zip(&mut input.guide).enumerate() {
                 let (x, y) = (i as u32 % size.0, i as u32 / size.0);
                 g.depth = depth[0] + depth[1] * x as f32 + depth[2] * y as f32;
+                if name == "guide of high dynamic range" {
+                    g.depth = 10f32.powf(6.0 * hash(i as u32) as f32 / u32::MAX as f32);
+                }
                 if i % 97 == 0 {
                     *c = [bright, bright, bright, 1.0];
                 }
@@ -66,8 +70,12 @@ fn guided_holds_in_single_precision() {
     let mut input = Picture::new(width, height).noisy().input;
     input.guide.iter_mut().for_each(|g| g.normal = [g.normal[1], g.normal[1], 0.5]);
     let settings = FilterSettings { radius: 9, channels: 3, eps: [0.0; 4], ..base };
+    for radius in [1, 3, 9, 30, 60, 100] {
+        let settings = FilterSettings { radius, ..settings };
+        let off = apart(&run(&gpu, row, &input, &settings).unwrap().0, &(row.reference)(&input, &settings), 1e-3);
+        assert!(off < 1e-4, "rank 1, radius {radius}: {off}");
+    }
     let device = run(&gpu, row, &input, &settings).unwrap().0;
-    assert!(apart(&device, &(row.reference)(&input, &settings), 1e-3) < 1e-4);
     let other = FilterSettings { radius: 8, ..settings };
     assert!(apart(&device, &(row.reference)(&input, &other), 1e-3) > 1e-3, "control: another radius");
     // A channel that varies less than rounding counts as constant.

@@ -9,12 +9,12 @@ mod measure;
 mod scenes;
 mod view;
 
-use measure::{lookup, neural, ranking, textures, times};
+use measure::{breakdown, lookup, neural, ranking, textures, times};
 
 /// One table or set of pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Part {
-    /// Times beside those of EAW's table 2 and GIF's table 2.
+    /// Times beside those of EAW's tables 1 and 2 and GIF's table 2.
     Times,
     /// Errors on the bust, the dragon and Sibenik beside GIF's, and a sheet of pictures per scene.
     Ranking,
@@ -58,7 +58,10 @@ fn main() -> anyhow::Result<()> {
     let all = Part::value_variants().to_vec();
     for part in if args.parts.is_empty() { all } else { args.parts.clone() } {
         match part {
-            Part::Times => times::print(&gpu)?,
+            Part::Times => {
+                breakdown::print(&gpu, &args)?;
+                times::print(&gpu)?;
+            }
             Part::Ranking => ranking::print(&gpu, &args)?,
             Part::Neural => neural::print(&gpu, &args)?,
             Part::Textures => textures::print(&gpu, &args)?,

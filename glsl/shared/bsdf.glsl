@@ -208,16 +208,16 @@ bool bsdf_sample(Bsdf b, vec3 wo, float u_lobe, vec2 u, out BsdfSample s) {
     return true;
 }
 
-// Every lobe is a delta: no light sample can contribute, and a filter has nothing to blur.
-bool bsdf_is_delta(Bsdf b) {
-    bool interface_only = is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR) || is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC);
-    return interface_only && is_smooth(b);
-}
+// Nothing lies below it.
+bool is_interface(Bsdf b) { return is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR) || is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC); }
 
-// What indirect light is divided by before it is filtered.
+// Every lobe is a delta: no light sample can contribute, and a filter has nothing to blur.
+bool bsdf_is_delta(Bsdf b) { return is_interface(b) && is_smooth(b); }
+
+// What indirect light is divided by before it is filtered: 0 where all light counts as direct, so that none leaks in.
 vec3 bsdf_albedo(Bsdf b) {
-    bool interface_only = is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR) || is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC);
-    return interface_only ? b.specular : b.albedo;
+    if (!is_interface(b)) return b.albedo;
+    return is_smooth(b) ? vec3(0.0) : b.specular;
 }
 
 #endif

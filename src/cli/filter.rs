@@ -106,7 +106,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let start = Instant::now();
     let mut parts = composition::split(&aovs, demodulation(args));
     cut_fireflies(args, &gpu, &mut parts)?;
-    let (colour, times) = filtered(args, &gpu, &aovs, &parts)?;
+    let (colour, times) = filtered(args, &gpu, &aovs, &mut parts)?;
     let seconds = start.elapsed().as_secs_f64();
     let clean = replaced(args, &source, &aovs, &colour)?;
     fail_on_messages(&gpu)?;
@@ -144,9 +144,8 @@ fn cut_fireflies(args: &Args, gpu: &Gpu, parts: &mut Parts) -> Result<()> {
     Ok(())
 }
 
-fn filtered(args: &Args, gpu: &Gpu, aovs: &Aovs, parts: &Parts) -> Result<(Vec<[f32; 3]>, Vec<PassTime>)> {
-    let settings = args.overrides.settings(&parts.input);
-    let (light, times) = filter::run(gpu, args.filter, &parts.input, &settings)?;
+fn filtered(args: &Args, gpu: &Gpu, aovs: &Aovs, parts: &mut Parts) -> Result<(Vec<[f32; 3]>, Vec<PassTime>)> {
+    let (light, times) = parts.filter(gpu, args.filter, &|input| args.overrides.settings(input))?;
     Ok(match args.supersampling.look_up(gpu, &args.image, aovs, parts, &light)? {
         Some((indirect, more)) => (parts.join_reflected(&indirect), [times, more].concat()),
         None => (parts.join(&light), times),

@@ -178,9 +178,8 @@ pub fn run(args: &Args) -> Result<Exit> {
 /// With the filter's default settings, scaled to the image.
 fn denoise(gpu: &Gpu, row: &Row, film: &mut Film) -> Result<Vec<PassTime>> {
     let aovs = Aovs::find(film, &Names::new()).map_err(Error::Usage)?;
-    let parts = composition::split(&aovs, Demodulation::default());
-    let settings = FilterSettings::default().scaled_to(&parts.input);
-    let (light, times) = filter::run(gpu, row, &parts.input, &settings)?;
+    let mut parts = composition::split(&aovs, Demodulation::default());
+    let (light, times) = parts.filter(gpu, row, &|input| FilterSettings::default().scaled_to(input))?;
     layers::denoise(film, &parts.join(&light));
     Ok(times)
 }

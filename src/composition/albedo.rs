@@ -14,7 +14,7 @@ const OUTLIER: f32 = 2.0;
 pub(super) fn split(colour: &[vec3], albedo: &[vec3], width: usize) -> Light {
     let is_rim = |i: usize| is_rim(colour, albedo, width, i);
     let factor = |i: usize| match reflects(&albedo[i]) && !is_rim(i) {
-        true => albedo[i].map(|v| finite(v).max(SMALLEST_ALBEDO)),
+        true => divisor(&albedo[i]),
         false => [0.0; 3],
     };
     let factor: Vec<vec3> = (0..colour.len()).map(factor).collect();
@@ -24,11 +24,17 @@ pub(super) fn split(colour: &[vec3], albedo: &[vec3], width: usize) -> Light {
         filtered: colour.iter().zip(&factor).map(lit).collect(),
         sharp: colour.iter().zip(&factor).map(dark).collect(),
         factor,
+        unlit: None,
         note: "filtered: colour / albedo; what has no albedo, and its rim, stays as it is",
     }
 }
 
-fn reflects(albedo: &vec3) -> bool {
+/// What a pixel's colour is divided by.
+pub(super) fn divisor(albedo: &vec3) -> vec3 {
+    albedo.map(|v| finite(v).max(SMALLEST_ALBEDO))
+}
+
+pub(super) fn reflects(albedo: &vec3) -> bool {
     largest(albedo) > SMALLEST_ALBEDO
 }
 

@@ -19,6 +19,11 @@ pub struct FilterInput {
 }
 
 impl FilterInput {
+    /// Other light on the same surfaces.
+    pub fn with_radiance(&self, radiance: Vec<vec4>) -> Self {
+        Self { radiance, guide: self.guide.clone(), variance: None, ..*self }
+    }
+
     /// # Errors
     /// [`Error::Usage`] when the image is empty, or a plane has another number of pixels.
     pub fn validate(&self) -> Result<()> {

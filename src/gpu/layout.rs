@@ -300,7 +300,7 @@ gpu_structs! {
         position: vec3,
         /// Object index, or [`NONE`].
         object: uint,
-        /// Reflectance of the first hit that indirect light is divided by, linear Rec. 709.
+        /// Reflectance of the first hit that indirect light is divided by, linear Rec. 709; 0 for mirrors and clear glass.
         albedo: vec3,
         /// Index of the material, or [`NONE`].
         material: uint,

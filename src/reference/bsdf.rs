@@ -235,9 +235,13 @@ pub fn bsdf_is_delta(b: &Bsdf) -> bool {
     matches!(b.kind, BSDF_CONDUCTOR | BSDF_DIELECTRIC) && is_smooth(b)
 }
 
-/// What indirect light is divided by before it is filtered.
+/// What indirect light is divided by before it is filtered: 0 where all light counts as direct.
 pub fn bsdf_albedo(b: &Bsdf) -> Vec3 {
-    if matches!(b.kind, BSDF_CONDUCTOR | BSDF_DIELECTRIC) { b.specular } else { b.albedo }
+    match b.kind {
+        BSDF_CONDUCTOR | BSDF_DIELECTRIC if is_smooth(b) => Vec3::ZERO,
+        BSDF_CONDUCTOR | BSDF_DIELECTRIC => b.specular,
+        _ => b.albedo,
+    }
 }
 
 #[cfg(test)]

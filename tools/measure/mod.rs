@@ -1,4 +1,5 @@
 //! What `tools/filters` measures, a file per table.
+pub mod breakdown;
 mod case;
 mod frames;
 pub mod lookup;

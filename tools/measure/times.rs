@@ -37,9 +37,7 @@ const GIF: &[Line] = &[
 /// # Errors
 /// Those of the device.
 pub fn print(gpu: &Gpu) -> anyhow::Result<()> {
-    println!(
-        "EAW, table 2 (and the 5 levels with 3 weights at 512x512 of its table 1): milliseconds, ours / published"
-    );
+    println!("EAW, table 2: milliseconds, ours / published");
     let atrous = filter::find("atrous").expect("a row of the table");
     for (size, published) in EAW {
         let input = input(size);
