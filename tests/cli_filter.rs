@@ -120,7 +120,8 @@ fn pixels_without_samples_take_direct_light_from_the_others_which_keep_theirs() 
     let unsampled = |x: u32, y: u32| (x + 2 * y).is_multiple_of(5);
     let direct = |x: u32, y: u32| checker(x, y) * (1.5 + ((x / 2 + y / 2) % 2) as f32);
     let indirect = film.channel("indirect.R").unwrap().to_f32().into_owned();
-    for channel in film.channels.iter_mut().filter(|c| c.name.len() == 1 && c.name != "Z" || c.name.contains("direct")) {
+    for channel in film.channels.iter_mut().filter(|c| c.name.len() == 1 && c.name != "Z" || c.name.contains("direct"))
+    {
         let value = |(i, (x, y)): (usize, (u32, u32))| match channel.name.as_str() {
             _ if unsampled(x, y) => 0.0,
             name if name.starts_with("indirect") => indirect[i],

@@ -33,7 +33,9 @@ const fn view(name: &'static str, scene: &'static str) -> View {
 /// When a scene cannot be found, or the device fails.
 pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
     println!("EAW, table 1, 512x512, one path per pixel, one indirect bounce, À-Trous with 5 levels and 3 weights:");
-    println!("milliseconds of the device, means of {FRAMES} frames, ours / published for a scene of that kind; split and");
+    println!(
+        "milliseconds of the device, means of {FRAMES} frames, ours / published for a scene of that kind; split and"
+    );
     println!("join stand where the paper uploads\n");
     let mut rows = Vec::new();
     for (view, theirs, published, rate) in VIEWS {

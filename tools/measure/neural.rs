@@ -1,6 +1,7 @@
 //! The Cornell box against Open Image Denoise: the same image, albedo and normals, in one run.
-use super::case::{self, Case};
+use super::case::Case;
 use super::frames::View;
+use super::sheet::{self, Tile};
 use super::{sweep, times};
 use crate::Args;
 use anyhow::{Context, bail};
@@ -42,23 +43,29 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
 /// One noisy image through every filter.
 fn one(gpu: &Gpu, args: &Args, title: &str, noisy: &Path, cases: &[(&str, Case)]) -> anyhow::Result<()> {
     let truth = &cases[0].1.reference;
-    let mut rows = vec![line("unfiltered", &cases[0].1.noisy, truth, None, "")];
+    let unfiltered = &cases[0].1.noisy;
+    let mut rows = vec![line("unfiltered", unfiltered, truth, None, "")];
+    let mut tiles = vec![Tile::new("unfiltered", unfiltered)];
     for (kind, case) in cases {
         for row in FILTERS.iter().filter(|row| row.name != "none") {
             let relmse = |p: &Picture| metrics::relmse(p, truth);
             let best = sweep::best(row, case.start(), |s| Ok(relmse(&case.whole(&case.run(gpu, row, s)?))))?;
             let picture = case.whole(&case.run(gpu, row, &best.settings)?);
             let ms = times::milliseconds(gpu, row, &best.settings, &case.parts.input)?;
-            rows.push(line(&format!("{}, {kind}", row.name), &picture, truth, Some(ms), &best.text));
-            let stem = noisy.file_stem().unwrap_or_default().to_string_lossy();
-            case::write(&picture, &args.output.join(format!("{stem}-{}-{}.png", row.name, kind.replace(' ', "-"))))?;
+            let name = format!("{}, {kind}", row.name);
+            rows.push(line(&name, &picture, truth, Some(ms), &best.text));
+            tiles.push(Tile::new(&name, &picture));
         }
     }
     if let Some(peers) = &args.peers {
-        rows.extend(denoised(peers, &args.output, noisy, truth)?);
+        for (name, picture, ms) in denoised(peers, &args.output, noisy)? {
+            rows.push(line(&name, &picture, truth, Some(ms), "colour, albedo, normal"));
+            tiles.push(Tile::new(&name, &picture));
+        }
     }
     println!("{title}\n{}", table::text(&["filter", "relMSE", "SSIM", "FLIP", "ms", "best settings"], &rows));
-    Ok(())
+    let stem = noisy.file_stem().unwrap_or_default().to_string_lossy();
+    sheet::write(&args.output.join(format!("{stem}-sheet.png")), &tiles, truth)
 }
 
 fn line(name: &str, picture: &Picture, truth: &Picture, ms: Option<f64>, settings: &str) -> Vec<String> {
@@ -69,14 +76,13 @@ fn line(name: &str, picture: &Picture, truth: &Picture, ms: Option<f64>, setting
     [&[name.to_owned()], &figures[..], &[settings.to_owned()]].concat()
 }
 
-/// Runs the peer, which prints `QUALITY MILLISECONDS FILE` per line.
-fn denoised(peers: &Path, output: &Path, noisy: &Path, truth: &Picture) -> anyhow::Result<Vec<Vec<String>>> {
+/// Runs the peer, which prints `QUALITY MILLISECONDS FILE` per line: its name, picture and milliseconds.
+fn denoised(peers: &Path, output: &Path, noisy: &Path) -> anyhow::Result<Vec<(String, Picture, f64)>> {
     let text = python(peers, "oidn.py", &[noisy, output])?;
     let row = |line: &str| {
         let [quality, ms, file] = line.split_whitespace().collect::<Vec<_>>()[..] else { return Ok(None) };
         let picture = image::read(&PathBuf::from(file))?.picture(None).map_err(anyhow::Error::msg)?;
-        let name = format!("Open Image Denoise, {quality}");
-        Ok(Some(self::line(&name, &picture, truth, Some(ms.parse()?), "colour, albedo, normal")))
+        Ok(Some((format!("Open Image Denoise, {quality}"), picture, ms.parse()?)))
     };
     text.lines().filter_map(|line| row(line).transpose()).collect()
 }

@@ -1,4 +1,4 @@
-//! Errors of every filter on GIF's three kinds of scene, each at its best settings, beside the published ones.
+//! Errors of every filter at its best settings: on GIF's three kinds of scene beside the published ones, and on two more.
 use super::case::Case;
 use super::frames::View;
 use super::sheet::{self, Tile};
@@ -16,6 +16,8 @@ const VIEWS: &[View] = &[
     View { name: "bust-room", scene: "scenes/bust/room.toml", size: [180, 240], depth: DEPTH, reference: 1024 },
     View { name: "dragon", scene: "stanford-dragon", size: [256, 256], depth: DEPTH, reference: 1024 },
     View { name: "sibenik-lamps", scene: "sibenik-lamps", size: [192, 108], depth: DEPTH, reference: 1024 },
+    View { name: "sponza", scene: "crytek-sponza", size: [256, 144], depth: DEPTH, reference: 1024 },
+    View { name: "grass", scene: "scenes/grass/scene.toml", size: [224, 126], depth: DEPTH, reference: 1024 },
 ];
 
 /// Scene, samples per pixel, and the published errors of cross bilateral, À-Trous and guided.
@@ -33,7 +35,7 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
     println!("GIF's ranking: mean squared error in 8-bit sRGB code values against 1024 samples per pixel.");
     println!("light: filtered indirect light with the reference's direct light and albedo, which the settings are");
     println!("searched for; image: with the noisy image's own; again: light of another seed at the same settings.");
-    println!("Published: other scenes of the same kind.\n");
+    println!("Published: other scenes of the same kind, where there are any.\n");
     for view in VIEWS {
         for spp in [1, 4] {
             one(gpu, args, view, spp)?;

@@ -8,15 +8,15 @@ use tallow::image::difference::{heat_map, heat_map_to};
 const GAP: usize = 4;
 
 /// One column.
-pub struct Tile<'a> {
-    name: &'a str,
+pub struct Tile {
+    name: String,
     picture: Picture,
 }
 
-impl<'a> Tile<'a> {
+impl Tile {
     /// With the name that the legend has.
-    pub fn new(name: &'a str, picture: &Picture) -> Self {
-        Self { name, picture: picture.clone() }
+    pub fn new(name: &str, picture: &Picture) -> Self {
+        Self { name: name.to_owned(), picture: picture.clone() }
     }
 }
 
@@ -39,7 +39,7 @@ pub fn write(path: &Path, tiles: &[Tile], reference: &Picture) -> anyhow::Result
         paste(&mut sheet, map, [i * column, height + GAP]);
     }
     case::write(&sheet, path)?;
-    let names: Vec<_> = tiles.iter().map(|t| t.name).chain(["reference"]).collect();
+    let names: Vec<_> = tiles.iter().map(|t| t.name.as_str()).chain(["reference"]).collect();
     println!("{}: {}; error maps from black, 0, to {top:.4} and above\n", path.display(), names.join(", "));
     Ok(())
 }

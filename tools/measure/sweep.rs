@@ -1,45 +1,60 @@
 //! The best settings of a filter for one image, by search.
-use tallow::filter::{FilterSettings, Row, WaveletBasis};
+use tallow::filter::{AtrousForm, FilterSettings, Row, WaveletBasis};
 
-/// One setting and the values that are tried.
+/// One setting and the values that are tried: numbers, or places among the words of a choice.
 pub struct Knob {
     name: &'static str,
     values: &'static [f32],
     set: fn(&mut FilterSettings, f32),
+    words: &'static [&'static str],
+}
+
+impl Knob {
+    const fn numbers(name: &'static str, values: &'static [f32], set: fn(&mut FilterSettings, f32)) -> Self {
+        Self { name, values, set, words: &[] }
+    }
+
+    fn text(&self, value: f32) -> String {
+        self.words.get(value as usize).map_or(value.to_string(), |word| (*word).to_owned())
+    }
 }
 
 const OFF: f32 = f32::INFINITY;
 
-const LEVELS: Knob = Knob { name: "levels", values: &[2.0, 3.0, 4.0, 5.0, 6.0], set: |s, v| s.levels = v as u32 };
-const SIGMA_RT: Knob = Knob { name: "sigma_rt", values: &[0.03, 0.1, 0.3, 1.0, 3.0, OFF], set: |s, v| s.sigma_rt = v };
-const SIGMA_N: Knob = Knob { name: "sigma_n", values: &[0.1, 0.2, 0.4, 0.8, OFF], set: |s, v| s.sigma_n = v };
-const SIGMA_X: Knob = Knob { name: "sigma_x", values: &[0.01, 0.03, 0.1, 0.3, 1.0, OFF], set: |s, v| s.sigma_x = v };
-
-const RADIUS: Knob =
-    Knob { name: "radius", values: &[4.0, 8.0, 12.0, 16.0, 24.0, 32.0], set: |s, v| s.radius = v as u32 };
-const EPS_N: Knob = Knob {
-    name: "eps of the normal",
-    values: &[1e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1],
-    set: |s, v| s.eps = [v, v, v, s.eps[3]],
+const FORM: Knob = Knob {
+    name: "form",
+    values: &[0.0, 1.0, 2.0],
+    set: |s, v| s.form = [AtrousForm::Listing, AtrousForm::Squared, AtrousForm::Printed][v as usize],
+    words: &["listing", "squared", "printed"],
 };
-const EPS_Z: Knob =
-    Knob { name: "eps of the depth", values: &[1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.03], set: |s, v| s.eps[3] = v };
+const LEVELS: Knob = Knob::numbers("levels", &[2.0, 3.0, 4.0, 5.0, 6.0], |s, v| s.levels = v as u32);
+const SIGMA_RT: Knob = Knob::numbers("sigma_rt", &[0.03, 0.1, 0.3, 1.0, 3.0, OFF], |s, v| s.sigma_rt = v);
+const SIGMA_N: Knob = Knob::numbers("sigma_n", &[0.1, 0.2, 0.4, 0.8, OFF], |s, v| s.sigma_n = v);
+const SIGMA_X: Knob = Knob::numbers("sigma_x", &[0.01, 0.03, 0.1, 0.3, 1.0, OFF], |s, v| s.sigma_x = v);
 
-const SIGMA_L: Knob = Knob { name: "sigma_l", values: &[0.5, 1.0, 2.0, 4.0, 8.0, 16.0], set: |s, v| s.sigma_l = v };
+const CHANNELS: Knob = Knob::numbers("channels", &[1.0, 3.0, 4.0], |s, v| s.channels = v as u32);
+const RADIUS: Knob =
+    Knob::numbers("radius", &[4.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0], |s, v| s.radius = v as u32);
+const EPS_N: Knob =
+    Knob::numbers("eps of the normal", &[1e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1], |s, v| s.eps = [v, v, v, s.eps[3]]);
+const EPS_Z: Knob = Knob::numbers("eps of the depth", &[1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.03], |s, v| s.eps[3] = v);
+
+const SIGMA_L: Knob = Knob::numbers("sigma_l", &[0.5, 1.0, 2.0, 4.0, 8.0, 16.0], |s, v| s.sigma_l = v);
 const BASIS: Knob = Knob {
     name: "basis",
     values: &[0.0, 1.0],
-    set: |s, v| s.basis = if v == 0.0 { WaveletBasis::Cdf22 } else { WaveletBasis::RedBlack },
+    set: |s, v| s.basis = [WaveletBasis::Cdf22, WaveletBasis::RedBlack][v as usize],
+    words: &["cdf22", "red-black"],
 };
 
 /// What is searched for a filter. A new one goes here.
 fn knobs(filter: &str) -> Vec<Knob> {
     match filter {
-        "atrous" => vec![LEVELS, SIGMA_RT, SIGMA_N, SIGMA_X],
+        "atrous" => vec![FORM, LEVELS, SIGMA_RT, SIGMA_N, SIGMA_X],
         "bilateral" => vec![RADIUS, SIGMA_RT, SIGMA_N, SIGMA_X],
         "wavelet" => vec![BASIS, LEVELS, SIGMA_RT, SIGMA_N, SIGMA_X],
         "svgf" => vec![LEVELS, SIGMA_L, SIGMA_N, SIGMA_X],
-        "guided" => vec![RADIUS, EPS_N, EPS_Z],
+        "guided" => vec![CHANNELS, RADIUS, EPS_N, EPS_Z],
         _ => vec![],
     }
 }
@@ -76,7 +91,7 @@ pub fn best(
         }
     }
     let name = |(knob, value): (&Knob, &Option<f32>)| {
-        format!("{} {}", knob.name, value.map_or("default".to_owned(), |v| v.to_string()))
+        format!("{} {}", knob.name, value.map_or("default".to_owned(), |v| knob.text(v)))
     };
     best.text = knobs.iter().zip(&chosen).map(name).collect::<Vec<_>>().join(", ");
     Ok(best)
@@ -97,7 +112,7 @@ fn along(
         if found < best.error {
             (best.error, best.settings, *chosen) = (found, settings, Some(value));
         }
-        line += &format!(" {value} -> {found:.4};");
+        line += &format!(" {} -> {found:.4};", knob.text(value));
     }
     Ok(line)
 }
