@@ -46,7 +46,7 @@ void main() {
     vec3 missed = vec3(scaled(a, e.rgb), scaled(b, e.rgb), scaled(c, e.rgb)) / (1.0 - leverage);
     float deviation = min(sqrt(e.w) / push.floor, LIMIT);
     // Between errors relative to luminance (^1), which are what is seen, and equal trust in bright and dark pixels (^2).
-    float level = scaled((a + b + c) / 3.0, vec3(0.0)), root = sqrt(level * level + 1.0), weight = 1.0 / (root * sqrt(root));
+    float level = scaled((a + b + c) / 3.0, vec3(0.0)), weight = pow(level * level + 1.0, -0.65);
     vec4 square = weight * vec4(2.0 * deviation * deviation, missed * missed);
     // What few samples tell of their own variance follows their values: whoever relies on it seems better than it is.
     if (count < ENOUGH) square.xw = vec2(WORST);

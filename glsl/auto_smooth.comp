@@ -29,7 +29,8 @@ void main() {
         for (int i = -2; i <= 2; i++) {
             ivec2 tap = clamp(at + int(push.spacing) * ivec2(i, j), ivec2(0), size - 1); // borders repeat
             Pixel q = pixel_at(tap.y * size.x + tap.x);
-            float w = B3[abs(i)] * B3[abs(j)] * edge_weight(q, edge_exponent(p, q, push.rates));
+            float alike = edge_weight(q, edge_exponent(p, q, push.rates));
+            float w = B3[abs(i)] * B3[abs(j)] * (q.colour.w > 0.0 ? max(alike, push.least) : 0.0);
             sum += w * texelFetch(estimates, tap.y * size.x + tap.x);
             total += w;
         }

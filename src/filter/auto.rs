@@ -28,6 +28,9 @@ const ENOUGH: f32 = 4.0;
 const MOST: f32 = 0.9;
 /// Of what the leverage of a pixel of one sample is above that of the pixels around it: see `glsl/auto_error.comp`.
 const OWN: f32 = 0.7;
+/// Of surfaces that are not alike: how much the errors of one count for another. Where all are small, as in grass, they are all
+/// there is to learn from: what few pixels tell is that filters that keep much are good.
+const LEAST_ALIKE: f32 = 0.2;
 /// Of luminance and its differences, so that their products are finite.
 const LIMIT: f32 = 1e9;
 /// Stands for an error that no candidate may be chosen with.
@@ -128,8 +131,8 @@ impl Auto {
         })
     }
 
-    /// One plane\[P\] -> another, or the same.
-    fn smooth(&self, rec: &mut Recorder, planes: &Planes, [from, to]: [&Buffer<vec4>; 2]) -> Result<()> {
+    /// One plane\[P\] -> another, or the same. `least`: weight of what is not alike.
+    fn smooth(&self, rec: &mut Recorder, planes: &Planes, [from, to]: [&Buffer<vec4>; 2], least: f32) -> Result<()> {
         let [width, height] = planes.size;
         let rates = Rates::of_surfaces(&alike(&self.settings)).as_array();
         (0..SMOOTHING).try_for_each(|level| {
@@ -139,7 +142,7 @@ impl Auto {
                 _ => (&self.between, to),
             };
             let bind = auto_smooth::Bind { estimates, colour: &self.pack.colour, place: &self.pack.place, smoothed };
-            let push = AutoSmoothPush { size: planes.size, spacing: 1 << level, rates };
+            let push = AutoSmoothPush { size: planes.size, spacing: 1 << level, rates, least };
             rec.dispatch(&self.smooth, bind, &push, [width.div_ceil(32), height, 1])
         })
     }
@@ -161,7 +164,7 @@ impl Filter for Auto {
             [0, 1, 2].map(|i| self.candidates[i].results.each_ref());
         let bind = auto_leverage::Bind { filtered_1, probed_1, filtered_2, probed_2, filtered_3, probed_3, leverages };
         rec.dispatch(&self.leverage, bind, &push, groups(count, 64))?;
-        self.smooth(rec, planes, [leverages, surroundings])?;
+        self.smooth(rec, planes, [leverages, surroundings], 0.0)?;
         let bind = auto_error::Bind {
             estimate,
             colour,
@@ -175,7 +178,7 @@ impl Filter for Auto {
         };
         rec.dispatch(&self.error, bind, &push, groups(count, 64))?;
         for plane in [squares, products] {
-            self.smooth(rec, planes, [plane, plane])?;
+            self.smooth(rec, planes, [plane, plane], LEAST_ALIKE)?;
         }
         let filtered = &planes.output;
         let bind = auto::Bind { squares, products, colour, filtered_1, filtered_2, filtered_3, filtered };
@@ -205,9 +208,10 @@ fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
     let leverages: Vec<Vec4> = (0..image.len()).map(grown).collect();
     let rates = Rates::of_surfaces(&alike(settings));
     let size = [input.width, input.height].map(i64::from);
-    let smoothed =
-        |plane: Vec<Vec4>| (0..SMOOTHING).fold(plane, |plane, level| smooth(&plane, &image, size, 1 << level, &rates));
-    let surroundings = smoothed(leverages.clone());
+    let smoothed = |plane: Vec<Vec4>, least: f32| {
+        (0..SMOOTHING).fold(plane, |plane, level| smooth(&plane, &image, size, 1 << level, &rates, least))
+    };
+    let surroundings = smoothed(leverages.clone(), 0.0);
     let scaled = |a: Vec3, b: Vec3| (contrast(a, b) / floor).clamp(-LIMIT, LIMIT);
     let missed = |i: usize| {
         let (own, around) = (leverages[i].xyz(), surroundings[i].xyz());
@@ -217,7 +221,7 @@ fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
     };
     let weight = |i: usize| {
         let level = scaled(results.iter().map(|r| colour(&r[i])).sum::<Vec3>() / 3.0, Vec3::ZERO);
-        (level * level + 1.0).powf(-0.75)
+        (level * level + 1.0).powf(-0.65)
     };
     let square = |i: usize| {
         let unfiltered = 2.0 * (noise[i].sqrt() / floor).min(LIMIT).powi(2);
@@ -226,8 +230,8 @@ fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
         if image[i].count < ENOUGH { Vec4::new(WORST, square.y, square.z, WORST) } else { square }
     };
     let product = |i: usize| weight(i) * (missed(i).xxy() * missed(i).yzz()).extend(0.0);
-    let squares = smoothed((0..image.len()).map(square).collect());
-    let products = smoothed((0..image.len()).map(product).collect());
+    let squares = smoothed((0..image.len()).map(square).collect(), LEAST_ALIKE);
+    let products = smoothed((0..image.len()).map(product).collect(), LEAST_ALIKE);
     let blended = |i: usize| blend(&image[i], squares[i], products[i], results.each_ref().map(|r| r[i].into()));
     (0..image.len()).map(blended).collect()
 }
@@ -238,7 +242,14 @@ fn probe(pixel: usize, around: Vec3, least: f32) -> f32 {
     if pcg(pixel as u32) >> 31 == 0 { size } else { -size }
 }
 
-fn smooth(estimates: &[Vec4], image: &[Packed], [width, height]: [i64; 2], spacing: i64, rates: &Rates) -> Vec<Vec4> {
+fn smooth(
+    estimates: &[Vec4],
+    image: &[Packed],
+    [width, height]: [i64; 2],
+    spacing: i64,
+    rates: &Rates,
+    least: f32,
+) -> Vec<Vec4> {
     const B3: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
     let pixel = |at: i64| {
         let (mut sum, mut total) = (Vec4::ZERO, 0.0);
@@ -247,7 +258,7 @@ fn smooth(estimates: &[Vec4], image: &[Packed], [width, height]: [i64; 2], spaci
             let v = (at / width + j * spacing).clamp(0, height - 1);
             let (p, q) = (&image[at as usize], &image[(v * width + u) as usize]);
             let w = B3[i.unsigned_abs() as usize] * B3[j.unsigned_abs() as usize];
-            let w = w * edge_weight(q, rates.exponent(p, q));
+            let w = if q.count > 0.0 { w * edge_weight(q, rates.exponent(p, q)).max(least) } else { 0.0 };
             sum += w * estimates[(v * width + u) as usize];
             total += w;
         }

@@ -111,5 +111,7 @@ gpu_structs! {
         spacing: uint,
         /// As in [`AtrousPush`]; that of radiance is 0.
         rates: vec3,
+        /// Weight of a pixel that is known but not alike.
+        least: float,
     }
 }
