@@ -4,7 +4,7 @@ mod picture;
 mod support;
 
 use picture::Picture;
-use support::{assert_silent, gpu};
+use support::{assert_silent, gpu, hash};
 use tallow::filter::{AtrousForm, FILTERS, FilterInput, FilterSettings, Row, find, run};
 use tallow::gpu::Gpu;
 use tallow::gpu::layout::{Guide, vec4};
@@ -267,6 +267,32 @@ fn a_sigma_of_zero_leaves_an_image_as_it_is() {
             assert!(odd.is_none(), "{}: {odd:?}", row.name);
         }
     }
+    assert_silent(&gpu);
+}
+
+/// Left, a pattern of light without noise, which every filter but none blurs; right, noise without a pattern. Towards the noise
+/// the pattern fades, as what is estimated of it does, from column to column by an eighth of it at most.
+#[test]
+fn auto_changes_from_filter_to_filter_without_a_seam() {
+    const HALF: usize = 48;
+    let gpu = gpu();
+    let mut input = constant(2 * HALF as u32, 48, 1.0);
+    let wall = Guide { normal: [0.0, 0.0, 1.0], depth: 5.0, position: [0.0, 0.0, -5.0], ..Guide::default() };
+    input.guide.fill(wall);
+    let sign = |x: usize, y: usize| if (x + y).is_multiple_of(2) { 1.0 } else { -1.0 };
+    for (i, c) in input.radiance.iter_mut().enumerate() {
+        let (x, y) = (i % (2 * HALF), i / (2 * HALF));
+        let noise = 2.0 * (hash(i as u32) as f32 / u32::MAX as f32) - 1.0;
+        let (value, variance) = if x < HALF { (1.0 + 0.3 * sign(x, y), 0.0) } else { (1.0 + noise, 1.0 / 3.0) };
+        *c = [value, value, value, 16.0];
+        input.variance.as_mut().unwrap()[i] = [variance; 3];
+    }
+    let auto = find("auto").unwrap();
+    let output = run(&gpu, auto, &input, &FilterSettings::default().scaled_to(&input)).unwrap().0;
+    let kept = |x: usize| (0..48).map(|y| sign(x, y) * (output[y * 2 * HALF + x][0] - 1.0)).sum::<f32>() / (0.3 * 48.0);
+    assert!(kept(0) > 0.99 && (HALF..2 * HALF).all(|x| kept(x).abs() < 0.1), "the pattern is kept, and noise is not");
+    let steepest = (1..HALF).map(|x| (kept(x) - kept(x - 1)).abs()).fold(0.0, f32::max);
+    assert!(steepest < 0.125, "{:.3?}", (0..HALF).map(kept).collect::<Vec<_>>());
     assert_silent(&gpu);
 }
 
