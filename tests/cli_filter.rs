@@ -58,6 +58,13 @@ fn read(folder: &TempDir, name: &str) -> Film {
     image::read(&folder.path().join(name)).unwrap()
 }
 
+/// Renders to `noisy.exr`.
+fn render(folder: &TempDir, scene: &str, spp: &str) {
+    let size = SIZE.to_string();
+    let words = ["render", scene, "-o", "noisy.exr", "--width", &size, "--height", &size, "--spp", spp, "--quiet"];
+    assert_eq!(tallow(folder, &words).status.code(), Some(0));
+}
+
 /// Filters `noisy.exr` to `clean.exr` under the validation layers.
 fn filter(folder: &TempDir, options: &[&str]) -> Film {
     let words = [&["filter", "noisy.exr", "-o", "clean.exr", "--validation", "--quiet"], options].concat();
@@ -162,10 +169,7 @@ fn layers_of_any_name_are_taken_when_named() {
 #[test]
 fn mirrors_stay_sharp() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/mirror.toml");
-    let size = SIZE.to_string();
-    let words = ["render", scene, "-o", "noisy.exr", "--width", &size, "--height", &size, "--spp", "2", "--quiet"];
-    assert_eq!(tallow(&folder, &words).status.code(), Some(0));
+    render(&folder, concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/mirror.toml"), "2");
     let (noisy, clean) = (read(&folder, "noisy.exr"), filter(&folder, &["--filter", "atrous"]));
     let [before, after] = [&noisy, &clean].map(|film| film.picture(None).unwrap().pixels);
     // The front of the tall box, without its edges.
@@ -303,9 +307,7 @@ fn what_cannot_be_filtered_is_told_in_one_line() {
 fn filtered_light_is_looked_up_in_the_scene() {
     let folder = tempfile::tempdir().unwrap();
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/scene.toml");
-    let size = SIZE.to_string();
-    let words = ["render", scene, "-o", "noisy.exr", "--width", &size, "--height", &size, "--spp", "64", "--quiet"];
-    assert_eq!(tallow(&folder, &words).status.code(), Some(0));
+    render(&folder, scene, "64");
     let before = read(&folder, "noisy.exr").channel("R").unwrap().to_f32().into_owned();
     let looked_up = filter(&folder, &["--filter", "atrous", "--scene", scene, "--eye-rays", "8"]);
     let plain = filter(&folder, &["--filter", "atrous"]);
