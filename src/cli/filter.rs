@@ -7,7 +7,8 @@ use super::compare::{self, check_sizes};
 use super::{Exit, fail_on_messages, layers, print, print_json};
 use crate::composition::{self, Demodulation, Parts};
 use crate::error::{Error, Result};
-use crate::filter::{self, FILTERS, Row};
+use crate::filter::{self, FILTERS, FilterInput, FilterSettings, Row};
+use crate::gpu::layout::vec4;
 use crate::gpu::{Gpu, PassTime};
 use crate::image::aov::Aovs;
 use crate::image::metrics::{self, Metrics};
@@ -145,11 +146,31 @@ fn cut_fireflies(args: &Args, gpu: &Gpu, parts: &mut Parts) -> Result<()> {
 }
 
 fn filtered(args: &Args, gpu: &Gpu, aovs: &Aovs, parts: &mut Parts) -> Result<(Vec<[f32; 3]>, Vec<PassTime>)> {
-    let (light, times) = parts.filter(gpu, args.filter, &|input| args.overrides.settings(input))?;
+    let (light, times) = run_on(gpu, args.filter, parts, &|input| args.overrides.settings(input))?;
     Ok(match args.supersampling.look_up(gpu, &args.image, aovs, parts, &light)? {
         Some((indirect, more)) => (parts.join_reflected(&indirect), [times, more].concat()),
         None => (parts.join(&light), times),
     })
+}
+
+/// Filters what is to be filtered, with the settings that `settings` makes for it, and returns that. Where pixels lack direct
+/// light, the filter in-paints it, with settings of its own.
+///
+/// # Errors
+/// Those of [`filter::run`].
+pub fn run_on(
+    gpu: &Gpu,
+    row: &Row,
+    parts: &mut Parts,
+    settings: &dyn Fn(&FilterInput) -> FilterSettings,
+) -> Result<(Vec<vec4>, Vec<PassTime>)> {
+    let (light, mut times) = filter::run(gpu, row, &parts.input, &settings(&parts.input))?;
+    if let Some(unlit) = parts.unlit() {
+        let (direct, more) = filter::run(gpu, row, &unlit, &settings(&unlit))?;
+        parts.light_up(&direct);
+        times.extend(more);
+    }
+    Ok((light, times))
 }
 
 /// The file with the filtered colour. Where its three channels are one, that holds their mean.

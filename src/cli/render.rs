@@ -1,6 +1,6 @@
 //! `tallow render`: a scene becomes image files.
 use super::common::Common;
-use super::filter::filter_names;
+use super::filter::{filter_names, run_on};
 use super::job::{End, Job, Why};
 use super::overrides::Overrides;
 use super::resume::{self, Earlier};
@@ -179,7 +179,7 @@ pub fn run(args: &Args) -> Result<Exit> {
 fn denoise(gpu: &Gpu, row: &Row, film: &mut Film) -> Result<Vec<PassTime>> {
     let aovs = Aovs::find(film, &Names::new()).map_err(Error::Usage)?;
     let mut parts = composition::split(&aovs, Demodulation::default());
-    let (light, times) = parts.filter(gpu, row, &|input| FilterSettings::default().scaled_to(input))?;
+    let (light, times) = run_on(gpu, row, &mut parts, &|input| FilterSettings::default().scaled_to(input))?;
     layers::denoise(film, &parts.join(&light));
     Ok(times)
 }

@@ -8,10 +8,8 @@
 mod albedo;
 mod guide;
 
-use crate::error::Result;
-use crate::filter::{self, FilterInput, FilterSettings, Row};
+use crate::filter::FilterInput;
 use crate::gpu::layout::{vec3, vec4};
-use crate::gpu::{Gpu, PassTime};
 use crate::image::aov::{Aov, Aovs};
 
 /// What is kept away from the filter, where an image tells it.
@@ -65,27 +63,22 @@ pub fn split(aovs: &Aovs, demodulation: Demodulation) -> Parts {
 }
 
 impl Parts {
-    /// Filters what is to be filtered, with the settings that `settings` makes for it, and returns that and what each pass
-    /// took. Where pixels lack direct light, the filter in-paints it, with settings of its own.
+    /// Direct light before albedo, where some pixels (0 samples) have none of their own: a filter in-paints it for
+    /// [`Parts::light_up`].
+    pub fn unlit(&self) -> Option<FilterInput> {
+        self.unlit.as_ref().map(|unlit| self.input.with_radiance(unlit.radiance.clone()))
+    }
+
+    /// Gives pixels without direct light what a filter made of [`Parts::unlit`].
     ///
-    /// # Errors
-    /// Those of [`filter::run`].
-    pub fn filter(
-        &mut self,
-        gpu: &Gpu,
-        row: &Row,
-        settings: &dyn Fn(&FilterInput) -> FilterSettings,
-    ) -> Result<(Vec<vec4>, Vec<PassTime>)> {
-        let (filtered, mut times) = filter::run(gpu, row, &self.input, &settings(&self.input))?;
-        if let Some(Unlit { radiance, factor }) = self.unlit.take() {
-            let lit = self.input.with_radiance(radiance);
-            let (direct, more) = filter::run(gpu, row, &lit, &settings(&lit))?;
-            for i in (0..direct.len()).filter(|&i| lit.radiance[i][3] == 0.0) {
-                self.sharp[i] = std::array::from_fn(|c| factor[i][c] * direct[i][c]);
-            }
-            times.extend(more);
+    /// # Panics
+    /// When that has another number of pixels.
+    pub fn light_up(&mut self, direct: &[vec4]) {
+        assert_eq!(direct.len(), self.sharp.len(), "one filtered value per pixel");
+        let Some(Unlit { radiance, factor }) = &self.unlit else { return };
+        for i in (0..direct.len()).filter(|&i| radiance[i][3] == 0.0) {
+            self.sharp[i] = std::array::from_fn(|c| factor[i][c] * direct[i][c]);
         }
-        Ok((filtered, times))
     }
 
     /// Puts the image together from what the filter returned.
