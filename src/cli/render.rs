@@ -309,9 +309,9 @@ fn check_memory(args: &Args, settings: &Settings, gpu: &Gpu) -> Result<()> {
     memory::check(bytes).map_err(|what| Error::Device(refused(what)))
 }
 
-/// What a pixel takes beside the film while it is filtered, the largest: measured at 2400 x 2400 on a device without memory of
-/// its own, 239 with `none`, 323 with `guided`, 680 with `auto`.
-const BYTES_DENOISED: u64 = 680;
+/// What a pixel takes beside the film's channels while it is filtered, the largest: measured at 2400 x 2400 on a device without
+/// memory of its own, 412 with `none`, 500 with `guided`, 906 with `auto`, 1009 with `auto` where pixels lack direct light.
+const BYTES_DENOISED: u64 = 1010;
 
 /// Of host memory, at the moment when it is read back.
 fn bytes_of_film(settings: &Settings, unified: bool) -> u64 {
