@@ -7,9 +7,14 @@ use anyhow::{Context, Result, bail};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
 use tallow::filter::{self, Filter, FilterInput, FilterSettings, GuidedSums, Planes, Row};
 use tallow::gpu::layout::Guide;
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu, PassTime};
+
+/// After a peer's run: its threads look for more work for a while before they sleep, on the cores that we run on.
+const PAUSE: Duration = Duration::from_millis(50);
 
 /// What is timed: our settings, and what the peer is asked for.
 struct Case {
@@ -169,6 +174,7 @@ fn main() -> Result<()> {
     let (mut frame, mut theirs) = (FrameResources::new(&gpu)?, Vec::new());
     for round in 0..=rounds {
         let peer = peer.as_mut().map(|peer| peer.milliseconds(case.peer)).transpose()?;
+        sleep(PAUSE);
         for ours in &mut ours {
             let times = gpu.run(&mut frame, |rec| ours.filter.record(rec, &planes))?;
             if round > 0 {
