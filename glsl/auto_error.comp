@@ -27,7 +27,7 @@ const float MOST = 0.9;   // leverage: beyond it, too little is left to judge by
 // Of what the leverage of a pixel of one sample is above that of the pixels around it, which alone is not too noisy. Where a
 // pixel's is high, its noise often is: filters that keep much would seem good where noise is hundreds of times their error,
 // as it is with few samples.
-const float OWN = 0.7;
+const float OWN = 0.8;
 const float LIMIT = 1e9; // of luminance and its differences, so that their products are finite
 
 float scaled(vec3 a, vec3 b) {

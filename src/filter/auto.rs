@@ -27,10 +27,10 @@ const ENOUGH: f32 = 4.0;
 /// Leverage: beyond it, too little is left to judge by.
 const MOST: f32 = 0.9;
 /// Of what the leverage of a pixel of one sample is above that of the pixels around it: see `glsl/auto_error.comp`.
-const OWN: f32 = 0.7;
-/// Of surfaces that are not alike: how much the errors of one count for another. Where all are small, as in grass, they are all
-/// there is to learn from: what few pixels tell is that filters that keep much are good.
-const LEAST_ALIKE: f32 = 0.2;
+const OWN: f32 = 0.8;
+/// How much the errors of one surface count for another, to the power of the level: neighbours fully, far pixels hardly. Where
+/// surfaces are small, as in grass, others are all there is to learn from, and few pixels seem to prove filters that keep much.
+const ACROSS: f32 = 0.4;
 /// Of luminance and its differences, so that their products are finite.
 const LIMIT: f32 = 1e9;
 /// Stands for an error that no candidate may be chosen with.
@@ -131,8 +131,8 @@ impl Auto {
         })
     }
 
-    /// One plane\[P\] -> another, or the same. `least`: weight of what is not alike.
-    fn smooth(&self, rec: &mut Recorder, planes: &Planes, [from, to]: [&Buffer<vec4>; 2], least: f32) -> Result<()> {
+    /// One plane\[P\] -> another, or the same; `across` surfaces, or within alike ones.
+    fn smooth(&self, rec: &mut Recorder, planes: &Planes, [from, to]: [&Buffer<vec4>; 2], across: bool) -> Result<()> {
         let [width, height] = planes.size;
         let rates = Rates::of_surfaces(&alike(&self.settings)).as_array();
         (0..SMOOTHING).try_for_each(|level| {
@@ -142,7 +142,7 @@ impl Auto {
                 _ => (&self.between, to),
             };
             let bind = auto_smooth::Bind { estimates, colour: &self.pack.colour, place: &self.pack.place, smoothed };
-            let push = AutoSmoothPush { size: planes.size, spacing: 1 << level, rates, least };
+            let push = AutoSmoothPush { size: planes.size, spacing: 1 << level, rates, least: least(level, across) };
             rec.dispatch(&self.smooth, bind, &push, [width.div_ceil(32), height, 1])
         })
     }
@@ -164,7 +164,7 @@ impl Filter for Auto {
             [0, 1, 2].map(|i| self.candidates[i].results.each_ref());
         let bind = auto_leverage::Bind { filtered_1, probed_1, filtered_2, probed_2, filtered_3, probed_3, leverages };
         rec.dispatch(&self.leverage, bind, &push, groups(count, 64))?;
-        self.smooth(rec, planes, [leverages, surroundings], 0.0)?;
+        self.smooth(rec, planes, [leverages, surroundings], false)?;
         let bind = auto_error::Bind {
             estimate,
             colour,
@@ -178,12 +178,17 @@ impl Filter for Auto {
         };
         rec.dispatch(&self.error, bind, &push, groups(count, 64))?;
         for plane in [squares, products] {
-            self.smooth(rec, planes, [plane, plane], LEAST_ALIKE)?;
+            self.smooth(rec, planes, [plane, plane], true)?;
         }
         let filtered = &planes.output;
         let bind = auto::Bind { squares, products, colour, filtered_1, filtered_2, filtered_3, filtered };
         rec.dispatch(&self.blend, bind, &PackPush { count }, groups(count, 64))
     }
+}
+
+/// Weight of what is not alike.
+fn least(level: u32, across: bool) -> f32 {
+    if across { ACROSS.powi(level as i32) } else { 0.0 }
 }
 
 /// Luminance below which errors count as absolute: a thousandth of the image's intensity.
@@ -208,10 +213,12 @@ fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
     let leverages: Vec<Vec4> = (0..image.len()).map(grown).collect();
     let rates = Rates::of_surfaces(&alike(settings));
     let size = [input.width, input.height].map(i64::from);
-    let smoothed = |plane: Vec<Vec4>, least: f32| {
-        (0..SMOOTHING).fold(plane, |plane, level| smooth(&plane, &image, size, 1 << level, &rates, least))
+    let smoothed = |plane: Vec<Vec4>, across: bool| {
+        let level =
+            |plane: Vec<Vec4>, level: u32| smooth(&plane, &image, size, 1i64 << level, &rates, least(level, across));
+        (0..SMOOTHING).fold(plane, level)
     };
-    let surroundings = smoothed(leverages.clone(), 0.0);
+    let surroundings = smoothed(leverages.clone(), false);
     let scaled = |a: Vec3, b: Vec3| (contrast(a, b) / floor).clamp(-LIMIT, LIMIT);
     let missed = |i: usize| {
         let (own, around) = (leverages[i].xyz(), surroundings[i].xyz());
@@ -230,8 +237,8 @@ fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
         if image[i].count < ENOUGH { Vec4::new(WORST, square.y, square.z, WORST) } else { square }
     };
     let product = |i: usize| weight(i) * (missed(i).xxy() * missed(i).yzz()).extend(0.0);
-    let squares = smoothed((0..image.len()).map(square).collect(), LEAST_ALIKE);
-    let products = smoothed((0..image.len()).map(product).collect(), LEAST_ALIKE);
+    let squares = smoothed((0..image.len()).map(square).collect(), true);
+    let products = smoothed((0..image.len()).map(product).collect(), true);
     let blended = |i: usize| blend(&image[i], squares[i], products[i], results.each_ref().map(|r| r[i].into()));
     (0..image.len()).map(blended).collect()
 }
