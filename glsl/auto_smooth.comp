@@ -4,7 +4,8 @@
 #include "layout.glsl"
 #include "shared/edge.glsl"
 
-// One level of A-Trous smoothing of estimates, among alike surfaces: they are right on average only.
+// One level of A-Trous smoothing of estimates, which are right on average only: among alike surfaces, and across others as
+// far as they count at least.
 // Unknown pixels have nothing to estimate; they take their neighbours'.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer estimates; // of vec4

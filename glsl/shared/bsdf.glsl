@@ -208,7 +208,7 @@ bool bsdf_sample(Bsdf b, vec3 wo, float u_lobe, vec2 u, out BsdfSample s) {
     return true;
 }
 
-// Nothing lies below it.
+// A conductor or a dielectric: light scatters at its surface alone.
 bool is_interface(Bsdf b) { return is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR) || is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC); }
 
 // Every lobe is a delta: no light sample can contribute, and a filter has nothing to blur.

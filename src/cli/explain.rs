@@ -107,7 +107,7 @@ fn gpu_ms(renderer: &Renderer, frame: &mut FrameResources) -> Result<f64> {
     let mut ns = 0;
     for step in renderer.steps() {
         let times = renderer.run(frame, &step)?;
-        ns += times.iter().filter(|t| t.name == "path").map(|t| t.end_ns - t.begin_ns).sum::<u64>();
+        ns += times.iter().filter(|t| t.name == "path").map(|t| t.duration_ns()).sum::<u64>();
     }
     Ok(ns as f64 * 1e-6)
 }

@@ -146,7 +146,7 @@ fn cut_fireflies(args: &Args, gpu: &Gpu, parts: &mut Parts) -> Result<()> {
 }
 
 fn filtered(args: &Args, gpu: &Gpu, aovs: &Aovs, parts: &mut Parts) -> Result<(Vec<[f32; 3]>, Vec<PassTime>)> {
-    let (light, times) = run_on(gpu, args.filter, parts, &|input| args.overrides.settings(input))?;
+    let (light, times) = filter_parts(gpu, args.filter, parts, &|input| args.overrides.settings(input))?;
     Ok(match args.supersampling.look_up(gpu, &args.image, aovs, parts, &light)? {
         Some((indirect, more)) => (parts.join_reflected(&indirect), [times, more].concat()),
         None => (parts.join(&light), times),
@@ -158,7 +158,7 @@ fn filtered(args: &Args, gpu: &Gpu, aovs: &Aovs, parts: &mut Parts) -> Result<(V
 ///
 /// # Errors
 /// Those of [`filter::run`].
-pub fn run_on(
+pub fn filter_parts(
     gpu: &Gpu,
     row: &Row,
     parts: &mut Parts,

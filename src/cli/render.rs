@@ -1,6 +1,6 @@
 //! `tallow render`: a scene becomes image files.
 use super::common::Common;
-use super::filter::{filter_names, run_on};
+use super::filter::{filter_names, filter_parts};
 use super::job::{End, Job, Why};
 use super::overrides::Overrides;
 use super::resume::{self, Earlier};
@@ -179,7 +179,7 @@ pub fn run(args: &Args) -> Result<Exit> {
 fn denoise(gpu: &Gpu, row: &Row, film: &mut Film) -> Result<Vec<PassTime>> {
     let aovs = Aovs::find(film, &Names::new()).map_err(Error::Usage)?;
     let mut parts = composition::split(&aovs, Demodulation::default());
-    let (light, times) = run_on(gpu, row, &mut parts, &|input| FilterSettings::default().scaled_to(input))?;
+    let (light, times) = filter_parts(gpu, row, &mut parts, &|input| FilterSettings::default().scaled_to(input))?;
     layers::denoise(film, &parts.join(&light));
     Ok(times)
 }
@@ -198,7 +198,7 @@ impl Spans {
 
     fn seconds(&self, name: &str) -> f64 {
         let spans = self.0.iter().filter(|s| s.name == name);
-        spans.map(|s| s.end_ns.saturating_sub(s.begin_ns) as f64 * 1e-9).sum()
+        spans.map(|s| s.duration_ns() as f64 * 1e-9).sum()
     }
 }
 

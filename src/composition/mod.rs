@@ -46,9 +46,11 @@ pub fn split(aovs: &Aovs, demodulation: Demodulation) -> Parts {
     let colour = aovs.get(Aov::Colour).unwrap_or_default();
     let counts = counts(aovs, colour);
     let mut notes = Vec::new();
-    let light = match (demodulation, aovs.get(Aov::Albedo), layers(aovs)) {
+    let light = match (demodulation, aovs.get(Aov::Albedo), aovs.get(Aov::Direct).zip(aovs.get(Aov::Indirect))) {
         (Demodulation::Off, ..) | (_, None, _) => plain(colour),
-        (Demodulation::Light, Some(albedo), Some(layers)) => split_light(aovs, colour, albedo, layers),
+        (Demodulation::Light, Some(albedo), Some((direct, indirect))) => {
+            split_light(aovs, colour, albedo, direct, indirect)
+        }
         (_, Some(albedo), _) => albedo::split(colour, albedo, aovs.film.width as usize),
     };
     notes.push(light.note.to_owned());
@@ -118,14 +120,9 @@ fn counts(aovs: &Aovs, colour: &[vec3]) -> Vec<f32> {
     (0..colour.len()).map(|i| if known(i) { count(i) } else { 0.0 }).collect()
 }
 
-/// Direct and indirect light.
-fn layers<'a>(aovs: &'a Aovs) -> Option<[&'a [vec3]; 2]> {
-    Some([aovs.get(Aov::Direct)?, aovs.get(Aov::Indirect)?])
-}
-
 /// The albedo that indirect light is multiplied by is that of the samples, `(colour - direct) / indirect`, so that edges
 /// and textures stay as smooth as the samples made them; that of the pixel's centre where no sample met light.
-fn split_light(aovs: &Aovs, colour: &[vec3], albedo: &[vec3], [direct, indirect]: [&[vec3]; 2]) -> Light {
+fn split_light(aovs: &Aovs, colour: &[vec3], albedo: &[vec3], direct: &[vec3], indirect: &[vec3]) -> Light {
     let factor = |i: usize| {
         std::array::from_fn(|c| {
             let of_samples = (colour[i][c] - direct[i][c]) / indirect[i][c];

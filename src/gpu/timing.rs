@@ -19,6 +19,13 @@ pub struct PassTime {
     pub end_ns: u64,
 }
 
+impl PassTime {
+    /// Nanoseconds that it took.
+    pub fn duration_ns(&self) -> u64 {
+        self.end_ns.saturating_sub(self.begin_ns)
+    }
+}
+
 /// Nanoseconds since this was first called, on a clock that never goes back.
 pub fn host_ns() -> u64 {
     static START: OnceLock<Instant> = OnceLock::new();

@@ -21,7 +21,7 @@ pub struct PassRow {
 pub fn summarise(times: &[PassTime]) -> Vec<PassRow> {
     let mut passes: Vec<(&'static str, Vec<u64>)> = Vec::new();
     for time in times {
-        let duration = time.end_ns.saturating_sub(time.begin_ns);
+        let duration = time.duration_ns();
         match passes.iter_mut().find(|(name, _)| *name == time.name) {
             Some((_, durations)) => durations.push(duration),
             None => passes.push((time.name, vec![duration])),

@@ -29,7 +29,7 @@ fn name_event(kind: &str, thread: u32, name: &str) -> Value {
 
 fn span_event(span: &PassTime, thread: u32, shift_ns: i128) -> Value {
     let begin_us = (i128::from(span.begin_ns) + shift_ns) as f64 / 1e3;
-    let duration_us = span.end_ns.saturating_sub(span.begin_ns) as f64 / 1e3;
+    let duration_us = span.duration_ns() as f64 / 1e3;
     json!({ "ph": "X", "name": span.name, "pid": 1, "tid": thread, "ts": begin_us, "dur": duration_us })
 }
 

@@ -130,7 +130,7 @@ struct Ours {
 
 impl Ours {
     fn milliseconds(&self, of: impl Fn(usize, &PassTime) -> bool) -> f64 {
-        let ms = |p: &PassTime| (p.end_ns - p.begin_ns) as f64 * 1e-6;
+        let ms = |p: &PassTime| p.duration_ns() as f64 * 1e-6;
         let run = |run: &Vec<PassTime>| run.iter().enumerate().filter(|(i, p)| of(*i, p)).map(|(_, p)| ms(p)).sum();
         median(self.runs.iter().map(run).collect())
     }

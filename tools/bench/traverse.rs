@@ -134,7 +134,7 @@ impl Device {
         })?;
         let pass = times.first().context("the device has no timestamps")?;
         let found = self.hits.read()?.iter().map(|h| (h.t, h.triangle)).collect();
-        Ok(((pass.end_ns - pass.begin_ns) as f64 * 1e-9, found))
+        Ok((pass.duration_ns() as f64 * 1e-9, found))
     }
 }
 

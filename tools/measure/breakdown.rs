@@ -66,7 +66,7 @@ fn one(gpu: &Gpu, args: &Args, view: &View) -> anyhow::Result<Milliseconds> {
             denoiser.record(rec)
         })?;
         if i > 0 {
-            passes.iter().for_each(|pass| sums[column(pass)] += milliseconds(pass) / FRAMES as f64);
+            passes.iter().for_each(|pass| sums[column(pass)] += pass.duration_ns() as f64 * 1e-6 / FRAMES as f64);
         }
     }
     Ok(sums)
@@ -79,8 +79,4 @@ fn column(pass: &PassTime) -> usize {
         "pack" | "atrous" => 3,
         _ => 0,
     }
-}
-
-fn milliseconds(pass: &PassTime) -> f64 {
-    pass.end_ns.saturating_sub(pass.begin_ns) as f64 * 1e-6
 }

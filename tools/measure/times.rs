@@ -95,7 +95,7 @@ pub fn milliseconds(gpu: &Gpu, row: &Row, settings: &FilterSettings, input: &Fil
     let mut times = Vec::new();
     for _ in 0..=RUNS {
         let passes = gpu.run(&mut frame, |rec| filter.record(rec, &planes))?;
-        times.push(passes.iter().map(|p| p.end_ns.saturating_sub(p.begin_ns)).sum::<u64>() as f64 * 1e-6);
+        times.push(passes.iter().map(|p| p.duration_ns()).sum::<u64>() as f64 * 1e-6);
     }
     times.remove(0);
     times.sort_by(f64::total_cmp);

@@ -84,7 +84,7 @@ pub fn render(gpu: &Gpu, scene: &Scene) -> anyhow::Result<Rendered> {
             listed = renderer.listed()?;
         }
         for pass in passes.iter().filter(|p| p.name != "guide") {
-            let took = pass.end_ns - pass.begin_ns;
+            let took = pass.duration_ns();
             ns += took;
             path_ns += if matches!(pass.name, "path" | "fold") { took } else { 0 };
         }

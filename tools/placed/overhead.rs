@@ -21,7 +21,7 @@ fn passes(gpu: &Gpu, renderer: &Renderer, steps: &[Step]) -> anyhow::Result<BTre
     for run in 0..=RUNS {
         let mut sums: BTreeMap<&str, f64> = BTreeMap::new();
         for step in steps {
-            let ms = |t: &PassTime| (t.end_ns - t.begin_ns) as f64 * 1e-6;
+            let ms = |t: &PassTime| t.duration_ns() as f64 * 1e-6;
             renderer.run(&mut frame, step)?.iter().for_each(|t| *sums.entry(t.name).or_default() += ms(t));
         }
         if run > 0 {
@@ -107,7 +107,7 @@ fn share(
     let (mut lists, mut traced) = (0.0, 0.0);
     for step in placed.steps() {
         for t in placed.run(&mut frame, &step)? {
-            let ms = (t.end_ns - t.begin_ns) as f64 * 1e-6;
+            let ms = t.duration_ns() as f64 * 1e-6;
             lists += if t.name == "batch" { ms } else { 0.0 };
             traced += if matches!(t.name, "path" | "fold") { ms } else { 0.0 };
         }
