@@ -110,33 +110,27 @@ bool survives_roulette(inout Path path, Sampler random, uint pair) {
     return true;
 }
 
+// Adds what the path meets at `hit`; true where it can go on from there, from `s`.
+bool arrive(inout Light2 sum, Path path, Hit hit, bool indirect, out Surface s) {
+    if (hit.triangle == NONE) {
+        add_light(sum, path.throughput * light_from_miss(path), indirect);
+        return false;
+    }
+    s = surface_at(hit);
+    add_light(sum, path.throughput * light_from_hit(path, s, hit.t), indirect);
+    return true;
+}
+
 Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
     Light2 sum = Light2(vec3(0.0), vec3(0.0));
-    bool smooth_first = false, shadowed = false, alive = true;
-    Segment shadow = Segment(vec3(0.0), vec3(0.0), 0.0, 0u);
-    uvec2 from = uvec2(NONE);
-    vec3 sampled = vec3(0.0); // light along `shadow`, which waits for the next ray: see traverse_both
     albedo = vec3(0.0);
-    for (uint bounce = 0u; alive || shadowed; bounce++) {
+    Hit hit = traverse(Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed)), push.root);
+    closest_rays++;
+    Surface s;
+    bool smooth_first = false;
+    uint bounce = 0u;
+    if (arrive(sum, path, hit, false, s) && push.max_depth > 1u) do {
         uint pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
-        closest_rays += uint(alive);
-        any_rays += uint(shadowed);
-        uint mask_seed = pcg(seed + 2u * bounce);
-        Segment ray = Segment(path.origin, path.direction, INFINITE_DISTANCE, mask_seed);
-        bool lit = shadowed;
-        Hit hit = traverse_both(shadow, shadowed, ray, alive, push.root, from);
-        bool indirect = bounce >= 2u && !smooth_first;
-        add_light(sum, lit && !shadowed ? sampled : vec3(0.0), indirect);
-        if (!alive) break;
-        if (hit.triangle == NONE) {
-            add_light(sum, path.throughput * light_from_miss(path), indirect);
-            break;
-        }
-        from = uvec2(hit.triangle, hit.instance);
-        Surface s = surface_at(hit);
-        add_light(sum, path.throughput * light_from_hit(path, s, hit.t), indirect);
-        if (bounce + 1u >= push.max_depth) break;
-
         Bsdf bsdf = surface_bsdf(s);
         // The two sides of a dielectric differ: its normal stays on the outside.
         bool turns = (s.flags & MATERIAL_TWO_SIDED) != 0u && !is_kind(FX_DIELECTRIC, bsdf, BSDF_DIELECTRIC);
@@ -148,12 +142,24 @@ Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
             albedo = bsdf_albedo(bsdf);
             smooth_first = smooth_here;
         }
-        sampled = path.throughput * light_from_nee(s, bsdf, basis, wo, random, pair, mask_seed + 1u, shadow);
-        shadowed = push.light_count > 0u && !smooth_here && max(sampled.r, max(sampled.g, sampled.b)) > 0.0;
-        alive = scatter(path, s, bsdf, basis, wo, random, pair);
+        Segment shadow;
+        uint mask_seed = pcg(seed + 2u * bounce);
+        vec3 sampled = path.throughput * light_from_nee(s, bsdf, basis, wo, random, pair, mask_seed + 1u, shadow);
+        bool shadowed = push.light_count > 0u && !smooth_here && max(sampled.r, max(sampled.g, sampled.b)) > 0.0;
+        bool alive = scatter(path, s, bsdf, basis, wo, random, pair);
         bool roulette = FX_ROULETTE && push.roulette_depth > 0u && bounce + 1u >= push.roulette_depth;
         if (roulette) alive = survives_roulette(path, random, pair) && alive;
-    }
+        bounce++;
+        if (!alive && !shadowed) break;
+
+        closest_rays += uint(alive);
+        any_rays += uint(shadowed);
+        bool lit = shadowed, indirect = bounce >= 2u && !smooth_first;
+        Segment ray = Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed + 2u * bounce));
+        hit = traverse_both(shadow, shadowed, ray, alive, push.root, uvec2(hit.triangle, hit.instance));
+        add_light(sum, lit && !shadowed ? sampled : vec3(0.0), indirect);
+        if (!alive || !arrive(sum, path, hit, indirect, s)) break;
+    } while (bounce + 1u < push.max_depth);
     if (FX_CLAMP) sum.indirect = clamped(sum.indirect);
     return sum;
 }

@@ -19,9 +19,6 @@ uint nodes_visited = 0u;
 #include "shared/texture.glsl"
 #include "shared/traverse.glsl"
 
-// Nodes that are visited before lanes look for new rays: looking costs about as much as a third of a visit.
-const uint STEPS = 4u;
-
 Segment ray_at(uint i) {
     uvec4 a = texelFetch(rays, int(2u * i)), b = texelFetch(rays, int(2u * i + 1u));
     return Segment(uintBitsToFloat(a.xyz), uintBitsToFloat(b.xyz), uintBitsToFloat(a.w), b.w);
@@ -30,17 +27,16 @@ Segment ray_at(uint i) {
 void main() {
     bool any_hit = push.any_hit != 0u, done = true;
     Traversal t = traversal_start(0.0, push.root);
-    for (uint i = thread_index(); i < push.count;) {
+    uint i = thread_index(), stride = gl_NumWorkGroups.x * gl_NumWorkGroups.y * WORKGROUP;
+    if (i >= push.count) return; // safe: no barrier() follows
+    do {
         Segment ray = ray_at(i); // again and again, which is cheaper than to keep it
-        RaySpace space = ray_space(ray.origin, ray.direction);
         if (done) t = traversal_start(ray.t_max, push.root);
-        done = false;
-        for (uint k = 0u; k < STEPS && !done; k++) {
-            done = traversal_step(t, space, any_hit, push.root, ray.mask_seed, uvec2(NONE));
-        }
+        RaySpace space = ray_space(ray.origin, ray.direction);
+        done = traversal_step(t, space, any_hit, push.root, ray.mask_seed, uvec2(NONE));
         if (done) {
-            hits[i] = RayHit(t.hit.t, t.hit.triangle, t.hit.instance, t.hit.barycentric);
-            i += gl_NumWorkGroups.x * gl_NumWorkGroups.y * WORKGROUP;
+            hits[i] = RayHit(t.hit.t, t.hit.triangle, t.hit.instance, vec2(t.hit.b1, t.hit.b2));
+            i += stride;
         }
-    }
+    } while (i < push.count);
 }

@@ -62,7 +62,7 @@ Surface surface_at(Hit hit) {
         mirrored = words.w != 0u;
     }
     s.flags = material_texel(s.material, 3u).w;
-    s.position = p0 + hit.barycentric.x * e1 + hit.barycentric.y * e2;
+    s.position = p0 + hit.b1 * e1 + hit.b2 * e2;
     vec3 scaled = mirrored ? cross(e2, e1) : cross(e1, e2);
     float doubled_area = max(length(scaled), 1e-30); // a needle that rounds to no area scatters nothing
     s.geometric = scaled / doubled_area;
@@ -73,8 +73,8 @@ Surface surface_at(Hit hit) {
     int at = int(3u * hit.triangle);
     uvec4 w0 = texelFetch(shading, at), w1 = texelFetch(shading, at + 1);
     if (FX_SMOOTH_NORMALS && (w0.x & w0.y & w0.z) != 0xffffffffu) {
-        vec3 n = mix(octahedral_decode(w0.x), octahedral_decode(w0.y), hit.barycentric.x) +
-                 hit.barycentric.y * (octahedral_decode(w0.z) - octahedral_decode(w0.x));
+        vec3 n = mix(octahedral_decode(w0.x), octahedral_decode(w0.y), hit.b1) +
+                 hit.b2 * (octahedral_decode(w0.z) - octahedral_decode(w0.x));
         n = normals_from_object * n;
         float len = dot(n, n);
         s.normal = len > 1e-20 ? n * inversesqrt(len) : s.geometric;
@@ -84,7 +84,7 @@ Surface surface_at(Hit hit) {
         vec2 uv0 = uintBitsToFloat(uvec2(w0.w, w1.x));
         vec2 d1 = uintBitsToFloat(w1.yz) - uv0;
         vec2 d2 = uintBitsToFloat(uvec2(w1.w, w2)) - uv0;
-        s.uv = uv0 + hit.barycentric.x * d1 + hit.barycentric.y * d2;
+        s.uv = uv0 + hit.b1 * d1 + hit.b2 * d2;
         if (FX_BUMP_MAPS || FX_NORMAL_MAPS) s.normal = perturbed_normal(s, e1, e2, d1, d2);
     }
     return s;

@@ -7,7 +7,7 @@ struct Hit {
     float t;          // in lengths of the ray's direction
     uint triangle;    // leaf order; NONE on a miss
     uint instance;    // NONE without instances
-    vec2 barycentric; // weights of vertices 1 and 2
+    float b1, b2;     // weights of vertices 1 and 2
 };
 
 // A ray and what it asks for: hits before `t_max`, in lengths of `direction`.
@@ -18,11 +18,28 @@ struct Segment {
     uint mask_seed; // decides hits on partly transparent surfaces
 };
 
-// Groups that a ray of this scene can leave behind (scene::bvh::stack_size). With one, it stays in registers.
+// Groups that a ray of this scene can leave behind (scene::bvh::stack_size). A few stay in registers. lavapipe writes to an
+// array lane by lane, with a branch each: to write always, for nothing where no group is left, costs less than to choose.
 layout(constant_id = 102) const uint STACK = TRAVERSAL_STACK;
-uvec2 stack[STACK];
+const bool SHALLOW = STACK <= 2u;
+uvec2 stack[STACK + 1u];
 
-uint stack_at(uint depth) { return STACK == 1u ? 0u : depth; }
+void push_group(inout uint depth, uvec2 group, bool left) {
+    if (SHALLOW) {
+        stack[1] = left ? stack[0] : stack[1];
+        stack[0] = left ? group : stack[0];
+    } else {
+        stack[depth] = group;
+    }
+    depth += uint(left);
+}
+
+uvec2 pop_group(inout uint depth) {
+    depth--;
+    uvec2 group = stack[SHALLOW ? 0u : depth];
+    if (SHALLOW) stack[0] = stack[1];
+    return group;
+}
 
 // Watertight (Woop, Benthin, Wald, JCGT 2013): all triangles project a shared vertex to the same point of the plane across
 // the ray, and the two edge functions of a shared edge are exact negatives of each other (precise forbids fused
@@ -138,7 +155,8 @@ uint count_bits(uint byte) {
 // Where a ray stands.
 struct Traversal {
     Hit hit;         // the closest so far
-    uvec2 group;     // inner children: base; hit bits (24..31) and inner mask. Or instances: base; bits below 24
+    uint base;       // of the group: the first of inner children, or of instances
+    uint bits;       // hit bits (24..31) and inner mask of children, or bits below 24 of instances
     uint depth;      // groups on the stack
     uint bottom;     // depth at which `instance` was entered
     uint instance;   // NONE in the top (or only) level
@@ -147,8 +165,9 @@ struct Traversal {
 
 Traversal traversal_start(float t_max, uint root) {
     Traversal t;
-    t.hit = Hit(t_max, NONE, NONE, vec2(0.0));
-    t.group = uvec2(root & ~ROOT_OF_INSTANCES, 0x80000000u);
+    t.hit = Hit(t_max, NONE, NONE, 0.0, 0.0);
+    t.base = root & ~ROOT_OF_INSTANCES;
+    t.bits = 0x80000000u;
     t.depth = 0u;
     t.bottom = 0u;
     t.instance = NONE;
@@ -157,30 +176,39 @@ Traversal traversal_start(float t_max, uint root) {
 
 void enter_instance(inout Traversal t, RaySpace world, uvec2 leaves) {
     uint bit = take_highest(leaves.y);
-    if (t.group.y > 0x00ffffffu) stack[t.depth++] = t.group;
-    if (leaves.y != 0u) stack[t.depth++] = leaves;
+    push_group(t.depth, uvec2(t.base, t.bits), t.bits > 0x00ffffffu);
+    push_group(t.depth, leaves, leaves.y != 0u);
     t.instance = leaves.x + bit;
     t.bottom = t.depth;
     mat4x3 object_from_world = instance_matrix(t.instance, 3);
     t.inside = ray_space(object_from_world * vec4(world.origin, 1.0), mat3(object_from_world) * world.direction);
-    t.group = uvec2(instance_root(t.instance), 0x80000000u);
+    t.base = instance_root(t.instance);
+    t.bits = 0x80000000u;
 }
 
 // lavapipe fetches for masked lanes too. So that those miss no cache, a lane without triangles stays at the one that it
-// tested last, or at the first of the scene.
-void intersect_leaves(inout Traversal t, RaySpace ray, uvec2 leaves, bool any_hit, uint mask_seed, uvec2 from) {
-    while (leaves.y != 0u) {
-        uint index = leaves.x + take_highest(leaves.y);
+// tested last, or at the first of the scene. An any hit ends the loop one triangle late: what to fetch next then waits for no
+// test, and tests overlap. What lives from round to round is scalar: vectors would be copied.
+void intersect_leaves(inout Hit hit, RaySpace ray, uvec2 leaves, uint instance, bool any_hit, uint mask_seed, uvec2 from) {
+    uint first = leaves.x, left = leaves.y;
+    bool found = false;
+    if (left != 0u) do {
+        uint index = first + take_highest(left);
+        if (found) left = 0u;
         float distance;
         vec2 barycentric;
-        bool meets = intersect_triangle(ray, index, t.hit.t, distance, barycentric) &&
-                     (index != from.x || (FX_INSTANCES && t.instance != from.y));
-        if (FX_ALPHA_MASKS && meets) meets = mask_blocks(index, t.instance, barycentric, mask_seed);
+        bool meets = intersect_triangle(ray, index, hit.t, distance, barycentric) && !found &&
+                     (index != from.x || (FX_INSTANCES && instance != from.y));
+        if (FX_ALPHA_MASKS && meets) meets = mask_blocks(index, instance, barycentric, mask_seed);
         if (meets) {
-            t.hit = Hit(distance, index, t.instance, barycentric);
-            if (any_hit) leaves.y = 0u;
+            hit.t = distance;
+            hit.triangle = index;
+            if (FX_INSTANCES) hit.instance = instance;
+            hit.b1 = barycentric.x;
+            hit.b2 = barycentric.y;
         }
-    }
+        found = any_hit && hit.triangle != NONE;
+    } while (left != 0u);
 }
 
 // Visits one node below `root` (with ROOT_OF_INSTANCES, a level of instances) and its triangles; true when nothing is
@@ -190,42 +218,48 @@ bool traversal_step(inout Traversal t, RaySpace world, bool any_hit, uint root, 
     bool two_levels = FX_INSTANCES && (root & ROOT_OF_INSTANCES) != 0u;
     RaySpace ray = world;
     if (FX_INSTANCES) ray = either(t.instance != NONE, t.inside, world);
-    uvec2 leaves = t.group; // instances that an earlier node left on the stack
-    if (!two_levels || t.group.y > 0x00ffffffu) {
-        uint hits = t.group.y >> 24, inner = t.group.y & 0xffu;
+    uvec2 leaves = uvec2(t.base, t.bits); // instances that an earlier node left on the stack
+    if (!two_levels || t.bits > 0x00ffffffu) {
+        uint hits = t.bits >> 24, inner = t.bits & 0xffu;
         uint slot = take_highest(hits) ^ (ray.octant & 0xffu);
-        if (hits != 0u) stack[stack_at(t.depth++)] = uvec2(t.group.x, (hits << 24) | inner);
+        push_group(t.depth, uvec2(t.base, (hits << 24) | inner), hits != 0u);
         uvec3 children;
-        uint mask = intersect_node(ray, t.group.x + count_bits(inner & ~(0xffffffffu << slot)), t.hit.t, children);
+        uint mask = intersect_node(ray, t.base + count_bits(inner & ~(0xffffffffu << slot)), t.hit.t, children);
         if (FX_COUNTERS) nodes_visited++;
-        t.group = uvec2(children.x, (mask & 0xff000000u) | children.z);
+        t.base = children.x;
+        t.bits = (mask & 0xff000000u) | children.z;
         leaves.y = mask & 0x00ffffffu;
         leaves.x = leaves.y != 0u ? children.y : 0u;
     } else {
-        t.group = uvec2(0u);
+        t.bits = 0u;
     }
     if (two_levels && t.instance == NONE && leaves.y != 0u) {
         enter_instance(t, world, leaves);
         leaves.y = 0u;
     }
-    intersect_leaves(t, ray, leaves, any_hit, mask_seed, from);
-    bool done = any_hit && t.hit.triangle != NONE;
-    if (!done && t.group.y <= 0x00ffffffu) {
+    uint instance = t.instance;
+    bool done = t.bits <= 0x00ffffffu && t.depth == 0u;
+    if (t.bits <= 0x00ffffffu && !done) {
         if (FX_INSTANCES && t.depth == t.bottom) {
             t.instance = NONE;
             t.bottom = 0u;
         }
-        done = t.depth == 0u;
-        if (!done) t.group = stack[stack_at(--t.depth)];
+        uvec2 group = pop_group(t.depth);
+        t.base = group.x;
+        t.bits = group.y;
     }
-    return done;
+    intersect_leaves(t.hit, ray, leaves, instance, any_hit, mask_seed, from);
+    return done || (any_hit && t.hit.triangle != NONE);
 }
 
 // The closest hit of a ray that leaves no triangle.
 Hit traverse(Segment ray, uint root) {
     RaySpace space = ray_space(ray.origin, ray.direction);
     Traversal t = traversal_start(ray.t_max, root);
-    while (!traversal_step(t, space, false, root, ray.mask_seed, uvec2(NONE))) {}
+    bool done;
+    do {
+        done = traversal_step(t, space, false, root, ray.mask_seed, uvec2(NONE));
+    } while (!done);
     return t.hit;
 }
 
@@ -233,10 +267,10 @@ Hit traverse(Segment ray, uint root) {
 // closest hit of `ray`. Both leave the same triangle. In one loop no lane waits for the slowest shadow ray, and the code is there once.
 Hit traverse_both(Segment shadow, inout bool shadowed, Segment ray, bool alive, uint root, uvec2 from) {
     RaySpace first = ray_space(shadow.origin, shadow.direction), second = ray_space(ray.origin, ray.direction);
-    bool any_hit = shadowed, done = false;
+    bool any_hit = shadowed, done;
     shadowed = false;
     Traversal t = traversal_start(any_hit ? shadow.t_max : ray.t_max, root);
-    while (!done) {
+    do {
         uint mask_seed = any_hit ? shadow.mask_seed : ray.mask_seed;
         done = traversal_step(t, either(any_hit, first, second), any_hit, root, mask_seed, from);
         if (done && any_hit) {
@@ -245,6 +279,6 @@ Hit traverse_both(Segment shadow, inout bool shadowed, Segment ray, bool alive, 
             any_hit = false;
             done = !alive;
         }
-    }
+    } while (!done);
     return t.hit;
 }
