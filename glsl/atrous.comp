@@ -41,7 +41,8 @@ void main() {
         sum[k] = vec3(0.0);
         total[k] = 0.0;
     }
-    for (int i = -2; i <= 2; i++) {
+    int i = -2;
+    do {
         int tap_x = x + i * spacing;
         float across = tap_x >= 0 && tap_x < size.x ? b3_spline(i) : 0.0;
         tap_x = clamp(tap_x, 0, size.x - 1);
@@ -57,7 +58,7 @@ void main() {
                 }
             }
         }
-    }
+    } while (++i <= 2);
     [[unroll]] for (int k = 0; k < ROWS; k++) {
         int y = first + k * spacing;
         vec4 c = centre[k].colour;

@@ -186,20 +186,19 @@ void enter_instance(inout Traversal t, RaySpace world, uvec2 leaves) {
     t.bits = 0x80000000u;
 }
 
-// lavapipe fetches for masked lanes too. So that those miss no cache, a lane without triangles stays at the one that it
-// tested last, or at the first of the scene. An any hit ends the loop one triangle late: what to fetch next then waits for no
-// test, and tests overlap. What lives from round to round is scalar: vectors would be copied.
-void intersect_leaves(inout Hit hit, RaySpace ray, uvec2 leaves, uint instance, bool any_hit, uint mask_seed, uvec2 from) {
-    uint first = leaves.x, left = leaves.y;
+// Tests the triangles of `left`, bits that count from `first`; true where one is met. lavapipe fetches for masked lanes too:
+// so that those miss no cache, a lane without triangles stays at the one that it tested last, or at the first of the scene.
+// An any hit ends the loop one triangle late: what to fetch next then waits for no test, and tests overlap.
+// What lives from round to round is scalar: vectors would be copied.
+bool intersect_triangles(inout Hit hit, RaySpace ray, uint first, uint left, uint instance, bool any_hit, uvec2 from) {
     bool found = false;
     if (left != 0u) do {
         uint index = first + take_highest(left);
-        if (found) left = 0u;
+        if (found && any_hit) left = 0u;
         float distance;
         vec2 barycentric;
-        bool meets = intersect_triangle(ray, index, hit.t, distance, barycentric) && !found &&
+        bool meets = intersect_triangle(ray, index, hit.t, distance, barycentric) && !(found && any_hit) &&
                      (index != from.x || (FX_INSTANCES && instance != from.y));
-        if (FX_ALPHA_MASKS && meets) meets = mask_blocks(index, instance, barycentric, mask_seed);
         if (meets) {
             hit.t = distance;
             hit.triangle = index;
@@ -207,8 +206,25 @@ void intersect_leaves(inout Hit hit, RaySpace ray, uvec2 leaves, uint instance, 
             hit.b1 = barycentric.x;
             hit.b2 = barycentric.y;
         }
-        found = any_hit && hit.triangle != NONE;
+        found = found || meets;
     } while (left != 0u);
+    return found;
+}
+
+// With masks, the one of the hit alone is looked up, and where it lets the ray pass, the rest is tested again.
+void intersect_leaves(inout Hit hit, RaySpace ray, uvec2 leaves, uint instance, bool any_hit, uint mask_seed, uvec2 from) {
+    if (!FX_ALPHA_MASKS) {
+        intersect_triangles(hit, ray, leaves.x, leaves.y, instance, any_hit, from);
+        return;
+    }
+    bool passes;
+    if (leaves.y != 0u) do {
+        Hit next = hit;
+        bool found = intersect_triangles(next, ray, leaves.x, leaves.y, instance, any_hit, from);
+        passes = found && !mask_blocks(next.triangle, instance, vec2(next.b1, next.b2), mask_seed);
+        if (passes) leaves.y &= ~(1u << (next.triangle - leaves.x));
+        else hit = next;
+    } while (passes && leaves.y != 0u);
 }
 
 // Visits one node below `root` (with ROOT_OF_INSTANCES, a level of instances) and its triangles; true when nothing is
