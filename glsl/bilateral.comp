@@ -49,8 +49,11 @@ void main() {
         top = max(top, begin);
         bottom = min(bottom, end - 1);
     }
-    for (int y = top; y <= bottom; y++) {
-        for (int i = -radius; i <= radius; i++) {
+    // Not a `for`: where a test stands at the head, lavapipe runs the body once more for no lane.
+    int y = top;
+    if (top <= bottom) do {
+        int i = -radius;
+        do {
             int tap_x = x + i;
             Pixel q = pixel_at(y * size.x + clamp(tap_x, 0, size.x - 1));
             bool counts = tap_x >= 0 && tap_x < size.x && q.colour.w > 0.0;
@@ -63,8 +66,8 @@ void main() {
                 sum[k] += w * (q.colour.rgb - centre[k].colour.rgb);
                 total[k] += w;
             }
-        }
-    }
+        } while (++i <= radius);
+    } while (++y <= bottom);
     [[unroll]] for (int k = 0; k < ROWS; k++) {
         if (first + k >= size.y) continue;
         if (BANDS && !last) {

@@ -25,8 +25,11 @@ Pixel pixel_at(int at) {
 float spread(ivec2 at, Pixel p) {
     ivec2 size = ivec2(push.size);
     float total = 0.0, squares = 0.0, mean = 0.0, m2 = 0.0;
-    for (int j = -REACH; j <= REACH; j++) {
-        for (int i = -REACH; i <= REACH; i++) {
+    // Not a `for`: where a test stands at the head, lavapipe runs the body once more for no lane.
+    int j = -REACH;
+    do {
+        int i = -REACH;
+        do {
             ivec2 tap = at + ivec2(i, j), inside = clamp(tap, ivec2(0), size - 1);
             Pixel q = pixel_at(inside.y * size.x + inside.x);
             float w = tap == inside ? edge_weight(q, edge_exponent(p, q, push.rates)) : 0.0;
@@ -35,8 +38,8 @@ float spread(ivec2 at, Pixel p) {
             squares += w * w;
             mean += w * off;
             m2 += w * off * off;
-        }
-    }
+        } while (++i <= REACH);
+    } while (++j <= REACH);
     mean /= total;
     // Unbiased for unequal weights; one pixel alone has no spread. Not negative: the pixel is one of at most 49, at 0.
     float others = 1.0 - squares / (total * total);

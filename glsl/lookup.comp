@@ -71,7 +71,9 @@ void main() {
     uint pixel = thread_index();
     if (pixel >= push.pixels) return; // safe: no barrier() follows
     vec3 sum = vec3(0.0);
-    for (uint k = 0u; k < push.samples; k++) {
+    // Not a `for`: where a test stands at the head, lavapipe runs the body once more for no lane.
+    uint k = 0u;
+    do {
         uint index = push.first_sample + k;
         Sampler random = sampler_start(pixel, index, push.seed);
         vec2 film = film_sample(pixel, random);
@@ -80,6 +82,6 @@ void main() {
         if (eye.object == NONE || delta) continue;
         uint chosen = most_similar(eye, film);
         if (chosen != NONE) sum += eye.albedo * known_radiance(texelFetch(filtered, int(chosen))).rgb;
-    }
+    } while (++k < push.samples);
     indirect[pixel] += sum;
 }

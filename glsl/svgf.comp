@@ -30,8 +30,8 @@ ivec2 nearest(ivec2 at) {
 // The variance of one pixel is itself uncertain: a Gaussian of 3x3 steadies it. Of a known pixel, which counts itself.
 float deviation(ivec2 at) {
     float sum = 0.0, total = 0.0;
-    for (int j = -1; j <= 1; j++) {
-        for (int i = -1; i <= 1; i++) {
+    [[unroll]] for (int j = -1; j <= 1; j++) {
+        [[unroll]] for (int i = -1; i <= 1; i++) {
             ivec2 tap = at + ivec2(i, j), inside = nearest(tap);
             float v = texelFetch(estimate, index(inside)).w, w = 1.0 / float(1 << (2 + abs(i) + abs(j)));
             if (v < 0.0 || tap != inside) w = 0.0;
@@ -51,7 +51,9 @@ void main() {
     float rate = push.rate_l / (deviation(at) + 1e-30); // finite, so that equal pixels are alike where nothing varies
     vec3 sum = vec3(0.0);
     float total = 0.0, spread = 0.0;
-    for (int i = -2; i <= 2; i++) {
+    // Not a `for`: where a test stands at the head, lavapipe runs the body once more for no lane.
+    int i = -2;
+    do {
         [[unroll]] for (int j = -2; j <= 2; j++) {
             ivec2 tap = at + int(push.spacing) * ivec2(i, j), inside = nearest(tap);
             vec4 there = texelFetch(estimate, index(inside));
@@ -64,7 +66,7 @@ void main() {
             total += w;
             spread += w * w * there.w;
         }
-    }
+    } while (++i <= 2);
     if (total > 0.0) here = vec4(here.rgb + sum / total, spread / (total * total));
     float count = texelFetch(colour, index(at)).w;
     if (LAST) here.w = count > 0.0 ? count : here.w >= 0.0 ? 1.0 : 0.0;

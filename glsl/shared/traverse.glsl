@@ -1,7 +1,8 @@
 // Closest hit and any hit through eight-way compressed nodes (Ylitie, Karras, Laine, HPG 2017), as obvhs builds them,
 // and a triangle test whose edges are watertight. The including kernel binds `nodes`, `triangles`, `instances`,
 // and for masks `shading`, `materials`, `textures`, `texels`. A device that masks lanes (lavapipe) executes all of it for
-// every node: fewer variables that live from step to step, and fewer instructions, count for more than early exits.
+// every node: fewer variables that live from step to step, and fewer instructions, count for more than early exits. It also
+// runs a loop's body once more for no lane where the test stands at the head, so loops test at their end.
 
 struct Hit {
     float t;          // in lengths of the ray's direction

@@ -112,9 +112,13 @@ void walk(int line, int first, int end) {
         for (int i = 0; i < TILE; i++) absorb_element(part.sum, part.point, line, begin + i);
         append(part, g);
     }
-    for (int tile = first, at = 0; tile < end; tile += TILE, left += TILE) {
+    // Not a `for`: where a test stands at the head, lavapipe runs the body once more for no lane.
+    int tile = first, at = 0;
+    do {
         if (MANY && at == 0) begin_turn(point_at(line, left + (GROUPS + 1) * TILE));
         walk_tile(line, tile, end, left, at);
         at = (at + 1) % TURN;
-    }
+        left += TILE;
+        tile += TILE;
+    } while (tile < end);
 }
