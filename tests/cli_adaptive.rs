@@ -95,7 +95,7 @@ fn interrupted(words: &str, spp: u32) {
         .spawn()
         .unwrap();
     // Long enough to be past compilation on any machine that renders this in more than that; short ones are seen below.
-    std::thread::sleep(Duration::from_millis(1500));
+    std::thread::sleep(Duration::from_millis(1000));
     assert!(child.try_wait().unwrap().is_none(), "the render was over before it could be interrupted: raise its spp");
     // Of the shell: a bare system has no program of that name.
     assert!(Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status().unwrap().success());
@@ -114,10 +114,10 @@ fn interrupted(words: &str, spp: u32) {
 
 #[test]
 fn ctrl_c_writes_what_there_is_and_resuming_completes_it() {
-    interrupted("", 200);
-    interrupted("--allocate variance --rounds 20", 200);
-    interrupted("--allocate threshold --min-spp 2 --max-spp 24", 200);
-    interrupted("--noise-threshold 0.001", 200);
+    interrupted("", 500);
+    interrupted("--allocate variance --rounds 20", 500);
+    interrupted("--allocate threshold --min-spp 2 --max-spp 96", 500);
+    interrupted("--noise-threshold 0.001", 500);
 }
 
 #[test]
