@@ -41,7 +41,7 @@ void main() {
         sum[k] = vec3(0.0);
         total[k] = 0.0;
     }
-    // Not a `for`: where a test stands at the head, lavapipe runs the body once more for no lane.
+    // Tested at its end: see shared/traverse.glsl.
     int i = -2;
     do {
         int tap_x = x + i * spacing;

@@ -27,7 +27,7 @@ void main() {
     Pixel p = pixel_at(at.y * size.x + at.x);
     vec4 sum = vec4(0.0);
     float total = 0.0;
-    // Not a `for`: where a test stands at the head, lavapipe runs the body once more for no lane.
+    // Tested at its end: see shared/traverse.glsl.
     int j = -2;
     do {
         [[unroll]] for (int i = -2; i <= 2; i++) {

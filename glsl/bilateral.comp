@@ -49,7 +49,7 @@ void main() {
         top = max(top, begin);
         bottom = min(bottom, end - 1);
     }
-    // Not a `for`: where a test stands at the head, lavapipe runs the body once more for no lane.
+    // Tested at its end: see shared/traverse.glsl.
     int y = top;
     if (top <= bottom) do {
         int i = -radius;

@@ -25,7 +25,7 @@ Pixel pixel_at(int at) {
 float spread(ivec2 at, Pixel p) {
     ivec2 size = ivec2(push.size);
     float total = 0.0, squares = 0.0, mean = 0.0, m2 = 0.0;
-    // Not a `for`: where a test stands at the head, lavapipe runs the body once more for no lane.
+    // Tested at its end: see shared/traverse.glsl.
     int j = -REACH;
     do {
         int i = -REACH;

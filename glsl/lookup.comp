@@ -71,7 +71,7 @@ void main() {
     uint pixel = thread_index();
     if (pixel >= push.pixels) return; // safe: no barrier() follows
     vec3 sum = vec3(0.0);
-    // Not a `for`: where a test stands at the head, lavapipe runs the body once more for no lane.
+    // Tested at its end: see shared/traverse.glsl.
     uint k = 0u;
     do {
         uint index = push.first_sample + k;

@@ -129,6 +129,8 @@ Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
     Surface s;
     bool smooth_first = false;
     uint bounce = 0u;
+    // A round goes from one surface to the next, so that the last one samples no light. The light sampled at the first waits
+    // for the ray to the next: see traverse_both.
     if (arrive(sum, path, hit, false, s) && push.max_depth > 1u) do {
         uint pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
         Bsdf bsdf = surface_bsdf(s);

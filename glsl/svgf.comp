@@ -51,7 +51,7 @@ void main() {
     float rate = push.rate_l / (deviation(at) + 1e-30); // finite, so that equal pixels are alike where nothing varies
     vec3 sum = vec3(0.0);
     float total = 0.0, spread = 0.0;
-    // Not a `for`: where a test stands at the head, lavapipe runs the body once more for no lane.
+    // Tested at its end: see shared/traverse.glsl.
     int i = -2;
     do {
         [[unroll]] for (int j = -2; j <= 2; j++) {

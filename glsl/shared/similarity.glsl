@@ -22,7 +22,7 @@ float importance(uint p) {
     ivec2 size = ivec2(push.size), at = ivec2(p % push.size.x, p / push.size.x);
     int reach = int(push.window) / 2;
     uint sum = 0u, count = 0u;
-    // Not a `for`: where a test stands at the head, lavapipe runs the body once more for no lane.
+    // Tested at its end: see shared/traverse.glsl.
     int dy = -reach;
     do {
         int dx = -reach;

@@ -212,7 +212,7 @@ bool intersect_triangles(inout Hit hit, RaySpace ray, uint first, uint left, uin
     return found;
 }
 
-// With masks, the one of the hit alone is looked up, and where it lets the ray pass, the rest is tested again.
+// A mask is looked up of the nearest triangle alone; where it lets the ray pass, the others are tested again.
 void intersect_leaves(inout Hit hit, RaySpace ray, uvec2 leaves, uint instance, bool any_hit, uint mask_seed, uvec2 from) {
     if (!FX_ALPHA_MASKS) {
         intersect_triangles(hit, ray, leaves.x, leaves.y, instance, any_hit, from);
@@ -281,7 +281,7 @@ Hit traverse(Segment ray, uint root) {
 }
 
 // First, where `shadowed`, whether anything blocks `shadow` (the answer replaces `shadowed`); then, where `alive`, the
-// closest hit of `ray`. Both leave the same triangle. In one loop no lane waits for the slowest shadow ray, and the code is there once.
+// closest hit of `ray`. Both leave the same triangle. In one loop no lane waits for the slowest shadow ray.
 Hit traverse_both(Segment shadow, inout bool shadowed, Segment ray, bool alive, uint root, uvec2 from) {
     RaySpace first = ray_space(shadow.origin, shadow.direction), second = ray_space(ray.origin, ray.direction);
     bool any_hit = shadowed, done;

@@ -112,7 +112,7 @@ void walk(int line, int first, int end) {
         for (int i = 0; i < TILE; i++) absorb_element(part.sum, part.point, line, begin + i);
         append(part, g);
     }
-    // Not a `for`: where a test stands at the head, lavapipe runs the body once more for no lane.
+    // Tested at its end: see shared/traverse.glsl.
     int tile = first, at = 0;
     do {
         if (MANY && at == 0) begin_turn(point_at(line, left + (GROUPS + 1) * TILE));
