@@ -27,8 +27,10 @@ const SIDE: u32 = 512;
 const THREADS: usize = 2;
 /// Rays that a thread takes at a time.
 const CHUNK: usize = 4096;
-/// Rays that a thread of the device traces one after the other.
-const RAYS: u32 = 16;
+/// Rays that a thread of the device traces one after the other: lanes that are done early find work until the last of them.
+/// A CPU has few lanes to keep busy, a GPU many.
+const RAYS_CPU: u32 = 128;
+const RAYS_GPU: u32 = 16;
 
 /// What either side finds: distance and triangle in leaf order (any hit: any value for a hit), [`NONE`] on a miss.
 type Found = (f32, u32);
@@ -128,9 +130,10 @@ impl Device {
         let count = self.rays.len() as u32;
         let push = TraversePush { count, root: self.root, any_hit: u32::from(any_hit) };
         let s = self.renderer.scene();
+        let rays = if self.gpu.info().kind == "CPU" { RAYS_CPU } else { RAYS_GPU };
         let times = self.gpu.run(&mut self.frame, |rec| {
             let bind = Bind { scene: s.bind(), rays: &self.rays, hits: &self.hits };
-            self.kernel.record(rec, bind, &push, count.div_ceil(RAYS))
+            self.kernel.record(rec, bind, &push, count.div_ceil(rays))
         })?;
         let pass = times.first().context("the device has no timestamps")?;
         let found = self.hits.read()?.iter().map(|h| (h.t, h.triangle)).collect();
