@@ -1,19 +1,26 @@
 //! `tallow explain`: what a scene calls for, and what that costs.
 use super::{Exit, print, print_json};
-use crate::error::Result;
-use crate::gpu::{DeviceOptions, FrameResources, Gpu};
+use crate::error::{Error, Result};
+use crate::gpu::layout::*;
+use crate::gpu::{DeviceOptions, FrameResources, Gpu, PassTime};
 use crate::renderer::{Outputs, Renderer};
 use crate::report::table::{self, milliseconds};
 use crate::scene::{self, Scene};
-use crate::settings::Settings;
+use crate::settings::{Allocate, Settings};
+use indicatif::ProgressBar;
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
+use std::process::Command;
 
 /// List every effect: on or off, what calls for it, and what it costs
 #[derive(clap::Args)]
 pub struct Args {
     /// Scene file (.toml) or model (.obj)
     pub scene: PathBuf,
+    /// Effects to measure [default: all of them]
+    #[arg(value_name = "EFFECT")]
+    pub effects: Vec<String>,
     /// Device, by index or part of its name [default: the best one]
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
@@ -22,7 +29,7 @@ pub struct Args {
     pub json: bool,
 }
 
-/// One effect. Costs are none where they were not measured.
+/// One effect of a render that writes an EXR file. Costs are none where they were not measured.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Row {
     /// Name of the effect.
@@ -35,17 +42,20 @@ pub struct Row {
     pub gpu_ms_with: Option<f64>,
     /// The same without it.
     pub gpu_ms_without: Option<f64>,
-    /// Time to compile the pipelines that the effect adds.
+    /// Time to compile the pipelines with the effect, less that without it; 0 where they cannot be told apart.
     pub compile_ms: Option<f64>,
-    /// Device memory that the effect adds.
-    pub bytes: Option<u64>,
+    /// Device memory that the effect adds: records of the scene that nothing else reads, and those of the render.
+    pub bytes: u64,
 }
 
-/// Runs the subcommand.
+/// Runs the subcommand, in a process whose drivers keep no compiled kernels: they would hide what compilation costs.
 ///
 /// # Errors
 /// As a render of the scene.
 pub fn run(args: &Args) -> Result<Exit> {
+    if COLD.iter().any(|(name, value)| std::env::var(name).as_deref() != Ok(*value)) {
+        return run_cold();
+    }
     let rows = rows(args)?;
     if args.json {
         print_json(&rows)?;
@@ -55,90 +65,160 @@ pub fn run(args: &Args) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
+/// Of the outputs, that which is no effect of a kernel.
+const GUIDES: &str = "guides";
+
+/// Drivers read these when they are loaded: Mesa's, NVIDIA's, and where Tallow keeps its own pipelines, which cannot be there.
+const COLD: [(&str, &str); 3] =
+    [("MESA_SHADER_CACHE_DISABLE", "true"), ("__GL_SHADER_DISK_CACHE", "0"), ("XDG_CACHE_HOME", "/dev/null")];
+
+/// The same command once more, whose messages and exit code are this one's.
+fn run_cold() -> Result<Exit> {
+    let mut again =
+        std::env::current_exe().map(Command::new).map_err(|e| Error::Device(format!("this program: {e}")))?;
+    let ended = again.args(std::env::args_os().skip(1)).envs(COLD).status();
+    let ended = ended.map_err(|e| Error::Device(format!("this program: {e}")))?;
+    std::process::exit(ended.code().unwrap_or(1))
+}
+
+/// What was measured so far.
+#[derive(Clone, Copy)]
+struct Cost {
+    /// The least of all passes of one sample per pixel.
+    gpu_ms: f64,
+    /// Creation of the pipelines, and what the first run took longer than a later one: compilation that the driver put off.
+    compile_ms: f64,
+    /// Device memory.
+    bytes: u64,
+}
+
+/// A renderer on a device of its own, so that nothing of it was compiled before.
+struct Variant {
+    renderer: Renderer,
+    frame: FrameResources,
+    cost: Cost,
+}
+
+impl Variant {
+    fn new(args: &Args, scene: &Scene, outputs: Outputs, effects: Effects) -> Result<Self> {
+        let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), validation: false })?;
+        let renderer = Renderer::specialised(&gpu, scene, outputs, effects)?;
+        let created: f64 = renderer.compile_times().iter().map(|(_, ms)| ms).sum();
+        let cost = Cost { gpu_ms: f64::INFINITY, compile_ms: created, bytes: gpu.allocated_bytes() };
+        let mut variant = Self { renderer, frame: FrameResources::new(&gpu)?, cost };
+        let first = variant.run()?;
+        variant.cost.gpu_ms = f64::INFINITY;
+        variant.cost.compile_ms += (first - variant.run()?).max(0.0);
+        Ok(variant)
+    }
+
+    /// Milliseconds.
+    fn run(&mut self) -> Result<f64> {
+        let mut ns = 0;
+        for step in self.renderer.steps() {
+            let times = self.renderer.run(&mut self.frame, &step)?;
+            ns += times.iter().map(PassTime::duration_ns).sum::<u64>();
+        }
+        let ms = ns as f64 * 1e-6;
+        self.cost.gpu_ms = self.cost.gpu_ms.min(ms);
+        Ok(ms)
+    }
+}
+
 fn rows(args: &Args) -> Result<Vec<Row>> {
     let scene = Scene::load(&args.scene, &shrink)?;
-    let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), validation: false })?;
     let outputs = Outputs { split_light: true, guides: true, counters: false };
     let (base, reasons) = scene::effects(&scene, outputs.split_light, outputs.counters);
-    let usual = Renderer::new(&gpu, &scene, outputs)?;
-    let sizes = usual.scene().sizes();
-    let mut frame = FrameResources::new(&gpu)?;
-    let usual_compile_ms = compile_ms(&usual, gpu_ms(&usual, &mut frame)?, gpu_ms(&usual, &mut frame)?);
-    let mut rows = Vec::new();
-    for (effect, id, on) in base.entries() {
-        let reason = reasons.iter().find(|(name, _)| *name == effect);
-        let called_for_by = reason.map_or_else(String::new, |(_, object)| object.clone());
-        if effect == "adaptive" {
-            // With and without it are different renders, not one picture at two prices: tools/adaptive compares those.
-            rows.push(Row { effect, on, called_for_by, ..Row::default() });
-            continue;
-        }
-        let other_effects = base.toggled(id);
-        let (split_light, counters) = (other_effects.split_light, other_effects.counters);
-        let other = Renderer::specialised(&gpu, &scene, Outputs { split_light, counters, ..outputs }, other_effects)?;
-        let first_ms = gpu_ms(&other, &mut frame)?;
-        let (usual_ms, other_ms) = in_turn(&usual, &other, &mut frame)?;
-        let usual = (usual_ms, usual_compile_ms);
-        let other = (other_ms, compile_ms(&other, first_ms, other_ms));
+    let called_for_by = |effect| reasons.iter().find(|(name, _)| *name == effect).map_or("", |(_, by)| by).to_owned();
+    let names: Vec<_> = base.entries().iter().map(|(name, ..)| *name).chain([GUIDES]).collect();
+    if let Some(unknown) = args.effects.iter().find(|name| !names.contains(&name.as_str())) {
+        return Err(Error::Usage(format!("no effect \"{unknown}\": choose of {}", names.join(", "))));
+    }
+    let wanted = |name: &str| args.effects.is_empty() || args.effects.iter().any(|effect| effect == name);
+    let bar = ProgressBar::new(names.iter().filter(|name| wanted(name)).count() as u64);
+    let price = |(effect, on): (&'static str, bool), outputs_then, effects_then| {
+        let usual = || Variant::new(args, &scene, outputs, base);
+        let other = || Variant::new(args, &scene, outputs_then, effects_then);
+        let (usual, other) = in_turn(usual, other)?;
         let (with, without) = if on { (usual, other) } else { (other, usual) };
-        rows.push(Row {
+        bar.inc(1);
+        Ok::<_, Error>(Row {
             effect,
             on,
-            called_for_by,
-            gpu_ms_with: Some(with.0),
-            gpu_ms_without: Some(without.0),
-            compile_ms: Some(with.1 - without.1),
-            bytes: bytes_of(effect, &sizes).filter(|_| on),
-        });
+            called_for_by: called_for_by(effect),
+            gpu_ms_with: Some(with.gpu_ms),
+            gpu_ms_without: Some(without.gpu_ms),
+            compile_ms: Some((with.compile_ms - without.compile_ms).max(0.0)),
+            bytes: scene_bytes(effect, &scene) + with.bytes.saturating_sub(without.bytes),
+        })
+    };
+    let mut rows = Vec::new();
+    for (effect, id, on) in base.entries().into_iter().filter(|(name, ..)| wanted(name)) {
+        let then = base.toggled(id);
+        let outputs_then = Outputs { split_light: then.split_light, counters: then.counters, ..outputs };
+        let row = price((effect, on), outputs_then, then)?;
+        // With and without it are different renders, not one picture at two prices: tools/adaptive compares those.
+        let unknown = Row { gpu_ms_with: None, gpu_ms_without: None, compile_ms: None, ..row.clone() };
+        rows.push(if effect == "adaptive" { unknown } else { row });
     }
+    if wanted(GUIDES) {
+        let guides = price((GUIDES, true), Outputs { guides: false, ..outputs }, base)?;
+        rows.push(Row { called_for_by: "an output that keeps primary hits".to_owned(), ..guides });
+    }
+    bar.finish_and_clear();
     Ok(rows)
 }
 
-/// A small film tells enough about cost, and a kernel per effect is timed.
+/// A small film tells enough about cost, and a kernel per effect is timed. All samples are spread evenly.
 fn shrink(settings: &mut Settings) {
     let scale = (65_536.0 / settings.pixels() as f64).sqrt().min(1.0);
     let shrunk = |edge: u32| ((f64::from(edge) * scale) as u32).max(1);
     (settings.width, settings.height) = (shrunk(settings.width), shrunk(settings.height));
     settings.spp = 1;
+    settings.allocate = Allocate { policy: std::mem::take(&mut settings.allocate.policy), ..Allocate::default() };
 }
 
-/// GPU time of the paths of one sample per pixel.
-fn gpu_ms(renderer: &Renderer, frame: &mut FrameResources) -> Result<f64> {
-    let mut ns = 0;
-    for step in renderer.steps() {
-        let times = renderer.run(frame, &step)?;
-        ns += times.iter().filter(|t| t.name == "path").map(|t| t.duration_ns()).sum::<u64>();
-    }
-    Ok(ns as f64 * 1e-6)
-}
-
-/// Best of three each, in turn, so that a machine that changes its speed changes both.
-fn in_turn(a: &Renderer, b: &Renderer, frame: &mut FrameResources) -> Result<(f64, f64)> {
-    let (mut best_a, mut best_b) = (f64::INFINITY, f64::INFINITY);
+/// Both compiled twice and run three times, in turn, so that a machine that changes its speed changes both: the least counts.
+fn in_turn(a: impl Fn() -> Result<Variant>, b: impl Fn() -> Result<Variant>) -> Result<(Cost, Cost)> {
+    let first = [a()?.cost, b()?.cost];
+    let (mut a, mut b) = (a()?, b()?);
     for _ in 0..3 {
-        best_a = best_a.min(gpu_ms(a, frame)?);
-        best_b = best_b.min(gpu_ms(b, frame)?);
+        a.run()?;
+        b.run()?;
     }
-    Ok((best_a, best_b))
+    let least = |first: Cost, c: Cost| Cost { compile_ms: c.compile_ms.min(first.compile_ms), ..c };
+    Ok((least(first[0], a.cost), least(first[1], b.cost)))
 }
 
-/// Creation of the pipelines, and what the first run took longer than a later one: compilation that the driver put off.
-/// A driver that keeps its own cache on disk (Mesa's: MESA_SHADER_CACHE_DISABLE=true) hides what it has compiled before.
-fn compile_ms(renderer: &Renderer, first_ms: f64, later_ms: f64) -> f64 {
-    renderer.compile_times().iter().map(|(_, ms)| ms).sum::<f64>() + (first_ms - later_ms).max(0.0)
-}
-
-/// Device memory of the arrays that exist only for this effect.
-fn bytes_of(effect: &str, sizes: &[(&'static str, u64)]) -> Option<u64> {
-    let part = match effect {
-        "textures" => "texels",
-        "smooth_normals" => "shading",
-        "instances" => "instances",
-        "environment_map" => "environment",
-        "emissive" => "lights",
-        _ => return None,
+/// Device memory of the scene's records that nothing but this effect reads.
+fn scene_bytes(effect: &str, scene: &Scene) -> u64 {
+    let maps = |of: fn(&Material) -> [u32; 4]| {
+        let named: BTreeSet<u32> = scene.materials.iter().flat_map(of).filter(|&map| map != NONE).collect();
+        let texels = |map: u32| (scene.textures[map as usize].width * scene.textures[map as usize].height) as usize;
+        named.into_iter().map(|map| texels(map) * size_of::<u32>()).sum()
     };
-    sizes.iter().find(|(name, _)| *name == part).map(|(_, bytes)| *bytes)
+    let lights = |kind: u32| {
+        let lights = scene.lights.iter().filter(|light| light.kind == kind);
+        lights.count() * (size_of::<Light>() + size_of::<AliasEntry>())
+    };
+    let bytes = match effect {
+        "textures" => maps(|m| [m.base_texture, m.specular_texture, m.roughness_texture, m.emission_texture]),
+        "bump_maps" => maps(|m| [if m.flags & MATERIAL_NORMAL_MAP == 0 { m.bump_texture } else { NONE }; 4]),
+        "normal_maps" => maps(|m| [if m.flags & MATERIAL_NORMAL_MAP != 0 { m.bump_texture } else { NONE }; 4]),
+        "alpha_masks" => maps(|m| [m.opacity_texture; 4]),
+        "smooth_normals" => size_of_val(&scene.shading[..]),
+        "instances" => size_of_val(&scene.instances[..]),
+        "environment_map" => {
+            scene.environment.as_ref().map_or(0, |e| size_of_val(&e.texels[..]) + size_of_val(&e.table[..]))
+        }
+        "emissive" => lights(LIGHT_TRIANGLE),
+        "point_lights" => lights(LIGHT_POINT),
+        "spot_lights" => lights(LIGHT_SPOT),
+        "directional_lights" => lights(LIGHT_DIRECTIONAL),
+        "environment" => lights(LIGHT_ENVIRONMENT),
+        _ => 0,
+    };
+    bytes as u64
 }
 
 /// The rows as a table; a dash stands for what was not measured.
@@ -151,7 +231,7 @@ pub fn text(rows: &[Row]) -> String {
             ms(r.gpu_ms_with),
             ms(r.gpu_ms_without),
             ms(r.compile_ms),
-            r.bytes.map_or("-".to_owned(), |b| b.to_string()),
+            r.bytes.to_string(),
             r.called_for_by.clone(),
         ]
     };
@@ -165,10 +245,10 @@ mod tests {
 
     #[test]
     fn costs_not_measured_are_dashes() {
-        let on = Row { effect: "ggx", on: true, called_for_by: "vase".to_owned(), bytes: Some(64), ..Row::default() };
+        let on = Row { effect: "ggx", on: true, called_for_by: "vase".to_owned(), bytes: 64, ..Row::default() };
         let table = text(&[on, Row { effect: "lens", ..Row::default() }]);
         let last = |line: usize| table.lines().nth(line).unwrap().split_whitespace().collect::<Vec<_>>();
         assert_eq!(last(1), ["ggx", "on", "-", "-", "-", "64", "vase"]);
-        assert_eq!(last(2), ["lens", "off", "-", "-", "-", "-"]);
+        assert_eq!(last(2), ["lens", "off", "-", "-", "-", "0"]);
     }
 }

@@ -80,6 +80,12 @@ impl Args {
         name.push(".exr");
         vec![name.into()]
     }
+
+    /// More than radiance is kept only where a file or a filter takes it.
+    fn wanted(&self) -> Outputs {
+        let layers = self.denoise.is_some() || self.output_files().iter().any(|file| image::has_layers(file));
+        Outputs { split_light: layers, guides: layers, counters: self.counters }
+    }
 }
 
 /// What `--json` prints.
@@ -132,7 +138,7 @@ pub fn run(args: &Args) -> Result<Exit> {
         scene.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
     }
     let gpu = host.time("open device", || args.common.open())?;
-    let wanted = Outputs { split_light: true, guides: true, counters: args.counters };
+    let wanted = args.wanted();
     check_memory(args, &scene.settings, &gpu)?;
     args.denoise.map_or(Ok(()), |_| {
         filter::check_size(&gpu, [scene.settings.width, scene.settings.height], filter::GUIDE_TEXELS)

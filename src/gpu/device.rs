@@ -103,6 +103,11 @@ impl Gpu {
         &self.0.info
     }
 
+    /// Bytes of all buffers that were made on the device and still are.
+    pub fn allocated_bytes(&self) -> u64 {
+        self.0.lock_allocator().as_ref().map_or(0, |a| a.generate_report().total_allocated_bytes)
+    }
+
     /// Records work with `record`, submits it, waits for it, and returns what each pass took, in order. The times are
     /// empty where the queue has no timestamps. Everything that earlier runs wrote is visible to this one, and what
     /// this one writes to the host.

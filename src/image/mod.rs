@@ -47,6 +47,11 @@ fn format_of(path: &Path) -> Result<Format> {
     }
 }
 
+/// Whether [`write()`] to a file of this name keeps more than the colour.
+pub fn has_layers(path: &Path) -> bool {
+    matches!(format_of(path), Ok(Format::Exr))
+}
+
 /// Writes a film in the format its extension names: `.exr` holds every channel and the metadata, `.png` (8-bit sRGB)
 /// and `.hdr` (Radiance RGBE, negative values as 0) the colour alone.
 ///
