@@ -4,7 +4,7 @@ use crate::composition::Demodulation;
 use crate::error::{Error, Result};
 use crate::filter::{self, Filter, FilterSettings, Planes, Row};
 use crate::gpu::layout::{Effects, PixelLight, PixelStats, SplitPush, vec4};
-use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
+use crate::gpu::{Buffer, Gpu, Kernel, Location, PixelFormat, Recorder};
 use crate::renderer::{OutputView, Renderer};
 use crate::shaders::{join, split};
 use crate::stage::groups;
@@ -98,7 +98,7 @@ impl Denoiser {
             buffer: self.picture.raw(),
             offset: 0,
             stride: size_of::<vec4>() as u32,
-            channels: 4,
+            format: PixelFormat::R32G32B32A32Sfloat,
             pixels: self.planes.pixels(),
         }
     }

@@ -1,6 +1,7 @@
 //! The renderer that an engine embeds and that the command line drives: a scene on a device, kernels specialised for
 //! it, and frames recorded batch by batch into command buffers.
 mod lookup;
+mod views;
 
 use crate::allocate::{self, HostInputs, Row};
 use crate::error::{Error, Result};
@@ -10,7 +11,7 @@ use crate::gpu::layout::{
     Apportionment, Camera, Effects, LIGHT_ENVIRONMENT, NONE, PathPush, PixelLight, PixelStats, PriorityPush,
     ROOT_OF_INSTANCES,
 };
-use crate::gpu::{FrameResources, Gpu, Kernel, PassTime, RawBuffer, Recorder};
+use crate::gpu::{FrameResources, Gpu, Kernel, PassTime, Recorder};
 use crate::scene::{self, Scene};
 use crate::schedule::{self, Cut};
 pub use crate::schedule::{Batch, Choice, PathRange, Plan, Progress, Share, Step};
@@ -18,6 +19,7 @@ use crate::settings::{PixelFilter, Placing, Sampler, Settings};
 use crate::stage::apportion::Apportion;
 use crate::stage::scan::Scan;
 use crate::stage::{PerThread, WORKGROUP_CPU, WORKGROUP_GPU};
+pub use views::{Layer, OutputView};
 
 /// What a render leaves in buffers besides radiance and its variance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,21 +30,6 @@ pub struct Outputs {
     pub guides: bool,
     /// Rays and nodes counted.
     pub counters: bool,
-}
-
-/// A result buffer for the caller: pixel `i` of the view (row-major, row 0 at the top) starts at `offset + i * stride`.
-#[derive(Clone, Copy, Debug)]
-pub struct OutputView {
-    /// The Vulkan handle, valid as long as what returned the view.
-    pub buffer: RawBuffer,
-    /// Bytes to the first pixel's first value.
-    pub offset: u64,
-    /// Bytes from pixel to pixel.
-    pub stride: u32,
-    /// 32-bit floats of one pixel.
-    pub channels: u32,
-    /// Pixels in this view.
-    pub pixels: u32,
 }
 
 /// A scene on a device and the kernels to render it. Everything is created in [`Renderer::new`], nothing later.
@@ -258,18 +245,6 @@ impl Renderer {
         }
         self.push.camera = camera;
         Ok(())
-    }
-
-    /// Linear radiance (Rec. 709), 3 floats a pixel: one view for each of [`FilmBuffers::tiles`], in order.
-    pub fn radiance(&self) -> Vec<OutputView> {
-        let view = |tile: &FilmTile| OutputView {
-            buffer: tile.stats.raw(),
-            offset: 0,
-            stride: size_of::<PixelStats>() as u32,
-            channels: 3,
-            pixels: tile.pixels,
-        };
-        self.film.tiles.iter().map(view).collect()
     }
 
     /// The buffers, for reading back and for stages of the caller's own.

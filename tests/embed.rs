@@ -13,10 +13,10 @@ use tallow::composition::{self, Demodulation};
 use tallow::denoiser::Denoiser;
 use tallow::filter::{self, FilterSettings};
 use tallow::gpu::layout::{Camera, Effects, vec3, vec4};
-use tallow::gpu::{Buffer, FrameResources, Gpu, Location, Recorder};
+use tallow::gpu::{Buffer, FrameResources, Gpu, Location, PixelFormat, Recorder};
 use tallow::image::aov::{Aovs, Names};
-use tallow::image::{self, Film};
-use tallow::renderer::{OutputView, Outputs, Renderer};
+use tallow::image::{self, Film, Samples};
+use tallow::renderer::{Layer, OutputView, Outputs, Renderer};
 use tallow::scene::Scene;
 use tallow::settings::Settings;
 
@@ -51,9 +51,9 @@ fn command_line(policy: &str) -> Film {
     image::read(&file).unwrap()
 }
 
-/// The engine copies every pixel's radiance out of the strided result, in its own command buffer.
+/// The engine copies every pixel's values out of the strided result, in its own command buffer.
 unsafe fn gather<T: Pod>(device: &ash::Device, commands: vk::CommandBuffer, from: OutputView, to: &Buffer<T>) {
-    let size = 4 * u64::from(from.channels);
+    let size = size_of::<T>() as u64;
     let region = |i: usize| vk::BufferCopy {
         src_offset: from.buffer.offset + from.offset + i as u64 * u64::from(from.stride),
         dst_offset: to.raw().offset + i as u64 * size,
@@ -87,7 +87,7 @@ fn agrees(engine: &Engine, gpu: &Gpu, policy: &str) {
                 renderer.record(&mut rec, &step).unwrap();
             }
             drop(rec);
-            gather(&engine.device, commands, renderer.radiance()[0], &download);
+            gather(&engine.device, commands, renderer.views(Layer::Radiance).unwrap()[0], &download);
         });
         download.read().unwrap()
     };
@@ -104,6 +104,57 @@ fn agrees(engine: &Engine, gpu: &Gpu, policy: &str) {
     assert_eq!(renderer.set_camera(lens).unwrap_err().exit_code(), 2, "the kernels were compiled for a pinhole");
     let effects = Effects { lens: true, ..*renderer.effects() };
     Renderer::specialised(gpu, &scene, outputs, effects).unwrap().set_camera(lens).unwrap();
+}
+
+/// The layers of the command line's file, as the engine finds them.
+#[test]
+fn an_engine_gets_every_layer() {
+    let engine = Engine::new();
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
+    let scene = Scene::load(&scene_file(), &|s| small(s, "uniform")).unwrap();
+    let renderer = Renderer::new(&gpu, &scene, Outputs { split_light: true, guides: true, counters: false }).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let pixels = (WIDTH * HEIGHT) as usize;
+    let vectors = Buffer::<vec3>::new(&gpu, "vectors", pixels, Location::Readback).unwrap();
+    let words = Buffer::<u32>::new(&gpu, "words", pixels, Location::Readback).unwrap();
+    for step in renderer.steps() {
+        renderer.run(&mut frame, &step).unwrap();
+    }
+    let view = |layer| renderer.views(layer).unwrap()[0];
+    let film = command_line("uniform");
+    for (layer, name) in [
+        (Layer::Radiance, None),
+        (Layer::M2, Some("m2")),
+        (Layer::Direct, Some("direct")),
+        (Layer::Indirect, Some("indirect")),
+        (Layer::Albedo, Some("albedo")),
+        (Layer::Normal, Some("N")),
+        (Layer::Position, Some("P")),
+    ] {
+        // SAFETY: the view is of a live buffer, the download of its length.
+        engine.run(|commands| unsafe { gather(&engine.device, commands, view(layer), &vectors) });
+        assert_eq!(view(layer).format, PixelFormat::R32G32B32Sfloat);
+        assert!(vectors.read().unwrap() == film.picture(name).unwrap().pixels, "{layer:?}");
+    }
+    for (layer, name, format) in [
+        (Layer::Samples, "samples", PixelFormat::R32Uint),
+        (Layer::Depth, "Z", PixelFormat::R32Sfloat),
+        (Layer::Object, "id", PixelFormat::R32Uint),
+    ] {
+        // SAFETY: as above.
+        engine.run(|commands| unsafe { gather(&engine.device, commands, view(layer), &words) });
+        assert_eq!(view(layer).format, format);
+        let expected = match film.channel(name).unwrap() {
+            Samples::U32(values) => values.clone(),
+            Samples::F32(values) => values.iter().map(|v| v.to_bits()).collect(),
+        };
+        assert!(words.read().unwrap() == expected, "{layer:?}");
+    }
+    let plain = Renderer::new(&gpu, &scene, Outputs::default()).unwrap();
+    assert!(plain.views(Layer::Radiance).is_ok());
+    assert!([Layer::Indirect, Layer::Depth].iter().all(|&layer| plain.views(layer).unwrap_err().exit_code() == 2));
+    assert_eq!(engine.messages(), Vec::<String>::new());
 }
 
 /// Steps and filter in one command buffer, against the command line's file taken apart, filtered and put together.

@@ -70,6 +70,20 @@ unsafe fn engine_copy(device: &ash::Device, commands: vk::CommandBuffer, from: &
     unsafe { device.cmd_copy_buffer(commands, buffers.0, buffers.1, &[region]) };
 }
 
+/// The engine enables the extension where there is one, as the layer does on a device of its own.
+#[test]
+fn an_engines_clocks_are_tied_together_where_its_device_can() {
+    let engine = Engine::new();
+    let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
+    assert_eq!(gpu.calibrate().is_some(), support::gpu().calibrate().is_some());
+    if let Some((device, host)) = gpu.calibrate() {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        let (device_after, host_after) = gpu.calibrate().unwrap();
+        assert!((device_after - device).abs_diff(host_after - host) < 5_000_000);
+    }
+    assert_eq!(engine.messages(), Vec::<String>::new());
+}
+
 #[test]
 fn times_before_the_work_is_done_are_an_error() {
     let engine = Engine::new();

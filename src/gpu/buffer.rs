@@ -36,6 +36,20 @@ pub struct RawBuffer {
     pub size: u64,
 }
 
+/// How the values of one pixel lie in memory: `as i32`, the `VkFormat` of the same name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(i32)]
+pub enum PixelFormat {
+    /// One unsigned integer.
+    R32Uint = vk::Format::R32_UINT.as_raw(),
+    /// One float.
+    R32Sfloat = vk::Format::R32_SFLOAT.as_raw(),
+    /// Three floats.
+    R32G32B32Sfloat = vk::Format::R32G32B32_SFLOAT.as_raw(),
+    /// Four floats.
+    R32G32B32A32Sfloat = vk::Format::R32G32B32A32_SFLOAT.as_raw(),
+}
+
 /// `len` values of `T`, readable by kernels as storage and as texels, and copied from and to.
 pub struct Buffer<T> {
     untyped: Arc<Untyped>,

@@ -107,4 +107,31 @@ mod tests {
         std::fs::write(&file, flipped).unwrap();
         assert_eq!(read(&file), None);
     }
+
+    /// VkPipelineCacheHeaderVersionOne: its length, 1, the vendor, the device, 16 bytes of the driver's.
+    fn header(c: &Candidate) -> Vec<u8> {
+        let words = [32, vk::PipelineCacheHeaderVersion::ONE.as_raw() as u32, c.vendor, c.id];
+        words.iter().flat_map(|w| w.to_le_bytes()).chain(c.cache_uuid).chain(*b"data").collect()
+    }
+
+    #[test]
+    fn caches_are_kept_apart_by_device_driver_and_kernels() {
+        let instance = super::super::instance::Instance::new(false).unwrap();
+        let mut candidates = super::super::info::candidates(&instance.raw).unwrap();
+        let c = &mut candidates[0];
+        let (data, name) = (header(c), file_name(c));
+        assert!(fits(&data, c));
+        assert!(!fits(&data[..31], c) && !fits(&[], c), "cut");
+        assert!(name.contains(&format!("{:016x}", crate::shaders::HASH)), "{name}");
+        for byte in [4, 8, 12, 16, 31] {
+            let mut other = data.clone();
+            other[byte] ^= 1;
+            assert!(!fits(&other, c), "byte {byte} tells another device");
+        }
+        c.cache_uuid[15] ^= 1;
+        assert_ne!(file_name(c), name, "another build of the driver");
+        c.cache_uuid[15] ^= 1;
+        c.info.driver_version += "1";
+        assert_ne!(file_name(c), name, "another version of it");
+    }
 }

@@ -6,7 +6,7 @@ use super::instance::Instance;
 use crate::error::{Error, Result};
 use ash::vk::Handle;
 use ash::{ext, vk};
-use std::ffi::c_void;
+use std::ffi::{CStr, c_void};
 
 /// The caller's handles, as the numbers that Vulkan's C interface uses (pointers for dispatchable handles).
 #[derive(Clone, Copy, Debug)]
@@ -27,7 +27,7 @@ pub struct RawDevice {
 
 impl Gpu {
     /// Works on a device made elsewhere. Destroys nothing that it did not make. Passes carry debug labels when the
-    /// instance has VK_EXT_debug_utils enabled.
+    /// instance has VK_EXT_debug_utils enabled; [`Gpu::calibrate`] works when the device has VK_EXT_calibrated_timestamps.
     ///
     /// # Safety
     /// - The handles are valid, belong together, and outlive everything made from the returned `Gpu`.
@@ -59,11 +59,15 @@ impl Gpu {
         check_family(&instance, physical, raw.queue_family)?;
         let candidate = info::describe(&instance, physical, Some(raw.queue_family));
         usable(&candidate)?;
-        let debug = has_labels(&instance, &device).then(|| ext::debug_utils::Device::new(&instance, &device));
+        let labels = [c"vkCmdBeginDebugUtilsLabelEXT", c"vkCmdEndDebugUtilsLabelEXT", c"vkSetDebugUtilsObjectNameEXT"];
+        let has = |names: &[&CStr]| enabled(&instance, &device, names);
+        let debug = has(&labels).then(|| ext::debug_utils::Device::new(&instance, &device));
+        let calibrated = has(&[c"vkGetCalibratedTimestampsEXT"]);
+        let calibrated = calibrated.then(|| ext::calibrated_timestamps::Device::new(&instance, &device));
         drop(alone);
         let queue = vk::Queue::from_raw(raw.queue);
         let instance = Instance::borrowed(entry, instance);
-        Self::assemble(instance, candidate, raw.queue_family, device, queue, (debug, None))
+        Self::assemble(instance, candidate, raw.queue_family, device, queue, (debug, calibrated))
     }
 }
 
@@ -77,9 +81,8 @@ fn check_family(instance: &ash::Instance, physical: vk::PhysicalDevice, family: 
     }
 }
 
-/// The loader returns these only when the extension is enabled.
-fn has_labels(instance: &ash::Instance, device: &ash::Device) -> bool {
-    let names = [c"vkCmdBeginDebugUtilsLabelEXT", c"vkCmdEndDebugUtilsLabelEXT", c"vkSetDebugUtilsObjectNameEXT"];
+/// The loader returns functions of extensions only where these are enabled.
+fn enabled(instance: &ash::Instance, device: &ash::Device, names: &[&CStr]) -> bool {
     // SAFETY: valid handles by the contract of `from_raw`.
     names.iter().all(|name| unsafe { instance.get_device_proc_addr(device.handle(), name.as_ptr()) }.is_some())
 }

@@ -27,7 +27,7 @@ mod timing;
 
 pub use access::Access;
 use buffer::Untyped;
-pub use buffer::{Bound, Buffer, Location, PART, RawBuffer};
+pub use buffer::{Bound, Buffer, Location, PART, PixelFormat, RawBuffer};
 pub use device::{DeviceOptions, Gpu};
 pub use external::RawDevice;
 pub use frame::FrameResources;
