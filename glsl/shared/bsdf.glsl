@@ -69,33 +69,6 @@ float visible_weight(Bsdf b, vec3 wo, vec3 wi, float area) {
     return g * area / wo.z;
 }
 
-// Torrance-Sparrow reflection without its Fresnel factor about the half vector m: x = f cos, y = pdf.
-vec2 evaluate_reflection(Bsdf b, vec3 wo, vec3 wi, vec3 m) {
-    float area = microfacet_area(b.ggx, wo, b.alpha);
-    float pdf = microfacet_d(b.ggx, m, b.alpha) / (4.0 * area);
-    return vec2(visible_weight(b, wo, wi, area) * pdf, pdf);
-}
-
-vec4 evaluate_conductor(Bsdf b, vec3 wo, vec3 wi) {
-    if (is_smooth(b)) return vec4(0.0);
-    vec3 m = half_vector(wo, wi);
-    vec2 r = evaluate_reflection(b, wo, wi, m);
-    return vec4(b.specular * fresnel_conductor(dot(wo, m), b.eta, b.k) * r.x, r.y);
-}
-
-bool sample_conductor(Bsdf b, vec3 wo, vec2 u, out BsdfSample s) {
-    bool delta = is_smooth(b);
-    vec3 m = UP;
-    if (!delta) m = microfacet_sample(b.ggx, wo, b.alpha, u);
-    s = BsdfSample(mirror(wo, m), b.specular * fresnel_conductor(dot(wo, m), b.eta, b.k), 0.0, delta);
-    if (!delta) {
-        float area = microfacet_area(b.ggx, wo, b.alpha);
-        s.weight *= visible_weight(b, wo, s.wi, area);
-        s.pdf = microfacet_d(b.ggx, m, b.alpha) / (4.0 * area);
-    }
-    return s.wi.z > GRAZING && dot(wo, m) > 0.0;
-}
-
 // Index beyond / index on the side of wo. A rough interface needs the two to differ: equal indices refract along one
 // direction only, so 1 counts as 1.001, which bends light by less than the smallest alpha.
 float relative_index(Bsdf b, float wo_z) {
@@ -110,47 +83,6 @@ float scattered_density(Bsdf b, vec3 m, float n, float co, float ci) {
     return microfacet_d(b.ggx, m, b.alpha) * co * abs(ci) * n * n / max(q * q, 1e-30);
 }
 
-// Works on the side of wo: both z flip together when wo is inside.
-vec4 evaluate_dielectric(Bsdf b, vec3 wo, vec3 wi) {
-    float eta = relative_index(b, wo.z);
-    wi.z = wo.z < 0.0 ? -wi.z : wi.z;
-    wo.z = abs(wo.z);
-    bool reflected = wi.z > 0.0;
-    float n = reflected ? 1.0 : eta;
-    vec3 m = half_vector(wo, n * wi);
-    m = m.z < 0.0 ? -m : m;
-    float co = dot(wo, m);
-    float ci = dot(wi, m);
-    if (is_smooth(b) || wo.z < GRAZING || abs(wi.z) < GRAZING || co <= 0.0 || ci * wi.z <= 0.0) return vec4(0.0);
-    float f = fresnel_dielectric(co, eta).x;
-    float area = microfacet_area(b.ggx, wo, b.alpha);
-    float pdf = (reflected ? f : 1.0 - f) * scattered_density(b, m, n, co, ci) / area;
-    vec3 tint = reflected ? b.specular : b.transmission;
-    return vec4(tint * (visible_weight(b, wo, wi, area) * pdf / (n * n)), pdf);
-}
-
-bool sample_dielectric(Bsdf b, vec3 wo, float u_lobe, vec2 u, out BsdfSample s) {
-    bool delta = is_smooth(b);
-    float eta = relative_index(b, wo.z);
-    float side = wo.z < 0.0 ? -1.0 : 1.0;
-    wo.z = abs(wo.z);
-    vec3 m = UP;
-    if (!delta) m = microfacet_sample(b.ggx, wo, b.alpha, u);
-    float co = dot(wo, m);
-    vec2 f = fresnel_dielectric(co, eta);
-    bool reflected = u_lobe < f.x;
-    float n = reflected ? 1.0 : eta;
-    float ci = reflected ? co : -f.y;
-    vec3 wi = (co / n + ci) * m - wo / n;
-    s = BsdfSample(vec3(wi.xy, side * wi.z), (reflected ? b.specular : b.transmission) / (n * n), 0.0, delta);
-    if (!delta) {
-        float area = microfacet_area(b.ggx, wo, b.alpha);
-        s.weight *= visible_weight(b, wo, wi, area);
-        s.pdf = (reflected ? f.x : 1.0 - f.x) * scattered_density(b, m, n, co, ci) / area;
-    }
-    return wo.z >= GRAZING && co > 0.0 && (reflected ? wi.z > GRAZING : wi.z < -GRAZING);
-}
-
 // Probability of the coat's own reflection: each lobe's share of the reflected energy, roughly.
 float coat_probability(Bsdf b, float f) {
     float specular = f * mean3(b.specular);
@@ -159,53 +91,94 @@ float coat_probability(Bsdf b, float f) {
 
 // Mitsuba 3's `plastic` with `nonlinear` off: light enters and leaves through smooth Fresnel transmittance, and the
 // reflections inside add up to 1 / (1 - internal_fresnel). Its rough variant differs by a tabulated transmittance.
-vec4 evaluate_coated(Bsdf b, vec3 wo, vec3 wi) {
+// x multiplies the diffuse base, y is the probability of the coat's lobe.
+vec2 coat(Bsdf b, vec3 wo, vec3 wi) {
     float fo = fresnel_dielectric(wo.z, b.eta.x).x;
     float fi = fresnel_dielectric(wi.z, b.eta.x).x;
-    float p = coat_probability(b, fo);
-    float through = (1.0 - fo) * (1.0 - fi) / (b.eta.x * b.eta.x * (1.0 - b.internal_fresnel));
-    vec4 value = evaluate_diffuse(b, wi) * vec4(vec3(through), 1.0 - p);
-    if (is_smooth(b)) return value;
-    vec3 m = half_vector(wo, wi);
-    vec2 r = evaluate_reflection(b, wo, wi, m);
-    return value + vec4(b.specular * (fresnel_dielectric(dot(wo, m), b.eta.x).x * r.x), p * r.y);
+    return vec2((1.0 - fo) * (1.0 - fi) / (b.eta.x * b.eta.x * (1.0 - b.internal_fresnel)), coat_probability(b, fo));
 }
 
-bool sample_coated(Bsdf b, vec3 wo, float u_lobe, vec2 u, out BsdfSample s) {
-    float f = fresnel_dielectric(wo.z, b.eta.x).x;
-    float p = coat_probability(b, f);
-    bool specular = u_lobe < p;
-    bool delta = specular && is_smooth(b);
-    vec3 m = UP;
-    if (specular && !delta) m = microfacet_sample(b.ggx, wo, b.alpha, u);
-    s = BsdfSample(specular ? mirror(wo, m) : warp_cosine_hemisphere(u), b.specular * (f / max(p, 1e-10)), 0.0, delta);
-    bool above = s.wi.z > GRAZING;
-    if (above && !delta) {
-        vec4 value = evaluate_coated(b, wo, s.wi);
-        s.weight = value.rgb / max(value.w, 1e-30);
-        s.pdf = value.w;
-    }
-    return above;
-}
-
+// The kinds share their code, half vectors and distributions above all: a device that masks lanes runs that of all kinds.
 // rgb = f |cos wi|, w = density over solid angle with which bsdf_sample picks wi. Delta lobes count as 0.
 vec4 bsdf_evaluate(Bsdf b, vec3 wo, vec3 wi) {
-    if (is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC)) return evaluate_dielectric(b, wo, wi);
-    if (min(wo.z, wi.z) <= GRAZING) return vec4(0.0);
-    if (is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR)) return evaluate_conductor(b, wo, wi);
-    if (is_kind(FX_COATED, b, BSDF_COATED)) return evaluate_coated(b, wo, wi);
-    return evaluate_diffuse(b, wi);
+    bool glass = is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC), metal = is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR);
+    bool coated = is_kind(FX_COATED, b, BSDF_COATED);
+    float eta = glass ? relative_index(b, wo.z) : b.eta.x;
+    if (glass) { // on the side of wo: both z flip together when wo is inside
+        wi.z = wo.z < 0.0 ? -wi.z : wi.z;
+        wo.z = abs(wo.z);
+    }
+    if (wo.z <= GRAZING || (glass ? abs(wi.z) : wi.z) <= GRAZING) return vec4(0.0);
+    vec4 value = glass || metal ? vec4(0.0) : evaluate_diffuse(b, wi);
+    float share = 1.0; // of the samples
+    if (coated) {
+        vec2 c = coat(b, wo, wi);
+        value *= vec4(c.xxx, 1.0 - c.y);
+        share = c.y;
+    }
+    if (!(glass || metal || coated) || is_smooth(b)) return value;
+    bool reflected = wi.z > 0.0;
+    float n = reflected ? 1.0 : eta;
+    vec3 m = half_vector(wo, n * wi);
+    m = m.z < 0.0 ? -m : m;
+    float co = dot(wo, m), ci = dot(wi, m);
+    if (co <= 0.0 || ci * wi.z <= 0.0) return value;
+    vec3 tint = reflected ? b.specular : b.transmission;
+    if (metal) {
+        tint *= fresnel_conductor(co, b.eta, b.k);
+    } else {
+        float f = fresnel_dielectric(co, eta).x;
+        if (glass) share = reflected ? f : 1.0 - f;
+        tint *= glass ? share : f;
+    }
+    float area = microfacet_area(b.ggx, wo, b.alpha);
+    float density = scattered_density(b, m, n, co, ci) / area;
+    return value + vec4(tint * (visible_weight(b, wo, wi, area) * density / (n * n)), share * density);
 }
 
 // False: the path is absorbed, and `s` holds nothing of use. `u_lobe` chooses the lobe, `u` the direction in it.
 bool bsdf_sample(Bsdf b, vec3 wo, float u_lobe, vec2 u, out BsdfSample s) {
-    if (is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC)) return sample_dielectric(b, wo, u_lobe, u, s);
+    bool glass = is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC), metal = is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR);
+    bool coated = is_kind(FX_COATED, b, BSDF_COATED);
     vec3 wi = warp_cosine_hemisphere(u);
     s = BsdfSample(wi, b.albedo, wi.z * INV_PI, false);
-    if (wo.z <= GRAZING) return false;
-    if (is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR)) return sample_conductor(b, wo, u, s);
-    if (is_kind(FX_COATED, b, BSDF_COATED)) return sample_coated(b, wo, u_lobe, u, s);
-    return true;
+    if (!glass && wo.z <= GRAZING) return false;
+    if (!(glass || metal || coated)) return true;
+    s.delta = is_smooth(b);
+    float side = wo.z < 0.0 ? -1.0 : 1.0;
+    vec3 above = vec3(wo.xy, side * wo.z), m = UP;
+    if (!s.delta) m = microfacet_sample(b.ggx, above, b.alpha, u);
+    float co = dot(above, m), ci = co, n = 1.0;
+    float eta = glass ? relative_index(b, wo.z) : b.eta.x;
+    bool specular = true, reflected = true;
+    s.weight = b.specular;
+    if (metal) {
+        s.weight *= fresnel_conductor(co, b.eta, b.k);
+    } else {
+        vec2 f = fresnel_dielectric(coated ? above.z : co, eta);
+        float p = coated ? coat_probability(b, f.x) : f.x;
+        bool first = u_lobe < p;
+        if (coated) {
+            specular = first;
+            s.weight *= f.x / max(p, 1e-10);
+        } else {
+            reflected = first;
+            n = reflected ? 1.0 : eta;
+            ci = reflected ? co : -f.y;
+            s.weight = (reflected ? b.specular : b.transmission) / (n * n);
+        }
+    }
+    if (specular) wi = (co / n + ci) * m - above / n;
+    s.wi = vec3(wi.xy, side * wi.z);
+    s.delta = s.delta && specular;
+    s.pdf = 0.0;
+    bool scattered = above.z >= GRAZING && (reflected ? wi.z > GRAZING : wi.z < -GRAZING) && (co > 0.0 || !specular);
+    if (scattered && !s.delta) {
+        vec4 value = bsdf_evaluate(b, wo, s.wi);
+        s.weight = value.rgb / max(value.w, 1e-30);
+        s.pdf = value.w;
+    }
+    return scattered;
 }
 
 // A conductor or a dielectric: light scatters at its surface alone.

@@ -18,23 +18,31 @@ vec3 perturbed_normal(Surface s, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
     if (image == NONE || det == 0.0) return s.normal;
     vec3 dpdu = (d2.y * e1 - d1.y * e2) / det;
     vec3 dpdv = (d1.x * e2 - d2.x * e1) / det;
+    bool mapped = FX_NORMAL_MAPS && (!FX_BUMP_MAPS || (s.flags & MATERIAL_NORMAL_MAP) != 0u);
+    uvec4 words = texelFetch(textures, int(2u * image));
+    vec2 scale = uintBitsToFloat(texelFetch(textures, int(2u * image + 1u)).xy);
+    vec2 texel = 1.0 / (vec2(words.yz) * max(abs(scale), 1e-6));
+    // The normal, or heights here, one texel along u and one along v.
+    vec3 value;
+    float here, along_u = 0.0, along_v = 0.0;
+    int k = 0;
+    do {
+        here = along_u;
+        along_u = along_v;
+        value = texture_sample(image, s.uv + vec2(k == 1 ? texel.x : 0.0, k == 2 ? texel.y : 0.0)).xyz;
+        along_v = value.r;
+    } while (FX_BUMP_MAPS && !mapped && ++k < 3);
     vec3 n;
-    if (FX_NORMAL_MAPS && (!FX_BUMP_MAPS || (s.flags & MATERIAL_NORMAL_MAP) != 0u)) {
-        vec3 m = 2.0 * texture_sample(image, s.uv).xyz - 1.0;
+    if (mapped) {
+        vec3 m = 2.0 * value - 1.0;
         vec3 t = dpdu - s.normal * dot(s.normal, dpdu);
         t *= inversesqrt(max(dot(t, t), 1e-30));
         vec3 b = cross(s.normal, t);
         n = m.x * t + m.y * (dot(b, dpdv) < 0.0 ? -b : b) + m.z * s.normal;
     } else {
         float height = uintBitsToFloat(material_texel(s.material, 4u).w);
-        uvec4 words = texelFetch(textures, int(2u * image));
-        vec2 scale = uintBitsToFloat(texelFetch(textures, int(2u * image + 1u)).xy);
-        vec2 texel = 1.0 / (vec2(words.yz) * max(abs(scale), 1e-6));
-        float h = texture_sample(image, s.uv).r;
-        float hu = (texture_sample(image, s.uv + vec2(texel.x, 0.0)).r - h) / texel.x;
-        float hv = (texture_sample(image, s.uv + vec2(0.0, texel.y)).r - h) / texel.y;
-        vec3 pu = dpdu + s.normal * (height * hu - dot(s.normal, dpdu));
-        vec3 pv = dpdv + s.normal * (height * hv - dot(s.normal, dpdv));
+        vec3 pu = dpdu + s.normal * (height * ((along_u - here) / texel.x) - dot(s.normal, dpdu));
+        vec3 pv = dpdv + s.normal * (height * ((along_v - here) / texel.y) - dot(s.normal, dpdv));
         n = cross(pu, pv);
         n = dot(n, s.normal) < 0.0 ? -n : n;
     }
