@@ -13,6 +13,7 @@ pub mod tone;
 use crate::error::{Error, Result};
 use crate::memory;
 pub use film::{Channel, Film, Picture, Samples, Window};
+pub(crate) use photo::check_end;
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;

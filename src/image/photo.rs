@@ -38,12 +38,10 @@ pub(super) fn encode_hdr(picture: &Picture) -> Result<Vec<u8>, String> {
 pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
     let reader = || ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string());
     let damaged = |e: ImageError| format!("cannot be decoded: {e}; is it complete?");
-    let Some(format) = reader()?.format() else {
+    if reader()?.format().is_none() {
         return Err("is no EXR, PNG, JPEG or HDR file".to_owned());
-    };
-    if format == ImageFormat::Jpeg && jpeg_is_cut(bytes) {
-        return Err("is a JPEG without its end: get the complete file".to_owned());
     }
+    check_end(bytes)?;
     let (width, height) = reader()?.into_dimensions().map_err(damaged)?;
     // Four: alpha, or what a decoder adds for it.
     let samples = 4 * u64::from(width) * u64::from(height);
@@ -55,13 +53,31 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
     reader.decode().map(film_from).map_err(damaged)
 }
 
-/// The decoder fills what is missing with grey. A complete file has an end marker behind its last start of scan; the
-/// thumbnail that a camera embeds before it does not count.
+/// # Errors
+/// For a JPEG that is not complete; other decoders notice by themselves.
+pub fn check_end(bytes: &[u8]) -> Result<(), String> {
+    match image::guess_format(bytes).is_ok_and(|f| f == ImageFormat::Jpeg) && jpeg_is_cut(bytes) {
+        true => Err("is a JPEG without its end: get the complete file".to_owned()),
+        false => Ok(()),
+    }
+}
+
+/// Whether the end marker is missing: the decoder fills what is not there with grey. Segments are passed over by their
+/// lengths, so that thumbnails within them and what phones append behind the picture do not count.
 fn jpeg_is_cut(bytes: &[u8]) -> bool {
-    let last = |marker: [u8; 2]| bytes.windows(2).rposition(|w| w == marker);
-    const START_OF_SCAN: [u8; 2] = [0xff, 0xda];
-    const END_OF_IMAGE: [u8; 2] = [0xff, 0xd9];
-    last(END_OF_IMAGE) < last(START_OF_SCAN)
+    const END_OF_IMAGE: u8 = 0xd9;
+    let mut rest = bytes;
+    // In the data of a scan a 0 or a restart follows each 0xff; those, 1 and the start of the image have no length.
+    let is_segment = |pair: &[u8]| pair[0] == 0xff && !matches!(pair[1], 0 | 1 | 0xd0..=0xd8 | 0xff);
+    while let Some(at) = rest.windows(2).position(is_segment) {
+        if rest[at + 1] == END_OF_IMAGE {
+            return false;
+        }
+        let Some(&[high, low]) = rest[at + 2..].first_chunk() else { return true };
+        let behind = at + 2 + usize::from(u16::from_be_bytes([high, low]));
+        rest = rest.get(behind..).unwrap_or_default();
+    }
+    true
 }
 
 /// Integers are taken for sRGB code values, floats for radiance. Alpha, always linear, is kept as the channel A.

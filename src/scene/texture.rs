@@ -3,7 +3,7 @@ use super::mesh::Bitmap;
 use super::mtl::find_file;
 use crate::error::{Error, Result};
 use crate::gpu::layout::{NONE, TEXTURE_CLAMP, TEXTURE_SRGB, Texture};
-use crate::image::{contained, input};
+use crate::image::{check_end, contained, input};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::io::Cursor;
@@ -176,6 +176,7 @@ enum Source {
 impl Source {
     fn read(path: &Path) -> Result<Self> {
         let bytes = input::read(path)?;
+        check_end(&bytes).map_err(|what| Error::input(path, what))?;
         let size = contained(|| reader(&bytes)?.into_dimensions().map_err(|e| e.to_string()));
         let (width, height) = size.map_err(|what| damaged(path, what))?;
         check_size(width, height).map_err(|what| Error::input(path, what))?;
@@ -256,11 +257,20 @@ mod tests {
         set.decode()
     }
 
-    fn png(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
+    fn encoded(picture: &image::RgbImage, format: image::ImageFormat) -> Vec<u8> {
         let mut bytes = std::io::Cursor::new(Vec::new());
-        let picture = image::RgbImage::from_raw(width, height, pixels.to_vec()).unwrap();
-        picture.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+        picture.write_to(&mut bytes, format).unwrap();
         bytes.into_inner()
+    }
+
+    fn png(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
+        let picture = image::RgbImage::from_raw(width, height, pixels.to_vec()).unwrap();
+        encoded(&picture, image::ImageFormat::Png)
+    }
+
+    fn jpeg(width: u32, height: u32) -> Vec<u8> {
+        let picture = image::RgbImage::from_fn(width, height, |x, y| image::Rgb([6 * x as u8, 6 * y as u8, 77]));
+        encoded(&picture, image::ImageFormat::Jpeg)
     }
 
     #[test]
@@ -290,6 +300,13 @@ mod tests {
             assert!(error.contains("a.png: is no usable picture") && !error.contains('\n'), "{error}");
         }
         assert!(decode(&whole, "a.png", Kind::Color).is_ok(), "control");
+        let whole = jpeg(40, 40);
+        for end in [whole.len() / 2, whole.len() - 40, whole.len() - 2] {
+            let error = decode(&whole[..end], "a.jpg", Kind::Color).unwrap_err();
+            assert_eq!(error.exit_code(), 3);
+            assert!(error.to_string().contains("a.jpg: is a JPEG without its end"), "{error}");
+        }
+        assert!(decode(&whole, "a.jpg", Kind::Color).is_ok(), "control");
     }
 
     #[test]

@@ -82,6 +82,19 @@ fn whole_files_are_accepted_and_truncated_ones_refused() {
 }
 
 #[test]
+fn ends_within_or_behind_a_jpeg_are_not_its_end() {
+    let whole = jpeg();
+    let (start, rest) = whole.split_at(2);
+    // A thumbnail is a whole JPEG in a segment; the length of a segment counts itself.
+    let length = (whole.len() as u16 + 2).to_be_bytes();
+    let with_thumbnail = [start, &[0xff, 0xe1], &length[..], &whole[..], rest].concat();
+    assert!(check(&with_thumbnail));
+    assert!(!check(&with_thumbnail[..with_thumbnail.len() - 2]), "the thumbnail's end is not the picture's");
+    let with_video = [&whole[..], b"video \xff\xda and more"].concat();
+    assert!(check(&with_video), "what follows the end is no part of the picture");
+}
+
+#[test]
 fn headers_that_ask_for_too_much_are_refused_before_memory_is_taken() {
     let mut png = FILES[1].clone();
     png[16..24].copy_from_slice(&[0, 0, 0xf0, 0, 0, 0, 0xf0, 0]);
