@@ -221,6 +221,24 @@ fn what_is_legal_but_odd_is_a_warning() {
 }
 
 #[test]
+fn missing_normals_are_counted_unless_they_are_meant_to_be() {
+    let dir = tempfile::tempdir().unwrap();
+    let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\nvn 0 0 1\nvn 0 1 0\n";
+    std::fs::write(dir.path().join("some.obj"), format!("{corners}f 1//1 2//1 3//2\nf 1 2 4\nf 1 3 4\n")).unwrap();
+    std::fs::write(dir.path().join("none.obj"), format!("{corners}f 1 2 3\n")).unwrap();
+    let said = |mesh: &str| {
+        let text = format!("{BOX}[[mesh]]\nname = \"a\"\n{mesh}");
+        Scene::parse(&dir.path().join("scene.toml"), &text, &|_| {}).unwrap().warnings
+    };
+    let repaired = |n| [format!("mesh \"a\": triangles repaired: {n} without vertex normals shaded flat")];
+    assert_eq!(said("file = \"some.obj\""), repaired(2));
+    assert_eq!(said("file = \"none.obj\""), repaired(1));
+    for file in ["some.obj", "none.obj"] {
+        assert_eq!(said(&format!("file = \"{file}\"\nflat = true")), Vec::<String>::new(), "{file}");
+    }
+}
+
+#[test]
 fn models_alone_get_a_camera_and_a_sky() {
     let dir = tempfile::tempdir().unwrap();
     let load = |name: &str, text: &str| {

@@ -195,6 +195,9 @@ fn what_can_be_mended_is_counted() {
     assert_eq!(scene.triangles.len(), 3);
     let said = scene.warnings.join("\n");
     assert!(said.contains("1 with NaN") && said.contains("1 with unusable vertex normals"), "{said}");
+    let mut flat = described();
+    flat.mesh[0].data.as_mut().unwrap().normals.clear();
+    assert_eq!(build(&flat).unwrap().warnings, Vec::<String>::new(), "a mesh in memory has no normals on purpose");
 }
 
 #[test]

@@ -114,7 +114,7 @@ pub struct MeshTable {
     pub transform: Transform,
     /// A `[[material]]` for all of it.
     pub material: Option<String>,
-    /// Ignore vertex normals.
+    /// Ignore vertex normals; a file without any is then no reason for a warning.
     pub flat: bool,
     /// Turn inside out.
     pub flip_normals: bool,

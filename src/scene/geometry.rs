@@ -18,7 +18,7 @@ pub struct Geometry {
 pub struct Placement {
     /// To the space the triangles are stored in. Invertible.
     pub affine: DAffine3,
-    /// Ignore vertex normals.
+    /// Ignore vertex normals, and do not miss them.
     pub flat: bool,
     /// Turn every triangle and its normals around.
     pub flip: bool,
@@ -57,6 +57,8 @@ pub struct Repairs {
     pub no_area: usize,
     /// Triangles dropped for equalling an earlier one.
     pub copies: usize,
+    /// Triangles without vertex normals that are not meant to be flat: shaded flat.
+    pub no_normals: usize,
     /// Triangles whose vertex normals are unusable: shaded flat.
     pub bad_normals: usize,
     /// Triangles whose texture coordinates are not finite: set to zero.
@@ -70,6 +72,7 @@ impl Repairs {
             (self.not_finite, "with NaN or infinite coordinates dropped"),
             (self.no_area, "without area dropped"),
             (self.copies, "that repeat an earlier one dropped"),
+            (self.no_normals, "without vertex normals shaded flat"),
             (self.bad_normals, "with unusable vertex normals shaded flat"),
             (self.bad_uvs, "with NaN or infinite texture coordinates set to zero"),
         ];
@@ -135,7 +138,10 @@ impl Geometry {
 
     /// Packed vertex normals; `FLAT` where they say no more than the face does.
     fn normals(&self, c: &Corners, at: &Placement, swap: bool, face: Vec3, repairs: &mut Repairs) -> [u32; 3] {
-        let Some(mut n) = c.n.filter(|_| !at.flat) else { return FLAT };
+        let Some(mut n) = c.n.filter(|_| !at.flat) else {
+            repairs.no_normals += usize::from(!at.flat);
+            return FLAT;
+        };
         if swap {
             n.swap(1, 2);
         }
@@ -279,7 +285,8 @@ mod tests {
         let line = Corners { p: [Vec3::ZERO, Vec3::X, Vec3::X * 2.0], ..plain };
         assert_eq!(push(nan, PLAIN).1, Repairs { not_finite: 1, ..Repairs::default() });
         assert_eq!(push(line, PLAIN).1, Repairs { no_area: 1, ..Repairs::default() });
-        assert_eq!(push(plain, PLAIN).1.warning("mesh"), None);
+        assert_eq!(push(plain, PLAIN).1, Repairs { no_normals: 1, ..Repairs::default() });
+        assert_eq!(push(plain, Placement { flat: true, ..PLAIN }).1.warning("mesh"), None);
         assert!(push(line, PLAIN).1.warning("mesh").unwrap().contains("1 without area"));
         let zero = Corners { n: Some([Vec3::ZERO; 3]), uv: Some([Vec2::NAN; 3]), ..plain };
         assert_eq!(push(zero, PLAIN).1, Repairs { bad_normals: 1, bad_uvs: 1, ..Repairs::default() });

@@ -173,6 +173,10 @@ pub fn parse(path: &Path, reader: impl std::io::BufRead, library: &mut Library) 
         let what = format!("{}: grey is used for materials defined nowhere: {}", path.display(), unknown.join(", "));
         library.warnings.push(what);
     }
+    if let (short @ 1.., line) = lines.short_faces {
+        let what = format!("{short} of fewer than three corners dropped, the first in line {line}");
+        library.warnings.push(format!("{}: faces repaired: {what}", path.display()));
+    }
     let materials = models.iter().map(|m| index(m).unwrap_or_else(|| library.grey())).collect();
     Ok(ObjFile { models, materials })
 }
@@ -214,7 +218,20 @@ mod tests {
         assert_eq!(penta.models[0].mesh.indices.len(), 9);
         let marked = parse(Path::new("a.obj"), format!("\u{feff}{SQUARE}f 1 2 4").as_bytes(), &mut Library::default());
         assert_eq!(marked.unwrap().models[0].mesh.indices.len(), 3, "a byte order mark is no part of the first line");
-        assert!(read("l 1 2\np 1\nf 1 2").unwrap().models.iter().all(|m| m.mesh.indices.is_empty()));
+        assert!(read("l 1 2\np 1").unwrap().models.iter().all(|m| m.mesh.indices.is_empty()));
+    }
+
+    #[test]
+    fn faces_without_area_for_want_of_corners_are_counted() {
+        let warnings = |text: &str| {
+            let mut library = Library::default();
+            let file = parse(Path::new("a.obj"), format!("{SQUARE}{text}").as_bytes(), &mut library).unwrap();
+            assert_eq!(file.models.iter().map(|m| m.mesh.indices.len()).sum::<usize>(), 3, "the whole face is kept");
+            library.warnings
+        };
+        let said = "a.obj: faces repaired: 2 of fewer than three corners dropped, the first in line 11";
+        assert_eq!(warnings("f 1 2 3\nf 1 2\n\nf -1"), [said]);
+        assert_eq!(warnings("l 1 2\nf 1 2 3\np 1"), Vec::<String>::new(), "lines and points are no faces");
     }
 
     #[test]

@@ -19,6 +19,8 @@ pub struct ObjLines<R> {
     group: String,
     /// Names after `usemtl`.
     pub worn: BTreeSet<String>,
+    /// Faces of one or two corners, dropped: how many, and the line of the first.
+    pub short_faces: (usize, usize),
     /// Number of the last line read, from 1.
     pub line: usize,
     /// What is wrong with a face, and its line.
@@ -36,7 +38,7 @@ impl<R: BufRead> ObjLines<R> {
         let out = format!("mtllib {}\n", Self::TABLES).into_bytes();
         let group = "unnamed_object".to_owned();
         let (raw, defined, format, worn) = (Vec::new(), [0; 3], None, BTreeSet::new());
-        Self { inner, out, used: 0, raw, defined, format, group, worn, line: 0, error: None }
+        Self { inner, out, used: 0, raw, defined, format, group, worn, short_faces: (0, 0), line: 0, error: None }
     }
 
     /// Reads the next line, with its continuations, into `raw`; false at the end.
@@ -114,8 +116,14 @@ impl<R: BufRead> ObjLines<R> {
             (0..2).for_each(|i| format[i] &= has[i]);
             corners += 1;
         }
-        if corners < 3 {
-            return if corners > 0 { Ok(()) } else { Err("the face names no vertices: delete the line".into()) };
+        match corners {
+            0 => return Err("the face names no vertices: delete the line".into()),
+            1 | 2 => {
+                let (count, first) = self.short_faces;
+                self.short_faces = (count + 1, if count == 0 { self.line } else { first });
+                return Ok(());
+            }
+            _ => {}
         }
         if self.format.is_some_and(|f| f != format) {
             self.out.extend_from_slice(format!("g {}\n", self.group).as_bytes());

@@ -181,7 +181,9 @@ impl Assembly<'_> {
         repairs: &mut Repairs,
     ) -> std::result::Result<Vec<String>, TooFar> {
         let uvs = self.library.materials.textures.len() > 0;
-        let at = Placement { affine: job.affine, flat: table.flat, flip: table.flip_normals, uvs };
+        // Who hands over triangles without normals means it: in memory all vertices have one or none has.
+        let meant = table.data.as_ref().is_some_and(|mesh| mesh.normals.is_empty());
+        let at = Placement { affine: job.affine, flat: table.flat || meant, flip: table.flip_normals, uvs };
         let (mut names, mut previous, mut primitive) = (Vec::new(), None, 0);
         for (model, &own) in file.models.iter().zip(&file.materials) {
             if table.group.as_ref().is_none_or(|g| *g == model.name) {
