@@ -56,6 +56,10 @@ fn input_errors_name_the_file_and_exit_3() {
     complains(&compare("small.exr"), 3, &["12x12", "11x11"]);
     complains(&compare("nan.exr"), 3, &["nan.exr", "144 of 144 pixels"]);
     complains(&tallow(&folder, &["compare", "a.exr", "a.exr", "--layer", "N"]), 3, &["\"N\"", "albedo.R"]);
+    let render = |scene: &str| tallow(&folder, &["render", scene]);
+    complains(&render("missing"), 3, &["error: missing: cannot be read: No such file"]);
+    complains(&render("missing.blend"), 3, &["missing.blend: cannot be read: No such file"]);
+    complains(&render("text.png"), 3, &["text.png", "is no scene", "toml nor obj"]);
     // Control: what is right gives no line.
     let good = compare("a.exr");
     assert_eq!((good.status.code(), good.stderr.len()), (Some(0), 0));
@@ -73,7 +77,7 @@ fn pipes_and_folders_are_refused_and_odd_names_are_not() {
     complains(&tallow(&folder, &["render", "p.toml"]), 3, &["p.toml", "pipe", "save"]);
     complains(&tallow(&folder, &["render", "p.obj"]), 3, &["p.obj", "pipe"]);
     complains(&tallow(&folder, &["compare", "a.exr", "b.exr"]), 3, &["b.exr", "pipe"]);
-    complains(&tallow(&folder, &["render", "."]), 3, &["error: .", "toml nor obj"]);
+    complains(&tallow(&folder, &["render", "."]), 3, &["error: .: is a folder"]);
     let odd = std::ffi::OsString::from_vec(b"caf\xe9.exr".to_vec());
     let mut filter = Command::new(env!("CARGO_BIN_EXE_tallow"));
     filter.args(["filter", "a.exr", "--filter", "none", "--json", "-o"]).arg(&odd).current_dir(folder.path());
@@ -118,7 +122,10 @@ fn output_errors_exit_5_and_the_old_file_stays() {
     complains(&tallow(&folder, &["render", "s.toml", "-o", "missing/a.exr"]), 5, &["missing", "create it"]);
     complains(&tallow(&folder, &["compare", "a.exr", "a.exr", "--diff", "missing/d.png"]), 5, &["create it"]);
     #[cfg(target_os = "linux")]
-    full_disk(&folder);
+    {
+        complains(&tallow(&folder, &["render", "s.toml", "-o", "/proc/a.exr"]), 5, &["/proc takes no new files"]);
+        full_disk(&folder);
+    }
 }
 
 /// A limit of 0 bytes per file stands in for a full disk: the temporary file opens, and writing to it fails.

@@ -83,8 +83,12 @@ fn temporary(path: &Path) -> std::io::Result<tempfile::NamedTempFile> {
 }
 
 fn remedy(path: &Path, e: &std::io::Error) -> String {
-    let folder = folder(path).display();
+    let (folder, exists) = (folder(path).display(), folder(path).is_dir());
     match e.kind() {
+        // Linux says so of /proc and the like.
+        ErrorKind::NotFound if exists => {
+            format!("cannot be written: {folder} takes no new files; choose another folder")
+        }
         ErrorKind::NotFound => format!("cannot be written: the folder {folder} does not exist; create it"),
         ErrorKind::PermissionDenied => format!("cannot be written: no permission for {folder}; choose another folder"),
         ErrorKind::IsADirectory => "cannot be written: it is a folder; name a file in it".to_owned(),

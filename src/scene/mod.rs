@@ -122,7 +122,10 @@ impl Scene {
                 Self::parse(path, &text, overrides)
             }
             "obj" => Self::from_description(path, &model(path), true, overrides),
-            other => Err(Error::input(path, format!("is no scene: \"{other}\" is neither toml nor obj"))),
+            other => {
+                input::open(path)?; // a missing file is that first of all
+                Err(Error::input(path, format!("is no scene: \"{other}\" is neither toml nor obj")))
+            }
         }
     }
 
