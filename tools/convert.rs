@@ -9,7 +9,7 @@ mod scenes;
 #[derive(Parser)]
 #[command(about = "Makes scene files for the outside scenes")]
 struct Args {
-    /// Scenes to convert; all when none is named
+    /// Scenes to convert; all when none is named. fox and rigid take a frame: fox-15, rigid-59
     names: Vec<String>,
     /// Folder to write NAME.toml into
     #[arg(short, long)]
@@ -21,7 +21,7 @@ struct Args {
 
 fn main() -> anyhow::Result<()> {
     let args = Args::parse();
-    let all = || scenes::names().map(str::to_owned).collect();
+    let all = || scenes::names().collect();
     for name in if args.names.is_empty() { all() } else { args.names.clone() } {
         println!("{}", scenes::convert(&name, &args.data, &args.output)?.display());
     }

@@ -65,11 +65,11 @@ fn build(place: &Place, json: &Path) -> anyhow::Result<Table> {
 }
 
 /// A table from pairs.
-fn table<const N: usize>(pairs: [(&str, Value); N]) -> Table {
+pub fn table<const N: usize>(pairs: [(&str, Value); N]) -> Table {
     pairs.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
 }
 
-fn numbers(values: impl IntoIterator<Item = f64>) -> Value {
+pub fn numbers(values: impl IntoIterator<Item = f64>) -> Value {
     // Negative zeros are only noise to a reader.
     Value::Array(values.into_iter().map(|v| Value::Float(v + 0.0)).collect())
 }
@@ -98,8 +98,8 @@ fn render(integrator: &Integrator) -> Table {
 }
 
 /// Absolute and there.
-fn file(place: &Place, name: &str) -> anyhow::Result<Value> {
-    let path = place.folder.join(name);
+pub fn file(folder: &Path, name: &str) -> anyhow::Result<Value> {
+    let path = folder.join(name);
     ensure!(path.is_file(), "{} is missing", path.display());
     Ok(path.display().to_string().into())
 }
@@ -107,7 +107,7 @@ fn file(place: &Place, name: &str) -> anyhow::Result<Value> {
 fn environment(place: &Place, emitter: &Emitter) -> anyhow::Result<Table> {
     match emitter {
         Emitter::Constant { radiance, .. } => Ok(table([("radiance", numbers(*radiance))])),
-        Emitter::Envmap { filename } => Ok(table([("file", file(place, filename)?)])),
+        Emitter::Envmap { filename } => Ok(table([("file", file(place.folder, filename)?)])),
         _ => bail!("not an environment"),
     }
 }
@@ -131,7 +131,7 @@ fn mesh(place: &Place, shape: &Shape) -> anyhow::Result<Table> {
     match shape.kind.as_str() {
         "obj" => {
             let name = shape.file.as_deref().context("names no OBJ file")?;
-            mesh.insert("file".into(), file(place, name)?);
+            mesh.insert("file".into(), file(place.folder, name)?);
         }
         "rectangle" | "cube" | "sphere" => _ = mesh.insert("shape".into(), shape.kind.as_str().into()),
         kind => bail!("the shape type `{kind}` is not modelled; convert it to OBJ"),
@@ -230,7 +230,7 @@ fn color(place: &Place, color: &Color, out: &mut Table) -> anyhow::Result<()> {
         Color::Constant(rgb) => out.insert("color".into(), numbers(*rgb)),
         Color::Bitmap(Bitmap::Bitmap { filename, .. }) => {
             out.insert("color".into(), numbers([1.0; 3]));
-            out.insert("color_texture".into(), file(place, filename)?)
+            out.insert("color_texture".into(), file(place.folder, filename)?)
         }
     };
     Ok(())

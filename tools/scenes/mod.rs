@@ -5,6 +5,7 @@ use toml::{Table, Value};
 
 mod description;
 mod emit;
+mod rigid;
 
 /// Where a scene file comes from.
 enum Source {
@@ -15,6 +16,10 @@ enum Source {
     MitsubaTest(&'static str),
     /// A scene file whose paths are relative to the data's `scenes` folder.
     Written(&'static str),
+    /// The same for frame 00 of a sequence of OBJ files.
+    Sequence(&'static str),
+    /// The rigid animation's description.
+    Rigid(&'static str),
 }
 
 /// Degrees, across a square film whose diagonal is that of 36 mm x 24 mm film: 2 atan(hypot(36, 24) / (100 sqrt 2)).
@@ -52,12 +57,29 @@ const SCENES: &[(&str, Source)] = &[
     ("stanford-dragon", Source::Written(include_str!("stanford-dragon.toml"))),
     ("glass-dragon", Source::Written(include_str!("glass-dragon.toml"))),
     ("nefertiti", Source::Written(include_str!("nefertiti.toml"))),
-    ("fox", Source::Written(include_str!("fox.toml"))),
+    ("fox", Source::Sequence(include_str!("fox.toml"))),
+    ("rigid", Source::Rigid("animation/rigid/rigid_animation.json")),
 ];
 
-/// The names of all scenes.
-pub fn names() -> impl Iterator<Item = &'static str> {
-    SCENES.iter().map(|(name, _)| *name)
+/// Frames of the fox, each an OBJ file.
+const FOX_FRAMES: usize = 16;
+
+/// The names of all scenes. `fox` and `rigid` take a frame as well (`rigid-59`, of 60); those that have OBJ files of their
+/// own are among the names.
+pub fn names() -> impl Iterator<Item = String> {
+    let frames = (1..FOX_FRAMES).map(|frame| format!("fox-{frame:02}"));
+    SCENES.iter().map(|(name, _)| (*name).to_owned()).chain(frames)
+}
+
+/// The scene that a name means, and its frame.
+fn find(name: &str) -> Option<(&'static str, &'static Source, usize)> {
+    let known = |name: &str| SCENES.iter().find(|(known, _)| *known == name);
+    if let Some((name, source)) = known(name) {
+        return Some((name, source, 0));
+    }
+    let (base, frame) = name.rsplit_once('-')?;
+    let (base, source) = known(base).filter(|(_, s)| matches!(s, Source::Sequence(_) | Source::Rigid(_)))?;
+    Some((base, source, frame.parse().ok()?))
 }
 
 /// Writes `out/NAME.toml`, whose files are named by absolute path, and returns where it lies. `data` is the folder that
@@ -66,7 +88,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 /// # Errors
 /// On an unknown name, a missing or malformed file, and anything in the description that a scene file cannot say.
 pub fn convert(name: &str, data: &Path, out: &Path) -> anyhow::Result<PathBuf> {
-    let Some((name, source)) = SCENES.iter().find(|(known, _)| *known == name) else {
+    let Some((base, source, frame)) = find(name) else {
         bail!("there is no scene `{name}`; the names are: {}", names().collect::<Vec<_>>().join(", "));
     };
     let folder = data.join("scenes");
@@ -78,6 +100,11 @@ pub fn convert(name: &str, data: &Path, out: &Path) -> anyhow::Result<PathBuf> {
             (emit::scene(name, &folder.join(json), out, Some(MITSUBA_FOV))?, format!("scenes/{json}"))
         }
         Source::Written(text) => (written(text, &folder)?, format!("tools/scenes/{name}.toml")),
+        Source::Sequence(text) => {
+            let text = text.replace("_00.obj", &format!("_{frame:02}.obj"));
+            (written(&text, &folder)?, format!("tools/scenes/{base}.toml"))
+        }
+        Source::Rigid(json) => (rigid::scene(&folder, json, frame)?, format!("frame {frame} of scenes/{json}")),
     };
     let path = out.join(format!("{name}.toml"));
     let text = format!("# Made by tools/convert.rs from {origin}; do not edit.\n\n{}", toml::to_string(&table)?);
@@ -101,4 +128,47 @@ fn written(text: &str, folder: &Path) -> anyhow::Result<Table> {
         }
     }
     Ok(scene)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn objs(folder: &Path) -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
+        let (folders, files): (Vec<_>, Vec<_>) = entries.partition(|path| path.is_dir());
+        let below = folders.iter().flat_map(|folder| objs(folder));
+        files.into_iter().filter(|path| path.extension().is_some_and(|e| e == "obj")).chain(below).collect()
+    }
+
+    /// Whether a converted description lies beside a model: it says the same in shapes of its own.
+    fn is_described(obj: &Path, folder: &Path) -> bool {
+        let beside = |json: &str| folder.join(json) == obj.with_extension("json");
+        SCENES.iter().any(|(_, source)| matches!(source, Source::Json(json) if beside(json)))
+    }
+
+    #[test]
+    #[ignore = "needs TALLOW_DATA"]
+    fn every_obj_is_in_a_scene() {
+        let (out, data) = (tempfile::tempdir().unwrap(), std::env::var_os("TALLOW_DATA").expect("TALLOW_DATA"));
+        let text = |name: String| std::fs::read_to_string(convert(&name, Path::new(&data), out.path()).unwrap());
+        let scenes: String = names().map(|name| text(name).unwrap()).collect();
+        let folder = Path::new(&data).join("scenes").canonicalize().unwrap();
+        let found = objs(&folder);
+        assert!(found.len() >= 50, "only {} OBJ files below {}", found.len(), folder.display());
+        let is_in = |obj: &&PathBuf| scenes.contains(&format!("/{}\"", obj.strip_prefix(&folder).unwrap().display()));
+        let missing: Vec<_> = found.iter().filter(|obj| !is_in(obj) && !is_described(obj, &folder)).collect();
+        assert!(missing.is_empty(), "{missing:?}");
+    }
+
+    #[test]
+    fn what_moves_takes_a_frame() {
+        let frame = |name| find(name).map(|(base, _, frame)| (base, frame));
+        assert_eq!(
+            (frame("fox"), frame("fox-03"), frame("rigid-59")),
+            (Some(("fox", 0)), Some(("fox", 3)), Some(("rigid", 59)))
+        );
+        assert_eq!((frame("forest-1"), frame("fox-"), frame("wolf-1")), (None, None, None));
+        assert!(names().all(|name| find(&name).is_some()));
+    }
 }
