@@ -4,6 +4,7 @@
 mod statistics;
 
 use glam::{DVec3, Vec2, Vec3, dvec3, vec3};
+use rayon::prelude::*;
 use statistics::{chi_square, sidak};
 use std::f64::consts::{PI, TAU};
 use tallow::gpu::layout::{BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE};
@@ -31,6 +32,29 @@ fn bsdf(kind: u32, alpha: f32, ggx: bool, eta: f32) -> Bsdf {
 /// Reflects everything: extinction beyond any metal.
 fn conductor(alpha: f32, ggx: bool) -> Bsdf {
     Bsdf { k: Vec3::splat(1e4), ..bsdf(BSDF_CONDUCTOR, alpha, ggx, 1.0) }
+}
+
+/// A coat that reflects one colour best, over a dark base of another: the odds of its lobes depend on both.
+fn tinted(alpha: f32, ggx: bool) -> Bsdf {
+    let (albedo, specular) = (vec3(0.25, 0.04, 0.1), vec3(0.9, 0.3, 0.5));
+    Bsdf { albedo, specular, ..bsdf(BSDF_COATED, alpha, ggx, 1.5) }
+}
+
+/// Smooth coats, and tinted ones.
+fn coats() -> Vec<(String, Bsdf, Vec3)> {
+    let coats = [
+        ("smooth coat", bsdf(BSDF_COATED, 0.0, false, 1.5)),
+        ("tinted smooth coat", tinted(0.0, false)),
+        ("tinted Beckmann coat", tinted(0.05, false)),
+        ("tinted GGX coat", tinted(0.5, true)),
+    ];
+    let cases = coats.map(|(name, b)| {
+        DEGREES.map(|degrees| {
+            let (s, c) = degrees.to_radians().sin_cos();
+            (format!("{name} {degrees} degrees"), b, vec3(0.8 * s, -0.6 * s, c))
+        })
+    });
+    cases.concat()
 }
 
 /// Every rough kind, glass from both sides, and a bubble (index below 1); `inside` means wo.z < 0.
@@ -138,6 +162,16 @@ fn grids(b: &Bsdf, wo: Vec3) -> Vec<Grid> {
     indices.into_iter().map(|n| Grid { wo: wo.as_dvec3(), n, alpha }).collect()
 }
 
+/// Quadrature errs by up to 8e-4 of all samples (a diffuse base in the slopes of a narrow coat): a last cell that
+/// expects no more joins the largest.
+fn join_what_cannot_be_told(observed: &mut Vec<f64>, expected: &mut Vec<f64>) {
+    if expected[expected.len() - 1] < 1e-3 * expected.iter().sum::<f64>() {
+        let largest = (0..expected.len()).max_by(|&a, &b| expected[a].total_cmp(&expected[b])).unwrap();
+        expected[largest] += expected.pop().unwrap();
+        observed[largest] += observed.pop().unwrap();
+    }
+}
+
 /// Observed and expected counts; the last cell holds what is absorbed or a delta.
 fn counts(b: &Bsdf, wo: Vec3, count: u32, seed: u32) -> (Vec<f64>, Vec<f64>) {
     let grids = grids(b, wo);
@@ -152,6 +186,7 @@ fn counts(b: &Bsdf, wo: Vec3, count: u32, seed: u32) -> (Vec<f64>, Vec<f64>) {
             if sampled && !s.delta { refracted * cells + grids[refracted].cell(s.wi) } else { grids.len() * cells };
         observed[cell] += 1.0;
     }
+    join_what_cannot_be_told(&mut observed, &mut expected);
     (observed, expected)
 }
 
@@ -161,20 +196,18 @@ fn samples_follow_the_pdf() {
     for degrees in DEGREES {
         let (s, c) = degrees.to_radians().sin_cos();
         cases.push((format!("diffuse {degrees}"), bsdf(BSDF_DIFFUSE, 0.0, false, 1.5), vec3(s, 0.0, c)));
-        cases.push((format!("smooth coat {degrees}"), bsdf(BSDF_COATED, 0.0, false, 1.5), vec3(s, 0.0, c)));
     }
+    cases.extend(coats());
     let level = sidak(cases.len());
-    let mut failures = Vec::new();
-    for (seed, (name, b, wo)) in cases.iter().enumerate() {
+    let judge = |(seed, (name, b, wo)): (usize, &(String, Bsdf, Vec3))| {
         let (observed, expected) = counts(b, *wo, 200_000, seed as u32);
-        let p = chi_square(&observed, &expected);
-        if p < level {
-            failures.push(format!("{name}: p = {p:.1e}"));
-        }
         // Control: 5 % more density everywhere.
         let planted: Vec<f64> = expected.iter().map(|e| 1.05 * e).collect();
         assert!(chi_square(&observed, &planted) < level, "{name}: the test cannot see a pdf that is 5 % off");
-    }
+        let p = chi_square(&observed, &expected);
+        (p < level).then(|| format!("{name}: p = {p:.1e}"))
+    };
+    let failures: Vec<_> = cases.par_iter().enumerate().filter_map(judge).collect();
     assert!(
         failures.is_empty(),
         "{} of {} rejected at level {level:.1e}:\n{}",
@@ -186,27 +219,28 @@ fn samples_follow_the_pdf() {
 
 #[test]
 fn weight_is_value_over_pdf() {
-    for (name, b, wo) in rough_cases() {
+    for (name, b, wo) in rough_cases().into_iter().chain(coats()) {
         let mut checked = 0;
-        for (sampled, s) in samples(b, wo, 256, false, 7) {
+        for (sampled, s) in samples(b, wo, 4096, false, 7) {
             let value = bsdf_evaluate(&b, wo, s.wi);
-            if !sampled || value.w <= 0.0 {
+            if !sampled || s.delta || value.w <= 0.0 {
                 continue;
             }
             checked += 1;
-            let ratio = value.x / value.w;
-            assert!((ratio - s.weight.x).abs() <= 2e-3 * s.weight.x.abs(), "{name}: {ratio} {s:?}");
+            let ratio = value.truncate() / value.w;
+            let near = |ratio: Vec3| (ratio - s.weight).abs().cmple(2e-3 * s.weight).all();
+            assert!(near(ratio), "{name}: {ratio} {s:?}");
             // The half vector of a grazing pair loses digits, which a narrow lobe magnifies.
             assert!((value.w - s.pdf).abs() <= 0.05 * s.pdf, "{name}: pdf {} {s:?}", value.w);
-            assert!((1.02 * ratio - s.weight.x).abs() > 2e-3 * s.weight.x.abs(), "control");
+            assert!(!near(1.02 * ratio), "control");
         }
-        assert!(checked > 50, "{name}: only {checked} samples");
+        assert!(checked > 40, "{name}: only {checked} samples");
     }
 }
 
 #[test]
 fn reciprocal() {
-    for (name, b, wo) in rough_cases() {
+    for (name, b, wo) in rough_cases().into_iter().chain(coats()) {
         for (sampled, s) in samples(b, wo, 64, false, 3) {
             if !sampled || s.wi.z.abs() < 1e-3 {
                 continue;

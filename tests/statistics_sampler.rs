@@ -2,9 +2,11 @@
 #[path = "support/statistics.rs"]
 mod statistics;
 
-use glam::{Vec2, vec2};
+use glam::{Mat3, Vec2, Vec3, vec2};
 use statistics::{chi_square, sidak, uniform_2d};
 use std::f64::consts::TAU;
+use tallow::gpu::layout::{Camera, Effects, PathPush};
+use tallow::reference::camera::{eye_ray, film_from_pixel, film_sample};
 use tallow::reference::sampler::{sample_2d, sample_2d_bits, sampler_start};
 use tallow::reference::warp::*;
 
@@ -147,10 +149,7 @@ fn warps_have_their_densities() {
             let sum = f64::from(b.x + b.y);
             [sum * sum, f64::from(b.x) / sum.max(1e-30)]
         }),
-        ("tent", |u| {
-            let cdf = |x: f64| if x < 0.0 { 0.5 * (1.0 + x).powi(2) } else { 1.0 - 0.5 * (1.0 - x).powi(2) };
-            [cdf(f64::from(warp_tent(u.x))), cdf(f64::from(warp_tent(u.y)))]
-        }),
+        ("tent", |u| [u.x, u.y].map(|v| tent_cdf(warp_tent(v)))),
         ("gaussian", |u| [u.x, u.y].map(|v| gaussian_cdf(warp_gaussian(v)))),
     ];
     let level = sidak(warps.len());
@@ -167,11 +166,92 @@ fn warps_have_their_densities() {
     }
 }
 
+/// Of the filter of radius 1.
+fn tent_cdf(x: f32) -> f64 {
+    let tail = 0.5 * (1.0 - f64::from(x.abs())).powi(2);
+    if x < 0.0 { tail } else { 1.0 - tail }
+}
+
 /// Of the filter with standard deviation 0.5 cut at 2.
 fn gaussian_cdf(x: f32) -> f64 {
     let z = x.abs() / 0.5f32 / 2f32.sqrt();
     let erf = 1.0 - erfc_scaled(z) * (-z * z).exp();
     0.5 + 0.5 * f64::from(erf.copysign(x)) / 0.99993666
+}
+
+#[test]
+fn film_samples_follow_their_filter() {
+    const PIXEL: u32 = 3 * 7 + 2;
+    let from_corner = |filter: u32, i: u32| {
+        let push = PathPush { size: [7, 5], pixel_filter: filter, ..PathPush::default() };
+        film_sample(&push, &Effects::ALL, PIXEL, sampler_start(PIXEL, i, 4, true)) - vec2(2.0, 3.0)
+    };
+    type Cdf = fn(f32) -> f64;
+    let cdfs: [(&str, Cdf); 3] =
+        [("box", |x| f64::from(x)), ("tent", |x| tent_cdf(x - 0.5)), ("Gaussian", |x| gaussian_cdf(x - 0.5))];
+    let level = sidak(cdfs.len());
+    for (filter, (name, _)) in cdfs.iter().enumerate() {
+        for (other, (_, cdf)) in cdfs.iter().enumerate() {
+            let points = (0..1 << 18).map(|i| from_corner(filter as u32, i).to_array().map(cdf));
+            let p = uniform_2d(points);
+            // Control: by every other filter they are not uniform.
+            assert!((p > level) == (filter == other), "{name} by the CDF of {}: p = {p:.1e}", cdfs[other].0);
+        }
+    }
+    assert_eq!(from_corner(3, 0), vec2(0.5, 0.5), "the filter that is a point");
+}
+
+/// A camera that is turned, with a lens, and pixels that are no squares.
+fn lens_camera() -> Camera {
+    let axes = Mat3::from_rotation_y(0.7) * Mat3::from_rotation_x(-0.4);
+    Camera {
+        position: [1.0, -2.0, 0.5],
+        lens_radius: 0.3,
+        right: (1.2 * axes.x_axis).into(),
+        focus_distance: 4.0,
+        up: (0.5 * axes.y_axis).into(),
+        near: 0.0,
+        forward: (-axes.z_axis).into(),
+    }
+}
+
+#[test]
+fn rays_leave_a_uniform_lens_towards_one_point_in_focus() {
+    let camera = lens_camera();
+    let [position, right, up, forward] = [camera.position, camera.right, camera.up, camera.forward].map(Vec3::from);
+    let push = PathPush { camera, size: [12, 5], ..PathPush::default() };
+    let film = vec2(3.3, 4.1);
+    let at = film_from_pixel(film, push.size);
+    let focus = position + camera.focus_distance * (forward + at.x * right + at.y * up);
+    let rays = || (0..1 << 18).map(|i| eye_ray(&push, &Effects::ALL, film, sampler_start(5, i, 1, true)));
+    for ray in rays().take(1000) {
+        let miss = |p: Vec3| (p - ray.origin).cross(ray.direction).length();
+        assert!((ray.origin - position).dot(forward).abs() < 1e-6, "{ray:?} leaves the lens");
+        assert!(miss(focus) < 1e-5, "{ray:?} misses {focus}");
+        let off = (ray.origin - position).length();
+        assert!(off < 1e-3 || miss(focus + 0.1 * forward) > 1e-5, "control: {ray:?} meets another point");
+    }
+    let on_lens = |bend: f32| {
+        rays().map(move |ray| {
+            let p = (ray.origin - position) / camera.lens_radius;
+            let p = vec2(p.dot(right.normalize()), p.dot(up.normalize()));
+            [f64::from(p.length_squared().powf(bend)), turn(p)]
+        })
+    };
+    assert!(uniform_2d(on_lens(1.0)) > sidak(1));
+    assert!(uniform_2d(on_lens(1.05)) < sidak(1), "control: a lens whose middle is thinner");
+}
+
+#[test]
+fn what_is_nearer_than_the_near_distance_is_skipped() {
+    let ray = |near: f32| {
+        let push = PathPush { camera: Camera { near, ..lens_camera() }, size: [12, 5], ..PathPush::default() };
+        eye_ray(&push, &Effects::ALL, vec2(1.0, 2.0), sampler_start(5, 0, 1, false))
+    };
+    let (from_lens, clipped) = (ray(0.0), ray(1.5));
+    assert_eq!(from_lens.direction, clipped.direction);
+    let along = (clipped.origin - from_lens.origin).dot(from_lens.direction);
+    assert!((along - 1.5).abs() < 1e-5, "{along}");
 }
 
 #[test]
