@@ -46,7 +46,8 @@ fn shipped(file: &str) -> Scene {
     Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file), &small).unwrap()
 }
 
-/// Textures of every use, masks (of the lamp too), a normal map, an environment image, a lens, a mirrored instance, roulette and a clamp.
+/// Textures of every use, masks (of the lamp too), a normal map, an environment image, a spot light, a lens, a mirrored
+/// instance, roulette and a clamp.
 fn pictures() -> Scene {
     let checks = |x: u32, y: u32| if (x / 4 + y / 4).is_multiple_of(2) { [230, 120, 40] } else { [60, 150, 220] };
     let bumps = |x: u32, y: u32| [128 + (x * 7 % 60) as u8, 128 + (y * 5 % 60) as u8, 235];
@@ -58,6 +59,8 @@ fn pictures() -> Scene {
         "[camera]\nposition = [0.0, 1.4, 5.0]\ntarget = [0.0, 0.7, 0.0]\nfov = 45.0\nlens_radius = 0.05\n\
          focus_distance = 5.0\n[render]\nmax_depth = 4\nroulette_depth = 2\nclamp_indirect = 1.0\n\
          [environment]\nfile = 'sky.exr'\nrotation = 40.0\n\
+         [[light]]\ntype = 'spot'\nposition = [-0.5, 3.5, 3.0]\ntarget = [0.0, 0.5, 0.0]\n\
+         intensity = [90.0, 60.0, 30.0]\ncone = 15.0\ncutoff = 40.0\n\
          [[material]]\nname = 'floor'\ncolor_texture = 'checks.png'\nbump = 'checks.png'\nbump_scale = 0.05\n\
          [[material]]\nname = 'ball'\ntype = 'coated'\nalpha = 0.3\nroughness_texture = 'checks.png'\n\
          normal_map = 'bumps.png'\nspecular_texture = 'checks.png'\n\
