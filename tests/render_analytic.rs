@@ -1,11 +1,16 @@
 //! Pictures whose every value is known by derivation, on the device.
+#[path = "support/scattering.rs"]
+#[allow(dead_code)]
+mod scattering;
 mod support;
 #[path = "support/twin.rs"]
 mod twin;
 
-use glam::{DVec2, DVec3, dvec2, dvec3};
+use glam::{DVec2, DVec3, dvec2, dvec3, vec3};
+use scattering::scattered_once;
 use std::f64::consts::PI;
 use tallow::gpu::layout::PixelStats;
+use tallow::reference::bsdf::Bsdf;
 use tallow::renderer::{Outputs, Renderer};
 use tallow::scene::Scene;
 use twin::Workplace;
@@ -141,4 +146,47 @@ fn a_lens_blurs_over_its_circle_of_confusion() {
     is_blurred(&pictures[1], 0.0).unwrap();
     assert!(is_blurred(&pictures[0], 1.03 * LENS).is_err(), "control: another lens");
     assert!(is_blurred(&pictures[1], LENS).is_err(), "control: a pinhole");
+}
+
+/// A sheet in the plane z = 0 in a sky of radiance 1, seen from afar, `degrees` from +z.
+fn sheet_in_the_sky(material: &str, degrees: f32) -> Scene {
+    let (s, c) = degrees.to_radians().sin_cos();
+    Workplace::new().scene(&format!(
+        "[film]\nwidth = 32\nheight = 32\n[camera]\nposition = [{}, 0.0, {}]\ntarget = [0.0, 0.0, 0.0]\nfov = 0.1\n\
+         [render]\nspp = 256\nmax_depth = 2\n[environment]\nradiance = 1.0\n[[material]]\nname = 'sheet'\n{material}\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'sheet'\n",
+        20.0 * s,
+        20.0 * c
+    ))
+}
+
+/// Refracted radiance is divided by the relative index squared.
+fn left_of_the_sky(b: &Bsdf, degrees: f32) -> f64 {
+    let (s, c) = degrees.to_radians().sin_cos();
+    let eta = f64::from(if c < 0.0 { 1.0 / b.eta.x } else { b.eta.x });
+    let [reflected, refracted] = scattered_once(b, vec3(s, 0.0, c));
+    reflected + refracted / (eta * eta)
+}
+
+#[test]
+fn rough_sheets_show_what_single_scattering_leaves_of_a_white_sky() {
+    let glass = |rest: &str| format!("type = 'dielectric'\nior = 1.5\n{rest}\n");
+    let coat = |rest: &str| format!("type = 'coated'\ncolor = 1.0\nior = 1.5\n{rest}\n");
+    for (material, degrees) in [
+        (glass("alpha = 0.8"), 35.0),
+        (glass("alpha = 0.5\ndistribution = 'ggx'"), 60.0),
+        (glass("alpha = 0.4\ndistribution = 'ggx'"), 140.0), // from inside
+        (coat("alpha = 0.2"), 75.0),
+        (coat("alpha = 0.6\ndistribution = 'ggx'"), 40.0),
+    ] {
+        let scene = sheet_in_the_sky(&material, degrees);
+        let b = Bsdf::from(&scene.materials[scene.triangles[0].material as usize]);
+        let exact = left_of_the_sky(&b, degrees);
+        let stats = rendered(&scene);
+        let mean = stats.iter().map(|s| f64::from(s.mean[0])).sum::<f64>() / stats.len() as f64;
+        println!("{mean:.5}, by quadrature {exact:.5}");
+        assert!((mean - exact).abs() < 1e-3, "{mean}, by quadrature {exact}: {degrees} degrees, {material}");
+        let smoother = left_of_the_sky(&Bsdf { alpha: 0.8 * b.alpha, ..b }, degrees);
+        assert!((mean - smoother).abs() > 1e-3, "control: {degrees} degrees, {material}");
+    }
 }

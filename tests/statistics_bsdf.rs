@@ -1,14 +1,16 @@
 //! Statistics of the BSDFs on their CPU twins: what is sampled follows the pdf, the weight is f cos / pdf, light is
 //! neither made nor lost but where theory says so.
+#[path = "support/scattering.rs"]
+mod scattering;
 #[path = "support/statistics.rs"]
 mod statistics;
 
-use glam::{DVec3, Vec2, Vec3, dvec3, vec3};
+use glam::{Vec2, Vec3, vec3};
 use rayon::prelude::*;
+use scattering::{RINGS, SECTORS, d, g1, grids, scattered_once};
 use statistics::{chi_square, sidak};
-use std::f64::consts::{PI, TAU};
 use tallow::gpu::layout::{BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE};
-use tallow::reference::bsdf::{Bsdf, BsdfSample, SMOOTH_ALPHA, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
+use tallow::reference::bsdf::{Bsdf, BsdfSample, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
 use tallow::reference::fresnel::internal_fresnel;
 use tallow::reference::sampler::{sample_2d, sampler_start};
 
@@ -91,75 +93,6 @@ fn samples(b: Bsdf, wo: Vec3, count: u32, independent: bool, seed: u32) -> impl 
         let s = sampler_start(0, i, seed, independent);
         bsdf_sample(&b, wo, sample_2d(s, 0).x, sample_2d(s, 1))
     })
-}
-
-/// Cells in the slopes of the half vector over alpha, polar with a logarithmic radius: there a microfacet lobe is about one
-/// unit wide for every roughness, incidence and index, and neither cells nor quadrature miss it or a diffuse base.
-struct Grid {
-    wo: DVec3,
-    /// Index on wi's side / on wo's: 1 for reflection.
-    n: f64,
-    alpha: f64,
-}
-
-const RINGS: usize = 16;
-const SECTORS: usize = 16;
-/// Quadrature points per cell and axis.
-const POINTS: usize = 20;
-
-impl Grid {
-    fn cell(&self, wi: Vec3) -> usize {
-        let h = self.wo + self.n * wi.as_dvec3();
-        let slope = h.truncate() / (h.z * self.alpha);
-        let log = slope.length().ln_1p();
-        let t = log / (1.0 + log);
-        let turn = slope.y.atan2(slope.x).rem_euclid(TAU) / TAU;
-        let index = |v: f64, n: usize| ((v * n as f64) as usize).min(n - 1);
-        index(t, RINGS) * SECTORS + index(turn, SECTORS)
-    }
-
-    /// wi for polar coordinates of the slope, and the solid angle per unit of (t, turn); None where no wi exists.
-    fn direction(&self, t: f64, turn: f64) -> Option<(Vec3, f64)> {
-        let radius = (t / (1.0 - t)).exp_m1();
-        let (sin, cos) = (TAU * turn).sin_cos();
-        let side = self.wo.z.signum();
-        let m = dvec3(radius * self.alpha * cos, radius * self.alpha * sin, 1.0).normalize() * side;
-        let co = self.wo.dot(m);
-        let ct2 = 1.0 - (1.0 - co * co) / (self.n * self.n);
-        if co <= 0.0 || ct2 <= 0.0 {
-            return None;
-        }
-        let (ci, reflected) = if self.n == 1.0 { (co, true) } else { (-ct2.sqrt(), false) };
-        let wi = (co / self.n + ci) * m - self.wo / self.n;
-        let slope_area = radius * (1.0 + radius) * TAU * self.alpha * self.alpha / (1.0 - t).powi(2);
-        // Walter et al. 2007: d omega_m = d slope cos^3; d omega_i = (co + n ci)^2 / (n^2 |ci|) d omega_m.
-        let jacobian = (co + self.n * ci).powi(2) / (self.n * self.n * ci.abs()) * (m.z * side).powi(3);
-        ((wi.z * side > 0.0) == reflected).then(|| (wi.as_vec3(), slope_area * jacobian))
-    }
-
-    /// Integrals of `f` over the cells.
-    fn integrate(&self, f: impl Fn(Vec3) -> f64) -> Vec<f64> {
-        let mut cells = vec![0.0; RINGS * SECTORS];
-        let (rings, sectors) = (RINGS * POINTS, SECTORS * POINTS);
-        for i in 0..rings {
-            for j in 0..sectors {
-                let (t, turn) = ((i as f64 + 0.5) / rings as f64, (j as f64 + 0.5) / sectors as f64);
-                if let Some((wi, area)) = self.direction(t, turn) {
-                    cells[i / POINTS * SECTORS + j / POINTS] += f(wi) * area / (rings * sectors) as f64;
-                }
-            }
-        }
-        cells
-    }
-}
-
-/// The grid of the reflected lobe, and of the refracted one where there is one.
-fn grids(b: &Bsdf, wo: Vec3) -> Vec<Grid> {
-    // A diffuse lobe without a rough coat spreads over all slopes.
-    let alpha = f64::from(if b.alpha < SMOOTH_ALPHA { 1.0 } else { b.alpha });
-    let eta = f64::from(if wo.z < 0.0 { 1.0 / b.eta.x } else { b.eta.x });
-    let indices = if b.kind == BSDF_DIELECTRIC { vec![1.0, eta] } else { vec![1.0] };
-    indices.into_iter().map(|n| Grid { wo: wo.as_dvec3(), n, alpha }).collect()
 }
 
 /// Quadrature errs by up to 8e-4 of all samples (a diffuse base in the slopes of a narrow coat): a last cell that
@@ -286,22 +219,6 @@ fn smooth_kinds_conserve_energy() {
     }
 }
 
-/// Smith G1 in f64, written apart from the twin.
-fn g1(ggx: bool, z: f64, alpha: f64) -> f64 {
-    let a = z / (alpha * (1.0 - z * z).max(1e-300).sqrt());
-    match ggx {
-        true => 2.0 / (1.0 + (1.0 + 1.0 / (a * a)).sqrt()),
-        false if a >= 1.6 => 1.0,
-        false => (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a),
-    }
-}
-
-fn d(ggx: bool, m: DVec3, alpha: f64) -> f64 {
-    let (c2, a2) = (m.z * m.z, alpha * alpha);
-    let x = (1.0 - c2) / (c2 * a2);
-    (if ggx { 1.0 / (1.0 + x).powi(2) } else { (-x).exp() }) / (PI * a2 * c2 * c2)
-}
-
 #[test]
 fn a_rough_mirror_loses_what_single_scattering_loses() {
     for (alpha, ggx) in ALPHAS.iter().flat_map(|&a| [(a, false), (a, true)]) {
@@ -323,12 +240,18 @@ fn a_rough_mirror_loses_what_single_scattering_loses() {
 }
 
 #[test]
-fn rough_kinds_make_no_light() {
-    for (name, b, wo) in rough_cases() {
-        let e = energy(b, wo, 1 << 12);
+fn rough_glass_and_coats_lose_what_single_scattering_loses() {
+    let cases: Vec<_> = rough_cases().into_iter().filter(|(_, b, _)| b.kind != BSDF_CONDUCTOR).collect();
+    let judge = |(name, b, wo): &(String, Bsdf, Vec3)| {
+        let exact: f64 = scattered_once(b, *wo).iter().sum();
+        let e = energy(*b, *wo, 1 << 16);
+        let off = |e: f64| (e - exact).abs() > 2e-3;
         // Walter's fit adds up to 0.4 %; a coat whose base passes a smooth interface stays within the same margin.
-        assert!(e < 1.006 && e > 0.05, "{name}: {e}");
-    }
+        let wrong = off(e) || e > 1.006 || !off(0.97 * e);
+        wrong.then(|| format!("{name}: {e}, by quadrature {exact}"))
+    };
+    let failures: Vec<_> = cases.par_iter().filter_map(judge).collect();
+    assert!(failures.is_empty(), "or a loss of 3 % more is not seen:\n{}", failures.join("\n"));
 }
 
 #[test]

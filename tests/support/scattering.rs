@@ -1,0 +1,131 @@
+//! What one scattering by microfacets leaves of the light, by quadrature in f64.
+use glam::{DVec3, Vec3, dvec3};
+use std::f64::consts::{PI, TAU};
+use tallow::gpu::layout::{BSDF_COATED, BSDF_DIELECTRIC};
+use tallow::reference::bsdf::{Bsdf, SMOOTH_ALPHA};
+
+/// Cells in the slopes of the half vector over alpha, polar with a logarithmic radius: there a microfacet lobe is about one
+/// unit wide for every roughness, incidence and index, and neither cells nor quadrature miss it or a diffuse base.
+pub struct Grid {
+    wo: DVec3,
+    /// Index on wi's side / on wo's: 1 for reflection.
+    n: f64,
+    alpha: f64,
+}
+
+pub const RINGS: usize = 16;
+pub const SECTORS: usize = 16;
+/// Quadrature points per cell and axis.
+const POINTS: usize = 20;
+
+impl Grid {
+    /// Of `wi`.
+    pub fn cell(&self, wi: Vec3) -> usize {
+        let h = self.wo + self.n * wi.as_dvec3();
+        let slope = h.truncate() / (h.z * self.alpha);
+        let log = slope.length().ln_1p();
+        let t = log / (1.0 + log);
+        let turn = slope.y.atan2(slope.x).rem_euclid(TAU) / TAU;
+        let index = |v: f64, n: usize| ((v * n as f64) as usize).min(n - 1);
+        index(t, RINGS) * SECTORS + index(turn, SECTORS)
+    }
+
+    /// wi for polar coordinates of the slope, and the solid angle per unit of (t, turn); None where no wi exists.
+    fn direction(&self, t: f64, turn: f64) -> Option<(Vec3, f64)> {
+        let radius = (t / (1.0 - t)).exp_m1();
+        let (sin, cos) = (TAU * turn).sin_cos();
+        let side = self.wo.z.signum();
+        let m = dvec3(radius * self.alpha * cos, radius * self.alpha * sin, 1.0).normalize() * side;
+        let co = self.wo.dot(m);
+        let ct2 = 1.0 - (1.0 - co * co) / (self.n * self.n);
+        if co <= 0.0 || ct2 <= 0.0 {
+            return None;
+        }
+        let (ci, reflected) = if self.n == 1.0 { (co, true) } else { (-ct2.sqrt(), false) };
+        let wi = (co / self.n + ci) * m - self.wo / self.n;
+        let slope_area = radius * (1.0 + radius) * TAU * self.alpha * self.alpha / (1.0 - t).powi(2);
+        // Walter et al. 2007: d omega_m = d slope cos^3; d omega_i = (co + n ci)^2 / (n^2 |ci|) d omega_m.
+        let jacobian = (co + self.n * ci).powi(2) / (self.n * self.n * ci.abs()) * (m.z * side).powi(3);
+        ((wi.z * side > 0.0) == reflected).then(|| (wi.as_vec3(), slope_area * jacobian))
+    }
+
+    /// Integrals of `f` over the cells.
+    pub fn integrate(&self, f: impl Fn(Vec3) -> f64) -> Vec<f64> {
+        let mut cells = vec![0.0; RINGS * SECTORS];
+        let (rings, sectors) = (RINGS * POINTS, SECTORS * POINTS);
+        for i in 0..rings {
+            for j in 0..sectors {
+                let (t, turn) = ((i as f64 + 0.5) / rings as f64, (j as f64 + 0.5) / sectors as f64);
+                if let Some((wi, area)) = self.direction(t, turn) {
+                    cells[i / POINTS * SECTORS + j / POINTS] += f(wi) * area / (rings * sectors) as f64;
+                }
+            }
+        }
+        cells
+    }
+}
+
+/// The grid of the reflected lobe, and of the refracted one where there is one.
+pub fn grids(b: &Bsdf, wo: Vec3) -> Vec<Grid> {
+    // A diffuse lobe without a rough coat spreads over all slopes.
+    let alpha = f64::from(if b.alpha < SMOOTH_ALPHA { 1.0 } else { b.alpha });
+    let eta = f64::from(if wo.z < 0.0 { 1.0 / b.eta.x } else { b.eta.x });
+    let indices = if b.kind == BSDF_DIELECTRIC { vec![1.0, eta] } else { vec![1.0] };
+    indices.into_iter().map(|n| Grid { wo: wo.as_dvec3(), n, alpha }).collect()
+}
+
+/// Smith G1 in f64, written apart from the twin.
+pub fn g1(ggx: bool, z: f64, alpha: f64) -> f64 {
+    let a = z / (alpha * (1.0 - z * z).max(1e-300).sqrt());
+    match ggx {
+        true => 2.0 / (1.0 + (1.0 + 1.0 / (a * a)).sqrt()),
+        false if a >= 1.6 => 1.0,
+        false => (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a),
+    }
+}
+
+/// Normal distribution, per steradian.
+pub fn d(ggx: bool, m: DVec3, alpha: f64) -> f64 {
+    let (c2, a2) = ((m.z * m.z).max(1e-30), alpha * alpha);
+    let x = (1.0 - c2) / (c2 * a2);
+    (if ggx { 1.0 / (1.0 + x).powi(2) } else { (-x).exp() }) / (PI * a2 * c2 * c2)
+}
+
+/// Reflectance of a dielectric in f64, written apart from the twin; `n` = index beyond / on this side.
+fn fresnel(cosine: f64, n: f64) -> f64 {
+    let beyond2 = 1.0 - (1.0 - cosine * cosine) / (n * n);
+    if beyond2 <= 0.0 {
+        return 1.0;
+    }
+    let beyond = beyond2.sqrt();
+    let (s, p) = ((cosine - n * beyond) / (cosine + n * beyond), (n * cosine - beyond) / (n * cosine + beyond));
+    0.5 * (s * s + p * p)
+}
+
+/// Flux that microfacets of relative index `eta` send on by one scattering, per solid angle of wi and for one unit that
+/// arrives along wo: reflected (Walter et al. 2007, eq. 20), or refracted (eq. 21 without the n^2 of radiance).
+fn microfacets(b: &Bsdf, eta: f64, wo: DVec3, wi: DVec3) -> f64 {
+    let n = if wi.z * wo.z > 0.0 { 1.0 } else { eta };
+    let m = (wo + n * wi).normalize();
+    let m = m * m.z.signum();
+    let (co, ci) = (wo.dot(m).abs(), wi.dot(m).abs());
+    let share = if n == 1.0 { fresnel(co, eta) } else { 1.0 - fresnel(co, eta) };
+    // h_r points between the two, h_t away from both: the projections add up there, and subtract here.
+    let q = if n == 1.0 { 2.0 * co } else { co - n * ci };
+    let (alpha, g) = (f64::from(b.alpha), |w: DVec3| g1(b.ggx, w.z.abs(), f64::from(b.alpha)));
+    share * d(b.ggx, m, alpha) * g(wo) * g(wi) * co * ci * n * n / (q * q) / wo.z.abs()
+}
+
+/// Flux that is left of one unit along wo, reflected and refracted; of a coat, reflected alone. Its base, if white,
+/// returns all that the coat lets in: (1 - F(wo)) (1 - mean of F outside) / (eta^2 (1 - mean of F inside)), whose last
+/// factors cancel.
+pub fn scattered_once(b: &Bsdf, wo: Vec3) -> [f64; 2] {
+    let eta = f64::from(if wo.z < 0.0 { 1.0 / b.eta.x } else { b.eta.x });
+    let flux = |wi: Vec3| microfacets(b, eta, wo.as_dvec3(), wi.as_dvec3());
+    let lobes: Vec<f64> = grids(b, wo).iter().map(|grid| grid.integrate(flux).iter().sum()).collect();
+    match lobes[..] {
+        [reflected, refracted] => [reflected, refracted],
+        _ if b.kind == BSDF_COATED => [lobes[0] + 1.0 - fresnel(f64::from(wo.z), eta), 0.0],
+        _ => [lobes[0], 0.0],
+    }
+}
