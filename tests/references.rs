@@ -3,6 +3,7 @@
 mod support;
 
 use std::path::{Path, PathBuf};
+use tallow::gpu::layout::{Guide, NONE};
 use tallow::image::{self, Film, Picture};
 use tallow::renderer::{Outputs, Renderer};
 use tallow::scene::Scene;
@@ -147,41 +148,59 @@ fn plane(film: &Film, name: &str) -> Vec<f32> {
     film.channel(name).unwrap_or_else(|| panic!("no channel {name}")).to_f32().into_owned()
 }
 
-/// True where the pixel's neighbours show the same shape, so that no edge is near.
-fn interior(shape: &[f32], i: usize) -> bool {
-    let (w, x, y) = (SIZE as usize, i % SIZE as usize, i / SIZE as usize);
-    let near = [(x > 0, -1), (x + 1 < w, 1), (y > 0, -(w as isize)), (y + 1 < w, w as isize)];
-    near.iter().all(|&(inside, step)| !inside || shape[i.wrapping_add_signed(step)] == shape[i])
+fn planes(film: &Film, name: &str, parts: [&str; 3]) -> [Vec<f32>; 3] {
+    parts.map(|part| plane(film, &format!("{name}.{part}")))
+}
+
+/// Pixels at which depth, position, normal, object or albedo is not the reference's; of `metal` it says no albedo.
+fn unlike_first_hits(guide: &[Guide], centre: &Film, metal: Option<f32>) -> Vec<usize> {
+    let (t, shape) = (plane(centre, "t.T"), plane(centre, "shape.I"));
+    let [normal, position] = ["n", "pos"].map(|name| planes(centre, name, ["X", "Y", "Z"]));
+    let albedo = planes(centre, "albedo", ["R", "G", "B"]);
+    let unlike = |&i: &usize| {
+        let g = &guide[i];
+        if t[i] < 0.0 {
+            return g.object != NONE || g.depth != 0.0;
+        }
+        let near = |ours: [f32; 3], planes: &[Vec<f32>; 3], tolerance: f32| {
+            ours.iter().zip(planes).all(|(a, plane)| (a - plane[i]).abs() <= tolerance)
+        };
+        g.object as f32 != shape[i]
+            || (g.depth - t[i]).abs() > 1e-5 * t[i]
+            || !near(g.position, &position, 1e-4)
+            || !near(g.normal, &normal, 1e-5)
+            || !(near(g.albedo, &albedo, 1e-5) || metal == Some(shape[i]))
+    };
+    (0..guide.len()).filter(unlike).collect()
 }
 
 #[test]
 fn first_hits_match_at_pixel_centres() {
     let gpu = support::gpu();
     let outputs = Outputs { guides: true, ..Outputs::default() };
-    let renderer = Renderer::new(&gpu, &scene("scene.toml", 1), outputs).unwrap();
-    support::render(&gpu, &renderer);
-    let guide = renderer.film().tiles[0].guide.read().unwrap();
-    let centre = reference("center_diffuse.exr");
-    let (t, shape) = (plane(&centre, "t.T"), plane(&centre, "shape.I"));
-    let (n, albedo) = (
-        ["n.X", "n.Y", "n.Z"].map(|c| plane(&centre, c)),
-        ["R", "G", "B"].map(|c| plane(&centre, &format!("albedo.{c}"))),
-    );
-    let mut at_edges = 0;
-    for (i, g) in guide.iter().enumerate() {
-        let miss = t[i] < 0.0;
-        let same = if miss {
-            g.depth == 0.0
-        } else {
-            let normals: f32 = (0..3).map(|c| g.normal[c] * n[c][i]).sum();
-            let colours = (0..3).all(|c| (g.albedo[c] - albedo[c][i]).abs() < 1e-4);
-            (g.depth - t[i]).abs() <= 1e-4 * t[i] && normals > 0.9999 && colours
-        };
-        if !same {
-            assert!(!interior(&shape, i), "pixel {i}: {g:?}, expected t {} shape {}", t[i], shape[i]);
-            at_edges += 1;
+    let variants =
+        [("scene.toml", "diffuse", None), ("conductor.toml", "conductor", Some(6.0)), ("point.toml", "point", None)];
+    for (file, variant, metal) in variants {
+        let mut scene = scene(file, 1);
+        scene.settings.spp = 1; // guides take no samples
+        let renderer = Renderer::new(&gpu, &scene, outputs).unwrap();
+        support::render(&gpu, &renderer);
+        let guide = renderer.film().tiles[0].guide.read().unwrap();
+        let centre = reference(&format!("center_{variant}.exr"));
+        assert_eq!(unlike_first_hits(&guide, &centre, metal), [0; 0], "{variant}");
+        // Control: one thing that is off in one pixel, on the floor.
+        let changes: [fn(&mut Guide); 5] = [
+            |g| g.object += 1,
+            |g| g.depth *= 1.0001,
+            |g| g.position[1] -= 2e-4,
+            |g| g.normal[2] += 1e-4,
+            |g| g.albedo[2] += 1e-3,
+        ];
+        for change in changes {
+            let (pixel, mut other) = ((120 * SIZE + 64) as usize, guide.clone());
+            change(&mut other[pixel]);
+            assert_eq!(unlike_first_hits(&other, &centre, metal), [pixel], "{variant}: control");
         }
     }
-    println!("{at_edges} pixels differ, all of them beside an edge");
-    assert!(at_edges <= 8, "{at_edges} pixels beside edges differ: more than ties can explain");
+    support::assert_silent(&gpu);
 }
