@@ -20,7 +20,7 @@ use tallow::scene::Scene;
 use tallow::settings::{PixelFilter, Settings};
 use tallow::shaders;
 use tallow::stage::PerThread;
-use twin::{Random, Workplace};
+use twin::{Aim, BALL, Random, Workplace, aimed_at_seam, ball, instanced_ball};
 
 const SIDE: u32 = 48;
 const SAMPLES: u32 = 3;
@@ -258,6 +258,48 @@ fn traversal_agrees_with_its_twin() {
                 assert!(differing(scene, &rays, &hits, any_hit) > 300, "{name} control: other rays' hits");
             }
         }
+    }
+    assert_silent(&gpu);
+}
+
+/// Rays at shared vertices and edges of a ball: from inside, from the centre along the axes too, and from as far as the
+/// twin lets none through.
+fn aims(scene: &Scene) -> Vec<Aim> {
+    type From = fn(&mut Random) -> Vec3;
+    let from: [(usize, From); 4] = [
+        (100_000, |r| BALL + 0.5 * r.point()),
+        (20_000, |_| BALL),
+        (100_000, |r| BALL + 10.0 * r.point().normalize()),
+        (200_000, |r| BALL + 100.0 * r.point().normalize()),
+    ];
+    let aim = |(count, from): (usize, From)| (0..count).filter_map(move |i| aimed_at_seam(scene, i, from));
+    from.into_iter().flat_map(aim).collect()
+}
+
+/// Those that the kernel lets through, on the way to the closest hit or to any before an end behind the surface.
+fn leaks(gpu: &Gpu, scene: &Scene, any_hit: bool) -> Vec<Aim> {
+    let mut aims = aims(scene);
+    let query = |a: &Aim| {
+        let t_max = if any_hit { a.distance + 0.2 } else { 3e38 };
+        RayQuery { origin: a.origin.into(), t_max, direction: a.direction.into(), mask_seed: 0 }
+    };
+    let queries: Vec<_> = aims.iter().map(query).collect();
+    let mut hits = traversed(gpu, scene, called_for(scene, Outputs::default()), &queries, any_hit).into_iter();
+    aims.retain(|a| hits.next().is_some_and(|hit| hit.triangle == NONE || hit.t > a.distance + 0.2));
+    aims
+}
+
+#[test]
+fn closed_meshes_do_not_leak() {
+    let gpu = gpu();
+    for (name, mut scene) in [("ball", ball()), ("instance", instanced_ball())] {
+        for any_hit in [false, true] {
+            let leaks = leaks(&gpu, &scene, any_hit);
+            assert!(leaks.is_empty(), "{name} any_hit {any_hit}: {} leaks, {:?}", leaks.len(), leaks[0]);
+        }
+        let hole = scene.triangles[1234].v0;
+        scene.triangles[1234].v1 = hole;
+        assert!(!leaks(&gpu, &scene, false).is_empty(), "control: a missing triangle leaks");
     }
     assert_silent(&gpu);
 }

@@ -1,6 +1,6 @@
 //! Scenes made in a test, and the mean of their picture by the CPU twin.
 #![allow(dead_code)]
-use glam::Vec3;
+use glam::{Vec3, vec3};
 use image::codecs::png::PngEncoder;
 use rayon::prelude::*;
 use std::fmt::Write;
@@ -8,6 +8,7 @@ use std::fs::File;
 use tallow::gpu::layout::Effects;
 use tallow::image::{Film, Samples, WriteOptions};
 use tallow::reference::path::{Strategy, Tracer};
+use tallow::reference::scene::world_from_object;
 use tallow::renderer::path_push;
 use tallow::scene::Scene;
 use tallow::settings::Sampler;
@@ -75,6 +76,50 @@ impl Workplace {
         let path = self.0.path().join("scene.toml");
         Scene::parse(&path, text, &|_| {}).unwrap_or_else(|e| panic!("{e}"))
     }
+}
+
+/// Middle of [`ball`].
+pub const BALL: Vec3 = vec3(0.3, -0.2, 5.0);
+
+/// A closed mesh of radius 1 in world space.
+pub fn ball() -> Scene {
+    let sphere = "[[mesh]]\nshape = 'sphere'\nsegments = 128\ntransform = { translate = [0.3, -0.2, 5.0] }\n";
+    Workplace::new().scene(sphere)
+}
+
+/// [`ball`] as an instance that is turned.
+pub fn instanced_ball() -> Scene {
+    let sphere = "[[mesh]]\nname = 'ball'\nshape = 'sphere'\nsegments = 128\n[[instance]]\nmesh = 'ball'\n";
+    let turned = "transform = { translate = [0.3, -0.2, 5.0], rotate = [20.0, 40.0, 60.0] }\n";
+    let scene = Workplace::new().scene(&format!("{sphere}{turned}"));
+    assert_eq!(scene.instances.len(), 1);
+    scene
+}
+
+/// A ray towards a point where triangles meet, `distance` away.
+#[derive(Debug)]
+pub struct Aim {
+    pub origin: Vec3,
+    pub direction: Vec3,
+    pub distance: f32,
+}
+
+/// Ray `i` of many from `origin(random)` to vertices and to points on edges of a ball, in turn. `None` from outside
+/// near the silhouette, where a ray may pass beside it.
+pub fn aimed_at_seam(scene: &Scene, i: usize, origin: impl Fn(&mut Random) -> Vec3) -> Option<Aim> {
+    let mut random = Random::stream(i);
+    let t = scene.triangles[(random.unit() * scene.triangles.len() as f32) as usize];
+    let place = |p: [f32; 3]| match scene.instances.first() {
+        Some(instance) => world_from_object(instance).point(p.into()),
+        None => p.into(),
+    };
+    let [a, b] = [t.v0, t.v1].map(place);
+    let target = if i.is_multiple_of(2) { a } else { a.lerp(b, random.unit()) };
+    let origin = origin(&mut random);
+    let distance = (target - origin).length();
+    let direction = (target - origin) / distance;
+    let grazes = direction.dot(target - BALL).abs() < 0.3 && origin.distance(BALL) > 1.0;
+    (!grazes).then_some(Aim { origin, direction, distance })
 }
 
 /// Mean of the picture's channels and the standard error of that mean.
