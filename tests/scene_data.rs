@@ -1,7 +1,16 @@
-//! Every OBJ below TALLOW_DATA/scenes loads with its textures; prints what loading takes.
+//! Every OBJ below TALLOW_DATA/scenes loads with its textures and renders; prints what loading takes.
+mod support;
+
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::time::Instant;
+use tallow::gpu::Gpu;
+use tallow::renderer::{Outputs, Renderer};
 use tallow::scene::Scene;
+use tallow::settings::Settings;
+
+/// What is timed runs alone.
+static ALONE: Mutex<()> = Mutex::new(());
 
 /// # Panics
 /// When there is none: these tests are ignored unless asked for.
@@ -20,47 +29,81 @@ fn objs(directory: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
+fn tiny(s: &mut Settings) {
+    (s.width, s.height, s.spp) = (8, 8, 1);
+}
+
+/// Renders it; bytes on the device but for pictures (of textures and of the sky), and whether any light is seen.
+fn rendered(gpu: &Gpu, scene: &Scene, name: &str) -> (u64, bool) {
+    let renderer = Renderer::new(gpu, scene, Outputs::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let sizes = renderer.scene().sizes();
+    let bytes =
+        sizes.iter().filter(|(part, _)| !["texels", "environment"].contains(part)).map(|(_, bytes)| bytes).sum();
+    let stats = support::render(gpu, &renderer);
+    assert!(stats.iter().all(|s| s.count == 1 && s.mean.iter().all(|v| v.is_finite())), "{name}: broken pixels");
+    (bytes, stats.iter().any(|s| s.mean != [0.0; 3]))
+}
+
 #[test]
 #[ignore = "needs TALLOW_DATA"]
-fn every_obj_loads() {
-    let data = data();
+fn every_obj_loads_and_renders() {
+    let _alone = ALONE.lock();
+    let (data, gpu) = (data(), support::gpu());
     let mut paths = Vec::new();
     objs(&data.join("scenes"), &mut paths);
     assert!(paths.len() >= 50, "only {} OBJ files below {}", paths.len(), data.display());
     paths.sort();
+    let (mut seen, mut dark) = (Vec::new(), Vec::new());
     for path in paths {
         let start = Instant::now();
-        let scene = Scene::load(&path, &|_| {}).unwrap_or_else(|e| panic!("{e}"));
+        let scene = Scene::load(&path, &tiny).unwrap_or_else(|e| panic!("{e}"));
+        let (ms, n) = (start.elapsed().as_secs_f64() * 1e3, scene.triangles.len());
         let name = path.strip_prefix(&data).unwrap_or(&path).display().to_string();
-        println!("{:5.0} ms {:8} triangles {name}", start.elapsed().as_secs_f64() * 1e3, scene.triangles.len());
+        println!("{ms:5.0} ms {n:8} triangles {name}");
         scene.warnings.iter().for_each(|w| println!("         {w}"));
         assert!(!scene.triangles.is_empty() && !scene.lights.is_empty(), "{name}");
         let missing = scene.warnings.iter().find(|w| w.contains("no such file") || w.contains("not found"));
         assert!(missing.is_none() || name.contains("gltf"), "{missing:?}");
-        assert!(scene.shading.is_empty() || scene.shading.len() == scene.triangles.len());
-        let bytes = scene.triangles.len() * 48 + scene.shading.len() * 48 + scene.nodes.len() * 80;
-        // Every leaf holds a triangle or more; tiny scenes have a node to themselves.
-        assert!(bytes <= 200 * scene.triangles.len() + 80, "{name}: {bytes} bytes");
+        assert!(scene.shading.is_empty() || scene.shading.len() == n);
+        // Of the poses of an animation, which a number tells apart, one is enough: compiling takes a third of a second.
+        let mesh = (name.replace(|c: char| c.is_ascii_digit(), ""), n);
+        if seen.contains(&mesh) {
+            continue;
+        }
+        seen.push(mesh);
+        let (bytes, lit) = rendered(&gpu, &scene, &name);
+        // Two triangles have a node, materials and a light as well.
+        assert!(bytes <= 200 * n as u64 + 256, "{name}: {bytes} bytes");
+        dark.extend((!lit).then_some(name));
     }
+    // Rooms that are closed, and lit inside.
+    println!("of {} scenes, no light leaves {dark:?}", seen.len());
+    assert!(seen.len() >= 40 && dark.len() <= 4, "{} scenes, {dark:?}", seen.len());
+    support::assert_silent(&gpu);
 }
 
 #[test]
 #[ignore = "needs TALLOW_DATA"]
 fn sponza_loads_with_its_textures() {
-    let data = data();
+    let _alone = ALONE.lock();
+    let (data, gpu) = (data(), support::gpu());
     let path = data.join("scenes/crytek-sponza/sponza.obj");
     let mut best = f64::INFINITY;
-    for _ in 0..3 {
+    // Three rounds, and more where something else keeps the machine busy.
+    for round in 1.. {
         let start = Instant::now();
-        let scene = Scene::load(&path, &|_| {}).expect("Sponza loads");
+        let scene = Scene::load(&path, &tiny).expect("Sponza loads");
+        let loaded = start.elapsed().as_secs_f64();
+        let _renderer = Renderer::new(&gpu, &scene, Outputs::default()).expect("Sponza fits");
         best = best.min(start.elapsed().as_secs_f64());
         let (n, bytes) = (scene.triangles.len(), scene.texels.len() * 4);
-        println!(
-            "Sponza: {n} triangles, {} nodes, {} textures, {bytes} bytes",
-            scene.nodes.len(),
-            scene.textures.len()
-        );
+        println!("Sponza: {n} triangles, {} textures, {bytes} bytes, loaded in {loaded:.2} s", scene.textures.len());
         assert!(n > 262_000 && scene.textures.len() > 40);
+        if round >= 3 && best < 2.0 || round == 10 {
+            break;
+        }
     }
-    println!("Sponza is ready in {best:.2} s");
+    println!("Sponza is ready in {best:.2} s, uploaded and its kernels compiled");
+    assert!(best < 2.0, "{best} s");
+    support::assert_silent(&gpu);
 }
