@@ -3,6 +3,7 @@
 mod command;
 
 use command::{complains, stdout, tallow};
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use tallow::image::{self, Film, WriteOptions};
@@ -82,7 +83,7 @@ fn pipes_and_folders_are_refused_and_odd_names_are_not() {
     let mut filter = Command::new(env!("CARGO_BIN_EXE_tallow"));
     filter.args(["filter", "a.exr", "--filter", "none", "--json", "-o"]).arg(&odd).current_dir(folder.path());
     let output = filter.output().unwrap();
-    assert!(serde_json::from_slice::<serde_json::Value>(&output.stdout).is_ok(), "{output:?}");
+    assert!(serde_json::from_slice::<Value>(&output.stdout).is_ok(), "{output:?}");
     assert!(folder.path().join(odd).exists());
 }
 
@@ -109,10 +110,69 @@ fn compare_prints_json_and_writes_the_difference() {
     write(&folder, "a.exr", 12, 0.5);
     write(&folder, "b.exr", 12, 0.6);
     let output = tallow(&folder, &["compare", "a.exr", "b.exr", "--json", "--diff", "d.png"]);
-    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let json: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!((json["metrics"]["mse"].as_f64().unwrap() - 0.02 / 3.0).abs() < 1e-6, "{json}");
     assert!((json["diff"]["scale"][1].as_f64().unwrap() - 0.2 / 3.0).abs() < 1e-6, "{json}");
     assert_eq!(image::read(&folder.path().join("d.png")).unwrap().height, 12);
+}
+
+#[test]
+fn devices_are_listed_as_vulkan_has_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let found = tallow::gpu::survey().unwrap();
+    let output = tallow(&folder, &["devices", "--json"]);
+    let listed: Vec<Value> = serde_json::from_slice(&output.stdout).unwrap();
+    let text = stdout(&tallow(&folder, &["devices"]));
+    assert!(!found.is_empty() && output.status.success());
+    assert_eq!(listed.len(), found.len());
+    for (index, (device, info)) in listed.iter().zip(&found).enumerate() {
+        assert_eq!(device["index"], index);
+        assert!(device["name"] == info.name.as_str() && device["kind"] == info.kind, "{device}");
+        assert_eq!(device["api"], info.api_version.as_str());
+        assert_eq!(device["missing"], Value::from(info.missing.clone()));
+        let limits = device["limits"].as_array().unwrap();
+        let range = limits.iter().find(|l| l[0].as_str().unwrap().contains("storage buffer range")).unwrap();
+        assert_eq!(range[1], info.max_storage_range);
+        // A row of the table, and a block of limits.
+        let row = text.lines().find(|line| line.starts_with(&format!("{index}  {}", info.name))).unwrap();
+        assert_eq!(row.ends_with("yes"), info.missing.is_empty(), "{row}");
+        assert!(text.contains(&format!("{index} {}: missing:", info.name)), "{text}");
+        assert!(text.contains(&info.max_storage_range.to_string()), "{text}");
+    }
+}
+
+/// Events of a thread of the trace: name, begin and end in microseconds.
+fn spans(trace: &Value, thread: &str) -> Vec<(String, f64, f64)> {
+    let events = trace["traceEvents"].as_array().unwrap();
+    let named = |e: &&Value| e["name"] == "thread_name" && e["args"]["name"].as_str().unwrap().starts_with(thread);
+    let id = &events.iter().find(named).unwrap_or_else(|| panic!("no thread {thread}"))["tid"];
+    let span = |e: &Value| {
+        let (begin, duration) = (e["ts"].as_f64().unwrap(), e["dur"].as_f64().unwrap());
+        (e["name"].as_str().unwrap().to_owned(), begin, begin + duration)
+    };
+    events.iter().filter(|e| e["ph"] == "X" && e["tid"] == *id).map(span).collect()
+}
+
+#[test]
+fn a_profile_holds_every_pass_on_the_time_axis_of_the_host() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/scene.toml");
+    let words = ["--width", "16", "--height", "16", "--spp", "2", "--quiet", "-o", "box.exr", "--profile", "p.json"];
+    let output = tallow(&folder, &[&["render", scene], &words[..]].concat());
+    assert!(output.status.success(), "{output:?}");
+    let trace: Value = serde_json::from_slice(&std::fs::read(folder.path().join("p.json")).unwrap()).unwrap();
+    let (cpu, gpu) = (spans(&trace, "CPU"), spans(&trace, "GPU"));
+    let of = |spans: &[(String, f64, f64)], name: &str| {
+        spans.iter().find(|s| s.0 == name).unwrap_or_else(|| panic!("no {name} in {spans:?}")).clone()
+    };
+    let [load, compile, render, write] = ["load scene", "upload and compile", "render", "write"].map(|n| of(&cpu, n));
+    assert!(load.1 == 0.0 && load.2 <= compile.1 && compile.2 <= render.1 && render.2 <= write.1, "{cpu:?}");
+    let [guide, path, fold] = ["guide", "path", "fold"].map(|n| of(&gpu, n));
+    assert!(guide.2 <= path.1 && path.1 < path.2 && path.2 <= fold.1, "{gpu:?}");
+    if !trace.to_string().contains("unknown") {
+        let within = |s: &(String, f64, f64)| render.1 - 100.0 <= s.1 && s.2 <= render.2 + 100.0; // clocks drift
+        assert!(gpu.iter().all(within), "outside {render:?}: {gpu:?}");
+    }
 }
 
 #[test]

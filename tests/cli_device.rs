@@ -1,4 +1,4 @@
-//! What the built program says without a Vulkan loader or driver, and when it loses its device in the middle.
+//! What the built program says without a Vulkan loader, driver or device, and when it loses its device in the middle.
 #![cfg(target_os = "linux")]
 #[path = "support/command.rs"]
 #[allow(dead_code)]
@@ -54,12 +54,27 @@ fn compile(source: &Path, library: &Path) {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
+/// Puts `support/lost_loader.rs` before the loader, and says where that lies.
+fn stand_in(folder: &TempDir) -> PathBuf {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/support/lost_loader.rs");
+    compile(&source, &folder.path().join("libvulkan.so.1"));
+    loader()
+}
+
+#[test]
+fn drivers_without_a_device_are_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let real = stand_in(&folder);
+    let real = ("REAL_LOADER", real.to_str().unwrap());
+    fails(&folder, &[real, ("NO_DEVICE", "1")], &["no Vulkan device", "mesa-vulkan-drivers"]);
+    let control = render(&folder, &[real]);
+    assert!(control.status.success(), "the same loader with its devices: {control:?}");
+}
+
 #[test]
 fn a_lost_device_is_one_line_and_keeps_the_old_file() {
     let folder = tempfile::tempdir().unwrap();
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/support/lost_loader.rs");
-    compile(&source, &folder.path().join("libvulkan.so.1"));
-    let (real, lost) = (loader(), ["the device was lost", "run again"]);
+    let (real, lost) = (stand_in(&folder), ["the device was lost", "run again"]);
     let real = ("REAL_LOADER", real.to_str().unwrap());
     // There are two submissions: what begins a render, and its only batch.
     fails(&folder, &[real, ("LOSE_AT", "1")], &lost);

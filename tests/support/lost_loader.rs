@@ -1,5 +1,6 @@
-//! Stands in for Vulkan's loader in front of a program that opens it: `REAL_LOADER` names the real one, and submission
-//! number `LOSE_AT`, counted from 1, loses the device. `tests/cli_device.rs` compiles it, with std alone.
+//! Stands in for Vulkan's loader in front of a program that opens it: `REAL_LOADER` names the real one, submission
+//! number `LOSE_AT`, counted from 1, loses the device, and with `NO_DEVICE` its drivers have none.
+//! `tests/cli_device.rs` compiles it, with std alone.
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::mem::transmute;
 use std::sync::OnceLock;
@@ -33,12 +34,24 @@ fn real() -> Find {
 unsafe extern "system" fn vkGetInstanceProcAddr(instance: *mut c_void, name: *const c_char) -> *const c_void {
     unsafe {
         let found = real()(instance, name);
-        if found.is_null() || CStr::from_ptr(name) != c"vkGetDeviceProcAddr" {
+        if found.is_null() {
+            return found;
+        }
+        let name = CStr::from_ptr(name);
+        if name == c"vkEnumeratePhysicalDevices" && std::env::var_os("NO_DEVICE").is_some() {
+            return no_devices as *const c_void;
+        }
+        if name != c"vkGetDeviceProcAddr" {
             return found;
         }
         DEVICE.get_or_init(|| transmute::<*const c_void, Find>(found));
         device as *const c_void
     }
+}
+
+unsafe extern "system" fn no_devices(_: *mut c_void, count: *mut u32, _: *mut c_void) -> c_int {
+    unsafe { *count = 0 };
+    0
 }
 
 unsafe extern "system" fn device(device: *mut c_void, name: *const c_char) -> *const c_void {
