@@ -1,7 +1,10 @@
 //! The path tracer against images of an independent renderer (Mitsuba 3, `tests/data/references/README.md`): every
 //! pixel by a z-test with both standard errors, and the image means.
+#[path = "support/normal.rs"]
+mod normal;
 mod support;
 
+use normal::sidak_quantile;
 use std::path::{Path, PathBuf};
 use tallow::gpu::layout::{Guide, NONE};
 use tallow::image::{self, Film, Picture};
@@ -49,38 +52,6 @@ fn render(file: &str, depth: u32) -> Estimate {
         mean: stats.iter().map(|s| s.mean).collect(),
         error2: stats.iter().map(|s| s.m2.map(|m2| error2(m2, s.count as f32))).collect(),
     }
-}
-
-/// Two-sided quantile of the normal distribution at which `tests` independent tests together fail once in a hundred
-/// times (Sidak 1967): 1 - (1 - 0.01)^(1 / tests).
-fn sidak_quantile(tests: usize) -> f64 {
-    let level = 1.0 - (1.0f64 - 0.01).powf(1.0 / tests as f64);
-    let tail = |z: f64| libm_erfc(z / 2f64.sqrt());
-    let (mut low, mut high) = (0.0, 40.0);
-    for _ in 0..100 {
-        let middle = 0.5 * (low + high);
-        if tail(middle) > level { low = middle } else { high = middle }
-    }
-    high
-}
-
-/// Complementary error function for x >= 0, relative error below 1.2e-7 (Numerical Recipes, erfcc).
-fn libm_erfc(x: f64) -> f64 {
-    let t = 1.0 / (1.0 + 0.5 * x);
-    let c = [
-        -1.26551223,
-        1.00002368,
-        0.37409196,
-        0.09678418,
-        -0.18628806,
-        0.27886807,
-        -1.13520398,
-        1.48851587,
-        -0.82215223,
-        0.17087277,
-    ];
-    let poly = c.iter().rev().fold(0.0, |sum, &c| sum * t + c);
-    t * (-x * x + poly).exp()
 }
 
 /// Share of pixels whose three channels all pass.

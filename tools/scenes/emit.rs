@@ -1,9 +1,8 @@
 //! From a JSON description to the tables of a scene file.
 use super::description::{Bitmap, Bsdf, Camera, Color, Description, Emitter, Index, Integrator, Material, Shape};
+use super::mitsuba;
 use anyhow::{Context, bail, ensure};
-use image::codecs::png::PngEncoder;
-use std::fs::File;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use toml::{Table, Value};
 
 /// Paths without a limit go on until roulette ends them; this is Tallow's own limit.
@@ -12,22 +11,23 @@ const UNLIMITED: i64 = 1024;
 const ROULETTE_DEPTH: i64 = 16;
 
 /// What the conversion of a material needs to know beside the description.
-struct Place<'a> {
+pub struct Place<'a> {
     /// The scene's name, for files made beside the scene file.
-    name: &'a str,
+    pub name: &'a str,
     /// Folder that file names are relative to.
-    folder: &'a Path,
+    pub folder: &'a Path,
     /// Folder of the scene file.
-    out: &'a Path,
+    pub out: &'a Path,
+    /// Whether to make the picture that Mitsuba makes: see the module `mitsuba`.
+    pub is_mitsuba: bool,
 }
 
-/// The scene file that says the same as the JSON description at `json`; `fov` replaces its vertical field of view, in
-/// degrees.
-pub fn scene(name: &str, json: &Path, out: &Path, fov: Option<f64>) -> anyhow::Result<Table> {
-    let place = Place { name, folder: json.parent().unwrap_or(Path::new(".")), out };
+/// The scene file that says the same as the JSON description at `json`.
+pub fn scene(name: &str, json: &Path, out: &Path, is_mitsuba: bool) -> anyhow::Result<Table> {
+    let place = Place { name, folder: json.parent().unwrap_or(Path::new(".")), out, is_mitsuba };
     let mut scene = build(&place, json).with_context(|| format!("{}", json.display()))?;
-    if let (Some(fov), Some(camera)) = (fov, scene["camera"].as_table_mut()) {
-        camera.insert("fov".into(), fov.into());
+    if let (true, Some(camera)) = (is_mitsuba, scene["camera"].as_table_mut()) {
+        camera.insert("fov".into(), mitsuba::FOV.into());
     }
     Ok(scene)
 }
@@ -107,6 +107,10 @@ pub fn file(folder: &Path, name: &str) -> anyhow::Result<Value> {
 fn environment(place: &Place, emitter: &Emitter) -> anyhow::Result<Table> {
     match emitter {
         Emitter::Constant { radiance, .. } => Ok(table([("radiance", numbers(*radiance))])),
+        Emitter::Envmap { filename } if place.is_mitsuba => {
+            let path = mitsuba::environment(place, filename)?;
+            Ok(table([("file", path.display().to_string().into())]))
+        }
         Emitter::Envmap { filename } => Ok(table([("file", file(place.folder, filename)?)])),
         _ => bail!("not an environment"),
     }
@@ -209,7 +213,13 @@ fn bsdf(place: &Place, model: &Bsdf, out: &mut Table) -> anyhow::Result<()> {
             kind("coated");
             rough(*alpha, distribution, out)?;
             out.insert("ior".into(), ratio(int_ior, ext_ior)?);
-            color(place, diffuse_reflectance, out)?;
+            match diffuse_reflectance {
+                Color::Constant(rgb) if place.is_mitsuba => {
+                    let darker = mitsuba::under_rough_coat(int_ior.value()? / ext_ior.value()?);
+                    out.insert("color".into(), numbers(rgb.map(|v| v * darker)));
+                }
+                as_it_is => color(place, as_it_is, out)?,
+            }
         }
     }
     Ok(())
@@ -240,28 +250,9 @@ fn mask(place: &Place, opacity: &Color, out: &mut Table) -> anyhow::Result<()> {
     match opacity {
         Color::Constant(_) => bail!("a constant opacity is not modelled"),
         Color::Bitmap(Bitmap::Bitmap { filename, .. }) => {
-            let path = grey_mask(place, filename)?;
+            let path = mitsuba::grey_mask(place, filename)?;
             out.insert("opacity_texture".into(), path.display().to_string().into());
         }
     }
     Ok(())
-}
-
-/// Mitsuba masks with an image's decoded luminance and ignores its alpha; Tallow takes the alpha, and linear values. So
-/// a grey image of those values is written beside the scene file.
-fn grey_mask(place: &Place, filename: &str) -> anyhow::Result<PathBuf> {
-    let source = place.folder.join(filename);
-    let bytes = std::fs::read(&source).with_context(|| format!("cannot read {}", source.display()))?;
-    let image = image::load_from_memory(&bytes).with_context(|| format!("cannot decode {}", source.display()))?;
-    let mut grey = image.to_luma8();
-    for pixel in grey.pixels_mut() {
-        let s = f32::from(pixel.0[0]) / 255.0;
-        let linear = if s <= 0.04045 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) };
-        pixel.0[0] = (linear * 255.0).round() as u8;
-    }
-    let stem = source.file_stem().unwrap_or_default().to_string_lossy();
-    let path = place.out.canonicalize()?.join(format!("{}-{stem}.png", place.name));
-    let file = File::create(&path).with_context(|| format!("cannot write {}", path.display()))?;
-    grey.write_with_encoder(PngEncoder::new(file)).with_context(|| format!("cannot write {}", path.display()))?;
-    Ok(path)
 }

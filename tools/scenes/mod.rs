@@ -5,14 +5,14 @@ use toml::{Table, Value};
 
 mod description;
 mod emit;
+mod mitsuba;
 mod rigid;
 
 /// Where a scene file comes from.
 enum Source {
     /// A JSON description below the data's `scenes` folder.
     Json(&'static str),
-    /// The same for one of Mitsuba's tests. Their XML leaves the field of view to the default, which is that of a 50 mm
-    /// lens on 36 mm x 24 mm film; the descriptions say 30 degrees, at which the references do not match.
+    /// The same for one of Mitsuba's tests, told so that the picture is the one that Mitsuba makes.
     MitsubaTest(&'static str),
     /// A scene file whose paths are relative to the data's `scenes` folder.
     Written(&'static str),
@@ -21,9 +21,6 @@ enum Source {
     /// The rigid animation's description.
     Rigid(&'static str),
 }
-
-/// Degrees, across a square film whose diagonal is that of 36 mm x 24 mm film: 2 atan(hypot(36, 24) / (100 sqrt 2)).
-const MITSUBA_FOV: f64 = 34.02205717235932;
 
 /// All scenes by name. The name is that of the scene file made for it.
 const SCENES: &[(&str, Source)] = &[
@@ -95,9 +92,9 @@ pub fn convert(name: &str, data: &Path, out: &Path) -> anyhow::Result<PathBuf> {
     let folder = folder.canonicalize().with_context(|| format!("{}: set TALLOW_DATA", folder.display()))?;
     std::fs::create_dir_all(out).with_context(|| format!("cannot make the folder {}", out.display()))?;
     let (table, origin) = match source {
-        Source::Json(json) => (emit::scene(name, &folder.join(json), out, None)?, format!("scenes/{json}")),
-        Source::MitsubaTest(json) => {
-            (emit::scene(name, &folder.join(json), out, Some(MITSUBA_FOV))?, format!("scenes/{json}"))
+        Source::Json(json) | Source::MitsubaTest(json) => {
+            let is_mitsuba = matches!(source, Source::MitsubaTest(_));
+            (emit::scene(name, &folder.join(json), out, is_mitsuba)?, format!("scenes/{json}"))
         }
         Source::Written(text) => (written(text, &folder)?, format!("tools/scenes/{name}.toml")),
         Source::Sequence(text) => {

@@ -1,0 +1,67 @@
+//! Where Mitsuba computes something else than its words say: what a scene file has to say for the same picture.
+use super::emit::Place;
+use anyhow::Context;
+use image::codecs::png::PngEncoder;
+use std::fs::File;
+use std::path::PathBuf;
+use tallow::image::{Film, Picture, WriteOptions};
+use tallow::reference::fresnel::{fresnel_dielectric, internal_fresnel};
+
+/// Degrees. The tests' XML leaves the field of view to the default, which is that of a 50 mm lens on 36 mm x 24 mm film;
+/// the descriptions say 30, at which the references do not match. Across a square film whose diagonal is that of
+/// 36 mm x 24 mm film: 2 atan(hypot(36, 24) / (100 sqrt 2)).
+pub const FOV: f64 = 34.02205717235932;
+
+/// Mitsuba masks with an image's decoded luminance and ignores its alpha; Tallow takes the alpha, and linear values. So
+/// a grey image of those values is written beside the scene file.
+pub fn grey_mask(place: &Place, filename: &str) -> anyhow::Result<PathBuf> {
+    let source = place.folder.join(filename);
+    let bytes = std::fs::read(&source).with_context(|| format!("cannot read {}", source.display()))?;
+    let image = image::load_from_memory(&bytes).with_context(|| format!("cannot decode {}", source.display()))?;
+    let mut grey = image.to_luma8();
+    for pixel in grey.pixels_mut() {
+        let s = f32::from(pixel.0[0]) / 255.0;
+        let linear = if s <= 0.04045 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) };
+        pixel.0[0] = (linear * 255.0).round() as u8;
+    }
+    let path = beside(place, filename, "png")?;
+    let file = File::create(&path).with_context(|| format!("cannot write {}", path.display()))?;
+    grey.write_with_encoder(PngEncoder::new(file)).with_context(|| format!("cannot write {}", path.display()))?;
+    Ok(path)
+}
+
+/// Mitsuba puts the centres of an environment's first and last row on the poles, Tallow half a row away. So an image
+/// whose rows are where Tallow expects them is written beside the scene file; finer, to bend where the rows were.
+pub fn environment(place: &Place, filename: &str) -> anyhow::Result<PathBuf> {
+    const FINER: usize = 4;
+    let Picture { width, height, pixels } =
+        tallow::image::read(&place.folder.join(filename))?.picture(None).map_err(anyhow::Error::msg)?;
+    let (columns, last) = (width as usize, height as usize - 1);
+    let pixel = |i: usize| {
+        let at = (i / columns) as f32 + 0.5;
+        let at = at / FINER as f32;
+        let above = (at as usize).min(last - 1);
+        let row = |y: usize| glam::Vec3::from(pixels[y * columns + i % columns]);
+        row(above).lerp(row(above + 1), at - above as f32).to_array()
+    };
+    let rows = FINER * last;
+    let mut film = Film::new(width, rows as u32);
+    film.add_vec3("", ["R", "G", "B"], &(0..rows * columns).map(pixel).collect::<Vec<_>>());
+    let path = beside(place, filename, "exr")?;
+    tallow::image::write(&path, &film, &WriteOptions::default())?;
+    Ok(path)
+}
+
+/// What the colour under a rough coat of index `eta` is multiplied by. What the coat reflects inwards, an integral, is to
+/// Mitsuba the mean over 64 cosines with both ends: 63/64 of it, and 1/64 of the reflectance along the normal.
+pub fn under_rough_coat(eta: f64) -> f64 {
+    let exact = internal_fresnel(eta);
+    let normal = f64::from(fresnel_dielectric(1.0, eta as f32).x);
+    (1.0 - exact) / (1.0 - (63.0 * exact + normal) / 64.0)
+}
+
+/// Where a picture made for the scene goes.
+fn beside(place: &Place, filename: &str, extension: &str) -> anyhow::Result<PathBuf> {
+    let stem = PathBuf::from(filename).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    Ok(place.out.canonicalize()?.join(format!("{}-{stem}.{extension}", place.name)))
+}
