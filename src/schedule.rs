@@ -197,6 +197,18 @@ fn choices(settings: &Settings, cut: &Cut, done: u32) -> impl Iterator<Item = St
     })
 }
 
+/// Samples a pixel that a round is worth: deciding and adding up take as long as one to two samples of a simple scene.
+const WORTH: u32 = 3;
+
+/// Rounds for `rest` samples a pixel to place.
+fn round_count(settings: &Settings, rest: u32) -> u32 {
+    match (settings.allocate.rounds, settings.allocate.placing()) {
+        (0, Placing::Learning) => (rest / WORTH).clamp(1, 4),
+        (0, _) => 1,
+        (rounds, _) => rounds,
+    }
+}
+
 /// Samples a pixel, on average, between two looks at what a threshold still needs.
 const LOOK: u32 = 4;
 
@@ -204,7 +216,7 @@ const LOOK: u32 = 4;
 fn needed(settings: &Settings, cut: &Cut, done: u32) -> impl Iterator<Item = Step> + use<> {
     let limit = limit(settings);
     let rest = limit.saturating_sub(first_spp(settings));
-    let look = rest.div_ceil(settings.allocate.rounds).min(LOOK);
+    let look = rest.div_ceil(round_count(settings, rest)).min(LOOK);
     let rounds = if rest == 0 { 0 } else { rest.div_ceil(look) + u32::BITS };
     let Cut { pixels, paths, .. } = *cut;
     let budget = u64::from(look) * u64::from(pixels);
@@ -217,7 +229,8 @@ fn allocated(settings: &Settings, learns: bool, cut: &Cut, done: u32) -> impl It
     let Cut { pixels, paths, .. } = *cut;
     let first = u64::from(first_spp(settings)) * u64::from(pixels);
     let rest = (u64::from(settings.spp) * u64::from(pixels)).saturating_sub(first);
-    let (all, dealt) = if learns { (settings.allocate.rounds, 1) } else { (1, settings.allocate.rounds) };
+    let rounds = round_count(settings, settings.spp - first_spp(settings));
+    let (all, dealt) = if learns { (rounds, 1) } else { (1, rounds) };
     let limit = limit(settings);
     let room = u64::from(limit) * u64::from(pixels);
     let upto = move |round: u32| ((rest as u128 * u128::from(round) / u128::from(all)) as u64 + first).min(room);
@@ -327,6 +340,20 @@ mod tests {
 
     fn list(settings: &Settings, cut: &Cut) -> Vec<Step> {
         steps(settings, cut).collect()
+    }
+
+    #[test]
+    fn policies_that_learn_look_again_where_it_is_worth_it() {
+        let looks = |policy: &str, spp: u32, rounds: u32| {
+            list(&settings(policy, spp, 1, 0, rounds), &CUT).iter().filter(|s| matches!(s, Step::Allocate(_))).count()
+        };
+        assert_eq!([2, 6, 7, 8, 10, 13, 32].map(|spp| looks("both", spp, 0)), [1, 1, 2, 2, 3, 4, 4]);
+        assert_eq!([looks("geometry", 32, 0), looks("both", 8, 5)], [1, 5]);
+        let dealt = |rounds: u32| {
+            let steps = list(&settings("geometry", 32, 1, 0, rounds), &CUT);
+            steps.iter().any(|s| matches!(s, Step::Listed(range) if range.round > 0))
+        };
+        assert!(!dealt(0) && dealt(2), "what does not learn is dealt to rounds only when asked for");
     }
 
     #[test]

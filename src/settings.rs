@@ -44,7 +44,8 @@ pub struct Allocate {
     /// Samples that no pixel exceeds; 0: no limit but [`Settings::MAX_SPP`]. Of the policy `threshold`: rounds until its
     /// threshold is 0 and chance decides; 0: `spp`.
     pub max_spp: u32,
-    /// Rounds that the budget is spread over, 1 to 4096; policies that learn do so before each.
+    /// Rounds that the budget is spread over, up to 4096; policies that learn do so before each. 0: one, of policies that
+    /// learn one for every three samples a pixel, and no more than four.
     pub rounds: u32,
     /// Edge of the square of pixels that geometry compares, 2 to 10.
     pub window: u32,
@@ -68,7 +69,7 @@ impl Default for Allocate {
             policy: "uniform".into(),
             min_spp: 2,
             max_spp: 0,
-            rounds: 4,
+            rounds: 0,
             window: 4,
             sigma_normal: 0.35,
             sigma_position: 0.003,
@@ -116,7 +117,7 @@ impl Allocate {
         [
             Entry::whole("min-spp", self.min_spp, [0, Settings::MAX_SPP]),
             Entry::whole("max-spp", self.max_spp, [0, Settings::MAX_SPP]),
-            Entry::whole("rounds", self.rounds, [1, 4096]),
+            Entry::whole("rounds", self.rounds, [0, 4096]),
             Entry::whole("window", self.window, [2, 10]),
             above_0("sigma-normal", self.sigma_normal),
             above_0("sigma-position", self.sigma_position),

@@ -200,7 +200,7 @@ fn a_render_resumed_anywhere_has_the_bits_of_one_that_never_stopped() {
     let gpu = gpu();
     for policy in ["uniform", "geometry", "variance", "both", "threshold"] {
         let scene = scene(|s| {
-            s.allocate.policy = policy.into();
+            (s.allocate.policy, s.allocate.rounds) = (policy.into(), 4);
             // The last three of 8 rounds are left to chance.
             s.allocate.max_spp = if policy == "threshold" { 5 } else { 0 };
         });
