@@ -66,7 +66,11 @@ fn drivers_without_a_device_are_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let real = stand_in(&folder);
     let real = ("REAL_LOADER", real.to_str().unwrap());
-    fails(&folder, &[real, ("NO_DEVICE", "1")], &["no Vulkan device", "mesa-vulkan-drivers"]);
+    let told = ["no Vulkan device", "mesa-vulkan-drivers"];
+    fails(&folder, &[real, ("NO_DEVICE", "1")], &told);
+    let mut devices = Command::new(env!("CARGO_BIN_EXE_tallow"));
+    devices.arg("devices").env("LD_LIBRARY_PATH", folder.path()).envs([real, ("NO_DEVICE", "1")]);
+    complains(&devices.output().unwrap(), 4, &told);
     let control = render(&folder, &[real]);
     assert!(control.status.success(), "the same loader with its devices: {control:?}");
 }

@@ -223,19 +223,12 @@ pub(super) fn one_at_a_time() -> MutexGuard<'static, ()> {
     DEVICES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// `candidates` are not none.
 fn choose(mut candidates: Vec<Candidate>, wanted: Option<&str>) -> Result<Candidate> {
-    let list = candidates.iter().enumerate().map(|(i, c)| format!("\n  {i}: {}", c.info.name)).collect::<String>();
-    let index = match wanted {
-        None => (0..candidates.len()).min_by_key(|&i| (!candidates[i].info.missing.is_empty(), candidates[i].rank)),
-        Some(wanted) => find(&candidates, wanted),
-    };
-    let index = index.ok_or_else(|| {
-        Error::Device(match wanted {
-            Some(wanted) if !list.is_empty() => format!("no device is called \"{wanted}\"; choose one of{list}"),
-            _ => "no Vulkan device: install the driver of the graphics card, or the package mesa-vulkan-drivers for a \
-                  software device"
-                .into(),
-        })
+    let best = || (0..candidates.len()).min_by_key(|&i| (!candidates[i].info.missing.is_empty(), candidates[i].rank));
+    let index = wanted.map_or_else(best, |wanted| find(&candidates, wanted)).ok_or_else(|| {
+        let list = candidates.iter().enumerate().map(|(i, c)| format!("\n  {i}: {}", c.info.name)).collect::<String>();
+        Error::Device(format!("no device is called \"{}\"; choose one of{list}", wanted.unwrap_or_default()))
     })?;
     Ok(candidates.swap_remove(index))
 }

@@ -1,7 +1,7 @@
 //! What a device is, what it can do, and what Tallow requires of it.
 use super::At;
 use super::instance::Instance;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use ash::vk;
 use serde::Serialize;
 
@@ -117,7 +117,7 @@ pub(super) struct Candidate {
 /// Every device of this machine, in the loader's order; the index is what `DeviceOptions::device` takes.
 ///
 /// # Errors
-/// No loader or no driver.
+/// No loader, no driver or no device.
 pub fn survey() -> Result<Vec<DeviceInfo>> {
     let instance = Instance::new(false)?;
     Ok(candidates(&instance.raw)?.into_iter().map(|candidate| candidate.info).collect())
@@ -126,6 +126,13 @@ pub fn survey() -> Result<Vec<DeviceInfo>> {
 pub(super) fn candidates(instance: &ash::Instance) -> Result<Vec<Candidate>> {
     // SAFETY: a live instance.
     let devices = unsafe { instance.enumerate_physical_devices() }.at("list of devices")?;
+    if devices.is_empty() {
+        return Err(Error::Device(
+            "no Vulkan device: install the driver of the graphics card, or the package mesa-vulkan-drivers for a \
+             software device"
+                .into(),
+        ));
+    }
     Ok(devices.into_iter().map(|physical| describe(instance, physical, None)).collect())
 }
 

@@ -45,7 +45,7 @@ pub struct LightTable {
     pub irradiance: Option<Rgb>,
     /// Spot: degrees from the axis up to which intensity is full; default three quarters of `cutoff`.
     pub cone: Option<f32>,
-    /// Spot: degrees from the axis beyond which there is none; default 20.
+    /// Spot: degrees from the axis beyond which there is none; default 20. In between intensity falls linearly with the angle.
     pub cutoff: Option<f32>,
 }
 
