@@ -198,7 +198,7 @@ fn choices(settings: &Settings, cut: &Cut, done: u32) -> impl Iterator<Item = St
 }
 
 /// Samples a pixel that a round is worth: deciding and adding up take as long as one to two samples of a simple scene.
-const WORTH: u32 = 3;
+const WORTH: u32 = 2;
 
 /// Rounds for `rest` samples a pixel to place.
 fn round_count(settings: &Settings, rest: u32) -> u32 {
@@ -347,7 +347,7 @@ mod tests {
         let looks = |policy: &str, spp: u32, rounds: u32| {
             list(&settings(policy, spp, 1, 0, rounds), &CUT).iter().filter(|s| matches!(s, Step::Allocate(_))).count()
         };
-        assert_eq!([2, 6, 7, 8, 10, 13, 32].map(|spp| looks("both", spp, 0)), [1, 1, 2, 2, 3, 4, 4]);
+        assert_eq!([2, 6, 7, 8, 10, 13, 32].map(|spp| looks("both", spp, 0)), [1, 2, 3, 3, 4, 4, 4]);
         assert_eq!([looks("geometry", 32, 0), looks("both", 8, 5)], [1, 5]);
         let dealt = |rounds: u32| {
             let steps = list(&settings("geometry", 32, 1, 0, rounds), &CUT);

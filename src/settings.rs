@@ -45,7 +45,7 @@ pub struct Allocate {
     /// threshold is 0 and chance decides; 0: `spp`.
     pub max_spp: u32,
     /// Rounds that the budget is spread over, up to 4096; policies that learn do so before each. 0: one, of policies that
-    /// learn one for every three samples a pixel, and no more than four.
+    /// learn one for every two samples a pixel, and no more than four.
     pub rounds: u32,
     /// Edge of the square of pixels that geometry compares, 2 to 10.
     pub window: u32,

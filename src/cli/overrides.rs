@@ -56,7 +56,7 @@ pub struct AllocateOverrides {
     /// Samples that no pixel exceeds; 0 is off. Of threshold: the rounds until chance decides; 0 is --spp
     #[arg(long, value_name = "N")]
     pub max_spp: Option<u32>,
-    /// Rounds that the budget is spread over; 0: one, of policies that learn one for every 3 samples a pixel, up to 4
+    /// Rounds that the budget is spread over; 0: one, of policies that learn one for every 2 samples a pixel, up to 4
     #[arg(long, value_name = "N")]
     pub rounds: Option<u32>,
     /// Edge of the square of pixels whose geometry is compared

@@ -1,4 +1,4 @@
-//! Damaged files give one line and no panic. `TALLOW_FUZZ_CASES` sets the number of mutations (default 2000).
+//! Damaged files give one line and no panic. `TALLOW_FUZZ` sets the number of mutations (default 2000).
 use proptest::prelude::*;
 use std::sync::LazyLock;
 use tallow::image::{self, Film, Samples, WriteOptions};
@@ -119,7 +119,7 @@ fn what_is_no_image_is_refused() {
 }
 
 fn cases() -> u32 {
-    std::env::var("TALLOW_FUZZ_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(2000)
+    std::env::var("TALLOW_FUZZ").ok().and_then(|n| n.parse().ok()).unwrap_or(2000)
 }
 
 /// Where, and by what a byte is replaced: values at the edges of ranges are the likeliest to hurt.
