@@ -106,7 +106,7 @@ void sample_triangle_light(vec3 p, vec3 a, vec3 b, vec3 c, float chosen, vec2 u,
     uint triangle = light_texel(light, 2u).w;
     if (FX_TEXTURES) {
         uint image = material_texel(words.w, 7u).x;
-        if (image != NONE) radiance *= texture_sample(image, texture_coordinates(triangle, bary)).rgb;
+        if (image != NONE) radiance *= texture_sample(image, texture_coordinates(triangle, bary), true).rgb;
     }
     // The shadow ray ends before the light, whose mask would stop it with this probability.
     if (FX_ALPHA_MASKS) radiance *= surface_opacity(words.w, triangle, bary);

@@ -29,7 +29,7 @@ vec3 perturbed_normal(Surface s, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
     do {
         here = along_u;
         along_u = along_v;
-        value = texture_sample(image, s.uv + vec2(k == 1 ? texel.x : 0.0, k == 2 ? texel.y : 0.0)).xyz;
+        value = texture_sample(image, s.uv + vec2(k == 1 ? texel.x : 0.0, k == 2 ? texel.y : 0.0), false).xyz;
         along_v = value.r;
     } while (FX_BUMP_MAPS && !mapped && ++k < 3);
     vec3 n;
@@ -100,7 +100,7 @@ Surface surface_at(Hit hit) {
 
 vec3 textured(vec3 constant, uint image, Surface s) {
     if (!FX_TEXTURES || image == NONE) return constant;
-    return constant * texture_sample(image, s.uv).rgb;
+    return constant * texture_sample(image, s.uv, true).rgb;
 }
 
 // Radiance that the surface emits from its front side.
@@ -108,7 +108,7 @@ vec3 surface_emission(Surface s) {
     vec3 emission = uintBitsToFloat(material_texel(s.material, 1u).xyz);
     if (!FX_TEXTURES) return emission;
     uint image = material_texel(s.material, 7u).x;
-    return image == NONE ? emission : emission * texture_sample(image, s.uv).rgb;
+    return image == NONE ? emission : emission * texture_sample(image, s.uv, true).rgb;
 }
 
 Bsdf surface_bsdf(Surface s) {
@@ -131,7 +131,7 @@ Bsdf surface_bsdf(Surface s) {
         b.specular = textured(uintBitsToFloat(material_texel(s.material, 4u).xyz), m6.x, s);
         if (FX_COATED) b.internal_fresnel = uintBitsToFloat(material_texel(s.material, 7u).y);
         if (FX_TEXTURES && m6.w != NONE) {
-            float r = texture_sample(m6.w, s.uv).r; // perceptual: alpha = r^2
+            float r = texture_sample(m6.w, s.uv, false).r; // perceptual: alpha = r^2
             b.alpha *= r * r;
         }
     }

@@ -5,16 +5,17 @@ vec3 linear_from_srgb(vec3 c) {
     return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045)));
 }
 
-vec4 texture_texel(uvec4 image, ivec2 at) {
+vec4 texture_texel(uvec4 image, ivec2 at, bool colour) {
     ivec2 edge = ivec2(image.yz);
     // Coordinates come in as floor(uv * size) with uv already wrapped to one period, so one step over is enough.
     at = (image.w & TEXTURE_CLAMP) != 0u ? clamp(at, ivec2(0), edge - 1) : at + mix(ivec2(0), edge, lessThan(at, ivec2(0)));
     at = mix(at, at - edge, greaterThanEqual(at, edge));
     vec4 c = unpackUnorm4x8(texelFetch(texels, int(image.x) + at.y * edge.x + at.x).x);
-    return (image.w & TEXTURE_SRGB) != 0u ? vec4(linear_from_srgb(c.rgb), c.a) : c;
+    return colour ? vec4(linear_from_srgb(c.rgb), c.a) : c;
 }
 
-vec4 texture_sample(uint index, vec2 uv) {
+// `colour`: TEXTURE_SRGB, known from what a texture is for, so that masks and heights are read without decoding.
+vec4 texture_sample(uint index, vec2 uv, bool colour) {
     uvec4 image = texelFetch(textures, int(2u * index));
     vec4 mapping = uintBitsToFloat(texelFetch(textures, int(2u * index + 1u)));
     uv = uv * mapping.xy + mapping.zw;
@@ -22,9 +23,9 @@ vec4 texture_sample(uint index, vec2 uv) {
     vec2 at = vec2(wrapped.x, 1.0 - wrapped.y) * vec2(image.yz) - 0.5; // v points up, rows go down
     ivec2 corner = ivec2(floor(at));
     vec2 f = at - vec2(corner);
-    vec4 top = mix(texture_texel(image, corner), texture_texel(image, corner + ivec2(1, 0)), f.x);
-    vec4 low = mix(texture_texel(image, corner + ivec2(0, 1)),
-                   texture_texel(image, corner + ivec2(1, 1)), f.x);
+    vec4 top = mix(texture_texel(image, corner, colour), texture_texel(image, corner + ivec2(1, 0), colour), f.x);
+    vec4 low = mix(texture_texel(image, corner + ivec2(0, 1), colour),
+                   texture_texel(image, corner + ivec2(1, 1), colour), f.x);
     return mix(top, low, f.y);
 }
 
@@ -33,7 +34,7 @@ float surface_opacity(uint material, uint triangle, vec2 barycentric) {
     if ((material_texel(material, 3u).w & MATERIAL_MASKED) == 0u) return 1.0;
     float opacity = uintBitsToFloat(material_texel(material, 2u).w);
     uint image = material_texel(material, 6u).y;
-    return image == NONE ? opacity : opacity * texture_sample(image, texture_coordinates(triangle, barycentric)).r;
+    return image == NONE ? opacity : opacity * texture_sample(image, texture_coordinates(triangle, barycentric), false).r;
 }
 
 // Partly transparent surfaces let a ray pass with the probability 1 - opacity, decided by a hash, so the light that
