@@ -201,11 +201,10 @@ fn choices(settings: &Settings, cut: &Cut, done: u32) -> impl Iterator<Item = St
 const WORTH: u32 = 2;
 
 /// Rounds for `rest` samples a pixel to place.
-fn round_count(settings: &Settings, rest: u32) -> u32 {
-    match (settings.allocate.rounds, settings.allocate.placing()) {
-        (0, Placing::Learning) => (rest / WORTH).clamp(1, 4),
-        (0, _) => 1,
-        (rounds, _) => rounds,
+fn round_count(settings: &Settings, learns: bool, rest: u32) -> u32 {
+    match settings.allocate.rounds {
+        0 if learns => (rest / WORTH).clamp(1, 4),
+        rounds => rounds.max(1),
     }
 }
 
@@ -216,7 +215,7 @@ const LOOK: u32 = 4;
 fn needed(settings: &Settings, cut: &Cut, done: u32) -> impl Iterator<Item = Step> + use<> {
     let limit = limit(settings);
     let rest = limit.saturating_sub(first_spp(settings));
-    let look = rest.div_ceil(round_count(settings, rest)).min(LOOK);
+    let look = rest.div_ceil(round_count(settings, true, rest)).min(LOOK);
     let rounds = if rest == 0 { 0 } else { rest.div_ceil(look) + u32::BITS };
     let Cut { pixels, paths, .. } = *cut;
     let budget = u64::from(look) * u64::from(pixels);
@@ -229,7 +228,7 @@ fn allocated(settings: &Settings, learns: bool, cut: &Cut, done: u32) -> impl It
     let Cut { pixels, paths, .. } = *cut;
     let first = u64::from(first_spp(settings)) * u64::from(pixels);
     let rest = (u64::from(settings.spp) * u64::from(pixels)).saturating_sub(first);
-    let rounds = round_count(settings, settings.spp - first_spp(settings));
+    let rounds = round_count(settings, learns, settings.spp - first_spp(settings));
     let (all, dealt) = if learns { (rounds, 1) } else { (1, rounds) };
     let limit = limit(settings);
     let room = u64::from(limit) * u64::from(pixels);

@@ -78,7 +78,7 @@ fn run_cold() -> Result<Exit> {
         std::env::current_exe().map(Command::new).map_err(|e| Error::Device(format!("this program: {e}")))?;
     let ended = again.args(std::env::args_os().skip(1)).envs(COLD).status();
     let ended = ended.map_err(|e| Error::Device(format!("this program: {e}")))?;
-    std::process::exit(ended.code().unwrap_or(1))
+    std::process::exit(ended.code().unwrap_or(Exit::Interrupted as i32)) // none: ended by a signal
 }
 
 /// What was measured so far.

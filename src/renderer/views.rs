@@ -27,7 +27,8 @@ pub struct OutputView {
 pub enum Layer {
     /// Mean of the samples: linear radiance (Rec. 709).
     Radiance,
-    /// Sum of the squared deviations from the mean; over (samples - 1) samples it is the variance of the mean.
+    /// Sum of the squared deviations from the mean: m2 / (n - 1) is the variance of one of n samples, and an n-th of that the
+    /// variance of the mean.
     M2,
     /// Samples behind the mean.
     Samples,
@@ -53,11 +54,19 @@ impl Renderer {
     /// # Errors
     /// [`Error::Usage`] when the renderer was made without the [`super::Outputs`] that keep it.
     pub fn views(&self, layer: Layer) -> Result<Vec<OutputView>> {
-        self.film.tiles.iter().map(|tile| view(tile, layer)).collect()
+        let kept = match layer {
+            Layer::Radiance | Layer::M2 | Layer::Samples => true,
+            Layer::Direct | Layer::Indirect => self.outputs.split_light,
+            Layer::Albedo | Layer::Normal | Layer::Position | Layer::Depth | Layer::Object => self.outputs.guides,
+        };
+        if !kept {
+            return Err(Error::Usage(format!("the renderer keeps no {layer:?}: make it with the Outputs that do")));
+        }
+        Ok(self.film.tiles.iter().map(|tile| view(tile, layer)).collect())
     }
 }
 
-fn view(tile: &FilmTile, layer: Layer) -> Result<OutputView> {
+fn view(tile: &FilmTile, layer: Layer) -> OutputView {
     use PixelFormat::{R32G32B32Sfloat, R32Sfloat, R32Uint};
     let (stats, light, guide) = (&tile.stats, &tile.light, &tile.guide);
     match layer {
@@ -74,10 +83,7 @@ fn view(tile: &FilmTile, layer: Layer) -> Result<OutputView> {
     }
 }
 
-fn within<T: Pod>(tile: &FilmTile, records: &Buffer<T>, offset: usize, format: PixelFormat) -> Result<OutputView> {
-    if records.len() != tile.pixels as usize {
-        return Err(Error::Usage("the renderer keeps no such layer: make it with the Outputs that do".into()));
-    }
+fn within<T: Pod>(tile: &FilmTile, records: &Buffer<T>, offset: usize, format: PixelFormat) -> OutputView {
     let (stride, offset) = (size_of::<T>() as u32, offset as u64);
-    Ok(OutputView { buffer: records.raw(), offset, stride, format, pixels: tile.pixels })
+    OutputView { buffer: records.raw(), offset, stride, format, pixels: tile.pixels }
 }
