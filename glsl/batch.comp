@@ -11,13 +11,13 @@
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer offset; // of uvec2
 layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
-layout(scalar, binding = 2) writeonly buffer Paths { uvec2 paths[]; };
+layout(scalar, binding = 2) writeonly buffer Paths { uint64_t paths[]; }; // of uvec2
 layout(scalar, push_constant) uniform Push { BatchPush push; };
 
 #include "shared/offset.glsl"
 #include "shared/rounds.glsl"
 
-const uint PLAIN = 32u; // of each of a thread's 64 pixels: see shared/rounds.glsl
+const uint PLAIN = 32u; // of each of a thread's 64 pixels at most: see shared/rounds.glsl
 
 // Places of a pixel's paths in the batch: from the first to before the last; two equal ones where there are none.
 uvec2 places(uint64_t from, uint64_t to, uint64_t begin, uint64_t end) {
@@ -41,7 +41,7 @@ void main() {
         uvec2 run = places(from, to, begin, end);
         if (run.y > run.x) {
             uint index = first_index(i), plain = min(run.y, run.x + PLAIN);
-            for (uint at = run.x; at < plain; at++) paths[at] = uvec2(i, index++);
+            for (uint at = run.x; at < plain; at++) paths[at] = packUint2x32(uvec2(i, index++));
             if (plain < run.y) many = min(many, k);
         }
         from = to;
@@ -54,7 +54,7 @@ void main() {
         uint index = first_index(i) + PLAIN;
         for (uint at = run.x + PLAIN; at < run.y; at += STRIDE, index += STRIDE) {
             [[unroll]] for (uint j = 0u; j < STRIDE; j++) {
-                if (at + j < run.y) paths[at + j] = uvec2(i, index + j);
+                if (at + j < run.y) paths[at + j] = packUint2x32(uvec2(i, index + j));
             }
         }
     }

@@ -3,22 +3,22 @@
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #extension GL_GOOGLE_include_directive : require
 #include "layout.glsl"
-#include "shared/wide.glsl"
 #include "shared/block.glsl"
 
-// Exclusive scan of the blocks' sums, in place. One workgroup.
+// Exclusive scan of the blocks' sums, in place. One workgroup, each thread a run of them.
 layout(local_size_x = 64) in;
-layout(scalar, binding = 0) buffer Blocks { uvec2 blocks[]; };
+layout(scalar, binding = 0) buffer Blocks { uint64_t blocks[]; }; // of uvec2
 layout(scalar, push_constant) uniform Push { ScanPush push; };
 
 void main() {
-    uint count = (push.pixels + BLOCK_THREADS * THREAD_ITEMS - 1u) / (BLOCK_THREADS * THREAD_ITEMS);
-    uint64_t before = 0UL;
-    for (uint start = 0u; start < count; start += BLOCK_THREADS) {
-        uint b = start + gl_LocalInvocationIndex;
-        uint64_t total, here = b < count ? wide(blocks[b]) : 0UL;
-        uint64_t scanned = block_scan(here, total);
-        if (b < count) blocks[b] = unpackUint2x32(before + scanned);
-        before += total;
+    uint count = block_count(push.pixels), run = (count + BLOCK_THREADS - 1u) / BLOCK_THREADS;
+    uint first = gl_LocalInvocationIndex * run, end = min(first + run, count);
+    uint64_t mine = 0UL, total;
+    for (uint b = first; b < end; b++) mine += blocks[b];
+    uint64_t before = block_scan(mine, total);
+    for (uint b = first; b < end; b++) {
+        uint64_t here = blocks[b];
+        blocks[b] = before;
+        before += here;
     }
 }

@@ -7,18 +7,22 @@
 #include "effects.glsl"
 #include "shared/thread.glsl"
 #include "shared/wide.glsl"
+#include "shared/paired.glsl"
 
 // Adds a batch of samples to the statistics of their pixels. One thread folds one pixel, in order of sample index, so
 // the result does not depend on how samples were batched (Welford 1962).
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer samples; // of vec4
-layout(scalar, binding = 1) buffer Stats { PixelStats stats[]; };
-layout(scalar, binding = 2) buffer Lights { PixelLight light[]; };
+layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
+layout(binding = 2) uniform samplerBuffer light; // of PixelLight
 layout(binding = 3) uniform usamplerBuffer offset; // of uvec2
+layout(scalar, binding = 4) writeonly buffer Stats { u64vec4 folded_stats[]; }; // of PixelStats
+layout(scalar, binding = 5) writeonly buffer Lights { u64vec3 folded_light[]; }; // of PixelLight
 layout(scalar, push_constant) uniform Push { FoldPush push; };
 
 #include "shared/offset.glsl"
 #include "shared/rounds.glsl"
+#include "shared/pixel_light.glsl"
 
 const uint PLAIN = 2048u; // see shared/rounds.glsl
 
@@ -54,16 +58,21 @@ void fold(inout PixelStats s, inout PixelLight l, int at) {
     s.m2 += off * (radiance - s.mean);
 }
 
+PixelStats load_stats(int pixel) {
+    uvec4 a = texelFetch(stats, 2 * pixel), b = texelFetch(stats, 2 * pixel + 1);
+    return PixelStats(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), b.w);
+}
+
 void main() {
     uint i = thread_index();
     if (i >= push.pixels) return; // safe: no barrier() follows
     uvec3 at_step_count = samples_of(i, push.first_pixel + i);
     uint at = at_step_count.x, step = at_step_count.y, count = at_step_count.z;
     if (count == 0u) return;
-    uint pixel = push.first_pixel - push.window + i;
-    PixelStats s = stats[pixel];
+    uint pixel = push.first_pixel + i;
+    PixelStats s = load_stats(int(pixel));
     PixelLight l = PixelLight(vec3(0.0), vec3(0.0));
-    if (FX_SPLIT) l = light[pixel];
+    if (FX_SPLIT) l = load_light(int(pixel));
     uint plain = FX_ADAPTIVE ? min(count, PLAIN) : count; // see SAMPLES_AT_ONCE in schedule.rs
     for (uint k = 0u; k < plain; k++) fold(s, l, int(at + k * step));
     for (uint k = plain; FX_ADAPTIVE && k < count; k += STRIDE) {
@@ -71,6 +80,7 @@ void main() {
             if (k + j < count) fold(s, l, int(at + (k + j) * step));
         }
     }
-    stats[pixel] = s;
-    if (FX_SPLIT) light[pixel] = l;
+    uint place = pixel - push.window;
+    folded_stats[place] = u64vec4(paired(uvec4(floatBitsToUint(s.mean), s.count)), paired(uvec4(floatBitsToUint(s.m2), s.rays)));
+    if (FX_SPLIT) folded_light[place] = u64vec3(paired(vec4(l.direct, l.indirect.x)), paired(l.indirect.yzyz).x);
 }

@@ -12,7 +12,7 @@ layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer weight; // of uint
 layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
 layout(binding = 2) uniform usamplerBuffer state; // of Apportionment
-layout(scalar, binding = 3) buffer Keys { uvec2 key[]; };
+layout(scalar, binding = 3) buffer Keys { uint64_t key[]; }; // of uvec2
 layout(scalar, binding = 4) writeonly buffer Counts { uint count[]; };
 layout(scalar, binding = 5) writeonly buffer Sums { BlockSums sums[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
@@ -32,13 +32,13 @@ void main() {
     uint settled = 0u, open = 0u;
     for (uint k = 0u; k < items; k++) {
         uint i = first + k;
-        if (push.round > 0u && is_full(key[i])) continue;
+        if (push.round > 0u && is_full(unpackUint2x32(key[i]))) continue;
         uint w = equal ? 1u : texelFetch(weight, int(i)).x, room = room_of(i);
         uint64_t quota, rest;
         multiply_divide(share_of, w, quota, rest);
         bool full = quota >= room;
         count[i] = full ? room : uint(quota);
-        key[i] = full ? FULL : unpackUint2x32(rest << s.up);
+        key[i] = full ? packUint2x32(FULL) : rest << s.up;
         filled += full ? room : 0u;
         floors += full ? 0UL : quota;
         weights += full ? 0u : w;

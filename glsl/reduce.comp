@@ -9,7 +9,7 @@
 // Samples of each block, the first pass of the scan (reduce, then scan).
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer counts; // of uint
-layout(scalar, binding = 1) writeonly buffer Blocks { uvec2 blocks[]; };
+layout(scalar, binding = 1) writeonly buffer Blocks { uint64_t blocks[]; }; // of uvec2
 layout(scalar, push_constant) uniform Push { ScanPush push; };
 
 void main() {
@@ -17,5 +17,5 @@ void main() {
     uint64_t sum = 0UL;
     for (uint k = 0u; k < items; k++) sum += texelFetch(counts, int(first + k)).x;
     sum = block_sum(sum);
-    if (gl_LocalInvocationIndex == 0u) blocks[gl_WorkGroupID.x] = unpackUint2x32(sum);
+    if (gl_LocalInvocationIndex == 0u) blocks[gl_WorkGroupID.x] = sum;
 }

@@ -15,7 +15,7 @@ layout(scalar, push_constant) uniform Push { ApportionPush push; };
 
 void main() {
     if (state[0].settled != 0u) return; // safe: the same for all threads
-    uint blocks = (push.pixels + BLOCK_THREADS * THREAD_ITEMS - 1u) / (BLOCK_THREADS * THREAD_ITEMS);
+    uint blocks = block_count(push.pixels);
     uint64_t weights = 0UL, filled = 0UL, floors = 0UL, counts = 0UL;
     for (uint b = gl_LocalInvocationIndex; b < blocks; b += BLOCK_THREADS) {
         weights += wide(sums[b].weights);

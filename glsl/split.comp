@@ -18,6 +18,8 @@ layout(scalar, binding = 5) writeonly buffer Factor { vec4 factor[]; };
 layout(scalar, binding = 6) writeonly buffer Sharp { vec4 sharp[]; };
 layout(scalar, push_constant) uniform Push { SplitPush push; };
 
+#include "shared/pixel_light.glsl"
+
 // As in src/composition/albedo.rs.
 const float SMALLEST_ALBEDO = 0.01;
 const float WHOLE = 0.98;
@@ -51,12 +53,10 @@ float factor_of_samples(float colour, float direct, float indirect, float albedo
 
 Parts split_light(int i) {
     vec3 colour = colour_at(i), albedo = albedo_at(i);
-    Parts p;
+    PixelLight l = load_light(i);
+    Parts p = Parts(l.indirect, vec3(0.0), number(l.direct));
     for (int k = 0; k < 3; k++) {
-        float direct = texelFetch(light, 6 * i + k).x, indirect = texelFetch(light, 6 * i + 3 + k).x;
-        p.filtered[k] = indirect;
-        p.factor[k] = factor_of_samples(colour[k], direct, indirect, albedo[k]);
-        p.sharp[k] = number(direct);
+        p.factor[k] = factor_of_samples(colour[k], l.direct[k], l.indirect[k], albedo[k]);
     }
     return p;
 }

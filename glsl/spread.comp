@@ -12,7 +12,7 @@ layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer key; // of uvec2
 layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
 layout(binding = 2) uniform usamplerBuffer state; // of Apportionment
-layout(scalar, binding = 3) readonly buffer Blocks { uvec2 blocks[]; };
+layout(scalar, binding = 3) readonly buffer Blocks { uint64_t blocks[]; }; // of uvec2
 layout(scalar, binding = 4) buffer Counts { uint count[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
 
@@ -24,7 +24,7 @@ void main() {
     Apportionment s = load_state();
     uint first = first_item(), items = item_count(first, push.pixels);
     uint64_t total, before = block_scan(possible(s, first, items), total);
-    before += wide(blocks[gl_WorkGroupID.x]);
+    before += blocks[gl_WorkGroupID.x];
     uint64_t needed = wide(s.needed), left = needed - min(needed, before);
     uint ties = uint(min(left, uint64_t(items))); // at most one for each
     uint forced = s.forced != 0u ? items : 0u, free = items - forced;

@@ -12,7 +12,7 @@ layout(binding = 0) uniform usamplerBuffer key; // of uvec2
 layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
 layout(binding = 2) uniform usamplerBuffer counts; // of uint
 layout(binding = 3) uniform usamplerBuffer state; // of Apportionment
-layout(scalar, binding = 4) writeonly buffer Blocks { uvec2 blocks[]; };
+layout(scalar, binding = 4) writeonly buffer Blocks { uint64_t blocks[]; }; // of uvec2
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
 
 uint quota_of(uint pixel) { return texelFetch(counts, int(pixel)).x; }
@@ -22,5 +22,5 @@ uint quota_of(uint pixel) { return texelFetch(counts, int(pixel)).x; }
 void main() {
     uint first = first_item();
     uint64_t sum = block_sum(possible(load_state(), first, item_count(first, push.pixels)));
-    if (gl_LocalInvocationIndex == 0u) blocks[gl_WorkGroupID.x] = unpackUint2x32(sum);
+    if (gl_LocalInvocationIndex == 0u) blocks[gl_WorkGroupID.x] = sum;
 }

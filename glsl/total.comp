@@ -14,7 +14,7 @@ layout(scalar, binding = 1) buffer States { Apportionment state[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
 
 void main() {
-    uint blocks = (push.pixels + BLOCK_THREADS * THREAD_ITEMS - 1u) / (BLOCK_THREADS * THREAD_ITEMS);
+    uint blocks = block_count(push.pixels);
     uint64_t weights = 0UL, counts = 0UL;
     for (uint b = gl_LocalInvocationIndex; b < blocks; b += BLOCK_THREADS) {
         weights += wide(sums[b].weights);

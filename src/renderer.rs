@@ -11,14 +11,14 @@ use crate::gpu::layout::{
     Apportionment, Camera, Effects, LIGHT_ENVIRONMENT, NONE, PathPush, PixelLight, PixelStats, PriorityPush,
     ROOT_OF_INSTANCES,
 };
-use crate::gpu::{FrameResources, Gpu, Kernel, PassTime, Recorder};
+use crate::gpu::{FrameResources, Gpu, PassTime, Recorder};
 use crate::scene::{self, Scene};
 use crate::schedule::{self, Cut};
 pub use crate::schedule::{Batch, Choice, PathRange, Plan, Progress, Share, Step};
 use crate::settings::{PixelFilter, Placing, Sampler, Settings};
 use crate::stage::apportion::Apportion;
 use crate::stage::scan::Scan;
-use crate::stage::{PerThread, WORKGROUP_CPU, WORKGROUP_GPU};
+use crate::stage::{PerBlock, PerThread, WORKGROUP_CPU, WORKGROUP_GPU, thread_items};
 pub use views::{Layer, OutputView};
 
 /// What a render leaves in buffers besides radiance and its variance.
@@ -323,12 +323,13 @@ fn policy_of(settings: &Settings) -> Result<&'static Row> {
 }
 
 fn allocation(gpu: &Gpu, policy: &Row, pixels: u32, workgroup: u32) -> Result<Allocation> {
+    let thread_items = thread_items(gpu, pixels);
     Ok(Allocation {
         policy: (policy.make)(gpu, pixels, workgroup)?,
-        apportion: Apportion::new(gpu)?,
+        apportion: Apportion::new(gpu, thread_items)?,
         choose: PerThread::new(gpu, &Effects::default(), workgroup)?,
-        scan: Scan::new(gpu)?,
-        batch: Kernel::new(gpu, &Effects::default(), &[])?,
+        scan: Scan::new(gpu, thread_items)?,
+        batch: PerBlock::new(gpu, thread_items)?,
     })
 }
 

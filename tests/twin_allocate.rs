@@ -7,14 +7,17 @@ use proptest::test_runner::{Config, TestRunner};
 use support::{assert_silent, gpu, words};
 use tallow::allocate::{HostInputs, Inputs, POLICIES, Placing, policy};
 use tallow::gpu::layout::*;
-use tallow::gpu::{Buffer, FrameResources, Gpu, Kernel, Location};
+use tallow::gpu::{Buffer, FrameResources, Gpu, Location};
 use tallow::reference::apportion as twin;
 use tallow::schedule::{Choice, PathRange, Plan, Share};
-use tallow::stage::PerThread;
 use tallow::stage::apportion::{Apportion, Counts, fixed_threshold};
 use tallow::stage::batch::{self, Batches};
 use tallow::stage::choose::{self, Choose};
 use tallow::stage::scan::Scan;
+use tallow::stage::{PerBlock, PerThread};
+
+/// Pixels of a thread on a CPU and on a GPU.
+const RUNS: [u32; 2] = [64, 16];
 
 /// Around a thread's items, a workgroup's threads and a block.
 const SIZES: [usize; 9] = [1, 15, 31, 64, 65, 1023, 1024, 1025, 70_001];
@@ -24,14 +27,21 @@ struct Bench {
     apportion: Apportion,
     scan: Scan,
     batch: Batches,
+    thread_items: u32,
 }
 
 impl Bench {
     fn new() -> Self {
+        Self::with(RUNS[0])
+    }
+
+    /// With threads of so many pixels.
+    fn with(thread_items: u32) -> Self {
         let gpu = gpu();
-        let (apportion, scan) = (Apportion::new(&gpu).unwrap(), Scan::new(&gpu).unwrap());
-        let batch = Kernel::new(&gpu, &Effects::default(), &[]).unwrap();
-        Self { gpu, apportion, scan, batch }
+        let apportion = Apportion::new(&gpu, thread_items).unwrap();
+        let scan = Scan::new(&gpu, thread_items).unwrap();
+        let batch = PerBlock::new(&gpu, thread_items).unwrap();
+        Self { gpu, apportion, scan, batch, thread_items }
     }
 
     fn stats(&self, have: &[u32]) -> Buffer<PixelStats> {
@@ -40,7 +50,7 @@ impl Bench {
     }
 
     fn counts(&self, priority: &[f32], have: &[u32], plan: &Plan) -> Counts {
-        let counts = Counts::new(&self.gpu, plan.pixels).unwrap();
+        let counts = Counts::new(&self.gpu, plan.pixels, self.thread_items).unwrap();
         let (priority, stats) = (Buffer::from_slice(&self.gpu, "priority", priority).unwrap(), self.stats(have));
         let mut frame = FrameResources::new(&self.gpu).unwrap();
         self.gpu
@@ -93,13 +103,14 @@ fn priorities(count: usize, seed: u32) -> Vec<f32> {
 
 #[test]
 fn counts_agree_with_hamilton_at_awkward_sizes() {
-    let bench = Bench::new();
-    for size in SIZES {
-        for budget in [0, 1, size as u64 / 2, 4 * size as u64, 1_000_003] {
-            bench.check(&priorities(size, 1), &vec![0; size], &plan(size, budget));
+    for bench in RUNS.map(Bench::with) {
+        for size in SIZES {
+            for budget in [0, 1, size as u64 / 2, 4 * size as u64, 1_000_003] {
+                bench.check(&priorities(size, 1), &vec![0; size], &plan(size, budget));
+            }
         }
+        assert_silent(&bench.gpu);
     }
-    assert_silent(&bench.gpu);
 }
 
 #[test]
@@ -134,19 +145,20 @@ fn extreme_priorities_still_sum_to_the_budget() {
 
 #[test]
 fn full_pixels_hand_on_what_they_leave() {
-    let bench = Bench::new();
-    for size in SIZES {
-        let have: Vec<u32> = words(size, 9).into_iter().map(|w| w % 20).collect();
-        for (limit, budget) in [(16, 3), (16, 8), (3, 100), (25, 12), (0, 1)] {
-            let budget = budget * size as u64;
-            let total = have.iter().map(|&n| u64::from(n)).sum::<u64>() + budget;
-            for (rounds, share) in [(16, Share::Next), (2, Share::Next), (16, Share::All(total))] {
-                let plan = Plan { limit: Some(limit), share, rounds, ..plan(size, budget) };
-                bench.check(&priorities(size, 2).iter().map(|p| p * p * p).collect::<Vec<_>>(), &have, &plan);
+    for bench in RUNS.map(Bench::with) {
+        for size in SIZES {
+            let have: Vec<u32> = words(size, 9).into_iter().map(|w| w % 20).collect();
+            for (limit, budget) in [(16, 3), (16, 8), (3, 100), (25, 12), (0, 1)] {
+                let budget = budget * size as u64;
+                let total = have.iter().map(|&n| u64::from(n)).sum::<u64>() + budget;
+                for (rounds, share) in [(16, Share::Next), (2, Share::Next), (16, Share::All(total))] {
+                    let plan = Plan { limit: Some(limit), share, rounds, ..plan(size, budget) };
+                    bench.check(&priorities(size, 2).iter().map(|p| p * p * p).collect::<Vec<_>>(), &have, &plan);
+                }
             }
         }
+        assert_silent(&bench.gpu);
     }
-    assert_silent(&bench.gpu);
 }
 
 #[test]
@@ -194,40 +206,41 @@ fn random_images_agree() {
 
 #[test]
 fn every_path_of_every_batch_is_listed_once() {
-    let bench = Bench::new();
-    for size in [1, 65, 4097] {
-        let have: Vec<u32> = words(size, 3).into_iter().map(|w| w % 5).collect();
-        let next: Vec<u32> = have.iter().map(|n| n + 7).collect();
-        let budget = 3 * size as u64 + 1;
-        let counts = bench.counts(&priorities(size, 4), &have, &plan(size, budget));
-        let (stats, offsets) = (bench.stats(&have), twin::offsets(&counts.count.read().unwrap()));
-        let mut frame = FrameResources::new(&bench.gpu).unwrap();
-        for rounds in [1, 3] {
-            for paths in [1_u32, 31, 64, 4096] {
-                let mine: Vec<_> = (0..rounds).map(|round| twin::dealt(&offsets, round, rounds)).collect();
-                assert_eq!(mine.iter().map(|m| m[size]).sum::<u64>(), budget);
-                for (round, dealt) in mine.iter().enumerate() {
-                    // All batches where they are few, else the first and the last.
-                    let firsts: Vec<u64> = (0..dealt[size]).step_by(paths as usize).collect();
-                    let some = firsts
-                        .iter()
-                        .filter(|&&f| firsts.len() < 20 || f == 0 || f + 2 * u64::from(paths) > dealt[size]);
-                    for &first in some {
-                        let n = u64::from(paths).min(dealt[size] - first) as u32;
-                        let range = PathRange { first, paths: n, round: round as u32, rounds };
-                        let list = Buffer::new(&bench.gpu, "paths", n as usize, Location::Device).unwrap();
-                        let (b, offset) = (&bench.batch, &counts.offset);
-                        bench
-                            .gpu
-                            .run(&mut frame, |rec| batch::record(b, rec, offset, &stats, &list, &range, 7))
-                            .unwrap();
-                        assert_eq!(list.read().unwrap(), twin::batch(dealt, &next, first, n), "{size} {range:?}");
+    for bench in RUNS.map(Bench::with) {
+        for size in [1, 65, 4097] {
+            let have: Vec<u32> = words(size, 3).into_iter().map(|w| w % 5).collect();
+            let next: Vec<u32> = have.iter().map(|n| n + 7).collect();
+            let budget = 3 * size as u64 + 1;
+            let counts = bench.counts(&priorities(size, 4), &have, &plan(size, budget));
+            let (stats, offsets) = (bench.stats(&have), twin::offsets(&counts.count.read().unwrap()));
+            let mut frame = FrameResources::new(&bench.gpu).unwrap();
+            for rounds in [1, 3] {
+                for paths in [1_u32, 31, 64, 4096] {
+                    let mine: Vec<_> = (0..rounds).map(|round| twin::dealt(&offsets, round, rounds)).collect();
+                    assert_eq!(mine.iter().map(|m| m[size]).sum::<u64>(), budget);
+                    for (round, dealt) in mine.iter().enumerate() {
+                        // All batches where they are few, else the first and the last.
+                        let firsts: Vec<u64> = (0..dealt[size]).step_by(paths as usize).collect();
+                        let some = firsts
+                            .iter()
+                            .filter(|&&f| firsts.len() < 20 || f == 0 || f + 2 * u64::from(paths) > dealt[size]);
+                        for &first in some {
+                            let n = u64::from(paths).min(dealt[size] - first) as u32;
+                            let range = PathRange { first, paths: n, round: round as u32, rounds };
+                            let list = Buffer::new(&bench.gpu, "paths", n as usize, Location::Device).unwrap();
+                            let (b, offset) = (&bench.batch, &counts.offset);
+                            bench
+                                .gpu
+                                .run(&mut frame, |rec| batch::record(b, rec, offset, &stats, &list, &range, 7))
+                                .unwrap();
+                            assert_eq!(list.read().unwrap(), twin::batch(dealt, &next, first, n), "{size} {range:?}");
+                        }
                     }
                 }
             }
         }
+        assert_silent(&bench.gpu);
     }
-    assert_silent(&bench.gpu);
 }
 
 /// A bumpy surface with misses and broken normals, and noisy statistics with untouched pixels.
@@ -316,7 +329,7 @@ fn one_sample_or_none_agrees_with_its_reference() {
             .map(|(i, p)| if i % 3 == 0 { odd(i / 3) } else { p / 1100.0 })
             .collect();
         let on_device = Buffer::from_slice(&gpu, "priority", &priority).unwrap();
-        let counts = Counts::new(&gpu, size as u32).unwrap();
+        let counts = Counts::new(&gpu, size as u32, RUNS[0]).unwrap();
         for (round, threshold) in [(3, 1.0), (4, 0.25), (17, 0.0), (u32::MAX, 0.0)] {
             let choice = Choice { pixels: size as u32, round, threshold };
             gpu.run(&mut frame, |rec| choose::record(&choose, rec, &on_device, &counts, &choice, 7)).unwrap();

@@ -9,7 +9,7 @@ mod measure;
 mod scenes;
 mod view;
 
-use measure::{breakdown, lookup, neural, ranking, textures, times};
+use measure::{breakdown, energy, lookup, neural, ranking, textures, times};
 
 /// One table or set of pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -18,6 +18,8 @@ enum Part {
     Times,
     /// Errors on the bust, the dragon and Sibenik beside GIF's, and a sheet of pictures per scene.
     Ranking,
+    /// How much light À-Trous keeps, by form.
+    Energy,
     /// The Cornell box against Open Image Denoise.
     Neural,
     /// Sponza's textures with and without demodulation.
@@ -63,6 +65,7 @@ fn main() -> anyhow::Result<()> {
                 times::print(&gpu)?;
             }
             Part::Ranking => ranking::print(&gpu, &args)?,
+            Part::Energy => energy::print(&gpu, &args)?,
             Part::Neural => neural::print(&gpu, &args)?,
             Part::Textures => textures::print(&gpu, &args)?,
             Part::Lookup => lookup::print(&gpu, &args)?,

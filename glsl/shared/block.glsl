@@ -1,10 +1,13 @@
-// A workgroup of 64 threads owns a block of 4096 items; each thread 64 that follow one another, so that scans need one
-// step across threads. Larger groups pay more for barriers on lavapipe. See stage::BLOCK.
-const uint BLOCK_THREADS = 64u, THREAD_ITEMS = 64u;
+// A workgroup of 64 threads owns a block of items; each thread some that follow one another, so that scans need one step
+// across threads. Larger groups pay more for barriers on lavapipe. See stage::PerBlock.
+const uint BLOCK_THREADS = 64u;
+layout(constant_id = 103) const uint THREAD_ITEMS = 64u;
 
 shared uint64_t block_words[BLOCK_THREADS];
 
 uint first_item() { return (gl_WorkGroupID.x * BLOCK_THREADS + gl_LocalInvocationIndex) * THREAD_ITEMS; }
+
+uint block_count(uint all) { return (all + BLOCK_THREADS * THREAD_ITEMS - 1u) / (BLOCK_THREADS * THREAD_ITEMS); }
 
 // Items that a thread has. A count that is not constant also keeps loops over them from being unrolled and run under a mask
 // by compilers for CPUs.

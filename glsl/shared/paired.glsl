@@ -2,9 +2,12 @@
 // store of four is fewer instructions than two of two.
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 
+u64vec2 paired(uvec4 v) {
+    return u64vec2(packUint2x32(v.xy), packUint2x32(v.zw));
+}
+
 u64vec2 paired(vec4 v) {
-    uvec4 bits = floatBitsToUint(v);
-    return u64vec2(packUint2x32(bits.xy), packUint2x32(bits.zw));
+    return paired(floatBitsToUint(v));
 }
 
 u64vec4 paired(vec4 v, vec4 w) {

@@ -214,7 +214,7 @@ impl Bound<'_> {
         Ok(vk::DescriptorBufferInfo::default().buffer(*raw).offset(self.offset).range(self.size))
     }
 
-    /// A view as texels of 16 bytes where elements are a multiple of that, of 8 where they have 8, else of 4. Made once,
+    /// A view as texels of 16 bytes where elements are a multiple of that, of 8 where they are one of 8, else of 4. Made once,
     /// then kept.
     ///
     /// # Errors
@@ -339,7 +339,7 @@ impl Drop for Untyped {
 fn texel_bytes(stride: usize) -> u64 {
     match stride {
         n if n.is_multiple_of(16) => 16,
-        8 => 8,
+        n if n.is_multiple_of(8) => 8,
         _ => 4,
     }
 }
@@ -364,8 +364,8 @@ mod tests {
 
     #[test]
     fn texels_are_as_wide_as_elements_allow() {
-        // Elements of 48, 24 and 8 bytes are read 16, 4 and 8 at a time.
-        for (stride, texels) in [(48, 6), (24, 24), (8, 12)] {
+        // Elements of 48, 24 and 12 bytes are read 16, 8 and 4 at a time.
+        for (stride, texels) in [(48, 6), (24, 12), (12, 24)] {
             assert!(check_texels("a", 96, stride, texels).is_ok());
             let line = check_texels("a", 96, stride, texels - 1).unwrap_err().to_string();
             assert!(line.contains(&format!("{texels} texels")) && line.contains("choose"), "{line}");

@@ -2,10 +2,10 @@
 //! Kernels: `glsl/{weigh,total,deficit,need,quota,settle,digit,pick,ties,blocks,spread}.comp`. Twin:
 //! [`crate::reference::apportion`].
 use super::scan::Blocks;
-use super::{blocks, one_workgroup};
+use super::{PerBlock, block_count};
 use crate::error::Result;
-use crate::gpu::layout::{ApportionPush, Apportionment, BlockSums, Effects, NONE, PixelStats, uvec2};
-use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
+use crate::gpu::layout::{ApportionPush, Apportionment, BlockSums, NONE, PixelStats, uvec2};
+use crate::gpu::{Buffer, Gpu, Location, Recorder};
 use crate::schedule::{Plan, Share};
 use crate::shaders::{deficit, digit, need, pick, quota, settle, spread, ties, total, weigh};
 
@@ -32,12 +32,12 @@ impl Counts {
     /// Weight, count and offset.
     pub const BYTES_PER_PIXEL: usize = 16;
 
-    /// For a film of `pixels`.
+    /// For a film of `pixels`, and kernels whose threads have so many each.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when it does not fit.
-    pub fn new(gpu: &Gpu, pixels: u32) -> Result<Self> {
-        let (n, of_blocks) = (pixels as usize, blocks(pixels)[0] as usize);
+    pub fn new(gpu: &Gpu, pixels: u32, thread_items: u32) -> Result<Self> {
+        let (n, of_blocks) = (pixels as usize, block_count(pixels, thread_items) as usize);
         Ok(Self {
             weight: Buffer::new(gpu, "weight", n, Location::Device)?,
             count: Buffer::new(gpu, "count", n, Location::Device)?,
@@ -56,38 +56,37 @@ impl Counts {
 
 /// The kernels.
 pub struct Apportion {
-    weigh: Kernel<weigh::Bind<'static>>,
-    total: Kernel<total::Bind<'static>>,
-    deficit: Kernel<deficit::Bind<'static>>,
-    need: Kernel<need::Bind<'static>>,
-    quota: Kernel<quota::Bind<'static>>,
-    settle: Kernel<settle::Bind<'static>>,
-    digit: Kernel<digit::Bind<'static>>,
-    pick: Kernel<pick::Bind<'static>>,
-    ties: Kernel<ties::Bind<'static>>,
+    weigh: PerBlock<weigh::Bind<'static>>,
+    total: PerBlock<total::Bind<'static>>,
+    deficit: PerBlock<deficit::Bind<'static>>,
+    need: PerBlock<need::Bind<'static>>,
+    quota: PerBlock<quota::Bind<'static>>,
+    settle: PerBlock<settle::Bind<'static>>,
+    digit: PerBlock<digit::Bind<'static>>,
+    pick: PerBlock<pick::Bind<'static>>,
+    ties: PerBlock<ties::Bind<'static>>,
     blocks: Blocks,
-    spread: Kernel<spread::Bind<'static>>,
+    spread: PerBlock<spread::Bind<'static>>,
 }
 
 impl Apportion {
-    /// Compiles them.
+    /// Compiles them, as [`PerBlock::new`] does.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when the driver refuses one.
-    pub fn new(gpu: &Gpu) -> Result<Self> {
-        let none = Effects::default();
+    pub fn new(gpu: &Gpu, thread_items: u32) -> Result<Self> {
         Ok(Self {
-            weigh: Kernel::new(gpu, &none, &[])?,
-            total: Kernel::new(gpu, &none, &[])?,
-            deficit: Kernel::new(gpu, &none, &[])?,
-            need: Kernel::new(gpu, &none, &[])?,
-            quota: Kernel::new(gpu, &none, &[])?,
-            settle: Kernel::new(gpu, &none, &[])?,
-            digit: Kernel::new(gpu, &none, &[])?,
-            pick: Kernel::new(gpu, &none, &[])?,
-            ties: Kernel::new(gpu, &none, &[])?,
-            blocks: Blocks::new(gpu)?,
-            spread: Kernel::new(gpu, &none, &[])?,
+            weigh: PerBlock::new(gpu, thread_items)?,
+            total: PerBlock::new(gpu, thread_items)?,
+            deficit: PerBlock::new(gpu, thread_items)?,
+            need: PerBlock::new(gpu, thread_items)?,
+            quota: PerBlock::new(gpu, thread_items)?,
+            settle: PerBlock::new(gpu, thread_items)?,
+            digit: PerBlock::new(gpu, thread_items)?,
+            pick: PerBlock::new(gpu, thread_items)?,
+            ties: PerBlock::new(gpu, thread_items)?,
+            blocks: Blocks::new(gpu, thread_items)?,
+            spread: PerBlock::new(gpu, thread_items)?,
         })
     }
 
@@ -103,23 +102,21 @@ impl Apportion {
         c: &Counts,
         plan: &Plan,
     ) -> Result<()> {
-        let push = |round| push(plan, round);
-        let all = blocks(plan.pixels);
-        rec.dispatch(&self.weigh, weigh::Bind { priority, weight: &c.weight, sums: &c.sums }, &push(0), all)?;
-        rec.dispatch(&self.total, total::Bind { sums: &c.sums, state: &c.state }, &push(0), one_workgroup())?;
+        let (push, n) = (|round| push(plan, round), plan.pixels);
+        self.weigh.record(rec, weigh::Bind { priority, weight: &c.weight, sums: &c.sums }, &push(0), n)?;
+        self.total.record_one(rec, total::Bind { sums: &c.sums, state: &c.state }, &push(0))?;
         match plan.share {
             Share::Next => {}
             Share::All(_) => {
                 let bind = deficit::Bind { stats, state: &c.state, weight: &c.weight, sums: &c.sums };
-                rec.dispatch(&self.deficit, bind, &push(0), all)?;
+                self.deficit.record(rec, bind, &push(0), n)?;
             }
             Share::Need { .. } => {
-                let bind = need::Bind { stats, weight: &c.weight, sums: &c.sums };
-                rec.dispatch(&self.need, bind, &push(0), all)?;
+                self.need.record(rec, need::Bind { stats, weight: &c.weight, sums: &c.sums }, &push(0), n)?;
             }
         }
         if plan.share != Share::Next {
-            rec.dispatch(&self.total, total::Bind { sums: &c.sums, state: &c.state }, &push(1), one_workgroup())?;
+            self.total.record_one(rec, total::Bind { sums: &c.sums, state: &c.state }, &push(1))?;
         }
         for round in 0..plan.rounds {
             let bind = quota::Bind {
@@ -130,28 +127,25 @@ impl Apportion {
                 count: &c.count,
                 sums: &c.sums,
             };
-            rec.dispatch(&self.quota, bind, &push(round), all)?;
-            let bind = settle::Bind { sums: &c.sums, state: &c.state };
-            rec.dispatch(&self.settle, bind, &push(round), one_workgroup())?;
+            self.quota.record(rec, bind, &push(round), n)?;
+            self.settle.record_one(rec, settle::Bind { sums: &c.sums, state: &c.state }, &push(round))?;
         }
         self.record_remainders(rec, stats, c, plan)
     }
 
     fn record_remainders(&self, rec: &mut Recorder, stats: &Buffer<PixelStats>, c: &Counts, plan: &Plan) -> Result<()> {
-        let all = blocks(plan.pixels);
         for round in 0..DIGITS {
             let push = push(plan, round);
             let bind = digit::Bind { key: &c.offset, state: &c.state, histogram: &c.histogram };
-            rec.dispatch(&self.digit, bind, &push, all)?;
-            let bind = pick::Bind { state: &c.state, histogram: &c.histogram };
-            rec.dispatch(&self.pick, bind, &push, one_workgroup())?;
+            self.digit.record(rec, bind, &push, plan.pixels)?;
+            self.pick.record_one(rec, pick::Bind { state: &c.state, histogram: &c.histogram }, &push)?;
         }
         let push = push(plan, 0);
         let bind = ties::Bind { key: &c.offset, stats, counts: &c.count, state: &c.state, blocks: &c.blocks };
-        rec.dispatch(&self.ties, bind, &push, all)?;
+        self.ties.record(rec, bind, &push, plan.pixels)?;
         self.blocks.record(rec, &c.blocks, plan.pixels)?;
         let bind = spread::Bind { key: &c.offset, stats, state: &c.state, blocks: &c.blocks, count: &c.count };
-        rec.dispatch(&self.spread, bind, &push, all)
+        self.spread.record(rec, bind, &push, plan.pixels)
     }
 }
 

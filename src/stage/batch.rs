@@ -1,14 +1,14 @@
 //! Lists the paths of one batch of a round: the sample-to-pixel buffer. Kernel: `glsl/batch.comp`. Twin:
 //! [`crate::reference::apportion::batch`].
-use super::{blocks, pair};
+use super::{PerBlock, pair};
 use crate::error::Result;
 use crate::gpu::layout::{BatchPush, PixelStats, uvec2};
-use crate::gpu::{Buffer, Kernel, Recorder};
+use crate::gpu::{Buffer, Recorder};
 use crate::schedule::PathRange;
 use crate::shaders::batch::Bind;
 
 /// The kernel.
-pub type Batches = Kernel<Bind<'static>>;
+pub type Batches = PerBlock<Bind<'static>>;
 
 /// offset\[P + 1\], stats\[P\] -> paths\[batch\]
 pub fn record(
@@ -23,5 +23,5 @@ pub fn record(
     let pixels = offset.len() as u32 - 1;
     let PathRange { first, paths: n, round, rounds } = *range;
     let push = BatchPush { pixels, paths: n, first_path: pair(first), round, rounds, first_sample };
-    rec.dispatch(k, Bind { offset, stats, paths }, &push, blocks(pixels))
+    k.record(rec, Bind { offset, stats, paths }, &push, pixels)
 }

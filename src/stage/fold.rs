@@ -39,8 +39,10 @@ fn fold(
     push: &FoldPush,
 ) -> Result<()> {
     let bound = window.start as usize..window.end as usize;
-    let stats = &tile.stats.part(bound.clone())?;
+    let folded_stats = &tile.stats.part(bound.clone())?;
     let apart = tile.light.len() == tile.pixels as usize; // else one unused element
-    let light = &if apart { tile.light.part(bound)? } else { tile.light.clone() };
-    k.record(rec, Bind { samples: &f.samples, stats, light, offset: &f.counts.offset }, push, push.pixels)
+    let folded_light = &if apart { tile.light.part(bound)? } else { tile.light.clone() };
+    let (samples, offset) = (&f.samples, &f.counts.offset);
+    let bind = Bind { samples, stats: &tile.stats, light: &tile.light, offset, folded_stats, folded_light };
+    k.record(rec, bind, push, push.pixels)
 }

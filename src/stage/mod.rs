@@ -66,17 +66,54 @@ pub fn groups(threads: u32, size: u32) -> [u32; 3] {
     [groups.min(ROW), groups.div_ceil(ROW), 1]
 }
 
-/// Pixels that one workgroup of the scanning kernels owns: `BLOCK_THREADS * THREAD_ITEMS` of `glsl/shared/block.glsl`.
-pub const BLOCK: u32 = 4096;
-
-/// Workgroups of those kernels for a film of `pixels`; at most 2^28 of them, so that one row is enough.
-fn blocks(pixels: u32) -> [u32; 3] {
-    [pixels.div_ceil(BLOCK), 1, 1]
+/// A kernel whose workgroups each own a block of pixels, a run of them each thread; or one that closes what those began.
+pub struct PerBlock<B> {
+    kernel: Kernel<B>,
+    thread_items: u32,
 }
 
-/// Of the kernels that close what the blocks began.
-fn one_workgroup() -> [u32; 3] {
-    [1; 3]
+impl<B: Bindings> PerBlock<B> {
+    /// Compiles the kernel for blocks of threads with so many pixels: see [`thread_items`].
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when the driver refuses it.
+    pub fn new(gpu: &Gpu, thread_items: u32) -> Result<Self> {
+        // THREAD_ITEMS of `shared/block.glsl`.
+        Ok(Self { kernel: Kernel::new(gpu, &Effects::default(), &[(103, thread_items)])?, thread_items })
+    }
+
+    /// Records it over all blocks of a film.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub fn record(&self, rec: &mut Recorder, bind: B, push: &B::Push, pixels: u32) -> Result<()> {
+        rec.dispatch(&self.kernel, bind, push, [block_count(pixels, self.thread_items), 1, 1])
+    }
+
+    /// Records one workgroup of it.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub fn record_one(&self, rec: &mut Recorder, bind: B, push: &B::Push) -> Result<()> {
+        rec.dispatch(&self.kernel, bind, push, [1; 3])
+    }
+}
+
+/// Of a [`PerBlock`] kernel.
+const BLOCK_THREADS: u32 = 64;
+
+/// Blocks of a film.
+pub fn block_count(pixels: u32, thread_items: u32) -> u32 {
+    pixels.div_ceil(BLOCK_THREADS * thread_items)
+}
+
+/// Pixels that a thread of a [`PerBlock`] kernel walks over. Two cores are busy with few threads, and a long run spares
+/// barriers; a GPU hides the time that its memory takes behind other threads, of which it wants tens of thousands.
+pub fn thread_items(gpu: &Gpu, pixels: u32) -> u32 {
+    const FEW: u32 = 16;
+    const MANY: u32 = 64;
+    let fits = block_count(pixels, FEW) <= ROW;
+    if fits && gpu.info().kind != "CPU" { FEW } else { MANY }
 }
 
 /// A 64-bit number as buffers and push constants hold it, low word first.

@@ -1,46 +1,44 @@
 //! Exclusive scan of the counts: where every pixel's paths start. Reduce, then scan, in three passes, with
 //! no assumption about forward progress or subgroups. Kernels: `glsl/{reduce,blocks,offsets}.comp`. Twin:
 //! [`crate::reference::apportion::offsets`].
+use super::PerBlock;
 use super::apportion::Counts;
-use super::{blocks, one_workgroup};
 use crate::error::Result;
-use crate::gpu::layout::{Effects, ScanPush, uvec2};
-use crate::gpu::{Buffer, Gpu, Kernel, Recorder};
+use crate::gpu::layout::{ScanPush, uvec2};
+use crate::gpu::{Buffer, Gpu, Recorder};
 use crate::shaders::{self, offsets, reduce};
 
 /// The middle pass, which apportioning needs too.
-pub(super) struct Blocks(Kernel<shaders::blocks::Bind<'static>>);
+pub(super) struct Blocks(PerBlock<shaders::blocks::Bind<'static>>);
 
 impl Blocks {
-    pub fn new(gpu: &Gpu) -> Result<Self> {
-        Ok(Self(Kernel::new(gpu, &Effects::default(), &[])?))
+    pub fn new(gpu: &Gpu, thread_items: u32) -> Result<Self> {
+        Ok(Self(PerBlock::new(gpu, thread_items)?))
     }
 
     /// Replaces the sums of all blocks by the sums before them.
     pub fn record(&self, rec: &mut Recorder, sums: &Buffer<uvec2>, pixels: u32) -> Result<()> {
-        let push = ScanPush { pixels };
-        rec.dispatch(&self.0, shaders::blocks::Bind { blocks: sums }, &push, one_workgroup())
+        self.0.record_one(rec, shaders::blocks::Bind { blocks: sums }, &ScanPush { pixels })
     }
 }
 
 /// The kernels.
 pub struct Scan {
-    reduce: Kernel<reduce::Bind<'static>>,
+    reduce: PerBlock<reduce::Bind<'static>>,
     blocks: Blocks,
-    offsets: Kernel<offsets::Bind<'static>>,
+    offsets: PerBlock<offsets::Bind<'static>>,
 }
 
 impl Scan {
-    /// Compiles them.
+    /// Compiles them, as [`PerBlock::new`] does.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when the driver refuses one.
-    pub fn new(gpu: &Gpu) -> Result<Self> {
-        let none = Effects::default();
+    pub fn new(gpu: &Gpu, thread_items: u32) -> Result<Self> {
         Ok(Self {
-            reduce: Kernel::new(gpu, &none, &[])?,
-            blocks: Blocks::new(gpu)?,
-            offsets: Kernel::new(gpu, &none, &[])?,
+            reduce: PerBlock::new(gpu, thread_items)?,
+            blocks: Blocks::new(gpu, thread_items)?,
+            offsets: PerBlock::new(gpu, thread_items)?,
         })
     }
 
@@ -50,10 +48,10 @@ impl Scan {
     /// [`crate::error::Error::Device`].
     pub fn record(&self, rec: &mut Recorder, c: &Counts) -> Result<()> {
         let pixels = c.count.len() as u32;
-        let (push, all) = (&ScanPush { pixels }, blocks(pixels));
-        rec.dispatch(&self.reduce, reduce::Bind { counts: &c.count, blocks: c.blocks() }, push, all)?;
+        let push = &ScanPush { pixels };
+        self.reduce.record(rec, reduce::Bind { counts: &c.count, blocks: c.blocks() }, push, pixels)?;
         self.blocks.record(rec, c.blocks(), pixels)?;
         let bind = offsets::Bind { counts: &c.count, blocks: c.blocks(), offset: &c.offset };
-        rec.dispatch(&self.offsets, bind, push, all)
+        self.offsets.record(rec, bind, push, pixels)
     }
 }

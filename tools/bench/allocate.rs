@@ -3,12 +3,12 @@
 use anyhow::Result;
 use std::collections::BTreeMap;
 use tallow::gpu::layout::PixelStats;
-use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Kernel, Location};
+use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Location};
 use tallow::report::table;
 use tallow::schedule::{PathRange, Plan, Share};
 use tallow::stage::apportion::{Apportion, Counts};
-use tallow::stage::batch;
 use tallow::stage::scan::Scan;
+use tallow::stage::{PerBlock, batch, thread_items};
 
 const RUNS: usize = 9;
 
@@ -27,9 +27,10 @@ fn main() -> Result<()> {
     let priority = Buffer::from_slice(&gpu, "priority", &priority)?;
     let stats = Buffer::from_slice(&gpu, "stats", &vec![PixelStats::default(); pixels as usize])?;
     let paths = Buffer::new(&gpu, "paths", pixels as usize, Location::Device)?;
-    let counts = Counts::new(&gpu, pixels)?;
-    let (apportion, scan) = (Apportion::new(&gpu)?, Scan::new(&gpu)?);
-    let lists = Kernel::new(&gpu, &Default::default(), &[])?;
+    let items = thread_items(&gpu, pixels);
+    let counts = Counts::new(&gpu, pixels, items)?;
+    let (apportion, scan) = (Apportion::new(&gpu, items)?, Scan::new(&gpu, items)?);
+    let lists = PerBlock::new(&gpu, items)?;
     let mut frame = FrameResources::new(&gpu)?;
     for spp in [1, 4, 64] {
         let plan = Plan { pixels, budget: u64::from(pixels) * spp, limit: None, share: Share::Next, rounds: 1 };

@@ -1,6 +1,7 @@
 //! What `tools/filters` measures, a file per table.
 pub mod breakdown;
 mod case;
+pub mod energy;
 mod frames;
 pub mod lookup;
 pub mod neural;

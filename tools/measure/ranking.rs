@@ -12,7 +12,8 @@ use tallow::report::table;
 /// Two bounces of indirect light, as GIF has them.
 const DEPTH: u32 = 4;
 
-const VIEWS: &[View] = &[
+/// GIF has three kinds of scene.
+pub const VIEWS: &[View] = &[
     View { name: "bust-room", scene: "scenes/bust/room.toml", size: [180, 240], depth: DEPTH, reference: 1024 },
     View { name: "dragon", scene: "stanford-dragon", size: [256, 256], depth: DEPTH, reference: 1024 },
     View { name: "sibenik-lamps", scene: "sibenik-lamps", size: [192, 108], depth: DEPTH, reference: 1024 },
