@@ -6,9 +6,9 @@
 #include "shared/edge.glsl"
 
 // One level of the edge-avoiding A-Trous wavelet transform (Dammertz et al. 2010, section 2.2): 5x5 taps that are
-// push.spacing pixels apart, each weighted by how alike the two pixels are. A thread filters ROWS pixels of a column,
-// push.spacing apart, because they share most of their taps; neighbouring threads take neighbouring columns, so that
-// every level reads runs of memory.
+// push.spacing pixels apart, each weighted by how alike the two pixels are, and by the samples behind it. A thread filters
+// ROWS pixels of a column, push.spacing apart, because they share most of their taps; neighbouring threads take
+// neighbouring columns, so that every level reads runs of memory.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
@@ -18,6 +18,11 @@ layout(scalar, push_constant) uniform Push { AtrousPush push; };
 layout(constant_id = 114) const bool CONSERVE = false; // what a neighbour is refused stays with the centre
 
 const int ROWS = 4;
+const float MOST_SAMPLES = 1e12; // beyond it, counts are cut, so that sums stay finite
+
+// For images of placed samples, which EAW does not have. Where geometry placed them, noise is alike, and the number of samples
+// the best weight; where noise did, the means are alike in error, and no weight is. The root serves both.
+float trust(Pixel q) { return CONSERVE ? 1.0 : sqrt(min(q.colour.w, MOST_SAMPLES)); }
 
 float b3_spline(int offset) {
     int by = abs(offset);
@@ -51,6 +56,7 @@ void main() {
             int y = first + j * spacing;
             float h = y >= 0 && y < size.y ? across : 0.0; // nothing is known outside
             Pixel q = pixel_at(clamp(y, 0, size.y - 1) * size.x + tap_x);
+            h *= trust(q);
             [[unroll]] for (int k = 0; k < ROWS; k++) { // constant bounds, or it would not be unrolled
                 if (abs(j - k) <= 2) {
                     float w = h * b3_spline(j - k) * edge_weight(q, edge_exponent(centre[k], q, push.rates));

@@ -1,5 +1,6 @@
 //! Tallow: a Vulkan-native path tracer.
 pub mod allocate;
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod composition;
 pub mod denoiser;

@@ -8,7 +8,8 @@ use entry::Entry;
 use serde::{Deserialize, Serialize};
 
 /// How a pixel's samples are spread over its surroundings. Widths are in pixels.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum PixelFilter {
     /// Uniform over the pixel.
@@ -23,7 +24,8 @@ pub enum PixelFilter {
 }
 
 /// Where the random numbers come from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Sampler {
     /// Owen-scrambled Sobol points.

@@ -43,8 +43,9 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("gpu", &["error", "shaders"]),
 ];
 
-/// Words that only `src/gpu` may hold.
-const GPU_ONLY: &[&str] = &["unsafe", "vk::", "ash::"];
+/// Words that only one module may hold: those of Vulkan, and of what an engine does without (the feature `cli`).
+const ROOMS: &[(&str, &[&str])] =
+    &[("gpu", &["unsafe", "vk::", "ash::"]), ("cli", &["clap::", "ctrlc::", "indicatif::"])];
 
 fn sources(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
@@ -53,13 +54,17 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
     files.into_iter().filter(|f| f.extension().is_some_and(|e| e == "rs")).chain(below).collect()
 }
 
-/// The lines of a file without comments and strings.
+/// The lines of a file without comments, strings and what only the feature `cli` switches on.
 fn code(text: &str) -> String {
     let bare = |line: &str| {
         let line = line.split("//").next().unwrap_or_default();
         line.split('"').step_by(2).collect::<String>()
     };
-    text.lines().map(bare).collect::<Vec<_>>().join("\n")
+    text.lines()
+        .filter(|line| !line.starts_with("#[cfg_attr(feature = \"cli\","))
+        .map(bare)
+        .collect::<Vec<_>>()
+        .join("\n")
 }
 
 /// Paths below the crate's root that a file names: `gpu::layout`, `error`.
@@ -81,11 +86,10 @@ fn faults(module: &str, text: &str) -> Vec<String> {
     let fine = |path: &str| within(path, module) || allowed.iter().any(|root| within(path, root));
     let mut found: Vec<_> =
         named(&code).into_iter().filter(|p| !fine(p)).map(|p| format!("names crate::{p}")).collect();
-    if module != "gpu" {
-        let starts = |at: usize| !code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_');
-        let words = GPU_ONLY.iter().filter(|w| code.match_indices(*w).any(|(at, _)| starts(at)));
-        found.extend(words.map(|w| format!("writes {w}")));
-    }
+    let starts = |at: usize| !code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_');
+    let elsewhere = ROOMS.iter().filter(|(room, _)| *room != module).flat_map(|(_, words)| *words);
+    let words = elsewhere.filter(|w| code.match_indices(*w).any(|(at, _)| starts(at)));
+    found.extend(words.map(|w| format!("writes {w}")));
     found
 }
 
@@ -111,6 +115,9 @@ fn a_fault_is_found() {
         faults("stage", "fn f(b: vk::Buffer) {}\nuse crate::cli::Exit;"),
         ["names crate::cli::Exit", "writes vk::"]
     );
+    assert_eq!(faults("settings", "#[derive(clap::ValueEnum)]"), ["writes clap::"]);
+    let switched = "#[cfg_attr(feature = \"cli\", derive(clap::ValueEnum))]";
+    assert_eq!(faults("settings", switched), [] as [&str; 0]);
     assert_eq!(faults("stage", "use hash::Hash;"), [] as [&str; 0], "ash:: within a word");
     assert_eq!(faults("scene", "// crate::cli and unsafe\nuse crate::gpu::layout::Light;"), [] as [&str; 0]);
     assert_eq!(faults("drawer", "").len(), 1);

@@ -65,9 +65,18 @@ fn atrous_solves_the_worked_example() {
     assert!((red(&reference(&line(&[0.0, 1.0]), &edge))[0] - w / (w + 6.0 / 16.0)).abs() < 1e-6);
     let kept = red(&reference(&line(&[0.0, 1.0]), &FilterSettings { conserve_energy: true, ..edge }));
     assert!((kept[0] - w * 6.0 / 16.0).abs() < 1e-6 && kept[0] + kept[1] == 1.0);
+    // The root of a pixel's samples weighs too: of 9 beside 1, 4/16 * 3 beside 6/16.
+    let mut uneven = line(&[0.0, 1.0]);
+    uneven.radiance[1][3] = 9.0;
+    let found = reference(&uneven, &plain);
+    assert!((found[0][0] - 12.0 / 18.0).abs() < 1e-6 && found[1][3] == 9.0, "{found:?}");
     // An unknown pixel between 2 and 4 takes their mean, whatever the radiance weight, and counts as one sample.
     let painted = reference(&line(&[2.0, f32::NAN, 4.0]), &FilterSettings { sigma_rt: 0.1, ..plain });
     assert_eq!(painted[1], [3.0, 3.0, 3.0, 1.0]);
+    // Any number of samples is one, as far as sums can hold them.
+    uneven.radiance[1] = [1e20, 1e20, 1e20, f32::MAX];
+    let many = red(&both(&gpu(), "atrous", &uneven, &plain));
+    assert!(many.iter().all(|v| (v / 1e20 - 1.0).abs() < 1e-5), "{many:?}");
     // A weight that is off does not count where the square of a difference is infinite: 4/16 beside 6/16.
     let gpu = gpu();
     let bright = red(&both(&gpu, "atrous", &line(&[0.0, 1e20]), &plain));

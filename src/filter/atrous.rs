@@ -20,6 +20,9 @@ pub const ROW: Row = Row {
 const ROWS: u32 = 4;
 const WORKGROUP: u32 = 32;
 
+/// Beyond it, counts are cut.
+const MOST_SAMPLES: f32 = 1e12;
+
 struct Atrous {
     pack: Pack,
     /// With the radiance weight, and without it for the levels that in-paint.
@@ -93,7 +96,8 @@ fn filtered(
         if (0..i64::from(width)).contains(&u) && (0..i64::from(height)).contains(&v) {
             let q = image[(v * i64::from(width) + u) as usize];
             let h = B3[i.unsigned_abs() as usize] * B3[j.unsigned_abs() as usize];
-            let w = h * edge_weight(&q, rates.exponent(&p, &q));
+            let trust = if settings.conserve_energy { 1.0 } else { q.count.min(MOST_SAMPLES).sqrt() };
+            let w = h * trust * edge_weight(&q, rates.exponent(&p, &q));
             sum += w * (q.colour - p.colour);
             total += w;
         }

@@ -5,9 +5,12 @@ use crate::error::Result;
 use crate::gpu::layout::vec4;
 use crate::settings::entry::{self, Entry};
 use glam::Vec3;
+use serde::Serialize;
 
 /// How EAW's edge-stopping weights are computed: the paper's listing and its equations differ.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum AtrousForm {
     /// As the listing: squared differences, that of normals divided by the squared distance between taps.
     #[default]
@@ -19,7 +22,9 @@ pub enum AtrousForm {
 }
 
 /// How `guided` sums over windows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum GuidedSums {
     /// Block by block, about local means: nothing cancels.
     #[default]
@@ -30,7 +35,9 @@ pub enum GuidedSums {
 }
 
 /// The lattices of the decimated wavelets.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum WaveletBasis {
     /// CDF(2,2), along rows and columns.
     #[default]

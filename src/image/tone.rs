@@ -1,7 +1,8 @@
 //! From radiance to what a screen shows.
 
 /// Curve applied after exposure and before the sRGB transfer function.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum ToneMap {
     /// Values above 1 are cut.
     #[default]

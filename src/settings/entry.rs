@@ -1,6 +1,6 @@
 //! A setting as its option, its help and its error message name it.
 use crate::error::{Error, Result};
-use clap::ValueEnum;
+use serde::Serialize;
 use std::fmt::Display;
 
 /// One setting and what it may be.
@@ -23,8 +23,9 @@ impl Entry {
     }
 
     /// One of a list.
-    pub fn one_of(name: &'static str, value: &impl ValueEnum) -> Self {
-        Self::any(name, value.to_possible_value().map_or(String::new(), |v| v.get_name().to_owned()))
+    pub fn one_of(name: &'static str, value: &impl Serialize) -> Self {
+        let word = serde_json::to_value(value).unwrap_or_default();
+        Self::any(name, word.as_str().unwrap_or_default())
     }
 
     /// From `low` to `high`.

@@ -37,14 +37,14 @@ impl Picture {
         self
     }
 
-    /// Exponential noise of the mean's size, the samples' variance beside it, and every 13th pixel without samples.
+    /// Exponential noise of the mean's size, the samples' variance beside it, 1 to 7 samples, and every 13th pixel without.
     pub fn noisy(mut self) -> Self {
         let mut variance = Vec::new();
         for (i, c) in self.input.radiance.iter_mut().enumerate() {
             variance.push([c[0] * c[0], c[1] * c[1], c[2] * c[2]]);
             let u = (hash(i as u32) as f32 + 0.5) / 4_294_967_296.0;
             let scale = -u.max(1e-6).ln();
-            *c = [c[0] * scale, c[1] * scale, c[2] * scale, if i % 13 == 12 { 0.0 } else { 4.0 }];
+            *c = [c[0] * scale, c[1] * scale, c[2] * scale, if i % 13 == 12 { 0.0 } else { (1 + i % 7) as f32 }];
         }
         self.input.variance = Some(variance);
         self

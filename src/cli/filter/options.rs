@@ -135,6 +135,8 @@ impl Overrides {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::entry::Entry;
+    use crate::settings::{PixelFilter, Sampler};
     use clap::{Args, Command};
 
     #[test]
@@ -145,5 +147,15 @@ mod tests {
         assert_eq!(texts.iter().filter(|t| t.matches("[default: ").count() == 1).count(), 14, "{texts:#?}");
         assert_eq!(texts[2], "Levels of the wavelet filters [1 to 10] [default: 5]");
         assert!(texts[0].ends_with("[default: the image's largest] [a finite number above 0]"), "{}", texts[0]);
+    }
+    fn named_alike<T: clap::ValueEnum + serde::Serialize>() -> bool {
+        let option = |v: &T| v.to_possible_value().map(|word| word.get_name().to_owned());
+        T::value_variants().iter().all(|v| option(v) == Some(Entry::one_of("", v).value))
+    }
+
+    #[test]
+    fn messages_name_choices_as_options_do() {
+        assert!(named_alike::<PixelFilter>() && named_alike::<Sampler>());
+        assert!(named_alike::<AtrousForm>() && named_alike::<GuidedSums>() && named_alike::<WaveletBasis>());
     }
 }
