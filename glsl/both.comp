@@ -1,12 +1,14 @@
 #version 460
 #extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
 #extension GL_GOOGLE_include_directive : require
 #include "layout.glsl"
 #include "shared/thread.glsl"
 
 // Noise that the samples show, estimated among the surroundings that look alike, less what a geometry-aware filter will
 // remove of it. A filter that gathers a share W of its window divides the variance by about 1 + W (pixels - 1): the
-// deviation that is left is what needs samples. Where nothing is known of the noise yet, geometry alone decides.
+// deviation that is left is what needs samples. Where nothing is known of the noise yet, geometry alone decides. A thread
+// decides for ROWS pixels of a column, which share most of their neighbours.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
 layout(binding = 1) uniform usamplerBuffer words; // of float
@@ -18,40 +20,62 @@ layout(scalar, push_constant) uniform Push { PriorityPush push; };
 
 const float LEAST_LEFT = 0.01; // of two pixels at least .27
 
-vec3 mean_of(uint pixel) {
-    return uintBitsToFloat(texelFetch(stats, int(2u * pixel)).rgb);
+const int ROWS = 4;
+
+// What the pixels around one say of its noise.
+struct Surroundings {
+    vec4 around, offsets; // of the means, and how many there are
+    float squares, weights, freedom;
+};
+
+// `mean` is that of a pixel with these moments, less that of the centre: small numbers, whose squares keep their digits.
+void absorb(inout Surroundings s, float kin, vec4 m, vec3 mean) {
+    s.around += kin * m;
+    s.offsets += kin * vec4(mean, 1.0);
+    s.squares += kin * dot(mean, mean);
+    s.weights += kin * kin;
+    s.freedom += kin / max(m.w, 1.0);
+}
+
+// Pixels that look alike should be equally bright: how far their means are apart is noise as well, and all that shows it
+// after one sample a pixel. Of n samples it counts 1/n, since the more there are, the more of it is no noise.
+vec4 with_means(Surroundings s) {
+    // The share of it that is left when the mean is taken off: 0 of one pixel, but for what division rounds.
+    float count = s.offsets.w, left = 1.0 - s.weights / (count * count);
+    float apart = max(s.squares - dot(s.offsets.rgb, s.offsets.rgb) / count, 0.0) / 3.0;
+    return s.around + (count > 0.0 && left > LEAST_LEFT ? vec4(apart, s.freedom * left, 0.0, 0.0) : vec4(0.0));
 }
 
 void main() {
-    uint i = thread_index();
-    if (i >= push.size.x * push.size.y) return; // safe: no barrier() follows
-    ivec2 size = ivec2(push.size), at = ivec2(i % push.size.x, i / push.size.x);
-    ivec2 first = max(at - 1, ivec2(0)), last = min(at + 1, size - 1);
-    uint word = texelFetch(words, int(i)).x;
-    vec3 own = mean_of(i);
-    vec4 around = vec4(0.0), offsets = vec4(0.0);
-    float squares = 0.0, weights = 0.0, freedom = 0.0;
-    for (int y = first.y; y <= last.y; y++) {
-        for (int x = first.x; x <= last.x; x++) {
-            uint neighbour = uint(y * size.x + x);
-            vec4 m = moments(neighbour);
-            if (m.w == 0.0) continue;
-            float kin = kinship_of(word, 3 * (y - at.y) + x - at.x + 4);
-            vec3 offset = mean_of(neighbour) - own; // small numbers: their squares keep their digits
-            around += kin * m;
-            offsets += kin * vec4(offset, 1.0);
-            squares += kin * dot(offset, offset);
-            weights += kin * kin;
-            freedom += kin / m.w;
+    ivec2 size = ivec2(push.size);
+    int thread = int(thread_index()), x = thread % size.x, first = thread / size.x * ROWS;
+    if (first >= size.y) return; // safe: no barrier() follows
+    uint word[ROWS];
+    vec4 own[ROWS];
+    vec3 mean[ROWS];
+    Surroundings s[ROWS];
+    [[unroll]] for (int k = 0; k < ROWS; k++) {
+        int i = min(first + k, size.y - 1) * size.x + x;
+        word[k] = texelFetch(words, i).x;
+        own[k] = moments(uint(i), mean[k]);
+        s[k] = Surroundings(vec4(0.0), vec4(0.0), 0.0, 0.0, 0.0);
+    }
+    for (int column = -1; column <= 1; column++) {
+        [[unroll]] for (int row = -1; row <= ROWS; row++) {
+            ivec2 at = ivec2(x + column, first + row), q = clamp(at, ivec2(0), size - 1);
+            vec3 their_mean;
+            vec4 m = moments(uint(q.y * size.x + q.x), their_mean);
+            float known = at == q && m.w > 0.0 ? 1.0 : 0.0;
+            [[unroll]] for (int k = 0; k < ROWS; k++) { // constant bounds, or it would not be unrolled
+                if (abs(row - k) <= 1) {
+                    float kin = known * kinship_of(word[k], 3 * (row - k) + column + 4);
+                    absorb(s[k], kin, m, their_mean - mean[k]);
+                }
+            }
         }
     }
-    // Pixels that look alike should be equally bright: how far their means are apart is noise as well, and all that shows it
-    // after one sample a pixel. Of n samples it counts 1/n, since the more there are, the more of it is no noise.
-    // The share of it that is left when the mean is taken off: 0 of one pixel, but for what division rounds.
-    float left = 1.0 - weights / (offsets.w * offsets.w);
-    if (offsets.w > 0.0 && left > LEAST_LEFT) {
-        around.x += max(squares - dot(offsets.rgb, offsets.rgb) / offsets.w, 0.0) / 3.0;
-        around.y += freedom * left;
+    [[unroll]] for (int k = 0; k < ROWS; k++) {
+        float left = sqrt(max(1.0 - push.filtered * gathered_of(word[k]), 0.0));
+        if (first + k < size.y) priority[(first + k) * size.x + x] = noise(own[k], with_means(s[k])) * left;
     }
-    priority[i] = noise(moments(i), around) * sqrt(max(1.0 - push.filtered * gathered_of(word), 0.0));
 }

@@ -322,6 +322,8 @@ fn filtered_light_is_looked_up_in_the_scene() {
     complains(&run(&["noisy.exr", "--scene", "no.toml"]), 3, &["no.toml"]);
     assert_eq!(run(&["noisy.exr", "--eye-rays", "4"]).status.code(), Some(2));
     assert_eq!(run(&["noisy.exr", "--scene", scene, "--no-demodulate"]).status.code(), Some(2));
+    let other = scene.replace("scene.toml", "mirror.toml");
+    complains(&run(&["noisy.exr", "--scene", &other]), 3, &["noisy.exr", "another scene"]);
     write(&folder, "foreign.exr", &noisy(true));
     complains(&run(&["foreign.exr", "--scene", scene]), 3, &["foreign.exr", "tallow render"]);
 }

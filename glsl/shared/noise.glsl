@@ -5,12 +5,17 @@
 const float PRIOR_SAMPLES = 32.0;
 
 // (squared deviations summed, mean over channels; degrees of freedom; luminance times samples; samples)
+vec4 moments(uint pixel, out vec3 mean) {
+    uvec4 a = texelFetch(stats, int(2u * pixel)), b = texelFetch(stats, int(2u * pixel + 1u));
+    vec3 squares = uintBitsToFloat(b.rgb);
+    mean = uintBitsToFloat(a.rgb);
+    float n = float(a.w);
+    return a.w > 0u ? vec4((squares.r + squares.g + squares.b) / 3.0, n - 1.0, luminance(mean) * n, n) : vec4(0.0);
+}
+
 vec4 moments(uint pixel) {
-    uvec4 mean = texelFetch(stats, int(2u * pixel)), m2 = texelFetch(stats, int(2u * pixel + 1u));
-    vec3 squares = uintBitsToFloat(m2.rgb);
-    float n = float(mean.w);
-    vec4 m = vec4((squares.r + squares.g + squares.b) / 3.0, n - 1.0, luminance(uintBitsToFloat(mean.rgb)) * n, n);
-    return mean.w > 0u ? m : vec4(0.0);
+    vec3 mean;
+    return moments(pixel, mean);
 }
 
 // Standard deviation of one sample over the luminance (RAS), both steadied by the surroundings, `own` included, of which a

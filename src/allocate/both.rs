@@ -20,6 +20,9 @@ pub(super) const ROW: Row = Row {
     reference,
 };
 
+/// Pixels of a column that a thread decides for, as in the kernel.
+const ROWS: u32 = 4;
+
 struct Both {
     geometry: Geometry,
     kinship: PerThread<kinship::Bind<'static>>,
@@ -50,7 +53,7 @@ impl Policy for Both {
 
     fn record(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
         let bind = both::Bind { stats: b.stats, words: &self.words, priority: b.priority };
-        self.join.record(rec, bind, push, push.size[0] * push.size[1])
+        self.join.record(rec, bind, push, push.size[0] * push.size[1].div_ceil(ROWS))
     }
 }
 

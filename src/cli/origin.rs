@@ -54,6 +54,15 @@ impl Origin {
         let settings = parsed(film, SETTINGS)?;
         Ok(Self { settings, scene: said(film, SCENE)?.to_owned(), samples: parsed(film, SAMPLES)? })
     }
+
+    /// # Errors
+    /// When the film is of another scene.
+    pub fn shows(&self, scene: &Scene) -> std::result::Result<(), String> {
+        if self.scene == scene.fingerprint.to_string() {
+            return Ok(());
+        }
+        Err("shows another scene, or this one before it was changed".into())
+    }
 }
 
 fn said<'a>(film: &'a Film, key: &str) -> std::result::Result<&'a str, String> {

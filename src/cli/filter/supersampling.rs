@@ -1,5 +1,6 @@
 //! `--scene`: filtered light is looked up along eye rays.
 use crate::composition::Parts;
+use crate::cli::origin::Origin;
 use crate::error::{Error, Result};
 use crate::gpu::layout::{vec3, vec4};
 use crate::gpu::{Gpu, PassTime};
@@ -7,6 +8,7 @@ use crate::image::aov::{Aov, Aovs};
 use crate::renderer::{Outputs, Renderer};
 use crate::scene::Scene;
 use crate::settings::{Allocate, Settings};
+use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// Which scene, and how many rays.
@@ -26,7 +28,7 @@ impl Supersampling {
     /// Indirect light of every pixel, if a scene is named; `image` is for messages.
     ///
     /// # Errors
-    /// [`Error::Input`] when tallow did not render the image, and those of scene and device.
+    /// [`Error::Input`] when tallow did not render the image, or from another scene, and those of scene and device.
     pub fn look_up(
         &self,
         gpu: &Gpu,
@@ -36,18 +38,20 @@ impl Supersampling {
         filtered: &[vec4],
     ) -> Result<Option<(Vec<vec3>, Vec<PassTime>)>> {
         let Some(path) = &self.scene else { return Ok(None) };
-        let settings = settings(aovs).map_err(|what| Error::input(image, what))?;
+        let of_image = |what| Error::input(image, what);
+        let origin = Origin::of(aovs.film).map_err(of_image)?;
+        let settings = settings(aovs, &origin).map_err(of_image)?;
         let scene = Scene::load(path, &|s| *s = settings.clone())?;
+        origin.shows(&scene).map_err(of_image)?;
         let renderer = Renderer::new(gpu, &scene, Outputs::default())?;
         renderer.look_up(&parts.input.guide, filtered, self.eye_rays).map(Some)
     }
 }
 
 /// Of the render, without what placed its samples.
-fn settings(aovs: &Aovs) -> std::result::Result<Settings, String> {
-    let said = aovs.film.metadata.get("settings").filter(|_| aovs.get(Aov::Direct).is_some());
-    let said = said.ok_or("has no settings or no direct light: --scene needs an .exr file of tallow render")?;
-    let settings: Settings = serde_json::from_str(said).map_err(|e| format!("settings: {e}"))?;
+fn settings(aovs: &Aovs, origin: &Origin) -> std::result::Result<Settings, String> {
+    aovs.get(Aov::Direct).ok_or("has no direct light: --scene needs an .exr file of tallow render")?;
+    let settings = Settings::deserialize(&origin.settings).map_err(|e| format!("settings: {e}"))?;
     let [width, height] = [aovs.film.width, aovs.film.height];
     if [settings.width, settings.height] != [width, height] {
         return Err(format!("is {width}x{height}, but was rendered as {}x{}", settings.width, settings.height));
