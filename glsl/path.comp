@@ -173,8 +173,8 @@ void count(uint slot, uint n) {
 }
 
 void main() {
-    uint i = thread_index();
     bool listed = FX_ADAPTIVE && push.samples == 0u;
+    uint i = listed ? striped_index() : thread_index(); // listed pixel by pixel, else sample by sample
     if (i >= push.pixels * (listed ? 1u : push.samples)) return; // safe: no barrier() follows
     uint pixel = push.first_pixel + i % push.pixels;
     uint index = push.first_sample + i / push.pixels;

@@ -15,6 +15,10 @@ pub mod scan;
 /// Tracing on lavapipe runs fastest at 32 (against 16 and 64).
 pub const WORKGROUP_CPU: u32 = 32;
 
+/// Runs of a list of paths that are begun at once, so that no thread of lavapipe has the dear ones alone: placed samples of
+/// Cornell box, Sponza, bust and grass trace in 0.95 to 0.97 of the time.
+const STRIPES_CPU: u32 = 16;
+
 /// Two subgroups of the most common width.
 pub const WORKGROUP_GPU: u32 = 64;
 
@@ -41,8 +45,9 @@ impl<B: Bindings> PerThread<B> {
     /// # Errors
     /// As [`PerThread::new`].
     pub fn with_stack(gpu: &Gpu, effects: &Effects, workgroup: u32, stack: u32) -> Result<Self> {
-        // local_size_x_id, the same for `thread_index()`, and the stack of `shared/traverse.glsl`.
-        let numbers = [(100, workgroup), (101, workgroup), (102, stack)];
+        let stripes = if gpu.info().kind == "CPU" { STRIPES_CPU } else { 1 };
+        // local_size_x_id, the same for `thread_index()`, the stack of `shared/traverse.glsl`, and `striped_index()`.
+        let numbers = [(100, workgroup), (101, workgroup), (102, stack), (104, stripes)];
         Ok(Self { kernel: Kernel::new(gpu, effects, &numbers)?, workgroup })
     }
 

@@ -1,6 +1,6 @@
 //! `--scene`: filtered light is looked up along eye rays.
-use crate::composition::Parts;
 use crate::cli::origin::Origin;
+use crate::composition::Parts;
 use crate::error::{Error, Result};
 use crate::gpu::layout::{vec3, vec4};
 use crate::gpu::{Gpu, PassTime};
