@@ -6,7 +6,7 @@ use tallow::gpu::Gpu;
 use tallow::report::table;
 
 /// Samples per pixel, and the least of a pixel.
-const BUDGETS: [[u32; 2]; 2] = [[8, 1], [32, 4]];
+const BUDGETS: [[u32; 2]; 3] = [[8, 1], [16, 2], [32, 4]];
 const SEEDS: [u32; 3] = [0, 2, 3];
 /// Each seed six times: the shortest time counts.
 const RUNS: usize = 18;
