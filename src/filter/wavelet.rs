@@ -1,5 +1,9 @@
 //! Decimated wavelets whose details are dropped, as EAW is compared with: CDF(2,2) and red-black (Uytterhoeven and
 //! Bultheel 1998), and with edge-stopping weights their edge-avoiding forms (Fattal 2009). Kernel: `glsl/wavelet.comp`.
+//!
+//! Predictions are weighted means, and updates half of such means, as Fattal has them. The weights are EAW's, of guides too,
+//! not 1 / (|a - b|^alpha + eps) of the image alone; and on the way back, that of radiance compares with the smoothed
+//! neighbours, where Fattal keeps the weights of the way down.
 use super::edge::{Rates, edge_weight};
 use super::pack::{Pack, Packed};
 use super::{Filter, FilterInput, FilterSettings, Planes, Row, WaveletBasis};
