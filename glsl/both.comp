@@ -60,8 +60,8 @@ void main() {
         own[k] = moments(uint(i), mean[k]);
         s[k] = Surroundings(vec4(0.0), vec4(0.0), 0.0, 0.0, 0.0);
     }
-    for (int column = -1; column <= 1; column++) {
-        [[unroll]] for (int row = -1; row <= ROWS; row++) {
+    [[unroll]] for (int row = -1; row <= ROWS; row++) {
+        for (int column = -1; column <= 1; column++) {
             ivec2 at = ivec2(x + column, first + row), q = clamp(at, ivec2(0), size - 1);
             vec3 their_mean;
             vec4 m = moments(uint(q.y * size.x + q.x), their_mean);
