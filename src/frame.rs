@@ -7,7 +7,7 @@ use crate::scene::Scene;
 use crate::schedule::{Batch, Choice, PathRange, Plan};
 use crate::stage::apportion::{Apportion, Counts};
 use crate::stage::scan::Scan;
-use crate::stage::{batch, choose, fold, guide, path};
+use crate::stage::{batch, choose, fold, guide, path, thread_items};
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -292,7 +292,7 @@ impl FilmBuffers {
         Ok(Self {
             paths: Buffer::new(gpu, "paths", placed(paths) as usize, Location::Device)?,
             priority: Buffer::new(gpu, "priority", placed(pixels) as usize, Location::Device)?,
-            counts: Counts::new(gpu, placed(pixels))?,
+            counts: Counts::new(gpu, placed(pixels), thread_items(gpu, pixels))?,
             samples: Buffer::new(gpu, "samples", records, Location::Device)?,
             tiles: starts.map(tile).collect::<Result<_>>()?,
             counters: Buffer::from_slice(gpu, "counters", &[0; 6])?,

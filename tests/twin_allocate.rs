@@ -27,6 +27,7 @@ struct Bench {
     apportion: Apportion,
     scan: Scan,
     batch: Batches,
+    thread_items: u32,
 }
 
 impl Bench {
@@ -40,7 +41,7 @@ impl Bench {
         let apportion = Apportion::new(&gpu, thread_items).unwrap();
         let scan = Scan::new(&gpu, thread_items).unwrap();
         let batch = PerBlock::new(&gpu, thread_items).unwrap();
-        Self { gpu, apportion, scan, batch }
+        Self { gpu, apportion, scan, batch, thread_items }
     }
 
     fn stats(&self, have: &[u32]) -> Buffer<PixelStats> {
@@ -49,7 +50,7 @@ impl Bench {
     }
 
     fn counts(&self, priority: &[f32], have: &[u32], plan: &Plan) -> Counts {
-        let counts = Counts::new(&self.gpu, plan.pixels).unwrap();
+        let counts = Counts::new(&self.gpu, plan.pixels, self.thread_items).unwrap();
         let (priority, stats) = (Buffer::from_slice(&self.gpu, "priority", priority).unwrap(), self.stats(have));
         let mut frame = FrameResources::new(&self.gpu).unwrap();
         self.gpu
@@ -328,7 +329,7 @@ fn one_sample_or_none_agrees_with_its_reference() {
             .map(|(i, p)| if i % 3 == 0 { odd(i / 3) } else { p / 1100.0 })
             .collect();
         let on_device = Buffer::from_slice(&gpu, "priority", &priority).unwrap();
-        let counts = Counts::new(&gpu, size as u32).unwrap();
+        let counts = Counts::new(&gpu, size as u32, RUNS[0]).unwrap();
         for (round, threshold) in [(3, 1.0), (4, 0.25), (17, 0.0), (u32::MAX, 0.0)] {
             let choice = Choice { pixels: size as u32, round, threshold };
             gpu.run(&mut frame, |rec| choose::record(&choose, rec, &on_device, &counts, &choice, 7)).unwrap();

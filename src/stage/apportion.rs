@@ -2,7 +2,7 @@
 //! Kernels: `glsl/{weigh,total,deficit,need,quota,settle,digit,pick,ties,blocks,spread}.comp`. Twin:
 //! [`crate::reference::apportion`].
 use super::scan::Blocks;
-use super::{PerBlock, most_blocks};
+use super::{PerBlock, block_count};
 use crate::error::Result;
 use crate::gpu::layout::{ApportionPush, Apportionment, BlockSums, NONE, PixelStats, uvec2};
 use crate::gpu::{Buffer, Gpu, Location, Recorder};
@@ -32,12 +32,12 @@ impl Counts {
     /// Weight, count and offset.
     pub const BYTES_PER_PIXEL: usize = 16;
 
-    /// For a film of `pixels`.
+    /// For a film of `pixels`, and kernels whose threads have so many each.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when it does not fit.
-    pub fn new(gpu: &Gpu, pixels: u32) -> Result<Self> {
-        let (n, of_blocks) = (pixels as usize, most_blocks(pixels) as usize);
+    pub fn new(gpu: &Gpu, pixels: u32, thread_items: u32) -> Result<Self> {
+        let (n, of_blocks) = (pixels as usize, block_count(pixels, thread_items) as usize);
         Ok(Self {
             weight: Buffer::new(gpu, "weight", n, Location::Device)?,
             count: Buffer::new(gpu, "count", n, Location::Device)?,

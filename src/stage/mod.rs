@@ -78,7 +78,7 @@ pub struct PerBlock<B> {
 }
 
 impl<B: Bindings> PerBlock<B> {
-    /// Compiles the kernel for blocks of threads with so many pixels, at least 16: see [`thread_items`].
+    /// Compiles the kernel for blocks of threads with so many pixels: see [`thread_items`].
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when the driver refuses it.
@@ -107,23 +107,17 @@ impl<B: Bindings> PerBlock<B> {
 /// Of a [`PerBlock`] kernel.
 const BLOCK_THREADS: u32 = 64;
 
-fn block_count(pixels: u32, thread_items: u32) -> u32 {
+/// Blocks of a film.
+pub fn block_count(pixels: u32, thread_items: u32) -> u32 {
     pixels.div_ceil(BLOCK_THREADS * thread_items)
 }
-
-/// Blocks of a film at most: what they leave has room for so many.
-fn most_blocks(pixels: u32) -> u32 {
-    block_count(pixels, FEW)
-}
-
-/// Pixels of a thread, where threads are many and where they are few.
-const FEW: u32 = 16;
-const MANY: u32 = 64;
 
 /// Pixels that a thread of a [`PerBlock`] kernel walks over. Two cores are busy with few threads, and a long run spares
 /// barriers; a GPU hides the time that its memory takes behind other threads, of which it wants tens of thousands.
 pub fn thread_items(gpu: &Gpu, pixels: u32) -> u32 {
-    let fits = most_blocks(pixels) <= ROW;
+    const FEW: u32 = 16;
+    const MANY: u32 = 64;
+    let fits = block_count(pixels, FEW) <= ROW;
     if fits && gpu.info().kind != "CPU" { FEW } else { MANY }
 }
 

@@ -28,7 +28,7 @@ fn main() -> Result<()> {
     let stats = Buffer::from_slice(&gpu, "stats", &vec![PixelStats::default(); pixels as usize])?;
     let paths = Buffer::new(&gpu, "paths", pixels as usize, Location::Device)?;
     let items = thread_items(&gpu, pixels);
-    let counts = Counts::new(&gpu, pixels)?;
+    let counts = Counts::new(&gpu, pixels, items)?;
     let (apportion, scan) = (Apportion::new(&gpu, items)?, Scan::new(&gpu, items)?);
     let lists = PerBlock::new(&gpu, items)?;
     let mut frame = FrameResources::new(&gpu)?;
