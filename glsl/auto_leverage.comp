@@ -6,15 +6,15 @@
 #include "shared/luminance.glsl"
 #include "shared/probe.glsl"
 
-// What three filters keep of a pixel: its leverage, the diagonal of the matrix that a linear filter is, plus what the probe
+// What the candidates keep of a pixel: its leverage, the diagonal of the matrix that a linear filter is, plus what the probe
 // brings along from neighbours, which is 0 on average (Ramani, Blu, Unser 2008).
 layout(local_size_x = 64) in;
-layout(binding = 0) uniform samplerBuffer filtered_1; // of vec4
-layout(binding = 1) uniform samplerBuffer probed_1; // of vec4
-layout(binding = 2) uniform samplerBuffer filtered_2; // of vec4
-layout(binding = 3) uniform samplerBuffer probed_2; // of vec4
-layout(binding = 4) uniform samplerBuffer filtered_3; // of vec4
-layout(binding = 5) uniform samplerBuffer probed_3; // of vec4
+layout(binding = 0) uniform samplerBuffer wide; // of vec4, of the image
+layout(binding = 1) uniform samplerBuffer svgf; // of vec4, of the image
+layout(binding = 2) uniform samplerBuffer wide_kept; // of vec4, of the signs
+layout(binding = 3) uniform samplerBuffer mid_kept; // of vec4, of the signs
+layout(binding = 4) uniform samplerBuffer narrow_kept; // of vec4, of the signs
+layout(binding = 5) uniform samplerBuffer svgf_kept; // of vec4, of the probed image
 layout(scalar, binding = 6) writeonly buffer Output { vec4 leverages[]; };
 layout(scalar, push_constant) uniform Push { AutoPush push; };
 
@@ -22,8 +22,10 @@ void main() {
     uint i = thread_index();
     if (i >= push.count) return; // safe: no barrier() follows
     int at = int(i);
-    vec3 a = texelFetch(filtered_1, at).rgb, b = texelFetch(filtered_2, at).rgb, c = texelFetch(filtered_3, at).rgb;
-    vec3 grown = vec3(contrast(texelFetch(probed_1, at).rgb, a), contrast(texelFetch(probed_2, at).rgb, b),
-        contrast(texelFetch(probed_3, at).rgb, c));
-    leverages[i] = vec4(clamp(grown / probe(i, a, push.floor), -1.0, 1.0), 0.0);
+    vec3 kept = texelFetch(wide_kept, at).rgb, signs = signs_of(i) / 3.0;
+    float added = probe(i, texelFetch(wide, at).rgb, push.floor);
+    float grown = contrast(texelFetch(svgf_kept, at).rgb, texelFetch(svgf, at).rgb);
+    vec4 leverage = vec4(dot(kept, signs), dot(texelFetch(mid_kept, at).rgb, signs), dot(texelFetch(narrow_kept, at).rgb, signs),
+        grown / added);
+    leverages[i] = clamp(leverage, -1.0, 1.0);
 }

@@ -207,7 +207,8 @@ fn edges_of_the_geometry_hold() {
 }
 
 /// Of the planes above, only every 2nd or 4th pixel of every 2nd or 4th row has samples: every other takes the light of its own
-/// plane. Windows of `guided` that end before the first sample of the other plane know nothing of it: up to 3 of 49 extrapolate.
+/// plane. Windows of fits that end before the first sample of the other plane know nothing of it: up to 3 of 49 of `guided`'s and
+/// of 9 of `auto`'s narrow ones extrapolate.
 #[test]
 fn sub_sampled_images_are_in_painted() {
     let gpu = gpu();
@@ -220,11 +221,12 @@ fn sub_sampled_images_are_in_painted() {
             for output in [run(&gpu, row, &input, &narrow).unwrap().0, (row.reference)(&input, &narrow)] {
                 let off = |(i, c): (usize, &vec4)| (c[0] - if i % 64 < 30 { 0.0 } else { 4.0 }).abs();
                 let worst = output.iter().enumerate().map(off).fold(0.0, f32::max);
-                assert!(
-                    worst <= if ["guided", "auto"].contains(&row.name) { 4.0 * 3.0 / 49.0 } else { 0.0 },
-                    "{}: {worst}",
-                    row.name
-                );
+                let most = match row.name {
+                    "guided" => 4.0 * 3.0 / 49.0,
+                    "auto" => 4.0 * 3.0 / 9.0,
+                    _ => 0.0,
+                };
+                assert!(worst <= most, "{}: {worst}", row.name);
             }
         }
     }

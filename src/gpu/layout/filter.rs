@@ -95,7 +95,7 @@ gpu_structs! {
         factor: float,
     }
 
-    /// Push constants of `auto_probe.comp`, `auto_leverage.comp` and `auto_error.comp`.
+    /// Push constants of `auto_inputs.comp`, `auto_leverage.comp` and `auto_error.comp`.
     struct AutoPush {
         /// Pixels.
         count: uint,

@@ -1,0 +1,235 @@
+//! `auto` on the host: the twin of `glsl/auto*.comp`.
+use super::{SMOOTHING, alike, candidates, floor, least};
+use crate::filter::edge::{Rates, edge_weight};
+use crate::filter::estimate::{self, contrast, luminance};
+use crate::filter::pack::Packed;
+use crate::filter::{FilterInput, FilterSettings};
+use crate::gpu::layout::vec4;
+use crate::reference::sampler::pcg;
+use glam::{Vec3, Vec4, Vec4Swizzles};
+use std::array::from_fn;
+
+/// Times the light around: what of a pixel is above it is spread wide.
+const BRIGHT: f32 = 5.0;
+/// Samples whose own variance is trusted.
+const ENOUGH: f32 = 4.0;
+/// Leverage: beyond it, too little is left to judge by.
+const MOST: f32 = 0.9;
+/// Of what the leverage of a pixel of one sample is above that of the pixels around it: see `glsl/auto_error.comp`.
+const OWN: f32 = 0.3;
+/// Of luminance and its differences, so that their products are finite.
+const LIMIT: f32 = 1e9;
+/// Stands for an error that no candidate may be chosen with.
+const WORST: f32 = 1e24;
+/// Of the whole image's errors in those of a pixel, at most.
+const OVERALL: f32 = 0.6;
+/// Rounds of trades.
+const ROUNDS: u32 = 8;
+/// Of every square, added: weights that the estimates cannot tell apart become alike.
+const RIDGE: f32 = 0.01;
+
+/// What is blended: none, windows (wide, middle, narrow), svgf.
+const BLENDED: usize = 5;
+
+/// Of what left-out pixels are missed by: mean squares, and mean products of two.
+type Errors = [[f32; BLENDED]; BLENDED];
+
+/// The twin.
+pub fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
+    let (image, floor) = (Packed::reference(input), floor(settings));
+    let noise = estimate::reference(input, &image, settings);
+    let rows = candidates(settings);
+    let run = |k: usize, radiance: Vec<vec4>| -> Vec<Vec4> {
+        let (row, settings) = &rows[k];
+        let output = (row.reference)(&FilterInput { radiance, ..input.clone() }, settings);
+        output.into_iter().map(Vec4::from).collect()
+    };
+    let pixels = |colour: &dyn Fn(usize) -> Vec3| -> Vec<vec4> {
+        (0..image.len()).map(|i| colour(i).extend(image[i].count).into()).collect()
+    };
+    let wide = run(0, input.radiance.clone());
+    let dim = |i: usize| dimmed(image[i].colour, wide[i].xyz());
+    let added = |i: usize| probe(i, wide[i].xyz(), floor);
+    let [middle, svgf] = [1, 3].map(|k| run(k, input.radiance.clone()));
+    let [wide_dim, narrow] = [0, 2].map(|k| run(k, pixels(&dim)));
+    let kept = [0, 1, 2].map(|k| run(k, pixels(&signs)));
+    let svgf_kept = run(3, pixels(&|i| image[i].colour + added(i)));
+
+    let leverage = |i: usize| {
+        let [a, b, c] = kept.each_ref().map(|kept| kept[i].xyz().dot(signs(i) / 3.0));
+        let grown = contrast(svgf_kept[i].xyz(), svgf[i].xyz()) / added(i);
+        Vec4::new(a, b, c, grown).clamp(Vec4::splat(-1.0), Vec4::ONE)
+    };
+    let leverages: Vec<Vec4> = (0..image.len()).map(leverage).collect();
+    let rates = Rates::of_surfaces(&alike(settings));
+    let size = [input.width, input.height].map(i64::from);
+    let smoothed = |plane: Vec<Vec4>, across: bool| {
+        let level =
+            |plane: Vec<Vec4>, level: u32| smooth(&plane, &image, size, 1i64 << level, &rates, least(level, across));
+        (0..SMOOTHING).fold(plane, level)
+    };
+    let surroundings = smoothed(leverages.clone(), false);
+
+    // As they are blended.
+    let filtered = |i: usize| {
+        let [a, b, n, a_dim, d] = [&wide, &middle, &narrow, &wide_dim, &svgf].map(|plane| plane[i].xyz());
+        let as_light = |fitted: Vec3| fitted.max(a.min(Vec3::ZERO));
+        [image[i].colour, a, as_light(b), as_light(n + (a - a_dim)), d]
+    };
+    let missed = |i: usize| {
+        let (own, around) = (leverages[i], surroundings[i]);
+        let trust = OWN / image[i].count.max(1.0).sqrt();
+        let left = 1.0 - (around + trust * (own - around).max(Vec4::ZERO)).clamp(Vec4::ZERO, Vec4::splat(MOST));
+        let scaled = |a: Vec3, b: Vec3| (contrast(a, b) / floor).clamp(-LIMIT, LIMIT);
+        let (pixel, dim) = (image[i].colour, dim(i));
+        let [a, b, n, a_dim, d] = [&wide, &middle, &narrow, &wide_dim, &svgf].map(|plane| plane[i].xyz());
+        let mut missed = Vec4::new(scaled(a, pixel), scaled(b, pixel), scaled(n, dim), scaled(d, pixel)) / left;
+        missed.z += scaled(a - a_dim, pixel - dim) / left.x;
+        let light = scaled(filtered(i)[1..].iter().sum::<Vec3>() / 4.0, Vec3::ZERO).powi(2) + 1.0;
+        (missed, light, if image[i].count > 0.0 { light.powf(-0.55) } else { 0.0 })
+    };
+    // Squares of the filters; their products; the rest of those, the square of none, and the light itself.
+    let errors = |i: usize| {
+        let (m, light, weight) = missed(i);
+        let unfiltered = 2.0 * (noise[i].max(0.0).sqrt() / floor).min(LIMIT).powi(2);
+        let others = weight * Vec4::new(m.y * m.w, m.z * m.w, unfiltered, light);
+        [weight * m * m, weight * m.xxxy() * m.yzwz(), others]
+    };
+    let planes: [Vec<Vec4>; 3] = from_fn(|k| (0..image.len()).map(|i| errors(i)[k]).collect());
+    let sums: [Vec4; 3] = from_fn(|k| planes[k].iter().map(|e| e.as_dvec4()).sum::<glam::DVec4>().as_vec4());
+    let planes = planes.map(|plane| smoothed(plane, true));
+    let expected = |i: usize| -> [Vec4; 3] {
+        let (light, lights) = (planes[2][i].w.max(1.0), sums[2].w.max(1.0));
+        let noisy = 0.5 * planes[2][i].z / light;
+        from_fn(|k| (planes[k][i] / light).lerp(sums[k] / lights, OVERALL * noisy / (1.0 + noisy)))
+    };
+    let known = [&wide, &middle, &narrow, &svgf];
+    let blended = |i: usize| {
+        let usable = known.map(|plane| plane[i].w > 0.0);
+        blend(&image[i], &matrix(expected(i)), usable, filtered(i))
+    };
+    (0..image.len()).map(blended).collect()
+}
+
+/// As `glsl/shared/candidates.glsl`.
+fn dimmed(colour: Vec3, around: Vec3) -> Vec3 {
+    let (bright, most) = (luminance(colour), BRIGHT * luminance(around).max(0.0));
+    if bright > most { colour * (most / bright) } else { colour }
+}
+
+/// As `glsl/shared/probe.glsl`.
+fn signs(pixel: usize) -> Vec3 {
+    let bits = pcg(pixel as u32);
+    Vec3::from_array([31, 30, 29].map(|bit| 1.0 - 2.0 * (bits >> bit & 1) as f32))
+}
+
+fn probe(pixel: usize, around: Vec3, least: f32) -> f32 {
+    signs(pixel).x * 0.02 * (contrast(around, Vec3::ZERO).abs() + least)
+}
+
+/// An independent copy of the pixel misses it by both copies' noise, and has the pixel's in common with what a filter misses.
+fn matrix([squares, products, others]: [Vec4; 3]) -> Errors {
+    let noise = 0.5 * others.z;
+    [
+        [others.z, noise, noise, noise, noise],
+        [noise, squares.x, products.x, products.y, products.z],
+        [noise, products.x, squares.y, products.w, others.x],
+        [noise, products.y, products.w, squares.z, others.y],
+        [noise, products.z, others.x, others.y, squares.w],
+    ]
+}
+
+fn smooth(
+    estimates: &[Vec4],
+    image: &[Packed],
+    [width, height]: [i64; 2],
+    spacing: i64,
+    rates: &Rates,
+    least: f32,
+) -> Vec<Vec4> {
+    const B3: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
+    let pixel = |at: i64| {
+        let (mut sum, mut total) = (Vec4::ZERO, 0.0);
+        for (i, j) in (-2..=2i64).flat_map(|j| (-2..=2i64).map(move |i| (i, j))) {
+            let u = (at % width + i * spacing).clamp(0, width - 1);
+            let v = (at / width + j * spacing).clamp(0, height - 1);
+            let (p, q) = (&image[at as usize], &image[(v * width + u) as usize]);
+            let w = B3[i.unsigned_abs() as usize] * B3[j.unsigned_abs() as usize];
+            let w = if q.count > 0.0 { w * edge_weight(q, rates.exponent(p, q)).max(least) } else { 0.0 };
+            sum += w * estimates[(v * width + u) as usize];
+            total += w;
+        }
+        if total > 0.0 { sum / total } else { Vec4::ZERO }
+    };
+    (0..width * height).map(pixel).collect()
+}
+
+fn blend(p: &Packed, errors: &Errors, [wide, middle, narrow, svgf]: [bool; 4], filtered: [Vec3; BLENDED]) -> vec4 {
+    let (known, enough) = (p.count > 0.0, p.count >= ENOUGH);
+    let usable = [enough, wide, middle, narrow, enough && svgf];
+    let adrift = wide && !known && p.normal == Vec3::ZERO;
+    let w = if adrift { [0.0, 1.0, 0.0, 0.0, 0.0] } else { least_square(errors, usable) };
+    let base = if known { p.colour } else { filtered[1] };
+    let off: Vec3 = (1..BLENDED).map(|k| w[k] * (filtered[k] - base)).sum();
+    let count = if known { p.count } else { 1.0 };
+    if usable.contains(&true) { (base + off).extend(count).into() } else { [0.0; 4] }
+}
+
+/// Weights of at least 0, together 1, whose blend has the least mean square; those that are not usable get none.
+fn least_square(errors: &Errors, usable: [bool; BLENDED]) -> [f32; BLENDED] {
+    let squares: [f32; BLENDED] = from_fn(|k| if usable[k] { errors[k][k].min(WORST) } else { WORST });
+    let best = (0..BLENDED).filter(|k| usable[*k]).min_by(|a, b| squares[*a].total_cmp(&squares[*b])).unwrap_or(1);
+    let mut missed = *errors;
+    (0..BLENDED).for_each(|k| missed[k][k] *= 1.0 + RIDGE);
+    let mut w: [f32; BLENDED] = from_fn(|k| if k == best { 1.0 } else { 0.0 });
+    for _ in 0..ROUNDS {
+        for (j, k) in (0..BLENDED).flat_map(|j| (j + 1..BLENDED).map(move |k| (j, k))) {
+            let bend = missed[j][j] + missed[k][k] - 2.0 * missed[j][k];
+            let gain: f32 = (0..BLENDED).map(|m| (missed[k][m] - missed[j][m]) * w[m]).sum();
+            if bend > 0.0 && usable[j] && usable[k] {
+                let moved = (gain / bend).clamp(-w[j], w[k]);
+                w[j] += moved;
+                w[k] -= moved;
+            }
+        }
+    }
+    w
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Errors, RIDGE, least_square};
+
+    #[test]
+    fn independent_errors_share_weight_by_their_inverses() {
+        // Noise 1: what misses a left-out pixel has it in its square and in every product; the image itself has error 1.
+        // Filters of error 1, 1/2, 1/4 and 1/8, on top of which comes the ridge.
+        let squares = [2.0, 2.0, 1.5, 1.25, 1.125];
+        let mut errors: Errors = [[1.0; 5]; 5];
+        (0..5).for_each(|k| errors[k][k] = squares[k]);
+        let inverse = squares.map(|square| 1.0 / (square - 1.0 + RIDGE * square));
+        let (found, all) = (least_square(&errors, [true; 5]), inverse.iter().sum::<f32>());
+        assert!(found.iter().zip(inverse).all(|(w, inverse)| (w - inverse / all).abs() < 2e-3), "{found:?}");
+        assert!((found.iter().sum::<f32>() - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn what_only_adds_error_gets_next_to_none() {
+        // The second misses by what the first does and something of its own; none of the others can be used.
+        let two = |squares: [f32; 2], product: f32| {
+            let mut errors: Errors = [[0.0; 5]; 5];
+            (errors[1][1], errors[2][2]) = (squares[0], squares[1]);
+            (errors[1][2], errors[2][1]) = (product, product);
+            least_square(&errors, [false, true, true, false, false])
+        };
+        let found = two([1.5, 2.5], 1.5);
+        // The ridge of .01 * 1.5 over what the squares differ by, 1.04 with ridges.
+        let off = [0.0, 1.0 - 0.015 / 1.04, 0.015 / 1.04, 0.0, 0.0];
+        assert!(found.iter().zip(off).all(|(w, right)| (w - right).abs() < 1e-5), "{found:?}");
+        // Weights are not below 0: the second alone would be subtracted from.
+        assert_eq!(two([1.5, 2.5], 2.0), [0.0, 1.0, 0.0, 0.0, 0.0]);
+        // The same twice: the ridge makes them alike.
+        let twice = two([2.0, 2.0], 2.0);
+        assert!(twice.iter().zip([0.0, 0.5, 0.5, 0.0, 0.0]).all(|(w, right)| (w - right).abs() < 1e-5), "{twice:?}");
+    }
+}
