@@ -27,7 +27,7 @@ layout(binding = 12) uniform samplerBuffer svgf; // of vec4
 layout(scalar, binding = 13) writeonly buffer Output { vec4 filtered[]; };
 layout(scalar, push_constant) uniform Push { PackPush push; };
 
-const uint ROUNDS = 8u;     // of trades
+const uint ROUNDS = 4u;     // of trades
 const float RIDGE = 0.01;   // of every square, added: weights that the estimates cannot tell apart become alike
 const float ENOUGH = 4.0;   // samples whose own variance is trusted
 // Of the whole image's errors in those of a pixel, at most. What its surroundings tell is uncertain where few pixels have
@@ -69,15 +69,20 @@ void main() {
         }
         missed[k][k] *= 1.0 + RIDGE;
     }
-    [[unroll]] for (int k = 0; k < 5; k++) w[k] = k == best ? 1.0 : 0.0;
+    // Half of what the blend's mean square grows by with each weight.
+    float growth[5];
+    [[unroll]] for (int k = 0; k < 5; k++) {
+        w[k] = k == best ? 1.0 : 0.0;
+        [[unroll]] for (int m = 0; m < 5; m++) if (k == best) growth[m] = missed[m][k];
+    }
     for (uint round = 0u; round < ROUNDS; round++) {
         [[unroll]] for (int j = 0; j < 4; j++) {
             [[unroll]] for (int k = j + 1; k < 5; k++) {
-                float bend = missed[j][j] + missed[k][k] - 2.0 * missed[j][k], gain = 0.0;
-                [[unroll]] for (int m = 0; m < 5; m++) gain += (missed[k][m] - missed[j][m]) * w[m];
+                float bend = missed[j][j] + missed[k][k] - 2.0 * missed[j][k], gain = growth[k] - growth[j];
                 float moved = bend > 0.0 && usable[j] && usable[k] ? clamp(gain / bend, -w[j], w[k]) : 0.0;
                 w[j] += moved;
                 w[k] -= moved;
+                [[unroll]] for (int m = 0; m < 5; m++) growth[m] += moved * (missed[m][j] - missed[m][k]);
             }
         }
     }

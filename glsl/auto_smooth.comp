@@ -5,16 +5,21 @@
 #include "layout.glsl"
 #include "shared/edge.glsl"
 
-// One level of A-Trous smoothing of estimates, which are right on average only: among alike surfaces, and across others as
-// far as they count at least.
+// One level of A-Trous smoothing of estimates, one plane or three, which are right on average only: among alike surfaces, and
+// across others as far as they count at least.
 // Unknown pixels have nothing to estimate; they take their neighbours'.
 layout(local_size_x = 32) in;
-layout(binding = 0) uniform samplerBuffer estimates; // of vec4
-layout(binding = 1) uniform samplerBuffer colour; // of vec4
-layout(binding = 2) uniform usamplerBuffer place; // of uvec4
-layout(scalar, binding = 3) writeonly buffer Output { vec4 smoothed[]; };
+layout(binding = 0) uniform samplerBuffer colour; // of vec4
+layout(binding = 1) uniform usamplerBuffer place; // of uvec4
+layout(binding = 2) uniform samplerBuffer first; // of vec4
+layout(binding = 3) uniform samplerBuffer second; // of vec4
+layout(binding = 4) uniform samplerBuffer third; // of vec4
+layout(scalar, binding = 5) writeonly buffer First { vec4 first_smoothed[]; };
+layout(scalar, binding = 6) writeonly buffer Second { vec4 second_smoothed[]; };
+layout(scalar, binding = 7) writeonly buffer Third { vec4 third_smoothed[]; };
 layout(scalar, push_constant) uniform Push { AutoSmoothPush push; };
 
+layout(constant_id = 114) const bool THREE = true; // false: the first plane alone
 const float B3[3] = float[](3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0); // by |offset|
 
 Pixel pixel_at(int at) {
@@ -25,19 +30,30 @@ void main() {
     ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(at, size))) return; // safe: no barrier() follows
     Pixel p = pixel_at(at.y * size.x + at.x);
-    vec4 sum = vec4(0.0);
+    vec4 sum_1 = vec4(0.0), sum_2 = vec4(0.0), sum_3 = vec4(0.0);
     float total = 0.0;
     // Tested at its end: see shared/traverse.glsl.
     int j = -2;
     do {
         [[unroll]] for (int i = -2; i <= 2; i++) {
             ivec2 tap = clamp(at + int(push.spacing) * ivec2(i, j), ivec2(0), size - 1); // borders repeat
-            Pixel q = pixel_at(tap.y * size.x + tap.x);
+            int there = tap.y * size.x + tap.x;
+            Pixel q = pixel_at(there);
             float alike = edge_weight(q, edge_exponent(p, q, push.rates));
             float w = B3[abs(i)] * B3[abs(j)] * (q.colour.w > 0.0 ? max(alike, push.least) : 0.0);
-            sum += w * texelFetch(estimates, tap.y * size.x + tap.x);
+            sum_1 += w * texelFetch(first, there);
+            if (THREE) {
+                sum_2 += w * texelFetch(second, there);
+                sum_3 += w * texelFetch(third, there);
+            }
             total += w;
         }
     } while (++j <= 2);
-    smoothed[at.y * size.x + at.x] = total > 0.0 ? sum / total : vec4(0.0);
+    int here = at.y * size.x + at.x;
+    float share = total > 0.0 ? 1.0 / total : 0.0;
+    first_smoothed[here] = share * sum_1;
+    if (THREE) {
+        second_smoothed[here] = share * sum_2;
+        third_smoothed[here] = share * sum_3;
+    }
 }

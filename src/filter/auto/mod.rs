@@ -20,7 +20,7 @@ pub const ROW: Row = Row {
     reference: reference::reference,
 };
 
-/// Levels of smoothing of what is estimated, a footprint of 61 pixels. Even: see `Auto::smooth`.
+/// Levels of smoothing of what is estimated, a footprint of 61 pixels. Even: see `Auto::record_smoothing`.
 const SMOOTHING: u32 = 4;
 /// How much the errors of one surface count for another, to the power of the level: neighbours fully, far pixels hardly. Where
 /// surfaces are small, as in grass, others are all there is to learn from, and few pixels seem to prove filters that keep much.
@@ -89,7 +89,8 @@ struct Auto {
     leverage: Kernel<auto_leverage::Bind<'static>>,
     error: Kernel<auto_error::Bind<'static>>,
     sum: Kernel<auto_sum::Bind<'static>>,
-    smooth: Kernel<auto_smooth::Bind<'static>>,
+    /// Of leverages, and of errors.
+    smooth: [Kernel<auto_smooth::Bind<'static>>; 2],
     blend: Kernel<auto::Bind<'static>>,
     /// Wide, middle and narrow windows, svgf.
     candidates: [Candidate; 4],
@@ -105,8 +106,6 @@ struct Auto {
     errors: [Buffer<vec4>; 3],
     /// Over groups of pixels, in turn.
     sums: [[Buffer<vec4>; 3]; 2],
-    /// Between two levels of smoothing.
-    between: Buffer<vec4>,
     settings: FilterSettings,
 }
 
@@ -122,13 +121,18 @@ impl Auto {
         let [wide, middle, narrow, svgf] = candidates(settings).map(candidate);
         let sum = || Buffer::new(gpu, "sums of errors", pixels.div_ceil(SUMMED).max(1), Location::Device);
         let effects = Effects::default();
+        let smooth = |three| {
+            let mut constants = Rates::of_surfaces(&alike(settings)).constants();
+            constants.push((114, three));
+            Kernel::new(gpu, &effects, &constants)
+        };
         Ok(Self {
             estimate: Estimate::new(gpu, settings, size)?,
             inputs: Kernel::new(gpu, &effects, &[])?,
             leverage: Kernel::new(gpu, &effects, &[])?,
             error: Kernel::new(gpu, &effects, &[])?,
             sum: Kernel::new(gpu, &effects, &[])?,
-            smooth: Kernel::new(gpu, &effects, &Rates::of_surfaces(&alike(settings)).constants())?,
+            smooth: [smooth(0)?, smooth(1)?],
             blend: Kernel::new(gpu, &effects, &[])?,
             candidates: [wide?, middle?, narrow?, svgf?],
             dim: plane("dim")?,
@@ -139,7 +143,6 @@ impl Auto {
             surroundings: plane("smoothed leverages")?,
             errors: [plane("squared errors")?, plane("products of errors")?, plane("other errors")?],
             sums: [[sum()?, sum()?, sum()?], [sum()?, sum()?, sum()?]],
-            between: plane("between levels")?,
             settings: *settings,
             pack,
         })
@@ -211,19 +214,39 @@ impl Auto {
         Ok(from)
     }
 
-    /// One plane\[P\] -> another, or the same; `across` surfaces, or within alike ones.
-    fn smooth(&self, rec: &mut Recorder, planes: &Planes, [from, to]: [&Buffer<vec4>; 2], across: bool) -> Result<()> {
+    /// Planes\[P\] -> others, or the same, which lie in `between` after every other level; `across` surfaces, or within alike
+    /// ones. One plane comes thrice.
+    fn record_smoothing<'a>(
+        &'a self,
+        rec: &mut Recorder,
+        planes: &Planes,
+        [from, to]: [[&'a Buffer<vec4>; 3]; 2],
+        across: bool,
+    ) -> Result<()> {
         let [width, height] = planes.size;
         let rates = Rates::of_surfaces(&alike(&self.settings)).as_array();
+        // What the candidates made of the probes is not needed any more.
+        let between = [0, 1, 2].map(|k| &self.candidates[k].kept);
+        let smooth = &self.smooth[usize::from(across)];
         (0..SMOOTHING).try_for_each(|level| {
-            let (estimates, smoothed) = match level {
-                0 => (from, &self.between),
-                level if level % 2 == 0 => (to, &self.between),
-                _ => (&self.between, to),
+            let ([first, second, third], [first_smoothed, second_smoothed, third_smoothed]) = match level {
+                0 => (from, between),
+                level if level % 2 == 0 => (to, between),
+                _ => (between, to),
             };
-            let bind = auto_smooth::Bind { estimates, colour: &self.pack.colour, place: &self.pack.place, smoothed };
+            let (colour, place) = (&self.pack.colour, &self.pack.place);
+            let bind = auto_smooth::Bind {
+                colour,
+                place,
+                first,
+                second,
+                third,
+                first_smoothed,
+                second_smoothed,
+                third_smoothed,
+            };
             let push = AutoSmoothPush { size: planes.size, spacing: 1 << level, rates, least: least(level, across) };
-            rec.dispatch(&self.smooth, bind, &push, [width.div_ceil(32), height, 1])
+            rec.dispatch(smooth, bind, &push, [width.div_ceil(32), height, 1])
         })
     }
 }
@@ -233,12 +256,10 @@ impl Filter for Auto {
         self.pack.record(rec, planes)?;
         self.estimate.record(rec, planes, &self.pack, &self.settings)?;
         self.record_candidates(rec, planes)?;
-        self.smooth(rec, planes, [&self.leverages, &self.surroundings], false)?;
+        self.record_smoothing(rec, planes, [[&self.leverages; 3], [&self.surroundings; 3]], false)?;
         self.record_errors(rec, planes)?;
         let [square_sum, product_sum, other_sum] = self.record_sums(rec, planes)?;
-        for plane in &self.errors {
-            self.smooth(rec, planes, [plane, plane], true)?;
-        }
+        self.record_smoothing(rec, planes, [self.errors.each_ref(); 2], true)?;
         let [squares, products, others] = &self.errors;
         let [wide, mid, narrow, svgf] = self.candidates.each_ref().map(|c| &c.result);
         let bind = auto::Bind {
