@@ -299,6 +299,37 @@ fn auto_changes_from_filter_to_filter_without_a_seam() {
     assert_silent(&gpu);
 }
 
+/// On a floor lit by 1, a patch whose light rises with the tilt of its normals, by 20 from 0 at a tilt of .1. At -.4 a fit in the
+/// patch foretells less than 0, by a slope that `eps` makes smaller in narrow windows and next to none in wide ones: light is not
+/// below 0.
+#[test]
+fn auto_makes_no_negative_light() {
+    const EDGE: usize = 72;
+    let gpu = gpu();
+    let mut input = constant(EDGE as u32, EDGE as u32, 1.0);
+    let tilted = |tilt: f32| Guide { normal: [tilt, 0.0, (1.0 - tilt * tilt).sqrt()], depth: 5.0, ..Guide::default() };
+    for (i, (c, g)) in input.radiance.iter_mut().zip(&mut input.guide).enumerate() {
+        let tilt = 0.1 + 0.3 * (hash(i as u32) as f32 / u32::MAX as f32);
+        let patch = [i % EDGE, i / EDGE].iter().all(|at| (16..56).contains(at));
+        (*c, *g) = if patch { ([20.0 * (tilt - 0.1); 4], tilted(tilt)) } else { ([1.0; 4], tilted(0.0)) };
+        c[3] = 16.0;
+    }
+    // Noise that lets all pixels' errors count, of more pixels than one workgroup adds up.
+    input.variance = Some(vec![[0.5; 3]; EDGE * EDGE]);
+    let beyond = EDGE / 2 * EDGE + EDGE / 2;
+    input.guide[beyond] = tilted(-0.4);
+    input.radiance[beyond] = [0.0; 4];
+    let settings = FilterSettings::default().scaled_to(&input);
+    let narrow = FilterSettings { radius: 4, eps: [1e-3; 4], ..settings };
+    assert!((find("guided").unwrap().reference)(&input, &narrow)[beyond][0] < -1.0, "control: a fit goes below");
+    let auto = find("auto").unwrap();
+    let (output, reference) = (run(&gpu, auto, &input, &settings).unwrap().0, (auto.reference)(&input, &settings));
+    assert!(output.iter().chain(&reference).all(|c| c[0] >= 0.0), "{:?}", output[beyond]);
+    let apart = output.iter().zip(&reference).map(|(a, b)| (a[0] - b[0]).abs()).fold(0.0, f32::max);
+    assert!(apart < 1e-4, "{apart}");
+    assert_silent(&gpu);
+}
+
 fn mean(pixels: &[vec4]) -> f64 {
     pixels.iter().map(|c| f64::from(c[0] + c[1] + c[2])).sum::<f64>() / pixels.len() as f64
 }

@@ -94,16 +94,14 @@ struct Auto {
     blend: Kernel<auto::Bind<'static>>,
     /// Wide, middle and narrow windows, svgf.
     candidates: [Candidate; 4],
-    /// The image, less what the narrow window does not get, and what the wide one makes of it.
-    dim: Buffer<vec4>,
+    /// What candidates are run on besides the image: see `glsl/auto_inputs.comp`. Then squares and products of what is missed:
+    /// see `glsl/auto_error.comp`.
+    planes: [Buffer<vec4>; 3],
+    /// What the wide window makes of what the narrow one gets.
     wide_dim: Buffer<vec4>,
-    signs: Buffer<vec4>,
-    probed: Buffer<vec4>,
     leverages: Buffer<vec4>,
     /// Leverages, smoothed.
     surroundings: Buffer<vec4>,
-    /// Squares and products of what is missed: see `glsl/auto_error.comp`.
-    errors: [Buffer<vec4>; 3],
     /// Over groups of pixels, in turn.
     sums: [[Buffer<vec4>; 3]; 2],
     settings: FilterSettings,
@@ -135,13 +133,14 @@ impl Auto {
             smooth: [smooth(0)?, smooth(1)?],
             blend: Kernel::new(gpu, &effects, &[])?,
             candidates: [wide?, middle?, narrow?, svgf?],
-            dim: plane("dim")?,
+            planes: [
+                plane("dim, squared errors")?,
+                plane("signs, products of errors")?,
+                plane("probed, other errors")?,
+            ],
             wide_dim: plane("wide, dim")?,
-            signs: plane("signs")?,
-            probed: plane("probed")?,
             leverages: plane("leverages")?,
             surroundings: plane("smoothed leverages")?,
-            errors: [plane("squared errors")?, plane("products of errors")?, plane("other errors")?],
             sums: [[sum()?, sum()?, sum()?], [sum()?, sum()?, sum()?]],
             settings: *settings,
             pack,
@@ -151,12 +150,12 @@ impl Auto {
     /// What every candidate makes of the image, and how much of it each keeps.
     fn record_candidates(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
         let [wide, middle, narrow, svgf] = &self.candidates;
-        let (count, Self { dim, wide_dim, signs, probed, .. }) = (planes.pixels(), self);
+        let ([dim, signs, probed], count) = (&self.planes, planes.pixels());
         wide.record(rec, planes, &planes.radiance, &wide.result)?;
         let push = AutoPush { count, floor: floor(&self.settings) };
         let bind = auto_inputs::Bind { colour: &self.pack.colour, wide: &wide.result, dim, signs, probed };
         rec.dispatch(&self.inputs, bind, &push, groups(count, 64))?;
-        wide.record(rec, planes, dim, wide_dim)?;
+        wide.record(rec, planes, dim, &self.wide_dim)?;
         middle.record(rec, planes, &planes.radiance, &middle.result)?;
         narrow.record(rec, planes, dim, &narrow.result)?;
         svgf.record(rec, planes, &planes.radiance, &svgf.result)?;
@@ -178,7 +177,7 @@ impl Auto {
 
     fn record_errors(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
         let [wide, mid, narrow, svgf] = self.candidates.each_ref().map(|c| &c.result);
-        let [squares, products, others] = &self.errors;
+        let [squares, products, others] = &self.planes;
         let bind = auto_error::Bind {
             estimate: &self.estimate.plane,
             colour: &self.pack.colour,
@@ -200,7 +199,7 @@ impl Auto {
 
     /// Errors of all pixels -> their sums, which lie first in what is returned.
     fn record_sums(&self, rec: &mut Recorder, planes: &Planes) -> Result<&[Buffer<vec4>; 3]> {
-        let (mut from, mut count) = (&self.errors, planes.pixels());
+        let (mut from, mut count) = (&self.planes, planes.pixels());
         for to in self.sums.iter().cycle() {
             let ([squares, products, others], [square_sums, product_sums, other_sums]) = (from, to);
             let bind = auto_sum::Bind { squares, products, others, square_sums, product_sums, other_sums };
@@ -259,8 +258,8 @@ impl Filter for Auto {
         self.record_smoothing(rec, planes, [[&self.leverages; 3], [&self.surroundings; 3]], false)?;
         self.record_errors(rec, planes)?;
         let [square_sum, product_sum, other_sum] = self.record_sums(rec, planes)?;
-        self.record_smoothing(rec, planes, [self.errors.each_ref(); 2], true)?;
-        let [squares, products, others] = &self.errors;
+        self.record_smoothing(rec, planes, [self.planes.each_ref(); 2], true)?;
+        let [squares, products, others] = &self.planes;
         let [wide, mid, narrow, svgf] = self.candidates.each_ref().map(|c| &c.result);
         let bind = auto::Bind {
             squares,
