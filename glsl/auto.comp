@@ -76,8 +76,10 @@ void main() {
         [[unroll]] for (int m = 0; m < 5; m++) if (k == best) growth[m] = missed[m][k];
     }
     for (uint round = 0u; round < ROUNDS; round++) {
-        [[unroll]] for (int j = 0; j < 4; j++) {
-            [[unroll]] for (int k = j + 1; k < 5; k++) {
+        // Bounds that do not depend on each other: only loops of those are unrolled, and arrays kept in registers.
+        [[unroll]] for (int j = 0; j < 5; j++) {
+            [[unroll]] for (int k = 0; k < 5; k++) {
+                if (j >= k) continue;
                 float bend = missed[j][j] + missed[k][k] - 2.0 * missed[j][k], gain = growth[k] - growth[j];
                 float moved = bend > 0.0 && usable[j] && usable[k] ? clamp(gain / bend, -w[j], w[k]) : 0.0;
                 w[j] += moved;
