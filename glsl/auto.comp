@@ -30,6 +30,7 @@ layout(scalar, push_constant) uniform Push { PackPush push; };
 const uint ROUNDS = 4u;     // of trades
 const float RIDGE = 0.01;   // of every square, added: weights that the estimates cannot tell apart become alike
 const float ENOUGH = 4.0;   // samples whose own variance is trusted
+const float WORST = 1e24;   // above every error
 // Of the whole image's errors in those of a pixel, at most. What its surroundings tell is uncertain where few pixels have
 // seen light, and what is good elsewhere is rarely bad here.
 const float OVERALL = 0.6;

@@ -9,7 +9,7 @@ use crate::shaders::estimate::Bind;
 use glam::Vec3;
 
 /// Samples whose own variance is trusted.
-const ENOUGH: f32 = 4.0;
+pub const ENOUGH: f32 = 4.0;
 /// Pixels from the centre to the border of the window over which the others' is taken.
 const REACH: i64 = 3;
 /// Differences are cut there, so that their squares are finite.

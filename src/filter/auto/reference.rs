@@ -1,26 +1,22 @@
 //! `auto` on the host: the twin of `glsl/auto*.comp`.
 use super::{SMOOTHING, alike, candidates, floor, least};
 use crate::filter::edge::{Rates, edge_weight};
-use crate::filter::estimate::{self, contrast, luminance};
+use crate::filter::estimate::{self, ENOUGH, contrast, luminance};
 use crate::filter::pack::Packed;
 use crate::filter::{FilterInput, FilterSettings};
 use crate::gpu::layout::vec4;
 use crate::reference::sampler::pcg;
-use glam::{Vec3, Vec4, Vec4Swizzles};
+use glam::{DVec4, Vec3, Vec4, Vec4Swizzles};
 use std::array::from_fn;
 
 /// Times the light around: what of a pixel is above it is spread wide.
 const BRIGHT: f32 = 5.0;
-/// Samples whose own variance is trusted.
-const ENOUGH: f32 = 4.0;
 /// Leverage: beyond it, too little is left to judge by.
 const MOST: f32 = 0.9;
 /// Of what the leverage of a pixel of one sample is above that of the pixels around it: see `glsl/auto_error.comp`.
 const OWN: f32 = 0.3;
 /// Of luminance and its differences, so that their products are finite.
 const LIMIT: f32 = 1e9;
-/// Stands for an error that no candidate may be chosen with.
-const WORST: f32 = 1e24;
 /// Of the whole image's errors in those of a pixel, at most.
 const OVERALL: f32 = 0.6;
 /// Rounds of trades.
@@ -34,33 +30,65 @@ const BLENDED: usize = 5;
 /// Of what left-out pixels are missed by: mean squares, and mean products of two.
 type Errors = [[f32; BLENDED]; BLENDED];
 
+/// What the candidates make of an image, and how much each keeps of its pixels.
+struct Results {
+    wide: Vec<Vec4>,
+    middle: Vec<Vec4>,
+    narrow: Vec<Vec4>,
+    wide_dim: Vec<Vec4>,
+    svgf: Vec<Vec4>,
+    leverages: Vec<Vec4>,
+}
+
+impl Results {
+    fn new(input: &FilterInput, image: &[Packed], settings: &FilterSettings) -> Self {
+        let rows = candidates(settings);
+        let run = |k: usize, radiance: Vec<vec4>| -> Vec<Vec4> {
+            let (row, settings) = &rows[k];
+            let output = (row.reference)(&FilterInput { radiance, ..input.clone() }, settings);
+            output.into_iter().map(Vec4::from).collect()
+        };
+        let pixels = |colour: &dyn Fn(usize) -> Vec3| -> Vec<vec4> {
+            (0..image.len()).map(|i| colour(i).extend(image[i].count).into()).collect()
+        };
+        let [wide, middle, svgf] = [0, 1, 3].map(|k| run(k, input.radiance.clone()));
+        let dim = |i: usize| dimmed(image[i].colour, wide[i].xyz());
+        let [wide_dim, narrow] = [0, 2].map(|k| run(k, pixels(&dim)));
+        let added = |i: usize| probe(i, wide[i].xyz(), floor(settings));
+        let kept = [0, 1, 2].map(|k| run(k, pixels(&signs)));
+        let svgf_kept = run(3, pixels(&|i| image[i].colour + added(i)));
+        let leverage = |i: usize| {
+            let [a, b, c] = kept.each_ref().map(|kept| kept[i].xyz().dot(signs(i) / 3.0));
+            let grown = contrast(svgf_kept[i].xyz(), svgf[i].xyz()) / added(i);
+            Vec4::new(a, b, c, grown).clamp(Vec4::splat(-1.0), Vec4::ONE)
+        };
+        let leverages = (0..image.len()).map(leverage).collect();
+        Self { wide, middle, narrow, wide_dim, svgf, leverages }
+    }
+
+    /// Wide, middle and narrow windows, svgf; the wide one of what the narrow one gets.
+    fn at(&self, i: usize) -> ([Vec3; 4], Vec3) {
+        let filtered = [&self.wide, &self.middle, &self.narrow, &self.svgf].map(|plane| plane[i].xyz());
+        (filtered, self.wide_dim[i].xyz())
+    }
+
+    /// As they are blended.
+    fn blended(&self, i: usize) -> [Vec3; 4] {
+        let ([wide, middle, narrow, svgf], wide_dim) = self.at(i);
+        let as_light = |fitted: Vec3| fitted.max(wide.min(Vec3::ZERO));
+        [wide, as_light(middle), as_light(narrow + (wide - wide_dim)), svgf]
+    }
+
+    fn usable(&self, i: usize) -> [bool; 4] {
+        [&self.wide, &self.middle, &self.narrow, &self.svgf].map(|plane| plane[i].w > 0.0)
+    }
+}
+
 /// The twin.
 pub fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
     let (image, floor) = (Packed::reference(input), floor(settings));
     let noise = estimate::reference(input, &image, settings);
-    let rows = candidates(settings);
-    let run = |k: usize, radiance: Vec<vec4>| -> Vec<Vec4> {
-        let (row, settings) = &rows[k];
-        let output = (row.reference)(&FilterInput { radiance, ..input.clone() }, settings);
-        output.into_iter().map(Vec4::from).collect()
-    };
-    let pixels = |colour: &dyn Fn(usize) -> Vec3| -> Vec<vec4> {
-        (0..image.len()).map(|i| colour(i).extend(image[i].count).into()).collect()
-    };
-    let wide = run(0, input.radiance.clone());
-    let dim = |i: usize| dimmed(image[i].colour, wide[i].xyz());
-    let added = |i: usize| probe(i, wide[i].xyz(), floor);
-    let [middle, svgf] = [1, 3].map(|k| run(k, input.radiance.clone()));
-    let [wide_dim, narrow] = [0, 2].map(|k| run(k, pixels(&dim)));
-    let kept = [0, 1, 2].map(|k| run(k, pixels(&signs)));
-    let svgf_kept = run(3, pixels(&|i| image[i].colour + added(i)));
-
-    let leverage = |i: usize| {
-        let [a, b, c] = kept.each_ref().map(|kept| kept[i].xyz().dot(signs(i) / 3.0));
-        let grown = contrast(svgf_kept[i].xyz(), svgf[i].xyz()) / added(i);
-        Vec4::new(a, b, c, grown).clamp(Vec4::splat(-1.0), Vec4::ONE)
-    };
-    let leverages: Vec<Vec4> = (0..image.len()).map(leverage).collect();
+    let results = Results::new(input, &image, settings);
     let rates = Rates::of_surfaces(&alike(settings));
     let size = [input.width, input.height].map(i64::from);
     let smoothed = |plane: Vec<Vec4>, across: bool| {
@@ -68,46 +96,37 @@ pub fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
             |plane: Vec<Vec4>, level: u32| smooth(&plane, &image, size, 1i64 << level, &rates, least(level, across));
         (0..SMOOTHING).fold(plane, level)
     };
-    let surroundings = smoothed(leverages.clone(), false);
-
-    // As they are blended.
-    let filtered = |i: usize| {
-        let [a, b, n, a_dim, d] = [&wide, &middle, &narrow, &wide_dim, &svgf].map(|plane| plane[i].xyz());
-        let as_light = |fitted: Vec3| fitted.max(a.min(Vec3::ZERO));
-        [image[i].colour, a, as_light(b), as_light(n + (a - a_dim)), d]
-    };
+    let surroundings = smoothed(results.leverages.clone(), false);
+    let scaled = |a: Vec3, b: Vec3| (contrast(a, b) / floor).clamp(-LIMIT, LIMIT);
     let missed = |i: usize| {
-        let (own, around) = (leverages[i], surroundings[i]);
+        let (own, around) = (results.leverages[i], surroundings[i]);
         let trust = OWN / image[i].count.max(1.0).sqrt();
         let left = 1.0 - (around + trust * (own - around).max(Vec4::ZERO)).clamp(Vec4::ZERO, Vec4::splat(MOST));
-        let scaled = |a: Vec3, b: Vec3| (contrast(a, b) / floor).clamp(-LIMIT, LIMIT);
-        let (pixel, dim) = (image[i].colour, dim(i));
-        let [a, b, n, a_dim, d] = [&wide, &middle, &narrow, &wide_dim, &svgf].map(|plane| plane[i].xyz());
-        let mut missed = Vec4::new(scaled(a, pixel), scaled(b, pixel), scaled(n, dim), scaled(d, pixel)) / left;
-        missed.z += scaled(a - a_dim, pixel - dim) / left.x;
-        let light = scaled(filtered(i)[1..].iter().sum::<Vec3>() / 4.0, Vec3::ZERO).powi(2) + 1.0;
-        (missed, light, if image[i].count > 0.0 { light.powf(-0.55) } else { 0.0 })
+        let ([wide, middle, narrow, svgf], wide_dim) = results.at(i);
+        let (pixel, dim) = (image[i].colour, dimmed(image[i].colour, wide));
+        let whole = [(wide, pixel), (middle, pixel), (narrow, dim), (svgf, pixel)];
+        let mut missed = Vec4::from_array(whole.map(|(filtered, pixel)| scaled(filtered, pixel))) / left;
+        missed.z += scaled(wide - wide_dim, pixel - dim) / left.x;
+        missed
     };
     // Squares of the filters; their products; the rest of those, the square of none, and the light itself.
     let errors = |i: usize| {
-        let (m, light, weight) = missed(i);
+        let m = missed(i);
+        let light = scaled(results.blended(i).iter().sum::<Vec3>() / 4.0, Vec3::ZERO).powi(2) + 1.0;
+        let weight = if image[i].count > 0.0 { light.powf(-0.55) } else { 0.0 };
         let unfiltered = 2.0 * (noise[i].max(0.0).sqrt() / floor).min(LIMIT).powi(2);
         let others = weight * Vec4::new(m.y * m.w, m.z * m.w, unfiltered, light);
         [weight * m * m, weight * m.xxxy() * m.yzwz(), others]
     };
     let planes: [Vec<Vec4>; 3] = from_fn(|k| (0..image.len()).map(|i| errors(i)[k]).collect());
-    let sums: [Vec4; 3] = from_fn(|k| planes[k].iter().map(|e| e.as_dvec4()).sum::<glam::DVec4>().as_vec4());
+    let sums: [Vec4; 3] = from_fn(|k| planes[k].iter().map(|e| e.as_dvec4()).sum::<DVec4>().as_vec4());
     let planes = planes.map(|plane| smoothed(plane, true));
     let expected = |i: usize| -> [Vec4; 3] {
         let (light, lights) = (planes[2][i].w.max(1.0), sums[2].w.max(1.0));
         let noisy = 0.5 * planes[2][i].z / light;
         from_fn(|k| (planes[k][i] / light).lerp(sums[k] / lights, OVERALL * noisy / (1.0 + noisy)))
     };
-    let known = [&wide, &middle, &narrow, &svgf];
-    let blended = |i: usize| {
-        let usable = known.map(|plane| plane[i].w > 0.0);
-        blend(&image[i], &matrix(expected(i)), usable, filtered(i))
-    };
+    let blended = |i: usize| blend(&image[i], &matrix(expected(i)), results.usable(i), results.blended(i));
     (0..image.len()).map(blended).collect()
 }
 
@@ -164,21 +183,21 @@ fn smooth(
     (0..width * height).map(pixel).collect()
 }
 
-fn blend(p: &Packed, errors: &Errors, [wide, middle, narrow, svgf]: [bool; 4], filtered: [Vec3; BLENDED]) -> vec4 {
+fn blend(p: &Packed, errors: &Errors, [wide, middle, narrow, svgf]: [bool; 4], filtered: [Vec3; 4]) -> vec4 {
     let (known, enough) = (p.count > 0.0, p.count >= ENOUGH);
     let usable = [enough, wide, middle, narrow, enough && svgf];
     let adrift = wide && !known && p.normal == Vec3::ZERO;
     let w = if adrift { [0.0, 1.0, 0.0, 0.0, 0.0] } else { least_square(errors, usable) };
-    let base = if known { p.colour } else { filtered[1] };
-    let off: Vec3 = (1..BLENDED).map(|k| w[k] * (filtered[k] - base)).sum();
+    let base = if known { p.colour } else { filtered[0] };
+    let off: Vec3 = w[1..].iter().zip(filtered).map(|(w, filtered)| w * (filtered - base)).sum();
     let count = if known { p.count } else { 1.0 };
     if usable.contains(&true) { (base + off).extend(count).into() } else { [0.0; 4] }
 }
 
 /// Weights of at least 0, together 1, whose blend has the least mean square; those that are not usable get none.
 fn least_square(errors: &Errors, usable: [bool; BLENDED]) -> [f32; BLENDED] {
-    let squares: [f32; BLENDED] = from_fn(|k| if usable[k] { errors[k][k].min(WORST) } else { WORST });
-    let best = (0..BLENDED).filter(|k| usable[*k]).min_by(|a, b| squares[*a].total_cmp(&squares[*b])).unwrap_or(1);
+    let square = |k: &usize| errors[*k][*k];
+    let best = (0..BLENDED).filter(|k| usable[*k]).min_by(|a, b| square(a).total_cmp(&square(b))).unwrap_or(1);
     let mut missed = *errors;
     (0..BLENDED).for_each(|k| missed[k][k] *= 1.0 + RIDGE);
     let mut w: [f32; BLENDED] = from_fn(|k| if k == best { 1.0 } else { 0.0 });
