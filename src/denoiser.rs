@@ -3,11 +3,10 @@
 use crate::composition::Demodulation;
 use crate::error::{Error, Result};
 use crate::filter::{self, Filter, FilterSettings, Planes, Row};
-use crate::gpu::layout::{Effects, PixelLight, PixelStats, SplitPush, vec4};
+use crate::gpu::layout::{PixelLight, PixelStats, SplitPush, vec4};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, PixelFormat, Recorder};
 use crate::renderer::{OutputView, Renderer};
 use crate::shaders::{join, split};
-use crate::stage::groups;
 
 /// Texels of a pixel's [`PixelLight`].
 const LIGHT_TEXELS: u64 = 6;
@@ -56,9 +55,9 @@ impl Denoiser {
             output: plane("filtered")?,
         };
         Ok(Self {
-            split: Kernel::new(gpu, &Effects::default(), &[(110, demodulation as u32)])?,
+            split: Kernel::new(gpu, &split::Constants { demodulation: demodulation as u32, ..Default::default() })?,
             filter: (row.make)(gpu, settings, size)?,
-            join: Kernel::new(gpu, &Effects::default(), &[])?,
+            join: Kernel::new(gpu, &join::Constants::default())?,
             stats: film.stats.clone(),
             light: film.light.clone(),
             planes,
@@ -75,7 +74,6 @@ impl Denoiser {
     /// [`Error::Device`].
     pub fn record(&self, rec: &mut Recorder) -> Result<()> {
         let (push, planes) = (SplitPush { size: self.planes.size }, &self.planes);
-        let all = groups(planes.pixels(), 64);
         let bind = split::Bind {
             stats: &self.stats,
             light: &self.light,
@@ -85,11 +83,11 @@ impl Denoiser {
             factor: &self.factor,
             sharp: &self.sharp,
         };
-        rec.dispatch(&self.split, bind, &push, all)?;
+        rec.dispatch_threads(&self.split, bind, &push, planes.pixels())?;
         self.filter.record(rec, planes)?;
         let bind =
             join::Bind { filtered: &planes.output, factor: &self.factor, sharp: &self.sharp, picture: &self.picture };
-        rec.dispatch(&self.join, bind, &push, all)
+        rec.dispatch_threads(&self.join, bind, &push, planes.pixels())
     }
 
     /// Filtered linear radiance (Rec. 709), 4 floats a pixel, the last of them 1.

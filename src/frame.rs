@@ -164,8 +164,8 @@ impl DeviceScene {
     }
 
     /// What the kernels bind.
-    pub fn bind(&self) -> crate::shaders::scene::Bind<'_> {
-        crate::shaders::scene::Bind {
+    pub fn bind(&self) -> crate::shaders::shared::scene::Bind<'_> {
+        crate::shaders::shared::scene::Bind {
             nodes: &self.nodes,
             triangles: &self.triangles,
             shading: &self.shading,

@@ -11,14 +11,17 @@ use crate::gpu::layout::{
     Apportionment, Camera, Effects, LIGHT_ENVIRONMENT, NONE, PathPush, PixelLight, PixelStats, PriorityPush,
     ROOT_OF_INSTANCES,
 };
-use crate::gpu::{FrameResources, Gpu, PassTime, Recorder};
+use crate::gpu::{FrameResources, Gpu, Kernel, PassTime, Recorder};
 use crate::scene::{self, Scene};
 use crate::schedule::{self, Cut};
 pub use crate::schedule::{Batch, Choice, PathRange, Plan, Progress, Share, Step};
 use crate::settings::{PixelFilter, Placing, Sampler, Settings};
+use crate::shaders::shared::traverse;
+use crate::shaders::{fold, guide, path};
 use crate::stage::apportion::Apportion;
 use crate::stage::scan::Scan;
-use crate::stage::{PerBlock, PerThread, WORKGROUP_CPU, WORKGROUP_GPU, thread_items};
+use crate::stage::{PerBlock, thread_items};
+use std::time::Duration;
 pub use views::{Layer, OutputView};
 
 /// What a render leaves in buffers besides radiance and its variance.
@@ -84,15 +87,15 @@ impl Renderer {
         let settings = scene.settings.clone();
         settings.validate()?;
         let effects = Effects { split_light: outputs.split_light, counters: outputs.counters, ..effects };
-        let workgroup = workgroup(gpu);
+        let (thread, traverse) = (gpu.tuning().thread(), traverse::Constants { stack: scene.stack });
         let stages = Stages {
-            guide: PerThread::with_stack(gpu, &effects, workgroup, scene.stack)?,
-            path: PerThread::with_stack(gpu, &effects, workgroup, scene.stack)?,
-            fold: PerThread::new(gpu, &effects, workgroup)?,
+            guide: Kernel::new(gpu, &guide::Constants { effects, thread, traverse })?,
+            path: Kernel::new(gpu, &path::Constants { effects, thread, traverse })?,
+            fold: Kernel::new(gpu, &fold::Constants { effects, thread })?,
         };
         let policy = policy_of(&settings)?;
         let pixels = settings.pixels() as u32;
-        let allocation = effects.adaptive.then(|| allocation(gpu, policy, pixels, workgroup)).transpose()?;
+        let allocation = effects.adaptive.then(|| allocation(gpu, policy, pixels)).transpose()?;
         let paths = paths_in_flight(gpu, &settings, &effects);
         let film = FilmBuffers::new(gpu, pixels, paths, &effects, outputs.guides || policy.guides)?;
         // Offsets are the widest records that are bound whole.
@@ -275,9 +278,9 @@ impl Renderer {
     /// Milliseconds that the pipelines took to create, by kernel.
     pub fn compile_times(&self) -> [(&'static str, f64); 3] {
         [
-            ("guide", self.stages.guide.compile_ms()),
-            ("path", self.stages.path.compile_ms()),
-            ("fold", self.stages.fold.compile_ms()),
+            ("guide", milliseconds(self.stages.guide.compile_time())),
+            ("path", milliseconds(self.stages.path.compile_time())),
+            ("fold", milliseconds(self.stages.fold.compile_time())),
         ]
     }
 
@@ -302,19 +305,16 @@ pub fn all_effects(scene: &Scene) -> Effects {
     Effects { independent_sampler: scene.settings.sampler == Sampler::Independent, ..Effects::ALL }
 }
 
-/// Paths per dispatch: enough to fill the device, few enough that a batch ends within a fraction of a second, and
-/// that the samples fit a storage buffer.
+/// Paths per dispatch, whose samples fit a storage buffer.
 fn paths_in_flight(gpu: &Gpu, settings: &Settings, effects: &Effects) -> u32 {
-    let wanted: u64 = if gpu.info().kind == "CPU" { 1 << 20 } else { 1 << 22 };
     let bytes = if effects.split_light { 48 } else { 16 };
     let room = gpu.info().max_storage_range / bytes;
     let all = settings.pixels() as u64 * u64::from(settings.spp);
-    wanted.min(room).min(all).max(1) as u32
+    gpu.tuning().paths_in_flight.min(room).min(all).max(1) as u32
 }
 
-/// Threads of a workgroup that traces.
-fn workgroup(gpu: &Gpu) -> u32 {
-    if gpu.info().kind == "CPU" { WORKGROUP_CPU } else { WORKGROUP_GPU }
+fn milliseconds(time: Duration) -> f64 {
+    time.as_secs_f64() * 1e3
 }
 
 fn policy_of(settings: &Settings) -> Result<&'static Row> {
@@ -322,12 +322,12 @@ fn policy_of(settings: &Settings) -> Result<&'static Row> {
     allocate::policy(name).ok_or_else(|| Error::Usage(format!("no policy \"{name}\"")))
 }
 
-fn allocation(gpu: &Gpu, policy: &Row, pixels: u32, workgroup: u32) -> Result<Allocation> {
+fn allocation(gpu: &Gpu, policy: &Row, pixels: u32) -> Result<Allocation> {
     let thread_items = thread_items(gpu, pixels);
     Ok(Allocation {
-        policy: (policy.make)(gpu, pixels, workgroup)?,
+        policy: (policy.make)(gpu, pixels)?,
         apportion: Apportion::new(gpu, thread_items)?,
-        choose: PerThread::new(gpu, &Effects::default(), workgroup)?,
+        choose: Kernel::new(gpu, &gpu.tuning().thread().into())?,
         scan: Scan::new(gpu, thread_items)?,
         batch: PerBlock::new(gpu, thread_items)?,
     })

@@ -127,7 +127,7 @@ fn devices_are_listed_as_vulkan_has_them() {
     assert_eq!(listed.len(), found.len());
     for (index, (device, info)) in listed.iter().zip(&found).enumerate() {
         assert_eq!(device["index"], index);
-        assert!(device["name"] == info.name.as_str() && device["kind"] == info.kind, "{device}");
+        assert!(device["name"] == info.name.as_str() && device["kind"] == info.kind.to_string(), "{device}");
         assert_eq!(device["api"], info.api_version.as_str());
         assert_eq!(device["missing"], Value::from(info.missing.clone()));
         let limits = device["limits"].as_array().unwrap();

@@ -5,7 +5,6 @@ use ash::vk;
 use ash::vk::Handle;
 use support::engine::Engine;
 use support::kernels::next;
-use tallow::gpu::layout::Effects;
 use tallow::gpu::{Buffer, FrameResources, Gpu, Location, RawDevice, Recorder};
 
 /// Two dependent passes; returns the buffers in use, the result last.
@@ -24,7 +23,7 @@ fn buffers(gpu: &Gpu, input: &[u32]) -> [Buffer<u32>; 3] {
 /// The result on a device that the layer opened itself.
 fn own_device(input: &[u32]) -> Vec<u32> {
     let gpu = support::gpu();
-    let kernel = next::Kernel::new(&gpu, &Effects::ALL, &[]).unwrap();
+    let kernel = next::Kernel::new(&gpu, &Default::default()).unwrap();
     let (buffers, mut frame) = (buffers(&gpu, input), FrameResources::new(&gpu).unwrap());
     gpu.run(&mut frame, |rec| {
         record(rec, &kernel, &buffers);
@@ -40,7 +39,7 @@ fn an_engines_command_buffer_gives_the_same_bits() {
     let engine = Engine::new();
     let input = support::words(10_007, 1);
     let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
-    let kernel = next::Kernel::new(&gpu, &Effects::ALL, &[]).unwrap();
+    let kernel = next::Kernel::new(&gpu, &Default::default()).unwrap();
     let (buffers, mut frame) = (buffers(&gpu, &vec![0; input.len()]), FrameResources::new(&gpu).unwrap());
     // The engine writes the input itself, just before, without a barrier of its own, and copies the result just after.
     let upload = Buffer::from_slice(&gpu, "upload", &input).unwrap();
@@ -88,7 +87,7 @@ fn an_engines_clocks_are_tied_together_where_its_device_can() {
 fn times_before_the_work_is_done_are_an_error() {
     let engine = Engine::new();
     let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
-    let kernel = next::Kernel::new(&gpu, &Effects::ALL, &[]).unwrap();
+    let kernel = next::Kernel::new(&gpu, &Default::default()).unwrap();
     let (buffers, mut frame) = (buffers(&gpu, &[1]), FrameResources::new(&gpu).unwrap());
     engine.run(|commands| {
         let mut rec = unsafe { Recorder::external(&gpu, &mut frame, commands.as_raw()) }.unwrap();

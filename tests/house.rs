@@ -25,7 +25,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
         ],
     ),
     ("denoiser", &["composition", "error", "filter", "gpu", "renderer", "shaders", "stage"]),
-    ("renderer", &["allocate", "error", "frame", "gpu", "scene", "schedule", "settings", "stage"]),
+    ("renderer", &["allocate", "error", "frame", "gpu", "scene", "schedule", "settings", "shaders", "stage"]),
     ("frame", &["allocate", "error", "gpu", "scene", "schedule", "shaders", "stage"]),
     ("stage", &["error", "frame", "gpu", "reference", "schedule", "shaders"]),
     ("allocate", &["error", "gpu", "reference", "shaders", "stage"]),

@@ -65,12 +65,13 @@ fn pixels_know_the_rays_of_their_samples() {
 /// The effects that change the picture when they are compiled in alone, for the message of a failure.
 fn culprits(gpu: &Gpu, scene: &Scene, expected: &[PixelStats]) -> String {
     let called_for = renderer::called_for(scene, Outputs::default());
-    let off = called_for.entries().into_iter().filter(|(name, _, on)| !on && *name != "independent_sampler");
-    let changes = |id| {
-        let other = Renderer::specialised(gpu, scene, Outputs::default(), called_for.toggled(id)).unwrap();
+    let effects = Effects::NAMES.iter().copied().zip(called_for.switches());
+    let off = effects.filter(|(name, on)| !on && *name != "independent_sampler").map(|(name, _)| name);
+    let changes = |name: &&str| {
+        let other = Renderer::specialised(gpu, scene, Outputs::default(), called_for.toggled(name)).unwrap();
         bits(&support::render(gpu, &other)) != bits(expected)
     };
-    off.filter(|(_, id, _)| changes(*id)).map(|(name, _, _)| name).collect::<Vec<_>>().join(", ")
+    off.filter(changes).collect::<Vec<_>>().join(", ")
 }
 
 /// What is called for, and all effects.

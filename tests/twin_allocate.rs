@@ -10,11 +10,11 @@ use tallow::gpu::layout::*;
 use tallow::gpu::{Buffer, FrameResources, Gpu, Location};
 use tallow::reference::apportion as twin;
 use tallow::schedule::{Choice, PathRange, Plan, Share};
+use tallow::stage::PerBlock;
 use tallow::stage::apportion::{Apportion, Counts, fixed_threshold};
 use tallow::stage::batch::{self, Batches};
 use tallow::stage::choose::{self, Choose};
 use tallow::stage::scan::Scan;
-use tallow::stage::{PerBlock, PerThread};
 
 /// Pixels of a thread on a CPU and on a GPU.
 const RUNS: [u32; 2] = [64, 16];
@@ -294,7 +294,7 @@ fn policies_agree_with_their_references() {
                 round: 0,
             };
             for row in POLICIES {
-                let policy = (row.make)(&gpu, pixels as u32, 32).unwrap();
+                let policy = (row.make)(&gpu, pixels as u32).unwrap();
                 let inputs = Inputs { guide: &guides, stats: &statistics, priority: &priority };
                 gpu.run(&mut frame, |rec| {
                     policy.prepare(rec, &inputs, &push)?;
@@ -319,7 +319,7 @@ fn policies_agree_with_their_references() {
 #[test]
 fn one_sample_or_none_agrees_with_its_reference() {
     let gpu = gpu();
-    let choose: Choose = PerThread::new(&gpu, &Effects::default(), 32).unwrap();
+    let choose = Choose::new(&gpu, &gpu.tuning().thread().into()).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
     for size in SIZES {
         let odd = |i: usize| [f32::NAN, f32::INFINITY, -1.0, 0.0, 1.0, 0.999_999_94, 0.5, 1e-30][i % 8];
@@ -350,7 +350,7 @@ fn a_frozen_probability_is_the_share_of_samples_and_stays() {
         Buffer::from_slice(&gpu, "priority", &kept).unwrap(),
         Buffer::new(&gpu, "guide", 1, Location::Device).unwrap(),
     );
-    let policy = (row.make)(&gpu, 65, 32).unwrap();
+    let policy = (row.make)(&gpu, 65).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
     for round in [64, 63, 65] {
         let push = PriorityPush { size: [65, 1], limit: 64, round, ..PriorityPush::default() };

@@ -70,7 +70,7 @@ fn twin((material, [wo, wi, u]): &Case) -> [Vec4; 5] {
 }
 
 fn on_device(gpu: &Gpu, effects: &Effects, cases: &[Case]) -> Result<Vec<[Vec4; 5]>> {
-    let kernel = bsdf::Kernel::new(gpu, effects, &[])?;
+    let kernel = bsdf::Kernel::new(gpu, &bsdf::Constants { effects: *effects })?;
     let materials: Vec<Material> = cases.iter().map(|c| c.0).collect();
     let inputs: Vec<[f32; 3]> = cases.iter().flat_map(|c| c.1.map(|v| v.to_array())).collect();
     let materials = Buffer::from_slice(gpu, "materials", &materials)?;
@@ -151,7 +151,8 @@ fn random_words_equal_their_twin() -> Result<()> {
     let floats = Buffer::new(&gpu, "floats", queries.len(), Location::Readback)?;
     let push = TestPush { count: queries.len() as u32, seed: 77 };
     for independent_sampler in [false, true] {
-        let kernel = sampler::Kernel::new(&gpu, &Effects { independent_sampler, ..Effects::ALL }, &[])?;
+        let effects = Effects { independent_sampler, ..Effects::ALL };
+        let kernel = sampler::Kernel::new(&gpu, &sampler::Constants { effects })?;
         let bind = sampler::Bind { queries: &input, words: &words, floats: &floats };
         let groups = [push.count.div_ceil(64), 1, 1];
         gpu.run(&mut FrameResources::new(&gpu)?, |rec| rec.dispatch(&kernel, bind, &push, groups))?;

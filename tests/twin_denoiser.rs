@@ -10,7 +10,7 @@ use tallow::composition::{Demodulation, split};
 use tallow::denoiser::Denoiser;
 use tallow::filter::{FilterSettings, check_size, find};
 use tallow::gpu::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
-use tallow::gpu::{FrameResources, Gpu};
+use tallow::gpu::{DeviceKind, FrameResources, Gpu};
 use tallow::image::aov::{Aovs, Names};
 use tallow::image::{Film, Samples};
 use tallow::renderer::{Outputs, Renderer};
@@ -175,7 +175,7 @@ fn what_no_binding_holds_is_refused_beforehand() {
     let rows = most / 50_000;
     check_size(&gpu, [50_000, rows], 3).unwrap();
     let long = [60_001, 1].map(|edge| [edge, 60_002 - edge]);
-    let long = long.into_iter().filter(|_| gpu.info().kind == "CPU");
+    let long = long.into_iter().filter(|_| gpu.info().kind == DeviceKind::Cpu);
     for size in long.chain([[50_000, rows + 1], [49_993, most / 49_993 + 1]]) {
         let refused = check_size(&gpu, size, 3).unwrap_err();
         assert!(refused.exit_code() == 4 && refused.to_string().contains(&most.to_string()), "{refused}");

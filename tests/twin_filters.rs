@@ -6,8 +6,8 @@ mod support;
 use picture::{Picture, SIZES, apart, line, red};
 use support::{assert_silent, gpu};
 use tallow::filter::{FILTERS, FilterInput, FilterSettings, GuidedSums, WaveletBasis, find, firefly, run};
-use tallow::gpu::Gpu;
 use tallow::gpu::layout::vec4;
+use tallow::gpu::{DeviceKind, Gpu};
 
 #[test]
 fn kernels_agree_with_their_twins() {
@@ -152,7 +152,7 @@ fn the_longest_lines_are_whole() {
             assert!(off < 1e-2, "{name} {width}x{height}: {off} apart with {settings:?}");
         }
     }
-    if gpu.info().kind == "CPU" {
+    if gpu.info().kind == DeviceKind::Cpu {
         let wider = run(&gpu, find("none").unwrap(), &Picture::new(60_001, 1).noisy().input, &narrow);
         assert!(wider.unwrap_err().to_string().contains("60000 along an edge"));
     }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use std::path::Path;
 use support::{assert_silent, gpu};
 use tallow::gpu::layout::*;
-use tallow::gpu::{Buffer, FrameResources, Gpu, Location};
+use tallow::gpu::{Buffer, FrameResources, Gpu, Kernel, Location};
 use tallow::reference::fold::fold;
 use tallow::reference::guide::guide;
 use tallow::reference::path::{Strategy, Tracer};
@@ -19,7 +19,6 @@ use tallow::renderer::{Batch, Outputs, Renderer, Step, all_effects, called_for, 
 use tallow::scene::Scene;
 use tallow::settings::{PixelFilter, Settings};
 use tallow::shaders;
-use tallow::stage::PerThread;
 use twin::{Aim, BALL, Random, Workplace, aimed_at_seam, ball, instanced_ball};
 
 const SIDE: u32 = 48;
@@ -202,7 +201,9 @@ fn renders_agree_with_their_twins() {
 /// What the kernel finds.
 fn traversed(gpu: &Gpu, scene: &Scene, effects: Effects, rays: &[RayQuery], any_hit: bool) -> Vec<RayHit> {
     let renderer = Renderer::specialised(gpu, scene, Outputs::default(), effects).unwrap();
-    let kernel = PerThread::with_stack(gpu, &effects, 32, scene.stack).unwrap();
+    let traverse = shaders::shared::traverse::Constants { stack: scene.stack };
+    let thread = shaders::shared::thread::Constants { workgroup: 32, stripes: 1 };
+    let kernel = Kernel::new(gpu, &shaders::traverse::Constants { effects, thread, traverse }).unwrap();
     let s = renderer.scene();
     let queries = Buffer::from_slice(gpu, "rays", rays).unwrap();
     let hits = Buffer::new(gpu, "hits", rays.len(), Location::Device).unwrap();
@@ -210,7 +211,7 @@ fn traversed(gpu: &Gpu, scene: &Scene, effects: Effects, rays: &[RayQuery], any_
     let mut frame = FrameResources::new(gpu).unwrap();
     gpu.run(&mut frame, |rec| {
         let bind = shaders::traverse::Bind { scene: s.bind(), rays: &queries, hits: &hits };
-        kernel.record(rec, bind, &push, rays.len().div_ceil(3) as u32) // some threads have fewer than 3
+        rec.dispatch_threads(&kernel, bind, &push, rays.len().div_ceil(3) as u32) // some threads have fewer than 3
     })
     .unwrap();
     hits.read().unwrap()

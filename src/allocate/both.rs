@@ -4,11 +4,12 @@ use super::geometry::Geometry;
 use super::variance::{moments, noise, square};
 use super::{HostInputs, Inputs, Placing, Policy, Row, geometry};
 use crate::error::Result;
-use crate::gpu::layout::{Effects, Guide, NONE, PriorityPush, vec3};
-use crate::gpu::{Buffer, Gpu, Location, Recorder};
+use crate::gpu::layout::{Guide, NONE, PriorityPush, vec3};
+use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::reference::exact::{exp_negative, squared_distance};
+use crate::shaders::both::LEAST_LEFT;
+use crate::shaders::shared::kinship::{GATHERED_UNIT, LEAST_KINSHIP, SEVENTHS};
 use crate::shaders::{both, kinship};
-use crate::stage::PerThread;
 use glam::Vec3;
 
 pub(super) const ROW: Row = Row {
@@ -16,27 +17,25 @@ pub(super) const ROW: Row = Row {
     about: "noise that the samples show, less what a geometry-aware filter will remove; geometry until samples tell",
     guides: true,
     placing: Placing::Learning,
-    make: |gpu, pixels, workgroup| Ok(Box::new(Both::new(gpu, pixels, workgroup)?)),
+    make: |gpu, pixels| Ok(Box::new(Both::new(gpu, pixels)?)),
     reference,
 };
 
-/// Pixels of a column that a thread decides for, as in the kernel.
-const ROWS: u32 = 4;
-
 struct Both {
     geometry: Geometry,
-    kinship: PerThread<kinship::Bind<'static>>,
-    join: PerThread<both::Bind<'static>>,
+    kinship: Kernel<kinship::Bind<'static>>,
+    join: Kernel<both::Bind<'static>>,
     /// Importance, then what it and [`kinship`] come to, a word a pixel: priorities of a render that goes on stay as they are.
     words: Buffer<f32>,
 }
 
 impl Both {
-    fn new(gpu: &Gpu, pixels: u32, workgroup: u32) -> Result<Self> {
+    fn new(gpu: &Gpu, pixels: u32) -> Result<Self> {
+        let thread = gpu.tuning().thread();
         Ok(Self {
-            geometry: Geometry::new(gpu, workgroup)?,
-            kinship: PerThread::new(gpu, &Effects::default(), workgroup)?,
-            join: PerThread::new(gpu, &Effects::default(), workgroup)?,
+            geometry: Geometry::new(gpu)?,
+            kinship: Kernel::new(gpu, &thread.into())?,
+            join: Kernel::new(gpu, &thread.into())?,
             words: Buffer::new(gpu, "kinship", pixels as usize, Location::Device)?,
         })
     }
@@ -48,22 +47,14 @@ impl Policy for Both {
             self.geometry.record(rec, &Inputs { priority: &self.words, ..*b }, push)?;
         }
         let bind = kinship::Bind { guides: b.guide, words: &self.words };
-        self.kinship.record(rec, bind, push, push.size[0] * push.size[1])
+        rec.dispatch_threads(&self.kinship, bind, push, push.size[0] * push.size[1])
     }
 
     fn record(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
         let bind = both::Bind { stats: b.stats, words: &self.words, priority: b.priority };
-        self.join.record(rec, bind, push, push.size[0] * push.size[1].div_ceil(ROWS))
+        rec.dispatch_threads(&self.join, bind, push, push.size[0] * push.size[1].div_ceil(both::ROWS as u32))
     }
 }
-
-/// In this many steps, as the kernels pack it.
-const SEVENTHS: f32 = 7.0;
-const GATHERED_UNIT: f32 = 31.0;
-/// Of pixels that look nothing alike.
-const LEAST_KINSHIP: f32 = 0.2;
-/// What the mean leaves of a pixel's own deviation: 0 of one alone, but for rounding, and of two at least .27.
-const LEAST_LEFT: f32 = 0.01;
 
 /// How much a neighbour's noise says of a pixel's, 0 to 1.
 fn kinship(a: &Guide, b: &Guide, push: &PriorityPush) -> f32 {

@@ -1,32 +1,31 @@
 //! GEO: importance from normals and positions, before any radiance is known. Kernel: `glsl/geometry.comp`.
 use super::{HostInputs, Inputs, Placing, Policy, Row};
 use crate::error::Result;
-use crate::gpu::layout::{Effects, Guide, NONE, PriorityPush};
-use crate::gpu::{Gpu, Recorder};
+use crate::gpu::layout::{Guide, NONE, PriorityPush};
+use crate::gpu::{Gpu, Kernel, Recorder};
 use crate::reference::exact::{exp_negative, squared_distance};
 use crate::shaders::geometry::Bind;
-use crate::stage::PerThread;
 
 pub(super) const ROW: Row = Row {
     name: "geometry",
     about: "more where neighbours differ in normal and position, so that a filter has little to gather (GEO)",
     guides: true,
     placing: Placing::Once,
-    make: |gpu, _, workgroup| Ok(Box::new(Geometry::new(gpu, workgroup)?)),
+    make: |gpu, _| Ok(Box::new(Geometry::new(gpu)?)),
     reference,
 };
 
-pub(super) struct Geometry(PerThread<Bind<'static>>);
+pub(super) struct Geometry(Kernel<Bind<'static>>);
 
 impl Geometry {
-    pub fn new(gpu: &Gpu, workgroup: u32) -> Result<Self> {
-        Ok(Self(PerThread::new(gpu, &Effects::default(), workgroup)?))
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        Ok(Self(Kernel::new(gpu, &gpu.tuning().thread().into())?))
     }
 }
 
 impl Policy for Geometry {
     fn record(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
-        self.0.record(rec, Bind { guides: b.guide, priority: b.priority }, push, push.size[0] * push.size[1])
+        rec.dispatch_threads(&self.0, Bind { guides: b.guide, priority: b.priority }, push, push.size[0] * push.size[1])
     }
 }
 

@@ -73,8 +73,8 @@ pub struct Row {
     pub guides: bool,
     /// What becomes of its priorities.
     pub placing: Placing,
-    /// Compiles it for a film of so many pixels, with so many threads per workgroup.
-    pub make: fn(&Gpu, pixels: u32, workgroup: u32) -> Result<Box<dyn Policy>>,
+    /// Compiles it for a film of so many pixels.
+    pub make: fn(&Gpu, pixels: u32) -> Result<Box<dyn Policy>>,
     /// The kernel's twin.
     pub reference: fn(&HostInputs) -> Vec<f32>,
 }

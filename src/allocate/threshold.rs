@@ -3,25 +3,24 @@
 use super::variance::moments;
 use super::{HostInputs, Inputs, Placing, Policy, Row};
 use crate::error::Result;
-use crate::gpu::Recorder;
-use crate::gpu::layout::{Effects, PixelStats, PriorityPush};
+use crate::gpu::layout::{PixelStats, PriorityPush};
+use crate::gpu::{Kernel, Recorder};
 use crate::shaders::threshold::Bind;
-use crate::stage::PerThread;
 
 pub(super) const ROW: Row = Row {
     name: "threshold",
     about: "RAS as published: a sample a round where noise exceeds a threshold that falls to 0 by --max-spp, then by chance",
     guides: false,
     placing: Placing::Chosen,
-    make: |gpu, _, workgroup| Ok(Box::new(Threshold(PerThread::new(gpu, &Effects::default(), workgroup)?))),
+    make: |gpu, _| Ok(Box::new(Threshold(Kernel::new(gpu, &gpu.tuning().thread().into())?))),
     reference,
 };
 
-struct Threshold(PerThread<Bind<'static>>);
+struct Threshold(Kernel<Bind<'static>>);
 
 impl Policy for Threshold {
     fn record(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
-        self.0.record(rec, Bind { stats: b.stats, priority: b.priority }, push, push.size[0] * push.size[1])
+        rec.dispatch_threads(&self.0, Bind { stats: b.stats, priority: b.priority }, push, push.size[0] * push.size[1])
     }
 }
 

@@ -9,7 +9,7 @@ pub(super) const ROW: Row = Row {
     about: "the same number for every pixel",
     guides: false,
     placing: Placing::Once,
-    make: |_, _, _| Ok(Box::new(Uniform)),
+    make: |_, _| Ok(Box::new(Uniform)),
     reference,
 };
 

@@ -1,28 +1,25 @@
 //! RAS, kept up to date: the noise that the samples show. Kernel: `glsl/variance.comp`.
 use super::{HostInputs, Inputs, Placing, Policy, Row};
 use crate::error::Result;
-use crate::gpu::Recorder;
-use crate::gpu::layout::{Effects, PixelStats, PriorityPush};
+use crate::gpu::layout::{PixelStats, PriorityPush};
+use crate::gpu::{Kernel, Recorder};
+use crate::shaders::shared::noise::PRIOR_SAMPLES;
 use crate::shaders::variance::Bind;
-use crate::stage::PerThread;
 
 pub(super) const ROW: Row = Row {
     name: "variance",
     about: "more where samples differ, relative to their luminance, estimated anew every round (RAS)",
     guides: false,
     placing: Placing::Learning,
-    make: |gpu, _, workgroup| Ok(Box::new(Variance(PerThread::new(gpu, &Effects::default(), workgroup)?))),
+    make: |gpu, _| Ok(Box::new(Variance(Kernel::new(gpu, &gpu.tuning().thread().into())?))),
     reference,
 };
 
-/// Samples' worth of trust in the noise of the surroundings.
-const PRIOR_SAMPLES: f32 = 32.0;
-
-struct Variance(PerThread<Bind<'static>>);
+struct Variance(Kernel<Bind<'static>>);
 
 impl Policy for Variance {
     fn record(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
-        self.0.record(rec, Bind { stats: b.stats, priority: b.priority }, push, push.size[0] * push.size[1])
+        rec.dispatch_threads(&self.0, Bind { stats: b.stats, priority: b.priority }, push, push.size[0] * push.size[1])
     }
 }
 

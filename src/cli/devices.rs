@@ -63,7 +63,7 @@ fn device(index: usize, info: gpu::DeviceInfo) -> Device {
     Device {
         index,
         name: info.name,
-        kind: info.kind.to_owned(),
+        kind: info.kind.to_string(),
         driver: format!("{} {}", info.driver_name, info.driver_info),
         api: info.api_version,
         limits: limits.map(|(name, value)| (name.to_owned(), value)).into(),

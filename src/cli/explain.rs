@@ -130,7 +130,7 @@ fn rows(args: &Args) -> Result<Vec<Row>> {
     let outputs = Outputs { split_light: true, guides: true, counters: false };
     let (base, reasons) = scene::effects(&scene, outputs.split_light, outputs.counters);
     let called_for_by = |effect| reasons.iter().find(|(name, _)| *name == effect).map_or("", |(_, by)| by).to_owned();
-    let names: Vec<_> = base.entries().iter().map(|(name, ..)| *name).chain([GUIDES]).collect();
+    let names: Vec<_> = Effects::NAMES.iter().copied().chain([GUIDES]).collect();
     if let Some(unknown) = args.effects.iter().find(|name| !names.contains(&name.as_str())) {
         return Err(Error::Usage(format!("no effect \"{unknown}\": choose of {}", names.join(", "))));
     }
@@ -153,8 +153,9 @@ fn rows(args: &Args) -> Result<Vec<Row>> {
         })
     };
     let mut rows = Vec::new();
-    for (effect, id, on) in base.entries().into_iter().filter(|(name, ..)| wanted(name)) {
-        let then = base.toggled(id);
+    let effects = Effects::NAMES.iter().copied().zip(base.switches());
+    for (effect, on) in effects.filter(|(name, _)| wanted(name)) {
+        let then = base.toggled(effect);
         let outputs_then = Outputs { split_light: then.split_light, counters: then.counters, ..outputs };
         let row = price((effect, on), outputs_then, then)?;
         // With and without it are different renders, not one picture at two prices: tools/adaptive compares those.

@@ -3,9 +3,9 @@ use super::edge::{Rates, edge_weight};
 use super::pack::{Pack, Packed};
 use super::{Filter, FilterInput, FilterSettings, Planes, Row};
 use crate::error::Result;
-use crate::gpu::layout::{AtrousPush, Effects, vec4};
+use crate::gpu::layout::{AtrousPush, vec4};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::shaders::atrous::Bind;
+use crate::shaders::atrous::{Bind, Constants, MOST_SAMPLES, ROWS};
 use glam::Vec3;
 
 /// See [`super::FILTERS`].
@@ -15,13 +15,6 @@ pub const ROW: Row = Row {
     make: |gpu, settings, size| Ok(Box::new(Atrous::new(gpu, settings, size)?)),
     reference,
 };
-
-/// Pixels of a column that a thread filters, and threads of a workgroup, as in the kernel.
-const ROWS: u32 = 4;
-const WORKGROUP: u32 = 32;
-
-/// Beyond it, counts are cut.
-const MOST_SAMPLES: f32 = 1e12;
 
 struct Atrous {
     pack: Pack,
@@ -34,9 +27,8 @@ struct Atrous {
 impl Atrous {
     fn new(gpu: &Gpu, settings: &FilterSettings, size: [u32; 2]) -> Result<Self> {
         let kernel = |level: u32| {
-            let mut constants = Rates::at_level(settings, level).constants();
-            constants.push((114, u32::from(settings.conserve_energy)));
-            Kernel::new(gpu, &Effects::default(), &constants)
+            let edge = Rates::at_level(settings, level).constants();
+            Kernel::new(gpu, &Constants { edge, conserve: settings.conserve_energy })
         };
         let pack = Pack::new(gpu, size)?;
         let scratch = Buffer::new(gpu, "atrous", pack.colour.len(), Location::Device)?;
@@ -60,8 +52,8 @@ impl Filter for Atrous {
             let push = AtrousPush { size: planes.size, spacing, rates: rates.as_array() };
             let kernel = &self.kernels[usize::from(level >= self.settings.rt_from_level)];
             let bind = Bind { colour: from, place: &self.pack.place, filtered: to };
-            let columns = height.div_ceil(ROWS * spacing) * spacing;
-            rec.dispatch(kernel, bind, &push, [width.div_ceil(WORKGROUP), columns, 1])?;
+            let columns = height.div_ceil(ROWS as u32 * spacing) * spacing;
+            rec.dispatch(kernel, bind, &push, kernel.groups([width, columns]))?;
             from = to;
         }
         Ok(())

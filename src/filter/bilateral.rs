@@ -4,9 +4,9 @@ use super::edge::{Rates, edge_weight, rate};
 use super::pack::{Pack, Packed};
 use super::{Filter, FilterInput, FilterSettings, Planes, Row};
 use crate::error::Result;
-use crate::gpu::layout::{BilateralPush, Effects, vec4};
+use crate::gpu::layout::{BilateralPush, vec4};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::shaders::bilateral::Bind;
+use crate::shaders::bilateral::{self, Bind, Constants};
 use glam::Vec3;
 
 /// See [`super::FILTERS`].
@@ -17,9 +17,8 @@ pub const ROW: Row = Row {
     reference,
 };
 
-/// Pixels of a column that a thread filters, and threads of a workgroup, as in the kernel.
-const ROWS: u32 = 8;
-const WORKGROUP: u32 = 32;
+/// Pixels of a column that a thread filters.
+const ROWS: u32 = bilateral::ROWS as u32;
 
 /// Taps of a thread in one dispatch: software devices end loops early (`glsl/shared/rounds.glsl`).
 const TAPS: u32 = 60_000;
@@ -37,9 +36,7 @@ impl Bilateral {
     fn new(gpu: &Gpu, settings: &FilterSettings, size: [u32; 2]) -> Result<Self> {
         let (pack, radius) = (Pack::new(gpu, size)?, settings.radius.min(size[0].max(size[1]) - 1));
         let banded = bands(radius).0 > 1;
-        let mut constants = Rates::new(settings).constants();
-        constants.push((115, u32::from(banded)));
-        let kernel = Kernel::new(gpu, &Effects::default(), &constants)?;
+        let kernel = Kernel::new(gpu, &Constants { edge: Rates::new(settings).constants(), bands: banded })?;
         let sums = Buffer::new(gpu, "sums", if banded { pack.colour.len() } else { 1 }, Location::Device)?;
         Ok(Self { pack, kernel, sums, radius, settings: *settings })
     }
@@ -73,7 +70,7 @@ impl Filter for Bilateral {
         let (colour, place) = (&self.pack.colour, &self.pack.place);
         (0..bands).try_for_each(|band| {
             let bind = Bind { colour, place, filtered: &planes.output, sums: &self.sums };
-            let groups = [width.div_ceil(WORKGROUP), height.div_ceil(ROWS), 1];
+            let groups = self.kernel.groups([width, height.div_ceil(ROWS)]);
             rec.dispatch(&self.kernel, bind, &BilateralPush { band, ..push }, groups)
         })
     }

@@ -2,11 +2,9 @@
 use super::pack::Packed;
 use super::{AtrousForm, FilterSettings};
 use crate::gpu::layout::vec3;
+use crate::shaders::shared::edge::{Constants, LEAST};
 use glam::Vec3;
 use std::f32::consts::LOG2_E;
-
-/// Weights below 2^LEAST are 0, squares of the others are not.
-const LEAST: f32 = -50.0;
 
 /// Exponents of the edge-stopping weights, in base 2, per squared (or plain) difference; 0 switches a weight off.
 #[derive(Clone, Copy, Debug)]
@@ -45,10 +43,9 @@ impl Rates {
         Self { rt: 0.0, ..Self::new(s) }
     }
 
-    /// Specialisation constants that leave out the weights that are off.
-    pub fn constants(&self) -> Vec<(u32, u32)> {
-        let switches = [self.rt > 0.0, self.n > 0.0, self.x > 0.0, self.squared];
-        (110..).zip(switches.map(u32::from)).collect()
+    /// Constants that leave out the weights that are off.
+    pub fn constants(&self) -> Constants {
+        Constants { weight_rt: self.rt > 0.0, weight_n: self.n > 0.0, weight_x: self.x > 0.0, squared: self.squared }
     }
 
     /// As push constants have them.

@@ -3,17 +3,15 @@ use super::edge::{Rates, edge_weight};
 use super::pack::{Pack, Packed};
 use super::{FilterInput, FilterSettings, Planes};
 use crate::error::Result;
-use crate::gpu::layout::{Effects, SvgfPush, vec3, vec4};
+use crate::gpu::layout::{SvgfPush, vec3, vec4};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::shaders::estimate::Bind;
+pub use crate::shaders::estimate::ENOUGH;
+use crate::shaders::estimate::{self, Bind, Constants};
+use crate::shaders::shared::luminance::STRONGEST;
 use glam::Vec3;
 
-/// Samples whose own variance is trusted.
-pub const ENOUGH: f32 = 4.0;
-/// Pixels from the centre to the border of the window over which the others' is taken.
-const REACH: i64 = 3;
-/// Differences are cut there, so that their squares are finite.
-const STRONGEST: f32 = 1e18;
+/// Pixels from the centre to the border of the window over which the others' variance is taken.
+const REACH: i64 = estimate::REACH as i64;
 
 /// The kernel, with and without a variance to read, and its plane.
 pub struct Estimate {
@@ -29,13 +27,10 @@ impl Estimate {
     /// # Errors
     /// [`crate::error::Error::Device`] when it does not fit.
     pub fn new(gpu: &Gpu, settings: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
-        let kernel = |measured| {
-            let mut constants = Rates::of_surfaces(settings).constants();
-            constants.push((114, measured));
-            Kernel::new(gpu, &Effects::default(), &constants)
-        };
+        let kernel =
+            |measured| Kernel::new(gpu, &Constants { edge: Rates::of_surfaces(settings).constants(), measured });
         Ok(Self {
-            kernels: [kernel(0)?, kernel(1)?],
+            kernels: [kernel(false)?, kernel(true)?],
             nothing: Buffer::from_slice(gpu, "no variance", &[])?,
             plane: Buffer::new(gpu, "estimate", width as usize * height as usize, Location::Device)?,
         })
@@ -43,13 +38,12 @@ impl Estimate {
 
     /// colour\[P\], place\[P\], variance\[P\] -> plane\[P\]
     pub fn record(&self, rec: &mut Recorder, planes: &Planes, pack: &Pack, settings: &FilterSettings) -> Result<()> {
-        let [width, height] = planes.size;
         let rates = Rates::of_surfaces(settings).as_array();
         let push = SvgfPush { size: planes.size, spacing: 1, rate_l: 0.0, rates };
         let variance = planes.variance.as_ref().unwrap_or(&self.nothing);
         let bind = Bind { colour: &pack.colour, place: &pack.place, variance, estimate: &self.plane };
         let kernel = &self.kernels[usize::from(planes.variance.is_some())];
-        rec.dispatch(kernel, bind, &push, [width.div_ceil(32), height, 1])
+        rec.dispatch(kernel, bind, &push, kernel.groups(planes.size))
     }
 }
 

@@ -3,9 +3,9 @@ use super::FilterInput;
 use super::estimate::luminance;
 use super::pixel::known_radiance;
 use crate::error::{Error, Result};
-use crate::gpu::layout::{Effects, FireflyPush, vec4};
+use crate::gpu::layout::{FireflyPush, vec4};
 use crate::gpu::{Buffer, FrameResources, Gpu, Kernel, Location, Recorder};
-use crate::shaders::firefly::Bind;
+use crate::shaders::firefly::{Bind, Constants};
 
 /// What was cut.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,7 +25,7 @@ impl Fireflies {
     /// # Errors
     /// [`Error::Device`] when the driver refuses it.
     pub fn new(gpu: &Gpu) -> Result<Self> {
-        Ok(Self(Kernel::new(gpu, &Effects::default(), &[])?))
+        Ok(Self(Kernel::new(gpu, &Constants::default())?))
     }
 
     /// radiance\[P\] -> cut\[P\]; `factor` as in [`remove_fireflies`].
@@ -38,7 +38,7 @@ impl Fireflies {
         cut: &Buffer<vec4>,
     ) -> Result<()> {
         let push = FireflyPush { size, factor };
-        rec.dispatch(&self.0, Bind { radiance, cut }, &push, [size[0].div_ceil(32), size[1], 1])
+        rec.dispatch(&self.0, Bind { radiance, cut }, &push, self.0.groups(size))
     }
 }
 

@@ -4,9 +4,9 @@ use super::guided_table::GuidedTable;
 use super::pixel::{known_channel, known_radiance};
 use super::{Filter, FilterInput, FilterSettings, GuidedSums, Planes, Row};
 use crate::error::Result;
-use crate::gpu::layout::{Effects, Guide, GuidedPackPush, GuidedPush, vec4};
-use crate::gpu::{Bindings, Buffer, Gpu, Kernel, Location, Recorder};
-use crate::shaders::{guided_columns, guided_mean_columns, guided_mean_rows, guided_pack, guided_rows};
+use crate::gpu::layout::{Guide, GuidedPackPush, GuidedPush, vec4};
+use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
+use crate::shaders::{guided_columns, guided_mean_columns, guided_mean_rows, guided_pack, guided_rows, shared};
 use glam::{DVec3, DVec4};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -28,9 +28,6 @@ pub const ROW: Row = Row {
 const BESIDE: u32 = 8;
 /// `vec4`s of a pixel's record in a strip.
 const RECORD: u64 = 8;
-/// Bytes of a strip on a CPU, so that caches hold much of it; a GPU is filled by larger ones.
-const STRIP_CPU: u64 = 32 << 20;
-const STRIP_GPU: u64 = 256 << 20;
 
 /// What the kernels read of an image.
 pub struct Packed {
@@ -46,7 +43,7 @@ impl Packed {
     pub fn new(gpu: &Gpu, settings: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
         let pixels = width.next_multiple_of(BESIDE) as usize * height as usize;
         Ok(Self {
-            kernel: Kernel::new(gpu, &Effects::default(), &[(110, settings.channels)])?,
+            kernel: Kernel::new(gpu, &guided_pack::Constants { channels: settings.channels })?,
             colour: Buffer::new(gpu, "colour", pixels, Location::Device)?,
             channels: Buffer::new(gpu, "channels", pixels, Location::Device)?,
         })
@@ -57,8 +54,7 @@ impl Packed {
         let (radiance, guide) = (&planes.radiance, &planes.guide);
         let bind = guided_pack::Bind { radiance, guide, colour: &self.colour, channels: &self.channels };
         let push = GuidedPackPush { size: planes.size, depth_scale: 1.0 / settings.extent };
-        let [across, down] = planes.size.map(|edge| edge.div_ceil(BESIDE));
-        rec.dispatch(&self.kernel, bind, &push, [across, down, 1])
+        rec.dispatch(&self.kernel, bind, &push, self.kernel.groups(planes.size))
     }
 }
 
@@ -92,12 +88,8 @@ struct Walk {
 impl Walk {
     fn new(gpu: &Gpu, radius: u32, edge: u32) -> Self {
         let window = 2 * radius.min(edge - 1) + 1;
-        // Every segment sums the first window's elements anew, so that a CPU takes a whole line at once; a GPU needs
-        // the threads.
-        match gpu.info().kind {
-            "CPU" => Self { window, segment: edge, lines: 8 },
-            _ => Self { window, segment: window, lines: 32 },
-        }
+        let tuning = gpu.tuning();
+        Self { window, segment: if tuning.whole_lines { edge } else { window }, lines: tuning.lines }
     }
 
     /// Windows that are taken at a time, each of which costs registers. Wide windows are worth more, lest their groups
@@ -113,9 +105,9 @@ impl Walk {
         tiles.min_by(|a, b| besides(*a).total_cmp(&besides(*b))).unwrap_or(1)
     }
 
-    fn kernel<B: Bindings>(self, gpu: &Gpu) -> Result<Kernel<B>> {
-        let numbers = [(100, self.lines), (110, self.window), (111, self.tile()), (112, self.segment)];
-        Kernel::new(gpu, &Effects::default(), &numbers)
+    fn constants(self) -> shared::windows::Constants {
+        let [window, tile, segment] = [self.window, self.tile(), self.segment].map(|n| n as i32);
+        shared::windows::Constants { window, tile, segment }
     }
 
     /// Workgroups for `windows` of each of `lines`.
@@ -128,15 +120,21 @@ impl Guided {
     fn new(gpu: &Gpu, settings: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
         let [down, along] = [height, width].map(|edge| Walk::new(gpu, settings.radius, edge));
         let pack = Packed::new(gpu, settings, [width, height])?;
-        let target = if gpu.info().kind == "CPU" { STRIP_CPU } else { STRIP_GPU };
-        let strip_rows = strip_rows(target, gpu.info().max_storage_range, down.window, [width, height]);
+        let strip_rows =
+            strip_rows(gpu.tuning().strip_bytes, gpu.info().max_storage_range, down.window, [width, height]);
         let plane = |name| Buffer::new(gpu, name, pack.colour.len(), Location::Device);
         let records = u64::from(strip_rows.next_multiple_of(BESIDE)) * u64::from(width) * RECORD;
+        let (local_size_x, windows) = (down.lines, down.constants());
+        let columns = Kernel::new(gpu, &guided_columns::Constants { windows, local_size_x })?;
+        let mean_columns = Kernel::new(gpu, &guided_mean_columns::Constants { windows, local_size_x })?;
+        let (local_size_x, windows) = (along.lines, along.constants());
+        let rows = Kernel::new(gpu, &guided_rows::Constants { windows, local_size_x })?;
+        let mean_rows = Kernel::new(gpu, &guided_mean_rows::Constants { windows, local_size_x })?;
         Ok(Self {
-            columns: down.kernel(gpu)?,
-            rows: along.kernel(gpu)?,
-            mean_columns: down.kernel(gpu)?,
-            mean_rows: along.kernel(gpu)?,
+            columns,
+            rows,
+            mean_columns,
+            mean_rows,
             model: [plane("slope_r")?, plane("slope_g")?, plane("slope_b")?, plane("value")?],
             strip: Buffer::new(gpu, "columns", records as usize, Location::Device)?,
             down,
@@ -305,7 +303,7 @@ mod tests {
         let limit = 1 << 27; // lavapipe's
         for size in [[1200, 1200], [3840, 2160], [1, 1], [31, 70_001], [100_000, 9]] {
             for window in [1, 49, 601, 1181] {
-                let rows = strip_rows(STRIP_CPU, limit, window, size);
+                let rows = strip_rows(32 << 20, limit, window, size);
                 let records = u64::from(rows.next_multiple_of(BESIDE)) * u64::from(size[0]);
                 assert!(
                     rows > 0 && rows <= size[1] && records * RECORD * 16 <= limit,

@@ -3,16 +3,15 @@
 use super::guided::Packed;
 use super::{Filter, FilterSettings, Planes};
 use crate::error::Result;
-use crate::gpu::layout::{Effects, GuidedPush, vec4};
+use crate::gpu::layout::{GuidedPush, vec4};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::shaders::{
-    guided_table_columns, guided_table_fits, guided_table_models, guided_table_moments, guided_table_result,
+    guided_table_columns, guided_table_fits, guided_table_models, guided_table_moments, guided_table_result, shared,
 };
 
-const WORKGROUP: u32 = 32;
 /// `vec4`s of a record of moments, and of models.
-const MOMENTS: u32 = 8;
-const FIT: u32 = 4;
+const MOMENTS: u32 = shared::moments::MOMENTS as u32;
+const FIT: u32 = shared::fit::FIT as u32;
 
 pub struct GuidedTable {
     pack: Packed,
@@ -38,13 +37,12 @@ impl GuidedTable {
         let plane = |name| Buffer::new(gpu, name, pack.colour.len(), Location::Device);
         let table =
             |name| Buffer::new(gpu, name, size[0] as usize * size[1] as usize * MOMENTS as usize, Location::Device);
-        let effects = Effects::default();
         Ok(Self {
-            moments: Kernel::new(gpu, &effects, &[])?,
-            fits: Kernel::new(gpu, &effects, &[])?,
-            columns: Kernel::new(gpu, &effects, &[])?,
-            models: Kernel::new(gpu, &effects, &[])?,
-            result: Kernel::new(gpu, &effects, &[])?,
+            moments: Kernel::new(gpu, &Default::default())?,
+            fits: Kernel::new(gpu, &Default::default())?,
+            columns: Kernel::new(gpu, &Default::default())?,
+            models: Kernel::new(gpu, &Default::default())?,
+            result: Kernel::new(gpu, &Default::default())?,
             model: [plane("slope_r")?, plane("slope_g")?, plane("slope_b")?, plane("value")?],
             rows: table("rows")?,
             table: table("table")?,
@@ -61,8 +59,9 @@ impl Filter for GuidedTable {
         let Packed { colour, channels, .. } = &self.pack;
         let (rows, table, filtered) = (&self.rows, &self.table, &planes.output);
         let push = |width| GuidedPush { size: [width, height], first_row: 0, rows: height, radius, eps };
-        let (lines, pixels) = ([height.div_ceil(WORKGROUP), 1, 1], [width.div_ceil(WORKGROUP), height, 1]);
-        let columns = |record: u32| (push(record * width), [(record * width).div_ceil(WORKGROUP), 1, 1]);
+        let lines = self.moments.groups([height, 1]);
+        let pixels = self.models.groups([width, height]);
+        let columns = |record: u32| (push(record * width), self.columns.groups([record * width, 1]));
         self.pack.record(rec, planes, &self.settings)?;
 
         let bind = guided_table_moments::Bind { colour, channels, table: rows };
@@ -73,10 +72,10 @@ impl Filter for GuidedTable {
         rec.dispatch(&self.models, bind, &push(width), pixels)?;
 
         let bind = guided_table_fits::Bind { slope_r, slope_g, slope_b, value, table: rows };
-        rec.dispatch(&self.fits, bind, &push(width), lines)?;
+        rec.dispatch(&self.fits, bind, &push(width), self.fits.groups([height, 1]))?;
         let (down, groups) = columns(FIT);
         rec.dispatch(&self.columns, guided_table_columns::Bind { rows, table }, &down, groups)?;
         let bind = guided_table_result::Bind { table, channels, colour, filtered };
-        rec.dispatch(&self.result, bind, &push(width), pixels)
+        rec.dispatch(&self.result, bind, &push(width), self.result.groups([width, height]))
     }
 }

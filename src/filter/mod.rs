@@ -99,7 +99,7 @@ pub fn find(name: &str) -> Option<&'static Row> {
 pub fn check_size(gpu: &Gpu, [width, height]: [u32; 2], texels: u64) -> Result<()> {
     let info = gpu.info();
     let most = (info.max_storage_range / size_of::<vec4>() as u64).min(info.max_texel_elements / texels);
-    let longest = if info.kind == "CPU" { 60_000 } else { most };
+    let longest = gpu.tuning().longest_edge.min(most);
     // `guided` pads its rows.
     let padded = u64::from(width).next_multiple_of(8) * u64::from(height);
     match padded <= most && u64::from(width.max(height)) <= longest {

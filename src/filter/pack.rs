@@ -2,10 +2,9 @@
 use super::pixel::{known_normal, known_position, known_radiance};
 use super::{FilterInput, Planes};
 use crate::error::Result;
-use crate::gpu::layout::{Effects, PackPush, uvec4, vec4};
+use crate::gpu::layout::{PackPush, uvec4, vec4};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::shaders::pack::Bind;
-use crate::stage::groups;
 use glam::Vec3;
 
 /// The kernel and its planes.
@@ -25,7 +24,7 @@ impl Pack {
     pub fn new(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<Self> {
         let pixels = width as usize * height as usize;
         Ok(Self {
-            kernel: Kernel::new(gpu, &Effects::default(), &[])?,
+            kernel: Kernel::new(gpu, &Default::default())?,
             colour: Buffer::new(gpu, "colour", pixels, Location::Device)?,
             place: Buffer::new(gpu, "place", pixels, Location::Device)?,
         })
@@ -34,7 +33,7 @@ impl Pack {
     /// radiance\[P\], guide\[P\] -> colour\[P\], place\[P\]
     pub fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
         let bind = Bind { radiance: &planes.radiance, guide: &planes.guide, colour: &self.colour, place: &self.place };
-        rec.dispatch(&self.kernel, bind, &PackPush { count: planes.pixels() }, groups(planes.pixels(), 64))
+        rec.dispatch_threads(&self.kernel, bind, &PackPush { count: planes.pixels() }, planes.pixels())
     }
 }
 

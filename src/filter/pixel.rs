@@ -1,14 +1,7 @@
 //! What the filters make of a pixel before they trust it. Twin of `glsl/shared/pixel.glsl`.
 use crate::gpu::layout::{vec3, vec4};
+pub use crate::shaders::shared::pixel::{FARTHEST, LARGEST, WIDEST};
 use glam::{Vec2, Vec3, vec2};
-
-/// Radiance beyond it is cut, so that differences and sums stay finite.
-pub const LARGEST: f32 = 1e24;
-/// The same for positions, whose squares are summed.
-pub const FARTHEST: f32 = 1e18;
-
-/// The same for the guided filter's channels.
-pub const WIDEST: f32 = 1e7;
 
 /// Radiance that some samples stand behind.
 pub fn known_radiance([r, g, b, count]: vec4) -> Option<Vec3> {

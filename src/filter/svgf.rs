@@ -5,9 +5,9 @@ use super::estimate::{self, Estimate, contrast};
 use super::pack::{Pack, Packed};
 use super::{Filter, FilterInput, FilterSettings, Planes, Row};
 use crate::error::Result;
-use crate::gpu::layout::{Effects, SvgfPush, vec4};
+use crate::gpu::layout::{SvgfPush, vec4};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::shaders::svgf::Bind;
+use crate::shaders::svgf::{Bind, Constants};
 use glam::Vec3;
 use std::f32::consts::LOG2_E;
 
@@ -38,15 +38,11 @@ struct Svgf {
 
 impl Svgf {
     fn new(gpu: &Gpu, settings: &FilterSettings, size: [u32; 2]) -> Result<Self> {
-        let kernel = |last| {
-            let mut constants = Rates::of_surfaces(settings).constants();
-            constants.push((114, last));
-            Kernel::new(gpu, &Effects::default(), &constants)
-        };
+        let kernel = |last| Kernel::new(gpu, &Constants { edge: Rates::of_surfaces(settings).constants(), last });
         let pack = Pack::new(gpu, size)?;
         let scratch = Buffer::new(gpu, "svgf", pack.colour.len(), Location::Device)?;
         let estimate = Estimate::new(gpu, settings, size)?;
-        Ok(Self { pack, estimate, kernels: [kernel(0)?, kernel(1)?], scratch, settings: *settings })
+        Ok(Self { pack, estimate, kernels: [kernel(false)?, kernel(true)?], scratch, settings: *settings })
     }
 }
 
@@ -54,7 +50,6 @@ impl Filter for Svgf {
     fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
         self.pack.record(rec, planes)?;
         self.estimate.record(rec, planes, &self.pack, &self.settings)?;
-        let [width, height] = planes.size;
         let mut from = &self.estimate.plane;
         for level in 0..self.settings.levels {
             let last = level + 1 == self.settings.levels;
@@ -70,7 +65,8 @@ impl Filter for Svgf {
                 rates: Rates::of_surfaces(&self.settings).as_array(),
             };
             let bind = Bind { estimate: from, place: &self.pack.place, colour: &self.pack.colour, filtered: to };
-            rec.dispatch(&self.kernels[usize::from(last)], bind, &push, [width.div_ceil(32), height, 1])?;
+            let kernel = &self.kernels[usize::from(last)];
+            rec.dispatch(kernel, bind, &push, kernel.groups(planes.size))?;
             from = to;
         }
         Ok(())

@@ -8,9 +8,9 @@ use super::edge::{Rates, edge_weight};
 use super::pack::{Pack, Packed};
 use super::{Filter, FilterInput, FilterSettings, Planes, Row, WaveletBasis};
 use crate::error::Result;
-use crate::gpu::layout::{Effects, WaveletPush, vec4};
+use crate::gpu::layout::{WaveletPush, vec4};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::shaders::wavelet::Bind;
+use crate::shaders::wavelet::{Bind, Constants};
 use glam::Vec3;
 
 /// See [`super::FILTERS`].
@@ -50,21 +50,17 @@ struct Wavelet {
 
 impl Wavelet {
     fn new(gpu: &Gpu, settings: &FilterSettings, size: [u32; 2]) -> Result<Self> {
-        let kernel = |inverse| {
-            let mut constants = Rates::new(settings).constants();
-            constants.push((114, inverse));
-            Kernel::new(gpu, &Effects::default(), &constants)
-        };
+        let kernel = |inverse| Kernel::new(gpu, &Constants { edge: Rates::new(settings).constants(), inverse });
         let pack = Pack::new(gpu, size)?;
         let scratch = Buffer::new(gpu, "wavelet", pack.colour.len(), Location::Device)?;
-        Ok(Self { pack, kernels: [kernel(0)?, kernel(1)?], scratch, settings: *settings })
+        Ok(Self { pack, kernels: [kernel(false)?, kernel(true)?], scratch, settings: *settings })
     }
 }
 
 impl Filter for Wavelet {
     fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
         self.pack.record(rec, planes)?;
-        let ([width, height], steps) = (planes.size, steps(&self.settings));
+        let steps = steps(&self.settings);
         let mut from = &self.pack.colour;
         for (i, (spacing, stencil, inverse)) in steps.iter().copied().enumerate() {
             let to = match i + 1 == steps.len() {
@@ -75,7 +71,8 @@ impl Filter for Wavelet {
             let rates = Rates::new(&self.settings).as_array();
             let push = WaveletPush { size: planes.size, spacing, stencil, rates };
             let bind = Bind { colour: from, place: &self.pack.place, filtered: to };
-            rec.dispatch(&self.kernels[usize::from(inverse)], bind, &push, [width.div_ceil(32), height, 1])?;
+            let kernel = &self.kernels[usize::from(inverse)];
+            rec.dispatch(kernel, bind, &push, kernel.groups(planes.size))?;
             from = to;
         }
         Ok(())

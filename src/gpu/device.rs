@@ -225,7 +225,8 @@ pub(super) fn one_at_a_time() -> MutexGuard<'static, ()> {
 
 /// `candidates` are not none.
 fn choose(mut candidates: Vec<Candidate>, wanted: Option<&str>) -> Result<Candidate> {
-    let best = || (0..candidates.len()).min_by_key(|&i| (!candidates[i].info.missing.is_empty(), candidates[i].rank));
+    let best =
+        || (0..candidates.len()).min_by_key(|&i| (!candidates[i].info.missing.is_empty(), candidates[i].info.kind));
     let index = wanted.map_or_else(best, |wanted| find(&candidates, wanted)).ok_or_else(|| {
         let list = candidates.iter().enumerate().map(|(i, c)| format!("\n  {i}: {}", c.info.name)).collect::<String>();
         Error::Device(format!("no device is called \"{}\"; choose one of{list}", wanted.unwrap_or_default()))

@@ -63,13 +63,57 @@ impl Features {
     }
 }
 
+/// What a device is made of, in the order of preference.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub enum DeviceKind {
+    /// A graphics card with memory of its own.
+    #[serde(rename = "discrete GPU")]
+    DiscreteGpu,
+    /// A GPU that shares the processor's memory.
+    #[serde(rename = "integrated GPU")]
+    IntegratedGpu,
+    /// A share of a GPU, given to a virtual machine.
+    #[serde(rename = "virtual GPU")]
+    VirtualGpu,
+    /// Software, such as Mesa's lavapipe.
+    #[serde(rename = "CPU")]
+    Cpu,
+    /// None of these.
+    #[serde(rename = "other")]
+    Other,
+}
+
+impl DeviceKind {
+    fn of(device: vk::PhysicalDeviceType) -> Self {
+        match device {
+            vk::PhysicalDeviceType::DISCRETE_GPU => Self::DiscreteGpu,
+            vk::PhysicalDeviceType::INTEGRATED_GPU => Self::IntegratedGpu,
+            vk::PhysicalDeviceType::VIRTUAL_GPU => Self::VirtualGpu,
+            vk::PhysicalDeviceType::CPU => Self::Cpu,
+            _ => Self::Other,
+        }
+    }
+}
+
+impl std::fmt::Display for DeviceKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::DiscreteGpu => "discrete GPU",
+            Self::IntegratedGpu => "integrated GPU",
+            Self::VirtualGpu => "virtual GPU",
+            Self::Cpu => "CPU",
+            Self::Other => "other",
+        })
+    }
+}
+
 /// A device as `tallow devices` prints it.
 #[derive(Clone, Debug, Serialize)]
 pub struct DeviceInfo {
     /// As the driver calls it.
     pub name: String,
-    /// "discrete GPU", "integrated GPU", "virtual GPU", "CPU" or "other".
-    pub kind: &'static str,
+    /// What it is made of.
+    pub kind: DeviceKind,
     /// Whether host and device share one memory, so that buffers are written in place.
     pub unified: bool,
     /// Short name of the driver.
@@ -110,8 +154,6 @@ pub(super) struct Candidate {
     pub id: u32,
     /// First family with compute, with timestamps if there is one.
     pub queue_family: Option<u32>,
-    /// Place in the order of preference, lowest first.
-    pub rank: u32,
 }
 
 /// Every device of this machine, in the loader's order; the index is what `DeviceOptions::device` takes.
@@ -145,10 +187,9 @@ pub(super) fn describe(instance: &ash::Instance, physical: vk::PhysicalDevice, q
     let queue_family = queue_family.or_else(|| best_family(&families));
     let (v11, v12, v13) = newer_properties(instance, physical, basic.api_version);
     let text = |bytes: Option<&std::ffi::CStr>| bytes.unwrap_or_default().to_string_lossy().into_owned();
-    let (kind, rank) = kind(basic.device_type);
     let info = DeviceInfo {
         name: text(basic.device_name_as_c_str().ok()),
-        kind,
+        kind: DeviceKind::of(basic.device_type),
         unified: matches!(basic.device_type, vk::PhysicalDeviceType::CPU | vk::PhysicalDeviceType::INTEGRATED_GPU),
         driver_name: text(v12.driver_name_as_c_str().ok()),
         driver_info: text(v12.driver_info_as_c_str().ok()),
@@ -168,7 +209,7 @@ pub(super) fn describe(instance: &ash::Instance, physical: vk::PhysicalDevice, q
     };
     let (cache_uuid, limits) = (basic.pipeline_cache_uuid, basic.limits);
     let (vendor, id) = (basic.vendor_id, basic.device_id);
-    Candidate { physical, info, limits, cache_uuid, vendor, id, queue_family, rank }
+    Candidate { physical, info, limits, cache_uuid, vendor, id, queue_family }
 }
 
 /// Zero for a device below 1.3, which cannot be used and must not be asked.
@@ -200,16 +241,6 @@ fn best_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
 fn largest_heap(memory: &vk::PhysicalDeviceMemoryProperties) -> u64 {
     let local = memory.memory_heaps_as_slice().iter().filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL));
     local.map(|heap| heap.size).max().unwrap_or(0)
-}
-
-fn kind(device: vk::PhysicalDeviceType) -> (&'static str, u32) {
-    match device {
-        vk::PhysicalDeviceType::DISCRETE_GPU => ("discrete GPU", 0),
-        vk::PhysicalDeviceType::INTEGRATED_GPU => ("integrated GPU", 1),
-        vk::PhysicalDeviceType::VIRTUAL_GPU => ("virtual GPU", 2),
-        vk::PhysicalDeviceType::CPU => ("CPU", 3),
-        _ => ("other", 4),
-    }
 }
 
 fn version(v: u32) -> String {

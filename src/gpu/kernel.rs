@@ -1,6 +1,5 @@
 //! A compute pipeline and what it binds.
 use super::access::Access;
-use super::layout::Effects;
 use super::{At, Bound, Gpu};
 use crate::error::{Error, Result};
 use ash::vk;
@@ -46,6 +45,8 @@ pub struct Slot {
 pub trait Bindings {
     /// The push constants, at most 128 bytes.
     type Push: Pod;
+    /// The specialisation constants.
+    type Constants: Specialise;
     /// Basename of the GLSL file, label of the pass.
     const NAME: &'static str;
     /// The compiled code.
@@ -56,10 +57,22 @@ pub trait Bindings {
     fn buffers(&self) -> Vec<Bound<'_>>;
 }
 
-/// A compiled kernel, specialised for a set of effects. `B` is the kernel's `Bind` struct.
+/// Specialisation constants; the build script implements it for the `Constants` struct of every kernel.
+pub trait Specialise {
+    /// (constant id, value) of all.
+    fn entries(&self) -> Vec<(u32, u32)>;
+    /// Threads of a workgroup along x and y.
+    fn local_size(&self) -> [u32; 2];
+}
+
+/// Workgroups along one axis that every Vulkan device can run.
+const MAX_GROUPS: u32 = 65_535;
+
+/// A compiled kernel, specialised by its constants. `B` is the kernel's `Bind` struct.
 pub struct Kernel<B> {
     pub(super) parts: Arc<Parts>,
     compile_time: Duration,
+    local_size: [u32; 2],
     /// Covariant, so that a kernel kept as `Kernel<Bind<'static>>` takes shorter borrows.
     of: PhantomData<fn() -> B>,
 }
@@ -73,37 +86,41 @@ pub(super) struct Parts {
 }
 
 impl<B: Bindings> Kernel<B> {
-    /// Compiles the kernel with every effect's specialisation constant, and `numbers` as (constant id, value), such as
-    /// the workgroup size.
+    /// Compiles the kernel for these constants.
     ///
     /// # Errors
-    /// [`Error::Device`] when the driver refuses, or an id is given twice.
-    pub fn new(gpu: &Gpu, effects: &Effects, numbers: &[(u32, u32)]) -> Result<Self> {
+    /// [`Error::Device`] when the driver refuses.
+    pub fn new(gpu: &Gpu, constants: &B::Constants) -> Result<Self> {
         let begun = Instant::now();
         let (set_layout, layout, pipeline) = Default::default();
         // From here on Drop cleans up, whichever line below fails; null handles may be destroyed.
         let mut parts = Parts { gpu: gpu.clone(), set_layout, layout, pipeline };
         parts.create_layouts(B::SLOTS, size_of::<B::Push>() as u32).at(B::NAME)?;
-        parts.create_pipeline(B::NAME, B::SPIRV, &constants(B::NAME, effects, numbers)?)?;
+        parts.create_pipeline(B::NAME, B::SPIRV, &constants.entries())?;
         gpu.0.name(parts.pipeline, B::NAME);
-        Ok(Self { parts: Arc::new(parts), compile_time: begun.elapsed(), of: PhantomData })
+        let (compile_time, local_size) = (begun.elapsed(), constants.local_size());
+        Ok(Self { parts: Arc::new(parts), compile_time, local_size, of: PhantomData })
     }
 
     /// What creating the pipeline took. Some drivers (lavapipe) compile more on the first dispatch.
     pub fn compile_time(&self) -> Duration {
         self.compile_time
     }
+
+    /// Workgroups that cover a grid of threads.
+    pub fn groups(&self, [x, y]: [u32; 2]) -> [u32; 3] {
+        [x.div_ceil(self.local_size[0]), y.div_ceil(self.local_size[1]), 1]
+    }
+
+    /// Workgroups that cover threads in a row, folded into several rows of groups where the device would refuse one;
+    /// `thread_index()` of `shared/thread.glsl` unfolds them.
+    pub fn folded_groups(&self, threads: u32) -> [u32; 3] {
+        folded(threads.div_ceil(self.local_size[0]))
+    }
 }
 
-/// (id, value) of every specialisation constant; an id that the kernel does not have is ignored by Vulkan.
-fn constants(kernel: &str, effects: &Effects, numbers: &[(u32, u32)]) -> Result<Vec<(u32, u32)>> {
-    let switches = effects.entries().into_iter().map(|(_, id, on)| (id, u32::from(on)));
-    let mut all: Vec<_> = switches.chain(numbers.iter().copied()).collect();
-    all.sort_unstable();
-    match all.windows(2).find(|pair| pair[0].0 == pair[1].0) {
-        Some(pair) => Err(Error::Device(format!("{kernel}: specialisation constant {} is given twice", pair[0].0))),
-        None => Ok(all),
-    }
+fn folded(groups: u32) -> [u32; 3] {
+    [groups.min(MAX_GROUPS), groups.div_ceil(MAX_GROUPS), 1]
 }
 
 impl Parts {
@@ -166,5 +183,15 @@ impl Drop for Parts {
             device.destroy_pipeline_layout(self.layout, None);
             device.destroy_descriptor_set_layout(self.set_layout, None);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn large_dispatches_fold_into_rows() {
+        assert_eq!(super::folded(2), [2, 1, 1]);
+        assert_eq!(super::folded(65_535), [65_535, 1, 1]);
+        assert_eq!(super::folded(65_536), [65_535, 2, 1]);
     }
 }

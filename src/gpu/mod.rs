@@ -24,6 +24,7 @@ pub mod layout;
 mod recorder;
 mod staging;
 mod timing;
+mod tuning;
 
 pub use access::Access;
 use buffer::Untyped;
@@ -31,10 +32,11 @@ pub use buffer::{Bound, Buffer, Location, PART, PixelFormat, RawBuffer};
 pub use device::{DeviceOptions, Gpu};
 pub use external::RawDevice;
 pub use frame::FrameResources;
-pub use info::{DeviceInfo, Feature, REQUIRED_FEATURES, survey};
-pub use kernel::{Bindings, Kernel, Slot, SlotKind};
+pub use info::{DeviceInfo, DeviceKind, Feature, REQUIRED_FEATURES, survey};
+pub use kernel::{Bindings, Kernel, Slot, SlotKind, Specialise};
 pub use recorder::Recorder;
 pub use timing::{PassTime, host_ns};
+pub use tuning::Tuning;
 
 use crate::error::{Error, Result};
 use ash::vk;

@@ -51,6 +51,20 @@ impl<'a> Recorder<'a> {
         Self { gpu, frame, commands, barriers: true }
     }
 
+    /// Runs `kernel` on what `bind` names, with at least `threads` threads, which are numbered by `thread_index()`.
+    ///
+    /// # Errors
+    /// As [`Self::dispatch`].
+    pub fn dispatch_threads<B: Bindings>(
+        &mut self,
+        kernel: &Kernel<B>,
+        bind: B,
+        push: &B::Push,
+        threads: u32,
+    ) -> Result<()> {
+        self.dispatch(kernel, bind, push, kernel.folded_groups(threads))
+    }
+
     /// Runs `kernel` on what `bind` names, with `groups` workgroups.
     ///
     /// # Errors

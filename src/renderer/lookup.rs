@@ -1,9 +1,10 @@
 //! Supersampling of filtered light (GIF, section 3.2).
-use super::{Renderer, workgroup};
+use super::Renderer;
 use crate::error::{Error, Result};
 use crate::gpu::layout::{Guide, PathPush, vec3, vec4};
-use crate::gpu::{Buffer, FrameResources, Location, PassTime};
-use crate::stage::{PerThread, lookup};
+use crate::gpu::{Buffer, FrameResources, Kernel, Location, PassTime};
+use crate::shaders;
+use crate::stage::lookup;
 
 /// Eye rays of a dispatch, unless there are more pixels: drivers kill what runs for seconds.
 const RAYS_AT_ONCE: u32 = 1 << 22;
@@ -31,7 +32,8 @@ impl Renderer {
             )));
         }
         let gpu = &self.gpu;
-        let kernel = PerThread::new(gpu, &self.effects, workgroup(gpu))?;
+        let (effects, thread) = (self.effects, gpu.tuning().thread());
+        let kernel = Kernel::new(gpu, &shaders::lookup::Constants { effects, thread, ..Default::default() })?;
         let guide = Buffer::from_slice(gpu, "guide rays", guide)?;
         let filtered = Buffer::from_slice(gpu, "filtered", filtered)?;
         let indirect = Buffer::new(gpu, "indirect", pixels, Location::Device)?;

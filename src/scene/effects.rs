@@ -40,8 +40,7 @@ pub fn effects(scene: &Scene, split_light: bool, counters: bool) -> (Effects, Ve
     };
     light_effects(scene, &mut found, &mut reasons);
     other_effects(scene, split_light, counters, &mut found, &mut reasons);
-    let order: Vec<_> = found.entries().into_iter().map(|e| e.0).collect();
-    reasons.sort_by_key(|r| order.iter().position(|&name| name == r.0));
+    reasons.sort_by_key(|r| Effects::NAMES.iter().position(|&name| name == r.0));
     (found, reasons)
 }
 

@@ -1,15 +1,15 @@
 //! Folds a batch of samples into the pixels' statistics. Kernel: `glsl/fold.comp`. Twin: [`crate::reference::fold`].
-use super::{PerThread, pair};
+use super::pair;
 use crate::error::Result;
 use crate::frame::{FilmBuffers, FilmTile};
-use crate::gpu::Recorder;
 use crate::gpu::layout::FoldPush;
+use crate::gpu::{Kernel, Recorder};
 use crate::schedule::{Batch, PathRange};
 use crate::shaders::fold::Bind;
 use std::ops::Range;
 
 /// The specialised kernel.
-pub type Fold = PerThread<Bind<'static>>;
+pub type Fold = Kernel<Bind<'static>>;
 
 /// samples\[batch\] -> stats\[P\], light\[P\]
 pub fn record(k: &Fold, rec: &mut Recorder, f: &FilmBuffers, b: &Batch) -> Result<()> {
@@ -44,5 +44,5 @@ fn fold(
     let folded_light = &if apart { tile.light.part(bound)? } else { tile.light.clone() };
     let (samples, offset) = (&f.samples, &f.counts.offset);
     let bind = Bind { samples, stats: &tile.stats, light: &tile.light, offset, folded_stats, folded_light };
-    k.record(rec, bind, push, push.pixels)
+    rec.dispatch_threads(k, bind, push, push.pixels)
 }

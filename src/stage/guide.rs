@@ -1,19 +1,18 @@
 //! Primary hits at pixel centres. Kernel: `glsl/guide.comp`. Twin: [`crate::reference::guide`].
-use super::PerThread;
 use crate::error::Result;
 use crate::frame::{DeviceScene, FilmTile};
-use crate::gpu::Recorder;
 use crate::gpu::layout::PathPush;
+use crate::gpu::{Kernel, Recorder};
 use crate::shaders::guide::Bind;
 
 /// The specialised kernel.
-pub type Guides = PerThread<Bind<'static>>;
+pub type Guides = Kernel<Bind<'static>>;
 
 /// camera -> guide\[tile\]
 pub fn record(k: &Guides, rec: &mut Recorder, s: &DeviceScene, tile: &FilmTile, push: &PathPush) -> Result<()> {
     tile.windows().try_for_each(|w| {
         let (first_pixel, pixels) = (tile.first_pixel + w.start, w.end - w.start);
         let guides = &tile.guide.part(w.start as usize..w.end as usize)?;
-        k.record(rec, Bind { scene: s.bind(), guides }, &PathPush { first_pixel, pixels, ..*push }, pixels)
+        rec.dispatch_threads(k, Bind { scene: s.bind(), guides }, &PathPush { first_pixel, pixels, ..*push }, pixels)
     })
 }

@@ -1,14 +1,13 @@
 //! Filtered light of guide rays as further eye rays see it. Kernel: `glsl/lookup.comp`. Twin:
 //! [`crate::reference::lookup`].
-use super::PerThread;
 use crate::error::Result;
 use crate::frame::DeviceScene;
 use crate::gpu::layout::{Guide, PathPush, vec3, vec4};
-use crate::gpu::{Buffer, Recorder};
+use crate::gpu::{Buffer, Kernel, Recorder};
 use crate::shaders::lookup::Bind;
 
 /// The specialised kernel.
-pub type Lookup = PerThread<Bind<'static>>;
+pub type Lookup = Kernel<Bind<'static>>;
 
 /// Adds the light of `push.samples` eye rays to the push's pixels: scene, guide\[P\], filtered\[P\] -> indirect\[P\]
 pub fn record(
@@ -20,5 +19,5 @@ pub fn record(
     indirect: &Buffer<vec3>,
     push: &PathPush,
 ) -> Result<()> {
-    k.record(rec, Bind { scene: s.bind(), guides, filtered, indirect }, push, push.pixels)
+    rec.dispatch_threads(k, Bind { scene: s.bind(), guides, filtered, indirect }, push, push.pixels)
 }

@@ -1,14 +1,13 @@
 //! Traces one path per thread. Kernel: `glsl/path.comp`. Twin: [`crate::reference::path`].
-use super::PerThread;
 use crate::error::Result;
 use crate::frame::{DeviceScene, FilmBuffers};
-use crate::gpu::Recorder;
 use crate::gpu::layout::PathPush;
+use crate::gpu::{Kernel, Recorder};
 use crate::schedule::Batch;
 use crate::shaders::path::Bind;
 
 /// The specialised kernel.
-pub type Path = PerThread<Bind<'static>>;
+pub type Path = Kernel<Bind<'static>>;
 
 /// scene -> samples\[batch\]
 pub fn record(
@@ -26,7 +25,7 @@ pub fn record(
         samples: b.samples,
         ..*push
     };
-    k.record(rec, bind(s, f), &push, b.pixels * b.samples)
+    rec.dispatch_threads(k, bind(s, f), &push, b.pixels * b.samples)
 }
 
 fn bind<'a>(s: &'a DeviceScene, f: &'a FilmBuffers) -> Bind<'a> {
@@ -43,5 +42,5 @@ pub fn record_listed(
     paths: u32,
 ) -> Result<()> {
     let push = PathPush { pixels: paths, samples: 0, ..*push };
-    k.record(rec, bind(s, f), &push, paths)
+    rec.dispatch_threads(k, bind(s, f), &push, paths)
 }

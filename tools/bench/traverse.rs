@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::path::Path;
 use std::time::Instant;
 use tallow::gpu::layout::{self, Effects, NONE, RayHit, RayQuery, TraversePush};
-use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Location};
+use tallow::gpu::{Buffer, DeviceKind, DeviceOptions, FrameResources, Gpu, Location};
 use tallow::reference::light::INFINITE_DISTANCE;
 use tallow::reference::sampler::{sample_2d, sampler_start};
 use tallow::reference::surface::{offset_origin, surface_at};
@@ -20,8 +20,8 @@ use tallow::reference::warp::{basis_from_normal, warp_cosine_hemisphere};
 use tallow::renderer::{Outputs, Renderer};
 use tallow::scene::Scene;
 use tallow::settings::Settings;
-use tallow::shaders::traverse::Bind;
-use tallow::stage::{PerThread, WORKGROUP_CPU};
+use tallow::shaders::shared;
+use tallow::shaders::traverse::{Bind, Constants, Kernel};
 
 const SIDE: u32 = 512;
 const THREADS: usize = 2;
@@ -102,7 +102,7 @@ impl Host {
 struct Device {
     gpu: Gpu,
     frame: FrameResources,
-    kernel: PerThread<Bind<'static>>,
+    kernel: Kernel,
     renderer: Renderer,
     rays: Buffer<RayQuery>,
     hits: Buffer<RayHit>,
@@ -114,9 +114,11 @@ impl Device {
         let gpu = Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), validation: false })?;
         // obvhs knows no masks, so neither side tests them.
         let effects = Effects::default();
+        let traverse = shared::traverse::Constants { stack: scene.stack };
+        let constants = Constants { effects, traverse, thread: gpu.tuning().thread() };
         Ok(Self {
             frame: FrameResources::new(&gpu)?,
-            kernel: PerThread::with_stack(&gpu, &effects, WORKGROUP_CPU, scene.stack)?,
+            kernel: Kernel::new(&gpu, &constants)?,
             renderer: Renderer::specialised(&gpu, scene, Outputs::default(), effects)?,
             rays: Buffer::from_slice(&gpu, "rays", rays)?,
             hits: Buffer::new(&gpu, "hits", rays.len(), Location::Device)?,
@@ -130,10 +132,10 @@ impl Device {
         let count = self.rays.len() as u32;
         let push = TraversePush { count, root: self.root, any_hit: u32::from(any_hit) };
         let s = self.renderer.scene();
-        let rays = if self.gpu.info().kind == "CPU" { RAYS_CPU } else { RAYS_GPU };
+        let rays = if self.gpu.info().kind == DeviceKind::Cpu { RAYS_CPU } else { RAYS_GPU };
         let times = self.gpu.run(&mut self.frame, |rec| {
             let bind = Bind { scene: s.bind(), rays: &self.rays, hits: &self.hits };
-            self.kernel.record(rec, bind, &push, count.div_ceil(rays))
+            rec.dispatch_threads(&self.kernel, bind, &push, count.div_ceil(rays))
         })?;
         let pass = times.first().context("the device has no timestamps")?;
         let found = self.hits.read()?.iter().map(|h| (h.t, h.triangle)).collect();

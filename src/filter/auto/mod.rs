@@ -7,10 +7,9 @@ use super::estimate::Estimate;
 use super::pack::Pack;
 use super::{Filter, FilterSettings, Planes, Row, guided, svgf};
 use crate::error::Result;
-use crate::gpu::layout::{AutoPush, AutoSmoothPush, Effects, PackPush, vec4};
+use crate::gpu::layout::{AutoPush, AutoSmoothPush, PackPush, vec4};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::shaders::{auto, auto_error, auto_inputs, auto_leverage, auto_smooth, auto_sum};
-use crate::stage::groups;
 
 /// See [`super::FILTERS`].
 pub const ROW: Row = Row {
@@ -26,7 +25,7 @@ const SMOOTHING: u32 = 4;
 /// surfaces are small, as in grass, others are all there is to learn from, and few pixels seem to prove filters that keep much.
 const ACROSS: f32 = 0.4;
 /// Elements that a workgroup of `auto_sum.comp` adds up.
-const SUMMED: usize = 4096;
+const SUMMED: usize = (auto_sum::THREADS * auto_sum::EACH) as usize;
 
 /// The filters beside none, found by searching thirteen noisy images of six scenes for what leaves `auto` nearest to the best
 /// filter of each. At their defaults: windows of 65 pixels and normals alone, in which a few bright samples are spread; windows
@@ -118,20 +117,18 @@ impl Auto {
         };
         let [wide, middle, narrow, svgf] = candidates(settings).map(candidate);
         let sum = || Buffer::new(gpu, "sums of errors", pixels.div_ceil(SUMMED).max(1), Location::Device);
-        let effects = Effects::default();
         let smooth = |three| {
-            let mut constants = Rates::of_surfaces(&alike(settings)).constants();
-            constants.push((114, three));
-            Kernel::new(gpu, &effects, &constants)
+            let edge = Rates::of_surfaces(&alike(settings)).constants();
+            Kernel::new(gpu, &auto_smooth::Constants { edge, three })
         };
         Ok(Self {
             estimate: Estimate::new(gpu, settings, size)?,
-            inputs: Kernel::new(gpu, &effects, &[])?,
-            leverage: Kernel::new(gpu, &effects, &[])?,
-            error: Kernel::new(gpu, &effects, &[])?,
-            sum: Kernel::new(gpu, &effects, &[])?,
-            smooth: [smooth(0)?, smooth(1)?],
-            blend: Kernel::new(gpu, &effects, &[])?,
+            inputs: Kernel::new(gpu, &Default::default())?,
+            leverage: Kernel::new(gpu, &Default::default())?,
+            error: Kernel::new(gpu, &Default::default())?,
+            sum: Kernel::new(gpu, &Default::default())?,
+            smooth: [smooth(false)?, smooth(true)?],
+            blend: Kernel::new(gpu, &Default::default())?,
             candidates: [wide?, middle?, narrow?, svgf?],
             planes: [
                 plane("dim, squared errors")?,
@@ -154,7 +151,7 @@ impl Auto {
         wide.record(rec, planes, &planes.radiance, &wide.result)?;
         let push = AutoPush { count, floor: floor(&self.settings) };
         let bind = auto_inputs::Bind { colour: &self.pack.colour, wide: &wide.result, dim, signs, probed };
-        rec.dispatch(&self.inputs, bind, &push, groups(count, 64))?;
+        rec.dispatch_threads(&self.inputs, bind, &push, count)?;
         wide.record(rec, planes, dim, &self.wide_dim)?;
         middle.record(rec, planes, &planes.radiance, &middle.result)?;
         narrow.record(rec, planes, dim, &narrow.result)?;
@@ -172,7 +169,7 @@ impl Auto {
             svgf_kept: &svgf.kept,
             leverages: &self.leverages,
         };
-        rec.dispatch(&self.leverage, bind, &push, groups(count, 64))
+        rec.dispatch_threads(&self.leverage, bind, &push, count)
     }
 
     fn record_errors(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
@@ -194,7 +191,7 @@ impl Auto {
         };
         let count = planes.pixels();
         let push = AutoPush { count, floor: floor(&self.settings) };
-        rec.dispatch(&self.error, bind, &push, groups(count, 64))
+        rec.dispatch_threads(&self.error, bind, &push, count)
     }
 
     /// Errors of all pixels -> their sums, which lie first in what is returned.
@@ -222,7 +219,6 @@ impl Auto {
         [from, to]: [[&'a Buffer<vec4>; 3]; 2],
         across: bool,
     ) -> Result<()> {
-        let [width, height] = planes.size;
         let rates = Rates::of_surfaces(&alike(&self.settings)).as_array();
         // What the candidates made of the probes is not needed any more.
         let between = [0, 1, 2].map(|k| &self.candidates[k].kept);
@@ -245,7 +241,7 @@ impl Auto {
                 third_smoothed,
             };
             let push = AutoSmoothPush { size: planes.size, spacing: 1 << level, rates, least: least(level, across) };
-            rec.dispatch(smooth, bind, &push, [width.div_ceil(32), height, 1])
+            rec.dispatch(smooth, bind, &push, smooth.groups(planes.size))
         })
     }
 }
@@ -278,6 +274,6 @@ impl Filter for Auto {
             filtered: &planes.output,
         };
         let count = planes.pixels();
-        rec.dispatch(&self.blend, bind, &PackPush { count }, groups(count, 64))
+        rec.dispatch_threads(&self.blend, bind, &PackPush { count }, count)
     }
 }

@@ -6,23 +6,11 @@ use crate::filter::pack::Packed;
 use crate::filter::{FilterInput, FilterSettings};
 use crate::gpu::layout::vec4;
 use crate::reference::sampler::pcg;
+use crate::shaders::auto::{OVERALL, RIDGE, ROUNDS};
+use crate::shaders::auto_error::{LIMIT, MOST, OWN};
+use crate::shaders::shared::candidates::BRIGHT;
 use glam::{DVec4, Vec3, Vec4, Vec4Swizzles};
 use std::array::from_fn;
-
-/// Times the light around: what of a pixel is above it is spread wide.
-const BRIGHT: f32 = 5.0;
-/// Leverage: beyond it, too little is left to judge by.
-const MOST: f32 = 0.9;
-/// Of what the leverage of a pixel of one sample is above that of the pixels around it: see `glsl/auto_error.comp`.
-const OWN: f32 = 0.3;
-/// Of luminance and its differences, so that their products are finite.
-const LIMIT: f32 = 1e9;
-/// Of the whole image's errors in those of a pixel, at most.
-const OVERALL: f32 = 0.6;
-/// Rounds of trades.
-const ROUNDS: u32 = 4;
-/// Of every square, added: weights that the estimates cannot tell apart become alike.
-const RIDGE: f32 = 0.01;
 
 /// What is blended: none, windows (wide, middle, narrow), svgf.
 const BLENDED: usize = 5;

@@ -1,0 +1,295 @@
+//! What a kernel's sources say of its interface: buffers, push constants, specialisation constants, numbers.
+use anyhow::{Context, Result, bail, ensure};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// A file that a kernel is made of: name for messages, text.
+pub type Source = (String, String);
+
+/// A buffer.
+#[derive(Clone)]
+pub struct Binding {
+    /// Basename of the shared file that declares it; none in the kernel itself.
+    pub group: Option<String>,
+    pub number: u32,
+    pub field: String,
+    /// Name of a type in layout.rs.
+    pub element: String,
+    /// Variant of `gpu::SlotKind`.
+    pub kind: &'static str,
+    /// Variant of `gpu::Access`.
+    pub access: &'static str,
+}
+
+/// A specialisation constant.
+#[derive(Clone)]
+pub struct Constant {
+    /// As [`Binding::group`].
+    pub group: Option<String>,
+    pub id: u32,
+    /// As in the GLSL, in capitals.
+    pub name: String,
+    /// Rust's name of the type.
+    pub ty: &'static str,
+    /// A literal, or the name of a number.
+    pub default: String,
+    pub comment: String,
+}
+
+/// A number that has a name: `const uint ROWS = 4u;`.
+#[derive(Clone)]
+pub struct Number {
+    /// As [`Binding::group`].
+    pub group: Option<String>,
+    pub name: String,
+    /// Rust's name of the type.
+    pub ty: &'static str,
+    /// A literal.
+    pub value: String,
+    pub comment: String,
+}
+
+/// Threads of a workgroup along x.
+#[derive(Clone, Copy)]
+pub enum LocalSizeX {
+    Fixed(u32),
+    /// Specialised by the constant of this id.
+    Constant(u32),
+}
+
+pub struct Interface {
+    pub push: String,
+    pub bindings: Vec<Binding>,
+    pub constants: Vec<Constant>,
+    pub numbers: Vec<Number>,
+    pub local_size_x: LocalSizeX,
+    pub local_size_y: u32,
+    /// Whether the kernel is specialised by what a scene calls for.
+    pub effects: bool,
+}
+
+impl Interface {
+    /// Reads the sources of a kernel, itself first.
+    pub fn of(sources: &[Source]) -> Result<Self> {
+        let (mut push, mut size) = (None, None);
+        let (mut bindings, mut constants, mut numbers) = (Vec::<Binding>::new(), Vec::<Constant>::new(), Vec::new());
+        let kernel = &sources[0].0;
+        for (file, text) in sources.iter().filter(|(file, _)| !is_generated(file)) {
+            let group = (file != kernel).then(|| basename(file));
+            for (index, line) in text.lines().enumerate() {
+                let place = || format!("{file}:{}: {}", index + 1, line.trim());
+                if line.starts_with("const ") {
+                    numbers.extend(parse_numbers(line, &group));
+                } else if !line.trim_start().starts_with("layout(") {
+                    continue;
+                } else if line.contains("push_constant") {
+                    ensure!(push.is_none(), "{}\na second push constant block", place());
+                    push = Some(parse_push(line).with_context(place)?);
+                } else if line.contains("constant_id") {
+                    constants.push(Constant { group: group.clone(), ..parse_constant(line).with_context(place)? });
+                } else if line.contains("local_size") {
+                    size = Some(parse_local_size(line).with_context(place)?);
+                } else if line.contains("binding") {
+                    let new = Binding { group: group.clone(), ..parse_binding(line).with_context(place)? };
+                    let taken = bindings.iter().any(|old| old.number == new.number || old.field == new.field);
+                    ensure!(!taken, "{}\nits binding or its name is taken", place());
+                    bindings.push(new);
+                }
+            }
+        }
+        ensure!(!bindings.is_empty(), "{kernel}: a kernel needs at least one buffer");
+        let push = push.with_context(|| {
+            format!("{kernel}: every kernel has `layout(scalar, push_constant) uniform Push {{ SomePush push; }};`")
+        })?;
+        let (local_size_x, local_size_y) =
+            size.with_context(|| format!("{kernel}: no `layout(local_size_x = 64) in;`"))?;
+        let effects = sources.iter().any(|(file, _)| file.ends_with("effects.glsl"));
+        let interface = Self { push, bindings, constants, numbers, local_size_x, local_size_y, effects };
+        interface.check_ids(kernel)?;
+        Ok(interface)
+    }
+
+    /// Shared files with bindings.
+    pub fn bound_groups(&self) -> BTreeSet<String> {
+        self.bindings.iter().filter_map(|b| b.group.clone()).collect()
+    }
+
+    /// Shared files with specialisation constants.
+    pub fn constant_groups(&self) -> BTreeSet<String> {
+        self.constants.iter().filter_map(|c| c.group.clone()).collect()
+    }
+
+    /// Shared files with bindings, constants or numbers.
+    pub fn groups(&self) -> BTreeSet<String> {
+        let numbers = self.numbers.iter().filter_map(|n| n.group.clone());
+        self.bound_groups().into_iter().chain(self.constant_groups()).chain(numbers).collect()
+    }
+
+    pub fn bindings_of(&self, group: Option<&str>) -> Vec<Binding> {
+        self.bindings.iter().filter(|b| b.group.as_deref() == group).cloned().collect()
+    }
+
+    pub fn constants_of(&self, group: Option<&str>) -> Vec<Constant> {
+        self.constants.iter().filter(|c| c.group.as_deref() == group).cloned().collect()
+    }
+
+    pub fn numbers_of(&self, group: Option<&str>) -> Vec<Number> {
+        self.numbers.iter().filter(|n| n.group.as_deref() == group).cloned().collect()
+    }
+
+    /// The constant that tells a kernel its own workgroup's size, if it has one.
+    pub fn workgroup(&self) -> Option<&Constant> {
+        self.constants.iter().find(|c| c.name == "WORKGROUP")
+    }
+
+    /// Effects have the ids below 100; two constants of one id would share a value without a word.
+    fn check_ids(&self, kernel: &str) -> Result<()> {
+        let mut taken = BTreeSet::new();
+        if let LocalSizeX::Constant(id) = self.local_size_x {
+            taken.insert(id);
+        }
+        for Constant { id, name, .. } in &self.constants {
+            ensure!(*id >= 100, "{kernel}: constant_id {id} of {name} is an effect's: choose 100 or more");
+            ensure!(taken.insert(*id), "{kernel}: constant_id {id} of {name} is taken");
+        }
+        Ok(())
+    }
+}
+
+/// layout.glsl and effects.glsl, whose constants come from Rust in the first place.
+fn is_generated(file: &str) -> bool {
+    ["glsl/layout.glsl", "glsl/effects.glsl"].contains(&file)
+}
+
+fn basename(file: &str) -> String {
+    Path::new(file).file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The words between braces, without the semicolon: a type and a name.
+fn member(line: &str) -> Option<(&str, &str)> {
+    let (_, rest) = line.split_once('{')?;
+    rest.split_once(';')?.0.trim().split_once(' ')
+}
+
+fn parse_push(line: &str) -> Result<String> {
+    match member(line) {
+        Some((ty, "push")) => Ok(ty.to_owned()),
+        _ => bail!("expected `layout(scalar, push_constant) uniform Push {{ SomePush push; }};`"),
+    }
+}
+
+/// The code of a line, and what is said after it.
+fn split_comment(line: &str) -> (&str, String) {
+    match line.split_once("//") {
+        Some((code, comment)) => (code.trim(), comment.trim().to_owned()),
+        None => (line.trim(), String::new()),
+    }
+}
+
+fn rust_type(glsl: &str) -> Option<&'static str> {
+    match glsl {
+        "uint" => Some("u32"),
+        "int" => Some("i32"),
+        "float" => Some("f32"),
+        "bool" => Some("bool"),
+        _ => None,
+    }
+}
+
+/// Rust writes literals as GLSL does, but for the `u`.
+fn rust_value(glsl: &str) -> String {
+    glsl.trim().trim_end_matches('u').to_owned()
+}
+
+fn parse_constant(line: &str) -> Result<Constant> {
+    let expected = "expected `layout(constant_id = 110) const bool NAME = true; // what it does`";
+    let (code, comment) = split_comment(line);
+    let parse = || {
+        let (id, rest) = code.strip_prefix("layout(constant_id = ")?.split_once(')')?;
+        let (ty, rest) = rest.trim().strip_prefix("const ")?.split_once(' ')?;
+        let (name, default) = rest.strip_suffix(';')?.split_once(" = ")?;
+        let (id, ty) = (id.parse().ok()?, rust_type(ty)?);
+        Some(Constant { group: None, id, name: name.to_owned(), ty, default: rust_value(default), comment })
+    };
+    parse().context(expected)
+}
+
+/// Numbers that are given by literals; what is computed from others stays the GLSL's own.
+fn parse_numbers(line: &str, group: &Option<String>) -> Vec<Number> {
+    let (code, comment) = split_comment(line);
+    let declared = code.strip_prefix("const ").and_then(|rest| rest.strip_suffix(';')?.split_once(' '));
+    let Some((Some(ty), list)) = declared.map(|(ty, list)| (rust_type(ty), list)) else { return Vec::new() };
+    let number = |item: &str| {
+        let (name, value) = item.trim().split_once(" = ")?;
+        let value = rust_value(value);
+        value.parse::<f64>().ok()?;
+        Some(Number { group: group.clone(), name: name.to_owned(), ty, value, comment: comment.clone() })
+    };
+    list.split(',').filter_map(number).collect()
+}
+
+fn parse_local_size(line: &str) -> Result<(LocalSizeX, u32)> {
+    let (code, _) = split_comment(line);
+    let items = code.strip_prefix("layout(").and_then(|rest| rest.strip_suffix(") in;"));
+    let items = items.context("expected `layout(local_size_x = 64) in;` or `layout(local_size_x_id = 100) in;`")?;
+    let (mut x, mut y) = (None, 1);
+    for item in items.split(',') {
+        let (key, value) = item.split_once('=').context("expected `local_size_x = 64`")?;
+        let value = value.trim().parse()?;
+        match key.trim() {
+            "local_size_x" => x = Some(LocalSizeX::Fixed(value)),
+            "local_size_x_id" => x = Some(LocalSizeX::Constant(value)),
+            "local_size_y" => y = value,
+            other => bail!("{other} is not understood: use local_size_x, local_size_x_id, local_size_y"),
+        }
+    }
+    Ok((x.context("local_size_x is missing")?, y))
+}
+
+fn parse_binding(line: &str) -> Result<Binding> {
+    parse_storage(line).or_else(|| parse_texels(line)).context(
+        "expected `layout(scalar, binding = 0) readonly buffer Name { type field[]; };` or \
+         `layout(binding = 0) uniform usamplerBuffer field; // of Type`",
+    )
+}
+
+fn parse_storage(line: &str) -> Option<Binding> {
+    let (number, rest) = line.trim().strip_prefix("layout(scalar, binding = ")?.split_once(')')?;
+    let access = match rest.split_once(" buffer ")?.0.trim() {
+        "readonly" => "Read",
+        "writeonly" => "Write",
+        "" => "ReadWrite",
+        _ => return None,
+    };
+    let (element, field) = member(rest)?;
+    let field = field.strip_suffix("[]")?.to_owned();
+    let element = rest.split_once("// of ").map_or(element, |(_, of)| of.trim());
+    Some(Binding {
+        group: None,
+        number: number.parse().ok()?,
+        field,
+        element: element.to_owned(),
+        kind: "Storage",
+        access,
+    })
+}
+
+fn parse_texels(line: &str) -> Option<Binding> {
+    let (number, rest) = line.trim().strip_prefix("layout(binding = ")?.split_once(')')?;
+    let (kind, rest) = rest.trim().strip_prefix("uniform ")?.split_once(' ')?;
+    let kind = match kind {
+        "usamplerBuffer" => "UintTexels",
+        "samplerBuffer" => "FloatTexels",
+        _ => return None,
+    };
+    let (field, element) = rest.split_once("; // of ")?;
+    let element = element.split_whitespace().next()?.to_owned();
+    Some(Binding {
+        group: None,
+        number: number.parse().ok()?,
+        field: field.trim().to_owned(),
+        element,
+        kind,
+        access: "TexelRead",
+    })
+}
