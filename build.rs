@@ -2,6 +2,8 @@
 //! specialisation constant, so that a forgotten buffer or a constant that a kernel does not have does not compile.
 //! `glsl/test/*.comp` becomes `$OUT_DIR/test_shaders.rs` for the integration tests. Any error stops the build with
 //! file and line. The compiler is `glslc`, as a program: Debian 12's libshaderc cannot be linked (undefined symbols).
+//! A packaged crate needs no compiler: it carries what `tools/package` compiled, in `spirv/`, under names that tell of which
+//! sources it was made. A checkout has no such folder.
 //!
 //! The interface of a kernel is read from lines of exactly these forms, in itself or in a file that it includes. What a
 //! shared file declares is a module `shared::NAME`, and one field of the `Bind` and the `Constants` of its kernels.
@@ -21,6 +23,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::{env, fs};
+use xxhash_rust::xxh3::{Xxh3Default, xxh3_64};
 
 #[allow(dead_code, unused_imports)]
 #[path = "src/gpu/layout.rs"]
@@ -47,7 +50,15 @@ fn build() -> Result<()> {
     println!("cargo:rerun-if-changed=src/gpu/layout");
     println!("cargo:rerun-if-changed=tools/build");
     println!("cargo:rerun-if-changed=glsl");
+    if Path::new("spirv").exists() {
+        println!("cargo:rerun-if-changed=spirv");
+    }
     let out = PathBuf::from(env::var("OUT_DIR")?);
+    let compiled = out.join("spirv");
+    if compiled.exists() {
+        fs::remove_dir_all(&compiled)?; // kernels of earlier sources
+    }
+    fs::create_dir(&compiled)?;
     generate(Path::new("glsl"), "crate", &out.join("shaders.rs"))?;
     generate(Path::new("glsl/test"), "tallow", &out.join("test_shaders.rs"))
 }
@@ -60,13 +71,16 @@ fn generate(folder: &Path, root: &str, target: &Path) -> Result<()> {
         .collect::<Result<_>>()?;
     files.retain(|file| file.extension().is_some_and(|e| e == "comp"));
     files.sort();
-    let (mut code, mut hash) = (String::new(), FNV_BASIS);
+    let (mut code, mut hash) = (String::new(), Xxh3Default::new());
+    let compiled = target.with_file_name("spirv");
     let mut groups = BTreeMap::new();
     for file in &files {
         let name = file.file_stem().and_then(|s| s.to_str()).context("kernel names are ASCII")?;
-        let (spirv, sources) = compile(file)?;
-        hash = fnv(hash, &spirv);
-        let binary = target.with_extension(format!("{name}.spv"));
+        let (whole, sources) = preprocess(file)?;
+        let label = format!("{name}-{:016x}.spv", xxh3_64(whole.as_bytes()));
+        let spirv = fs::read(Path::new("spirv").join(&label)).or_else(|_| compile(file, &whole))?;
+        hash.update(&spirv);
+        let binary = compiled.join(&label);
         fs::write(&binary, &spirv)?;
         let interface = Interface::of(&sources)?;
         code += &emit::module(name, file, &interface, root, &binary)?;
@@ -80,8 +94,8 @@ fn generate(folder: &Path, root: &str, target: &Path) -> Result<()> {
         }
         code += "}\n";
     }
-    writeln!(code, "/// FNV-1a over the SPIR-V of every kernel, part of the pipeline cache's name.")?;
-    writeln!(code, "pub const HASH: u64 = {hash:#018x};")?;
+    writeln!(code, "/// xxh3 of the SPIR-V of every kernel, part of the pipeline cache's name.")?;
+    writeln!(code, "pub const HASH: u64 = {:#018x};", hash.digest())?;
     fs::write(target, code).with_context(|| format!("{}: cannot be written", target.display()))
 }
 
@@ -94,12 +108,17 @@ fn declared(interface: &Interface, name: String) -> Group {
     }
 }
 
-/// SPIR-V, and the texts it was made from: the kernel first, then each file it includes.
-fn compile(file: &Path) -> Result<(Vec<u8>, Vec<Source>)> {
+/// The kernel with all that it includes, and the files it was made from: itself first.
+fn preprocess(file: &Path) -> Result<(String, Vec<Source>)> {
     let label = file.display().to_string();
     let text = fs::read_to_string(file).with_context(|| label.clone())?;
     let mut sources = vec![(label.clone(), text.clone())];
     let whole = expand(&label, &text, &mut sources)?;
+    Ok((whole, sources))
+}
+
+fn compile(file: &Path, whole: &str) -> Result<Vec<u8>> {
+    let label = file.display();
     let mut child = Command::new("glslc")
         .args(["-fshader-stage=compute", "--target-env=vulkan1.3", "-O", "-Werror", "-o", "-", "-"])
         .stdin(Stdio::piped())
@@ -110,9 +129,9 @@ fn compile(file: &Path) -> Result<(Vec<u8>, Vec<Source>)> {
     // Nothing is printed before all is read, so this cannot block on a full pipe.
     child.stdin.take().context("glslc has no input")?.write_all(whole.as_bytes())?;
     let output = child.wait_with_output()?;
-    let messages = String::from_utf8_lossy(&output.stderr).replace("<stdin>", &label);
+    let messages = String::from_utf8_lossy(&output.stderr).replace("<stdin>", &label.to_string());
     ensure!(output.status.success(), "glslc refused {label}:\n{messages}");
-    Ok((output.stdout, sources))
+    Ok(output.stdout)
 }
 
 /// Replaces `#include "name"` by the file, the first time that a kernel asks for it and by nothing after that, so that
@@ -152,11 +171,4 @@ fn read(name: &str, path: &str) -> Result<String> {
 fn effects() -> String {
     let line = |(id, name): (usize, &&str)| format!("layout(constant_id = {id}) const bool {name} = true;\n");
     layout::effects::GLSL_NAMES.iter().enumerate().map(line).collect()
-}
-
-const FNV_BASIS: u64 = 0xcbf2_9ce4_8422_2325;
-
-/// FNV-1a, 64 bits.
-fn fnv(hash: u64, bytes: &[u8]) -> u64 {
-    bytes.iter().fold(hash, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0000_0100_0000_01b3))
 }
