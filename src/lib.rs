@@ -8,6 +8,7 @@ pub mod error;
 pub mod filter;
 mod frame;
 pub mod gpu;
+pub mod guide;
 pub mod image;
 mod memory;
 pub mod reference;
