@@ -311,3 +311,15 @@ fn maps_are_scaled_and_moved() {
     }
     assert!((sample(moved, 0.3, 0.2) - sample(plain, 0.3, 0.2)).abs().max_element() > 0.1, "control");
 }
+
+/// The file that scenes/README.md shows, with shapes and a constant in place of the files that it names.
+#[test]
+fn the_guide_s_scene_is_one() {
+    let guide = include_str!("../scenes/README.md");
+    let shown = guide.split("```toml").nth(1).unwrap().split("```").next().unwrap();
+    let text = shown.replace("file = \"room.obj\"", "shape = \"cube\"").replace("file = \"sky.hdr\"", "radiance = 1");
+    assert_ne!(text, shown, "control: the files are named");
+    let scene = parse(&text).unwrap();
+    assert_eq!(scene.warnings, Vec::<String>::new());
+    assert_eq!((scene.settings.width, scene.instances.len(), scene.lights.len()), (640, 1, 2));
+}

@@ -96,7 +96,7 @@ impl Fields {
 pub fn group_module(group: &Group) -> Result<String> {
     let Group { name, .. } = group;
     let (fields, list) = members(&group.bindings)?;
-    let mut code = format!("/// What `glsl/shared/{name}.glsl` declares.\npub mod {name} {{\n");
+    let mut code = format!("/// What `glsl/shared/{name}.glsl` declares.\n#[allow(clippy::all)]\npub mod {name} {{\n");
     code += "    #[allow(unused_imports)]\n    use crate::gpu::{Bound, Buffer, layout::*};\n";
     code += &numbers(&group.numbers)?;
     if !group.bindings.is_empty() {
@@ -200,6 +200,7 @@ pub fn module(name: &str, file: &Path, interface: &Interface, root: &str, binary
     let file = file.display();
     Ok(format!(
         r#"/// The kernel `{file}`.
+#[allow(clippy::all)]
 pub mod {name} {{
     #[allow(unused_imports)]
     use {root}::gpu::{{Access, Bindings, Bound, Buffer, Slot, SlotKind, Specialise, layout::*}};
