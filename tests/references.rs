@@ -1,10 +1,10 @@
 //! The path tracer against images of an independent renderer (Mitsuba 3, `tests/data/references/README.md`): every
 //! pixel by a z-test with both standard errors, and the image means.
-#[path = "support/normal.rs"]
-mod normal;
+#[path = "support/statistics.rs"]
+mod statistics;
 mod support;
 
-use normal::sidak_quantile;
+use statistics::sidak_quantile;
 use std::path::{Path, PathBuf};
 use tallow::gpu::layout::{Guide, NONE};
 use tallow::image::{self, Film, Picture};

@@ -2,8 +2,8 @@
 //! answer is known, and no broken pixel anywhere.
 #[path = "support/alike.rs"]
 mod alike;
-#[path = "support/normal.rs"]
-mod normal;
+#[path = "support/statistics.rs"]
+mod statistics;
 mod support;
 
 use alike::alike;

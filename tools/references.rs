@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 mod compare;
-#[path = "../tests/support/normal.rs"]
-mod normal;
 mod scenes;
 mod significance;
+#[path = "../tests/support/statistics.rs"]
+mod statistics;
 mod visibility;
 
 use Reference::{Constant, Mean, Normals, Visibility};

@@ -1,7 +1,7 @@
 //! Whether an image differs from its reference by more than the noise of both, where a file says how noisy the
 //! reference is.
 use crate::compare::{self, Picture};
-use crate::normal::sidak_quantile;
+use crate::statistics::sidak_quantile;
 use anyhow::{Context, ensure};
 use std::path::Path;
 

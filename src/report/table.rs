@@ -1,5 +1,6 @@
 //! Text tables, and the one of the passes of a render.
 use crate::gpu::PassTime;
+use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
 
 /// All calls of one pass.
@@ -60,25 +61,17 @@ pub fn milliseconds(ms: f64) -> String {
 /// Aligned columns under a header; a column whose cells all start with a digit or a dash is set flush right. Every line
 /// ends in a newline.
 pub fn text(header: &[&str], rows: &[Vec<String>]) -> String {
-    let is_number = |cell: &String| cell.starts_with(|c: char| c.is_ascii_digit() || c == '-');
-    let column = |i: usize| rows.iter().map(move |r| &r[i]);
-    let layout: Vec<(usize, bool)> = (0..header.len())
-        .map(|i| {
-            let width = column(i).map(|c| c.chars().count()).chain([header[i].chars().count()]).max();
-            (width.unwrap_or(0), !rows.is_empty() && column(i).all(is_number))
-        })
-        .collect();
-    let header: Vec<String> = header.iter().map(|h| (*h).to_owned()).collect();
-    [header].iter().chain(rows).map(|cells| line(cells, &layout)).collect()
-}
-
-fn line(cells: &[String], layout: &[(usize, bool)]) -> String {
-    let cell = |(cell, &(width, right)): (&String, &(usize, bool))| match right {
-        true => format!("{cell:>width$}"),
-        false => format!("{cell:<width$}"),
-    };
-    let joined = cells.iter().zip(layout).map(cell).collect::<Vec<_>>().join("  ");
-    format!("{}\n", joined.trim_end())
+    let is_number = |row: &Vec<String>, i: usize| row[i].starts_with(|c: char| c.is_ascii_digit() || c == '-');
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING).set_header(header.iter().copied());
+    table.add_rows(rows);
+    for (i, column) in table.column_iter_mut().enumerate() {
+        column.set_padding((0, 2));
+        if !rows.is_empty() && rows.iter().all(|row| is_number(row, i)) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table.lines().map(|line| format!("{}\n", line.trim_end())).collect()
 }
 
 #[cfg(test)]

@@ -1,50 +1,7 @@
-//! Pearson's chi-square test, as pbrt and nori use it for samplers.
-
-/// ln Gamma(x) for x > 0 (Lanczos, Numerical Recipes).
-fn ln_gamma(x: f64) -> f64 {
-    const C: [f64; 6] = [
-        76.18009172947146,
-        -86.50532032941677,
-        24.01409824083091,
-        -1.231739572450155,
-        1.208650973866179e-3,
-        -5.395239384953e-6,
-    ];
-    let t = x + 5.5;
-    let series = C.iter().enumerate().fold(1.000000000190015, |sum, (i, c)| sum + c / (x + 1.0 + i as f64));
-    (x + 0.5) * t.ln() - t + (2.5066282746310005 * series / x).ln()
-}
-
-/// Regularised upper incomplete gamma function Q(a, x).
-fn gamma_q(a: f64, x: f64) -> f64 {
-    if x <= 0.0 {
-        return 1.0;
-    }
-    let scale = (a * x.ln() - x - ln_gamma(a)).exp();
-    if x < a + 1.0 {
-        let (mut term, mut sum) = (1.0 / a, 1.0 / a);
-        for n in 1..10_000 {
-            term *= x / (a + f64::from(n));
-            sum += term;
-        }
-        return (1.0 - scale * sum).max(0.0);
-    }
-    // Lentz's continued fraction.
-    let (mut b, mut c) = (x + 1.0 - a, 1e300);
-    let mut d = 1.0 / b;
-    let mut h = d;
-    for n in 1..10_000 {
-        let an = -f64::from(n) * (f64::from(n) - a);
-        b += 2.0;
-        d = 1.0 / (an * d + b);
-        c = b + an / c;
-        h *= d * c;
-        if (d * c - 1.0).abs() < 1e-14 {
-            break;
-        }
-    }
-    scale * h
-}
+//! Pearson's chi-square test, as pbrt and nori use it for samplers, and quantiles for z-tests.
+#![allow(dead_code, reason = "each test program compiles its own copy and uses a part")]
+use statrs::distribution::{ContinuousCDF, Normal};
+use statrs::function::gamma::gamma_ur;
 
 /// Probability of a statistic as large as the one observed, if `expected` were true. Cells that expect fewer than 5
 /// are pooled, smallest first, so that counts where nothing is expected weigh on a small cell.
@@ -64,7 +21,7 @@ pub fn chi_square(observed: &[f64], expected: &[f64]) -> f64 {
     if pooled.0 > 20.0 {
         return 0.0;
     }
-    if degrees < 1.0 { 1.0 } else { gamma_q(0.5 * degrees, 0.5 * statistic) }
+    if degrees < 1.0 { 1.0 } else { gamma_ur(0.5 * degrees, 0.5 * statistic.max(f64::MIN_POSITIVE)) }
 }
 
 /// Level of each of `tests` tests that together err with probability 0.01 (Sidak).
@@ -72,8 +29,12 @@ pub fn sidak(tests: usize) -> f64 {
     1.0 - 0.99f64.powf(1.0 / tests as f64)
 }
 
+/// Two-sided quantile of the normal distribution at which `tests` independent tests together fail once in a hundred times.
+pub fn sidak_quantile(tests: usize) -> f64 {
+    -Normal::standard().inverse_cdf(0.5 * sidak(tests))
+}
+
 /// Probability that points spread this unevenly over 16 x 16 cells are uniform on the unit square.
-#[allow(dead_code)] // each test file compiles its own copy
 pub fn uniform_2d(points: impl Iterator<Item = [f64; 2]>) -> f64 {
     let mut counts = vec![0.0; 256];
     for [x, y] in points {
@@ -87,8 +48,17 @@ pub fn uniform_2d(points: impl Iterator<Item = [f64; 2]>) -> f64 {
 #[test]
 fn chi_square_matches_published_quantiles() {
     // 5 % points: 3.841 with 1 degree of freedom, 124.342 with 100.
-    assert!((gamma_q(0.5, 0.5 * 3.841459) - 0.05).abs() < 1e-6);
-    assert!((gamma_q(50.0, 0.5 * 124.342113) - 0.05).abs() < 1e-6);
+    // A statistic of 3.841459 over two cells: 100 expected in each, 13.859 more in one and less in the other.
+    let off = (3.841459f64 * 50.0).sqrt();
+    assert!((chi_square(&[100.0 + off, 100.0 - off], &[100.0; 2]) - 0.05).abs() < 1e-6);
+    assert!((gamma_ur(50.0, 0.5 * 124.342113) - 0.05).abs() < 1e-6);
     assert!(chi_square(&[60.0, 40.0], &[50.0, 50.0]) < 0.05);
     assert!(chi_square(&[50.0, 50.0, 30.0], &[50.0, 50.0, 0.0]) < 1e-4);
+}
+
+#[test]
+fn quantiles_are_the_published_ones() {
+    // 1 % two-sided: 2.5758. A hundred tests: 1 - 0.99^(1/100) = 1.00499e-4, whose quantile is 3.8893.
+    assert!((sidak_quantile(1) - 2.5758).abs() < 1e-3, "{}", sidak_quantile(1));
+    assert!((sidak_quantile(100) - 3.8893).abs() < 1e-3, "{}", sidak_quantile(100));
 }
