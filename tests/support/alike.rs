@@ -1,5 +1,5 @@
 //! Two renders of one scene by the same samples, on a device that rounds one kernel otherwise than another.
-use crate::normal::sidak_quantile;
+use crate::statistics::sidak_quantile;
 use tallow::gpu::layout::PixelStats;
 
 /// What rounding alone may make of a value, relative.
