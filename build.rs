@@ -296,9 +296,11 @@ fn module(name: &str, file: &Path, interface: &Interface, root: &str, binary: &P
         )?;
     }
     let file = file.display();
+    // Who can name a kernel of the crate can run it with any numbers, so that nobody outside can.
+    let visible = if root == "crate" { "#[allow(dead_code)]\npub(crate)" } else { "pub" };
     Ok(format!(
         r#"/// The kernel `{file}`.
-pub mod {name} {{
+{visible} mod {name} {{
     #[allow(unused_imports)]
     use {root}::gpu::{{Access, Bindings, Bound, Buffer, Slot, SlotKind, layout::*}};
     /// Basename of the file, label of the pass.
@@ -310,7 +312,9 @@ pub mod {name} {{
     /// What the kernel reads and writes.
     pub struct Bind<'a> {{
 {fields}    }}
-    impl Bindings for Bind<'_> {{
+    // SAFETY: the code is what `glslc` made of the file, and the slots are what the file declares.
+    #[allow(unsafe_code)]
+    unsafe impl Bindings for Bind<'_> {{
         type Push = {push};
         const NAME: &'static str = NAME;
         const SPIRV: &'static [u8] = SPIRV;

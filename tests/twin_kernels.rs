@@ -8,6 +8,7 @@ mod twin;
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use std::path::Path;
+use support::kernels::traverse as traverse_kernel;
 use support::{assert_silent, gpu};
 use tallow::gpu::layout::*;
 use tallow::gpu::{Buffer, FrameResources, Gpu, Location};
@@ -18,7 +19,6 @@ use tallow::reference::traverse::traverse;
 use tallow::renderer::{Batch, Outputs, Renderer, Step, all_effects, called_for, path_push};
 use tallow::scene::Scene;
 use tallow::settings::{PixelFilter, Settings};
-use tallow::shaders;
 use tallow::stage::PerThread;
 use twin::{Aim, BALL, Random, Workplace, aimed_at_seam, ball, instanced_ball};
 
@@ -209,7 +209,7 @@ fn traversed(gpu: &Gpu, scene: &Scene, effects: Effects, rays: &[RayQuery], any_
     let push = TraversePush { count: rays.len() as u32, root: path_push(scene).root, any_hit: u32::from(any_hit) };
     let mut frame = FrameResources::new(gpu).unwrap();
     gpu.run(&mut frame, |rec| {
-        let bind = shaders::traverse::Bind { scene: s.bind(), rays: &queries, hits: &hits };
+        let bind = traverse_kernel::Bind { scene: s.bind(), rays: &queries, hits: &hits };
         kernel.record(rec, bind, &push, rays.len().div_ceil(3) as u32) // some threads have fewer than 3
     })
     .unwrap();

@@ -43,7 +43,45 @@ pub struct Slot {
 }
 
 /// What a kernel binds; the build script implements it for the `Bind` struct of every kernel.
-pub trait Bindings {
+///
+/// # Safety
+/// - [`Self::SPIRV`] is valid code for Vulkan 1.3 and the features in [`super::REQUIRED_FEATURES`], with an entry point
+///   `main` for compute; [`Self::SLOTS`] are its descriptors, all in set 0, with numbers that differ.
+/// - [`Self::Push`] is its push constants: at most 128 bytes, a multiple of 4.
+/// - [`Self::buffers`] returns as many as there are slots.
+/// - Whatever buffers, push constants and specialisation constants its owner lets others choose, it accesses nothing but
+///   its buffers. Accesses beyond their ends are allowed on devices with robust buffer access; those beyond the ends of
+///   its own arrays are not.
+///
+/// Safe code cannot implement it:
+/// ```compile_fail,E0200
+/// # use tallow::gpu::{Bindings, Bound, Slot};
+/// struct Mine;
+/// impl Bindings for Mine {
+///     type Push = u32;
+///     const NAME: &'static str = "mine";
+///     const SPIRV: &'static [u8] = &[0; 64];
+///     const SLOTS: &'static [Slot] = &[];
+///     fn buffers(&self) -> Vec<Bound<'_>> {
+///         Vec::new()
+///     }
+/// }
+/// ```
+/// The same by somebody who vouches for it:
+/// ```
+/// # use tallow::gpu::{Bindings, Bound, Slot};
+/// struct Mine;
+/// unsafe impl Bindings for Mine {
+///     type Push = u32;
+///     const NAME: &'static str = "mine";
+///     const SPIRV: &'static [u8] = &[0; 64];
+///     const SLOTS: &'static [Slot] = &[];
+///     fn buffers(&self) -> Vec<Bound<'_>> {
+///         Vec::new()
+///     }
+/// }
+/// ```
+pub unsafe trait Bindings {
     /// The push constants, at most 128 bytes.
     type Push: Pod;
     /// Basename of the GLSL file, label of the pass.
@@ -77,9 +115,10 @@ impl<B: Bindings> Kernel<B> {
     /// the workgroup size.
     ///
     /// # Errors
-    /// [`Error::Device`] when the driver refuses, or an id is given twice.
+    /// [`Error::Device`] when the driver refuses, an id is given twice, or a workgroup is larger than the device's.
     pub fn new(gpu: &Gpu, effects: &Effects, numbers: &[(u32, u32)]) -> Result<Self> {
         let begun = Instant::now();
+        check_workgroup(B::NAME, numbers, &gpu.0.limits)?;
         let (set_layout, layout, pipeline) = Default::default();
         // From here on Drop cleans up, whichever line below fails; null handles may be destroyed.
         let mut parts = Parts { gpu: gpu.clone(), set_layout, layout, pipeline };
@@ -92,6 +131,19 @@ impl<B: Bindings> Kernel<B> {
     /// What creating the pipeline took. Some drivers (lavapipe) compile more on the first dispatch.
     pub fn compile_time(&self) -> Duration {
         self.compile_time
+    }
+}
+
+/// The `local_size_x_id` of all kernels whose workgroup is chosen when they are made.
+const WORKGROUP: u32 = 100;
+
+fn check_workgroup(kernel: &str, numbers: &[(u32, u32)], limits: &vk::PhysicalDeviceLimits) -> Result<()> {
+    let most = limits.max_compute_work_group_size[0].min(limits.max_compute_work_group_invocations);
+    match numbers.iter().find(|(id, threads)| *id == WORKGROUP && !(1..=most).contains(threads)) {
+        Some((_, threads)) => {
+            Err(Error::Device(format!("{kernel}: a workgroup of {threads} threads: choose 1 to {most}")))
+        }
+        None => Ok(()),
     }
 }
 
@@ -160,11 +212,10 @@ impl Parts {
 impl Drop for Parts {
     fn drop(&mut self) {
         // SAFETY: made on this device; whoever recorded them keeps this until the work is complete.
-        unsafe {
-            let device = &self.gpu.0.device;
+        self.gpu.0.free(|device| unsafe {
             device.destroy_pipeline(self.pipeline, None);
             device.destroy_pipeline_layout(self.layout, None);
             device.destroy_descriptor_set_layout(self.set_layout, None);
-        }
+        });
     }
 }

@@ -1,5 +1,5 @@
 //! One file per kernel: what it reads and writes, and how it is recorded. Stages never call stages; `frame.rs` lists them.
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::layout::{Effects, TRAVERSAL_STACK};
 use crate::gpu::{Bindings, Gpu, Kernel, Recorder};
 
@@ -43,8 +43,11 @@ impl<B: Bindings> PerThread<B> {
     /// [`PerThread::new`] of a kernel that traces rays of a scene with this [`Scene::stack`](crate::scene::Scene::stack).
     ///
     /// # Errors
-    /// As [`PerThread::new`].
+    /// As [`PerThread::new`], and [`Error::Usage`] for a stack of another size than scenes may have.
     pub fn with_stack(gpu: &Gpu, effects: &Effects, workgroup: u32, stack: u32) -> Result<Self> {
+        if !(1..=TRAVERSAL_STACK).contains(&stack) {
+            return Err(Error::Usage(format!("a stack of {stack} groups: choose 1 to {TRAVERSAL_STACK}")));
+        }
         let stripes = if gpu.info().kind == "CPU" { STRIPES_CPU } else { 1 };
         // local_size_x_id, the same for `thread_index()`, the stack of `shared/traverse.glsl`, and `striped_index()`.
         let numbers = [(100, workgroup), (101, workgroup), (102, stack), (104, stripes)];
@@ -81,8 +84,11 @@ impl<B: Bindings> PerBlock<B> {
     /// Compiles the kernel for blocks of threads with so many pixels: see [`thread_items`].
     ///
     /// # Errors
-    /// [`crate::error::Error::Device`] when the driver refuses it.
+    /// [`crate::error::Error::Device`] when the driver refuses it, [`Error::Usage`] for more than 1024 pixels or none.
     pub fn new(gpu: &Gpu, thread_items: u32) -> Result<Self> {
+        if !(1..=MOST_ITEMS).contains(&thread_items) {
+            return Err(Error::Usage(format!("{thread_items} pixels of a thread: choose 1 to {MOST_ITEMS}")));
+        }
         // THREAD_ITEMS of `shared/block.glsl`.
         Ok(Self { kernel: Kernel::new(gpu, &Effects::default(), &[(103, thread_items)])?, thread_items })
     }
@@ -106,6 +112,9 @@ impl<B: Bindings> PerBlock<B> {
 
 /// Of a [`PerBlock`] kernel.
 const BLOCK_THREADS: u32 = 64;
+
+/// Pixels of a thread of a [`PerBlock`] kernel at most.
+const MOST_ITEMS: u32 = 1024;
 
 /// Blocks of a film.
 pub fn block_count(pixels: u32, thread_items: u32) -> u32 {

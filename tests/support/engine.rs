@@ -62,7 +62,7 @@ unsafe fn instance(entry: &ash::Entry) -> ash::Instance {
 
 unsafe fn device(instance: &ash::Instance, physical: vk::PhysicalDevice) -> ash::Device {
     let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
-    let core = vk::PhysicalDeviceFeatures::default().shader_int64(true);
+    let core = vk::PhysicalDeviceFeatures::default().shader_int64(true).robust_buffer_access(true);
     let mut v12 = vk::PhysicalDeviceVulkan12Features::default().scalar_block_layout(true).host_query_reset(true);
     let mut v13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).maintenance4(true);
     let offered = unsafe { instance.enumerate_device_extension_properties(physical) }.unwrap();
@@ -113,6 +113,9 @@ impl Engine {
             device: self.device.handle().as_raw(),
             queue: self.queue.as_raw(),
             queue_family: 0,
+            robust_buffer_access: true,
+            cache: None,
+            wait_limit: None,
         }
     }
 
