@@ -57,7 +57,7 @@ impl Denoiser {
         };
         Ok(Self {
             split: Kernel::new(gpu, &Effects::default(), &[(110, demodulation as u32)])?,
-            filter: (row.make)(gpu, settings, size)?,
+            filter: row.compile(gpu, settings, size)?,
             join: Kernel::new(gpu, &Effects::default(), &[])?,
             stats: film.stats.clone(),
             light: film.light.clone(),

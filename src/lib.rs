@@ -1,4 +1,7 @@
 //! Tallow: a Vulkan-native path tracer.
+//!
+//! Damaged images are errors as long as panics unwind: the decoders are other people's, and some assert what a file may
+//! break. A program built with `panic = "abort"` should read no images that it does not trust.
 pub mod allocate;
 #[cfg(feature = "cli")]
 pub mod cli;

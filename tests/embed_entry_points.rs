@@ -109,11 +109,11 @@ fn a_device_that_stops_answering_is_given_up_with_all_that_is_on_it() {
     let gpu = unsafe { Gpu::from_raw(raw) }.unwrap();
     let buffer = Buffer::from_slice(&gpu, "kept", &[1u32]).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
-    hooks::take_calls();
     hooks::WAIT.store(vk::Result::TIMEOUT.as_raw(), SeqCst);
     // Nothing is recorded, so that nothing goes on, and the engine has nothing to wait for.
     let hung = gpu.run(&mut frame, |_| Ok(())).map(drop);
     hooks::WAIT.store(0, SeqCst);
+    hooks::take_calls();
     let error = hung.unwrap_err();
     assert!(matches!(error, Error::DeviceLost(_)) && error.exit_code() == 4);
     let line = error.to_string();
@@ -126,6 +126,8 @@ fn a_device_that_stops_answering_is_given_up_with_all_that_is_on_it() {
     let calls = hooks::take_calls();
     let freed = calls.keys().find(|name| ["Destroy", "Free", "Reset", "Idle"].iter().any(|word| name.contains(word)));
     assert_eq!(freed, None, "{calls:?}");
+    assert_eq!(engine.messages(), Vec::<String>::new());
+    engine.abandon();
 }
 
 /// A device that is slow goes on; passes that begin and end tell it from one that hangs.
@@ -165,7 +167,8 @@ fn a_buffer_is_read_and_written_between_submissions() {
         was_seen.store(is_done.load(SeqCst), SeqCst);
     }));
     std::thread::scope(|scope| {
-        scope.spawn(|| {
+        let (buffer, done) = (&buffer, &done);
+        scope.spawn(move || {
             runs.recv().unwrap();
             assert_eq!(buffer.read().unwrap(), [7]);
             done.store(true, SeqCst);

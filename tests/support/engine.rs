@@ -19,7 +19,7 @@ pub struct Engine {
     messages: Box<Mutex<Vec<String>>>,
     /// The loader may read its list of devices while another thread changes it (Vulkan-Loader's issue 2018); it is for
     /// whoever makes devices to see to that, and the tests of one program run side by side.
-    _alone: MutexGuard<'static, ()>,
+    alone: Option<MutexGuard<'static, ()>>,
 }
 
 static ENGINES: Mutex<()> = Mutex::new(());
@@ -100,7 +100,7 @@ impl Engine {
             let queue = device.get_device_queue(0, 0);
             let pool = device.create_command_pool(&vk::CommandPoolCreateInfo::default(), None).unwrap();
             let messenger = (utils, messenger);
-            Self { _entry: entry, instance, physical, device, queue, pool, messenger, messages, _alone: alone }
+            Self { _entry: entry, instance, physical, device, queue, pool, messenger, messages, alone: Some(alone) }
         }
     }
 
@@ -131,6 +131,12 @@ impl Engine {
             self.device.queue_submit(self.queue, &submit, vk::Fence::null()).unwrap();
             self.device.queue_wait_idle(self.queue).unwrap();
         }
+    }
+
+    /// Leaves the device as it is for ever, with what was left on it.
+    pub fn abandon(mut self) {
+        self.alone = None;
+        std::mem::forget(self);
     }
 
     /// What the layers have said so far.

@@ -166,7 +166,7 @@ fn main() -> Result<()> {
     let input = picture(case.size);
     let planes = Planes::new(&gpu, &input)?;
     let make = |(name, s): &(&'static str, FilterSettings)| {
-        let filter = (row.make)(&gpu, &s.scaled_to(&input), case.size)?;
+        let filter = row.compile(&gpu, &s.scaled_to(&input), case.size)?;
         Ok(Ours { name, filter, runs: Vec::new() })
     };
     let mut ours: Vec<Ours> = case.settings.iter().map(make).collect::<Result<_>>()?;
