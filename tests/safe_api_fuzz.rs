@@ -13,6 +13,8 @@ use tallow::reference::path::{Strategy as Ways, Tracer};
 use tallow::renderer::{Batch, Choice, Outputs, PathRange, Plan, Renderer, Share, Step, called_for, path_push};
 use tallow::scene::Scene;
 use tallow::settings::Settings;
+use tallow::stage::batch::Batches;
+use tallow::stage::guide::Guides;
 
 fn number() -> u32 {
     std::env::var("TALLOW_FUZZ").ok().and_then(|n| n.parse().ok()).unwrap_or(100)
@@ -387,4 +389,16 @@ fn stacks_indices_and_cycles_that_were_believed_once() {
     let mut renderer = Renderer::new(&GPU, &SCENE, Outputs::default()).unwrap();
     assert!(renderer.set_camera(Camera { near: f32::INFINITY, ..SCENE.camera }).is_err());
     assert!(renderer.set_camera(SCENE.camera).is_ok());
+}
+
+/// Kernels whose numbers would make them overrun what they have, or the device.
+#[test]
+fn kernels_of_impossible_numbers_are_refused() {
+    let traced = |workgroup, stack| Guides::with_stack(&GPU, &Effects::default(), workgroup, stack).map(drop);
+    for (workgroup, stack) in [(64, 0), (64, 33), (64, 268_435_455), (0, 8), (1 << 30, 8), (u32::MAX, 8)] {
+        assert!(traced(workgroup, stack).is_err(), "{workgroup} {stack}");
+    }
+    assert!([0, 1025, u32::MAX].iter().all(|&items| Batches::new(&GPU, items).is_err()));
+    assert!(traced(64, 8).is_ok() && Batches::new(&GPU, 64).is_ok(), "control");
+    assert_silent();
 }

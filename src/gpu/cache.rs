@@ -274,7 +274,8 @@ mod tests {
         ["notes.bin", ".tmpnotes", "a-b-c.bin", ".tmpAAAAAA"].iter().for_each(|name| aged(name, 1000));
         aged(".tmpBBBBBB", 0);
         write(&at(&cache(99)), b"data").unwrap();
-        let mut left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+        let name = |entry: std::io::Result<std::fs::DirEntry>| entry.unwrap().file_name().into_string().unwrap();
+        let mut left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(name).collect();
         let newest = (0..KEPT - 1).chain([99]).map(cache);
         let others = ["notes.bin", ".tmpnotes", "a-b-c.bin", ".tmpBBBBBB"].map(String::from);
         let mut expected: Vec<_> = newest.chain(others).collect();
