@@ -8,8 +8,7 @@ use ash::vk;
 use ash::vk::Handle;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
-use std::sync::atomic::Ordering::SeqCst;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
 use std::sync::mpsc;
 use std::time::Duration;
 use support::engine::Engine;
@@ -134,16 +133,17 @@ fn a_device_that_stops_answering_is_given_up_with_all_that_is_on_it() {
 #[test]
 fn a_device_that_goes_on_is_waited_for() {
     let engine = Engine::new();
-    let raw = RawDevice { wait_limit: Some(Duration::from_nanos(1)), ..hooks::between(engine.raw()) };
     // SAFETY: the engine's handles are valid and outlive what is made from them.
-    let gpu = unsafe { Gpu::from_raw(raw) }.unwrap();
+    let gpu = unsafe { Gpu::from_raw(hooks::between(engine.raw())) }.unwrap();
     let buffer = Buffer::from_slice(&gpu, "filled", &[1u32]).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
-    // The first wait begins once a pass has ended.
-    let device = engine.device.clone();
+    // Once a pass has ended, the first wait is over time; the second is not.
+    let (device, waits) = (engine.device.clone(), AtomicUsize::new(0));
     *hooks::BEFORE_WAIT.lock().unwrap() = Some(Box::new(move || {
         // SAFETY: nobody else uses the engine's device.
         unsafe { device.device_wait_idle() }.unwrap();
+        let late = if waits.fetch_add(1, SeqCst) == 0 { vk::Result::TIMEOUT } else { vk::Result::SUCCESS };
+        hooks::WAIT.store(late.as_raw(), SeqCst);
     }));
     let times = gpu.run(&mut frame, |rec| rec.fill(&buffer, 7));
     *hooks::BEFORE_WAIT.lock().unwrap() = None;
