@@ -56,7 +56,7 @@ impl Denoiser {
         };
         Ok(Self {
             split: Kernel::new(gpu, &split::Constants { demodulation: demodulation as u32, ..Default::default() })?,
-            filter: (row.make)(gpu, settings, size)?,
+            filter: row.compile(gpu, settings, size)?,
             join: Kernel::new(gpu, &join::Constants::default())?,
             stats: film.stats.clone(),
             light: film.light.clone(),

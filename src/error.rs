@@ -21,6 +21,9 @@ pub enum Error {
         /// What is wrong and how to mend it.
         what: String,
     },
+    /// A scene whose arrays were edited and no longer fit together.
+    #[error("the scene's arrays do not fit together: {0}: edit all that an index leads to, or load the scene again")]
+    Scene(String),
     /// No Vulkan loader, no usable device, a missing feature, or out of memory.
     #[error("{0}")]
     Device(String),
@@ -57,7 +60,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
-            Self::Input { .. } => 3,
+            Self::Input { .. } | Self::Scene(_) => 3,
             Self::Device(_) | Self::DeviceLost(_) => 4,
             Self::Output { .. } => 5,
         }

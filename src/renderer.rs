@@ -72,8 +72,8 @@ impl Renderer {
     /// Uploads the scene and compiles its kernels for what it calls for.
     ///
     /// # Errors
-    /// [`crate::error::Error::Usage`] for settings out of range, [`crate::error::Error::Device`] when the device
-    /// refuses something.
+    /// [`crate::error::Error::Usage`] for settings out of range, [`crate::error::Error::Scene`] for a scene that
+    /// [`Scene::check`] refuses, [`crate::error::Error::Device`] when the device refuses something.
     pub fn new(gpu: &Gpu, scene: &Scene, outputs: Outputs) -> Result<Self> {
         Self::specialised(gpu, scene, outputs, called_for(scene, outputs))
     }
@@ -86,6 +86,7 @@ impl Renderer {
     pub fn specialised(gpu: &Gpu, scene: &Scene, outputs: Outputs, effects: Effects) -> Result<Self> {
         let settings = scene.settings.clone();
         settings.validate()?;
+        scene.check()?;
         let effects = Effects { split_light: outputs.split_light, counters: outputs.counters, ..effects };
         let (thread, traverse) = (gpu.tuning().thread(), traverse::Constants { stack: scene.stack });
         let stages = Stages {
@@ -212,8 +213,12 @@ impl Renderer {
     /// before `limit` samples.
     ///
     /// # Errors
-    /// [`crate::error::Error::Device`].
+    /// [`crate::error::Error::Usage`] for statistics of another film, [`crate::error::Error::Device`].
     pub fn priorities_of(&self, stats: &[PixelStats], limit: u32) -> Result<Vec<f32>> {
+        let (found, pixels) = (stats.len(), self.settings.pixels());
+        if found != pixels {
+            return Err(Error::Usage(format!("statistics of {found} pixels: the film has {pixels}")));
+        }
         let push = PriorityPush { limit, ..self.priority };
         let guide = self.film.tiles[0].guide.read()?;
         Ok((policy_of(&self.settings)?.reference)(&HostInputs { guide: &guide, stats, priority: &[], push }))
@@ -240,9 +245,11 @@ impl Renderer {
     /// Moves the camera; what was accumulated belongs to the old one, so begin with [`Step::Start`].
     ///
     /// # Errors
+    /// [`crate::error::Error::Scene`] for a number that is not finite, and
     /// [`crate::error::Error::Usage`] for a lens when the scene was loaded with a pinhole: the kernels have no lens then.
     /// Ask [`Renderer::specialised`] for the effect `lens`, or load the scene with one.
     pub fn set_camera(&mut self, camera: Camera) -> Result<()> {
+        scene::check_camera(&camera)?;
         if camera.lens_radius > 0.0 && !self.effects.lens {
             return Err(Error::Usage("this renderer was made without the effect \"lens\"".into()));
         }

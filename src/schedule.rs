@@ -56,7 +56,7 @@ pub struct Plan {
     pub limit: Option<u32>,
     /// What of.
     pub share: Share,
-    /// Times at most that the samples of full pixels are apportioned again; 1 when none can be full.
+    /// Times at most that the samples of full pixels are apportioned again, up to 16; 1 when none can be full.
     pub rounds: u32,
 }
 
@@ -108,6 +108,9 @@ impl Step {
 /// Samples of a pixel in a batch at most: a software device ends loops early (`glsl/shared/rounds.glsl`).
 const SAMPLES_AT_ONCE: u32 = 1 << 15;
 
+/// Times at most that the samples of full pixels are apportioned again.
+const REFILLS: u32 = 16;
+
 /// How the work may be cut. It changes no bit of the result.
 #[derive(Clone, Copy, Debug)]
 pub struct Cut {
@@ -132,7 +135,7 @@ impl Cut {
                     && b.samples <= SAMPLES_AT_ONCE
                     && u64::from(b.first_pixel / self.tile) == (end - 1) / u64::from(self.tile)
             }
-            Step::Allocate(plan) => plan.pixels == self.pixels,
+            Step::Allocate(plan) => plan.pixels == self.pixels && (1..=REFILLS).contains(&plan.rounds),
             Step::Choose(choice) => choice.pixels == self.pixels,
             Step::Listed(range) => (1..=self.paths).contains(&range.paths) && range.round < range.rounds,
         }
@@ -241,7 +244,7 @@ fn allocated(settings: &Settings, learns: bool, cut: &Cut, done: u32) -> impl It
             budget,
             limit: fills.then_some(limit),
             share: if learns { Share::All(total) } else { Share::Next },
-            rounds: if fills { 16 } else { 1 },
+            rounds: if fills { REFILLS } else { 1 },
         };
         once(Step::Allocate(plan)).chain(deal(budget, dealt, paths))
     })
@@ -376,6 +379,7 @@ mod tests {
             batch(20, 11, 1), // two tiles
             of(&list(&settings("geometry", 4, 1, 0, 1), &plan), |s| matches!(s, Step::Allocate(_))),
             of(&list(&settings("threshold", 4, 1, 0, 1), &plan), |s| matches!(s, Step::Choose(_))),
+            Step::Allocate(Plan { pixels: 65, budget: 1, limit: None, share: Share::Next, rounds: u32::MAX }),
             of(&list(&settings("geometry", 4, 1, 0, 1), &wide), |s| matches!(s, Step::Listed(_))),
         ];
         others.iter().for_each(|step| assert!(!cut.has_room_for(step), "{step:?}"));

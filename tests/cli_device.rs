@@ -76,6 +76,29 @@ fn drivers_without_a_device_are_one_line() {
 }
 
 #[test]
+fn a_device_that_cannot_be_set_up_is_closed_before_its_instance() {
+    let folder = tempfile::tempdir().unwrap();
+    let real = stand_in(&folder);
+    let real = ("REAL_LOADER", real.to_str().unwrap());
+    fails(&folder, &[real, ("NO_CACHE", "1")], &["pipeline cache", "out of memory"]);
+    let control = render(&folder, &[real]);
+    assert!(control.status.success(), "the same loader with a cache: {control:?}");
+}
+
+#[cfg(unix)]
+#[test]
+fn compiled_pipelines_are_kept_in_a_folder_of_the_users_own() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let caches = folder.path().join("caches");
+    assert!(render(&folder, &[("XDG_CACHE_HOME", caches.to_str().unwrap())]).status.success());
+    let kept: Vec<_> = std::fs::read_dir(caches.join("tallow")).unwrap().map(|e| e.unwrap().path()).collect();
+    assert!(kept.len() == 1 && kept[0].extension().is_some_and(|e| e == "bin"), "{kept:?}");
+    let mode = std::fs::metadata(caches.join("tallow")).unwrap().permissions().mode();
+    assert_eq!(mode & 0o777, 0o700, "{mode:o}");
+}
+
+#[test]
 fn a_lost_device_is_one_line_and_keeps_the_old_file() {
     let folder = tempfile::tempdir().unwrap();
     let (real, lost) = (stand_in(&folder), ["the device was lost", "run again"]);

@@ -351,7 +351,7 @@ fn a_buffer_too_large_for_its_slot_is_an_error_with_the_limit() {
 #[test]
 fn unusable_choices_of_device_say_what_there_is() {
     let all = tallow::gpu::survey().unwrap();
-    let open = |device: &str| Gpu::open(&DeviceOptions { device: Some(device.into()), validation: false });
+    let open = |device: &str| Gpu::open(&DeviceOptions { device: Some(device.into()), ..DeviceOptions::default() });
     let message = open("no such device").err().unwrap().to_string();
     assert!(all.iter().all(|info| message.contains(&info.name)), "{message}");
     let by_name = open(&all[0].name.to_uppercase()).unwrap();

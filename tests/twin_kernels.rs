@@ -8,6 +8,7 @@ mod twin;
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use std::path::Path;
+use support::kernels::traverse as traverse_kernel;
 use support::{assert_silent, gpu};
 use tallow::gpu::layout::*;
 use tallow::gpu::{Buffer, FrameResources, Gpu, Kernel, Location};
@@ -18,7 +19,7 @@ use tallow::reference::traverse::traverse;
 use tallow::renderer::{Batch, Outputs, Renderer, Step, all_effects, called_for, path_push};
 use tallow::scene::Scene;
 use tallow::settings::{PixelFilter, Settings};
-use tallow::shaders;
+use tallow::shaders::shared;
 use twin::{Aim, BALL, Random, Workplace, aimed_at_seam, ball, instanced_ball};
 
 const SIDE: u32 = 48;
@@ -201,16 +202,16 @@ fn renders_agree_with_their_twins() {
 /// What the kernel finds.
 fn traversed(gpu: &Gpu, scene: &Scene, effects: Effects, rays: &[RayQuery], any_hit: bool) -> Vec<RayHit> {
     let renderer = Renderer::specialised(gpu, scene, Outputs::default(), effects).unwrap();
-    let traverse = shaders::shared::traverse::Constants { stack: scene.stack };
-    let thread = shaders::shared::thread::Constants { workgroup: 32, stripes: 1 };
-    let kernel = Kernel::new(gpu, &shaders::traverse::Constants { effects, thread, traverse }).unwrap();
+    let traverse = shared::traverse::Constants { stack: scene.stack };
+    let thread = shared::thread::Constants { workgroup: 32, stripes: 1 };
+    let kernel = Kernel::new(gpu, &traverse_kernel::Constants { effects, thread, traverse }).unwrap();
     let s = renderer.scene();
     let queries = Buffer::from_slice(gpu, "rays", rays).unwrap();
     let hits = Buffer::new(gpu, "hits", rays.len(), Location::Device).unwrap();
     let push = TraversePush { count: rays.len() as u32, root: path_push(scene).root, any_hit: u32::from(any_hit) };
     let mut frame = FrameResources::new(gpu).unwrap();
     gpu.run(&mut frame, |rec| {
-        let bind = shaders::traverse::Bind { scene: s.bind(), rays: &queries, hits: &hits };
+        let bind = traverse_kernel::Bind { scene: s.bind(), rays: &queries, hits: &hits };
         rec.dispatch_threads(&kernel, bind, &push, rays.len().div_ceil(3) as u32) // some threads have fewer than 3
     })
     .unwrap();

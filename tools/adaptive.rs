@@ -44,7 +44,7 @@ struct Args {
 fn main() -> anyhow::Result<()> {
     let args = Args::parse();
     std::fs::create_dir_all(&args.output).with_context(|| format!("{}", args.output.display()))?;
-    let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), validation: false })?;
+    let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), ..DeviceOptions::default() })?;
     let info = gpu.info();
     println!("device: {}, {} {}\n", info.name, info.driver_name, info.driver_info);
     let all = Part::value_variants().to_vec();

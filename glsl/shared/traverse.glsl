@@ -32,7 +32,7 @@ void push_group(inout uint depth, uvec2 group, bool left) {
     } else {
         stack[depth] = group;
     }
-    depth += uint(left);
+    depth = min(depth + uint(left), STACK); // whatever the nodes are, `stack` is not left: scenes need no more than it has
 }
 
 uvec2 pop_group(inout uint depth) {

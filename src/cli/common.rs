@@ -1,7 +1,7 @@
 //! Options of every command that runs on a device and writes pictures.
 use super::finite;
 use crate::error::Result;
-use crate::gpu::{DeviceOptions, Gpu};
+use crate::gpu::{self, DeviceOptions, Gpu};
 use crate::image::{WriteOptions, tone::ToneMap};
 use crate::settings::entry::Entry;
 use clap::Arg;
@@ -54,7 +54,12 @@ impl Common {
     /// # Errors
     /// [`crate::error::Error::Device`].
     pub fn open(&self) -> Result<Gpu> {
-        Gpu::open(&DeviceOptions { device: self.device.clone(), validation: self.validation })
+        Gpu::open(&DeviceOptions {
+            device: self.device.clone(),
+            validation: self.validation,
+            cache: gpu::cache_folder(),
+            wait_limit: None,
+        })
     }
 
     /// How PNG files are made.

@@ -101,7 +101,7 @@ struct Variant {
 
 impl Variant {
     fn new(args: &Args, scene: &Scene, outputs: Outputs, effects: Effects) -> Result<Self> {
-        let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), validation: false })?;
+        let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), ..DeviceOptions::default() })?;
         let renderer = Renderer::specialised(&gpu, scene, outputs, effects)?;
         let created: f64 = renderer.compile_times().iter().map(|(_, ms)| ms).sum();
         let cost = Cost { gpu_ms: f64::INFINITY, compile_ms: created, bytes: gpu.allocated_bytes() };

@@ -26,8 +26,8 @@ use crate::gpu::{Buffer, FrameResources, Gpu, Location, PassTime, Recorder};
 /// Every filter, in the order of `--help`; the twin and stability tests run each row.
 pub const FILTERS: &[Row] = &[none::ROW, atrous::ROW, bilateral::ROW, guided::ROW, wavelet::ROW, svgf::ROW, auto::ROW];
 
-/// Compiles a filter's kernels and makes its own buffers, for images of (width, height).
-pub type Make = fn(&Gpu, &FilterSettings, [u32; 2]) -> Result<Box<dyn Filter>>;
+/// Compiles a filter's kernels and makes its own buffers, for images of (width, height) that [`check_size`] has seen.
+type Make = fn(&Gpu, &FilterSettings, [u32; 2]) -> Result<Box<dyn Filter>>;
 
 /// One filter.
 pub struct Row {
@@ -35,10 +35,48 @@ pub struct Row {
     pub name: &'static str,
     /// One line of help.
     pub about: &'static str,
-    /// On a device.
-    pub make: Make,
+    /// On a device: see [`Row::compile`].
+    pub(crate) make: Make,
     /// The same on the host, in plain Rust.
     pub reference: fn(&FilterInput, &FilterSettings) -> Vec<vec4>,
+}
+
+impl Row {
+    /// Compiles the filter's kernels and makes its own buffers, for images of (width, height).
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for settings out of range and images without a pixel, [`Error::Device`] when the images are too
+    /// large.
+    pub fn compile(&self, gpu: &Gpu, settings: &FilterSettings, size: [u32; 2]) -> Result<Box<dyn Filter>> {
+        settings.validate()?;
+        if size.contains(&0) {
+            return Err(Error::Usage(format!("an image of {} x {} has no pixel to filter", size[0], size[1])));
+        }
+        check_size(gpu, size, GUIDE_TEXELS)?;
+        Ok(Box::new(Fitted { filter: (self.make)(gpu, settings, size)?, size }))
+    }
+}
+
+/// A filter that takes images of its own size alone.
+struct Fitted {
+    filter: Box<dyn Filter>,
+    size: [u32; 2],
+}
+
+impl Filter for Fitted {
+    fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
+        let pixels = self.size[0] as usize * self.size[1] as usize;
+        let variance = planes.variance.as_ref().map_or(pixels, Buffer::len);
+        let lengths = [planes.radiance.len(), planes.guide.len(), variance, planes.output.len()];
+        if planes.size != self.size || lengths.iter().any(|&length| length != pixels) {
+            let (size, own) = (planes.size, self.size);
+            return Err(Error::Usage(format!(
+                "planes of {size:?} with {lengths:?} pixels (radiance, guide, variance, output): the filter was made for \
+                 {own:?}"
+            )));
+        }
+        self.filter.record(rec, planes)
+    }
 }
 
 /// A filter on a device, for one size and one set of settings.
@@ -46,7 +84,7 @@ pub trait Filter: Send + Sync {
     /// radiance\[P\], guide\[P\], variance\[P\] -> output\[P\]
     ///
     /// # Errors
-    /// [`crate::error::Error::Device`] when the image is too large for the device.
+    /// [`Error::Usage`] for planes of another size, [`Error::Device`] when the image is too large for the device.
     fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()>;
 }
 
@@ -82,7 +120,7 @@ impl Planes {
 
     /// Pixels.
     pub fn pixels(&self) -> u32 {
-        self.size[0] * self.size[1]
+        self.size[0].saturating_mul(self.size[1])
     }
 }
 
@@ -122,9 +160,9 @@ pub const GUIDE_TEXELS: u64 = 3;
 pub fn run(gpu: &Gpu, row: &Row, input: &FilterInput, settings: &FilterSettings) -> Result<(Vec<vec4>, Vec<PassTime>)> {
     settings.validate()?;
     input.validate()?;
-    check_size(gpu, [input.width, input.height], GUIDE_TEXELS)?;
+    check_size(gpu, [input.width, input.height], GUIDE_TEXELS)?; // before anything is uploaded
     let planes = Planes::new(gpu, input)?;
-    let filter = (row.make)(gpu, settings, planes.size)?;
+    let filter = row.compile(gpu, settings, planes.size)?;
     let times = gpu.run(&mut FrameResources::new(gpu)?, |rec| filter.record(rec, &planes))?;
     Ok((planes.output.read()?, times))
 }

@@ -93,12 +93,13 @@ pub struct Untyped {
 }
 
 impl<T: Pod> Buffer<T> {
-    /// Room for `len` values, contents undefined; `name` appears in messages and captures. A length of 0 becomes 1,
-    /// since there is no empty Vulkan buffer.
+    /// Room for `len` values of one or more 32-bit words, contents undefined; `name` appears in messages and captures. A
+    /// length of 0 becomes 1, since there is no empty Vulkan buffer.
     ///
     /// # Errors
     /// [`Error::Device`] with the name, the size and the limit when the device cannot hold it.
     pub fn new(gpu: &Gpu, name: &str, len: usize, location: Location) -> Result<Self> {
+        const { assert!(size_of::<T>() > 0 && size_of::<T>().is_multiple_of(4), "elements are whole words") };
         let len = len.max(1);
         let size = len
             .checked_mul(size_of::<T>())
@@ -149,7 +150,8 @@ impl<T: Pod> Buffer<T> {
         self.len
     }
 
-    /// Replaces elements from `offset` on. The device must not be using them.
+    /// Replaces elements from `offset` on, once what [`Gpu::run`] has submitted is done. Of what was recorded by
+    /// [`super::Recorder::external`], see there.
     ///
     /// # Errors
     /// [`Error::Device`] when they do not fit, or the copy fails.
@@ -161,7 +163,8 @@ impl<T: Pod> Buffer<T> {
         self.untyped.write((self.first + offset) * size_of::<T>(), bytemuck::cast_slice(values))
     }
 
-    /// All elements. The device must not be writing them.
+    /// All elements, once what [`Gpu::run`] has submitted is done. Of what was recorded by
+    /// [`super::Recorder::external`], see there.
     ///
     /// # Errors
     /// [`Error::Device`] when the copy fails.
@@ -169,7 +172,7 @@ impl<T: Pod> Buffer<T> {
         self.read_range(0..self.len)
     }
 
-    /// Some elements. The device must not be writing them.
+    /// Some elements, as [`Self::read`].
     ///
     /// # Errors
     /// [`Error::Device`] when there are not so many, or the copy fails.
@@ -302,17 +305,27 @@ impl Untyped {
     }
 
     fn write(&self, offset: usize, bytes: &[u8]) -> Result<()> {
+        self.gpu.0.answers()?;
         let any = vk::MemoryPropertyFlags::empty();
-        match self.mapped(any, |all| all[offset..offset + bytes.len()].copy_from_slice(bytes)) {
+        let copied = {
+            let _idle = self.gpu.0.idle();
+            self.mapped(any, |all| all[offset..offset + bytes.len()].copy_from_slice(bytes))
+        };
+        match copied {
             Some(()) => Ok(()),
             None => staging::upload(self, offset, bytes),
         }
     }
 
     fn read(&self, offset: usize, bytes: &mut [u8]) -> Result<()> {
+        self.gpu.0.answers()?;
         // Integrated GPUs map memory that only writes are quick to.
         let (length, cached) = (bytes.len(), vk::MemoryPropertyFlags::HOST_CACHED);
-        match self.mapped(cached, |all| bytes.copy_from_slice(&all[offset..offset + length])) {
+        let copied = {
+            let _idle = self.gpu.0.idle();
+            self.mapped(cached, |all| bytes.copy_from_slice(&all[offset..offset + length]))
+        };
+        match copied {
             Some(()) => Ok(()),
             None => staging::download(self, offset, bytes),
         }
@@ -323,15 +336,17 @@ impl Drop for Untyped {
     fn drop(&mut self) {
         let views = std::mem::take(self.views.get_mut().unwrap_or_else(PoisonError::into_inner));
         let memory = self.memory.get_mut().unwrap_or_else(PoisonError::into_inner).take();
-        // SAFETY: not in use, since whoever records a buffer keeps it until the work is complete; destroyed once.
-        unsafe {
-            views.iter().for_each(|(_, view)| self.gpu.0.device.destroy_buffer_view(*view, None));
-            self.gpu.0.device.destroy_buffer(self.raw, None);
-        }
-        if let (Some(memory), Some(allocator)) = (memory, self.gpu.0.lock_allocator().as_mut()) {
-            // It fails only for memory of another allocator.
-            let _ = allocator.free(memory);
-        }
+        self.gpu.0.free(|device| {
+            // SAFETY: not in use, since whoever records a buffer keeps it until the work is complete; destroyed once.
+            unsafe {
+                views.iter().for_each(|(_, view)| device.destroy_buffer_view(*view, None));
+                device.destroy_buffer(self.raw, None);
+            }
+            if let (Some(memory), Some(allocator)) = (memory, self.gpu.0.lock_allocator().as_mut()) {
+                // It fails only for memory of another allocator.
+                let _ = allocator.free(memory);
+            }
+        });
     }
 }
 

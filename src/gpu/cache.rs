@@ -1,15 +1,32 @@
-//! One pipeline cache per device, kept on disk between runs: `tallow/<device, driver, kernels>.bin` in
-//! `$XDG_CACHE_HOME` or `~/.cache`. A cache is a convenience: whatever goes wrong with the file, it is left aside.
+//! One pipeline cache per device, kept on disk between runs where the caller asks for it:
+//! `<device, driver, kernels>.bin` in a folder. A cache is a convenience: whatever goes wrong with the file, it is left
+//! aside. Drivers believe what they get back, so that nothing is read that somebody else could have written.
 use super::At;
 use super::info::Candidate;
 use crate::error::Result;
 use ash::vk;
-use std::io::Write;
+use ash::vk::Handle;
+use std::fs::{File, Metadata};
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
 
 /// The file starts with these, then FNV-1a of the rest, then what the driver returned.
 const MAGIC: &[u8; 8] = b"TALLOWP1";
+/// Bytes of a file at most; all kernels of a driver are a few million.
+const LARGEST: u64 = 64 << 20;
+/// Caches that are kept at most: of other devices, and of earlier drivers and kernels, the newest.
+const KEPT: usize = 16;
+/// A file in the making that is older was left behind by a run that was ended.
+const ABANDONED: Duration = Duration::from_secs(3600);
 
+/// `tallow` in `$XDG_CACHE_HOME` or `~/.cache`, where the command line keeps compiled pipelines.
+pub fn cache_folder() -> Option<PathBuf> {
+    let path = |name| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
+    Some(path("XDG_CACHE_HOME").or_else(|| Some(path("HOME")?.join(".cache")))?.join("tallow"))
+}
+
+#[derive(Default)]
 pub(super) struct PipelineCache {
     pub raw: vk::PipelineCache,
     file: Option<PathBuf>,
@@ -20,21 +37,24 @@ pub(super) struct PipelineCache {
 impl PipelineCache {
     /// # Errors
     /// The device is out of memory.
-    pub fn new(device: &ash::Device, candidate: &Candidate) -> Result<Self> {
-        let file = folder().map(|folder| folder.join(file_name(candidate)));
+    pub fn new(device: &ash::Device, candidate: &Candidate, folder: Option<PathBuf>) -> Result<Self> {
+        let file = folder.map(|folder| folder.join(file_name(candidate)));
         let data = file.as_deref().and_then(read).filter(|data| fits(data, candidate)).unwrap_or_default();
         let info = vk::PipelineCacheCreateInfo::default().initial_data(&data);
-        // SAFETY: the data came from this driver (file name, checksum, header); drivers check it once more.
+        // SAFETY: the data came from this driver (file name, checksum, header), and nobody but the user could write them.
         let raw = unsafe { device.create_pipeline_cache(&info, None) }.at("pipeline cache")?;
         Ok(Self { raw, file, loaded: checksum(&data) })
     }
 
     /// # Safety
-    /// `device` made this cache, nothing uses it, and it is not used again.
+    /// `device` made this cache, if any did; nothing uses it, and it is not used again.
     pub unsafe fn store_and_destroy(&self, device: &ash::Device) {
-        // SAFETY: by contract.
-        let data = unsafe { device.get_pipeline_cache_data(self.raw) };
-        if let (Ok(data), Some(file)) = (data, &self.file)
+        if self.raw.is_null() {
+            return;
+        }
+        if let Some(file) = &self.file
+            // SAFETY: by contract.
+            && let Ok(data) = unsafe { device.get_pipeline_cache_data(self.raw) }
             && checksum(&data) != self.loaded
         {
             // No error is worth failing for: the next run compiles again.
@@ -44,33 +64,113 @@ impl PipelineCache {
     }
 }
 
-fn folder() -> Option<PathBuf> {
-    let path = |name| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
-    Some(path("XDG_CACHE_HOME").or_else(|| Some(path("HOME")?.join(".cache")))?.join("tallow"))
-}
-
 fn file_name(candidate: &Candidate) -> String {
     let uuid: String = candidate.cache_uuid.iter().map(|byte| format!("{byte:02x}")).collect();
     format!("{uuid}-{}-{:016x}.bin", candidate.info.driver_version, crate::shaders::HASH)
 }
 
-/// The driver's data, if the file is whole.
+/// The driver's data, if the file is whole and nobody else's.
 fn read(file: &Path) -> Option<Vec<u8>> {
-    let bytes = std::fs::read(file).ok()?;
+    let folder = std::fs::metadata(file.parent()?).ok()?;
+    if !(folder.is_dir() && is_private(&folder)) {
+        return None;
+    }
+    let mut bytes = Vec::new();
+    let file = open(file).filter(|file| file.metadata().is_ok_and(|kind| kind.is_file() && is_private(&kind)))?;
+    file.take(LARGEST + 1).read_to_end(&mut bytes).ok()?;
     let (sum, data) = bytes.strip_prefix(MAGIC)?.split_first_chunk::<8>()?;
-    (checksum(data) == u64::from_le_bytes(*sum)).then(|| data.to_vec())
+    (bytes.len() as u64 <= LARGEST && checksum(data) == u64::from_le_bytes(*sum)).then(|| data.to_vec())
 }
 
 /// Written beside its target and renamed, so that a reader sees all of it or none.
 fn write(file: &Path, data: &[u8]) -> std::io::Result<()> {
     let folder = file.parent().unwrap_or(Path::new("."));
-    std::fs::create_dir_all(folder)?;
+    make_folder(folder)?;
+    if !is_private(&std::fs::metadata(folder)?) {
+        return Err(std::io::Error::other("the folder is not the user's alone"));
+    }
     let mut temporary = tempfile::NamedTempFile::new_in(folder)?;
     temporary.write_all(MAGIC)?;
     temporary.write_all(&checksum(data).to_le_bytes())?;
     temporary.write_all(data)?;
     temporary.persist(file)?;
-    Ok(())
+    prune(folder)
+}
+
+/// Removes files in the making that nobody finished, and all but the newest caches.
+fn prune(folder: &Path) -> std::io::Result<()> {
+    let (mut temporary, mut caches) = (Vec::new(), Vec::new());
+    for entry in std::fs::read_dir(folder)? {
+        let entry = entry?;
+        let (name, changed) = (entry.file_name(), entry.metadata()?.modified()?);
+        match name.to_str() {
+            Some(name) if name.starts_with(".tmp") && name.len() == 10 => temporary.push((changed, entry.path())),
+            Some(name) if is_cache(name) => caches.push((changed, entry.path())),
+            _ => {}
+        }
+    }
+    caches.sort_by_key(|(changed, _)| std::cmp::Reverse(*changed));
+    let since = SystemTime::now().checked_sub(ABANDONED);
+    let left = temporary.into_iter().filter(|(changed, _)| since.is_some_and(|since| *changed < since));
+    left.chain(caches.into_iter().skip(KEPT)).try_for_each(|(_, path)| std::fs::remove_file(path))
+}
+
+/// Whether [`file_name`] makes such names.
+fn is_cache(name: &str) -> bool {
+    let hex = |part: &str, digits| part.len() == digits && part.bytes().all(|b| b.is_ascii_hexdigit());
+    let parts = name.strip_suffix(".bin").and_then(|name| name.split_once('-'));
+    parts
+        .and_then(|(uuid, rest)| Some((uuid, rest.rsplit_once('-')?.1)))
+        .is_some_and(|(uuid, kernels)| hex(uuid, 2 * vk::UUID_SIZE) && hex(kernels, 16))
+}
+
+/// Opens what is at the path itself, no matter what it is, without waiting.
+#[cfg(unix)]
+fn open(path: &Path) -> Option<File> {
+    use rustix::fs::{Mode, OFlags};
+    let flags = OFlags::RDONLY | OFlags::NOFOLLOW | OFlags::NONBLOCK | OFlags::CLOEXEC;
+    Some(rustix::fs::open(path, flags, Mode::empty()).ok()?.into())
+}
+
+#[cfg(not(unix))]
+fn open(path: &Path) -> Option<File> {
+    std::fs::symlink_metadata(path).ok().filter(Metadata::is_file)?;
+    File::open(path).ok()
+}
+
+/// Whether it is the user's, and nobody else may write it. Root is not at home in a user's folder.
+#[cfg(unix)]
+fn is_private(kind: &Metadata) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    owned_alone(kind.uid(), kind.mode(), rustix::process::geteuid().as_raw())
+}
+
+#[cfg(unix)]
+fn owned_alone(owner: u32, mode: u32, user: u32) -> bool {
+    owner == user && mode & 0o022 == 0
+}
+
+#[cfg(not(unix))]
+fn is_private(_: &Metadata) -> bool {
+    true
+}
+
+/// Makes the folder and those above it, open to nobody else; but none below a folder of somebody else's, where `sudo` can
+/// lead and where the owner could no longer use it.
+#[cfg(unix)]
+fn make_folder(folder: &Path) -> std::io::Result<()> {
+    use std::os::unix::fs::{DirBuilderExt, MetadataExt};
+    let above = folder.ancestors().find_map(|above| std::fs::metadata(above).ok());
+    let me = rustix::process::geteuid().as_raw();
+    if above.is_some_and(|above| ![me, 0].contains(&above.uid())) {
+        return Err(std::io::Error::other("the folder above is another user's"));
+    }
+    std::fs::DirBuilder::new().recursive(true).mode(0o700).create(folder)
+}
+
+#[cfg(not(unix))]
+fn make_folder(folder: &Path) -> std::io::Result<()> {
+    std::fs::create_dir_all(folder)
 }
 
 /// Whether the header (`VkPipelineCacheHeaderVersionOne`) names this very device.
@@ -82,7 +182,7 @@ fn fits(data: &[u8], candidate: &Candidate) -> bool {
         && data.get(16..32) == Some(&candidate.cache_uuid)
 }
 
-/// FNV-1a, 64 bits.
+/// FNV-1a, 64 bits: against accidents.
 fn checksum(data: &[u8]) -> u64 {
     data.iter().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0000_0100_0000_01b3))
 }
@@ -106,6 +206,82 @@ mod tests {
         *flipped.last_mut().unwrap() ^= 1;
         std::fs::write(&file, flipped).unwrap();
         assert_eq!(read(&file), None);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn only_files_of_the_users_own_are_read() {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let mode = |path: &Path, mode| std::fs::set_permissions(path, PermissionsExt::from_mode(mode)).unwrap();
+        write(&at("cache.bin"), b"data").unwrap();
+        for wide in [0o620, 0o602] {
+            mode(&at("cache.bin"), wide);
+            assert_eq!(read(&at("cache.bin")), None, "{wide:o}");
+        }
+        mode(&at("cache.bin"), 0o600);
+        assert!(read(&at("cache.bin")).is_some(), "control");
+        for (name, target) in [("link", at("cache.bin")), ("zero", "/dev/zero".into()), ("loop", at("loop"))] {
+            symlink(target, at(name)).unwrap();
+            assert_eq!(read(&at(name)), None, "{name}");
+        }
+        rustix::fs::mknodat(rustix::fs::CWD, at("pipe"), rustix::fs::FileType::Fifo, 0o600.into(), 0).unwrap();
+        assert_eq!(read(&at("pipe")), None, "a pipe that nobody writes to");
+        std::fs::create_dir(at("folder")).unwrap();
+        assert_eq!(read(&at("folder")), None);
+        mode(folder.path(), 0o777);
+        assert_eq!(read(&at("cache.bin")), None, "anybody may have put it there");
+        assert!(write(&at("other.bin"), b"data").is_err());
+        mode(folder.path(), 0o700);
+        assert!(read(&at("cache.bin")).is_some(), "control");
+        assert!(!owned_alone(1000, 0o600, 0), "root believes no user");
+        assert!(!owned_alone(0, 0o600, 1000) && owned_alone(1000, 0o755, 1000));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn folders_are_closed_to_others() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        write(&folder.path().join("a/b/cache.bin"), b"data").unwrap();
+        for made in ["a", "a/b", "a/b/cache.bin"] {
+            let mode = std::fs::metadata(folder.path().join(made)).unwrap().permissions().mode();
+            assert_eq!(mode & 0o077, 0, "{made}: {mode:o}");
+        }
+    }
+
+    #[test]
+    fn a_file_larger_than_any_cache_is_not_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("cache.bin");
+        write(&path, &vec![0; LARGEST as usize - 16]).unwrap();
+        assert!(read(&path).is_some());
+        write(&path, &vec![0; LARGEST as usize - 15]).unwrap();
+        assert_eq!(read(&path), None);
+    }
+
+    #[test]
+    fn what_earlier_runs_left_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let aged = |name: &str, hours| {
+            let file = File::create(at(name)).unwrap();
+            file.set_modified(SystemTime::now() - Duration::from_secs(hours * 3600)).unwrap();
+        };
+        let cache = |n: usize| format!("{n:032x}-1.2.3-{n:016x}.bin");
+        (0..20).for_each(|n| aged(&cache(n), 100 + n as u64));
+        ["notes.bin", ".tmpnotes", "a-b-c.bin", ".tmpAAAAAA"].iter().for_each(|name| aged(name, 1000));
+        aged(".tmpBBBBBB", 0);
+        write(&at(&cache(99)), b"data").unwrap();
+        let name = |entry: std::io::Result<std::fs::DirEntry>| entry.unwrap().file_name().into_string().unwrap();
+        let mut left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(name).collect();
+        let newest = (0..KEPT - 1).chain([99]).map(cache);
+        let others = ["notes.bin", ".tmpnotes", "a-b-c.bin", ".tmpBBBBBB"].map(String::from);
+        let mut expected: Vec<_> = newest.chain(others).collect();
+        left.sort();
+        expected.sort();
+        assert_eq!(left, expected);
     }
 
     /// VkPipelineCacheHeaderVersionOne: its length, 1, the vendor, the device, 16 bytes of the driver's.

@@ -28,7 +28,11 @@ impl Commands {
     }
 
     /// Starts anew; what was recorded before is dropped.
+    ///
+    /// # Errors
+    /// The device is out of memory, or was abandoned.
     pub fn begin(&self) -> Result<()> {
+        self.gpu.0.answers()?;
         let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the buffer is not executing, since every submission is waited for.
         unsafe {
@@ -38,15 +42,25 @@ impl Commands {
         }
     }
 
-    /// Ends, submits, waits. `last_pass` names what was running when the device was lost, if anybody can tell.
-    pub fn submit_and_wait(&self, last_pass: impl FnOnce() -> Option<&'static str>) -> Result<()> {
+    /// Ends, submits, waits as long as `progress` goes on. `last_pass` names what was running when the device was lost, if
+    /// anybody can tell.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::Device`]. Nothing of the submission runs then, unless the device was abandoned.
+    pub fn submit_and_wait(
+        &self,
+        progress: impl Fn() -> usize,
+        last_pass: impl FnOnce() -> Option<&'static str>,
+    ) -> Result<()> {
         // SAFETY: the buffer is recording.
         unsafe { self.gpu.0.device.end_command_buffer(self.buffer) }.at("recording")?;
-        self.gpu.0.submit_and_wait(self.buffer, self.fence).map_err(|code| match (code, last_pass()) {
-            (vk::Result::ERROR_DEVICE_LOST, Some(pass)) => {
-                Error::DeviceLost(format!("{}; the last pass to start was \"{pass}\"", explain("running", code)))
+        self.gpu.0.submit_and_wait(self.buffer, self.fence, progress).map_err(|code| {
+            match (explain("running", code), last_pass()) {
+                (Error::DeviceLost(what), Some(pass)) => {
+                    Error::DeviceLost(format!("{what}; the last pass to start was \"{pass}\""))
+                }
+                (error, _) => error,
             }
-            _ => explain("running", code),
         })
     }
 }
@@ -54,9 +68,9 @@ impl Commands {
 impl Drop for Commands {
     fn drop(&mut self) {
         // SAFETY: made on this device, not executing, destroyed once. Freeing the pool frees the buffer.
-        unsafe {
-            self.gpu.0.device.destroy_command_pool(self.pool, None);
-            self.gpu.0.device.destroy_fence(self.fence, None);
-        }
+        self.gpu.0.free(|device| unsafe {
+            device.destroy_command_pool(self.pool, None);
+            device.destroy_fence(self.fence, None);
+        });
     }
 }

@@ -97,7 +97,9 @@ impl Descriptors {
 impl Drop for Descriptors {
     fn drop(&mut self) {
         // SAFETY: made on this device, not in use (the frame's contract), destroyed once.
-        self.pools.iter().for_each(|pool| unsafe { self.gpu.0.device.destroy_descriptor_pool(*pool, None) });
+        self.gpu.0.free(|device| {
+            self.pools.iter().for_each(|pool| unsafe { device.destroy_descriptor_pool(*pool, None) });
+        });
     }
 }
 

@@ -1,6 +1,6 @@
 //! Opening a device, and what the rest of the layer needs of it.
 use super::cache::PipelineCache;
-use super::info::{self, Candidate, DeviceInfo, Features};
+use super::info::{self, Candidate, DeviceInfo, DeviceKind, Features};
 use super::instance::{Instance, Messages};
 use super::{At, FrameResources, PassTime, Recorder, timing};
 use crate::error::{Error, Result};
@@ -8,9 +8,17 @@ use ash::vk::Handle;
 use ash::{ext, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::ffi::CString;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::mem::ManuallyDrop;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockWriteGuard};
+use std::time::Duration;
 
-/// Which device, and whether to watch it.
+/// How long a GPU is waited for while no pass begins or ends, unless it is said otherwise: passes are cut to take a
+/// fraction of a second, so that a machine a thousand times slower is still waited for.
+const WAIT_LIMIT: Duration = Duration::from_secs(600);
+
+/// Which device, and how to treat it.
 #[derive(Clone, Debug, Default)]
 pub struct DeviceOptions {
     /// Index in [`super::survey`], or a part of the device's name in any case. `None` prefers discrete over
@@ -18,13 +26,20 @@ pub struct DeviceOptions {
     pub device: Option<String>,
     /// Run under the validation layers with synchronization validation; see [`Gpu::validation_messages`].
     pub validation: bool,
+    /// Folder where compiled pipelines are kept from run to run, such as [`super::cache_folder`]; made where it is missing.
+    /// Drivers trust what they read back, so that only files are read that nobody but the user can write. `None`: nothing
+    /// is kept.
+    pub cache: Option<PathBuf>,
+    /// How long to wait while no pass of a submission begins or ends: then the device is given up as lost. `None`: 10
+    /// minutes, and for ever on CPUs, whose drivers end endless loops by themselves and whose passes can take hours.
+    pub wait_limit: Option<Duration>,
 }
 
 /// An open device. Clones share it; it closes when the last buffer, kernel and frame made with it is gone.
 #[derive(Clone)]
 pub struct Gpu(pub(super) Arc<Inner>);
 
-/// Fields drop in order, after [`Drop::drop`] has destroyed what they hold: the instance goes last.
+/// [`Drop::drop`] destroys what the fields hold, the instance last.
 pub(super) struct Inner {
     pub device: ash::Device,
     pub physical: vk::PhysicalDevice,
@@ -35,10 +50,26 @@ pub(super) struct Inner {
     pub info: DeviceInfo,
     calibrated: Option<ext::calibrated_timestamps::Device>,
     queue: Mutex<vk::Queue>,
-    /// `None` only while dropping.
+    /// Shared by submissions from before they are submitted until they are done; the host's accesses to memory exclude them.
+    running: RwLock<()>,
+    /// Nanoseconds.
+    wait_limit: u64,
+    /// Whether work may run for ever: nothing is freed any more, since that work may use it.
+    abandoned: AtomicBool,
+    /// `None` only while making and dropping.
     allocator: Mutex<Option<Allocator>>,
-    owned: bool,
-    instance: Instance,
+    instance: ManuallyDrop<Instance>,
+}
+
+/// What there is once a device is open.
+pub(super) struct Opened {
+    pub instance: Instance,
+    pub candidate: Candidate,
+    pub queue_family: u32,
+    pub device: ash::Device,
+    pub queue: vk::Queue,
+    pub debug: Option<ext::debug_utils::Device>,
+    pub calibrated: Option<ext::calibrated_timestamps::Device>,
 }
 
 impl Gpu {
@@ -59,43 +90,43 @@ impl Gpu {
         drop(alone);
         // SAFETY: the device was made with one queue of this family.
         let queue = unsafe { device.get_device_queue(queue_family, 0) };
-        Self::assemble(instance, candidate, queue_family, device, queue, (debug, calibrated))
+        let opened = Opened { instance, candidate, queue_family, device, queue, debug, calibrated };
+        Self::assemble(opened, options.cache.clone(), options.wait_limit)
     }
 
     /// Puts the parts together; on failure an owned device is destroyed.
-    pub(super) fn assemble(
-        instance: Instance,
-        candidate: Candidate,
-        queue_family: u32,
-        device: ash::Device,
-        queue: vk::Queue,
-        (debug, calibrated): (Option<ext::debug_utils::Device>, Option<ext::calibrated_timestamps::Device>),
-    ) -> Result<Self> {
-        let cache = PipelineCache::new(&device, &candidate);
-        let gpu = Self(Arc::new(Inner {
+    pub(super) fn assemble(opened: Opened, cache: Option<PathBuf>, wait_limit: Option<Duration>) -> Result<Self> {
+        let Opened { instance, candidate, queue_family, device, queue, debug, calibrated } = opened;
+        let limit =
+            wait_limit.unwrap_or(if candidate.info.kind == DeviceKind::Cpu { Duration::MAX } else { WAIT_LIMIT });
+        // From here on Drop cleans up, whichever line below fails.
+        let mut inner = Inner {
             physical: candidate.physical,
             queue_family,
             limits: candidate.limits,
-            cache: cache?,
+            cache: PipelineCache::default(),
             debug,
-            info: candidate.info,
+            info: candidate.info.clone(),
             calibrated,
             queue: Mutex::new(queue),
+            running: RwLock::new(()),
+            wait_limit: limit.as_nanos().try_into().unwrap_or(u64::MAX),
+            abandoned: AtomicBool::new(false),
             allocator: Mutex::new(None),
-            owned: instance.owned,
             device,
-            instance,
-        }));
+            instance: ManuallyDrop::new(instance),
+        };
+        inner.cache = PipelineCache::new(&inner.device, &candidate, cache)?;
         let allocator = Allocator::new(&AllocatorCreateDesc {
-            instance: gpu.0.instance.raw.clone(),
-            device: gpu.0.device.clone(),
-            physical_device: gpu.0.physical,
+            instance: inner.instance.raw.clone(),
+            device: inner.device.clone(),
+            physical_device: inner.physical,
             debug_settings: Default::default(),
             buffer_device_address: false,
             allocation_sizes: Default::default(),
         });
-        *gpu.0.lock_allocator() = Some(allocator.map_err(|e| Error::Device(format!("memory allocator: {e}")))?);
-        Ok(gpu)
+        *inner.lock_allocator() = Some(allocator.map_err(|e| Error::Device(format!("memory allocator: {e}")))?);
+        Ok(Self(Arc::new(inner)))
     }
 
     /// What the device is and can do.
@@ -170,21 +201,78 @@ impl Inner {
         self.allocator.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Submits one command buffer and waits for `fence`.
+    /// Submits one command buffer and waits for `fence`, as long as `progress`, which begins at 0, changes within the limit.
+    ///
+    /// # Errors
+    /// Those of Vulkan, `TIMEOUT` included. Nothing of the submission runs then, unless the device was abandoned.
     pub fn submit_and_wait(
         &self,
         commands: vk::CommandBuffer,
         fence: vk::Fence,
+        progress: impl Fn() -> usize,
     ) -> std::result::Result<(), vk::Result> {
         let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
         let submit = [vk::SubmitInfo2::default().command_buffer_infos(&buffers)];
+        let _running = self.running.read().unwrap_or_else(PoisonError::into_inner);
         // SAFETY: the buffer is complete, the fence unsignalled, and the lock keeps the queue to this thread.
         unsafe {
             self.device.reset_fences(&[fence])?;
-            let queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
-            self.device.queue_submit2(*queue, &submit, fence)?;
-            drop(queue);
-            self.device.wait_for_fences(&[fence], true, u64::MAX)
+            self.device.queue_submit2(*self.lock_queue(), &submit, fence)?;
+        }
+        self.wait(fence, progress).inspect_err(|failure| self.settle(*failure))
+    }
+
+    fn wait(&self, fence: vk::Fence, progress: impl Fn() -> usize) -> std::result::Result<(), vk::Result> {
+        let mut before = 0;
+        loop {
+            // SAFETY: a live fence, submitted just before.
+            match unsafe { self.device.wait_for_fences(&[fence], true, self.wait_limit) } {
+                Err(vk::Result::TIMEOUT) => match progress() {
+                    now if now == before => return Err(vk::Result::TIMEOUT),
+                    now => before = now,
+                },
+                done => return done,
+            }
+        }
+    }
+
+    /// After a wait that failed: makes sure that nothing is freed which still runs. What is lost runs no more; what hangs
+    /// would be waited for in vain.
+    fn settle(&self, failure: vk::Result) {
+        let stopped = match failure {
+            vk::Result::ERROR_DEVICE_LOST => true,
+            vk::Result::TIMEOUT => false,
+            // SAFETY: the lock keeps the queue to this thread. Other queues, of an engine's device, have work of others.
+            _ => matches!(
+                unsafe { self.device.queue_wait_idle(*self.lock_queue()) },
+                Ok(()) | Err(vk::Result::ERROR_DEVICE_LOST)
+            ),
+        };
+        self.abandoned.fetch_or(!stopped, Ordering::SeqCst);
+    }
+
+    fn lock_queue(&self) -> MutexGuard<'_, vk::Queue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Until it is dropped, no submission runs.
+    pub fn idle(&self) -> RwLockWriteGuard<'_, ()> {
+        self.running.write().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// # Errors
+    /// [`Error::DeviceLost`] when work was left behind on the device that may run for ever.
+    pub fn answers(&self) -> Result<()> {
+        match self.abandoned.load(Ordering::SeqCst) {
+            false => Ok(()),
+            true => Err(Error::DeviceLost("the device stopped answering before: open another".into())),
+        }
+    }
+
+    /// Destroys something with `destroy`, unless work was left behind that may use it.
+    pub fn free(&self, destroy: impl FnOnce(&ash::Device)) {
+        if self.answers().is_ok() {
+            destroy(&self.device);
         }
     }
 
@@ -203,15 +291,22 @@ impl Inner {
 
 impl Drop for Inner {
     fn drop(&mut self) {
+        if self.answers().is_err() {
+            // Work of it may run for ever, and the loader and the driver with it.
+            std::mem::forget(self.lock_allocator().take());
+            return;
+        }
         // SAFETY: nothing made on the device is left (all of it keeps this), and none of it is in use: whoever
-        // submits through the layer waits, and `Recorder::external` makes its caller promise so.
+        // submits through the layer waits, and `Recorder::external` makes its caller promise so. The instance is dropped
+        // once, here.
         unsafe {
             self.cache.store_and_destroy(&self.device);
             *self.lock_allocator() = None;
-            if self.owned {
+            if self.instance.owned {
                 let _alone = one_at_a_time();
                 self.device.destroy_device(None);
             }
+            ManuallyDrop::drop(&mut self.instance);
         }
     }
 }
@@ -274,6 +369,8 @@ fn create_device(
     let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&[1.0])];
     let extensions: Vec<_> = calibrated.then_some(ext::calibrated_timestamps::NAME.as_ptr()).into_iter().collect();
     let mut features = Features::required();
+    // Every device has it.
+    features.core.robust_buffer_access = vk::TRUE;
     let info = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_extension_names(&extensions)

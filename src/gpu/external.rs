@@ -1,15 +1,18 @@
 //! A device that an engine made, handed over as raw handles so that Vulkan bindings and their versions need not match.
 use super::Gpu;
-use super::device::{one_at_a_time, usable};
+use super::device::{Opened, one_at_a_time, usable};
 use super::info;
 use super::instance::Instance;
 use crate::error::{Error, Result};
 use ash::vk::Handle;
 use ash::{ext, vk};
 use std::ffi::{CStr, c_void};
+use std::path::PathBuf;
+use std::time::Duration;
 
-/// The caller's handles, as the numbers that Vulkan's C interface uses (pointers for dispatchable handles).
-#[derive(Clone, Copy, Debug)]
+/// The caller's handles, as the numbers that Vulkan's C interface uses (pointers for dispatchable handles), and how to treat
+/// the device.
+#[derive(Clone, Debug)]
 pub struct RawDevice {
     /// `vkGetInstanceProcAddr` of the loader that made the rest.
     pub get_instance_proc_addr: *const c_void,
@@ -23,6 +26,12 @@ pub struct RawDevice {
     pub queue: u64,
     /// Index of a family with compute.
     pub queue_family: u32,
+    /// Whether the device was made with `robustBufferAccess` enabled, which every device has; see [`Gpu::from_raw`].
+    pub robust_buffer_access: bool,
+    /// See [`super::DeviceOptions::cache`].
+    pub cache: Option<PathBuf>,
+    /// See [`super::DeviceOptions::wait_limit`].
+    pub wait_limit: Option<Duration>,
 }
 
 impl Gpu {
@@ -33,6 +42,11 @@ impl Gpu {
     /// - The handles are valid, belong together, and outlive everything made from the returned `Gpu`.
     /// - The device was made with every one of [`super::REQUIRED_FEATURES`] enabled.
     /// - Nobody else uses the queue while [`Gpu::run`] or a [`super::Buffer`]'s reads and writes do.
+    /// - Without `robust_buffer_access`, kernels get nothing to read but what a [`Renderer`](crate::renderer::Renderer), a
+    ///   [`Denoiser`](crate::denoiser::Denoiser) and [`filter::run`](crate::filter::run) give them by themselves, which is
+    ///   checked: no [`super::Buffer`] of theirs is written, no stage, policy or filter recorded apart from them, and no
+    ///   step but those of [`Renderer::steps`](crate::renderer::Renderer::steps) in their order. What is out of a buffer's
+    ///   bounds would be read and written.
     ///
     /// # Errors
     /// [`Error::Device`] when a handle is null, the device cannot do what is required, or the family cannot compute.
@@ -57,7 +71,8 @@ impl Gpu {
         let device = unsafe { ash::Device::load(instance.fp_v1_0(), vk::Device::from_raw(raw.device)) };
         let physical = vk::PhysicalDevice::from_raw(raw.physical_device);
         check_family(&instance, physical, raw.queue_family)?;
-        let candidate = info::describe(&instance, physical, Some(raw.queue_family));
+        let mut candidate = info::describe(&instance, physical, Some(raw.queue_family));
+        candidate.info.robust_buffer_access = raw.robust_buffer_access;
         usable(&candidate)?;
         let labels = [c"vkCmdBeginDebugUtilsLabelEXT", c"vkCmdEndDebugUtilsLabelEXT", c"vkSetDebugUtilsObjectNameEXT"];
         let has = |names: &[&CStr]| enabled(&instance, &device, names);
@@ -67,7 +82,9 @@ impl Gpu {
         drop(alone);
         let queue = vk::Queue::from_raw(raw.queue);
         let instance = Instance::borrowed(entry, instance);
-        Self::assemble(instance, candidate, raw.queue_family, device, queue, (debug, calibrated))
+        let queue_family = raw.queue_family;
+        let opened = Opened { instance, candidate, queue_family, device, queue, debug, calibrated };
+        Self::assemble(opened, raw.cache, raw.wait_limit)
     }
 }
 

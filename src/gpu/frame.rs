@@ -46,7 +46,11 @@ impl FrameResources {
 
     /// Ready for the next recording. The work of the last one is complete: `Gpu::run` waits, and
     /// `Recorder::external` makes its caller promise so.
+    ///
+    /// # Errors
+    /// The device was abandoned, with the work on it.
     pub(super) fn reset(&mut self) -> Result<()> {
+        self.gpu().0.answers()?;
         self.timer.reset();
         self.hazards.clear();
         self.kernels.clear();
@@ -61,7 +65,7 @@ impl FrameResources {
     }
 
     pub(super) fn submit_and_wait(&self) -> Result<()> {
-        self.commands.submit_and_wait(|| self.timer.last_started())
+        self.commands.submit_and_wait(|| self.timer.written(), || self.timer.last_started())
     }
 
     /// Keeps a kernel until the next reset.

@@ -140,6 +140,9 @@ pub struct DeviceInfo {
     pub timestamp_bits: u32,
     /// Nanoseconds per tick.
     pub timestamp_period: f32,
+    /// Whether kernels that read or write out of a buffer's bounds reach nothing else (`robustBufferAccess`): always on
+    /// devices that are opened here; of one that was handed over, what its maker said.
+    pub robust_buffer_access: bool,
     /// Names of required features that the device lacks.
     pub missing: Vec<&'static str>,
 }
@@ -205,6 +208,7 @@ pub(super) fn describe(instance: &ash::Instance, physical: vk::PhysicalDevice, q
             .and_then(|f| families.get(f as usize))
             .map_or(0, |family| family.timestamp_valid_bits),
         timestamp_period: basic.limits.timestamp_period,
+        robust_buffer_access: true,
         missing: Features::supported(instance, physical, basic.api_version).missing(),
     };
     let (cache_uuid, limits) = (basic.pipeline_cache_uuid, basic.limits);

@@ -42,7 +42,47 @@ pub struct Slot {
 }
 
 /// What a kernel binds; the build script implements it for the `Bind` struct of every kernel.
-pub trait Bindings {
+///
+/// # Safety
+/// - [`Self::SPIRV`] is valid code for Vulkan 1.3 and the features in [`super::REQUIRED_FEATURES`], with an entry point
+///   `main` for compute; [`Self::SLOTS`] are its descriptors, all in set 0, with numbers that differ.
+/// - [`Self::Push`] is its push constants: at most 128 bytes, a multiple of 4.
+/// - [`Self::buffers`] returns as many as there are slots.
+/// - Whatever buffers, push constants and specialisation constants its owner lets others choose, it accesses nothing but
+///   its buffers. Accesses beyond their ends are allowed on devices with robust buffer access; those beyond the ends of
+///   its own arrays are not.
+///
+/// Safe code cannot implement it:
+/// ```compile_fail,E0200
+/// # use tallow::gpu::{Bindings, Bound, Slot};
+/// struct Mine;
+/// impl Bindings for Mine {
+///     type Push = u32;
+///     type Constants = ();
+///     const NAME: &'static str = "mine";
+///     const SPIRV: &'static [u8] = &[0; 64];
+///     const SLOTS: &'static [Slot] = &[];
+///     fn buffers(&self) -> Vec<Bound<'_>> {
+///         Vec::new()
+///     }
+/// }
+/// ```
+/// The same by somebody who vouches for it:
+/// ```
+/// # use tallow::gpu::{Bindings, Bound, Slot};
+/// struct Mine;
+/// unsafe impl Bindings for Mine {
+///     type Push = u32;
+///     type Constants = ();
+///     const NAME: &'static str = "mine";
+///     const SPIRV: &'static [u8] = &[0; 64];
+///     const SLOTS: &'static [Slot] = &[];
+///     fn buffers(&self) -> Vec<Bound<'_>> {
+///         Vec::new()
+///     }
+/// }
+/// ```
+pub unsafe trait Bindings {
     /// The push constants, at most 128 bytes.
     type Push: Pod;
     /// The specialisation constants.
@@ -63,6 +103,17 @@ pub trait Specialise {
     fn entries(&self) -> Vec<(u32, u32)>;
     /// Threads of a workgroup along x and y.
     fn local_size(&self) -> [u32; 2];
+}
+
+/// No constants, and workgroups of one thread.
+impl Specialise for () {
+    fn entries(&self) -> Vec<(u32, u32)> {
+        Vec::new()
+    }
+
+    fn local_size(&self) -> [u32; 2] {
+        [1, 1]
+    }
 }
 
 /// Workgroups along one axis that every Vulkan device can run.
@@ -89,9 +140,10 @@ impl<B: Bindings> Kernel<B> {
     /// Compiles the kernel for these constants.
     ///
     /// # Errors
-    /// [`Error::Device`] when the driver refuses.
+    /// [`Error::Device`] when the driver refuses, or a workgroup is larger than the device's.
     pub fn new(gpu: &Gpu, constants: &B::Constants) -> Result<Self> {
         let begun = Instant::now();
+        check_workgroup(B::NAME, constants.local_size(), &gpu.0.limits)?;
         let (set_layout, layout, pipeline) = Default::default();
         // From here on Drop cleans up, whichever line below fails; null handles may be destroyed.
         let mut parts = Parts { gpu: gpu.clone(), set_layout, layout, pipeline };
@@ -121,6 +173,14 @@ impl<B: Bindings> Kernel<B> {
 
 fn folded(groups: u32) -> [u32; 3] {
     [groups.min(MAX_GROUPS), groups.div_ceil(MAX_GROUPS), 1]
+}
+
+fn check_workgroup(kernel: &str, [x, y]: [u32; 2], limits: &vk::PhysicalDeviceLimits) -> Result<()> {
+    let most = limits.max_compute_work_group_size[0].min(limits.max_compute_work_group_invocations);
+    if (1..=most).contains(&x.saturating_mul(y)) {
+        return Ok(());
+    }
+    Err(Error::Device(format!("{kernel}: a workgroup of {x} x {y} threads: choose 1 to {most}")))
 }
 
 impl Parts {
@@ -177,12 +237,11 @@ impl Parts {
 impl Drop for Parts {
     fn drop(&mut self) {
         // SAFETY: made on this device; whoever recorded them keeps this until the work is complete.
-        unsafe {
-            let device = &self.gpu.0.device;
+        self.gpu.0.free(|device| unsafe {
             device.destroy_pipeline(self.pipeline, None);
             device.destroy_pipeline_layout(self.layout, None);
             device.destroy_descriptor_set_layout(self.set_layout, None);
-        }
+        });
     }
 }
 

@@ -5,9 +5,11 @@
 //!   frame is reset, and everything keeps the device by a counted [`Gpu`].
 //! - Barriers are derived from the accesses that a kernel declares in its GLSL; no caller writes one.
 //! - Device memory is plain data (`Pod`), so that any bits are a value.
+//! - The host touches no memory while work runs that was submitted here, and nothing is freed that such work uses.
+//! - Kernels that are told nonsense, or read it from buffers, compute nonsense, but access nothing beyond their buffers
+//!   (robust buffer access) and their own arrays ([`Bindings`]).
 //!
-//! What it relies on: kernels stay inside their buffers, and whoever hands over raw handles keeps the contract of
-//! [`Gpu::from_raw`] and [`Recorder::external`].
+//! What it relies on: whoever hands over raw handles keeps the contract of [`Gpu::from_raw`] and [`Recorder::external`].
 #![allow(unsafe_code)]
 mod access;
 mod buffer;
@@ -29,6 +31,7 @@ mod tuning;
 pub use access::Access;
 use buffer::Untyped;
 pub use buffer::{Bound, Buffer, Location, PART, PixelFormat, RawBuffer};
+pub use cache::cache_folder;
 pub use device::{DeviceOptions, Gpu};
 pub use external::RawDevice;
 pub use frame::FrameResources;
@@ -57,6 +60,12 @@ fn explain(what: &str, code: vk::Result) -> Error {
         return Error::DeviceLost(format!(
             "{what}: the device was lost (a driver reset, often because one pass ran too long): run again, with a \
              smaller film if it happens again"
+        ));
+    }
+    if code == vk::Result::TIMEOUT {
+        return Error::DeviceLost(format!(
+            "{what}: the device stopped answering: no pass began or ended within the time that it is waited for: run \
+             again with a smaller film, and update its driver if it happens again"
         ));
     }
     Error::Device(match code {

@@ -55,7 +55,7 @@ impl Staging {
             device.cmd_copy_buffer(self.commands.buffer, from.raw, to.raw, &[region]);
             access::whole_barrier(device, self.commands.buffer);
         }
-        self.commands.submit_and_wait(|| Some("copy"))
+        self.commands.submit_and_wait(|| 0, || Some("copy"))
     }
 }
 
@@ -71,7 +71,7 @@ mod tests {
     /// Devices with unified memory never come here by themselves.
     #[test]
     fn copies_cross_chunks_both_ways() {
-        let gpu = Gpu::open(&DeviceOptions { device: None, validation: true }).unwrap();
+        let gpu = Gpu::open(&DeviceOptions { validation: true, ..DeviceOptions::default() }).unwrap();
         for count in [1, 1000, CHUNK / 4 + 3] {
             let values: Vec<u32> = (0..count as u32).map(|i| i.wrapping_mul(2_654_435_761)).collect();
             let buffer = Buffer::from_slice(&gpu, "staged", &vec![7u32; count + 2]).unwrap();

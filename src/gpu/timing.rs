@@ -50,12 +50,19 @@ impl Clock {
     pub fn absolute(self, ticks: u64) -> u64 {
         self.between(0, ticks)
     }
+
+    /// When a pass ran whose ticks are `begin` and `end`, in a recording that began at `first`.
+    fn pass(self, name: &'static str, first: u64, [begin, end]: [u64; 2]) -> PassTime {
+        let begin_ns = self.absolute(first).saturating_add(self.between(first, begin));
+        PassTime { name, begin_ns, end_ns: begin_ns.saturating_add(self.between(begin, end)) }
+    }
 }
 
-/// Exact for a period of 1, and good to 2^-24 for others: in 40-bit fixed point, since 64-bit ticks exceed a double.
+/// Exact for a period of 1, and good to 2^-24 for others: in 40-bit fixed point, since 64-bit ticks exceed a double. Ticks
+/// whose nanoseconds exceed 64 bits, of some counter that ran for centuries, become the most that there are.
 fn scale(ticks: u64, period: f32) -> u64 {
     let fixed = (f64::from(period) * (1u64 << 40) as f64) as u128;
-    ((u128::from(ticks) * fixed) >> 40) as u64
+    ((u128::from(ticks) * fixed) >> 40).try_into().unwrap_or(u64::MAX)
 }
 
 /// The queries of one frame.
@@ -114,19 +121,19 @@ impl Timer {
             Error::Device("the times of a frame were asked for before its work was complete: wait for it".into())
         })?;
         let Some(&[first, _]) = ticks.first() else { return Ok(Vec::new()) };
-        let at = |ticks| clock.absolute(first) + clock.between(first, ticks);
-        let pass = |(name, [begin, end]): (&&'static str, &[u64; 2])| PassTime {
-            name,
-            begin_ns: at(*begin),
-            end_ns: at(*begin) + clock.between(*begin, *end),
-        };
-        Ok(self.passes.iter().zip(&ticks).map(pass).collect())
+        Ok(self.passes.iter().zip(&ticks).map(|(name, ticks)| clock.pass(name, first, *ticks)).collect())
     }
 
     /// The last pass that began, for a message about a lost device; it still answers on most drivers.
     pub fn last_started(&self) -> Option<&'static str> {
         let started = |index: &usize| matches!(self.query(2 * index), Some([_, available]) if available != 0);
         (0..self.passes.len()).rev().find(started).map(|index| self.passes[index])
+    }
+
+    /// How many times there are so far: more and more while the work goes on.
+    pub fn written(&self) -> usize {
+        let there = |index: &usize| matches!(self.query(*index), Some([_, available]) if available != 0);
+        (0..2 * self.passes.len()).filter(there).count()
     }
 
     /// Begin and end of every pass; `None` when one is not there yet.
@@ -149,7 +156,9 @@ impl Timer {
 impl Drop for Timer {
     fn drop(&mut self) {
         // SAFETY: made on this device, not in use (the frame's contract), destroyed once.
-        self.pools.iter().for_each(|pool| unsafe { self.gpu.0.device.destroy_query_pool(*pool, None) });
+        self.gpu.0.free(|device| {
+            self.pools.iter().for_each(|pool| unsafe { device.destroy_query_pool(*pool, None) });
+        });
     }
 }
 
@@ -167,5 +176,15 @@ mod tests {
         assert_eq!(Clock { bits: 64, period: 2.5 }.between(0, 1000), 2500);
         assert_eq!(Clock { bits: 0, period: 1.0 }.between(0, 1000), 0);
         assert_eq!(Clock { bits: 64, period: 1.0 }.absolute(u64::MAX), u64::MAX, "no rounding at period 1");
+    }
+
+    #[test]
+    fn times_end_where_64_bits_do() {
+        let late = Clock { bits: 64, period: 2.5 }.pass("late", u64::MAX - 9, [u64::MAX - 7, u64::MAX]);
+        assert_eq!(late, PassTime { name: "late", begin_ns: u64::MAX, end_ns: u64::MAX });
+        let slow = Clock { bits: 64, period: 1.0 }.pass("slow", u64::MAX - 1, [u64::MAX, 5]);
+        assert_eq!((slow.begin_ns, slow.duration_ns()), (u64::MAX, 0));
+        let early = Clock { bits: 64, period: 2.5 }.pass("early", 100, [110, 150]);
+        assert_eq!(early, PassTime { name: "early", begin_ns: 275, end_ns: 375 });
     }
 }

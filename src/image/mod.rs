@@ -126,7 +126,8 @@ pub fn is_decoding() -> bool {
 }
 
 /// The decoders are other people's, and some assert what a damaged file may break (exr 1.74: the level of a tile, sums
-/// in B44 blocks). They keep no state between calls, so that nothing is left broken behind an unwound one.
+/// in B44 blocks). They keep no state between calls, so that nothing is left broken behind an unwound one. A program built
+/// with `panic = "abort"` ends where they assert.
 ///
 /// # Errors
 /// The decoder's own in one line, or that it broke off.

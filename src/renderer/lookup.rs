@@ -3,6 +3,7 @@ use super::Renderer;
 use crate::error::{Error, Result};
 use crate::gpu::layout::{Guide, PathPush, vec3, vec4};
 use crate::gpu::{Buffer, FrameResources, Kernel, Location, PassTime};
+use crate::settings::Settings;
 use crate::shaders;
 use crate::stage::lookup;
 
@@ -21,14 +22,15 @@ impl Renderer {
     /// EGSR 2011.
     ///
     /// # Errors
-    /// [`Error::Usage`] when there are no eye rays or not as many guide rays as pixels, [`Error::Device`].
+    /// [`Error::Usage`] when there are no eye rays or more than [`Settings::MAX_SPP`], or not as many guide rays as pixels, [`Error::Device`].
     pub fn look_up(&self, guide: &[Guide], filtered: &[vec4], eye_rays: u32) -> Result<(Vec<vec3>, Vec<PassTime>)> {
         let pixels = self.settings.pixels();
-        if eye_rays == 0 || guide.len() != pixels || filtered.len() != pixels {
+        if !(1..=Settings::MAX_SPP).contains(&eye_rays) || guide.len() != pixels || filtered.len() != pixels {
             let (guides, lights) = (guide.len(), filtered.len());
             return Err(Error::Usage(format!(
-                "{eye_rays} eye rays look up {guides} guide rays with {lights} filtered values: choose at least 1, and \
-                 as many guide rays as the film has pixels, {pixels}"
+                "{eye_rays} eye rays look up {guides} guide rays with {lights} filtered values: choose 1 to {} eye \
+                 rays, and as many guide rays as the film has pixels, {pixels}",
+                Settings::MAX_SPP
             )));
         }
         let gpu = &self.gpu;

@@ -13,7 +13,8 @@ pub fn effects(scene: &Scene, split_light: bool, counters: bool) -> (Effects, Ve
     let used = used_materials(scene);
     let mut material = |name, calls: &dyn Fn(&Material) -> bool| {
         let first = (0..scene.materials.len()).find(|&i| used[i] && calls(&scene.materials[i]));
-        first.inspect(|&i| reasons.push((name, format!("material \"{}\"", scene.names.materials[i])))).is_some()
+        let named = |i: usize| scene.names.materials.get(i).map_or("", |n| n);
+        first.inspect(|&i| reasons.push((name, format!("material \"{}\"", named(i))))).is_some()
     };
     let interface = |m: &Material| m.kind != BSDF_DIFFUSE;
     let bumped =
@@ -49,7 +50,11 @@ fn used_materials(scene: &Scene) -> Vec<bool> {
     let mut used = vec![false; scene.materials.len()];
     let triangles = scene.triangles.iter().map(|t| t.material);
     let worn = triangles.chain(scene.instances.iter().map(|i| i.material).filter(|&m| m != NONE));
-    worn.for_each(|m| used[m as usize] = true);
+    for material in worn {
+        if let Some(slot) = used.get_mut(material as usize) {
+            *slot = true;
+        }
+    }
     used
 }
 
@@ -90,7 +95,8 @@ fn other_effects(
         on
     };
     let bent = scene.shading.iter().position(|s| s.normal != geometry::FLAT);
-    let object = bent.map(|i| scene.triangles[i].object as usize).and_then(|o| scene.names.objects.get(o));
+    let object =
+        bent.and_then(|i| scene.triangles.get(i)).map(|t| t.object as usize).and_then(|o| scene.names.objects.get(o));
     let named = format!("object \"{}\"", object.map_or("", |o| o));
     found.smooth_normals = because("smooth_normals", bent.is_some(), named);
     found.lens = because("lens", scene.camera.lens_radius > 0.0, "camera lens_radius".into());

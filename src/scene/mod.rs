@@ -12,6 +12,7 @@ mod alias;
 mod assemble;
 mod bvh;
 mod camera;
+mod check;
 pub mod description;
 mod effects;
 mod environment;
@@ -30,13 +31,14 @@ mod shape;
 mod texture;
 mod value;
 
+pub use check::check_camera;
 pub use effects::effects;
 pub use fingerprint::Fingerprint;
 
 /// Largest coordinate a scene may have: squares of distances still fit a 32-bit float.
 pub const MAX_COORDINATE: f64 = 1e18;
 
-/// Everything a render reads, in the form that kernels read it.
+/// Everything a render reads, in the form that kernels read it. Whoever edits it keeps what [`Scene::check`] asks for.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     /// World-space camera; made for the film's aspect ratio.

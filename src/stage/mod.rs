@@ -1,15 +1,15 @@
 //! One file per kernel: what it reads and writes, and how it is recorded. Stages never call stages; `frame.rs` lists them.
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{Bindings, Gpu, Kernel, Recorder};
 use crate::shaders::shared::block;
 
 pub mod apportion;
 pub mod batch;
 pub mod choose;
-pub mod fold;
-pub mod guide;
-pub mod lookup;
-pub mod path;
+pub(crate) mod fold;
+pub(crate) mod guide;
+pub(crate) mod lookup;
+pub(crate) mod path;
 pub mod scan;
 
 /// A kernel whose workgroups each own a block of pixels, a run of them each thread; or one that closes what those began.
@@ -22,8 +22,11 @@ impl<B: Bindings<Constants: From<block::Constants>>> PerBlock<B> {
     /// Compiles the kernel for blocks of threads with so many pixels: see [`thread_items`].
     ///
     /// # Errors
-    /// [`crate::error::Error::Device`] when the driver refuses it.
+    /// [`crate::error::Error::Device`] when the driver refuses it, [`Error::Usage`] for more than 1024 pixels or none.
     pub fn new(gpu: &Gpu, thread_items: u32) -> Result<Self> {
+        if !(1..=MOST_ITEMS).contains(&thread_items) {
+            return Err(Error::Usage(format!("{thread_items} pixels of a thread: choose 1 to {MOST_ITEMS}")));
+        }
         Ok(Self { kernel: Kernel::new(gpu, &block::Constants { thread_items }.into())?, thread_items })
     }
 
@@ -46,6 +49,9 @@ impl<B: Bindings<Constants: From<block::Constants>>> PerBlock<B> {
 
 /// Workgroups along one axis that every Vulkan device can run.
 const MAX_GROUPS: u32 = 65_535;
+
+/// Pixels of a thread of a [`PerBlock`] kernel at most.
+const MOST_ITEMS: u32 = 1024;
 
 /// Blocks of a film.
 pub fn block_count(pixels: u32, thread_items: u32) -> u32 {

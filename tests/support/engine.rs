@@ -19,7 +19,7 @@ pub struct Engine {
     messages: Box<Mutex<Vec<String>>>,
     /// The loader may read its list of devices while another thread changes it (Vulkan-Loader's issue 2018); it is for
     /// whoever makes devices to see to that, and the tests of one program run side by side.
-    _alone: MutexGuard<'static, ()>,
+    alone: Option<MutexGuard<'static, ()>>,
 }
 
 static ENGINES: Mutex<()> = Mutex::new(());
@@ -62,7 +62,7 @@ unsafe fn instance(entry: &ash::Entry) -> ash::Instance {
 
 unsafe fn device(instance: &ash::Instance, physical: vk::PhysicalDevice) -> ash::Device {
     let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
-    let core = vk::PhysicalDeviceFeatures::default().shader_int64(true);
+    let core = vk::PhysicalDeviceFeatures::default().shader_int64(true).robust_buffer_access(true);
     let mut v12 = vk::PhysicalDeviceVulkan12Features::default().scalar_block_layout(true).host_query_reset(true);
     let mut v13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).maintenance4(true);
     let offered = unsafe { instance.enumerate_device_extension_properties(physical) }.unwrap();
@@ -100,7 +100,7 @@ impl Engine {
             let queue = device.get_device_queue(0, 0);
             let pool = device.create_command_pool(&vk::CommandPoolCreateInfo::default(), None).unwrap();
             let messenger = (utils, messenger);
-            Self { _entry: entry, instance, physical, device, queue, pool, messenger, messages, _alone: alone }
+            Self { _entry: entry, instance, physical, device, queue, pool, messenger, messages, alone: Some(alone) }
         }
     }
 
@@ -113,6 +113,9 @@ impl Engine {
             device: self.device.handle().as_raw(),
             queue: self.queue.as_raw(),
             queue_family: 0,
+            robust_buffer_access: true,
+            cache: None,
+            wait_limit: None,
         }
     }
 
@@ -128,6 +131,12 @@ impl Engine {
             self.device.queue_submit(self.queue, &submit, vk::Fence::null()).unwrap();
             self.device.queue_wait_idle(self.queue).unwrap();
         }
+    }
+
+    /// Leaves the device as it is for ever, with what was left on it.
+    pub fn abandon(mut self) {
+        self.alone = None;
+        std::mem::forget(self);
     }
 
     /// What the layers have said so far.

@@ -1,15 +1,50 @@
-//! Vulkan's entry points with ours in between: they count what is created, and lose the device when they are told to.
+//! Vulkan's entry points with ours in between: they count what is created and destroyed, and fail when they are told to.
 #![allow(unsafe_code, reason = "stands between the renderer and the driver")]
 use ash::vk;
 use std::collections::HashMap;
 use std::ffi::{CStr, c_char, c_void};
 use std::mem::transmute;
-use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering::SeqCst};
 use std::sync::{LazyLock, Mutex};
 use tallow::gpu::RawDevice;
 
 /// While set, whatever is submitted loses the device.
 pub static LOSE: AtomicBool = AtomicBool::new(false);
+
+/// While it is not 0, what every wait for a fence returns, without waiting.
+pub static WAIT: AtomicI32 = AtomicI32::new(0);
+
+/// Called before every wait for a fence.
+pub static BEFORE_WAIT: Mutex<Option<Box<dyn Fn() + Send>>> = Mutex::new(None);
+
+/// What an entry point returns.
+trait Outcome: Sized {
+    fn failure(code: vk::Result) -> Option<Self>;
+}
+
+impl Outcome for vk::Result {
+    fn failure(code: vk::Result) -> Option<Self> {
+        Some(code)
+    }
+}
+
+impl Outcome for () {
+    fn failure(_: vk::Result) -> Option<Self> {
+        None
+    }
+}
+
+/// Why `name` fails now, if it does.
+fn failure(name: &str) -> Option<vk::Result> {
+    if name == "vkWaitForFences" {
+        if let Some(f) = &*BEFORE_WAIT.lock().unwrap() {
+            f();
+        }
+        let code = WAIT.load(SeqCst);
+        return (code != 0).then(|| vk::Result::from_raw(code));
+    }
+    (LOSE.load(SeqCst) && name.starts_with("vkQueueSubmit")).then_some(vk::Result::ERROR_DEVICE_LOST)
+}
 
 /// A function of the loader or the driver; another one for every engine, since both may be unloaded between two.
 struct Real<F>(Mutex<Option<F>>);
@@ -58,17 +93,17 @@ unsafe extern "system" fn get_instance_proc_addr(
 
 /// For each entry point, one of its type that counts and passes on.
 macro_rules! between {
-    ($($name:ident: $pfn:ident($($arg:ident: $type:ty),+);)+) => {
+    ($($name:ident: $pfn:ident($($arg:ident: $type:ty),+) -> $outcome:ty;)+) => {
         unsafe extern "system" fn get_device_proc_addr(device: vk::Device, name: *const c_char) -> vk::PFN_vkVoidFunction {
             unsafe {
                 let found = DEVICE_LOADER.get()(device, name);
                 $(
                     if CStr::from_ptr(name).to_str() == Ok(stringify!($name)) {
                         static REAL: Real<vk::$pfn> = Real(Mutex::new(None));
-                        unsafe extern "system" fn ours($($arg: $type),+) -> vk::Result {
+                        unsafe extern "system" fn ours($($arg: $type),+) -> $outcome {
                             *CALLS.lock().unwrap().entry(stringify!($name)).or_default() += 1;
-                            if LOSE.load(SeqCst) && stringify!($name).starts_with("vkQueueSubmit") {
-                                return vk::Result::ERROR_DEVICE_LOST;
+                            if let Some(outcome) = failure(stringify!($name)).and_then(<$outcome>::failure) {
+                                return outcome;
                             }
                             unsafe { REAL.get()($($arg),+) }
                         }
@@ -85,21 +120,30 @@ macro_rules! between {
 type Alloc<'a> = *const vk::AllocationCallbacks<'a>;
 
 between! {
-    vkCreateBuffer: PFN_vkCreateBuffer(d: vk::Device, i: *const vk::BufferCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::Buffer);
-    vkCreateBufferView: PFN_vkCreateBufferView(d: vk::Device, i: *const vk::BufferViewCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::BufferView);
-    vkAllocateMemory: PFN_vkAllocateMemory(d: vk::Device, i: *const vk::MemoryAllocateInfo<'_>, a: Alloc<'_>, o: *mut vk::DeviceMemory);
-    vkMapMemory: PFN_vkMapMemory(d: vk::Device, m: vk::DeviceMemory, at: vk::DeviceSize, n: vk::DeviceSize, f: vk::MemoryMapFlags, o: *mut *mut c_void);
-    vkCreateShaderModule: PFN_vkCreateShaderModule(d: vk::Device, i: *const vk::ShaderModuleCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::ShaderModule);
-    vkCreateComputePipelines: PFN_vkCreateComputePipelines(d: vk::Device, c: vk::PipelineCache, n: u32, i: *const vk::ComputePipelineCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::Pipeline);
-    vkCreatePipelineLayout: PFN_vkCreatePipelineLayout(d: vk::Device, i: *const vk::PipelineLayoutCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::PipelineLayout);
-    vkCreateDescriptorSetLayout: PFN_vkCreateDescriptorSetLayout(d: vk::Device, i: *const vk::DescriptorSetLayoutCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::DescriptorSetLayout);
-    vkCreateDescriptorPool: PFN_vkCreateDescriptorPool(d: vk::Device, i: *const vk::DescriptorPoolCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::DescriptorPool);
-    vkCreateQueryPool: PFN_vkCreateQueryPool(d: vk::Device, i: *const vk::QueryPoolCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::QueryPool);
-    vkCreateCommandPool: PFN_vkCreateCommandPool(d: vk::Device, i: *const vk::CommandPoolCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::CommandPool);
-    vkAllocateCommandBuffers: PFN_vkAllocateCommandBuffers(d: vk::Device, i: *const vk::CommandBufferAllocateInfo<'_>, o: *mut vk::CommandBuffer);
-    vkCreateFence: PFN_vkCreateFence(d: vk::Device, i: *const vk::FenceCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::Fence);
-    vkCreateSemaphore: PFN_vkCreateSemaphore(d: vk::Device, i: *const vk::SemaphoreCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::Semaphore);
-    vkCreateEvent: PFN_vkCreateEvent(d: vk::Device, i: *const vk::EventCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::Event);
-    vkCreateImage: PFN_vkCreateImage(d: vk::Device, i: *const vk::ImageCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::Image);
-    vkQueueSubmit2: PFN_vkQueueSubmit2(q: vk::Queue, n: u32, i: *const vk::SubmitInfo2<'_>, f: vk::Fence);
+    vkCreateBuffer: PFN_vkCreateBuffer(d: vk::Device, i: *const vk::BufferCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::Buffer) -> vk::Result;
+    vkCreateBufferView: PFN_vkCreateBufferView(d: vk::Device, i: *const vk::BufferViewCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::BufferView) -> vk::Result;
+    vkAllocateMemory: PFN_vkAllocateMemory(d: vk::Device, i: *const vk::MemoryAllocateInfo<'_>, a: Alloc<'_>, o: *mut vk::DeviceMemory) -> vk::Result;
+    vkMapMemory: PFN_vkMapMemory(d: vk::Device, m: vk::DeviceMemory, at: vk::DeviceSize, n: vk::DeviceSize, f: vk::MemoryMapFlags, o: *mut *mut c_void) -> vk::Result;
+    vkCreateShaderModule: PFN_vkCreateShaderModule(d: vk::Device, i: *const vk::ShaderModuleCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::ShaderModule) -> vk::Result;
+    vkCreateComputePipelines: PFN_vkCreateComputePipelines(d: vk::Device, c: vk::PipelineCache, n: u32, i: *const vk::ComputePipelineCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::Pipeline) -> vk::Result;
+    vkCreatePipelineLayout: PFN_vkCreatePipelineLayout(d: vk::Device, i: *const vk::PipelineLayoutCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::PipelineLayout) -> vk::Result;
+    vkCreateDescriptorSetLayout: PFN_vkCreateDescriptorSetLayout(d: vk::Device, i: *const vk::DescriptorSetLayoutCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::DescriptorSetLayout) -> vk::Result;
+    vkCreateDescriptorPool: PFN_vkCreateDescriptorPool(d: vk::Device, i: *const vk::DescriptorPoolCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::DescriptorPool) -> vk::Result;
+    vkCreateQueryPool: PFN_vkCreateQueryPool(d: vk::Device, i: *const vk::QueryPoolCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::QueryPool) -> vk::Result;
+    vkCreateCommandPool: PFN_vkCreateCommandPool(d: vk::Device, i: *const vk::CommandPoolCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::CommandPool) -> vk::Result;
+    vkAllocateCommandBuffers: PFN_vkAllocateCommandBuffers(d: vk::Device, i: *const vk::CommandBufferAllocateInfo<'_>, o: *mut vk::CommandBuffer) -> vk::Result;
+    vkCreateFence: PFN_vkCreateFence(d: vk::Device, i: *const vk::FenceCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::Fence) -> vk::Result;
+    vkCreateSemaphore: PFN_vkCreateSemaphore(d: vk::Device, i: *const vk::SemaphoreCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::Semaphore) -> vk::Result;
+    vkCreateEvent: PFN_vkCreateEvent(d: vk::Device, i: *const vk::EventCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::Event) -> vk::Result;
+    vkCreateImage: PFN_vkCreateImage(d: vk::Device, i: *const vk::ImageCreateInfo<'_>, a: Alloc<'_>, o: *mut vk::Image) -> vk::Result;
+    vkQueueSubmit2: PFN_vkQueueSubmit2(q: vk::Queue, n: u32, i: *const vk::SubmitInfo2<'_>, f: vk::Fence) -> vk::Result;
+    vkWaitForFences: PFN_vkWaitForFences(d: vk::Device, n: u32, f: *const vk::Fence, all: vk::Bool32, limit: u64) -> vk::Result;
+    vkQueueWaitIdle: PFN_vkQueueWaitIdle(q: vk::Queue) -> vk::Result;
+    vkDestroyBuffer: PFN_vkDestroyBuffer(d: vk::Device, b: vk::Buffer, a: Alloc<'_>) -> ();
+    vkFreeMemory: PFN_vkFreeMemory(d: vk::Device, m: vk::DeviceMemory, a: Alloc<'_>) -> ();
+    vkDestroyPipeline: PFN_vkDestroyPipeline(d: vk::Device, p: vk::Pipeline, a: Alloc<'_>) -> ();
+    vkDestroyCommandPool: PFN_vkDestroyCommandPool(d: vk::Device, p: vk::CommandPool, a: Alloc<'_>) -> ();
+    vkDestroyDescriptorPool: PFN_vkDestroyDescriptorPool(d: vk::Device, p: vk::DescriptorPool, a: Alloc<'_>) -> ();
+    vkDestroyQueryPool: PFN_vkDestroyQueryPool(d: vk::Device, p: vk::QueryPool, a: Alloc<'_>) -> ();
+    vkResetCommandPool: PFN_vkResetCommandPool(d: vk::Device, p: vk::CommandPool, f: vk::CommandPoolResetFlags) -> vk::Result;
 }

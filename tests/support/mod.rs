@@ -16,7 +16,8 @@ pub mod kernels {
 /// # Panics
 /// With the remedy when there is no device or the layers are missing: a test that needs a GPU never passes without.
 pub fn gpu() -> Gpu {
-    Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), validation: true })
+    let device = std::env::var("TALLOW_DEVICE").ok();
+    Gpu::open(&DeviceOptions { device, validation: true, ..DeviceOptions::default() })
         .unwrap_or_else(|e| panic!("this test needs a Vulkan device and the validation layers: {e}"))
 }
 

@@ -162,11 +162,11 @@ fn main() -> Result<()> {
     let name = args.first().context("name a filter: atrous, guided or bilateral")?;
     let rounds: usize = args.get(1).map_or(Ok(7), |a| a.parse())?;
     let (row, case): (&Row, _) = (filter::find(name).context("no such filter")?, case(name)?);
-    let gpu = Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), validation: false })?;
+    let gpu = Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), ..DeviceOptions::default() })?;
     let input = picture(case.size);
     let planes = Planes::new(&gpu, &input)?;
     let make = |(name, s): &(&'static str, FilterSettings)| {
-        let filter = (row.make)(&gpu, &s.scaled_to(&input), case.size)?;
+        let filter = row.compile(&gpu, &s.scaled_to(&input), case.size)?;
         Ok(Ours { name, filter, runs: Vec::new() })
     };
     let mut ours: Vec<Ours> = case.settings.iter().map(make).collect::<Result<_>>()?;

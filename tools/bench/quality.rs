@@ -67,7 +67,7 @@ fn main() -> Result<()> {
     let file = args.first().context("name a scene file")?;
     let number = |i: usize, or: u32| args.get(i).map_or(Ok(or), |a| a.parse());
     let (side, spp, many) = (number(1, 256)?, number(2, 4)?, number(3, 1024)?);
-    let gpu = Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), validation: false })?;
+    let gpu = Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), ..DeviceOptions::default() })?;
     let (_, _, reference) = render(&gpu, file, side, many, 1)?;
     let (guide, stats, light) = render(&gpu, file, side, spp, 0)?;
     // The statistics are of direct and indirect light together, so the variance is left to be estimated.

@@ -21,7 +21,14 @@ use tallow::renderer::{Outputs, Renderer};
 use tallow::scene::Scene;
 use tallow::settings::Settings;
 use tallow::shaders::shared;
-use tallow::shaders::traverse::{Bind, Constants, Kernel};
+
+/// The kernels of `glsl/test`.
+#[allow(dead_code)]
+mod kernels {
+    include!(concat!(env!("OUT_DIR"), "/test_shaders.rs"));
+}
+
+use kernels::traverse::{Bind, Constants, Kernel};
 
 const SIDE: u32 = 512;
 const THREADS: usize = 2;
@@ -111,7 +118,8 @@ struct Device {
 
 impl Device {
     fn new(scene: &Scene, rays: &[RayQuery]) -> Result<Self> {
-        let gpu = Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), validation: false })?;
+        let gpu =
+            Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), ..DeviceOptions::default() })?;
         // obvhs knows no masks, so neither side tests them.
         let effects = Effects::default();
         let traverse = shared::traverse::Constants { stack: scene.stack };

@@ -198,10 +198,12 @@ pub fn module(name: &str, file: &Path, interface: &Interface, root: &str, binary
     let numbers = numbers(&interface.numbers_of(None))?;
     let constants = constants(interface, root)?;
     let file = file.display();
+    // Who can name a kernel of the crate can run it with any numbers, so that nobody outside can.
+    let visible = if root == "crate" { "#[allow(dead_code)]\npub(crate)" } else { "pub" };
     Ok(format!(
         r#"/// The kernel `{file}`.
 #[allow(clippy::all)]
-pub mod {name} {{
+{visible} mod {name} {{
     #[allow(unused_imports)]
     use {root}::gpu::{{Access, Bindings, Bound, Buffer, Slot, SlotKind, Specialise, layout::*}};
     /// Basename of the file, label of the pass.
@@ -213,7 +215,9 @@ pub mod {name} {{
 {numbers}{constants}    /// What the kernel reads and writes.
     pub struct Bind<'a> {{
 {fields}    }}
-    impl Bindings for Bind<'_> {{
+    // SAFETY: the code is what `glslc` made of the file, and the slots are what the file declares.
+    #[allow(unsafe_code)]
+    unsafe impl Bindings for Bind<'_> {{
         type Push = {push};
         type Constants = Constants;
         const NAME: &'static str = NAME;

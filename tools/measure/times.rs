@@ -90,7 +90,7 @@ fn weighted(weights: usize, levels: u32) -> FilterSettings {
 /// Those of the device.
 pub fn milliseconds(gpu: &Gpu, row: &Row, settings: &FilterSettings, input: &FilterInput) -> anyhow::Result<f64> {
     let planes = Planes::new(gpu, input)?;
-    let filter = (row.make)(gpu, settings, planes.size)?;
+    let filter = row.compile(gpu, settings, planes.size)?;
     let mut frame = FrameResources::new(gpu)?;
     let mut times = Vec::new();
     for _ in 0..=RUNS {

@@ -1,0 +1,186 @@
+//! Whether a scene's arrays fit together. Kernels follow indices without a look; whoever loads a scene gets right ones, but
+//! the arrays are there to be edited.
+use super::{Environment, Scene, bvh};
+use crate::error::{Error, Result};
+use crate::gpu::layout::{AliasEntry, BvhNode, Camera, LIGHT_TRIANGLE, Material, NONE, TRAVERSAL_STACK, Texture};
+
+type Checked = std::result::Result<(), String>;
+
+/// How a node is reached, if it is.
+#[derive(Clone, Copy, PartialEq)]
+enum Level {
+    Unreached,
+    /// Its leaves are instances.
+    Top,
+    /// Its leaves are triangles.
+    Mesh,
+}
+
+impl Scene {
+    /// Whether every index leads into its array, the nodes form trees that [`Scene::stack`] is deep enough for, parallel arrays
+    /// have the same length and the camera is of finite numbers. In time that is linear in all of that; making a
+    /// [`Renderer`](crate::renderer::Renderer) asks.
+    ///
+    /// # Errors
+    /// [`Error::Scene`] with the first thing that does not fit.
+    pub fn check(&self) -> Result<()> {
+        self.nodes_fit()
+            .and_then(|()| self.surfaces_fit())
+            .and_then(|()| self.textures_fit())
+            .and_then(|()| self.lights_fit())
+            .map_err(Error::Scene)?;
+        check_camera(&self.camera)
+    }
+
+    fn nodes_fit(&self) -> Checked {
+        let top = if self.instances.is_empty() { Level::Mesh } else { Level::Top };
+        let mut levels = vec![Level::Unreached; self.nodes.len()];
+        below("root", "node", self.nodes.len(), [self.root])?;
+        levels[self.root as usize] = top;
+        below("instance", "root", self.nodes.len(), self.instances.iter().map(|i| i.root))?;
+        for (index, instance) in self.instances.iter().enumerate() {
+            match &mut levels[instance.root as usize] {
+                Level::Top => return Err(format!("instance {index} has the scene's root")),
+                level => *level = Level::Mesh,
+            }
+        }
+        // A node's children come after it, so that all levels are known in one go and nothing leads back.
+        for (index, node) in self.nodes.iter().enumerate() {
+            let leaves = match levels[index] {
+                Level::Unreached => continue,
+                Level::Top => self.instances.len(),
+                Level::Mesh => self.triangles.len(),
+            };
+            self.node_fits(index, node, leaves, &mut levels).map_err(|what| format!("node {index} {what}"))?;
+        }
+        self.stack_fits()
+    }
+
+    fn node_fits(&self, index: usize, node: &BvhNode, leaves: usize, levels: &mut [Level]) -> Checked {
+        let inner = node.e_imask >> 24;
+        let meta: [u8; 8] = bytemuck::cast(node.meta);
+        for (slot, meta) in (0u8..).zip(meta) {
+            let fits = match (inner >> slot & 1, meta >> 5, meta & 31) {
+                (1, count, place) => count == 1 && place == 24 + slot,
+                (_, 0, place) => place == 0,
+                (_, unary, first) => {
+                    let count = unary.count_ones();
+                    let end = u64::from(node.primitive_base) + u64::from(first) + u64::from(count);
+                    [1, 3, 7].contains(&unary) && u32::from(first) + count <= 24 && end <= leaves as u64
+                }
+            };
+            if !fits {
+                return Err(format!("has a child {slot} that leads nowhere"));
+            }
+        }
+        let children = node.child_base as usize..node.child_base as usize + inner.count_ones() as usize;
+        if inner != 0 && (children.start <= index || children.end > levels.len()) {
+            return Err(format!("has the children {children:?}, which must come after it, of {} nodes", levels.len()));
+        }
+        let level = levels[index];
+        for child in children.filter(|_| inner != 0) {
+            if levels[child] != Level::Unreached {
+                return Err(format!("has the child {child}, which is another's or a root"));
+            }
+            levels[child] = level;
+        }
+        Ok(())
+    }
+
+    fn stack_fits(&self) -> Checked {
+        let needed = bvh::stack_size(&self.nodes, self.root, &self.instances);
+        match (needed..=TRAVERSAL_STACK).contains(&self.stack) {
+            true => Ok(()),
+            false => {
+                Err(format!("stack is {}: its nodes need {needed}, and {TRAVERSAL_STACK} is the most", self.stack))
+            }
+        }
+    }
+
+    fn surfaces_fit(&self) -> Checked {
+        let triangles = self.triangles.len();
+        if ![0, triangles].contains(&self.shading.len()) {
+            return Err(format!("there are {} records of shading for {triangles} triangles", self.shading.len()));
+        }
+        let materials = self.materials.len();
+        below("triangle", "material", materials, self.triangles.iter().map(|t| t.material))?;
+        below_or_none("instance", "material", materials, self.instances.iter().map(|i| i.material))
+    }
+
+    fn textures_fit(&self) -> Checked {
+        let all = self.textures.len();
+        let of = |m: &Material| {
+            [m.base_texture, m.specular_texture, m.opacity_texture].into_iter().chain([
+                m.bump_texture,
+                m.roughness_texture,
+                m.emission_texture,
+            ])
+        };
+        for (index, material) in self.materials.iter().enumerate() {
+            below_or_none("map", "texture", all, of(material)).map_err(|what| format!("material {index}: {what}"))?;
+        }
+        let texels = self.texels.len() as u64;
+        let past = |t: &Texture| {
+            let end = u64::from(t.first).checked_add(u64::from(t.width) * u64::from(t.height));
+            t.width == 0 || t.height == 0 || end.is_none_or(|end| end > texels)
+        };
+        match self.textures.iter().position(past) {
+            Some(index) => Err(format!("texture {index} is empty or ends beyond the {texels} texels")),
+            None => Ok(()),
+        }
+    }
+
+    fn lights_fit(&self) -> Checked {
+        let emissive = || self.lights.iter().enumerate().filter(|(_, light)| light.kind == LIGHT_TRIANGLE);
+        for (index, light) in emissive() {
+            let of = |what| format!("light {index}: {what}");
+            below("it", "triangle", self.triangles.len(), [light.triangle]).map_err(of)?;
+            below("it", "material", self.materials.len(), [light.material]).map_err(of)?;
+        }
+        table_fits("light_table", &self.light_table, self.lights.len())?;
+        self.environment.as_ref().map_or(Ok(()), environment_fits)
+    }
+}
+
+fn environment_fits(sky: &Environment) -> Checked {
+    let Environment { width, height, texels, table } = sky;
+    if u64::from(*width) * u64::from(*height) != texels.len() as u64 || texels.is_empty() {
+        return Err(format!("the environment of {width} x {height} has {} texels", texels.len()));
+    }
+    table_fits("the environment's table", table, texels.len())
+}
+
+fn table_fits(name: &str, table: &[AliasEntry], entries: usize) -> Checked {
+    if table.len() != entries {
+        return Err(format!("{name} has {} entries for {entries}", table.len()));
+    }
+    below(&format!("entry of {name}"), "alias", entries, table.iter().map(|entry| entry.alias))
+}
+
+/// Whether all of `indices`, which number `which` in order, are below `count`.
+fn below(which: &str, what: &str, count: usize, indices: impl IntoIterator<Item = u32>) -> Checked {
+    match indices.into_iter().enumerate().find(|(_, index)| *index as usize >= count) {
+        Some((at, index)) => Err(format!("{which} {at} names {what} {index} of {count}")),
+        None => Ok(()),
+    }
+}
+
+/// The same where [`NONE`] is allowed.
+fn below_or_none(which: &str, what: &str, count: usize, indices: impl IntoIterator<Item = u32>) -> Checked {
+    match indices.into_iter().enumerate().find(|(_, index)| *index != NONE && *index as usize >= count) {
+        Some((at, index)) => Err(format!("{which} {at} names {what} {index} of {count}")),
+        None => Ok(()),
+    }
+}
+
+/// Whether a camera is of finite numbers.
+///
+/// # Errors
+/// [`Error::Scene`].
+pub fn check_camera(camera: &Camera) -> Result<()> {
+    let numbers: &[f32] = bytemuck::cast_slice(std::slice::from_ref(camera));
+    match numbers.iter().all(|number| number.is_finite()) {
+        true => Ok(()),
+        false => Err(Error::Scene(format!("the camera has a number that is not finite: {camera:?}"))),
+    }
+}
