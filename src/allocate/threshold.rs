@@ -10,7 +10,7 @@ use crate::stage::PerThread;
 
 pub(super) const ROW: Row = Row {
     name: "threshold",
-    about: "RAS as published: a sample a round where noise exceeds a threshold that falls to 0 by --max-spp, then by chance",
+    about: "RAS as published: a sample a round where noise reaches a threshold that falls to 0 by --max-spp, then by chance",
     guides: false,
     placing: Placing::Chosen,
     make: |gpu, _, workgroup| Ok(Box::new(Threshold(PerThread::new(gpu, &Effects::default(), workgroup)?))),

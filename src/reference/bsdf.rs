@@ -113,7 +113,7 @@ fn sample_conductor(b: &Bsdf, wo: Vec3, u: Vec2) -> (bool, BsdfSample) {
 }
 
 /// Index beyond / index on the side of wo; a rough interface needs the two to differ.
-fn relative_index(b: &Bsdf, wo_z: f32) -> f32 {
+pub fn relative_index(b: &Bsdf, wo_z: f32) -> f32 {
     let eta = if !is_smooth(b) && (b.eta.x - 1.0).abs() < 1e-3 { 1.001 } else { b.eta.x };
     if wo_z < 0.0 { 1.0 / eta } else { eta }
 }
@@ -235,11 +235,17 @@ pub fn bsdf_is_delta(b: &Bsdf) -> bool {
     matches!(b.kind, BSDF_CONDUCTOR | BSDF_DIELECTRIC) && is_smooth(b)
 }
 
-/// What indirect light is divided by before it is filtered: 0 where all light counts as direct.
-pub fn bsdf_albedo(b: &Bsdf) -> Vec3 {
+/// Reflectance, roughly, of the lobes whose light counts as indirect, seen at the cosine `wo_z`: what that light is divided by
+/// before it is filtered.
+pub fn bsdf_albedo(b: &Bsdf, wo_z: f32) -> Vec3 {
+    let cosine = wo_z.abs();
+    let specular = if is_smooth(b) { Vec3::ZERO } else { b.specular };
+    let layered = |eta: f32, beneath: Vec3| beneath.lerp(specular, fresnel_dielectric(cosine, eta).x);
     match b.kind {
-        BSDF_CONDUCTOR | BSDF_DIELECTRIC if is_smooth(b) => Vec3::ZERO,
-        BSDF_CONDUCTOR | BSDF_DIELECTRIC => b.specular,
+        BSDF_CONDUCTOR => specular * fresnel_conductor(cosine, b.eta, b.k),
+        BSDF_DIELECTRIC if is_smooth(b) => Vec3::ZERO,
+        BSDF_DIELECTRIC => layered(relative_index(b, wo_z), b.transmission),
+        BSDF_COATED => layered(b.eta.x, b.albedo),
         _ => b.albedo,
     }
 }

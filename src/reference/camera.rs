@@ -56,5 +56,5 @@ pub fn eye_ray(push: &PathPush, effects: &Effects, film: Vec2, random: Sampler) 
 
 /// Alpha masks along a path draw from this.
 pub fn path_seed(push: &PathPush, pixel: u32, index: u32) -> u32 {
-    pcg(pcg(pixel ^ push.seed).wrapping_add(index))
+    pcg(pcg(pixel ^ pcg(!push.seed)).wrapping_add(index))
 }
