@@ -5,14 +5,17 @@
 #include "effects.glsl"
 #include "shared/thread.glsl"
 #include "shared/scene.glsl"
+#include "shared/finite.glsl"
 
 // One camera path per thread: next event estimation and BSDF sampling joined by the balance heuristic (Veach 1997).
 // Thread i traces sample first_sample + i / pixels of pixel first_pixel + i % pixels, or path i of a list, and writes 1 vec4 (radiance), or
-// with FX_SPLIT 3 (direct, indirect, the albedo that indirect is to be divided by); w of the first is the number of its rays.
+// with FX_SPLIT 3 (direct, indirect, the albedo that indirect is to be divided by); w of the first is the number of its rays, less
+// than 0 where the light was no number: such a sample is black.
 layout(local_size_x_id = 100) in;
 layout(scalar, binding = 11) writeonly buffer Samples { vec4 samples[]; };
 layout(scalar, binding = 12) buffer Counters { uint counters[]; };
 layout(binding = 13) uniform usamplerBuffer paths; // of uvec2
+layout(scalar, binding = 14) buffer Broken { BrokenTally broken[]; };
 layout(scalar, push_constant) uniform Push { PathPush push; };
 
 uint nodes_visited = 0u, closest_rays = 0u, any_rays = 0u;
@@ -199,6 +202,11 @@ void main() {
     vec3 albedo;
     Light2 light = trace_path(path, random, path_seed(pixel, index), albedo);
     float rays = float(closest_rays + any_rays);
+    if (!finite(light.direct + light.indirect)) {
+        light = Light2(vec3(0.0), vec3(0.0));
+        rays = -rays;
+        atomicMax(broken[0].lowest, ~pixel);
+    }
     if (FX_SPLIT) {
         samples[3u * i] = vec4(light.direct, rays);
         samples[3u * i + 1u] = vec4(light.indirect, 0.0);

@@ -16,6 +16,7 @@ use crate::scene::{self, Scene};
 use crate::schedule::{self, Cut};
 pub use crate::schedule::{Batch, Choice, PathRange, Plan, Progress, Share, Step};
 use crate::settings::{PixelFilter, Placing, Sampler, Settings};
+use crate::statistics::BrokenSamples;
 use crate::stage::apportion::Apportion;
 use crate::stage::scan::Scan;
 use crate::stage::{PerBlock, PerThread, WORKGROUP_CPU, WORKGROUP_GPU, thread_items};
@@ -83,14 +84,15 @@ impl Renderer {
     pub fn specialised(gpu: &Gpu, scene: &Scene, outputs: Outputs, effects: Effects) -> Result<Self> {
         let settings = scene.settings.clone();
         settings.validate()?;
-        let effects = Effects { split_light: outputs.split_light, counters: outputs.counters, ..effects };
+        let policy = policy_of(&settings)?;
+        let split_light = outputs.split_light || policy.split_light;
+        let effects = Effects { split_light, counters: outputs.counters, ..effects };
         let workgroup = workgroup(gpu);
         let stages = Stages {
             guide: PerThread::with_stack(gpu, &effects, workgroup, scene.stack)?,
             path: PerThread::with_stack(gpu, &effects, workgroup, scene.stack)?,
             fold: PerThread::new(gpu, &effects, workgroup)?,
         };
-        let policy = policy_of(&settings)?;
         let pixels = settings.pixels() as u32;
         let allocation = effects.adaptive.then(|| allocation(gpu, policy, pixels, workgroup)).transpose()?;
         let paths = paths_in_flight(gpu, &settings, &effects);
@@ -176,7 +178,7 @@ impl Renderer {
         self.gpu.run(frame, |rec| self.record(rec, step))
     }
 
-    /// Puts back what an earlier render had: statistics, light (empty unless it is kept apart), priorities (empty unless
+    /// Puts back what an earlier render had: statistics, light (empty unless it is kept apart or the policy asks for it), priorities (empty unless
     /// the policy keeps them from round to round), and how many samples each pixel still lacks of what it was to have.
     /// Follow it with [`Renderer::rest`]. Needs the effect `adaptive`.
     ///
@@ -213,7 +215,9 @@ impl Renderer {
     pub fn priorities_of(&self, stats: &[PixelStats], limit: u32) -> Result<Vec<f32>> {
         let push = PriorityPush { limit, ..self.priority };
         let guide = self.film.tiles[0].guide.read()?;
-        Ok((policy_of(&self.settings)?.reference)(&HostInputs { guide: &guide, stats, priority: &[], push }))
+        let light = self.film.tiles[0].light.read()?;
+        let inputs = HostInputs { guide: &guide, stats, light: &light, priority: &[], push };
+        Ok((policy_of(&self.settings)?.reference)(&inputs))
     }
 
     /// How the last allocation went.
@@ -279,6 +283,22 @@ impl Renderer {
             ("path", self.stages.path.compile_ms()),
             ("fold", self.stages.fold.compile_ms()),
         ]
+    }
+
+    /// Samples since [`Step::Start`] that were no number, and counted as black: a fault of the renderer, or of a scene whose
+    /// numbers are too large.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub fn broken_samples(&self) -> Result<Option<BrokenSamples>> {
+        let found = self.film.broken.read()?[0];
+        let (pixel, Settings { width, first_sample, seed, .. }) = (!found.pixel, &self.settings);
+        Ok((found.count > 0).then(|| BrokenSamples {
+            count: found.count.into(),
+            pixel: [pixel % width, pixel / width],
+            sample: first_sample.wrapping_add(found.index),
+            seed: *seed,
+        }))
     }
 
     /// Reads the counters; zero unless they were asked for.

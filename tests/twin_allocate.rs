@@ -265,7 +265,7 @@ fn surroundings(pixels: usize, width: usize) -> (Vec<Guide>, Vec<PixelStats>) {
         0 => PixelStats::default(),
         n => {
             let m2 = if n == 1 { 0.0 } else { unit(4 * i) };
-            PixelStats { mean: [unit(i), 2.0 * unit(i), 0.1], count: n as u32, m2: [m2; 3], rays: 0 }
+            PixelStats { mean: [unit(i), 2.0 * unit(i), 0.1], count: n as u32, m2: [m2; 3], remainder: 0 }
         }
     };
     ((0..pixels).map(guide).collect(), (0..pixels).map(stats).collect())

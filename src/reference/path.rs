@@ -28,6 +28,8 @@ pub struct PathSample {
     pub albedo: Vec3,
     /// Rays of both kinds.
     pub rays: u32,
+    /// The light was no number, and is black.
+    pub broken: bool,
 }
 
 impl PathSample {
@@ -243,6 +245,10 @@ impl Tracer<'_> {
             delta: true,
             eta_scale: 1.0,
         };
-        self.trace_path(path, random, path_seed(&self.push, pixel, index))
+        let sample = self.trace_path(path, random, path_seed(&self.push, pixel, index));
+        match sample.radiance().is_finite() {
+            true => sample,
+            false => PathSample { direct: Vec3::ZERO, indirect: Vec3::ZERO, broken: true, ..sample },
+        }
     }
 }
