@@ -34,7 +34,8 @@ const float BRIGHTEST = 3e38; // irradiance: what a small albedo makes of bright
 // Deviations and sums of their squares are cut there, so that what is added up over pixels stays finite.
 const float FARTHEST = 1e17, WIDEST = 1e35;
 // Samples up to which means are rounded to single precision. Those after them move a mean by little more than its last place,
-// or less: their steps are kept to more bits (Kahan 1965), or the mean of 2^22 samples would be off by 1e-5 and more.
+// or less: their steps are kept to more bits (Kahan 1965), or the mean of 2^22 samples would be off by 1e-5 and more. That is
+// code that takes long to compile, and is there only in renders of so many samples.
 const uint FEW = 4096u;
 const int BITS = 10, LIGHT_BITS = 5; // of the remainder of a mean, for each channel
 
@@ -48,20 +49,26 @@ uvec3 samples_of(uint i, uint pixel) {
 
 // 2^-bits of the last place of `mean`.
 vec3 unit(vec3 mean, int bits) {
-    return max(uintBitsToFloat(floatBitsToUint(mean) & 0x7f800000u) * exp2(float(-23 - bits)), 1e-37);
+    return max(uintBitsToFloat(floatBitsToUint(mean) & 0x7f800000u) * 1.1920928955078125e-7 / float(1 << bits), 1e-37);
 }
 
-// Moves a mean by a step. `remainder` holds what rounding has taken off, `bits` for each channel from bit `at` on.
-void move_mean(inout vec3 mean, vec3 by, inout uint remainder, int at, int bits) {
+// Moves a mean by a step. `remainder` holds what rounding has taken off, `bits` for each channel from bit `at` on; it is rounded
+// itself, up as often as down by the number of samples, since samples that repeat a value would all be rounded alike.
+void move_mean(inout vec3 mean, vec3 by, inout uint remainder, int at, int bits, uint count) {
     ivec3 kept;
-    for (int c = 0; c < 3; c++) kept[c] = bitfieldExtract(int(remainder), at + c * bits, bits);
+    [[unroll]] for (int c = 0; c < 3; c++) kept[c] = bitfieldExtract(int(remainder), at + c * bits, bits);
     precise vec3 added = vec3(kept) * unit(mean, bits) + by;
     precise vec3 moved = mean + added;
     precise vec3 lost = added - (moved - mean);
-    int most = (1 << (bits - 1)) - 1;
-    precise vec3 rounded = floor(lost / unit(moved, bits) + 0.5);
-    kept = ivec3(clamp(rounded, vec3(-most), vec3(most)));
-    for (int c = 0; c < 3; c++) remainder = bitfieldInsert(remainder, uint(kept[c]), at + c * bits, bits);
+    int end = 1 << (bits - 1);
+    precise vec3 rounded = floor(lost / unit(moved, bits) + float(bitfieldReverse(count) >> 8) * 5.9604644775390625e-8);
+    // Half of the last place above is half of it below the next number: cut, it would be lost, always in one direction.
+    precise vec3 next = moved + unit(moved, bits) * float(2 * end);
+    bvec3 carries = greaterThanEqual(rounded, vec3(end));
+    moved = mix(moved, next, carries);
+    rounded = mix(rounded, vec3(-end), carries);
+    kept = ivec3(clamp(rounded, vec3(-end), vec3(end - 1)));
+    [[unroll]] for (int c = 0; c < 3; c++) remainder = bitfieldInsert(remainder, uint(kept[c]), at + c * bits, bits);
     mean = moved;
 }
 
@@ -69,14 +76,14 @@ float square(float a, float b) {
     return clamp(a, -FARTHEST, FARTHEST) * clamp(b, -FARTHEST, FARTHEST);
 }
 
-void fold_light(inout PixelLight l, vec3 kept, vec3 irradiance, float share, bool few) {
+void fold_light(inout PixelLight l, vec3 kept, vec3 irradiance, float share, uint count) {
     float off = luminance(irradiance) - luminance(l.indirect);
-    if (few) {
+    if (!FX_MANY_SAMPLES || count <= FEW) {
         l.direct += (kept - l.direct) * share;
         l.indirect += (irradiance - l.indirect) * share;
     } else {
-        move_mean(l.direct, (kept - l.direct) * share, l.remainder, 0, LIGHT_BITS);
-        move_mean(l.indirect, (irradiance - l.indirect) * share, l.remainder, 3 * LIGHT_BITS, LIGHT_BITS);
+        move_mean(l.direct, (kept - l.direct) * share, l.remainder, 0, LIGHT_BITS, count);
+        move_mean(l.indirect, (irradiance - l.indirect) * share, l.remainder, 3 * LIGHT_BITS, LIGHT_BITS, count);
     }
     l.indirect_m2 = min(l.indirect_m2 + square(off, luminance(irradiance) - luminance(l.indirect)), WIDEST);
 }
@@ -88,7 +95,6 @@ void fold(inout PixelStats s, inout PixelLight l, inout uint broken_count, inout
     if (first.w < 0.0 && broken_count++ == 0u) first_broken = s.count;
     s.count++;
     float share = 1.0 / float(s.count);
-    bool few = s.count <= FEW;
     if (FX_SPLIT) {
         vec3 direct = first.rgb, indirect = texelFetch(samples, 3 * at + 1).rgb;
         vec3 albedo = texelFetch(samples, 3 * at + 2).rgb;
@@ -96,13 +102,13 @@ void fold(inout PixelStats s, inout PixelLight l, inout uint broken_count, inout
         vec3 irradiance = mix(vec3(0.0), min(indirect / max(albedo, vec3(SMALLEST_ALBEDO)), vec3(BRIGHTEST)), divides);
         vec3 kept = direct + mix(indirect, vec3(0.0), divides);
         radiance = direct + indirect;
-        fold_light(l, kept, irradiance, share, few);
+        fold_light(l, kept, irradiance, share, s.count);
     }
     vec3 off = radiance - s.mean;
-    if (few) s.mean += off * share;
-    else move_mean(s.mean, off * share, s.remainder, 0, BITS);
+    if (!FX_MANY_SAMPLES || s.count <= FEW) s.mean += off * share;
+    else move_mean(s.mean, off * share, s.remainder, 0, BITS, s.count);
     vec3 off_moved = radiance - s.mean;
-    for (int c = 0; c < 3; c++) s.m2[c] = min(s.m2[c] + square(off[c], off_moved[c]), WIDEST);
+    [[unroll]] for (int c = 0; c < 3; c++) s.m2[c] = min(s.m2[c] + square(off[c], off_moved[c]), WIDEST);
 }
 
 // The kernel that traced them has found the lowest pixel; only its own thread comes here for it.

@@ -16,10 +16,10 @@ use crate::scene::{self, Scene};
 use crate::schedule::{self, Cut};
 pub use crate::schedule::{Batch, Choice, PathRange, Plan, Progress, Share, Step};
 use crate::settings::{PixelFilter, Placing, Sampler, Settings};
-use crate::statistics::BrokenSamples;
 use crate::stage::apportion::Apportion;
 use crate::stage::scan::Scan;
 use crate::stage::{PerBlock, PerThread, WORKGROUP_CPU, WORKGROUP_GPU, thread_items};
+use crate::statistics::BrokenSamples;
 pub use views::{Layer, OutputView};
 
 /// What a render leaves in buffers besides radiance and its variance.

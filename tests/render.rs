@@ -8,7 +8,9 @@ mod support;
 
 use alike::alike;
 use std::path::Path;
-use tallow::gpu::layout::{BSDF_COATED, BSDF_DIFFUSE, Effects, Guide, Material, NONE, PixelLight, PixelStats, Triangle};
+use tallow::gpu::layout::{
+    BSDF_COATED, BSDF_DIFFUSE, Effects, Guide, Material, NONE, PixelLight, PixelStats, Triangle,
+};
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::renderer::{self, Batch, Outputs, Renderer, Step};
 use tallow::scene::Scene;

@@ -129,6 +129,27 @@ fn reference(inputs: &HostInputs) -> Vec<f32> {
 mod tests {
     use super::*;
 
+    #[test]
+    fn a_filter_removes_the_noise_of_indirect_light_alone() {
+        // One pixel: gathered is 1, so that a filter of share 0.5 leaves half of the variance of indirect light. Radiance 3 of
+        // which 1 is direct, irradiance 4, albedo 0.5; of the squared deviations 8, indirect light has 16 * 0.5^2 = 4.
+        let push =
+            PriorityPush { size: [1, 1], window: 2, luminance_floor: -1.0, limit: 99, ..PriorityPush::default() };
+        let of = |indirect_m2: f32, filtered: f32| {
+            let light = [PixelLight { direct: [1.0; 3], indirect: [4.0; 3], indirect_m2, remainder: 0 }];
+            let (guide, stats) = ([Guide::default()], [pixel(3.0, 2, 8.0)]);
+            let push = PriorityPush { filtered, ..push };
+            let [noise] = reference(&HostInputs { guide: &guide, stats: &stats, light: &light, priority: &[], push })
+                .try_into()
+                .unwrap();
+            noise * noise
+        };
+        let whole = of(16.0, 0.0);
+        let shares = [0.0, 16.0, 32.0, 99.0].map(|m2: f32| of(m2, 0.5) / whole);
+        let close = shares.iter().zip([1.0, 0.75, 0.5, 0.5]).all(|(a, b)| (a - b).abs() < 1e-6);
+        assert!(close, "{shares:?}");
+    }
+
     /// Two pixels in one row, of one albedo or not.
     fn pair(stats: [PixelStats; 2], albedo: f32) -> [f32; 2] {
         let push = PriorityPush { size: [2, 1], window: 2, luminance_floor: 0.0, limit: 99, ..PriorityPush::default() };

@@ -73,7 +73,10 @@ mod tests {
         let guide = [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]].map(plane);
         let push =
             PriorityPush { size: [4, 1], window: 2, normal_scale: 1e6, position_scale: 1.0, ..PriorityPush::default() };
-        assert_eq!(reference(&HostInputs { guide: &guide, stats: &[], light: &[], priority: &[], push }), [0.0, 0.0, 0.5, 0.0]);
+        assert_eq!(
+            reference(&HostInputs { guide: &guide, stats: &[], light: &[], priority: &[], push }),
+            [0.0, 0.0, 0.5, 0.0]
+        );
     }
 
     #[test]

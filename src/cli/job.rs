@@ -80,8 +80,15 @@ impl Job<'_> {
             }
         };
         let allocations = earlier.map_or(0, |e| e.progress.allocations);
-        let mut end =
-            End { times: Vec::new(), traced: 0, allocations, broken_priorities: 0, broken_samples: None, last: None, why: Why::Done };
+        let mut end = End {
+            times: Vec::new(),
+            traced: 0,
+            allocations,
+            broken_priorities: 0,
+            broken_samples: None,
+            last: None,
+            why: Why::Done,
+        };
         if earlier.is_some() {
             end.last = Some(nothing_yet(steps().next()));
         }
@@ -139,7 +146,8 @@ fn rays_of_a_few(renderer: &Renderer, traced: u64) -> Result<[u64; 2]> {
     let mut sums = [0; 2];
     for first in (0..RUNS).map(|i| i * traced / RUNS) {
         let run = first..traced.min(first + SAMPLES);
-        for [_, _, _, rays] in samples.read_range(run.start * records..run.end * records)?.into_iter().step_by(records) {
+        for [_, _, _, rays] in samples.read_range(run.start * records..run.end * records)?.into_iter().step_by(records)
+        {
             sums = [sums[0] + rays.abs() as u64, sums[1] + 1];
         }
     }

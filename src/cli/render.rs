@@ -375,12 +375,12 @@ mod tests {
 
     #[test]
     fn a_film_takes_its_records_and_its_channels() {
-        // 32 bytes of statistics, 24 of light, 48 of guide; 27 channels. Placed: 24 more, and 2 channels.
+        // 32 bytes of statistics, 32 of light, 48 of guide; 30 channels. Placed: 24 more, and 2 channels.
         let mut settings = Settings { width: 3, height: 2, ..Settings::default() };
-        assert_eq!(bytes_of_film(&settings, true), 6 * (104 + 4 * 27));
+        assert_eq!(bytes_of_film(&settings, true), 6 * (112 + 4 * 30));
         settings.allocate.policy = "both".into();
-        assert_eq!(bytes_of_film(&settings, false), 6 * 4 * 29);
-        assert_eq!(bytes_of_film(&settings, true), 6 * (104 + 24 + 4 * 29));
+        assert_eq!(bytes_of_film(&settings, false), 6 * 4 * 32);
+        assert_eq!(bytes_of_film(&settings, true), 6 * (112 + 24 + 4 * 32));
     }
 
     #[test]

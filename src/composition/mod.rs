@@ -210,8 +210,8 @@ fn demodulated_variance((v, f): (&vec3, &vec3)) -> vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::aov::Names;
     use crate::image::Film;
+    use crate::image::aov::Names;
 
     const RGB: [&str; 3] = ["R", "G", "B"];
 
@@ -303,7 +303,11 @@ mod tests {
         film.add_vec3("variance", RGB, &[[8.0; 3]; 4]);
         film.add("samples", Samples::U32(vec![4, 1, 3, 0]));
         let of = |film: &Film, demodulation| take_apart(film, demodulation).input.variance.unwrap();
-        assert_eq!(of(&film, Demodulation::Light)[0], [32.0; 3], "of earlier versions: of all light over the squared albedo");
+        assert_eq!(
+            of(&film, Demodulation::Light)[0],
+            [32.0; 3],
+            "of earlier versions: of all light over the squared albedo"
+        );
         film.add("indirect.m2", Samples::F32(vec![12.0; 4]));
         assert_eq!(of(&film, Demodulation::Light), [[1.0; 3], [0.0; 3], [2.0; 3], [0.0; 3]]);
         assert_eq!(of(&film, Demodulation::Off)[0], [8.0; 3]);

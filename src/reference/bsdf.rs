@@ -253,6 +253,7 @@ pub fn bsdf_albedo(b: &Bsdf, wo_z: f32) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gpu::layout::BSDF_DIFFUSE;
 
     const GLASS: Bsdf = Bsdf {
         kind: BSDF_DIELECTRIC,
@@ -275,6 +276,24 @@ mod tests {
         // Seen from where it went, the ray comes back, and the radiance with it.
         let (sampled, back) = bsdf_sample(&GLASS, s.wi, 0.99, Vec2::ZERO);
         assert!(sampled && (back.wi - wo).length() < 1e-6 && (back.weight.x - 2.25).abs() < 1e-5, "{back:?}");
+    }
+
+    #[test]
+    fn albedo_is_that_of_the_lobes_whose_light_is_indirect() {
+        let base = Bsdf { albedo: Vec3::splat(0.5), specular: Vec3::splat(0.8), ..GLASS };
+        let of = |kind, alpha, cosine| bsdf_albedo(&Bsdf { kind, alpha, k: Vec3::splat(4.0), ..base }, cosine).x;
+        let f = fresnel_dielectric(0.3, 1.5).x;
+        assert_eq!(
+            [of(BSDF_DIELECTRIC, 0.0, 1.0), of(BSDF_CONDUCTOR, 0.0, 1.0), of(BSDF_DIFFUSE, 0.0, 0.3)],
+            [0.0, 0.0, 0.5]
+        );
+        // 0.04 is what light meets head on: 0.5 * 0.96 + 0.8 * 0.04.
+        let close = |a: f32, b: f32| assert!((a - b).abs() < 1e-5, "{a} {b}");
+        close(of(BSDF_COATED, 0.2, 1.0), 0.512);
+        close(of(BSDF_COATED, 0.2, 0.3), 0.5 * (1.0 - f) + 0.8 * f);
+        close(of(BSDF_COATED, 0.0, 0.3), 0.5 * (1.0 - f));
+        close(of(BSDF_DIELECTRIC, 0.2, 1.0), 0.96 + 0.8 * 0.04);
+        close(of(BSDF_CONDUCTOR, 0.2, 1.0), 0.8 * (0.25 + 16.0) / (6.25 + 16.0));
     }
 
     #[test]

@@ -67,25 +67,39 @@ fn report(broken: &mut BrokenTally, pixel: u32, sample: u32) {
 /// 2^-bits of the last place of `mean`.
 fn unit(mean: f32, bits: u32) -> f32 {
     let power = f32::from_bits(mean.to_bits() & 0x7f80_0000);
-    (power * (-23.0 - bits as f32).exp2()).max(1e-37)
+    (power * f32::EPSILON / (1u32 << bits) as f32).max(1e-37)
 }
 
-/// Moves one channel of a mean by a step. `remainder` holds what rounding has taken off, `bits` from bit `at` on.
-fn move_channel(mean: f32, by: f32, remainder: &mut u32, at: u32, bits: u32) -> f32 {
-    let kept = ((*remainder << (32 - at - bits)) as i32) >> (32 - bits);
+/// A word of remainders, and the samples of the mean.
+struct Kept<'a> {
+    word: &'a mut u32,
+    count: u32,
+}
+
+/// Moves one channel of a mean by a step. The remainder holds what rounding has taken off, `bits` from bit `at` on; it is rounded
+/// itself, up as often as down by the number of samples.
+fn move_channel(mean: f32, by: f32, remainder: &mut Kept, at: u32, bits: u32) -> f32 {
+    let kept = ((*remainder.word << (32 - at - bits)) as i32) >> (32 - bits);
     let added = kept as f32 * unit(mean, bits) + by;
     let moved = mean + added;
     let lost = added - (moved - mean);
-    let most = ((1 << (bits - 1)) - 1) as f32;
-    let kept = (lost / unit(moved, bits) + 0.5).floor().clamp(-most, most) as i32;
+    let end = (1 << (bits - 1)) as f32;
+    let up = (remainder.count.reverse_bits() >> 8) as f32 * 5.960_464_5e-8;
+    let rounded = (lost / unit(moved, bits) + up).floor();
+    // Half of the last place above is half of it below the next number: cut, it would be lost, always in one direction.
+    let (moved, rounded) = match rounded >= end {
+        true => (moved + unit(moved, bits) * (2.0 * end), -end),
+        false => (moved, rounded),
+    };
+    let kept = rounded.clamp(-end, end - 1.0) as i32;
     let mask = ((1 << bits) - 1) << at;
-    *remainder = (*remainder & !mask) | (((kept as u32) << at) & mask);
+    *remainder.word = (*remainder.word & !mask) | (((kept as u32) << at) & mask);
     moved
 }
 
-fn move_mean(mean: vec3, by: Vec3, remainder: &mut u32, at: u32, bits: u32) -> Vec3 {
+fn move_mean(mean: vec3, by: Vec3, mut remainder: Kept, at: u32, bits: u32) -> Vec3 {
     let by = by.to_array();
-    [0, 1, 2].map(|c| move_channel(mean[c], by[c], remainder, at + c as u32 * bits, bits)).into()
+    [0, 1, 2].map(|c| move_channel(mean[c], by[c], &mut remainder, at + c as u32 * bits, bits)).into()
 }
 
 fn square(a: f32, b: f32) -> f32 {
@@ -98,7 +112,7 @@ fn fold_radiance(s: &mut PixelStats, radiance: Vec3) {
     let by = off * (1.0 / s.count as f32);
     let mean = match s.count <= FEW {
         true => Vec3::from(s.mean) + by,
-        false => move_mean(s.mean, by, &mut s.remainder, 0, BITS),
+        false => move_mean(s.mean, by, Kept { word: &mut s.remainder, count: s.count }, 0, BITS),
     };
     s.mean = mean.into();
     let moved = radiance - mean;
@@ -111,10 +125,11 @@ fn fold_light(l: &mut PixelLight, (kept, irradiance): (Vec3, Vec3), count: u32) 
     let [by, indirect_by] = [(kept - direct) * share, (irradiance - indirect) * share];
     let [direct, moved] = match count <= FEW {
         true => [direct + by, indirect + indirect_by],
-        false => [
-            move_mean(l.direct, by, &mut l.remainder, 0, LIGHT_BITS),
-            move_mean(l.indirect, indirect_by, &mut l.remainder, 3 * LIGHT_BITS, LIGHT_BITS),
-        ],
+        false => {
+            let word = &mut l.remainder;
+            let direct = move_mean(l.direct, by, Kept { word, count }, 0, LIGHT_BITS);
+            [direct, move_mean(l.indirect, indirect_by, Kept { word, count }, 3 * LIGHT_BITS, LIGHT_BITS)]
+        }
     };
     let off = |mean: Vec3| luminance(irradiance.into()) - luminance(mean.into());
     l.indirect_m2 = (l.indirect_m2 + square(off(indirect), off(moved))).min(WIDEST);

@@ -87,4 +87,6 @@ effects! {
     counters = 27, FX_COUNTERS;
     /// Samples placed where they count: a list of paths instead of so many per pixel.
     adaptive = 28, FX_ADAPTIVE;
+    /// More than 4096 samples of a pixel: means keep what rounding takes off.
+    many_samples = 29, FX_MANY_SAMPLES;
 }
