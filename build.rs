@@ -1,6 +1,6 @@
 //! `glsl/*.comp` becomes SPIR-V and `$OUT_DIR/shaders.rs`: one module per kernel, with a typed field per binding and per
 //! specialisation constant, so that a forgotten buffer or a constant that a kernel does not have does not compile.
-//! `glsl/test/*.comp` becomes `$OUT_DIR/test_shaders.rs` for the integration tests. Any error stops the build with
+//! `glsl/test/*.comp`, and kernels that tests run by themselves, become `$OUT_DIR/test_shaders.rs`. Any error stops the build with
 //! file and line. The compiler is `glslc`, as a program: Debian 12's libshaderc cannot be linked (undefined symbols).
 //! A packaged crate needs no compiler: it carries what `tools/package` compiled, in `spirv/`, under names that tell of which
 //! sources it was made. A checkout has no such folder.
@@ -59,22 +59,28 @@ fn build() -> Result<()> {
         fs::remove_dir_all(&compiled)?; // kernels of earlier sources
     }
     fs::create_dir(&compiled)?;
-    generate(Path::new("glsl"), "crate", &out.join("shaders.rs"))?;
-    generate(Path::new("glsl/test"), "tallow", &out.join("test_shaders.rs"))
+    generate(&kernels(Path::new("glsl"))?, "crate", &out.join("shaders.rs"))?;
+    let tested = [&kernels(Path::new("glsl/test"))?[..], &[PathBuf::from("glsl/fold.comp")]].concat();
+    generate(&tested, "tallow", &out.join("test_shaders.rs"))
 }
 
-/// Compiles every kernel directly in `folder`; `root` is the path by which the generated code reaches the crate.
-fn generate(folder: &Path, root: &str, target: &Path) -> Result<()> {
+/// The kernels directly in `folder`.
+fn kernels(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = fs::read_dir(folder)
         .with_context(|| format!("{}: cannot be listed", folder.display()))?
         .map(|entry| Ok(entry?.path()))
         .collect::<Result<_>>()?;
     files.retain(|file| file.extension().is_some_and(|e| e == "comp"));
     files.sort();
+    Ok(files)
+}
+
+/// Compiles `files`; `root` is the path by which the generated code reaches the crate.
+fn generate(files: &[PathBuf], root: &str, target: &Path) -> Result<()> {
     let (mut code, mut hash) = (String::new(), Xxh3Default::new());
     let compiled = target.with_file_name("spirv");
     let mut groups = BTreeMap::new();
-    for file in &files {
+    for file in files {
         let name = file.file_stem().and_then(|s| s.to_str()).context("kernel names are ASCII")?;
         let (whole, sources) = preprocess(file)?;
         let label = format!("{name}-{:016x}.spv", xxh3_64(whole.as_bytes()));

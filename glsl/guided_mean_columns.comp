@@ -31,7 +31,7 @@ void absorb_element(inout Fit f, vec4 point, int x, int y) {
     int at = pixel_at(x, y);
     Fit model = Fit(texelFetch(slope_r, at), texelFetch(slope_g, at), texelFetch(slope_b, at), texelFetch(value, at));
     bool is = y >= 0 && y < int(push.size.y);
-    absorb(f, moved(model, point - point_at(x, y)), is ? 1.0 : 0.0);
+    absorb(f, moved(model, point - point_at(x, y)), is);
 }
 
 void put(int x, int y, Fit whole, vec4 point) {

@@ -33,7 +33,7 @@ void absorb_element(inout Fit f, vec4 point, int row, int x) {
     int width = int(push.size.x);
     int at = strip_at(clamp(x, 0, width - 1), row, width, FIT);
     Fit column = FIT_LOAD(at, 8, FETCH_COLUMN);
-    absorb(f, moved(column, point - point_at(row, x)), x >= 0 && x < width ? 1.0 : 0.0);
+    absorb(f, moved(column, point - point_at(row, x)), x >= 0 && x < width);
 }
 
 void put(int row, int x, Fit whole, vec4 point) {

@@ -35,7 +35,7 @@ void absorb_element(inout Moments m, vec4 point, int row, int x) {
     int at = strip_at(clamp(x, 0, width - 1), row, width, MOMENTS);
     Moments column = MOMENTS_LOAD(at, 8, FETCH_COLUMN);
     column.mean += point_at(row, x) - point;
-    absorb(m, column, x >= 0 && x < width ? 1.0 : 0.0);
+    absorb(m, column, x >= 0 && x < width);
 }
 
 void put(int row, int x, Moments whole, vec4 point) {

@@ -5,14 +5,17 @@
 #include "effects.glsl"
 #include "shared/thread.glsl"
 #include "shared/scene.glsl"
+#include "shared/finite.glsl"
 
 // One camera path per thread: next event estimation and BSDF sampling joined by the balance heuristic (Veach 1997).
 // Thread i traces sample first_sample + i / pixels of pixel first_pixel + i % pixels, or path i of a list, and writes 1 vec4 (radiance), or
-// with FX_SPLIT 3 (direct, indirect, the albedo that indirect is to be divided by); w of the first is the number of its rays.
+// with FX_SPLIT 3 (direct, indirect, the albedo that indirect is to be divided by); w of the first is the number of its rays, less
+// than 0 where the light was no number: such a sample is black.
 layout(local_size_x_id = 100) in;
 layout(scalar, binding = 11) writeonly buffer Samples { vec4 samples[]; };
 layout(scalar, binding = 12) buffer Counters { uint counters[]; };
 layout(binding = 13) uniform usamplerBuffer paths; // of uvec2
+layout(scalar, binding = 14) buffer Broken { BrokenTally broken[]; };
 layout(scalar, push_constant) uniform Push { PathPush push; };
 
 uint nodes_visited = 0u, closest_rays = 0u, any_rays = 0u;
@@ -41,6 +44,7 @@ struct Path {
     vec3 throughput;
     float bsdf_pdf; // of `direction`; 0 after a smooth interface or from the camera
     bool delta;     // no light sampling competes for what `direction` hits
+    float eta_scale; // squared refractive index at `origin` over that at the camera
 };
 
 struct Light2 {
@@ -100,11 +104,16 @@ bool scatter(inout Path path, Surface s, Bsdf bsdf, mat3 basis, vec3 wo, Sampler
     path.origin = offset_origin(s.position, normal);
     path.bsdf_pdf = next.pdf;
     path.delta = next.delta;
+    if (FX_ROULETTE && is_kind(FX_DIELECTRIC, bsdf, BSDF_DIELECTRIC) && wo.z * next.wi.z < 0.0) {
+        float eta = relative_index(bsdf, wo.z);
+        path.eta_scale *= eta * eta;
+    }
     return scattered && max(path.throughput.r, max(path.throughput.g, path.throughput.b)) > 0.0;
 }
 
+// Radiance is scaled by 1 / eta^2 on the way into glass, and back on the way out: that says nothing of what a path is worth.
 bool survives_roulette(inout Path path, Sampler random, uint pair) {
-    float q = min(max(path.throughput.r, max(path.throughput.g, path.throughput.b)), 0.95);
+    float q = min(max(path.throughput.r, max(path.throughput.g, path.throughput.b)) * path.eta_scale, 0.95);
     if (sample_2d(random, pair + PAIR_ROULETTE).x >= q) return false;
     path.throughput /= q;
     return true;
@@ -127,7 +136,7 @@ Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
     Hit hit = traverse(Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed)), push.root);
     closest_rays++;
     Surface s;
-    bool smooth_first = false;
+    bool smooth_first = false, mirrored = false;
     uint bounce = 0u;
     // A round goes from one surface to the next, so that the last one samples no light. The light sampled at the first waits
     // for the ray to the next: see traverse_both.
@@ -141,7 +150,7 @@ Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         vec3 wo = -path.direction * basis;
         bool smooth_here = bsdf_is_delta(bsdf);
         if (bounce == 0u) {
-            albedo = bsdf_albedo(bsdf);
+            albedo = bsdf_albedo(bsdf, wo.z);
             smooth_first = smooth_here;
         }
         Segment shadow;
@@ -149,6 +158,7 @@ Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         vec3 sampled = path.throughput * light_from_nee(s, bsdf, basis, wo, random, pair, mask_seed + 1u, shadow);
         bool shadowed = push.light_count > 0u && !smooth_here && max(sampled.r, max(sampled.g, sampled.b)) > 0.0;
         bool alive = scatter(path, s, bsdf, basis, wo, random, pair);
+        if (bounce == 0u) mirrored = path.delta;
         bool roulette = FX_ROULETTE && push.roulette_depth > 0u && bounce + 1u >= push.roulette_depth;
         if (roulette) alive = survives_roulette(path, random, pair) && alive;
         bounce++;
@@ -163,6 +173,8 @@ Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         if (!alive || !arrive(sum, path, hit, indirect, s)) break;
     } while (bounce + 1u < push.max_depth);
     if (FX_CLAMP) sum.indirect = clamped(sum.indirect);
+    // What a smooth coat mirrors needs no filter. It is moved only here, so that the sum of both keeps its bits.
+    if (mirrored) sum = Light2(sum.direct + sum.indirect, vec3(0.0));
     return sum;
 }
 
@@ -186,10 +198,15 @@ void main() {
     }
     Sampler random = sampler_start(pixel, index, push.seed);
     Ray ray = eye_ray(film_sample(pixel, random), random);
-    Path path = Path(ray.origin, ray.direction, vec3(1.0), 0.0, true);
+    Path path = Path(ray.origin, ray.direction, vec3(1.0), 0.0, true, 1.0);
     vec3 albedo;
     Light2 light = trace_path(path, random, path_seed(pixel, index), albedo);
     float rays = float(closest_rays + any_rays);
+    if (!finite(light.direct + light.indirect)) {
+        light = Light2(vec3(0.0), vec3(0.0));
+        rays = -rays;
+        atomicMax(broken[0].lowest, ~pixel);
+    }
     if (FX_SPLIT) {
         samples[3u * i] = vec4(light.direct, rays);
         samples[3u * i + 1u] = vec4(light.indirect, 0.0);

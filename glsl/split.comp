@@ -10,7 +10,7 @@ layout(local_size_x = 64) in;
 const uint LIGHT = 0u, ALBEDO = 1u; // composition::Demodulation
 layout(constant_id = 110) const uint DEMODULATION = LIGHT;
 layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
-layout(binding = 1) uniform samplerBuffer light; // of PixelLight
+layout(binding = 1) uniform usamplerBuffer light; // of PixelLight
 layout(binding = 2) uniform samplerBuffer guide; // of Guide
 layout(scalar, binding = 3) writeonly buffer Radiance { vec4 radiance[]; };
 layout(scalar, binding = 4) writeonly buffer Variance { vec3 variance[]; };
@@ -98,6 +98,13 @@ Parts split_as_demanded(int i) {
     return Parts(colour_at(i), vec3(1.0), vec3(0.0));
 }
 
+// Of the mean. That of indirect light is known of its luminance.
+vec3 variance_of_filtered(int i, vec3 factor, float freedom) {
+    if (DEMODULATION == LIGHT) return vec3(load_light(i).indirect_m2 / freedom);
+    vec3 of_mean = uintBitsToFloat(texelFetch(stats, 2 * i + 1).xyz) / freedom;
+    return mix(vec3(0.0), of_mean / (factor * factor), greaterThan(factor, vec3(0.0)));
+}
+
 void main() {
     uint i = thread_index();
     if (i >= push.size.x * push.size.y) return; // safe: no barrier() follows
@@ -106,9 +113,8 @@ void main() {
     // Pixels whose filtered part is not used must not reach others.
     bool known = finite(colour_at(int(i))) && any(greaterThan(p.factor, vec3(0.0)));
     radiance[i] = vec4(p.filtered, known ? float(count) : 0.0);
-    vec3 m2 = uintBitsToFloat(texelFetch(stats, 2 * int(i) + 1).xyz);
-    vec3 of_mean = count > 1u ? m2 / (float(count) * float(count - 1u)) : vec3(0.0);
-    variance[i] = mix(vec3(0.0), of_mean / (p.factor * p.factor), greaterThan(p.factor, vec3(0.0)));
+    float freedom = count > 1u ? float(count) * float(count - 1u) : 0.0;
+    variance[i] = freedom > 0.0 ? variance_of_filtered(int(i), p.factor, freedom) : vec3(0.0);
     factor[i] = vec4(p.factor, 0.0);
     sharp[i] = vec4(p.sharp, 0.0);
 }

@@ -8,9 +8,6 @@ use crate::gpu::{Buffer, Gpu, Kernel, Location, PixelFormat, Recorder};
 use crate::renderer::{OutputView, Renderer};
 use crate::shaders::{join, split};
 
-/// Texels of a pixel's [`PixelLight`].
-const LIGHT_TEXELS: u64 = 6;
-
 /// A filter over the films of one renderer. Everything is created in [`Denoiser::new`], nothing later.
 pub struct Denoiser {
     split: Kernel<split::Bind<'static>>,
@@ -44,7 +41,7 @@ impl Denoiser {
         settings.validate()?;
         check(renderer, demodulation)?;
         let (film, size) = (&renderer.film().tiles[0], [renderer.settings().width, renderer.settings().height]);
-        filter::check_size(gpu, size, LIGHT_TEXELS)?;
+        filter::check_size(gpu, size, filter::GUIDE_TEXELS)?;
         let pixels = film.pixels as usize;
         let plane = |name| Buffer::new(gpu, name, pixels, Location::Device);
         let planes = Planes {

@@ -37,6 +37,7 @@ pub struct Allocation {
 
 /// Forgets all samples, and finds the primary hits where they are wanted: once per camera.
 pub fn record_start(rec: &mut Recorder, st: &Stages, s: &DeviceScene, f: &FilmBuffers, push: &PathPush) -> Result<()> {
+    rec.fill(&f.broken, 0)?;
     for tile in &f.tiles {
         rec.fill(&tile.stats, 0)?;
         rec.fill(&tile.light, 0)?;
@@ -53,7 +54,8 @@ pub fn record_preparation(rec: &mut Recorder, a: &Allocation, f: &FilmBuffers, p
 }
 
 fn inputs(f: &FilmBuffers) -> Inputs<'_> {
-    Inputs { guide: &f.tiles[0].guide, stats: &f.tiles[0].stats, priority: &f.priority }
+    let tile = &f.tiles[0];
+    Inputs { guide: &tile.guide, stats: &tile.stats, light: &tile.light, priority: &f.priority }
 }
 
 /// Records one batch with the same number of paths for every pixel of a run.
@@ -264,13 +266,15 @@ impl FilmTile {
 
 /// What a frame writes. Buffers that the outputs do not call for hold one element.
 pub struct FilmBuffers {
-    /// vec4 per sample in flight, three with direct and indirect light apart; w of the first is the number of its rays.
-    /// Overwritten by every batch.
+    /// vec4 per sample in flight, three with direct and indirect light apart; w of the first is the number of its rays, less
+    /// than 0 where the light was no number. Overwritten by every batch.
     pub samples: Buffer<vec4>,
     /// The film, in order; one tile unless a device's buffers are too small for that.
     pub tiles: Vec<FilmTile>,
     /// Closest-hit rays, any-hit rays, nodes visited: pairs of words, low first.
     pub counters: Buffer<u32>,
+    /// One element.
+    pub broken: Buffer<BrokenTally>,
     /// (pixel, sample index) of the paths in flight, where samples are placed.
     pub paths: Buffer<uvec2>,
     /// Per pixel, where samples are placed.
@@ -297,6 +301,7 @@ impl FilmBuffers {
             samples: Buffer::new(gpu, "samples", records, Location::Device)?,
             tiles: starts.map(tile).collect::<Result<_>>()?,
             counters: Buffer::from_slice(gpu, "counters", &[0; 6])?,
+            broken: Buffer::from_slice(gpu, "broken samples", &[BrokenTally::default()])?,
         })
     }
 

@@ -21,6 +21,7 @@ use crate::shaders::{fold, guide, path};
 use crate::stage::apportion::Apportion;
 use crate::stage::scan::Scan;
 use crate::stage::{PerBlock, thread_items};
+use crate::statistics::BrokenSamples;
 use std::time::Duration;
 pub use views::{Layer, OutputView};
 
@@ -87,14 +88,15 @@ impl Renderer {
         let settings = scene.settings.clone();
         settings.validate()?;
         scene.check()?;
-        let effects = Effects { split_light: outputs.split_light, counters: outputs.counters, ..effects };
+        let policy = policy_of(&settings)?;
+        let split_light = outputs.split_light || policy.split_light;
+        let effects = Effects { split_light, counters: outputs.counters, ..effects };
         let (thread, traverse) = (gpu.tuning().thread(), traverse::Constants { stack: scene.stack });
         let stages = Stages {
             guide: Kernel::new(gpu, &guide::Constants { effects, thread, traverse })?,
             path: Kernel::new(gpu, &path::Constants { effects, thread, traverse })?,
             fold: Kernel::new(gpu, &fold::Constants { effects, thread })?,
         };
-        let policy = policy_of(&settings)?;
         let pixels = settings.pixels() as u32;
         let allocation = effects.adaptive.then(|| allocation(gpu, policy, pixels)).transpose()?;
         let paths = paths_in_flight(gpu, &settings, &effects);
@@ -180,7 +182,7 @@ impl Renderer {
         self.gpu.run(frame, |rec| self.record(rec, step))
     }
 
-    /// Puts back what an earlier render had: statistics, light (empty unless it is kept apart), priorities (empty unless
+    /// Puts back what an earlier render had: statistics, light (empty unless it is kept apart or the policy asks for it), priorities (empty unless
     /// the policy keeps them from round to round), and how many samples each pixel still lacks of what it was to have.
     /// Follow it with [`Renderer::rest`]. Needs the effect `adaptive`.
     ///
@@ -221,7 +223,9 @@ impl Renderer {
         }
         let push = PriorityPush { limit, ..self.priority };
         let guide = self.film.tiles[0].guide.read()?;
-        Ok((policy_of(&self.settings)?.reference)(&HostInputs { guide: &guide, stats, priority: &[], push }))
+        let light = self.film.tiles[0].light.read()?;
+        let inputs = HostInputs { guide: &guide, stats, light: &light, priority: &[], push };
+        Ok((policy_of(&self.settings)?.reference)(&inputs))
     }
 
     /// How the last allocation went.
@@ -289,6 +293,22 @@ impl Renderer {
             ("path", milliseconds(self.stages.path.compile_time())),
             ("fold", milliseconds(self.stages.fold.compile_time())),
         ]
+    }
+
+    /// Samples since [`Step::Start`] that were no number, and counted as black: a fault of the renderer, or of a scene whose
+    /// numbers are too large.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub fn broken_samples(&self) -> Result<Option<BrokenSamples>> {
+        let found = self.film.broken.read()?[0];
+        let (pixel, Settings { width, first_sample, seed, .. }) = (!found.pixel, &self.settings);
+        Ok((found.count > 0).then(|| BrokenSamples {
+            count: found.count.into(),
+            pixel: [pixel % width, pixel / width],
+            sample: first_sample.wrapping_add(found.index),
+            seed: *seed,
+        }))
     }
 
     /// Reads the counters; zero unless they were asked for.

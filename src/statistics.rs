@@ -1,5 +1,6 @@
 //! What is known of a pixel after some of its samples, and how two such records become one.
 use crate::gpu::layout::{PixelLight, PixelStats, vec3};
+use serde::{Deserialize, Serialize};
 
 /// One pixel of a render.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -8,6 +9,37 @@ pub struct Pixel {
     pub stats: PixelStats,
     /// Direct and indirect light, zero where they are not kept apart.
     pub light: PixelLight,
+}
+
+/// Samples that were no number, and counted as black.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct BrokenSamples {
+    /// How many.
+    pub count: u64,
+    /// Column and row of one: of the first pixel, row by row, that has such a sample.
+    pub pixel: [u32; 2],
+    /// Its index, the lowest of that pixel.
+    pub sample: u32,
+    /// The seed of its render.
+    pub seed: u32,
+}
+
+impl BrokenSamples {
+    /// Those of two disjoint sets of samples.
+    pub fn join(a: Option<Self>, b: Option<Self>) -> Option<Self> {
+        let (Some(x), Some(y)) = (a, b) else { return a.or(b) };
+        let place = |s: &Self| (s.pixel[1], s.pixel[0], s.sample, s.seed);
+        let first = if place(&y) < place(&x) { y } else { x };
+        Some(Self { count: x.count + y.count, ..first })
+    }
+}
+
+/// Sums of squares are cut there, as in `glsl/fold.comp`.
+const WIDEST: f64 = 1e35;
+
+/// Rec. 709.
+pub fn luminance([r, g, b]: vec3) -> f32 {
+    0.2126 * r + 0.7152 * g + 0.0722 * b
 }
 
 /// The record of two disjoint sets of samples (Chan, Golub and LeVeque 1979): with d the difference of the means, the
@@ -22,20 +54,24 @@ pub fn join(a: &Pixel, b: &Pixel) -> Pixel {
     let mean = |x: vec3, y: vec3| -> vec3 {
         std::array::from_fn(|i| (f64::from(x[i]) + (f64::from(y[i]) - f64::from(x[i])) * nb / n) as f32)
     };
+    let squares = |[x, y]: [f32; 2], d: f64| (f64::from(x) + f64::from(y) + d * d * na * nb / n).min(WIDEST) as f32;
     let m2 = std::array::from_fn(|i| {
         let d = f64::from(b.stats.mean[i]) - f64::from(a.stats.mean[i]);
-        (f64::from(a.stats.m2[i]) + f64::from(b.stats.m2[i]) + d * d * na * nb / n) as f32
+        squares([a.stats.m2[i], b.stats.m2[i]], d)
     });
+    let off = f64::from(luminance(b.light.indirect)) - f64::from(luminance(a.light.indirect));
     Pixel {
         stats: PixelStats {
             mean: mean(a.stats.mean, b.stats.mean),
             count: a.stats.count + b.stats.count,
             m2,
-            rays: a.stats.rays.wrapping_add(b.stats.rays),
+            remainder: 0,
         },
         light: PixelLight {
             direct: mean(a.light.direct, b.light.direct),
+            indirect_m2: squares([a.light.indirect_m2, b.light.indirect_m2], off),
             indirect: mean(a.light.indirect, b.light.indirect),
+            remainder: 0,
         },
     }
 }
@@ -54,20 +90,43 @@ mod tests {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let m2 = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
-        let stats = PixelStats { mean: [mean as f32; 3], count: n as u32, m2: [m2 as f32; 3], rays: 0 };
-        Pixel { stats, light: PixelLight { direct: stats.mean, indirect: [0.0; 3] } }
+        let stats = PixelStats { mean: [mean as f32; 3], count: n as u32, m2: [m2 as f32; 3], remainder: 0 };
+        let light = PixelLight { indirect: stats.mean, indirect_m2: m2 as f32, ..PixelLight::default() };
+        Pixel { stats, light }
     }
 
     #[test]
     fn two_parts_are_the_whole() {
         // 1, 3, 5, 7: mean 4, M2 20, however they are parted; nothing joined to them changes nothing.
         for (a, b) in [(&[1.0][..], &[3.0, 5.0, 7.0][..]), (&[1.0, 3.0], &[5.0, 7.0]), (&[5.0, 1.0, 3.0], &[7.0])] {
-            let whole = join(&of(a), &of(b)).stats;
+            let Pixel { stats: whole, light } = join(&of(a), &of(b));
             assert_eq!((whole.count, whole.mean, whole.m2), (4, [4.0; 3], [20.0; 3]));
+            assert!(light.indirect == [4.0; 3] && (light.indirect_m2 - 20.0).abs() < 1e-4, "{light:?}");
         }
         let some = of(&[1.0, 2.0]);
         assert_eq!((join(&some, &Pixel::default()), join(&Pixel::default(), &some)), (some, some));
         assert_eq!(join(&Pixel::default(), &Pixel::default()), Pixel::default());
+    }
+
+    #[test]
+    fn broken_samples_add_up_and_the_first_is_kept() {
+        let of = |count, pixel, sample, seed| Some(BrokenSamples { count, pixel, sample, seed });
+        let (a, b) = (of(2, [9, 1], 3, 0), of(5, [1, 2], 0, 1));
+        assert_eq!([BrokenSamples::join(a, b), BrokenSamples::join(b, a)], [of(7, [9, 1], 3, 0); 2]);
+        assert_eq!(
+            [BrokenSamples::join(a, None), BrokenSamples::join(None, b), BrokenSamples::join(None, None)],
+            [a, b, None]
+        );
+    }
+
+    #[test]
+    fn squares_of_records_far_apart_stay_finite() {
+        let far = |mean: f32| Pixel {
+            stats: PixelStats { mean: [mean; 3], count: 1, ..PixelStats::default() },
+            light: PixelLight { indirect: [mean; 3], ..PixelLight::default() },
+        };
+        let whole = join(&far(0.0), &far(1e38));
+        assert_eq!((whole.stats.m2, whole.light.indirect_m2), ([1e35; 3], 1e35));
     }
 
     #[test]

@@ -36,7 +36,7 @@ fn same(a: &Film, b: &Film, layers: &[&str]) -> bool {
     layers.iter().all(|layer| planes(a, layer) == planes(b, layer))
 }
 
-const LAYERS: [&str; 6] = ["", "m2", "variance", "direct", "indirect", "samples"];
+const LAYERS: [&str; 7] = ["", "m2", "variance", "direct", "indirect", "indirect.m2", "samples"];
 
 fn counts(film: &Film) -> Vec<u32> {
     match film.channel("samples") {
@@ -131,6 +131,8 @@ fn disjoint_ranges_merge_and_others_are_refused() {
     assert_eq!(counts(&whole), counts(&merged));
     let [a, b] = [&whole, &merged].map(|f| f.picture(None).unwrap().pixels.concat());
     assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() <= 3e-6 * a + 1e-9));
+    let [a, b] = [&whole, &merged].map(|f| f.picture(Some("indirect.m2")).unwrap().pixels.concat());
+    assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() <= 1e-5 * a + 1e-6) && a.iter().any(|&a| a > 0.1));
     complains(&run(&folder, "merge a.exr whole.exr -o d.exr"), 3, &["whole.exr", "count twice"]);
     render(&folder, "--spp 4 --clamp-indirect 3 -o other.exr");
     complains(&run(&folder, "merge a.exr other.exr -o d.exr"), 3, &["other.exr", "other settings"]);
@@ -164,6 +166,41 @@ fn a_merged_file_still_knows_every_sample_that_it_holds() {
     }
 }
 
+/// A light so near to a surface that its irradiance is no number where the middle pixel looks.
+const TOO_BRIGHT: &str = "[film]\nwidth = 5\nheight = 5\n[camera]\nposition = [0, 0, 2]\ntarget = [0, 0, 0]\nfov = 45\n\
+    [render]\nspp = 4\nmax_depth = 2\n[[mesh]]\nshape = 'rectangle'\n\
+    [[light]]\ntype = 'point'\nposition = [0, 0, 1e-5]\nintensity = [1e30, 1e30, 1e30]\n";
+
+#[test]
+fn samples_that_are_no_numbers_are_told_and_add_up() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("s.toml"), TOO_BRIGHT).unwrap();
+    let told = |file: &str| film(&folder, file).metadata.get("brokenSamples").cloned();
+    let first = |count: u32| Some(format!(r#"{{"count":{count},"pixel":[2,2],"sample":0,"seed":0}}"#));
+    let render = |words: &str| {
+        let output = run(&folder, &format!("render s.toml --filter point --quiet {words}"));
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let said = render("-o a.exr");
+    assert!(said.lines().count() == 1 && said.contains("black: 4; the first: pixel (2, 2), sample 0"), "{said}");
+    assert_eq!(told("a.exr"), first(4));
+    for layer in ["", "m2", "variance", "direct", "indirect", "indirect.m2"] {
+        let picture = film(&folder, "a.exr").picture(Some(layer).filter(|l| !l.is_empty())).unwrap();
+        assert_eq!(picture.non_finite(), 0, "{layer}");
+    }
+    render("--spp 7 --resume a.exr -o more.exr");
+    assert_eq!(told("more.exr"), first(7));
+    render("--spp 3 --first-sample 4 -o b.exr");
+    assert!(run(&folder, "merge b.exr a.exr -o both.exr").status.success());
+    assert_eq!(told("both.exr"), first(7));
+    let output = run(&folder, "render s.toml --filter point --json -o c.exr");
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(json["broken_samples"]["count"], 4);
+    let beside = run(&folder, "render s.toml --filter box --quiet -o d.exr");
+    assert!(beside.stderr.is_empty() && told("d.exr").is_none(), "control: beside it there is light: {beside:?}");
+}
+
 #[test]
 fn samples_are_added_to_those_of_the_same_scene_only() {
     let folder = tempfile::tempdir().unwrap();
@@ -192,6 +229,15 @@ fn samples_are_added_to_those_of_the_same_scene_only() {
     image::write(&folder.path().join("old.exr"), &old, &Default::default()).unwrap();
     complains(&render("moved/t.toml --spp 4 --resume old.exr -o not.exr"), 3, &["old.exr", "sceneFingerprint"]);
     complains(&run(&folder, "merge b.exr old.exr -o not.exr"), 3, &["old.exr", "sceneFingerprint"]);
+    let mut old = film(&folder, "a.exr");
+    old.channels.retain(|c| c.name != "indirect.m2");
+    image::write(&folder.path().join("old.exr"), &old, &Default::default()).unwrap();
+    complains(
+        &render("moved/t.toml --spp 4 --resume old.exr -o not.exr"),
+        3,
+        &["old.exr", "indirect.m2", "earlier versions"],
+    );
+    complains(&run(&folder, "merge b.exr old.exr -o not.exr"), 3, &["old.exr", "indirect.m2", "earlier versions"]);
     assert!(!folder.path().join("not.exr").exists());
 }
 

@@ -8,11 +8,14 @@ mod support;
 
 use alike::alike;
 use std::path::Path;
-use tallow::gpu::layout::{Effects, PixelStats};
+use tallow::gpu::layout::{
+    BSDF_COATED, BSDF_DIFFUSE, Effects, Guide, Material, NONE, PixelLight, PixelStats, Triangle,
+};
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::renderer::{self, Batch, Outputs, Renderer, Step};
 use tallow::scene::Scene;
 use tallow::settings::{PixelFilter, Sampler, Settings};
+use tallow::statistics::BrokenSamples;
 
 fn scene(file: &str, change: impl Fn(&mut Settings)) -> Scene {
     Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file), &change).unwrap()
@@ -41,23 +44,20 @@ fn scenes() -> Vec<String> {
     all
 }
 
-/// The statistics' rays against the counters, which atomics make.
+/// The samples' rays against the counters, which atomics make.
 #[test]
-fn pixels_know_the_rays_of_their_samples() {
+fn samples_know_their_rays() {
     let gpu = support::gpu();
-    for (file, policy) in [("cornell-box/scene.toml", "uniform"), ("cornell-box/glass.toml", "both")] {
-        for split_light in [false, true] {
-            let scene = scene(file, |s| {
-                small(s);
-                s.allocate.policy = policy.to_owned();
-            });
-            let outputs = Outputs { split_light, guides: false, counters: true };
-            let renderer = Renderer::new(&gpu, &scene, outputs).unwrap();
-            let stats = support::render(&gpu, &renderer);
-            let rays: u64 = stats.iter().map(|s| u64::from(s.rays)).sum();
-            assert_eq!(rays, renderer.counters().unwrap().rays(), "{file} {policy}");
-            assert!(rays > 2 * 33 * 17 * 4, "control: {rays}");
-        }
+    for split_light in [false, true] {
+        let scene = scene("cornell-box/glass.toml", small);
+        let renderer = Renderer::new(&gpu, &scene, Outputs { split_light, guides: false, counters: true }).unwrap();
+        support::render(&gpu, &renderer); // one batch
+        let records = if split_light { 3 } else { 1 };
+        let samples = renderer.film().samples.read().unwrap();
+        assert_eq!(samples.len(), 33 * 17 * 4 * records, "one batch");
+        let rays: f64 = samples.iter().step_by(records).map(|s| f64::from(s[3])).sum();
+        assert_eq!(rays, renderer.counters().unwrap().rays() as f64, "split_light {split_light}");
+        assert!(rays > f64::from(2 * 33 * 17 * 4), "control: {rays}");
     }
     support::assert_silent(&gpu);
 }
@@ -236,6 +236,136 @@ fn a_mirror_vanishes_in_the_furnace() {
 fn glass_vanishes_in_the_furnace() {
     // The tessellated ball holds some light by total reflection from facet to facet: 64 edges lose 0.27 %.
     is_invisible("furnace/glass.toml", 512);
+}
+
+/// Entering glass scales radiance by 1 / eta^2 = 0.44, and leaving it by eta^2. Roulette that took the former for a loss would
+/// end more than half of all paths through the ball, and the variance of a sample be above 1; it ends 5 % at each surface.
+#[test]
+fn roulette_knows_that_glass_loses_no_light() {
+    let gpu = support::gpu();
+    let scene = scene("furnace/glass.toml", |s| {
+        (s.width, s.height, s.spp, s.max_depth, s.roulette_depth) = (64, 64, 64, 512, 1);
+    });
+    let stats = support::render(&gpu, &Renderer::new(&gpu, &scene, Outputs::default()).unwrap());
+    for (mean, error) in mean(&stats) {
+        assert!((mean - 1.0).abs() <= 4.0 * error + 1e-3, "{mean} +- {error}");
+    }
+    let middle = |i: &usize| (24..40).contains(&(i % 64)) && (24..40).contains(&(i / 64));
+    let variance = (0..64 * 64).filter(middle).map(|i| stats[i].m2[1] / 63.0).sum::<f32>() / 256.0;
+    assert!((0.05..0.3).contains(&variance), "{variance}");
+    support::assert_silent(&gpu);
+}
+
+/// A Cornell box whose floor is black plastic, or black without a coat.
+fn black_floor(coated: bool) -> Scene {
+    let mut scene = scene("cornell-box/scene.toml", |s| (s.width, s.height, s.spp) = (32, 32, 64));
+    let plastic = Material {
+        kind: if coated { BSDF_COATED } else { BSDF_DIFFUSE },
+        base_color: [0.005; 3],
+        eta: [1.5; 3],
+        specular: [1.0; 3],
+        internal_fresnel: tallow::reference::fresnel::internal_fresnel(1.5) as f32,
+        ..scene.materials[0]
+    };
+    let own = scene.materials.len() as u32;
+    scene.materials.push(plastic);
+    scene.names.materials.push("plastic".to_owned());
+    let lies = |t: &Triangle| [t.v0, t.v1, t.v2].iter().all(|v| v[1].abs() < 1e-3);
+    scene.triangles.iter_mut().filter(|t| lies(t)).for_each(|t| t.material = own);
+    scene
+}
+
+/// Radiance, light and guides.
+fn apart(gpu: &Gpu, scene: &Scene) -> (Vec<PixelStats>, Vec<PixelLight>, Vec<Guide>) {
+    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    let renderer = Renderer::new(gpu, scene, outputs).unwrap();
+    let stats = support::render(gpu, &renderer);
+    let tile = &renderer.film().tiles[0];
+    (stats, tile.light.read().unwrap(), tile.guide.read().unwrap())
+}
+
+/// The image of the walls in a smooth coat, 4 % and more of their light, over an albedo of 0.005, would be an irradiance of
+/// 8 times that light and more, which every filter would blur.
+#[test]
+fn what_a_smooth_coat_mirrors_is_direct_light() {
+    let gpu = support::gpu();
+    let [(coated, light, guide), (_, plain_light, _)] = [true, false].map(|coated| apart(&gpu, &black_floor(coated)));
+    let shows_floor = |g: &Guide| g.material != NONE && g.position[1].abs() < 1e-3;
+    let floor = |light: &[PixelLight]| {
+        let seen = light.iter().zip(&guide).filter(|(_, g)| shows_floor(g));
+        let sum = |(sum, n): (f64, f64), (l, _): (&PixelLight, _)| (sum + f64::from(l.indirect[1]), n + 1.0);
+        let (sum, n) = seen.fold((0.0, 0.0), sum);
+        assert!(n > 50.0, "{n} pixels show the floor");
+        sum / n
+    };
+    let share = floor(&light) / floor(&plain_light);
+    assert!((0.7..1.2).contains(&share), "irradiance under the coat is {share} of that without it");
+    // The base alone, through the coat.
+    let albedo = guide.iter().find(|g| shows_floor(g)).unwrap().albedo[1];
+    assert!((0.002..0.0049).contains(&albedo), "{albedo}");
+    // Keeping light apart changes no bit of the radiance.
+    let whole = support::render(&gpu, &Renderer::new(&gpu, &black_floor(true), Outputs::default()).unwrap());
+    assert!(bits(&whole) == bits(&coated));
+    support::assert_silent(&gpu);
+}
+
+/// A point light so near to a floor, below what pixel 2, 2 of 5 x 5 shows, that its irradiance is no number there: 1e30 W/sr
+/// over (1e-5)^2.
+fn too_bright(change: impl Fn(&mut Settings)) -> Scene {
+    let text = "[camera]\nposition = [0.0, 0.0, 2.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 45.0\n\
+                [film]\nwidth = 5\nheight = 5\n[render]\nspp = 4\nmax_depth = 2\n\
+                [[light]]\ntype = 'point'\nposition = [0.0, 0.0, 1e-5]\nintensity = [1e30, 1e30, 1e30]\n\
+                [[mesh]]\nshape = 'rectangle'\n";
+    let centres = |s: &mut Settings| {
+        s.filter = PixelFilter::Point;
+        change(s);
+    };
+    Scene::parse(Path::new("too_bright.toml"), text, &centres).unwrap()
+}
+
+#[test]
+fn samples_that_are_no_numbers_are_black_and_told() {
+    let gpu = support::gpu();
+    for policy in ["uniform", "variance", "both"] {
+        let scene = too_bright(|s| (s.allocate.policy, s.first_sample) = (policy.to_owned(), 10));
+        let outputs = Outputs { split_light: true, guides: true, counters: false };
+        let renderer = Renderer::new(&gpu, &scene, outputs).unwrap();
+        let mut frame = FrameResources::new(&gpu).unwrap();
+        renderer.steps().for_each(|step| drop(renderer.run(&mut frame, &step).unwrap()));
+        let (stats, broken) = (support::stats(&renderer), renderer.broken_samples().unwrap().unwrap());
+        let expected = BrokenSamples { count: stats[12].count.into(), pixel: [2, 2], sample: 10, seed: 0 };
+        assert_eq!(broken, expected, "{policy}");
+        assert!(stats[12].count > 0 && stats[12].mean == [0.0; 3], "{policy}: {:?}", stats[12]);
+        let (others, light) = ([&stats[..12], &stats[13..]].concat(), renderer.film().tiles[0].light.read().unwrap());
+        assert!(others.iter().all(|s| s.mean[0] > 1e20 && s.mean[0].is_finite()), "control: {policy}");
+        assert!(stats.iter().all(|s| s.m2.iter().all(|v| v.is_finite())), "{policy}");
+        assert!(light.iter().all(|l| l.indirect_m2.is_finite()), "{policy}");
+        // Whatever is in the film before, a start forgets it.
+        renderer.run(&mut frame, &Step::Start).unwrap();
+        assert_eq!(renderer.broken_samples().unwrap(), None);
+    }
+    support::assert_silent(&gpu);
+}
+
+/// Whatever batches the work is cut into, it is the first of the lowest pixel that is told.
+#[test]
+fn the_first_broken_sample_does_not_depend_on_batches() {
+    let gpu = support::gpu();
+    let scene = too_bright(|_| {});
+    let renderer = Renderer::new(&gpu, &scene, Outputs::default()).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let batch = |first_pixel, pixels, first_sample, samples| Batch { first_pixel, pixels, first_sample, samples };
+    let cuts = [
+        vec![batch(0, 25, 0, 4)],
+        (0..4).map(|k| batch(0, 25, k, 1)).collect(),
+        (0..25).rev().map(|pixel| batch(pixel, 1, 0, 4)).collect(),
+    ];
+    for cut in cuts {
+        renderer.run(&mut frame, &Step::Start).unwrap();
+        cut.iter().for_each(|&batch| drop(renderer.run(&mut frame, &Step::Uniform(batch)).unwrap()));
+        let expected = BrokenSamples { count: 4, pixel: [2, 2], sample: 0, seed: 0 };
+        assert_eq!(renderer.broken_samples().unwrap(), Some(expected), "{cut:?}");
+    }
 }
 
 /// A closed box that emits E = 1 everywhere and reflects rho = 0.5: after d edges the radiance is

@@ -244,7 +244,7 @@ fn every_path_of_every_batch_is_listed_once() {
 }
 
 /// A bumpy surface with misses and broken normals, and noisy statistics with untouched pixels.
-fn surroundings(pixels: usize, width: usize) -> (Vec<Guide>, Vec<PixelStats>) {
+fn surroundings(pixels: usize, width: usize) -> (Vec<Guide>, Vec<PixelStats>, Vec<PixelLight>) {
     let random = words(4 * pixels, 77);
     let unit = |i: usize| (random[i] >> 8) as f32 / 16_777_216.0;
     let guide = |i: usize| {
@@ -265,10 +265,22 @@ fn surroundings(pixels: usize, width: usize) -> (Vec<Guide>, Vec<PixelStats>) {
         0 => PixelStats::default(),
         n => {
             let m2 = if n == 1 { 0.0 } else { unit(4 * i) };
-            PixelStats { mean: [unit(i), 2.0 * unit(i), 0.1], count: n as u32, m2: [m2; 3], rays: 0 }
+            PixelStats { mean: [unit(i), 2.0 * unit(i), 0.1], count: n as u32, m2: [m2; 3], remainder: 0 }
         }
     };
-    ((0..pixels).map(guide).collect(), (0..pixels).map(stats).collect())
+    // Some of it brighter than squares of single precision go.
+    let light = |i: usize| PixelLight {
+        direct: [0.5 * unit(i), unit(i), 0.0],
+        indirect_m2: [unit(4 * i + 1), 0.0, 1e35][i % 7 % 3],
+        indirect: if i % 11 == 3 { [0.0; 3] } else { [unit(4 * i + 2), 1.0, 0.5] },
+        remainder: 0,
+    };
+    let stats = |i: usize| match i % 41 {
+        20 => PixelStats { mean: [3e38; 3], count: 4, m2: [1e35; 3], remainder: 0 },
+        _ => stats(i),
+    };
+    let pixels = || 0..pixels;
+    (pixels().map(guide).collect(), pixels().map(stats).collect(), pixels().map(light).collect())
 }
 
 #[test]
@@ -276,9 +288,10 @@ fn policies_agree_with_their_references() {
     let gpu = gpu();
     for [width, height] in [[1, 1], [31, 1], [1, 65], [31, 17], [64, 9]] {
         let pixels = (width * height) as usize;
-        let (guide, stats) = surroundings(pixels, width as usize);
-        let (guides, statistics) =
-            (Buffer::from_slice(&gpu, "guide", &guide).unwrap(), Buffer::from_slice(&gpu, "stats", &stats).unwrap());
+        let (guide, stats, light) = surroundings(pixels, width as usize);
+        let guides = Buffer::from_slice(&gpu, "guide", &guide).unwrap();
+        let statistics = Buffer::from_slice(&gpu, "stats", &stats).unwrap();
+        let lights = Buffer::from_slice(&gpu, "light", &light).unwrap();
         let priority = Buffer::new(&gpu, "priority", pixels, Location::Device).unwrap();
         let mut frame = FrameResources::new(&gpu).unwrap();
         for (window, luminance_floor, threshold) in [(2, 0.05, 0.0), (4, -1.0, 0.0), (5, 0.1, 0.3), (10, 1.0, 0.1)] {
@@ -295,7 +308,7 @@ fn policies_agree_with_their_references() {
             };
             for row in POLICIES {
                 let policy = (row.make)(&gpu, pixels as u32).unwrap();
-                let inputs = Inputs { guide: &guides, stats: &statistics, priority: &priority };
+                let inputs = Inputs { guide: &guides, stats: &statistics, light: &lights, priority: &priority };
                 gpu.run(&mut frame, |rec| {
                     policy.prepare(rec, &inputs, &push)?;
                     policy.record(rec, &inputs, &push)
@@ -303,7 +316,7 @@ fn policies_agree_with_their_references() {
                 .unwrap();
                 let (found, expected) = (
                     priority.read().unwrap(),
-                    (row.reference)(&HostInputs { guide: &guide, stats: &stats, priority: &[], push }),
+                    (row.reference)(&HostInputs { guide: &guide, stats: &stats, light: &light, priority: &[], push }),
                 );
                 for (i, (a, b)) in found.iter().zip(&expected).enumerate() {
                     // Importance is exact on every device; roots and quotients are not.
@@ -350,14 +363,15 @@ fn a_frozen_probability_is_the_share_of_samples_and_stays() {
         Buffer::from_slice(&gpu, "priority", &kept).unwrap(),
         Buffer::new(&gpu, "guide", 1, Location::Device).unwrap(),
     );
+    let light = Buffer::new(&gpu, "light", 1, Location::Device).unwrap();
     let policy = (row.make)(&gpu, 65).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
     for round in [64, 63, 65] {
         let push = PriorityPush { size: [65, 1], limit: 64, round, ..PriorityPush::default() };
         let before = buffers.1.read().unwrap();
-        let inputs = Inputs { guide: &buffers.2, stats: &buffers.0, priority: &buffers.1 };
+        let inputs = Inputs { guide: &buffers.2, stats: &buffers.0, light: &light, priority: &buffers.1 };
         gpu.run(&mut frame, |rec| policy.record(rec, &inputs, &push)).unwrap();
-        let host = HostInputs { guide: &[], stats: &stats, priority: &before, push };
+        let host = HostInputs { guide: &[], stats: &stats, light: &[], priority: &before, push };
         assert_eq!(buffers.1.read().unwrap(), (row.reference)(&host), "round {round}");
     }
     assert_silent(&gpu);

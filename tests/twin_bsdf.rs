@@ -64,7 +64,7 @@ fn twin((material, [wo, wi, u]): &Case) -> [Vec4; 5] {
         bsdf_evaluate(&b, *wo, *wi),
         s.wi.extend(flag(sampled)),
         s.weight.extend(s.pdf),
-        bsdf_albedo(&b).extend(flag(bsdf_is_delta(&b))),
+        bsdf_albedo(&b, wo.z).extend(flag(bsdf_is_delta(&b))),
         bsdf_evaluate(&b, *wo, s.wi),
     ]
 }

@@ -37,9 +37,11 @@ impl Frame {
             let unit = |salt: u32| hash(i.wrapping_mul(8) + salt) as f32 / 4_294_967_296.0;
             let is_lamp = i % 23 == 7;
             let albedo = if is_lamp { [0.0; 3] } else { [0, 1, 2].map(|c| 0.005 + 0.9 * unit(c)) };
-            let mut light = PixelLight { direct: [unit(3); 3], indirect: [unit(4), 0.3 * unit(5), 1.0] };
+            let indirect = [unit(4), 0.3 * unit(5), 1.0];
+            let mut light =
+                PixelLight { direct: [unit(3); 3], indirect_m2: 2.0 * unit(7), indirect, ..PixelLight::default() };
             if is_lamp {
-                light = PixelLight { direct: [20.0; 3], indirect: [0.0; 3] };
+                light = PixelLight { direct: [20.0; 3], ..PixelLight::default() };
             }
             let mut mean: vec3 = std::array::from_fn(|c| light.direct[c] + albedo[c] * light.indirect[c]);
             let mut guide = Guide { normal: [0.0, 0.6, 0.8], depth: 2.0 + unit(6), albedo, ..Guide::default() };
@@ -54,7 +56,7 @@ impl Frame {
                 _ => {}
             }
             let count = 1 + hash(i) % 4;
-            frame.stats.push(PixelStats { mean, count, m2: mean.map(|v| v * v * count as f32), rays: 0 });
+            frame.stats.push(PixelStats { mean, count, m2: mean.map(|v| v * v * count as f32), remainder: 0 });
             frame.light.push(light);
             frame.guide.push(guide);
         }
@@ -75,6 +77,7 @@ impl Frame {
         add("albedo", |f, i| f.guide[i].albedo);
         add("N", |f, i| f.guide[i].normal);
         add("P", |f, i| f.guide[i].position);
+        film.add("indirect.m2", Samples::F32(self.light.iter().map(|l| l.indirect_m2).collect()));
         film.add("Z", Samples::F32(self.guide.iter().map(|g| g.depth).collect()));
         film.add("samples", Samples::U32(self.stats.iter().map(|s| s.count).collect()));
         film.metadata.insert("software".to_owned(), "tallow test".to_owned());

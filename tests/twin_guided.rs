@@ -4,10 +4,11 @@ mod picture;
 mod support;
 
 use picture::{Picture, SIZES, apart, line, red};
+use support::kernels::absorb;
 use support::{assert_silent, gpu, hash};
 use tallow::filter::{FilterInput, FilterSettings, GuidedSums, find, run};
-use tallow::gpu::Gpu;
 use tallow::gpu::layout::vec4;
+use tallow::gpu::{Buffer, FrameResources, Gpu, Location};
 
 /// A constant guide leaves `guided` nothing but box means, and box means of those.
 #[test]
@@ -27,6 +28,24 @@ fn guided_solves_the_worked_examples() {
     // With eps the slope shrinks by var / (var + eps): over depths 0 1 2 by (2/3) / (2/3 + 2/3); the middle stays.
     let half = red(&reference(&input, &FilterSettings { eps: [2.0 / 3.0; 4], ..exact }));
     assert!((half[2] - 5.0).abs() < 1e-6 && half[0] > 1.5, "{half:?}");
+}
+
+/// What lies beyond the border is no part of a window, and its infinities are none either.
+#[test]
+fn records_that_are_not_there_leave_nothing_behind() {
+    let gpu = gpu();
+    let from = [1.0, 3.0, 3e38, f32::INFINITY, f32::NAN];
+    let kernel = absorb::Kernel::new(&gpu, &Default::default()).unwrap();
+    let values = Buffer::from_slice(&gpu, "from", &from).unwrap();
+    let results = Buffer::new(&gpu, "results", 4 * from.len(), Location::Readback).unwrap();
+    let bind = absorb::Bind { from: &values, results: &results };
+    let count = from.len() as u32;
+    gpu.run(&mut FrameResources::new(&gpu).unwrap(), |rec| rec.dispatch(&kernel, bind, &count, [1; 3])).unwrap();
+    for (value, sums) in from.iter().zip(results.read().unwrap().chunks(4)) {
+        assert_eq!([sums[0], sums[2]], [30.0, 16.0], "not with {value}");
+        assert!((sums[1] - 30.0).abs() > 0.5 || sums[1].is_nan(), "control: with {value} it is {}", sums[1]);
+    }
+    assert_silent(&gpu);
 }
 
 /// Single precision against double, on guides that break sums of squares.

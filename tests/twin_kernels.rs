@@ -8,7 +8,7 @@ mod twin;
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use std::path::Path;
-use support::kernels::traverse as traverse_kernel;
+use support::kernels::{fold as fold_kernel, traverse as traverse_kernel};
 use support::{assert_silent, gpu};
 use tallow::gpu::layout::*;
 use tallow::gpu::{Buffer, FrameResources, Gpu, Kernel, Location};
@@ -171,6 +171,8 @@ fn check(name: &str, pair: &Pair) {
     }
     for (a, b) in pair.light[0].iter().zip(&pair.light[1]) {
         assert!(near(a.direct, b.direct, 1e-5) && near(a.indirect, b.indirect, 1e-5), "{name}: {a:?} {b:?}");
+        let [m2, expected] = [a, b].map(|l| Vec3::splat(l.indirect_m2));
+        assert!(near(m2, expected, 1e-4), "{name}: {a:?} {b:?}");
     }
 }
 
@@ -196,6 +198,108 @@ fn renders_agree_with_their_twins() {
     assert!(agreement(&pair.samples) < 0.5, "control: other samples are told apart");
     pair.guides[1].rotate_right(1);
     assert!(!pair.guides[0].iter().zip(&pair.guides[1]).all(|(a, b)| guides_agree(a, b)));
+    assert_silent(&gpu);
+}
+
+/// Pixels whose samples repeat every so many.
+const REPEATED: u32 = 8;
+const PERIOD: u32 = 1 << 15;
+
+/// Sample `k` of a pixel: mostly dark with now and then a bright one, or all nearly alike; (direct, indirect, albedo).
+fn repeated(pixel: u32, k: u32) -> [vec4; 3] {
+    let unit = |salt: u32| support::hash((k * REPEATED + pixel) * 4 + salt) as f32 / 4_294_967_296.0;
+    let value = |salt: u32| match pixel % 2 {
+        0 if unit(salt) < 0.9 => 0.0,
+        0 => 10.0 * unit(3 - salt),
+        _ => 1.0 + 0.01 * unit(salt),
+    };
+    [[value(0), value(0), 0.3, 2.0], [0.5 * value(1), 0.1, 0.25 * value(1), 0.0], [0.5, 0.5, 0.25, 0.0]]
+}
+
+/// Statistics after `times` times all repeated samples, in batches of `depth` samples a pixel.
+fn folded(gpu: &Gpu, samples: &[vec4], depth: u32, times: u32) -> (Vec<PixelStats>, Vec<PixelLight>) {
+    let effects = Effects { split_light: true, many_samples: true, ..Effects::default() };
+    let thread = gpu.tuning().thread();
+    let kernel = Kernel::new(gpu, &fold_kernel::Constants { effects, thread }).unwrap();
+    let stats = Buffer::from_slice(gpu, "stats", &[PixelStats::default(); REPEATED as usize]).unwrap();
+    let light = Buffer::from_slice(gpu, "light", &[PixelLight::default(); REPEATED as usize]).unwrap();
+    let broken = Buffer::from_slice(gpu, "broken", &[BrokenTally::default()]).unwrap();
+    let offset = Buffer::from_slice(gpu, "offset", &[[0, 0]]).unwrap();
+    let batches = samples.chunks((3 * REPEATED * depth) as usize);
+    let batches: Vec<_> = batches.map(|part| Buffer::from_slice(gpu, "samples", part).unwrap()).collect();
+    let mut frame = FrameResources::new(gpu).unwrap();
+    for samples in (0..times).flat_map(|_| &batches) {
+        let bind = fold_kernel::Bind {
+            samples,
+            stats: &stats,
+            light: &light,
+            offset: &offset,
+            folded_stats: &stats,
+            folded_light: &light,
+            broken: &broken,
+        };
+        let push = FoldPush { pixels: REPEATED, samples: depth, ..FoldPush::default() };
+        gpu.run(&mut frame, |rec| rec.dispatch_threads(&kernel, bind, &push, REPEATED)).unwrap();
+    }
+    (stats.read().unwrap(), light.read().unwrap())
+}
+
+/// In double precision.
+fn exact(samples: &[vec4], pixel: u32, of: impl Fn(&[vec4]) -> f64) -> f64 {
+    let own = samples.chunks(3).skip(pixel as usize).step_by(REPEATED as usize);
+    own.map(of).sum::<f64>() / f64::from(PERIOD)
+}
+
+#[test]
+fn means_of_millions_of_samples_are_exact() {
+    let gpu = gpu();
+    let samples: Vec<vec4> =
+        (0..PERIOD).flat_map(|k| (0..REPEATED).flat_map(move |pixel| repeated(pixel, k))).collect();
+    const TIMES: u32 = 1 << 7; // 2^22 samples
+    let (stats, light) = folded(&gpu, &samples, PERIOD, TIMES);
+    let push = FoldPush { pixels: REPEATED, samples: PERIOD, ..FoldPush::default() };
+    let (mut twin, mut twin_light) = ([PixelStats::default(); 8], [PixelLight::default(); 8]);
+    for _ in 0..TIMES {
+        fold(&push, true, &samples, &mut twin, &mut twin_light);
+    }
+    for (name, stats, light) in [("kernel", &stats[..], &light[..]), ("twin", &twin, &twin_light)] {
+        for pixel in 0..REPEATED {
+            let (s, l) = (&stats[pixel as usize], &light[pixel as usize]);
+            let off =
+                |found: f32, of: &dyn Fn(&[vec4]) -> f64| (f64::from(found) / exact(&samples, pixel, of) - 1.0).abs();
+            let radiance = off(s.mean[0], &|r| f64::from(r[0][0]) + f64::from(r[1][0]));
+            assert!(
+                s.count == TIMES * PERIOD && radiance < 1e-6,
+                "{name}, pixel {pixel}: radiance off by {radiance:.1e}"
+            );
+            let direct = off(l.direct[1], &|r| f64::from(r[0][1]));
+            let indirect = off(l.indirect[2], &|r| f64::from(r[1][2] / r[2][2]));
+            assert!(direct.max(indirect) < 4e-6, "{name}, pixel {pixel}: {direct:.1e} {indirect:.1e}");
+        }
+    }
+    // However they are cut into batches, also across the sample from which more bits are kept.
+    let cut = |depth| folded(&gpu, &samples, depth, 1);
+    let [whole, parts] = [PERIOD, 96].map(cut);
+    assert!(whole == parts && whole.0.iter().any(|s| s.remainder != 0), "the bits depend on batches");
+    assert_silent(&gpu);
+}
+
+/// Light as strong as numbers go.
+#[test]
+fn squares_of_the_brightest_samples_stay_finite() {
+    let gpu = gpu();
+    let bright = |k: u32| if k.is_multiple_of(2) { 3e38 } else { 0.0 };
+    let sample = |k: u32| [[0.0, bright(k), 0.0, 2.0], [bright(k), 0.0, 1e30, 0.0], [1e-5, 1.0, 0.5, 0.0]];
+    let samples: Vec<vec4> = (0..64).flat_map(|k| (0..REPEATED).flat_map(move |_| sample(k))).collect();
+    let (stats, light) = folded(&gpu, &samples, 64, 1);
+    let push = FoldPush { pixels: REPEATED, samples: 64, ..FoldPush::default() };
+    let (mut twin, mut twin_light) = ([PixelStats::default(); 8], [PixelLight::default(); 8]);
+    fold(&push, true, &samples, &mut twin, &mut twin_light);
+    for (s, l) in stats.iter().zip(&light).chain(twin.iter().zip(&twin_light)) {
+        let all = s.mean.iter().chain(&s.m2).chain(&l.direct).chain(&l.indirect).chain([&l.indirect_m2]);
+        assert!(all.into_iter().all(|v| v.is_finite()), "{s:?} {l:?}");
+        assert!(s.m2[0] > 1e34 && l.indirect_m2 > 1e34, "control: {s:?} {l:?}");
+    }
     assert_silent(&gpu);
 }
 

@@ -187,10 +187,18 @@ bool is_interface(Bsdf b) { return is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR) || i
 // Every lobe is a delta: no light sample can contribute, and a filter has nothing to blur.
 bool bsdf_is_delta(Bsdf b) { return is_interface(b) && is_smooth(b); }
 
-// What indirect light is divided by before it is filtered: 0 where all light counts as direct, so that none leaks in.
-vec3 bsdf_albedo(Bsdf b) {
-    if (!is_interface(b)) return b.albedo;
-    return is_smooth(b) ? vec3(0.0) : b.specular;
+// Reflectance, roughly, of the lobes whose light counts as indirect, seen at the cosine `wo_z`: what that light is divided by
+// before it is filtered. What smooth interfaces show counts as direct: mirrors and clear glass have none, and of a smooth
+// coat only the base counts, so that its texture is divided out.
+vec3 bsdf_albedo(Bsdf b, float wo_z) {
+    bool glass = is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC), metal = is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR);
+    bool coated = is_kind(FX_COATED, b, BSDF_COATED);
+    if (!(glass || metal || coated)) return b.albedo;
+    vec3 specular = is_smooth(b) ? vec3(0.0) : b.specular;
+    if (metal) return specular * fresnel_conductor(abs(wo_z), b.eta, b.k);
+    float f = fresnel_dielectric(abs(wo_z), glass ? relative_index(b, wo_z) : b.eta.x).x;
+    vec3 beneath = glass ? (is_smooth(b) ? vec3(0.0) : b.transmission) : b.albedo;
+    return mix(beneath, specular, f);
 }
 
 #endif

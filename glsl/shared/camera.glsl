@@ -43,5 +43,6 @@ Ray eye_ray(vec2 film, Sampler random) {
     return camera_ray(push.camera, film_from_pixel(film, push.size), lens);
 }
 
-// Alpha masks along a path draw from this.
-uint path_seed(uint pixel, uint index) { return pcg(pcg(pixel ^ push.seed) + index); }
+// Alpha masks along a path draw from this. The seed is hashed first, or seeds 0 and 1 would swap the numbers of neighbouring
+// pixels, and it is inverted, or they would be those of `sampler_start`.
+uint path_seed(uint pixel, uint index) { return pcg(pcg(pixel ^ pcg(~push.seed)) + index); }

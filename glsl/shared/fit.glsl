@@ -24,9 +24,10 @@ Fit moved(Fit f, vec4 by) {
     return f;
 }
 
-// `f` with `other` if `is` is 1, and as it was if it is 0. Both about the same point.
-void absorb(inout Fit f, Fit other, float is) {
-    float count = is * other.value.w, all = f.value.w + count, share = count / max(all, 1.0);
+// `f` with `other` if it `is` there, and as it was if not, whatever `other` holds then. Both about the same point.
+void absorb(inout Fit f, Fit other, bool is) {
+    if (!is) other = Fit(f.r, f.g, f.b, vec4(f.value.rgb, 0.0));
+    float count = other.value.w, all = f.value.w + count, share = count / max(all, 1.0);
     f.r += share * (other.r - f.r);
     f.g += share * (other.g - f.g);
     f.b += share * (other.b - f.b);

@@ -54,15 +54,16 @@ void absorb_means(inout Moments m, float count, vec3 n, vec4 i) {
     m.b += off_n.b * scaled;
 }
 
-// `m` with `other` if `is` is 1, and as it was if it is 0. Both about the same point.
-void absorb(inout Moments m, Moments other, float is) {
-    absorb_means(m, is * other.head.x, other.head.yzw, other.mean);
-    m.xx += is * other.xx;
-    m.yy += is * other.yy;
-    m.zz += is * other.zz;
-    m.r += is * other.r;
-    m.g += is * other.g;
-    m.b += is * other.b;
+// `m` with `other` if it `is` there, and as it was if not, whatever `other` holds then. Both about the same point.
+void absorb(inout Moments m, Moments other, bool is) {
+    if (!is) other = Moments(vec4(0.0, m.head.yzw), m.mean, vec4(0.0), vec3(0.0), vec3(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
+    absorb_means(m, other.head.x, other.head.yzw, other.mean);
+    m.xx += other.xx;
+    m.yy += other.yy;
+    m.zz += other.zz;
+    m.r += other.r;
+    m.g += other.g;
+    m.b += other.b;
 }
 
 // Of a sum over `count` pixels.

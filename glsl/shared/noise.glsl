@@ -3,6 +3,8 @@
 
 // Samples' worth of trust in the noise of the surroundings.
 const float PRIOR_SAMPLES = 32.0;
+// Luminance is cut there, so that its sum over samples and pixels is finite.
+const float BLINDING = 1e29;
 
 // (squared deviations summed, mean over channels; degrees of freedom; luminance times samples; samples)
 vec4 moments(uint pixel, out vec3 mean) {
@@ -10,7 +12,7 @@ vec4 moments(uint pixel, out vec3 mean) {
     vec3 squares = uintBitsToFloat(b.rgb);
     mean = uintBitsToFloat(a.rgb);
     float n = float(a.w);
-    return a.w > 0u ? vec4((squares.r + squares.g + squares.b) / 3.0, n - 1.0, luminance(mean) * n, n) : vec4(0.0);
+    return a.w > 0u ? vec4((squares.r + squares.g + squares.b) / 3.0, n - 1.0, min(luminance(mean), BLINDING) * n, n) : vec4(0.0);
 }
 
 vec4 moments(uint pixel) {

@@ -1,18 +1,11 @@
 // What the filters make of a pixel before they trust it. Twin: src/filter/pixel.rs.
+#include "shared/finite.glsl"
 #include "shared/octahedral.glsl"
 
 const uint NO_NORMAL = 0x80008000u; // packSnorm2x16 never returns -32768
 const float LARGEST = 1e24;         // radiance beyond it is cut, so that differences and sums stay finite
 const float FARTHEST = 1e18;        // the same for positions, whose squares are summed
 const float WIDEST = 1e7;           // the same for the guided filter's channels
-
-bool finite(float v) {
-    return (floatBitsToUint(v) & 0x7f800000u) != 0x7f800000u; // by bits: isinf may be optimised away
-}
-
-bool finite(vec3 v) {
-    return finite(v.x) && finite(v.y) && finite(v.z);
-}
 
 // Radiance and the samples behind it; all zero where nothing is known.
 vec4 known_radiance(vec4 c) {

@@ -42,7 +42,7 @@ void absorb_element(inout SUM sum, vec4 point, int line, int at);
 void put(int line, int at, SUM whole, vec4 point);
 
 void absorb_part(inout SUM sum, vec4 point, Part part) {
-    absorb(sum, moved(part.sum, point - part.point), 1.0);
+    absorb(sum, moved(part.sum, point - part.point), true);
 }
 
 // For tile `at` of the turn.

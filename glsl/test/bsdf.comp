@@ -26,6 +26,6 @@ void main() {
     results[5 * i] = bsdf_evaluate(b, wo, inputs[3 * i + 1]);
     results[5 * i + 1] = vec4(s.wi, sampled ? 1.0 : 0.0);
     results[5 * i + 2] = vec4(s.weight, s.pdf);
-    results[5 * i + 3] = vec4(bsdf_albedo(b), bsdf_is_delta(b) ? 1.0 : 0.0);
+    results[5 * i + 3] = vec4(bsdf_albedo(b, wo.z), bsdf_is_delta(b) ? 1.0 : 0.0);
     results[5 * i + 4] = bsdf_evaluate(b, wo, s.wi);
 }

@@ -1,21 +1,23 @@
-//! Geometry first, noise as it becomes known, less what a filter will remove. Noise is estimated among neighbours that look
+//! Geometry first, noise as it becomes known, less what a filter of indirect light will remove. Noise is estimated among neighbours that look
 //! alike: from their samples, and from how far their means are apart. Kernels: `glsl/kinship.comp`, `glsl/both.comp`.
 use super::geometry::Geometry;
 use super::variance::{moments, noise, square};
 use super::{HostInputs, Inputs, Placing, Policy, Row, geometry};
 use crate::error::Result;
-use crate::gpu::layout::{Guide, NONE, PriorityPush, vec3};
+use crate::gpu::layout::{Guide, NONE, PixelLight, PixelStats, PriorityPush, vec3};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::reference::exact::{exp_negative, squared_distance};
-use crate::shaders::both::LEAST_LEFT;
+use crate::shaders::both::{APART, LEAST_LEFT, STRONGEST_TINT};
 use crate::shaders::shared::kinship::{GATHERED_UNIT, LEAST_KINSHIP, SEVENTHS};
 use crate::shaders::{both, kinship};
+use crate::statistics::luminance;
 use glam::Vec3;
 
 pub(super) const ROW: Row = Row {
     name: "both",
     about: "noise that the samples show, less what a geometry-aware filter will remove; geometry until samples tell",
     guides: true,
+    split_light: true,
     placing: Placing::Learning,
     make: |gpu, pixels| Ok(Box::new(Both::new(gpu, pixels)?)),
     reference,
@@ -51,7 +53,7 @@ impl Policy for Both {
     }
 
     fn record(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
-        let bind = both::Bind { stats: b.stats, words: &self.words, priority: b.priority };
+        let bind = both::Bind { stats: b.stats, words: &self.words, priority: b.priority, light: b.light };
         rec.dispatch_threads(&self.join, bind, push, push.size[0] * push.size[1].div_ceil(both::ROWS as u32))
     }
 }
@@ -65,35 +67,48 @@ fn kinship(a: &Guide, b: &Guide, push: &PriorityPush) -> f32 {
     (sevenths / SEVENTHS).max(LEAST_KINSHIP)
 }
 
-/// What pixels around one say of its noise, as [`moments`] does; each by its kinship.
-fn surroundings(inputs: &HostInputs, pixel: usize) -> [f32; 4] {
-    let HostInputs { guide, stats, push, .. } = inputs;
+/// Squared deviations, mean over channels, of indirect light, out of those of its luminance before albedo.
+fn indirect_squares(stats: &PixelStats, light: &PixelLight) -> f32 {
+    let level = luminance(light.indirect);
+    let tint = (Vec3::from(stats.mean) - Vec3::from(light.direct)) / level;
+    let tint = if level > 0.0 { tint.min(Vec3::splat(STRONGEST_TINT)) } else { Vec3::ZERO };
+    (light.indirect_m2 * tint.length_squared() / 3.0).min(moments(stats)[0])
+}
+
+/// What pixels around one say of its noise, as [`moments`] does, and which share of it is that of indirect light; each by its
+/// kinship.
+fn surroundings(inputs: &HostInputs, pixel: usize) -> ([f32; 4], f32) {
+    let HostInputs { guide, stats, light, push, .. } = inputs;
     let mut around = [0.0; 4];
     let (mut offsets, mut kin_of_all) = (Vec3::ZERO, 0.0);
-    let (mut squares, mut weights, mut freedom) = (0.0, 0.0, 0.0);
+    let (mut squares, mut weights, mut freedom, mut indirect) = (0.0, 0.0, 0.0, 0.0);
     for j in square(push, pixel).filter(|&j| stats[j].count > 0) {
         let (kin, m) = (kinship(&guide[pixel], &guide[j], push), moments(&stats[j]));
         let offset = Vec3::from(stats[j].mean) - Vec3::from(stats[pixel].mean);
+        let offset = offset.clamp(Vec3::splat(-APART), Vec3::splat(APART));
         around = std::array::from_fn(|k| around[k] + kin * m[k]);
+        indirect += kin * indirect_squares(&stats[j], &light[j]);
         offsets += kin * offset;
         kin_of_all += kin;
         squares += kin * offset.length_squared();
         weights += kin * kin;
         freedom += kin / m[3];
     }
+    let share = if around[0] > 0.0 { indirect / around[0] } else { 1.0 };
     let left = 1.0 - weights / (kin_of_all * kin_of_all);
     if kin_of_all > 0.0 && left > LEAST_LEFT {
         around[0] += (squares - offsets.length_squared() / kin_of_all).max(0.0) / 3.0;
         around[1] += freedom * left;
     }
-    around
+    (around, share)
 }
 
 fn reference(inputs: &HostInputs) -> Vec<f32> {
     let HostInputs { stats, push, .. } = inputs;
     let of = |(i, q): (usize, f32)| {
         let gathered = ((1.0 - q) * GATHERED_UNIT + 0.5).floor() / GATHERED_UNIT;
-        noise(push, moments(&stats[i]), surroundings(inputs, i)) * (1.0 - push.filtered * gathered).max(0.0).sqrt()
+        let (around, indirect) = surroundings(inputs, i);
+        noise(push, moments(&stats[i]), around) * (1.0 - push.filtered * gathered * indirect).max(0.0).sqrt()
     };
     geometry::reference(inputs).into_iter().enumerate().map(of).collect()
 }
@@ -101,13 +116,34 @@ fn reference(inputs: &HostInputs) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::layout::PixelStats;
+
+    #[test]
+    fn a_filter_removes_the_noise_of_indirect_light_alone() {
+        // One pixel: gathered is 1, so that a filter of share 0.5 leaves half of the variance of indirect light. Radiance 3 of
+        // which 1 is direct, irradiance 4, albedo 0.5; of the squared deviations 8, indirect light has 16 * 0.5^2 = 4.
+        let push =
+            PriorityPush { size: [1, 1], window: 2, luminance_floor: -1.0, limit: 99, ..PriorityPush::default() };
+        let of = |indirect_m2: f32, filtered: f32| {
+            let light = [PixelLight { direct: [1.0; 3], indirect: [4.0; 3], indirect_m2, remainder: 0 }];
+            let (guide, stats) = ([Guide::default()], [pixel(3.0, 2, 8.0)]);
+            let push = PriorityPush { filtered, ..push };
+            let [noise] = reference(&HostInputs { guide: &guide, stats: &stats, light: &light, priority: &[], push })
+                .try_into()
+                .unwrap();
+            noise * noise
+        };
+        let whole = of(16.0, 0.0);
+        let shares = [0.0, 16.0, 32.0, 99.0].map(|m2: f32| of(m2, 0.5) / whole);
+        let close = shares.iter().zip([1.0, 0.75, 0.5, 0.5]).all(|(a, b)| (a - b).abs() < 1e-6);
+        assert!(close, "{shares:?}");
+    }
 
     /// Two pixels in one row, of one albedo or not.
     fn pair(stats: [PixelStats; 2], albedo: f32) -> [f32; 2] {
         let push = PriorityPush { size: [2, 1], window: 2, luminance_floor: 0.0, limit: 99, ..PriorityPush::default() };
         let guide = [0.0, albedo].map(|albedo| Guide { albedo: [albedo; 3], ..Guide::default() });
-        reference(&HostInputs { guide: &guide, stats: &stats, priority: &[], push }).try_into().unwrap()
+        let light = [PixelLight::default(); 2];
+        reference(&HostInputs { guide: &guide, stats: &stats, light: &light, priority: &[], push }).try_into().unwrap()
     }
 
     fn assert_close(found: [f32; 2], expected: [f32; 2]) {
@@ -115,7 +151,7 @@ mod tests {
     }
 
     fn pixel(mean: f32, count: u32, m2: f32) -> PixelStats {
-        PixelStats { mean: [mean; 3], count, m2: [m2; 3], rays: 0 }
+        PixelStats { mean: [mean; 3], count, m2: [m2; 3], remainder: 0 }
     }
 
     #[test]

@@ -10,6 +10,7 @@ pub(super) const ROW: Row = Row {
     name: "geometry",
     about: "more where neighbours differ in normal and position, so that a filter has little to gather (GEO)",
     guides: true,
+    split_light: false,
     placing: Placing::Once,
     make: |gpu, _| Ok(Box::new(Geometry::new(gpu)?)),
     reference,
@@ -71,7 +72,10 @@ mod tests {
         let guide = [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]].map(plane);
         let push =
             PriorityPush { size: [4, 1], window: 2, normal_scale: 1e6, position_scale: 1.0, ..PriorityPush::default() };
-        assert_eq!(reference(&HostInputs { guide: &guide, stats: &[], priority: &[], push }), [0.0, 0.0, 0.5, 0.0]);
+        assert_eq!(
+            reference(&HostInputs { guide: &guide, stats: &[], light: &[], priority: &[], push }),
+            [0.0, 0.0, 0.5, 0.0]
+        );
     }
 
     #[test]
@@ -79,7 +83,7 @@ mod tests {
         let mut guide = [Guide::default(); 4];
         guide[1].position = [f32::NAN; 3];
         let push = PriorityPush { size: [4, 1], window: 3, position_scale: 1.0, ..PriorityPush::default() };
-        let q = reference(&HostInputs { guide: &guide, stats: &[], priority: &[], push });
+        let q = reference(&HostInputs { guide: &guide, stats: &[], light: &[], priority: &[], push });
         assert_eq!(q[1], 1.0);
         assert!(q.iter().all(|q| (0.0..=1.0).contains(q)));
     }

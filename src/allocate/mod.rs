@@ -1,7 +1,7 @@
 //! What makes a pixel worth samples: one file per policy, one row in [`POLICIES`]. A policy writes a priority per pixel;
 //! `stage::apportion` turns priorities into counts that sum to the budget exactly, `stage::choose` into one sample or none.
 use crate::error::Result;
-use crate::gpu::layout::{Guide, PixelStats, PriorityPush};
+use crate::gpu::layout::{Guide, PixelLight, PixelStats, PriorityPush};
 use crate::gpu::{Buffer, Gpu, Recorder};
 
 pub mod both;
@@ -34,6 +34,8 @@ pub struct Inputs<'a> {
     pub guide: &'a Buffer<Guide>,
     /// What the samples so far have said.
     pub stats: &'a Buffer<PixelStats>,
+    /// Direct and indirect light; of the policies that do not ask for it, one unused element.
+    pub light: &'a Buffer<PixelLight>,
     /// Shares of the samples, at least 0, in any unit up to 4095.
     pub priority: &'a Buffer<f32>,
 }
@@ -45,6 +47,8 @@ pub struct HostInputs<'a> {
     pub guide: &'a [Guide],
     /// Of every pixel.
     pub stats: &'a [PixelStats],
+    /// Of every pixel, for policies that ask for it.
+    pub light: &'a [PixelLight],
     /// Those of the round before.
     pub priority: &'a [f32],
     /// What the kernel gets.
@@ -71,6 +75,8 @@ pub struct Row {
     pub about: &'static str,
     /// Whether it reads primary hits.
     pub guides: bool,
+    /// Whether it reads direct and indirect light apart.
+    pub split_light: bool,
     /// What becomes of its priorities.
     pub placing: Placing,
     /// Compiles it for a film of so many pixels.

@@ -9,8 +9,9 @@ use crate::shaders::threshold::Bind;
 
 pub(super) const ROW: Row = Row {
     name: "threshold",
-    about: "RAS as published: a sample a round where noise exceeds a threshold that falls to 0 by --max-spp, then by chance",
+    about: "RAS as published: a sample a round where noise reaches a threshold that falls to 0 by --max-spp, then by chance",
     guides: false,
+    split_light: false,
     placing: Placing::Chosen,
     make: |gpu, _| Ok(Box::new(Threshold(Kernel::new(gpu, &gpu.tuning().thread().into())?))),
     reference,
@@ -48,13 +49,13 @@ mod tests {
 
     fn of_one(stats: PixelStats, round: u32) -> f32 {
         let push = PriorityPush { size: [1, 1], luminance_floor: 1.0, limit: 8, round, ..PriorityPush::default() };
-        reference(&HostInputs { guide: &[], stats: &[stats], priority: &[0.25], push })[0]
+        reference(&HostInputs { guide: &[], stats: &[stats], light: &[], priority: &[0.25], push })[0]
     }
 
     #[test]
     fn noise_counts_until_the_last_threshold_and_the_share_of_samples_after() {
         // Samples 2 and 6: mean 4, m2 = 8, variance 8; (sqrt 8 + 1) / (4 + 1). By round 8 it has 2 of 8 samples.
-        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3], rays: 0 };
+        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3], remainder: 0 };
         assert!((of_one(stats, 7) - (8.0_f32.sqrt() + 1.0) / 5.0).abs() < 1e-6);
         assert_eq!(of_one(stats, 8), 0.25);
         assert_eq!(of_one(PixelStats { count: 7, ..stats }, 9), 0.25, "frozen");

@@ -8,6 +8,7 @@ pub(super) const ROW: Row = Row {
     name: "uniform",
     about: "the same number for every pixel",
     guides: false,
+    split_light: false,
     placing: Placing::Once,
     make: |_, _| Ok(Box::new(Uniform)),
     reference,

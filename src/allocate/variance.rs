@@ -3,13 +3,15 @@ use super::{HostInputs, Inputs, Placing, Policy, Row};
 use crate::error::Result;
 use crate::gpu::layout::{PixelStats, PriorityPush};
 use crate::gpu::{Kernel, Recorder};
-use crate::shaders::shared::noise::PRIOR_SAMPLES;
+use crate::shaders::shared::noise::{BLINDING, PRIOR_SAMPLES};
 use crate::shaders::variance::Bind;
+use crate::statistics::luminance;
 
 pub(super) const ROW: Row = Row {
     name: "variance",
     about: "more where samples differ, relative to their luminance, estimated anew every round (RAS)",
     guides: false,
+    split_light: false,
     placing: Placing::Learning,
     make: |gpu, _| Ok(Box::new(Variance(Kernel::new(gpu, &gpu.tuning().thread().into())?))),
     reference,
@@ -29,8 +31,7 @@ pub(super) fn moments(s: &PixelStats) -> [f32; 4] {
         return [0.0; 4];
     }
     let n = s.count as f32;
-    let luminance = 0.2126 * s.mean[0] + 0.7152 * s.mean[1] + 0.0722 * s.mean[2];
-    [(s.m2[0] + s.m2[1] + s.m2[2]) / 3.0, n - 1.0, luminance * n, n]
+    [(s.m2[0] + s.m2[1] + s.m2[2]) / 3.0, n - 1.0, luminance(s.mean).min(BLINDING) * n, n]
 }
 
 /// Of the 3 x 3 pixels around one, those on the film, row by row.
@@ -81,13 +82,13 @@ mod tests {
     };
 
     fn of_one(stats: PixelStats, push: PriorityPush) -> f32 {
-        reference(&HostInputs { guide: &[], stats: &[stats], priority: &[], push })[0]
+        reference(&HostInputs { guide: &[], stats: &[stats], light: &[], priority: &[], push })[0]
     }
 
     #[test]
     fn noise_is_the_deviation_over_the_luminance() {
         // Samples 2 and 6: mean 4, m2 = 8, variance 8 from one degree of freedom, and so around; sqrt 8 / (4 + 1).
-        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3], rays: 0 };
+        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3], remainder: 0 };
         assert!((of_one(stats, PUSH) - 8.0_f32.sqrt() / 5.0).abs() < 1e-6);
         let plain = PriorityPush { luminance_floor: -1.0, ..PUSH };
         assert!((of_one(stats, plain) - 8.0_f32.sqrt()).abs() < 1e-6);
@@ -96,7 +97,7 @@ mod tests {
     #[test]
     fn a_mean_below_the_threshold_wants_nothing_and_an_unknown_one_something() {
         // Relative error of the mean: sqrt 8 / 5 / sqrt 2 = 0.4.
-        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3], rays: 0 };
+        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3], remainder: 0 };
         assert_eq!(of_one(stats, PriorityPush { threshold: 0.41, ..PUSH }), 0.0);
         assert!(of_one(stats, PriorityPush { threshold: 0.39, ..PUSH }) > 0.0);
         assert_eq!(of_one(PixelStats::default(), PUSH), 1.0);

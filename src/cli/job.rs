@@ -4,6 +4,7 @@ use super::resume::Earlier;
 use crate::error::Result;
 use crate::gpu::{FrameResources, PassTime};
 use crate::renderer::{PathRange, Renderer, Step};
+use crate::statistics::BrokenSamples;
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -56,6 +57,8 @@ pub struct End {
     pub allocations: u32,
     /// Most priorities of one allocation that were not finite, and so counted for nothing.
     pub broken_priorities: u32,
+    /// Samples that were no number, those of a resumed render included; filled in once it has ended.
+    pub broken_samples: Option<BrokenSamples>,
     /// What was traced last of the last allocation; none before the first.
     pub last: Option<PathRange>,
     /// Why it ended.
@@ -77,15 +80,20 @@ impl Job<'_> {
             }
         };
         let allocations = earlier.map_or(0, |e| e.progress.allocations);
-        let mut end =
-            End { times: Vec::new(), traced: 0, allocations, broken_priorities: 0, last: None, why: Why::Done };
+        let mut end = End {
+            times: Vec::new(),
+            traced: 0,
+            allocations,
+            broken_priorities: 0,
+            broken_samples: None,
+            last: None,
+            why: Why::Done,
+        };
         if earlier.is_some() {
             end.last = Some(nothing_yet(steps().next()));
         }
         let threshold = r.settings().allocate.noise_threshold > 0.0;
         let mut progress = Progress::new(steps().map(|step| step.paths()).sum(), self.quiet);
-        // The samples of an earlier render come without their rays.
-        let before = if earlier.is_some() { rays_of_a_few(r)? } else { [0; 2] };
         let (mut listed, mut to_do) = (u64::MAX, steps().peekable());
         while let Some(planned) = to_do.next() {
             if self.stop.load(Ordering::SeqCst) {
@@ -118,8 +126,7 @@ impl Job<'_> {
             }
             progress.add(planned.paths());
             if progress.wants_speed() {
-                let now = rays_of_a_few(r)?;
-                progress.set_speed([now[0] - before[0], now[1] - before[1]]);
+                progress.set_speed(rays_of_a_few(r, step.map_or(0, |step| step.paths()))?);
             }
         }
         progress.finish();
@@ -130,15 +137,18 @@ impl Job<'_> {
     }
 }
 
-/// Rays and samples since the renderer was made, of 16 runs of 64 pixels spread over the film.
-fn rays_of_a_few(renderer: &Renderer) -> Result<[u64; 2]> {
+/// Rays and samples of 16 runs of up to 64 of the samples that were traced last.
+fn rays_of_a_few(renderer: &Renderer, traced: u64) -> Result<[u64; 2]> {
     const RUNS: usize = 16;
-    const PIXELS: usize = 64;
-    let stats = &renderer.film().tiles[0].stats;
+    const SAMPLES: usize = 64;
+    let records = if renderer.effects().split_light { 3 } else { 1 };
+    let (samples, traced) = (&renderer.film().samples, traced as usize);
     let mut sums = [0; 2];
-    for first in (0..RUNS).map(|i| i * stats.len() / RUNS) {
-        for s in stats.read_range(first..stats.len().min(first + PIXELS))? {
-            sums = [sums[0] + u64::from(s.rays), sums[1] + u64::from(s.count)];
+    for first in (0..RUNS).map(|i| i * traced / RUNS) {
+        let run = first..traced.min(first + SAMPLES);
+        for [_, _, _, rays] in samples.read_range(run.start * records..run.end * records)?.into_iter().step_by(records)
+        {
+            sums = [sums[0] + rays.abs() as u64, sums[1] + 1];
         }
     }
     Ok(sums)

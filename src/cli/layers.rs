@@ -3,7 +3,7 @@ use crate::error::Result;
 use crate::gpu::layout::{Guide, PixelLight, PixelStats, vec3};
 use crate::image::{Film, Samples};
 use crate::renderer::Renderer;
-use crate::statistics::{Pixel, variance_of_mean};
+use crate::statistics::{BrokenSamples, Pixel, variance_of_mean};
 
 const RGB: [&str; 3] = ["R", "G", "B"];
 const XYZ: [&str; 3] = ["X", "Y", "Z"];
@@ -20,8 +20,17 @@ const NOISY: &str = "Noisy Image";
 /// Metadata of what `tallow filter` wrote: the filter.
 pub const FILTERED: &str = "filtered";
 
+/// Sum of squared deviations of the luminance of indirect light before albedo.
+pub const INDIRECT_M2: &str = "indirect.m2";
+
+/// What rounding took off the means of pixels with thousands of samples: only in files that have such pixels.
+const REMAINDERS: [&str; 2] = ["remainder", "light.remainder"];
+
+/// Metadata of what was no number.
+const BROKEN: &str = "brokenSamples";
+
 /// Of a film with everything.
-const CHANNELS: usize = 27;
+const CHANNELS: usize = 30;
 
 /// What a pixel takes in a film with everything.
 pub fn bytes_per_pixel(placed: bool) -> u64 {
@@ -48,6 +57,7 @@ pub fn film(renderer: &Renderer) -> Result<Film> {
             film.append(part);
         }
     }
+    drop_remainders_of_none(&mut film);
     if settings.allocate.policy != "uniform" {
         film.add(PRIORITY, Samples::F32(renderer.film().priority.read()?));
     }
@@ -64,7 +74,20 @@ fn add_pixels(film: &mut Film, stats: &[PixelStats], light: &[PixelLight]) {
     if !light.is_empty() {
         film.add_vec3("direct", RGB, &light.iter().map(|l| l.direct).collect::<Vec<_>>());
         film.add_vec3("indirect", RGB, &light.iter().map(|l| l.indirect).collect::<Vec<_>>());
+        film.add(INDIRECT_M2, Samples::F32(light.iter().map(|l| l.indirect_m2).collect()));
     }
+    let remainders = [stats.iter().map(|s| s.remainder).collect(), light.iter().map(|l| l.remainder).collect()];
+    for (name, remainders) in REMAINDERS.into_iter().zip::<[Vec<u32>; 2]>(remainders) {
+        if remainders.len() == stats.len() {
+            film.add(name, Samples::U32(remainders));
+        }
+    }
+}
+
+/// Only pixels with thousands of samples have any.
+fn drop_remainders_of_none(film: &mut Film) {
+    let is_zero = |samples: &Samples| matches!(samples, Samples::U32(words) if words.iter().all(|&word| word == 0));
+    film.channels.retain(|c| !(REMAINDERS.contains(&c.name.as_str()) && is_zero(&c.samples)));
 }
 
 /// What the samples say, out of a film that [`film()`] made.
@@ -84,13 +107,51 @@ pub fn pixels(film: &Film) -> std::result::Result<Vec<Pixel>, String> {
     };
     let (m2, count) = (layer(Some("m2"))?, counts(film, "samples")?);
     let dark = vec![[0.0; 3]; mean.len()];
+    let indirect_m2 = indirect_m2(film)?;
+    let [remainder, light_remainder] = REMAINDERS.map(|name| counts(film, name).ok());
+    let word = |words: &Option<Vec<u32>>, i: usize| words.as_ref().map_or(0, |words| words[i]);
     let direct = layer(Some("direct")).unwrap_or_else(|_| dark.clone());
     let indirect = layer(Some("indirect")).unwrap_or(dark);
     let pixel = |i: usize| Pixel {
-        stats: PixelStats { mean: mean[i], count: count[i], m2: m2[i], rays: 0 },
-        light: PixelLight { direct: direct[i], indirect: indirect[i] },
+        stats: PixelStats { mean: mean[i], count: count[i], m2: m2[i], remainder: word(&remainder, i) },
+        light: PixelLight {
+            direct: direct[i],
+            indirect_m2: indirect_m2[i],
+            indirect: indirect[i],
+            remainder: word(&light_remainder, i),
+        },
     };
     Ok((0..mean.len()).map(pixel).collect())
+}
+
+/// 0 where direct and indirect light are not kept apart.
+fn indirect_m2(film: &Film) -> std::result::Result<Vec<f32>, String> {
+    match (film.channel(INDIRECT_M2), film.channel("indirect.R")) {
+        (Some(Samples::F32(m2)), _) => Ok(m2.clone()),
+        (None, None) => Ok(vec![0.0; film.pixels()]),
+        _ => Err(format!(
+            "has no layer \"{INDIRECT_M2}\", the noise of indirect light, as files of earlier versions: it can be filtered, but \
+             to add samples render it anew"
+        )),
+    }
+}
+
+/// What the file says of samples that were no number.
+///
+/// # Errors
+/// When it is damaged.
+pub fn broken_samples(film: &Film) -> std::result::Result<Option<BrokenSamples>, String> {
+    let said = film.metadata.get(BROKEN);
+    said.map(|text| serde_json::from_str(text).map_err(|e| format!("{BROKEN}: {e}"))).transpose()
+}
+
+/// Makes the file say it.
+pub fn set_broken_samples(film: &mut Film, broken: Option<BrokenSamples>) {
+    film.metadata.remove(BROKEN);
+    if let Some(broken) = broken {
+        let text = serde_json::to_string(&broken).expect("integers alone");
+        film.metadata.insert(BROKEN.to_owned(), text);
+    }
 }
 
 /// Puts a filtered colour in the place of the samples' mean, which stays as a layer.
@@ -108,6 +169,7 @@ pub fn replace_pixels(film: &mut Film, pixels: &[Pixel]) {
     let light: Vec<_> = pixels.iter().filter(|_| split).map(|p| p.light).collect();
     add_pixels(&mut fresh, &pixels.iter().map(|p| p.stats).collect::<Vec<_>>(), &light);
     film.channels.retain(|c| fresh.channel(&c.name).is_none() && !c.name.starts_with(NOISY));
+    drop_remainders_of_none(&mut fresh);
     film.metadata.remove(FILTERED);
     film.channels.extend(fresh.channels);
 }

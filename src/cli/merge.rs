@@ -3,7 +3,7 @@ use super::origin::{self, Origin, SampleRange};
 use super::{Exit, layers};
 use crate::error::{Error, Result};
 use crate::image::{self, Film, WriteOptions};
-use crate::statistics::{Pixel, join};
+use crate::statistics::{BrokenSamples, Pixel, join};
 use std::path::{Path, PathBuf};
 
 /// Merge renders of disjoint sample ranges into one
@@ -26,6 +26,7 @@ const FREE: [&str; 3] = ["spp", "first_sample", "seed"];
 struct Part {
     film: Film,
     pixels: Vec<Pixel>,
+    broken: Option<BrokenSamples>,
     /// Its settings are all but [`FREE`].
     origin: Origin,
 }
@@ -41,7 +42,7 @@ impl Part {
         if let Some(settings) = origin.settings.as_object_mut() {
             settings.retain(|key, _| !FREE.contains(&key.as_str()));
         }
-        Ok(Self { pixels: layers::pixels(&film)?, film, origin })
+        Ok(Self { pixels: layers::pixels(&film)?, broken: layers::broken_samples(&film)?, film, origin })
     }
 
     /// Why they cannot be merged.
@@ -77,14 +78,16 @@ pub fn run(args: &Args) -> Result<Exit> {
 /// The first film, with everybody's samples.
 fn merged(parts: Vec<Part>) -> Result<Film> {
     let mut parts = parts.into_iter();
-    let Some(Part { mut film, mut pixels, mut origin }) = parts.next() else {
+    let Some(Part { mut film, mut pixels, mut broken, mut origin }) = parts.next() else {
         return Err(Error::Usage("name files to merge".into()));
     };
     for part in parts {
         pixels.iter_mut().zip(&part.pixels).for_each(|(a, b)| *a = join(a, b));
         origin.samples.extend(part.origin.samples);
+        broken = BrokenSamples::join(broken, part.broken);
     }
     layers::replace_pixels(&mut film, &pixels);
+    layers::set_broken_samples(&mut film, broken);
     film.channels.retain(|c| c.name != layers::PENDING && c.name != layers::PRIORITY);
     origin::set_samples(&mut film, &origin.samples)?;
     Ok(film)

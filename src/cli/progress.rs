@@ -32,7 +32,7 @@ impl Progress {
         !self.bar.is_hidden() && self.shown.is_none_or(|shown| shown.elapsed() > Duration::from_millis(200))
     }
 
-    /// Shows the speed, by the rays of some of all samples so far: (rays, samples).
+    /// Shows the speed, by the rays of some of the samples: (rays, samples).
     pub fn set_speed(&mut self, rays_of: [u64; 2]) {
         self.shown = Some(Instant::now());
         self.bar.set_message(speed(self.bar.position(), rays_of, self.start.elapsed().as_secs_f64()));

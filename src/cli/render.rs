@@ -18,6 +18,7 @@ use crate::report::table::{self, PassRow};
 use crate::report::trace::chrome_trace;
 use crate::scene::Scene;
 use crate::settings::Settings;
+use crate::statistics::BrokenSamples;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -109,6 +110,8 @@ pub struct Summary {
     pub stopped: Why,
     /// Most priorities of one allocation that were not finite.
     pub broken_priorities: u32,
+    /// Samples that were no number and counted as black, those of a resumed file included.
+    pub broken_samples: Option<BrokenSamples>,
     /// Rays and nodes; none without `--counters`.
     pub counters: Option<Counters>,
     /// Wall time of reading the scene and building its hierarchy.
@@ -163,6 +166,10 @@ pub fn run(args: &Args) -> Result<Exit> {
     let seconds = host.seconds("render");
     film.metadata = metadata(args, &gpu, seconds, end.allocations);
     film.metadata.extend(origin::metadata(&scene, &film)?.map(|(k, v)| (k.to_owned(), v)));
+    let before = earlier.as_ref().and_then(|earlier| earlier.broken);
+    end.broken_samples = BrokenSamples::join(before, renderer.broken_samples()?);
+    layers::set_broken_samples(&mut film, end.broken_samples);
+    end.broken_samples.iter().for_each(warn_of_broken);
     if end.why == Why::Interrupted {
         let pending = resume::pending(&renderer, &film, &end)?;
         film.add(layers::PENDING, Samples::U32(pending));
@@ -179,6 +186,14 @@ pub fn run(args: &Args) -> Result<Exit> {
     fail_on_messages(&gpu)?;
     report(args, counters, &gpu, &scene, &film, &host, &end)?;
     Ok(if end.why == Why::Interrupted { Exit::Interrupted } else { Exit::Done })
+}
+
+/// Always told: it is a bug, or light too strong for the numbers.
+fn warn_of_broken(broken: &BrokenSamples) {
+    let BrokenSamples { count, pixel: [x, y], sample, seed } = broken;
+    eprintln!(
+        "warning: samples that were no number and count as black: {count}; the first: pixel ({x}, {y}), sample {sample}, seed {seed}"
+    );
 }
 
 /// With the filter's default settings, scaled to the image.
@@ -269,6 +284,7 @@ fn report(
         most_samples: least_most.1,
         stopped: end.why,
         broken_priorities: end.broken_priorities,
+        broken_samples: end.broken_samples,
         counters,
         load_seconds: host.seconds("load scene"),
         compile_seconds: host.seconds("upload and compile"),
@@ -359,12 +375,12 @@ mod tests {
 
     #[test]
     fn a_film_takes_its_records_and_its_channels() {
-        // 32 bytes of statistics, 24 of light, 48 of guide; 27 channels. Placed: 24 more, and 2 channels.
+        // 32 bytes of statistics, 32 of light, 48 of guide; 30 channels. Placed: 24 more, and 2 channels.
         let mut settings = Settings { width: 3, height: 2, ..Settings::default() };
-        assert_eq!(bytes_of_film(&settings, true), 6 * (104 + 4 * 27));
+        assert_eq!(bytes_of_film(&settings, true), 6 * (112 + 4 * 30));
         settings.allocate.policy = "both".into();
-        assert_eq!(bytes_of_film(&settings, false), 6 * 4 * 29);
-        assert_eq!(bytes_of_film(&settings, true), 6 * (104 + 24 + 4 * 29));
+        assert_eq!(bytes_of_film(&settings, false), 6 * 4 * 32);
+        assert_eq!(bytes_of_film(&settings, true), 6 * (112 + 24 + 4 * 32));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::image::{self, Film, Samples};
 use crate::renderer::{Progress, Renderer};
 use crate::scene::Scene;
 use crate::schedule;
-use crate::statistics::Pixel;
+use crate::statistics::{BrokenSamples, Pixel};
 use serde_json::Value;
 use std::path::Path;
 
@@ -20,6 +20,8 @@ pub const ALLOCATIONS: &str = "allocations";
 pub struct Earlier {
     /// Where it stopped.
     pub progress: Progress,
+    /// Samples that were no number.
+    pub broken: Option<BrokenSamples>,
     pixels: Vec<Pixel>,
     priority: Vec<f32>,
     pending: Vec<u32>,
@@ -53,7 +55,7 @@ impl Earlier {
             Some(Samples::F32(priority)) => priority.clone(),
             _ => Vec::new(),
         };
-        Ok(Self { progress, pixels, priority, pending })
+        Ok(Self { progress, broken: layers::broken_samples(film)?, pixels, priority, pending })
     }
 
     /// Puts it into the renderer's buffers and returns the steps that are left.

@@ -25,6 +25,7 @@ pub(super) fn split(colour: &[vec3], albedo: &[vec3], width: usize) -> Light {
         sharp: colour.iter().zip(&factor).map(dark).collect(),
         factor,
         unlit: None,
+        variance: None,
         note: "filtered: colour / albedo; what has no albedo, and its rim, stays as it is",
     }
 }

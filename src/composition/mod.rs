@@ -10,6 +10,7 @@ mod guide;
 
 use crate::filter::FilterInput;
 use crate::gpu::layout::{vec3, vec4};
+use crate::image::Samples;
 use crate::image::aov::{Aov, Aovs};
 
 /// What is kept away from the filter, where an image tells it.
@@ -55,7 +56,10 @@ pub fn split(aovs: &Aovs, demodulation: Demodulation) -> Parts {
     };
     notes.push(light.note.to_owned());
     let radiance = light.filtered.iter().zip(&counts).zip(&light.factor).map(with_count).collect();
-    let variance = variance(aovs, &counts).map(|v| v.iter().zip(&light.factor).map(demodulated_variance).collect());
+    let variance = light.variance.or_else(|| {
+        let of_colour = variance(aovs, &counts)?;
+        Some(of_colour.iter().zip(&light.factor).map(demodulated_variance).collect())
+    });
     let guide = guide::guides(aovs, &mut notes);
     let input = FilterInput { width: aovs.film.width, height: aovs.film.height, radiance, guide, variance };
     if light.unlit.is_some() {
@@ -109,6 +113,8 @@ struct Light {
     factor: Vec<vec3>,
     sharp: Vec<vec3>,
     unlit: Option<Unlit>,
+    /// Of what is filtered, where the image tells it.
+    variance: Option<Vec<vec3>>,
     note: &'static str,
 }
 
@@ -135,6 +141,7 @@ fn split_light(aovs: &Aovs, colour: &[vec3], albedo: &[vec3], direct: &[vec3], i
         factor: (0..colour.len()).map(factor).collect(),
         sharp: direct.iter().map(|v| v.map(finite)).collect(),
         unlit: unlit(aovs, albedo, direct),
+        variance: indirect_variance(aovs),
         note: "filtered: indirect light before albedo; direct light stays as it is",
     }
 }
@@ -166,6 +173,7 @@ fn plain(colour: &[vec3]) -> Light {
         factor: vec![[1.0; 3]; colour.len()],
         sharp: vec![[0.0; 3]; colour.len()],
         unlit: None,
+        variance: None,
         note: "filtered: the colour, without demodulation",
     }
 }
@@ -176,9 +184,18 @@ fn with_count(((c, count), factor): ((&vec3, &f32), &vec3)) -> vec4 {
     [c[0], c[1], c[2], if used { *count } else { 0.0 }]
 }
 
-/// Of each pixel's mean. pbrt stores that of one sample. Where only indirect light is filtered, that of all light stands for its
-/// own: without any, `auto` had 1.04 to 4.8 times the error on the four images of 4 samples and more that `tools/filters ranking
-/// neural` filters so.
+/// That of each pixel's mean of indirect light, by its luminance.
+fn indirect_variance(aovs: &Aovs) -> Option<Vec<vec3>> {
+    let Some(Samples::F32(m2)) = aovs.film.channel("indirect.m2") else { return None };
+    let of_mean = |i: usize| {
+        let n = aovs.scalar(Aov::Samples, i).unwrap_or(0.0);
+        if n > 1.0 { m2[i] / (n * (n - 1.0)) } else { 0.0 }
+    };
+    Some((0..m2.len()).map(|i| [of_mean(i); 3]).collect())
+}
+
+/// Of each pixel's mean of all light; pbrt stores that of one sample. In images of earlier versions it stands for that of indirect
+/// light, which alone is filtered: without any, `auto` had 1.04 to 4.8 times the error.
 fn variance(aovs: &Aovs, counts: &[f32]) -> Option<Vec<vec3>> {
     let stored = aovs.get(Aov::Variance)?;
     let of_one_sample = aovs.film.channels.iter().any(|c| c.name.starts_with("RelativeVariance."));
@@ -193,8 +210,8 @@ fn demodulated_variance((v, f): (&vec3, &vec3)) -> vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::image::Film;
     use crate::image::aov::Names;
-    use crate::image::{Film, Samples};
 
     const RGB: [&str; 3] = ["R", "G", "B"];
 
@@ -275,6 +292,25 @@ mod tests {
                 assert_eq!([broken[0], broken[2], broken[3]], [clean[0], clean[2], clean[3]], "{demodulation:?}");
             }
         }
+    }
+
+    #[test]
+    fn indirect_light_has_the_variance_of_its_own_samples() {
+        let mut film = film();
+        film.metadata.insert("software".to_owned(), "tallow 0.1.0".to_owned());
+        film.add_vec3("direct", RGB, &[[0.5; 3]; 4]);
+        film.add_vec3("indirect", RGB, &[[1.0; 3]; 4]);
+        film.add_vec3("variance", RGB, &[[8.0; 3]; 4]);
+        film.add("samples", Samples::U32(vec![4, 1, 3, 0]));
+        let of = |film: &Film, demodulation| take_apart(film, demodulation).input.variance.unwrap();
+        assert_eq!(
+            of(&film, Demodulation::Light)[0],
+            [32.0; 3],
+            "of earlier versions: of all light over the squared albedo"
+        );
+        film.add("indirect.m2", Samples::F32(vec![12.0; 4]));
+        assert_eq!(of(&film, Demodulation::Light), [[1.0; 3], [0.0; 3], [2.0; 3], [0.0; 3]]);
+        assert_eq!(of(&film, Demodulation::Off)[0], [8.0; 3]);
     }
 
     #[test]

@@ -314,16 +314,33 @@ gpu_structs! {
         count: uint,
         /// Sum of squared deviations from the mean; the variance of one sample is m2 / (count - 1).
         m2: vec3,
-        /// Rays of its samples, of both kinds, modulo 2^32; those of an earlier render that was resumed do not count.
-        rays: uint,
+        /// What rounding took off `mean`: three signed numbers of 10 bits, in units of 2^-10 of its last place, red lowest;
+        /// 0 up to 4096 samples.
+        remainder: uint,
     }
 
-    /// Running means of one pixel that the filters read; the count is that of its [`PixelStats`].
+    /// Running means of one pixel that the filters read; the count is that of its [`PixelStats`]. 2 texels.
     struct PixelLight {
-        /// Radiance that needs no filter: emission, direct light, and all that a smooth first hit shows.
+        /// Radiance that needs no filter: emission, direct light, and all that smooth interfaces show at the first hit.
         direct: vec3,
+        /// Sum of squared deviations of the luminance of `indirect`, as [`PixelStats::m2`].
+        indirect_m2: float,
         /// Incident indirect irradiance over pi at the first hit: indirect radiance before its albedo.
         indirect: vec3,
+        /// As [`PixelStats::remainder`]: six numbers of 5 bits, in units of 2^-5; those of `direct` are the lowest.
+        remainder: uint,
+    }
+
+    /// Samples that were no number and counted as black.
+    struct BrokenTally {
+        /// How many, up to 2^31.
+        count: uint,
+        /// Complement of the lowest pixel of such a sample; 0: none.
+        lowest: uint,
+        /// Complement of the pixel that `index` is of; it is that of `lowest` once a batch is folded.
+        pixel: uint,
+        /// Index of the first such sample of that pixel, counted from its first sample of all.
+        index: uint,
     }
 
     /// Push constants of `path.comp` and `guide.comp`.
@@ -368,7 +385,9 @@ gpu_structs! {
         first_pixel: uint,
         /// Pixels to fold.
         pixels: uint,
-        /// First pixel of those that are bound, counted likewise.
+        /// First pixel of the tile in the film.
+        tile: uint,
+        /// First pixel of those that are bound, counted from the tile's first.
         window: uint,
         /// Samples of every pixel in the batch; 0 when the round's offsets say how many.
         samples: uint,

@@ -13,7 +13,9 @@ pub fn weigh(priority: &[f32]) -> (Vec<u32>, u32) {
 pub fn choose(priority: &[f32], round: u32, seed: u32, threshold: f32) -> Vec<u32> {
     let chosen = |(i, &p): (usize, &f32)| match threshold > 0.0 {
         true => p >= threshold,
-        false => f64::from(pcg(pcg(i as u32 ^ seed).wrapping_add(round))) < (f64::from(p) * 4_294_967_296.0).floor(),
+        false => {
+            f64::from(pcg(pcg(i as u32 ^ pcg(seed)).wrapping_add(round))) < (f64::from(p) * 4_294_967_296.0).floor()
+        }
     };
     priority.iter().enumerate().map(chosen).map(u32::from).collect()
 }

@@ -113,7 +113,7 @@ fn sample_conductor(b: &Bsdf, wo: Vec3, u: Vec2) -> (bool, BsdfSample) {
 }
 
 /// Index beyond / index on the side of wo; a rough interface needs the two to differ.
-fn relative_index(b: &Bsdf, wo_z: f32) -> f32 {
+pub fn relative_index(b: &Bsdf, wo_z: f32) -> f32 {
     let eta = if !is_smooth(b) && (b.eta.x - 1.0).abs() < 1e-3 { 1.001 } else { b.eta.x };
     if wo_z < 0.0 { 1.0 / eta } else { eta }
 }
@@ -235,11 +235,17 @@ pub fn bsdf_is_delta(b: &Bsdf) -> bool {
     matches!(b.kind, BSDF_CONDUCTOR | BSDF_DIELECTRIC) && is_smooth(b)
 }
 
-/// What indirect light is divided by before it is filtered: 0 where all light counts as direct.
-pub fn bsdf_albedo(b: &Bsdf) -> Vec3 {
+/// Reflectance, roughly, of the lobes whose light counts as indirect, seen at the cosine `wo_z`: what that light is divided by
+/// before it is filtered.
+pub fn bsdf_albedo(b: &Bsdf, wo_z: f32) -> Vec3 {
+    let cosine = wo_z.abs();
+    let specular = if is_smooth(b) { Vec3::ZERO } else { b.specular };
+    let layered = |eta: f32, beneath: Vec3| beneath.lerp(specular, fresnel_dielectric(cosine, eta).x);
     match b.kind {
-        BSDF_CONDUCTOR | BSDF_DIELECTRIC if is_smooth(b) => Vec3::ZERO,
-        BSDF_CONDUCTOR | BSDF_DIELECTRIC => b.specular,
+        BSDF_CONDUCTOR => specular * fresnel_conductor(cosine, b.eta, b.k),
+        BSDF_DIELECTRIC if is_smooth(b) => Vec3::ZERO,
+        BSDF_DIELECTRIC => layered(relative_index(b, wo_z), b.transmission),
+        BSDF_COATED => layered(b.eta.x, b.albedo),
         _ => b.albedo,
     }
 }
@@ -247,6 +253,7 @@ pub fn bsdf_albedo(b: &Bsdf) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gpu::layout::BSDF_DIFFUSE;
 
     const GLASS: Bsdf = Bsdf {
         kind: BSDF_DIELECTRIC,
@@ -269,6 +276,24 @@ mod tests {
         // Seen from where it went, the ray comes back, and the radiance with it.
         let (sampled, back) = bsdf_sample(&GLASS, s.wi, 0.99, Vec2::ZERO);
         assert!(sampled && (back.wi - wo).length() < 1e-6 && (back.weight.x - 2.25).abs() < 1e-5, "{back:?}");
+    }
+
+    #[test]
+    fn albedo_is_that_of_the_lobes_whose_light_is_indirect() {
+        let base = Bsdf { albedo: Vec3::splat(0.5), specular: Vec3::splat(0.8), ..GLASS };
+        let of = |kind, alpha, cosine| bsdf_albedo(&Bsdf { kind, alpha, k: Vec3::splat(4.0), ..base }, cosine).x;
+        let f = fresnel_dielectric(0.3, 1.5).x;
+        assert_eq!(
+            [of(BSDF_DIELECTRIC, 0.0, 1.0), of(BSDF_CONDUCTOR, 0.0, 1.0), of(BSDF_DIFFUSE, 0.0, 0.3)],
+            [0.0, 0.0, 0.5]
+        );
+        // 0.04 is what light meets head on: 0.5 * 0.96 + 0.8 * 0.04.
+        let close = |a: f32, b: f32| assert!((a - b).abs() < 1e-5, "{a} {b}");
+        close(of(BSDF_COATED, 0.2, 1.0), 0.512);
+        close(of(BSDF_COATED, 0.2, 0.3), 0.5 * (1.0 - f) + 0.8 * f);
+        close(of(BSDF_COATED, 0.0, 0.3), 0.5 * (1.0 - f));
+        close(of(BSDF_DIELECTRIC, 0.2, 1.0), 0.96 + 0.8 * 0.04);
+        close(of(BSDF_CONDUCTOR, 0.2, 1.0), 0.8 * (0.25 + 16.0) / (6.25 + 16.0));
     }
 
     #[test]

@@ -56,5 +56,23 @@ pub fn eye_ray(push: &PathPush, effects: &Effects, film: Vec2, random: Sampler) 
 
 /// Alpha masks along a path draw from this.
 pub fn path_seed(push: &PathPush, pixel: u32, index: u32) -> u32 {
-    pcg(pcg(pixel ^ push.seed).wrapping_add(index))
+    pcg(pcg(pixel ^ pcg(!push.seed)).wrapping_add(index))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn seeds_share_no_numbers_of_masks() {
+        // Pixel and seed joined by exclusive-or alone, seeds 0 to 3 would have the same numbers at other pixels.
+        let seeds = |seed: u32| {
+            let push = PathPush { seed, ..PathPush::default() };
+            (0..4096u32).map(move |pixel| path_seed(&push, pixel, 7))
+        };
+        let all: HashSet<u32> = (0..4).flat_map(seeds).collect();
+        // By chance, n^2 / 2^33 pairs of n numbers.
+        assert!(all.len() >= 4 * 4096 - 2, "{}", all.len());
+    }
 }

@@ -1,51 +1,139 @@
 //! Twin of `glsl/fold.comp`: Welford's running mean and variance (1962), in order of sample index.
-use crate::gpu::layout::{FoldPush, PixelLight, PixelStats, vec4};
+use crate::gpu::layout::{BrokenTally, FoldPush, PixelLight, PixelStats, vec3, vec4};
+use crate::statistics::luminance;
 use glam::{Vec3, Vec4};
 
 /// A channel whose albedo is below this cannot be divided out.
 const SMALLEST_ALBEDO: f32 = 1e-6;
 
+/// Irradiance is cut there: what a small albedo makes of bright light stays finite.
+const BRIGHTEST: f32 = 3e38;
+/// Deviations and sums of their squares are cut there, so that what is added up over pixels stays finite.
+const FARTHEST: f32 = 1e17;
+const WIDEST: f32 = 1e35;
+/// Samples up to which means are rounded to single precision.
+const FEW: u32 = 4096;
+/// Of the remainder of a mean, for each channel.
+const BITS: u32 = 10;
+const LIGHT_BITS: u32 = 5;
+
 /// What of a sample's light needs no filter, and its indirect irradiance over pi.
 fn split(direct: Vec3, indirect: Vec3, albedo: Vec3) -> (Vec3, Vec3) {
     let divides = albedo.cmpgt(Vec3::splat(SMALLEST_ALBEDO));
-    let irradiance = Vec3::select(divides, indirect / albedo.max(Vec3::splat(SMALLEST_ALBEDO)), Vec3::ZERO);
+    let before = (indirect / albedo.max(Vec3::splat(SMALLEST_ALBEDO))).min(Vec3::splat(BRIGHTEST));
+    let irradiance = Vec3::select(divides, before, Vec3::ZERO);
     (direct + Vec3::select(divides, Vec3::ZERO, indirect), irradiance)
 }
 
 /// Adds a batch to the statistics of all pixels. `samples`: sample k of pixel i at `k * push.pixels + i`, one vec4, or
-/// with `split_light` three (direct, indirect, albedo), and in w of the first the sample's rays; `light` is left alone
-/// without it.
-pub fn fold(push: &FoldPush, split_light: bool, samples: &[vec4], stats: &mut [PixelStats], light: &mut [PixelLight]) {
+/// with `split_light` three (direct, indirect, albedo); `light` is left alone without it. Returns the samples that were no
+/// number, as the sign of w of the first tells, and the first of them.
+pub fn fold(
+    push: &FoldPush,
+    split_light: bool,
+    samples: &[vec4],
+    stats: &mut [PixelStats],
+    light: &mut [PixelLight],
+) -> BrokenTally {
+    let mut broken = BrokenTally::default();
     for i in 0..push.pixels as usize {
         let pixel = push.first_pixel as usize + i;
         for k in 0..push.samples as usize {
             let at = k * push.pixels as usize + i;
+            let record = if split_light { 3 * at } else { at };
+            if samples[record][3] < 0.0 {
+                report(&mut broken, push.tile + pixel as u32, stats[pixel].count);
+            }
             if split_light {
-                let [direct, indirect, albedo] = [0, 1, 2].map(|j| Vec4::from(samples[3 * at + j]).truncate());
-                fold_radiance(&mut stats[pixel], direct + indirect, samples[3 * at][3]);
-                let share = 1.0 / stats[pixel].count as f32;
-                fold_light(&mut light[pixel], split(direct, indirect, albedo), share);
+                let [direct, indirect, albedo] = [0, 1, 2].map(|j| Vec4::from(samples[record + j]).truncate());
+                fold_radiance(&mut stats[pixel], direct + indirect);
+                fold_light(&mut light[pixel], split(direct, indirect, albedo), stats[pixel].count);
             } else {
-                fold_radiance(&mut stats[pixel], Vec4::from(samples[at]).truncate(), samples[at][3]);
+                fold_radiance(&mut stats[pixel], Vec4::from(samples[record]).truncate());
             }
         }
     }
+    broken
 }
 
-fn fold_radiance(s: &mut PixelStats, radiance: Vec3, rays: f32) {
+/// Pixels come in order, and so do the samples of each.
+fn report(broken: &mut BrokenTally, pixel: u32, sample: u32) {
+    if broken.count == 0 {
+        (broken.lowest, broken.pixel, broken.index) = (!pixel, !pixel, sample);
+    }
+    broken.count += 1;
+}
+
+/// 2^-bits of the last place of `mean`.
+fn unit(mean: f32, bits: u32) -> f32 {
+    let power = f32::from_bits(mean.to_bits() & 0x7f80_0000);
+    (power * f32::EPSILON / (1u32 << bits) as f32).max(1e-37)
+}
+
+/// A word of remainders, and the samples of the mean.
+struct Kept<'a> {
+    word: &'a mut u32,
+    count: u32,
+}
+
+/// Moves one channel of a mean by a step. The remainder holds what rounding has taken off, `bits` from bit `at` on; it is rounded
+/// itself, up as often as down by the number of samples.
+fn move_channel(mean: f32, by: f32, remainder: &mut Kept, at: u32, bits: u32) -> f32 {
+    let kept = ((*remainder.word << (32 - at - bits)) as i32) >> (32 - bits);
+    let added = kept as f32 * unit(mean, bits) + by;
+    let moved = mean + added;
+    let lost = added - (moved - mean);
+    let end = (1 << (bits - 1)) as f32;
+    let up = (remainder.count.reverse_bits() >> 8) as f32 * 5.960_464_5e-8;
+    let rounded = (lost / unit(moved, bits) + up).floor();
+    // Half of the last place above is half of it below the next number: cut, it would be lost, always in one direction.
+    let (moved, rounded) = match rounded >= end {
+        true => (moved + unit(moved, bits) * (2.0 * end), -end),
+        false => (moved, rounded),
+    };
+    let kept = rounded.clamp(-end, end - 1.0) as i32;
+    let mask = ((1 << bits) - 1) << at;
+    *remainder.word = (*remainder.word & !mask) | (((kept as u32) << at) & mask);
+    moved
+}
+
+fn move_mean(mean: vec3, by: Vec3, mut remainder: Kept, at: u32, bits: u32) -> Vec3 {
+    let by = by.to_array();
+    [0, 1, 2].map(|c| move_channel(mean[c], by[c], &mut remainder, at + c as u32 * bits, bits)).into()
+}
+
+fn square(a: f32, b: f32) -> f32 {
+    a.clamp(-FARTHEST, FARTHEST) * b.clamp(-FARTHEST, FARTHEST)
+}
+
+fn fold_radiance(s: &mut PixelStats, radiance: Vec3) {
     s.count += 1;
-    s.rays = s.rays.wrapping_add(rays as u32);
-    let mean = Vec3::from(s.mean);
-    let off = radiance - mean;
-    let mean = mean + off * (1.0 / s.count as f32);
+    let off = radiance - Vec3::from(s.mean);
+    let by = off * (1.0 / s.count as f32);
+    let mean = match s.count <= FEW {
+        true => Vec3::from(s.mean) + by,
+        false => move_mean(s.mean, by, Kept { word: &mut s.remainder, count: s.count }, 0, BITS),
+    };
     s.mean = mean.into();
-    s.m2 = (Vec3::from(s.m2) + off * (radiance - mean)).into();
+    let moved = radiance - mean;
+    s.m2 = std::array::from_fn(|c| (s.m2[c] + square(off[c], moved[c])).min(WIDEST));
 }
 
-fn fold_light(l: &mut PixelLight, (kept, irradiance): (Vec3, Vec3), share: f32) {
+fn fold_light(l: &mut PixelLight, (kept, irradiance): (Vec3, Vec3), count: u32) {
+    let share = 1.0 / count as f32;
     let (direct, indirect) = (Vec3::from(l.direct), Vec3::from(l.indirect));
-    l.direct = (direct + (kept - direct) * share).into();
-    l.indirect = (indirect + (irradiance - indirect) * share).into();
+    let [by, indirect_by] = [(kept - direct) * share, (irradiance - indirect) * share];
+    let [direct, moved] = match count <= FEW {
+        true => [direct + by, indirect + indirect_by],
+        false => {
+            let word = &mut l.remainder;
+            let direct = move_mean(l.direct, by, Kept { word, count }, 0, LIGHT_BITS);
+            [direct, move_mean(l.indirect, indirect_by, Kept { word, count }, 3 * LIGHT_BITS, LIGHT_BITS)]
+        }
+    };
+    let off = |mean: Vec3| luminance(irradiance.into()) - luminance(mean.into());
+    l.indirect_m2 = (l.indirect_m2 + square(off(indirect), off(moved))).min(WIDEST);
+    (l.direct, l.indirect) = (direct.into(), moved.into());
 }
 
 #[cfg(test)]
@@ -57,9 +145,9 @@ mod tests {
         // 1, 2 then 3, 6: mean 3, squared deviations 4 + 1 + 0 + 9 = 14.
         let mut stats = [PixelStats::default()];
         let batch = FoldPush { pixels: 1, samples: 2, ..FoldPush::default() };
-        fold(&batch, false, &[[1.0, 1.0, 1.0, 3.0], [2.0; 4]], &mut stats, &mut []);
+        fold(&batch, false, &[[1.0; 4], [2.0; 4]], &mut stats, &mut []);
         fold(&batch, false, &[[3.0; 4], [6.0; 4]], &mut stats, &mut []);
-        assert_eq!((stats[0].count, stats[0].mean[1], stats[0].m2[2], stats[0].rays), (4, 3.0, 14.0, 14));
+        assert_eq!((stats[0].count, stats[0].mean[1], stats[0].m2[2], stats[0].remainder), (4, 3.0, 14.0, 0));
     }
 
     #[test]

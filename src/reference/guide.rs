@@ -31,7 +31,7 @@ pub fn first_hit(scene: &Scene, push: &PathPush, ray: Ray, mask_seed: u32) -> (G
         depth: hit.t + push.camera.near,
         position: s.position.into(),
         object: s.object,
-        albedo: bsdf_albedo(&bsdf).into(),
+        albedo: bsdf_albedo(&bsdf, -s.normal.dot(ray.direction)).into(),
         material: s.material,
     };
     (guide, bsdf_is_delta(&bsdf))

@@ -1,6 +1,6 @@
 //! Twin of `glsl/path.comp`.
 use crate::gpu::layout::{BSDF_DIELECTRIC, Effects, MATERIAL_TWO_SIDED, NONE, PathPush};
-use crate::reference::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
+use crate::reference::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_sample, relative_index};
 use crate::reference::camera::{eye_ray, film_sample, path_seed};
 use crate::reference::light::*;
 use crate::reference::sampler::{Sampler, pcg, sample_2d, sample_2d_bits, sampler_start};
@@ -28,6 +28,8 @@ pub struct PathSample {
     pub albedo: Vec3,
     /// Rays of both kinds.
     pub rays: u32,
+    /// The light was no number, and is black.
+    pub broken: bool,
 }
 
 impl PathSample {
@@ -54,6 +56,7 @@ struct Path {
     throughput: Vec3,
     bsdf_pdf: f32,
     delta: bool,
+    eta_scale: f32,
 }
 
 /// A path tracer for one scene.
@@ -158,11 +161,14 @@ impl Tracer<'_> {
         path.origin = offset_origin(p.surface.position, normal);
         path.bsdf_pdf = next.pdf;
         path.delta = next.delta;
+        if p.bsdf.kind == BSDF_DIELECTRIC && p.wo.z * next.wi.z < 0.0 {
+            path.eta_scale *= relative_index(&p.bsdf, p.wo.z).powi(2);
+        }
         path.throughput.max_element() > 0.0
     }
 
     fn survives_roulette(&self, path: &mut Path, random: Sampler, pair: u32) -> bool {
-        let q = path.throughput.max_element().min(0.95);
+        let q = (path.throughput.max_element() * path.eta_scale).min(0.95);
         if sample_2d(random, pair + PAIR_ROULETTE).x >= q {
             return false;
         }
@@ -180,7 +186,7 @@ impl Tracer<'_> {
 
     fn trace_path(&self, mut path: Path, random: Sampler, seed: u32) -> PathSample {
         let mut sum = PathSample::default();
-        let mut smooth_first = false;
+        let (mut smooth_first, mut mirrored) = (false, false);
         let mut from = [NONE; 2];
         for bounce in 0u32.. {
             let pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
@@ -201,7 +207,7 @@ impl Tracer<'_> {
             let p = self.shade(s, path.direction, pair, from);
             let smooth_here = bsdf_is_delta(&p.bsdf);
             if bounce == 0 {
-                sum.albedo = bsdf_albedo(&p.bsdf);
+                sum.albedo = bsdf_albedo(&p.bsdf, p.wo.z);
                 smooth_first = smooth_here;
             }
             if self.push.light_count > 0 && !smooth_here {
@@ -212,13 +218,18 @@ impl Tracer<'_> {
             if !self.scatter(&mut path, &p, random) {
                 break;
             }
+            mirrored |= bounce == 0 && path.delta;
             let from = self.push.roulette_depth;
             let roulette = self.effects.roulette && from > 0 && bounce + 1 >= from;
             if roulette && !self.survives_roulette(&mut path, random, pair) {
                 break;
             }
         }
-        PathSample { indirect: self.clamped(sum.indirect), ..sum }
+        sum.indirect = self.clamped(sum.indirect);
+        match mirrored {
+            true => PathSample { direct: sum.radiance(), indirect: Vec3::ZERO, ..sum },
+            false => sum,
+        }
     }
 
     /// Sample `index` of `pixel` (row-major).
@@ -226,8 +237,18 @@ impl Tracer<'_> {
         let random = sampler_start(pixel, index, self.push.seed, self.effects.independent_sampler);
         let film = film_sample(&self.push, &self.effects, pixel, random);
         let ray = eye_ray(&self.push, &self.effects, film, random);
-        let path =
-            Path { origin: ray.origin, direction: ray.direction, throughput: Vec3::ONE, bsdf_pdf: 0.0, delta: true };
-        self.trace_path(path, random, path_seed(&self.push, pixel, index))
+        let path = Path {
+            origin: ray.origin,
+            direction: ray.direction,
+            throughput: Vec3::ONE,
+            bsdf_pdf: 0.0,
+            delta: true,
+            eta_scale: 1.0,
+        };
+        let sample = self.trace_path(path, random, path_seed(&self.push, pixel, index));
+        match sample.radiance().is_finite() {
+            true => sample,
+            false => PathSample { direct: Vec3::ZERO, indirect: Vec3::ZERO, broken: true, ..sample },
+        }
     }
 }

@@ -112,6 +112,8 @@ fn other_effects(
     found.independent_sampler = because("independent_sampler", independent, "sampler independent".into());
     let policy = &s.allocate.policy;
     found.adaptive = because("adaptive", policy != "uniform", format!("allocate {policy}"));
+    let most = s.spp.max(s.allocate.max_spp);
+    found.many_samples = because("many_samples", most > 4096, format!("{most} samples of a pixel"));
     found.counters = because("counters", counters, "ray counters".into());
 }
 

@@ -16,7 +16,8 @@ pub fn record(k: &Fold, rec: &mut Recorder, f: &FilmBuffers, b: &Batch) -> Resul
     let tile = f.tile_of(b);
     let first_pixel = b.first_pixel - tile.first_pixel;
     let window = first_pixel / tile.window * tile.window;
-    let push = FoldPush { first_pixel, pixels: b.pixels, window, samples: b.samples, ..FoldPush::default() };
+    let (tile_first, pixels, samples) = (tile.first_pixel, b.pixels, b.samples);
+    let push = FoldPush { first_pixel, pixels, tile: tile_first, window, samples, ..FoldPush::default() };
     fold(k, rec, f, tile, window..tile.pixels.min(window + tile.window), &push)
 }
 
@@ -25,7 +26,8 @@ pub fn record_listed(k: &Fold, rec: &mut Recorder, f: &FilmBuffers, range: &Path
     let PathRange { first, paths, round, rounds } = *range;
     f.tiles[0].windows().try_for_each(|w| {
         let (first_pixel, pixels, first_path) = (w.start, w.end - w.start, pair(first));
-        let push = FoldPush { first_pixel, pixels, window: w.start, samples: 0, paths, first_path, round, rounds };
+        let push =
+            FoldPush { first_pixel, pixels, tile: 0, window: w.start, samples: 0, paths, first_path, round, rounds };
         fold(k, rec, f, &f.tiles[0], w, &push)
     })
 }
@@ -43,6 +45,7 @@ fn fold(
     let apart = tile.light.len() == tile.pixels as usize; // else one unused element
     let folded_light = &if apart { tile.light.part(bound)? } else { tile.light.clone() };
     let (samples, offset) = (&f.samples, &f.counts.offset);
-    let bind = Bind { samples, stats: &tile.stats, light: &tile.light, offset, folded_stats, folded_light };
+    let (stats, light, broken) = (&tile.stats, &tile.light, &f.broken);
+    let bind = Bind { samples, stats, light, offset, folded_stats, folded_light, broken };
     rec.dispatch_threads(k, bind, push, push.pixels)
 }

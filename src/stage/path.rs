@@ -29,7 +29,7 @@ pub fn record(
 }
 
 fn bind<'a>(s: &'a DeviceScene, f: &'a FilmBuffers) -> Bind<'a> {
-    Bind { scene: s.bind(), samples: &f.samples, counters: &f.counters, paths: &f.paths }
+    Bind { scene: s.bind(), samples: &f.samples, counters: &f.counters, paths: &f.paths, broken: &f.broken }
 }
 
 /// scene, paths\[batch\] -> samples\[batch\]

@@ -39,16 +39,25 @@ pub fn hash(v: u32) -> u32 {
     (word >> 22) ^ word
 }
 
+/// Of all pixels.
+pub fn stats(renderer: &Renderer) -> Vec<PixelStats> {
+    renderer.film().tiles.iter().flat_map(|tile| tile.stats.read().unwrap()).collect()
+}
+
 /// Runs the whole of a render.
 pub fn render(gpu: &Gpu, renderer: &Renderer) -> Vec<PixelStats> {
     render_steps(gpu, renderer, &renderer.steps().collect::<Vec<_>>())
 }
 
 /// Runs a render cut as the caller likes.
+///
+/// # Panics
+/// When a sample was no number.
 pub fn render_steps(gpu: &Gpu, renderer: &Renderer, steps: &[Step]) -> Vec<PixelStats> {
     let mut frame = FrameResources::new(gpu).unwrap();
     for step in steps {
         renderer.run(&mut frame, step).unwrap();
     }
-    renderer.film().tiles.iter().flat_map(|tile| tile.stats.read().unwrap()).collect()
+    assert_eq!(renderer.broken_samples().unwrap(), None);
+    stats(renderer)
 }

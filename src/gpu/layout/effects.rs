@@ -97,4 +97,6 @@ effects! {
     counters: FX_COUNTERS;
     /// Samples placed where they count: a list of paths instead of so many per pixel.
     adaptive: FX_ADAPTIVE;
+    /// More than 4096 samples of a pixel: means keep what rounding takes off.
+    many_samples: FX_MANY_SAMPLES;
 }
