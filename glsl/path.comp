@@ -79,7 +79,7 @@ vec3 light_from_nee(Surface s, Bsdf bsdf, mat3 basis, vec3 wo, Sampler random, u
     uint word = sample_2d_bits(random, pair + PAIR_CHOICE).x;
     LightSample light = light_sample(s.position, word, sample_2d(random, pair + PAIR_LIGHT));
     vec3 wi = light.direction * basis; // row vector times matrix: into the frame
-    vec4 f = bsdf_evaluate(bsdf, wo, wi);
+    vec4 f = crosses_plane(s, basis[2], light.direction, wi.z) ? vec4(0.0) : bsdf_evaluate(bsdf, wo, wi);
     vec3 normal = dot(light.direction, s.geometric) < 0.0 ? -s.geometric : s.geometric;
     shadow = Segment(offset_origin(s.position, normal), light.direction, light.distance, mask_seed);
     if (light.distance < INFINITE_DISTANCE) { // aim again from the offset origin, so that the segment ends on the light
@@ -96,6 +96,7 @@ bool scatter(inout Path path, Surface s, Bsdf bsdf, mat3 basis, vec3 wo, Sampler
     bool scattered = bsdf_sample(bsdf, wo, lobe, sample_2d(random, pair + PAIR_BSDF), next);
     path.throughput *= next.weight;
     path.direction = basis * next.wi;
+    scattered = scattered && !crosses_plane(s, basis[2], path.direction, next.wi.z);
     vec3 normal = dot(path.direction, s.geometric) < 0.0 ? -s.geometric : s.geometric;
     path.origin = offset_origin(s.position, normal);
     path.bsdf_pdf = next.pdf;
@@ -136,8 +137,7 @@ Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         Bsdf bsdf = surface_bsdf(s);
         // The two sides of a dielectric differ: its normal stays on the outside.
         bool turns = (s.flags & MATERIAL_TWO_SIDED) != 0u && !is_kind(FX_DIELECTRIC, bsdf, BSDF_DIELECTRIC);
-        vec3 normal = turns && dot(s.normal, path.direction) > 0.0 ? -s.normal : s.normal;
-        mat3 basis = basis_from_normal(normal);
+        mat3 basis = basis_from_normal(facing_normal(s, -path.direction, turns, bsdf_is_specular(bsdf)));
         vec3 wo = -path.direction * basis;
         bool smooth_here = bsdf_is_delta(bsdf);
         if (bounce == 0u) {

@@ -98,6 +98,40 @@ Surface surface_at(Hit hit) {
     return s;
 }
 
+// Vertex normals and maps turn the shading normal away from the plane of its triangle.
+const bool SHADING_NORMALS = FX_SMOOTH_NORMALS || FX_BUMP_MAPS || FX_NORMAL_MAPS;
+
+// 1 where `w` leaves the surface on the side of the shading normal, else -1. The plane decides, not the shading normal:
+// that of a coarse mesh turns away from the viewer before the rim.
+float side_of(Surface s, vec3 w) {
+    return dot(s.normal, s.geometric) * dot(s.geometric, w) < 0.0 ? -1.0 : 1.0;
+}
+
+// The shading normal for a viewer towards `wo`; on the viewer's side where the surface `turns`. One that faces away is
+// bent until `wo` is above its horizon, and for surfaces with a mirror image (`mirrors`) until that is above the plane
+// (Keller et al. 2017, "The Iray light transport simulation and rendering system", A.3; here along the plane's normal,
+// which is defined for all normals).
+vec3 facing_normal(Surface s, vec3 wo, bool turns, bool mirrors) {
+    const float ABOVE = 1e-3; // sine of the elevation
+    float side = side_of(s, wo);
+    vec3 n = side * s.normal;
+    if (SHADING_NORMALS) {
+        float along = dot(n, wo);
+        vec3 plane = dot(n, s.geometric) < 0.0 ? -s.geometric : s.geometric;
+        vec3 image = 2.0 * along * n - wo;
+        float height = dot(image, plane);
+        if (mirrors && height < 0.0) n = normalize(wo + normalize(image + (ABOVE - height) * plane));
+        if (!mirrors && along < 0.0) n = normalize(n + (ABOVE - along) * wo);
+    }
+    return turns ? n : side * n;
+}
+
+// Whether a direction is on the other side of the plane than of the shading normal `normal`; `z` is its component along
+// the latter. Lobes lose what they send there: an opaque surface would see its own inside.
+bool crosses_plane(Surface s, vec3 normal, vec3 w, float z) {
+    return SHADING_NORMALS && dot(normal, s.geometric) * dot(s.geometric, w) * z < 0.0;
+}
+
 vec3 textured(vec3 constant, uint image, Surface s) {
     if (!FX_TEXTURES || image == NONE) return constant;
     return constant * texture_sample(image, s.uv, true).rgb;

@@ -1,10 +1,12 @@
 //! Twin of `glsl/path.comp`.
 use crate::gpu::layout::{BSDF_DIELECTRIC, Effects, MATERIAL_TWO_SIDED, NONE, PathPush};
-use crate::reference::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
+use crate::reference::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_is_specular, bsdf_sample};
 use crate::reference::camera::{eye_ray, film_sample, path_seed};
 use crate::reference::light::*;
 use crate::reference::sampler::{Sampler, pcg, sample_2d, sample_2d_bits, sampler_start};
-use crate::reference::surface::{Surface, offset_origin, surface_at, surface_bsdf, surface_emission};
+use crate::reference::surface::{
+    Surface, crosses_plane, facing_normal, offset_origin, surface_at, surface_bsdf, surface_emission,
+};
 use crate::reference::traverse::traverse_from;
 use crate::reference::warp::basis_from_normal;
 use crate::scene::Scene;
@@ -128,7 +130,11 @@ impl Tracer<'_> {
         if light.radiance == Vec3::ZERO {
             return None;
         }
-        let f = bsdf_evaluate(&p.bsdf, p.wo, p.basis.transpose() * light.direction);
+        let wi = p.basis.transpose() * light.direction;
+        if crosses_plane(s, p.basis.z_axis, light.direction, wi.z) {
+            return None;
+        }
+        let f = bsdf_evaluate(&p.bsdf, p.wo, wi);
         let weight = if light.pdf > 0.0 { self.balance(light.pdf, f.w, Strategy::Light) } else { 1.0 };
         let contribution = f.truncate() * light.radiance * weight;
         if contribution.max_element() <= 0.0 || contribution.is_nan() {
@@ -154,6 +160,9 @@ impl Tracer<'_> {
         let geometric = p.surface.geometric;
         path.throughput *= next.weight;
         path.direction = p.basis * next.wi;
+        if crosses_plane(&p.surface, p.basis.z_axis, path.direction, next.wi.z) {
+            return false;
+        }
         let normal = if path.direction.dot(geometric) < 0.0 { -geometric } else { geometric };
         path.origin = offset_origin(p.surface.position, normal);
         path.bsdf_pdf = next.pdf;
@@ -171,10 +180,9 @@ impl Tracer<'_> {
     }
 
     fn shade(&self, surface: Surface, direction: Vec3, pair: u32, from: [u32; 2]) -> Shade {
-        let away = surface.normal.dot(direction) > 0.0;
         let bsdf = surface_bsdf(self.scene, &surface);
         let turns = surface.flags & MATERIAL_TWO_SIDED != 0 && bsdf.kind != BSDF_DIELECTRIC;
-        let basis = basis_from_normal(if turns && away { -surface.normal } else { surface.normal });
+        let basis = basis_from_normal(facing_normal(&surface, -direction, turns, bsdf_is_specular(&bsdf)));
         Shade { bsdf, surface, basis, wo: basis.transpose() * -direction, pair, from }
     }
 

@@ -124,6 +124,35 @@ pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
     s
 }
 
+/// 1 where `w` leaves the surface on the side of the shading normal, else -1: the plane of the triangle decides.
+pub fn side_of(s: &Surface, w: Vec3) -> f32 {
+    if s.normal.dot(s.geometric) * s.geometric.dot(w) < 0.0 { -1.0 } else { 1.0 }
+}
+
+/// The shading normal for a viewer towards `wo`, on the viewer's side where the surface `turns`; bent where it faces away,
+/// or where the mirror image of `wo` of a surface that `mirrors` would be below the plane (Keller et al. 2017).
+pub fn facing_normal(s: &Surface, wo: Vec3, turns: bool, mirrors: bool) -> Vec3 {
+    const ABOVE: f32 = 1e-3;
+    let side = side_of(s, wo);
+    let mut n = side * s.normal;
+    let along = n.dot(wo);
+    let plane = if n.dot(s.geometric) < 0.0 { -s.geometric } else { s.geometric };
+    let image = 2.0 * along * n - wo;
+    let height = image.dot(plane);
+    if mirrors && height < 0.0 {
+        n = (wo + (image + (ABOVE - height) * plane).normalize()).normalize();
+    }
+    if !mirrors && along < 0.0 {
+        n = (n + (ABOVE - along) * wo).normalize();
+    }
+    if turns { n } else { side * n }
+}
+
+/// Whether a direction is on the other side of the plane than of `normal`, along which its component is `z`.
+pub fn crosses_plane(s: &Surface, normal: Vec3, w: Vec3, z: f32) -> bool {
+    normal.dot(s.geometric) * s.geometric.dot(w) * z < 0.0
+}
+
 fn textured(scene: &Scene, constant: [f32; 3], image: u32, s: &Surface) -> Vec3 {
     let constant = Vec3::from(constant);
     match image {
