@@ -32,6 +32,10 @@ uint nodes_visited = 0u, closest_rays = 0u, any_rays = 0u;
 const uint PAIR_FIRST_BOUNCE = 2u, PAIRS_PER_BOUNCE = 4u;
 const uint PAIR_CHOICE = 0u, PAIR_LIGHT = 1u, PAIR_BSDF = 2u, PAIR_ROULETTE = 3u;
 
+// Shadow rays to a lamp end at this part of the way: the error of the distance at which they would meet it is some 2^-24
+// over the cosine there.
+const float SHADOW_END = 1.0 - 1e-5;
+
 // Joins the two strategies. Two densities that vanished give 0, not 0 / 0.
 float balance(float taken, float other) { return taken / max(taken + other, 1e-37); }
 
@@ -80,11 +84,10 @@ vec3 light_from_nee(Surface s, Bsdf bsdf, mat3 basis, vec3 wo, Sampler random, u
     LightSample light = light_sample(s.position, word, sample_2d(random, pair + PAIR_LIGHT));
     vec3 wi = light.direction * basis; // row vector times matrix: into the frame
     vec4 f = crosses_plane(s, basis[2], light.direction, wi.z) ? vec4(0.0) : bsdf_evaluate(bsdf, wo, wi);
-    vec3 normal = dot(light.direction, s.geometric) < 0.0 ? -s.geometric : s.geometric;
-    shadow = Segment(offset_origin(s.position, normal), light.direction, light.distance, mask_seed);
+    shadow = Segment(ray_origin(s, light.direction), light.direction, light.distance, mask_seed);
     if (light.distance < INFINITE_DISTANCE) { // aim again from the offset origin, so that the segment ends on the light
         shadow.direction = s.position + light.distance * light.direction - shadow.origin;
-        shadow.t_max = 1.0 - 1e-6;
+        shadow.t_max = SHADOW_END;
     }
     return f.rgb * light.radiance * (light.pdf > 0.0 ? balance(light.pdf, f.w) : 1.0);
 }
@@ -97,8 +100,7 @@ bool scatter(inout Path path, Surface s, Bsdf bsdf, mat3 basis, vec3 wo, Sampler
     path.throughput *= next.weight;
     path.direction = basis * next.wi;
     scattered = scattered && !crosses_plane(s, basis[2], path.direction, next.wi.z);
-    vec3 normal = dot(path.direction, s.geometric) < 0.0 ? -s.geometric : s.geometric;
-    path.origin = offset_origin(s.position, normal);
+    path.origin = ray_origin(s, path.direction);
     path.bsdf_pdf = next.pdf;
     path.delta = next.delta;
     return scattered && max(path.throughput.r, max(path.throughput.g, path.throughput.b)) > 0.0;

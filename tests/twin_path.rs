@@ -3,13 +3,14 @@
 mod support {
     pub mod twin;
 }
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3, vec2, vec3};
 use rayon::prelude::*;
 use support::twin::*;
-use tallow::gpu::layout::NONE;
-use tallow::reference::path::Strategy;
+use tallow::gpu::layout::{Light, NONE};
+use tallow::reference::light::light_sample;
+use tallow::reference::path::{SHADOW_END, Strategy};
 use tallow::reference::surface::surface_at;
-use tallow::reference::traverse::{Hit, traverse};
+use tallow::reference::traverse::{Hit, traverse, traverse_from};
 use tallow::scene::Scene;
 
 const FAR: f32 = 3e38;
@@ -175,6 +176,94 @@ fn two_levels_agree_with_one() {
     assert!(wrong < 20 && hits > 10_000, "{wrong} of {hits} differ");
     two.instances[1].object0[3] += 0.05;
     assert!(differences(&one, &two, &rays).0 > 200, "control: a displaced instance is seen");
+}
+
+/// Weights of vertices 1 and 2 at the point of the triangles of [`coplanar`] that is `from_origin`.
+const MIDDLE: Vec2 = vec2(0.8 / 2.6, 1.0 / 2.6);
+
+/// A slanted triangle of this `size` some way from the origin and a copy of it, whose corners start elsewhere or turn the other
+/// way: both in one level, or the copy placed by an instance.
+fn coplanar(size: f32, from_origin: Vec3, turned: bool, instanced: bool) -> Scene {
+    let [a, b] = [vec3(-1.0, -0.55, 0.8), vec3(0.9, 0.25, -0.3)];
+    let [a, b, c] = [a, b, -0.8 * (a + b)].map(|p| from_origin + size * p);
+    let copy = if turned { [a, c, b] } else { [b, c, a] };
+    let place = Workplace::new().obj("one.obj", &[[a, b, c]]).obj("two.obj", &[copy]);
+    let place = if instanced { place.obj("two.obj", &[copy.map(|p| (p - from_origin) / 3.0)]) } else { place };
+    let two = "[[mesh]]\nname = 'two'\nfile = 'two.obj'\n";
+    let at = format!(
+        "[[instance]]\nmesh = 'two'\ntransform = {{ scale = 3.0, translate = {:?} }}\n",
+        from_origin.to_array()
+    );
+    place.scene(&format!("[[mesh]]\nfile = 'one.obj'\n{two}{}", if instanced { at } else { String::new() }))
+}
+
+/// Of `count` rays that leave points of the first triangle in all directions, or `upward` where it looks, those that meet the
+/// other one. Rays start at `times` their distance from the plane.
+fn copies_met(scene: &Scene, count: usize, times: f32, upward: bool) -> usize {
+    let instance = if scene.instances.is_empty() { NONE } else { 0 };
+    let root = scene.instances.first().map(|placed| placed.root);
+    let triangle = root.map_or(0, |root| scene.nodes[root as usize].primitive_base);
+    let meets = |i: &usize| {
+        let mut random = Random::stream(*i);
+        // Half of them crowd around the point whose distance from the middle of the plane is 0 in `coplanar`.
+        let (u, v, crowded) = (random.unit(), random.unit(), 10f32.powf(-14.0 * (random.unit() - 0.5).max(0.0)));
+        let barycentric = MIDDLE + crowded * (vec2(u.min(v), 1.0 - u.max(v)) - MIDDLE);
+        let mut s = surface_at(scene, &Hit { t: 1.0, triangle, instance, barycentric });
+        s.clearance *= times;
+        let away = random.point().normalize();
+        let direction = if upward { s.geometric } else { away };
+        traverse_from(scene, [triangle, instance], s.ray_origin(direction), direction, FAR, false, 0).any()
+    };
+    (0..count).into_par_iter().filter(meets).count()
+}
+
+#[test]
+fn rays_do_not_meet_a_copy_of_the_surface_that_they_leave() {
+    let far = vec3(800.0, -300.0, 500.0);
+    for (size, from_origin) in [(1000.0, Vec3::ZERO), (1000.0, far), (1.0, far), (1e-3, Vec3::ONE), (3e8, 10.0 * far)] {
+        for (turned, instanced) in [(false, false), (true, false), (false, true)] {
+            let scene = coplanar(size, from_origin, turned, instanced);
+            let name = format!("{size} {from_origin} {turned} {instanced}");
+            assert_eq!(copies_met(&scene, 100_000, 1.0, false), 0, "{name}");
+            assert!(copies_met(&scene, 100_000, 0.03, false) > 0, "control, {name}: a distance that is too small");
+        }
+        // What is really apart is seen: by 10^-5 of the size, or of the distance from the origin.
+        let mut scene = coplanar(size, from_origin, false, false);
+        let gap = 1e-5 * size.max(from_origin.length());
+        let up = gap * surface_at(&scene, &Hit { t: 1.0, triangle: 0, instance: NONE, barycentric: MIDDLE }).geometric;
+        let other = &mut scene.triangles[1];
+        [&mut other.v0, &mut other.v1, &mut other.v2].into_iter().for_each(|v| *v = (Vec3::from(*v) + up).into());
+        let met = copies_met(&scene, 1000, 1.0, true);
+        assert!(met > 990, "{size} {from_origin}: {met} of 1000 met a copy {gap:.1e} above");
+    }
+}
+
+#[test]
+fn shadow_rays_end_before_the_lamp() {
+    for (size, from_origin) in [(1.0, Vec3::ZERO), (1.0, vec3(800.0, -300.0, 500.0)), (100.0, Vec3::ONE)] {
+        let mut scene = coplanar(size, from_origin, true, false);
+        let t = &scene.triangles[0];
+        let (a, b, c, value) = (t.v0, t.v1, t.v2, [1.0; 3]);
+        scene.lights = vec![Light { a, b, c, value, probability: 1.0, triangle: NONE, ..Light::default() }];
+        for distance in [0.1, 1.0, 100.0, 1e4] {
+            // Light that reaches a point, and what the lamp itself blocks of it before `end` of the way.
+            let light = |i: usize, end: f32| {
+                let mut random = Random::stream(i);
+                let p = from_origin + size * distance * random.point();
+                let s = light_sample(&scene, p, 0, vec2(random.unit(), random.unit()));
+                let light = if s.pdf > 0.0 { f64::from(s.radiance.x * s.distance * s.distance) } else { 0.0 };
+                let blocked = light > 0.0 && occluded(&scene, p, s.distance * s.direction, end);
+                [light, if blocked { light } else { 0.0 }]
+            };
+            let lost = |end: f32| {
+                let add = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];
+                let [all, blocked] = (0..50_000).into_par_iter().map(|i| light(i, end)).reduce(|| [0.0; 2], add);
+                blocked / all
+            };
+            assert!(lost(SHADOW_END) < 1e-5, "{size} {from_origin} {distance}: {} of the light", lost(SHADOW_END));
+            assert!(lost(1.1) > 0.9, "control: {}", lost(1.1));
+        }
+    }
 }
 
 /// A box that is one big emitter: every path of d edges gathers E (1 + rho + ... + rho^(d - 1)).

@@ -93,11 +93,11 @@ void sample_environment(uint light, float chosen, uint word, vec2 u, inout Light
 void sample_triangle_light(vec3 p, vec3 a, vec3 b, vec3 c, float chosen, vec2 u, uvec4 words, uint light, inout LightSample s) {
     vec2 bary = warp_triangle(u);
     vec3 e1 = b - a, e2 = c - a;
-    vec3 scaled = cross(e1, e2);
-    float doubled_area = length(scaled);
-    vec3 n = scaled / doubled_area;
+    float doubled_area;
+    vec3 n = unit_vector(cross(e1, e2), doubled_area);
     vec3 on_light = a + bary.x * e1 + bary.y * e2;
-    vec3 to_light = offset_origin(on_light, n) - p; // the front side is the only one that emits
+    // The front side is the only one that emits.
+    vec3 to_light = on_light + plane_clearance(n, abs(a), e1, e2) * n - p;
     float d2 = dot(to_light, to_light);
     s.distance = sqrt(d2);
     s.direction = to_light / s.distance;
@@ -128,7 +128,7 @@ LightSample light_sample(vec3 p, uint word, vec2 u) {
         sample_triangle_light(p, a, b, c, chosen, u, w3, light, s);
     } else if ((FX_POINT && kind == LIGHT_POINT) || (FX_SPOT && kind == LIGHT_SPOT)) {
         vec3 to_light = a - p;
-        float d2 = max(dot(to_light, to_light), 1e-20);
+        float d2 = max(dot(to_light, to_light), 1e-30);
         s.distance = sqrt(d2);
         s.direction = to_light / s.distance;
         s.radiance = value / (d2 * chosen);

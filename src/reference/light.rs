@@ -2,7 +2,7 @@
 use crate::gpu::layout::*;
 use crate::reference::sampler::pcg;
 use crate::reference::scene::texture_coordinates;
-use crate::reference::surface::offset_origin;
+use crate::reference::surface::{plane_clearance, unit_vector};
 use crate::reference::texture::{surface_opacity, texture_sample};
 use crate::reference::warp::{warp_sphere, warp_triangle};
 use crate::scene::{Environment, Scene};
@@ -98,11 +98,9 @@ fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> Ligh
     let [a, b, c] = [light.a, light.b, light.c].map(Vec3::from);
     let bary = warp_triangle(u);
     let (e1, e2) = (b - a, c - a);
-    let scaled = e1.cross(e2);
-    let doubled_area = scaled.length();
-    let n = scaled / doubled_area;
+    let (n, doubled_area) = unit_vector(e1.cross(e2));
     let on_light = a + bary.x * e1 + bary.y * e2;
-    let to_light = offset_origin(on_light, n) - p;
+    let to_light = on_light + plane_clearance(n, a.abs(), e1, e2) * n - p;
     let d2 = to_light.dot(to_light);
     let distance = d2.sqrt();
     let direction = to_light / distance;
@@ -121,7 +119,7 @@ fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> Ligh
 
 fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
     let to_light = Vec3::from(light.a) - p;
-    let d2 = to_light.dot(to_light).max(1e-20);
+    let d2 = to_light.dot(to_light).max(1e-30);
     let distance = d2.sqrt();
     let direction = to_light / distance;
     let mut radiance = Vec3::from(light.value) / (d2 * light.probability);

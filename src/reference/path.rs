@@ -4,9 +4,7 @@ use crate::reference::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bs
 use crate::reference::camera::{eye_ray, film_sample, path_seed};
 use crate::reference::light::*;
 use crate::reference::sampler::{Sampler, pcg, sample_2d, sample_2d_bits, sampler_start};
-use crate::reference::surface::{
-    Surface, crosses_plane, facing_normal, offset_origin, surface_at, surface_bsdf, surface_emission,
-};
+use crate::reference::surface::{Surface, crosses_plane, facing_normal, surface_at, surface_bsdf, surface_emission};
 use crate::reference::traverse::traverse_from;
 use crate::reference::warp::basis_from_normal;
 use crate::scene::Scene;
@@ -18,6 +16,10 @@ const PAIR_CHOICE: u32 = 0;
 const PAIR_LIGHT: u32 = 1;
 const PAIR_BSDF: u32 = 2;
 const PAIR_ROULETTE: u32 = 3;
+
+/// Shadow rays to a lamp end at this part of the way: the error of the distance at which they would meet it is some 2^-24
+/// over the cosine there.
+pub const SHADOW_END: f32 = 1.0 - 1e-5;
 
 /// What one path returns, linear Rec. 709. Without [`Effects::indirect`] all light is in `direct`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -140,12 +142,11 @@ impl Tracer<'_> {
         if contribution.max_element() <= 0.0 || contribution.is_nan() {
             return None;
         }
-        let normal = if light.direction.dot(s.geometric) < 0.0 { -s.geometric } else { s.geometric };
-        let origin = offset_origin(s.position, normal);
+        let origin = s.ray_origin(light.direction);
         let (mut direction, mut distance) = (light.direction, light.distance);
         if distance < INFINITE_DISTANCE {
             direction = s.position + light.distance * light.direction - origin;
-            distance = 1.0 - 1e-6;
+            distance = SHADOW_END;
         }
         let blocker = traverse_from(self.scene, p.from, origin, direction, distance, true, mask_seed);
         Some(if blocker.any() { Vec3::ZERO } else { contribution })
@@ -157,14 +158,12 @@ impl Tracer<'_> {
         if !scattered {
             return false;
         }
-        let geometric = p.surface.geometric;
         path.throughput *= next.weight;
         path.direction = p.basis * next.wi;
         if crosses_plane(&p.surface, p.basis.z_axis, path.direction, next.wi.z) {
             return false;
         }
-        let normal = if path.direction.dot(geometric) < 0.0 { -geometric } else { geometric };
-        path.origin = offset_origin(p.surface.position, normal);
+        path.origin = p.surface.ray_origin(path.direction);
         path.bsdf_pdf = next.pdf;
         path.delta = next.delta;
         path.throughput.max_element() > 0.0

@@ -24,6 +24,32 @@ pub struct Surface {
     pub object: u32,
     /// Texture coordinates.
     pub uv: Vec2,
+    /// Distance from the plane at which rays start, world units.
+    pub clearance: f32,
+}
+
+impl Surface {
+    /// Where a ray that leaves the surface towards `w` starts.
+    pub fn ray_origin(&self, w: Vec3) -> Vec3 {
+        let along = if w.dot(self.geometric) < 0.0 { -self.clearance } else { self.clearance };
+        self.position + along * self.geometric
+    }
+}
+
+/// Unit vector along `v`, and its length; both 0 where `v` is 0.
+pub fn unit_vector(v: Vec3) -> (Vec3, f32) {
+    let largest = v.abs().max_element();
+    let scaled = v / largest.max(1e-37);
+    let length = scaled.length();
+    (scaled / length.max(1e-37), length * largest)
+}
+
+const CLEARANCE: f32 = 1.0 / (1 << 21) as f32;
+
+/// How far along the unit normal `n` a ray must start so that it meets no other triangle of the same plane. `reach`: the
+/// numbers that the point is a sum of.
+pub fn plane_clearance(n: Vec3, reach: Vec3, e1: Vec3, e2: Vec3) -> f32 {
+    CLEARANCE * n.abs().dot(reach + e1.abs().max(e2.abs()).max_element())
 }
 
 /// Unit normal from two snorm words of 16 bits.
@@ -88,18 +114,19 @@ fn perturbed_normal(scene: &Scene, s: &Surface, e: &Edges) -> Vec3 {
 pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
     let [mut p0, p1, p2] = triangle_vertices(scene, hit.triangle);
     let (mut e1, mut e2) = (p1 - p0, p2 - p0);
+    let mut reach = p0.abs();
     let mut object = scene.triangles[hit.triangle as usize].object;
     let instance = scene.instances.get(hit.instance as usize);
     if let Some(i) = instance {
         let world = world_from_object(i);
         (p0, e1, e2) = (world.point(p0), world.vector(e1), world.vector(e2));
+        reach = world.magnitude(object_from_world(i).magnitude(p0.abs()));
         object += i.object;
     }
     let material = material_of(scene, hit.triangle, hit.instance);
     let mirrored = instance.is_some_and(|i| i.mirrored != 0);
     let scaled = if mirrored { e2.cross(e1) } else { e1.cross(e2) };
-    let doubled_area = scaled.length().max(1e-30);
-    let geometric = scaled / doubled_area;
+    let (geometric, _) = unit_vector(scaled);
     let mut s = Surface {
         position: p0 + hit.barycentric.x * e1 + hit.barycentric.y * e2,
         geometric,
@@ -108,14 +135,14 @@ pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
         flags: scene.materials[material as usize].flags,
         object,
         uv: Vec2::ZERO,
+        clearance: plane_clearance(geometric, reach, e1, e2),
     };
     let Some(shading) = scene.shading.get(hit.triangle as usize) else { return s };
     if shading.normal != [0xffffffff; 3] {
         let [n0, n1, n2] = shading.normal.map(octahedral_decode);
         let n = n0 * (1.0 - hit.barycentric.x) + n1 * hit.barycentric.x + hit.barycentric.y * (n2 - n0);
-        let n = instance.map_or(n, |i| object_from_world(i).normal(n));
-        let len = n.dot(n);
-        s.normal = if len > 1e-20 { n * (1.0 / len.sqrt()) } else { geometric };
+        let (n, length) = unit_vector(instance.map_or(n, |i| object_from_world(i).normal(n)));
+        s.normal = if length > 0.0 { n } else { geometric };
     }
     let [uv0, uv1, uv2] = [shading.uv0, shading.uv1, shading.uv2].map(Vec2::from);
     let (d1, d2) = (uv1 - uv0, uv2 - uv0);
@@ -181,17 +208,4 @@ pub fn surface_bsdf(scene: &Scene, s: &Surface) -> Bsdf {
         b.alpha *= r * r;
     }
     b
-}
-
-/// Moves a point off its surface along the unit normal `n` (Waechter and Binder 2019).
-pub fn offset_origin(p: Vec3, n: Vec3) -> Vec3 {
-    const ORIGIN: f32 = 1.0 / 32.0;
-    const FLOAT_SCALE: f32 = 1.0 / 65536.0;
-    const INT_SCALE: f32 = 256.0;
-    let offset = |p: f32, n: f32| {
-        let steps = (INT_SCALE * n) as i32;
-        let stepped = f32::from_bits((p.to_bits() as i32).wrapping_add(if p < 0.0 { -steps } else { steps }) as u32);
-        if p.abs() < ORIGIN { p + FLOAT_SCALE * n } else { stepped }
-    };
-    vec3(offset(p.x, n.x), offset(p.y, n.y), offset(p.z, n.z))
 }
