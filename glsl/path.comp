@@ -79,11 +79,13 @@ vec3 light_from_hit(Path path, Surface s, float t) {
 
 // Direct light at `s` by light sampling, unless something blocks `shadow`; 0 needs no ray. `basis` columns are the
 // shading frame.
-vec3 light_from_nee(Surface s, Bsdf bsdf, mat3 basis, vec3 wo, Sampler random, uint pair, uint mask_seed, out Segment shadow) {
+vec3 light_from_nee(Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sampler random, uint pair, uint mask_seed,
+                    out Segment shadow) {
     uint word = sample_2d_bits(random, pair + PAIR_CHOICE).x;
     LightSample light = light_sample(s.position, word, sample_2d(random, pair + PAIR_LIGHT));
     vec3 wi = light.direction * basis; // row vector times matrix: into the frame
-    vec4 f = crosses_plane(s, basis[2], light.direction, wi.z) ? vec4(0.0) : bsdf_evaluate(bsdf, wo, wi);
+    vec4 f = bsdf_evaluate(bsdf, wo, wi);
+    f.rgb *= light_share(s, facing, light.direction, wi.z);
     shadow = Segment(ray_origin(s, light.direction), light.direction, light.distance, mask_seed);
     if (light.distance < INFINITE_DISTANCE) { // aim again from the offset origin, so that the segment ends on the light
         shadow.direction = s.position + light.distance * light.direction - shadow.origin;
@@ -93,13 +95,12 @@ vec3 light_from_nee(Surface s, Bsdf bsdf, mat3 basis, vec3 wo, Sampler random, u
 }
 
 // Chooses the next direction. False when the path ends.
-bool scatter(inout Path path, Surface s, Bsdf bsdf, mat3 basis, vec3 wo, Sampler random, uint pair) {
+bool scatter(inout Path path, Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sampler random, uint pair) {
     BsdfSample next;
     float lobe = sample_2d(random, pair + PAIR_CHOICE).y;
     bool scattered = bsdf_sample(bsdf, wo, lobe, sample_2d(random, pair + PAIR_BSDF), next);
-    path.throughput *= next.weight;
     path.direction = basis * next.wi;
-    scattered = scattered && !crosses_plane(s, basis[2], path.direction, next.wi.z);
+    path.throughput *= next.weight * light_share(s, facing, path.direction, next.wi.z);
     path.origin = ray_origin(s, path.direction);
     path.bsdf_pdf = next.pdf;
     path.delta = next.delta;
@@ -139,7 +140,8 @@ Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         Bsdf bsdf = surface_bsdf(s);
         // The two sides of a dielectric differ: its normal stays on the outside.
         bool turns = (s.flags & MATERIAL_TWO_SIDED) != 0u && !is_kind(FX_DIELECTRIC, bsdf, BSDF_DIELECTRIC);
-        mat3 basis = basis_from_normal(facing_normal(s, -path.direction, turns, bsdf_is_specular(bsdf)));
+        Facing facing = facing_normals(s, -path.direction, turns, bsdf_is_specular(bsdf));
+        mat3 basis = basis_from_normal(facing.normal);
         vec3 wo = -path.direction * basis;
         bool smooth_here = bsdf_is_delta(bsdf);
         if (bounce == 0u) {
@@ -148,9 +150,9 @@ Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         }
         Segment shadow;
         uint mask_seed = pcg(seed + 2u * bounce);
-        vec3 sampled = path.throughput * light_from_nee(s, bsdf, basis, wo, random, pair, mask_seed + 1u, shadow);
+        vec3 sampled = path.throughput * light_from_nee(s, bsdf, facing, basis, wo, random, pair, mask_seed + 1u, shadow);
         bool shadowed = push.light_count > 0u && !smooth_here && max(sampled.r, max(sampled.g, sampled.b)) > 0.0;
-        bool alive = scatter(path, s, bsdf, basis, wo, random, pair);
+        bool alive = scatter(path, s, bsdf, facing, basis, wo, random, pair);
         bool roulette = FX_ROULETTE && push.roulette_depth > 0u && bounce + 1u >= push.roulette_depth;
         if (roulette) alive = survives_roulette(path, random, pair) && alive;
         bounce++;

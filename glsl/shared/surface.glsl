@@ -4,7 +4,8 @@
 struct Surface {
     vec3 position;  // world, interpolated from the vertices: more exact than origin + t * direction
     vec3 geometric; // unit, by the winding of the triangle
-    vec3 normal;    // unit shading normal, on the side that the vertex normals point to
+    vec3 smooth_normal; // unit, interpolated from the vertices, on the side that they point to
+    vec3 normal;        // unit shading normal: the smooth one perturbed by a map
     uint material;
     uint flags;     // of the material
     uint object;
@@ -61,8 +62,8 @@ vec3 perturbed_normal(Surface s, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
     vec3 n;
     if (mapped) {
         vec3 m = 2.0 * value - 1.0;
-        vec3 t = dpdu - s.normal * dot(s.normal, dpdu);
-        t *= inversesqrt(max(dot(t, t), 1e-30));
+        float extent;
+        vec3 t = unit_vector(dpdu - s.normal * dot(s.normal, dpdu), extent);
         vec3 b = cross(s.normal, t);
         n = m.x * t + m.y * (dot(b, dpdv) < 0.0 ? -b : b) + m.z * s.normal;
     } else {
@@ -72,8 +73,9 @@ vec3 perturbed_normal(Surface s, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
         n = cross(pu, pv);
         n = dot(n, s.normal) < 0.0 ? -n : n;
     }
-    float len = dot(n, n);
-    return len > 1e-30 && len < 1e38 ? n * inversesqrt(len) : s.normal; // not where uv spans no or all of space
+    float len;
+    n = unit_vector(n, len);
+    return len > 0.0 && len < 1e37 ? n : s.normal; // not where uv spans no or all of space
 }
 
 // The sum of the magnitudes that `m` adds up for a point of coordinates up to `p`.
@@ -110,7 +112,7 @@ Surface surface_at(Hit hit) {
     float doubled_area;
     s.geometric = unit_vector(scaled, doubled_area); // a needle that rounds to no area scatters nothing
     s.clearance = plane_clearance(s.geometric, reach, e1, e2);
-    s.normal = s.geometric;
+    s.smooth_normal = s.normal = s.geometric;
     s.uv = vec2(0.0);
     if (!(FX_SMOOTH_NORMALS || FX_TEXTURES || FX_BUMP_MAPS || FX_NORMAL_MAPS)) return s;
 
@@ -121,7 +123,7 @@ Surface surface_at(Hit hit) {
                  hit.b2 * (octahedral_decode(w0.z) - octahedral_decode(w0.x));
         float len;
         n = unit_vector(normals_from_object * n, len);
-        s.normal = len > 0.0 ? n : s.geometric;
+        s.smooth_normal = s.normal = len > 0.0 ? n : s.geometric;
     }
     if (FX_TEXTURES || FX_BUMP_MAPS || FX_NORMAL_MAPS) {
         uint w2 = texelFetch(shading, at + 2).x;
@@ -135,37 +137,53 @@ Surface surface_at(Hit hit) {
 }
 
 // Vertex normals and maps turn the shading normal away from the plane of its triangle.
-const bool SHADING_NORMALS = FX_SMOOTH_NORMALS || FX_BUMP_MAPS || FX_NORMAL_MAPS;
+const bool MAPS = FX_BUMP_MAPS || FX_NORMAL_MAPS, SHADING_NORMALS = FX_SMOOTH_NORMALS || MAPS;
 
-// 1 where `w` leaves the surface on the side of the shading normal, else -1. The plane decides, not the shading normal:
-// that of a coarse mesh turns away from the viewer before the rim.
+// 1 where `w` leaves the surface on the side of its normals, else -1. The plane decides, not the shading normal: that of a
+// coarse mesh turns away from the viewer before the rim.
 float side_of(Surface s, vec3 w) {
-    return dot(s.normal, s.geometric) * dot(s.geometric, w) < 0.0 ? -1.0 : 1.0;
+    return dot(s.smooth_normal, s.geometric) * dot(s.geometric, w) < 0.0 ? -1.0 : 1.0;
 }
 
-// The shading normal for a viewer towards `wo`; on the viewer's side where the surface `turns`. One that faces away is
-// bent until `wo` is above its horizon, and for surfaces with a mirror image (`mirrors`) until that is above the plane
-// (Keller et al. 2017, "The Iray light transport simulation and rendering system", A.3; here along the plane's normal,
-// which is defined for all normals).
-vec3 facing_normal(Surface s, vec3 wo, bool turns, bool mirrors) {
+// The normals of a surface as a viewer needs them: the smooth one and the one that scatters.
+struct Facing {
+    vec3 smooth_normal;
+    vec3 normal;
+};
+
+// For a viewer towards `wo`; on the viewer's side where the surface `turns`. A smooth normal that faces away is bent until
+// `wo` is above its horizon, and for surfaces with a mirror image (`mirrors`) until that is above the plane (Keller et al.
+// 2017, "The Iray light transport simulation and rendering system", A.3; here along the plane's normal, which is defined for
+// all of them). A map's normal that faces away is turned by half a turn around the smooth one, as Mitsuba 3 does.
+Facing facing_normals(Surface s, vec3 wo, bool turns, bool mirrors) {
     const float ABOVE = 1e-3; // sine of the elevation
     float side = side_of(s, wo);
-    vec3 n = side * s.normal;
+    vec3 n = side * s.smooth_normal, mapped = side * s.normal;
     if (SHADING_NORMALS) {
         float along = dot(n, wo);
         vec3 plane = dot(n, s.geometric) < 0.0 ? -s.geometric : s.geometric;
         vec3 image = 2.0 * along * n - wo;
         float height = dot(image, plane);
-        if (mirrors && height < 0.0) n = normalize(wo + normalize(image + (ABOVE - height) * plane));
-        if (!mirrors && along < 0.0) n = normalize(n + (ABOVE - along) * wo);
+        bool bent = (mirrors ? height : along) < 0.0;
+        if (bent) n = normalize(mirrors ? wo + normalize(image + (ABOVE - height) * plane) : n + (ABOVE - along) * wo);
+        if (bent) mapped = n;
+        if (MAPS && dot(mapped, wo) < 0.0) mapped = 2.0 * dot(mapped, n) * n - mapped;
     }
-    return turns ? n : side * n;
+    float back = turns ? 1.0 : side;
+    return Facing(back * n, back * mapped);
 }
 
-// Whether a direction is on the other side of the plane than of the shading normal `normal`; `z` is its component along
-// the latter. Lobes lose what they send there: an opaque surface would see its own inside.
-bool crosses_plane(Surface s, vec3 normal, vec3 w, float z) {
-    return SHADING_NORMALS && dot(normal, s.geometric) * dot(s.geometric, w) * z < 0.0;
+// The share of a direction's light that lobes around `facing.normal` keep; `z` is the direction's component along that. None
+// where the direction is on the other side of the plane than of that normal: an opaque surface would see its own inside. Maps
+// shadow themselves: Conty Estevez, Lecocq and Stein 2019, Ray Tracing Gems, chapter 12.
+float light_share(Surface s, Facing facing, vec3 w, float z) {
+    if (!SHADING_NORMALS) return 1.0;
+    bool crosses = dot(facing.normal, s.geometric) * dot(s.geometric, w) * z < 0.0;
+    if (!MAPS || crosses || s.normal == s.smooth_normal) return crosses ? 0.0 : 1.0;
+    float tilt = dot(facing.normal, facing.smooth_normal), up = dot(w, facing.smooth_normal);
+    if (up * z <= 0.0) return 0.0;
+    float alpha2 = min(0.125 * (1.0 / max(tilt * tilt, 1e-6) - 1.0), 1.0);
+    return 2.0 / (1.0 + sqrt(1.0 + max(alpha2, 0.0) * max(1.0 / max(up * up, 1e-12) - 1.0, 0.0)));
 }
 
 vec3 textured(vec3 constant, uint image, Surface s) {

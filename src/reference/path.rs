@@ -4,7 +4,9 @@ use crate::reference::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bs
 use crate::reference::camera::{eye_ray, film_sample, path_seed};
 use crate::reference::light::*;
 use crate::reference::sampler::{Sampler, pcg, sample_2d, sample_2d_bits, sampler_start};
-use crate::reference::surface::{Surface, crosses_plane, facing_normal, surface_at, surface_bsdf, surface_emission};
+use crate::reference::surface::{
+    Facing, Surface, facing_normals, light_share, surface_at, surface_bsdf, surface_emission,
+};
 use crate::reference::traverse::traverse_from;
 use crate::reference::warp::basis_from_normal;
 use crate::scene::Scene;
@@ -77,6 +79,7 @@ pub struct Tracer<'a> {
 struct Shade {
     surface: Surface,
     bsdf: Bsdf,
+    facing: Facing,
     basis: Mat3,
     wo: Vec3,
     pair: u32,
@@ -133,12 +136,10 @@ impl Tracer<'_> {
             return None;
         }
         let wi = p.basis.transpose() * light.direction;
-        if crosses_plane(s, p.basis.z_axis, light.direction, wi.z) {
-            return None;
-        }
         let f = bsdf_evaluate(&p.bsdf, p.wo, wi);
+        let share = light_share(s, &p.facing, light.direction, wi.z);
         let weight = if light.pdf > 0.0 { self.balance(light.pdf, f.w, Strategy::Light) } else { 1.0 };
-        let contribution = f.truncate() * light.radiance * weight;
+        let contribution = f.truncate() * share * light.radiance * weight;
         if contribution.max_element() <= 0.0 || contribution.is_nan() {
             return None;
         }
@@ -158,11 +159,8 @@ impl Tracer<'_> {
         if !scattered {
             return false;
         }
-        path.throughput *= next.weight;
         path.direction = p.basis * next.wi;
-        if crosses_plane(&p.surface, p.basis.z_axis, path.direction, next.wi.z) {
-            return false;
-        }
+        path.throughput *= next.weight * light_share(&p.surface, &p.facing, path.direction, next.wi.z);
         path.origin = p.surface.ray_origin(path.direction);
         path.bsdf_pdf = next.pdf;
         path.delta = next.delta;
@@ -181,8 +179,9 @@ impl Tracer<'_> {
     fn shade(&self, surface: Surface, direction: Vec3, pair: u32, from: [u32; 2]) -> Shade {
         let bsdf = surface_bsdf(self.scene, &surface);
         let turns = surface.flags & MATERIAL_TWO_SIDED != 0 && bsdf.kind != BSDF_DIELECTRIC;
-        let basis = basis_from_normal(facing_normal(&surface, -direction, turns, bsdf_is_specular(&bsdf)));
-        Shade { bsdf, surface, basis, wo: basis.transpose() * -direction, pair, from }
+        let facing = facing_normals(&surface, -direction, turns, bsdf_is_specular(&bsdf));
+        let basis = basis_from_normal(facing.normal);
+        Shade { bsdf, surface, facing, basis, wo: basis.transpose() * -direction, pair, from }
     }
 
     fn trace_path(&self, mut path: Path, random: Sampler, seed: u32) -> PathSample {

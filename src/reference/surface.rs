@@ -14,7 +14,9 @@ pub struct Surface {
     pub position: Vec3,
     /// Unit, by the winding of the triangle.
     pub geometric: Vec3,
-    /// Unit shading normal, on the side that the vertex normals point to.
+    /// Unit, interpolated from the vertices, on the side that they point to.
+    pub smooth_normal: Vec3,
+    /// Unit shading normal: the smooth one perturbed by a map.
     pub normal: Vec3,
     /// Index.
     pub material: u32,
@@ -72,8 +74,7 @@ struct Edges {
 
 fn normal_from_map(scene: &Scene, s: &Surface, image: u32, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
     let m = 2.0 * texture_sample(scene, image, s.uv).truncate() - 1.0;
-    let t = dpdu - s.normal * s.normal.dot(dpdu);
-    let t = t * (1.0 / t.dot(t).max(1e-30).sqrt());
+    let (t, _) = unit_vector(dpdu - s.normal * s.normal.dot(dpdu));
     let b = s.normal.cross(t);
     m.x * t + m.y * (if b.dot(dpdv) < 0.0 { -b } else { b }) + m.z * s.normal
 }
@@ -106,8 +107,8 @@ fn perturbed_normal(scene: &Scene, s: &Surface, e: &Edges) -> Vec3 {
         0 => normal_from_height(scene, s, material, dpdu, dpdv),
         _ => normal_from_map(scene, s, image, dpdu, dpdv),
     };
-    let len = n.dot(n);
-    if len > 1e-30 && len < 1e38 { n * (1.0 / len.sqrt()) } else { s.normal }
+    let (n, length) = unit_vector(n);
+    if length > 0.0 && length < 1e37 { n } else { s.normal }
 }
 
 /// Position and normals.
@@ -130,6 +131,7 @@ pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
     let mut s = Surface {
         position: p0 + hit.barycentric.x * e1 + hit.barycentric.y * e2,
         geometric,
+        smooth_normal: geometric,
         normal: geometric,
         material,
         flags: scene.materials[material as usize].flags,
@@ -143,6 +145,7 @@ pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
         let n = n0 * (1.0 - hit.barycentric.x) + n1 * hit.barycentric.x + hit.barycentric.y * (n2 - n0);
         let (n, length) = unit_vector(instance.map_or(n, |i| object_from_world(i).normal(n)));
         s.normal = if length > 0.0 { n } else { geometric };
+        s.smooth_normal = s.normal;
     }
     let [uv0, uv1, uv2] = [shading.uv0, shading.uv1, shading.uv2].map(Vec2::from);
     let (d1, d2) = (uv1 - uv0, uv2 - uv0);
@@ -151,33 +154,57 @@ pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
     s
 }
 
-/// 1 where `w` leaves the surface on the side of the shading normal, else -1: the plane of the triangle decides.
+/// 1 where `w` leaves the surface on the side of its normals, else -1: the plane of the triangle decides.
 pub fn side_of(s: &Surface, w: Vec3) -> f32 {
-    if s.normal.dot(s.geometric) * s.geometric.dot(w) < 0.0 { -1.0 } else { 1.0 }
+    if s.smooth_normal.dot(s.geometric) * s.geometric.dot(w) < 0.0 { -1.0 } else { 1.0 }
 }
 
-/// The shading normal for a viewer towards `wo`, on the viewer's side where the surface `turns`; bent where it faces away,
-/// or where the mirror image of `wo` of a surface that `mirrors` would be below the plane (Keller et al. 2017).
-pub fn facing_normal(s: &Surface, wo: Vec3, turns: bool, mirrors: bool) -> Vec3 {
+/// The normals of a surface as a viewer needs them.
+#[derive(Clone, Copy, Debug)]
+pub struct Facing {
+    /// Unit, before a map.
+    pub smooth_normal: Vec3,
+    /// Unit, the one that scatters.
+    pub normal: Vec3,
+}
+
+/// For a viewer towards `wo`; on the viewer's side where the surface `turns`. Smooth normals that face away, or that send the
+/// mirror image of `wo` below the plane (where the surface `mirrors`), are bent; those of maps are turned by half a turn.
+pub fn facing_normals(s: &Surface, wo: Vec3, turns: bool, mirrors: bool) -> Facing {
     const ABOVE: f32 = 1e-3;
     let side = side_of(s, wo);
-    let mut n = side * s.normal;
+    let (mut n, mut mapped) = (side * s.smooth_normal, side * s.normal);
     let along = n.dot(wo);
     let plane = if n.dot(s.geometric) < 0.0 { -s.geometric } else { s.geometric };
     let image = 2.0 * along * n - wo;
     let height = image.dot(plane);
-    if mirrors && height < 0.0 {
-        n = (wo + (image + (ABOVE - height) * plane).normalize()).normalize();
+    if (if mirrors { height } else { along }) < 0.0 {
+        let raised = (image + (ABOVE - height) * plane).normalize();
+        n = (if mirrors { wo + raised } else { n + (ABOVE - along) * wo }).normalize();
+        mapped = n;
     }
-    if !mirrors && along < 0.0 {
-        n = (n + (ABOVE - along) * wo).normalize();
+    if mapped.dot(wo) < 0.0 {
+        mapped = 2.0 * mapped.dot(n) * n - mapped;
     }
-    if turns { n } else { side * n }
+    let back = if turns { 1.0 } else { side };
+    Facing { smooth_normal: back * n, normal: back * mapped }
 }
 
-/// Whether a direction is on the other side of the plane than of `normal`, along which its component is `z`.
-pub fn crosses_plane(s: &Surface, normal: Vec3, w: Vec3, z: f32) -> bool {
-    normal.dot(s.geometric) * s.geometric.dot(w) * z < 0.0
+/// The share of a direction's light that lobes around `facing.normal` keep; `z` is the direction's component along that.
+pub fn light_share(s: &Surface, facing: &Facing, w: Vec3, z: f32) -> f32 {
+    let (tilt, up) = (facing.normal.dot(facing.smooth_normal), w.dot(facing.smooth_normal));
+    if facing.normal.dot(s.geometric) * s.geometric.dot(w) * z < 0.0 {
+        return 0.0;
+    }
+    if s.normal == s.smooth_normal {
+        return 1.0;
+    }
+    if up * z <= 0.0 {
+        return 0.0;
+    }
+    let tan2 = |cosine2: f32, least: f32| (1.0 / cosine2.max(least) - 1.0).max(0.0);
+    let alpha2 = (0.125 * tan2(tilt * tilt, 1e-6)).min(1.0);
+    2.0 / (1.0 + (1.0 + alpha2 * tan2(up * up, 1e-12)).sqrt())
 }
 
 fn textured(scene: &Scene, constant: [f32; 3], image: u32, s: &Surface) -> Vec3 {
