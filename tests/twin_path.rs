@@ -336,13 +336,14 @@ fn rims_of_coarse_smooth_meshes_stay_bright() {
 fn room(lamp: &str, width: f32) -> Scene {
     let place = Workplace::new().sky("sky.exr", 64, 32, |x, y| if (x, y) == (20, 6) { 200.0 } else { 0.5 });
     let place = place.picture("mask.png", 16, |x, y| [if x + y < 16 { 255 } else { 20 }; 3]);
+    let place = place.picture("waves.png", 16, |x, y| [(x * 7 % 16 * 8 + y * 5 % 16 * 8) as u8; 3]);
     place.scene(&format!(
         "[film]\nwidth = 16\nheight = 16\n[camera]\nposition = [0.0, 1.0, 5.0]\ntarget = [0.0, 0.8, 0.0]\nfov = 40.0\n\
          [render]\nmax_depth = 4\n[environment]\nfile = 'sky.exr'\nrotation = 70.0\n\
          [[material]]\nname = 'coat'\ntype = 'coated'\nalpha = 0.2\ncolor = [0.6, 0.3, 0.2]\n\
          [[material]]\nname = 'metal'\ntype = 'conductor'\nmetal = 'Al'\nalpha = 0.3\ndistribution = 'ggx'\n\
          [[material]]\nname = 'lamp'\nemission = [4.0, 5.0, 6.0]\n{lamp}[[material]]\nname = 'grey'\ncolor = 0.6\n\
-         [[mesh]]\nshape = 'rectangle'\ntransform = {{ rotate = [-90.0, 0.0, 0.0], scale = 4.0 }}\nmaterial = 'grey'\n\
+         bump = 'waves.png'\n[[mesh]]\nshape = 'rectangle'\ntransform = {{ rotate = [-90.0, 0.0, 0.0], scale = 4.0 }}\nmaterial = 'grey'\n\
          [[mesh]]\nshape = 'sphere'\nsegments = 48\ntransform = {{ translate = [-0.8, 0.7, 0.0], scale = 0.7 }}\n\
          material = 'coat'\n[[mesh]]\nshape = 'cube'\nmaterial = 'metal'\n\
          transform = {{ translate = [0.9, 0.5, 0.0], rotate = [0.0, 30.0, 0.0], scale = 0.5 }}\n\

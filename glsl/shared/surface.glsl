@@ -49,16 +49,15 @@ vec3 perturbed_normal(Surface s, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
     uvec4 words = texelFetch(textures, int(2u * image));
     vec2 scale = uintBitsToFloat(texelFetch(textures, int(2u * image + 1u)).xy);
     vec2 texel = 1.0 / (vec2(words.yz) * max(abs(scale), 1e-6));
-    // The normal, or heights here, one texel along u and one along v.
+    // The normal, or differences of heights half a texel to either side: along u, then along v.
     vec3 value;
-    float here, along_u = 0.0, along_v = 0.0;
+    vec2 rise = vec2(0.0);
     int k = 0;
     do {
-        here = along_u;
-        along_u = along_v;
-        value = texture_sample(image, s.uv + vec2(k == 1 ? texel.x : 0.0, k == 2 ? texel.y : 0.0), false).xyz;
-        along_v = value.r;
-    } while (FX_BUMP_MAPS && !mapped && ++k < 3);
+        vec2 offset = (k < 2 ? vec2(texel.x, 0.0) : vec2(0.0, texel.y)) * (k % 2 == 0 ? 0.5 : -0.5);
+        value = texture_sample(image, mapped ? s.uv : s.uv + offset, false).xyz;
+        rise += sign(offset) * value.r;
+    } while (FX_BUMP_MAPS && !mapped && ++k < 4);
     vec3 n;
     if (mapped) {
         vec3 m = 2.0 * value - 1.0;
@@ -68,8 +67,8 @@ vec3 perturbed_normal(Surface s, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
         n = m.x * t + m.y * (dot(b, dpdv) < 0.0 ? -b : b) + m.z * s.normal;
     } else {
         float height = uintBitsToFloat(material_texel(s.material, 4u).w);
-        vec3 pu = dpdu + s.normal * (height * ((along_u - here) / texel.x) - dot(s.normal, dpdu));
-        vec3 pv = dpdv + s.normal * (height * ((along_v - here) / texel.y) - dot(s.normal, dpdv));
+        vec3 pu = dpdu + s.normal * (height * (rise.x / texel.x) - dot(s.normal, dpdu));
+        vec3 pv = dpdv + s.normal * (height * (rise.y / texel.y) - dot(s.normal, dpdv));
         n = cross(pu, pv);
         n = dot(n, s.normal) < 0.0 ? -n : n;
     }

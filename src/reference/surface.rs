@@ -85,9 +85,9 @@ fn normal_from_height(scene: &Scene, s: &Surface, material: &Material, dpdu: Vec
     let scale = Vec2::from(texture.scale).abs().max(Vec2::splat(1e-6));
     let texel = 1.0 / (vec2(texture.width as f32, texture.height as f32) * scale);
     let height = |offset| texture_sample(scene, image, s.uv + offset).x;
-    let h = height(Vec2::ZERO);
-    let hu = (height(vec2(texel.x, 0.0)) - h) / texel.x;
-    let hv = (height(vec2(0.0, texel.y)) - h) / texel.y;
+    let rise = |half: Vec2| height(half) - height(-half);
+    let hu = rise(vec2(0.5 * texel.x, 0.0)) / texel.x;
+    let hv = rise(vec2(0.0, 0.5 * texel.y)) / texel.y;
     let pu = dpdu + s.normal * (material.bump_scale * hu - s.normal.dot(dpdu));
     let pv = dpdv + s.normal * (material.bump_scale * hv - s.normal.dot(dpdv));
     let n = pu.cross(pv);
