@@ -159,7 +159,7 @@ fn lights_are_drawn_with_their_probabilities() {
     let p = |scene: &Scene| {
         let mut observed = vec![0.0; scene.lights.len()];
         let words = (0..1 << 18).map(|i| sample_2d_bits(sampler_start(0, i, 9, true), 0)[0]);
-        words.for_each(|word| observed[alias_choose(&scene.light_table, word) as usize] += 1.0);
+        words.for_each(|word| observed[alias_choose(&scene.light_table, word).0 as usize] += 1.0);
         let expected: Vec<_> = scene.lights.iter().map(|l| f64::from(l.probability) * f64::from(1 << 18)).collect();
         chi_square(&observed, &expected)
     };
@@ -211,5 +211,54 @@ fn the_density_of_a_sky_integrates_to_one() {
         assert_eq!(Grid::new(&scene).directions().filter(missed).count(), 0, "{width} x {height}: light never drawn");
         scene.environment.as_mut().unwrap().texels[width as usize - 1][3] += 1e-3;
         assert!((sum(&scene) - 1.0).abs() > 1e-4, "control: {width} x {height}");
+    }
+}
+
+#[test]
+fn what_is_left_of_a_choice_is_independent_of_it() {
+    const BINS: usize = 16;
+    let table = &many_lights().light_table;
+    let p = |rest: &dyn Fn(u32) -> (u32, u32)| {
+        let mut observed = vec![0.0; table.len() * BINS];
+        for i in 0..1 << 19 {
+            let (chosen, rest) = rest(sample_2d_bits(sampler_start(0, i, 9, true), 0)[0]);
+            observed[chosen as usize * BINS + (rest >> 28) as usize] += 1.0;
+        }
+        let expected: Vec<_> =
+            observed.chunks(BINS).flat_map(|c| [c.iter().sum::<f64>() / BINS as f64; BINS]).collect();
+        chi_square(&observed, &expected)
+    };
+    let found = p(&|word| alias_choose(table, word));
+    assert!(found > sidak(1), "{found:.1e}");
+    let word_itself = p(&|word| (alias_choose(table, word).0, word));
+    assert!(word_itself < sidak(1), "control: the word that chose");
+}
+
+/// Variance of the mean of 64 light samples' irradiance on a floor, over many pixels.
+fn variance(scene: &Scene, independent: bool) -> f64 {
+    let irradiance = |pixel: u32| {
+        let sample = |i| {
+            let s = sampler_start(pixel, i, 1, independent);
+            let light = light_sample(scene, HERE, sample_2d_bits(s, 0)[0], sample_2d(s, 1));
+            f64::from(light.radiance.x * light.direction.y.max(0.0))
+        };
+        (0..64).map(sample).sum::<f64>() / 64.0
+    };
+    let all: Vec<f64> = (0..400).map(irradiance).collect();
+    let mean = all.iter().sum::<f64>() / 400.0;
+    all.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 399.0
+}
+
+#[test]
+fn skies_gain_from_stratified_samples() {
+    let sky = |x: u32, y: u32| 0.2 + ((x * x * 7 + y * 13) % 32) as f32 * if y < 12 { 0.3 } else { 0.02 };
+    let place = Workplace::new().sky("sky.exr", 64, 32, sky);
+    let alone = place.scene("[environment]\nfile = 'sky.exr'\n");
+    let light = "[[light]]\ntype = 'directional'\ndirection = [0.0, -1.0, 0.2]\nirradiance = 5.0\n";
+    let beside = place.scene(&format!("[environment]\nfile = 'sky.exr'\n{light}"));
+    for (name, scene) in [("alone", alone), ("beside a light", beside)] {
+        let ratio = variance(&scene, false) / variance(&scene, true);
+        println!("{name}: {ratio:.3} of the variance of independent samples");
+        assert!(ratio < 0.8, "{name}: {ratio}");
     }
 }

@@ -11,11 +11,18 @@ const float INFINITE_DISTANCE = 3e38;
 
 uvec4 light_texel(uint light, uint i) { return texelFetch(lights, int(4u * light + i)); }
 
-uint alias_choose(usamplerBuffer table, uint n, uint random) {
+// `random` is left as a word that is independent of the choice and as well stratified as it was: where in its share of the slot
+// it fell. A hash fills up the bits that the choice used.
+uint alias_choose(usamplerBuffer table, uint n, inout uint random) {
     uint slot, low;
     umulExtended(random, n, slot, low);
     uvec2 entry = texelFetch(table, int(slot)).xy; // threshold, alias
-    return low < entry.x ? slot : entry.y;
+    bool stays = low < entry.x;
+    uint hash = pcg(random);
+    float into = float(stays ? low : low - entry.x) + float(hash) * (float(n) / 4294967296.0);
+    float share = stays ? float(entry.x) : 4294967296.0 - float(entry.x);
+    random = (min(uint(into / share * 16777216.0), 0xffffffu) << 8) | (hash & 0xffu);
+    return stays ? slot : entry.y;
 }
 
 // Environment direction: u = atan(x, -z) / 2pi, v = acos(y) / pi in the environment's own frame (row 0 is +y). acos would
@@ -77,8 +84,7 @@ void sample_environment(uint light, float chosen, uint word, vec2 u, inout Light
         s.pdf = chosen * (0.25 / PI);
     } else {
         uvec2 size = environment_extent();
-        // The word chose the light; its hash chooses the texel, so that the two choices are independent.
-        uint texel = alias_choose(environment_table, size.x * size.y, pcg(word));
+        uint texel = alias_choose(environment_table, size.x * size.y, word);
         vec2 uv = (vec2(texel % size.x, texel / size.x) + u) / vec2(size);
         float phi = 2.0 * PI * uv.x, theta = PI * uv.y;
         float sine = sin(theta);

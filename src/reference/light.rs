@@ -25,12 +25,18 @@ pub struct LightSample {
 /// Of lights at infinity.
 pub const INFINITE_DISTANCE: f32 = 3e38;
 
-/// The entry that a random word stands for.
-pub fn alias_choose(table: &[AliasEntry], random: u32) -> u32 {
+/// The entry that a random word stands for, and a word that is independent of it and as well stratified.
+pub fn alias_choose(table: &[AliasEntry], random: u32) -> (u32, u32) {
     let product = u64::from(random) * table.len() as u64;
     let (slot, low) = ((product >> 32) as u32, product as u32);
     let entry = table[slot as usize];
-    if low < entry.threshold { slot } else { entry.alias }
+    let stays = low < entry.threshold;
+    let hash = pcg(random);
+    let into =
+        (if stays { low } else { low - entry.threshold }) as f32 + hash as f32 * (table.len() as f32 / 4294967296.0);
+    let share = if stays { entry.threshold as f32 } else { 4294967296.0 - entry.threshold as f32 };
+    let rest = (((into / share * 16777216.0) as u32).min(0xffffff) << 8) | (hash & 0xff);
+    (if stays { slot } else { entry.alias }, rest)
 }
 
 fn environment_uv(d: Vec3, sine: f32) -> Vec2 {
@@ -80,7 +86,7 @@ fn sample_environment(scene: &Scene, light: &Light, word: u32, u: Vec2) -> Light
     let (direction, radiance, pdf) = match &scene.environment {
         None => (warp_sphere(u), light.value.into(), light.probability * (0.25 / PI)),
         Some(e) => {
-            let texel = alias_choose(&e.table, pcg(word));
+            let (texel, _) = alias_choose(&e.table, word);
             let corner = vec2((texel % e.width) as f32, (texel / e.width) as f32);
             let uv = (corner + u) / vec2(e.width as f32, e.height as f32);
             let (phi, theta) = (2.0 * PI * uv.x, PI * uv.y);
@@ -133,7 +139,7 @@ fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
 
 /// One light for the surface point `p`. Radiance is 0 when the light cannot reach the point.
 pub fn light_sample(scene: &Scene, p: Vec3, word: u32, u: Vec2) -> LightSample {
-    let chosen = if scene.lights.len() == 1 { 0 } else { alias_choose(&scene.light_table, word) };
+    let (chosen, word) = if scene.lights.len() == 1 { (0, word) } else { alias_choose(&scene.light_table, word) };
     let light = &scene.lights[chosen as usize];
     match light.kind {
         LIGHT_TRIANGLE => sample_triangle_light(scene, light, p, u),
