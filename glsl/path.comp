@@ -73,7 +73,7 @@ vec3 light_from_miss(Path path) {
 
 vec3 light_from_hit(Path path, Surface s, float t) {
     float cosine = -dot(s.geometric, path.direction);
-    float weight = path.delta ? 1.0 : balance(path.bsdf_pdf, triangle_light_pdf(s.material, t, cosine));
+    float weight = path.delta ? 1.0 : balance(path.bsdf_pdf, triangle_light_pdf(s, path.origin, t, cosine));
     return FX_EMISSIVE && cosine > 0.0 ? surface_emission(s) * weight : vec3(0.0);
 }
 

@@ -299,7 +299,8 @@ pub fn called_for(scene: &Scene, outputs: Outputs) -> Effects {
 
 /// Every effect of light and matter; the random numbers stay those that the settings chose.
 pub fn all_effects(scene: &Scene) -> Effects {
-    Effects { independent_sampler: scene.settings.sampler == Sampler::Independent, ..Effects::ALL }
+    let independent_sampler = scene.settings.sampler == Sampler::Independent;
+    Effects { independent_sampler, large_lamps: scene.large_lamps, ..Effects::ALL }
 }
 
 /// Paths per dispatch: enough to fill the device, few enough that a batch ends within a fraction of a second, and

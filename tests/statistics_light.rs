@@ -8,11 +8,12 @@ mod twin;
 use glam::{Mat3, Vec3, dvec3, vec3};
 use statistics::{chi_square, sidak};
 use std::f64::consts::{PI, TAU};
-use tallow::gpu::layout::{LIGHT_ENVIRONMENT, Light, Triangle};
+use tallow::gpu::layout::{LIGHT_ENVIRONMENT, Light, NONE};
 use tallow::reference::light::*;
 use tallow::reference::sampler::{sample_2d, sample_2d_bits, sampler_start};
 use tallow::reference::scene::triangle_vertices;
-use tallow::reference::traverse::{intersect_triangle, ray_space};
+use tallow::reference::surface::surface_at;
+use tallow::reference::traverse::{Hit, intersect_triangle, ray_space};
 use tallow::scene::Scene;
 use twin::{Random, Workplace};
 
@@ -69,13 +70,13 @@ fn density(scene: &Scene, direction: Vec3) -> f64 {
     let sky = scene.lights.iter().find(|l| l.kind == LIGHT_ENVIRONMENT);
     let sky = sky.map_or(0.0, |l| environment_radiance(scene, l, direction).1);
     let ray = ray_space(HERE, direction);
-    let lamp = |(i, t): (usize, &Triangle)| {
-        let [a, b, c] = triangle_vertices(scene, i as u32);
-        let (t, material) = (intersect_triangle(&ray, [a, b, c], INFINITE_DISTANCE)?.0, t.material);
-        let cosine = -(b - a).cross(c - a).normalize().dot(direction);
-        (cosine > 0.0).then(|| triangle_light_pdf(scene, material, t, cosine))
+    let lamp = |i: usize| {
+        let (t, barycentric) = intersect_triangle(&ray, triangle_vertices(scene, i as u32), INFINITE_DISTANCE)?;
+        let s = surface_at(scene, &Hit { t, triangle: i as u32, instance: NONE, barycentric });
+        let cosine = -s.geometric.dot(direction);
+        (cosine > 0.0).then(|| triangle_light_pdf(scene, &s, HERE, t, cosine))
     };
-    f64::from(sky) + scene.triangles.iter().enumerate().filter_map(lamp).map(f64::from).sum::<f64>()
+    f64::from(sky) + (0..scene.triangles.len()).filter_map(lamp).map(f64::from).sum::<f64>()
 }
 
 fn samples(scene: &Scene, count: u32, seed: u32) -> impl Iterator<Item = LightSample> {
@@ -89,7 +90,10 @@ const LAMP: [Vec3; 3] = [vec3(-1.0, -0.8, -1.2), vec3(1.6, -0.5, -0.6), vec3(0.1
 
 fn one_lamp() -> Scene {
     let place = Workplace::new().obj("lamp.obj", &[LAMP]);
-    place.scene("[[material]]\nname = 'a'\nemission = [2.0, 3.0, 5.0]\n[[mesh]]\nfile = 'lamp.obj'\nmaterial = 'a'\n")
+    let text = "[[material]]\nname = 'a'\nemission = [2.0, 3.0, 5.0]\n[[mesh]]\nfile = 'lamp.obj'\nmaterial = 'a'\n";
+    let scene = place.scene(text);
+    assert!(scene.large_lamps, "sampled by solid angle");
+    scene
 }
 
 fn constant_sky() -> Scene {
@@ -127,8 +131,14 @@ fn many_lights() -> Scene {
     place.scene(&text)
 }
 
-fn single_lights() -> [(&'static str, Scene); 3] {
-    [("triangle", one_lamp()), ("constant sky", constant_sky()), ("image sky", image_sky(16, 8))]
+fn single_lights() -> [(&'static str, Scene); 4] {
+    let by_area = Scene { large_lamps: false, ..one_lamp() };
+    [
+        ("triangle", one_lamp()),
+        ("triangle by area", by_area),
+        ("constant sky", constant_sky()),
+        ("image sky", image_sky(16, 8)),
+    ]
 }
 
 #[test]

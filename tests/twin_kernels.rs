@@ -20,7 +20,7 @@ use tallow::scene::Scene;
 use tallow::settings::{PixelFilter, Settings};
 use tallow::shaders;
 use tallow::stage::PerThread;
-use twin::{Aim, BALL, Random, Workplace, aimed_at_seam, ball, instanced_ball};
+use twin::{Aim, BALL, Random, Workplace, aimed_at_seam, ball, instanced_ball, under_a_panel};
 
 const SIDE: u32 = 48;
 const SAMPLES: u32 = 3;
@@ -183,6 +183,9 @@ fn renders_agree_with_their_twins() {
         check(file, &run(&gpu, &scene, called_for(&scene, outputs)));
     }
     check("wide sky", &run(&gpu, &wide_sky(), called_for(&wide_sky(), outputs)));
+    let mut panel = under_a_panel();
+    small(&mut panel.settings);
+    check("panel", &run(&gpu, &panel, called_for(&panel, outputs)));
     let scene = pictures();
     let mut pair = run(&gpu, &scene, called_for(&scene, outputs));
     check("pictures", &pair);

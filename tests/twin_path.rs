@@ -353,6 +353,21 @@ fn room(lamp: &str, width: f32) -> Scene {
 }
 
 #[test]
+fn large_lamps_are_sampled_by_solid_angle() {
+    let scene = under_a_panel();
+    assert!(scene.large_lamps);
+    let by_area = Scene { large_lamps: false, ..scene.clone() };
+    let [near, far] = [&scene, &by_area].map(|s| mean(s, Strategy::Light, 256));
+    let [both, bsdf] = [Strategy::Both, Strategy::Bsdf].map(|strategy| mean(&scene, strategy, 256));
+    assert!(near.agrees(&far) && near.agrees(&both) && near.agrees(&bsdf), "{near:?} {far:?} {both:?} {bsdf:?}");
+    assert!(near.error < 0.8 * far.error, "{near:?} {far:?}");
+    // Control: one density for the choice, the other for the weight.
+    let other = Scene { triangle_pdf_scale: 0.25 * scene.triangle_pdf_scale, ..scene };
+    let wrong = mean(&other, Strategy::Both, 256);
+    assert!(!wrong.agrees(&near), "control: {wrong:?} {near:?}");
+}
+
+#[test]
 fn either_way_to_find_light_gives_the_same_picture() {
     let compared = |scene: &Scene| {
         let strategies = [Strategy::Both, Strategy::Light, Strategy::Bsdf];

@@ -10,6 +10,7 @@ struct Surface {
     uint flags;     // of the material
     uint object;
     vec2 uv;
+    vec3 corner, e1, e2; // the triangle in world space: its first vertex, and the edges from there
     float clearance; // distance from the plane at which rays start, world units
 };
 
@@ -107,6 +108,9 @@ Surface surface_at(Hit hit) {
     }
     s.flags = material_texel(s.material, 3u).w;
     s.position = p0 + hit.b1 * e1 + hit.b2 * e2;
+    s.corner = p0;
+    s.e1 = e1;
+    s.e2 = e2;
     vec3 scaled = mirrored ? cross(e2, e1) : cross(e1, e2);
     float doubled_area;
     s.geometric = unit_vector(scaled, doubled_area); // a needle that rounds to no area scatters nothing

@@ -2,7 +2,7 @@
 use crate::gpu::layout::*;
 use crate::reference::sampler::pcg;
 use crate::reference::scene::texture_coordinates;
-use crate::reference::surface::{plane_clearance, unit_vector};
+use crate::reference::surface::{Surface, plane_clearance, unit_vector};
 use crate::reference::texture::{surface_opacity, texture_sample};
 use crate::reference::warp::{warp_sphere, warp_triangle};
 use crate::scene::{Environment, Scene};
@@ -100,11 +100,52 @@ fn sample_environment(scene: &Scene, light: &Light, word: u32, u: Vec2) -> Light
     LightSample { direction, distance: INFINITE_DISTANCE, radiance, pdf }
 }
 
+/// A triangle seen from a point: unit vectors to its corners, and its solid angle.
+struct SphericalTriangle {
+    corners: [Vec3; 3],
+    solid_angle: f32,
+}
+
+impl SphericalTriangle {
+    fn new([a, e1, e2]: [Vec3; 3]) -> Self {
+        let inverse = [a, a + e1, a + e2].map(|v| 1.0 / v.length_squared().max(1e-37).sqrt());
+        let [a, b, c] = [a * inverse[0], (a + e1) * inverse[1], (a + e2) * inverse[2]];
+        let volume = a.dot((e1 * inverse[1]).cross(e2 * inverse[2])).abs();
+        let solid_angle = 2.0 * volume.atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a));
+        Self { corners: [a, b, c], solid_angle }
+    }
+
+    /// Whether it is sampled so, and not by area.
+    fn by_solid_angle(&self, scene: &Scene) -> bool {
+        scene.large_lamps && self.solid_angle > 3e-4 && self.solid_angle < 6.0
+    }
+
+    /// A direction, uniform by solid angle (Arvo 1995).
+    fn sample(&self, u: Vec2) -> Vec3 {
+        let [a, b, c] = self.corners;
+        let (sin, cos) = (0.5 * u.x * self.solid_angle).sin_cos();
+        let along = (c - a.dot(c) * a).normalize();
+        let volume = a.cross(b).dot(along).abs();
+        let half_tan = (1.0 + a.dot(b)) * sin / (volume * cos - b.dot(along) * sin).max(1e-10);
+        let d = ((1.0 - half_tan * half_tan) * a + 2.0 * half_tan * along) / (1.0 + half_tan * half_tan);
+        let rest = 0.5 * u.y * (d - b).length_squared();
+        let across = d - d.dot(b) * b;
+        (1.0 - rest) * b + (rest * (2.0 - rest)).sqrt() * across / across.length_squared().max(1e-30).sqrt()
+    }
+}
+
 fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> LightSample {
     let [a, b, c] = [light.a, light.b, light.c].map(Vec3::from);
-    let bary = warp_triangle(u);
+    let mut bary = warp_triangle(u);
     let (e1, e2) = (b - a, c - a);
     let (n, doubled_area) = unit_vector(e1.cross(e2));
+    let seen = SphericalTriangle::new([a - p, e1, e2]);
+    if seen.by_solid_angle(scene) {
+        let w = seen.sample(u);
+        let q = (a - p).dot(n) / w.dot(n) * w - (a - p);
+        bary = vec2(q.cross(e2).dot(n), e1.cross(q).dot(n)) / doubled_area;
+        bary = bary.clamp(Vec2::ZERO, Vec2::ONE);
+    }
     let on_light = a + bary.x * e1 + bary.y * e2;
     let to_light = on_light + plane_clearance(n, a.abs(), e1, e2) * n - p;
     let d2 = to_light.dot(to_light);
@@ -119,7 +160,11 @@ fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> Ligh
     }
     radiance *= surface_opacity(scene, light.material, light.triangle, bary);
     let lit = cosine > 0.0 && d2 > 0.0;
-    let pdf = if lit { light.probability * 2.0 * d2 / (cosine * doubled_area) } else { 0.0 };
+    let density = match seen.by_solid_angle(scene) {
+        true => light.probability / seen.solid_angle,
+        false => light.probability * 2.0 * d2 / (cosine * doubled_area),
+    };
+    let pdf = if lit { density } else { 0.0 };
     LightSample { direction, distance, radiance: if lit { radiance / pdf } else { Vec3::ZERO }, pdf }
 }
 
@@ -154,8 +199,14 @@ pub fn light_sample(scene: &Scene, p: Vec3, word: u32, u: Vec2) -> LightSample {
     }
 }
 
-/// Density per solid angle with which [`light_sample`] chooses a point of an emissive triangle hit by a ray.
-pub fn triangle_light_pdf(scene: &Scene, material: u32, t: f32, cosine: f32) -> f32 {
-    let weight = scene.materials[material as usize].emission_weight;
-    scene.triangle_pdf_scale * weight * t * t / cosine.max(1e-20)
+/// Density per solid angle with which [`light_sample`] chooses, from `origin`, a point of an emissive triangle hit by a
+/// ray.
+pub fn triangle_light_pdf(scene: &Scene, s: &Surface, origin: Vec3, t: f32, cosine: f32) -> f32 {
+    let [a, e1, e2] = s.triangle;
+    let density = scene.triangle_pdf_scale * scene.materials[s.material as usize].emission_weight;
+    let seen = SphericalTriangle::new([a - origin, e1, e2]);
+    match seen.by_solid_angle(scene) {
+        true => density * 0.5 * unit_vector(e1.cross(e2)).1 / seen.solid_angle,
+        false => density * t * t / cosine.max(1e-20),
+    }
 }

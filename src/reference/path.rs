@@ -122,7 +122,7 @@ impl Tracer<'_> {
         if cosine <= 0.0 {
             return Vec3::ZERO;
         }
-        let pdf = triangle_light_pdf(self.scene, s.material, t, cosine);
+        let pdf = triangle_light_pdf(self.scene, s, path.origin, t, cosine);
         let weight = if path.delta { 1.0 } else { self.balance(path.bsdf_pdf, pdf, Strategy::Bsdf) };
         surface_emission(self.scene, s) * weight
     }

@@ -26,6 +26,8 @@ pub struct Surface {
     pub object: u32,
     /// Texture coordinates.
     pub uv: Vec2,
+    /// The triangle in world space: its first vertex and the edges from there.
+    pub triangle: [Vec3; 3],
     /// Distance from the plane at which rays start, world units.
     pub clearance: f32,
 }
@@ -137,6 +139,7 @@ pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
         flags: scene.materials[material as usize].flags,
         object,
         uv: Vec2::ZERO,
+        triangle: [p0, e1, e2],
         clearance: plane_clearance(geometric, reach, e1, e2),
     };
     let Some(shading) = scene.shading.get(hit.triangle as usize) else { return s };

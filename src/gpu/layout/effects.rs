@@ -87,4 +87,6 @@ effects! {
     counters = 27, FX_COUNTERS;
     /// Samples placed where they count: a list of paths instead of so many per pixel.
     adaptive = 28, FX_ADAPTIVE;
+    /// Emissive triangles large enough to be sampled by solid angle.
+    large_lamps = 29, FX_LARGE_LAMPS;
 }
