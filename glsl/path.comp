@@ -35,6 +35,10 @@ uint nodes_visited = 0u, closest_rays = 0u, any_rays = 0u;
 const uint PAIR_FIRST_BOUNCE = 2u, PAIRS_PER_BOUNCE = 4u;
 const uint PAIR_CHOICE = 0u, PAIR_LIGHT = 1u, PAIR_BSDF = 2u, PAIR_ROULETTE = 3u;
 
+// Shadow rays to a lamp end at this part of the way: the error of the distance at which they would meet it is some 2^-24
+// over the cosine there.
+const float SHADOW_END = 1.0 - 1e-5;
+
 // Joins the two strategies. Two densities that vanished give 0, not 0 / 0.
 float balance(float taken, float other) { return taken / max(taken + other, 1e-37); }
 
@@ -73,35 +77,35 @@ vec3 light_from_miss(Path path) {
 
 vec3 light_from_hit(Path path, Surface s, float t) {
     float cosine = -dot(s.geometric, path.direction);
-    float weight = path.delta ? 1.0 : balance(path.bsdf_pdf, triangle_light_pdf(s.material, t, cosine));
+    float weight = path.delta ? 1.0 : balance(path.bsdf_pdf, triangle_light_pdf(s, path.origin, t, cosine));
     return FX_EMISSIVE && cosine > 0.0 ? surface_emission(s) * weight : vec3(0.0);
 }
 
 // Direct light at `s` by light sampling, unless something blocks `shadow`; 0 needs no ray. `basis` columns are the
 // shading frame.
-vec3 light_from_nee(Surface s, Bsdf bsdf, mat3 basis, vec3 wo, Sampler random, uint pair, uint mask_seed, out Segment shadow) {
+vec3 light_from_nee(Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sampler random, uint pair, uint mask_seed,
+                    out Segment shadow) {
     uint word = sample_2d_bits(random, pair + PAIR_CHOICE).x;
     LightSample light = light_sample(s.position, word, sample_2d(random, pair + PAIR_LIGHT));
     vec3 wi = light.direction * basis; // row vector times matrix: into the frame
     vec4 f = bsdf_evaluate(bsdf, wo, wi);
-    vec3 normal = dot(light.direction, s.geometric) < 0.0 ? -s.geometric : s.geometric;
-    shadow = Segment(offset_origin(s.position, normal), light.direction, light.distance, mask_seed);
+    f.rgb *= light_share(s, facing, light.direction, wi.z);
+    shadow = Segment(ray_origin(s, light.direction), light.direction, light.distance, mask_seed);
     if (light.distance < INFINITE_DISTANCE) { // aim again from the offset origin, so that the segment ends on the light
         shadow.direction = s.position + light.distance * light.direction - shadow.origin;
-        shadow.t_max = 1.0 - 1e-6;
+        shadow.t_max = SHADOW_END;
     }
     return f.rgb * light.radiance * (light.pdf > 0.0 ? balance(light.pdf, f.w) : 1.0);
 }
 
 // Chooses the next direction. False when the path ends.
-bool scatter(inout Path path, Surface s, Bsdf bsdf, mat3 basis, vec3 wo, Sampler random, uint pair) {
+bool scatter(inout Path path, Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sampler random, uint pair) {
     BsdfSample next;
     float lobe = sample_2d(random, pair + PAIR_CHOICE).y;
     bool scattered = bsdf_sample(bsdf, wo, lobe, sample_2d(random, pair + PAIR_BSDF), next);
-    path.throughput *= next.weight;
     path.direction = basis * next.wi;
-    vec3 normal = dot(path.direction, s.geometric) < 0.0 ? -s.geometric : s.geometric;
-    path.origin = offset_origin(s.position, normal);
+    path.throughput *= next.weight * light_share(s, facing, path.direction, next.wi.z);
+    path.origin = ray_origin(s, path.direction);
     path.bsdf_pdf = next.pdf;
     path.delta = next.delta;
     if (FX_ROULETTE && is_kind(FX_DIELECTRIC, bsdf, BSDF_DIELECTRIC) && wo.z * next.wi.z < 0.0) {
@@ -145,8 +149,8 @@ Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         Bsdf bsdf = surface_bsdf(s);
         // The two sides of a dielectric differ: its normal stays on the outside.
         bool turns = (s.flags & MATERIAL_TWO_SIDED) != 0u && !is_kind(FX_DIELECTRIC, bsdf, BSDF_DIELECTRIC);
-        vec3 normal = turns && dot(s.normal, path.direction) > 0.0 ? -s.normal : s.normal;
-        mat3 basis = basis_from_normal(normal);
+        Facing facing = facing_normals(s, -path.direction, turns, bsdf_is_specular(bsdf));
+        mat3 basis = basis_from_normal(facing.normal);
         vec3 wo = -path.direction * basis;
         bool smooth_here = bsdf_is_delta(bsdf);
         if (bounce == 0u) {
@@ -155,9 +159,9 @@ Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         }
         Segment shadow;
         uint mask_seed = pcg(seed + 2u * bounce);
-        vec3 sampled = path.throughput * light_from_nee(s, bsdf, basis, wo, random, pair, mask_seed + 1u, shadow);
+        vec3 sampled = path.throughput * light_from_nee(s, bsdf, facing, basis, wo, random, pair, mask_seed + 1u, shadow);
         bool shadowed = push.light_count > 0u && !smooth_here && max(sampled.r, max(sampled.g, sampled.b)) > 0.0;
-        bool alive = scatter(path, s, bsdf, basis, wo, random, pair);
+        bool alive = scatter(path, s, bsdf, facing, basis, wo, random, pair);
         if (bounce == 0u) mirrored = path.delta;
         bool roulette = FX_ROULETTE && push.roulette_depth > 0u && bounce + 1u >= push.roulette_depth;
         if (roulette) alive = survives_roulette(path, random, pair) && alive;

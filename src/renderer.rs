@@ -329,7 +329,8 @@ pub fn called_for(scene: &Scene, outputs: Outputs) -> Effects {
 
 /// Every effect of light and matter; the random numbers stay those that the settings chose.
 pub fn all_effects(scene: &Scene) -> Effects {
-    Effects { independent_sampler: scene.settings.sampler == Sampler::Independent, ..Effects::ALL }
+    let independent_sampler = scene.settings.sampler == Sampler::Independent;
+    Effects { independent_sampler, large_lamps: scene.large_lamps, ..Effects::ALL }
 }
 
 /// Paths per dispatch, whose samples fit a storage buffer.

@@ -3,14 +3,19 @@
 #[path = "support/statistics.rs"]
 mod statistics;
 mod support;
+#[path = "support/twin.rs"]
+mod twin;
 
+use glam::dvec3;
 use statistics::sidak_quantile;
+use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use tallow::gpu::layout::{Guide, NONE};
 use tallow::image::{self, Film, Picture};
 use tallow::renderer::{Outputs, Renderer};
 use tallow::scene::Scene;
 use tallow::settings::Settings;
+use twin::Workplace;
 
 const SIZE: u32 = 128;
 const SPP: u32 = 1024;
@@ -174,4 +179,62 @@ fn first_hits_match_at_pixel_centres() {
         }
     }
     support::assert_silent(&gpu);
+}
+
+/// A square with a map of hills (3 across, 2 along; heights times `scale`, or normals), lit from low on the left.
+fn hills(map: &str, material: &str, scale: f32) -> Scene {
+    let wave = |i: u32, periods: u32| (TAU * f64::from(periods) * (f64::from(i) + 0.5) / 64.0).sin();
+    let height = |x: u32, y: u32| [(127.5 + 127.5 * wave(x, 3) * wave(y, 2)).round() as u8; 3];
+    let normal = |x: u32, y: u32| {
+        let n = dvec3(0.75 * wave(x, 3), 0.6 * wave(y, 2), 0.5).normalize();
+        n.to_array().map(|v| ((v + 1.0) * 127.5).round() as u8)
+    };
+    let place = Workplace::new().picture("bump.png", 64, height).picture("normal.png", 64, normal);
+    let material = match material {
+        "metal" => "type = 'conductor'\nmetal = 'Al'\nalpha = 0.3\ndistribution = 'ggx'",
+        _ => "color = 0.7",
+    };
+    let map = match map {
+        "bump" => format!("bump = 'bump.png'\nbump_scale = {scale}"),
+        _ => "normal_map = 'normal.png'".into(),
+    };
+    place.scene(&format!(
+        "[film]\nwidth = 32\nheight = 32\n[camera]\nposition = [0.0, 1.1, 3.2]\ntarget = [0.0, 0.0, 0.0]\nfov = 45.0\n\
+         [render]\nspp = 1024\nmax_depth = 2\n[environment]\nradiance = 0.1\n[[material]]\nname = 'hills'\n{material}\n{map}\n\
+         [[material]]\nname = 'lamp'\ncolor = 0.0\nemission = 20.0\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'hills'\ntransform = {{ rotate = [-90.0, 0.0, 0.0], scale = 1.5 }}\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'lamp'\n\
+         transform = {{ translate = [-3.0, 1.2, 0.5], rotate = [0.0, 90.0, 0.0], scale = 0.5 }}\n"
+    ))
+}
+
+/// Of blocks of 4 by 4 pixels the largest relative difference, beyond four standard errors.
+fn worst_block(scene: &Scene, name: &str) -> f64 {
+    let gpu = support::gpu();
+    let renderer = Renderer::new(&gpu, scene, Outputs::default()).unwrap();
+    let ours = support::render(&gpu, &renderer);
+    support::assert_silent(&gpu);
+    let (mean, error) = (colour(&format!("{name}.exr")).pixels, colour(&format!("{name}_se.exr")).pixels);
+    let block = |b: usize| {
+        let (mut a, mut m, mut spread) = (0.0, 0.0, 0.0);
+        for i in (0..16).map(|i| (b / 8 * 4 + i / 4) * 32 + b % 8 * 4 + i % 4) {
+            let n = ours[i].count as f32;
+            a += f64::from(ours[i].mean[1]);
+            m += f64::from(mean[i][1]);
+            spread += f64::from(ours[i].m2[1] / (n * (n - 1.0)) + error[i][1] * error[i][1]);
+        }
+        ((a - m).abs() - 4.0 * spread.sqrt()).max(0.0) / m
+    };
+    (0..64).map(block).fold(0.0, f64::max)
+}
+
+#[test]
+fn maps_match_in_blocks() {
+    for (map, material) in [("bump", "diffuse"), ("normal", "diffuse"), ("bump", "metal"), ("normal", "metal")] {
+        let worst = worst_block(&hills(map, material, 0.35), &format!("{map}_{material}"));
+        println!("{map} {material}: {worst:.4}");
+        assert!(worst < 0.02, "{map} {material}: a block is {worst} off");
+    }
+    let steeper = worst_block(&hills("bump", "diffuse", 0.4), "bump_diffuse");
+    assert!(steeper > 0.02, "control: hills that are a seventh higher, {steeper}");
 }

@@ -8,11 +8,12 @@ mod twin;
 use glam::{Mat3, Vec3, dvec3, vec3};
 use statistics::{chi_square, sidak};
 use std::f64::consts::{PI, TAU};
-use tallow::gpu::layout::{LIGHT_ENVIRONMENT, Light, Triangle};
+use tallow::gpu::layout::{LIGHT_ENVIRONMENT, Light, NONE};
 use tallow::reference::light::*;
 use tallow::reference::sampler::{sample_2d, sample_2d_bits, sampler_start};
 use tallow::reference::scene::triangle_vertices;
-use tallow::reference::traverse::{intersect_triangle, ray_space};
+use tallow::reference::surface::surface_at;
+use tallow::reference::traverse::{Hit, intersect_triangle, ray_space};
 use tallow::scene::Scene;
 use twin::{Random, Workplace};
 
@@ -69,13 +70,13 @@ fn density(scene: &Scene, direction: Vec3) -> f64 {
     let sky = scene.lights.iter().find(|l| l.kind == LIGHT_ENVIRONMENT);
     let sky = sky.map_or(0.0, |l| environment_radiance(scene, l, direction).1);
     let ray = ray_space(HERE, direction);
-    let lamp = |(i, t): (usize, &Triangle)| {
-        let [a, b, c] = triangle_vertices(scene, i as u32);
-        let (t, material) = (intersect_triangle(&ray, [a, b, c], INFINITE_DISTANCE)?.0, t.material);
-        let cosine = -(b - a).cross(c - a).normalize().dot(direction);
-        (cosine > 0.0).then(|| triangle_light_pdf(scene, material, t, cosine))
+    let lamp = |i: usize| {
+        let (t, barycentric) = intersect_triangle(&ray, triangle_vertices(scene, i as u32), INFINITE_DISTANCE)?;
+        let s = surface_at(scene, &Hit { t, triangle: i as u32, instance: NONE, barycentric });
+        let cosine = -s.geometric.dot(direction);
+        (cosine > 0.0).then(|| triangle_light_pdf(scene, &s, HERE, t, cosine))
     };
-    f64::from(sky) + scene.triangles.iter().enumerate().filter_map(lamp).map(f64::from).sum::<f64>()
+    f64::from(sky) + (0..scene.triangles.len()).filter_map(lamp).map(f64::from).sum::<f64>()
 }
 
 fn samples(scene: &Scene, count: u32, seed: u32) -> impl Iterator<Item = LightSample> {
@@ -89,7 +90,10 @@ const LAMP: [Vec3; 3] = [vec3(-1.0, -0.8, -1.2), vec3(1.6, -0.5, -0.6), vec3(0.1
 
 fn one_lamp() -> Scene {
     let place = Workplace::new().obj("lamp.obj", &[LAMP]);
-    place.scene("[[material]]\nname = 'a'\nemission = [2.0, 3.0, 5.0]\n[[mesh]]\nfile = 'lamp.obj'\nmaterial = 'a'\n")
+    let text = "[[material]]\nname = 'a'\nemission = [2.0, 3.0, 5.0]\n[[mesh]]\nfile = 'lamp.obj'\nmaterial = 'a'\n";
+    let scene = place.scene(text);
+    assert!(scene.large_lamps, "sampled by solid angle");
+    scene
 }
 
 fn constant_sky() -> Scene {
@@ -127,8 +131,14 @@ fn many_lights() -> Scene {
     place.scene(&text)
 }
 
-fn single_lights() -> [(&'static str, Scene); 3] {
-    [("triangle", one_lamp()), ("constant sky", constant_sky()), ("image sky", image_sky(16, 8))]
+fn single_lights() -> [(&'static str, Scene); 4] {
+    let by_area = Scene { large_lamps: false, ..one_lamp() };
+    [
+        ("triangle", one_lamp()),
+        ("triangle by area", by_area),
+        ("constant sky", constant_sky()),
+        ("image sky", image_sky(16, 8)),
+    ]
 }
 
 #[test]
@@ -159,7 +169,7 @@ fn lights_are_drawn_with_their_probabilities() {
     let p = |scene: &Scene| {
         let mut observed = vec![0.0; scene.lights.len()];
         let words = (0..1 << 18).map(|i| sample_2d_bits(sampler_start(0, i, 9, true), 0)[0]);
-        words.for_each(|word| observed[alias_choose(&scene.light_table, word) as usize] += 1.0);
+        words.for_each(|word| observed[alias_choose(&scene.light_table, word).0 as usize] += 1.0);
         let expected: Vec<_> = scene.lights.iter().map(|l| f64::from(l.probability) * f64::from(1 << 18)).collect();
         chi_square(&observed, &expected)
     };
@@ -211,5 +221,54 @@ fn the_density_of_a_sky_integrates_to_one() {
         assert_eq!(Grid::new(&scene).directions().filter(missed).count(), 0, "{width} x {height}: light never drawn");
         scene.environment.as_mut().unwrap().texels[width as usize - 1][3] += 1e-3;
         assert!((sum(&scene) - 1.0).abs() > 1e-4, "control: {width} x {height}");
+    }
+}
+
+#[test]
+fn what_is_left_of_a_choice_is_independent_of_it() {
+    const BINS: usize = 16;
+    let table = &many_lights().light_table;
+    let p = |rest: &dyn Fn(u32) -> (u32, u32)| {
+        let mut observed = vec![0.0; table.len() * BINS];
+        for i in 0..1 << 19 {
+            let (chosen, rest) = rest(sample_2d_bits(sampler_start(0, i, 9, true), 0)[0]);
+            observed[chosen as usize * BINS + (rest >> 28) as usize] += 1.0;
+        }
+        let expected: Vec<_> =
+            observed.chunks(BINS).flat_map(|c| [c.iter().sum::<f64>() / BINS as f64; BINS]).collect();
+        chi_square(&observed, &expected)
+    };
+    let found = p(&|word| alias_choose(table, word));
+    assert!(found > sidak(1), "{found:.1e}");
+    let word_itself = p(&|word| (alias_choose(table, word).0, word));
+    assert!(word_itself < sidak(1), "control: the word that chose");
+}
+
+/// Variance of the mean of 64 light samples' irradiance on a floor, over many pixels.
+fn variance(scene: &Scene, independent: bool) -> f64 {
+    let irradiance = |pixel: u32| {
+        let sample = |i| {
+            let s = sampler_start(pixel, i, 1, independent);
+            let light = light_sample(scene, HERE, sample_2d_bits(s, 0)[0], sample_2d(s, 1));
+            f64::from(light.radiance.x * light.direction.y.max(0.0))
+        };
+        (0..64).map(sample).sum::<f64>() / 64.0
+    };
+    let all: Vec<f64> = (0..400).map(irradiance).collect();
+    let mean = all.iter().sum::<f64>() / 400.0;
+    all.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 399.0
+}
+
+#[test]
+fn skies_gain_from_stratified_samples() {
+    let sky = |x: u32, y: u32| 0.2 + ((x * x * 7 + y * 13) % 32) as f32 * if y < 12 { 0.3 } else { 0.02 };
+    let place = Workplace::new().sky("sky.exr", 64, 32, sky);
+    let alone = place.scene("[environment]\nfile = 'sky.exr'\n");
+    let light = "[[light]]\ntype = 'directional'\ndirection = [0.0, -1.0, 0.2]\nirradiance = 5.0\n";
+    let beside = place.scene(&format!("[environment]\nfile = 'sky.exr'\n{light}"));
+    for (name, scene) in [("alone", alone), ("beside a light", beside)] {
+        let ratio = variance(&scene, false) / variance(&scene, true);
+        println!("{name}: {ratio:.3} of the variance of independent samples");
+        assert!(ratio < 0.8, "{name}: {ratio}");
     }
 }

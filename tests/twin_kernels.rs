@@ -20,7 +20,7 @@ use tallow::renderer::{Batch, Outputs, Renderer, Step, all_effects, called_for, 
 use tallow::scene::Scene;
 use tallow::settings::{PixelFilter, Settings};
 use tallow::shaders::shared;
-use twin::{Aim, BALL, Random, Workplace, aimed_at_seam, ball, instanced_ball};
+use twin::{Aim, BALL, Random, Workplace, aimed_at_seam, ball, instanced_ball, under_a_panel};
 
 const SIDE: u32 = 48;
 const SAMPLES: u32 = 3;
@@ -185,6 +185,9 @@ fn renders_agree_with_their_twins() {
         check(file, &run(&gpu, &scene, called_for(&scene, outputs)));
     }
     check("wide sky", &run(&gpu, &wide_sky(), called_for(&wide_sky(), outputs)));
+    let mut panel = under_a_panel();
+    small(&mut panel.settings);
+    check("panel", &run(&gpu, &panel, called_for(&panel, outputs)));
     let scene = pictures();
     let mut pair = run(&gpu, &scene, called_for(&scene, outputs));
     check("pictures", &pair);
@@ -406,6 +409,59 @@ fn closed_meshes_do_not_leak() {
         let hole = scene.triangles[1234].v0;
         scene.triangles[1234].v1 = hole;
         assert!(!leaks(&gpu, &scene, false).is_empty(), "control: a missing triangle leaks");
+    }
+    assert_silent(&gpu);
+}
+
+/// A lamp, a point light, a sky, a smooth ball twice (one is an instance), a coat and glass, all `scale` times as large.
+fn scaled(scale: f64) -> Scene {
+    let v = |x: f64, y: f64, z: f64| format!("[{:e}, {:e}, {:e}]", x * scale, y * scale, z * scale);
+    let mut scene = Workplace::new().scene(&format!(
+        "[camera]\nposition = {}\ntarget = {}\nfov = 45.0\n[render]\nmax_depth = 4\n[environment]\nradiance = 0.2\n\
+         [[light]]\ntype = 'point'\nposition = {}\nintensity = {:e}\n\
+         [[material]]\nname = 'coat'\ntype = 'coated'\nalpha = 0.2\n[[material]]\nname = 'glass'\ntype = 'dielectric'\n\
+         [[material]]\nname = 'lamp'\nemission = 9.0\n\
+         [[mesh]]\nshape = 'rectangle'\ntransform = {{ rotate = [-90.0, 0.0, 0.0], scale = {:e} }}\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'lamp'\n\
+         transform = {{ rotate = [75.0, 0.0, 0.0], scale = {:e}, translate = {} }}\n\
+         [[mesh]]\nname = 'ball'\nshape = 'sphere'\nsegments = 24\nmaterial = 'coat'\n\
+         [[instance]]\nmesh = 'ball'\ntransform = {{ rotate = [30.0, 0.0, 0.0], scale = {:e}, translate = {} }}\n\
+         [[instance]]\nmesh = 'ball'\nmaterial = 'glass'\ntransform = {{ scale = {:e}, translate = {} }}\n",
+        v(0.0, 1.4, 5.0),
+        v(0.0, 0.7, 0.0),
+        v(1.0, 2.0, 2.0),
+        5.0 * scale * scale,
+        4.0 * scale,
+        0.5 * scale,
+        v(0.0, 3.0, 0.5),
+        0.7 * scale,
+        v(-0.8, 0.7, 0.0),
+        0.5 * scale,
+        v(0.9, 0.5, 0.5),
+    ));
+    small(&mut scene.settings);
+    scene
+}
+
+#[test]
+fn the_unit_of_length_does_not_matter() {
+    let gpu = gpu();
+    let samples = |scale: f64| {
+        let scene = scaled(scale);
+        let effects = called_for(&scene, Outputs { split_light: true, guides: true, counters: false });
+        run(&gpu, &scene, effects).samples
+    };
+    let [device, twin] = samples(1.0);
+    for scale in [2f64.powi(-33), 2f64.powi(33)] {
+        let [d, t] = samples(scale);
+        assert!(d == device && t == twin, "{scale:e}: to the last bit");
+    }
+    for scale in [1e-10, 1e-5, 1e5, 1e10] {
+        let other = samples(scale);
+        for (is, was) in other.into_iter().zip([&device, &twin]) {
+            let share = agreement(&[is, was.clone()]);
+            assert!(share > 0.98, "{scale:e}: {share} of samples agree");
+        }
     }
     assert_silent(&gpu);
 }

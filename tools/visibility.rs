@@ -8,7 +8,7 @@ use tallow::gpu::layout::NONE;
 use tallow::reference::camera::{camera_ray, film_from_pixel};
 use tallow::reference::light::INFINITE_DISTANCE;
 use tallow::reference::sampler::{sample_2d, sampler_start};
-use tallow::reference::surface::{offset_origin, surface_at};
+use tallow::reference::surface::surface_at;
 use tallow::reference::traverse::traverse_from;
 use tallow::reference::warp::warp_sphere;
 use tallow::scene::Scene;
@@ -41,6 +41,6 @@ fn sample(scene: &Scene, pixel: u32, index: u32, reach: f32) -> f32 {
     let normal = if s.geometric.dot(ray.direction) > 0.0 { -s.geometric } else { s.geometric };
     let sphere = warp_sphere(sample_2d(random, 1));
     let direction = if sphere.dot(normal) < 0.0 { -sphere } else { sphere };
-    let blocker = meets([hit.triangle, hit.instance], offset_origin(s.position, normal), direction, reach, true);
+    let blocker = meets([hit.triangle, hit.instance], s.ray_origin(normal), direction, reach, true);
     f32::from(!blocker.any())
 }

@@ -184,6 +184,9 @@ bool bsdf_sample(Bsdf b, vec3 wo, float u_lobe, vec2 u, out BsdfSample s) {
 // A conductor or a dielectric: light scatters at its surface alone.
 bool is_interface(Bsdf b) { return is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR) || is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC); }
 
+// A lobe around the mirror image of `wo`.
+bool bsdf_is_specular(Bsdf b) { return is_interface(b) || is_kind(FX_COATED, b, BSDF_COATED); }
+
 // Every lobe is a delta: no light sample can contribute, and a filter has nothing to blur.
 bool bsdf_is_delta(Bsdf b) { return is_interface(b) && is_smooth(b); }
 

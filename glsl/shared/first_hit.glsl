@@ -8,7 +8,7 @@ Guide first_hit(Ray ray, uint mask_seed, out bool delta) {
     Surface s = surface_at(hit);
     Bsdf bsdf = surface_bsdf(s);
     delta = bsdf_is_delta(bsdf);
-    vec3 normal = dot(s.normal, ray.direction) > 0.0 ? -s.normal : s.normal;
+    vec3 normal = side_of(s, -ray.direction) * s.normal;
     vec3 albedo = bsdf_albedo(bsdf, -dot(s.normal, ray.direction));
     return Guide(normal, hit.t + push.camera.near, s.position, s.object, albedo, s.material);
 }

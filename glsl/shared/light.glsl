@@ -11,11 +11,18 @@ const float INFINITE_DISTANCE = 3e38;
 
 uvec4 light_texel(uint light, uint i) { return texelFetch(lights, int(4u * light + i)); }
 
-uint alias_choose(usamplerBuffer table, uint n, uint random) {
+// `random` is left as a word that is independent of the choice and as well stratified as it was: where in its share of the slot
+// it fell. A hash fills up the bits that the choice used.
+uint alias_choose(usamplerBuffer table, uint n, inout uint random) {
     uint slot, low;
     umulExtended(random, n, slot, low);
     uvec2 entry = texelFetch(table, int(slot)).xy; // threshold, alias
-    return low < entry.x ? slot : entry.y;
+    bool stays = low < entry.x;
+    uint hash = pcg(random);
+    float into = float(stays ? low : low - entry.x) + float(hash) * (float(n) / 4294967296.0);
+    float share = stays ? float(entry.x) : 4294967296.0 - float(entry.x);
+    random = (min(uint(into / share * 16777216.0), 0xffffffu) << 8) | (hash & 0xffu);
+    return stays ? slot : entry.y;
 }
 
 // Environment direction: u = atan(x, -z) / 2pi, v = acos(y) / pi in the environment's own frame (row 0 is +y). acos would
@@ -77,8 +84,7 @@ void sample_environment(uint light, float chosen, uint word, vec2 u, inout Light
         s.pdf = chosen * (0.25 / PI);
     } else {
         uvec2 size = environment_extent();
-        // The word chose the light; its hash chooses the texel, so that the two choices are independent.
-        uint texel = alias_choose(environment_table, size.x * size.y, pcg(word));
+        uint texel = alias_choose(environment_table, size.x * size.y, word);
         vec2 uv = (vec2(texel % size.x, texel / size.x) + u) / vec2(size);
         float phi = 2.0 * PI * uv.x, theta = PI * uv.y;
         float sine = sin(theta);
@@ -90,14 +96,57 @@ void sample_environment(uint light, float chosen, uint word, vec2 u, inout Light
     s.radiance = s.pdf > 0.0 ? s.radiance / s.pdf : vec3(0.0);
 }
 
+// A triangle seen from a point: unit vectors to its corners, and its solid angle (Van Oosterom and Strackee 1983; the volume
+// comes from the edges, since unit vectors of a small triangle differ too little).
+struct SphericalTriangle {
+    vec3 a, b, c;
+    float solid_angle;
+};
+
+SphericalTriangle spherical_triangle(vec3 a, vec3 e1, vec3 e2) {
+    vec3 b = a + e1, c = a + e2;
+    vec3 inverse = inversesqrt(max(vec3(dot(a, a), dot(b, b), dot(c, c)), 1e-37));
+    SphericalTriangle t = SphericalTriangle(a * inverse.x, b * inverse.y, c * inverse.z, 0.0);
+    float volume = abs(dot(t.a, cross(e1 * inverse.y, e2 * inverse.z)));
+    t.solid_angle = 2.0 * atan(volume, 1.0 + dot(t.a, t.b) + dot(t.b, t.c) + dot(t.c, t.a));
+    return t;
+}
+
+// Where sampling by solid angle pays and is exact in single precision; elsewhere triangles are sampled by area.
+bool by_solid_angle(float solid_angle) { return FX_LARGE_LAMPS && solid_angle > 3e-4 && solid_angle < 6.0; }
+
+// Uniform by solid angle: u.x cuts off the triangle `a`, `b`, `d` with d on the arc from `a` to `c`, u.y chooses a point of the
+// arc from `b` to d (Arvo 1995). tan(ad / 2) follows from the solid angle's formula for `a`, `b`, d.
+vec3 sample_spherical_triangle(SphericalTriangle t, vec2 u) {
+    float half_angle = 0.5 * u.x * t.solid_angle;
+    vec3 along = normalize(t.c - dot(t.a, t.c) * t.a);
+    float volume = abs(dot(cross(t.a, t.b), along));
+    float s = sin(half_angle), ab = dot(t.a, t.b);
+    float half_tan = (1.0 + ab) * s / max(volume * cos(half_angle) - dot(t.b, along) * s, 1e-10);
+    vec3 d = ((1.0 - half_tan * half_tan) * t.a + 2.0 * half_tan * along) / (1.0 + half_tan * half_tan);
+    vec3 chord = d - t.b;
+    float rest = 0.5 * u.y * dot(chord, chord); // 1 - cosine of the part of the arc
+    vec3 across = d - dot(d, t.b) * t.b;
+    return (1.0 - rest) * t.b + sqrt(rest * (2.0 - rest)) * across * inversesqrt(max(dot(across, across), 1e-30));
+}
+
 void sample_triangle_light(vec3 p, vec3 a, vec3 b, vec3 c, float chosen, vec2 u, uvec4 words, uint light, inout LightSample s) {
     vec2 bary = warp_triangle(u);
     vec3 e1 = b - a, e2 = c - a;
-    vec3 scaled = cross(e1, e2);
-    float doubled_area = length(scaled);
-    vec3 n = scaled / doubled_area;
+    float doubled_area;
+    vec3 n = unit_vector(cross(e1, e2), doubled_area);
+    float solid_angle = 0.0;
+    if (FX_LARGE_LAMPS) {
+        SphericalTriangle seen = spherical_triangle(a - p, e1, e2);
+        solid_angle = seen.solid_angle;
+        vec3 w = sample_spherical_triangle(seen, u);
+        vec3 q = dot(a - p, n) / dot(w, n) * w - (a - p);
+        vec2 at = clamp(vec2(dot(cross(q, e2), n), dot(cross(e1, q), n)) / doubled_area, 0.0, 1.0);
+        if (by_solid_angle(solid_angle)) bary = at;
+    }
     vec3 on_light = a + bary.x * e1 + bary.y * e2;
-    vec3 to_light = offset_origin(on_light, n) - p; // the front side is the only one that emits
+    // The front side is the only one that emits.
+    vec3 to_light = on_light + plane_clearance(n, abs(a), e1, e2) * n - p;
     float d2 = dot(to_light, to_light);
     s.distance = sqrt(d2);
     s.direction = to_light / s.distance;
@@ -112,6 +161,7 @@ void sample_triangle_light(vec3 p, vec3 a, vec3 b, vec3 c, float chosen, vec2 u,
     if (FX_ALPHA_MASKS) radiance *= surface_opacity(words.w, triangle, bary);
     bool lit = cosine > 0.0 && d2 > 0.0;
     s.pdf = lit ? chosen * 2.0 * d2 / (cosine * doubled_area) : 0.0;
+    if (lit && by_solid_angle(solid_angle)) s.pdf = chosen / solid_angle;
     s.radiance = lit ? radiance / s.pdf : vec3(0.0);
 }
 
@@ -128,7 +178,7 @@ LightSample light_sample(vec3 p, uint word, vec2 u) {
         sample_triangle_light(p, a, b, c, chosen, u, w3, light, s);
     } else if ((FX_POINT && kind == LIGHT_POINT) || (FX_SPOT && kind == LIGHT_SPOT)) {
         vec3 to_light = a - p;
-        float d2 = max(dot(to_light, to_light), 1e-20);
+        float d2 = max(dot(to_light, to_light), 1e-30);
         s.distance = sqrt(d2);
         s.direction = to_light / s.distance;
         s.radiance = value / (d2 * chosen);
@@ -147,8 +197,14 @@ LightSample light_sample(vec3 p, uint word, vec2 u) {
     return s;
 }
 
-// Density per solid angle with which light_sample chooses a point of an emissive triangle hit by a ray.
-float triangle_light_pdf(uint material, float t, float cosine) {
-    float weight = uintBitsToFloat(material_texel(material, 7u).z);
-    return push.triangle_pdf_scale * weight * t * t / max(cosine, 1e-20);
+// Density per solid angle with which light_sample chooses, from `origin`, a point of an emissive triangle hit by a ray.
+float triangle_light_pdf(Surface s, vec3 origin, float t, float cosine) {
+    float density = push.triangle_pdf_scale * uintBitsToFloat(material_texel(s.material, 7u).z); // over area
+    if (FX_LARGE_LAMPS) {
+        float doubled_area;
+        unit_vector(cross(s.e1, s.e2), doubled_area);
+        float solid_angle = spherical_triangle(s.corner - origin, s.e1, s.e2).solid_angle;
+        if (by_solid_angle(solid_angle)) return density * 0.5 * doubled_area / solid_angle;
+    }
+    return density * t * t / max(cosine, 1e-20);
 }

@@ -230,6 +230,11 @@ pub fn bsdf_sample(b: &Bsdf, wo: Vec3, u_lobe: f32, u: Vec2) -> (bool, BsdfSampl
     }
 }
 
+/// A lobe around the mirror image of `wo`.
+pub fn bsdf_is_specular(b: &Bsdf) -> bool {
+    matches!(b.kind, BSDF_CONDUCTOR | BSDF_DIELECTRIC | BSDF_COATED)
+}
+
 /// Every lobe is a delta.
 pub fn bsdf_is_delta(b: &Bsdf) -> bool {
     matches!(b.kind, BSDF_CONDUCTOR | BSDF_DIELECTRIC) && is_smooth(b)

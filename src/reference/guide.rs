@@ -4,7 +4,7 @@ use crate::reference::bsdf::{bsdf_albedo, bsdf_is_delta};
 use crate::reference::camera::{Ray, camera_ray, film_from_pixel};
 use crate::reference::light::INFINITE_DISTANCE;
 use crate::reference::sampler::pcg;
-use crate::reference::surface::{surface_at, surface_bsdf};
+use crate::reference::surface::{side_of, surface_at, surface_bsdf};
 use crate::reference::traverse::traverse;
 use crate::scene::Scene;
 use glam::{Vec2, vec2};
@@ -25,7 +25,7 @@ pub fn first_hit(scene: &Scene, push: &PathPush, ray: Ray, mask_seed: u32) -> (G
     }
     let s = surface_at(scene, &hit);
     let bsdf = surface_bsdf(scene, &s);
-    let normal = if s.normal.dot(ray.direction) > 0.0 { -s.normal } else { s.normal };
+    let normal = side_of(&s, -ray.direction) * s.normal;
     let guide = Guide {
         normal: normal.into(),
         depth: hit.t + push.camera.near,

@@ -2,7 +2,7 @@
 use crate::gpu::layout::*;
 use crate::reference::sampler::pcg;
 use crate::reference::scene::texture_coordinates;
-use crate::reference::surface::offset_origin;
+use crate::reference::surface::{Surface, plane_clearance, unit_vector};
 use crate::reference::texture::{surface_opacity, texture_sample};
 use crate::reference::warp::{warp_sphere, warp_triangle};
 use crate::scene::{Environment, Scene};
@@ -25,12 +25,18 @@ pub struct LightSample {
 /// Of lights at infinity.
 pub const INFINITE_DISTANCE: f32 = 3e38;
 
-/// The entry that a random word stands for.
-pub fn alias_choose(table: &[AliasEntry], random: u32) -> u32 {
+/// The entry that a random word stands for, and a word that is independent of it and as well stratified.
+pub fn alias_choose(table: &[AliasEntry], random: u32) -> (u32, u32) {
     let product = u64::from(random) * table.len() as u64;
     let (slot, low) = ((product >> 32) as u32, product as u32);
     let entry = table[slot as usize];
-    if low < entry.threshold { slot } else { entry.alias }
+    let stays = low < entry.threshold;
+    let hash = pcg(random);
+    let into =
+        (if stays { low } else { low - entry.threshold }) as f32 + hash as f32 * (table.len() as f32 / 4294967296.0);
+    let share = if stays { entry.threshold as f32 } else { 4294967296.0 - entry.threshold as f32 };
+    let rest = (((into / share * 16777216.0) as u32).min(0xffffff) << 8) | (hash & 0xff);
+    (if stays { slot } else { entry.alias }, rest)
 }
 
 fn environment_uv(d: Vec3, sine: f32) -> Vec2 {
@@ -80,7 +86,7 @@ fn sample_environment(scene: &Scene, light: &Light, word: u32, u: Vec2) -> Light
     let (direction, radiance, pdf) = match &scene.environment {
         None => (warp_sphere(u), light.value.into(), light.probability * (0.25 / PI)),
         Some(e) => {
-            let texel = alias_choose(&e.table, pcg(word));
+            let (texel, _) = alias_choose(&e.table, word);
             let corner = vec2((texel % e.width) as f32, (texel / e.width) as f32);
             let uv = (corner + u) / vec2(e.width as f32, e.height as f32);
             let (phi, theta) = (2.0 * PI * uv.x, PI * uv.y);
@@ -94,15 +100,54 @@ fn sample_environment(scene: &Scene, light: &Light, word: u32, u: Vec2) -> Light
     LightSample { direction, distance: INFINITE_DISTANCE, radiance, pdf }
 }
 
+/// A triangle seen from a point: unit vectors to its corners, and its solid angle.
+struct SphericalTriangle {
+    corners: [Vec3; 3],
+    solid_angle: f32,
+}
+
+impl SphericalTriangle {
+    fn new([a, e1, e2]: [Vec3; 3]) -> Self {
+        let inverse = [a, a + e1, a + e2].map(|v| 1.0 / v.length_squared().max(1e-37).sqrt());
+        let [a, b, c] = [a * inverse[0], (a + e1) * inverse[1], (a + e2) * inverse[2]];
+        let volume = a.dot((e1 * inverse[1]).cross(e2 * inverse[2])).abs();
+        let solid_angle = 2.0 * volume.atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a));
+        Self { corners: [a, b, c], solid_angle }
+    }
+
+    /// Whether it is sampled so, and not by area.
+    fn by_solid_angle(&self, scene: &Scene) -> bool {
+        scene.large_lamps && self.solid_angle > 3e-4 && self.solid_angle < 6.0
+    }
+
+    /// A direction, uniform by solid angle (Arvo 1995).
+    fn sample(&self, u: Vec2) -> Vec3 {
+        let [a, b, c] = self.corners;
+        let (sin, cos) = (0.5 * u.x * self.solid_angle).sin_cos();
+        let along = (c - a.dot(c) * a).normalize();
+        let volume = a.cross(b).dot(along).abs();
+        let half_tan = (1.0 + a.dot(b)) * sin / (volume * cos - b.dot(along) * sin).max(1e-10);
+        let d = ((1.0 - half_tan * half_tan) * a + 2.0 * half_tan * along) / (1.0 + half_tan * half_tan);
+        let rest = 0.5 * u.y * (d - b).length_squared();
+        let across = d - d.dot(b) * b;
+        (1.0 - rest) * b + (rest * (2.0 - rest)).sqrt() * across / across.length_squared().max(1e-30).sqrt()
+    }
+}
+
 fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> LightSample {
     let [a, b, c] = [light.a, light.b, light.c].map(Vec3::from);
-    let bary = warp_triangle(u);
+    let mut bary = warp_triangle(u);
     let (e1, e2) = (b - a, c - a);
-    let scaled = e1.cross(e2);
-    let doubled_area = scaled.length();
-    let n = scaled / doubled_area;
+    let (n, doubled_area) = unit_vector(e1.cross(e2));
+    let seen = SphericalTriangle::new([a - p, e1, e2]);
+    if seen.by_solid_angle(scene) {
+        let w = seen.sample(u);
+        let q = (a - p).dot(n) / w.dot(n) * w - (a - p);
+        bary = vec2(q.cross(e2).dot(n), e1.cross(q).dot(n)) / doubled_area;
+        bary = bary.clamp(Vec2::ZERO, Vec2::ONE);
+    }
     let on_light = a + bary.x * e1 + bary.y * e2;
-    let to_light = offset_origin(on_light, n) - p;
+    let to_light = on_light + plane_clearance(n, a.abs(), e1, e2) * n - p;
     let d2 = to_light.dot(to_light);
     let distance = d2.sqrt();
     let direction = to_light / distance;
@@ -115,13 +160,17 @@ fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> Ligh
     }
     radiance *= surface_opacity(scene, light.material, light.triangle, bary);
     let lit = cosine > 0.0 && d2 > 0.0;
-    let pdf = if lit { light.probability * 2.0 * d2 / (cosine * doubled_area) } else { 0.0 };
+    let density = match seen.by_solid_angle(scene) {
+        true => light.probability / seen.solid_angle,
+        false => light.probability * 2.0 * d2 / (cosine * doubled_area),
+    };
+    let pdf = if lit { density } else { 0.0 };
     LightSample { direction, distance, radiance: if lit { radiance / pdf } else { Vec3::ZERO }, pdf }
 }
 
 fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
     let to_light = Vec3::from(light.a) - p;
-    let d2 = to_light.dot(to_light).max(1e-20);
+    let d2 = to_light.dot(to_light).max(1e-30);
     let distance = d2.sqrt();
     let direction = to_light / distance;
     let mut radiance = Vec3::from(light.value) / (d2 * light.probability);
@@ -135,7 +184,7 @@ fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
 
 /// One light for the surface point `p`. Radiance is 0 when the light cannot reach the point.
 pub fn light_sample(scene: &Scene, p: Vec3, word: u32, u: Vec2) -> LightSample {
-    let chosen = if scene.lights.len() == 1 { 0 } else { alias_choose(&scene.light_table, word) };
+    let (chosen, word) = if scene.lights.len() == 1 { (0, word) } else { alias_choose(&scene.light_table, word) };
     let light = &scene.lights[chosen as usize];
     match light.kind {
         LIGHT_TRIANGLE => sample_triangle_light(scene, light, p, u),
@@ -150,8 +199,14 @@ pub fn light_sample(scene: &Scene, p: Vec3, word: u32, u: Vec2) -> LightSample {
     }
 }
 
-/// Density per solid angle with which [`light_sample`] chooses a point of an emissive triangle hit by a ray.
-pub fn triangle_light_pdf(scene: &Scene, material: u32, t: f32, cosine: f32) -> f32 {
-    let weight = scene.materials[material as usize].emission_weight;
-    scene.triangle_pdf_scale * weight * t * t / cosine.max(1e-20)
+/// Density per solid angle with which [`light_sample`] chooses, from `origin`, a point of an emissive triangle hit by a
+/// ray.
+pub fn triangle_light_pdf(scene: &Scene, s: &Surface, origin: Vec3, t: f32, cosine: f32) -> f32 {
+    let [a, e1, e2] = s.triangle;
+    let density = scene.triangle_pdf_scale * scene.materials[s.material as usize].emission_weight;
+    let seen = SphericalTriangle::new([a - origin, e1, e2]);
+    match seen.by_solid_angle(scene) {
+        true => density * 0.5 * unit_vector(e1.cross(e2)).1 / seen.solid_angle,
+        false => density * t * t / cosine.max(1e-20),
+    }
 }

@@ -1,10 +1,14 @@
 //! Twin of `glsl/path.comp`.
 use crate::gpu::layout::{BSDF_DIELECTRIC, Effects, MATERIAL_TWO_SIDED, NONE, PathPush};
-use crate::reference::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_sample, relative_index};
+use crate::reference::bsdf::{
+    Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_is_specular, bsdf_sample, relative_index,
+};
 use crate::reference::camera::{eye_ray, film_sample, path_seed};
 use crate::reference::light::*;
 use crate::reference::sampler::{Sampler, pcg, sample_2d, sample_2d_bits, sampler_start};
-use crate::reference::surface::{Surface, offset_origin, surface_at, surface_bsdf, surface_emission};
+use crate::reference::surface::{
+    Facing, Surface, facing_normals, light_share, surface_at, surface_bsdf, surface_emission,
+};
 use crate::reference::traverse::traverse_from;
 use crate::reference::warp::basis_from_normal;
 use crate::scene::Scene;
@@ -16,6 +20,10 @@ const PAIR_CHOICE: u32 = 0;
 const PAIR_LIGHT: u32 = 1;
 const PAIR_BSDF: u32 = 2;
 const PAIR_ROULETTE: u32 = 3;
+
+/// Shadow rays to a lamp end at this part of the way: the error of the distance at which they would meet it is some 2^-24
+/// over the cosine there.
+pub const SHADOW_END: f32 = 1.0 - 1e-5;
 
 /// What one path returns, linear Rec. 709. Without [`Effects::indirect`] all light is in `direct`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -76,6 +84,7 @@ pub struct Tracer<'a> {
 struct Shade {
     surface: Surface,
     bsdf: Bsdf,
+    facing: Facing,
     basis: Mat3,
     wo: Vec3,
     pair: u32,
@@ -118,7 +127,7 @@ impl Tracer<'_> {
         if cosine <= 0.0 {
             return Vec3::ZERO;
         }
-        let pdf = triangle_light_pdf(self.scene, s.material, t, cosine);
+        let pdf = triangle_light_pdf(self.scene, s, path.origin, t, cosine);
         let weight = if path.delta { 1.0 } else { self.balance(path.bsdf_pdf, pdf, Strategy::Bsdf) };
         surface_emission(self.scene, s) * weight
     }
@@ -131,18 +140,19 @@ impl Tracer<'_> {
         if light.radiance == Vec3::ZERO {
             return None;
         }
-        let f = bsdf_evaluate(&p.bsdf, p.wo, p.basis.transpose() * light.direction);
+        let wi = p.basis.transpose() * light.direction;
+        let f = bsdf_evaluate(&p.bsdf, p.wo, wi);
+        let share = light_share(s, &p.facing, light.direction, wi.z);
         let weight = if light.pdf > 0.0 { self.balance(light.pdf, f.w, Strategy::Light) } else { 1.0 };
-        let contribution = f.truncate() * light.radiance * weight;
+        let contribution = f.truncate() * share * light.radiance * weight;
         if contribution.max_element() <= 0.0 || contribution.is_nan() {
             return None;
         }
-        let normal = if light.direction.dot(s.geometric) < 0.0 { -s.geometric } else { s.geometric };
-        let origin = offset_origin(s.position, normal);
+        let origin = s.ray_origin(light.direction);
         let (mut direction, mut distance) = (light.direction, light.distance);
         if distance < INFINITE_DISTANCE {
             direction = s.position + light.distance * light.direction - origin;
-            distance = 1.0 - 1e-6;
+            distance = SHADOW_END;
         }
         let blocker = traverse_from(self.scene, p.from, origin, direction, distance, true, mask_seed);
         Some(if blocker.any() { Vec3::ZERO } else { contribution })
@@ -154,11 +164,9 @@ impl Tracer<'_> {
         if !scattered {
             return false;
         }
-        let geometric = p.surface.geometric;
-        path.throughput *= next.weight;
         path.direction = p.basis * next.wi;
-        let normal = if path.direction.dot(geometric) < 0.0 { -geometric } else { geometric };
-        path.origin = offset_origin(p.surface.position, normal);
+        path.throughput *= next.weight * light_share(&p.surface, &p.facing, path.direction, next.wi.z);
+        path.origin = p.surface.ray_origin(path.direction);
         path.bsdf_pdf = next.pdf;
         path.delta = next.delta;
         if p.bsdf.kind == BSDF_DIELECTRIC && p.wo.z * next.wi.z < 0.0 {
@@ -177,11 +185,11 @@ impl Tracer<'_> {
     }
 
     fn shade(&self, surface: Surface, direction: Vec3, pair: u32, from: [u32; 2]) -> Shade {
-        let away = surface.normal.dot(direction) > 0.0;
         let bsdf = surface_bsdf(self.scene, &surface);
         let turns = surface.flags & MATERIAL_TWO_SIDED != 0 && bsdf.kind != BSDF_DIELECTRIC;
-        let basis = basis_from_normal(if turns && away { -surface.normal } else { surface.normal });
-        Shade { bsdf, surface, basis, wo: basis.transpose() * -direction, pair, from }
+        let facing = facing_normals(&surface, -direction, turns, bsdf_is_specular(&bsdf));
+        let basis = basis_from_normal(facing.normal);
+        Shade { bsdf, surface, facing, basis, wo: basis.transpose() * -direction, pair, from }
     }
 
     fn trace_path(&self, mut path: Path, random: Sampler, seed: u32) -> PathSample {

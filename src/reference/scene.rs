@@ -18,6 +18,11 @@ impl Rows {
         Vec3::from(self.0.map(|r| r.x * v.x + r.y * v.y + r.z * v.z))
     }
 
+    /// The sum of the magnitudes that are added up for a point of coordinates up to `p`.
+    pub fn magnitude(&self, p: Vec3) -> Vec3 {
+        Vec3::from(self.0.map(|r| r.x.abs() * p.x + r.y.abs() * p.y + r.z.abs() * p.z + r.w.abs()))
+    }
+
     /// The transpose of the linear part: of a normal, when `self` leads the other way.
     pub fn normal(&self, n: Vec3) -> Vec3 {
         Mat3::from_cols(self.0[0].truncate(), self.0[1].truncate(), self.0[2].truncate()) * n

@@ -14,7 +14,9 @@ pub struct Surface {
     pub position: Vec3,
     /// Unit, by the winding of the triangle.
     pub geometric: Vec3,
-    /// Unit shading normal, on the side that the vertex normals point to.
+    /// Unit, interpolated from the vertices, on the side that they point to.
+    pub smooth_normal: Vec3,
+    /// Unit shading normal: the smooth one perturbed by a map.
     pub normal: Vec3,
     /// Index.
     pub material: u32,
@@ -24,6 +26,34 @@ pub struct Surface {
     pub object: u32,
     /// Texture coordinates.
     pub uv: Vec2,
+    /// The triangle in world space: its first vertex and the edges from there.
+    pub triangle: [Vec3; 3],
+    /// Distance from the plane at which rays start, world units.
+    pub clearance: f32,
+}
+
+impl Surface {
+    /// Where a ray that leaves the surface towards `w` starts.
+    pub fn ray_origin(&self, w: Vec3) -> Vec3 {
+        let along = if w.dot(self.geometric) < 0.0 { -self.clearance } else { self.clearance };
+        self.position + along * self.geometric
+    }
+}
+
+/// Unit vector along `v`, and its length; both 0 where `v` is 0.
+pub fn unit_vector(v: Vec3) -> (Vec3, f32) {
+    let largest = v.abs().max_element();
+    let scaled = v / largest.max(1e-37);
+    let length = scaled.length();
+    (scaled / length.max(1e-37), length * largest)
+}
+
+const CLEARANCE: f32 = 1.0 / (1 << 21) as f32;
+
+/// How far along the unit normal `n` a ray must start so that it meets no other triangle of the same plane. `reach`: the
+/// numbers that the point is a sum of.
+pub fn plane_clearance(n: Vec3, reach: Vec3, e1: Vec3, e2: Vec3) -> f32 {
+    CLEARANCE * n.abs().dot(reach + e1.abs().max(e2.abs()).max_element())
 }
 
 /// Unit normal from two snorm words of 16 bits.
@@ -46,8 +76,7 @@ struct Edges {
 
 fn normal_from_map(scene: &Scene, s: &Surface, image: u32, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
     let m = 2.0 * texture_sample(scene, image, s.uv).truncate() - 1.0;
-    let t = dpdu - s.normal * s.normal.dot(dpdu);
-    let t = t * (1.0 / t.dot(t).max(1e-30).sqrt());
+    let (t, _) = unit_vector(dpdu - s.normal * s.normal.dot(dpdu));
     let b = s.normal.cross(t);
     m.x * t + m.y * (if b.dot(dpdv) < 0.0 { -b } else { b }) + m.z * s.normal
 }
@@ -58,9 +87,9 @@ fn normal_from_height(scene: &Scene, s: &Surface, material: &Material, dpdu: Vec
     let scale = Vec2::from(texture.scale).abs().max(Vec2::splat(1e-6));
     let texel = 1.0 / (vec2(texture.width as f32, texture.height as f32) * scale);
     let height = |offset| texture_sample(scene, image, s.uv + offset).x;
-    let h = height(Vec2::ZERO);
-    let hu = (height(vec2(texel.x, 0.0)) - h) / texel.x;
-    let hv = (height(vec2(0.0, texel.y)) - h) / texel.y;
+    let rise = |half: Vec2| height(half) - height(-half);
+    let hu = rise(vec2(0.5 * texel.x, 0.0)) / texel.x;
+    let hv = rise(vec2(0.0, 0.5 * texel.y)) / texel.y;
     let pu = dpdu + s.normal * (material.bump_scale * hu - s.normal.dot(dpdu));
     let pv = dpdv + s.normal * (material.bump_scale * hv - s.normal.dot(dpdv));
     let n = pu.cross(pv);
@@ -80,48 +109,105 @@ fn perturbed_normal(scene: &Scene, s: &Surface, e: &Edges) -> Vec3 {
         0 => normal_from_height(scene, s, material, dpdu, dpdv),
         _ => normal_from_map(scene, s, image, dpdu, dpdv),
     };
-    let len = n.dot(n);
-    if len > 1e-30 && len < 1e38 { n * (1.0 / len.sqrt()) } else { s.normal }
+    let (n, length) = unit_vector(n);
+    if length > 0.0 && length < 1e37 { n } else { s.normal }
 }
 
 /// Position and normals.
 pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
     let [mut p0, p1, p2] = triangle_vertices(scene, hit.triangle);
     let (mut e1, mut e2) = (p1 - p0, p2 - p0);
+    let mut reach = p0.abs();
     let mut object = scene.triangles[hit.triangle as usize].object;
     let instance = scene.instances.get(hit.instance as usize);
     if let Some(i) = instance {
         let world = world_from_object(i);
         (p0, e1, e2) = (world.point(p0), world.vector(e1), world.vector(e2));
+        reach = world.magnitude(object_from_world(i).magnitude(p0.abs()));
         object += i.object;
     }
     let material = material_of(scene, hit.triangle, hit.instance);
     let mirrored = instance.is_some_and(|i| i.mirrored != 0);
     let scaled = if mirrored { e2.cross(e1) } else { e1.cross(e2) };
-    let doubled_area = scaled.length().max(1e-30);
-    let geometric = scaled / doubled_area;
+    let (geometric, _) = unit_vector(scaled);
     let mut s = Surface {
         position: p0 + hit.barycentric.x * e1 + hit.barycentric.y * e2,
         geometric,
+        smooth_normal: geometric,
         normal: geometric,
         material,
         flags: scene.materials[material as usize].flags,
         object,
         uv: Vec2::ZERO,
+        triangle: [p0, e1, e2],
+        clearance: plane_clearance(geometric, reach, e1, e2),
     };
     let Some(shading) = scene.shading.get(hit.triangle as usize) else { return s };
     if shading.normal != [0xffffffff; 3] {
         let [n0, n1, n2] = shading.normal.map(octahedral_decode);
         let n = n0 * (1.0 - hit.barycentric.x) + n1 * hit.barycentric.x + hit.barycentric.y * (n2 - n0);
-        let n = instance.map_or(n, |i| object_from_world(i).normal(n));
-        let len = n.dot(n);
-        s.normal = if len > 1e-20 { n * (1.0 / len.sqrt()) } else { geometric };
+        let (n, length) = unit_vector(instance.map_or(n, |i| object_from_world(i).normal(n)));
+        s.normal = if length > 0.0 { n } else { geometric };
+        s.smooth_normal = s.normal;
     }
     let [uv0, uv1, uv2] = [shading.uv0, shading.uv1, shading.uv2].map(Vec2::from);
     let (d1, d2) = (uv1 - uv0, uv2 - uv0);
     s.uv = uv0 + hit.barycentric.x * d1 + hit.barycentric.y * d2;
     s.normal = perturbed_normal(scene, &s, &Edges { e1, e2, d1, d2 });
     s
+}
+
+/// 1 where `w` leaves the surface on the side of its normals, else -1: the plane of the triangle decides.
+pub fn side_of(s: &Surface, w: Vec3) -> f32 {
+    if s.smooth_normal.dot(s.geometric) * s.geometric.dot(w) < 0.0 { -1.0 } else { 1.0 }
+}
+
+/// The normals of a surface as a viewer needs them.
+#[derive(Clone, Copy, Debug)]
+pub struct Facing {
+    /// Unit, before a map.
+    pub smooth_normal: Vec3,
+    /// Unit, the one that scatters.
+    pub normal: Vec3,
+}
+
+/// For a viewer towards `wo`; on the viewer's side where the surface `turns`. Smooth normals that face away, or that send the
+/// mirror image of `wo` below the plane (where the surface `mirrors`), are bent; those of maps are turned by half a turn.
+pub fn facing_normals(s: &Surface, wo: Vec3, turns: bool, mirrors: bool) -> Facing {
+    const ABOVE: f32 = 1e-3;
+    let side = side_of(s, wo);
+    let (mut n, mut mapped) = (side * s.smooth_normal, side * s.normal);
+    let along = n.dot(wo);
+    let plane = if n.dot(s.geometric) < 0.0 { -s.geometric } else { s.geometric };
+    let image = 2.0 * along * n - wo;
+    let height = image.dot(plane);
+    if (if mirrors { height } else { along }) < 0.0 {
+        let raised = (image + (ABOVE - height) * plane).normalize();
+        n = (if mirrors { wo + raised } else { n + (ABOVE - along) * wo }).normalize();
+        mapped = n;
+    }
+    if mapped.dot(wo) < 0.0 {
+        mapped = 2.0 * mapped.dot(n) * n - mapped;
+    }
+    let back = if turns { 1.0 } else { side };
+    Facing { smooth_normal: back * n, normal: back * mapped }
+}
+
+/// The share of a direction's light that lobes around `facing.normal` keep; `z` is the direction's component along that.
+pub fn light_share(s: &Surface, facing: &Facing, w: Vec3, z: f32) -> f32 {
+    let (tilt, up) = (facing.normal.dot(facing.smooth_normal), w.dot(facing.smooth_normal));
+    if facing.normal.dot(s.geometric) * s.geometric.dot(w) * z < 0.0 {
+        return 0.0;
+    }
+    if s.normal == s.smooth_normal {
+        return 1.0;
+    }
+    if up * z <= 0.0 {
+        return 0.0;
+    }
+    let tan2 = |cosine2: f32, least: f32| (1.0 / cosine2.max(least) - 1.0).max(0.0);
+    let alpha2 = (0.125 * tan2(tilt * tilt, 1e-6)).min(1.0);
+    2.0 / (1.0 + (1.0 + alpha2 * tan2(up * up, 1e-12)).sqrt())
 }
 
 fn textured(scene: &Scene, constant: [f32; 3], image: u32, s: &Surface) -> Vec3 {
@@ -152,17 +238,4 @@ pub fn surface_bsdf(scene: &Scene, s: &Surface) -> Bsdf {
         b.alpha *= r * r;
     }
     b
-}
-
-/// Moves a point off its surface along the unit normal `n` (Waechter and Binder 2019).
-pub fn offset_origin(p: Vec3, n: Vec3) -> Vec3 {
-    const ORIGIN: f32 = 1.0 / 32.0;
-    const FLOAT_SCALE: f32 = 1.0 / 65536.0;
-    const INT_SCALE: f32 = 256.0;
-    let offset = |p: f32, n: f32| {
-        let steps = (INT_SCALE * n) as i32;
-        let stepped = f32::from_bits((p.to_bits() as i32).wrapping_add(if p < 0.0 { -steps } else { steps }) as u32);
-        if p.abs() < ORIGIN { p + FLOAT_SCALE * n } else { stepped }
-    };
-    vec3(offset(p.x, n.x), offset(p.y, n.y), offset(p.z, n.z))
 }

@@ -69,6 +69,8 @@ fn light_effects(scene: &Scene, found: &mut Effects, reasons: &mut Vec<(&'static
     found.directional_lights = light("directional_lights", LIGHT_DIRECTIONAL);
     found.environment = light("environment", LIGHT_ENVIRONMENT);
     found.environment_map = scene.environment.is_some() && light("environment_map", LIGHT_ENVIRONMENT);
+    let large = scene.lights.iter().position(|l| super::light::is_large(scene, l));
+    found.large_lamps = large.inspect(|&i| reasons.push(("large_lamps", light_name(scene, i)))).is_some();
 }
 
 fn light_name(scene: &Scene, index: usize) -> String {

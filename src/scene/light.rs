@@ -133,6 +133,7 @@ pub fn finish(scene: &mut Scene, ranges: &HashMap<u32, Range<usize>>) {
     powers.retain(|&p| p > 0.0);
     let total: f64 = powers.iter().sum();
     scene.triangle_pdf_scale = if total > 0.0 { (PI / total) as f32 } else { 0.0 };
+    scene.large_lamps = lights.iter().any(|l| is_large(scene, l));
     scene.light_table = alias::build(&powers);
     let probabilities = alias::probabilities(&scene.light_table);
     lights.iter_mut().zip(probabilities).for_each(|(l, p)| l.probability = p as f32);
@@ -178,6 +179,15 @@ fn add_range(
         let (triangle, value) = (index as u32, m.emission);
         lights.push(Light { kind: LIGHT_TRIANGLE, a, b, c, triangle, value, material, ..Light::default() });
     }
+}
+
+/// Area of an emissive triangle, in squares of the scene's diagonal, above which sampling by solid angle pays.
+const LARGE: f64 = 0.01;
+
+/// A lamp that fills so much of the sky of points near it that its nearest parts outshine the others.
+pub(super) fn is_large(scene: &Scene, light: &Light) -> bool {
+    let [low, high] = scene.bounds.map(|b| Vec3::from(b).as_dvec3());
+    light.kind == LIGHT_TRIANGLE && geometry::area([light.a, light.b, light.c]) > LARGE * (high - low).length_squared()
 }
 
 /// See the module documentation.

@@ -71,6 +71,8 @@ pub struct Scene {
     /// per square world unit of drawing a point by [`Scene::light_table`] that a path has hit otherwise. 0 without
     /// emissive triangles. Exact up to the rounding of the table (2^-32 / lights) and of 32-bit floats.
     pub triangle_pdf_scale: f32,
+    /// Emissive triangles are sampled by the solid angle in which they are seen, not by area: one is large.
+    pub large_lamps: bool,
     /// The environment image, when the environment is not a constant.
     pub environment: Option<Environment>,
     /// Of all that decides the picture but the settings, in the order of the files: triangles are added before the

@@ -96,6 +96,20 @@ pub fn instanced_ball() -> Scene {
     scene
 }
 
+/// A room under a panel that is as wide as its ceiling.
+pub fn under_a_panel() -> Scene {
+    Workplace::new().scene(
+        "[film]\nwidth = 16\nheight = 16\n[camera]\nposition = [0.2, -0.4, 0.9]\ntarget = [0.0, 0.3, -1.0]\nfov = 80.0\n\
+         [render]\nmax_depth = 3\n[[material]]\nname = 'wall'\ncolor = 0.5\n\
+         [[material]]\nname = 'metal'\ntype = 'conductor'\nmetal = 'Al'\nalpha = 0.2\n\
+         [[material]]\nname = 'lamp'\nemission = [4.0, 5.0, 6.0]\n\
+         [[mesh]]\nshape = 'cube'\nflip_normals = true\nmaterial = 'wall'\n\
+         [[mesh]]\nshape = 'sphere'\nmaterial = 'metal'\ntransform = { translate = [0.3, 0.3, -0.4], scale = 0.4 }\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'lamp'\n\
+         transform = { translate = [0.0, 0.8, 0.0], rotate = [90.0, 0.0, 0.0], scale = 0.9 }\n",
+    )
+}
+
 /// A ray towards a point where triangles meet, `distance` away.
 #[derive(Debug)]
 pub struct Aim {

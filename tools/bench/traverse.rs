@@ -14,7 +14,7 @@ use tallow::gpu::layout::{self, Effects, NONE, RayHit, RayQuery, TraversePush};
 use tallow::gpu::{Buffer, DeviceKind, DeviceOptions, FrameResources, Gpu, Location};
 use tallow::reference::light::INFINITE_DISTANCE;
 use tallow::reference::sampler::{sample_2d, sampler_start};
-use tallow::reference::surface::{offset_origin, surface_at};
+use tallow::reference::surface::surface_at;
 use tallow::reference::traverse::traverse;
 use tallow::reference::warp::{basis_from_normal, warp_cosine_hemisphere};
 use tallow::renderer::{Outputs, Renderer};
@@ -56,7 +56,7 @@ fn bounce(scene: &Scene, i: u32) -> Option<RayQuery> {
     let s = surface_at(scene, &hit);
     let normal = if s.geometric.dot(direction) > 0.0 { -s.geometric } else { s.geometric };
     let direction = basis_from_normal(normal) * warp_cosine_hemisphere(sample_2d(random, 1));
-    let origin = offset_origin(s.position, normal).to_array();
+    let origin = s.ray_origin(normal).to_array();
     let direction = direction.normalize().to_array();
     Some(RayQuery { origin, t_max: INFINITE_DISTANCE, direction, mask_seed: 0 })
 }

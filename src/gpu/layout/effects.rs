@@ -99,4 +99,6 @@ effects! {
     adaptive: FX_ADAPTIVE;
     /// More than 4096 samples of a pixel: means keep what rounding takes off.
     many_samples: FX_MANY_SAMPLES;
+    /// Emissive triangles large enough to be sampled by solid angle.
+    large_lamps: FX_LARGE_LAMPS;
 }
