@@ -116,28 +116,26 @@ fn microfacets(b: &Bsdf, eta: f64, wo: DVec3, wi: DVec3) -> f64 {
     share * d(b.ggx, m, alpha) * g(wo) * g(wi) * co * ci * n * n / (q * q) / wo.z.abs()
 }
 
-/// Flux that the interface reflects and refracts of one unit at cosine `c`, from the side with relative index `eta`.
-fn interface(b: &Bsdf, eta: f64, c: f64) -> [f64; 2] {
+/// Flux that the interface reflects, or lets through, of one unit at cosine `c` from the side with relative index `eta`.
+fn interface(b: &Bsdf, eta: f64, c: f64, through: bool) -> f64 {
     if b.alpha < SMOOTH_ALPHA {
-        return [fresnel(c, eta), 1.0 - fresnel(c, eta)];
+        return if through { 1.0 - fresnel(c, eta) } else { fresnel(c, eta) };
     }
     let wo = dvec3((1.0 - c * c).sqrt(), 0.0, c);
-    [1.0, eta].map(|n| {
-        let grid = Grid { wo, n, alpha: f64::from(b.alpha) };
-        grid.integrate(|wi| microfacets(b, eta, wo, wi.as_dvec3())).iter().sum()
-    })
+    let grid = Grid { wo, n: if through { eta } else { 1.0 }, alpha: f64::from(b.alpha) };
+    grid.integrate(|wi| microfacets(b, eta, wo, wi.as_dvec3())).iter().sum()
 }
 
 /// What a coat's white base gives back of one unit along wo: what the coat lets in, of that what it lets out, and all that
 /// comes of what it reflects inside, 1 / (1 - mean of R inside). By reciprocity, out of a medium goes 1 / eta^2 of the
 /// mean that comes into it.
-pub fn under_coat(b: &Bsdf, wo: Vec3) -> f64 {
+fn under_coat(b: &Bsdf, wo: Vec3) -> f64 {
     let eta = f64::from(b.eta.x);
-    let mean = |eta: f64, which: usize| {
-        let cosines = (0..24).map(|i| (f64::from(i) + 0.5) / 24.0);
-        cosines.map(|c| 2.0 * c * interface(b, eta, c)[which] / 24.0).sum::<f64>()
+    let mean = |eta: f64, through: bool| {
+        let cosines = (0..16).map(|i| (f64::from(i) + 0.5) / 16.0);
+        cosines.map(|c| 2.0 * c * interface(b, eta, c, through) / 16.0).sum::<f64>()
     };
-    interface(b, eta, f64::from(wo.z))[1] * mean(eta, 1) / (eta * eta * (1.0 - mean(1.0 / eta, 0)))
+    interface(b, eta, f64::from(wo.z), true) * mean(eta, true) / (eta * eta * (1.0 - mean(1.0 / eta, false)))
 }
 
 /// Flux that is left of one unit along wo, reflected and refracted; of a coat, reflected alone.
