@@ -33,7 +33,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("stage", &["error", "frame", "gpu", "reference", "schedule", "shaders"]),
     ("allocate", &["error", "gpu", "reference", "shaders", "stage", "statistics"]),
     ("filter", &["error", "gpu", "reference", "settings::entry", "shaders", "stage"]),
-    ("scene", &["error", "gpu::layout", "image", "reference::fresnel", "settings"]),
+    ("scene", &["error", "gpu::layout", "image", "reference::coat", "reference::fresnel", "settings"]),
     ("reference", &["gpu::layout", "scene", "settings", "statistics"]),
     ("composition", &["filter", "gpu::layout", "image"]),
     ("image", &["error", "gpu::layout", "memory"]),

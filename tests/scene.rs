@@ -323,3 +323,16 @@ fn the_guide_s_scene_is_one() {
     assert_eq!(scene.warnings, Vec::<String>::new());
     assert_eq!((scene.settings.width, scene.instances.len(), scene.lights.len()), (640, 1, 2));
 }
+
+#[test]
+fn rough_coats_share_a_table_by_index_and_distribution() {
+    let coat = |name: &str, rest: &str| format!("[[material]]\nname = '{name}'\ntype = 'coated'\n{rest}\n");
+    let text = coat("a", "alpha = 0.2") + &coat("b", "alpha = 0.7\nnonlinear = true") + &coat("smooth", "");
+    let text = text + &coat("ggx", "alpha = 0.2\ndistribution = 'ggx'") + "[[mesh]]\nshape = 'cube'\nmaterial = 'a'\n";
+    let scene = Scene::parse(Path::new("scene.toml"), &text, &|_| {}).unwrap();
+    let length = COAT_ROWS * COAT_COLUMNS;
+    let at: Vec<_> = scene.materials[..4].iter().map(|m| m.coat_table).collect();
+    assert_eq!((at, scene.texels.len()), (vec![0, 0, 0, length], 2 * length as usize));
+    let nonlinear: Vec<_> = scene.materials[..4].iter().map(|m| m.flags & MATERIAL_NONLINEAR != 0).collect();
+    assert_eq!(nonlinear, [false, true, false, false]);
+}

@@ -1,11 +1,14 @@
 //! The shading functions on the device against their CPU twins: random words by equality, radiometry by tolerance.
 use glam::{Vec2, Vec3, Vec4, vec2, vec3};
+use std::sync::LazyLock;
 use tallow::error::Result;
 use tallow::gpu::layout::{
-    BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE, Effects, MATERIAL_GGX, Material, TestPush,
+    BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE, Effects, MATERIAL_GGX, MATERIAL_NONLINEAR, Material,
+    TestPush,
 };
 use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Location};
 use tallow::reference::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
+use tallow::reference::coat::coat_table;
 use tallow::reference::fresnel::internal_fresnel;
 use tallow::reference::sampler::{sample_2d, sample_2d_bits, sampler_start};
 
@@ -28,6 +31,17 @@ fn direction(u: Vec2) -> Vec3 {
     tallow::reference::warp::warp_sphere(u)
 }
 
+const TABLES: usize = 3;
+
+/// Of rough coats, one after another, as a scene's texels hold them. Which coat gets which does not matter here.
+fn tables() -> &'static [u32] {
+    static WORDS: LazyLock<Vec<u32>> = LazyLock::new(|| {
+        let tables: [_; TABLES] = [(1.5, false), (1.8, true), (0.8, true)].map(|(eta, ggx)| coat_table(eta, ggx));
+        tables.concat().into_iter().map(f32::to_bits).collect()
+    });
+    &WORDS
+}
+
 /// Materials and directions of every kind; every eighth case has an extreme incidence, index or roughness.
 fn cases(kinds: &[u32], ggx: &[u32]) -> Vec<Case> {
     let case = |i: usize| {
@@ -47,7 +61,9 @@ fn cases(kinds: &[u32], ggx: &[u32]) -> Vec<Case> {
             specular: [1.0, d.x, d.y],
             transmission: [d.y, 1.0, d.x],
             internal_fresnel: internal_fresnel(f64::from(eta)) as f32,
-            flags: if ggx[i / 4 % ggx.len()] == 1 { MATERIAL_GGX } else { 0 },
+            flags: if ggx[i / 4 % ggx.len()] == 1 { MATERIAL_GGX } else { 0 }
+                | if i / 16 % 3 == 1 { MATERIAL_NONLINEAR } else { 0 },
+            coat_table: (i % TABLES * tables().len() / TABLES) as u32,
             ..Material::default()
         };
         (material, [wo, wi, u])
@@ -57,7 +73,7 @@ fn cases(kinds: &[u32], ggx: &[u32]) -> Vec<Case> {
 
 /// What `glsl/test/bsdf.comp` writes for one case.
 fn twin((material, [wo, wi, u]): &Case) -> [Vec4; 5] {
-    let b = Bsdf::from(material);
+    let b = Bsdf::new(material, material.alpha, tables());
     let (sampled, s) = bsdf_sample(&b, *wo, u.x, vec2(u.y, u.z));
     let flag = |on: bool| f32::from(u8::from(on));
     [
@@ -75,10 +91,11 @@ fn on_device(gpu: &Gpu, effects: &Effects, cases: &[Case]) -> Result<Vec<[Vec4; 
     let inputs: Vec<[f32; 3]> = cases.iter().flat_map(|c| c.1.map(|v| v.to_array())).collect();
     let materials = Buffer::from_slice(gpu, "materials", &materials)?;
     let inputs = Buffer::from_slice(gpu, "inputs", &inputs)?;
+    let texels = Buffer::from_texels(gpu, "texels", tables())?;
     let results = Buffer::new(gpu, "results", 5 * cases.len(), Location::Readback)?;
     let push = TestPush { count: cases.len() as u32, seed: 0 };
     let groups = [push.count.div_ceil(64), 1, 1];
-    let bind = bsdf::Bind { materials: &materials, inputs: &inputs, results: &results };
+    let bind = bsdf::Bind { materials: &materials, inputs: &inputs, results: &results, texels: &texels };
     gpu.run(&mut FrameResources::new(gpu)?, |rec| rec.dispatch(&kernel, bind, &push, groups))?;
     Ok(results.read()?.chunks_exact(5).map(|r| [0, 1, 2, 3, 4].map(|i| Vec4::from(r[i]))).collect())
 }
@@ -136,6 +153,16 @@ fn bsdfs_equal_their_twins() -> Result<()> {
         let mut planted = cases.clone();
         planted.iter_mut().for_each(|c| (c.0.base_color[1], c.0.specular[0]) = (c.0.base_color[1] * 1.01, 1.01));
         assert!(disagreements(&special, &planted).len() > CASES / 10, "control");
+        if kinds.contains(&BSDF_COATED) {
+            // Control: another coat's table, and light that keeps the base's colour once.
+            let of = |plant: fn(&mut Material)| {
+                let mut planted = cases.clone();
+                planted.iter_mut().for_each(|c| plant(&mut c.0));
+                disagreements(&special, &planted).len()
+            };
+            assert!(of(|m| m.coat_table = 0) > CASES / 50, "control");
+            assert!(of(|m| m.flags &= !MATERIAL_NONLINEAR) > CASES / 50, "control");
+        }
     }
     Ok(())
 }

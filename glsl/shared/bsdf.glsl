@@ -1,6 +1,6 @@
 // Scattering at a surface point. Local frame: z = shading normal on the front side. `wo` points to the camera, `wi` to the
 // light; both leave the surface. Radiance is transported: refraction scales it by 1 / eta^2.
-// Needs effects.glsl and layout.glsl.
+// Needs effects.glsl, layout.glsl and the binding `texels`, which holds the tables of rough coats.
 #ifndef BSDF_GLSL
 #define BSDF_GLSL
 #include "shared/warp.glsl"
@@ -17,6 +17,8 @@ struct Bsdf {
     vec3 specular;
     vec3 transmission;
     float internal_fresnel;
+    uint coat_table;
+    bool nonlinear;
     bool ggx;
 };
 
@@ -89,13 +91,34 @@ float coat_probability(Bsdf b, float f) {
     return specular / max(specular + (1.0 - f) * mean3(b.albedo), 1e-10);
 }
 
-// Mitsuba 3's `plastic` with `nonlinear` off: light enters and leaves through smooth Fresnel transmittance, and the
-// reflections inside add up to 1 / (1 - internal_fresnel). Its rough variant differs by a tabulated transmittance.
-// x multiplies the diffuse base, y is the probability of the coat's lobe.
-vec2 coat(Bsdf b, vec3 wo, vec3 wi) {
-    float fo = fresnel_dielectric(wo.z, b.eta.x).x;
-    float fi = fresnel_dielectric(wi.z, b.eta.x).x;
-    return vec2((1.0 - fo) * (1.0 - fi) / (b.eta.x * b.eta.x * (1.0 - b.internal_fresnel)), coat_probability(b, fo));
+// Twin: reference/coat.rs, which says what the table holds. `column` is an index, or lies between two of cosines.
+float coat_entry(Bsdf b, float column) {
+    float row = (log2(max(b.alpha, SMOOTH_ALPHA)) * (1.0 / 6.643856189774724) + 1.0) * float(COAT_ROWS - 1u);
+    int i = min(int(row), int(COAT_ROWS) - 2), j = min(int(column), int(COAT_COLUMNS) - 2);
+    int at = int(b.coat_table) + i * int(COAT_COLUMNS) + j;
+    uvec4 words = uvec4(texelFetch(texels, at).x, texelFetch(texels, at + 1).x, texelFetch(texels, at + int(COAT_COLUMNS)).x,
+                        texelFetch(texels, at + int(COAT_COLUMNS) + 1).x);
+    vec4 corners = uintBitsToFloat(words);
+    vec2 along = mix(corners.xy, corners.zw, row - float(i));
+    return mix(along.x, along.y, column - float(j));
+}
+
+// The share of light at cosine `c` that the coat does not let in.
+float coat_outside(Bsdf b, float c) {
+    if (is_smooth(b)) return fresnel_dielectric(c, b.eta.x).x;
+    return coat_entry(b, sqrt(clamp(c, 0.0, 1.0)) * float(COAT_COLUMNS - 2u));
+}
+
+// Mitsuba 3's `plastic` and `roughplastic`: light enters and leaves through the interface, and what that reflects inwards adds
+// up to 1 / (1 - its mean), `nonlinear` with the base's colour in each reflection.
+// rgb multiplies the diffuse base, w is the probability of the coat's lobe.
+vec4 coat(Bsdf b, vec3 wo, vec3 wi) {
+    float fo = coat_outside(b, wo.z);
+    float fi = coat_outside(b, wi.z);
+    float inside = b.internal_fresnel;
+    if (!is_smooth(b)) inside = coat_entry(b, float(COAT_COLUMNS - 1u));
+    vec3 back = b.nonlinear ? b.albedo * inside : vec3(inside);
+    return vec4((1.0 - fo) * (1.0 - fi) / (b.eta.x * b.eta.x * (1.0 - back)), coat_probability(b, fo));
 }
 
 // The kinds share their code, half vectors and distributions above all: a device that masks lanes runs that of all kinds.
@@ -112,9 +135,9 @@ vec4 bsdf_evaluate(Bsdf b, vec3 wo, vec3 wi) {
     vec4 value = glass || metal ? vec4(0.0) : evaluate_diffuse(b, wi);
     float share = 1.0; // of the samples
     if (coated) {
-        vec2 c = coat(b, wo, wi);
-        value *= vec4(c.xxx, 1.0 - c.y);
-        share = c.y;
+        vec4 c = coat(b, wo, wi);
+        value *= vec4(c.xyz, 1.0 - c.w);
+        share = c.w;
     }
     if (!(glass || metal || coated) || is_smooth(b)) return value;
     bool reflected = wi.z > 0.0;
@@ -156,6 +179,7 @@ bool bsdf_sample(Bsdf b, vec3 wo, float u_lobe, vec2 u, out BsdfSample s) {
         s.weight *= fresnel_conductor(co, b.eta, b.k);
     } else {
         vec2 f = fresnel_dielectric(coated ? above.z : co, eta);
+        if (coated && !s.delta) f.x = coat_outside(b, above.z);
         float p = coated ? coat_probability(b, f.x) : f.x;
         bool first = u_lobe < p;
         if (coated) {

@@ -216,11 +216,17 @@ Bsdf surface_bsdf(Surface s) {
     b.k = vec3(0.0);
     b.specular = vec3(0.0);
     b.internal_fresnel = 0.0;
+    b.coat_table = 0u;
+    b.nonlinear = (s.flags & MATERIAL_NONLINEAR) != 0u;
     if (FX_CONDUCTOR || FX_DIELECTRIC || FX_COATED) {
         b.eta = uintBitsToFloat(material_texel(s.material, 2u).xyz);
         b.k = uintBitsToFloat(material_texel(s.material, 3u).xyz);
         b.specular = textured(uintBitsToFloat(material_texel(s.material, 4u).xyz), m6.x, s);
-        if (FX_COATED) b.internal_fresnel = uintBitsToFloat(material_texel(s.material, 7u).y);
+        if (FX_COATED) {
+            uvec4 m7 = material_texel(s.material, 7u);
+            b.internal_fresnel = uintBitsToFloat(m7.y);
+            b.coat_table = m7.w;
+        }
         if (FX_TEXTURES && m6.w != NONE) {
             float r = texture_sample(m6.w, s.uv, false).r; // perceptual: alpha = r^2
             b.alpha *= r * r;

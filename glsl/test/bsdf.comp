@@ -3,6 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "layout.glsl"
 #include "effects.glsl"
+layout(binding = 3) uniform usamplerBuffer texels; // of uint
 #include "shared/bsdf.glsl"
 
 // Case i: its Material, and inputs[3 i ..] = wo, wi, (u_lobe, u). results[5 i ..] = bsdf_evaluate; sampled wi and
@@ -17,8 +18,8 @@ void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i >= push.count) return;
     Material m = materials[i];
-    Bsdf b = Bsdf(m.kind, m.base_color, m.alpha, m.eta, m.k, m.specular, m.transmission, m.internal_fresnel,
-                  (m.flags & MATERIAL_GGX) != 0u);
+    Bsdf b = Bsdf(m.kind, m.base_color, m.alpha, m.eta, m.k, m.specular, m.transmission, m.internal_fresnel, m.coat_table,
+                  (m.flags & MATERIAL_NONLINEAR) != 0u, (m.flags & MATERIAL_GGX) != 0u);
     vec3 wo = inputs[3 * i];
     vec3 u = inputs[3 * i + 2];
     BsdfSample s;

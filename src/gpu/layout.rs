@@ -80,6 +80,12 @@ constants! {
     MATERIAL_NORMAL_MAP = 4;
     /// [`Material::flags`]: hits are subject to an alpha mask (`opacity_texture` or `opacity` below 1).
     MATERIAL_MASKED = 8;
+    /// [`Material::flags`]: light that scatters below a coat takes on the base's colour at every turn.
+    MATERIAL_NONLINEAR = 16;
+    /// Roughnesses in the table of a rough coat (reference::coat).
+    COAT_ROWS = 32;
+    /// Numbers for each of them: [`COAT_COLUMNS`] - 1 cosines, and the mean from inside.
+    COAT_COLUMNS = 49;
     /// [`Texture::flags`]: RGB is stored with the sRGB curve and decoded when read.
     TEXTURE_SRGB = 1;
     /// [`Texture::flags`]: coordinates outside [0, 1] clamp to the border texel; otherwise they repeat.
@@ -237,12 +243,12 @@ gpu_structs! {
         roughness_texture: uint,
         /// Multiplies `emission`.
         emission_texture: uint,
-        /// Diffuse reflectance of the interface seen from inside (coated): mean internal Fresnel reflectance.
+        /// Diffuse reflectance of the smooth interface seen from inside (coated): mean internal Fresnel reflectance.
         internal_fresnel: float,
         /// Luminance of the mean emission, times the mean opacity; emissive triangles are chosen in proportion to it times their area.
         emission_weight: float,
-        /// Unused, zero.
-        pad: uint,
+        /// Index of the first word of a coat's table among the texels (coated, where rough); else zero.
+        coat_table: uint,
     }
 
     /// A picture in the texel buffer: RGBA8 texels (R in the low byte), row 0 at the top. 2 texels.

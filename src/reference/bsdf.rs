@@ -1,5 +1,6 @@
 //! Twin of `glsl/shared/bsdf.glsl`. Local frame: z = shading normal on the front side; both directions leave the surface.
-use crate::gpu::layout::{BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, MATERIAL_GGX, Material};
+use crate::gpu::layout::{BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, MATERIAL_GGX, MATERIAL_NONLINEAR, Material};
+use crate::reference::coat::{CoatRow, coat_row_at, row_inside, row_outside};
 use crate::reference::fresnel::{fresnel_conductor, fresnel_dielectric};
 use crate::reference::microfacet::{microfacet_area, microfacet_d, microfacet_g1, microfacet_sample};
 use crate::reference::warp::{INV_PI, warp_cosine_hemisphere};
@@ -22,8 +23,12 @@ pub struct Bsdf {
     pub specular: Vec3,
     /// Tint of refraction.
     pub transmission: Vec3,
-    /// Mean internal Fresnel reflectance (coated).
+    /// Mean internal Fresnel reflectance (smooth coat).
     pub internal_fresnel: f32,
+    /// Of the table of a rough coat, at `alpha`; the kernel reads it where it needs it.
+    pub coat: CoatRow,
+    /// Light below a coat takes on the base's colour at every turn.
+    pub nonlinear: bool,
     /// GGX instead of Beckmann.
     pub ggx: bool,
 }
@@ -46,13 +51,17 @@ pub const SMOOTH_ALPHA: f32 = 0.01;
 /// Directions closer to the horizon count as below it.
 pub const GRAZING: f32 = 1e-9;
 
-impl From<&Material> for Bsdf {
-    fn from(m: &Material) -> Self {
+impl Bsdf {
+    /// A material of constant colours with this roughness. `texels` are the scene's, which hold the tables of rough coats.
+    pub fn new(m: &Material, alpha: f32, texels: &[u32]) -> Self {
         let [albedo, eta, k] = [m.base_color, m.eta, m.k].map(Vec3::from);
         let [specular, transmission] = [m.specular, m.transmission].map(Vec3::from);
-        let ggx = m.flags & MATERIAL_GGX != 0;
-        let (alpha, internal_fresnel) = (m.alpha, m.internal_fresnel);
-        Self { kind: m.kind, albedo, alpha, eta, k, specular, transmission, internal_fresnel, ggx }
+        let [ggx, nonlinear] = [MATERIAL_GGX, MATERIAL_NONLINEAR].map(|flag| m.flags & flag != 0);
+        let (kind, internal_fresnel) = (m.kind, m.internal_fresnel);
+        let has_table = kind == BSDF_COATED && alpha >= SMOOTH_ALPHA;
+        let table = texels.get(m.coat_table as usize..).filter(|_| has_table).unwrap_or(&[]);
+        let coat = coat_row_at(table, alpha);
+        Self { kind, albedo, alpha, eta, k, specular, transmission, internal_fresnel, coat, nonlinear, ggx }
     }
 }
 
@@ -171,12 +180,18 @@ fn coat_probability(b: &Bsdf, f: f32) -> f32 {
     specular / (specular + (1.0 - f) * mean3(b.albedo)).max(1e-10)
 }
 
+/// The share of light at cosine `c` that the coat does not let in.
+fn coat_outside(b: &Bsdf, c: f32) -> f32 {
+    if is_smooth(b) { fresnel_dielectric(c, b.eta.x).x } else { row_outside(&b.coat, c) }
+}
+
 fn evaluate_coated(b: &Bsdf, wo: Vec3, wi: Vec3) -> Vec4 {
-    let fo = fresnel_dielectric(wo.z, b.eta.x).x;
-    let fi = fresnel_dielectric(wi.z, b.eta.x).x;
+    let (fo, fi) = (coat_outside(b, wo.z), coat_outside(b, wi.z));
     let p = coat_probability(b, fo);
-    let through = (1.0 - fo) * (1.0 - fi) / (b.eta.x * b.eta.x * (1.0 - b.internal_fresnel));
-    let value = evaluate_diffuse(b, wi) * Vec3::splat(through).extend(1.0 - p);
+    let inside = if is_smooth(b) { b.internal_fresnel } else { row_inside(&b.coat) };
+    let back = if b.nonlinear { b.albedo * inside } else { Vec3::splat(inside) };
+    let through = (1.0 - fo) * (1.0 - fi) / (b.eta.x * b.eta.x * (1.0 - back));
+    let value = evaluate_diffuse(b, wi) * through.extend(1.0 - p);
     if is_smooth(b) {
         return value;
     }
@@ -186,7 +201,7 @@ fn evaluate_coated(b: &Bsdf, wo: Vec3, wi: Vec3) -> Vec4 {
 }
 
 fn sample_coated(b: &Bsdf, wo: Vec3, u_lobe: f32, u: Vec2) -> (bool, BsdfSample) {
-    let f = fresnel_dielectric(wo.z, b.eta.x).x;
+    let f = coat_outside(b, wo.z);
     let p = coat_probability(b, f);
     let specular = u_lobe < p;
     let delta = specular && is_smooth(b);
@@ -258,7 +273,7 @@ pub fn bsdf_albedo(b: &Bsdf, wo_z: f32) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::layout::BSDF_DIFFUSE;
+    use crate::gpu::layout::{BSDF_DIFFUSE, COAT_COLUMNS};
 
     const GLASS: Bsdf = Bsdf {
         kind: BSDF_DIELECTRIC,
@@ -269,6 +284,8 @@ mod tests {
         specular: Vec3::ONE,
         transmission: Vec3::ONE,
         internal_fresnel: 0.0,
+        coat: [0.0; COAT_COLUMNS as usize],
+        nonlinear: false,
         ggx: false,
     };
 
@@ -286,7 +303,11 @@ mod tests {
     #[test]
     fn albedo_is_that_of_the_lobes_whose_light_is_indirect() {
         let base = Bsdf { albedo: Vec3::splat(0.5), specular: Vec3::splat(0.8), ..GLASS };
-        let of = |kind, alpha, cosine| bsdf_albedo(&Bsdf { kind, alpha, k: Vec3::splat(4.0), ..base }, cosine).x;
+        let of = |kind, alpha, cosine| {
+            let mut b = base;
+            (b.kind, b.alpha, b.k) = (kind, alpha, Vec3::splat(4.0));
+            bsdf_albedo(&b, cosine).x
+        };
         let f = fresnel_dielectric(0.3, 1.5).x;
         assert_eq!(
             [of(BSDF_DIELECTRIC, 0.0, 1.0), of(BSDF_CONDUCTOR, 0.0, 1.0), of(BSDF_DIFFUSE, 0.0, 0.3)],

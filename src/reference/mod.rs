@@ -1,10 +1,11 @@
 //! Plain CPU twins of the kernels and of the functions under `glsl/shared`: same names, same order of operations, `f32`.
 //! Tests compare the kernels with them, and run the statistics that a GPU would only slow down. Nothing here is used in
-//! a render, but for [`fresnel::internal_fresnel`].
+//! a render, but for [`coat::coat_table`].
 #![allow(clippy::excessive_precision, clippy::approx_constant, reason = "constants as the GLSL writes them")]
 pub mod apportion;
 pub mod bsdf;
 pub mod camera;
+pub mod coat;
 pub mod exact;
 pub mod fold;
 pub mod fresnel;

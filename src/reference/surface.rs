@@ -230,12 +230,13 @@ pub fn surface_emission(scene: &Scene, s: &Surface) -> Vec3 {
 /// The material with its textures looked up.
 pub fn surface_bsdf(scene: &Scene, s: &Surface) -> Bsdf {
     let material = &scene.materials[s.material as usize];
-    let mut b = Bsdf::from(material);
-    b.albedo = textured(scene, material.base_color, material.base_texture, s);
-    b.specular = textured(scene, material.specular, material.specular_texture, s);
+    let mut alpha = material.alpha;
     if material.roughness_texture != NONE {
         let r = texture_sample(scene, material.roughness_texture, s.uv).x;
-        b.alpha *= r * r;
+        alpha *= r * r;
     }
+    let mut b = Bsdf::new(material, alpha, &scene.texels);
+    b.albedo = textured(scene, material.base_color, material.base_texture, s);
+    b.specular = textured(scene, material.specular, material.specular_texture, s);
     b
 }

@@ -1,6 +1,7 @@
 //! From a description to the flat arrays: files are read, meshes placed, BVHs built and textures decoded.
 use super::description::{self, Description, Mesh};
 use super::geometry::Geometry;
+use super::material::Materials;
 use super::obj::{self, Library, ObjFile};
 use super::place::{Job, Plan, instance, mesh_name};
 use super::{Scene, bvh, environment, light};
@@ -267,6 +268,7 @@ impl<'a> Assembly<'a> {
             scene.lights.push(light::environment([1.0; 3], glam::DMat3::IDENTITY));
         }
         add_appearance(scene);
+        Materials::add_coat_tables(&mut scene.materials, &mut scene.texels);
         light::finish(scene, ranges);
         if !scene.lights.iter().any(|l| l.kind == LIGHT_ENVIRONMENT) {
             scene.environment = None;

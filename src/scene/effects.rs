@@ -4,7 +4,7 @@ use crate::gpu::layout::*;
 use crate::settings::{PixelFilter, Sampler};
 
 /// Roughness below which an interface is smooth; kernels draw the same line.
-const SMOOTH: f32 = 0.01;
+pub const SMOOTH: f32 = 0.01;
 
 /// The effects of a scene with its settings, and for each one that is on the first object, material, light or setting
 /// that calls for it. `split_light`: direct and indirect light are wanted apart. `counters`: rays are counted.

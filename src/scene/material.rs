@@ -13,12 +13,15 @@
 //! Roughness: alpha = Pr^2; without Pr, sqrt(2 / (Ns + 2)) for coats and conductors, and smooth for 2 and 3.
 //! d (or 1 - Tr) and map_d are opacity except on dielectrics. `norm` wins over a bump map. Bump heights are `-bm` world
 //! units; without -bm, 0.0005 of the scene's diagonal. A black Kd under a map_Kd counts as white.
+use super::effects::SMOOTH;
 use super::fresnel;
 use super::mtl::{Map, Mtl};
 use super::texture::{Kind, Mapping, TextureSet};
 use super::value::Rgb;
 use crate::gpu::layout::{self, *};
+use crate::reference::coat::coat_table;
 use serde::Deserialize;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// The materials of a scene and the textures they ask for.
@@ -111,6 +114,8 @@ pub struct MaterialTable {
     pub roughness_texture: Option<PathBuf>,
     /// Default true.
     pub two_sided: Option<bool>,
+    /// Coated: light that is reflected below the coat takes on the base's colour each time; default false.
+    pub nonlinear: bool,
 }
 
 impl Materials {
@@ -149,6 +154,19 @@ impl Materials {
         self.list.len() as u32 - 1
     }
 
+    /// Adds what rough coats reflect to the words of the textures: a table for each index and distribution.
+    pub fn add_coat_tables(materials: &mut [layout::Material], texels: &mut Vec<u32>) {
+        let mut tables = HashMap::new();
+        for m in materials.iter_mut().filter(|m| m.kind == BSDF_COATED && m.alpha >= SMOOTH) {
+            let ggx = m.flags & MATERIAL_GGX != 0;
+            m.coat_table = *tables.entry((m.eta[0].to_bits(), ggx)).or_insert_with(|| {
+                let first = texels.len() as u32;
+                texels.extend(coat_table(m.eta[0], ggx).into_iter().map(f32::to_bits));
+                first
+            });
+        }
+    }
+
     /// Adds a `[[material]]`.
     ///
     /// # Errors
@@ -177,6 +195,9 @@ impl Materials {
         }
         if t.distribution == Distribution::Ggx {
             m.flags |= MATERIAL_GGX;
+        }
+        if t.nonlinear {
+            m.flags |= MATERIAL_NONLINEAR;
         }
         self.table_textures(&mut m, t, body, directory, warn)?;
         Ok(self.push(&t.name, m))

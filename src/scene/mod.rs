@@ -61,7 +61,7 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// May be empty.
     pub textures: Vec<Texture>,
-    /// RGBA8 texels of all textures, R in the low byte.
+    /// RGBA8 texels of all textures, R in the low byte; after them the tables of rough coats, words of floats.
     pub texels: Vec<u32>,
     /// May be empty: then only emission that paths run into is seen (none).
     pub lights: Vec<Light>,

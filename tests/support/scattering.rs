@@ -116,16 +116,36 @@ fn microfacets(b: &Bsdf, eta: f64, wo: DVec3, wi: DVec3) -> f64 {
     share * d(b.ggx, m, alpha) * g(wo) * g(wi) * co * ci * n * n / (q * q) / wo.z.abs()
 }
 
-/// Flux that is left of one unit along wo, reflected and refracted; of a coat, reflected alone. Its base, if white,
-/// returns all that the coat lets in: (1 - F(wo)) (1 - mean of F outside) / (eta^2 (1 - mean of F inside)), whose last
-/// factors cancel.
+/// Flux that the interface reflects, or lets through, of one unit at cosine `c` from the side with relative index `eta`.
+fn interface(b: &Bsdf, eta: f64, c: f64, through: bool) -> f64 {
+    if b.alpha < SMOOTH_ALPHA {
+        return if through { 1.0 - fresnel(c, eta) } else { fresnel(c, eta) };
+    }
+    let wo = dvec3((1.0 - c * c).sqrt(), 0.0, c);
+    let grid = Grid { wo, n: if through { eta } else { 1.0 }, alpha: f64::from(b.alpha) };
+    grid.integrate(|wi| microfacets(b, eta, wo, wi.as_dvec3())).iter().sum()
+}
+
+/// What a coat's white base gives back of one unit along wo: what the coat lets in, of that what it lets out, and all that
+/// comes of what it reflects inside, 1 / (1 - mean of R inside). By reciprocity, out of a medium goes 1 / eta^2 of the
+/// mean that comes into it.
+fn under_coat(b: &Bsdf, wo: Vec3) -> f64 {
+    let eta = f64::from(b.eta.x);
+    let mean = |eta: f64, through: bool| {
+        let cosines = (0..16).map(|i| (f64::from(i) + 0.5) / 16.0);
+        cosines.map(|c| 2.0 * c * interface(b, eta, c, through) / 16.0).sum::<f64>()
+    };
+    interface(b, eta, f64::from(wo.z), true) * mean(eta, true) / (eta * eta * (1.0 - mean(1.0 / eta, false)))
+}
+
+/// Flux that is left of one unit along wo, reflected and refracted; of a coat, reflected alone.
 pub fn scattered_once(b: &Bsdf, wo: Vec3) -> [f64; 2] {
     let eta = f64::from(if wo.z < 0.0 { 1.0 / b.eta.x } else { b.eta.x });
     let flux = |wi: Vec3| microfacets(b, eta, wo.as_dvec3(), wi.as_dvec3());
     let lobes: Vec<f64> = grids(b, wo).iter().map(|grid| grid.integrate(flux).iter().sum()).collect();
     match lobes[..] {
         [reflected, refracted] => [reflected, refracted],
-        _ if b.kind == BSDF_COATED => [lobes[0] + 1.0 - fresnel(f64::from(wo.z), eta), 0.0],
+        _ if b.kind == BSDF_COATED => [lobes[0] + under_coat(b, wo), 0.0],
         _ => [lobes[0], 0.0],
     }
 }

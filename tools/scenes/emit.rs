@@ -215,7 +215,8 @@ fn bsdf(place: &Place, model: &Bsdf, out: &mut Table) -> anyhow::Result<()> {
             out.insert("ior".into(), ratio(int_ior, ext_ior)?);
             match diffuse_reflectance {
                 Color::Constant(rgb) if place.is_mitsuba => {
-                    let darker = mitsuba::under_rough_coat(int_ior.value()? / ext_ior.value()?);
+                    let index = int_ior.value()? / ext_ior.value()?;
+                    let darker = mitsuba::under_rough_coat(index, *alpha, distribution == "ggx");
                     out.insert("color".into(), numbers(rgb.map(|v| v * darker)));
                 }
                 as_it_is => color(place, as_it_is, out)?,

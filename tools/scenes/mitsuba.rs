@@ -5,7 +5,8 @@ use image::codecs::png::PngEncoder;
 use std::fs::File;
 use std::path::PathBuf;
 use tallow::image::{Film, Picture, WriteOptions};
-use tallow::reference::fresnel::{fresnel_dielectric, internal_fresnel};
+use tallow::reference::coat::{coat_row_at, coat_table, row_inside};
+use tallow::reference::fresnel::fresnel_dielectric;
 
 /// Degrees. The tests' XML leaves the field of view to the default, which is that of a 50 mm lens on 36 mm x 24 mm film;
 /// the descriptions say 30, at which the references do not match. Across a square film whose diagonal is that of
@@ -54,8 +55,9 @@ pub fn environment(place: &Place, filename: &str) -> anyhow::Result<PathBuf> {
 
 /// What the colour under a rough coat of index `eta` is multiplied by. What the coat reflects inwards, an integral, is to
 /// Mitsuba the mean over 64 cosines with both ends: 63/64 of it, and 1/64 of the reflectance along the normal.
-pub fn under_rough_coat(eta: f64) -> f64 {
-    let exact = internal_fresnel(eta);
+pub fn under_rough_coat(eta: f64, alpha: f64, ggx: bool) -> f64 {
+    let table: Vec<u32> = coat_table(eta as f32, ggx).into_iter().map(f32::to_bits).collect();
+    let exact = f64::from(row_inside(&coat_row_at(&table, alpha as f32)));
     let normal = f64::from(fresnel_dielectric(1.0, eta as f32).x);
     (1.0 - exact) / (1.0 - (63.0 * exact + normal) / 64.0)
 }
