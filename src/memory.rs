@@ -82,7 +82,8 @@ mod tests {
 
     #[test]
     fn limits_are_numbers_or_none() {
-        let text = "Max cpu time  unlimited\nMax address space         4096000000           unlimited            bytes\n";
+        let text =
+            "Max cpu time  unlimited\nMax address space         4096000000           unlimited            bytes\n";
         assert_eq!(number_after(text, "Max address space"), Some(4_096_000_000));
         assert_eq!(number_after(&text.replace("4096000000", "unlimited"), "Max address space"), None);
         assert_eq!(number_after("VmPeak:\t 9 kB\nVmSize:\t    7052 kB\n", "VmSize:"), Some(7052));

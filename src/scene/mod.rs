@@ -1,8 +1,6 @@
 //! Scene files become flat arrays, ready to be copied to the device as they are. Nothing here talks to a GPU.
 use crate::error::{Error, Result};
-use crate::gpu::layout::{
-    AliasEntry, BvhNode, Camera, Instance, Light, Material, Shading, TRAVERSAL_STACK, Texture, Triangle,
-};
+use crate::gpu::layout::{AliasEntry, BvhNode, Camera, Instance, Light, Material, Shading, Texture, Triangle};
 use crate::image::input;
 use crate::settings::Settings;
 use description::Description;
@@ -158,11 +156,6 @@ impl Scene {
         scene.settings.validate()?;
         assemble::assemble(path, description, sky, &mut scene)?;
         scene.stack = bvh::stack_size(&scene.nodes, scene.root, &scene.instances);
-        if scene.stack > TRAVERSAL_STACK {
-            let what =
-                "lies so densely on itself that no hierarchy of a usable depth holds it: remove copies of triangles";
-            return Err(Error::input_at(path, "geometry", what));
-        }
         let camera = description.camera.build(&scene.settings, scene.bounds);
         scene.camera = camera.map_err(|what| Error::input_at(path, "[camera]", what))?;
         scene.fingerprint.add(&[scene.camera]);
