@@ -3,6 +3,7 @@ use crate::error::{Error, Result};
 use crate::gpu::layout::{AliasEntry, BvhNode, Camera, Instance, Light, Material, Shading, Texture, Triangle};
 use crate::image::input;
 use crate::settings::Settings;
+use crate::threads;
 use description::Description;
 use std::path::Path;
 
@@ -154,7 +155,7 @@ impl Scene {
         scene.settings.validate().map_err(|e| Error::input(path, e))?;
         overrides(&mut scene.settings);
         scene.settings.validate()?;
-        assemble::assemble(path, description, sky, &mut scene)?;
+        threads::within(|| assemble::assemble(path, description, sky, &mut scene))?;
         scene.stack = bvh::stack_size(&scene.nodes, scene.root, &scene.instances);
         let camera = description.camera.build(&scene.settings, scene.bounds);
         scene.camera = camera.map_err(|what| Error::input_at(path, "[camera]", what))?;
