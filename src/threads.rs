@@ -9,7 +9,8 @@ pub fn within<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     }
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     // 0 is Rayon's default, which an environment variable may set.
-    let counts = std::iter::once(0).chain(std::iter::successors(Some(cores / 2), |n| Some(n / 2)).take_while(|&n| n > 0));
+    let counts =
+        std::iter::once(0).chain(std::iter::successors(Some(cores / 2), |n| Some(n / 2)).take_while(|&n| n > 0));
     let pool = counts.into_iter().find_map(|threads| ThreadPoolBuilder::new().num_threads(threads).build().ok());
     let alone = || ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
     match pool.map_or_else(alone, Ok) {

@@ -32,8 +32,14 @@ mod value;
 pub use effects::effects;
 pub use fingerprint::Fingerprint;
 
-/// Largest coordinate a scene may have: squares of distances still fit a 32-bit float.
-pub const MAX_COORDINATE: f64 = 1e18;
+/// Largest coordinate M of triangles, of points that rays start from and of lights: what a ray's hit is computed from fits a
+/// 32-bit float (3.4e38). Seen from its origin a corner is within 2 M, and sheared along the ray within 4 M; an edge
+/// function is within 2 (4 M)^2 = 32 M^2, and the numerator of the distance, three of them times a depth, within
+/// 3 * 32 M^2 * 2 M = 192 M^3, which is 1.9e38.
+pub const MAX_COORDINATE: f64 = 1e12;
+
+/// Bytes that a byte of a scene file takes while it is read, at most.
+const BYTES_OF_TOML: u64 = 40;
 
 /// Everything a render reads, in the form that kernels read it.
 #[derive(Clone, Debug, Default)]
@@ -116,7 +122,7 @@ impl Scene {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_lowercase();
         match extension.as_str() {
             "toml" => {
-                let text = String::from_utf8(input::read(path)?);
+                let text = String::from_utf8(input::read_text(path, BYTES_OF_TOML)?);
                 let text = text.map_err(|_| Error::input(path, "is no text: write it in UTF-8"))?;
                 Self::parse(path, &text, overrides)
             }
