@@ -2,11 +2,14 @@
 #[allow(dead_code)]
 #[path = "support/command.rs"]
 mod command;
+mod support;
 
 use command::complains;
 use image::codecs::png::PngEncoder;
 use std::fs::File;
 use std::process::{Command, Output};
+use tallow::reference::guide::guide;
+use tallow::renderer::{Outputs, Renderer, path_push};
 use tallow::scene::Scene;
 use tempfile::TempDir;
 
@@ -158,6 +161,25 @@ fn coordinates_reach_to_the_limit_and_no_further() {
     ] {
         let error = scene(at, rest).unwrap_err();
         assert!(error.exit_code() == 3 && error.to_string().contains("1e12"), "{at} {rest}: {error}");
+    }
+}
+
+#[test]
+fn a_triangle_at_the_limit_is_hit() {
+    let corners = "v -1e12 -1e12 -1e12\nv 1e12 -1e12 -1e12\nv 0 1e12 -1e12\nvn 0 0 1\nf 1//1 2//1 3//1\n";
+    let text = "[film]\nwidth = 8\nheight = 8\n[render]\nspp = 1\n[environment]\n[[mesh]]\nfile = \"a.obj\"\n
+        [camera]\nposition = [0, 0, 1e12]\ntarget = [0, 0, 0]";
+    let folder = folder(&[("a.obj", corners), ("s.toml", text)]);
+    let scene = load(&folder, "s.toml").unwrap();
+    let gpu = support::gpu();
+    let renderer = Renderer::new(&gpu, &scene, Outputs { guides: true, ..Outputs::default() }).unwrap();
+    let stats = support::render(&gpu, &renderer);
+    assert!(stats.iter().all(|s| s.count == 1 && s.mean.iter().all(|v| v.is_finite())));
+    let depths: Vec<_> = renderer.film().tiles[0].guide.read().unwrap().iter().map(|g| g.depth).collect();
+    let twins: Vec<_> = (0..64).map(|p| guide(&scene, &path_push(&scene), p).depth).collect();
+    for found in [depths, twins] {
+        let hits: Vec<_> = found.into_iter().filter(|&depth| depth > 0.0).collect();
+        assert!(hits.len() >= 16 && hits.iter().all(|depth| (1.9e12..4e12).contains(depth)), "{hits:?}");
     }
 }
 
