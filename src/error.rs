@@ -24,9 +24,12 @@ pub enum Error {
     /// A scene whose arrays were edited and no longer fit together.
     #[error("the scene's arrays do not fit together: {0}: edit all that an index leads to, or load the scene again")]
     Scene(String),
-    /// No Vulkan loader, no usable device, a missing feature, or out of memory.
+    /// No Vulkan loader, no usable device, a missing feature, or the device is out of memory.
     #[error("{0}")]
     Device(String),
+    /// What is asked for takes more memory than the host has free.
+    #[error("{0}")]
+    Memory(String),
     /// The device was lost: nothing made on it works any more, and a new one must be opened.
     #[error("{0}")]
     DeviceLost(String),
@@ -56,12 +59,12 @@ impl Error {
         Self::Output { path: path.as_ref().to_owned(), what: what.to_string() }
     }
 
-    /// 2 usage, 3 input, 4 device, 5 output.
+    /// 2 usage, 3 input, 4 device or memory, 5 output.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
             Self::Input { .. } | Self::Scene(_) => 3,
-            Self::Device(_) | Self::DeviceLost(_) => 4,
+            Self::Device(_) | Self::DeviceLost(_) | Self::Memory(_) => 4,
             Self::Output { .. } => 5,
         }
     }

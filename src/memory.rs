@@ -1,20 +1,64 @@
 //! What the machine can still hold: systems promise more, and end the process when it is touched.
+use crate::error::{Error, Result};
+use std::fmt::Display;
 use sysinfo::{MemoryRefreshKind, System};
 
-/// Refuses what needs more bytes than are free, those of the process's control group included.
+/// Refuses what needs more bytes than are free, those of the process's control group and address space included.
 ///
 /// # Errors
 /// How much is needed and how much is free.
-pub fn check(needed: u64) -> Result<(), String> {
+pub fn check(needed: u64) -> std::result::Result<(), String> {
     let mut system = System::new();
     system.refresh_memory_specifics(MemoryRefreshKind::nothing().with_ram());
     let group = system.cgroup_limits().map_or(u64::MAX, |limits| limits.free_memory);
     // Systems that do not tell say 0.
     let free = Some(system.available_memory()).filter(|&bytes| bytes > 0).unwrap_or(u64::MAX).min(group);
+    let free = free.min(free_addresses().unwrap_or(u64::MAX));
     if needed > free {
         return Err(format!("needs {} of memory, {} are free", gibibytes(needed), gibibytes(free)));
     }
     Ok(())
+}
+
+/// [`check`] on behalf of `what`, a plural noun with its place.
+///
+/// # Errors
+/// [`Error::Memory`].
+pub fn need(what: impl Display, bytes: u64) -> Result<()> {
+    check(bytes).map_err(|lack| Error::Memory(format!("{what}: {lack}; free some, or make the scene smaller")))
+}
+
+/// A vector with room for exactly `len` values.
+///
+/// # Errors
+/// [`Error::Memory`].
+pub fn vector<T>(what: impl Display, len: usize) -> Result<Vec<T>> {
+    let mut vector = Vec::new();
+    reserve(what, &mut vector, len)?;
+    Ok(vector)
+}
+
+/// Room for exactly `more` values behind those that `vector` has.
+///
+/// # Errors
+/// [`Error::Memory`].
+pub fn reserve<T>(what: impl Display, vector: &mut Vec<T>, more: usize) -> Result<()> {
+    let bytes = (more as u64).saturating_mul(size_of::<T>() as u64);
+    let refused = |_| Error::Memory(format!("{what}: {} of memory are refused", gibibytes(bytes)));
+    vector.try_reserve_exact(more).map_err(refused)
+}
+
+/// What a limit of the address space (`ulimit -v`) leaves; only Linux tells.
+fn free_addresses() -> Option<u64> {
+    let read = |file: &str| std::fs::read_to_string(format!("/proc/self/{file}")).ok();
+    let limit = number_after(&read("limits")?, "Max address space")?;
+    let used = number_after(&read("status")?, "VmSize:")? * 1024;
+    Some(limit.saturating_sub(used))
+}
+
+/// The number that follows `key` at the beginning of a line; `None` where it says "unlimited".
+fn number_after(text: &str, key: &str) -> Option<u64> {
+    text.lines().find_map(|line| line.strip_prefix(key))?.split_whitespace().next()?.parse().ok()
 }
 
 fn gibibytes(bytes: u64) -> String {
@@ -30,5 +74,18 @@ mod tests {
         assert_eq!(check(1 << 20), Ok(()));
         let line = check(3 << 60).unwrap_err();
         assert!(line.starts_with("needs 3221225472.0 GiB of memory, ") && line.ends_with(" GiB are free"), "{line}");
+        let error = need("a.obj", 3 << 60).unwrap_err();
+        assert!(error.exit_code() == 4 && error.to_string().starts_with("a.obj: needs 3221225472.0 GiB"), "{error}");
+        assert_eq!(vector::<u8>("bytes", usize::MAX).unwrap_err().exit_code(), 4);
+        assert_eq!(vector::<u8>("bytes", 3).unwrap().capacity(), 3);
+    }
+
+    #[test]
+    fn limits_are_numbers_or_none() {
+        let text =
+            "Max cpu time  unlimited\nMax address space         4096000000           unlimited            bytes\n";
+        assert_eq!(number_after(text, "Max address space"), Some(4_096_000_000));
+        assert_eq!(number_after(&text.replace("4096000000", "unlimited"), "Max address space"), None);
+        assert_eq!(number_after("VmPeak:\t 9 kB\nVmSize:\t    7052 kB\n", "VmSize:"), Some(7052));
     }
 }

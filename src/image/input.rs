@@ -1,5 +1,6 @@
 //! Opening files to read.
 use crate::error::{Error, Result};
+use crate::memory;
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
@@ -20,10 +21,31 @@ pub fn open(path: &Path) -> Result<File> {
 /// Reads the whole of a file.
 ///
 /// # Errors
-/// As [`open`].
+/// As [`open`], and [`Error::Memory`].
 pub fn read(path: &Path) -> Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    open(path)?.read_to_end(&mut bytes).map_err(|e| Error::input(path, remedy(&e)))?;
+    read_times(path, 1)
+}
+
+/// Reads the whole of a text, of which `times` its size will be made.
+///
+/// # Errors
+/// As [`read`], and for UTF-16.
+pub fn read_text(path: &Path, times: u64) -> Result<Vec<u8>> {
+    let bytes = read_times(path, times)?;
+    match bytes[..] {
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Err(Error::input(path, "is UTF-16 text: save it as UTF-8")),
+        _ => Ok(bytes),
+    }
+}
+
+/// Reads the whole of a file where there is memory for `times` its size.
+fn read_times(path: &Path, times: u64) -> Result<Vec<u8>> {
+    let about = |e| Error::input(path, remedy(&e));
+    let mut file = open(path)?;
+    let size = file.metadata().map_err(about)?.len();
+    memory::need(path.display(), size.saturating_mul(times))?;
+    let mut bytes = memory::vector(path.display(), size as usize)?;
+    file.read_to_end(&mut bytes).map_err(about)?;
     Ok(bytes)
 }
 

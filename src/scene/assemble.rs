@@ -7,6 +7,7 @@ use super::place::{Job, Plan, instance, mesh_name};
 use super::{Scene, bvh, environment, light};
 use crate::error::{Error, Result};
 use crate::gpu::layout::{Instance, LIGHT_ENVIRONMENT, NONE};
+use crate::memory;
 use glam::{DAffine3, Vec3};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
@@ -14,6 +15,11 @@ use std::path::{Path, PathBuf};
 
 /// Height of an MTL's bump map without `-bm`, as a share of the scene's diagonal.
 const DEFAULT_BUMP: f32 = 0.0005;
+
+/// Bytes that a triangle takes while the hierarchy over it is built, with what it is made of and its shading: 316 to build.
+const BYTES_OF_TRIANGLE: u64 = 400;
+/// Bytes of an object's name, about.
+const BYTES_OF_NAME: u64 = 64;
 
 /// A mesh in the triangle array: where, and how it is called.
 struct Stored {
@@ -51,8 +57,7 @@ pub fn assemble(path: &Path, description: &Description, sky: bool, scene: &mut S
     let (ranges, textures) = (built?, &a.library.materials.textures);
     let decoded = if textures.len() == early.len() { decoded? } else { textures.decode()? };
     (scene.textures, scene.texels) = (decoded.textures, decoded.texels);
-    a.finish(&ranges, sky, scene);
-    Ok(())
+    a.finish(&ranges, sky, scene)
 }
 
 impl<'a> Assembly<'a> {
@@ -179,9 +184,12 @@ impl<'a> Assembly<'a> {
     /// Puts all triangles into the array: first those in world space, then one mesh after another.
     fn store(&mut self, plan: &Plan) -> Result<Vec<Stored>> {
         let jobs: Vec<&Job> = plan.baked.iter().chain(&plan.stored).collect();
-        let file = |job: &Job| self.description.mesh[job.mesh].file.clone();
-        let last: Vec<bool> =
-            (0..jobs.len()).map(|i| jobs[i + 1..].iter().all(|later| file(later) != file(jobs[i]))).collect();
+        let triangles: u64 = jobs.iter().map(|job| self.triangles_of(job)).sum();
+        memory::need(format!("{}: {triangles} triangles", self.path.display()), triangles * BYTES_OF_TRIANGLE)?;
+        self.warn_of_grey(plan)?;
+        let file = |job: &Job| self.description.mesh[job.mesh].file.as_ref();
+        let latest: HashMap<_, _> = jobs.iter().enumerate().map(|(i, job)| (file(job), i)).collect();
+        let last: Vec<bool> = jobs.iter().enumerate().map(|(i, job)| latest[&file(job)] == i).collect();
         let mut stored = vec![Stored { mesh: None, range: 0..0, objects: Vec::new() }];
         for (i, job) in jobs.into_iter().enumerate() {
             let start = self.geometry.triangles.len();
@@ -210,12 +218,17 @@ impl<'a> Assembly<'a> {
             return Ok(ranges);
         }
         let mut boxes = HashMap::new();
+        let mut copies: HashMap<usize, Vec<&Job>> = HashMap::new();
+        plan.copies.iter().for_each(|copy| copies.entry(copy.mesh).or_default().push(copy));
+        let copies_of = |mesh: &Stored| mesh.mesh.and_then(|m| copies.get(&m)).map_or(&[][..], |jobs| jobs);
+        let names: u64 = stored.iter().map(|mesh| copies_of(mesh).len() as u64 * mesh.objects.len() as u64).sum();
+        memory::need(format!("{}: {names} objects", self.path.display()), names.saturating_mul(BYTES_OF_NAME))?;
         for mesh in stored {
             let Some(bounds) = bvh::bounds(&self.geometry.triangles[mesh.range.clone()]) else { continue };
             let root = bvh::build_mesh(&mut self.geometry, mesh.range.clone(), &mut scene.nodes);
             ranges.insert(root, mesh.range.clone());
             boxes.insert(root, bounds);
-            let copies = plan.copies.iter().filter(|c| Some(c.mesh) == mesh.mesh);
+            let copies = copies_of(&mesh).iter().copied();
             let identity = Job { mesh: 0, affine: DAffine3::IDENTITY, material: None };
             let baked = mesh.mesh.is_none().then_some(&identity);
             for copy in copies.chain(baked) {
@@ -246,13 +259,26 @@ impl<'a> Assembly<'a> {
         if far.is_nan() || far > super::MAX_COORDINATE as f32 {
             return Err(self.at("instances", format!("reach beyond the limit of {:e}", super::MAX_COORDINATE)));
         }
-        scene.bounds = [low.to_array(), high.to_array()];
+        // Rays are taken to the space of each instance that they meet.
+        let world = [low.to_array(), high.to_array()];
+        let seen = |i: &Instance| {
+            bvh::world_bounds(&turned(i), world).as_flattened().iter().map(|v| v.abs()).fold(0.0, f32::max)
+        };
+        if let Some(i) = scene.instances.iter().find(|i| !(seen(i) <= super::MAX_COORDINATE as f32)) {
+            let name = &scene.names.objects[i.object as usize];
+            let what = format!(
+                "seen from it, the scene reaches beyond the limit of {:e}: choose a larger scale",
+                super::MAX_COORDINATE
+            );
+            return Err(self.at(format!("an instance of \"{name}\""), what));
+        }
+        scene.bounds = world;
         scene.root = bvh::build_top(&mut scene.instances, &object_bounds, &mut scene.nodes);
         Ok(())
     }
 
     /// Moves what is left into the scene and chooses among its lights.
-    fn finish(mut self, ranges: &HashMap<u32, Range<usize>>, sky: bool, scene: &mut Scene) {
+    fn finish(mut self, ranges: &HashMap<u32, Range<usize>>, sky: bool, scene: &mut Scene) -> Result<()> {
         let [low, high] = scene.bounds.map(Vec3::from);
         if self.library.materials.list.is_empty() {
             self.library.grey();
@@ -269,7 +295,7 @@ impl<'a> Assembly<'a> {
         }
         add_appearance(scene);
         Materials::add_coat_tables(&mut scene.materials, &mut scene.texels);
-        light::finish(scene, ranges);
+        light::finish(scene, ranges)?;
         if !scene.lights.iter().any(|l| l.kind == LIGHT_ENVIRONMENT) {
             scene.environment = None;
         }
@@ -277,7 +303,13 @@ impl<'a> Assembly<'a> {
             warnings.push("the scene has no light: its image will be black".into());
         }
         scene.warnings = warnings;
+        Ok(())
     }
+}
+
+/// The instance whose world is the object's space.
+fn turned(i: &Instance) -> Instance {
+    Instance { world0: i.object0, world1: i.object1, world2: i.object2, ..*i }
 }
 
 /// Adds to the fingerprint what surfaces and lights look like; the rest of them is derived from that.

@@ -1,26 +1,32 @@
 //! Eight-way compressed BVHs (Ylitie et al. 2017) by obvhs: PLOC (Meister and Bittner 2018) and reinsertion. Triangles
 //! and their shading are put in leaf order; child and primitive indices are made global, so one array holds all levels.
 use super::geometry::Geometry;
-use crate::gpu::layout::{BvhNode, Instance, Triangle};
+use crate::gpu::layout::{BvhNode, Instance, TRAVERSAL_STACK, Triangle};
 use clusters::Clusters;
 use glam::{Mat4, Vec3, Vec4};
 use obvhs::Boundable;
 use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::cwbvh::CwBvh;
 use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use std::collections::HashSet;
 use std::ops::Range;
 
 mod clusters;
+mod level;
 
 /// Triangles in a leaf; the node format holds up to 3.
 const LEAF: u32 = 3;
 /// Relative growth of every box. Quantisation in the builder and slabs in the kernel round at 2^-24: this keeps their
 /// errors from opening gaps between boxes that share a face.
 const GROWTH: f32 = 1.0 / (1 << 21) as f32;
-/// The builder recurses, one frame per level; boxes inside boxes make thousands of levels.
-const STACK: usize = 1 << 28;
+/// Levels of a hierarchy at most: that of the instances and that of a mesh fill a traversal's stack together. Crytek Sponza
+/// has 14.
+const LEVELS: usize = TRAVERSAL_STACK as usize / 2;
+/// Levels of a two-way tree above which a part of it is halved, where the whole is too deep.
+const HALVED: usize = 24;
 
 /// Bounds of a set of points, `[low, high]`.
 pub type Bounds = [[f32; 3]; 2];
@@ -100,7 +106,7 @@ pub fn depth(nodes: &[BvhNode], root: u32) -> usize {
 }
 
 /// Groups that a ray leaves behind at most: one a level below the root, and with instances the groups of nodes and of
-/// instances around the one it enters. At least 1, and in kernels at most [`TRAVERSAL_STACK`](crate::gpu::layout::TRAVERSAL_STACK).
+/// instances around the one it enters. At least 1, and at most [`TRAVERSAL_STACK`].
 pub fn stack_size(nodes: &[BvhNode], root: u32, instances: &[Instance]) -> u32 {
     let roots: HashSet<u32> = instances.iter().map(|i| i.root).collect();
     let below = roots.iter().map(|&mesh| depth(nodes, mesh) + 1).max().unwrap_or(0);
@@ -114,9 +120,7 @@ fn build<T: Boundable + Sync>(items: &[T], first: u32, nodes: &mut Vec<BvhNode>)
         nodes.push(BvhNode::default()); // eight empty children: every ray misses
         return (root, Vec::new());
     }
-    // A pool of its own rather than a thread that others wait for: waiting inside a shared pool could starve it.
-    let pool = rayon::ThreadPoolBuilder::new().stack_size(STACK).build().expect("threads can be started");
-    let bvh = pool.install(|| compressed(items));
+    let bvh = compressed(items);
     nodes.reserve_exact(bvh.nodes.len());
     nodes.extend(bvh.nodes.iter().map(|node| {
         // The two structs agree byte for byte; only the indices become global.
@@ -131,7 +135,7 @@ fn build<T: Boundable + Sync>(items: &[T], first: u32, nodes: &mut Vec<BvhNode>)
 /// Search distance 6, then reinsertion. On Crytek Sponza, reinserting 10 % of the nodes instead of 2 % builds in 0.42 s
 /// instead of 0.21 s and visits 5 % fewer nodes per ray (Sibenik 4 %, a 100k dragon 3 %); larger search distances visit
 /// no fewer. Meshes so large that loading takes seconds keep to 2 %.
-fn compressed<T: Boundable + Sync>(items: &[T]) -> obvhs::cwbvh::CwBvh {
+fn compressed<T: Boundable + Sync>(items: &[T]) -> CwBvh {
     let clusters = Clusters::new(items);
     let mut bvh2 = {
         let boxes = clusters.boxes(items);
@@ -143,7 +147,22 @@ fn compressed<T: Boundable + Sync>(items: &[T]) -> obvhs::cwbvh::CwBvh {
     ReinsertionOptimizer::default().run(&mut bvh2, share, None);
     bvh2.parents = Vec::new();
     clusters.unfold(&mut bvh2, items);
-    bvh2_to_cwbvh(&bvh2, LEAF, true, false)
+    collapsed(&mut bvh2)
+}
+
+/// Eight-way nodes of at most [`LEVELS`] levels: what is too deep is halved, ever nearer to the root until all of it is.
+fn collapsed(bvh2: &mut Bvh2) -> CwBvh {
+    for from in [32, 16, 8, 0] {
+        // Eight children are seven levels deep at most, and a leaf of three triangles two.
+        if level::height(bvh2) <= 7 * LEVELS + 2 {
+            let bvh = bvh2_to_cwbvh(bvh2, LEAF, true, false);
+            if depth(bytemuck::cast_slice(&bvh.nodes), 0) <= LEVELS {
+                return bvh;
+            }
+        }
+        level::level(bvh2, from, if from == 0 { 0 } else { HALVED });
+    }
+    bvh2_to_cwbvh(bvh2, LEAF, true, false)
 }
 
 fn reorder<T: Copy>(items: &mut [T], order: &[u32]) {

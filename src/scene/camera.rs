@@ -58,9 +58,10 @@ impl Camera {
             Some(rows) => frame_from_matrix(rows)?,
             None => self.frame_from_target(bounds, tan_x.min(tan_y))?,
         };
+        finite(position)?;
         let positive = |name: &str, v: f32| match v {
-            v if v.is_finite() && v >= 0.0 => Ok(v),
-            v => Err(format!("{name} is {v}: choose 0 or a positive number")),
+            v if (0.0..=super::MAX_COORDINATE as f32).contains(&v) => Ok(v),
+            v => Err(format!("{name} is {v}: choose 0 or a positive number of at most {:e}", super::MAX_COORDINATE)),
         };
         let to_target = self.target.map_or(1.0, |t| (DVec3::from(t) - position).dot(forward).max(1e-6));
         let focus_distance = positive("focus_distance", self.focus_distance.unwrap_or(to_target as f32))?;

@@ -126,14 +126,17 @@ impl Geometry {
         };
         let mut keys: Vec<_> = (start..self.triangles.len()).into_par_iter().map(key).collect();
         keys.par_sort_unstable();
-        let mut keep = vec![true; self.triangles.len()];
+        let mut keep = vec![true; self.triangles.len() - start];
         for alike in keys.chunk_by(|a, b| a.0 == b.0) {
             let first = all(alike[0].1 as usize);
-            alike[1..].iter().for_each(|&(_, i)| keep[i as usize] = all(i as usize) != first);
+            alike[1..].iter().for_each(|&(_, i)| keep[i as usize - start] = all(i as usize) != first);
         }
-        retain(&mut self.triangles, &keep);
-        retain(&mut self.shading, &keep);
-        keep.iter().filter(|keep| !**keep).count()
+        let dropped = keep.iter().filter(|keep| !**keep).count();
+        if dropped > 0 {
+            retain(&mut self.triangles, start, &keep);
+            retain(&mut self.shading, start, &keep);
+        }
+        dropped
     }
 
     /// Packed vertex normals; `FLAT` where they say no more than the face does.
@@ -171,10 +174,12 @@ impl Geometry {
     }
 }
 
-/// `items` may be empty.
-fn retain<T>(items: &mut Vec<T>, keep: &[bool]) {
-    let mut keep = keep.iter();
-    items.retain(|_| *keep.next().expect("one for each"));
+/// Drops what is not kept from `start` on; `items` may be empty.
+fn retain<T: Copy>(items: &mut Vec<T>, start: usize, keep: &[bool]) {
+    let tail = items.get(start..).unwrap_or_default();
+    let kept: Vec<T> = tail.iter().zip(keep).filter(|(_, keep)| **keep).map(|(item, _)| *item).collect();
+    items.truncate(start);
+    items.extend(kept);
 }
 
 /// The code of a triangle without vertex normals.

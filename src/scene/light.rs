@@ -6,7 +6,9 @@
 use super::environment::{luminance, mean_luminance};
 use super::value::Rgb;
 use super::{Scene, alias, geometry, texture};
+use crate::error::Result;
 use crate::gpu::layout::*;
+use crate::memory;
 use glam::{DMat3, Mat4, Vec3, Vec4};
 use serde::Deserialize;
 use std::collections::HashMap;
@@ -54,7 +56,7 @@ impl LightTable {
     ///
     /// # Errors
     /// A sentence that names the key at fault.
-    pub fn build(&self) -> Result<Light, String> {
+    pub fn build(&self) -> std::result::Result<Light, String> {
         let position = || finite(self.position.ok_or("needs a position")?, "position");
         let light = Light { triangle: NONE, material: NONE, ..Light::default() };
         match self.kind {
@@ -81,7 +83,7 @@ impl LightTable {
     }
 
     /// Unit direction of travel.
-    fn axis(&self, from: Vec3) -> Result<[f32; 3], String> {
+    fn axis(&self, from: Vec3) -> std::result::Result<[f32; 3], String> {
         let direction = match (self.direction, self.target) {
             (Some(d), None) => Vec3::from(d),
             (None, Some(t)) if self.kind == Type::Spot => Vec3::from(t) - from,
@@ -92,14 +94,14 @@ impl LightTable {
     }
 }
 
-fn finite(v: [f32; 3], key: &str) -> Result<[f32; 3], String> {
+fn finite(v: [f32; 3], key: &str) -> std::result::Result<[f32; 3], String> {
     match v.iter().all(|v| v.abs() <= super::MAX_COORDINATE as f32) {
         true => Ok(v),
         false => Err(format!("{key} {v:?} is not within {:e}", super::MAX_COORDINATE)),
     }
 }
 
-fn emitted(v: Option<Rgb>, key: &str) -> Result<[f32; 3], String> {
+fn emitted(v: Option<Rgb>, key: &str) -> std::result::Result<[f32; 3], String> {
     let v = v.ok_or_else(|| format!("needs {key}"))?.0;
     match v.iter().all(|v| (0.0..=1e30).contains(v)) {
         true => Ok(v),
@@ -116,8 +118,15 @@ pub fn environment(radiance: [f32; 3], world_from_environment: DMat3) -> Light {
 
 /// Adds the emissive triangles to the scene's lights (which hold the others), drops lights without power, and builds
 /// the table. Sets [`Material::emission_weight`], [`Light::probability`] and [`Scene::triangle_pdf_scale`].
-pub fn finish(scene: &mut Scene, ranges: &HashMap<u32, Range<usize>>) {
-    let mean = |image: u32| scene.textures.get(image as usize).map_or([1.0; 3], |t| texture::mean(t, &scene.texels));
+///
+/// # Errors
+/// [`Error::Memory`](crate::error::Error::Memory).
+pub fn finish(scene: &mut Scene, ranges: &HashMap<u32, Range<usize>>) -> Result<()> {
+    let mut means = HashMap::new(); // many materials may share a picture
+    let mut mean = |image: u32| match scene.textures.get(image as usize) {
+        Some(t) => *means.entry((t.first, t.flags & TEXTURE_SRGB)).or_insert_with(|| texture::mean(t, &scene.texels)),
+        None => [1.0; 3],
+    };
     for m in &mut scene.materials {
         let mean_emission = mean(m.emission_texture);
         let emission: [f32; 3] = std::array::from_fn(|c| m.emission[c] * mean_emission[c]);
@@ -126,7 +135,7 @@ pub fn finish(scene: &mut Scene, ranges: &HashMap<u32, Range<usize>>) {
         m.emission_weight = luminance(emission) * opacity;
     }
     let mut lights = std::mem::take(&mut scene.lights);
-    add_triangles(scene, ranges, &mut lights);
+    add_triangles(scene, ranges, &mut lights)?;
     let mut powers: Vec<f64> = lights.iter().map(|l| power(scene, l)).collect();
     let mut kept = powers.iter();
     lights.retain(|_| kept.next().is_some_and(|&p| p > 0.0));
@@ -138,47 +147,62 @@ pub fn finish(scene: &mut Scene, ranges: &HashMap<u32, Range<usize>>) {
     let probabilities = alias::probabilities(&scene.light_table);
     lights.iter_mut().zip(probabilities).for_each(|(l, p)| l.probability = p as f32);
     scene.lights = lights;
+    Ok(())
 }
 
 /// Emissive triangles in world space: of the only level, or of every instance. `ranges` are the triangles below
 /// each root that instances name.
-fn add_triangles(scene: &Scene, ranges: &HashMap<u32, Range<usize>>, lights: &mut Vec<Light>) {
+fn add_triangles(scene: &Scene, ranges: &HashMap<u32, Range<usize>>, lights: &mut Vec<Light>) -> Result<()> {
+    let emits = |material: u32| scene.materials[material as usize].emission_weight > 0.0;
+    let own = |range: Range<usize>| range.filter(|&i| emits(scene.triangles[i].material)).collect::<Vec<_>>();
     if scene.instances.is_empty() {
-        let whole = 0..scene.triangles.len();
-        add_range(scene, whole, |p| p, None, false, lights);
+        let lit = own(0..scene.triangles.len());
+        reserve(lights, lit.len())?;
+        lit.into_iter().for_each(|index| lights.push(triangle_light(scene, index, |p| p, None, false)));
+        return Ok(());
     }
-    for instance in &scene.instances {
-        let range = &ranges[&instance.root];
+    let own: HashMap<u32, Vec<usize>> = ranges.iter().map(|(&root, range)| (root, own(range.clone()))).collect();
+    let lit = |instance: &Instance| match instance.material {
+        NONE => own[&instance.root].len(),
+        worn if emits(worn) => ranges[&instance.root].len(),
+        _ => 0,
+    };
+    reserve(lights, scene.instances.iter().map(lit).sum())?;
+    for instance in scene.instances.iter().filter(|instance| lit(instance) > 0) {
         let rows = [instance.world0, instance.world1, instance.world2].map(Vec4::from);
         let world = Mat4::from_cols(rows[0], rows[1], rows[2], Vec4::W).transpose();
         let place = |p: Vec3| world.transform_point3(p);
         let material = (instance.material != NONE).then_some(instance.material);
-        add_range(scene, range.clone(), place, material, instance.mirrored == 1, lights);
+        let mut add = |index| lights.push(triangle_light(scene, index, place, material, instance.mirrored == 1));
+        match material {
+            Some(_) => ranges[&instance.root].clone().for_each(&mut add),
+            None => own[&instance.root].iter().copied().for_each(&mut add),
+        }
     }
+    Ok(())
 }
 
-fn add_range(
+/// A light takes as much again in the table, its power and its probability while they are made.
+fn reserve(lights: &mut Vec<Light>, more: usize) -> Result<()> {
+    memory::need(format!("{more} emissive triangles"), 2 * (more * size_of::<Light>()) as u64)?;
+    memory::reserve("lights", lights, more)
+}
+
+fn triangle_light(
     scene: &Scene,
-    range: Range<usize>,
+    index: usize,
     place: impl Fn(Vec3) -> Vec3,
     material: Option<u32>,
     mirrored: bool,
-    lights: &mut Vec<Light>,
-) {
-    for index in range {
-        let t = &scene.triangles[index];
-        let material = material.unwrap_or(t.material);
-        let m = &scene.materials[material as usize];
-        if m.emission_weight <= 0.0 {
-            continue;
-        }
-        let [a, mut b, mut c] = [t.v0, t.v1, t.v2].map(|p| place(p.into()).to_array());
-        if mirrored {
-            std::mem::swap(&mut b, &mut c); // the front of the mesh stays in front
-        }
-        let (triangle, value) = (index as u32, m.emission);
-        lights.push(Light { kind: LIGHT_TRIANGLE, a, b, c, triangle, value, material, ..Light::default() });
+) -> Light {
+    let t = &scene.triangles[index];
+    let material = material.unwrap_or(t.material);
+    let [a, mut b, mut c] = [t.v0, t.v1, t.v2].map(|p| place(p.into()).to_array());
+    if mirrored {
+        std::mem::swap(&mut b, &mut c); // the front of the mesh stays in front
     }
+    let value = scene.materials[material as usize].emission;
+    Light { kind: LIGHT_TRIANGLE, a, b, c, triangle: index as u32, value, material, ..Light::default() }
 }
 
 /// Area of an emissive triangle, in squares of the scene's diagonal, above which sampling by solid angle pays.

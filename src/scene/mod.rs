@@ -1,10 +1,9 @@
 //! Scene files become flat arrays, ready to be copied to the device as they are. Nothing here talks to a GPU.
 use crate::error::{Error, Result};
-use crate::gpu::layout::{
-    AliasEntry, BvhNode, Camera, Instance, Light, Material, Shading, TRAVERSAL_STACK, Texture, Triangle,
-};
+use crate::gpu::layout::{AliasEntry, BvhNode, Camera, Instance, Light, Material, Shading, Texture, Triangle};
 use crate::image::input;
 use crate::settings::Settings;
+use crate::threads;
 use description::Description;
 use std::path::Path;
 
@@ -35,8 +34,14 @@ pub use check::check_camera;
 pub use effects::effects;
 pub use fingerprint::Fingerprint;
 
-/// Largest coordinate a scene may have: squares of distances still fit a 32-bit float.
-pub const MAX_COORDINATE: f64 = 1e18;
+/// Largest coordinate M of triangles, of points that rays start from and of lights: what a ray's hit is computed from fits a
+/// 32-bit float (3.4e38). Seen from its origin a corner is within 2 M, and sheared along the ray within 4 M; an edge
+/// function is within 2 (4 M)^2 = 32 M^2, and the numerator of the distance, three of them times a depth, within
+/// 3 * 32 M^2 * 2 M = 192 M^3, which is 1.9e38.
+pub const MAX_COORDINATE: f64 = 1e12;
+
+/// Bytes that a byte of a scene file takes while it is read, at most.
+const BYTES_OF_TOML: u64 = 40;
 
 /// Everything a render reads, in the form that kernels read it. Whoever edits it keeps what [`Scene::check`] asks for.
 #[derive(Clone, Debug, Default)]
@@ -121,7 +126,7 @@ impl Scene {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_lowercase();
         match extension.as_str() {
             "toml" => {
-                let text = String::from_utf8(input::read(path)?);
+                let text = String::from_utf8(input::read_text(path, BYTES_OF_TOML)?);
                 let text = text.map_err(|_| Error::input(path, "is no text: write it in UTF-8"))?;
                 Self::parse(path, &text, overrides)
             }
@@ -160,13 +165,8 @@ impl Scene {
         scene.settings.validate().map_err(|e| Error::input(path, e))?;
         overrides(&mut scene.settings);
         scene.settings.validate()?;
-        assemble::assemble(path, description, sky, &mut scene)?;
+        threads::within(|| assemble::assemble(path, description, sky, &mut scene))?;
         scene.stack = bvh::stack_size(&scene.nodes, scene.root, &scene.instances);
-        if scene.stack > TRAVERSAL_STACK {
-            let what =
-                "lies so densely on itself that no hierarchy of a usable depth holds it: remove copies of triangles";
-            return Err(Error::input_at(path, "geometry", what));
-        }
         let camera = description.camera.build(&scene.settings, scene.bounds);
         scene.camera = camera.map_err(|what| Error::input_at(path, "[camera]", what))?;
         scene.fingerprint.add(&[scene.camera]);

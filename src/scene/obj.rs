@@ -5,10 +5,12 @@ use super::obj_lines::ObjLines;
 use super::polygon;
 use crate::error::{Error, Result};
 use crate::image::input;
+use crate::memory;
 use std::cell::RefCell;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A parsed OBJ file.
 #[derive(Debug, Default)]
@@ -17,7 +19,15 @@ pub struct ObjFile {
     pub models: Vec<tobj::Model>,
     /// Scene material of each model.
     pub materials: Vec<u32>,
+    /// What is said when a mesh wears the file's own materials, and grey stands in for some.
+    pub grey: Option<String>,
 }
+
+/// Names and indices of materials.
+type Named = Arc<[(String, u32)]>;
+
+/// Bytes that a material takes while it is read.
+const BYTES_OF_MATERIAL: u64 = 2048;
 
 /// What all OBJ files of a scene share.
 #[derive(Debug, Default)]
@@ -26,8 +36,8 @@ pub struct Library {
     pub materials: Materials,
     /// `[[material]]` tables by name: they win over MTL materials.
     pub tables: HashMap<String, u32>,
-    /// MTL files already read.
-    mtls: HashMap<PathBuf, Vec<(String, u32)>>,
+    /// MTL files already read, by their one true path.
+    mtls: HashMap<PathBuf, Named>,
     /// The grey of triangles without a material.
     grey: Option<u32>,
     /// What was repaired.
@@ -41,16 +51,19 @@ impl Library {
         *self.grey.get_or_insert_with(|| materials.push("(default)", Materials::plain([0.6; 3])))
     }
 
-    /// Names and indices of the materials of an MTL file, read once.
-    fn mtl(&mut self, path: &Path) -> Result<Vec<(String, u32)>> {
-        if let Some(known) = self.mtls.get(path) {
-            return Ok(known.clone());
+    /// The materials of an MTL file, read once however its path is written.
+    fn mtl(&mut self, path: &Path) -> Result<Named> {
+        let known = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        if let Some(named) = self.mtls.get(&known) {
+            return Ok(named.clone());
         }
-        let bytes = input::read(path)?;
-        let blocks = mtl::parse(path, &String::from_utf8_lossy(&bytes))?;
-        let names = blocks.iter().map(|b| Ok((b.name.clone(), self.block(path, b)?))).collect::<Result<Vec<_>>>()?;
-        self.mtls.insert(path.to_owned(), names.clone());
-        Ok(names)
+        let bytes = input::read_text(path, 4)?;
+        let text = String::from_utf8_lossy(&bytes);
+        memory::need(path.display(), BYTES_OF_MATERIAL * text.matches("newmtl").count() as u64)?;
+        let blocks = mtl::parse(path, &text)?;
+        let named: Named = blocks.iter().map(|b| Ok((b.name.clone(), self.block(path, b)?))).collect::<Result<_>>()?;
+        self.mtls.insert(known, named.clone());
+        Ok(named)
     }
 
     fn block(&mut self, path: &Path, block: &Mtl) -> Result<u32> {
@@ -60,28 +73,24 @@ impl Library {
         let place = || format!("material \"{}\"", block.name);
         self.materials.push_mtl(block, &mut self.warnings).map_err(|what| Error::input_at(path, place(), what))
     }
+}
 
-    /// Materials of an `mtllib` statement: one file whose name may hold spaces, or several files.
-    fn mtllib(&mut self, obj: &Path, statement: &str, report: bool) -> Result<Vec<(String, u32)>> {
-        let directory = obj.parent().unwrap_or(Path::new(""));
-        let written = statement.trim().replace('\\', "/");
-        let files = match mtl::find_file(directory, &written) {
-            Some(_) => vec![written],
-            None => split_files(&written),
-        };
-        let mut names = Vec::new();
-        for file in files {
-            match mtl::find_file(directory, &file) {
-                Some((path, _)) => names.extend(self.mtl(&path)?),
-                None if !report => {}
-                None => {
-                    let what = format!("{}: material library {file} not found: grey is used", obj.display());
-                    self.warnings.push(what);
-                }
-            }
-        }
-        Ok(names)
+/// The files of an `mtllib` statement, one whose name may hold spaces or several, and the names of which there is none.
+fn libraries(obj: &Path, statement: &str) -> (Vec<PathBuf>, Vec<String>) {
+    let directory = obj.parent().unwrap_or(Path::new(""));
+    let written = statement.trim().replace('\\', "/");
+    let whole = mtl::find_file(directory, &written).map(|(path, _)| path);
+    if let Some(path) = whole {
+        return (vec![path], Vec::new());
     }
+    let (mut found, mut missing) = (Vec::new(), Vec::new());
+    for file in split_files(&written) {
+        match mtl::find_file(directory, &file) {
+            Some((path, _)) => found.push(path),
+            None => missing.push(file),
+        }
+    }
+    (found, missing)
 }
 
 /// Words joined until one ends in `.mtl`.
@@ -110,12 +119,10 @@ pub fn read_libraries(path: &Path, library: &mut Library) -> Result<()> {
     let mut head = Vec::new();
     let _ = file.take(1 << 16).read_to_end(&mut head); // what could be read is enough
     let head = String::from_utf8_lossy(&head);
-    let statements = head.lines().filter_map(|l| l.trim_start().strip_prefix("mtllib "));
-    for statement in statements {
-        // One that is missing is reported when the whole file is read.
-        library.mtllib(path, statement, false)?;
-    }
-    Ok(())
+    let statements: BTreeSet<_> = head.lines().filter_map(|l| l.trim_start().strip_prefix("mtllib ")).collect();
+    // One that is missing is reported when the whole file is read.
+    let found = statements.iter().flat_map(|statement| libraries(path, statement).0);
+    found.into_iter().try_for_each(|path| library.mtl(&path).map(|_| ()))
 }
 
 /// Reads an OBJ file and the MTL files it names.
@@ -132,30 +139,21 @@ pub fn load(path: &Path, library: &mut Library) -> Result<ObjFile> {
 /// See [`load`].
 pub fn parse(path: &Path, reader: impl std::io::BufRead, library: &mut Library) -> Result<ObjFile> {
     let mut lines = ObjLines::new(reader);
-    // tobj numbers materials in the order its loader returns them; this is the same list with scene indices.
-    let found: RefCell<Vec<u32>> = RefCell::default();
-    let known: RefCell<HashSet<String>> = RefCell::default();
-    let failure: RefCell<Option<Error>> = RefCell::default();
+    let served = RefCell::new(Served::default());
     let shared = RefCell::new(&mut *library);
     let loader = |statement: &Path| {
-        let mut library = shared.borrow_mut();
-        let names = match statement.to_str() {
-            Some(ObjLines::<&[u8]>::TABLES) => Ok(library.tables.iter().map(|(n, &i)| (n.clone(), i)).collect()),
-            _ => library.mtllib(path, &statement.to_string_lossy(), true),
-        };
-        let names = names.unwrap_or_else(|e| {
-            failure.borrow_mut().get_or_insert(e);
-            Vec::new()
-        });
-        found.borrow_mut().extend(names.iter().map(|n| n.1));
-        known.borrow_mut().extend(names.iter().map(|n| n.0.clone()));
-        let blocks = names.iter().map(|n| tobj::Material { name: n.0.clone(), ..Default::default() }).collect();
-        Ok((blocks, names.into_iter().enumerate().map(|(i, n)| (n.0, i)).collect()))
+        let named = served.borrow_mut().statement(path, &statement.to_string_lossy(), &mut shared.borrow_mut());
+        let blocks = named.iter().map(|n| tobj::Material { name: n.0.clone(), ..Default::default() }).collect();
+        Ok((blocks, named.into_iter().enumerate().map(|(i, n)| (n.0, i)).collect()))
     };
     let options = tobj::LoadOptions { single_index: true, triangulate: false, ignore_points: true, ignore_lines: true };
     let outcome = tobj::load_obj_buf(&mut lines, &options, loader);
-    if let Some(error) = failure.take() {
+    let served = served.into_inner();
+    if let Some(error) = served.failure {
         return Err(error);
+    }
+    if let Some(lack) = lines.lack {
+        return Err(Error::Memory(format!("{}, line {}: {lack}; split the file", path.display(), lines.line)));
     }
     let mut models = match (lines.error.take(), outcome) {
         (Some((line, what)), _) => return Err(Error::input_at(path, format!("line {line}"), what)),
@@ -166,19 +164,75 @@ pub fn parse(path: &Path, reader: impl std::io::BufRead, library: &mut Library) 
         mesh.indices = polygon::triangulate(&mesh.positions, &mesh.face_arities, &mesh.indices);
         mesh.face_arities.clear();
     }
-    let found = found.into_inner();
-    let index = |m: &tobj::Model| m.mesh.material_id.and_then(|i| found.get(i).copied());
-    let unknown: Vec<_> = lines.worn.iter().filter(|name| !known.borrow().contains(*name)).cloned().collect();
-    if !unknown.is_empty() {
-        let what = format!("{}: grey is used for materials defined nowhere: {}", path.display(), unknown.join(", "));
-        library.warnings.push(what);
-    }
+    let index = |m: &tobj::Model| m.mesh.material_id.and_then(|i| served.found.get(i).copied());
     if let (short @ 1.., line) = lines.short_faces {
         let what = format!("{short} of fewer than three corners dropped, the first in line {line}");
         library.warnings.push(format!("{}: faces repaired: {what}", path.display()));
     }
     let materials = models.iter().map(|m| index(m).unwrap_or_else(|| library.grey())).collect();
-    Ok(ObjFile { models, materials })
+    Ok(ObjFile { models, materials, grey: served.grey(path, &lines.worn) })
+}
+
+/// What `mtllib` statements came to so far.
+#[derive(Default)]
+struct Served {
+    /// Statements, and the true paths of what they name: each is served once.
+    done: HashSet<PathBuf>,
+    /// Libraries that are nowhere.
+    missing: BTreeSet<String>,
+    /// Scene materials in the order in which tobj numbers them.
+    found: Vec<u32>,
+    known: HashSet<String>,
+    failure: Option<Error>,
+}
+
+impl Served {
+    /// The materials that a statement adds.
+    fn statement(&mut self, obj: &Path, statement: &str, library: &mut Library) -> Vec<(String, u32)> {
+        let named: Vec<_> = match statement {
+            ObjLines::<&[u8]>::TABLES => library.tables.iter().map(|(n, &i)| (n.clone(), i)).collect(),
+            _ if !self.done.insert(statement.into()) => Vec::new(),
+            _ => self.files(obj, statement, library).unwrap_or_else(|e| {
+                self.failure.get_or_insert(e);
+                Vec::new()
+            }),
+        };
+        self.found.extend(named.iter().map(|n| n.1));
+        self.known.extend(named.iter().map(|n| n.0.clone()));
+        named
+    }
+
+    fn files(&mut self, obj: &Path, statement: &str, library: &mut Library) -> Result<Vec<(String, u32)>> {
+        let (found, missing) = libraries(obj, statement);
+        self.missing.extend(missing);
+        let mut named = Vec::new();
+        for path in found {
+            if self.done.insert(path.canonicalize().unwrap_or_else(|_| path.clone())) {
+                named.extend_from_slice(&library.mtl(&path)?);
+            }
+        }
+        Ok(named)
+    }
+
+    /// What is said of the names in `worn` that are defined nowhere.
+    fn grey(&self, obj: &Path, worn: &BTreeSet<String>) -> Option<String> {
+        let unknown: Vec<&str> = worn.iter().filter(|name| !self.known.contains(*name)).map(String::as_str).collect();
+        let missing: Vec<&str> = self.missing.iter().map(String::as_str).collect();
+        let libraries = match missing.is_empty() {
+            true => String::new(),
+            false => format!(" (no such library: {})", few(&missing)),
+        };
+        let what = || format!("grey is used for materials defined nowhere: {}{libraries}", few(&unknown));
+        (!unknown.is_empty()).then(|| format!("{}: {}", obj.display(), what()))
+    }
+}
+
+/// The first names of a list, and how many more there are.
+fn few(names: &[&str]) -> String {
+    match names.len() {
+        0..=8 => names.join(", "),
+        n => format!("{} and {} more", names[..8].join(", "), n - 8),
+    }
 }
 
 fn remedy(error: tobj::LoadError) -> String {
@@ -274,8 +328,8 @@ mod tests {
         let text = format!("mtllib none.mtl\n{SQUARE}usemtl red\nf 1 2 3\nusemtl what\nf 1 2 3");
         let file = parse(Path::new("a.obj"), text.as_bytes(), &mut library).unwrap();
         assert_eq!(file.materials, [red, library.grey()]);
-        assert!(library.warnings[0].contains("none.mtl not found"), "{:?}", library.warnings);
-        assert!(library.warnings[1].ends_with("defined nowhere: what"));
+        let said = file.grey.unwrap();
+        assert!(said.ends_with("defined nowhere: what (no such library: none.mtl)"), "{said}");
     }
 
     #[test]

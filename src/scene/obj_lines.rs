@@ -2,6 +2,7 @@
 //! colours dropped, and every face index is checked against what is defined above it, so that errors have a line.
 //! Where faces with and without normals (texture coordinates) alternate, a group statement is slipped in between:
 //! tobj would otherwise lend a corner the normal of its neighbour.
+use crate::memory;
 use std::collections::BTreeSet;
 use std::io::{BufRead, Read};
 
@@ -12,6 +13,9 @@ pub struct ObjLines<R> {
     out: Vec<u8>,
     used: usize,
     raw: Vec<u8>,
+    /// What was read up to a line feed, and how much of it was taken: old files end their lines by carriage returns alone.
+    chunk: Vec<u8>,
+    taken: usize,
     /// v, vt, vn so far.
     defined: [i64; 3],
     /// Has texture coordinates, has normals; of the last face.
@@ -25,7 +29,18 @@ pub struct ObjLines<R> {
     pub line: usize,
     /// What is wrong with a face, and its line.
     pub error: Option<(usize, String)>,
+    /// Bytes that what was read so far takes, about, and how many of them memory was asked for.
+    held: u64,
+    asked: u64,
+    /// What is said when there is no memory for more.
+    pub lack: Option<String>,
 }
+
+/// Bytes of a line, with its continuations, at most.
+const LONGEST_LINE: usize = 1 << 26;
+const TOO_LONG: &str = "64 MiB without a line feed: is this an OBJ file?";
+/// Estimated bytes that a parsed file takes before memory is asked for the first time.
+const UNASKED: u64 = 1 << 26;
 
 const KINDS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
 
@@ -37,30 +52,87 @@ impl<R: BufRead> ObjLines<R> {
     pub fn new(inner: R) -> Self {
         let out = format!("mtllib {}\n", Self::TABLES).into_bytes();
         let group = "unnamed_object".to_owned();
-        let (raw, defined, format, worn) = (Vec::new(), [0; 3], None, BTreeSet::new());
-        Self { inner, out, used: 0, raw, defined, format, group, worn, short_faces: (0, 0), line: 0, error: None }
+        let (raw, chunk, defined, format, worn) = (Vec::new(), Vec::new(), [0; 3], None, BTreeSet::new());
+        Self {
+            inner,
+            out,
+            used: 0,
+            raw,
+            chunk,
+            taken: 0,
+            defined,
+            format,
+            group,
+            worn,
+            short_faces: (0, 0),
+            line: 0,
+            error: None,
+            held: 0,
+            asked: UNASKED,
+            lack: None,
+        }
     }
 
     /// Reads the next line, with its continuations, into `raw`; false at the end.
     fn next_raw(&mut self) -> std::io::Result<bool> {
         self.raw.clear();
-        loop {
-            let got = self.inner.read_until(b'\n', &mut self.raw)?;
-            if got == 0 {
-                return Ok(!self.raw.is_empty());
-            }
-            self.line += 1;
-            if self.line == 1 && self.raw.starts_with("\u{feff}".as_bytes()) {
-                self.raw.drain(..3);
-            }
-            while matches!(self.raw.last(), Some(b'\n' | b'\r')) {
-                self.raw.pop();
-            }
+        while self.next_line()? {
             match self.raw.last() {
                 Some(b'\\') => *self.raw.last_mut().expect("just seen") = b' ',
                 _ => return Ok(true),
             }
         }
+        Ok(!self.raw.is_empty())
+    }
+
+    /// Appends the next line to `raw`, without its end; false at the end of the file.
+    fn next_line(&mut self) -> std::io::Result<bool> {
+        if self.taken == self.chunk.len() && !self.next_chunk()? {
+            return Ok(false);
+        }
+        self.line += 1;
+        let rest = &self.chunk[self.taken..];
+        // `contains` is fast where there is none, as nearly always.
+        let end = if rest.contains(&b'\r') { rest.iter().position(|&b| b == b'\r') } else { None };
+        let end = end.unwrap_or(rest.len());
+        self.raw.extend_from_slice(&rest[..end]);
+        self.taken = (self.taken + end + 1).min(self.chunk.len());
+        match self.raw.len() > LONGEST_LINE {
+            true => self.refuse(TOO_LONG),
+            false => Ok(true),
+        }
+    }
+
+    /// Reads up to the next line feed, which is dropped together with a carriage return before it.
+    fn next_chunk(&mut self) -> std::io::Result<bool> {
+        self.chunk.clear();
+        self.taken = 0;
+        let most = LONGEST_LINE as u64 + 2;
+        if self.inner.by_ref().take(most).read_until(b'\n', &mut self.chunk)? == 0 {
+            return Ok(false);
+        }
+        if self.chunk.len() > LONGEST_LINE && !self.chunk.ends_with(b"\n") {
+            return self.refuse(TOO_LONG);
+        }
+        if self.line == 0 && (self.chunk.starts_with(&[0xff, 0xfe]) || self.chunk.starts_with(&[0xfe, 0xff])) {
+            return self.refuse("the file is UTF-16 text: save it as UTF-8");
+        }
+        if self.line == 0 && self.chunk.starts_with("\u{feff}".as_bytes()) {
+            self.chunk.drain(..3);
+        }
+        for end in [b'\n', b'\r'] {
+            self.chunk.pop_if(|last| *last == end);
+        }
+        // An empty line is a line: its end is left to be taken.
+        if self.chunk.is_empty() {
+            self.chunk.push(b'\r');
+        }
+        Ok(true)
+    }
+
+    fn refuse(&mut self, what: &str) -> std::io::Result<bool> {
+        self.error = Some((self.line.max(1), what.to_owned()));
+        Err(std::io::ErrorKind::InvalidData.into())
     }
 
     fn refill(&mut self) -> std::io::Result<()> {
@@ -75,16 +147,34 @@ impl<R: BufRead> ObjLines<R> {
         drop(text);
         self.raw = raw;
         if let Err(what) = outcome {
-            self.error = Some((self.line, what));
-            return Err(std::io::ErrorKind::InvalidData.into());
+            return self.refuse(&what).map(|_| ());
         }
         self.out.push(b'\n');
-        Ok(())
+        self.ask()
+    }
+
+    /// Asks for as much memory again whenever what is held has doubled.
+    fn ask(&mut self) -> std::io::Result<()> {
+        if self.held > self.asked {
+            self.asked = 2 * self.held;
+            self.lack = memory::check(self.held).err();
+        }
+        match self.lack {
+            Some(_) => Err(std::io::ErrorKind::OutOfMemory.into()),
+            None => Ok(()),
+        }
     }
 
     fn mend(&mut self, text: &str) -> Result<(), String> {
         let (key, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
         let mut text = text;
+        self.held += match key {
+            "v" => 90, // its numbers, those of a mesh's vertex, and a place in the table of vertices
+            "vt" => 16,
+            "vn" => 24,
+            "o" | "g" | "usemtl" => 700, // a model
+            _ => 0,
+        };
         match key {
             "v" => {
                 self.defined[0] += 1;
@@ -116,6 +206,7 @@ impl<R: BufRead> ObjLines<R> {
             (0..2).for_each(|i| format[i] &= has[i]);
             corners += 1;
         }
+        self.held += 104 + 20 * corners;
         match corners {
             0 => return Err("the face names no vertices: delete the line".into()),
             1 | 2 => {

@@ -3,9 +3,11 @@ use super::assemble::Assembly;
 use super::description::{self, Mesh, MeshTable};
 use super::geometry::{Corners, Geometry, Placement, Repairs, Tag, TooFar};
 use super::obj::ObjFile;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::layout::{Instance, NONE};
+use crate::memory;
 use glam::{DAffine3, Vec2, Vec3};
+use std::collections::HashMap;
 use std::path::PathBuf;
 
 /// A mesh and where it goes.
@@ -61,12 +63,15 @@ impl Assembly<'_> {
     pub fn plan(&self) -> Result<Plan> {
         let meshes = &self.description.mesh;
         let mut plan = Plan::default();
-        let mut instanced = vec![false; meshes.len()];
+        let (mut instanced, mut copied) = (vec![false; meshes.len()], vec![false; meshes.len()]);
+        let named = meshes.iter().enumerate().rev().filter_map(|(i, m)| Some((m.name.as_deref()?, i)));
+        let named: HashMap<&str, usize> = named.collect(); // the first of a name counts
+        let mut textured = HashMap::new();
         for (number, table) in self.description.instance.iter().enumerate() {
             let place = format!("instance {} of mesh \"{}\"", number + 1, table.mesh);
-            let names = || meshes.iter().filter_map(|m| m.name.as_deref());
-            let Some(mesh) = meshes.iter().position(|m| m.name.as_deref() == Some(&table.mesh)) else {
-                let near = description::nearest(&table.mesh, names()).unwrap_or("(none has a name)");
+            let Some(&mesh) = named.get(table.mesh.as_str()) else {
+                let names = meshes.iter().filter_map(|m| m.name.as_deref());
+                let near = description::nearest(&table.mesh, names).unwrap_or("(none has a name)");
                 return Err(self.at(place, format!("no such mesh: did you mean \"{near}\"?")));
             };
             instanced[mesh] = true;
@@ -74,17 +79,22 @@ impl Assembly<'_> {
             let material = table.material.as_ref().map(|m| self.material(m, &place)).transpose()?;
             let own = self.invertible(meshes[mesh].transform.0, &place)?;
             // Textures of a light are looked up by the corners' order, which a mirrored light has to swap: bake it.
-            match affine.matrix3.determinant() < 0.0 && self.is_textured_light(mesh, material)? {
+            let mirrored = affine.matrix3.determinant() < 0.0;
+            if mirrored && !textured.contains_key(&(mesh, material)) {
+                textured.insert((mesh, material), self.is_textured_light(mesh, material)?);
+            }
+            match mirrored && textured[&(mesh, material)] {
                 true => plan.baked.push(Job { mesh, affine: affine * own, material }),
                 false => plan.copies.push(Job { mesh, affine, material }),
             }
+            copied[mesh] |= plan.copies.last().is_some_and(|copy| copy.mesh == mesh);
         }
         for (mesh, table) in meshes.iter().enumerate() {
             let affine = self.invertible(table.transform.0, &format!("mesh \"{}\"", mesh_name(table)))?;
             let job = Job { mesh, affine, material: None };
             if !instanced[mesh] {
                 plan.baked.push(job);
-            } else if plan.copies.iter().any(|c| c.mesh == mesh) {
+            } else if copied[mesh] {
                 plan.stored.push(job);
             }
         }
@@ -124,9 +134,33 @@ impl Assembly<'_> {
         )
     }
 
+    /// Says where grey stands in for a material of a file that some mesh wears.
+    pub fn warn_of_grey(&mut self, plan: &Plan) -> Result<()> {
+        let meshes = &self.description.mesh;
+        let (mut worn, mut copies) = (vec![false; meshes.len()], vec![false; meshes.len()]);
+        plan.copies.iter().filter(|copy| copy.material.is_none()).for_each(|copy| copies[copy.mesh] = true);
+        for job in &plan.baked {
+            worn[job.mesh] |= self.override_of(job)?.is_none();
+        }
+        for job in plan.stored.iter().filter(|job| copies[job.mesh]) {
+            worn[job.mesh] |= self.override_of(job)?.is_none();
+        }
+        for (table, _) in meshes.iter().zip(worn).filter(|(_, worn)| *worn) {
+            let file = self.file_of(table).and_then(|path| self.files.get_mut(&path));
+            self.library.warnings.extend(file.and_then(|file| file.grey.take()));
+        }
+        Ok(())
+    }
+
     /// Path of a mesh's OBJ file.
     pub fn file_of(&self, table: &MeshTable) -> Option<PathBuf> {
         Some(self.directory().join(table.file.as_ref()?.to_string_lossy().replace('\\', "/")))
+    }
+
+    /// How many triangles a mesh has before any is dropped.
+    pub fn triangles_of(&self, job: &Job) -> u64 {
+        let table = &self.description.mesh[job.mesh];
+        triangles(table, self.file_of(table).and_then(|path| self.files.get(&path)))
     }
 
     /// The parsed file, taken out of the store, or a shape, or a copy of what is in memory.
@@ -134,9 +168,10 @@ impl Assembly<'_> {
         if let Some(file) = self.file_of(table).and_then(|path| self.files.remove(&path)) {
             return file;
         }
-        let shape = || table.shape.map(|s| s.mesh(table.segments.unwrap_or(64)));
+        let shape = || table.shape.map(|s| s.mesh(segments(table)));
         let mesh = table.data.as_ref().map(Mesh::to_tobj).or_else(shape).unwrap_or_default();
-        ObjFile { models: vec![tobj::Model { mesh, name: String::new() }], materials: vec![self.library.grey()] }
+        let models = vec![tobj::Model { mesh, name: String::new() }];
+        ObjFile { models, materials: vec![self.library.grey()], grey: None }
     }
 
     /// Adds a mesh's triangles; their object indices count from `first` on. Returns the names of its objects. The file
@@ -154,16 +189,26 @@ impl Assembly<'_> {
             return Err(self.at(place, format!("no group \"{group}\": did you mean \"{near}\"?")));
         }
         let before = self.geometry.triangles.len();
+        let more = triangles(table, Some(&file)) as usize;
+        memory::reserve(&place, &mut self.geometry.triangles, more)?;
+        if !self.geometry.shading.is_empty() {
+            memory::reserve(&place, &mut self.geometry.shading, more)?;
+        }
         let mut repairs = Repairs::default();
         let objects = self.add_models(table, &file, job, material, first, &mut repairs);
         let objects = objects.map_err(|TooFar(v)| {
             self.at(&place, format!("has a coordinate of {v:e}: the limit is {:e}", super::MAX_COORDINATE))
         })?;
         repairs.copies = self.geometry.drop_copies(before);
-        self.library.warnings.extend(repairs.warning(&place));
+        let repaired = repairs.warning(&place);
         if self.geometry.triangles.len() == before {
-            self.library.warnings.push(format!("{place} has no triangles"));
+            let why = repaired.as_deref().unwrap_or("no face is in it: is it an OBJ file?");
+            match self.file_of(table) {
+                Some(path) => return Err(Error::input(path, format!("has no triangles: {why}"))),
+                None => self.library.warnings.push(format!("{place} has no triangles")),
+            }
         }
+        self.library.warnings.extend(repaired);
         if let (Some(path), false) = (self.file_of(table), last_use) {
             self.files.insert(path, file);
         }
@@ -201,6 +246,21 @@ impl Assembly<'_> {
     }
 }
 
+fn triangles(table: &MeshTable, file: Option<&ObjFile>) -> u64 {
+    let worn = |m: &&tobj::Model| table.group.as_ref().is_none_or(|g| *g == m.name);
+    let of_file = |file: &ObjFile| file.models.iter().filter(worn).map(|m| m.mesh.indices.len() as u64 / 3).sum();
+    match (&table.data, table.shape, file) {
+        (Some(mesh), ..) => mesh.indices.len() as u64 / 3,
+        (_, Some(shape), _) => shape.triangles(segments(table)),
+        (.., file) => file.map_or(0, of_file),
+    }
+}
+
+/// Edges around a tessellated shape.
+fn segments(table: &MeshTable) -> u32 {
+    table.segments.unwrap_or(64)
+}
+
 fn object_name(mesh: &str, object: &str) -> String {
     if object.is_empty() || object == "unnamed_object" { mesh.to_owned() } else { format!("{mesh}/{object}") }
 }
@@ -212,8 +272,6 @@ fn add_model(
     at: &Placement,
     repairs: &mut Repairs,
 ) -> std::result::Result<(), TooFar> {
-    let count = mesh.indices.len() / 3;
-    geometry.triangles.reserve(count);
     let vec3 = |from: &[f32], i: u32| Vec3::from_slice(&from[3 * i as usize..]);
     for (t, corners) in mesh.indices.chunks_exact(3).enumerate() {
         let corners = [corners[0], corners[1], corners[2]];

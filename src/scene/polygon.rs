@@ -1,14 +1,19 @@
-//! Faces of more than three corners as triangles. Convex ones become fans; others are clipped ear by ear (Meisters 1975),
-//! in the plane of their Newell normal.
+//! Faces of more than three corners as triangles. Small convex ones become fans; others are cut by earcut (Held 2001) in the
+//! plane of their Newell normal, and edges flipped until they are Delaunay's: triangles that all share a corner have
+//! boxes inside boxes.
+use earcut::{Earcut, Refiner};
 use glam::{DVec2, DVec3};
 
-/// Corners of a face that is still clipped, in time that grows with their square; a larger one becomes a fan.
-const MOST_CORNERS: usize = 10_000;
+/// Corners up to which a convex face is a fan, as other readers of OBJ files have it.
+const FAN: usize = 16;
+/// Corners of a face that is still cut, in time that may grow with their square; a larger one becomes a fan.
+const MOST_CORNERS: usize = 100_000;
 
 /// Triangle corners out of faces of `arities` corners each, windings kept. `positions`: three floats a vertex.
-/// Corners that form no area may be left with triangles of none.
+/// Corners that form no area may be left without triangles, or with triangles of none.
 pub fn triangulate(positions: &[f32], arities: &[u32], indices: &[u32]) -> Vec<u32> {
     let mut triangles = Vec::with_capacity(3 * (indices.len() - 2 * arities.len().min(indices.len() / 2)));
+    let mut cutter = Cutter { earcut: Earcut::new(), refiner: Refiner::new(), corners: Vec::new() };
     let mut rest = indices;
     for &arity in arities {
         let (face, after) = rest.split_at(arity as usize);
@@ -16,72 +21,54 @@ pub fn triangulate(positions: &[f32], arities: &[u32], indices: &[u32]) -> Vec<u
         match face.len() {
             0..3 => {}
             3 => triangles.extend(face),
-            _ => polygon(positions, face, &mut triangles),
+            _ => cutter.polygon(positions, face, &mut triangles),
         }
     }
     triangles
 }
 
-fn polygon(positions: &[f32], face: &[u32], triangles: &mut Vec<u32>) {
-    let flat = flattened(positions, face);
-    let mut left: Vec<usize> = (0..face.len()).collect();
-    let convex = (0..left.len()).all(|i| turn(&flat, &left, i) > 0.0);
-    let mut at = 0;
-    // Without an ear (a face that crosses itself, or has no area) what is left becomes a fan.
-    let mut without = if convex || face.len() > MOST_CORNERS { left.len() } else { 0 };
-    while left.len() > 3 && without < left.len() {
-        at %= left.len();
-        if is_ear(&flat, &left, at) {
-            triangles.extend(corners(&left, at).map(|c| face[c]));
-            left.remove(at);
-            without = 0;
-        } else {
-            at += 1;
-            without += 1;
+/// What faces share: memory.
+struct Cutter {
+    earcut: Earcut<f64>,
+    refiner: Refiner,
+    corners: Vec<u32>,
+}
+
+impl Cutter {
+    fn polygon(&mut self, positions: &[f32], face: &[u32], triangles: &mut Vec<u32>) {
+        let flat = flattened(positions, face);
+        self.corners.clear();
+        if (face.len() > FAN || !is_convex(&flat)) && face.len() <= MOST_CORNERS {
+            self.earcut.earcut_slice(&flat, &[], &mut self.corners);
+            self.refiner.refine(&mut self.corners, &flat);
+        }
+        // Of a face without area (as a whole: it may cross itself) nothing may be left.
+        match self.corners.is_empty() {
+            true => triangles.extend(face[1..].windows(2).flat_map(|w| [face[0], w[0], w[1]])),
+            false => triangles.extend(self.corners.iter().map(|&corner| face[corner as usize])),
         }
     }
-    triangles.extend(left.windows(2).skip(1).flat_map(|w| [face[left[0]], face[w[0]], face[w[1]]]));
 }
 
 /// The corners seen along the face's normal, counter-clockwise as a whole.
-fn flattened(positions: &[f32], face: &[u32]) -> Vec<DVec2> {
+fn flattened(positions: &[f32], face: &[u32]) -> Vec<[f64; 2]> {
     let point = |&i: &u32| DVec3::from([0, 1, 2].map(|a| f64::from(positions[3 * i as usize + a])));
-    let points: Vec<DVec3> = face.iter().map(point).collect();
-    let next = points.iter().cycle().skip(1);
-    let normal: DVec3 = points.iter().zip(next).map(|(a, b)| (a - points[0]).cross(b - points[0])).sum();
+    let first = point(&face[0]);
+    let points: Vec<DVec3> = face.iter().map(|i| point(i) - first).collect();
+    let normal: DVec3 = points.windows(2).map(|w| w[0].cross(w[1])).sum();
     let size = normal.abs();
     let drop_axis = |p: &DVec3| match size.max_element() {
-        m if m == size.x => DVec2::new(p.y, p.z * normal.x.signum()),
-        m if m == size.y => DVec2::new(p.z, p.x * normal.y.signum()),
-        _ => DVec2::new(p.x, p.y * normal.z.signum()),
+        m if m == size.x => [p.y, p.z * normal.x.signum()],
+        m if m == size.y => [p.z, p.x * normal.y.signum()],
+        _ => [p.x, p.y * normal.z.signum()],
     };
     points.iter().map(drop_axis).collect()
 }
 
-/// Before, at and after place `at` of the corners that are left.
-fn corners(left: &[usize], at: usize) -> [usize; 3] {
-    let n = left.len();
-    [left[(at + n - 1) % n], left[at], left[(at + 1) % n]]
-}
-
-/// Twice the signed area of a triangle.
-fn area(a: DVec2, b: DVec2, c: DVec2) -> f64 {
-    (b - a).perp_dot(c - a)
-}
-
-fn turn(flat: &[DVec2], left: &[usize], at: usize) -> f64 {
-    let [a, b, c] = corners(left, at).map(|c| flat[c]);
-    area(a, b, c)
-}
-
-/// A convex corner whose triangle holds none of the other corners, not even on its border.
-fn is_ear(flat: &[DVec2], left: &[usize], at: usize) -> bool {
-    let [a, b, c] = corners(left, at).map(|c| flat[c]);
-    let holds = |p: DVec2| {
-        // A corner that two parts of a face share stands for no other.
-        p != a && p != b && p != c && area(a, b, p) >= 0.0 && area(b, c, p) >= 0.0 && area(c, a, p) >= 0.0
-    };
-    area(a, b, c) > 0.0 && !left.iter().any(|&i| holds(flat[i]))
+/// Whether every corner turns left.
+fn is_convex(flat: &[[f64; 2]]) -> bool {
+    let at = |i: usize| DVec2::from(flat[i % flat.len()]);
+    (0..flat.len()).all(|i| (at(i + 1) - at(i)).perp_dot(at(i + 2) - at(i)) > 0.0)
 }
 
 #[cfg(test)]
@@ -151,6 +138,31 @@ mod tests {
             let (area, against) = measure(&positions, &triangles, normal);
             assert!((area / exact - 1.0).abs() < 1e-5 && against == 0, "{n} corners: {area} of {exact}");
             assert_eq!(triangles.len(), 3 * (n - 2));
+        }
+    }
+
+    #[test]
+    fn a_comb_and_a_round_face_keep_their_area() {
+        // Teeth as wide as the gaps between them, on a bar as high as they are.
+        let comb = |teeth: usize| {
+            let tooth = |i: usize| {
+                let x = (2 * (teeth - i)) as f64;
+                [(x - 1.0, 0.0), (x - 1.0, 1.0), (x - 2.0, 1.0), (x - 2.0, 0.0)]
+            };
+            let bar = [(0.0, -1.0), ((2 * teeth - 1) as f64, -1.0)];
+            bar.into_iter().chain((0..teeth).flat_map(tooth)).collect::<Vec<_>>()
+        };
+        let round = |n: usize| -> Vec<_> {
+            (0..n).map(|i| (std::f64::consts::TAU * i as f64 / n as f64).sin_cos()).map(|(y, x)| (x, y)).collect()
+        };
+        for (points, exact) in [(comb(250), 749.0), (comb(2500), 7499.0), (round(10_000), std::f64::consts::PI)] {
+            let count = points.len() as u32;
+            let (positions, normal) = placed(&points, DVec3::Y, DVec3::Z);
+            let triangles = triangulate(&positions, &[count], &(0..count).collect::<Vec<_>>());
+            let (area, against) = measure(&positions, &triangles, normal);
+            assert!((area / exact - 1.0).abs() < 1e-5 && against == 0, "{count} corners: {area} of {exact}");
+            let corners: std::collections::BTreeSet<_> = triangles.iter().collect();
+            assert_eq!(corners.len(), points.len(), "every corner is kept");
         }
     }
 

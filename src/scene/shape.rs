@@ -17,6 +17,17 @@ pub enum Shape {
 }
 
 impl Shape {
+    /// How many triangles [`Self::mesh`] returns.
+    pub(super) fn triangles(self, segments: u32) -> u64 {
+        let n = u64::from(segments);
+        match self {
+            Self::Sphere => 2 * n * (n.div_ceil(2).max(2) - 1),
+            Self::Rectangle => 2,
+            Self::Cube => 12,
+            Self::Disk => n,
+        }
+    }
+
     /// Triangles of the shape; `segments` around, at least 3 (sphere: half as many from pole to pole).
     pub(super) fn mesh(self, segments: u32) -> tobj::Mesh {
         match self {
@@ -130,6 +141,15 @@ mod tests {
         assert!((area / (4.0 * PI) - 1.0).abs() < 1e-3 && (volume / (4.0 / 3.0 * PI) - 1.0).abs() < 1e-3);
         assert!((measure(&Shape::Disk.mesh(512)).0 / PI - 1.0).abs() < 1e-3);
         assert_eq!(measure(&Shape::Rectangle.mesh(0)).0, 4.0);
+    }
+
+    #[test]
+    fn triangles_are_counted_before_they_are_made() {
+        for shape in [Shape::Sphere, Shape::Rectangle, Shape::Cube, Shape::Disk] {
+            for segments in [3, 4, 7, 64] {
+                assert_eq!(shape.mesh(segments).indices.len() as u64 / 3, shape.triangles(segments), "{shape:?}");
+            }
+        }
     }
 
     #[test]

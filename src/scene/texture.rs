@@ -4,6 +4,7 @@ use super::mtl::find_file;
 use crate::error::{Error, Result};
 use crate::gpu::layout::{NONE, TEXTURE_CLAMP, TEXTURE_SRGB, Texture};
 use crate::image::{check_end, contained, input};
+use crate::memory;
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::io::Cursor;
@@ -47,11 +48,15 @@ impl Mapping {
     }
 }
 
-/// The pictures that materials asked for, each once per kind and mapping.
+/// The pictures that materials asked for: each is kept once per kind, however many mappings share it.
 #[derive(Clone, Debug, Default)]
 pub struct TextureSet {
     bitmaps: HashMap<PathBuf, Bitmap>,
-    wanted: Vec<(PathBuf, Kind, Mapping)>,
+    pictures: Vec<(PathBuf, Kind)>,
+    /// Index of each kind of each picture, by its one true path.
+    known: HashMap<(PathBuf, Kind), usize>,
+    /// Index of the picture and how it is mapped.
+    wanted: Vec<(usize, Mapping)>,
     index: HashMap<(PathBuf, Kind, [u32; 5]), u32>,
 }
 
@@ -92,14 +97,19 @@ impl TextureSet {
         if mended {
             warn.push(format!("texture {}: found as {}", dir.join(file).display(), path.display()));
         }
-        let next = self.wanted.len() as u32;
+        let (next, pictures) = (self.wanted.len() as u32, &mut self.pictures);
         *self.index.entry((path, kind, mapping.bits())).or_insert_with_key(|(path, ..)| {
-            self.wanted.push((path.clone(), kind, mapping));
+            let known = path.canonicalize().unwrap_or_else(|_| path.clone());
+            let picture = *self.known.entry((known, kind)).or_insert_with(|| {
+                pictures.push((path.clone(), kind));
+                pictures.len() - 1
+            });
+            self.wanted.push((picture, mapping));
             next
         })
     }
 
-    /// Pictures asked for so far.
+    /// Textures asked for so far.
     pub fn len(&self) -> usize {
         self.wanted.len()
     }
@@ -109,25 +119,32 @@ impl TextureSet {
     /// # Errors
     /// [`Error::Input`] with the file that is truncated, damaged, or in a form other than PNG or JPEG.
     pub fn decode(&self) -> Result<Decoded> {
-        let sources: Vec<_> = self.wanted.par_iter().map(|(path, ..)| self.source(path)).collect::<Result<_>>()?;
-        let mut textures = Vec::with_capacity(sources.len());
+        let sources: Vec<_> = self.pictures.par_iter().map(|(path, _)| self.source(path)).collect::<Result<_>>()?;
+        let sizes: Vec<_> = sources.iter().map(Source::size).collect();
+        let mut firsts = Vec::with_capacity(sizes.len());
         let mut total = 0u64;
-        for ((path, kind, mapping), source) in self.wanted.iter().zip(&sources) {
-            let [width, height] = source.size();
-            let first = u32::try_from(total).map_err(|_| too_many(path))?;
-            total += u64::from(width) * u64::from(height);
-            let bits = [(*kind == Kind::Color, TEXTURE_SRGB), (mapping.clamp, TEXTURE_CLAMP)];
-            let bits: u32 = bits.iter().filter(|b| b.0).map(|b| b.1).sum();
-            let Mapping { scale, offset, .. } = *mapping;
-            textures.push(Texture { first, width, height, flags: bits, scale, offset });
+        for ([width, height], (path, _)) in sizes.iter().zip(&self.pictures) {
+            firsts.push(u32::try_from(total).map_err(|_| too_many(path))?);
+            total += u64::from(*width) * u64::from(*height);
         }
         if total > u64::from(u32::MAX) {
-            return Err(too_many(&self.wanted[0].0));
+            return Err(too_many(&self.pictures[0].0));
         }
-        let mut texels = vec![0u32; total as usize];
-        jobs(sources, &mut texels).into_par_iter().zip(&self.wanted).try_for_each(|((source, space), wanted)| {
-            contained(|| source.decode(wanted.1, space)).map_err(|what| damaged(&wanted.0, what))
-        })?;
+        let texture = |&(picture, Mapping { clamp, scale, offset }): &(usize, Mapping)| {
+            let bits = [(self.pictures[picture].1 == Kind::Color, TEXTURE_SRGB), (clamp, TEXTURE_CLAMP)];
+            let flags = bits.iter().filter(|b| b.0).map(|b| b.1).sum();
+            let [width, height] = sizes[picture];
+            Texture { first: firsts[picture], width, height, flags, scale, offset }
+        };
+        let textures = self.wanted.iter().map(texture).collect();
+        memory::need(format!("textures of {total} texels"), 4 * total + while_decoded(&sizes))?;
+        let mut texels = memory::vector("textures", total as usize)?;
+        texels.resize(total as usize, 0u32);
+        jobs(sources, &mut texels).into_par_iter().zip(&self.pictures).try_for_each(
+            |((source, space), (path, kind))| {
+                contained(|| source.decode(*kind, space)).map_err(|what| damaged(path, what))
+            },
+        )?;
         Ok(Decoded { textures, texels })
     }
 
@@ -137,6 +154,13 @@ impl TextureSet {
             None => Source::read(path),
         }
     }
+}
+
+/// Bytes that the largest pictures take, one a thread, as their format has them (8 a texel at most) and as RGBA8.
+fn while_decoded(sizes: &[[u32; 2]]) -> u64 {
+    let mut texels: Vec<_> = sizes.iter().map(|&[width, height]| u64::from(width) * u64::from(height)).collect();
+    texels.sort_unstable_by(|a, b| b.cmp(a));
+    12 * texels.iter().take(rayon::current_num_threads()).sum::<u64>()
 }
 
 /// Each picture with its own part of the texel array.
@@ -254,7 +278,7 @@ mod tests {
         let index = set.request(dir.path(), name, kind, Mapping::default(), &mut warnings);
         assert_eq!((index, warnings.len()), (0, 0));
         assert_eq!(set.request(dir.path(), name, kind, Mapping::default(), &mut warnings), 0, "each picture once");
-        set.decode()
+        crate::threads::within(|| set.decode())
     }
 
     fn encoded(picture: &image::RgbImage, format: image::ImageFormat) -> Vec<u8> {

@@ -224,3 +224,25 @@ fn coincident_instances_make_a_flat_tree() {
     let top = build_top(&mut instances, &vec![object; 50_000], &mut nodes);
     assert!(stack_size(&nodes, top, &instances) <= TRAVERSAL_STACK);
 }
+
+/// Thin triangles from one corner to the pieces of a line: boxes inside boxes.
+#[test]
+fn a_fan_makes_a_flat_tree() {
+    let mut random = Random(7);
+    let mut geometry = random_geometry(500, 0.1, &mut random);
+    let step = |i: u32| [f32::from(i as u16) / 1000.0 - 1.0, 1.0, 0.0];
+    geometry.triangles.extend((0..2000).map(|i| Triangle {
+        v0: [-1.0, -1.0, 0.0],
+        v1: step(i),
+        v2: step(i + 1),
+        primitive: 500 + i,
+        ..Triangle::default()
+    }));
+    let (nodes, root) = builds_flat(&mut geometry);
+    assert_eq!(compare(&geometry, &nodes, root, 0..2500, &mut random), 0);
+    let mut instances = vec![crate::scene::place::instance(&DAffine3::IDENTITY, root); 2000];
+    let nested: Vec<_> = (1..=2000).map(|i| [[0.0; 3], [i as f32, 1.0, 1.0]]).collect();
+    let mut nodes = nodes;
+    let top = build_top(&mut instances, &nested, &mut nodes);
+    assert!(stack_size(&nodes, top, &instances) <= TRAVERSAL_STACK, "two levels of fans");
+}
