@@ -20,10 +20,32 @@ pub fn open(path: &Path) -> Result<File> {
 /// Reads the whole of a file.
 ///
 /// # Errors
-/// As [`open`].
+/// As [`open`]; [`Error::Device`] when there is not enough memory.
 pub fn read(path: &Path) -> Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    open(path)?.read_to_end(&mut bytes).map_err(|e| Error::input(path, remedy(&e)))?;
+    read_rest(path, open(path)?, Vec::new())
+}
+
+/// Bytes that tell the kind of an image.
+const HEAD: u64 = 16;
+
+/// [`read`] for images: a file that begins as none is not read on.
+///
+/// # Errors
+/// As [`read`], and for a file of another kind.
+pub fn read_image(path: &Path) -> Result<Vec<u8>> {
+    let mut file = open(path)?;
+    let mut head = Vec::new();
+    file.by_ref().take(HEAD).read_to_end(&mut head).map_err(|e| Error::input(path, remedy(&e)))?;
+    match super::is_image(&head) {
+        true => read_rest(path, file, head),
+        false => Err(Error::input(path, "is no EXR, PNG, JPEG or HDR file")),
+    }
+}
+
+fn read_rest(path: &Path, mut file: File, mut bytes: Vec<u8>) -> Result<Vec<u8>> {
+    let length = file.metadata().map_or(0, |m| m.len());
+    super::check_memory(path, length)?;
+    file.read_to_end(&mut bytes).map_err(|e| Error::input(path, remedy(&e)))?;
     Ok(bytes)
 }
 

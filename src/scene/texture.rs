@@ -3,10 +3,9 @@ use super::mesh::Bitmap;
 use super::mtl::find_file;
 use crate::error::{Error, Result};
 use crate::gpu::layout::{NONE, TEXTURE_CLAMP, TEXTURE_SRGB, Texture};
-use crate::image::{check_end, contained, input};
+use crate::image::{BAND, bands, check_end, contained, input, picture, picture_claim};
 use rayon::prelude::*;
 use std::collections::HashMap;
-use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 /// What a picture holds, which decides how it is read and which channels are kept.
@@ -177,8 +176,8 @@ impl Source {
     fn read(path: &Path) -> Result<Self> {
         let bytes = input::read(path)?;
         check_end(&bytes).map_err(|what| Error::input(path, what))?;
-        let size = contained(|| reader(&bytes)?.into_dimensions().map_err(|e| e.to_string()));
-        let (width, height) = size.map_err(|what| damaged(path, what))?;
+        let claim = contained(|| picture_claim(&bytes)).map_err(|what| damaged(path, what))?;
+        let [width, height] = claim.size;
         check_size(width, height).map_err(|what| Error::input(path, what))?;
         Ok(Self::File(bytes, [width, height]))
     }
@@ -198,12 +197,15 @@ impl Source {
             }
             Self::File(bytes, size) => (bytes, size),
         };
-        let picture = reader(&bytes)?.decode().map_err(|e| e.to_string())?;
+        let picture = picture(&bytes)?;
         if [picture.width(), picture.height()] != size {
             return Err("its header says another size".to_owned());
         }
         let has_alpha = picture.color().has_alpha();
-        fill(space, picture.into_rgba8().pixels().map(|p| p.0), kind, has_alpha);
+        let rows = space.chunks_mut(BAND as usize * size[0] as usize);
+        for (space, band) in rows.zip(bands(&picture)) {
+            fill(space, band.into_rgba8().pixels().map(|p| p.0), kind, has_alpha);
+        }
         Ok(())
     }
 }
@@ -217,10 +219,6 @@ fn fill(space: &mut [u32], texels: impl Iterator<Item = [u8; 4]>, kind: Kind, ha
             Kind::Roughness => same(rgba[1]),
         };
     }
-}
-
-fn reader(bytes: &[u8]) -> std::result::Result<image::ImageReader<Cursor<&[u8]>>, String> {
-    image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())
 }
 
 /// The sRGB curve (IEC 61966-2-1), from a byte to linear light.

@@ -34,7 +34,7 @@ fn rewritten(source: &Source, folder: &TempDir) -> (Film, PathBuf) {
         (0..3).map(|c| aovs.get(Aov::Colour).unwrap().iter().map(|v| v[c] + 0.25).collect()).collect();
     let channels: Vec<_> = aovs.colour.into_iter().zip(planes.iter().map(Vec::as_slice)).collect();
     let path = folder.path().join("clean.exr");
-    source.replaced(&channels, ("filtered", "none")).unwrap().write(&path, &WriteOptions::default()).unwrap();
+    source.replaced(&channels, None, ("filtered", "none")).unwrap().write(&path, &WriteOptions::default()).unwrap();
     (Source::read(&path).unwrap().film, path)
 }
 
