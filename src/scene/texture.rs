@@ -308,6 +308,20 @@ mod tests {
     }
 
     #[test]
+    fn large_pictures_are_decoded_where_memory_allows() {
+        use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+        use image::{ExtendedColorType, ImageEncoder};
+        // 517 MiB as it is decoded, which the decoder's own limit refuses.
+        const SIDE: u32 = 8230;
+        let mut bytes = Vec::new();
+        PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::NoFilter)
+            .write_image(&vec![0; 8 * SIDE as usize * SIDE as usize], SIDE, SIDE, ExtendedColorType::Rgba16)
+            .unwrap();
+        let found = decode(&bytes, "a.png", Kind::Color).unwrap();
+        assert!(found.texels.len() == SIDE as usize * SIDE as usize && found.texels.iter().all(|&t| t == 0));
+    }
+
+    #[test]
     fn a_missing_file_is_a_warning_and_case_is_mended() {
         let dir = tempfile::tempdir().unwrap();
         std::fs::create_dir(dir.path().join("Tex")).unwrap();
