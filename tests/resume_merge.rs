@@ -1,5 +1,6 @@
 //! What `--resume` and `merge` believe of a file, and what comes of files that are right.
 #[path = "support/command.rs"]
+#[allow(dead_code)]
 mod command;
 
 use command::{complains, tallow};

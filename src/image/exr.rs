@@ -2,6 +2,7 @@
 use super::claim::{self, Claim};
 use super::film::{Channel, Film, Samples, Window, split};
 use super::output::Stream;
+use super::sorted_head::SortedHead;
 use crate::memory;
 use exr::block::lines::LineRefMut;
 use exr::image::write::samples::{SamplesWriter, WritableSamples};
@@ -32,7 +33,7 @@ pub(super) fn encode(film: &Film, out: &mut dyn Stream) -> std::io::Result<()> {
     let attribute = |(key, value): (&String, &String)| (text(&format!("{PREFIX}{key}")), text(value));
     attributes.other = film.metadata.iter().map(attribute).map(|(k, v)| (k, AttributeValue::Text(v))).collect();
     let image = Image::empty(attributes).with_layer(layer);
-    image.write().to_buffered(out).map_err(|e| match e {
+    image.write().to_buffered(SortedHead::new(out)).map_err(|e| match e {
         exr::error::Error::Io(e) => e,
         other => std::io::Error::new(ErrorKind::InvalidData, other.to_string()),
     })
@@ -147,8 +148,7 @@ pub(super) fn replace(bytes: &[u8], with: &Replacement) -> Result<Vec<u8>, Strin
         }
     }
     let mut out = Cursor::new(Vec::new());
-    let stream: &mut dyn Stream = &mut out;
-    image.write().to_buffered(stream).map_err(|e| format!("cannot be encoded: {e}"))?;
+    image.write().to_buffered(SortedHead::new(&mut out)).map_err(|e| format!("cannot be encoded: {e}"))?;
     Ok(out.into_inner())
 }
 

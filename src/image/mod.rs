@@ -8,6 +8,7 @@ pub mod input;
 pub mod metrics;
 pub mod output;
 mod photo;
+mod sorted_head;
 pub mod source;
 pub mod tone;
 
