@@ -240,12 +240,13 @@ fn files_that_claim_much_take_little_memory() {
     save("channels.exr", &[channels.bytes(), vec![0; 6000]].concat());
     let sparse = std::fs::File::create(folder.path().join("sparse.exr")).unwrap();
     sparse.set_len(3 << 30).unwrap();
-    save("sky.toml", b"environment.image = \"framed.exr\"\n");
+    save("sky.toml", b"environment.file = \"framed.exr\"\n");
     for (words, parts) in [
         ("compare framed.exr framed.exr", ["framed.exr", "display window"]),
         ("compare bare.exr bare.exr", ["bare.exr", "complete?"]),
         ("compare channels.exr channels.exr", ["channels.exr", "complete?"]),
         ("compare sparse.exr sparse.exr", ["sparse.exr", "is no EXR"]),
+        ("render sky.toml -o a.exr", ["framed.exr", "display window"]),
         ("merge sparse.exr sparse.exr -o a.exr", ["sparse.exr", "is no EXR"]),
         ("filter sparse.exr -o a.exr", ["sparse.exr", "is no EXR"]),
     ] {

@@ -1,5 +1,5 @@
 //! What a file's headers ask for, weighed before anything is allocated: a header of a few bytes may claim any size.
-use super::exr::{Frame, frame_of};
+use super::frame::{self, Frame};
 use exr::meta::MetaData;
 use exr::meta::attribute::{IntegerBounds, SampleType};
 use exr::meta::header::Header;
@@ -37,7 +37,7 @@ const EMPTY_TIMES: u64 = 4;
 /// Which of its sizes cannot be.
 pub(super) fn of_exr(meta: &MetaData, behind: usize, frame: Frame) -> Result<Claim, String> {
     check_data(&meta.headers, behind as u64)?;
-    let frame = frame_of(meta, frame);
+    let frame = frame::of(meta, frame);
     check_frame(&meta.headers, frame)?;
     let film = 4 * area(frame) * channels(&meta.headers);
     let stored: u64 = meta.headers.iter().map(bytes_of_pixels).fold(0, u64::saturating_add);

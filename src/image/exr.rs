@@ -1,6 +1,7 @@
 //! OpenEXR, scan lines, lossless: ours out, anybody's in.
 use super::claim::{self, Claim};
-use super::film::{Channel, Film, Samples, Window, split};
+use super::film::{Channel, Film, Samples, split};
+use super::frame::{Frame, held, shown, union};
 use super::output::Stream;
 use super::sorted_head::SortedHead;
 use crate::memory;
@@ -84,15 +85,6 @@ impl SamplesWriter for Lines<'_> {
         };
         written.expect("a line has room for its samples");
     }
-}
-
-/// Which pixels of a file make its film.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Frame {
-    /// Those that are shown: the display window.
-    Display,
-    /// Those that are stored: the union of the data windows of all parts.
-    Data,
 }
 
 /// What its film takes, by the headers alone.
@@ -180,25 +172,6 @@ fn stored(image: &FlatImage) -> IntegerBounds {
     windows.reduce(union).unwrap_or(image.attributes.display_window)
 }
 
-/// The frame that [`decode`] fills.
-pub(super) fn frame_of(meta: &MetaData, frame: Frame) -> IntegerBounds {
-    let display = meta.headers[0].shared_attributes.display_window;
-    match frame {
-        Frame::Display => display,
-        Frame::Data => meta.headers.iter().map(claim::window).reduce(union).unwrap_or(display),
-    }
-}
-
-fn union(a: IntegerBounds, b: IntegerBounds) -> IntegerBounds {
-    let edges = |a: i32, a_size: usize, b: i32, b_size: usize| {
-        let end = (i64::from(a) + a_size as i64).max(i64::from(b) + b_size as i64);
-        (a.min(b), (end - i64::from(a.min(b))) as usize)
-    };
-    let (x, width) = edges(a.position.0, a.size.0, b.position.0, b.size.0);
-    let (y, height) = edges(a.position.1, a.size.1, b.position.1, b.size.1);
-    IntegerBounds::new((x, y), (width, height))
-}
-
 fn read(bytes: &[u8]) -> Result<FlatImage, String> {
     let chunks = exr::block::read(Cursor::new(bytes), false).map_err(plain)?;
     exr::prelude::read()
@@ -263,19 +236,6 @@ fn film_from(image: FlatImage, frame: IntegerBounds) -> Result<Film, String> {
     Ok(film)
 }
 
-/// The part of `frame` that is stored, unless it is all.
-fn held(data: IntegerBounds, frame: IntegerBounds) -> Option<Window> {
-    let edges = |at: i32, size: usize, start: i32, length: usize| {
-        let first = (i64::from(at) - i64::from(start)).clamp(0, length as i64);
-        let end = (i64::from(at) - i64::from(start) + size as i64).clamp(first, length as i64);
-        (first as u32, (end - first) as u32)
-    };
-    let (x, width) = edges(data.position.0, data.size.0, frame.position.0, frame.size.0);
-    let (y, height) = edges(data.position.1, data.size.1, frame.position.1, frame.size.1);
-    let all = (width as usize, height as usize) == (frame.size.0, frame.size.1);
-    (!all).then_some(Window { first: [x, y], size: [width, height] })
-}
-
 fn texts<'a>(
     attributes: impl IntoIterator<Item = (&'a Text, &'a AttributeValue)>,
 ) -> impl Iterator<Item = (String, String)> {
@@ -304,24 +264,4 @@ fn shown_samples(samples: FlatSamples, data: IntegerBounds, frame: IntegerBounds
         FlatSamples::F32(v) => Samples::F32(if data == frame { v } else { shown(&v, data, frame)? }),
         FlatSamples::U32(v) => Samples::U32(if data == frame { v } else { shown(&v, data, frame)? }),
     })
-}
-
-/// The picture is the display window: pixels outside the data window are 0, data outside the display window is dropped.
-fn shown<T: Copy + Default>(stored: &[T], data: IntegerBounds, window: IntegerBounds) -> Result<Vec<T>, String> {
-    let (width, height) = (window.size.0, window.size.1);
-    let mut out = memory::reserved(width * height)?;
-    out.resize(width * height, T::default());
-    // Offsets of two 32-bit positions need 33 bits.
-    let dx = i64::from(data.position.0) - i64::from(window.position.0);
-    let dy = i64::from(data.position.1) - i64::from(window.position.1);
-    let first = (-dx).clamp(0, data.size.0 as i64) as usize;
-    let last = (width as i64 - dx).clamp(first as i64, data.size.0 as i64) as usize;
-    for (row, values) in stored.chunks_exact(data.size.0.max(1)).enumerate() {
-        let y = row as i64 + dy;
-        if first < last && (0..height as i64).contains(&y) {
-            let start = y as usize * width + (first as i64 + dx) as usize;
-            out[start..start + last - first].copy_from_slice(&values[first..last]);
-        }
-    }
-    Ok(out)
 }

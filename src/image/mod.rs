@@ -4,6 +4,7 @@ mod claim;
 pub mod difference;
 mod exr;
 mod film;
+mod frame;
 pub mod input;
 pub mod metrics;
 pub mod output;
@@ -16,6 +17,7 @@ use crate::error::{Error, Result};
 use crate::memory;
 pub use claim::Claim;
 pub use film::{Channel, Film, NOISY, Picture, Samples, Window};
+use frame::Frame;
 pub(crate) use photo::{BAND, bands, check_end, claim as picture_claim, picture};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -90,7 +92,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
 /// [`Error::Input`] when the file cannot be read, is of another kind, or is damaged; [`Error::Device`] when there is not enough
 /// memory.
 pub fn read(path: &Path) -> Result<Film> {
-    decode_file(path, &input::read_image(path)?, exr::Frame::Display)
+    decode_file(path, &input::read_image(path)?, Frame::Display)
 }
 
 /// [`read`] for a file that is already in memory.
@@ -98,11 +100,11 @@ pub fn read(path: &Path) -> Result<Film> {
 /// # Errors
 /// What is wrong with the data, or that they need more memory than is free, in one line.
 pub fn decode(bytes: &[u8]) -> std::result::Result<Film, String> {
-    memory::check(claim_of(bytes, exr::Frame::Display)?.bytes)?;
-    decode_frame(bytes, exr::Frame::Display)
+    memory::check(claim_of(bytes, Frame::Display)?.bytes)?;
+    decode_frame(bytes, Frame::Display)
 }
 
-fn decode_file(path: &Path, bytes: &[u8], frame: exr::Frame) -> Result<Film> {
+fn decode_file(path: &Path, bytes: &[u8], frame: Frame) -> Result<Film> {
     let claim = claim_of(bytes, frame).map_err(|what| Error::input(path, what))?;
     check_memory(path, claim.bytes)?;
     decode_frame(bytes, frame).map_err(|what| Error::input(path, what))
@@ -114,12 +116,12 @@ pub fn check_memory(path: &Path, bytes: u64) -> Result<()> {
     memory::check(bytes).map_err(|what| Error::Device(format!("{}: {what}", path.display())))
 }
 
-fn claim_of(bytes: &[u8], frame: exr::Frame) -> std::result::Result<Claim, String> {
+fn claim_of(bytes: &[u8], frame: Frame) -> std::result::Result<Claim, String> {
     contained(|| if is_exr(bytes) { exr::claim(bytes, frame) } else { photo::claim(bytes) })
 }
 
 /// To be called after [`claim_of`] alone.
-fn decode_frame(bytes: &[u8], frame: exr::Frame) -> std::result::Result<Film, String> {
+fn decode_frame(bytes: &[u8], frame: Frame) -> std::result::Result<Film, String> {
     contained(|| if is_exr(bytes) { exr::decode(bytes, frame) } else { photo::decode(bytes) })
 }
 

@@ -1,5 +1,6 @@
 //! An image file that is changed in some channels and kept in all others.
 use super::film::Film;
+use super::frame::Frame;
 use super::{Claim, WriteOptions, exr, output};
 use crate::error::{Error, Result};
 use std::io::Cursor;
@@ -20,7 +21,7 @@ impl Unread {
     /// As [`super::read`].
     pub fn open(path: &Path) -> Result<Self> {
         let bytes = super::input::read_image(path)?;
-        let claim = super::claim_of(&bytes, exr::Frame::Data).map_err(|what| Error::input(path, what))?;
+        let claim = super::claim_of(&bytes, Frame::Data).map_err(|what| Error::input(path, what))?;
         Ok(Self { path: path.to_owned(), bytes, claim })
     }
 
@@ -30,7 +31,7 @@ impl Unread {
     /// As [`super::read`].
     pub fn decode(self) -> Result<Source> {
         let Self { path, mut bytes, .. } = self;
-        let film = super::decode_file(&path, &bytes, exr::Frame::Data)?;
+        let film = super::decode_file(&path, &bytes, Frame::Data)?;
         if !super::is_exr(&bytes) {
             let mut encoded = Cursor::new(Vec::new());
             exr::encode(&film, &mut encoded).map_err(|e| Error::input(&path, e))?;
@@ -63,7 +64,7 @@ impl Source {
     /// # Errors
     /// [`Error::Input`], [`Error::Device`] when there is not enough memory.
     pub fn shown(&self) -> Result<Film> {
-        super::decode_file(&self.path, &self.bytes, exr::Frame::Display)
+        super::decode_file(&self.path, &self.bytes, Frame::Display)
     }
 
     /// The file with other samples, one per pixel of `film`, in the channels of these names, and with an entry of metadata
@@ -75,7 +76,7 @@ impl Source {
         let with = exr::Replacement { channels, keep_as, entry };
         let bytes = super::contained(|| exr::replace(&self.bytes, &with));
         let bytes = bytes.map_err(|what| Error::input(&self.path, what))?;
-        let film = super::decode_file(&self.path, &bytes, exr::Frame::Data)?;
+        let film = super::decode_file(&self.path, &bytes, Frame::Data)?;
         Ok(Self { path: self.path.clone(), bytes, film })
     }
 

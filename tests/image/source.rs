@@ -59,6 +59,24 @@ fn only_the_colour_of_a_file_in_many_parts_changes() {
 }
 
 #[test]
+fn what_was_there_stays_in_a_layer_of_the_same_part() {
+    let folder = tempfile::tempdir().unwrap();
+    let colour = part("View.Combined", (0, 0), (4, 3), triple(["R", "G", "B"], 12));
+    let mask = part("mask", (0, 0), (4, 3), vec![AnyChannel::new("A", FlatSamples::F32(vec![1.0; 12]))]);
+    let source = Source::read(&write(&folder, vec![colour, mask])).unwrap();
+    let aovs = Aovs::find(&source.film, &Names::new()).unwrap();
+    assert_eq!(aovs.keep_as(), Some("Noisy Image"));
+    let channels: Vec<_> = aovs.colour.into_iter().map(|name| (name, &[7.0; 12][..])).collect();
+    let clean = source.replaced(&channels, aovs.keep_as(), ("filtered", "none")).unwrap();
+    assert_eq!(values(&clean.film, "View.Combined.G"), [7.0; 12]);
+    let again = Aovs::find(&clean.film, &Names::new()).unwrap();
+    assert_eq!(again.get(Aov::Colour), aovs.get(Aov::Colour), "it is what is filtered next");
+    assert_eq!((again.colour, again.keep_as()), (aovs.colour, None));
+    let twice = clean.replaced(&channels, None, ("filtered", "atrous")).unwrap();
+    assert_eq!(twice.film.metadata["filtered"], "atrous");
+}
+
+#[test]
 fn pixels_outside_the_display_window_are_filtered_too_and_those_outside_the_data_window_are_unknown() {
     let folder = tempfile::tempdir().unwrap();
     // Colour and normal: columns -1 to 2 of rows 1 and 2. A mask of the whole display window makes the film larger.
