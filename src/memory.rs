@@ -12,10 +12,10 @@ pub fn check(needed: u64) -> std::result::Result<(), String> {
     system.refresh_memory_specifics(MemoryRefreshKind::nothing().with_ram());
     let group = system.cgroup_limits().map_or(u64::MAX, |limits| limits.free_memory);
     // Systems that do not tell say 0.
-    let free = Some(system.available_memory()).filter(|&bytes| bytes > 0).unwrap_or(u64::MAX).min(group);
-    let free = free.min(free_addresses().unwrap_or(u64::MAX));
+    let machine = Some(system.available_memory()).filter(|&bytes| bytes > 0).unwrap_or(u64::MAX);
+    let free = machine.min(group).min(free_addresses().unwrap_or(u64::MAX));
     if needed > free {
-        return Err(format!("needs {} of memory, {} are free", gibibytes(needed), gibibytes(free)));
+        return Err(format!("needs {} of memory, {} are free", readable(needed), readable(free)));
     }
     Ok(())
 }
@@ -33,8 +33,16 @@ pub fn need(what: impl Display, bytes: u64) -> Result<()> {
 /// # Errors
 /// [`Error::Memory`].
 pub fn vector<T>(what: impl Display, len: usize) -> Result<Vec<T>> {
+    reserved(len).map_err(|lack| Error::Memory(format!("{what}: {lack}")))
+}
+
+/// A vector with room for exactly `len` values.
+///
+/// # Errors
+/// How much memory the system did not give.
+pub fn reserved<T>(len: usize) -> std::result::Result<Vec<T>, String> {
     let mut vector = Vec::new();
-    reserve(what, &mut vector, len)?;
+    reserve_exact(&mut vector, len)?;
     Ok(vector)
 }
 
@@ -43,8 +51,12 @@ pub fn vector<T>(what: impl Display, len: usize) -> Result<Vec<T>> {
 /// # Errors
 /// [`Error::Memory`].
 pub fn reserve<T>(what: impl Display, vector: &mut Vec<T>, more: usize) -> Result<()> {
+    reserve_exact(vector, more).map_err(|lack| Error::Memory(format!("{what}: {lack}")))
+}
+
+fn reserve_exact<T>(vector: &mut Vec<T>, more: usize) -> std::result::Result<(), String> {
     let bytes = (more as u64).saturating_mul(size_of::<T>() as u64);
-    let refused = |_| Error::Memory(format!("{what}: {} of memory are refused", gibibytes(bytes)));
+    let refused = |_| format!("needs {} of memory, which the system does not give", readable(bytes));
     vector.try_reserve_exact(more).map_err(refused)
 }
 
@@ -61,8 +73,11 @@ fn number_after(text: &str, key: &str) -> Option<u64> {
     text.lines().find_map(|line| line.strip_prefix(key))?.split_whitespace().next()?.parse().ok()
 }
 
-fn gibibytes(bytes: u64) -> String {
-    format!("{:.1} GiB", bytes as f64 / (1 << 30) as f64)
+fn readable(bytes: u64) -> String {
+    match bytes < 1 << 30 {
+        true => format!("{:.1} MiB", bytes as f64 / (1 << 20) as f64),
+        false => format!("{:.1} GiB", bytes as f64 / (1 << 30) as f64),
+    }
 }
 
 #[cfg(test)]
@@ -73,11 +88,12 @@ mod tests {
     fn what_no_machine_has_is_refused_and_what_every_machine_has_is_not() {
         assert_eq!(check(1 << 20), Ok(()));
         let line = check(3 << 60).unwrap_err();
-        assert!(line.starts_with("needs 3221225472.0 GiB of memory, ") && line.ends_with(" GiB are free"), "{line}");
+        assert!(line.starts_with("needs 3221225472.0 GiB of memory, ") && line.ends_with("iB are free"), "{line}");
         let error = need("a.obj", 3 << 60).unwrap_err();
         assert!(error.exit_code() == 4 && error.to_string().starts_with("a.obj: needs 3221225472.0 GiB"), "{error}");
         assert_eq!(vector::<u8>("bytes", usize::MAX).unwrap_err().exit_code(), 4);
         assert_eq!(vector::<u8>("bytes", 3).unwrap().capacity(), 3);
+        assert!(reserved::<u64>(1 << 58).unwrap_err().starts_with("needs 2147483648.0 GiB"));
     }
 
     #[test]

@@ -187,8 +187,8 @@ impl Renderer {
     /// Follow it with [`Renderer::rest`]. Needs the effect `adaptive`.
     ///
     /// # Errors
-    /// [`crate::error::Error::Usage`] when there is no such effect, [`crate::error::Error::Device`] when the lengths
-    /// are not those of the film.
+    /// [`crate::error::Error::Usage`] when there is no such effect, or when the lengths are not those of the film;
+    /// [`crate::error::Error::Device`].
     pub fn resume(
         &self,
         frame: &mut FrameResources,
@@ -200,6 +200,15 @@ impl Renderer {
         let Some(a) = &self.allocation else {
             return Err(Error::Usage("this renderer was made without the effect \"adaptive\"".into()));
         };
+        let pixels = self.settings.pixels();
+        let of_film = |what: &str, len: usize, may_be_empty: bool| match len == pixels || (may_be_empty && len == 0) {
+            true => Ok(()),
+            false => Err(Error::Usage(format!("{len} {what} for a film of {pixels} pixels: give one each"))),
+        };
+        of_film("statistics", stats.len(), false)?;
+        of_film("lights", light.len(), !self.effects.split_light)?;
+        of_film("priorities", priority.len(), true)?;
+        of_film("pending counts", pending.len(), false)?;
         self.run(frame, &Step::Start)?;
         self.film.tiles[0].stats.write(0, stats)?;
         if self.effects.split_light {

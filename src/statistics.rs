@@ -45,6 +45,9 @@ pub fn luminance([r, g, b]: vec3) -> f32 {
 /// The record of two disjoint sets of samples (Chan, Golub and LeVeque 1979): with d the difference of the means, the
 /// mean moves by d n_b / n and M2 grows by d^2 n_a n_b / n. In double precision, rounded once: means within 2^-24 relative
 /// of exact arithmetic on the records, M2 likewise.
+///
+/// # Panics
+/// When they have 2^32 samples and more together.
 pub fn join(a: &Pixel, b: &Pixel) -> Pixel {
     let (na, nb) = (f64::from(a.stats.count), f64::from(b.stats.count));
     let n = na + nb;
@@ -63,7 +66,7 @@ pub fn join(a: &Pixel, b: &Pixel) -> Pixel {
     Pixel {
         stats: PixelStats {
             mean: mean(a.stats.mean, b.stats.mean),
-            count: a.stats.count + b.stats.count,
+            count: a.stats.count.checked_add(b.stats.count).expect("fewer than 2^32 samples"),
             m2,
             remainder: 0,
         },

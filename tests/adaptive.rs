@@ -4,6 +4,7 @@ mod support;
 
 use std::path::Path;
 use support::{assert_silent, gpu};
+use tallow::error::Error;
 use tallow::gpu::layout::{PixelLight, PixelStats};
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::renderer::{Outputs, PathRange, Progress, Renderer, Step, path_push};
@@ -220,6 +221,31 @@ fn a_render_resumed_anywhere_has_the_bits_of_one_that_never_stopped() {
             let rest = list(renderer.rest(Progress { allocations, pending }));
             assert!(bits(&run(&renderer, &mut frame, &rest)) == bits(&whole), "{policy}, stopped after step {stop}");
         }
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn records_of_another_film_are_an_error() {
+    let gpu = gpu();
+    let scene = scene(|s| s.allocate.policy = "both".into());
+    let (renderer, mut frame) = (Renderer::new(&gpu, &scene, split()).unwrap(), FrameResources::new(&gpu).unwrap());
+    let pixels = (SIZE[0] * SIZE[1]) as usize;
+    let mut resume = |stats: usize, light: usize, priority: usize, lacks: usize| {
+        let (stats, light) = (vec![PixelStats::default(); stats], vec![PixelLight::default(); light]);
+        renderer.resume(&mut frame, &stats, &light, &vec![0.0; priority], &vec![0; lacks])
+    };
+    for wrong in [pixels - 1, pixels + 1, 0] {
+        for [stats, light, priority, lacks] in
+            [[wrong, pixels, 0, pixels], [pixels, wrong, 0, pixels], [pixels, pixels, 0, wrong]]
+        {
+            let error = resume(stats, light, priority, lacks).unwrap_err();
+            assert!(matches!(&error, Error::Usage(line) if line.contains(&format!("{wrong} "))), "{error}");
+        }
+    }
+    assert!(matches!(resume(pixels, pixels, 1, pixels), Err(Error::Usage(_))));
+    for priority in [0, pixels] {
+        resume(pixels, pixels, priority, pixels).unwrap();
     }
     assert_silent(&gpu);
 }

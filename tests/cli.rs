@@ -1,6 +1,8 @@
 //! The command line through the built program: exit codes, and one readable line for what goes wrong.
 #[path = "support/command.rs"]
 mod command;
+#[path = "support/flat.rs"]
+mod flat;
 
 use command::{complains, stdout, tallow};
 use serde_json::Value;
@@ -215,4 +217,61 @@ fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<_> = std::fs::read_dir(folder).unwrap().map(entry).collect();
     names.sort();
     names
+}
+
+/// The process has so many KiB of addresses: what asks for more ends in an abort, unless it is told before.
+#[cfg(target_os = "linux")]
+fn within(kib: u32, folder: &TempDir, words: &str) -> std::process::Output {
+    let script = format!("ulimit -v {kib}; exec \"$0\" {words}");
+    let mut shell = Command::new("sh");
+    shell.args(["-c", &script, env!("CARGO_BIN_EXE_tallow")]).current_dir(folder.path()).output().unwrap()
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn files_that_claim_much_take_little_memory() {
+    use flat::{ExrHead, NO_COMPRESSION, ZIP_16_LINES};
+    let folder = tempfile::tempdir().unwrap();
+    let save = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
+    let framed = ExrHead { display: [48, 8_388_656], ..ExrHead::new(ZIP_16_LINES, [8, 8]) };
+    save("framed.exr", &framed.flat_file());
+    save("bare.exr", &[ExrHead::new(NO_COMPRESSION, [8192, 8192]).bytes(), vec![0; 6000]].concat());
+    let channels = ExrHead { channels: 60_000, ..ExrHead::new(ZIP_16_LINES, [64, 64]) };
+    save("channels.exr", &[channels.bytes(), vec![0; 6000]].concat());
+    let sparse = std::fs::File::create(folder.path().join("sparse.exr")).unwrap();
+    sparse.set_len(3 << 30).unwrap();
+    save("sky.toml", b"environment.file = \"framed.exr\"\n");
+    for (words, parts) in [
+        ("compare framed.exr framed.exr", ["framed.exr", "display window"]),
+        ("compare bare.exr bare.exr", ["bare.exr", "complete?"]),
+        ("compare channels.exr channels.exr", ["channels.exr", "complete?"]),
+        ("compare sparse.exr sparse.exr", ["sparse.exr", "is no EXR"]),
+        ("render sky.toml -o a.exr", ["framed.exr", "display window"]),
+        ("merge sparse.exr sparse.exr -o a.exr", ["sparse.exr", "is no EXR"]),
+        ("filter sparse.exr -o a.exr", ["sparse.exr", "is no EXR"]),
+    ] {
+        complains(&within(300_000, &folder, words), 3, &parts);
+    }
+    // What is right but too large for the process is another matter.
+    let large = ExrHead { channels: 1, ..ExrHead::new(ZIP_16_LINES, [8192, 8192]) };
+    save("large.exr", &large.flat_file());
+    complains(&within(250_000, &folder, "compare large.exr large.exr"), 4, &["large.exr", "256.0 MiB of memory"]);
+    let medium = ExrHead { channels: 1, ..ExrHead::new(ZIP_16_LINES, [2048, 2048]) };
+    save("medium.exr", &medium.flat_file());
+    complains(
+        &within(300_000, &folder, "compare medium.exr medium.exr --layer c00000"),
+        4,
+        &["medium.exr", "of memory"],
+    );
+}
+
+#[test]
+fn what_no_device_can_filter_is_refused_before_it_is_decoded() {
+    let folder = tempfile::tempdir().unwrap();
+    // 3.2 GB of pixels, the last of which are damaged.
+    let mut bytes = flat::ExrHead::new(flat::ZIP_16_LINES, [16_384, 16_384]).flat_file();
+    let end = bytes.len();
+    bytes[end - 100..].fill(0x55);
+    std::fs::write(folder.path().join("large.exr"), bytes).unwrap();
+    complains(&tallow(&folder, &["filter", "large.exr", "-o", "a.exr"]), 4, &["16384 x 16384"]);
 }

@@ -152,7 +152,7 @@ fn a_merged_file_still_knows_every_sample_that_it_holds() {
     render(&folder, "--spp 2 --first-sample 9 -o c.exr");
     render(&folder, "--spp 3 --seed 1 -o other.exr");
     merges("b.exr a.exr -o ba.exr");
-    refuses("ba.exr a.exr", &["a.exr", "0 to 4 of seed 0", "count twice"]);
+    refuses("ba.exr a.exr", &["a.exr", "0 to 3 of seed 0", "count twice"]);
     merges("ba.exr other.exr c.exr -o all.exr");
     for again in ["a", "b", "c", "other", "ba", "all"] {
         refuses(&format!("all.exr {again}.exr"), &[&format!("{again}.exr"), "count twice"]);
@@ -160,10 +160,8 @@ fn a_merged_file_still_knows_every_sample_that_it_holds() {
     }
     assert_eq!(counts(&film(&folder, "all.exr")), [14; 40 * 30]);
     let small = "--width 40 --height 30 --max-depth 3";
-    for first in ["--resume ba.exr --first-sample 4", "--resume all.exr --first-sample 4"] {
-        let resumed = run(&folder, &format!("render {} {small} --spp 20 {first} -o not.exr", scene()));
-        complains(&resumed, 3, &["was merged", "--first-sample"]);
-    }
+    let resumed = run(&folder, &format!("render {} {small} --spp 20 --resume all.exr -o not.exr", scene()));
+    complains(&resumed, 3, &["was merged", "--first-sample"]);
 }
 
 /// A light so near to a surface that its irradiance is no number where the middle pixel looks.

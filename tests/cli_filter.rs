@@ -362,11 +362,50 @@ fn a_denoised_render_is_the_filtered_file_and_keeps_its_samples() {
     std::fs::copy(folder.path().join("denoised.exr"), folder.path().join("noisy.exr")).unwrap();
     assert_eq!(layer(&filter(&folder, &["--filter", "guided"]), None), layer(&filtered, None));
     complains(&tallow(&folder, &["render", scene, "--denoise", "gided"]), 2, &["gided", "guided"]);
-    // That file is still whole; one without the noisy layer has lost its samples' mean.
+    // That file is still whole, and so is a render that was filtered, again and again and in place.
     let merge = |name: &str| tallow(&folder, &["merge", name, "rest.exr", "-o", "merged.exr"]);
     assert_eq!(merge("clean.exr").status.code(), Some(0));
     assert_eq!(layer(&read(&folder, "merged.exr"), None), layer(&merged[0], None));
     render("noisy.exr", &["--spp", "4"]);
-    filter(&folder, &["--filter", "guided"]);
-    complains(&merge("clean.exr"), 3, &["clean.exr", "was filtered (guided)", "before"]);
+    let once = filter(&folder, &["--filter", "guided"]);
+    for _ in 0..2 {
+        let again = ["filter", "clean.exr", "-o", "clean.exr", "--filter", "guided", "--quiet"];
+        assert_eq!(tallow(&folder, &again).status.code(), Some(0));
+        assert!(read(&folder, "clean.exr") == once, "it starts from the noisy image");
+    }
+    assert_eq!(merge("clean.exr").status.code(), Some(0));
+    assert_eq!(layer(&read(&folder, "merged.exr"), None), layer(&merged[0], None));
+    let resumed = render("resumed.exr", &["--spp", "8", "--resume", "clean.exr"]);
+    assert_eq!(layer(&resumed, None), layer(&read(&folder, "whole.exr"), None));
+    // Filtered by an older version, which did not keep the noisy image, it has lost its samples' mean.
+    let mut lost = once;
+    lost.channels.retain(|c| !c.name.starts_with("Noisy Image"));
+    write(&folder, "lost.exr", &lost);
+    complains(&merge("lost.exr"), 3, &["lost.exr", "was filtered (guided)", "before"]);
+}
+
+/// As other programs write it: one part, a view layer, half floats.
+#[test]
+fn the_noisy_image_stays_in_the_view_of_its_colour() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut film = noisy(false);
+    film.channels.iter_mut().for_each(|c| c.name = format!("View.{}", c.name.replace("albedo", "DiffCol")));
+    film.channels[..3].iter_mut().for_each(|c| c.name = c.name.replace("View.", "View.Combined."));
+    write(&folder, "noisy.exr", &film);
+    let clean = filter(&folder, &["--filter", "atrous"]);
+    for c in ["R", "G", "B"] {
+        let (kept, was) = (format!("View.Noisy Image.{c}"), format!("View.Combined.{c}"));
+        assert_eq!(clean.channel(&kept), film.channel(&was));
+        assert_ne!(clean.channel(&was), film.channel(&was), "control");
+    }
+    std::fs::copy(folder.path().join("clean.exr"), folder.path().join("noisy.exr")).unwrap();
+    assert!(filter(&folder, &["--filter", "atrous"]) == clean);
+    assert!(filter(&folder, &["--filter", "atrous", "--colour", "Noisy Image"]) == clean, "it is not replaced");
+    // A layer of the only colour there is, under a name of its own, stays the colour.
+    let mut film = noisy(false);
+    film.channels[..3].iter_mut().for_each(|c| c.name = format!("light.{}", c.name));
+    film.channels.retain(|c| !c.name.starts_with("albedo"));
+    write(&folder, "noisy.exr", &film);
+    let clean = filter(&folder, &["--filter", "atrous"]);
+    assert_eq!(clean.picture(None).unwrap().pixels, clean.picture(Some("light")).unwrap().pixels);
 }

@@ -52,6 +52,9 @@ struct Limits {
     min_ssim: Option<f64>,
 }
 
+/// What metrics take beside the two pictures: 75 were measured at 2048 x 2048.
+const BYTES_PER_PIXEL: u64 = 80;
+
 /// Runs the subcommand.
 ///
 /// # Errors
@@ -62,6 +65,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     }
     let (a, b) = (load(&args.a, args.layer.as_deref())?, load(&args.b, args.layer.as_deref())?);
     check_sizes((&args.a, &a), (&args.b, &b))?;
+    image::check_memory(&args.a, a.pixels.len() as u64 * BYTES_PER_PIXEL)?;
     let metrics = metrics::compare(&a, &b);
     let exceeded = args.limits.exceeded(&metrics)?;
     let scale = args.diff.as_ref().map(|path| write_diff(path, &a, &b)).transpose()?;
@@ -77,7 +81,10 @@ pub fn run(args: &Args) -> Result<Exit> {
 /// # Errors
 /// [`Error::Input`].
 pub fn load(path: &Path, layer: Option<&str>) -> Result<Picture> {
-    let picture = image::read(path)?.picture(layer).map_err(|what| Error::input(path, what))?;
+    let film = image::read(path)?;
+    image::check_memory(path, (film.pixels() * size_of::<[f32; 3]>()) as u64)?;
+    let picture = film.picture(layer).map_err(|what| Error::input(path, what))?;
+    drop(film);
     match picture.non_finite() {
         0 => Ok(picture),
         n => Err(Error::input(

@@ -1,7 +1,8 @@
 //! What a renderer's buffers hold, as the channels of an image file, and back.
 use crate::error::Result;
 use crate::gpu::layout::{Guide, PixelLight, PixelStats, vec3};
-use crate::image::{Film, Samples};
+use crate::image::{Film, NOISY, Samples};
+use crate::memory;
 use crate::renderer::Renderer;
 use crate::statistics::{BrokenSamples, Pixel, variance_of_mean};
 
@@ -13,9 +14,6 @@ pub const PRIORITY: &str = "priority";
 
 /// Samples that a pixel still lacks of what it was to have: only in files of renders that were interrupted.
 pub const PENDING: &str = "pending";
-
-/// The mean of the samples, where the colour is filtered: only in files of `--denoise`. Blender's name for it.
-const NOISY: &str = "Noisy Image";
 
 /// Metadata of what `tallow filter` wrote: the filter.
 pub const FILTERED: &str = "filtered";
@@ -93,47 +91,75 @@ fn drop_remainders_of_none(film: &mut Film) {
 /// What the samples say, out of a film that [`film()`] made.
 ///
 /// # Errors
-/// Which layer is missing.
+/// Which layer is missing, or that memory is.
 pub fn pixels(film: &Film) -> std::result::Result<Vec<Pixel>, String> {
-    let layer = |name: Option<&str>| film.picture(name).map(|p| p.pixels);
-    let mean = match (layer(Some(NOISY)), film.metadata.get(FILTERED)) {
+    let mean = match (rgb(film, NOISY), film.metadata.get(FILTERED)) {
         (Ok(mean), _) => mean,
-        (Err(_), None) => layer(None)?,
+        (Err(_), None) => rgb(film, "")?,
         (Err(_), Some(filter)) => {
             return Err(format!(
                 "was filtered ({filter}), and the mean of its samples is gone: take the file before that"
             ));
         }
     };
-    let (m2, count) = (layer(Some("m2"))?, counts(film, "samples")?);
-    let dark = vec![[0.0; 3]; mean.len()];
-    let indirect_m2 = indirect_m2(film)?;
+    let (m2, count) = (rgb(film, "m2")?, counts(film, "samples")?);
+    let light = light(film)?;
     let [remainder, light_remainder] = REMAINDERS.map(|name| counts(film, name).ok());
     let word = |words: &Option<Vec<u32>>, i: usize| words.as_ref().map_or(0, |words| words[i]);
-    let direct = layer(Some("direct")).unwrap_or_else(|_| dark.clone());
-    let indirect = layer(Some("indirect")).unwrap_or(dark);
+    let at = |plane: [&[f32]; 3], i: usize| plane.map(|values| values[i]);
     let pixel = |i: usize| Pixel {
-        stats: PixelStats { mean: mean[i], count: count[i], m2: m2[i], remainder: word(&remainder, i) },
-        light: PixelLight {
-            direct: direct[i],
+        stats: PixelStats { mean: at(mean, i), count: count[i], m2: at(m2, i), remainder: word(&remainder, i) },
+        light: light.map_or_else(PixelLight::default, |(direct, indirect, indirect_m2)| PixelLight {
+            direct: at(direct, i),
             indirect_m2: indirect_m2[i],
-            indirect: indirect[i],
+            indirect: at(indirect, i),
             remainder: word(&light_remainder, i),
-        },
+        }),
     };
-    Ok((0..mean.len()).map(pixel).collect())
+    let mut pixels = memory::reserved(film.pixels())?;
+    pixels.extend((0..film.pixels()).map(pixel));
+    Ok(pixels)
 }
 
-/// 0 where direct and indirect light are not kept apart.
-fn indirect_m2(film: &Film) -> std::result::Result<Vec<f32>, String> {
-    match (film.channel(INDIRECT_M2), film.channel("indirect.R")) {
-        (Some(Samples::F32(m2)), _) => Ok(m2.clone()),
-        (None, None) => Ok(vec![0.0; film.pixels()]),
-        _ => Err(format!(
+/// Whether a film keeps direct and indirect light apart.
+///
+/// # Errors
+/// When it has a part of what that takes.
+pub fn splits_light(film: &Film) -> std::result::Result<bool, String> {
+    let names = ["direct", "indirect"].map(|layer| RGB.map(|c| format!("{layer}.{c}"))).concat();
+    match names.iter().filter(|name| film.channel(name).is_some()).count() {
+        0 => Ok(false),
+        n if n == names.len() => Ok(true),
+        _ => Err("has direct or indirect light in part: take the file as tallow wrote it".to_owned()),
+    }
+}
+
+/// The channels of a layer.
+fn rgb<'a>(film: &'a Film, layer: &str) -> std::result::Result<[&'a [f32]; 3], String> {
+    let plane = |component: &str| {
+        let name = if layer.is_empty() { component.to_owned() } else { format!("{layer}.{component}") };
+        match film.channel(&name) {
+            Some(Samples::F32(values)) => Ok(values.as_slice()),
+            _ => Err(format!("has no channel of floats \"{name}\": it must be an EXR file that tallow rendered")),
+        }
+    };
+    Ok([plane("R")?, plane("G")?, plane("B")?])
+}
+
+/// Direct light, indirect light and its M2, where they are kept apart.
+type Light<'a> = ([&'a [f32]; 3], [&'a [f32]; 3], &'a [f32]);
+
+fn light(film: &Film) -> std::result::Result<Option<Light<'_>>, String> {
+    if !splits_light(film)? {
+        return Ok(None);
+    }
+    let Some(Samples::F32(m2)) = film.channel(INDIRECT_M2) else {
+        return Err(format!(
             "has no layer \"{INDIRECT_M2}\", the noise of indirect light, as files of earlier versions: it can be filtered, but \
              to add samples render it anew"
-        )),
-    }
+        ));
+    };
+    Ok(Some((rgb(film, "direct")?, rgb(film, "indirect")?, m2)))
 }
 
 /// What the file says of samples that were no number.

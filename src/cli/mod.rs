@@ -12,6 +12,7 @@ pub mod origin;
 pub mod overrides;
 pub mod progress;
 pub mod render;
+pub mod rendered;
 pub mod resume;
 
 use crate::error::{Error, Result};

@@ -3,6 +3,7 @@ use super::layers;
 use crate::error::{Error, Result};
 use crate::image::Film;
 use crate::scene::Scene;
+use crate::settings::Settings;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -12,7 +13,7 @@ const SCENE: &str = "sceneFingerprint";
 const SAMPLES: &str = "sampleRanges";
 
 /// Samples of one render. A pixel has no others, and may lack some at the end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct SampleRange {
     /// Of their sequence.
     pub seed: u32,
@@ -23,14 +24,19 @@ pub struct SampleRange {
 }
 
 impl SampleRange {
-    /// Index after the last.
-    pub fn end(&self) -> u64 {
-        u64::from(self.first) + u64::from(self.count)
+    /// Index of the last. Ranges in an [`Origin`] have one.
+    pub fn last(&self) -> u32 {
+        self.first + (self.count - 1)
+    }
+
+    /// Whether the other goes on where this one ends.
+    pub fn ends_before(&self, other: &Self) -> bool {
+        self.seed == other.seed && other.first.checked_sub(1) == Some(self.last())
     }
 
     /// Whether a sample is in both.
     pub fn overlaps(&self, other: &Self) -> bool {
-        self.seed == other.seed && u64::from(self.first) < other.end() && u64::from(other.first) < self.end()
+        self.seed == other.seed && self.first <= other.last() && other.first <= self.last()
     }
 }
 
@@ -40,19 +46,25 @@ pub struct Origin {
     pub settings: Value,
     /// [`Scene::fingerprint`].
     pub scene: String,
-    /// One for each render that went into it. Adjacent ones stay apart: pixels that lack samples at the end of the former
-    /// have a gap there.
+    /// One for each render that went into it, unless it closed up with another. They are not empty, do not overlap, and have
+    /// [`Settings::MAX_SPP`] samples at most.
     pub samples: Vec<SampleRange>,
 }
 
 impl Origin {
-    /// Reads it.
+    /// Reads and checks it.
     ///
     /// # Errors
     /// What is missing or damaged.
     pub fn of(film: &Film) -> std::result::Result<Self, String> {
-        let settings = parsed(film, SETTINGS)?;
-        Ok(Self { settings, scene: said(film, SCENE)?.to_owned(), samples: parsed(film, SAMPLES)? })
+        let (settings, samples) = (parsed(film, SETTINGS)?, parsed::<Vec<SampleRange>>(film, SAMPLES)?);
+        check_ranges(&samples)?;
+        Ok(Self { settings, scene: said(film, SCENE)?.to_owned(), samples })
+    }
+
+    /// Samples of all ranges.
+    pub fn samples_per_pixel(&self) -> u32 {
+        self.samples.iter().map(|range| range.count).sum()
     }
 
     /// # Errors
@@ -62,6 +74,22 @@ impl Origin {
             return Ok(());
         }
         Err("shows another scene, or this one before it was changed".into())
+    }
+}
+
+fn check_ranges(samples: &[SampleRange]) -> std::result::Result<(), String> {
+    let wrong = |what: &str| Err(format!("{SAMPLES} {what}: take the file as tallow wrote it"));
+    if samples.is_empty() || samples.iter().any(|r| r.count == 0 || r.first.checked_add(r.count).is_none()) {
+        return wrong("are empty, or end beyond 32 bits");
+    }
+    if samples.iter().map(|r| u64::from(r.count)).sum::<u64>() > Settings::MAX_SPP.into() {
+        return wrong("have more samples than a pixel can count");
+    }
+    let mut sorted = samples.to_vec();
+    sorted.sort();
+    match sorted.windows(2).any(|pair| pair[0].overlaps(&pair[1])) {
+        true => wrong("overlap"),
+        false => Ok(()),
     }
 }
 
@@ -97,4 +125,31 @@ pub fn metadata(scene: &Scene, film: &Film) -> Result<[(&'static str, String); 3
 pub fn set_samples(film: &mut Film, samples: &[SampleRange]) -> Result<()> {
     film.metadata.insert(SAMPLES.to_owned(), json(&samples)?);
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_that_cannot_be_are_refused() {
+        let check = |ranges: &[(u32, u32, u32)]| {
+            let range = |&(seed, first, count): &(u32, u32, u32)| SampleRange { seed, first, count };
+            check_ranges(&ranges.iter().map(range).collect::<Vec<_>>())
+        };
+        assert_eq!(check(&[(0, 0, 4), (0, 4, 1), (1, 0, 4)]), Ok(()));
+        assert_eq!(check(&[(7, u32::MAX - 1, 1)]), Ok(()));
+        for (ranges, part) in [
+            (&[][..], "empty"),
+            (&[(0, 0, 0)], "empty"),
+            (&[(0, u32::MAX, 1)], "32 bits"),
+            (&[(0, 0, 4), (1, 0, 4), (0, 3, 1)], "overlap"),
+            (&[(0, 0, 9), (0, 3, 1), (0, 5, 1)], "overlap"),
+            (&[(0, 0, Settings::MAX_SPP), (1, 0, 1)], "can count"),
+            (&[(0, 0, 1 << 31), (1, 0, 1 << 31)], "can count"),
+        ] {
+            let line = check(ranges).unwrap_err();
+            assert!(line.contains(part), "{ranges:?}: {line}");
+        }
+    }
 }

@@ -2,13 +2,15 @@
 use super::job::End;
 use super::layers;
 use super::origin::Origin;
+use super::rendered::Rendered;
 use crate::error::{Error, Result};
 use crate::gpu::FrameResources;
 use crate::gpu::layout::{PixelLight, PixelStats};
-use crate::image::{self, Film, Samples};
+use crate::image::{self, Film};
 use crate::renderer::{Progress, Renderer};
 use crate::scene::Scene;
 use crate::schedule;
+use crate::settings::Settings;
 use crate::statistics::{BrokenSamples, Pixel};
 use serde_json::Value;
 use std::path::Path;
@@ -39,23 +41,19 @@ impl Earlier {
     }
 
     fn of(film: &Film, scene: &Scene) -> std::result::Result<Self, String> {
-        check(&Origin::of(film)?, scene)?;
-        let settings = &scene.settings;
-        let uniform = settings.allocate.policy == "uniform";
-        let pixels = layers::pixels(film)?;
-        let count = |p: &Pixel| p.stats.count;
-        let pending = match layers::counts(film, layers::PENDING) {
-            _ if uniform => pixels.iter().map(|p| settings.spp.saturating_sub(count(p))).collect(),
-            Ok(pending) => pending,
-            Err(_) => vec![0; pixels.len()],
+        let rendered = Rendered::of(film)?;
+        check(&rendered.origin, scene)?;
+        let (settings, priority) = (&scene.settings, rendered.priority(film)?);
+        let Rendered { pixels, broken, pending, .. } = rendered;
+        let pending = match pending {
+            _ if settings.allocate.policy == "uniform" => {
+                pixels.iter().map(|p| settings.spp.saturating_sub(p.stats.count)).collect()
+            }
+            pending => pending.unwrap_or_else(|| vec![0; pixels.len()]),
         };
-        let allocations = film.metadata.get(ALLOCATIONS).and_then(|n| n.parse().ok()).unwrap_or(0);
-        let progress = Progress { allocations, pending: pending.iter().map(|&n| u64::from(n)).sum() };
-        let priority = match film.channel(layers::PRIORITY) {
-            Some(Samples::F32(priority)) => priority.clone(),
-            _ => Vec::new(),
-        };
-        Ok(Self { progress, broken: layers::broken_samples(film)?, pixels, priority, pending })
+        let progress =
+            Progress { allocations: allocations(film)?, pending: pending.iter().map(|&n| u64::from(n)).sum() };
+        Ok(Self { progress, broken, pixels, priority, pending })
     }
 
     /// Puts it into the renderer's buffers and returns the steps that are left.
@@ -90,8 +88,19 @@ fn check(origin: &Origin, scene: &Scene) -> std::result::Result<(), String> {
     // A pixel goes on at the index of its first sample plus their number.
     match &origin.samples[..] {
         [one] if (one.seed, one.first) == (settings.seed, settings.first_sample) => Ok(()),
-        _ => Err("was merged, and cannot be resumed: render more samples with --first-sample, and merge those".into()),
+        _ => Err("was merged, and cannot be resumed unless its samples are spread evenly and close up to one range from the \
+                  scene's first: render more samples with --first-sample, and merge those"
+            .into()),
     }
+}
+
+/// Allocations that the render had made.
+fn allocations(film: &Film) -> std::result::Result<u32, String> {
+    // Each adds a sample to some pixel, but for those behind a threshold, which may find nothing to add.
+    const MOST: u32 = Settings::MAX_SPP + u32::BITS;
+    let made = film.metadata.get(ALLOCATIONS).and_then(|n| n.parse().ok());
+    made.filter(|&n| n <= MOST)
+        .ok_or_else(|| format!("has no number of {ALLOCATIONS}: take the file as tallow wrote it"))
 }
 
 /// What the pixels of an interrupted render still lack of what they were to have by then.

@@ -1,5 +1,5 @@
 //! What filters can use of an image, found by the channel names of Tallow, Blender (Cycles), Mitsuba 3 and pbrt-v4.
-use super::film::{Channel, Film, Window, split};
+use super::film::{Channel, Film, NOISY, Window, split};
 use std::collections::BTreeMap;
 
 /// One kind of arbitrary output variable.
@@ -35,7 +35,7 @@ struct Known {
 /// Blender: `ViewLayer.NAME.R`; its "Denoising" passes are made for filters. Mitsuba: the user chooses the names; these
 /// are those of its documentation. pbrt: `Albedo.R`, `Ns.X`, `P.X`, `Variance.R`.
 const KNOWN: &[Known] = &[
-    Known { aov: Aov::Colour, label: "colour", names: &["noisy image"] },
+    Known { aov: Aov::Colour, label: "colour", names: &[NOISY] },
     Known { aov: Aov::Direct, label: "direct light", names: &["direct"] },
     Known { aov: Aov::Indirect, label: "indirect light", names: &["indirect"] },
     Known { aov: Aov::Albedo, label: "albedo", names: &["denoising albedo", "albedo", "diffcol", "diffuse color"] },
@@ -72,7 +72,10 @@ impl<'a> Aovs<'a> {
     /// When there is no colour, or not what the user named, or when the file holds other pixels of it than of the colour.
     pub fn find(film: &'a Film, names: &Names) -> Result<Self, String> {
         let given = names.get(&Aov::Colour).map(String::as_str);
-        let shown = film.find(given).ok_or_else(|| film.picture(given).err().unwrap_or_default())?;
+        // The noisy image is filtered, and never replaced.
+        let shown = film
+            .find(given.filter(|name| !is_noisy(name)))
+            .ok_or_else(|| film.picture(given).err().unwrap_or_default())?;
         let view = split(split(&shown[0].name).0).0;
         let mut found = Self {
             film,
@@ -120,6 +123,14 @@ impl<'a> Aovs<'a> {
         self.planes.get(&aov).map(Vec::as_slice)
     }
 
+    /// The layer to keep the noisy image in when the colour is replaced: none where the file has one already, or where the colour
+    /// is a layer that the user chose.
+    pub fn keep_as(&self) -> Option<&'static str> {
+        let has_one = self.film.layers().iter().any(|layer| is_noisy(split(layer).1));
+        let is_shown = self.film.find(None).is_some_and(|shown| shown.map(|c| c.name.as_str()) == self.colour);
+        (is_shown && !has_one).then_some(NOISY)
+    }
+
     /// The first of the three.
     pub fn scalar(&self, aov: Aov, pixel: usize) -> Option<f32> {
         self.get(aov).map(|plane| plane[pixel][0])
@@ -141,6 +152,10 @@ impl Known {
     fn is_tallow_s_own(&self) -> bool {
         matches!(self.aov, Aov::Direct | Aov::Indirect)
     }
+}
+
+fn is_noisy(layer: &str) -> bool {
+    layer.eq_ignore_ascii_case(NOISY)
 }
 
 /// Other programs may use the same names for something else.

@@ -1,6 +1,10 @@
 //! OpenEXR, scan lines, lossless: ours out, anybody's in.
-use super::film::{Channel, Film, Samples, Window};
+use super::claim::{self, Claim};
+use super::film::{Channel, Film, Samples, split};
+use super::frame::{Frame, held, shown, union};
 use super::output::Stream;
+use super::sorted_head::SortedHead;
+use crate::memory;
 use exr::block::lines::LineRefMut;
 use exr::image::write::samples::{SamplesWriter, WritableSamples};
 use exr::image::{AnyChannel, AnyChannels, Blocks, Encoding, FlatImage, FlatSamples, Image, Layer};
@@ -12,8 +16,6 @@ use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
 use exr::prelude::{Compression, LineOrder, ReadChannels, ReadLayers, WritableImage};
 use std::io::{Cursor, ErrorKind};
 
-/// Flat areas in DWA blocks: one value in 64, deflated 1032 to 1.
-const MAX_RATIO: u64 = 1 << 16;
 const ENCODING: Encoding =
     Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
 /// Before the names of our attributes, as many names (`version`, `comments`...) are taken by the standard.
@@ -32,7 +34,7 @@ pub(super) fn encode(film: &Film, out: &mut dyn Stream) -> std::io::Result<()> {
     let attribute = |(key, value): (&String, &String)| (text(&format!("{PREFIX}{key}")), text(value));
     attributes.other = film.metadata.iter().map(attribute).map(|(k, v)| (k, AttributeValue::Text(v))).collect();
     let image = Image::empty(attributes).with_layer(layer);
-    image.write().to_buffered(out).map_err(|e| match e {
+    image.write().to_buffered(SortedHead::new(out)).map_err(|e| match e {
         exr::error::Error::Io(e) => e,
         other => std::io::Error::new(ErrorKind::InvalidData, other.to_string()),
     })
@@ -85,15 +87,16 @@ impl SamplesWriter for Lines<'_> {
     }
 }
 
-/// Which pixels of a file make its film.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Frame {
-    /// Those that are shown: the display window.
-    Display,
-    /// Those that are stored: the union of the data windows of all parts.
-    Data,
+/// What its film takes, by the headers alone.
+pub(super) fn claim(bytes: &[u8], frame: Frame) -> Result<Claim, String> {
+    let mut stream = Cursor::new(bytes);
+    let meta = MetaData::read_from_buffered(&mut stream, true).map_err(plain)?;
+    MetaData::validate(&meta.headers, false).map_err(plain)?;
+    check_sampling(&meta)?;
+    claim::of_exr(&meta, bytes.len().saturating_sub(stream.position() as usize), frame)
 }
 
+/// To be called after [`claim`] alone.
 pub(super) fn decode(bytes: &[u8], frame: Frame) -> Result<Film, String> {
     let image = read(bytes)?;
     let window = match frame {
@@ -103,32 +106,60 @@ pub(super) fn decode(bytes: &[u8], frame: Frame) -> Result<Film, String> {
     film_from(image, window)
 }
 
-/// The file again with other samples in some channels, given by their names in the film of [`Frame::Data`], and with an entry
-/// of metadata. All else is kept, but for the compression, which is lossless.
-pub(super) fn replace(
-    bytes: &[u8],
-    channels: &[(&str, &[f32])],
-    (key, value): (&str, &str),
-) -> Result<Vec<u8>, String> {
+/// Other samples for some channels, given by their names in the film of [`Frame::Data`].
+pub(super) struct Replacement<'a> {
+    pub(super) channels: &'a [(&'a str, &'a [f32])],
+    /// The layer that keeps what was there, beside its own.
+    pub(super) keep_as: Option<&'a str>,
+    /// Metadata: key and value.
+    pub(super) entry: (&'a str, &'a str),
+}
+
+/// The file again with other samples. All else is kept, but for the compression, which is lossless.
+pub(super) fn replace(bytes: &[u8], with: &Replacement) -> Result<Vec<u8>, String> {
     let mut image = read(bytes)?;
-    image.attributes.other.insert(text(&format!("{PREFIX}{key}")), AttributeValue::Text(text(value)));
+    set_entry(&mut image, with.entry);
     let frame = stored(&image);
     let many = image.layer_data.len() > 1;
     for part in &mut image.layer_data {
         let data = window(part);
         let part_name = part.attributes.layer_name.as_ref().filter(|_| many).map(string);
         part.encoding = ENCODING;
+        let mut kept = Vec::new();
         for channel in &mut part.channel_data.list {
             let name = channel_name(part_name.as_deref(), &string(&channel.name));
-            if let Some((_, samples)) = channels.iter().find(|(wanted, _)| *wanted == name) {
-                channel.sample_data = FlatSamples::F32(shown(samples.to_vec(), frame, data));
+            if let Some((_, samples)) = with.channels.iter().find(|(wanted, _)| *wanted == name) {
+                let fresh = FlatSamples::F32(shown(samples, frame, data)?);
+                let old = std::mem::replace(&mut channel.sample_data, fresh);
+                kept.extend(with.keep_as.map(|layer| AnyChannel { sample_data: old, ..named(channel, layer) }));
             }
+        }
+        if !kept.is_empty() {
+            kept.extend(std::mem::take(&mut part.channel_data.list));
+            part.channel_data = AnyChannels::sort(kept.into());
         }
     }
     let mut out = Cursor::new(Vec::new());
-    let stream: &mut dyn Stream = &mut out;
-    image.write().to_buffered(stream).map_err(|e| format!("cannot be encoded: {e}"))?;
+    image.write().to_buffered(SortedHead::new(&mut out)).map_err(|e| format!("cannot be encoded: {e}"))?;
     Ok(out.into_inner())
+}
+
+/// What the reader took for the own attributes of parts becomes common to all.
+fn set_entry(image: &mut FlatImage, (key, value): (&str, &str)) {
+    let name = text(&format!("{PREFIX}{key}"));
+    for part in &mut image.layer_data {
+        part.attributes.other.remove(&name);
+    }
+    image.attributes.other.insert(name, AttributeValue::Text(text(value)));
+}
+
+/// A channel without samples, of the same view and component in another layer.
+fn named(channel: &AnyChannel<FlatSamples>, layer: &str) -> AnyChannel<FlatSamples> {
+    let name = string(&channel.name);
+    let (own_layer, component) = split(&name);
+    let parts = [split(own_layer).0, layer, component];
+    let name = parts.into_iter().filter(|p| !p.is_empty()).collect::<Vec<_>>().join(".");
+    AnyChannel::new(text(&name), FlatSamples::F32(Vec::new()))
 }
 
 fn window(part: &FlatPart) -> IntegerBounds {
@@ -141,21 +172,8 @@ fn stored(image: &FlatImage) -> IntegerBounds {
     windows.reduce(union).unwrap_or(image.attributes.display_window)
 }
 
-fn union(a: IntegerBounds, b: IntegerBounds) -> IntegerBounds {
-    let edges = |a: i32, a_size: usize, b: i32, b_size: usize| {
-        let end = (i64::from(a) + a_size as i64).max(i64::from(b) + b_size as i64);
-        (a.min(b), (end - i64::from(a.min(b))) as usize)
-    };
-    let (x, width) = edges(a.position.0, a.size.0, b.position.0, b.size.0);
-    let (y, height) = edges(a.position.1, a.size.1, b.position.1, b.size.1);
-    IntegerBounds::new((x, y), (width, height))
-}
-
 fn read(bytes: &[u8]) -> Result<FlatImage, String> {
-    let damaged = |e: exr::error::Error| format!("cannot be decoded: {e}; is it complete?");
-    let chunks = exr::block::read(Cursor::new(bytes), false).map_err(damaged)?;
-    check_size(chunks.meta_data(), bytes.len())?;
-    check_sampling(chunks.meta_data())?;
+    let chunks = exr::block::read(Cursor::new(bytes), false).map_err(plain)?;
     exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -165,20 +183,27 @@ fn read(bytes: &[u8]) -> Result<FlatImage, String> {
         // A panic on one of its own threads would abort the process, see `contained`.
         .non_parallel()
         .from_chunks(chunks)
-        .map_err(damaged)
+        .map_err(plain)
 }
 
-fn check_size(meta: &MetaData, file_len: usize) -> Result<(), String> {
-    let data = meta.headers.iter().map(|h| IntegerBounds::new(h.own_attributes.layer_position, h.layer_size));
-    let all = data.reduce(union).map_or(Vec2(0, 0), |b| b.size);
-    let mut claimed = 0_u64;
-    for header in &meta.headers {
-        let display = header.shared_attributes.display_window.size;
-        let samples = |size: Vec2<usize>| (size.0 as u64).saturating_mul(size.1 as u64);
-        let plane = samples(all).max(samples(display));
-        claimed = claimed.saturating_add(plane.saturating_mul(header.channels.list.len() as u64));
+/// The crate's words for programmers, as words for users.
+fn plain(e: exr::error::Error) -> String {
+    use exr::error::Error;
+    let kind = |what: &str| format!("{what}, which is not supported: save it as a flat EXR with ZIP compression");
+    match e {
+        Error::NotSupported(m) if m.contains("deep") => kind("holds several samples a pixel in depth (deep data)"),
+        Error::NotSupported(m) if m.contains("compression") => kind("is compressed in a rare way"),
+        Error::NotSupported(_) => kind("is an EXR file of a rare kind"),
+        Error::Invalid(m) if m.contains("deep") => kind("holds several samples a pixel in depth (deep data)"),
+        Error::Invalid(m) if m.starts_with("compressed ") => damaged("its compressed pixels are damaged"),
+        Error::Invalid(m) if m.contains("missing bytes") => damaged("it ends too early"),
+        Error::Invalid(m) => damaged(&format!("something is wrong with this: {m}")),
+        Error::Io(_) | Error::Aborted => damaged("it ends too early"),
     }
-    super::check_claim(claimed, file_len, MAX_RATIO)
+}
+
+fn damaged(what: &str) -> String {
+    format!("cannot be decoded: {what}; is it complete?")
 }
 
 /// The crate's reader asserts this.
@@ -202,26 +227,13 @@ fn film_from(image: FlatImage, frame: IntegerBounds) -> Result<Film, String> {
         let data = window(&part);
         for channel in part.channel_data.list {
             let name = channel_name(part_name.as_deref(), &string(&channel.name));
-            let samples = shown_samples(channel.sample_data, data, frame);
+            let samples = shown_samples(channel.sample_data, data, frame)?;
             film.channels.push(Channel { name, samples, window: held(data, frame) });
         }
         film.metadata.extend(texts(&part.attributes.other));
     }
     film.metadata.extend(texts(&image.attributes.other));
     Ok(film)
-}
-
-/// The part of `frame` that is stored, unless it is all.
-fn held(data: IntegerBounds, frame: IntegerBounds) -> Option<Window> {
-    let edges = |at: i32, size: usize, start: i32, length: usize| {
-        let first = (i64::from(at) - i64::from(start)).clamp(0, length as i64);
-        let end = (i64::from(at) - i64::from(start) + size as i64).clamp(first, length as i64);
-        (first as u32, (end - first) as u32)
-    };
-    let (x, width) = edges(data.position.0, data.size.0, frame.position.0, frame.size.0);
-    let (y, height) = edges(data.position.1, data.size.1, frame.position.1, frame.size.1);
-    let all = (width as usize, height as usize) == (frame.size.0, frame.size.1);
-    (!all).then_some(Window { first: [x, y], size: [width, height] })
 }
 
 fn texts<'a>(
@@ -242,32 +254,14 @@ fn channel_name(part: Option<&str>, channel: &str) -> String {
     }
 }
 
-fn shown_samples(samples: FlatSamples, data: IntegerBounds, window: IntegerBounds) -> Samples {
-    match samples {
-        FlatSamples::F16(v) => Samples::F32(shown(v.iter().map(|h| h.to_f32()).collect(), data, window)),
-        FlatSamples::F32(v) => Samples::F32(shown(v, data, window)),
-        FlatSamples::U32(v) => Samples::U32(shown(v, data, window)),
-    }
-}
-
-/// The picture is the display window: pixels outside the data window are 0, data outside the display window is dropped.
-fn shown<T: Copy + Default>(stored: Vec<T>, data: IntegerBounds, window: IntegerBounds) -> Vec<T> {
-    if data == window {
-        return stored;
-    }
-    let (width, height) = (window.size.0, window.size.1);
-    let mut out = vec![T::default(); width * height];
-    // Offsets of two 32-bit positions need 33 bits.
-    let dx = i64::from(data.position.0) - i64::from(window.position.0);
-    let dy = i64::from(data.position.1) - i64::from(window.position.1);
-    let first = (-dx).clamp(0, data.size.0 as i64) as usize;
-    let last = (width as i64 - dx).clamp(first as i64, data.size.0 as i64) as usize;
-    for (row, values) in stored.chunks_exact(data.size.0.max(1)).enumerate() {
-        let y = row as i64 + dy;
-        if first < last && (0..height as i64).contains(&y) {
-            let start = y as usize * width + (first as i64 + dx) as usize;
-            out[start..start + last - first].copy_from_slice(&values[first..last]);
+fn shown_samples(samples: FlatSamples, data: IntegerBounds, frame: IntegerBounds) -> Result<Samples, String> {
+    Ok(match samples {
+        FlatSamples::F16(v) => {
+            let mut floats = memory::reserved(v.len())?;
+            floats.extend(v.iter().map(|h| h.to_f32()));
+            Samples::F32(if data == frame { floats } else { shown(&floats, data, frame)? })
         }
-    }
-    out
+        FlatSamples::F32(v) => Samples::F32(if data == frame { v } else { shown(&v, data, frame)? }),
+        FlatSamples::U32(v) => Samples::U32(if data == frame { v } else { shown(&v, data, frame)? }),
+    })
 }

@@ -1,6 +1,10 @@
 //! What a render returns and what an image file holds: planes of samples under dotted names, as EXR has them.
+use crate::memory;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
+
+/// The layer of the colour before it was filtered: Blender's name.
+pub const NOISY: &str = "Noisy Image";
 
 /// The samples of one channel, row-major, row 0 at the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,11 +135,12 @@ impl Film {
     /// `rgba`), or the only layer with R, G, B, or grey (Y). A name matches ignoring case, in full or by its last part.
     ///
     /// # Errors
-    /// When there is no such layer, or more than one; lists those there are.
+    /// When there is no such layer, or more than one, which lists those there are, or no memory.
     pub fn picture(&self, layer: Option<&str>) -> Result<Picture, String> {
         let channels = self.find(layer).ok_or_else(|| self.no_such_layer(layer))?;
         let [a, b, c] = channels.map(|c| c.samples.to_f32());
-        let pixels = a.iter().zip(b.iter()).zip(c.iter()).map(|((&a, &b), &c)| [a, b, c]).collect();
+        let mut pixels = memory::reserved(self.pixels())?;
+        pixels.extend(a.iter().zip(b.iter()).zip(c.iter()).map(|((&a, &b), &c)| [a, b, c]));
         Ok(Picture { width: self.width, height: self.height, pixels })
     }
 
@@ -158,7 +163,8 @@ impl Film {
         let coloured: Vec<_> =
             self.layers().into_iter().filter(|l| self.triple(l, ["R", "G", "B"]).is_some()).collect();
         let usual = |l: &&&str| USUAL.contains(&split(l).1.to_lowercase().as_str());
-        let only = || coloured.first().filter(|_| coloured.len() == 1);
+        let clean = |l: &&&str| !split(l).1.eq_ignore_ascii_case(NOISY);
+        let only = || coloured.iter().find(clean).filter(|_| coloured.iter().filter(clean).count() == 1);
         match coloured.iter().find(usual).or_else(only) {
             Some(layer) => self.triple(layer, ["R", "G", "B"]),
             None => self.grey(|c| c.name == "Y"),

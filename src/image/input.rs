@@ -38,13 +38,33 @@ pub fn read_text(path: &Path, times: u64) -> Result<Vec<u8>> {
     }
 }
 
+/// Bytes that tell the kind of an image.
+const HEAD: u64 = 16;
+
+/// [`read`] for images: a file that begins as none is not read on.
+///
+/// # Errors
+/// As [`read`], and for a file of another kind.
+pub fn read_image(path: &Path) -> Result<Vec<u8>> {
+    let mut file = open(path)?;
+    let mut head = Vec::new();
+    file.by_ref().take(HEAD).read_to_end(&mut head).map_err(|e| Error::input(path, remedy(&e)))?;
+    match super::is_image(&head) {
+        true => read_rest(path, file, head, 1),
+        false => Err(Error::input(path, "is no EXR, PNG, JPEG or HDR file")),
+    }
+}
+
 /// Reads the whole of a file where there is memory for `times` its size.
 fn read_times(path: &Path, times: u64) -> Result<Vec<u8>> {
+    read_rest(path, open(path)?, Vec::new(), times)
+}
+
+fn read_rest(path: &Path, mut file: File, mut bytes: Vec<u8>, times: u64) -> Result<Vec<u8>> {
     let about = |e| Error::input(path, remedy(&e));
-    let mut file = open(path)?;
     let size = file.metadata().map_err(about)?.len();
     memory::need(path.display(), size.saturating_mul(times))?;
-    let mut bytes = memory::vector(path.display(), size as usize)?;
+    memory::reserve(path.display(), &mut bytes, size as usize)?;
     file.read_to_end(&mut bytes).map_err(about)?;
     Ok(bytes)
 }

@@ -1,19 +1,24 @@
 //! Pictures and files: a [`Film`] of named channels, its readers and writers, and the metrics between two of them.
 pub mod aov;
+mod claim;
 pub mod difference;
 mod exr;
 mod film;
+mod frame;
 pub mod input;
 pub mod metrics;
 pub mod output;
 mod photo;
+mod sorted_head;
 pub mod source;
 pub mod tone;
 
 use crate::error::{Error, Result};
 use crate::memory;
-pub use film::{Channel, Film, Picture, Samples, Window};
-pub(crate) use photo::check_end;
+pub use claim::Claim;
+pub use film::{Channel, Film, NOISY, Picture, Samples, Window};
+use frame::Frame;
+pub(crate) use photo::{BAND, bands, check_end, claim as picture_claim, picture};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -84,32 +89,45 @@ pub fn check_writable(path: &Path) -> Result<()> {
 /// Reads an EXR, PNG, JPEG or HDR file, told apart by content, into linear Rec. 709.
 ///
 /// # Errors
-/// [`Error::Input`] when the file cannot be read, is of another kind, or is damaged.
+/// [`Error::Input`] when the file cannot be read, is of another kind, or is damaged; [`Error::Device`] when there is not enough
+/// memory.
 pub fn read(path: &Path) -> Result<Film> {
-    decode(&input::read(path)?).map_err(|what| Error::input(path, what))
-}
-
-/// Refuses a header that asks for more samples of 32 bits than `ratio` times the bytes of its file, which is damaged, or
-/// than memory can hold twice, as decoded and as a film.
-fn check_claim(samples: u64, file_len: usize, ratio: u64) -> std::result::Result<(), String> {
-    if samples > ratio.saturating_mul(file_len as u64) {
-        return Err(format!(
-            "claims {samples} samples, more than a file of {file_len} bytes can hold; is it complete?"
-        ));
-    }
-    memory::check(samples.saturating_mul(8))
+    decode_file(path, &input::read_image(path)?, Frame::Display)
 }
 
 /// [`read`] for a file that is already in memory.
 ///
 /// # Errors
-/// What is wrong with the data, in one line.
+/// What is wrong with the data, or that they need more memory than is free, in one line.
 pub fn decode(bytes: &[u8]) -> std::result::Result<Film, String> {
-    decode_frame(bytes, exr::Frame::Display)
+    memory::check(claim_of(bytes, Frame::Display)?.bytes)?;
+    decode_frame(bytes, Frame::Display)
 }
 
-fn decode_frame(bytes: &[u8], frame: exr::Frame) -> std::result::Result<Film, String> {
+fn decode_file(path: &Path, bytes: &[u8], frame: Frame) -> Result<Film> {
+    let claim = claim_of(bytes, frame).map_err(|what| Error::input(path, what))?;
+    check_memory(path, claim.bytes)?;
+    decode_frame(bytes, frame).map_err(|what| Error::input(path, what))
+}
+
+/// # Errors
+/// [`Error::Device`] about the file when so many bytes are not free.
+pub fn check_memory(path: &Path, bytes: u64) -> Result<()> {
+    memory::check(bytes).map_err(|what| Error::Memory(format!("{}: {what}", path.display())))
+}
+
+fn claim_of(bytes: &[u8], frame: Frame) -> std::result::Result<Claim, String> {
+    contained(|| if is_exr(bytes) { exr::claim(bytes, frame) } else { photo::claim(bytes) })
+}
+
+/// To be called after [`claim_of`] alone.
+fn decode_frame(bytes: &[u8], frame: Frame) -> std::result::Result<Film, String> {
     contained(|| if is_exr(bytes) { exr::decode(bytes, frame) } else { photo::decode(bytes) })
+}
+
+/// Whether a file that begins so may be an image.
+fn is_image(head: &[u8]) -> bool {
+    is_exr(head) || ::image::guess_format(head).is_ok()
 }
 
 fn is_exr(bytes: &[u8]) -> bool {

@@ -1,15 +1,19 @@
 //! PNG, JPEG and Radiance HDR.
 use super::WriteOptions;
+use super::claim::Claim;
 use super::film::{Film, Picture, Samples};
 use super::tone;
+use crate::memory;
 use image::codecs::{hdr::HdrEncoder, png::PngEncoder};
 use image::{
-    ColorType, DynamicImage, ExtendedColorType, ImageEncoder, ImageError, ImageFormat, ImageReader, Limits, Rgb,
+    ColorType, DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, ImageFormat, ImageReader,
+    Limits, Rgb,
 };
-use std::io::Cursor;
+use std::io::{Cursor, ErrorKind};
 
-/// Deflate, in PNG, packs at most 1032 to 1; each pixel counts as four samples.
-const MAX_RATIO: u64 = 4 * 1032;
+/// Pixels that a byte can stand for: PNG packs 8 into one before deflate packs 1032 of those. JPEG needs a bit for 64 pixels of
+/// one component, which may be the quarter of another each way; a line of HDR holds 2^16 pixels in 12 bytes.
+const PIXELS_PER_BYTE: u64 = 8 * 1032;
 /// Bytes that colour profiles and texts beside the pixels may take.
 const TEXTS: u64 = 1 << 26;
 
@@ -35,22 +39,60 @@ pub(super) fn encode_hdr(picture: &Picture) -> Result<Vec<u8>, String> {
     Ok(out)
 }
 
-pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
-    let reader = || ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string());
-    let damaged = |e: ImageError| format!("cannot be decoded: {e}; is it complete?");
-    if reader()?.format().is_none() {
+/// What the film of a file takes, by its header alone.
+///
+/// # Errors
+/// What is wrong with the header.
+pub fn claim(bytes: &[u8]) -> Result<Claim, String> {
+    const KNOWN: [ImageFormat; 3] = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Hdr];
+    if !image::guess_format(bytes).is_ok_and(|format| KNOWN.contains(&format)) {
         return Err("is no EXR, PNG, JPEG or HDR file".to_owned());
     }
     check_end(bytes)?;
-    let (width, height) = reader()?.into_dimensions().map_err(damaged)?;
-    // Four: alpha, or what a decoder adds for it.
-    let samples = 4 * u64::from(width) * u64::from(height);
-    super::check_claim(samples, bytes.len(), MAX_RATIO)?;
-    let mut reader = reader()?;
+    let decoder = reader(bytes, TEXTS)?.into_decoder().map_err(plain)?;
+    let (width, height) = decoder.dimensions();
+    let pixels = u64::from(width) * u64::from(height);
+    if pixels > PIXELS_PER_BYTE * bytes.len() as u64 {
+        let length = bytes.len();
+        return Err(format!("claims {pixels} pixels, more than a file of {length} bytes can hold; is it complete?"));
+    }
+    let color = decoder.color_type();
+    let planes = if color.has_alpha() { 4 } else { 3 };
+    Ok(Claim { size: [width, height], bytes: pixels * (u64::from(color.bytes_per_pixel()) + 4 * planes) })
+}
+
+pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
+    film_from(&picture(bytes)?)
+}
+
+/// A PNG, JPEG or HDR file as it was stored.
+///
+/// # Errors
+/// What is wrong with the data, or that they need more memory than is free.
+pub fn picture(bytes: &[u8]) -> Result<DynamicImage, String> {
+    let claim = claim(bytes)?;
+    memory::check(claim.bytes)?;
+    reader(bytes, TEXTS + claim.bytes)?.decode().map_err(plain)
+}
+
+fn reader(bytes: &[u8], memory: u64) -> Result<ImageReader<Cursor<&[u8]>>, String> {
+    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| plain(e.into()))?;
     let mut limits = Limits::no_limits();
-    limits.max_alloc = Some(TEXTS + 8 * samples);
+    limits.max_alloc = Some(memory);
     reader.limits(limits);
-    reader.decode().map(film_from).map_err(damaged)
+    Ok(reader)
+}
+
+/// The crate's words for programmers, as words for users.
+fn plain(e: ImageError) -> String {
+    let damaged = |what: &str| format!("cannot be decoded: {what}; is it complete?");
+    match e {
+        ImageError::IoError(e) if e.kind() != ErrorKind::UnexpectedEof => damaged("it cannot be read to its end"),
+        ImageError::IoError(_) => damaged("it ends too early"),
+        ImageError::Unsupported(_) => "is of a rare kind, which is not supported: save it as a plain PNG".to_owned(),
+        ImageError::Limits(_) => "holds more than 64 MiB of texts or profiles: save it without".to_owned(),
+        ImageError::Decoding(_) | ImageError::Encoding(_) | ImageError::Parameter(_) => damaged("its data are damaged"),
+    }
 }
 
 /// # Errors
@@ -80,17 +122,28 @@ fn jpeg_is_cut(bytes: &[u8]) -> bool {
     true
 }
 
+/// Rows of a picture that are converted at once: whole pictures in other formats would be as large again.
+pub const BAND: u32 = 64;
+
+/// The picture in bands of [`BAND`] rows; the last may have fewer.
+pub fn bands(image: &DynamicImage) -> impl Iterator<Item = DynamicImage> {
+    let (width, height) = (image.width(), image.height());
+    (0..height).step_by(BAND as usize).map(move |y| image.crop_imm(0, y, width, BAND.min(height - y)))
+}
+
 /// Integers are taken for sRGB code values, floats for radiance. Alpha, always linear, is kept as the channel A.
-fn film_from(image: DynamicImage) -> Film {
+fn film_from(image: &DynamicImage) -> Result<Film, String> {
     let is_float = matches!(image.color(), ColorType::Rgb32F | ColorType::Rgba32F);
-    let has_alpha = image.color().has_alpha();
-    let rgba = image.into_rgba32f();
-    let mut film = Film::new(rgba.width(), rgba.height());
+    let names = if image.color().has_alpha() { &["R", "G", "B", "A"][..] } else { &["R", "G", "B"] };
+    let mut film = Film::new(image.width(), image.height());
+    let mut planes: Vec<Vec<f32>> = names.iter().map(|_| memory::reserved(film.pixels())).collect::<Result<_, _>>()?;
     let linear = |v: f32| if is_float { v } else { tone::linear_from_srgb(v) };
-    let colour: Vec<_> = rgba.pixels().map(|p| [p[0], p[1], p[2]].map(linear)).collect();
-    film.add_vec3("", ["R", "G", "B"], &colour);
-    if has_alpha {
-        film.add("A", Samples::F32(rgba.pixels().map(|p| p[3]).collect()));
+    for band in bands(image) {
+        for pixel in band.into_rgba32f().pixels() {
+            let [r, g, b, a] = pixel.0;
+            planes.iter_mut().zip([linear(r), linear(g), linear(b), a]).for_each(|(plane, v)| plane.push(v));
+        }
     }
-    film
+    names.iter().zip(planes).for_each(|(name, plane)| film.add(*name, Samples::F32(plane)));
+    Ok(film)
 }

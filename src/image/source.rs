@@ -1,9 +1,45 @@
 //! An image file that is changed in some channels and kept in all others.
 use super::film::Film;
-use super::{WriteOptions, exr, output};
+use super::frame::Frame;
+use super::{Claim, WriteOptions, exr, output};
 use crate::error::{Error, Result};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
+
+/// An image file in memory of which the header alone was looked at.
+pub struct Unread {
+    path: PathBuf,
+    bytes: Vec<u8>,
+    /// What decoding it takes: every pixel that is stored.
+    pub claim: Claim,
+}
+
+impl Unread {
+    /// Reads an EXR, PNG, JPEG or HDR file.
+    ///
+    /// # Errors
+    /// As [`super::read`].
+    pub fn open(path: &Path) -> Result<Self> {
+        let bytes = super::input::read_image(path)?;
+        let claim = super::claim_of(&bytes, Frame::Data).map_err(|what| Error::input(path, what))?;
+        Ok(Self { path: path.to_owned(), bytes, claim })
+    }
+
+    /// Decodes it.
+    ///
+    /// # Errors
+    /// As [`super::read`].
+    pub fn decode(self) -> Result<Source> {
+        let Self { path, mut bytes, .. } = self;
+        let film = super::decode_file(&path, &bytes, Frame::Data)?;
+        if !super::is_exr(&bytes) {
+            let mut encoded = Cursor::new(Vec::new());
+            exr::encode(&film, &mut encoded).map_err(|e| Error::input(&path, e))?;
+            bytes = encoded.into_inner();
+        }
+        Ok(Source { path, bytes, film })
+    }
+}
 
 /// An image file in memory.
 pub struct Source {
@@ -20,34 +56,27 @@ impl Source {
     /// # Errors
     /// As [`super::read`].
     pub fn read(path: &Path) -> Result<Self> {
-        let about = |what: String| Error::input(path, what);
-        let mut bytes = super::input::read(path)?;
-        let film = super::decode_frame(&bytes, exr::Frame::Data).map_err(about)?;
-        if !super::is_exr(&bytes) {
-            let mut encoded = Cursor::new(Vec::new());
-            exr::encode(&film, &mut encoded).map_err(|e| about(e.to_string()))?;
-            bytes = encoded.into_inner();
-        }
-        Ok(Self { path: path.to_owned(), bytes, film })
+        Unread::open(path)?.decode()
     }
 
     /// The part of it that is shown.
     ///
     /// # Errors
-    /// [`Error::Input`].
+    /// [`Error::Input`], [`Error::Device`] when there is not enough memory.
     pub fn shown(&self) -> Result<Film> {
-        super::decode(&self.bytes).map_err(|what| Error::input(&self.path, what))
+        super::decode_file(&self.path, &self.bytes, Frame::Display)
     }
 
     /// The file with other samples, one per pixel of `film`, in the channels of these names, and with an entry of metadata
-    /// that says so.
+    /// that says so. What was there stays in the layer `keep_as`, if one is named.
     ///
     /// # Errors
     /// [`Error::Input`] when it holds what cannot be written again.
-    pub fn replaced(&self, channels: &[(&str, &[f32])], entry: (&str, &str)) -> Result<Self> {
-        let about = |what| Error::input(&self.path, what);
-        let bytes = super::contained(|| exr::replace(&self.bytes, channels, entry)).map_err(about)?;
-        let film = super::decode_frame(&bytes, exr::Frame::Data).map_err(about)?;
+    pub fn replaced(&self, channels: &[(&str, &[f32])], keep_as: Option<&str>, entry: (&str, &str)) -> Result<Self> {
+        let with = exr::Replacement { channels, keep_as, entry };
+        let bytes = super::contained(|| exr::replace(&self.bytes, &with));
+        let bytes = bytes.map_err(|what| Error::input(&self.path, what))?;
+        let film = super::decode_file(&self.path, &bytes, Frame::Data)?;
         Ok(Self { path: self.path.clone(), bytes, film })
     }
 

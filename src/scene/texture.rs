@@ -3,11 +3,10 @@ use super::mesh::Bitmap;
 use super::mtl::find_file;
 use crate::error::{Error, Result};
 use crate::gpu::layout::{NONE, TEXTURE_CLAMP, TEXTURE_SRGB, Texture};
-use crate::image::{check_end, contained, input};
+use crate::image::{BAND, bands, check_end, contained, input, picture, picture_claim};
 use crate::memory;
 use rayon::prelude::*;
 use std::collections::HashMap;
-use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 /// What a picture holds, which decides how it is read and which channels are kept.
@@ -201,8 +200,8 @@ impl Source {
     fn read(path: &Path) -> Result<Self> {
         let bytes = input::read(path)?;
         check_end(&bytes).map_err(|what| Error::input(path, what))?;
-        let size = contained(|| reader(&bytes)?.into_dimensions().map_err(|e| e.to_string()));
-        let (width, height) = size.map_err(|what| damaged(path, what))?;
+        let claim = contained(|| picture_claim(&bytes)).map_err(|what| damaged(path, what))?;
+        let [width, height] = claim.size;
         check_size(width, height).map_err(|what| Error::input(path, what))?;
         Ok(Self::File(bytes, [width, height]))
     }
@@ -222,12 +221,15 @@ impl Source {
             }
             Self::File(bytes, size) => (bytes, size),
         };
-        let picture = reader(&bytes)?.decode().map_err(|e| e.to_string())?;
+        let picture = picture(&bytes)?;
         if [picture.width(), picture.height()] != size {
             return Err("its header says another size".to_owned());
         }
         let has_alpha = picture.color().has_alpha();
-        fill(space, picture.into_rgba8().pixels().map(|p| p.0), kind, has_alpha);
+        let rows = space.chunks_mut(BAND as usize * size[0] as usize);
+        for (space, band) in rows.zip(bands(&picture)) {
+            fill(space, band.into_rgba8().pixels().map(|p| p.0), kind, has_alpha);
+        }
         Ok(())
     }
 }
@@ -241,10 +243,6 @@ fn fill(space: &mut [u32], texels: impl Iterator<Item = [u8; 4]>, kind: Kind, ha
             Kind::Roughness => same(rgba[1]),
         };
     }
-}
-
-fn reader(bytes: &[u8]) -> std::result::Result<image::ImageReader<Cursor<&[u8]>>, String> {
-    image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())
 }
 
 /// The sRGB curve (IEC 61966-2-1), from a byte to linear light.
@@ -331,6 +329,20 @@ mod tests {
             assert!(error.to_string().contains("a.jpg: is a JPEG without its end"), "{error}");
         }
         assert!(decode(&whole, "a.jpg", Kind::Color).is_ok(), "control");
+    }
+
+    #[test]
+    fn large_pictures_are_decoded_where_memory_allows() {
+        use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+        use image::{ExtendedColorType, ImageEncoder};
+        // 517 MiB as it is decoded, which the decoder's own limit refuses.
+        const SIDE: u32 = 8230;
+        let mut bytes = Vec::new();
+        PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::NoFilter)
+            .write_image(&vec![0; 8 * SIDE as usize * SIDE as usize], SIDE, SIDE, ExtendedColorType::Rgba16)
+            .unwrap();
+        let found = decode(&bytes, "a.png", Kind::Color).unwrap();
+        assert!(found.texels.len() == SIDE as usize * SIDE as usize && found.texels.iter().all(|&t| t == 0));
     }
 
     #[test]

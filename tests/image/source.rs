@@ -34,7 +34,7 @@ fn rewritten(source: &Source, folder: &TempDir) -> (Film, PathBuf) {
         (0..3).map(|c| aovs.get(Aov::Colour).unwrap().iter().map(|v| v[c] + 0.25).collect()).collect();
     let channels: Vec<_> = aovs.colour.into_iter().zip(planes.iter().map(Vec::as_slice)).collect();
     let path = folder.path().join("clean.exr");
-    source.replaced(&channels, ("filtered", "none")).unwrap().write(&path, &WriteOptions::default()).unwrap();
+    source.replaced(&channels, None, ("filtered", "none")).unwrap().write(&path, &WriteOptions::default()).unwrap();
     (Source::read(&path).unwrap().film, path)
 }
 
@@ -56,6 +56,24 @@ fn only_the_colour_of_a_file_in_many_parts_changes() {
     let parts = read_all_flat_layers_from_file(path).unwrap().layer_data;
     assert_eq!(parts.len(), 2);
     assert!(matches!(parts[1].channel_data.list[0].sample_data, FlatSamples::F16(_)), "what is kept keeps its type");
+}
+
+#[test]
+fn what_was_there_stays_in_a_layer_of_the_same_part() {
+    let folder = tempfile::tempdir().unwrap();
+    let colour = part("View.Combined", (0, 0), (4, 3), triple(["R", "G", "B"], 12));
+    let mask = part("mask", (0, 0), (4, 3), vec![AnyChannel::new("A", FlatSamples::F32(vec![1.0; 12]))]);
+    let source = Source::read(&write(&folder, vec![colour, mask])).unwrap();
+    let aovs = Aovs::find(&source.film, &Names::new()).unwrap();
+    assert_eq!(aovs.keep_as(), Some("Noisy Image"));
+    let channels: Vec<_> = aovs.colour.into_iter().map(|name| (name, &[7.0; 12][..])).collect();
+    let clean = source.replaced(&channels, aovs.keep_as(), ("filtered", "none")).unwrap();
+    assert_eq!(values(&clean.film, "View.Combined.G"), [7.0; 12]);
+    let again = Aovs::find(&clean.film, &Names::new()).unwrap();
+    assert_eq!(again.get(Aov::Colour), aovs.get(Aov::Colour), "it is what is filtered next");
+    assert_eq!((again.colour, again.keep_as()), (aovs.colour, None));
+    let twice = clean.replaced(&channels, None, ("filtered", "atrous")).unwrap();
+    assert_eq!(twice.film.metadata["filtered"], "atrous");
 }
 
 #[test]

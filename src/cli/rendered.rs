@@ -1,0 +1,130 @@
+//! The samples in a file of `tallow render` or `merge`, checked against what its metadata claim: whoever adds samples to them
+//! trusts them from here on.
+use super::layers;
+use super::origin::Origin;
+use crate::image::{Film, Samples};
+use crate::schedule;
+use crate::settings::{Placing, Settings};
+use crate::statistics::{BrokenSamples, Pixel};
+use serde::Deserialize;
+
+/// What was rendered so far.
+pub struct Rendered {
+    /// Where the samples come from.
+    pub origin: Origin,
+    /// Of the render; of a merged file, those of its first part.
+    pub settings: Settings,
+    /// Row-major. Every value is finite, M2 is not negative, and no pixel has more samples than the ranges.
+    pub pixels: Vec<Pixel>,
+    /// Samples that were no number.
+    pub broken: Option<BrokenSamples>,
+    /// Whether direct and indirect light are kept apart.
+    pub splits_light: bool,
+    /// Samples that each pixel still lacks: of a file that was interrupted.
+    pub pending: Option<Vec<u32>>,
+}
+
+impl Rendered {
+    /// Reads a film and checks it.
+    ///
+    /// # Errors
+    /// What is missing, damaged, or not as the metadata say.
+    pub fn of(film: &Film) -> Result<Self, String> {
+        let origin = Origin::of(film)?;
+        let settings = Settings::deserialize(&origin.settings).map_err(|e| format!("settings: {e}"))?;
+        settings.validate().map_err(|e| format!("settings: {e}"))?;
+        check_size(film, &settings)?;
+        let pixels = layers::pixels(film)?;
+        check_pixels(&pixels, settings.width, origin.samples_per_pixel())?;
+        let pending = film.channel(layers::PENDING).map(|_| layers::counts(film, layers::PENDING)).transpose()?;
+        if let Some(pending) = &pending {
+            check_pending(pending, &pixels, &settings)?;
+        }
+        let (broken, splits_light) = (layers::broken_samples(film)?, layers::splits_light(film)?);
+        Ok(Self { origin, settings, pixels, broken, splits_light, pending })
+    }
+
+    /// Whether samples are spread evenly, and every pixel has all that the ranges tell of.
+    pub fn is_full(&self) -> bool {
+        let all = self.origin.samples_per_pixel();
+        self.settings.allocate.policy == "uniform" && self.pixels.iter().all(|p| p.stats.count == all)
+    }
+
+    /// The last priorities, where the policy keeps some.
+    ///
+    /// # Errors
+    /// When they are missing.
+    pub fn priority(&self, film: &Film) -> Result<Vec<f32>, String> {
+        match film.channel(layers::PRIORITY) {
+            _ if self.settings.allocate.policy == "uniform" => Ok(Vec::new()),
+            Some(Samples::F32(priority)) => Ok(priority.clone()),
+            _ => Err(format!("has no layer \"{}\": take the file as tallow wrote it", layers::PRIORITY)),
+        }
+    }
+}
+
+fn check_size(film: &Film, settings: &Settings) -> Result<(), String> {
+    let (width, height) = (settings.width, settings.height);
+    let is_cut = film.channels.iter().any(|c| c.window.is_some());
+    if (film.width, film.height) != (width, height) || is_cut {
+        let size = format!("{}x{}{}", film.width, film.height, if is_cut { ", in part" } else { "" });
+        return Err(format!("is {size}, but was rendered as {width}x{height}: take the file as tallow wrote it"));
+    }
+    Ok(())
+}
+
+fn check_pixels(pixels: &[Pixel], width: u32, most: u32) -> Result<(), String> {
+    for (i, pixel) in pixels.iter().enumerate() {
+        let at = || format!("pixel ({}, {})", i as u32 % width, i as u32 / width);
+        let count = pixel.stats.count;
+        if count > most {
+            return Err(format!("{} has {count} samples, but the file tells of {most} at most", at()));
+        }
+        if let Some((layer, value)) = broken(pixel) {
+            return Err(format!("{} has {value} in the layer {layer}: no samples can be added to that", at()));
+        }
+    }
+    Ok(())
+}
+
+/// A value that no samples have, and its layer.
+fn broken(pixel: &Pixel) -> Option<(&'static str, f32)> {
+    let Pixel { stats, light } = pixel;
+    let layers = [
+        ("R, G, B", stats.mean),
+        ("m2", stats.m2),
+        ("direct", light.direct),
+        ("indirect", light.indirect),
+        (layers::INDIRECT_M2, [light.indirect_m2; 3]),
+    ];
+    layers.into_iter().find_map(|(name, values)| {
+        let is_broken = |v: &f32| !v.is_finite() || (name.ends_with("m2") && *v < 0.0);
+        values.into_iter().find(is_broken).map(|value| (name, value))
+    })
+}
+
+/// What pixels lack is part of what the settings give them.
+fn check_pending(pending: &[u32], pixels: &[Pixel], settings: &Settings) -> Result<(), String> {
+    let with_pending = |(&lacks, pixel): (&u32, &Pixel)| u64::from(lacks) + u64::from(pixel.stats.count);
+    let most = u64::from(most_of_pixel(settings));
+    let sums = || pending.iter().zip(pixels).map(with_pending);
+    if let Some(too_many) = sums().find(|&sum| sum > most) {
+        return Err(format!("a pixel has or lacks {too_many} samples, but its settings allow {most}"));
+    }
+    let (all, budget) = (sums().sum::<u64>(), budget(settings));
+    match all > budget {
+        true => Err(format!("its pixels have or lack {all} samples, but its settings allow {budget}")),
+        false => Ok(()),
+    }
+}
+
+fn most_of_pixel(settings: &Settings) -> u32 {
+    let is_even = settings.allocate.policy == "uniform" || settings.allocate.placing() == Placing::Chosen;
+    if is_even { settings.spp } else { schedule::limit(settings) }
+}
+
+/// Samples of all pixels at most: those of a noise threshold are bound by the pixels' limit alone.
+fn budget(settings: &Settings) -> u64 {
+    let per_pixel = if settings.allocate.noise_threshold > 0.0 { most_of_pixel(settings) } else { settings.spp };
+    u64::from(per_pixel) * settings.pixels() as u64
+}
