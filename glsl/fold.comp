@@ -9,6 +9,7 @@
 #include "shared/wide.glsl"
 #include "shared/paired.glsl"
 #include "shared/luminance.glsl"
+#include "shared/pcg.glsl"
 
 // Adds a batch of samples to the statistics of their pixels. One thread folds one pixel, in order of sample index, so
 // the result does not depend on how samples were batched (Welford 1962).
@@ -53,7 +54,7 @@ vec3 unit(vec3 mean, int bits) {
 }
 
 // Moves a mean by a step. `remainder` holds what rounding has taken off, `bits` for each channel from bit `at` on; it is rounded
-// itself, up as often as down by the number of samples, since samples that repeat a value would all be rounded alike.
+// itself, up or down by chance, since samples that repeat a value would all be rounded alike.
 void move_mean(inout vec3 mean, vec3 by, inout uint remainder, int at, int bits, uint count) {
     ivec3 kept;
     [[unroll]] for (int c = 0; c < 3; c++) kept[c] = bitfieldExtract(int(remainder), at + c * bits, bits);
@@ -61,7 +62,7 @@ void move_mean(inout vec3 mean, vec3 by, inout uint remainder, int at, int bits,
     precise vec3 moved = mean + added;
     precise vec3 lost = added - (moved - mean);
     int end = 1 << (bits - 1);
-    precise vec3 rounded = floor(lost / unit(moved, bits) + float(bitfieldReverse(count) >> 8) * 5.9604644775390625e-8);
+    precise vec3 rounded = floor(lost / unit(moved, bits) + float(pcg(count) >> 8) * 5.9604644775390625e-8);
     // Half of the last place above is half of it below the next number: cut, it would be lost, always in one direction.
     precise vec3 next = moved + unit(moved, bits) * float(2 * end);
     bvec3 carries = greaterThanEqual(rounded, vec3(end));

