@@ -5,14 +5,12 @@ use crate::error::Result;
 use crate::gpu::{FrameResources, PassTime};
 use crate::renderer::{PathRange, Renderer, Step};
 use serde::Serialize;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::ops::ControlFlow;
 
 /// A render to run.
 pub struct Job<'a> {
     /// What runs it.
     pub renderer: &'a Renderer,
-    /// Set when the user wants it to stop.
-    pub stop: &'a AtomicBool,
     /// Whether to hide the progress bar.
     pub quiet: bool,
 }
@@ -41,7 +39,8 @@ impl Why {
                 "stopped: the error of every pixel is estimated below the threshold\n".into()
             }
             Self::Threshold { above } => format!("stopped: {above} pixels are above the threshold at their limit\n"),
-            Self::Interrupted => "interrupted: what there is was written; --resume continues it\n".into(),
+            // Told when it is known where what there is was written.
+            Self::Interrupted => String::new(),
         }
     }
 }
@@ -63,11 +62,17 @@ pub struct End {
 }
 
 impl Job<'_> {
-    /// Runs it, from where `earlier` stopped if there is one.
+    /// Runs it, from where `earlier` stopped if there is one. Before each step `between` is told how far it is, may read
+    /// the renderer's buffers, and says whether to go on.
     ///
     /// # Errors
-    /// As [`Renderer::run`].
-    pub fn run(&self, frame: &mut FrameResources, earlier: Option<&Earlier>) -> Result<End> {
+    /// As [`Renderer::run`], and those of `between`.
+    pub fn run(
+        &self,
+        frame: &mut FrameResources,
+        earlier: Option<&Earlier>,
+        between: &mut dyn FnMut(&End) -> Result<ControlFlow<()>>,
+    ) -> Result<End> {
         let r = self.renderer;
         earlier.map_or(Ok(()), |earlier| earlier.put_back(r, frame))?;
         let steps = || -> Box<dyn Iterator<Item = Step>> {
@@ -88,7 +93,7 @@ impl Job<'_> {
         let before = if earlier.is_some() { rays_of_a_few(r)? } else { [0; 2] };
         let (mut listed, mut to_do) = (u64::MAX, steps().peekable());
         while let Some(planned) = to_do.next() {
-            if self.stop.load(Ordering::SeqCst) {
+            if between(&end)?.is_break() {
                 end.why = Why::Interrupted;
                 break;
             }
