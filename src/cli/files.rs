@@ -71,30 +71,24 @@ impl Files {
     }
 
     /// Writes what goes to pipes and devices, and returns where it went. A pipe may have no reader, so that a signal ends the
-    /// process now.
-    pub fn pipe(&mut self, items: &[Item]) -> Vec<PathBuf> {
+    /// process now; so does one that came while the other files were written, unless it is why they are not `whole`.
+    pub fn pipe(&mut self, items: &[Item], whole: bool) -> Vec<PathBuf> {
         let pipes = items.iter().filter(|item| output::is_special(&item.path));
-        let written = pipes.filter_map(|item| self.pipe_one(item)).collect();
+        let written = pipes.filter_map(|item| self.pipe_one(item, whole)).collect();
         interrupt::leave_at_once("interrupted: all files are written");
         written
     }
 
-    /// All failures as one error.
-    ///
-    /// # Errors
-    /// [`Error::Output`].
-    pub fn finish(self) -> Result<()> {
-        let mut failures = self.failures.into_iter();
-        let Some((path, mut what)) = failures.next() else { return Ok(()) };
-        for (path, more) in failures {
-            what += &format!("; {}: {more}", path.display());
-        }
-        Err(Error::output(path, what))
+    /// All failures so far as one.
+    pub fn failure(&self) -> Option<Error> {
+        let ((path, first), more) = self.failures.split_first()?;
+        let more = more.iter().map(|(path, what)| format!("; {}: {what}", path.display())).collect::<String>();
+        Some(Error::output(path, format!("{first}{more}")))
     }
 
-    /// Whether nothing has failed so far.
-    pub fn are_well(&self) -> bool {
-        self.failures.is_empty()
+    /// This line, and what has failed.
+    pub fn with_failures(&self, line: &str) -> String {
+        self.failure().map_or(line.to_owned(), |e| format!("{line}; {e}"))
     }
 
     fn save_one(&mut self, item: &Item, whole: bool) -> Option<PathBuf> {
@@ -106,9 +100,12 @@ impl Files {
         saved.map_or_else(|e| self.put_elsewhere(item, &e), Some)
     }
 
-    fn pipe_one(&mut self, item: &Item) -> Option<PathBuf> {
-        let name = item.path.display();
-        interrupt::leave_at_once(&format!("interrupted: {name} was not read to its end; all files are written"));
+    fn pipe_one(&mut self, item: &Item, whole: bool) -> Option<PathBuf> {
+        let line = format!("interrupted: {} was not read to its end; all files are written", item.path.display());
+        let line = self.with_failures(&line);
+        if interrupt::leave_at_once(&line) && whole {
+            interrupt::leave(&line);
+        }
         match output::write_with(&item.path, |stream| (item.fill)(stream)) {
             Ok(()) => Some(item.path.clone()),
             Err(e) => self.put_elsewhere(item, &e),
@@ -208,7 +205,7 @@ mod tests {
         assert_eq!([&old, &inside("old.partial.exr")].map(|path| read(path)), ["old"; 2]);
         save(&mut files, "whole", true);
         assert_eq!(read(&old), "whole");
-        files.finish().unwrap();
+        assert!(files.failure().is_none());
     }
 
     #[test]

@@ -127,7 +127,7 @@ pub fn run(args: &Args) -> Result<Exit> {
         after: distance(&clean)?,
     };
     report(args, &summary)?;
-    files.finish()?;
+    files.failure().map_or(Ok(()), Err)?;
     Ok(Exit::Done)
 }
 
@@ -149,7 +149,7 @@ fn write<'a>(args: &'a Args, clean: &'a Source) -> (Vec<String>, Files) {
     let items: Vec<_> = args.outputs.iter().map(item).collect();
     let mut files = Files::default();
     let mut written = files.save(&items, true);
-    written.extend(files.pipe(&items));
+    written.extend(files.pipe(&items, true));
     (written.iter().map(|path| path.display().to_string()).collect(), files)
 }
 

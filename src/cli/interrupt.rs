@@ -57,6 +57,17 @@ pub fn leave_at_once(line: &str) -> bool {
     ASKED.load(Ordering::SeqCst)
 }
 
+/// Ends the process as a signal does.
+pub fn leave(line: &str) -> ! {
+    let mut stderr = std::io::stderr();
+    if stderr.is_terminal() {
+        // A progress bar may stand there.
+        let _ = stderr.write_all(b"\r\x1b[K");
+    }
+    complain(line);
+    exit(Exit::Interrupted as i32)
+}
+
 /// Ends the process from any thread. Nothing is unwound: a driver may be in the middle of anything.
 pub fn exit(code: i32) -> ! {
     output::remove_unfinished();
@@ -75,13 +86,7 @@ pub fn install() {
         let mut listener = listener();
         let first_ask = !ASKED.swap(true, Ordering::SeqCst);
         if listener.hear(ctrl_c, first_ask, Instant::now()) {
-            let mut stderr = std::io::stderr();
-            if stderr.is_terminal() {
-                // A progress bar may stand there.
-                let _ = stderr.write_all(b"\r\x1b[K");
-            }
-            complain(&listener.line);
-            exit(Exit::Interrupted as i32);
+            leave(&listener.line);
         }
     });
 }

@@ -139,9 +139,9 @@ pub fn run(args: &Args) -> Result<Exit> {
     let mut written = host.time("write", || Ok(save(args, &film, &mut files, checkpoint, !interrupted)))?;
     // By now what took hours is safe, whatever becomes of the filter.
     if let Some(row) = args.denoise.filter(|_| !interrupted) {
-        if interrupt::leave_at_once(INTERRUPTED_FILTER) {
-            complain(INTERRUPTED_FILTER);
-            return files.finish().map(|()| Exit::Interrupted);
+        let line = files.with_failures("interrupted: the noisy image was written, --denoise was not finished");
+        if interrupt::leave_at_once(&line) {
+            interrupt::leave(&line);
         }
         end.times.extend(host.time("denoise", || denoise(&gpu, row, &mut film))?);
         host.time("write", || Ok(save(args, &film, &mut files, None, true)))?;
@@ -150,19 +150,17 @@ pub fn run(args: &Args) -> Result<Exit> {
     let trace = args.profile.iter().map(|path| Item::bytes(path.clone(), profile(&gpu, &host, &end).into_bytes()));
     let trace: Vec<_> = trace.collect();
     files.save(&trace, !interrupted);
-    written.extend(files.pipe(&items(args, &film)));
-    files.pipe(&trace);
+    written.extend(files.pipe(&items(args, &film), !interrupted));
+    files.pipe(&trace, !interrupted);
     let outcome = Outcome { gpu: &gpu, scene: &scene, film: &film, host: &host, end: &end };
     report(args, &outcome.summary(&written, counters))?;
-    files.finish()?;
+    files.failure().map_or(Ok(()), Err)?;
     if interrupted {
         complain(&interruption(&written));
         return Ok(Exit::Interrupted);
     }
     Ok(Exit::Done)
 }
-
-const INTERRUPTED_FILTER: &str = "interrupted: the noisy image was written, --denoise was not finished";
 
 /// Takes the samples, and writes checkpoints on the way.
 fn trace(shot: &Shot, earlier: Option<&Earlier>, files: &mut Files) -> Result<(End, Option<Checkpoint>)> {
@@ -198,7 +196,7 @@ fn save(args: &Args, film: &Film, files: &mut Files, checkpoint: Option<Checkpoi
     if !whole && !written.iter().any(|path| image::has_layers(path)) {
         written.extend(checkpoint.write(files, film));
     }
-    if files.are_well() {
+    if files.failure().is_none() {
         checkpoint.remove(&written);
     }
     written
