@@ -41,7 +41,7 @@ fn mkfifo(folder: &TempDir, name: &str) {
 #[test]
 fn what_the_caller_has_switched_off_stays_off() {
     let folder = tempfile::tempdir().unwrap();
-    let words = format!("render {} {SMALL} {OFTEN} --spp 3000 -o a.exr", scene());
+    let words = format!("render {} {SMALL} {OFTEN} --spp 400 -o a.exr", scene());
     let mut nohup = Command::new("sh");
     let script = format!("trap '' HUP INT; exec \"$0\" {words}");
     nohup.args(["-c", &script, env!("CARGO_BIN_EXE_tallow")]).current_dir(folder.path());

@@ -52,7 +52,6 @@ pub fn write_new(path: &Path, fill: impl FnOnce(&mut dyn Stream) -> std::io::Res
 /// As [`write()`].
 pub fn check(path: &Path) -> Result<()> {
     let result = match () {
-        () if path.is_dir() => Err(remedy(path, &ErrorKind::IsADirectory.into())),
         // Opening a pipe and closing it again would be the end of its reader.
         () if is_special(path) => Ok(()),
         () => check_file(path),
@@ -130,6 +129,9 @@ fn filled(
 /// What is said of the file that would be replaced; nothing when there is none.
 fn replaceable(target: &Path) -> std::result::Result<Option<Metadata>, String> {
     let Ok(old) = std::fs::symlink_metadata(target) else { return Ok(None) };
+    if old.is_dir() {
+        return Err(remedy(target, &ErrorKind::IsADirectory.into()));
+    }
     // Root may write to any file: what counts is what its owner said.
     let opened = std::fs::OpenOptions::new().write(true).open(target);
     if old.permissions().readonly() || opened.is_err_and(|e| e.kind() == ErrorKind::PermissionDenied) {
