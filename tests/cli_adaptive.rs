@@ -89,14 +89,19 @@ fn resuming_with_more_samples_is_one_render() {
 fn interrupted(words: &str, spp: u32) {
     let folder = tempfile::tempdir().unwrap();
     let words = format!("--width 192 --height 160 --max-depth 4 --spp {spp} --quiet {words}");
-    let mut child = command(&folder, &format!("render {} {words} -o part.exr", scene()))
+    let mut child = command(&folder, &format!("render {} {words} --checkpoint 0.001 -o part.exr", scene()))
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    // Long enough to be past compilation on any machine that renders this in more than that; short ones are seen below.
-    std::thread::sleep(Duration::from_millis(1000));
-    assert!(child.try_wait().unwrap().is_none(), "the render was over before it could be interrupted: raise its spp");
+    // Past compilation.
+    while !folder.path().join("part.partial.exr").exists() {
+        assert!(
+            child.try_wait().unwrap().is_none(),
+            "the render was over before it could be interrupted: raise its spp"
+        );
+        std::thread::sleep(Duration::from_millis(10));
+    }
     // Of the shell: a bare system has no program of that name.
     assert!(Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status().unwrap().success());
     let begun = Instant::now();

@@ -52,7 +52,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
 
 /// Words that only one module may hold: those of Vulkan, and of what an engine does without (the feature `cli`).
 const ROOMS: &[(&str, &[&str])] =
-    &[("gpu", &["unsafe", "vk::", "ash::"]), ("cli", &["clap::", "ctrlc::", "indicatif::"])];
+    &[("gpu", &["unsafe", "vk::", "ash::"]), ("cli", &["clap::", "signal_hook::", "indicatif::"])];
 
 fn sources(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());

@@ -27,7 +27,7 @@ pub struct Common {
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
     /// Exposure of PNG files in stops
-    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = finite, allow_negative_numbers = true)]
+    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = finite)]
     pub exposure: f64,
     /// Tone curve of PNG files
     #[arg(long, value_enum, default_value_t)]

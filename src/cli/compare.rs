@@ -1,5 +1,6 @@
 //! `tallow compare`: how far an image is from its reference.
-use super::{Exit, check_png, complain, finite, print, print_json};
+use super::files::check_distinct;
+use super::{Exit, check_png, complain, finite, print, print_json, readable};
 use crate::error::{Error, Result};
 use crate::image::difference::{WIDER, heat_map};
 use crate::image::metrics::{self, Metrics};
@@ -62,6 +63,7 @@ const BYTES_PER_PIXEL: u64 = 80;
 pub fn run(args: &Args) -> Result<Exit> {
     if let Some(diff) = &args.diff {
         check_png("--diff", diff)?;
+        check_distinct(&[("--diff", diff)], &[("A", &args.a), ("B", &args.b)])?;
     }
     let (a, b) = (load(&args.a, args.layer.as_deref())?, load(&args.b, args.layer.as_deref())?);
     check_sizes((&args.a, &a), (&args.b, &b))?;
@@ -161,7 +163,7 @@ fn report(args: &Args, m: &Metrics, scale: Option<f32>, exceeded: &[String]) -> 
     match args.diff.as_ref().zip(scale) {
         Some((path, top)) => print(&format!(
             "{}: |A - B|, mean of the channels; black is 0, the palest colour {top:.6} and above\n",
-            path.display()
+            readable(&path.display().to_string())
         )),
         None => Ok(()),
     }

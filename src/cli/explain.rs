@@ -1,5 +1,5 @@
 //! `tallow explain`: what a scene calls for, and what that costs.
-use super::{Exit, print, print_json};
+use super::{Exit, print, print_json, readable};
 use crate::error::{Error, Result};
 use crate::gpu::layout::*;
 use crate::gpu::{DeviceOptions, FrameResources, Gpu, PassTime};
@@ -10,7 +10,7 @@ use crate::settings::{Allocate, Settings};
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// List every effect: on or off, what calls for it, and what it costs
@@ -72,13 +72,27 @@ const GUIDES: &str = "guides";
 const COLD: [(&str, &str); 3] =
     [("MESA_SHADER_CACHE_DISABLE", "true"), ("__GL_SHADER_DISK_CACHE", "0"), ("XDG_CACHE_HOME", "/dev/null")];
 
-/// The same command once more, whose messages and exit code are this one's.
+/// The same command once more, in the place of this one: signals reach it, and its end is the end that the caller sees.
+#[cfg(unix)]
 fn run_cold() -> Result<Exit> {
-    let mut again =
-        std::env::current_exe().map(Command::new).map_err(|e| Error::Device(format!("this program: {e}")))?;
-    let ended = again.args(std::env::args_os().skip(1)).envs(COLD).status();
-    let ended = ended.map_err(|e| Error::Device(format!("this program: {e}")))?;
-    std::process::exit(ended.code().unwrap_or(Exit::Interrupted as i32)) // none: ended by a signal
+    use std::os::unix::process::CommandExt;
+    let again = std::env::current_exe().map(|program| again(&program).exec());
+    Err(Error::Device(format!("this program cannot be started once more: {}", again.unwrap_or_else(|e| e))))
+}
+
+/// The same command once more, whose messages and exit code are this one's.
+#[cfg(not(unix))]
+fn run_cold() -> Result<Exit> {
+    let ended = std::env::current_exe().and_then(|program| again(&program).status());
+    let ended = ended.map_err(|e| Error::Device(format!("this program cannot be started once more: {e}")))?;
+    let killed = || Error::Device(format!("this program, started once more, was ended: {ended}"));
+    std::process::exit(ended.code().ok_or_else(killed)?)
+}
+
+fn again(program: &Path) -> Command {
+    let mut again = Command::new(program);
+    again.args(std::env::args_os().skip(1)).envs(COLD);
+    again
 }
 
 /// What was measured so far.
@@ -233,7 +247,7 @@ pub fn text(rows: &[Row]) -> String {
             ms(r.gpu_ms_without),
             ms(r.compile_ms),
             r.bytes.to_string(),
-            r.called_for_by.clone(),
+            readable(&r.called_for_by),
         ]
     };
     let header = ["effect", "", "GPU ms with", "GPU ms without", "compile ms", "bytes", "called for by"];

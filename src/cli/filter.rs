@@ -4,7 +4,8 @@ mod supersampling;
 
 use super::common::Common;
 use super::compare::{self, check_sizes};
-use super::{Exit, fail_on_messages, layers, print, print_json};
+use super::files::{Files, Item, check_distinct};
+use super::{Exit, fail_on_messages, layers, print, print_json, readable};
 use crate::composition::{self, Demodulation, Parts};
 use crate::error::{Error, Result};
 use crate::filter::{self, FILTERS, FilterInput, FilterSettings, Row};
@@ -100,7 +101,7 @@ pub struct Summary {
 /// # Errors
 /// Of every kind; nothing is written then.
 pub fn run(args: &Args) -> Result<Exit> {
-    args.outputs.iter().try_for_each(|path| image::check_writable(path))?;
+    check_outputs(args)?;
     let file = Unread::open(&args.image)?;
     let gpu = args.common.open()?;
     check_room(args, &gpu, &file.claim)?;
@@ -114,11 +115,10 @@ pub fn run(args: &Args) -> Result<Exit> {
     let seconds = start.elapsed().as_secs_f64();
     let clean = replaced(args, &source, &aovs, &colour)?;
     fail_on_messages(&gpu)?;
-    let options = args.common.write_options();
-    args.outputs.iter().try_for_each(|path| clean.write(path, &options))?;
+    let (written, files) = write(args, &clean);
     let distance = |image: &Source| reference.as_ref().map_or(Ok(None), |r| distance(args, image, r));
     let summary = Summary {
-        files: args.outputs.iter().map(|f| f.display().to_string()).collect(),
+        files: written,
         filter: args.filter.name,
         width: source.film.width,
         height: source.film.height,
@@ -130,6 +130,7 @@ pub fn run(args: &Args) -> Result<Exit> {
         after: distance(&clean)?,
     };
     report(args, &summary)?;
+    files.failure().map_or(Ok(()), Err)?;
     Ok(Exit::Done)
 }
 
@@ -145,7 +146,29 @@ fn check_room(args: &Args, gpu: &Gpu, claim: &Claim) -> Result<()> {
     let bytes = claim.bytes.saturating_add(claim.pixels() * bytes_per_pixel(args.filter));
     let refused =
         |what| format!("{}: filtering its {} x {} pixels {what}", args.image.display(), claim.size[0], claim.size[1]);
-    memory::check(bytes).map_err(|what| Error::Device(refused(what)))
+    memory::check(bytes).map_err(|what| Error::Memory(refused(what)))
+}
+
+/// The image may be filtered in place.
+fn check_outputs(args: &Args) -> Result<()> {
+    args.outputs.iter().try_for_each(|path| image::check_writable(path))?;
+    let outputs: Vec<_> = args.outputs.iter().map(|path| ("-o", path.as_path())).collect();
+    let reference = args.reference.iter().map(|path| ("--reference", path.as_path()));
+    let scene = args.supersampling.scene.iter().map(|path| ("--scene", path.as_path()));
+    check_distinct(&outputs, &reference.chain(scene).collect::<Vec<_>>())
+}
+
+fn write<'a>(args: &'a Args, clean: &'a Source) -> (Vec<String>, Files) {
+    let options = args.common.write_options();
+    let item = |path: &'a PathBuf| Item {
+        path: path.clone(),
+        fill: Box::new(move |stream| clean.encode(path, &options, stream)),
+    };
+    let items: Vec<_> = args.outputs.iter().map(item).collect();
+    let mut files = Files::default();
+    let mut written = files.save(&items, true);
+    written.extend(files.pipe(&items, true));
+    (written.iter().map(|path| path.display().to_string()).collect(), files)
 }
 
 fn demodulation(args: &Args) -> Demodulation {
@@ -226,7 +249,7 @@ fn report(args: &Args, summary: &Summary) -> Result<()> {
 }
 
 fn text(args: &Args, s: &Summary) -> String {
-    let mut text = s.notes.iter().map(|note| format!("{note}\n")).collect::<String>();
+    let mut text = s.notes.iter().map(|note| readable(note) + "\n").collect::<String>();
     text += &format!("{} x {}, {} in {:.3} s on {}\n", s.width, s.height, s.filter, s.seconds, s.device);
     text += &table::timing_table(&s.passes);
     if args.reference.is_some() {

@@ -1,24 +1,169 @@
-//! Ctrl-C: the first one asks, the second one kills.
-use std::sync::Once;
+//! Signals that ask a command to stop: Ctrl-C (INT), TERM and HUP.
+use super::{Exit, complain};
+use crate::image::output;
+use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
-static FLAG: AtomicBool = AtomicBool::new(false);
+static ASKED: AtomicBool = AtomicBool::new(false);
+static LISTENER: Mutex<Listener> = Mutex::new(Listener { first_ctrl_c: None, leave: true, line: String::new() });
 
-/// Set once the user has asked to stop, by Ctrl-C or a termination signal. Whoever works in steps looks at it between
-/// two of them, and returns [`super::Exit::Interrupted`] with what there is.
-///
-/// The first call installs the handler. A second signal ends the process at once; files are safe even then, as they are
-/// renamed only when complete.
-pub fn flag() -> &'static AtomicBool {
-    static INSTALLED: Once = Once::new();
-    INSTALLED.call_once(|| {
-        let handler = || {
-            if FLAG.swap(true, Ordering::SeqCst) {
-                std::process::exit(super::Exit::Interrupted as i32);
+/// Keys that repeat and impatient fingers send more than one Ctrl-C; the one that kills comes so much later than the first.
+const MEANT: Duration = Duration::from_secs(1);
+
+struct Listener {
+    first_ctrl_c: Option<Instant>,
+    /// Whether a signal ends the process, because there is nothing to save.
+    leave: bool,
+    /// What is said then.
+    line: String,
+}
+
+impl Listener {
+    /// Whether the process is to end at once. TERM and HUP only ask, however often they come.
+    fn hear(&mut self, ctrl_c: bool, first_ask: bool, now: Instant) -> bool {
+        let again = match (ctrl_c, self.first_ctrl_c) {
+            (true, Some(first)) => now.duration_since(first) >= MEANT,
+            (true, None) => {
+                self.first_ctrl_c = Some(now);
+                self.leave
             }
+            (false, _) => false,
         };
-        // Without a handler Ctrl-C still ends the process, so a failure here is not worth a failed render.
-        let _ = ctrlc::set_handler(handler);
+        again || (first_ask && self.leave)
+    }
+}
+
+fn listener() -> MutexGuard<'static, Listener> {
+    LISTENER.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// From now on a signal sets this flag: whoever works in steps looks at it between two of them, and returns
+/// [`Exit::Interrupted`] with what there is. A second Ctrl-C that comes a second after the first still ends the process;
+/// files are safe even then, as they get their names only when complete.
+pub fn flag() -> &'static AtomicBool {
+    let mut listener = listener();
+    listener.leave = false;
+    listener.line = "interrupted again: what was not written yet is lost".to_owned();
+    &ASKED
+}
+
+/// From now on a signal ends the process with this line. Returns whether one came before, and was not acted on.
+pub fn leave_at_once(line: &str) -> bool {
+    let mut listener = listener();
+    listener.leave = true;
+    listener.line = line.to_owned();
+    ASKED.load(Ordering::SeqCst)
+}
+
+/// Ends the process as a signal does.
+pub fn leave(line: &str) -> ! {
+    let mut stderr = std::io::stderr();
+    if stderr.is_terminal() {
+        // A progress bar may stand there.
+        let _ = stderr.write_all(b"\r\x1b[K");
+    }
+    complain(line);
+    exit(Exit::Interrupted as i32)
+}
+
+/// Ends the process from any thread. Nothing is unwound: a driver may be in the middle of anything.
+pub fn exit(code: i32) -> ! {
+    output::remove_unfinished();
+    #[cfg(unix)]
+    signal_hook::low_level::exit(code);
+    #[cfg(not(unix))]
+    std::process::exit(code)
+}
+
+/// Begins to listen; for the command line's start. What the caller has switched off (`nohup`, `&` in a script) stays off.
+/// Where no thread can be started, signals end the process as they end any other.
+pub fn install() {
+    leave_at_once("interrupted: nothing was written");
+    #[cfg(unix)]
+    signals::listen(|ctrl_c| {
+        let mut listener = listener();
+        let first_ask = !ASKED.swap(true, Ordering::SeqCst);
+        if listener.hear(ctrl_c, first_ask, Instant::now()) {
+            leave(&listener.line);
+        }
     });
-    &FLAG
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What each of some signals, given by seconds and whether it is Ctrl-C, does: whether it ends the process.
+    fn ends(leave: bool, signals: &[(f64, bool)]) -> Vec<bool> {
+        let mut listener = Listener { first_ctrl_c: None, leave, line: String::new() };
+        let begin = Instant::now();
+        let at = |seconds| begin + Duration::from_secs_f64(seconds);
+        signals.iter().enumerate().map(|(i, &(s, ctrl_c))| listener.hear(ctrl_c, i == 0, at(s))).collect()
+    }
+
+    #[test]
+    fn only_a_second_ctrl_c_a_second_later_kills() {
+        let (ctrl_c, other) = (true, false);
+        assert_eq!(
+            ends(false, &[(0.0, ctrl_c), (0.5, ctrl_c), (0.9, ctrl_c), (1.0, ctrl_c)]),
+            [false, false, false, true]
+        );
+        assert_eq!(ends(false, &[(0.0, other), (2.0, other), (4.0, other)]), [false; 3]);
+        assert_eq!(
+            ends(false, &[(0.0, other), (5.0, ctrl_c), (5.5, ctrl_c), (6.0, ctrl_c)]),
+            [false, false, false, true]
+        );
+        assert_eq!(ends(false, &[(0.0, ctrl_c), (5.0, other)]), [false; 2]);
+    }
+
+    #[test]
+    fn what_nobody_would_miss_is_left_at_once() {
+        assert_eq!(ends(true, &[(0.0, true)]), [true]);
+        assert_eq!(ends(true, &[(0.0, false)]), [true]);
+        // Asked before, while there was something to save: TERM again changes nothing, the first Ctrl-C does.
+        let mut listener = Listener { first_ctrl_c: None, leave: true, line: String::new() };
+        assert!(!listener.hear(false, false, Instant::now()));
+        assert!(listener.hear(true, false, Instant::now()));
+    }
+}
+
+#[cfg(unix)]
+mod signals {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
+    use signal_hook::iterator::Signals;
+    use std::sync::mpsc;
+
+    /// Calls `heard` on a thread of its own, with whether it was Ctrl-C.
+    pub fn listen(heard: fn(bool)) {
+        let ignored = std::fs::read_to_string("/proc/self/status").map_or(0, |status| ignored(&status));
+        let wanted = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| ignored & (1 << (signal - 1)) == 0);
+        // It comes with an error of the write, which says more than the end of the process that it is by default.
+        let signals: Vec<_> = wanted.chain([SIGXFSZ]).collect();
+        let (ready, wait) = mpsc::channel();
+        let listener = move || {
+            let Ok(mut heard_of) = Signals::new(signals) else { return };
+            let _ = ready.send(());
+            heard_of.forever().filter(|&signal| signal != SIGXFSZ).for_each(|signal| heard(signal == SIGINT));
+        };
+        if std::thread::Builder::new().name("signals".into()).spawn(listener).is_ok() {
+            let _ = wait.recv();
+        }
+    }
+
+    /// A bit for each signal that this process ignores, by what Linux says of it; other systems do not say.
+    fn ignored(status: &str) -> u64 {
+        let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+        mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
+    }
+
+    #[cfg(test)]
+    mod tests {
+        #[test]
+        fn ignored_signals_are_bits() {
+            assert_eq!(super::ignored("Name:\tx\nSigBlk:\tff\nSigIgn:\t0000000000001001\n"), 0x1001);
+            assert_eq!(super::ignored(""), 0);
+        }
+    }
 }

@@ -6,14 +6,12 @@ use crate::gpu::{FrameResources, PassTime};
 use crate::renderer::{PathRange, Renderer, Step};
 use crate::statistics::BrokenSamples;
 use serde::Serialize;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::ops::ControlFlow;
 
 /// A render to run.
 pub struct Job<'a> {
     /// What runs it.
     pub renderer: &'a Renderer,
-    /// Set when the user wants it to stop.
-    pub stop: &'a AtomicBool,
     /// Whether to hide the progress bar.
     pub quiet: bool,
 }
@@ -42,7 +40,8 @@ impl Why {
                 "stopped: the error of every pixel is estimated below the threshold\n".into()
             }
             Self::Threshold { above } => format!("stopped: {above} pixels are above the threshold at their limit\n"),
-            Self::Interrupted => "interrupted: what there is was written; --resume continues it\n".into(),
+            // Told when it is known where what there is was written.
+            Self::Interrupted => String::new(),
         }
     }
 }
@@ -66,11 +65,17 @@ pub struct End {
 }
 
 impl Job<'_> {
-    /// Runs it, from where `earlier` stopped if there is one.
+    /// Runs it, from where `earlier` stopped if there is one. Before each step `between` is told how far it is, may read
+    /// the renderer's buffers, and says whether to go on.
     ///
     /// # Errors
-    /// As [`Renderer::run`].
-    pub fn run(&self, frame: &mut FrameResources, earlier: Option<&Earlier>) -> Result<End> {
+    /// As [`Renderer::run`], and those of `between`.
+    pub fn run(
+        &self,
+        frame: &mut FrameResources,
+        earlier: Option<&Earlier>,
+        between: &mut dyn FnMut(&End) -> Result<ControlFlow<()>>,
+    ) -> Result<End> {
         let r = self.renderer;
         earlier.map_or(Ok(()), |earlier| earlier.put_back(r, frame))?;
         let steps = || -> Box<dyn Iterator<Item = Step>> {
@@ -96,7 +101,7 @@ impl Job<'_> {
         let mut progress = Progress::new(steps().map(|step| step.paths()).sum(), self.quiet);
         let (mut listed, mut to_do) = (u64::MAX, steps().peekable());
         while let Some(planned) = to_do.next() {
-            if self.stop.load(Ordering::SeqCst) {
+            if between(&end)?.is_break() {
                 end.why = Why::Interrupted;
                 break;
             }

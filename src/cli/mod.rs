@@ -1,8 +1,11 @@
 //! The command line: one file per subcommand.
+pub mod checkpoint;
 pub mod common;
 pub mod compare;
+mod crash;
 pub mod devices;
 pub mod explain;
+pub mod files;
 pub mod filter;
 pub mod interrupt;
 pub mod job;
@@ -18,7 +21,8 @@ pub mod resume;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use clap::error::ErrorKind;
-use clap::{Parser, Subcommand};
+use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
+use std::ffi::OsString;
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
@@ -31,6 +35,7 @@ Exit codes:
   3    input: a file cannot be read or is damaged
   4    device: no Vulkan, no usable device, or it was lost
   5    output: a file cannot be written
+  70   internal error: a bug, please report it
   130  interrupted (Ctrl-C)";
 
 /// A path tracer for Vulkan.
@@ -64,13 +69,9 @@ pub enum Exit {
 
 /// Runs the command line and returns its exit code. What fails is told in one line on stderr.
 pub fn main() -> ExitCode {
-    let tell = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |panic| {
-        if !crate::image::is_decoding() {
-            tell(panic);
-        }
-    }));
-    let result = match Cli::try_parse() {
+    crash::report_panics();
+    interrupt::install();
+    let result = match parse(std::env::args_os()) {
         Ok(cli) => run(cli.command),
         Err(e) => usage(&e),
     };
@@ -81,6 +82,16 @@ pub fn main() -> ExitCode {
             ExitCode::from(e.exit_code())
         }
     }
+}
+
+/// A number that is negative is a value and not an option, whether the option that it is given to takes it or not.
+fn parse(words: impl IntoIterator<Item = OsString>) -> std::result::Result<Cli, clap::Error> {
+    let numbers = |arg: Arg| match arg.get_long().is_some() && arg.get_action().takes_values() {
+        true => arg.allow_negative_numbers(true),
+        false => arg,
+    };
+    let command = Cli::command().mut_subcommands(|command| command.mut_args(numbers));
+    Cli::from_arg_matches(&command.try_get_matches_from(words)?)
 }
 
 fn run(command: Command) -> Result<Exit> {
@@ -111,21 +122,28 @@ fn usage(e: &clap::Error) -> Result<Exit> {
     Err(Error::Usage(format!("{} (see tallow --help)", message.trim_start_matches("error: "))))
 }
 
-/// Writes one line to stderr, whatever line breaks a message brought along. A closed stderr is no reason to fail.
-fn complain(message: &str) {
-    let _ = writeln!(std::io::stderr(), "{}", message.replace(['\n', '\r'], " "));
+/// Control characters become visible: names out of files may hold what a terminal obeys, or a line break.
+pub fn readable(text: &str) -> String {
+    // These turn the direction of what follows them.
+    let turns = |c| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let shown = |c: char| match c.is_control() || turns(c) {
+        true => c.escape_default().to_string(),
+        false => c.to_string(),
+    };
+    text.chars().map(shown).collect()
 }
 
-/// Writes results to stdout. A reader that has seen enough (`| head`) is no error; a full disk behind it is one.
+/// Writes one line to stderr. A closed stderr is no reason to fail.
+pub fn complain(message: &str) {
+    let _ = writeln!(std::io::stderr(), "{}", readable(message));
+}
+
+/// Writes lines to stdout. A reader that has seen enough (`| head`) is no error; a full disk behind it is one.
 ///
 /// # Errors
 /// [`Error::Output`].
 pub fn print(text: &str) -> Result<()> {
-    let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::output("standard output", format!("{e}"))),
-        _ => Ok(()),
-    }
+    write_out(&text.split('\n').map(readable).collect::<Vec<_>>().join("\n"))
 }
 
 /// Prints a value as one line of JSON; numbers that JSON does not know (infinities) become null.
@@ -134,7 +152,17 @@ pub fn print(text: &str) -> Result<()> {
 /// As [`print()`].
 pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
     let text = serde_json::to_string(value).map_err(|e| Error::output("standard output", e))?;
-    print(&(text + "\n"))
+    // What JSON allows as it is, terminals may obey.
+    let shown = |c: char| if c.is_control() { format!("\\u{:04x}", u32::from(c)) } else { c.to_string() };
+    write_out(&(text.chars().map(shown).collect::<String>() + "\n"))
+}
+
+fn write_out(text: &str) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::output("standard output", format!("{e}"))),
+        _ => Ok(()),
+    }
 }
 
 /// With `--validation`, any message is a failure.
@@ -158,5 +186,16 @@ fn finite(text: &str) -> std::result::Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
         _ => Err("expected a finite number".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::readable;
+
+    #[test]
+    fn nothing_that_a_terminal_obeys_is_printed() {
+        assert_eq!(readable("a\u{1b}]0;x\u{7}b\nc\u{9b}d\u{202e}e"), "a\\u{1b}]0;x\\u{7}b\\nc\\u{9b}d\\u{202e}e");
+        assert_eq!(readable("wände \"für\" C:\\x '家'"), "wände \"für\" C:\\x '家'");
     }
 }

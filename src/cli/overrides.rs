@@ -69,7 +69,7 @@ pub struct AllocateOverrides {
     #[arg(long, value_name = "X")]
     pub sigma_position: Option<f32>,
     /// Luminance added before noise is compared with it; negative: noise counts by itself
-    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    #[arg(long, value_name = "X")]
     pub luminance_floor: Option<f32>,
     /// Stop when every pixel's relative error is estimated below this, or at --max-spp (else --spp); 0 is off
     #[arg(long, value_name = "E")]
@@ -148,7 +148,7 @@ mod tests {
         assert_eq!(settings, Settings { spp: 7, ..Settings::default() });
         let words = "--width 1 --height 2 --budget-spp 3 --first-sample 10 --max-depth 4 --roulette-depth 5 \
             --clamp-indirect 6 --seed 8 --filter tent --sampler independent --allocate both --min-spp 11 --max-spp 12 \
-            --rounds 13 --window 9 --sigma-normal 0.1 --sigma-position 0.2 --luminance-floor -1 \
+            --rounds 13 --window 9 --sigma-normal 0.1 --sigma-position 0.2 --luminance-floor=-1 \
             --noise-threshold 0.3 --filtered 0.4";
         apply(words, &mut settings);
         let allocate = Allocate {

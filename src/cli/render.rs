@@ -1,28 +1,35 @@
 //! `tallow render`: a scene becomes image files.
+mod shot;
+mod summary;
+
+use super::checkpoint::{self, Checkpoint};
 use super::common::Common;
+use super::files::{Files, Item, check_distinct};
 use super::filter::{filter_names, filter_parts};
 use super::job::{End, Job, Why};
 use super::overrides::Overrides;
-use super::resume::{self, Earlier};
-use super::{Exit, fail_on_messages, interrupt, layers, origin, print, print_json};
+use super::resume::Earlier;
+use super::{Exit, complain, fail_on_messages, interrupt, layers};
 use crate::composition::{self, Demodulation};
 use crate::error::{Error, Result};
 use crate::filter::{self, FilterSettings, Row};
 use crate::gpu::{self, FrameResources, Gpu, PassTime};
 use crate::image::aov::{Aovs, Names};
 use crate::image::difference::false_colours;
-use crate::image::{self, Film, Samples, WriteOptions, output};
+use crate::image::output::{self, Stream};
+use crate::image::{self, Film, WriteOptions};
 use crate::memory;
-use crate::renderer::{self, Counters, FilmBuffers, Outputs, Renderer};
-use crate::report::table::{self, PassRow};
+use crate::renderer::{self, FilmBuffers, Outputs, Renderer};
 use crate::report::trace::chrome_trace;
 use crate::scene::Scene;
 use crate::settings::Settings;
 use crate::statistics::BrokenSamples;
-use serde::Serialize;
-use std::collections::BTreeMap;
+use shot::Shot;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+use summary::{Outcome, report};
 
 /// Which effects are compiled into the kernels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -53,6 +60,10 @@ pub struct Args {
     /// Continue a render from the .exr file that it wrote when it was interrupted, or that has fewer samples
     #[arg(long, value_name = "FILE")]
     pub resume: Option<PathBuf>,
+    /// Every so many minutes, write what there is to NAME.partial.exr, beside the first .exr output: --resume continues it
+    /// after a crash. It is removed when the render is complete
+    #[arg(long, value_name = "MINUTES", value_parser = checkpoint::minutes)]
+    pub checkpoint: Option<Duration>,
     /// Write the samples per pixel in false colours to a .png
     #[arg(long, value_name = "FILE")]
     pub heatmap: Option<PathBuf>,
@@ -76,69 +87,30 @@ impl Args {
         if !self.outputs.is_empty() {
             return self.outputs.clone();
         }
-        // A folder has no name of its own to give: `.` and `..`.
-        let mut name = self.scene.file_stem().unwrap_or("image".as_ref()).to_owned();
-        name.push(".exr");
-        vec![name.into()]
+        vec![checkpoint::default_output(&self.scene)]
     }
 
     /// More than radiance is kept only where a file or a filter takes it.
     fn wanted(&self) -> Outputs {
-        let layers = self.denoise.is_some() || self.output_files().iter().any(|file| image::has_layers(file));
+        let layers = self.denoise.is_some()
+            || self.checkpoint.is_some()
+            || self.output_files().iter().any(|file| image::has_layers(file));
         Outputs { split_light: layers, guides: layers, counters: self.counters }
     }
-}
-
-/// What `--json` prints.
-#[derive(Clone, Debug, Serialize)]
-pub struct Summary {
-    /// Files written; what is not UTF-8 in their names is replaced.
-    pub files: Vec<String>,
-    /// Pixels.
-    pub width: u32,
-    /// Pixels.
-    pub height: u32,
-    /// Samples of all pixels, those of a resumed file included.
-    pub samples: u64,
-    /// Samples traced now.
-    pub traced: u64,
-    /// Of any pixel.
-    pub least_samples: u32,
-    /// Of any pixel.
-    pub most_samples: u32,
-    /// Why it ended.
-    pub stopped: Why,
-    /// Most priorities of one allocation that were not finite.
-    pub broken_priorities: u32,
-    /// Samples that were no number and counted as black, those of a resumed file included.
-    pub broken_samples: Option<BrokenSamples>,
-    /// Rays and nodes; none without `--counters`.
-    pub counters: Option<Counters>,
-    /// Wall time of reading the scene and building its hierarchy.
-    pub load_seconds: f64,
-    /// Wall time of the upload and of making pipelines.
-    pub compile_seconds: f64,
-    /// Wall time of the render without loading and writing.
-    pub seconds: f64,
-    /// Name of the device.
-    pub device: String,
-    /// GPU time by pass.
-    pub passes: Vec<PassRow>,
-    /// What was repaired in the scene.
-    pub warnings: Vec<String>,
 }
 
 /// Runs the subcommand.
 ///
 /// # Errors
-/// Of every kind; nothing is written then, but for the noisy image when `--denoise` fails.
+/// Of every kind. What fails before the first sample leaves nothing written; when `--denoise` fails the noisy image is there;
+/// an output that fails keeps no other from being written.
 pub fn run(args: &Args) -> Result<Exit> {
     check_outputs(args)?;
     let mut host = Spans::default();
     let scene = host.time("load scene", || Scene::load(&args.scene, &|s| args.overrides.apply(s)))?;
     let earlier = args.resume.as_deref().map(|path| Earlier::read(path, &scene)).transpose()?;
     if args.common.talkative() {
-        scene.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
+        scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
     }
     let gpu = host.time("open device", || args.common.open())?;
     let wanted = args.wanted();
@@ -152,48 +124,111 @@ pub fn run(args: &Args) -> Result<Exit> {
     };
     effects.adaptive |= earlier.is_some();
     let renderer = host.time("upload and compile", || Renderer::specialised(&gpu, &scene, wanted, effects))?;
-    let mut frame = FrameResources::new(&gpu)?;
-    // Until here there is nothing to keep, and Ctrl-C ends the process as it does any other.
-    let job = Job { renderer: &renderer, stop: interrupt::flag(), quiet: !args.common.talkative() };
-    let mut end = host.time("render", || job.run(&mut frame, earlier.as_ref()))?;
-    if end.why == Why::Interrupted && end.traced == 0 {
-        if args.common.talkative() {
-            eprintln!("interrupted before the first sample: nothing is written");
-        }
+    let broken_before = earlier.as_ref().and_then(|earlier| earlier.broken);
+    let shot = Shot { args, gpu: &gpu, scene: &scene, renderer: &renderer, broken_before };
+    let mut files = Files::new(args.resume.as_deref());
+    let (mut end, checkpoint) = host.time("render", || trace(&shot, earlier.as_ref(), &mut files))?;
+    let interrupted = end.why == Why::Interrupted;
+    if interrupted && end.traced == 0 {
+        complain("interrupted before the first sample: nothing was written");
         return Ok(Exit::Interrupted);
     }
-    let mut film = host.time("read back", || layers::film(&renderer))?;
     let seconds = host.seconds("render");
-    film.metadata = metadata(args, &gpu, seconds, end.allocations);
-    film.metadata.extend(origin::metadata(&scene, &film)?.map(|(k, v)| (k.to_owned(), v)));
-    let before = earlier.as_ref().and_then(|earlier| earlier.broken);
-    end.broken_samples = BrokenSamples::join(before, renderer.broken_samples()?);
-    layers::set_broken_samples(&mut film, end.broken_samples);
+    end.broken_samples = shot.broken_samples()?;
     end.broken_samples.iter().for_each(warn_of_broken);
-    if end.why == Why::Interrupted {
-        let pending = resume::pending(&renderer, &film, &end)?;
-        film.add(layers::PENDING, Samples::U32(pending));
-    }
+    let mut film = host.time("read back", || shot.film(&end, seconds, !interrupted))?;
     let counters = args.counters.then(|| renderer.counters()).transpose()?;
     // The film is all that is left to write, and large films need the memory.
     drop(renderer);
-    host.time("write", || write(args, &film))?;
+    let mut written = host.time("write", || Ok(save(args, &film, &mut files, checkpoint, !interrupted)))?;
     // By now what took hours is safe, whatever becomes of the filter.
-    if let Some(row) = args.denoise.filter(|_| end.why != Why::Interrupted) {
+    if let Some(row) = args.denoise.filter(|_| !interrupted) {
+        let line = files.with_failures("interrupted: the noisy image was written, --denoise was not finished");
+        if interrupt::leave_at_once(&line) {
+            interrupt::leave(&line);
+        }
         end.times.extend(host.time("denoise", || denoise(&gpu, row, &mut film))?);
-        host.time("write", || write(args, &film))?;
+        host.time("write", || Ok(save(args, &film, &mut files, None, true)))?;
     }
     fail_on_messages(&gpu)?;
-    report(args, counters, &gpu, &scene, &film, &host, &end)?;
-    Ok(if end.why == Why::Interrupted { Exit::Interrupted } else { Exit::Done })
+    let trace = args.profile.iter().map(|path| Item::bytes(path.clone(), profile(&gpu, &host, &end).into_bytes()));
+    let trace: Vec<_> = trace.collect();
+    files.save(&trace, !interrupted);
+    written.extend(files.pipe(&items(args, &film), !interrupted));
+    files.pipe(&trace, !interrupted);
+    let outcome = Outcome { gpu: &gpu, scene: &scene, film: &film, host: &host, end: &end };
+    report(args, &outcome.summary(&written, counters))?;
+    files.failure().map_or(Ok(()), Err)?;
+    if interrupted {
+        complain(&interruption(&written));
+        return Ok(Exit::Interrupted);
+    }
+    Ok(Exit::Done)
+}
+
+/// Takes the samples, and writes checkpoints on the way.
+fn trace(shot: &Shot, earlier: Option<&Earlier>, files: &mut Files) -> Result<(End, Option<Checkpoint>)> {
+    let Shot { args, gpu, renderer, .. } = *shot;
+    let place = || checkpoint::path(&args.output_files(), &args.scene);
+    let mut checkpoint = args.checkpoint.map(|every| Checkpoint::new(every, place()));
+    let begun = Instant::now();
+    // Until here there is nothing to keep, and a signal ends the process.
+    let stop = interrupt::flag();
+    let mut between = |end: &End| {
+        if stop.load(Ordering::SeqCst) {
+            return Ok(ControlFlow::Break(()));
+        }
+        if let Some(checkpoint) = checkpoint.as_mut().filter(|c| end.traced > 0 && c.is_due()) {
+            checkpoint.write(files, &shot.film(end, begun.elapsed().as_secs_f64(), false)?);
+        }
+        Ok(ControlFlow::Continue(()))
+    };
+    let job = Job { renderer, quiet: !args.common.talkative() };
+    let end = job.run(&mut FrameResources::new(gpu)?, earlier, &mut between)?;
+    Ok((end, checkpoint))
+}
+
+/// Writes the images that are files, and brings the checkpoint up to date or removes it: where an image has all layers, or
+/// the render is complete, it is not needed any more.
+fn save(args: &Args, film: &Film, files: &mut Files, checkpoint: Option<Checkpoint>, whole: bool) -> Vec<PathBuf> {
+    let broken = film.picture(None).map_or(0, |p| p.non_finite());
+    if broken > 0 {
+        complain(&format!("warning: {broken} pixels are not finite"));
+    }
+    let mut written = files.save(&items(args, film), whole);
+    let Some(mut checkpoint) = checkpoint else { return written };
+    if !whole && !written.iter().any(|path| image::has_layers(path)) {
+        written.extend(checkpoint.write(files, film));
+    }
+    if files.failure().is_none() {
+        checkpoint.remove(&written);
+    }
+    written
+}
+
+/// The images: a film's own, and that of its samples.
+fn items<'a>(args: &'a Args, film: &'a Film) -> Vec<Item<'a>> {
+    let options = args.common.write_options();
+    let images = args.output_files().into_iter().map(|path| Item::image(path, film, options));
+    let heatmap = |path: &PathBuf| Item { path: path.clone(), fill: Box::new(|stream| heatmap(film, stream)) };
+    images.chain(args.heatmap.iter().map(heatmap)).collect()
+}
+
+/// Says where what there is was written.
+fn interruption(written: &[PathBuf]) -> String {
+    let names = written.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
+    let resumable = written.iter().find(|path| image::has_layers(path));
+    let how = resumable.map(|path| format!("; --resume {} continues it", path.display())).unwrap_or_default();
+    format!("interrupted: what there is was written to {names}{how}")
 }
 
 /// Always told: it is a bug, or light too strong for the numbers.
 fn warn_of_broken(broken: &BrokenSamples) {
     let BrokenSamples { count, pixel: [x, y], sample, seed } = broken;
-    eprintln!(
-        "warning: samples that were no number and count as black: {count}; the first: pixel ({x}, {y}), sample {sample}, seed {seed}"
-    );
+    complain(&format!(
+        "warning: samples that were no number and count as black: {count}; the first: pixel ({x}, {y}), sample {sample}, \
+         seed {seed}"
+    ));
 }
 
 /// With the filter's default settings, scaled to the image.
@@ -207,7 +242,7 @@ fn denoise(gpu: &Gpu, row: &Row, film: &mut Film) -> Result<Vec<PassTime>> {
 
 /// Host-side stages, for the trace.
 #[derive(Default)]
-struct Spans(Vec<PassTime>);
+pub struct Spans(Vec<PassTime>);
 
 impl Spans {
     fn time<T>(&mut self, name: &'static str, work: impl FnOnce() -> Result<T>) -> Result<T> {
@@ -223,102 +258,20 @@ impl Spans {
     }
 }
 
-fn metadata(args: &Args, gpu: &Gpu, seconds: f64, allocations: u32) -> BTreeMap<String, String> {
-    let info = gpu.info();
-    let since_epoch = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    let entries = [
-        ("software", format!("tallow {}", env!("CARGO_PKG_VERSION"))),
-        ("scene", args.scene.display().to_string()),
-        (resume::ALLOCATIONS, allocations.to_string()),
-        ("device", info.name.clone()),
-        ("driver", format!("{} {} {}", info.driver_name, info.driver_version, info.driver_info)),
-        ("renderSeconds", format!("{seconds:.3}")),
-        ("dateUnix", since_epoch.as_secs().to_string()),
-    ];
-    entries.map(|(k, v)| (k.to_owned(), v)).into()
-}
-
-/// A broken pixel is a bug, and is told; the file is written all the same, so that it can be looked at.
-fn write(args: &Args, film: &Film) -> Result<()> {
-    let broken = film.picture(None).map_or(0, |p| p.non_finite());
-    if broken > 0 {
-        eprintln!("warning: {broken} pixels are not finite");
-    }
-    args.output_files().iter().try_for_each(|path| image::write(path, film, &args.common.write_options()))?;
-    args.heatmap.iter().try_for_each(|path| write_heatmap(path, film))
-}
-
 /// Samples per pixel from 0 (dark) to the largest number (bright).
-fn write_heatmap(path: &Path, film: &Film) -> Result<()> {
-    let counts = layers::counts(film, "samples").map_err(|what| Error::output(path, what))?;
+fn heatmap(film: &Film, stream: &mut dyn Stream) -> std::io::Result<()> {
+    let counts = layers::counts(film, "samples").unwrap_or_default();
     let most = counts.iter().copied().max().unwrap_or(0).max(1);
     let values: Vec<f32> = counts.iter().map(|&n| n as f32).collect();
     let picture = false_colours(film.width, &values, most as f32);
     let mut map = Film::new(picture.width, picture.height);
     map.add_vec3("", ["R", "G", "B"], &picture.pixels);
-    image::write(path, &map, &WriteOptions::default())
+    image::encode(Path::new("map.png"), &map, &WriteOptions::default(), stream)
 }
 
-fn report(
-    args: &Args,
-    counters: Option<Counters>,
-    gpu: &Gpu,
-    scene: &Scene,
-    film: &Film,
-    host: &Spans,
-    end: &End,
-) -> Result<()> {
-    if let Some(path) = &args.profile {
-        let offset = gpu.calibrate().map(|(gpu_ns, host_ns)| host_ns as i64 - gpu_ns as i64);
-        output::write(path, chrome_trace(&host.0, &end.times, offset).as_bytes())?;
-    }
-    let counts = layers::counts(film, "samples").unwrap_or_default();
-    let least_most = (counts.iter().copied().min().unwrap_or(0), counts.iter().copied().max().unwrap_or(0));
-    let summary = Summary {
-        files: args.output_files().iter().map(|f| f.display().to_string()).collect(),
-        width: film.width,
-        height: film.height,
-        samples: counts.iter().map(|&n| u64::from(n)).sum(),
-        traced: end.traced,
-        least_samples: least_most.0,
-        most_samples: least_most.1,
-        stopped: end.why,
-        broken_priorities: end.broken_priorities,
-        broken_samples: end.broken_samples,
-        counters,
-        load_seconds: host.seconds("load scene"),
-        compile_seconds: host.seconds("upload and compile"),
-        seconds: host.seconds("render"),
-        device: gpu.info().name.clone(),
-        passes: table::summarise(&end.times),
-        warnings: scene.warnings.clone(),
-    };
-    match (args.common.json, args.common.quiet) {
-        (true, _) => print_json(&summary),
-        (false, true) => Ok(()),
-        (false, false) => print(&text(&summary)),
-    }
-}
-
-fn text(s: &Summary) -> String {
-    let speed = s.traced as f64 * 1e-6 / s.seconds.max(1e-9);
-    let mut text = format!(
-        "{} x {}, {} samples in {:.2} s ({speed:.2} Msamples/s) on {}; loaded in {:.2} s, compiled in {:.2} s\n",
-        s.width, s.height, s.traced, s.seconds, s.device, s.load_seconds, s.compile_seconds
-    );
-    if s.least_samples != s.most_samples {
-        let mean = s.samples as f64 / (f64::from(s.width) * f64::from(s.height));
-        text += &format!("{} to {} samples per pixel, {mean:.2} on average\n", s.least_samples, s.most_samples);
-    }
-    text += &s.stopped.line();
-    if s.broken_priorities > 0 {
-        text += &format!("warning: {} priorities were not finite and counted for nothing\n", s.broken_priorities);
-    }
-    if let Some(c) = &s.counters {
-        let per_ray = c.nodes as f64 / c.rays().max(1) as f64;
-        text += &format!("{} closest-hit rays, {} any-hit rays, {per_ray:.1} nodes each\n", c.closest, c.any);
-    }
-    text + &table::timing_table(&s.passes)
+fn profile(gpu: &Gpu, host: &Spans, end: &End) -> String {
+    let offset = gpu.calibrate().map(|(gpu_ns, host_ns)| host_ns as i64 - gpu_ns as i64);
+    chrome_trace(&host.0, &end.times, offset)
 }
 
 /// A system that is out of memory ends the process hours later without a word.
@@ -342,11 +295,24 @@ fn bytes_of_film(settings: &Settings, unified: bool) -> u64 {
     settings.pixels() as u64 * (device + layers::bytes_per_pixel(placed))
 }
 
-/// A render may take hours; what cannot be written is told before.
+/// A render may take hours; what cannot be written, or would replace what it is not to, is told before.
 fn check_outputs(args: &Args) -> Result<()> {
-    args.output_files().iter().try_for_each(|path| image::check_writable(path))?;
+    let (images, checkpoint) = (args.output_files(), checkpoint::path(&args.output_files(), &args.scene));
+    images.iter().try_for_each(|path| image::check_writable(path))?;
     args.heatmap.iter().try_for_each(|path| super::check_png("--heatmap", path))?;
-    args.profile.iter().try_for_each(|path| image::output::check(path))
+    args.profile.iter().try_for_each(|path| output::check(path))?;
+    args.checkpoint.map_or(Ok(()), |_| output::check(&checkpoint))?;
+    let (layers, colours): (Vec<_>, Vec<_>) =
+        images.iter().map(|path| ("-o", path.as_path())).partition(|(_, path)| image::has_layers(path));
+    let maps = args.heatmap.iter().map(|path| ("--heatmap", path.as_path()));
+    let traces = args.profile.iter().map(|path| ("--profile", path.as_path()));
+    let others: Vec<_> = colours.into_iter().chain(maps).chain(traces).collect();
+    let resumed: Vec<_> = args.resume.iter().map(|path| ("--resume", path.as_path())).collect();
+    // A resumed file may become the complete one.
+    check_distinct(&others, &resumed)?;
+    let partial = args.checkpoint.map(|_| ("--checkpoint", checkpoint.as_path()));
+    let all: Vec<_> = layers.into_iter().chain(others).chain(partial).collect();
+    check_distinct(&all, &[("the scene", &args.scene)])
 }
 
 #[cfg(test)]
@@ -370,7 +336,7 @@ mod tests {
         assert_eq!(parse(&["scenes/box/room.toml"]).output_files(), [Path::new("room.exr")]);
         assert_eq!(parse(&["room.toml", "-o", "a.png", "-o", "b.exr"]).output_files().len(), 2);
         assert_eq!(parse(&["room.v2.obj"]).output_files(), [Path::new("room.v2.exr")]);
-        assert_eq!(parse(&["room.toml", "--exposure", "-1.5"]).common.write_options().exposure, -1.5);
+        assert_eq!(parse(&["room.toml", "--exposure=-1.5"]).common.write_options().exposure, -1.5);
     }
 
     #[test]

@@ -18,6 +18,7 @@ use crate::memory;
 pub use claim::Claim;
 pub use film::{Channel, Film, NOISY, Picture, Samples, Window};
 use frame::Frame;
+use output::Stream;
 pub(crate) use photo::{BAND, bands, check_end, claim as picture_claim, picture};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -66,14 +67,21 @@ pub fn has_layers(path: &Path) -> bool {
 /// # Errors
 /// [`Error::Usage`] for another extension, [`Error::Output`] when the film has no colour or the file cannot be written.
 pub fn write(path: &Path, film: &Film, options: &WriteOptions) -> Result<()> {
-    let colour = || film.picture(None).map_err(|what| Error::output(path, what));
-    let whole = |bytes: std::result::Result<Vec<u8>, String>| {
-        output::write(path, &bytes.map_err(|what| Error::output(path, what))?)
-    };
-    match format_of(path)? {
-        Format::Exr => output::write_with(path, |stream| exr::encode(film, stream)),
-        Format::Png => whole(photo::encode_png(&colour()?, options)),
-        Format::Hdr => whole(photo::encode_hdr(&colour()?)),
+    format_of(path)?;
+    output::write_with(path, |stream| encode(path, film, options, stream))
+}
+
+/// What [`write()`] writes to a file of this name.
+///
+/// # Errors
+/// [`std::io::ErrorKind::InvalidData`] when the film has no colour or the extension is unknown, and the stream's own.
+pub fn encode(path: &Path, film: &Film, options: &WriteOptions, stream: &mut dyn Stream) -> std::io::Result<()> {
+    let invalid = |what: String| std::io::Error::new(std::io::ErrorKind::InvalidData, what);
+    let colour = || film.picture(None).map_err(invalid);
+    match format_of(path).map_err(|e| invalid(e.to_string()))? {
+        Format::Exr => exr::encode(film, stream),
+        Format::Png => stream.write_all(&photo::encode_png(&colour()?, options).map_err(invalid)?),
+        Format::Hdr => stream.write_all(&photo::encode_hdr(&colour()?).map_err(invalid)?),
     }
 }
 

@@ -1,7 +1,12 @@
-//! Writing files so that they appear complete or not at all.
+//! Writing files so that they appear complete or not at all, and stay whose and what they were.
+mod temporary;
+
 use crate::error::{Error, Result};
+use std::fs::Metadata;
 use std::io::{BufWriter, Cursor, ErrorKind, Seek, Write};
 use std::path::{Path, PathBuf};
+use temporary::Temporary;
+pub use temporary::remove_unfinished;
 
 /// Where the bytes of a file go.
 pub trait Stream: Write + Seek {}
@@ -15,42 +20,74 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     write_with(path, |stream| stream.write_all(bytes))
 }
 
-/// Replaces `path` by what `fill` writes: it goes to a temporary name in the same folder, which is then renamed, so that a run
-/// that is interrupted, or a disk that fills up, leaves the old file. Links are followed. What exists and is no regular
-/// file (a pipe, `/dev/stdout`) is written to as it is.
+/// Replaces `path` by what `fill` writes: it goes to a temporary file in the same folder, which is then renamed, so that a run
+/// that is interrupted, or a disk that fills up, leaves the old file. Links are followed. A file that is replaced passes on
+/// its mode, and its owner and group as far as this user may give them; one that is read-only, or that has other names
+/// (hard links, which renaming would part), is not replaced. What exists and is no regular file (a pipe, `/dev/stdout`) is
+/// written to as it is.
 ///
 /// # Errors
 /// [`Error::Output`] with what to do about it. Of `fill`, [`ErrorKind::InvalidData`] says that there is no way to write this.
 pub fn write_with(path: &Path, fill: impl FnOnce(&mut dyn Stream) -> std::io::Result<()>) -> Result<()> {
-    let result = if is_special(path) { write_through(path, fill) } else { write_renamed(&target(path), fill) };
-    result.map_err(|e| Error::output(path, remedy(path, &e)))
+    let result = match is_special(path) {
+        true => write_through(path, fill).map_err(|e| remedy(path, &e)),
+        false => write_renamed(path, fill),
+    };
+    result.map_err(|what| Error::output(path, what))
 }
 
-/// Checks that [`write()`] could start: the folder exists and accepts a file, and `path` is not a folder itself.
+/// Makes a file of what `fill` writes, and returns its name: `path`, or if that exists one with a number. Nothing is
+/// replaced.
+///
+/// # Errors
+/// As [`write_with`].
+pub fn write_new(path: &Path, fill: impl FnOnce(&mut dyn Stream) -> std::io::Result<()>) -> Result<PathBuf> {
+    let made = filled(folder(path), None, fill).and_then(|file| file.create(path));
+    made.map_err(|e| Error::output(path, remedy(path, &e)))
+}
+
+/// Checks that [`write()`] could start: the folder exists and accepts a file, and what it would replace may be replaced.
 ///
 /// # Errors
 /// As [`write()`].
 pub fn check(path: &Path) -> Result<()> {
     let result = match () {
-        () if path.is_dir() => Err(ErrorKind::IsADirectory.into()),
         // Opening a pipe and closing it again would be the end of its reader.
         () if is_special(path) => Ok(()),
-        () => temporary(&target(path)).map(drop),
+        () => check_file(path),
     };
-    result.map_err(|e| Error::output(path, remedy(path, &e)))
+    result.map_err(|what| Error::output(path, what))
 }
 
-fn is_special(path: &Path) -> bool {
+/// Whether `path` exists and is written to as it is: a pipe or a device.
+pub fn is_special(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir())
 }
 
-/// The file behind a link, so that renaming replaces the file and not the link.
-fn target(path: &Path) -> PathBuf {
-    std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned())
+/// The file that `path` leads to, links followed, whether it exists or not: two paths of one file give the same.
+///
+/// # Errors
+/// When a folder on the way is missing, or links go round in a circle.
+pub fn resolve(path: &Path) -> std::io::Result<PathBuf> {
+    let missing = match std::fs::canonicalize(path) {
+        Err(e) if e.kind() == ErrorKind::NotFound => e,
+        found => return found,
+    };
+    if let Ok(target) = std::fs::read_link(path) {
+        return resolve(&folder(path).join(target));
+    }
+    let name = path.file_name().ok_or(missing)?;
+    Ok(std::fs::canonicalize(folder(path))?.join(name))
 }
 
 fn folder(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+fn check_file(path: &Path) -> std::result::Result<(), String> {
+    let target = resolve(path).map_err(|e| remedy(path, &e))?;
+    replaceable(&target)?;
+    Temporary::new_in(folder(&target)).map(drop).map_err(|e| remedy(path, &e))
 }
 
 /// Pipes cannot go back, as some formats must.
@@ -62,29 +99,81 @@ fn write_through(path: &Path, fill: impl FnOnce(&mut dyn Stream) -> std::io::Res
     file.flush()
 }
 
-fn write_renamed(path: &Path, fill: impl FnOnce(&mut dyn Stream) -> std::io::Result<()>) -> std::io::Result<()> {
-    let mut file = temporary(path)?;
-    let mut stream = BufWriter::new(&mut file);
+fn write_renamed(
+    path: &Path,
+    fill: impl FnOnce(&mut dyn Stream) -> std::io::Result<()>,
+) -> std::result::Result<(), String> {
+    let target = resolve(path).map_err(|e| remedy(path, &e))?;
+    let old = replaceable(&target)?;
+    let written = filled(folder(&target), old, fill).and_then(|file| file.replace(&target));
+    written.map_err(|e| remedy(path, &e))
+}
+
+fn filled(
+    folder: &Path,
+    old: Option<Metadata>,
+    fill: impl FnOnce(&mut dyn Stream) -> std::io::Result<()>,
+) -> std::io::Result<Temporary> {
+    let temporary = Temporary::new_in(folder)?;
+    let mut stream = BufWriter::new(temporary.file());
     fill(&mut stream)?;
     stream.flush()?;
     drop(stream);
+    #[cfg(unix)]
+    old.map_or(Ok(()), |old| owner::pass_on(&old, temporary.file()))?;
     // Without this a crash of the system soon after the renaming could leave an empty file.
-    file.as_file().sync_all()?;
-    file.persist(path).map(drop).map_err(|e| e.error)
+    temporary.file().sync_all()?;
+    Ok(temporary)
 }
 
-fn temporary(path: &Path) -> std::io::Result<tempfile::NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".tallow-").suffix(".part");
-    // The crate's own default, 0600, would hide the image from everybody else; the umask still applies.
+/// What is said of the file that would be replaced; nothing when there is none.
+fn replaceable(target: &Path) -> std::result::Result<Option<Metadata>, String> {
+    let Ok(old) = std::fs::symlink_metadata(target) else { return Ok(None) };
+    if old.is_dir() {
+        return Err(remedy(target, &ErrorKind::IsADirectory.into()));
+    }
+    // Root may write to any file: what counts is what its owner said.
+    let opened = std::fs::OpenOptions::new().write(true).open(target);
+    if old.permissions().readonly() || opened.is_err_and(|e| e.kind() == ErrorKind::PermissionDenied) {
+        return Err("cannot be written: it is read-only; make it writable or choose another name".to_owned());
+    }
     #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder(path))
+    if std::os::unix::fs::MetadataExt::nlink(&old) > 1 {
+        return Err(
+            "cannot be written: the same file has other names (hard links), which would keep the old content; \
+                    remove it or choose another name"
+                .to_owned(),
+        );
+    }
+    Ok(Some(old))
+}
+
+#[cfg(unix)]
+mod owner {
+    use std::fs::{File, Metadata, Permissions};
+    use std::os::unix::fs::{MetadataExt, PermissionsExt, fchown};
+
+    /// Passes on owner, group and mode. Only root may give a file away; others may give it to groups that they are in.
+    pub fn pass_on(old: &Metadata, file: &File) -> std::io::Result<()> {
+        let new = file.metadata()?;
+        let same_group = new.gid() == old.gid() || fchown(file, None, Some(old.gid())).is_ok();
+        if new.uid() != old.uid() {
+            // Where this is refused the file stays ours.
+            let _ = fchown(file, Some(old.uid()), None);
+        }
+        // Another group may do no more than everybody.
+        let mode = if same_group { old.mode() } else { old.mode() & !0o070 | (old.mode() & 0o007) << 3 };
+        file.set_permissions(Permissions::from_mode(mode & 0o777))
+    }
 }
 
 fn remedy(path: &Path, e: &std::io::Error) -> String {
     let (folder, exists) = (folder(path).display(), folder(path).is_dir());
     match e.kind() {
+        // Neither the end of the link nor its folder.
+        _ if path.is_symlink() && resolve(path).is_err() => {
+            format!("cannot be written: it is a link that leads nowhere ({e}); remove it or choose another name")
+        }
         // Linux says so of /proc and the like.
         ErrorKind::NotFound if exists => {
             format!("cannot be written: {folder} takes no new files; choose another folder")

@@ -23,7 +23,7 @@ pub(super) fn encode_png(picture: &Picture, options: &WriteOptions) -> Result<Ve
     let mut out = Vec::new();
     PngEncoder::new(&mut out)
         .write_image(&bytes, picture.width, picture.height, ExtendedColorType::Rgb8)
-        .map_err(|e| format!("cannot be encoded: {e}"))?;
+        .map_err(|e| e.to_string())?;
     Ok(out)
 }
 
@@ -35,7 +35,7 @@ pub(super) fn encode_hdr(picture: &Picture) -> Result<Vec<u8>, String> {
     let mut out = Vec::new();
     HdrEncoder::new(&mut out)
         .encode(&pixels, picture.width as usize, picture.height as usize)
-        .map_err(|e| format!("cannot be encoded: {e}"))?;
+        .map_err(|e| e.to_string())?;
     Ok(out)
 }
 

@@ -1,9 +1,10 @@
 //! An image file that is changed in some channels and kept in all others.
 use super::film::Film;
 use super::frame::Frame;
+use super::output::Stream;
 use super::{Claim, WriteOptions, exr, output};
 use crate::error::{Error, Result};
-use std::io::Cursor;
+use std::io::{Cursor, ErrorKind};
 use std::path::{Path, PathBuf};
 
 /// An image file in memory of which the header alone was looked at.
@@ -85,9 +86,19 @@ impl Source {
     /// # Errors
     /// As [`super::write`].
     pub fn write(&self, path: &Path, options: &WriteOptions) -> Result<()> {
-        match super::format_of(path)? {
-            super::Format::Exr => output::write(path, &self.bytes),
-            _ => super::write(path, &self.shown()?, options),
+        super::format_of(path)?;
+        output::write_with(path, |stream| self.encode(path, options, stream))
+    }
+
+    /// What [`Source::write`] writes to a file of this name.
+    ///
+    /// # Errors
+    /// As [`super::encode`].
+    pub fn encode(&self, path: &Path, options: &WriteOptions, stream: &mut dyn Stream) -> std::io::Result<()> {
+        if super::has_layers(path) {
+            return stream.write_all(&self.bytes);
         }
+        let shown = self.shown().map_err(|e| std::io::Error::new(ErrorKind::InvalidData, e.to_string()))?;
+        super::encode(path, &shown, options, stream)
     }
 }

@@ -282,3 +282,85 @@ fn devices_are_written_to_and_links_are_followed() {
     assert_eq!(std::fs::read(&file).unwrap(), b"new");
     assert!(link.is_symlink());
 }
+
+#[cfg(unix)]
+mod replaced {
+    //! What a file that is replaced passes on.
+    use super::what;
+    use std::fs::{Permissions, hard_link, metadata, read, set_permissions, write};
+    use std::os::unix::fs::{MetadataExt, PermissionsExt, chown, symlink};
+    use tallow::image::output;
+
+    #[test]
+    fn modes_and_owners_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        for mode in [0o600, 0o640, 0o666, 0o200] {
+            write(&path, "old").unwrap();
+            set_permissions(&path, Permissions::from_mode(mode)).unwrap();
+            // Only root may do this; for anybody else it is the owner that there is.
+            let _ = chown(&path, Some(65534), Some(65534));
+            let old = metadata(&path).unwrap();
+            output::write(&path, b"new").unwrap();
+            let new = metadata(&path).unwrap();
+            assert_eq!((new.mode(), new.uid(), new.gid()), (old.mode(), old.uid(), old.gid()));
+            assert_ne!(new.ino(), old.ino(), "it was not replaced as a whole");
+            std::fs::remove_file(&path).unwrap();
+        }
+        output::write(&path, b"new").unwrap();
+        assert_eq!(metadata(&path).unwrap().mode() & 0o600, 0o600);
+    }
+
+    #[test]
+    fn read_only_files_and_hard_links_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let inside = |name: &str| folder.path().join(name);
+        let refused = |name: &str, word: &str| {
+            assert!(what(output::check(&inside(name))).contains(word));
+            assert!(what(output::write(&inside(name), b"new")).contains(word));
+            assert_eq!(read(inside(name)).unwrap(), b"old");
+        };
+        write(inside("locked.exr"), "old").unwrap();
+        set_permissions(inside("locked.exr"), Permissions::from_mode(0o444)).unwrap();
+        symlink("locked.exr", inside("link.exr")).unwrap();
+        refused("locked.exr", "read-only");
+        refused("link.exr", "read-only");
+        write(inside("one.exr"), "old").unwrap();
+        hard_link(inside("one.exr"), inside("two.exr")).unwrap();
+        refused("one.exr", "hard links");
+        std::fs::remove_file(inside("two.exr")).unwrap();
+        output::write(&inside("one.exr"), b"new").unwrap();
+    }
+
+    #[test]
+    fn links_lead_where_they_led() {
+        let folder = tempfile::tempdir().unwrap();
+        let inside = |name: &str| folder.path().join(name);
+        std::fs::create_dir(inside("x")).unwrap();
+        for (link, target) in [("first.exr", "x/second.exr"), ("x/second.exr", "end.exr"), ("gone.exr", "y/end.exr")] {
+            symlink(target, inside(link)).unwrap();
+        }
+        symlink("b.exr", inside("a.exr")).unwrap();
+        symlink("a.exr", inside("b.exr")).unwrap();
+        output::check(&inside("first.exr")).unwrap();
+        for text in [b"one", b"two"] {
+            output::write(&inside("first.exr"), text).unwrap();
+            assert_eq!(read(inside("x/end.exr")).unwrap(), text);
+        }
+        assert!(inside("first.exr").is_symlink() && inside("x/second.exr").is_symlink());
+        for broken in ["a.exr", "gone.exr"] {
+            assert!(what(output::check(&inside(broken))).contains("a link that leads nowhere"));
+            assert!(what(output::write(&inside(broken), b"new")).contains("a link that leads nowhere"));
+            assert!(inside(broken).is_symlink());
+        }
+    }
+
+    #[test]
+    fn a_new_file_replaces_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let inside = |name: &str| folder.path().join(name);
+        let new = |text: &str| output::write_new(&inside("a.exr"), |stream| stream.write_all(text.as_bytes())).unwrap();
+        assert_eq!([new("1"), new("2"), new("3")], ["a.exr", "a-2.exr", "a-3.exr"].map(inside));
+        assert_eq!(["a.exr", "a-2.exr", "a-3.exr"].map(|name| read(inside(name)).unwrap()), [b"1", b"2", b"3"]);
+    }
+}

@@ -1,0 +1,235 @@
+//! The files that a command writes: each is tried, whatever becomes of the others, and none is replaced by less than it holds.
+use super::interrupt;
+use crate::error::{Error, Result};
+use crate::image::output::{self, Stream};
+use crate::image::{self, Film, WriteOptions};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// A file to write, and what writes it.
+pub struct Item<'a> {
+    /// Where it should go.
+    pub path: PathBuf,
+    /// What goes there.
+    pub fill: Fill<'a>,
+}
+
+/// Writes a file; may be called again when a first place fails.
+type Fill<'a> = Box<dyn Fn(&mut dyn Stream) -> std::io::Result<()> + 'a>;
+
+impl<'a> Item<'a> {
+    /// An image, in the format that the name says.
+    pub fn image(path: PathBuf, film: &'a Film, options: WriteOptions) -> Self {
+        let name = path.clone();
+        Self { path, fill: Box::new(move |stream| image::encode(&name, film, &options, stream)) }
+    }
+
+    /// Any file.
+    pub fn bytes(path: PathBuf, bytes: Vec<u8>) -> Self {
+        Self { path, fill: Box::new(move |stream| stream.write_all(&bytes)) }
+    }
+}
+
+/// Files of one run.
+#[derive(Default)]
+pub struct Files {
+    /// Where this run has put a file, by where it was to go, links followed. This run may replace those.
+    own: BTreeMap<PathBuf, PathBuf>,
+    /// What was wanted and could not be written, and where it is instead.
+    failures: Vec<(PathBuf, String)>,
+}
+
+/// `a.partial.exr` for `a.exr`.
+pub fn partial_name(path: &Path) -> PathBuf {
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push(".partial");
+    if let Some(extension) = path.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    path.with_file_name(name)
+}
+
+/// Two paths of one file have one key.
+fn key(path: &Path) -> PathBuf {
+    output::resolve(path).unwrap_or_else(|_| path.to_owned())
+}
+
+impl Files {
+    /// `resumed` is the file that this run goes on from, which it may replace.
+    pub fn new(resumed: Option<&Path>) -> Self {
+        let own = resumed.map(|path| (key(path), path.to_owned())).into_iter().collect();
+        Self { own, failures: Vec::new() }
+    }
+
+    /// Writes all that are files, and returns where they are. What is not `whole` goes beside a file that it did not write,
+    /// under the name of [`partial_name`]. Signals wait until all is written. Pipes are left for [`Self::pipe`].
+    pub fn save(&mut self, items: &[Item], whole: bool) -> Vec<PathBuf> {
+        interrupt::flag();
+        let files = items.iter().filter(|item| !output::is_special(&item.path));
+        files.filter_map(|item| self.save_one(item, whole)).collect()
+    }
+
+    /// Writes what goes to pipes and devices, and returns where it went. A pipe may have no reader, so that a signal ends the
+    /// process now; so does one that came while the other files were written, unless it is why they are not `whole`.
+    pub fn pipe(&mut self, items: &[Item], whole: bool) -> Vec<PathBuf> {
+        let pipes = items.iter().filter(|item| output::is_special(&item.path));
+        let written = pipes.filter_map(|item| self.pipe_one(item, whole)).collect();
+        interrupt::leave_at_once("interrupted: all files are written");
+        written
+    }
+
+    /// All failures so far as one.
+    pub fn failure(&self) -> Option<Error> {
+        let ((path, first), more) = self.failures.split_first()?;
+        let more = more.iter().map(|(path, what)| format!("; {}: {what}", path.display())).collect::<String>();
+        Some(Error::output(path, format!("{first}{more}")))
+    }
+
+    /// This line, and what has failed.
+    pub fn with_failures(&self, line: &str) -> String {
+        self.failure().map_or(line.to_owned(), |e| format!("{line}; {e}"))
+    }
+
+    fn save_one(&mut self, item: &Item, whole: bool) -> Option<PathBuf> {
+        let taken = !self.own.contains_key(&key(&item.path)) && item.path.try_exists().unwrap_or(true);
+        let saved = match whole || !taken {
+            true => self.replace(item),
+            false => self.add(&partial_name(&item.path), item),
+        };
+        saved.map_or_else(|e| self.put_elsewhere(item, &e), Some)
+    }
+
+    fn pipe_one(&mut self, item: &Item, whole: bool) -> Option<PathBuf> {
+        let line = format!("interrupted: {} was not read to its end; all files are written", item.path.display());
+        let line = self.with_failures(&line);
+        if interrupt::leave_at_once(&line) && whole {
+            interrupt::leave(&line);
+        }
+        match output::write_with(&item.path, |stream| (item.fill)(stream)) {
+            Ok(()) => Some(item.path.clone()),
+            Err(e) => self.put_elsewhere(item, &e),
+        }
+    }
+
+    /// Writes where it should go, or where this run has put it before.
+    fn replace(&mut self, item: &Item) -> Result<PathBuf> {
+        let key = key(&item.path);
+        let place = self.own.get(&key).cloned().unwrap_or_else(|| item.path.clone());
+        output::write_with(&place, |stream| (item.fill)(stream))?;
+        self.own.insert(key, place.clone());
+        Ok(place)
+    }
+
+    /// Writes to `path` if this run has written there before, and else to a new file of that name or one with a number.
+    ///
+    /// # Errors
+    /// [`Error::Output`].
+    pub fn add(&mut self, path: &Path, item: &Item) -> Result<PathBuf> {
+        let key = key(path);
+        if let Some(place) = self.own.get(&key) {
+            output::write_with(place, |stream| (item.fill)(stream))?;
+            return Ok(place.clone());
+        }
+        let place = output::write_new(path, |stream| (item.fill)(stream))?;
+        self.own.insert(key, place.clone());
+        Ok(place)
+    }
+
+    /// Keeps what a failed write would lose: in the working folder, or in that for temporary files.
+    fn put_elsewhere(&mut self, item: &Item, failure: &Error) -> Option<PathBuf> {
+        let name = item.path.file_name()?;
+        let places = [PathBuf::from(name), std::env::temp_dir().join(name)];
+        let put = places.iter().find_map(|place| output::write_new(place, |stream| (item.fill)(stream)).ok());
+        let failure = match failure {
+            Error::Output { what, .. } => what.clone(),
+            other => other.to_string(),
+        };
+        let what = match &put {
+            Some(place) => format!("{failure} (it is in {} instead)", place.display()),
+            None => failure,
+        };
+        self.failures.push((item.path.clone(), what));
+        if let Some(place) = &put {
+            self.own.insert(key(&item.path), place.clone());
+        }
+        put
+    }
+}
+
+/// Refuses outputs that are one file, or an input. Each is an option, or what the user calls it, and a path. Pipes and
+/// devices may be written to more than once.
+///
+/// # Errors
+/// [`Error::Usage`].
+pub fn check_distinct(outputs: &[(&str, &Path)], inputs: &[(&str, &Path)]) -> Result<()> {
+    let outputs: Vec<_> = outputs.iter().filter(|(_, path)| !output::is_special(path)).collect();
+    for (i, (option, path)) in outputs.iter().enumerate() {
+        let others = outputs[..i].iter().copied().chain(inputs);
+        if let Some((other, _)) = others.into_iter().find(|(_, taken)| key(taken) == key(path)) {
+            let path = path.display();
+            return Err(Error::Usage(format!("{option} {path} is the same file as {other}: choose another name")));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn item(path: &Path, text: &str) -> Item<'static> {
+        Item::bytes(path.to_owned(), text.into())
+    }
+
+    fn read(path: &Path) -> String {
+        std::fs::read_to_string(path).unwrap()
+    }
+
+    #[test]
+    fn what_is_not_whole_replaces_nothing_but_its_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let inside = |name: &str| folder.path().join(name);
+        let (old, fresh, resumed) = (inside("old.exr"), inside("fresh.exr"), inside("resumed.exr"));
+        for path in [&old, &resumed, &inside("old.partial.exr")] {
+            std::fs::write(path, "old").unwrap();
+        }
+        let mut files = Files::new(Some(&resumed));
+        let save = |files: &mut Files, text, whole| {
+            files.save(&[item(&old, text), item(&fresh, text), item(&resumed, text)], whole)
+        };
+        let beside = inside("old.partial-2.exr");
+        assert_eq!(save(&mut files, "first", false), [beside.clone(), fresh.clone(), resumed.clone()]);
+        assert_eq!(save(&mut files, "second", false), [beside.clone(), fresh.clone(), resumed.clone()]);
+        assert_eq!([&beside, &fresh, &resumed].map(|path| read(path)), ["second"; 3]);
+        assert_eq!([&old, &inside("old.partial.exr")].map(|path| read(path)), ["old"; 2]);
+        save(&mut files, "whole", true);
+        assert_eq!(read(&old), "whole");
+        assert!(files.failure().is_none());
+    }
+
+    #[test]
+    fn one_file_by_two_names_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let inside = |name: &str| folder.path().join(name);
+        let [a, b, link, roundabout] = ["a.exr", "b.exr", "link.exr", "x/../a.exr"].map(inside);
+        std::fs::create_dir(inside("x")).unwrap();
+        let check = |outputs: [&Path; 2], input: &Path| {
+            check_distinct(&[("-o", outputs[0]), ("--heatmap", outputs[1])], &[("the scene", input)])
+        };
+        let refused = |outputs, input, word: &str| {
+            let line = check(outputs, input).unwrap_err().to_string();
+            assert!(line.contains(word), "{line}");
+        };
+        refused([&a, &roundabout], &b, "same file as -o");
+        refused([&a, &b], &roundabout, "same file as the scene");
+        check([&a, &b], &link).unwrap();
+        #[cfg(unix)]
+        {
+            // It leads to a file that does not exist yet.
+            std::os::unix::fs::symlink(&a, &link).unwrap();
+            refused([&b, &link], &a, "--heatmap");
+            check([Path::new("/dev/null"), Path::new("/dev/null")], Path::new("/dev/null")).unwrap();
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! What is said of a render at its end.
+use super::{Args, Spans};
+use crate::cli::job::{End, Why};
+use crate::cli::{layers, print, print_json};
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::image::Film;
+use crate::renderer::Counters;
+use crate::report::table::{self, PassRow};
+use crate::scene::Scene;
+use crate::statistics::BrokenSamples;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// What `--json` prints.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// Files written; what is not UTF-8 in their names is replaced.
+    pub files: Vec<String>,
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// Samples of all pixels, those of a resumed file included.
+    pub samples: u64,
+    /// Samples traced now.
+    pub traced: u64,
+    /// Of any pixel.
+    pub least_samples: u32,
+    /// Of any pixel.
+    pub most_samples: u32,
+    /// Why it ended.
+    pub stopped: Why,
+    /// Most priorities of one allocation that were not finite.
+    pub broken_priorities: u32,
+    /// Samples that were no number and counted as black, those of a resumed file included.
+    pub broken_samples: Option<BrokenSamples>,
+    /// Rays and nodes; none without `--counters`.
+    pub counters: Option<Counters>,
+    /// Wall time of reading the scene and building its hierarchy.
+    pub load_seconds: f64,
+    /// Wall time of the upload and of making pipelines.
+    pub compile_seconds: f64,
+    /// Wall time of the render without loading and writing.
+    pub seconds: f64,
+    /// Name of the device.
+    pub device: String,
+    /// GPU time by pass.
+    pub passes: Vec<PassRow>,
+    /// What was repaired in the scene.
+    pub warnings: Vec<String>,
+}
+
+/// A render that is over.
+pub struct Outcome<'a> {
+    /// What rendered it.
+    pub gpu: &'a Gpu,
+    /// What was rendered.
+    pub scene: &'a Scene,
+    /// Its image.
+    pub film: &'a Film,
+    /// What the host did.
+    pub host: &'a Spans,
+    /// How it ended.
+    pub end: &'a End,
+}
+
+impl Outcome<'_> {
+    /// In numbers, with the files that were written.
+    pub fn summary(&self, written: &[PathBuf], counters: Option<Counters>) -> Summary {
+        let Self { gpu, scene, film, host, end } = *self;
+        let counts = layers::counts(film, "samples").unwrap_or_default();
+        Summary {
+            files: written.iter().map(|f| f.display().to_string()).collect(),
+            width: film.width,
+            height: film.height,
+            samples: counts.iter().map(|&n| u64::from(n)).sum(),
+            traced: end.traced,
+            least_samples: counts.iter().copied().min().unwrap_or(0),
+            most_samples: counts.iter().copied().max().unwrap_or(0),
+            stopped: end.why,
+            broken_priorities: end.broken_priorities,
+            broken_samples: end.broken_samples,
+            counters,
+            load_seconds: host.seconds("load scene"),
+            compile_seconds: host.seconds("upload and compile"),
+            seconds: host.seconds("render"),
+            device: gpu.info().name.clone(),
+            passes: table::summarise(&end.times),
+            warnings: scene.warnings.clone(),
+        }
+    }
+}
+
+/// Prints it as the user wants it.
+///
+/// # Errors
+/// As [`print()`].
+pub fn report(args: &Args, summary: &Summary) -> Result<()> {
+    match (args.common.json, args.common.quiet) {
+        (true, _) => print_json(summary),
+        (false, true) => Ok(()),
+        (false, false) => print(&text(summary)),
+    }
+}
+
+fn text(s: &Summary) -> String {
+    let speed = s.traced as f64 * 1e-6 / s.seconds.max(1e-9);
+    let mut text = format!(
+        "{} x {}, {} samples in {:.2} s ({speed:.2} Msamples/s) on {}; loaded in {:.2} s, compiled in {:.2} s\n",
+        s.width, s.height, s.traced, s.seconds, s.device, s.load_seconds, s.compile_seconds
+    );
+    if s.least_samples != s.most_samples {
+        let mean = s.samples as f64 / (f64::from(s.width) * f64::from(s.height));
+        text += &format!("{} to {} samples per pixel, {mean:.2} on average\n", s.least_samples, s.most_samples);
+    }
+    text += &s.stopped.line();
+    if s.broken_priorities > 0 {
+        text += &format!("warning: {} priorities were not finite and counted for nothing\n", s.broken_priorities);
+    }
+    if let Some(c) = &s.counters {
+        let per_ray = c.nodes as f64 / c.rays().max(1) as f64;
+        text += &format!("{} closest-hit rays, {} any-hit rays, {per_ray:.1} nodes each\n", c.closest, c.any);
+    }
+    text + &table::timing_table(&s.passes)
+}

@@ -1,0 +1,158 @@
+//! Files that get their name when they are complete.
+use std::fs::File;
+use std::io::{Error, Result};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use tempfile::NamedTempFile;
+
+/// A file that nobody sees. Where the system can, it has no name, and is gone when the process ends in whatever way;
+/// elsewhere it has a hidden one.
+pub(super) enum Temporary {
+    #[cfg(target_os = "linux")]
+    Nameless(File),
+    Hidden(NamedTempFile),
+}
+
+/// Hidden files that this process has made, complete ones included.
+static HIDDEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// Removes what is not complete. For exits of the process that run no destructors.
+pub fn remove_unfinished() {
+    if let Ok(hidden) = HIDDEN.try_lock() {
+        // A file that was completed has another name by now.
+        hidden.iter().for_each(|path| drop(std::fs::remove_file(path)));
+    }
+}
+
+impl Temporary {
+    pub fn new_in(folder: &Path) -> Result<Self> {
+        #[cfg(target_os = "linux")]
+        if let Ok(file) = linux::nameless(folder) {
+            return Ok(Self::Nameless(file));
+        }
+        builder().tempfile_in(folder).map(noted).map(Self::Hidden)
+    }
+
+    pub fn file(&self) -> &File {
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Nameless(file) => file,
+            Self::Hidden(file) => file.as_file(),
+        }
+    }
+
+    /// Becomes `path`, in the same folder, in the place of what was there.
+    pub fn replace(self, path: &Path) -> Result<()> {
+        self.hidden(path)?.persist(path).map(drop).map_err(|e| e.error)
+    }
+
+    /// Becomes `path`, in the same folder, or if that exists a file with a number in its name, which is returned.
+    pub fn create(self, path: &Path) -> Result<PathBuf> {
+        let mut file = self.hidden(path)?;
+        for number in 1_u32.. {
+            let name = numbered(path, number);
+            file = match file.persist_noclobber(&name) {
+                Ok(_) => return Ok(name),
+                Err(taken) if name.symlink_metadata().is_ok() => taken.file,
+                Err(failed) => return Err(failed.error),
+            };
+        }
+        Err(Error::other("every name is taken"))
+    }
+
+    /// Only what has a name can replace another file, so that a nameless one is hidden first, for a moment.
+    fn hidden(self, path: &Path) -> Result<NamedTempFile> {
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Nameless(file) => linux::named(file, super::folder(path)).map(noted),
+            Self::Hidden(file) => Ok(file),
+        }
+    }
+}
+
+fn noted(file: NamedTempFile) -> NamedTempFile {
+    if let Ok(mut hidden) = HIDDEN.lock() {
+        hidden.push(file.path().to_owned());
+    }
+    file
+}
+
+/// `a.exr`, `a-2.exr`, `a-3.exr`...
+fn numbered(path: &Path, number: u32) -> PathBuf {
+    if number == 1 {
+        return path.to_owned();
+    }
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push(format!("-{number}"));
+    if let Some(extension) = path.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    path.with_file_name(name)
+}
+
+fn builder() -> tempfile::Builder<'static, 'static> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".tallow-").suffix(".part");
+    // The crate's own default, 0600, would hide the image from everybody else; the umask still applies.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder
+}
+
+#[cfg(target_os = "linux")]
+mod linux {
+    use rustix::fs::{AtFlags, CWD, Mode, OFlags, linkat, open};
+    use std::fs::File;
+    use std::io::Result;
+    use std::os::fd::AsRawFd;
+    use std::path::{Path, PathBuf};
+    use tempfile::NamedTempFile;
+
+    /// # Errors
+    /// Where the file system knows no such files, or where they could not be given a name.
+    pub fn nameless(folder: &Path) -> Result<File> {
+        let mode = Mode::from_raw_mode(0o666);
+        let file = File::from(open(folder, OFlags::TMPFILE | OFlags::WRONLY | OFlags::CLOEXEC, mode)?);
+        link(&file).symlink_metadata()?;
+        Ok(file)
+    }
+
+    /// Gives it a hidden name in `folder`, on the file system where it was made.
+    pub fn named(file: File, folder: &Path) -> Result<NamedTempFile> {
+        let link = link(&file);
+        let made =
+            super::builder().make_in(folder, |path| Ok(linkat(CWD, &link, CWD, path, AtFlags::SYMLINK_FOLLOW)?))?;
+        Ok(NamedTempFile::from_parts(file, made.into_temp_path()))
+    }
+
+    /// Where the system shows what a process has opened.
+    fn link(file: &File) -> PathBuf {
+        format!("/proc/self/fd/{}", file.as_raw_fd()).into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_go_before_the_extension() {
+        assert_eq!(numbered(Path::new("x/a.b.exr"), 1), Path::new("x/a.b.exr"));
+        assert_eq!(numbered(Path::new("x/a.b.exr"), 2), Path::new("x/a.b-2.exr"));
+        assert_eq!(numbered(Path::new("trace"), 3), Path::new("trace-3"));
+    }
+
+    #[test]
+    fn hidden_files_are_removed_by_hand_and_complete_ones_are_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let hidden = || Temporary::Hidden(noted(builder().tempfile_in(folder.path()).unwrap()));
+        let count = || std::fs::read_dir(folder.path()).unwrap().count();
+        let unfinished = hidden();
+        hidden().replace(&folder.path().join("a.exr")).unwrap();
+        assert_eq!(hidden().create(&folder.path().join("a.exr")).unwrap(), folder.path().join("a-2.exr"));
+        assert_eq!(count(), 3);
+        remove_unfinished();
+        assert_eq!(count(), 2, "{unfinished:?}", unfinished = unfinished.file());
+    }
+}

@@ -1,0 +1,89 @@
+//! The built program while it runs, and signals to it.
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
+
+/// A small film.
+pub const SMALL: &str = "--width 96 --height 80 --max-depth 3 --quiet";
+/// A render that ends by itself only after days.
+pub const LONG: &str = "--width 96 --height 80 --max-depth 3 --quiet --spp 10000000";
+/// Writes checkpoints all the time.
+pub const OFTEN: &str = "--checkpoint 0.000001";
+
+/// What is rendered.
+pub fn scene() -> String {
+    format!("{}/scenes/cornell-box/scene.toml", env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The program with these words.
+pub fn command(folder: &Path, words: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tallow"));
+    command.current_dir(folder).args(words.split_whitespace());
+    command
+}
+
+/// A process, and where it runs.
+pub struct Running {
+    /// It is killed when this is dropped.
+    child: Child,
+    folder: PathBuf,
+}
+
+impl Running {
+    pub fn start(mut command: Command, folder: &Path) -> Self {
+        let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        Self { child, folder: folder.to_owned() }
+    }
+
+    /// Waits until `done` says so.
+    #[track_caller]
+    pub fn until(&mut self, what: &str, done: impl Fn(&Path) -> bool) {
+        while !done(&self.folder) {
+            let ended = self.child.try_wait().unwrap();
+            assert!(ended.is_none() || done(&self.folder), "it ended before {what}: {ended:?}");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    /// Waits for a file.
+    #[track_caller]
+    pub fn until_there_is(&mut self, name: &str) {
+        self.until(name, |folder| folder.join(name).exists());
+    }
+
+    /// Waits until it listens to signals.
+    #[track_caller]
+    pub fn until_it_listens(&mut self) {
+        let status = format!("/proc/{}/status", self.id());
+        let caught = |line: &str| u64::from_str_radix(line.trim(), 16).unwrap() & (1 << 1) != 0;
+        self.until("it listened", |_| {
+            let status = std::fs::read_to_string(&status).unwrap_or_default();
+            status.lines().find_map(|line| line.strip_prefix("SigCgt:")).is_some_and(caught)
+        });
+    }
+
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Sends signals, one right after the other.
+    pub fn send(&self, signals: &[&str]) {
+        // Of the shell: a bare system has no program of that name.
+        let script = signals.iter().map(|signal| format!("kill -{signal} {};", self.id())).collect::<String>();
+        assert!(Command::new("sh").args(["-c", &script]).status().unwrap().success());
+    }
+
+    /// Waits for its end.
+    pub fn end(mut self) -> Output {
+        let mut stderr = Vec::new();
+        std::io::Read::read_to_end(self.child.stderr.as_mut().unwrap(), &mut stderr).unwrap();
+        Output { status: self.child.wait().unwrap(), stdout: Vec::new(), stderr }
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
