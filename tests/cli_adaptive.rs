@@ -89,7 +89,7 @@ fn resuming_with_more_samples_is_one_render() {
 fn interrupted(words: &str, spp: u32) {
     let folder = tempfile::tempdir().unwrap();
     let words = format!("--width 192 --height 160 --max-depth 4 --spp {spp} --quiet {words}");
-    let mut child = command(&folder, &format!("render {} {words} --checkpoint 0.001 -o part.exr", scene()))
+    let mut child = command(&folder, &format!("render {} {words} --checkpoint 0.000001 -o part.exr", scene()))
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
@@ -119,10 +119,10 @@ fn interrupted(words: &str, spp: u32) {
 
 #[test]
 fn ctrl_c_writes_what_there_is_and_resuming_completes_it() {
-    interrupted("", 500);
-    interrupted("--allocate variance --rounds 20", 500);
-    interrupted("--allocate threshold --min-spp 2 --max-spp 96", 500);
-    interrupted("--noise-threshold 0.001", 500);
+    interrupted("", 250);
+    interrupted("--allocate variance --rounds 20", 250);
+    interrupted("--allocate threshold --min-spp 2 --max-spp 96", 250);
+    interrupted("--noise-threshold 0.001", 250);
 }
 
 #[test]
