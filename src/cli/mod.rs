@@ -33,7 +33,7 @@ Exit codes:
   1    a limit given with --max-... or --min-... is exceeded
   2    usage: an option or a setting is wrong
   3    input: a file cannot be read or is damaged
-  4    device: no Vulkan, no usable device, or it was lost
+  4    device or memory: no Vulkan, no usable device, it was lost, or memory is out
   5    output: a file cannot be written
   70   internal error: a bug, please report it
   130  interrupted (Ctrl-C)";
