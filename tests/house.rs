@@ -43,6 +43,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("memory", &["error"]),
     ("threads", &[]),
     ("report", &["error", "gpu"]),
+    ("guide", &[]),
     ("schedule", &["settings"]),
     ("settings", &["allocate", "error"]),
     ("statistics", &["gpu::layout"]),

@@ -54,7 +54,7 @@ fn a_small_scene_becomes_arrays() {
     assert_eq!(scene.camera.right[0], scene.camera.up[1] * 2.0, "twice as wide as high");
     assert_eq!((scene.lights.len(), scene.warnings.len()), (2, 0));
     let (found, why) = effects(&scene, false, false);
-    assert_eq!(found, Effects { diffuse: true, emissive: true, ..Effects::default() });
+    assert_eq!(found, Effects { diffuse: true, emissive: true, large_lamps: true, ..Effects::default() });
     assert_eq!(why[1].1, "material \"lamp\"");
     let wide = Scene::parse(Path::new("s.toml"), BOX, &|s| s.width = 64).unwrap();
     assert_eq!(wide.camera.right[0], wide.camera.up[1] * 4.0, "the camera follows the override");
