@@ -152,6 +152,7 @@ Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         Facing facing = facing_normals(s, -path.direction, turns, bsdf_is_specular(bsdf));
         mat3 basis = basis_from_normal(facing.normal);
         vec3 wo = -path.direction * basis;
+        bsdf_view(bsdf, wo);
         bool smooth_here = bsdf_is_delta(bsdf);
         if (bounce == 0u) {
             albedo = bsdf_albedo(bsdf, wo.z);

@@ -20,6 +20,10 @@ struct Bsdf {
     uint coat_table;
     bool nonlinear;
     bool ggx;
+    // What `bsdf_view` finds of a coat, once for all that asks for it.
+    float coat_row;     // of the table at this roughness
+    float coat_outside; // the share of light from the viewer that the coat does not let in
+    float coat_inside;  // the mean share that it reflects of light from inside
 };
 
 // weight = f |cos| / pdf. A delta lobe has pdf 0 and carries its probability in the weight alone.
@@ -93,7 +97,7 @@ float coat_probability(Bsdf b, float f) {
 
 // Twin: reference/coat.rs, which says what the table holds. `column` is an index, or lies between two of cosines.
 float coat_entry(Bsdf b, float column) {
-    float row = (log2(max(b.alpha, SMOOTH_ALPHA)) * (1.0 / 6.643856189774724) + 1.0) * float(COAT_ROWS - 1u);
+    float row = b.coat_row;
     int i = min(int(row), int(COAT_ROWS) - 2), j = min(int(column), int(COAT_COLUMNS) - 2);
     int at = int(b.coat_table) + i * int(COAT_COLUMNS) + j;
     uvec4 words = uvec4(texelFetch(texels, at).x, texelFetch(texels, at + 1).x, texelFetch(texels, at + int(COAT_COLUMNS)).x,
@@ -109,15 +113,21 @@ float coat_outside(Bsdf b, float c) {
     return coat_entry(b, sqrt(clamp(c, 0.0, 1.0)) * float(COAT_COLUMNS - 2u));
 }
 
+// To be called before a material is evaluated or sampled.
+void bsdf_view(inout Bsdf b, vec3 wo) {
+    if (!is_kind(FX_COATED, b, BSDF_COATED)) return;
+    b.coat_row = (log2(max(b.alpha, SMOOTH_ALPHA)) * (1.0 / 6.643856189774724) + 1.0) * float(COAT_ROWS - 1u);
+    b.coat_outside = coat_outside(b, wo.z);
+    b.coat_inside = is_smooth(b) ? b.internal_fresnel : coat_entry(b, float(COAT_COLUMNS - 1u));
+}
+
 // Mitsuba 3's `plastic` and `roughplastic`: light enters and leaves through the interface, and what that reflects inwards adds
 // up to 1 / (1 - its mean), `nonlinear` with the base's colour in each reflection.
 // rgb multiplies the diffuse base, w is the probability of the coat's lobe.
-vec4 coat(Bsdf b, vec3 wo, vec3 wi) {
-    float fo = coat_outside(b, wo.z);
+vec4 coat(Bsdf b, vec3 wi) {
+    float fo = b.coat_outside;
     float fi = coat_outside(b, wi.z);
-    float inside = b.internal_fresnel;
-    if (!is_smooth(b)) inside = coat_entry(b, float(COAT_COLUMNS - 1u));
-    vec3 back = b.nonlinear ? b.albedo * inside : vec3(inside);
+    vec3 back = b.nonlinear ? b.albedo * b.coat_inside : vec3(b.coat_inside);
     return vec4((1.0 - fo) * (1.0 - fi) / (b.eta.x * b.eta.x * (1.0 - back)), coat_probability(b, fo));
 }
 
@@ -135,7 +145,7 @@ vec4 bsdf_evaluate(Bsdf b, vec3 wo, vec3 wi) {
     vec4 value = glass || metal ? vec4(0.0) : evaluate_diffuse(b, wi);
     float share = 1.0; // of the samples
     if (coated) {
-        vec4 c = coat(b, wo, wi);
+        vec4 c = coat(b, wi);
         value *= vec4(c.xyz, 1.0 - c.w);
         share = c.w;
     }
@@ -179,7 +189,7 @@ bool bsdf_sample(Bsdf b, vec3 wo, float u_lobe, vec2 u, out BsdfSample s) {
         s.weight *= fresnel_conductor(co, b.eta, b.k);
     } else {
         vec2 f = fresnel_dielectric(coated ? above.z : co, eta);
-        if (coated && !s.delta) f.x = coat_outside(b, above.z);
+        if (coated) f.x = b.coat_outside;
         float p = coated ? coat_probability(b, f.x) : f.x;
         bool first = u_lobe < p;
         if (coated) {

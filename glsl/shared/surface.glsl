@@ -217,6 +217,9 @@ Bsdf surface_bsdf(Surface s) {
     b.specular = vec3(0.0);
     b.internal_fresnel = 0.0;
     b.coat_table = 0u;
+    b.coat_row = 0.0;
+    b.coat_outside = 0.0;
+    b.coat_inside = 0.0;
     b.nonlinear = (s.flags & MATERIAL_NONLINEAR) != 0u;
     if (FX_CONDUCTOR || FX_DIELECTRIC || FX_COATED) {
         b.eta = uintBitsToFloat(material_texel(s.material, 2u).xyz);
