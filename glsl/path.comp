@@ -6,13 +6,14 @@
 #include "shared/thread.glsl"
 #include "shared/scene.glsl"
 #include "shared/finite.glsl"
+#include "shared/paired.glsl"
 
 // One camera path per thread: next event estimation and BSDF sampling joined by the balance heuristic (Veach 1997).
 // Thread i traces sample first_sample + i / pixels of pixel first_pixel + i % pixels, or path i of a list, and writes 1 vec4 (radiance), or
 // with FX_SPLIT 3 (direct, indirect, the albedo that indirect is to be divided by); w of the first is the number of its rays, less
 // than 0 where the light was no number: such a sample is black.
 layout(local_size_x_id = 100) in;
-layout(scalar, binding = 11) writeonly buffer Samples { vec4 samples[]; };
+layout(scalar, binding = 11) writeonly buffer Samples { u64vec2 samples[]; }; // of vec4
 layout(scalar, binding = 12) buffer Counters { uint counters[]; };
 layout(binding = 13) uniform usamplerBuffer paths; // of uvec2
 layout(scalar, binding = 14) buffer Broken { BrokenTally broken[]; };
@@ -213,11 +214,11 @@ void main() {
         atomicMax(broken[0].lowest, ~pixel);
     }
     if (FX_SPLIT) {
-        samples[3u * i] = vec4(light.direct, rays);
-        samples[3u * i + 1u] = vec4(light.indirect, 0.0);
-        samples[3u * i + 2u] = vec4(albedo, 0.0);
+        samples[3u * i] = paired(vec4(light.direct, rays));
+        samples[3u * i + 1u] = paired(vec4(light.indirect, 0.0));
+        samples[3u * i + 2u] = paired(vec4(albedo, 0.0));
     } else {
-        samples[i] = vec4(light.direct + light.indirect, rays);
+        samples[i] = paired(vec4(light.direct + light.indirect, rays));
     }
     if (FX_COUNTERS) {
         count(0u, closest_rays);
