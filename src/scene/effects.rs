@@ -101,6 +101,9 @@ fn other_effects(
         bent.and_then(|i| scene.triangles.get(i)).map(|t| t.object as usize).and_then(|o| scene.names.objects.get(o));
     let named = format!("object \"{}\"", object.map_or("", |o| o));
     found.smooth_normals = because("smooth_normals", bent.is_some(), named);
+    let ball = scene.triangles.iter().find(|t| t.primitive & SPHERE != 0);
+    let object = ball.and_then(|t| scene.names.objects.get(t.object as usize));
+    found.spheres = because("spheres", ball.is_some(), format!("object \"{}\"", object.map_or("", |o| o)));
     found.lens = because("lens", scene.camera.lens_radius > 0.0, "camera lens_radius".into());
     let instances = scene.instances.len();
     found.instances = because("instances", instances > 0, format!("{instances} instances"));

@@ -101,4 +101,6 @@ effects! {
     many_samples: FX_MANY_SAMPLES;
     /// Emissive triangles large enough to be sampled by solid angle.
     large_lamps: FX_LARGE_LAMPS;
+    /// Exact spheres among the triangles.
+    spheres: FX_SPHERES;
 }
