@@ -63,7 +63,7 @@ fn light_effects(scene: &Scene, found: &mut Effects, reasons: &mut Vec<(&'static
         let first = scene.lights.iter().position(|l| l.kind == kind);
         first.inspect(|&i| reasons.push((name, light_name(scene, i)))).is_some()
     };
-    found.emissive = light("emissive", LIGHT_TRIANGLE);
+    found.emissive = light("emissive", LIGHT_TRIANGLE) || light("emissive", LIGHT_SPHERE);
     found.point_lights = light("point_lights", LIGHT_POINT);
     found.spot_lights = light("spot_lights", LIGHT_SPOT);
     found.directional_lights = light("directional_lights", LIGHT_DIRECTIONAL);

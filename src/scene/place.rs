@@ -5,7 +5,7 @@ use super::geometry::{Corners, Geometry, Placement, Repairs, Tag, TooFar};
 use super::obj::ObjFile;
 use super::shape::Shape;
 use crate::error::{Error, Result};
-use crate::gpu::layout::{Instance, NONE};
+use crate::gpu::layout::{Instance, MATERIAL_MASKED, Material, NONE};
 use crate::memory;
 use glam::{DAffine3, DMat3, Vec2, Vec3};
 use std::collections::HashMap;
@@ -118,11 +118,14 @@ impl Assembly<'_> {
         Ok(plan)
     }
 
-    /// Whether a sphere can be stored as one, whatever its transform: if it is no lamp.
+    /// Whether a sphere can be stored as one, where `job` places it in the world. Lamps are chosen by the cone in which
+    /// they are seen: that takes a sphere of even radiance which emits outward.
     fn may_be_exact(&self, job: &Job) -> Result<bool> {
-        let worn = self.override_of(job)?;
-        Ok(is_sphere(&self.description.mesh[job.mesh])
-            && worn.is_none_or(|m| self.library.materials.list[m as usize].emission == [0.0; 3]))
+        let table = &self.description.mesh[job.mesh];
+        let even = |m: &Material| m.emission_texture == NONE && m.flags & MATERIAL_MASKED == 0;
+        let lamp = self.override_of(job)?.map(|m| &self.library.materials.list[m as usize]);
+        let lamp = lamp.filter(|m| m.emission != [0.0; 3]);
+        Ok(is_sphere(table) && lamp.is_none_or(|m| even(m) && is_even(&job.affine) && !table.flip_normals))
     }
 
     fn invertible(&self, affine: DAffine3, place: &str) -> Result<DAffine3> {

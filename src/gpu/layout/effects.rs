@@ -65,7 +65,7 @@ effects! {
     beckmann: FX_BECKMANN;
     /// The GGX distribution.
     ggx: FX_GGX;
-    /// Emissive triangles.
+    /// Emissive triangles or spheres.
     emissive: FX_EMISSIVE;
     /// Point lights.
     point_lights: FX_POINT;
