@@ -2,7 +2,9 @@
 //! the arrays are there to be edited.
 use super::{Environment, Scene, bvh};
 use crate::error::{Error, Result};
-use crate::gpu::layout::{AliasEntry, BvhNode, Camera, Light, LIGHT_SPHERE, LIGHT_TRIANGLE, Material, NONE, TRAVERSAL_STACK, Texture};
+use crate::gpu::layout::{
+    AliasEntry, BvhNode, Camera, LIGHT_SPHERE, LIGHT_TRIANGLE, Light, Material, NONE, TRAVERSAL_STACK, Texture,
+};
 
 type Checked = std::result::Result<(), String>;
 
