@@ -92,6 +92,37 @@ fn wide_sky() -> Scene {
     scene
 }
 
+/// Exact spheres of every kind: of glass, masked, with maps, as lamps, mirrored and stretched instances.
+fn spheres() -> Scene {
+    let bumps = |x: u32, y: u32| [128 + (x * 7 % 60) as u8, 128 + (y * 5 % 60) as u8, 235];
+    let place = Workplace::new()
+        .picture(
+            "checks.png",
+            32,
+            |x, y| if (x / 4 + y / 4).is_multiple_of(2) { [230, 120, 40] } else { [60, 150, 220] },
+        )
+        .picture("bumps.png", 32, bumps);
+    let mut scene = place.scene(
+        "[camera]\nposition = [0.0, 1.4, 5.0]\ntarget = [0.0, 0.7, 0.0]\nfov = 45.0\n[render]\nmax_depth = 4\n\
+         [environment]\nradiance = 0.3\n[[material]]\nname = 'lamp'\nemission = 9.0\n\
+         [[material]]\nname = 'glass'\ntype = 'dielectric'\n[[material]]\nname = 'bumpy'\ntype = 'coated'\nalpha = 0.2\n\
+         color_texture = 'checks.png'\nbump = 'checks.png'\nbump_scale = 0.05\n\
+         [[material]]\nname = 'mapped'\nnormal_map = 'bumps.png'\nopacity = 0.8\nopacity_texture = 'checks.png'\n\
+         [[mesh]]\nshape = 'rectangle'\ntransform = { rotate = [-90.0, 0.0, 0.0], scale = 4.0 }\n\
+         [[mesh]]\nshape = 'sphere'\nmaterial = 'lamp'\ntransform = { scale = 0.2, translate = [0.4, 1.8, 1.0] }\n\
+         [[mesh]]\nshape = 'sphere'\nmaterial = 'glass'\ntransform = { scale = 0.5, translate = [1.3, 0.5, 1.0] }\n\
+         [[mesh]]\nshape = 'sphere'\nmaterial = 'mapped'\ntransform = { scale = 0.5, translate = [-0.2, 0.5, 1.2] }\n\
+         [[mesh]]\nshape = 'sphere'\nflip_normals = true\ntransform = { scale = 30.0 }\n\
+         [[mesh]]\nname = 'ball'\nshape = 'sphere'\nmaterial = 'bumpy'\ntransform = { rotate = [0.0, 30.0, 10.0] }\n\
+         [[instance]]\nmesh = 'ball'\ntransform = { translate = [-1.2, 0.7, 0.0], scale = [0.7, 0.7, -0.7] }\n\
+         [[instance]]\nmesh = 'ball'\ntransform = { translate = [0.4, 0.8, -0.9], rotate = [20.0, 50.0, 0.0], scale = [0.5, 0.8, 1.0] }\n\
+         [[instance]]\nmesh = 'ball'\nmaterial = 'lamp'\ntransform = { translate = [2.5, 2.6, -0.5], scale = 0.1 }\n",
+    );
+    assert!(scene.triangles.len() == 7 && scene.lights.iter().filter(|l| l.kind == LIGHT_SPHERE).count() == 2);
+    small(&mut scene.settings);
+    scene
+}
+
 /// Everything that a render leaves behind, and the twin's answers to the same questions.
 struct Pair {
     samples: [Vec<Vec3>; 2],
@@ -188,6 +219,7 @@ fn renders_agree_with_their_twins() {
     let mut panel = under_a_panel();
     small(&mut panel.settings);
     check("panel", &run(&gpu, &panel, called_for(&panel, outputs)));
+    check("spheres", &run(&gpu, &spheres(), called_for(&spheres(), outputs)));
     let scene = pictures();
     let mut pair = run(&gpu, &scene, called_for(&scene, outputs));
     check("pictures", &pair);
@@ -354,7 +386,7 @@ fn differing(scene: &Scene, rays: &[RayQuery], hits: &[RayHit], any_hit: bool) -
 fn traversal_agrees_with_its_twin() {
     let gpu = gpu();
     let mut scenes = SCENES.map(|file| (file, shipped(file))).to_vec();
-    scenes.push(("pictures", pictures()));
+    scenes.extend([("pictures", pictures()), ("spheres", spheres())]);
     for (name, scene) in &scenes {
         let rays = queries(scene, 5000);
         for effects in [called_for(scene, Outputs::default()), all_effects(scene)] {

@@ -165,6 +165,31 @@ void sample_triangle_light(vec3 p, vec3 a, vec3 b, vec3 c, float chosen, vec2 u,
     s.radiance = lit ? radiance / s.pdf : vec3(0.0);
 }
 
+// 1 - cosine of half the angle that a sphere takes up, seen from outside; 0 from inside. Exact for small ones.
+float sphere_cap(vec3 to_centre, float radius) {
+    float sine2 = radius * radius / max(dot(to_centre, to_centre), 1e-37);
+    return sine2 < 1.0 ? sine2 / (1.0 + sqrt(1.0 - sine2)) : 0.0;
+}
+
+// Uniform by solid angle in the cone of the sphere. The point follows from the cone's own sine: a far sphere is smaller than
+// the rounding of a direction times its distance.
+void sample_sphere_light(vec3 p, vec3 centre, float radius, float chosen, vec2 u, vec3 radiance, inout LightSample s) {
+    vec3 to_centre = centre - p;
+    float cap = sphere_cap(to_centre, radius), distance;
+    vec3 axis = unit_vector(to_centre, distance), w = warp_cone(u, cap);
+    float sine2 = dot(w.xy, w.xy);
+    float along = distance * w.z - sqrt(max(radius * radius - distance * distance * sine2, 0.0));
+    vec2 across = w.xy * (along / radius);
+    vec3 n = basis_from_normal(axis) * vec3(across, -sqrt(max(1.0 - dot(across, across), 0.0)));
+    vec3 to_light = to_centre + (radius + plane_clearance(n, abs(centre), vec3(radius), vec3(0.0))) * n;
+    float d2 = dot(to_light, to_light);
+    s.distance = sqrt(d2);
+    s.direction = to_light / s.distance;
+    bool lit = cap > 0.0 && d2 > 0.0 && dot(n, s.direction) < 0.0;
+    s.pdf = lit ? chosen / (2.0 * PI * cap) : 0.0;
+    s.radiance = lit ? radiance / s.pdf : vec3(0.0);
+}
+
 // One light for the surface point `p`. Radiance is 0 when the light cannot reach the point.
 LightSample light_sample(vec3 p, uint word, vec2 u) {
     LightSample s = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0);
@@ -176,6 +201,8 @@ LightSample light_sample(vec3 p, uint word, vec2 u) {
     uint kind = w0.w;
     if (FX_EMISSIVE && kind == LIGHT_TRIANGLE) {
         sample_triangle_light(p, a, b, c, chosen, u, w3, light, s);
+    } else if (FX_EMISSIVE && FX_SPHERES && kind == LIGHT_SPHERE) {
+        sample_sphere_light(p, a, b.x, chosen, u, value, s);
     } else if ((FX_POINT && kind == LIGHT_POINT) || (FX_SPOT && kind == LIGHT_SPOT)) {
         vec3 to_light = a - p;
         float d2 = max(dot(to_light, to_light), 1e-30);
@@ -197,9 +224,13 @@ LightSample light_sample(vec3 p, uint word, vec2 u) {
     return s;
 }
 
-// Density per solid angle with which light_sample chooses, from `origin`, a point of an emissive triangle hit by a ray.
+// Density per solid angle with which light_sample chooses, from `origin`, a point of an emissive triangle or sphere hit by a ray.
 float triangle_light_pdf(Surface s, vec3 origin, float t, float cosine) {
     float density = push.triangle_pdf_scale * uintBitsToFloat(material_texel(s.material, 7u).z); // over area
+    if (FX_SPHERES && s.radius > 0.0) {
+        float cap = sphere_cap(s.corner - origin, s.radius);
+        return cap > 0.0 ? density * 2.0 * s.radius * s.radius / cap : 0.0; // times the area, over 2 pi times the cap
+    }
     if (FX_LARGE_LAMPS) {
         float doubled_area;
         unit_vector(cross(s.e1, s.e2), doubled_area);

@@ -43,7 +43,10 @@ uint material_of(uint triangle, uint instance) {
     return material;
 }
 
+#include "shared/sphere.glsl"
+
 vec2 texture_coordinates(uint triangle, vec2 barycentric) {
+    if (FX_SPHERES && is_sphere(triangle)) return sphere_coordinates(sphere_of(triangle), octahedral_vector(barycentric));
     int at = int(3u * triangle);
     vec4 a = uintBitsToFloat(texelFetch(shading, at));
     vec4 b = uintBitsToFloat(texelFetch(shading, at + 1));

@@ -11,6 +11,7 @@ struct Surface {
     uint object;
     vec2 uv;
     vec3 corner, e1, e2; // the triangle in world space: its first vertex, and the edges from there
+    float radius;    // of a sphere, whose centre is `corner`; 0 of a triangle
     float clearance; // distance from the plane at which rays start, world units
 };
 
@@ -83,7 +84,49 @@ vec3 magnitude(mat4x3 m, vec3 p) {
     return abs(m[0]) * p.x + abs(m[1]) * p.y + abs(m[2]) * p.z + abs(m[3]);
 }
 
+// As surface_at, for a hit on a sphere. The point lies on it again, wherever along the ray it was met.
+Surface sphere_at(Hit hit) {
+    Surface s;
+    Sphere ball = sphere_of(hit.triangle);
+    vec3 n = octahedral_vector(vec2(hit.b1, hit.b2)), side = sphere_side(ball);
+    float radius = length(ball.pole);
+    vec3 reach = abs(ball.centre), point = radius * n;
+    // Derivatives of the point by u and v.
+    float equator = length(vec2(dot(n, ball.meridian), dot(n, side))) / radius; // distance from the axis
+    vec3 around = (dot(n, ball.meridian) * side - dot(n, side) * ball.meridian) / radius;
+    vec3 e1 = 2.0 * PI * around, e2 = (ball.pole - dot(n, ball.pole) * n) * (PI / max(equator, 1e-6));
+    s.object = triangle_object(hit.triangle);
+    s.material = material_of(hit.triangle, hit.instance);
+    s.corner = ball.centre;
+    s.geometric = n;
+    if (FX_INSTANCES && hit.instance != NONE) {
+        mat4x3 world = instance_matrix(hit.instance, 0);
+        mat4x3 object = instance_matrix(hit.instance, 3);
+        float len;
+        s.geometric = unit_vector(transpose(mat3(object)) * n, len);
+        s.corner = world * vec4(ball.centre, 1.0);
+        reach = magnitude(world, magnitude(object, abs(s.corner)));
+        point = mat3(world) * point;
+        e1 = mat3(world) * e1;
+        e2 = mat3(world) * e2;
+        radius = length(mat3(world) * ball.pole);
+        s.object += instance_words(hit.instance).z;
+    }
+    if ((ball.flags & SPHERE_INWARD) != 0u) s.geometric = -s.geometric;
+    s.flags = material_texel(s.material, 3u).w;
+    s.position = s.corner + point;
+    s.e1 = s.e2 = vec3(0.0);
+    s.radius = radius;
+    s.clearance = plane_clearance(s.geometric, reach, point, vec3(radius));
+    s.smooth_normal = s.normal = s.geometric;
+    s.uv = vec2(0.0);
+    if (FX_TEXTURES || FX_BUMP_MAPS || FX_NORMAL_MAPS) s.uv = sphere_coordinates(ball, n);
+    if (FX_BUMP_MAPS || FX_NORMAL_MAPS) s.normal = perturbed_normal(s, e1, e2, vec2(1.0, 0.0), vec2(0.0, 1.0));
+    return s;
+}
+
 Surface surface_at(Hit hit) {
+    if (FX_SPHERES && is_sphere(hit.triangle)) return sphere_at(hit);
     Surface s;
     vec3 p0 = triangle_vertex(hit.triangle, 0);
     vec3 e1 = triangle_vertex(hit.triangle, 1) - p0;
@@ -111,6 +154,7 @@ Surface surface_at(Hit hit) {
     s.corner = p0;
     s.e1 = e1;
     s.e2 = e2;
+    s.radius = 0.0;
     vec3 scaled = mirrored ? cross(e2, e1) : cross(e1, e2);
     float doubled_area;
     s.geometric = unit_vector(scaled, doubled_area); // a needle that rounds to no area scatters nothing

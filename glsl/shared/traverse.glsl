@@ -8,7 +8,7 @@ struct Hit {
     float t;          // in lengths of the ray's direction
     uint triangle;    // leaf order; NONE on a miss
     uint instance;    // NONE without instances
-    float b1, b2;     // weights of vertices 1 and 2
+    float b1, b2;     // weights of vertices 1 and 2; of a sphere, see sphere.glsl
 };
 
 // A ray and what it asks for: hits before `t_max`, in lengths of `direction`.
@@ -47,7 +47,7 @@ uvec2 pop_group(inout uint depth) {
 // multiply-adds). Two axes change places where the paper permutes three: that mirrors triangles, and both windings hit.
 struct RaySpace {
     vec3 origin;
-    vec3 direction; // world rays only: what an instance transforms
+    vec3 direction; // what an instance transforms, and spheres need
     vec3 inverse;   // of the direction
     vec3 shear;     // takes the direction to (0, 0, 1) once its largest component is the last
     bool along_x;   // the largest component is x
@@ -99,6 +99,34 @@ bool intersect_triangle(RaySpace r, uint index, float t_max, out float t, out ve
     barycentric = vec2(v, w) * inv;
     t = (u * inv * a.z + barycentric.x * b.z + barycentric.y * c.z) * r.shear.z;
     return inside && det != 0.0 && t > 0.0 && t < t_max;
+}
+
+// The point of the ray that is nearest to the centre comes first, in two steps: what is left of it along the ray would count
+// for a far or small sphere (after Haines, Guenther, Akenine-Moeller 2019, Ray Tracing Gems, chapter 7). Half the chord
+// leads from there to both hits. A ray that `leaves` the sphere meets only its far side. A mask decides on each side.
+bool intersect_sphere(RaySpace r, uint index, uint instance, float t_max, bool leaves, uint mask_seed, out float t,
+                      out vec2 normal) {
+    vec3 pole = triangle_vertex(index, 1), from_centre = r.origin - triangle_vertex(index, 0);
+    float inverse = inversesqrt(dot(r.direction, r.direction));
+    vec3 d = r.direction * inverse;
+    float along = dot(from_centre, d);
+    vec3 nearest = from_centre - along * d;
+    float rest = dot(nearest, d);
+    nearest -= rest * d;
+    along += rest;
+    float squared = dot(pole, pole) - dot(nearest, nearest);
+    float chord = sqrt(max(squared, 0.0)); // half of it
+    bool enters = !leaves && -along - chord > 0.0;
+    normal = octahedral_point(nearest + (enters ? -chord : chord) * d);
+    if (FX_ALPHA_MASKS) {
+        if (enters && squared >= 0.0 && !mask_blocks(index, instance, normal, mask_seed)) {
+            enters = false;
+            normal = octahedral_point(nearest + chord * d);
+        }
+        if (!enters && squared >= 0.0 && !mask_blocks(index, instance, normal, ~mask_seed)) return false;
+    }
+    t = ((enters ? -chord : chord) - along) * inverse;
+    return squared >= 0.0 && t > 0.0 && t < t_max;
 }
 
 // Distances to planes round at 2^-24 in four steps each, near and far; boxes that share a face must not part (Ize 2013).
@@ -192,7 +220,8 @@ void enter_instance(inout Traversal t, RaySpace world, uvec2 leaves) {
 // so that those miss no cache, a lane without triangles stays at the one that it tested last, or at the first of the scene.
 // An any hit ends the loop one triangle late: what to fetch next then waits for no test, and tests overlap.
 // What lives from round to round is scalar: vectors would be copied.
-bool intersect_triangles(inout Hit hit, RaySpace ray, uint first, uint left, uint instance, bool any_hit, uvec2 from) {
+bool intersect_triangles(inout Hit hit, RaySpace ray, uint first, uint left, uint instance, bool any_hit, uint mask_seed,
+                         uvec2 from) {
     bool found = false;
     if (left != 0u) do {
         uint index = first + take_highest(left);
@@ -201,6 +230,11 @@ bool intersect_triangles(inout Hit hit, RaySpace ray, uint first, uint left, uin
         vec2 barycentric;
         bool meets = intersect_triangle(ray, index, hit.t, distance, barycentric) && !(found && any_hit) &&
                      (index != from.x || (FX_INSTANCES && instance != from.y));
+        if (FX_SPHERES && is_sphere(index)) {
+            bool leaves = index == from.x && (!FX_INSTANCES || instance == from.y);
+            meets = intersect_sphere(ray, index, instance, hit.t, leaves, mask_seed, distance, barycentric) &&
+                    !(found && any_hit);
+        }
         if (meets) {
             hit.t = distance;
             hit.triangle = index;
@@ -216,14 +250,15 @@ bool intersect_triangles(inout Hit hit, RaySpace ray, uint first, uint left, uin
 // A mask is looked up of the nearest triangle alone; where it lets the ray pass, the others are tested again.
 void intersect_leaves(inout Hit hit, RaySpace ray, uvec2 leaves, uint instance, bool any_hit, uint mask_seed, uvec2 from) {
     if (!FX_ALPHA_MASKS) {
-        intersect_triangles(hit, ray, leaves.x, leaves.y, instance, any_hit, from);
+        intersect_triangles(hit, ray, leaves.x, leaves.y, instance, any_hit, mask_seed, from);
         return;
     }
     bool passes;
     if (leaves.y != 0u) do {
         Hit next = hit;
-        bool found = intersect_triangles(next, ray, leaves.x, leaves.y, instance, any_hit, from);
+        bool found = intersect_triangles(next, ray, leaves.x, leaves.y, instance, any_hit, mask_seed, from);
         passes = found && !mask_blocks(next.triangle, instance, vec2(next.b1, next.b2), mask_seed);
+        if (FX_SPHERES && found) passes = passes && !is_sphere(next.triangle); // which has asked for each side
         if (passes) leaves.y &= ~(1u << (next.triangle - leaves.x));
         else hit = next;
     } while (passes && leaves.y != 0u);
@@ -231,7 +266,7 @@ void intersect_leaves(inout Hit hit, RaySpace ray, uvec2 leaves, uint instance, 
 
 // Visits one node below `root` (with ROOT_OF_INSTANCES, a level of instances) and its triangles; true when nothing is
 // left to visit, or with `any_hit` a triangle is found. `from` is the triangle that the ray leaves, and its instance: a
-// plane is not met twice, but the offset of the origin can be smaller than the error of a large triangle's distance.
+// plane is not met twice, nor the near side of a sphere, but the offset of the origin can be smaller than the error of a large triangle's distance.
 bool traversal_step(inout Traversal t, RaySpace world, bool any_hit, uint root, uint mask_seed, uvec2 from) {
     bool two_levels = FX_INSTANCES && (root & ROOT_OF_INSTANCES) != 0u;
     RaySpace ray = world;

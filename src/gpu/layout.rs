@@ -64,6 +64,12 @@ constants! {
     TRAVERSAL_STACK = 32;
     /// Set in [`PathPush::root`] when the leaves of that level are instances.
     ROOT_OF_INSTANCES = 0x80000000;
+    /// Set in [`Triangle::primitive`] of a sphere.
+    SPHERE = 0x80000000;
+    /// [`Triangle::primitive`] of a sphere: its front side is the inner one.
+    SPHERE_INWARD = 1;
+    /// [`Triangle::primitive`] of a sphere: its azimuth runs the other way, as a mirror shows it.
+    SPHERE_MIRRORED = 2;
     /// [`Material::kind`]: Lambertian reflection, `base_color / pi`.
     BSDF_DIFFUSE = 0;
     /// [`Material::kind`]: microfacet conductor with exact Fresnel from `eta`, `k`; `alpha` below 0.01 is a mirror.
@@ -100,6 +106,8 @@ constants! {
     LIGHT_DIRECTIONAL = 3;
     /// [`Light::kind`]: the environment; rows of the rotation environment_from_world in `a`, `b`, `c`; radiance scale `value`.
     LIGHT_ENVIRONMENT = 4;
+    /// [`Light::kind`]: sphere around `a` of radius `b.x` (world units), emits radiance `value` outward.
+    LIGHT_SPHERE = 5;
 }
 
 gpu_structs! {
@@ -152,11 +160,12 @@ gpu_structs! {
         max_z: uvec2,
     }
 
-    /// What traversal reads of a triangle, in leaf order. 3 texels.
+    /// What traversal reads of a triangle, in leaf order. 3 texels. One with [`SPHERE`] is a sphere instead: `v0` is its
+    /// centre, `v1` and `v2` lead from there to the pole and to where the meridian of u = 0 crosses the equator.
     struct Triangle {
         /// World units, or object units below an instance.
         v0: vec3,
-        /// Index of the triangle in its mesh file, for reports.
+        /// Index of the triangle in its mesh file, for reports; or SPHERE_ bits.
         primitive: uint,
         /// See `v0`.
         v1: vec3,
@@ -279,11 +288,11 @@ gpu_structs! {
         probability: float,
         /// See the LIGHT_ constants.
         c: vec3,
-        /// Index of the triangle in leaf order (LIGHT_TRIANGLE), else [`NONE`].
+        /// Index of the triangle in leaf order (LIGHT_TRIANGLE, LIGHT_SPHERE), else [`NONE`].
         triangle: uint,
         /// Radiance, intensity or irradiance, linear Rec. 709.
         value: vec3,
-        /// Index of the material (LIGHT_TRIANGLE), else [`NONE`].
+        /// Index of the material (LIGHT_TRIANGLE, LIGHT_SPHERE), else [`NONE`].
         material: uint,
     }
 

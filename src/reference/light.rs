@@ -4,7 +4,7 @@ use crate::reference::sampler::pcg;
 use crate::reference::scene::texture_coordinates;
 use crate::reference::surface::{Surface, plane_clearance, unit_vector};
 use crate::reference::texture::{surface_opacity, texture_sample};
-use crate::reference::warp::{warp_sphere, warp_triangle};
+use crate::reference::warp::{basis_from_normal, warp_cone, warp_sphere, warp_triangle};
 use crate::scene::{Environment, Scene};
 use glam::{Mat3, Vec2, Vec3, Vec3Swizzles, vec2, vec3};
 use std::f32::consts::PI;
@@ -168,6 +168,30 @@ fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> Ligh
     LightSample { direction, distance, radiance: if lit { radiance / pdf } else { Vec3::ZERO }, pdf }
 }
 
+/// 1 - cosine of half the angle that a sphere takes up, seen from outside; 0 from inside.
+fn sphere_cap(to_centre: Vec3, radius: f32) -> f32 {
+    let sine2 = radius * radius / to_centre.length_squared().max(1e-37);
+    if sine2 < 1.0 { sine2 / (1.0 + (1.0 - sine2).sqrt()) } else { 0.0 }
+}
+
+fn sample_sphere_light(light: &Light, p: Vec3, u: Vec2) -> LightSample {
+    let (centre, radius) = (Vec3::from(light.a), light.b[0]);
+    let to_centre = centre - p;
+    let cap = sphere_cap(to_centre, radius);
+    let (axis, distance) = unit_vector(to_centre);
+    let w = warp_cone(u, cap);
+    let squared = radius * radius - distance * distance * w.xy().length_squared();
+    let across = w.xy() * ((distance * w.z - squared.max(0.0).sqrt()) / radius);
+    let n = basis_from_normal(axis) * across.extend(-(1.0 - across.length_squared()).max(0.0).sqrt());
+    let clearance = plane_clearance(n, centre.abs(), Vec3::splat(radius), Vec3::ZERO);
+    let to_light = to_centre + (radius + clearance) * n;
+    let distance = to_light.length();
+    let direction = to_light / distance;
+    let lit = cap > 0.0 && distance > 0.0 && n.dot(direction) < 0.0;
+    let pdf = if lit { light.probability / (2.0 * PI * cap) } else { 0.0 };
+    LightSample { direction, distance, radiance: if lit { Vec3::from(light.value) / pdf } else { Vec3::ZERO }, pdf }
+}
+
 fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
     let to_light = Vec3::from(light.a) - p;
     let d2 = to_light.dot(to_light).max(1e-30);
@@ -188,6 +212,7 @@ pub fn light_sample(scene: &Scene, p: Vec3, word: u32, u: Vec2) -> LightSample {
     let light = &scene.lights[chosen as usize];
     match light.kind {
         LIGHT_TRIANGLE => sample_triangle_light(scene, light, p, u),
+        LIGHT_SPHERE => sample_sphere_light(light, p, u),
         LIGHT_POINT | LIGHT_SPOT => sample_point_light(light, p),
         LIGHT_DIRECTIONAL => LightSample {
             direction: -Vec3::from(light.b),
@@ -199,11 +224,15 @@ pub fn light_sample(scene: &Scene, p: Vec3, word: u32, u: Vec2) -> LightSample {
     }
 }
 
-/// Density per solid angle with which [`light_sample`] chooses, from `origin`, a point of an emissive triangle hit by a
-/// ray.
+/// Density per solid angle with which [`light_sample`] chooses, from `origin`, a point of an emissive triangle or
+/// sphere hit by a ray.
 pub fn triangle_light_pdf(scene: &Scene, s: &Surface, origin: Vec3, t: f32, cosine: f32) -> f32 {
     let [a, e1, e2] = s.triangle;
     let density = scene.triangle_pdf_scale * scene.materials[s.material as usize].emission_weight;
+    if s.radius > 0.0 {
+        let cap = sphere_cap(a - origin, s.radius);
+        return if cap > 0.0 { density * 2.0 * s.radius * s.radius / cap } else { 0.0 };
+    }
     let seen = SphericalTriangle::new([a - origin, e1, e2]);
     match seen.by_solid_angle(scene) {
         true => density * 0.5 * unit_vector(e1.cross(e2)).1 / seen.solid_angle,

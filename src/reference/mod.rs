@@ -16,6 +16,7 @@ pub mod microfacet;
 pub mod path;
 pub mod sampler;
 pub mod scene;
+pub mod sphere;
 pub mod surface;
 pub mod texture;
 pub mod traverse;

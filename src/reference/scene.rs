@@ -1,5 +1,6 @@
 //! Twin of `glsl/shared/scene.glsl`: typed access to the scene's arrays.
 use crate::gpu::layout::{Instance, NONE};
+use crate::reference::sphere::Sphere;
 use crate::scene::Scene;
 use glam::{Mat3, Vec2, Vec3, Vec4};
 
@@ -56,6 +57,9 @@ pub fn material_of(scene: &Scene, triangle: u32, instance: u32) -> u32 {
 
 /// Interpolated; `barycentric` weighs vertices 1 and 2.
 pub fn texture_coordinates(scene: &Scene, triangle: u32, barycentric: Vec2) -> Vec2 {
+    if let Some(sphere) = Sphere::of(scene, triangle) {
+        return sphere.coordinates_of_hit(barycentric);
+    }
     let s = &scene.shading[triangle as usize];
     let [uv0, uv1, uv2] = [s.uv0, s.uv1, s.uv2].map(Vec2::from);
     uv0 + barycentric.x * (uv1 - uv0) + barycentric.y * (uv2 - uv0)

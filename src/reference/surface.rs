@@ -2,10 +2,12 @@
 use crate::gpu::layout::{MATERIAL_NORMAL_MAP, Material, NONE};
 use crate::reference::bsdf::Bsdf;
 use crate::reference::scene::{material_of, object_from_world, triangle_vertices, world_from_object};
+use crate::reference::sphere::Sphere;
 use crate::reference::texture::texture_sample;
 use crate::reference::traverse::Hit;
 use crate::scene::Scene;
 use glam::{Vec2, Vec3, vec2, vec3};
+use std::f32::consts::PI;
 
 /// What shading needs of a hit.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +30,8 @@ pub struct Surface {
     pub uv: Vec2,
     /// The triangle in world space: its first vertex and the edges from there.
     pub triangle: [Vec3; 3],
+    /// Of a sphere, whose centre is the first of `triangle`; 0 of a triangle.
+    pub radius: f32,
     /// Distance from the plane at which rays start, world units.
     pub clearance: f32,
 }
@@ -59,11 +63,22 @@ pub fn plane_clearance(n: Vec3, reach: Vec3, e1: Vec3, e2: Vec3) -> f32 {
 /// Unit normal from two snorm words of 16 bits.
 pub fn octahedral_decode(bits: u32) -> Vec3 {
     let snorm = |b: u32| (f32::from(b as u16 as i16) / 32767.0).max(-1.0);
-    let e = vec2(snorm(bits), snorm(bits >> 16));
+    octahedral_vector(vec2(snorm(bits), snorm(bits >> 16)))
+}
+
+/// Unit vector that a point of the unfolded octahedron, the square [-1, 1]^2, stands for.
+pub fn octahedral_vector(e: Vec2) -> Vec3 {
     let z = 1.0 - e.x.abs() - e.y.abs();
     let t = (-z).max(0.0);
     let fold = |e: f32| if e >= 0.0 { e - t } else { e + t };
     vec3(fold(e.x), fold(e.y), z).normalize()
+}
+
+/// Inverse of [`octahedral_vector`]; `n` may have any length but 0.
+pub fn octahedral_point(n: Vec3) -> Vec2 {
+    let e = n.truncate() / (n.x.abs() + n.y.abs() + n.z.abs());
+    let fold = |own: f32, other: f32| (1.0 - other.abs()) * if own >= 0.0 { 1.0 } else { -1.0 };
+    if n.z < 0.0 { vec2(fold(e.x, e.y), fold(e.y, e.x)) } else { e }
 }
 
 /// The edges of a triangle in space and in texture coordinates.
@@ -113,8 +128,51 @@ fn perturbed_normal(scene: &Scene, s: &Surface, e: &Edges) -> Vec3 {
     if length > 0.0 && length < 1e37 { n } else { s.normal }
 }
 
+/// As [`surface_at`], for a hit on a sphere.
+fn sphere_at(scene: &Scene, hit: &Hit, ball: &Sphere) -> Surface {
+    let (n, side) = (octahedral_vector(hit.barycentric), ball.side());
+    let mut radius = ball.pole.length();
+    let (mut centre, mut reach, mut point) = (ball.centre, ball.centre.abs(), radius * n);
+    let equator = vec2(n.dot(ball.meridian), n.dot(side)).length() / radius;
+    let around = (n.dot(ball.meridian) * side - n.dot(side) * ball.meridian) / radius;
+    let (mut e1, mut e2) = (2.0 * PI * around, (ball.pole - n.dot(ball.pole) * n) * (PI / equator.max(1e-6)));
+    let mut object = scene.triangles[hit.triangle as usize].object;
+    let material = material_of(scene, hit.triangle, hit.instance);
+    let mut geometric = n;
+    if let Some(i) = scene.instances.get(hit.instance as usize) {
+        let world = world_from_object(i);
+        (geometric, _) = unit_vector(object_from_world(i).normal(n));
+        centre = world.point(centre);
+        reach = world.magnitude(object_from_world(i).magnitude(centre.abs()));
+        (point, e1, e2) = (world.vector(point), world.vector(e1), world.vector(e2));
+        radius = world.vector(ball.pole).length();
+        object += i.object;
+    }
+    if ball.inward() {
+        geometric = -geometric;
+    }
+    let mut s = Surface {
+        position: centre + point,
+        geometric,
+        smooth_normal: geometric,
+        normal: geometric,
+        material,
+        flags: scene.materials[material as usize].flags,
+        object,
+        uv: ball.coordinates(n),
+        triangle: [centre, Vec3::ZERO, Vec3::ZERO],
+        radius,
+        clearance: plane_clearance(geometric, reach, point, Vec3::splat(radius)),
+    };
+    s.normal = perturbed_normal(scene, &s, &Edges { e1, e2, d1: Vec2::X, d2: Vec2::Y });
+    s
+}
+
 /// Position and normals.
 pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
+    if let Some(ball) = Sphere::of(scene, hit.triangle) {
+        return sphere_at(scene, hit, &ball);
+    }
     let [mut p0, p1, p2] = triangle_vertices(scene, hit.triangle);
     let (mut e1, mut e2) = (p1 - p0, p2 - p0);
     let mut reach = p0.abs();
@@ -140,6 +198,7 @@ pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
         object,
         uv: Vec2::ZERO,
         triangle: [p0, e1, e2],
+        radius: 0.0,
         clearance: plane_clearance(geometric, reach, e1, e2),
     };
     let Some(shading) = scene.shading.get(hit.triangle as usize) else { return s };

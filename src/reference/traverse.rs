@@ -1,6 +1,8 @@
 //! Twin of `glsl/shared/traverse.glsl`.
 use crate::gpu::layout::{BvhNode, NONE, TRAVERSAL_STACK};
 use crate::reference::scene::{object_from_world, triangle_vertices};
+use crate::reference::sphere::Sphere;
+use crate::reference::surface::octahedral_point;
 use crate::reference::texture::mask_blocks;
 use crate::scene::Scene;
 use glam::{Vec2, Vec3, vec2, vec3};
@@ -14,7 +16,7 @@ pub struct Hit {
     pub triangle: u32,
     /// [`NONE`] without instances.
     pub instance: u32,
-    /// Weights of vertices 1 and 2.
+    /// Weights of vertices 1 and 2; of a sphere, its unit normal as a point of the octahedron.
     pub barycentric: Vec2,
 }
 
@@ -32,6 +34,7 @@ const SLAB_ROUNDING: i32 = 8;
 #[derive(Clone, Copy, Debug)]
 pub struct RaySpace {
     origin: Vec3,
+    direction: Vec3,
     inverse: Vec3,
     shear: Vec3,
     along_x: bool,
@@ -57,7 +60,7 @@ pub fn ray_space(origin: Vec3, direction: Vec3) -> RaySpace {
     let along_y = !along_x && size.y > size.z;
     let positive = safe.to_array().map(|d| u32::from(d >= 0.0));
     let octant = (positive[0] * 4 + positive[1] * 2 + positive[2]) * 0x01010101;
-    let mut r = RaySpace { origin, inverse: 1.0 / safe, shear: Vec3::ZERO, along_x, along_y, octant };
+    let mut r = RaySpace { origin, direction, inverse: 1.0 / safe, shear: Vec3::ZERO, along_x, along_y, octant };
     let along = r.largest_last(r.inverse).z;
     let d = r.largest_last(direction);
     r.shear = vec3(d.x * along, d.y * along, along);
@@ -77,6 +80,21 @@ pub fn intersect_triangle(r: &RaySpace, vertices: [Vec3; 3], t_max: f32) -> Opti
     let barycentric = vec2(v, w) * inv;
     let t = (u * inv * a.z + barycentric.x * b.z + barycentric.y * c.z) * r.shear.z;
     (inside && det != 0.0 && t > 0.0 && t < t_max).then_some((t, barycentric))
+}
+
+/// Both hits with a sphere, from half its chord: distances in lengths of the ray's direction, and vectors from the centre.
+pub fn intersect_sphere(r: &RaySpace, sphere: &Sphere) -> Option<[(f32, Vec3); 2]> {
+    let from_centre = r.origin - sphere.centre;
+    let inverse = 1.0 / r.direction.length();
+    let d = r.direction * inverse;
+    let mut along = from_centre.dot(d);
+    let mut nearest = from_centre - along * d;
+    let rest = nearest.dot(d);
+    nearest -= rest * d;
+    along += rest;
+    let squared = sphere.pole.length_squared() - nearest.length_squared();
+    let chord = squared.max(0.0).sqrt();
+    (squared >= 0.0).then(|| [-chord, chord].map(|half| ((half - along) * inverse, nearest + half * d)))
 }
 
 /// Four children: their planes near and far along the ray, a byte each.
@@ -176,10 +194,36 @@ impl Traversal<'_> {
         (instance.root, 0x80000000)
     }
 
+    /// True where the ray meets it. A ray that leaves the sphere meets only its far side; a mask decides on each side.
+    fn test_sphere(&mut self, index: u32, sphere: &Sphere) -> bool {
+        let Some([near, far]) = intersect_sphere(&self.ray, sphere) else { return false };
+        let leaves = [index, self.instance] == self.from;
+        let blocks = |(_, point): (f32, Vec3), seed: u32| {
+            let (scene, place) = (self.scene, octahedral_point(point));
+            mask_blocks(scene, index, self.instance, place, seed)
+        };
+        let (t, point) = match !leaves && near.0 > 0.0 && blocks(near, self.mask_seed) {
+            true => near,
+            false if blocks(far, !self.mask_seed) => far,
+            false => return false,
+        };
+        let meets = t > 0.0 && t < self.hit.t;
+        if meets {
+            self.hit = Hit { t, triangle: index, instance: self.instance, barycentric: octahedral_point(point) };
+        }
+        meets
+    }
+
     /// Tests triangles; true when the first hit is enough and found.
     fn test(&mut self, mut leaves: Group, any_hit: bool) -> bool {
         while leaves.1 != 0 {
             let index = leaves.0 + take_highest(&mut leaves.1);
+            if let Some(sphere) = Sphere::of(self.scene, index) {
+                if self.test_sphere(index, &sphere) && any_hit {
+                    return true;
+                }
+                continue;
+            }
             if [index, self.instance] == self.from {
                 continue;
             }

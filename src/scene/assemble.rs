@@ -229,7 +229,7 @@ impl<'a> Assembly<'a> {
             ranges.insert(root, mesh.range.clone());
             boxes.insert(root, bounds);
             let copies = copies_of(&mesh).iter().copied();
-            let identity = Job { mesh: 0, affine: DAffine3::IDENTITY, material: None };
+            let identity = Job { mesh: 0, affine: DAffine3::IDENTITY, material: None, exact: false };
             let baked = mesh.mesh.is_none().then_some(&identity);
             for copy in copies.chain(baked) {
                 let (material, object) = (copy.material.unwrap_or(NONE), scene.names.objects.len() as u32);

@@ -1,6 +1,6 @@
 //! Eight-way compressed BVHs (Ylitie et al. 2017) by obvhs: PLOC (Meister and Bittner 2018) and reinsertion. Triangles
 //! and their shading are put in leaf order; child and primitive indices are made global, so one array holds all levels.
-use super::geometry::Geometry;
+use super::geometry::{self, Geometry};
 use crate::gpu::layout::{BvhNode, Instance, TRAVERSAL_STACK, Triangle};
 use clusters::Clusters;
 use glam::{Mat4, Vec3, Vec4};
@@ -39,8 +39,17 @@ fn grown(low: Vec3, high: Vec3) -> Aabb {
 
 impl Boundable for Triangle {
     fn aabb(&self) -> Aabb {
-        let [a, b, c] = [self.v0, self.v1, self.v2].map(Vec3::from);
-        grown(a.min(b).min(c), a.max(b).max(c))
+        let [low, high] = extent(self);
+        grown(low, high)
+    }
+}
+
+/// The lowest and the highest coordinates of a triangle or sphere.
+fn extent(t: &Triangle) -> [Vec3; 2] {
+    let [a, b, c] = [t.v0, t.v1, t.v2].map(Vec3::from);
+    match geometry::radius(t) {
+        Some(radius) => [a - radius, a + radius],
+        None => [a.min(b).min(c), a.max(b).max(c)],
     }
 }
 
@@ -55,7 +64,7 @@ impl Boundable for Placed {
 
 /// Bounds of triangles; `None` for no triangles.
 pub fn bounds(triangles: &[Triangle]) -> Option<Bounds> {
-    let points = triangles.iter().flat_map(|t| [t.v0, t.v1, t.v2]).map(Vec3::from);
+    let points = triangles.iter().flat_map(extent);
     let seed = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     let (low, high) = points.fold(seed, |(low, high), p| (low.min(p), high.max(p)));
     (!triangles.is_empty()).then(|| [low.to_array(), high.to_array()])

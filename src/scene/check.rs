@@ -2,7 +2,9 @@
 //! the arrays are there to be edited.
 use super::{Environment, Scene, bvh};
 use crate::error::{Error, Result};
-use crate::gpu::layout::{AliasEntry, BvhNode, Camera, LIGHT_TRIANGLE, Material, NONE, TRAVERSAL_STACK, Texture};
+use crate::gpu::layout::{
+    AliasEntry, BvhNode, Camera, LIGHT_SPHERE, LIGHT_TRIANGLE, Light, Material, NONE, TRAVERSAL_STACK, Texture,
+};
 
 type Checked = std::result::Result<(), String>;
 
@@ -131,7 +133,8 @@ impl Scene {
     }
 
     fn lights_fit(&self) -> Checked {
-        let emissive = || self.lights.iter().enumerate().filter(|(_, light)| light.kind == LIGHT_TRIANGLE);
+        let on_surface = |light: &Light| matches!(light.kind, LIGHT_TRIANGLE | LIGHT_SPHERE);
+        let emissive = || self.lights.iter().enumerate().filter(|(_, light)| on_surface(light));
         for (index, light) in emissive() {
             let of = |what| format!("light {index}: {what}");
             below("it", "triangle", self.triangles.len(), [light.triangle]).map_err(of)?;

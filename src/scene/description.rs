@@ -108,7 +108,8 @@ pub struct MeshTable {
     /// Instead of either.
     #[serde(skip)]
     pub data: Option<Mesh>,
-    /// Sphere and disk: edges around, 3 to 4096; default 64.
+    /// Disk: edges around, 3 to 4096; default 64. A sphere is exact without, and a mesh with it; also where it is `flat`, and
+    /// as a lamp that is stretched, turned inside out, textured or partly transparent.
     pub segments: Option<u32>,
     /// world_from_object.
     pub transform: Transform,

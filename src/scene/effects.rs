@@ -63,7 +63,7 @@ fn light_effects(scene: &Scene, found: &mut Effects, reasons: &mut Vec<(&'static
         let first = scene.lights.iter().position(|l| l.kind == kind);
         first.inspect(|&i| reasons.push((name, light_name(scene, i)))).is_some()
     };
-    found.emissive = light("emissive", LIGHT_TRIANGLE);
+    found.emissive = light("emissive", LIGHT_TRIANGLE) || light("emissive", LIGHT_SPHERE);
     found.point_lights = light("point_lights", LIGHT_POINT);
     found.spot_lights = light("spot_lights", LIGHT_SPOT);
     found.directional_lights = light("directional_lights", LIGHT_DIRECTIONAL);
@@ -101,6 +101,9 @@ fn other_effects(
         bent.and_then(|i| scene.triangles.get(i)).map(|t| t.object as usize).and_then(|o| scene.names.objects.get(o));
     let named = format!("object \"{}\"", object.map_or("", |o| o));
     found.smooth_normals = because("smooth_normals", bent.is_some(), named);
+    let ball = scene.triangles.iter().find(|t| t.primitive & SPHERE != 0);
+    let object = ball.and_then(|t| scene.names.objects.get(t.object as usize));
+    found.spheres = because("spheres", ball.is_some(), format!("object \"{}\"", object.map_or("", |o| o)));
     found.lens = because("lens", scene.camera.lens_radius > 0.0, "camera lens_radius".into());
     let instances = scene.instances.len();
     found.instances = because("instances", instances > 0, format!("{instances} instances"));

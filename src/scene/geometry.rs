@@ -1,5 +1,5 @@
 //! The growing triangle arrays: placement, repair of what can be repaired, packing of normals.
-use crate::gpu::layout::{NONE, Shading, Triangle};
+use crate::gpu::layout::{NONE, SPHERE, SPHERE_INWARD, SPHERE_MIRRORED, Shading, Triangle};
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -115,6 +115,34 @@ impl Geometry {
         Ok(())
     }
 
+    /// Adds the unit sphere around the origin, placed by a rotation and a scale that is the same along all axes, or a mirror
+    /// of that.
+    pub fn push_sphere(&mut self, tag: Tag, at: &Placement, repairs: &mut Repairs) -> Result<(), TooFar> {
+        let (matrix, determinant) = (at.affine.matrix3, at.affine.matrix3.determinant());
+        let radius = determinant.abs().cbrt();
+        let far = (at.affine.translation.abs().max_element() + radius) as f32;
+        if far > super::MAX_COORDINATE as f32 {
+            return Err(TooFar(far));
+        }
+        if radius < LEAST_RADIUS {
+            repairs.no_area += 1;
+            return Ok(());
+        }
+        let axis = |a: DVec3| (a.normalize() * radius).as_vec3().to_array();
+        let inward = if at.flip { SPHERE_INWARD } else { 0 };
+        let mirrored = if determinant < 0.0 { SPHERE_MIRRORED } else { 0 };
+        self.shade(FLAT, None);
+        self.triangles.push(Triangle {
+            v0: at.affine.translation.as_vec3().to_array(),
+            primitive: SPHERE | inward | mirrored,
+            v1: axis(matrix.z_axis),
+            material: tag.material,
+            v2: axis(matrix.x_axis),
+            object: tag.object,
+        });
+        Ok(())
+    }
+
     /// Drops triangles from `start` on that equal an earlier one of them in all but number and object; returns how many.
     /// A lamp that is there twice would be sampled twice as often as rays meet it.
     pub fn drop_copies(&mut self, start: usize) -> usize {
@@ -180,6 +208,14 @@ fn retain<T: Copy>(items: &mut Vec<T>, start: usize, keep: &[bool]) {
     let kept: Vec<T> = tail.iter().zip(keep).filter(|(_, keep)| **keep).map(|(item, _)| *item).collect();
     items.truncate(start);
     items.extend(kept);
+}
+
+/// Radius of a sphere below which it is dropped: its square has to be a normal 32-bit float.
+const LEAST_RADIUS: f64 = 1e-15;
+
+/// Of a sphere; `None` of a triangle.
+pub fn radius(t: &Triangle) -> Option<f32> {
+    (t.primitive & SPHERE != 0).then(|| Vec3::from(t.v1).length())
 }
 
 /// The code of a triangle without vertex normals.

@@ -1,6 +1,6 @@
 //! The list of lights and the table that chooses one in proportion to its power.
 //!
-//! Power, by luminance, in watts up to a common factor: emissive triangle `pi * area * L` (front side, L the mean over
+//! Power, by luminance, in watts up to a common factor: emissive triangle or sphere `pi * area * L` (front side, L the mean over
 //! its texture times the mean opacity), point `4 pi I`, spot `2 pi I (1 - mean of the two cosines)`, directional
 //! `pi R^2 E`, environment `4 pi^2 R^2` times its mean, R the radius of the scene.
 use super::environment::{luminance, mean_luminance};
@@ -158,7 +158,7 @@ fn add_triangles(scene: &Scene, ranges: &HashMap<u32, Range<usize>>, lights: &mu
     if scene.instances.is_empty() {
         let lit = own(0..scene.triangles.len());
         reserve(lights, lit.len())?;
-        lit.into_iter().for_each(|index| lights.push(triangle_light(scene, index, |p| p, None, false)));
+        lit.into_iter().for_each(|index| lights.push(surface_light(scene, index, None, None)));
         return Ok(());
     }
     let own: HashMap<u32, Vec<usize>> = ranges.iter().map(|(&root, range)| (root, own(range.clone()))).collect();
@@ -171,9 +171,9 @@ fn add_triangles(scene: &Scene, ranges: &HashMap<u32, Range<usize>>, lights: &mu
     for instance in scene.instances.iter().filter(|instance| lit(instance) > 0) {
         let rows = [instance.world0, instance.world1, instance.world2].map(Vec4::from);
         let world = Mat4::from_cols(rows[0], rows[1], rows[2], Vec4::W).transpose();
-        let place = |p: Vec3| world.transform_point3(p);
         let material = (instance.material != NONE).then_some(instance.material);
-        let mut add = |index| lights.push(triangle_light(scene, index, place, material, instance.mirrored == 1));
+        let at = Some((world, instance.mirrored == 1));
+        let mut add = |index| lights.push(surface_light(scene, index, at, material));
         match material {
             Some(_) => ranges[&instance.root].clone().for_each(&mut add),
             None => own[&instance.root].iter().copied().for_each(&mut add),
@@ -188,21 +188,22 @@ fn reserve(lights: &mut Vec<Light>, more: usize) -> Result<()> {
     memory::reserve("lights", lights, more)
 }
 
-fn triangle_light(
-    scene: &Scene,
-    index: usize,
-    place: impl Fn(Vec3) -> Vec3,
-    material: Option<u32>,
-    mirrored: bool,
-) -> Light {
+/// An emissive triangle or sphere; `at`: placed by an instance, which may mirror it.
+fn surface_light(scene: &Scene, index: usize, at: Option<(Mat4, bool)>, material: Option<u32>) -> Light {
     let t = &scene.triangles[index];
     let material = material.unwrap_or(t.material);
-    let [a, mut b, mut c] = [t.v0, t.v1, t.v2].map(|p| place(p.into()).to_array());
-    if mirrored {
+    let [a, mut b, mut c] =
+        [t.v0, t.v1, t.v2].map(|p| at.map_or(p, |(world, _)| world.transform_point3(p.into()).to_array()));
+    if at.is_some_and(|(_, mirrored)| mirrored) {
         std::mem::swap(&mut b, &mut c); // the front of the mesh stays in front
     }
     let value = scene.materials[material as usize].emission;
-    Light { kind: LIGHT_TRIANGLE, a, b, c, triangle: index as u32, value, material, ..Light::default() }
+    let light = Light { kind: LIGHT_TRIANGLE, a, b, c, triangle: index as u32, value, material, ..Light::default() };
+    if geometry::radius(t).is_none() {
+        return light;
+    }
+    let pole = at.map_or(t.v1.into(), |(world, _)| world.transform_vector3(t.v1.into()));
+    Light { kind: LIGHT_SPHERE, b: [pole.length(), 0.0, 0.0], c: [0.0; 3], ..light }
 }
 
 /// Area of an emissive triangle, in squares of the scene's diagonal, above which sampling by solid angle pays.
@@ -223,6 +224,10 @@ fn power(scene: &Scene, light: &Light) -> f64 {
         LIGHT_TRIANGLE => {
             let weight = scene.materials[light.material as usize].emission_weight;
             PI * geometry::area([light.a, light.b, light.c]) * f64::from(weight)
+        }
+        LIGHT_SPHERE => {
+            let weight = scene.materials[light.material as usize].emission_weight;
+            4.0 * (PI * f64::from(light.b[0])).powi(2) * f64::from(weight)
         }
         LIGHT_POINT => 4.0 * PI * value,
         LIGHT_SPOT => 2.0 * PI * value * (1.0 - f64::from(light.c[0] + light.c[1]) / 2.0),

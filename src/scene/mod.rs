@@ -56,7 +56,7 @@ pub struct Scene {
     pub root: u32,
     /// Groups of nodes that a ray puts aside at most; at least 1.
     pub stack: u32,
-    /// In leaf order.
+    /// In leaf order; spheres are among them.
     pub triangles: Vec<Triangle>,
     /// Same order as `triangles`; empty when no mesh has vertex normals or texture coordinates.
     pub shading: Vec<Shading>,

@@ -3,10 +3,11 @@ use super::assemble::Assembly;
 use super::description::{self, Mesh, MeshTable};
 use super::geometry::{Corners, Geometry, Placement, Repairs, Tag, TooFar};
 use super::obj::ObjFile;
+use super::shape::Shape;
 use crate::error::{Error, Result};
-use crate::gpu::layout::{Instance, NONE};
+use crate::gpu::layout::{Instance, MATERIAL_MASKED, Material, NONE};
 use crate::memory;
-use glam::{DAffine3, Vec2, Vec3};
+use glam::{DAffine3, DMat3, Vec2, Vec3};
 use std::collections::HashMap;
 use std::path::PathBuf;
 
@@ -19,6 +20,8 @@ pub struct Job {
     pub affine: DAffine3,
     /// Instead of all its materials.
     pub material: Option<u32>,
+    /// A sphere that is stored as one, not as triangles.
+    pub exact: bool,
 }
 
 /// What is baked into world space, stored for instances, and placed.
@@ -67,6 +70,9 @@ impl Assembly<'_> {
         let named = meshes.iter().enumerate().rev().filter_map(|(i, m)| Some((m.name.as_deref()?, i)));
         let named: HashMap<&str, usize> = named.collect(); // the first of a name counts
         let mut textured = HashMap::new();
+        // Of a sphere that is stretched, its instances do the stretching: rays meet a sphere in its own space.
+        let stretched: Vec<_> = meshes.iter().map(|m| is_sphere(m) && !is_even(&m.transform.0)).collect();
+        let mut exact: Vec<_> = meshes.iter().map(is_sphere).collect();
         for (number, table) in self.description.instance.iter().enumerate() {
             let place = format!("instance {} of mesh \"{}\"", number + 1, table.mesh);
             let Some(&mesh) = named.get(table.mesh.as_str()) else {
@@ -83,22 +89,43 @@ impl Assembly<'_> {
             if mirrored && !textured.contains_key(&(mesh, material)) {
                 textured.insert((mesh, material), self.is_textured_light(mesh, material)?);
             }
+            let whole = Job { mesh, affine: affine * own, material, exact: false };
+            exact[mesh] = exact[mesh] && self.may_be_exact(&whole)?;
             match mirrored && textured[&(mesh, material)] {
-                true => plan.baked.push(Job { mesh, affine: affine * own, material }),
-                false => plan.copies.push(Job { mesh, affine, material }),
+                true => plan.baked.push(whole),
+                false if stretched[mesh] => plan.copies.push(whole),
+                false => plan.copies.push(Job { affine, ..whole }),
             }
             copied[mesh] |= plan.copies.last().is_some_and(|copy| copy.mesh == mesh);
         }
         for (mesh, table) in meshes.iter().enumerate() {
             let affine = self.invertible(table.transform.0, &format!("mesh \"{}\"", mesh_name(table)))?;
-            let job = Job { mesh, affine, material: None };
+            let job = Job { mesh, affine, material: None, exact: false };
             if !instanced[mesh] {
-                plan.baked.push(job);
+                let exact = exact[mesh] && self.may_be_exact(&job)?;
+                match exact && stretched[mesh] {
+                    true => {
+                        plan.stored.push(Job { affine: DAffine3::IDENTITY, exact, ..job });
+                        plan.copies.push(job);
+                    }
+                    false => plan.baked.push(Job { exact, ..job }),
+                }
             } else if copied[mesh] {
-                plan.stored.push(job);
+                let affine = if stretched[mesh] { DAffine3::IDENTITY } else { affine };
+                plan.stored.push(Job { affine, exact: exact[mesh], ..job });
             }
         }
         Ok(plan)
+    }
+
+    /// Whether a sphere can be stored as one, where `job` places it in the world. Lamps are chosen by the cone in which
+    /// they are seen: that takes a sphere of even radiance which emits outward.
+    fn may_be_exact(&self, job: &Job) -> Result<bool> {
+        let table = &self.description.mesh[job.mesh];
+        let even = |m: &Material| m.emission_texture == NONE && m.flags & MATERIAL_MASKED == 0;
+        let lamp = self.override_of(job)?.map(|m| &self.library.materials.list[m as usize]);
+        let lamp = lamp.filter(|m| m.emission != [0.0; 3]);
+        Ok(is_sphere(table) && lamp.is_none_or(|m| even(m) && is_even(&job.affine) && !table.flip_normals))
     }
 
     fn invertible(&self, affine: DAffine3, place: &str) -> Result<DAffine3> {
@@ -123,7 +150,7 @@ impl Assembly<'_> {
             let m = &list[i as usize];
             m.emission != [0.0; 3] && (m.emission_texture != NONE || m.opacity_texture != NONE)
         };
-        let job = Job { mesh, affine: DAffine3::IDENTITY, material };
+        let job = Job { mesh, affine: DAffine3::IDENTITY, material, exact: false };
         Ok(
             match (self.override_of(&job)?, self.file_of(&self.description.mesh[mesh]).and_then(|p| self.files.get(&p)))
             {
@@ -160,15 +187,16 @@ impl Assembly<'_> {
     /// How many triangles a mesh has before any is dropped.
     pub fn triangles_of(&self, job: &Job) -> u64 {
         let table = &self.description.mesh[job.mesh];
-        triangles(table, self.file_of(table).and_then(|path| self.files.get(&path)))
+        if job.exact { 1 } else { triangles(table, self.file_of(table).and_then(|path| self.files.get(&path))) }
     }
 
     /// The parsed file, taken out of the store, or a shape, or a copy of what is in memory.
-    fn take_source(&mut self, table: &MeshTable) -> ObjFile {
+    fn take_source(&mut self, job: &Job) -> ObjFile {
+        let table = &self.description.mesh[job.mesh];
         if let Some(file) = self.file_of(table).and_then(|path| self.files.remove(&path)) {
             return file;
         }
-        let shape = || table.shape.map(|s| s.mesh(segments(table)));
+        let shape = || table.shape.filter(|_| !job.exact).map(|s| s.mesh(segments(table)));
         let mesh = table.data.as_ref().map(Mesh::to_tobj).or_else(shape).unwrap_or_default();
         let models = vec![tobj::Model { mesh, name: String::new() }];
         ObjFile { models, materials: vec![self.library.grey()], grey: None }
@@ -182,14 +210,14 @@ impl Assembly<'_> {
     pub fn add(&mut self, job: &Job, first: u32, last_use: bool) -> Result<Vec<String>> {
         let table = &self.description.mesh[job.mesh];
         let material = self.override_of(job)?;
-        let file = self.take_source(table);
+        let file = self.take_source(job);
         let place = format!("mesh \"{}\"", mesh_name(table));
         if let Some(group) = table.group.as_ref().filter(|g| !file.models.iter().any(|m| m.name == **g)) {
             let near = description::nearest(group, file.models.iter().map(|m| m.name.as_str())).unwrap_or("(none)");
             return Err(self.at(place, format!("no group \"{group}\": did you mean \"{near}\"?")));
         }
         let before = self.geometry.triangles.len();
-        let more = triangles(table, Some(&file)) as usize;
+        let more = if job.exact { 1 } else { triangles(table, Some(&file)) as usize };
         memory::reserve(&place, &mut self.geometry.triangles, more)?;
         if !self.geometry.shading.is_empty() {
             memory::reserve(&place, &mut self.geometry.shading, more)?;
@@ -238,7 +266,10 @@ impl Assembly<'_> {
                 }
                 let object = first + names.len() as u32 - 1;
                 let tag = Tag { primitive, material: material.unwrap_or(own), object };
-                add_model(&mut self.geometry, &model.mesh, tag, &at, repairs)?;
+                match job.exact {
+                    true => self.geometry.push_sphere(tag, &at, repairs)?,
+                    false => add_model(&mut self.geometry, &model.mesh, tag, &at, repairs)?,
+                }
             }
             primitive += (model.mesh.indices.len() / 3) as u32;
         }
@@ -254,6 +285,18 @@ fn triangles(table: &MeshTable, file: Option<&ObjFile>) -> u64 {
         (_, Some(shape), _) => shape.triangles(segments(table)),
         (.., file) => file.map_or(0, of_file),
     }
+}
+
+/// A sphere that need not be tessellated: nobody asks for its segments or facets.
+fn is_sphere(table: &MeshTable) -> bool {
+    table.shape == Some(Shape::Sphere) && table.segments.is_none() && !table.flat
+}
+
+/// Whether spheres stay spheres, up to what six digits of a matrix leave open.
+fn is_even(affine: &DAffine3) -> bool {
+    let gram = affine.matrix3.transpose() * affine.matrix3;
+    let mean = (gram.x_axis.x + gram.y_axis.y + gram.z_axis.z) / 3.0;
+    (gram * (1.0 / mean)).abs_diff_eq(DMat3::IDENTITY, 1e-5)
 }
 
 /// Edges around a tessellated shape.

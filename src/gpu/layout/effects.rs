@@ -65,7 +65,7 @@ effects! {
     beckmann: FX_BECKMANN;
     /// The GGX distribution.
     ggx: FX_GGX;
-    /// Emissive triangles.
+    /// Emissive triangles or spheres.
     emissive: FX_EMISSIVE;
     /// Point lights.
     point_lights: FX_POINT;
@@ -101,4 +101,6 @@ effects! {
     many_samples: FX_MANY_SAMPLES;
     /// Emissive triangles large enough to be sampled by solid angle.
     large_lamps: FX_LARGE_LAMPS;
+    /// Exact spheres among the triangles.
+    spheres: FX_SPHERES;
 }

@@ -1,0 +1,31 @@
+// Spheres, which take the place of triangles: what a hit says of them, and their texture coordinates. A hit holds the unit
+// normal, from the centre, as a point of the octahedron's square in place of two barycentric weights: no trigonometry.
+#include "shared/octahedral.glsl"
+#include "shared/warp.glsl"
+
+struct Sphere {
+    vec3 centre;
+    vec3 pole;     // from the centre to v = 1
+    vec3 meridian; // from the centre to u = 0 on the equator
+    uint flags;    // SPHERE_ bits
+};
+
+bool is_sphere(uint triangle) { return (texelFetch(triangles, int(3u * triangle)).w & SPHERE) != 0u; }
+
+Sphere sphere_of(uint triangle) {
+    uvec4 words = texelFetch(triangles, int(3u * triangle));
+    return Sphere(uintBitsToFloat(words.xyz), triangle_vertex(triangle, 1), triangle_vertex(triangle, 2), words.w);
+}
+
+// From the centre, as long as the radius, a quarter turn of azimuth from `meridian`.
+vec3 sphere_side(Sphere s) {
+    vec3 side = cross(s.pole, s.meridian) * inversesqrt(dot(s.pole, s.pole));
+    return (s.flags & SPHERE_MIRRORED) != 0u ? -side : side;
+}
+
+// u is the azimuth, v rises from pole to pole: as those of the tessellated shape.
+vec2 sphere_coordinates(Sphere s, vec3 normal) {
+    float x = dot(normal, s.meridian), y = dot(normal, sphere_side(s));
+    float u = atan(y, x) * (0.5 / PI);
+    return vec2(u < 0.0 ? u + 1.0 : u, 1.0 - atan(length(vec2(x, y)), dot(normal, s.pole)) / PI);
+}
