@@ -128,9 +128,10 @@ fn a_comb_and_a_disk_of_many_corners_load() {
 
 #[test]
 fn a_picture_is_kept_once_for_all_its_mappings() {
-    let mtl: String = (1..9).map(|i| format!("newmtl m{i}\nmap_Kd -s {i} {i} {}a.png\n", "./".repeat(i))).collect();
+    let mtl: String = (1..9).map(|i| format!("newmtl m{i}\nmap_Kd -s {i} {i} {}a.png\n", "b/../".repeat(i))).collect();
     let worn: String = (1..9).map(|i| format!("usemtl m{i}\nf 1//1 2//1 3//1\n")).collect();
     let folder = folder(&[("m.mtl", &mtl), ("a.obj", &format!("mtllib m.mtl\n{TRIANGLE}{worn}"))]);
+    std::fs::create_dir(folder.path().join("b")).unwrap();
     let picture = image::RgbImage::from_pixel(4, 2, image::Rgb([1, 2, 3]));
     picture.write_with_encoder(PngEncoder::new(File::create(folder.path().join("a.png")).unwrap())).unwrap();
     let scene = load(&folder, "a.obj").unwrap();
@@ -147,20 +148,22 @@ fn coordinates_reach_to_the_limit_and_no_further() {
         Scene::parse(std::path::Path::new("s.toml"), &text, &|_| {})
     };
     assert!(scene("1e12", "[camera]\nposition = [0, 0, 1e12]\ntarget = [0, 0, 0]").is_ok());
-    for (at, rest) in [
-        ("1.1e12", ""),
-        ("1", "[camera]\nposition = [0, 0, 1.1e12]\ntarget = [0, 0, 0]"),
-        ("1", "[camera]\nlens_radius = 1.1e12"),
-        ("1", "[[instance]]\nmesh = \"m\"\ntransform = { scale = 1.1e12 }"),
-        ("1e12", "[[instance]]\nmesh = \"m\"\ntransform = { translate = [1e11, 0, 0] }"),
+    for (at, rest, what) in [
+        ("1.1e12", "", "mesh \"m\": has a coordinate"),
+        ("1", "[camera]\nposition = [0, 0, 1.1e12]\ntarget = [0, 0, 0]", "point [0, 0, 1100000000000] is"),
+        ("1", "[camera]\nlens_radius = 1.1e12", "lens_radius"),
+        ("1", "[[instance]]\nmesh = \"m\"\ntransform = { scale = 1.1e12 }", "instances: reach"),
+        ("1e12", "[[instance]]\nmesh = \"m\"\ntransform = { translate = [1e11, 0, 0] }", "instances: reach"),
         (
             "1",
             "[[instance]]\nmesh = \"m\"\n[[instance]]\nmesh = \"m\"\ntransform = { scale = 9e-13, translate = [1, 0, 0] }",
+            "seen from it",
         ),
-        ("1", "[[light]]\ntype = \"point\"\nintensity = 1\nposition = [0, 0, 1.1e12]"),
+        ("1", "[[light]]\ntype = \"point\"\nintensity = 1\nposition = [0, 0, 1.1e12]", "light 1: position"),
     ] {
         let error = scene(at, rest).unwrap_err();
-        assert!(error.exit_code() == 3 && error.to_string().contains("1e12"), "{at} {rest}: {error}");
+        let says = |part: &str| error.to_string().contains(part);
+        assert!(error.exit_code() == 3 && says(what) && says("1e12"), "{at} {rest}: {error}");
     }
 }
 

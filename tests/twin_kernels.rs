@@ -333,6 +333,8 @@ fn squares_of_the_brightest_samples_stay_finite() {
     for (s, l) in stats.iter().zip(&light).chain(twin.iter().zip(&twin_light)) {
         let all = s.mean.iter().chain(&s.m2).chain(&l.direct).chain(&l.indirect).chain([&l.indirect_m2]);
         assert!(all.into_iter().all(|v| v.is_finite()), "{s:?} {l:?}");
+        // Sums of them over pixels stay finite too.
+        assert!(s.m2.iter().chain([&l.indirect_m2]).all(|&v| v <= 1e35), "{s:?} {l:?}");
         assert!(s.m2[0] > 1e34 && l.indirect_m2 > 1e34, "control: {s:?} {l:?}");
     }
     assert_silent(&gpu);

@@ -123,10 +123,6 @@ impl<R: BufRead> ObjLines<R> {
         for end in [b'\n', b'\r'] {
             self.chunk.pop_if(|last| *last == end);
         }
-        // An empty line is a line: its end is left to be taken.
-        if self.chunk.is_empty() {
-            self.chunk.push(b'\r');
-        }
         Ok(true)
     }
 
