@@ -384,6 +384,11 @@ fn stacks_indices_and_cycles_that_were_believed_once() {
     refused("lights without a table", &|s| s.light_table.clear());
     refused("a sky of another size", &|s| s.environment.as_mut().unwrap().width += 1);
     refused("a sky's alias", &|s| s.environment.as_mut().unwrap().table[0].alias = 99);
+    refused("a sphere without a radius", &|s| (s.triangles[0].primitive, s.triangles[0].v1) = (SPHERE, [0.0; 3]));
+    refused("a coat without its table", &|s| {
+        let coat = &mut s.materials[0];
+        (coat.kind, coat.alpha, coat.coat_table) = (BSDF_COATED, 0.5, 1 << 30);
+    });
     refused("no nodes", &|s| s.nodes.clear());
     refused("a camera nowhere", &|s| s.camera.position[0] = f32::NAN);
     assert!(Renderer::new(&GPU, &SCENE, Outputs::default()).is_ok(), "control");

@@ -264,7 +264,7 @@ impl<'a> Assembly<'a> {
         let seen = |i: &Instance| {
             bvh::world_bounds(&turned(i), world).as_flattened().iter().map(|v| v.abs()).fold(0.0, f32::max)
         };
-        if let Some(i) = scene.instances.iter().find(|i| !(seen(i) <= super::MAX_COORDINATE as f32)) {
+        if let Some(i) = scene.instances.iter().find(|i| seen(i).is_nan() || seen(i) > super::MAX_COORDINATE as f32) {
             let name = &scene.names.objects[i.object as usize];
             let what = format!(
                 "seen from it, the scene reaches beyond the limit of {:e}: choose a larger scale",

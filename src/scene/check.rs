@@ -1,10 +1,13 @@
 //! Whether a scene's arrays fit together. Kernels follow indices without a look; whoever loads a scene gets right ones, but
 //! the arrays are there to be edited.
+use super::effects::SMOOTH;
 use super::{Environment, Scene, bvh};
 use crate::error::{Error, Result};
 use crate::gpu::layout::{
-    AliasEntry, BvhNode, Camera, LIGHT_SPHERE, LIGHT_TRIANGLE, Light, Material, NONE, TRAVERSAL_STACK, Texture,
+    AliasEntry, BSDF_COATED, BvhNode, COAT_COLUMNS, COAT_ROWS, Camera, LIGHT_SPHERE, LIGHT_TRIANGLE, Light, Material,
+    NONE, SPHERE, TRAVERSAL_STACK, Texture, Triangle,
 };
+use glam::Vec3;
 
 type Checked = std::result::Result<(), String>;
 
@@ -106,6 +109,9 @@ impl Scene {
         }
         let materials = self.materials.len();
         below("triangle", "material", materials, self.triangles.iter().map(|t| t.material))?;
+        if let Some(index) = self.triangles.iter().position(|t| t.primitive & SPHERE != 0 && !is_sphere(t)) {
+            return Err(format!("sphere {index} needs a centre, and a pole and a meridian as long as its radius"));
+        }
         below_or_none("instance", "material", materials, self.instances.iter().map(|i| i.material))
     }
 
@@ -122,6 +128,12 @@ impl Scene {
             below_or_none("map", "texture", all, of(material)).map_err(|what| format!("material {index}: {what}"))?;
         }
         let texels = self.texels.len() as u64;
+        let coat = u64::from(COAT_ROWS * COAT_COLUMNS);
+        let lacks_table = |m: &Material| m.kind == BSDF_COATED && u64::from(m.coat_table) + coat > texels;
+        let rough = |m: &Material| m.alpha >= SMOOTH;
+        if let Some(index) = self.materials.iter().position(|m| rough(m) && lacks_table(m)) {
+            return Err(format!("material {index}: its coat's table ends beyond the {texels} texels"));
+        }
         let past = |t: &Texture| {
             let end = u64::from(t.first).checked_add(u64::from(t.width) * u64::from(t.height));
             t.width == 0 || t.height == 0 || end.is_none_or(|end| end > texels)
@@ -143,6 +155,13 @@ impl Scene {
         table_fits("light_table", &self.light_table, self.lights.len())?;
         self.environment.as_ref().map_or(Ok(()), environment_fits)
     }
+}
+
+fn is_sphere(t: &Triangle) -> bool {
+    let [centre, pole, meridian] = [t.v0, t.v1, t.v2].map(Vec3::from);
+    let radius = pole.length();
+    let alike = (meridian.length() - radius).abs() <= 1e-3 * radius;
+    centre.is_finite() && radius.is_finite() && radius > 0.0 && alike
 }
 
 fn environment_fits(sky: &Environment) -> Checked {
