@@ -226,7 +226,7 @@ LightSample light_sample(vec3 p, uint word, vec2 u) {
 
 // Density per solid angle with which light_sample chooses, from `origin`, a point of an emissive triangle or sphere hit by a ray.
 float triangle_light_pdf(Surface s, vec3 origin, float t, float cosine) {
-    float density = push.triangle_pdf_scale * uintBitsToFloat(material_texel(s.material, 7u).z); // over area
+    float density = push.triangle_pdf_scale * uintBitsToFloat(material_texel(s.material, 1u).w); // over area
     if (FX_SPHERES && s.radius > 0.0) {
         float cap = sphere_cap(s.corner - origin, s.radius);
         return cap > 0.0 ? density * 2.0 * s.radius * s.radius / cap : 0.0; // times the area, over 2 pi times the cap

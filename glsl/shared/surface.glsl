@@ -113,7 +113,7 @@ Surface sphere_at(Hit hit) {
         s.object += instance_words(hit.instance).z;
     }
     if ((ball.flags & SPHERE_INWARD) != 0u) s.geometric = -s.geometric;
-    s.flags = material_texel(s.material, 3u).w;
+    s.flags = material_texel(s.material, 0u).w;
     s.position = s.corner + point;
     s.e1 = s.e2 = vec3(0.0);
     s.radius = radius;
@@ -149,7 +149,7 @@ Surface surface_at(Hit hit) {
         s.object += words.z;
         mirrored = words.w != 0u;
     }
-    s.flags = material_texel(s.material, 3u).w;
+    s.flags = material_texel(s.material, 0u).w;
     s.position = p0 + hit.b1 * e1 + hit.b2 * e2;
     s.corner = p0;
     s.e1 = e1;
@@ -251,11 +251,12 @@ Bsdf surface_bsdf(Surface s) {
     uvec4 m0 = material_texel(s.material, 0u), m5 = uvec4(0u, 0u, 0u, NONE), m6 = uvec4(NONE);
     if (FX_TEXTURES || FX_DIELECTRIC) m5 = material_texel(s.material, 5u);
     if (FX_TEXTURES) m6 = material_texel(s.material, 6u);
-    b.kind = material_texel(s.material, 1u).w;
+    b.kind = BSDF_DIFFUSE;
+    if (!ONE_KIND) b.kind = material_texel(s.material, 7u).z;
     b.albedo = textured(uintBitsToFloat(m0.xyz), m5.w, s);
     b.transmission = uintBitsToFloat(m5.xyz);
     b.ggx = (s.flags & MATERIAL_GGX) != 0u;
-    b.alpha = uintBitsToFloat(m0.w);
+    b.alpha = 0.0;
     b.eta = vec3(1.0);
     b.k = vec3(0.0);
     b.specular = vec3(0.0);
@@ -267,7 +268,9 @@ Bsdf surface_bsdf(Surface s) {
     b.nonlinear = (s.flags & MATERIAL_NONLINEAR) != 0u;
     if (FX_CONDUCTOR || FX_DIELECTRIC || FX_COATED) {
         b.eta = uintBitsToFloat(material_texel(s.material, 2u).xyz);
-        b.k = uintBitsToFloat(material_texel(s.material, 3u).xyz);
+        uvec4 m3 = material_texel(s.material, 3u);
+        b.k = uintBitsToFloat(m3.xyz);
+        b.alpha = uintBitsToFloat(m3.w);
         b.specular = textured(uintBitsToFloat(material_texel(s.material, 4u).xyz), m6.x, s);
         if (FX_COATED) {
             uvec4 m7 = material_texel(s.material, 7u);

@@ -31,7 +31,7 @@ vec4 texture_sample(uint index, vec2 uv, bool colour) {
 
 // The share of rays that a surface stops at a point of a triangle.
 float surface_opacity(uint material, uint triangle, vec2 barycentric) {
-    if ((material_texel(material, 3u).w & MATERIAL_MASKED) == 0u) return 1.0;
+    if ((material_texel(material, 0u).w & MATERIAL_MASKED) == 0u) return 1.0;
     float opacity = uintBitsToFloat(material_texel(material, 2u).w);
     uint image = material_texel(material, 6u).y;
     return image == NONE ? opacity : opacity * texture_sample(image, texture_coordinates(triangle, barycentric), false).r;

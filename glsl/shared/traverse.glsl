@@ -32,7 +32,8 @@ void push_group(inout uint depth, uvec2 group, bool left) {
     } else {
         stack[depth] = group;
     }
-    depth = min(depth + uint(left), STACK); // whatever the nodes are, `stack` is not left: scenes need no more than it has
+    // Whatever the nodes are, `stack` is not left: scenes need no more than it has.
+    depth = SHALLOW ? depth + uint(left) : min(depth + uint(left), STACK);
 }
 
 uvec2 pop_group(inout uint depth) {

@@ -216,24 +216,25 @@ gpu_structs! {
         mirrored: uint,
     }
 
-    /// Surface appearance. 8 texels. Colours are linear Rec. 709 in [0, 1] unless said otherwise.
+    /// Surface appearance. 8 texels, of which a diffuse surface without textures needs the first two. Colours are linear Rec. 709 in
+    /// [0, 1] unless said otherwise.
     struct Material {
         /// Diffuse albedo; multiplies `base_texture`.
         base_color: vec3,
-        /// Microfacet roughness (alpha itself, not its root); below 0.01 the interface is smooth.
-        alpha: float,
+        /// MATERIAL_ bits.
+        flags: uint,
         /// Emitted radiance of the front side, W/(m^2 sr); 0 emits nothing.
         emission: vec3,
-        /// One of the BSDF_ constants.
-        kind: uint,
+        /// Luminance of the mean emission, times the mean opacity; emissive triangles are chosen in proportion to it times their area.
+        emission_weight: float,
         /// Index of refraction per channel (conductor), or interior / exterior in `x` (dielectric, coated).
         eta: vec3,
         /// Constant opacity in [0, 1]; multiplies `opacity_texture`.
         opacity: float,
         /// Extinction per channel (conductor).
         k: vec3,
-        /// MATERIAL_ bits.
-        flags: uint,
+        /// Microfacet roughness (alpha itself, not its root); below 0.01 the interface is smooth.
+        alpha: float,
         /// Tint of specular reflection; multiplies `specular_texture`.
         specular: vec3,
         /// Height of a bump map in world units per unit of texture value.
@@ -254,8 +255,8 @@ gpu_structs! {
         emission_texture: uint,
         /// Diffuse reflectance of the smooth interface seen from inside (coated): mean internal Fresnel reflectance.
         internal_fresnel: float,
-        /// Luminance of the mean emission, times the mean opacity; emissive triangles are chosen in proportion to it times their area.
-        emission_weight: float,
+        /// One of the BSDF_ constants.
+        kind: uint,
         /// Index of the first word of a coat's table among the texels (coated, where rough); else zero.
         coat_table: uint,
     }
