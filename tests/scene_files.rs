@@ -196,6 +196,9 @@ fn without_memory_the_end_is_one_line() {
     let mapped = format!("mtllib m.mtl\n{TRIANGLE}usemtl m0\nf 1//1 2//1 3//1\nusemtl m1\nf 1//1 2//1 3//1\n");
     let files = [("sphere.toml", sphere), ("lamps.toml", &lamps), ("m.mtl", &pictures), ("mapped.obj", &mapped)];
     let folder = folder(&files);
+    std::fs::write(folder.path().join("sky.toml"), "[environment]\nfile = \"sky.png\"\n").unwrap();
+    let sky = image::GrayImage::new(16_384, 8192);
+    sky.write_with_encoder(PngEncoder::new(File::create(folder.path().join("sky.png")).unwrap())).unwrap();
     for name in ["0.png", "1.png"] {
         let picture = image::GrayImage::new(8192, 4096);
         picture.write_with_encoder(PngEncoder::new(File::create(folder.path().join(name)).unwrap())).unwrap();
@@ -208,6 +211,7 @@ fn without_memory_the_end_is_one_line() {
     fails("sphere.toml", 4_000_000, &["sphere.toml: 16769024 triangles: needs 6.2 GiB of memory, "]);
     fails("lamps.toml", 4_000_000, &["emissive triangles: needs "]);
     fails("mapped.obj", 700_000, &["textures of 67108864 texels: needs "]);
+    fails("sky.toml", 1_500_000, &["sky.png: needs "]);
     fails("sparse.toml", 4_000_000, &["sparse.toml: needs 120.0 GiB of memory, "]);
     fails("library.obj", 4_000_000, &["sparse.mtl: needs 12.0 GiB of memory, "]);
     complains(&render(&folder, "sparse.obj", 4_000_000, ""), 3, &["sparse.obj, line 1: 64 MiB without a line feed"]);

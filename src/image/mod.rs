@@ -97,8 +97,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
 /// Reads an EXR, PNG, JPEG or HDR file, told apart by content, into linear Rec. 709.
 ///
 /// # Errors
-/// [`Error::Input`] when the file cannot be read, is of another kind, or is damaged; [`Error::Device`] when there is not enough
-/// memory.
+/// [`Error::Input`] when the file cannot be read, is of another kind, or is damaged; [`Error::Memory`].
 pub fn read(path: &Path) -> Result<Film> {
     decode_file(path, &input::read_image(path)?, Frame::Display)
 }
@@ -112,6 +111,14 @@ pub fn decode(bytes: &[u8]) -> std::result::Result<Film, String> {
     decode_frame(bytes, Frame::Display)
 }
 
+/// Looks whether there is memory to decode an image; what is damaged is told when it is decoded.
+///
+/// # Errors
+/// [`Error::Memory`].
+pub fn check_room(path: &Path, bytes: &[u8]) -> Result<()> {
+    claim_of(bytes, Frame::Display).map_or(Ok(()), |claim| check_memory(path, claim.bytes))
+}
+
 fn decode_file(path: &Path, bytes: &[u8], frame: Frame) -> Result<Film> {
     let claim = claim_of(bytes, frame).map_err(|what| Error::input(path, what))?;
     check_memory(path, claim.bytes)?;
@@ -119,7 +126,7 @@ fn decode_file(path: &Path, bytes: &[u8], frame: Frame) -> Result<Film> {
 }
 
 /// # Errors
-/// [`Error::Device`] about the file when so many bytes are not free.
+/// [`Error::Memory`] about the file when so many bytes are not free.
 pub fn check_memory(path: &Path, bytes: u64) -> Result<()> {
     memory::check(bytes).map_err(|what| Error::Memory(format!("{}: {what}", path.display())))
 }

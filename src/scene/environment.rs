@@ -23,7 +23,7 @@ fn row_sine(row: u32, height: u32) -> f64 {
 /// Reads an image and builds its alias table. `None` for an image that is black throughout.
 ///
 /// # Errors
-/// [`Error::Input`] for a file that cannot be read or decoded.
+/// [`Error::Input`] for a file that cannot be read or decoded, [`Error::Memory`].
 pub fn load(path: &Path, warn: &mut Vec<String>) -> Result<Option<Environment>> {
     decode(path, &image::input::read(path)?, warn)
 }
@@ -35,6 +35,7 @@ pub fn load(path: &Path, warn: &mut Vec<String>) -> Result<Option<Environment>> 
 pub fn decode(path: &Path, bytes: &[u8], warn: &mut Vec<String>) -> Result<Option<Environment>> {
     let unusable =
         |what| Error::input(path, format!("is no usable environment image ({what}): save it again as HDR or EXR"));
+    image::check_room(path, bytes)?;
     let picture = image::decode(bytes).and_then(|film| film.picture(None)).map_err(unusable)?;
     from_picture(&path.display().to_string(), &picture, warn).map_err(unusable)
 }
