@@ -173,7 +173,7 @@ fn a_buffer_is_read_and_written_between_submissions() {
             assert_eq!(buffer.read().unwrap(), [7]);
             done.store(true, SeqCst);
         });
-        gpu.run(&mut frame, |rec| rec.fill(&buffer, 7)).unwrap();
+        gpu.run(&mut frame, |rec| rec.fill(buffer, 7)).unwrap();
     });
     *hooks::BEFORE_WAIT.lock().unwrap() = None;
     assert!(done.load(SeqCst) && !seen.load(SeqCst), "it was read while the submission ran");

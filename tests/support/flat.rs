@@ -8,7 +8,7 @@ pub fn deflated(zeros: u64) -> Vec<u8> {
     bits.push(0b10, 2); // fixed codes; its bits come the other way round
     let (runs, rest) = ((zeros - 1) / 258, (zeros - 1) % 258);
     (0..=rest).for_each(|_| bits.push(0b0011_0000, 8)); // a literal 0
-    (0..runs).for_each(|_| bits.push(0b1100_0101_00000, 13)); // 258 times what was 1 before
+    (0..runs).for_each(|_| bits.push(0b1100_0101 << 5, 13)); // 258 times what was 1 before
     bits.push(0, 7); // the end
     let sum = (((zeros % 65_521) as u32) << 16) | 1;
     [bits.bytes, sum.to_be_bytes().to_vec()].concat()
