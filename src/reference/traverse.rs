@@ -77,9 +77,8 @@ pub fn intersect_triangle(r: &RaySpace, vertices: [Vec3; 3], t_max: f32) -> Opti
     let det = u + v + w;
     let inside = u.min(v).min(w) >= 0.0 || u.max(v).max(w) <= 0.0;
     let inv = 1.0 / det;
-    let barycentric = vec2(v, w) * inv;
-    let t = (u * inv * a.z + barycentric.x * b.z + barycentric.y * c.z) * r.shear.z;
-    (inside && det != 0.0 && t > 0.0 && t < t_max).then_some((t, barycentric))
+    let t = (u * a.z + v * b.z + w * c.z) * (inv * r.shear.z);
+    (inside && det != 0.0 && t > 0.0 && t < t_max).then_some((t, vec2(v, w) * inv))
 }
 
 /// Both hits with a sphere, from half its chord: distances in lengths of the ray's direction, and vectors from the centre.
