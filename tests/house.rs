@@ -37,7 +37,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
         "scene",
         &["error", "gpu::layout", "image", "memory", "reference::coat", "reference::fresnel", "settings", "threads"],
     ),
-    ("reference", &["gpu::layout", "scene", "settings", "statistics"]),
+    ("reference", &["gpu::layout", "scene", "settings", "shaders", "statistics"]),
     ("composition", &["filter", "gpu::layout", "image"]),
     ("image", &["error", "gpu::layout", "memory"]),
     ("memory", &["error"]),

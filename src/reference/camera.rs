@@ -2,10 +2,8 @@
 use crate::gpu::layout::{Camera, Effects, PathPush};
 use crate::reference::sampler::{Sampler, pcg, sample_2d};
 use crate::reference::warp::{warp_disk, warp_gaussian, warp_tent};
+use crate::shaders::shared::camera::{PAIR_FILM, PAIR_LENS};
 use glam::{Vec2, Vec3, vec2};
-
-const PAIR_FILM: u32 = 0;
-const PAIR_LENS: u32 = 1;
 
 /// A ray.
 #[derive(Clone, Copy, Debug)]

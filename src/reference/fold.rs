@@ -1,22 +1,14 @@
 //! Twin of `glsl/fold.comp`: Welford's running mean and variance (1962), in order of sample index.
 use crate::gpu::layout::{BrokenTally, FoldPush, PixelLight, PixelStats, vec3, vec4};
 use crate::reference::sampler::pcg;
+use crate::shaders;
+use crate::shaders::fold::{BRIGHTEST, FARTHEST, FEW, SMALLEST_ALBEDO, WIDEST};
 use crate::statistics::luminance;
 use glam::{Vec3, Vec4};
 
-/// A channel whose albedo is below this cannot be divided out.
-const SMALLEST_ALBEDO: f32 = 1e-6;
-
-/// Irradiance is cut there: what a small albedo makes of bright light stays finite.
-const BRIGHTEST: f32 = 3e38;
-/// Deviations and sums of their squares are cut there, so that what is added up over pixels stays finite.
-const FARTHEST: f32 = 1e17;
-const WIDEST: f32 = 1e35;
-/// Samples up to which means are rounded to single precision.
-const FEW: u32 = 4096;
 /// Of the remainder of a mean, for each channel.
-const BITS: u32 = 10;
-const LIGHT_BITS: u32 = 5;
+const BITS: u32 = shaders::fold::BITS as u32;
+const LIGHT_BITS: u32 = shaders::fold::LIGHT_BITS as u32;
 
 /// What of a sample's light needs no filter, and its indirect irradiance over pi.
 fn split(direct: Vec3, indirect: Vec3, albedo: Vec3) -> (Vec3, Vec3) {

@@ -12,14 +12,8 @@ use crate::reference::surface::{
 use crate::reference::traverse::traverse_from;
 use crate::reference::warp::basis_from_normal;
 use crate::scene::Scene;
+use crate::shaders::path::{PAIR_BSDF, PAIR_CHOICE, PAIR_FIRST_BOUNCE, PAIR_LIGHT, PAIR_ROULETTE, PAIRS_PER_BOUNCE};
 use glam::{Mat3, Vec3};
-
-const PAIR_FIRST_BOUNCE: u32 = 2;
-const PAIRS_PER_BOUNCE: u32 = 4;
-const PAIR_CHOICE: u32 = 0;
-const PAIR_LIGHT: u32 = 1;
-const PAIR_BSDF: u32 = 2;
-const PAIR_ROULETTE: u32 = 3;
 
 /// Shadow rays to a lamp end at this part of the way: the error of the distance at which they would meet it is some 2^-24
 /// over the cosine there.
