@@ -1,4 +1,4 @@
-//! `glsl/*.comp` becomes SPIR-V and `$OUT_DIR/shaders.rs`: one module per kernel, with a typed field per binding and per
+//! Every `.comp` file below `glsl/` becomes SPIR-V and `$OUT_DIR/shaders.rs`: one module per kernel, with a typed field per binding and per
 //! specialisation constant, so that a forgotten buffer or a constant that a kernel does not have does not compile.
 //! `glsl/test/*.comp`, and kernels that tests run by themselves, become `$OUT_DIR/test_shaders.rs`. Any error stops the build with
 //! file and line. The compiler is `glslc`, as a program: Debian 12's libshaderc cannot be linked (undefined symbols).
@@ -26,7 +26,7 @@ use std::{env, fs};
 use xxhash_rust::xxh3::{Xxh3Default, xxh3_64};
 
 #[allow(dead_code, unused_imports)]
-#[path = "src/gpu/layout.rs"]
+#[path = "src/layout/mod.rs"]
 mod layout;
 
 #[path = "tools/build/emit.rs"]
@@ -46,8 +46,8 @@ fn main() {
 
 fn build() -> Result<()> {
     println!("cargo:rerun-if-changed=build.rs");
-    println!("cargo:rerun-if-changed=src/gpu/layout.rs");
-    println!("cargo:rerun-if-changed=src/gpu/layout");
+    println!("cargo:rerun-if-changed=src/layout/mod.rs");
+    println!("cargo:rerun-if-changed=src/layout");
     println!("cargo:rerun-if-changed=tools/build");
     println!("cargo:rerun-if-changed=glsl");
     if Path::new("spirv").exists() {
@@ -59,19 +59,26 @@ fn build() -> Result<()> {
         fs::remove_dir_all(&compiled)?; // kernels of earlier sources
     }
     fs::create_dir(&compiled)?;
-    generate(&kernels(Path::new("glsl"))?, "crate", &out.join("shaders.rs"))?;
-    let tested = [&kernels(Path::new("glsl/test"))?[..], &[PathBuf::from("glsl/fold.comp")]].concat();
+    let (tests, own) =
+        kernels(Path::new("glsl"))?.into_iter().partition::<Vec<_>, _>(|file| file.starts_with("glsl/test"));
+    generate(&own, "crate", &out.join("shaders.rs"))?;
+    let tested = [&tests[..], &[PathBuf::from("glsl/film/accumulate.comp")]].concat();
     generate(&tested, "tallow", &out.join("test_shaders.rs"))
 }
 
-/// The kernels directly in `folder`.
+/// The kernels below `folder`, by name.
 fn kernels(folder: &Path) -> Result<Vec<PathBuf>> {
-    let mut files: Vec<PathBuf> = fs::read_dir(folder)
-        .with_context(|| format!("{}: cannot be listed", folder.display()))?
-        .map(|entry| Ok(entry?.path()))
-        .collect::<Result<_>>()?;
-    files.retain(|file| file.extension().is_some_and(|e| e == "comp"));
-    files.sort();
+    let entries = fs::read_dir(folder).with_context(|| format!("{}: cannot be listed", folder.display()))?;
+    let mut files = Vec::new();
+    for entry in entries {
+        let path = entry?.path();
+        if path.is_dir() {
+            files.extend(kernels(&path)?);
+        } else if path.extension().is_some_and(|e| e == "comp") {
+            files.push(path);
+        }
+    }
+    files.sort_by(|a, b| a.file_name().cmp(&b.file_name()));
     Ok(files)
 }
 

@@ -1,5 +1,5 @@
 //! What is known of a pixel after some of its samples, and how two such records become one.
-use crate::gpu::layout::{PixelLight, PixelStats, vec3};
+use crate::layout::{PixelLight, PixelStats, vec3};
 use serde::{Deserialize, Serialize};
 
 /// One pixel of a render.
@@ -34,7 +34,7 @@ impl BrokenSamples {
     }
 }
 
-/// Sums of squares are cut there, as in `glsl/fold.comp`.
+/// Sums of squares are cut there, as in `glsl/film/accumulate.comp`.
 const WIDEST: f64 = 1e35;
 
 /// Rec. 709.

@@ -5,12 +5,12 @@ mod support;
 use std::path::Path;
 use support::{assert_silent, gpu};
 use tallow::error::Error;
-use tallow::gpu::layout::{PixelLight, PixelStats};
 use tallow::gpu::{FrameResources, Gpu};
-use tallow::renderer::{Outputs, PathRange, Progress, Renderer, Step, path_push};
+use tallow::layout::{PixelLight, PixelStats};
+use tallow::render::schedule::{self, Cut};
+use tallow::render::settings::Settings;
+use tallow::render::{Outputs, PathRange, Progress, Renderer, Step, path_push};
 use tallow::scene::Scene;
-use tallow::schedule::{self, Cut};
-use tallow::settings::Settings;
 use tallow::statistics::{Pixel, join};
 
 const POLICIES: [&str; 3] = ["geometry", "variance", "both"];
@@ -206,7 +206,7 @@ fn a_render_resumed_anywhere_has_the_bits_of_one_that_never_stopped() {
             s.allocate.max_spp = if policy == "threshold" { 5 } else { 0 };
         });
         let whole = render(&gpu, &scene);
-        let effects = tallow::gpu::layout::Effects { adaptive: true, ..tallow::renderer::called_for(&scene, split()) };
+        let effects = tallow::layout::Effects { adaptive: true, ..tallow::render::called_for(&scene, split()) };
         let renderer = Renderer::specialised(&gpu, &scene, split(), effects).unwrap();
         let mut frame = FrameResources::new(&gpu).unwrap();
         let cut = Cut { pixels: SIZE[0] * SIZE[1], tile: 1 << 20, paths: 300 };
@@ -378,7 +378,7 @@ fn a_film_of_several_storage_bindings_is_placed() {
     assert!(two.iter().all(|&i| bits(&pixels[i..=i]) == bits(&alike[i..=i])), "a pixel of two samples has other light");
     let (scene, guide) = (sized("both", 3), placed.film().tiles[0].guide.read().unwrap());
     let push = path_push(&scene);
-    let wrong = |&p: &u32| tallow::reference::guide::guide(&scene, &push, p).object != guide[p as usize].object;
+    let wrong = |&p: &u32| tallow::twins::primary_hit::guide(&scene, &push, p).object != guide[p as usize].object;
     assert!((0..2048 * 1400).step_by(997).filter(wrong).count() < 10, "primary hits");
     assert_silent(&gpu);
 }

@@ -174,7 +174,7 @@ fn a_profile_holds_every_pass_on_the_time_axis_of_the_host() {
     };
     let [load, compile, render, write] = ["load scene", "upload and compile", "render", "write"].map(|n| of(&cpu, n));
     assert!(load.1 == 0.0 && load.2 <= compile.1 && compile.2 <= render.1 && render.2 <= write.1, "{cpu:?}");
-    let [guide, path, fold] = ["guide", "path", "fold"].map(|n| of(&gpu, n));
+    let [guide, path, fold] = ["primary_hit", "path", "accumulate"].map(|n| of(&gpu, n));
     assert!(guide.2 <= path.1 && path.1 < path.2 && path.2 <= fold.1, "{gpu:?}");
     if !trace.to_string().contains("unknown") {
         let within = |s: &(String, f64, f64)| render.1 - 100.0 <= s.1 && s.2 <= render.2 + 100.0; // clocks drift

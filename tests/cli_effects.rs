@@ -21,7 +21,7 @@ fn primary_hits_are_found_only_for_files_that_keep_them() {
         let outputs = files.iter().flat_map(|file| ["-o", file]);
         let words = ["render", BOX, "--width", "31", "--height", "17", "--spp", "3", "--json"];
         let summary = json(&folder, &words.into_iter().chain(outputs).collect::<Vec<_>>());
-        summary["passes"].as_array().unwrap().iter().any(|p| p["pass"] == "guide")
+        summary["passes"].as_array().unwrap().iter().any(|p| p["pass"] == "primary_hit")
     };
     assert!(render(&["layers.exr", "beside.png"]));
     assert!(!render(&["alone.png"]));

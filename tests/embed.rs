@@ -9,16 +9,16 @@ use bytemuck::Pod;
 use std::path::Path;
 use std::process::Command;
 use support::engine::Engine;
-use tallow::composition::{self, Demodulation};
-use tallow::denoiser::Denoiser;
-use tallow::filter::{self, FilterSettings};
-use tallow::gpu::layout::{Camera, Effects, vec3, vec4};
+use tallow::denoise::Denoiser;
+use tallow::denoise::composition::{self, Demodulation};
+use tallow::denoise::filter::{self, FilterSettings};
 use tallow::gpu::{Buffer, FrameResources, Gpu, Location, PixelFormat, Recorder};
 use tallow::image::aov::{Aovs, Names};
 use tallow::image::{self, Film, Samples};
-use tallow::renderer::{Layer, OutputView, Outputs, Renderer};
+use tallow::layout::{Camera, Effects, vec3, vec4};
+use tallow::render::settings::Settings;
+use tallow::render::{Layer, OutputView, Outputs, Renderer};
 use tallow::scene::Scene;
-use tallow::settings::Settings;
 
 const WIDTH: u32 = 65;
 const HEIGHT: u32 = 33;
@@ -185,7 +185,7 @@ fn an_engine_filters_its_frames_where_they_are() {
                 gather(&engine.device, commands, denoiser.radiance(), &download);
             });
         }
-        assert!(frame.times().unwrap().iter().any(|pass| pass.name == "split"), "the filter's passes are timed");
+        assert!(frame.times().unwrap().iter().any(|pass| pass.name == "demodulate"), "the filter's passes are timed");
         let parts = composition::split(&aovs, demodulation);
         let expected = parts.join(&filter::run(&gpu, row, &parts.input, &settings).unwrap().0);
         let off = download.read().unwrap().iter().zip(&expected).fold(0f32, |worst, (found, expected)| {

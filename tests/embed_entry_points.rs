@@ -12,14 +12,14 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
 use std::sync::mpsc;
 use std::time::Duration;
 use support::engine::Engine;
-use tallow::composition::Demodulation;
-use tallow::denoiser::Denoiser;
+use tallow::denoise::Denoiser;
+use tallow::denoise::composition::Demodulation;
+use tallow::denoise::filter::{self, FilterSettings};
 use tallow::error::Error;
-use tallow::filter::{self, FilterSettings};
 use tallow::gpu::{Buffer, FrameResources, Gpu, RawDevice, Recorder};
-use tallow::renderer::{Outputs, Renderer, Step};
+use tallow::render::settings::Settings;
+use tallow::render::{Outputs, Renderer, Step};
 use tallow::scene::Scene;
-use tallow::settings::Settings;
 
 /// Counts are asked for, so that every kind of pass takes part.
 fn scene() -> Scene {

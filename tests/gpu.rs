@@ -2,8 +2,8 @@
 mod support;
 use support::kernels::{far, mix, next};
 use support::{assert_silent, hash, words};
-use tallow::gpu::layout::{Effects, uvec2, uvec3, uvec4, vec4};
 use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Location, PassTime};
+use tallow::layout::{Effects, uvec2, uvec3, uvec4, vec4};
 
 const SIZES: [usize; 5] = [1, 31, 64, 65, 1_000_001];
 const WIDTH: u32 = 64;

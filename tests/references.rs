@@ -10,11 +10,11 @@ use glam::dvec3;
 use statistics::sidak_quantile;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
-use tallow::gpu::layout::{Guide, NONE};
 use tallow::image::{self, Film, Picture};
-use tallow::renderer::{Outputs, Renderer};
+use tallow::layout::{Guide, NONE};
+use tallow::render::settings::Settings;
+use tallow::render::{Outputs, Renderer};
 use tallow::scene::Scene;
-use tallow::settings::Settings;
 use twin::Workplace;
 
 const SIZE: u32 = 128;

@@ -8,13 +8,11 @@ mod support;
 
 use alike::alike;
 use std::path::Path;
-use tallow::gpu::layout::{
-    BSDF_COATED, BSDF_DIFFUSE, Effects, Guide, Material, NONE, PixelLight, PixelStats, Triangle,
-};
 use tallow::gpu::{FrameResources, Gpu};
-use tallow::renderer::{self, Batch, Outputs, Renderer, Step};
+use tallow::layout::{BSDF_COATED, BSDF_DIFFUSE, Effects, Guide, Material, NONE, PixelLight, PixelStats, Triangle};
+use tallow::render::settings::{PixelFilter, Sampler, Settings};
+use tallow::render::{self, Batch, Outputs, Renderer, Step};
 use tallow::scene::Scene;
-use tallow::settings::{PixelFilter, Sampler, Settings};
 use tallow::statistics::BrokenSamples;
 
 fn scene(file: &str, change: impl Fn(&mut Settings)) -> Scene {
@@ -64,7 +62,7 @@ fn samples_know_their_rays() {
 
 /// The effects that change the picture when they are compiled in alone, for the message of a failure.
 fn culprits(gpu: &Gpu, scene: &Scene, expected: &[PixelStats]) -> String {
-    let called_for = renderer::called_for(scene, Outputs::default());
+    let called_for = render::called_for(scene, Outputs::default());
     let effects = Effects::NAMES.iter().copied().zip(called_for.switches());
     let off = effects.filter(|(name, on)| !on && *name != "independent_sampler").map(|(name, _)| name);
     let changes = |name: &&str| {
@@ -77,7 +75,7 @@ fn culprits(gpu: &Gpu, scene: &Scene, expected: &[PixelStats]) -> String {
 /// What is called for, and all effects.
 fn plain_and_all(gpu: &Gpu, scene: &Scene) -> [Renderer; 2] {
     let outputs = Outputs { split_light: true, guides: true, counters: false };
-    let all = Renderer::specialised(gpu, scene, outputs, renderer::all_effects(scene));
+    let all = Renderer::specialised(gpu, scene, outputs, render::all_effects(scene));
     [Renderer::new(gpu, scene, outputs).unwrap(), all.unwrap()]
 }
 
@@ -128,7 +126,7 @@ fn renders_that_rounding_tells_apart_are_alike_and_faults_are_not() {
             more_samples(s);
             s.seed = seed;
         });
-        let mut effects = renderer::called_for(&scene, Outputs::default());
+        let mut effects = render::called_for(&scene, Outputs::default());
         change(&mut effects);
         support::render(&gpu, &Renderer::specialised(&gpu, &scene, Outputs::default(), effects).unwrap())
     };
@@ -279,7 +277,7 @@ fn black_floor(coated: bool) -> Scene {
         base_color: [0.005; 3],
         eta: [1.5; 3],
         specular: [1.0; 3],
-        internal_fresnel: tallow::reference::fresnel::internal_fresnel(1.5) as f32,
+        internal_fresnel: tallow::twins::fresnel::internal_fresnel(1.5) as f32,
         ..scene.materials[0]
     };
     let own = scene.materials.len() as u32;
@@ -425,7 +423,7 @@ fn an_effect_that_is_called_for_and_left_out_shows() {
     // Control of the bit comparison above: without indirect light the box must differ.
     let gpu = support::gpu();
     let scene = scene("cornell-box/scene.toml", small);
-    let effects = renderer::called_for(&scene, Outputs::default());
+    let effects = render::called_for(&scene, Outputs::default());
     let without = Effects { emissive: false, ..effects };
     let a = support::render(&gpu, &Renderer::new(&gpu, &scene, Outputs::default()).unwrap());
     let b = support::render(&gpu, &Renderer::specialised(&gpu, &scene, Outputs::default(), without).unwrap());

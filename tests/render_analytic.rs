@@ -9,10 +9,10 @@ mod twin;
 use glam::{DVec2, DVec3, dvec2, dvec3, vec3};
 use scattering::scattered_once;
 use std::f64::consts::PI;
-use tallow::gpu::layout::{BSDF_COATED, PixelStats};
-use tallow::reference::bsdf::Bsdf;
-use tallow::renderer::{Outputs, Renderer};
+use tallow::layout::{BSDF_COATED, PixelStats};
+use tallow::render::{Outputs, Renderer};
 use tallow::scene::Scene;
+use tallow::twins::bsdf::Bsdf;
 use twin::Workplace;
 
 const SIDE: u32 = 64;

@@ -4,18 +4,18 @@
 use proptest::prelude::*;
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use tallow::denoise::filter::{FILTERS, FilterInput, FilterSettings, Planes};
 use tallow::error::Error;
-use tallow::filter::{FILTERS, FilterInput, FilterSettings, Planes};
-use tallow::gpu::layout::*;
 use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Location};
 use tallow::image::{Film, Samples, WriteOptions};
-use tallow::reference::path::{Strategy as Ways, Tracer};
-use tallow::renderer::{Batch, Choice, Outputs, PathRange, Plan, Renderer, Share, Step, called_for, path_push};
+use tallow::layout::*;
+use tallow::render::pass::choose::Choose;
+use tallow::render::pass::sample_list::Batches;
+use tallow::render::settings::Settings;
+use tallow::render::{Batch, Choice, Outputs, PathRange, Plan, Renderer, Share, Step, called_for, path_push};
 use tallow::scene::Scene;
-use tallow::settings::Settings;
 use tallow::shaders::shared;
-use tallow::stage::batch::Batches;
-use tallow::stage::choose::Choose;
+use tallow::twins::path::{Strategy as Ways, Tracer};
 
 fn number() -> u32 {
     std::env::var("TALLOW_FUZZ").ok().and_then(|n| n.parse().ok()).unwrap_or(100)

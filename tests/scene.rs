@@ -2,9 +2,9 @@
 use image::codecs::png::PngEncoder;
 use std::fs::File;
 use std::path::Path;
-use tallow::gpu::layout::*;
-use tallow::reference::texture::texture_sample;
+use tallow::layout::*;
 use tallow::scene::{Scene, effects};
+use tallow::twins::texture::texture_sample;
 
 const BOX: &str = "
 [film]

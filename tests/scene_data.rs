@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::Instant;
 use tallow::gpu::Gpu;
-use tallow::renderer::{Outputs, Renderer};
+use tallow::render::settings::Settings;
+use tallow::render::{Outputs, Renderer};
 use tallow::scene::Scene;
-use tallow::settings::Settings;
 
 /// What is timed runs alone.
 static ALONE: Mutex<()> = Mutex::new(());

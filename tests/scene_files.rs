@@ -8,9 +8,9 @@ use command::complains;
 use image::codecs::png::PngEncoder;
 use std::fs::File;
 use std::process::{Command, Output};
-use tallow::reference::guide::guide;
-use tallow::renderer::{Outputs, Renderer, path_push};
+use tallow::render::{Outputs, Renderer, path_push};
 use tallow::scene::Scene;
+use tallow::twins::primary_hit::guide;
 use tempfile::TempDir;
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\n";
@@ -120,7 +120,7 @@ fn a_comb_and_a_disk_of_many_corners_load() {
     let face: String = (1..=points.len()).map(|i| format!(" {i}")).collect();
     let folder = folder(&[("a.obj", &format!("{corners}f{face}\n"))]);
     let scene = load(&folder, "a.obj").unwrap();
-    let corner = |t: &tallow::gpu::layout::Triangle| [t.v0, t.v1, t.v2].map(glam::Vec3::from);
+    let corner = |t: &tallow::layout::Triangle| [t.v0, t.v1, t.v2].map(glam::Vec3::from);
     let area = |[a, b, c]: [glam::Vec3; 3]| f64::from((b - a).cross(c - a).length()) / 2.0;
     let found: f64 = scene.triangles.iter().map(|t| area(corner(t))).sum();
     assert!((found / 7499.0 - 1.0).abs() < 1e-5, "{found}");

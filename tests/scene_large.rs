@@ -4,9 +4,9 @@ mod support;
 
 use std::path::Path;
 use std::time::Instant;
-use tallow::reference::guide::guide;
-use tallow::renderer::{Outputs, Renderer, path_push};
+use tallow::render::{Outputs, Renderer, path_push};
 use tallow::scene::Scene;
+use tallow::twins::primary_hit::guide;
 
 /// A grid of bumps written as quads, without normals.
 fn write_grid(path: &Path, side: u32) -> std::io::Result<()> {

@@ -203,6 +203,6 @@ fn what_can_be_mended_is_counted() {
 #[test]
 fn an_empty_scene_is_black_and_says_so() {
     let empty = Scene::build(&Description::default(), &|_| {}).unwrap();
-    assert_eq!((empty.triangles.len(), empty.settings.width), (0, tallow::settings::Settings::default().width));
+    assert_eq!((empty.triangles.len(), empty.settings.width), (0, tallow::render::settings::Settings::default().width));
     assert!(empty.warnings.iter().any(|w| w.contains("no light")), "{:?}", empty.warnings);
 }

@@ -5,9 +5,9 @@ mod support;
 
 use picture::Picture;
 use support::{assert_silent, gpu, hash};
-use tallow::filter::{AtrousForm, FILTERS, FilterInput, FilterSettings, Row, find, run};
+use tallow::denoise::filter::{AtrousForm, FILTERS, FilterInput, FilterSettings, Row, find, run};
 use tallow::gpu::Gpu;
-use tallow::gpu::layout::{Guide, vec4};
+use tallow::layout::{Guide, vec4};
 
 /// Device and twin, under every setting that the filter is tested with and these besides.
 fn outputs(gpu: &Gpu, row: &Row, input: &FilterInput, more: &[FilterSettings]) -> Vec<Vec<vec4>> {

@@ -11,11 +11,11 @@ use scattering::{RINGS, SECTORS, d, g1, grids, scattered_once};
 use statistics::{chi_square, sidak};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
-use tallow::gpu::layout::{BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE, COAT_COLUMNS};
-use tallow::reference::bsdf::{Bsdf, BsdfSample, SMOOTH_ALPHA, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
-use tallow::reference::coat::{CoatRow, coat_row_at, coat_table};
-use tallow::reference::fresnel::internal_fresnel;
-use tallow::reference::sampler::{sample_2d, sampler_start};
+use tallow::layout::{BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE, COAT_COLUMNS};
+use tallow::twins::bsdf::{Bsdf, BsdfSample, SMOOTH_ALPHA, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
+use tallow::twins::coat::{CoatRow, coat_row_at, coat_table};
+use tallow::twins::fresnel::internal_fresnel;
+use tallow::twins::sampler::{sample_2d, sampler_start};
 
 const ALPHAS: [f32; 5] = [0.01, 0.05, 0.2, 0.5, 1.0];
 const DEGREES: [f32; 5] = [0.0, 35.0, 60.0, 86.0, 89.5];

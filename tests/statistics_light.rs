@@ -8,13 +8,13 @@ mod twin;
 use glam::{Mat3, Vec3, dvec3, vec3};
 use statistics::{chi_square, sidak};
 use std::f64::consts::{PI, TAU};
-use tallow::gpu::layout::{LIGHT_ENVIRONMENT, Light, NONE};
-use tallow::reference::light::*;
-use tallow::reference::sampler::{sample_2d, sample_2d_bits, sampler_start};
-use tallow::reference::scene::triangle_vertices;
-use tallow::reference::surface::surface_at;
-use tallow::reference::traverse::{Hit, intersect_triangle, ray_space};
+use tallow::layout::{LIGHT_ENVIRONMENT, Light, NONE};
 use tallow::scene::Scene;
+use tallow::twins::light::*;
+use tallow::twins::sampler::{sample_2d, sample_2d_bits, sampler_start};
+use tallow::twins::scene::triangle_vertices;
+use tallow::twins::surface::surface_at;
+use tallow::twins::traverse::{Hit, intersect_triangle, ray_space};
 use twin::{Random, Workplace};
 
 /// From where lights are seen.

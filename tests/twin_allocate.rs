@@ -6,15 +6,15 @@ use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 use support::{assert_silent, gpu, words};
 use tallow::allocate::{HostInputs, Inputs, POLICIES, Placing, policy};
-use tallow::gpu::layout::*;
+use tallow::gpu::PerBlock;
 use tallow::gpu::{Buffer, FrameResources, Gpu, Location};
-use tallow::reference::apportion as twin;
-use tallow::schedule::{Choice, PathRange, Plan, Share};
-use tallow::stage::PerBlock;
-use tallow::stage::apportion::{Apportion, Counts, fixed_threshold};
-use tallow::stage::batch::{self, Batches};
-use tallow::stage::choose::{self, Choose};
-use tallow::stage::scan::Scan;
+use tallow::layout::*;
+use tallow::render::pass::apportion::{Apportion, Counts, fixed_threshold};
+use tallow::render::pass::choose::{self, Choose};
+use tallow::render::pass::sample_list::{self, Batches};
+use tallow::render::pass::scan::Scan;
+use tallow::render::schedule::{Choice, PathRange, Plan, Share};
+use tallow::twins::apportion as twin;
 
 /// Pixels of a thread on a CPU and on a GPU.
 const RUNS: [u32; 2] = [64, 16];
@@ -231,7 +231,7 @@ fn every_path_of_every_batch_is_listed_once() {
                             let (b, offset) = (&bench.batch, &counts.offset);
                             bench
                                 .gpu
-                                .run(&mut frame, |rec| batch::record(b, rec, offset, &stats, &list, &range, 7))
+                                .run(&mut frame, |rec| sample_list::record(b, rec, offset, &stats, &list, &range, 7))
                                 .unwrap();
                             assert_eq!(list.read().unwrap(), twin::batch(dealt, &next, first, n), "{size} {range:?}");
                         }

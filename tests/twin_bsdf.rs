@@ -2,15 +2,15 @@
 use glam::{Vec2, Vec3, Vec4, vec2, vec3};
 use std::sync::LazyLock;
 use tallow::error::Result;
-use tallow::gpu::layout::{
+use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Location};
+use tallow::layout::{
     BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE, Effects, MATERIAL_GGX, MATERIAL_NONLINEAR, Material,
     TestPush,
 };
-use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Location};
-use tallow::reference::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
-use tallow::reference::coat::coat_table;
-use tallow::reference::fresnel::internal_fresnel;
-use tallow::reference::sampler::{sample_2d, sample_2d_bits, sampler_start};
+use tallow::twins::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
+use tallow::twins::coat::coat_table;
+use tallow::twins::fresnel::internal_fresnel;
+use tallow::twins::sampler::{sample_2d, sample_2d_bits, sampler_start};
 
 /// The test kernels.
 mod kernels {
@@ -28,7 +28,7 @@ fn numbers(case: usize, pair: u32) -> Vec2 {
 }
 
 fn direction(u: Vec2) -> Vec3 {
-    tallow::reference::warp::warp_sphere(u)
+    tallow::twins::warp::warp_sphere(u)
 }
 
 const TABLES: usize = 3;

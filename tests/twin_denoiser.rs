@@ -6,16 +6,16 @@ mod support;
 
 use std::path::Path;
 use support::{assert_silent, gpu, hash};
-use tallow::composition::{Demodulation, split};
-use tallow::denoiser::Denoiser;
-use tallow::filter::{FilterSettings, check_size, find};
-use tallow::gpu::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
+use tallow::denoise::Denoiser;
+use tallow::denoise::composition::{Demodulation, split};
+use tallow::denoise::filter::{FilterSettings, check_size, find};
 use tallow::gpu::{DeviceKind, FrameResources, Gpu};
 use tallow::image::aov::{Aovs, Names};
 use tallow::image::{Film, Samples};
-use tallow::renderer::{Outputs, Renderer};
+use tallow::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
+use tallow::render::settings::Settings;
+use tallow::render::{Outputs, Renderer};
 use tallow::scene::Scene;
-use tallow::settings::Settings;
 use tallow::statistics::variance_of_mean;
 
 const SIZES: [[u32; 2]; 6] = [[1, 1], [31, 1], [1, 65], [64, 2], [65, 3], [33, 17]];

@@ -5,9 +5,9 @@ mod support;
 
 use picture::{Picture, SIZES, apart, line, red};
 use support::{assert_silent, gpu};
-use tallow::filter::{FILTERS, FilterInput, FilterSettings, GuidedSums, WaveletBasis, find, firefly, run};
-use tallow::gpu::layout::vec4;
+use tallow::denoise::filter::{FILTERS, FilterInput, FilterSettings, GuidedSums, WaveletBasis, find, firefly, run};
 use tallow::gpu::{DeviceKind, Gpu};
+use tallow::layout::vec4;
 
 #[test]
 fn kernels_agree_with_their_twins() {

@@ -6,9 +6,9 @@ mod support;
 use picture::{Picture, SIZES, apart, line, red};
 use support::kernels::absorb;
 use support::{assert_silent, gpu, hash};
-use tallow::filter::{FilterInput, FilterSettings, GuidedSums, find, run};
-use tallow::gpu::layout::vec4;
+use tallow::denoise::filter::{FilterInput, FilterSettings, GuidedSums, find, run};
 use tallow::gpu::{Buffer, FrameResources, Gpu, Location};
+use tallow::layout::vec4;
 
 /// A constant guide leaves `guided` nothing but box means, and box means of those.
 #[test]

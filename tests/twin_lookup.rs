@@ -6,13 +6,13 @@ use glam::{Vec2, vec2};
 use std::path::Path;
 use support::{assert_silent, gpu, hash};
 use tallow::gpu::Gpu;
-use tallow::gpu::layout::{Effects, Guide, NONE, PathPush, vec3, vec4};
-use tallow::reference::guide::guide;
-use tallow::reference::lookup::{GuideRays, look_up};
-use tallow::reference::path::{Strategy, Tracer};
-use tallow::renderer::{Outputs, Renderer, path_push};
+use tallow::layout::{Effects, Guide, NONE, PathPush, vec3, vec4};
+use tallow::render::settings::PixelFilter;
+use tallow::render::{Outputs, Renderer, path_push};
 use tallow::scene::Scene;
-use tallow::settings::PixelFilter;
+use tallow::twins::guide_lookup::{GuideRays, look_up};
+use tallow::twins::path::{Strategy, Tracer};
+use tallow::twins::primary_hit::guide;
 
 /// Around the workgroups' sizes, one row, one column, one pixel.
 const SIZES: [[u32; 2]; 6] = [[1, 1], [31, 1], [1, 65], [64, 1], [65, 2], [33, 17]];

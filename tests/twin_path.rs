@@ -6,12 +6,12 @@ mod support {
 use glam::{DVec3, Vec2, Vec3, vec2, vec3};
 use rayon::prelude::*;
 use support::twin::*;
-use tallow::gpu::layout::{Light, NONE};
-use tallow::reference::light::light_sample;
-use tallow::reference::path::{SHADOW_END, Strategy};
-use tallow::reference::surface::surface_at;
-use tallow::reference::traverse::{Hit, traverse, traverse_from};
+use tallow::layout::{Light, NONE};
 use tallow::scene::Scene;
+use tallow::twins::light::light_sample;
+use tallow::twins::path::{SHADOW_END, Strategy};
+use tallow::twins::surface::surface_at;
+use tallow::twins::traverse::{Hit, traverse, traverse_from};
 
 const FAR: f32 = 3e38;
 

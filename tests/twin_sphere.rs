@@ -4,11 +4,11 @@ mod support {
 }
 use glam::{DVec3, Vec3, vec3};
 use support::twin::*;
-use tallow::gpu::layout::{LIGHT_SPHERE, LIGHT_TRIANGLE, NONE, SPHERE};
-use tallow::reference::path::Strategy;
-use tallow::reference::surface::{Surface, surface_at};
-use tallow::reference::traverse::{Hit, traverse, traverse_from};
+use tallow::layout::{LIGHT_SPHERE, LIGHT_TRIANGLE, NONE, SPHERE};
 use tallow::scene::Scene;
+use tallow::twins::path::Strategy;
+use tallow::twins::surface::{Surface, surface_at};
+use tallow::twins::traverse::{Hit, traverse, traverse_from};
 
 const FAR: f32 = 3e38;
 

@@ -4,14 +4,14 @@ use crate::compare::Picture;
 use glam::{Vec3, vec2};
 use rayon::prelude::*;
 use std::path::Path;
-use tallow::gpu::layout::NONE;
-use tallow::reference::camera::{camera_ray, film_from_pixel};
-use tallow::reference::light::INFINITE_DISTANCE;
-use tallow::reference::sampler::{sample_2d, sampler_start};
-use tallow::reference::surface::surface_at;
-use tallow::reference::traverse::traverse_from;
-use tallow::reference::warp::warp_sphere;
+use tallow::layout::NONE;
 use tallow::scene::Scene;
+use tallow::twins::camera::{camera_ray, film_from_pixel};
+use tallow::twins::light::INFINITE_DISTANCE;
+use tallow::twins::sampler::{sample_2d, sampler_start};
+use tallow::twins::surface::surface_at;
+use tallow::twins::traverse::traverse_from;
+use tallow::twins::warp::warp_sphere;
 
 /// Of the scene's film, with `spp` samples a pixel; `reach` in world units.
 ///

@@ -1,4 +1,4 @@
-// What auto makes of the image for its candidates, and of what they return. Twin: src/filter/auto/reference.rs.
+// What auto makes of the image for its candidates, and of what they return. Twin: src/denoise/filter/auto/reference.rs.
 const float BRIGHT = 5.0; // times the light around
 
 // What the narrow window gets of a pixel. The wide one spreads the rest: a few bright samples, which carry much of the light

@@ -1,6 +1,6 @@
 // How alike two pixels are: edge-stopping weights of radiance, normal and position (Dammertz et al. 2010, section 2.2).
-// Twin: src/filter/edge.rs.
-#include "shared/pixel.glsl"
+// Twin: src/denoise/filter/edge.rs.
+#include "shared/sanitise.glsl"
 
 layout(constant_id = 110) const bool WEIGHT_RT = true;
 layout(constant_id = 111) const bool WEIGHT_N = true;

@@ -2,7 +2,7 @@
 // Chan's rule (Chan, Golub, LeVeque 1979): about the sets' own means, so that nothing cancels, and without ever
 // subtracting a pixel, so that nothing is left behind by one that has gone. The guide's means are counted from a point
 // within the window, so that far-away guides keep their digits.
-#include "shared/paired.glsl"
+#include "shared/store64.glsl"
 
 struct Moments {
     vec4 head; // count, mean N

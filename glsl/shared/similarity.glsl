@@ -1,5 +1,5 @@
 // How alike a pixel's surroundings are. Needs `push` (PriorityPush) and `guides`.
-#include "shared/exact.glsl"
+#include "shared/portable_math.glsl"
 
 const float SIMILARITY_UNIT = 65536.0;
 

@@ -3,7 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "layout.glsl"
 #include "shared/moments.glsl"
-#include "shared/fit.glsl"
+#include "shared/linear_model.glsl"
 
 // Thread i: a record whose numbers are all from[i] into one of ones, and not into one of ones. results[4 i ..]: of moments, a sum
 // over all numbers of the latter, then of the former; the same of fits.

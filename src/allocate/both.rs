@@ -1,16 +1,16 @@
 //! Geometry first, noise as it becomes known, less what a filter of indirect light will remove. Noise is estimated among neighbours that look
-//! alike: from their samples, and from how far their means are apart. Kernels: `glsl/kinship.comp`, `glsl/both.comp`.
+//! alike: from their samples, and from how far their means are apart. Kernels: `glsl/allocate/likeness.comp`, `glsl/allocate/both.comp`.
 use super::geometry::Geometry;
 use super::variance::{moments, noise, square};
 use super::{HostInputs, Inputs, Placing, Policy, Row, geometry};
 use crate::error::Result;
-use crate::gpu::layout::{Guide, NONE, PixelLight, PixelStats, PriorityPush, vec3};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::reference::exact::{exp_negative, squared_distance};
+use crate::layout::{Guide, NONE, PixelLight, PixelStats, PriorityPush, vec3};
 use crate::shaders::both::{APART, LEAST_LEFT, STRONGEST_TINT};
-use crate::shaders::shared::kinship::{GATHERED_UNIT, LEAST_KINSHIP, SEVENTHS};
-use crate::shaders::{both, kinship};
+use crate::shaders::shared::likeness_bits::{GATHERED_UNIT, LEAST_KINSHIP, SEVENTHS};
+use crate::shaders::{both, likeness};
 use crate::statistics::luminance;
+use crate::twins::exact::{exp_negative, squared_distance};
 use glam::Vec3;
 
 pub(super) const ROW: Row = Row {
@@ -25,7 +25,7 @@ pub(super) const ROW: Row = Row {
 
 struct Both {
     geometry: Geometry,
-    kinship: Kernel<kinship::Bind<'static>>,
+    kinship: Kernel<likeness::Bind<'static>>,
     join: Kernel<both::Bind<'static>>,
     /// Importance, then what it and [`kinship`] come to, a word a pixel: priorities of a render that goes on stay as they are.
     words: Buffer<f32>,
@@ -38,7 +38,7 @@ impl Both {
             geometry: Geometry::new(gpu)?,
             kinship: Kernel::new(gpu, &thread.into())?,
             join: Kernel::new(gpu, &thread.into())?,
-            words: Buffer::new(gpu, "kinship", pixels as usize, Location::Device)?,
+            words: Buffer::new(gpu, "likeness", pixels as usize, Location::Device)?,
         })
     }
 }
@@ -48,7 +48,7 @@ impl Policy for Both {
         if push.filtered > 0.0 {
             self.geometry.record(rec, &Inputs { priority: &self.words, ..*b }, push)?;
         }
-        let bind = kinship::Bind { guides: b.guide, words: &self.words };
+        let bind = likeness::Bind { guides: b.guide, words: &self.words };
         rec.dispatch_threads(&self.kinship, bind, push, push.size[0] * push.size[1])
     }
 

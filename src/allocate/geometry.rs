@@ -1,10 +1,10 @@
-//! GEO: importance from normals and positions, before any radiance is known. Kernel: `glsl/geometry.comp`.
+//! GEO: importance from normals and positions, before any radiance is known. Kernel: `glsl/allocate/geometry.comp`.
 use super::{HostInputs, Inputs, Placing, Policy, Row};
 use crate::error::Result;
-use crate::gpu::layout::{Guide, NONE, PriorityPush};
 use crate::gpu::{Gpu, Kernel, Recorder};
-use crate::reference::exact::{exp_negative, squared_distance};
+use crate::layout::{Guide, NONE, PriorityPush};
 use crate::shaders::geometry::Bind;
+use crate::twins::exact::{exp_negative, squared_distance};
 
 pub(super) const ROW: Row = Row {
     name: "geometry",

@@ -1,8 +1,8 @@
 //! What makes a pixel worth samples: one file per policy, one row in [`POLICIES`]. A policy writes a priority per pixel;
 //! `stage::apportion` turns priorities into counts that sum to the budget exactly, `stage::choose` into one sample or none.
 use crate::error::Result;
-use crate::gpu::layout::{Guide, PixelLight, PixelStats, PriorityPush};
 use crate::gpu::{Buffer, Gpu, Recorder};
+use crate::layout::{Guide, PixelLight, PixelStats, PriorityPush};
 
 pub mod both;
 pub mod geometry;

@@ -1,10 +1,10 @@
 //! RAS as published: noise against a threshold that falls, then a probability that is frozen. Kernel:
-//! `glsl/threshold.comp`; `stage::choose` turns its priorities into samples.
+//! `glsl/allocate/threshold.comp`; `stage::choose` turns its priorities into samples.
 use super::variance::moments;
 use super::{HostInputs, Inputs, Placing, Policy, Row};
 use crate::error::Result;
-use crate::gpu::layout::{PixelStats, PriorityPush};
 use crate::gpu::{Kernel, Recorder};
+use crate::layout::{PixelStats, PriorityPush};
 use crate::shaders::threshold::Bind;
 
 pub(super) const ROW: Row = Row {

@@ -2,7 +2,7 @@
 use super::{HostInputs, Inputs, Placing, Policy, Row};
 use crate::error::Result;
 use crate::gpu::Recorder;
-use crate::gpu::layout::PriorityPush;
+use crate::layout::PriorityPush;
 
 pub(super) const ROW: Row = Row {
     name: "uniform",

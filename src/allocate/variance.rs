@@ -1,9 +1,9 @@
-//! RAS, kept up to date: the noise that the samples show. Kernel: `glsl/variance.comp`.
+//! RAS, kept up to date: the noise that the samples show. Kernel: `glsl/allocate/variance.comp`.
 use super::{HostInputs, Inputs, Placing, Policy, Row};
 use crate::error::Result;
-use crate::gpu::layout::{PixelStats, PriorityPush};
 use crate::gpu::{Kernel, Recorder};
-use crate::shaders::shared::noise::{BLINDING, PRIOR_SAMPLES};
+use crate::layout::{PixelStats, PriorityPush};
+use crate::shaders::shared::pixel_noise::{BLINDING, PRIOR_SAMPLES};
 use crate::shaders::variance::Bind;
 use crate::statistics::luminance;
 
@@ -42,7 +42,7 @@ pub(super) fn square(push: &PriorityPush, pixel: usize) -> impl Iterator<Item = 
     beside(y, height).flat_map(move |y| beside(x, width).map(move |x| y * width + x))
 }
 
-/// Twin of the function in `glsl/shared/noise.glsl`.
+/// Twin of the function in `glsl/shared/pixel_noise.glsl`.
 pub(super) fn noise(push: &PriorityPush, own: [f32; 4], around: [f32; 4]) -> f32 {
     if around[1] == 0.0 {
         return 1.0;

@@ -3,7 +3,7 @@ use super::finite;
 use crate::error::Result;
 use crate::gpu::{self, DeviceOptions, Gpu};
 use crate::image::{WriteOptions, tone::ToneMap};
-use crate::settings::entry::Entry;
+use crate::render::settings::entry::Entry;
 use clap::Arg;
 
 /// Adds range and default to the help of the options that set `defaults`. Options that say what their default depends

@@ -1,12 +1,12 @@
 //! `tallow explain`: what a scene calls for, and what that costs.
 use super::{Exit, print, print_json, readable};
 use crate::error::{Error, Result};
-use crate::gpu::layout::*;
 use crate::gpu::{DeviceOptions, FrameResources, Gpu, PassTime};
-use crate::renderer::{Outputs, Renderer};
+use crate::layout::*;
+use crate::render::settings::{Allocate, Settings};
+use crate::render::{Outputs, Renderer};
 use crate::report::table::{self, milliseconds};
 use crate::scene::{self, Scene};
-use crate::settings::{Allocate, Settings};
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::collections::BTreeSet;

@@ -3,7 +3,7 @@ use super::progress::Progress;
 use super::resume::Earlier;
 use crate::error::Result;
 use crate::gpu::{FrameResources, PassTime};
-use crate::renderer::{PathRange, Renderer, Step};
+use crate::render::{PathRange, Renderer, Step};
 use crate::statistics::BrokenSamples;
 use serde::Serialize;
 use std::ops::ControlFlow;

@@ -1,9 +1,9 @@
 //! What a renderer's buffers hold, as the channels of an image file, and back.
 use crate::error::Result;
-use crate::gpu::layout::{Guide, PixelLight, PixelStats, vec3};
 use crate::image::{Film, NOISY, Samples};
+use crate::layout::{Guide, PixelLight, PixelStats, vec3};
 use crate::memory;
-use crate::renderer::Renderer;
+use crate::render::Renderer;
 use crate::statistics::{BrokenSamples, Pixel, variance_of_mean};
 
 const RGB: [&str; 3] = ["R", "G", "B"];

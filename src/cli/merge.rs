@@ -4,7 +4,7 @@ use super::rendered::Rendered;
 use super::{Exit, complain, layers};
 use crate::error::{Error, Result};
 use crate::image::{self, Film, WriteOptions};
-use crate::settings::Settings;
+use crate::render::settings::Settings;
 use crate::statistics::{BrokenSamples, Pixel, join};
 use std::path::{Path, PathBuf};
 

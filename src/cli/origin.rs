@@ -2,8 +2,8 @@
 use super::layers;
 use crate::error::{Error, Result};
 use crate::image::Film;
+use crate::render::settings::Settings;
 use crate::scene::Scene;
-use crate::settings::Settings;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;

@@ -1,7 +1,7 @@
 //! Settings that the command line gives over those of the scene file.
 use super::common::with_ranges;
 use crate::allocate::{POLICIES, Placing};
-use crate::settings::{Allocate, PixelFilter, Sampler, Settings};
+use crate::render::settings::{Allocate, PixelFilter, Sampler, Settings};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 
 /// Settings given on the command line.

@@ -10,19 +10,19 @@ use super::job::{End, Job, Why};
 use super::overrides::Overrides;
 use super::resume::Earlier;
 use super::{Exit, complain, fail_on_messages, interrupt, layers};
-use crate::composition::{self, Demodulation};
+use crate::denoise::composition::{self, Demodulation};
+use crate::denoise::filter::{self, FilterSettings, Row};
 use crate::error::{Error, Result};
-use crate::filter::{self, FilterSettings, Row};
 use crate::gpu::{self, FrameResources, Gpu, PassTime};
 use crate::image::aov::{Aovs, Names};
 use crate::image::difference::false_colours;
 use crate::image::output::{self, Stream};
 use crate::image::{self, Film, WriteOptions};
 use crate::memory;
-use crate::renderer::{self, FilmBuffers, Outputs, Renderer};
+use crate::render::settings::Settings;
+use crate::render::{self, FilmBuffers, Outputs, Renderer};
 use crate::report::trace::chrome_trace;
 use crate::scene::Scene;
-use crate::settings::Settings;
 use crate::statistics::BrokenSamples;
 use shot::Shot;
 use std::ops::ControlFlow;
@@ -119,8 +119,8 @@ pub fn run(args: &Args) -> Result<Exit> {
         filter::check_size(&gpu, [scene.settings.width, scene.settings.height], filter::GUIDE_TEXELS)
     })?;
     let mut effects = match args.effects {
-        EffectChoice::Auto => renderer::called_for(&scene, wanted),
-        EffectChoice::All => renderer::all_effects(&scene),
+        EffectChoice::Auto => render::called_for(&scene, wanted),
+        EffectChoice::All => render::all_effects(&scene),
     };
     effects.adaptive |= earlier.is_some();
     let renderer = host.time("upload and compile", || Renderer::specialised(&gpu, &scene, wanted, effects))?;

@@ -3,8 +3,8 @@
 use super::layers;
 use super::origin::Origin;
 use crate::image::{Film, Samples};
-use crate::schedule;
-use crate::settings::{Placing, Settings};
+use crate::render::schedule;
+use crate::render::settings::{Placing, Settings};
 use crate::statistics::{BrokenSamples, Pixel};
 use serde::Deserialize;
 

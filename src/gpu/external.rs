@@ -42,10 +42,10 @@ impl Gpu {
     /// - The handles are valid, belong together, and outlive everything made from the returned `Gpu`.
     /// - The device was made with every one of [`super::REQUIRED_FEATURES`] enabled.
     /// - Nobody else uses the queue while [`Gpu::run`] or a [`super::Buffer`]'s reads and writes do.
-    /// - Without `robust_buffer_access`, kernels get nothing to read but what a [`Renderer`](crate::renderer::Renderer), a
-    ///   [`Denoiser`](crate::denoiser::Denoiser) and [`filter::run`](crate::filter::run) give them by themselves, which is
+    /// - Without `robust_buffer_access`, kernels get nothing to read but what a [`Renderer`](crate::render::Renderer), a
+    ///   [`Denoiser`](crate::denoise::Denoiser) and [`filter::run`](crate::denoise::filter::run) give them by themselves, which is
     ///   checked: no [`super::Buffer`] of theirs is written, no stage, policy or filter recorded apart from them, and no
-    ///   step but those of [`Renderer::steps`](crate::renderer::Renderer::steps) in their order. What is out of a buffer's
+    ///   step but those of [`Renderer::steps`](crate::render::Renderer::steps) in their order. What is out of a buffer's
     ///   bounds would be read and written.
     ///
     /// # Errors

@@ -12,6 +12,7 @@
 //! What it relies on: whoever hands over raw handles keeps the contract of [`Gpu::from_raw`] and [`Recorder::external`].
 #![allow(unsafe_code)]
 mod access;
+mod blocks;
 mod buffer;
 mod cache;
 mod commands;
@@ -22,13 +23,13 @@ mod frame;
 mod info;
 mod instance;
 mod kernel;
-pub mod layout;
 mod recorder;
 mod staging;
 mod timing;
 mod tuning;
 
 pub use access::Access;
+pub use blocks::{PerBlock, block_count, thread_items};
 use buffer::Untyped;
 pub use buffer::{Bound, Buffer, Location, PART, PixelFormat, RawBuffer};
 pub use cache::cache_folder;

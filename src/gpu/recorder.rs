@@ -34,7 +34,7 @@ impl<'a> Recorder<'a> {
     /// - It is submitted at most once, to a queue of that device.
     /// - `frame` is neither recorded into again nor dropped before that submission is complete.
     /// - Nor is, from the submission until it is complete, any buffer read or written that it uses: by [`Buffer::read`],
-    ///   [`Buffer::read_range`] or [`Buffer::write`], by what calls them (of a [`Renderer`](crate::renderer::Renderer):
+    ///   [`Buffer::read_range`] or [`Buffer::write`], by what calls them (of a [`Renderer`](crate::render::Renderer):
     ///   `resume`, `counters`, `apportionment`, `listed`, `priorities_of`), by [`Gpu::run`] and what runs by it, or by
     ///   another such submission, unless a semaphore orders the two. All of these are safe functions, and nothing but this
     ///   promise keeps them from memory that the device is writing.

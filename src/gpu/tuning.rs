@@ -25,7 +25,7 @@ pub struct Tuning {
     pub whole_lines: bool,
     /// Lines of the guided filter's windows in a workgroup.
     pub lines: u32,
-    /// Pixels along an edge of a filtered image at most: see `glsl/shared/rounds.glsl`.
+    /// Pixels along an edge of a filtered image at most: see `glsl/shared/loop_limit.glsl`.
     pub longest_edge: u64,
 }
 

@@ -85,9 +85,9 @@ mod tests {
     #[test]
     fn rows_are_medians_maxima_and_shares_in_order_of_first_call() {
         let ms = 1_000_000;
-        let rows = summarise(&times(&[("path", 5 * ms), ("fold", ms), ("path", 3 * ms), ("path", 11 * ms)]));
+        let rows = summarise(&times(&[("path", 5 * ms), ("accumulate", ms), ("path", 3 * ms), ("path", 11 * ms)]));
         let path = PassRow { pass: "path", calls: 3, median_ms: 5.0, max_ms: 11.0, share: 0.95 };
-        let fold = PassRow { pass: "fold", calls: 1, median_ms: 1.0, max_ms: 1.0, share: 0.05 };
+        let fold = PassRow { pass: "accumulate", calls: 1, median_ms: 1.0, max_ms: 1.0, share: 0.05 };
         assert_eq!(rows, [path, fold]);
     }
 

@@ -1,6 +1,6 @@
 //! Alias tables (Walker 1977; construction after Vose 1991) in integer arithmetic: what a table returns is known
 //! exactly, so the probability that an estimator divides by is the one that the kernel draws with.
-use crate::gpu::layout::AliasEntry;
+use crate::layout::AliasEntry;
 
 /// Units of probability that one slot holds.
 const SLOT: u64 = 1 << 32;

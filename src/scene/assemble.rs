@@ -6,7 +6,7 @@ use super::obj::{self, Library, ObjFile};
 use super::place::{Job, Plan, instance, mesh_name};
 use super::{Scene, bvh, environment, light};
 use crate::error::{Error, Result};
-use crate::gpu::layout::{Instance, LIGHT_ENVIRONMENT, NONE};
+use crate::layout::{Instance, LIGHT_ENVIRONMENT, NONE};
 use crate::memory;
 use glam::{DAffine3, Vec3};
 use std::collections::{BTreeSet, HashMap};
@@ -289,7 +289,7 @@ impl<'a> Assembly<'a> {
         }
         (scene.materials, scene.names.materials) = (materials.list, materials.names);
         (scene.triangles, scene.shading) = (self.geometry.triangles, self.geometry.shading);
-        let emits = |t: &crate::gpu::layout::Triangle| scene.materials[t.material as usize].emission != [0.0; 3];
+        let emits = |t: &crate::layout::Triangle| scene.materials[t.material as usize].emission != [0.0; 3];
         if sky && scene.lights.is_empty() && !scene.triangles.iter().any(emits) {
             scene.lights.push(light::environment([1.0; 3], glam::DMat3::IDENTITY));
         }

@@ -1,7 +1,7 @@
 //! Eight-way compressed BVHs (Ylitie et al. 2017) by obvhs: PLOC (Meister and Bittner 2018) and reinsertion. Triangles
 //! and their shading are put in leaf order; child and primitive indices are made global, so one array holds all levels.
 use super::geometry::{self, Geometry};
-use crate::gpu::layout::{BvhNode, Instance, TRAVERSAL_STACK, Triangle};
+use crate::layout::{BvhNode, Instance, TRAVERSAL_STACK, Triangle};
 use clusters::Clusters;
 use glam::{Mat4, Vec3, Vec4};
 use obvhs::Boundable;

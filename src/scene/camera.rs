@@ -1,6 +1,6 @@
 //! From the `[camera]` table and the film's shape to the camera that kernels read.
-use crate::gpu::layout;
-use crate::settings::Settings;
+use crate::layout;
+use crate::render::settings::Settings;
 use glam::{DMat4, DVec3};
 use serde::Deserialize;
 

@@ -3,7 +3,7 @@
 use super::effects::SMOOTH;
 use super::{Environment, Scene, bvh};
 use crate::error::{Error, Result};
-use crate::gpu::layout::{
+use crate::layout::{
     AliasEntry, BSDF_COATED, BvhNode, COAT_COLUMNS, COAT_ROWS, Camera, LIGHT_SPHERE, LIGHT_TRIANGLE, Light, Material,
     NONE, SPHERE, TRAVERSAL_STACK, Texture, Triangle,
 };
@@ -24,7 +24,7 @@ enum Level {
 impl Scene {
     /// Whether every index leads into its array, the nodes form trees that [`Scene::stack`] is deep enough for, parallel arrays
     /// have the same length and the camera is of finite numbers. In time that is linear in all of that; making a
-    /// [`Renderer`](crate::renderer::Renderer) asks.
+    /// [`Renderer`](crate::render::Renderer) asks.
     ///
     /// # Errors
     /// [`Error::Scene`] with the first thing that does not fit.

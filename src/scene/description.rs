@@ -13,7 +13,7 @@ pub use super::shape::Shape;
 pub use super::value::{Rgb, Transform};
 use crate::error::{Error, Result};
 use crate::image::Picture;
-use crate::settings::{Allocate, PixelFilter, Sampler, Settings};
+use crate::render::settings::{Allocate, PixelFilter, Sampler, Settings};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 

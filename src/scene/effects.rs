@@ -1,7 +1,7 @@
 //! What a scene and its settings call for, and who calls: kernels are compiled without the rest.
 use super::{Scene, geometry};
-use crate::gpu::layout::*;
-use crate::settings::{PixelFilter, Sampler};
+use crate::layout::*;
+use crate::render::settings::{PixelFilter, Sampler};
 
 /// Roughness below which an interface is smooth; kernels draw the same line.
 pub const SMOOTH: f32 = 0.01;

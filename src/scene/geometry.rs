@@ -1,5 +1,5 @@
 //! The growing triangle arrays: placement, repair of what can be repaired, packing of normals.
-use crate::gpu::layout::{NONE, SPHERE, SPHERE_INWARD, SPHERE_MIRRORED, Shading, Triangle};
+use crate::layout::{NONE, SPHERE, SPHERE_INWARD, SPHERE_MIRRORED, Shading, Triangle};
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use std::hash::{DefaultHasher, Hash, Hasher};

@@ -7,7 +7,7 @@ use super::environment::{luminance, mean_luminance};
 use super::value::Rgb;
 use super::{Scene, alias, geometry, texture};
 use crate::error::Result;
-use crate::gpu::layout::*;
+use crate::layout::*;
 use crate::memory;
 use glam::{DMat3, Mat4, Vec3, Vec4};
 use serde::Deserialize;

@@ -1,8 +1,8 @@
 //! Scene files become flat arrays, ready to be copied to the device as they are. Nothing here talks to a GPU.
 use crate::error::{Error, Result};
-use crate::gpu::layout::{AliasEntry, BvhNode, Camera, Instance, Light, Material, Shading, Texture, Triangle};
 use crate::image::input;
-use crate::settings::Settings;
+use crate::layout::{AliasEntry, BvhNode, Camera, Instance, Light, Material, Shading, Texture, Triangle};
+use crate::render::settings::Settings;
 use crate::threads;
 use description::Description;
 use std::path::Path;

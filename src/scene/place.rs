@@ -5,7 +5,7 @@ use super::geometry::{Corners, Geometry, Placement, Repairs, Tag, TooFar};
 use super::obj::ObjFile;
 use super::shape::Shape;
 use crate::error::{Error, Result};
-use crate::gpu::layout::{Instance, MATERIAL_MASKED, Material, NONE};
+use crate::layout::{Instance, MATERIAL_MASKED, Material, NONE};
 use crate::memory;
 use glam::{DAffine3, DMat3, Vec2, Vec3};
 use std::collections::HashMap;

@@ -2,8 +2,8 @@
 use super::mesh::Bitmap;
 use super::mtl::find_file;
 use crate::error::{Error, Result};
-use crate::gpu::layout::{NONE, TEXTURE_CLAMP, TEXTURE_SRGB, Texture};
 use crate::image::{BAND, bands, check_end, contained, input, picture, picture_claim};
+use crate::layout::{NONE, TEXTURE_CLAMP, TEXTURE_SRGB, Texture};
 use crate::memory;
 use rayon::prelude::*;
 use std::collections::HashMap;

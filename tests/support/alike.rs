@@ -1,6 +1,6 @@
 //! Two renders of one scene by the same samples, on a device that rounds one kernel otherwise than another.
 use crate::statistics::sidak_quantile;
-use tallow::gpu::layout::PixelStats;
+use tallow::layout::PixelStats;
 
 /// What rounding alone may make of a value, relative.
 const ROUNDING: f64 = 1e-4;

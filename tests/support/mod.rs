@@ -1,8 +1,8 @@
 //! What the tests share.
 #![allow(dead_code)]
-use tallow::gpu::layout::PixelStats;
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu};
-use tallow::renderer::{Renderer, Step};
+use tallow::layout::PixelStats;
+use tallow::render::{Renderer, Step};
 
 pub mod engine;
 

@@ -1,8 +1,8 @@
 //! Images for the filters' tests: a floor and a wall with a step in depth, lit from one side.
 #![allow(dead_code)]
 use crate::support::hash;
-use tallow::filter::{AtrousForm, FilterInput, FilterSettings, WaveletBasis};
-use tallow::gpu::layout::{Guide, NONE, vec4};
+use tallow::denoise::filter::{AtrousForm, FilterInput, FilterSettings, WaveletBasis};
+use tallow::layout::{Guide, NONE, vec4};
 
 /// Around the workgroups' sizes, and one pixel.
 pub const SIZES: [(u32, u32); 7] = [(1, 1), (31, 1), (1, 65), (31, 17), (64, 65), (33, 40), (130, 7)];

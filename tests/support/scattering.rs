@@ -1,8 +1,8 @@
 //! What one scattering by microfacets leaves of the light, by quadrature in f64.
 use glam::{DVec3, Vec3, dvec3};
 use std::f64::consts::{PI, TAU};
-use tallow::gpu::layout::{BSDF_COATED, BSDF_DIELECTRIC};
-use tallow::reference::bsdf::{Bsdf, SMOOTH_ALPHA};
+use tallow::layout::{BSDF_COATED, BSDF_DIELECTRIC};
+use tallow::twins::bsdf::{Bsdf, SMOOTH_ALPHA};
 
 /// Cells in the slopes of the half vector over alpha, polar with a logarithmic radius: there a microfacet lobe is about one
 /// unit wide for every roughness, incidence and index, and neither cells nor quadrature miss it or a diffuse base.

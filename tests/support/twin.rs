@@ -5,13 +5,13 @@ use image::codecs::png::PngEncoder;
 use rayon::prelude::*;
 use std::fmt::Write;
 use std::fs::File;
-use tallow::gpu::layout::Effects;
 use tallow::image::{Film, Samples, WriteOptions};
-use tallow::reference::path::{Strategy, Tracer};
-use tallow::reference::scene::world_from_object;
-use tallow::renderer::path_push;
+use tallow::layout::Effects;
+use tallow::render::path_push;
+use tallow::render::settings::Sampler;
 use tallow::scene::Scene;
-use tallow::settings::Sampler;
+use tallow::twins::path::{Strategy, Tracer};
+use tallow::twins::scene::world_from_object;
 
 /// Uniform numbers (an LCG of Knuth's, high bits).
 pub struct Random(pub u64);

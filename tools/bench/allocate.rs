@@ -2,13 +2,14 @@
 //! budgets, on which it must not depend. `cargo run --release --example bench-allocate [width height]`
 use anyhow::Result;
 use std::collections::BTreeMap;
-use tallow::gpu::layout::PixelStats;
 use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Location};
+use tallow::gpu::{PerBlock, thread_items};
+use tallow::layout::PixelStats;
+use tallow::render::pass::apportion::{Apportion, Counts};
+use tallow::render::pass::sample_list;
+use tallow::render::pass::scan::Scan;
+use tallow::render::schedule::{PathRange, Plan, Share};
 use tallow::report::table;
-use tallow::schedule::{PathRange, Plan, Share};
-use tallow::stage::apportion::{Apportion, Counts};
-use tallow::stage::scan::Scan;
-use tallow::stage::{PerBlock, batch, thread_items};
 
 const RUNS: usize = 9;
 
@@ -40,7 +41,7 @@ fn main() -> Result<()> {
             let times = gpu.run(&mut frame, |rec| {
                 apportion.record(rec, &priority, &stats, &counts, &plan)?;
                 scan.record(rec, &counts)?;
-                batch::record(&lists, rec, &counts.offset, &stats, &paths, &range, 0)
+                sample_list::record(&lists, rec, &counts.offset, &stats, &paths, &range, 0)
             })?;
             let mut sums: BTreeMap<&str, f64> = BTreeMap::new();
             for t in &times {

@@ -9,9 +9,9 @@ use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
-use tallow::filter::{self, Filter, FilterInput, FilterSettings, GuidedSums, Planes, Row};
-use tallow::gpu::layout::Guide;
+use tallow::denoise::filter::{self, Filter, FilterInput, FilterSettings, GuidedSums, Planes, Row};
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu, PassTime};
+use tallow::layout::Guide;
 
 /// After a peer's run: its threads look for more work for a while before they sleep, on the cores that we run on.
 const PAUSE: Duration = Duration::from_millis(50);

@@ -3,12 +3,12 @@
 #![allow(missing_docs)]
 use anyhow::{Context, Result};
 use std::path::Path;
-use tallow::filter::{FILTERS, FilterInput, FilterSettings, run};
-use tallow::gpu::layout::{Guide, PixelLight, PixelStats, vec4};
+use tallow::denoise::filter::{FILTERS, FilterInput, FilterSettings, run};
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu};
-use tallow::renderer::{Outputs, Renderer};
+use tallow::layout::{Guide, PixelLight, PixelStats, vec4};
+use tallow::render::settings::Settings;
+use tallow::render::{Outputs, Renderer};
 use tallow::scene::Scene;
-use tallow::settings::Settings;
 
 /// Guides, statistics and light of a whole render.
 fn render(

@@ -10,17 +10,17 @@ use obvhs::rt_triangle::RtTriangle;
 use rayon::prelude::*;
 use std::path::Path;
 use std::time::Instant;
-use tallow::gpu::layout::{self, Effects, NONE, RayHit, RayQuery, TraversePush};
 use tallow::gpu::{Buffer, DeviceKind, DeviceOptions, FrameResources, Gpu, Location};
-use tallow::reference::light::INFINITE_DISTANCE;
-use tallow::reference::sampler::{sample_2d, sampler_start};
-use tallow::reference::surface::surface_at;
-use tallow::reference::traverse::traverse;
-use tallow::reference::warp::{basis_from_normal, warp_cosine_hemisphere};
-use tallow::renderer::{Outputs, Renderer};
+use tallow::layout::{self, Effects, NONE, RayHit, RayQuery, TraversePush};
+use tallow::render::settings::Settings;
+use tallow::render::{Outputs, Renderer};
 use tallow::scene::Scene;
-use tallow::settings::Settings;
 use tallow::shaders::shared;
+use tallow::twins::light::INFINITE_DISTANCE;
+use tallow::twins::sampler::{sample_2d, sampler_start};
+use tallow::twins::surface::surface_at;
+use tallow::twins::traverse::traverse;
+use tallow::twins::warp::{basis_from_normal, warp_cosine_hemisphere};
 
 /// The kernels of `glsl/test`.
 #[allow(dead_code)]

@@ -97,7 +97,7 @@ pub fn group_module(group: &Group) -> Result<String> {
     let Group { name, .. } = group;
     let (fields, list) = members(&group.bindings)?;
     let mut code = format!("/// What `glsl/shared/{name}.glsl` declares.\n#[allow(clippy::all)]\npub mod {name} {{\n");
-    code += "    #[allow(unused_imports)]\n    use crate::gpu::{Bound, Buffer, layout::*};\n";
+    code += "    #[allow(unused_imports)]\n    use crate::gpu::{Bound, Buffer};\n    #[allow(unused_imports)]\n    use crate::layout::*;\n";
     code += &numbers(&group.numbers)?;
     if !group.bindings.is_empty() {
         code += &format!(
@@ -205,7 +205,9 @@ pub fn module(name: &str, file: &Path, interface: &Interface, root: &str, binary
 #[allow(clippy::all)]
 {visible} mod {name} {{
     #[allow(unused_imports)]
-    use {root}::gpu::{{Access, Bindings, Bound, Buffer, Slot, SlotKind, Specialise, layout::*}};
+    use {root}::gpu::{{Access, Bindings, Bound, Buffer, Slot, SlotKind, Specialise}};
+    #[allow(unused_imports)]
+    use {root}::layout::*;
     /// Basename of the file, label of the pass.
     pub const NAME: &str = {name:?};
     /// The compiled code.

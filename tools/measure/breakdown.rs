@@ -2,11 +2,11 @@
 //! a CPU, an Intel Core 2 Duo E6850, its guides drawn by a GPU).
 use super::frames::View;
 use crate::Args;
-use tallow::composition::Demodulation;
-use tallow::denoiser::Denoiser;
-use tallow::filter::{self, FilterSettings};
+use tallow::denoise::Denoiser;
+use tallow::denoise::composition::Demodulation;
+use tallow::denoise::filter::{self, FilterSettings};
 use tallow::gpu::{FrameResources, Gpu, PassTime};
-use tallow::renderer::{Outputs, Renderer};
+use tallow::render::{Outputs, Renderer};
 use tallow::report::table;
 use tallow::scene::Scene;
 
@@ -74,8 +74,8 @@ fn one(gpu: &Gpu, args: &Args, view: &View) -> anyhow::Result<Milliseconds> {
 
 fn column(pass: &PassTime) -> usize {
     match pass.name {
-        "guide" => 1,
-        "split" | "join" => 2,
+        "primary_hit" => 1,
+        "demodulate" | "remodulate" => 2,
         "pack" | "atrous" => 3,
         _ => 0,
     }

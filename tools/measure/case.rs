@@ -1,13 +1,13 @@
 //! A noisy image taken apart, and the image that it should become.
 use anyhow::anyhow;
 use std::path::Path;
-use tallow::composition::{self, Demodulation, Parts};
-use tallow::filter::{self, FilterSettings, Row};
+use tallow::denoise::composition::{self, Demodulation, Parts};
+use tallow::denoise::filter::{self, FilterSettings, Row};
 use tallow::gpu::Gpu;
-use tallow::gpu::layout::vec4;
 use tallow::image::aov::{Aovs, Names};
 use tallow::image::source::Source;
 use tallow::image::{self, Film, Picture, WriteOptions, metrics};
+use tallow::layout::vec4;
 
 /// See above.
 pub struct Case {

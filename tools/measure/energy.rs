@@ -2,10 +2,10 @@
 use super::case::Case;
 use super::ranking::VIEWS;
 use crate::Args;
-use tallow::composition::Demodulation;
-use tallow::filter::{self, AtrousForm, FilterSettings};
+use tallow::denoise::composition::Demodulation;
+use tallow::denoise::filter::{self, AtrousForm, FilterSettings};
 use tallow::gpu::Gpu;
-use tallow::gpu::layout::vec4;
+use tallow::layout::vec4;
 use tallow::report::table;
 
 const FORMS: [(&str, AtrousForm); 3] =

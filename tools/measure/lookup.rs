@@ -6,15 +6,15 @@ use super::sweep;
 use crate::Args;
 use anyhow::anyhow;
 use rayon::prelude::*;
-use tallow::composition::Demodulation;
-use tallow::filter;
+use tallow::denoise::composition::Demodulation;
+use tallow::denoise::filter;
 use tallow::gpu::Gpu;
-use tallow::gpu::layout::{Effects, Guide, PathPush, vec3, vec4};
 use tallow::image::Picture;
-use tallow::reference::lookup::{GuideRays, eye_hit};
-use tallow::renderer::{Outputs, Renderer, path_push};
+use tallow::layout::{Effects, Guide, PathPush, vec3, vec4};
+use tallow::render::{Outputs, Renderer, path_push};
 use tallow::report::table;
 use tallow::scene::Scene;
+use tallow::twins::guide_lookup::{GuideRays, eye_hit};
 
 const VIEWS: &[View] = &[
     View { name: "sponza", scene: "crytek-sponza", size: [256, 144], depth: 4, reference: 256 },

@@ -1,5 +1,5 @@
 //! The best settings of a filter for one image, by search.
-use tallow::filter::{AtrousForm, FilterSettings, Row, WaveletBasis};
+use tallow::denoise::filter::{AtrousForm, FilterSettings, Row, WaveletBasis};
 
 /// One setting and the values that are tried: numbers, or places among the words of a choice.
 pub struct Knob {

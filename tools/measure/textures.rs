@@ -4,8 +4,8 @@ use super::frames::View;
 use super::sheet::{self, Tile};
 use super::sweep;
 use crate::Args;
-use tallow::composition::Demodulation;
-use tallow::filter;
+use tallow::denoise::composition::Demodulation;
+use tallow::denoise::filter;
 use tallow::gpu::Gpu;
 
 const VIEW: View = View { name: "sponza", scene: "crytek-sponza", size: [256, 144], depth: 4, reference: 256 };

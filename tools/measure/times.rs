@@ -1,7 +1,7 @@
 //! Times beside those of EAW's table 2 and GIF's table 2, both on an NVIDIA GTX 285.
-use tallow::filter::{self, FilterInput, FilterSettings, Planes, Row};
-use tallow::gpu::layout::Guide;
+use tallow::denoise::filter::{self, FilterInput, FilterSettings, Planes, Row};
 use tallow::gpu::{FrameResources, Gpu};
+use tallow::layout::Guide;
 use tallow::report::table;
 
 const RUNS: usize = 3;

@@ -1,12 +1,12 @@
 //! GEO's result: with a geometry-aware filter behind it, the same number of samples does more where the filter cannot.
 use super::{View, indirect, mean, render};
 use crate::Args;
-use tallow::filter::{self, AtrousForm, FilterInput, FilterSettings};
+use tallow::denoise::filter::{self, AtrousForm, FilterInput, FilterSettings};
 use tallow::gpu::Gpu;
-use tallow::gpu::layout::{Guide, vec3, vec4};
 use tallow::image::tone::srgb_from_linear;
+use tallow::layout::{Guide, vec3, vec4};
+use tallow::render::settings::{PixelFilter, Settings};
 use tallow::report::table;
-use tallow::settings::{PixelFilter, Settings};
 
 struct Case {
     view: View,

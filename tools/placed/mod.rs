@@ -1,12 +1,12 @@
 //! Renders of a scene by one policy, their references, and how far they are apart.
 use crate::Args;
 pub use crate::view::View;
-use tallow::gpu::layout::{Guide, PixelStats, vec3, vec4};
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::image::{self, Film, WriteOptions};
-use tallow::renderer::{Outputs, Renderer, Step};
+use tallow::layout::{Guide, PixelStats, vec3, vec4};
+use tallow::render::settings::Settings;
+use tallow::render::{Outputs, Renderer, Step};
 use tallow::scene::Scene;
-use tallow::settings::Settings;
 use tallow::statistics::Pixel;
 
 pub mod geometry;
@@ -83,10 +83,10 @@ pub fn render(gpu: &Gpu, scene: &Scene) -> anyhow::Result<Rendered> {
         if matches!(step, Step::Choose(_)) {
             listed = renderer.listed()?;
         }
-        for pass in passes.iter().filter(|p| p.name != "guide") {
+        for pass in passes.iter().filter(|p| p.name != "primary_hit") {
             let took = pass.duration_ns();
             ns += took;
-            path_ns += if matches!(pass.name, "path" | "fold") { took } else { 0 };
+            path_ns += if matches!(pass.name, "path" | "accumulate") { took } else { 0 };
         }
     }
     let tile = &renderer.film().tiles[0];

@@ -3,7 +3,7 @@ use super::View;
 use crate::Args;
 use std::collections::BTreeMap;
 use tallow::gpu::{FrameResources, Gpu, PassTime};
-use tallow::renderer::{Outputs, Renderer, Step};
+use tallow::render::{Outputs, Renderer, Step};
 use tallow::report::table;
 
 const VIEW: View = View { name: "sponza", scene: "crytek-sponza", size: [1024, 768], depth: 4, reference: 0 };
@@ -81,7 +81,7 @@ fn samples(
         // The first list; the others are as long.
         let listed: Vec<Step> = r.steps().filter(|s| matches!(s, Step::Listed(_))).collect();
         let first = passes(gpu, &r, &listed[..1])?;
-        lists += first["batch"] * listed.len() as f64;
+        lists += first["sample_list"] * listed.len() as f64;
         rows.push(vec![
             spp.to_string(),
             format!("{:.1}", importance + counts),
@@ -108,8 +108,8 @@ fn share(
     for step in placed.steps() {
         for t in placed.run(&mut frame, &step)? {
             let ms = t.duration_ns() as f64 * 1e-6;
-            lists += if t.name == "batch" { ms } else { 0.0 };
-            traced += if matches!(t.name, "path" | "fold") { ms } else { 0.0 };
+            lists += if t.name == "sample_list" { ms } else { 0.0 };
+            traced += if matches!(t.name, "path" | "accumulate") { ms } else { 0.0 };
         }
     }
     let scene = VIEW.load(args, |s| s.spp = 4)?;

@@ -3,7 +3,7 @@ use super::{View, radiance, render};
 use crate::Args;
 use plotters::prelude::*;
 use tallow::gpu::Gpu;
-use tallow::gpu::layout::vec3;
+use tallow::layout::vec3;
 use tallow::report::table;
 
 const VIEWS: [View; 2] = [

@@ -1,6 +1,6 @@
 //! What can be set about layers and filters.
 use crate::cli::common::with_ranges;
-use crate::filter::{AtrousForm, FilterInput, FilterSettings, GuidedSums, WaveletBasis};
+use crate::denoise::filter::{AtrousForm, FilterInput, FilterSettings, GuidedSums, WaveletBasis};
 use crate::image::aov::{Aov, Names};
 
 /// Names of layers, for those that are not found, or not the right ones.
@@ -135,8 +135,8 @@ impl Overrides {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::entry::Entry;
-    use crate::settings::{PixelFilter, Sampler};
+    use crate::render::settings::entry::Entry;
+    use crate::render::settings::{PixelFilter, Sampler};
     use clap::{Args, Command};
 
     #[test]

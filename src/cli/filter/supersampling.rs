@@ -1,13 +1,13 @@
 //! `--scene`: filtered light is looked up along eye rays.
 use crate::cli::origin::Origin;
-use crate::composition::Parts;
+use crate::denoise::composition::Parts;
 use crate::error::{Error, Result};
-use crate::gpu::layout::{vec3, vec4};
 use crate::gpu::{Gpu, PassTime};
 use crate::image::aov::{Aov, Aovs};
-use crate::renderer::{Outputs, Renderer};
+use crate::layout::{vec3, vec4};
+use crate::render::settings::{Allocate, Settings};
+use crate::render::{Outputs, Renderer};
 use crate::scene::Scene;
-use crate::settings::{Allocate, Settings};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 

@@ -5,7 +5,7 @@ use crate::cli::{layers, origin, resume};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::image::{Film, Samples};
-use crate::renderer::Renderer;
+use crate::render::Renderer;
 use crate::scene::Scene;
 use crate::statistics::BrokenSamples;
 use std::collections::BTreeMap;

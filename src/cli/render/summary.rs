@@ -5,7 +5,7 @@ use crate::cli::{layers, print, print_json};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::image::Film;
-use crate::renderer::Counters;
+use crate::render::Counters;
 use crate::report::table::{self, PassRow};
 use crate::scene::Scene;
 use crate::statistics::BrokenSamples;

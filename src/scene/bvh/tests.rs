@@ -1,6 +1,6 @@
 //! A plain traversal of our nodes against brute force, both in 64-bit arithmetic.
 use super::*;
-use crate::gpu::layout::TRAVERSAL_STACK;
+use crate::layout::TRAVERSAL_STACK;
 use glam::{DAffine3, DVec3};
 
 struct Random(u64);

@@ -1,0 +1,101 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/thread.glsl"
+
+// Noise that the samples show, estimated among the surroundings that look alike, less what a geometry-aware filter will
+// remove of it. A filter that gathers a share W of its window divides the variance of indirect light, which is all that it
+// filters, by about 1 + W (pixels - 1): the deviation that is left is what needs samples. Where nothing is known of the noise yet, geometry alone decides. A thread
+// decides for ROWS pixels of a column, which share most of their neighbours.
+layout(local_size_x_id = 100) in;
+layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
+layout(binding = 1) uniform usamplerBuffer words; // of float
+layout(scalar, binding = 2) writeonly buffer Priorities { float priority[]; };
+layout(binding = 3) uniform usamplerBuffer light; // of PixelLight
+layout(scalar, push_constant) uniform Push { PriorityPush push; };
+
+#include "shared/likeness_bits.glsl"
+#include "shared/pixel_noise.glsl"
+#include "shared/pixel_light.glsl"
+
+const float LEAST_LEFT = 0.01; // of two pixels at least .27
+const float APART = 1e17;      // means differ by no more, so that squares are finite
+const float STRONGEST_TINT = 100.0;
+
+const int ROWS = 4;
+
+// What the pixels around one say of its noise.
+struct Surroundings {
+    vec4 around, offsets; // of the means, and how many there are
+    float squares, weights, freedom;
+    float indirect; // squared deviations of indirect light, as those of all light in `around`
+};
+
+// Squared deviations, mean over channels, of indirect light, out of those of its luminance before albedo: its colour at the pixel
+// is taken for that of every sample. Whatever direct and indirect light of a sample have in common counts as direct.
+float indirect_squares(uint pixel, vec3 mean, float squares) {
+    PixelLight l = load_light(int(pixel));
+    float level = luminance(l.indirect);
+    vec3 tint = level > 0.0 ? min((mean - l.direct) / level, vec3(STRONGEST_TINT)) : vec3(0.0);
+    return min(l.indirect_m2 * dot(tint, tint) / 3.0, squares);
+}
+
+// `mean` is that of a pixel with these moments, less that of the centre: small numbers, whose squares keep their digits.
+void absorb(inout Surroundings s, float kin, vec4 m, float indirect, vec3 mean) {
+    mean = clamp(mean, -APART, APART);
+    s.around += kin * m;
+    s.indirect += kin * indirect;
+    s.offsets += kin * vec4(mean, 1.0);
+    s.squares += kin * dot(mean, mean);
+    s.weights += kin * kin;
+    s.freedom += kin / max(m.w, 1.0);
+}
+
+// Pixels that look alike should be equally bright: how far their means are apart is noise as well, and all that shows it
+// after one sample a pixel. Of n samples it counts 1/n, since the more there are, the more of it is no noise.
+vec4 with_means(Surroundings s) {
+    // The share of it that is left when the mean is taken off: 0 of one pixel, but for what division rounds.
+    float count = s.offsets.w, left = 1.0 - s.weights / (count * count);
+    float apart = max(s.squares - dot(s.offsets.rgb, s.offsets.rgb) / count, 0.0) / 3.0;
+    return s.around + (count > 0.0 && left > LEAST_LEFT ? vec4(apart, s.freedom * left, 0.0, 0.0) : vec4(0.0));
+}
+
+void main() {
+    ivec2 size = ivec2(push.size);
+    int thread = int(thread_index()), x = thread % size.x, first = thread / size.x * ROWS;
+    if (first >= size.y) return; // safe: no barrier() follows
+    uint word[ROWS];
+    vec4 own[ROWS];
+    vec3 mean[ROWS];
+    Surroundings s[ROWS];
+    [[unroll]] for (int k = 0; k < ROWS; k++) {
+        int i = min(first + k, size.y - 1) * size.x + x;
+        word[k] = texelFetch(words, i).x;
+        own[k] = moments(uint(i), mean[k]);
+        s[k] = Surroundings(vec4(0.0), vec4(0.0), 0.0, 0.0, 0.0, 0.0);
+    }
+    [[unroll]] for (int row = -1; row <= ROWS; row++) {
+        for (int column = -1; column <= 1; column++) {
+            ivec2 at = ivec2(x + column, first + row), q = clamp(at, ivec2(0), size - 1);
+            vec3 their_mean;
+            uint pixel = uint(q.y * size.x + q.x);
+            vec4 m = moments(pixel, their_mean);
+            float indirect = indirect_squares(pixel, their_mean, m.x);
+            float known = at == q && m.w > 0.0 ? 1.0 : 0.0;
+            [[unroll]] for (int k = 0; k < ROWS; k++) { // constant bounds, or it would not be unrolled
+                if (abs(row - k) <= 1) {
+                    float kin = known * kinship_of(word[k], 3 * (row - k) + column + 4);
+                    absorb(s[k], kin, m, indirect, their_mean - mean[k]);
+                }
+            }
+        }
+    }
+    [[unroll]] for (int k = 0; k < ROWS; k++) {
+        // All of it while nothing is known.
+        float indirect = s[k].around.x > 0.0 ? s[k].indirect / s[k].around.x : 1.0;
+        float left = sqrt(max(1.0 - push.filtered * gathered_of(word[k]) * indirect, 0.0));
+        if (first + k < size.y) priority[(first + k) * size.x + x] = noise(own[k], with_means(s[k])) * left;
+    }
+}

@@ -1,0 +1,42 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/uint64.glsl"
+#include "shared/block.glsl"
+
+// Hamilton's second step: one sample beyond the quota for the largest remainders, ties to the lower pixel index. `blocks`
+// holds the exclusive scan of `ties`.
+layout(local_size_x = 64) in;
+layout(binding = 0) uniform usamplerBuffer key; // of uvec2
+layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
+layout(binding = 2) uniform usamplerBuffer state; // of Apportionment
+layout(scalar, binding = 3) readonly buffer Blocks { uint64_t blocks[]; }; // of uvec2
+layout(scalar, binding = 4) buffer Counts { uint count[]; };
+layout(scalar, push_constant) uniform Push { ApportionPush push; };
+
+uint quota_of(uint pixel) { return count[pixel]; }
+
+#include "shared/tie_break.glsl"
+
+void main() {
+    Apportionment s = load_state();
+    uint first = first_item(), items = item_count(first, push.pixels);
+    uint64_t total, before = block_scan(possible(s, first, items), total);
+    before += blocks[gl_WorkGroupID.x];
+    uint64_t needed = wide(s.needed), left = needed - min(needed, before);
+    uint ties = uint(min(left, uint64_t(items))); // at most one for each
+    uint forced = s.forced != 0u ? items : 0u, free = items - forced;
+    for (uint k = 0u; k < forced; k++) {
+        uint gets = uint(min(left, uint64_t(room_of(first + k) - count[first + k])));
+        count[first + k] += gets;
+        left -= gets;
+    }
+    for (uint k = 0u; k < free; k++) {
+        uvec2 more = selected_tied(s, key_of(first + k));
+        uint tied = min(ties, more.y);
+        if (more.x + tied > 0u) count[first + k] += more.x + tied;
+        ties -= tied;
+    }
+}

@@ -1,0 +1,35 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/uint64.glsl"
+#include "shared/block.glsl"
+
+// Turns priorities into what a pixel lacks of the samples that its threshold needs: the error of a mean of n samples is
+// w / sqrt(n), so ceil((w / t)^2) - n; at most as many as it has, or a few, since they are all that the noise is known from.
+layout(local_size_x = 64) in;
+layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
+layout(scalar, binding = 1) buffer Weights { uint weight[]; };
+layout(scalar, binding = 2) writeonly buffer Sums { BlockSums sums[]; };
+layout(scalar, push_constant) uniform Push { ApportionPush push; };
+
+const uint FEW = 4u;
+
+void main() {
+    uint first = first_item(), items = item_count(first, push.pixels);
+    uint64_t per_sample = uint64_t(push.threshold) * push.threshold, total = 0UL;
+    for (uint k = 0u; k < items; k++) {
+        uint i = first + k, w = weight[i], have = texelFetch(stats, int(2u * i)).w;
+        uint64_t squared = uint64_t(w) * w, wanted = squared / per_sample;
+        wanted += wanted * per_sample < squared ? 1UL : 0UL; // rounded up
+        uint most = min(max(have, FEW), push.enough - min(push.enough, have));
+        uint lack = uint(min(max(wanted, have + 1UL) - have, uint64_t(most)));
+        weight[i] = w > 0u ? lack : 0u;
+        total += w > 0u ? lack : 0u;
+    }
+    uint64_t weights = block_sum(total);
+    if (gl_LocalInvocationIndex == 0u) {
+        sums[gl_WorkGroupID.x] = BlockSums(unpackUint2x32(weights), uvec2(0u), uvec2(0u), 0u, 0u);
+    }
+}

@@ -1,0 +1,56 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/uint64.glsl"
+#include "shared/block.glsl"
+
+// Hamilton's first step: every open pixel's quota, floor(budget * weight / weights), and its remainder as a key. A pixel
+// whose quota is no less than its room is full: it gets the room, and what it leaves is apportioned again.
+layout(local_size_x = 64) in;
+layout(binding = 0) uniform usamplerBuffer weight; // of uint
+layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
+layout(binding = 2) uniform usamplerBuffer state; // of Apportionment
+layout(scalar, binding = 3) buffer Keys { uint64_t key[]; }; // of uvec2
+layout(scalar, binding = 4) writeonly buffer Counts { uint count[]; };
+layout(scalar, binding = 5) writeonly buffer Sums { BlockSums sums[]; };
+layout(scalar, push_constant) uniform Push { ApportionPush push; };
+
+#include "shared/load_apportionment.glsl"
+#include "shared/proportion.glsl"
+#include "shared/capacity.glsl"
+#include "shared/remainder_key.glsl"
+
+void main() {
+    Apportionment s = load_state();
+    if (s.settled != 0u) return; // safe: the same for all threads
+    uint first = first_item(), items = item_count(first, push.pixels);
+    Proportion share_of = proportion_of(s);
+    bool equal = s.equal != 0u;
+    uint64_t weights = 0UL, filled = 0UL, floors = 0UL;
+    uint settled = 0u, open = 0u;
+    for (uint k = 0u; k < items; k++) {
+        uint i = first + k;
+        if (push.round > 0u && is_full(unpackUint2x32(key[i]))) continue;
+        uint w = equal ? 1u : texelFetch(weight, int(i)).x, room = room_of(i);
+        uint64_t quota, rest;
+        multiply_divide(share_of, w, quota, rest);
+        bool full = quota >= room;
+        count[i] = full ? room : uint(quota);
+        key[i] = full ? packUint2x32(FULL) : rest << s.up;
+        filled += full ? room : 0u;
+        floors += full ? 0UL : quota;
+        weights += full ? 0u : w;
+        settled += full ? 1u : 0u;
+        open += full ? 0u : 1u;
+    }
+    weights = block_sum(weights);
+    filled = block_sum(filled);
+    floors = block_sum(floors);
+    uvec2 counts = unpackUint2x32(block_sum(packUint2x32(uvec2(settled, open))));
+    if (gl_LocalInvocationIndex == 0u) {
+        sums[gl_WorkGroupID.x] = BlockSums(unpackUint2x32(weights), unpackUint2x32(filled), unpackUint2x32(floors),
+                                           counts.x, counts.y);
+    }
+}

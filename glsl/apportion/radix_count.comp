@@ -1,0 +1,36 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/uint64.glsl"
+#include "shared/block.glsl"
+
+// Counts one digit of the keys that still share the prefix of the one sought (radix selection).
+layout(local_size_x = 64) in;
+layout(binding = 0) uniform usamplerBuffer key; // of uvec2
+layout(binding = 1) uniform usamplerBuffer state; // of Apportionment
+layout(scalar, binding = 2) buffer Histogram { uint histogram[]; };
+layout(scalar, push_constant) uniform Push { ApportionPush push; };
+
+#include "shared/load_apportionment.glsl"
+
+shared uint bins[256];
+
+void main() {
+    Apportionment s = load_state();
+    if (s.selected != 0u) return; // safe: the same for all threads
+    for (uint b = gl_LocalInvocationIndex; b < 256u; b += BLOCK_THREADS) bins[b] = 0u;
+    barrier();
+    uint first = first_item(), items = item_count(first, push.pixels);
+    uint shift = 24u - 8u * (push.round % 4u);
+    bool high = push.round < 4u; // the high word has the first four digits
+    for (uint k = 0u; k < items; k++) {
+        uvec2 word = texelFetch(key, int(first + k)).xy;
+        if ((word & s.mask) == s.prefix) atomicAdd(bins[((high ? word.y : word.x) >> shift) & 255u], 1u);
+    }
+    barrier();
+    for (uint b = gl_LocalInvocationIndex; b < 256u; b += BLOCK_THREADS) {
+        if (bins[b] > 0u) atomicAdd(histogram[b], bins[b]);
+    }
+}

@@ -1,0 +1,55 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/uint64.glsl"
+#include "shared/block.glsl"
+#include "shared/proportion.glsl"
+
+// After the quotas: either apportion again what full pixels left, or start the search for the largest remainders.
+layout(local_size_x = 64) in;
+layout(scalar, binding = 0) readonly buffer Sums { BlockSums sums[]; };
+layout(scalar, binding = 1) buffer States { Apportionment state[]; };
+layout(scalar, push_constant) uniform Push { ApportionPush push; };
+
+void main() {
+    if (state[0].settled != 0u) return; // safe: the same for all threads
+    uint blocks = block_count(push.pixels);
+    uint64_t weights = 0UL, filled = 0UL, floors = 0UL, counts = 0UL;
+    for (uint b = gl_LocalInvocationIndex; b < blocks; b += BLOCK_THREADS) {
+        weights += wide(sums[b].weights);
+        filled += wide(sums[b].filled);
+        floors += wide(sums[b].floors);
+        counts += wide(uvec2(sums[b].settled, sums[b].open));
+    }
+    weights = block_sum(weights);
+    filled = block_sum(filled);
+    floors = block_sum(floors);
+    uvec2 pixels = unpackUint2x32(block_sum(counts));
+    if (gl_LocalInvocationIndex != 0u) return; // safe: no barrier() follows
+    Apportionment s = state[0];
+    uint64_t left = wide(s.budget) - filled;
+    if (pixels.x > 0u && push.round + 1u < push.rounds) {
+        if (weights == 0UL && s.equal == 0u) { // who wanted more is full: the rest alike
+            s.equal = 1u;
+            weights = pixels.y;
+        }
+        set_proportion(s, left, weights);
+    } else {
+        s.settled = 1u;
+        s.forced = pixels.x > 0u ? 1u : 0u;
+        s.needed = unpackUint2x32(left - floors);
+        s.prefix = uvec2(0u);
+        s.mask = uvec2(0u);
+        s.selected = 0u;
+        s.whole_edge = 0u;
+        if (left == floors || s.forced != 0u) { // no remainder, or room decides instead: above all keys
+            s.selected = 1u;
+            s.whole_edge = 1u - s.forced;
+            s.mask = uvec2(NONE);
+            s.prefix = uvec2(NONE);
+        }
+    }
+    state[0] = s;
+}

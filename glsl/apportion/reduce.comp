@@ -1,0 +1,21 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/uint64.glsl"
+#include "shared/block.glsl"
+
+// Samples of each block, the first pass of the scan (reduce, then scan).
+layout(local_size_x = 64) in;
+layout(binding = 0) uniform usamplerBuffer counts; // of uint
+layout(scalar, binding = 1) writeonly buffer Blocks { uint64_t blocks[]; }; // of uvec2
+layout(scalar, push_constant) uniform Push { ScanPush push; };
+
+void main() {
+    uint first = first_item(), items = item_count(first, push.pixels);
+    uint64_t sum = 0UL;
+    for (uint k = 0u; k < items; k++) sum += texelFetch(counts, int(first + k)).x;
+    sum = block_sum(sum);
+    if (gl_LocalInvocationIndex == 0u) blocks[gl_WorkGroupID.x] = sum;
+}

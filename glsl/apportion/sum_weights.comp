@@ -1,0 +1,39 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/uint64.glsl"
+#include "shared/block.glsl"
+#include "shared/proportion.glsl"
+
+// Adds the sums of all blocks and starts an apportionment with them. One workgroup.
+layout(local_size_x = 64) in;
+layout(scalar, binding = 0) readonly buffer Sums { BlockSums sums[]; };
+layout(scalar, binding = 1) buffer States { Apportionment state[]; };
+layout(scalar, push_constant) uniform Push { ApportionPush push; };
+
+void main() {
+    uint blocks = block_count(push.pixels);
+    uint64_t weights = 0UL, counts = 0UL;
+    for (uint b = gl_LocalInvocationIndex; b < blocks; b += BLOCK_THREADS) {
+        weights += wide(sums[b].weights);
+        counts += wide(uvec2(sums[b].settled, sums[b].open));
+    }
+    weights = block_sum(weights);
+    counts = block_sum(counts);
+    if (gl_LocalInvocationIndex != 0u) return; // safe: no barrier() follows
+    Apportionment s = state[0];
+    s.equal = weights == 0UL ? 1u : 0u; // nothing is wanted more than the rest: all pixels alike
+    bool deficit_next = push.round == 0u && push.total != uvec2(0u);
+    uint64_t budget = wide(deficit_next ? push.total : push.budget);
+    if (push.round == 1u && push.threshold != 0u) budget = min(budget, weights); // no more than is needed
+    set_proportion(s, budget, weights == 0UL ? uint64_t(push.pixels) : weights);
+    if (push.round == 0u) { // of weigh
+        s.non_finite = unpackUint2x32(counts).x;
+        s.wanting = unpackUint2x32(counts).y;
+    }
+    s.settled = 0u;
+    s.forced = 0u;
+    state[0] = s;
+}

@@ -1,0 +1,26 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/uint64.glsl"
+#include "shared/block.glsl"
+
+// Per block, how much its pixels could take in order of index.
+layout(local_size_x = 64) in;
+layout(binding = 0) uniform usamplerBuffer key; // of uvec2
+layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
+layout(binding = 2) uniform usamplerBuffer counts; // of uint
+layout(binding = 3) uniform usamplerBuffer state; // of Apportionment
+layout(scalar, binding = 4) writeonly buffer Blocks { uint64_t blocks[]; }; // of uvec2
+layout(scalar, push_constant) uniform Push { ApportionPush push; };
+
+uint quota_of(uint pixel) { return texelFetch(counts, int(pixel)).x; }
+
+#include "shared/tie_break.glsl"
+
+void main() {
+    uint first = first_item();
+    uint64_t sum = block_sum(possible(load_state(), first, item_count(first, push.pixels)));
+    if (gl_LocalInvocationIndex == 0u) blocks[gl_WorkGroupID.x] = sum;
+}

@@ -1,0 +1,31 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/thread.glsl"
+#include "shared/luminance.glsl"
+#include "shared/perturbation.glsl"
+
+// What the candidates keep of a pixel: its leverage, the diagonal of the matrix that a linear filter is, plus what the probe
+// brings along from neighbours, which is 0 on average (Ramani, Blu, Unser 2008).
+layout(local_size_x = 64) in;
+layout(binding = 0) uniform samplerBuffer wide; // of vec4, of the image
+layout(binding = 1) uniform samplerBuffer svgf; // of vec4, of the image
+layout(binding = 2) uniform samplerBuffer wide_kept; // of vec4, of the signs
+layout(binding = 3) uniform samplerBuffer mid_kept; // of vec4, of the signs
+layout(binding = 4) uniform samplerBuffer narrow_kept; // of vec4, of the signs
+layout(binding = 5) uniform samplerBuffer svgf_kept; // of vec4, of the probed image
+layout(scalar, binding = 6) writeonly buffer Output { vec4 leverages[]; };
+layout(scalar, push_constant) uniform Push { AutoPush push; };
+
+void main() {
+    uint i = thread_index();
+    if (i >= push.count) return; // safe: no barrier() follows
+    int at = int(i);
+    vec3 kept = texelFetch(wide_kept, at).rgb, signs = signs_of(i) / 3.0;
+    float added = probe(i, texelFetch(wide, at).rgb, push.floor);
+    float grown = contrast(texelFetch(svgf_kept, at).rgb, texelFetch(svgf, at).rgb);
+    vec4 leverage = vec4(dot(kept, signs), dot(texelFetch(mid_kept, at).rgb, signs), dot(texelFetch(narrow_kept, at).rgb, signs),
+        grown / added);
+    leverages[i] = clamp(leverage, -1.0, 1.0);
+}

@@ -1,0 +1,151 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "effects.glsl"
+#include "shared/thread.glsl"
+#include "shared/uint64.glsl"
+#include "shared/store64.glsl"
+#include "shared/luminance.glsl"
+#include "shared/pcg.glsl"
+
+// Adds a batch of samples to the statistics of their pixels. One thread folds one pixel, in order of sample index, so
+// the result does not depend on how samples were batched (Welford 1962).
+layout(local_size_x_id = 100) in;
+layout(binding = 0) uniform samplerBuffer samples; // of vec4
+layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
+layout(binding = 2) uniform usamplerBuffer light; // of PixelLight
+layout(binding = 3) uniform usamplerBuffer offset; // of uvec2
+layout(scalar, binding = 4) writeonly buffer Stats { u64vec4 folded_stats[]; }; // of PixelStats
+layout(scalar, binding = 5) writeonly buffer Lights { u64vec4 folded_light[]; }; // of PixelLight
+layout(scalar, binding = 6) buffer Broken { BrokenTally broken[]; };
+layout(scalar, push_constant) uniform Push { FoldPush push; };
+
+#include "shared/first_path.glsl"
+#include "shared/loop_limit.glsl"
+#include "shared/pixel_light.glsl"
+
+const uint PLAIN = 2048u; // see shared/loop_limit.glsl
+
+// A channel whose albedo is below this cannot be divided out; its light stays with the direct light.
+const float SMALLEST_ALBEDO = 1e-6;
+const float BRIGHTEST = 3e38; // irradiance: what a small albedo makes of bright light stays finite
+// Deviations and sums of their squares are cut there, so that what is added up over pixels stays finite.
+const float FARTHEST = 1e17, WIDEST = 1e35;
+// Samples up to which means are rounded to single precision. Those after them move a mean by little more than its last place,
+// or less: their steps are kept to more bits (Kahan 1965), or the mean of 2^22 samples would be off by 1e-5 and more. That is
+// code that takes long to compile, and is there only in renders of so many samples.
+const uint FEW = 4096u;
+const int BITS = 10, LIGHT_BITS = 5; // of the remainder of a mean, for each channel
+
+// Where a pixel's samples lie in the batch: (first, step, number).
+uvec3 samples_of(uint i, uint pixel) {
+    if (!FX_ADAPTIVE || push.samples > 0u) return uvec3(i, push.pixels, push.samples);
+    uint64_t begin = wide(push.first_path), end = begin + push.paths;
+    uint64_t from = max(offset_of(pixel), begin), to = min(offset_of(pixel + 1u), end);
+    return uvec3(uint(from - begin), 1u, to > from ? uint(to - from) : 0u);
+}
+
+// 2^-bits of the last place of `mean`.
+vec3 unit(vec3 mean, int bits) {
+    return max(uintBitsToFloat(floatBitsToUint(mean) & 0x7f800000u) * 1.1920928955078125e-7 / float(1 << bits), 1e-37);
+}
+
+// Moves a mean by a step. `remainder` holds what rounding has taken off, `bits` for each channel from bit `at` on; it is rounded
+// itself, up or down by chance, since samples that repeat a value would all be rounded alike.
+void move_mean(inout vec3 mean, vec3 by, inout uint remainder, int at, int bits, uint count) {
+    ivec3 kept;
+    [[unroll]] for (int c = 0; c < 3; c++) kept[c] = bitfieldExtract(int(remainder), at + c * bits, bits);
+    precise vec3 added = vec3(kept) * unit(mean, bits) + by;
+    precise vec3 moved = mean + added;
+    precise vec3 lost = added - (moved - mean);
+    int end = 1 << (bits - 1);
+    precise vec3 rounded = floor(lost / unit(moved, bits) + float(pcg(count) >> 8) * 5.9604644775390625e-8);
+    // Half of the last place above is half of it below the next number: cut, it would be lost, always in one direction.
+    precise vec3 next = moved + unit(moved, bits) * float(2 * end);
+    bvec3 carries = greaterThanEqual(rounded, vec3(end));
+    moved = mix(moved, next, carries);
+    rounded = mix(rounded, vec3(-end), carries);
+    kept = ivec3(clamp(rounded, vec3(-end), vec3(end - 1)));
+    [[unroll]] for (int c = 0; c < 3; c++) remainder = bitfieldInsert(remainder, uint(kept[c]), at + c * bits, bits);
+    mean = moved;
+}
+
+float square(float a, float b) {
+    return clamp(a, -FARTHEST, FARTHEST) * clamp(b, -FARTHEST, FARTHEST);
+}
+
+void fold_light(inout PixelLight l, vec3 kept, vec3 irradiance, float share, uint count) {
+    float off = luminance(irradiance) - luminance(l.indirect);
+    if (!FX_MANY_SAMPLES || count <= FEW) {
+        l.direct += (kept - l.direct) * share;
+        l.indirect += (irradiance - l.indirect) * share;
+    } else {
+        move_mean(l.direct, (kept - l.direct) * share, l.remainder, 0, LIGHT_BITS, count);
+        move_mean(l.indirect, (irradiance - l.indirect) * share, l.remainder, 3 * LIGHT_BITS, LIGHT_BITS, count);
+    }
+    l.indirect_m2 = min(l.indirect_m2 + square(off, luminance(irradiance) - luminance(l.indirect)), WIDEST);
+}
+
+// `first_broken`: samples before the first that was no number, which the sign of its rays tells.
+void fold(inout PixelStats s, inout PixelLight l, inout uint broken_count, inout uint first_broken, int at) {
+    vec4 first = texelFetch(samples, FX_SPLIT ? 3 * at : at);
+    vec3 radiance = first.rgb;
+    if (first.w < 0.0 && broken_count++ == 0u) first_broken = s.count;
+    s.count++;
+    float share = 1.0 / float(s.count);
+    if (FX_SPLIT) {
+        vec3 direct = first.rgb, indirect = texelFetch(samples, 3 * at + 1).rgb;
+        vec3 albedo = texelFetch(samples, 3 * at + 2).rgb;
+        bvec3 divides = greaterThan(albedo, vec3(SMALLEST_ALBEDO));
+        vec3 irradiance = mix(vec3(0.0), min(indirect / max(albedo, vec3(SMALLEST_ALBEDO)), vec3(BRIGHTEST)), divides);
+        vec3 kept = direct + mix(indirect, vec3(0.0), divides);
+        radiance = direct + indirect;
+        fold_light(l, kept, irradiance, share, s.count);
+    }
+    vec3 off = radiance - s.mean;
+    if (!FX_MANY_SAMPLES || s.count <= FEW) s.mean += off * share;
+    else move_mean(s.mean, off * share, s.remainder, 0, BITS, s.count);
+    vec3 off_moved = radiance - s.mean;
+    [[unroll]] for (int c = 0; c < 3; c++) s.m2[c] = min(s.m2[c] + square(off[c], off_moved[c]), WIDEST);
+}
+
+// The kernel that traced them has found the lowest pixel; only its own thread comes here for it.
+void report(uint pixel, uint broken_count, uint first_broken) {
+    if (broken[0].count < 0x80000000u) atomicAdd(broken[0].count, broken_count);
+    if (broken[0].lowest != ~pixel || broken[0].pixel == ~pixel) return;
+    broken[0].pixel = ~pixel;
+    broken[0].index = first_broken;
+}
+
+PixelStats load_stats(int pixel) {
+    uvec4 a = texelFetch(stats, 2 * pixel), b = texelFetch(stats, 2 * pixel + 1);
+    return PixelStats(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), b.w);
+}
+
+void main() {
+    uint i = thread_index();
+    if (i >= push.pixels) return; // safe: no barrier() follows
+    uvec3 at_step_count = samples_of(i, push.first_pixel + i);
+    uint at = at_step_count.x, step = at_step_count.y, count = at_step_count.z;
+    if (count == 0u) return;
+    uint pixel = push.first_pixel + i;
+    PixelStats s = load_stats(int(pixel));
+    PixelLight l = PixelLight(vec3(0.0), 0.0, vec3(0.0), 0u);
+    uint broken_count = 0u, first_broken = 0u;
+    if (FX_SPLIT) l = load_light(int(pixel));
+    uint plain = FX_ADAPTIVE ? min(count, PLAIN) : count; // see SAMPLES_AT_ONCE in schedule.rs
+    for (uint k = 0u; k < plain; k++) fold(s, l, broken_count, first_broken, int(at + k * step));
+    for (uint k = plain; FX_ADAPTIVE && k < count; k += STRIDE) {
+        [[unroll]] for (uint j = 0u; j < STRIDE; j++) {
+            if (k + j < count) fold(s, l, broken_count, first_broken, int(at + (k + j) * step));
+        }
+    }
+    uint place = pixel - push.window;
+    uvec4 m2 = uvec4(floatBitsToUint(s.m2), s.remainder), indirect = uvec4(floatBitsToUint(l.indirect), l.remainder);
+    folded_stats[place] = u64vec4(paired(uvec4(floatBitsToUint(s.mean), s.count)), paired(m2));
+    if (FX_SPLIT) folded_light[place] = u64vec4(paired(vec4(l.direct, l.indirect_m2)), paired(indirect));
+    if (broken_count > 0u) report(push.tile + pixel, broken_count, first_broken);
+}

@@ -1,0 +1,43 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/moments.glsl"
+#include "shared/tiled_index.glsl"
+#define SUM Moments
+#define NO_SUM NO_MOMENTS
+#include "shared/windows.glsl"
+
+// Moments over the part of every window that lies in its centre's column, tile by tile of a strip.
+layout(local_size_x_id = 100) in;
+layout(binding = 0) uniform samplerBuffer colour; // of vec4
+layout(binding = 1) uniform samplerBuffer channels; // of vec4
+layout(scalar, binding = 2) writeonly buffer Sums { u64vec4 sums[]; }; // of vec4
+layout(scalar, push_constant) uniform Push { GuidedPush push; };
+
+int pixel_at(int x, int y) {
+    return blocked(x, clamp(y, 0, int(push.size.y) - 1), int(push.size.y));
+}
+
+vec4 point_at(int x, int y) {
+    return texelFetch(channels, pixel_at(x, y));
+}
+
+void absorb_element(inout Moments m, vec4 point, int x, int y) {
+    vec4 c = texelFetch(colour, pixel_at(x, y));
+    bool known = y >= 0 && y < int(push.size.y) && c.w > 0.0;
+    absorb_means(m, known ? 1.0 : 0.0, c.rgb, point_at(x, y) - point);
+}
+
+void put(int x, int y, Moments whole, vec4 point) {
+    whole = moved(whole, point_at(x, y) - point);
+    int at = strip_at(x, y - int(push.first_row), int(push.size.x), MOMENTS);
+    MOMENTS_STORE(sums, at, 8, whole);
+}
+
+void main() {
+    int x = int(gl_GlobalInvocationID.x), from = int(gl_GlobalInvocationID.y) * SEGMENT;
+    if (x >= int(push.size.x)) return; // safe: no barrier() follows
+    walk(x, int(push.first_row) + from, int(push.first_row) + min(from + SEGMENT, int(push.rows)));
+}

@@ -1,0 +1,47 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/linear_model.glsl"
+#include "shared/tiled_index.glsl"
+#define SUM Fit
+#define NO_SUM NO_FIT
+#include "shared/windows.glsl"
+
+// Mean of the models of all windows that cover a pixel and are centred in its column, tile by tile of a strip.
+layout(local_size_x_id = 100) in;
+layout(binding = 0) uniform samplerBuffer slope_r; // of vec4
+layout(binding = 1) uniform samplerBuffer slope_g; // of vec4
+layout(binding = 2) uniform samplerBuffer slope_b; // of vec4
+layout(binding = 3) uniform samplerBuffer value; // of vec4
+layout(binding = 4) uniform samplerBuffer channels; // of vec4
+layout(scalar, binding = 5) writeonly buffer Sums { u64vec4 sums[]; }; // of vec4
+layout(scalar, push_constant) uniform Push { GuidedPush push; };
+
+int pixel_at(int x, int y) {
+    return blocked(x, clamp(y, 0, int(push.size.y) - 1), int(push.size.y));
+}
+
+vec4 point_at(int x, int y) {
+    return texelFetch(channels, pixel_at(x, y));
+}
+
+void absorb_element(inout Fit f, vec4 point, int x, int y) {
+    int at = pixel_at(x, y);
+    Fit model = Fit(texelFetch(slope_r, at), texelFetch(slope_g, at), texelFetch(slope_b, at), texelFetch(value, at));
+    bool is = y >= 0 && y < int(push.size.y);
+    absorb(f, moved(model, point - point_at(x, y)), is);
+}
+
+void put(int x, int y, Fit whole, vec4 point) {
+    whole = moved(whole, point_at(x, y) - point);
+    int at = strip_at(x, y - int(push.first_row), int(push.size.x), FIT);
+    FIT_STORE(sums, at, 8, whole);
+}
+
+void main() {
+    int x = int(gl_GlobalInvocationID.x), from = int(gl_GlobalInvocationID.y) * SEGMENT;
+    if (x >= int(push.size.x)) return; // safe: no barrier() follows
+    walk(x, int(push.first_row) + from, int(push.first_row) + min(from + SEGMENT, int(push.rows)));
+}

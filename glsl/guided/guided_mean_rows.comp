@@ -1,0 +1,53 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/linear_model.glsl"
+#include "shared/sanitise.glsl"
+#include "shared/tiled_index.glsl"
+#define SUM Fit
+#define NO_SUM NO_FIT
+#include "shared/windows.glsl"
+
+// The guided filter's result: the mean model of all windows that cover a pixel, at the pixel's own guide; tile by tile
+// of a row.
+layout(local_size_x_id = 100) in;
+layout(binding = 0) uniform samplerBuffer columns; // of vec4
+layout(binding = 1) uniform samplerBuffer channels; // of vec4
+layout(binding = 2) uniform samplerBuffer colour; // of vec4
+layout(scalar, binding = 3) writeonly buffer Output { u64vec2 filtered[]; }; // of vec4
+layout(scalar, push_constant) uniform Push { GuidedPush push; };
+
+#define FETCH_COLUMN(at) texelFetch(columns, at)
+
+int pixel_at(int row, int x) {
+    return blocked(clamp(x, 0, int(push.size.x) - 1), int(push.first_row) + row, int(push.size.y));
+}
+
+vec4 point_at(int row, int x) {
+    return texelFetch(channels, pixel_at(row, x));
+}
+
+void absorb_element(inout Fit f, vec4 point, int row, int x) {
+    int width = int(push.size.x);
+    int at = strip_at(clamp(x, 0, width - 1), row, width, FIT);
+    Fit column = FIT_LOAD(at, 8, FETCH_COLUMN);
+    absorb(f, moved(column, point - point_at(row, x)), x >= 0 && x < width);
+}
+
+void put(int row, int x, Fit whole, vec4 point) {
+    int pixel = pixel_at(row, x);
+    whole = moved(whole, texelFetch(channels, pixel) - point);
+    vec4 c = texelFetch(colour, pixel);
+    // A model that no float can hold, or no known pixel in reach: the pixel stays as it is.
+    bool usable = whole.value.w > 0.0 && finite(whole.value.rgb);
+    vec4 result = usable ? vec4(whole.value.rgb, c.w > 0.0 ? c.w : 1.0) : c;
+    filtered[(int(push.first_row) + row) * int(push.size.x) + x] = paired(result);
+}
+
+void main() {
+    int row = int(gl_GlobalInvocationID.x), from = int(gl_GlobalInvocationID.y) * SEGMENT;
+    if (row >= int(push.rows)) return; // safe: no barrier() follows
+    walk(row, from, min(from + SEGMENT, int(push.size.x)));
+}

@@ -1,0 +1,56 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/moments.glsl"
+#include "shared/tiled_index.glsl"
+#define SUM Moments
+#define NO_SUM NO_MOMENTS
+#include "shared/windows.glsl"
+
+// The linear model a . I + b of every window (He et al. 2010, equation 19), from the moments of its columns, tile by
+// tile of a row. Instead of b it keeps the model's value at the window's own centre.
+layout(local_size_x_id = 100) in;
+layout(binding = 0) uniform samplerBuffer columns; // of vec4
+layout(binding = 1) uniform samplerBuffer channels; // of vec4
+layout(scalar, binding = 2) writeonly buffer SlopeR { u64vec2 slope_r[]; }; // of vec4
+layout(scalar, binding = 3) writeonly buffer SlopeG { u64vec2 slope_g[]; }; // of vec4
+layout(scalar, binding = 4) writeonly buffer SlopeB { u64vec2 slope_b[]; }; // of vec4
+layout(scalar, binding = 5) writeonly buffer Values { u64vec2 value[]; }; // of vec4
+layout(scalar, push_constant) uniform Push { GuidedPush push; };
+
+#define FETCH_COLUMN(at) texelFetch(columns, at)
+
+int pixel_at(int row, int x) {
+    return blocked(clamp(x, 0, int(push.size.x) - 1), int(push.first_row) + row, int(push.size.y));
+}
+
+vec4 point_at(int row, int x) {
+    return texelFetch(channels, pixel_at(row, x));
+}
+
+void absorb_element(inout Moments m, vec4 point, int row, int x) {
+    int width = int(push.size.x);
+    int at = strip_at(clamp(x, 0, width - 1), row, width, MOMENTS);
+    Moments column = MOMENTS_LOAD(at, 8, FETCH_COLUMN);
+    column.mean += point_at(row, x) - point;
+    absorb(m, column, x >= 0 && x < width);
+}
+
+void put(int row, int x, Moments whole, vec4 point) {
+    vec4 r, g, b, off = point_at(row, x) - point - whole.mean;
+    solve(whole, whole.head.x * push.eps, r, g, b);
+    int at = pixel_at(row, x);
+    vec3 here = whole.head.yzw + vec3(dot(r, off), dot(g, off), dot(b, off));
+    slope_r[at] = paired(r);
+    slope_g[at] = paired(g);
+    slope_b[at] = paired(b);
+    value[at] = paired(vec4(here, min(whole.head.x, 1.0)));
+}
+
+void main() {
+    int row = int(gl_GlobalInvocationID.x), from = int(gl_GlobalInvocationID.y) * SEGMENT;
+    if (row >= int(push.rows)) return; // safe: no barrier() follows
+    walk(row, from, min(from + SEGMENT, int(push.size.x)));
+}

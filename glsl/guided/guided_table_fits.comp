@@ -1,0 +1,29 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/linear_model.glsl"
+#include "shared/tiled_index.glsl"
+
+// Rows of the summed-area table of the models.
+layout(local_size_x = 32) in;
+layout(binding = 0) uniform samplerBuffer slope_r; // of vec4
+layout(binding = 1) uniform samplerBuffer slope_g; // of vec4
+layout(binding = 2) uniform samplerBuffer slope_b; // of vec4
+layout(binding = 3) uniform samplerBuffer value; // of vec4
+layout(scalar, binding = 4) writeonly buffer Table { u64vec4 table[]; }; // of vec4
+layout(scalar, push_constant) uniform Push { GuidedPush push; };
+
+void main() {
+    int y = int(gl_GlobalInvocationID.x), width = int(push.size.x), height = int(push.size.y);
+    if (y >= height) return; // safe: no barrier() follows
+    Fit f = NO_FIT;
+    for (int x = 0; x < width; x++) {
+        int at = blocked(x, y, height);
+        f.r += texelFetch(slope_r, at);
+        f.g += texelFetch(slope_g, at);
+        f.b += texelFetch(slope_b, at);
+        f.value += texelFetch(value, at);
+        FIT_STORE(table, FIT / 2 * (y * width + x), 1, f);
+    }
+}

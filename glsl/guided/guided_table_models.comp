@@ -1,0 +1,49 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/moments.glsl"
+#include "shared/summed_area.glsl"
+#include "shared/tiled_index.glsl"
+
+// The linear model of every window, from the corners of a summed-area table: E[I I] - E[I] E[I], which cancels.
+layout(local_size_x = 32) in;
+layout(binding = 0) uniform samplerBuffer table; // of vec4
+layout(scalar, binding = 1) writeonly buffer SlopeR { u64vec2 slope_r[]; }; // of vec4
+layout(scalar, binding = 2) writeonly buffer SlopeG { u64vec2 slope_g[]; }; // of vec4
+layout(scalar, binding = 3) writeonly buffer SlopeB { u64vec2 slope_b[]; }; // of vec4
+layout(scalar, binding = 4) writeonly buffer Values { u64vec2 value[]; }; // of vec4
+layout(scalar, push_constant) uniform Push { GuidedPush push; };
+
+vec4 corner(int pixel, int member) {
+    return pixel < 0 ? vec4(0.0) : texelFetch(table, MOMENTS * pixel + member);
+}
+
+vec4 sum(ivec4 c, int member) {
+    return corner(c.x, member) - corner(c.y, member) - corner(c.z, member) + corner(c.w, member);
+}
+
+#define SUM(member) sum(c, member)
+
+void main() {
+    ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(at, size))) return; // safe: no barrier() follows
+    ivec4 c = corners(at, size, int(push.radius));
+    Moments m = MOMENTS_LOAD(0, 1, SUM);
+    float count = m.head.x, share = 1.0 / max(count, 1.0);
+    vec3 n = share * m.head.yzw;
+    vec4 i = share * m.mean;
+    m.xx -= m.mean.x * i;
+    m.yy -= m.mean.y * i.yzw;
+    m.zz -= m.mean.zzw * i.zww;
+    m.r -= n.r * m.mean;
+    m.g -= n.g * m.mean;
+    m.b -= n.b * m.mean;
+    vec4 r, g, b;
+    solve(m, count * push.eps, r, g, b);
+    int to = blocked(at.x, at.y, size.y);
+    slope_r[to] = paired(r);
+    slope_g[to] = paired(g);
+    slope_b[to] = paired(b);
+    value[to] = paired(vec4(n - vec3(dot(r, i), dot(g, i), dot(b, i)), min(count, 1.0)));
+}

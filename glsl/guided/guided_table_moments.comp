@@ -1,0 +1,33 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/moments.glsl"
+#include "shared/tiled_index.glsl"
+
+// Rows of the summed-area table of N, I and their products (Crow 1984), as Bauszat et al. 2011 (section 3.3) have it:
+// plain sums about 0.
+layout(local_size_x = 32) in;
+layout(binding = 0) uniform samplerBuffer colour; // of vec4
+layout(binding = 1) uniform samplerBuffer channels; // of vec4
+layout(scalar, binding = 2) writeonly buffer Table { u64vec4 table[]; }; // of vec4
+layout(scalar, push_constant) uniform Push { GuidedPush push; };
+
+void main() {
+    int y = int(gl_GlobalInvocationID.x), width = int(push.size.x), height = int(push.size.y);
+    if (y >= height) return; // safe: no barrier() follows
+    Moments m = NO_MOMENTS;
+    for (int x = 0; x < width; x++) {
+        vec4 c = texelFetch(colour, blocked(x, y, height)), i = texelFetch(channels, blocked(x, y, height));
+        if (c.w == 0.0) i = vec4(0.0);
+        m.head += vec4(c.w > 0.0 ? 1.0 : 0.0, c.rgb);
+        m.mean += i;
+        m.xx += i.x * i;
+        m.yy += i.y * i.yzw;
+        m.zz += i.zzw * i.zww;
+        m.r += c.r * i;
+        m.g += c.g * i;
+        m.b += c.b * i;
+        MOMENTS_STORE(table, MOMENTS / 2 * (y * width + x), 1, m);
+    }
+}

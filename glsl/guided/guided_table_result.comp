@@ -1,0 +1,39 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/linear_model.glsl"
+#include "shared/summed_area.glsl"
+#include "shared/sanitise.glsl"
+#include "shared/tiled_index.glsl"
+
+// The guided filter's result: the mean model of all windows that cover a pixel, from the corners of a summed-area table.
+layout(local_size_x = 32) in;
+layout(binding = 0) uniform samplerBuffer table; // of vec4
+layout(binding = 1) uniform samplerBuffer channels; // of vec4
+layout(binding = 2) uniform samplerBuffer colour; // of vec4
+layout(scalar, binding = 3) writeonly buffer Output { u64vec2 filtered[]; }; // of vec4
+layout(scalar, push_constant) uniform Push { GuidedPush push; };
+
+vec4 corner(int pixel, int member) {
+    return pixel < 0 ? vec4(0.0) : texelFetch(table, FIT * pixel + member);
+}
+
+vec4 sum(ivec4 c, int member) {
+    return corner(c.x, member) - corner(c.y, member) - corner(c.z, member) + corner(c.w, member);
+}
+
+#define SUM(member) sum(c, member)
+
+void main() {
+    ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(at, size))) return; // safe: no barrier() follows
+    ivec4 c = corners(at, size, int(push.radius));
+    int from = blocked(at.x, at.y, size.y);
+    Fit f = moved(FIT_LOAD(0, 1, SUM), texelFetch(channels, from));
+    vec4 here = texelFetch(colour, from);
+    vec3 result = f.value.rgb / f.value.w;
+    // A model that no float can hold, or no known pixel in reach: the pixel stays as it is.
+    bool usable = f.value.w > 0.0 && finite(result);
+    filtered[at.y * size.x + at.x] = paired(usable ? vec4(result, here.w > 0.0 ? here.w : 1.0) : here);
+}

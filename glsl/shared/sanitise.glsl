@@ -1,0 +1,27 @@
+// What the filters make of a pixel before they trust it. Twin: src/denoise/filter/pixel.rs.
+#include "shared/finite.glsl"
+#include "shared/octahedral.glsl"
+
+const uint NO_NORMAL = 0x80008000u; // packSnorm2x16 never returns -32768
+const float LARGEST = 1e24;         // radiance beyond it is cut, so that differences and sums stay finite
+const float FARTHEST = 1e18;        // the same for positions, whose squares are summed
+const float WIDEST = 1e7;           // the same for the guided filter's channels
+
+// Radiance and the samples behind it; all zero where nothing is known.
+vec4 known_radiance(vec4 c) {
+    bool known = c.w > 0.0 && finite(c.w) && finite(c.rgb);
+    return known ? vec4(clamp(c.rgb, -LARGEST, LARGEST), c.w) : vec4(0.0);
+}
+
+uint packed_normal(vec3 n) {
+    float len = dot(n, n);
+    return finite(len) && len > 1e-20 ? octahedral_encode(n) : NO_NORMAL;
+}
+
+vec3 unpacked_normal(uint bits) {
+    return bits == NO_NORMAL ? vec3(0.0) : octahedral_decode(bits);
+}
+
+float known_channel(float v) {
+    return finite(v) ? clamp(v, -WIDEST, WIDEST) : 0.0;
+}

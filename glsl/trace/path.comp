@@ -1,0 +1,228 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "effects.glsl"
+#include "shared/thread.glsl"
+#include "shared/scene.glsl"
+#include "shared/finite.glsl"
+#include "shared/store64.glsl"
+
+// One camera path per thread: next event estimation and BSDF sampling joined by the balance heuristic (Veach 1997).
+// Thread i traces sample first_sample + i / pixels of pixel first_pixel + i % pixels, or path i of a list, and writes 1 vec4 (radiance), or
+// with FX_SPLIT 3 (direct, indirect, the albedo that indirect is to be divided by); w of the first is the number of its rays, less
+// than 0 where the light was no number: such a sample is black.
+layout(local_size_x_id = 100) in;
+layout(scalar, binding = 11) writeonly buffer Samples { u64vec2 samples[]; }; // of vec4
+layout(scalar, binding = 12) buffer Counters { uint counters[]; };
+layout(binding = 13) uniform usamplerBuffer paths; // of uvec2
+layout(scalar, binding = 14) buffer Broken { BrokenTally broken[]; };
+layout(scalar, push_constant) uniform Push { PathPush push; };
+
+uint nodes_visited = 0u, closest_rays = 0u, any_rays = 0u;
+
+#include "shared/sampler.glsl"
+#include "shared/warp.glsl"
+#include "shared/fresnel.glsl"
+#include "shared/microfacet.glsl"
+#include "shared/bsdf.glsl"
+#include "shared/texture.glsl"
+#include "shared/camera.glsl"
+#include "shared/traverse.glsl"
+#include "shared/surface.glsl"
+#include "shared/light.glsl"
+
+// Dimension pairs: those of the camera, then these for every scattering event.
+const uint PAIR_FIRST_BOUNCE = 2u, PAIRS_PER_BOUNCE = 4u;
+const uint PAIR_CHOICE = 0u, PAIR_LIGHT = 1u, PAIR_BSDF = 2u, PAIR_ROULETTE = 3u;
+
+// Shadow rays to a lamp end at this part of the way: the error of the distance at which they would meet it is some 2^-24
+// over the cosine there.
+const float SHADOW_END = 1.0 - 1e-5;
+
+// Joins the two strategies. Two densities that vanished give 0, not 0 / 0.
+float balance(float taken, float other) { return taken / max(taken + other, 1e-37); }
+
+struct Path {
+    vec3 origin;
+    vec3 direction;
+    vec3 throughput;
+    float bsdf_pdf; // of `direction`; 0 after a smooth interface or from the camera
+    bool delta;     // no light sampling competes for what `direction` hits
+    float eta_scale; // squared refractive index at `origin` over that at the camera
+};
+
+struct Light2 {
+    vec3 direct;
+    vec3 indirect;
+};
+
+void add_light(inout Light2 sum, vec3 light, bool indirect) {
+    bool apart = FX_INDIRECT && indirect;
+    sum.direct += apart ? vec3(0.0) : light;
+    sum.indirect += apart ? light : vec3(0.0);
+}
+
+// The whole sample is clamped, in place of what each bounce adds: the limit is that of what a pixel averages.
+vec3 clamped(vec3 light) {
+    float largest = max(light.r, max(light.g, light.b));
+    return light * (push.clamp_indirect > 0.0 && largest > push.clamp_indirect ? push.clamp_indirect / largest : 1.0);
+}
+
+vec3 light_from_miss(Path path) {
+    if (!FX_ENVIRONMENT || push.environment == NONE) return vec3(0.0);
+    float pdf;
+    vec3 radiance = environment_radiance(path.direction, pdf);
+    return radiance * (path.delta ? 1.0 : balance(path.bsdf_pdf, pdf));
+}
+
+vec3 light_from_hit(Path path, Surface s, float t) {
+    float cosine = -dot(s.geometric, path.direction);
+    float weight = path.delta ? 1.0 : balance(path.bsdf_pdf, triangle_light_pdf(s, path.origin, t, cosine));
+    return FX_EMISSIVE && cosine > 0.0 ? surface_emission(s) * weight : vec3(0.0);
+}
+
+// Direct light at `s` by light sampling, unless something blocks `shadow`; 0 needs no ray. `basis` columns are the
+// shading frame.
+vec3 light_from_nee(Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sampler random, uint pair, uint mask_seed,
+                    out Segment shadow) {
+    uint word = sample_2d_bits(random, pair + PAIR_CHOICE).x;
+    LightSample light = light_sample(s.position, word, sample_2d(random, pair + PAIR_LIGHT));
+    vec3 wi = light.direction * basis; // row vector times matrix: into the frame
+    vec4 f = bsdf_evaluate(bsdf, wo, wi);
+    f.rgb *= light_share(s, facing, light.direction, wi.z);
+    shadow = Segment(ray_origin(s, light.direction), light.direction, light.distance, mask_seed);
+    if (light.distance < INFINITE_DISTANCE) { // aim again from the offset origin, so that the segment ends on the light
+        shadow.direction = s.position + light.distance * light.direction - shadow.origin;
+        shadow.t_max = SHADOW_END;
+    }
+    return f.rgb * light.radiance * (light.pdf > 0.0 ? balance(light.pdf, f.w) : 1.0);
+}
+
+// Chooses the next direction. False when the path ends.
+bool scatter(inout Path path, Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sampler random, uint pair) {
+    BsdfSample next;
+    float lobe = sample_2d(random, pair + PAIR_CHOICE).y;
+    bool scattered = bsdf_sample(bsdf, wo, lobe, sample_2d(random, pair + PAIR_BSDF), next);
+    path.direction = basis * next.wi;
+    path.throughput *= next.weight * light_share(s, facing, path.direction, next.wi.z);
+    path.origin = ray_origin(s, path.direction);
+    path.bsdf_pdf = next.pdf;
+    path.delta = next.delta;
+    if (FX_ROULETTE && is_kind(FX_DIELECTRIC, bsdf, BSDF_DIELECTRIC) && wo.z * next.wi.z < 0.0) {
+        float eta = relative_index(bsdf, wo.z);
+        path.eta_scale *= eta * eta;
+    }
+    return scattered && max(path.throughput.r, max(path.throughput.g, path.throughput.b)) > 0.0;
+}
+
+// Radiance is scaled by 1 / eta^2 on the way into glass, and back on the way out: that says nothing of what a path is worth.
+bool survives_roulette(inout Path path, Sampler random, uint pair) {
+    float q = min(max(path.throughput.r, max(path.throughput.g, path.throughput.b)) * path.eta_scale, 0.95);
+    if (sample_2d(random, pair + PAIR_ROULETTE).x >= q) return false;
+    path.throughput /= q;
+    return true;
+}
+
+// Adds what the path meets at `hit`; true where it can go on from there, from `s`.
+bool arrive(inout Light2 sum, Path path, Hit hit, bool indirect, out Surface s) {
+    if (hit.triangle == NONE) {
+        add_light(sum, path.throughput * light_from_miss(path), indirect);
+        return false;
+    }
+    s = surface_at(hit);
+    add_light(sum, path.throughput * light_from_hit(path, s, hit.t), indirect);
+    return true;
+}
+
+Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
+    Light2 sum = Light2(vec3(0.0), vec3(0.0));
+    albedo = vec3(0.0);
+    Hit hit = traverse(Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed)), push.root);
+    closest_rays++;
+    Surface s;
+    bool smooth_first = false, mirrored = false;
+    uint bounce = 0u;
+    // A round goes from one surface to the next, so that the last one samples no light. The light sampled at the first waits
+    // for the ray to the next: see traverse_both.
+    if (arrive(sum, path, hit, false, s) && push.max_depth > 1u) do {
+        uint pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
+        Bsdf bsdf = surface_bsdf(s);
+        // The two sides of a dielectric differ: its normal stays on the outside.
+        bool turns = (s.flags & MATERIAL_TWO_SIDED) != 0u && !is_kind(FX_DIELECTRIC, bsdf, BSDF_DIELECTRIC);
+        Facing facing = facing_normals(s, -path.direction, turns, bsdf_is_specular(bsdf));
+        mat3 basis = basis_from_normal(facing.normal);
+        vec3 wo = -path.direction * basis;
+        bsdf_view(bsdf, wo);
+        bool smooth_here = bsdf_is_delta(bsdf);
+        if (bounce == 0u) {
+            albedo = bsdf_albedo(bsdf, wo.z);
+            smooth_first = smooth_here;
+        }
+        Segment shadow;
+        uint mask_seed = pcg(seed + 2u * bounce);
+        vec3 sampled = path.throughput * light_from_nee(s, bsdf, facing, basis, wo, random, pair, mask_seed + 1u, shadow);
+        bool shadowed = push.light_count > 0u && !smooth_here && max(sampled.r, max(sampled.g, sampled.b)) > 0.0;
+        bool alive = scatter(path, s, bsdf, facing, basis, wo, random, pair);
+        if (bounce == 0u) mirrored = path.delta;
+        bool roulette = FX_ROULETTE && push.roulette_depth > 0u && bounce + 1u >= push.roulette_depth;
+        if (roulette) alive = survives_roulette(path, random, pair) && alive;
+        bounce++;
+        if (!alive && !shadowed) break;
+
+        closest_rays += uint(alive);
+        any_rays += uint(shadowed);
+        bool lit = shadowed, indirect = bounce >= 2u && !smooth_first;
+        Segment ray = Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed + 2u * bounce));
+        hit = traverse_both(shadow, shadowed, ray, alive, push.root, uvec2(hit.triangle, hit.instance));
+        add_light(sum, lit && !shadowed ? sampled : vec3(0.0), indirect);
+        if (!alive || !arrive(sum, path, hit, indirect, s)) break;
+    } while (bounce + 1u < push.max_depth);
+    if (FX_CLAMP) sum.indirect = clamped(sum.indirect);
+    // What a smooth coat mirrors needs no filter. It is moved only here, so that the sum of both keeps its bits.
+    if (mirrored) sum = Light2(sum.direct + sum.indirect, vec3(0.0));
+    return sum;
+}
+
+// 64-bit counters out of pairs of words: 64-bit atomics are not a required feature.
+void count(uint slot, uint n) {
+    uint before = atomicAdd(counters[2u * slot], n);
+    if (before + n < before) atomicAdd(counters[2u * slot + 1u], 1u);
+}
+
+void main() {
+    bool listed = FX_ADAPTIVE && push.samples == 0u;
+    uint i = listed ? striped_index() : thread_index(); // listed pixel by pixel, else sample by sample
+    if (i >= push.pixels * (listed ? 1u : push.samples)) return; // safe: no barrier() follows
+    uint pixel = push.first_pixel + i % push.pixels;
+    uint index = push.first_sample + i / push.pixels;
+    if (listed) {
+        uvec2 path = texelFetch(paths, int(i)).xy;
+        pixel = path.x;
+        index = path.y;
+        if (pixel == NONE) return; // safe: no barrier() follows
+    }
+    Sampler random = sampler_start(pixel, index, push.seed);
+    Ray ray = eye_ray(film_sample(pixel, random), random);
+    Path path = Path(ray.origin, ray.direction, vec3(1.0), 0.0, true, 1.0);
+    vec3 albedo;
+    Light2 light = trace_path(path, random, path_seed(pixel, index), albedo);
+    float rays = float(closest_rays + any_rays);
+    if (!finite(light.direct + light.indirect)) {
+        light = Light2(vec3(0.0), vec3(0.0));
+        rays = -rays;
+        atomicMax(broken[0].lowest, ~pixel);
+    }
+    if (FX_SPLIT) {
+        samples[3u * i] = paired(vec4(light.direct, rays));
+        samples[3u * i + 1u] = paired(vec4(light.indirect, 0.0));
+        samples[3u * i + 2u] = paired(vec4(albedo, 0.0));
+    } else {
+        samples[i] = paired(vec4(light.direct + light.indirect, rays));
+    }
+    if (FX_COUNTERS) {
+        count(0u, closest_rays);
+        count(1u, any_rays);
+        count(2u, nodes_visited);
+    }
+}

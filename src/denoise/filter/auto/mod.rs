@@ -1,0 +1,279 @@
+//! Per pixel, the blend of candidates with the least estimated error: it spares the user the sweep. Kernels:
+//! `glsl/auto*.comp`.
+mod reference;
+
+use super::edge::Rates;
+use super::noise_estimate::Estimate;
+use super::pack::Pack;
+use super::{Filter, FilterSettings, Planes, Row, guided, svgf};
+use crate::error::Result;
+use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
+use crate::layout::{AutoPush, AutoSmoothPush, PackPush, vec4};
+use crate::shaders::{auto, auto_error, auto_inputs, auto_leverage, auto_smooth, auto_sum};
+
+/// See [`super::FILTERS`].
+pub const ROW: Row = Row {
+    name: "auto",
+    about: "per pixel the best blend of none, guided by wide, middle and narrow windows, and svgf, by estimated error",
+    make: |gpu, settings, size| Ok(Box::new(Auto::new(gpu, settings, size)?)),
+    reference: reference::reference,
+};
+
+/// Levels of smoothing of what is estimated, a footprint of 61 pixels. Even: see `Auto::record_smoothing`.
+const SMOOTHING: u32 = 4;
+/// How much the errors of one surface count for another, to the power of the level: neighbours fully, far pixels hardly. Where
+/// surfaces are small, as in grass, others are all there is to learn from, and few pixels seem to prove filters that keep much.
+const ACROSS: f32 = 0.4;
+/// Elements that a workgroup of `auto_sum.comp` adds up.
+const SUMMED: usize = (auto_sum::THREADS * auto_sum::EACH) as usize;
+
+/// The filters beside none, found by searching thirteen noisy images of six scenes for what leaves `auto` nearest to the best
+/// filter of each. At their defaults: windows of 65 pixels and normals alone, in which a few bright samples are spread; windows
+/// of 33 and of 9 pixels, both held more tightly than alone, depth above all; and 3 levels of `svgf`, which light and positions
+/// hold more tightly and normals hardly.
+fn candidates(s: &FilterSettings) -> [(Row, FilterSettings); 4] {
+    let windows = |radius: u32, depth: f32| {
+        let [x, y, z, w] = s.eps;
+        FilterSettings { radius, eps: [0.1 * x, 0.1 * y, 0.1 * z, depth * w], ..*s }
+    };
+    let (sigma_l, sigma_n, sigma_x) = (0.75 * s.sigma_l, 4.0 * s.sigma_n, 0.6 * s.sigma_x);
+    [
+        (guided::ROW, FilterSettings { radius: (4 * s.radius).div_ceil(3), channels: s.channels.min(3), ..*s }),
+        (guided::ROW, windows((2 * s.radius).div_ceil(3), 5e-3)),
+        // Fewer than 5 x 5 pixels do not determine a model of four channels: little of a pixel is left to judge it by.
+        (guided::ROW, windows(s.radius.div_ceil(6).max(2), 5e-5)),
+        (svgf::ROW, FilterSettings { levels: s.levels.min(3), sigma_l, sigma_n, sigma_x, ..*s }),
+    ]
+}
+
+/// What counts as one surface to the estimates of errors.
+fn alike(s: &FilterSettings) -> FilterSettings {
+    FilterSettings { sigma_n: 2.5 * s.sigma_n, sigma_x: 1.2 * s.sigma_x, ..*s }
+}
+
+/// Weight of what is not alike.
+fn least(level: u32, across: bool) -> f32 {
+    if across { ACROSS.powi(level as i32) } else { 0.0 }
+}
+
+/// Luminance below which errors count as absolute: a thousandth of the image's intensity.
+fn floor(settings: &FilterSettings) -> f32 {
+    (1e-3 * settings.intensity).clamp(1e-30, 1e24)
+}
+
+/// A filter, and what it makes of its image and of a probe.
+struct Candidate {
+    filter: Box<dyn Filter>,
+    result: Buffer<vec4>,
+    kept: Buffer<vec4>,
+}
+
+impl Candidate {
+    fn record(
+        &self,
+        rec: &mut Recorder,
+        planes: &Planes,
+        radiance: &Buffer<vec4>,
+        output: &Buffer<vec4>,
+    ) -> Result<()> {
+        let (radiance, guide, variance) = (radiance.clone(), planes.guide.clone(), planes.variance.clone());
+        self.filter.record(rec, &Planes { size: planes.size, radiance, guide, variance, output: output.clone() })
+    }
+}
+
+struct Auto {
+    pack: Pack,
+    estimate: Estimate,
+    inputs: Kernel<auto_inputs::Bind<'static>>,
+    leverage: Kernel<auto_leverage::Bind<'static>>,
+    error: Kernel<auto_error::Bind<'static>>,
+    sum: Kernel<auto_sum::Bind<'static>>,
+    /// Of leverages, and of errors.
+    smooth: [Kernel<auto_smooth::Bind<'static>>; 2],
+    blend: Kernel<auto::Bind<'static>>,
+    /// Wide, middle and narrow windows, svgf.
+    candidates: [Candidate; 4],
+    /// What candidates are run on besides the image: see `glsl/auto/auto_inputs.comp`. Then squares and products of what is missed:
+    /// see `glsl/auto/auto_error.comp`.
+    planes: [Buffer<vec4>; 3],
+    /// What the wide window makes of what the narrow one gets.
+    wide_dim: Buffer<vec4>,
+    leverages: Buffer<vec4>,
+    /// Leverages, smoothed.
+    surroundings: Buffer<vec4>,
+    /// Over groups of pixels, in turn.
+    sums: [[Buffer<vec4>; 3]; 2],
+    settings: FilterSettings,
+}
+
+impl Auto {
+    fn new(gpu: &Gpu, settings: &FilterSettings, size: [u32; 2]) -> Result<Self> {
+        let pack = Pack::new(gpu, size)?;
+        let pixels = pack.colour.len();
+        let plane = |name| Buffer::new(gpu, name, pixels, Location::Device);
+        let candidate = |(row, settings): (Row, FilterSettings)| {
+            let filter = (row.make)(gpu, &settings, size)?;
+            Ok(Candidate { filter, result: plane("candidate")?, kept: plane("probed candidate")? })
+        };
+        let [wide, middle, narrow, svgf] = candidates(settings).map(candidate);
+        let sum = || Buffer::new(gpu, "sums of errors", pixels.div_ceil(SUMMED).max(1), Location::Device);
+        let smooth = |three| {
+            let edge = Rates::of_surfaces(&alike(settings)).constants();
+            Kernel::new(gpu, &auto_smooth::Constants { edge, three })
+        };
+        Ok(Self {
+            estimate: Estimate::new(gpu, settings, size)?,
+            inputs: Kernel::new(gpu, &Default::default())?,
+            leverage: Kernel::new(gpu, &Default::default())?,
+            error: Kernel::new(gpu, &Default::default())?,
+            sum: Kernel::new(gpu, &Default::default())?,
+            smooth: [smooth(false)?, smooth(true)?],
+            blend: Kernel::new(gpu, &Default::default())?,
+            candidates: [wide?, middle?, narrow?, svgf?],
+            planes: [
+                plane("dim, squared errors")?,
+                plane("signs, products of errors")?,
+                plane("probed, other errors")?,
+            ],
+            wide_dim: plane("wide, dim")?,
+            leverages: plane("leverages")?,
+            surroundings: plane("smoothed leverages")?,
+            sums: [[sum()?, sum()?, sum()?], [sum()?, sum()?, sum()?]],
+            settings: *settings,
+            pack,
+        })
+    }
+
+    /// What every candidate makes of the image, and how much of it each keeps.
+    fn record_candidates(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
+        let [wide, middle, narrow, svgf] = &self.candidates;
+        let ([dim, signs, probed], count) = (&self.planes, planes.pixels());
+        wide.record(rec, planes, &planes.radiance, &wide.result)?;
+        let push = AutoPush { count, floor: floor(&self.settings) };
+        let bind = auto_inputs::Bind { colour: &self.pack.colour, wide: &wide.result, dim, signs, probed };
+        rec.dispatch_threads(&self.inputs, bind, &push, count)?;
+        wide.record(rec, planes, dim, &self.wide_dim)?;
+        middle.record(rec, planes, &planes.radiance, &middle.result)?;
+        narrow.record(rec, planes, dim, &narrow.result)?;
+        svgf.record(rec, planes, &planes.radiance, &svgf.result)?;
+        for linear in [wide, middle, narrow] {
+            linear.record(rec, planes, signs, &linear.kept)?;
+        }
+        svgf.record(rec, planes, probed, &svgf.kept)?;
+        let bind = auto_leverage::Bind {
+            wide: &wide.result,
+            svgf: &svgf.result,
+            wide_kept: &wide.kept,
+            mid_kept: &middle.kept,
+            narrow_kept: &narrow.kept,
+            svgf_kept: &svgf.kept,
+            leverages: &self.leverages,
+        };
+        rec.dispatch_threads(&self.leverage, bind, &push, count)
+    }
+
+    fn record_errors(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
+        let [wide, mid, narrow, svgf] = self.candidates.each_ref().map(|c| &c.result);
+        let [squares, products, others] = &self.planes;
+        let bind = auto_error::Bind {
+            estimate: &self.estimate.plane,
+            colour: &self.pack.colour,
+            wide,
+            mid,
+            narrow,
+            wide_dim: &self.wide_dim,
+            svgf,
+            leverages: &self.leverages,
+            surroundings: &self.surroundings,
+            squares,
+            products,
+            others,
+        };
+        let count = planes.pixels();
+        let push = AutoPush { count, floor: floor(&self.settings) };
+        rec.dispatch_threads(&self.error, bind, &push, count)
+    }
+
+    /// Errors of all pixels -> their sums, which lie first in what is returned.
+    fn record_sums(&self, rec: &mut Recorder, planes: &Planes) -> Result<&[Buffer<vec4>; 3]> {
+        let (mut from, mut count) = (&self.planes, planes.pixels());
+        for to in self.sums.iter().cycle() {
+            let ([squares, products, others], [square_sums, product_sums, other_sums]) = (from, to);
+            let bind = auto_sum::Bind { squares, products, others, square_sums, product_sums, other_sums };
+            let blocks = count.div_ceil(SUMMED as u32);
+            rec.dispatch(&self.sum, bind, &PackPush { count }, [blocks, 1, 1])?;
+            (from, count) = (to, blocks);
+            if blocks == 1 {
+                break;
+            }
+        }
+        Ok(from)
+    }
+
+    /// Planes\[P\] -> others, or the same, which lie in `between` after every other level; `across` surfaces, or within alike
+    /// ones. One plane comes thrice.
+    fn record_smoothing<'a>(
+        &'a self,
+        rec: &mut Recorder,
+        planes: &Planes,
+        [from, to]: [[&'a Buffer<vec4>; 3]; 2],
+        across: bool,
+    ) -> Result<()> {
+        let rates = Rates::of_surfaces(&alike(&self.settings)).as_array();
+        // What the candidates made of the probes is not needed any more.
+        let between = [0, 1, 2].map(|k| &self.candidates[k].kept);
+        let smooth = &self.smooth[usize::from(across)];
+        (0..SMOOTHING).try_for_each(|level| {
+            let ([first, second, third], [first_smoothed, second_smoothed, third_smoothed]) = match level {
+                0 => (from, between),
+                level if level % 2 == 0 => (to, between),
+                _ => (between, to),
+            };
+            let (colour, place) = (&self.pack.colour, &self.pack.place);
+            let bind = auto_smooth::Bind {
+                colour,
+                place,
+                first,
+                second,
+                third,
+                first_smoothed,
+                second_smoothed,
+                third_smoothed,
+            };
+            let push = AutoSmoothPush { size: planes.size, spacing: 1 << level, rates, least: least(level, across) };
+            rec.dispatch(smooth, bind, &push, smooth.groups(planes.size))
+        })
+    }
+}
+
+impl Filter for Auto {
+    fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
+        self.pack.record(rec, planes)?;
+        self.estimate.record(rec, planes, &self.pack, &self.settings)?;
+        self.record_candidates(rec, planes)?;
+        self.record_smoothing(rec, planes, [[&self.leverages; 3], [&self.surroundings; 3]], false)?;
+        self.record_errors(rec, planes)?;
+        let [square_sum, product_sum, other_sum] = self.record_sums(rec, planes)?;
+        self.record_smoothing(rec, planes, [self.planes.each_ref(); 2], true)?;
+        let [squares, products, others] = &self.planes;
+        let [wide, mid, narrow, svgf] = self.candidates.each_ref().map(|c| &c.result);
+        let bind = auto::Bind {
+            squares,
+            products,
+            others,
+            square_sum,
+            product_sum,
+            other_sum,
+            colour: &self.pack.colour,
+            place: &self.pack.place,
+            wide,
+            mid,
+            narrow,
+            wide_dim: &self.wide_dim,
+            svgf,
+            filtered: &planes.output,
+        };
+        let count = planes.pixels();
+        rec.dispatch_threads(&self.blend, bind, &PackPush { count }, count)
+    }
+}

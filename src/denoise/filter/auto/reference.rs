@@ -1,0 +1,245 @@
+//! `auto` on the host: the twin of `glsl/auto*.comp`.
+use super::{SMOOTHING, alike, candidates, floor, least};
+use crate::denoise::filter::edge::{Rates, edge_weight};
+use crate::denoise::filter::noise_estimate::{self, ENOUGH, contrast, luminance};
+use crate::denoise::filter::pack::Packed;
+use crate::denoise::filter::{FilterInput, FilterSettings};
+use crate::layout::vec4;
+use crate::shaders::auto::{OVERALL, RIDGE, ROUNDS};
+use crate::shaders::auto_error::{LIMIT, MOST, OWN};
+use crate::shaders::shared::candidates::BRIGHT;
+use crate::twins::sampler::pcg;
+use glam::{DVec4, Vec3, Vec4, Vec4Swizzles};
+use std::array::from_fn;
+
+/// What is blended: none, windows (wide, middle, narrow), svgf.
+const BLENDED: usize = 5;
+
+/// Of what left-out pixels are missed by: mean squares, and mean products of two.
+type Errors = [[f32; BLENDED]; BLENDED];
+
+/// What the candidates make of an image, and how much each keeps of its pixels.
+struct Results {
+    wide: Vec<Vec4>,
+    middle: Vec<Vec4>,
+    narrow: Vec<Vec4>,
+    wide_dim: Vec<Vec4>,
+    svgf: Vec<Vec4>,
+    leverages: Vec<Vec4>,
+}
+
+impl Results {
+    fn new(input: &FilterInput, image: &[Packed], settings: &FilterSettings) -> Self {
+        let rows = candidates(settings);
+        let run = |k: usize, radiance: Vec<vec4>| -> Vec<Vec4> {
+            let (row, settings) = &rows[k];
+            let output = (row.reference)(&FilterInput { radiance, ..input.clone() }, settings);
+            output.into_iter().map(Vec4::from).collect()
+        };
+        let pixels = |colour: &dyn Fn(usize) -> Vec3| -> Vec<vec4> {
+            (0..image.len()).map(|i| colour(i).extend(image[i].count).into()).collect()
+        };
+        let [wide, middle, svgf] = [0, 1, 3].map(|k| run(k, input.radiance.clone()));
+        let dim = |i: usize| dimmed(image[i].colour, wide[i].xyz());
+        let [wide_dim, narrow] = [0, 2].map(|k| run(k, pixels(&dim)));
+        let added = |i: usize| probe(i, wide[i].xyz(), floor(settings));
+        let kept = [0, 1, 2].map(|k| run(k, pixels(&signs)));
+        let svgf_kept = run(3, pixels(&|i| image[i].colour + added(i)));
+        let leverage = |i: usize| {
+            let [a, b, c] = kept.each_ref().map(|kept| kept[i].xyz().dot(signs(i) / 3.0));
+            let grown = contrast(svgf_kept[i].xyz(), svgf[i].xyz()) / added(i);
+            Vec4::new(a, b, c, grown).clamp(Vec4::splat(-1.0), Vec4::ONE)
+        };
+        let leverages = (0..image.len()).map(leverage).collect();
+        Self { wide, middle, narrow, wide_dim, svgf, leverages }
+    }
+
+    /// Wide, middle and narrow windows, svgf; the wide one of what the narrow one gets.
+    fn at(&self, i: usize) -> ([Vec3; 4], Vec3) {
+        let filtered = [&self.wide, &self.middle, &self.narrow, &self.svgf].map(|plane| plane[i].xyz());
+        (filtered, self.wide_dim[i].xyz())
+    }
+
+    /// As they are blended.
+    fn blended(&self, i: usize) -> [Vec3; 4] {
+        let ([wide, middle, narrow, svgf], wide_dim) = self.at(i);
+        let as_light = |fitted: Vec3| fitted.max(wide.min(Vec3::ZERO));
+        [wide, as_light(middle), as_light(narrow + (wide - wide_dim)), svgf]
+    }
+
+    fn usable(&self, i: usize) -> [bool; 4] {
+        [&self.wide, &self.middle, &self.narrow, &self.svgf].map(|plane| plane[i].w > 0.0)
+    }
+}
+
+/// The twin.
+pub fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
+    let (image, floor) = (Packed::reference(input), floor(settings));
+    let noise = noise_estimate::reference(input, &image, settings);
+    let results = Results::new(input, &image, settings);
+    let rates = Rates::of_surfaces(&alike(settings));
+    let size = [input.width, input.height].map(i64::from);
+    let smoothed = |plane: Vec<Vec4>, across: bool| {
+        let level =
+            |plane: Vec<Vec4>, level: u32| smooth(&plane, &image, size, 1i64 << level, &rates, least(level, across));
+        (0..SMOOTHING).fold(plane, level)
+    };
+    let surroundings = smoothed(results.leverages.clone(), false);
+    let scaled = |a: Vec3, b: Vec3| (contrast(a, b) / floor).clamp(-LIMIT, LIMIT);
+    let missed = |i: usize| {
+        let (own, around) = (results.leverages[i], surroundings[i]);
+        let trust = OWN / image[i].count.max(1.0).sqrt();
+        let left = 1.0 - (around + trust * (own - around).max(Vec4::ZERO)).clamp(Vec4::ZERO, Vec4::splat(MOST));
+        let ([wide, middle, narrow, svgf], wide_dim) = results.at(i);
+        let (pixel, dim) = (image[i].colour, dimmed(image[i].colour, wide));
+        let whole = [(wide, pixel), (middle, pixel), (narrow, dim), (svgf, pixel)];
+        let mut missed = Vec4::from_array(whole.map(|(filtered, pixel)| scaled(filtered, pixel))) / left;
+        missed.z += scaled(wide - wide_dim, pixel - dim) / left.x;
+        missed
+    };
+    // Squares of the filters; their products; the rest of those, the square of none, and the light itself.
+    let errors = |i: usize| {
+        let m = missed(i);
+        let light = scaled(results.blended(i).iter().sum::<Vec3>() / 4.0, Vec3::ZERO).powi(2) + 1.0;
+        let weight = if image[i].count > 0.0 { light.powf(-0.55) } else { 0.0 };
+        let unfiltered = 2.0 * (noise[i].max(0.0).sqrt() / floor).min(LIMIT).powi(2);
+        let others = weight * Vec4::new(m.y * m.w, m.z * m.w, unfiltered, light);
+        [weight * m * m, weight * m.xxxy() * m.yzwz(), others]
+    };
+    let planes: [Vec<Vec4>; 3] = from_fn(|k| (0..image.len()).map(|i| errors(i)[k]).collect());
+    let sums: [Vec4; 3] = from_fn(|k| planes[k].iter().map(|e| e.as_dvec4()).sum::<DVec4>().as_vec4());
+    let planes = planes.map(|plane| smoothed(plane, true));
+    let expected = |i: usize| -> [Vec4; 3] {
+        let (light, lights) = (planes[2][i].w.max(1.0), sums[2].w.max(1.0));
+        let noisy = 0.5 * planes[2][i].z / light;
+        from_fn(|k| (planes[k][i] / light).lerp(sums[k] / lights, OVERALL * noisy / (1.0 + noisy)))
+    };
+    let blended = |i: usize| blend(&image[i], &matrix(expected(i)), results.usable(i), results.blended(i));
+    (0..image.len()).map(blended).collect()
+}
+
+/// As `glsl/shared/candidates.glsl`.
+fn dimmed(colour: Vec3, around: Vec3) -> Vec3 {
+    let (bright, most) = (luminance(colour), BRIGHT * luminance(around).max(0.0));
+    if bright > most { colour * (most / bright) } else { colour }
+}
+
+/// As `glsl/shared/perturbation.glsl`.
+fn signs(pixel: usize) -> Vec3 {
+    let bits = pcg(pixel as u32);
+    Vec3::from_array([31, 30, 29].map(|bit| 1.0 - 2.0 * (bits >> bit & 1) as f32))
+}
+
+fn probe(pixel: usize, around: Vec3, least: f32) -> f32 {
+    signs(pixel).x * 0.02 * (contrast(around, Vec3::ZERO).abs() + least)
+}
+
+/// An independent copy of the pixel misses it by both copies' noise, and has the pixel's in common with what a filter misses.
+fn matrix([squares, products, others]: [Vec4; 3]) -> Errors {
+    let noise = 0.5 * others.z;
+    [
+        [others.z, noise, noise, noise, noise],
+        [noise, squares.x, products.x, products.y, products.z],
+        [noise, products.x, squares.y, products.w, others.x],
+        [noise, products.y, products.w, squares.z, others.y],
+        [noise, products.z, others.x, others.y, squares.w],
+    ]
+}
+
+fn smooth(
+    estimates: &[Vec4],
+    image: &[Packed],
+    [width, height]: [i64; 2],
+    spacing: i64,
+    rates: &Rates,
+    least: f32,
+) -> Vec<Vec4> {
+    const B3: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
+    let pixel = |at: i64| {
+        let (mut sum, mut total) = (Vec4::ZERO, 0.0);
+        for (i, j) in (-2..=2i64).flat_map(|j| (-2..=2i64).map(move |i| (i, j))) {
+            let u = (at % width + i * spacing).clamp(0, width - 1);
+            let v = (at / width + j * spacing).clamp(0, height - 1);
+            let (p, q) = (&image[at as usize], &image[(v * width + u) as usize]);
+            let w = B3[i.unsigned_abs() as usize] * B3[j.unsigned_abs() as usize];
+            let w = if q.count > 0.0 { w * edge_weight(q, rates.exponent(p, q)).max(least) } else { 0.0 };
+            sum += w * estimates[(v * width + u) as usize];
+            total += w;
+        }
+        if total > 0.0 { sum / total } else { Vec4::ZERO }
+    };
+    (0..width * height).map(pixel).collect()
+}
+
+fn blend(p: &Packed, errors: &Errors, [wide, middle, narrow, svgf]: [bool; 4], filtered: [Vec3; 4]) -> vec4 {
+    let (known, enough) = (p.count > 0.0, p.count >= ENOUGH);
+    let usable = [enough, wide, middle, narrow, enough && svgf];
+    let adrift = wide && !known && p.normal == Vec3::ZERO;
+    let w = if adrift { [0.0, 1.0, 0.0, 0.0, 0.0] } else { least_square(errors, usable) };
+    let base = if known { p.colour } else { filtered[0] };
+    let off: Vec3 = w[1..].iter().zip(filtered).map(|(w, filtered)| w * (filtered - base)).sum();
+    let count = if known { p.count } else { 1.0 };
+    if usable.contains(&true) { (base + off).extend(count).into() } else { [0.0; 4] }
+}
+
+/// Weights of at least 0, together 1, whose blend has the least mean square; those that are not usable get none.
+fn least_square(errors: &Errors, usable: [bool; BLENDED]) -> [f32; BLENDED] {
+    let square = |k: &usize| errors[*k][*k];
+    let best = (0..BLENDED).filter(|k| usable[*k]).min_by(|a, b| square(a).total_cmp(&square(b))).unwrap_or(1);
+    let mut missed = *errors;
+    (0..BLENDED).for_each(|k| missed[k][k] *= 1.0 + RIDGE);
+    let mut w: [f32; BLENDED] = from_fn(|k| if k == best { 1.0 } else { 0.0 });
+    // Half of what the blend's mean square grows by with each weight.
+    let mut growth: [f32; BLENDED] = from_fn(|m| missed[m][best]);
+    for _ in 0..ROUNDS {
+        for (j, k) in (0..BLENDED).flat_map(|j| (j + 1..BLENDED).map(move |k| (j, k))) {
+            let bend = missed[j][j] + missed[k][k] - 2.0 * missed[j][k];
+            let gain = growth[k] - growth[j];
+            if bend > 0.0 && usable[j] && usable[k] {
+                let moved = (gain / bend).clamp(-w[j], w[k]);
+                w[j] += moved;
+                w[k] -= moved;
+                (0..BLENDED).for_each(|m| growth[m] += moved * (missed[m][j] - missed[m][k]));
+            }
+        }
+    }
+    w
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Errors, RIDGE, least_square};
+
+    #[test]
+    fn independent_errors_share_weight_by_their_inverses() {
+        // Noise 1: what misses a left-out pixel has it in its square and in every product; the image itself has error 1.
+        // Filters of error 1, 1/2, 1/4 and 1/8, on top of which comes the ridge.
+        let squares = [2.0, 2.0, 1.5, 1.25, 1.125];
+        let mut errors: Errors = [[1.0; 5]; 5];
+        (0..5).for_each(|k| errors[k][k] = squares[k]);
+        let inverse = squares.map(|square| 1.0 / (square - 1.0 + RIDGE * square));
+        let (found, all) = (least_square(&errors, [true; 5]), inverse.iter().sum::<f32>());
+        assert!(found.iter().zip(inverse).all(|(w, inverse)| (w - inverse / all).abs() < 2e-3), "{found:?}");
+        assert!((found.iter().sum::<f32>() - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn what_only_adds_error_gets_next_to_none() {
+        // The second misses by what the first does and something of its own; none of the others can be used.
+        let two = |squares: [f32; 2], product: f32| {
+            let mut errors: Errors = [[0.0; 5]; 5];
+            (errors[1][1], errors[2][2]) = (squares[0], squares[1]);
+            (errors[1][2], errors[2][1]) = (product, product);
+            least_square(&errors, [false, true, true, false, false])
+        };
+        let found = two([1.5, 2.5], 1.5);
+        // The ridge of .01 * 1.5 over what the squares differ by, 1.04 with ridges.
+        let off = [0.0, 1.0 - 0.015 / 1.04, 0.015 / 1.04, 0.0, 0.0];
+        assert!(found.iter().zip(off).all(|(w, right)| (w - right).abs() < 1e-5), "{found:?}");
+        // Weights are not below 0: the second alone would be subtracted from.
+        assert_eq!(two([1.5, 2.5], 2.0), [0.0, 1.0, 0.0, 0.0, 0.0]);
+        // The same twice: the ridge makes them alike.
+        let twice = two([2.0, 2.0], 2.0);
+        assert!(twice.iter().zip([0.0, 0.5, 0.5, 0.0, 0.0]).all(|(w, right)| (w - right).abs() < 1e-5), "{twice:?}");
+    }
+}

@@ -1,0 +1,68 @@
+//! How alike two pixels are. Twin of `glsl/shared/edge.glsl`.
+use super::pack::Packed;
+use super::{AtrousForm, FilterSettings};
+use crate::layout::vec3;
+use crate::shaders::shared::edge::{Constants, LEAST};
+use glam::Vec3;
+use std::f32::consts::LOG2_E;
+
+/// Exponents of the edge-stopping weights, in base 2, per squared (or plain) difference; 0 switches a weight off.
+#[derive(Clone, Copy, Debug)]
+pub struct Rates {
+    rt: f32,
+    n: f32,
+    x: f32,
+    squared: bool,
+}
+
+/// Of exp(-difference / sigma^2); 0 where that is 1 for every difference.
+pub fn rate(sigma: f32) -> f32 {
+    match f64::from(LOG2_E) / f64::from(sigma).powi(2) {
+        rate if rate < f64::from(f32::MIN_POSITIVE) => 0.0,
+        rate => rate.min(f64::from(f32::MAX)) as f32,
+    }
+}
+
+impl Rates {
+    /// The settings' sigmas as they are.
+    pub fn new(s: &FilterSettings) -> Self {
+        Self { rt: rate(s.sigma_rt * s.intensity), n: rate(s.sigma_n), x: rate(s.sigma_x * s.extent), squared: true }
+    }
+
+    /// On a level of EAW: the sigma of radiance halves, and the listing's of normals doubles.
+    pub fn at_level(s: &FilterSettings, level: u32) -> Self {
+        let spacing = (1 << level) as f32;
+        let per_distance = if s.form == AtrousForm::Listing { spacing } else { 1.0 };
+        let sigma_rt = if level < s.rt_from_level { f32::INFINITY } else { s.sigma_rt / spacing };
+        let scaled = FilterSettings { sigma_rt, sigma_n: s.sigma_n * per_distance, ..*s };
+        Self { squared: s.form != AtrousForm::Printed, ..Self::new(&scaled) }
+    }
+
+    /// Without the weight of radiance.
+    pub fn of_surfaces(s: &FilterSettings) -> Self {
+        Self { rt: 0.0, ..Self::new(s) }
+    }
+
+    /// Constants that leave out the weights that are off.
+    pub fn constants(&self) -> Constants {
+        Constants { weight_rt: self.rt > 0.0, weight_n: self.n > 0.0, weight_x: self.x > 0.0, squared: self.squared }
+    }
+
+    /// As push constants have them.
+    pub fn as_array(&self) -> vec3 {
+        [self.rt, self.n, self.x]
+    }
+
+    /// In base 2. An unknown `p` has no radiance to compare.
+    pub fn exponent(&self, p: &Packed, q: &Packed) -> f32 {
+        let difference = |d: Vec3| if self.squared { d.length_squared() } else { d.length() };
+        let term = |rate: f32, d: Vec3| if rate > 0.0 { rate * difference(d) } else { 0.0 };
+        let rt = if p.count > 0.0 { term(self.rt, q.colour - p.colour) } else { 0.0 };
+        -rt - term(self.n, q.normal - p.normal) - term(self.x, q.position - p.position)
+    }
+}
+
+/// The weight of a neighbour; 0 where it is unknown.
+pub fn edge_weight(q: &Packed, exponent: f32) -> f32 {
+    if q.count > 0.0 && exponent > LEAST { exponent.exp2() } else { 0.0 }
+}

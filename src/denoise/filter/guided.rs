@@ -1,0 +1,318 @@
+//! Guided image filter (He, Sun, Tang, ECCV 2010) on normals and depth, as Bauszat, Eisemann and Magnor (EGSR 2011) use
+//! it. Kernels: `glsl/guided_*.comp`. Its time hardly depends on the radius.
+use super::guided_table::GuidedTable;
+use super::pixel::{known_channel, known_radiance};
+use super::{Filter, FilterInput, FilterSettings, GuidedSums, Planes, Row};
+use crate::error::Result;
+use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
+use crate::layout::{Guide, GuidedPackPush, GuidedPush, vec4};
+use crate::shaders::{guided_columns, guided_mean_columns, guided_mean_rows, guided_pack, guided_rows, shared};
+use glam::{DVec3, DVec4};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// See [`super::FILTERS`].
+pub const ROW: Row = Row {
+    name: "guided",
+    about: "guided image filter: light as a local linear function of normal and depth",
+    make: |gpu, settings, size| {
+        Ok(match settings.sums {
+            GuidedSums::Blocks => Box::new(Guided::new(gpu, settings, size)?),
+            GuidedSums::Table => Box::new(GuidedTable::new(gpu, settings, size)?),
+        })
+    },
+    reference,
+};
+
+/// Columns of a plane that lie beside each other, and rows of a strip, as in `glsl/shared/tiled_index.glsl`.
+const BESIDE: u32 = 8;
+/// `vec4`s of a pixel's record in a strip.
+const RECORD: u64 = 8;
+
+/// What the kernels read of an image.
+pub struct Packed {
+    kernel: Kernel<guided_pack::Bind<'static>>,
+    /// Radiance and the samples behind it, all zero where nothing is known.
+    pub colour: Buffer<vec4>,
+    /// The guide.
+    pub channels: Buffer<vec4>,
+}
+
+impl Packed {
+    /// For images of (width, height).
+    pub fn new(gpu: &Gpu, settings: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
+        let pixels = width.next_multiple_of(BESIDE) as usize * height as usize;
+        Ok(Self {
+            kernel: Kernel::new(gpu, &guided_pack::Constants { channels: settings.channels })?,
+            colour: Buffer::new(gpu, "colour", pixels, Location::Device)?,
+            channels: Buffer::new(gpu, "channels", pixels, Location::Device)?,
+        })
+    }
+
+    /// radiance\[P\], guide\[P\] -> colour\[P\], channels\[P\]
+    pub fn record(&self, rec: &mut Recorder, planes: &Planes, settings: &FilterSettings) -> Result<()> {
+        let (radiance, guide) = (&planes.radiance, &planes.guide);
+        let bind = guided_pack::Bind { radiance, guide, colour: &self.colour, channels: &self.channels };
+        let push = GuidedPackPush { size: planes.size, depth_scale: 1.0 / settings.extent };
+        rec.dispatch(&self.kernel, bind, &push, self.kernel.groups(planes.size))
+    }
+}
+
+struct Guided {
+    pack: Packed,
+    columns: Kernel<guided_columns::Bind<'static>>,
+    rows: Kernel<guided_rows::Bind<'static>>,
+    mean_columns: Kernel<guided_mean_columns::Bind<'static>>,
+    mean_rows: Kernel<guided_mean_rows::Bind<'static>>,
+    /// Slopes of the three colours, then the value at the window's centre with the number of its windows.
+    model: [Buffer<vec4>; 4],
+    /// A strip's sums over columns.
+    strip: Buffer<vec4>,
+    down: Walk,
+    along: Walk,
+    strip_rows: u32,
+    settings: FilterSettings,
+}
+
+/// How windows along a line are summed, by `glsl/shared/windows.glsl`.
+#[derive(Clone, Copy)]
+struct Walk {
+    /// Elements of a window.
+    window: u32,
+    /// Windows that a thread takes in turn.
+    segment: u32,
+    /// Lines of a workgroup.
+    lines: u32,
+}
+
+impl Walk {
+    fn new(gpu: &Gpu, radius: u32, edge: u32) -> Self {
+        let window = 2 * radius.min(edge - 1) + 1;
+        let tuning = gpu.tuning();
+        Self { window, segment: if tuning.whole_lines { edge } else { window }, lines: tuning.lines }
+    }
+
+    /// Windows that are taken at a time, each of which costs registers. Wide windows are worth more, lest their groups
+    /// become many.
+    fn tile(self) -> u32 {
+        let most = if self.window > 64 { 16 } else { 8 };
+        // Elements and groups, per window, that are added besides those of the tile itself.
+        let besides = |tile: u32| {
+            let whole = ((self.window - 1) / tile).max(1);
+            f64::from(self.window - whole * (tile - 1)) / f64::from(tile)
+        };
+        let tiles = (most / 2 + 1).min(self.window)..=most.min(self.window);
+        tiles.min_by(|a, b| besides(*a).total_cmp(&besides(*b))).unwrap_or(1)
+    }
+
+    fn constants(self) -> shared::windows::Constants {
+        let [window, tile, segment] = [self.window, self.tile(), self.segment].map(|n| n as i32);
+        shared::windows::Constants { window, tile, segment }
+    }
+
+    /// Workgroups for `windows` of each of `lines`.
+    fn groups(self, lines: u32, windows: u32) -> [u32; 3] {
+        [lines.div_ceil(self.lines), windows.div_ceil(self.segment), 1]
+    }
+}
+
+impl Guided {
+    fn new(gpu: &Gpu, settings: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
+        let [down, along] = [height, width].map(|edge| Walk::new(gpu, settings.radius, edge));
+        let pack = Packed::new(gpu, settings, [width, height])?;
+        let strip_rows =
+            strip_rows(gpu.tuning().strip_bytes, gpu.info().max_storage_range, down.window, [width, height]);
+        let plane = |name| Buffer::new(gpu, name, pack.colour.len(), Location::Device);
+        let records = u64::from(strip_rows.next_multiple_of(BESIDE)) * u64::from(width) * RECORD;
+        let (local_size_x, windows) = (down.lines, down.constants());
+        let columns = Kernel::new(gpu, &guided_columns::Constants { windows, local_size_x })?;
+        let mean_columns = Kernel::new(gpu, &guided_mean_columns::Constants { windows, local_size_x })?;
+        let (local_size_x, windows) = (along.lines, along.constants());
+        let rows = Kernel::new(gpu, &guided_rows::Constants { windows, local_size_x })?;
+        let mean_rows = Kernel::new(gpu, &guided_mean_rows::Constants { windows, local_size_x })?;
+        Ok(Self {
+            columns,
+            rows,
+            mean_columns,
+            mean_rows,
+            model: [plane("slope_r")?, plane("slope_g")?, plane("slope_b")?, plane("value")?],
+            strip: Buffer::new(gpu, "columns", records as usize, Location::Device)?,
+            down,
+            along,
+            strip_rows,
+            settings: *settings,
+            pack,
+        })
+    }
+
+    /// Columns, then rows of every strip: (push, workgroups of the two).
+    fn strips(&self, size: [u32; 2]) -> impl Iterator<Item = (GuidedPush, [[u32; 3]; 2])> {
+        let ([width, height], settings, strip) = (size, self.settings, self.strip_rows);
+        (0..height).step_by(strip as usize).map(move |first_row| {
+            let rows = strip.min(height - first_row);
+            let push = GuidedPush { size, first_row, rows, radius: settings.radius, eps: settings.eps };
+            (push, [self.down.groups(width, rows), self.along.groups(rows, width)])
+        })
+    }
+
+    fn record_models(&self, rec: &mut Recorder, size: [u32; 2]) -> Result<()> {
+        let [slope_r, slope_g, slope_b, value] = &self.model;
+        let (colour, channels, columns) = (&self.pack.colour, &self.pack.channels, &self.strip);
+        for (push, [down, along]) in self.strips(size) {
+            rec.dispatch(&self.columns, guided_columns::Bind { colour, channels, sums: columns }, &push, down)?;
+            let bind = guided_rows::Bind { columns, channels, slope_r, slope_g, slope_b, value };
+            rec.dispatch(&self.rows, bind, &push, along)?;
+        }
+        Ok(())
+    }
+
+    fn record_means(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
+        let [slope_r, slope_g, slope_b, value] = &self.model;
+        let (colour, channels, columns) = (&self.pack.colour, &self.pack.channels, &self.strip);
+        for (push, [down, along]) in self.strips(planes.size) {
+            let bind = guided_mean_columns::Bind { slope_r, slope_g, slope_b, value, channels, sums: columns };
+            rec.dispatch(&self.mean_columns, bind, &push, down)?;
+            let bind = guided_mean_rows::Bind { columns, channels, colour, filtered: &planes.output };
+            rec.dispatch(&self.mean_rows, bind, &push, along)?;
+        }
+        Ok(())
+    }
+}
+
+/// At least a few windows where memory allows it, since the first rows of a strip are summed anew. `limit`: bytes of one
+/// storage binding; a strip's last rows take the room of [`BESIDE`].
+fn strip_rows(target: u64, limit: u64, window: u32, [width, height]: [u32; 2]) -> u32 {
+    let (row, beside) = (RECORD * 16 * u64::from(width), u64::from(BESIDE));
+    let wanted = (target / row).max(4 * u64::from(window));
+    wanted.min((limit / row / beside).max(1) * beside).min(u64::from(height)) as u32
+}
+
+impl Filter for Guided {
+    fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
+        self.pack.record(rec, planes, &self.settings)?;
+        self.record_models(rec, planes.size)?;
+        self.record_means(rec, planes)
+    }
+}
+
+/// A pixel in double precision.
+struct Pixel {
+    colour: Option<DVec3>,
+    guide: DVec4,
+}
+
+/// A window's model, with the value at the window's centre.
+#[derive(Clone, Copy)]
+struct Model {
+    slopes: [DVec4; 3],
+    mean: DVec3,
+    mean_guide: DVec4,
+}
+
+/// Window by window, in double precision: the definition.
+fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
+    let pixel = |(c, g): (&vec4, &Guide)| Pixel {
+        colour: known_radiance(*c).map(|c| c.as_dvec3()),
+        guide: channels(g, settings),
+    };
+    let pixels: Vec<Pixel> = input.radiance.iter().zip(&input.guide).map(pixel).collect();
+    let size = [input.width, input.height];
+    let models: Vec<Option<Model>> = (0..pixels.len())
+        .into_par_iter()
+        .map(|at| model(&pixels, window(size, at, settings.radius), settings))
+        .collect();
+    let mean = |at: usize| {
+        let values = window(size, at, settings.radius).filter_map(|k| models[k]).map(|m| {
+            let off = pixels[at].guide - m.mean_guide;
+            m.mean + DVec3::from(m.slopes.map(|slope| slope.dot(off)))
+        });
+        let (count, sum) = values.fold((0.0, DVec3::ZERO), |(n, sum), v| (n + 1.0, sum + v));
+        let own = pixels[at].colour.map(|c| c.as_vec3().extend(input.radiance[at][3]));
+        let value = (sum / count).as_vec3();
+        // A model that no float can hold, or no known pixel in reach: the pixel stays as it is.
+        match value.is_finite() {
+            true => value.extend(own.map_or(1.0, |own| own.w)).into(),
+            false => own.unwrap_or_default().into(),
+        }
+    };
+    (0..pixels.len()).into_par_iter().map(mean).collect()
+}
+
+fn channels(g: &Guide, settings: &FilterSettings) -> DVec4 {
+    let n = glam::Vec3::from(g.normal.map(known_channel)) * 0.5;
+    let depth = known_channel(g.depth * (1.0 / settings.extent));
+    match settings.channels {
+        1 => glam::vec4((n.x + n.y + n.z) / 3.0, 0.0, 0.0, 0.0),
+        3 => n.extend(0.0),
+        _ => n.extend(depth),
+    }
+    .as_dvec4()
+}
+
+/// Indices of the pixels of a window, clipped to the image.
+fn window([width, height]: [u32; 2], at: usize, radius: u32) -> impl Iterator<Item = usize> {
+    let (x, y) = (at as u32 % width, at as u32 / width);
+    let around = move |v: u32, edge: u32| -> Range<u32> { v.saturating_sub(radius)..(v + radius + 1).min(edge) };
+    around(y, height).flat_map(move |v| around(x, width).map(move |u| (v * width + u) as usize))
+}
+
+fn model(pixels: &[Pixel], window: impl Iterator<Item = usize>, settings: &FilterSettings) -> Option<Model> {
+    let known: Vec<(DVec3, DVec4)> =
+        window.filter_map(|k| pixels[k].colour.map(|colour| (colour, pixels[k].guide))).collect();
+    let share = 1.0 / known.len().max(1) as f64;
+    let mean = known.iter().map(|(c, _)| c * share).sum::<DVec3>();
+    let mean_guide = known.iter().map(|(_, g)| g * share).sum::<DVec4>();
+    let (mut guide, mut colour) = ([[0.0; 4]; 4], [DVec4::ZERO; 3]);
+    for (c, g) in &known {
+        let (off, c) = (*g - mean_guide, *c - mean);
+        for i in 0..4 {
+            (0..4).for_each(|j| guide[i][j] += off[i] * off[j] * share);
+        }
+        (0..3).for_each(|i| colour[i] += off * c[i] * share);
+    }
+    (0..4).for_each(|i| guide[i][i] += f64::from(settings.eps[i]));
+    (!known.is_empty()).then(|| Model { slopes: colour.map(|rhs| solve(guide, rhs)), mean, mean_guide })
+}
+
+/// Gaussian elimination without exchanges, for symmetric matrices that are not negative; a channel that the others
+/// explain takes no part.
+fn solve(mut a: [[f64; 4]; 4], mut rhs: DVec4) -> DVec4 {
+    let diagonal = [0, 1, 2, 3].map(|i| a[i][i]);
+    let usable = |i: usize, pivot: f64| pivot > 1e-5 * diagonal[i] && pivot > 1e-20;
+    for i in 0..4 {
+        for j in i + 1..4 {
+            let factor = if usable(i, a[i][i]) { a[j][i] / a[i][i] } else { 0.0 };
+            (i..4).for_each(|k| a[j][k] -= factor * a[i][k]);
+            rhs[j] -= factor * rhs[i];
+        }
+    }
+    let mut x = DVec4::ZERO;
+    for i in (0..4).rev() {
+        let rest: f64 = (i + 1..4).map(|k| a[i][k] * x[k]).sum();
+        x[i] = if usable(i, a[i][i]) { (rhs[i] - rest) / a[i][i] } else { 0.0 };
+    }
+    x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strips_fit_a_storage_binding() {
+        let limit = 1 << 27; // lavapipe's
+        for size in [[1200, 1200], [3840, 2160], [1, 1], [31, 70_001], [100_000, 9]] {
+            for window in [1, 49, 601, 1181] {
+                let rows = strip_rows(32 << 20, limit, window, size);
+                let records = u64::from(rows.next_multiple_of(BESIDE)) * u64::from(size[0]);
+                assert!(
+                    rows > 0 && rows <= size[1] && records * RECORD * 16 <= limit,
+                    "{size:?} {window}: {rows} rows"
+                );
+            }
+        }
+        // 128 bytes a pixel: 213 rows of 32 MiB, 4 windows, or what the binding holds of rows, in eights.
+        let rows = [1, 60, 300].map(|window| strip_rows(32 << 20, limit, window, [1228, 1200]));
+        assert_eq!(rows, [213, 240, 848]);
+    }
+}

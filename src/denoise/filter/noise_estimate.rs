@@ -1,0 +1,92 @@
+//! What is known of each pixel's noise. Kernel: `glsl/filter/noise_estimate.comp`. Twin: [`reference`].
+use super::edge::{Rates, edge_weight};
+use super::pack::{Pack, Packed};
+use super::{FilterInput, FilterSettings, Planes};
+use crate::error::Result;
+use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
+use crate::layout::{SvgfPush, vec3, vec4};
+pub use crate::shaders::noise_estimate::ENOUGH;
+use crate::shaders::noise_estimate::{self, Bind, Constants};
+use crate::shaders::shared::luminance::STRONGEST;
+use glam::Vec3;
+
+/// Pixels from the centre to the border of the window over which the others' variance is taken.
+const REACH: i64 = noise_estimate::REACH as i64;
+
+/// The kernel, with and without a variance to read, and its plane.
+pub struct Estimate {
+    kernels: [Kernel<Bind<'static>>; 2],
+    nothing: Buffer<vec3>,
+    /// Radiance, and the variance of its luminance; -1 where nothing is known.
+    pub plane: Buffer<vec4>,
+}
+
+impl Estimate {
+    /// For images of (width, height).
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when it does not fit.
+    pub fn new(gpu: &Gpu, settings: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
+        let kernel =
+            |measured| Kernel::new(gpu, &Constants { edge: Rates::of_surfaces(settings).constants(), measured });
+        Ok(Self {
+            kernels: [kernel(false)?, kernel(true)?],
+            nothing: Buffer::from_slice(gpu, "no variance", &[])?,
+            plane: Buffer::new(gpu, "estimate", width as usize * height as usize, Location::Device)?,
+        })
+    }
+
+    /// colour\[P\], place\[P\], variance\[P\] -> plane\[P\]
+    pub fn record(&self, rec: &mut Recorder, planes: &Planes, pack: &Pack, settings: &FilterSettings) -> Result<()> {
+        let rates = Rates::of_surfaces(settings).as_array();
+        let push = SvgfPush { size: planes.size, spacing: 1, rate_l: 0.0, rates };
+        let variance = planes.variance.as_ref().unwrap_or(&self.nothing);
+        let bind = Bind { colour: &pack.colour, place: &pack.place, variance, estimate: &self.plane };
+        let kernel = &self.kernels[usize::from(planes.variance.is_some())];
+        rec.dispatch(kernel, bind, &push, kernel.groups(planes.size))
+    }
+}
+
+/// Rec. 709.
+pub fn luminance(c: Vec3) -> f32 {
+    c.dot(Vec3::new(0.2126, 0.7152, 0.0722))
+}
+
+/// Difference of luminance.
+pub fn contrast(a: Vec3, b: Vec3) -> f32 {
+    (luminance(a) - luminance(b)).clamp(-STRONGEST, STRONGEST)
+}
+
+/// The variance of every pixel's luminance; -1 where nothing is known.
+pub fn reference(input: &FilterInput, image: &[Packed], settings: &FilterSettings) -> Vec<f32> {
+    let rates = Rates::of_surfaces(settings);
+    let variance = |at: usize| {
+        let measured = input.variance.as_ref().map(|v| Vec3::from(v[at]));
+        match measured.filter(|v| v.is_finite() && v.min_element() >= 0.0) {
+            _ if image[at].count == 0.0 => -1.0,
+            Some(v) if image[at].count >= ENOUGH => luminance(v.map(f32::sqrt)).powi(2),
+            _ => spread(input, image, at, &rates),
+        }
+    };
+    (0..image.len()).map(variance).collect()
+}
+
+fn spread(input: &FilterInput, image: &[Packed], at: usize, rates: &Rates) -> f32 {
+    let (width, height) = (i64::from(input.width), i64::from(input.height));
+    let (x, y) = (at as i64 % width, at as i64 / width);
+    let (mut total, mut squares, mut mean, mut m2) = (0.0, 0.0, 0.0, 0.0);
+    for v in (y - REACH).max(0)..=(y + REACH).min(height - 1) {
+        for u in (x - REACH).max(0)..=(x + REACH).min(width - 1) {
+            let q = image[(v * width + u) as usize];
+            let w = edge_weight(&q, rates.exponent(&image[at], &q));
+            let off = contrast(q.colour, image[at].colour);
+            total += w;
+            squares += w * w;
+            mean += w * off;
+            m2 += w * off * off;
+        }
+    }
+    mean /= total;
+    let others = 1.0 - squares / (total * total);
+    if others > 1e-3 { (m2 / total - mean * mean) / others } else { 0.0 }
+}

@@ -1,0 +1,117 @@
+//! Push constants of the filters' kernels.
+use super::{float, uint, uvec2, vec3, vec4};
+use bytemuck::{Pod, Zeroable};
+
+gpu_structs! {
+    /// Push constants of `demodulate.comp` and `remodulate.comp`.
+    struct SplitPush {
+        /// Film in pixels.
+        size: uvec2,
+    }
+
+    /// Push constants of `pack.comp`.
+    struct PackPush {
+        /// Pixels.
+        count: uint,
+    }
+
+    /// Push constants of `atrous.comp`: one level.
+    struct AtrousPush {
+        /// Image in pixels.
+        size: uvec2,
+        /// Pixels from one tap to the next.
+        spacing: uint,
+        /// Exponents of the weights of radiance, normal and position, in base 2, per squared (or plain) difference.
+        rates: vec3,
+    }
+
+    /// Push constants of `guided_pack.comp`.
+    struct GuidedPackPush {
+        /// Image in pixels.
+        size: uvec2,
+        /// 1 / extent.
+        depth_scale: float,
+    }
+
+    /// Push constants of the passes of the guided filter, over a strip of rows.
+    struct GuidedPush {
+        /// Image in pixels.
+        size: uvec2,
+        /// First row of the strip.
+        first_row: uint,
+        /// Rows of the strip.
+        rows: uint,
+        /// Pixels from a window's centre to its border; only the tables' kernels read it.
+        radius: uint,
+        /// Added to the variance of each channel of the guide.
+        eps: vec4,
+    }
+
+    /// Push constants of `bilateral.comp`.
+    struct BilateralPush {
+        /// Image in pixels.
+        size: uvec2,
+        /// Pixels from the centre to the border of the window.
+        radius: uint,
+        /// As in [`AtrousPush`], per squared pixel.
+        rate_space: float,
+        /// As in [`AtrousPush`].
+        rates: vec3,
+        /// Which band of the window's rows, from its top.
+        band: uint,
+        /// Rows of a band.
+        band_rows: uint,
+    }
+
+    /// Push constants of `noise_estimate.comp` and `svgf.comp`.
+    struct SvgfPush {
+        /// Image in pixels.
+        size: uvec2,
+        /// Pixels from one tap to the next.
+        spacing: uint,
+        /// Exponent, in base 2, per standard deviation of luminance.
+        rate_l: float,
+        /// As in [`AtrousPush`]; that of radiance is 0.
+        rates: vec3,
+    }
+
+    /// Push constants of `wavelet.comp`.
+    struct WaveletPush {
+        /// Image in pixels.
+        size: uvec2,
+        /// Pixels between neighbours on the lattice of this level.
+        spacing: uint,
+        /// 0 = along rows, 1 = along columns, 2 = four neighbours side by side, 3 = four neighbours diagonally.
+        stencil: uint,
+        /// As in [`AtrousPush`].
+        rates: vec3,
+    }
+
+    /// Push constants of `firefly.comp`.
+    struct FireflyPush {
+        /// Image in pixels.
+        size: uvec2,
+        /// How much brighter than its surroundings a pixel may be.
+        factor: float,
+    }
+
+    /// Push constants of `auto_inputs.comp`, `auto_leverage.comp` and `auto_error.comp`.
+    struct AutoPush {
+        /// Pixels.
+        count: uint,
+        /// Luminance below which errors count as absolute.
+        floor: float,
+    }
+
+    /// Push constants of `auto_smooth.comp`.
+    struct AutoSmoothPush {
+        /// Image in pixels.
+        size: uvec2,
+        /// Pixels from one tap to the next.
+        spacing: uint,
+        /// As in [`AtrousPush`]; that of radiance is 0.
+        rates: vec3,
+        /// Weight of a pixel that is known but not alike.
+        least: float,
+    }
+}

@@ -1,0 +1,230 @@
+//! The buffers of a render: the scene's, the film's, and what is in flight. `P` pixels, `B` paths in flight.
+use crate::error::Result;
+use crate::gpu::{Buffer, DeviceInfo, Gpu, Location, PART, thread_items};
+use crate::layout::*;
+use crate::render::pass::apportion::Counts;
+use crate::render::schedule::Batch;
+use crate::scene::Scene;
+use std::borrow::Cow;
+use std::ops::Range;
+
+/// The scene on the device. Absent parts are buffers of one element that no kernel reads.
+pub struct DeviceScene {
+    /// See [`Scene::nodes`]; likewise the others.
+    pub nodes: Buffer<BvhNode>,
+    /// See [`Scene`].
+    pub triangles: Buffer<Triangle>,
+    /// See [`Scene`].
+    pub shading: Buffer<Shading>,
+    /// See [`Scene`].
+    pub instances: Buffer<Instance>,
+    /// See [`Scene`].
+    pub materials: Buffer<Material>,
+    /// See [`Scene`].
+    pub textures: Buffer<Texture>,
+    /// See [`Scene`].
+    pub texels: Buffer<u32>,
+    /// See [`Scene`].
+    pub lights: Buffer<Light>,
+    /// See [`Scene`].
+    pub light_table: Buffer<AliasEntry>,
+    /// See [`crate::scene::Environment`].
+    pub environment: Buffer<vec4>,
+    /// See [`crate::scene::Environment`].
+    pub environment_table: Buffer<AliasEntry>,
+}
+
+impl DeviceScene {
+    /// Copies `scene` to the device, for kernels with these effects.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when it does not fit.
+    pub fn new(gpu: &Gpu, scene: &Scene, effects: &Effects) -> Result<Self> {
+        let environment = scene.environment.as_ref();
+        Ok(Self {
+            nodes: Buffer::from_texels(gpu, "nodes", &scene.nodes)?,
+            triangles: Buffer::from_texels(gpu, "triangles", &scene.triangles)?,
+            shading: Buffer::from_texels(gpu, "shading", &shading(scene, effects))?,
+            instances: Buffer::from_texels(gpu, "instances", &scene.instances)?,
+            materials: Buffer::from_texels(gpu, "materials", &scene.materials)?,
+            textures: Buffer::from_texels(gpu, "textures", &scene.textures)?,
+            texels: Buffer::from_texels(gpu, "texels of textures", &scene.texels)?,
+            lights: Buffer::from_texels(gpu, "lights", &scene.lights)?,
+            light_table: Buffer::from_texels(gpu, "light_table", &scene.light_table)?,
+            environment: Buffer::from_texels(gpu, "environment", environment.map_or(&[], |e| &e.texels[..]))?,
+            environment_table: Buffer::from_texels(
+                gpu,
+                "environment_table",
+                environment.map_or(&[], |e| &e.table[..]),
+            )?,
+        })
+    }
+
+    /// What the kernels bind.
+    pub fn bind(&self) -> crate::shaders::shared::scene::Bind<'_> {
+        crate::shaders::shared::scene::Bind {
+            nodes: &self.nodes,
+            triangles: &self.triangles,
+            shading: &self.shading,
+            instances: &self.instances,
+            materials: &self.materials,
+            textures: &self.textures,
+            texels: &self.texels,
+            lights: &self.lights,
+            light_table: &self.light_table,
+            environment: &self.environment,
+            environment_table: &self.environment_table,
+        }
+    }
+
+    /// Bytes of each part, largest first.
+    pub fn sizes(&self) -> Vec<(&'static str, u64)> {
+        let mut sizes = vec![
+            ("nodes", self.nodes.raw().size),
+            ("triangles", self.triangles.raw().size),
+            ("shading", self.shading.raw().size),
+            ("instances", self.instances.raw().size),
+            ("materials", self.materials.raw().size),
+            ("textures", self.textures.raw().size),
+            ("texels", self.texels.raw().size),
+            ("lights", self.lights.raw().size + self.light_table.raw().size),
+            ("environment", self.environment.raw().size + self.environment_table.raw().size),
+        ];
+        sizes.sort_by_key(|s| std::cmp::Reverse(s.1));
+        sizes
+    }
+}
+
+/// The scene's own records, or flat ones where kernels read what the scene does not have (`--effects all`).
+fn shading<'a>(scene: &'a Scene, effects: &Effects) -> Cow<'a, [Shading]> {
+    let maps = effects.textures || effects.bump_maps || effects.normal_maps || effects.alpha_masks;
+    let read = effects.smooth_normals || maps;
+    if read && scene.shading.is_empty() {
+        return vec![Shading { normal: [u32::MAX; 3], ..Shading::default() }; scene.triangles.len()].into();
+    }
+    Cow::Borrowed(&scene.shading)
+}
+
+/// Bytes of the largest record of a pixel.
+const WIDEST: u64 = size_of::<Guide>() as u64;
+const _: () = assert!(size_of::<PixelStats>() as u64 <= WIDEST && size_of::<PixelLight>() as u64 <= WIDEST);
+
+/// Pixels of the largest tile, whose records fit one buffer and one view of texels, and of a window.
+fn extents(info: &DeviceInfo) -> [u32; 2] {
+    let texels = info.max_texel_elements.saturating_mul(16);
+    whole_windows(info.max_allocation.min(info.max_buffer_size).min(texels), info.max_storage_range)
+}
+
+/// The same for bytes of a tile and of a storage binding.
+fn whole_windows(tile: u64, binding: u64) -> [u32; 2] {
+    let pixels = |bytes: u64| ((bytes / WIDEST / PART as u64).clamp(1, 1 << 22) * PART as u64) as u32;
+    let window = pixels(binding.min(tile));
+    [pixels(tile) / window * window, window]
+}
+
+/// A run of the film's pixels, row-major, that fits the device's buffers.
+pub struct FilmTile {
+    /// Index of its first pixel in the film.
+    pub first_pixel: u32,
+    /// Its pixels.
+    pub pixels: u32,
+    /// Pixels whose records fit one storage binding, a multiple of [`PART`]: batches never cross its multiples.
+    pub window: u32,
+    /// Per pixel.
+    pub stats: Buffer<PixelStats>,
+    /// Per pixel, where direct and indirect light are wanted apart.
+    pub light: Buffer<PixelLight>,
+    /// Per pixel, where guides are wanted.
+    pub guide: Buffer<Guide>,
+}
+
+impl FilmTile {
+    /// The tile's pixels, cut into runs whose records fit one storage binding.
+    pub fn windows(&self) -> impl Iterator<Item = Range<u32>> + use<> {
+        let (pixels, window) = (self.pixels, self.window);
+        (0..pixels).step_by(window as usize).map(move |first| first..pixels.min(first + window))
+    }
+
+    fn new(gpu: &Gpu, range: Range<u32>, window: u32, effects: &Effects, guides: bool) -> Result<Self> {
+        let pixels = range.end - range.start;
+        let room = |on: bool| if on { pixels as usize } else { 1 };
+        Ok(Self {
+            first_pixel: range.start,
+            pixels,
+            window,
+            stats: Buffer::new(gpu, "stats", pixels as usize, Location::Device)?,
+            light: Buffer::new(gpu, "light", room(effects.split_light), Location::Device)?,
+            guide: Buffer::new(gpu, "guide", room(guides), Location::Device)?,
+        })
+    }
+}
+
+/// What a frame writes. Buffers that the outputs do not call for hold one element.
+pub struct FilmBuffers {
+    /// vec4 per sample in flight, three with direct and indirect light apart; w of the first is the number of its rays, less
+    /// than 0 where the light was no number. Overwritten by every batch.
+    pub samples: Buffer<vec4>,
+    /// The film, in order; one tile unless a device's buffers are too small for that.
+    pub tiles: Vec<FilmTile>,
+    /// Closest-hit rays, any-hit rays, nodes visited: pairs of words, low first.
+    pub counters: Buffer<u32>,
+    /// One element.
+    pub broken: Buffer<BrokenTally>,
+    /// (pixel, sample index) of the paths in flight, where samples are placed.
+    pub paths: Buffer<uvec2>,
+    /// Per pixel, where samples are placed.
+    pub priority: Buffer<f32>,
+    /// Per pixel, where samples are placed.
+    pub counts: Counts,
+}
+
+impl FilmBuffers {
+    /// Room for `pixels` pixels and `paths` paths in flight.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when it does not fit.
+    pub fn new(gpu: &Gpu, pixels: u32, paths: u32, effects: &Effects, guides: bool) -> Result<Self> {
+        let records = paths as usize * if effects.split_light { 3 } else { 1 };
+        let [capacity, window] = extents(gpu.info());
+        let starts = (0..pixels).step_by(capacity as usize);
+        let tile = |first: u32| FilmTile::new(gpu, first..pixels.min(first + capacity), window, effects, guides);
+        let placed = |n: u32| if effects.adaptive { n } else { 1 };
+        Ok(Self {
+            paths: Buffer::new(gpu, "paths", placed(paths) as usize, Location::Device)?,
+            priority: Buffer::new(gpu, "priority", placed(pixels) as usize, Location::Device)?,
+            counts: Counts::new(gpu, placed(pixels), thread_items(gpu, pixels))?,
+            samples: Buffer::new(gpu, "samples", records, Location::Device)?,
+            tiles: starts.map(tile).collect::<Result<_>>()?,
+            counters: Buffer::from_slice(gpu, "counters", &[0; 6])?,
+            broken: Buffer::from_slice(gpu, "broken samples", &[BrokenTally::default()])?,
+        })
+    }
+
+    /// What a pixel takes where all outputs are wanted, samples in flight not counted.
+    pub fn bytes_per_pixel(placed: bool) -> u64 {
+        const PLACED: usize = Counts::BYTES_PER_PIXEL + size_of::<[f32; 2]>(); // priority, and a policy's own
+        let records = size_of::<PixelStats>() + size_of::<PixelLight>() + size_of::<Guide>();
+        (records + if placed { PLACED } else { 0 }) as u64
+    }
+
+    /// The tile that holds a batch's pixels; a batch never spans two.
+    pub fn tile_of(&self, batch: &Batch) -> &FilmTile {
+        let after = self.tiles.partition_point(|tile| tile.first_pixel <= batch.first_pixel);
+        &self.tiles[after - 1]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_are_whole_windows_whichever_limit_is_the_least() {
+        // 48 bytes a pixel, 64 pixels at a time.
+        let pixels = |bytes: u64| (bytes / 48 / 64 * 64) as u32;
+        assert_eq!(whole_windows(1 << 31, 1 << 27), [16 * pixels(1 << 27), pixels(1 << 27)], "lavapipe");
+        assert_eq!(whole_windows(1 << 31, 1 << 32), [pixels(1 << 31); 2], "buffers end before bindings do");
+        assert_eq!(whole_windows(u64::MAX, u64::MAX), [1 << 28; 2]);
+        assert_eq!(whole_windows(1, 1), [64; 2]);
+    }
+}

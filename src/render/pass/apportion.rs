@@ -1,0 +1,181 @@
+//! Turns priorities into counts that sum to a budget exactly, by Hamilton's method, with radix selection and no sort.
+//! Kernels: `glsl/apportion/*.comp`. Twin:
+//! [`crate::twins::apportion`].
+use super::scan::Blocks;
+use crate::error::Result;
+use crate::gpu::{Buffer, Gpu, Location, Recorder};
+use crate::gpu::{PerBlock, block_count};
+use crate::layout::{ApportionPush, Apportionment, BlockSums, NONE, PixelStats, uvec2};
+use crate::render::schedule::{Plan, Share};
+use crate::shaders::{
+    give_remainders, lack_of_accuracy, lack_of_share, quantise_priority, quota, radix_count, radix_select,
+    redistribute, sum_weights, tie_sums,
+};
+
+/// Digits of a remainder, and the values of each.
+const DIGITS: u32 = 8;
+const BINS: usize = 256;
+
+/// The counts, and what finding them takes, the offsets of the scan included.
+pub struct Counts {
+    /// 12.20 fixed point; then, unless they are shares of the next samples, what a pixel lacks.
+    pub weight: Buffer<u32>,
+    /// Samples of every pixel.
+    pub count: Buffer<u32>,
+    /// First path of every pixel, and the number of all: 64 bits, low word first. Before the scan, the remainders.
+    pub offset: Buffer<uvec2>,
+    /// One: read it for what was not finite.
+    pub state: Buffer<Apportionment>,
+    sums: Buffer<BlockSums>,
+    blocks: Buffer<uvec2>,
+    histogram: Buffer<u32>,
+}
+
+impl Counts {
+    /// Weight, count and offset.
+    pub const BYTES_PER_PIXEL: usize = 16;
+
+    /// For a film of `pixels`, and kernels whose threads have so many each.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when it does not fit.
+    pub fn new(gpu: &Gpu, pixels: u32, thread_items: u32) -> Result<Self> {
+        let (n, of_blocks) = (pixels as usize, block_count(pixels, thread_items) as usize);
+        Ok(Self {
+            weight: Buffer::new(gpu, "weight", n, Location::Device)?,
+            count: Buffer::new(gpu, "count", n, Location::Device)?,
+            offset: Buffer::new(gpu, "offset", n + 1, Location::Device)?,
+            state: Buffer::new(gpu, "apportionment", 1, Location::Device)?,
+            sums: Buffer::new(gpu, "sums", of_blocks, Location::Device)?,
+            blocks: Buffer::new(gpu, "blocks", of_blocks, Location::Device)?,
+            histogram: Buffer::from_slice(gpu, "histogram", &[0; BINS])?,
+        })
+    }
+
+    pub(super) fn blocks(&self) -> &Buffer<uvec2> {
+        &self.blocks
+    }
+}
+
+/// The kernels.
+pub struct Apportion {
+    weigh: PerBlock<quantise_priority::Bind<'static>>,
+    total: PerBlock<sum_weights::Bind<'static>>,
+    deficit: PerBlock<lack_of_share::Bind<'static>>,
+    need: PerBlock<lack_of_accuracy::Bind<'static>>,
+    quota: PerBlock<quota::Bind<'static>>,
+    settle: PerBlock<redistribute::Bind<'static>>,
+    digit: PerBlock<radix_count::Bind<'static>>,
+    pick: PerBlock<radix_select::Bind<'static>>,
+    ties: PerBlock<tie_sums::Bind<'static>>,
+    blocks: Blocks,
+    spread: PerBlock<give_remainders::Bind<'static>>,
+}
+
+impl Apportion {
+    /// Compiles them, as [`PerBlock::new`] does.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when the driver refuses one.
+    pub fn new(gpu: &Gpu, thread_items: u32) -> Result<Self> {
+        Ok(Self {
+            weigh: PerBlock::new(gpu, thread_items)?,
+            total: PerBlock::new(gpu, thread_items)?,
+            deficit: PerBlock::new(gpu, thread_items)?,
+            need: PerBlock::new(gpu, thread_items)?,
+            quota: PerBlock::new(gpu, thread_items)?,
+            settle: PerBlock::new(gpu, thread_items)?,
+            digit: PerBlock::new(gpu, thread_items)?,
+            pick: PerBlock::new(gpu, thread_items)?,
+            ties: PerBlock::new(gpu, thread_items)?,
+            blocks: Blocks::new(gpu, thread_items)?,
+            spread: PerBlock::new(gpu, thread_items)?,
+        })
+    }
+
+    /// priority\[P\], stats\[P\] -> count\[P\]
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        priority: &Buffer<f32>,
+        stats: &Buffer<PixelStats>,
+        c: &Counts,
+        plan: &Plan,
+    ) -> Result<()> {
+        let (push, n) = (|round| push(plan, round), plan.pixels);
+        self.weigh.record(rec, quantise_priority::Bind { priority, weight: &c.weight, sums: &c.sums }, &push(0), n)?;
+        self.total.record_one(rec, sum_weights::Bind { sums: &c.sums, state: &c.state }, &push(0))?;
+        match plan.share {
+            Share::Next => {}
+            Share::All(_) => {
+                let bind = lack_of_share::Bind { stats, state: &c.state, weight: &c.weight, sums: &c.sums };
+                self.deficit.record(rec, bind, &push(0), n)?;
+            }
+            Share::Need { .. } => {
+                self.need.record(
+                    rec,
+                    lack_of_accuracy::Bind { stats, weight: &c.weight, sums: &c.sums },
+                    &push(0),
+                    n,
+                )?;
+            }
+        }
+        if plan.share != Share::Next {
+            self.total.record_one(rec, sum_weights::Bind { sums: &c.sums, state: &c.state }, &push(1))?;
+        }
+        for round in 0..plan.rounds {
+            let bind = quota::Bind {
+                weight: &c.weight,
+                stats,
+                state: &c.state,
+                key: &c.offset,
+                count: &c.count,
+                sums: &c.sums,
+            };
+            self.quota.record(rec, bind, &push(round), n)?;
+            self.settle.record_one(rec, redistribute::Bind { sums: &c.sums, state: &c.state }, &push(round))?;
+        }
+        self.record_remainders(rec, stats, c, plan)
+    }
+
+    fn record_remainders(&self, rec: &mut Recorder, stats: &Buffer<PixelStats>, c: &Counts, plan: &Plan) -> Result<()> {
+        for round in 0..DIGITS {
+            let push = push(plan, round);
+            let bind = radix_count::Bind { key: &c.offset, state: &c.state, histogram: &c.histogram };
+            self.digit.record(rec, bind, &push, plan.pixels)?;
+            self.pick.record_one(rec, radix_select::Bind { state: &c.state, histogram: &c.histogram }, &push)?;
+        }
+        let push = push(plan, 0);
+        let bind = tie_sums::Bind { key: &c.offset, stats, counts: &c.count, state: &c.state, blocks: &c.blocks };
+        self.ties.record(rec, bind, &push, plan.pixels)?;
+        self.blocks.record(rec, &c.blocks, plan.pixels)?;
+        let bind = give_remainders::Bind { key: &c.offset, stats, state: &c.state, blocks: &c.blocks, count: &c.count };
+        self.spread.record(rec, bind, &push, plan.pixels)
+    }
+}
+
+/// As priorities are counted in weights, 12.20 fixed point; at least the least.
+pub fn fixed_threshold(threshold: f32) -> u32 {
+    ((threshold.min(4095.0) * 1_048_576.0) as u32).max(1)
+}
+
+fn push(plan: &Plan, round: u32) -> ApportionPush {
+    let total = if let Share::All(total) = plan.share { total } else { 0 };
+    let (threshold, enough) = match plan.share {
+        Share::Need { threshold, limit } => (fixed_threshold(threshold), limit),
+        _ => (0, 0),
+    };
+    ApportionPush {
+        pixels: plan.pixels,
+        limit: plan.limit.unwrap_or(NONE),
+        round,
+        rounds: plan.rounds,
+        budget: super::pair(plan.budget),
+        total: super::pair(total),
+        threshold,
+        enough,
+    }
+}

@@ -1,0 +1,28 @@
+//! Turns priorities into one sample or none for every pixel. Kernel: `glsl/allocate/choose.comp`. Twin:
+//! [`crate::twins::apportion::choose`].
+use super::apportion::Counts;
+use crate::error::Result;
+use crate::gpu::{Buffer, Kernel, Recorder};
+use crate::layout::ChoosePush;
+use crate::render::schedule::Choice;
+use crate::shaders::choose::Bind;
+
+/// The kernel.
+pub type Choose = Kernel<Bind<'static>>;
+
+/// priority\[P\] -> count\[P\], each 0 or 1
+///
+/// # Errors
+/// [`crate::error::Error::Device`].
+pub fn record(
+    k: &Choose,
+    rec: &mut Recorder,
+    priority: &Buffer<f32>,
+    c: &Counts,
+    choice: &Choice,
+    seed: u32,
+) -> Result<()> {
+    let Choice { pixels, round, threshold } = *choice;
+    let push = ChoosePush { pixels, round, seed, threshold };
+    rec.dispatch_threads(k, Bind { priority, count: &c.count }, &push, pixels)
+}

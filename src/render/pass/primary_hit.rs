@@ -1,0 +1,18 @@
+//! Primary hits at pixel centres. Kernel: `glsl/trace/primary_hit.comp`. Twin: [`crate::twins::primary_hit`].
+use crate::error::Result;
+use crate::gpu::{Kernel, Recorder};
+use crate::layout::PathPush;
+use crate::render::buffers::{DeviceScene, FilmTile};
+use crate::shaders::primary_hit::Bind;
+
+/// The specialised kernel.
+pub type Guides = Kernel<Bind<'static>>;
+
+/// camera -> guide\[tile\]
+pub fn record(k: &Guides, rec: &mut Recorder, s: &DeviceScene, tile: &FilmTile, push: &PathPush) -> Result<()> {
+    tile.windows().try_for_each(|w| {
+        let (first_pixel, pixels) = (tile.first_pixel + w.start, w.end - w.start);
+        let guides = &tile.guide.part(w.start as usize..w.end as usize)?;
+        rec.dispatch_threads(k, Bind { scene: s.bind(), guides }, &PathPush { first_pixel, pixels, ..*push }, pixels)
+    })
+}

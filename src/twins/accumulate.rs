@@ -1,0 +1,151 @@
+//! Twin of `glsl/film/accumulate.comp`: Welford's running mean and variance (1962), in order of sample index.
+use crate::layout::{BrokenTally, FoldPush, PixelLight, PixelStats, vec3, vec4};
+use crate::shaders;
+use crate::shaders::accumulate::{BRIGHTEST, FARTHEST, FEW, SMALLEST_ALBEDO, WIDEST};
+use crate::statistics::luminance;
+use crate::twins::sampler::pcg;
+use glam::{Vec3, Vec4};
+
+/// Of the remainder of a mean, for each channel.
+const BITS: u32 = shaders::accumulate::BITS as u32;
+const LIGHT_BITS: u32 = shaders::accumulate::LIGHT_BITS as u32;
+
+/// What of a sample's light needs no filter, and its indirect irradiance over pi.
+fn split(direct: Vec3, indirect: Vec3, albedo: Vec3) -> (Vec3, Vec3) {
+    let divides = albedo.cmpgt(Vec3::splat(SMALLEST_ALBEDO));
+    let before = (indirect / albedo.max(Vec3::splat(SMALLEST_ALBEDO))).min(Vec3::splat(BRIGHTEST));
+    let irradiance = Vec3::select(divides, before, Vec3::ZERO);
+    (direct + Vec3::select(divides, Vec3::ZERO, indirect), irradiance)
+}
+
+/// Adds a batch to the statistics of all pixels. `samples`: sample k of pixel i at `k * push.pixels + i`, one vec4, or
+/// with `split_light` three (direct, indirect, albedo); `light` is left alone without it. Returns the samples that were no
+/// number, as the sign of w of the first tells, and the first of them.
+pub fn fold(
+    push: &FoldPush,
+    split_light: bool,
+    samples: &[vec4],
+    stats: &mut [PixelStats],
+    light: &mut [PixelLight],
+) -> BrokenTally {
+    let mut broken = BrokenTally::default();
+    for i in 0..push.pixels as usize {
+        let pixel = push.first_pixel as usize + i;
+        for k in 0..push.samples as usize {
+            let at = k * push.pixels as usize + i;
+            let record = if split_light { 3 * at } else { at };
+            if samples[record][3] < 0.0 {
+                report(&mut broken, push.tile + pixel as u32, stats[pixel].count);
+            }
+            if split_light {
+                let [direct, indirect, albedo] = [0, 1, 2].map(|j| Vec4::from(samples[record + j]).truncate());
+                fold_radiance(&mut stats[pixel], direct + indirect);
+                fold_light(&mut light[pixel], split(direct, indirect, albedo), stats[pixel].count);
+            } else {
+                fold_radiance(&mut stats[pixel], Vec4::from(samples[record]).truncate());
+            }
+        }
+    }
+    broken
+}
+
+/// Pixels come in order, and so do the samples of each.
+fn report(broken: &mut BrokenTally, pixel: u32, sample: u32) {
+    if broken.count == 0 {
+        (broken.lowest, broken.pixel, broken.index) = (!pixel, !pixel, sample);
+    }
+    broken.count += 1;
+}
+
+/// 2^-bits of the last place of `mean`.
+fn unit(mean: f32, bits: u32) -> f32 {
+    let power = f32::from_bits(mean.to_bits() & 0x7f80_0000);
+    (power * f32::EPSILON / (1u32 << bits) as f32).max(1e-37)
+}
+
+/// A word of remainders, and the samples of the mean.
+struct Kept<'a> {
+    word: &'a mut u32,
+    count: u32,
+}
+
+/// Moves one channel of a mean by a step. The remainder holds what rounding has taken off, `bits` from bit `at` on; it is rounded
+/// itself, up or down by chance.
+fn move_channel(mean: f32, by: f32, remainder: &mut Kept, at: u32, bits: u32) -> f32 {
+    let kept = ((*remainder.word << (32 - at - bits)) as i32) >> (32 - bits);
+    let added = kept as f32 * unit(mean, bits) + by;
+    let moved = mean + added;
+    let lost = added - (moved - mean);
+    let end = (1 << (bits - 1)) as f32;
+    let up = (pcg(remainder.count) >> 8) as f32 * 5.960_464_5e-8;
+    let rounded = (lost / unit(moved, bits) + up).floor();
+    // Half of the last place above is half of it below the next number: cut, it would be lost, always in one direction.
+    let (moved, rounded) = match rounded >= end {
+        true => (moved + unit(moved, bits) * (2.0 * end), -end),
+        false => (moved, rounded),
+    };
+    let kept = rounded.clamp(-end, end - 1.0) as i32;
+    let mask = ((1 << bits) - 1) << at;
+    *remainder.word = (*remainder.word & !mask) | (((kept as u32) << at) & mask);
+    moved
+}
+
+fn move_mean(mean: vec3, by: Vec3, mut remainder: Kept, at: u32, bits: u32) -> Vec3 {
+    let by = by.to_array();
+    [0, 1, 2].map(|c| move_channel(mean[c], by[c], &mut remainder, at + c as u32 * bits, bits)).into()
+}
+
+fn square(a: f32, b: f32) -> f32 {
+    a.clamp(-FARTHEST, FARTHEST) * b.clamp(-FARTHEST, FARTHEST)
+}
+
+fn fold_radiance(s: &mut PixelStats, radiance: Vec3) {
+    s.count += 1;
+    let off = radiance - Vec3::from(s.mean);
+    let by = off * (1.0 / s.count as f32);
+    let mean = match s.count <= FEW {
+        true => Vec3::from(s.mean) + by,
+        false => move_mean(s.mean, by, Kept { word: &mut s.remainder, count: s.count }, 0, BITS),
+    };
+    s.mean = mean.into();
+    let moved = radiance - mean;
+    s.m2 = std::array::from_fn(|c| (s.m2[c] + square(off[c], moved[c])).min(WIDEST));
+}
+
+fn fold_light(l: &mut PixelLight, (kept, irradiance): (Vec3, Vec3), count: u32) {
+    let share = 1.0 / count as f32;
+    let (direct, indirect) = (Vec3::from(l.direct), Vec3::from(l.indirect));
+    let [by, indirect_by] = [(kept - direct) * share, (irradiance - indirect) * share];
+    let [direct, moved] = match count <= FEW {
+        true => [direct + by, indirect + indirect_by],
+        false => {
+            let word = &mut l.remainder;
+            let direct = move_mean(l.direct, by, Kept { word, count }, 0, LIGHT_BITS);
+            [direct, move_mean(l.indirect, indirect_by, Kept { word, count }, 3 * LIGHT_BITS, LIGHT_BITS)]
+        }
+    };
+    let off = |mean: Vec3| luminance(irradiance.into()) - luminance(mean.into());
+    l.indirect_m2 = (l.indirect_m2 + square(off(indirect), off(moved))).min(WIDEST);
+    (l.direct, l.indirect) = (direct.into(), moved.into());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_batches_solve_the_worked_example() {
+        // 1, 2 then 3, 6: mean 3, squared deviations 4 + 1 + 0 + 9 = 14.
+        let mut stats = [PixelStats::default()];
+        let batch = FoldPush { pixels: 1, samples: 2, ..FoldPush::default() };
+        fold(&batch, false, &[[1.0; 4], [2.0; 4]], &mut stats, &mut []);
+        fold(&batch, false, &[[3.0; 4], [6.0; 4]], &mut stats, &mut []);
+        assert_eq!((stats[0].count, stats[0].mean[1], stats[0].m2[2], stats[0].remainder), (4, 3.0, 14.0, 0));
+    }
+
+    #[test]
+    fn light_without_albedo_stays_direct() {
+        let (kept, irradiance) = split(Vec3::ONE, Vec3::splat(2.0), glam::vec3(0.5, 0.0, 1.0));
+        assert_eq!((kept, irradiance), (glam::vec3(1.0, 3.0, 1.0), glam::vec3(4.0, 0.0, 2.0)));
+    }
+}

@@ -1,0 +1,76 @@
+//! Twin of `glsl/shared/camera.glsl`.
+use crate::layout::{Camera, Effects, PathPush};
+use crate::shaders::shared::camera::{PAIR_FILM, PAIR_LENS};
+use crate::twins::sampler::{Sampler, pcg, sample_2d};
+use crate::twins::warp::{warp_disk, warp_gaussian, warp_tent};
+use glam::{Vec2, Vec3, vec2};
+
+/// A ray.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray {
+    /// World units.
+    pub origin: Vec3,
+    /// Unit.
+    pub direction: Vec3,
+}
+
+/// Film coordinates in pixels (x right, y down) to [-1, 1] (right, up).
+pub fn film_from_pixel(pixel: Vec2, size: [u32; 2]) -> Vec2 {
+    vec2(2.0, -2.0) * pixel / vec2(size[0] as f32, size[1] as f32) + vec2(-1.0, 1.0)
+}
+
+/// `lens` in [0, 1)^2 matters only to a lens of positive radius.
+pub fn camera_ray(camera: &Camera, film: Vec2, lens: Vec2) -> Ray {
+    let [forward, right, up] = [camera.forward, camera.right, camera.up].map(Vec3::from);
+    let mut through = forward + film.x * right + film.y * up;
+    let mut origin = Vec3::from(camera.position);
+    if camera.lens_radius > 0.0 {
+        let disk = camera.lens_radius * warp_disk(lens);
+        let shift = disk.x * right.normalize() + disk.y * up.normalize();
+        origin += shift;
+        through -= shift / camera.focus_distance.max(1e-20);
+    }
+    let direction = through.normalize();
+    Ray { origin: origin + camera.near * direction, direction }
+}
+
+/// Where in the film a sample of `pixel` falls, in pixels.
+pub fn film_sample(push: &PathPush, effects: &Effects, pixel: u32, random: Sampler) -> Vec2 {
+    let at = vec2((pixel % push.size[0]) as f32, (pixel / push.size[0]) as f32);
+    let u = sample_2d(random, PAIR_FILM);
+    at + match push.pixel_filter {
+        1 if effects.pixel_filter => 0.5 + vec2(warp_tent(u.x), warp_tent(u.y)),
+        2 if effects.pixel_filter => 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y)),
+        3 if effects.pixel_filter => Vec2::splat(0.5),
+        _ => u,
+    }
+}
+
+/// The first ray of a sample's path, through `film` in pixels.
+pub fn eye_ray(push: &PathPush, effects: &Effects, film: Vec2, random: Sampler) -> Ray {
+    let lens = if effects.lens { sample_2d(random, PAIR_LENS) } else { Vec2::ZERO };
+    camera_ray(&push.camera, film_from_pixel(film, push.size), lens)
+}
+
+/// Alpha masks along a path draw from this.
+pub fn path_seed(push: &PathPush, pixel: u32, index: u32) -> u32 {
+    pcg(pcg(pixel ^ pcg(!push.seed)).wrapping_add(index))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn seeds_share_no_numbers_of_masks() {
+        // Pixel and seed joined by exclusive-or alone, seeds 0 to 3 would have the same numbers at other pixels.
+        let seeds = |seed: u32| {
+            let push = PathPush { seed, ..PathPush::default() };
+            (0..4096u32).map(move |pixel| path_seed(&push, pixel, 7))
+        };
+        let all: HashSet<u32> = (0..4).flat_map(seeds).collect();
+        // By chance, n^2 / 2^33 pairs of n numbers.
+        assert!(all.len() >= 4 * 4096 - 2, "{}", all.len());
+    }
+}

@@ -1,0 +1,180 @@
+//! What a rough coat lets in, and what it reflects inwards: the table that the host computes for a scene's rough coats, and
+//! the twin of how `glsl/shared/bsdf.glsl` reads it.
+use crate::layout::{COAT_COLUMNS, COAT_ROWS};
+use crate::twins::bsdf::SMOOTH_ALPHA;
+use crate::twins::fresnel::fresnel_dielectric;
+use crate::twins::microfacet::{microfacet_area, microfacet_g1, microfacet_sample};
+use glam::{Vec3, vec2, vec3};
+use rayon::prelude::*;
+
+const ROWS: usize = COAT_ROWS as usize;
+const COLUMNS: usize = COAT_COLUMNS as usize;
+/// The reflectance has a limit at the horizon, but its formulas divide by the cosine.
+const LEAST_COSINE: f32 = 1e-4;
+/// Points per axis among microfacet normals, and cosines for the mean from inside.
+const POINTS: usize = 24;
+
+/// For a coat of one roughness, the share of light that it does not let in, at cosines that are the squares of equal steps
+/// from 0 to 1; last, its mean reflectance for diffuse light from inside.
+pub type CoatRow = [f32; COLUMNS];
+
+/// [`CoatRow`]s at roughnesses from 0.01 to 1, each the same multiple of the one before, for a coat of relative index `eta` over
+/// GGX microfacets, or Beckmann's. Light is let in or reflected by one scattering, as in Mitsuba 3's `roughplastic`; what
+/// would need more is lost.
+pub fn coat_table(eta: f32, ggx: bool) -> Vec<f32> {
+    let alpha = |row: usize| SMOOTH_ALPHA.powf(1.0 - row as f32 / (ROWS - 1) as f32);
+    (0..ROWS).into_par_iter().flat_map_iter(|row| coat_row(eta, ggx, alpha(row))).collect()
+}
+
+fn coat_row(eta: f32, ggx: bool, alpha: f32) -> CoatRow {
+    let step = 1.0 / (COLUMNS - 2) as f32;
+    let mut row: CoatRow = std::array::from_fn(|i| {
+        let root = (step * i as f32).min(1.0);
+        1.0 - scattered(eta, ggx, alpha, root * root)[1]
+    });
+    let cosines = (0..POINTS).map(|i| (i as f32 + 0.5) / POINTS as f32);
+    let inside = cosines.map(|c| 2.0 * c * scattered(1.0 / eta, ggx, alpha, c)[0]).sum::<f32>() / POINTS as f32;
+    // By reciprocity 1 / eta^2 of what enters can leave: no more, although columns are wide around an angle of total
+    // reflection. The mean of 1 - row over c = s^2 is that of 4 s^3 (1 - row), by the trapezoidal rule.
+    let weight = |i: usize| (step * i as f32).powi(3) * step * if i == COLUMNS - 2 { 2.0 } else { 4.0 };
+    let enters: f32 = (0..COLUMNS - 1).map(|i| weight(i) * (1.0 - row[i])).sum();
+    row[COLUMNS - 1] = inside.min(1.0 - enters / (eta * eta));
+    row
+}
+
+/// The shares of light along a direction of cosine `c` >= 0 that one scattering by a rough interface reflects above the
+/// horizon and refracts below it: the lobes of [`crate::twins::bsdf::bsdf_evaluate`], averaged over visible normals.
+fn scattered(eta: f32, ggx: bool, alpha: f32, c: f32) -> [f32; 2] {
+    let c = c.max(LEAST_COSINE);
+    let wo = vec3((1.0 - c * c).max(0.0).sqrt(), 0.0, c);
+    let masking = microfacet_g1(ggx, wo, alpha) * microfacet_area(ggx, wo, alpha) / c;
+    let of_normal = |m: Vec3| {
+        let co = wo.dot(m);
+        let (f, lit) =
+            (fresnel_dielectric(co, eta), |z: f32, w: Vec3| if z > 0.0 { microfacet_g1(ggx, w, alpha) } else { 0.0 });
+        let (reflected, refracted) = (2.0 * co * m - wo, wo / eta - (co / eta - f.y) * m);
+        [f.x * lit(reflected.z, reflected), (1.0 - f.x) * lit(refracted.z, refracted)]
+            .map(|share| f64::from(share * masking))
+    };
+    // Steps in u = v^2 (3 - 2 v), which vanish at both ends: there normals run off into the tails of the distribution.
+    let [u, width] = [|v: f32| v * v * (3.0 - 2.0 * v), |v: f32| 6.0 * v * (1.0 - v)];
+    let at = |i: usize| (i as f32 + 0.5) / POINTS as f32;
+    let (mut sum, mut all) = ([0.0; 2], 0.0);
+    for (x, y) in (0..POINTS * POINTS).map(|i| (at(i % POINTS), at(i / POINTS))) {
+        let weight = f64::from(width(x) * width(y));
+        let shares = of_normal(microfacet_sample(ggx, wo, alpha, vec2(u(x), u(y))));
+        sum = [0, 1].map(|i| sum[i] + weight * shares[i]);
+        all += weight;
+    }
+    sum.map(|s| (s / all).min(1.0) as f32)
+}
+
+/// The row of a coat's table, words of floats, at a roughness; zeros without a table.
+pub fn coat_row_at(table: &[u32], alpha: f32) -> CoatRow {
+    if table.len() < ROWS * COLUMNS {
+        return [0.0; COLUMNS];
+    }
+    let (row, f) = place((alpha.max(SMOOTH_ALPHA).ln() / -SMOOTH_ALPHA.ln() + 1.0) * (ROWS - 1) as f32, ROWS);
+    let at = |row: usize, column: usize| f32::from_bits(table[row * COLUMNS + column]);
+    std::array::from_fn(|column| mix(at(row, column), at(row + 1, column), f))
+}
+
+/// The share of light at cosine `c` that a rough coat does not let in.
+pub fn row_outside(row: &CoatRow, c: f32) -> f32 {
+    let (column, f) = place(c.clamp(0.0, 1.0).sqrt() * (COLUMNS - 2) as f32, COLUMNS - 1);
+    mix(row[column], row[column + 1], f)
+}
+
+/// Mean reflectance of a rough coat for diffuse light from inside.
+pub fn row_inside(row: &CoatRow) -> f32 {
+    row[COLUMNS - 1]
+}
+
+/// The entry before `at`, of `count`, and how far it is to the next.
+fn place(at: f32, count: usize) -> (usize, f32) {
+    let first = (at as usize).min(count - 2);
+    (first, at - first as f32)
+}
+
+fn mix(a: f32, b: f32, f: f32) -> f32 {
+    a * (1.0 - f) + b * f
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twins::microfacet::microfacet_d;
+    use std::f64::consts::TAU;
+
+    /// Reflected and refracted by quadrature over slopes of microfacets, polar, without any sampling of normals:
+    /// D G1(wo) G1(wi) (wo.m) / cos, times F or 1 - F.
+    fn brute_force(eta: f32, ggx: bool, alpha: f32, c: f32) -> [f64; 2] {
+        const RADII: usize = 300;
+        const TURNS: usize = 100;
+        let wo = vec3((1.0 - c * c).sqrt(), 0.0, c);
+        let mut sum = [0.0; 2];
+        for (i, j) in (0..RADII * TURNS).map(|k| (k / TURNS, k % TURNS)) {
+            let (t, turn) = ((i as f32 + 0.5) / RADII as f32, (j as f32 + 0.5) / TURNS as f32);
+            let slope = alpha * t / (1.0 - t);
+            let (sin, cos) = (turn * TAU as f32).sin_cos();
+            let m = vec3(slope * cos, slope * sin, 1.0).normalize();
+            let co = wo.dot(m);
+            if co <= 0.0 {
+                continue;
+            }
+            let (f, sine2) = (fresnel_dielectric(co, eta).x, (1.0 - co * co) / (eta * eta));
+            let beyond = (1.0 - sine2).max(0.0).sqrt();
+            let area = slope * alpha / (1.0 - t).powi(2) * m.z.powi(3); // of normals, per (t, angle)
+            let seen = microfacet_d(ggx, m, alpha) * microfacet_g1(ggx, wo, alpha) * co / c * area;
+            for (i, (share, z)) in [(f, 2.0 * co * m.z - wo.z), (1.0 - f, -((co / eta - beyond) * m.z - wo.z / eta))]
+                .into_iter()
+                .enumerate()
+            {
+                let w = vec3((1.0 - z * z).max(0.0).sqrt(), 0.0, z);
+                sum[i] += if z > 0.0 { f64::from(seen * share * microfacet_g1(ggx, w, alpha)) } else { 0.0 };
+            }
+        }
+        sum.map(|s| s * TAU / (RADII * TURNS) as f64)
+    }
+
+    /// Of 2 c R(c) over cosines inside.
+    fn brute_force_inside(eta: f32, ggx: bool, alpha: f32) -> f64 {
+        let cosines = (0..48).map(|i| (i as f32 + 0.5) / 48.0);
+        cosines.map(|c| 2.0 * f64::from(c) * brute_force(1.0 / eta, ggx, alpha, c)[0] / 48.0).sum()
+    }
+
+    #[test]
+    fn a_table_agrees_with_quadrature_over_slopes() {
+        for (eta, ggx) in [(1.5, false), (1.5, true), (1.1, true), (2.0, false)] {
+            let table: Vec<u32> = coat_table(eta, ggx).into_iter().map(f32::to_bits).collect();
+            for alpha in [0.02, 0.05, 0.1, 0.3, 0.5, 0.83, 1.0] {
+                let row = coat_row_at(&table, alpha);
+                let off = |found: f32, exact: f64| (f64::from(found) - exact).abs();
+                for c in [0.02, 0.07, 0.2, 0.41, 0.8, 1.0] {
+                    let exact = 1.0 - brute_force(eta, ggx, alpha, c)[1];
+                    assert!(off(row_outside(&row, c), exact) < 3e-3, "{eta} {ggx} {alpha} {c}: {exact}");
+                    let other = coat_row_at(&table, 0.7 * alpha);
+                    assert!(
+                        c > 0.1 || alpha > 0.1 || off(row_outside(&other, c), exact) > 3e-3,
+                        "control: {alpha} {c}"
+                    );
+                }
+                let exact = brute_force_inside(eta, ggx, alpha);
+                assert!(off(row_inside(&row), exact) < 3e-3, "{eta} {ggx} {alpha}: {} {exact}", row_inside(&row));
+            }
+        }
+    }
+
+    #[test]
+    fn a_white_base_below_a_coat_makes_no_light() {
+        for (eta, ggx) in [(0.5, false), (0.8, true), (1.0, true), (1.02, false), (1.5, true), (3.0, false)] {
+            for row in coat_table(eta, ggx).as_chunks::<COLUMNS>().0 {
+                assert!(row.iter().take(COLUMNS - 1).all(|r| (0.0..=1.0).contains(r)), "{eta} {ggx}: {row:?}");
+                let cosines = (0..512).map(|i| (i as f32 + 0.5) / 512.0);
+                let leaves = cosines.map(|c| 2.0 * c * (1.0 - row_outside(row, c)) / 512.0).sum::<f32>();
+                let of_base = leaves / (eta * eta * (1.0 - row_inside(row)));
+                assert!(of_base < 1.003, "{eta} {ggx}: {of_base}");
+            }
+        }
+    }
+}

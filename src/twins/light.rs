@@ -1,0 +1,241 @@
+//! Twin of `glsl/shared/light.glsl`.
+use crate::layout::*;
+use crate::scene::{Environment, Scene};
+use crate::twins::sampler::pcg;
+use crate::twins::scene::texture_coordinates;
+use crate::twins::surface::{Surface, plane_clearance, unit_vector};
+use crate::twins::texture::{surface_opacity, texture_sample};
+use crate::twins::warp::{basis_from_normal, warp_cone, warp_sphere, warp_triangle};
+use glam::{Mat3, Vec2, Vec3, Vec3Swizzles, vec2, vec3};
+use std::f32::consts::PI;
+
+/// One light, seen from a surface point.
+#[derive(Clone, Copy, Debug)]
+pub struct LightSample {
+    /// Unit, from the surface to the light.
+    pub direction: Vec3,
+    /// To the offset point on the light, world units; [`INFINITE_DISTANCE`] for lights at infinity.
+    pub distance: f32,
+    /// Already divided by the probability of the sample.
+    pub radiance: Vec3,
+    /// Per solid angle; 0 for lights that no BSDF sample can hit.
+    pub pdf: f32,
+}
+
+/// Of lights at infinity.
+pub const INFINITE_DISTANCE: f32 = 3e38;
+
+/// The entry that a random word stands for, and a word that is independent of it and as well stratified.
+pub fn alias_choose(table: &[AliasEntry], random: u32) -> (u32, u32) {
+    let product = u64::from(random) * table.len() as u64;
+    let (slot, low) = ((product >> 32) as u32, product as u32);
+    let entry = table[slot as usize];
+    let stays = low < entry.threshold;
+    let hash = pcg(random);
+    let into =
+        (if stays { low } else { low - entry.threshold }) as f32 + hash as f32 * (table.len() as f32 / 4294967296.0);
+    let share = if stays { entry.threshold as f32 } else { 4294967296.0 - entry.threshold as f32 };
+    let rest = (((into / share * 16777216.0) as u32).min(0xffffff) << 8) | (hash & 0xff);
+    (if stays { slot } else { entry.alias }, rest)
+}
+
+fn environment_uv(d: Vec3, sine: f32) -> Vec2 {
+    vec2(d.x.atan2(-d.z) * (0.5 / PI), sine.atan2(d.y) / PI)
+}
+
+/// world_from_environment.
+fn environment_rotation(light: &Light) -> Mat3 {
+    Mat3::from_cols(light.a.into(), light.b.into(), light.c.into())
+}
+
+fn environment_lookup(e: &Environment, uv: Vec2) -> Vec3 {
+    let (width, height) = (e.width as i32, e.height as i32);
+    let at = uv * vec2(width as f32, height as f32) - 0.5;
+    let p = at.floor().as_ivec2();
+    let f = at - p.as_vec2();
+    let x0 = p.x.rem_euclid(width);
+    let x1 = if x0 + 1 == width { 0 } else { x0 + 1 };
+    let texel = |x: i32, y: i32| {
+        let [r, g, b, _] = e.texels[(y.clamp(0, height - 1) * width + x) as usize];
+        vec3(r, g, b)
+    };
+    let top = texel(x0, p.y).lerp(texel(x1, p.y), f.x);
+    let low = texel(x0, p.y + 1).lerp(texel(x1, p.y + 1), f.x);
+    top.lerp(low, f.y)
+}
+
+fn environment_pdf(e: &Environment, light: &Light, texel: u32, sine: f32) -> f32 {
+    let p = e.texels[texel as usize][3];
+    light.probability * p * e.width as f32 * e.height as f32 / (2.0 * PI * PI * sine.max(1e-6))
+}
+
+/// Radiance from `direction`, and the density with which [`light_sample`] would choose it (solid angle).
+pub fn environment_radiance(scene: &Scene, light: &Light, direction: Vec3) -> (Vec3, f32) {
+    let scale = Vec3::from(light.value);
+    let Some(e) = &scene.environment else { return (scale, light.probability * (0.25 / PI)) };
+    let d = environment_rotation(light).transpose() * direction;
+    let sine = d.xz().length();
+    let mut uv = environment_uv(d, sine);
+    uv.x -= uv.x.floor();
+    let x = ((uv.x * e.width as f32) as u32).min(e.width - 1);
+    let y = ((uv.y * e.height as f32) as u32).min(e.height - 1);
+    (scale * environment_lookup(e, uv), environment_pdf(e, light, y * e.width + x, sine))
+}
+
+fn sample_environment(scene: &Scene, light: &Light, word: u32, u: Vec2) -> LightSample {
+    let (direction, radiance, pdf) = match &scene.environment {
+        None => (warp_sphere(u), light.value.into(), light.probability * (0.25 / PI)),
+        Some(e) => {
+            let (texel, _) = alias_choose(&e.table, word);
+            let corner = vec2((texel % e.width) as f32, (texel / e.width) as f32);
+            let uv = (corner + u) / vec2(e.width as f32, e.height as f32);
+            let (phi, theta) = (2.0 * PI * uv.x, PI * uv.y);
+            let sine = theta.sin();
+            let d = vec3(phi.sin() * sine, theta.cos(), -phi.cos() * sine);
+            let radiance = Vec3::from(light.value) * environment_lookup(e, uv);
+            (environment_rotation(light) * d, radiance, environment_pdf(e, light, texel, sine))
+        }
+    };
+    let radiance = if pdf > 0.0 { radiance / pdf } else { Vec3::ZERO };
+    LightSample { direction, distance: INFINITE_DISTANCE, radiance, pdf }
+}
+
+/// A triangle seen from a point: unit vectors to its corners, and its solid angle.
+struct SphericalTriangle {
+    corners: [Vec3; 3],
+    solid_angle: f32,
+}
+
+impl SphericalTriangle {
+    fn new([a, e1, e2]: [Vec3; 3]) -> Self {
+        let inverse = [a, a + e1, a + e2].map(|v| 1.0 / v.length_squared().max(1e-37).sqrt());
+        let [a, b, c] = [a * inverse[0], (a + e1) * inverse[1], (a + e2) * inverse[2]];
+        let volume = a.dot((e1 * inverse[1]).cross(e2 * inverse[2])).abs();
+        let solid_angle = 2.0 * volume.atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a));
+        Self { corners: [a, b, c], solid_angle }
+    }
+
+    /// Whether it is sampled so, and not by area.
+    fn by_solid_angle(&self, scene: &Scene) -> bool {
+        scene.large_lamps && self.solid_angle > 3e-4 && self.solid_angle < 6.0
+    }
+
+    /// A direction, uniform by solid angle (Arvo 1995).
+    fn sample(&self, u: Vec2) -> Vec3 {
+        let [a, b, c] = self.corners;
+        let (sin, cos) = (0.5 * u.x * self.solid_angle).sin_cos();
+        let along = (c - a.dot(c) * a).normalize();
+        let volume = a.cross(b).dot(along).abs();
+        let half_tan = (1.0 + a.dot(b)) * sin / (volume * cos - b.dot(along) * sin).max(1e-10);
+        let d = ((1.0 - half_tan * half_tan) * a + 2.0 * half_tan * along) / (1.0 + half_tan * half_tan);
+        let rest = 0.5 * u.y * (d - b).length_squared();
+        let across = d - d.dot(b) * b;
+        (1.0 - rest) * b + (rest * (2.0 - rest)).sqrt() * across / across.length_squared().max(1e-30).sqrt()
+    }
+}
+
+fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> LightSample {
+    let [a, b, c] = [light.a, light.b, light.c].map(Vec3::from);
+    let mut bary = warp_triangle(u);
+    let (e1, e2) = (b - a, c - a);
+    let (n, doubled_area) = unit_vector(e1.cross(e2));
+    let seen = SphericalTriangle::new([a - p, e1, e2]);
+    if seen.by_solid_angle(scene) {
+        let w = seen.sample(u);
+        let q = (a - p).dot(n) / w.dot(n) * w - (a - p);
+        bary = vec2(q.cross(e2).dot(n), e1.cross(q).dot(n)) / doubled_area;
+        bary = bary.clamp(Vec2::ZERO, Vec2::ONE);
+    }
+    let on_light = a + bary.x * e1 + bary.y * e2;
+    let to_light = on_light + plane_clearance(n, a.abs(), e1, e2) * n - p;
+    let d2 = to_light.dot(to_light);
+    let distance = d2.sqrt();
+    let direction = to_light / distance;
+    let cosine = -n.dot(direction);
+    let mut radiance = Vec3::from(light.value);
+    let image = scene.materials[light.material as usize].emission_texture;
+    if image != NONE {
+        let uv = texture_coordinates(scene, light.triangle, bary);
+        radiance *= texture_sample(scene, image, uv).truncate();
+    }
+    radiance *= surface_opacity(scene, light.material, light.triangle, bary);
+    let lit = cosine > 0.0 && d2 > 0.0;
+    let density = match seen.by_solid_angle(scene) {
+        true => light.probability / seen.solid_angle,
+        false => light.probability * 2.0 * d2 / (cosine * doubled_area),
+    };
+    let pdf = if lit { density } else { 0.0 };
+    LightSample { direction, distance, radiance: if lit { radiance / pdf } else { Vec3::ZERO }, pdf }
+}
+
+/// 1 - cosine of half the angle that a sphere takes up, seen from outside; 0 from inside.
+fn sphere_cap(to_centre: Vec3, radius: f32) -> f32 {
+    let sine2 = radius * radius / to_centre.length_squared().max(1e-37);
+    if sine2 < 1.0 { sine2 / (1.0 + (1.0 - sine2).sqrt()) } else { 0.0 }
+}
+
+fn sample_sphere_light(light: &Light, p: Vec3, u: Vec2) -> LightSample {
+    let (centre, radius) = (Vec3::from(light.a), light.b[0]);
+    let to_centre = centre - p;
+    let cap = sphere_cap(to_centre, radius);
+    let (axis, distance) = unit_vector(to_centre);
+    let w = warp_cone(u, cap);
+    let squared = radius * radius - distance * distance * w.xy().length_squared();
+    let across = w.xy() * ((distance * w.z - squared.max(0.0).sqrt()) / radius);
+    let n = basis_from_normal(axis) * across.extend(-(1.0 - across.length_squared()).max(0.0).sqrt());
+    let clearance = plane_clearance(n, centre.abs(), Vec3::splat(radius), Vec3::ZERO);
+    let to_light = to_centre + (radius + clearance) * n;
+    let distance = to_light.length();
+    let direction = to_light / distance;
+    let lit = cap > 0.0 && distance > 0.0 && n.dot(direction) < 0.0;
+    let pdf = if lit { light.probability / (2.0 * PI * cap) } else { 0.0 };
+    LightSample { direction, distance, radiance: if lit { Vec3::from(light.value) / pdf } else { Vec3::ZERO }, pdf }
+}
+
+fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
+    let to_light = Vec3::from(light.a) - p;
+    let d2 = to_light.dot(to_light).max(1e-30);
+    let distance = d2.sqrt();
+    let direction = to_light / distance;
+    let mut radiance = Vec3::from(light.value) / (d2 * light.probability);
+    if light.kind == LIGHT_SPOT {
+        let angle = (-Vec3::from(light.b).dot(direction)).clamp(-1.0, 1.0).acos();
+        let (full, cut) = (light.c[0].acos(), light.c[1].acos());
+        radiance *= ((cut - angle) / (cut - full).max(1e-6)).clamp(0.0, 1.0);
+    }
+    LightSample { direction, distance, radiance, pdf: 0.0 }
+}
+
+/// One light for the surface point `p`. Radiance is 0 when the light cannot reach the point.
+pub fn light_sample(scene: &Scene, p: Vec3, word: u32, u: Vec2) -> LightSample {
+    let (chosen, word) = if scene.lights.len() == 1 { (0, word) } else { alias_choose(&scene.light_table, word) };
+    let light = &scene.lights[chosen as usize];
+    match light.kind {
+        LIGHT_TRIANGLE => sample_triangle_light(scene, light, p, u),
+        LIGHT_SPHERE => sample_sphere_light(light, p, u),
+        LIGHT_POINT | LIGHT_SPOT => sample_point_light(light, p),
+        LIGHT_DIRECTIONAL => LightSample {
+            direction: -Vec3::from(light.b),
+            distance: INFINITE_DISTANCE,
+            radiance: Vec3::from(light.value) / light.probability,
+            pdf: 0.0,
+        },
+        _ => sample_environment(scene, light, word, u),
+    }
+}
+
+/// Density per solid angle with which [`light_sample`] chooses, from `origin`, a point of an emissive triangle or
+/// sphere hit by a ray.
+pub fn triangle_light_pdf(scene: &Scene, s: &Surface, origin: Vec3, t: f32, cosine: f32) -> f32 {
+    let [a, e1, e2] = s.triangle;
+    let density = scene.triangle_pdf_scale * scene.materials[s.material as usize].emission_weight;
+    if s.radius > 0.0 {
+        let cap = sphere_cap(a - origin, s.radius);
+        return if cap > 0.0 { density * 2.0 * s.radius * s.radius / cap } else { 0.0 };
+    }
+    let seen = SphericalTriangle::new([a - origin, e1, e2]);
+    match seen.by_solid_angle(scene) {
+        true => density * 0.5 * unit_vector(e1.cross(e2)).1 / seen.solid_angle,
+        false => density * t * t / cosine.max(1e-20),
+    }
+}

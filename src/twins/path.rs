@@ -1,0 +1,254 @@
+//! Twin of `glsl/trace/path.comp`.
+use crate::layout::{BSDF_DIELECTRIC, Effects, MATERIAL_TWO_SIDED, NONE, PathPush};
+use crate::scene::Scene;
+use crate::shaders::path::{PAIR_BSDF, PAIR_CHOICE, PAIR_FIRST_BOUNCE, PAIR_LIGHT, PAIR_ROULETTE, PAIRS_PER_BOUNCE};
+use crate::twins::bsdf::{
+    Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_is_specular, bsdf_sample, relative_index,
+};
+use crate::twins::camera::{eye_ray, film_sample, path_seed};
+use crate::twins::light::*;
+use crate::twins::sampler::{Sampler, pcg, sample_2d, sample_2d_bits, sampler_start};
+use crate::twins::surface::{Facing, Surface, facing_normals, light_share, surface_at, surface_bsdf, surface_emission};
+use crate::twins::traverse::traverse_from;
+use crate::twins::warp::basis_from_normal;
+use glam::{Mat3, Vec3};
+
+/// Shadow rays to a lamp end at this part of the way: the error of the distance at which they would meet it is some 2^-24
+/// over the cosine there.
+pub const SHADOW_END: f32 = 1.0 - 1e-5;
+
+/// What one path returns, linear Rec. 709. Without [`Effects::indirect`] all light is in `direct`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PathSample {
+    /// See [`crate::layout::PixelLight::direct`].
+    pub direct: Vec3,
+    /// Radiance that arrived by more than one bounce.
+    pub indirect: Vec3,
+    /// Reflectance of the first hit.
+    pub albedo: Vec3,
+    /// Rays of both kinds.
+    pub rays: u32,
+    /// The light was no number, and is black.
+    pub broken: bool,
+}
+
+impl PathSample {
+    /// All of it.
+    pub fn radiance(&self) -> Vec3 {
+        self.direct + self.indirect
+    }
+}
+
+/// Which of the two ways to find light are used. The kernel has only `Both`; the others test that either is enough.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Strategy {
+    /// Joined by the balance heuristic.
+    Both,
+    /// Light sampling, wherever a light can be sampled.
+    Light,
+    /// BSDF sampling: point, spot and directional lights are lost.
+    Bsdf,
+}
+
+struct Path {
+    origin: Vec3,
+    direction: Vec3,
+    throughput: Vec3,
+    bsdf_pdf: f32,
+    delta: bool,
+    eta_scale: f32,
+}
+
+/// A path tracer for one scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Tracer<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// As the kernel's; the batch does not matter.
+    pub push: PathPush,
+    /// Roulette, clamp, pixel filter, sampler and the split of light; the rest follows from the scene.
+    pub effects: Effects,
+    /// [`Strategy::Both`] for the kernel's answer.
+    pub strategy: Strategy,
+}
+
+/// The point being shaded.
+struct Shade {
+    surface: Surface,
+    bsdf: Bsdf,
+    facing: Facing,
+    basis: Mat3,
+    wo: Vec3,
+    pair: u32,
+    /// Triangle and instance.
+    from: [u32; 2],
+}
+
+impl Tracer<'_> {
+    fn balance(&self, taken: f32, other: f32, strategy: Strategy) -> f32 {
+        match self.strategy {
+            Strategy::Both => taken / (taken + other).max(1e-37),
+            only => f32::from(only == strategy),
+        }
+    }
+
+    fn add_light(&self, sum: &mut PathSample, light: Vec3, indirect: bool) {
+        match self.effects.indirect && indirect {
+            true => sum.indirect += light,
+            false => sum.direct += light,
+        }
+    }
+
+    fn clamped(&self, light: Vec3) -> Vec3 {
+        let (largest, limit) = (light.max_element(), self.push.clamp_indirect);
+        let clamps = self.effects.clamp && limit > 0.0 && largest > limit;
+        if clamps { light * (limit / largest) } else { light }
+    }
+
+    fn light_from_miss(&self, path: &Path) -> Vec3 {
+        if self.push.environment == NONE {
+            return Vec3::ZERO;
+        }
+        let light = &self.scene.lights[self.push.environment as usize];
+        let (radiance, pdf) = environment_radiance(self.scene, light, path.direction);
+        radiance * if path.delta { 1.0 } else { self.balance(path.bsdf_pdf, pdf, Strategy::Bsdf) }
+    }
+
+    fn light_from_hit(&self, path: &Path, s: &Surface, t: f32) -> Vec3 {
+        let cosine = -s.geometric.dot(path.direction);
+        if cosine <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let pdf = triangle_light_pdf(self.scene, s, path.origin, t, cosine);
+        let weight = if path.delta { 1.0 } else { self.balance(path.bsdf_pdf, pdf, Strategy::Bsdf) };
+        surface_emission(self.scene, s) * weight
+    }
+
+    /// None where there is nothing to ask a shadow ray for.
+    fn light_from_nee(&self, p: &Shade, random: Sampler, mask_seed: u32) -> Option<Vec3> {
+        let s = &p.surface;
+        let word = sample_2d_bits(random, p.pair + PAIR_CHOICE)[0];
+        let light = light_sample(self.scene, s.position, word, sample_2d(random, p.pair + PAIR_LIGHT));
+        if light.radiance == Vec3::ZERO {
+            return None;
+        }
+        let wi = p.basis.transpose() * light.direction;
+        let f = bsdf_evaluate(&p.bsdf, p.wo, wi);
+        let share = light_share(s, &p.facing, light.direction, wi.z);
+        let weight = if light.pdf > 0.0 { self.balance(light.pdf, f.w, Strategy::Light) } else { 1.0 };
+        let contribution = f.truncate() * share * light.radiance * weight;
+        if contribution.max_element() <= 0.0 || contribution.is_nan() {
+            return None;
+        }
+        let origin = s.ray_origin(light.direction);
+        let (mut direction, mut distance) = (light.direction, light.distance);
+        if distance < INFINITE_DISTANCE {
+            direction = s.position + light.distance * light.direction - origin;
+            distance = SHADOW_END;
+        }
+        let blocker = traverse_from(self.scene, p.from, origin, direction, distance, true, mask_seed);
+        Some(if blocker.any() { Vec3::ZERO } else { contribution })
+    }
+
+    fn scatter(&self, path: &mut Path, p: &Shade, random: Sampler) -> bool {
+        let lobe = sample_2d(random, p.pair + PAIR_CHOICE).y;
+        let (scattered, next) = bsdf_sample(&p.bsdf, p.wo, lobe, sample_2d(random, p.pair + PAIR_BSDF));
+        if !scattered {
+            return false;
+        }
+        path.direction = p.basis * next.wi;
+        path.throughput *= next.weight * light_share(&p.surface, &p.facing, path.direction, next.wi.z);
+        path.origin = p.surface.ray_origin(path.direction);
+        path.bsdf_pdf = next.pdf;
+        path.delta = next.delta;
+        if p.bsdf.kind == BSDF_DIELECTRIC && p.wo.z * next.wi.z < 0.0 {
+            path.eta_scale *= relative_index(&p.bsdf, p.wo.z).powi(2);
+        }
+        path.throughput.max_element() > 0.0
+    }
+
+    fn survives_roulette(&self, path: &mut Path, random: Sampler, pair: u32) -> bool {
+        let q = (path.throughput.max_element() * path.eta_scale).min(0.95);
+        if sample_2d(random, pair + PAIR_ROULETTE).x >= q {
+            return false;
+        }
+        path.throughput /= q;
+        true
+    }
+
+    fn shade(&self, surface: Surface, direction: Vec3, pair: u32, from: [u32; 2]) -> Shade {
+        let bsdf = surface_bsdf(self.scene, &surface);
+        let turns = surface.flags & MATERIAL_TWO_SIDED != 0 && bsdf.kind != BSDF_DIELECTRIC;
+        let facing = facing_normals(&surface, -direction, turns, bsdf_is_specular(&bsdf));
+        let basis = basis_from_normal(facing.normal);
+        Shade { bsdf, surface, facing, basis, wo: basis.transpose() * -direction, pair, from }
+    }
+
+    fn trace_path(&self, mut path: Path, random: Sampler, seed: u32) -> PathSample {
+        let mut sum = PathSample::default();
+        let (mut smooth_first, mut mirrored) = (false, false);
+        let mut from = [NONE; 2];
+        for bounce in 0u32.. {
+            let pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
+            let mask_seed = pcg(seed.wrapping_add(2 * bounce));
+            sum.rays += 1;
+            let hit = traverse_from(self.scene, from, path.origin, path.direction, INFINITE_DISTANCE, false, mask_seed);
+            let indirect = bounce >= 2 && !smooth_first;
+            if !hit.any() {
+                self.add_light(&mut sum, path.throughput * self.light_from_miss(&path), indirect);
+                break;
+            }
+            from = [hit.triangle, hit.instance];
+            let s = surface_at(self.scene, &hit);
+            self.add_light(&mut sum, path.throughput * self.light_from_hit(&path, &s, hit.t), indirect);
+            if bounce + 1 >= self.push.max_depth {
+                break;
+            }
+            let p = self.shade(s, path.direction, pair, from);
+            let smooth_here = bsdf_is_delta(&p.bsdf);
+            if bounce == 0 {
+                sum.albedo = bsdf_albedo(&p.bsdf, p.wo.z);
+                smooth_first = smooth_here;
+            }
+            if self.push.light_count > 0 && !smooth_here {
+                let light = self.light_from_nee(&p, random, mask_seed.wrapping_add(1));
+                sum.rays += u32::from(light.is_some());
+                self.add_light(&mut sum, path.throughput * light.unwrap_or_default(), bounce >= 1 && !smooth_first);
+            }
+            if !self.scatter(&mut path, &p, random) {
+                break;
+            }
+            mirrored |= bounce == 0 && path.delta;
+            let from = self.push.roulette_depth;
+            let roulette = self.effects.roulette && from > 0 && bounce + 1 >= from;
+            if roulette && !self.survives_roulette(&mut path, random, pair) {
+                break;
+            }
+        }
+        sum.indirect = self.clamped(sum.indirect);
+        match mirrored {
+            true => PathSample { direct: sum.radiance(), indirect: Vec3::ZERO, ..sum },
+            false => sum,
+        }
+    }
+
+    /// Sample `index` of `pixel` (row-major).
+    pub fn sample(&self, pixel: u32, index: u32) -> PathSample {
+        let random = sampler_start(pixel, index, self.push.seed, self.effects.independent_sampler);
+        let film = film_sample(&self.push, &self.effects, pixel, random);
+        let ray = eye_ray(&self.push, &self.effects, film, random);
+        let path = Path {
+            origin: ray.origin,
+            direction: ray.direction,
+            throughput: Vec3::ONE,
+            bsdf_pdf: 0.0,
+            delta: true,
+            eta_scale: 1.0,
+        };
+        let sample = self.trace_path(path, random, path_seed(&self.push, pixel, index));
+        match sample.radiance().is_finite() {
+            true => sample,
+            false => PathSample { direct: Vec3::ZERO, indirect: Vec3::ZERO, broken: true, ..sample },
+        }
+    }
+}

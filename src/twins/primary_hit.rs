@@ -1,0 +1,38 @@
+//! Twin of `glsl/trace/primary_hit.comp` and of `glsl/shared/first_hit.glsl`.
+use crate::layout::{Camera, Guide, NONE, PathPush};
+use crate::scene::Scene;
+use crate::twins::bsdf::{bsdf_albedo, bsdf_is_delta};
+use crate::twins::camera::{Ray, camera_ray, film_from_pixel};
+use crate::twins::light::INFINITE_DISTANCE;
+use crate::twins::sampler::pcg;
+use crate::twins::surface::{side_of, surface_at, surface_bsdf};
+use crate::twins::traverse::traverse;
+use glam::{Vec2, vec2};
+
+/// The primary hit through the centre of `pixel` (row-major), from the middle of the lens.
+pub fn guide(scene: &Scene, push: &PathPush, pixel: u32) -> Guide {
+    let centre = vec2((pixel % push.size[0]) as f32, (pixel / push.size[0]) as f32) + 0.5;
+    let camera = Camera { lens_radius: 0.0, ..push.camera };
+    let ray = camera_ray(&camera, film_from_pixel(centre, push.size), Vec2::splat(0.5));
+    first_hit(scene, push, ray, pcg(pixel)).0
+}
+
+/// What a primary ray meets, and whether that is a smooth surface, all of whose light counts as direct.
+pub fn first_hit(scene: &Scene, push: &PathPush, ray: Ray, mask_seed: u32) -> (Guide, bool) {
+    let hit = traverse(scene, ray.origin, ray.direction, INFINITE_DISTANCE, false, mask_seed);
+    if !hit.any() {
+        return (Guide { object: NONE, material: NONE, ..Guide::default() }, false);
+    }
+    let s = surface_at(scene, &hit);
+    let bsdf = surface_bsdf(scene, &s);
+    let normal = side_of(&s, -ray.direction) * s.normal;
+    let guide = Guide {
+        normal: normal.into(),
+        depth: hit.t + push.camera.near,
+        position: s.position.into(),
+        object: s.object,
+        albedo: bsdf_albedo(&bsdf, -s.normal.dot(ray.direction)).into(),
+        material: s.material,
+    };
+    (guide, bsdf_is_delta(&bsdf))
+}

@@ -1,0 +1,66 @@
+//! Twin of `glsl/shared/scene.glsl`: typed access to the scene's arrays.
+use crate::layout::{Instance, NONE};
+use crate::scene::Scene;
+use crate::twins::sphere::Sphere;
+use glam::{Mat3, Vec2, Vec3, Vec4};
+
+/// Three rows that take a point (x, y, z, 1), as GLSL's mat4x3 does.
+#[derive(Clone, Copy, Debug)]
+pub struct Rows([Vec4; 3]);
+
+impl Rows {
+    /// Of a point.
+    pub fn point(&self, p: Vec3) -> Vec3 {
+        Vec3::from(self.0.map(|r| r.x * p.x + r.y * p.y + r.z * p.z + r.w))
+    }
+
+    /// Of a direction.
+    pub fn vector(&self, v: Vec3) -> Vec3 {
+        Vec3::from(self.0.map(|r| r.x * v.x + r.y * v.y + r.z * v.z))
+    }
+
+    /// The sum of the magnitudes that are added up for a point of coordinates up to `p`.
+    pub fn magnitude(&self, p: Vec3) -> Vec3 {
+        Vec3::from(self.0.map(|r| r.x.abs() * p.x + r.y.abs() * p.y + r.z.abs() * p.z + r.w.abs()))
+    }
+
+    /// The transpose of the linear part: of a normal, when `self` leads the other way.
+    pub fn normal(&self, n: Vec3) -> Vec3 {
+        Mat3::from_cols(self.0[0].truncate(), self.0[1].truncate(), self.0[2].truncate()) * n
+    }
+}
+
+/// world_from_object.
+pub fn world_from_object(i: &Instance) -> Rows {
+    Rows([i.world0, i.world1, i.world2].map(Vec4::from))
+}
+
+/// object_from_world.
+pub fn object_from_world(i: &Instance) -> Rows {
+    Rows([i.object0, i.object1, i.object2].map(Vec4::from))
+}
+
+/// Corners in object space (world space without instances).
+pub fn triangle_vertices(scene: &Scene, triangle: u32) -> [Vec3; 3] {
+    let t = &scene.triangles[triangle as usize];
+    [t.v0, t.v1, t.v2].map(Vec3::from)
+}
+
+/// The instance's material where it has one.
+pub fn material_of(scene: &Scene, triangle: u32, instance: u32) -> u32 {
+    let material = scene.triangles[triangle as usize].material;
+    match instance {
+        NONE => material,
+        i => Some(scene.instances[i as usize].material).filter(|&m| m != NONE).unwrap_or(material),
+    }
+}
+
+/// Interpolated; `barycentric` weighs vertices 1 and 2.
+pub fn texture_coordinates(scene: &Scene, triangle: u32, barycentric: Vec2) -> Vec2 {
+    if let Some(sphere) = Sphere::of(scene, triangle) {
+        return sphere.coordinates_of_hit(barycentric);
+    }
+    let s = &scene.shading[triangle as usize];
+    let [uv0, uv1, uv2] = [s.uv0, s.uv1, s.uv2].map(Vec2::from);
+    uv0 + barycentric.x * (uv1 - uv0) + barycentric.y * (uv2 - uv0)
+}

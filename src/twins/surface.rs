@@ -1,0 +1,301 @@
+//! Twin of `glsl/shared/surface.glsl`.
+use crate::layout::{MATERIAL_NORMAL_MAP, Material, NONE};
+use crate::scene::Scene;
+use crate::twins::bsdf::Bsdf;
+use crate::twins::scene::{material_of, object_from_world, triangle_vertices, world_from_object};
+use crate::twins::sphere::Sphere;
+use crate::twins::texture::texture_sample;
+use crate::twins::traverse::Hit;
+use glam::{Vec2, Vec3, vec2, vec3};
+use std::f32::consts::PI;
+
+/// What shading needs of a hit.
+#[derive(Clone, Copy, Debug)]
+pub struct Surface {
+    /// World units, interpolated from the vertices.
+    pub position: Vec3,
+    /// Unit, by the winding of the triangle.
+    pub geometric: Vec3,
+    /// Unit, interpolated from the vertices, on the side that they point to.
+    pub smooth_normal: Vec3,
+    /// Unit shading normal: the smooth one perturbed by a map.
+    pub normal: Vec3,
+    /// Index.
+    pub material: u32,
+    /// Of the material.
+    pub flags: u32,
+    /// Index.
+    pub object: u32,
+    /// Texture coordinates.
+    pub uv: Vec2,
+    /// The triangle in world space: its first vertex and the edges from there.
+    pub triangle: [Vec3; 3],
+    /// Of a sphere, whose centre is the first of `triangle`; 0 of a triangle.
+    pub radius: f32,
+    /// Distance from the plane at which rays start, world units.
+    pub clearance: f32,
+}
+
+impl Surface {
+    /// Where a ray that leaves the surface towards `w` starts.
+    pub fn ray_origin(&self, w: Vec3) -> Vec3 {
+        let along = if w.dot(self.geometric) < 0.0 { -self.clearance } else { self.clearance };
+        self.position + along * self.geometric
+    }
+}
+
+/// Unit vector along `v`, and its length; both 0 where `v` is 0.
+pub fn unit_vector(v: Vec3) -> (Vec3, f32) {
+    let largest = v.abs().max_element();
+    let scaled = v / largest.max(1e-37);
+    let length = scaled.length();
+    (scaled / length.max(1e-37), length * largest)
+}
+
+const CLEARANCE: f32 = 1.0 / (1 << 21) as f32;
+
+/// How far along the unit normal `n` a ray must start so that it meets no other triangle of the same plane. `reach`: the
+/// numbers that the point is a sum of.
+pub fn plane_clearance(n: Vec3, reach: Vec3, e1: Vec3, e2: Vec3) -> f32 {
+    CLEARANCE * n.abs().dot(reach + e1.abs().max(e2.abs()).max_element())
+}
+
+/// Unit normal from two snorm words of 16 bits.
+pub fn octahedral_decode(bits: u32) -> Vec3 {
+    let snorm = |b: u32| (f32::from(b as u16 as i16) / 32767.0).max(-1.0);
+    octahedral_vector(vec2(snorm(bits), snorm(bits >> 16)))
+}
+
+/// Unit vector that a point of the unfolded octahedron, the square [-1, 1]^2, stands for.
+pub fn octahedral_vector(e: Vec2) -> Vec3 {
+    let z = 1.0 - e.x.abs() - e.y.abs();
+    let t = (-z).max(0.0);
+    let fold = |e: f32| if e >= 0.0 { e - t } else { e + t };
+    vec3(fold(e.x), fold(e.y), z).normalize()
+}
+
+/// Inverse of [`octahedral_vector`]; `n` may have any length but 0.
+pub fn octahedral_point(n: Vec3) -> Vec2 {
+    let e = n.truncate() / (n.x.abs() + n.y.abs() + n.z.abs());
+    let fold = |own: f32, other: f32| (1.0 - other.abs()) * if own >= 0.0 { 1.0 } else { -1.0 };
+    if n.z < 0.0 { vec2(fold(e.x, e.y), fold(e.y, e.x)) } else { e }
+}
+
+/// The edges of a triangle in space and in texture coordinates.
+struct Edges {
+    e1: Vec3,
+    e2: Vec3,
+    d1: Vec2,
+    d2: Vec2,
+}
+
+fn normal_from_map(scene: &Scene, s: &Surface, image: u32, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
+    let m = 2.0 * texture_sample(scene, image, s.uv).truncate() - 1.0;
+    let (t, _) = unit_vector(dpdu - s.normal * s.normal.dot(dpdu));
+    let b = s.normal.cross(t);
+    m.x * t + m.y * (if b.dot(dpdv) < 0.0 { -b } else { b }) + m.z * s.normal
+}
+
+fn normal_from_height(scene: &Scene, s: &Surface, material: &Material, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
+    let image = material.bump_texture;
+    let texture = &scene.textures[image as usize];
+    let scale = Vec2::from(texture.scale).abs().max(Vec2::splat(1e-6));
+    let texel = 1.0 / (vec2(texture.width as f32, texture.height as f32) * scale);
+    let height = |offset| texture_sample(scene, image, s.uv + offset).x;
+    let rise = |half: Vec2| height(half) - height(-half);
+    let hu = rise(vec2(0.5 * texel.x, 0.0)) / texel.x;
+    let hv = rise(vec2(0.0, 0.5 * texel.y)) / texel.y;
+    let pu = dpdu + s.normal * (material.bump_scale * hu - s.normal.dot(dpdu));
+    let pv = dpdv + s.normal * (material.bump_scale * hv - s.normal.dot(dpdv));
+    let n = pu.cross(pv);
+    if n.dot(s.normal) < 0.0 { -n } else { n }
+}
+
+fn perturbed_normal(scene: &Scene, s: &Surface, e: &Edges) -> Vec3 {
+    let material = &scene.materials[s.material as usize];
+    let image = material.bump_texture;
+    let det = e.d1.x * e.d2.y - e.d2.x * e.d1.y;
+    if image == NONE || det == 0.0 {
+        return s.normal;
+    }
+    let dpdu = (e.d2.y * e.e1 - e.d1.y * e.e2) / det;
+    let dpdv = (e.d1.x * e.e2 - e.d2.x * e.e1) / det;
+    let n = match s.flags & MATERIAL_NORMAL_MAP {
+        0 => normal_from_height(scene, s, material, dpdu, dpdv),
+        _ => normal_from_map(scene, s, image, dpdu, dpdv),
+    };
+    let (n, length) = unit_vector(n);
+    if length > 0.0 && length < 1e37 { n } else { s.normal }
+}
+
+/// As [`surface_at`], for a hit on a sphere.
+fn sphere_at(scene: &Scene, hit: &Hit, ball: &Sphere) -> Surface {
+    let (n, side) = (octahedral_vector(hit.barycentric), ball.side());
+    let mut radius = ball.pole.length();
+    let (mut centre, mut reach, mut point) = (ball.centre, ball.centre.abs(), radius * n);
+    let equator = vec2(n.dot(ball.meridian), n.dot(side)).length() / radius;
+    let around = (n.dot(ball.meridian) * side - n.dot(side) * ball.meridian) / radius;
+    let (mut e1, mut e2) = (2.0 * PI * around, (ball.pole - n.dot(ball.pole) * n) * (PI / equator.max(1e-6)));
+    let mut object = scene.triangles[hit.triangle as usize].object;
+    let material = material_of(scene, hit.triangle, hit.instance);
+    let mut geometric = n;
+    if let Some(i) = scene.instances.get(hit.instance as usize) {
+        let world = world_from_object(i);
+        (geometric, _) = unit_vector(object_from_world(i).normal(n));
+        centre = world.point(centre);
+        reach = world.magnitude(object_from_world(i).magnitude(centre.abs()));
+        (point, e1, e2) = (world.vector(point), world.vector(e1), world.vector(e2));
+        radius = world.vector(ball.pole).length();
+        object += i.object;
+    }
+    if ball.inward() {
+        geometric = -geometric;
+    }
+    let mut s = Surface {
+        position: centre + point,
+        geometric,
+        smooth_normal: geometric,
+        normal: geometric,
+        material,
+        flags: scene.materials[material as usize].flags,
+        object,
+        uv: ball.coordinates(n),
+        triangle: [centre, Vec3::ZERO, Vec3::ZERO],
+        radius,
+        clearance: plane_clearance(geometric, reach, point, Vec3::splat(radius)),
+    };
+    s.normal = perturbed_normal(scene, &s, &Edges { e1, e2, d1: Vec2::X, d2: Vec2::Y });
+    s
+}
+
+/// Position and normals.
+pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
+    if let Some(ball) = Sphere::of(scene, hit.triangle) {
+        return sphere_at(scene, hit, &ball);
+    }
+    let [mut p0, p1, p2] = triangle_vertices(scene, hit.triangle);
+    let (mut e1, mut e2) = (p1 - p0, p2 - p0);
+    let mut reach = p0.abs();
+    let mut object = scene.triangles[hit.triangle as usize].object;
+    let instance = scene.instances.get(hit.instance as usize);
+    if let Some(i) = instance {
+        let world = world_from_object(i);
+        (p0, e1, e2) = (world.point(p0), world.vector(e1), world.vector(e2));
+        reach = world.magnitude(object_from_world(i).magnitude(p0.abs()));
+        object += i.object;
+    }
+    let material = material_of(scene, hit.triangle, hit.instance);
+    let mirrored = instance.is_some_and(|i| i.mirrored != 0);
+    let scaled = if mirrored { e2.cross(e1) } else { e1.cross(e2) };
+    let (geometric, _) = unit_vector(scaled);
+    let mut s = Surface {
+        position: p0 + hit.barycentric.x * e1 + hit.barycentric.y * e2,
+        geometric,
+        smooth_normal: geometric,
+        normal: geometric,
+        material,
+        flags: scene.materials[material as usize].flags,
+        object,
+        uv: Vec2::ZERO,
+        triangle: [p0, e1, e2],
+        radius: 0.0,
+        clearance: plane_clearance(geometric, reach, e1, e2),
+    };
+    let Some(shading) = scene.shading.get(hit.triangle as usize) else { return s };
+    if shading.normal != [0xffffffff; 3] {
+        let [n0, n1, n2] = shading.normal.map(octahedral_decode);
+        let n = n0 * (1.0 - hit.barycentric.x) + n1 * hit.barycentric.x + hit.barycentric.y * (n2 - n0);
+        let (n, length) = unit_vector(instance.map_or(n, |i| object_from_world(i).normal(n)));
+        s.normal = if length > 0.0 { n } else { geometric };
+        s.smooth_normal = s.normal;
+    }
+    let [uv0, uv1, uv2] = [shading.uv0, shading.uv1, shading.uv2].map(Vec2::from);
+    let (d1, d2) = (uv1 - uv0, uv2 - uv0);
+    s.uv = uv0 + hit.barycentric.x * d1 + hit.barycentric.y * d2;
+    s.normal = perturbed_normal(scene, &s, &Edges { e1, e2, d1, d2 });
+    s
+}
+
+/// 1 where `w` leaves the surface on the side of its normals, else -1: the plane of the triangle decides.
+pub fn side_of(s: &Surface, w: Vec3) -> f32 {
+    if s.smooth_normal.dot(s.geometric) * s.geometric.dot(w) < 0.0 { -1.0 } else { 1.0 }
+}
+
+/// The normals of a surface as a viewer needs them.
+#[derive(Clone, Copy, Debug)]
+pub struct Facing {
+    /// Unit, before a map.
+    pub smooth_normal: Vec3,
+    /// Unit, the one that scatters.
+    pub normal: Vec3,
+}
+
+/// For a viewer towards `wo`; on the viewer's side where the surface `turns`. Smooth normals that face away, or that send the
+/// mirror image of `wo` below the plane (where the surface `mirrors`), are bent; those of maps are turned by half a turn.
+pub fn facing_normals(s: &Surface, wo: Vec3, turns: bool, mirrors: bool) -> Facing {
+    const ABOVE: f32 = 1e-3;
+    let side = side_of(s, wo);
+    let (mut n, mut mapped) = (side * s.smooth_normal, side * s.normal);
+    let along = n.dot(wo);
+    let plane = if n.dot(s.geometric) < 0.0 { -s.geometric } else { s.geometric };
+    let image = 2.0 * along * n - wo;
+    let height = image.dot(plane);
+    if (if mirrors { height } else { along }) < 0.0 {
+        let raised = (image + (ABOVE - height) * plane).normalize();
+        n = (if mirrors { wo + raised } else { n + (ABOVE - along) * wo }).normalize();
+        mapped = n;
+    }
+    if mapped.dot(wo) < 0.0 {
+        mapped = 2.0 * mapped.dot(n) * n - mapped;
+    }
+    let back = if turns { 1.0 } else { side };
+    Facing { smooth_normal: back * n, normal: back * mapped }
+}
+
+/// The share of a direction's light that lobes around `facing.normal` keep; `z` is the direction's component along that.
+pub fn light_share(s: &Surface, facing: &Facing, w: Vec3, z: f32) -> f32 {
+    let (tilt, up) = (facing.normal.dot(facing.smooth_normal), w.dot(facing.smooth_normal));
+    if facing.normal.dot(s.geometric) * s.geometric.dot(w) * z < 0.0 {
+        return 0.0;
+    }
+    if s.normal == s.smooth_normal {
+        return 1.0;
+    }
+    if up * z <= 0.0 {
+        return 0.0;
+    }
+    let tan2 = |cosine2: f32, least: f32| (1.0 / cosine2.max(least) - 1.0).max(0.0);
+    let alpha2 = (0.125 * tan2(tilt * tilt, 1e-6)).min(1.0);
+    2.0 / (1.0 + (1.0 + alpha2 * tan2(up * up, 1e-12)).sqrt())
+}
+
+fn textured(scene: &Scene, constant: [f32; 3], image: u32, s: &Surface) -> Vec3 {
+    let constant = Vec3::from(constant);
+    match image {
+        NONE => constant,
+        _ => constant * texture_sample(scene, image, s.uv).truncate(),
+    }
+}
+
+/// Radiance that the surface emits from its front side.
+pub fn surface_emission(scene: &Scene, s: &Surface) -> Vec3 {
+    let material = &scene.materials[s.material as usize];
+    match material.emission_texture {
+        NONE => material.emission.into(),
+        image => Vec3::from(material.emission) * texture_sample(scene, image, s.uv).truncate(),
+    }
+}
+
+/// The material with its textures looked up.
+pub fn surface_bsdf(scene: &Scene, s: &Surface) -> Bsdf {
+    let material = &scene.materials[s.material as usize];
+    let mut alpha = material.alpha;
+    if material.roughness_texture != NONE {
+        let r = texture_sample(scene, material.roughness_texture, s.uv).x;
+        alpha *= r * r;
+    }
+    let mut b = Bsdf::new(material, alpha, &scene.texels);
+    b.albedo = textured(scene, material.base_color, material.base_texture, s);
+    b.specular = textured(scene, material.specular, material.specular_texture, s);
+    b
+}

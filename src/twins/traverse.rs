@@ -1,0 +1,290 @@
+//! Twin of `glsl/shared/traverse.glsl`.
+use crate::layout::{BvhNode, NONE, TRAVERSAL_STACK};
+use crate::scene::Scene;
+use crate::twins::scene::{object_from_world, triangle_vertices};
+use crate::twins::sphere::Sphere;
+use crate::twins::surface::octahedral_point;
+use crate::twins::texture::mask_blocks;
+use glam::{Vec2, Vec3, vec2, vec3};
+
+/// Where a ray meets the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// In lengths of the ray's direction; the ray's end on a miss.
+    pub t: f32,
+    /// In leaf order; [`NONE`] on a miss.
+    pub triangle: u32,
+    /// [`NONE`] without instances.
+    pub instance: u32,
+    /// Weights of vertices 1 and 2; of a sphere, its unit normal as a point of the octahedron.
+    pub barycentric: Vec2,
+}
+
+impl Hit {
+    /// Whether there is one.
+    pub fn any(&self) -> bool {
+        self.triangle != NONE
+    }
+}
+
+const STACK_SIZE: usize = TRAVERSAL_STACK as usize;
+const SLAB_ROUNDING: i32 = 8;
+
+/// A ray as the triangle and box tests want it.
+#[derive(Clone, Copy, Debug)]
+pub struct RaySpace {
+    origin: Vec3,
+    direction: Vec3,
+    inverse: Vec3,
+    shear: Vec3,
+    along_x: bool,
+    along_y: bool,
+    octant: u32,
+}
+
+impl RaySpace {
+    fn largest_last(&self, v: Vec3) -> Vec3 {
+        match (self.along_x, self.along_y) {
+            (true, _) => vec3(v.z, v.y, v.x),
+            (_, true) => vec3(v.x, v.z, v.y),
+            _ => v,
+        }
+    }
+}
+
+/// Any length of `direction` but 0.
+pub fn ray_space(origin: Vec3, direction: Vec3) -> RaySpace {
+    let safe = direction.map(|d| if d.abs() < 1e-20 { 1e-20 } else { d });
+    let size = direction.abs();
+    let along_x = size.x > size.y.max(size.z);
+    let along_y = !along_x && size.y > size.z;
+    let positive = safe.to_array().map(|d| u32::from(d >= 0.0));
+    let octant = (positive[0] * 4 + positive[1] * 2 + positive[2]) * 0x01010101;
+    let mut r = RaySpace { origin, direction, inverse: 1.0 / safe, shear: Vec3::ZERO, along_x, along_y, octant };
+    let along = r.largest_last(r.inverse).z;
+    let d = r.largest_last(direction);
+    r.shear = vec3(d.x * along, d.y * along, along);
+    r
+}
+
+/// Distance in lengths of the ray's direction, and barycentric weights; nothing at or beyond `t_max`.
+pub fn intersect_triangle(r: &RaySpace, vertices: [Vec3; 3], t_max: f32) -> Option<(f32, Vec2)> {
+    let [a, b, c] = vertices.map(|v| r.largest_last(v - r.origin));
+    let [p, q, s] = [a, b, c].map(|v| vec2(v.x - r.shear.x * v.z, v.y - r.shear.y * v.z));
+    let u = s.x * q.y - s.y * q.x;
+    let v = p.x * s.y - p.y * s.x;
+    let w = q.x * p.y - q.y * p.x;
+    let det = u + v + w;
+    let inside = u.min(v).min(w) >= 0.0 || u.max(v).max(w) <= 0.0;
+    let inv = 1.0 / det;
+    let t = (u * a.z + v * b.z + w * c.z) * (inv * r.shear.z);
+    (inside && det != 0.0 && t > 0.0 && t < t_max).then_some((t, vec2(v, w) * inv))
+}
+
+/// Both hits with a sphere, from half its chord: distances in lengths of the ray's direction, and vectors from the centre.
+pub fn intersect_sphere(r: &RaySpace, sphere: &Sphere) -> Option<[(f32, Vec3); 2]> {
+    let from_centre = r.origin - sphere.centre;
+    let inverse = 1.0 / r.direction.length();
+    let d = r.direction * inverse;
+    let mut along = from_centre.dot(d);
+    let mut nearest = from_centre - along * d;
+    let rest = nearest.dot(d);
+    nearest -= rest * d;
+    along += rest;
+    let squared = sphere.pole.length_squared() - nearest.length_squared();
+    let chord = squared.max(0.0).sqrt();
+    (squared >= 0.0).then(|| [-chord, chord].map(|half| ((half - along) * inverse, nearest + half * d)))
+}
+
+/// Four children: their planes near and far along the ray, a byte each.
+fn intersect_children(
+    meta: u32,
+    octant: u32,
+    near: [u32; 3],
+    far: [u32; 3],
+    scale: Vec3,
+    origin: Vec3,
+    t_max: f32,
+) -> u32 {
+    let inner = ((meta & (meta << 1)) & 0x10101010) >> 4;
+    let bit_index = (meta ^ (octant & inner.wrapping_mul(0xff))) & 0x1f1f1f1f;
+    let child_bits = (meta >> 5) & 0x07070707;
+    let mut mask = 0;
+    for i in [0, 8, 16, 24] {
+        let plane = |q: u32| ((q >> i) & 0xff) as f32;
+        let planes = |q: [u32; 3]| (Vec3::from(q.map(plane)) * scale + origin).to_array().map(|t| t.to_bits() as i32);
+        let (t_near, t_far) = (planes(near), planes(far));
+        let enter = t_near.into_iter().fold(0, i32::max);
+        let leave = t_far.into_iter().fold(t_max.to_bits() as i32, i32::min);
+        if enter <= leave + SLAB_ROUNDING {
+            mask |= ((child_bits >> i) & 0xff) << ((bit_index >> i) & 0xff);
+        }
+    }
+    mask
+}
+
+/// One bit per inner child hit (24 to 31, in order of visit) and one per triangle (0 to 23).
+fn intersect_node(r: &RaySpace, n: &BvhNode, t_max: f32) -> u32 {
+    let cell = Vec3::from([0, 8, 16].map(|i| f32::from_bits(((n.e_imask >> i) & 0xff) << 23)));
+    let scale = cell * r.inverse;
+    let origin = (Vec3::from(n.p) - r.origin) * r.inverse;
+    let axes = [(n.min_x, n.max_x), (n.min_y, n.max_y), (n.min_z, n.max_z)];
+    let negative = r.inverse.to_array().map(|i| i < 0.0);
+    let half = |h: usize| {
+        let near = [0, 1, 2].map(|i| if negative[i] { axes[i].1[h] } else { axes[i].0[h] });
+        let far = [0, 1, 2].map(|i| if negative[i] { axes[i].0[h] } else { axes[i].1[h] });
+        intersect_children(n.meta[h], r.octant, near, far, scale, origin, t_max)
+    };
+    half(0) | half(1)
+}
+
+/// A base index and, in `1`, bits: inner children hit (high byte) with the mask of inner children, or primitives hit.
+type Group = (u32, u32);
+
+fn take_highest(bits: &mut u32) -> u32 {
+    let bit = 31 - bits.leading_zeros();
+    *bits &= !(1 << bit);
+    bit
+}
+
+struct Traversal<'a> {
+    scene: &'a Scene,
+    ray: RaySpace,
+    stack: Vec<Group>,
+    hit: Hit,
+    instance: u32,
+    mask_seed: u32,
+    from: [u32; 2],
+}
+
+impl Traversal<'_> {
+    fn push(&mut self, group: Group) {
+        assert!(self.stack.len() < STACK_SIZE, "the kernel's stack would overflow");
+        self.stack.push(group);
+    }
+
+    /// Visits the nearest child of `group`: its inner children and its leaves that the ray meets.
+    fn visit(&mut self, mut group: Group) -> (Group, Group) {
+        let hits = group.1;
+        let bit = take_highest(&mut group.1);
+        if group.1 > 0x00ffffff {
+            self.push(group);
+        }
+        let slot = (bit - 24) ^ (self.ray.octant & 0xff);
+        let child = group.0 + (hits & !(0xffffffff << slot)).count_ones();
+        let node = &self.scene.nodes[child as usize];
+        let mask = intersect_node(&self.ray, node, self.hit.t);
+        ((node.child_base, (mask & 0xff000000) | node.e_imask >> 24), (node.primitive_base, mask & 0x00ffffff))
+    }
+
+    /// Goes down into one of the instances of `leaves`, and leaves the rest on the stack.
+    fn enter(&mut self, group: Group, mut leaves: Group, origin: Vec3, direction: Vec3) -> Group {
+        let bit = take_highest(&mut leaves.1);
+        if group.1 > 0x00ffffff {
+            self.push(group);
+        }
+        if leaves.1 != 0 {
+            self.push(leaves);
+        }
+        self.instance = leaves.0 + bit;
+        let instance = &self.scene.instances[self.instance as usize];
+        let object_from_world = object_from_world(instance);
+        self.ray = ray_space(object_from_world.point(origin), object_from_world.vector(direction));
+        (instance.root, 0x80000000)
+    }
+
+    /// True where the ray meets it. A ray that leaves the sphere meets only its far side; a mask decides on each side.
+    fn test_sphere(&mut self, index: u32, sphere: &Sphere) -> bool {
+        let Some([near, far]) = intersect_sphere(&self.ray, sphere) else { return false };
+        let leaves = [index, self.instance] == self.from;
+        let blocks = |(_, point): (f32, Vec3), seed: u32| {
+            let (scene, place) = (self.scene, octahedral_point(point));
+            mask_blocks(scene, index, self.instance, place, seed)
+        };
+        let (t, point) = match !leaves && near.0 > 0.0 && blocks(near, self.mask_seed) {
+            true => near,
+            false if blocks(far, !self.mask_seed) => far,
+            false => return false,
+        };
+        let meets = t > 0.0 && t < self.hit.t;
+        if meets {
+            self.hit = Hit { t, triangle: index, instance: self.instance, barycentric: octahedral_point(point) };
+        }
+        meets
+    }
+
+    /// Tests triangles; true when the first hit is enough and found.
+    fn test(&mut self, mut leaves: Group, any_hit: bool) -> bool {
+        while leaves.1 != 0 {
+            let index = leaves.0 + take_highest(&mut leaves.1);
+            if let Some(sphere) = Sphere::of(self.scene, index) {
+                if self.test_sphere(index, &sphere) && any_hit {
+                    return true;
+                }
+                continue;
+            }
+            if [index, self.instance] == self.from {
+                continue;
+            }
+            let vertices = triangle_vertices(self.scene, index);
+            let Some((t, barycentric)) = intersect_triangle(&self.ray, vertices, self.hit.t) else { continue };
+            if mask_blocks(self.scene, index, self.instance, barycentric, self.mask_seed) {
+                self.hit = Hit { t, triangle: index, instance: self.instance, barycentric };
+                if any_hit {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+}
+
+/// The closest hit before `t_max`, or with `any_hit` the first one found.
+pub fn traverse(scene: &Scene, origin: Vec3, direction: Vec3, t_max: f32, any_hit: bool, mask_seed: u32) -> Hit {
+    traverse_from(scene, [NONE; 2], origin, direction, t_max, any_hit, mask_seed)
+}
+
+/// [`traverse`] for a ray that leaves the triangle `from[0]` of the instance `from[1]`, and does not meet it again.
+pub fn traverse_from(
+    scene: &Scene,
+    from: [u32; 2],
+    origin: Vec3,
+    direction: Vec3,
+    t_max: f32,
+    any_hit: bool,
+    mask_seed: u32,
+) -> Hit {
+    let hit = Hit { t: t_max, triangle: NONE, instance: NONE, barycentric: Vec2::ZERO };
+    let ray = ray_space(origin, direction);
+    let mut t = Traversal { scene, ray, stack: Vec::with_capacity(STACK_SIZE), hit, instance: NONE, mask_seed, from };
+    let two_levels = !scene.instances.is_empty();
+    let mut bottom = 0; // stack depth at which the current instance was entered
+    let mut group = (scene.root, 0x80000000);
+    loop {
+        let mut leaves = (0, 0);
+        if group.1 > 0x00ffffff {
+            (group, leaves) = t.visit(group);
+        } else if two_levels {
+            leaves = std::mem::take(&mut group);
+        }
+        if two_levels && t.instance == NONE && leaves.1 != 0 {
+            group = t.enter(group, leaves, origin, direction);
+            bottom = t.stack.len();
+            continue;
+        }
+        if t.test(leaves, any_hit) {
+            return t.hit;
+        }
+        if group.1 <= 0x00ffffff {
+            if t.instance != NONE && t.stack.len() == bottom {
+                t.instance = NONE;
+                bottom = 0;
+                t.ray = ray_space(origin, direction);
+            }
+            match t.stack.pop() {
+                Some(next) => group = next,
+                None => return t.hit,
+            }
+        }
+    }
+}
