@@ -1,7 +1,7 @@
 //! Stands in for Vulkan's loader in front of a program that opens it: `REAL_LOADER` names the real one, submission
 //! number `LOSE_AT`, counted from 1, loses the device, and with `NO_DEVICE` its drivers have none. With `NO_CACHE` no
 //! pipeline cache can be made; an instance that is destroyed before its device aborts the program.
-//! `tests/cli_device.rs` compiles it, with std alone.
+//! `tests/cli/device.rs` compiles it, with std alone.
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::mem::transmute;
 use std::sync::OnceLock;

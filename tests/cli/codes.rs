@@ -1,0 +1,278 @@
+//! The command line through the built program: exit codes, and one readable line for what goes wrong.
+use crate::command::{complains, stdout, tallow};
+use crate::flat;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use tallow::image::{self, Film, WriteOptions};
+use tempfile::TempDir;
+
+fn write(folder: &TempDir, name: &str, size: u32, value: f32) -> PathBuf {
+    let mut film = Film::new(size, size);
+    film.add_vec3("", ["R", "G", "B"], &vec![[value, value, 0.5]; film.pixels()]);
+    film.add_vec3("albedo", ["R", "G", "B"], &vec![[0.5; 3]; film.pixels()]);
+    let path = folder.path().join(name);
+    image::write(&path, &film, &WriteOptions::default()).unwrap();
+    path
+}
+
+#[test]
+fn help_lists_the_exit_codes_and_every_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let help = tallow(&folder, &["--help"]);
+    assert_eq!(help.status.code(), Some(0));
+    for word in ["render", "filter", "compare", "explain", "devices", "130  interrupted", "3    input", "70   internal"]
+    {
+        assert!(stdout(&help).contains(word), "{word}");
+    }
+    assert!(stdout(&tallow(&folder, &["--version"])).starts_with("tallow "));
+}
+
+#[test]
+fn usage_errors_are_one_line_and_exit_2() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |words: &[&str]| tallow(&folder, words);
+    complains(&run(&[]), 2, &["error: name a command"]);
+    complains(&run(&["compare", "a.exr"]), 2, &["<B>"]);
+    complains(&run(&["compare", "a.exr", "b.exr", "--max-mes", "1"]), 2, &["'--max-mes'", "tip:", "'--max-mse'"]);
+    complains(&run(&["compare", "a.exr", "b.exr", "--max-mse", "nan"]), 2, &["finite"]);
+    complains(&run(&["compare", "a.exr", "b.exr", "--diff", "d.exr"]), 2, &["d.exr", ".png"]);
+    complains(&run(&["render", "s.toml", "-o", "a.tif"]), 2, &["a.tif", ".exr", ".png", ".hdr"]);
+    complains(&run(&["render", "s.toml", "--sampler", "x"]), 2, &["sobol"]);
+    complains(&run(&["render", "s.toml", "--width", "wide"]), 2, &["--width"]);
+    complains(&run(&["render", "s.toml", "--checkpoint", "0"]), 2, &["--checkpoint", "minutes above 0"]);
+    let negative = run(&["render", "s.toml", "--spp", "-1"]);
+    complains(&negative, 2, &["'-1'", "'--spp <N>'"]);
+    assert!(!String::from_utf8_lossy(&negative.stderr).contains("-- -1"), "a wrong tip");
+}
+
+#[test]
+fn input_errors_name_the_file_and_exit_3() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "a.exr", 12, 0.5);
+    write(&folder, "small.exr", 11, 0.5);
+    write(&folder, "nan.exr", 12, f32::NAN);
+    std::fs::write(folder.path().join("text.png"), "not a picture").unwrap();
+    let compare = |b: &str| tallow(&folder, &["compare", "a.exr", b]);
+    complains(&compare("missing.exr"), 3, &["error: missing.exr", "No such file"]);
+    complains(&compare("."), 3, &["folder"]);
+    complains(&compare("text.png"), 3, &["text.png", "PNG"]);
+    complains(&compare("small.exr"), 3, &["12x12", "11x11"]);
+    complains(&compare("nan.exr"), 3, &["nan.exr", "144 of 144 pixels"]);
+    complains(&tallow(&folder, &["compare", "a.exr", "a.exr", "--layer", "N"]), 3, &["\"N\"", "albedo.R"]);
+    let render = |scene: &str| tallow(&folder, &["render", scene]);
+    complains(&render("missing"), 3, &["error: missing: cannot be read: No such file"]);
+    complains(&render("missing.blend"), 3, &["missing.blend: cannot be read: No such file"]);
+    complains(&render("text.png"), 3, &["text.png", "is no scene", "toml nor obj"]);
+    // Control: what is right gives no line.
+    let good = compare("a.exr");
+    assert_eq!((good.status.code(), good.stderr.len()), (Some(0), 0));
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn pipes_and_folders_are_refused_and_odd_names_are_not() {
+    use std::os::unix::ffi::OsStringExt;
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "a.exr", 12, 0.5);
+    for name in ["p.toml", "p.obj", "b.exr"] {
+        assert!(Command::new("mkfifo").arg(folder.path().join(name)).status().unwrap().success());
+    }
+    complains(&tallow(&folder, &["render", "p.toml"]), 3, &["p.toml", "pipe", "save"]);
+    complains(&tallow(&folder, &["render", "p.obj"]), 3, &["p.obj", "pipe"]);
+    complains(&tallow(&folder, &["compare", "a.exr", "b.exr"]), 3, &["b.exr", "pipe"]);
+    complains(&tallow(&folder, &["render", "."]), 3, &["error: .: is a folder"]);
+    let odd = std::ffi::OsString::from_vec(b"caf\xe9.exr".to_vec());
+    let mut filter = Command::new(env!("CARGO_BIN_EXE_tallow"));
+    filter.args(["filter", "a.exr", "--filter", "none", "--json", "-o"]).arg(&odd).current_dir(folder.path());
+    let output = filter.output().unwrap();
+    assert!(serde_json::from_slice::<Value>(&output.stdout).is_ok(), "{output:?}");
+    assert!(folder.path().join(odd).exists());
+}
+
+#[test]
+fn limits_set_the_exit_code() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "a.exr", 12, 0.5);
+    write(&folder, "b.exr", 12, 0.6);
+    // Two channels of three differ by 0.1: MSE 0.00667.
+    let run = |limit: &[&str]| tallow(&folder, &[&["compare", "a.exr", "b.exr"], limit].concat());
+    complains(&run(&["--max-mse", "0.006"]), 1, &["limit exceeded: mse", "--max-mse 0.006"]);
+    complains(&run(&["--max-relmse", "0.001"]), 1, &["relmse"]);
+    complains(&run(&["--max-flip", "0"]), 1, &["flip"]);
+    complains(&run(&["--min-psnr", "90"]), 1, &["psnr"]);
+    complains(&run(&["--min-ssim", "0.9999"]), 1, &["ssim"]);
+    let within = ["--max-mse", "0.007", "--max-relmse", "1", "--max-flip", "1", "--min-psnr", "5", "--min-ssim", "0.5"];
+    assert_eq!(run(&within).status.code(), Some(0));
+    assert_eq!(run(&["--max-mse", "0", "--layer", "albedo"]).status.code(), Some(0), "the albedo is the same");
+}
+
+#[test]
+fn compare_prints_json_and_writes_the_difference() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "a.exr", 12, 0.5);
+    write(&folder, "b.exr", 12, 0.6);
+    let output = tallow(&folder, &["compare", "a.exr", "b.exr", "--json", "--diff", "d.png"]);
+    let json: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!((json["metrics"]["mse"].as_f64().unwrap() - 0.02 / 3.0).abs() < 1e-6, "{json}");
+    assert!((json["diff"]["scale"][1].as_f64().unwrap() - 0.2 / 3.0).abs() < 1e-6, "{json}");
+    assert_eq!(image::read(&folder.path().join("d.png")).unwrap().height, 12);
+}
+
+#[test]
+fn devices_are_listed_as_vulkan_has_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let found = tallow::gpu::survey().unwrap();
+    let output = tallow(&folder, &["devices", "--json"]);
+    let listed: Vec<Value> = serde_json::from_slice(&output.stdout).unwrap();
+    let text = stdout(&tallow(&folder, &["devices"]));
+    assert!(!found.is_empty() && output.status.success());
+    assert_eq!(listed.len(), found.len());
+    for (index, (device, info)) in listed.iter().zip(&found).enumerate() {
+        assert_eq!(device["index"], index);
+        assert!(device["name"] == info.name.as_str() && device["kind"] == info.kind.to_string(), "{device}");
+        assert_eq!(device["api"], info.api_version.as_str());
+        assert_eq!(device["missing"], Value::from(info.missing.clone()));
+        let limits = device["limits"].as_array().unwrap();
+        let range = limits.iter().find(|l| l[0].as_str().unwrap().contains("storage buffer range")).unwrap();
+        assert_eq!(range[1], info.max_storage_range);
+        // A row of the table, and a block of limits.
+        let row = text.lines().find(|line| line.starts_with(&format!("{index}  {}", info.name))).unwrap();
+        assert_eq!(row.ends_with("yes"), info.missing.is_empty(), "{row}");
+        assert!(text.contains(&format!("{index} {}: missing:", info.name)), "{text}");
+        assert!(text.contains(&info.max_storage_range.to_string()), "{text}");
+    }
+}
+
+/// Events of a thread of the trace: name, begin and end in microseconds.
+fn spans(trace: &Value, thread: &str) -> Vec<(String, f64, f64)> {
+    let events = trace["traceEvents"].as_array().unwrap();
+    let named = |e: &&Value| e["name"] == "thread_name" && e["args"]["name"].as_str().unwrap().starts_with(thread);
+    let id = &events.iter().find(named).unwrap_or_else(|| panic!("no thread {thread}"))["tid"];
+    let span = |e: &Value| {
+        let (begin, duration) = (e["ts"].as_f64().unwrap(), e["dur"].as_f64().unwrap());
+        (e["name"].as_str().unwrap().to_owned(), begin, begin + duration)
+    };
+    events.iter().filter(|e| e["ph"] == "X" && e["tid"] == *id).map(span).collect()
+}
+
+#[test]
+fn a_profile_holds_every_pass_on_the_time_axis_of_the_host() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/scene.toml");
+    let words = ["--width", "16", "--height", "16", "--spp", "2", "--quiet", "-o", "box.exr", "--profile", "p.json"];
+    let output = tallow(&folder, &[&["render", scene], &words[..]].concat());
+    assert!(output.status.success(), "{output:?}");
+    let trace: Value = serde_json::from_slice(&std::fs::read(folder.path().join("p.json")).unwrap()).unwrap();
+    let (cpu, gpu) = (spans(&trace, "CPU"), spans(&trace, "GPU"));
+    let of = |spans: &[(String, f64, f64)], name: &str| {
+        spans.iter().find(|s| s.0 == name).unwrap_or_else(|| panic!("no {name} in {spans:?}")).clone()
+    };
+    let [load, compile, render, write] = ["load scene", "upload and compile", "render", "write"].map(|n| of(&cpu, n));
+    assert!(load.1 == 0.0 && load.2 <= compile.1 && compile.2 <= render.1 && render.2 <= write.1, "{cpu:?}");
+    let [guide, path, fold] = ["primary_hit", "path", "accumulate"].map(|n| of(&gpu, n));
+    assert!(guide.2 <= path.1 && path.1 < path.2 && path.2 <= fold.1, "{gpu:?}");
+    if !trace.to_string().contains("unknown") {
+        let within = |s: &(String, f64, f64)| render.1 - 100.0 <= s.1 && s.2 <= render.2 + 100.0; // clocks drift
+        assert!(gpu.iter().all(within), "outside {render:?}: {gpu:?}");
+    }
+}
+
+#[test]
+fn output_errors_exit_5_and_the_old_file_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "a.exr", 64, 0.5);
+    complains(&tallow(&folder, &["render", "s.toml", "-o", "missing/a.exr"]), 5, &["missing", "create it"]);
+    complains(&tallow(&folder, &["compare", "a.exr", "a.exr", "--diff", "missing/d.png"]), 5, &["create it"]);
+    #[cfg(target_os = "linux")]
+    {
+        complains(&tallow(&folder, &["render", "s.toml", "-o", "/proc/a.exr"]), 5, &["/proc takes no new files"]);
+        full_disk(&folder);
+    }
+}
+
+/// A limit of 0 bytes per file stands in for a full disk: the temporary file opens, and writing to it fails.
+#[cfg(target_os = "linux")]
+fn full_disk(folder: &TempDir) {
+    let old = folder.path().join("d.png");
+    std::fs::write(&old, "old").unwrap();
+    let shell = |setup: &str| {
+        let script = format!("{setup} exec \"$0\" compare a.exr a.exr --diff d.png");
+        let mut command = Command::new("sh");
+        command.args(["-c", &script, env!("CARGO_BIN_EXE_tallow")]).current_dir(folder.path()).output().unwrap()
+    };
+    complains(&shell("ulimit -f 0;"), 5, &["d.png", "free some space"]);
+    assert_eq!(std::fs::read(&old).unwrap(), b"old");
+    assert_eq!(names(folder.path()), ["a.exr", "d.png"], "no temporary file stays");
+    // Control: without the limit the file is replaced.
+    assert_eq!(shell("").status.code(), Some(0));
+    assert_ne!(std::fs::read(&old).unwrap(), b"old");
+    let mut to_full = Command::new("sh");
+    to_full.args(["-c", "exec \"$0\" compare a.exr a.exr > /dev/full", env!("CARGO_BIN_EXE_tallow")]);
+    complains(&to_full.current_dir(folder.path()).output().unwrap(), 5, &["standard output"]);
+}
+
+#[cfg(target_os = "linux")]
+fn names(folder: &Path) -> Vec<String> {
+    let entry = |e: std::io::Result<std::fs::DirEntry>| e.unwrap().file_name().into_string().unwrap();
+    let mut names: Vec<_> = std::fs::read_dir(folder).unwrap().map(entry).collect();
+    names.sort();
+    names
+}
+
+/// The process has so many KiB of addresses: what asks for more ends in an abort, unless it is told before.
+#[cfg(target_os = "linux")]
+fn within(kib: u32, folder: &TempDir, words: &str) -> std::process::Output {
+    let script = format!("ulimit -v {kib}; exec \"$0\" {words}");
+    let mut shell = Command::new("sh");
+    shell.args(["-c", &script, env!("CARGO_BIN_EXE_tallow")]).current_dir(folder.path()).output().unwrap()
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn files_that_claim_much_take_little_memory() {
+    use flat::{ExrHead, NO_COMPRESSION, ZIP_16_LINES};
+    let folder = tempfile::tempdir().unwrap();
+    let save = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
+    let framed = ExrHead { display: [48, 8_388_656], ..ExrHead::new(ZIP_16_LINES, [8, 8]) };
+    save("framed.exr", &framed.flat_file());
+    save("bare.exr", &[ExrHead::new(NO_COMPRESSION, [8192, 8192]).bytes(), vec![0; 6000]].concat());
+    let channels = ExrHead { channels: 60_000, ..ExrHead::new(ZIP_16_LINES, [64, 64]) };
+    save("channels.exr", &[channels.bytes(), vec![0; 6000]].concat());
+    let sparse = std::fs::File::create(folder.path().join("sparse.exr")).unwrap();
+    sparse.set_len(3 << 30).unwrap();
+    save("sky.toml", b"environment.file = \"framed.exr\"\n");
+    for (words, parts) in [
+        ("compare framed.exr framed.exr", ["framed.exr", "display window"]),
+        ("compare bare.exr bare.exr", ["bare.exr", "complete?"]),
+        ("compare channels.exr channels.exr", ["channels.exr", "complete?"]),
+        ("compare sparse.exr sparse.exr", ["sparse.exr", "is no EXR"]),
+        ("render sky.toml -o a.exr", ["framed.exr", "display window"]),
+        ("merge sparse.exr sparse.exr -o a.exr", ["sparse.exr", "is no EXR"]),
+        ("filter sparse.exr -o a.exr", ["sparse.exr", "is no EXR"]),
+    ] {
+        complains(&within(300_000, &folder, words), 3, &parts);
+    }
+    // What is right but too large for the process is another matter.
+    let large = ExrHead { channels: 1, ..ExrHead::new(ZIP_16_LINES, [8192, 8192]) };
+    save("large.exr", &large.flat_file());
+    complains(&within(250_000, &folder, "compare large.exr large.exr"), 4, &["large.exr", "256.0 MiB of memory"]);
+    let medium = ExrHead { channels: 1, ..ExrHead::new(ZIP_16_LINES, [2048, 2048]) };
+    save("medium.exr", &medium.flat_file());
+    complains(
+        &within(300_000, &folder, "compare medium.exr medium.exr --layer c00000"),
+        4,
+        &["medium.exr", "of memory"],
+    );
+}
+
+#[test]
+fn what_no_device_can_filter_is_refused_before_it_is_decoded() {
+    let folder = tempfile::tempdir().unwrap();
+    // 3.2 GB of pixels, the last of which are damaged.
+    let mut bytes = flat::ExrHead::new(flat::ZIP_16_LINES, [16_384, 16_384]).flat_file();
+    let end = bytes.len();
+    bytes[end - 100..].fill(0x55);
+    std::fs::write(folder.path().join("large.exr"), bytes).unwrap();
+    complains(&tallow(&folder, &["filter", "large.exr", "-o", "a.exr"]), 4, &["16384 x 16384"]);
+}

@@ -1,0 +1,108 @@
+//! What the built program says without a Vulkan loader, driver or device, and when it loses its device in the middle.
+#![cfg(target_os = "linux")]
+use crate::command::complains;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use tallow::gpu::{DeviceOptions, Gpu};
+use tempfile::TempDir;
+
+/// Renders over an old file, with a folder in front of those that libraries are looked for in.
+fn render(folder: &TempDir, environment: &[(&str, &str)]) -> Output {
+    std::fs::write(folder.path().join("a.exr"), "old").unwrap();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/scene.toml");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tallow"));
+    command.args(["render", scene, "-o", "a.exr", "--width", "32", "--height", "32", "--spp", "4", "--quiet"]);
+    command.current_dir(folder.path()).env("LD_LIBRARY_PATH", folder.path());
+    command.envs(environment.iter().copied()).output().unwrap()
+}
+
+#[track_caller]
+fn fails(folder: &TempDir, environment: &[(&str, &str)], parts: &[&str]) {
+    complains(&render(folder, environment), 4, parts);
+    assert_eq!(std::fs::read(folder.path().join("a.exr")).unwrap(), b"old");
+    let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert!(left.iter().all(|name| name == "a.exr" || name == "libvulkan.so.1"), "{left:?}");
+}
+
+#[test]
+fn no_loader_and_no_driver_are_told_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let nothing = [("VK_DRIVER_FILES", "/nothing.json"), ("VK_ICD_FILENAMES", "/nothing.json")];
+    fails(&folder, &nothing, &["no Vulkan driver", "mesa-vulkan-drivers"]);
+    std::fs::write(folder.path().join("libvulkan.so.1"), "no library").unwrap();
+    fails(&folder, &[], &["no Vulkan loader", "libvulkan1"]);
+}
+
+/// The Vulkan loader that programs get.
+fn loader() -> PathBuf {
+    let _gpu = Gpu::open(&DeviceOptions::default()).unwrap();
+    let maps = std::fs::read_to_string("/proc/self/maps").unwrap();
+    let line = maps.lines().find(|line| line.contains("/libvulkan.so")).expect("a loaded loader");
+    PathBuf::from(&line[line.find('/').unwrap()..])
+}
+
+fn compile(source: &Path, library: &Path) {
+    // Cargo says where it lies itself; the compiler lies beside it.
+    let rustc = Path::new(env!("CARGO")).with_file_name("rustc");
+    let mut command = Command::new(if rustc.exists() { rustc } else { "rustc".into() });
+    command.args(["--edition=2024", "--crate-type=cdylib", "-O"]).arg(source).arg("-o").arg(library);
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// Puts `support/lost_loader.rs` before the loader, and says where that lies.
+fn stand_in(folder: &TempDir) -> PathBuf {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/support/lost_loader.rs");
+    compile(&source, &folder.path().join("libvulkan.so.1"));
+    loader()
+}
+
+#[test]
+fn drivers_without_a_device_are_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let real = stand_in(&folder);
+    let real = ("REAL_LOADER", real.to_str().unwrap());
+    let told = ["no Vulkan device", "mesa-vulkan-drivers"];
+    fails(&folder, &[real, ("NO_DEVICE", "1")], &told);
+    let mut devices = Command::new(env!("CARGO_BIN_EXE_tallow"));
+    devices.arg("devices").env("LD_LIBRARY_PATH", folder.path()).envs([real, ("NO_DEVICE", "1")]);
+    complains(&devices.output().unwrap(), 4, &told);
+    let control = render(&folder, &[real]);
+    assert!(control.status.success(), "the same loader with its devices: {control:?}");
+}
+
+#[test]
+fn a_device_that_cannot_be_set_up_is_closed_before_its_instance() {
+    let folder = tempfile::tempdir().unwrap();
+    let real = stand_in(&folder);
+    let real = ("REAL_LOADER", real.to_str().unwrap());
+    fails(&folder, &[real, ("NO_CACHE", "1")], &["pipeline cache", "out of memory"]);
+    let control = render(&folder, &[real]);
+    assert!(control.status.success(), "the same loader with a cache: {control:?}");
+}
+
+#[cfg(unix)]
+#[test]
+fn compiled_pipelines_are_kept_in_a_folder_of_the_users_own() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let caches = folder.path().join("caches");
+    assert!(render(&folder, &[("XDG_CACHE_HOME", caches.to_str().unwrap())]).status.success());
+    let kept: Vec<_> = std::fs::read_dir(caches.join("tallow")).unwrap().map(|e| e.unwrap().path()).collect();
+    assert!(kept.len() == 1 && kept[0].extension().is_some_and(|e| e == "bin"), "{kept:?}");
+    let mode = std::fs::metadata(caches.join("tallow")).unwrap().permissions().mode();
+    assert_eq!(mode & 0o777, 0o700, "{mode:o}");
+}
+
+#[test]
+fn a_lost_device_is_one_line_and_keeps_the_old_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let (real, lost) = (stand_in(&folder), ["the device was lost", "run again"]);
+    let real = ("REAL_LOADER", real.to_str().unwrap());
+    // There are two submissions: what begins a render, and its only batch.
+    fails(&folder, &[real, ("LOSE_AT", "1")], &lost);
+    fails(&folder, &[real, ("LOSE_AT", "2")], &lost);
+    let control = render(&folder, &[real]);
+    assert!(control.status.success(), "nothing fails without the loss: {control:?}");
+    assert_ne!(std::fs::read(folder.path().join("a.exr")).unwrap(), b"old");
+}

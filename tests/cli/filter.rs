@@ -1,0 +1,408 @@
+//! `tallow filter` through the built program: what becomes of the image, what is printed, and what is refused.
+use crate::command::{complains, stdout, tallow};
+use tallow::image::{self, Film, Samples, WriteOptions};
+use tempfile::TempDir;
+
+const SIZE: u32 = 32;
+
+/// A plane facing the camera. Its albedo is a checkerboard of single pixels, 0.2 and 0.8; the light that falls on it is
+/// 1 with noise of standard deviation 0.29; `direct` is another checkerboard, of 2x2 pixels.
+fn noisy(is_tallow_s: bool) -> Film {
+    let mut film = Film::new(SIZE, SIZE);
+    let pixels: Vec<(u32, u32)> = (0..SIZE * SIZE).map(|i| (i % SIZE, i / SIZE)).collect();
+    let each = |value: &dyn Fn(u32, u32) -> f32| pixels.iter().map(|&(x, y)| [value(x, y); 3]).collect::<Vec<_>>();
+    let light = |x, y| 0.5 + random(x, y);
+    let direct = |x, y| if is_tallow_s { ((x / 2 + y / 2) % 2) as f32 } else { 0.0 };
+    film.add_vec3("", ["R", "G", "B"], &each(&|x, y| direct(x, y) + checker(x, y) * light(x, y)));
+    film.add_vec3("albedo", ["R", "G", "B"], &each(&checker));
+    film.add_vec3("N", ["X", "Y", "Z"], &vec![[0.0, 0.0, 1.0]; pixels.len()]);
+    film.add("Z", Samples::F32(vec![5.0; pixels.len()]));
+    if is_tallow_s {
+        film.metadata.insert("software".to_owned(), "tallow 0.1.0".to_owned());
+        film.add_vec3("direct", ["R", "G", "B"], &each(&direct));
+        film.add_vec3("indirect", ["R", "G", "B"], &each(&light));
+    }
+    film
+}
+
+fn checker(x: u32, y: u32) -> f32 {
+    if (x + y).is_multiple_of(2) { 0.2 } else { 0.8 }
+}
+
+/// In [0, 1).
+fn random(x: u32, y: u32) -> f32 {
+    let h = (x * 7919 + y * 104_729).wrapping_mul(0x9e37_79b9);
+    ((h ^ (h >> 15)).wrapping_mul(0x85eb_ca6b) >> 8) as f32 / (1 << 24) as f32
+}
+
+fn write(folder: &TempDir, name: &str, film: &Film) {
+    image::write(&folder.path().join(name), film, &WriteOptions::default()).unwrap();
+}
+
+/// Parts of so many pixels square with so many channels.
+fn write_parts(folder: &TempDir, name: &str, parts: [(usize, &str, &[&str]); 2]) {
+    use exr::prelude::*;
+    let part = |(size, name, channels): (usize, &str, &[&str])| {
+        let plane = |c: &&str| AnyChannel::new(*c, FlatSamples::F32(vec![0.5; size * size]));
+        let planes = AnyChannels::sort(channels.iter().map(plane).collect());
+        Layer::new((size, size), LayerAttributes::named(name), Encoding::FAST_LOSSLESS, planes)
+    };
+    let image = Image::from_layers(ImageAttributes::with_size((parts[0].0, parts[0].0)), parts.map(part).to_vec());
+    image.write().to_file(folder.path().join(name)).unwrap();
+}
+
+fn read(folder: &TempDir, name: &str) -> Film {
+    image::read(&folder.path().join(name)).unwrap()
+}
+
+/// Renders to `noisy.exr`.
+fn render(folder: &TempDir, scene: &str, spp: &str) {
+    let size = SIZE.to_string();
+    let words = ["render", scene, "-o", "noisy.exr", "--width", &size, "--height", &size, "--spp", spp, "--quiet"];
+    assert_eq!(tallow(folder, &words).status.code(), Some(0));
+}
+
+/// Filters `noisy.exr` to `clean.exr` under the validation layers.
+fn filter(folder: &TempDir, options: &[&str]) -> Film {
+    let words = [&["filter", "noisy.exr", "-o", "clean.exr", "--validation", "--quiet"], options].concat();
+    let output = tallow(folder, &words);
+    assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &b""[..]));
+    assert_eq!(stdout(&output), "");
+    read(folder, "clean.exr")
+}
+
+/// Root mean square distance of the red channel from `expected`, over the pixels 4 or more from the border.
+fn error(film: &Film, expected: impl Fn(u32, u32) -> f32) -> f32 {
+    let red = film.channel("R").unwrap().to_f32();
+    let inner = 4..SIZE - 4;
+    let square = |(x, y): (u32, u32)| (red[(y * SIZE + x) as usize] - expected(x, y)).powi(2);
+    let sum: f32 = inner.clone().flat_map(|y| inner.clone().map(move |x| (x, y))).map(square).sum();
+    (sum / (inner.len() * inner.len()) as f32).sqrt()
+}
+
+#[test]
+fn textures_stay_sharp_while_noise_goes() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "noisy.exr", &noisy(false));
+    let before = error(&noisy(false), checker);
+    let after = error(&filter(&folder, &["--filter", "atrous"]), checker);
+    assert!(after < 0.3 * before, "{before} {after}");
+    // Control: without demodulation the checkerboard fades towards grey, 0.3 off everywhere.
+    let plain = error(&filter(&folder, &["--filter", "atrous", "--no-demodulate"]), checker);
+    assert!(plain > 4.0 * after, "{plain} {after}");
+}
+
+#[test]
+fn direct_light_of_our_own_files_stays_as_it_is_and_other_layers_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let film = noisy(true);
+    write(&folder, "noisy.exr", &film);
+    let lit = |x, y| ((x / 2 + y / 2) % 2) as f32 + checker(x, y);
+    let (before, clean) = (error(&film, lit), filter(&folder, &["--filter", "atrous"]));
+    let after = error(&clean, lit);
+    assert!(after < 0.3 * before, "{before} {after}");
+    for channel in film.channels.iter().filter(|c| c.name.len() > 1 || c.name == "Z") {
+        assert_eq!(clean.channel(&channel.name), Some(&channel.samples), "{}", channel.name);
+    }
+    let mut metadata = film.metadata.clone();
+    metadata.insert("filtered".to_owned(), "atrous".to_owned());
+    assert_eq!(clean.metadata, metadata);
+    assert!(error(&filter(&folder, &["--filter", "atrous", "--filter-direct"]), lit) > 0.2);
+    // Control: taken for a file of another renderer, direct light is filtered along.
+    let mut foreign = film.clone();
+    foreign.metadata.clear();
+    write(&folder, "noisy.exr", &foreign);
+    assert!(error(&filter(&folder, &["--filter", "atrous"]), lit) > 0.2);
+}
+
+/// Direct light of 1.5 and 2.5 in 2x2 squares, before the albedo; a fifth of the pixels has no sample.
+#[test]
+fn pixels_without_samples_take_direct_light_from_the_others_which_keep_theirs() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut film = noisy(true);
+    let pixels = || (0..SIZE * SIZE).map(|i| (i % SIZE, i / SIZE));
+    let unsampled = |x: u32, y: u32| (x + 2 * y).is_multiple_of(5);
+    let direct = |x: u32, y: u32| checker(x, y) * (1.5 + ((x / 2 + y / 2) % 2) as f32);
+    let indirect = film.channel("indirect.R").unwrap().to_f32().into_owned();
+    for channel in film.channels.iter_mut().filter(|c| c.name.len() == 1 && c.name != "Z" || c.name.contains("direct"))
+    {
+        let value = |(i, (x, y)): (usize, (u32, u32))| match channel.name.as_str() {
+            _ if unsampled(x, y) => 0.0,
+            name if name.starts_with("indirect") => indirect[i],
+            name if name.starts_with("direct") => direct(x, y),
+            _ => direct(x, y) + checker(x, y) * indirect[i],
+        };
+        channel.samples = Samples::F32(pixels().enumerate().map(value).collect());
+    }
+    film.add("samples", Samples::U32(pixels().map(|(x, y)| if unsampled(x, y) { 0 } else { 4 }).collect()));
+    write(&folder, "noisy.exr", &film);
+    let clean = filter(&folder, &["--filter", "atrous"]).channel("R").unwrap().to_f32().into_owned();
+    for (i, (x, y)) in pixels().enumerate() {
+        let lit = clean[i] / checker(x, y);
+        let [low, high] = match unsampled(x, y) {
+            true => [1.6 + 0.7, 2.4 + 1.3],
+            false => [direct(x, y) / checker(x, y) + 0.7, direct(x, y) / checker(x, y) + 1.3],
+        };
+        assert!((low..high).contains(&lit), "pixel {x} {y}: {lit}, not within {low} and {high}");
+    }
+    let text = stdout(&tallow(&folder, &["filter", "noisy.exr", "-o", "clean.exr"]));
+    assert!(text.contains("direct light of pixels without a sample"), "{text}");
+}
+
+#[test]
+fn layers_of_any_name_are_taken_when_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut film = noisy(false);
+    for channel in &mut film.channels {
+        channel.name = channel.name.replace("albedo.", "paint.").replace("N.", "bent.");
+    }
+    write(&folder, "noisy.exr", &film);
+    let found = error(&filter(&folder, &["--filter", "atrous", "--albedo", "paint", "--normal", "bent"]), checker);
+    let missed = error(&filter(&folder, &["--filter", "atrous"]), checker);
+    assert!(missed > 4.0 * found && found < 0.1, "{found}; not named: {missed}");
+}
+
+/// What a smooth surface shows is no light that falls on it: it comes back to the bit.
+#[test]
+fn mirrors_stay_sharp() {
+    let folder = tempfile::tempdir().unwrap();
+    render(&folder, concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/mirror.toml"), "2");
+    let (noisy, clean) = (read(&folder, "noisy.exr"), filter(&folder, &["--filter", "atrous"]));
+    let [before, after] = [&noisy, &clean].map(|film| film.picture(None).unwrap().pixels);
+    // The front of the tall box, without its edges.
+    let front = |i: usize| (10..15).contains(&(i % 32)) && (16..24).contains(&(i / 32));
+    let changed = |i: &usize| before[*i] != after[*i];
+    assert_eq!((0..before.len()).filter(|&i| front(i)).find(changed), None);
+    assert!((0..before.len()).filter(changed).count() > 500, "control: walls are filtered");
+}
+
+#[test]
+fn the_filter_none_returns_every_kind_of_image() {
+    let folder = tempfile::tempdir().unwrap();
+    for film in [noisy(true), noisy(false)] {
+        write(&folder, "noisy.exr", &film);
+        let red = film.channel("R").unwrap().to_f32();
+        let clean = filter(&folder, &["--filter", "none"]).channel("R").unwrap().to_f32().into_owned();
+        let same = red.iter().zip(&clean).all(|(a, b)| (a - b).abs() <= 1e-6 * a.abs());
+        assert!(same, "taking apart and putting together loses nothing");
+    }
+}
+
+#[test]
+fn broken_pixels_are_filled_in_from_their_neighbours() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut film = noisy(false);
+    if let Samples::F32(red) = &mut film.channels[0].samples {
+        red[(16 * SIZE + 16) as usize] = f32::NAN;
+    }
+    write(&folder, "noisy.exr", &film);
+    let after = error(&filter(&folder, &["--filter", "atrous"]), checker);
+    assert!(after < 0.1, "{after}");
+}
+
+#[test]
+fn fireflies_are_cut_only_when_asked_and_it_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut film = noisy(false);
+    for channel in &mut film.channels[..3] {
+        let Samples::F32(values) = &mut channel.samples else { continue };
+        values[(16 * SIZE + 16) as usize] = 400.0;
+    }
+    write(&folder, "noisy.exr", &film);
+    let kept = error(&filter(&folder, &["--filter", "atrous"]), checker);
+    let cut = error(&filter(&folder, &["--filter", "atrous", "--fireflies", "2"]), checker);
+    assert!(cut < 0.1 && kept > 2.0 * cut, "{kept} {cut}");
+    let words = ["filter", "noisy.exr", "-o", "clean.exr", "--filter", "none", "--fireflies", "2"];
+    let text = stdout(&tallow(&folder, &words));
+    assert!(text.contains("fireflies: 1 pixels cut"), "{text}");
+}
+
+#[test]
+fn lamps_do_not_leak_through_their_rims() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut film = noisy(false);
+    // A lamp of radiance 50 without albedo, in the middle; the pixel beside it shows it by nine tenths.
+    let lamp = |i: u32| (12..20).contains(&(i % SIZE)) && (12..20).contains(&(i / SIZE));
+    let rim = 15 * SIZE + 20;
+    for channel in film.channels.iter_mut().filter(|c| ["R", "G", "B"].iter().any(|n| c.name.ends_with(n))) {
+        let Samples::F32(values) = &mut channel.samples else { continue };
+        let (own, part) = if channel.name.starts_with("albedo") { (0.0, 0.1) } else { (50.0, 45.0) };
+        (0..SIZE * SIZE).filter(|&i| lamp(i)).for_each(|i| values[i as usize] = own);
+        values[rim as usize] = part;
+    }
+    write(&folder, "noisy.exr", &film);
+    let expected = |x, y| match y * SIZE + x {
+        i if lamp(i) => 50.0,
+        i if i == rim => 45.0,
+        _ => checker(x, y),
+    };
+    let after = error(&filter(&folder, &["--filter", "atrous"]), expected);
+    assert!(after < 0.06, "{after}");
+}
+
+#[test]
+fn a_reference_gives_metrics_before_and_after() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "noisy.exr", &noisy(false));
+    let mut clean = Film::new(SIZE, SIZE);
+    clean.add_vec3(
+        "",
+        ["R", "G", "B"],
+        &(0..SIZE * SIZE).map(|i| [checker(i % SIZE, i / SIZE); 3]).collect::<Vec<_>>(),
+    );
+    write(&folder, "reference.exr", &clean);
+    let run = |options: &[&str]| {
+        let words = ["filter", "noisy.exr", "--filter", "atrous", "-o", "a.exr", "-o", "a.png", "--reference"];
+        stdout(&tallow(&folder, &[&words[..], &["reference.exr"], options].concat()))
+    };
+    let json: serde_json::Value = serde_json::from_str(&run(&["--json"])).unwrap();
+    let mse = |when: &str| json[when]["mse"].as_f64().unwrap();
+    assert!(mse("after") < 0.1 * mse("before"), "{json}");
+    assert_eq!(json["passes"].as_array().unwrap().last().unwrap()["pass"], "atrous", "{json}");
+    let compared = stdout(&tallow(&folder, &["compare", "a.exr", "reference.exr", "--json"]));
+    let compared: serde_json::Value = serde_json::from_str(&compared).unwrap();
+    assert_eq!(compared["metrics"]["mse"], json["after"]["mse"], "what is printed is what is written");
+    let text = run(&[]);
+    let expected =
+        ["albedo: albedo.R albedo.G albedo.B", "variance: not there", "position: made of the depth", "median ms"];
+    assert!(expected.iter().all(|part| text.contains(part)), "{text}");
+    assert_eq!(read(&folder, "a.png").width, SIZE);
+}
+
+#[test]
+fn what_cannot_be_filtered_is_told_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "noisy.exr", &noisy(false));
+    let run = |words: &[&str]| tallow(&folder, &[&["filter"], words].concat());
+    complains(&run(&["noisy.exr"]), 2, &["--output"]);
+    complains(&run(&["noisy.exr", "-o", "a.tif"]), 2, &["a.tif", ".exr"]);
+    complains(&run(&["noisy.exr", "-o", "a.exr", "--filter", "median"]), 2, &["'median'", "atrous"]);
+    complains(&run(&["noisy.exr", "-o", "a.exr", "--filter", "atrous", "--levels", "11"]), 2, &["levels", "11"]);
+    complains(&run(&["noisy.exr", "-o", "a.exr", "--device", "no such"]), 4, &["no such"]);
+    complains(&run(&["noisy.exr", "-o", "missing/a.exr"]), 5, &["missing", "create it"]);
+    complains(&run(&["missing.exr", "-o", "a.exr"]), 3, &["missing.exr"]);
+    complains(&run(&["noisy.exr", "-o", "a.exr", "--normal", "bump"]), 3, &["noisy.exr", "normal", "\"bump\"", "N.X"]);
+    complains(&run(&["noisy.exr", "-o", "a.exr", "--colour", "rgb"]), 3, &["noisy.exr", "\"rgb\"", "N.X"]);
+    let mut guides = Film::new(SIZE, SIZE);
+    guides.add_vec3("N", ["X", "Y", "Z"], &vec![[0.0; 3]; guides.pixels()]);
+    write(&folder, "guides.exr", &guides);
+    complains(&run(&["guides.exr", "-o", "a.exr"]), 3, &["guides.exr", "no colour", "N.X"]);
+    write_parts(&folder, "parts.exr", [(8, "rgba", &["R", "G", "B"]), (4, "albedo", &["R", "G", "B"])]);
+    complains(&run(&["parts.exr", "-o", "a.exr"]), 3, &["parts.exr", "albedo", "4x4", "8x8", "at one size"]);
+    let whole = std::fs::read(folder.path().join("noisy.exr")).unwrap();
+    std::fs::write(folder.path().join("cut.exr"), &whole[..whole.len() / 2]).unwrap();
+    complains(&run(&["cut.exr", "-o", "a.exr"]), 3, &["cut.exr", "complete?"]);
+    let mut small = Film::new(8, 8);
+    small.add_vec3("", ["R", "G", "B"], &[[0.5; 3]; 64]);
+    write(&folder, "small.exr", &small);
+    complains(&run(&["noisy.exr", "-o", "a.exr", "--reference", "small.exr"]), 3, &["32x32", "8x8"]);
+    assert!(!folder.path().join("a.exr").exists(), "nothing is written");
+}
+
+/// Direct light stays, and indirect light is that of the render, noise and edges apart.
+#[test]
+fn filtered_light_is_looked_up_in_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/scene.toml");
+    render(&folder, scene, "64");
+    let before = read(&folder, "noisy.exr").channel("R").unwrap().to_f32().into_owned();
+    let looked_up = filter(&folder, &["--filter", "atrous", "--scene", scene, "--eye-rays", "8"]);
+    let plain = filter(&folder, &["--filter", "atrous"]);
+    let distance = |film: &Film| {
+        let after = film.channel("R").unwrap().to_f32();
+        before.iter().zip(after.iter()).map(|(a, b)| (a - b).abs()).sum::<f32>() / before.iter().sum::<f32>()
+    };
+    assert!(distance(&looked_up) < 0.05, "{}", distance(&looked_up));
+    assert_ne!(looked_up.channel("R").unwrap().to_f32(), plain.channel("R").unwrap().to_f32(), "control");
+
+    let run = |words: &[&str]| tallow(&folder, &[&["filter", "-o", "clean.exr"], words].concat());
+    complains(&run(&["noisy.exr", "--scene", "no.toml"]), 3, &["no.toml"]);
+    assert_eq!(run(&["noisy.exr", "--eye-rays", "4"]).status.code(), Some(2));
+    assert_eq!(run(&["noisy.exr", "--scene", scene, "--no-demodulate"]).status.code(), Some(2));
+    let other = scene.replace("scene.toml", "mirror.toml");
+    complains(&run(&["noisy.exr", "--scene", &other]), 3, &["noisy.exr", "another scene"]);
+    write(&folder, "foreign.exr", &noisy(true));
+    complains(&run(&["foreign.exr", "--scene", scene]), 3, &["foreign.exr", "tallow render"]);
+}
+
+#[test]
+fn a_denoised_render_is_the_filtered_file_and_keeps_its_samples() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/scene.toml");
+    let size = SIZE.to_string();
+    let render = |name: &str, more: &[&str]| {
+        let words = ["render", scene, "-o", name, "--width", &size, "--height", &size, "--quiet", "--validation"];
+        let output = tallow(&folder, &[&words, more].concat());
+        assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &b""[..]));
+        read(&folder, name)
+    };
+    let layer = |film: &Film, name: Option<&str>| film.picture(name).unwrap().pixels;
+    let noisy = render("noisy.exr", &["--spp", "4"]);
+    let filtered = filter(&folder, &["--filter", "guided"]);
+    let denoised = render("denoised.exr", &["--spp", "4", "--denoise", "guided"]);
+    assert_eq!(layer(&denoised, None), layer(&filtered, None));
+    assert_eq!(layer(&denoised, Some("Noisy Image")), layer(&noisy, None));
+    assert_ne!(layer(&denoised, None), layer(&noisy, None), "control");
+
+    // Resumed and merged, it is the render that it was.
+    let resumed = render("resumed.exr", &["--spp", "8", "--resume", "denoised.exr"]);
+    assert_eq!(layer(&resumed, None), layer(&render("whole.exr", &["--spp", "8"]), None));
+    render("rest.exr", &["--spp", "4", "--first-sample", "4"]);
+    let merged = ["noisy", "denoised"].map(|name| {
+        let words = ["merge", &format!("{name}.exr"), "rest.exr", "-o", "merged.exr"];
+        assert_eq!(tallow(&folder, &words).status.code(), Some(0));
+        read(&folder, "merged.exr")
+    });
+    assert_eq!(layer(&merged[0], None), layer(&merged[1], None));
+    assert!(merged[1].picture(Some("Noisy Image")).is_err(), "nothing is left of the filter");
+    // Filtered again, the noisy image is what is filtered.
+    std::fs::copy(folder.path().join("denoised.exr"), folder.path().join("noisy.exr")).unwrap();
+    assert_eq!(layer(&filter(&folder, &["--filter", "guided"]), None), layer(&filtered, None));
+    complains(&tallow(&folder, &["render", scene, "--denoise", "gided"]), 2, &["gided", "guided"]);
+    // That file is still whole, and so is a render that was filtered, again and again and in place.
+    let merge = |name: &str| tallow(&folder, &["merge", name, "rest.exr", "-o", "merged.exr"]);
+    assert_eq!(merge("clean.exr").status.code(), Some(0));
+    assert_eq!(layer(&read(&folder, "merged.exr"), None), layer(&merged[0], None));
+    render("noisy.exr", &["--spp", "4"]);
+    let once = filter(&folder, &["--filter", "guided"]);
+    for _ in 0..2 {
+        let again = ["filter", "clean.exr", "-o", "clean.exr", "--filter", "guided", "--quiet"];
+        assert_eq!(tallow(&folder, &again).status.code(), Some(0));
+        assert!(read(&folder, "clean.exr") == once, "it starts from the noisy image");
+    }
+    assert_eq!(merge("clean.exr").status.code(), Some(0));
+    assert_eq!(layer(&read(&folder, "merged.exr"), None), layer(&merged[0], None));
+    let resumed = render("resumed.exr", &["--spp", "8", "--resume", "clean.exr"]);
+    assert_eq!(layer(&resumed, None), layer(&read(&folder, "whole.exr"), None));
+    // Filtered by an older version, which did not keep the noisy image, it has lost its samples' mean.
+    let mut lost = once;
+    lost.channels.retain(|c| !c.name.starts_with("Noisy Image"));
+    write(&folder, "lost.exr", &lost);
+    complains(&merge("lost.exr"), 3, &["lost.exr", "was filtered (guided)", "before"]);
+}
+
+/// As other programs write it: one part, a view layer, half floats.
+#[test]
+fn the_noisy_image_stays_in_the_view_of_its_colour() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut film = noisy(false);
+    film.channels.iter_mut().for_each(|c| c.name = format!("View.{}", c.name.replace("albedo", "DiffCol")));
+    film.channels[..3].iter_mut().for_each(|c| c.name = c.name.replace("View.", "View.Combined."));
+    write(&folder, "noisy.exr", &film);
+    let clean = filter(&folder, &["--filter", "atrous"]);
+    for c in ["R", "G", "B"] {
+        let (kept, was) = (format!("View.Noisy Image.{c}"), format!("View.Combined.{c}"));
+        assert_eq!(clean.channel(&kept), film.channel(&was));
+        assert_ne!(clean.channel(&was), film.channel(&was), "control");
+    }
+    std::fs::copy(folder.path().join("clean.exr"), folder.path().join("noisy.exr")).unwrap();
+    assert!(filter(&folder, &["--filter", "atrous"]) == clean);
+    assert!(filter(&folder, &["--filter", "atrous", "--colour", "Noisy Image"]) == clean, "it is not replaced");
+    // A layer of the only colour there is, under a name of its own, stays the colour.
+    let mut film = noisy(false);
+    film.channels[..3].iter_mut().for_each(|c| c.name = format!("light.{}", c.name));
+    film.channels.retain(|c| !c.name.starts_with("albedo"));
+    write(&folder, "noisy.exr", &film);
+    let clean = filter(&folder, &["--filter", "atrous"]);
+    assert_eq!(clean.picture(None).unwrap().pixels, clean.picture(Some("light")).unwrap().pixels);
+}

@@ -1,0 +1,16 @@
+//! The built program: exit codes, what is printed, and what becomes of files.
+mod adaptive;
+#[cfg(target_os = "linux")]
+#[path = "../support/child.rs"]
+mod child;
+mod codes;
+#[path = "../support/command.rs"]
+mod command;
+mod device;
+mod effects;
+mod filter;
+#[path = "../support/flat.rs"]
+mod flat;
+mod outputs;
+mod resume_merge;
+mod signals;

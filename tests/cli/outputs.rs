@@ -1,0 +1,146 @@
+//! Outputs of the built program: all are tried, none replaces an input or another, and what is printed can be read.
+#![cfg(target_os = "linux")]
+use crate::child::{LONG, OFTEN, Running, SMALL, command, scene};
+use crate::command::complains;
+use std::path::Path;
+use std::process::{Command, Output};
+use tallow::image;
+use tempfile::TempDir;
+
+fn run(folder: &TempDir, words: &str) -> Output {
+    command(folder.path(), words).output().unwrap()
+}
+
+#[track_caller]
+fn well(output: &Output) {
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+}
+
+fn render(folder: &TempDir, words: &str) -> Output {
+    run(folder, &format!("render {} {SMALL} --spp 1 {words}", scene()))
+}
+
+#[test]
+fn an_output_that_fails_keeps_no_other_from_being_written() {
+    let folder = tempfile::tempdir().unwrap();
+    // The picture fits into 64 blocks, all layers do not; SIGXFSZ is not ignored by the caller.
+    let words = format!("render {} {SMALL} --spp 1 -o a.exr -o b.exr -o c.png", scene());
+    let mut limited = Command::new("sh");
+    let script = format!("ulimit -f 64; exec \"$0\" {words}");
+    limited.args(["-c", &script, env!("CARGO_BIN_EXE_tallow")]).current_dir(folder.path());
+    complains(&limited.output().unwrap(), 5, &["a.exr", "; b.exr", "free some space"]);
+    assert!(folder.path().join("c.png").exists() && !folder.path().join("a.exr").exists());
+}
+
+/// Interrupts a render whose folder has gone.
+fn lost_folder(folder: &TempDir, cwd: &str) -> Output {
+    let inside = |name: &str| folder.path().join(name);
+    std::fs::create_dir_all(inside("gone")).unwrap();
+    std::fs::create_dir_all(inside("temporary")).unwrap();
+    let place = inside("gone").display().to_string();
+    let words = format!("render {} {LONG} {OFTEN} -o {place}/a.exr -o {}/b.png", scene(), folder.path().display());
+    let mut begun = command(&inside(cwd), &words);
+    begun.env("TMPDIR", inside("temporary"));
+    let mut running = Running::start(begun, folder.path());
+    running.until_there_is("gone/a.partial.exr");
+    std::fs::rename(inside("gone"), inside("moved")).unwrap();
+    running.send(&["INT"]);
+    running.end()
+}
+
+#[test]
+fn what_could_not_be_written_lies_elsewhere() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.exr"), "mine").unwrap();
+    let output = lost_folder(&folder, ".");
+    let text = String::from_utf8(output.stderr).unwrap();
+    let last = text.lines().last().unwrap();
+    assert_eq!(output.status.code(), Some(5), "{text}");
+    assert!(last.contains("gone/a.exr: cannot be written") && last.contains("(it is in a-2.exr instead)"), "{text}");
+    assert!(image::read(&folder.path().join("a-2.exr")).unwrap().channel("pending").is_some());
+    assert_eq!(std::fs::read(folder.path().join("a.exr")).unwrap(), b"mine");
+    assert!(folder.path().join("b.png").exists());
+}
+
+#[test]
+fn where_the_working_folder_takes_nothing_that_for_temporary_files_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let inside = |name: &str| folder.path().join(name);
+    std::fs::create_dir(inside("cwd")).unwrap();
+    // Its reader goes before anything was read.
+    assert!(Command::new("mkfifo").arg(inside("pipe.exr")).status().unwrap().success());
+    let words = format!("render {} {SMALL} --spp 1 -o {}", scene(), inside("pipe.exr").display());
+    std::fs::create_dir(inside("temporary")).unwrap();
+    let mut begun = command(&inside("cwd"), &words);
+    begun.env("TMPDIR", inside("temporary"));
+    let running = Running::start(begun, folder.path());
+    // Opened, and closed before anything was read.
+    let reader = std::fs::File::open(inside("pipe.exr")).unwrap();
+    std::fs::remove_dir(inside("cwd")).unwrap();
+    drop(reader);
+    complains(&running.end(), 5, &["pipe.exr: cannot be written", "temporary/pipe.exr instead"]);
+    image::read(&inside("temporary/pipe.exr")).unwrap();
+}
+
+#[test]
+fn one_file_for_two_things_is_refused_before_anything_is_done() {
+    let folder = tempfile::tempdir().unwrap();
+    let inside = |name: &str| folder.path().join(name);
+    well(&render(&folder, "-o a.exr -o b.exr"));
+    std::fs::create_dir(inside("x")).unwrap();
+    std::os::unix::fs::symlink("a.exr", inside("link.exr")).unwrap();
+    std::fs::write(inside("s.toml"), "").unwrap();
+    let before = std::fs::read(inside("a.exr")).unwrap();
+    let refused = |words: &str, parts: &[&str]| complains(&run(&folder, words), 2, parts);
+    for (words, other) in [
+        ("-o s.png --heatmap s.png", "-o"),
+        ("-o s.exr --profile ./x/../s.exr", "-o"),
+        ("-o new.exr -o x/../new.exr", "-o"),
+        ("-o a.exr -o link.exr", "-o"),
+        ("--profile s.toml", "the scene"),
+        ("--resume a.exr --profile a.exr", "--resume"),
+        ("--resume a.exr --profile link.exr", "--resume"),
+        ("-o n.exr -o n.partial.exr --checkpoint 5", "-o"),
+    ] {
+        refused(&format!("render s.toml {words}"), &["is the same file as", other]);
+    }
+    refused("filter a.exr -o c.exr -o c.exr", &["same file as -o"]);
+    refused("filter a.exr --reference b.exr -o b.exr", &["same file as --reference"]);
+    std::fs::write(inside("d.png"), "").unwrap();
+    refused("compare a.exr d.png --diff d.png", &["same file as B"]);
+    assert_eq!(std::fs::read(inside("a.exr")).unwrap(), before);
+    assert_eq!(std::fs::read(inside("s.toml")).unwrap(), b"");
+    // What one may want: the same image on in its place.
+    well(&render(&folder, "--resume a.exr -o a.exr"));
+    well(&run(&folder, "filter b.exr --filter none --quiet -o b.exr"));
+    well(&render(&folder, "-o e.exr --profile /dev/null"));
+}
+
+#[test]
+fn read_only_files_are_refused_before_rendering() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    std::fs::write(&path, "old").unwrap();
+    let mode = |mode| std::fs::set_permissions(&path, std::os::unix::fs::PermissionsExt::from_mode(mode)).unwrap();
+    mode(0o444);
+    complains(&run(&folder, "render missing.toml -o a.exr"), 5, &["a.exr", "read-only", "make it writable"]);
+    mode(0o644);
+    complains(&run(&folder, "render missing.toml -o a.exr"), 3, &["missing.toml"]);
+}
+
+#[test]
+fn what_a_terminal_obeys_is_shown_and_not_sent() {
+    let folder = tempfile::tempdir().unwrap();
+    let inside = |name: &str| folder.path().join(name);
+    let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl \u{1b}]0;OWNED\u{7}\nf 1 2 3\n";
+    std::fs::write(inside("a.obj"), mesh).unwrap();
+    let words = ["render", "a.obj", "--width", "8", "--height", "8", "--spp", "1", "-o", "a.png"];
+    let raw = |bytes: &[u8]| bytes.iter().any(|&b| b < 32 && b != b'\n' || b == 127);
+    let output = Command::new(env!("CARGO_BIN_EXE_tallow")).args(words).current_dir(folder.path()).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success() && text.contains("\\u{1b}]0;OWNED\\u{7}"), "{text}");
+    assert!(!raw(&output.stderr) && !raw(&output.stdout), "{output:?}");
+    let name = Path::new("two\nlines\u{1b}[31m.toml");
+    let output = Command::new(env!("CARGO_BIN_EXE_tallow")).arg("render").arg(name).output().unwrap();
+    complains(&output, 3, &["two\\nlines\\u{1b}[31m.toml"]);
+}

@@ -1,0 +1,243 @@
+//! Signals to the built program: what is asked, what is ignored, and what is saved.
+#![cfg(target_os = "linux")]
+use crate::child::{LONG, OFTEN, Running, SMALL, command, scene};
+use crate::command::complains;
+use std::os::unix::process::ExitStatusExt;
+use std::path::Path;
+use std::process::Command;
+use tallow::image::{self, Film, Samples, WriteOptions};
+use tempfile::TempDir;
+
+fn start(folder: &TempDir, words: &str) -> Running {
+    Running::start(command(folder.path(), words), folder.path())
+}
+
+fn film(folder: &TempDir, name: &str) -> Film {
+    image::read(&folder.path().join(name)).unwrap()
+}
+
+/// Memory without a disk, where files need no name on every system; the names that are in it.
+fn in_memory() -> TempDir {
+    tempfile::tempdir_in("/dev/shm").unwrap()
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entry = |e: std::io::Result<std::fs::DirEntry>| e.unwrap().file_name().into_string().unwrap();
+    let mut names: Vec<_> = std::fs::read_dir(folder).unwrap().map(entry).collect();
+    names.sort();
+    names
+}
+
+fn mkfifo(folder: &TempDir, name: &str) {
+    assert!(Command::new("mkfifo").arg(folder.path().join(name)).status().unwrap().success());
+}
+
+#[test]
+fn what_the_caller_has_switched_off_stays_off() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = format!("render {} {SMALL} {OFTEN} --spp 400 -o a.exr", scene());
+    let mut nohup = Command::new("sh");
+    let script = format!("trap '' HUP INT; exec \"$0\" {words}");
+    nohup.args(["-c", &script, env!("CARGO_BIN_EXE_tallow")]).current_dir(folder.path());
+    let mut running = Running::start(nohup, folder.path());
+    running.until_there_is("a.partial.exr");
+    running.send(&["HUP", "INT", "HUP"]);
+    let output = running.end();
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+    assert!(film(&folder, "a.exr").channel("pending").is_none(), "it stopped");
+}
+
+#[test]
+fn signals_that_come_together_ask_once() {
+    for volley in [&["TERM", "HUP"][..], &["INT", "INT", "INT"], &["HUP", "INT", "TERM", "HUP"]] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut running = start(&folder, &format!("render {} {LONG} {OFTEN} -o a.exr", scene()));
+        running.until_there_is("a.partial.exr");
+        running.send(volley);
+        complains(&running.end(), 130, &["interrupted: what there is was written to a.exr; --resume a.exr"]);
+        assert_eq!(names(folder.path()), ["a.exr"], "{volley:?}");
+        let film = film(&folder, "a.exr");
+        assert!(film.channel("pending").is_some());
+        assert!(matches!(film.channel("samples"), Some(Samples::U32(counts)) if counts.iter().any(|&n| n > 0)));
+    }
+}
+
+#[test]
+fn ctrl_c_ends_a_write_that_nobody_reads_after_all_others() {
+    let folder = tempfile::tempdir().unwrap();
+    mkfifo(&folder, "pipe.exr");
+    let words = format!("render {} {SMALL} --spp 2 -o pipe.exr -o a.exr -o a.png --profile t.json", scene());
+    let mut running = start(&folder, &words);
+    // The last of the files.
+    running.until_there_is("t.json");
+    running.send(&["INT"]);
+    complains(&running.end(), 130, &["pipe.exr", "not read", "all files are written"]);
+    assert_eq!(names(folder.path()), ["a.exr", "a.png", "pipe.exr", "t.json"]);
+    // An interrupted render may still have a reader: only Ctrl-C gives it up, however often TERM comes.
+    let mut running = start(&folder, &format!("render {} {LONG} {OFTEN} -o pipe.exr -o b.exr", scene()));
+    running.until_there_is("pipe.partial.exr");
+    running.send(&["TERM"]);
+    running.until_there_is("b.exr");
+    running.until("its checkpoint is gone", |folder| !folder.join("pipe.partial.exr").exists());
+    running.send(&["TERM", "HUP", "INT"]);
+    // One that came while other files were written is not enough.
+    std::thread::sleep(std::time::Duration::from_millis(1100));
+    running.send(&["INT"]);
+    complains(&running.end(), 130, &["pipe.exr", "not read"]);
+    assert!(film(&folder, "b.exr").channel("pending").is_some());
+}
+
+#[test]
+fn a_pipe_gets_the_image_once() {
+    let folder = tempfile::tempdir().unwrap();
+    mkfifo(&folder, "pipe.exr");
+    let words = format!("render {} {SMALL} --spp 2 -o pipe.exr -o a.exr --denoise atrous", scene());
+    let mut running = start(&folder, &words);
+    running.until_there_is("a.exr");
+    let read = std::fs::read(folder.path().join("pipe.exr")).unwrap();
+    let output = running.end();
+    assert!(output.status.success(), "{output:?}");
+    let (read, saved) = (image::decode(&read).unwrap(), film(&folder, "a.exr"));
+    assert!(
+        read.channel("Noisy Image.R").is_some()
+            && read.picture(None).unwrap().pixels == saved.picture(None).unwrap().pixels
+    );
+}
+
+#[test]
+fn ctrl_c_is_heard_while_a_filter_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = format!("render {} --width 768 --height 768 --max-depth 2 --spp 1 --quiet", scene());
+    let mut running = start(&folder, &format!("{words} --denoise auto -o a.exr"));
+    running.until_there_is("a.exr");
+    running.send(&["INT"]);
+    complains(&running.end(), 130, &["the noisy image was written", "--denoise"]);
+    let noisy = film(&folder, "a.exr");
+    assert!(noisy.channel("Noisy Image.R").is_none() && noisy.channel("pending").is_none());
+    let mut running = start(&folder, "filter a.exr --filter auto --quiet -o b.exr");
+    running.until_it_listens();
+    running.send(&["INT"]);
+    complains(&running.end(), 130, &["interrupted: nothing was written"]);
+    assert_eq!(names(folder.path()), ["a.exr"]);
+    mkfifo(&folder, "pipe.exr");
+    let mut running = start(&folder, "filter a.exr --filter none --quiet -o pipe.exr -o c.exr");
+    running.until_there_is("c.exr");
+    running.send(&["TERM"]);
+    complains(&running.end(), 130, &["pipe.exr"]);
+}
+
+#[test]
+fn explain_is_one_process() {
+    let folder = tempfile::tempdir().unwrap();
+    let begun = || {
+        let mut running = start(&folder, &format!("explain {}", scene()));
+        let environment = format!("/proc/{}/environ", running.id());
+        let again =
+            |environment: &[u8]| String::from_utf8_lossy(environment).contains("MESA_SHADER_CACHE_DISABLE=true");
+        running.until("it began again", |_| again(&std::fs::read(&environment).unwrap_or_default()));
+        running.until_it_listens();
+        running
+    };
+    for signal in ["TERM", "INT", "HUP"] {
+        let running = begun();
+        let children = std::fs::read_to_string(format!("/proc/{0}/task/{0}/children", running.id())).unwrap();
+        assert_eq!(children, "", "a child");
+        running.send(&[signal]);
+        complains(&running.end(), 130, &["interrupted"]);
+    }
+    let running = begun();
+    running.send(&["KILL"]);
+    assert_eq!(running.end().status.signal(), Some(9));
+}
+
+#[test]
+fn nothing_hidden_stays_whatever_ends_it() {
+    let folder = in_memory();
+    for signal in ["KILL", "QUIT", "KILL"] {
+        let mut running = start(&folder, &format!("render {} {LONG} {OFTEN} -o a.exr", scene()));
+        running.until("a checkpoint", |folder| names(folder).iter().any(|name| name.ends_with(".exr")));
+        running.send(&[signal]);
+        assert!(running.end().status.signal().is_some());
+        assert!(names(folder.path()).iter().all(|name| name.ends_with(".exr")), "{:?}", names(folder.path()));
+    }
+    // Control: a file that is being written cannot be seen, whenever that is.
+    let path = folder.path().join("b.exr");
+    let before = names(folder.path());
+    image::output::write_with(&path, |stream| {
+        stream.write_all(b"half")?;
+        assert_eq!(names(folder.path()), before);
+        stream.write_all(b"whole")
+    })
+    .unwrap();
+    assert_eq!(std::fs::read(&path).unwrap(), b"halfwhole");
+}
+
+/// Kills a render that writes checkpoints, and resumes it.
+fn killed(words: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let words = format!("render {} {SMALL} --spp 400 {words}", scene());
+    let mut running = start(&folder, &format!("{words} {OFTEN} -o a.exr"));
+    running.until_there_is("a.partial.exr");
+    running.send(&["KILL"]);
+    assert_eq!(running.end().status.signal(), Some(9), "it was over before it could be killed: raise its spp");
+    assert_eq!(names(folder.path()), ["a.partial.exr"]);
+    let part = film(&folder, "a.partial.exr");
+    assert!(part.channel("pending").is_some());
+    for end in ["-o whole.exr".into(), format!("{OFTEN} --resume a.partial.exr -o a.exr")] {
+        let output = command(folder.path(), &format!("{words} {end}")).output().unwrap();
+        assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+    }
+    let (whole, resumed) = (film(&folder, "whole.exr"), film(&folder, "a.exr"));
+    for layer in [None, Some("m2"), Some("direct"), Some("indirect"), Some("samples")] {
+        let [whole, resumed, part] = [&whole, &resumed, &part].map(|film| film.picture(layer).unwrap().pixels);
+        assert!(whole == resumed, "{layer:?}");
+        assert!(whole != part, "the comparison cannot fail");
+    }
+    assert_eq!(names(folder.path()), ["a.exr", "whole.exr"], "the checkpoint is not needed any more");
+}
+
+#[test]
+fn a_killed_render_goes_on_from_its_checkpoint() {
+    killed("");
+    killed("--allocate variance --rounds 20");
+}
+
+#[test]
+fn what_was_finished_is_not_replaced_by_what_was_interrupted() {
+    let folder = tempfile::tempdir().unwrap();
+    let images = "-o a.exr -o a.png --heatmap map.png";
+    let run = |words: &str| command(folder.path(), &format!("render {} {SMALL} {words}", scene())).output().unwrap();
+    assert!(run(&format!("--spp 2 {images}")).status.success());
+    let finished = ["a.exr", "a.png", "map.png"].map(|name| std::fs::read(folder.path().join(name)).unwrap());
+    let mut running = start(&folder, &format!("render {} {LONG} {OFTEN} {images} -o fresh.exr", scene()));
+    running.until_there_is("a.partial.exr");
+    running.send(&["INT"]);
+    complains(
+        &running.end(),
+        130,
+        &["a.partial.exr, a.partial.png, fresh.exr, map.partial.png; --resume a.partial.exr"],
+    );
+    let after = ["a.exr", "a.png", "map.png"].map(|name| std::fs::read(folder.path().join(name)).unwrap());
+    assert!(finished == after, "a finished file was replaced");
+    assert!(film(&folder, "a.partial.exr").channel("pending").is_some());
+    // It goes on from what it wrote, and may replace that.
+    let before = std::fs::read(folder.path().join("a.partial.exr")).unwrap();
+    let words = format!("render {} {LONG} {OFTEN} --resume a.partial.exr -o a.exr", scene());
+    let mut running = start(&folder, &words);
+    let changed = |folder: &Path| std::fs::read(folder.join("a.partial.exr")).unwrap() != before;
+    running.until("it wrote a checkpoint", changed);
+    running.send(&["INT"]);
+    complains(&running.end(), 130, &["written to a.partial.exr; --resume a.partial.exr"]);
+    assert!(!folder.path().join("a.partial-2.exr").exists());
+}
+
+#[test]
+fn a_render_without_layers_keeps_its_checkpoint() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut running = start(&folder, &format!("render {} {LONG} {OFTEN} -o a.png", scene()));
+    running.until_there_is("scene.partial.exr");
+    running.send(&["INT"]);
+    complains(&running.end(), 130, &["a.png", "--resume scene.partial.exr"]);
+    assert_eq!(names(folder.path()), ["a.png", "scene.partial.exr"]);
+    image::write(&folder.path().join("x.exr"), &film(&folder, "scene.partial.exr"), &WriteOptions::default()).unwrap();
+}

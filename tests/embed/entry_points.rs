@@ -1,0 +1,177 @@
+//! What the renderer asks of an engine's device, seen at Vulkan's entry points.
+#![allow(unsafe_code, reason = "an engine's side of the contract is raw Vulkan")]
+use crate::hooks;
+use crate::support::engine::Engine;
+use ash::vk;
+use ash::vk::Handle;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
+use std::sync::mpsc;
+use std::time::Duration;
+use tallow::denoise::Denoiser;
+use tallow::denoise::composition::Demodulation;
+use tallow::denoise::filter::{self, FilterSettings};
+use tallow::error::Error;
+use tallow::gpu::{Buffer, FrameResources, Gpu, RawDevice, Recorder};
+use tallow::render::settings::Settings;
+use tallow::render::{Outputs, Renderer, Step};
+use tallow::scene::Scene;
+
+/// Counts are asked for, so that every kind of pass takes part.
+fn scene() -> Scene {
+    let small = |s: &mut Settings| {
+        (s.width, s.height, s.spp) = (33, 17, 4);
+        s.allocate.policy = "both".into();
+    };
+    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml"), &small).unwrap()
+}
+
+#[test]
+fn nothing_is_created_after_the_first_frame() {
+    let engine = Engine::new();
+    let raw = hooks::between(engine.raw());
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(raw) }.unwrap();
+    let scene = scene();
+    let outputs = Outputs { split_light: true, guides: true, counters: true };
+    let renderer = Renderer::new(&gpu, &scene, outputs).unwrap();
+    let (row, settings) = (filter::find("auto").unwrap(), FilterSettings::default());
+    let denoiser = Denoiser::new(&gpu, &renderer, row, &settings, Demodulation::Light).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let made = hooks::take_calls();
+    for name in ["vkCreateBuffer", "vkAllocateMemory", "vkCreateComputePipelines"] {
+        assert!(made.contains_key(name), "control: {name} is seen when the renderer is made: {made:?}");
+    }
+    for number in 0..3 {
+        engine.run(|commands| {
+            // SAFETY: recording, on this device.
+            let mut rec = unsafe { Recorder::external(&gpu, &mut frame, commands.as_raw()) }.unwrap();
+            renderer.steps().for_each(|step| renderer.record(&mut rec, &step).unwrap());
+            denoiser.record(&mut rec).unwrap();
+        });
+        assert!(frame.times().is_ok());
+        let calls = hooks::take_calls();
+        assert!(number == 0 || calls.is_empty(), "frame {number}: {calls:?}");
+    }
+}
+
+#[test]
+fn a_lost_device_is_one_line_and_exit_code_4() {
+    let engine = Engine::new();
+    let raw = hooks::between(engine.raw());
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(raw) }.unwrap();
+    let renderer = Renderer::new(&gpu, &scene(), Outputs::default()).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    hooks::LOSE.store(true, SeqCst);
+    let lost = renderer.run(&mut frame, &Step::Start).map(drop);
+    hooks::LOSE.store(false, SeqCst);
+    let error = lost.unwrap_err();
+    assert!(matches!(error, Error::DeviceLost(_)) && error.exit_code() == 4);
+    let line = error.to_string();
+    assert!(line.contains("the device was lost") && line.contains("run again") && !line.contains('\n'), "{line}");
+    assert!(renderer.run(&mut frame, &Step::Start).is_ok(), "control: nothing fails without the hook");
+}
+
+/// Out of memory says nothing of the work that was submitted: it is over before anything of it is freed.
+#[test]
+fn a_wait_that_fails_leaves_nothing_in_flight() {
+    let engine = Engine::new();
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(hooks::between(engine.raw())) }.unwrap();
+    let renderer = Renderer::new(&gpu, &scene(), Outputs::default()).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    hooks::take_calls();
+    hooks::WAIT.store(vk::Result::ERROR_OUT_OF_HOST_MEMORY.as_raw(), SeqCst);
+    let failed = renderer.run(&mut frame, &Step::Start).map(drop);
+    hooks::WAIT.store(0, SeqCst);
+    let calls = hooks::take_calls();
+    assert_eq!((calls["vkWaitForFences"], calls.get("vkQueueWaitIdle")), (1, Some(&1)), "{calls:?}");
+    let error = failed.unwrap_err();
+    assert!(matches!(error, Error::Device(_)) && error.to_string().contains("out of memory"), "{error}");
+    assert!(renderer.run(&mut frame, &Step::Start).is_ok(), "the device is as good as before");
+    assert_eq!(hooks::take_calls().get("vkQueueWaitIdle"), None, "control: only after a failure");
+    drop((renderer, frame, gpu));
+    assert!(hooks::take_calls().contains_key("vkFreeMemory"), "control: all is freed in the end");
+}
+
+/// What hangs is neither waited for nor freed, since it may go on using what it was given.
+#[test]
+fn a_device_that_stops_answering_is_given_up_with_all_that_is_on_it() {
+    let engine = Engine::new();
+    let raw = RawDevice { wait_limit: Some(Duration::from_millis(1)), ..hooks::between(engine.raw()) };
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(raw) }.unwrap();
+    let buffer = Buffer::from_slice(&gpu, "kept", &[1u32]).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    hooks::WAIT.store(vk::Result::TIMEOUT.as_raw(), SeqCst);
+    // Nothing is recorded, so that nothing goes on, and the engine has nothing to wait for.
+    let hung = gpu.run(&mut frame, |_| Ok(())).map(drop);
+    hooks::WAIT.store(0, SeqCst);
+    hooks::take_calls();
+    let error = hung.unwrap_err();
+    assert!(matches!(error, Error::DeviceLost(_)) && error.exit_code() == 4);
+    let line = error.to_string();
+    assert!(line.contains("stopped answering") && line.contains("run again") && !line.contains('\n'), "{line}");
+    let again = gpu.run(&mut frame, |rec| rec.fill(&buffer, 0)).map(drop);
+    for refused in [again, buffer.read().map(drop), buffer.write(0, &[2])] {
+        assert!(matches!(refused, Err(Error::DeviceLost(_))), "{refused:?}");
+    }
+    drop((frame, buffer, gpu));
+    let calls = hooks::take_calls();
+    let freed = calls.keys().find(|name| ["Destroy", "Free", "Reset", "Idle"].iter().any(|word| name.contains(word)));
+    assert_eq!(freed, None, "{calls:?}");
+    assert_eq!(engine.messages(), Vec::<String>::new());
+    engine.abandon();
+}
+
+/// A device that is slow goes on; passes that begin and end tell it from one that hangs.
+#[test]
+fn a_device_that_goes_on_is_waited_for() {
+    let engine = Engine::new();
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(hooks::between(engine.raw())) }.unwrap();
+    let buffer = Buffer::from_slice(&gpu, "filled", &[1u32]).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    // Once a pass has ended, the first wait is over time; the second is not.
+    let (device, waits) = (engine.device.clone(), AtomicUsize::new(0));
+    *hooks::BEFORE_WAIT.lock().unwrap() = Some(Box::new(move || {
+        // SAFETY: nobody else uses the engine's device.
+        unsafe { device.device_wait_idle() }.unwrap();
+        let late = if waits.fetch_add(1, SeqCst) == 0 { vk::Result::TIMEOUT } else { vk::Result::SUCCESS };
+        hooks::WAIT.store(late.as_raw(), SeqCst);
+    }));
+    let times = gpu.run(&mut frame, |rec| rec.fill(&buffer, 7));
+    *hooks::BEFORE_WAIT.lock().unwrap() = None;
+    assert_eq!((times.unwrap().len(), buffer.read().unwrap()), (1, vec![7]));
+}
+
+/// Memory that the host maps is not touched while a submission runs, whoever asks.
+#[test]
+fn a_buffer_is_read_and_written_between_submissions() {
+    let engine = Engine::new();
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(hooks::between(engine.raw())) }.unwrap();
+    let buffer = Buffer::from_slice(&gpu, "shared", &[1u32]).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let (running, runs) = mpsc::channel();
+    let (done, seen) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let (is_done, was_seen) = (done.clone(), seen.clone());
+    *hooks::BEFORE_WAIT.lock().unwrap() = Some(Box::new(move || {
+        running.send(()).unwrap();
+        std::thread::sleep(Duration::from_millis(100)); // time enough for who does not wait
+        was_seen.store(is_done.load(SeqCst), SeqCst);
+    }));
+    std::thread::scope(|scope| {
+        let (buffer, done) = (&buffer, &done);
+        scope.spawn(move || {
+            runs.recv().unwrap();
+            assert_eq!(buffer.read().unwrap(), [7]);
+            done.store(true, SeqCst);
+        });
+        gpu.run(&mut frame, |rec| rec.fill(buffer, 7)).unwrap();
+    });
+    *hooks::BEFORE_WAIT.lock().unwrap() = None;
+    assert!(done.load(SeqCst) && !seen.load(SeqCst), "it was read while the submission ran");
+}

@@ -1,0 +1,198 @@
+//! The renderer inside an engine: on the engine's device, into the engine's command buffer, with the bits that the
+//! command line writes.
+#![allow(unsafe_code, reason = "an engine's side of the contract is raw Vulkan")]
+use crate::support::engine::Engine;
+use ash::vk;
+use ash::vk::Handle;
+use bytemuck::Pod;
+use std::path::Path;
+use std::process::Command;
+use tallow::denoise::Denoiser;
+use tallow::denoise::composition::{self, Demodulation};
+use tallow::denoise::filter::{self, FilterSettings};
+use tallow::gpu::{Buffer, FrameResources, Gpu, Location, PixelFormat, Recorder};
+use tallow::image::aov::{Aovs, Names};
+use tallow::image::{self, Film, Samples};
+use tallow::layout::{Camera, Effects, vec3, vec4};
+use tallow::render::settings::Settings;
+use tallow::render::{Layer, OutputView, Outputs, Renderer};
+use tallow::scene::Scene;
+
+const WIDTH: u32 = 65;
+const HEIGHT: u32 = 33;
+const SPP: u32 = 4;
+
+fn scene_file() -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml")
+}
+
+/// One that decides nothing, one that apportions, and one whose lists are of a length that only the device knows.
+const POLICIES: [&str; 3] = ["uniform", "both", "threshold"];
+
+fn small(s: &mut Settings, policy: &str) {
+    (s.width, s.height, s.spp, s.max_depth) = (WIDTH, HEIGHT, SPP, 4);
+    s.allocate.policy = policy.to_owned();
+}
+
+/// The film that the command line writes for the same settings.
+fn command_line(policy: &str) -> Film {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("box.exr");
+    let [width, height, spp] = [WIDTH, HEIGHT, SPP].map(|n| n.to_string());
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tallow"));
+    command.arg("render").arg(scene_file()).arg("-o").arg(&file).arg("--quiet").args(["--max-depth", "4"]);
+    command.args(["--width", &width, "--height", &height, "--spp", &spp, "--allocate", policy]);
+    if let Ok(device) = std::env::var("TALLOW_DEVICE") {
+        command.args(["--device", &device]);
+    }
+    assert!(command.status().unwrap().success());
+    image::read(&file).unwrap()
+}
+
+/// The engine copies every pixel's values out of the strided result, in its own command buffer.
+unsafe fn gather<T: Pod>(device: &ash::Device, commands: vk::CommandBuffer, from: OutputView, to: &Buffer<T>) {
+    let size = size_of::<T>() as u64;
+    let region = |i: usize| vk::BufferCopy {
+        src_offset: from.buffer.offset + from.offset + i as u64 * u64::from(from.stride),
+        dst_offset: to.raw().offset + i as u64 * size,
+        size,
+    };
+    let regions: Vec<_> = (0..to.len()).map(region).collect();
+    let (from, to) = (vk::Buffer::from_raw(from.buffer.handle), vk::Buffer::from_raw(to.raw().handle));
+    unsafe { device.cmd_copy_buffer(commands, from, to, &regions) };
+}
+
+#[test]
+fn an_engine_gets_the_bits_of_the_command_line_frame_after_frame() {
+    let engine = Engine::new();
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
+    POLICIES.iter().for_each(|policy| agrees(&engine, &gpu, policy));
+    assert_eq!(engine.messages(), Vec::<String>::new());
+}
+
+fn agrees(engine: &Engine, gpu: &Gpu, policy: &str) {
+    let scene = Scene::load(&scene_file(), &|s| small(s, policy)).unwrap();
+    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    let mut renderer = Renderer::new(gpu, &scene, outputs).unwrap();
+    let mut frame = FrameResources::new(gpu).unwrap();
+    let pixels = (WIDTH * HEIGHT) as usize;
+    let download = Buffer::<vec3>::new(gpu, "download", pixels, Location::Readback).unwrap();
+    let mut record = |renderer: &Renderer| {
+        engine.run(|commands| unsafe {
+            let mut rec = Recorder::external(gpu, &mut frame, commands.as_raw()).unwrap();
+            for step in renderer.steps() {
+                renderer.record(&mut rec, &step).unwrap();
+            }
+            drop(rec);
+            gather(&engine.device, commands, renderer.views(Layer::Radiance).unwrap()[0], &download);
+        });
+        download.read().unwrap()
+    };
+    let expected = command_line(policy).picture(None).unwrap().pixels;
+    for _ in 0..3 {
+        assert!(record(&renderer) == expected, "{policy}: the engine's pixels are not those of the command line");
+    }
+    // Control: another camera must change the picture.
+    let mut camera = scene.camera;
+    camera.position[0] += 0.1;
+    renderer.set_camera(camera).unwrap();
+    assert!(record(&renderer) != expected, "{policy}: the comparison cannot fail");
+    let lens = Camera { lens_radius: 0.1, ..camera };
+    assert_eq!(renderer.set_camera(lens).unwrap_err().exit_code(), 2, "the kernels were compiled for a pinhole");
+    let effects = Effects { lens: true, ..*renderer.effects() };
+    Renderer::specialised(gpu, &scene, outputs, effects).unwrap().set_camera(lens).unwrap();
+}
+
+/// The layers of the command line's file, as the engine finds them.
+#[test]
+fn an_engine_gets_every_layer() {
+    let engine = Engine::new();
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
+    let scene = Scene::load(&scene_file(), &|s| small(s, "uniform")).unwrap();
+    let renderer = Renderer::new(&gpu, &scene, Outputs { split_light: true, guides: true, counters: false }).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let pixels = (WIDTH * HEIGHT) as usize;
+    let vectors = Buffer::<vec3>::new(&gpu, "vectors", pixels, Location::Readback).unwrap();
+    let words = Buffer::<u32>::new(&gpu, "words", pixels, Location::Readback).unwrap();
+    for step in renderer.steps() {
+        renderer.run(&mut frame, &step).unwrap();
+    }
+    let view = |layer| renderer.views(layer).unwrap()[0];
+    let film = command_line("uniform");
+    for (layer, name) in [
+        (Layer::Radiance, None),
+        (Layer::M2, Some("m2")),
+        (Layer::Direct, Some("direct")),
+        (Layer::Indirect, Some("indirect")),
+        (Layer::Albedo, Some("albedo")),
+        (Layer::Normal, Some("N")),
+        (Layer::Position, Some("P")),
+    ] {
+        // SAFETY: the view is of a live buffer, the download of its length.
+        engine.run(|commands| unsafe { gather(&engine.device, commands, view(layer), &vectors) });
+        assert_eq!(view(layer).format, PixelFormat::R32G32B32Sfloat);
+        assert!(vectors.read().unwrap() == film.picture(name).unwrap().pixels, "{layer:?}");
+    }
+    for (layer, name, format) in [
+        (Layer::Samples, "samples", PixelFormat::R32Uint),
+        (Layer::Depth, "Z", PixelFormat::R32Sfloat),
+        (Layer::Object, "id", PixelFormat::R32Uint),
+    ] {
+        // SAFETY: as above.
+        engine.run(|commands| unsafe { gather(&engine.device, commands, view(layer), &words) });
+        assert_eq!(view(layer).format, format);
+        let expected = match film.channel(name).unwrap() {
+            Samples::U32(values) => values.clone(),
+            Samples::F32(values) => values.iter().map(|v| v.to_bits()).collect(),
+        };
+        assert!(words.read().unwrap() == expected, "{layer:?}");
+    }
+    // Of one pixel, so that the size of a buffer does not tell whether a layer is kept.
+    let one = Scene::load(&scene_file(), &|s| (s.width, s.height) = (1, 1)).unwrap();
+    let plain = Renderer::new(&gpu, &one, Outputs::default()).unwrap();
+    assert!(plain.views(Layer::Radiance).is_ok());
+    assert!([Layer::Indirect, Layer::Depth].iter().all(|&layer| plain.views(layer).unwrap_err().exit_code() == 2));
+    assert_eq!(engine.messages(), Vec::<String>::new());
+}
+
+/// Steps and filter in one command buffer, against the command line's file taken apart, filtered and put together.
+#[test]
+fn an_engine_filters_its_frames_where_they_are() {
+    let engine = Engine::new();
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
+    let scene = Scene::load(&scene_file(), &|s| small(s, "uniform")).unwrap();
+    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    let renderer = Renderer::new(&gpu, &scene, outputs).unwrap();
+    let film = command_line("uniform");
+    let aovs = Aovs::find(&film, &Names::new()).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let download = Buffer::<vec4>::new(&gpu, "download", film.pixels(), Location::Readback).unwrap();
+    let settings = FilterSettings { extent: 5.0, radius: 8, ..FilterSettings::default() };
+    for (name, demodulation) in [("guided", Demodulation::Light), ("auto", Demodulation::Albedo)] {
+        let row = filter::find(name).unwrap();
+        let denoiser = Denoiser::new(&gpu, &renderer, row, &settings, demodulation).unwrap();
+        for _ in 0..2 {
+            engine.run(|commands| unsafe {
+                let mut rec = Recorder::external(&gpu, &mut frame, commands.as_raw()).unwrap();
+                renderer.steps().for_each(|step| renderer.record(&mut rec, &step).unwrap());
+                denoiser.record(&mut rec).unwrap();
+                drop(rec);
+                gather(&engine.device, commands, denoiser.radiance(), &download);
+            });
+        }
+        assert!(frame.times().unwrap().iter().any(|pass| pass.name == "demodulate"), "the filter's passes are timed");
+        let parts = composition::split(&aovs, demodulation);
+        let expected = parts.join(&filter::run(&gpu, row, &parts.input, &settings).unwrap().0);
+        let off = download.read().unwrap().iter().zip(&expected).fold(0f32, |worst, (found, expected)| {
+            (0..3).fold(worst, |worst, c| worst.max((found[c] - expected[c]).abs() / expected[c].abs().max(1e-2)))
+        });
+        assert!(off < 1e-3, "{name}: {off}");
+        let plain = film.picture(None).unwrap().pixels;
+        let moved = expected.iter().zip(&plain).filter(|(a, b)| (a[0] - b[0]).abs() > 1e-2 * b[0].abs()).count();
+        assert!(moved > plain.len() / 4, "control: {moved} pixels are filtered");
+    }
+    assert_eq!(engine.messages(), Vec::<String>::new());
+}

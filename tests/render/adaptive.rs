@@ -1,0 +1,382 @@
+//! Renders that place their samples: the same bits however they are cut, interrupted or dealt to rounds, the right mean,
+//! and pixels without a sample stay well defined.
+use crate::support::{assert_silent, gpu};
+use std::path::Path;
+use tallow::error::Error;
+use tallow::gpu::{FrameResources, Gpu};
+use tallow::layout::{PixelLight, PixelStats};
+use tallow::render::schedule::{self, Cut};
+use tallow::render::settings::Settings;
+use tallow::render::{Outputs, PathRange, Progress, Renderer, Step, path_push};
+use tallow::scene::Scene;
+use tallow::statistics::{Pixel, join};
+
+const POLICIES: [&str; 3] = ["geometry", "variance", "both"];
+const SIZE: [u32; 2] = [33, 17];
+
+fn scene(change: impl Fn(&mut Settings)) -> Scene {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml");
+    let small = |s: &mut Settings| {
+        [s.width, s.height] = SIZE;
+        (s.spp, s.max_depth) = (8, 3);
+        change(s);
+    };
+    Scene::load(&file, &small).unwrap()
+}
+
+fn split() -> Outputs {
+    Outputs { split_light: true, guides: false, counters: false }
+}
+
+fn bits(pixels: &[Pixel]) -> Vec<u32> {
+    let words =
+        |p: &Pixel| bytemuck::cast_slice(&[p.stats]).iter().chain(bytemuck::cast_slice(&[p.light])).copied().collect();
+    pixels.iter().flat_map(|p: &Pixel| -> Vec<u32> { words(p) }).collect()
+}
+
+fn read(renderer: &Renderer) -> Vec<Pixel> {
+    let tile = &renderer.film().tiles[0];
+    let (stats, light) = (tile.stats.read().unwrap(), tile.light.read().unwrap());
+    stats.into_iter().zip(light).map(|(stats, light)| Pixel { stats, light }).collect()
+}
+
+fn list(steps: impl Iterator<Item = Step>) -> Vec<Step> {
+    steps.collect()
+}
+
+fn run(renderer: &Renderer, frame: &mut FrameResources, steps: &[Step]) -> Vec<Pixel> {
+    steps.iter().for_each(|step| drop(renderer.run(frame, step).unwrap()));
+    read(renderer)
+}
+
+fn render(gpu: &Gpu, scene: &Scene) -> Vec<Pixel> {
+    let renderer = Renderer::new(gpu, scene, split()).unwrap();
+    run(&renderer, &mut FrameResources::new(gpu).unwrap(), &list(renderer.steps()))
+}
+
+fn total(pixels: &[Pixel]) -> u64 {
+    pixels.iter().map(|p| u64::from(p.stats.count)).sum()
+}
+
+/// A software device ends a thread's loops after 65,535 rounds, silently, and one pixel may have more samples in a batch.
+#[test]
+fn a_pixel_may_have_any_number_of_samples() {
+    let gpu = gpu();
+    for policy in ["uniform", "variance"] {
+        let scene = scene(|s| {
+            ([s.width, s.height], s.spp, s.max_depth) = ([2, 1], 200_000, 2);
+            s.allocate.policy = policy.into();
+        });
+        let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
+        let mut frame = FrameResources::new(&gpu).unwrap();
+        let whole = run(&renderer, &mut frame, &list(renderer.steps()));
+        assert_eq!(total(&whole), 400_000, "{policy}");
+        assert!(whole.iter().any(|p| p.stats.count >= 200_000), "{policy}: {whole:?}");
+        let steps = list(schedule::steps(&scene.settings, &Cut { pixels: 2, tile: 1 << 20, paths: 9_001 }));
+        assert!(bits(&run(&renderer, &mut frame, &steps)) == bits(&whole), "{policy}");
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn the_budget_is_met_and_no_cut_changes_a_bit() {
+    let gpu = gpu();
+    for policy in POLICIES {
+        let scene = scene(|s| s.allocate.policy = policy.into());
+        let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
+        let mut frame = FrameResources::new(&gpu).unwrap();
+        let whole = run(&renderer, &mut frame, &list(renderer.steps()));
+        assert_eq!(total(&whole), 8 * 33 * 17, "{policy}");
+        let counts: Vec<u32> = whole.iter().map(|p| p.stats.count).collect();
+        assert!(
+            counts.iter().min() < counts.iter().max() && *counts.iter().min().unwrap() >= 2,
+            "{policy}: {counts:?}"
+        );
+        let pixels = SIZE[0] * SIZE[1];
+        for paths in [31, 64, 65, 500, pixels] {
+            let steps = list(schedule::steps(&scene.settings, &Cut { pixels, tile: 1 << 20, paths }));
+            assert!(steps.len() > renderer.steps().count());
+            assert!(bits(&run(&renderer, &mut frame, &steps)) == bits(&whole), "{policy}, batches of {paths}");
+        }
+        // Control: one path fewer shows.
+        let mut steps = list(renderer.steps());
+        if let Some(Step::Listed(range)) = steps.last_mut() {
+            range.paths -= 1;
+        }
+        assert!(bits(&run(&renderer, &mut frame, &steps)) != bits(&whole), "{policy}");
+    }
+    assert_silent(&gpu);
+}
+
+/// RAS as published: at most one sample a round, the same bits for every batch size, and by chance in the end.
+#[test]
+fn a_falling_threshold_gives_at_most_one_sample_a_round() {
+    let gpu = gpu();
+    let with = |spp| {
+        scene(move |s| {
+            (s.spp, s.allocate.policy, s.allocate.min_spp, s.allocate.max_spp) = (spp, "threshold".into(), 2, 16);
+        })
+    };
+    let counts = |pixels: &[Pixel]| pixels.iter().map(|p| p.stats.count).collect::<Vec<_>>();
+    let (frozen, scene) = (counts(&render(&gpu, &with(16))), with(80));
+    assert!(frozen.iter().all(|n| (2..=16).contains(n)), "{frozen:?}");
+    let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let whole = run(&renderer, &mut frame, &list(renderer.steps()));
+    let later: Vec<u32> = counts(&whole).iter().zip(&frozen).map(|(all, before)| all - before).collect();
+    // Each of 64 rounds is a chance of n / 16: binomial, and independent from pixel to pixel. The sum of squared
+    // deviations over their variances is chi-square; pixels with all 16 samples get one every time.
+    let certain = frozen.iter().zip(&later).filter(|&(&n, _)| n == 16);
+    assert!(certain.clone().all(|(_, &n)| n == 64));
+    let (mut chi, mut freedom) = (0.0, 0.0);
+    for (&n, &got) in frozen.iter().zip(&later).filter(|&(&n, _)| n < 16) {
+        let p = f64::from(n) / 16.0;
+        chi += (f64::from(got) - 64.0 * p).powi(2) / (64.0 * p * (1.0 - p));
+        freedom += 1.0;
+    }
+    assert!(freedom > 100.0 && certain.count() > 0, "all alike: the test tests nothing");
+    assert!((chi - freedom).abs() < 5.0 * f64::sqrt(2.0 * freedom), "chi-square {chi} of {freedom}");
+    for paths in [64, 65, SIZE[0] * SIZE[1]] {
+        let cut = Cut { pixels: SIZE[0] * SIZE[1], tile: 1 << 20, paths };
+        let steps = list(schedule::steps(&scene.settings, &cut));
+        assert!(bits(&run(&renderer, &mut frame, &steps)) == bits(&whole), "batches of {paths}");
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn batches_of_one_path_and_rounds_in_any_number_or_order_change_no_bit() {
+    let gpu = gpu();
+    let with = |rounds| {
+        scene(move |s| {
+            (s.width, s.height, s.spp) = (7, 5, 6);
+            (s.allocate.policy, s.allocate.rounds) = ("geometry".into(), rounds);
+        })
+    };
+    let whole = render(&gpu, &with(1));
+    for rounds in [2, 3, 100] {
+        assert!(bits(&render(&gpu, &with(rounds))) == bits(&whole), "{rounds} rounds");
+    }
+    let (scene, cut) = (with(4), Cut { pixels: 35, tile: 1 << 20, paths: 1 });
+    let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    assert!(
+        bits(&run(&renderer, &mut frame, &list(schedule::steps(&scene.settings, &cut)))) == bits(&whole),
+        "one path"
+    );
+    // The rounds backwards: a pixel's next sample is its next, whichever round asks for it.
+    let mut steps = list(renderer.steps());
+    let first = steps.iter().position(|s| matches!(s, Step::Listed(_))).unwrap();
+    steps[first..].reverse();
+    assert!(bits(&run(&renderer, &mut frame, &steps)) == bits(&whole), "backwards");
+    assert_silent(&gpu);
+}
+
+/// What an interrupted render hands over: pixels, and what each still lacks.
+fn interrupted(renderer: &Renderer, frame: &mut FrameResources, steps: &[Step]) -> (Vec<Pixel>, Vec<u32>, u32) {
+    let pixels = run(renderer, frame, steps);
+    let decides = |s: &&Step| matches!(s, Step::Allocate(_) | Step::Choose(_));
+    let allocations = steps.iter().filter(decides).count() as u32;
+    let last = steps.iter().rev().find_map(|step| match step {
+        Step::Listed(range) => Some(Some(*range)),
+        Step::Allocate(_) | Step::Choose(_) => Some(None),
+        _ => None,
+    });
+    let Some(last) = last else {
+        let first = schedule::first_spp(renderer.settings());
+        let lacks = pixels.iter().map(|p| first - p.stats.count).collect();
+        return (pixels, lacks, 0);
+    };
+    let rounds =
+        if renderer.settings().allocate.policy == "geometry" { renderer.settings().allocate.rounds } else { 1 };
+    let none = PathRange { first: 0, paths: 0, round: 0, rounds };
+    let lacks = schedule::pending(&renderer.film().counts.count.read().unwrap(), &last.unwrap_or(none));
+    (pixels, lacks, allocations)
+}
+
+#[test]
+fn a_render_resumed_anywhere_has_the_bits_of_one_that_never_stopped() {
+    let gpu = gpu();
+    for policy in ["uniform", "geometry", "variance", "both", "threshold"] {
+        let scene = scene(|s| {
+            (s.allocate.policy, s.allocate.rounds) = (policy.into(), 4);
+            // The last three of 8 rounds are left to chance.
+            s.allocate.max_spp = if policy == "threshold" { 5 } else { 0 };
+        });
+        let whole = render(&gpu, &scene);
+        let effects = tallow::layout::Effects { adaptive: true, ..tallow::render::called_for(&scene, split()) };
+        let renderer = Renderer::specialised(&gpu, &scene, split(), effects).unwrap();
+        let mut frame = FrameResources::new(&gpu).unwrap();
+        let cut = Cut { pixels: SIZE[0] * SIZE[1], tile: 1 << 20, paths: 300 };
+        let steps = list(schedule::steps(&scene.settings, &cut));
+        for stop in [1, 2, 3, steps.len() / 2, steps.len() - 2, steps.len()] {
+            let (pixels, lacks, allocations) = interrupted(&renderer, &mut frame, &steps[..stop]);
+            let stats: Vec<PixelStats> = pixels.iter().map(|p| p.stats).collect();
+            let light: Vec<PixelLight> = pixels.iter().map(|p| p.light).collect();
+            let pending = lacks.iter().map(|&n| u64::from(n)).sum();
+            let priority = if allocations > 0 { renderer.film().priority.read().unwrap() } else { Vec::new() };
+            renderer.resume(&mut frame, &stats, &light, &priority, &lacks).unwrap();
+            let rest = list(renderer.rest(Progress { allocations, pending }));
+            assert!(bits(&run(&renderer, &mut frame, &rest)) == bits(&whole), "{policy}, stopped after step {stop}");
+        }
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn records_of_another_film_are_an_error() {
+    let gpu = gpu();
+    let scene = scene(|s| s.allocate.policy = "both".into());
+    let (renderer, mut frame) = (Renderer::new(&gpu, &scene, split()).unwrap(), FrameResources::new(&gpu).unwrap());
+    let pixels = (SIZE[0] * SIZE[1]) as usize;
+    let mut resume = |stats: usize, light: usize, priority: usize, lacks: usize| {
+        let (stats, light) = (vec![PixelStats::default(); stats], vec![PixelLight::default(); light]);
+        renderer.resume(&mut frame, &stats, &light, &vec![0.0; priority], &vec![0; lacks])
+    };
+    for wrong in [pixels - 1, pixels + 1, 0] {
+        for [stats, light, priority, lacks] in
+            [[wrong, pixels, 0, pixels], [pixels, wrong, 0, pixels], [pixels, pixels, 0, wrong]]
+        {
+            let error = resume(stats, light, priority, lacks).unwrap_err();
+            assert!(matches!(&error, Error::Usage(line) if line.contains(&format!("{wrong} "))), "{error}");
+        }
+    }
+    assert!(matches!(resume(pixels, pixels, 1, pixels), Err(Error::Usage(_))));
+    for priority in [0, pixels] {
+        resume(pixels, pixels, priority, pixels).unwrap();
+    }
+    assert_silent(&gpu);
+}
+
+/// What policies find once per camera is no priority yet: a file that is written before the first round would show it.
+#[test]
+fn a_start_leaves_priorities_as_they_are() {
+    let gpu = gpu();
+    let pixels = (SIZE[0] * SIZE[1]) as usize;
+    let (stats, light) = (vec![PixelStats::default(); pixels], vec![PixelLight::default(); pixels]);
+    let (priority, lacks) = (vec![7.0; pixels], vec![0; pixels]);
+    for policy in ["geometry", "variance", "both", "threshold"] {
+        let scene = scene(|s| s.allocate.policy = policy.into());
+        let (renderer, mut frame) = (Renderer::new(&gpu, &scene, split()).unwrap(), FrameResources::new(&gpu).unwrap());
+        renderer.resume(&mut frame, &stats, &light, &priority, &lacks).unwrap();
+        renderer.run(&mut frame, &Step::Start).unwrap();
+        assert_eq!(renderer.film().priority.read().unwrap(), priority, "{policy}");
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn disjoint_sample_ranges_join_to_one_render() {
+    let gpu = gpu();
+    let part = |first, spp| render(&gpu, &scene(move |s| (s.first_sample, s.spp) = (first, spp)));
+    let (whole, a, b) = (part(0, 24), part(0, 7), part(7, 17));
+    let joined: Vec<Pixel> = a.iter().zip(&b).map(|(a, b)| join(a, b)).collect();
+    // Each of n = 24 additions of a running mean rounds to 2^-24 of it, and of M2 to as much of M2 and of its change,
+    // n 2^-24 = 1.5e-6 in all; both sides may be off by it.
+    let close =
+        |x: &[f32; 3], y: &[f32; 3]| x.iter().zip(y).all(|(x, y)| (x - y).abs() <= 3e-6 * x.abs().max(y.abs()) + 1e-9);
+    for (one, two) in whole.iter().zip(&joined) {
+        assert_eq!(one.stats.count, two.stats.count);
+        assert!(close(&one.stats.mean, &two.stats.mean) && close(&one.light.indirect, &two.light.indirect));
+        assert!(
+            one.stats.m2.iter().zip(&two.stats.m2).all(|(x, y)| (x - y).abs() <= 1e-5 * x + 1e-6),
+            "{one:?} {two:?}"
+        );
+    }
+    // Control: parts that overlap are not the whole.
+    let wrong: Vec<Pixel> = a.iter().zip(&part(0, 17)).map(|(a, b)| join(a, b)).collect();
+    assert!(!whole.iter().zip(&wrong).all(|(one, two)| close(&one.stats.mean, &two.stats.mean)));
+}
+
+fn average(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len() as f64;
+    values.sum::<f64>() / count
+}
+
+#[test]
+fn geometry_is_unbiased_and_learning_nearly_so() {
+    let gpu = gpu();
+    let picture = |policy: &str, spp, min_spp| {
+        let of = |seed| {
+            render(
+                &gpu,
+                &scene(|s| {
+                    (s.spp, s.seed, s.allocate.policy, s.allocate.min_spp) = (spp, seed, policy.to_owned(), min_spp);
+                }),
+            )
+        };
+        let brightness = |p: Pixel| f64::from(p.stats.mean.iter().sum::<f32>()) / 3.0;
+        let means: Vec<f64> = (1..=8).map(|seed| average(of(seed).into_iter().map(brightness))).collect();
+        let mean = average(means.iter().copied());
+        // Standard error of a mean of eight.
+        (mean, (average(means.iter().map(|m| (m - mean).powi(2))) / 7.0).sqrt())
+    };
+    let reference = picture("uniform", 512, 2);
+    for (policy, min_spp, bias) in [("geometry", 2, 0.0), ("variance", 4, 0.02), ("both", 4, 0.02), ("both", 1, 0.02)] {
+        let (mean, error) = picture(policy, 32, min_spp);
+        let off = (mean - reference.0).abs();
+        println!("{policy}: {mean:.5} +- {error:.5}, uniform {:.5} +- {:.5}", reference.0, reference.1);
+        assert!(off < 4.0 * error.hypot(reference.1) + bias * reference.0, "{policy}: {mean} {error} {reference:?}");
+    }
+}
+
+#[test]
+fn pixels_without_a_sample_are_well_defined() {
+    let gpu = gpu();
+    for policy in POLICIES {
+        let scene =
+            scene(|s| (s.spp, s.allocate.policy, s.allocate.min_spp, s.allocate.rounds) = (1, policy.into(), 0, 1));
+        let pixels = render(&gpu, &scene);
+        assert_eq!(total(&pixels), 33 * 17, "{policy}");
+        let finite = |p: &Pixel| {
+            bytemuck::cast_slice::<_, f32>(&[p.light])
+                .iter()
+                .chain(&p.stats.mean)
+                .chain(&p.stats.m2)
+                .all(|v| v.is_finite())
+        };
+        assert!(pixels.iter().all(finite), "{policy}");
+        let untouched = pixels.iter().filter(|p| p.stats.count == 0);
+        assert!(untouched.clone().all(|p| *p == Pixel::default()), "{policy}");
+        assert!(policy != "geometry" || untouched.count() > 0, "no pixel was left out: the test tests nothing");
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn no_pixel_exceeds_the_largest_number() {
+    let gpu = gpu();
+    for policy in POLICIES {
+        let scene = scene(|s| (s.allocate.policy, s.allocate.max_spp) = (policy.into(), 9));
+        let pixels = render(&gpu, &scene);
+        assert_eq!((total(&pixels), pixels.iter().map(|p| p.stats.count).max()), (8 * 33 * 17, Some(9)), "{policy}");
+    }
+    assert_silent(&gpu);
+}
+
+/// The records of this film are more than one storage binding of the reference device may hold: 1366 rows and no more.
+#[test]
+fn a_film_of_several_storage_bindings_is_placed() {
+    let gpu = gpu();
+    let sized = |policy: &'static str, spp| {
+        scene(move |s| {
+            ([s.width, s.height], s.spp, s.max_depth) = ([2048, 1400], spp, 2);
+            (s.allocate.policy, s.allocate.min_spp) = (policy.into(), 2);
+        })
+    };
+    let outputs = Outputs { guides: true, ..split() };
+    let placed = Renderer::new(&gpu, &sized("both", 3), outputs).unwrap();
+    let windows = placed.film().tiles[0].windows().count();
+    assert!(windows == 2 || gpu.info().max_storage_range > 1 << 27, "{windows} windows");
+    let pixels = run(&placed, &mut FrameResources::new(&gpu).unwrap(), &list(placed.steps()));
+    assert_eq!(total(&pixels), 3 * 2048 * 1400);
+    let alike = render(&gpu, &sized("uniform", 2));
+    let two: Vec<usize> = (0..pixels.len()).filter(|&i| pixels[i].stats.count == 2).collect();
+    assert!(two.iter().filter(|&&i| i >= 2048 * 1370).count() > 1000, "the last rows have too few to compare");
+    assert!(two.iter().all(|&i| bits(&pixels[i..=i]) == bits(&alike[i..=i])), "a pixel of two samples has other light");
+    let (scene, guide) = (sized("both", 3), placed.film().tiles[0].guide.read().unwrap());
+    let push = path_push(&scene);
+    let wrong = |&p: &u32| tallow::twins::primary_hit::guide(&scene, &push, p).object != guide[p as usize].object;
+    assert!((0..2048 * 1400).step_by(997).filter(wrong).count() < 10, "primary hits");
+    assert_silent(&gpu);
+}

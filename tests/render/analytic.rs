@@ -1,0 +1,189 @@
+//! Pictures whose every value is known by derivation, on the device.
+use crate::scattering::scattered_once;
+use crate::support;
+use crate::twin::Workplace;
+use glam::{DVec2, DVec3, dvec2, dvec3, vec3};
+use std::f64::consts::PI;
+use tallow::layout::{BSDF_COATED, PixelStats};
+use tallow::render::{Outputs, Renderer};
+use tallow::scene::Scene;
+use tallow::twins::bsdf::Bsdf;
+
+const SIDE: u32 = 64;
+
+fn rendered(scene: &Scene) -> Vec<PixelStats> {
+    let gpu = support::gpu();
+    let renderer = Renderer::new(&gpu, scene, Outputs::default()).unwrap();
+    let stats = support::render(&gpu, &renderer);
+    support::assert_silent(&gpu);
+    stats
+}
+
+/// A square film: [-1, 1] (right, up) of the middle of pixel `i`.
+fn middle(i: usize) -> DVec2 {
+    let at = |v: usize| (v as f64 + 0.5) * 2.0 / f64::from(SIDE) - 1.0;
+    dvec2(at(i % SIDE as usize), -at(i / SIDE as usize))
+}
+
+const SPOT: DVec3 = dvec3(0.5, 3.0, -0.4);
+const SPOT_TARGET: DVec3 = dvec3(-0.2, 0.0, 0.3);
+const ALBEDO: f64 = 0.5;
+const INTENSITY: f64 = 7.0;
+
+/// Looks down from 4 above at 4 by 4 of a floor, which the spot alone lights.
+fn spot_over_floor() -> Scene {
+    Workplace::new().scene(&format!(
+        "[film]\nwidth = {SIDE}\nheight = {SIDE}\nfilter = 'point'\n[camera]\nposition = [0.0, 4.0, 0.0]\n\
+         target = [0.0, 0.0, 0.0]\nup = [0.0, 0.0, -1.0]\nfov = 53.13010235\n[render]\nspp = 1\nmax_depth = 2\n\
+         [[light]]\ntype = 'spot'\nposition = {:?}\ntarget = {:?}\nintensity = {INTENSITY}\n\
+         cone = 10.0\ncutoff = 25.0\n[[material]]\nname = 'floor'\ncolor = {ALBEDO}\n[[mesh]]\nshape = 'rectangle'\n\
+         material = 'floor'\ntransform = {{ rotate = [-90.0, 0.0, 0.0], scale = 2.5 }}\n",
+        SPOT.to_array(),
+        SPOT_TARGET.to_array()
+    ))
+}
+
+/// From the spot to the floor behind a pixel.
+fn to_floor(pixel: usize) -> DVec3 {
+    let film = middle(pixel);
+    dvec3(2.0 * film.x, 0.0, -2.0 * film.y) - SPOT
+}
+
+/// Degrees from the spot's axis.
+fn angle(pixel: usize) -> f64 {
+    to_floor(pixel).angle_between(SPOT_TARGET - SPOT).to_degrees()
+}
+
+/// albedo / pi I cos / d^2 times the fall-off.
+fn lit_floor(pixel: usize, falloff: impl Fn(f64) -> f64) -> f64 {
+    let way = to_floor(pixel);
+    ALBEDO / PI * INTENSITY * -way.y / way.length().powi(3) * falloff(angle(pixel))
+}
+
+/// Full up to `cone`, none beyond `cutoff`, linear in the angle between the two.
+fn linear(angle: f64) -> f64 {
+    ((25.0 - angle) / 15.0).clamp(0.0, 1.0)
+}
+
+/// Control.
+fn linear_in_the_cosine(angle: f64) -> f64 {
+    let [angle, cone, cutoff] = [angle, 10.0, 25.0].map(|degrees: f64| degrees.to_radians().cos());
+    ((angle - cutoff) / (cone - cutoff)).clamp(0.0, 1.0)
+}
+
+#[test]
+fn a_spot_lights_a_diffuse_floor_by_the_inverse_square() {
+    let stats = rendered(&spot_over_floor());
+    let kinds =
+        [0.0..10.0, 10.0..25.0, 25.0..90.0].map(|r| (0..stats.len()).filter(|&i| r.contains(&angle(i))).count());
+    assert!(kinds.iter().all(|&pixels| pixels > 100), "{kinds:?} in the cone, in the fall-off, in the dark");
+    let largest = ALBEDO / PI * INTENSITY / SPOT.y.powi(2);
+    let off = |falloff: fn(f64) -> f64| {
+        let of_pixel = |(i, s): (usize, &PixelStats)| (f64::from(s.mean[0]) - lit_floor(i, falloff)).abs() / largest;
+        stats.iter().enumerate().map(of_pixel).fold(0.0, f64::max)
+    };
+    println!("off by at most {:.1e} of the largest", off(linear));
+    // Lavapipe's arc cosine brings it to 5e-5.
+    assert!(off(linear) < 3e-4, "{}", off(linear));
+    assert!(off(linear_in_the_cosine) > 0.01, "control: {}", off(linear_in_the_cosine));
+}
+
+const LENS: f64 = 0.3;
+const FOCUS: f64 = 4.0;
+const DEPTH: f64 = 2.0;
+/// Half the edge of the emitting square, and its middle.
+const HALF: f64 = 0.1;
+const PLACE: DVec2 = dvec2(0.25, -0.1);
+
+fn square_out_of_focus(lens: f64) -> Scene {
+    Workplace::new().scene(&format!(
+        "[film]\nwidth = {SIDE}\nheight = {SIDE}\n[camera]\nposition = [0.0, 0.0, {DEPTH}]\ntarget = [0.0, 0.0, 0.0]\n\
+         fov = 53.13010235\nlens_radius = {lens}\nfocus_distance = {FOCUS}\n[render]\nspp = 1024\nmax_depth = 1\n\
+         [[material]]\nname = 'lamp'\nemission = 1.0\n[[mesh]]\nshape = 'rectangle'\nmaterial = 'lamp'\n\
+         transform = {{ translate = [{}, {}, 0.0], scale = {HALF} }}\n",
+        PLACE.x, PLACE.y
+    ))
+}
+
+/// Of the picture in the plane in focus: light times area, middle, mean squared distance from it, and the largest one.
+fn moments(stats: &[PixelStats]) -> (f64, DVec2, f64, f64) {
+    let half = 0.5 * FOCUS; // tan(fov / 2) = 1 / 2
+    let pixel = (2.0 * half / f64::from(SIDE)).powi(2);
+    let points: Vec<_> = (0..stats.len()).map(|i| (f64::from(stats[i].mean[0]), half * middle(i))).collect();
+    let light: f64 = points.iter().map(|(l, _)| l).sum();
+    let centre = points.iter().map(|&(l, p)| l * p).sum::<DVec2>() / light;
+    let spread = points.iter().map(|(l, p)| l * p.distance_squared(centre)).sum::<f64>() / light;
+    let reach = points.iter().filter(|(l, _)| *l > 0.0).map(|(_, p)| p.distance(centre)).fold(0.0, f64::max);
+    // A pixel's own extent adds the variance of a uniform square.
+    (light * pixel, centre, spread - pixel / 6.0, reach)
+}
+
+/// From a point of the lens, the square at depth d covers in the plane in focus, at depth F, a square F / d as large,
+/// moved by (1 - F / d) times the point's place on the lens. All together it is blurred over a disk, the circle of
+/// confusion, whose radius is R |F - d| / d; variances add, and no light is lost.
+fn is_blurred(stats: &[PixelStats], lens: f64) -> Result<(), String> {
+    let (light, centre, spread, reach) = moments(stats);
+    let (half, circle) = (HALF * FOCUS / DEPTH, lens * (FOCUS - DEPTH) / DEPTH);
+    let (exact_light, exact_spread) = (4.0 * half * half, circle * circle / 2.0 + 2.0 * half * half / 3.0);
+    let ok = (light / exact_light - 1.0).abs() < 5e-3
+        && centre.distance(PLACE * FOCUS / DEPTH) < 2e-3
+        && (spread / exact_spread - 1.0).abs() < 0.02
+        && (circle + half..circle + 1.7 * half).contains(&reach); // a pixel beyond the corner at most
+    let found = format!("light {light:.5} {centre:.4} spread {spread:.5} reach {reach:.4}");
+    if ok { Ok(()) } else { Err(format!("{found}, expected {exact_light:.5}, {exact_spread:.5}, {circle} + {half}")) }
+}
+
+#[test]
+fn a_lens_blurs_over_its_circle_of_confusion() {
+    let pictures = [LENS, 0.0].map(|lens| rendered(&square_out_of_focus(lens)));
+    is_blurred(&pictures[0], LENS).unwrap();
+    is_blurred(&pictures[1], 0.0).unwrap();
+    assert!(is_blurred(&pictures[0], 1.03 * LENS).is_err(), "control: another lens");
+    assert!(is_blurred(&pictures[1], LENS).is_err(), "control: a pinhole");
+}
+
+/// A sheet in the plane z = 0 in a sky of radiance 1, seen from afar, `degrees` from +z.
+fn sheet_in_the_sky(material: &str, degrees: f32) -> Scene {
+    let (s, c) = degrees.to_radians().sin_cos();
+    Workplace::new().scene(&format!(
+        "[film]\nwidth = 32\nheight = 32\n[camera]\nposition = [{}, 0.0, {}]\ntarget = [0.0, 0.0, 0.0]\nfov = 0.1\n\
+         [render]\nspp = 256\nmax_depth = 2\n[environment]\nradiance = 1.0\n[[material]]\nname = 'sheet'\n{material}\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'sheet'\n",
+        20.0 * s,
+        20.0 * c
+    ))
+}
+
+/// Refracted radiance is divided by the relative index squared.
+fn left_of_the_sky(b: &Bsdf, degrees: f32) -> f64 {
+    let (s, c) = degrees.to_radians().sin_cos();
+    let eta = f64::from(if c < 0.0 { 1.0 / b.eta.x } else { b.eta.x });
+    let [reflected, refracted] = scattered_once(b, vec3(s, 0.0, c));
+    reflected + refracted / (eta * eta)
+}
+
+#[test]
+fn rough_sheets_show_what_single_scattering_leaves_of_a_white_sky() {
+    let glass = |rest: &str| format!("type = 'dielectric'\nior = 1.5\n{rest}\n");
+    let coat = |rest: &str| format!("type = 'coated'\ncolor = 1.0\nior = 1.5\n{rest}\n");
+    for (material, degrees) in [
+        (glass("alpha = 0.8"), 35.0),
+        (glass("alpha = 0.5\ndistribution = 'ggx'"), 60.0),
+        (glass("alpha = 0.4\ndistribution = 'ggx'"), 140.0), // from inside
+        (coat("alpha = 0.2"), 75.0),
+        (coat("alpha = 0.6\ndistribution = 'ggx'"), 40.0),
+    ] {
+        let scene = sheet_in_the_sky(&material, degrees);
+        let sheet = &scene.materials[scene.triangles[0].material as usize];
+        let b = Bsdf::new(sheet, sheet.alpha, &scene.texels);
+        let exact = left_of_the_sky(&b, degrees);
+        let stats = rendered(&scene);
+        let mean = stats.iter().map(|s| f64::from(s.mean[0])).sum::<f64>() / stats.len() as f64;
+        println!("{mean:.5}, by quadrature {exact:.5}");
+        // A coat's table stands for its quadrature.
+        let tolerance = if b.kind == BSDF_COATED { 3e-3 } else { 1e-3 };
+        assert!((mean - exact).abs() < tolerance, "{mean}, by quadrature {exact}: {degrees} degrees, {material}");
+        let smoother = left_of_the_sky(&Bsdf::new(sheet, 0.8 * b.alpha, &scene.texels), degrees);
+        assert!((mean - smoother).abs() > tolerance, "control: {degrees} degrees, {material}");
+    }
+}

@@ -1,0 +1,16 @@
+//! Whole renders on the device: against themselves, known answers and an independent renderer.
+mod adaptive;
+#[path = "../support/alike.rs"]
+mod alike;
+mod analytic;
+mod references;
+#[path = "../support/scattering.rs"]
+#[allow(dead_code)]
+mod scattering;
+#[path = "../support/statistics.rs"]
+mod statistics;
+#[path = "../support/mod.rs"]
+mod support;
+#[path = "../support/twin.rs"]
+mod twin;
+mod whole;

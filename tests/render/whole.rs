@@ -1,0 +1,426 @@
+//! Whole renders: the same bits however the work is cut and, but for rounding, whatever is compiled in, furnaces whose
+//! answer is known, and no broken pixel anywhere.
+use crate::alike::alike;
+use crate::support;
+use std::path::Path;
+use tallow::gpu::{FrameResources, Gpu};
+use tallow::layout::{BSDF_COATED, BSDF_DIFFUSE, Effects, Guide, Material, NONE, PixelLight, PixelStats, Triangle};
+use tallow::render::settings::{PixelFilter, Sampler, Settings};
+use tallow::render::{self, Batch, Outputs, Renderer, Step};
+use tallow::scene::Scene;
+use tallow::statistics::BrokenSamples;
+
+fn scene(file: &str, change: impl Fn(&mut Settings)) -> Scene {
+    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file), &change).unwrap()
+}
+
+fn small(s: &mut Settings) {
+    (s.width, s.height, s.spp) = (33, 17, 4);
+}
+
+fn bits(stats: &[PixelStats]) -> Vec<u32> {
+    bytemuck::cast_slice(stats).to_vec()
+}
+
+/// Every scene that the repository ships.
+fn scenes() -> Vec<String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let files = |folder: std::fs::DirEntry| {
+        let name = folder.file_name().into_string().unwrap();
+        let inside = std::fs::read_dir(folder.path()).unwrap();
+        inside.map(move |f| format!("{name}/{}", f.unwrap().file_name().into_string().unwrap()))
+    };
+    let folders = std::fs::read_dir(root).unwrap().map(Result::unwrap).filter(|f| f.path().is_dir());
+    let mut all: Vec<_> = folders.flat_map(files).filter(|f| f.ends_with(".toml")).collect();
+    all.sort();
+    assert!(all.len() >= 12, "{all:?}");
+    all
+}
+
+/// The samples' rays against the counters, which atomics make.
+#[test]
+fn samples_know_their_rays() {
+    let gpu = support::gpu();
+    for split_light in [false, true] {
+        let scene = scene("cornell-box/glass.toml", small);
+        let renderer = Renderer::new(&gpu, &scene, Outputs { split_light, guides: false, counters: true }).unwrap();
+        support::render(&gpu, &renderer); // one batch
+        let records = if split_light { 3 } else { 1 };
+        let samples = renderer.film().samples.read().unwrap();
+        assert_eq!(samples.len(), 33 * 17 * 4 * records, "one batch");
+        let rays: f64 = samples.iter().step_by(records).map(|s| f64::from(s[3])).sum();
+        assert_eq!(rays, renderer.counters().unwrap().rays() as f64, "split_light {split_light}");
+        assert!(rays > f64::from(2 * 33 * 17 * 4), "control: {rays}");
+    }
+    support::assert_silent(&gpu);
+}
+
+/// The effects that change the picture when they are compiled in alone, for the message of a failure.
+fn culprits(gpu: &Gpu, scene: &Scene, expected: &[PixelStats]) -> String {
+    let called_for = render::called_for(scene, Outputs::default());
+    let effects = Effects::NAMES.iter().copied().zip(called_for.switches());
+    let off = effects.filter(|(name, on)| !on && *name != "independent_sampler").map(|(name, _)| name);
+    let changes = |name: &&str| {
+        let other = Renderer::specialised(gpu, scene, Outputs::default(), called_for.toggled(name)).unwrap();
+        bits(&support::render(gpu, &other)) != bits(expected)
+    };
+    off.filter(changes).collect::<Vec<_>>().join(", ")
+}
+
+/// What is called for, and all effects.
+fn plain_and_all(gpu: &Gpu, scene: &Scene) -> [Renderer; 2] {
+    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    let all = Renderer::specialised(gpu, scene, outputs, render::all_effects(scene));
+    [Renderer::new(gpu, scene, outputs).unwrap(), all.unwrap()]
+}
+
+/// llvmpipe rounds as the source says. Other drivers fuse and reorder arithmetic in one kernel and not in another; what
+/// they make of the same samples must then be alike, by a z-test.
+fn alike_with_all_effects(gpu: &Gpu, file: &str, renders: usize) -> Result<(), String> {
+    if gpu.info().name.contains("llvmpipe") {
+        return Err("the bits differ".to_owned());
+    }
+    let scene = scene(file, more_samples);
+    let [a, b] = plain_and_all(gpu, &scene).map(|renderer| support::render(gpu, &renderer));
+    println!("{file}: the bits differ with all effects compiled in; judged by a z-test");
+    alike(&a, &b, renders)
+}
+
+/// As many as know their own error.
+fn more_samples(s: &mut Settings) {
+    small(s);
+    s.spp = 16;
+}
+
+#[test]
+fn every_scene_renders_finite_pixels_and_the_same_with_all_effects() {
+    let gpu = support::gpu();
+    let files = scenes();
+    for file in &files {
+        let scene = scene(file, small);
+        let [plain, all] = plain_and_all(&gpu, &scene);
+        let (a, b) = (support::render(&gpu, &plain), support::render(&gpu, &all));
+        assert!(a.iter().all(|s| s.mean.iter().chain(&s.m2).all(|v| v.is_finite())), "{file}: broken pixels");
+        assert!(a.iter().any(|s| s.mean != [0.0; 3]), "{file}: black");
+        if bits(&a) != bits(&b) {
+            alike_with_all_effects(&gpu, file, files.len())
+                .unwrap_or_else(|e| panic!("{file}: {e}; effects that change it: {}", culprits(&gpu, &scene, &a)));
+        }
+        let light = plain.film().tiles[0].light.read().unwrap();
+        assert!(light.iter().all(|l| l.direct.iter().chain(&l.indirect).all(|v| v.is_finite())), "{file}");
+    }
+    support::assert_silent(&gpu);
+}
+
+/// The z-test that other devices are judged by, on any device.
+#[test]
+fn renders_that_rounding_tells_apart_are_alike_and_faults_are_not() {
+    let gpu = support::gpu();
+    let render = |file: &str, seed: u32, change: fn(&mut Effects)| {
+        let scene = scene(file, |s| {
+            more_samples(s);
+            s.seed = seed;
+        });
+        let mut effects = render::called_for(&scene, Outputs::default());
+        change(&mut effects);
+        support::render(&gpu, &Renderer::specialised(&gpu, &scene, Outputs::default(), effects).unwrap())
+    };
+    let scaled = |s: PixelStats, by: f32| PixelStats { mean: s.mean.map(|v| v * by), ..s };
+    for file in ["cornell-box/scene.toml", "cornell-box/glass.toml", "grass/scene.toml"] {
+        let (a, other) = (render(file, 1, |_| {}), render(file, 2, |_| {}));
+        let changed = |change: &dyn Fn(PixelStats, PixelStats, usize) -> PixelStats| -> Vec<_> {
+            (0..a.len()).map(|i| change(a[i], other[i], i)).collect()
+        };
+        let verdict = |b: &[PixelStats]| alike(&a, b, scenes().len());
+        for (what, b) in [
+            ("the same", a.clone()),
+            ("another seed", other.clone()),
+            ("paths that turn", changed(&|a, b, i| if i % 100 == 0 { b } else { a })),
+            ("rounding", changed(&|a, _, _| scaled(a, 1.00005))),
+        ] {
+            verdict(&b).unwrap_or_else(|e| panic!("{file}: {what}: {e}"));
+        }
+        for (what, b) in [
+            ("2 % brighter, and paths that turn", changed(&|a, b, i| scaled(if i % 100 == 0 { b } else { a }, 1.02))),
+            ("broken pixels", changed(&|a, _, i| if i % 50 == 0 { scaled(a, 9.0) } else { a })),
+        ] {
+            assert!(verdict(&b).is_err(), "{file}: {what}");
+        }
+    }
+    let without = render("cornell-box/scene.toml", 1, |effects| effects.emissive = false);
+    assert!(alike(&render("cornell-box/scene.toml", 1, |_| {}), &without, 1).is_err(), "an effect that is left out");
+    support::assert_silent(&gpu);
+}
+
+#[test]
+fn the_cut_into_batches_changes_no_bit() {
+    let gpu = support::gpu();
+    let scene = scene("cornell-box/scene.toml", small);
+    let renderer = Renderer::new(&gpu, &scene, Outputs::default()).unwrap();
+    let whole = support::render(&gpu, &renderer);
+    let pixels = 33 * 17;
+    for (run, depth) in [(1, 4), (31, 1), (64, 3), (65, 2), (pixels, 1)] {
+        let mut steps = vec![Step::Start];
+        for first_sample in (0..4).step_by(depth as usize) {
+            for first_pixel in (0..pixels).step_by(run as usize) {
+                let (pixels, samples) = (run.min(pixels - first_pixel), depth.min(4 - first_sample));
+                steps.push(Step::Uniform(Batch { first_pixel, pixels, first_sample, samples }));
+            }
+        }
+        assert!(bits(&support::render_steps(&gpu, &renderer, &steps)) == bits(&whole), "{run} x {depth}");
+    }
+    // A step of a larger renderer would be written beyond this one's buffers.
+    let foreign = Step::Uniform(Batch { first_pixel: 1, pixels, first_sample: 0, samples: 1 });
+    let refused = renderer.run(&mut FrameResources::new(&gpu).unwrap(), &foreign).unwrap_err();
+    assert!(refused.to_string().contains("of another renderer"), "{refused}");
+    // Control: one sample left out must show.
+    let part = Step::Uniform(Batch { first_pixel: 0, pixels, first_sample: 0, samples: 3 });
+    assert!(bits(&support::render_steps(&gpu, &renderer, &[Step::Start, part])) != bits(&whole));
+    support::assert_silent(&gpu);
+}
+
+/// Mean over the film and its standard error, per channel.
+fn mean(stats: &[PixelStats]) -> [(f64, f64); 3] {
+    let n = stats.len() as f64;
+    std::array::from_fn(|c| {
+        let sum: f64 = stats.iter().map(|s| f64::from(s.mean[c])).sum();
+        let spread: f64 =
+            stats.iter().map(|s| f64::from(s.m2[c]) / (f64::from(s.count) * f64::from(s.count - 1))).sum();
+        (sum / n, spread.sqrt() / n)
+    })
+}
+
+fn furnace(file: &str, depth: u32, spp: u32) -> [(f64, f64); 3] {
+    let gpu = support::gpu();
+    let scene = scene(file, |s| {
+        (s.width, s.height, s.spp, s.max_depth, s.roulette_depth) = (64, 64, spp, depth, 0);
+    });
+    let renderer = Renderer::new(&gpu, &scene, Outputs::default()).unwrap();
+    let stats = support::render(&gpu, &renderer);
+    support::assert_silent(&gpu);
+    mean(&stats)
+}
+
+/// An object that absorbs nothing, in a constant environment of radiance 1, cannot be seen: every path that leaves
+/// carries 1. Cut at d edges, a diffuse body loses what its paths would have carried on; a convex one loses nothing.
+fn is_invisible(file: &str, depth: u32) {
+    for (mean, error) in furnace(file, depth, 64) {
+        println!("{file}: {mean:.6} +- {error:.6}");
+        assert!((mean - 1.0).abs() <= 1e-3, "{file}: {mean} +- {error}");
+    }
+}
+
+#[test]
+fn a_white_body_vanishes_in_the_furnace() {
+    is_invisible("furnace/scene.toml", 8);
+}
+
+#[test]
+fn a_coated_white_body_vanishes_in_the_furnace() {
+    is_invisible("furnace/coated.toml", 8);
+}
+
+#[test]
+fn a_mirror_vanishes_in_the_furnace() {
+    is_invisible("furnace/mirror.toml", 8);
+}
+
+#[test]
+fn glass_vanishes_in_the_furnace() {
+    is_invisible("furnace/glass.toml", 64);
+}
+
+/// Rays that meet the rim of a sphere are mirrored into the sky as others are: there is no facet to look past.
+#[test]
+fn every_pixel_of_a_mirror_in_the_furnace_is_white() {
+    let gpu = support::gpu();
+    let worst = |specular: f32| {
+        let mut scene = scene("furnace/mirror.toml", |s| (s.width, s.height, s.spp) = (64, 64, 32));
+        scene.materials.iter_mut().for_each(|m| m.specular = [specular; 3]);
+        let stats = support::render(&gpu, &Renderer::new(&gpu, &scene, Outputs::default()).unwrap());
+        stats.iter().flat_map(|s| s.mean).map(|v| (v - 1.0).abs()).fold(0.0, f32::max)
+    };
+    let off = worst(1.0);
+    assert!(off < 1e-5, "off by {off:e}");
+    assert!(worst(0.999) > 5e-4, "control: a mirror that absorbs");
+    support::assert_silent(&gpu);
+}
+
+/// Entering glass scales radiance by 1 / eta^2 = 0.44, and leaving it by eta^2. Roulette that took the former for a loss would
+/// end more than half of all paths through the ball, and the variance of a sample be above 1; it ends 5 % at each surface.
+#[test]
+fn roulette_knows_that_glass_loses_no_light() {
+    let gpu = support::gpu();
+    let scene = scene("furnace/glass.toml", |s| {
+        (s.width, s.height, s.spp, s.max_depth, s.roulette_depth) = (64, 64, 64, 512, 1);
+    });
+    let stats = support::render(&gpu, &Renderer::new(&gpu, &scene, Outputs::default()).unwrap());
+    for (mean, error) in mean(&stats) {
+        assert!((mean - 1.0).abs() <= 4.0 * error + 1e-3, "{mean} +- {error}");
+    }
+    let middle = |i: &usize| (24..40).contains(&(i % 64)) && (24..40).contains(&(i / 64));
+    let variance = (0..64 * 64).filter(middle).map(|i| stats[i].m2[1] / 63.0).sum::<f32>() / 256.0;
+    assert!((0.05..0.3).contains(&variance), "{variance}");
+    support::assert_silent(&gpu);
+}
+
+/// A Cornell box whose floor is black plastic, or black without a coat.
+fn black_floor(coated: bool) -> Scene {
+    let mut scene = scene("cornell-box/scene.toml", |s| (s.width, s.height, s.spp) = (32, 32, 64));
+    let plastic = Material {
+        kind: if coated { BSDF_COATED } else { BSDF_DIFFUSE },
+        base_color: [0.005; 3],
+        eta: [1.5; 3],
+        specular: [1.0; 3],
+        internal_fresnel: tallow::twins::fresnel::internal_fresnel(1.5) as f32,
+        ..scene.materials[0]
+    };
+    let own = scene.materials.len() as u32;
+    scene.materials.push(plastic);
+    scene.names.materials.push("plastic".to_owned());
+    let lies = |t: &Triangle| [t.v0, t.v1, t.v2].iter().all(|v| v[1].abs() < 1e-3);
+    scene.triangles.iter_mut().filter(|t| lies(t)).for_each(|t| t.material = own);
+    scene
+}
+
+/// Radiance, light and guides.
+fn apart(gpu: &Gpu, scene: &Scene) -> (Vec<PixelStats>, Vec<PixelLight>, Vec<Guide>) {
+    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    let renderer = Renderer::new(gpu, scene, outputs).unwrap();
+    let stats = support::render(gpu, &renderer);
+    let tile = &renderer.film().tiles[0];
+    (stats, tile.light.read().unwrap(), tile.guide.read().unwrap())
+}
+
+/// The image of the walls in a smooth coat, 4 % and more of their light, over an albedo of 0.005, would be an irradiance of
+/// 8 times that light and more, which every filter would blur.
+#[test]
+fn what_a_smooth_coat_mirrors_is_direct_light() {
+    let gpu = support::gpu();
+    let [(coated, light, guide), (_, plain_light, _)] = [true, false].map(|coated| apart(&gpu, &black_floor(coated)));
+    let shows_floor = |g: &Guide| g.material != NONE && g.position[1].abs() < 1e-3;
+    let floor = |light: &[PixelLight]| {
+        let seen = light.iter().zip(&guide).filter(|(_, g)| shows_floor(g));
+        let sum = |(sum, n): (f64, f64), (l, _): (&PixelLight, _)| (sum + f64::from(l.indirect[1]), n + 1.0);
+        let (sum, n) = seen.fold((0.0, 0.0), sum);
+        assert!(n > 50.0, "{n} pixels show the floor");
+        sum / n
+    };
+    let share = floor(&light) / floor(&plain_light);
+    assert!((0.7..1.2).contains(&share), "irradiance under the coat is {share} of that without it");
+    // The base alone, through the coat.
+    let albedo = guide.iter().find(|g| shows_floor(g)).unwrap().albedo[1];
+    assert!((0.002..0.0049).contains(&albedo), "{albedo}");
+    // Keeping light apart changes no bit of the radiance.
+    let whole = support::render(&gpu, &Renderer::new(&gpu, &black_floor(true), Outputs::default()).unwrap());
+    assert!(bits(&whole) == bits(&coated));
+    support::assert_silent(&gpu);
+}
+
+/// A point light so near to a floor, below what pixel 2, 2 of 5 x 5 shows, that its irradiance is no number there: 1e30 W/sr
+/// over (1e-5)^2.
+fn too_bright(change: impl Fn(&mut Settings)) -> Scene {
+    let text = "[camera]\nposition = [0.0, 0.0, 2.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 45.0\n\
+                [film]\nwidth = 5\nheight = 5\n[render]\nspp = 4\nmax_depth = 2\n\
+                [[light]]\ntype = 'point'\nposition = [0.0, 0.0, 1e-5]\nintensity = [1e30, 1e30, 1e30]\n\
+                [[mesh]]\nshape = 'rectangle'\n";
+    let centres = |s: &mut Settings| {
+        s.filter = PixelFilter::Point;
+        change(s);
+    };
+    Scene::parse(Path::new("too_bright.toml"), text, &centres).unwrap()
+}
+
+#[test]
+fn samples_that_are_no_numbers_are_black_and_told() {
+    let gpu = support::gpu();
+    for policy in ["uniform", "variance", "both"] {
+        let scene = too_bright(|s| (s.allocate.policy, s.first_sample) = (policy.to_owned(), 10));
+        let outputs = Outputs { split_light: true, guides: true, counters: false };
+        let renderer = Renderer::new(&gpu, &scene, outputs).unwrap();
+        let mut frame = FrameResources::new(&gpu).unwrap();
+        renderer.steps().for_each(|step| drop(renderer.run(&mut frame, &step).unwrap()));
+        let (stats, broken) = (support::stats(&renderer), renderer.broken_samples().unwrap().unwrap());
+        let expected = BrokenSamples { count: stats[12].count.into(), pixel: [2, 2], sample: 10, seed: 0 };
+        assert_eq!(broken, expected, "{policy}");
+        assert!(stats[12].count > 0 && stats[12].mean == [0.0; 3], "{policy}: {:?}", stats[12]);
+        let (others, light) = ([&stats[..12], &stats[13..]].concat(), renderer.film().tiles[0].light.read().unwrap());
+        assert!(others.iter().all(|s| s.mean[0] > 1e20 && s.mean[0].is_finite()), "control: {policy}");
+        assert!(stats.iter().all(|s| s.m2.iter().all(|v| v.is_finite())), "{policy}");
+        assert!(light.iter().all(|l| l.indirect_m2.is_finite()), "{policy}");
+        // Whatever is in the film before, a start forgets it.
+        renderer.run(&mut frame, &Step::Start).unwrap();
+        assert_eq!(renderer.broken_samples().unwrap(), None);
+    }
+    support::assert_silent(&gpu);
+}
+
+/// Whatever batches the work is cut into, it is the first of the lowest pixel that is told.
+#[test]
+fn the_first_broken_sample_does_not_depend_on_batches() {
+    let gpu = support::gpu();
+    let scene = too_bright(|_| {});
+    let renderer = Renderer::new(&gpu, &scene, Outputs::default()).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let batch = |first_pixel, pixels, first_sample, samples| Batch { first_pixel, pixels, first_sample, samples };
+    let cuts = [
+        vec![batch(0, 25, 0, 4)],
+        (0..4).map(|k| batch(0, 25, k, 1)).collect(),
+        (0..25).rev().map(|pixel| batch(pixel, 1, 0, 4)).collect(),
+    ];
+    for cut in cuts {
+        renderer.run(&mut frame, &Step::Start).unwrap();
+        cut.iter().for_each(|&batch| drop(renderer.run(&mut frame, &Step::Uniform(batch)).unwrap()));
+        let expected = BrokenSamples { count: 4, pixel: [2, 2], sample: 0, seed: 0 };
+        assert_eq!(renderer.broken_samples().unwrap(), Some(expected), "{cut:?}");
+    }
+}
+
+/// A closed box that emits E = 1 everywhere and reflects rho = 0.5: after d edges the radiance is
+/// E (1 + rho + ... + rho^(d - 1)) = E (1 - rho^d) / (1 - rho).
+#[test]
+fn a_closed_box_holds_the_geometric_series() {
+    for depth in 1..=6 {
+        let expected = (1.0 - 0.5f64.powi(depth as i32)) / 0.5;
+        for (mean, error) in furnace("furnace/box.toml", depth, 64) {
+            println!("depth {depth}: {mean:.5} +- {error:.5}, expected {expected:.5}");
+            assert!((mean - expected).abs() <= 4.0 * error + 1e-4 * expected, "depth {depth}: {mean}, not {expected}");
+        }
+    }
+}
+
+#[test]
+fn filters_and_samplers_agree_on_the_mean() {
+    let gpu = support::gpu();
+    let render = |filter: PixelFilter, sampler: Sampler| {
+        let scene = scene("cornell-box/scene.toml", |s| {
+            (s.width, s.height, s.spp, s.max_depth, s.filter, s.sampler) = (64, 64, 64, 3, filter, sampler);
+        });
+        mean(&support::render(&gpu, &Renderer::new(&gpu, &scene, Outputs::default()).unwrap()))
+    };
+    let reference = render(PixelFilter::Box, Sampler::Sobol);
+    let independent = render(PixelFilter::Box, Sampler::Independent);
+    for ((a, _), (b, error)) in reference.iter().zip(&independent) {
+        // Sobol's own error is far below what its samples' variance says.
+        assert!((a - b).abs() < 4.0 * error, "sampler: {a} {b} +- {error}");
+    }
+    for filter in [PixelFilter::Tent, PixelFilter::Gaussian] {
+        for ((a, _), (b, error)) in reference.iter().zip(&render(filter, Sampler::Sobol)) {
+            // The filters look past the film's border, which here is black on all sides.
+            assert!((a - b).abs() < 0.03 * a + 4.0 * error, "{filter:?}: {a} {b}");
+        }
+    }
+    support::assert_silent(&gpu);
+}
+
+#[test]
+fn an_effect_that_is_called_for_and_left_out_shows() {
+    // Control of the bit comparison above: without indirect light the box must differ.
+    let gpu = support::gpu();
+    let scene = scene("cornell-box/scene.toml", small);
+    let effects = render::called_for(&scene, Outputs::default());
+    let without = Effects { emissive: false, ..effects };
+    let a = support::render(&gpu, &Renderer::new(&gpu, &scene, Outputs::default()).unwrap());
+    let b = support::render(&gpu, &Renderer::specialised(&gpu, &scene, Outputs::default(), without).unwrap());
+    assert!(bits(&a) != bits(&b));
+}

@@ -1,0 +1,337 @@
+//! Scene files end to end: what they become, and what is said about mistakes.
+use image::codecs::png::PngEncoder;
+use std::fs::File;
+use std::path::Path;
+use tallow::layout::*;
+use tallow::scene::{Scene, effects};
+use tallow::twins::texture::texture_sample;
+
+const BOX: &str = "
+[film]
+width = 32
+height = 16
+[camera]
+position = [0, 0, 5]
+target = [0, 0, 0]
+[render]
+spp = 4
+max_depth = 2
+[[material]]
+name = \"wall\"
+color = [0.1, 0.2, 0.3]
+[[material]]
+name = \"lamp\"
+emission = 5
+[[mesh]]
+name = \"floor\"
+shape = \"rectangle\"
+material = \"wall\"
+[[mesh]]
+name = \"lamp\"
+shape = \"rectangle\"
+transform = { translate = [0, 0, 2], scale = 0.5 }
+material = \"lamp\"
+";
+
+fn parse(text: &str) -> tallow::error::Result<Scene> {
+    Scene::parse(Path::new("scene.toml"), text, &|_| {})
+}
+
+fn error(text: &str) -> String {
+    let found = parse(text).unwrap_err();
+    assert_eq!(found.exit_code(), 3);
+    assert!(!found.to_string().contains('\n'), "one line: {found}");
+    found.to_string()
+}
+
+#[test]
+fn a_small_scene_becomes_arrays() {
+    let scene = parse(BOX).unwrap();
+    assert_eq!((scene.settings.width, scene.settings.spp), (32, 4));
+    assert_eq!((scene.triangles.len(), scene.shading.len(), scene.instances.len()), (4, 0, 0));
+    assert_eq!(scene.bounds, [[-1.0, -1.0, 0.0], [1.0, 1.0, 2.0]]);
+    assert_eq!(scene.names.objects, ["floor", "lamp"]);
+    assert_eq!(scene.camera.right[0], scene.camera.up[1] * 2.0, "twice as wide as high");
+    assert_eq!((scene.lights.len(), scene.warnings.len()), (2, 0));
+    let (found, why) = effects(&scene, false, false);
+    assert_eq!(found, Effects { diffuse: true, emissive: true, large_lamps: true, ..Effects::default() });
+    assert_eq!(why[1].1, "material \"lamp\"");
+    let wide = Scene::parse(Path::new("s.toml"), BOX, &|s| s.width = 64).unwrap();
+    assert_eq!(wide.camera.right[0], wide.camera.up[1] * 4.0, "the camera follows the override");
+}
+
+#[test]
+fn the_fingerprint_is_that_of_what_is_seen() {
+    let more = "
+[[mesh]]\nname = \"ball\"\nshape = \"sphere\"\nsegments = 24
+[[instance]]\nmesh = \"ball\"\ntransform = { translate = [1, 2, 3] }
+[[instance]]\nmesh = \"ball\"\ntransform = { translate = [3, 2, 1] }
+[[light]]\ntype = \"point\"\nposition = [0, 1, 1]\nintensity = 3
+[environment]\nradiance = 0.1";
+    let text = format!("{BOX}{more}");
+    let of = |text: &str| parse(text).unwrap().fingerprint;
+    for threads in [1, 2, 5] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        assert_eq!(pool.install(|| of(&text)), of(&text), "by {threads} threads");
+    }
+    let edited = |from: &str, to: &str| {
+        assert!(text.contains(from), "{from}");
+        of(&text.replacen(from, to, 1))
+    };
+    let seen = [
+        ("position = [0, 0, 5]", "position = [0, 0, 5.1]"),
+        ("width = 32", "width = 33"), // the camera's aspect
+        ("0.2, 0.3]", "0.2, 0.31]"),
+        ("emission = 5", "emission = 5.1"),
+        ("shape = \"rectangle\"", "shape = \"disk\""),
+        ("scale = 0.5", "scale = 0.51"),
+        ("material = \"wall\"", "material = \"lamp\""),
+        ("segments = 24", "segments = 25"),
+        ("[3, 2, 1]", "[3, 2, 1.1]"),
+        ("mesh = \"ball\"", "mesh = \"lamp\""),
+        ("position = [0, 1, 1]", "position = [0, 1, 1.1]"),
+        ("intensity = 3", "intensity = 3.1"),
+        ("radiance = 0.1", "radiance = 0.11"),
+    ];
+    let found: std::collections::HashSet<_> = seen.iter().map(|(from, to)| edited(from, to).to_string()).collect();
+    assert_eq!(found.len(), seen.len());
+    assert!(!found.contains(&of(&text).to_string()));
+    for (from, to) in [("spp = 4", "spp = 5"), ("name = \"floor\"", "name = \"ground\"")] {
+        assert_eq!(edited(from, to), of(&text), "{to}");
+    }
+}
+
+/// As PNG; the picture's own `save` would compile every encoder.
+fn save(picture: &image::RgbImage, path: &Path) {
+    picture.write_with_encoder(PngEncoder::new(File::create(path).unwrap())).unwrap();
+}
+
+#[test]
+fn a_texel_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |blue: u8| {
+        let picture = image::RgbImage::from_raw(2, 1, vec![1, 2, 3, 4, 5, blue]).unwrap();
+        save(&picture, &folder.path().join("a.png"));
+        let text = BOX.replacen("color = [0.1, 0.2, 0.3]", "color_texture = \"a.png\"", 1);
+        let scene = Scene::parse(&folder.path().join("scene.toml"), &text, &|_| {}).unwrap();
+        assert_eq!(scene.texels.len(), 2);
+        scene.fingerprint
+    };
+    assert_eq!(of(6), of(6));
+    assert_ne!(of(6), of(7));
+}
+
+/// Area of a light's triangle.
+fn area(l: &Light) -> f32 {
+    let [a, b, c] = [l.a, l.b, l.c].map(glam::Vec3::from);
+    (b - a).cross(c - a).length() / 2.0
+}
+
+#[test]
+fn one_constant_turns_emission_into_the_density_of_every_emissive_triangle() {
+    let more = "
+[[material]]\nname = \"blue\"\nemission = [0, 0, 0.3]
+[[mesh]]\nshape = \"sphere\"\nmaterial = \"blue\"\nsegments = 24
+[[light]]\ntype = \"point\"\nposition = [0, 1, 1]\nintensity = 3
+[[light]]\ntype = \"spot\"\nposition = [0, 1, 1]\ntarget = [0, 0, 0]\nintensity = [1, 2, 3]
+[[light]]\ntype = \"directional\"\ndirection = [0, -1, 0]\nirradiance = 1
+[environment]\nradiance = 0.1";
+    let scene = parse(&format!("{BOX}{more}")).unwrap();
+    let (mut triangles, mut sum) = (0, 0.0);
+    for l in &scene.lights {
+        sum += f64::from(l.probability);
+        if l.kind == LIGHT_TRIANGLE {
+            triangles += 1;
+            let weight = scene.materials[l.material as usize].emission_weight;
+            let ratio = l.probability / area(l) / (weight * scene.triangle_pdf_scale);
+            assert!((ratio - 1.0).abs() < 2e-5, "{ratio}");
+        }
+    }
+    assert_eq!((triangles, scene.lights.len() - triangles), (2 + 24 * 22, 4));
+    assert!((sum - 1.0).abs() < 1e-5);
+    // The lamp: 2 triangles of 0.5 square units and radiance 5, so pi * 0.5 * 5 W each; the point light 4 pi * 3 W.
+    let by_kind = |kind| scene.lights.iter().find(|l| l.kind == kind).unwrap();
+    let lamp = scene.lights.iter().find(|l| l.value == [5.0; 3]).unwrap();
+    assert!((by_kind(LIGHT_POINT).probability / lamp.probability - 12.0 / 2.5).abs() < 1e-4);
+    assert_eq!(by_kind(LIGHT_DIRECTIONAL).b, [0.0, -1.0, 0.0]);
+}
+
+#[test]
+fn instances_make_two_levels_and_carry_their_lights() {
+    let more = "
+[[mesh]]\nname = \"ball\"\nshape = \"sphere\"\nsegments = 8\nmaterial = \"lamp\"
+[[instance]]\nmesh = \"ball\"\ntransform = { translate = [5, 0, 0] }
+[[instance]]\nmesh = \"ball\"\ntransform = { translate = [-5, 0, 0], scale = [-1, 1, 1] }
+[[instance]]\nmesh = \"ball\"\nmaterial = \"wall\"";
+    let scene = parse(&format!("{BOX}{more}")).unwrap();
+    assert_eq!((scene.instances.len(), scene.triangles.len()), (4, 4 + 48), "three balls share their triangles");
+    assert_eq!(scene.instances.iter().filter(|i| i.mirrored == 1).count(), 1);
+    assert_eq!(scene.names.objects.len(), 2 + 3);
+    let lamps: Vec<_> = scene.lights.iter().filter(|l| l.kind == LIGHT_TRIANGLE).collect();
+    assert_eq!(lamps.len(), 2 + 2 * 48, "the third ball wears the wall");
+    for l in lamps.iter().filter(|l| l.a[0].abs() > 3.0) {
+        // Outward of its ball, mirrored or not.
+        let [a, b, c] = [l.a, l.b, l.c].map(glam::Vec3::from);
+        let center = glam::Vec3::X * 5.0 * a.x.signum();
+        assert!((b - a).cross(c - a).dot(a - center) > 0.0);
+    }
+    assert!(scene.bounds[0][0] < -5.9 && scene.bounds[1][0] > 5.9);
+    assert!(effects(&scene, false, false).0.instances);
+}
+
+#[test]
+fn mistakes_are_one_line_with_place_and_remedy() {
+    for (text, expected) in [
+        ("[film]\nwidth = 0", "scene.toml: width is 0: choose 1 to 16384"),
+        ("[render]\nspp = 99999999999", "line 2"),
+        ("[[mesh]]\nshape = \"cube\"\ntransform = { scale = 0 }", "mesh \"cube\": its transform has no inverse"),
+        ("[[mesh]]\nshape = \"cube\"\ntransform = { scale = 1e30 }", "coordinate of 1e30: the limit is 1e12"),
+        ("[[mesh]]\nshape = \"cube\"\ntransform = { translate = [nan, 0, 0] }", "no inverse"),
+        ("[[mesh]]\nname = \"a\"", "mesh \"a\": needs either a file or a shape"),
+        ("[[mesh]]\nfile = \"nowhere.obj\"", "nowhere.obj: cannot be read"),
+        ("[[mesh]]\nshape = \"cube\"\nmaterial = \"a\"", "mesh \"cube\": no material \"a\": add a [[material]] table"),
+        ("[[instance]]\nmesh = \"a\"", "instance 1 of mesh \"a\": no such mesh"),
+        ("[[material]]\nname = \"a\"\nemission = nan", "material \"a\": emission [NaN, NaN, NaN] is negative, NaN"),
+        ("[[material]]\nname = \"a\"\nalpha = 2", "alpha is 2: choose a value from 0 to 1"),
+        ("[[material]]\nname = \"a\"\n[[material]]\nname = \"a\"", "is defined twice"),
+        ("[[material]]\ncolor = 1", "has no name"),
+        ("[[material]]\nname = \"a\"\ntype = \"conductor\"\nmetal = \"wood\"", "metal \"wood\" is not known"),
+        ("[[light]]\ntype = \"point\"\nintensity = 1", "light 1: needs a position"),
+        ("[[light]]\ntype = \"directional\"\ndirection = [0, 0, 0]\nirradiance = 1", "the direction has no length"),
+        ("[environment]\nfile = \"sky.hdr\"", "sky.hdr: cannot be read"),
+        ("[environment]\nradiance = -1", "[environment]"),
+        ("[camera]\nfov = 200", "[camera]: fov is 200"),
+        ("film = 3", "line 1: invalid type"),
+    ] {
+        let found = error(text);
+        assert!(found.contains(expected), "{text}\n  gave {found}\n  not  {expected}");
+    }
+    assert!(parse(BOX).is_ok(), "control");
+}
+
+#[test]
+fn what_is_legal_but_odd_is_a_warning() {
+    let empty = parse("").unwrap();
+    assert_eq!((empty.triangles.len(), empty.nodes.len(), empty.materials.len()), (0, 1, 1));
+    assert_eq!(empty.warnings, ["the scene has no light: its image will be black"]);
+    let bright = parse("[[material]]\nname = \"a\"\ncolor = 1.5").unwrap();
+    assert!(bright.warnings[0].contains("outside [0, 1]: clamped"), "{:?}", bright.warnings);
+    let missing = parse("[[material]]\nname = \"a\"\ncolor_texture = \"no.png\"").unwrap();
+    assert!(missing.warnings[0].contains("no.png: no such file"), "{:?}", missing.warnings);
+}
+
+#[test]
+fn missing_normals_are_counted_unless_they_are_meant_to_be() {
+    let dir = tempfile::tempdir().unwrap();
+    let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\nvn 0 0 1\nvn 0 1 0\n";
+    std::fs::write(dir.path().join("some.obj"), format!("{corners}f 1//1 2//1 3//2\nf 1 2 4\nf 1 3 4\n")).unwrap();
+    std::fs::write(dir.path().join("none.obj"), format!("{corners}f 1 2 3\n")).unwrap();
+    let said = |mesh: &str| {
+        let text = format!("{BOX}[[mesh]]\nname = \"a\"\n{mesh}");
+        Scene::parse(&dir.path().join("scene.toml"), &text, &|_| {}).unwrap().warnings
+    };
+    let repaired = |n| [format!("mesh \"a\": triangles repaired: {n} without vertex normals shaded flat")];
+    assert_eq!(said("file = \"some.obj\""), repaired(2));
+    assert_eq!(said("file = \"none.obj\""), repaired(1));
+    for file in ["some.obj", "none.obj"] {
+        assert_eq!(said(&format!("file = \"{file}\"\nflat = true")), Vec::<String>::new(), "{file}");
+    }
+}
+
+#[test]
+fn models_alone_get_a_camera_and_a_sky() {
+    let dir = tempfile::tempdir().unwrap();
+    let load = |name: &str, text: &str| {
+        std::fs::write(dir.path().join(name), text).unwrap();
+        Scene::load(&dir.path().join(name), &|_| {})
+    };
+    load("m.mtl", "newmtl lamp\nKe 1 1 1\n").unwrap_err(); // no scene, but now the file is there
+    let triangle = "v 0 0 0\nv 4 0 0\nv 0 4 0\nv nan 0 0\n";
+    let scene = load("a.obj", &format!("{triangle}f 1 2 3\nf 1 2 2\nf 1 2 4\n")).unwrap();
+    assert_eq!((scene.triangles.len(), scene.lights[0].kind), (1, LIGHT_ENVIRONMENT));
+    let repaired = &scene.warnings[0];
+    assert!(repaired.contains("1 with NaN or infinite coordinates dropped, 1 without area dropped"), "{repaired}");
+    let eye = glam::Vec3::from(scene.camera.position) - glam::Vec3::new(2.0, 2.0, 0.0);
+    assert!(eye.normalize().dot(glam::Vec3::from(scene.camera.forward)) < -0.999, "it looks at the middle");
+    let lit = load("b.obj", &format!("mtllib m.mtl\n{triangle}usemtl lamp\nf 1 2 3\n")).unwrap();
+    assert_eq!((lit.lights.len(), lit.lights[0].kind), (1, LIGHT_TRIANGLE), "no sky over a lamp");
+    let far = load("c.obj", "v 0 0 0\nv 2e12 0 0\nv 0 1 0\nf 1 2 3").unwrap_err().to_string();
+    assert!(far.contains("coordinate of 2e12: the limit is 1e12"), "{far}");
+}
+
+#[test]
+fn mtl_rules_by_example() {
+    let dir = tempfile::tempdir().unwrap();
+    let blocks = [
+        ("diffuse", "Kd 0.5 0.4 0.3\nKs 0.5 0.5 0.5\nillum 1"),
+        ("coated", "Kd 0.5 0.5 0.5\nKs 0.04 0.04 0.02\nNs 198\nNi 1.5\nillum 2"),
+        ("metal", "Kd 0.9 0.5 0.1\nPm 1\nPr 0.5"),
+        ("mirror", "Kd 0 0 0\nKs 0.8 0.8 0.8\nillum 3"),
+        ("glass", "Kd 0 0 0\nTf 0.9 1 0.9\nNi 1.33\nillum 7\nd 0.3"),
+        ("tinted", "Kd 1 1 1\nTf 1 0 0\nNi 1.4\nd 0.5"),
+        ("veil", "Kd 1 1 1\nd 0.5"),
+    ];
+    let mtl: String = blocks.iter().map(|(name, text)| format!("newmtl {name}\n{text}\n")).collect();
+    let faces: String = blocks.iter().map(|(name, _)| format!("usemtl {name}\nf 1 2 3\n")).collect();
+    std::fs::write(dir.path().join("m.mtl"), mtl).unwrap();
+    std::fs::write(dir.path().join("m.obj"), format!("mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{faces}")).unwrap();
+    let scene = Scene::load(&dir.path().join("m.obj"), &|_| {}).unwrap();
+    let [diffuse, coated, metal, mirror, glass, tinted, veil] = scene.materials[..] else { panic!("seven materials") };
+    assert_eq!((diffuse.kind, diffuse.base_color), (BSDF_DIFFUSE, [0.5, 0.4, 0.3]));
+    assert_eq!((coated.kind, coated.eta[0]), (BSDF_COATED, 1.5));
+    assert!((coated.alpha - 0.1).abs() < 1e-6 && (coated.specular[0] - 1.0).abs() < 1e-4);
+    assert!((coated.specular[2] - 0.5).abs() < 1e-4 && (coated.internal_fresnel - 0.5963).abs() < 1e-3);
+    // Reflectance 0.9 at normal incidence: n = 0.1 / 1.9, k = 2 sqrt(0.9) / 1.9.
+    assert_eq!((metal.kind, metal.alpha), (BSDF_CONDUCTOR, 0.25));
+    assert!((metal.eta[0] - 0.052632).abs() < 1e-5 && (metal.k[0] - 0.998614).abs() < 1e-5);
+    assert_eq!((mirror.kind, mirror.alpha, mirror.specular), (BSDF_CONDUCTOR, 0.0, [0.8; 3]));
+    assert_eq!((mirror.eta, mirror.k), ([0.0; 3], [1.0; 3]));
+    assert_eq!((glass.kind, glass.eta[0], glass.alpha, glass.opacity), (BSDF_DIELECTRIC, 1.33, 0.0, 1.0));
+    assert_eq!((glass.transmission, glass.flags & MATERIAL_MASKED), ([0.9, 1.0, 0.9], 0));
+    assert_eq!((tinted.kind, tinted.transmission), (BSDF_DIELECTRIC, [1.0, 0.0, 0.0]));
+    assert_eq!((veil.kind, veil.opacity, veil.flags & MATERIAL_MASKED), (BSDF_DIFFUSE, 0.5, MATERIAL_MASKED));
+}
+
+#[test]
+fn maps_are_scaled_and_moved() {
+    let dir = tempfile::tempdir().unwrap();
+    let picture = image::RgbImage::from_fn(8, 8, |x, y| image::Rgb([(x * 31) as u8, (y * 31) as u8, 99]));
+    save(&picture, &dir.path().join("a.png"));
+    let mtl = "newmtl plain\nmap_Kd a.png\nnewmtl moved\nmap_Kd -s 2 -3 -o 0.25 0.5 a.png\n";
+    std::fs::write(dir.path().join("m.mtl"), mtl).unwrap();
+    let text = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl plain\nf 1 2 3\nusemtl moved\nf 1 2 3\n";
+    std::fs::write(dir.path().join("m.obj"), text).unwrap();
+    let scene = Scene::load(&dir.path().join("m.obj"), &|_| {}).unwrap();
+    let [plain, moved] = [0, 1].map(|i| scene.materials[i].base_texture);
+    let sample = |texture, u, v| texture_sample(&scene, texture, glam::vec2(u, v));
+    for (u, v) in [(0.0, 0.0), (0.3, 0.2), (0.9, 0.7), (-0.4, 1.6)] {
+        let expected = sample(plain, 2.0 * u + 0.25, -3.0 * v + 0.5);
+        assert!((sample(moved, u, v) - expected).abs().max_element() < 1e-5, "{u} {v}");
+    }
+    assert!((sample(moved, 0.3, 0.2) - sample(plain, 0.3, 0.2)).abs().max_element() > 0.1, "control");
+}
+
+/// The file that scenes/README.md shows, with shapes and a constant in place of the files that it names.
+#[test]
+fn the_guide_s_scene_is_one() {
+    let guide = include_str!("../../scenes/README.md");
+    let shown = guide.split("```toml").nth(1).unwrap().split("```").next().unwrap();
+    let text = shown.replace("file = \"room.obj\"", "shape = \"cube\"").replace("file = \"sky.hdr\"", "radiance = 1");
+    assert_ne!(text, shown, "control: the files are named");
+    let scene = parse(&text).unwrap();
+    assert_eq!(scene.warnings, Vec::<String>::new());
+    assert_eq!((scene.settings.width, scene.instances.len(), scene.lights.len()), (640, 1, 2));
+}
+
+#[test]
+fn rough_coats_share_a_table_by_index_and_distribution() {
+    let coat = |name: &str, rest: &str| format!("[[material]]\nname = '{name}'\ntype = 'coated'\n{rest}\n");
+    let text = coat("a", "alpha = 0.2") + &coat("b", "alpha = 0.7\nnonlinear = true") + &coat("smooth", "");
+    let text = text + &coat("ggx", "alpha = 0.2\ndistribution = 'ggx'") + "[[mesh]]\nshape = 'cube'\nmaterial = 'a'\n";
+    let scene = Scene::parse(Path::new("scene.toml"), &text, &|_| {}).unwrap();
+    let length = COAT_ROWS * COAT_COLUMNS;
+    let at: Vec<_> = scene.materials[..4].iter().map(|m| m.coat_table).collect();
+    assert_eq!((at, scene.texels.len()), (vec![0, 0, 0, length], 2 * length as usize));
+    let nonlinear: Vec<_> = scene.materials[..4].iter().map(|m| m.flags & MATERIAL_NONLINEAR != 0).collect();
+    assert_eq!(nonlinear, [false, true, false, false]);
+}

@@ -1,0 +1,269 @@
+//! Statistics of light sampling on its CPU twin: directions follow the densities that are claimed for them, those by
+//! which bounces weigh the same light.
+use crate::statistics::{chi_square, sidak};
+use crate::twin::{Random, Workplace};
+use glam::{Mat3, Vec3, dvec3, vec3};
+use std::f64::consts::{PI, TAU};
+use tallow::layout::{LIGHT_ENVIRONMENT, Light, NONE};
+use tallow::scene::Scene;
+use tallow::twins::light::*;
+use tallow::twins::sampler::{sample_2d, sample_2d_bits, sampler_start};
+use tallow::twins::scene::triangle_vertices;
+use tallow::twins::surface::surface_at;
+use tallow::twins::traverse::{Hit, intersect_triangle, ray_space};
+
+/// From where lights are seen.
+const HERE: Vec3 = vec3(0.2, -0.1, 0.3);
+const COLUMNS: usize = 32;
+const ROWS: usize = 16;
+/// Quadrature points per cell and axis.
+const POINTS: usize = 32;
+
+/// Cells of all directions in latitude and longitude, turned as the sky is: every texel holds whole cells.
+struct Grid {
+    world_from_sky: Mat3,
+}
+
+impl Grid {
+    fn new(scene: &Scene) -> Self {
+        let sky = scene.lights.iter().find(|l| l.kind == LIGHT_ENVIRONMENT);
+        let axes = |l: &Light| Mat3::from_cols(l.a.into(), l.b.into(), l.c.into());
+        Self { world_from_sky: sky.map_or(Mat3::IDENTITY, axes) }
+    }
+
+    fn cell(&self, direction: Vec3) -> usize {
+        let d = (self.world_from_sky.transpose() * direction).as_dvec3();
+        let u = d.x.atan2(-d.z).rem_euclid(TAU) / TAU;
+        let v = d.y.clamp(-1.0, 1.0).acos() / PI;
+        let index = |v: f64, n: usize| ((v * n as f64) as usize).min(n - 1);
+        index(v, ROWS) * COLUMNS + index(u, COLUMNS)
+    }
+
+    /// Directions inside the cells: index of the cell, direction, solid angle.
+    fn directions(&self) -> impl Iterator<Item = (usize, Vec3, f64)> {
+        let (columns, rows) = (COLUMNS * POINTS, ROWS * POINTS);
+        (0..columns * rows).map(move |i| {
+            let (x, y) = (i % columns, i / columns);
+            let (sin_phi, cos_phi) = (TAU * (x as f64 + 0.5) / columns as f64).sin_cos();
+            let (sin, cos) = (PI * (y as f64 + 0.5) / rows as f64).sin_cos();
+            let direction = dvec3(sin_phi * sin, cos, -cos_phi * sin);
+            let area = TAU * PI * sin / (columns * rows) as f64;
+            (y / POINTS * COLUMNS + x / POINTS, self.world_from_sky * direction.as_vec3(), area)
+        })
+    }
+
+    /// Integrals over the cells of what is claimed.
+    fn integrate(&self, scene: &Scene) -> Vec<f64> {
+        let mut cells = vec![0.0; COLUMNS * ROWS];
+        self.directions().for_each(|(cell, direction, area)| cells[cell] += density(scene, direction) * area);
+        cells
+    }
+}
+
+/// Of the sky, and of every emissive triangle whose front lies in that direction.
+fn density(scene: &Scene, direction: Vec3) -> f64 {
+    let sky = scene.lights.iter().find(|l| l.kind == LIGHT_ENVIRONMENT);
+    let sky = sky.map_or(0.0, |l| environment_radiance(scene, l, direction).1);
+    let ray = ray_space(HERE, direction);
+    let lamp = |i: usize| {
+        let (t, barycentric) = intersect_triangle(&ray, triangle_vertices(scene, i as u32), INFINITE_DISTANCE)?;
+        let s = surface_at(scene, &Hit { t, triangle: i as u32, instance: NONE, barycentric });
+        let cosine = -s.geometric.dot(direction);
+        (cosine > 0.0).then(|| triangle_light_pdf(scene, &s, HERE, t, cosine))
+    };
+    f64::from(sky) + (0..scene.triangles.len()).filter_map(lamp).map(f64::from).sum::<f64>()
+}
+
+fn samples(scene: &Scene, count: u32, seed: u32) -> impl Iterator<Item = LightSample> {
+    (0..count).map(move |i| {
+        let s = sampler_start(0, i, seed, true);
+        light_sample(scene, HERE, sample_2d_bits(s, 0)[0], sample_2d(s, 1))
+    })
+}
+
+const LAMP: [Vec3; 3] = [vec3(-1.0, -0.8, -1.2), vec3(1.6, -0.5, -0.6), vec3(0.1, 1.2, -2.0)];
+
+fn one_lamp() -> Scene {
+    let place = Workplace::new().obj("lamp.obj", &[LAMP]);
+    let text = "[[material]]\nname = 'a'\nemission = [2.0, 3.0, 5.0]\n[[mesh]]\nfile = 'lamp.obj'\nmaterial = 'a'\n";
+    let scene = place.scene(text);
+    assert!(scene.large_lamps, "sampled by solid angle");
+    scene
+}
+
+fn constant_sky() -> Scene {
+    Workplace::new().scene("[environment]\nradiance = [2.0, 3.0, 5.0]\n")
+}
+
+/// A sun, a gradient, and a part that is black.
+fn image_sky(width: u32, height: u32) -> Scene {
+    let light = |x: u32, y: u32| match (2 * x / width, y) {
+        (_, 1) if x == width - 1 => 40.0,
+        (0, _) => 0.0,
+        _ => 0.3 + 0.1 * (x + 2 * y) as f32,
+    };
+    let place = Workplace::new().sky("sky.exr", width, height, light);
+    place.scene("[environment]\nfile = 'sky.exr'\nrotation = 70.0\nscale = 0.5\n")
+}
+
+/// Triangles of three strengths, half of which face away, below an image, with lights that no ray can hit.
+fn many_lights() -> Scene {
+    let mut random = Random(5);
+    let mut triangle = || {
+        let centre = HERE + 3.0 * random.point().normalize();
+        [0; 3].map(|_| centre + 0.5 * random.point())
+    };
+    let mut place = Workplace::new().sky("sky.exr", 16, 8, |x, y| 0.02 * (1 + x + 3 * y) as f32);
+    let mut text = "[environment]\nfile = 'sky.exr'\nrotation = 25.0\n".to_owned();
+    for (name, emission) in [("a", "1.0"), ("b", "[9.0, 2.0, 1.0]"), ("c", "30.0"), ("dark", "0.0")] {
+        place = place.obj(&format!("{name}.obj"), &[0; 9].map(|_| triangle()));
+        text += &format!("[[material]]\nname = '{name}'\nemission = {emission}\n");
+        text += &format!("[[mesh]]\nfile = '{name}.obj'\nmaterial = '{name}'\n");
+    }
+    text += "[[light]]\ntype = 'point'\nposition = [0.0, 2.0, 0.0]\nintensity = 3.0\n\
+             [[light]]\ntype = 'spot'\nposition = [0.0, 3.0, 0.0]\ndirection = [0.0, -1.0, 0.0]\nintensity = 9.0\n\
+             [[light]]\ntype = 'directional'\ndirection = [0.0, -1.0, 0.2]\nirradiance = 0.5\n";
+    place.scene(&text)
+}
+
+fn single_lights() -> [(&'static str, Scene); 4] {
+    let by_area = Scene { large_lamps: false, ..one_lamp() };
+    [
+        ("triangle", one_lamp()),
+        ("triangle by area", by_area),
+        ("constant sky", constant_sky()),
+        ("image sky", image_sky(16, 8)),
+    ]
+}
+
+#[test]
+fn directions_follow_the_density() {
+    const COUNT: u32 = 200_000;
+    let scenes = [single_lights().to_vec(), vec![("many lights", many_lights())]].concat();
+    let level = sidak(scenes.len());
+    for (seed, (name, scene)) in scenes.iter().enumerate() {
+        let grid = Grid::new(scene);
+        let mut expected: Vec<f64> = grid.integrate(scene).iter().map(|p| p * f64::from(COUNT)).collect();
+        // The last cell: what faces away, and lights that are points.
+        expected.push((f64::from(COUNT) - expected.iter().sum::<f64>()).max(0.0));
+        let mut observed = vec![0.0; expected.len()];
+        for s in samples(scene, COUNT, seed as u32) {
+            observed[if s.pdf > 0.0 { grid.cell(s.direction) } else { COLUMNS * ROWS }] += 1.0;
+        }
+        let p = chi_square(&observed, &expected);
+        assert!(p > level, "{name}: p = {p:.1e}");
+        let planted: Vec<f64> = expected.iter().map(|e| 1.03 * e).collect();
+        assert!(chi_square(&observed, &planted) < level, "{name}: the test cannot see a density that is 3 % off");
+    }
+}
+
+#[test]
+fn lights_are_drawn_with_their_probabilities() {
+    let mut scene = many_lights();
+    assert_eq!(scene.lights.len(), 31, "27 triangles, three lights and the sky");
+    let p = |scene: &Scene| {
+        let mut observed = vec![0.0; scene.lights.len()];
+        let words = (0..1 << 18).map(|i| sample_2d_bits(sampler_start(0, i, 9, true), 0)[0]);
+        words.for_each(|word| observed[alias_choose(&scene.light_table, word).0 as usize] += 1.0);
+        let expected: Vec<_> = scene.lights.iter().map(|l| f64::from(l.probability) * f64::from(1 << 18)).collect();
+        chi_square(&observed, &expected)
+    };
+    assert!(p(&scene) > sidak(1));
+    scene.light_table.iter_mut().for_each(|entry| entry.threshold -= entry.threshold / 20);
+    assert!(p(&scene) < sidak(1), "control: thresholds that are 5 % off");
+}
+
+/// Share of samples of `scene` whose density and light are not what `claimed` says of their directions.
+fn unlike(scene: &Scene, claimed: &Scene) -> f64 {
+    let light = &claimed.lights[0];
+    let differs = |s: &LightSample| {
+        let radiance = match light.kind {
+            LIGHT_ENVIRONMENT => environment_radiance(claimed, light, s.direction).0,
+            _ => light.value.into(),
+        };
+        let (seen, pdf) = (s.radiance * s.pdf, density(claimed, s.direction) as f32);
+        (s.pdf - pdf).abs() > 1e-3 * pdf || (seen - radiance).abs().max_element() > 1e-3 * radiance.max_element()
+    };
+    samples(scene, 1 << 14, 3).filter(differs).count() as f64 / f64::from(1 << 14)
+}
+
+#[test]
+fn samples_know_their_density_and_their_light() {
+    for (name, scene) in single_lights() {
+        // Rounding moves a few over the edge of a triangle or a texel.
+        let share = unlike(&scene, &scene);
+        assert!(share < 1e-3, "{name}: {share} of the samples");
+        let (mut brighter, mut likelier) = (scene.clone(), scene.clone());
+        brighter.lights[0].value = scene.lights[0].value.map(|v| 1.01 * v);
+        likelier.lights[0].probability *= 1.01;
+        likelier.triangle_pdf_scale *= 1.01;
+        for control in [brighter, likelier] {
+            // Rims of black parts of the sky are drawn too, and often beside the sun.
+            assert!(unlike(&scene, &control) > 0.5, "{name}: control");
+        }
+    }
+}
+
+#[test]
+fn the_density_of_a_sky_integrates_to_one() {
+    for (width, height) in [(16, 8), (4, 2), (32, 4)] {
+        let mut scene = image_sky(width, height);
+        let sum = |scene: &Scene| Grid::new(scene).integrate(scene).iter().sum::<f64>();
+        let whole = sum(&scene);
+        assert!((whole - 1.0).abs() < 1e-4, "{width} x {height}: {whole}");
+        let seen = |d| environment_radiance(&scene, &scene.lights[0], d);
+        let missed = |&(_, d, _): &(usize, Vec3, f64)| seen(d).1 == 0.0 && seen(d).0 != Vec3::ZERO;
+        assert_eq!(Grid::new(&scene).directions().filter(missed).count(), 0, "{width} x {height}: light never drawn");
+        scene.environment.as_mut().unwrap().texels[width as usize - 1][3] += 1e-3;
+        assert!((sum(&scene) - 1.0).abs() > 1e-4, "control: {width} x {height}");
+    }
+}
+
+#[test]
+fn what_is_left_of_a_choice_is_independent_of_it() {
+    const BINS: usize = 16;
+    let table = &many_lights().light_table;
+    let p = |rest: &dyn Fn(u32) -> (u32, u32)| {
+        let mut observed = vec![0.0; table.len() * BINS];
+        for i in 0..1 << 19 {
+            let (chosen, rest) = rest(sample_2d_bits(sampler_start(0, i, 9, true), 0)[0]);
+            observed[chosen as usize * BINS + (rest >> 28) as usize] += 1.0;
+        }
+        let expected: Vec<_> =
+            observed.chunks(BINS).flat_map(|c| [c.iter().sum::<f64>() / BINS as f64; BINS]).collect();
+        chi_square(&observed, &expected)
+    };
+    let found = p(&|word| alias_choose(table, word));
+    assert!(found > sidak(1), "{found:.1e}");
+    let word_itself = p(&|word| (alias_choose(table, word).0, word));
+    assert!(word_itself < sidak(1), "control: the word that chose");
+}
+
+/// Variance of the mean of 64 light samples' irradiance on a floor, over many pixels.
+fn variance(scene: &Scene, independent: bool) -> f64 {
+    let irradiance = |pixel: u32| {
+        let sample = |i| {
+            let s = sampler_start(pixel, i, 1, independent);
+            let light = light_sample(scene, HERE, sample_2d_bits(s, 0)[0], sample_2d(s, 1));
+            f64::from(light.radiance.x * light.direction.y.max(0.0))
+        };
+        (0..64).map(sample).sum::<f64>() / 64.0
+    };
+    let all: Vec<f64> = (0..400).map(irradiance).collect();
+    let mean = all.iter().sum::<f64>() / 400.0;
+    all.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 399.0
+}
+
+#[test]
+fn skies_gain_from_stratified_samples() {
+    let sky = |x: u32, y: u32| 0.2 + ((x * x * 7 + y * 13) % 32) as f32 * if y < 12 { 0.3 } else { 0.02 };
+    let place = Workplace::new().sky("sky.exr", 64, 32, sky);
+    let alone = place.scene("[environment]\nfile = 'sky.exr'\n");
+    let light = "[[light]]\ntype = 'directional'\ndirection = [0.0, -1.0, 0.2]\nirradiance = 5.0\n";
+    let beside = place.scene(&format!("[environment]\nfile = 'sky.exr'\n{light}"));
+    for (name, scene) in [("alone", alone), ("beside a light", beside)] {
+        let ratio = variance(&scene, false) / variance(&scene, true);
+        println!("{name}: {ratio:.3} of the variance of independent samples");
+        assert!(ratio < 0.8, "{name}: {ratio}");
+    }
+}

@@ -1,0 +1,299 @@
+//! The filters on the device against their CPU twins, and the twins against examples worked by hand.
+use crate::picture::{self, Picture, SIZES, apart, line, red};
+use crate::support::{assert_silent, gpu};
+use tallow::denoise::filter::{FILTERS, FilterInput, FilterSettings, GuidedSums, WaveletBasis, find, firefly, run};
+use tallow::gpu::{DeviceKind, Gpu};
+use tallow::layout::vec4;
+
+#[test]
+fn kernels_agree_with_their_twins() {
+    let gpu = gpu();
+    for row in FILTERS {
+        for (width, height) in SIZES {
+            let input = Picture::new(width, height).noisy().input;
+            for settings in picture::settings(row.name) {
+                let settings = settings.scaled_to(&input);
+                let (device, _) = run(&gpu, row, &input, &settings).unwrap();
+                let host = (row.reference)(&input, &settings);
+                let off = apart(&device, &host, 1.0);
+                // An eps of 0 leaves matrices whose condition is the pivots' limit, 1e5.
+                assert!(off < 5e-4, "{} {width}x{height}: {off} apart with {settings:?}", row.name);
+                if width * height > 1 {
+                    let mut turned = host.clone();
+                    turned.rotate_right(1);
+                    assert!(apart(&device, &turned, 1.0) > 1e-2, "{} control: other pixels", row.name);
+                }
+            }
+        }
+    }
+    assert_silent(&gpu);
+}
+
+/// What the device makes of an image, and its twin to rounding.
+fn both(gpu: &Gpu, filter: &str, input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
+    let row = find(filter).unwrap();
+    let device = run(gpu, row, input, settings).unwrap().0;
+    let host = (row.reference)(input, settings);
+    let off = apart(&device, &host, 1.0);
+    assert!(off < 1e-5, "{filter}: {off} apart with {settings:?}");
+    device
+}
+
+#[test]
+fn atrous_solves_the_worked_example() {
+    let off = f32::INFINITY;
+    let plain = FilterSettings { levels: 1, sigma_rt: off, sigma_n: off, sigma_x: off, ..FilterSettings::default() };
+    let reference = find("atrous").unwrap().reference;
+    // An impulse of 16 becomes the B3 spline 1, 4, 6, 4, 1; nothing is known outside, so pixels 2 and 6 of a row of 9
+    // have all their taps, 1 and 7 lack the last.
+    let mut values = [0.0; 9];
+    values[4] = 16.0;
+    assert_eq!(red(&reference(&line(&values), &plain)), [0.0, 0.0, 1.0, 4.0, 6.0, 4.0, 1.0, 0.0, 0.0]);
+    // Level 1 spreads taps of 2 pixels over that: pixel 4 takes 6/16 of 6, 4/16 of 1 + 1; pixel 0 has 6/16 and 4/16 of
+    // 0 and 1 and 1/16 of 6 in reach: (4 + 6) / (6 + 4 + 1).
+    let two = reference(&line(&values), &FilterSettings { levels: 2, ..plain });
+    assert_eq!(two[4][0], (6.0 * 6.0 + 4.0 * 2.0) / 16.0);
+    assert!((two[0][0] - 10.0 / 11.0).abs() < 1e-6);
+    // 0 | 1 in all three channels with sigma 1: the neighbour weighs 4/16 * e^-3 beside 6/16. Conserving, it moves that
+    // much of the step, times the 6/16 of the taps that lie in the row.
+    let edge = FilterSettings { sigma_rt: 1.0, ..plain };
+    let w = (-3.0f32).exp() * 4.0 / 16.0;
+    assert!((red(&reference(&line(&[0.0, 1.0]), &edge))[0] - w / (w + 6.0 / 16.0)).abs() < 1e-6);
+    let kept = red(&reference(&line(&[0.0, 1.0]), &FilterSettings { conserve_energy: true, ..edge }));
+    assert!((kept[0] - w * 6.0 / 16.0).abs() < 1e-6 && kept[0] + kept[1] == 1.0);
+    // The root of a pixel's samples weighs too: of 9 beside 1, 4/16 * 3 beside 6/16.
+    let mut uneven = line(&[0.0, 1.0]);
+    uneven.radiance[1][3] = 9.0;
+    let found = reference(&uneven, &plain);
+    assert!((found[0][0] - 12.0 / 18.0).abs() < 1e-6 && found[1][3] == 9.0, "{found:?}");
+    // An unknown pixel between 2 and 4 takes their mean, whatever the radiance weight, and counts as one sample.
+    let painted = reference(&line(&[2.0, f32::NAN, 4.0]), &FilterSettings { sigma_rt: 0.1, ..plain });
+    assert_eq!(painted[1], [3.0, 3.0, 3.0, 1.0]);
+    // Any number of samples is one, as far as sums can hold them.
+    uneven.radiance[1] = [1e22, 1e22, 1e22, f32::MAX];
+    let many = red(&both(&gpu(), "atrous", &uneven, &plain));
+    assert!(many.iter().all(|v| (v / 1e22 - 1.0).abs() < 1e-5), "{many:?}");
+    // A weight that is off does not count where the square of a difference is infinite: 4/16 beside 6/16.
+    let gpu = gpu();
+    let bright = red(&both(&gpu, "atrous", &line(&[0.0, 1e20]), &plain));
+    assert!((bright[0] / 1e20 - 0.4).abs() < 1e-6 && (bright[1] / 1e20 - 0.6).abs() < 1e-6, "{bright:?}");
+    assert_silent(&gpu);
+}
+
+#[test]
+fn fireflies_are_cut_and_accounted_for() {
+    let gpu = gpu();
+    // A lone 9 over a floor of 1 is cut to twice that; two together keep each other.
+    let mut input = Picture::new(20, 6).flat().input;
+    input.radiance.fill([1.0, 1.0, 1.0, 1.0]);
+    input.radiance[2 * 20 + 4] = [9.0, 9.0, 9.0, 1.0];
+    input.radiance[2 * 20 + 14] = [9.0, 9.0, 9.0, 1.0];
+    input.radiance[3 * 20 + 14] = [9.0, 9.0, 9.0, 1.0];
+    input.radiance[3 * 20 + 15] = [9.0, 9.0, 9.0, 1.0];
+    let host = firefly::reference(&input, 2.0);
+    let before = input.clone();
+    let removed = firefly::remove_fireflies(&gpu, &mut input, 2.0).unwrap();
+    assert!(apart(&input.radiance, &host, 1.0) < 1e-6);
+    assert!((input.radiance[2 * 20 + 4][0] - 2.0).abs() < 1e-6 && input.radiance[2 * 20 + 14][0] == 9.0);
+    assert_eq!((removed.pixels, removed.radiance[1].round()), (1, 7.0));
+    assert!((removed.share - 7.0 / (120.0 + 4.0 * 8.0)).abs() < 1e-6, "{removed:?}");
+    assert_eq!(firefly::removed(&before.radiance, &before.radiance).pixels, 0, "control: nothing was cut");
+    assert!(firefly::remove_fireflies(&gpu, &mut input, 0.5).is_err());
+
+    // Fewer than two known neighbours are no company to judge by; light below 0 counts as none.
+    let none = f32::NAN;
+    let rows = [([none, 9.0, none], 9.0), ([1.0, 9.0, none], 9.0), ([1.0, 9.0, 3.0], 2.0), ([-0.5, 9.0, -0.5], 0.0)];
+    for (values, kept) in rows {
+        let mut input = line(&values);
+        let host = firefly::reference(&input, 2.0);
+        firefly::remove_fireflies(&gpu, &mut input, 2.0).unwrap();
+        let found = [host[1][0], input.radiance[1][0]];
+        assert!(found.iter().all(|v| (v - kept).abs() < 1e-6), "{values:?}: {found:?}");
+    }
+
+    let mut noisy = Picture::new(33, 18).noisy().input;
+    let host = firefly::reference(&noisy, 1.5);
+    assert!(firefly::remove_fireflies(&gpu, &mut noisy, 1.5).unwrap().pixels > 3);
+    assert!(apart(&noisy.radiance, &host, 1e-3) < 1e-5);
+    assert_silent(&gpu);
+}
+
+/// A window of 644,000 taps: a software device ends a thread's loops after 65,535 rounds, silently.
+#[test]
+fn the_widest_windows_of_bilateral_are_whole() {
+    let gpu = gpu();
+    let input = Picture::new(8, 400).noisy().input;
+    let off = f32::INFINITY;
+    let settings = FilterSettings { radius: 399, sigma_n: off, sigma_x: off, ..FilterSettings::default() };
+    let wide = both(&gpu, "bilateral", &input, &settings);
+    let narrow = both(&gpu, "bilateral", &input, &FilterSettings { radius: 30, ..settings });
+    assert!(apart(&wide, &narrow, 1.0) > 1e-2, "control: the window counts");
+    assert_silent(&gpu);
+}
+
+/// Threads of some filters walk along whole lines: see `check_size`.
+#[test]
+fn the_longest_lines_are_whole() {
+    let gpu = gpu();
+    let narrow = FilterSettings { radius: 0, ..FilterSettings::default() };
+    let table = FilterSettings { sums: GuidedSums::Table, eps: [0.1; 4], radius: 3, ..FilterSettings::default() };
+    let rows = [("guided", FilterSettings::default()), ("guided", narrow), ("guided", table), ("atrous", narrow)];
+    for [width, height] in [[60_000, 1], [1, 60_000]] {
+        let input = Picture::new(width, height).noisy().input;
+        for (name, settings) in &rows {
+            let settings = settings.scaled_to(&input);
+            let device = run(&gpu, find(name).unwrap(), &input, &settings).unwrap().0;
+            let host = (find(name).unwrap().reference)(&input, &settings);
+            let off = apart(&device, &host, 1.0);
+            assert!(off < 1e-2, "{name} {width}x{height}: {off} apart with {settings:?}");
+        }
+    }
+    if gpu.info().kind == DeviceKind::Cpu {
+        let wider = run(&gpu, find("none").unwrap(), &Picture::new(60_001, 1).noisy().input, &narrow);
+        assert!(wider.unwrap_err().to_string().contains("60000 along an edge"));
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn bilateral_and_wavelets_solve_the_worked_examples() {
+    let off = f32::INFINITY;
+    let plain = FilterSettings { sigma_rt: off, sigma_n: off, sigma_x: off, levels: 1, ..FilterSettings::default() };
+    // Radius 2 has a Gaussian of standard deviation 1: neighbours weigh e^-1/2 and e^-2.
+    let reference = find("bilateral").unwrap().reference;
+    let (near, far) = ((-0.5f32).exp(), (-2.0f32).exp());
+    let blurred = red(&reference(&line(&[0.0, 0.0, 1.0, 0.0, 0.0]), &FilterSettings { radius: 2, ..plain }));
+    assert!((blurred[2] - 1.0 / (1.0 + 2.0 * near + 2.0 * far)).abs() < 1e-6);
+    assert!((blurred[0] - far / (1.0 + near + far)).abs() < 1e-6);
+    // A step of 1 in all channels under a sigma of 1: squared distance 3.
+    let edge = FilterSettings { radius: 1, sigma_rt: 1.0, ..plain };
+    let w = (-3.0f32 - 2.0).exp();
+    assert!((red(&reference(&line(&[0.0, 1.0]), &edge))[0] - w / (1.0 + w)).abs() < 1e-6);
+
+    let reference = find("wavelet").unwrap().reference;
+    // CDF(2,2), 0 0 8 0 0: odd pixels miss by -4 each, the middle becomes 8 - 4/2 = 6, the ends, with one neighbour,
+    // 0 - 4/2 = -2; without details the odd ones come back as 2.
+    let row = red(&reference(&line(&[0.0, 0.0, 8.0, 0.0, 0.0]), &plain));
+    assert_eq!(row, [-2.0, 2.0, 6.0, 2.0, -2.0]);
+    // Red-black on 3x3 with 8 in the middle, which is red: each black pixel foretells (8 + 0 + 0) / 3 and misses by that,
+    // the middle becomes 8 - 4/3 and corners -4/3; on the diagonals the middle is odd and comes back as their mean.
+    let mut input = Picture::new(3, 3).flat().input;
+    input.radiance.fill([0.0, 0.0, 0.0, 1.0]);
+    input.radiance[4] = [8.0, 8.0, 8.0, 1.0];
+    let square = red(&reference(&input, &FilterSettings { basis: WaveletBasis::RedBlack, ..plain }));
+    // Corners before the second step -4/3, the middle 20/3 misses their mean by 8: corners gain half of that, 8/3.
+    assert!(square.iter().all(|v| (v - 8.0 / 3.0).abs() < 1e-5), "{square:?}");
+}
+
+/// What the left of 0 | 1 takes of the right, which weighs 4/16 beside 6/16, less what it is unlike.
+fn taken(unlike: f32) -> f32 {
+    let w = (-unlike).exp() * 4.0 / 16.0;
+    w / (w + 6.0 / 16.0)
+}
+
+#[test]
+fn guides_that_are_none_are_alike() {
+    let gpu = gpu();
+    let off = f32::INFINITY;
+    let left = |normals: [[f32; 3]; 2], positions: [[f32; 3]; 2], sigma_x: f32| {
+        let mut input = line(&[0.0, 1.0]);
+        for (g, (normal, position)) in input.guide.iter_mut().zip(normals.into_iter().zip(positions)) {
+            (g.normal, g.position) = (normal, position);
+        }
+        let settings = FilterSettings { levels: 1, sigma_rt: off, sigma_n: 1.0, sigma_x, ..FilterSettings::default() };
+        both(&gpu, "atrous", &input, &settings)[0][0]
+    };
+    // Too short, and too long to be measured; every normal differs from none by 1.
+    for none in [[0.0; 3], [1e-11; 3], [0.0, 0.0, 1e30], [0.0, f32::INFINITY, 0.0], [f32::NAN, 0.0, 1.0]] {
+        for (other, unlike) in [([0.0; 3], 0.0), ([0.0, 0.0, -1.0], 1.0), ([0.6, 0.0, 0.8], 1.0)] {
+            let found = left([none, other], [[0.0; 3]; 2], off);
+            assert!((found - taken(unlike)).abs() < 1e-5, "normals {none:?}, {other:?}: {found}");
+        }
+    }
+    // No position is 0, and the farthest is 1e18.
+    for (a, b, sigma_x, unlike) in [
+        ([f32::NAN, 2.0, 2.0], [0.0; 3], 1.0, 0.0),
+        ([2.0, f32::NEG_INFINITY, 2.0], [0.0; 3], 1.0, 0.0),
+        ([-3e38, 0.0, 0.0], [3e38, 0.0, 0.0], 4e18, 0.25),
+    ] {
+        let found = left([[0.0; 3]; 2], [a, b], sigma_x);
+        assert!((found - taken(unlike)).abs() < 1e-5, "positions {a:?}, {b:?}: {found}");
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn svgf_counts_in_deviations() {
+    let gpu = gpu();
+    let off = f32::INFINITY;
+    let plain = FilterSettings { sigma_n: off, sigma_x: off, levels: 1, sigma_l: 1.0, ..FilterSettings::default() };
+    // Fewer than four samples, or a variance that is none, are not trusted: the window's 0 and 1 have 1/2, unbiased.
+    let spread = std::f32::consts::SQRT_2;
+    let pair = |[a, b]: [[f32; 3]; 2], samples: f32, variance: [f32; 3]| {
+        let mut input = line(&[0.0; 2]);
+        input.radiance = [a, b].map(|[r, g, b]| [r, g, b, samples]).to_vec();
+        FilterInput { variance: Some(vec![variance; 2]), ..input }
+    };
+    let step = [[0.0; 3], [1.0; 3]];
+    for (samples, variance, deviations) in [
+        (4.0, [1.0; 3], 1.0),
+        (4.0, [1e-6; 3], 1e3),
+        (3.0, [1.0; 3], spread),
+        (4.0, [1.0, f32::NAN, 1.0], spread),
+        (4.0, [1.0, f32::INFINITY, 1.0], spread),
+        (4.0, [1.0, 1.0, -1.0], spread),
+        (4.0, [f32::MAX; 3], 0.0),
+    ] {
+        let left = both(&gpu, "svgf", &pair(step, samples, variance), &plain)[0][0];
+        assert!((left - taken(deviations)).abs() < 1e-5, "{samples} samples, variance {variance:?}: {left}");
+    }
+    // An infinite sigma switches the weight off, also where nothing varies: that counts as a deviation of 1e-30.
+    for (sigma_l, left) in [(off, taken(0.0)), (1e30, taken(1.0)), (1.0, 0.0), (0.0, 0.0)] {
+        let settings = FilterSettings { sigma_l, ..plain };
+        let found = both(&gpu, "svgf", &pair(step, 4.0, [0.0; 3]), &settings)[0][0];
+        assert!((found - left).abs() < 1e-6, "sigma {sigma_l}: {found}");
+        // Red and blue of one luminance, 0.2126 to the last bit, are no step at all.
+        let alike = [[1.0, 0.0, 0.0], [0.0, 0.0, 2.944_598_2]];
+        let red = red(&both(&gpu, "svgf", &pair(alike, 4.0, [0.0; 3]), &settings));
+        assert!((red[0] - 0.6).abs() < 1e-6 && (red[1] - 0.4).abs() < 1e-6, "sigma {sigma_l}: {red:?}");
+    }
+    // A hole that one level does not fill has no variance yet.
+    let mut holed = Picture::new(31, 1).noisy().input;
+    holed.radiance[12..24].iter_mut().for_each(|c| c[3] = 0.0);
+    both(&gpu, "svgf", &holed, &FilterSettings::default().scaled_to(&holed));
+    // Contrast is cut at 1e18: one in a window of 7 has a variance of 1/7 of its square, so that it is one deviation away
+    // from the 4 4 1 1 sixteenths around its own 6.
+    let mut values = [0.0; 9];
+    values[4] = 8e23;
+    let cut = red(&both(&gpu, "svgf", &line(&values), &FilterSettings { sigma_l: 7f32.sqrt(), ..plain }))[4] / 8e23;
+    assert!((cut - 6.0 / (6.0 + 10.0 * (-1.0f32).exp())).abs() < 1e-5, "{cut}");
+    assert_silent(&gpu);
+}
+
+/// 0 and a value beside it, on two surfaces that only `guided` takes for one: its windows make half of the value of both.
+#[test]
+fn auto_trusts_variances_of_four_samples() {
+    let gpu = gpu();
+    let settings = FilterSettings { sigma_n: 0.05, eps: [1e30; 4], ..FilterSettings::default() };
+    for (samples, variance, value, taken) in [
+        // Left out, each pixel is missed: none and svgf, which changes nothing, are better.
+        (4.0, 0.0, 1.0, 0.0),
+        // A pixel that stands alone seems not to vary: of few samples that is no proof.
+        (3.0, 0.0, 1.0, 0.5),
+        // Squares stay finite: of deviations, and of values 1e23 times the luminance below which errors are absolute.
+        (4.0, f32::MAX, 1.0, 0.0),
+        (4.0, 0.0, 4e20, 0.0),
+    ] {
+        let mut input = line(&[0.0, value]);
+        input.guide[1].normal = [0.0, 1.0, 0.0];
+        input.radiance.iter_mut().for_each(|c| c[3] = samples);
+        input.variance = Some(vec![[variance; 3]; 2]);
+        let found = red(&both(&gpu, "auto", &input, &settings));
+        let right = [taken, 1.0 - taken].map(|share| share * value);
+        assert!(
+            found.iter().zip(right).all(|(a, b)| (a - b).abs() < 1e-6 * value),
+            "{samples} {variance} {value}: {found:?}"
+        );
+    }
+    assert_silent(&gpu);
+}

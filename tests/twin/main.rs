@@ -1,0 +1,17 @@
+//! Kernels and filters on the device against their CPU twins, and the twins against exact answers.
+mod allocate;
+mod bsdf;
+mod denoiser;
+mod filters;
+mod guided;
+mod kernels;
+mod lookup;
+mod path;
+#[path = "../support/picture.rs"]
+mod picture;
+mod sphere;
+mod stability;
+#[path = "../support/mod.rs"]
+mod support;
+#[path = "../support/twin.rs"]
+mod twin;
