@@ -11,6 +11,7 @@ pub mod gpu;
 pub mod guide;
 pub mod image;
 pub mod layout;
+pub mod math;
 mod memory;
 pub mod render;
 pub mod report;

@@ -5,13 +5,13 @@ use glam::{Vec3, vec2};
 use rayon::prelude::*;
 use std::path::Path;
 use tallow::layout::NONE;
+use tallow::math::warp::warp_sphere;
 use tallow::scene::Scene;
 use tallow::twins::camera::{camera_ray, film_from_pixel};
 use tallow::twins::light::INFINITE_DISTANCE;
 use tallow::twins::sampler::{sample_2d, sampler_start};
 use tallow::twins::surface::surface_at;
 use tallow::twins::traverse::traverse_from;
-use tallow::twins::warp::warp_sphere;
 
 /// Of the scene's film, with `spp` samples a pixel; `reach` in world units.
 ///

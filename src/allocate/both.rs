@@ -6,11 +6,11 @@ use super::{HostInputs, Inputs, Placing, Policy, Row, geometry};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{Guide, NONE, PixelLight, PixelStats, PriorityPush, vec3};
+use crate::math::portable::{exp_negative, squared_distance};
 use crate::shaders::both::{APART, LEAST_LEFT, STRONGEST_TINT};
 use crate::shaders::shared::likeness_bits::{GATHERED_UNIT, LEAST_KINSHIP, SEVENTHS};
 use crate::shaders::{both, likeness};
 use crate::statistics::luminance;
-use crate::twins::exact::{exp_negative, squared_distance};
 use glam::Vec3;
 
 pub(super) const ROW: Row = Row {

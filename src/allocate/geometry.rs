@@ -3,8 +3,8 @@ use super::{HostInputs, Inputs, Placing, Policy, Row};
 use crate::error::Result;
 use crate::gpu::{Gpu, Kernel, Recorder};
 use crate::layout::{Guide, NONE, PriorityPush};
+use crate::math::portable::{exp_negative, squared_distance};
 use crate::shaders::geometry::Bind;
-use crate::twins::exact::{exp_negative, squared_distance};
 
 pub(super) const ROW: Row = Row {
     name: "geometry",

@@ -95,6 +95,26 @@ mod tests {
         }
     }
 
+    /// Exact mean for light from OUTSIDE (Walsh 1926, as given by Duntley 1942), n > 1.
+    fn walsh(n: f64) -> f64 {
+        let (n2, n4) = (n * n, n.powi(4));
+        0.5 + (n - 1.0) * (3.0 * n + 1.0) / (6.0 * (n + 1.0).powi(2))
+            + n2 * (n2 - 1.0).powi(2) / (n2 + 1.0).powi(3) * ((n - 1.0) / (n + 1.0)).ln()
+            - 2.0 * n.powi(3) * (n2 + 2.0 * n - 1.0) / ((n2 + 1.0) * (n4 - 1.0))
+            + 8.0 * n4 * (n4 + 1.0) / ((n2 + 1.0) * (n4 - 1.0).powi(2)) * n.ln()
+    }
+
+    #[test]
+    fn mean_reflectance_matches_walsh() {
+        for n in [1.05f32, 1.33, 1.5, 1.9, 2.4] {
+            let (outside, found) = (walsh(f64::from(n)), f64::from(mean_internal(n)));
+            let exact = 1.0 - (1.0 - outside) / f64::from(n * n);
+            assert!((found - exact).abs() < 1e-5, "{n}: {found} {exact}");
+        }
+        // Published: glass of 1.5 reflects 9.18 % of diffuse light from outside (Judd 1942).
+        assert!((walsh(1.5) - 0.0918).abs() < 1e-4);
+    }
+
     #[test]
     fn internal_mean_agrees_with_integration_from_inside() {
         // The published value for 1.5 (d'Eon and Irving 2011), and the integral that reciprocity was used for.

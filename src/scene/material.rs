@@ -13,13 +13,13 @@
 //! Roughness: alpha = Pr^2; without Pr, sqrt(2 / (Ns + 2)) for coats and conductors, and smooth for 2 and 3.
 //! d (or 1 - Tr) and map_d are opacity except on dielectrics. `norm` wins over a bump map. Bump heights are `-bm` world
 //! units; without -bm, 0.0005 of the scene's diagonal. A black Kd under a map_Kd counts as white.
+use super::coat::coat_table;
 use super::effects::SMOOTH;
 use super::fresnel;
 use super::mtl::{Map, Mtl};
 use super::texture::{Kind, Mapping, TextureSet};
 use super::value::Rgb;
 use crate::layout::{self, *};
-use crate::twins::coat::coat_table;
 use serde::Deserialize;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};

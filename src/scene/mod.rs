@@ -12,6 +12,7 @@ mod assemble;
 mod bvh;
 mod camera;
 mod check;
+mod coat;
 pub mod description;
 mod effects;
 mod environment;
@@ -31,8 +32,10 @@ mod texture;
 mod value;
 
 pub use check::check_camera;
-pub use effects::effects;
+pub use coat::{CoatRow, coat_table};
+pub use effects::{SMOOTH, effects};
 pub use fingerprint::Fingerprint;
+pub use fresnel::mean_internal as mean_internal_fresnel;
 
 /// Largest coordinate M of triangles, of points that rays start from and of lights: what a ray's hit is computed from fits a
 /// 32-bit float (3.4e38). Seen from its origin a corner is within 2 M, and sheared along the ray within 4 M; an edge

@@ -1,9 +1,9 @@
 //! Twin of `glsl/film/accumulate.comp`: Welford's running mean and variance (1962), in order of sample index.
 use crate::layout::{BrokenTally, FoldPush, PixelLight, PixelStats, vec3, vec4};
+use crate::math::hash::pcg;
 use crate::shaders;
 use crate::shaders::accumulate::{BRIGHTEST, FARTHEST, FEW, SMALLEST_ALBEDO, WIDEST};
 use crate::statistics::luminance;
-use crate::twins::sampler::pcg;
 use glam::{Vec3, Vec4};
 
 /// Of the remainder of a mean, for each channel.

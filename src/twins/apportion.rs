@@ -1,6 +1,6 @@
 //! Twins of the kernels that apportion, scan and batch: plain, with 128-bit products and a sort. They agree with `==`.
 use crate::layout::NONE;
-use crate::twins::sampler::pcg;
+use crate::math::hash::pcg;
 
 /// Priorities as 12.20 fixed point, and how many of them are not finite (they weigh nothing).
 pub fn weigh(priority: &[f32]) -> (Vec<u32>, u32) {

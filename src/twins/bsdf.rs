@@ -1,9 +1,10 @@
 //! Twin of `glsl/shared/bsdf.glsl`. Local frame: z = shading normal on the front side; both directions leave the surface.
 use crate::layout::{BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, MATERIAL_GGX, MATERIAL_NONLINEAR, Material};
-use crate::twins::coat::{CoatRow, coat_row_at, row_inside, row_outside};
-use crate::twins::fresnel::{fresnel_conductor, fresnel_dielectric};
-use crate::twins::microfacet::{microfacet_area, microfacet_d, microfacet_g1, microfacet_sample};
-use crate::twins::warp::{INV_PI, warp_cosine_hemisphere};
+use crate::math::fresnel::{fresnel_conductor, fresnel_dielectric};
+use crate::math::microfacet::{microfacet_area, microfacet_d, microfacet_g1, microfacet_sample};
+use crate::math::warp::{INV_PI, warp_cosine_hemisphere};
+use crate::scene::CoatRow;
+use crate::twins::coat::{coat_row_at, row_inside, row_outside};
 use glam::{Vec2, Vec3, Vec4, vec2, vec3};
 
 /// A material resolved at the hit. Members as in [`Material`].

@@ -1,8 +1,9 @@
 //! Twin of `glsl/shared/camera.glsl`.
 use crate::layout::{Camera, Effects, PathPush};
+use crate::math::hash::pcg;
+use crate::math::warp::{warp_disk, warp_gaussian, warp_tent};
 use crate::shaders::shared::camera::{PAIR_FILM, PAIR_LENS};
-use crate::twins::sampler::{Sampler, pcg, sample_2d};
-use crate::twins::warp::{warp_disk, warp_gaussian, warp_tent};
+use crate::twins::sampler::{Sampler, sample_2d};
 use glam::{Vec2, Vec3, vec2};
 
 /// A ray.

@@ -1,9 +1,10 @@
 //! Twin of `glsl/trace/guide_lookup.comp`.
 use crate::layout::{Effects, Guide, NONE, PathPush, vec3, vec4};
+use crate::math::hash::pcg;
 use crate::scene::Scene;
 use crate::twins::camera::{eye_ray, film_sample, path_seed};
 use crate::twins::primary_hit::first_hit;
-use crate::twins::sampler::{pcg, sampler_start};
+use crate::twins::sampler::sampler_start;
 use glam::{IVec2, Vec2, Vec3, ivec2};
 
 const LEAST_NORMAL: f32 = 1e-3;

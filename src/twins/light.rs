@@ -1,11 +1,11 @@
 //! Twin of `glsl/shared/light.glsl`.
 use crate::layout::*;
+use crate::math::hash::pcg;
+use crate::math::warp::{basis_from_normal, warp_cone, warp_sphere, warp_triangle};
 use crate::scene::{Environment, Scene};
-use crate::twins::sampler::pcg;
 use crate::twins::scene::texture_coordinates;
 use crate::twins::surface::{Surface, plane_clearance, unit_vector};
 use crate::twins::texture::{surface_opacity, texture_sample};
-use crate::twins::warp::{basis_from_normal, warp_cone, warp_sphere, warp_triangle};
 use glam::{Mat3, Vec2, Vec3, Vec3Swizzles, vec2, vec3};
 use std::f32::consts::PI;
 

@@ -1,5 +1,7 @@
 //! Twin of `glsl/trace/path.comp`.
 use crate::layout::{BSDF_DIELECTRIC, Effects, MATERIAL_TWO_SIDED, NONE, PathPush};
+use crate::math::hash::pcg;
+use crate::math::warp::basis_from_normal;
 use crate::scene::Scene;
 use crate::shaders::path::{PAIR_BSDF, PAIR_CHOICE, PAIR_FIRST_BOUNCE, PAIR_LIGHT, PAIR_ROULETTE, PAIRS_PER_BOUNCE};
 use crate::twins::bsdf::{
@@ -7,10 +9,9 @@ use crate::twins::bsdf::{
 };
 use crate::twins::camera::{eye_ray, film_sample, path_seed};
 use crate::twins::light::*;
-use crate::twins::sampler::{Sampler, pcg, sample_2d, sample_2d_bits, sampler_start};
+use crate::twins::sampler::{Sampler, sample_2d, sample_2d_bits, sampler_start};
 use crate::twins::surface::{Facing, Surface, facing_normals, light_share, surface_at, surface_bsdf, surface_emission};
 use crate::twins::traverse::traverse_from;
-use crate::twins::warp::basis_from_normal;
 use glam::{Mat3, Vec3};
 
 /// Shadow rays to a lamp end at this part of the way: the error of the distance at which they would meet it is some 2^-24

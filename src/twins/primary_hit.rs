@@ -1,10 +1,10 @@
 //! Twin of `glsl/trace/primary_hit.comp` and of `glsl/shared/first_hit.glsl`.
 use crate::layout::{Camera, Guide, NONE, PathPush};
+use crate::math::hash::pcg;
 use crate::scene::Scene;
 use crate::twins::bsdf::{bsdf_albedo, bsdf_is_delta};
 use crate::twins::camera::{Ray, camera_ray, film_from_pixel};
 use crate::twins::light::INFINITE_DISTANCE;
-use crate::twins::sampler::pcg;
 use crate::twins::surface::{side_of, surface_at, surface_bsdf};
 use crate::twins::traverse::traverse;
 use glam::{Vec2, vec2};

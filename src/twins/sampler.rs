@@ -1,4 +1,5 @@
 //! Twin of `glsl/shared/sampler.glsl`: the words agree with `==`.
+use crate::math::hash::pcg;
 use glam::Vec2;
 
 /// State of one sample's random numbers: everything they depend on but the dimension.
@@ -10,13 +11,6 @@ pub struct Sampler {
     pub index: u32,
     /// PCG numbers instead of Sobol points (`FX_INDEPENDENT` in the shader).
     pub independent: bool,
-}
-
-/// PCG-RXS-M-XS as a hash, a bijection (Jarzynski and Olano 2020).
-pub fn pcg(x: u32) -> u32 {
-    let x = x.wrapping_mul(747796405).wrapping_add(2891336453);
-    let x = ((x >> ((x >> 28) + 4)) ^ x).wrapping_mul(277803737);
-    (x >> 22) ^ x
 }
 
 /// Owen scrambling of a bit-reversed word: Laine-Karras with Vegdahl's constants.

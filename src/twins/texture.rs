@@ -1,7 +1,7 @@
 //! Twin of `glsl/shared/texture.glsl`.
 use crate::layout::{MATERIAL_MASKED, NONE, TEXTURE_CLAMP, TEXTURE_SRGB, Texture};
+use crate::math::hash::pcg;
 use crate::scene::Scene;
-use crate::twins::sampler::pcg;
 use crate::twins::scene::{material_of, texture_coordinates};
 use glam::{IVec2, Vec2, Vec3, Vec4, ivec2, vec2};
 

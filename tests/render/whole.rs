@@ -272,7 +272,7 @@ fn black_floor(coated: bool) -> Scene {
         base_color: [0.005; 3],
         eta: [1.5; 3],
         specular: [1.0; 3],
-        internal_fresnel: tallow::twins::fresnel::internal_fresnel(1.5) as f32,
+        internal_fresnel: tallow::scene::mean_internal_fresnel(1.5),
         ..scene.materials[0]
     };
     let own = scene.materials.len() as u32;

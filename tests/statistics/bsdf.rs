@@ -7,9 +7,9 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 use tallow::layout::{BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE, COAT_COLUMNS};
+use tallow::scene::{CoatRow, coat_table, mean_internal_fresnel};
 use tallow::twins::bsdf::{Bsdf, BsdfSample, SMOOTH_ALPHA, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
-use tallow::twins::coat::{CoatRow, coat_row_at, coat_table};
-use tallow::twins::fresnel::internal_fresnel;
+use tallow::twins::coat::coat_row_at;
 use tallow::twins::sampler::{sample_2d, sampler_start};
 
 const ALPHAS: [f32; 5] = [0.01, 0.05, 0.2, 0.5, 1.0];
@@ -32,7 +32,7 @@ fn bsdf(kind: u32, alpha: f32, ggx: bool, eta: f32) -> Bsdf {
         k: Vec3::ZERO,
         specular: Vec3::ONE,
         transmission: Vec3::ONE,
-        internal_fresnel: internal_fresnel(f64::from(eta)) as f32,
+        internal_fresnel: mean_internal_fresnel(eta),
         coat: if rough_coat { coat(alpha, ggx, eta) } else { [0.0; COAT_COLUMNS as usize] },
         nonlinear: false,
         ggx,

@@ -3,9 +3,9 @@ use crate::statistics::{chi_square, sidak, uniform_2d};
 use glam::{Mat3, Vec2, Vec3, vec2};
 use std::f64::consts::TAU;
 use tallow::layout::{Camera, Effects, PathPush};
+use tallow::math::warp::*;
 use tallow::twins::camera::{eye_ray, film_from_pixel, film_sample};
 use tallow::twins::sampler::{sample_2d, sample_2d_bits, sampler_start};
-use tallow::twins::warp::*;
 
 /// Every elementary interval of area 2^-k holds one of these 2^k points.
 fn is_stratified(points: &[[u32; 2]]) -> bool {

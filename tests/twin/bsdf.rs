@@ -8,9 +8,8 @@ use tallow::layout::{
     BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE, Effects, MATERIAL_GGX, MATERIAL_NONLINEAR, Material,
     TestPush,
 };
+use tallow::scene::{coat_table, mean_internal_fresnel};
 use tallow::twins::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
-use tallow::twins::coat::coat_table;
-use tallow::twins::fresnel::internal_fresnel;
 use tallow::twins::sampler::{sample_2d, sample_2d_bits, sampler_start};
 
 const CASES: usize = 20_000;
@@ -22,7 +21,7 @@ fn numbers(case: usize, pair: u32) -> Vec2 {
 }
 
 fn direction(u: Vec2) -> Vec3 {
-    tallow::twins::warp::warp_sphere(u)
+    tallow::math::warp::warp_sphere(u)
 }
 
 const TABLES: usize = 3;
@@ -54,7 +53,7 @@ fn cases(kinds: &[u32], ggx: &[u32]) -> Vec<Case> {
             k: [4.0 * c.y, 3.0, 0.0],
             specular: [1.0, d.x, d.y],
             transmission: [d.y, 1.0, d.x],
-            internal_fresnel: internal_fresnel(f64::from(eta)) as f32,
+            internal_fresnel: mean_internal_fresnel(eta),
             flags: if ggx[i / 4 % ggx.len()] == 1 { MATERIAL_GGX } else { 0 }
                 | if i / 16 % 3 == 1 { MATERIAL_NONLINEAR } else { 0 },
             coat_table: (i % TABLES * tables().len() / TABLES) as u32,

@@ -12,6 +12,7 @@ use std::path::Path;
 use std::time::Instant;
 use tallow::gpu::{Buffer, DeviceKind, DeviceOptions, FrameResources, Gpu, Location};
 use tallow::layout::{self, Effects, NONE, RayHit, RayQuery, TraversePush};
+use tallow::math::warp::{basis_from_normal, warp_cosine_hemisphere};
 use tallow::render::settings::Settings;
 use tallow::render::{Outputs, Renderer};
 use tallow::scene::Scene;
@@ -20,7 +21,6 @@ use tallow::twins::light::INFINITE_DISTANCE;
 use tallow::twins::sampler::{sample_2d, sampler_start};
 use tallow::twins::surface::surface_at;
 use tallow::twins::traverse::traverse;
-use tallow::twins::warp::{basis_from_normal, warp_cosine_hemisphere};
 
 /// The kernels of `glsl/test`.
 #[allow(dead_code)]

@@ -5,8 +5,9 @@ use image::codecs::png::PngEncoder;
 use std::fs::File;
 use std::path::PathBuf;
 use tallow::image::{Film, Picture, WriteOptions};
-use tallow::twins::coat::{coat_row_at, coat_table, row_inside};
-use tallow::twins::fresnel::fresnel_dielectric;
+use tallow::math::fresnel::fresnel_dielectric;
+use tallow::scene::coat_table;
+use tallow::twins::coat::{coat_row_at, row_inside};
 
 /// Degrees. The tests' XML leaves the field of view to the default, which is that of a 50 mm lens on 36 mm x 24 mm film;
 /// the descriptions say 30, at which the references do not match. Across a square film whose diagonal is that of

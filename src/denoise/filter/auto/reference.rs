@@ -5,10 +5,10 @@ use crate::denoise::filter::noise_estimate::{self, ENOUGH, contrast, luminance};
 use crate::denoise::filter::pack::Packed;
 use crate::denoise::filter::{FilterInput, FilterSettings};
 use crate::layout::vec4;
+use crate::math::hash::pcg;
 use crate::shaders::auto::{OVERALL, RIDGE, ROUNDS};
 use crate::shaders::auto_error::{LIMIT, MOST, OWN};
 use crate::shaders::shared::candidates::BRIGHT;
-use crate::twins::sampler::pcg;
 use glam::{DVec4, Vec3, Vec4, Vec4Swizzles};
 use std::array::from_fn;
 

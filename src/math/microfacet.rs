@@ -1,5 +1,5 @@
 //! Twin of `glsl/shared/microfacet.glsl`: isotropic distributions over normals m with m.z > 0, `alpha` in [0.01, 1].
-use crate::twins::warp::{INV_PI, circle_point, erf_inverse, erfc_scaled};
+use crate::math::warp::{INV_PI, circle_point, erf_inverse, erfc_scaled};
 use glam::{Vec2, Vec3, Vec3Swizzles, vec2, vec3};
 
 const INV_SQRT_PI: f32 = 0.564_189_6;

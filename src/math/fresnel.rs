@@ -1,4 +1,4 @@
-//! Twin of `glsl/shared/fresnel.glsl`, and the mean internal reflectance that the host computes per material.
+//! Twin of `glsl/shared/fresnel.glsl`.
 use glam::{Vec2, Vec3, vec2};
 
 /// x: reflectance at cosine `c` >= 0 for `eta` = index beyond / index on this side; y: cosine of the refracted ray.
@@ -26,51 +26,10 @@ pub fn fresnel_conductor(c: f32, eta: Vec3, k: Vec3) -> Vec3 {
     0.5 * (rs + rp)
 }
 
-/// Mean reflectance of a dielectric of relative index `eta` (> 0) for diffuse light that arrives from INSIDE it:
-/// `2 * integral of F(c) c dc` over c in [0, 1]. In [0, 1); 0 for `eta` = 1. For [`crate::layout::Material`].
-///
-/// Midpoint rule in the refracted cosine, where the integrand is smooth; total reflection is added exactly.
-pub fn internal_fresnel(eta: f64) -> f64 {
-    if eta < 1.0 {
-        // Reciprocity: both sides let the same share of diffuse flux per etendue through.
-        return 1.0 - (1.0 - internal_fresnel(1.0 / eta)) / (eta * eta);
-    }
-    const STEPS: usize = 4096;
-    let reflectance = |t: f64| {
-        // Outside cosine t, inside cosine c.
-        let c = (1.0 - (1.0 - t * t) / (eta * eta)).sqrt();
-        let (rs, rp) = ((eta * c - t) / (eta * c + t), (eta * t - c) / (eta * t + c));
-        0.5 * (rs * rs + rp * rp)
-    };
-    let mean = (0..STEPS).map(|i| (i as f64 + 0.5) / STEPS as f64).map(|t| 2.0 * t * reflectance(t)).sum::<f64>();
-    1.0 - (1.0 - mean / STEPS as f64) / (eta * eta)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use glam::vec3;
-
-    /// Exact mean for light from OUTSIDE (Walsh 1926, as given by Duntley 1942), n > 1.
-    fn walsh(n: f64) -> f64 {
-        let (n2, n4) = (n * n, n.powi(4));
-        0.5 + (n - 1.0) * (3.0 * n + 1.0) / (6.0 * (n + 1.0).powi(2))
-            + n2 * (n2 - 1.0).powi(2) / (n2 + 1.0).powi(3) * ((n - 1.0) / (n + 1.0)).ln()
-            - 2.0 * n.powi(3) * (n2 + 2.0 * n - 1.0) / ((n2 + 1.0) * (n4 - 1.0))
-            + 8.0 * n4 * (n4 + 1.0) / ((n2 + 1.0) * (n4 - 1.0).powi(2)) * n.ln()
-    }
-
-    #[test]
-    fn mean_reflectance_matches_walsh() {
-        for n in [1.05, 1.33, 1.5, 1.9, 2.4] {
-            let internal = 1.0 - (1.0 - walsh(n)) / (n * n);
-            assert!((internal_fresnel(n) - internal).abs() < 1e-6, "{n}: {} {internal}", internal_fresnel(n));
-            assert!((internal_fresnel(1.0 / n) - walsh(n)).abs() < 1e-5, "1 / {n}");
-        }
-        // Published: glass of 1.5 reflects 9.18 % of diffuse light from outside, 59.6 % from inside (Judd 1942).
-        assert!((internal_fresnel(1.5) - 0.5963).abs() < 2e-4 && (walsh(1.5) - 0.0918).abs() < 1e-4);
-        assert!(internal_fresnel(1.0).abs() < 1e-12);
-    }
 
     #[test]
     fn dielectric_solves_the_worked_examples() {

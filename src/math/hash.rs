@@ -1,0 +1,8 @@
+//! Twin of the hash in `glsl/shared/sampler.glsl`: the words agree with `==`.
+
+/// PCG-RXS-M-XS as a hash, a bijection (Jarzynski and Olano 2020).
+pub fn pcg(x: u32) -> u32 {
+    let x = x.wrapping_mul(747796405).wrapping_add(2891336453);
+    let x = ((x >> ((x >> 28) + 4)) ^ x).wrapping_mul(277803737);
+    (x >> 22) ^ x
+}
