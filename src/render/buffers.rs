@@ -145,6 +145,11 @@ impl FilmTile {
         (0..pixels).step_by(window as usize).map(move |first| first..pixels.min(first + window))
     }
 
+    /// Whether it holds primary hits.
+    pub fn has_guide(&self) -> bool {
+        self.guide.len() == self.pixels as usize
+    }
+
     fn new(gpu: &Gpu, range: Range<u32>, window: u32, effects: &Effects, guides: bool) -> Result<Self> {
         let pixels = range.end - range.start;
         let room = |on: bool| if on { pixels as usize } else { 1 };

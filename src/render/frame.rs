@@ -1,112 +1,88 @@
 //! One frame, in the order the GPU runs it. `P` pixels, `B` paths in flight.
-use crate::allocate::{Inputs, Policy};
-use crate::error::Result;
+use crate::allocate::Inputs;
+use crate::error::{Error, Result};
 use crate::gpu::Recorder;
-use crate::layout::*;
+use crate::layout::{NONE, PathPush, PriorityPush};
 use crate::render::buffers::{DeviceScene, FilmBuffers};
-use crate::render::pass::apportion::Apportion;
-use crate::render::pass::scan::Scan;
+use crate::render::kernels::{Allocation, Kernels};
 use crate::render::pass::{accumulate, choose, path, primary_hit, sample_list};
-use crate::render::schedule::{Batch, Choice, PathRange, Plan};
+use crate::render::schedule::Step;
 
-/// The kernels of a frame, specialised for one scene.
-pub struct Stages {
-    /// Primary hits at pixel centres.
-    pub guide: primary_hit::Guides,
-    /// Paths.
-    pub path: path::Path,
-    /// Statistics.
-    pub fold: accumulate::Fold,
+/// What the frames of a renderer are recorded from: what they read, what they write, and the kernels between.
+pub struct Frame {
+    /// The scene, which no pass changes.
+    pub scene: DeviceScene,
+    /// What the passes write.
+    pub film: FilmBuffers,
+    /// The kernels of every render.
+    pub kernels: Kernels,
+    /// The kernels that place samples, where samples are placed.
+    pub allocation: Option<Allocation>,
+    /// What the path tracing kernels are told; each pass fills in its batch.
+    pub path_push: PathPush,
+    /// What the policy is told.
+    pub priority_push: PriorityPush,
 }
 
-/// The kernels that decide where samples go, for renders that do not spread them evenly.
-pub struct Allocation {
-    /// What makes a pixel worth samples.
-    pub policy: Box<dyn Policy>,
-    /// Priorities to counts.
-    pub apportion: Apportion,
-    /// The same, one sample at most.
-    pub choose: choose::Choose,
-    /// Counts to offsets.
-    pub scan: Scan,
-    /// Offsets to paths.
-    pub batch: sample_list::Batches,
-}
-
-/// Forgets all samples, and finds the primary hits where they are wanted: once per camera.
-pub fn record_start(rec: &mut Recorder, st: &Stages, s: &DeviceScene, f: &FilmBuffers, push: &PathPush) -> Result<()> {
-    rec.fill(&f.broken, 0)?;
-    for tile in &f.tiles {
-        rec.fill(&tile.stats, 0)?;
-        rec.fill(&tile.light, 0)?;
-        if tile.guide.len() == tile.pixels as usize {
-            primary_hit::record(&st.guide, rec, s, tile, push)?; //   camera  -> guide[P]
+/// Records the passes of one step. Beside each stands what it reads and what it writes.
+///
+/// # Errors
+/// [`Error::Usage`] for a step that places samples where there are no kernels for it, [`Error::Device`].
+pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
+    let Frame { scene, film, kernels, path_push, priority_push, .. } = frame;
+    match step {
+        Step::Start => {
+            rec.fill(&film.broken, 0)?; // 0 -> broken
+            for tile in &film.tiles {
+                rec.fill(&tile.stats, 0)?; // 0 -> stats[P]
+                rec.fill(&tile.light, 0)?; // 0 -> light[P]
+                if tile.has_guide() {
+                    primary_hit::record(&kernels.primary_hit, rec, scene, tile, path_push)?; // camera -> guide[P]
+                }
+            }
+            if let Some(Allocation { policy, .. }) = &frame.allocation {
+                policy.prepare(rec, &inputs(film), priority_push)?; // guide[P] -> the policy's own
+            }
+        }
+        Step::Uniform(batch) => {
+            let push = path::push_of_batch(path_push, batch);
+            path::record(&kernels.path, rec, scene, film, &push)?; // batch -> samples[B]
+            accumulate::record(&kernels.accumulate, rec, film, batch)?; // samples[B] -> stats[P], light[P]
+        }
+        Step::Allocate(plan) => {
+            let (a, stats) = (allocation(frame)?, &film.tiles[0].stats);
+            a.policy.record(rec, &inputs(film), priority_push)?; // guide[P], stats[P] -> priority[P]
+            a.apportion.record(rec, &film.priority, stats, &film.counts, plan)?; // priority[P] -> count[P]
+            a.scan.record(rec, &film.counts)?; // count[P] -> offset[P + 1]
+        }
+        Step::Choose(choice) => {
+            let (a, counts, seed) = (allocation(frame)?, &film.counts, path_push.seed);
+            let push = PriorityPush { round: choice.round, ..*priority_push };
+            a.policy.record(rec, &inputs(film), &push)?; // stats[P] -> priority[P]
+            choose::record(&a.choose, rec, &film.priority, counts, choice, seed)?; // priority[P] -> count[P], 0 or 1
+            a.scan.record(rec, counts)?; // count[P] -> offset[P + 1]
+        }
+        Step::Listed(range) => {
+            let (a, push) = (allocation(frame)?, path::push_of_list(path_push, range.paths));
+            let (offset, stats, first) = (&film.counts.offset, &film.tiles[0].stats, push.first_sample);
+            if a.list_may_be_short {
+                rec.fill(&film.paths, NONE)?; // NONE -> paths[B]
+            }
+            sample_list::record(&a.sample_list, rec, offset, stats, &film.paths, range, first)?; // offset -> paths[B]
+            path::record(&kernels.path, rec, scene, film, &push)?; // paths[B] -> samples[B]
+            accumulate::record_listed(&kernels.accumulate, rec, film, range)?; // samples[B] -> stats[P], light[P]
         }
     }
     Ok(())
 }
 
-/// What a policy finds out before there are samples: once per camera.
-pub fn record_preparation(rec: &mut Recorder, a: &Allocation, f: &FilmBuffers, push: &PriorityPush) -> Result<()> {
-    a.policy.prepare(rec, &inputs(f), push) //                  guide[P] -> a policy's own
+fn allocation(frame: &Frame) -> Result<&Allocation> {
+    let without = || Error::Usage("this renderer was made without the effect \"adaptive\"".into());
+    frame.allocation.as_ref().ok_or_else(without)
 }
 
-fn inputs(f: &FilmBuffers) -> Inputs<'_> {
-    let tile = &f.tiles[0];
-    Inputs { guide: &tile.guide, stats: &tile.stats, light: &tile.light, priority: &f.priority }
-}
-
-/// Records one batch with the same number of paths for every pixel of a run.
-pub fn record_uniform(
-    rec: &mut Recorder,
-    st: &Stages,
-    s: &DeviceScene,
-    f: &FilmBuffers,
-    push: &PathPush,
-    batch: &Batch,
-) -> Result<()> {
-    path::record(&st.path, rec, s, f, push, batch)?; //         batch   -> samples[B]
-    accumulate::record(&st.fold, rec, f, batch) //                    samples -> stats[P], light[P]
-}
-
-/// Records the decision of how many samples each pixel gets next.
-pub fn record_allocation(
-    rec: &mut Recorder,
-    a: &Allocation,
-    f: &FilmBuffers,
-    push: &PriorityPush,
-    plan: &Plan,
-) -> Result<()> {
-    a.policy.record(rec, &inputs(f), push)?; //                             guide[P], stats[P] -> priority[P]
-    a.apportion.record(rec, &f.priority, &f.tiles[0].stats, &f.counts, plan)?; // priority -> count[P], sum = budget
-    a.scan.record(rec, &f.counts) //                                        count    -> offset[P + 1]
-}
-
-/// Records the decision of who gets one sample next.
-pub fn record_choice(
-    rec: &mut Recorder,
-    a: &Allocation,
-    f: &FilmBuffers,
-    push: &PriorityPush,
-    choice: &Choice,
-    seed: u32,
-) -> Result<()> {
-    a.policy.record(rec, &inputs(f), &PriorityPush { round: choice.round, ..*push })?; // stats[P] -> priority[P]
-    choose::record(&a.choose, rec, &f.priority, &f.counts, choice, seed)?; //       priority -> count[P], 0 or 1
-    a.scan.record(rec, &f.counts) //                                                count    -> offset[P + 1]
-}
-
-/// Records one batch of what was allocated.
-pub fn record_listed(
-    rec: &mut Recorder,
-    st: &Stages,
-    a: &Allocation,
-    s: &DeviceScene,
-    f: &FilmBuffers,
-    push: &PathPush,
-    range: &PathRange,
-) -> Result<()> {
-    sample_list::record(&a.batch, rec, &f.counts.offset, &f.tiles[0].stats, &f.paths, range, push.first_sample)?; // offset -> paths[B]
-    path::record_listed(&st.path, rec, s, f, push, range.paths)?; //                     paths   -> samples[B]
-    accumulate::record_listed(&st.fold, rec, f, range) //                                      samples -> stats[P], light[P]
+/// Samples are placed on films of one tile alone.
+fn inputs(film: &FilmBuffers) -> Inputs<'_> {
+    let tile = &film.tiles[0];
+    Inputs { guide: &tile.guide, stats: &tile.stats, light: &tile.light, priority: &film.priority }
 }

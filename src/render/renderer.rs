@@ -2,21 +2,15 @@
 //! it, and frames recorded batch by batch into command buffers.
 use crate::allocate::{self, HostInputs, Row};
 use crate::error::{Error, Result};
-use crate::gpu::{FrameResources, Gpu, Kernel, PassTime, PerBlock, Recorder, thread_items};
-use crate::layout::{
-    Apportionment, Camera, Effects, LIGHT_ENVIRONMENT, NONE, PathPush, PixelLight, PixelStats, PriorityPush,
-    ROOT_OF_INSTANCES,
-};
+use crate::gpu::{FrameResources, Gpu, PassTime, Recorder};
+use crate::layout::{Apportionment, Camera, Effects, PixelLight, PixelStats, PriorityPush};
 use crate::render::buffers::{DeviceScene, FilmBuffers};
-use crate::render::frame::{self, Allocation, Stages};
-use crate::render::pass::apportion::Apportion;
-use crate::render::pass::scan::Scan;
-use crate::render::schedule::{self, Cut};
-use crate::render::schedule::{Progress, Step};
-use crate::render::settings::{PixelFilter, Placing, Sampler, Settings};
+use crate::render::frame::{self, Frame};
+use crate::render::kernels::{Allocation, Kernels};
+use crate::render::push::{path_push, priority_push};
+use crate::render::schedule::{self, Cut, Progress, Step};
+use crate::render::settings::{Sampler, Settings};
 use crate::scene::{self, Scene};
-use crate::shaders::shared::traverse;
-use crate::shaders::{accumulate, path, primary_hit};
 use crate::statistics::BrokenSamples;
 use std::time::Duration;
 
@@ -34,15 +28,10 @@ pub struct Outputs {
 /// A scene on a device and the kernels to render it. Everything is created in [`Renderer::new`], nothing later.
 pub struct Renderer {
     pub(super) gpu: Gpu,
-    pub(super) scene: DeviceScene,
-    pub(super) stages: Stages,
-    pub(super) allocation: Option<Allocation>,
-    pub(super) film: FilmBuffers,
+    pub(super) frame: Frame,
     pub(super) effects: Effects,
     pub(super) outputs: Outputs,
     pub(super) settings: Settings,
-    pub(super) push: PathPush,
-    pub(super) priority: PriorityPush,
     pub(super) paths: u32,
 }
 
@@ -86,14 +75,9 @@ impl Renderer {
         let policy = policy_of(&settings)?;
         let split_light = outputs.split_light || policy.split_light;
         let effects = Effects { split_light, counters: outputs.counters, ..effects };
-        let (thread, traverse) = (gpu.tuning().thread(), traverse::Constants { stack: scene.stack });
-        let stages = Stages {
-            guide: Kernel::new(gpu, &primary_hit::Constants { effects, thread, traverse })?,
-            path: Kernel::new(gpu, &path::Constants { effects, thread, traverse })?,
-            fold: Kernel::new(gpu, &accumulate::Constants { effects, thread })?,
-        };
+        let kernels = Kernels::new(gpu, effects, scene.stack)?;
         let pixels = settings.pixels() as u32;
-        let allocation = effects.adaptive.then(|| allocation(gpu, policy, pixels)).transpose()?;
+        let allocation = effects.adaptive.then(|| Allocation::new(gpu, policy, &settings)).transpose()?;
         let paths = paths_in_flight(gpu, &settings, &effects);
         let film = FilmBuffers::new(gpu, pixels, paths, &effects, outputs.guides || policy.guides)?;
         // Offsets are the widest records that are bound whole.
@@ -104,21 +88,10 @@ impl Renderer {
                  or --allocate uniform"
             )));
         }
-        let (push, priority) = (path_push(scene), priority_push(scene));
+        let (path_push, priority_push) = (path_push(scene), priority_push(scene));
         let scene = DeviceScene::new(gpu, scene, &effects)?;
-        Ok(Self {
-            gpu: gpu.clone(),
-            scene,
-            stages,
-            allocation,
-            film,
-            effects,
-            outputs,
-            settings,
-            push,
-            priority,
-            paths,
-        })
+        let frame = Frame { scene, film, kernels, allocation, path_push, priority_push };
+        Ok(Self { gpu: gpu.clone(), frame, effects, outputs, settings, paths })
     }
 
     /// The work of a whole render, in the order that it must be recorded in. The result does not depend on how the work
@@ -133,7 +106,7 @@ impl Renderer {
     }
 
     fn cut(&self) -> Cut {
-        Cut { pixels: self.settings.pixels() as u32, tile: self.film.tiles[0].window, paths: self.paths }
+        Cut { pixels: self.settings.pixels() as u32, tile: self.frame.film.tiles[0].window, paths: self.paths }
     }
 
     /// Records one step.
@@ -144,29 +117,12 @@ impl Renderer {
         if !self.cut().has_room_for(step) {
             return Err(Error::Usage(format!("{step:?} is of another renderer: take those of Renderer::steps")));
         }
-        let (st, s, f, push) = (&self.stages, &self.scene, &self.film, &self.push);
-        match (step, &self.allocation) {
-            (Step::Start, allocation) => {
-                frame::record_start(rec, st, s, f, push)?;
-                allocation.as_ref().map_or(Ok(()), |a| frame::record_preparation(rec, a, f, &self.priority))
-            }
-            (Step::Uniform(batch), _) => frame::record_uniform(rec, st, s, f, push, batch),
-            (Step::Allocate(plan), Some(a)) => frame::record_allocation(rec, a, f, &self.priority, plan),
-            (Step::Choose(choice), Some(a)) => frame::record_choice(rec, a, f, &self.priority, choice, push.seed),
-            (Step::Listed(range), Some(a)) => {
-                if self.list_may_be_short() {
-                    rec.fill(&f.paths, NONE)?;
-                }
-                frame::record_listed(rec, st, a, s, f, push, range)
-            }
-            _ => Err(Error::Usage("this renderer was made without the effect \"adaptive\"".into())),
-        }
+        frame::record(rec, &self.frame, step)
     }
 
     /// Whether only the device knows how many paths [`Renderer::listed`] are listed.
     pub fn list_may_be_short(&self) -> bool {
-        let allocate = &self.settings.allocate;
-        allocate.placing() == Placing::Chosen || allocate.noise_threshold > 0.0
+        schedule::list_may_be_short(&self.settings)
     }
 
     /// Runs one step on the renderer's own queue and waits.
@@ -192,7 +148,7 @@ impl Renderer {
         priority: &[f32],
         pending: &[u32],
     ) -> Result<()> {
-        let Some(a) = &self.allocation else {
+        let Some(a) = &self.frame.allocation else {
             return Err(Error::Usage("this renderer was made without the effect \"adaptive\"".into()));
         };
         let pixels = self.settings.pixels();
@@ -205,13 +161,13 @@ impl Renderer {
         of_film("priorities", priority.len(), true)?;
         of_film("pending counts", pending.len(), false)?;
         self.run(frame, &Step::Start)?;
-        self.film.tiles[0].stats.write(0, stats)?;
+        self.frame.film.tiles[0].stats.write(0, stats)?;
         if self.effects.split_light {
-            self.film.tiles[0].light.write(0, light)?;
+            self.frame.film.tiles[0].light.write(0, light)?;
         }
-        self.film.priority.write(0, priority)?;
-        self.film.counts.count.write(0, pending)?;
-        self.gpu.run(frame, |rec| a.scan.record(rec, &self.film.counts))?;
+        self.frame.film.priority.write(0, priority)?;
+        self.frame.film.counts.count.write(0, pending)?;
+        self.gpu.run(frame, |rec| a.scan.record(rec, &self.frame.film.counts))?;
         Ok(())
     }
 
@@ -225,9 +181,9 @@ impl Renderer {
         if found != pixels {
             return Err(Error::Usage(format!("statistics of {found} pixels: the film has {pixels}")));
         }
-        let push = PriorityPush { limit, ..self.priority };
-        let guide = self.film.tiles[0].guide.read()?;
-        let light = self.film.tiles[0].light.read()?;
+        let push = PriorityPush { limit, ..self.frame.priority_push };
+        let guide = self.frame.film.tiles[0].guide.read()?;
+        let light = self.frame.film.tiles[0].light.read()?;
         let inputs = HostInputs { guide: &guide, stats, light: &light, priority: &[], push };
         Ok((policy_of(&self.settings)?.reference)(&inputs))
     }
@@ -237,7 +193,7 @@ impl Renderer {
     /// # Errors
     /// [`crate::error::Error::Device`].
     pub fn apportionment(&self) -> Result<Apportionment> {
-        Ok(self.film.counts.state.read()?[0])
+        Ok(self.frame.film.counts.state.read()?[0])
     }
 
     /// Paths of the list that the last [`Step::Allocate`] or [`Step::Choose`] made.
@@ -246,7 +202,7 @@ impl Renderer {
     /// [`crate::error::Error::Device`].
     pub fn listed(&self) -> Result<u64> {
         let pixels = self.settings.pixels();
-        let [low, high] = self.film.counts.offset.read_range(pixels..pixels + 1)?[0];
+        let [low, high] = self.frame.film.counts.offset.read_range(pixels..pixels + 1)?[0];
         Ok(u64::from(low) | u64::from(high) << 32)
     }
 
@@ -261,18 +217,18 @@ impl Renderer {
         if camera.lens_radius > 0.0 && !self.effects.lens {
             return Err(Error::Usage("this renderer was made without the effect \"lens\"".into()));
         }
-        self.push.camera = camera;
+        self.frame.path_push.camera = camera;
         Ok(())
     }
 
     /// The buffers, for reading back and for stages of the caller's own.
     pub fn film(&self) -> &FilmBuffers {
-        &self.film
+        &self.frame.film
     }
 
     /// The scene's buffers.
     pub fn scene(&self) -> &DeviceScene {
-        &self.scene
+        &self.frame.scene
     }
 
     /// What was asked for.
@@ -293,9 +249,9 @@ impl Renderer {
     /// Milliseconds that the pipelines took to create, by kernel.
     pub fn compile_times(&self) -> [(&'static str, f64); 3] {
         [
-            ("primary_hit", milliseconds(self.stages.guide.compile_time())),
-            ("path", milliseconds(self.stages.path.compile_time())),
-            ("accumulate", milliseconds(self.stages.fold.compile_time())),
+            ("primary_hit", milliseconds(self.frame.kernels.primary_hit.compile_time())),
+            ("path", milliseconds(self.frame.kernels.path.compile_time())),
+            ("accumulate", milliseconds(self.frame.kernels.accumulate.compile_time())),
         ]
     }
 
@@ -305,7 +261,7 @@ impl Renderer {
     /// # Errors
     /// [`crate::error::Error::Device`].
     pub fn broken_samples(&self) -> Result<Option<BrokenSamples>> {
-        let found = self.film.broken.read()?[0];
+        let found = self.frame.film.broken.read()?[0];
         let (pixel, Settings { width, first_sample, seed, .. }) = (!found.pixel, &self.settings);
         Ok((found.count > 0).then(|| BrokenSamples {
             count: found.count.into(),
@@ -320,7 +276,7 @@ impl Renderer {
     /// # Errors
     /// [`crate::error::Error::Device`].
     pub fn counters(&self) -> Result<Counters> {
-        let words = self.film.counters.read()?;
+        let words = self.frame.film.counters.read()?;
         let pair = |i: usize| u64::from(words[2 * i]) | u64::from(words[2 * i + 1]) << 32;
         Ok(Counters { closest: pair(0), any: pair(1), nodes: pair(2) })
     }
@@ -352,60 +308,4 @@ fn milliseconds(time: Duration) -> f64 {
 fn policy_of(settings: &Settings) -> Result<&'static Row> {
     let name = &settings.allocate.policy;
     allocate::policy(name).ok_or_else(|| Error::Usage(format!("no policy \"{name}\"")))
-}
-
-fn allocation(gpu: &Gpu, policy: &Row, pixels: u32) -> Result<Allocation> {
-    let thread_items = thread_items(gpu, pixels);
-    Ok(Allocation {
-        policy: (policy.make)(gpu, pixels)?,
-        apportion: Apportion::new(gpu, thread_items)?,
-        choose: Kernel::new(gpu, &gpu.tuning().thread().into())?,
-        scan: Scan::new(gpu, thread_items)?,
-        batch: PerBlock::new(gpu, thread_items)?,
-    })
-}
-
-/// What the policies are told of a scene.
-pub fn priority_push(scene: &Scene) -> PriorityPush {
-    let (s, a) = (&scene.settings, &scene.settings.allocate);
-    let [low, high] = scene.bounds.map(glam::Vec3::from);
-    let sigma = (a.sigma_position * high.distance(low)).max(f32::MIN_POSITIVE.sqrt());
-    PriorityPush {
-        size: [s.width, s.height],
-        window: a.window,
-        normal_scale: a.sigma_normal.powi(-2),
-        position_scale: sigma.powi(-2),
-        luminance_floor: a.luminance_floor,
-        limit: schedule::limit(s),
-        threshold: a.noise_threshold,
-        filtered: a.filtered,
-        round: 0,
-    }
-}
-
-/// What the kernels are told of a scene; the batch is still to be filled in.
-pub fn path_push(scene: &Scene) -> PathPush {
-    let settings = &scene.settings;
-    let environment = scene.lights.iter().position(|l| l.kind == LIGHT_ENVIRONMENT);
-    PathPush {
-        camera: scene.camera,
-        size: [settings.width, settings.height],
-        first_sample: settings.first_sample,
-        seed: settings.seed,
-        max_depth: settings.max_depth,
-        roulette_depth: settings.roulette_depth,
-        clamp_indirect: settings.clamp_indirect,
-        pixel_filter: match settings.filter {
-            PixelFilter::Box => 0,
-            PixelFilter::Tent => 1,
-            PixelFilter::Gaussian => 2,
-            PixelFilter::Point => 3,
-        },
-        light_count: scene.lights.len() as u32,
-        triangle_pdf_scale: scene.triangle_pdf_scale,
-        environment: environment.map_or(NONE, |i| i as u32),
-        environment_width: scene.environment.as_ref().map_or(0, |e| e.width),
-        root: scene.root | if scene.instances.is_empty() { 0 } else { ROOT_OF_INSTANCES },
-        ..PathPush::default()
-    }
 }

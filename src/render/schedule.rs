@@ -181,6 +181,13 @@ pub fn limit(settings: &Settings) -> u32 {
     }
 }
 
+/// Whether only the device knows how many paths of a list there are to trace: where pixels are chosen, and where a noise
+/// threshold may ask for less than its round has room for.
+pub fn list_may_be_short(settings: &Settings) -> bool {
+    let allocate = &settings.allocate;
+    allocate.placing() == Placing::Chosen || allocate.noise_threshold > 0.0
+}
+
 fn rounds(settings: &Settings, cut: &Cut, done: u32) -> Box<dyn Iterator<Item = Step>> {
     match settings.allocate.placing() {
         Placing::Chosen => Box::new(choices(settings, cut, done)),

@@ -44,10 +44,10 @@ impl Renderer {
         let at_once = (RAYS_AT_ONCE / pixels as u32).clamp(1, RAYS_OF_A_PIXEL);
         for first_sample in (0..eye_rays).step_by(at_once as usize) {
             let samples = at_once.min(eye_rays - first_sample);
-            let first_sample = self.push.first_sample + first_sample;
-            let push = PathPush { pixels: pixels as u32, first_sample, samples, ..self.push };
+            let first_sample = self.frame.path_push.first_sample + first_sample;
+            let push = PathPush { pixels: pixels as u32, first_sample, samples, ..self.frame.path_push };
             times.extend(gpu.run(&mut frame, |rec| {
-                guide_lookup::record(&kernel, rec, &self.scene, &guide, &filtered, &indirect, &push)
+                guide_lookup::record(&kernel, rec, &self.frame.scene, &guide, &filtered, &indirect, &push)
             })?);
         }
         let light = indirect.read()?.into_iter().map(|sum| sum.map(|v| v / eye_rays as f32));

@@ -62,7 +62,7 @@ impl Renderer {
         if !kept {
             return Err(Error::Usage(format!("the renderer keeps no {layer:?}: make it with the Outputs that do")));
         }
-        Ok(self.film.tiles.iter().map(|tile| view(tile, layer)).collect())
+        Ok(self.frame.film.tiles.iter().map(|tile| view(tile, layer)).collect())
     }
 }
 

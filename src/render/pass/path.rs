@@ -9,38 +9,18 @@ use crate::shaders::path::Bind;
 /// The specialised kernel.
 pub type Path = Kernel<Bind<'static>>;
 
-/// scene -> samples\[batch\]
-pub fn record(
-    k: &Path,
-    rec: &mut Recorder,
-    s: &DeviceScene,
-    f: &FilmBuffers,
-    push: &PathPush,
-    b: &Batch,
-) -> Result<()> {
-    let push = PathPush {
-        first_pixel: b.first_pixel,
-        pixels: b.pixels,
-        first_sample: b.first_sample,
-        samples: b.samples,
-        ..*push
-    };
-    rec.dispatch_threads(k, bind(s, f), &push, b.pixels * b.samples)
+/// The same number of samples for every pixel of a run.
+pub fn push_of_batch(push: &PathPush, b: &Batch) -> PathPush {
+    PathPush { first_pixel: b.first_pixel, pixels: b.pixels, first_sample: b.first_sample, samples: b.samples, ..*push }
 }
 
-fn bind<'a>(s: &'a DeviceScene, f: &'a FilmBuffers) -> Bind<'a> {
-    Bind { scene: s.bind(), samples: &f.samples, counters: &f.counters, paths: &f.paths, broken: &f.broken }
+/// So many paths of a list.
+pub fn push_of_list(push: &PathPush, paths: u32) -> PathPush {
+    PathPush { pixels: paths, samples: 0, ..*push }
 }
 
-/// scene, paths\[batch\] -> samples\[batch\]
-pub fn record_listed(
-    k: &Path,
-    rec: &mut Recorder,
-    s: &DeviceScene,
-    f: &FilmBuffers,
-    push: &PathPush,
-    paths: u32,
-) -> Result<()> {
-    let push = PathPush { pixels: paths, samples: 0, ..*push };
-    rec.dispatch_threads(k, bind(s, f), &push, paths)
+/// scene, and paths\[batch\] where they are listed -> samples\[batch\]
+pub fn record(k: &Path, rec: &mut Recorder, s: &DeviceScene, f: &FilmBuffers, push: &PathPush) -> Result<()> {
+    let bind = Bind { scene: s.bind(), samples: &f.samples, counters: &f.counters, paths: &f.paths, broken: &f.broken };
+    rec.dispatch_threads(k, bind, push, push.pixels * push.samples.max(1))
 }

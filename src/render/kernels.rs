@@ -1,0 +1,72 @@
+//! The kernels of a renderer, compiled for what its scene calls for.
+use crate::allocate::{Policy, Row};
+use crate::error::Result;
+use crate::gpu::{Gpu, Kernel, PerBlock, thread_items};
+use crate::layout::Effects;
+use crate::render::pass::apportion::Apportion;
+use crate::render::pass::scan::Scan;
+use crate::render::pass::{accumulate, choose, path, primary_hit, sample_list};
+use crate::render::schedule;
+use crate::render::settings::Settings;
+use crate::shaders;
+use crate::shaders::shared::traverse;
+
+/// The kernels of every render.
+pub struct Kernels {
+    /// Finds what lies behind the centre of each pixel.
+    pub primary_hit: primary_hit::Guides,
+    /// Traces paths.
+    pub path: path::Path,
+    /// Adds samples to the statistics of their pixels.
+    pub accumulate: accumulate::Fold,
+}
+
+impl Kernels {
+    /// Compiles them with these effects; `stack` is the depth that traversal needs, [`crate::scene::Scene::stack`].
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when the driver refuses one.
+    pub fn new(gpu: &Gpu, effects: Effects, stack: u32) -> Result<Self> {
+        let (thread, traverse) = (gpu.tuning().thread(), traverse::Constants { stack });
+        Ok(Self {
+            primary_hit: Kernel::new(gpu, &shaders::primary_hit::Constants { effects, thread, traverse })?,
+            path: Kernel::new(gpu, &shaders::path::Constants { effects, thread, traverse })?,
+            accumulate: Kernel::new(gpu, &shaders::accumulate::Constants { effects, thread })?,
+        })
+    }
+}
+
+/// The kernels that decide where samples go, for renders that do not spread them evenly.
+pub struct Allocation {
+    /// What makes a pixel worth samples.
+    pub policy: Box<dyn Policy>,
+    /// Turns priorities into counts.
+    pub apportion: Apportion,
+    /// Turns priorities into one sample or none.
+    pub choose: choose::Choose,
+    /// Turns counts into offsets.
+    pub scan: Scan,
+    /// Turns offsets into paths.
+    pub sample_list: sample_list::Batches,
+    /// Whether a list of paths may have fewer than its step has room for: only the device knows.
+    pub list_may_be_short: bool,
+}
+
+impl Allocation {
+    /// Compiles them for a film of the settings' size.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when the driver refuses one.
+    pub fn new(gpu: &Gpu, policy: &Row, settings: &Settings) -> Result<Self> {
+        let pixels = settings.pixels() as u32;
+        let thread_items = thread_items(gpu, pixels);
+        Ok(Self {
+            policy: (policy.make)(gpu, pixels)?,
+            apportion: Apportion::new(gpu, thread_items)?,
+            choose: Kernel::new(gpu, &gpu.tuning().thread().into())?,
+            scan: Scan::new(gpu, thread_items)?,
+            sample_list: PerBlock::new(gpu, thread_items)?,
+            list_may_be_short: schedule::list_may_be_short(settings),
+        })
+    }
+}

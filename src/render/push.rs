@@ -1,0 +1,50 @@
+//! What the kernels are told of a scene and its settings, besides the scene's own records.
+use crate::layout::{LIGHT_ENVIRONMENT, NONE, PathPush, PriorityPush, ROOT_OF_INSTANCES};
+use crate::render::schedule;
+use crate::render::settings::PixelFilter;
+use crate::scene::Scene;
+
+/// What the policies are told of a scene.
+pub fn priority_push(scene: &Scene) -> PriorityPush {
+    let (s, a) = (&scene.settings, &scene.settings.allocate);
+    let [low, high] = scene.bounds.map(glam::Vec3::from);
+    let sigma = (a.sigma_position * high.distance(low)).max(f32::MIN_POSITIVE.sqrt());
+    PriorityPush {
+        size: [s.width, s.height],
+        window: a.window,
+        normal_scale: a.sigma_normal.powi(-2),
+        position_scale: sigma.powi(-2),
+        luminance_floor: a.luminance_floor,
+        limit: schedule::limit(s),
+        threshold: a.noise_threshold,
+        filtered: a.filtered,
+        round: 0,
+    }
+}
+
+/// What the kernels are told of a scene; the batch is still to be filled in.
+pub fn path_push(scene: &Scene) -> PathPush {
+    let settings = &scene.settings;
+    let environment = scene.lights.iter().position(|l| l.kind == LIGHT_ENVIRONMENT);
+    PathPush {
+        camera: scene.camera,
+        size: [settings.width, settings.height],
+        first_sample: settings.first_sample,
+        seed: settings.seed,
+        max_depth: settings.max_depth,
+        roulette_depth: settings.roulette_depth,
+        clamp_indirect: settings.clamp_indirect,
+        pixel_filter: match settings.filter {
+            PixelFilter::Box => 0,
+            PixelFilter::Tent => 1,
+            PixelFilter::Gaussian => 2,
+            PixelFilter::Point => 3,
+        },
+        light_count: scene.lights.len() as u32,
+        triangle_pdf_scale: scene.triangle_pdf_scale,
+        environment: environment.map_or(NONE, |i| i as u32),
+        environment_width: scene.environment.as_ref().map_or(0, |e| e.width),
+        root: scene.root | if scene.instances.is_empty() { 0 } else { ROOT_OF_INSTANCES },
+        ..PathPush::default()
+    }
+}
