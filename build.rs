@@ -13,9 +13,11 @@
 //! const uint ROWS = 4u;                                             // a number that Rust may use: `atrous::ROWS`
 //! layout(scalar, binding = 3) readonly buffer Src { vec3 src[]; };  // or writeonly, or neither
 //! layout(scalar, binding = 3) writeonly buffer Dst { u64vec2 dst[]; }; // of vec4, which it stores two floats at a time
-//! layout(binding = 0) uniform usamplerBuffer nodes; // of BvhNode   // or samplerBuffer
+//! layout(binding = 0) uniform usamplerBuffer nodes; // of BvhNode   // or samplerBuffer of floats
 //! layout(scalar, push_constant) uniform Push { PathPush push; };    // once per kernel
 //! ```
+//! Structs of `src/layout` that a kernel binds come with functions, so that no kernel knows where their fields lie: see
+//! `tools/build/structs.rs`.
 use anyhow::{Context, Result, ensure};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -33,9 +35,19 @@ mod layout;
 mod emit;
 #[path = "tools/build/interface.rs"]
 mod interface;
+#[path = "tools/build/structs.rs"]
+mod structs;
 
 use emit::Group;
-use interface::{Interface, Source};
+use interface::{EFFECTS, Interface, Source};
+
+/// The first lines of every kernel.
+const HEADER: &str = "#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#extension GL_GOOGLE_include_directive : require
+";
 
 fn main() {
     if let Err(error) = build() {
@@ -89,13 +101,14 @@ fn generate(files: &[PathBuf], root: &str, target: &Path) -> Result<()> {
     let mut groups = BTreeMap::new();
     for file in files {
         let name = file.file_stem().and_then(|s| s.to_str()).context("kernel names are ASCII")?;
-        let (whole, sources) = preprocess(file)?;
+        let (text, sources) = preprocess(file)?;
+        let interface = Interface::of(&sources)?;
+        let whole = [HEADER, &structs::glsl(&interface.bindings), &text].concat();
         let label = format!("{name}-{:016x}.spv", xxh3_64(whole.as_bytes()));
         let spirv = fs::read(Path::new("spirv").join(&label)).or_else(|_| compile(file, &whole))?;
         hash.update(&spirv);
         let binary = compiled.join(&label);
         fs::write(&binary, &spirv)?;
-        let interface = Interface::of(&sources)?;
         code += &emit::module(name, file, &interface, root, &binary)?;
         groups.extend(interface.groups().into_iter().map(|group| (group.clone(), declared(&interface, group))));
     }
@@ -126,7 +139,7 @@ fn preprocess(file: &Path) -> Result<(String, Vec<Source>)> {
     let label = file.display().to_string();
     let text = fs::read_to_string(file).with_context(|| label.clone())?;
     let mut sources = vec![(label.clone(), text.clone())];
-    let whole = expand(&label, &text, &mut sources)?;
+    let whole = format!("#line 1 \"{label}\"\n{}", expand(&label, &text, &mut sources)?);
     Ok((whole, sources))
 }
 
@@ -148,7 +161,8 @@ fn compile(file: &Path, whole: &str) -> Result<Vec<u8>> {
 }
 
 /// Replaces `#include "name"` by the file, the first time that a kernel asks for it and by nothing after that, so that
-/// files may include what they need. Line directives keep places in messages right.
+/// files may include what they need. Line directives keep places in messages right. Not left to `glslc -I`: a packaged crate finds
+/// its compiled kernels by the whole text, where there is no `glslc`, and the interface is in comments, which `glslc -E` drops.
 fn expand(file: &str, text: &str, sources: &mut Vec<Source>) -> Result<String> {
     let mut whole = String::new();
     for (index, line) in text.lines().enumerate() {
@@ -160,24 +174,13 @@ fn expand(file: &str, text: &str, sources: &mut Vec<Source>) -> Result<String> {
         let name = rest.split('"').nth(1).with_context(|| format!("{}\nexpected #include \"name\"", place()))?;
         let path = format!("glsl/{name}");
         if sources.iter().all(|(seen, _)| *seen != path) {
-            let content = read(name, &path).with_context(place)?;
+            let content = if path == EFFECTS { effects() } else { fs::read_to_string(&path).with_context(place)? };
             sources.push((path.clone(), content.clone()));
             whole += &format!("#line 1 \"{path}\"\n{}", expand(&path, &content, sources)?);
         }
         whole += &format!("#line {} \"{file}\"\n", index + 2);
     }
     Ok(whole)
-}
-
-fn read(name: &str, path: &str) -> Result<String> {
-    Ok(match name {
-        "layout.glsl" => {
-            use layout::{allocate, filter};
-            [layout::GLSL_CONSTANTS, layout::GLSL_STRUCTS, allocate::GLSL_STRUCTS, filter::GLSL_STRUCTS].concat()
-        }
-        "effects.glsl" => effects(),
-        _ => fs::read_to_string(path).with_context(|| path.to_owned())?,
-    })
 }
 
 /// One specialisation constant an effect, whose place in the list is its id.

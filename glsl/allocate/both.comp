@@ -1,8 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_EXT_control_flow_attributes : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "shared/thread.glsl"
 
 // Noise that the samples show, estimated among the surroundings that look alike, less what a geometry-aware filter will
@@ -18,8 +13,6 @@ layout(scalar, push_constant) uniform Push { PriorityPush push; };
 
 #include "shared/likeness_bits.glsl"
 #include "shared/pixel_noise.glsl"
-#include "shared/pixel_light.glsl"
-
 const float LEAST_LEFT = 0.01; // of two pixels at least .27
 const float APART = 1e17;      // means differ by no more, so that squares are finite
 const float STRONGEST_TINT = 100.0;
@@ -36,7 +29,7 @@ struct Surroundings {
 // Squared deviations, mean over channels, of indirect light, out of those of its luminance before albedo: its colour at the pixel
 // is taken for that of every sample. Whatever direct and indirect light of a sample have in common counts as direct.
 float indirect_squares(uint pixel, vec3 mean, float squares) {
-    PixelLight l = load_light(int(pixel));
+    PixelLight l = PixelLight_load(light, pixel);
     float level = luminance(l.indirect);
     vec3 tint = level > 0.0 ? min((mean - l.direct) / level, vec3(STRONGEST_TINT)) : vec3(0.0);
     return min(l.indirect_m2 * dot(tint, tint) / 3.0, squares);

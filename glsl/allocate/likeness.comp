@@ -1,7 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "shared/thread.glsl"
 
 // What the geometry alone says of a pixel, in one word: what a filter will gather around it, and how much the noise of each
@@ -22,8 +18,8 @@ struct Place {
 };
 
 Place place_at(uint pixel) {
-    uvec4 albedo = guide_texel(pixel, 2u);
-    return Place(uintBitsToFloat(guide_texel(pixel, 0u).xyz), uintBitsToFloat(albedo.xyz), albedo.w != NONE);
+    Guide g = Guide_load(guides, pixel);
+    return Place(g.normal, g.albedo, g.material != NONE);
 }
 
 // 0 to 1, in sevenths.

@@ -1,7 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "shared/thread.glsl"
 
 // Priority as published (Schalk 2018, eq. 11 and 12, algorithm 1): the pixel's own noise over its luminance until round

@@ -1,7 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "shared/thread.glsl"
 
 // Priority by the noise that the samples show (Schalk 2018). Squared error is least when a pixel's samples are in

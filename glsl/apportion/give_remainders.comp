@@ -1,8 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "shared/uint64.glsl"
 #include "shared/block.glsl"
 
@@ -21,7 +16,7 @@ uint quota_of(uint pixel) { return count[pixel]; }
 #include "shared/tie_break.glsl"
 
 void main() {
-    Apportionment s = load_state();
+    Apportionment s = Apportionment_load(state, 0u);
     uint first = first_item(), items = item_count(first, push.pixels);
     uint64_t total, before = block_scan(possible(s, first, items), total);
     before += blocks[gl_WorkGroupID.x];

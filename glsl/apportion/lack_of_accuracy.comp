@@ -1,8 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "shared/uint64.glsl"
 #include "shared/block.glsl"
 
@@ -20,7 +15,7 @@ void main() {
     uint first = first_item(), items = item_count(first, push.pixels);
     uint64_t per_sample = uint64_t(push.threshold) * push.threshold, total = 0UL;
     for (uint k = 0u; k < items; k++) {
-        uint i = first + k, w = weight[i], have = texelFetch(stats, int(2u * i)).w;
+        uint i = first + k, w = weight[i], have = PixelStats_count(stats, i);
         uint64_t squared = uint64_t(w) * w, wanted = squared / per_sample;
         wanted += wanted * per_sample < squared ? 1UL : 0UL; // rounded up
         uint most = min(max(have, FEW), push.enough - min(push.enough, have));
@@ -30,6 +25,8 @@ void main() {
     }
     uint64_t weights = block_sum(total);
     if (gl_LocalInvocationIndex == 0u) {
-        sums[gl_WorkGroupID.x] = BlockSums(unpackUint2x32(weights), uvec2(0u), uvec2(0u), 0u, 0u);
+        BlockSums sum = BlockSums_zero();
+        sum.weights = unpackUint2x32(weights);
+        sums[gl_WorkGroupID.x] = sum;
     }
 }

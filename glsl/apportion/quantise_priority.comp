@@ -1,8 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "shared/uint64.glsl"
 #include "shared/block.glsl"
 
@@ -32,9 +27,12 @@ void main() {
         positive += w > 0u ? 1u : 0u;
     }
     uint64_t weights = block_sum(total);
-    uint64_t counts = block_sum(packUint2x32(uvec2(broken, positive)));
+    uvec2 counts = unpackUint2x32(block_sum(packUint2x32(uvec2(broken, positive))));
     if (gl_LocalInvocationIndex == 0u) {
-        uvec2 both = unpackUint2x32(counts);
-        sums[gl_WorkGroupID.x] = BlockSums(unpackUint2x32(weights), uvec2(0u), uvec2(0u), both.x, both.y);
+        BlockSums sum = BlockSums_zero();
+        sum.weights = unpackUint2x32(weights);
+        sum.settled = counts.x;
+        sum.open = counts.y;
+        sums[gl_WorkGroupID.x] = sum;
     }
 }

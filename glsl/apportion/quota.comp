@@ -1,8 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "shared/uint64.glsl"
 #include "shared/block.glsl"
 
@@ -17,13 +12,12 @@ layout(scalar, binding = 4) writeonly buffer Counts { uint count[]; };
 layout(scalar, binding = 5) writeonly buffer Sums { BlockSums sums[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
 
-#include "shared/load_apportionment.glsl"
 #include "shared/proportion.glsl"
 #include "shared/capacity.glsl"
 #include "shared/remainder_key.glsl"
 
 void main() {
-    Apportionment s = load_state();
+    Apportionment s = Apportionment_load(state, 0u);
     if (s.settled != 0u) return; // safe: the same for all threads
     uint first = first_item(), items = item_count(first, push.pixels);
     Proportion share_of = proportion_of(s);
@@ -50,7 +44,12 @@ void main() {
     floors = block_sum(floors);
     uvec2 counts = unpackUint2x32(block_sum(packUint2x32(uvec2(settled, open))));
     if (gl_LocalInvocationIndex == 0u) {
-        sums[gl_WorkGroupID.x] = BlockSums(unpackUint2x32(weights), unpackUint2x32(filled), unpackUint2x32(floors),
-                                           counts.x, counts.y);
+        BlockSums sum = BlockSums_zero();
+        sum.weights = unpackUint2x32(weights);
+        sum.filled = unpackUint2x32(filled);
+        sum.floors = unpackUint2x32(floors);
+        sum.settled = counts.x;
+        sum.open = counts.y;
+        sums[gl_WorkGroupID.x] = sum;
     }
 }

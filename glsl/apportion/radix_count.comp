@@ -1,8 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "shared/uint64.glsl"
 #include "shared/block.glsl"
 
@@ -13,12 +8,11 @@ layout(binding = 1) uniform usamplerBuffer state; // of Apportionment
 layout(scalar, binding = 2) buffer Histogram { uint histogram[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
 
-#include "shared/load_apportionment.glsl"
 
 shared uint bins[256];
 
 void main() {
-    Apportionment s = load_state();
+    Apportionment s = Apportionment_load(state, 0u);
     if (s.selected != 0u) return; // safe: the same for all threads
     for (uint b = gl_LocalInvocationIndex; b < 256u; b += BLOCK_THREADS) bins[b] = 0u;
     barrier();

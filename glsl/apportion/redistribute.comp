@@ -1,8 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "shared/uint64.glsl"
 #include "shared/block.glsl"
 #include "shared/proportion.glsl"

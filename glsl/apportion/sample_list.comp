@@ -1,9 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
-#extension GL_EXT_control_flow_attributes : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "shared/uint64.glsl"
 #include "shared/block.glsl"
 
@@ -26,7 +20,7 @@ uvec2 places(uint64_t from, uint64_t to, uint64_t begin, uint64_t end) {
 }
 
 // Earlier batches of this round are in it.
-uint first_index(uint pixel) { return push.first_sample + texelFetch(stats, int(2u * pixel)).w; }
+uint first_index(uint pixel) { return push.first_sample + PixelStats_count(stats, pixel); }
 
 void main() {
     uint first = first_item();

@@ -1,8 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "shared/uint64.glsl"
 #include "shared/block.glsl"
 
@@ -21,6 +16,6 @@ uint quota_of(uint pixel) { return texelFetch(counts, int(pixel)).x; }
 
 void main() {
     uint first = first_item();
-    uint64_t sum = block_sum(possible(load_state(), first, item_count(first, push.pixels)));
+    uint64_t sum = block_sum(possible(Apportionment_load(state, 0u), first, item_count(first, push.pixels)));
     if (gl_LocalInvocationIndex == 0u) blocks[gl_WorkGroupID.x] = sum;
 }

@@ -1,8 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
-
 // Adds up three planes, 4096 elements a workgroup; once more over its sums until one is left.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer squares; // of vec4

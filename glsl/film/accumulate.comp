@@ -1,13 +1,6 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
-#extension GL_EXT_control_flow_attributes : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "effects.glsl"
 #include "shared/thread.glsl"
 #include "shared/uint64.glsl"
-#include "shared/store64.glsl"
 #include "shared/luminance.glsl"
 #include "shared/pcg.glsl"
 
@@ -18,15 +11,13 @@ layout(binding = 0) uniform samplerBuffer samples; // of vec4
 layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
 layout(binding = 2) uniform usamplerBuffer light; // of PixelLight
 layout(binding = 3) uniform usamplerBuffer offset; // of uvec2
-layout(scalar, binding = 4) writeonly buffer Stats { u64vec4 folded_stats[]; }; // of PixelStats
-layout(scalar, binding = 5) writeonly buffer Lights { u64vec4 folded_light[]; }; // of PixelLight
+layout(scalar, binding = 4) writeonly buffer Stats { PixelStatsWords folded_stats[]; }; // of PixelStats
+layout(scalar, binding = 5) writeonly buffer Lights { PixelLightWords folded_light[]; }; // of PixelLight
 layout(scalar, binding = 6) buffer Broken { BrokenTally broken[]; };
 layout(scalar, push_constant) uniform Push { FoldPush push; };
 
 #include "shared/first_path.glsl"
 #include "shared/loop_limit.glsl"
-#include "shared/pixel_light.glsl"
-
 const uint PLAIN = 2048u; // see shared/loop_limit.glsl
 
 // A channel whose albedo is below this cannot be divided out; its light stays with the direct light.
@@ -120,11 +111,6 @@ void report(uint pixel, uint broken_count, uint first_broken) {
     broken[0].index = first_broken;
 }
 
-PixelStats load_stats(int pixel) {
-    uvec4 a = texelFetch(stats, 2 * pixel), b = texelFetch(stats, 2 * pixel + 1);
-    return PixelStats(uintBitsToFloat(a.xyz), a.w, uintBitsToFloat(b.xyz), b.w);
-}
-
 void main() {
     uint i = thread_index();
     if (i >= push.pixels) return; // safe: no barrier() follows
@@ -132,10 +118,10 @@ void main() {
     uint at = at_step_count.x, step = at_step_count.y, count = at_step_count.z;
     if (count == 0u) return;
     uint pixel = push.first_pixel + i;
-    PixelStats s = load_stats(int(pixel));
-    PixelLight l = PixelLight(vec3(0.0), 0.0, vec3(0.0), 0u);
+    PixelStats s = PixelStats_load(stats, pixel);
+    PixelLight l = PixelLight_zero();
     uint broken_count = 0u, first_broken = 0u;
-    if (FX_SPLIT) l = load_light(int(pixel));
+    if (FX_SPLIT) l = PixelLight_load(light, pixel);
     uint plain = FX_ADAPTIVE ? min(count, PLAIN) : count; // see SAMPLES_AT_ONCE in schedule.rs
     for (uint k = 0u; k < plain; k++) fold(s, l, broken_count, first_broken, int(at + k * step));
     for (uint k = plain; FX_ADAPTIVE && k < count; k += STRIDE) {
@@ -144,8 +130,7 @@ void main() {
         }
     }
     uint place = pixel - push.window;
-    uvec4 m2 = uvec4(floatBitsToUint(s.m2), s.remainder), indirect = uvec4(floatBitsToUint(l.indirect), l.remainder);
-    folded_stats[place] = u64vec4(paired(uvec4(floatBitsToUint(s.mean), s.count)), paired(m2));
-    if (FX_SPLIT) folded_light[place] = u64vec4(paired(vec4(l.direct, l.indirect_m2)), paired(indirect));
+    folded_stats[place] = PixelStats_words(s);
+    if (FX_SPLIT) folded_light[place] = PixelLight_words(l);
     if (broken_count > 0u) report(push.tile + pixel, broken_count, first_broken);
 }

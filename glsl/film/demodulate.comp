@@ -1,7 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "shared/thread.glsl"
 #include "shared/sanitise.glsl"
 
@@ -11,14 +7,12 @@ const uint LIGHT = 0u, ALBEDO = 1u; // composition::Demodulation
 layout(constant_id = 110) const uint DEMODULATION = LIGHT;
 layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
 layout(binding = 1) uniform usamplerBuffer light; // of PixelLight
-layout(binding = 2) uniform samplerBuffer guide; // of Guide
+layout(binding = 2) uniform usamplerBuffer guide; // of Guide
 layout(scalar, binding = 3) writeonly buffer Radiance { vec4 radiance[]; };
 layout(scalar, binding = 4) writeonly buffer Variance { vec3 variance[]; };
 layout(scalar, binding = 5) writeonly buffer Factor { vec4 factor[]; };
 layout(scalar, binding = 6) writeonly buffer Sharp { vec4 sharp[]; };
 layout(scalar, push_constant) uniform Push { SplitPush push; };
-
-#include "shared/pixel_light.glsl"
 
 // As in src/composition/albedo.rs.
 const float SMALLEST_ALBEDO = 0.01;
@@ -31,9 +25,9 @@ struct Parts {
     vec3 sharp;
 };
 
-vec3 colour_at(int i) { return uintBitsToFloat(texelFetch(stats, 2 * i).xyz); }
+vec3 colour_at(int i) { return PixelStats_mean(stats, i); }
 
-vec3 albedo_at(int i) { return texelFetch(guide, 3 * i + 2).xyz; }
+vec3 albedo_at(int i) { return Guide_albedo(guide, i); }
 
 // 0 for what is no number.
 float number(float v) { return finite(v) ? v : 0.0; }
@@ -53,7 +47,7 @@ float factor_of_samples(float colour, float direct, float indirect, float albedo
 
 Parts split_light(int i) {
     vec3 colour = colour_at(i), albedo = albedo_at(i);
-    PixelLight l = load_light(i);
+    PixelLight l = PixelLight_load(light, i);
     Parts p = Parts(l.indirect, vec3(0.0), number(l.direct));
     for (int k = 0; k < 3; k++) {
         p.factor[k] = factor_of_samples(colour[k], l.direct[k], l.indirect[k], albedo[k]);
@@ -100,15 +94,15 @@ Parts split_as_demanded(int i) {
 
 // Of the mean. That of indirect light is known of its luminance.
 vec3 variance_of_filtered(int i, vec3 factor, float freedom) {
-    if (DEMODULATION == LIGHT) return vec3(load_light(i).indirect_m2 / freedom);
-    vec3 of_mean = uintBitsToFloat(texelFetch(stats, 2 * i + 1).xyz) / freedom;
+    if (DEMODULATION == LIGHT) return vec3(PixelLight_indirect_m2(light, i) / freedom);
+    vec3 of_mean = PixelStats_m2(stats, i) / freedom;
     return mix(vec3(0.0), of_mean / (factor * factor), greaterThan(factor, vec3(0.0)));
 }
 
 void main() {
     uint i = thread_index();
     if (i >= push.size.x * push.size.y) return; // safe: no barrier() follows
-    uint count = texelFetch(stats, 2 * int(i)).w;
+    uint count = PixelStats_count(stats, i);
     Parts p = split_as_demanded(int(i));
     // Pixels whose filtered part is not used must not reach others.
     bool known = finite(colour_at(int(i))) && any(greaterThan(p.factor, vec3(0.0)));

@@ -1,8 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_EXT_control_flow_attributes : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "shared/edge.glsl"
 
 // The bilateral filter (Tomasi and Manduchi 1998) as it is defined, joint where normals or positions have weights. A

@@ -1,14 +1,10 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "shared/thread.glsl"
 #include "shared/sanitise.glsl"
 
 // What a filter's taps read, in two texels instead of four: radiance with its count, position with its normal.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer radiance; // of vec4
-layout(binding = 1) uniform samplerBuffer guide; // of Guide
+layout(binding = 1) uniform usamplerBuffer guide; // of Guide
 layout(scalar, binding = 2) writeonly buffer Colours { vec4 colour[]; };
 layout(scalar, binding = 3) writeonly buffer Places { uvec4 place[]; };
 layout(scalar, push_constant) uniform Push { PackPush push; };
@@ -17,7 +13,8 @@ void main() {
     uint i = thread_index();
     if (i >= push.count) return; // safe: no barrier() follows
     colour[i] = known_radiance(texelFetch(radiance, int(i)));
-    vec3 normal = texelFetch(guide, 3 * int(i)).xyz, position = texelFetch(guide, 3 * int(i) + 1).xyz;
+    Guide hit = Guide_load(guide, i);
+    vec3 position = hit.position;
     position = finite(position) ? clamp(position, -FARTHEST, FARTHEST) : vec3(0.0);
-    place[i] = uvec4(floatBitsToUint(position), packed_normal(normal));
+    place[i] = uvec4(floatBitsToUint(position), packed_normal(hit.normal));
 }

@@ -1,8 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_EXT_control_flow_attributes : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "shared/linear_model.glsl"
 #include "shared/tiled_index.glsl"
 #define SUM Fit

@@ -1,7 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "shared/sanitise.glsl"
 #include "shared/store64.glsl"
 #include "shared/tiled_index.glsl"
@@ -9,7 +5,7 @@
 // What the guided filter reads: radiance with its count, and the channels of its guide.
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 0) uniform samplerBuffer radiance; // of vec4
-layout(binding = 1) uniform samplerBuffer guide; // of Guide
+layout(binding = 1) uniform usamplerBuffer guide; // of Guide
 layout(scalar, binding = 2) writeonly buffer Colours { u64vec2 colour[]; }; // of vec4
 layout(scalar, binding = 3) writeonly buffer Channels { u64vec2 channels[]; }; // of vec4
 layout(scalar, push_constant) uniform Push { GuidedPackPush push; };
@@ -21,9 +17,9 @@ void main() {
     if (any(greaterThanEqual(p, size))) return; // safe: no barrier() follows
     int at = blocked(p.x, p.y, size.y), pixel = p.y * size.x + p.x;
     colour[at] = paired(known_radiance(texelFetch(radiance, pixel)));
-    vec4 hit = texelFetch(guide, 3 * pixel);
+    Guide hit = Guide_load(guide, pixel);
     // Normals span [0, 1] once they are halved; where that interval begins does not matter to a covariance.
-    vec3 normal = 0.5 * vec3(known_channel(hit.x), known_channel(hit.y), known_channel(hit.z));
-    float grey = (normal.x + normal.y + normal.z) / 3.0, depth = known_channel(hit.w * push.depth_scale);
+    vec3 normal = 0.5 * vec3(known_channel(hit.normal.x), known_channel(hit.normal.y), known_channel(hit.normal.z));
+    float grey = (normal.x + normal.y + normal.z) / 3.0, depth = known_channel(hit.depth * push.depth_scale);
     channels[at] = paired(CHANNELS == 1u ? vec4(grey, 0.0, 0.0, 0.0) : vec4(normal, CHANNELS == 4u ? depth : 0.0));
 }

@@ -1,7 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "shared/store64.glsl"
 
 // Columns of a summed-area table, from its rows; a record of several vec4s is as many columns.

@@ -1,6 +1,6 @@
 // Scattering at a surface point. Local frame: z = shading normal on the front side. `wo` points to the camera, `wi` to the
 // light; both leave the surface. Radiance is transported: refraction scales it by 1 / eta^2.
-// Needs effects.glsl, layout.glsl and the binding `texels`, which holds the tables of rough coats.
+// Needs effects.glsl and the binding `texels`, which holds the tables of rough coats.
 #ifndef BSDF_GLSL
 #define BSDF_GLSL
 #include "shared/warp.glsl"

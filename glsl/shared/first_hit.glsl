@@ -4,11 +4,17 @@
 Guide first_hit(Ray ray, uint mask_seed, out bool delta) {
     Hit hit = traverse(Segment(ray.origin, ray.direction, 3e38, mask_seed), push.root);
     delta = false;
-    if (hit.triangle == NONE) return Guide(vec3(0.0), 0.0, vec3(0.0), NONE, vec3(0.0), NONE);
+    Guide guide = Guide_zero();
+    guide.object = guide.material = NONE;
+    if (hit.triangle == NONE) return guide;
     Surface s = surface_at(hit);
     Bsdf bsdf = surface_bsdf(s);
     delta = bsdf_is_delta(bsdf);
-    vec3 normal = side_of(s, -ray.direction) * s.normal;
-    vec3 albedo = bsdf_albedo(bsdf, -dot(s.normal, ray.direction));
-    return Guide(normal, hit.t + push.camera.near, s.position, s.object, albedo, s.material);
+    guide.normal = side_of(s, -ray.direction) * s.normal;
+    guide.depth = hit.t + push.camera.near;
+    guide.position = s.position;
+    guide.object = s.object;
+    guide.albedo = bsdf_albedo(bsdf, -dot(s.normal, ray.direction));
+    guide.material = s.material;
+    return guide;
 }

@@ -9,20 +9,18 @@ struct LightSample {
 
 const float INFINITE_DISTANCE = 3e38;
 
-uvec4 light_texel(uint light, uint i) { return texelFetch(lights, int(4u * light + i)); }
-
 // `random` is left as a word that is independent of the choice and as well stratified as it was: where in its share of the slot
 // it fell. A hash fills up the bits that the choice used.
 uint alias_choose(usamplerBuffer table, uint n, inout uint random) {
     uint slot, low;
     umulExtended(random, n, slot, low);
-    uvec2 entry = texelFetch(table, int(slot)).xy; // threshold, alias
-    bool stays = low < entry.x;
+    AliasEntry entry = AliasEntry_load(table, slot);
+    bool stays = low < entry.threshold;
     uint hash = pcg(random);
-    float into = float(stays ? low : low - entry.x) + float(hash) * (float(n) / 4294967296.0);
-    float share = stays ? float(entry.x) : 4294967296.0 - float(entry.x);
+    float into = float(stays ? low : low - entry.threshold) + float(hash) * (float(n) / 4294967296.0);
+    float share = stays ? float(entry.threshold) : 4294967296.0 - float(entry.threshold);
     random = (min(uint(into / share * 16777216.0), 0xffffffu) << 8) | (hash & 0xffu);
-    return stays ? slot : entry.y;
+    return stays ? slot : entry.alias;
 }
 
 // Environment direction: u = atan(x, -z) / 2pi, v = acos(y) / pi in the environment's own frame (row 0 is +y). acos would
@@ -32,8 +30,7 @@ vec2 environment_uv(vec3 d, float sine) {
 }
 
 mat3 environment_rotation(uint light) { // environment_from_world
-    return transpose(mat3(uintBitsToFloat(light_texel(light, 0u).xyz), uintBitsToFloat(light_texel(light, 1u).xyz),
-                          uintBitsToFloat(light_texel(light, 2u).xyz)));
+    return transpose(mat3(Light_a(lights, light), Light_b(lights, light), Light_c(lights, light)));
 }
 
 uvec2 environment_extent() {
@@ -56,15 +53,15 @@ vec3 environment_lookup(vec2 uv) {
 // Density per solid angle of a texel, given the sine of the polar angle.
 float environment_pdf(uint light, uint texel, float sine) {
     uvec2 size = environment_extent();
-    float chosen = uintBitsToFloat(light_texel(light, 1u).w);
+    float chosen = Light_probability(lights, light);
     float p = texelFetch(environment, int(texel)).w;
     return chosen * p * float(size.x) * float(size.y) / (2.0 * PI * PI * max(sine, 1e-6));
 }
 
 // Radiance from `direction` and the density with which light_sample would choose it (solid angle).
 vec3 environment_radiance(vec3 direction, out float pdf) {
-    vec3 scale = uintBitsToFloat(light_texel(push.environment, 3u).xyz);
-    pdf = uintBitsToFloat(light_texel(push.environment, 1u).w) * (0.25 / PI);
+    vec3 scale = Light_value(lights, push.environment);
+    pdf = Light_probability(lights, push.environment) * (0.25 / PI);
     if (!FX_ENVIRONMENT_MAP || push.environment_width == 0u) return scale;
     uvec2 size = environment_extent();
     vec3 d = environment_rotation(push.environment) * direction;
@@ -78,7 +75,7 @@ vec3 environment_radiance(vec3 direction, out float pdf) {
 
 void sample_environment(uint light, float chosen, uint word, vec2 u, inout LightSample s) {
     s.distance = INFINITE_DISTANCE;
-    s.radiance = uintBitsToFloat(light_texel(light, 3u).xyz);
+    s.radiance = Light_value(lights, light);
     if (!FX_ENVIRONMENT_MAP || push.environment_width == 0u) {
         s.direction = warp_sphere(u);
         s.pdf = chosen * (0.25 / PI);
@@ -130,9 +127,9 @@ vec3 sample_spherical_triangle(SphericalTriangle t, vec2 u) {
     return (1.0 - rest) * t.b + sqrt(rest * (2.0 - rest)) * across * inversesqrt(max(dot(across, across), 1e-30));
 }
 
-void sample_triangle_light(vec3 p, vec3 a, vec3 b, vec3 c, float chosen, vec2 u, uvec4 words, uint light, inout LightSample s) {
+void sample_triangle_light(vec3 p, Light light, vec2 u, inout LightSample s) {
     vec2 bary = warp_triangle(u);
-    vec3 e1 = b - a, e2 = c - a;
+    vec3 a = light.a, e1 = light.b - a, e2 = light.c - a;
     float doubled_area;
     vec3 n = unit_vector(cross(e1, e2), doubled_area);
     float solid_angle = 0.0;
@@ -151,17 +148,16 @@ void sample_triangle_light(vec3 p, vec3 a, vec3 b, vec3 c, float chosen, vec2 u,
     s.distance = sqrt(d2);
     s.direction = to_light / s.distance;
     float cosine = -dot(n, s.direction);
-    vec3 radiance = uintBitsToFloat(words.xyz);
-    uint triangle = light_texel(light, 2u).w;
+    vec3 radiance = light.value;
     if (FX_TEXTURES) {
-        uint image = material_texel(words.w, 7u).x;
-        if (image != NONE) radiance *= texture_sample(image, texture_coordinates(triangle, bary), true).rgb;
+        uint image = Material_emission_texture(materials, light.material);
+        if (image != NONE) radiance *= texture_sample(image, texture_coordinates(light.triangle, bary), true).rgb;
     }
     // The shadow ray ends before the light, whose mask would stop it with this probability.
-    if (FX_ALPHA_MASKS) radiance *= surface_opacity(words.w, triangle, bary);
+    if (FX_ALPHA_MASKS) radiance *= surface_opacity(light.material, light.triangle, bary);
     bool lit = cosine > 0.0 && d2 > 0.0;
-    s.pdf = lit ? chosen * 2.0 * d2 / (cosine * doubled_area) : 0.0;
-    if (lit && by_solid_angle(solid_angle)) s.pdf = chosen / solid_angle;
+    s.pdf = lit ? light.probability * 2.0 * d2 / (cosine * doubled_area) : 0.0;
+    if (lit && by_solid_angle(solid_angle)) s.pdf = light.probability / solid_angle;
     s.radiance = lit ? radiance / s.pdf : vec3(0.0);
 }
 
@@ -173,60 +169,57 @@ float sphere_cap(vec3 to_centre, float radius) {
 
 // Uniform by solid angle in the cone of the sphere. The point follows from the cone's own sine: a far sphere is smaller than
 // the rounding of a direction times its distance.
-void sample_sphere_light(vec3 p, vec3 centre, float radius, float chosen, vec2 u, vec3 radiance, inout LightSample s) {
-    vec3 to_centre = centre - p;
+void sample_sphere_light(vec3 p, Light light, vec2 u, inout LightSample s) {
+    float radius = light.b.x;
+    vec3 to_centre = light.a - p;
     float cap = sphere_cap(to_centre, radius), distance;
     vec3 axis = unit_vector(to_centre, distance), w = warp_cone(u, cap);
     float sine2 = dot(w.xy, w.xy);
     float along = distance * w.z - sqrt(max(radius * radius - distance * distance * sine2, 0.0));
     vec2 across = w.xy * (along / radius);
     vec3 n = basis_from_normal(axis) * vec3(across, -sqrt(max(1.0 - dot(across, across), 0.0)));
-    vec3 to_light = to_centre + (radius + plane_clearance(n, abs(centre), vec3(radius), vec3(0.0))) * n;
+    vec3 to_light = to_centre + (radius + plane_clearance(n, abs(light.a), vec3(radius), vec3(0.0))) * n;
     float d2 = dot(to_light, to_light);
     s.distance = sqrt(d2);
     s.direction = to_light / s.distance;
     bool lit = cap > 0.0 && d2 > 0.0 && dot(n, s.direction) < 0.0;
-    s.pdf = lit ? chosen / (2.0 * PI * cap) : 0.0;
-    s.radiance = lit ? radiance / s.pdf : vec3(0.0);
+    s.pdf = lit ? light.probability / (2.0 * PI * cap) : 0.0;
+    s.radiance = lit ? light.value / s.pdf : vec3(0.0);
 }
 
 // One light for the surface point `p`. Radiance is 0 when the light cannot reach the point.
 LightSample light_sample(vec3 p, uint word, vec2 u) {
     LightSample s = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0);
-    uint light = push.light_count == 1u ? 0u : alias_choose(light_table, push.light_count, word);
-    uvec4 w0 = light_texel(light, 0u), w1 = light_texel(light, 1u), w2 = light_texel(light, 2u), w3 = light_texel(light, 3u);
-    vec3 a = uintBitsToFloat(w0.xyz), b = uintBitsToFloat(w1.xyz), c = uintBitsToFloat(w2.xyz);
-    vec3 value = uintBitsToFloat(w3.xyz);
-    float chosen = uintBitsToFloat(w1.w);
-    uint kind = w0.w;
-    if (FX_EMISSIVE && kind == LIGHT_TRIANGLE) {
-        sample_triangle_light(p, a, b, c, chosen, u, w3, light, s);
-    } else if (FX_EMISSIVE && FX_SPHERES && kind == LIGHT_SPHERE) {
-        sample_sphere_light(p, a, b.x, chosen, u, value, s);
-    } else if ((FX_POINT && kind == LIGHT_POINT) || (FX_SPOT && kind == LIGHT_SPOT)) {
-        vec3 to_light = a - p;
+    uint index = push.light_count == 1u ? 0u : alias_choose(light_table, push.light_count, word);
+    Light light = Light_load(lights, index);
+    if (FX_EMISSIVE && light.kind == LIGHT_TRIANGLE) {
+        sample_triangle_light(p, light, u, s);
+    } else if (FX_EMISSIVE && FX_SPHERES && light.kind == LIGHT_SPHERE) {
+        sample_sphere_light(p, light, u, s);
+    } else if ((FX_POINT && light.kind == LIGHT_POINT) || (FX_SPOT && light.kind == LIGHT_SPOT)) {
+        vec3 to_light = light.a - p;
         float d2 = max(dot(to_light, to_light), 1e-30);
         s.distance = sqrt(d2);
         s.direction = to_light / s.distance;
-        s.radiance = value / (d2 * chosen);
-        if (FX_SPOT && kind == LIGHT_SPOT) { // smooth fall-off between the two angles, linear in the angle
-            float angle = acos(clamp(-dot(b, s.direction), -1.0, 1.0));
-            float full = acos(c.x), cut = acos(c.y);
+        s.radiance = light.value / (d2 * light.probability);
+        if (FX_SPOT && light.kind == LIGHT_SPOT) { // smooth fall-off between the two angles, linear in the angle
+            float angle = acos(clamp(-dot(light.b, s.direction), -1.0, 1.0));
+            float full = acos(light.c.x), cut = acos(light.c.y);
             s.radiance *= clamp((cut - angle) / max(cut - full, 1e-6), 0.0, 1.0);
         }
-    } else if (FX_DIRECTIONAL && kind == LIGHT_DIRECTIONAL) {
-        s.direction = -b;
+    } else if (FX_DIRECTIONAL && light.kind == LIGHT_DIRECTIONAL) {
+        s.direction = -light.b;
         s.distance = INFINITE_DISTANCE;
-        s.radiance = value / chosen;
-    } else if (FX_ENVIRONMENT && kind == LIGHT_ENVIRONMENT) {
-        sample_environment(light, chosen, word, u, s);
+        s.radiance = light.value / light.probability;
+    } else if (FX_ENVIRONMENT && light.kind == LIGHT_ENVIRONMENT) {
+        sample_environment(index, light.probability, word, u, s);
     }
     return s;
 }
 
 // Density per solid angle with which light_sample chooses, from `origin`, a point of an emissive triangle or sphere hit by a ray.
 float triangle_light_pdf(Surface s, vec3 origin, float t, float cosine) {
-    float density = push.triangle_pdf_scale * uintBitsToFloat(material_texel(s.material, 1u).w); // over area
+    float density = push.triangle_pdf_scale * Material_emission_weight(materials, s.material); // over area
     if (FX_SPHERES && s.radius > 0.0) {
         float cap = sphere_cap(s.corner - origin, s.radius);
         return cap > 0.0 ? density * 2.0 * s.radius * s.radius / cap : 0.0; // times the area, over 2 pi times the cap

@@ -8,11 +8,10 @@ const float BLINDING = 1e29;
 
 // (squared deviations summed, mean over channels; degrees of freedom; luminance times samples; samples)
 vec4 moments(uint pixel, out vec3 mean) {
-    uvec4 a = texelFetch(stats, int(2u * pixel)), b = texelFetch(stats, int(2u * pixel + 1u));
-    vec3 squares = uintBitsToFloat(b.rgb);
-    mean = uintBitsToFloat(a.rgb);
-    float n = float(a.w);
-    return a.w > 0u ? vec4((squares.r + squares.g + squares.b) / 3.0, n - 1.0, min(luminance(mean), BLINDING) * n, n) : vec4(0.0);
+    PixelStats s = PixelStats_load(stats, pixel);
+    mean = s.mean;
+    float n = float(s.count);
+    return s.count > 0u ? vec4((s.m2.r + s.m2.g + s.m2.b) / 3.0, n - 1.0, min(luminance(mean), BLINDING) * n, n) : vec4(0.0);
 }
 
 vec4 moments(uint pixel) {

@@ -12,32 +12,21 @@ layout(binding = 8) uniform usamplerBuffer light_table; // of AliasEntry
 layout(binding = 9) uniform samplerBuffer environment; // of vec4
 layout(binding = 10) uniform usamplerBuffer environment_table; // of AliasEntry
 
-const uint MATERIAL_TEXELS = 8u;
-
-uvec4 material_texel(uint material, uint i) { return texelFetch(materials, int(MATERIAL_TEXELS * material + i)); }
-
-// Three rows from `first_row` (0 world_from_object, 3 object_from_world) as a matrix for column vectors.
-mat4x3 instance_matrix(uint instance, int first_row) {
-    int at = int(7u * instance) + first_row;
-    return transpose(mat3x4(uintBitsToFloat(texelFetch(instances, at)), uintBitsToFloat(texelFetch(instances, at + 1)),
-                            uintBitsToFloat(texelFetch(instances, at + 2))));
+// Matrices for column vectors.
+mat4x3 world_from_object(uint instance) {
+    return transpose(mat3x4(Instance_world0(instances, instance), Instance_world1(instances, instance),
+                            Instance_world2(instances, instance)));
 }
 
-// (root, material, object, mirrored)
-uvec4 instance_words(uint instance) { return texelFetch(instances, int(7u * instance + 6u)); }
-
-uint instance_root(uint instance) { return instance_words(instance).x; }
-
-vec3 triangle_vertex(uint triangle, int i) {
-    return uintBitsToFloat(texelFetch(triangles, int(3u * triangle) + i).xyz);
+mat4x3 object_from_world(uint instance) {
+    return transpose(mat3x4(Instance_object0(instances, instance), Instance_object1(instances, instance),
+                            Instance_object2(instances, instance)));
 }
-
-uint triangle_object(uint triangle) { return texelFetch(triangles, int(3u * triangle + 2u)).w; }
 
 uint material_of(uint triangle, uint instance) {
-    uint material = texelFetch(triangles, int(3u * triangle + 1u)).w;
+    uint material = Triangle_material(triangles, triangle);
     if (FX_INSTANCES && instance != NONE) {
-        uint override = instance_words(instance).y;
+        uint override = Instance_material(instances, instance);
         material = override == NONE ? material : override;
     }
     return material;
@@ -47,10 +36,6 @@ uint material_of(uint triangle, uint instance) {
 
 vec2 texture_coordinates(uint triangle, vec2 barycentric) {
     if (FX_SPHERES && is_sphere(triangle)) return sphere_coordinates(sphere_of(triangle), octahedral_vector(barycentric));
-    int at = int(3u * triangle);
-    vec4 a = uintBitsToFloat(texelFetch(shading, at));
-    vec4 b = uintBitsToFloat(texelFetch(shading, at + 1));
-    vec4 c = uintBitsToFloat(texelFetch(shading, at + 2));
-    vec2 uv0 = vec2(a.w, b.x), uv1 = b.yz, uv2 = vec2(b.w, c.x);
-    return uv0 + barycentric.x * (uv1 - uv0) + barycentric.y * (uv2 - uv0);
+    Shading s = Shading_load(shading, triangle);
+    return s.uv0 + barycentric.x * (s.uv1 - s.uv0) + barycentric.y * (s.uv2 - s.uv0);
 }

@@ -3,14 +3,11 @@
 
 const float SIMILARITY_UNIT = 65536.0;
 
-uvec4 guide_texel(uint pixel, uint part) { return texelFetch(guides, int(3u * pixel + part)); }
-
 // G_n * G_x of GEO's equation 2, without colour, in units of 2^-16; 0 between a hit and a miss.
 uint similarity(uint p, uint q) {
-    uvec4 a = guide_texel(p, 1u), b = guide_texel(q, 1u);
-    if ((a.w == NONE) != (b.w == NONE)) return 0u;
-    float normals = squared_distance(uintBitsToFloat(guide_texel(p, 0u).xyz), uintBitsToFloat(guide_texel(q, 0u).xyz));
-    float positions = squared_distance(uintBitsToFloat(a.xyz), uintBitsToFloat(b.xyz));
+    Guide a = Guide_load(guides, p), b = Guide_load(guides, q);
+    if ((a.object == NONE) != (b.object == NONE)) return 0u;
+    float normals = squared_distance(a.normal, b.normal), positions = squared_distance(a.position, b.position);
     precise float x = normals * push.normal_scale + positions * push.position_scale;
     precise float rounded = exp_negative(x) * SIMILARITY_UNIT + 0.5;
     return uint(rounded);

@@ -10,11 +10,11 @@ struct Sphere {
     uint flags;    // SPHERE_ bits
 };
 
-bool is_sphere(uint triangle) { return (texelFetch(triangles, int(3u * triangle)).w & SPHERE) != 0u; }
+bool is_sphere(uint triangle) { return (Triangle_primitive(triangles, triangle) & SPHERE) != 0u; }
 
 Sphere sphere_of(uint triangle) {
-    uvec4 words = texelFetch(triangles, int(3u * triangle));
-    return Sphere(uintBitsToFloat(words.xyz), triangle_vertex(triangle, 1), triangle_vertex(triangle, 2), words.w);
+    Triangle t = Triangle_load(triangles, triangle);
+    return Sphere(t.v0, t.v1, t.v2, t.primitive);
 }
 
 // From the centre, as long as the radius, a quarter turn of azimuth from `meridian`.

@@ -1,6 +1,5 @@
 // Floats as words of 64 bits. lavapipe stores lane by lane and member by member: two members cost half of four, and one
 // store of four is fewer instructions than two of two.
-#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 
 u64vec2 paired(uvec4 v) {
     return u64vec2(packUint2x32(v.xy), packUint2x32(v.zw));

@@ -42,15 +42,14 @@ vec3 ray_origin(Surface s, vec3 w) {
 
 // Height map (Blinn 1978) or tangent-space normal map. `e1`, `e2` are edges, `d1`, `d2` their extents in uv.
 vec3 perturbed_normal(Surface s, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
-    uint image = material_texel(s.material, 6u).z;
+    uint image = Material_bump_texture(materials, s.material);
     float det = d1.x * d2.y - d2.x * d1.y;
     if (image == NONE || det == 0.0) return s.normal;
     vec3 dpdu = (d2.y * e1 - d1.y * e2) / det;
     vec3 dpdv = (d1.x * e2 - d2.x * e1) / det;
     bool mapped = FX_NORMAL_MAPS && (!FX_BUMP_MAPS || (s.flags & MATERIAL_NORMAL_MAP) != 0u);
-    uvec4 words = texelFetch(textures, int(2u * image));
-    vec2 scale = uintBitsToFloat(texelFetch(textures, int(2u * image + 1u)).xy);
-    vec2 texel = 1.0 / (vec2(words.yz) * max(abs(scale), 1e-6));
+    Texture map = Texture_load(textures, image);
+    vec2 texel = 1.0 / (vec2(map.width, map.height) * max(abs(map.scale), 1e-6));
     // The normal, or differences of heights half a texel to either side: along u, then along v.
     vec3 value;
     vec2 rise = vec2(0.0);
@@ -68,7 +67,7 @@ vec3 perturbed_normal(Surface s, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
         vec3 b = cross(s.normal, t);
         n = m.x * t + m.y * (dot(b, dpdv) < 0.0 ? -b : b) + m.z * s.normal;
     } else {
-        float height = uintBitsToFloat(material_texel(s.material, 4u).w);
+        float height = Material_bump_scale(materials, s.material);
         vec3 pu = dpdu + s.normal * (height * (rise.x / texel.x) - dot(s.normal, dpdu));
         vec3 pv = dpdv + s.normal * (height * (rise.y / texel.y) - dot(s.normal, dpdv));
         n = cross(pu, pv);
@@ -95,13 +94,13 @@ Surface sphere_at(Hit hit) {
     float equator = length(vec2(dot(n, ball.meridian), dot(n, side))) / radius; // distance from the axis
     vec3 around = (dot(n, ball.meridian) * side - dot(n, side) * ball.meridian) / radius;
     vec3 e1 = 2.0 * PI * around, e2 = (ball.pole - dot(n, ball.pole) * n) * (PI / max(equator, 1e-6));
-    s.object = triangle_object(hit.triangle);
+    s.object = Triangle_object(triangles, hit.triangle);
     s.material = material_of(hit.triangle, hit.instance);
     s.corner = ball.centre;
     s.geometric = n;
     if (FX_INSTANCES && hit.instance != NONE) {
-        mat4x3 world = instance_matrix(hit.instance, 0);
-        mat4x3 object = instance_matrix(hit.instance, 3);
+        mat4x3 world = world_from_object(hit.instance);
+        mat4x3 object = object_from_world(hit.instance);
         float len;
         s.geometric = unit_vector(transpose(mat3(object)) * n, len);
         s.corner = world * vec4(ball.centre, 1.0);
@@ -110,10 +109,10 @@ Surface sphere_at(Hit hit) {
         e1 = mat3(world) * e1;
         e2 = mat3(world) * e2;
         radius = length(mat3(world) * ball.pole);
-        s.object += instance_words(hit.instance).z;
+        s.object += Instance_object(instances, hit.instance);
     }
     if ((ball.flags & SPHERE_INWARD) != 0u) s.geometric = -s.geometric;
-    s.flags = material_texel(s.material, 0u).w;
+    s.flags = Material_flags(materials, s.material);
     s.position = s.corner + point;
     s.e1 = s.e2 = vec3(0.0);
     s.radius = radius;
@@ -128,28 +127,28 @@ Surface sphere_at(Hit hit) {
 Surface surface_at(Hit hit) {
     if (FX_SPHERES && is_sphere(hit.triangle)) return sphere_at(hit);
     Surface s;
-    vec3 p0 = triangle_vertex(hit.triangle, 0);
-    vec3 e1 = triangle_vertex(hit.triangle, 1) - p0;
-    vec3 e2 = triangle_vertex(hit.triangle, 2) - p0;
-    s.object = triangle_object(hit.triangle);
+    Triangle triangle = Triangle_load(triangles, hit.triangle);
+    vec3 p0 = triangle.v0;
+    vec3 e1 = triangle.v1 - p0;
+    vec3 e2 = triangle.v2 - p0;
+    s.object = triangle.object;
     s.material = material_of(hit.triangle, hit.instance);
     vec3 reach = abs(p0);
     mat3 normals_from_object = mat3(1.0);
     bool mirrored = false;
     if (FX_INSTANCES && hit.instance != NONE) {
-        mat4x3 world = instance_matrix(hit.instance, 0);
-        mat4x3 object = instance_matrix(hit.instance, 3);
+        mat4x3 world = world_from_object(hit.instance);
+        mat4x3 object = object_from_world(hit.instance);
         normals_from_object = transpose(mat3(object));
-        uvec4 words = instance_words(hit.instance);
         p0 = world * vec4(p0, 1.0);
         // Rays are taken to the object and points from it: both round.
         reach = magnitude(world, magnitude(object, abs(p0)));
         e1 = mat3(world) * e1;
         e2 = mat3(world) * e2;
-        s.object += words.z;
-        mirrored = words.w != 0u;
+        s.object += Instance_object(instances, hit.instance);
+        mirrored = Instance_mirrored(instances, hit.instance) != 0u;
     }
-    s.flags = material_texel(s.material, 0u).w;
+    s.flags = Material_flags(materials, s.material);
     s.position = p0 + hit.b1 * e1 + hit.b2 * e2;
     s.corner = p0;
     s.e1 = e1;
@@ -163,21 +162,17 @@ Surface surface_at(Hit hit) {
     s.uv = vec2(0.0);
     if (!(FX_SMOOTH_NORMALS || FX_TEXTURES || FX_BUMP_MAPS || FX_NORMAL_MAPS)) return s;
 
-    int at = int(3u * hit.triangle);
-    uvec4 w0 = texelFetch(shading, at), w1 = texelFetch(shading, at + 1);
-    if (FX_SMOOTH_NORMALS && (w0.x & w0.y & w0.z) != 0xffffffffu) {
-        vec3 n = mix(octahedral_decode(w0.x), octahedral_decode(w0.y), hit.b1) +
-                 hit.b2 * (octahedral_decode(w0.z) - octahedral_decode(w0.x));
+    Shading at = Shading_load(shading, hit.triangle);
+    if (FX_SMOOTH_NORMALS && (at.normal.x & at.normal.y & at.normal.z) != 0xffffffffu) {
+        vec3 n = mix(octahedral_decode(at.normal.x), octahedral_decode(at.normal.y), hit.b1) +
+                 hit.b2 * (octahedral_decode(at.normal.z) - octahedral_decode(at.normal.x));
         float len;
         n = unit_vector(normals_from_object * n, len);
         s.smooth_normal = s.normal = len > 0.0 ? n : s.geometric;
     }
     if (FX_TEXTURES || FX_BUMP_MAPS || FX_NORMAL_MAPS) {
-        uint w2 = texelFetch(shading, at + 2).x;
-        vec2 uv0 = uintBitsToFloat(uvec2(w0.w, w1.x));
-        vec2 d1 = uintBitsToFloat(w1.yz) - uv0;
-        vec2 d2 = uintBitsToFloat(uvec2(w1.w, w2)) - uv0;
-        s.uv = uv0 + hit.b1 * d1 + hit.b2 * d2;
+        vec2 d1 = at.uv1 - at.uv0, d2 = at.uv2 - at.uv0;
+        s.uv = at.uv0 + hit.b1 * d1 + hit.b2 * d2;
         if (FX_BUMP_MAPS || FX_NORMAL_MAPS) s.normal = perturbed_normal(s, e1, e2, d1, d2);
     }
     return s;
@@ -240,21 +235,19 @@ vec3 textured(vec3 constant, uint image, Surface s) {
 
 // Radiance that the surface emits from its front side.
 vec3 surface_emission(Surface s) {
-    vec3 emission = uintBitsToFloat(material_texel(s.material, 1u).xyz);
+    vec3 emission = Material_emission(materials, s.material);
     if (!FX_TEXTURES) return emission;
-    uint image = material_texel(s.material, 7u).x;
+    uint image = Material_emission_texture(materials, s.material);
     return image == NONE ? emission : emission * texture_sample(image, s.uv, true).rgb;
 }
 
+// What an effect alone needs is not fetched where the scene has none of it: the compiler drops what is not used.
 Bsdf surface_bsdf(Surface s) {
+    Material m = Material_load(materials, s.material);
     Bsdf b;
-    uvec4 m0 = material_texel(s.material, 0u), m5 = uvec4(0u, 0u, 0u, NONE), m6 = uvec4(NONE);
-    if (FX_TEXTURES || FX_DIELECTRIC) m5 = material_texel(s.material, 5u);
-    if (FX_TEXTURES) m6 = material_texel(s.material, 6u);
-    b.kind = BSDF_DIFFUSE;
-    if (!ONE_KIND) b.kind = material_texel(s.material, 7u).z;
-    b.albedo = textured(uintBitsToFloat(m0.xyz), m5.w, s);
-    b.transmission = uintBitsToFloat(m5.xyz);
+    b.kind = ONE_KIND ? BSDF_DIFFUSE : m.kind;
+    b.albedo = textured(m.base_color, m.base_texture, s);
+    b.transmission = m.transmission;
     b.ggx = (s.flags & MATERIAL_GGX) != 0u;
     b.alpha = 0.0;
     b.eta = vec3(1.0);
@@ -267,18 +260,16 @@ Bsdf surface_bsdf(Surface s) {
     b.coat_inside = 0.0;
     b.nonlinear = (s.flags & MATERIAL_NONLINEAR) != 0u;
     if (FX_CONDUCTOR || FX_DIELECTRIC || FX_COATED) {
-        b.eta = uintBitsToFloat(material_texel(s.material, 2u).xyz);
-        uvec4 m3 = material_texel(s.material, 3u);
-        b.k = uintBitsToFloat(m3.xyz);
-        b.alpha = uintBitsToFloat(m3.w);
-        b.specular = textured(uintBitsToFloat(material_texel(s.material, 4u).xyz), m6.x, s);
+        b.eta = m.eta;
+        b.k = m.k;
+        b.alpha = m.alpha;
+        b.specular = textured(m.specular, m.specular_texture, s);
         if (FX_COATED) {
-            uvec4 m7 = material_texel(s.material, 7u);
-            b.internal_fresnel = uintBitsToFloat(m7.y);
-            b.coat_table = m7.w;
+            b.internal_fresnel = m.internal_fresnel;
+            b.coat_table = m.coat_table;
         }
-        if (FX_TEXTURES && m6.w != NONE) {
-            float r = texture_sample(m6.w, s.uv, false).r; // perceptual: alpha = r^2
+        if (FX_TEXTURES && m.roughness_texture != NONE) {
+            float r = texture_sample(m.roughness_texture, s.uv, false).r; // perceptual: alpha = r^2
             b.alpha *= r * r;
         }
     }

@@ -5,22 +5,21 @@ vec3 linear_from_srgb(vec3 c) {
     return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045)));
 }
 
-vec4 texture_texel(uvec4 image, ivec2 at, bool colour) {
-    ivec2 edge = ivec2(image.yz);
+vec4 texture_texel(Texture image, ivec2 at, bool colour) {
+    ivec2 edge = ivec2(image.width, image.height);
     // Coordinates come in as floor(uv * size) with uv already wrapped to one period, so one step over is enough.
-    at = (image.w & TEXTURE_CLAMP) != 0u ? clamp(at, ivec2(0), edge - 1) : at + mix(ivec2(0), edge, lessThan(at, ivec2(0)));
+    at = (image.flags & TEXTURE_CLAMP) != 0u ? clamp(at, ivec2(0), edge - 1) : at + mix(ivec2(0), edge, lessThan(at, ivec2(0)));
     at = mix(at, at - edge, greaterThanEqual(at, edge));
-    vec4 c = unpackUnorm4x8(texelFetch(texels, int(image.x) + at.y * edge.x + at.x).x);
+    vec4 c = unpackUnorm4x8(texelFetch(texels, int(image.first) + at.y * edge.x + at.x).x);
     return colour ? vec4(linear_from_srgb(c.rgb), c.a) : c;
 }
 
 // `colour`: TEXTURE_SRGB, known from what a texture is for, so that masks and heights are read without decoding.
 vec4 texture_sample(uint index, vec2 uv, bool colour) {
-    uvec4 image = texelFetch(textures, int(2u * index));
-    vec4 mapping = uintBitsToFloat(texelFetch(textures, int(2u * index + 1u)));
-    uv = uv * mapping.xy + mapping.zw;
-    vec2 wrapped = (image.w & TEXTURE_CLAMP) != 0u ? clamp(uv, 0.0, 1.0) : fract(uv);
-    vec2 at = vec2(wrapped.x, 1.0 - wrapped.y) * vec2(image.yz) - 0.5; // v points up, rows go down
+    Texture image = Texture_load(textures, index);
+    uv = uv * image.scale + image.offset;
+    vec2 wrapped = (image.flags & TEXTURE_CLAMP) != 0u ? clamp(uv, 0.0, 1.0) : fract(uv);
+    vec2 at = vec2(wrapped.x, 1.0 - wrapped.y) * vec2(image.width, image.height) - 0.5; // v points up, rows go down
     ivec2 corner = ivec2(floor(at));
     vec2 f = at - vec2(corner);
     vec4 top = mix(texture_texel(image, corner, colour), texture_texel(image, corner + ivec2(1, 0), colour), f.x);
@@ -31,9 +30,9 @@ vec4 texture_sample(uint index, vec2 uv, bool colour) {
 
 // The share of rays that a surface stops at a point of a triangle.
 float surface_opacity(uint material, uint triangle, vec2 barycentric) {
-    if ((material_texel(material, 0u).w & MATERIAL_MASKED) == 0u) return 1.0;
-    float opacity = uintBitsToFloat(material_texel(material, 2u).w);
-    uint image = material_texel(material, 6u).y;
+    if ((Material_flags(materials, material) & MATERIAL_MASKED) == 0u) return 1.0;
+    float opacity = Material_opacity(materials, material);
+    uint image = Material_opacity_texture(materials, material);
     return image == NONE ? opacity : opacity * texture_sample(image, texture_coordinates(triangle, barycentric), false).r;
 }
 

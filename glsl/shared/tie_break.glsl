@@ -1,7 +1,6 @@
 // What the order of index decides: equal keys at the edge of the selection, or, when the repetitions ran out, all the room
 // there is. Needs `key`, `stats`, `state` and `push`. Loops of no turn, not branches: compilers for CPUs run both sides of
 // a branch under masks, fetches included.
-#include "shared/load_apportionment.glsl"
 #include "shared/capacity.glsl"
 #include "shared/remainder_key.glsl"
 

@@ -85,9 +85,9 @@ RaySpace either(bool first, RaySpace a, RaySpace b) {
 }
 
 bool intersect_triangle(RaySpace r, uint index, float t_max, out float t, out vec2 barycentric) {
-    vec3 a = largest_last(r.along_x, r.along_y, triangle_vertex(index, 0) - r.origin);
-    vec3 b = largest_last(r.along_x, r.along_y, triangle_vertex(index, 1) - r.origin);
-    vec3 c = largest_last(r.along_x, r.along_y, triangle_vertex(index, 2) - r.origin);
+    vec3 a = largest_last(r.along_x, r.along_y, Triangle_v0(triangles, index) - r.origin);
+    vec3 b = largest_last(r.along_x, r.along_y, Triangle_v1(triangles, index) - r.origin);
+    vec3 c = largest_last(r.along_x, r.along_y, Triangle_v2(triangles, index) - r.origin);
     precise vec2 p = a.xy - r.shear.xy * a.z, q = b.xy - r.shear.xy * b.z, s = c.xy - r.shear.xy * c.z;
     precise float u = s.x * q.y - s.y * q.x;
     precise float v = p.x * s.y - p.y * s.x;
@@ -107,7 +107,7 @@ bool intersect_triangle(RaySpace r, uint index, float t_max, out float t, out ve
 // leads from there to both hits. A ray that `leaves` the sphere meets only its far side. A mask decides on each side.
 bool intersect_sphere(RaySpace r, uint index, uint instance, float t_max, bool leaves, uint mask_seed, out float t,
                       out vec2 normal) {
-    vec3 pole = triangle_vertex(index, 1), from_centre = r.origin - triangle_vertex(index, 0);
+    vec3 pole = Triangle_v1(triangles, index), from_centre = r.origin - Triangle_v0(triangles, index);
     float inverse = inversesqrt(dot(r.direction, r.direction));
     vec3 d = r.direction * inverse;
     float along = dot(from_centre, d);
@@ -152,22 +152,20 @@ uint intersect_children(uint meta, uint octant, uvec3 near_q, uvec3 far_q, vec3 
 
 // Returns the hit mask; `children` = (first inner child, first primitive, inner mask).
 uint intersect_node(RaySpace r, uint index, float t_max, out uvec3 children) {
-    int at = int(5u * index);
-    uvec4 n0 = texelFetch(nodes, at);
-    uvec4 n1 = texelFetch(nodes, at + 1);
-    uvec4 x = texelFetch(nodes, at + 2); // min 0-3, min 4-7, max 0-3, max 4-7
-    uvec4 y = texelFetch(nodes, at + 3);
-    uvec4 z = texelFetch(nodes, at + 4);
-    children = uvec3(n1.xy, n0.w >> 24);
-    vec3 cell = uintBitsToFloat(uvec3(n0.w & 0xffu, (n0.w >> 8) & 0xffu, (n0.w >> 16) & 0xffu) << 23);
+    BvhNode node = BvhNode_load(nodes, index);
+    uint exponents = node.e_imask;
+    children = uvec3(node.child_base, node.primitive_base, exponents >> 24);
+    vec3 cell = uintBitsToFloat(uvec3(exponents & 0xffu, (exponents >> 8) & 0xffu, (exponents >> 16) & 0xffu) << 23);
     vec3 scale = cell * r.inverse;
-    vec3 origin = (uintBitsToFloat(n0.xyz) - r.origin) * r.inverse;
+    vec3 origin = (node.p - r.origin) * r.inverse;
+    // Near planes of children 0-3 and 4-7, then far ones.
+    uvec4 x = uvec4(node.min_x, node.max_x), y = uvec4(node.min_y, node.max_y), z = uvec4(node.min_z, node.max_z);
     x = r.inverse.x < 0.0 ? x.zwxy : x;
     y = r.inverse.y < 0.0 ? y.zwxy : y;
     z = r.inverse.z < 0.0 ? z.zwxy : z;
     int t = floatBitsToInt(t_max);
-    return intersect_children(n1.z, r.octant, uvec3(x.x, y.x, z.x), uvec3(x.z, y.z, z.z), scale, origin, t) |
-           intersect_children(n1.w, r.octant, uvec3(x.y, y.y, z.y), uvec3(x.w, y.w, z.w), scale, origin, t);
+    return intersect_children(node.meta.x, r.octant, uvec3(x.x, y.x, z.x), uvec3(x.z, y.z, z.z), scale, origin, t) |
+           intersect_children(node.meta.y, r.octant, uvec3(x.y, y.y, z.y), uvec3(x.w, y.w, z.w), scale, origin, t);
 }
 
 // Takes the highest of `bits`, which are below 2^24: by the exponent of a float, where findMSB is a long sequence.
@@ -211,9 +209,9 @@ void enter_instance(inout Traversal t, RaySpace world, uvec2 leaves) {
     push_group(t.depth, leaves, leaves.y != 0u);
     t.instance = leaves.x + bit;
     t.bottom = t.depth;
-    mat4x3 object_from_world = instance_matrix(t.instance, 3);
-    t.inside = ray_space(object_from_world * vec4(world.origin, 1.0), mat3(object_from_world) * world.direction);
-    t.base = instance_root(t.instance);
+    mat4x3 object = object_from_world(t.instance);
+    t.inside = ray_space(object * vec4(world.origin, 1.0), mat3(object) * world.direction);
+    t.base = Instance_root(instances, t.instance);
     t.bits = 0x80000000u;
 }
 

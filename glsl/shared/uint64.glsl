@@ -1,4 +1,4 @@
-// 64-bit words as pairs in buffers, low first, and exact proportions. Kernels that include this ask for int64 themselves.
+// 64-bit words as pairs in buffers, low first, and exact proportions.
 uint64_t wide(uvec2 pair) { return packUint2x32(pair); }
 
 // How a * b / d is found for many b, 0 <= b <= d < 2^62: by a reciprocal while a has 32 bits, else bit by bit.

@@ -1,7 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "effects.glsl"
 layout(binding = 3) uniform usamplerBuffer texels; // of uint
 #include "shared/bsdf.glsl"

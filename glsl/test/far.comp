@@ -1,8 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
-
 // Fetches one texel, however far it lies.
 layout(local_size_x = 1) in;
 layout(binding = 0) uniform usamplerBuffer texels; // of uvec4

@@ -1,8 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
-
 // to[i] = 3 from[n - 1 - i] + 1: reads what another thread of the previous pass wrote.
 layout(local_size_x = 64) in;
 layout(scalar, binding = 0) readonly buffer From { uint from[]; };

@@ -1,7 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "effects.glsl"
 #include "shared/thread.glsl"
 #include "shared/scene.glsl"
@@ -20,8 +16,8 @@ uint nodes_visited = 0u;
 #include "shared/traverse.glsl"
 
 Segment ray_at(uint i) {
-    uvec4 a = texelFetch(rays, int(2u * i)), b = texelFetch(rays, int(2u * i + 1u));
-    return Segment(uintBitsToFloat(a.xyz), uintBitsToFloat(b.xyz), uintBitsToFloat(a.w), b.w);
+    RayQuery ray = RayQuery_load(rays, i);
+    return Segment(ray.origin, ray.direction, ray.t_max, ray.mask_seed);
 }
 
 void main() {
@@ -35,7 +31,10 @@ void main() {
         RaySpace space = ray_space(ray.origin, ray.direction);
         done = traversal_step(t, space, any_hit, push.root, ray.mask_seed, uvec2(NONE));
         if (done) {
-            hits[i] = RayHit(t.hit.t, t.hit.triangle, t.hit.instance, vec2(t.hit.b1, t.hit.b2));
+            hits[i].t = t.hit.t;
+            hits[i].triangle = t.hit.triangle;
+            hits[i].instance = t.hit.instance;
+            hits[i].barycentric = vec2(t.hit.b1, t.hit.b2);
             i += stride;
         }
     } while (i < push.count);

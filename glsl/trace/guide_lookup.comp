@@ -1,7 +1,3 @@
-#version 460
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_GOOGLE_include_directive : require
-#include "layout.glsl"
 #include "effects.glsl"
 #include "shared/thread.glsl"
 #include "shared/scene.glsl"
@@ -36,9 +32,9 @@ const float LEAST_NORMAL = 1e-3, LEAST_DEPTH = 1e-4;
 vec4 guide_ray(ivec2 at) {
     if (any(greaterThanEqual(at, ivec2(push.size)))) return vec4(0.0);
     int q = at.y * int(push.size.x) + at.x;
-    vec4 guide = uintBitsToFloat(texelFetch(guides, 3 * q));
-    bool known = known_radiance(texelFetch(filtered, q)).w > 0.0 && finite(guide.xyz) && finite(guide.w);
-    return known ? guide : vec4(0.0);
+    Guide guide = Guide_load(guides, q);
+    bool known = known_radiance(texelFetch(filtered, q)).w > 0.0 && finite(guide.normal) && finite(guide.depth);
+    return known ? vec4(guide.normal, guide.depth) : vec4(0.0);
 }
 
 // Pixel of the guide ray with the largest S = S_n * S_d (equations 3 to 5) among the four nearest to `film`; the nearest of

@@ -1,5 +1,5 @@
 //! What the kernels share that decide where samples go.
-use super::{float, uint, uvec2};
+use super::{Field, Struct, float, uint, uvec2};
 use bytemuck::{Pod, Zeroable};
 
 gpu_structs! {

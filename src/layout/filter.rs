@@ -1,5 +1,5 @@
 //! Push constants of the filters' kernels.
-use super::{float, uint, uvec2, vec3, vec4};
+use super::{Field, Struct, float, uint, uvec2, vec3, vec4};
 use bytemuck::{Pod, Zeroable};
 
 gpu_structs! {

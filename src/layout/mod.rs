@@ -1,8 +1,9 @@
-//! Every struct that crosses the line between host and shader, written once. The crate compiles this file;
-//! `build.rs` includes it by `#[path]` and serves `GLSL` to the shaders as `layout.glsl`.
+//! Every struct that crosses the line between host and shader, written once. The crate compiles this file; `build.rs` includes
+//! it by `#[path]` and writes the same structs in GLSL at the head of every kernel.
 //!
-//! Structs are laid out as GLSL `scalar` does: members of four bytes, no padding anywhere. Structs that kernels
-//! read through texel buffers are multiples of 16 bytes, or 8, so that one fetch returns all that it can.
+//! Structs are laid out as GLSL `scalar` does: members of four bytes, no padding anywhere. A kernel that binds a struct as texels
+//! reads it by functions that the build writes too: `Guide_depth(guides, i)`, `Guide_load(guides, i)`. They fetch 16 bytes at a
+//! time where the struct is a multiple of that, 8 where it is one of 8, else 4: structs that are read often have a `pad`.
 #![allow(non_camel_case_types)]
 
 use bytemuck::{Pod, Zeroable};
@@ -24,17 +25,52 @@ pub type uvec3 = [u32; 3];
 /// Four unsigned words.
 pub type uvec4 = [u32; 4];
 
+/// A struct as kernels know it, in the order of memory.
+pub struct Struct {
+    /// Name on both sides.
+    pub name: &'static str,
+    /// Bytes.
+    pub size: usize,
+    /// All of them.
+    pub fields: &'static [Field],
+}
+
+/// A field of a [`Struct`].
+pub struct Field {
+    /// Name on both sides.
+    pub name: &'static str,
+    /// GLSL's name of the type.
+    pub ty: &'static str,
+    /// Bytes from the start of the struct.
+    pub offset: usize,
+}
+
+/// Declares structs, and lists them in `STRUCTS` for `build.rs`. With the feature `dummy-fields` each begins with a field that
+/// nothing reads: tests that pass with it show that nobody knows the places of fields by heart.
 macro_rules! gpu_structs {
     ($($(#[$doc:meta])* struct $name:ident { $($(#[$unit:meta])* $field:ident: $ty:ident,)+ })+) => {
         $(
             $(#[$doc])*
             #[repr(C)]
             #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-            pub struct $name { $($(#[$unit])* pub $field: $ty,)+ }
+            pub struct $name {
+                #[cfg(feature = "dummy-fields")]
+                #[doc(hidden)]
+                pub dummy: [f32; 4],
+                $($(#[$unit])* pub $field: $ty,)+
+            }
         )+
-        /// The same structs as GLSL text.
-        pub const GLSL_STRUCTS: &str = concat!($("struct ", stringify!($name), " {\n",
-            $("    ", stringify!($ty), " ", stringify!($field), ";\n",)+ "};\n",)+);
+        /// The structs of this file.
+        #[doc(hidden)]
+        pub const STRUCTS: &[Struct] = &[$(Struct {
+            name: stringify!($name),
+            size: size_of::<$name>(),
+            fields: &[
+                #[cfg(feature = "dummy-fields")]
+                Field { name: "dummy", ty: "vec4", offset: 0 },
+                $(Field { name: stringify!($field), ty: stringify!($ty), offset: std::mem::offset_of!($name, $field) },)+
+            ],
+        },)+];
     };
 }
 

@@ -6,6 +6,9 @@ use std::path::Path;
 /// A file that a kernel is made of: name for messages, text.
 pub type Source = (String, String);
 
+/// The file whose constants come from Rust in the first place.
+pub const EFFECTS: &str = "glsl/effects.glsl";
+
 /// A buffer.
 #[derive(Clone)]
 pub struct Binding {
@@ -13,8 +16,10 @@ pub struct Binding {
     pub group: Option<String>,
     pub number: u32,
     pub field: String,
-    /// Name of a type in layout.rs.
+    /// Rust's name of the type.
     pub element: String,
+    /// GLSL's name of it; none for texels.
+    pub in_glsl: String,
     /// Variant of `gpu::SlotKind`.
     pub kind: &'static str,
     /// Variant of `gpu::Access`.
@@ -74,7 +79,7 @@ impl Interface {
         let (mut push, mut size) = (None, None);
         let (mut bindings, mut constants, mut numbers) = (Vec::<Binding>::new(), Vec::<Constant>::new(), Vec::new());
         let kernel = &sources[0].0;
-        for (file, text) in sources.iter().filter(|(file, _)| !is_generated(file)) {
+        for (file, text) in sources.iter().filter(|(file, _)| file != EFFECTS) {
             let group = (file != kernel).then(|| basename(file));
             for (index, line) in text.lines().enumerate() {
                 let place = || format!("{file}:{}: {}", index + 1, line.trim());
@@ -103,7 +108,7 @@ impl Interface {
         })?;
         let (local_size_x, local_size_y) =
             size.with_context(|| format!("{kernel}: no `layout(local_size_x = 64) in;`"))?;
-        let effects = sources.iter().any(|(file, _)| file.ends_with("effects.glsl"));
+        let effects = sources.iter().any(|(file, _)| file == EFFECTS);
         let interface = Self { push, bindings, constants, numbers, local_size_x, local_size_y, effects };
         interface.check_ids(kernel)?;
         Ok(interface)
@@ -154,11 +159,6 @@ impl Interface {
         }
         Ok(())
     }
-}
-
-/// layout.glsl and effects.glsl, whose constants come from Rust in the first place.
-fn is_generated(file: &str) -> bool {
-    ["glsl/layout.glsl", "glsl/effects.glsl"].contains(&file)
 }
 
 fn basename(file: &str) -> String {
@@ -261,14 +261,15 @@ fn parse_storage(line: &str) -> Option<Binding> {
         "" => "ReadWrite",
         _ => return None,
     };
-    let (element, field) = member(rest)?;
+    let (in_glsl, field) = member(rest)?;
     let field = field.strip_suffix("[]")?.to_owned();
-    let element = rest.split_once("// of ").map_or(element, |(_, of)| of.trim());
+    let element = rest.split_once("// of ").map_or(in_glsl, |(_, of)| of.trim());
     Some(Binding {
         group: None,
         number: number.parse().ok()?,
         field,
         element: element.to_owned(),
+        in_glsl: in_glsl.to_owned(),
         kind: "Storage",
         access,
     })
@@ -289,6 +290,7 @@ fn parse_texels(line: &str) -> Option<Binding> {
         number: number.parse().ok()?,
         field: field.trim().to_owned(),
         element,
+        in_glsl: String::new(),
         kind,
         access: "TexelRead",
     })

@@ -149,8 +149,8 @@ pub fn check_size(gpu: &Gpu, [width, height]: [u32; 2], texels: u64) -> Result<(
     }
 }
 
-/// Texels of a pixel's guide, or of its variance.
-pub const GUIDE_TEXELS: u64 = 3;
+/// Texels of a pixel's guide; those of its variance are not more.
+pub const GUIDE_TEXELS: u64 = (size_of::<Guide>() / 16) as u64;
 
 /// Filters one image: uploads it, runs `row` on it and reads the result; also what each pass took.
 ///
