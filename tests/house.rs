@@ -6,7 +6,22 @@ use std::path::{Path, PathBuf};
 const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("main", &[]),
     ("lib", &[]),
-    ("cli", &["allocate", "denoise", "error", "gpu", "image", "layout", "memory", "render", "report", "scene", "statistics"]),
+    (
+        "cli",
+        &[
+            "allocate",
+            "denoise",
+            "error",
+            "gpu",
+            "image",
+            "layout",
+            "memory",
+            "render",
+            "report",
+            "scene",
+            "statistics",
+        ],
+    ),
     ("denoise", &["error", "gpu", "image", "layout", "math", "render", "shaders"]),
     ("render", &["allocate", "error", "gpu", "layout", "scene", "shaders", "statistics"]),
     ("allocate", &["error", "gpu", "layout", "math", "shaders", "statistics"]),

@@ -1,8 +1,9 @@
 //! From a description to the flat arrays: files are read, meshes placed, BVHs built and textures decoded.
 use super::description::{self, Description, Mesh};
 use super::geometry::Geometry;
+use super::library::Library;
 use super::material::Materials;
-use super::obj::{self, Library, ObjFile};
+use super::obj::{self, ObjFile};
 use super::place::{Job, Plan, instance, mesh_name};
 use super::{Scene, bvh, environment, light};
 use crate::error::{Error, Result};
@@ -36,7 +37,7 @@ pub struct Assembly<'a> {
     /// Materials and warnings so far.
     pub library: Library,
     /// Parsed files that meshes still need.
-    pub files: HashMap<PathBuf, ObjFile>,
+    pub files: HashMap<PathBuf, ObjFile<'a>>,
     /// Triangles so far.
     pub geometry: Geometry,
 }
@@ -111,7 +112,7 @@ impl<'a> Assembly<'a> {
     /// Reads the MTL files that OBJ files name near their beginning; others are read when they turn up.
     fn read_libraries(&mut self) -> Result<()> {
         let paths: BTreeSet<_> = self.description.mesh.iter().filter_map(|m| self.file_of(m)).collect();
-        paths.iter().try_for_each(|path| obj::read_libraries(path, &mut self.library))
+        paths.iter().try_for_each(|path| self.library.read_ahead(path))
     }
 
     /// Everything but textures; returns the triangles below each root that instances name.

@@ -1,22 +1,7 @@
-//! Materials: what the `[[material]]` tables say, and what MTL statements are taken to mean.
-//!
-//! An MTL block becomes, by the first rule that fits:
-//! 1. `Pm` of at least 0.5: a conductor whose reflectance at normal incidence is Kd. With map_Kd, the tint of a perfect
-//!    mirror, since indices cannot be textured.
-//! 2. `illum` 3 or 5 with black Kd and no map_Kd: a mirror tinted by Ks (white where Ks is black).
-//! 3. `illum` 4, 6, 7 or 9 without map_d, or d below 1 together with Tf and Ni above 1: a dielectric of index Ni
-//!    (1.5 where absent), its transmission tinted by Tf.
-//! 4. Ks above black and `illum` other than 0 and 1: a diffuse base Kd under a coat of index Ni (1.5 where it is not
-//!    above 1). Ks is the coat's reflectance at normal incidence, capped at what the index gives.
-//! 5. Otherwise diffuse.
-//!
-//! Roughness: alpha = Pr^2; without Pr, sqrt(2 / (Ns + 2)) for coats and conductors, and smooth for 2 and 3.
-//! d (or 1 - Tr) and map_d are opacity except on dielectrics. `norm` wins over a bump map. Bump heights are `-bm` world
-//! units; without -bm, 0.0005 of the scene's diagonal. A black Kd under a map_Kd counts as white.
+//! Materials: what the `[[material]]` tables say.
 use super::coat::coat_table;
 use super::effects::SMOOTH;
 use super::fresnel;
-use super::mtl::{Map, Mtl};
 use super::texture::{Kind, Mapping, TextureSet};
 use super::value::Rgb;
 use crate::layout::{self, *};
@@ -270,128 +255,13 @@ impl Materials {
             false => Err("bump_scale is not a finite number".into()),
         }
     }
-
-    /// Adds what an MTL block means (module documentation).
-    ///
-    /// # Errors
-    /// A sentence that names the statement at fault.
-    pub fn push_mtl(&mut self, mtl: &Mtl, warn: &mut Vec<String>) -> Result<u32, String> {
-        let color = |key: &str, or: f32| mtl.colors.get(key).copied().unwrap_or([or; 3]);
-        let mut m = Self::plain([0.0; 3]);
-        let named = |key: &str| format!("material \"{}\": {key}", mtl.name);
-        let textured = mtl.maps.contains_key("map_Kd");
-        let kd = match color("Kd", if textured { 1.0 } else { 0.6 }) {
-            [0.0, 0.0, 0.0] if textured => [1.0; 3],
-            kd => kd,
-        };
-        m.base_color = reflectance(kd, &named("Kd"), warn)?;
-        let ks = reflectance(color("Ks", f32::from(mtl.maps.contains_key("map_Ks"))), &named("Ks"), warn)?;
-        m.emission = radiance(color("Ke", f32::from(mtl.maps.contains_key("map_Ke"))))?;
-        m.opacity = mtl.numbers.get("d").copied().unwrap_or(1.0).clamp(0.0, 1.0);
-        let kind = mtl_kind(mtl, m.base_color, ks, m.opacity);
-        mtl_interface(&mut m, mtl, kind, ks, warn)?;
-        self.mtl_textures(&mut m, mtl, kind, warn);
-        let index = self.push(&mtl.name, m);
-        if m.bump_texture != NONE && mtl.maps.get("bump").is_some_and(|b| b.bump.is_none()) {
-            self.default_bumps.push(index);
-        }
-        Ok(index)
-    }
-
-    fn mtl_textures(&mut self, m: &mut layout::Material, mtl: &Mtl, kind: Type, warn: &mut Vec<String>) {
-        let textures = &mut self.textures;
-        let mut ask = |map: Option<&Map>, kind| match map {
-            Some(map) => textures.request(&mtl.directory, &map.file, kind, map.mapping, warn),
-            None => NONE,
-        };
-        match kind {
-            Type::Conductor => m.specular_texture = ask(mtl.maps.get("map_Kd"), Kind::Color),
-            Type::Mirror | Type::Dielectric => {}
-            Type::Diffuse => m.base_texture = ask(mtl.maps.get("map_Kd"), Kind::Color),
-            Type::Coated => {
-                m.base_texture = ask(mtl.maps.get("map_Kd"), Kind::Color);
-                m.specular_texture = ask(mtl.maps.get("map_Ks"), Kind::Color);
-            }
-        }
-        if kind != Type::Diffuse && mtl.maps.contains_key("map_Pr") {
-            m.roughness_texture = ask(mtl.maps.get("map_Pr"), Kind::Roughness);
-            m.alpha = mtl.numbers.get("Pr").map_or(1.0, |_| m.alpha);
-        }
-        if kind != Type::Dielectric {
-            m.opacity_texture = ask(mtl.maps.get("map_d"), Kind::Mask);
-        }
-        if m.emission != [0.0; 3] {
-            m.emission_texture = ask(mtl.maps.get("map_Ke"), Kind::Color);
-        }
-        let bump = mtl.maps.get("bump");
-        m.bump_texture = ask(mtl.maps.get("norm").or(bump), Kind::Data);
-        if m.bump_texture != NONE && mtl.maps.contains_key("norm") {
-            m.flags |= MATERIAL_NORMAL_MAP;
-        }
-        m.bump_scale = bump.and_then(|b| b.bump).unwrap_or(1.0);
-    }
-}
-
-/// Which of the rules of the module documentation applies.
-fn mtl_kind(mtl: &Mtl, kd: [f32; 3], ks: [f32; 3], d: f32) -> Type {
-    let number = |key: &str| mtl.numbers.get(key).copied();
-    let illum = number("illum").unwrap_or(2.0) as i32;
-    let black = kd == [0.0; 3] && !mtl.maps.contains_key("map_Kd");
-    let tinted_glass = d < 1.0 && mtl.colors.contains_key("Tf") && number("Ni").is_some_and(|n| n > 1.0);
-    match illum {
-        _ if number("Pm").is_some_and(|pm| pm >= 0.5) => Type::Conductor,
-        3 | 5 if black => Type::Mirror,
-        4 | 6 | 7 | 9 if !mtl.maps.contains_key("map_d") => Type::Dielectric,
-        _ if tinted_glass && !mtl.maps.contains_key("map_d") => Type::Dielectric,
-        0 | 1 => Type::Diffuse,
-        _ if ks != [0.0; 3] => Type::Coated,
-        _ => Type::Diffuse,
-    }
-}
-
-fn mtl_interface(
-    m: &mut layout::Material,
-    mtl: &Mtl,
-    kind: Type,
-    ks: [f32; 3],
-    warn: &mut Vec<String>,
-) -> Result<(), String> {
-    let number = |key: &str| mtl.numbers.get(key).copied();
-    let glossy = (2.0 / (number("Ns").unwrap_or(0.0).max(0.0) + 2.0)).sqrt();
-    let default = if matches!(kind, Type::Mirror | Type::Dielectric) { 0.0 } else { glossy };
-    m.alpha = number("Pr").map_or(default, |pr| pr.clamp(0.0, 1.0).powi(2));
-    let index = number("Ni").filter(|n| (0.1..=10.0).contains(n));
-    match kind {
-        Type::Diffuse => m.kind = BSDF_DIFFUSE,
-        Type::Conductor | Type::Mirror => {
-            m.kind = BSDF_CONDUCTOR;
-            (m.eta, m.k) = ([0.0; 3], [1.0; 3]);
-            let white = if ks == [0.0; 3] { [1.0; 3] } else { ks };
-            m.specular = if kind == Type::Mirror { white } else { m.base_color };
-            if kind == Type::Conductor && !mtl.maps.contains_key("map_Kd") {
-                let constants = m.base_color.map(fresnel::metal_from_reflectance);
-                (m.eta, m.k, m.specular) = (constants.map(|c| c.0), constants.map(|c| c.1), [1.0; 3]);
-            }
-        }
-        Type::Dielectric => {
-            m.kind = BSDF_DIELECTRIC;
-            m.eta = [index.unwrap_or(1.5); 3];
-            m.opacity = 1.0;
-            let tf = mtl.colors.get("Tf").copied().unwrap_or([1.0; 3]);
-            m.transmission = reflectance(tf, &format!("material \"{}\": Tf", mtl.name), warn)?;
-        }
-        Type::Coated => {
-            m.kind = BSDF_COATED;
-            let index = index.filter(|&n| n > 1.0).unwrap_or(1.5);
-            m.eta = [index; 3];
-            m.specular = ks.map(|ks| (ks / fresnel::normal_reflectance(index)).min(1.0));
-        }
-    }
-    Ok(())
 }
 
 /// A colour that must not exceed 1; more is clamped and said so.
-fn reflectance(color: [f32; 3], what: &str, warn: &mut Vec<String>) -> Result<[f32; 3], String> {
+///
+/// # Errors
+/// For one that is not finite.
+pub fn reflectance(color: [f32; 3], what: &str, warn: &mut Vec<String>) -> Result<[f32; 3], String> {
     if !color.iter().all(|v| v.is_finite()) {
         return Err(format!("{what} is not finite"));
     }
@@ -402,7 +272,11 @@ fn reflectance(color: [f32; 3], what: &str, warn: &mut Vec<String>) -> Result<[f
     Ok(clamped)
 }
 
-fn radiance(color: [f32; 3]) -> Result<[f32; 3], String> {
+/// A colour from 0 to 1e18.
+///
+/// # Errors
+/// With the colour, for another one.
+pub fn radiance(color: [f32; 3]) -> Result<[f32; 3], String> {
     match color.iter().all(|v| v.is_finite() && (0.0..=1e18).contains(v)) {
         true => Ok(color),
         false => Err(format!("emission {color:?} is negative, NaN or above 1e18")),

@@ -1,135 +1,33 @@
-//! OBJ files through tobj, behind a reader that repairs what tobj does not and knows the line of every mistake.
-use super::material::Materials;
-use super::mtl::{self, Mtl};
-use super::obj_lines::ObjLines;
-use super::polygon;
+//! OBJ files: statements become meshes line by line, so that every mistake has its line.
+use super::library::{self, Library};
+use super::lines::Lines;
+use super::obj_part::{Corner, NO_EXTRA, Part, PartBuilder};
 use crate::error::{Error, Result};
 use crate::image::input;
+use crate::layout::NONE;
 use crate::memory;
-use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap, HashSet};
-use std::io::{BufReader, Read};
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+
+/// What is read of a line, or what is wrong with it.
+type Checked<T> = std::result::Result<T, String>;
 
 /// A parsed OBJ file.
 #[derive(Debug, Default)]
-pub struct ObjFile {
-    /// Single-indexed triangle meshes; within one, either every corner has a normal (coordinate) or none has.
-    pub models: Vec<tobj::Model>,
-    /// Scene material of each model.
-    pub materials: Vec<u32>,
+pub struct ObjFile<'a> {
+    /// At least one. An object is split wherever its material changes, and where faces begin or cease to have normals
+    /// (texture coordinates); its parts follow each other.
+    pub parts: Vec<Part<'a>>,
     /// What is said when a mesh wears the file's own materials, and grey stands in for some.
     pub grey: Option<String>,
-}
-
-/// Names and indices of materials.
-type Named = Arc<[(String, u32)]>;
-
-/// Bytes that a material takes while it is read.
-const BYTES_OF_MATERIAL: u64 = 2048;
-
-/// What all OBJ files of a scene share.
-#[derive(Debug, Default)]
-pub struct Library {
-    /// The scene's materials so far.
-    pub materials: Materials,
-    /// `[[material]]` tables by name: they win over MTL materials.
-    pub tables: HashMap<String, u32>,
-    /// MTL files already read, by their one true path.
-    mtls: HashMap<PathBuf, Named>,
-    /// The grey of triangles without a material.
-    grey: Option<u32>,
-    /// What was repaired.
-    pub warnings: Vec<String>,
-}
-
-impl Library {
-    /// Index of the grey that stands in for missing materials.
-    pub fn grey(&mut self) -> u32 {
-        let materials = &mut self.materials;
-        *self.grey.get_or_insert_with(|| materials.push("(default)", Materials::plain([0.6; 3])))
-    }
-
-    /// The materials of an MTL file, read once however its path is written.
-    fn mtl(&mut self, path: &Path) -> Result<Named> {
-        let known = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-        if let Some(named) = self.mtls.get(&known) {
-            return Ok(named.clone());
-        }
-        let bytes = input::read_text(path, 4)?;
-        let text = String::from_utf8_lossy(&bytes);
-        memory::need(path.display(), BYTES_OF_MATERIAL * text.matches("newmtl").count() as u64)?;
-        let blocks = mtl::parse(path, &text)?;
-        let named: Named = blocks.iter().map(|b| Ok((b.name.clone(), self.block(path, b)?))).collect::<Result<_>>()?;
-        self.mtls.insert(known, named.clone());
-        Ok(named)
-    }
-
-    fn block(&mut self, path: &Path, block: &Mtl) -> Result<u32> {
-        if let Some(&index) = self.tables.get(&block.name) {
-            return Ok(index);
-        }
-        let place = || format!("material \"{}\"", block.name);
-        self.materials.push_mtl(block, &mut self.warnings).map_err(|what| Error::input_at(path, place(), what))
-    }
-}
-
-/// The files of an `mtllib` statement, one whose name may hold spaces or several, and the names of which there is none.
-fn libraries(obj: &Path, statement: &str) -> (Vec<PathBuf>, Vec<String>) {
-    let directory = obj.parent().unwrap_or(Path::new(""));
-    let written = statement.trim().replace('\\', "/");
-    let whole = mtl::find_file(directory, &written).map(|(path, _)| path);
-    if let Some(path) = whole {
-        return (vec![path], Vec::new());
-    }
-    let (mut found, mut missing) = (Vec::new(), Vec::new());
-    for file in split_files(&written) {
-        match mtl::find_file(directory, &file) {
-            Some((path, _)) => found.push(path),
-            None => missing.push(file),
-        }
-    }
-    (found, missing)
-}
-
-/// Words joined until one ends in `.mtl`.
-fn split_files(statement: &str) -> Vec<String> {
-    let mut files = vec![String::new()];
-    for word in statement.split_whitespace() {
-        let last = files.last_mut().expect("never empty");
-        if !last.is_empty() {
-            last.push(' ');
-        }
-        last.push_str(word);
-        if word.to_lowercase().ends_with(".mtl") {
-            files.push(String::new());
-        }
-    }
-    files.retain(|f| !f.is_empty());
-    files
-}
-
-/// Reads the MTL files named within an OBJ file's first 64 KiB. A file that cannot be opened is left to [`load`].
-///
-/// # Errors
-/// [`Error::Input`] for a malformed MTL file.
-pub fn read_libraries(path: &Path, library: &mut Library) -> Result<()> {
-    let Ok(file) = input::open(path) else { return Ok(()) };
-    let mut head = Vec::new();
-    let _ = file.take(1 << 16).read_to_end(&mut head); // what could be read is enough
-    let head = String::from_utf8_lossy(&head);
-    let statements: BTreeSet<_> = head.lines().filter_map(|l| l.trim_start().strip_prefix("mtllib ")).collect();
-    // One that is missing is reported when the whole file is read.
-    let found = statements.iter().flat_map(|statement| libraries(path, statement).0);
-    found.into_iter().try_for_each(|path| library.mtl(&path).map(|_| ()))
 }
 
 /// Reads an OBJ file and the MTL files it names.
 ///
 /// # Errors
-/// [`Error::Input`] with file, line, what is wrong and what to do.
-pub fn load(path: &Path, library: &mut Library) -> Result<ObjFile> {
+/// [`Error::Input`] with file, line, what is wrong and what to do; [`Error::Memory`].
+pub fn load(path: &Path, library: &mut Library) -> Result<ObjFile<'static>> {
     parse(path, BufReader::with_capacity(1 << 18, input::open(path)?), library)
 }
 
@@ -137,125 +35,277 @@ pub fn load(path: &Path, library: &mut Library) -> Result<ObjFile> {
 ///
 /// # Errors
 /// See [`load`].
-pub fn parse(path: &Path, reader: impl std::io::BufRead, library: &mut Library) -> Result<ObjFile> {
-    let mut lines = ObjLines::new(reader);
-    let served = RefCell::new(Served::default());
-    let shared = RefCell::new(&mut *library);
-    let loader = |statement: &Path| {
-        let named = served.borrow_mut().statement(path, &statement.to_string_lossy(), &mut shared.borrow_mut());
-        let blocks = named.iter().map(|n| tobj::Material { name: n.0.clone(), ..Default::default() }).collect();
-        Ok((blocks, named.into_iter().enumerate().map(|(i, n)| (n.0, i)).collect()))
-    };
-    let options = tobj::LoadOptions { single_index: true, triangulate: false, ignore_points: true, ignore_lines: true };
-    let outcome = tobj::load_obj_buf(&mut lines, &options, loader);
-    let served = served.into_inner();
-    if let Some(error) = served.failure {
-        return Err(error);
+pub fn parse(path: &Path, reader: impl BufRead, library: &mut Library) -> Result<ObjFile<'static>> {
+    let mut lines = Lines::new(reader);
+    let mut parser = Parser::new(path, library);
+    while let Some(line) =
+        lines.next().map_err(|(number, what)| Error::input_at(path, format!("line {number}"), what))?
+    {
+        parser.line = line.number;
+        parser.statement(&line.text)?;
+        parser.ask()?;
     }
-    if let Some(lack) = lines.lack {
-        return Err(Error::Memory(format!("{}, line {}: {lack}; split the file", path.display(), lines.line)));
-    }
-    let mut models = match (lines.error.take(), outcome) {
-        (Some((line, what)), _) => return Err(Error::input_at(path, format!("line {line}"), what)),
-        (None, Err(e)) => return Err(Error::input_at(path, format!("line {}", lines.line), remedy(e))),
-        (None, Ok((models, _))) => models,
-    };
-    for mesh in models.iter_mut().map(|m| &mut m.mesh).filter(|mesh| !mesh.face_arities.is_empty()) {
-        mesh.indices = polygon::triangulate(&mesh.positions, &mesh.face_arities, &mesh.indices);
-        mesh.face_arities.clear();
-    }
-    let index = |m: &tobj::Model| m.mesh.material_id.and_then(|i| served.found.get(i).copied());
-    if let (short @ 1.., line) = lines.short_faces {
-        let what = format!("{short} of fewer than three corners dropped, the first in line {line}");
-        library.warnings.push(format!("{}: faces repaired: {what}", path.display()));
-    }
-    let materials = models.iter().map(|m| index(m).unwrap_or_else(|| library.grey())).collect();
-    Ok(ObjFile { models, materials, grey: served.grey(path, &lines.worn) })
+    Ok(parser.finish())
 }
 
-/// What `mtllib` statements came to so far.
-#[derive(Default)]
-struct Served {
-    /// Statements, and the true paths of what they name: each is served once.
-    done: HashSet<PathBuf>,
+/// Estimated bytes that a parsed file takes before memory is asked for the first time.
+const UNASKED: u64 = 1 << 26;
+/// Bytes that a part takes, with its name, about. Those of the arrays below count twice: arrays double when they are full.
+const BYTES_OF_PART: u64 = 400;
+const BYTES_OF_VERTEX: u64 = 2 * (12 + 4);
+const BYTES_OF_CORNER: u64 = 2 * (12 + 12 + 8 + 16);
+const BYTES_OF_TRIANGLE: u64 = 2 * 12;
+
+struct Parser<'a> {
+    path: &'a Path,
+    library: &'a mut Library,
+    /// Number of the line that is read.
+    line: usize,
+    /// `v`, `vt` and `vn` so far.
+    positions: Vec<[f32; 3]>,
+    uvs: Vec<[f32; 2]>,
+    normals: Vec<[f32; 3]>,
+    parts: Vec<Part<'static>>,
+    part: PartBuilder,
+    corners: Vec<Corner>,
+    /// Materials by name: the scene file's own, and those of the libraries read so far.
+    names: HashMap<String, u32>,
+    /// Names after `usemtl`.
+    worn: BTreeSet<String>,
+    /// `mtllib` statements, and the true paths of what they name: each is read once.
+    statements: HashSet<String>,
+    libraries: HashSet<PathBuf>,
     /// Libraries that are nowhere.
     missing: BTreeSet<String>,
-    /// Scene materials in the order in which tobj numbers them.
-    found: Vec<u32>,
-    known: HashSet<String>,
-    failure: Option<Error>,
+    /// Faces of one or two corners, dropped: how many, and the line of the first.
+    short_faces: (usize, usize),
+    /// Bytes that what was read so far takes, about, and how many of them memory was asked for.
+    held: u64,
+    asked: u64,
 }
 
-impl Served {
-    /// The materials that a statement adds.
-    fn statement(&mut self, obj: &Path, statement: &str, library: &mut Library) -> Vec<(String, u32)> {
-        let named: Vec<_> = match statement {
-            ObjLines::<&[u8]>::TABLES => library.tables.iter().map(|(n, &i)| (n.clone(), i)).collect(),
-            _ if !self.done.insert(statement.into()) => Vec::new(),
-            _ => self.files(obj, statement, library).unwrap_or_else(|e| {
-                self.failure.get_or_insert(e);
-                Vec::new()
-            }),
-        };
-        self.found.extend(named.iter().map(|n| n.1));
-        self.known.extend(named.iter().map(|n| n.0.clone()));
-        named
+impl<'a> Parser<'a> {
+    fn new(path: &'a Path, library: &'a mut Library) -> Self {
+        Self {
+            path,
+            names: library.tables.clone(),
+            library,
+            line: 0,
+            positions: Vec::new(),
+            uvs: Vec::new(),
+            normals: Vec::new(),
+            parts: Vec::new(),
+            part: PartBuilder::default(),
+            corners: Vec::new(),
+            worn: BTreeSet::new(),
+            statements: HashSet::new(),
+            libraries: HashSet::new(),
+            missing: BTreeSet::new(),
+            short_faces: (0, 0),
+            held: 0,
+            asked: UNASKED,
+        }
     }
 
-    fn files(&mut self, obj: &Path, statement: &str, library: &mut Library) -> Result<Vec<(String, u32)>> {
-        let (found, missing) = libraries(obj, statement);
+    /// What a path tracer has no use for, lines and points among it, is passed over.
+    fn statement(&mut self, text: &str) -> Result<()> {
+        let text = text.trim_start();
+        let (key, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+        let outcome = match key {
+            "v" => self.vertex(rest),
+            "vt" => self.uv(rest),
+            "vn" => self.normal(rest),
+            "f" => self.face(rest),
+            "o" | "g" => {
+                self.end_part();
+                self.part.rename(rest.trim());
+                Ok(())
+            }
+            "usemtl" => self.wear(rest.trim()),
+            "mtllib" => return self.read_libraries(rest.trim()),
+            _ => Ok(()),
+        };
+        outcome.map_err(|what| Error::input_at(self.path, format!("line {}", self.line), what))
+    }
+
+    /// A fourth number is a weight that the others are divided by; five numbers or more end in a colour, which is dropped.
+    fn vertex(&mut self, rest: &str) -> Checked<()> {
+        let what = "a vertex needs three numbers after v";
+        let mut position = numbers(rest, what)?;
+        let mut more = rest.split_whitespace().skip(3);
+        if let (Some(w), None) = (more.next(), more.next()) {
+            let [w]: [f32; 1] = numbers(w, what)?;
+            if w == 0.0 {
+                return Err(mend("the fourth number of a vertex (w) is 0"));
+            }
+            position = position.map(|v: f32| v / w);
+        }
+        self.positions.push(position);
+        self.held += BYTES_OF_VERTEX;
+        Ok(())
+    }
+
+    fn uv(&mut self, rest: &str) -> Checked<()> {
+        self.uvs.push(numbers(rest, "a texture coordinate needs two numbers after vt")?);
+        self.held += 16;
+        Ok(())
+    }
+
+    fn normal(&mut self, rest: &str) -> Checked<()> {
+        self.normals.push(numbers(rest, "a normal needs three numbers after vn")?);
+        self.held += 24;
+        Ok(())
+    }
+
+    /// The corners of a face have the texture coordinates (normals) that all of them have, or none.
+    fn face(&mut self, rest: &str) -> Checked<()> {
+        self.corners.clear();
+        for word in rest.split_ascii_whitespace() {
+            let corner = self.corner(word)?;
+            self.corners.push(corner);
+        }
+        match self.corners.len() {
+            0 => return Err("the face names no vertices: delete the line".into()),
+            1 | 2 => {
+                let (count, first) = self.short_faces;
+                self.short_faces = (count + 1, if count == 0 { self.line } else { first });
+                return Ok(());
+            }
+            _ => {}
+        }
+        let has = [1, 2].map(|extra| self.corners.iter().all(|corner| corner[extra] != NO_EXTRA));
+        if self.part.differs(has) {
+            self.end_part();
+        }
+        let made = self.part.face(&self.corners, has, [&self.positions, &self.normals], &self.uvs);
+        self.held += BYTES_OF_TRIANGLE * (self.corners.len() as u64 - 2) + BYTES_OF_CORNER * made as u64;
+        Ok(())
+    }
+
+    /// The indices of `v/vt/vn`, from 0 on. Negative ones count back from the last one defined.
+    fn corner(&self, word: &str) -> Checked<Corner> {
+        const KINDS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
+        let defined = [self.positions.len(), self.uvs.len(), self.normals.len()];
+        let mut corner = [NO_EXTRA; 3];
+        for (i, part) in word.split('/').enumerate() {
+            if part.is_empty() && i > 0 {
+                continue;
+            }
+            let count = *defined.get(i).ok_or_else(|| format!("\"{word}\" has more than two slashes"))? as i64;
+            let index: i64 = part.parse().map_err(|_| format!("\"{word}\" is no vertex of a face"))?;
+            if index == 0 || index > count || index < -count {
+                let what = format!("the face uses {} {index}, but {count} are defined above it", KINDS[i]);
+                return Err(format!("{what}: export the file again"));
+            }
+            let place = if index > 0 { index - 1 } else { count + index };
+            corner[i] = u32::try_from(place).map_err(|_| "the file has more than 2^32 vertices: split it")?;
+        }
+        Ok(corner)
+    }
+
+    fn wear(&mut self, name: &str) -> Checked<()> {
+        if name.is_empty() {
+            return Err(mend("usemtl names no material"));
+        }
+        if !self.worn.contains(name) {
+            self.worn.insert(name.to_owned());
+        }
+        let material = self.names.get(name).copied().unwrap_or(NONE);
+        if self.part.material != material {
+            self.end_part();
+            self.part.material = material;
+        }
+        Ok(())
+    }
+
+    fn read_libraries(&mut self, statement: &str) -> Result<()> {
+        if !self.statements.insert(statement.to_owned()) {
+            return Ok(());
+        }
+        let (found, missing) = library::find(self.path, statement);
         self.missing.extend(missing);
-        let mut named = Vec::new();
         for path in found {
-            if self.done.insert(path.canonicalize().unwrap_or_else(|_| path.clone())) {
-                named.extend_from_slice(&library.mtl(&path)?);
+            if self.libraries.insert(path.canonicalize().unwrap_or_else(|_| path.clone())) {
+                self.names.extend(self.library.mtl(&path)?.iter().cloned());
             }
         }
-        Ok(named)
+        Ok(())
     }
 
-    /// What is said of the names in `worn` that are defined nowhere.
-    fn grey(&self, obj: &Path, worn: &BTreeSet<String>) -> Option<String> {
-        let unknown: Vec<&str> = worn.iter().filter(|name| !self.known.contains(*name)).map(String::as_str).collect();
-        let missing: Vec<&str> = self.missing.iter().map(String::as_str).collect();
-        let libraries = match missing.is_empty() {
+    /// What follows is another part, if this one has faces.
+    fn end_part(&mut self) {
+        if !self.part.is_empty() {
+            self.parts.push(self.part.take());
+            self.held += BYTES_OF_PART;
+        }
+    }
+
+    /// Asks for as much memory again whenever what is held has doubled.
+    fn ask(&mut self) -> Result<()> {
+        if self.held <= self.asked {
+            return Ok(());
+        }
+        self.asked = 2 * self.held;
+        let about =
+            |lack| Error::Memory(format!("{}, line {}: {lack}; split the file", self.path.display(), self.line));
+        memory::check(self.held).map_err(about)
+    }
+
+    /// The last part is kept even without faces: a file has at least one.
+    fn finish(mut self) -> ObjFile<'static> {
+        self.parts.push(self.part.take());
+        if let (short @ 1.., line) = self.short_faces {
+            let what = format!("{short} of fewer than three corners dropped, the first in line {line}");
+            self.library.warnings.push(format!("{}: faces repaired: {what}", self.path.display()));
+        }
+        for part in self.parts.iter_mut().filter(|part| part.material == NONE) {
+            part.material = self.library.grey();
+        }
+        ObjFile { grey: self.grey(), parts: self.parts }
+    }
+
+    /// What is said of the names that are worn and defined nowhere.
+    fn grey(&self) -> Option<String> {
+        let unknown: Vec<_> = self.worn.iter().filter(|name| !self.names.contains_key(*name)).collect();
+        let libraries = match self.missing.is_empty() {
             true => String::new(),
-            false => format!(" (no such library: {})", few(&missing)),
+            false => format!(" (no such library: {})", few(&self.missing.iter().collect::<Vec<_>>())),
         };
         let what = || format!("grey is used for materials defined nowhere: {}{libraries}", few(&unknown));
-        (!unknown.is_empty()).then(|| format!("{}: {}", obj.display(), what()))
+        (!unknown.is_empty()).then(|| format!("{}: {}", self.path.display(), what()))
     }
+}
+
+/// The first numbers of a statement.
+fn numbers<const N: usize>(rest: &str, what: &str) -> Checked<[f32; N]> {
+    let (mut words, mut found) = (rest.split_whitespace(), [0.0; N]);
+    for number in &mut found {
+        *number = words.next().and_then(|word| word.parse().ok()).ok_or_else(|| mend(what))?;
+    }
+    Ok(found)
+}
+
+fn mend(what: &str) -> String {
+    format!("{what}: mend the line or export the file again")
 }
 
 /// The first names of a list, and how many more there are.
-fn few(names: &[&str]) -> String {
+fn few(names: &[&String]) -> String {
+    let shown: Vec<&str> = names.iter().take(8).map(|name| name.as_str()).collect();
     match names.len() {
-        0..=8 => names.join(", "),
-        n => format!("{} and {} more", names[..8].join(", "), n - 8),
+        0..=8 => shown.join(", "),
+        n => format!("{} and {} more", shown.join(", "), n - 8),
     }
-}
-
-fn remedy(error: tobj::LoadError) -> String {
-    use tobj::LoadError as E;
-    let what = match error {
-        E::PositionParseError => "a vertex needs three numbers after v",
-        E::ScalingByZeroError => "the fourth number of a vertex (w) is 0",
-        E::NormalParseError => "a normal needs three numbers after vn",
-        E::TexcoordParseError => "a texture coordinate needs two numbers after vt",
-        E::MaterialParseError => "usemtl names no material",
-        E::ReadError => "the file could not be read to its end",
-        _ => return format!("{error}: export the file again"),
-    };
-    format!("{what}: mend the line or export the file again")
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::material::Materials;
     use super::*;
 
     const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n";
 
-    fn read(text: &str) -> Result<ObjFile> {
+    fn read(text: &str) -> Result<ObjFile<'static>> {
         parse(Path::new("a.obj"), format!("{SQUARE}{text}").as_bytes(), &mut Library::default())
     }
 
@@ -266,13 +316,13 @@ mod tests {
     #[test]
     fn polygons_become_fans_and_negative_indices_count_back() {
         let quad = read("f -4 -3 -2 -1").unwrap();
-        assert_eq!(quad.models[0].mesh.indices, [0, 1, 2, 0, 2, 3]);
-        assert_eq!(quad.models[0].mesh.positions[..6], [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+        assert_eq!(quad.parts[0].mesh.indices, [0, 1, 2, 0, 2, 3]);
+        assert_eq!(quad.parts[0].mesh.positions[..2], [[0.0; 3], [1.0, 0.0, 0.0]]);
         let penta = read("v 0.5 2 0\nf 1 2 3 5 4").unwrap();
-        assert_eq!(penta.models[0].mesh.indices.len(), 9);
+        assert_eq!(penta.parts[0].mesh.indices.len(), 9);
         let marked = parse(Path::new("a.obj"), format!("\u{feff}{SQUARE}f 1 2 4").as_bytes(), &mut Library::default());
-        assert_eq!(marked.unwrap().models[0].mesh.indices.len(), 3, "a byte order mark is no part of the first line");
-        assert!(read("l 1 2\np 1").unwrap().models.iter().all(|m| m.mesh.indices.is_empty()));
+        assert_eq!(marked.unwrap().parts[0].mesh.indices.len(), 3, "a byte order mark is no part of the first line");
+        assert!(read("l 1 2\np 1").unwrap().parts.iter().all(|m| m.mesh.indices.is_empty()));
     }
 
     #[test]
@@ -280,7 +330,7 @@ mod tests {
         let warnings = |text: &str| {
             let mut library = Library::default();
             let file = parse(Path::new("a.obj"), format!("{SQUARE}{text}").as_bytes(), &mut library).unwrap();
-            assert_eq!(file.models.iter().map(|m| m.mesh.indices.len()).sum::<usize>(), 3, "the whole face is kept");
+            assert_eq!(file.parts.iter().map(|m| m.mesh.indices.len()).sum::<usize>(), 3, "the whole face is kept");
             library.warnings
         };
         let said = "a.obj: faces repaired: 2 of fewer than three corners dropped, the first in line 11";
@@ -292,15 +342,15 @@ mod tests {
     fn corners_with_and_without_normals_stay_apart() {
         let file = read("o box\nf 1//1 2//1 3//1\nf 1 3 4\nf 1/1/1 2/2/1 3/3/1\nf 1/1 2 3").unwrap();
         let shape: Vec<_> =
-            file.models.iter().map(|m| (m.name.as_str(), m.mesh.normals.len(), m.mesh.texcoords.len())).collect();
-        assert_eq!(shape, [("box", 9, 0), ("box", 0, 0), ("box", 9, 6), ("box", 0, 0)]);
+            file.parts.iter().map(|m| (m.name.as_str(), m.mesh.normals.len(), m.mesh.uvs.len())).collect();
+        assert_eq!(shape, [("box", 3, 0), ("box", 0, 0), ("box", 3, 3), ("box", 0, 0)]);
     }
 
     #[test]
     fn lines_may_continue_and_carry_colours_or_foreign_letters() {
         let bytes = [SQUARE.as_bytes(), b"# caf\xe9\nv 9 9 9 1 0 0\nf 1 2 \\\n 3\n"].concat();
         let file = parse(Path::new("a.obj"), &bytes[..], &mut Library::default()).unwrap();
-        assert_eq!(file.models[0].mesh.indices.len(), 3);
+        assert_eq!(file.parts[0].mesh.indices.len(), 3);
     }
 
     #[test]
@@ -327,7 +377,7 @@ mod tests {
         library.tables.insert("red".into(), red);
         let text = format!("mtllib none.mtl\n{SQUARE}usemtl red\nf 1 2 3\nusemtl what\nf 1 2 3");
         let file = parse(Path::new("a.obj"), text.as_bytes(), &mut library).unwrap();
-        assert_eq!(file.materials, [red, library.grey()]);
+        assert_eq!([0, 1].map(|i: usize| file.parts[i].material), [red, library.grey()]);
         let said = file.grey.unwrap();
         assert!(said.ends_with("defined nowhere: what (no such library: none.mtl)"), "{said}");
     }
@@ -340,7 +390,8 @@ mod tests {
         let text = format!("mtllib one a.mtl two.mtl\n{SQUARE}usemtl b c\nf 1 2 3\nusemtl a\nf 1 2 3");
         let mut library = Library::default();
         let file = parse(&dir.path().join("x.obj"), text.as_bytes(), &mut library).unwrap();
-        let colors: Vec<_> = file.materials.iter().map(|&i| library.materials.list[i as usize].base_color).collect();
+        let colors: Vec<_> =
+            file.parts.iter().map(|p| library.materials.list[p.material as usize].base_color).collect();
         assert_eq!((colors, library.warnings.len()), (vec![[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]], 0));
     }
 }

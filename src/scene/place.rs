@@ -3,11 +3,13 @@ use super::assemble::Assembly;
 use super::description::{self, Mesh, MeshTable};
 use super::geometry::{Corners, Geometry, Placement, Repairs, Tag, TooFar};
 use super::obj::ObjFile;
+use super::obj_part::Part;
 use super::shape::Shape;
 use crate::error::{Error, Result};
 use crate::layout::{Instance, MATERIAL_MASKED, Material, NONE};
 use crate::memory;
-use glam::{DAffine3, DMat3, Vec2, Vec3};
+use glam::{DAffine3, DMat3};
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::path::PathBuf;
 
@@ -58,7 +60,7 @@ pub fn instance(affine: &DAffine3, root: u32) -> Instance {
     Instance { world0, world1, world2, object0, object1, object2, root, material: NONE, object: 0, mirrored }
 }
 
-impl Assembly<'_> {
+impl<'a> Assembly<'a> {
     /// Sorts meshes into baked and stored ones.
     ///
     /// # Errors
@@ -155,7 +157,7 @@ impl Assembly<'_> {
             match (self.override_of(&job)?, self.file_of(&self.description.mesh[mesh]).and_then(|p| self.files.get(&p)))
             {
                 (Some(index), _) => textured(index),
-                (None, Some(file)) => file.materials.iter().any(|&i| textured(i)),
+                (None, Some(file)) => file.parts.iter().any(|part| textured(part.material)),
                 (None, None) => false,
             },
         )
@@ -190,16 +192,16 @@ impl Assembly<'_> {
         if job.exact { 1 } else { triangles(table, self.file_of(table).and_then(|path| self.files.get(&path))) }
     }
 
-    /// The parsed file, taken out of the store, or a shape, or a copy of what is in memory.
-    fn take_source(&mut self, job: &Job) -> ObjFile {
+    /// The parsed file, taken out of the store, or a shape, or what is in memory.
+    fn take_source(&mut self, job: &Job) -> ObjFile<'a> {
         let table = &self.description.mesh[job.mesh];
         if let Some(file) = self.file_of(table).and_then(|path| self.files.remove(&path)) {
             return file;
         }
-        let shape = || table.shape.filter(|_| !job.exact).map(|s| s.mesh(segments(table)));
-        let mesh = table.data.as_ref().map(Mesh::to_tobj).or_else(shape).unwrap_or_default();
-        let models = vec![tobj::Model { mesh, name: String::new() }];
-        ObjFile { models, materials: vec![self.library.grey()], grey: None }
+        let shape = || table.shape.filter(|_| !job.exact).map(|s| Cow::Owned(s.mesh(segments(table))));
+        let mesh = table.data.as_ref().map(Cow::Borrowed).or_else(shape).unwrap_or_default();
+        let part = Part { name: String::new(), material: self.library.grey(), mesh };
+        ObjFile { parts: vec![part], grey: None }
     }
 
     /// Adds a mesh's triangles; their object indices count from `first` on. Returns the names of its objects. The file
@@ -212,8 +214,8 @@ impl Assembly<'_> {
         let material = self.override_of(job)?;
         let file = self.take_source(job);
         let place = format!("mesh \"{}\"", mesh_name(table));
-        if let Some(group) = table.group.as_ref().filter(|g| !file.models.iter().any(|m| m.name == **g)) {
-            let near = description::nearest(group, file.models.iter().map(|m| m.name.as_str())).unwrap_or("(none)");
+        if let Some(group) = table.group.as_ref().filter(|g| !file.parts.iter().any(|m| m.name == **g)) {
+            let near = description::nearest(group, file.parts.iter().map(|m| m.name.as_str())).unwrap_or("(none)");
             return Err(self.at(place, format!("no group \"{group}\": did you mean \"{near}\"?")));
         }
         let before = self.geometry.triangles.len();
@@ -223,7 +225,7 @@ impl Assembly<'_> {
             memory::reserve(&place, &mut self.geometry.shading, more)?;
         }
         let mut repairs = Repairs::default();
-        let objects = self.add_models(table, &file, job, material, first, &mut repairs);
+        let objects = self.add_parts(table, &file, job, material, first, &mut repairs);
         let objects = objects.map_err(|TooFar(v)| {
             self.at(&place, format!("has a coordinate of {v:e}: the limit is {:e}", super::MAX_COORDINATE))
         })?;
@@ -243,11 +245,11 @@ impl Assembly<'_> {
         Ok(objects)
     }
 
-    /// tobj splits an object at every change of material; the parts keep one name and one index.
-    fn add_models(
+    /// Parts of one object follow each other; they have one name and one index.
+    fn add_parts(
         &mut self,
         table: &MeshTable,
-        file: &ObjFile,
+        file: &ObjFile<'_>,
         job: &Job,
         material: Option<u32>,
         first: u32,
@@ -258,30 +260,30 @@ impl Assembly<'_> {
         let meant = table.data.as_ref().is_some_and(|mesh| mesh.normals.is_empty());
         let at = Placement { affine: job.affine, flat: table.flat || meant, flip: table.flip_normals, uvs };
         let (mut names, mut previous, mut primitive) = (Vec::new(), None, 0);
-        for (model, &own) in file.models.iter().zip(&file.materials) {
-            if table.group.as_ref().is_none_or(|g| *g == model.name) {
-                if previous != Some(&model.name) {
-                    names.push(object_name(&mesh_name(table), &model.name));
-                    previous = Some(&model.name);
+        for part in &file.parts {
+            if table.group.as_ref().is_none_or(|g| *g == part.name) {
+                if previous != Some(&part.name) {
+                    names.push(object_name(&mesh_name(table), &part.name));
+                    previous = Some(&part.name);
                 }
                 let object = first + names.len() as u32 - 1;
-                let tag = Tag { primitive, material: material.unwrap_or(own), object };
+                let tag = Tag { primitive, material: material.unwrap_or(part.material), object };
                 match job.exact {
                     true => self.geometry.push_sphere(tag, &at, repairs)?,
-                    false => add_model(&mut self.geometry, &model.mesh, tag, &at, repairs)?,
+                    false => add_mesh(&mut self.geometry, &part.mesh, tag, &at, repairs)?,
                 }
             }
-            primitive += (model.mesh.indices.len() / 3) as u32;
+            primitive += part.mesh.triangles() as u32;
         }
         Ok(names)
     }
 }
 
 fn triangles(table: &MeshTable, file: Option<&ObjFile>) -> u64 {
-    let worn = |m: &&tobj::Model| table.group.as_ref().is_none_or(|g| *g == m.name);
-    let of_file = |file: &ObjFile| file.models.iter().filter(worn).map(|m| m.mesh.indices.len() as u64 / 3).sum();
+    let worn = |part: &&Part| table.group.as_ref().is_none_or(|g| *g == part.name);
+    let of_file = |file: &ObjFile| file.parts.iter().filter(worn).map(|part| part.mesh.triangles() as u64).sum();
     match (&table.data, table.shape, file) {
-        (Some(mesh), ..) => mesh.indices.len() as u64 / 3,
+        (Some(mesh), ..) => mesh.triangles() as u64,
         (_, Some(shape), _) => shape.triangles(segments(table)),
         (.., file) => file.map_or(0, of_file),
     }
@@ -308,24 +310,21 @@ fn object_name(mesh: &str, object: &str) -> String {
     if object.is_empty() || object == "unnamed_object" { mesh.to_owned() } else { format!("{mesh}/{object}") }
 }
 
-fn add_model(
+fn add_mesh(
     geometry: &mut Geometry,
-    mesh: &tobj::Mesh,
+    mesh: &Mesh,
     first: Tag,
     at: &Placement,
     repairs: &mut Repairs,
 ) -> std::result::Result<(), TooFar> {
-    let vec3 = |from: &[f32], i: u32| Vec3::from_slice(&from[3 * i as usize..]);
-    for (t, corners) in mesh.indices.chunks_exact(3).enumerate() {
-        let corners = [corners[0], corners[1], corners[2]];
+    for (t, corners) in (0..).zip(mesh.indices.as_chunks().0) {
+        let corners: [usize; 3] = corners.map(|i| i as usize);
         let c = Corners {
-            p: corners.map(|i| vec3(&mesh.positions, i)),
-            n: (!mesh.normals.is_empty()).then(|| corners.map(|i| vec3(&mesh.normals, i))),
-            uv: (!mesh.texcoords.is_empty())
-                .then(|| corners.map(|i| Vec2::from_slice(&mesh.texcoords[2 * i as usize..]))),
+            p: corners.map(|i| mesh.positions[i].into()),
+            n: (!mesh.normals.is_empty()).then(|| corners.map(|i| mesh.normals[i].into())),
+            uv: (!mesh.uvs.is_empty()).then(|| corners.map(|i| mesh.uvs[i].into())),
         };
-        let tag = Tag { primitive: first.primitive + t as u32, ..first };
-        geometry.push(&c, tag, at, repairs)?;
+        geometry.push(&c, Tag { primitive: first.primitive + t, ..first }, at, repairs)?;
     }
     Ok(())
 }
