@@ -18,7 +18,7 @@ pub struct Mesh {
 impl Mesh {
     /// # Errors
     /// A sentence that says what does not fit together.
-    pub(super) fn check(&self) -> Result<(), String> {
+    pub(in crate::scene) fn check(&self) -> Result<(), String> {
         let vertices = self.positions.len();
         let extras = [("normals", self.normals.len()), ("uvs", self.uvs.len())];
         if let Some((name, count)) = extras.iter().find(|(_, count)| ![0, vertices].contains(count)) {
@@ -34,7 +34,7 @@ impl Mesh {
     }
 
     /// How many it has.
-    pub(super) fn triangles(&self) -> usize {
+    pub(in crate::scene) fn triangles(&self) -> usize {
         self.indices.len() / 3
     }
 }

@@ -1,8 +1,8 @@
 //! A part of an OBJ file in the making: corners that name positions, texture coordinates and normals apart become vertices
 //! that have all three.
-use super::mesh::Mesh;
-use super::polygon::Triangulator;
+use super::triangulate::Triangulator;
 use crate::layout::NONE;
+use crate::scene::description::mesh::Mesh;
 use std::borrow::Cow;
 
 /// Triangles of one object and one material.

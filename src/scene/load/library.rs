@@ -1,4 +1,5 @@
 //! The materials that the OBJ files of a scene share, and the MTL files that define them.
+use super::find::find_file;
 use super::material::Materials;
 use super::mtl::{self, Mtl};
 use crate::error::{Error, Result};
@@ -84,13 +85,13 @@ impl Library {
 pub fn find(obj: &Path, statement: &str) -> (Vec<PathBuf>, Vec<String>) {
     let directory = obj.parent().unwrap_or(Path::new(""));
     let written = statement.trim().replace('\\', "/");
-    let whole = mtl::find_file(directory, &written).map(|(path, _)| path);
+    let whole = find_file(directory, &written).map(|(path, _)| path);
     if let Some(path) = whole {
         return (vec![path], Vec::new());
     }
     let (mut found, mut missing) = (Vec::new(), Vec::new());
     for file in split_files(&written) {
-        match mtl::find_file(directory, &file) {
+        match find_file(directory, &file) {
             Some((path, _)) => found.push(path),
             None => missing.push(file),
         }

@@ -11,11 +11,12 @@
 //! Roughness: alpha = Pr^2; without Pr, sqrt(2 / (Ns + 2)) for coats and conductors, and smooth for 2 and 3.
 //! d (or 1 - Tr) and map_d are opacity except on dielectrics. `norm` wins over a bump map. Bump heights are `-bm` world
 //! units; without -bm, 0.0005 of the scene's diagonal. A black Kd under a map_Kd counts as white.
-use super::fresnel;
-use super::material::{Materials, Type, radiance, reflectance};
+use super::material::{Materials, radiance, reflectance};
+use super::metal;
 use super::mtl::{Map, Mtl, map};
 use super::texture::Kind;
 use crate::layout::{BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE, MATERIAL_NORMAL_MAP, Material, NONE};
+use crate::scene::description::material::Type;
 
 impl Materials {
     /// Adds what an MTL block means (module documentation).
@@ -116,7 +117,7 @@ fn mtl_interface(m: &mut Material, mtl: &Mtl, kind: Type, ks: [f32; 3], warn: &m
             let white = if ks == [0.0; 3] { [1.0; 3] } else { ks };
             m.specular = if kind == Type::Mirror { white } else { m.base_color };
             if kind == Type::Conductor && mtl.block.diffuse_texture.is_none() {
-                let constants = m.base_color.map(fresnel::metal_from_reflectance);
+                let constants = m.base_color.map(metal::metal_from_reflectance);
                 (m.eta, m.k, m.specular) = (constants.map(|c| c.0), constants.map(|c| c.1), [1.0; 3]);
             }
         }
@@ -131,7 +132,7 @@ fn mtl_interface(m: &mut Material, mtl: &Mtl, kind: Type, ks: [f32; 3], warn: &m
             m.kind = BSDF_COATED;
             let index = index.filter(|&n| n > 1.0).unwrap_or(1.5);
             m.eta = [index; 3];
-            m.specular = ks.map(|ks| (ks / fresnel::normal_reflectance(index)).min(1.0));
+            m.specular = ks.map(|ks| (ks / metal::normal_reflectance(index)).min(1.0));
         }
     }
     Ok(())

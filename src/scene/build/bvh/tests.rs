@@ -141,7 +141,7 @@ fn instances_are_found_through_the_top_level() {
     let places: Vec<_> = (0..40).map(|_| DAffine3::from_scale(random.point() * 0.2)).collect();
     let mut instances: Vec<_> = places
         .iter()
-        .map(|a| crate::scene::place::instance(&(DAffine3::from_translation(random.point()) * *a), root))
+        .map(|a| crate::scene::build::hierarchy::instance(&(DAffine3::from_translation(random.point()) * *a), root))
         .collect();
     let top = build_top(&mut instances, &vec![object; 40], &mut nodes);
     for _ in 0..300 {
@@ -219,7 +219,7 @@ fn coincident_instances_make_a_flat_tree() {
     let mut geometry = random_geometry(9, 0.5, &mut random);
     let mut nodes = Vec::new();
     let root = build_mesh(&mut geometry, 0..9, &mut nodes);
-    let mut instances = vec![crate::scene::place::instance(&DAffine3::IDENTITY, root); 50_000];
+    let mut instances = vec![crate::scene::build::hierarchy::instance(&DAffine3::IDENTITY, root); 50_000];
     let object = bounds(&geometry.triangles).unwrap();
     let top = build_top(&mut instances, &vec![object; 50_000], &mut nodes);
     assert!(stack_size(&nodes, top, &instances) <= TRAVERSAL_STACK);
@@ -240,7 +240,7 @@ fn a_fan_makes_a_flat_tree() {
     }));
     let (nodes, root) = builds_flat(&mut geometry);
     assert_eq!(compare(&geometry, &nodes, root, 0..2500, &mut random), 0);
-    let mut instances = vec![crate::scene::place::instance(&DAffine3::IDENTITY, root); 2000];
+    let mut instances = vec![crate::scene::build::hierarchy::instance(&DAffine3::IDENTITY, root); 2000];
     let nested: Vec<_> = (1..=2000).map(|i| [[0.0; 3], [i as f32, 1.0, 1.0]]).collect();
     let mut nodes = nodes;
     let top = build_top(&mut instances, &nested, &mut nodes);

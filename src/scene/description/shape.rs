@@ -19,7 +19,7 @@ pub enum Shape {
 
 impl Shape {
     /// How many triangles [`Self::mesh`] returns.
-    pub(super) fn triangles(self, segments: u32) -> u64 {
+    pub(in crate::scene) fn triangles(self, segments: u32) -> u64 {
         let n = u64::from(segments);
         match self {
             Self::Sphere => 2 * n * (n.div_ceil(2).max(2) - 1),
@@ -30,7 +30,7 @@ impl Shape {
     }
 
     /// Triangles of the shape; `segments` around, at least 3 (sphere: half as many from pole to pole).
-    pub(super) fn mesh(self, segments: u32) -> Mesh {
+    pub(in crate::scene) fn mesh(self, segments: u32) -> Mesh {
         match self {
             Self::Sphere => sphere(segments),
             Self::Rectangle => rectangle(),

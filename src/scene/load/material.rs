@@ -1,19 +1,16 @@
 //! Materials: what the `[[material]]` tables say.
-use super::coat::coat_table;
-use super::effects::SMOOTH;
-use super::fresnel;
+use super::metal;
 use super::texture::{Kind, Mapping, TextureSet};
-use super::value::Rgb;
-use crate::layout::{self, *};
-use serde::Deserialize;
-use std::collections::HashMap;
+use crate::layout::*;
+use crate::scene::description::material::{Distribution, MaterialTable, Type};
+use crate::scene::description::value::Rgb;
 use std::path::{Path, PathBuf};
 
 /// The materials of a scene and the textures they ask for.
 #[derive(Debug, Default)]
 pub struct Materials {
     /// As kernels read them.
-    pub list: Vec<layout::Material>,
+    pub list: Vec<Material>,
     /// Same order.
     pub names: Vec<String>,
     /// Asked for so far.
@@ -22,91 +19,10 @@ pub struct Materials {
     pub default_bumps: Vec<u32>,
 }
 
-/// What a material reflects like.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Type {
-    /// Lambertian.
-    #[default]
-    Diffuse,
-    /// Microfacet metal.
-    Conductor,
-    /// Microfacet glass.
-    Dielectric,
-    /// A conductor of eta 0, k 1, whose Fresnel reflectance is 1 at every angle, tinted by `color`.
-    Mirror,
-    /// Diffuse base under a dielectric coat.
-    Coated,
-}
-
-/// Microfacet distribution.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Distribution {
-    /// Beckmann.
-    #[default]
-    Beckmann,
-    /// GGX (Trowbridge-Reitz).
-    Ggx,
-}
-
-/// A `[[material]]` table. Colours are linear Rec. 709, one number or `[r, g, b]`; files are relative to the scene file.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct MaterialTable {
-    /// What meshes and OBJ files call it; replaces an MTL material of that name.
-    pub name: String,
-    /// Default diffuse.
-    #[serde(rename = "type")]
-    pub kind: Type,
-    /// Albedo, or the tint of a mirror or conductor; default 0.5 (diffuse, coated without texture), else 1.
-    pub color: Option<Rgb>,
-    /// sRGB picture, multiplies `color`.
-    pub color_texture: Option<PathBuf>,
-    /// Microfacet roughness in [0, 1]; below 0.01 smooth; default 0.
-    pub alpha: f32,
-    /// Default Beckmann.
-    pub distribution: Distribution,
-    /// Conductor: index of refraction.
-    pub eta: Option<Rgb>,
-    /// Conductor: extinction.
-    pub k: Option<Rgb>,
-    /// Conductor: eta and k by name.
-    pub metal: Option<String>,
-    /// Dielectric and coat: interior over exterior index; default 1.5.
-    pub ior: Option<f32>,
-    /// Tint of specular reflection; default 1.
-    pub specular: Option<Rgb>,
-    /// sRGB picture, multiplies `specular`.
-    pub specular_texture: Option<PathBuf>,
-    /// Tint of transmission; default 1.
-    pub transmission: Option<Rgb>,
-    /// Radiance of the front side, W/(m^2 sr).
-    pub emission: Option<Rgb>,
-    /// sRGB picture, multiplies `emission` (default then 1).
-    pub emission_texture: Option<PathBuf>,
-    /// In [0, 1]; default 1.
-    pub opacity: Option<f32>,
-    /// Mask: its alpha channel, or its red channel where it has none.
-    pub opacity_texture: Option<PathBuf>,
-    /// Height map.
-    pub bump: Option<PathBuf>,
-    /// World units per unit of the height map; default 1.
-    pub bump_scale: Option<f32>,
-    /// Tangent-space normal map, instead of `bump`.
-    pub normal_map: Option<PathBuf>,
-    /// Perceptual roughness (root of alpha) in its green channel; multiplies the root of `alpha` (default then 1).
-    pub roughness_texture: Option<PathBuf>,
-    /// Default true.
-    pub two_sided: Option<bool>,
-    /// Coated: light that is reflected below the coat takes on the base's colour each time; default false.
-    pub nonlinear: bool,
-}
-
 impl Materials {
     /// A diffuse grey with nothing else on.
-    pub fn plain(color: [f32; 3]) -> layout::Material {
-        layout::Material {
+    pub fn plain(color: [f32; 3]) -> Material {
+        Material {
             base_color: color,
             kind: BSDF_DIFFUSE,
             opacity: 1.0,
@@ -121,15 +37,12 @@ impl Materials {
             bump_texture: NONE,
             roughness_texture: NONE,
             emission_texture: NONE,
-            ..layout::Material::default()
+            ..Material::default()
         }
     }
 
     /// Adds a finished material and returns its index.
-    pub fn push(&mut self, name: &str, mut material: layout::Material) -> u32 {
-        if material.kind == BSDF_COATED {
-            material.internal_fresnel = fresnel::mean_internal(material.eta[0]);
-        }
+    pub fn push(&mut self, name: &str, mut material: Material) -> u32 {
         let masked = material.opacity < 1.0 || material.opacity_texture != NONE;
         if masked && material.kind != BSDF_DIELECTRIC {
             material.flags |= MATERIAL_MASKED;
@@ -137,19 +50,6 @@ impl Materials {
         self.list.push(material);
         self.names.push(name.to_owned());
         self.list.len() as u32 - 1
-    }
-
-    /// Adds what rough coats reflect to the words of the textures: a table for each index and distribution.
-    pub fn add_coat_tables(materials: &mut [layout::Material], texels: &mut Vec<u32>) {
-        let mut tables = HashMap::new();
-        for m in materials.iter_mut().filter(|m| m.kind == BSDF_COATED && m.alpha >= SMOOTH) {
-            let ggx = m.flags & MATERIAL_GGX != 0;
-            m.coat_table = *tables.entry((m.eta[0].to_bits(), ggx)).or_insert_with(|| {
-                let first = texels.len() as u32;
-                texels.extend(coat_table(m.eta[0], ggx).into_iter().map(f32::to_bits));
-                first
-            });
-        }
     }
 
     /// Adds a `[[material]]`.
@@ -188,7 +88,7 @@ impl Materials {
         Ok(self.push(&t.name, m))
     }
 
-    fn interface(&self, m: &mut layout::Material, t: &MaterialTable) -> Result<(), String> {
+    fn interface(&self, m: &mut Material, t: &MaterialTable) -> Result<(), String> {
         let ior = t.ior.unwrap_or(1.5);
         if !(0.1..=10.0).contains(&ior) {
             return Err(format!("ior is {ior}: choose a value from 0.1 to 10"));
@@ -205,7 +105,7 @@ impl Materials {
         }
         if t.kind == Type::Conductor {
             if let Some(name) = &t.metal {
-                (m.eta, m.k) = fresnel::metal(name)?;
+                (m.eta, m.k) = metal::metal(name)?;
             } else if t.eta.is_some() || t.k.is_some() {
                 (m.eta, m.k) = (t.eta.map_or([1.0; 3], |v| v.0), t.k.map_or([0.0; 3], |v| v.0));
             }
@@ -218,7 +118,7 @@ impl Materials {
 
     fn table_textures(
         &mut self,
-        m: &mut layout::Material,
+        m: &mut Material,
         t: &MaterialTable,
         body: bool,
         directory: &Path,

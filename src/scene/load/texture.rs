@@ -1,10 +1,10 @@
 //! Pictures to RGBA8 texels, decoded on all cores straight into the one texel array.
-use super::mesh::Bitmap;
-use super::mtl::find_file;
+use super::find::find_file;
 use crate::error::{Error, Result};
 use crate::image::{BAND, bands, check_end, contained, input, picture, picture_claim};
 use crate::layout::{NONE, TEXTURE_CLAMP, TEXTURE_SRGB, Texture};
 use crate::memory;
+use crate::scene::description::mesh::Bitmap;
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
