@@ -120,17 +120,13 @@ mod tests {
 
     #[test]
     fn random_stars_keep_their_area() {
-        let mut state = 1u64;
-        let mut unit = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        };
+        let mut random = fastrand::Rng::with_seed(1);
         for n in 4..60 {
             let point = |i: usize, r: f64| {
                 let angle = std::f64::consts::TAU * i as f64 / n as f64;
                 (r * angle.cos(), r * angle.sin())
             };
-            let points: Vec<_> = (0..n).map(|i| point(i, 0.1 + unit())).collect();
+            let points: Vec<_> = (0..n).map(|i| point(i, 0.1 + random.f64())).collect();
             let exact = (0..n).map(|i| (points[i], points[(i + 1) % n])).map(|(a, b)| 0.5 * (a.0 * b.1 - a.1 * b.0));
             let exact: f64 = exact.sum();
             let (positions, normal) = placed(&points, DVec3::Y, DVec3::Z);
