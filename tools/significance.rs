@@ -121,13 +121,9 @@ mod tests {
 
     /// Grey 0.5 with noise of standard error 0.01 in every pixel, all channels alike.
     fn noisy(seed: u64) -> (Picture, Errors) {
-        let mut state = seed;
-        let mut random = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 40) as f32 / (1 << 24) as f32 - 0.5
-        };
+        let mut random = fastrand::Rng::with_seed(seed);
         // Uniform noise of width w has standard deviation w / sqrt 12.
-        let rgb = (0..64 * 64).map(|_| [0.5 + 0.01 * 12f32.sqrt() * random(); 3]).collect();
+        let rgb = (0..64 * 64).map(|_| [0.5 + 0.01 * 12f32.sqrt() * (random.f32() - 0.5); 3]).collect();
         (Picture { width: 64, height: 64, rgb }, vec![together([0.01; 3]); 64 * 64])
     }
 

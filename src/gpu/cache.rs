@@ -6,6 +6,7 @@ use super::info::Candidate;
 use crate::error::Result;
 use ash::vk;
 use ash::vk::Handle;
+use etcetera::BaseStrategy;
 use std::fs::{File, Metadata};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -20,10 +21,11 @@ const KEPT: usize = 16;
 /// A file in the making that is older was left behind by a run that was ended.
 const ABANDONED: Duration = Duration::from_secs(3600);
 
-/// `tallow` in `$XDG_CACHE_HOME` or `~/.cache`, where the command line keeps compiled pipelines.
+/// `tallow` in the user's folder of caches, where the command line keeps compiled pipelines: `$XDG_CACHE_HOME` or `~/.cache`, on
+/// Windows the local application data.
 pub fn cache_folder() -> Option<PathBuf> {
-    let path = |name| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
-    Some(path("XDG_CACHE_HOME").or_else(|| Some(path("HOME")?.join(".cache")))?.join("tallow"))
+    let folder = etcetera::choose_base_strategy().ok()?.cache_dir();
+    folder.is_absolute().then(|| folder.join("tallow"))
 }
 
 #[derive(Default)]

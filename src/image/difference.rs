@@ -61,6 +61,6 @@ fn scale_top(errors: &[f32]) -> f32 {
 /// 256 linear colours from black through purple and orange to pale yellow.
 fn magma() -> Vec<[f32; 3]> {
     let codes = nv_flip::magma_lut().to_vec();
-    let linear = |c: u8| super::tone::linear_from_srgb(f32::from(c) / 255.0);
+    let linear = |c: u8| crate::math::srgb::linear_from_srgb(f32::from(c) / 255.0);
     codes.chunks_exact(3).map(|c| [linear(c[0]), linear(c[1]), linear(c[2])]).collect()
 }

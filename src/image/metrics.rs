@@ -1,6 +1,6 @@
 //! How far a picture is from its reference. Sums run over all pixels and channels in `f64`.
 use super::film::Picture;
-use super::tone::srgb_from_linear;
+use crate::math::srgb::srgb_from_linear;
 use serde::Serialize;
 
 /// In the denominator of relMSE, so that black reference pixels do not divide by 0.

@@ -3,6 +3,7 @@ use super::WriteOptions;
 use super::claim::Claim;
 use super::film::{Film, Picture, Samples};
 use super::tone;
+use crate::math::srgb::linear_from_srgb;
 use crate::memory;
 use image::codecs::{hdr::HdrEncoder, png::PngEncoder};
 use image::{
@@ -137,7 +138,7 @@ fn film_from(image: &DynamicImage) -> Result<Film, String> {
     let names = if image.color().has_alpha() { &["R", "G", "B", "A"][..] } else { &["R", "G", "B"] };
     let mut film = Film::new(image.width(), image.height());
     let mut planes: Vec<Vec<f32>> = names.iter().map(|_| memory::reserved(film.pixels())).collect::<Result<_, _>>()?;
-    let linear = |v: f32| if is_float { v } else { tone::linear_from_srgb(v) };
+    let linear = |v: f32| if is_float { v } else { linear_from_srgb(v) };
     for band in bands(image) {
         for pixel in band.into_rgba32f().pixels() {
             let [r, g, b, a] = pixel.0;

@@ -1,4 +1,5 @@
 //! From radiance to what a screen shows.
+use crate::math::srgb::srgb_from_linear;
 
 /// Curve applied after exposure and before the sRGB transfer function.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -9,17 +10,6 @@ pub enum ToneMap {
     None,
     /// Filmic curve close to that of ACES, which rolls highlights off towards white.
     Aces,
-}
-
-/// Linear value in [0, 1] to its sRGB code value in [0, 1]; values outside are cut. IEC 61966-2-1:1999.
-pub fn srgb_from_linear(linear: f32) -> f32 {
-    let v = linear.clamp(0.0, 1.0);
-    if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
-}
-
-/// Inverse of [`srgb_from_linear`].
-pub fn linear_from_srgb(code: f32) -> f32 {
-    if code <= 0.040_45 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
 }
 
 /// Narkowicz's fit, per channel: "ACES Filmic Tone Mapping Curve", 2016. Its own result is linear.

@@ -6,4 +6,5 @@ pub mod fresnel;
 pub mod hash;
 pub mod microfacet;
 pub mod portable;
+pub mod srgb;
 pub mod warp;

@@ -1,7 +1,8 @@
 //! Whether a scene's arrays fit together. Kernels follow indices without a look; whoever loads a scene gets right ones, but
 //! the arrays are there to be edited.
+use super::build::bvh;
 use super::effects::SMOOTH;
-use super::{Environment, Scene, bvh};
+use super::{Environment, Scene};
 use crate::error::{Error, Result};
 use crate::layout::{
     AliasEntry, BSDF_COATED, BvhNode, COAT_COLUMNS, COAT_ROWS, Camera, LIGHT_SPHERE, LIGHT_TRIANGLE, Light, Material,

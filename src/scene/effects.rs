@@ -1,5 +1,6 @@
 //! What a scene and its settings call for, and who calls: kernels are compiled without the rest.
-use super::{Scene, geometry};
+use super::Scene;
+use super::build::{geometry, lights};
 use crate::layout::*;
 use crate::render::settings::{PixelFilter, Sampler};
 
@@ -69,7 +70,7 @@ fn light_effects(scene: &Scene, found: &mut Effects, reasons: &mut Vec<(&'static
     found.directional_lights = light("directional_lights", LIGHT_DIRECTIONAL);
     found.environment = light("environment", LIGHT_ENVIRONMENT);
     found.environment_map = scene.environment.is_some() && light("environment_map", LIGHT_ENVIRONMENT);
-    let large = scene.lights.iter().position(|l| super::light::is_large(scene, l));
+    let large = scene.lights.iter().position(|l| lights::is_large(scene, l));
     found.large_lamps = large.inspect(|&i| reasons.push(("large_lamps", light_name(scene, i)))).is_some();
 }
 
@@ -125,7 +126,7 @@ fn other_effects(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::material::Materials;
+    use crate::scene::load::material::Materials;
 
     #[test]
     fn only_what_is_worn_calls() {

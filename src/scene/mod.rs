@@ -1,41 +1,28 @@
 //! Scene files become flat arrays, ready to be copied to the device as they are. Nothing here talks to a GPU.
+//!
+//! A scene takes three steps: a [`Description`] says what is there, `load` reads the files that it names, and `build` makes
+//! the arrays of both. A front end for another format is a file of `load` that makes a description.
 use crate::error::{Error, Result};
 use crate::image::input;
 use crate::layout::{AliasEntry, BvhNode, Camera, Instance, Light, Material, Shading, Texture, Triangle};
 use crate::render::settings::Settings;
 use crate::threads;
+use build::assemble::assemble;
 use description::Description;
 use std::path::Path;
 
-mod alias;
-mod assemble;
-mod bvh;
-mod camera;
+mod build;
 mod check;
-mod coat;
 pub mod description;
 mod effects;
-mod environment;
 mod fingerprint;
-mod fresnel;
-mod geometry;
-mod light;
-mod material;
-mod mesh;
-mod mtl;
-mod obj;
-mod obj_lines;
-mod place;
-mod polygon;
-mod shape;
-mod texture;
-mod value;
+mod load;
 
+pub use build::coat::{CoatRow, coat_table};
+pub use build::fresnel::mean_internal as mean_internal_fresnel;
 pub use check::check_camera;
-pub use coat::{CoatRow, coat_table};
 pub use effects::{SMOOTH, effects};
 pub use fingerprint::Fingerprint;
-pub use fresnel::mean_internal as mean_internal_fresnel;
 
 /// Largest coordinate M of triangles, of points that rays start from and of lights: what a ray's hit is computed from fits a
 /// 32-bit float (3.4e38). Seen from its origin a corner is within 2 M, and sheared along the ray within 4 M; an edge
@@ -168,8 +155,7 @@ impl Scene {
         scene.settings.validate().map_err(|e| Error::input(path, e))?;
         overrides(&mut scene.settings);
         scene.settings.validate()?;
-        threads::within(|| assemble::assemble(path, description, sky, &mut scene))?;
-        scene.stack = bvh::stack_size(&scene.nodes, scene.root, &scene.instances);
+        threads::within(|| assemble(path, description, sky, &mut scene))?;
         let camera = description.camera.build(&scene.settings, scene.bounds);
         scene.camera = camera.map_err(|what| Error::input_at(path, "[camera]", what))?;
         scene.fingerprint.add(&[scene.camera]);

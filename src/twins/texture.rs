@@ -1,13 +1,10 @@
 //! Twin of `glsl/shared/texture.glsl`.
 use crate::layout::{MATERIAL_MASKED, NONE, TEXTURE_CLAMP, TEXTURE_SRGB, Texture};
 use crate::math::hash::pcg;
+use crate::math::srgb::linear_from_srgb;
 use crate::scene::Scene;
 use crate::twins::scene::{material_of, texture_coordinates};
-use glam::{IVec2, Vec2, Vec3, Vec4, ivec2, vec2};
-
-fn linear_from_srgb(c: Vec3) -> Vec3 {
-    c.map(|c| if c > 0.04045 { ((c + 0.055) / 1.055).powf(2.4) } else { c / 12.92 })
-}
+use glam::{IVec2, Vec2, Vec4, ivec2, vec2};
 
 /// One coordinate brought into `0..edge`, at most one period away.
 fn into_range(at: i32, edge: i32, clamp: bool) -> i32 {
@@ -24,7 +21,7 @@ fn texture_texel(scene: &Scene, image: &Texture, at: IVec2) -> Vec4 {
     let (x, y) = (into_range(at.x, edge.x, clamp), into_range(at.y, edge.y, clamp));
     let bytes = scene.texels[image.first as usize + (y * edge.x + x) as usize].to_le_bytes();
     let c = Vec4::from(bytes.map(|b| f32::from(b) / 255.0));
-    if image.flags & TEXTURE_SRGB != 0 { linear_from_srgb(c.truncate()).extend(c.w) } else { c }
+    if image.flags & TEXTURE_SRGB != 0 { c.truncate().map(linear_from_srgb).extend(c.w) } else { c }
 }
 
 /// Bilinear.

@@ -2,7 +2,7 @@
 use tallow::image::Picture;
 use tallow::image::difference::{WIDER, heat_map};
 use tallow::image::metrics::{Metrics, compare};
-use tallow::image::tone::{linear_from_srgb, srgb_from_linear};
+use tallow::math::srgb::{linear_from_srgb, srgb_from_linear};
 
 fn picture(width: u32, height: u32, pixel: impl Fn(u32, u32) -> [f32; 3]) -> Picture {
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect();

@@ -108,7 +108,7 @@ fn image_sky(width: u32, height: u32) -> Scene {
 
 /// Triangles of three strengths, half of which face away, below an image, with lights that no ray can hit.
 fn many_lights() -> Scene {
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     let mut triangle = || {
         let centre = HERE + 3.0 * random.point().normalize();
         [0; 3].map(|_| centre + 0.5 * random.point())

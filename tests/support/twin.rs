@@ -13,21 +13,22 @@ use tallow::scene::Scene;
 use tallow::twins::path::{Strategy, Tracer};
 use tallow::twins::scene::world_from_object;
 
-/// Uniform numbers (an LCG of Knuth's, high bits).
-pub struct Random(pub u64);
+/// Uniform numbers.
+pub struct Random(fastrand::Rng);
 
 impl Random {
+    pub fn new(seed: u64) -> Self {
+        Self(fastrand::Rng::with_seed(seed))
+    }
+
     /// Number `i` of many sequences.
     pub fn stream(i: usize) -> Self {
-        let mut random = Self((i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) + 1);
-        random.unit();
-        random
+        Self::new(i as u64)
     }
 
     /// In [0, 1).
     pub fn unit(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 40) as f32 / (1u64 << 24) as f32
+        self.0.f32()
     }
 
     /// In [-1, 1)^3.

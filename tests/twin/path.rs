@@ -49,7 +49,7 @@ fn brute_force(scene: &Scene, origin: Vec3, direction: Vec3) -> Option<(u32, f64
 
 /// Random rays, a third of them along an axis.
 fn rays(count: usize, reach: f32) -> Vec<(Vec3, Vec3)> {
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     let mut ray = |i: usize| {
         let origin = reach * random.point();
         match i % 3 {
@@ -78,7 +78,7 @@ fn disagreements(scene: &Scene, rays: &[(Vec3, Vec3)]) -> (usize, usize, usize) 
 
 #[test]
 fn traversal_agrees_with_brute_force() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     let mut corners = Vec::new();
     for _ in 0..400 {
         let centre = random.point();

@@ -33,7 +33,7 @@ fn nearest(scene: &Scene, origin: Vec3, direction: Vec3) -> Option<f64> {
 
 /// Rays whose hit is elsewhere than in 64 bits, and rays that hit.
 fn misjudged(scene: &Scene) -> (usize, usize) {
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     let (mut wrong, mut hits) = (0, 0);
     for _ in 0..20_000 {
         let (origin, direction) = (3.0 * random.point(), random.point().normalize());
@@ -52,7 +52,7 @@ fn misjudged(scene: &Scene) -> (usize, usize) {
 
 #[test]
 fn rays_meet_spheres_where_they_are() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     let ball = |_| {
         let [x, y, z] = (2.0 * random.point()).to_array();
         let radius = 0.5 * random.unit().powi(3) + 1e-3;
@@ -89,7 +89,7 @@ fn placed(place: &str, instance: bool, more: &str) -> Scene {
 
 /// Largest differences between the surfaces that rays meet: in position, normal, mapped normal and texture coordinates.
 fn apart(exact: &Scene, mesh: &Scene) -> [f32; 4] {
-    let mut random = Random(9);
+    let mut random = Random::new(9);
     let (mut worst, mut met) = ([0f32; 4], 0);
     for i in 0..6000 {
         let origin = if i % 3 == 0 { 0.1 * random.point() } else { 4.0 * random.point() };
@@ -142,7 +142,7 @@ fn self_hits(centre: Vec3, radius: f32, error: f32) -> usize {
     let scene = Workplace::new().scene(&format!(
         "[[mesh]]\nshape = 'sphere'\ntransform = {{ scale = {radius:e}, translate = [{x:e}, {y:e}, {z:e}] }}\n"
     ));
-    let (mut random, mut wrong) = (Random(2), 0);
+    let (mut random, mut wrong) = (Random::new(2), 0);
     for _ in 0..5000 {
         let origin = centre + 3.0 * radius * random.point().normalize();
         let hit = closest(&scene, origin, (centre - origin + 0.9 * radius * random.point()).normalize());

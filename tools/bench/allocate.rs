@@ -19,12 +19,8 @@ fn main() -> Result<()> {
     let pixels = width * height;
     let gpu = Gpu::open(&DeviceOptions::default())?;
     println!("{width} x {height} on {}", gpu.info().name);
-    let mut state = 1_u64;
-    let mut random = || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 40) as f32 / 16_777_216.0
-    };
-    let priority: Vec<f32> = (0..pixels).map(|_| random()).collect();
+    let mut random = fastrand::Rng::with_seed(1);
+    let priority: Vec<f32> = (0..pixels).map(|_| random.f32()).collect();
     let priority = Buffer::from_slice(&gpu, "priority", &priority)?;
     let stats = Buffer::from_slice(&gpu, "stats", &vec![PixelStats::default(); pixels as usize])?;
     let paths = Buffer::new(&gpu, "paths", pixels as usize, Location::Device)?;

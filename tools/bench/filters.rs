@@ -52,11 +52,8 @@ fn case(name: &str) -> Result<Case> {
 
 /// A checkered floor under exponential noise, as peers.py makes it, with positions.
 fn picture([width, height]: [u32; 2]) -> FilterInput {
-    let mut state = 1u32;
-    let mut noise = || {
-        state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-        -0.2 * ((state >> 8) as f32 / 16_777_216.0 + 1e-7).ln()
-    };
+    let mut random = fastrand::Rng::with_seed(1);
+    let mut noise = || -0.2 * (1.0 - random.f32()).ln();
     let mut pixel = |i: u32| {
         let (x, y) = (i % width, i / width);
         let (u, v) = (x as f32 / width as f32, y as f32 / height as f32);

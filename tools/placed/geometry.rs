@@ -3,8 +3,8 @@ use super::{View, indirect, mean, render};
 use crate::Args;
 use tallow::denoise::filter::{self, AtrousForm, FilterInput, FilterSettings};
 use tallow::gpu::Gpu;
-use tallow::image::tone::srgb_from_linear;
 use tallow::layout::{Guide, vec3, vec4};
+use tallow::math::srgb::srgb_from_linear;
 use tallow::render::settings::{PixelFilter, Settings};
 use tallow::report::table;
 

@@ -4,110 +4,17 @@
 //! its texture times the mean opacity), point `4 pi I`, spot `2 pi I (1 - mean of the two cosines)`, directional
 //! `pi R^2 E`, environment `4 pi^2 R^2` times its mean, R the radius of the scene.
 use super::environment::{luminance, mean_luminance};
-use super::value::Rgb;
-use super::{Scene, alias, geometry, texture};
+use super::hierarchy::Ranges;
+use super::{alias, geometry};
 use crate::error::Result;
 use crate::layout::*;
 use crate::memory;
+use crate::scene::Scene;
+use crate::scene::load::texture;
 use glam::{DMat3, Mat4, Vec3, Vec4};
-use serde::Deserialize;
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::ops::Range;
-
-/// Which light a `[[light]]` table is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Type {
-    /// In all directions from `position`.
-    #[default]
-    Point,
-    /// In a cone from `position`.
-    Spot,
-    /// Parallel light.
-    Directional,
-}
-
-/// A `[[light]]` table. Positions in world units.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LightTable {
-    /// Which.
-    #[serde(rename = "type")]
-    pub kind: Type,
-    /// Point, spot.
-    pub position: Option<[f32; 3]>,
-    /// Spot, directional: the way light travels; any length.
-    pub direction: Option<[f32; 3]>,
-    /// Spot: a point on its axis, instead of `direction`.
-    pub target: Option<[f32; 3]>,
-    /// Point, spot (on its axis): W/sr.
-    pub intensity: Option<Rgb>,
-    /// Directional: W/m^2 on a facing plane.
-    pub irradiance: Option<Rgb>,
-    /// Spot: degrees from the axis up to which intensity is full; default three quarters of `cutoff`.
-    pub cone: Option<f32>,
-    /// Spot: degrees from the axis beyond which there is none; default 20. In between intensity falls linearly with the angle.
-    pub cutoff: Option<f32>,
-}
-
-impl LightTable {
-    /// The device's light.
-    ///
-    /// # Errors
-    /// A sentence that names the key at fault.
-    pub fn build(&self) -> std::result::Result<Light, String> {
-        let position = || finite(self.position.ok_or("needs a position")?, "position");
-        let light = Light { triangle: NONE, material: NONE, ..Light::default() };
-        match self.kind {
-            Type::Point => {
-                let value = emitted(self.intensity, "intensity")?;
-                Ok(Light { kind: LIGHT_POINT, a: position()?, value, ..light })
-            }
-            Type::Directional => {
-                let value = emitted(self.irradiance, "irradiance")?;
-                Ok(Light { kind: LIGHT_DIRECTIONAL, b: self.axis(Vec3::ZERO)?, value, ..light })
-            }
-            Type::Spot => {
-                let a = position()?;
-                let cutoff = self.cutoff.unwrap_or(20.0);
-                let cone = self.cone.unwrap_or(cutoff * 0.75);
-                if !((0.0..=cutoff).contains(&cone) && cutoff > 0.0 && cutoff <= 180.0) {
-                    return Err(format!("cone {cone} and cutoff {cutoff}: need 0 <= cone <= cutoff <= 180 degrees"));
-                }
-                let c = [cone.to_radians().cos(), cutoff.to_radians().cos(), 0.0];
-                let value = emitted(self.intensity, "intensity")?;
-                Ok(Light { kind: LIGHT_SPOT, a, b: self.axis(a.into())?, c, value, ..light })
-            }
-        }
-    }
-
-    /// Unit direction of travel.
-    fn axis(&self, from: Vec3) -> std::result::Result<[f32; 3], String> {
-        let direction = match (self.direction, self.target) {
-            (Some(d), None) => Vec3::from(d),
-            (None, Some(t)) if self.kind == Type::Spot => Vec3::from(t) - from,
-            _ => return Err("needs a direction (spot: or a target), not both".into()),
-        };
-        let unit = direction.as_dvec3().try_normalize().ok_or("the direction has no length")?;
-        Ok(unit.as_vec3().to_array())
-    }
-}
-
-fn finite(v: [f32; 3], key: &str) -> std::result::Result<[f32; 3], String> {
-    match v.iter().all(|v| v.abs() <= super::MAX_COORDINATE as f32) {
-        true => Ok(v),
-        false => Err(format!("{key} {v:?} is not within {:e}", super::MAX_COORDINATE)),
-    }
-}
-
-fn emitted(v: Option<Rgb>, key: &str) -> std::result::Result<[f32; 3], String> {
-    let v = v.ok_or_else(|| format!("needs {key}"))?.0;
-    match v.iter().all(|v| (0.0..=1e30).contains(v)) {
-        true => Ok(v),
-        false => Err(format!("{key} {v:?} is negative, NaN or above 1e30")),
-    }
-}
 
 /// The environment's light; `radiance` is its constant, or what its image is multiplied by.
 pub fn environment(radiance: [f32; 3], world_from_environment: DMat3) -> Light {
@@ -121,7 +28,7 @@ pub fn environment(radiance: [f32; 3], world_from_environment: DMat3) -> Light {
 ///
 /// # Errors
 /// [`Error::Memory`](crate::error::Error::Memory).
-pub fn finish(scene: &mut Scene, ranges: &HashMap<u32, Range<usize>>) -> Result<()> {
+pub fn finish(scene: &mut Scene, ranges: &Ranges) -> Result<()> {
     let mut means = HashMap::new(); // many materials may share a picture
     let mut mean = |image: u32| match scene.textures.get(image as usize) {
         Some(t) => *means.entry((t.first, t.flags & TEXTURE_SRGB)).or_insert_with(|| texture::mean(t, &scene.texels)),
@@ -152,7 +59,7 @@ pub fn finish(scene: &mut Scene, ranges: &HashMap<u32, Range<usize>>) -> Result<
 
 /// Emissive triangles in world space: of the only level, or of every instance. `ranges` are the triangles below
 /// each root that instances name.
-fn add_triangles(scene: &Scene, ranges: &HashMap<u32, Range<usize>>, lights: &mut Vec<Light>) -> Result<()> {
+fn add_triangles(scene: &Scene, ranges: &Ranges, lights: &mut Vec<Light>) -> Result<()> {
     let emits = |material: u32| scene.materials[material as usize].emission_weight > 0.0;
     let own = |range: Range<usize>| range.filter(|&i| emits(scene.triangles[i].material)).collect::<Vec<_>>();
     if scene.instances.is_empty() {
@@ -210,7 +117,7 @@ fn surface_light(scene: &Scene, index: usize, at: Option<(Mat4, bool)>, material
 const LARGE: f64 = 0.01;
 
 /// A lamp that fills so much of the sky of points near it that its nearest parts outshine the others.
-pub(super) fn is_large(scene: &Scene, light: &Light) -> bool {
+pub fn is_large(scene: &Scene, light: &Light) -> bool {
     let [low, high] = scene.bounds.map(|b| Vec3::from(b).as_dvec3());
     light.kind == LIGHT_TRIANGLE && geometry::area([light.a, light.b, light.c]) > LARGE * (high - low).length_squared()
 }

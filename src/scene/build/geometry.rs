@@ -1,5 +1,6 @@
 //! The growing triangle arrays: placement, repair of what can be repaired, packing of normals.
 use crate::layout::{NONE, SPHERE, SPHERE_INWARD, SPHERE_MIRRORED, Shading, Triangle};
+use crate::scene::MAX_COORDINATE;
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -81,7 +82,7 @@ impl Repairs {
     }
 }
 
-/// A coordinate beyond [`super::MAX_COORDINATE`].
+/// A coordinate beyond [`MAX_COORDINATE`].
 #[derive(Clone, Copy, Debug)]
 pub struct TooFar(pub f32);
 
@@ -94,7 +95,7 @@ impl Geometry {
         }
         let mut p = c.p.map(|p| at.affine.transform_point3(p.as_dvec3()).as_vec3());
         let far = p.iter().map(|p| p.abs().max_element()).fold(0.0, f32::max);
-        if far > super::MAX_COORDINATE as f32 {
+        if far > MAX_COORDINATE as f32 {
             return Err(TooFar(far));
         }
         // A mirror turns windings around; swapping two corners keeps the outside of the mesh outside.
@@ -121,7 +122,7 @@ impl Geometry {
         let (matrix, determinant) = (at.affine.matrix3, at.affine.matrix3.determinant());
         let radius = determinant.abs().cbrt();
         let far = (at.affine.translation.abs().max_element() + radius) as f32;
-        if far > super::MAX_COORDINATE as f32 {
+        if far > MAX_COORDINATE as f32 {
             return Err(TooFar(far));
         }
         if radius < LEAST_RADIUS {

@@ -1,8 +1,8 @@
-//! Geometry and pictures that an engine has in memory, in place of files.
+//! Geometry and pictures as scenes have them, whether they come out of files or out of an engine's memory.
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Triangles in memory. Everything is per vertex, as in OBJ files after tessellation.
+/// Triangles: what files, shapes and engines give. Everything is per vertex.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
     /// Object units.
@@ -18,7 +18,7 @@ pub struct Mesh {
 impl Mesh {
     /// # Errors
     /// A sentence that says what does not fit together.
-    pub(super) fn check(&self) -> Result<(), String> {
+    pub(in crate::scene) fn check(&self) -> Result<(), String> {
         let vertices = self.positions.len();
         let extras = [("normals", self.normals.len()), ("uvs", self.uvs.len())];
         if let Some((name, count)) = extras.iter().find(|(_, count)| ![0, vertices].contains(count)) {
@@ -33,15 +33,9 @@ impl Mesh {
         }
     }
 
-    /// As the loader of files returns them.
-    pub(super) fn to_tobj(&self) -> tobj::Mesh {
-        tobj::Mesh {
-            positions: self.positions.as_flattened().to_vec(),
-            normals: self.normals.as_flattened().to_vec(),
-            texcoords: self.uvs.as_flattened().to_vec(),
-            indices: self.indices.clone(),
-            ..tobj::Mesh::default()
-        }
+    /// How many it has.
+    pub(in crate::scene) fn triangles(&self) -> usize {
+        self.indices.len() / 3
     }
 }
 

@@ -5,12 +5,20 @@
 //!
 //! An engine fills in the same tables for [`Scene::build`](super::Scene::build), with [`MeshTable::data`],
 //! [`Description::bitmap`] and [`EnvironmentTable::picture`] in place of files.
-pub use super::camera::{Camera, FovAxis};
-pub use super::light::{LightTable, Type as LightType};
-pub use super::material::{Distribution, MaterialTable, Type as MaterialType};
-pub use super::mesh::{Bitmap, Mesh};
-pub use super::shape::Shape;
-pub use super::value::{Rgb, Transform};
+pub(super) mod camera;
+pub(super) mod light;
+pub(super) mod material;
+pub(super) mod mesh;
+pub(super) mod shape;
+pub(super) mod value;
+
+pub use camera::{Camera, FovAxis};
+pub use light::{LightTable, Type as LightType};
+pub use material::{Distribution, MaterialTable, Type as MaterialType};
+pub use mesh::{Bitmap, Mesh};
+pub use shape::Shape;
+pub use value::{Rgb, Transform};
+
 use crate::error::{Error, Result};
 use crate::image::Picture;
 use crate::render::settings::{Allocate, PixelFilter, Sampler, Settings};

@@ -9,33 +9,27 @@ const FAN: usize = 16;
 /// Corners of a face that is still cut, in time that may grow with their square; a larger one becomes a fan.
 const MOST_CORNERS: usize = 100_000;
 
-/// Triangle corners out of faces of `arities` corners each, windings kept. `positions`: three floats a vertex.
-/// Corners that form no area may be left without triangles, or with triangles of none.
-pub fn triangulate(positions: &[f32], arities: &[u32], indices: &[u32]) -> Vec<u32> {
-    let mut triangles = Vec::with_capacity(3 * (indices.len() - 2 * arities.len().min(indices.len() / 2)));
-    let mut cutter = Cutter { earcut: Earcut::new(), refiner: Refiner::new(), corners: Vec::new() };
-    let mut rest = indices;
-    for &arity in arities {
-        let (face, after) = rest.split_at(arity as usize);
-        rest = after;
-        match face.len() {
-            0..3 => {}
-            3 => triangles.extend(face),
-            _ => cutter.polygon(positions, face, &mut triangles),
-        }
-    }
-    triangles
-}
-
-/// What faces share: memory.
-struct Cutter {
+/// Cuts faces; what they share is memory.
+pub struct Triangulator {
     earcut: Earcut<f64>,
     refiner: Refiner,
     corners: Vec<u32>,
 }
 
-impl Cutter {
-    fn polygon(&mut self, positions: &[f32], face: &[u32], triangles: &mut Vec<u32>) {
+impl Default for Triangulator {
+    fn default() -> Self {
+        Self { earcut: Earcut::new(), refiner: Refiner::new(), corners: Vec::new() }
+    }
+}
+
+impl Triangulator {
+    /// Adds the triangles of a face of three corners or more, its winding kept. Corners that form no area may be left without
+    /// triangles, or with triangles of none; a face always has some.
+    pub fn add(&mut self, positions: &[[f32; 3]], face: &[u32], triangles: &mut Vec<u32>) {
+        if let [_, _, _] = face {
+            triangles.extend(face);
+            return;
+        }
         let flat = flattened(positions, face);
         self.corners.clear();
         if (face.len() > FAN || !is_convex(&flat)) && face.len() <= MOST_CORNERS {
@@ -51,8 +45,8 @@ impl Cutter {
 }
 
 /// The corners seen along the face's normal, counter-clockwise as a whole.
-fn flattened(positions: &[f32], face: &[u32]) -> Vec<[f64; 2]> {
-    let point = |&i: &u32| DVec3::from([0, 1, 2].map(|a| f64::from(positions[3 * i as usize + a])));
+fn flattened(positions: &[[f32; 3]], face: &[u32]) -> Vec<[f64; 2]> {
+    let point = |&i: &u32| DVec3::from(positions[i as usize].map(f64::from));
     let first = point(&face[0]);
     let points: Vec<DVec3> = face.iter().map(|i| point(i) - first).collect();
     let normal: DVec3 = points.windows(2).map(|w| w[0].cross(w[1])).sum();
@@ -76,8 +70,8 @@ mod tests {
     use super::*;
 
     /// Sum of the areas, and how many triangles face against `normal`.
-    fn measure(positions: &[f32], triangles: &[u32], normal: DVec3) -> (f64, usize) {
-        let point = |i: u32| DVec3::from([0, 1, 2].map(|a| f64::from(positions[3 * i as usize + a])));
+    fn measure(positions: &[[f32; 3]], triangles: &[u32], normal: DVec3) -> (f64, usize) {
+        let point = |i: u32| DVec3::from(positions[i as usize].map(f64::from));
         let areas: Vec<f64> = triangles
             .chunks(3)
             .map(|t| 0.5 * (point(t[1]) - point(t[0])).cross(point(t[2]) - point(t[0])).dot(normal))
@@ -85,14 +79,20 @@ mod tests {
         (areas.iter().map(|a| a.abs()).sum(), areas.iter().filter(|&&a| a < -1e-9).count())
     }
 
+    fn triangulated(positions: &[[f32; 3]], face: &[u32]) -> Vec<u32> {
+        let mut triangles = Vec::new();
+        Triangulator::default().add(positions, face, &mut triangles);
+        triangles
+    }
+
     fn fan(corners: u32) -> Vec<u32> {
         (2..corners).flat_map(|i| [0, i - 1, i]).collect()
     }
 
     /// Corners (x, y) placed on a plane, and its unit normal.
-    fn placed(points: &[(f64, f64)], x: DVec3, y: DVec3) -> (Vec<f32>, DVec3) {
+    fn placed(points: &[(f64, f64)], x: DVec3, y: DVec3) -> (Vec<[f32; 3]>, DVec3) {
         let at = |&(u, v): &(f64, f64)| (DVec3::new(3.0, -2.0, 5.0) + u * x + v * y).as_vec3().to_array();
-        (points.iter().flat_map(at).collect(), x.cross(y))
+        (points.iter().map(at).collect(), x.cross(y))
     }
 
     const L: [(f64, f64); 6] = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (0.0, 2.0)];
@@ -106,10 +106,10 @@ mod tests {
                 let mut points = L;
                 points.rotate_left(start);
                 let (positions, normal) = placed(&points, x, y);
-                let triangles = triangulate(&positions, &[6], &[0, 1, 2, 3, 4, 5]);
+                let triangles = triangulated(&positions, &[0, 1, 2, 3, 4, 5]);
                 let (area, against) = measure(&positions, &triangles, normal);
                 assert!((area - 3.0).abs() < 1e-5 && against == 0 && triangles.len() == 12, "{x} {y} {start}: {area}");
-                let reversed = triangulate(&positions, &[6], &[5, 4, 3, 2, 1, 0]);
+                let reversed = triangulated(&positions, &[5, 4, 3, 2, 1, 0]);
                 assert_eq!(measure(&positions, &reversed, -normal).1, 0, "{x} {y} {start}");
             }
         }
@@ -120,21 +120,17 @@ mod tests {
 
     #[test]
     fn random_stars_keep_their_area() {
-        let mut state = 1u64;
-        let mut unit = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        };
+        let mut random = fastrand::Rng::with_seed(1);
         for n in 4..60 {
             let point = |i: usize, r: f64| {
                 let angle = std::f64::consts::TAU * i as f64 / n as f64;
                 (r * angle.cos(), r * angle.sin())
             };
-            let points: Vec<_> = (0..n).map(|i| point(i, 0.1 + unit())).collect();
+            let points: Vec<_> = (0..n).map(|i| point(i, 0.1 + random.f64())).collect();
             let exact = (0..n).map(|i| (points[i], points[(i + 1) % n])).map(|(a, b)| 0.5 * (a.0 * b.1 - a.1 * b.0));
             let exact: f64 = exact.sum();
             let (positions, normal) = placed(&points, DVec3::Y, DVec3::Z);
-            let triangles = triangulate(&positions, &[n as u32], &(0..n as u32).collect::<Vec<_>>());
+            let triangles = triangulated(&positions, &(0..n as u32).collect::<Vec<_>>());
             let (area, against) = measure(&positions, &triangles, normal);
             assert!((area / exact - 1.0).abs() < 1e-5 && against == 0, "{n} corners: {area} of {exact}");
             assert_eq!(triangles.len(), 3 * (n - 2));
@@ -158,7 +154,7 @@ mod tests {
         for (points, exact) in [(comb(250), 749.0), (comb(2500), 7499.0), (round(10_000), std::f64::consts::PI)] {
             let count = points.len() as u32;
             let (positions, normal) = placed(&points, DVec3::Y, DVec3::Z);
-            let triangles = triangulate(&positions, &[count], &(0..count).collect::<Vec<_>>());
+            let triangles = triangulated(&positions, &(0..count).collect::<Vec<_>>());
             let (area, against) = measure(&positions, &triangles, normal);
             assert!((area / exact - 1.0).abs() < 1e-5 && against == 0, "{count} corners: {area} of {exact}");
             let corners: std::collections::BTreeSet<_> = triangles.iter().collect();
@@ -170,14 +166,15 @@ mod tests {
     fn convex_faces_are_fans_and_broken_ones_come_to_an_end() {
         let square = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
         let (positions, _) = placed(&square, DVec3::X, DVec3::Y);
-        assert_eq!(triangulate(&positions, &[4, 3], &[0, 1, 2, 3, 0, 1, 2]), [0, 1, 2, 0, 2, 3, 0, 1, 2]);
-        assert_eq!(triangulate(&positions, &[4], &[0, 2, 1, 3]).len(), 6, "a face that crosses itself");
-        assert_eq!(triangulate(&positions, &[5], &[1, 1, 1, 1, 1]).len(), 9, "a face without area");
-        assert_eq!(triangulate(&[f32::NAN; 12], &[4], &[0, 1, 2, 3]).len(), 6);
+        assert_eq!(triangulated(&positions, &[0, 1, 2, 3]), [0, 1, 2, 0, 2, 3]);
+        assert_eq!(triangulated(&positions, &[0, 1, 2]), [0, 1, 2]);
+        assert_eq!(triangulated(&positions, &[0, 2, 1, 3]).len(), 6, "a face that crosses itself");
+        assert_eq!(triangulated(&positions, &[1, 1, 1, 1, 1]).len(), 9, "a face without area");
+        assert_eq!(triangulated(&[[f32::NAN; 3]; 4], &[0, 1, 2, 3]).len(), 6);
         // A corner in the middle of an edge: nothing is lost, whichever comes first.
         let (positions, normal) =
             placed(&[(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)], DVec3::X, DVec3::Y);
-        let (area, against) = measure(&positions, &triangulate(&positions, &[5], &[0, 1, 2, 3, 4]), normal);
+        let (area, against) = measure(&positions, &triangulated(&positions, &[0, 1, 2, 3, 4]), normal);
         assert!((area - 2.0).abs() < 1e-6 && against == 0, "{area}");
     }
 }

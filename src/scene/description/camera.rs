@@ -1,6 +1,7 @@
 //! From the `[camera]` table and the film's shape to the camera that kernels read.
 use crate::layout;
 use crate::render::settings::Settings;
+use crate::scene::MAX_COORDINATE;
 use glam::{DMat4, DVec3};
 use serde::Deserialize;
 
@@ -60,8 +61,8 @@ impl Camera {
         };
         finite(position)?;
         let positive = |name: &str, v: f32| match v {
-            v if (0.0..=super::MAX_COORDINATE as f32).contains(&v) => Ok(v),
-            v => Err(format!("{name} is {v}: choose 0 or a positive number of at most {:e}", super::MAX_COORDINATE)),
+            v if (0.0..=MAX_COORDINATE as f32).contains(&v) => Ok(v),
+            v => Err(format!("{name} is {v}: choose 0 or a positive number of at most {:e}", MAX_COORDINATE)),
         };
         let to_target = self.target.map_or(1.0, |t| (DVec3::from(t) - position).dot(forward).max(1e-6));
         let focus_distance = positive("focus_distance", self.focus_distance.unwrap_or(to_target as f32))?;
@@ -133,9 +134,9 @@ fn frame_from_matrix(rows: &[f64; 16]) -> Result<Frame, String> {
 }
 
 fn finite(position: DVec3) -> Result<(), String> {
-    match position.is_finite() && position.abs().max_element() <= super::MAX_COORDINATE {
+    match position.is_finite() && position.abs().max_element() <= MAX_COORDINATE {
         true => Ok(()),
-        false => Err(format!("point {position} is not within {:e}", super::MAX_COORDINATE)),
+        false => Err(format!("point {position} is not within {:e}", MAX_COORDINATE)),
     }
 }
 

@@ -1,4 +1,5 @@
 //! Shapes that need no file, with the extents, normals and texture coordinates of Mitsuba's shapes of the same name.
+use super::mesh::Mesh;
 use serde::Deserialize;
 use std::f32::consts::{PI, TAU};
 
@@ -18,7 +19,7 @@ pub enum Shape {
 
 impl Shape {
     /// How many triangles [`Self::mesh`] returns.
-    pub(super) fn triangles(self, segments: u32) -> u64 {
+    pub(in crate::scene) fn triangles(self, segments: u32) -> u64 {
         let n = u64::from(segments);
         match self {
             Self::Sphere => 2 * n * (n.div_ceil(2).max(2) - 1),
@@ -29,7 +30,7 @@ impl Shape {
     }
 
     /// Triangles of the shape; `segments` around, at least 3 (sphere: half as many from pole to pole).
-    pub(super) fn mesh(self, segments: u32) -> tobj::Mesh {
+    pub(in crate::scene) fn mesh(self, segments: u32) -> Mesh {
         match self {
             Self::Sphere => sphere(segments),
             Self::Rectangle => rectangle(),
@@ -39,15 +40,15 @@ impl Shape {
     }
 }
 
-fn push(mesh: &mut tobj::Mesh, p: [f32; 3], n: [f32; 3], uv: [f32; 2]) {
-    mesh.positions.extend(p);
-    mesh.normals.extend(n);
-    mesh.texcoords.extend(uv);
+fn push(mesh: &mut Mesh, p: [f32; 3], n: [f32; 3], uv: [f32; 2]) {
+    mesh.positions.push(p);
+    mesh.normals.push(n);
+    mesh.uvs.push(uv);
 }
 
 /// Rows run from +z to -z; v falls from 1 at the north pole.
-fn sphere(segments: u32) -> tobj::Mesh {
-    let (mut mesh, rows) = (tobj::Mesh::default(), segments.div_ceil(2).max(2));
+fn sphere(segments: u32) -> Mesh {
+    let (mut mesh, rows) = (Mesh::default(), segments.div_ceil(2).max(2));
     for row in 0..=rows {
         let (sin, cos) = (PI * row as f32 / rows as f32).sin_cos();
         for column in 0..=segments {
@@ -76,19 +77,19 @@ fn sphere(segments: u32) -> tobj::Mesh {
     mesh
 }
 
-fn rectangle() -> tobj::Mesh {
-    let mut mesh = tobj::Mesh { indices: vec![0, 1, 2, 0, 2, 3], ..tobj::Mesh::default() };
+fn rectangle() -> Mesh {
+    let mut mesh = Mesh { indices: vec![0, 1, 2, 0, 2, 3], ..Mesh::default() };
     for [u, v] in [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]] {
         push(&mut mesh, [2.0 * u - 1.0, 2.0 * v - 1.0, 0.0], [0.0, 0.0, 1.0], [u, v]);
     }
     mesh
 }
 
-fn cube() -> tobj::Mesh {
-    let mut mesh = tobj::Mesh::default();
+fn cube() -> Mesh {
+    let mut mesh = Mesh::default();
     for axis in 0..3 {
         for sign in [-1.0, 1.0] {
-            let first = (mesh.positions.len() / 3) as u32;
+            let first = mesh.positions.len() as u32;
             for [u, v] in [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]] {
                 let (mut p, mut n) = ([0.0; 3], [0.0; 3]);
                 (p[axis], n[axis]) = (sign, sign);
@@ -104,10 +105,10 @@ fn cube() -> tobj::Mesh {
 }
 
 /// Texture coordinates are polar: u the radius, v the angle over a full turn.
-fn disk(segments: u32) -> tobj::Mesh {
-    let mut mesh = tobj::Mesh::default();
+fn disk(segments: u32) -> Mesh {
+    let mut mesh = Mesh::default();
     for i in 0..segments {
-        let first = (mesh.positions.len() / 3) as u32;
+        let first = mesh.positions.len() as u32;
         let v = [i, i + 1].map(|i| i as f32 / segments as f32);
         push(&mut mesh, [0.0; 3], [0.0, 0.0, 1.0], [0.0, v[0]]);
         for (k, v) in [(i, v[0]), ((i + 1) % segments, v[1])] {
@@ -125,8 +126,8 @@ mod tests {
     use glam::Vec3;
 
     /// Area and signed volume of the closed or open surface.
-    fn measure(mesh: &tobj::Mesh) -> (f32, f32) {
-        let p = |i: u32| Vec3::from_slice(&mesh.positions[3 * i as usize..]);
+    fn measure(mesh: &Mesh) -> (f32, f32) {
+        let p = |i: u32| Vec3::from(mesh.positions[i as usize]);
         mesh.indices.chunks(3).fold((0.0, 0.0), |(area, volume), t| {
             let [a, b, c] = [p(t[0]), p(t[1]), p(t[2])];
             (area + (b - a).cross(c - a).length() / 2.0, volume + a.dot(b.cross(c)) / 6.0)
@@ -156,7 +157,7 @@ mod tests {
     fn a_sphere_has_no_triangle_without_area() {
         let mesh = Shape::Sphere.mesh(8);
         assert_eq!(mesh.indices.len() / 3, 8 * (1 + 2 + 2 + 1));
-        let p = |i: u32| Vec3::from_slice(&mesh.positions[3 * i as usize..]);
+        let p = |i: u32| Vec3::from(mesh.positions[i as usize]);
         assert!(mesh.indices.chunks(3).all(|t| (p(t[1]) - p(t[0])).cross(p(t[2]) - p(t[0])).length() > 1e-3));
     }
 }

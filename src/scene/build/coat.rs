@@ -1,10 +1,12 @@
 //! What a rough coat lets in, and what it reflects inwards: the table that kernels read for a scene's rough coats.
-use super::effects::SMOOTH;
-use crate::layout::{COAT_COLUMNS, COAT_ROWS};
+use super::fresnel;
+use crate::layout::{BSDF_COATED, COAT_COLUMNS, COAT_ROWS, MATERIAL_GGX, Material};
 use crate::math::fresnel::fresnel_dielectric;
 use crate::math::microfacet::{microfacet_area, microfacet_g1, microfacet_sample};
+use crate::scene::effects::SMOOTH;
 use glam::{Vec3, vec2, vec3};
 use rayon::prelude::*;
+use std::collections::HashMap;
 
 const ROWS: usize = COAT_ROWS as usize;
 const COLUMNS: usize = COAT_COLUMNS as usize;
@@ -16,6 +18,26 @@ const POINTS: usize = 24;
 /// For a coat of one roughness, the share of light that it does not let in, at cosines that are the squares of equal steps
 /// from 0 to 1; last, its mean reflectance for diffuse light from inside.
 pub type CoatRow = [f32; COLUMNS];
+
+/// Sets what smooth coats reflect of diffuse light from inside.
+pub fn add_means(materials: &mut [Material]) {
+    for m in materials.iter_mut().filter(|m| m.kind == BSDF_COATED) {
+        m.internal_fresnel = fresnel::mean_internal(m.eta[0]);
+    }
+}
+
+/// Adds what rough coats reflect to the words of the textures: a table for each index and distribution.
+pub fn add_tables(materials: &mut [Material], texels: &mut Vec<u32>) {
+    let mut tables = HashMap::new();
+    for m in materials.iter_mut().filter(|m| m.kind == BSDF_COATED && m.alpha >= SMOOTH) {
+        let ggx = m.flags & MATERIAL_GGX != 0;
+        m.coat_table = *tables.entry((m.eta[0].to_bits(), ggx)).or_insert_with(|| {
+            let first = texels.len() as u32;
+            texels.extend(coat_table(m.eta[0], ggx).into_iter().map(f32::to_bits));
+            first
+        });
+    }
+}
 
 /// [`CoatRow`]s at roughnesses from 0.01 to 1, each the same multiple of the one before, for a coat of relative index `eta` over
 /// GGX microfacets, or Beckmann's. Light is let in or reflected by one scattering, as in Mitsuba 3's `roughplastic`; what

@@ -4,11 +4,64 @@
 //! (2 pi)` wrapped to [0, 1) and `v = acos(d.y) / pi`; so +y is up (row 0), column 0 begins at -z and u grows towards
 //! +x. Texel centres lie at `(column + 0.5) / width` and `(row + 0.5) / height` (Mitsuba stretches rows so that the
 //! first and last lie on the poles: half a texel apart at most).
-use super::{Environment, alias};
+use super::sources::Sources;
+use super::{alias, lights};
 use crate::error::{Error, Result};
-use crate::image::{self, Picture};
+use crate::image::Picture;
+use crate::scene::description::EnvironmentTable;
+use crate::scene::load::environment::{load, unusable};
+use crate::scene::{Environment, Scene};
 use glam::DMat3;
-use std::path::Path;
+
+/// Adds the lights without surface and the environment, with its image.
+///
+/// # Errors
+/// [`Error::Input`] for a table at fault and an image that cannot be read, [`Error::Memory`].
+pub fn add_lights(sources: &mut Sources, scene: &mut Scene) -> Result<()> {
+    for (i, table) in sources.description.light.iter().enumerate() {
+        let light = table.build().map_err(|what| sources.at(format!("light {}", i + 1), what))?;
+        scene.lights.push(light);
+    }
+    let Some(table) = &sources.description.environment else { return Ok(()) };
+    let at = |what| Error::input_at(sources.path, PLACE, what);
+    let scale = table.scale.map_or([1.0; 3], |s| s.0);
+    let constant = table.radiance.map_or([1.0; 3], |r| r.0);
+    let radiance: [f32; 3] = std::array::from_fn(|c| scale[c] * constant[c]);
+    if !radiance.iter().all(|v| (0.0..=1e18).contains(v)) || !table.rotation.is_finite() {
+        return Err(at("radiance times scale must lie from 0 to 1e18, rotation be finite".to_owned()));
+    }
+    let rotation = rotation(table.rotation, table.world_from_environment).map_err(at)?;
+    let light = lights::environment(radiance, rotation);
+    if table.file.is_none() && table.picture.is_none() {
+        scene.lights.push(light);
+        return Ok(());
+    }
+    scene.environment = image_of(sources, table)?;
+    scene.lights.extend(scene.environment.is_some().then_some(light));
+    Ok(())
+}
+
+/// Where an environment's mistakes are.
+const PLACE: &str = "[environment]";
+
+fn image_of(sources: &mut Sources, table: &EnvironmentTable) -> Result<Option<Environment>> {
+    let directory = sources.directory();
+    let at = |what: String| Error::input_at(sources.path, PLACE, what);
+    let warnings = &mut sources.library.warnings;
+    match (&table.file, &table.picture) {
+        _ if table.radiance.is_some() => Err(at("has both radiance and an image: choose one".to_owned())),
+        (Some(_), Some(_)) => Err(at("has both file and picture: choose one".to_owned())),
+        (Some(file), None) => {
+            let path = directory.join(file.to_string_lossy().replace('\\', "/"));
+            let picture = load(&path)?;
+            from_picture(&path.display().to_string(), &picture, warnings).map_err(|what| unusable(&path, &what))
+        }
+        (None, Some(picture)) => {
+            from_picture(PLACE, picture, warnings).map_err(|what| at(format!("its picture is unusable: {what}")))
+        }
+        (None, None) => Ok(None),
+    }
+}
 
 /// Luminance of linear Rec. 709.
 pub fn luminance(c: [f32; 3]) -> f32 {
@@ -20,27 +73,7 @@ fn row_sine(row: u32, height: u32) -> f64 {
     ((f64::from(row) + 0.5) / f64::from(height) * std::f64::consts::PI).sin()
 }
 
-/// Reads an image and builds its alias table. `None` for an image that is black throughout.
-///
-/// # Errors
-/// [`Error::Input`] for a file that cannot be read or decoded, [`Error::Memory`].
-pub fn load(path: &Path, warn: &mut Vec<String>) -> Result<Option<Environment>> {
-    decode(path, &image::input::read(path)?, warn)
-}
-
-/// [`load`] from bytes; `path` is for messages.
-///
-/// # Errors
-/// See [`load`].
-pub fn decode(path: &Path, bytes: &[u8], warn: &mut Vec<String>) -> Result<Option<Environment>> {
-    let unusable =
-        |what| Error::input(path, format!("is no usable environment image ({what}): save it again as HDR or EXR"));
-    image::check_room(path, bytes)?;
-    let picture = image::decode(bytes).and_then(|film| film.picture(None)).map_err(unusable)?;
-    from_picture(&path.display().to_string(), &picture, warn).map_err(unusable)
-}
-
-/// [`load`] of linear radiance; `name` is for warnings.
+/// An image of linear radiance with its alias table; `None` for one that is black throughout. `name` is for warnings.
 ///
 /// # Errors
 /// A sentence, for a picture without pixels, or with others than its size says.
@@ -155,10 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn damaged_and_black_images() {
-        let mut warnings = Vec::new();
-        let error = decode(Path::new("a.hdr"), b"#?RADIANCE\nnonsense", &mut warnings).unwrap_err().to_string();
-        assert!(error.starts_with("a.hdr: is no usable environment image") && !error.contains('\n'), "{error}");
+    fn black_images_are_none_and_damaged_pixels_are_mended() {
         assert!(with_table(2, 1, vec![[0.0; 4]; 2]).is_none());
         let mut repaired = 0;
         assert_eq!(sane([f32::NAN, -1.0, 2.0], &mut repaired), [0.0, 0.0, 2.0, 0.0]);

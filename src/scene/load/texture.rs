@@ -1,10 +1,11 @@
 //! Pictures to RGBA8 texels, decoded on all cores straight into the one texel array.
-use super::mesh::Bitmap;
-use super::mtl::find_file;
+use super::find::find_file;
 use crate::error::{Error, Result};
 use crate::image::{BAND, bands, check_end, contained, input, picture, picture_claim};
 use crate::layout::{NONE, TEXTURE_CLAMP, TEXTURE_SRGB, Texture};
+use crate::math::srgb::linear_from_srgb_f64;
 use crate::memory;
+use crate::scene::description::mesh::Bitmap;
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -245,18 +246,14 @@ fn fill(space: &mut [u32], texels: impl Iterator<Item = [u8; 4]>, kind: Kind, ha
     }
 }
 
-/// The sRGB curve (IEC 61966-2-1), from a byte to linear light.
-fn linear_from_byte(byte: u8) -> f64 {
-    let v = f64::from(byte) / 255.0;
-    if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
-}
-
 /// Mean linear colour.
 pub fn mean(texture: &Texture, texels: &[u32]) -> [f32; 3] {
     let count = texture.width as usize * texture.height as usize;
     let srgb = texture.flags & TEXTURE_SRGB != 0;
-    let curve: [f64; 256] =
-        std::array::from_fn(|byte| if srgb { linear_from_byte(byte as u8) } else { byte as f64 / 255.0 });
+    let curve: [f64; 256] = std::array::from_fn(|byte| {
+        let code = byte as f64 / 255.0;
+        if srgb { linear_from_srgb_f64(code) } else { code }
+    });
     let mut sum = [0.0; 3];
     for texel in &texels[texture.first as usize..][..count] {
         let bytes = texel.to_le_bytes();

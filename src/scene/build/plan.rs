@@ -1,0 +1,187 @@
+//! Which mesh goes where: baked into world space, or stored in its own space for instances.
+use super::sources::{Sources, mesh_name};
+use crate::error::Result;
+use crate::layout::{MATERIAL_MASKED, Material, NONE};
+use crate::scene::description::shape::Shape;
+use crate::scene::description::{self, InstanceTable, MeshTable};
+use glam::{DAffine3, DMat3};
+use std::collections::HashMap;
+
+/// A mesh and where it goes.
+#[derive(Clone, Copy, Debug)]
+pub struct Job {
+    /// Index of the `[[mesh]]`.
+    pub mesh: usize,
+    /// From its file to the space it is stored in; of a copy, from there to the world.
+    pub affine: DAffine3,
+    /// Instead of all its materials.
+    pub material: Option<u32>,
+    /// A sphere that is stored as one, not as triangles.
+    pub exact: bool,
+}
+
+/// What is baked into world space, stored for instances, and placed.
+#[derive(Debug, Default)]
+pub struct Plan {
+    /// Triangles in world space.
+    pub baked: Vec<Job>,
+    /// Triangles in object space; every one is placed by a copy.
+    pub stored: Vec<Job>,
+    /// In the order of the file.
+    pub copies: Vec<Job>,
+}
+
+/// Sorts meshes into baked and stored ones.
+///
+/// # Errors
+/// For unknown names and transforms without inverse.
+pub fn plan(sources: &Sources) -> Result<Plan> {
+    let mut planner = Planner::new(sources);
+    for (number, table) in sources.description.instance.iter().enumerate() {
+        planner.place(&format!("instance {} of mesh \"{}\"", number + 1, table.mesh), table)?;
+    }
+    for mesh in 0..sources.description.mesh.len() {
+        planner.keep(mesh)?;
+    }
+    Ok(planner.plan)
+}
+
+/// The material that replaces all of a mesh's own.
+///
+/// # Errors
+/// For one that is not there.
+pub fn override_of(sources: &Sources, job: &Job) -> Result<Option<u32>> {
+    let table = &sources.description.mesh[job.mesh];
+    let place = || format!("mesh \"{}\"", mesh_name(table));
+    let own = table.material.as_ref().map(|m| sources.material(m, &place())).transpose()?;
+    Ok(job.material.or(own))
+}
+
+struct Planner<'s, 'a> {
+    sources: &'s Sources<'a>,
+    plan: Plan,
+    /// Of a name, the first mesh.
+    named: HashMap<&'a str, usize>,
+    /// By mesh: whether an instance names it, and whether one of them is a copy.
+    instanced: Vec<bool>,
+    copied: Vec<bool>,
+    /// By mesh: whether it is stored as a sphere so far, and whether its instances stretch it, since rays meet a sphere in its
+    /// own space.
+    exact: Vec<bool>,
+    stretched: Vec<bool>,
+    /// By mesh and material: whether it is a textured light.
+    textured: HashMap<(usize, Option<u32>), bool>,
+}
+
+impl<'s, 'a> Planner<'s, 'a> {
+    fn new(sources: &'s Sources<'a>) -> Self {
+        let meshes = &sources.description.mesh;
+        let named = meshes.iter().enumerate().rev().filter_map(|(i, m)| Some((m.name.as_deref()?, i)));
+        Self {
+            sources,
+            plan: Plan::default(),
+            named: named.collect(),
+            instanced: vec![false; meshes.len()],
+            copied: vec![false; meshes.len()],
+            exact: meshes.iter().map(is_sphere).collect(),
+            stretched: meshes.iter().map(|m| is_sphere(m) && !is_even(&m.transform.0)).collect(),
+            textured: HashMap::new(),
+        }
+    }
+
+    /// Places an instance.
+    fn place(&mut self, place: &str, table: &InstanceTable) -> Result<()> {
+        let (sources, meshes) = (self.sources, &self.sources.description.mesh);
+        let Some(&mesh) = self.named.get(table.mesh.as_str()) else {
+            let names = meshes.iter().filter_map(|m| m.name.as_deref());
+            let near = description::nearest(&table.mesh, names).unwrap_or("(none has a name)");
+            return Err(sources.at(place, format!("no such mesh: did you mean \"{near}\"?")));
+        };
+        self.instanced[mesh] = true;
+        let affine = invertible(sources, table.transform.0, place)?;
+        let material = table.material.as_ref().map(|m| sources.material(m, place)).transpose()?;
+        let own = invertible(sources, meshes[mesh].transform.0, place)?;
+        let whole = Job { mesh, affine: affine * own, material, exact: false };
+        // Textures of a light are looked up by the corners' order, which a mirrored light has to swap: bake it.
+        let baked = affine.matrix3.determinant() < 0.0 && self.is_textured_light(&whole)?;
+        self.exact[mesh] = self.exact[mesh] && may_be_exact(sources, &whole)?;
+        match baked {
+            true => self.plan.baked.push(whole),
+            false if self.stretched[mesh] => self.plan.copies.push(whole),
+            false => self.plan.copies.push(Job { affine, ..whole }),
+        }
+        self.copied[mesh] |= !baked;
+        Ok(())
+    }
+
+    /// Stores a mesh for its instances, or where it has none, bakes it.
+    fn keep(&mut self, mesh: usize) -> Result<()> {
+        let table = &self.sources.description.mesh[mesh];
+        let affine = invertible(self.sources, table.transform.0, &format!("mesh \"{}\"", mesh_name(table)))?;
+        let job = Job { mesh, affine, material: None, exact: false };
+        let (exact, stretched) = (self.exact[mesh], self.stretched[mesh]);
+        if !self.instanced[mesh] {
+            let exact = exact && may_be_exact(self.sources, &job)?;
+            match exact && stretched {
+                true => {
+                    self.plan.stored.push(Job { affine: DAffine3::IDENTITY, exact, ..job });
+                    self.plan.copies.push(job);
+                }
+                false => self.plan.baked.push(Job { exact, ..job }),
+            }
+        } else if self.copied[mesh] {
+            let affine = if stretched { DAffine3::IDENTITY } else { affine };
+            self.plan.stored.push(Job { affine, exact, ..job });
+        }
+        Ok(())
+    }
+
+    fn is_textured_light(&mut self, job: &Job) -> Result<bool> {
+        if let Some(&known) = self.textured.get(&(job.mesh, job.material)) {
+            return Ok(known);
+        }
+        let sources = self.sources;
+        let textured = |i: u32| {
+            let m = &sources.library.materials.list[i as usize];
+            m.emission != [0.0; 3] && (m.emission_texture != NONE || m.opacity_texture != NONE)
+        };
+        let file = sources.file_of(&sources.description.mesh[job.mesh]).and_then(|path| sources.files.get(&path));
+        let found = match (override_of(sources, job)?, file) {
+            (Some(index), _) => textured(index),
+            (None, Some(file)) => file.parts.iter().any(|part| textured(part.material)),
+            (None, None) => false,
+        };
+        self.textured.insert((job.mesh, job.material), found);
+        Ok(found)
+    }
+}
+
+/// Whether a sphere can be stored as one, where `job` places it in the world. Lamps are chosen by the cone in which they are
+/// seen: that takes a sphere of even radiance which emits outward.
+fn may_be_exact(sources: &Sources, job: &Job) -> Result<bool> {
+    let table = &sources.description.mesh[job.mesh];
+    let even = |m: &Material| m.emission_texture == NONE && m.flags & MATERIAL_MASKED == 0;
+    let lamp = override_of(sources, job)?.map(|m| &sources.library.materials.list[m as usize]);
+    let lamp = lamp.filter(|m| m.emission != [0.0; 3]);
+    Ok(is_sphere(table) && lamp.is_none_or(|m| even(m) && is_even(&job.affine) && !table.flip_normals))
+}
+
+fn invertible(sources: &Sources, affine: DAffine3, place: &str) -> Result<DAffine3> {
+    let det = affine.matrix3.determinant();
+    match affine.is_finite() && det.abs() > 1e-60 && affine.inverse().is_finite() {
+        true => Ok(affine),
+        false => Err(sources.at(place, "its transform has no inverse: choose scales other than 0")),
+    }
+}
+
+/// A sphere that need not be tessellated: nobody asks for its segments or facets.
+fn is_sphere(table: &MeshTable) -> bool {
+    table.shape == Some(Shape::Sphere) && table.segments.is_none() && !table.flat
+}
+
+/// Whether spheres stay spheres, up to what six digits of a matrix leave open.
+fn is_even(affine: &DAffine3) -> bool {
+    let gram = affine.matrix3.transpose() * affine.matrix3;
+    let mean = (gram.x_axis.x + gram.y_axis.y + gram.z_axis.z) / 3.0;
+    (gram * (1.0 / mean)).abs_diff_eq(DMat3::IDENTITY, 1e-5)
+}

@@ -1,0 +1,129 @@
+//! What a description names, read: materials, OBJ files and the warnings about them.
+use crate::error::{Error, Result};
+use crate::scene::description::mesh::Mesh;
+use crate::scene::description::{self, Description, MeshTable};
+use crate::scene::load::library::Library;
+use crate::scene::load::obj::{self, ObjFile};
+use std::collections::{BTreeSet, HashMap};
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+
+/// The sources of one scene.
+pub struct Sources<'a> {
+    /// Of the scene file, for messages and for what it names.
+    pub path: &'a Path,
+    /// What to build.
+    pub description: &'a Description,
+    /// Materials and warnings so far.
+    pub library: Library,
+    /// Parsed files that meshes still need.
+    pub files: HashMap<PathBuf, ObjFile<'a>>,
+}
+
+/// `mesh "name"`, by its own name, its file's or its shape's.
+pub fn mesh_name(mesh: &MeshTable) -> String {
+    match (&mesh.name, &mesh.file, mesh.shape) {
+        (Some(name), ..) => name.clone(),
+        (_, Some(file), _) => file.display().to_string(),
+        (_, _, Some(shape)) => format!("{shape:?}").to_lowercase(),
+        _ => "unnamed".into(),
+    }
+}
+
+impl<'a> Sources<'a> {
+    /// Takes the bitmaps and materials of a description, and reads the MTL files that OBJ files name near their beginning;
+    /// others are read when they turn up.
+    ///
+    /// # Errors
+    /// For what is wrong with them, with its place.
+    pub fn new(path: &'a Path, description: &'a Description) -> Result<Self> {
+        let mut sources = Self { path, description, library: Library::default(), files: HashMap::new() };
+        sources.add_bitmaps()?;
+        sources.add_materials()?;
+        let paths: BTreeSet<_> = description.mesh.iter().filter_map(|m| sources.file_of(m)).collect();
+        paths.iter().try_for_each(|path| sources.library.read_ahead(path))?;
+        Ok(sources)
+    }
+
+    /// What paths are relative to.
+    pub fn directory(&self) -> &'a Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+
+    /// An error at a place in the scene file.
+    pub fn at(&self, place: impl Display, what: impl Display) -> Error {
+        Error::input_at(self.path, place, what)
+    }
+
+    fn add_bitmaps(&mut self) -> Result<()> {
+        for bitmap in &self.description.bitmap {
+            let taken = self.library.materials.textures.add_bitmap(bitmap);
+            taken.map_err(|what| self.at(format!("bitmap \"{}\"", bitmap.name.display()), what))?;
+        }
+        Ok(())
+    }
+
+    fn add_materials(&mut self) -> Result<()> {
+        for table in &self.description.material {
+            let place = format!("material \"{}\"", table.name);
+            let directory = self.directory();
+            let Library { materials, warnings, .. } = &mut self.library;
+            let index = materials.push_table(table, directory, warnings).map_err(|what| self.at(&place, what))?;
+            if table.name.is_empty() {
+                return Err(self.at("[[material]]", "has no name: meshes could not refer to it"));
+            }
+            if self.library.tables.insert(table.name.clone(), index).is_some() {
+                return Err(self.at(place, "is defined twice: rename one"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Parses every OBJ file. All are needed before the first is placed: whether texture coordinates are kept depends on all
+    /// materials.
+    ///
+    /// # Errors
+    /// For a mesh without a source or with two, and for what is wrong with a source.
+    pub fn read_files(&mut self) -> Result<()> {
+        for mesh in &self.description.mesh {
+            self.check(mesh)?;
+            let Some(path) = self.file_of(mesh) else { continue };
+            if !self.files.contains_key(&path) {
+                let parsed = obj::load(&path, &mut self.library)?;
+                self.files.insert(path, parsed);
+            }
+        }
+        Ok(())
+    }
+
+    fn check(&self, mesh: &MeshTable) -> Result<()> {
+        let place = || format!("mesh \"{}\"", mesh_name(mesh));
+        let sources = [mesh.file.is_some(), mesh.shape.is_some(), mesh.data.is_some()];
+        if sources.into_iter().filter(|there| *there).count() != 1 {
+            return Err(self.at(place(), "needs either a file or a shape (or, in memory, data)"));
+        }
+        mesh.data.as_ref().map_or(Ok(()), Mesh::check).map_err(|what| self.at(place(), what))?;
+        match mesh.segments.filter(|n| !(3..=4096).contains(n)) {
+            Some(n) => Err(self.at(place(), format!("segments is {n}: choose a value from 3 to 4096"))),
+            None => Ok(()),
+        }
+    }
+
+    /// Path of a mesh's OBJ file.
+    pub fn file_of(&self, table: &MeshTable) -> Option<PathBuf> {
+        Some(self.directory().join(table.file.as_ref()?.to_string_lossy().replace('\\', "/")))
+    }
+
+    /// Index of a `[[material]]`.
+    ///
+    /// # Errors
+    /// With the nearest name, when there is none of that name.
+    pub fn material(&self, name: &str, place: &str) -> Result<u32> {
+        let known = self.library.tables.keys().map(String::as_str);
+        match (self.library.tables.get(name), description::nearest(name, known)) {
+            (Some(&index), _) => Ok(index),
+            (None, Some(near)) => Err(self.at(place, format!("no material \"{name}\": did you mean \"{near}\"?"))),
+            (None, None) => Err(self.at(place, format!("no material \"{name}\": add a [[material]] table"))),
+        }
+    }
+}

@@ -1,0 +1,226 @@
+//! Meshes become triangles in one array: first those in world space, then one mesh after another.
+use super::geometry::{Corners, Geometry, Placement, Repairs, Tag, TooFar};
+use super::plan::{Job, Plan, override_of};
+use super::sources::{Sources, mesh_name};
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::scene::MAX_COORDINATE;
+use crate::scene::description::mesh::Mesh;
+use crate::scene::description::{self, MeshTable};
+use crate::scene::load::obj::ObjFile;
+use crate::scene::load::obj_part::Part;
+use std::borrow::Cow;
+use std::collections::HashMap;
+use std::ops::Range;
+
+/// Bytes that a triangle takes while the hierarchy over it is built, with what it is made of and its shading: 316 to build.
+const BYTES_OF_TRIANGLE: u64 = 400;
+
+/// A mesh in the triangle array: where, and how it is called.
+pub struct Stored {
+    /// Index of the `[[mesh]]`; `None`: all that is in world space.
+    pub mesh: Option<usize>,
+    /// Triangles.
+    pub range: Range<usize>,
+    /// Names of its objects.
+    pub objects: Vec<String>,
+}
+
+/// Puts all triangles into the array; world space comes first, and is always there. Files are dropped after their last use.
+///
+/// # Errors
+/// For an unknown group or material, coordinates that are too large, and [`Error::Memory`].
+pub fn store(sources: &mut Sources, plan: &Plan, geometry: &mut Geometry) -> Result<Vec<Stored>> {
+    let jobs: Vec<&Job> = plan.baked.iter().chain(&plan.stored).collect();
+    let triangles: u64 = jobs.iter().map(|job| triangles_of(sources, job)).sum();
+    memory::need(format!("{}: {triangles} triangles", sources.path.display()), triangles * BYTES_OF_TRIANGLE)?;
+    warn_of_grey(sources, plan)?;
+    let description = sources.description;
+    let file = |job: &Job| description.mesh[job.mesh].file.as_ref();
+    let latest: HashMap<_, _> = jobs.iter().enumerate().map(|(i, job)| (file(job), i)).collect();
+    let last: Vec<bool> = jobs.iter().enumerate().map(|(i, job)| latest[&file(job)] == i).collect();
+    let mut stored = vec![Stored { mesh: None, range: 0..0, objects: Vec::new() }];
+    for (i, job) in jobs.into_iter().enumerate() {
+        let start = geometry.triangles.len();
+        let baked = i < plan.baked.len();
+        let first = if baked { stored[0].objects.len() as u32 } else { 0 };
+        let objects = Addition::new(sources, job, first)?.add(sources, geometry, last[i])?;
+        let end = geometry.triangles.len();
+        if baked {
+            stored[0].objects.extend(objects);
+            stored[0].range.end = end;
+        } else {
+            stored.push(Stored { mesh: Some(job.mesh), range: start..end, objects });
+        }
+    }
+    sources.files.clear();
+    Ok(stored)
+}
+
+/// How many triangles a mesh has before any is dropped.
+fn triangles_of(sources: &Sources, job: &Job) -> u64 {
+    let table = &sources.description.mesh[job.mesh];
+    let file = sources.file_of(table).and_then(|path| sources.files.get(&path));
+    if job.exact { 1 } else { triangles(table, file) }
+}
+
+fn triangles(table: &MeshTable, file: Option<&ObjFile>) -> u64 {
+    let of_file = |file: &ObjFile| parts_of(table, file).map(|(part, _)| part.mesh.triangles() as u64).sum();
+    match (&table.data, table.shape, file) {
+        (Some(mesh), ..) => mesh.triangles() as u64,
+        (_, Some(shape), _) => shape.triangles(segments(table)),
+        (.., file) => file.map_or(0, of_file),
+    }
+}
+
+/// The parts of a file that a mesh consists of, each with the number of its first triangle in the file.
+fn parts_of<'f>(table: &'f MeshTable, file: &'f ObjFile) -> impl Iterator<Item = (&'f Part<'f>, u32)> {
+    let numbered = file.parts.iter().scan(0, |next, part| {
+        let first = *next;
+        *next += part.mesh.triangles() as u32;
+        Some((part, first))
+    });
+    numbered.filter(|(part, _)| table.group.as_ref().is_none_or(|g| *g == part.name))
+}
+
+/// Edges around a tessellated shape.
+fn segments(table: &MeshTable) -> u32 {
+    table.segments.unwrap_or(64)
+}
+
+/// Says where grey stands in for a material of a file that some mesh wears.
+fn warn_of_grey(sources: &mut Sources, plan: &Plan) -> Result<()> {
+    let meshes = &sources.description.mesh;
+    let (mut worn, mut copies) = (vec![false; meshes.len()], vec![false; meshes.len()]);
+    plan.copies.iter().filter(|copy| copy.material.is_none()).for_each(|copy| copies[copy.mesh] = true);
+    for job in plan.baked.iter().chain(plan.stored.iter().filter(|job| copies[job.mesh])) {
+        worn[job.mesh] |= override_of(sources, job)?.is_none();
+    }
+    for (table, _) in meshes.iter().zip(worn).filter(|(_, worn)| *worn) {
+        let file = sources.file_of(table).and_then(|path| sources.files.get_mut(&path));
+        sources.library.warnings.extend(file.and_then(|file| file.grey.take()));
+    }
+    Ok(())
+}
+
+/// A mesh on its way into the triangle array.
+struct Addition<'a> {
+    job: Job,
+    table: &'a MeshTable,
+    place: String,
+    /// Instead of the parts' own.
+    material: Option<u32>,
+    placement: Placement,
+    /// Object index of the first part.
+    first: u32,
+}
+
+impl<'a> Addition<'a> {
+    fn new(sources: &Sources<'a>, job: &Job, first: u32) -> Result<Self> {
+        let table = &sources.description.mesh[job.mesh];
+        // Who hands over triangles without normals means it: in memory all vertices have one or none has.
+        let meant = table.data.as_ref().is_some_and(|mesh| mesh.normals.is_empty());
+        let uvs = sources.library.materials.textures.len() > 0;
+        let placement = Placement { affine: job.affine, flat: table.flat || meant, flip: table.flip_normals, uvs };
+        let place = format!("mesh \"{}\"", mesh_name(table));
+        Ok(Self { job: *job, table, place, material: override_of(sources, job)?, placement, first })
+    }
+
+    /// Adds the triangles; returns the names of the objects.
+    fn add(&self, sources: &mut Sources<'a>, geometry: &mut Geometry, last_use: bool) -> Result<Vec<String>> {
+        let file = self.take_file(sources);
+        self.check_group(sources, &file)?;
+        let before = geometry.triangles.len();
+        let more = if self.job.exact { 1 } else { triangles(self.table, Some(&file)) as usize };
+        memory::reserve(&self.place, &mut geometry.triangles, more)?;
+        if !geometry.shading.is_empty() {
+            memory::reserve(&self.place, &mut geometry.shading, more)?;
+        }
+        let mut repairs = Repairs::default();
+        let objects = self.add_parts(&file, geometry, &mut repairs).map_err(|TooFar(v)| {
+            sources.at(&self.place, format!("has a coordinate of {v:e}: the limit is {MAX_COORDINATE:e}"))
+        })?;
+        repairs.copies = geometry.drop_copies(before);
+        let repaired = repairs.warning(&self.place);
+        if geometry.triangles.len() == before {
+            let why = repaired.as_deref().unwrap_or("no face is in it: is it an OBJ file?");
+            match sources.file_of(self.table) {
+                Some(path) => return Err(Error::input(path, format!("has no triangles: {why}"))),
+                None => sources.library.warnings.push(format!("{} has no triangles", self.place)),
+            }
+        }
+        sources.library.warnings.extend(repaired);
+        if let (Some(path), false) = (sources.file_of(self.table), last_use) {
+            sources.files.insert(path, file);
+        }
+        Ok(objects)
+    }
+
+    /// The parsed file, taken out of the store, or a shape, or what is in memory.
+    fn take_file(&self, sources: &mut Sources<'a>) -> ObjFile<'a> {
+        if let Some(file) = sources.file_of(self.table).and_then(|path| sources.files.remove(&path)) {
+            return file;
+        }
+        let shape = || self.table.shape.filter(|_| !self.job.exact).map(|s| Cow::Owned(s.mesh(segments(self.table))));
+        let mesh = self.table.data.as_ref().map(Cow::Borrowed).or_else(shape).unwrap_or_default();
+        let part = Part { name: String::new(), material: sources.library.grey(), mesh };
+        ObjFile { parts: vec![part], grey: None }
+    }
+
+    fn check_group(&self, sources: &Sources, file: &ObjFile) -> Result<()> {
+        match self.table.group.as_ref().filter(|g| !file.parts.iter().any(|part| part.name == **g)) {
+            Some(group) => {
+                let names = file.parts.iter().map(|part| part.name.as_str());
+                let near = description::nearest(group, names).unwrap_or("(none)");
+                Err(sources.at(&self.place, format!("no group \"{group}\": did you mean \"{near}\"?")))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Parts of one object follow each other; they have one name and one index.
+    fn add_parts(
+        &self,
+        file: &ObjFile,
+        geometry: &mut Geometry,
+        repairs: &mut Repairs,
+    ) -> std::result::Result<Vec<String>, TooFar> {
+        let (mut names, mut previous) = (Vec::new(), None);
+        for (part, primitive) in parts_of(self.table, file) {
+            if previous != Some(&part.name) {
+                names.push(object_name(&mesh_name(self.table), &part.name));
+                previous = Some(&part.name);
+            }
+            let object = self.first + names.len() as u32 - 1;
+            let tag = Tag { primitive, material: self.material.unwrap_or(part.material), object };
+            match self.job.exact {
+                true => geometry.push_sphere(tag, &self.placement, repairs)?,
+                false => add_mesh(geometry, &part.mesh, tag, &self.placement, repairs)?,
+            }
+        }
+        Ok(names)
+    }
+}
+
+fn object_name(mesh: &str, object: &str) -> String {
+    if object.is_empty() || object == "unnamed_object" { mesh.to_owned() } else { format!("{mesh}/{object}") }
+}
+
+fn add_mesh(
+    geometry: &mut Geometry,
+    mesh: &Mesh,
+    first: Tag,
+    at: &Placement,
+    repairs: &mut Repairs,
+) -> std::result::Result<(), TooFar> {
+    for (t, corners) in (0..).zip(mesh.indices.as_chunks().0) {
+        let corners: [usize; 3] = corners.map(|i| i as usize);
+        let c = Corners {
+            p: corners.map(|i| mesh.positions[i].into()),
+            n: (!mesh.normals.is_empty()).then(|| corners.map(|i| mesh.normals[i].into())),
+            uv: (!mesh.uvs.is_empty()).then(|| corners.map(|i| mesh.uvs[i].into())),
+        };
+        geometry.push(&c, Tag { primitive: first.primitive + t, ..first }, at, repairs)?;
+    }
+    Ok(())
+}

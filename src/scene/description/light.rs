@@ -1,0 +1,100 @@
+//! The `[[light]]` tables.
+use super::value::Rgb;
+use crate::layout::{LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT, Light, NONE};
+use crate::scene::MAX_COORDINATE;
+use glam::Vec3;
+use serde::Deserialize;
+
+/// Which light a `[[light]]` table is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Type {
+    /// In all directions from `position`.
+    #[default]
+    Point,
+    /// In a cone from `position`.
+    Spot,
+    /// Parallel light.
+    Directional,
+}
+
+/// A `[[light]]` table. Positions in world units.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LightTable {
+    /// Which.
+    #[serde(rename = "type")]
+    pub kind: Type,
+    /// Point, spot.
+    pub position: Option<[f32; 3]>,
+    /// Spot, directional: the way light travels; any length.
+    pub direction: Option<[f32; 3]>,
+    /// Spot: a point on its axis, instead of `direction`.
+    pub target: Option<[f32; 3]>,
+    /// Point, spot (on its axis): W/sr.
+    pub intensity: Option<Rgb>,
+    /// Directional: W/m^2 on a facing plane.
+    pub irradiance: Option<Rgb>,
+    /// Spot: degrees from the axis up to which intensity is full; default three quarters of `cutoff`.
+    pub cone: Option<f32>,
+    /// Spot: degrees from the axis beyond which there is none; default 20. In between intensity falls linearly with the angle.
+    pub cutoff: Option<f32>,
+}
+
+impl LightTable {
+    /// The device's light.
+    ///
+    /// # Errors
+    /// A sentence that names the key at fault.
+    pub fn build(&self) -> Result<Light, String> {
+        let position = || finite(self.position.ok_or("needs a position")?, "position");
+        let light = Light { triangle: NONE, material: NONE, ..Light::default() };
+        match self.kind {
+            Type::Point => {
+                let value = emitted(self.intensity, "intensity")?;
+                Ok(Light { kind: LIGHT_POINT, a: position()?, value, ..light })
+            }
+            Type::Directional => {
+                let value = emitted(self.irradiance, "irradiance")?;
+                Ok(Light { kind: LIGHT_DIRECTIONAL, b: self.axis(Vec3::ZERO)?, value, ..light })
+            }
+            Type::Spot => {
+                let a = position()?;
+                let cutoff = self.cutoff.unwrap_or(20.0);
+                let cone = self.cone.unwrap_or(cutoff * 0.75);
+                if !((0.0..=cutoff).contains(&cone) && cutoff > 0.0 && cutoff <= 180.0) {
+                    return Err(format!("cone {cone} and cutoff {cutoff}: need 0 <= cone <= cutoff <= 180 degrees"));
+                }
+                let c = [cone.to_radians().cos(), cutoff.to_radians().cos(), 0.0];
+                let value = emitted(self.intensity, "intensity")?;
+                Ok(Light { kind: LIGHT_SPOT, a, b: self.axis(a.into())?, c, value, ..light })
+            }
+        }
+    }
+
+    /// Unit direction of travel.
+    fn axis(&self, from: Vec3) -> Result<[f32; 3], String> {
+        let direction = match (self.direction, self.target) {
+            (Some(d), None) => Vec3::from(d),
+            (None, Some(t)) if self.kind == Type::Spot => Vec3::from(t) - from,
+            _ => return Err("needs a direction (spot: or a target), not both".into()),
+        };
+        let unit = direction.as_dvec3().try_normalize().ok_or("the direction has no length")?;
+        Ok(unit.as_vec3().to_array())
+    }
+}
+
+fn finite(v: [f32; 3], key: &str) -> Result<[f32; 3], String> {
+    match v.iter().all(|v| v.abs() <= MAX_COORDINATE as f32) {
+        true => Ok(v),
+        false => Err(format!("{key} {v:?} is not within {:e}", MAX_COORDINATE)),
+    }
+}
+
+fn emitted(v: Option<Rgb>, key: &str) -> Result<[f32; 3], String> {
+    let v = v.ok_or_else(|| format!("needs {key}"))?.0;
+    match v.iter().all(|v| (0.0..=1e30).contains(v)) {
+        true => Ok(v),
+        false => Err(format!("{key} {v:?} is negative, NaN or above 1e30")),
+    }
+}

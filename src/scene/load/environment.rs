@@ -1,0 +1,34 @@
+//! Images of light from infinitely far.
+use crate::error::{Error, Result};
+use crate::image::{self, Picture};
+use std::path::Path;
+
+/// Reads an image of linear radiance.
+///
+/// # Errors
+/// [`Error::Input`] for a file that cannot be read or decoded, [`Error::Memory`].
+pub fn load(path: &Path) -> Result<Picture> {
+    decode(path, &image::input::read(path)?)
+}
+
+/// [`load`] from bytes; `path` is for messages.
+fn decode(path: &Path, bytes: &[u8]) -> Result<Picture> {
+    image::check_room(path, bytes)?;
+    image::decode(bytes).and_then(|film| film.picture(None)).map_err(|what| unusable(path, &what))
+}
+
+/// What is said about an image that is damaged.
+pub fn unusable(path: &Path, what: &str) -> Error {
+    Error::input(path, format!("is no usable environment image ({what}): save it again as HDR or EXR"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn damage_is_one_line_with_a_remedy() {
+        let error = decode(Path::new("a.hdr"), b"#?RADIANCE\nnonsense").unwrap_err().to_string();
+        assert!(error.starts_with("a.hdr: is no usable environment image") && !error.contains('\n'), "{error}");
+    }
+}

@@ -1,0 +1,191 @@
+//! Materials: what the `[[material]]` tables say.
+use super::metal;
+use super::texture::{Kind, Mapping, TextureSet};
+use crate::layout::*;
+use crate::scene::description::material::{Distribution, MaterialTable, Type};
+use crate::scene::description::value::Rgb;
+use std::path::{Path, PathBuf};
+
+/// The materials of a scene and the textures they ask for.
+#[derive(Debug, Default)]
+pub struct Materials {
+    /// As kernels read them.
+    pub list: Vec<Material>,
+    /// Same order.
+    pub names: Vec<String>,
+    /// Asked for so far.
+    pub textures: TextureSet,
+    /// Materials whose bump height is a share of the scene's size, known only in the end.
+    pub default_bumps: Vec<u32>,
+}
+
+impl Materials {
+    /// A diffuse grey with nothing else on.
+    pub fn plain(color: [f32; 3]) -> Material {
+        Material {
+            base_color: color,
+            kind: BSDF_DIFFUSE,
+            opacity: 1.0,
+            flags: MATERIAL_TWO_SIDED,
+            specular: [1.0; 3],
+            transmission: [1.0; 3],
+            eta: [1.5; 3],
+            bump_scale: 1.0,
+            base_texture: NONE,
+            specular_texture: NONE,
+            opacity_texture: NONE,
+            bump_texture: NONE,
+            roughness_texture: NONE,
+            emission_texture: NONE,
+            ..Material::default()
+        }
+    }
+
+    /// Adds a finished material and returns its index.
+    pub fn push(&mut self, name: &str, mut material: Material) -> u32 {
+        let masked = material.opacity < 1.0 || material.opacity_texture != NONE;
+        if masked && material.kind != BSDF_DIELECTRIC {
+            material.flags |= MATERIAL_MASKED;
+        }
+        self.list.push(material);
+        self.names.push(name.to_owned());
+        self.list.len() as u32 - 1
+    }
+
+    /// Adds a `[[material]]`.
+    ///
+    /// # Errors
+    /// A sentence that names the key at fault.
+    pub fn push_table(&mut self, t: &MaterialTable, directory: &Path, warn: &mut Vec<String>) -> Result<u32, String> {
+        let mut m = Self::plain([0.5; 3]);
+        let named = |key: &str| format!("material \"{}\": {key}", t.name);
+        let tint = |v: Option<Rgb>, or: f32, key: &str, warn: &mut Vec<String>| {
+            reflectance(v.map_or([or; 3], |v| v.0), &named(key), warn)
+        };
+        let body = matches!(t.kind, Type::Diffuse | Type::Coated);
+        let default = if body && t.color_texture.is_none() { 0.5 } else { 1.0 };
+        m.base_color = tint(t.color, default, "color", warn)?;
+        m.specular = tint(if body { t.specular } else { t.specular.or(t.color) }, 1.0, "specular", warn)?;
+        m.transmission = tint(t.transmission, 1.0, "transmission", warn)?;
+        if t.kind == Type::Dielectric {
+            m.specular = tint(t.specular, 1.0, "specular", warn)?;
+        }
+        m.opacity = within(t.opacity.unwrap_or(1.0), 1.0, "opacity")?;
+        let rough = t.roughness_texture.is_some() && t.alpha == 0.0;
+        m.alpha = if rough { 1.0 } else { within(t.alpha, 1.0, "alpha")? };
+        m.emission = radiance(t.emission.map_or([f32::from(t.emission_texture.is_some()); 3], |v| v.0))?;
+        self.interface(&mut m, t)?;
+        if t.two_sided == Some(false) {
+            m.flags &= !MATERIAL_TWO_SIDED;
+        }
+        if t.distribution == Distribution::Ggx {
+            m.flags |= MATERIAL_GGX;
+        }
+        if t.nonlinear {
+            m.flags |= MATERIAL_NONLINEAR;
+        }
+        self.table_textures(&mut m, t, body, directory, warn)?;
+        Ok(self.push(&t.name, m))
+    }
+
+    fn interface(&self, m: &mut Material, t: &MaterialTable) -> Result<(), String> {
+        let ior = t.ior.unwrap_or(1.5);
+        if !(0.1..=10.0).contains(&ior) {
+            return Err(format!("ior is {ior}: choose a value from 0.1 to 10"));
+        }
+        m.eta = [ior; 3];
+        m.kind = match t.kind {
+            Type::Diffuse => BSDF_DIFFUSE,
+            Type::Dielectric => BSDF_DIELECTRIC,
+            Type::Coated => BSDF_COATED,
+            Type::Mirror | Type::Conductor => BSDF_CONDUCTOR,
+        };
+        if m.kind == BSDF_CONDUCTOR {
+            (m.eta, m.k) = ([0.0; 3], [1.0; 3]);
+        }
+        if t.kind == Type::Conductor {
+            if let Some(name) = &t.metal {
+                (m.eta, m.k) = metal::metal(name)?;
+            } else if t.eta.is_some() || t.k.is_some() {
+                (m.eta, m.k) = (t.eta.map_or([1.0; 3], |v| v.0), t.k.map_or([0.0; 3], |v| v.0));
+            }
+        }
+        match m.eta.iter().chain(&m.k).all(|v| (0.0..=100.0).contains(v)) {
+            true => Ok(()),
+            false => Err("eta and k must lie between 0 and 100".into()),
+        }
+    }
+
+    fn table_textures(
+        &mut self,
+        m: &mut Material,
+        t: &MaterialTable,
+        body: bool,
+        directory: &Path,
+        warn: &mut Vec<String>,
+    ) -> Result<(), String> {
+        if t.bump.is_some() && t.normal_map.is_some() {
+            return Err("has both bump and normal_map: choose one".into());
+        }
+        let mut ask = |file: Option<&PathBuf>, kind| match file.map(|f| f.to_string_lossy().replace('\\', "/")) {
+            Some(file) => self.textures.request(directory, &file, kind, Mapping::default(), warn),
+            None => NONE,
+        };
+        if body {
+            m.base_texture = ask(t.color_texture.as_ref(), Kind::Color);
+        }
+        if m.kind != BSDF_DIFFUSE {
+            let tint = if body {
+                &t.specular_texture
+            } else {
+                t.specular_texture.as_ref().map_or(&t.color_texture, |_| &t.specular_texture)
+            };
+            m.specular_texture = ask(tint.as_ref(), Kind::Color);
+            m.roughness_texture = ask(t.roughness_texture.as_ref(), Kind::Roughness);
+        }
+        m.opacity_texture = ask(t.opacity_texture.as_ref(), Kind::Mask);
+        m.emission_texture = ask(t.emission_texture.as_ref(), Kind::Color);
+        m.bump_texture = ask(t.bump.as_ref().or(t.normal_map.as_ref()), Kind::Data);
+        if t.normal_map.is_some() && m.bump_texture != NONE {
+            m.flags |= MATERIAL_NORMAL_MAP;
+        }
+        m.bump_scale = t.bump_scale.unwrap_or(1.0);
+        match m.bump_scale.is_finite() {
+            true => Ok(()),
+            false => Err("bump_scale is not a finite number".into()),
+        }
+    }
+}
+
+/// A colour that must not exceed 1; more is clamped and said so.
+///
+/// # Errors
+/// For one that is not finite.
+pub fn reflectance(color: [f32; 3], what: &str, warn: &mut Vec<String>) -> Result<[f32; 3], String> {
+    if !color.iter().all(|v| v.is_finite()) {
+        return Err(format!("{what} is not finite"));
+    }
+    let clamped = color.map(|v| v.clamp(0.0, 1.0));
+    if clamped != color {
+        warn.push(format!("{what} {color:?} lies outside [0, 1]: clamped"));
+    }
+    Ok(clamped)
+}
+
+/// A colour from 0 to 1e18.
+///
+/// # Errors
+/// With the colour, for another one.
+pub fn radiance(color: [f32; 3]) -> Result<[f32; 3], String> {
+    match color.iter().all(|v| v.is_finite() && (0.0..=1e18).contains(v)) {
+        true => Ok(color),
+        false => Err(format!("emission {color:?} is negative, NaN or above 1e18")),
+    }
+}
+
+fn within(v: f32, max: f32, key: &str) -> Result<f32, String> {
+    match v {
+        v if (0.0..=max).contains(&v) => Ok(v),
+        v => Err(format!("{key} is {v}: choose a value from 0 to {max}")),
+    }
+}

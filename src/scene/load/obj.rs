@@ -1,0 +1,397 @@
+//! OBJ files: statements become meshes line by line, so that every mistake has its line.
+use super::library::{self, Library};
+use super::lines::Lines;
+use super::obj_part::{Corner, NO_EXTRA, Part, PartBuilder};
+use crate::error::{Error, Result};
+use crate::image::input;
+use crate::layout::NONE;
+use crate::memory;
+use std::collections::{BTreeSet, HashMap, HashSet};
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+
+/// What is read of a line, or what is wrong with it.
+type Checked<T> = std::result::Result<T, String>;
+
+/// A parsed OBJ file.
+#[derive(Debug, Default)]
+pub struct ObjFile<'a> {
+    /// At least one. An object is split wherever its material changes, and where faces begin or cease to have normals
+    /// (texture coordinates); its parts follow each other.
+    pub parts: Vec<Part<'a>>,
+    /// What is said when a mesh wears the file's own materials, and grey stands in for some.
+    pub grey: Option<String>,
+}
+
+/// Reads an OBJ file and the MTL files it names.
+///
+/// # Errors
+/// [`Error::Input`] with file, line, what is wrong and what to do; [`Error::Memory`].
+pub fn load(path: &Path, library: &mut Library) -> Result<ObjFile<'static>> {
+    parse(path, BufReader::with_capacity(1 << 18, input::open(path)?), library)
+}
+
+/// [`load`] from any reader; `path` is for messages and for finding the MTL files.
+///
+/// # Errors
+/// See [`load`].
+pub fn parse(path: &Path, reader: impl BufRead, library: &mut Library) -> Result<ObjFile<'static>> {
+    let mut lines = Lines::new(reader);
+    let mut parser = Parser::new(path, library);
+    while let Some(line) =
+        lines.next().map_err(|(number, what)| Error::input_at(path, format!("line {number}"), what))?
+    {
+        parser.line = line.number;
+        parser.statement(&line.text)?;
+        parser.ask()?;
+    }
+    Ok(parser.finish())
+}
+
+/// Estimated bytes that a parsed file takes before memory is asked for the first time.
+const UNASKED: u64 = 1 << 26;
+/// Bytes that a part takes, with its name, about. Those of the arrays below count twice: arrays double when they are full.
+const BYTES_OF_PART: u64 = 400;
+const BYTES_OF_VERTEX: u64 = 2 * (12 + 4);
+const BYTES_OF_CORNER: u64 = 2 * (12 + 12 + 8 + 16);
+const BYTES_OF_TRIANGLE: u64 = 2 * 12;
+
+struct Parser<'a> {
+    path: &'a Path,
+    library: &'a mut Library,
+    /// Number of the line that is read.
+    line: usize,
+    /// `v`, `vt` and `vn` so far.
+    positions: Vec<[f32; 3]>,
+    uvs: Vec<[f32; 2]>,
+    normals: Vec<[f32; 3]>,
+    parts: Vec<Part<'static>>,
+    part: PartBuilder,
+    corners: Vec<Corner>,
+    /// Materials by name: the scene file's own, and those of the libraries read so far.
+    names: HashMap<String, u32>,
+    /// Names after `usemtl`.
+    worn: BTreeSet<String>,
+    /// `mtllib` statements, and the true paths of what they name: each is read once.
+    statements: HashSet<String>,
+    libraries: HashSet<PathBuf>,
+    /// Libraries that are nowhere.
+    missing: BTreeSet<String>,
+    /// Faces of one or two corners, dropped: how many, and the line of the first.
+    short_faces: (usize, usize),
+    /// Bytes that what was read so far takes, about, and how many of them memory was asked for.
+    held: u64,
+    asked: u64,
+}
+
+impl<'a> Parser<'a> {
+    fn new(path: &'a Path, library: &'a mut Library) -> Self {
+        Self {
+            path,
+            names: library.tables.clone(),
+            library,
+            line: 0,
+            positions: Vec::new(),
+            uvs: Vec::new(),
+            normals: Vec::new(),
+            parts: Vec::new(),
+            part: PartBuilder::default(),
+            corners: Vec::new(),
+            worn: BTreeSet::new(),
+            statements: HashSet::new(),
+            libraries: HashSet::new(),
+            missing: BTreeSet::new(),
+            short_faces: (0, 0),
+            held: 0,
+            asked: UNASKED,
+        }
+    }
+
+    /// What a path tracer has no use for, lines and points among it, is passed over.
+    fn statement(&mut self, text: &str) -> Result<()> {
+        let text = text.trim_start();
+        let (key, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+        let outcome = match key {
+            "v" => self.vertex(rest),
+            "vt" => self.uv(rest),
+            "vn" => self.normal(rest),
+            "f" => self.face(rest),
+            "o" | "g" => {
+                self.end_part();
+                self.part.rename(rest.trim());
+                Ok(())
+            }
+            "usemtl" => self.wear(rest.trim()),
+            "mtllib" => return self.read_libraries(rest.trim()),
+            _ => Ok(()),
+        };
+        outcome.map_err(|what| Error::input_at(self.path, format!("line {}", self.line), what))
+    }
+
+    /// A fourth number is a weight that the others are divided by; five numbers or more end in a colour, which is dropped.
+    fn vertex(&mut self, rest: &str) -> Checked<()> {
+        let what = "a vertex needs three numbers after v";
+        let mut position = numbers(rest, what)?;
+        let mut more = rest.split_whitespace().skip(3);
+        if let (Some(w), None) = (more.next(), more.next()) {
+            let [w]: [f32; 1] = numbers(w, what)?;
+            if w == 0.0 {
+                return Err(mend("the fourth number of a vertex (w) is 0"));
+            }
+            position = position.map(|v: f32| v / w);
+        }
+        self.positions.push(position);
+        self.held += BYTES_OF_VERTEX;
+        Ok(())
+    }
+
+    fn uv(&mut self, rest: &str) -> Checked<()> {
+        self.uvs.push(numbers(rest, "a texture coordinate needs two numbers after vt")?);
+        self.held += 16;
+        Ok(())
+    }
+
+    fn normal(&mut self, rest: &str) -> Checked<()> {
+        self.normals.push(numbers(rest, "a normal needs three numbers after vn")?);
+        self.held += 24;
+        Ok(())
+    }
+
+    /// The corners of a face have the texture coordinates (normals) that all of them have, or none.
+    fn face(&mut self, rest: &str) -> Checked<()> {
+        self.corners.clear();
+        for word in rest.split_ascii_whitespace() {
+            let corner = self.corner(word)?;
+            self.corners.push(corner);
+        }
+        match self.corners.len() {
+            0 => return Err("the face names no vertices: delete the line".into()),
+            1 | 2 => {
+                let (count, first) = self.short_faces;
+                self.short_faces = (count + 1, if count == 0 { self.line } else { first });
+                return Ok(());
+            }
+            _ => {}
+        }
+        let has = [1, 2].map(|extra| self.corners.iter().all(|corner| corner[extra] != NO_EXTRA));
+        if self.part.differs(has) {
+            self.end_part();
+        }
+        let made = self.part.face(&self.corners, has, [&self.positions, &self.normals], &self.uvs);
+        self.held += BYTES_OF_TRIANGLE * (self.corners.len() as u64 - 2) + BYTES_OF_CORNER * made as u64;
+        Ok(())
+    }
+
+    /// The indices of `v/vt/vn`, from 0 on. Negative ones count back from the last one defined.
+    fn corner(&self, word: &str) -> Checked<Corner> {
+        const KINDS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
+        let defined = [self.positions.len(), self.uvs.len(), self.normals.len()];
+        let mut corner = [NO_EXTRA; 3];
+        for (i, part) in word.split('/').enumerate() {
+            if part.is_empty() && i > 0 {
+                continue;
+            }
+            let count = *defined.get(i).ok_or_else(|| format!("\"{word}\" has more than two slashes"))? as i64;
+            let index: i64 = part.parse().map_err(|_| format!("\"{word}\" is no vertex of a face"))?;
+            if index == 0 || index > count || index < -count {
+                let what = format!("the face uses {} {index}, but {count} are defined above it", KINDS[i]);
+                return Err(format!("{what}: export the file again"));
+            }
+            let place = if index > 0 { index - 1 } else { count + index };
+            corner[i] = u32::try_from(place).map_err(|_| "the file has more than 2^32 vertices: split it")?;
+        }
+        Ok(corner)
+    }
+
+    fn wear(&mut self, name: &str) -> Checked<()> {
+        if name.is_empty() {
+            return Err(mend("usemtl names no material"));
+        }
+        if !self.worn.contains(name) {
+            self.worn.insert(name.to_owned());
+        }
+        let material = self.names.get(name).copied().unwrap_or(NONE);
+        if self.part.material != material {
+            self.end_part();
+            self.part.material = material;
+        }
+        Ok(())
+    }
+
+    fn read_libraries(&mut self, statement: &str) -> Result<()> {
+        if !self.statements.insert(statement.to_owned()) {
+            return Ok(());
+        }
+        let (found, missing) = library::find(self.path, statement);
+        self.missing.extend(missing);
+        for path in found {
+            if self.libraries.insert(path.canonicalize().unwrap_or_else(|_| path.clone())) {
+                self.names.extend(self.library.mtl(&path)?.iter().cloned());
+            }
+        }
+        Ok(())
+    }
+
+    /// What follows is another part, if this one has faces.
+    fn end_part(&mut self) {
+        if !self.part.is_empty() {
+            self.parts.push(self.part.take());
+            self.held += BYTES_OF_PART;
+        }
+    }
+
+    /// Asks for as much memory again whenever what is held has doubled.
+    fn ask(&mut self) -> Result<()> {
+        if self.held <= self.asked {
+            return Ok(());
+        }
+        self.asked = 2 * self.held;
+        let about =
+            |lack| Error::Memory(format!("{}, line {}: {lack}; split the file", self.path.display(), self.line));
+        memory::check(self.held).map_err(about)
+    }
+
+    /// The last part is kept even without faces: a file has at least one.
+    fn finish(mut self) -> ObjFile<'static> {
+        self.parts.push(self.part.take());
+        if let (short @ 1.., line) = self.short_faces {
+            let what = format!("{short} of fewer than three corners dropped, the first in line {line}");
+            self.library.warnings.push(format!("{}: faces repaired: {what}", self.path.display()));
+        }
+        for part in self.parts.iter_mut().filter(|part| part.material == NONE) {
+            part.material = self.library.grey();
+        }
+        ObjFile { grey: self.grey(), parts: self.parts }
+    }
+
+    /// What is said of the names that are worn and defined nowhere.
+    fn grey(&self) -> Option<String> {
+        let unknown: Vec<_> = self.worn.iter().filter(|name| !self.names.contains_key(*name)).collect();
+        let libraries = match self.missing.is_empty() {
+            true => String::new(),
+            false => format!(" (no such library: {})", few(&self.missing.iter().collect::<Vec<_>>())),
+        };
+        let what = || format!("grey is used for materials defined nowhere: {}{libraries}", few(&unknown));
+        (!unknown.is_empty()).then(|| format!("{}: {}", self.path.display(), what()))
+    }
+}
+
+/// The first numbers of a statement.
+fn numbers<const N: usize>(rest: &str, what: &str) -> Checked<[f32; N]> {
+    let (mut words, mut found) = (rest.split_whitespace(), [0.0; N]);
+    for number in &mut found {
+        *number = words.next().and_then(|word| word.parse().ok()).ok_or_else(|| mend(what))?;
+    }
+    Ok(found)
+}
+
+fn mend(what: &str) -> String {
+    format!("{what}: mend the line or export the file again")
+}
+
+/// The first names of a list, and how many more there are.
+fn few(names: &[&String]) -> String {
+    let shown: Vec<&str> = names.iter().take(8).map(|name| name.as_str()).collect();
+    match names.len() {
+        0..=8 => shown.join(", "),
+        n => format!("{} and {} more", shown.join(", "), n - 8),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::material::Materials;
+    use super::*;
+
+    const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n";
+
+    fn read(text: &str) -> Result<ObjFile<'static>> {
+        parse(Path::new("a.obj"), format!("{SQUARE}{text}").as_bytes(), &mut Library::default())
+    }
+
+    fn error(text: &str) -> String {
+        read(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn polygons_become_fans_and_negative_indices_count_back() {
+        let quad = read("f -4 -3 -2 -1").unwrap();
+        assert_eq!(quad.parts[0].mesh.indices, [0, 1, 2, 0, 2, 3]);
+        assert_eq!(quad.parts[0].mesh.positions[..2], [[0.0; 3], [1.0, 0.0, 0.0]]);
+        let penta = read("v 0.5 2 0\nf 1 2 3 5 4").unwrap();
+        assert_eq!(penta.parts[0].mesh.indices.len(), 9);
+        let marked = parse(Path::new("a.obj"), format!("\u{feff}{SQUARE}f 1 2 4").as_bytes(), &mut Library::default());
+        assert_eq!(marked.unwrap().parts[0].mesh.indices.len(), 3, "a byte order mark is no part of the first line");
+        assert!(read("l 1 2\np 1").unwrap().parts.iter().all(|m| m.mesh.indices.is_empty()));
+    }
+
+    #[test]
+    fn faces_without_area_for_want_of_corners_are_counted() {
+        let warnings = |text: &str| {
+            let mut library = Library::default();
+            let file = parse(Path::new("a.obj"), format!("{SQUARE}{text}").as_bytes(), &mut library).unwrap();
+            assert_eq!(file.parts.iter().map(|m| m.mesh.indices.len()).sum::<usize>(), 3, "the whole face is kept");
+            library.warnings
+        };
+        let said = "a.obj: faces repaired: 2 of fewer than three corners dropped, the first in line 11";
+        assert_eq!(warnings("f 1 2 3\nf 1 2\n\nf -1"), [said]);
+        assert_eq!(warnings("l 1 2\nf 1 2 3\np 1"), Vec::<String>::new(), "lines and points are no faces");
+    }
+
+    #[test]
+    fn corners_with_and_without_normals_stay_apart() {
+        let file = read("o box\nf 1//1 2//1 3//1\nf 1 3 4\nf 1/1/1 2/2/1 3/3/1\nf 1/1 2 3").unwrap();
+        let shape: Vec<_> =
+            file.parts.iter().map(|m| (m.name.as_str(), m.mesh.normals.len(), m.mesh.uvs.len())).collect();
+        assert_eq!(shape, [("box", 3, 0), ("box", 0, 0), ("box", 3, 3), ("box", 0, 0)]);
+    }
+
+    #[test]
+    fn lines_may_continue_and_carry_colours_or_foreign_letters() {
+        let bytes = [SQUARE.as_bytes(), b"# caf\xe9\nv 9 9 9 1 0 0\nf 1 2 \\\n 3\n"].concat();
+        let file = parse(Path::new("a.obj"), &bytes[..], &mut Library::default()).unwrap();
+        assert_eq!(file.parts[0].mesh.indices.len(), 3);
+    }
+
+    #[test]
+    fn mistakes_name_their_line() {
+        assert_eq!(
+            error("f 1 2 5"),
+            "a.obj, line 10: the face uses vertex 5, but 4 are defined above it: export the file again"
+        );
+        assert!(error("f 1/9 2/9 3/9").contains("line 10: the face uses texture coordinate 9, but 4"));
+        assert!(error("f 1//2 2//2 3//2").contains("normal 2, but 1"));
+        assert!(error("\n\nf 1 2 -5").contains("line 12: the face uses vertex -5"));
+        assert!(error("f 1 0 2").contains("vertex 0"));
+        assert!(error("f 1 2 6148914691236517205").contains("vertex 6148914691236517205"));
+        assert!(error("f 1 2 x").contains("line 10"));
+        assert!(error("f").contains("line 10"));
+        assert!(error("v 1 2").contains("line 10: a vertex needs three numbers"));
+        assert!(read("f 1 2 3").is_ok(), "control");
+    }
+
+    #[test]
+    fn tables_stand_in_for_materials_and_unknown_ones_are_grey() {
+        let mut library = Library::default();
+        let red = library.materials.push("red", Materials::plain([1.0, 0.0, 0.0]));
+        library.tables.insert("red".into(), red);
+        let text = format!("mtllib none.mtl\n{SQUARE}usemtl red\nf 1 2 3\nusemtl what\nf 1 2 3");
+        let file = parse(Path::new("a.obj"), text.as_bytes(), &mut library).unwrap();
+        assert_eq!([0, 1].map(|i: usize| file.parts[i].material), [red, library.grey()]);
+        let said = file.grey.unwrap();
+        assert!(said.ends_with("defined nowhere: what (no such library: none.mtl)"), "{said}");
+    }
+
+    #[test]
+    fn several_libraries_and_names_with_spaces() {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("one a.mtl"), "newmtl a\nKd 1 0 0").unwrap();
+        std::fs::write(dir.path().join("two.mtl"), "newmtl b c\nKd 0 1 0").unwrap();
+        let text = format!("mtllib one a.mtl two.mtl\n{SQUARE}usemtl b c\nf 1 2 3\nusemtl a\nf 1 2 3");
+        let mut library = Library::default();
+        let file = parse(&dir.path().join("x.obj"), text.as_bytes(), &mut library).unwrap();
+        let colors: Vec<_> =
+            file.parts.iter().map(|p| library.materials.list[p.material as usize].base_color).collect();
+        assert_eq!((colors, library.warnings.len()), (vec![[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]], 0));
+    }
+}
