@@ -23,7 +23,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
         ],
     ),
     ("denoise", &["error", "gpu", "image", "layout", "render", "shaders", "twins"]),
-    ("render", &["allocate", "error", "gpu", "layout", "scene", "shaders", "statistics", "twins"]),
+    ("render", &["allocate", "error", "gpu", "image", "layout", "memory", "scene", "shaders", "statistics", "twins"]),
     ("allocate", &["error", "gpu", "layout", "shaders", "statistics", "twins"]),
     ("scene", &["error", "image", "layout", "memory", "render::settings", "threads", "twins"]),
     ("twins", &["layout", "render::schedule", "render::settings", "scene", "shaders", "statistics"]),
