@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// When to write, and where.
-pub struct Checkpoint {
+pub struct CheckpointFile {
     every: Duration,
     last: Instant,
     path: PathBuf,
@@ -38,7 +38,7 @@ pub fn minutes(text: &str) -> std::result::Result<Duration, String> {
     }
 }
 
-impl Checkpoint {
+impl CheckpointFile {
     /// Begins to count now.
     pub fn new(every: Duration, path: PathBuf) -> Self {
         Self { every, last: Instant::now(), path, written: None, complained: false }
@@ -88,7 +88,7 @@ mod tests {
         assert_eq!(minutes("0.5"), Ok(Duration::from_secs(30)));
         assert_eq!(minutes("1e300"), Ok(Duration::MAX));
         assert!(["0", "-1", "nan", "x"].into_iter().all(|text| minutes(text).is_err()));
-        assert!(Checkpoint::new(Duration::ZERO, PathBuf::new()).is_due());
-        assert!(!Checkpoint::new(Duration::MAX, PathBuf::new()).is_due());
+        assert!(CheckpointFile::new(Duration::ZERO, PathBuf::new()).is_due());
+        assert!(!CheckpointFile::new(Duration::MAX, PathBuf::new()).is_due());
     }
 }

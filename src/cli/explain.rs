@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{DeviceOptions, FrameResources, Gpu, PassTime};
 use crate::layout::*;
 use crate::render::settings::{Allocate, Settings};
-use crate::render::{Outputs, Renderer};
+use crate::render::{Job, Outputs, Renderer};
 use crate::report::table::{self, milliseconds};
 use crate::scene::{self, Scene};
 use indicatif::ProgressBar;
@@ -128,12 +128,8 @@ impl Variant {
 
     /// Milliseconds.
     fn run(&mut self) -> Result<f64> {
-        let mut ns = 0;
-        for step in self.renderer.steps() {
-            let times = self.renderer.run(&mut self.frame, &step)?;
-            ns += times.iter().map(PassTime::duration_ns).sum::<u64>();
-        }
-        let ms = ns as f64 * 1e-6;
+        let times = Job::new(&self.renderer).run_to_end(&mut self.frame)?.times;
+        let ms = times.iter().map(PassTime::duration_ns).sum::<u64>() as f64 * 1e-6;
         self.cost.gpu_ms = self.cost.gpu_ms.min(ms);
         Ok(ms)
     }

@@ -5,7 +5,7 @@ mod supersampling;
 use super::common::Common;
 use super::compare::{self, check_sizes};
 use super::files::{Files, Item, check_distinct};
-use super::{Exit, fail_on_messages, layers, print, print_json, readable};
+use super::{Exit, fail_on_messages, print, print_json, readable};
 use crate::denoise::composition::{self, Demodulation, Parts};
 use crate::denoise::filter::{self, FILTERS, FilterInput, FilterSettings, Row};
 use crate::error::{Error, Result};
@@ -220,7 +220,7 @@ fn replaced(args: &Args, source: &Source, aovs: &Aovs, colour: &[[f32; 3]]) -> R
     let plane = |c: usize| colour.iter().map(|v| if grey { (v[0] + v[1] + v[2]) / 3.0 } else { v[c] }).collect();
     let planes: Vec<Vec<f32>> = (0..3).map(plane).collect();
     let channels: Vec<_> = aovs.colour.into_iter().zip(planes.iter().map(Vec::as_slice)).collect();
-    source.replaced(&channels, aovs.keep_as(), (layers::FILTERED, args.filter.name))
+    source.replaced(&channels, aovs.keep_as(), (crate::render::film::FILTERED, args.filter.name))
 }
 
 /// Read before anything long, and of the size of the image.

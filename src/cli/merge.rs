@@ -1,12 +1,9 @@
 //! `tallow merge`: renders of the same picture by different samples become one.
-use super::origin::{self, Origin, SampleRange};
-use super::rendered::Rendered;
-use super::{Exit, complain, layers};
-use crate::error::{Error, Result};
-use crate::image::{self, Film, WriteOptions};
-use crate::render::settings::Settings;
-use crate::statistics::{BrokenSamples, Pixel, join};
-use std::path::{Path, PathBuf};
+use super::{Exit, complain};
+use crate::error::Result;
+use crate::image::{self, WriteOptions};
+use crate::render::{self, Gap, Merged};
+use std::path::PathBuf;
 
 /// Merge renders of disjoint sample ranges into one
 ///
@@ -24,170 +21,16 @@ pub struct Args {
     output: PathBuf,
 }
 
-/// Settings in which merged renders may differ.
-const FREE: [&str; 3] = ["spp", "first_sample", "seed"];
-
-struct Part {
-    pixels: Vec<Pixel>,
-    broken: Option<BrokenSamples>,
-    splits_light: bool,
-    is_full: bool,
-    /// Its settings are all but [`FREE`].
-    origin: Origin,
-}
-
-impl Part {
-    fn read(path: &Path) -> Result<(Self, Film)> {
-        let film = image::read(path)?;
-        let bytes = film.pixels() as u64 * (size_of::<Pixel>() as u64 + layers::bytes_per_pixel(false));
-        image::check_memory(path, bytes)?;
-        let rendered = Rendered::of(&film).map_err(|what| Error::input(path, what))?;
-        Ok((Self::of(rendered), film))
-    }
-
-    fn of(rendered: Rendered) -> Self {
-        let is_full = rendered.is_full();
-        let Rendered { mut origin, pixels, broken, splits_light, .. } = rendered;
-        if let Some(settings) = origin.settings.as_object_mut() {
-            settings.retain(|key, _| !FREE.contains(&key.as_str()));
-        }
-        Self { pixels, broken, splits_light, is_full, origin }
-    }
-
-    /// By this the parts are sorted: no two that may be merged have the same.
-    fn first(&self) -> Option<SampleRange> {
-        self.origin.samples.iter().min().copied()
-    }
-
-    /// Why they cannot be merged.
-    fn conflict(&self, other: &Self) -> Option<String> {
-        if self.origin.settings != other.origin.settings {
-            return Some("was rendered with other settings".into());
-        }
-        if self.origin.scene != other.origin.scene {
-            return Some("shows another scene, or the same one changed".into());
-        }
-        if self.splits_light != other.splits_light {
-            let lacks = if other.splits_light { "has, but another lacks," } else { "lacks, but another has," };
-            return Some(format!("{lacks} direct and indirect light apart"));
-        }
-        let again = other.origin.samples.iter().find(|b| self.origin.samples.iter().any(|a| a.overlaps(b)))?;
-        let SampleRange { seed, first, .. } = again;
-        Some(format!("has samples {first} to {} of seed {seed} as well: they would count twice", again.last()))
-    }
-}
-
 /// Runs the subcommand.
 ///
 /// # Errors
-/// [`Error::Input`] when a file cannot be read or does not belong to the others, [`Error::Device`] when there is not enough
-/// memory, [`Error::Output`].
+/// As [`render::merge()`], and [`crate::error::Error::Output`].
 pub fn run(args: &Args) -> Result<Exit> {
     image::check_writable(&args.output)?;
-    let (mut parts, mut film) = (Vec::<Part>::new(), Film::default());
-    for path in &args.files {
-        let (part, own_film) = Part::read(path)?;
-        if let Some(what) = parts.iter().find_map(|earlier| earlier.conflict(&part)) {
-            return Err(Error::input(path, what));
-        }
-        // What is not joined is the same in all but for rounding: it is taken from the first.
-        if parts.iter().all(|other| part.first() < other.first()) {
-            film = own_film;
-        }
-        parts.push(part);
-    }
-    parts.sort_by_key(Part::first);
-    let samples = closed_up(&parts)?;
-    let broken = parts.iter().map(|part| part.broken).fold(None, BrokenSamples::join);
-    layers::replace_pixels(&mut film, &joined(parts));
-    layers::set_broken_samples(&mut film, broken);
-    film.channels.retain(|c| c.name != layers::PENDING && c.name != layers::PRIORITY);
-    origin::set_samples(&mut film, &samples)?;
+    let Merged { film, gaps } = render::merge(&args.files)?;
     image::write(&args.output, &film, &WriteOptions::default())?;
-    missing(&samples).iter().for_each(|line| complain(line));
+    for Gap { seed, first, last } in gaps {
+        complain(&format!("warning: samples {first} to {last} of seed {seed} are missing"));
+    }
     Ok(Exit::Done)
-}
-
-/// The samples of all parts, which are sorted. Ranges that follow each other become one where every pixel has all of the
-/// former: only then is its next sample the one behind its last.
-fn closed_up(parts: &[Part]) -> Result<Vec<SampleRange>> {
-    let of_part = |part: &'_ Part| part.origin.samples.iter().map(|&range| (range, part.is_full)).collect::<Vec<_>>();
-    let mut all: Vec<_> = parts.iter().flat_map(of_part).collect();
-    all.sort();
-    let sum: u64 = all.iter().map(|(range, _)| u64::from(range.count)).sum();
-    if sum > Settings::MAX_SPP.into() {
-        let most = Settings::MAX_SPP;
-        return Err(Error::Usage(format!("together the files have {sum} samples a pixel: merge {most} at most")));
-    }
-    let mut closed: Vec<(SampleRange, bool)> = Vec::new();
-    for (range, is_full) in all {
-        match closed.last_mut() {
-            Some((last, true)) if last.ends_before(&range) => {
-                last.count += range.count;
-                closed.last_mut().expect("the same one").1 = is_full;
-            }
-            _ => closed.push((range, is_full)),
-        }
-    }
-    Ok(closed.into_iter().map(|(range, _)| range).collect())
-}
-
-fn joined(parts: Vec<Part>) -> Vec<Pixel> {
-    let mut parts = parts.into_iter().map(|part| part.pixels);
-    let mut pixels = parts.next().unwrap_or_default();
-    for part in parts {
-        pixels.iter_mut().zip(&part).for_each(|(a, b)| *a = join(a, b));
-    }
-    pixels
-}
-
-/// A line for each gap between sorted ranges of one seed.
-fn missing(samples: &[SampleRange]) -> Vec<String> {
-    let gap = |pair: &[SampleRange]| {
-        let (from, to, seed) = (pair[0].last() + 1, pair[1].first, pair[1].seed);
-        let is_gap = pair[0].seed == seed && from < to;
-        is_gap.then(|| format!("warning: samples {from} to {} of seed {seed} are missing", to - 1))
-    };
-    samples.windows(2).filter_map(gap).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn part(ranges: &[(u32, u32, u32)], is_full: bool) -> Part {
-        let samples = ranges.iter().map(|&(seed, first, count)| SampleRange { seed, first, count }).collect();
-        let origin = Origin { settings: serde_json::Value::Null, scene: String::new(), samples };
-        Part { pixels: Vec::new(), broken: None, splits_light: true, is_full, origin }
-    }
-
-    fn closed(parts: &[Part]) -> Vec<(u32, u32, u32)> {
-        closed_up(parts).unwrap().iter().map(|r| (r.seed, r.first, r.count)).collect()
-    }
-
-    #[test]
-    fn ranges_close_up_behind_full_ones_alone() {
-        let full = part(&[(0, 0, 4)], true);
-        assert_eq!(closed(&[part(&[(0, 4, 3)], false), full]), [(0, 0, 7)]);
-        assert_eq!(closed(&[part(&[(0, 0, 4)], false), part(&[(0, 4, 3)], true)]), [(0, 0, 4), (0, 4, 3)]);
-        let both = [part(&[(0, 0, 4), (0, 8, 2), (1, 10, 2)], true), part(&[(0, 4, 4)], true)];
-        assert_eq!(closed(&both), [(0, 0, 10), (1, 10, 2)], "other seeds are other sequences");
-    }
-
-    #[test]
-    fn gaps_within_a_seed_are_told() {
-        let ranges = closed_up(&[part(&[(0, 0, 64), (0, 128, 64), (0, 193, 1), (2, 300, 1)], true)]).unwrap();
-        let lines = missing(&ranges);
-        assert_eq!(lines.len(), 2, "{lines:?}");
-        assert_eq!(lines[0], "warning: samples 64 to 127 of seed 0 are missing");
-        assert_eq!(lines[1], "warning: samples 192 to 192 of seed 0 are missing");
-    }
-
-    #[test]
-    fn more_samples_than_a_pixel_can_count_are_refused() {
-        let most = Settings::MAX_SPP;
-        assert!(closed_up(&[part(&[(0, 0, most)], true)]).is_ok());
-        let error = closed_up(&[part(&[(0, 0, most)], true), part(&[(1, 0, 1)], true)]).unwrap_err().to_string();
-        assert!(error.contains("16777217 samples a pixel"), "{error}");
-    }
 }

@@ -8,15 +8,10 @@ pub mod explain;
 pub mod files;
 pub mod filter;
 pub mod interrupt;
-pub mod job;
-pub mod layers;
 pub mod merge;
-pub mod origin;
 pub mod overrides;
 pub mod progress;
 pub mod render;
-pub mod rendered;
-pub mod resume;
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;

@@ -22,9 +22,9 @@ impl Progress {
         Self { bar, start: Instant::now(), shown: None }
     }
 
-    /// Counts samples that are done.
-    pub fn add(&mut self, samples: u64) {
-        self.bar.inc(samples);
+    /// Shows how many samples are done.
+    pub fn set(&mut self, samples: u64) {
+        self.bar.set_position(samples);
     }
 
     /// Whether somebody sees it, and has seen the last speed for a while.

@@ -2,14 +2,13 @@
 mod shot;
 mod summary;
 
-use super::checkpoint::{self, Checkpoint};
+use super::checkpoint::{self, CheckpointFile};
 use super::common::Common;
 use super::files::{Files, Item, check_distinct};
 use super::filter::{filter_names, filter_parts};
-use super::job::{End, Job, Why};
 use super::overrides::Overrides;
-use super::resume::Earlier;
-use super::{Exit, complain, fail_on_messages, interrupt, layers};
+use super::progress::Progress;
+use super::{Exit, complain, fail_on_messages, interrupt};
 use crate::denoise::composition::{self, Demodulation};
 use crate::denoise::filter::{self, FilterSettings, Row};
 use crate::error::{Error, Result};
@@ -17,10 +16,10 @@ use crate::gpu::{self, FrameResources, Gpu, PassTime};
 use crate::image::aov::{Aovs, Names};
 use crate::image::difference::false_colours;
 use crate::image::output::{self, Stream};
-use crate::image::{self, Film, WriteOptions};
+use crate::image::{self, Film, NOISY, WriteOptions};
 use crate::memory;
 use crate::render::settings::Settings;
-use crate::render::{self, FilmBuffers, Outputs, Renderer};
+use crate::render::{self, Checkpoint, FilmBuffers, Job, Outputs, Renderer, Status, StopReason};
 use crate::report::trace::chrome_trace;
 use crate::scene::Scene;
 use crate::statistics::BrokenSamples;
@@ -108,7 +107,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     check_outputs(args)?;
     let mut host = Spans::default();
     let scene = host.time("load scene", || Scene::load(&args.scene, &|s| args.overrides.apply(s)))?;
-    let earlier = args.resume.as_deref().map(|path| Earlier::read(path, &scene)).transpose()?;
+    let earlier = args.resume.as_deref().map(|path| Checkpoint::read(path, &scene)).transpose()?;
     if args.common.talkative() {
         scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
     }
@@ -124,19 +123,18 @@ pub fn run(args: &Args) -> Result<Exit> {
     };
     effects.adaptive |= earlier.is_some();
     let renderer = host.time("upload and compile", || Renderer::specialised(&gpu, &scene, wanted, effects))?;
-    let broken_before = earlier.as_ref().and_then(|earlier| earlier.broken);
-    let shot = Shot { args, gpu: &gpu, scene: &scene, renderer: &renderer, broken_before };
+    let job = Job { checkpoint: earlier.as_ref(), ..Job::new(&renderer) };
+    let shot = Shot { args, gpu: &gpu, job };
     let mut files = Files::new(args.resume.as_deref());
-    let (mut end, checkpoint) = host.time("render", || trace(&shot, earlier.as_ref(), &mut files))?;
-    let interrupted = end.why == Why::Interrupted;
-    if interrupted && end.traced == 0 {
+    let (mut status, checkpoint) = host.time("render", || trace(&shot, &mut files))?;
+    let interrupted = status.stopped == StopReason::Interrupted;
+    if interrupted && status.traced == 0 {
         complain("interrupted before the first sample: nothing was written");
         return Ok(Exit::Interrupted);
     }
     let seconds = host.seconds("render");
-    end.broken_samples = shot.broken_samples()?;
-    end.broken_samples.iter().for_each(warn_of_broken);
-    let mut film = host.time("read back", || shot.film(&end, seconds, !interrupted))?;
+    status.broken_samples.iter().for_each(warn_of_broken);
+    let mut film = host.time("read back", || shot.film(&status, seconds))?;
     let counters = args.counters.then(|| renderer.counters()).transpose()?;
     // The film is all that is left to write, and large films need the memory.
     drop(renderer);
@@ -147,16 +145,16 @@ pub fn run(args: &Args) -> Result<Exit> {
         if interrupt::leave_at_once(&line) {
             interrupt::leave(&line);
         }
-        end.times.extend(host.time("denoise", || denoise(&gpu, row, &mut film))?);
+        status.times.extend(host.time("denoise", || denoise(&gpu, row, &mut film))?);
         host.time("write", || Ok(save(args, &film, &mut files, None, true)))?;
     }
     fail_on_messages(&gpu)?;
-    let trace = args.profile.iter().map(|path| Item::bytes(path.clone(), profile(&gpu, &host, &end).into_bytes()));
+    let trace = args.profile.iter().map(|path| Item::bytes(path.clone(), profile(&gpu, &host, &status).into_bytes()));
     let trace: Vec<_> = trace.collect();
     files.save(&trace, !interrupted);
     written.extend(files.pipe(&items(args, &film), !interrupted));
     files.pipe(&trace, !interrupted);
-    let outcome = Outcome { gpu: &gpu, scene: &scene, film: &film, host: &host, end: &end };
+    let outcome = Outcome { gpu: &gpu, scene: &scene, film: &film, host: &host, status: &status };
     report(args, &outcome.summary(&written, counters))?;
     files.failure().map_or(Ok(()), Err)?;
     if interrupted {
@@ -166,31 +164,36 @@ pub fn run(args: &Args) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// Takes the samples, and writes checkpoints on the way.
-fn trace(shot: &Shot, earlier: Option<&Earlier>, files: &mut Files) -> Result<(End, Option<Checkpoint>)> {
-    let Shot { args, gpu, renderer, .. } = *shot;
+/// Takes the samples, shows how far it is, and writes checkpoints on the way.
+fn trace(shot: &Shot, files: &mut Files) -> Result<(Status, Option<CheckpointFile>)> {
+    let Shot { args, gpu, job } = *shot;
     let place = || checkpoint::path(&args.output_files(), &args.scene);
-    let mut checkpoint = args.checkpoint.map(|every| Checkpoint::new(every, place()));
-    let begun = Instant::now();
+    let mut checkpoint = args.checkpoint.map(|every| CheckpointFile::new(every, place()));
+    let (begun, mut progress) = (Instant::now(), None);
     // Until here there is nothing to keep, and a signal ends the process.
     let stop = interrupt::flag();
-    let mut between = |end: &End| {
+    let mut between = |status: &Status| {
+        let progress = progress.get_or_insert_with(|| Progress::new(status.planned, !args.common.talkative()));
+        progress.set(status.done);
+        if progress.wants_speed() {
+            progress.set_speed(job.rays_of_a_few(status)?);
+        }
         if stop.load(Ordering::SeqCst) {
             return Ok(ControlFlow::Break(()));
         }
-        if let Some(checkpoint) = checkpoint.as_mut().filter(|c| end.traced > 0 && c.is_due()) {
-            checkpoint.write(files, &shot.film(end, begun.elapsed().as_secs_f64(), false)?);
+        if let Some(checkpoint) = checkpoint.as_mut().filter(|c| status.traced > 0 && c.is_due()) {
+            checkpoint.write(files, &shot.film(status, begun.elapsed().as_secs_f64())?);
         }
         Ok(ControlFlow::Continue(()))
     };
-    let job = Job { renderer, quiet: !args.common.talkative() };
-    let end = job.run(&mut FrameResources::new(gpu)?, earlier, &mut between)?;
-    Ok((end, checkpoint))
+    let status = job.run(&mut FrameResources::new(gpu)?, &mut between)?;
+    progress.iter().for_each(Progress::finish);
+    Ok((status, checkpoint))
 }
 
 /// Writes the images that are files, and brings the checkpoint up to date or removes it: where an image has all layers, or
 /// the render is complete, it is not needed any more.
-fn save(args: &Args, film: &Film, files: &mut Files, checkpoint: Option<Checkpoint>, whole: bool) -> Vec<PathBuf> {
+fn save(args: &Args, film: &Film, files: &mut Files, checkpoint: Option<CheckpointFile>, whole: bool) -> Vec<PathBuf> {
     let broken = film.picture(None).map_or(0, |p| p.non_finite());
     if broken > 0 {
         complain(&format!("warning: {broken} pixels are not finite"));
@@ -236,7 +239,11 @@ fn denoise(gpu: &Gpu, row: &Row, film: &mut Film) -> Result<Vec<PassTime>> {
     let aovs = Aovs::find(film, &Names::new()).map_err(Error::Usage)?;
     let mut parts = composition::split(&aovs, Demodulation::default());
     let (light, times) = filter_parts(gpu, row, &mut parts, &|input| FilterSettings::default().scaled_to(input))?;
-    layers::denoise(film, &parts.join(&light));
+    // The mean of the samples stays as a layer.
+    for channel in film.channels.iter_mut().filter(|c| ["R", "G", "B"].contains(&c.name.as_str())) {
+        channel.name = format!("{NOISY}.{}", channel.name);
+    }
+    film.add_vec3("", ["R", "G", "B"], &parts.join(&light));
     Ok(times)
 }
 
@@ -260,7 +267,7 @@ impl Spans {
 
 /// Samples per pixel from 0 (dark) to the largest number (bright).
 fn heatmap(film: &Film, stream: &mut dyn Stream) -> std::io::Result<()> {
-    let counts = layers::counts(film, "samples").unwrap_or_default();
+    let counts = render::film::counts(film, "samples").unwrap_or_default();
     let most = counts.iter().copied().max().unwrap_or(0).max(1);
     let values: Vec<f32> = counts.iter().map(|&n| n as f32).collect();
     let picture = false_colours(film.width, &values, most as f32);
@@ -269,9 +276,9 @@ fn heatmap(film: &Film, stream: &mut dyn Stream) -> std::io::Result<()> {
     image::encode(Path::new("map.png"), &map, &WriteOptions::default(), stream)
 }
 
-fn profile(gpu: &Gpu, host: &Spans, end: &End) -> String {
+fn profile(gpu: &Gpu, host: &Spans, status: &Status) -> String {
     let offset = gpu.calibrate().map(|(gpu_ns, host_ns)| host_ns as i64 - gpu_ns as i64);
-    chrome_trace(&host.0, &end.times, offset)
+    chrome_trace(&host.0, &status.times, offset)
 }
 
 /// A system that is out of memory ends the process hours later without a word.
@@ -292,7 +299,7 @@ const BYTES_DENOISED: u64 = 1160;
 fn bytes_of_film(settings: &Settings, unified: bool) -> u64 {
     let placed = settings.allocate.policy != "uniform";
     let device = if unified { FilmBuffers::bytes_per_pixel(placed) } else { 0 };
-    settings.pixels() as u64 * (device + layers::bytes_per_pixel(placed))
+    settings.pixels() as u64 * (device + render::film::bytes_per_pixel(placed))
 }
 
 /// A render may take hours; what cannot be written, or would replace what it is not to, is told before.

@@ -24,6 +24,17 @@ pub struct Frame {
     pub priority_push: PriorityPush,
 }
 
+impl Frame {
+    /// The kernels that place samples.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when there are none.
+    pub fn allocation(&self) -> Result<&Allocation> {
+        let without = || Error::Usage("this renderer was made without the effect \"adaptive\"".into());
+        self.allocation.as_ref().ok_or_else(without)
+    }
+}
+
 /// Records the passes of one step. Beside each stands what it reads and what it writes.
 ///
 /// # Errors
@@ -50,20 +61,20 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
             accumulate::record(&kernels.accumulate, rec, film, batch)?; // samples[B] -> stats[P], light[P]
         }
         Step::Allocate(plan) => {
-            let (a, stats) = (allocation(frame)?, &film.tiles[0].stats);
+            let (a, stats) = (frame.allocation()?, &film.tiles[0].stats);
             a.policy.record(rec, &inputs(film), priority_push)?; // guide[P], stats[P] -> priority[P]
             a.apportion.record(rec, &film.priority, stats, &film.counts, plan)?; // priority[P] -> count[P]
             a.scan.record(rec, &film.counts)?; // count[P] -> offset[P + 1]
         }
         Step::Choose(choice) => {
-            let (a, counts, seed) = (allocation(frame)?, &film.counts, path_push.seed);
+            let (a, counts, seed) = (frame.allocation()?, &film.counts, path_push.seed);
             let push = PriorityPush { round: choice.round, ..*priority_push };
             a.policy.record(rec, &inputs(film), &push)?; // stats[P] -> priority[P]
             choose::record(&a.choose, rec, &film.priority, counts, choice, seed)?; // priority[P] -> count[P], 0 or 1
             a.scan.record(rec, counts)?; // count[P] -> offset[P + 1]
         }
         Step::Listed(range) => {
-            let (a, push) = (allocation(frame)?, path::push_of_list(path_push, range.paths));
+            let (a, push) = (frame.allocation()?, path::push_of_list(path_push, range.paths));
             let (offset, stats, first) = (&film.counts.offset, &film.tiles[0].stats, push.first_sample);
             if a.list_may_be_short {
                 rec.fill(&film.paths, NONE)?; // NONE -> paths[B]
@@ -74,11 +85,6 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
         }
     }
     Ok(())
-}
-
-fn allocation(frame: &Frame) -> Result<&Allocation> {
-    let without = || Error::Usage("this renderer was made without the effect \"adaptive\"".into());
-    frame.allocation.as_ref().ok_or_else(without)
 }
 
 /// Samples are placed on films of one tile alone.

@@ -1,17 +1,27 @@
-//! Renders: settings, the schedule of their work, the buffers it runs over, and what is recorded for it.
+//! Renders: settings, the schedule of their work, the buffers it runs over, what is recorded for it, the loop that runs it,
+//! and its life in files.
 pub mod buffers;
+pub mod film;
 mod frame;
+mod job;
 mod kernels;
+mod merge;
 pub mod pass;
+pub(crate) mod provenance;
 mod push;
+mod rendered;
 mod renderer;
+mod resume;
 pub mod schedule;
 pub mod settings;
 mod supersampling;
 mod views;
 
 pub use buffers::{DeviceScene, FilmBuffers, FilmTile};
+pub use job::{Job, Status, StopReason};
+pub use merge::{Gap, Merged, merge};
 pub use push::{path_push, priority_push};
 pub use renderer::*;
+pub use resume::Checkpoint;
 pub use schedule::{Batch, Choice, PathRange, Plan, Progress, Share, Step};
 pub use views::{Layer, OutputView};

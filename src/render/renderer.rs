@@ -3,14 +3,14 @@
 use crate::allocate::{self, HostInputs, Row};
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu, PassTime, Recorder};
-use crate::layout::{Apportionment, Camera, Effects, PixelLight, PixelStats, PriorityPush};
+use crate::layout::{Apportionment, Camera, Effects, PixelStats, PriorityPush};
 use crate::render::buffers::{DeviceScene, FilmBuffers};
 use crate::render::frame::{self, Frame};
 use crate::render::kernels::{Allocation, Kernels};
 use crate::render::push::{path_push, priority_push};
-use crate::render::schedule::{self, Cut, Progress, Step};
+use crate::render::schedule::{self, Cut, Step};
 use crate::render::settings::{Sampler, Settings};
-use crate::scene::{self, Scene};
+use crate::scene::{self, Fingerprint, Scene};
 use crate::statistics::BrokenSamples;
 use std::time::Duration;
 
@@ -32,7 +32,8 @@ pub struct Renderer {
     pub(super) effects: Effects,
     pub(super) outputs: Outputs,
     pub(super) settings: Settings,
-    pub(super) paths: u32,
+    paths: u32,
+    fingerprint: Option<Fingerprint>,
 }
 
 /// Ray counts since the renderer was made.
@@ -89,9 +90,10 @@ impl Renderer {
             )));
         }
         let (path_push, priority_push) = (path_push(scene), priority_push(scene));
+        let fingerprint = Some(scene.fingerprint.clone());
         let scene = DeviceScene::new(gpu, scene, &effects)?;
         let frame = Frame { scene, film, kernels, allocation, path_push, priority_push };
-        Ok(Self { gpu: gpu.clone(), frame, effects, outputs, settings, paths })
+        Ok(Self { gpu: gpu.clone(), frame, effects, outputs, settings, paths, fingerprint })
     }
 
     /// The work of a whole render, in the order that it must be recorded in. The result does not depend on how the work
@@ -100,12 +102,7 @@ impl Renderer {
         schedule::steps(&self.settings, &self.cut())
     }
 
-    /// The rest of the work, once [`Renderer::resume`] has put back what there was.
-    pub fn rest(&self, progress: Progress) -> impl Iterator<Item = Step> + use<> {
-        schedule::rest(&self.settings, &self.cut(), progress)
-    }
-
-    fn cut(&self) -> Cut {
+    pub(super) fn cut(&self) -> Cut {
         Cut { pixels: self.settings.pixels() as u32, tile: self.frame.film.tiles[0].window, paths: self.paths }
     }
 
@@ -131,44 +128,6 @@ impl Renderer {
     /// As [`Renderer::record`].
     pub fn run(&self, frame: &mut FrameResources, step: &Step) -> Result<Vec<PassTime>> {
         self.gpu.run(frame, |rec| self.record(rec, step))
-    }
-
-    /// Puts back what an earlier render had: statistics, light (empty unless it is kept apart or the policy asks for it), priorities (empty unless
-    /// the policy keeps them from round to round), and how many samples each pixel still lacks of what it was to have.
-    /// Follow it with [`Renderer::rest`]. Needs the effect `adaptive`.
-    ///
-    /// # Errors
-    /// [`crate::error::Error::Usage`] when there is no such effect, or when the lengths are not those of the film;
-    /// [`crate::error::Error::Device`].
-    pub fn resume(
-        &self,
-        frame: &mut FrameResources,
-        stats: &[PixelStats],
-        light: &[PixelLight],
-        priority: &[f32],
-        pending: &[u32],
-    ) -> Result<()> {
-        let Some(a) = &self.frame.allocation else {
-            return Err(Error::Usage("this renderer was made without the effect \"adaptive\"".into()));
-        };
-        let pixels = self.settings.pixels();
-        let of_film = |what: &str, len: usize, may_be_empty: bool| match len == pixels || (may_be_empty && len == 0) {
-            true => Ok(()),
-            false => Err(Error::Usage(format!("{len} {what} for a film of {pixels} pixels: give one each"))),
-        };
-        of_film("statistics", stats.len(), false)?;
-        of_film("lights", light.len(), !self.effects.split_light)?;
-        of_film("priorities", priority.len(), true)?;
-        of_film("pending counts", pending.len(), false)?;
-        self.run(frame, &Step::Start)?;
-        self.frame.film.tiles[0].stats.write(0, stats)?;
-        if self.effects.split_light {
-            self.frame.film.tiles[0].light.write(0, light)?;
-        }
-        self.frame.film.priority.write(0, priority)?;
-        self.frame.film.counts.count.write(0, pending)?;
-        self.gpu.run(frame, |rec| a.scan.record(rec, &self.frame.film.counts))?;
-        Ok(())
     }
 
     /// The priorities that the policy gives to pixels of these statistics, found on the host, if no pixel were full
@@ -218,6 +177,7 @@ impl Renderer {
             return Err(Error::Usage("this renderer was made without the effect \"lens\"".into()));
         }
         self.frame.path_push.camera = camera;
+        self.fingerprint = None;
         Ok(())
     }
 
@@ -229,6 +189,11 @@ impl Renderer {
     /// The scene's buffers.
     pub fn scene(&self) -> &DeviceScene {
         &self.frame.scene
+    }
+
+    /// That of the scene; none once the camera was moved.
+    pub(super) fn fingerprint(&self) -> Option<&Fingerprint> {
+        self.fingerprint.as_ref()
     }
 
     /// What was asked for.

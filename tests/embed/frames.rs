@@ -15,7 +15,7 @@ use tallow::image::aov::{Aovs, Names};
 use tallow::image::{self, Film, Samples};
 use tallow::layout::{Camera, Effects, vec3, vec4};
 use tallow::render::settings::Settings;
-use tallow::render::{Layer, OutputView, Outputs, Renderer};
+use tallow::render::{Job, Layer, OutputView, Outputs, Renderer};
 use tallow::scene::Scene;
 
 const WIDTH: u32 = 65;
@@ -116,9 +116,7 @@ fn an_engine_gets_every_layer() {
     let pixels = (WIDTH * HEIGHT) as usize;
     let vectors = Buffer::<vec3>::new(&gpu, "vectors", pixels, Location::Readback).unwrap();
     let words = Buffer::<u32>::new(&gpu, "words", pixels, Location::Readback).unwrap();
-    for step in renderer.steps() {
-        renderer.run(&mut frame, &step).unwrap();
-    }
+    Job::new(&renderer).run_to_end(&mut frame).unwrap();
     let view = |layer| renderer.views(layer).unwrap()[0];
     let film = command_line("uniform");
     for (layer, name) in [

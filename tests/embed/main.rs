@@ -1,8 +1,10 @@
 //! The renderer on a device that an engine made, one engine at a time in the process.
 mod device;
 mod entry_points;
+#[cfg(feature = "cli")] // compares with the program
 mod frames;
 #[path = "../support/hooks.rs"]
 mod hooks;
+mod job;
 #[path = "../support/mod.rs"]
 mod support;

@@ -1,6 +1,7 @@
 //! The library used without `unsafe`, with numbers that nobody should give it: errors or pictures, never a signal, a panic or
 //! a hang. TALLOW_FUZZ sets the cases of every target (default 100; the slower ones take a part of it).
 use proptest::prelude::*;
+use std::ops::ControlFlow;
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use tallow::denoise::filter::{FILTERS, FilterInput, FilterSettings, Planes};
@@ -11,7 +12,9 @@ use tallow::layout::*;
 use tallow::render::pass::choose::Choose;
 use tallow::render::pass::sample_list::Batches;
 use tallow::render::settings::Settings;
-use tallow::render::{Batch, Choice, Outputs, PathRange, Plan, Renderer, Share, Step, called_for, path_push};
+use tallow::render::{
+    Batch, Choice, Job, Outputs, PathRange, Plan, Renderer, Share, Status, Step, called_for, path_push,
+};
 use tallow::scene::Scene;
 use tallow::shaders::shared;
 use tallow::twins::path::{Strategy as Ways, Tracer};
@@ -161,7 +164,7 @@ fn try_scene(scene: &Scene) {
         let outputs = Outputs { split_light: true, guides: true, counters: true };
         let renderer = Renderer::new(&GPU, scene, outputs).expect("a scene that fits");
         let mut frame = FrameResources::new(&GPU).expect("a frame");
-        renderer.steps().for_each(|step| drop(renderer.run(&mut frame, &step).expect("a device that goes on")));
+        Job::new(&renderer).run_to_end(&mut frame).expect("a device that goes on");
     }
 }
 
@@ -291,7 +294,7 @@ proptest! {
         static RENDERER: LazyLock<Renderer> = LazyLock::new(|| renderers().remove(1));
         let (s, f) = (RENDERER.scene(), RENDERER.film());
         let mut frame = FrameResources::new(&GPU).unwrap();
-        for step in RENDERER.steps() {
+        let mut scribble = |_: &Status| {
             for &(buffer, at, value) in &words {
                 match buffer {
                     0..=3 => poke(&s.nodes, at, value),
@@ -305,8 +308,9 @@ proptest! {
                     _ => poke(&f.tiles[0].stats, at, value),
                 }
             }
-            prop_assert!(RENDERER.run(&mut frame, &step).is_ok());
-        }
+            Ok(ControlFlow::Continue(()))
+        };
+        prop_assert!(Job::new(&RENDERER).run(&mut frame, &mut scribble).is_ok());
     }
 
     #[test]

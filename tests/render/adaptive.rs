@@ -1,13 +1,14 @@
 //! Renders that place their samples: the same bits however they are cut, interrupted or dealt to rounds, the right mean,
 //! and pixels without a sample stay well defined.
 use crate::support::{assert_silent, gpu};
+use std::ops::ControlFlow;
 use std::path::Path;
 use tallow::error::Error;
 use tallow::gpu::{FrameResources, Gpu};
-use tallow::layout::{PixelLight, PixelStats};
+use tallow::image::{self, WriteOptions};
 use tallow::render::schedule::{self, Cut};
 use tallow::render::settings::Settings;
-use tallow::render::{Outputs, PathRange, Progress, Renderer, Step, path_push};
+use tallow::render::{Checkpoint, Job, Outputs, Renderer, Status, Step, path_push};
 use tallow::scene::Scene;
 use tallow::statistics::{Pixel, join};
 
@@ -40,18 +41,25 @@ fn read(renderer: &Renderer) -> Vec<Pixel> {
     stats.into_iter().zip(light).map(|(stats, light)| Pixel { stats, light }).collect()
 }
 
-fn list(steps: impl Iterator<Item = Step>) -> Vec<Step> {
-    steps.collect()
+/// Runs a whole render by steps of at most so many paths.
+fn run_by(renderer: &Renderer, frame: &mut FrameResources, paths_at_once: u32) -> Vec<Pixel> {
+    Job { paths_at_once, ..Job::new(renderer) }.run_to_end(frame).unwrap();
+    read(renderer)
 }
 
-fn run(renderer: &Renderer, frame: &mut FrameResources, steps: &[Step]) -> Vec<Pixel> {
+fn run(renderer: &Renderer, frame: &mut FrameResources) -> Vec<Pixel> {
+    run_by(renderer, frame, u32::MAX)
+}
+
+/// Steps that are not in the order of a render.
+fn run_steps(renderer: &Renderer, frame: &mut FrameResources, steps: &[Step]) -> Vec<Pixel> {
     steps.iter().for_each(|step| drop(renderer.run(frame, step).unwrap()));
     read(renderer)
 }
 
 fn render(gpu: &Gpu, scene: &Scene) -> Vec<Pixel> {
     let renderer = Renderer::new(gpu, scene, split()).unwrap();
-    run(&renderer, &mut FrameResources::new(gpu).unwrap(), &list(renderer.steps()))
+    run(&renderer, &mut FrameResources::new(gpu).unwrap())
 }
 
 fn total(pixels: &[Pixel]) -> u64 {
@@ -69,11 +77,10 @@ fn a_pixel_may_have_any_number_of_samples() {
         });
         let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
         let mut frame = FrameResources::new(&gpu).unwrap();
-        let whole = run(&renderer, &mut frame, &list(renderer.steps()));
+        let whole = run(&renderer, &mut frame);
         assert_eq!(total(&whole), 400_000, "{policy}");
         assert!(whole.iter().any(|p| p.stats.count >= 200_000), "{policy}: {whole:?}");
-        let steps = list(schedule::steps(&scene.settings, &Cut { pixels: 2, tile: 1 << 20, paths: 9_001 }));
-        assert!(bits(&run(&renderer, &mut frame, &steps)) == bits(&whole), "{policy}");
+        assert!(bits(&run_by(&renderer, &mut frame, 9_001)) == bits(&whole), "{policy}");
     }
     assert_silent(&gpu);
 }
@@ -85,7 +92,7 @@ fn the_budget_is_met_and_no_cut_changes_a_bit() {
         let scene = scene(|s| s.allocate.policy = policy.into());
         let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
         let mut frame = FrameResources::new(&gpu).unwrap();
-        let whole = run(&renderer, &mut frame, &list(renderer.steps()));
+        let whole = run(&renderer, &mut frame);
         assert_eq!(total(&whole), 8 * 33 * 17, "{policy}");
         let counts: Vec<u32> = whole.iter().map(|p| p.stats.count).collect();
         assert!(
@@ -94,16 +101,16 @@ fn the_budget_is_met_and_no_cut_changes_a_bit() {
         );
         let pixels = SIZE[0] * SIZE[1];
         for paths in [31, 64, 65, 500, pixels] {
-            let steps = list(schedule::steps(&scene.settings, &Cut { pixels, tile: 1 << 20, paths }));
-            assert!(steps.len() > renderer.steps().count());
-            assert!(bits(&run(&renderer, &mut frame, &steps)) == bits(&whole), "{policy}, batches of {paths}");
+            let steps = schedule::steps(&scene.settings, &Cut { pixels, tile: 1 << 20, paths });
+            assert!(steps.count() > renderer.steps().count());
+            assert!(bits(&run_by(&renderer, &mut frame, paths)) == bits(&whole), "{policy}, batches of {paths}");
         }
         // Control: one path fewer shows.
-        let mut steps = list(renderer.steps());
+        let mut steps: Vec<Step> = renderer.steps().collect();
         if let Some(Step::Listed(range)) = steps.last_mut() {
             range.paths -= 1;
         }
-        assert!(bits(&run(&renderer, &mut frame, &steps)) != bits(&whole), "{policy}");
+        assert!(bits(&run_steps(&renderer, &mut frame, &steps)) != bits(&whole), "{policy}");
     }
     assert_silent(&gpu);
 }
@@ -122,7 +129,7 @@ fn a_falling_threshold_gives_at_most_one_sample_a_round() {
     assert!(frozen.iter().all(|n| (2..=16).contains(n)), "{frozen:?}");
     let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
-    let whole = run(&renderer, &mut frame, &list(renderer.steps()));
+    let whole = run(&renderer, &mut frame);
     let later: Vec<u32> = counts(&whole).iter().zip(&frozen).map(|(all, before)| all - before).collect();
     // Each of 64 rounds is a chance of n / 16: binomial, and independent from pixel to pixel. The sum of squared
     // deviations over their variances is chi-square; pixels with all 16 samples get one every time.
@@ -137,9 +144,7 @@ fn a_falling_threshold_gives_at_most_one_sample_a_round() {
     assert!(freedom > 100.0 && certain.count() > 0, "all alike: the test tests nothing");
     assert!((chi - freedom).abs() < 5.0 * f64::sqrt(2.0 * freedom), "chi-square {chi} of {freedom}");
     for paths in [64, 65, SIZE[0] * SIZE[1]] {
-        let cut = Cut { pixels: SIZE[0] * SIZE[1], tile: 1 << 20, paths };
-        let steps = list(schedule::steps(&scene.settings, &cut));
-        assert!(bits(&run(&renderer, &mut frame, &steps)) == bits(&whole), "batches of {paths}");
+        assert!(bits(&run_by(&renderer, &mut frame, paths)) == bits(&whole), "batches of {paths}");
     }
     assert_silent(&gpu);
 }
@@ -157,41 +162,29 @@ fn batches_of_one_path_and_rounds_in_any_number_or_order_change_no_bit() {
     for rounds in [2, 3, 100] {
         assert!(bits(&render(&gpu, &with(rounds))) == bits(&whole), "{rounds} rounds");
     }
-    let (scene, cut) = (with(4), Cut { pixels: 35, tile: 1 << 20, paths: 1 });
-    let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
+    let renderer = Renderer::new(&gpu, &with(4), split()).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
-    assert!(
-        bits(&run(&renderer, &mut frame, &list(schedule::steps(&scene.settings, &cut)))) == bits(&whole),
-        "one path"
-    );
+    assert!(bits(&run_by(&renderer, &mut frame, 1)) == bits(&whole), "one path");
     // The rounds backwards: a pixel's next sample is its next, whichever round asks for it.
-    let mut steps = list(renderer.steps());
+    let mut steps: Vec<Step> = renderer.steps().collect();
     let first = steps.iter().position(|s| matches!(s, Step::Listed(_))).unwrap();
     steps[first..].reverse();
-    assert!(bits(&run(&renderer, &mut frame, &steps)) == bits(&whole), "backwards");
+    assert!(bits(&run_steps(&renderer, &mut frame, &steps)) == bits(&whole), "backwards");
     assert_silent(&gpu);
 }
 
-/// What an interrupted render hands over: pixels, and what each still lacks.
-fn interrupted(renderer: &Renderer, frame: &mut FrameResources, steps: &[Step]) -> (Vec<Pixel>, Vec<u32>, u32) {
-    let pixels = run(renderer, frame, steps);
-    let decides = |s: &&Step| matches!(s, Step::Allocate(_) | Step::Choose(_));
-    let allocations = steps.iter().filter(decides).count() as u32;
-    let last = steps.iter().rev().find_map(|step| match step {
-        Step::Listed(range) => Some(Some(*range)),
-        Step::Allocate(_) | Step::Choose(_) => Some(None),
-        _ => None,
-    });
-    let Some(last) = last else {
-        let first = schedule::first_spp(renderer.settings());
-        let lacks = pixels.iter().map(|p| first - p.stats.count).collect();
-        return (pixels, lacks, 0);
+/// What a render leaves that is stopped after so many steps.
+fn interrupted(job: &Job, frame: &mut FrameResources, scene: &Scene, stop: usize) -> Checkpoint {
+    let mut steps = 0;
+    let mut stop_there = |_: &Status| {
+        steps += 1;
+        Ok(if steps > stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     };
-    let rounds =
-        if renderer.settings().allocate.policy == "geometry" { renderer.settings().allocate.rounds } else { 1 };
-    let none = PathRange { first: 0, paths: 0, round: 0, rounds };
-    let lacks = schedule::pending(&renderer.film().counts.count.read().unwrap(), &last.unwrap_or(none));
-    (pixels, lacks, allocations)
+    let status = job.run(frame, &mut stop_there).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("interrupted.exr");
+    image::write(&file, &job.film(&status).unwrap(), &WriteOptions::default()).unwrap();
+    Checkpoint::read(&file, scene).unwrap()
 }
 
 #[test]
@@ -208,16 +201,13 @@ fn a_render_resumed_anywhere_has_the_bits_of_one_that_never_stopped() {
         let renderer = Renderer::specialised(&gpu, &scene, split(), effects).unwrap();
         let mut frame = FrameResources::new(&gpu).unwrap();
         let cut = Cut { pixels: SIZE[0] * SIZE[1], tile: 1 << 20, paths: 300 };
-        let steps = list(schedule::steps(&scene.settings, &cut));
-        for stop in [1, 2, 3, steps.len() / 2, steps.len() - 2, steps.len()] {
-            let (pixels, lacks, allocations) = interrupted(&renderer, &mut frame, &steps[..stop]);
-            let stats: Vec<PixelStats> = pixels.iter().map(|p| p.stats).collect();
-            let light: Vec<PixelLight> = pixels.iter().map(|p| p.light).collect();
-            let pending = lacks.iter().map(|&n| u64::from(n)).sum();
-            let priority = if allocations > 0 { renderer.film().priority.read().unwrap() } else { Vec::new() };
-            renderer.resume(&mut frame, &stats, &light, &priority, &lacks).unwrap();
-            let rest = list(renderer.rest(Progress { allocations, pending }));
-            assert!(bits(&run(&renderer, &mut frame, &rest)) == bits(&whole), "{policy}, stopped after step {stop}");
+        let all = schedule::steps(&scene.settings, &cut).count();
+        let job = Job { paths_at_once: cut.paths, ..Job::new(&renderer) };
+        for stop in [1, 2, 3, all / 2, all - 2, all] {
+            let checkpoint = interrupted(&job, &mut frame, &scene, stop);
+            let resumed = Job { checkpoint: Some(&checkpoint), ..Job::new(&renderer) };
+            resumed.run_to_end(&mut frame).unwrap();
+            assert!(bits(&read(&renderer)) == bits(&whole), "{policy}, stopped after step {stop}");
         }
     }
     assert_silent(&gpu);
@@ -229,21 +219,19 @@ fn records_of_another_film_are_an_error() {
     let scene = scene(|s| s.allocate.policy = "both".into());
     let (renderer, mut frame) = (Renderer::new(&gpu, &scene, split()).unwrap(), FrameResources::new(&gpu).unwrap());
     let pixels = (SIZE[0] * SIZE[1]) as usize;
-    let mut resume = |stats: usize, light: usize, priority: usize, lacks: usize| {
-        let (stats, light) = (vec![PixelStats::default(); stats], vec![PixelLight::default(); light]);
-        renderer.resume(&mut frame, &stats, &light, &vec![0.0; priority], &vec![0; lacks])
+    let mut resume = |size: usize, priority: usize, lacks: usize| {
+        let (pixels, priority, pending) = (vec![Pixel::default(); size], vec![0.0; priority], vec![0; lacks]);
+        renderer.resume(&mut frame, &Checkpoint { pixels, priority, pending, ..Checkpoint::default() })
     };
     for wrong in [pixels - 1, pixels + 1, 0] {
-        for [stats, light, priority, lacks] in
-            [[wrong, pixels, 0, pixels], [pixels, wrong, 0, pixels], [pixels, pixels, 0, wrong]]
-        {
-            let error = resume(stats, light, priority, lacks).unwrap_err();
+        for [size, priority, lacks] in [[wrong, 0, pixels], [pixels, 0, wrong]] {
+            let error = resume(size, priority, lacks).unwrap_err();
             assert!(matches!(&error, Error::Usage(line) if line.contains(&format!("{wrong} "))), "{error}");
         }
     }
-    assert!(matches!(resume(pixels, pixels, 1, pixels), Err(Error::Usage(_))));
+    assert!(matches!(resume(pixels, 1, pixels), Err(Error::Usage(_))));
     for priority in [0, pixels] {
-        resume(pixels, pixels, priority, pixels).unwrap();
+        resume(pixels, priority, pixels).unwrap();
     }
     assert_silent(&gpu);
 }
@@ -253,14 +241,14 @@ fn records_of_another_film_are_an_error() {
 fn a_start_leaves_priorities_as_they_are() {
     let gpu = gpu();
     let pixels = (SIZE[0] * SIZE[1]) as usize;
-    let (stats, light) = (vec![PixelStats::default(); pixels], vec![PixelLight::default(); pixels]);
-    let (priority, lacks) = (vec![7.0; pixels], vec![0; pixels]);
+    let (priority, pending) = (vec![7.0; pixels], vec![0; pixels]);
+    let checkpoint = Checkpoint { pixels: vec![Pixel::default(); pixels], priority, pending, ..Checkpoint::default() };
     for policy in ["geometry", "variance", "both", "threshold"] {
         let scene = scene(|s| s.allocate.policy = policy.into());
         let (renderer, mut frame) = (Renderer::new(&gpu, &scene, split()).unwrap(), FrameResources::new(&gpu).unwrap());
-        renderer.resume(&mut frame, &stats, &light, &priority, &lacks).unwrap();
+        renderer.resume(&mut frame, &checkpoint).unwrap();
         renderer.run(&mut frame, &Step::Start).unwrap();
-        assert_eq!(renderer.film().priority.read().unwrap(), priority, "{policy}");
+        assert_eq!(renderer.film().priority.read().unwrap(), checkpoint.priority, "{policy}");
     }
     assert_silent(&gpu);
 }
@@ -368,7 +356,7 @@ fn a_film_of_several_storage_bindings_is_placed() {
     let placed = Renderer::new(&gpu, &sized("both", 3), outputs).unwrap();
     let windows = placed.film().tiles[0].windows().count();
     assert!(windows == 2 || gpu.info().max_storage_range > 1 << 27, "{windows} windows");
-    let pixels = run(&placed, &mut FrameResources::new(&gpu).unwrap(), &list(placed.steps()));
+    let pixels = run(&placed, &mut FrameResources::new(&gpu).unwrap());
     assert_eq!(total(&pixels), 3 * 2048 * 1400);
     let alike = render(&gpu, &sized("uniform", 2));
     let two: Vec<usize> = (0..pixels.len()).filter(|&i| pixels[i].stats.count == 2).collect();

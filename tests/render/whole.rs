@@ -6,7 +6,7 @@ use std::path::Path;
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::layout::{BSDF_COATED, BSDF_DIFFUSE, Effects, Guide, Material, NONE, PixelLight, PixelStats, Triangle};
 use tallow::render::settings::{PixelFilter, Sampler, Settings};
-use tallow::render::{self, Batch, Outputs, Renderer, Step};
+use tallow::render::{self, Batch, Job, Outputs, Renderer, Step};
 use tallow::scene::Scene;
 use tallow::statistics::BrokenSamples;
 
@@ -339,7 +339,7 @@ fn samples_that_are_no_numbers_are_black_and_told() {
         let outputs = Outputs { split_light: true, guides: true, counters: false };
         let renderer = Renderer::new(&gpu, &scene, outputs).unwrap();
         let mut frame = FrameResources::new(&gpu).unwrap();
-        renderer.steps().for_each(|step| drop(renderer.run(&mut frame, &step).unwrap()));
+        Job::new(&renderer).run_to_end(&mut frame).unwrap();
         let (stats, broken) = (support::stats(&renderer), renderer.broken_samples().unwrap().unwrap());
         let expected = BrokenSamples { count: stats[12].count.into(), pixel: [2, 2], sample: 10, seed: 0 };
         assert_eq!(broken, expected, "{policy}");

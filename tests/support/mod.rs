@@ -2,7 +2,7 @@
 #![allow(dead_code)]
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu};
 use tallow::layout::PixelStats;
-use tallow::render::{Renderer, Step};
+use tallow::render::{Job, Renderer, Step};
 
 pub mod engine;
 
@@ -46,18 +46,20 @@ pub fn stats(renderer: &Renderer) -> Vec<PixelStats> {
 
 /// Runs the whole of a render.
 pub fn render(gpu: &Gpu, renderer: &Renderer) -> Vec<PixelStats> {
-    render_steps(gpu, renderer, &renderer.steps().collect::<Vec<_>>())
+    Job::new(renderer).run_to_end(&mut FrameResources::new(gpu).unwrap()).unwrap();
+    whole(renderer)
 }
 
-/// Runs a render cut as the caller likes.
-///
-/// # Panics
-/// When a sample was no number.
+/// Runs steps that are not in the order of a render.
 pub fn render_steps(gpu: &Gpu, renderer: &Renderer, steps: &[Step]) -> Vec<PixelStats> {
     let mut frame = FrameResources::new(gpu).unwrap();
-    for step in steps {
-        renderer.run(&mut frame, step).unwrap();
-    }
+    steps.iter().for_each(|step| drop(renderer.run(&mut frame, step).unwrap()));
+    whole(renderer)
+}
+
+/// # Panics
+/// When a sample was no number.
+fn whole(renderer: &Renderer) -> Vec<PixelStats> {
     assert_eq!(renderer.broken_samples().unwrap(), None);
     stats(renderer)
 }

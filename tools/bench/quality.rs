@@ -7,7 +7,7 @@ use tallow::denoise::filter::{FILTERS, FilterInput, FilterSettings, run};
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu};
 use tallow::layout::{Guide, PixelLight, PixelStats, vec4};
 use tallow::render::settings::Settings;
-use tallow::render::{Outputs, Renderer};
+use tallow::render::{Job, Outputs, Renderer};
 use tallow::scene::Scene;
 
 /// Guides, statistics and light of a whole render.
@@ -22,10 +22,7 @@ fn render(
     let scene = Scene::load(Path::new(file), &settings)?;
     let outputs = Outputs { split_light: true, guides: true, counters: false };
     let renderer = Renderer::new(gpu, &scene, outputs)?;
-    let mut frame = FrameResources::new(gpu)?;
-    for step in renderer.steps() {
-        renderer.run(&mut frame, &step)?;
-    }
+    Job::new(&renderer).run_to_end(&mut FrameResources::new(gpu)?)?;
     let tile = renderer.film().tiles.first().context("a film has a tile")?;
     Ok((tile.guide.read()?, tile.stats.read()?, tile.light.read()?))
 }

@@ -1,11 +1,11 @@
 //! Renders of a scene by one policy, their references, and how far they are apart.
 use crate::Args;
 pub use crate::view::View;
-use tallow::gpu::{FrameResources, Gpu};
+use tallow::gpu::{FrameResources, Gpu, PassTime};
 use tallow::image::{self, Film, WriteOptions};
 use tallow::layout::{Guide, PixelStats, vec3, vec4};
 use tallow::render::settings::Settings;
-use tallow::render::{Outputs, Renderer, Step};
+use tallow::render::{Job, Outputs, Renderer, Step};
 use tallow::scene::Scene;
 use tallow::statistics::Pixel;
 
@@ -60,39 +60,32 @@ impl View {
     }
 }
 
+/// What tells the kinds of steps apart, in the order of a render.
+const ONE_OF_EACH: [fn(&Step) -> bool; 5] = [
+    |s| matches!(s, Step::Start),
+    |s| matches!(s, Step::Uniform(_)),
+    |s| matches!(s, Step::Allocate(_)),
+    |s| matches!(s, Step::Choose(_)),
+    |s| matches!(s, Step::Listed(_)),
+];
+
 /// Renders a scene by its settings, after one run of each kernel that does not count: drivers compile on it.
 pub fn render(gpu: &Gpu, scene: &Scene) -> anyhow::Result<Rendered> {
     let renderer = Renderer::new(gpu, scene, Outputs { split_light: true, guides: true, counters: false })?;
     let mut frame = FrameResources::new(gpu)?;
-    let steps: Vec<Step> = renderer.steps().collect();
-    let of_kind = |kind: fn(&Step) -> bool| steps.iter().find(move |s| kind(s));
-    let kinds: [fn(&Step) -> bool; 5] = [
-        |s| matches!(s, Step::Start),
-        |s| matches!(s, Step::Uniform(_)),
-        |s| matches!(s, Step::Allocate(_)),
-        |s| matches!(s, Step::Choose(_)),
-        |s| matches!(s, Step::Listed(_)),
-    ];
-    for step in kinds.into_iter().filter_map(of_kind) {
-        renderer.run(&mut frame, step)?;
+    for kind in ONE_OF_EACH {
+        renderer.steps().find(|step| kind(step)).map_or(Ok(Vec::new()), |step| renderer.run(&mut frame, &step))?;
     }
-    let (mut ns, mut path_ns, mut listed) = (0, 0, u64::MAX);
-    for step in &steps {
-        let Some(step) = step.within(listed) else { continue };
-        let passes = renderer.run(&mut frame, &step)?;
-        if matches!(step, Step::Choose(_)) {
-            listed = renderer.listed()?;
-        }
-        for pass in passes.iter().filter(|p| p.name != "primary_hit") {
-            let took = pass.duration_ns();
-            ns += took;
-            path_ns += if matches!(pass.name, "path" | "accumulate") { took } else { 0 };
-        }
-    }
+    let times = Job::new(&renderer).run_to_end(&mut frame)?.times;
+    let took = |counts: fn(&str) -> bool| {
+        let ns: u64 = times.iter().filter(|pass| counts(pass.name)).map(PassTime::duration_ns).sum();
+        ns as f64 * 1e-6
+    };
+    let (ms, path_ms) = (took(|name| name != "primary_hit"), took(|name| matches!(name, "path" | "accumulate")));
     let tile = &renderer.film().tiles[0];
     let (stats, light) = (tile.stats.read()?, tile.light.read()?);
     let pixels = stats.into_iter().zip(light).map(|(stats, light)| Pixel { stats, light }).collect();
-    Ok(Rendered { pixels, guide: tile.guide.read()?, ms: ns as f64 * 1e-6, path_ms: path_ns as f64 * 1e-6 })
+    Ok(Rendered { pixels, guide: tile.guide.read()?, ms, path_ms })
 }
 
 /// Mean over the channels of the squared difference over the reference's square (relMSE, eps 0.01), pixel by pixel.

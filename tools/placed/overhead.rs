@@ -3,7 +3,7 @@ use super::View;
 use crate::Args;
 use std::collections::BTreeMap;
 use tallow::gpu::{FrameResources, Gpu, PassTime};
-use tallow::render::{Outputs, Renderer, Step};
+use tallow::render::{Job, Outputs, Renderer, Step};
 use tallow::report::table;
 
 const VIEW: View = View { name: "sponza", scene: "crytek-sponza", size: [1024, 768], depth: 4, reference: 0 };
@@ -105,12 +105,10 @@ fn share(
     let (importance, counts) = allocation(&placed)?;
     let mut frame = FrameResources::new(gpu)?;
     let (mut lists, mut traced) = (0.0, 0.0);
-    for step in placed.steps() {
-        for t in placed.run(&mut frame, &step)? {
-            let ms = t.duration_ns() as f64 * 1e-6;
-            lists += if t.name == "sample_list" { ms } else { 0.0 };
-            traced += if matches!(t.name, "path" | "accumulate") { ms } else { 0.0 };
-        }
+    for t in Job::new(&placed).run_to_end(&mut frame)?.times {
+        let ms = t.duration_ns() as f64 * 1e-6;
+        lists += if t.name == "sample_list" { ms } else { 0.0 };
+        traced += if matches!(t.name, "path" | "accumulate") { ms } else { 0.0 };
     }
     let scene = VIEW.load(args, |s| s.spp = 4)?;
     let uniform = super::render(gpu, &scene)?;

@@ -1,10 +1,10 @@
 //! `--scene`: filtered light is looked up along eye rays.
-use crate::cli::origin::Origin;
 use crate::denoise::composition::Parts;
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, PassTime};
 use crate::image::aov::{Aov, Aovs};
 use crate::layout::{vec3, vec4};
+use crate::render::provenance::Provenance;
 use crate::render::settings::{Allocate, Settings};
 use crate::render::{Outputs, Renderer};
 use crate::scene::Scene;
@@ -39,19 +39,19 @@ impl Supersampling {
     ) -> Result<Option<(Vec<vec3>, Vec<PassTime>)>> {
         let Some(path) = &self.scene else { return Ok(None) };
         let of_image = |what| Error::input(image, what);
-        let origin = Origin::of(aovs.film).map_err(of_image)?;
-        let settings = settings(aovs, &origin).map_err(of_image)?;
+        let provenance = Provenance::of(aovs.film).map_err(of_image)?;
+        let settings = settings(aovs, &provenance).map_err(of_image)?;
         let scene = Scene::load(path, &|s| *s = settings.clone())?;
-        origin.shows(&scene).map_err(of_image)?;
+        provenance.shows(&scene).map_err(of_image)?;
         let renderer = Renderer::new(gpu, &scene, Outputs::default())?;
         renderer.look_up(&parts.input.guide, filtered, self.eye_rays).map(Some)
     }
 }
 
 /// Of the render, without what placed its samples.
-fn settings(aovs: &Aovs, origin: &Origin) -> std::result::Result<Settings, String> {
+fn settings(aovs: &Aovs, provenance: &Provenance) -> std::result::Result<Settings, String> {
     aovs.get(Aov::Direct).ok_or("has no direct light: --scene needs an .exr file of tallow render")?;
-    let settings = Settings::deserialize(&origin.settings).map_err(|e| format!("settings: {e}"))?;
+    let settings = Settings::deserialize(&provenance.settings).map_err(|e| format!("settings: {e}"))?;
     let [width, height] = [aovs.film.width, aovs.film.height];
     if [settings.width, settings.height] != [width, height] {
         return Err(format!("is {width}x{height}, but was rendered as {}x{}", settings.width, settings.height));

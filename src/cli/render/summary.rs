@@ -1,11 +1,10 @@
-//! What is said of a render at its end.
+//! What is said of a render at its status.
 use super::{Args, Spans};
-use crate::cli::job::{End, Why};
-use crate::cli::{layers, print, print_json};
+use crate::cli::{print, print_json};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::image::Film;
-use crate::render::Counters;
+use crate::render::{Counters, Status, StopReason, film};
 use crate::report::table::{self, PassRow};
 use crate::scene::Scene;
 use crate::statistics::BrokenSamples;
@@ -30,7 +29,7 @@ pub struct Summary {
     /// Of any pixel.
     pub most_samples: u32,
     /// Why it ended.
-    pub stopped: Why,
+    pub stopped: StopReason,
     /// Most priorities of one allocation that were not finite.
     pub broken_priorities: u32,
     /// Samples that were no number and counted as black, those of a resumed file included.
@@ -62,31 +61,31 @@ pub struct Outcome<'a> {
     /// What the host did.
     pub host: &'a Spans,
     /// How it ended.
-    pub end: &'a End,
+    pub status: &'a Status,
 }
 
 impl Outcome<'_> {
     /// In numbers, with the files that were written.
     pub fn summary(&self, written: &[PathBuf], counters: Option<Counters>) -> Summary {
-        let Self { gpu, scene, film, host, end } = *self;
-        let counts = layers::counts(film, "samples").unwrap_or_default();
+        let Self { gpu, scene, film, host, status } = *self;
+        let counts = film::counts(film, "samples").unwrap_or_default();
         Summary {
             files: written.iter().map(|f| f.display().to_string()).collect(),
             width: film.width,
             height: film.height,
             samples: counts.iter().map(|&n| u64::from(n)).sum(),
-            traced: end.traced,
+            traced: status.traced,
             least_samples: counts.iter().copied().min().unwrap_or(0),
             most_samples: counts.iter().copied().max().unwrap_or(0),
-            stopped: end.why,
-            broken_priorities: end.broken_priorities,
-            broken_samples: end.broken_samples,
+            stopped: status.stopped,
+            broken_priorities: status.broken_priorities,
+            broken_samples: status.broken_samples,
             counters,
             load_seconds: host.seconds("load scene"),
             compile_seconds: host.seconds("upload and compile"),
             seconds: host.seconds("render"),
             device: gpu.info().name.clone(),
-            passes: table::summarise(&end.times),
+            passes: table::summarise(&status.times),
             warnings: scene.warnings.clone(),
         }
     }
@@ -114,7 +113,7 @@ fn text(s: &Summary) -> String {
         let mean = s.samples as f64 / (f64::from(s.width) * f64::from(s.height));
         text += &format!("{} to {} samples per pixel, {mean:.2} on average\n", s.least_samples, s.most_samples);
     }
-    text += &s.stopped.line();
+    text += &stop_line(s.stopped);
     if s.broken_priorities > 0 {
         text += &format!("warning: {} priorities were not finite and counted for nothing\n", s.broken_priorities);
     }
@@ -123,4 +122,16 @@ fn text(s: &Summary) -> String {
         text += &format!("{} closest-hit rays, {} any-hit rays, {per_ray:.1} nodes each\n", c.closest, c.any);
     }
     text + &table::timing_table(&s.passes)
+}
+
+/// What is worth saying of why it ended, with a line break; nothing when all went as planned. An interruption is told when it
+/// is known where what there is was written.
+fn stop_line(reason: StopReason) -> String {
+    match reason {
+        StopReason::Done | StopReason::Interrupted => String::new(),
+        StopReason::Threshold { above: 0 } => {
+            "stopped: the error of every pixel is estimated below the threshold\n".into()
+        }
+        StopReason::Threshold { above } => format!("stopped: {above} pixels are above the threshold at their limit\n"),
+    }
 }

@@ -10,16 +10,16 @@ const RGB: [&str; 3] = ["R", "G", "B"];
 const XYZ: [&str; 3] = ["X", "Y", "Z"];
 
 /// What the policy said last: only in files of renders that place samples.
-pub const PRIORITY: &str = "priority";
+pub(crate) const PRIORITY: &str = "priority";
 
 /// Samples that a pixel still lacks of what it was to have: only in files of renders that were interrupted.
-pub const PENDING: &str = "pending";
+pub(crate) const PENDING: &str = "pending";
 
 /// Metadata of what `tallow filter` wrote: the filter.
-pub const FILTERED: &str = "filtered";
+pub(crate) const FILTERED: &str = "filtered";
 
 /// Sum of squared deviations of the luminance of indirect light before albedo.
-pub const INDIRECT_M2: &str = "indirect.m2";
+pub(crate) const INDIRECT_M2: &str = "indirect.m2";
 
 /// What rounding took off the means of pixels with thousands of samples: only in files that have such pixels.
 const REMAINDERS: [&str; 2] = ["remainder", "light.remainder"];
@@ -31,18 +31,19 @@ const BROKEN: &str = "brokenSamples";
 const CHANNELS: usize = 30;
 
 /// What a pixel takes in a film with everything.
-pub fn bytes_per_pixel(placed: bool) -> u64 {
+pub(crate) fn bytes_per_pixel(placed: bool) -> u64 {
     (size_of::<f32>() * (CHANNELS + if placed { 2 } else { 0 })) as u64 // priority, pending
 }
 
-/// Reads the buffers back into a film with the layers that the renderer was asked for, a window at a time: whole buffers
-/// beside the film would be as large again.
+/// Reads the buffers back into a film with the layers that the renderer was asked for. [`super::Job::film`] adds where
+/// they come from, so that the file can be resumed and merged.
 ///
 /// # Errors
 /// [`crate::error::Error::Device`].
-pub fn film(renderer: &Renderer) -> Result<Film> {
+pub fn read_back(renderer: &Renderer) -> Result<Film> {
     let (settings, outputs) = (renderer.settings(), renderer.outputs());
     let mut film = Film::new(settings.width, settings.height);
+    // A window at a time: whole buffers beside the film would be as large again.
     for tile in &renderer.film().tiles {
         for range in tile.windows() {
             let window = range.start as usize..range.end as usize;
@@ -88,11 +89,11 @@ fn drop_remainders_of_none(film: &mut Film) {
     film.channels.retain(|c| !(REMAINDERS.contains(&c.name.as_str()) && is_zero(&c.samples)));
 }
 
-/// What the samples say, out of a film that [`film()`] made.
+/// What the samples say, out of a film that [`read_back`] made.
 ///
 /// # Errors
 /// Which layer is missing, or that memory is.
-pub fn pixels(film: &Film) -> std::result::Result<Vec<Pixel>, String> {
+pub(crate) fn pixels(film: &Film) -> std::result::Result<Vec<Pixel>, String> {
     let mean = match (rgb(film, NOISY), film.metadata.get(FILTERED)) {
         (Ok(mean), _) => mean,
         (Err(_), None) => rgb(film, "")?,
@@ -125,7 +126,7 @@ pub fn pixels(film: &Film) -> std::result::Result<Vec<Pixel>, String> {
 ///
 /// # Errors
 /// When it has a part of what that takes.
-pub fn splits_light(film: &Film) -> std::result::Result<bool, String> {
+pub(crate) fn splits_light(film: &Film) -> std::result::Result<bool, String> {
     let names = ["direct", "indirect"].map(|layer| RGB.map(|c| format!("{layer}.{c}"))).concat();
     match names.iter().filter(|name| film.channel(name).is_some()).count() {
         0 => Ok(false),
@@ -166,13 +167,13 @@ fn light(film: &Film) -> std::result::Result<Option<Light<'_>>, String> {
 ///
 /// # Errors
 /// When it is damaged.
-pub fn broken_samples(film: &Film) -> std::result::Result<Option<BrokenSamples>, String> {
+pub(crate) fn broken_samples(film: &Film) -> std::result::Result<Option<BrokenSamples>, String> {
     let said = film.metadata.get(BROKEN);
     said.map(|text| serde_json::from_str(text).map_err(|e| format!("{BROKEN}: {e}"))).transpose()
 }
 
 /// Makes the file say it.
-pub fn set_broken_samples(film: &mut Film, broken: Option<BrokenSamples>) {
+pub(crate) fn set_broken_samples(film: &mut Film, broken: Option<BrokenSamples>) {
     film.metadata.remove(BROKEN);
     if let Some(broken) = broken {
         let text = serde_json::to_string(&broken).expect("integers alone");
@@ -180,16 +181,8 @@ pub fn set_broken_samples(film: &mut Film, broken: Option<BrokenSamples>) {
     }
 }
 
-/// Puts a filtered colour in the place of the samples' mean, which stays as a layer.
-pub fn denoise(film: &mut Film, colour: &[vec3]) {
-    for channel in film.channels.iter_mut().filter(|c| RGB.contains(&c.name.as_str())) {
-        channel.name = format!("{NOISY}.{}", channel.name);
-    }
-    film.add_vec3("", RGB, colour);
-}
-
 /// Replaces what the samples say; the other layers stay, but for a filtered colour.
-pub fn replace_pixels(film: &mut Film, pixels: &[Pixel]) {
+pub(crate) fn replace_pixels(film: &mut Film, pixels: &[Pixel]) {
     let split = film.channel("direct.R").is_some();
     let mut fresh = Film::new(film.width, film.height);
     let light: Vec<_> = pixels.iter().filter(|_| split).map(|p| p.light).collect();
@@ -204,7 +197,7 @@ pub fn replace_pixels(film: &mut Film, pixels: &[Pixel]) {
 ///
 /// # Errors
 /// When there is no such layer of integers.
-pub fn counts(film: &Film, name: &str) -> std::result::Result<Vec<u32>, String> {
+pub(crate) fn counts(film: &Film, name: &str) -> std::result::Result<Vec<u32>, String> {
     match film.channel(name) {
         Some(Samples::U32(counts)) => Ok(counts.clone()),
         _ => Err(format!("has no layer of counts \"{name}\": it must be an EXR file that tallow rendered")),

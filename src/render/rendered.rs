@@ -1,7 +1,7 @@
 //! The samples in a file of `tallow render` or `merge`, checked against what its metadata claim: whoever adds samples to them
 //! trusts them from here on.
-use super::layers;
-use super::origin::Origin;
+use super::film;
+use super::provenance::Provenance;
 use crate::image::{Film, Samples};
 use crate::render::schedule;
 use crate::render::settings::{Placing, Settings};
@@ -9,9 +9,9 @@ use crate::statistics::{BrokenSamples, Pixel};
 use serde::Deserialize;
 
 /// What was rendered so far.
-pub struct Rendered {
+pub(crate) struct Rendered {
     /// Where the samples come from.
-    pub origin: Origin,
+    pub provenance: Provenance,
     /// Of the render; of a merged file, those of its first part.
     pub settings: Settings,
     /// Row-major. Every value is finite, M2 is not negative, and no pixel has more samples than the ranges.
@@ -29,24 +29,24 @@ impl Rendered {
     ///
     /// # Errors
     /// What is missing, damaged, or not as the metadata say.
-    pub fn of(film: &Film) -> Result<Self, String> {
-        let origin = Origin::of(film)?;
-        let settings = Settings::deserialize(&origin.settings).map_err(|e| format!("settings: {e}"))?;
+    pub(crate) fn of(film: &Film) -> Result<Self, String> {
+        let provenance = Provenance::of(film)?;
+        let settings = Settings::deserialize(&provenance.settings).map_err(|e| format!("settings: {e}"))?;
         settings.validate().map_err(|e| format!("settings: {e}"))?;
         check_size(film, &settings)?;
-        let pixels = layers::pixels(film)?;
-        check_pixels(&pixels, settings.width, origin.samples_per_pixel())?;
-        let pending = film.channel(layers::PENDING).map(|_| layers::counts(film, layers::PENDING)).transpose()?;
+        let pixels = film::pixels(film)?;
+        check_pixels(&pixels, settings.width, provenance.samples_per_pixel())?;
+        let pending = film.channel(film::PENDING).map(|_| film::counts(film, film::PENDING)).transpose()?;
         if let Some(pending) = &pending {
             check_pending(pending, &pixels, &settings)?;
         }
-        let (broken, splits_light) = (layers::broken_samples(film)?, layers::splits_light(film)?);
-        Ok(Self { origin, settings, pixels, broken, splits_light, pending })
+        let (broken, splits_light) = (film::broken_samples(film)?, film::splits_light(film)?);
+        Ok(Self { provenance, settings, pixels, broken, splits_light, pending })
     }
 
     /// Whether samples are spread evenly, and every pixel has all that the ranges tell of.
-    pub fn is_full(&self) -> bool {
-        let all = self.origin.samples_per_pixel();
+    pub(crate) fn is_full(&self) -> bool {
+        let all = self.provenance.samples_per_pixel();
         self.settings.allocate.policy == "uniform" && self.pixels.iter().all(|p| p.stats.count == all)
     }
 
@@ -54,11 +54,11 @@ impl Rendered {
     ///
     /// # Errors
     /// When they are missing.
-    pub fn priority(&self, film: &Film) -> Result<Vec<f32>, String> {
-        match film.channel(layers::PRIORITY) {
+    pub(crate) fn priority(&self, film: &Film) -> Result<Vec<f32>, String> {
+        match film.channel(film::PRIORITY) {
             _ if self.settings.allocate.policy == "uniform" => Ok(Vec::new()),
             Some(Samples::F32(priority)) => Ok(priority.clone()),
-            _ => Err(format!("has no layer \"{}\": take the file as tallow wrote it", layers::PRIORITY)),
+            _ => Err(format!("has no layer \"{}\": take the file as tallow wrote it", film::PRIORITY)),
         }
     }
 }
@@ -95,7 +95,7 @@ fn broken(pixel: &Pixel) -> Option<(&'static str, f32)> {
         ("m2", stats.m2),
         ("direct", light.direct),
         ("indirect", light.indirect),
-        (layers::INDIRECT_M2, [light.indirect_m2; 3]),
+        (film::INDIRECT_M2, [light.indirect_m2; 3]),
     ];
     layers.into_iter().find_map(|(name, values)| {
         let is_broken = |v: &f32| !v.is_finite() || (name.ends_with("m2") && *v < 0.0);

@@ -1,5 +1,5 @@
 //! What the metadata of a rendered file say of where its samples come from: by that it is resumed and merged.
-use super::layers;
+use super::{Renderer, film};
 use crate::error::{Error, Result};
 use crate::image::Film;
 use crate::render::settings::Settings;
@@ -7,6 +7,7 @@ use crate::scene::Scene;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::collections::BTreeMap;
 
 const SETTINGS: &str = "settings";
 const SCENE: &str = "sceneFingerprint";
@@ -14,7 +15,7 @@ const SAMPLES: &str = "sampleRanges";
 
 /// Samples of one render. A pixel has no others, and may lack some at the end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct SampleRange {
+pub(crate) struct SampleRange {
     /// Of their sequence.
     pub seed: u32,
     /// Index of the first.
@@ -24,24 +25,24 @@ pub struct SampleRange {
 }
 
 impl SampleRange {
-    /// Index of the last. Ranges in an [`Origin`] have one.
-    pub fn last(&self) -> u32 {
+    /// Index of the last. Ranges in an [`Provenance`] have one.
+    pub(crate) fn last(&self) -> u32 {
         self.first + (self.count - 1)
     }
 
     /// Whether the other goes on where this one ends.
-    pub fn ends_before(&self, other: &Self) -> bool {
+    pub(crate) fn ends_before(&self, other: &Self) -> bool {
         self.seed == other.seed && other.first.checked_sub(1) == Some(self.last())
     }
 
     /// Whether a sample is in both.
-    pub fn overlaps(&self, other: &Self) -> bool {
+    pub(crate) fn overlaps(&self, other: &Self) -> bool {
         self.seed == other.seed && self.first <= other.last() && other.first <= self.last()
     }
 }
 
 /// Where a film's samples come from.
-pub struct Origin {
+pub(crate) struct Provenance {
     /// Of the render; of a merged file, those of the first that went into it.
     pub settings: Value,
     /// [`Scene::fingerprint`].
@@ -51,25 +52,25 @@ pub struct Origin {
     pub samples: Vec<SampleRange>,
 }
 
-impl Origin {
+impl Provenance {
     /// Reads and checks it.
     ///
     /// # Errors
     /// What is missing or damaged.
-    pub fn of(film: &Film) -> std::result::Result<Self, String> {
+    pub(crate) fn of(film: &Film) -> std::result::Result<Self, String> {
         let (settings, samples) = (parsed(film, SETTINGS)?, parsed::<Vec<SampleRange>>(film, SAMPLES)?);
         check_ranges(&samples)?;
         Ok(Self { settings, scene: said(film, SCENE)?.to_owned(), samples })
     }
 
     /// Samples of all ranges.
-    pub fn samples_per_pixel(&self) -> u32 {
+    pub(crate) fn samples_per_pixel(&self) -> u32 {
         self.samples.iter().map(|range| range.count).sum()
     }
 
     /// # Errors
     /// When the film is of another scene.
-    pub fn shows(&self, scene: &Scene) -> std::result::Result<(), String> {
+    pub(crate) fn shows(&self, scene: &Scene) -> std::result::Result<(), String> {
         if self.scene == scene.fingerprint.to_string() {
             return Ok(());
         }
@@ -106,23 +107,25 @@ fn json(what: &impl Serialize) -> Result<String> {
     serde_json::to_string(what).map_err(|e| Error::Usage(e.to_string()))
 }
 
-/// The metadata of a render's film.
+/// The metadata of a render's film; none when the renderer's camera was moved, since no scene has those samples.
 ///
 /// # Errors
 /// [`Error::Usage`] when the film has no layer of counts.
-pub fn metadata(scene: &Scene, film: &Film) -> Result<[(&'static str, String); 3]> {
-    let settings = &scene.settings;
-    let counts = layers::counts(film, "samples").map_err(Error::Usage)?;
+pub(crate) fn metadata(renderer: &Renderer, film: &Film) -> Result<BTreeMap<String, String>> {
+    let Some(scene) = renderer.fingerprint() else { return Ok(BTreeMap::new()) };
+    let settings = renderer.settings();
+    let counts = film::counts(film, "samples").map_err(Error::Usage)?;
     let count = counts.into_iter().max().unwrap_or(0);
     let range = SampleRange { seed: settings.seed, first: settings.first_sample, count };
-    Ok([(SETTINGS, json(settings)?), (SCENE, scene.fingerprint.to_string()), (SAMPLES, json(&[range])?)])
+    let entries = [(SETTINGS, json(settings)?), (SCENE, scene.to_string()), (SAMPLES, json(&[range])?)];
+    Ok(entries.map(|(key, value)| (key.to_owned(), value)).into())
 }
 
 /// Says that a film is of these samples.
 ///
 /// # Errors
 /// [`Error::Usage`] when JSON cannot say it (a bug).
-pub fn set_samples(film: &mut Film, samples: &[SampleRange]) -> Result<()> {
+pub(crate) fn set_samples(film: &mut Film, samples: &[SampleRange]) -> Result<()> {
     film.metadata.insert(SAMPLES.to_owned(), json(&samples)?);
     Ok(())
 }

@@ -1,37 +1,39 @@
 //! Taking up a render where it stopped: everything that it needs is in the EXR file that it wrote.
-use super::job::End;
-use super::layers;
-use super::origin::Origin;
+use super::provenance::Provenance;
 use super::rendered::Rendered;
+use super::{Progress, Renderer, Status, Step, film};
 use crate::error::{Error, Result};
 use crate::gpu::FrameResources;
 use crate::image::{self, Film};
 use crate::layout::{PixelLight, PixelStats};
 use crate::render::schedule;
 use crate::render::settings::Settings;
-use crate::render::{Progress, Renderer};
 use crate::scene::Scene;
 use crate::statistics::{BrokenSamples, Pixel};
 use serde_json::Value;
 use std::path::Path;
 
 /// Metadata that tells how many allocations a render had made.
-pub const ALLOCATIONS: &str = "allocations";
+pub(crate) const ALLOCATIONS: &str = "allocations";
 
 /// What an earlier render left.
-pub struct Earlier {
-    /// Where it stopped.
-    pub progress: Progress,
-    /// Samples that were no number.
+#[derive(Clone, Debug, Default)]
+pub struct Checkpoint {
+    /// What its samples say of every pixel, row-major.
+    pub pixels: Vec<Pixel>,
+    /// The last priority of every pixel; empty where the policy keeps none from round to round.
+    pub priority: Vec<f32>,
+    /// Samples that each pixel still lacked of what it was to have by then.
+    pub pending: Vec<u32>,
+    /// Allocations that it had made.
+    pub allocations: u32,
+    /// Its samples that were no number.
     pub broken: Option<BrokenSamples>,
-    pixels: Vec<Pixel>,
-    priority: Vec<f32>,
-    pending: Vec<u32>,
 }
 
-impl Earlier {
-    /// Reads the file of a render of this scene with its settings; one that spread its samples evenly may have had fewer
-    /// of them.
+impl Checkpoint {
+    /// Reads the EXR file of a render of this scene with its settings; one that spread its samples evenly may have had
+    /// fewer of them.
     ///
     /// # Errors
     /// [`Error::Input`] when it is no such file.
@@ -42,7 +44,7 @@ impl Earlier {
 
     fn of(film: &Film, scene: &Scene) -> std::result::Result<Self, String> {
         let rendered = Rendered::of(film)?;
-        check(&rendered.origin, scene)?;
+        check(&rendered.provenance, scene)?;
         let (settings, priority) = (&scene.settings, rendered.priority(film)?);
         let Rendered { pixels, broken, pending, .. } = rendered;
         let pending = match pending {
@@ -51,30 +53,58 @@ impl Earlier {
             }
             pending => pending.unwrap_or_else(|| vec![0; pixels.len()]),
         };
-        let progress =
-            Progress { allocations: allocations(film)?, pending: pending.iter().map(|&n| u64::from(n)).sum() };
-        Ok(Self { progress, broken, pixels, priority, pending })
+        Ok(Self { pixels, priority, pending, allocations: allocations(film)?, broken })
     }
 
-    /// Puts it into the renderer's buffers and returns the steps that are left.
+    /// Where in the schedule it stopped.
+    pub fn progress(&self) -> Progress {
+        let pending = self.pending.iter().map(|&n| u64::from(n)).sum();
+        Progress { allocations: self.allocations, pending }
+    }
+}
+
+impl Renderer {
+    /// Puts back what an earlier render had, as [`super::Job`] does before it goes on. Needs the effect `adaptive`, which
+    /// renders that spread their samples evenly do not have by themselves: make the renderer with
+    /// [`Renderer::specialised`].
     ///
     /// # Errors
-    /// As [`Renderer::resume`].
-    pub fn put_back(&self, renderer: &Renderer, frame: &mut FrameResources) -> Result<()> {
-        let stats: Vec<PixelStats> = self.pixels.iter().map(|p| p.stats).collect();
-        let light: Vec<PixelLight> = self.pixels.iter().map(|p| p.light).collect();
-        renderer.resume(frame, &stats, &light, &self.priority, &self.pending)
+    /// [`Error::Usage`] when there is no such effect, or when the checkpoint is of a film of another size;
+    /// [`Error::Device`].
+    pub fn resume(&self, frame: &mut FrameResources, checkpoint: &Checkpoint) -> Result<()> {
+        let allocation = self.frame.allocation()?;
+        let Checkpoint { pixels, priority, pending, .. } = checkpoint;
+        let size = self.settings.pixels();
+        let of_film = |what: &str, len: usize| match len == size {
+            true => Ok(()),
+            false => Err(Error::Usage(format!("{len} {what} for a film of {size} pixels: give one each"))),
+        };
+        of_film("statistics", pixels.len())?;
+        of_film("pending counts", pending.len())?;
+        if !priority.is_empty() {
+            of_film("priorities", priority.len())?;
+        }
+        self.run(frame, &Step::Start)?;
+        let film = &self.frame.film;
+        film.tiles[0].stats.write(0, &pixels.iter().map(|p| p.stats).collect::<Vec<PixelStats>>())?;
+        if self.effects.split_light {
+            film.tiles[0].light.write(0, &pixels.iter().map(|p| p.light).collect::<Vec<PixelLight>>())?;
+        }
+        film.priority.write(0, priority)?;
+        film.counts.count.write(0, pending)?;
+        self.gpu.run(frame, |rec| allocation.scan.record(rec, &film.counts))?;
+        Ok(())
     }
 }
 
 /// Whether a render of this scene can go on where the file's ended.
-fn check(origin: &Origin, scene: &Scene) -> std::result::Result<(), String> {
+fn check(provenance: &Provenance, scene: &Scene) -> std::result::Result<(), String> {
     let settings = &scene.settings;
     let uniform = settings.allocate.policy == "uniform";
     // By way of text: a number's shortest decimal is not its value in double precision.
     let text = serde_json::to_string(settings).map_err(|e| e.to_string())?;
     let mut wanted: Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
-    let mut had = origin.settings.clone();
+    let mut had = provenance.settings.clone();
     if uniform {
         for settings in [&mut wanted, &mut had] {
             settings.as_object_mut().map(|s| s.remove("spp"));
@@ -82,11 +112,11 @@ fn check(origin: &Origin, scene: &Scene) -> std::result::Result<(), String> {
     }
     if wanted != had {
         let free = if uniform { "; only spp may differ" } else { "" };
-        return Err(format!("was rendered with other settings{free}: {}", origin.settings));
+        return Err(format!("was rendered with other settings{free}: {}", provenance.settings));
     }
-    origin.shows(scene)?;
+    provenance.shows(scene)?;
     // A pixel goes on at the index of its first sample plus their number.
-    match &origin.samples[..] {
+    match &provenance.samples[..] {
         [one] if (one.seed, one.first) == (settings.seed, settings.first_sample) => Ok(()),
         _ => Err("was merged, and cannot be resumed unless its samples are spread evenly and close up to one range from the \
                   scene's first: render more samples with --first-sample, and merge those"
@@ -107,10 +137,10 @@ fn allocations(film: &Film) -> std::result::Result<u32, String> {
 ///
 /// # Errors
 /// [`Error::Device`].
-pub fn pending(renderer: &Renderer, film: &Film, end: &End) -> Result<Vec<u32>> {
-    let Some(last) = &end.last else {
+pub(super) fn pending(renderer: &Renderer, film: &Film, status: &Status) -> Result<Vec<u32>> {
+    let Some(last) = &status.last else {
         let first = schedule::first_spp(renderer.settings());
-        let counts = layers::counts(film, "samples").map_err(Error::Usage)?;
+        let counts = film::counts(film, "samples").map_err(Error::Usage)?;
         return Ok(counts.iter().map(|n| first - n).collect());
     };
     Ok(schedule::pending(&renderer.film().counts.count.read()?, last))

@@ -1,0 +1,229 @@
+//! The loop of a render: it runs the steps until they end, the image is good enough, or the caller has seen enough.
+use super::{Checkpoint, PathRange, Renderer, Step, film, provenance, resume};
+use crate::error::Result;
+use crate::gpu::{FrameResources, PassTime};
+use crate::image::{Film, Samples};
+use crate::render::schedule::Cut;
+use crate::statistics::BrokenSamples;
+use serde::Serialize;
+use std::ops::ControlFlow;
+
+/// A render to run.
+#[derive(Clone, Copy)]
+pub struct Job<'a> {
+    /// What runs it.
+    pub renderer: &'a Renderer,
+    /// Where it goes on from, if it does not begin anew. The renderer then needs the effect `adaptive`.
+    pub checkpoint: Option<&'a Checkpoint>,
+    /// Paths that one step traces at most, at least 1; the renderer's own limit where that is lower. Fewer paths make
+    /// shorter steps, and change no bit of the result.
+    pub paths_at_once: u32,
+}
+
+/// Why a render ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StopReason {
+    /// All samples are taken.
+    Done,
+    /// No pixel wants more: its error is below the threshold, or it has as many samples as it may have.
+    Threshold {
+        /// Pixels whose estimated error is still above the threshold.
+        above: u64,
+    },
+    /// The caller stopped it.
+    Interrupted,
+}
+
+/// How far a render is, and how it ended.
+#[derive(Clone, Debug)]
+pub struct Status {
+    /// GPU time of every pass so far.
+    pub times: Vec<PassTime>,
+    /// Samples that this job traced.
+    pub traced: u64,
+    /// Samples that its last step traced.
+    pub traced_last: u64,
+    /// Samples that it has dealt with out of [`Status::planned`]; those that nobody wanted count as well.
+    pub done: u64,
+    /// Samples that it takes at most.
+    pub planned: u64,
+    /// Allocations made, those before the checkpoint included.
+    pub allocations: u32,
+    /// Most priorities of one allocation that were not finite, and so counted for nothing.
+    pub broken_priorities: u32,
+    /// Samples that were no number, those before the checkpoint included; found once the job has ended.
+    pub broken_samples: Option<BrokenSamples>,
+    /// Why it ended; while it goes on, [`StopReason::Interrupted`], as if it stopped here.
+    pub stopped: StopReason,
+    /// What was traced last of the last allocation; none before the first.
+    pub(super) last: Option<PathRange>,
+}
+
+impl<'a> Job<'a> {
+    /// A render from its beginning to its end.
+    pub fn new(renderer: &'a Renderer) -> Self {
+        Self { renderer, checkpoint: None, paths_at_once: u32::MAX }
+    }
+
+    /// Runs it. Before each step `between` is told how far it is, may read the renderer's buffers (the renderer waits), and
+    /// says whether to go on: that is the place to show progress, to look at a clock or a button, and to write a
+    /// [`Job::film`] every so often.
+    ///
+    /// # Errors
+    /// As [`Renderer::run`] and [`Renderer::resume`], and those of `between`.
+    pub fn run(
+        &self,
+        frame: &mut FrameResources,
+        between: &mut dyn FnMut(&Status) -> Result<ControlFlow<()>>,
+    ) -> Result<Status> {
+        let renderer = self.renderer;
+        self.checkpoint.map_or(Ok(()), |checkpoint| renderer.resume(frame, checkpoint))?;
+        let (mut status, mut steps, mut listed) = (self.at_start(), self.steps().peekable(), u64::MAX);
+        while let Some(planned) = steps.next() {
+            if between(&status)?.is_break() {
+                return self.ended(status);
+            }
+            let step = planned.within(listed);
+            if let Some(step) = &step {
+                status.times.extend(renderer.run(frame, step)?);
+            }
+            status.count(&planned, step.as_ref());
+            if let Some(Step::Allocate(_) | Step::Choose(_)) = step {
+                status.last = Some(nothing_of(steps.peek()));
+                listed = if renderer.list_may_be_short() { renderer.listed()? } else { u64::MAX };
+            }
+            if let Some(Step::Allocate(_)) = step
+                && self.nobody_wants_more(&mut status)?
+            {
+                break;
+            }
+        }
+        status.stopped = StopReason::Done;
+        if self.has_threshold() {
+            status.stopped = StopReason::Threshold { above: above_threshold(renderer)? };
+        }
+        self.ended(status)
+    }
+
+    /// [`Job::run`] without interruption.
+    ///
+    /// # Errors
+    /// As [`Renderer::run`] and [`Renderer::resume`].
+    pub fn run_to_end(&self, frame: &mut FrameResources) -> Result<Status> {
+        self.run(frame, &mut |_| Ok(ControlFlow::Continue(())))
+    }
+
+    /// Reads back what there is: the layers that the renderer's [`super::Outputs`] ask for, and as metadata what
+    /// [`Checkpoint::read`] and [`super::merge`] go by. Written as EXR, such a file can be resumed and merged; not once the
+    /// renderer's camera was moved, as its samples are then of no scene that was loaded.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub fn film(&self, status: &Status) -> Result<Film> {
+        let mut film = film::read_back(self.renderer)?;
+        film.metadata.extend(provenance::metadata(self.renderer, &film)?);
+        film.metadata.insert(resume::ALLOCATIONS.to_owned(), status.allocations.to_string());
+        film::set_broken_samples(&mut film, self.broken_samples()?);
+        if status.stopped == StopReason::Interrupted {
+            let pending = resume::pending(self.renderer, &film, status)?;
+            film.add(film::PENDING, Samples::U32(pending));
+        }
+        Ok(film)
+    }
+
+    /// Rays and samples of 16 runs of up to 64 of the samples that the last step traced: their quotient times
+    /// [`Status::traced`] is the number of rays so far, about.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub fn rays_of_a_few(&self, status: &Status) -> Result<[u64; 2]> {
+        const RUNS: usize = 16;
+        const SAMPLES: usize = 64;
+        let records = if self.renderer.effects().split_light { 3 } else { 1 };
+        let (samples, traced) = (&self.renderer.film().samples, status.traced_last as usize);
+        let mut sums = [0; 2];
+        for first in (0..RUNS).map(|i| i * traced / RUNS) {
+            let run = first..traced.min(first + SAMPLES);
+            let run = samples.read_range(run.start * records..run.end * records)?;
+            for [_, _, _, rays] in run.into_iter().step_by(records) {
+                sums = [sums[0] + rays.abs() as u64, sums[1] + 1];
+            }
+        }
+        Ok(sums)
+    }
+
+    fn steps(&self) -> Box<dyn Iterator<Item = Step>> {
+        let cut = self.renderer.cut();
+        let cut = Cut { paths: cut.paths.min(self.paths_at_once).max(1), ..cut };
+        let settings = self.renderer.settings();
+        match self.checkpoint {
+            Some(checkpoint) => Box::new(super::schedule::rest(settings, &cut, checkpoint.progress())),
+            None => Box::new(super::schedule::steps(settings, &cut)),
+        }
+    }
+
+    fn at_start(&self) -> Status {
+        Status {
+            times: Vec::new(),
+            traced: 0,
+            traced_last: 0,
+            done: 0,
+            planned: self.steps().map(|step| step.paths()).sum(),
+            allocations: self.checkpoint.map_or(0, |checkpoint| checkpoint.allocations),
+            broken_priorities: 0,
+            broken_samples: None,
+            stopped: StopReason::Interrupted,
+            last: self.checkpoint.map(|_| nothing_of(self.steps().next().as_ref())),
+        }
+    }
+
+    fn ended(&self, status: Status) -> Result<Status> {
+        Ok(Status { broken_samples: self.broken_samples()?, ..status })
+    }
+
+    fn broken_samples(&self) -> Result<Option<BrokenSamples>> {
+        let before = self.checkpoint.and_then(|checkpoint| checkpoint.broken);
+        Ok(BrokenSamples::join(before, self.renderer.broken_samples()?))
+    }
+
+    fn has_threshold(&self) -> bool {
+        self.renderer.settings().allocate.noise_threshold > 0.0
+    }
+
+    /// Looks at how the last allocation went. Only a noise threshold makes pixels want nothing.
+    fn nobody_wants_more(&self, status: &mut Status) -> Result<bool> {
+        let state = self.renderer.apportionment()?;
+        status.broken_priorities = status.broken_priorities.max(state.non_finite);
+        Ok(self.has_threshold() && state.wanting == 0)
+    }
+}
+
+impl Status {
+    /// Counts what was planned, and what of it was done.
+    fn count(&mut self, planned: &Step, step: Option<&Step>) {
+        self.traced_last = step.map_or(0, Step::paths);
+        self.traced += self.traced_last;
+        self.done += planned.paths();
+        match step {
+            Some(Step::Allocate(_) | Step::Choose(_)) => self.allocations += 1,
+            Some(Step::Listed(range)) => self.last = Some(*range),
+            Some(Step::Start | Step::Uniform(_)) | None => {}
+        }
+    }
+}
+
+/// The beginning of the round that the next step deals to.
+fn nothing_of(next: Option<&Step>) -> PathRange {
+    match next {
+        Some(Step::Listed(range)) => PathRange { first: 0, paths: 0, ..*range },
+        _ => PathRange { first: 0, paths: 0, round: 0, rounds: 1 },
+    }
+}
+
+/// Pixels whose error is estimated above the threshold, however many samples they have.
+fn above_threshold(renderer: &Renderer) -> Result<u64> {
+    let stats = renderer.film().tiles[0].stats.read()?;
+    let wanting = renderer.priorities_of(&stats, u32::MAX)?;
+    Ok(wanting.iter().filter(|&&p| p > 0.0).count() as u64)
+}
