@@ -1,6 +1,7 @@
 #include "effects.glsl"
 #include "shared/thread.glsl"
 #include "shared/scene.glsl"
+#include "shared/frame.glsl"
 #include "shared/sanitise.glsl"
 
 // Supersampling of Bauszat, Eisemann and Magnor 2011 (EGSR), section 3.2: guide rays at pixel centres carry filtered light;
@@ -30,8 +31,8 @@ const float LEAST_NORMAL = 1e-3, LEAST_DEPTH = 1e-4;
 
 // Normal and depth of the guide ray through a pixel; depth 0 where it carries no light.
 vec4 guide_ray(ivec2 at) {
-    if (any(greaterThanEqual(at, ivec2(push.size)))) return vec4(0.0);
-    int q = at.y * int(push.size.x) + at.x;
+    if (any(greaterThanEqual(at, ivec2(frame.size)))) return vec4(0.0);
+    int q = at.y * int(frame.size.x) + at.x;
     Guide guide = Guide_load(guides, q);
     bool known = known_radiance(texelFetch(filtered, q)).w > 0.0 && finite(guide.normal) && finite(guide.depth);
     return known ? vec4(guide.normal, guide.depth) : vec4(0.0);
@@ -40,7 +41,7 @@ vec4 guide_ray(ivec2 at) {
 // Pixel of the guide ray with the largest S = S_n * S_d (equations 3 to 5) among the four nearest to `film`; the nearest of
 // equals, NONE where none of them carries light.
 uint most_similar(Guide eye, vec2 film) {
-    ivec2 size = ivec2(push.size);
+    ivec2 size = ivec2(frame.size);
     ivec2 first = clamp(ivec2(floor(film - 0.5)), ivec2(0), max(size - 2, 0));
     ivec2 near = clamp(ivec2(floor(film)), ivec2(0), size - 1), far = 2 * first + 1 - near;
     ivec2 at[4] = ivec2[](near, ivec2(far.x, near.y), ivec2(near.x, far.y), far);
@@ -71,7 +72,7 @@ void main() {
     uint k = 0u;
     do {
         uint index = push.first_sample + k;
-        Sampler random = sampler_start(pixel, index, push.seed);
+        Sampler random = sampler_start(pixel, index, frame.seed);
         vec2 film = film_sample(pixel, random);
         bool delta;
         Guide eye = first_hit(eye_ray(film, random), pcg(path_seed(pixel, index)), delta);

@@ -1,6 +1,7 @@
 #include "effects.glsl"
 #include "shared/thread.glsl"
 #include "shared/scene.glsl"
+#include "shared/frame.glsl"
 #include "shared/finite.glsl"
 #include "shared/store64.glsl"
 
@@ -62,11 +63,11 @@ void add_light(inout Light2 sum, vec3 light, bool indirect) {
 // The whole sample is clamped, in place of what each bounce adds: the limit is that of what a pixel averages.
 vec3 clamped(vec3 light) {
     float largest = max(light.r, max(light.g, light.b));
-    return light * (push.clamp_indirect > 0.0 && largest > push.clamp_indirect ? push.clamp_indirect / largest : 1.0);
+    return light * (frame.clamp_indirect > 0.0 && largest > frame.clamp_indirect ? frame.clamp_indirect / largest : 1.0);
 }
 
 vec3 light_from_miss(Path path) {
-    if (!FX_ENVIRONMENT || push.environment == NONE) return vec3(0.0);
+    if (!FX_ENVIRONMENT || frame.environment == NONE) return vec3(0.0);
     float pdf;
     vec3 radiance = environment_radiance(path.direction, pdf);
     return radiance * (path.delta ? 1.0 : balance(path.bsdf_pdf, pdf));
@@ -134,14 +135,14 @@ bool arrive(inout Light2 sum, Path path, Hit hit, bool indirect, out Surface s) 
 Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
     Light2 sum = Light2(vec3(0.0), vec3(0.0));
     albedo = vec3(0.0);
-    Hit hit = traverse(Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed)), push.root);
+    Hit hit = traverse(Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed)), frame.root);
     closest_rays++;
     Surface s;
     bool smooth_first = false, mirrored = false;
     uint bounce = 0u;
     // A round goes from one surface to the next, so that the last one samples no light. The light sampled at the first waits
     // for the ray to the next: see traverse_both.
-    if (arrive(sum, path, hit, false, s) && push.max_depth > 1u) do {
+    if (arrive(sum, path, hit, false, s) && frame.max_depth > 1u) do {
         uint pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
         Bsdf bsdf = surface_bsdf(s);
         // The two sides of a dielectric differ: its normal stays on the outside.
@@ -158,10 +159,10 @@ Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         Segment shadow;
         uint mask_seed = pcg(seed + 2u * bounce);
         vec3 sampled = path.throughput * light_from_nee(s, bsdf, facing, basis, wo, random, pair, mask_seed + 1u, shadow);
-        bool shadowed = push.light_count > 0u && !smooth_here && max(sampled.r, max(sampled.g, sampled.b)) > 0.0;
+        bool shadowed = frame.light_count > 0u && !smooth_here && max(sampled.r, max(sampled.g, sampled.b)) > 0.0;
         bool alive = scatter(path, s, bsdf, facing, basis, wo, random, pair);
         if (bounce == 0u) mirrored = path.delta;
-        bool roulette = FX_ROULETTE && push.roulette_depth > 0u && bounce + 1u >= push.roulette_depth;
+        bool roulette = FX_ROULETTE && frame.roulette_depth > 0u && bounce + 1u >= frame.roulette_depth;
         if (roulette) alive = survives_roulette(path, random, pair) && alive;
         bounce++;
         if (!alive && !shadowed) break;
@@ -170,10 +171,10 @@ Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         any_rays += uint(shadowed);
         bool lit = shadowed, indirect = bounce >= 2u && !smooth_first;
         Segment ray = Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed + 2u * bounce));
-        hit = traverse_both(shadow, shadowed, ray, alive, push.root, uvec2(hit.triangle, hit.instance));
+        hit = traverse_both(shadow, shadowed, ray, alive, frame.root, uvec2(hit.triangle, hit.instance));
         add_light(sum, lit && !shadowed ? sampled : vec3(0.0), indirect);
         if (!alive || !arrive(sum, path, hit, indirect, s)) break;
-    } while (bounce + 1u < push.max_depth);
+    } while (bounce + 1u < frame.max_depth);
     if (FX_CLAMP) sum.indirect = clamped(sum.indirect);
     // What a smooth coat mirrors needs no filter. It is moved only here, so that the sum of both keeps its bits.
     if (mirrored) sum = Light2(sum.direct + sum.indirect, vec3(0.0));
@@ -198,7 +199,7 @@ void main() {
         index = path.y;
         if (pixel == NONE) return; // safe: no barrier() follows
     }
-    Sampler random = sampler_start(pixel, index, push.seed);
+    Sampler random = sampler_start(pixel, index, frame.seed);
     Ray ray = eye_ray(film_sample(pixel, random), random);
     Path path = Path(ray.origin, ray.direction, vec3(1.0), 0.0, true, 1.0);
     vec3 albedo;

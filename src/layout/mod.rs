@@ -98,7 +98,7 @@ constants! {
     NONE = 0xffffffff;
     /// Groups of nodes that a traversal can put aside; scenes that need more are refused when they are loaded.
     TRAVERSAL_STACK = 32;
-    /// Set in [`PathPush::root`] when the leaves of that level are instances.
+    /// Set in [`FrameConstants::root`] when the leaves of that level are instances.
     ROOT_OF_INSTANCES = 0x80000000;
     /// Set in [`Triangle::primitive`] of a sphere.
     SPHERE = 0x80000000;
@@ -395,20 +395,13 @@ gpu_structs! {
         index: uint,
     }
 
-    /// Push constants of `path.comp` and `primary_hit.comp`.
-    struct PathPush {
+    /// What all paths of a frame have in common: of the scene, the camera and the settings. Kernels read it as a uniform buffer,
+    /// which has room for more, where push constants end at 128 bytes.
+    struct FrameConstants {
         /// Where rays start.
         camera: Camera,
         /// Film in pixels.
         size: uvec2,
-        /// First pixel of the batch, row-major.
-        first_pixel: uint,
-        /// Pixels of the batch; its paths, with `samples` = 0.
-        pixels: uint,
-        /// Index of the batch's first sample of every pixel.
-        first_sample: uint,
-        /// Samples of every pixel in the batch; 0 when the sample-to-pixel buffer lists the paths.
-        samples: uint,
         /// Chooses the random sequence.
         seed: uint,
         /// Path edges, at least 1.
@@ -417,7 +410,7 @@ gpu_structs! {
         roulette_depth: uint,
         /// Limit of an indirect sample's largest channel; 0 is off.
         clamp_indirect: float,
-        /// 0 = box, 1 = tent, 2 = Gaussian.
+        /// 0 = box, 1 = tent, 2 = Gaussian, 3 = the pixel's centre.
         pixel_filter: uint,
         /// Lights in the alias table.
         light_count: uint,
@@ -429,6 +422,18 @@ gpu_structs! {
         environment_width: uint,
         /// Node where traversal starts, with ROOT_OF_INSTANCES.
         root: uint,
+    }
+
+    /// Push constants of `path.comp`, `primary_hit.comp` and `guide_lookup.comp`: what differs from dispatch to dispatch.
+    struct PathPush {
+        /// First pixel of the batch, row-major.
+        first_pixel: uint,
+        /// Pixels of the batch; its paths, with `samples` = 0.
+        pixels: uint,
+        /// Index of the batch's first sample of every pixel.
+        first_sample: uint,
+        /// Samples of every pixel in the batch; 0 when the sample-to-pixel buffer lists the paths.
+        samples: uint,
     }
 
     /// Push constants of `accumulate.comp`.
@@ -481,7 +486,7 @@ gpu_structs! {
     struct TraversePush {
         /// Rays.
         count: uint,
-        /// As [`PathPush::root`].
+        /// As [`FrameConstants::root`].
         root: uint,
         /// 1 = any hit, 0 = the closest.
         any_hit: uint,

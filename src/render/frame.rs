@@ -34,13 +34,20 @@ pub struct Allocation {
 }
 
 /// Forgets all samples, and finds the primary hits where they are wanted: once per camera.
-pub fn record_start(rec: &mut Recorder, st: &Stages, s: &DeviceScene, f: &FilmBuffers, push: &PathPush) -> Result<()> {
+pub fn record_start(
+    rec: &mut Recorder,
+    st: &Stages,
+    s: &DeviceScene,
+    f: &FilmBuffers,
+    frame: &FrameConstants,
+) -> Result<()> {
+    rec.update(&s.frame, frame)?;
     rec.fill(&f.broken, 0)?;
     for tile in &f.tiles {
         rec.fill(&tile.stats, 0)?;
         rec.fill(&tile.light, 0)?;
         if tile.guide.len() == tile.pixels as usize {
-            primary_hit::record(&st.guide, rec, s, tile, push)?; //   camera  -> guide[P]
+            primary_hit::record(&st.guide, rec, s, tile)?; //   camera  -> guide[P]
         }
     }
     Ok(())
@@ -57,15 +64,8 @@ fn inputs(f: &FilmBuffers) -> Inputs<'_> {
 }
 
 /// Records one batch with the same number of paths for every pixel of a run.
-pub fn record_uniform(
-    rec: &mut Recorder,
-    st: &Stages,
-    s: &DeviceScene,
-    f: &FilmBuffers,
-    push: &PathPush,
-    batch: &Batch,
-) -> Result<()> {
-    path::record(&st.path, rec, s, f, push, batch)?; //         batch   -> samples[B]
+pub fn record_uniform(rec: &mut Recorder, st: &Stages, s: &DeviceScene, f: &FilmBuffers, batch: &Batch) -> Result<()> {
+    path::record(&st.path, rec, s, f, batch)?; //         batch   -> samples[B]
     accumulate::record(&st.fold, rec, f, batch) //                    samples -> stats[P], light[P]
 }
 
@@ -103,10 +103,10 @@ pub fn record_listed(
     a: &Allocation,
     s: &DeviceScene,
     f: &FilmBuffers,
-    push: &PathPush,
     range: &PathRange,
+    first_sample: u32,
 ) -> Result<()> {
-    sample_list::record(&a.batch, rec, &f.counts.offset, &f.tiles[0].stats, &f.paths, range, push.first_sample)?; // offset -> paths[B]
-    path::record_listed(&st.path, rec, s, f, push, range.paths)?; //                     paths   -> samples[B]
+    sample_list::record(&a.batch, rec, &f.counts.offset, &f.tiles[0].stats, &f.paths, range, first_sample)?; // offset -> paths[B]
+    path::record_listed(&st.path, rec, s, f, range.paths)?; //                     paths   -> samples[B]
     accumulate::record_listed(&st.fold, rec, f, range) //                                      samples -> stats[P], light[P]
 }

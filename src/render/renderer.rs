@@ -4,7 +4,7 @@ use crate::allocate::{self, HostInputs, Row};
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu, Kernel, PassTime, PerBlock, Recorder, thread_items};
 use crate::layout::{
-    Apportionment, Camera, Effects, LIGHT_ENVIRONMENT, NONE, PathPush, PixelLight, PixelStats, PriorityPush,
+    Apportionment, Camera, Effects, FrameConstants, LIGHT_ENVIRONMENT, NONE, PixelLight, PixelStats, PriorityPush,
     ROOT_OF_INSTANCES,
 };
 use crate::render::buffers::{DeviceScene, FilmBuffers};
@@ -41,7 +41,7 @@ pub struct Renderer {
     pub(super) effects: Effects,
     pub(super) outputs: Outputs,
     pub(super) settings: Settings,
-    pub(super) push: PathPush,
+    pub(super) frame: FrameConstants,
     pub(super) priority: PriorityPush,
     pub(super) paths: u32,
 }
@@ -104,7 +104,7 @@ impl Renderer {
                  or --allocate uniform"
             )));
         }
-        let (push, priority) = (path_push(scene), priority_push(scene));
+        let (frame, priority) = (frame_constants(scene), priority_push(scene));
         let scene = DeviceScene::new(gpu, scene, &effects)?;
         Ok(Self {
             gpu: gpu.clone(),
@@ -115,7 +115,7 @@ impl Renderer {
             effects,
             outputs,
             settings,
-            push,
+            frame,
             priority,
             paths,
         })
@@ -144,20 +144,20 @@ impl Renderer {
         if !self.cut().has_room_for(step) {
             return Err(Error::Usage(format!("{step:?} is of another renderer: take those of Renderer::steps")));
         }
-        let (st, s, f, push) = (&self.stages, &self.scene, &self.film, &self.push);
+        let (st, s, f) = (&self.stages, &self.scene, &self.film);
         match (step, &self.allocation) {
             (Step::Start, allocation) => {
-                frame::record_start(rec, st, s, f, push)?;
+                frame::record_start(rec, st, s, f, &self.frame)?;
                 allocation.as_ref().map_or(Ok(()), |a| frame::record_preparation(rec, a, f, &self.priority))
             }
-            (Step::Uniform(batch), _) => frame::record_uniform(rec, st, s, f, push, batch),
+            (Step::Uniform(batch), _) => frame::record_uniform(rec, st, s, f, batch),
             (Step::Allocate(plan), Some(a)) => frame::record_allocation(rec, a, f, &self.priority, plan),
-            (Step::Choose(choice), Some(a)) => frame::record_choice(rec, a, f, &self.priority, choice, push.seed),
+            (Step::Choose(choice), Some(a)) => frame::record_choice(rec, a, f, &self.priority, choice, self.frame.seed),
             (Step::Listed(range), Some(a)) => {
                 if self.list_may_be_short() {
                     rec.fill(&f.paths, NONE)?;
                 }
-                frame::record_listed(rec, st, a, s, f, push, range)
+                frame::record_listed(rec, st, a, s, f, range, self.settings.first_sample)
             }
             _ => Err(Error::Usage("this renderer was made without the effect \"adaptive\"".into())),
         }
@@ -250,7 +250,8 @@ impl Renderer {
         Ok(u64::from(low) | u64::from(high) << 32)
     }
 
-    /// Moves the camera; what was accumulated belongs to the old one, so begin with [`Step::Start`].
+    /// Moves the camera from the next [`Step::Start`] on; what was accumulated belongs to the old one. Steps that were recorded
+    /// before keep theirs, done or not.
     ///
     /// # Errors
     /// [`crate::error::Error::Scene`] for a number that is not finite, and
@@ -261,7 +262,7 @@ impl Renderer {
         if camera.lens_radius > 0.0 && !self.effects.lens {
             return Err(Error::Usage("this renderer was made without the effect \"lens\"".into()));
         }
-        self.push.camera = camera;
+        self.frame.camera = camera;
         Ok(())
     }
 
@@ -383,14 +384,13 @@ pub fn priority_push(scene: &Scene) -> PriorityPush {
     }
 }
 
-/// What the kernels are told of a scene; the batch is still to be filled in.
-pub fn path_push(scene: &Scene) -> PathPush {
+/// What the kernels are told of a scene and its camera.
+pub fn frame_constants(scene: &Scene) -> FrameConstants {
     let settings = &scene.settings;
     let environment = scene.lights.iter().position(|l| l.kind == LIGHT_ENVIRONMENT);
-    PathPush {
+    FrameConstants {
         camera: scene.camera,
         size: [settings.width, settings.height],
-        first_sample: settings.first_sample,
         seed: settings.seed,
         max_depth: settings.max_depth,
         roulette_depth: settings.roulette_depth,
@@ -406,6 +406,5 @@ pub fn path_push(scene: &Scene) -> PathPush {
         environment: environment.map_or(NONE, |i| i as u32),
         environment_width: scene.environment.as_ref().map_or(0, |e| e.width),
         root: scene.root | if scene.instances.is_empty() { 0 } else { ROOT_OF_INSTANCES },
-        ..PathPush::default()
     }
 }

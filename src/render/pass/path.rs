@@ -10,37 +10,25 @@ use crate::shaders::path::Bind;
 pub type Path = Kernel<Bind<'static>>;
 
 /// scene -> samples\[batch\]
-pub fn record(
-    k: &Path,
-    rec: &mut Recorder,
-    s: &DeviceScene,
-    f: &FilmBuffers,
-    push: &PathPush,
-    b: &Batch,
-) -> Result<()> {
-    let push = PathPush {
-        first_pixel: b.first_pixel,
-        pixels: b.pixels,
-        first_sample: b.first_sample,
-        samples: b.samples,
-        ..*push
-    };
+pub fn record(k: &Path, rec: &mut Recorder, s: &DeviceScene, f: &FilmBuffers, b: &Batch) -> Result<()> {
+    let push =
+        PathPush { first_pixel: b.first_pixel, pixels: b.pixels, first_sample: b.first_sample, samples: b.samples };
     rec.dispatch_threads(k, bind(s, f), &push, b.pixels * b.samples)
 }
 
 fn bind<'a>(s: &'a DeviceScene, f: &'a FilmBuffers) -> Bind<'a> {
-    Bind { scene: s.bind(), samples: &f.samples, counters: &f.counters, paths: &f.paths, broken: &f.broken }
+    Bind {
+        scene: s.bind(),
+        frame: s.bind_frame(),
+        samples: &f.samples,
+        counters: &f.counters,
+        paths: &f.paths,
+        broken: &f.broken,
+    }
 }
 
 /// scene, paths\[batch\] -> samples\[batch\]
-pub fn record_listed(
-    k: &Path,
-    rec: &mut Recorder,
-    s: &DeviceScene,
-    f: &FilmBuffers,
-    push: &PathPush,
-    paths: u32,
-) -> Result<()> {
-    let push = PathPush { pixels: paths, samples: 0, ..*push };
+pub fn record_listed(k: &Path, rec: &mut Recorder, s: &DeviceScene, f: &FilmBuffers, paths: u32) -> Result<()> {
+    let push = PathPush { pixels: paths, ..PathPush::default() };
     rec.dispatch_threads(k, bind(s, f), &push, paths)
 }
