@@ -7,7 +7,7 @@ struct LightSample {
     float pdf;      // per solid angle, for MIS; 0 for lights that no BSDF sample can hit
 };
 
-const float INFINITE_DISTANCE = 3e38;
+const float INFINITE_DISTANCE = 3e38; // of lights at infinity
 
 // `random` is left as a word that is independent of the choice and as well stratified as it was: where in its share of the slot
 // it fell. A hash fills up the bits that the choice used.
@@ -110,7 +110,11 @@ SphericalTriangle spherical_triangle(vec3 a, vec3 e1, vec3 e2) {
 }
 
 // Where sampling by solid angle pays and is exact in single precision; elsewhere triangles are sampled by area.
-bool by_solid_angle(float solid_angle) { return FX_LARGE_LAMPS && solid_angle > 3e-4 && solid_angle < 6.0; }
+const float MIN_SOLID_ANGLE = 3e-4, MAX_SOLID_ANGLE = 6.0; // steradians
+
+bool by_solid_angle(float solid_angle) {
+    return FX_LARGE_LAMPS && solid_angle > MIN_SOLID_ANGLE && solid_angle < MAX_SOLID_ANGLE;
+}
 
 // Uniform by solid angle: u.x cuts off the triangle `a`, `b`, `d` with d on the arc from `a` to `c`, u.y chooses a point of the
 // arc from `b` to d (Arvo 1995). tan(ad / 2) follows from the solid angle's formula for `a`, `b`, d.

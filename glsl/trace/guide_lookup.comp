@@ -27,7 +27,7 @@ uint nodes_visited = 0u;
 
 // Departure from the paper, whose quotients are 0 / 0 on one plane: the largest difference counts as at least this, so that
 // rounding decides nothing. Of unit normals, and relative to depth.
-const float LEAST_NORMAL = 1e-3, LEAST_DEPTH = 1e-4;
+const float MIN_NORMAL_DIFFERENCE = 1e-3, MIN_DEPTH_DIFFERENCE = 1e-4;
 
 // Normal and depth of the guide ray through a pixel; depth 0 where it carries no light.
 vec4 guide_ray(ivec2 at) {
@@ -45,7 +45,7 @@ uint most_similar(Guide eye, vec2 film) {
     ivec2 first = clamp(ivec2(floor(film - 0.5)), ivec2(0), max(size - 2, 0));
     ivec2 near = clamp(ivec2(floor(film)), ivec2(0), size - 1), far = 2 * first + 1 - near;
     ivec2 at[4] = ivec2[](near, ivec2(far.x, near.y), ivec2(near.x, far.y), far);
-    vec2 differences[4], largest = vec2(LEAST_NORMAL, LEAST_DEPTH * eye.depth);
+    vec2 differences[4], largest = vec2(MIN_NORMAL_DIFFERENCE, MIN_DEPTH_DIFFERENCE * eye.depth);
     for (int k = 0; k < 4; k++) {
         vec4 guide = guide_ray(at[k]);
         bool carries = guide.w > 0.0;
@@ -66,7 +66,7 @@ uint most_similar(Guide eye, vec2 film) {
 
 void main() {
     uint pixel = thread_index();
-    if (pixel >= push.pixels) return; // safe: no barrier() follows
+    if (pixel >= push.pixels) return;
     vec3 sum = vec3(0.0);
     // Tested at its end: see shared/traverse.glsl.
     uint k = 0u;

@@ -23,7 +23,7 @@ uint nodes_visited = 0u;
 
 void main() {
     uint i = thread_index();
-    if (i >= push.pixels) return; // safe: no barrier() follows
+    if (i >= push.pixels) return;
     uint pixel = push.first_pixel + i;
     vec2 centre = vec2(pixel % frame.size.x, pixel / frame.size.x) + 0.5;
     Camera camera = frame.camera;

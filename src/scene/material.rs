@@ -13,7 +13,6 @@
 //! Roughness: alpha = Pr^2; without Pr, sqrt(2 / (Ns + 2)) for coats and conductors, and smooth for 2 and 3.
 //! d (or 1 - Tr) and map_d are opacity except on dielectrics. `norm` wins over a bump map. Bump heights are `-bm` world
 //! units; without -bm, 0.0005 of the scene's diagonal. A black Kd under a map_Kd counts as white.
-use super::effects::SMOOTH;
 use super::fresnel;
 use super::mtl::{Map, Mtl};
 use super::texture::{Kind, Mapping, TextureSet};
@@ -157,7 +156,7 @@ impl Materials {
     /// Adds what rough coats reflect to the words of the textures: a table for each index and distribution.
     pub fn add_coat_tables(materials: &mut [layout::Material], texels: &mut Vec<u32>) {
         let mut tables = HashMap::new();
-        for m in materials.iter_mut().filter(|m| m.kind == BSDF_COATED && m.alpha >= SMOOTH) {
+        for m in materials.iter_mut().filter(|m| m.kind == BSDF_COATED && m.alpha >= SMOOTH_ALPHA) {
             let ggx = m.flags & MATERIAL_GGX != 0;
             m.coat_table = *tables.entry((m.eta[0].to_bits(), ggx)).or_insert_with(|| {
                 let first = texels.len() as u32;

@@ -1,14 +1,13 @@
 //! Twin of `glsl/trace/guide_lookup.comp`.
 use crate::layout::{Guide, NONE, vec3, vec4};
+use crate::shaders::guide_lookup::{MIN_DEPTH_DIFFERENCE, MIN_NORMAL_DIFFERENCE};
+use crate::shaders::shared::sanitise::LARGEST;
 use crate::twins::camera::{eye_ray, film_sample, path_seed};
 use crate::twins::path::Tracer;
 use crate::twins::primary_hit::first_hit;
 use crate::twins::sampler::{pcg, sampler_start};
 use glam::{IVec2, Vec2, Vec3, ivec2};
 use std::ops::Range;
-
-const LEAST_NORMAL: f32 = 1e-3;
-const LEAST_DEPTH: f32 = 1e-4;
 
 /// The guide rays of a film, row-major, and the filtered light that they carry.
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +46,7 @@ impl GuideRays<'_> {
         let far = 2 * first + 1 - near;
         let at = [near, ivec2(far.x, near.y), ivec2(near.x, far.y), far];
         let differences = at.map(|at| self.differences(eye, at));
-        let least = Vec2::new(LEAST_NORMAL, LEAST_DEPTH * eye.depth);
+        let least = Vec2::new(MIN_NORMAL_DIFFERENCE, MIN_DEPTH_DIFFERENCE * eye.depth);
         let largest = differences.iter().flatten().fold(least, |a, b| a.max(*b));
         let (mut chosen, mut best) = (None, -1.0);
         for (at, difference) in at.iter().zip(differences) {
@@ -82,6 +81,3 @@ pub fn look_up(tracer: &Tracer, guides: &GuideRays, pixel: u32, samples: Range<u
     };
     (samples.clone().map(seen).sum::<Vec3>() / samples.len() as f32).into()
 }
-
-/// As in `glsl/shared/sanitise.glsl`.
-const LARGEST: f32 = 1e24;

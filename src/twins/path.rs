@@ -1,7 +1,9 @@
 //! Twin of `glsl/trace/path.comp`.
 use crate::layout::{BSDF_DIELECTRIC, Effects, FrameConstants, MATERIAL_TWO_SIDED, NONE};
 use crate::scene::Scene;
-use crate::shaders::path::{PAIR_BSDF, PAIR_CHOICE, PAIR_FIRST_BOUNCE, PAIR_LIGHT, PAIR_ROULETTE, PAIRS_PER_BOUNCE};
+use crate::shaders::path::{
+    MAX_SURVIVAL, PAIR_BSDF, PAIR_CHOICE, PAIR_FIRST_BOUNCE, PAIR_LIGHT, PAIR_ROULETTE, PAIRS_PER_BOUNCE,
+};
 use crate::twins::bsdf::{
     Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_is_specular, bsdf_sample, relative_index,
 };
@@ -13,9 +15,7 @@ use crate::twins::traverse::traverse_from;
 use crate::twins::warp::basis_from_normal;
 use glam::{Mat3, Vec3};
 
-/// Shadow rays to a lamp end at this part of the way: the error of the distance at which they would meet it is some 2^-24
-/// over the cosine there.
-pub const SHADOW_END: f32 = 1.0 - 1e-5;
+pub use crate::shaders::path::SHADOW_END;
 
 /// What one path returns, linear Rec. 709. Without [`Effects::indirect`] all light is in `direct`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -168,7 +168,7 @@ impl Tracer<'_> {
     }
 
     fn survives_roulette(&self, path: &mut Path, random: Sampler, pair: u32) -> bool {
-        let q = (path.throughput.max_element() * path.eta_scale).min(0.95);
+        let q = (path.throughput.max_element() * path.eta_scale).min(MAX_SURVIVAL);
         if sample_2d(random, pair + PAIR_ROULETTE).x >= q {
             return false;
         }
