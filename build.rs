@@ -14,6 +14,7 @@
 //! layout(scalar, binding = 3) readonly buffer Src { vec3 src[]; };  // or writeonly, or neither
 //! layout(scalar, binding = 3) writeonly buffer Dst { u64vec2 dst[]; }; // of vec4, which it stores two floats at a time
 //! layout(binding = 0) uniform usamplerBuffer nodes; // of BvhNode   // or samplerBuffer of floats
+//! layout(scalar, binding = 3) uniform Frame { FrameConstants frame; }; // the first of a buffer
 //! layout(scalar, push_constant) uniform Push { PathPush push; };    // once per kernel
 //! ```
 //! Structs of `src/layout` that a kernel binds come with functions, so that no kernel knows where their fields lie: see

@@ -69,6 +69,9 @@ fn float(bits: u32) -> f32 {
     f32::from_bits(bits & 0xbf7f_ffff)
 }
 
+/// The uniform block.
+const BLOCK: uvec2 = [0x1234_5678, 0x9abc_def0];
+
 impl Inputs {
     fn new(count: usize) -> Self {
         let three = |seed| words(3 * count, seed).chunks_exact(3).map(|w| [w[0], w[1], w[2]]).collect();
@@ -91,7 +94,7 @@ impl Inputs {
         };
         let mixed = |i: usize| {
             let floats = self.floats[i][3].to_bits() ^ self.scalars[i].to_bits();
-            hash(self.wide[i][0] ^ self.narrow[i][1] ^ floats ^ self.words[i][2] ^ salt)
+            hash(self.wide[i][0] ^ self.narrow[i][1] ^ floats ^ self.words[i][2] ^ BLOCK[1] ^ salt)
         };
         let all = 0..self.sums.len();
         (all.clone().map(sum).collect(), all.map(|i| [mixed(i), sum(i)]).collect())
@@ -109,6 +112,7 @@ fn run_mix(gpu: &Gpu, inputs: &Inputs, constants: mix::Constants, salt: u32) -> 
     let words = Buffer::from_slice(gpu, "words", &inputs.words).unwrap();
     let sums = Buffer::from_slice(gpu, "sums", &inputs.sums).unwrap();
     let result = Buffer::new(gpu, "result", count, Location::Device).unwrap();
+    let block = Buffer::from_slice(gpu, "block", &[[0; 2], BLOCK]).unwrap();
     let mut frame = FrameResources::new(gpu).unwrap();
     let bind = mix::Bind {
         wide: &wide,
@@ -118,9 +122,14 @@ fn run_mix(gpu: &Gpu, inputs: &Inputs, constants: mix::Constants, salt: u32) -> 
         words: &words,
         sums: &sums,
         result: &result,
+        block: &block,
     };
     let push = [count as u32, salt, 0, 0];
-    gpu.run(&mut frame, |rec| rec.dispatch(&kernel, bind, &push, groups(count))).unwrap();
+    gpu.run(&mut frame, |rec| {
+        rec.update(&block, &BLOCK)?;
+        rec.dispatch(&kernel, bind, &push, groups(count))
+    })
+    .unwrap();
     (sums.read().unwrap(), result.read().unwrap())
 }
 

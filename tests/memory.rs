@@ -4,7 +4,7 @@ mod support;
 
 use std::path::Path;
 use std::time::Instant;
-use tallow::render::{Outputs, Renderer, path_push};
+use tallow::render::{Outputs, Renderer, frame_constants};
 use tallow::scene::Scene;
 use tallow::twins::primary_hit::guide;
 
@@ -49,7 +49,7 @@ fn ten_million_triangles_load_within_four_gibibytes_and_render() {
     let stats = support::render(&gpu, &renderer);
     assert!(stats.iter().all(|s| s.mean.iter().all(|v| v.is_finite())));
     let hits = renderer.film().tiles[0].guide.read().unwrap();
-    let twins: Vec<_> = (0..stats.len() as u32).map(|p| guide(&scene, &path_push(&scene), p)).collect();
+    let twins: Vec<_> = (0..stats.len() as u32).map(|p| guide(&scene, &frame_constants(&scene), p)).collect();
     let apart = hits.iter().zip(&twins).filter(|(a, b)| (a.depth - b.depth).abs() > 1e-4 * b.depth).count();
     let surface = hits.iter().filter(|hit| hit.depth > 0.0).count();
     println!("{surface} of {} pixels show the mesh, {apart} of them elsewhere than the twin", stats.len());

@@ -13,9 +13,9 @@ layout(scalar, push_constant) uniform Push { PriorityPush push; };
 
 #include "shared/likeness_bits.glsl"
 #include "shared/pixel_noise.glsl"
-const float LEAST_LEFT = 0.01; // of two pixels at least .27
+const float MIN_LEFT = 0.01; // of two pixels at least .27
 const float APART = 1e17;      // means differ by no more, so that squares are finite
-const float STRONGEST_TINT = 100.0;
+const float MAX_TINT = 100.0;
 
 const int ROWS = 4;
 
@@ -31,12 +31,12 @@ struct Surroundings {
 float indirect_squares(uint pixel, vec3 mean, float squares) {
     PixelLight l = PixelLight_load(light, pixel);
     float level = luminance(l.indirect);
-    vec3 tint = level > 0.0 ? min((mean - l.direct) / level, vec3(STRONGEST_TINT)) : vec3(0.0);
+    vec3 tint = level > 0.0 ? min((mean - l.direct) / level, vec3(MAX_TINT)) : vec3(0.0);
     return min(l.indirect_m2 * dot(tint, tint) / 3.0, squares);
 }
 
 // `mean` is that of a pixel with these moments, less that of the centre: small numbers, whose squares keep their digits.
-void absorb(inout Surroundings s, float kin, vec4 m, float indirect, vec3 mean) {
+void merge(inout Surroundings s, float kin, vec4 m, float indirect, vec3 mean) {
     mean = clamp(mean, -APART, APART);
     s.around += kin * m;
     s.indirect += kin * indirect;
@@ -52,13 +52,13 @@ vec4 with_means(Surroundings s) {
     // The share of it that is left when the mean is taken off: 0 of one pixel, but for what division rounds.
     float count = s.offsets.w, left = 1.0 - s.weights / (count * count);
     float apart = max(s.squares - dot(s.offsets.rgb, s.offsets.rgb) / count, 0.0) / 3.0;
-    return s.around + (count > 0.0 && left > LEAST_LEFT ? vec4(apart, s.freedom * left, 0.0, 0.0) : vec4(0.0));
+    return s.around + (count > 0.0 && left > MIN_LEFT ? vec4(apart, s.freedom * left, 0.0, 0.0) : vec4(0.0));
 }
 
 void main() {
     ivec2 size = ivec2(push.size);
     int thread = int(thread_index()), x = thread % size.x, first = thread / size.x * ROWS;
-    if (first >= size.y) return; // safe: no barrier() follows
+    if (first >= size.y) return;
     uint word[ROWS];
     vec4 own[ROWS];
     vec3 mean[ROWS];
@@ -80,7 +80,7 @@ void main() {
             [[unroll]] for (int k = 0; k < ROWS; k++) { // constant bounds, or it would not be unrolled
                 if (abs(row - k) <= 1) {
                     float kin = known * kinship_of(word[k], 3 * (row - k) + column + 4);
-                    absorb(s[k], kin, m, indirect, their_mean - mean[k]);
+                    merge(s[k], kin, m, indirect, their_mean - mean[k]);
                 }
             }
         }

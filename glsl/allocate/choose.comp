@@ -11,7 +11,7 @@ layout(scalar, push_constant) uniform Push { ChoosePush push; };
 
 void main() {
     uint i = thread_index();
-    if (i >= push.pixels) return; // safe: no barrier() follows
+    if (i >= push.pixels) return;
     float p = texelFetch(priority, int(i)).x;
     // In integers, and so the same on every device: the product is exact.
     bool lucky = p >= 1.0 || pcg(pcg(i ^ pcg(push.seed)) + push.round) < (p > 0.0 ? uint(p * 4294967296.0) : 0u);

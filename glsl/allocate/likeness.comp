@@ -33,7 +33,7 @@ uint kinship(Place a, Place b) {
 
 void main() {
     uint i = thread_index();
-    if (i >= push.size.x * push.size.y) return; // safe: no barrier() follows
+    if (i >= push.size.x * push.size.y) return;
     ivec2 size = ivec2(push.size), at = ivec2(i % push.size.x, i / push.size.x);
     float gathered = push.filtered > 0.0 ? 1.0 - uintBitsToFloat(words[i]) : 0.0;
     precise float rounded = gathered * GATHERED_UNIT + 0.5;

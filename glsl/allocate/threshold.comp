@@ -11,7 +11,7 @@ layout(scalar, push_constant) uniform Push { PriorityPush push; };
 
 void main() {
     uint i = thread_index();
-    if (i >= push.size.x * push.size.y) return; // safe: no barrier() follows
+    if (i >= push.size.x * push.size.y) return;
     vec4 m = moments(i);
     float floored = max(push.luminance_floor, 0.0);
     float noise = (sqrt(max(m.x / m.y, 0.0)) + floored) / max(m.z / m.w + floored, 1e-20);

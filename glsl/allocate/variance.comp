@@ -11,7 +11,7 @@ layout(scalar, push_constant) uniform Push { PriorityPush push; };
 
 void main() {
     uint i = thread_index();
-    if (i >= push.size.x * push.size.y) return; // safe: no barrier() follows
+    if (i >= push.size.x * push.size.y) return;
     ivec2 size = ivec2(push.size), at = ivec2(i % push.size.x, i / push.size.x);
     ivec2 first = max(at - 1, ivec2(0)), last = min(at + 1, size - 1);
     vec4 around = vec4(0.0);

@@ -1,5 +1,6 @@
 #include "shared/uint64.glsl"
 #include "shared/block.glsl"
+#include "shared/finite.glsl"
 
 // Turns priorities into integer weights, 12.20 fixed point, so that all that follows is exact. A priority that is not
 // finite weighs nothing and is counted. One workgroup sums one block.
@@ -10,7 +11,7 @@ layout(scalar, binding = 2) writeonly buffer Sums { BlockSums sums[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
 
 const float FIXED_POINT = 1048576.0; // 2^20: the product is exact
-const float LARGEST = 4095.0;
+const float MAX_PRIORITY = 4095.0;
 
 void main() {
     uint first = first_item(), items = item_count(first, push.pixels);
@@ -19,11 +20,10 @@ void main() {
     for (uint k = 0u; k < items; k++) {
         uint i = first + k;
         float p = texelFetch(priority, int(i)).x;
-        bool finite = (floatBitsToUint(p) & 0x7f800000u) != 0x7f800000u;
-        uint w = finite && p > 0.0 ? uint(min(p, LARGEST) * FIXED_POINT) : 0u;
+        uint w = finite(p) && p > 0.0 ? uint(min(p, MAX_PRIORITY) * FIXED_POINT) : 0u;
         weight[i] = w;
         total += w;
-        broken += finite ? 0u : 1u;
+        broken += finite(p) ? 0u : 1u;
         positive += w > 0u ? 1u : 0u;
     }
     uint64_t weights = block_sum(total);

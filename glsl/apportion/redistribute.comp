@@ -22,7 +22,7 @@ void main() {
     filled = block_sum(filled);
     floors = block_sum(floors);
     uvec2 pixels = unpackUint2x32(block_sum(counts));
-    if (gl_LocalInvocationIndex != 0u) return; // safe: no barrier() follows
+    if (gl_LocalInvocationIndex != 0u) return;
     Apportionment s = state[0];
     uint64_t left = wide(s.budget) - filled;
     if (pixels.x > 0u && push.round + 1u < push.rounds) {

@@ -24,7 +24,7 @@ uint first_index(uint pixel) { return push.first_sample + PixelStats_count(stats
 
 void main() {
     uint first = first_item();
-    if (first >= push.pixels) return; // safe: no barrier() follows
+    if (first >= push.pixels) return;
     uint64_t begin = wide(push.first_path), end = begin + push.paths;
     uint64_t from = offset_of(first);
     uint many = THREAD_ITEMS; // the first pixel with more than PLAIN paths

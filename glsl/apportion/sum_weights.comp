@@ -17,7 +17,7 @@ void main() {
     }
     weights = block_sum(weights);
     counts = block_sum(counts);
-    if (gl_LocalInvocationIndex != 0u) return; // safe: no barrier() follows
+    if (gl_LocalInvocationIndex != 0u) return;
     Apportionment s = state[0];
     s.equal = weights == 0UL ? 1u : 0u; // nothing is wanted more than the rest: all pixels alike
     bool deficit_next = push.round == 0u && push.total != uvec2(0u);

@@ -24,15 +24,14 @@ layout(scalar, push_constant) uniform Push { PackPush push; };
 
 const uint ROUNDS = 4u;     // of trades
 const float RIDGE = 0.01;   // of every square, added: weights that the estimates cannot tell apart become alike
-const float ENOUGH = 4.0;   // samples whose own variance is trusted
-const float WORST = 1e24;   // above every error
+const float MAX_ERROR = 1e24;   // above every error
 // Of the whole image's errors in those of a pixel, at most. What its surroundings tell is uncertain where few pixels have
 // seen light, and what is good elsewhere is rarely bad here.
 const float OVERALL = 0.6;
 
 void main() {
     uint i = thread_index();
-    if (i >= push.count) return; // safe: no barrier() follows
+    if (i >= push.count) return;
     int at = int(i);
     vec4 c = texelFetch(colour, at);
     vec4 a = texelFetch(wide, at), b = texelFetch(mid, at), n = texelFetch(narrow, at), d = texelFetch(svgf, at);
@@ -56,7 +55,7 @@ void main() {
         float[](noise, product.x, square.y, product.w, other.x),
         float[](noise, product.y, product.w, square.z, other.y),
         float[](noise, product.z, other.x, other.y, square.w));
-    float w[5] = float[](0.0, 0.0, 0.0, 0.0, 0.0), least = WORST;
+    float w[5] = float[](0.0, 0.0, 0.0, 0.0, 0.0), least = MAX_ERROR;
     int best = 1;
     [[unroll]] for (int k = 0; k < 5; k++) {
         if (usable[k] && missed[k][k] < least) {

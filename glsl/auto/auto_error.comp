@@ -34,7 +34,7 @@ float scaled(vec3 a, vec3 b) {
 
 void main() {
     uint i = thread_index();
-    if (i >= push.count) return; // safe: no barrier() follows
+    if (i >= push.count) return;
     int at = int(i);
     vec4 e = texelFetch(estimate, at);
     vec3 a = texelFetch(wide, at).rgb, b = texelFetch(mid, at).rgb, c = texelFetch(narrow, at).rgb;

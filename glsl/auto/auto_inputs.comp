@@ -16,7 +16,7 @@ layout(scalar, push_constant) uniform Push { AutoPush push; };
 
 void main() {
     uint i = thread_index();
-    if (i >= push.count) return; // safe: no barrier() follows
+    if (i >= push.count) return;
     vec4 c = texelFetch(colour, int(i));
     vec3 around = texelFetch(wide, int(i)).rgb;
     dim[i] = vec4(dimmed(c.rgb, around), c.w);

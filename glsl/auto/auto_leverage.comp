@@ -16,7 +16,7 @@ layout(scalar, push_constant) uniform Push { AutoPush push; };
 
 void main() {
     uint i = thread_index();
-    if (i >= push.count) return; // safe: no barrier() follows
+    if (i >= push.count) return;
     int at = int(i);
     vec3 kept = texelFetch(wide_kept, at).rgb, signs = signs_of(i) / 3.0;
     float added = probe(i, texelFetch(wide, at).rgb, push.floor);

@@ -1,4 +1,5 @@
 #include "shared/edge.glsl"
+#include "shared/b3_spline.glsl"
 
 // One level of A-Trous smoothing of estimates, one plane or three, which are right on average only: among alike surfaces, and
 // across others as far as they count at least.
@@ -14,16 +15,13 @@ layout(scalar, binding = 6) writeonly buffer Second { vec4 second_smoothed[]; };
 layout(scalar, binding = 7) writeonly buffer Third { vec4 third_smoothed[]; };
 layout(scalar, push_constant) uniform Push { AutoSmoothPush push; };
 
-layout(constant_id = 114) const bool THREE = true; // false: the first plane alone
-const float B3[3] = float[](3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0); // by |offset|
+#include "shared/packed_pixels.glsl"
 
-Pixel pixel_at(int at) {
-    return unpack_pixel(texelFetch(colour, at), texelFetch(place, at));
-}
+layout(constant_id = 114) const bool THREE = true; // false: the first plane alone
 
 void main() {
     ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(at, size))) return; // safe: no barrier() follows
+    if (any(greaterThanEqual(at, size))) return;
     Pixel p = pixel_at(at.y * size.x + at.x);
     vec4 sum_1 = vec4(0.0), sum_2 = vec4(0.0), sum_3 = vec4(0.0);
     float total = 0.0;
@@ -35,7 +33,7 @@ void main() {
             int there = tap.y * size.x + tap.x;
             Pixel q = pixel_at(there);
             float alike = edge_weight(q, edge_exponent(p, q, push.rates));
-            float w = B3[abs(i)] * B3[abs(j)] * (q.colour.w > 0.0 ? max(alike, push.least) : 0.0);
+            float w = b3_spline(i) * b3_spline(j) * (q.colour.w > 0.0 ? max(alike, push.least) : 0.0);
             sum_1 += w * texelFetch(first, there);
             if (THREE) {
                 sum_2 += w * texelFetch(second, there);

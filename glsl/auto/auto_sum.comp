@@ -30,7 +30,7 @@ void main() {
         }
         barrier();
     }
-    if (at != 0u) return; // safe: no barrier() follows
+    if (at != 0u) return;
     square_sums[gl_WorkGroupID.x] = sums[0][0];
     product_sums[gl_WorkGroupID.x] = sums[1][0];
     other_sums[gl_WorkGroupID.x] = sums[2][0];

@@ -21,10 +21,10 @@ layout(scalar, push_constant) uniform Push { FoldPush push; };
 const uint PLAIN = 2048u; // see shared/loop_limit.glsl
 
 // A channel whose albedo is below this cannot be divided out; its light stays with the direct light.
-const float SMALLEST_ALBEDO = 1e-6;
-const float BRIGHTEST = 3e38; // irradiance: what a small albedo makes of bright light stays finite
+const float MIN_ALBEDO = 1e-6;
+const float MAX_IRRADIANCE = 3e38; // irradiance: what a small albedo makes of bright light stays finite
 // Deviations and sums of their squares are cut there, so that what is added up over pixels stays finite.
-const float FARTHEST = 1e17, WIDEST = 1e35;
+const float MAX_DEVIATION = 1e17, MAX_M2 = 1e35;
 // Samples up to which means are rounded to single precision. Those after them move a mean by little more than its last place,
 // or less: their steps are kept to more bits (Kahan 1965), or the mean of 2^22 samples would be off by 1e-5 and more. That is
 // code that takes long to compile, and is there only in renders of so many samples.
@@ -53,7 +53,7 @@ void move_mean(inout vec3 mean, vec3 by, inout uint remainder, int at, int bits,
     precise vec3 moved = mean + added;
     precise vec3 lost = added - (moved - mean);
     int end = 1 << (bits - 1);
-    precise vec3 rounded = floor(lost / unit(moved, bits) + float(pcg(count) >> 8) * 5.9604644775390625e-8);
+    precise vec3 rounded = floor(lost / unit(moved, bits) + unit_interval(pcg(count)));
     // Half of the last place above is half of it below the next number: cut, it would be lost, always in one direction.
     precise vec3 next = moved + unit(moved, bits) * float(2 * end);
     bvec3 carries = greaterThanEqual(rounded, vec3(end));
@@ -65,7 +65,7 @@ void move_mean(inout vec3 mean, vec3 by, inout uint remainder, int at, int bits,
 }
 
 float square(float a, float b) {
-    return clamp(a, -FARTHEST, FARTHEST) * clamp(b, -FARTHEST, FARTHEST);
+    return clamp(a, -MAX_DEVIATION, MAX_DEVIATION) * clamp(b, -MAX_DEVIATION, MAX_DEVIATION);
 }
 
 void fold_light(inout PixelLight l, vec3 kept, vec3 irradiance, float share, uint count) {
@@ -77,7 +77,7 @@ void fold_light(inout PixelLight l, vec3 kept, vec3 irradiance, float share, uin
         move_mean(l.direct, (kept - l.direct) * share, l.remainder, 0, LIGHT_BITS, count);
         move_mean(l.indirect, (irradiance - l.indirect) * share, l.remainder, 3 * LIGHT_BITS, LIGHT_BITS, count);
     }
-    l.indirect_m2 = min(l.indirect_m2 + square(off, luminance(irradiance) - luminance(l.indirect)), WIDEST);
+    l.indirect_m2 = min(l.indirect_m2 + square(off, luminance(irradiance) - luminance(l.indirect)), MAX_M2);
 }
 
 // `first_broken`: samples before the first that was no number, which the sign of its rays tells.
@@ -90,8 +90,8 @@ void fold(inout PixelStats s, inout PixelLight l, inout uint broken_count, inout
     if (FX_SPLIT) {
         vec3 direct = first.rgb, indirect = texelFetch(samples, 3 * at + 1).rgb;
         vec3 albedo = texelFetch(samples, 3 * at + 2).rgb;
-        bvec3 divides = greaterThan(albedo, vec3(SMALLEST_ALBEDO));
-        vec3 irradiance = mix(vec3(0.0), min(indirect / max(albedo, vec3(SMALLEST_ALBEDO)), vec3(BRIGHTEST)), divides);
+        bvec3 divides = greaterThan(albedo, vec3(MIN_ALBEDO));
+        vec3 irradiance = mix(vec3(0.0), min(indirect / max(albedo, vec3(MIN_ALBEDO)), vec3(MAX_IRRADIANCE)), divides);
         vec3 kept = direct + mix(indirect, vec3(0.0), divides);
         radiance = direct + indirect;
         fold_light(l, kept, irradiance, share, s.count);
@@ -100,7 +100,7 @@ void fold(inout PixelStats s, inout PixelLight l, inout uint broken_count, inout
     if (!FX_MANY_SAMPLES || s.count <= FEW) s.mean += off * share;
     else move_mean(s.mean, off * share, s.remainder, 0, BITS, s.count);
     vec3 off_moved = radiance - s.mean;
-    [[unroll]] for (int c = 0; c < 3; c++) s.m2[c] = min(s.m2[c] + square(off[c], off_moved[c]), WIDEST);
+    [[unroll]] for (int c = 0; c < 3; c++) s.m2[c] = min(s.m2[c] + square(off[c], off_moved[c]), MAX_M2);
 }
 
 // The kernel that traced them has found the lowest pixel; only its own thread comes here for it.
@@ -113,7 +113,7 @@ void report(uint pixel, uint broken_count, uint first_broken) {
 
 void main() {
     uint i = thread_index();
-    if (i >= push.pixels) return; // safe: no barrier() follows
+    if (i >= push.pixels) return;
     uvec3 at_step_count = samples_of(i, push.first_pixel + i);
     uint at = at_step_count.x, step = at_step_count.y, count = at_step_count.z;
     if (count == 0u) return;

@@ -1,7 +1,7 @@
 #include "shared/thread.glsl"
 #include "shared/sanitise.glsl"
 
-// Takes a frame apart for a filter: colour = sharp + factor * filtered. Twin: composition::split, whose words these are.
+// Takes a frame apart for a filter: colour = sharp + factor * filtered. Twin: composition::split.
 layout(local_size_x = 64) in;
 const uint LIGHT = 0u, ALBEDO = 1u; // composition::Demodulation
 layout(constant_id = 110) const uint DEMODULATION = LIGHT;
@@ -14,9 +14,11 @@ layout(scalar, binding = 5) writeonly buffer Factor { vec4 factor[]; };
 layout(scalar, binding = 6) writeonly buffer Sharp { vec4 sharp[]; };
 layout(scalar, push_constant) uniform Push { SplitPush push; };
 
-// As in src/composition/albedo.rs.
+// A channel of smaller albedo is divided by this instead; a pixel with no larger one is left as it is.
 const float SMALLEST_ALBEDO = 0.01;
+// A pixel with less than this part of its neighbours' albedo may show a piece of something that has none.
 const float WHOLE = 0.98;
+// And one with this many times the light of its neighbours.
 const float OUTLIER = 2.0;
 
 struct Parts {
@@ -86,7 +88,7 @@ Parts split_albedo(int i) {
     return Parts(colour / factor, factor, vec3(0.0));
 }
 
-Parts split_as_demanded(int i) {
+Parts demodulated(int i) {
     if (DEMODULATION == LIGHT) return split_light(i);
     if (DEMODULATION == ALBEDO) return split_albedo(i);
     return Parts(colour_at(i), vec3(1.0), vec3(0.0));
@@ -101,9 +103,9 @@ vec3 variance_of_filtered(int i, vec3 factor, float freedom) {
 
 void main() {
     uint i = thread_index();
-    if (i >= push.size.x * push.size.y) return; // safe: no barrier() follows
+    if (i >= push.size.x * push.size.y) return;
     uint count = PixelStats_count(stats, i);
-    Parts p = split_as_demanded(int(i));
+    Parts p = demodulated(int(i));
     // Pixels whose filtered part is not used must not reach others.
     bool known = finite(colour_at(int(i))) && any(greaterThan(p.factor, vec3(0.0)));
     radiance[i] = vec4(p.filtered, known ? float(count) : 0.0);

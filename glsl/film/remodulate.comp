@@ -10,7 +10,7 @@ layout(scalar, push_constant) uniform Push { SplitPush push; };
 
 void main() {
     uint i = thread_index();
-    if (i >= push.size.x * push.size.y) return; // safe: no barrier() follows
+    if (i >= push.size.x * push.size.y) return;
     int at = int(i);
     vec3 light = texelFetch(factor, at).rgb * texelFetch(filtered, at).rgb;
     picture[i] = vec4(texelFetch(sharp, at).rgb + light, 1.0);

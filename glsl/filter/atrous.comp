@@ -1,4 +1,5 @@
 #include "shared/edge.glsl"
+#include "shared/b3_spline.glsl"
 
 // One level of the edge-avoiding A-Trous wavelet transform (Dammertz et al. 2010, section 2.2): 5x5 taps that are
 // push.spacing pixels apart, each weighted by how alike the two pixels are, and by the samples behind it. A thread filters
@@ -10,6 +11,8 @@ layout(binding = 1) uniform usamplerBuffer place; // of uvec4
 layout(scalar, binding = 2) writeonly buffer Output { vec4 filtered[]; };
 layout(scalar, push_constant) uniform Push { AtrousPush push; };
 
+#include "shared/packed_pixels.glsl"
+
 layout(constant_id = 114) const bool CONSERVE = false; // what a neighbour is refused stays with the centre
 
 const int ROWS = 4;
@@ -19,20 +22,11 @@ const float MOST_SAMPLES = 1e12; // beyond it, counts are cut, so that sums stay
 // the best weight; where noise did, the means are alike in error, and no weight is. The root serves both.
 float trust(Pixel q) { return CONSERVE ? 1.0 : sqrt(min(q.colour.w, MOST_SAMPLES)); }
 
-float b3_spline(int offset) {
-    int by = abs(offset);
-    return by == 0 ? 3.0 / 8.0 : by == 1 ? 1.0 / 4.0 : 1.0 / 16.0;
-}
-
-Pixel pixel_at(int at) {
-    return unpack_pixel(texelFetch(colour, at), texelFetch(place, at));
-}
-
 void main() {
     ivec2 size = ivec2(push.size);
     int spacing = int(push.spacing), x = int(gl_GlobalInvocationID.x), column = int(gl_GlobalInvocationID.y);
     int first = column / spacing * (ROWS * spacing) + column % spacing;
-    if (x >= size.x || first >= size.y) return; // safe: no barrier() follows
+    if (x >= size.x || first >= size.y) return;
     Pixel centre[ROWS];
     vec3 sum[ROWS];
     float total[ROWS];

@@ -8,6 +8,8 @@ layout(binding = 1) uniform usamplerBuffer place; // of uvec4
 layout(scalar, binding = 2) writeonly buffer Output { vec4 filtered[]; };
 layout(scalar, binding = 3) buffer Sums { vec4 sums[]; };
 layout(scalar, push_constant) uniform Push { BilateralPush push; };
+
+#include "shared/packed_pixels.glsl"
 // Whether the window is cut into bands of rows, a dispatch each, which adds to `sums` (weighted differences, weights):
 // see shared/loop_limit.glsl.
 layout(constant_id = 115) const bool BANDS = false;
@@ -15,14 +17,10 @@ layout(constant_id = 115) const bool BANDS = false;
 const int ROWS = 8;
 const float REFUSED = -1e30; // an exponent whose weight is 0
 
-Pixel pixel_at(int at) {
-    return unpack_pixel(texelFetch(colour, at), texelFetch(place, at));
-}
-
 void main() {
     ivec2 size = ivec2(push.size);
     int x = int(gl_GlobalInvocationID.x), first = ROWS * int(gl_GlobalInvocationID.y), radius = int(push.radius);
-    if (x >= size.x || first >= size.y) return; // safe: no barrier() follows
+    if (x >= size.x || first >= size.y) return;
     Pixel centre[ROWS];
     vec3 sum[ROWS];
     float total[ROWS];

@@ -10,7 +10,7 @@ layout(scalar, push_constant) uniform Push { FireflyPush push; };
 
 void main() {
     ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(at, size))) return; // safe: no barrier() follows
+    if (any(greaterThanEqual(at, size))) return;
     vec4 here = known_radiance(texelFetch(radiance, at.y * size.x + at.x));
     float first = -1.0, second = -1.0;
     for (int j = -2; j <= 2; j++) {

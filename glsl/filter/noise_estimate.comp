@@ -10,13 +10,10 @@ layout(binding = 2) uniform samplerBuffer variance; // of vec3
 layout(scalar, binding = 3) writeonly buffer Estimates { vec4 estimate[]; };
 layout(scalar, push_constant) uniform Push { SvgfPush push; };
 
-layout(constant_id = 114) const bool MEASURED = true; // `variance` has a pixel for every pixel
-const float ENOUGH = 4.0;                             // samples whose own variance is trusted
-const int REACH = 3;
+#include "shared/packed_pixels.glsl"
 
-Pixel pixel_at(int at) {
-    return unpack_pixel(texelFetch(colour, at), texelFetch(place, at));
-}
+layout(constant_id = 114) const bool MEASURED = true; // `variance` has a pixel for every pixel
+const int REACH = 3;
 
 float spread(ivec2 at, Pixel p) {
     ivec2 size = ivec2(push.size);
@@ -44,7 +41,7 @@ float spread(ivec2 at, Pixel p) {
 
 void main() {
     ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(at, size))) return; // safe: no barrier() follows
+    if (any(greaterThanEqual(at, size))) return;
     int i = at.y * size.x + at.x;
     Pixel p = pixel_at(i);
     vec3 v = MEASURED ? vec3(texelFetch(variance, 3 * i).x, texelFetch(variance, 3 * i + 1).x, texelFetch(variance, 3 * i + 2).x) : vec3(-1.0);

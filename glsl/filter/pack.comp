@@ -11,7 +11,7 @@ layout(scalar, push_constant) uniform Push { PackPush push; };
 
 void main() {
     uint i = thread_index();
-    if (i >= push.count) return; // safe: no barrier() follows
+    if (i >= push.count) return;
     colour[i] = known_radiance(texelFetch(radiance, int(i)));
     Guide hit = Guide_load(guide, i);
     vec3 position = hit.position;

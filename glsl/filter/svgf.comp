@@ -1,4 +1,5 @@
 #include "shared/edge.glsl"
+#include "shared/b3_spline.glsl"
 #include "shared/luminance.glsl"
 
 // One level of A-Trous wavelets whose radiance weight counts in standard deviations of the pixel (Schied et al. 2017,
@@ -11,7 +12,6 @@ layout(scalar, binding = 3) writeonly buffer Output { vec4 filtered[]; };
 layout(scalar, push_constant) uniform Push { SvgfPush push; };
 
 layout(constant_id = 114) const bool LAST = false;
-const float B3[3] = float[](3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0); // by |offset|
 
 int index(ivec2 at) {
     return at.y * int(push.size.x) + at.x;
@@ -39,7 +39,7 @@ float deviation(ivec2 at) {
 
 void main() {
     ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(at, size))) return; // safe: no barrier() follows
+    if (any(greaterThanEqual(at, size))) return;
     vec4 here = texelFetch(estimate, index(at));
     bool known = here.w >= 0.0;
     Pixel p = unpack_pixel(here, texelFetch(place, index(at)));
@@ -56,7 +56,7 @@ void main() {
             Pixel q = unpack_pixel(vec4(there.rgb, counts), texelFetch(place, index(inside)));
             float exponent = edge_exponent(p, q, push.rates);
             if (known) exponent -= rate * abs(contrast(q.colour.rgb, p.colour.rgb));
-            float w = B3[abs(i)] * B3[abs(j)] * edge_weight(q, exponent);
+            float w = b3_spline(i) * b3_spline(j) * edge_weight(q, exponent);
             sum += w * (q.colour.rgb - p.colour.rgb);
             total += w;
             spread += w * w * there.w;

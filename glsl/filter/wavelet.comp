@@ -10,6 +10,8 @@ layout(binding = 1) uniform usamplerBuffer place; // of uvec4
 layout(scalar, binding = 2) writeonly buffer Output { vec4 filtered[]; };
 layout(scalar, push_constant) uniform Push { WaveletPush push; };
 
+#include "shared/packed_pixels.glsl"
+
 layout(constant_id = 114) const bool INVERSE = false;
 
 // Neighbours of a pixel by stencil, in units of the spacing; rows and columns have two.
@@ -19,7 +21,7 @@ const ivec2 AROUND[16] = ivec2[](ivec2(-1, 0), ivec2(1, 0), ivec2(0), ivec2(0), 
 Pixel pixel_at(ivec2 at) {
     ivec2 inside = clamp(at, ivec2(0), ivec2(push.size) - 1);
     int i = inside.y * int(push.size.x) + inside.x;
-    Pixel p = unpack_pixel(texelFetch(colour, i), texelFetch(place, i));
+    Pixel p = pixel_at(i);
     if (at != inside) p.colour.w = 0.0;
     return p;
 }
@@ -71,7 +73,7 @@ vec3 update(ivec2 at, Pixel p) {
 
 void main() {
     ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(at, size))) return; // safe: no barrier() follows
+    if (any(greaterThanEqual(at, size))) return;
     Pixel p = pixel_at(at);
     vec4 c = p.colour;
     int odd = parity(at);

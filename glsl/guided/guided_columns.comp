@@ -19,20 +19,20 @@ vec4 point_at(int x, int y) {
     return texelFetch(channels, pixel_at(x, y));
 }
 
-void absorb_element(inout Moments m, vec4 point, int x, int y) {
+void merge_element(inout Moments m, vec4 point, int x, int y) {
     vec4 c = texelFetch(colour, pixel_at(x, y));
     bool known = y >= 0 && y < int(push.size.y) && c.w > 0.0;
-    absorb_means(m, known ? 1.0 : 0.0, c.rgb, point_at(x, y) - point);
+    merge_means(m, known ? 1.0 : 0.0, c.rgb, point_at(x, y) - point);
 }
 
-void put(int x, int y, Moments whole, vec4 point) {
-    whole = moved(whole, point_at(x, y) - point);
+void store(int x, int y, Moments whole, vec4 point) {
+    whole = rebased(whole, point_at(x, y) - point);
     int at = strip_at(x, y - int(push.first_row), int(push.size.x), MOMENTS);
     MOMENTS_STORE(sums, at, 8, whole);
 }
 
 void main() {
     int x = int(gl_GlobalInvocationID.x), from = int(gl_GlobalInvocationID.y) * SEGMENT;
-    if (x >= int(push.size.x)) return; // safe: no barrier() follows
+    if (x >= int(push.size.x)) return;
     walk(x, int(push.first_row) + from, int(push.first_row) + min(from + SEGMENT, int(push.rows)));
 }

@@ -22,21 +22,21 @@ vec4 point_at(int x, int y) {
     return texelFetch(channels, pixel_at(x, y));
 }
 
-void absorb_element(inout Fit f, vec4 point, int x, int y) {
+void merge_element(inout Fit f, vec4 point, int x, int y) {
     int at = pixel_at(x, y);
     Fit model = Fit(texelFetch(slope_r, at), texelFetch(slope_g, at), texelFetch(slope_b, at), texelFetch(value, at));
     bool is = y >= 0 && y < int(push.size.y);
-    absorb(f, moved(model, point - point_at(x, y)), is);
+    merge(f, rebased(model, point - point_at(x, y)), is);
 }
 
-void put(int x, int y, Fit whole, vec4 point) {
-    whole = moved(whole, point_at(x, y) - point);
+void store(int x, int y, Fit whole, vec4 point) {
+    whole = rebased(whole, point_at(x, y) - point);
     int at = strip_at(x, y - int(push.first_row), int(push.size.x), FIT);
     FIT_STORE(sums, at, 8, whole);
 }
 
 void main() {
     int x = int(gl_GlobalInvocationID.x), from = int(gl_GlobalInvocationID.y) * SEGMENT;
-    if (x >= int(push.size.x)) return; // safe: no barrier() follows
+    if (x >= int(push.size.x)) return;
     walk(x, int(push.first_row) + from, int(push.first_row) + min(from + SEGMENT, int(push.rows)));
 }

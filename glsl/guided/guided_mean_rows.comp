@@ -24,16 +24,16 @@ vec4 point_at(int row, int x) {
     return texelFetch(channels, pixel_at(row, x));
 }
 
-void absorb_element(inout Fit f, vec4 point, int row, int x) {
+void merge_element(inout Fit f, vec4 point, int row, int x) {
     int width = int(push.size.x);
     int at = strip_at(clamp(x, 0, width - 1), row, width, FIT);
     Fit column = FIT_LOAD(at, 8, FETCH_COLUMN);
-    absorb(f, moved(column, point - point_at(row, x)), x >= 0 && x < width);
+    merge(f, rebased(column, point - point_at(row, x)), x >= 0 && x < width);
 }
 
-void put(int row, int x, Fit whole, vec4 point) {
+void store(int row, int x, Fit whole, vec4 point) {
     int pixel = pixel_at(row, x);
-    whole = moved(whole, texelFetch(channels, pixel) - point);
+    whole = rebased(whole, texelFetch(channels, pixel) - point);
     vec4 c = texelFetch(colour, pixel);
     // A model that no float can hold, or no known pixel in reach: the pixel stays as it is.
     bool usable = whole.value.w > 0.0 && finite(whole.value.rgb);
@@ -43,6 +43,6 @@ void put(int row, int x, Fit whole, vec4 point) {
 
 void main() {
     int row = int(gl_GlobalInvocationID.x), from = int(gl_GlobalInvocationID.y) * SEGMENT;
-    if (row >= int(push.rows)) return; // safe: no barrier() follows
+    if (row >= int(push.rows)) return;
     walk(row, from, min(from + SEGMENT, int(push.size.x)));
 }

@@ -14,7 +14,7 @@ layout(constant_id = 110) const uint CHANNELS = 4u; // 1: the grey normal, 3: th
 
 void main() {
     ivec2 size = ivec2(push.size), p = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(p, size))) return; // safe: no barrier() follows
+    if (any(greaterThanEqual(p, size))) return;
     int at = blocked(p.x, p.y, size.y), pixel = p.y * size.x + p.x;
     colour[at] = paired(known_radiance(texelFetch(radiance, pixel)));
     Guide hit = Guide_load(guide, pixel);

@@ -25,15 +25,15 @@ vec4 point_at(int row, int x) {
     return texelFetch(channels, pixel_at(row, x));
 }
 
-void absorb_element(inout Moments m, vec4 point, int row, int x) {
+void merge_element(inout Moments m, vec4 point, int row, int x) {
     int width = int(push.size.x);
     int at = strip_at(clamp(x, 0, width - 1), row, width, MOMENTS);
     Moments column = MOMENTS_LOAD(at, 8, FETCH_COLUMN);
     column.mean += point_at(row, x) - point;
-    absorb(m, column, x >= 0 && x < width);
+    merge(m, column, x >= 0 && x < width);
 }
 
-void put(int row, int x, Moments whole, vec4 point) {
+void store(int row, int x, Moments whole, vec4 point) {
     vec4 r, g, b, off = point_at(row, x) - point - whole.mean;
     solve(whole, whole.head.x * push.eps, r, g, b);
     int at = pixel_at(row, x);
@@ -46,6 +46,6 @@ void put(int row, int x, Moments whole, vec4 point) {
 
 void main() {
     int row = int(gl_GlobalInvocationID.x), from = int(gl_GlobalInvocationID.y) * SEGMENT;
-    if (row >= int(push.rows)) return; // safe: no barrier() follows
+    if (row >= int(push.rows)) return;
     walk(row, from, min(from + SEGMENT, int(push.size.x)));
 }

@@ -8,7 +8,7 @@ layout(scalar, push_constant) uniform Push { GuidedPush push; };
 
 void main() {
     int x = int(gl_GlobalInvocationID.x), width = int(push.size.x);
-    if (x >= width) return; // safe: no barrier() follows
+    if (x >= width) return;
     vec4 sum = vec4(0.0);
     for (int y = 0; y < int(push.size.y); y++) {
         sum += texelFetch(rows, y * width + x);

@@ -12,7 +12,7 @@ layout(scalar, push_constant) uniform Push { GuidedPush push; };
 
 void main() {
     int y = int(gl_GlobalInvocationID.x), width = int(push.size.x), height = int(push.size.y);
-    if (y >= height) return; // safe: no barrier() follows
+    if (y >= height) return;
     Fit f = NO_FIT;
     for (int x = 0; x < width; x++) {
         int at = blocked(x, y, height);

@@ -23,7 +23,7 @@ vec4 sum(ivec4 c, int member) {
 
 void main() {
     ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(at, size))) return; // safe: no barrier() follows
+    if (any(greaterThanEqual(at, size))) return;
     ivec4 c = corners(at, size, int(push.radius));
     Moments m = MOMENTS_LOAD(0, 1, SUM);
     float count = m.head.x, share = 1.0 / max(count, 1.0);

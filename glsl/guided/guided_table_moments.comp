@@ -11,7 +11,7 @@ layout(scalar, push_constant) uniform Push { GuidedPush push; };
 
 void main() {
     int y = int(gl_GlobalInvocationID.x), width = int(push.size.x), height = int(push.size.y);
-    if (y >= height) return; // safe: no barrier() follows
+    if (y >= height) return;
     Moments m = NO_MOMENTS;
     for (int x = 0; x < width; x++) {
         vec4 c = texelFetch(colour, blocked(x, y, height)), i = texelFetch(channels, blocked(x, y, height));

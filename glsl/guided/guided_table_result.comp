@@ -23,10 +23,10 @@ vec4 sum(ivec4 c, int member) {
 
 void main() {
     ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(at, size))) return; // safe: no barrier() follows
+    if (any(greaterThanEqual(at, size))) return;
     ivec4 c = corners(at, size, int(push.radius));
     int from = blocked(at.x, at.y, size.y);
-    Fit f = moved(FIT_LOAD(0, 1, SUM), texelFetch(channels, from));
+    Fit f = rebased(FIT_LOAD(0, 1, SUM), texelFetch(channels, from));
     vec4 here = texelFetch(colour, from);
     vec3 result = f.value.rgb / f.value.w;
     // A model that no float can hold, or no known pixel in reach: the pixel stays as it is.

@@ -35,8 +35,7 @@ struct BsdfSample {
 };
 
 // Interfaces below this roughness are smooth; directions closer to the horizon than GRAZING count as below it.
-const float SMOOTH_ALPHA = 0.01;
-const float GRAZING = 1e-9;
+const float GRAZING = 1e-9; // directions closer to the horizon count as below it
 const vec3 UP = vec3(0.0, 0.0, 1.0);
 
 // With one kind in the scene the test for it folds away.

@@ -1,4 +1,4 @@
-// Camera rays. Needs `push` (PathPush), sampler.glsl and warp.glsl before it.
+// Camera rays. Needs frame.glsl, sampler.glsl and warp.glsl before it.
 
 struct Ray {
     vec3 origin;
@@ -29,20 +29,20 @@ const uint PAIR_FILM = 0u, PAIR_LENS = 1u;
 
 // Where in the film a sample of `pixel` falls, in pixels.
 vec2 film_sample(uint pixel, Sampler random) {
-    vec2 at = vec2(pixel % push.size.x, pixel / push.size.x);
+    vec2 at = vec2(pixel % frame.size.x, pixel / frame.size.x);
     vec2 u = sample_2d(random, PAIR_FILM);
-    if (FX_PIXEL_FILTER && push.pixel_filter == 1u) u = 0.5 + vec2(warp_tent(u.x), warp_tent(u.y));
-    else if (FX_PIXEL_FILTER && push.pixel_filter == 2u) u = 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y));
-    else if (FX_PIXEL_FILTER && push.pixel_filter == 3u) u = vec2(0.5);
+    if (FX_PIXEL_FILTER && frame.pixel_filter == 1u) u = 0.5 + vec2(warp_tent(u.x), warp_tent(u.y));
+    else if (FX_PIXEL_FILTER && frame.pixel_filter == 2u) u = 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y));
+    else if (FX_PIXEL_FILTER && frame.pixel_filter == 3u) u = vec2(0.5);
     return at + u;
 }
 
 // The first ray of a sample's path, through `film` in pixels.
 Ray eye_ray(vec2 film, Sampler random) {
     vec2 lens = FX_LENS ? sample_2d(random, PAIR_LENS) : vec2(0.0);
-    return camera_ray(push.camera, film_from_pixel(film, push.size), lens);
+    return camera_ray(frame.camera, film_from_pixel(film, frame.size), lens);
 }
 
 // Alpha masks along a path draw from this. The seed is hashed first, or seeds 0 and 1 would swap the numbers of neighbouring
 // pixels, and it is inverted, or they would be those of `sampler_start`.
-uint path_seed(uint pixel, uint index) { return pcg(pcg(pixel ^ pcg(~push.seed)) + index); }
+uint path_seed(uint pixel, uint index) { return pcg(pcg(pixel ^ pcg(~frame.seed)) + index); }

@@ -1,8 +1,8 @@
-// What a primary ray meets. Needs `push` (PathPush), bsdf.glsl, camera.glsl, traverse.glsl and surface.glsl before it.
+// What a primary ray meets. Needs frame.glsl, bsdf.glsl, camera.glsl, traverse.glsl and surface.glsl before it.
 
 // `delta`: a smooth surface, all of whose light counts as direct.
 Guide first_hit(Ray ray, uint mask_seed, out bool delta) {
-    Hit hit = traverse(Segment(ray.origin, ray.direction, 3e38, mask_seed), push.root);
+    Hit hit = traverse(Segment(ray.origin, ray.direction, 3e38, mask_seed), frame.root);
     delta = false;
     Guide guide = Guide_zero();
     guide.object = guide.material = NONE;
@@ -11,7 +11,7 @@ Guide first_hit(Ray ray, uint mask_seed, out bool delta) {
     Bsdf bsdf = surface_bsdf(s);
     delta = bsdf_is_delta(bsdf);
     guide.normal = side_of(s, -ray.direction) * s.normal;
-    guide.depth = hit.t + push.camera.near;
+    guide.depth = hit.t + frame.camera.near;
     guide.position = s.position;
     guide.object = s.object;
     guide.albedo = bsdf_albedo(bsdf, -dot(s.normal, ray.direction));

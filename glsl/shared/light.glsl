@@ -7,7 +7,7 @@ struct LightSample {
     float pdf;      // per solid angle, for MIS; 0 for lights that no BSDF sample can hit
 };
 
-const float INFINITE_DISTANCE = 3e38;
+const float INFINITE_DISTANCE = 3e38; // of lights at infinity
 
 // `random` is left as a word that is independent of the choice and as well stratified as it was: where in its share of the slot
 // it fell. A hash fills up the bits that the choice used.
@@ -34,7 +34,7 @@ mat3 environment_rotation(uint light) { // environment_from_world
 }
 
 uvec2 environment_extent() {
-    return uvec2(push.environment_width, uint(textureSize(environment)) / push.environment_width);
+    return uvec2(frame.environment_width, uint(textureSize(environment)) / frame.environment_width);
 }
 
 vec3 environment_lookup(vec2 uv) {
@@ -60,23 +60,23 @@ float environment_pdf(uint light, uint texel, float sine) {
 
 // Radiance from `direction` and the density with which light_sample would choose it (solid angle).
 vec3 environment_radiance(vec3 direction, out float pdf) {
-    vec3 scale = Light_value(lights, push.environment);
-    pdf = Light_probability(lights, push.environment) * (0.25 / PI);
-    if (!FX_ENVIRONMENT_MAP || push.environment_width == 0u) return scale;
+    vec3 scale = Light_value(lights, frame.environment);
+    pdf = Light_probability(lights, frame.environment) * (0.25 / PI);
+    if (!FX_ENVIRONMENT_MAP || frame.environment_width == 0u) return scale;
     uvec2 size = environment_extent();
-    vec3 d = environment_rotation(push.environment) * direction;
+    vec3 d = environment_rotation(frame.environment) * direction;
     float sine = length(d.xz);
     vec2 uv = environment_uv(d, sine);
     uv.x -= floor(uv.x);
     uvec2 texel = min(uvec2(uv * vec2(size)), size - 1u);
-    pdf = environment_pdf(push.environment, texel.y * size.x + texel.x, sine);
+    pdf = environment_pdf(frame.environment, texel.y * size.x + texel.x, sine);
     return scale * environment_lookup(uv);
 }
 
 void sample_environment(uint light, float chosen, uint word, vec2 u, inout LightSample s) {
     s.distance = INFINITE_DISTANCE;
     s.radiance = Light_value(lights, light);
-    if (!FX_ENVIRONMENT_MAP || push.environment_width == 0u) {
+    if (!FX_ENVIRONMENT_MAP || frame.environment_width == 0u) {
         s.direction = warp_sphere(u);
         s.pdf = chosen * (0.25 / PI);
     } else {
@@ -110,7 +110,11 @@ SphericalTriangle spherical_triangle(vec3 a, vec3 e1, vec3 e2) {
 }
 
 // Where sampling by solid angle pays and is exact in single precision; elsewhere triangles are sampled by area.
-bool by_solid_angle(float solid_angle) { return FX_LARGE_LAMPS && solid_angle > 3e-4 && solid_angle < 6.0; }
+const float MIN_SOLID_ANGLE = 3e-4, MAX_SOLID_ANGLE = 6.0; // steradians
+
+bool by_solid_angle(float solid_angle) {
+    return FX_LARGE_LAMPS && solid_angle > MIN_SOLID_ANGLE && solid_angle < MAX_SOLID_ANGLE;
+}
 
 // Uniform by solid angle: u.x cuts off the triangle `a`, `b`, `d` with d on the arc from `a` to `c`, u.y chooses a point of the
 // arc from `b` to d (Arvo 1995). tan(ad / 2) follows from the solid angle's formula for `a`, `b`, d.
@@ -190,7 +194,7 @@ void sample_sphere_light(vec3 p, Light light, vec2 u, inout LightSample s) {
 // One light for the surface point `p`. Radiance is 0 when the light cannot reach the point.
 LightSample light_sample(vec3 p, uint word, vec2 u) {
     LightSample s = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0);
-    uint index = push.light_count == 1u ? 0u : alias_choose(light_table, push.light_count, word);
+    uint index = frame.light_count == 1u ? 0u : alias_choose(light_table, frame.light_count, word);
     Light light = Light_load(lights, index);
     if (FX_EMISSIVE && light.kind == LIGHT_TRIANGLE) {
         sample_triangle_light(p, light, u, s);
@@ -219,7 +223,7 @@ LightSample light_sample(vec3 p, uint word, vec2 u) {
 
 // Density per solid angle with which light_sample chooses, from `origin`, a point of an emissive triangle or sphere hit by a ray.
 float triangle_light_pdf(Surface s, vec3 origin, float t, float cosine) {
-    float density = push.triangle_pdf_scale * Material_emission_weight(materials, s.material); // over area
+    float density = frame.triangle_pdf_scale * Material_emission_weight(materials, s.material); // over area
     if (FX_SPHERES && s.radius > 0.0) {
         float cap = sphere_cap(s.corner - origin, s.radius);
         return cap > 0.0 ? density * 2.0 * s.radius * s.radius / cap : 0.0; // times the area, over 2 pi times the cap

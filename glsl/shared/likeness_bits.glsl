@@ -2,14 +2,14 @@
 // row by row.
 const float GATHERED_UNIT = 31.0, SEVENTHS = 7.0;
 // Pixels that look unlike still count a little: where all are, as in grass, there is no better source.
-const float LEAST_KINSHIP = 0.2;
+const float MIN_KINSHIP = 0.2;
 
 uint kinship_bit(int n) {
     return 5u + 3u * uint(n);
 }
 
 float kinship_of(uint word, int n) {
-    return max(float((word >> kinship_bit(n)) & 7u) / SEVENTHS, LEAST_KINSHIP);
+    return max(float((word >> kinship_bit(n)) & 7u) / SEVENTHS, MIN_KINSHIP);
 }
 
 float gathered_of(uint word) {

@@ -19,13 +19,13 @@ const Fit NO_FIT = Fit(vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
     to[at] = paired(f.r, f.g); \
     to[(at) + step] = paired(f.b, f.value)
 
-Fit moved(Fit f, vec4 by) {
+Fit rebased(Fit f, vec4 by) {
     f.value.rgb += vec3(dot(f.r, by), dot(f.g, by), dot(f.b, by));
     return f;
 }
 
 // `f` with `other` if it `is` there, and as it was if not, whatever `other` holds then. Both about the same point.
-void absorb(inout Fit f, Fit other, bool is) {
+void merge(inout Fit f, Fit other, bool is) {
     if (!is) other = Fit(f.r, f.g, f.b, vec4(f.value.rgb, 0.0));
     float count = other.value.w, all = f.value.w + count, share = count / max(all, 1.0);
     f.r += share * (other.r - f.r);

@@ -1,5 +1,6 @@
 // One number for a radiance.
 
+const float ENOUGH = 4.0; // samples whose own variance is trusted
 const float STRONGEST = 1e18; // differences are cut there, so that their squares are finite
 
 float luminance(vec3 c) {

@@ -33,13 +33,13 @@ Moments unpacked(vec4 head, vec4 mean, vec4 xx, vec4 y, vec4 zr, vec4 rg, vec4 g
     to[(at) + 2 * step] = paired(vec4(m.zz.yz, m.r.xy), vec4(m.r.zw, m.g.xy)); \
     to[(at) + 3 * step].xyz = paired(vec4(m.g.zw, m.b.xy), m.b.zwzw).xyz
 
-Moments moved(Moments m, vec4 by) {
+Moments rebased(Moments m, vec4 by) {
     m.mean -= by;
     return m;
 }
 
 // `m` with a set of these means and `count` pixels that do not vary.
-void absorb_means(inout Moments m, float count, vec3 n, vec4 i) {
+void merge_means(inout Moments m, float count, vec3 n, vec4 i) {
     vec3 off_n = n - m.head.yzw;
     vec4 off_i = i - m.mean;
     float all = m.head.x + count, share = count / max(all, 1.0);
@@ -55,9 +55,9 @@ void absorb_means(inout Moments m, float count, vec3 n, vec4 i) {
 }
 
 // `m` with `other` if it `is` there, and as it was if not, whatever `other` holds then. Both about the same point.
-void absorb(inout Moments m, Moments other, bool is) {
+void merge(inout Moments m, Moments other, bool is) {
     if (!is) other = Moments(vec4(0.0, m.head.yzw), m.mean, vec4(0.0), vec3(0.0), vec3(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
-    absorb_means(m, other.head.x, other.head.yzw, other.mean);
+    merge_means(m, other.head.x, other.head.yzw, other.mean);
     m.xx += other.xx;
     m.yy += other.yy;
     m.zz += other.zz;

@@ -4,14 +4,14 @@
 // Samples' worth of trust in the noise of the surroundings.
 const float PRIOR_SAMPLES = 32.0;
 // Luminance is cut there, so that its sum over samples and pixels is finite.
-const float BLINDING = 1e29;
+const float MAX_LUMINANCE = 1e29;
 
 // (squared deviations summed, mean over channels; degrees of freedom; luminance times samples; samples)
 vec4 moments(uint pixel, out vec3 mean) {
     PixelStats s = PixelStats_load(stats, pixel);
     mean = s.mean;
     float n = float(s.count);
-    return s.count > 0u ? vec4((s.m2.r + s.m2.g + s.m2.b) / 3.0, n - 1.0, min(luminance(mean), BLINDING) * n, n) : vec4(0.0);
+    return s.count > 0u ? vec4((s.m2.r + s.m2.g + s.m2.b) / 3.0, n - 1.0, min(luminance(mean), MAX_LUMINANCE) * n, n) : vec4(0.0);
 }
 
 vec4 moments(uint pixel) {

@@ -52,9 +52,8 @@ uvec2 sample_2d_bits(Sampler s, uint pair) {
     return uvec2(bitfieldReverse(x), bitfieldReverse(y));
 }
 
-// In [0, 1): 24 bits, so that the conversion is exact and never rounds up to 1.
 vec2 unit_floats(uvec2 bits) {
-    return vec2(bits >> 8) * 5.9604644775390625e-8;
+    return vec2(unit_interval(bits.x), unit_interval(bits.y));
 }
 
 vec2 sample_2d(Sampler s, uint pair) {

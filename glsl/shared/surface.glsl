@@ -28,7 +28,7 @@ vec3 unit_vector(vec3 v, out float len) {
 // How far along the unit normal a ray must start so that it meets no other triangle of the same plane. Rounding moves the
 // interpolated point by some 2^-24 of the numbers that it is a sum of (`reach`), and the distance that the triangle test
 // computes by as much of the triangle's size. A quarter of this was enough for all but one in 10^4 rays, half for all.
-const float CLEARANCE = 1.0 / (1 << 21);
+const float CLEARANCE = 4.76837158203125e-7; // 2^-21
 
 float plane_clearance(vec3 n, vec3 reach, vec3 e1, vec3 e2) {
     vec3 edge = max(abs(e1), abs(e2));
@@ -193,12 +193,13 @@ struct Facing {
     vec3 normal;
 };
 
+const float MIN_ELEVATION = 1e-3; // sine, of what a bent normal raises above the horizon
+
 // For a viewer towards `wo`; on the viewer's side where the surface `turns`. A smooth normal that faces away is bent until
 // `wo` is above its horizon, and for surfaces with a mirror image (`mirrors`) until that is above the plane (Keller et al.
 // 2017, "The Iray light transport simulation and rendering system", A.3; here along the plane's normal, which is defined for
 // all of them). A map's normal that faces away is turned by half a turn around the smooth one, as Mitsuba 3 does.
 Facing facing_normals(Surface s, vec3 wo, bool turns, bool mirrors) {
-    const float ABOVE = 1e-3; // sine of the elevation
     float side = side_of(s, wo);
     vec3 n = side * s.smooth_normal, mapped = side * s.normal;
     if (SHADING_NORMALS) {
@@ -207,7 +208,7 @@ Facing facing_normals(Surface s, vec3 wo, bool turns, bool mirrors) {
         vec3 image = 2.0 * along * n - wo;
         float height = dot(image, plane);
         bool bent = (mirrors ? height : along) < 0.0;
-        if (bent) n = normalize(mirrors ? wo + normalize(image + (ABOVE - height) * plane) : n + (ABOVE - along) * wo);
+        if (bent) n = normalize(mirrors ? wo + normalize(image + (MIN_ELEVATION - height) * plane) : n + (MIN_ELEVATION - along) * wo);
         if (bent) mapped = n;
         if (MAPS && dot(mapped, wo) < 0.0) mapped = 2.0 * dot(mapped, n) * n - mapped;
     }

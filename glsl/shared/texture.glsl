@@ -42,5 +42,5 @@ bool mask_blocks(uint triangle, uint instance, vec2 barycentric, uint seed) {
     float opacity = surface_opacity(material_of(triangle, instance), triangle, barycentric);
     // Two copies of a triangle on one ray decide independently.
     uint surface = triangle * 0x9e3779b9u ^ instance * 0x85ebca6bu;
-    return opacity > float(pcg(seed ^ surface) >> 8) * 5.9604644775390625e-8;
+    return opacity > unit_interval(pcg(seed ^ surface));
 }

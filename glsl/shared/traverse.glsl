@@ -77,7 +77,7 @@ RaySpace ray_space(vec3 origin, vec3 direction) {
     return r;
 }
 
-RaySpace either(bool first, RaySpace a, RaySpace b) {
+RaySpace select_ray(bool first, RaySpace a, RaySpace b) {
     bvec3 all = bvec3(first);
     return RaySpace(mix(b.origin, a.origin, all), mix(b.direction, a.direction, all), mix(b.inverse, a.inverse, all),
                     mix(b.shear, a.shear, all), first ? a.along_x : b.along_x, first ? a.along_y : b.along_y,
@@ -269,7 +269,7 @@ void intersect_leaves(inout Hit hit, RaySpace ray, uvec2 leaves, uint instance, 
 bool traversal_step(inout Traversal t, RaySpace world, bool any_hit, uint root, uint mask_seed, uvec2 from) {
     bool two_levels = FX_INSTANCES && (root & ROOT_OF_INSTANCES) != 0u;
     RaySpace ray = world;
-    if (FX_INSTANCES) ray = either(t.instance != NONE, t.inside, world);
+    if (FX_INSTANCES) ray = select_ray(t.instance != NONE, t.inside, world);
     uvec2 leaves = uvec2(t.base, t.bits); // instances that an earlier node left on the stack
     if (!two_levels || t.bits > 0x00ffffffu) {
         uint hits = t.bits >> 24, inner = t.bits & 0xffu;
@@ -317,14 +317,14 @@ Hit traverse(Segment ray, uint root) {
 
 // First, where `shadowed`, whether anything blocks `shadow` (the answer replaces `shadowed`); then, where `alive`, the
 // closest hit of `ray`. Both leave the same triangle. In one loop no lane waits for the slowest shadow ray.
-Hit traverse_both(Segment shadow, inout bool shadowed, Segment ray, bool alive, uint root, uvec2 from) {
+Hit trace_shadow_then_closest(Segment shadow, inout bool shadowed, Segment ray, bool alive, uint root, uvec2 from) {
     RaySpace first = ray_space(shadow.origin, shadow.direction), second = ray_space(ray.origin, ray.direction);
     bool any_hit = shadowed, done;
     shadowed = false;
     Traversal t = traversal_start(any_hit ? shadow.t_max : ray.t_max, root);
     do {
         uint mask_seed = any_hit ? shadow.mask_seed : ray.mask_seed;
-        done = traversal_step(t, either(any_hit, first, second), any_hit, root, mask_seed, from);
+        done = traversal_step(t, select_ray(any_hit, first, second), any_hit, root, mask_seed, from);
         if (done && any_hit) {
             shadowed = t.hit.triangle != NONE;
             t = traversal_start(ray.t_max, root);

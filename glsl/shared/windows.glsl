@@ -5,6 +5,17 @@
 // are counted from the first window's left border. Window j of tile k is the end of group k from its element j, GROUPS
 // whole groups, and REST + j elements after those, whose sum becomes the next whole group on the way.
 //
+// Windows of 15 elements in tiles of 4, so that GROUPS = 2 and REST = 3. t: in `tail`, w: in a whole group, a: in `ahead`.
+//
+//     window 0   t t t t | w w w w | w w w w | a a a
+//     window 1     t t t | w w w w | w w w w | a a a a
+//     window 2       t t | w w w w | w w w w | a a a a | a
+//     window 3         t | w w w w | w w w w | a a a a | a a
+//
+// tail[j] grows from the right to the left, and begins with the whole groups; `ahead` grows to the right by an element a window.
+// As it fills its group it is kept as the newest whole one for the next tile, and the oldest is forgotten. A tile so adds fewer
+// than 3 * TILE elements, however long windows are.
+//
 // A kernel defines SUM, its type, and NO_SUM, and the functions that are declared here.
 layout(constant_id = 110) const int WINDOW = 49;
 layout(constant_id = 111) const int TILE = 8;     // at most WINDOW
@@ -36,23 +47,23 @@ Part recent; // sum of many that came in this turn
 vec4 point_at(int line, int at);
 
 // `sum`, counted from `point`, with an element, if there is one at that place.
-void absorb_element(inout SUM sum, vec4 point, int line, int at);
+void merge_element(inout SUM sum, vec4 point, int line, int at);
 
 // Takes the sum over the window around a place.
-void put(int line, int at, SUM whole, vec4 point);
+void store(int line, int at, SUM whole, vec4 point);
 
-void absorb_part(inout SUM sum, vec4 point, Part part) {
-    absorb(sum, moved(part.sum, point - part.point), true);
+void merge_part(inout SUM sum, vec4 point, Part part) {
+    merge(sum, rebased(part.sum, point - part.point), true);
 }
 
 // For tile `at` of the turn.
 SUM whole_groups(vec4 point, int at) {
     SUM sum = NO_SUM;
     if (MANY) {
-        absorb_part(sum, point, group[at]);
-        absorb_part(sum, point, recent);
+        merge_part(sum, point, group[at]);
+        merge_part(sum, point, recent);
     } else {
-        [[unroll]] for (int g = 0; g < GROUPS; g++) absorb_part(sum, point, group[g]);
+        [[unroll]] for (int g = 0; g < GROUPS; g++) merge_part(sum, point, group[g]);
     }
     return sum;
 }
@@ -61,7 +72,7 @@ SUM whole_groups(vec4 point, int at) {
 void append(Part next, int at) {
     if (MANY) {
         group[at] = next;
-        absorb_part(recent.sum, recent.point, next);
+        merge_part(recent.sum, recent.point, next);
     } else {
         [[unroll]] for (int g = 0; g + 1 < SLOTS; g++) group[g] = group[g + 1];
         group[SLOTS - 1] = next;
@@ -72,7 +83,7 @@ void append(Part next, int at) {
 void begin_turn(vec4 point) {
     for (int g = GROUPS - 2; g >= 0; g--) {
         Part part = group[g];
-        absorb_part(part.sum, part.point, group[g + 1]);
+        merge_part(part.sum, part.point, group[g + 1]);
         group[g] = part;
     }
     recent = Part(NO_SUM, point);
@@ -83,19 +94,19 @@ void walk_tile(int line, int tile, int end, int left, int at) {
     vec4 here = point_at(line, min(tile + TILE / 2, end - 1));
     SUM sum = whole_groups(here, at), tail[TILE];
     [[unroll]] for (int j = TILE - 1; j >= 0; j--) {
-        absorb_element(sum, here, line, left + j);
+        merge_element(sum, here, line, left + j);
         tail[j] = sum;
     }
     int next = left + (GROUPS + 1) * TILE;
     Part ahead = Part(NO_SUM, point_at(line, next));
-    [[unroll]] for (int i = 0; i < REST - 1; i++) absorb_element(ahead.sum, ahead.point, line, next + i);
+    [[unroll]] for (int i = 0; i < REST - 1; i++) merge_element(ahead.sum, ahead.point, line, next + i);
     [[unroll]] for (int j = 0; j < TILE; j++) {
         int last = REST + j - 1; // of the window, from `next`
-        if (last >= 0) absorb_element(ahead.sum, ahead.point, line, next + last);
+        if (last >= 0) merge_element(ahead.sum, ahead.point, line, next + last);
         if (last == TILE - 1) append(ahead, at);
         SUM whole = tail[j];
-        absorb_part(whole, here, ahead);
-        if (tile + j < end) put(line, tile + j, whole, here);
+        merge_part(whole, here, ahead);
+        if (tile + j < end) store(line, tile + j, whole, here);
     }
 }
 
@@ -109,7 +120,7 @@ void walk(int line, int first, int end) {
     for (int g = 0; g < GROUPS; g++) {
         int begin = left + (g + 1) * TILE;
         Part part = Part(NO_SUM, point_at(line, begin));
-        for (int i = 0; i < TILE; i++) absorb_element(part.sum, part.point, line, begin + i);
+        for (int i = 0; i < TILE; i++) merge_element(part.sum, part.point, line, begin + i);
         append(part, g);
     }
     // Tested at its end: see shared/traverse.glsl.

@@ -12,6 +12,7 @@ layout(binding = 3) uniform samplerBuffer scalars; // of float
 layout(scalar, binding = 4) readonly buffer Words { uvec3 words[]; };
 layout(scalar, binding = 5) buffer Sums { uint sums[]; };
 layout(scalar, binding = 6) writeonly buffer Result { uvec2 result[]; };
+layout(scalar, binding = 7) uniform Block { uvec2 block; };
 layout(scalar, push_constant) uniform Push { uvec4 push; };
 
 void main() {
@@ -25,5 +26,5 @@ void main() {
     uvec3 e = words[i];
     uint sum = sums[i] + (FX_TEXTURES ? a.w : 1u) + ADDEND;
     sums[i] = sum;
-    result[i] = uvec2(hash(a.x ^ b ^ c ^ d ^ e.z ^ push.y), sum);
+    result[i] = uvec2(hash(a.x ^ b ^ c ^ d ^ e.z ^ block.y ^ push.y), sum);
 }

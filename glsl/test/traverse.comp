@@ -24,7 +24,7 @@ void main() {
     bool any_hit = push.any_hit != 0u, done = true;
     Traversal t = traversal_start(0.0, push.root);
     uint i = thread_index(), stride = gl_NumWorkGroups.x * gl_NumWorkGroups.y * WORKGROUP;
-    if (i >= push.count) return; // safe: no barrier() follows
+    if (i >= push.count) return;
     do {
         Segment ray = ray_at(i); // again and again, which is cheaper than to keep it
         if (done) t = traversal_start(ray.t_max, push.root);

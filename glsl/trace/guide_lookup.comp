@@ -1,6 +1,7 @@
 #include "effects.glsl"
 #include "shared/thread.glsl"
 #include "shared/scene.glsl"
+#include "shared/frame.glsl"
 #include "shared/sanitise.glsl"
 
 // Supersampling of Bauszat, Eisemann and Magnor 2011 (EGSR), section 3.2: guide rays at pixel centres carry filtered light;
@@ -26,12 +27,12 @@ uint nodes_visited = 0u;
 
 // Departure from the paper, whose quotients are 0 / 0 on one plane: the largest difference counts as at least this, so that
 // rounding decides nothing. Of unit normals, and relative to depth.
-const float LEAST_NORMAL = 1e-3, LEAST_DEPTH = 1e-4;
+const float MIN_NORMAL_DIFFERENCE = 1e-3, MIN_DEPTH_DIFFERENCE = 1e-4;
 
 // Normal and depth of the guide ray through a pixel; depth 0 where it carries no light.
 vec4 guide_ray(ivec2 at) {
-    if (any(greaterThanEqual(at, ivec2(push.size)))) return vec4(0.0);
-    int q = at.y * int(push.size.x) + at.x;
+    if (any(greaterThanEqual(at, ivec2(frame.size)))) return vec4(0.0);
+    int q = at.y * int(frame.size.x) + at.x;
     Guide guide = Guide_load(guides, q);
     bool known = known_radiance(texelFetch(filtered, q)).w > 0.0 && finite(guide.normal) && finite(guide.depth);
     return known ? vec4(guide.normal, guide.depth) : vec4(0.0);
@@ -40,11 +41,11 @@ vec4 guide_ray(ivec2 at) {
 // Pixel of the guide ray with the largest S = S_n * S_d (equations 3 to 5) among the four nearest to `film`; the nearest of
 // equals, NONE where none of them carries light.
 uint most_similar(Guide eye, vec2 film) {
-    ivec2 size = ivec2(push.size);
+    ivec2 size = ivec2(frame.size);
     ivec2 first = clamp(ivec2(floor(film - 0.5)), ivec2(0), max(size - 2, 0));
     ivec2 near = clamp(ivec2(floor(film)), ivec2(0), size - 1), far = 2 * first + 1 - near;
     ivec2 at[4] = ivec2[](near, ivec2(far.x, near.y), ivec2(near.x, far.y), far);
-    vec2 differences[4], largest = vec2(LEAST_NORMAL, LEAST_DEPTH * eye.depth);
+    vec2 differences[4], largest = vec2(MIN_NORMAL_DIFFERENCE, MIN_DEPTH_DIFFERENCE * eye.depth);
     for (int k = 0; k < 4; k++) {
         vec4 guide = guide_ray(at[k]);
         bool carries = guide.w > 0.0;
@@ -65,13 +66,13 @@ uint most_similar(Guide eye, vec2 film) {
 
 void main() {
     uint pixel = thread_index();
-    if (pixel >= push.pixels) return; // safe: no barrier() follows
+    if (pixel >= push.pixels) return;
     vec3 sum = vec3(0.0);
     // Tested at its end: see shared/traverse.glsl.
     uint k = 0u;
     do {
         uint index = push.first_sample + k;
-        Sampler random = sampler_start(pixel, index, push.seed);
+        Sampler random = sampler_start(pixel, index, frame.seed);
         vec2 film = film_sample(pixel, random);
         bool delta;
         Guide eye = first_hit(eye_ray(film, random), pcg(path_seed(pixel, index)), delta);

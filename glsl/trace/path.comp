@@ -1,6 +1,7 @@
 #include "effects.glsl"
 #include "shared/thread.glsl"
 #include "shared/scene.glsl"
+#include "shared/frame.glsl"
 #include "shared/finite.glsl"
 #include "shared/store64.glsl"
 
@@ -34,7 +35,9 @@ const uint PAIR_CHOICE = 0u, PAIR_LIGHT = 1u, PAIR_BSDF = 2u, PAIR_ROULETTE = 3u
 
 // Shadow rays to a lamp end at this part of the way: the error of the distance at which they would meet it is some 2^-24
 // over the cosine there.
-const float SHADOW_END = 1.0 - 1e-5;
+const float SHADOW_END = 0.99999;
+
+const float MAX_SURVIVAL = 0.95; // of roulette
 
 // Joins the two strategies. Two densities that vanished give 0, not 0 / 0.
 float balance(float taken, float other) { return taken / max(taken + other, 1e-37); }
@@ -48,12 +51,12 @@ struct Path {
     float eta_scale; // squared refractive index at `origin` over that at the camera
 };
 
-struct Light2 {
+struct SplitLight {
     vec3 direct;
     vec3 indirect;
 };
 
-void add_light(inout Light2 sum, vec3 light, bool indirect) {
+void add_light(inout SplitLight sum, vec3 light, bool indirect) {
     bool apart = FX_INDIRECT && indirect;
     sum.direct += apart ? vec3(0.0) : light;
     sum.indirect += apart ? light : vec3(0.0);
@@ -62,11 +65,11 @@ void add_light(inout Light2 sum, vec3 light, bool indirect) {
 // The whole sample is clamped, in place of what each bounce adds: the limit is that of what a pixel averages.
 vec3 clamped(vec3 light) {
     float largest = max(light.r, max(light.g, light.b));
-    return light * (push.clamp_indirect > 0.0 && largest > push.clamp_indirect ? push.clamp_indirect / largest : 1.0);
+    return light * (frame.clamp_indirect > 0.0 && largest > frame.clamp_indirect ? frame.clamp_indirect / largest : 1.0);
 }
 
 vec3 light_from_miss(Path path) {
-    if (!FX_ENVIRONMENT || push.environment == NONE) return vec3(0.0);
+    if (!FX_ENVIRONMENT || frame.environment == NONE) return vec3(0.0);
     float pdf;
     vec3 radiance = environment_radiance(path.direction, pdf);
     return radiance * (path.delta ? 1.0 : balance(path.bsdf_pdf, pdf));
@@ -114,14 +117,14 @@ bool scatter(inout Path path, Surface s, Bsdf bsdf, Facing facing, mat3 basis, v
 
 // Radiance is scaled by 1 / eta^2 on the way into glass, and back on the way out: that says nothing of what a path is worth.
 bool survives_roulette(inout Path path, Sampler random, uint pair) {
-    float q = min(max(path.throughput.r, max(path.throughput.g, path.throughput.b)) * path.eta_scale, 0.95);
+    float q = min(max(path.throughput.r, max(path.throughput.g, path.throughput.b)) * path.eta_scale, MAX_SURVIVAL);
     if (sample_2d(random, pair + PAIR_ROULETTE).x >= q) return false;
     path.throughput /= q;
     return true;
 }
 
 // Adds what the path meets at `hit`; true where it can go on from there, from `s`.
-bool arrive(inout Light2 sum, Path path, Hit hit, bool indirect, out Surface s) {
+bool arrive(inout SplitLight sum, Path path, Hit hit, bool indirect, out Surface s) {
     if (hit.triangle == NONE) {
         add_light(sum, path.throughput * light_from_miss(path), indirect);
         return false;
@@ -131,17 +134,17 @@ bool arrive(inout Light2 sum, Path path, Hit hit, bool indirect, out Surface s) 
     return true;
 }
 
-Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
-    Light2 sum = Light2(vec3(0.0), vec3(0.0));
+SplitLight trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
+    SplitLight sum = SplitLight(vec3(0.0), vec3(0.0));
     albedo = vec3(0.0);
-    Hit hit = traverse(Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed)), push.root);
+    Hit hit = traverse(Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed)), frame.root);
     closest_rays++;
     Surface s;
     bool smooth_first = false, mirrored = false;
     uint bounce = 0u;
     // A round goes from one surface to the next, so that the last one samples no light. The light sampled at the first waits
-    // for the ray to the next: see traverse_both.
-    if (arrive(sum, path, hit, false, s) && push.max_depth > 1u) do {
+    // for the ray to the next: see trace_shadow_then_closest.
+    if (arrive(sum, path, hit, false, s) && frame.max_depth > 1u) do {
         uint pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
         Bsdf bsdf = surface_bsdf(s);
         // The two sides of a dielectric differ: its normal stays on the outside.
@@ -158,10 +161,10 @@ Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         Segment shadow;
         uint mask_seed = pcg(seed + 2u * bounce);
         vec3 sampled = path.throughput * light_from_nee(s, bsdf, facing, basis, wo, random, pair, mask_seed + 1u, shadow);
-        bool shadowed = push.light_count > 0u && !smooth_here && max(sampled.r, max(sampled.g, sampled.b)) > 0.0;
+        bool shadowed = frame.light_count > 0u && !smooth_here && max(sampled.r, max(sampled.g, sampled.b)) > 0.0;
         bool alive = scatter(path, s, bsdf, facing, basis, wo, random, pair);
         if (bounce == 0u) mirrored = path.delta;
-        bool roulette = FX_ROULETTE && push.roulette_depth > 0u && bounce + 1u >= push.roulette_depth;
+        bool roulette = FX_ROULETTE && frame.roulette_depth > 0u && bounce + 1u >= frame.roulette_depth;
         if (roulette) alive = survives_roulette(path, random, pair) && alive;
         bounce++;
         if (!alive && !shadowed) break;
@@ -170,13 +173,13 @@ Light2 trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         any_rays += uint(shadowed);
         bool lit = shadowed, indirect = bounce >= 2u && !smooth_first;
         Segment ray = Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed + 2u * bounce));
-        hit = traverse_both(shadow, shadowed, ray, alive, push.root, uvec2(hit.triangle, hit.instance));
+        hit = trace_shadow_then_closest(shadow, shadowed, ray, alive, frame.root, uvec2(hit.triangle, hit.instance));
         add_light(sum, lit && !shadowed ? sampled : vec3(0.0), indirect);
         if (!alive || !arrive(sum, path, hit, indirect, s)) break;
-    } while (bounce + 1u < push.max_depth);
+    } while (bounce + 1u < frame.max_depth);
     if (FX_CLAMP) sum.indirect = clamped(sum.indirect);
     // What a smooth coat mirrors needs no filter. It is moved only here, so that the sum of both keeps its bits.
-    if (mirrored) sum = Light2(sum.direct + sum.indirect, vec3(0.0));
+    if (mirrored) sum = SplitLight(sum.direct + sum.indirect, vec3(0.0));
     return sum;
 }
 
@@ -189,23 +192,23 @@ void count(uint slot, uint n) {
 void main() {
     bool listed = FX_ADAPTIVE && push.samples == 0u;
     uint i = listed ? striped_index() : thread_index(); // listed pixel by pixel, else sample by sample
-    if (i >= push.pixels * (listed ? 1u : push.samples)) return; // safe: no barrier() follows
+    if (i >= push.pixels * (listed ? 1u : push.samples)) return;
     uint pixel = push.first_pixel + i % push.pixels;
     uint index = push.first_sample + i / push.pixels;
     if (listed) {
         uvec2 path = texelFetch(paths, int(i)).xy;
         pixel = path.x;
         index = path.y;
-        if (pixel == NONE) return; // safe: no barrier() follows
+        if (pixel == NONE) return;
     }
-    Sampler random = sampler_start(pixel, index, push.seed);
+    Sampler random = sampler_start(pixel, index, frame.seed);
     Ray ray = eye_ray(film_sample(pixel, random), random);
     Path path = Path(ray.origin, ray.direction, vec3(1.0), 0.0, true, 1.0);
     vec3 albedo;
-    Light2 light = trace_path(path, random, path_seed(pixel, index), albedo);
+    SplitLight light = trace_path(path, random, path_seed(pixel, index), albedo);
     float rays = float(closest_rays + any_rays);
     if (!finite(light.direct + light.indirect)) {
-        light = Light2(vec3(0.0), vec3(0.0));
+        light = SplitLight(vec3(0.0), vec3(0.0));
         rays = -rays;
         atomicMax(broken[0].lowest, ~pixel);
     }

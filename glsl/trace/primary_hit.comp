@@ -1,6 +1,7 @@
 #include "effects.glsl"
 #include "shared/thread.glsl"
 #include "shared/scene.glsl"
+#include "shared/frame.glsl"
 
 // The primary hit through the centre of every pixel, from the middle of the lens: what filters and allocation steer by.
 layout(local_size_x_id = 100) in;
@@ -22,12 +23,12 @@ uint nodes_visited = 0u;
 
 void main() {
     uint i = thread_index();
-    if (i >= push.pixels) return; // safe: no barrier() follows
+    if (i >= push.pixels) return;
     uint pixel = push.first_pixel + i;
-    vec2 centre = vec2(pixel % push.size.x, pixel / push.size.x) + 0.5;
-    Camera camera = push.camera;
+    vec2 centre = vec2(pixel % frame.size.x, pixel / frame.size.x) + 0.5;
+    Camera camera = frame.camera;
     camera.lens_radius = 0.0;
-    Ray ray = camera_ray(camera, film_from_pixel(centre, push.size), vec2(0.5));
+    Ray ray = camera_ray(camera, film_from_pixel(centre, frame.size), vec2(0.5));
     bool delta;
     guides[i] = first_hit(ray, pcg(pixel), delta);
 }

@@ -7,8 +7,8 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{Guide, NONE, PixelLight, PixelStats, PriorityPush, vec3};
 use crate::math::portable::{exp_negative, squared_distance};
-use crate::shaders::both::{APART, LEAST_LEFT, STRONGEST_TINT};
-use crate::shaders::shared::likeness_bits::{GATHERED_UNIT, LEAST_KINSHIP, SEVENTHS};
+use crate::shaders::both::{APART, MAX_TINT, MIN_LEFT};
+use crate::shaders::shared::likeness_bits::{GATHERED_UNIT, MIN_KINSHIP, SEVENTHS};
 use crate::shaders::{both, likeness};
 use crate::statistics::luminance;
 use glam::Vec3;
@@ -64,14 +64,14 @@ fn kinship(a: &Guide, b: &Guide, push: &PriorityPush) -> f32 {
     let x = apart(|g| g.normal) * push.normal_scale + apart(|g| g.albedo) * 25.0;
     let alike = (a.material == NONE) == (b.material == NONE);
     let sevenths = if alike { (exp_negative(x) * SEVENTHS + 0.5).floor() } else { 0.0 };
-    (sevenths / SEVENTHS).max(LEAST_KINSHIP)
+    (sevenths / SEVENTHS).max(MIN_KINSHIP)
 }
 
 /// Squared deviations, mean over channels, of indirect light, out of those of its luminance before albedo.
 fn indirect_squares(stats: &PixelStats, light: &PixelLight) -> f32 {
     let level = luminance(light.indirect);
     let tint = (Vec3::from(stats.mean) - Vec3::from(light.direct)) / level;
-    let tint = if level > 0.0 { tint.min(Vec3::splat(STRONGEST_TINT)) } else { Vec3::ZERO };
+    let tint = if level > 0.0 { tint.min(Vec3::splat(MAX_TINT)) } else { Vec3::ZERO };
     (light.indirect_m2 * tint.length_squared() / 3.0).min(moments(stats)[0])
 }
 
@@ -96,7 +96,7 @@ fn surroundings(inputs: &HostInputs, pixel: usize) -> ([f32; 4], f32) {
     }
     let share = if around[0] > 0.0 { indirect / around[0] } else { 1.0 };
     let left = 1.0 - weights / (kin_of_all * kin_of_all);
-    if kin_of_all > 0.0 && left > LEAST_LEFT {
+    if kin_of_all > 0.0 && left > MIN_LEFT {
         around[0] += (squares - offsets.length_squared() / kin_of_all).max(0.0) / 3.0;
         around[1] += freedom * left;
     }

@@ -3,7 +3,7 @@ use super::{HostInputs, Inputs, Placing, Policy, Row};
 use crate::error::Result;
 use crate::gpu::{Kernel, Recorder};
 use crate::layout::{PixelStats, PriorityPush};
-use crate::shaders::shared::pixel_noise::{BLINDING, PRIOR_SAMPLES};
+use crate::shaders::shared::pixel_noise::{MAX_LUMINANCE, PRIOR_SAMPLES};
 use crate::shaders::variance::Bind;
 use crate::statistics::luminance;
 
@@ -31,7 +31,7 @@ pub(super) fn moments(s: &PixelStats) -> [f32; 4] {
         return [0.0; 4];
     }
     let n = s.count as f32;
-    [(s.m2[0] + s.m2[1] + s.m2[2]) / 3.0, n - 1.0, luminance(s.mean).min(BLINDING) * n, n]
+    [(s.m2[0] + s.m2[1] + s.m2[2]) / 3.0, n - 1.0, luminance(s.mean).min(MAX_LUMINANCE) * n, n]
 }
 
 /// Of the 3 x 3 pixels around one, those on the film, row by row.

@@ -15,14 +15,23 @@ pub enum Access {
     ReadWrite,
     /// Uniform texel buffer.
     TexelRead,
+    /// Uniform buffer.
+    UniformRead,
     /// Source of a copy.
     CopySource,
-    /// Target of a copy or a fill.
+    /// Target of a copy, a fill or an update.
     CopyTarget,
 }
 
-const ALL: [Access; 6] =
-    [Access::Read, Access::Write, Access::ReadWrite, Access::TexelRead, Access::CopySource, Access::CopyTarget];
+const ALL: [Access; 7] = [
+    Access::Read,
+    Access::Write,
+    Access::ReadWrite,
+    Access::TexelRead,
+    Access::UniformRead,
+    Access::CopySource,
+    Access::CopyTarget,
+];
 
 /// The only place that knows which stages and accesses an [`Access`] means: (stage, reads, writes).
 fn masks(access: Access) -> (vk::PipelineStageFlags2, vk::AccessFlags2, vk::AccessFlags2) {
@@ -32,6 +41,7 @@ fn masks(access: Access) -> (vk::PipelineStageFlags2, vk::AccessFlags2, vk::Acce
         Access::Write => (S::COMPUTE_SHADER, A::NONE, A::SHADER_STORAGE_WRITE),
         Access::ReadWrite => (S::COMPUTE_SHADER, A::SHADER_STORAGE_READ, A::SHADER_STORAGE_WRITE),
         Access::TexelRead => (S::COMPUTE_SHADER, A::SHADER_SAMPLED_READ, A::NONE),
+        Access::UniformRead => (S::COMPUTE_SHADER, A::UNIFORM_READ, A::NONE),
         Access::CopySource => (S::ALL_TRANSFER, A::TRANSFER_READ, A::NONE),
         Access::CopyTarget => (S::ALL_TRANSFER, A::NONE, A::TRANSFER_WRITE),
     }

@@ -10,7 +10,7 @@ use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Parts of buffers begin at multiples of so many elements, each of 4 bytes at least: no device asks for storage offsets
+/// Parts of buffers begin at multiples of so many elements, each of 4 bytes at least: no device asks for offsets of bindings
 /// that are multiples of more than 256 bytes.
 pub const PART: usize = 64;
 
@@ -50,7 +50,7 @@ pub enum PixelFormat {
     R32G32B32A32Sfloat = vk::Format::R32G32B32A32_SFLOAT.as_raw(),
 }
 
-/// `len` values of `T`, readable by kernels as storage and as texels, and copied from and to.
+/// `len` values of `T`, readable by kernels as storage, as texels and as a uniform block, and copied from and to.
 pub struct Buffer<T> {
     untyped: Arc<Untyped>,
     /// Index of the first element; 0 but in a part.
@@ -217,6 +217,12 @@ impl Bound<'_> {
         Ok(vk::DescriptorBufferInfo::default().buffer(*raw).offset(self.offset).range(self.size))
     }
 
+    /// The first element. By the contract of `Bindings` no device refuses its size.
+    pub(super) fn uniform(&self) -> vk::DescriptorBufferInfo {
+        let range = self.buffer.stride as u64;
+        vk::DescriptorBufferInfo::default().buffer(self.buffer.raw).offset(self.offset).range(range)
+    }
+
     /// A view as texels of 16 bytes where elements are a multiple of that, of 8 where they are one of 8, else of 4. Made once,
     /// then kept.
     ///
@@ -256,6 +262,7 @@ impl Untyped {
         }
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER
             | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
+            | vk::BufferUsageFlags::UNIFORM_BUFFER
             | vk::BufferUsageFlags::TRANSFER_SRC
             | vk::BufferUsageFlags::TRANSFER_DST;
         let info = vk::BufferCreateInfo::default().size(size).usage(usage);

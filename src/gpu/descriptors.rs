@@ -17,7 +17,7 @@ pub(super) struct Descriptors {
 
 /// What a slot is bound to; arrays of one, since Vulkan wants slices.
 enum Resource {
-    Storage([vk::DescriptorBufferInfo; 1]),
+    Buffer([vk::DescriptorBufferInfo; 1]),
     Texels([vk::BufferView; 1]),
 }
 
@@ -47,7 +47,8 @@ impl Descriptors {
     pub fn set(&mut self, kernel: &Parts, slots: &[Slot], buffers: &[Bound]) -> Result<vk::DescriptorSet> {
         let resource = |(slot, bound): (&Slot, &Bound)| {
             Ok(match slot.kind {
-                SlotKind::Storage => Resource::Storage([bound.storage()?]),
+                SlotKind::Storage => Resource::Buffer([bound.storage()?]),
+                SlotKind::Uniform => Resource::Buffer([bound.uniform()]),
                 kind => Resource::Texels([bound.texels(kind)?]),
             })
         };
@@ -62,7 +63,7 @@ impl Descriptors {
                     .dst_binding(slot.binding)
                     .descriptor_type(slot.kind.descriptor());
                 match resource {
-                    Resource::Storage(info) => write.buffer_info(info),
+                    Resource::Buffer(info) => write.buffer_info(info),
                     Resource::Texels(view) => write.texel_buffer_view(view).descriptor_count(1),
                 }
             })
@@ -105,7 +106,11 @@ impl Drop for Descriptors {
 
 fn create_pool(gpu: &Gpu) -> Result<vk::DescriptorPool> {
     let size = |ty| vk::DescriptorPoolSize { ty, descriptor_count: SETS * PER_SET };
-    let sizes = [size(vk::DescriptorType::STORAGE_BUFFER), size(vk::DescriptorType::UNIFORM_TEXEL_BUFFER)];
+    let sizes = [
+        size(vk::DescriptorType::STORAGE_BUFFER),
+        size(vk::DescriptorType::UNIFORM_TEXEL_BUFFER),
+        size(vk::DescriptorType::UNIFORM_BUFFER),
+    ];
     let info = vk::DescriptorPoolCreateInfo::default().max_sets(SETS).pool_sizes(&sizes);
     // SAFETY: a complete info.
     unsafe { gpu.0.device.create_descriptor_pool(&info, None) }.at("descriptors")

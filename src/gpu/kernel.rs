@@ -17,6 +17,8 @@ pub enum SlotKind {
     UintTexels,
     /// `samplerBuffer`.
     FloatTexels,
+    /// Uniform block: the first element.
+    Uniform,
 }
 
 impl SlotKind {
@@ -24,6 +26,7 @@ impl SlotKind {
         match self {
             Self::Storage => vk::DescriptorType::STORAGE_BUFFER,
             Self::UintTexels | Self::FloatTexels => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+            Self::Uniform => vk::DescriptorType::UNIFORM_BUFFER,
         }
     }
 }
@@ -46,7 +49,8 @@ pub struct Slot {
 /// # Safety
 /// - [`Self::SPIRV`] is valid code for Vulkan 1.3 and the features in [`super::REQUIRED_FEATURES`], with an entry point
 ///   `main` for compute; [`Self::SLOTS`] are its descriptors, all in set 0, with numbers that differ.
-/// - [`Self::Push`] is its push constants: at most 128 bytes, a multiple of 4.
+/// - [`Self::Push`] is its push constants: at most 128 bytes, a multiple of 4. Elements of [`SlotKind::Uniform`] have at most
+///   16384 bytes.
 /// - [`Self::buffers`] returns as many as there are slots.
 /// - Whatever buffers, push constants and specialisation constants its owner lets others choose, it accesses nothing but
 ///   its buffers. Accesses beyond their ends are allowed on devices with robust buffer access; those beyond the ends of

@@ -134,6 +134,20 @@ impl<'a> Recorder<'a> {
         })
     }
 
+    /// Replaces the first element of `buffer`, in the order of the passes: those before read the old value, those after the new.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when memory is out.
+    pub fn update<T: Pod>(&mut self, buffer: &Buffer<T>, value: &T) -> Result<()> {
+        const { assert!(size_of::<T>() <= 65_536, "the most that an update may have") };
+        let Bound { buffer: target, offset, .. } = buffer.bound();
+        self.owns(&[buffer.bound()])?;
+        // SAFETY: a live buffer of one element or more, whole words, kept by the frame.
+        self.pass("update", &[(target, Access::CopyTarget)], |device, commands| unsafe {
+            device.cmd_update_buffer(commands, target.raw, offset, bytemuck::bytes_of(value));
+        })
+    }
+
     /// From here on no barriers come between passes: a fault to plant, for tests of the validation that would find it.
     #[doc(hidden)]
     pub fn suppress_barriers(&mut self) {

@@ -75,11 +75,11 @@ macro_rules! gpu_structs {
 }
 
 macro_rules! constants {
-    ($($(#[$doc:meta])* $name:ident = $value:literal;)+) => {
-        $($(#[$doc])* pub const $name: u32 = $value;)+
+    ($($(#[$doc:meta])* $name:ident: $ty:ident = $value:literal;)+) => {
+        $($(#[$doc])* pub const $name: $ty = $value;)+
         /// The same constants as GLSL text.
         pub const GLSL_CONSTANTS: &str =
-            concat!($("const uint ", stringify!($name), " = ", stringify!($value), "u;\n",)+);
+            concat!($("const ", stringify!($ty), " ", stringify!($name), " = ", stringify!($value), ";\n",)+);
     };
 }
 
@@ -95,55 +95,57 @@ pub use filter::*;
 
 constants! {
     /// "No texture", "no material override", "no hit".
-    NONE = 0xffffffff;
+    NONE: uint = 0xffffffff;
     /// Groups of nodes that a traversal can put aside; scenes that need more are refused when they are loaded.
-    TRAVERSAL_STACK = 32;
-    /// Set in [`PathPush::root`] when the leaves of that level are instances.
-    ROOT_OF_INSTANCES = 0x80000000;
+    TRAVERSAL_STACK: uint = 32;
+    /// Set in [`FrameConstants::root`] when the leaves of that level are instances.
+    ROOT_OF_INSTANCES: uint = 0x80000000;
     /// Set in [`Triangle::primitive`] of a sphere.
-    SPHERE = 0x80000000;
+    SPHERE: uint = 0x80000000;
     /// [`Triangle::primitive`] of a sphere: its front side is the inner one.
-    SPHERE_INWARD = 1;
+    SPHERE_INWARD: uint = 1;
     /// [`Triangle::primitive`] of a sphere: its azimuth runs the other way, as a mirror shows it.
-    SPHERE_MIRRORED = 2;
+    SPHERE_MIRRORED: uint = 2;
     /// [`Material::kind`]: Lambertian reflection, `base_color / pi`.
-    BSDF_DIFFUSE = 0;
-    /// [`Material::kind`]: microfacet conductor with exact Fresnel from `eta`, `k`; `alpha` below 0.01 is a mirror.
-    BSDF_CONDUCTOR = 1;
+    BSDF_DIFFUSE: uint = 0;
+    /// [`Material::kind`]: microfacet conductor with exact Fresnel from `eta`, `k`.
+    BSDF_CONDUCTOR: uint = 1;
     /// [`Material::kind`]: microfacet dielectric, reflection and refraction, `eta[0]` = interior / exterior index.
-    BSDF_DIELECTRIC = 2;
+    BSDF_DIELECTRIC: uint = 2;
     /// [`Material::kind`]: diffuse base under a dielectric coat of index `eta[0]`, roughness `alpha`.
-    BSDF_COATED = 3;
+    BSDF_COATED: uint = 3;
+    /// An interface whose [`Material::alpha`] is below this is smooth.
+    SMOOTH_ALPHA: float = 0.01;
     /// [`Material::flags`]: the GGX distribution instead of Beckmann.
-    MATERIAL_GGX = 1;
+    MATERIAL_GGX: uint = 1;
     /// [`Material::flags`]: both sides scatter alike (dielectrics ignore it: their sides differ by definition).
-    MATERIAL_TWO_SIDED = 2;
+    MATERIAL_TWO_SIDED: uint = 2;
     /// [`Material::flags`]: `bump_texture` is a tangent-space normal map, not a height map.
-    MATERIAL_NORMAL_MAP = 4;
+    MATERIAL_NORMAL_MAP: uint = 4;
     /// [`Material::flags`]: hits are subject to an alpha mask (`opacity_texture` or `opacity` below 1).
-    MATERIAL_MASKED = 8;
+    MATERIAL_MASKED: uint = 8;
     /// [`Material::flags`]: light that scatters below a coat takes on the base's colour at every turn.
-    MATERIAL_NONLINEAR = 16;
+    MATERIAL_NONLINEAR: uint = 16;
     /// Roughnesses in the table of a rough coat (reference::coat).
-    COAT_ROWS = 32;
+    COAT_ROWS: uint = 32;
     /// Numbers for each of them: [`COAT_COLUMNS`] - 1 cosines, and the mean from inside.
-    COAT_COLUMNS = 49;
+    COAT_COLUMNS: uint = 49;
     /// [`Texture::flags`]: RGB is stored with the sRGB curve and decoded when read.
-    TEXTURE_SRGB = 1;
+    TEXTURE_SRGB: uint = 1;
     /// [`Texture::flags`]: coordinates outside [0, 1] clamp to the border texel; otherwise they repeat.
-    TEXTURE_CLAMP = 2;
+    TEXTURE_CLAMP: uint = 2;
     /// [`Light::kind`]: emissive triangle `a`, `b`, `c` (vertices in world units), radiance `value`.
-    LIGHT_TRIANGLE = 0;
+    LIGHT_TRIANGLE: uint = 0;
     /// [`Light::kind`]: point at `a`, radiant intensity `value` in W/sr.
-    LIGHT_POINT = 1;
+    LIGHT_POINT: uint = 1;
     /// [`Light::kind`]: spot at `a` along unit `b`; `c` = (cos of the full-intensity angle, cos of the cut-off angle, 0).
-    LIGHT_SPOT = 2;
+    LIGHT_SPOT: uint = 2;
     /// [`Light::kind`]: directional along unit `b` (the way light travels), irradiance `value` on a facing plane.
-    LIGHT_DIRECTIONAL = 3;
+    LIGHT_DIRECTIONAL: uint = 3;
     /// [`Light::kind`]: the environment; rows of the rotation environment_from_world in `a`, `b`, `c`; radiance scale `value`.
-    LIGHT_ENVIRONMENT = 4;
+    LIGHT_ENVIRONMENT: uint = 4;
     /// [`Light::kind`]: sphere around `a` of radius `b.x` (world units), emits radiance `value` outward.
-    LIGHT_SPHERE = 5;
+    LIGHT_SPHERE: uint = 5;
 }
 
 gpu_structs! {
@@ -269,7 +271,7 @@ gpu_structs! {
         opacity: float,
         /// Extinction per channel (conductor).
         k: vec3,
-        /// Microfacet roughness (alpha itself, not its root); below 0.01 the interface is smooth.
+        /// Microfacet roughness (alpha itself, not its root); see [`SMOOTH_ALPHA`].
         alpha: float,
         /// Tint of specular reflection; multiplies `specular_texture`.
         specular: vec3,
@@ -395,20 +397,13 @@ gpu_structs! {
         index: uint,
     }
 
-    /// Push constants of `path.comp` and `primary_hit.comp`.
-    struct PathPush {
+    /// What all paths of a frame have in common: of the scene, the camera and the settings. Kernels read it as a uniform buffer,
+    /// which has room for more, where push constants end at 128 bytes.
+    struct FrameConstants {
         /// Where rays start.
         camera: Camera,
         /// Film in pixels.
         size: uvec2,
-        /// First pixel of the batch, row-major.
-        first_pixel: uint,
-        /// Pixels of the batch; its paths, with `samples` = 0.
-        pixels: uint,
-        /// Index of the batch's first sample of every pixel.
-        first_sample: uint,
-        /// Samples of every pixel in the batch; 0 when the sample-to-pixel buffer lists the paths.
-        samples: uint,
         /// Chooses the random sequence.
         seed: uint,
         /// Path edges, at least 1.
@@ -417,7 +412,7 @@ gpu_structs! {
         roulette_depth: uint,
         /// Limit of an indirect sample's largest channel; 0 is off.
         clamp_indirect: float,
-        /// 0 = box, 1 = tent, 2 = Gaussian.
+        /// 0 = box, 1 = tent, 2 = Gaussian, 3 = the pixel's centre.
         pixel_filter: uint,
         /// Lights in the alias table.
         light_count: uint,
@@ -429,6 +424,18 @@ gpu_structs! {
         environment_width: uint,
         /// Node where traversal starts, with ROOT_OF_INSTANCES.
         root: uint,
+    }
+
+    /// Push constants of `path.comp`, `primary_hit.comp` and `guide_lookup.comp`: what differs from dispatch to dispatch.
+    struct PathPush {
+        /// First pixel of the batch, row-major.
+        first_pixel: uint,
+        /// Pixels of the batch; its paths, with `samples` = 0.
+        pixels: uint,
+        /// Index of the batch's first sample of every pixel.
+        first_sample: uint,
+        /// Samples of every pixel in the batch; 0 when the sample-to-pixel buffer lists the paths.
+        samples: uint,
     }
 
     /// Push constants of `accumulate.comp`.
@@ -481,7 +488,7 @@ gpu_structs! {
     struct TraversePush {
         /// Rays.
         count: uint,
-        /// As [`PathPush::root`].
+        /// As [`FrameConstants::root`].
         root: uint,
         /// 1 = any hit, 0 = the closest.
         any_hit: uint,

@@ -1,8 +1,7 @@
 //! Twin of `glsl/shared/microfacet.glsl`: isotropic distributions over normals m with m.z > 0, `alpha` in [0.01, 1].
 use crate::math::warp::{INV_PI, circle_point, erf_inverse, erfc_scaled};
+use crate::shaders::shared::microfacet::INV_SQRT_PI;
 use glam::{Vec2, Vec3, Vec3Swizzles, vec2, vec3};
-
-const INV_SQRT_PI: f32 = 0.564_189_6;
 
 /// Normal distribution D(m), per steradian; GGX when `ggx`, else Beckmann.
 pub fn microfacet_d(ggx: bool, m: Vec3, alpha: f32) -> f32 {

@@ -3,6 +3,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, DeviceInfo, Gpu, Location, PART, thread_items};
 use crate::layout::*;
 use crate::render::pass::apportion::Counts;
+use crate::render::push::frame_constants;
 use crate::render::schedule::Batch;
 use crate::scene::Scene;
 use std::borrow::Cow;
@@ -32,6 +33,8 @@ pub struct DeviceScene {
     pub environment: Buffer<vec4>,
     /// See [`crate::scene::Environment`].
     pub environment_table: Buffer<AliasEntry>,
+    /// One: what paths are told. [`Step::Start`](crate::render::Step::Start) writes it.
+    pub frame: Buffer<FrameConstants>,
 }
 
 impl DeviceScene {
@@ -57,6 +60,7 @@ impl DeviceScene {
                 "environment_table",
                 environment.map_or(&[], |e| &e.table[..]),
             )?,
+            frame: Buffer::from_slice(gpu, "frame constants", &[frame_constants(scene)])?,
         })
     }
 
@@ -75,6 +79,11 @@ impl DeviceScene {
             environment: &self.environment,
             environment_table: &self.environment_table,
         }
+    }
+
+    /// What the kernels that trace paths bind as well.
+    pub fn bind_frame(&self) -> crate::shaders::shared::frame::Bind<'_> {
+        crate::shaders::shared::frame::Bind { frame: &self.frame }
     }
 
     /// Bytes of each part, largest first.

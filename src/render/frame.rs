@@ -2,7 +2,7 @@
 use crate::allocate::Inputs;
 use crate::error::{Error, Result};
 use crate::gpu::Recorder;
-use crate::layout::{NONE, PathPush, PriorityPush};
+use crate::layout::{FrameConstants, NONE, PriorityPush};
 use crate::render::buffers::{DeviceScene, FilmBuffers};
 use crate::render::kernels::{Allocation, Kernels};
 use crate::render::pass::{accumulate, choose, path, primary_hit, sample_list};
@@ -18,8 +18,10 @@ pub struct Frame {
     pub kernels: Kernels,
     /// The kernels that place samples, where samples are placed.
     pub allocation: Option<Allocation>,
-    /// What the path tracing kernels are told; each pass fills in its batch.
-    pub path_push: PathPush,
+    /// What all paths of a frame have in common.
+    pub constants: FrameConstants,
+    /// Index of every pixel's first sample.
+    pub first_sample: u32,
     /// What the policy is told.
     pub priority_push: PriorityPush,
 }
@@ -40,15 +42,16 @@ impl Frame {
 /// # Errors
 /// [`Error::Usage`] for a step that places samples where there are no kernels for it, [`Error::Device`].
 pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
-    let Frame { scene, film, kernels, path_push, priority_push, .. } = frame;
+    let Frame { scene, film, kernels, constants, priority_push, .. } = frame;
     match step {
         Step::Start => {
+            rec.update(&scene.frame, constants)?; // camera, film, limits -> frame
             rec.fill(&film.broken, 0)?; // 0 -> broken
             for tile in &film.tiles {
                 rec.fill(&tile.stats, 0)?; // 0 -> stats[P]
                 rec.fill(&tile.light, 0)?; // 0 -> light[P]
                 if tile.has_guide() {
-                    primary_hit::record(&kernels.primary_hit, rec, scene, tile, path_push)?; // camera -> guide[P]
+                    primary_hit::record(&kernels.primary_hit, rec, scene, tile)?; // camera -> guide[P]
                 }
             }
             if let Some(Allocation { policy, .. }) = &frame.allocation {
@@ -56,7 +59,7 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
             }
         }
         Step::Uniform(batch) => {
-            let push = path::push_of_batch(path_push, batch);
+            let push = path::push_of_batch(batch);
             path::record(&kernels.path, rec, scene, film, &push)?; // batch -> samples[B]
             accumulate::record(&kernels.accumulate, rec, film, batch)?; // samples[B] -> stats[P], light[P]
         }
@@ -67,15 +70,15 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
             a.scan.record(rec, &film.counts)?; // count[P] -> offset[P + 1]
         }
         Step::Choose(choice) => {
-            let (a, counts, seed) = (frame.allocation()?, &film.counts, path_push.seed);
+            let (a, counts, seed) = (frame.allocation()?, &film.counts, constants.seed);
             let push = PriorityPush { round: choice.round, ..*priority_push };
             a.policy.record(rec, &inputs(film), &push)?; // stats[P] -> priority[P]
             choose::record(&a.choose, rec, &film.priority, counts, choice, seed)?; // priority[P] -> count[P], 0 or 1
             a.scan.record(rec, counts)?; // count[P] -> offset[P + 1]
         }
         Step::Listed(range) => {
-            let (a, push) = (frame.allocation()?, path::push_of_list(path_push, range.paths));
-            let (offset, stats, first) = (&film.counts.offset, &film.tiles[0].stats, push.first_sample);
+            let (a, push) = (frame.allocation()?, path::push_of_list(range.paths));
+            let (offset, stats, first) = (&film.counts.offset, &film.tiles[0].stats, frame.first_sample);
             if a.list_may_be_short {
                 rec.fill(&film.paths, NONE)?; // NONE -> paths[B]
             }

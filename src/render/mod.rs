@@ -20,7 +20,7 @@ mod views;
 pub use buffers::{DeviceScene, FilmBuffers, FilmTile};
 pub use job::{Job, Status, StopReason};
 pub use merge::{Gap, Merged, merge};
-pub use push::{path_push, priority_push};
+pub use push::{frame_constants, priority_push};
 pub use renderer::*;
 pub use resume::Checkpoint;
 pub use schedule::{Batch, Choice, PathRange, Plan, Progress, Share, Step};

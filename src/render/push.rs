@@ -1,5 +1,5 @@
 //! What the kernels are told of a scene and its settings, besides the scene's own records.
-use crate::layout::{LIGHT_ENVIRONMENT, NONE, PathPush, PriorityPush, ROOT_OF_INSTANCES};
+use crate::layout::{FrameConstants, LIGHT_ENVIRONMENT, NONE, PriorityPush, ROOT_OF_INSTANCES};
 use crate::render::schedule;
 use crate::render::settings::PixelFilter;
 use crate::scene::Scene;
@@ -22,14 +22,13 @@ pub fn priority_push(scene: &Scene) -> PriorityPush {
     }
 }
 
-/// What the kernels are told of a scene; the batch is still to be filled in.
-pub fn path_push(scene: &Scene) -> PathPush {
+/// What the kernels are told of a scene and its camera.
+pub fn frame_constants(scene: &Scene) -> FrameConstants {
     let settings = &scene.settings;
     let environment = scene.lights.iter().position(|l| l.kind == LIGHT_ENVIRONMENT);
-    PathPush {
+    FrameConstants {
         camera: scene.camera,
         size: [settings.width, settings.height],
-        first_sample: settings.first_sample,
         seed: settings.seed,
         max_depth: settings.max_depth,
         roulette_depth: settings.roulette_depth,
@@ -45,6 +44,5 @@ pub fn path_push(scene: &Scene) -> PathPush {
         environment: environment.map_or(NONE, |i| i as u32),
         environment_width: scene.environment.as_ref().map_or(0, |e| e.width),
         root: scene.root | if scene.instances.is_empty() { 0 } else { ROOT_OF_INSTANCES },
-        ..PathPush::default()
     }
 }

@@ -7,7 +7,7 @@ use crate::layout::{Apportionment, Camera, Effects, PixelStats, PriorityPush};
 use crate::render::buffers::{DeviceScene, FilmBuffers};
 use crate::render::frame::{self, Frame};
 use crate::render::kernels::{Allocation, Kernels};
-use crate::render::push::{path_push, priority_push};
+use crate::render::push::{frame_constants, priority_push};
 use crate::render::schedule::{self, Cut, Step};
 use crate::render::settings::{Sampler, Settings};
 use crate::scene::{self, Fingerprint, Scene};
@@ -89,10 +89,11 @@ impl Renderer {
                  or --allocate uniform"
             )));
         }
-        let (path_push, priority_push) = (path_push(scene), priority_push(scene));
+        let (constants, priority_push) = (frame_constants(scene), priority_push(scene));
         let fingerprint = Some(scene.fingerprint.clone());
         let scene = DeviceScene::new(gpu, scene, &effects)?;
-        let frame = Frame { scene, film, kernels, allocation, path_push, priority_push };
+        let frame =
+            Frame { scene, film, kernels, allocation, constants, first_sample: settings.first_sample, priority_push };
         Ok(Self { gpu: gpu.clone(), frame, effects, outputs, settings, paths, fingerprint })
     }
 
@@ -165,7 +166,8 @@ impl Renderer {
         Ok(u64::from(low) | u64::from(high) << 32)
     }
 
-    /// Moves the camera; what was accumulated belongs to the old one, so begin with [`Step::Start`].
+    /// Moves the camera from the next [`Step::Start`] on; what was accumulated belongs to the old one. Steps that were recorded
+    /// before keep theirs, done or not.
     ///
     /// # Errors
     /// [`crate::error::Error::Scene`] for a number that is not finite, and
@@ -176,7 +178,7 @@ impl Renderer {
         if camera.lens_radius > 0.0 && !self.effects.lens {
             return Err(Error::Usage("this renderer was made without the effect \"lens\"".into()));
         }
-        self.frame.path_push.camera = camera;
+        self.frame.constants.camera = camera;
         self.fingerprint = None;
         Ok(())
     }

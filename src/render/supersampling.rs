@@ -40,12 +40,15 @@ impl Renderer {
         let filtered = Buffer::from_slice(gpu, "filtered", filtered)?;
         let indirect = Buffer::new(gpu, "indirect", pixels, Location::Device)?;
         let (mut frame, mut times) = (FrameResources::new(gpu)?, Vec::new());
-        times.extend(gpu.run(&mut frame, |rec| rec.fill(&indirect, 0))?);
+        times.extend(gpu.run(&mut frame, |rec| {
+            rec.update(&self.frame.scene.frame, &self.frame.constants)?;
+            rec.fill(&indirect, 0)
+        })?);
         let at_once = (RAYS_AT_ONCE / pixels as u32).clamp(1, RAYS_OF_A_PIXEL);
         for first_sample in (0..eye_rays).step_by(at_once as usize) {
             let samples = at_once.min(eye_rays - first_sample);
-            let first_sample = self.frame.path_push.first_sample + first_sample;
-            let push = PathPush { pixels: pixels as u32, first_sample, samples, ..self.frame.path_push };
+            let first_sample = self.settings.first_sample + first_sample;
+            let push = PathPush { first_pixel: 0, pixels: pixels as u32, first_sample, samples };
             times.extend(gpu.run(&mut frame, |rec| {
                 guide_lookup::record(&kernel, rec, &self.frame.scene, &guide, &filtered, &indirect, &push)
             })?);

@@ -1,12 +1,11 @@
 //! Whether a scene's arrays fit together. Kernels follow indices without a look; whoever loads a scene gets right ones, but
 //! the arrays are there to be edited.
 use super::build::bvh;
-use super::effects::SMOOTH;
 use super::{Environment, Scene};
 use crate::error::{Error, Result};
 use crate::layout::{
     AliasEntry, BSDF_COATED, BvhNode, COAT_COLUMNS, COAT_ROWS, Camera, LIGHT_SPHERE, LIGHT_TRIANGLE, Light, Material,
-    NONE, SPHERE, TRAVERSAL_STACK, Texture, Triangle,
+    NONE, SMOOTH_ALPHA, SPHERE, TRAVERSAL_STACK, Texture, Triangle,
 };
 use glam::Vec3;
 
@@ -131,7 +130,7 @@ impl Scene {
         let texels = self.texels.len() as u64;
         let coat = u64::from(COAT_ROWS * COAT_COLUMNS);
         let lacks_table = |m: &Material| m.kind == BSDF_COATED && u64::from(m.coat_table) + coat > texels;
-        let rough = |m: &Material| m.alpha >= SMOOTH;
+        let rough = |m: &Material| m.alpha >= SMOOTH_ALPHA;
         if let Some(index) = self.materials.iter().position(|m| rough(m) && lacks_table(m)) {
             return Err(format!("material {index}: its coat's table ends beyond the {texels} texels"));
         }

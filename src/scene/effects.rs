@@ -4,9 +4,6 @@ use super::build::{geometry, lights};
 use crate::layout::*;
 use crate::render::settings::{PixelFilter, Sampler};
 
-/// Roughness below which an interface is smooth; kernels draw the same line.
-pub const SMOOTH: f32 = 0.01;
-
 /// The effects of a scene with its settings, and for each one that is on the first object, material, light or setting
 /// that calls for it. `split_light`: direct and indirect light are wanted apart. `counters`: rays are counted.
 pub fn effects(scene: &Scene, split_light: bool, counters: bool) -> (Effects, Vec<(&'static str, String)>) {
@@ -21,8 +18,8 @@ pub fn effects(scene: &Scene, split_light: bool, counters: bool) -> (Effects, Ve
     let bumped =
         |m: &Material, normal_map| m.bump_texture != NONE && (m.flags & MATERIAL_NORMAL_MAP != 0) == normal_map;
     // A roughness map may take any part of the surface below the line.
-    let smooth = |m: &Material| interface(m) && (m.alpha < SMOOTH || m.roughness_texture != NONE);
-    let rough = |m: &Material| interface(m) && m.alpha >= SMOOTH;
+    let smooth = |m: &Material| interface(m) && (m.alpha < SMOOTH_ALPHA || m.roughness_texture != NONE);
+    let rough = |m: &Material| interface(m) && m.alpha >= SMOOTH_ALPHA;
     let mut found = Effects {
         textures: material("textures", &|m| {
             [m.base_texture, m.specular_texture, m.roughness_texture, m.emission_texture].iter().any(|&t| t != NONE)

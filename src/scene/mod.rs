@@ -21,7 +21,7 @@ mod load;
 pub use build::coat::{CoatRow, coat_table};
 pub use build::fresnel::mean_internal as mean_internal_fresnel;
 pub use check::check_camera;
-pub use effects::{SMOOTH, effects};
+pub use effects::effects;
 pub use fingerprint::Fingerprint;
 
 /// Largest coordinate M of triangles, of points that rays start from and of lights: what a ray's hit is computed from fits a

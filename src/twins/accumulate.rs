@@ -2,7 +2,7 @@
 use crate::layout::{BrokenTally, FoldPush, PixelLight, PixelStats, vec3, vec4};
 use crate::math::hash::pcg;
 use crate::shaders;
-use crate::shaders::accumulate::{BRIGHTEST, FARTHEST, FEW, SMALLEST_ALBEDO, WIDEST};
+use crate::shaders::accumulate::{FEW, MAX_DEVIATION, MAX_IRRADIANCE, MAX_M2, MIN_ALBEDO};
 use crate::statistics::luminance;
 use glam::{Vec3, Vec4};
 
@@ -12,8 +12,8 @@ const LIGHT_BITS: u32 = shaders::accumulate::LIGHT_BITS as u32;
 
 /// What of a sample's light needs no filter, and its indirect irradiance over pi.
 fn split(direct: Vec3, indirect: Vec3, albedo: Vec3) -> (Vec3, Vec3) {
-    let divides = albedo.cmpgt(Vec3::splat(SMALLEST_ALBEDO));
-    let before = (indirect / albedo.max(Vec3::splat(SMALLEST_ALBEDO))).min(Vec3::splat(BRIGHTEST));
+    let divides = albedo.cmpgt(Vec3::splat(MIN_ALBEDO));
+    let before = (indirect / albedo.max(Vec3::splat(MIN_ALBEDO))).min(Vec3::splat(MAX_IRRADIANCE));
     let irradiance = Vec3::select(divides, before, Vec3::ZERO);
     (direct + Vec3::select(divides, Vec3::ZERO, indirect), irradiance)
 }
@@ -96,7 +96,7 @@ fn move_mean(mean: vec3, by: Vec3, mut remainder: Kept, at: u32, bits: u32) -> V
 }
 
 fn square(a: f32, b: f32) -> f32 {
-    a.clamp(-FARTHEST, FARTHEST) * b.clamp(-FARTHEST, FARTHEST)
+    a.clamp(-MAX_DEVIATION, MAX_DEVIATION) * b.clamp(-MAX_DEVIATION, MAX_DEVIATION)
 }
 
 fn fold_radiance(s: &mut PixelStats, radiance: Vec3) {
@@ -109,7 +109,7 @@ fn fold_radiance(s: &mut PixelStats, radiance: Vec3) {
     };
     s.mean = mean.into();
     let moved = radiance - mean;
-    s.m2 = std::array::from_fn(|c| (s.m2[c] + square(off[c], moved[c])).min(WIDEST));
+    s.m2 = std::array::from_fn(|c| (s.m2[c] + square(off[c], moved[c])).min(MAX_M2));
 }
 
 fn fold_light(l: &mut PixelLight, (kept, irradiance): (Vec3, Vec3), count: u32) {
@@ -125,7 +125,7 @@ fn fold_light(l: &mut PixelLight, (kept, irradiance): (Vec3, Vec3), count: u32) 
         }
     };
     let off = |mean: Vec3| luminance(irradiance.into()) - luminance(mean.into());
-    l.indirect_m2 = (l.indirect_m2 + square(off(indirect), off(moved))).min(WIDEST);
+    l.indirect_m2 = (l.indirect_m2 + square(off(indirect), off(moved))).min(MAX_M2);
     (l.direct, l.indirect) = (direct.into(), moved.into());
 }
 

@@ -47,10 +47,8 @@ pub struct BsdfSample {
     pub delta: bool,
 }
 
-/// Interfaces below this roughness are smooth.
-pub const SMOOTH_ALPHA: f32 = 0.01;
-/// Directions closer to the horizon count as below it.
-pub const GRAZING: f32 = 1e-9;
+pub use crate::layout::SMOOTH_ALPHA;
+pub use crate::shaders::shared::bsdf::GRAZING;
 
 impl Bsdf {
     /// A material of constant colours with this roughness. `texels` are the scene's, which hold the tables of rough coats.

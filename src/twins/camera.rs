@@ -1,5 +1,5 @@
 //! Twin of `glsl/shared/camera.glsl`.
-use crate::layout::{Camera, Effects, PathPush};
+use crate::layout::{Camera, Effects, FrameConstants};
 use crate::math::hash::pcg;
 use crate::math::warp::{warp_disk, warp_gaussian, warp_tent};
 use crate::shaders::shared::camera::{PAIR_FILM, PAIR_LENS};
@@ -36,10 +36,10 @@ pub fn camera_ray(camera: &Camera, film: Vec2, lens: Vec2) -> Ray {
 }
 
 /// Where in the film a sample of `pixel` falls, in pixels.
-pub fn film_sample(push: &PathPush, effects: &Effects, pixel: u32, random: Sampler) -> Vec2 {
-    let at = vec2((pixel % push.size[0]) as f32, (pixel / push.size[0]) as f32);
+pub fn film_sample(frame: &FrameConstants, effects: &Effects, pixel: u32, random: Sampler) -> Vec2 {
+    let at = vec2((pixel % frame.size[0]) as f32, (pixel / frame.size[0]) as f32);
     let u = sample_2d(random, PAIR_FILM);
-    at + match push.pixel_filter {
+    at + match frame.pixel_filter {
         1 if effects.pixel_filter => 0.5 + vec2(warp_tent(u.x), warp_tent(u.y)),
         2 if effects.pixel_filter => 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y)),
         3 if effects.pixel_filter => Vec2::splat(0.5),
@@ -48,14 +48,14 @@ pub fn film_sample(push: &PathPush, effects: &Effects, pixel: u32, random: Sampl
 }
 
 /// The first ray of a sample's path, through `film` in pixels.
-pub fn eye_ray(push: &PathPush, effects: &Effects, film: Vec2, random: Sampler) -> Ray {
+pub fn eye_ray(frame: &FrameConstants, effects: &Effects, film: Vec2, random: Sampler) -> Ray {
     let lens = if effects.lens { sample_2d(random, PAIR_LENS) } else { Vec2::ZERO };
-    camera_ray(&push.camera, film_from_pixel(film, push.size), lens)
+    camera_ray(&frame.camera, film_from_pixel(film, frame.size), lens)
 }
 
 /// Alpha masks along a path draw from this.
-pub fn path_seed(push: &PathPush, pixel: u32, index: u32) -> u32 {
-    pcg(pcg(pixel ^ pcg(!push.seed)).wrapping_add(index))
+pub fn path_seed(frame: &FrameConstants, pixel: u32, index: u32) -> u32 {
+    pcg(pcg(pixel ^ pcg(!frame.seed)).wrapping_add(index))
 }
 
 #[cfg(test)]
@@ -67,8 +67,8 @@ mod tests {
     fn seeds_share_no_numbers_of_masks() {
         // Pixel and seed joined by exclusive-or alone, seeds 0 to 3 would have the same numbers at other pixels.
         let seeds = |seed: u32| {
-            let push = PathPush { seed, ..PathPush::default() };
-            (0..4096u32).map(move |pixel| path_seed(&push, pixel, 7))
+            let frame = FrameConstants { seed, ..FrameConstants::default() };
+            (0..4096u32).map(move |pixel| path_seed(&frame, pixel, 7))
         };
         let all: HashSet<u32> = (0..4).flat_map(seeds).collect();
         // By chance, n^2 / 2^33 pairs of n numbers.

@@ -1,7 +1,8 @@
 //! Twin of how `glsl/shared/bsdf.glsl` reads what a rough coat lets in, and what it reflects inwards, from the table that
 //! [`coat_table`](crate::scene::coat_table) computes.
+use crate::layout::SMOOTH_ALPHA;
 use crate::layout::{COAT_COLUMNS, COAT_ROWS};
-use crate::scene::{CoatRow, SMOOTH};
+use crate::scene::CoatRow;
 
 const ROWS: usize = COAT_ROWS as usize;
 const COLUMNS: usize = COAT_COLUMNS as usize;
@@ -11,7 +12,7 @@ pub fn coat_row_at(table: &[u32], alpha: f32) -> CoatRow {
     if table.len() < ROWS * COLUMNS {
         return [0.0; COLUMNS];
     }
-    let (row, f) = place((alpha.max(SMOOTH).ln() / -SMOOTH.ln() + 1.0) * (ROWS - 1) as f32, ROWS);
+    let (row, f) = place((alpha.max(SMOOTH_ALPHA).ln() / -SMOOTH_ALPHA.ln() + 1.0) * (ROWS - 1) as f32, ROWS);
     let at = |row: usize, column: usize| f32::from_bits(table[row * COLUMNS + column]);
     std::array::from_fn(|column| mix(at(row, column), at(row + 1, column), f))
 }

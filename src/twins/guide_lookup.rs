@@ -1,14 +1,14 @@
 //! Twin of `glsl/trace/guide_lookup.comp`.
-use crate::layout::{Effects, Guide, NONE, PathPush, vec3, vec4};
+use crate::layout::{Guide, NONE, vec3, vec4};
 use crate::math::hash::pcg;
-use crate::scene::Scene;
+use crate::shaders::guide_lookup::{MIN_DEPTH_DIFFERENCE, MIN_NORMAL_DIFFERENCE};
+use crate::shaders::shared::sanitise::LARGEST;
 use crate::twins::camera::{eye_ray, film_sample, path_seed};
+use crate::twins::path::Tracer;
 use crate::twins::primary_hit::first_hit;
 use crate::twins::sampler::sampler_start;
 use glam::{IVec2, Vec2, Vec3, ivec2};
-
-const LEAST_NORMAL: f32 = 1e-3;
-const LEAST_DEPTH: f32 = 1e-4;
+use std::ops::Range;
 
 /// The guide rays of a film, row-major, and the filtered light that they carry.
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +47,7 @@ impl GuideRays<'_> {
         let far = 2 * first + 1 - near;
         let at = [near, ivec2(far.x, near.y), ivec2(near.x, far.y), far];
         let differences = at.map(|at| self.differences(eye, at));
-        let least = Vec2::new(LEAST_NORMAL, LEAST_DEPTH * eye.depth);
+        let least = Vec2::new(MIN_NORMAL_DIFFERENCE, MIN_DEPTH_DIFFERENCE * eye.depth);
         let largest = differences.iter().flatten().fold(least, |a, b| a.max(*b));
         let (mut chosen, mut best) = (None, -1.0);
         for (at, difference) in at.iter().zip(differences) {
@@ -63,24 +63,22 @@ impl GuideRays<'_> {
 
 /// What sample `index` of `pixel` meets first, and where it passes the film (pixels); none for the sky and for smooth
 /// surfaces.
-pub fn eye_hit(scene: &Scene, push: &PathPush, effects: &Effects, pixel: u32, index: u32) -> Option<(Guide, Vec2)> {
-    let random = sampler_start(pixel, index, push.seed, effects.independent_sampler);
-    let film = film_sample(push, effects, pixel, random);
-    let ray = eye_ray(push, effects, film, random);
-    let (eye, delta) = first_hit(scene, push, ray, pcg(path_seed(push, pixel, index)));
+pub fn eye_hit(tracer: &Tracer, pixel: u32, index: u32) -> Option<(Guide, Vec2)> {
+    let Tracer { scene, frame, effects, .. } = tracer;
+    let random = sampler_start(pixel, index, frame.seed, effects.independent_sampler);
+    let film = film_sample(frame, effects, pixel, random);
+    let ray = eye_ray(frame, effects, film, random);
+    let (eye, delta) = first_hit(scene, frame, ray, pcg(path_seed(frame, pixel, index)));
     (eye.object != NONE && !delta).then_some((eye, film))
 }
 
-/// Mean over the eye rays of albedo times the light of the guide ray that is most alike.
-pub fn look_up(scene: &Scene, push: &PathPush, effects: &Effects, guides: &GuideRays, pixel: u32) -> vec3 {
-    let seen = |k: u32| {
-        let Some((eye, film)) = eye_hit(scene, push, effects, pixel, push.first_sample + k) else { return Vec3::ZERO };
+/// Mean over the eye rays of these samples, one at least, of albedo times the light of the guide ray that is most alike.
+pub fn look_up(tracer: &Tracer, guides: &GuideRays, pixel: u32, samples: Range<u32>) -> vec3 {
+    let seen = |index: u32| {
+        let Some((eye, film)) = eye_hit(tracer, pixel, index) else { return Vec3::ZERO };
         let Some(q) = guides.most_similar(&eye, film) else { return Vec3::ZERO };
         let [r, g, b, _] = guides.filtered[q];
         Vec3::from(eye.albedo) * Vec3::new(r, g, b).clamp(Vec3::splat(-LARGEST), Vec3::splat(LARGEST))
     };
-    ((0..push.samples).map(seen).sum::<Vec3>() / push.samples as f32).into()
+    (samples.clone().map(seen).sum::<Vec3>() / samples.len() as f32).into()
 }
-
-/// As in `glsl/shared/sanitise.glsl`.
-const LARGEST: f32 = 1e24;

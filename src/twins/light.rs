@@ -3,6 +3,7 @@ use crate::layout::*;
 use crate::math::hash::pcg;
 use crate::math::warp::{basis_from_normal, warp_cone, warp_sphere, warp_triangle};
 use crate::scene::{Environment, Scene};
+use crate::shaders::shared::light::{MAX_SOLID_ANGLE, MIN_SOLID_ANGLE};
 use crate::twins::scene::texture_coordinates;
 use crate::twins::surface::{Surface, plane_clearance, unit_vector};
 use crate::twins::texture::{surface_opacity, texture_sample};
@@ -22,8 +23,7 @@ pub struct LightSample {
     pub pdf: f32,
 }
 
-/// Of lights at infinity.
-pub const INFINITE_DISTANCE: f32 = 3e38;
+pub use crate::shaders::shared::light::INFINITE_DISTANCE;
 
 /// The entry that a random word stands for, and a word that is independent of it and as well stratified.
 pub fn alias_choose(table: &[AliasEntry], random: u32) -> (u32, u32) {
@@ -117,7 +117,7 @@ impl SphericalTriangle {
 
     /// Whether it is sampled so, and not by area.
     fn by_solid_angle(&self, scene: &Scene) -> bool {
-        scene.large_lamps && self.solid_angle > 3e-4 && self.solid_angle < 6.0
+        scene.large_lamps && self.solid_angle > MIN_SOLID_ANGLE && self.solid_angle < MAX_SOLID_ANGLE
     }
 
     /// A direction, uniform by solid angle (Arvo 1995).

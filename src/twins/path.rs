@@ -1,9 +1,11 @@
 //! Twin of `glsl/trace/path.comp`.
-use crate::layout::{BSDF_DIELECTRIC, Effects, MATERIAL_TWO_SIDED, NONE, PathPush};
+use crate::layout::{BSDF_DIELECTRIC, Effects, FrameConstants, MATERIAL_TWO_SIDED, NONE};
 use crate::math::hash::pcg;
 use crate::math::warp::basis_from_normal;
 use crate::scene::Scene;
-use crate::shaders::path::{PAIR_BSDF, PAIR_CHOICE, PAIR_FIRST_BOUNCE, PAIR_LIGHT, PAIR_ROULETTE, PAIRS_PER_BOUNCE};
+use crate::shaders::path::{
+    MAX_SURVIVAL, PAIR_BSDF, PAIR_CHOICE, PAIR_FIRST_BOUNCE, PAIR_LIGHT, PAIR_ROULETTE, PAIRS_PER_BOUNCE,
+};
 use crate::twins::bsdf::{
     Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_is_specular, bsdf_sample, relative_index,
 };
@@ -14,9 +16,7 @@ use crate::twins::surface::{Facing, Surface, facing_normals, light_share, surfac
 use crate::twins::traverse::traverse_from;
 use glam::{Mat3, Vec3};
 
-/// Shadow rays to a lamp end at this part of the way: the error of the distance at which they would meet it is some 2^-24
-/// over the cosine there.
-pub const SHADOW_END: f32 = 1.0 - 1e-5;
+pub use crate::shaders::path::SHADOW_END;
 
 /// What one path returns, linear Rec. 709. Without [`Effects::indirect`] all light is in `direct`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -65,8 +65,8 @@ struct Path {
 pub struct Tracer<'a> {
     /// The scene.
     pub scene: &'a Scene,
-    /// As the kernel's; the batch does not matter.
-    pub push: PathPush,
+    /// As the kernel's.
+    pub frame: FrameConstants,
     /// Roulette, clamp, pixel filter, sampler and the split of light; the rest follows from the scene.
     pub effects: Effects,
     /// [`Strategy::Both`] for the kernel's answer.
@@ -101,16 +101,16 @@ impl Tracer<'_> {
     }
 
     fn clamped(&self, light: Vec3) -> Vec3 {
-        let (largest, limit) = (light.max_element(), self.push.clamp_indirect);
+        let (largest, limit) = (light.max_element(), self.frame.clamp_indirect);
         let clamps = self.effects.clamp && limit > 0.0 && largest > limit;
         if clamps { light * (limit / largest) } else { light }
     }
 
     fn light_from_miss(&self, path: &Path) -> Vec3 {
-        if self.push.environment == NONE {
+        if self.frame.environment == NONE {
             return Vec3::ZERO;
         }
-        let light = &self.scene.lights[self.push.environment as usize];
+        let light = &self.scene.lights[self.frame.environment as usize];
         let (radiance, pdf) = environment_radiance(self.scene, light, path.direction);
         radiance * if path.delta { 1.0 } else { self.balance(path.bsdf_pdf, pdf, Strategy::Bsdf) }
     }
@@ -169,7 +169,7 @@ impl Tracer<'_> {
     }
 
     fn survives_roulette(&self, path: &mut Path, random: Sampler, pair: u32) -> bool {
-        let q = (path.throughput.max_element() * path.eta_scale).min(0.95);
+        let q = (path.throughput.max_element() * path.eta_scale).min(MAX_SURVIVAL);
         if sample_2d(random, pair + PAIR_ROULETTE).x >= q {
             return false;
         }
@@ -202,7 +202,7 @@ impl Tracer<'_> {
             from = [hit.triangle, hit.instance];
             let s = surface_at(self.scene, &hit);
             self.add_light(&mut sum, path.throughput * self.light_from_hit(&path, &s, hit.t), indirect);
-            if bounce + 1 >= self.push.max_depth {
+            if bounce + 1 >= self.frame.max_depth {
                 break;
             }
             let p = self.shade(s, path.direction, pair, from);
@@ -211,7 +211,7 @@ impl Tracer<'_> {
                 sum.albedo = bsdf_albedo(&p.bsdf, p.wo.z);
                 smooth_first = smooth_here;
             }
-            if self.push.light_count > 0 && !smooth_here {
+            if self.frame.light_count > 0 && !smooth_here {
                 let light = self.light_from_nee(&p, random, mask_seed.wrapping_add(1));
                 sum.rays += u32::from(light.is_some());
                 self.add_light(&mut sum, path.throughput * light.unwrap_or_default(), bounce >= 1 && !smooth_first);
@@ -220,7 +220,7 @@ impl Tracer<'_> {
                 break;
             }
             mirrored |= bounce == 0 && path.delta;
-            let from = self.push.roulette_depth;
+            let from = self.frame.roulette_depth;
             let roulette = self.effects.roulette && from > 0 && bounce + 1 >= from;
             if roulette && !self.survives_roulette(&mut path, random, pair) {
                 break;
@@ -235,9 +235,9 @@ impl Tracer<'_> {
 
     /// Sample `index` of `pixel` (row-major).
     pub fn sample(&self, pixel: u32, index: u32) -> PathSample {
-        let random = sampler_start(pixel, index, self.push.seed, self.effects.independent_sampler);
-        let film = film_sample(&self.push, &self.effects, pixel, random);
-        let ray = eye_ray(&self.push, &self.effects, film, random);
+        let random = sampler_start(pixel, index, self.frame.seed, self.effects.independent_sampler);
+        let film = film_sample(&self.frame, &self.effects, pixel, random);
+        let ray = eye_ray(&self.frame, &self.effects, film, random);
         let path = Path {
             origin: ray.origin,
             direction: ray.direction,
@@ -246,7 +246,7 @@ impl Tracer<'_> {
             delta: true,
             eta_scale: 1.0,
         };
-        let sample = self.trace_path(path, random, path_seed(&self.push, pixel, index));
+        let sample = self.trace_path(path, random, path_seed(&self.frame, pixel, index));
         match sample.radiance().is_finite() {
             true => sample,
             false => PathSample { direct: Vec3::ZERO, indirect: Vec3::ZERO, broken: true, ..sample },

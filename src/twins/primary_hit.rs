@@ -1,5 +1,5 @@
 //! Twin of `glsl/trace/primary_hit.comp` and of `glsl/shared/first_hit.glsl`.
-use crate::layout::{Camera, Guide, NONE, PathPush};
+use crate::layout::{Camera, FrameConstants, Guide, NONE};
 use crate::math::hash::pcg;
 use crate::scene::Scene;
 use crate::twins::bsdf::{bsdf_albedo, bsdf_is_delta};
@@ -10,15 +10,15 @@ use crate::twins::traverse::traverse;
 use glam::{Vec2, vec2};
 
 /// The primary hit through the centre of `pixel` (row-major), from the middle of the lens.
-pub fn guide(scene: &Scene, push: &PathPush, pixel: u32) -> Guide {
-    let centre = vec2((pixel % push.size[0]) as f32, (pixel / push.size[0]) as f32) + 0.5;
-    let camera = Camera { lens_radius: 0.0, ..push.camera };
-    let ray = camera_ray(&camera, film_from_pixel(centre, push.size), Vec2::splat(0.5));
-    first_hit(scene, push, ray, pcg(pixel)).0
+pub fn guide(scene: &Scene, frame: &FrameConstants, pixel: u32) -> Guide {
+    let centre = vec2((pixel % frame.size[0]) as f32, (pixel / frame.size[0]) as f32) + 0.5;
+    let camera = Camera { lens_radius: 0.0, ..frame.camera };
+    let ray = camera_ray(&camera, film_from_pixel(centre, frame.size), Vec2::splat(0.5));
+    first_hit(scene, frame, ray, pcg(pixel)).0
 }
 
 /// What a primary ray meets, and whether that is a smooth surface, all of whose light counts as direct.
-pub fn first_hit(scene: &Scene, push: &PathPush, ray: Ray, mask_seed: u32) -> (Guide, bool) {
+pub fn first_hit(scene: &Scene, frame: &FrameConstants, ray: Ray, mask_seed: u32) -> (Guide, bool) {
     let hit = traverse(scene, ray.origin, ray.direction, INFINITE_DISTANCE, false, mask_seed);
     if !hit.any() {
         return (Guide { object: NONE, material: NONE, ..Guide::default() }, false);
@@ -28,7 +28,7 @@ pub fn first_hit(scene: &Scene, push: &PathPush, ray: Ray, mask_seed: u32) -> (G
     let normal = side_of(&s, -ray.direction) * s.normal;
     let guide = Guide {
         normal: normal.into(),
-        depth: hit.t + push.camera.near,
+        depth: hit.t + frame.camera.near,
         position: s.position.into(),
         object: s.object,
         albedo: bsdf_albedo(&bsdf, -s.normal.dot(ray.direction)).into(),

@@ -1,6 +1,7 @@
 //! Twin of `glsl/shared/surface.glsl`.
 use crate::layout::{MATERIAL_NORMAL_MAP, Material, NONE};
 use crate::scene::Scene;
+use crate::shaders::shared::surface::{CLEARANCE, MIN_ELEVATION};
 use crate::twins::bsdf::Bsdf;
 use crate::twins::scene::{material_of, object_from_world, triangle_vertices, world_from_object};
 use crate::twins::sphere::Sphere;
@@ -51,8 +52,6 @@ pub fn unit_vector(v: Vec3) -> (Vec3, f32) {
     let length = scaled.length();
     (scaled / length.max(1e-37), length * largest)
 }
-
-const CLEARANCE: f32 = 1.0 / (1 << 21) as f32;
 
 /// How far along the unit normal `n` a ray must start so that it meets no other triangle of the same plane. `reach`: the
 /// numbers that the point is a sum of.
@@ -233,7 +232,6 @@ pub struct Facing {
 /// For a viewer towards `wo`; on the viewer's side where the surface `turns`. Smooth normals that face away, or that send the
 /// mirror image of `wo` below the plane (where the surface `mirrors`), are bent; those of maps are turned by half a turn.
 pub fn facing_normals(s: &Surface, wo: Vec3, turns: bool, mirrors: bool) -> Facing {
-    const ABOVE: f32 = 1e-3;
     let side = side_of(s, wo);
     let (mut n, mut mapped) = (side * s.smooth_normal, side * s.normal);
     let along = n.dot(wo);
@@ -241,8 +239,8 @@ pub fn facing_normals(s: &Surface, wo: Vec3, turns: bool, mirrors: bool) -> Faci
     let image = 2.0 * along * n - wo;
     let height = image.dot(plane);
     if (if mirrors { height } else { along }) < 0.0 {
-        let raised = (image + (ABOVE - height) * plane).normalize();
-        n = (if mirrors { wo + raised } else { n + (ABOVE - along) * wo }).normalize();
+        let raised = (image + (MIN_ELEVATION - height) * plane).normalize();
+        n = (if mirrors { wo + raised } else { n + (MIN_ELEVATION - along) * wo }).normalize();
         mapped = n;
     }
     if mapped.dot(wo) < 0.0 {

@@ -1,6 +1,7 @@
 //! Twin of `glsl/shared/traverse.glsl`.
 use crate::layout::{BvhNode, NONE, TRAVERSAL_STACK};
 use crate::scene::Scene;
+use crate::shaders::shared::traverse::SLAB_ROUNDING;
 use crate::twins::scene::{object_from_world, triangle_vertices};
 use crate::twins::sphere::Sphere;
 use crate::twins::surface::octahedral_point;
@@ -28,7 +29,6 @@ impl Hit {
 }
 
 const STACK_SIZE: usize = TRAVERSAL_STACK as usize;
-const SLAB_ROUNDING: i32 = 8;
 
 /// A ray as the triangle and box tests want it.
 #[derive(Clone, Copy, Debug)]

@@ -13,7 +13,7 @@ use tallow::render::pass::choose::Choose;
 use tallow::render::pass::sample_list::Batches;
 use tallow::render::settings::Settings;
 use tallow::render::{
-    Batch, Choice, Job, Outputs, PathRange, Plan, Renderer, Share, Status, Step, called_for, path_push,
+    Batch, Choice, Job, Outputs, PathRange, Plan, Renderer, Share, Status, Step, called_for, frame_constants,
 };
 use tallow::scene::Scene;
 use tallow::shaders::shared;
@@ -158,7 +158,7 @@ fn try_scene(scene: &Scene) {
     // The twin looks every index up in a slice: what it survives leads nowhere else in a kernel either.
     let quick = Settings { max_depth: scene.settings.max_depth.min(4), ..scene.settings.clone() };
     let scene = &Scene { settings: quick, ..scene.clone() };
-    let tracer = Tracer { scene, push: path_push(scene), effects: Effects::ALL, strategy: Ways::Both };
+    let tracer = Tracer { scene, frame: frame_constants(scene), effects: Effects::ALL, strategy: Ways::Both };
     (0..scene.settings.pixels() as u32).for_each(|pixel| assert!(tracer.sample(pixel, 0).rays > 0));
     if RENDERED.fetch_add(1, Relaxed) < number().div_ceil(10) {
         let outputs = Outputs { split_light: true, guides: true, counters: true };

@@ -8,7 +8,7 @@ use tallow::gpu::{FrameResources, Gpu};
 use tallow::image::{self, WriteOptions};
 use tallow::render::schedule::{self, Cut};
 use tallow::render::settings::Settings;
-use tallow::render::{Checkpoint, Job, Outputs, Renderer, Status, Step, path_push};
+use tallow::render::{Checkpoint, Job, Outputs, Renderer, Status, Step, frame_constants};
 use tallow::scene::Scene;
 use tallow::statistics::{Pixel, join};
 
@@ -363,8 +363,8 @@ fn a_film_of_several_storage_bindings_is_placed() {
     assert!(two.iter().filter(|&&i| i >= 2048 * 1370).count() > 1000, "the last rows have too few to compare");
     assert!(two.iter().all(|&i| bits(&pixels[i..=i]) == bits(&alike[i..=i])), "a pixel of two samples has other light");
     let (scene, guide) = (sized("both", 3), placed.film().tiles[0].guide.read().unwrap());
-    let push = path_push(&scene);
-    let wrong = |&p: &u32| tallow::twins::primary_hit::guide(&scene, &push, p).object != guide[p as usize].object;
+    let frame = frame_constants(&scene);
+    let wrong = |&p: &u32| tallow::twins::primary_hit::guide(&scene, &frame, p).object != guide[p as usize].object;
     assert!((0..2048 * 1400).step_by(997).filter(wrong).count() < 10, "primary hits");
     assert_silent(&gpu);
 }

@@ -3,7 +3,7 @@
 use crate::alike::alike;
 use crate::support;
 use std::path::Path;
-use tallow::gpu::{FrameResources, Gpu};
+use tallow::gpu::{Buffer, FrameResources, Gpu, Location};
 use tallow::layout::{BSDF_COATED, BSDF_DIFFUSE, Effects, Guide, Material, NONE, PixelLight, PixelStats, Triangle};
 use tallow::render::settings::{PixelFilter, Sampler, Settings};
 use tallow::render::{self, Batch, Job, Outputs, Renderer, Step};
@@ -52,6 +52,35 @@ fn samples_know_their_rays() {
         assert_eq!(rays, renderer.counters().unwrap().rays() as f64, "split_light {split_light}");
         assert!(rays > f64::from(2 * 33 * 17 * 4), "control: {rays}");
     }
+    support::assert_silent(&gpu);
+}
+
+/// Two frames in one recording: the first is still to run when the camera moves.
+#[test]
+fn a_recorded_frame_keeps_its_camera() {
+    let gpu = support::gpu();
+    let scene = scene("cornell-box/scene.toml", small);
+    let moved = tallow::layout::Camera { near: scene.camera.near + 0.1, position: [0.1, 1.0, 6.0], ..scene.camera };
+    let mut renderer = Renderer::new(&gpu, &scene, Outputs::default()).unwrap();
+    let expected = [scene.camera, moved].map(|camera| {
+        renderer.set_camera(camera).unwrap();
+        support::render(&gpu, &renderer)
+    });
+    let copies = ["first", "second"].map(|name| Buffer::new(&gpu, name, 33 * 17, Location::Readback).unwrap());
+    let stats = renderer.film().tiles[0].stats.clone();
+    gpu.run(&mut FrameResources::new(&gpu).unwrap(), |rec| {
+        for (camera, copy) in [scene.camera, moved].into_iter().zip(&copies) {
+            renderer.set_camera(camera)?;
+            renderer.steps().try_for_each(|step| renderer.record(rec, &step))?;
+            rec.copy(&stats, copy)?;
+        }
+        Ok(())
+    })
+    .unwrap();
+    for (copy, expected) in copies.iter().zip(&expected) {
+        assert!(bits(&copy.read().unwrap()) == bits(expected));
+    }
+    assert!(bits(&expected[0]) != bits(&expected[1]), "control: the cameras see different pictures");
     support::assert_silent(&gpu);
 }
 

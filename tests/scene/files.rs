@@ -4,7 +4,7 @@ use crate::support;
 use image::codecs::png::PngEncoder;
 use std::fs::File;
 use std::process::{Command, Output};
-use tallow::render::{Outputs, Renderer, path_push};
+use tallow::render::{Outputs, Renderer, frame_constants};
 use tallow::scene::Scene;
 use tallow::twins::primary_hit::guide;
 use tempfile::TempDir;
@@ -175,7 +175,7 @@ fn a_triangle_at_the_limit_is_hit() {
     let stats = support::render(&gpu, &renderer);
     assert!(stats.iter().all(|s| s.count == 1 && s.mean.iter().all(|v| v.is_finite())));
     let depths: Vec<_> = renderer.film().tiles[0].guide.read().unwrap().iter().map(|g| g.depth).collect();
-    let twins: Vec<_> = (0..64).map(|p| guide(&scene, &path_push(&scene), p).depth).collect();
+    let twins: Vec<_> = (0..64).map(|p| guide(&scene, &frame_constants(&scene), p).depth).collect();
     for found in [depths, twins] {
         let hits: Vec<_> = found.into_iter().filter(|&depth| depth > 0.0).collect();
         assert!(hits.len() >= 16 && hits.iter().all(|depth| (1.9e12..4e12).contains(depth)), "{hits:?}");

@@ -2,7 +2,7 @@
 use crate::statistics::{chi_square, sidak, uniform_2d};
 use glam::{Mat3, Vec2, Vec3, vec2};
 use std::f64::consts::TAU;
-use tallow::layout::{Camera, Effects, PathPush};
+use tallow::layout::{Camera, Effects, FrameConstants};
 use tallow::math::warp::*;
 use tallow::twins::camera::{eye_ray, film_from_pixel, film_sample};
 use tallow::twins::sampler::{sample_2d, sample_2d_bits, sampler_start};
@@ -180,8 +180,8 @@ fn gaussian_cdf(x: f32) -> f64 {
 fn film_samples_follow_their_filter() {
     const PIXEL: u32 = 3 * 7 + 2;
     let from_corner = |filter: u32, i: u32| {
-        let push = PathPush { size: [7, 5], pixel_filter: filter, ..PathPush::default() };
-        film_sample(&push, &Effects::ALL, PIXEL, sampler_start(PIXEL, i, 4, true)) - vec2(2.0, 3.0)
+        let frame = FrameConstants { size: [7, 5], pixel_filter: filter, ..FrameConstants::default() };
+        film_sample(&frame, &Effects::ALL, PIXEL, sampler_start(PIXEL, i, 4, true)) - vec2(2.0, 3.0)
     };
     type Cdf = fn(f32) -> f64;
     let cdfs: [(&str, Cdf); 3] =
@@ -216,11 +216,11 @@ fn lens_camera() -> Camera {
 fn rays_leave_a_uniform_lens_towards_one_point_in_focus() {
     let camera = lens_camera();
     let [position, right, up, forward] = [camera.position, camera.right, camera.up, camera.forward].map(Vec3::from);
-    let push = PathPush { camera, size: [12, 5], ..PathPush::default() };
+    let frame = FrameConstants { camera, size: [12, 5], ..FrameConstants::default() };
     let film = vec2(3.3, 4.1);
-    let at = film_from_pixel(film, push.size);
+    let at = film_from_pixel(film, frame.size);
     let focus = position + camera.focus_distance * (forward + at.x * right + at.y * up);
-    let rays = || (0..1 << 18).map(|i| eye_ray(&push, &Effects::ALL, film, sampler_start(5, i, 1, true)));
+    let rays = || (0..1 << 18).map(|i| eye_ray(&frame, &Effects::ALL, film, sampler_start(5, i, 1, true)));
     for ray in rays().take(1000) {
         let miss = |p: Vec3| (p - ray.origin).cross(ray.direction).length();
         assert!((ray.origin - position).dot(forward).abs() < 1e-6, "{ray:?} leaves the lens");
@@ -242,8 +242,9 @@ fn rays_leave_a_uniform_lens_towards_one_point_in_focus() {
 #[test]
 fn what_is_nearer_than_the_near_distance_is_skipped() {
     let ray = |near: f32| {
-        let push = PathPush { camera: Camera { near, ..lens_camera() }, size: [12, 5], ..PathPush::default() };
-        eye_ray(&push, &Effects::ALL, vec2(1.0, 2.0), sampler_start(5, 0, 1, false))
+        let frame =
+            FrameConstants { camera: Camera { near, ..lens_camera() }, size: [12, 5], ..FrameConstants::default() };
+        eye_ray(&frame, &Effects::ALL, vec2(1.0, 2.0), sampler_start(5, 0, 1, false))
     };
     let (from_lens, clipped) = (ray(0.0), ray(1.5));
     assert_eq!(from_lens.direction, clipped.direction);

@@ -7,7 +7,7 @@ use std::fmt::Write;
 use std::fs::File;
 use tallow::image::{Film, Samples, WriteOptions};
 use tallow::layout::Effects;
-use tallow::render::path_push;
+use tallow::render::frame_constants;
 use tallow::render::settings::Sampler;
 use tallow::scene::Scene;
 use tallow::twins::path::{Strategy, Tracer};
@@ -160,7 +160,7 @@ impl Estimate {
 pub fn mean(scene: &Scene, strategy: Strategy, samples: u32) -> Estimate {
     let mut scene = scene.clone();
     scene.settings.sampler = Sampler::Independent;
-    let tracer = Tracer { scene: &scene, push: path_push(&scene), effects: Effects::ALL, strategy };
+    let tracer = Tracer { scene: &scene, frame: frame_constants(&scene), effects: Effects::ALL, strategy };
     let pixels = scene.settings.pixels() as u32;
     // Per pixel, the mean over samples and its variance: pixels differ, which is no error of the picture's mean.
     let of_pixel = |pixel| {

@@ -1,6 +1,6 @@
 //! The guided filter against its twin, which is in double precision, and the twin against examples worked by hand.
 use crate::picture::{Picture, SIZES, apart, line, red};
-use crate::support::kernels::absorb;
+use crate::support::kernels::merge;
 use crate::support::{assert_silent, gpu, hash};
 use tallow::denoise::filter::{FilterInput, FilterSettings, GuidedSums, find, run};
 use tallow::gpu::{Buffer, FrameResources, Gpu, Location};
@@ -31,10 +31,10 @@ fn guided_solves_the_worked_examples() {
 fn records_that_are_not_there_leave_nothing_behind() {
     let gpu = gpu();
     let from = [1.0, 3.0, 3e38, f32::INFINITY, f32::NAN];
-    let kernel = absorb::Kernel::new(&gpu, &Default::default()).unwrap();
+    let kernel = merge::Kernel::new(&gpu, &Default::default()).unwrap();
     let values = Buffer::from_slice(&gpu, "from", &from).unwrap();
     let results = Buffer::new(&gpu, "results", 4 * from.len(), Location::Readback).unwrap();
-    let bind = absorb::Bind { from: &values, results: &results };
+    let bind = merge::Bind { from: &values, results: &results };
     let count = from.len() as u32;
     gpu.run(&mut FrameResources::new(&gpu).unwrap(), |rec| rec.dispatch(&kernel, bind, &count, [1; 3])).unwrap();
     for (value, sums) in from.iter().zip(results.read().unwrap().chunks(4)) {

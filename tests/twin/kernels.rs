@@ -10,7 +10,7 @@ use std::path::Path;
 use tallow::gpu::{Buffer, FrameResources, Gpu, Kernel, Location};
 use tallow::layout::*;
 use tallow::render::settings::{PixelFilter, Settings};
-use tallow::render::{Batch, Outputs, Renderer, Step, all_effects, called_for, path_push};
+use tallow::render::{Batch, Outputs, Renderer, Step, all_effects, called_for, frame_constants};
 use tallow::scene::Scene;
 use tallow::shaders::shared;
 use tallow::twins::accumulate::fold;
@@ -140,8 +140,8 @@ fn run(gpu: &Gpu, scene: &Scene, effects: Effects) -> Pair {
     let device: Vec<_> = words[..3 * (pixels * SAMPLES) as usize].iter().map(|&v| Vec4::from(v).truncate()).collect();
     let rays: f32 = words[..device.len()].iter().map(|v| v[3]).sum();
 
-    let (push, effects) = (path_push(scene), *renderer.effects());
-    let tracer = Tracer { scene, push, effects, strategy: Strategy::Both };
+    let (frame, effects) = (frame_constants(scene), *renderer.effects());
+    let tracer = Tracer { scene, frame, effects, strategy: Strategy::Both };
     let sample = |i: u32| {
         let s = tracer.sample(i % pixels, i / pixels);
         [s.direct, s.indirect, s.albedo]
@@ -155,7 +155,7 @@ fn run(gpu: &Gpu, scene: &Scene, effects: Effects) -> Pair {
     fold(&push_fold, true, &words, &mut stats, &mut light); // of the device's samples: only rounding may differ
     Pair {
         samples: [device, host],
-        guides: [tile.guide.read().unwrap(), (0..pixels).into_par_iter().map(|p| guide(scene, &push, p)).collect()],
+        guides: [tile.guide.read().unwrap(), (0..pixels).into_par_iter().map(|p| guide(scene, &frame, p)).collect()],
         stats: [tile.stats.read().unwrap(), stats],
         light: [tile.light.read().unwrap(), light],
     }
@@ -345,7 +345,8 @@ fn traversed(gpu: &Gpu, scene: &Scene, effects: Effects, rays: &[RayQuery], any_
     let s = renderer.scene();
     let queries = Buffer::from_slice(gpu, "rays", rays).unwrap();
     let hits = Buffer::new(gpu, "hits", rays.len(), Location::Device).unwrap();
-    let push = TraversePush { count: rays.len() as u32, root: path_push(scene).root, any_hit: u32::from(any_hit) };
+    let push =
+        TraversePush { count: rays.len() as u32, root: frame_constants(scene).root, any_hit: u32::from(any_hit) };
     let mut frame = FrameResources::new(gpu).unwrap();
     gpu.run(&mut frame, |rec| {
         let bind = traverse_kernel::Bind { scene: s.bind(), rays: &queries, hits: &hits };

@@ -4,9 +4,9 @@ use crate::support::{assert_silent, gpu, hash};
 use glam::{Vec2, vec2};
 use std::path::Path;
 use tallow::gpu::Gpu;
-use tallow::layout::{Effects, Guide, NONE, PathPush, vec3, vec4};
+use tallow::layout::{Effects, Guide, NONE, vec3, vec4};
 use tallow::render::settings::PixelFilter;
-use tallow::render::{Outputs, Renderer, path_push};
+use tallow::render::{Outputs, Renderer, frame_constants};
 use tallow::scene::Scene;
 use tallow::twins::guide_lookup::{GuideRays, look_up};
 use tallow::twins::path::{Strategy, Tracer};
@@ -79,13 +79,13 @@ fn scene(file: &str, size: [u32; 2], filter: PixelFilter) -> Scene {
 
 /// What guide rays meet, and light that differs from pixel to pixel, a few having none.
 fn guides(scene: &Scene) -> (Vec<Guide>, Vec<vec4>) {
-    let push = path_push(scene);
+    let frame = frame_constants(scene);
     let light = |i: u32| {
         let unit = |k: u32| (hash(4 * i + k) >> 8) as f32 / (1 << 24) as f32;
         [unit(0), unit(1), unit(2), if i % 7 == 6 { 0.0 } else { 1.0 }]
     };
     let pixels = 0..scene.settings.pixels() as u32;
-    (pixels.clone().map(|p| guide(scene, &push, p)).collect(), pixels.map(light).collect())
+    (pixels.clone().map(|p| guide(scene, &frame, p)).collect(), pixels.map(light).collect())
 }
 
 /// Of the device and of the twin.
@@ -96,9 +96,13 @@ fn both(gpu: &Gpu, scene: &Scene, guide: &[Guide], filtered: &[vec4]) -> [Vec<ve
 }
 
 fn twin(scene: &Scene, effects: &Effects, guide: &[Guide], filtered: &[vec4]) -> Vec<vec3> {
-    let push = PathPush { samples: EYE_RAYS, ..path_push(scene) };
-    let guides = GuideRays { size: push.size, guide, filtered };
-    (0..guide.len() as u32).map(|p| look_up(scene, &push, effects, &guides, p)).collect()
+    let tracer = tracer(scene, *effects);
+    let guides = GuideRays { size: tracer.frame.size, guide, filtered };
+    (0..guide.len() as u32).map(|p| look_up(&tracer, &guides, p, 0..EYE_RAYS)).collect()
+}
+
+fn tracer(scene: &Scene, effects: Effects) -> Tracer<'_> {
+    Tracer { scene, frame: frame_constants(scene), effects, strategy: Strategy::Both }
 }
 
 /// A software device ends loops early, silently: all rays of a pixel in one loop brought a twentieth of the light.
@@ -153,10 +157,9 @@ fn the_kernel_agrees_with_its_twin() {
 fn eye_rays_are_those_of_the_samples() {
     let scene = scene("cornell-box/scene.toml", [31, 33], PixelFilter::Box);
     let effects = Effects { indirect: true, ..Effects::default() };
-    let push = path_push(&scene);
     let (guide, _) = guides(&scene);
     let seen = twin(&scene, &effects, &guide, &vec![LIT; guide.len()]);
-    let tracer = Tracer { scene: &scene, push, effects, strategy: Strategy::Both };
+    let tracer = tracer(&scene, effects);
     let albedo = |p: u32| (0..EYE_RAYS).map(|k| tracer.sample(p, k).albedo).sum::<glam::Vec3>() / EYE_RAYS as f32;
     let expected: Vec<vec3> = (0..seen.len() as u32).map(|p| albedo(p).into()).collect();
     assert_eq!(differing(&seen, &expected), 0);

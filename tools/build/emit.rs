@@ -23,6 +23,12 @@ fn members(bindings: &[Binding]) -> Result<(String, String)> {
     Ok((fields, list))
 }
 
+/// 16 KiB is what every Vulkan device has for a uniform block.
+fn assert_sizes(bindings: &[Binding]) -> String {
+    let uniform = bindings.iter().filter(|b| b.kind == "Uniform");
+    uniform.map(|b| format!("    const _: () = assert!(size_of::<{}>() <= 16384);\n", b.element)).collect()
+}
+
 /// A comment of the GLSL as documentation, or the name where there is none.
 fn doc(name: &str, comment: &str) -> String {
     match comment {
@@ -99,6 +105,7 @@ pub fn group_module(group: &Group) -> Result<String> {
     let mut code = format!("/// What `glsl/shared/{name}.glsl` declares.\n#[allow(clippy::all)]\npub mod {name} {{\n");
     code += "    #[allow(unused_imports)]\n    use crate::gpu::{Bound, Buffer};\n    #[allow(unused_imports)]\n    use crate::layout::*;\n";
     code += &numbers(&group.numbers)?;
+    code += &assert_sizes(&group.bindings);
     if !group.bindings.is_empty() {
         code += &format!(
             r#"    /// One field of every kernel that includes the file.
@@ -197,6 +204,7 @@ pub fn module(name: &str, file: &Path, interface: &Interface, root: &str, binary
     }
     let numbers = numbers(&interface.numbers_of(None))?;
     let constants = constants(interface, root)?;
+    let asserts = assert_sizes(&interface.bindings_of(None));
     let file = file.display();
     // Who can name a kernel of the crate can run it with any numbers, so that nobody outside can.
     let visible = if root == "crate" { "#[allow(dead_code)]\npub(crate)" } else { "pub" };
@@ -214,7 +222,7 @@ pub fn module(name: &str, file: &Path, interface: &Interface, root: &str, binary
     pub static SPIRV: &[u8] = include_bytes!({binary:?});
     /// This kernel, specialised.
     pub type Kernel = {root}::gpu::Kernel<Bind<'static>>;
-{numbers}{constants}    /// What the kernel reads and writes.
+{numbers}{asserts}{constants}    /// What the kernel reads and writes.
     pub struct Bind<'a> {{
 {fields}    }}
     // SAFETY: the code is what `glslc` made of the file, and the slots are what the file declares.

@@ -247,9 +247,10 @@ fn parse_local_size(line: &str) -> Result<(LocalSizeX, u32)> {
 }
 
 fn parse_binding(line: &str) -> Result<Binding> {
-    parse_storage(line).or_else(|| parse_texels(line)).context(
-        "expected `layout(scalar, binding = 0) readonly buffer Name { type field[]; };` or \
-         `layout(binding = 0) uniform usamplerBuffer field; // of Type`",
+    parse_storage(line).or_else(|| parse_texels(line)).or_else(|| parse_uniform(line)).context(
+        "expected `layout(scalar, binding = 0) readonly buffer Name { type field[]; };`, \
+         `layout(binding = 0) uniform usamplerBuffer field; // of Type` or \
+         `layout(scalar, binding = 0) uniform Name { Type field; };`",
     )
 }
 
@@ -293,5 +294,19 @@ fn parse_texels(line: &str) -> Option<Binding> {
         in_glsl: String::new(),
         kind,
         access: "TexelRead",
+    })
+}
+
+fn parse_uniform(line: &str) -> Option<Binding> {
+    let (number, rest) = line.trim().strip_prefix("layout(scalar, binding = ")?.split_once(')')?;
+    let (element, field) = member(rest.trim().strip_prefix("uniform ")?)?;
+    Some(Binding {
+        group: None,
+        number: number.parse().ok()?,
+        field: field.to_owned(),
+        element: element.to_owned(),
+        in_glsl: element.to_owned(),
+        kind: "Uniform",
+        access: "UniformRead",
     })
 }

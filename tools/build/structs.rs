@@ -15,7 +15,7 @@ pub fn glsl(bindings: &[Binding]) -> String {
         let fields: String = s.fields.iter().map(|f| format!("    {} {};\n", f.ty, f.name)).collect();
         text += &format!("struct {} {{\n{fields}}};\n", s.name);
         let bound = || bindings.iter().filter(|b| b.element == s.name);
-        if bound().count() > 0 {
+        if bound().any(|b| b.kind != "Uniform") {
             text += &zero(s);
         }
         if bound().any(|b| b.kind == "UintTexels") {

@@ -10,11 +10,12 @@ use tallow::denoise::composition::Demodulation;
 use tallow::denoise::filter;
 use tallow::gpu::Gpu;
 use tallow::image::Picture;
-use tallow::layout::{Effects, Guide, PathPush, vec3, vec4};
-use tallow::render::{Outputs, Renderer, path_push};
+use tallow::layout::{Effects, Guide, vec3, vec4};
+use tallow::render::{Outputs, Renderer, frame_constants};
 use tallow::report::table;
 use tallow::scene::Scene;
 use tallow::twins::guide_lookup::{GuideRays, eye_hit};
+use tallow::twins::path::{Strategy, Tracer};
 
 const VIEWS: &[View] = &[
     View { name: "sponza", scene: "crytek-sponza", size: [256, 144], depth: 4, reference: 256 },
@@ -101,13 +102,14 @@ fn line(light: &str, image: &str, case: &Case, lost: &[bool], picture: &Picture)
 
 /// Per pixel, the share of its eye rays for which none of the guide rays stands that they may choose from.
 fn lost(scene: &Scene, effects: &Effects, guide: &[Guide], filtered: &[vec4]) -> Vec<f32> {
-    let push = PathPush { samples: EYE_RAYS[1], ..path_push(scene) };
-    let guides = GuideRays { size: push.size, guide, filtered };
+    let (frame, effects) = (frame_constants(scene), *effects);
+    let tracer = Tracer { scene, frame, effects, strategy: Strategy::Both };
+    let guides = GuideRays { size: frame.size, guide, filtered };
     let is_lost = |pixel: u32, index: u32| {
-        let Some((eye, film)) = eye_hit(scene, &push, effects, pixel, index) else { return false };
+        let Some((eye, film)) = eye_hit(&tracer, pixel, index) else { return false };
         guides.most_similar(&eye, film).is_none_or(|q| !stands_for(&guide[q], &eye))
     };
-    let share = |pixel| (0..push.samples).filter(|&k| is_lost(pixel, k)).count() as f32 / push.samples as f32;
+    let share = |pixel| (0..EYE_RAYS[1]).filter(|&k| is_lost(pixel, k)).count() as f32 / EYE_RAYS[1] as f32;
     (0..guide.len() as u32).into_par_iter().map(share).collect()
 }
 

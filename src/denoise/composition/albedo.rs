@@ -1,13 +1,7 @@
 //! Colour divided by albedo, for images that do not hold direct light apart.
 use super::{Light, finite};
 use crate::layout::vec3;
-
-/// A channel of smaller albedo is divided by this instead; a pixel with no larger one is left as it is.
-const SMALLEST_ALBEDO: f32 = 0.01;
-/// A pixel with less than this part of its neighbours' albedo may show a piece of something that has none.
-const WHOLE: f32 = 0.98;
-/// And one with this many times the light of its neighbours.
-const OUTLIER: f32 = 2.0;
+use crate::shaders::demodulate::{OUTLIER, SMALLEST_ALBEDO, WHOLE};
 
 /// Lamps and sky, and the pixels at their rims, are not filtered: a rim's light divided by its little albedo would
 /// outshine everything around it.

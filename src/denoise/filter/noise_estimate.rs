@@ -5,8 +5,8 @@ use super::{FilterInput, FilterSettings, Planes};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{SvgfPush, vec3, vec4};
-pub use crate::shaders::noise_estimate::ENOUGH;
 use crate::shaders::noise_estimate::{self, Bind, Constants};
+pub use crate::shaders::shared::luminance::ENOUGH;
 use crate::shaders::shared::luminance::STRONGEST;
 use glam::Vec3;
 

@@ -1,6 +1,23 @@
 //! Turns priorities into counts that sum to a budget exactly, by Hamilton's method, with radix selection and no sort.
-//! Kernels: `glsl/apportion/*.comp`. Twin:
-//! [`crate::twins::apportion`].
+//! Kernels: `glsl/apportion/*.comp`. Twin: [`crate::twins::apportion`].
+//!
+//! ```text
+//! priority -> quantise_priority -> sum_weights          weights in fixed point, and their sum
+//!                  |
+//!          lack_of_share or lack_of_accuracy            only where past samples count: what is missing of a share of
+//!                  |                                    all samples, or of an accuracy; then
+//!             sum_weights                               the sum of that
+//!                  |
+//!       +-----> quota ------> redistribute --+          whole samples: floor(budget * weight / sum). What full pixels
+//!       +------- `rounds` times -------------+          leave is apportioned again
+//!                  |
+//!       +--> radix_count --> radix_select ---+          the rest, one sample each for the largest remainders: a digit of
+//!       +------- 8 digits -------------------+          the smallest of them at a time
+//!                  |
+//!       tie_sums -> scan_block_sums -> give_remainders  of equal ones, those of the lowest pixels
+//!                  |
+//!                count
+//! ```
 use super::scan::Blocks;
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Location, Recorder};

@@ -19,5 +19,10 @@ pub fn record(
     indirect: &Buffer<vec3>,
     push: &PathPush,
 ) -> Result<()> {
-    rec.dispatch_threads(k, Bind { scene: s.bind(), guides, filtered, indirect }, push, push.pixels)
+    rec.dispatch_threads(
+        k,
+        Bind { scene: s.bind(), frame: s.bind_frame(), guides, filtered, indirect },
+        push,
+        push.pixels,
+    )
 }

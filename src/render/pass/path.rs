@@ -10,17 +10,24 @@ use crate::shaders::path::Bind;
 pub type Path = Kernel<Bind<'static>>;
 
 /// The same number of samples for every pixel of a run.
-pub fn push_of_batch(push: &PathPush, b: &Batch) -> PathPush {
-    PathPush { first_pixel: b.first_pixel, pixels: b.pixels, first_sample: b.first_sample, samples: b.samples, ..*push }
+pub fn push_of_batch(b: &Batch) -> PathPush {
+    PathPush { first_pixel: b.first_pixel, pixels: b.pixels, first_sample: b.first_sample, samples: b.samples }
 }
 
 /// So many paths of a list.
-pub fn push_of_list(push: &PathPush, paths: u32) -> PathPush {
-    PathPush { pixels: paths, samples: 0, ..*push }
+pub fn push_of_list(paths: u32) -> PathPush {
+    PathPush { pixels: paths, ..PathPush::default() }
 }
 
 /// scene, and paths\[batch\] where they are listed -> samples\[batch\]
 pub fn record(k: &Path, rec: &mut Recorder, s: &DeviceScene, f: &FilmBuffers, push: &PathPush) -> Result<()> {
-    let bind = Bind { scene: s.bind(), samples: &f.samples, counters: &f.counters, paths: &f.paths, broken: &f.broken };
+    let bind = Bind {
+        scene: s.bind(),
+        frame: s.bind_frame(),
+        samples: &f.samples,
+        counters: &f.counters,
+        paths: &f.paths,
+        broken: &f.broken,
+    };
     rec.dispatch_threads(k, bind, push, push.pixels * push.samples.max(1))
 }

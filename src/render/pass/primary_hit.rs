@@ -9,10 +9,11 @@ use crate::shaders::primary_hit::Bind;
 pub type Guides = Kernel<Bind<'static>>;
 
 /// camera -> guide\[tile\]
-pub fn record(k: &Guides, rec: &mut Recorder, s: &DeviceScene, tile: &FilmTile, push: &PathPush) -> Result<()> {
+pub fn record(k: &Guides, rec: &mut Recorder, s: &DeviceScene, tile: &FilmTile) -> Result<()> {
     tile.windows().try_for_each(|w| {
         let (first_pixel, pixels) = (tile.first_pixel + w.start, w.end - w.start);
         let guides = &tile.guide.part(w.start as usize..w.end as usize)?;
-        rec.dispatch_threads(k, Bind { scene: s.bind(), guides }, &PathPush { first_pixel, pixels, ..*push }, pixels)
+        let push = PathPush { first_pixel, pixels, ..PathPush::default() };
+        rec.dispatch_threads(k, Bind { scene: s.bind(), frame: s.bind_frame(), guides }, &push, pixels)
     })
 }

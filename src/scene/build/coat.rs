@@ -1,9 +1,9 @@
 //! What a rough coat lets in, and what it reflects inwards: the table that kernels read for a scene's rough coats.
 use super::fresnel;
+use crate::layout::SMOOTH_ALPHA;
 use crate::layout::{BSDF_COATED, COAT_COLUMNS, COAT_ROWS, MATERIAL_GGX, Material};
 use crate::math::fresnel::fresnel_dielectric;
 use crate::math::microfacet::{microfacet_area, microfacet_g1, microfacet_sample};
-use crate::scene::effects::SMOOTH;
 use glam::{Vec3, vec2, vec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -29,7 +29,7 @@ pub fn add_means(materials: &mut [Material]) {
 /// Adds what rough coats reflect to the words of the textures: a table for each index and distribution.
 pub fn add_tables(materials: &mut [Material], texels: &mut Vec<u32>) {
     let mut tables = HashMap::new();
-    for m in materials.iter_mut().filter(|m| m.kind == BSDF_COATED && m.alpha >= SMOOTH) {
+    for m in materials.iter_mut().filter(|m| m.kind == BSDF_COATED && m.alpha >= SMOOTH_ALPHA) {
         let ggx = m.flags & MATERIAL_GGX != 0;
         m.coat_table = *tables.entry((m.eta[0].to_bits(), ggx)).or_insert_with(|| {
             let first = texels.len() as u32;
@@ -43,7 +43,7 @@ pub fn add_tables(materials: &mut [Material], texels: &mut Vec<u32>) {
 /// GGX microfacets, or Beckmann's. Light is let in or reflected by one scattering, as in Mitsuba 3's `roughplastic`; what
 /// would need more is lost.
 pub fn coat_table(eta: f32, ggx: bool) -> Vec<f32> {
-    let alpha = |row: usize| SMOOTH.powf(1.0 - row as f32 / (ROWS - 1) as f32);
+    let alpha = |row: usize| SMOOTH_ALPHA.powf(1.0 - row as f32 / (ROWS - 1) as f32);
     (0..ROWS).into_par_iter().flat_map_iter(|row| coat_row(eta, ggx, alpha(row))).collect()
 }
 

@@ -28,10 +28,10 @@ void main() {
     Moments without = moments_of(1.0), with = without;
     Fit fit_without = fit_of(1.0), fit_with = fit_without;
     bool never = from[i] == -1.0; // unknown when it is compiled
-    absorb(without, moments_of(from[i]), never);
-    absorb(with, moments_of(from[i]), !never);
-    absorb(fit_without, fit_of(from[i]), never);
-    absorb(fit_with, fit_of(from[i]), !never);
+    merge(without, moments_of(from[i]), never);
+    merge(with, moments_of(from[i]), !never);
+    merge(fit_without, fit_of(from[i]), never);
+    merge(fit_with, fit_of(from[i]), !never);
     results[4u * i] = sum(without);
     results[4u * i + 1u] = sum(with);
     results[4u * i + 2u] = sum(fit_without);
