@@ -11,8 +11,13 @@ pub type Path = Kernel<Bind<'static>>;
 
 /// scene -> samples\[batch\]
 pub fn record(k: &Path, rec: &mut Recorder, s: &DeviceScene, f: &FilmBuffers, b: &Batch) -> Result<()> {
-    let push =
-        PathPush { first_pixel: b.first_pixel, pixels: b.pixels, first_sample: b.first_sample, samples: b.samples };
+    let push = PathPush {
+        first_pixel: b.first_pixel,
+        pixels: b.pixels,
+        first_sample: b.first_sample,
+        samples: b.samples,
+        ..Default::default()
+    };
     rec.dispatch_threads(k, bind(s, f), &push, b.pixels * b.samples)
 }
 
