@@ -69,12 +69,14 @@ pub fn join(a: &Pixel, b: &Pixel) -> Pixel {
             count: a.stats.count.checked_add(b.stats.count).expect("fewer than 2^32 samples"),
             m2,
             remainder: 0,
+            ..Default::default()
         },
         light: PixelLight {
             direct: mean(a.light.direct, b.light.direct),
             indirect_m2: squares([a.light.indirect_m2, b.light.indirect_m2], off),
             indirect: mean(a.light.indirect, b.light.indirect),
             remainder: 0,
+            ..Default::default()
         },
     }
 }
@@ -93,7 +95,13 @@ mod tests {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let m2 = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
-        let stats = PixelStats { mean: [mean as f32; 3], count: n as u32, m2: [m2 as f32; 3], remainder: 0 };
+        let stats = PixelStats {
+            mean: [mean as f32; 3],
+            count: n as u32,
+            m2: [m2 as f32; 3],
+            remainder: 0,
+            ..Default::default()
+        };
         let light = PixelLight { indirect: stats.mean, indirect_m2: m2 as f32, ..PixelLight::default() };
         Pixel { stats, light }
     }

@@ -124,7 +124,8 @@ mod tests {
         let push =
             PriorityPush { size: [1, 1], window: 2, luminance_floor: -1.0, limit: 99, ..PriorityPush::default() };
         let of = |indirect_m2: f32, filtered: f32| {
-            let light = [PixelLight { direct: [1.0; 3], indirect: [4.0; 3], indirect_m2, remainder: 0 }];
+            let light =
+                [PixelLight { direct: [1.0; 3], indirect: [4.0; 3], indirect_m2, remainder: 0, ..Default::default() }];
             let (guide, stats) = ([Guide::default()], [pixel(3.0, 2, 8.0)]);
             let push = PriorityPush { filtered, ..push };
             let [noise] = reference(&HostInputs { guide: &guide, stats: &stats, light: &light, priority: &[], push })
@@ -151,7 +152,7 @@ mod tests {
     }
 
     fn pixel(mean: f32, count: u32, m2: f32) -> PixelStats {
-        PixelStats { mean: [mean; 3], count, m2: [m2; 3], remainder: 0 }
+        PixelStats { mean: [mean; 3], count, m2: [m2; 3], remainder: 0, ..Default::default() }
     }
 
     #[test]

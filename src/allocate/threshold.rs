@@ -55,7 +55,7 @@ mod tests {
     #[test]
     fn noise_counts_until_the_last_threshold_and_the_share_of_samples_after() {
         // Samples 2 and 6: mean 4, m2 = 8, variance 8; (sqrt 8 + 1) / (4 + 1). By round 8 it has 2 of 8 samples.
-        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3], remainder: 0 };
+        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3], remainder: 0, ..Default::default() };
         assert!((of_one(stats, 7) - (8.0_f32.sqrt() + 1.0) / 5.0).abs() < 1e-6);
         assert_eq!(of_one(stats, 8), 0.25);
         assert_eq!(of_one(PixelStats { count: 7, ..stats }, 9), 0.25, "frozen");

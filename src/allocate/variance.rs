@@ -69,17 +69,17 @@ pub(super) fn reference(inputs: &HostInputs) -> Vec<f32> {
 mod tests {
     use super::*;
 
-    const PUSH: PriorityPush = PriorityPush {
-        size: [1, 1],
-        window: 4,
-        normal_scale: 1.0,
-        position_scale: 1.0,
-        luminance_floor: 1.0,
-        limit: 100,
-        threshold: 0.0,
-        filtered: 0.0,
-        round: 0,
-    };
+    fn push() -> PriorityPush {
+        PriorityPush {
+            size: [1, 1],
+            window: 4,
+            normal_scale: 1.0,
+            position_scale: 1.0,
+            luminance_floor: 1.0,
+            limit: 100,
+            ..Default::default()
+        }
+    }
 
     fn of_one(stats: PixelStats, push: PriorityPush) -> f32 {
         reference(&HostInputs { guide: &[], stats: &[stats], light: &[], priority: &[], push })[0]
@@ -88,19 +88,19 @@ mod tests {
     #[test]
     fn noise_is_the_deviation_over_the_luminance() {
         // Samples 2 and 6: mean 4, m2 = 8, variance 8 from one degree of freedom, and so around; sqrt 8 / (4 + 1).
-        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3], remainder: 0 };
-        assert!((of_one(stats, PUSH) - 8.0_f32.sqrt() / 5.0).abs() < 1e-6);
-        let plain = PriorityPush { luminance_floor: -1.0, ..PUSH };
+        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3], remainder: 0, ..Default::default() };
+        assert!((of_one(stats, push()) - 8.0_f32.sqrt() / 5.0).abs() < 1e-6);
+        let plain = PriorityPush { luminance_floor: -1.0, ..push() };
         assert!((of_one(stats, plain) - 8.0_f32.sqrt()).abs() < 1e-6);
     }
 
     #[test]
     fn a_mean_below_the_threshold_wants_nothing_and_an_unknown_one_something() {
         // Relative error of the mean: sqrt 8 / 5 / sqrt 2 = 0.4.
-        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3], remainder: 0 };
-        assert_eq!(of_one(stats, PriorityPush { threshold: 0.41, ..PUSH }), 0.0);
-        assert!(of_one(stats, PriorityPush { threshold: 0.39, ..PUSH }) > 0.0);
-        assert_eq!(of_one(PixelStats::default(), PUSH), 1.0);
-        assert_eq!(of_one(PixelStats { count: 1, ..stats }, PriorityPush { threshold: 9.0, ..PUSH }), 1.0);
+        let stats = PixelStats { mean: [4.0; 3], count: 2, m2: [8.0; 3], remainder: 0, ..Default::default() };
+        assert_eq!(of_one(stats, PriorityPush { threshold: 0.41, ..push() }), 0.0);
+        assert!(of_one(stats, PriorityPush { threshold: 0.39, ..push() }) > 0.0);
+        assert_eq!(of_one(PixelStats::default(), push()), 1.0);
+        assert_eq!(of_one(PixelStats { count: 1, ..stats }, PriorityPush { threshold: 9.0, ..push() }), 1.0);
     }
 }

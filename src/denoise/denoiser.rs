@@ -73,7 +73,7 @@ impl Denoiser {
     /// # Errors
     /// [`Error::Device`].
     pub fn record(&self, rec: &mut Recorder) -> Result<()> {
-        let (push, planes) = (SplitPush { size: self.planes.size }, &self.planes);
+        let (push, planes) = (SplitPush { size: self.planes.size, ..Default::default() }, &self.planes);
         let bind = demodulate::Bind {
             stats: &self.stats,
             light: &self.light,

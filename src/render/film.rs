@@ -109,12 +109,19 @@ pub(crate) fn pixels(film: &Film) -> std::result::Result<Vec<Pixel>, String> {
     let word = |words: &Option<Vec<u32>>, i: usize| words.as_ref().map_or(0, |words| words[i]);
     let at = |plane: [&[f32]; 3], i: usize| plane.map(|values| values[i]);
     let pixel = |i: usize| Pixel {
-        stats: PixelStats { mean: at(mean, i), count: count[i], m2: at(m2, i), remainder: word(&remainder, i) },
+        stats: PixelStats {
+            mean: at(mean, i),
+            count: count[i],
+            m2: at(m2, i),
+            remainder: word(&remainder, i),
+            ..Default::default()
+        },
         light: light.map_or_else(PixelLight::default, |(direct, indirect, indirect_m2)| PixelLight {
             direct: at(direct, i),
             indirect_m2: indirect_m2[i],
             indirect: at(indirect, i),
             remainder: word(&light_remainder, i),
+            ..Default::default()
         }),
     };
     let mut pixels = memory::reserved(film.pixels())?;

@@ -19,6 +19,7 @@ pub fn priority_push(scene: &Scene) -> PriorityPush {
         threshold: a.noise_threshold,
         filtered: a.filtered,
         round: 0,
+        ..Default::default()
     }
 }
 
@@ -44,5 +45,6 @@ pub fn frame_constants(scene: &Scene) -> FrameConstants {
         environment: environment.map_or(NONE, |i| i as u32),
         environment_width: scene.environment.as_ref().map_or(0, |e| e.width),
         root: scene.root | if scene.instances.is_empty() { 0 } else { ROOT_OF_INSTANCES },
+        ..Default::default()
     }
 }

@@ -48,7 +48,7 @@ impl Renderer {
         for first_sample in (0..eye_rays).step_by(at_once as usize) {
             let samples = at_once.min(eye_rays - first_sample);
             let first_sample = self.settings.first_sample + first_sample;
-            let push = PathPush { first_pixel: 0, pixels: pixels as u32, first_sample, samples };
+            let push = PathPush { first_pixel: 0, pixels: pixels as u32, first_sample, samples, ..Default::default() };
             times.extend(gpu.run(&mut frame, |rec| {
                 guide_lookup::record(&kernel, rec, &self.frame.scene, &guide, &filtered, &indirect, &push)
             })?);

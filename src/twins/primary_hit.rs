@@ -33,6 +33,7 @@ pub fn first_hit(scene: &Scene, frame: &FrameConstants, ray: Ray, mask_seed: u32
         object: s.object,
         albedo: bsdf_albedo(&bsdf, -s.normal.dot(ray.direction)).into(),
         material: s.material,
+        ..Default::default()
     };
     (guide, bsdf_is_delta(&bsdf))
 }

@@ -209,6 +209,7 @@ fn lens_camera() -> Camera {
         up: (0.5 * axes.y_axis).into(),
         near: 0.0,
         forward: (-axes.z_axis).into(),
+        ..Default::default()
     }
 }
 

@@ -22,7 +22,15 @@ impl Picture {
             let depth = if floor { 6.0 - 4.0 * v } else { 5.0 + u };
             let normal = if floor { [0.0, 1.0, 0.0] } else { [0.0, 0.1 * u, 1.0] };
             let position = [4.0 * u - 2.0, 2.0 - 4.0 * v, -depth];
-            let guide = Guide { normal, depth, position, object: u32::from(floor), albedo: [0.5; 3], material: 0 };
+            let guide = Guide {
+                normal,
+                depth,
+                position,
+                object: u32::from(floor),
+                albedo: [0.5; 3],
+                material: 0,
+                ..Default::default()
+            };
             let sky = Guide { object: NONE, material: NONE, ..Guide::default() };
             ([light, 0.7 * light, 0.4 * light, 4.0], if u > 0.8 { sky } else { guide })
         };

@@ -263,7 +263,13 @@ fn surroundings(pixels: usize, width: usize) -> (Vec<Guide>, Vec<PixelStats>, Ve
         0 => PixelStats::default(),
         n => {
             let m2 = if n == 1 { 0.0 } else { unit(4 * i) };
-            PixelStats { mean: [unit(i), 2.0 * unit(i), 0.1], count: n as u32, m2: [m2; 3], remainder: 0 }
+            PixelStats {
+                mean: [unit(i), 2.0 * unit(i), 0.1],
+                count: n as u32,
+                m2: [m2; 3],
+                remainder: 0,
+                ..Default::default()
+            }
         }
     };
     // Some of it brighter than squares of single precision go.
@@ -272,9 +278,10 @@ fn surroundings(pixels: usize, width: usize) -> (Vec<Guide>, Vec<PixelStats>, Ve
         indirect_m2: [unit(4 * i + 1), 0.0, 1e35][i % 7 % 3],
         indirect: if i % 11 == 3 { [0.0; 3] } else { [unit(4 * i + 2), 1.0, 0.5] },
         remainder: 0,
+        ..Default::default()
     };
     let stats = |i: usize| match i % 41 {
-        20 => PixelStats { mean: [3e38; 3], count: 4, m2: [1e35; 3], remainder: 0 },
+        20 => PixelStats { mean: [3e38; 3], count: 4, m2: [1e35; 3], remainder: 0, ..Default::default() },
         _ => stats(i),
     };
     let pixels = || 0..pixels;
@@ -303,6 +310,7 @@ fn policies_agree_with_their_references() {
                 threshold,
                 filtered: 0.9,
                 round: 0,
+                ..Default::default()
             };
             for row in POLICIES {
                 let policy = (row.make)(&gpu, pixels as u32).unwrap();

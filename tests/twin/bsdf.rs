@@ -86,7 +86,7 @@ fn on_device(gpu: &Gpu, effects: &Effects, cases: &[Case]) -> Result<Vec<[Vec4; 
     let inputs = Buffer::from_slice(gpu, "inputs", &inputs)?;
     let texels = Buffer::from_texels(gpu, "texels", tables())?;
     let results = Buffer::new(gpu, "results", 5 * cases.len(), Location::Readback)?;
-    let push = TestPush { count: cases.len() as u32, seed: 0 };
+    let push = TestPush { count: cases.len() as u32, seed: 0, ..Default::default() };
     let groups = [push.count.div_ceil(64), 1, 1];
     let bind = bsdf::Bind { materials: &materials, inputs: &inputs, results: &results, texels: &texels };
     gpu.run(&mut FrameResources::new(gpu)?, |rec| rec.dispatch(&kernel, bind, &push, groups))?;
@@ -169,7 +169,7 @@ fn random_words_equal_their_twin() -> Result<()> {
     let input = Buffer::from_slice(&gpu, "queries", &queries)?;
     let words = Buffer::new(&gpu, "words", queries.len(), Location::Readback)?;
     let floats = Buffer::new(&gpu, "floats", queries.len(), Location::Readback)?;
-    let push = TestPush { count: queries.len() as u32, seed: 77 };
+    let push = TestPush { count: queries.len() as u32, seed: 77, ..Default::default() };
     for independent_sampler in [false, true] {
         let effects = Effects { independent_sampler, ..Effects::ALL };
         let kernel = sampler::Kernel::new(&gpu, &sampler::Constants { effects })?;

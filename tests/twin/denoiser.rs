@@ -53,7 +53,13 @@ impl Frame {
                 _ => {}
             }
             let count = 1 + hash(i) % 4;
-            frame.stats.push(PixelStats { mean, count, m2: mean.map(|v| v * v * count as f32), remainder: 0 });
+            frame.stats.push(PixelStats {
+                mean,
+                count,
+                m2: mean.map(|v| v * v * count as f32),
+                remainder: 0,
+                ..Default::default()
+            });
             frame.light.push(light);
             frame.guide.push(guide);
         }

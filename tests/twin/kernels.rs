@@ -345,8 +345,12 @@ fn traversed(gpu: &Gpu, scene: &Scene, effects: Effects, rays: &[RayQuery], any_
     let s = renderer.scene();
     let queries = Buffer::from_slice(gpu, "rays", rays).unwrap();
     let hits = Buffer::new(gpu, "hits", rays.len(), Location::Device).unwrap();
-    let push =
-        TraversePush { count: rays.len() as u32, root: frame_constants(scene).root, any_hit: u32::from(any_hit) };
+    let push = TraversePush {
+        count: rays.len() as u32,
+        root: frame_constants(scene).root,
+        any_hit: u32::from(any_hit),
+        ..Default::default()
+    };
     let mut frame = FrameResources::new(gpu).unwrap();
     gpu.run(&mut frame, |rec| {
         let bind = traverse_kernel::Bind { scene: s.bind(), rays: &queries, hits: &hits };
@@ -364,7 +368,13 @@ fn queries(scene: &Scene, count: usize) -> Vec<RayQuery> {
         let axis = [Vec3::X, Vec3::NEG_Y, Vec3::NEG_Z][i % 3];
         let direction = if i.is_multiple_of(4) { axis } else { random.point().normalize() };
         let t_max = if i.is_multiple_of(5) { 0.3 * (high - low).length() } else { 3e38 };
-        RayQuery { origin: origin.into(), t_max, direction: direction.into(), mask_seed: i as u32 }
+        RayQuery {
+            origin: origin.into(),
+            t_max,
+            direction: direction.into(),
+            mask_seed: i as u32,
+            ..Default::default()
+        }
     };
     (0..count).map(&mut query).collect()
 }
@@ -421,7 +431,7 @@ fn leaks(gpu: &Gpu, scene: &Scene, any_hit: bool) -> Vec<Aim> {
     let mut aims = aims(scene);
     let query = |a: &Aim| {
         let t_max = if any_hit { a.distance + 0.2 } else { 3e38 };
-        RayQuery { origin: a.origin.into(), t_max, direction: a.direction.into(), mask_seed: 0 }
+        RayQuery { origin: a.origin.into(), t_max, direction: a.direction.into(), mask_seed: 0, ..Default::default() }
     };
     let queries: Vec<_> = aims.iter().map(query).collect();
     let mut hits = traversed(gpu, scene, called_for(scene, Outputs::default()), &queries, any_hit).into_iter();

@@ -58,7 +58,7 @@ fn bounce(scene: &Scene, i: u32) -> Option<RayQuery> {
     let direction = basis_from_normal(normal) * warp_cosine_hemisphere(sample_2d(random, 1));
     let origin = s.ray_origin(normal).to_array();
     let direction = direction.normalize().to_array();
-    Some(RayQuery { origin, t_max: INFINITE_DISTANCE, direction, mask_seed: 0 })
+    Some(RayQuery { origin, t_max: INFINITE_DISTANCE, direction, mask_seed: 0, ..Default::default() })
 }
 
 /// obvhs over the nodes that Tallow built with it.
@@ -138,7 +138,7 @@ impl Device {
     /// Seconds by the device's timestamps, and what was found.
     fn run(&mut self, any_hit: bool) -> Result<(f64, Vec<Found>)> {
         let count = self.rays.len() as u32;
-        let push = TraversePush { count, root: self.root, any_hit: u32::from(any_hit) };
+        let push = TraversePush { count, root: self.root, any_hit: u32::from(any_hit), ..Default::default() };
         let s = self.renderer.scene();
         let rays = if self.gpu.info().kind == DeviceKind::Cpu { RAYS_CPU } else { RAYS_GPU };
         let times = self.gpu.run(&mut self.frame, |rec| {

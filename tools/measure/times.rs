@@ -109,7 +109,7 @@ fn input([width, height]: [u32; 2]) -> FilterInput {
         let (x, y) = ((i % width) as f32 / width as f32 - 0.5, (i / width) as f32 / height as f32 - 0.5);
         let ball = 0.1 - x * x - y * y;
         let (normal, depth) = if ball > 0.0 { ([x, y, ball.sqrt()], 2.0 - ball) } else { ([0.0, 1.0, 0.0], 3.0 - y) };
-        Guide { normal, depth, position: [x, y, depth], object: 0, albedo: [0.5; 3], material: 0 }
+        Guide { normal, depth, position: [x, y, depth], object: 0, albedo: [0.5; 3], material: 0, ..Default::default() }
     };
     let pixels = 0..width * height;
     let radiance = pixels.clone().map(|i| [noise(3 * i), noise(3 * i + 1), noise(3 * i + 2), 1.0]).collect();

@@ -22,6 +22,7 @@ pub(super) fn guides(aovs: &Aovs, notes: &mut Vec<String>) -> Vec<Guide> {
             object: if hit || normals[i] != Vec3::ZERO { 0 } else { NONE },
             albedo: vector(aovs, Aov::Albedo, i).into(),
             material: NONE,
+            ..Default::default()
         }
     };
     (0..pixels).map(guide).collect()

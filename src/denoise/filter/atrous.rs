@@ -49,7 +49,7 @@ impl Filter for Atrous {
                 false => &self.pack.colour,
             };
             let (rates, spacing) = (Rates::at_level(&self.settings, level), 1 << level);
-            let push = AtrousPush { size: planes.size, spacing, rates: rates.as_array() };
+            let push = AtrousPush { size: planes.size, spacing, rates: rates.as_array(), ..Default::default() };
             let kernel = &self.kernels[usize::from(level >= self.settings.rt_from_level)];
             let bind = Bind { colour: from, place: &self.pack.place, filtered: to };
             let columns = height.div_ceil(ROWS as u32 * spacing) * spacing;

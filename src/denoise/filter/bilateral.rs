@@ -66,6 +66,7 @@ impl Filter for Bilateral {
             rates: Rates::new(&self.settings).as_array(),
             band: 0,
             band_rows,
+            ..Default::default()
         };
         let (colour, place) = (&self.pack.colour, &self.pack.place);
         (0..bands).try_for_each(|band| {

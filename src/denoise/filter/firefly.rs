@@ -37,7 +37,7 @@ impl Fireflies {
         radiance: &Buffer<vec4>,
         cut: &Buffer<vec4>,
     ) -> Result<()> {
-        let push = FireflyPush { size, factor };
+        let push = FireflyPush { size, factor, ..Default::default() };
         rec.dispatch(&self.0, Bind { radiance, cut }, &push, self.0.groups(size))
     }
 }

@@ -53,7 +53,7 @@ impl Packed {
     pub fn record(&self, rec: &mut Recorder, planes: &Planes, settings: &FilterSettings) -> Result<()> {
         let (radiance, guide) = (&planes.radiance, &planes.guide);
         let bind = guided_pack::Bind { radiance, guide, colour: &self.colour, channels: &self.channels };
-        let push = GuidedPackPush { size: planes.size, depth_scale: 1.0 / settings.extent };
+        let push = GuidedPackPush { size: planes.size, depth_scale: 1.0 / settings.extent, ..Default::default() };
         rec.dispatch(&self.kernel, bind, &push, self.kernel.groups(planes.size))
     }
 }
@@ -150,7 +150,8 @@ impl Guided {
         let ([width, height], settings, strip) = (size, self.settings, self.strip_rows);
         (0..height).step_by(strip as usize).map(move |first_row| {
             let rows = strip.min(height - first_row);
-            let push = GuidedPush { size, first_row, rows, radius: settings.radius, eps: settings.eps };
+            let push =
+                GuidedPush { size, first_row, rows, radius: settings.radius, eps: settings.eps, ..Default::default() };
             (push, [self.down.groups(width, rows), self.along.groups(rows, width)])
         })
     }

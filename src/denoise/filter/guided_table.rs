@@ -58,7 +58,8 @@ impl Filter for GuidedTable {
         let [slope_r, slope_g, slope_b, value] = &self.model;
         let Packed { colour, channels, .. } = &self.pack;
         let (rows, table, filtered) = (&self.rows, &self.table, &planes.output);
-        let push = |width| GuidedPush { size: [width, height], first_row: 0, rows: height, radius, eps };
+        let push =
+            |width| GuidedPush { size: [width, height], first_row: 0, rows: height, radius, eps, ..Default::default() };
         let lines = self.moments.groups([height, 1]);
         let pixels = self.models.groups([width, height]);
         let columns = |record: u32| (push(record * width), self.columns.groups([record * width, 1]));

@@ -39,7 +39,7 @@ impl Estimate {
     /// colour\[P\], place\[P\], variance\[P\] -> plane\[P\]
     pub fn record(&self, rec: &mut Recorder, planes: &Planes, pack: &Pack, settings: &FilterSettings) -> Result<()> {
         let rates = Rates::of_surfaces(settings).as_array();
-        let push = SvgfPush { size: planes.size, spacing: 1, rate_l: 0.0, rates };
+        let push = SvgfPush { size: planes.size, spacing: 1, rate_l: 0.0, rates, ..Default::default() };
         let variance = planes.variance.as_ref().unwrap_or(&self.nothing);
         let bind = Bind { colour: &pack.colour, place: &pack.place, variance, estimate: &self.plane };
         let kernel = &self.kernels[usize::from(planes.variance.is_some())];

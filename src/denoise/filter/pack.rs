@@ -33,7 +33,12 @@ impl Pack {
     /// radiance\[P\], guide\[P\] -> colour\[P\], place\[P\]
     pub fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
         let bind = Bind { radiance: &planes.radiance, guide: &planes.guide, colour: &self.colour, place: &self.place };
-        rec.dispatch_threads(&self.kernel, bind, &PackPush { count: planes.pixels() }, planes.pixels())
+        rec.dispatch_threads(
+            &self.kernel,
+            bind,
+            &PackPush { count: planes.pixels(), ..Default::default() },
+            planes.pixels(),
+        )
     }
 }
 

@@ -63,6 +63,7 @@ impl Filter for Svgf {
                 spacing: 1 << level,
                 rate_l: rate_l(&self.settings),
                 rates: Rates::of_surfaces(&self.settings).as_array(),
+                ..Default::default()
             };
             let bind = Bind { estimate: from, place: &self.pack.place, colour: &self.pack.colour, filtered: to };
             let kernel = &self.kernels[usize::from(last)];

@@ -69,7 +69,7 @@ impl Filter for Wavelet {
                 false => &self.pack.colour,
             };
             let rates = Rates::new(&self.settings).as_array();
-            let push = WaveletPush { size: planes.size, spacing, stencil, rates };
+            let push = WaveletPush { size: planes.size, spacing, stencil, rates, ..Default::default() };
             let bind = Bind { colour: from, place: &self.pack.place, filtered: to };
             let kernel = &self.kernels[usize::from(inverse)];
             rec.dispatch(kernel, bind, &push, kernel.groups(planes.size))?;

@@ -26,8 +26,18 @@ pub fn record_listed(k: &Fold, rec: &mut Recorder, f: &FilmBuffers, range: &Path
     let PathRange { first, paths, round, rounds } = *range;
     f.tiles[0].windows().try_for_each(|w| {
         let (first_pixel, pixels, first_path) = (w.start, w.end - w.start, pair(first));
-        let push =
-            FoldPush { first_pixel, pixels, tile: 0, window: w.start, samples: 0, paths, first_path, round, rounds };
+        let push = FoldPush {
+            first_pixel,
+            pixels,
+            tile: 0,
+            window: w.start,
+            samples: 0,
+            paths,
+            first_path,
+            round,
+            rounds,
+            ..Default::default()
+        };
         fold(k, rec, f, &f.tiles[0], w, &push)
     })
 }

@@ -194,5 +194,6 @@ fn push(plan: &Plan, round: u32) -> ApportionPush {
         total: super::pair(total),
         threshold,
         enough,
+        ..Default::default()
     }
 }

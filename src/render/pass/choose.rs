@@ -23,6 +23,6 @@ pub fn record(
     seed: u32,
 ) -> Result<()> {
     let Choice { pixels, round, threshold } = *choice;
-    let push = ChoosePush { pixels, round, seed, threshold };
+    let push = ChoosePush { pixels, round, seed, threshold, ..Default::default() };
     rec.dispatch_threads(k, Bind { priority, count: &c.count }, &push, pixels)
 }

@@ -11,7 +11,8 @@ pub type Path = Kernel<Bind<'static>>;
 
 /// The same number of samples for every pixel of a run.
 pub fn push_of_batch(b: &Batch) -> PathPush {
-    PathPush { first_pixel: b.first_pixel, pixels: b.pixels, first_sample: b.first_sample, samples: b.samples }
+    let (first_pixel, first_sample) = (b.first_pixel, b.first_sample);
+    PathPush { first_pixel, pixels: b.pixels, first_sample, samples: b.samples, ..Default::default() }
 }
 
 /// So many paths of a list.

@@ -23,6 +23,7 @@ pub fn record(
 ) -> Result<()> {
     let pixels = offset.len() as u32 - 1;
     let PathRange { first, paths: n, round, rounds } = *range;
-    let push = BatchPush { pixels, paths: n, first_path: pair(first), round, rounds, first_sample };
+    let push =
+        BatchPush { pixels, paths: n, first_path: pair(first), round, rounds, first_sample, ..Default::default() };
     k.record(rec, Bind { offset, stats, paths }, &push, pixels)
 }

@@ -18,7 +18,11 @@ impl Blocks {
 
     /// Replaces the sums of all blocks by the sums before them.
     pub fn record(&self, rec: &mut Recorder, sums: &Buffer<uvec2>, pixels: u32) -> Result<()> {
-        self.0.record_one(rec, shaders::scan_block_sums::Bind { blocks: sums }, &ScanPush { pixels })
+        self.0.record_one(
+            rec,
+            shaders::scan_block_sums::Bind { blocks: sums },
+            &ScanPush { pixels, ..Default::default() },
+        )
     }
 }
 
@@ -48,7 +52,7 @@ impl Scan {
     /// [`crate::error::Error::Device`].
     pub fn record(&self, rec: &mut Recorder, c: &Counts) -> Result<()> {
         let pixels = c.count.len() as u32;
-        let push = &ScanPush { pixels };
+        let push = &ScanPush { pixels, ..Default::default() };
         self.reduce.record(rec, reduce::Bind { counts: &c.count, blocks: c.blocks() }, push, pixels)?;
         self.blocks.record(rec, c.blocks(), pixels)?;
         let bind = offsets::Bind { counts: &c.count, blocks: c.blocks(), offset: &c.offset };

@@ -9,12 +9,12 @@ const SLOT: u64 = 1 << 32;
 /// keeps a positive probability, however small.
 pub fn build(weights: &[f64]) -> Vec<AliasEntry> {
     let mut units = units(weights);
-    let mut table = vec![AliasEntry { threshold: u32::MAX, alias: 0 }; units.len()];
+    let mut table = vec![AliasEntry { threshold: u32::MAX, alias: 0, ..Default::default() }; units.len()];
     let (mut small, mut large): (Vec<u32>, Vec<u32>) = (0..units.len() as u32).partition(|&i| units[i as usize] < SLOT);
     while let (Some(i), Some(&donor)) = (small.pop(), large.last()) {
         // A threshold of 2^32 - 1 would read as "always stays", so the entry gives up one unit.
         let kept = units[i as usize].min(SLOT - 2);
-        table[i as usize] = AliasEntry { threshold: kept as u32, alias: donor };
+        table[i as usize] = AliasEntry { threshold: kept as u32, alias: donor, ..Default::default() };
         let left = &mut units[donor as usize];
         *left = (*left + kept).saturating_sub(SLOT);
         if *left < SLOT {

@@ -112,7 +112,7 @@ impl Geometry {
         self.shade(normal, uv);
         let Tag { primitive, material, object } = tag;
         let [v0, v1, v2] = p.map(|p| p.to_array());
-        self.triangles.push(Triangle { v0, primitive, v1, material, v2, object });
+        self.triangles.push(Triangle { v0, primitive, v1, material, v2, object, ..Default::default() });
         Ok(())
     }
 
@@ -140,6 +140,7 @@ impl Geometry {
             material: tag.material,
             v2: axis(matrix.x_axis),
             object: tag.object,
+            ..Default::default()
         });
         Ok(())
     }
@@ -199,7 +200,7 @@ impl Geometry {
             self.shading = vec![flat; self.triangles.len()];
         }
         let [uv0, uv1, uv2] = uv.unwrap_or_default().map(|uv| uv.to_array());
-        self.shading.push(Shading { normal, uv0, uv1, uv2, pad: [0; 3] });
+        self.shading.push(Shading { normal, uv0, uv1, uv2, pad: [0; 3], ..Default::default() });
     }
 }
 

@@ -101,7 +101,19 @@ pub fn instance(affine: &DAffine3, root: u32) -> Instance {
     };
     let ([world0, world1, world2], [object0, object1, object2]) = (rows(affine), rows(&affine.inverse()));
     let mirrored = u32::from(affine.matrix3.determinant() < 0.0);
-    Instance { world0, world1, world2, object0, object1, object2, root, material: NONE, object: 0, mirrored }
+    Instance {
+        world0,
+        world1,
+        world2,
+        object0,
+        object1,
+        object2,
+        root,
+        material: NONE,
+        object: 0,
+        mirrored,
+        ..Default::default()
+    }
 }
 
 fn top_level(sources: &Sources, boxes: &HashMap<u32, Bounds>, scene: &mut Scene) -> Result<()> {

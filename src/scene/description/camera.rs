@@ -77,6 +77,7 @@ impl Camera {
             up: (up * tan_y).as_vec3().to_array(),
             near: positive("near", self.near)?,
             forward: forward.as_vec3().to_array(),
+            ..Default::default()
         })
     }
 

@@ -134,7 +134,7 @@ impl TextureSet {
             let bits = [(self.pictures[picture].1 == Kind::Color, TEXTURE_SRGB), (clamp, TEXTURE_CLAMP)];
             let flags = bits.iter().filter(|b| b.0).map(|b| b.1).sum();
             let [width, height] = sizes[picture];
-            Texture { first: firsts[picture], width, height, flags, scale, offset }
+            Texture { first: firsts[picture], width, height, flags, scale, offset, ..Default::default() }
         };
         let textures = self.wanted.iter().map(texture).collect();
         memory::need(format!("textures of {total} texels"), 4 * total + while_decoded(&sizes))?;

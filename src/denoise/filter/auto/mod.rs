@@ -149,7 +149,7 @@ impl Auto {
         let [wide, middle, narrow, svgf] = &self.candidates;
         let ([dim, signs, probed], count) = (&self.planes, planes.pixels());
         wide.record(rec, planes, &planes.radiance, &wide.result)?;
-        let push = AutoPush { count, floor: floor(&self.settings) };
+        let push = AutoPush { count, floor: floor(&self.settings), ..Default::default() };
         let bind = auto_inputs::Bind { colour: &self.pack.colour, wide: &wide.result, dim, signs, probed };
         rec.dispatch_threads(&self.inputs, bind, &push, count)?;
         wide.record(rec, planes, dim, &self.wide_dim)?;
@@ -190,7 +190,7 @@ impl Auto {
             others,
         };
         let count = planes.pixels();
-        let push = AutoPush { count, floor: floor(&self.settings) };
+        let push = AutoPush { count, floor: floor(&self.settings), ..Default::default() };
         rec.dispatch_threads(&self.error, bind, &push, count)
     }
 
@@ -201,7 +201,7 @@ impl Auto {
             let ([squares, products, others], [square_sums, product_sums, other_sums]) = (from, to);
             let bind = auto_sum::Bind { squares, products, others, square_sums, product_sums, other_sums };
             let blocks = count.div_ceil(SUMMED as u32);
-            rec.dispatch(&self.sum, bind, &PackPush { count }, [blocks, 1, 1])?;
+            rec.dispatch(&self.sum, bind, &PackPush { count, ..Default::default() }, [blocks, 1, 1])?;
             (from, count) = (to, blocks);
             if blocks == 1 {
                 break;
@@ -240,7 +240,13 @@ impl Auto {
                 second_smoothed,
                 third_smoothed,
             };
-            let push = AutoSmoothPush { size: planes.size, spacing: 1 << level, rates, least: least(level, across) };
+            let push = AutoSmoothPush {
+                size: planes.size,
+                spacing: 1 << level,
+                rates,
+                least: least(level, across),
+                ..Default::default()
+            };
             rec.dispatch(smooth, bind, &push, smooth.groups(planes.size))
         })
     }
@@ -274,6 +280,6 @@ impl Filter for Auto {
             filtered: &planes.output,
         };
         let count = planes.pixels();
-        rec.dispatch_threads(&self.blend, bind, &PackPush { count }, count)
+        rec.dispatch_threads(&self.blend, bind, &PackPush { count, ..Default::default() }, count)
     }
 }
