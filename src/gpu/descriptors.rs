@@ -48,7 +48,7 @@ impl Descriptors {
         let resource = |(slot, bound): (&Slot, &Bound)| {
             Ok(match slot.kind {
                 SlotKind::Storage => Resource::Storage([bound.storage()?]),
-                kind => Resource::Texels([bound.texels(kind)?]),
+                kind => Resource::Texels([bound.texels(kind == SlotKind::FloatTexels)?]),
             })
         };
         let resources = slots.iter().zip(buffers).map(resource).collect::<Result<Vec<_>>>()?;
