@@ -1,5 +1,5 @@
 //! Device memory with a type and a name.
-use super::{At, Gpu, SlotKind, staging};
+use super::{At, Gpu};
 use crate::error::{Error, Result};
 use ash::vk;
 use ash::vk::Handle;
@@ -228,18 +228,18 @@ impl Bound<'_> {
     ///
     /// # Errors
     /// When the buffer has more texels than one view may have, or this is but a part of it.
-    pub(super) fn texels(&self, kind: SlotKind) -> Result<vk::BufferView> {
+    pub(super) fn texels(&self, floats: bool) -> Result<vk::BufferView> {
         let whole = &**self.buffer;
         if self.offset > 0 || self.size.next_multiple_of(4) < whole.size {
             return Err(Error::Device(format!("buffer \"{}\": a part of it cannot be read as texels", whole.name)));
         }
-        let format = match (kind, texel_bytes(whole.stride)) {
-            (SlotKind::FloatTexels, 16) => vk::Format::R32G32B32A32_SFLOAT,
-            (SlotKind::FloatTexels, 8) => vk::Format::R32G32_SFLOAT,
-            (SlotKind::FloatTexels, _) => vk::Format::R32_SFLOAT,
-            (_, 16) => vk::Format::R32G32B32A32_UINT,
-            (_, 8) => vk::Format::R32G32_UINT,
-            (_, _) => vk::Format::R32_UINT,
+        let format = match (floats, texel_bytes(whole.stride)) {
+            (true, 16) => vk::Format::R32G32B32A32_SFLOAT,
+            (true, 8) => vk::Format::R32G32_SFLOAT,
+            (true, _) => vk::Format::R32_SFLOAT,
+            (false, 16) => vk::Format::R32G32B32A32_UINT,
+            (false, 8) => vk::Format::R32G32_UINT,
+            (false, _) => vk::Format::R32_UINT,
         };
         check_texels(&whole.name, whole.size, whole.stride, whole.gpu.0.info.max_texel_elements)?;
         let mut views = whole.views.lock().unwrap_or_else(PoisonError::into_inner);
@@ -309,33 +309,6 @@ impl Untyped {
         let memory = memory.as_mut()?;
         let fits = memory.memory_properties().contains(vk::MemoryPropertyFlags::HOST_COHERENT | also);
         memory.mapped_slice_mut().filter(|_| fits).map(access)
-    }
-
-    fn write(&self, offset: usize, bytes: &[u8]) -> Result<()> {
-        self.gpu.0.answers()?;
-        let any = vk::MemoryPropertyFlags::empty();
-        let copied = {
-            let _idle = self.gpu.0.idle();
-            self.mapped(any, |all| all[offset..offset + bytes.len()].copy_from_slice(bytes))
-        };
-        match copied {
-            Some(()) => Ok(()),
-            None => staging::upload(self, offset, bytes),
-        }
-    }
-
-    fn read(&self, offset: usize, bytes: &mut [u8]) -> Result<()> {
-        self.gpu.0.answers()?;
-        // Integrated GPUs map memory that only writes are quick to.
-        let (length, cached) = (bytes.len(), vk::MemoryPropertyFlags::HOST_CACHED);
-        let copied = {
-            let _idle = self.gpu.0.idle();
-            self.mapped(cached, |all| bytes.copy_from_slice(&all[offset..offset + length]))
-        };
-        match copied {
-            Some(()) => Ok(()),
-            None => staging::download(self, offset, bytes),
-        }
     }
 }
 

@@ -49,7 +49,7 @@ impl Descriptors {
             Ok(match slot.kind {
                 SlotKind::Storage => Resource::Buffer([bound.storage()?]),
                 SlotKind::Uniform => Resource::Buffer([bound.uniform()]),
-                kind => Resource::Texels([bound.texels(kind)?]),
+                kind => Resource::Texels([bound.texels(kind == SlotKind::FloatTexels)?]),
             })
         };
         let resources = slots.iter().zip(buffers).map(resource).collect::<Result<Vec<_>>>()?;

@@ -1,8 +1,8 @@
 //! Opening a device, and what the rest of the layer needs of it.
+use super::At;
 use super::cache::PipelineCache;
 use super::info::{self, Candidate, DeviceInfo, DeviceKind, Features};
 use super::instance::{Instance, Messages};
-use super::{At, FrameResources, PassTime, Recorder, timing};
 use crate::error::{Error, Result};
 use ash::vk::Handle;
 use ash::{ext, vk};
@@ -48,7 +48,7 @@ pub(super) struct Inner {
     pub cache: PipelineCache,
     pub debug: Option<ext::debug_utils::Device>,
     pub info: DeviceInfo,
-    calibrated: Option<ext::calibrated_timestamps::Device>,
+    pub calibrated: Option<ext::calibrated_timestamps::Device>,
     queue: Mutex<vk::Queue>,
     /// Shared by submissions from before they are submitted until they are done; the host's accesses to memory exclude them.
     running: RwLock<()>,
@@ -139,24 +139,6 @@ impl Gpu {
         self.0.lock_allocator().as_ref().map_or(0, |a| a.generate_report().total_allocated_bytes)
     }
 
-    /// Records work with `record`, submits it, waits for it, and returns what each pass took, in order. The times are
-    /// empty where the queue has no timestamps. Everything that earlier runs wrote is visible to this one, and what
-    /// this one writes to the host.
-    ///
-    /// # Errors
-    /// Those of `record`, in which case nothing was submitted, and [`Error::Device`] when the device fails.
-    pub fn run(
-        &self,
-        frame: &mut FrameResources,
-        record: impl FnOnce(&mut Recorder<'_>) -> Result<()>,
-    ) -> Result<Vec<PassTime>> {
-        let mut recorder = Recorder::own(self, frame)?;
-        record(&mut recorder)?;
-        drop(recorder);
-        frame.submit_and_wait()?;
-        frame.times()
-    }
-
     /// # Errors
     /// When `what` was made on another device: its handles mean nothing on this one.
     pub(super) fn owns(&self, what: &str, maker: &Gpu) -> Result<()> {
@@ -175,23 +157,6 @@ impl Gpu {
     #[doc(hidden)]
     pub fn validation_log(&self) -> Messages {
         self.0.instance.messages.clone()
-    }
-
-    /// One moment on both clocks: (GPU ns as in [`PassTime`], host ns as in [`super::host_ns`]). `None` where the
-    /// device cannot tell (VK_EXT_calibrated_timestamps).
-    pub fn calibrate(&self) -> Option<(u64, u64)> {
-        let extension = self.0.calibrated.as_ref()?;
-        let domain = [vk::CalibratedTimestampInfoEXT::default().time_domain(vk::TimeDomainEXT::DEVICE)];
-        // The host's clock is read on both sides of the device's; the tightest of a few tries is kept.
-        let tries = (0..5).filter_map(|_| {
-            let before = timing::host_ns();
-            // SAFETY: the extension is enabled and knows the device's own domain (checked when opened).
-            let (ticks, _) = unsafe { extension.get_calibrated_timestamps(&domain) }.ok()?;
-            let after = timing::host_ns();
-            Some((after - before, ticks[0], before + (after - before) / 2))
-        });
-        let (_, ticks, host) = tries.min()?;
-        Some((self.0.clock().absolute(ticks), host))
     }
 }
 
@@ -282,10 +247,6 @@ impl Inner {
         let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
         // SAFETY: a live object of this device. A name that cannot be set is no loss.
         let _ = unsafe { debug.set_debug_utils_object_name(&info) };
-    }
-
-    pub fn clock(&self) -> timing::Clock {
-        timing::Clock { bits: self.info.timestamp_bits, period: self.info.timestamp_period }
     }
 }
 

@@ -1,5 +1,5 @@
 //! The one place that records work: barrier, label, timestamps, bind, push, dispatch.
-use super::{Access, Bindings, Bound, Buffer, FrameResources, Gpu, Kernel, Untyped, access};
+use super::{Access, Bindings, Bound, Buffer, FrameResources, Gpu, Kernel, PassTime, Untyped, access};
 use crate::error::{Error, Result};
 use ash::vk;
 use ash::vk::Handle;
@@ -13,6 +13,26 @@ pub struct Recorder<'a> {
     frame: &'a mut FrameResources,
     commands: vk::CommandBuffer,
     barriers: bool,
+}
+
+impl Gpu {
+    /// Records work with `record`, submits it, waits for it, and returns what each pass took, in order. The times are
+    /// empty where the queue has no timestamps. Everything that earlier runs wrote is visible to this one, and what
+    /// this one writes to the host.
+    ///
+    /// # Errors
+    /// Those of `record`, in which case nothing was submitted, and [`Error::Device`] when the device fails.
+    pub fn run(
+        &self,
+        frame: &mut FrameResources,
+        record: impl FnOnce(&mut Recorder<'_>) -> Result<()>,
+    ) -> Result<Vec<PassTime>> {
+        let mut recorder = Recorder::own(self, frame)?;
+        record(&mut recorder)?;
+        drop(recorder);
+        frame.submit_and_wait()?;
+        frame.times()
+    }
 }
 
 impl<'a> Recorder<'a> {

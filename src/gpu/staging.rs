@@ -1,4 +1,4 @@
-//! Uploads and read-backs for devices whose own memory the host cannot map: copies through a mapped buffer.
+//! Uploads and read-backs: directly where the host can map the memory, else by copies through a mapped buffer.
 use super::commands::Commands;
 use super::{Gpu, Location, Untyped, access};
 use crate::error::{Error, Result};
@@ -7,8 +7,45 @@ use ash::vk;
 /// Bytes of the mapped buffer, at most.
 const CHUNK: usize = 64 << 20;
 
+impl Untyped {
+    /// Writes `bytes` from byte `offset` on, and waits for the device first.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub(super) fn write(&self, offset: usize, bytes: &[u8]) -> Result<()> {
+        self.gpu.0.answers()?;
+        let any = vk::MemoryPropertyFlags::empty();
+        let copied = {
+            let _idle = self.gpu.0.idle();
+            self.mapped(any, |all| all[offset..offset + bytes.len()].copy_from_slice(bytes))
+        };
+        match copied {
+            Some(()) => Ok(()),
+            None => upload(self, offset, bytes),
+        }
+    }
+
+    /// Reads from byte `offset` on, and waits for the device first.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub(super) fn read(&self, offset: usize, bytes: &mut [u8]) -> Result<()> {
+        self.gpu.0.answers()?;
+        // Integrated GPUs map memory that only writes are quick to.
+        let (length, cached) = (bytes.len(), vk::MemoryPropertyFlags::HOST_CACHED);
+        let copied = {
+            let _idle = self.gpu.0.idle();
+            self.mapped(cached, |all| bytes.copy_from_slice(&all[offset..offset + length]))
+        };
+        match copied {
+            Some(()) => Ok(()),
+            None => download(self, offset, bytes),
+        }
+    }
+}
+
 /// Writes `bytes` over `target` from byte `offset` on, and waits.
-pub(super) fn upload(target: &Untyped, offset: usize, bytes: &[u8]) -> Result<()> {
+fn upload(target: &Untyped, offset: usize, bytes: &[u8]) -> Result<()> {
     let staging = Staging::new(&target.gpu, bytes.len(), Location::Upload)?;
     for (index, chunk) in bytes.chunks(CHUNK).enumerate() {
         staging.access(|all| all[..chunk.len()].copy_from_slice(chunk))?;
@@ -18,7 +55,7 @@ pub(super) fn upload(target: &Untyped, offset: usize, bytes: &[u8]) -> Result<()
 }
 
 /// Reads `source` from byte `offset` on.
-pub(super) fn download(source: &Untyped, offset: usize, bytes: &mut [u8]) -> Result<()> {
+fn download(source: &Untyped, offset: usize, bytes: &mut [u8]) -> Result<()> {
     let staging = Staging::new(&source.gpu, bytes.len(), Location::Readback)?;
     for (index, chunk) in bytes.chunks_mut(CHUNK).enumerate() {
         staging.copy(source, &staging.buffer, region(offset + index * CHUNK, 0, chunk.len()))?;

@@ -32,6 +32,25 @@ pub fn host_ns() -> u64 {
     START.get_or_init(Instant::now).elapsed().as_nanos() as u64
 }
 
+impl Gpu {
+    /// One moment on both clocks: (GPU ns as in [`PassTime`], host ns as in [`host_ns`]). `None` where the
+    /// device cannot tell (VK_EXT_calibrated_timestamps).
+    pub fn calibrate(&self) -> Option<(u64, u64)> {
+        let extension = self.0.calibrated.as_ref()?;
+        let domain = [vk::CalibratedTimestampInfoEXT::default().time_domain(vk::TimeDomainEXT::DEVICE)];
+        // The host's clock is read on both sides of the device's; the tightest of a few tries is kept.
+        let tries = (0..5).filter_map(|_| {
+            let before = host_ns();
+            // SAFETY: the extension is enabled and knows the device's own domain (checked when opened).
+            let (ticks, _) = unsafe { extension.get_calibrated_timestamps(&domain) }.ok()?;
+            let after = host_ns();
+            Some((after - before, ticks[0], before + (after - before) / 2))
+        });
+        let (_, ticks, host) = tries.min()?;
+        Some((Clock::of(self).absolute(ticks), host))
+    }
+}
+
 /// How to read a timestamp: its meaningful low bits (`timestampValidBits`, 0 to 64) and nanoseconds per tick.
 #[derive(Clone, Copy)]
 pub(super) struct Clock {
@@ -40,6 +59,11 @@ pub(super) struct Clock {
 }
 
 impl Clock {
+    /// The device's.
+    fn of(gpu: &Gpu) -> Self {
+        Self { bits: gpu.info().timestamp_bits, period: gpu.info().timestamp_period }
+    }
+
     /// Nanoseconds from `begin` to `end`; the counter may wrap once between them.
     fn between(self, begin: u64, end: u64) -> u64 {
         let mask = u64::MAX.checked_shr(64 - self.bits).unwrap_or(0);
@@ -116,7 +140,7 @@ impl Timer {
     /// # Errors
     /// When the work is not complete.
     pub fn times(&self) -> Result<Vec<PassTime>> {
-        let clock = self.gpu.0.clock();
+        let clock = Clock::of(&self.gpu);
         let ticks = self.ticks().ok_or_else(|| {
             Error::Device("the times of a frame were asked for before its work was complete: wait for it".into())
         })?;

@@ -80,8 +80,8 @@ fn largest_ratio(compression: Compression) -> u64 {
 }
 
 fn check_frame(headers: &[Header], frame: IntegerBounds) -> Result<(), String> {
-    let stored: u64 = headers.iter().map(|h| area(window(h))).sum();
-    let samples: u64 = headers.iter().map(|h| area(window(h)) * h.channels.list.len() as u64).sum();
+    let stored: u64 = headers.iter().map(|h| area(frame::window(h))).sum();
+    let samples: u64 = headers.iter().map(|h| area(frame::window(h)) * h.channels.list.len() as u64).sum();
     let (pixels, all) = (area(frame), area(frame).saturating_mul(channels(headers)));
     if pixels > EMPTY_PIXELS.max(EMPTY_TIMES * stored) || all > EMPTY_SAMPLES.max(EMPTY_TIMES * samples) {
         return Err(format!(
@@ -97,12 +97,7 @@ fn check_frame(headers: &[Header], frame: IntegerBounds) -> Result<(), String> {
 
 /// Whether its samples become the film's as they are.
 fn is_kept(header: &Header, frame: IntegerBounds) -> bool {
-    window(header) == frame && header.channels.list.iter().all(|c| c.sample_type != SampleType::F16)
-}
-
-/// Data window of a part.
-pub(super) fn window(header: &Header) -> IntegerBounds {
-    IntegerBounds::new(header.own_attributes.layer_position, header.layer_size)
+    frame::window(header) == frame && header.channels.list.iter().all(|c| c.sample_type != SampleType::F16)
 }
 
 fn area(bounds: IntegerBounds) -> u64 {
@@ -114,5 +109,5 @@ fn channels(headers: &[Header]) -> u64 {
 }
 
 fn bytes_of_pixels(header: &Header) -> u64 {
-    area(window(header)).saturating_mul(header.channels.bytes_per_pixel as u64)
+    area(frame::window(header)).saturating_mul(header.channels.bytes_per_pixel as u64)
 }

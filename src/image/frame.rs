@@ -1,9 +1,9 @@
 //! Which pixels of an EXR file make a film: its parts have windows of their own.
-use super::claim;
 use super::film::Window;
 use crate::memory;
 use exr::meta::MetaData;
 use exr::meta::attribute::IntegerBounds;
+use exr::meta::header::Header;
 
 /// Which pixels of a file make its film.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -19,8 +19,13 @@ pub(super) fn of(meta: &MetaData, frame: Frame) -> IntegerBounds {
     let display = meta.headers[0].shared_attributes.display_window;
     match frame {
         Frame::Display => display,
-        Frame::Data => meta.headers.iter().map(claim::window).reduce(union).unwrap_or(display),
+        Frame::Data => meta.headers.iter().map(window).reduce(union).unwrap_or(display),
     }
+}
+
+/// Data window of a part.
+pub(super) fn window(header: &Header) -> IntegerBounds {
+    IntegerBounds::new(header.own_attributes.layer_position, header.layer_size)
 }
 
 /// The smallest rectangle that holds both.

@@ -5,6 +5,7 @@
 pub mod fresnel;
 pub mod hash;
 pub mod microfacet;
+pub mod octahedral;
 pub mod portable;
 pub mod srgb;
 pub mod warp;

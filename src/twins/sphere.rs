@@ -1,7 +1,7 @@
 //! Twin of `glsl/shared/sphere.glsl`.
 use crate::layout::{SPHERE, SPHERE_INWARD, SPHERE_MIRRORED};
+use crate::math::octahedral::octahedral_vector;
 use crate::scene::Scene;
-use crate::twins::surface::octahedral_vector;
 use glam::{Vec2, Vec3, vec2};
 use std::f32::consts::PI;
 

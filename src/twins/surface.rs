@@ -1,5 +1,6 @@
 //! Twin of `glsl/shared/surface.glsl`.
 use crate::layout::{MATERIAL_NORMAL_MAP, Material, NONE};
+use crate::math::octahedral::{octahedral_decode, octahedral_vector};
 use crate::scene::Scene;
 use crate::shaders::shared::surface::{CLEARANCE, MIN_ELEVATION};
 use crate::twins::bsdf::Bsdf;
@@ -7,7 +8,7 @@ use crate::twins::scene::{material_of, object_from_world, triangle_vertices, wor
 use crate::twins::sphere::Sphere;
 use crate::twins::texture::texture_sample;
 use crate::twins::traverse::Hit;
-use glam::{Vec2, Vec3, vec2, vec3};
+use glam::{Vec2, Vec3, vec2};
 use std::f32::consts::PI;
 
 /// What shading needs of a hit.
@@ -57,27 +58,6 @@ pub fn unit_vector(v: Vec3) -> (Vec3, f32) {
 /// numbers that the point is a sum of.
 pub fn plane_clearance(n: Vec3, reach: Vec3, e1: Vec3, e2: Vec3) -> f32 {
     CLEARANCE * n.abs().dot(reach + e1.abs().max(e2.abs()).max_element())
-}
-
-/// Unit normal from two snorm words of 16 bits.
-pub fn octahedral_decode(bits: u32) -> Vec3 {
-    let snorm = |b: u32| (f32::from(b as u16 as i16) / 32767.0).max(-1.0);
-    octahedral_vector(vec2(snorm(bits), snorm(bits >> 16)))
-}
-
-/// Unit vector that a point of the unfolded octahedron, the square [-1, 1]^2, stands for.
-pub fn octahedral_vector(e: Vec2) -> Vec3 {
-    let z = 1.0 - e.x.abs() - e.y.abs();
-    let t = (-z).max(0.0);
-    let fold = |e: f32| if e >= 0.0 { e - t } else { e + t };
-    vec3(fold(e.x), fold(e.y), z).normalize()
-}
-
-/// Inverse of [`octahedral_vector`]; `n` may have any length but 0.
-pub fn octahedral_point(n: Vec3) -> Vec2 {
-    let e = n.truncate() / (n.x.abs() + n.y.abs() + n.z.abs());
-    let fold = |own: f32, other: f32| (1.0 - other.abs()) * if own >= 0.0 { 1.0 } else { -1.0 };
-    if n.z < 0.0 { vec2(fold(e.x, e.y), fold(e.y, e.x)) } else { e }
 }
 
 /// The edges of a triangle in space and in texture coordinates.

@@ -1,10 +1,10 @@
 //! Twin of `glsl/shared/traverse.glsl`.
 use crate::layout::{BvhNode, NONE, TRAVERSAL_STACK};
+use crate::math::octahedral::octahedral_point;
 use crate::scene::Scene;
 use crate::shaders::shared::traverse::SLAB_ROUNDING;
 use crate::twins::scene::{object_from_world, triangle_vertices};
 use crate::twins::sphere::Sphere;
-use crate::twins::surface::octahedral_point;
 use crate::twins::texture::mask_blocks;
 use glam::{Vec2, Vec3, vec2, vec3};
 

@@ -34,7 +34,7 @@ pub fn assemble(path: &Path, description: &Description, sky: bool, scene: &mut S
     let mut warnings = add_materials(sources.library, scene);
     let emits = |t: &Triangle| scene.materials[t.material as usize].emission != [0.0; 3];
     if sky && scene.lights.is_empty() && !scene.triangles.iter().any(emits) {
-        scene.lights.push(lights::environment([1.0; 3], DMat3::IDENTITY));
+        scene.lights.push(environment::light([1.0; 3], DMat3::IDENTITY));
     }
     add_appearance(scene);
     coat::add_tables(&mut scene.materials, &mut scene.texels);

@@ -4,10 +4,11 @@
 //! (2 pi)` wrapped to [0, 1) and `v = acos(d.y) / pi`; so +y is up (row 0), column 0 begins at -z and u grows towards
 //! +x. Texel centres lie at `(column + 0.5) / width` and `(row + 0.5) / height` (Mitsuba stretches rows so that the
 //! first and last lie on the poles: half a texel apart at most).
+use super::alias;
 use super::sources::Sources;
-use super::{alias, lights};
 use crate::error::{Error, Result};
 use crate::image::Picture;
+use crate::layout::{LIGHT_ENVIRONMENT, Light, NONE};
 use crate::scene::description::EnvironmentTable;
 use crate::scene::load::environment::{load, unusable};
 use crate::scene::{Environment, Scene};
@@ -31,7 +32,7 @@ pub fn add_lights(sources: &mut Sources, scene: &mut Scene) -> Result<()> {
         return Err(at("radiance times scale must lie from 0 to 1e18, rotation be finite".to_owned()));
     }
     let rotation = rotation(table.rotation, table.world_from_environment).map_err(at)?;
-    let light = lights::environment(radiance, rotation);
+    let light = light(radiance, rotation);
     if table.file.is_none() && table.picture.is_none() {
         scene.lights.push(light);
         return Ok(());
@@ -43,6 +44,13 @@ pub fn add_lights(sources: &mut Sources, scene: &mut Scene) -> Result<()> {
 
 /// Where an environment's mistakes are.
 const PLACE: &str = "[environment]";
+
+/// The environment's light; `radiance` is its constant, or what its image is multiplied by.
+pub fn light(radiance: [f32; 3], world_from_environment: DMat3) -> Light {
+    // Rows of the inverse of a rotation are its columns.
+    let [a, b, c] = [0, 1, 2].map(|i| world_from_environment.col(i).as_vec3().to_array());
+    Light { kind: LIGHT_ENVIRONMENT, a, b, c, triangle: NONE, value: radiance, material: NONE, ..Light::default() }
+}
 
 fn image_of(sources: &mut Sources, table: &EnvironmentTable) -> Result<Option<Environment>> {
     let directory = sources.directory();

@@ -11,17 +11,10 @@ use crate::layout::*;
 use crate::memory;
 use crate::scene::Scene;
 use crate::scene::load::texture;
-use glam::{DMat3, Mat4, Vec3, Vec4};
+use glam::{Mat4, Vec3, Vec4};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::ops::Range;
-
-/// The environment's light; `radiance` is its constant, or what its image is multiplied by.
-pub fn environment(radiance: [f32; 3], world_from_environment: DMat3) -> Light {
-    // Rows of the inverse of a rotation are its columns.
-    let [a, b, c] = [0, 1, 2].map(|i| world_from_environment.col(i).as_vec3().to_array());
-    Light { kind: LIGHT_ENVIRONMENT, a, b, c, triangle: NONE, value: radiance, material: NONE, ..Light::default() }
-}
 
 /// Adds the emissive triangles to the scene's lights (which hold the others), drops lights without power, and builds
 /// the table. Sets [`Material::emission_weight`], [`Light::probability`] and [`Scene::triangle_pdf_scale`].

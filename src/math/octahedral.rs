@@ -1,0 +1,24 @@
+//! Directions as points of an unfolded octahedron (Cigolle et al. 2014). Twin of the functions of these names under
+//! `glsl/shared`.
+use glam::{Vec2, Vec3, vec2, vec3};
+
+/// Unit normal from two snorm words of 16 bits.
+pub fn octahedral_decode(bits: u32) -> Vec3 {
+    let snorm = |b: u32| (f32::from(b as u16 as i16) / 32767.0).max(-1.0);
+    octahedral_vector(vec2(snorm(bits), snorm(bits >> 16)))
+}
+
+/// Unit vector that a point of the unfolded octahedron, the square [-1, 1]^2, stands for.
+pub fn octahedral_vector(e: Vec2) -> Vec3 {
+    let z = 1.0 - e.x.abs() - e.y.abs();
+    let t = (-z).max(0.0);
+    let fold = |e: f32| if e >= 0.0 { e - t } else { e + t };
+    vec3(fold(e.x), fold(e.y), z).normalize()
+}
+
+/// Inverse of [`octahedral_vector`]; `n` may have any length but 0.
+pub fn octahedral_point(n: Vec3) -> Vec2 {
+    let e = n.truncate() / (n.x.abs() + n.y.abs() + n.z.abs());
+    let fold = |own: f32, other: f32| (1.0 - other.abs()) * if own >= 0.0 { 1.0 } else { -1.0 };
+    if n.z < 0.0 { vec2(fold(e.x, e.y), fold(e.y, e.x)) } else { e }
+}
