@@ -6,14 +6,31 @@ use std::path::{Path, PathBuf};
 const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("main", &[]),
     ("lib", &[]),
-    ("cli", &["allocate", "denoise", "error", "gpu", "image", "layout", "memory", "render", "report", "scene", "statistics"]),
-    ("denoise", &["error", "gpu", "image", "layout", "render", "shaders", "twins"]),
-    ("render", &["allocate", "error", "gpu", "layout", "scene", "shaders", "statistics", "twins"]),
-    ("allocate", &["error", "gpu", "layout", "shaders", "statistics", "twins"]),
+    (
+        "cli",
+        &[
+            "allocate",
+            "denoise",
+            "error",
+            "gpu",
+            "image",
+            "layout",
+            "memory",
+            "render",
+            "report",
+            "scene",
+            "settings",
+            "statistics",
+        ],
+    ),
+    ("denoise", &["error", "gpu", "image", "layout", "render", "settings", "shaders", "twins"]),
+    ("render", &["allocate", "error", "gpu", "layout", "scene", "settings", "shaders", "statistics", "twins"]),
+    ("allocate", &["error", "gpu", "layout", "settings", "shaders", "statistics", "twins"]),
     ("scene", &["error", "image", "layout", "memory", "render::settings", "threads", "twins"]),
     ("twins", &["layout", "render::schedule", "render::settings", "scene", "shaders", "statistics"]),
     ("image", &["error", "layout", "memory"]),
     ("memory", &["error"]),
+    ("settings", &["error"]),
     ("threads", &[]),
     ("report", &["error", "gpu"]),
     ("guide", &[]),
@@ -41,7 +58,7 @@ fn code(text: &str) -> String {
         line.split('"').step_by(2).collect::<String>()
     };
     text.lines()
-        .filter(|line| !line.starts_with("#[cfg_attr(feature = \"cli\","))
+        .filter(|line| !line.trim_start().starts_with("#[cfg_attr(feature = \"cli\","))
         .map(bare)
         .collect::<Vec<_>>()
         .join("\n")

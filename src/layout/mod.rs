@@ -88,6 +88,14 @@ constants! {
     MATERIAL_MASKED = 8;
     /// [`Material::flags`]: light that scatters below a coat takes on the base's colour at every turn.
     MATERIAL_NONLINEAR = 16;
+    /// [`PathPush::pixel_filter`]: uniform over the pixel.
+    PIXEL_FILTER_BOX = 0;
+    /// [`PathPush::pixel_filter`]: triangle of radius 1 pixel.
+    PIXEL_FILTER_TENT = 1;
+    /// [`PathPush::pixel_filter`]: Gaussian of standard deviation 0.5 pixels, cut at radius 2.
+    PIXEL_FILTER_GAUSSIAN = 2;
+    /// [`PathPush::pixel_filter`]: the pixel's centre.
+    PIXEL_FILTER_POINT = 3;
     /// Roughnesses in the table of a rough coat (reference::coat).
     COAT_ROWS = 32;
     /// Numbers for each of them: [`COAT_COLUMNS`] - 1 cosines, and the mean from inside.

@@ -1,6 +1,6 @@
 //! The renderer that an engine embeds and that the command line drives: a scene on a device, kernels specialised for
 //! it, and frames recorded batch by batch into command buffers.
-use crate::allocate::{self, HostInputs, Row};
+use crate::allocate::{HostInputs, Row};
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu, Kernel, PassTime, PerBlock, Recorder, thread_items};
 use crate::layout::{
@@ -13,7 +13,7 @@ use crate::render::pass::apportion::Apportion;
 use crate::render::pass::scan::Scan;
 use crate::render::schedule::{self, Cut};
 use crate::render::schedule::{Progress, Step};
-use crate::render::settings::{PixelFilter, Placing, Sampler, Settings};
+use crate::render::settings::{Placing, Sampler, Settings};
 use crate::scene::{self, Scene};
 use crate::shaders::shared::traverse;
 use crate::shaders::{accumulate, path, primary_hit};
@@ -83,7 +83,7 @@ impl Renderer {
         let settings = scene.settings.clone();
         settings.validate()?;
         scene.check()?;
-        let policy = policy_of(&settings)?;
+        let policy = settings.allocate.policy;
         let split_light = outputs.split_light || policy.split_light;
         let effects = Effects { split_light, counters: outputs.counters, ..effects };
         let (thread, traverse) = (gpu.tuning().thread(), traverse::Constants { stack: scene.stack });
@@ -98,7 +98,7 @@ impl Renderer {
         let film = FilmBuffers::new(gpu, pixels, paths, &effects, outputs.guides || policy.guides)?;
         // Offsets are the widest records that are bound whole.
         let most = (gpu.info().max_storage_range / 8 - 1).min(film.tiles[0].pixels.into());
-        if settings.allocate.policy != "uniform" && u64::from(pixels) > most {
+        if !settings.allocate.is_even() && u64::from(pixels) > most {
             return Err(Error::Usage(format!(
                 "a film of {pixels} pixels is too large to place samples on this device: choose at most {most} pixels, \
                  or --allocate uniform"
@@ -166,7 +166,7 @@ impl Renderer {
     /// Whether only the device knows how many paths [`Renderer::listed`] are listed.
     pub fn list_may_be_short(&self) -> bool {
         let allocate = &self.settings.allocate;
-        allocate.placing() == Placing::Chosen || allocate.noise_threshold > 0.0
+        allocate.policy.placing == Placing::Chosen || allocate.noise_threshold > 0.0
     }
 
     /// Runs one step on the renderer's own queue and waits.
@@ -229,7 +229,7 @@ impl Renderer {
         let guide = self.film.tiles[0].guide.read()?;
         let light = self.film.tiles[0].light.read()?;
         let inputs = HostInputs { guide: &guide, stats, light: &light, priority: &[], push };
-        Ok((policy_of(&self.settings)?.reference)(&inputs))
+        Ok((self.settings.allocate.policy.reference)(&inputs))
     }
 
     /// How the last allocation went.
@@ -349,11 +349,6 @@ fn milliseconds(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
 }
 
-fn policy_of(settings: &Settings) -> Result<&'static Row> {
-    let name = &settings.allocate.policy;
-    allocate::policy(name).ok_or_else(|| Error::Usage(format!("no policy \"{name}\"")))
-}
-
 fn allocation(gpu: &Gpu, policy: &Row, pixels: u32) -> Result<Allocation> {
     let thread_items = thread_items(gpu, pixels);
     Ok(Allocation {
@@ -369,16 +364,16 @@ fn allocation(gpu: &Gpu, policy: &Row, pixels: u32) -> Result<Allocation> {
 pub fn priority_push(scene: &Scene) -> PriorityPush {
     let (s, a) = (&scene.settings, &scene.settings.allocate);
     let [low, high] = scene.bounds.map(glam::Vec3::from);
-    let sigma = (a.sigma_position * high.distance(low)).max(f32::MIN_POSITIVE.sqrt());
+    let sigma = (a.geometry.sigma_position * high.distance(low)).max(f32::MIN_POSITIVE.sqrt());
     PriorityPush {
         size: [s.width, s.height],
-        window: a.window,
-        normal_scale: a.sigma_normal.powi(-2),
+        window: a.geometry.window,
+        normal_scale: a.geometry.sigma_normal.powi(-2),
         position_scale: sigma.powi(-2),
-        luminance_floor: a.luminance_floor,
+        luminance_floor: a.variance.luminance_floor,
         limit: schedule::limit(s),
         threshold: a.noise_threshold,
-        filtered: a.filtered,
+        filtered: a.both.filtered,
         round: 0,
     }
 }
@@ -395,12 +390,7 @@ pub fn path_push(scene: &Scene) -> PathPush {
         max_depth: settings.max_depth,
         roulette_depth: settings.roulette_depth,
         clamp_indirect: settings.clamp_indirect,
-        pixel_filter: match settings.filter {
-            PixelFilter::Box => 0,
-            PixelFilter::Tent => 1,
-            PixelFilter::Gaussian => 2,
-            PixelFilter::Point => 3,
-        },
+        pixel_filter: settings.filter.code(),
         light_count: scene.lights.len() as u32,
         triangle_pdf_scale: scene.triangle_pdf_scale,
         environment: environment.map_or(NONE, |i| i as u32),
