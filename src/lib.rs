@@ -16,6 +16,7 @@ mod memory;
 pub mod render;
 pub mod report;
 pub mod scene;
+pub mod settings;
 pub mod statistics;
 mod threads;
 pub mod twins;

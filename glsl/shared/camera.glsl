@@ -31,9 +31,9 @@ const uint PAIR_FILM = 0u, PAIR_LENS = 1u;
 vec2 film_sample(uint pixel, Sampler random) {
     vec2 at = vec2(pixel % frame.size.x, pixel / frame.size.x);
     vec2 u = sample_2d(random, PAIR_FILM);
-    if (FX_PIXEL_FILTER && frame.pixel_filter == 1u) u = 0.5 + vec2(warp_tent(u.x), warp_tent(u.y));
-    else if (FX_PIXEL_FILTER && frame.pixel_filter == 2u) u = 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y));
-    else if (FX_PIXEL_FILTER && frame.pixel_filter == 3u) u = vec2(0.5);
+    if (FX_PIXEL_FILTER && frame.pixel_filter == PIXEL_FILTER_TENT) u = 0.5 + vec2(warp_tent(u.x), warp_tent(u.y));
+    else if (FX_PIXEL_FILTER && frame.pixel_filter == PIXEL_FILTER_GAUSSIAN) u = 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y));
+    else if (FX_PIXEL_FILTER && frame.pixel_filter == PIXEL_FILTER_POINT) u = vec2(0.5);
     return at + u;
 }
 

@@ -7,13 +7,16 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{Guide, NONE, PixelLight, PixelStats, PriorityPush, vec3};
 use crate::math::portable::{exp_negative, squared_distance};
+use crate::settings::settings;
 use crate::shaders::both::{APART, MAX_TINT, MIN_LEFT};
 use crate::shaders::shared::likeness_bits::{GATHERED_UNIT, MIN_KINSHIP, SEVENTHS};
 use crate::shaders::{both, likeness};
 use crate::statistics::luminance;
 use glam::Vec3;
+use serde::Serialize;
 
-pub(super) const ROW: Row = Row {
+/// See [`super::POLICIES`].
+pub const ROW: Row = Row {
     name: "both",
     about: "noise that the samples show, less what a geometry-aware filter will remove; geometry until samples tell",
     guides: true,
@@ -22,6 +25,18 @@ pub(super) const ROW: Row = Row {
     make: |gpu, pixels| Ok(Box::new(Both::new(gpu, pixels)?)),
     reference,
 };
+
+settings! {
+    /// What becomes of the picture.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+    pub struct BothSettings {
+        /// What is given of them.
+        BothOverrides {
+            /// Share of the variance that a filter will remove where neighbours are alike; 0 is none.
+            filtered: f32 = 0.5, 0.0..=1.0;
+        }
+    }
+}
 
 struct Both {
     geometry: Geometry,

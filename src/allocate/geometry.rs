@@ -4,9 +4,12 @@ use crate::error::Result;
 use crate::gpu::{Gpu, Kernel, Recorder};
 use crate::layout::{Guide, NONE, PriorityPush};
 use crate::math::portable::{exp_negative, squared_distance};
+use crate::settings::{ABOVE_0, settings};
 use crate::shaders::geometry::Bind;
+use serde::Serialize;
 
-pub(super) const ROW: Row = Row {
+/// See [`super::POLICIES`].
+pub const ROW: Row = Row {
     name: "geometry",
     about: "more where neighbours differ in normal and position, so that a filter has little to gather (GEO)",
     guides: true,
@@ -15,6 +18,22 @@ pub(super) const ROW: Row = Row {
     make: |gpu, _| Ok(Box::new(Geometry::new(gpu)?)),
     reference,
 };
+
+settings! {
+    /// What counts as alike.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+    pub struct GeometrySettings {
+        /// What is given of them.
+        GeometryOverrides {
+            /// Edge of the square of pixels whose geometry is compared.
+            window: u32 = 4, 2..=10;
+            /// Difference of unit normals that counts as e^-1 alike.
+            sigma_normal: f32 = 0.35, ABOVE_0;
+            /// Distance of hits that counts as e^-1 alike, in diagonals of the scene.
+            sigma_position: f32 = 0.003, ABOVE_0;
+        }
+    }
+}
 
 pub(super) struct Geometry(Kernel<Bind<'static>>);
 

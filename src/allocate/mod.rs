@@ -3,12 +3,18 @@
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Recorder};
 use crate::layout::{Guide, PixelLight, PixelStats, PriorityPush};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::fmt;
 
 pub mod both;
 pub mod geometry;
+mod settings;
 pub mod threshold;
 pub mod uniform;
 pub mod variance;
+
+pub use settings::{Allocate, AllocateOverrides};
 
 /// A policy, ready to be recorded.
 pub trait Policy: Send + Sync {
@@ -58,6 +64,8 @@ pub struct HostInputs<'a> {
 /// What priorities mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Placing {
+    /// As many samples for every pixel: nothing is placed.
+    Even,
     /// Shares of the budget, found once.
     Once,
     /// Shares of all samples, past and next, found anew for every round.
@@ -86,9 +94,37 @@ pub struct Row {
 }
 
 /// Every policy, in the order of the help.
-pub const POLICIES: &[Row] = &[uniform::ROW, geometry::ROW, variance::ROW, both::ROW, threshold::ROW];
+pub const POLICIES: &[&Row] = &[&uniform::ROW, &geometry::ROW, &variance::ROW, &both::ROW, &threshold::ROW];
 
 /// The policy of this name.
 pub fn policy(name: &str) -> Option<&'static Row> {
-    POLICIES.iter().find(|row| row.name == name)
+    POLICIES.iter().copied().find(|row| row.name == name)
+}
+
+impl PartialEq for Row {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl fmt::Debug for Row {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(self.name)
+    }
+}
+
+/// Its name.
+impl Serialize for Row {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name)
+    }
+}
+
+/// By its name.
+impl<'de> Deserialize<'de> for &'static Row {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        let names = || POLICIES.iter().map(|row| row.name).collect::<Vec<_>>().join(", ");
+        policy(&name).ok_or_else(|| D::Error::custom(format!("no policy \"{name}\": choose one of {}", names())))
+    }
 }

@@ -7,7 +7,8 @@ use crate::gpu::{Kernel, Recorder};
 use crate::layout::{PixelStats, PriorityPush};
 use crate::shaders::threshold::Bind;
 
-pub(super) const ROW: Row = Row {
+/// See [`super::POLICIES`].
+pub const ROW: Row = Row {
     name: "threshold",
     about: "RAS as published: a sample a round where noise reaches a threshold that falls to 0 by --max-spp, then by chance",
     guides: false,

@@ -4,12 +4,13 @@ use crate::error::Result;
 use crate::gpu::Recorder;
 use crate::layout::PriorityPush;
 
-pub(super) const ROW: Row = Row {
+/// See [`super::POLICIES`].
+pub const ROW: Row = Row {
     name: "uniform",
     about: "the same number for every pixel",
     guides: false,
     split_light: false,
-    placing: Placing::Once,
+    placing: Placing::Even,
     make: |_, _| Ok(Box::new(Uniform)),
     reference,
 };

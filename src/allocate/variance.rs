@@ -3,11 +3,14 @@ use super::{HostInputs, Inputs, Placing, Policy, Row};
 use crate::error::Result;
 use crate::gpu::{Kernel, Recorder};
 use crate::layout::{PixelStats, PriorityPush};
+use crate::settings::{NUMBER, settings};
 use crate::shaders::shared::pixel_noise::{MAX_LUMINANCE, PRIOR_SAMPLES};
 use crate::shaders::variance::Bind;
 use crate::statistics::luminance;
+use serde::Serialize;
 
-pub(super) const ROW: Row = Row {
+/// See [`super::POLICIES`].
+pub const ROW: Row = Row {
     name: "variance",
     about: "more where samples differ, relative to their luminance, estimated anew every round (RAS)",
     guides: false,
@@ -16,6 +19,18 @@ pub(super) const ROW: Row = Row {
     make: |gpu, _| Ok(Box::new(Variance(Kernel::new(gpu, &gpu.tuning().thread().into())?))),
     reference,
 };
+
+settings! {
+    /// How noise is weighed, here and in the policies [`both`](super::both) and [`threshold`](super::threshold).
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+    pub struct VarianceSettings {
+        /// What is given of them.
+        VarianceOverrides {
+            /// Luminance added before noise is compared with it; negative: noise counts by itself.
+            luminance_floor: f32 = 0.05, NUMBER;
+        }
+    }
+}
 
 struct Variance(Kernel<Bind<'static>>);
 

@@ -3,20 +3,25 @@ use super::finite;
 use crate::error::Result;
 use crate::gpu::{self, DeviceOptions, Gpu};
 use crate::image::{WriteOptions, tone::ToneMap};
-use crate::render::settings::entry::Entry;
-use clap::Arg;
+use crate::settings::entry::Entry;
+use clap::{Arg, ArgAction};
 
-/// Adds range and default to the help of the options that set `defaults`. Options that say what their default depends
+/// Adds range, default and placeholder to the help of the options that set `defaults`. Options that say what their default depends
 /// on keep it.
 pub fn with_ranges(defaults: Vec<Entry>) -> impl FnMut(Arg) -> Arg {
     move |arg| {
-        let entry = defaults.iter().find(|e| arg.get_long() == Some(e.name));
-        let (Some(Entry { value, range, .. }), Some(help)) = (entry, arg.get_help()) else { return arg };
+        let entry = defaults.iter().find(|e| arg.get_long() == Some(&*e.name));
+        let (Some(entry), Some(help)) = (entry, arg.get_help()) else { return arg };
+        let Entry { value, range, placeholder, .. } = entry;
+        if entry.is_switch {
+            return arg.action(ArgAction::SetTrue);
+        }
         let range = if range.is_empty() { String::new() } else { format!(" [{range}]") };
         let own = help.to_string().contains("[default");
         let default = if own { String::new() } else { format!(" [default: {value}]") };
         let help = format!("{help}{range}{default}");
-        arg.help(help)
+        let arg = arg.help(help);
+        if placeholder.is_empty() { arg } else { arg.value_name(*placeholder) }
     }
 }
 

@@ -186,7 +186,7 @@ fn shrink(settings: &mut Settings) {
     let shrunk = |edge: u32| ((f64::from(edge) * scale) as u32).max(1);
     (settings.width, settings.height) = (shrunk(settings.width), shrunk(settings.height));
     settings.spp = 1;
-    settings.allocate = Allocate { policy: std::mem::take(&mut settings.allocate.policy), ..Allocate::default() };
+    settings.allocate = Allocate { policy: settings.allocate.policy, ..Allocate::default() };
 }
 
 /// Both compiled twice and run three times, in turn, so that a machine that changes its speed changes both: the least counts.

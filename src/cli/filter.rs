@@ -7,7 +7,7 @@ use super::compare::{self, check_sizes};
 use super::files::{Files, Item, check_distinct};
 use super::{Exit, fail_on_messages, print, print_json, readable};
 use crate::denoise::composition::{self, Demodulation, Parts};
-use crate::denoise::filter::{self, FILTERS, FilterInput, FilterSettings, Row};
+use crate::denoise::filter::{self, FilterInput, FilterSettings, Row};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, PassTime};
 use crate::image::aov::Aovs;
@@ -17,7 +17,6 @@ use crate::image::{self, Claim, Picture};
 use crate::layout::vec4;
 use crate::memory;
 use crate::report::table::{self, PassRow};
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use options::{Layers, Overrides};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -34,7 +33,7 @@ pub struct Args {
     /// Image to filter (EXR; PNG, JPEG and HDR hold no layers)
     pub image: PathBuf,
     /// Filter to apply
-    #[arg(long, value_parser = filter_names(), default_value = "auto")]
+    #[arg(long, default_value = "auto")]
     pub filter: &'static Row,
     /// Image to write: .exr (all layers, the colour filtered), .png or .hdr; may be given several times
     #[arg(short, long = "output", value_name = "FILE", required = true)]
@@ -63,12 +62,6 @@ pub struct Args {
     /// Replace the filters' own settings.
     #[command(flatten)]
     pub overrides: Overrides,
-}
-
-/// The values of an option that names a filter.
-pub fn filter_names() -> impl TypedValueParser<Value = &'static Row> {
-    let names = FILTERS.iter().map(|row| PossibleValue::new(row.name).help(row.about));
-    PossibleValuesParser::new(names).try_map(|name| filter::find(&name).ok_or("no such filter"))
 }
 
 /// What `--json` prints.

@@ -1,133 +1,60 @@
 //! Settings that the command line gives over those of the scene file.
 use super::common::with_ranges;
-use crate::allocate::{POLICIES, Placing};
-use crate::render::settings::{Allocate, PixelFilter, Sampler, Settings};
-use clap::builder::{PossibleValue, PossibleValuesParser};
+use crate::allocate::{POLICIES, Placing, Row};
+use crate::render::settings::{AllocateOverrides, Film, Render, Sequence, Settings};
+use clap::ValueEnum;
+use clap::builder::PossibleValue;
 
 /// Settings given on the command line.
 #[derive(clap::Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Settings", mut_args(with_ranges(Settings::default().entries())))]
 pub struct Overrides {
-    /// Film width in pixels
-    #[arg(long, value_name = "N")]
-    pub width: Option<u32>,
-    /// Film height in pixels
-    #[arg(long, value_name = "N")]
-    pub height: Option<u32>,
-    /// Samples per pixel; where samples are placed, their mean
-    #[arg(long, visible_alias = "budget-spp", value_name = "N")]
-    pub spp: Option<u32>,
-    /// Index of every pixel's first sample: renders of disjoint ranges can be merged
-    #[arg(long, value_name = "N")]
-    pub first_sample: Option<u32>,
-    /// Path edges: 2 is direct light, 3 one bounce of indirect light
-    #[arg(long, value_name = "N")]
-    pub max_depth: Option<u32>,
-    /// Edges after which Russian roulette starts; 0 is off
-    #[arg(long, value_name = "N")]
-    pub roulette_depth: Option<u32>,
-    /// Limit of a sample's indirect light, largest channel; 0 is off, others bias the image
-    #[arg(long, value_name = "N")]
-    pub clamp_indirect: Option<f32>,
-    /// Chooses the random sequence
-    #[arg(long, value_name = "N")]
-    pub seed: Option<u32>,
-    /// Pixel filter
-    #[arg(long, value_enum)]
-    pub filter: Option<PixelFilter>,
-    /// Random numbers
-    #[arg(long, value_enum)]
-    pub sampler: Option<Sampler>,
-    /// Where samples go.
+    /// Of the film.
     #[command(flatten)]
+    pub film: Film,
+    /// Of the paths.
+    #[command(flatten)]
+    pub render: Render,
+    /// Of the random numbers.
+    #[command(flatten)]
+    pub sequence: Sequence,
+    /// Where samples go.
+    #[command(flatten, next_help_heading = "Where samples go")]
     pub allocate: AllocateOverrides,
 }
 
-/// The `[allocate]` table given on the command line.
-#[derive(clap::Args, Clone, Debug, Default)]
-#[command(next_help_heading = "Where samples go")]
-pub struct AllocateOverrides {
-    /// Policy [default: uniform; variance with --noise-threshold]
-    #[arg(long, value_name = "POLICY", value_parser = policies())]
-    pub allocate: Option<String>,
-    /// Samples that every pixel gets before any is placed
-    #[arg(long, value_name = "N")]
-    pub min_spp: Option<u32>,
-    /// Samples that no pixel exceeds; 0 is off. Of threshold: the rounds until chance decides; 0 is --spp
-    #[arg(long, value_name = "N")]
-    pub max_spp: Option<u32>,
-    /// Rounds that the budget is spread over; 0: one, of policies that learn one for every 2 samples a pixel, up to 4
-    #[arg(long, value_name = "N")]
-    pub rounds: Option<u32>,
-    /// Edge of the square of pixels whose geometry is compared
-    #[arg(long, value_name = "N")]
-    pub window: Option<u32>,
-    /// Difference of unit normals that counts as e^-1 alike
-    #[arg(long, value_name = "X")]
-    pub sigma_normal: Option<f32>,
-    /// Distance of hits that counts as e^-1 alike, in diagonals of the scene
-    #[arg(long, value_name = "X")]
-    pub sigma_position: Option<f32>,
-    /// Luminance added before noise is compared with it; negative: noise counts by itself
-    #[arg(long, value_name = "X")]
-    pub luminance_floor: Option<f32>,
-    /// Stop when every pixel's relative error is estimated below this, or at --max-spp (else --spp); 0 is off
-    #[arg(long, value_name = "E")]
-    pub noise_threshold: Option<f32>,
-    /// Share of the variance that a filter will remove where neighbours are alike; 0 is none
-    #[arg(long, value_name = "X")]
-    pub filtered: Option<f32>,
-}
+impl ValueEnum for &'static Row {
+    fn value_variants<'a>() -> &'a [Self] {
+        POLICIES
+    }
 
-fn policies() -> PossibleValuesParser {
-    POLICIES.iter().map(|row| PossibleValue::new(row.name).help(row.about)).collect::<Vec<_>>().into()
-}
-
-impl AllocateOverrides {
-    fn apply(&self, settings: &mut Allocate) {
-        let learns = settings.placing() == Placing::Learning;
-        if self.allocate.is_none() && self.noise_threshold.is_some_and(|e| e > 0.0) && !learns {
-            settings.policy = "variance".into();
-        }
-        set(&mut settings.policy, self.allocate.clone());
-        set(&mut settings.min_spp, self.min_spp);
-        set(&mut settings.max_spp, self.max_spp);
-        set(&mut settings.rounds, self.rounds);
-        set(&mut settings.window, self.window);
-        set(&mut settings.sigma_normal, self.sigma_normal);
-        set(&mut settings.sigma_position, self.sigma_position);
-        set(&mut settings.luminance_floor, self.luminance_floor);
-        set(&mut settings.noise_threshold, self.noise_threshold);
-        set(&mut settings.filtered, self.filtered);
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.name).help(self.about))
     }
 }
 
 impl Overrides {
-    /// Replaces those settings that were given.
+    /// Replaces those settings that were given. A noise threshold without a policy that learns gets the first that does.
     pub fn apply(&self, settings: &mut Settings) {
-        set(&mut settings.width, self.width);
-        set(&mut settings.height, self.height);
-        set(&mut settings.spp, self.spp);
-        set(&mut settings.first_sample, self.first_sample);
-        set(&mut settings.max_depth, self.max_depth);
-        set(&mut settings.roulette_depth, self.roulette_depth);
-        set(&mut settings.clamp_indirect, self.clamp_indirect);
-        set(&mut settings.seed, self.seed);
-        set(&mut settings.filter, self.filter);
-        set(&mut settings.sampler, self.sampler);
+        let learns = |row: &Row| row.placing == Placing::Learning;
+        let threshold = self.allocate.noise_threshold.is_some_and(|e| e > 0.0);
+        if threshold && !learns(settings.allocate.policy) {
+            settings.allocate.policy = POLICIES.iter().find(|row| learns(row)).expect("the policy variance learns");
+        }
+        self.film.apply(settings);
+        self.render.apply(settings);
+        self.sequence.apply(settings);
         self.allocate.apply(&mut settings.allocate);
-    }
-}
-
-fn set<T>(setting: &mut T, given: Option<T>) {
-    if let Some(value) = given {
-        *setting = value;
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::allocate::both::{self, BothSettings};
+    use crate::allocate::geometry::GeometrySettings;
+    use crate::allocate::variance::VarianceSettings;
+    use crate::render::settings::{Allocate, PixelFilter, Sampler};
     use clap::{CommandFactory, Parser};
 
     #[derive(Parser)]
@@ -152,16 +79,14 @@ mod tests {
             --noise-threshold 0.3 --filtered 0.4";
         apply(words, &mut settings);
         let allocate = Allocate {
-            policy: "both".into(),
+            policy: &both::ROW,
             min_spp: 11,
             max_spp: 12,
             rounds: 13,
-            window: 9,
-            sigma_normal: 0.1,
-            sigma_position: 0.2,
-            luminance_floor: -1.0,
             noise_threshold: 0.3,
-            filtered: 0.4,
+            geometry: GeometrySettings { window: 9, sigma_normal: 0.1, sigma_position: 0.2 },
+            variance: VarianceSettings { luminance_floor: -1.0 },
+            both: BothSettings { filtered: 0.4 },
         };
         let expected = Settings {
             width: 1,
@@ -198,7 +123,7 @@ mod tests {
         let policy = |words| {
             let mut settings = Settings::default();
             apply(words, &mut settings);
-            settings.validate().map(|()| settings.allocate.policy)
+            settings.validate().map(|()| settings.allocate.policy.name)
         };
         assert_eq!(policy("--noise-threshold 0.1").unwrap(), "variance");
         assert_eq!(policy("--noise-threshold 0.1 --allocate both").unwrap(), "both");

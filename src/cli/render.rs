@@ -5,7 +5,7 @@ mod summary;
 use super::checkpoint::{self, CheckpointFile};
 use super::common::Common;
 use super::files::{Files, Item, check_distinct};
-use super::filter::{filter_names, filter_parts};
+use super::filter::filter_parts;
 use super::overrides::Overrides;
 use super::progress::Progress;
 use super::{Exit, complain, fail_on_messages, interrupt};
@@ -67,7 +67,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     pub heatmap: Option<PathBuf>,
     /// Filter the image as `tallow filter` does with the file; the noisy one stays as the layer "Noisy Image"
-    #[arg(long, value_name = "FILTER", value_parser = filter_names())]
+    #[arg(long, value_name = "FILTER")]
     pub denoise: Option<&'static Row>,
     /// Count rays and visited nodes
     #[arg(long)]
@@ -297,7 +297,7 @@ const BYTES_DENOISED: u64 = 1160;
 
 /// Of host memory, at the moment when it is read back.
 fn bytes_of_film(settings: &Settings, unified: bool) -> u64 {
-    let placed = settings.allocate.policy != "uniform";
+    let placed = !settings.allocate.is_even();
     let device = if unified { FilmBuffers::bytes_per_pixel(placed) } else { 0 };
     settings.pixels() as u64 * (device + render::film::bytes_per_pixel(placed))
 }
@@ -351,7 +351,7 @@ mod tests {
         // 32 bytes of statistics, 32 of light, 48 of guide; 30 channels. Placed: 24 more, and 2 channels.
         let mut settings = Settings { width: 3, height: 2, ..Settings::default() };
         assert_eq!(bytes_of_film(&settings, true), 6 * (112 + 4 * 30));
-        settings.allocate.policy = "both".into();
+        settings.allocate.policy = &crate::allocate::both::ROW;
         assert_eq!(bytes_of_film(&settings, false), 6 * 4 * 32);
         assert_eq!(bytes_of_film(&settings, true), 6 * (112 + 24 + 4 * 32));
     }

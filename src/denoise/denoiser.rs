@@ -119,7 +119,7 @@ fn check(renderer: &Renderer, demodulation: Demodulation) -> Result<()> {
         (outputs.guides, "its guides: make the renderer with Outputs::guides"),
         (apart || outputs.split_light, "direct light apart: make the renderer with Outputs::split_light"),
         (
-            apart || allocate.policy == "uniform" || allocate.min_spp > 0,
+            apart || allocate.is_even() || allocate.min_spp > 0,
             "direct light where a pixel has no sample: set min_spp to 1 or more, or demodulate albedo alone",
         ),
         (renderer.film().tiles.len() == 1, "a film in one piece: choose a smaller one"),

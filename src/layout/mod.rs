@@ -126,6 +126,14 @@ constants! {
     MATERIAL_MASKED: uint = 8;
     /// [`Material::flags`]: light that scatters below a coat takes on the base's colour at every turn.
     MATERIAL_NONLINEAR: uint = 16;
+    /// [`FrameConstants::pixel_filter`]: uniform over the pixel.
+    PIXEL_FILTER_BOX: uint = 0;
+    /// [`FrameConstants::pixel_filter`]: triangle of radius 1 pixel.
+    PIXEL_FILTER_TENT: uint = 1;
+    /// [`FrameConstants::pixel_filter`]: Gaussian of standard deviation 0.5 pixels, cut at radius 2.
+    PIXEL_FILTER_GAUSSIAN: uint = 2;
+    /// [`FrameConstants::pixel_filter`]: the pixel's centre.
+    PIXEL_FILTER_POINT: uint = 3;
     /// Roughnesses in the table of a rough coat (reference::coat).
     COAT_ROWS: uint = 32;
     /// Numbers for each of them: [`COAT_COLUMNS`] - 1 cosines, and the mean from inside.

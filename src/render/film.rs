@@ -57,7 +57,7 @@ pub fn read_back(renderer: &Renderer) -> Result<Film> {
         }
     }
     drop_remainders_of_none(&mut film);
-    if settings.allocate.policy != "uniform" {
+    if !settings.allocate.is_even() {
         film.add(PRIORITY, Samples::F32(renderer.film().priority.read()?));
     }
     Ok(film)

@@ -1,23 +1,22 @@
 //! What the kernels are told of a scene and its settings, besides the scene's own records.
 use crate::layout::{FrameConstants, LIGHT_ENVIRONMENT, NONE, PriorityPush, ROOT_OF_INSTANCES};
 use crate::render::schedule;
-use crate::render::settings::PixelFilter;
 use crate::scene::Scene;
 
 /// What the policies are told of a scene.
 pub fn priority_push(scene: &Scene) -> PriorityPush {
     let (s, a) = (&scene.settings, &scene.settings.allocate);
     let [low, high] = scene.bounds.map(glam::Vec3::from);
-    let sigma = (a.sigma_position * high.distance(low)).max(f32::MIN_POSITIVE.sqrt());
+    let sigma = (a.geometry.sigma_position * high.distance(low)).max(f32::MIN_POSITIVE.sqrt());
     PriorityPush {
         size: [s.width, s.height],
-        window: a.window,
-        normal_scale: a.sigma_normal.powi(-2),
+        window: a.geometry.window,
+        normal_scale: a.geometry.sigma_normal.powi(-2),
         position_scale: sigma.powi(-2),
-        luminance_floor: a.luminance_floor,
+        luminance_floor: a.variance.luminance_floor,
         limit: schedule::limit(s),
         threshold: a.noise_threshold,
-        filtered: a.filtered,
+        filtered: a.both.filtered,
         round: 0,
         ..Default::default()
     }
@@ -34,12 +33,7 @@ pub fn frame_constants(scene: &Scene) -> FrameConstants {
         max_depth: settings.max_depth,
         roulette_depth: settings.roulette_depth,
         clamp_indirect: settings.clamp_indirect,
-        pixel_filter: match settings.filter {
-            PixelFilter::Box => 0,
-            PixelFilter::Tent => 1,
-            PixelFilter::Gaussian => 2,
-            PixelFilter::Point => 3,
-        },
+        pixel_filter: settings.filter.code(),
         light_count: scene.lights.len() as u32,
         triangle_pdf_scale: scene.triangle_pdf_scale,
         environment: environment.map_or(NONE, |i| i as u32),

@@ -47,7 +47,7 @@ impl Rendered {
     /// Whether samples are spread evenly, and every pixel has all that the ranges tell of.
     pub(crate) fn is_full(&self) -> bool {
         let all = self.provenance.samples_per_pixel();
-        self.settings.allocate.policy == "uniform" && self.pixels.iter().all(|p| p.stats.count == all)
+        self.settings.allocate.is_even() && self.pixels.iter().all(|p| p.stats.count == all)
     }
 
     /// The last priorities, where the policy keeps some.
@@ -56,7 +56,7 @@ impl Rendered {
     /// When they are missing.
     pub(crate) fn priority(&self, film: &Film) -> Result<Vec<f32>, String> {
         match film.channel(film::PRIORITY) {
-            _ if self.settings.allocate.policy == "uniform" => Ok(Vec::new()),
+            _ if self.settings.allocate.is_even() => Ok(Vec::new()),
             Some(Samples::F32(priority)) => Ok(priority.clone()),
             _ => Err(format!("has no layer \"{}\": take the file as tallow wrote it", film::PRIORITY)),
         }
@@ -119,7 +119,7 @@ fn check_pending(pending: &[u32], pixels: &[Pixel], settings: &Settings) -> Resu
 }
 
 fn most_of_pixel(settings: &Settings) -> u32 {
-    let is_even = settings.allocate.policy == "uniform" || settings.allocate.placing() == Placing::Chosen;
+    let is_even = settings.allocate.is_even() || settings.allocate.policy.placing == Placing::Chosen;
     if is_even { settings.spp } else { schedule::limit(settings) }
 }
 

@@ -1,6 +1,6 @@
 //! The renderer that an engine embeds and that the command line drives: a scene on a device, kernels specialised for
 //! it, and frames recorded batch by batch into command buffers.
-use crate::allocate::{self, HostInputs, Row};
+use crate::allocate::HostInputs;
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu, PassTime, Recorder};
 use crate::layout::{Apportionment, Camera, Effects, PixelStats, PriorityPush};
@@ -73,7 +73,7 @@ impl Renderer {
         let settings = scene.settings.clone();
         settings.validate()?;
         scene.check()?;
-        let policy = policy_of(&settings)?;
+        let policy = settings.allocate.policy;
         let split_light = outputs.split_light || policy.split_light;
         let effects = Effects { split_light, counters: outputs.counters, ..effects };
         let kernels = Kernels::new(gpu, effects, scene.stack)?;
@@ -83,7 +83,7 @@ impl Renderer {
         let film = FilmBuffers::new(gpu, pixels, paths, &effects, outputs.guides || policy.guides)?;
         // Offsets are the widest records that are bound whole.
         let most = (gpu.info().max_storage_range / 8 - 1).min(film.tiles[0].pixels.into());
-        if settings.allocate.policy != "uniform" && u64::from(pixels) > most {
+        if !settings.allocate.is_even() && u64::from(pixels) > most {
             return Err(Error::Usage(format!(
                 "a film of {pixels} pixels is too large to place samples on this device: choose at most {most} pixels, \
                  or --allocate uniform"
@@ -145,7 +145,7 @@ impl Renderer {
         let guide = self.frame.film.tiles[0].guide.read()?;
         let light = self.frame.film.tiles[0].light.read()?;
         let inputs = HostInputs { guide: &guide, stats, light: &light, priority: &[], push };
-        Ok((policy_of(&self.settings)?.reference)(&inputs))
+        Ok((self.settings.allocate.policy.reference)(&inputs))
     }
 
     /// How the last allocation went.
@@ -270,9 +270,4 @@ fn paths_in_flight(gpu: &Gpu, settings: &Settings, effects: &Effects) -> u32 {
 
 fn milliseconds(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
-}
-
-fn policy_of(settings: &Settings) -> Result<&'static Row> {
-    let name = &settings.allocate.policy;
-    allocate::policy(name).ok_or_else(|| Error::Usage(format!("no policy \"{name}\"")))
 }

@@ -48,7 +48,7 @@ impl Checkpoint {
         let (settings, priority) = (&scene.settings, rendered.priority(film)?);
         let Rendered { pixels, broken, pending, .. } = rendered;
         let pending = match pending {
-            _ if settings.allocate.policy == "uniform" => {
+            _ if settings.allocate.is_even() => {
                 pixels.iter().map(|p| settings.spp.saturating_sub(p.stats.count)).collect()
             }
             pending => pending.unwrap_or_else(|| vec![0; pixels.len()]),
@@ -100,7 +100,7 @@ impl Renderer {
 /// Whether a render of this scene can go on where the file's ended.
 fn check(provenance: &Provenance, scene: &Scene) -> std::result::Result<(), String> {
     let settings = &scene.settings;
-    let uniform = settings.allocate.policy == "uniform";
+    let uniform = settings.allocate.is_even();
     // By way of text: a number's shortest decimal is not its value in double precision.
     let text = serde_json::to_string(settings).map_err(|e| e.to_string())?;
     let mut wanted: Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;

@@ -165,15 +165,12 @@ pub fn rest(settings: &Settings, cut: &Cut, progress: Progress) -> impl Iterator
 
 /// Samples that every pixel gets before any is placed.
 pub fn first_spp(settings: &Settings) -> u32 {
-    match settings.allocate.policy.as_str() {
-        "uniform" => settings.spp,
-        _ => settings.allocate.min_spp.min(settings.spp),
-    }
+    if settings.allocate.is_even() { settings.spp } else { settings.allocate.min_spp.min(settings.spp) }
 }
 
 /// Largest number of samples of a pixel; where samples are chosen, of those that a threshold decides.
 pub fn limit(settings: &Settings) -> u32 {
-    let chosen = settings.allocate.placing() == Placing::Chosen;
+    let chosen = settings.allocate.policy.placing == Placing::Chosen;
     match (settings.allocate.max_spp, settings.allocate.noise_threshold > 0.0 || chosen) {
         (0, true) => settings.spp,
         (0, false) => Settings::MAX_SPP,
@@ -185,11 +182,11 @@ pub fn limit(settings: &Settings) -> u32 {
 /// threshold may ask for less than its round has room for.
 pub fn list_may_be_short(settings: &Settings) -> bool {
     let allocate = &settings.allocate;
-    allocate.placing() == Placing::Chosen || allocate.noise_threshold > 0.0
+    allocate.policy.placing == Placing::Chosen || allocate.noise_threshold > 0.0
 }
 
 fn rounds(settings: &Settings, cut: &Cut, done: u32) -> Box<dyn Iterator<Item = Step>> {
-    match settings.allocate.placing() {
+    match settings.allocate.policy.placing {
         Placing::Chosen => Box::new(choices(settings, cut, done)),
         Placing::Learning if settings.allocate.noise_threshold > 0.0 => Box::new(needed(settings, cut, done)),
         placing => Box::new(allocated(settings, placing == Placing::Learning, cut, done)),
@@ -341,7 +338,13 @@ mod tests {
     }
 
     fn settings(policy: &str, spp: u32, min_spp: u32, max_spp: u32, rounds: u32) -> Settings {
-        let allocate = Allocate { policy: policy.into(), min_spp, max_spp, rounds, ..Allocate::default() };
+        let allocate = Allocate {
+            policy: crate::allocate::policy(policy).unwrap(),
+            min_spp,
+            max_spp,
+            rounds,
+            ..Allocate::default()
+        };
         Settings { spp, allocate, ..Settings::default() }
     }
 

@@ -113,8 +113,8 @@ fn other_effects(
         because("split_light", split_light, "an output that keeps direct and indirect light apart".into());
     let independent = s.sampler == Sampler::Independent;
     found.independent_sampler = because("independent_sampler", independent, "sampler independent".into());
-    let policy = &s.allocate.policy;
-    found.adaptive = because("adaptive", policy != "uniform", format!("allocate {policy}"));
+    let policy = s.allocate.policy.name;
+    found.adaptive = because("adaptive", !s.allocate.is_even(), format!("allocate {policy}"));
     let most = s.spp.max(s.allocate.max_spp);
     found.many_samples = because("many_samples", most > 4096, format!("{most} samples of a pixel"));
     found.counters = because("counters", counters, "ray counters".into());

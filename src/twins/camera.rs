@@ -1,5 +1,5 @@
 //! Twin of `glsl/shared/camera.glsl`.
-use crate::layout::{Camera, Effects, FrameConstants};
+use crate::layout::{Camera, Effects, FrameConstants, PIXEL_FILTER_GAUSSIAN, PIXEL_FILTER_POINT, PIXEL_FILTER_TENT};
 use crate::math::hash::pcg;
 use crate::math::warp::{warp_disk, warp_gaussian, warp_tent};
 use crate::shaders::shared::camera::{PAIR_FILM, PAIR_LENS};
@@ -40,9 +40,9 @@ pub fn film_sample(frame: &FrameConstants, effects: &Effects, pixel: u32, random
     let at = vec2((pixel % frame.size[0]) as f32, (pixel / frame.size[0]) as f32);
     let u = sample_2d(random, PAIR_FILM);
     at + match frame.pixel_filter {
-        1 if effects.pixel_filter => 0.5 + vec2(warp_tent(u.x), warp_tent(u.y)),
-        2 if effects.pixel_filter => 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y)),
-        3 if effects.pixel_filter => Vec2::splat(0.5),
+        PIXEL_FILTER_TENT if effects.pixel_filter => 0.5 + vec2(warp_tent(u.x), warp_tent(u.y)),
+        PIXEL_FILTER_GAUSSIAN if effects.pixel_filter => 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y)),
+        PIXEL_FILTER_POINT if effects.pixel_filter => Vec2::splat(0.5),
         _ => u,
     }
 }

@@ -22,7 +22,7 @@ use tallow::scene::Scene;
 fn scene() -> Scene {
     let small = |s: &mut Settings| {
         (s.width, s.height, s.spp) = (33, 17, 4);
-        s.allocate.policy = "both".into();
+        s.allocate.policy = &tallow::allocate::both::ROW;
     };
     Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml"), &small).unwrap()
 }

@@ -31,7 +31,7 @@ const POLICIES: [&str; 3] = ["uniform", "both", "threshold"];
 
 fn small(s: &mut Settings, policy: &str) {
     (s.width, s.height, s.spp, s.max_depth) = (WIDTH, HEIGHT, SPP, 4);
-    s.allocate.policy = policy.to_owned();
+    s.allocate.policy = tallow::allocate::policy(policy).unwrap();
 }
 
 /// The film that the command line writes for the same settings.
@@ -168,7 +168,10 @@ fn an_engine_filters_its_frames_where_they_are() {
     let aovs = Aovs::find(&film, &Names::new()).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
     let download = Buffer::<vec4>::new(&gpu, "download", film.pixels(), Location::Readback).unwrap();
-    let settings = FilterSettings { extent: 5.0, radius: 8, ..FilterSettings::default() };
+    let settings = FilterSettings::default().with(|s| {
+        s.edge.extent = 5.0;
+        s.footprint.radius = 8;
+    });
     for (name, demodulation) in [("guided", Demodulation::Light), ("auto", Demodulation::Albedo)] {
         let row = filter::find(name).unwrap();
         let denoiser = Denoiser::new(&gpu, &renderer, row, &settings, demodulation).unwrap();

@@ -23,7 +23,7 @@ fn scene(change: impl Fn(&mut Settings)) -> Scene {
 
 /// Some pixels reach it, and some do not before they are full.
 fn to_a_threshold(s: &mut Settings) {
-    (s.allocate.policy, s.allocate.noise_threshold) = ("variance".into(), 0.08);
+    (s.allocate.policy, s.allocate.noise_threshold) = (tallow::allocate::policy("variance").unwrap(), 0.08);
 }
 
 fn resumable(gpu: &Gpu, scene: &Scene) -> Renderer {

@@ -203,7 +203,7 @@ fn step() -> impl Strategy<Value = Step> {
 fn renderers() -> Vec<Renderer> {
     let made = |policy: &str| {
         let mut scene = SCENE.clone();
-        scene.settings.allocate.policy = policy.to_owned();
+        scene.settings.allocate.policy = tallow::allocate::policy(policy).unwrap();
         Renderer::new(&GPU, &scene, Outputs { split_light: true, guides: true, counters: true }).expect("a renderer")
     };
     ["uniform", "both", "threshold"].map(made).into()
@@ -229,9 +229,9 @@ proptest! {
         (s.width, s.height, s.spp, s.max_depth) = (edge(numbers[0]), edge(numbers[1]), numbers[2], numbers[3]);
         (s.first_sample, s.roulette_depth, s.seed, s.clamp_indirect) = (numbers[4], numbers[5], numbers[6], floats[0]);
         let a = &mut s.allocate;
-        (a.min_spp, a.max_spp, a.rounds, a.window) = (numbers[7], numbers[0], numbers[1], numbers[2]);
-        (a.sigma_normal, a.sigma_position, a.noise_threshold, a.filtered) = (floats[1], floats[2], floats[3], floats[4]);
-        a.policy = ["uniform", "both", "threshold", "no policy"][numbers[3] as usize % 4].to_owned();
+        (a.min_spp, a.max_spp, a.rounds, a.geometry.window) = (numbers[7], numbers[0], numbers[1], numbers[2]);
+        (a.geometry.sigma_normal, a.geometry.sigma_position, a.noise_threshold, a.both.filtered) = (floats[1], floats[2], floats[3], floats[4]);
+        a.policy = tallow::allocate::POLICIES[numbers[3] as usize % tallow::allocate::POLICIES.len()];
         if s.validate().is_err() {
             prop_assert!(Renderer::new(&GPU, &scene, Outputs::default()).is_err());
         }
@@ -316,7 +316,7 @@ proptest! {
     #[test]
     fn filters(row in 0..FILTERS.len(), size in [0u32..20, 0u32..20], off in 0usize..6, radius in word()) {
         let [width, height] = size;
-        let settings = FilterSettings { radius, ..FilterSettings::default() };
+        let settings = FilterSettings::default().with(|s| s.footprint.radius = radius);
         let Ok(filter) = FILTERS[row].compile(&GPU, &settings, size) else {
             prop_assert!(settings.validate().is_err() || size.contains(&0));
             return Ok(());

@@ -73,7 +73,7 @@ fn a_pixel_may_have_any_number_of_samples() {
     for policy in ["uniform", "variance"] {
         let scene = scene(|s| {
             ([s.width, s.height], s.spp, s.max_depth) = ([2, 1], 200_000, 2);
-            s.allocate.policy = policy.into();
+            s.allocate.policy = tallow::allocate::policy(policy).unwrap();
         });
         let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
         let mut frame = FrameResources::new(&gpu).unwrap();
@@ -89,7 +89,7 @@ fn a_pixel_may_have_any_number_of_samples() {
 fn the_budget_is_met_and_no_cut_changes_a_bit() {
     let gpu = gpu();
     for policy in POLICIES {
-        let scene = scene(|s| s.allocate.policy = policy.into());
+        let scene = scene(|s| s.allocate.policy = tallow::allocate::policy(policy).unwrap());
         let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
         let mut frame = FrameResources::new(&gpu).unwrap();
         let whole = run(&renderer, &mut frame);
@@ -121,7 +121,8 @@ fn a_falling_threshold_gives_at_most_one_sample_a_round() {
     let gpu = gpu();
     let with = |spp| {
         scene(move |s| {
-            (s.spp, s.allocate.policy, s.allocate.min_spp, s.allocate.max_spp) = (spp, "threshold".into(), 2, 16);
+            (s.spp, s.allocate.policy, s.allocate.min_spp, s.allocate.max_spp) =
+                (spp, &tallow::allocate::threshold::ROW, 2, 16);
         })
     };
     let counts = |pixels: &[Pixel]| pixels.iter().map(|p| p.stats.count).collect::<Vec<_>>();
@@ -155,7 +156,7 @@ fn batches_of_one_path_and_rounds_in_any_number_or_order_change_no_bit() {
     let with = |rounds| {
         scene(move |s| {
             (s.width, s.height, s.spp) = (7, 5, 6);
-            (s.allocate.policy, s.allocate.rounds) = ("geometry".into(), rounds);
+            (s.allocate.policy, s.allocate.rounds) = (&tallow::allocate::geometry::ROW, rounds);
         })
     };
     let whole = render(&gpu, &with(1));
@@ -192,7 +193,7 @@ fn a_render_resumed_anywhere_has_the_bits_of_one_that_never_stopped() {
     let gpu = gpu();
     for policy in ["uniform", "geometry", "variance", "both", "threshold"] {
         let scene = scene(|s| {
-            (s.allocate.policy, s.allocate.rounds) = (policy.into(), 4);
+            (s.allocate.policy, s.allocate.rounds) = (tallow::allocate::policy(policy).unwrap(), 4);
             // The last three of 8 rounds are left to chance.
             s.allocate.max_spp = if policy == "threshold" { 5 } else { 0 };
         });
@@ -216,7 +217,7 @@ fn a_render_resumed_anywhere_has_the_bits_of_one_that_never_stopped() {
 #[test]
 fn records_of_another_film_are_an_error() {
     let gpu = gpu();
-    let scene = scene(|s| s.allocate.policy = "both".into());
+    let scene = scene(|s| s.allocate.policy = &tallow::allocate::both::ROW);
     let (renderer, mut frame) = (Renderer::new(&gpu, &scene, split()).unwrap(), FrameResources::new(&gpu).unwrap());
     let pixels = (SIZE[0] * SIZE[1]) as usize;
     let mut resume = |size: usize, priority: usize, lacks: usize| {
@@ -244,7 +245,7 @@ fn a_start_leaves_priorities_as_they_are() {
     let (priority, pending) = (vec![7.0; pixels], vec![0; pixels]);
     let checkpoint = Checkpoint { pixels: vec![Pixel::default(); pixels], priority, pending, ..Checkpoint::default() };
     for policy in ["geometry", "variance", "both", "threshold"] {
-        let scene = scene(|s| s.allocate.policy = policy.into());
+        let scene = scene(|s| s.allocate.policy = tallow::allocate::policy(policy).unwrap());
         let (renderer, mut frame) = (Renderer::new(&gpu, &scene, split()).unwrap(), FrameResources::new(&gpu).unwrap());
         renderer.resume(&mut frame, &checkpoint).unwrap();
         renderer.run(&mut frame, &Step::Start).unwrap();
@@ -289,7 +290,8 @@ fn geometry_is_unbiased_and_learning_nearly_so() {
             render(
                 &gpu,
                 &scene(|s| {
-                    (s.spp, s.seed, s.allocate.policy, s.allocate.min_spp) = (spp, seed, policy.to_owned(), min_spp);
+                    (s.spp, s.seed, s.allocate.policy, s.allocate.min_spp) =
+                        (spp, seed, tallow::allocate::policy(policy).unwrap(), min_spp);
                 }),
             )
         };
@@ -312,8 +314,10 @@ fn geometry_is_unbiased_and_learning_nearly_so() {
 fn pixels_without_a_sample_are_well_defined() {
     let gpu = gpu();
     for policy in POLICIES {
-        let scene =
-            scene(|s| (s.spp, s.allocate.policy, s.allocate.min_spp, s.allocate.rounds) = (1, policy.into(), 0, 1));
+        let scene = scene(|s| {
+            (s.spp, s.allocate.policy, s.allocate.min_spp, s.allocate.rounds) =
+                (1, tallow::allocate::policy(policy).unwrap(), 0, 1)
+        });
         let pixels = render(&gpu, &scene);
         assert_eq!(total(&pixels), 33 * 17, "{policy}");
         let finite = |p: &Pixel| {
@@ -335,7 +339,7 @@ fn pixels_without_a_sample_are_well_defined() {
 fn no_pixel_exceeds_the_largest_number() {
     let gpu = gpu();
     for policy in POLICIES {
-        let scene = scene(|s| (s.allocate.policy, s.allocate.max_spp) = (policy.into(), 9));
+        let scene = scene(|s| (s.allocate.policy, s.allocate.max_spp) = (tallow::allocate::policy(policy).unwrap(), 9));
         let pixels = render(&gpu, &scene);
         assert_eq!((total(&pixels), pixels.iter().map(|p| p.stats.count).max()), (8 * 33 * 17, Some(9)), "{policy}");
     }
@@ -349,7 +353,7 @@ fn a_film_of_several_storage_bindings_is_placed() {
     let sized = |policy: &'static str, spp| {
         scene(move |s| {
             ([s.width, s.height], s.spp, s.max_depth) = ([2048, 1400], spp, 2);
-            (s.allocate.policy, s.allocate.min_spp) = (policy.into(), 2);
+            (s.allocate.policy, s.allocate.min_spp) = (tallow::allocate::policy(policy).unwrap(), 2);
         })
     };
     let outputs = Outputs { guides: true, ..split() };

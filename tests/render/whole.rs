@@ -364,7 +364,8 @@ fn too_bright(change: impl Fn(&mut Settings)) -> Scene {
 fn samples_that_are_no_numbers_are_black_and_told() {
     let gpu = support::gpu();
     for policy in ["uniform", "variance", "both"] {
-        let scene = too_bright(|s| (s.allocate.policy, s.first_sample) = (policy.to_owned(), 10));
+        let scene =
+            too_bright(|s| (s.allocate.policy, s.first_sample) = (tallow::allocate::policy(policy).unwrap(), 10));
         let outputs = Outputs { split_light: true, guides: true, counters: false };
         let renderer = Renderer::new(&gpu, &scene, outputs).unwrap();
         let mut frame = FrameResources::new(&gpu).unwrap();

@@ -65,27 +65,67 @@ pub fn settings(filter: &str) -> Vec<FilterSettings> {
     match filter {
         "atrous" => vec![
             base,
-            FilterSettings { sigma_rt: 0.3, conserve_energy: true, ..base },
-            FilterSettings { form: AtrousForm::Printed, levels: 3, rt_from_level: 2, ..base },
-            FilterSettings { form: AtrousForm::Squared, sigma_x: off, levels: 10, ..base },
-            FilterSettings { sigma_rt: off, sigma_n: off, ..base },
+            base.with(|s| {
+                s.edge.sigma_rt = 0.3;
+                s.atrous.conserve_energy = true;
+            }),
+            base.with(|s| {
+                s.atrous.form = AtrousForm::Printed;
+                s.footprint.levels = 3;
+                s.atrous.rt_from_level = 2;
+            }),
+            base.with(|s| {
+                s.atrous.form = AtrousForm::Squared;
+                s.edge.sigma_x = off;
+                s.footprint.levels = 10;
+            }),
+            base.with(|s| {
+                s.edge.sigma_rt = off;
+                s.edge.sigma_n = off;
+            }),
         ],
         "bilateral" => vec![
-            FilterSettings { radius: 5, ..base },
-            FilterSettings { radius: 12, sigma_n: off, sigma_x: off, sigma_rt: 0.3, ..base },
+            base.with(|s| s.footprint.radius = 5),
+            base.with(|s| {
+                s.footprint.radius = 12;
+                s.edge.sigma_n = off;
+                s.edge.sigma_x = off;
+                s.edge.sigma_rt = 0.3;
+            }),
         ],
         "wavelet" => vec![
             base,
-            FilterSettings { basis: WaveletBasis::RedBlack, ..base },
-            FilterSettings { levels: 3, sigma_rt: off, sigma_n: off, sigma_x: off, ..base },
+            base.with(|s| s.wavelet.basis = WaveletBasis::RedBlack),
+            base.with(|s| {
+                s.footprint.levels = 3;
+                s.edge.sigma_rt = off;
+                s.edge.sigma_n = off;
+                s.edge.sigma_x = off;
+            }),
         ],
-        "auto" => vec![FilterSettings { radius: 6, ..base }],
-        "svgf" => vec![base, FilterSettings { sigma_l: 1.0, levels: 3, ..base }],
+        "auto" => vec![base.with(|s| s.footprint.radius = 6)],
+        "svgf" => vec![
+            base,
+            base.with(|s| {
+                s.svgf.sigma_l = 1.0;
+                s.footprint.levels = 3;
+            }),
+        ],
         "guided" => vec![
-            FilterSettings { radius: 5, ..base },
-            FilterSettings { radius: 1, channels: 3, eps: [1e-4; 4], ..base },
-            FilterSettings { radius: 40, channels: 1, ..base },
-            FilterSettings { radius: 9, eps: [0.0; 4], ..base },
+            base.with(|s| s.footprint.radius = 5),
+            base.with(|s| {
+                s.footprint.radius = 1;
+                s.guided.channels = 3;
+                s.guided.eps = [1e-4; 4];
+            }),
+            base.with(|s| {
+                s.footprint.radius = 40;
+                s.guided.channels = 1;
+            }),
+            base.with(|s| {
+                s.footprint.radius = 9;
+                s.guided.eps = [0.0; 4];
+            }),
         ],
         _ => vec![base],
     }

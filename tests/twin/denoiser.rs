@@ -116,7 +116,7 @@ fn renderer(gpu: &Gpu, size: [u32; 2], outputs: Outputs, policy: &str) -> Render
     let small = |s: &mut Settings| {
         [s.width, s.height] = size;
         (s.spp, s.max_depth) = (4, 3);
-        (s.allocate.policy, s.allocate.min_spp) = (policy.to_owned(), 0);
+        (s.allocate.policy, s.allocate.min_spp) = (tallow::allocate::policy(policy).unwrap(), 0);
     };
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml");
     Renderer::new(gpu, &Scene::load(&file, &small).unwrap(), outputs).unwrap()
@@ -125,7 +125,7 @@ fn renderer(gpu: &Gpu, size: [u32; 2], outputs: Outputs, policy: &str) -> Render
 #[test]
 fn frames_are_taken_apart_and_put_together_as_files_are() {
     let gpu = gpu();
-    let settings = FilterSettings { extent: 3.0, ..FilterSettings::default() };
+    let settings = FilterSettings::default().with(|s| s.edge.extent = 3.0);
     for size in SIZES {
         let renderer = renderer(&gpu, size, ALL, "uniform");
         for frame in [false, true].map(|broken| Frame::new(size, broken)) {
@@ -164,7 +164,7 @@ fn a_frame_without_what_the_filter_needs_is_refused() {
         assert_eq!(refused(Outputs { split_light: false, ..ALL }, "geometry", demodulation), None);
     }
     let renderer = renderer(&gpu, [8, 8], ALL, "uniform");
-    let wrong = FilterSettings { extent: -1.0, ..FilterSettings::default() };
+    let wrong = FilterSettings::default().with(|s| s.edge.extent = -1.0);
     has(
         Denoiser::new(&gpu, &renderer, find("atrous").unwrap(), &wrong, Demodulation::Light)
             .err()

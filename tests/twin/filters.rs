@@ -42,7 +42,12 @@ fn both(gpu: &Gpu, filter: &str, input: &FilterInput, settings: &FilterSettings)
 #[test]
 fn atrous_solves_the_worked_example() {
     let off = f32::INFINITY;
-    let plain = FilterSettings { levels: 1, sigma_rt: off, sigma_n: off, sigma_x: off, ..FilterSettings::default() };
+    let plain = FilterSettings::default().with(|s| {
+        s.footprint.levels = 1;
+        s.edge.sigma_rt = off;
+        s.edge.sigma_n = off;
+        s.edge.sigma_x = off;
+    });
     let reference = find("atrous").unwrap().reference;
     // An impulse of 16 becomes the B3 spline 1, 4, 6, 4, 1; nothing is known outside, so pixels 2 and 6 of a row of 9
     // have all their taps, 1 and 7 lack the last.
@@ -51,15 +56,15 @@ fn atrous_solves_the_worked_example() {
     assert_eq!(red(&reference(&line(&values), &plain)), [0.0, 0.0, 1.0, 4.0, 6.0, 4.0, 1.0, 0.0, 0.0]);
     // Level 1 spreads taps of 2 pixels over that: pixel 4 takes 6/16 of 6, 4/16 of 1 + 1; pixel 0 has 6/16 and 4/16 of
     // 0 and 1 and 1/16 of 6 in reach: (4 + 6) / (6 + 4 + 1).
-    let two = reference(&line(&values), &FilterSettings { levels: 2, ..plain });
+    let two = reference(&line(&values), &plain.with(|s| s.footprint.levels = 2));
     assert_eq!(two[4][0], (6.0 * 6.0 + 4.0 * 2.0) / 16.0);
     assert!((two[0][0] - 10.0 / 11.0).abs() < 1e-6);
     // 0 | 1 in all three channels with sigma 1: the neighbour weighs 4/16 * e^-3 beside 6/16. Conserving, it moves that
     // much of the step, times the 6/16 of the taps that lie in the row.
-    let edge = FilterSettings { sigma_rt: 1.0, ..plain };
+    let edge = plain.with(|s| s.edge.sigma_rt = 1.0);
     let w = (-3.0f32).exp() * 4.0 / 16.0;
     assert!((red(&reference(&line(&[0.0, 1.0]), &edge))[0] - w / (w + 6.0 / 16.0)).abs() < 1e-6);
-    let kept = red(&reference(&line(&[0.0, 1.0]), &FilterSettings { conserve_energy: true, ..edge }));
+    let kept = red(&reference(&line(&[0.0, 1.0]), &edge.with(|s| s.atrous.conserve_energy = true)));
     assert!((kept[0] - w * 6.0 / 16.0).abs() < 1e-6 && kept[0] + kept[1] == 1.0);
     // The root of a pixel's samples weighs too: of 9 beside 1, 4/16 * 3 beside 6/16.
     let mut uneven = line(&[0.0, 1.0]);
@@ -67,7 +72,7 @@ fn atrous_solves_the_worked_example() {
     let found = reference(&uneven, &plain);
     assert!((found[0][0] - 12.0 / 18.0).abs() < 1e-6 && found[1][3] == 9.0, "{found:?}");
     // An unknown pixel between 2 and 4 takes their mean, whatever the radiance weight, and counts as one sample.
-    let painted = reference(&line(&[2.0, f32::NAN, 4.0]), &FilterSettings { sigma_rt: 0.1, ..plain });
+    let painted = reference(&line(&[2.0, f32::NAN, 4.0]), &plain.with(|s| s.edge.sigma_rt = 0.1));
     assert_eq!(painted[1], [3.0, 3.0, 3.0, 1.0]);
     // Any number of samples is one, as far as sums can hold them.
     uneven.radiance[1] = [1e22, 1e22, 1e22, f32::MAX];
@@ -124,9 +129,13 @@ fn the_widest_windows_of_bilateral_are_whole() {
     let gpu = gpu();
     let input = Picture::new(8, 400).noisy().input;
     let off = f32::INFINITY;
-    let settings = FilterSettings { radius: 399, sigma_n: off, sigma_x: off, ..FilterSettings::default() };
+    let settings = FilterSettings::default().with(|s| {
+        s.footprint.radius = 399;
+        s.edge.sigma_n = off;
+        s.edge.sigma_x = off;
+    });
     let wide = both(&gpu, "bilateral", &input, &settings);
-    let narrow = both(&gpu, "bilateral", &input, &FilterSettings { radius: 30, ..settings });
+    let narrow = both(&gpu, "bilateral", &input, &settings.with(|s| s.footprint.radius = 30));
     assert!(apart(&wide, &narrow, 1.0) > 1e-2, "control: the window counts");
     assert_silent(&gpu);
 }
@@ -135,8 +144,12 @@ fn the_widest_windows_of_bilateral_are_whole() {
 #[test]
 fn the_longest_lines_are_whole() {
     let gpu = gpu();
-    let narrow = FilterSettings { radius: 0, ..FilterSettings::default() };
-    let table = FilterSettings { sums: GuidedSums::Table, eps: [0.1; 4], radius: 3, ..FilterSettings::default() };
+    let narrow = FilterSettings::default().with(|s| s.footprint.radius = 0);
+    let table = FilterSettings::default().with(|s| {
+        s.guided.sums = GuidedSums::Table;
+        s.guided.eps = [0.1; 4];
+        s.footprint.radius = 3;
+    });
     let rows = [("guided", FilterSettings::default()), ("guided", narrow), ("guided", table), ("atrous", narrow)];
     for [width, height] in [[60_000, 1], [1, 60_000]] {
         let input = Picture::new(width, height).noisy().input;
@@ -158,15 +171,23 @@ fn the_longest_lines_are_whole() {
 #[test]
 fn bilateral_and_wavelets_solve_the_worked_examples() {
     let off = f32::INFINITY;
-    let plain = FilterSettings { sigma_rt: off, sigma_n: off, sigma_x: off, levels: 1, ..FilterSettings::default() };
+    let plain = FilterSettings::default().with(|s| {
+        s.edge.sigma_rt = off;
+        s.edge.sigma_n = off;
+        s.edge.sigma_x = off;
+        s.footprint.levels = 1;
+    });
     // Radius 2 has a Gaussian of standard deviation 1: neighbours weigh e^-1/2 and e^-2.
     let reference = find("bilateral").unwrap().reference;
     let (near, far) = ((-0.5f32).exp(), (-2.0f32).exp());
-    let blurred = red(&reference(&line(&[0.0, 0.0, 1.0, 0.0, 0.0]), &FilterSettings { radius: 2, ..plain }));
+    let blurred = red(&reference(&line(&[0.0, 0.0, 1.0, 0.0, 0.0]), &plain.with(|s| s.footprint.radius = 2)));
     assert!((blurred[2] - 1.0 / (1.0 + 2.0 * near + 2.0 * far)).abs() < 1e-6);
     assert!((blurred[0] - far / (1.0 + near + far)).abs() < 1e-6);
     // A step of 1 in all channels under a sigma of 1: squared distance 3.
-    let edge = FilterSettings { radius: 1, sigma_rt: 1.0, ..plain };
+    let edge = plain.with(|s| {
+        s.footprint.radius = 1;
+        s.edge.sigma_rt = 1.0;
+    });
     let w = (-3.0f32 - 2.0).exp();
     assert!((red(&reference(&line(&[0.0, 1.0]), &edge))[0] - w / (1.0 + w)).abs() < 1e-6);
 
@@ -180,7 +201,7 @@ fn bilateral_and_wavelets_solve_the_worked_examples() {
     let mut input = Picture::new(3, 3).flat().input;
     input.radiance.fill([0.0, 0.0, 0.0, 1.0]);
     input.radiance[4] = [8.0, 8.0, 8.0, 1.0];
-    let square = red(&reference(&input, &FilterSettings { basis: WaveletBasis::RedBlack, ..plain }));
+    let square = red(&reference(&input, &plain.with(|s| s.wavelet.basis = WaveletBasis::RedBlack)));
     // Corners before the second step -4/3, the middle 20/3 misses their mean by 8: corners gain half of that, 8/3.
     assert!(square.iter().all(|v| (v - 8.0 / 3.0).abs() < 1e-5), "{square:?}");
 }
@@ -200,7 +221,12 @@ fn guides_that_are_none_are_alike() {
         for (g, (normal, position)) in input.guide.iter_mut().zip(normals.into_iter().zip(positions)) {
             (g.normal, g.position) = (normal, position);
         }
-        let settings = FilterSettings { levels: 1, sigma_rt: off, sigma_n: 1.0, sigma_x, ..FilterSettings::default() };
+        let settings = FilterSettings::default().with(|s| {
+            s.footprint.levels = 1;
+            s.edge.sigma_rt = off;
+            s.edge.sigma_n = 1.0;
+            s.edge.sigma_x = sigma_x;
+        });
         both(&gpu, "atrous", &input, &settings)[0][0]
     };
     // Too short, and too long to be measured; every normal differs from none by 1.
@@ -226,7 +252,12 @@ fn guides_that_are_none_are_alike() {
 fn svgf_counts_in_deviations() {
     let gpu = gpu();
     let off = f32::INFINITY;
-    let plain = FilterSettings { sigma_n: off, sigma_x: off, levels: 1, sigma_l: 1.0, ..FilterSettings::default() };
+    let plain = FilterSettings::default().with(|s| {
+        s.edge.sigma_n = off;
+        s.edge.sigma_x = off;
+        s.footprint.levels = 1;
+        s.svgf.sigma_l = 1.0;
+    });
     // Fewer than four samples, or a variance that is none, are not trusted: the window's 0 and 1 have 1/2, unbiased.
     let spread = std::f32::consts::SQRT_2;
     let pair = |[a, b]: [[f32; 3]; 2], samples: f32, variance: [f32; 3]| {
@@ -249,7 +280,7 @@ fn svgf_counts_in_deviations() {
     }
     // An infinite sigma switches the weight off, also where nothing varies: that counts as a deviation of 1e-30.
     for (sigma_l, left) in [(off, taken(0.0)), (1e30, taken(1.0)), (1.0, 0.0), (0.0, 0.0)] {
-        let settings = FilterSettings { sigma_l, ..plain };
+        let settings = plain.with(|s| s.svgf.sigma_l = sigma_l);
         let found = both(&gpu, "svgf", &pair(step, 4.0, [0.0; 3]), &settings)[0][0];
         assert!((found - left).abs() < 1e-6, "sigma {sigma_l}: {found}");
         // Red and blue of one luminance, 0.2126 to the last bit, are no step at all.
@@ -265,7 +296,7 @@ fn svgf_counts_in_deviations() {
     // from the 4 4 1 1 sixteenths around its own 6.
     let mut values = [0.0; 9];
     values[4] = 8e23;
-    let cut = red(&both(&gpu, "svgf", &line(&values), &FilterSettings { sigma_l: 7f32.sqrt(), ..plain }))[4] / 8e23;
+    let cut = red(&both(&gpu, "svgf", &line(&values), &plain.with(|s| s.svgf.sigma_l = 7f32.sqrt())))[4] / 8e23;
     assert!((cut - 6.0 / (6.0 + 10.0 * (-1.0f32).exp())).abs() < 1e-5, "{cut}");
     assert_silent(&gpu);
 }
@@ -274,7 +305,10 @@ fn svgf_counts_in_deviations() {
 #[test]
 fn auto_trusts_variances_of_four_samples() {
     let gpu = gpu();
-    let settings = FilterSettings { sigma_n: 0.05, eps: [1e30; 4], ..FilterSettings::default() };
+    let settings = FilterSettings::default().with(|s| {
+        s.edge.sigma_n = 0.05;
+        s.guided.eps = [1e30; 4];
+    });
     for (samples, variance, value, taken) in [
         // Left out, each pixel is missed: none and svgf, which changes nothing, are better.
         (4.0, 0.0, 1.0, 0.0),

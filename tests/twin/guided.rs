@@ -10,7 +10,7 @@ use tallow::layout::vec4;
 #[test]
 fn guided_solves_the_worked_examples() {
     let reference = find("guided").unwrap().reference;
-    let base = FilterSettings { radius: 1, ..FilterSettings::default() };
+    let base = FilterSettings::default().with(|s| s.footprint.radius = 1);
     // Windows of 0 0 6 0 0: means 0 2 2 2 0; an end has a window of two. Their means: 1 4/3 2 4/3 1.
     let box_means = red(&reference(&line(&[0.0, 0.0, 6.0, 0.0, 0.0]), &base));
     let expected = [1.0, 4.0 / 3.0, 2.0, 4.0 / 3.0, 1.0];
@@ -18,11 +18,11 @@ fn guided_solves_the_worked_examples() {
     // Light that is a linear function of the guide is its own best fit, whatever the window.
     let mut input = line(&[1.0, 3.0, 5.0, 7.0, 9.0]);
     (0..5).for_each(|i| input.guide[i].depth = i as f32);
-    let exact = FilterSettings { eps: [0.0; 4], ..base };
+    let exact = base.with(|s| s.guided.eps = [0.0; 4]);
     let fitted = red(&reference(&input, &exact));
     assert!(fitted.iter().zip([1.0, 3.0, 5.0, 7.0, 9.0]).all(|(a, b)| (a - b).abs() < 1e-5), "{fitted:?}");
     // With eps the slope shrinks by var / (var + eps): over depths 0 1 2 by (2/3) / (2/3 + 2/3); the middle stays.
-    let half = red(&reference(&input, &FilterSettings { eps: [2.0 / 3.0; 4], ..exact }));
+    let half = red(&reference(&input, &exact.with(|s| s.guided.eps = [2.0 / 3.0; 4])));
     assert!((half[2] - 5.0).abs() < 1e-6 && half[0] > 1.5, "{half:?}");
 }
 
@@ -50,7 +50,7 @@ fn guided_holds_in_single_precision() {
     let gpu = gpu();
     let row = find("guided").unwrap();
     let (width, height) = (70, 50);
-    let base = FilterSettings { eps: [1e-4; 4], ..FilterSettings::default() };
+    let base = FilterSettings::default().with(|s| s.guided.eps = [1e-4; 4]);
     for (name, depth, bright) in [
         ("flat", [5.0, 0.0, 0.0], 1.0),
         ("tilted", [5.0, 0.01, 0.02], 1.0),
@@ -74,7 +74,10 @@ fn guided_holds_in_single_precision() {
                     *c = [bright, bright, bright, 1.0];
                 }
             }
-            let settings = FilterSettings { radius, channels, ..base };
+            let settings = base.with(|s| {
+                s.footprint.radius = radius;
+                s.guided.channels = channels;
+            });
             let device = run(&gpu, row, &input, &settings).unwrap().0;
             let host = (row.reference)(&input, &settings);
             let off = apart(&device, &host, 1e-3);
@@ -84,14 +87,18 @@ fn guided_holds_in_single_precision() {
     // Two equal channels and a constant one, with an eps of 0: a matrix of rank 1.
     let mut input = Picture::new(width, height).noisy().input;
     input.guide.iter_mut().for_each(|g| g.normal = [g.normal[1], g.normal[1], 0.5]);
-    let settings = FilterSettings { radius: 9, channels: 3, eps: [0.0; 4], ..base };
+    let settings = base.with(|s| {
+        s.footprint.radius = 9;
+        s.guided.channels = 3;
+        s.guided.eps = [0.0; 4];
+    });
     for radius in [1, 3, 9, 30, 60, 100] {
-        let settings = FilterSettings { radius, ..settings };
+        let settings = settings.with(|s| s.footprint.radius = radius);
         let off = apart(&run(&gpu, row, &input, &settings).unwrap().0, &(row.reference)(&input, &settings), 1e-3);
         assert!(off < 1e-4, "rank 1, radius {radius}: {off}");
     }
     let device = run(&gpu, row, &input, &settings).unwrap().0;
-    let other = FilterSettings { radius: 8, ..settings };
+    let other = settings.with(|s| s.footprint.radius = 8);
     assert!(apart(&device, &(row.reference)(&input, &other), 1e-3) > 1e-3, "control: another radius");
     // A channel that varies less than rounding counts as constant.
     input.guide.iter_mut().zip(0..).for_each(|(g, i)| g.normal[2] = 1e-11 * (i % 70) as f32);
@@ -105,15 +112,24 @@ fn guided_holds_in_single_precision() {
 fn guided_tables_agree_near_by_and_lose_digits_far_away() {
     let gpu = gpu();
     let row = find("guided").unwrap();
-    let base = FilterSettings { radius: 5, eps: [0.01; 4], ..FilterSettings::default() };
-    let table = FilterSettings { sums: GuidedSums::Table, ..base };
+    let base = FilterSettings::default().with(|s| {
+        s.footprint.radius = 5;
+        s.guided.eps = [0.01; 4];
+    });
+    let table = base.with(|s| s.guided.sums = GuidedSums::Table);
     let off = |input: &FilterInput, s: &FilterSettings| {
         let s = s.scaled_to(input);
         apart(&run(&gpu, row, input, &s).unwrap().0, &(row.reference)(input, &s), 1.0)
     };
     for (width, height) in SIZES {
         let input = Picture::new(width, height).noisy().input;
-        for s in [table, FilterSettings { radius: 40, channels: 1, ..table }] {
+        for s in [
+            table,
+            table.with(|s| {
+                s.footprint.radius = 40;
+                s.guided.channels = 1;
+            }),
+        ] {
             assert!(off(&input, &s) < 2e-3, "{width}x{height}: {}", off(&input, &s));
         }
     }
@@ -127,8 +143,11 @@ fn guided_tables_agree_near_by_and_lose_digits_far_away() {
 /// What both ways to sum make of one row, and the twin, which is in double precision.
 fn all(gpu: &Gpu, input: &FilterInput) -> [Vec<vec4>; 3] {
     let row = find("guided").unwrap();
-    let blocks = FilterSettings { radius: 1, eps: [0.0; 4], ..FilterSettings::default() };
-    let table = FilterSettings { sums: GuidedSums::Table, ..blocks };
+    let blocks = FilterSettings::default().with(|s| {
+        s.footprint.radius = 1;
+        s.guided.eps = [0.0; 4];
+    });
+    let table = blocks.with(|s| s.guided.sums = GuidedSums::Table);
     let device = |s: &FilterSettings| run(gpu, row, input, s).unwrap().0;
     [device(&blocks), device(&table), (row.reference)(input, &blocks)]
 }

@@ -18,9 +18,18 @@ fn outputs(gpu: &Gpu, row: &Row, input: &FilterInput, more: &[FilterSettings]) -
 /// Settings at the ends of their ranges.
 fn extremes() -> Vec<FilterSettings> {
     let base = FilterSettings::default();
-    let sigmas = |s: f32| FilterSettings { sigma_rt: s, sigma_n: s, sigma_x: s, sigma_l: s, ..base };
-    let wide = FilterSettings { eps: [0.0; 4], radius: 100, levels: 10, ..sigmas(f32::INFINITY) };
-    vec![FilterSettings { radius: 0, ..sigmas(0.0) }, wide, sigmas(1e-30), sigmas(1e30)]
+    let sigmas = |sigma: f32| {
+        base.with(|s| {
+            (s.edge.sigma_rt, s.edge.sigma_n, s.edge.sigma_x) = (sigma, sigma, sigma);
+            s.svgf.sigma_l = sigma;
+        })
+    };
+    let wide = sigmas(f32::INFINITY).with(|s| {
+        s.guided.eps = [0.0; 4];
+        s.footprint.radius = 100;
+        s.footprint.levels = 10;
+    });
+    vec![sigmas(0.0).with(|s| s.footprint.radius = 0), wide, sigmas(1e-30), sigmas(1e30)]
 }
 
 /// The channels of a constant image, in units of its value.
@@ -125,10 +134,11 @@ fn one_known_pixel_is_all_there_is() {
         let mut input = constant(19, 23, 7.0);
         input.radiance.iter_mut().enumerate().filter(|(i, _)| *i != 200).for_each(|(_, c)| *c = [5.0, 5.0, 5.0, 0.0]);
         // Wall and floor differ by 2 when squared: weights of 2^-45, and of 2^-76, whose square is 0.
-        let faint = [45.0, 76.0].map(|exponent: f32| FilterSettings {
-            sigma_n: (2.0 * std::f32::consts::LOG2_E / exponent).sqrt(),
-            sigma_x: f32::INFINITY,
-            ..FilterSettings::default()
+        let faint = [45.0, 76.0].map(|exponent: f32| {
+            FilterSettings::default().with(|s| {
+                s.edge.sigma_n = (2.0 * std::f32::consts::LOG2_E / exponent).sqrt();
+                s.edge.sigma_x = f32::INFINITY;
+            })
         });
         let outputs = outputs(&gpu, row, &input, &[&extremes()[..], &faint].concat());
         for (case, pair) in outputs.chunks(2).enumerate() {
@@ -190,9 +200,15 @@ fn edges_of_the_geometry_hold() {
         // Narrow weights of normals alike on every level, and none of radiance, which would hold the edge by itself; what a
         // filter of linear fits lets through is its eps against the contrast of the guide.
         let any = f32::INFINITY;
-        let base =
-            FilterSettings { sigma_rt: any, sigma_l: any, form: AtrousForm::Squared, ..FilterSettings::default() };
-        let narrow = FilterSettings { sigma_n: 0.1, eps: [1e-4; 4], ..base };
+        let base = FilterSettings::default().with(|s| {
+            s.edge.sigma_rt = any;
+            s.svgf.sigma_l = any;
+            s.atrous.form = AtrousForm::Squared;
+        });
+        let narrow = base.with(|s| {
+            s.edge.sigma_n = 0.1;
+            s.guided.eps = [1e-4; 4];
+        });
         let narrow = narrow.scaled_to(&input);
         for output in [run(&gpu, row, &input, &narrow).unwrap().0, (row.reference)(&input, &narrow)] {
             let worst = output.iter().zip(&input.radiance).map(|(a, b)| (a[0] - b[0]).abs()).fold(0.0, f32::max);
@@ -213,7 +229,12 @@ fn sub_sampled_images_are_in_painted() {
             let mut input = two_planes();
             let unknown = |i: usize| [i % 64, i / 64].iter().any(|at| !at.is_multiple_of(spacing));
             (0..).zip(&mut input.radiance).filter(|(i, _)| unknown(*i)).for_each(|(_, c)| *c = [1e3, 1e3, 1e3, 0.0]);
-            let narrow = FilterSettings { sigma_n: 0.1, eps: [1e-6; 4], ..FilterSettings::default() }.scaled_to(&input);
+            let narrow = FilterSettings::default()
+                .with(|s| {
+                    s.edge.sigma_n = 0.1;
+                    s.guided.eps = [1e-6; 4];
+                })
+                .scaled_to(&input);
             for output in [run(&gpu, row, &input, &narrow).unwrap().0, (row.reference)(&input, &narrow)] {
                 let off = |(i, c): (usize, &vec4)| (c[0] - if i % 64 < 30 { 0.0 } else { 4.0 }).abs();
                 let worst = output.iter().enumerate().map(off).fold(0.0, f32::max);
@@ -244,11 +265,14 @@ fn bumps_stay() {
         let output = run(&gpu, row, &input, &settings.scaled_to(&input)).unwrap().0;
         output.iter().enumerate().map(|(i, c)| side(i) * c[0]).sum::<f32>() / (0.3 * 64.0 * 40.0)
     };
-    let settings = FilterSettings { sigma_rt: off, sigma_l: off, ..FilterSettings::default() };
+    let settings = FilterSettings::default().with(|s| {
+        s.edge.sigma_rt = off;
+        s.svgf.sigma_l = off;
+    });
     for row in FILTERS.iter().filter(|row| row.name != "wavelet") {
         assert!(kept(row, settings) > 0.85, "{} kept {}", row.name, kept(row, settings));
     }
-    let blind = FilterSettings { sigma_n: off, ..settings };
+    let blind = settings.with(|s| s.edge.sigma_n = off);
     assert!(kept(find("atrous").unwrap(), blind) < 0.1, "control: without normals they are noise");
     assert_silent(&gpu);
 }
@@ -259,7 +283,12 @@ fn a_sigma_of_zero_leaves_an_image_as_it_is() {
     let gpu = gpu();
     let mut input = Picture::new(33, 18).noisy().input;
     input.radiance.iter_mut().for_each(|c| c[3] = 4.0);
-    let zero = FilterSettings { sigma_rt: 0.0, sigma_l: 0.0, ..FilterSettings::default() }.scaled_to(&input);
+    let zero = FilterSettings::default()
+        .with(|s| {
+            s.edge.sigma_rt = 0.0;
+            s.svgf.sigma_l = 0.0;
+        })
+        .scaled_to(&input);
     for row in ["atrous", "bilateral", "wavelet", "svgf"].map(|name| find(name).unwrap()) {
         for output in [run(&gpu, row, &input, &zero).unwrap().0, (row.reference)(&input, &zero)] {
             let odd = output.iter().zip(&input.radiance).find(|(a, b)| a != b);
@@ -316,7 +345,10 @@ fn auto_makes_no_negative_light() {
     input.guide[beyond] = tilted(-0.4);
     input.radiance[beyond] = [0.0; 4];
     let settings = FilterSettings::default().scaled_to(&input);
-    let narrow = FilterSettings { radius: 4, eps: [1e-3; 4], ..settings };
+    let narrow = settings.with(|s| {
+        s.footprint.radius = 4;
+        s.guided.eps = [1e-3; 4];
+    });
     assert!((find("guided").unwrap().reference)(&input, &narrow)[beyond][0] < -1.0, "control: a fit goes below");
     let auto = find("auto").unwrap();
     let (output, reference) = (run(&gpu, auto, &input, &settings).unwrap().0, (auto.reference)(&input, &settings));
@@ -336,9 +368,9 @@ fn energy_is_kept() {
     let row = find("atrous").unwrap();
     let mut input = Picture::new(96, 80).noisy().input;
     input.radiance.iter_mut().for_each(|c| c[3] = 4.0);
-    let narrow = FilterSettings { sigma_rt: 0.05, ..FilterSettings::default() }.scaled_to(&input);
+    let narrow = FilterSettings::default().with(|s| s.edge.sigma_rt = 0.05).scaled_to(&input);
     let ratio = |s: &FilterSettings| mean(&run(&gpu, row, &input, s).unwrap().0) / mean(&input.radiance);
-    let kept = ratio(&FilterSettings { conserve_energy: true, ..narrow });
+    let kept = ratio(&narrow.with(|s| s.atrous.conserve_energy = true));
     assert!((kept - 1.0).abs() < 1e-5, "{kept}");
     let lost = ratio(&narrow);
     assert!((lost - 1.0).abs() > 1e-3, "control: as published, {lost} of the light is left");
@@ -350,12 +382,12 @@ fn settings_and_images_out_of_range_are_refused() {
     let gpu = gpu();
     let (row, input, base) = (find("atrous").unwrap(), constant(4, 4, 1.0), FilterSettings::default());
     let refused = [
-        FilterSettings { levels: 0, ..base },
-        FilterSettings { levels: 11, ..base },
-        FilterSettings { sigma_n: -1.0, ..base },
-        FilterSettings { sigma_x: f32::NAN, ..base },
-        FilterSettings { extent: 0.0, ..base },
-        FilterSettings { intensity: f32::INFINITY, ..base },
+        base.with(|s| s.footprint.levels = 0),
+        base.with(|s| s.footprint.levels = 11),
+        base.with(|s| s.edge.sigma_n = -1.0),
+        base.with(|s| s.edge.sigma_x = f32::NAN),
+        base.with(|s| s.edge.extent = 0.0),
+        base.with(|s| s.edge.intensity = f32::INFINITY),
     ];
     for settings in refused {
         let error = run(&gpu, row, &input, &settings).map(|_| ()).unwrap_err();

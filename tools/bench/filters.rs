@@ -26,7 +26,7 @@ struct Case {
 
 fn case(name: &str) -> Result<Case> {
     let base = FilterSettings::default();
-    let radius = |radius| FilterSettings { radius, ..base };
+    let radius = |radius| base.with(|s| s.footprint.radius = radius);
     Ok(match name {
         "atrous" => Case { size: [512, 512], settings: vec![("5 levels, 3 weights", base)], peer: "oidn" },
         "guided" => Case {
@@ -36,14 +36,14 @@ fn case(name: &str) -> Result<Case> {
                 ("radius 8", radius(8)),
                 ("radius 64", radius(64)),
                 ("radius 200", radius(200)),
-                ("radius 24, tables", FilterSettings { sums: GuidedSums::Table, ..radius(24) }),
+                ("radius 24, tables", radius(24).with(|s| s.guided.sums = GuidedSums::Table)),
             ],
             peer: "guided 24",
         },
         // Joint: by the guide alone, as OpenCV's jointBilateralFilter and GIF's.
         "bilateral" => Case {
             size: [1024, 768],
-            settings: vec![("radius 24", FilterSettings { sigma_rt: f32::INFINITY, ..base })],
+            settings: vec![("radius 24", base.with(|s| s.edge.sigma_rt = f32::INFINITY))],
             peer: "bilateral 24",
         },
         _ => bail!("{name}: choose atrous, guided or bilateral"),
@@ -71,11 +71,11 @@ fn picture([width, height]: [u32; 2]) -> FilterInput {
 fn errors(gpu: &Gpu, row: &Row, near: f32) -> Result<()> {
     let mut input = picture([512, 384]);
     input.guide.iter_mut().for_each(|g| g.depth += near);
-    let base = FilterSettings { radius: 8, ..FilterSettings::default() }.scaled_to(&input);
+    let base = FilterSettings::default().with(|s| s.footprint.radius = 8).scaled_to(&input);
     let truth = (row.reference)(&input, &base);
     let mean = truth.iter().map(|c| c[1]).sum::<f32>() / truth.len() as f32;
     let error = |sums| -> Result<f32> {
-        let (image, _) = filter::run(gpu, row, &input, &FilterSettings { sums, ..base })?;
+        let (image, _) = filter::run(gpu, row, &input, &base.with(|s| s.guided.sums = sums))?;
         let channels = image.iter().flatten().zip(truth.iter().flatten());
         Ok(channels.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) / mean)
     };

@@ -43,17 +43,17 @@ fn errors(image: &[vec4], reference: &[PixelLight]) -> (f64, f64) {
 
 /// The settings that matter most to a filter.
 fn sweep(filter: &str, base: FilterSettings) -> Vec<FilterSettings> {
-    let levels = [3, 4, 5].map(|levels| FilterSettings { levels, ..base });
-    let radii = [6, 12, 24].map(|radius| FilterSettings { radius, ..base });
+    let levels = [3, 4, 5].map(|levels| base.with(|s| s.footprint.levels = levels));
+    let radii = [6, 12, 24].map(|radius| base.with(|s| s.footprint.radius = radius));
     match filter {
         "atrous" => levels
             .iter()
-            .flat_map(|s| [0.5, 1.0, f32::INFINITY].map(|sigma_rt| FilterSettings { sigma_rt, ..*s }))
+            .flat_map(|s| [0.5, 1.0, f32::INFINITY].map(|sigma_rt| s.with(|s| s.edge.sigma_rt = sigma_rt)))
             .collect(),
-        "svgf" => levels.iter().flat_map(|s| [2.0, 4.0, 8.0].map(|l| FilterSettings { sigma_l: l, ..*s })).collect(),
-        "bilateral" => radii[..2].iter().map(|s| FilterSettings { sigma_rt: f32::INFINITY, ..*s }).collect(),
+        "svgf" => levels.iter().flat_map(|s| [2.0, 4.0, 8.0].map(|l| s.with(|s| s.svgf.sigma_l = l))).collect(),
+        "bilateral" => radii[..2].iter().map(|s| s.with(|s| s.edge.sigma_rt = f32::INFINITY)).collect(),
         "guided" => {
-            radii.iter().flat_map(|s| [0.001, 0.01].map(|e| FilterSettings { eps: [e, e, e, 2.0 * e], ..*s })).collect()
+            radii.iter().flat_map(|s| [0.001, 0.01].map(|e| s.with(|s| s.guided.eps = [e, e, e, 2.0 * e]))).collect()
         }
         _ => vec![base],
     }
@@ -84,7 +84,14 @@ fn main() -> Result<()> {
         let (mse, relative, s) = best;
         println!(
             "{:10} {:10.3e} {:9.5}   {mse:10.3e} {relative:9.5}  levels {} sigma_rt {} sigma_l {} radius {} eps {}",
-            row.name, default.0, default.1, s.levels, s.sigma_rt, s.sigma_l, s.radius, s.eps[0]
+            row.name,
+            default.0,
+            default.1,
+            s.footprint.levels,
+            s.edge.sigma_rt,
+            s.svgf.sigma_l,
+            s.footprint.radius,
+            s.guided.eps[0]
         );
     }
     Ok(())

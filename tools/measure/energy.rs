@@ -3,7 +3,7 @@ use super::case::Case;
 use super::ranking::VIEWS;
 use crate::Args;
 use tallow::denoise::composition::Demodulation;
-use tallow::denoise::filter::{self, AtrousForm, FilterSettings};
+use tallow::denoise::filter::{self, AtrousForm};
 use tallow::gpu::Gpu;
 use tallow::layout::vec4;
 use tallow::report::table;
@@ -28,7 +28,14 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
         for (name, form) in FORMS {
             let mut row = vec![view.name.to_owned(), name.to_owned()];
             for conserve_energy in [false, true] {
-                let filtered = case.run(gpu, atrous, &FilterSettings { form, conserve_energy, ..case.start() })?;
+                let filtered = case.run(
+                    gpu,
+                    atrous,
+                    &case.start().with(|s| {
+                        s.atrous.form = form;
+                        s.atrous.conserve_energy = conserve_energy;
+                    }),
+                )?;
                 let kept = light(&case, &filtered) / light(&case, &case.parts.input.radiance);
                 row.extend([format!("{kept:.3}"), format!("{:.2}", case.mse(&case.filtered_light(&filtered)))]);
             }

@@ -24,26 +24,28 @@ const OFF: f32 = f32::INFINITY;
 const FORM: Knob = Knob {
     name: "form",
     values: &[0.0, 1.0, 2.0],
-    set: |s, v| s.form = [AtrousForm::Listing, AtrousForm::Squared, AtrousForm::Printed][v as usize],
+    set: |s, v| s.atrous.form = [AtrousForm::Listing, AtrousForm::Squared, AtrousForm::Printed][v as usize],
     words: &["listing", "squared", "printed"],
 };
-const LEVELS: Knob = Knob::numbers("levels", &[2.0, 3.0, 4.0, 5.0, 6.0], |s, v| s.levels = v as u32);
-const SIGMA_RT: Knob = Knob::numbers("sigma_rt", &[0.03, 0.1, 0.3, 1.0, 3.0, OFF], |s, v| s.sigma_rt = v);
-const SIGMA_N: Knob = Knob::numbers("sigma_n", &[0.1, 0.2, 0.4, 0.8, OFF], |s, v| s.sigma_n = v);
-const SIGMA_X: Knob = Knob::numbers("sigma_x", &[0.01, 0.03, 0.1, 0.3, 1.0, OFF], |s, v| s.sigma_x = v);
+const LEVELS: Knob = Knob::numbers("levels", &[2.0, 3.0, 4.0, 5.0, 6.0], |s, v| s.footprint.levels = v as u32);
+const SIGMA_RT: Knob = Knob::numbers("sigma_rt", &[0.03, 0.1, 0.3, 1.0, 3.0, OFF], |s, v| s.edge.sigma_rt = v);
+const SIGMA_N: Knob = Knob::numbers("sigma_n", &[0.1, 0.2, 0.4, 0.8, OFF], |s, v| s.edge.sigma_n = v);
+const SIGMA_X: Knob = Knob::numbers("sigma_x", &[0.01, 0.03, 0.1, 0.3, 1.0, OFF], |s, v| s.edge.sigma_x = v);
 
-const CHANNELS: Knob = Knob::numbers("channels", &[1.0, 3.0, 4.0], |s, v| s.channels = v as u32);
+const CHANNELS: Knob = Knob::numbers("channels", &[1.0, 3.0, 4.0], |s, v| s.guided.channels = v as u32);
 const RADIUS: Knob =
-    Knob::numbers("radius", &[4.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0], |s, v| s.radius = v as u32);
-const EPS_N: Knob =
-    Knob::numbers("eps of the normal", &[1e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1], |s, v| s.eps = [v, v, v, s.eps[3]]);
-const EPS_Z: Knob = Knob::numbers("eps of the depth", &[1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.03], |s, v| s.eps[3] = v);
+    Knob::numbers("radius", &[4.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0], |s, v| s.footprint.radius = v as u32);
+const EPS_N: Knob = Knob::numbers("eps of the normal", &[1e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1], |s, v| {
+    s.guided.eps = [v, v, v, s.guided.eps[3]]
+});
+const EPS_Z: Knob =
+    Knob::numbers("eps of the depth", &[1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.03], |s, v| s.guided.eps[3] = v);
 
-const SIGMA_L: Knob = Knob::numbers("sigma_l", &[0.5, 1.0, 2.0, 4.0, 8.0, 16.0], |s, v| s.sigma_l = v);
+const SIGMA_L: Knob = Knob::numbers("sigma_l", &[0.5, 1.0, 2.0, 4.0, 8.0, 16.0], |s, v| s.svgf.sigma_l = v);
 const BASIS: Knob = Knob {
     name: "basis",
     values: &[0.0, 1.0],
-    set: |s, v| s.basis = [WaveletBasis::Cdf22, WaveletBasis::RedBlack][v as usize],
+    set: |s, v| s.wavelet.basis = [WaveletBasis::Cdf22, WaveletBasis::RedBlack][v as usize],
     words: &["cdf22", "red-black"],
 };
 

@@ -23,15 +23,15 @@ struct Line {
 }
 
 const GIF: &[Line] = &[
-    Line { filter: "bilateral", what: "radius 16", published: 447.0, set: |s| s.radius = 16 },
-    Line { filter: "bilateral", what: "radius 24", published: 1001.0, set: |s| s.radius = 24 },
-    Line { filter: "bilateral", what: "radius 32", published: 1768.0, set: |s| s.radius = 32 },
-    Line { filter: "atrous", what: "4 levels", published: 54.0, set: |s| s.levels = 4 },
-    Line { filter: "atrous", what: "5 levels", published: 68.0, set: |s| s.levels = 5 },
-    Line { filter: "atrous", what: "6 levels", published: 82.0, set: |s| s.levels = 6 },
-    Line { filter: "guided", what: "1 channel", published: 16.0, set: |s| s.channels = 1 },
-    Line { filter: "guided", what: "3 channels", published: 71.0, set: |s| s.channels = 3 },
-    Line { filter: "guided", what: "4 channels", published: 80.0, set: |s| s.channels = 4 },
+    Line { filter: "bilateral", what: "radius 16", published: 447.0, set: |s| s.footprint.radius = 16 },
+    Line { filter: "bilateral", what: "radius 24", published: 1001.0, set: |s| s.footprint.radius = 24 },
+    Line { filter: "bilateral", what: "radius 32", published: 1768.0, set: |s| s.footprint.radius = 32 },
+    Line { filter: "atrous", what: "4 levels", published: 54.0, set: |s| s.footprint.levels = 4 },
+    Line { filter: "atrous", what: "5 levels", published: 68.0, set: |s| s.footprint.levels = 5 },
+    Line { filter: "atrous", what: "6 levels", published: 82.0, set: |s| s.footprint.levels = 6 },
+    Line { filter: "guided", what: "1 channel", published: 16.0, set: |s| s.guided.channels = 1 },
+    Line { filter: "guided", what: "3 channels", published: 71.0, set: |s| s.guided.channels = 3 },
+    Line { filter: "guided", what: "4 channels", published: 80.0, set: |s| s.guided.channels = 4 },
 ];
 
 /// # Errors
@@ -75,13 +75,12 @@ fn gif(gpu: &Gpu) -> anyhow::Result<Vec<Vec<String>>> {
 fn weighted(weights: usize, levels: u32) -> FilterSettings {
     let on = |i: usize, sigma: f32| if i < weights { sigma } else { f32::INFINITY };
     let own = FilterSettings::default();
-    FilterSettings {
-        levels,
-        sigma_rt: on(0, own.sigma_rt),
-        sigma_n: on(1, own.sigma_n),
-        sigma_x: on(2, own.sigma_x),
-        ..own
-    }
+    own.with(|s| {
+        s.footprint.levels = levels;
+        s.edge.sigma_rt = on(0, own.edge.sigma_rt);
+        s.edge.sigma_n = on(1, own.edge.sigma_n);
+        s.edge.sigma_x = on(2, own.edge.sigma_x);
+    })
 }
 
 /// Time of all passes: the median of some runs after one that compiles.

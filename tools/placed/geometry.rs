@@ -85,7 +85,13 @@ fn best(gpu: &Gpu, image: &Image, truth: &Truth, size: [u32; 2], normals: &[f32]
         for (levels, sigma_rt) in (1..=6).flat_map(|levels| [(levels, 0.5), (levels, f32::INFINITY)]) {
             for sigma_x in [0.01, 0.03, 0.1] {
                 let form = AtrousForm::Squared;
-                let s = FilterSettings { levels, sigma_rt, sigma_n, sigma_x, form, ..FilterSettings::default() };
+                let s = FilterSettings::default().with(|s| {
+                    s.footprint.levels = levels;
+                    s.edge.sigma_rt = sigma_rt;
+                    s.edge.sigma_n = sigma_n;
+                    s.edge.sigma_x = sigma_x;
+                    s.atrous.form = form;
+                });
                 let error = mean(&truth.errors(&filtered(gpu, image, size, &s)?));
                 if error < found.0 {
                     found = (error, s);
@@ -113,8 +119,9 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
         let image = |policy: &str, seed: u32| -> anyhow::Result<Image> {
             let scene = view.load(args, |s| {
                 centred(s);
-                (s.spp, s.seed, s.allocate.policy, s.allocate.min_spp) = (SPP, seed, policy.into(), case.min_spp);
-                (s.allocate.sigma_normal, s.allocate.sigma_position) = (SIGMA_NORMAL, SIGMA_POSITION);
+                (s.spp, s.seed, s.allocate.policy, s.allocate.min_spp) =
+                    (SPP, seed, tallow::allocate::policy(policy).unwrap(), case.min_spp);
+                (s.allocate.geometry.sigma_normal, s.allocate.geometry.sigma_position) = (SIGMA_NORMAL, SIGMA_POSITION);
             })?;
             let rendered = render(gpu, &scene)?;
             Ok(Image { light: indirect(&rendered.pixels), guide: rendered.guide })
@@ -194,6 +201,9 @@ fn row(
         ratio(published.1, published.0),
         ratio(outside[0][1] as f64, outside[0][0].max(1) as f64),
         ratio(outside[1][1] as f64, outside[1][0].max(1) as f64),
-        format!("{} levels, sigma_rt {}, sigma_n {}, sigma_x {}", s.levels, s.sigma_rt, s.sigma_n, s.sigma_x),
+        format!(
+            "{} levels, sigma_rt {}, sigma_n {}, sigma_x {}",
+            s.footprint.levels, s.edge.sigma_rt, s.edge.sigma_n, s.edge.sigma_x
+        ),
     ])
 }

@@ -39,7 +39,7 @@ impl View {
     /// Means of radiance and of indirect irradiance over many samples of another seed, kept in a file.
     pub fn reference(&self, gpu: &Gpu, args: &Args, change: impl Fn(&mut Settings)) -> anyhow::Result<[Vec<vec3>; 2]> {
         let scene = self.load(args, |s| {
-            (s.spp, s.seed, s.allocate.policy) = (self.reference, 1, "uniform".into());
+            (s.spp, s.seed, s.allocate.policy) = (self.reference, 1, &tallow::allocate::uniform::ROW);
             change(s);
         })?;
         let [width, height] = self.size;

@@ -40,8 +40,9 @@ fn passes(gpu: &Gpu, renderer: &Renderer, steps: &[Step]) -> anyhow::Result<BTre
 pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
     let renderer = |window, spp| -> anyhow::Result<Renderer> {
         let scene = VIEW.load(args, |s| {
-            (s.spp, s.allocate.policy, s.allocate.min_spp, s.allocate.rounds) = (spp, "geometry".into(), 1, 1);
-            s.allocate.window = window;
+            (s.spp, s.allocate.policy, s.allocate.min_spp, s.allocate.rounds) =
+                (spp, &tallow::allocate::geometry::ROW, 1, 1);
+            s.allocate.geometry.window = window;
         })?;
         Ok(Renderer::new(gpu, &scene, Outputs { split_light: true, guides: true, counters: false })?)
     };

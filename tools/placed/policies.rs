@@ -49,8 +49,9 @@ fn of_view(gpu: &Gpu, args: &Args, view: &View, [spp, least]: [u32; 2]) -> anyho
         // In turn, so that what else the machine does meets all alike.
         for (policy, error, ms) in &mut found {
             let scene = view.load(args, |s| {
-                (s.spp, s.seed, s.allocate.policy, s.allocate.min_spp) = (spp, *seed, (*policy).into(), least);
-                s.allocate.filtered = 0.0;
+                (s.spp, s.seed, s.allocate.policy, s.allocate.min_spp) =
+                    (spp, *seed, tallow::allocate::policy(policy).unwrap(), least);
+                s.allocate.both.filtered = 0.0;
             })?;
             let rendered = render(gpu, &scene)?;
             *error += mean(&relative_errors(&radiance(&rendered.pixels), reference)) / RUNS as f64;

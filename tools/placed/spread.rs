@@ -42,7 +42,7 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
             let possible = |&spp: &u32| policy == "threshold" || max == 0 || spp <= max;
             for spp in BUDGETS.into_iter().filter(possible) {
                 let scene = view.load(args, |s| {
-                    (s.spp, s.allocate.policy) = (spp, policy.into());
+                    (s.spp, s.allocate.policy) = (spp, tallow::allocate::policy(policy).unwrap());
                     (s.allocate.min_spp, s.allocate.max_spp) = (min, max);
                 })?;
                 let rendered = render(gpu, &scene)?;

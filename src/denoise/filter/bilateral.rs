@@ -34,9 +34,9 @@ struct Bilateral {
 
 impl Bilateral {
     fn new(gpu: &Gpu, settings: &FilterSettings, size: [u32; 2]) -> Result<Self> {
-        let (pack, radius) = (Pack::new(gpu, size)?, settings.radius.min(size[0].max(size[1]) - 1));
+        let (pack, radius) = (Pack::new(gpu, size)?, settings.footprint.radius.min(size[0].max(size[1]) - 1));
         let banded = bands(radius).0 > 1;
-        let kernel = Kernel::new(gpu, &Constants { edge: Rates::new(settings).constants(), bands: banded })?;
+        let kernel = Kernel::new(gpu, &Constants { edge: Rates::new(&settings.edge).constants(), bands: banded })?;
         let sums = Buffer::new(gpu, "sums", if banded { pack.colour.len() } else { 1 }, Location::Device)?;
         Ok(Self { pack, kernel, sums, radius, settings: *settings })
     }
@@ -51,7 +51,7 @@ fn bands(radius: u32) -> (u32, u32) {
 
 /// Of a Gaussian whose standard deviation is half the radius.
 fn rate_space(settings: &FilterSettings) -> f32 {
-    rate(settings.radius.max(1) as f32 * std::f32::consts::FRAC_1_SQRT_2)
+    rate(settings.footprint.radius.max(1) as f32 * std::f32::consts::FRAC_1_SQRT_2)
 }
 
 impl Filter for Bilateral {
@@ -63,7 +63,7 @@ impl Filter for Bilateral {
             size: planes.size,
             radius: self.radius,
             rate_space: rate_space(&self.settings),
-            rates: Rates::new(&self.settings).as_array(),
+            rates: Rates::new(&self.settings.edge).as_array(),
             band: 0,
             band_rows,
             ..Default::default()
@@ -79,8 +79,8 @@ impl Filter for Bilateral {
 
 fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
     let image = Packed::reference(input);
-    let (rates, space) = (Rates::new(settings), rate_space(settings));
-    let (width, height, radius) = (input.width as i64, input.height as i64, i64::from(settings.radius));
+    let (rates, space) = (Rates::new(&settings.edge), rate_space(settings));
+    let (width, height, radius) = (input.width as i64, input.height as i64, i64::from(settings.footprint.radius));
     let pixel = |at: usize| {
         let (x, y) = (at as i64 % width, at as i64 / width);
         let p = image[at];

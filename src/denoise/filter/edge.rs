@@ -1,10 +1,50 @@
 //! How alike two pixels are. Twin of `glsl/shared/edge.glsl`.
+use super::FilterInput;
+use super::atrous::{AtrousForm, AtrousSettings};
 use super::pack::Packed;
-use super::{AtrousForm, FilterSettings};
+use super::pixel::known_radiance;
 use crate::layout::vec3;
+use crate::settings::{FINITE_ABOVE_0, FROM_0, settings};
 use crate::shaders::shared::edge::{Constants, LEAST};
 use glam::Vec3;
 use std::f32::consts::LOG2_E;
+
+settings! {
+    /// Which differences stop a filter. A sigma of infinity switches its weight off.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct EdgeSettings {
+        /// What is given of them.
+        EdgeOverrides {
+            /// Scale of radiance [default: the image's largest]
+            intensity: f32 = 1.0, FINITE_ABOVE_0;
+            /// Scale of distances in world units [default: the diagonal of what is seen]
+            extent: f32 = 1.0, FINITE_ABOVE_0;
+            /// Radiance difference that counts as an edge, in units of --intensity; inf switches it off.
+            sigma_rt: f32 = 1.0, FROM_0;
+            /// Difference of normals that counts as an edge; inf switches it off.
+            sigma_n: f32 = 0.3, FROM_0;
+            /// Distance that counts as an edge, in units of --extent; inf switches it off.
+            sigma_x: f32 = 0.05, FROM_0;
+        }
+    }
+}
+
+impl EdgeSettings {
+    /// The same with `intensity` and `extent` taken from an image: its largest known channel, and the diagonal of the
+    /// box around the hits, or where there are no positions the largest depth. 1 where there is nothing to measure.
+    pub fn scaled_to(mut self, input: &FilterInput) -> Self {
+        let usable = |v: f32| if v.is_normal() && v > 0.0 { v } else { 1.0 };
+        let channels = input.radiance.iter().filter_map(|c| known_radiance(*c).map(|c| c.max_element()));
+        self.intensity = usable(channels.fold(0.0, f32::max));
+        let hits = || input.guide.iter().filter(|g| g.depth > 0.0 || g.position != [0.0; 3]);
+        let places = || hits().map(|g| Vec3::from(g.position)).filter(|p| p.is_finite());
+        let low = places().fold(Vec3::INFINITY, Vec3::min);
+        let diagonal = (places().fold(low, Vec3::max) - low).length();
+        let deepest = hits().map(|g| g.depth).filter(|d| d.is_finite()).fold(0.0, f32::max);
+        self.extent = usable(if diagonal > 0.0 { diagonal } else { deepest });
+        self
+    }
+}
 
 /// Exponents of the edge-stopping weights, in base 2, per squared (or plain) difference; 0 switches a weight off.
 #[derive(Clone, Copy, Debug)]
@@ -25,21 +65,21 @@ pub fn rate(sigma: f32) -> f32 {
 
 impl Rates {
     /// The settings' sigmas as they are.
-    pub fn new(s: &FilterSettings) -> Self {
+    pub fn new(s: &EdgeSettings) -> Self {
         Self { rt: rate(s.sigma_rt * s.intensity), n: rate(s.sigma_n), x: rate(s.sigma_x * s.extent), squared: true }
     }
 
     /// On a level of EAW: the sigma of radiance halves, and the listing's of normals doubles.
-    pub fn at_level(s: &FilterSettings, level: u32) -> Self {
+    pub fn at_level(s: &EdgeSettings, atrous: &AtrousSettings, level: u32) -> Self {
         let spacing = (1 << level) as f32;
-        let per_distance = if s.form == AtrousForm::Listing { spacing } else { 1.0 };
-        let sigma_rt = if level < s.rt_from_level { f32::INFINITY } else { s.sigma_rt / spacing };
-        let scaled = FilterSettings { sigma_rt, sigma_n: s.sigma_n * per_distance, ..*s };
-        Self { squared: s.form != AtrousForm::Printed, ..Self::new(&scaled) }
+        let per_distance = if atrous.form == AtrousForm::Listing { spacing } else { 1.0 };
+        let sigma_rt = if level < atrous.rt_from_level { f32::INFINITY } else { s.sigma_rt / spacing };
+        let scaled = EdgeSettings { sigma_rt, sigma_n: s.sigma_n * per_distance, ..*s };
+        Self { squared: atrous.form != AtrousForm::Printed, ..Self::new(&scaled) }
     }
 
     /// Without the weight of radiance.
-    pub fn of_surfaces(s: &FilterSettings) -> Self {
+    pub fn of_surfaces(s: &EdgeSettings) -> Self {
         Self { rt: 0.0, ..Self::new(s) }
     }
 

@@ -2,10 +2,11 @@
 //! it. Kernels: `glsl/guided_*.comp`. Its time hardly depends on the radius.
 use super::guided_table::GuidedTable;
 use super::pixel::{known_channel, known_radiance};
-use super::{Filter, FilterInput, FilterSettings, GuidedSums, Planes, Row};
+use super::{Filter, FilterInput, FilterSettings, Planes, Row};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{Guide, GuidedPackPush, GuidedPush, vec4};
+use crate::settings::{Is, choices, settings};
 use crate::shaders::{guided_columns, guided_mean_columns, guided_mean_rows, guided_pack, guided_rows, shared};
 use glam::{DVec3, DVec4};
 use rayon::prelude::*;
@@ -16,7 +17,7 @@ pub const ROW: Row = Row {
     name: "guided",
     about: "guided image filter: light as a local linear function of normal and depth",
     make: |gpu, settings, size| {
-        Ok(match settings.sums {
+        Ok(match settings.guided.sums {
             GuidedSums::Blocks => Box::new(Guided::new(gpu, settings, size)?),
             GuidedSums::Table => Box::new(GuidedTable::new(gpu, settings, size)?),
         })
@@ -28,6 +29,50 @@ pub const ROW: Row = Row {
 const BESIDE: u32 = 8;
 /// `vec4`s of a pixel's record in a strip.
 const RECORD: u64 = 8;
+
+choices! {
+    /// How `guided` sums over windows.
+    pub enum GuidedSums {
+        /// Block by block, about local means: nothing cancels.
+        #[default]
+        Blocks,
+        /// Summed-area tables, as published: digits are lost where images are large or guides far away. Images of one
+        /// million pixels at most where storage buffers hold 128 MiB.
+        Table,
+    }
+}
+
+/// A guide of normals alone, or with depth.
+const CHANNELS: Is<u32> = Is("1, 3 or 4", |n| [1, 3, 4].contains(n));
+const EPS: Is<vec4> = Is("finite numbers of 0 or more", |eps| eps.iter().all(|e| e.is_finite() && *e >= 0.0));
+
+settings! {
+    /// What `guided` alone can be told.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct GuidedSettings {
+        /// What is given of them.
+        GuidedOverrides {
+            /// Channels of guided's guide: 1 (grey normal), 3 (normal) or 4 (normal and depth).
+            channels: u32 = 4, CHANNELS;
+            // Normals are halved, depths in units of the extent.
+            /// Variance of the guide below which guided sees no edge: one number, or one per channel.
+            eps: vec4 = [0.01, 0.01, 0.01, 0.02], EPS, [value_parser = per_channel];
+            /// How guided sums over windows.
+            sums: GuidedSums = GuidedSums::Blocks, ..;
+        }
+    }
+}
+
+/// One number for all channels, or four.
+#[cfg(feature = "cli")]
+fn per_channel(text: &str) -> std::result::Result<vec4, String> {
+    let numbers: std::result::Result<Vec<f32>, _> = text.split(',').map(str::parse).collect();
+    match numbers.as_deref() {
+        Ok([n]) => Ok([*n; 4]),
+        Ok(&[a, b, c, d]) => Ok([a, b, c, d]),
+        _ => Err("expected one number, or four with commas between them".to_owned()),
+    }
+}
 
 /// What the kernels read of an image.
 pub struct Packed {
@@ -43,7 +88,7 @@ impl Packed {
     pub fn new(gpu: &Gpu, settings: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
         let pixels = width.next_multiple_of(BESIDE) as usize * height as usize;
         Ok(Self {
-            kernel: Kernel::new(gpu, &guided_pack::Constants { channels: settings.channels })?,
+            kernel: Kernel::new(gpu, &guided_pack::Constants { channels: settings.guided.channels })?,
             colour: Buffer::new(gpu, "colour", pixels, Location::Device)?,
             channels: Buffer::new(gpu, "channels", pixels, Location::Device)?,
         })
@@ -53,7 +98,7 @@ impl Packed {
     pub fn record(&self, rec: &mut Recorder, planes: &Planes, settings: &FilterSettings) -> Result<()> {
         let (radiance, guide) = (&planes.radiance, &planes.guide);
         let bind = guided_pack::Bind { radiance, guide, colour: &self.colour, channels: &self.channels };
-        let push = GuidedPackPush { size: planes.size, depth_scale: 1.0 / settings.extent, ..Default::default() };
+        let push = GuidedPackPush { size: planes.size, depth_scale: 1.0 / settings.edge.extent, ..Default::default() };
         rec.dispatch(&self.kernel, bind, &push, self.kernel.groups(planes.size))
     }
 }
@@ -118,7 +163,7 @@ impl Walk {
 
 impl Guided {
     fn new(gpu: &Gpu, settings: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
-        let [down, along] = [height, width].map(|edge| Walk::new(gpu, settings.radius, edge));
+        let [down, along] = [height, width].map(|edge| Walk::new(gpu, settings.footprint.radius, edge));
         let pack = Packed::new(gpu, settings, [width, height])?;
         let strip_rows =
             strip_rows(gpu.tuning().strip_bytes, gpu.info().max_storage_range, down.window, [width, height]);
@@ -150,8 +195,14 @@ impl Guided {
         let ([width, height], settings, strip) = (size, self.settings, self.strip_rows);
         (0..height).step_by(strip as usize).map(move |first_row| {
             let rows = strip.min(height - first_row);
-            let push =
-                GuidedPush { size, first_row, rows, radius: settings.radius, eps: settings.eps, ..Default::default() };
+            let push = GuidedPush {
+                size,
+                first_row,
+                rows,
+                radius: settings.footprint.radius,
+                eps: settings.guided.eps,
+                ..Default::default()
+            };
             (push, [self.down.groups(width, rows), self.along.groups(rows, width)])
         })
     }
@@ -220,10 +271,10 @@ fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
     let size = [input.width, input.height];
     let models: Vec<Option<Model>> = (0..pixels.len())
         .into_par_iter()
-        .map(|at| model(&pixels, window(size, at, settings.radius), settings))
+        .map(|at| model(&pixels, window(size, at, settings.footprint.radius), settings))
         .collect();
     let mean = |at: usize| {
-        let values = window(size, at, settings.radius).filter_map(|k| models[k]).map(|m| {
+        let values = window(size, at, settings.footprint.radius).filter_map(|k| models[k]).map(|m| {
             let off = pixels[at].guide - m.mean_guide;
             m.mean + DVec3::from(m.slopes.map(|slope| slope.dot(off)))
         });
@@ -241,8 +292,8 @@ fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
 
 fn channels(g: &Guide, settings: &FilterSettings) -> DVec4 {
     let n = glam::Vec3::from(g.normal.map(known_channel)) * 0.5;
-    let depth = known_channel(g.depth * (1.0 / settings.extent));
-    match settings.channels {
+    let depth = known_channel(g.depth * (1.0 / settings.edge.extent));
+    match settings.guided.channels {
         1 => glam::vec4((n.x + n.y + n.z) / 3.0, 0.0, 0.0, 0.0),
         3 => n.extend(0.0),
         _ => n.extend(depth),
@@ -271,7 +322,7 @@ fn model(pixels: &[Pixel], window: impl Iterator<Item = usize>, settings: &Filte
         }
         (0..3).for_each(|i| colour[i] += off * c[i] * share);
     }
-    (0..4).for_each(|i| guide[i][i] += f64::from(settings.eps[i]));
+    (0..4).for_each(|i| guide[i][i] += f64::from(settings.guided.eps[i]));
     (!known.is_empty()).then(|| Model { slopes: colour.map(|rhs| solve(guide, rhs)), mean, mean_guide })
 }
 

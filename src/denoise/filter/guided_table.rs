@@ -54,7 +54,7 @@ impl GuidedTable {
 
 impl Filter for GuidedTable {
     fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
-        let ([width, height], FilterSettings { radius, eps, .. }) = (planes.size, self.settings);
+        let ([width, height], radius, eps) = (planes.size, self.settings.footprint.radius, self.settings.guided.eps);
         let [slope_r, slope_g, slope_b, value] = &self.model;
         let Packed { colour, channels, .. } = &self.pack;
         let (rows, table, filtered) = (&self.rows, &self.table, &planes.output);

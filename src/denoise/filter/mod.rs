@@ -5,6 +5,7 @@ mod auto;
 mod bilateral;
 mod edge;
 pub mod firefly;
+mod footprint;
 mod guided;
 mod guided_table;
 mod input;
@@ -16,15 +17,22 @@ mod settings;
 mod svgf;
 mod wavelet;
 
+pub use atrous::{AtrousForm, AtrousOverrides, AtrousSettings};
+pub use edge::{EdgeOverrides, EdgeSettings};
+pub use footprint::{FootprintOverrides, FootprintSettings};
+pub use guided::{GuidedOverrides, GuidedSettings, GuidedSums};
 pub use input::FilterInput;
-pub use settings::{AtrousForm, FilterSettings, GuidedSums, WaveletBasis};
+pub use settings::{FilterOverrides, FilterSettings};
+pub use svgf::{SvgfOverrides, SvgfSettings};
+pub use wavelet::{WaveletBasis, WaveletOverrides, WaveletSettings};
 
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, FrameResources, Gpu, Location, PassTime, Recorder};
 use crate::layout::{Guide, vec3, vec4};
 
 /// Every filter, in the order of `--help`; the twin and stability tests run each row.
-pub const FILTERS: &[Row] = &[none::ROW, atrous::ROW, bilateral::ROW, guided::ROW, wavelet::ROW, svgf::ROW, auto::ROW];
+pub const FILTERS: &[&Row] =
+    &[&none::ROW, &atrous::ROW, &bilateral::ROW, &guided::ROW, &wavelet::ROW, &svgf::ROW, &auto::ROW];
 
 /// Compiles a filter's kernels and makes its own buffers, for images of (width, height) that [`check_size`] has seen.
 type Make = fn(&Gpu, &FilterSettings, [u32; 2]) -> Result<Box<dyn Filter>>;
@@ -126,7 +134,7 @@ impl Planes {
 
 /// The row of this name.
 pub fn find(name: &str) -> Option<&'static Row> {
-    FILTERS.iter().find(|row| row.name == name)
+    FILTERS.iter().copied().find(|row| row.name == name)
 }
 
 /// Refuses images whose planes a binding cannot hold, with `texels` texels a pixel in the widest that is read, and edges along

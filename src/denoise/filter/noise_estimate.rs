@@ -28,7 +28,7 @@ impl Estimate {
     /// [`crate::error::Error::Device`] when it does not fit.
     pub fn new(gpu: &Gpu, settings: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
         let kernel =
-            |measured| Kernel::new(gpu, &Constants { edge: Rates::of_surfaces(settings).constants(), measured });
+            |measured| Kernel::new(gpu, &Constants { edge: Rates::of_surfaces(&settings.edge).constants(), measured });
         Ok(Self {
             kernels: [kernel(false)?, kernel(true)?],
             nothing: Buffer::from_slice(gpu, "no variance", &[])?,
@@ -38,7 +38,7 @@ impl Estimate {
 
     /// colour\[P\], place\[P\], variance\[P\] -> plane\[P\]
     pub fn record(&self, rec: &mut Recorder, planes: &Planes, pack: &Pack, settings: &FilterSettings) -> Result<()> {
-        let rates = Rates::of_surfaces(settings).as_array();
+        let rates = Rates::of_surfaces(&settings.edge).as_array();
         let push = SvgfPush { size: planes.size, spacing: 1, rate_l: 0.0, rates, ..Default::default() };
         let variance = planes.variance.as_ref().unwrap_or(&self.nothing);
         let bind = Bind { colour: &pack.colour, place: &pack.place, variance, estimate: &self.plane };
@@ -59,7 +59,7 @@ pub fn contrast(a: Vec3, b: Vec3) -> f32 {
 
 /// The variance of every pixel's luminance; -1 where nothing is known.
 pub fn reference(input: &FilterInput, image: &[Packed], settings: &FilterSettings) -> Vec<f32> {
-    let rates = Rates::of_surfaces(settings);
+    let rates = Rates::of_surfaces(&settings.edge);
     let variance = |at: usize| {
         let measured = input.variance.as_ref().map(|v| Vec3::from(v[at]));
         match measured.filter(|v| v.is_finite() && v.min_element() >= 0.0) {

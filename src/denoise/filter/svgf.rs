@@ -7,6 +7,7 @@ use super::{Filter, FilterInput, FilterSettings, Planes, Row};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{SvgfPush, vec4};
+use crate::settings::{FROM_0, settings};
 use crate::shaders::svgf::{Bind, Constants};
 use glam::Vec3;
 use std::f32::consts::LOG2_E;
@@ -21,11 +22,23 @@ pub const ROW: Row = Row {
 
 /// Per standard deviation, in base 2; finite also over a deviation of [`LEAST_DEVIATION`].
 fn rate_l(settings: &FilterSettings) -> f32 {
-    (LOG2_E / settings.sigma_l).min(1e8)
+    (LOG2_E / settings.svgf.sigma_l).min(1e8)
 }
 
 /// Stands for 0, so that equal pixels are alike where nothing varies.
 const LEAST_DEVIATION: f32 = 1e-30;
+
+settings! {
+    /// What `svgf` alone can be told.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct SvgfSettings {
+        /// What is given of them.
+        SvgfOverrides {
+            /// Standard deviations of a pixel's luminance that count as an edge for svgf.
+            sigma_l: f32 = 4.0, FROM_0;
+        }
+    }
+}
 
 struct Svgf {
     pack: Pack,
@@ -38,7 +51,7 @@ struct Svgf {
 
 impl Svgf {
     fn new(gpu: &Gpu, settings: &FilterSettings, size: [u32; 2]) -> Result<Self> {
-        let kernel = |last| Kernel::new(gpu, &Constants { edge: Rates::of_surfaces(settings).constants(), last });
+        let kernel = |last| Kernel::new(gpu, &Constants { edge: Rates::of_surfaces(&settings.edge).constants(), last });
         let pack = Pack::new(gpu, size)?;
         let scratch = Buffer::new(gpu, "svgf", pack.colour.len(), Location::Device)?;
         let estimate = Estimate::new(gpu, settings, size)?;
@@ -51,8 +64,8 @@ impl Filter for Svgf {
         self.pack.record(rec, planes)?;
         self.estimate.record(rec, planes, &self.pack, &self.settings)?;
         let mut from = &self.estimate.plane;
-        for level in 0..self.settings.levels {
-            let last = level + 1 == self.settings.levels;
+        for level in 0..self.settings.footprint.levels {
+            let last = level + 1 == self.settings.footprint.levels;
             let to = match last {
                 true => &planes.output,
                 false if level % 2 == 0 => &self.scratch,
@@ -62,7 +75,7 @@ impl Filter for Svgf {
                 size: planes.size,
                 spacing: 1 << level,
                 rate_l: rate_l(&self.settings),
-                rates: Rates::of_surfaces(&self.settings).as_array(),
+                rates: Rates::of_surfaces(&self.settings.edge).as_array(),
                 ..Default::default()
             };
             let bind = Bind { estimate: from, place: &self.pack.place, colour: &self.pack.colour, filtered: to };
@@ -81,7 +94,7 @@ fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
     let packed = Packed::reference(input);
     let noise = noise_estimate::reference(input, &packed, settings);
     let mut image: Vec<Noisy> = packed.into_iter().zip(noise).collect();
-    for level in 0..settings.levels {
+    for level in 0..settings.footprint.levels {
         let size = [i64::from(input.width), i64::from(input.height)];
         image = (0..image.len()).map(|at| filtered(&image, size, at, 1 << level, settings)).collect();
     }
@@ -101,7 +114,7 @@ fn filtered(image: &[Noisy], [width, height]: [i64; 2], at: usize, spacing: i64,
         .filter(|((_, variance), _)| *variance >= 0.0)
         .fold((0.0, 0.0), |(total, sum), ((_, variance), w)| (total + w, sum + w * variance));
     let rate = rate_l(settings) / (f32::sqrt(sum / total) + LEAST_DEVIATION);
-    let rates = Rates::of_surfaces(settings);
+    let rates = Rates::of_surfaces(&settings.edge);
     let (mut sum, mut total, mut spread) = (Vec3::ZERO, 0.0, 0.0);
     for (i, j) in around(2) {
         let Some((q, variance)) = tap(i * spacing, j * spacing) else { continue };

@@ -6,10 +6,11 @@
 //! neighbours, where Fattal keeps the weights of the way down.
 use super::edge::{Rates, edge_weight};
 use super::pack::{Pack, Packed};
-use super::{Filter, FilterInput, FilterSettings, Planes, Row, WaveletBasis};
+use super::{Filter, FilterInput, FilterSettings, Planes, Row};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{WaveletPush, vec4};
+use crate::settings::{choices, settings};
 use crate::shaders::wavelet::{Bind, Constants};
 use glam::Vec3;
 
@@ -31,13 +32,36 @@ const AROUND: [&[[i64; 2]]; 4] = [
 
 /// Every lifting step: (spacing, stencil, whether it goes back).
 fn steps(settings: &FilterSettings) -> Vec<(u32, u32, bool)> {
-    let stencils = match settings.basis {
+    let stencils = match settings.wavelet.basis {
         WaveletBasis::Cdf22 => [0, 1],
         WaveletBasis::RedBlack => [2, 3],
     };
-    let forward: Vec<_> = (0..settings.levels).flat_map(|l| stencils.map(|s| (1 << l, s, false))).collect();
+    let forward: Vec<_> = (0..settings.footprint.levels).flat_map(|l| stencils.map(|s| (1 << l, s, false))).collect();
     let back: Vec<_> = forward.iter().rev().map(|&(spacing, stencil, _)| (spacing, stencil, true)).collect();
     [forward, back].concat()
+}
+
+choices! {
+    /// The lattices of the decimated wavelets.
+    pub enum WaveletBasis {
+        /// CDF(2,2), along rows and columns.
+        #[default]
+        Cdf22,
+        /// Red-black, on the quincunx.
+        RedBlack,
+    }
+}
+
+settings! {
+    /// What `wavelet` alone can be told.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct WaveletSettings {
+        /// What is given of them.
+        WaveletOverrides {
+            /// Wavelets of wavelet.
+            basis: WaveletBasis = WaveletBasis::Cdf22, ..;
+        }
+    }
 }
 
 struct Wavelet {
@@ -50,7 +74,7 @@ struct Wavelet {
 
 impl Wavelet {
     fn new(gpu: &Gpu, settings: &FilterSettings, size: [u32; 2]) -> Result<Self> {
-        let kernel = |inverse| Kernel::new(gpu, &Constants { edge: Rates::new(settings).constants(), inverse });
+        let kernel = |inverse| Kernel::new(gpu, &Constants { edge: Rates::new(&settings.edge).constants(), inverse });
         let pack = Pack::new(gpu, size)?;
         let scratch = Buffer::new(gpu, "wavelet", pack.colour.len(), Location::Device)?;
         Ok(Self { pack, kernels: [kernel(false)?, kernel(true)?], scratch, settings: *settings })
@@ -68,7 +92,7 @@ impl Filter for Wavelet {
                 false if i % 2 == 0 => &self.scratch,
                 false => &self.pack.colour,
             };
-            let rates = Rates::new(&self.settings).as_array();
+            let rates = Rates::new(&self.settings.edge).as_array();
             let push = WaveletPush { size: planes.size, spacing, stencil, rates, ..Default::default() };
             let bind = Bind { colour: from, place: &self.pack.place, filtered: to };
             let kernel = &self.kernels[usize::from(inverse)];
@@ -92,7 +116,7 @@ fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
     let mut image = Packed::reference(input);
     let size = [i64::from(input.width), i64::from(input.height)];
     for (spacing, stencil, inverse) in steps(settings) {
-        let rates = Rates::new(settings);
+        let rates = Rates::new(&settings.edge);
         let step = Step { image: &image, size, spacing: i64::from(spacing), stencil: stencil as usize, rates };
         image = (0..image.len()).map(|at| step.lifted(at as i64, inverse)).collect();
     }

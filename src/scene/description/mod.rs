@@ -21,7 +21,8 @@ pub use value::{Rgb, Transform};
 
 use crate::error::{Error, Result};
 use crate::image::Picture;
-use crate::render::settings::{Allocate, PixelFilter, Sampler, Settings};
+use crate::render::settings::Settings;
+pub use crate::render::settings::{Allocate, Film, Render};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -50,36 +51,6 @@ pub struct Description {
     /// Textures in memory.
     #[serde(skip)]
     pub bitmap: Vec<Bitmap>,
-}
-
-/// The `[film]` table; see [`Settings`].
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Film {
-    /// Pixels.
-    pub width: Option<u32>,
-    /// Pixels.
-    pub height: Option<u32>,
-    /// Pixel filter.
-    pub filter: Option<PixelFilter>,
-}
-
-/// The `[render]` table; see [`Settings`].
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Render {
-    /// Samples per pixel.
-    pub spp: Option<u32>,
-    /// Path edges.
-    pub max_depth: Option<u32>,
-    /// 0 is off.
-    pub roulette_depth: Option<u32>,
-    /// 0 is off.
-    pub clamp_indirect: Option<f32>,
-    /// Random sequence.
-    pub seed: Option<u32>,
-    /// Random numbers.
-    pub sampler: Option<Sampler>,
 }
 
 /// The `[environment]` table; orientation: see `environment.rs`.
@@ -157,20 +128,10 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Description> {
 impl Description {
     /// The file's settings over the defaults.
     pub fn settings(&self) -> Settings {
-        let (d, film, render) = (Settings::default(), &self.film, &self.render);
-        Settings {
-            width: film.width.unwrap_or(d.width),
-            height: film.height.unwrap_or(d.height),
-            filter: film.filter.unwrap_or(d.filter),
-            spp: render.spp.unwrap_or(d.spp),
-            first_sample: d.first_sample,
-            max_depth: render.max_depth.unwrap_or(d.max_depth),
-            roulette_depth: render.roulette_depth.unwrap_or(d.roulette_depth),
-            clamp_indirect: render.clamp_indirect.unwrap_or(d.clamp_indirect),
-            seed: render.seed.unwrap_or(d.seed),
-            sampler: render.sampler.unwrap_or(d.sampler),
-            allocate: self.allocate.clone(),
-        }
+        let mut settings = Settings { allocate: self.allocate.clone(), ..Settings::default() };
+        self.film.apply(&mut settings);
+        self.render.apply(&mut settings);
+        settings
     }
 }
 
@@ -217,6 +178,25 @@ mod tests {
     }
 
     #[test]
+    fn tables_of_settings_are_read_as_other_tables() {
+        // Keys that policies own, and those that the scene file does not have.
+        let found = error("[allocate]\n\nwindwo = 3\n");
+        assert!(found.starts_with("s.toml, line 3: unknown key \"windwo\": did you mean \"window\"?"), "{found}");
+        assert!(error("[render]\nfirst_sample = 3").contains("line 2: unknown key"));
+        assert!(error("[allocate]\n\nfiltered = \"x\"").contains("line 3: invalid type"));
+        let found = error("[allocate]\npolicy = \"none\"");
+        assert!(found.contains("line 2: no policy \"none\": choose one of uniform, geometry"), "{found}");
+        let text = "[film]\nwidth = 8\n[allocate]\npolicy = \"both\"\nwindow = 3\nfiltered = 1\n";
+        let settings = parse(Path::new("s.toml"), text).unwrap().settings();
+        let Allocate { policy, geometry, both, .. } = &settings.allocate;
+        assert_eq!((settings.width, policy.name, geometry.window, both.filtered), (8, "both", 3, 1.0));
+        // A rendered file holds them as the scene file does.
+        let json = serde_json::to_value(&settings.allocate).unwrap();
+        assert_eq!((&json["policy"], &json["window"]), (&"both".into(), &3.into()));
+        assert_eq!(serde_json::from_value::<Allocate>(json).unwrap(), settings.allocate);
+    }
+
+    #[test]
     fn wrong_types_name_their_line() {
         assert!(error("[film]\n\nwidth = \"wide\"").starts_with("s.toml, line 3: invalid type: string"));
         assert!(error("[film]\nwidth = -1").contains("line 2"));
@@ -233,7 +213,7 @@ mod tests {
         assert_eq!(empty.settings(), Settings::default());
         let text = "[film]\nwidth = 8\nfilter = \"tent\"\n[environment]\nradiance = 2\n[[material]]\nname = \"a\"\ncolor = [1, 0.5, 0]";
         let d = parse(Path::new("s.toml"), text).unwrap();
-        assert_eq!((d.settings().width, d.settings().filter), (8, PixelFilter::Tent));
+        assert_eq!((d.settings().width, d.settings().filter), (8, crate::render::settings::PixelFilter::Tent));
         assert_eq!(d.environment.unwrap().radiance, Some(Rgb([2.0; 3])));
         assert_eq!(d.material[0].color, Some(Rgb([1.0, 0.5, 0.0])));
     }

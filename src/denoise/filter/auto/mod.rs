@@ -2,7 +2,7 @@
 //! `glsl/auto*.comp`.
 mod reference;
 
-use super::edge::Rates;
+use super::edge::{EdgeSettings, Rates};
 use super::noise_estimate::Estimate;
 use super::pack::Pack;
 use super::{Filter, FilterSettings, Planes, Row, guided, svgf};
@@ -33,22 +33,39 @@ const SUMMED: usize = (auto_sum::THREADS * auto_sum::EACH) as usize;
 /// hold more tightly and normals hardly.
 fn candidates(s: &FilterSettings) -> [(Row, FilterSettings); 4] {
     let windows = |radius: u32, depth: f32| {
-        let [x, y, z, w] = s.eps;
-        FilterSettings { radius, eps: [0.1 * x, 0.1 * y, 0.1 * z, depth * w], ..*s }
+        let [x, y, z, w] = s.guided.eps;
+        s.with(|s| {
+            s.footprint.radius = radius;
+            s.guided.eps = [0.1 * x, 0.1 * y, 0.1 * z, depth * w];
+        })
     };
-    let (sigma_l, sigma_n, sigma_x) = (0.75 * s.sigma_l, 4.0 * s.sigma_n, 0.6 * s.sigma_x);
+    let (sigma_l, sigma_n, sigma_x) = (0.75 * s.svgf.sigma_l, 4.0 * s.edge.sigma_n, 0.6 * s.edge.sigma_x);
     [
-        (guided::ROW, FilterSettings { radius: (4 * s.radius).div_ceil(3), channels: s.channels.min(3), ..*s }),
-        (guided::ROW, windows((2 * s.radius).div_ceil(3), 5e-3)),
+        (
+            guided::ROW,
+            s.with(|s| {
+                s.footprint.radius = (4 * s.footprint.radius).div_ceil(3);
+                s.guided.channels = s.guided.channels.min(3);
+            }),
+        ),
+        (guided::ROW, windows((2 * s.footprint.radius).div_ceil(3), 5e-3)),
         // Fewer than 5 x 5 pixels do not determine a model of four channels: little of a pixel is left to judge it by.
-        (guided::ROW, windows(s.radius.div_ceil(6).max(2), 5e-5)),
-        (svgf::ROW, FilterSettings { levels: s.levels.min(3), sigma_l, sigma_n, sigma_x, ..*s }),
+        (guided::ROW, windows(s.footprint.radius.div_ceil(6).max(2), 5e-5)),
+        (
+            svgf::ROW,
+            s.with(|s| {
+                s.footprint.levels = s.footprint.levels.min(3);
+                s.svgf.sigma_l = sigma_l;
+                s.edge.sigma_n = sigma_n;
+                s.edge.sigma_x = sigma_x;
+            }),
+        ),
     ]
 }
 
 /// What counts as one surface to the estimates of errors.
-fn alike(s: &FilterSettings) -> FilterSettings {
-    FilterSettings { sigma_n: 2.5 * s.sigma_n, sigma_x: 1.2 * s.sigma_x, ..*s }
+fn alike(s: &EdgeSettings) -> EdgeSettings {
+    EdgeSettings { sigma_n: 2.5 * s.sigma_n, sigma_x: 1.2 * s.sigma_x, ..*s }
 }
 
 /// Weight of what is not alike.
@@ -58,7 +75,7 @@ fn least(level: u32, across: bool) -> f32 {
 
 /// Luminance below which errors count as absolute: a thousandth of the image's intensity.
 fn floor(settings: &FilterSettings) -> f32 {
-    (1e-3 * settings.intensity).clamp(1e-30, 1e24)
+    (1e-3 * settings.edge.intensity).clamp(1e-30, 1e24)
 }
 
 /// A filter, and what it makes of its image and of a probe.
@@ -118,7 +135,7 @@ impl Auto {
         let [wide, middle, narrow, svgf] = candidates(settings).map(candidate);
         let sum = || Buffer::new(gpu, "sums of errors", pixels.div_ceil(SUMMED).max(1), Location::Device);
         let smooth = |three| {
-            let edge = Rates::of_surfaces(&alike(settings)).constants();
+            let edge = Rates::of_surfaces(&alike(&settings.edge)).constants();
             Kernel::new(gpu, &auto_smooth::Constants { edge, three })
         };
         Ok(Self {
@@ -219,7 +236,7 @@ impl Auto {
         [from, to]: [[&'a Buffer<vec4>; 3]; 2],
         across: bool,
     ) -> Result<()> {
-        let rates = Rates::of_surfaces(&alike(&self.settings)).as_array();
+        let rates = Rates::of_surfaces(&alike(&self.settings.edge)).as_array();
         // What the candidates made of the probes is not needed any more.
         let between = [0, 1, 2].map(|k| &self.candidates[k].kept);
         let smooth = &self.smooth[usize::from(across)];

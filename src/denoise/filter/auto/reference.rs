@@ -77,7 +77,7 @@ pub fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
     let (image, floor) = (Packed::reference(input), floor(settings));
     let noise = noise_estimate::reference(input, &image, settings);
     let results = Results::new(input, &image, settings);
-    let rates = Rates::of_surfaces(&alike(settings));
+    let rates = Rates::of_surfaces(&alike(&settings.edge));
     let size = [input.width, input.height].map(i64::from);
     let smoothed = |plane: Vec<Vec4>, across: bool| {
         let level =

@@ -1,0 +1,75 @@
+//! Where samples go, and what the policies can be told. What a policy alone reads is written in its own file.
+use super::both::{BothOverrides, BothSettings};
+use super::geometry::{GeometryOverrides, GeometrySettings};
+use super::variance::{VarianceOverrides, VarianceSettings};
+use super::{Placing, Row, uniform};
+use crate::error::{Error, Result};
+use crate::settings::entry::Value;
+use crate::settings::{FROM_0, settings};
+use serde::{Deserialize, Serialize};
+
+impl Value for &'static Row {
+    fn text(&self) -> String {
+        self.name.to_owned()
+    }
+}
+
+settings! {
+    /// Where samples go. The `[allocate]` table of a scene file.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(from = "AllocateOverrides")]
+    pub struct Allocate {
+        /// What is given of the `[allocate]` table.
+        AllocateOverrides {
+            /// Policy [default: uniform; variance with --noise-threshold]
+            policy: &'static Row = &uniform::ROW, .., [long = "allocate", value_name = "POLICY"];
+            /// Samples that every pixel gets before any is placed.
+            min_spp: u32 = 2, 0..=Self::MAX_SPP;
+            /// Samples that no pixel exceeds; 0 is off. Of threshold: the rounds until chance decides; 0 is --spp.
+            max_spp: u32 = 0, 0..=Self::MAX_SPP;
+            /// Rounds that the budget is spread over; 0: one, of policies that learn one for every 2 samples a pixel, up to 4.
+            rounds: u32 = 0, 0..=4096;
+            /// Stop when every pixel's relative error is estimated below this, or at --max-spp (else --spp); 0 is off.
+            noise_threshold: f32 = 0.0, FROM_0;
+            ..geometry: GeometrySettings, GeometryOverrides, [serde(flatten)];
+            ..variance: VarianceSettings, VarianceOverrides, [serde(flatten)];
+            ..both: BothSettings, BothOverrides, [serde(flatten)];
+        }
+    }
+}
+
+impl Allocate {
+    /// The largest number of samples per pixel.
+    pub const MAX_SPP: u32 = 1 << 24;
+
+    /// Whether all pixels get as many samples, and none is placed.
+    pub fn is_even(&self) -> bool {
+        self.policy.placing == Placing::Even
+    }
+
+    /// What no range of a single setting says.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the settings that do not go together.
+    pub fn check_together(&self) -> Result<()> {
+        let Self { policy, min_spp, max_spp, noise_threshold, .. } = self;
+        if *noise_threshold > 0.0 && policy.placing != Placing::Learning {
+            let name = policy.name;
+            return Err(Error::Usage(format!(
+                "noise-threshold needs a policy that learns, variance or both: not {name}"
+            )));
+        }
+        if *max_spp > 0 && min_spp > max_spp {
+            return Err(Error::Usage(format!("min-spp is {min_spp}: it must not exceed max-spp, {max_spp}")));
+        }
+        Ok(())
+    }
+}
+
+impl From<AllocateOverrides> for Allocate {
+    fn from(given: AllocateOverrides) -> Self {
+        let mut settings = Self::default();
+        given.apply(&mut settings);
+        settings
+    }
+}

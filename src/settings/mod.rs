@@ -1,0 +1,165 @@
+//! A setting is written once. One row of [`settings!`] gives the field and its default, the range and the message of a value
+//! beyond it, the key in TOML, the option of the command line and the option's help.
+pub mod entry;
+mod range;
+mod table;
+
+pub use range::{ABOVE_0, FINITE_ABOVE_0, FINITE_FROM_0, FROM_0, Is, NUMBER, Range};
+pub use table::{Table, read};
+
+/// Makes structs out of rows of settings:
+///
+/// ```text
+/// settings! {
+///     /// The settings of a film.
+///     #[derive(Clone, Debug)]
+///     pub struct Settings {
+///         /// The `[film]` table.
+///         Film {
+///             /// Film width in pixels.
+///             width: u32 = 512, 1..=16384;
+///             /// Samples per pixel.
+///             spp: u32 = 64, .., [visible_alias = "budget-spp"];
+///             ..camera: Camera, CameraOverrides;
+///         }
+///         ..allocate: Allocate;
+///     }
+/// }
+/// ```
+///
+/// `Settings` has a field for every row, with its default and, in [`entries`](entry::Entry), its range. `Film` has the same
+/// fields as options: it is read from a TOML table, whose unknown keys are refused, or with the feature `cli` from the
+/// command line, where an underscore is a hyphen and the comment is the help; what stands in brackets goes to clap as it is.
+/// `Film::apply` replaces those settings that were given. A struct may have several such parts. A row with two dots in a
+/// part is another struct's settings, in a field of their own, but keys and options of this part; one behind the parts is a
+/// field that has a table of its own.
+macro_rules! settings {
+    (
+        $(#[$meta:meta])*
+        pub struct $Whole:ident {
+            $(
+                $(#[$part_meta:meta])*
+                $Part:ident {
+                    $($(#[$doc:meta])* $name:ident: $type:ty = $default:expr, $range:expr $(, [$($arg:tt)*])?;)*
+                    $(..$group:ident: $Group:ty, $GroupPart:ty $(, [$($attribute:tt)*])?;)*
+                }
+            )+
+            $(..$table:ident: $Table:ty;)*
+        }
+    ) => {
+        $(#[$meta])*
+        pub struct $Whole {
+            $(
+                $(
+                    $(#[$doc])*
+                    #[doc = concat!("\n\nDefault `", stringify!($default), "`, range `", stringify!($range), "`.")]
+                    pub $name: $type,
+                )*
+                $(
+                    #[doc = concat!("See [`", stringify!($Group), "`].")]
+                    $(#[$($attribute)*])?
+                    pub $group: $Group,
+                )*
+            )+
+            $(
+                #[doc = concat!("See [`", stringify!($Table), "`].")]
+                pub $table: $Table,
+            )*
+        }
+
+        impl Default for $Whole {
+            fn default() -> Self {
+                Self {
+                    $($($name: $default,)* $($group: Default::default(),)*)+
+                    $($table: Default::default(),)*
+                }
+            }
+        }
+
+        impl $Whole {
+            /// Every setting with its range, as messages and help name it.
+            pub fn entries(&self) -> Vec<$crate::settings::entry::Entry> {
+                let own = [
+                    $(
+                        vec![$($crate::settings::entry::Entry::new(stringify!($name), &self.$name, $range),)*],
+                        $(self.$group.entries(),)*
+                    )+
+                    $(self.$table.entries(),)*
+                ];
+                own.concat()
+            }
+        }
+
+        $(
+            $(#[$part_meta])*
+            #[derive(Clone, Debug, Default)]
+            #[cfg_attr(feature = "cli", derive(clap::Args))]
+            pub struct $Part {
+                $(
+                    $(#[$doc])*
+                    #[cfg_attr(feature = "cli", arg(long $(, $($arg)*)?))]
+                    pub $name: Option<$type>,
+                )*
+                $(
+                    #[doc = concat!("See [`", stringify!($Group), "`].")]
+                    #[cfg_attr(feature = "cli", command(flatten))]
+                    pub $group: $GroupPart,
+                )*
+            }
+
+            impl $Part {
+                /// Replaces those settings that are given.
+                pub fn apply(&self, settings: &mut $Whole) {
+                    $(
+                        if let Some(value) = self.$name {
+                            settings.$name = value;
+                        }
+                    )*
+                    $(self.$group.apply(&mut settings.$group);)*
+                }
+            }
+
+            impl $crate::settings::Table for $Part {
+                fn keys() -> Vec<&'static str> {
+                    let keys = [vec![$(stringify!($name)),*], $(<$GroupPart as $crate::settings::Table>::keys()),*];
+                    keys.concat()
+                }
+
+                fn take<'de, A: serde::de::MapAccess<'de>>(&mut self, key: &str, map: &mut A) -> std::result::Result<(), A::Error> {
+                    match key {
+                        $(stringify!($name) => self.$name = Some(map.next_value()?),)*
+                        $(_ if <$GroupPart as $crate::settings::Table>::keys().contains(&key) => self.$group.take(key, map)?,)*
+                        _ => {}
+                    }
+                    Ok(())
+                }
+            }
+
+            impl<'de> serde::Deserialize<'de> for $Part {
+                fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+                    $crate::settings::read(deserializer)
+                }
+            }
+        )+
+    };
+}
+pub(crate) use settings;
+
+/// Makes an enum whose variants are a setting's values, named in kebab case in TOML, on the command line and in messages.
+macro_rules! choices {
+    ($(#[$meta:meta])* pub enum $Name:ident { $($variants:tt)* }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+        #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+        #[serde(rename_all = "kebab-case")]
+        pub enum $Name { $($variants)* }
+
+        impl $crate::settings::entry::Value for $Name {
+            fn text(&self) -> String {
+                let word = serde_json::to_value(self).unwrap_or_default();
+                word.as_str().unwrap_or_default().to_owned()
+            }
+        }
+    };
+}
+pub(crate) use choices;
