@@ -2,7 +2,7 @@
 use crate::layout::{BrokenTally, FoldPush, PixelLight, PixelStats, vec3, vec4};
 use crate::shaders;
 use crate::shaders::accumulate::{BRIGHTEST, FARTHEST, FEW, SMALLEST_ALBEDO, WIDEST};
-use crate::statistics::luminance;
+use crate::statistics::{luminance, next_sample};
 use crate::twins::sampler::pcg;
 use glam::{Vec3, Vec4};
 
@@ -35,7 +35,7 @@ pub fn fold(
             let at = k * push.pixels as usize + i;
             let record = if split_light { 3 * at } else { at };
             if samples[record][3] < 0.0 {
-                report(&mut broken, push.tile + pixel as u32, stats[pixel].count);
+                report(&mut broken, push.tile + pixel as u32, next_sample(&stats[pixel]));
             }
             if split_light {
                 let [direct, indirect, albedo] = [0, 1, 2].map(|j| Vec4::from(samples[record + j]).truncate());
