@@ -81,6 +81,12 @@ pub fn join(a: &Pixel, b: &Pixel) -> Pixel {
     }
 }
 
+/// Index of the pixel's next sample; 0 is the render's first. It is the count while all samples behind the mean are of this
+/// render: samples carried over from an earlier frame would be subtracted here, as in `glsl/shared/next_sample.glsl`.
+pub fn next_sample(s: &PixelStats) -> u32 {
+    s.count
+}
+
 /// Squared standard error of a pixel: m2 / (n (n - 1)); 0 for fewer than two samples, which tell nothing.
 pub fn variance_of_mean(s: &PixelStats) -> vec3 {
     let n = s.count as f32;

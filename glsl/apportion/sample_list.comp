@@ -10,6 +10,7 @@ layout(scalar, push_constant) uniform Push { BatchPush push; };
 
 #include "shared/first_path.glsl"
 #include "shared/loop_limit.glsl"
+#include "shared/next_sample.glsl"
 
 const uint PLAIN = 32u; // of each of a thread's 64 pixels at most: see shared/loop_limit.glsl
 
@@ -20,7 +21,7 @@ uvec2 places(uint64_t from, uint64_t to, uint64_t begin, uint64_t end) {
 }
 
 // Earlier batches of this round are in it.
-uint first_index(uint pixel) { return push.first_sample + PixelStats_count(stats, pixel); }
+uint first_index(uint pixel) { return push.first_sample + next_sample(PixelStats_count(stats, pixel)); }
 
 void main() {
     uint first = first_item();

@@ -18,6 +18,7 @@ layout(scalar, push_constant) uniform Push { FoldPush push; };
 
 #include "shared/first_path.glsl"
 #include "shared/loop_limit.glsl"
+#include "shared/next_sample.glsl"
 const uint PLAIN = 2048u; // see shared/loop_limit.glsl
 
 // A channel whose albedo is below this cannot be divided out; its light stays with the direct light.
@@ -80,11 +81,11 @@ void fold_light(inout PixelLight l, vec3 kept, vec3 irradiance, float share, uin
     l.indirect_m2 = min(l.indirect_m2 + square(off, luminance(irradiance) - luminance(l.indirect)), MAX_M2);
 }
 
-// `first_broken`: samples before the first that was no number, which the sign of its rays tells.
+// `first_broken`: index of the first sample that was no number, which the sign of its rays tells.
 void fold(inout PixelStats s, inout PixelLight l, inout uint broken_count, inout uint first_broken, int at) {
     vec4 first = texelFetch(samples, FX_SPLIT ? 3 * at : at);
     vec3 radiance = first.rgb;
-    if (first.w < 0.0 && broken_count++ == 0u) first_broken = s.count;
+    if (first.w < 0.0 && broken_count++ == 0u) first_broken = next_sample(s.count);
     s.count++;
     float share = 1.0 / float(s.count);
     if (FX_SPLIT) {

@@ -139,8 +139,8 @@ fn rows(args: &Args) -> Result<Vec<Row>> {
     let scene = Scene::load(&args.scene, &shrink)?;
     let outputs = Outputs { split_light: true, guides: true, counters: false };
     let (base, reasons) = scene::effects(&scene, outputs.split_light, outputs.counters);
-    let called_for_by = |effect| reasons.iter().find(|(name, _)| *name == effect).map_or("", |(_, by)| by).to_owned();
-    let names: Vec<_> = Effects::NAMES.iter().copied().chain([GUIDES]).collect();
+    let called_for_by = |effect| reasons.iter().find(|(of, _)| *of == effect).map_or("", |(_, by)| by).to_owned();
+    let names: Vec<_> = Effect::ALL.iter().map(|effect| effect.name()).chain([GUIDES]).collect();
     if let Some(unknown) = args.effects.iter().find(|name| !names.contains(&name.as_str())) {
         return Err(Error::Usage(format!("no effect \"{unknown}\": choose of {}", names.join(", "))));
     }
@@ -155,22 +155,24 @@ fn rows(args: &Args) -> Result<Vec<Row>> {
         Ok::<_, Error>(Row {
             effect,
             on,
-            called_for_by: called_for_by(effect),
+            called_for_by: String::new(),
             gpu_ms_with: Some(with.gpu_ms),
             gpu_ms_without: Some(without.gpu_ms),
             compile_ms: Some((with.compile_ms - without.compile_ms).max(0.0)),
-            bytes: scene_bytes(effect, &scene) + with.bytes.saturating_sub(without.bytes),
+            bytes: with.bytes.saturating_sub(without.bytes),
         })
     };
     let mut rows = Vec::new();
-    let effects = Effects::NAMES.iter().copied().zip(base.switches());
-    for (effect, on) in effects.filter(|(name, _)| wanted(name)) {
+    let effects = Effect::ALL.iter().copied().zip(base.switches());
+    for (effect, on) in effects.filter(|(effect, _)| wanted(effect.name())) {
         let then = base.toggled(effect);
         let outputs_then = Outputs { split_light: then.split_light, counters: then.counters, ..outputs };
-        let row = price((effect, on), outputs_then, then)?;
+        let row = price((effect.name(), on), outputs_then, then)?;
+        let bytes = row.bytes + scene_bytes(effect, &scene);
+        let row = Row { called_for_by: called_for_by(effect), bytes, ..row };
         // With and without it are different renders, not one picture at two prices: tools/adaptive compares those.
         let unknown = Row { gpu_ms_with: None, gpu_ms_without: None, compile_ms: None, ..row.clone() };
-        rows.push(if effect == "adaptive" { unknown } else { row });
+        rows.push(if effect == Effect::adaptive { unknown } else { row });
     }
     if wanted(GUIDES) {
         let guides = price((GUIDES, true), Outputs { guides: false, ..outputs }, base)?;
@@ -201,8 +203,8 @@ fn in_turn(a: impl Fn() -> Result<Variant>, b: impl Fn() -> Result<Variant>) -> 
     Ok((least(first[0], a.cost), least(first[1], b.cost)))
 }
 
-/// Device memory of the scene's records that nothing but this effect reads.
-fn scene_bytes(effect: &str, scene: &Scene) -> u64 {
+/// Device memory of the scene's records that nothing but this effect reads. A new effect must say here what it takes.
+fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
     let maps = |of: fn(&Material) -> [u32; 4]| {
         let named: BTreeSet<u32> = scene.materials.iter().flat_map(of).filter(|&map| map != NONE).collect();
         let texels = |map: u32| (scene.textures[map as usize].width * scene.textures[map as usize].height) as usize;
@@ -213,21 +215,42 @@ fn scene_bytes(effect: &str, scene: &Scene) -> u64 {
         lights.count() * (size_of::<Light>() + size_of::<AliasEntry>())
     };
     let bytes = match effect {
-        "textures" => maps(|m| [m.base_texture, m.specular_texture, m.roughness_texture, m.emission_texture]),
-        "bump_maps" => maps(|m| [if m.flags & MATERIAL_NORMAL_MAP == 0 { m.bump_texture } else { NONE }; 4]),
-        "normal_maps" => maps(|m| [if m.flags & MATERIAL_NORMAL_MAP != 0 { m.bump_texture } else { NONE }; 4]),
-        "alpha_masks" => maps(|m| [m.opacity_texture; 4]),
-        "smooth_normals" => size_of_val(&scene.shading[..]),
-        "instances" => size_of_val(&scene.instances[..]),
-        "environment_map" => {
+        Effect::textures => maps(|m| [m.base_texture, m.specular_texture, m.roughness_texture, m.emission_texture]),
+        Effect::bump_maps => maps(|m| [if m.flags & MATERIAL_NORMAL_MAP == 0 { m.bump_texture } else { NONE }; 4]),
+        Effect::normal_maps => maps(|m| [if m.flags & MATERIAL_NORMAL_MAP != 0 { m.bump_texture } else { NONE }; 4]),
+        Effect::alpha_masks => maps(|m| [m.opacity_texture; 4]),
+        Effect::smooth_normals => size_of_val(&scene.shading[..]),
+        Effect::instances => size_of_val(&scene.instances[..]),
+        Effect::environment_map => {
             scene.environment.as_ref().map_or(0, |e| size_of_val(&e.texels[..]) + size_of_val(&e.table[..]))
         }
-        "emissive" => lights(LIGHT_TRIANGLE),
-        "point_lights" => lights(LIGHT_POINT),
-        "spot_lights" => lights(LIGHT_SPOT),
-        "directional_lights" => lights(LIGHT_DIRECTIONAL),
-        "environment" => lights(LIGHT_ENVIRONMENT),
-        _ => 0,
+        Effect::emissive => lights(LIGHT_TRIANGLE),
+        Effect::point_lights => lights(LIGHT_POINT),
+        Effect::spot_lights => lights(LIGHT_SPOT),
+        Effect::directional_lights => lights(LIGHT_DIRECTIONAL),
+        Effect::environment => lights(LIGHT_ENVIRONMENT),
+        // A sphere lies in the records of a triangle, and a large lamp is a lamp that is sampled in another way.
+        Effect::spheres | Effect::large_lamps => 0,
+        // What materials are made of: every material has room for all of it.
+        Effect::diffuse
+        | Effect::conductor
+        | Effect::dielectric
+        | Effect::coated
+        | Effect::rough
+        | Effect::smooth_interface
+        | Effect::beckmann
+        | Effect::ggx => 0,
+        // What settings and outputs ask for: no record of the scene.
+        Effect::lens
+        | Effect::indirect
+        | Effect::roulette
+        | Effect::clamp
+        | Effect::pixel_filter
+        | Effect::split_light
+        | Effect::independent_sampler
+        | Effect::counters
+        | Effect::adaptive
+        | Effect::many_samples => 0,
     };
     bytes as u64
 }

@@ -9,21 +9,34 @@ macro_rules! effects {
         impl Effects {
             /// Every effect switched on (`--effects all`).
             pub const ALL: Self = Self { $($field: true,)+ };
-            /// Their names, in the order of their ids.
-            pub const NAMES: &[&str] = &[$(stringify!($field),)+];
-
             /// Which are on, in the order of their ids.
-            pub fn switches(&self) -> [bool; Self::NAMES.len()] {
+            pub fn switches(&self) -> [bool; Effect::ALL.len()] {
                 [$(self.$field,)+]
             }
 
-            /// The same with the effect of this name switched; unknown names change nothing.
-            pub fn toggled(mut self, name: &str) -> Self {
-                match name {
-                    $(stringify!($field) => self.$field = !self.$field,)+
-                    _ => {}
-                }
+            /// The same with one effect switched.
+            pub fn toggled(mut self, effect: Effect) -> Self {
+                let switch = match effect {
+                    $(Effect::$field => &mut self.$field,)+
+                };
+                *switch = !*switch;
                 self
+            }
+        }
+
+        /// One of [`Effects`]. They are named as its fields are, so that both come from one list.
+        #[allow(non_camel_case_types)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub enum Effect { $($(#[$doc])* $field,)+ }
+        impl Effect {
+            /// All of them, in the order of their ids.
+            pub const ALL: &[Self] = &[$(Self::$field,)+];
+
+            /// The name that users know it by.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$field => stringify!($field),)+
+                }
             }
         }
         /// What the shaders call them, in the order of their ids.

@@ -116,7 +116,7 @@ impl<'a> Job<'a> {
 
     /// Reads back what there is: the layers that the renderer's [`super::Outputs`] ask for, and as metadata what
     /// [`Checkpoint::read`] and [`super::merge`] go by. Written as EXR, such a file can be resumed and merged; not once the
-    /// renderer's camera was moved, as its samples are then of no scene that was loaded.
+    /// renderer's camera was moved, as its samples are then of no scene that was loaded, and not before the first sample.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`].

@@ -88,7 +88,7 @@ pub struct Gap {
 /// # Errors
 /// [`Error::Input`] when a file cannot be read or does not belong to the others, [`Error::Device`] when there is not enough
 /// memory, [`Error::Usage`] when there is no file, or when a pixel would have more samples than it can count.
-pub fn merge(files: &[impl AsRef<Path>]) -> Result<Merged> {
+pub fn merge<P: AsRef<Path>>(files: &[P]) -> Result<Merged> {
     let (mut parts, mut film) = (Vec::<Part>::new(), Film::default());
     for path in files.iter().map(AsRef::as_ref) {
         let (part, own_film) = Part::read(path)?;

@@ -9,7 +9,7 @@ use crate::layout::{PixelLight, PixelStats};
 use crate::render::schedule;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
-use crate::statistics::{BrokenSamples, Pixel};
+use crate::statistics::{BrokenSamples, Pixel, next_sample};
 use serde_json::Value;
 use std::path::Path;
 
@@ -49,7 +49,7 @@ impl Checkpoint {
         let Rendered { pixels, broken, pending, .. } = rendered;
         let pending = match pending {
             _ if settings.allocate.is_even() => {
-                pixels.iter().map(|p| settings.spp.saturating_sub(p.stats.count)).collect()
+                pixels.iter().map(|p| settings.spp.saturating_sub(next_sample(&p.stats))).collect()
             }
             pending => pending.unwrap_or_else(|| vec![0; pixels.len()]),
         };

@@ -6,7 +6,7 @@ use crate::render::settings::{PixelFilter, Sampler};
 
 /// The effects of a scene with its settings, and for each one that is on the first object, material, light or setting
 /// that calls for it. `split_light`: direct and indirect light are wanted apart. `counters`: rays are counted.
-pub fn effects(scene: &Scene, split_light: bool, counters: bool) -> (Effects, Vec<(&'static str, String)>) {
+pub fn effects(scene: &Scene, split_light: bool, counters: bool) -> (Effects, Vec<(Effect, String)>) {
     let mut reasons = Vec::new();
     let used = used_materials(scene);
     let mut material = |name, calls: &dyn Fn(&Material) -> bool| {
@@ -21,25 +21,25 @@ pub fn effects(scene: &Scene, split_light: bool, counters: bool) -> (Effects, Ve
     let smooth = |m: &Material| interface(m) && (m.alpha < SMOOTH_ALPHA || m.roughness_texture != NONE);
     let rough = |m: &Material| interface(m) && m.alpha >= SMOOTH_ALPHA;
     let mut found = Effects {
-        textures: material("textures", &|m| {
+        textures: material(Effect::textures, &|m| {
             [m.base_texture, m.specular_texture, m.roughness_texture, m.emission_texture].iter().any(|&t| t != NONE)
         }),
-        bump_maps: material("bump_maps", &|m| bumped(m, false)),
-        normal_maps: material("normal_maps", &|m| bumped(m, true)),
-        alpha_masks: material("alpha_masks", &|m| m.flags & MATERIAL_MASKED != 0),
-        diffuse: material("diffuse", &|m| matches!(m.kind, BSDF_DIFFUSE | BSDF_COATED)),
-        conductor: material("conductor", &|m| m.kind == BSDF_CONDUCTOR),
-        dielectric: material("dielectric", &|m| m.kind == BSDF_DIELECTRIC),
-        coated: material("coated", &|m| m.kind == BSDF_COATED),
-        rough: material("rough", &rough),
-        smooth_interface: material("smooth_interface", &smooth),
-        beckmann: material("beckmann", &|m| rough(m) && m.flags & MATERIAL_GGX == 0),
-        ggx: material("ggx", &|m| rough(m) && m.flags & MATERIAL_GGX != 0),
+        bump_maps: material(Effect::bump_maps, &|m| bumped(m, false)),
+        normal_maps: material(Effect::normal_maps, &|m| bumped(m, true)),
+        alpha_masks: material(Effect::alpha_masks, &|m| m.flags & MATERIAL_MASKED != 0),
+        diffuse: material(Effect::diffuse, &|m| matches!(m.kind, BSDF_DIFFUSE | BSDF_COATED)),
+        conductor: material(Effect::conductor, &|m| m.kind == BSDF_CONDUCTOR),
+        dielectric: material(Effect::dielectric, &|m| m.kind == BSDF_DIELECTRIC),
+        coated: material(Effect::coated, &|m| m.kind == BSDF_COATED),
+        rough: material(Effect::rough, &rough),
+        smooth_interface: material(Effect::smooth_interface, &smooth),
+        beckmann: material(Effect::beckmann, &|m| rough(m) && m.flags & MATERIAL_GGX == 0),
+        ggx: material(Effect::ggx, &|m| rough(m) && m.flags & MATERIAL_GGX != 0),
         ..Effects::default()
     };
     light_effects(scene, &mut found, &mut reasons);
     other_effects(scene, split_light, counters, &mut found, &mut reasons);
-    reasons.sort_by_key(|r| Effects::NAMES.iter().position(|&name| name == r.0));
+    reasons.sort_by_key(|r| r.0);
     (found, reasons)
 }
 
@@ -56,19 +56,19 @@ fn used_materials(scene: &Scene) -> Vec<bool> {
     used
 }
 
-fn light_effects(scene: &Scene, found: &mut Effects, reasons: &mut Vec<(&'static str, String)>) {
+fn light_effects(scene: &Scene, found: &mut Effects, reasons: &mut Vec<(Effect, String)>) {
     let mut light = |name, kind| {
         let first = scene.lights.iter().position(|l| l.kind == kind);
         first.inspect(|&i| reasons.push((name, light_name(scene, i)))).is_some()
     };
-    found.emissive = light("emissive", LIGHT_TRIANGLE) || light("emissive", LIGHT_SPHERE);
-    found.point_lights = light("point_lights", LIGHT_POINT);
-    found.spot_lights = light("spot_lights", LIGHT_SPOT);
-    found.directional_lights = light("directional_lights", LIGHT_DIRECTIONAL);
-    found.environment = light("environment", LIGHT_ENVIRONMENT);
-    found.environment_map = scene.environment.is_some() && light("environment_map", LIGHT_ENVIRONMENT);
+    found.emissive = light(Effect::emissive, LIGHT_TRIANGLE) || light(Effect::emissive, LIGHT_SPHERE);
+    found.point_lights = light(Effect::point_lights, LIGHT_POINT);
+    found.spot_lights = light(Effect::spot_lights, LIGHT_SPOT);
+    found.directional_lights = light(Effect::directional_lights, LIGHT_DIRECTIONAL);
+    found.environment = light(Effect::environment, LIGHT_ENVIRONMENT);
+    found.environment_map = scene.environment.is_some() && light(Effect::environment_map, LIGHT_ENVIRONMENT);
     let large = scene.lights.iter().position(|l| lights::is_large(scene, l));
-    found.large_lamps = large.inspect(|&i| reasons.push(("large_lamps", light_name(scene, i)))).is_some();
+    found.large_lamps = large.inspect(|&i| reasons.push((Effect::large_lamps, light_name(scene, i)))).is_some();
 }
 
 fn light_name(scene: &Scene, index: usize) -> String {
@@ -85,7 +85,7 @@ fn other_effects(
     split_light: bool,
     counters: bool,
     found: &mut Effects,
-    reasons: &mut Vec<(&'static str, String)>,
+    reasons: &mut Vec<(Effect, String)>,
 ) {
     let s = &scene.settings;
     let mut because = |name, on: bool, why: String| {
@@ -98,26 +98,26 @@ fn other_effects(
     let object =
         bent.and_then(|i| scene.triangles.get(i)).map(|t| t.object as usize).and_then(|o| scene.names.objects.get(o));
     let named = format!("object \"{}\"", object.map_or("", |o| o));
-    found.smooth_normals = because("smooth_normals", bent.is_some(), named);
+    found.smooth_normals = because(Effect::smooth_normals, bent.is_some(), named);
     let ball = scene.triangles.iter().find(|t| t.primitive & SPHERE != 0);
     let object = ball.and_then(|t| scene.names.objects.get(t.object as usize));
-    found.spheres = because("spheres", ball.is_some(), format!("object \"{}\"", object.map_or("", |o| o)));
-    found.lens = because("lens", scene.camera.lens_radius > 0.0, "camera lens_radius".into());
+    found.spheres = because(Effect::spheres, ball.is_some(), format!("object \"{}\"", object.map_or("", |o| o)));
+    found.lens = because(Effect::lens, scene.camera.lens_radius > 0.0, "camera lens_radius".into());
     let instances = scene.instances.len();
-    found.instances = because("instances", instances > 0, format!("{instances} instances"));
-    found.indirect = because("indirect", s.max_depth > 2, format!("max_depth {}", s.max_depth));
-    found.roulette = because("roulette", s.roulette_depth > 0, format!("roulette_depth {}", s.roulette_depth));
-    found.clamp = because("clamp", s.clamp_indirect > 0.0, format!("clamp_indirect {}", s.clamp_indirect));
-    found.pixel_filter = because("pixel_filter", s.filter != PixelFilter::Box, format!("filter {:?}", s.filter));
+    found.instances = because(Effect::instances, instances > 0, format!("{instances} instances"));
+    found.indirect = because(Effect::indirect, s.max_depth > 2, format!("max_depth {}", s.max_depth));
+    found.roulette = because(Effect::roulette, s.roulette_depth > 0, format!("roulette_depth {}", s.roulette_depth));
+    found.clamp = because(Effect::clamp, s.clamp_indirect > 0.0, format!("clamp_indirect {}", s.clamp_indirect));
+    found.pixel_filter = because(Effect::pixel_filter, s.filter != PixelFilter::Box, format!("filter {:?}", s.filter));
     found.split_light =
-        because("split_light", split_light, "an output that keeps direct and indirect light apart".into());
+        because(Effect::split_light, split_light, "an output that keeps direct and indirect light apart".into());
     let independent = s.sampler == Sampler::Independent;
-    found.independent_sampler = because("independent_sampler", independent, "sampler independent".into());
+    found.independent_sampler = because(Effect::independent_sampler, independent, "sampler independent".into());
     let policy = s.allocate.policy.name;
-    found.adaptive = because("adaptive", !s.allocate.is_even(), format!("allocate {policy}"));
+    found.adaptive = because(Effect::adaptive, !s.allocate.is_even(), format!("allocate {policy}"));
     let most = s.spp.max(s.allocate.max_spp);
-    found.many_samples = because("many_samples", most > 4096, format!("{most} samples of a pixel"));
-    found.counters = because("counters", counters, "ray counters".into());
+    found.many_samples = because(Effect::many_samples, most > 4096, format!("{most} samples of a pixel"));
+    found.counters = because(Effect::counters, counters, "ray counters".into());
 }
 
 #[cfg(test)]
@@ -137,12 +137,12 @@ mod tests {
         scene.settings.max_depth = 2;
         let (found, reasons) = effects(&scene, false, false);
         assert_eq!(found, Effects { diffuse: true, ..Effects::default() });
-        assert_eq!(reasons, [("diffuse", "material \"wall\"".to_owned())]);
+        assert_eq!(reasons, [(Effect::diffuse, "material \"wall\"".to_owned())]);
         scene.triangles[0].material = 1;
         let (found, reasons) = effects(&scene, true, false);
         let expected = Effects { conductor: true, smooth_interface: true, split_light: true, ..Effects::default() };
         assert_eq!(found, expected);
-        assert_eq!(reasons[0], ("conductor", "material \"mirror\"".to_owned()));
+        assert_eq!(reasons[0], (Effect::conductor, "material \"mirror\"".to_owned()));
         assert_eq!(reasons.len(), 3);
     }
 }

@@ -3,7 +3,7 @@ use crate::layout::{BrokenTally, FoldPush, PixelLight, PixelStats, vec3, vec4};
 use crate::math::hash::pcg;
 use crate::shaders;
 use crate::shaders::accumulate::{FEW, MAX_DEVIATION, MAX_IRRADIANCE, MAX_M2, MIN_ALBEDO};
-use crate::statistics::luminance;
+use crate::statistics::{luminance, next_sample};
 use glam::{Vec3, Vec4};
 
 /// Of the remainder of a mean, for each channel.
@@ -35,7 +35,7 @@ pub fn fold(
             let at = k * push.pixels as usize + i;
             let record = if split_light { 3 * at } else { at };
             if samples[record][3] < 0.0 {
-                report(&mut broken, push.tile + pixel as u32, stats[pixel].count);
+                report(&mut broken, push.tile + pixel as u32, next_sample(&stats[pixel]));
             }
             if split_light {
                 let [direct, indirect, albedo] = [0, 1, 2].map(|j| Vec4::from(samples[record + j]).truncate());

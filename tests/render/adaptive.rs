@@ -204,7 +204,8 @@ fn a_render_resumed_anywhere_has_the_bits_of_one_that_never_stopped() {
         let cut = Cut { pixels: SIZE[0] * SIZE[1], tile: 1 << 20, paths: 300 };
         let all = schedule::steps(&scene.settings, &cut).count();
         let job = Job { paths_at_once: cut.paths, ..Job::new(&renderer) };
-        for stop in [1, 2, 3, all / 2, all - 2, all] {
+        // After the first step, which starts the film, there are no samples that a file could name.
+        for stop in [2, 3, 4, all / 2, all - 2, all] {
             let checkpoint = interrupted(&job, &mut frame, &scene, stop);
             let resumed = Job { checkpoint: Some(&checkpoint), ..Job::new(&renderer) };
             resumed.run_to_end(&mut frame).unwrap();

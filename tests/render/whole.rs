@@ -4,7 +4,9 @@ use crate::alike::alike;
 use crate::support;
 use std::path::Path;
 use tallow::gpu::{Buffer, FrameResources, Gpu, Location};
-use tallow::layout::{BSDF_COATED, BSDF_DIFFUSE, Effects, Guide, Material, NONE, PixelLight, PixelStats, Triangle};
+use tallow::layout::{
+    BSDF_COATED, BSDF_DIFFUSE, Effect, Effects, Guide, Material, NONE, PixelLight, PixelStats, Triangle,
+};
 use tallow::render::settings::{PixelFilter, Sampler, Settings};
 use tallow::render::{self, Batch, Job, Outputs, Renderer, Step};
 use tallow::scene::Scene;
@@ -87,13 +89,13 @@ fn a_recorded_frame_keeps_its_camera() {
 /// The effects that change the picture when they are compiled in alone, for the message of a failure.
 fn culprits(gpu: &Gpu, scene: &Scene, expected: &[PixelStats]) -> String {
     let called_for = render::called_for(scene, Outputs::default());
-    let effects = Effects::NAMES.iter().copied().zip(called_for.switches());
-    let off = effects.filter(|(name, on)| !on && *name != "independent_sampler").map(|(name, _)| name);
-    let changes = |name: &&str| {
-        let other = Renderer::specialised(gpu, scene, Outputs::default(), called_for.toggled(name)).unwrap();
+    let effects = Effect::ALL.iter().copied().zip(called_for.switches());
+    let off = effects.filter(|&(effect, on)| !on && effect != Effect::independent_sampler).map(|(effect, _)| effect);
+    let changes = |&effect: &Effect| {
+        let other = Renderer::specialised(gpu, scene, Outputs::default(), called_for.toggled(effect)).unwrap();
         bits(&support::render(gpu, &other)) != bits(expected)
     };
-    off.filter(changes).collect::<Vec<_>>().join(", ")
+    off.filter(changes).map(Effect::name).collect::<Vec<_>>().join(", ")
 }
 
 /// What is called for, and all effects.
