@@ -59,7 +59,6 @@ fn main() {
 
 fn build() -> Result<()> {
     println!("cargo:rerun-if-changed=build.rs");
-    println!("cargo:rerun-if-changed=src/layout/mod.rs");
     println!("cargo:rerun-if-changed=src/layout");
     println!("cargo:rerun-if-changed=tools/build");
     println!("cargo:rerun-if-changed=glsl");
@@ -187,5 +186,5 @@ fn expand(file: &str, text: &str, sources: &mut Vec<Source>) -> Result<String> {
 /// One specialisation constant an effect, whose place in the list is its id.
 fn effects() -> String {
     let line = |(id, name): (usize, &&str)| format!("layout(constant_id = {id}) const bool {name} = true;\n");
-    layout::effects::GLSL_NAMES.iter().enumerate().map(line).collect()
+    layout::GLSL_NAMES.iter().enumerate().map(line).collect()
 }

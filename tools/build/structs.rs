@@ -1,16 +1,16 @@
 //! The GLSL of the structs in `src/layout`, and of the functions by which kernels read and write them: no kernel knows where in a
 //! struct a field lies.
 use crate::interface::Binding;
-use crate::layout::{self, Field, Struct};
+use crate::layout::{Field, GLSL_CONSTANTS, STRUCTS, Struct};
 use std::ops::Range;
 
 fn structs() -> impl Iterator<Item = &'static Struct> {
-    [layout::STRUCTS, layout::allocate::STRUCTS, layout::filter::STRUCTS].into_iter().flatten()
+    STRUCTS.into_iter().flatten()
 }
 
 /// What stands before the text of a kernel with these bindings: constants, structs, and the functions of those that it binds.
 pub fn glsl(bindings: &[Binding]) -> String {
-    let mut text = layout::GLSL_CONSTANTS.to_owned();
+    let mut text = GLSL_CONSTANTS.to_owned();
     for s in structs() {
         let fields: String = s.fields.iter().map(|f| format!("    {} {};\n", f.ty, f.name)).collect();
         text += &format!("struct {} {{\n{fields}}};\n", s.name);

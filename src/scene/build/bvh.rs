@@ -10,6 +10,7 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::cwbvh::CwBvh;
 use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
+use obvhs::cwbvh::node::CwBvhNode;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use std::collections::HashSet;
 use std::ops::Range;
@@ -131,14 +132,31 @@ fn build<T: Boundable + Sync>(items: &[T], first: u32, nodes: &mut Vec<BvhNode>)
     }
     let bvh = compressed(items);
     nodes.reserve_exact(bvh.nodes.len());
-    nodes.extend(bvh.nodes.iter().map(|node| {
-        // The two structs agree byte for byte; only the indices become global.
-        let mut node: BvhNode = bytemuck::cast(*node);
-        node.child_base += root;
-        node.primitive_base += first;
-        node
+    // Indices become global.
+    nodes.extend(bvh.nodes.iter().map(node_of).map(|node| BvhNode {
+        child_base: node.child_base + root,
+        primitive_base: node.primitive_base + first,
+        ..node
     }));
     (root, bvh.primitive_indices)
+}
+
+fn node_of(n: &CwBvhNode) -> BvhNode {
+    let [x, y, z] = n.e;
+    BvhNode {
+        p: n.p.into(),
+        e_imask: u32::from_le_bytes([x, y, z, n.imask]),
+        child_base: n.child_base_idx,
+        primitive_base: n.primitive_base_idx,
+        meta: bytemuck::cast(n.child_meta),
+        min_x: bytemuck::cast(n.child_min_x),
+        max_x: bytemuck::cast(n.child_max_x),
+        min_y: bytemuck::cast(n.child_min_y),
+        max_y: bytemuck::cast(n.child_max_y),
+        min_z: bytemuck::cast(n.child_min_z),
+        max_z: bytemuck::cast(n.child_max_z),
+        ..Default::default()
+    }
 }
 
 /// Search distance 6, then reinsertion. On Crytek Sponza, reinserting 10 % of the nodes instead of 2 % builds in 0.42 s
@@ -165,7 +183,7 @@ fn collapsed(bvh2: &mut Bvh2) -> CwBvh {
         // Eight children are seven levels deep at most, and a leaf of three triangles two.
         if level::height(bvh2) <= 7 * LEVELS + 2 {
             let bvh = bvh2_to_cwbvh(bvh2, LEAF, true, false);
-            if depth(bytemuck::cast_slice(&bvh.nodes), 0) <= LEVELS {
+            if depth(&bvh.nodes.iter().map(node_of).collect::<Vec<_>>(), 0) <= LEVELS {
                 return bvh;
             }
         }

@@ -1,0 +1,67 @@
+//! Numbers that both sides know by name.
+#[cfg(doc)]
+use super::*;
+use super::{float, uint};
+
+constants! {
+    /// "No texture", "no material override", "no hit".
+    NONE: uint = 0xffffffff;
+    /// Groups of nodes that a traversal can put aside; scenes that need more are refused when they are loaded.
+    TRAVERSAL_STACK: uint = 32;
+    /// Set in [`FrameConstants::root`] when the leaves of that level are instances.
+    ROOT_OF_INSTANCES: uint = 0x80000000;
+    /// Set in [`Triangle::primitive`] of a sphere.
+    SPHERE: uint = 0x80000000;
+    /// [`Triangle::primitive`] of a sphere: its front side is the inner one.
+    SPHERE_INWARD: uint = 1;
+    /// [`Triangle::primitive`] of a sphere: its azimuth runs the other way, as a mirror shows it.
+    SPHERE_MIRRORED: uint = 2;
+    /// [`Material::kind`]: Lambertian reflection, `base_color / pi`.
+    BSDF_DIFFUSE: uint = 0;
+    /// [`Material::kind`]: microfacet conductor with exact Fresnel from `eta`, `k`.
+    BSDF_CONDUCTOR: uint = 1;
+    /// [`Material::kind`]: microfacet dielectric, reflection and refraction, `eta[0]` = interior / exterior index.
+    BSDF_DIELECTRIC: uint = 2;
+    /// [`Material::kind`]: diffuse base under a dielectric coat of index `eta[0]`, roughness `alpha`.
+    BSDF_COATED: uint = 3;
+    /// An interface whose [`Material::alpha`] is below this is smooth.
+    SMOOTH_ALPHA: float = 0.01;
+    /// [`Material::flags`]: the GGX distribution instead of Beckmann.
+    MATERIAL_GGX: uint = 1;
+    /// [`Material::flags`]: both sides scatter alike (dielectrics ignore it: their sides differ by definition).
+    MATERIAL_TWO_SIDED: uint = 2;
+    /// [`Material::flags`]: `bump_texture` is a tangent-space normal map, not a height map.
+    MATERIAL_NORMAL_MAP: uint = 4;
+    /// [`Material::flags`]: hits are subject to an alpha mask (`opacity_texture` or `opacity` below 1).
+    MATERIAL_MASKED: uint = 8;
+    /// [`Material::flags`]: light that scatters below a coat takes on the base's colour at every turn.
+    MATERIAL_NONLINEAR: uint = 16;
+    /// [`FrameConstants::pixel_filter`]: uniform over the pixel.
+    PIXEL_FILTER_BOX: uint = 0;
+    /// [`FrameConstants::pixel_filter`]: triangle of radius 1 pixel.
+    PIXEL_FILTER_TENT: uint = 1;
+    /// [`FrameConstants::pixel_filter`]: Gaussian of standard deviation 0.5 pixels, cut at radius 2.
+    PIXEL_FILTER_GAUSSIAN: uint = 2;
+    /// [`FrameConstants::pixel_filter`]: the pixel's centre.
+    PIXEL_FILTER_POINT: uint = 3;
+    /// Roughnesses in the table of a rough coat (reference::coat).
+    COAT_ROWS: uint = 32;
+    /// Numbers for each of them: [`COAT_COLUMNS`] - 1 cosines, and the mean from inside.
+    COAT_COLUMNS: uint = 49;
+    /// [`Texture::flags`]: RGB is stored with the sRGB curve and decoded when read.
+    TEXTURE_SRGB: uint = 1;
+    /// [`Texture::flags`]: coordinates outside [0, 1] clamp to the border texel; otherwise they repeat.
+    TEXTURE_CLAMP: uint = 2;
+    /// [`Light::kind`]: emissive triangle `a`, `b`, `c` (vertices in world units), radiance `value`.
+    LIGHT_TRIANGLE: uint = 0;
+    /// [`Light::kind`]: point at `a`, radiant intensity `value` in W/sr.
+    LIGHT_POINT: uint = 1;
+    /// [`Light::kind`]: spot at `a` along unit `b`; `c` = (cos of the full-intensity angle, cos of the cut-off angle, 0).
+    LIGHT_SPOT: uint = 2;
+    /// [`Light::kind`]: directional along unit `b` (the way light travels), irradiance `value` on a facing plane.
+    LIGHT_DIRECTIONAL: uint = 3;
+    /// [`Light::kind`]: the environment; rows of the rotation environment_from_world in `a`, `b`, `c`; radiance scale `value`.
+    LIGHT_ENVIRONMENT: uint = 4;
+    /// [`Light::kind`]: sphere around `a` of radius `b.x` (world units), emits radiance `value` outward.
+    LIGHT_SPHERE: uint = 5;
+}

@@ -1,0 +1,60 @@
+//! What is known of a pixel.
+#[cfg(doc)]
+use super::*;
+use super::{Field, Struct, float, uint, vec3};
+use bytemuck::{Pod, Zeroable};
+
+gpu_structs! {
+    /// The primary hit at the pixel centre. Zero where the ray leaves the scene, with `object` = [`NONE`].
+    struct Guide {
+        /// Shading normal in world space, unit, towards the camera.
+        normal: vec3,
+        /// Distance from the camera position along the unit ray, world units; 0 on a miss.
+        depth: float,
+        /// Hit in world units.
+        position: vec3,
+        /// Object index, or [`NONE`].
+        object: uint,
+        /// Reflectance of the first hit that indirect light is divided by, linear Rec. 709; 0 for mirrors and clear glass.
+        albedo: vec3,
+        /// Index of the material, or [`NONE`].
+        material: uint,
+    }
+
+    /// Running statistics of one pixel (Welford 1962), linear Rec. 709. 2 texels.
+    struct PixelStats {
+        /// Mean radiance, W/(m^2 sr).
+        mean: vec3,
+        /// Samples behind `mean`.
+        count: uint,
+        /// Sum of squared deviations from the mean; the variance of one sample is m2 / (count - 1).
+        m2: vec3,
+        /// What rounding took off `mean`: three signed numbers of 10 bits, in units of 2^-10 of its last place, red lowest;
+        /// 0 up to 4096 samples.
+        remainder: uint,
+    }
+
+    /// Running means of one pixel that the filters read; the count is that of its [`PixelStats`]. 2 texels.
+    struct PixelLight {
+        /// Radiance that needs no filter: emission, direct light, and all that smooth interfaces show at the first hit.
+        direct: vec3,
+        /// Sum of squared deviations of the luminance of `indirect`, as [`PixelStats::m2`].
+        indirect_m2: float,
+        /// Incident indirect irradiance over pi at the first hit: indirect radiance before its albedo.
+        indirect: vec3,
+        /// As [`PixelStats::remainder`]: six numbers of 5 bits, in units of 2^-5; those of `direct` are the lowest.
+        remainder: uint,
+    }
+
+    /// Samples that were no number and counted as black.
+    struct BrokenTally {
+        /// How many, up to 2^31.
+        count: uint,
+        /// Complement of the lowest pixel of such a sample; 0: none.
+        lowest: uint,
+        /// Complement of the pixel that `index` is of; it is that of `lowest` once a batch is folded.
+        pixel: uint,
+        /// Index of the first such sample of that pixel, counted from its first sample of all.
+        index: uint,
+    }
+}

@@ -1,0 +1,202 @@
+//! A scene as kernels read it: geometry, materials, lights.
+#[cfg(doc)]
+use super::*;
+use super::{Field, Struct, float, uint, uvec2, uvec3, vec2, vec3, vec4};
+use bytemuck::{Pod, Zeroable};
+
+gpu_structs! {
+    /// Camera rays start at `position` (pinhole) or on a disk of `lens_radius` around it. For film coordinates
+    /// `sx`, `sy` in [-1, 1] (right, up): `direction = forward + sx * right + sy * up`, all in world space; `right`
+    /// and `up` are already scaled by the tangent of half the field of view, so they need not be unit, nor
+    /// right-handed (a mirrored camera).
+    struct Camera {
+        /// World units.
+        position: vec3,
+        /// World units; 0 is a pinhole.
+        lens_radius: float,
+        /// Scaled by tan(horizontal fov / 2).
+        right: vec3,
+        /// Distance along `forward` to the plane in focus, world units.
+        focus_distance: float,
+        /// Scaled by tan(vertical fov / 2).
+        up: vec3,
+        /// Near clip distance along the ray, world units; 0 clips nothing.
+        near: float,
+        /// Unit.
+        forward: vec3,
+    }
+
+    /// One eight-way compressed node (Ylitie et al. 2017) as obvhs lays it out; child and triangle indices are
+    /// global. 5 texels. `words[0..3]` = origin, `[3]` = exponents and inner mask, `[4]` = first child,
+    /// `[5]` = first primitive, `[6..8]` = child meta, then 8 bytes each of min x, max x, min y, max y, min z, max z.
+    struct BvhNode {
+        /// Origin of the quantisation grid, world (or object) units.
+        p: vec3,
+        /// Exponents of x, y, z in the low three bytes, mask of inner children in the high byte.
+        e_imask: uint,
+        /// Index of the first inner child.
+        child_base: uint,
+        /// Index of the first primitive: a triangle, or an instance in the top level.
+        primitive_base: uint,
+        /// Eight bytes: kind and offset of each child.
+        meta: uvec2,
+        /// Quantised bounds of the children.
+        min_x: uvec2,
+        /// See `min_x`.
+        max_x: uvec2,
+        /// See `min_x`.
+        min_y: uvec2,
+        /// See `min_x`.
+        max_y: uvec2,
+        /// See `min_x`.
+        min_z: uvec2,
+        /// See `min_x`.
+        max_z: uvec2,
+    }
+
+    /// What traversal reads of a triangle, in leaf order. 3 texels. One with [`SPHERE`] is a sphere instead: `v0` is its
+    /// centre, `v1` and `v2` lead from there to the pole and to where the meridian of u = 0 crosses the equator.
+    struct Triangle {
+        /// World units, or object units below an instance.
+        v0: vec3,
+        /// Index of the triangle in its mesh file, for reports; or SPHERE_ bits.
+        primitive: uint,
+        /// See `v0`.
+        v1: vec3,
+        /// Index into the materials.
+        material: uint,
+        /// See `v0`.
+        v2: vec3,
+        /// Index of the object (shape), the `id` layer of the outputs.
+        object: uint,
+    }
+
+    /// What shading reads of a triangle beyond its positions; same index as its [`Triangle`]. 3 texels.
+    /// Present only when a mesh of the scene has vertex normals or texture coordinates.
+    struct Shading {
+        /// Octahedral unit normals of the three vertices, snorm 2 x 16, x in the low half. All three 0xffffffff: flat.
+        normal: uvec3,
+        /// Texture coordinates of vertex 0; v points up, so row 0 of an image is v = 1.
+        uv0: vec2,
+        /// Of vertex 1.
+        uv1: vec2,
+        /// Of vertex 2.
+        uv2: vec2,
+        /// Unused words, zero.
+        pad: uvec3,
+    }
+
+    /// A placed mesh. 7 texels. Matrices are three rows of four, `x_world = rows * (x_object, 1)`.
+    struct Instance {
+        /// Row 0 of world_from_object.
+        world0: vec4,
+        /// Row 1.
+        world1: vec4,
+        /// Row 2.
+        world2: vec4,
+        /// Row 0 of object_from_world.
+        object0: vec4,
+        /// Row 1.
+        object1: vec4,
+        /// Row 2.
+        object2: vec4,
+        /// Index of the mesh's root node.
+        root: uint,
+        /// Material for the whole instance, or [`NONE`] to keep those of the triangles.
+        material: uint,
+        /// Added to the triangles' object index.
+        object: uint,
+        /// 1 when the transform mirrors (negative determinant): the geometric normal flips.
+        mirrored: uint,
+    }
+
+    /// Surface appearance. 8 texels, of which a diffuse surface without textures needs the first two. Colours are linear Rec. 709 in
+    /// [0, 1] unless said otherwise.
+    struct Material {
+        /// Diffuse albedo; multiplies `base_texture`.
+        base_color: vec3,
+        /// MATERIAL_ bits.
+        flags: uint,
+        /// Emitted radiance of the front side, W/(m^2 sr); 0 emits nothing.
+        emission: vec3,
+        /// Luminance of the mean emission, times the mean opacity; emissive triangles are chosen in proportion to it times their area.
+        emission_weight: float,
+        /// Index of refraction per channel (conductor), or interior / exterior in `x` (dielectric, coated).
+        eta: vec3,
+        /// Constant opacity in [0, 1]; multiplies `opacity_texture`.
+        opacity: float,
+        /// Extinction per channel (conductor).
+        k: vec3,
+        /// Microfacet roughness (alpha itself, not its root); see [`SMOOTH_ALPHA`].
+        alpha: float,
+        /// Tint of specular reflection; multiplies `specular_texture`.
+        specular: vec3,
+        /// Height of a bump map in world units per unit of texture value.
+        bump_scale: float,
+        /// Tint of specular transmission (dielectric).
+        transmission: vec3,
+        /// Texture index or [`NONE`].
+        base_texture: uint,
+        /// Tint; texture index or [`NONE`].
+        specular_texture: uint,
+        /// Opacity in its red channel (the loader moves an alpha channel there); texture index or [`NONE`].
+        opacity_texture: uint,
+        /// Height map, or normal map with MATERIAL_NORMAL_MAP.
+        bump_texture: uint,
+        /// Perceptual roughness r in its red channel, multiplies sqrt(alpha).
+        roughness_texture: uint,
+        /// Multiplies `emission`.
+        emission_texture: uint,
+        /// Diffuse reflectance of the smooth interface seen from inside (coated): mean internal Fresnel reflectance.
+        internal_fresnel: float,
+        /// One of the BSDF_ constants.
+        kind: uint,
+        /// Index of the first word of a coat's table among the texels (coated, where rough); else zero.
+        coat_table: uint,
+    }
+
+    /// A picture in the texel buffer: RGBA8 texels (R in the low byte), row 0 at the top. 2 texels.
+    struct Texture {
+        /// Index of the first texel.
+        first: uint,
+        /// Texels.
+        width: uint,
+        /// Texels.
+        height: uint,
+        /// TEXTURE_ bits.
+        flags: uint,
+        /// It is read at `uv * scale + offset`.
+        scale: vec2,
+        /// See `scale`.
+        offset: vec2,
+    }
+
+    /// A light. 4 texels; what the vectors mean depends on `kind`.
+    struct Light {
+        /// See the LIGHT_ constants.
+        a: vec3,
+        /// One of the LIGHT_ constants.
+        kind: uint,
+        /// See the LIGHT_ constants.
+        b: vec3,
+        /// Probability that the alias table returns this light.
+        probability: float,
+        /// See the LIGHT_ constants.
+        c: vec3,
+        /// Index of the triangle in leaf order (LIGHT_TRIANGLE, LIGHT_SPHERE), else [`NONE`].
+        triangle: uint,
+        /// Radiance, intensity or irradiance, linear Rec. 709.
+        value: vec3,
+        /// Index of the material (LIGHT_TRIANGLE, LIGHT_SPHERE), else [`NONE`].
+        material: uint,
+    }
+
+    /// One slot of an alias table (Walker 1977, Vose 1991) over n entries. From a 32-bit random word r, the slot is
+    /// the high word of r * n; the low word picks the slot itself when below `threshold`, its alias otherwise.
+    struct AliasEntry {
+        /// Probability of staying, in units of 2^-32; 0xffffffff always stays.
+        threshold: uint,
+        /// The other entry.
+        alias: uint,
+    }
+}
