@@ -181,11 +181,11 @@ pub fn set_broken_samples(film: &mut Film, broken: Option<BrokenSamples>) {
 }
 
 /// Puts a filtered colour in the place of the samples' mean, which stays as a layer.
-pub fn denoise(film: &mut Film, colour: &[vec3]) {
+pub fn denoise(film: &mut Film, colour: [Vec<f32>; 3]) {
     for channel in film.channels.iter_mut().filter(|c| RGB.contains(&c.name.as_str())) {
         channel.name = format!("{NOISY}.{}", channel.name);
     }
-    film.add_vec3("", RGB, colour);
+    RGB.into_iter().zip(colour).for_each(|(name, plane)| film.add(name, Samples::F32(plane)));
 }
 
 /// Replaces what the samples say; the other layers stay, but for a filtered colour.

@@ -1,6 +1,6 @@
 //! What can be set about layers and filters.
 use crate::cli::common::with_ranges;
-use crate::denoise::filter::{AtrousForm, FilterInput, FilterSettings, GuidedSums, WaveletBasis};
+use crate::denoise::filter::{AtrousForm, FilterSettings, GuidedSums, WaveletBasis};
 use crate::image::aov::{Aov, Names};
 
 /// Names of layers, for those that are not found, or not the right ones.
@@ -109,9 +109,8 @@ fn per_channel(text: &str) -> Result<[f32; 4], String> {
 }
 
 impl Overrides {
-    /// The settings for an image: scaled to it, and replaced where they were given.
-    pub fn settings(&self, input: &FilterInput) -> FilterSettings {
-        let own = FilterSettings::default().scaled_to(input);
+    /// The settings of an image's own, replaced where others were given.
+    pub fn settings(&self, own: FilterSettings) -> FilterSettings {
         FilterSettings {
             intensity: self.intensity.unwrap_or(own.intensity),
             extent: self.extent.unwrap_or(own.extent),

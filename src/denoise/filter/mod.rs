@@ -12,11 +12,13 @@ mod noise_estimate;
 mod none;
 mod pack;
 mod pixel;
+mod scales;
 mod settings;
 mod svgf;
 mod wavelet;
 
 pub use input::FilterInput;
+pub use scales::Scales;
 pub use settings::{AtrousForm, FilterSettings, GuidedSums, WaveletBasis};
 
 use crate::error::{Error, Result};
@@ -35,6 +37,8 @@ pub struct Row {
     pub name: &'static str,
     /// One line of help.
     pub about: &'static str,
+    /// Bytes of device memory a pixel that its own buffers take, beside the [`Planes`].
+    pub(crate) bytes: u64,
     /// On a device: see [`Row::compile`].
     pub(crate) make: Make,
     /// The same on the host, in plain Rust.

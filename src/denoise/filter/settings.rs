@@ -1,10 +1,8 @@
 //! Every filter's parameters: default, unit and range in one place.
-use super::FilterInput;
-use super::pixel::known_radiance;
+use super::{FilterInput, Scales};
 use crate::error::Result;
 use crate::layout::vec4;
 use crate::render::settings::entry::{self, Entry};
-use glam::Vec3;
 use serde::Serialize;
 
 /// How EAW's edge-stopping weights are computed: the paper's listing and its equations differ.
@@ -141,18 +139,8 @@ impl FilterSettings {
         ]
     }
 
-    /// The same with `intensity` and `extent` taken from an image: its largest known channel, and the diagonal of the
-    /// box around the hits, or where there are no positions the largest depth. 1 where there is nothing to measure.
-    pub fn scaled_to(mut self, input: &FilterInput) -> Self {
-        let usable = |v: f32| if v.is_normal() && v > 0.0 { v } else { 1.0 };
-        let channels = input.radiance.iter().filter_map(|c| known_radiance(*c).map(|c| c.max_element()));
-        self.intensity = usable(channels.fold(0.0, f32::max));
-        let hits = || input.guide.iter().filter(|g| g.depth > 0.0 || g.position != [0.0; 3]);
-        let places = || hits().map(|g| Vec3::from(g.position)).filter(|p| p.is_finite());
-        let low = places().fold(Vec3::INFINITY, Vec3::min);
-        let diagonal = (places().fold(low, Vec3::max) - low).length();
-        let deepest = hits().map(|g| g.depth).filter(|d| d.is_finite()).fold(0.0, f32::max);
-        self.extent = usable(if diagonal > 0.0 { diagonal } else { deepest });
-        self
+    /// The same with `intensity` and `extent` taken from an image: see [`Scales::applied_to`].
+    pub fn scaled_to(self, input: &FilterInput) -> Self {
+        Scales::of(input).applied_to(self)
     }
 }

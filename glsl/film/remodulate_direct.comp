@@ -1,0 +1,22 @@
+#version 460
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+#include "layout.glsl"
+#include "shared/thread.glsl"
+#include "shared/albedo.glsl"
+
+// Gives pixels without direct light of their own what a filter made of that of the others. Twin:
+// denoise::twin::Parts::remodulate_direct.
+layout(local_size_x = 64) in;
+layout(binding = 0) uniform samplerBuffer guide; // of Guide
+layout(binding = 1) uniform samplerBuffer direct; // of vec4
+layout(binding = 2) uniform samplerBuffer filtered; // of vec4
+layout(scalar, binding = 3) writeonly buffer Sharp { vec4 sharp[]; };
+layout(scalar, push_constant) uniform Push { PackPush push; };
+
+void main() {
+    uint i = thread_index();
+    if (i >= push.count || texelFetch(direct, int(i)).w != 0.0) return; // safe: no barrier() follows
+    vec3 albedo = texelFetch(guide, 3 * int(i) + 2).xyz, light = texelFetch(filtered, int(i)).rgb;
+    sharp[i] = vec4(reflects(albedo) ? divisor(albedo) * light : light, 0.0);
+}
