@@ -1,17 +1,17 @@
 #include "shared/thread.glsl"
 
-// Puts a frame together from its filtered light. Twin: composition::Parts::join.
+// Puts an image together from its filtered light: what comes in as the part that was not filtered leaves as the picture.
+// Twin: denoise::twin::Parts::remodulate.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer filtered; // of vec4
 layout(binding = 1) uniform samplerBuffer factor; // of vec4
-layout(binding = 2) uniform samplerBuffer sharp; // of vec4
-layout(scalar, binding = 3) writeonly buffer Picture { vec4 picture[]; };
-layout(scalar, push_constant) uniform Push { SplitPush push; };
+layout(scalar, binding = 2) buffer Picture { vec4 picture[]; };
+layout(scalar, push_constant) uniform Push { PackPush push; };
 
 void main() {
     uint i = thread_index();
-    if (i >= push.size.x * push.size.y) return;
-    int at = int(i);
-    vec3 light = texelFetch(factor, at).rgb * texelFetch(filtered, at).rgb;
-    picture[i] = vec4(texelFetch(sharp, at).rgb + light, 1.0);
+    if (i >= push.count) return;
+    precise vec3 light = texelFetch(factor, int(i)).rgb * texelFetch(filtered, int(i)).rgb;
+    precise vec3 whole = picture[i].rgb + light;
+    picture[i] = vec4(whole, 1.0);
 }

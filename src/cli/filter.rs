@@ -6,15 +6,15 @@ use super::common::Common;
 use super::compare::{self, check_sizes};
 use super::files::{Files, Item, check_distinct};
 use super::{Exit, fail_on_messages, print, print_json, readable};
-use crate::denoise::composition::{self, Demodulation, Parts};
-use crate::denoise::filter::{self, FilterInput, FilterSettings, Row};
+use crate::denoise::filter::{self, FilterSettings, Row};
+use crate::denoise::{self, Colour, Demodulation, Filtered, Recipe, file};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, PassTime};
 use crate::image::aov::Aovs;
 use crate::image::metrics::{self, Metrics};
 use crate::image::source::{Source, Unread};
 use crate::image::{self, Claim, Picture};
-use crate::layout::vec4;
+use crate::layout::vec3;
 use crate::memory;
 use crate::report::table::{self, PassRow};
 use options::{Layers, Overrides};
@@ -102,11 +102,9 @@ pub fn run(args: &Args) -> Result<Exit> {
     let aovs = Aovs::find(&source.film, &args.layers.names()).map_err(|what| Error::input(&args.image, what))?;
     let reference = reference(args, &source)?;
     let start = Instant::now();
-    let mut parts = composition::split(&aovs, demodulation(args));
-    cut_fireflies(args, &gpu, &mut parts)?;
-    let (colour, times) = filtered(args, &gpu, &aovs, &mut parts)?;
+    let (colour, times, notes) = filtered(args, &gpu, &aovs)?;
     let seconds = start.elapsed().as_secs_f64();
-    let clean = replaced(args, &source, &aovs, &colour)?;
+    let clean = replaced(args, &source, &aovs, colour)?;
     fail_on_messages(&gpu)?;
     let (written, files) = write(args, &clean);
     let distance = |image: &Source| reference.as_ref().map_or(Ok(None), |r| distance(args, image, r));
@@ -115,7 +113,7 @@ pub fn run(args: &Args) -> Result<Exit> {
         filter: args.filter.name,
         width: source.film.width,
         height: source.film.height,
-        notes: [aovs.notes, parts.notes].concat(),
+        notes: [aovs.notes, notes].concat(),
         seconds,
         device: gpu.info().name.clone(),
         passes: table::summarise(&times),
@@ -127,16 +125,19 @@ pub fn run(args: &Args) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// Bytes that a pixel takes beside those of the file's channels: on a device without memory of its own 568 were measured with
-/// `guided`, 1186 with `auto`, in a file of 27 channels, and some 110 more go to pixels that lack direct light.
-fn bytes_per_pixel(filter: &Row) -> u64 {
-    if filter.name == "auto" { 1300 } else { 700 }
+/// Bytes of host memory that a pixel takes beside the file's channels: those of the filtered colour, and then while it is filtered
+/// the device's planes, where these lie in the same memory, or while it is put into the file the file itself, encoded and decoded
+/// once more.
+fn bytes_per_pixel(filter: &Row, unified: bool) -> u64 {
+    const COLOUR: u64 = size_of::<vec3>() as u64;
+    const REPLACED: u64 = 400;
+    COLOUR + if unified { denoise::bytes_per_pixel(filter).max(REPLACED) } else { REPLACED }
 }
 
 /// Large images take minutes to be read and prepared; what cannot be filtered is told before.
 fn check_room(args: &Args, gpu: &Gpu, claim: &Claim) -> Result<()> {
     filter::check_size(gpu, claim.size, filter::GUIDE_TEXELS)?;
-    let bytes = claim.bytes.saturating_add(claim.pixels() * bytes_per_pixel(args.filter));
+    let bytes = claim.bytes.saturating_add(claim.pixels() * bytes_per_pixel(args.filter, gpu.info().unified));
     let refused =
         |what| format!("{}: filtering its {} x {} pixels {what}", args.image.display(), claim.size[0], claim.size[1]);
     memory::check(bytes).map_err(|what| Error::Memory(refused(what)))
@@ -172,47 +173,39 @@ fn demodulation(args: &Args) -> Demodulation {
     }
 }
 
-fn cut_fireflies(args: &Args, gpu: &Gpu, parts: &mut Parts) -> Result<()> {
-    let Some(factor) = args.fireflies else { return Ok(()) };
-    let cut = filter::firefly::remove_fireflies(gpu, &mut parts.input, factor)?;
-    parts.notes.push(format!("fireflies: {} pixels cut, {:.3} % of what is filtered", cut.pixels, 100.0 * cut.share));
-    Ok(())
-}
-
-fn filtered(args: &Args, gpu: &Gpu, aovs: &Aovs, parts: &mut Parts) -> Result<(Vec<[f32; 3]>, Vec<PassTime>)> {
-    let (light, times) = filter_parts(gpu, args.filter, parts, &|input| args.overrides.settings(input))?;
-    Ok(match args.supersampling.look_up(gpu, &args.image, aovs, parts, &light)? {
-        Some((indirect, more)) => (parts.join_reflected(&indirect), [times, more].concat()),
-        None => (parts.join(&light), times),
-    })
-}
-
-/// Filters what is to be filtered, with the settings that `settings` makes for it, and returns that. Where pixels lack direct
-/// light, the filter in-paints it, with settings of its own.
-///
-/// # Errors
-/// Those of [`filter::run`].
-pub fn filter_parts(
-    gpu: &Gpu,
-    row: &Row,
-    parts: &mut Parts,
-    settings: &dyn Fn(&FilterInput) -> FilterSettings,
-) -> Result<(Vec<vec4>, Vec<PassTime>)> {
-    let (light, mut times) = filter::run(gpu, row, &parts.input, &settings(&parts.input))?;
-    if let Some(unlit) = parts.unlit() {
-        let (direct, more) = filter::run(gpu, row, &unlit, &settings(&unlit))?;
-        parts.light_up(&direct);
-        times.extend(more);
+fn filtered(args: &Args, gpu: &Gpu, aovs: &Aovs) -> Result<(Colour, Vec<PassTime>, Vec<String>)> {
+    let layers = file::Layers::new(aovs);
+    let recipe = Recipe {
+        row: args.filter,
+        demodulation: layers.holds().demodulation(demodulation(args)),
+        fireflies: args.fireflies,
+        settings: &|scales| args.overrides.settings(scales.applied_to(FilterSettings::default())),
+    };
+    let filtered = Filtered::new(gpu, layers.upload(gpu)?, &recipe)?;
+    let mut notes = vec![recipe.demodulation.note().to_owned()];
+    notes.extend(layers.notes);
+    if filtered.in_painted {
+        notes.push("direct light of pixels without a sample is made of that of the others".to_owned());
     }
-    Ok((light, times))
+    if let Some(cut) = &filtered.removed {
+        let share = 100.0 * cut.share;
+        notes.push(format!("fireflies: {} pixels cut, {share:.3} % of what is filtered", cut.pixels));
+    }
+    let (colour, times) = match args.supersampling.look_up(gpu, &args.image, aovs, &filtered)? {
+        Some((indirect, more)) => (filtered.join_reflected(&indirect)?, [filtered.times, more].concat()),
+        None => filtered.join(gpu)?,
+    };
+    Ok((colour, times, notes))
 }
 
 /// The file with the filtered colour; the noisy one stays as a layer. Where its three channels are one, that holds their mean.
-fn replaced(args: &Args, source: &Source, aovs: &Aovs, colour: &[[f32; 3]]) -> Result<Source> {
-    let grey = aovs.colour[0] == aovs.colour[1];
-    let plane = |c: usize| colour.iter().map(|v| if grey { (v[0] + v[1] + v[2]) / 3.0 } else { v[c] }).collect();
-    let planes: Vec<Vec<f32>> = (0..3).map(plane).collect();
-    let channels: Vec<_> = aovs.colour.into_iter().zip(planes.iter().map(Vec::as_slice)).collect();
+fn replaced(args: &Args, source: &Source, aovs: &Aovs, mut colour: Colour) -> Result<Source> {
+    if aovs.colour[0] == aovs.colour[1] {
+        let [r, g, b] = &colour;
+        let grey: Vec<f32> = r.iter().zip(g).zip(b).map(|((r, g), b)| (r + g + b) / 3.0).collect();
+        colour = [0; 3].map(|_| grey.clone());
+    }
+    let channels: Vec<_> = aovs.colour.into_iter().zip(colour.iter().map(Vec::as_slice)).collect();
     source.replaced(&channels, aovs.keep_as(), (crate::render::film::FILTERED, args.filter.name))
 }
 

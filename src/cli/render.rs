@@ -5,18 +5,17 @@ mod summary;
 use super::checkpoint::{self, CheckpointFile};
 use super::common::Common;
 use super::files::{Files, Item, check_distinct};
-use super::filter::filter_parts;
 use super::overrides::Overrides;
 use super::progress::Progress;
 use super::{Exit, complain, fail_on_messages, interrupt};
-use crate::denoise::composition::{self, Demodulation};
 use crate::denoise::filter::{self, FilterSettings, Row};
+use crate::denoise::{self, Demodulation, Filtered, Noisy, Recipe};
 use crate::error::{Error, Result};
 use crate::gpu::{self, FrameResources, Gpu, PassTime};
-use crate::image::aov::{Aovs, Names};
 use crate::image::difference::false_colours;
 use crate::image::output::{self, Stream};
-use crate::image::{self, Film, NOISY, WriteOptions};
+use crate::image::{self, Film, NOISY, Samples, WriteOptions};
+use crate::layout::vec3;
 use crate::memory;
 use crate::render::settings::Settings;
 use crate::render::{self, Checkpoint, FilmBuffers, Job, Outputs, Renderer, Status, StopReason};
@@ -123,6 +122,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     };
     effects.adaptive |= earlier.is_some();
     let renderer = host.time("upload and compile", || Renderer::specialised(&gpu, &scene, wanted, effects))?;
+    let noisy = args.denoise.map(|_| Noisy::of_film(&renderer)).transpose()?;
     let job = Job { checkpoint: earlier.as_ref(), ..Job::new(&renderer) };
     let shot = Shot { args, gpu: &gpu, job };
     let mut files = Files::new(args.resume.as_deref());
@@ -136,16 +136,16 @@ pub fn run(args: &Args) -> Result<Exit> {
     status.broken_samples.iter().for_each(warn_of_broken);
     let mut film = host.time("read back", || shot.film(&status, seconds))?;
     let counters = args.counters.then(|| renderer.counters()).transpose()?;
-    // The film is all that is left to write, and large films need the memory.
+    // The film is all that is left to write and to filter, and large films need the memory.
     drop(renderer);
     let mut written = host.time("write", || Ok(save(args, &film, &mut files, checkpoint, !interrupted)))?;
     // By now what took hours is safe, whatever becomes of the filter.
-    if let Some(row) = args.denoise.filter(|_| !interrupted) {
+    if let Some((row, noisy)) = args.denoise.zip(noisy).filter(|_| !interrupted) {
         let line = files.with_failures("interrupted: the noisy image was written, --denoise was not finished");
         if interrupt::leave_at_once(&line) {
             interrupt::leave(&line);
         }
-        status.times.extend(host.time("denoise", || denoise(&gpu, row, &mut film))?);
+        status.times.extend(host.time("denoise", || denoised(&gpu, row, noisy, &mut film))?);
         host.time("write", || Ok(save(args, &film, &mut files, None, true)))?;
     }
     fail_on_messages(&gpu)?;
@@ -235,15 +235,16 @@ fn warn_of_broken(broken: &BrokenSamples) {
 }
 
 /// With the filter's default settings, scaled to the image.
-fn denoise(gpu: &Gpu, row: &Row, film: &mut Film) -> Result<Vec<PassTime>> {
-    let aovs = Aovs::find(film, &Names::new()).map_err(Error::Usage)?;
-    let mut parts = composition::split(&aovs, Demodulation::default());
-    let (light, times) = filter_parts(gpu, row, &mut parts, &|input| FilterSettings::default().scaled_to(input))?;
+fn denoised(gpu: &Gpu, row: &Row, noisy: Noisy, film: &mut Film) -> Result<Vec<PassTime>> {
+    let settings = |scales: &filter::Scales| scales.applied_to(FilterSettings::default());
+    let recipe = Recipe { row, demodulation: Demodulation::default(), fireflies: None, settings: &settings };
+    let (colour, times) = Filtered::new(gpu, noisy, &recipe)?.join(gpu)?;
     // The mean of the samples stays as a layer.
-    for channel in film.channels.iter_mut().filter(|c| ["R", "G", "B"].contains(&c.name.as_str())) {
+    const RGB: [&str; 3] = ["R", "G", "B"];
+    for channel in film.channels.iter_mut().filter(|c| RGB.contains(&c.name.as_str())) {
         channel.name = format!("{NOISY}.{}", channel.name);
     }
-    film.add_vec3("", ["R", "G", "B"], &parts.join(&light));
+    RGB.into_iter().zip(colour).for_each(|(name, plane)| film.add(name, Samples::F32(plane)));
     Ok(times)
 }
 
@@ -285,15 +286,14 @@ fn profile(gpu: &Gpu, host: &Spans, status: &Status) -> String {
 fn check_memory(args: &Args, settings: &Settings, gpu: &Gpu) -> Result<()> {
     let refused = |what| format!("a film of {} x {} {what}: choose a smaller film", settings.width, settings.height);
     let bytes = bytes_of_film(settings, gpu.info().unified);
-    // The renderer's buffers are gone when the filter begins.
-    let filtered = bytes_of_film(settings, false) + settings.pixels() as u64 * BYTES_DENOISED;
-    let bytes = if args.denoise.is_some() { bytes.max(filtered) } else { bytes };
+    // The renderer is gone when the filter begins; its film is part of what the filter takes.
+    let while_filtered = |row: &Row| {
+        let device = if gpu.info().unified { denoise::bytes_per_pixel(row) } else { 0 };
+        bytes_of_film(settings, false) + settings.pixels() as u64 * (device + size_of::<vec3>() as u64)
+    };
+    let bytes = bytes.max(args.denoise.map_or(0, while_filtered));
     memory::check(bytes).map_err(|what| Error::Device(refused(what)))
 }
-
-/// What a pixel takes beside the film's channels while it is filtered, the largest: measured at 2400 x 2400 on a device without
-/// memory of its own, 412 with `none`, 500 with `guided`, 1047 with `auto`, 1158 with `auto` where pixels lack direct light.
-const BYTES_DENOISED: u64 = 1160;
 
 /// Of host memory, at the moment when it is read back.
 fn bytes_of_film(settings: &Settings, unified: bool) -> u64 {

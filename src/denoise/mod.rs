@@ -1,6 +1,25 @@
-//! Filters, and what turns a render into light that they can filter and back.
-pub mod composition;
+//! Denoising: what turns a render into light that filters can take, the filters, and the way back. The same kernels serve the
+//! film of a renderer ([`Denoiser`], within an engine's frame) and the file of any renderer ([`Filtered`], once).
+mod demodulated;
 mod denoiser;
+pub mod file;
 pub mod filter;
+mod filtered;
+mod noisy;
+#[doc(hidden)]
+pub mod twin;
 
+pub use demodulated::Demodulation;
 pub use denoiser::Denoiser;
+pub use filtered::{Colour, Filtered, Recipe, bytes_per_pixel};
+pub use noisy::{Holds, Noisy};
+
+use std::ops::Range;
+
+/// Pixels that are copied between host and device at a time, so that whole planes never lie on both.
+const WINDOW: usize = 1 << 16;
+
+/// All pixels, a window at a time.
+fn windows(pixels: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..pixels).step_by(WINDOW).map(move |first| first..pixels.min(first + WINDOW))
+}

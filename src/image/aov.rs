@@ -1,5 +1,5 @@
 //! What filters can use of an image, found by the channel names of Tallow, Blender (Cycles), Mitsuba 3 and pbrt-v4.
-use super::film::{Channel, Film, NOISY, Window, split};
+use super::film::{Channel, Film, NOISY, Samples, Window, split};
 use std::collections::BTreeMap;
 
 /// One kind of arbitrary output variable.
@@ -53,13 +53,24 @@ const KNOWN: &[Known] = &[
 /// Names that the user gives, for those of other renderers.
 pub type Names = BTreeMap<Aov, String>;
 
+/// Three values per pixel where they lie in a film, the same three times where the film has one.
+#[derive(Clone, Copy, Debug)]
+pub struct Plane<'a>([&'a Samples; 3]);
+
+impl Plane<'_> {
+    /// Those of a pixel.
+    pub fn at(&self, pixel: usize) -> [f32; 3] {
+        self.0.map(|samples| samples.at(pixel))
+    }
+}
+
 /// The AOVs of a film, each three values per pixel.
 pub struct Aovs<'a> {
     /// Where they are from.
     pub film: &'a Film,
     /// The channels of the colour, which a filter replaces.
     pub colour: [&'a str; 3],
-    planes: BTreeMap<Aov, Vec<[f32; 3]>>,
+    planes: BTreeMap<Aov, Plane<'a>>,
     window: Option<Window>,
     /// What was found under which name, and what is missing: one line each.
     pub notes: Vec<String>,
@@ -96,7 +107,7 @@ impl<'a> Aovs<'a> {
         Ok(found)
     }
 
-    fn take(&mut self, known: &Known, channels: Option<[&Channel; 3]>) -> Result<(), String> {
+    fn take(&mut self, known: &Known, channels: Option<[&'a Channel; 3]>) -> Result<(), String> {
         let Some(channels) = channels else {
             if !known.is_tallow_s_own() {
                 self.notes.push(format!("{}: not there", known.label));
@@ -112,15 +123,19 @@ impl<'a> Aovs<'a> {
                 extent(self.film, self.window)
             ));
         }
-        let [a, b, c] = channels.map(|c| c.samples.to_f32());
-        self.planes.insert(known.aov, a.iter().zip(b.iter()).zip(c.iter()).map(|((&a, &b), &c)| [a, b, c]).collect());
+        self.planes.insert(known.aov, Plane(channels.map(|c| &c.samples)));
         self.notes.push(format!("{}: {}", known.label, channel_names(channels)));
         Ok(())
     }
 
-    /// Three values per pixel, the same three times where the file has one.
-    pub fn get(&self, aov: Aov) -> Option<&[[f32; 3]]> {
-        self.planes.get(&aov).map(Vec::as_slice)
+    /// Where its values are, if the file has it.
+    pub fn get(&self, aov: Aov) -> Option<Plane<'a>> {
+        self.planes.get(&aov).copied()
+    }
+
+    /// Whether Tallow wrote the file.
+    pub fn is_tallow_s(&self) -> bool {
+        is_tallow_s(self.film)
     }
 
     /// The layer to keep the noisy image in when the colour is replaced: none where the file has one already, or where the colour
@@ -133,7 +148,7 @@ impl<'a> Aovs<'a> {
 
     /// The first of the three.
     pub fn scalar(&self, aov: Aov, pixel: usize) -> Option<f32> {
-        self.get(aov).map(|plane| plane[pixel][0])
+        self.get(aov).map(|plane| plane.at(pixel)[0])
     }
 
     /// Whether the file holds this pixel.

@@ -229,6 +229,14 @@ impl Samples {
         self.len() == 0
     }
 
+    /// One sample as a float; counts above 2^24 are rounded.
+    pub fn at(&self, pixel: usize) -> f32 {
+        match self {
+            Self::F32(v) => v[pixel],
+            Self::U32(v) => v[pixel] as f32,
+        }
+    }
+
     /// As floats; counts above 2^24 are rounded.
     pub fn to_f32(&self) -> Cow<'_, [f32]> {
         match self {

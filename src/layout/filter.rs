@@ -3,13 +3,13 @@ use super::{Field, Struct, float, uint, uvec2, vec3, vec4};
 use bytemuck::{Pod, Zeroable};
 
 gpu_structs! {
-    /// Push constants of `demodulate.comp` and `remodulate.comp`.
+    /// Push constants of `demodulate.comp`.
     struct SplitPush {
         /// Film in pixels.
         size: uvec2,
     }
 
-    /// Push constants of `pack.comp`.
+    /// Push constants of `pack.comp` and of kernels of `glsl/film` that look at no neighbours.
     struct PackPush {
         /// Pixels.
         count: uint,

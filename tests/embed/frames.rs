@@ -7,9 +7,8 @@ use ash::vk::Handle;
 use bytemuck::Pod;
 use std::path::Path;
 use std::process::Command;
-use tallow::denoise::Denoiser;
-use tallow::denoise::composition::{self, Demodulation};
 use tallow::denoise::filter::{self, FilterSettings};
+use tallow::denoise::{Demodulation, Denoiser, twin};
 use tallow::gpu::{Buffer, FrameResources, Gpu, Location, PixelFormat, Recorder};
 use tallow::image::aov::{Aovs, Names};
 use tallow::image::{self, Film, Samples};
@@ -185,8 +184,8 @@ fn an_engine_filters_its_frames_where_they_are() {
             });
         }
         assert!(frame.times().unwrap().iter().any(|pass| pass.name == "demodulate"), "the filter's passes are timed");
-        let parts = composition::split(&aovs, demodulation);
-        let expected = parts.join(&filter::run(&gpu, row, &parts.input, &settings).unwrap().0);
+        let parts = twin::split(&aovs, demodulation);
+        let expected = parts.remodulate(&filter::run(&gpu, row, &parts.input, &settings).unwrap().0);
         let off = download.read().unwrap().iter().zip(&expected).fold(0f32, |worst, (found, expected)| {
             (0..3).fold(worst, |worst, c| worst.max((found[c] - expected[c]).abs() / expected[c].abs().max(1e-2)))
         });

@@ -1,11 +1,12 @@
-//! Frames filtered where they were rendered, against the same frames as files: taken apart, filtered and put together by
-//! the twins.
+//! Noisy images filtered on the device, as frames where they were rendered and as files, against the same images taken apart,
+//! filtered and put together by the twins.
 use crate::picture;
 use crate::support::{assert_silent, gpu, hash};
 use std::path::Path;
-use tallow::denoise::Denoiser;
-use tallow::denoise::composition::{Demodulation, split};
-use tallow::denoise::filter::{FilterSettings, check_size, find};
+use tallow::denoise::file::Layers;
+use tallow::denoise::filter::{FILTERS, FilterSettings, Scales, check_size, find};
+use tallow::denoise::twin::{Parts, Pixels, demodulate, split};
+use tallow::denoise::{Demodulation, Denoiser, Filtered, Holds, Noisy, Recipe};
 use tallow::gpu::{DeviceKind, FrameResources, Gpu};
 use tallow::image::aov::{Aovs, Names};
 use tallow::image::{Film, Samples};
@@ -16,6 +17,7 @@ use tallow::scene::Scene;
 use tallow::statistics::variance_of_mean;
 
 const SIZES: [[u32; 2]; 6] = [[1, 1], [31, 1], [1, 65], [64, 2], [65, 3], [33, 17]];
+const DEMODULATIONS: [Demodulation; 3] = [Demodulation::Light, Demodulation::Albedo, Demodulation::Off];
 const ALL: Outputs = Outputs { split_light: true, guides: true, counters: false };
 
 /// What a renderer leaves.
@@ -87,11 +89,32 @@ impl Frame {
         film
     }
 
-    fn on_the_host(&self, filter: &str, settings: &FilterSettings, demodulation: Demodulation) -> Vec<vec4> {
-        let film = self.film();
-        let parts = split(&Aovs::find(&film, &Names::new()).unwrap(), demodulation);
-        let filtered = (find(filter).unwrap().reference)(&parts.input, settings);
-        parts.join(&filtered).into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()
+    /// Every fifth pixel without a sample, and so without light of its own.
+    fn sparse(mut self) -> Self {
+        for i in (0..self.stats.len()).step_by(5) {
+            (self.stats[i], self.light[i]) = (PixelStats::default(), PixelLight::default());
+        }
+        self
+    }
+
+    fn on_the_host(
+        &self,
+        filter: &str,
+        settings: &FilterSettings,
+        demodulation: Demodulation,
+        in_paint: bool,
+    ) -> Vec<vec4> {
+        let Self { size, stats, light, guide } = self;
+        let (stats, light, guide) = (stats.clone(), light.clone(), guide.clone());
+        let pixels = Pixels { size: *size, holds: Holds::film(true), stats, light, guide };
+        twins(demodulate(&pixels, demodulation, in_paint), filter, settings)
+    }
+
+    fn upload(&self, renderer: &Renderer) {
+        let tile = &renderer.film().tiles[0];
+        tile.stats.write(0, &self.stats).unwrap();
+        tile.light.write(0, &self.light).unwrap();
+        tile.guide.write(0, &self.guide).unwrap();
     }
 
     fn on_the_device(
@@ -102,14 +125,22 @@ impl Frame {
         settings: &FilterSettings,
         demodulation: Demodulation,
     ) -> Vec<vec4> {
-        let tile = &renderer.film().tiles[0];
-        tile.stats.write(0, &self.stats).unwrap();
-        tile.light.write(0, &self.light).unwrap();
-        tile.guide.write(0, &self.guide).unwrap();
+        self.upload(renderer);
         let denoiser = Denoiser::new(gpu, renderer, find(filter).unwrap(), settings, demodulation).unwrap();
         gpu.run(&mut FrameResources::new(gpu).unwrap(), |rec| denoiser.record(rec)).unwrap();
         denoiser.picture().read().unwrap()
     }
+}
+
+/// Filters what was taken apart and puts it together.
+fn twins(mut parts: Parts, filter: &str, settings: &FilterSettings) -> Vec<vec4> {
+    let filter = find(filter).unwrap().reference;
+    let filtered = filter(&parts.input, settings);
+    if let Some(direct) = &parts.direct {
+        let in_painted = filter(direct, settings);
+        parts.remodulate_direct(&in_painted);
+    }
+    parts.remodulate(&filtered).into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()
 }
 
 fn renderer(gpu: &Gpu, size: [u32; 2], outputs: Outputs, policy: &str) -> Renderer {
@@ -123,25 +154,81 @@ fn renderer(gpu: &Gpu, size: [u32; 2], outputs: Outputs, policy: &str) -> Render
 }
 
 #[test]
-fn frames_are_taken_apart_and_put_together_as_files_are() {
+fn frames_are_taken_apart_and_put_together_as_their_twins() {
     let gpu = gpu();
     let settings = FilterSettings::default().with(|s| s.edge.extent = 3.0);
     for size in SIZES {
-        let renderer = renderer(&gpu, size, ALL, "uniform");
-        for frame in [false, true].map(|broken| Frame::new(size, broken)) {
-            let of = |filter, demodulation| {
-                let device = frame.on_the_device(&gpu, &renderer, filter, &settings, demodulation);
-                let host = frame.on_the_host(filter, &settings, demodulation);
+        // Where samples are placed, pixels may have none.
+        for policy in ["uniform", "geometry"] {
+            let renderer = renderer(&gpu, size, ALL, policy);
+            let frames = [Frame::new(size, false), Frame::new(size, true), Frame::new(size, true).sparse()];
+            for frame in &frames {
+                let of = |filter, demodulation| {
+                    let device = frame.on_the_device(&gpu, &renderer, filter, &settings, demodulation);
+                    let in_paint = policy != "uniform" && demodulation == Demodulation::Light;
+                    let host = frame.on_the_host(filter, &settings, demodulation, in_paint);
+                    let off = picture::apart(&device, &host, 1e-3);
+                    assert!(off < 1e-4, "{filter} {demodulation:?} {policy} {size:?}: {off}");
+                    assert!(device.iter().flatten().all(|v| v.is_finite()), "{filter} {demodulation:?} {size:?}");
+                    device
+                };
+                let [light, albedo, off] = DEMODULATIONS;
+                let pictures = [("none", light), ("svgf", light), ("svgf", albedo), ("svgf", off), ("none", albedo)];
+                let pictures = pictures.map(|(filter, demodulation)| of(filter, demodulation));
+                let differ = |i: usize| picture::apart(&pictures[i], &pictures[i + 1], 1e-3) > 1e-2;
+                assert!(size == [1, 1] || (0..4).all(differ), "control: filters and demodulations differ");
+            }
+        }
+    }
+    assert_silent(&gpu);
+}
+
+/// Whatever a file lacks of what Tallow writes.
+#[test]
+fn files_are_taken_apart_and_put_together_as_their_twins() {
+    let gpu = gpu();
+    let settings = FilterSettings::default().with(|s| s.edge.extent = 3.0);
+    let lacking: [&[&str]; 7] =
+        [&[], &["albedo"], &["direct"], &["variance"], &["indirect.m2"], &["variance", "indirect.m2"], &["samples"]];
+    for (size, missing) in SIZES.into_iter().flat_map(|size| lacking.map(|missing| (size, missing))) {
+        for frame in [Frame::new(size, false), Frame::new(size, true).sparse()] {
+            let mut film = frame.film();
+            film.channels.retain(|c| !missing.iter().any(|layer| c.name.starts_with(layer)));
+            let aovs = Aovs::find(&film, &Names::new()).unwrap();
+            for demodulation in DEMODULATIONS {
+                let host = twins(split(&aovs, demodulation), "svgf", &settings);
+                let recipe =
+                    Recipe { row: find("svgf").unwrap(), demodulation, fireflies: None, settings: &|_| settings };
+                let noisy = Layers::new(&aovs).upload(&gpu).unwrap();
+                let ([r, g, b], _) = Filtered::new(&gpu, noisy, &recipe).unwrap().join(&gpu).unwrap();
+                let device: Vec<vec4> = (0..r.len()).map(|i| [r[i], g[i], b[i], 1.0]).collect();
                 let off = picture::apart(&device, &host, 1e-3);
-                assert!(off < 1e-4, "{filter} {demodulation:?} {size:?}: {off}");
-                assert!(device.iter().flatten().all(|v| v.is_finite()), "{filter} {demodulation:?} {size:?}");
-                device
-            };
-            let all = [Demodulation::Light, Demodulation::Albedo, Demodulation::Off];
-            let pictures = [("none", all[0]), ("svgf", all[0]), ("svgf", all[1]), ("svgf", all[2]), ("none", all[1])];
-            let pictures = pictures.map(|(filter, demodulation)| of(filter, demodulation));
-            let differ = |i: usize| picture::apart(&pictures[i], &pictures[i + 1], 1e-3) > 1e-2;
-            assert!(size == [1, 1] || (0..4).all(differ), "control: filters and demodulations differ");
+                assert!(off < 1e-4, "{demodulation:?} {size:?} without {missing:?}: {off}");
+            }
+        }
+    }
+    assert_silent(&gpu);
+}
+
+/// A film's frame and its file are the same image: to the bit, with scales and in-painting found on the way.
+#[test]
+fn a_film_and_its_file_become_one_picture() {
+    let gpu = gpu();
+    for frame in [Frame::new([65, 3], true), Frame::new([65, 3], true).sparse()] {
+        let renderer = renderer(&gpu, [65, 3], ALL, "geometry");
+        frame.upload(&renderer);
+        let film = frame.film();
+        let aovs = Aovs::find(&film, &Names::new()).unwrap();
+        for row in FILTERS {
+            let settings = |scales: &Scales| scales.applied_to(FilterSettings::default());
+            let recipe = Recipe { row, demodulation: Demodulation::Light, fireflies: Some(3.0), settings: &settings };
+            let images = [Noisy::of_film(&renderer).unwrap(), Layers::new(&aovs).upload(&gpu).unwrap()];
+            let [of_film, of_file] = images.map(|noisy| {
+                let filtered = Filtered::new(&gpu, noisy, &recipe).unwrap();
+                assert!(filtered.in_painted && filtered.removed.is_some());
+                filtered.join(&gpu).unwrap().0
+            });
+            assert!(of_film == of_file, "{}", row.name);
         }
     }
     assert_silent(&gpu);
@@ -159,7 +246,7 @@ fn a_frame_without_what_the_filter_needs_is_refused() {
         |error: Option<String>, word: &str| assert!(error.as_ref().is_some_and(|e| e.contains(word)), "{error:?}");
     has(refused(Outputs { guides: false, ..ALL }, "uniform", Demodulation::Off), "Outputs::guides");
     has(refused(Outputs { split_light: false, ..ALL }, "uniform", Demodulation::Light), "Outputs::split_light");
-    has(refused(ALL, "geometry", Demodulation::Light), "min_spp");
+    assert_eq!(refused(ALL, "geometry", Demodulation::Light), None);
     for demodulation in [Demodulation::Albedo, Demodulation::Off] {
         assert_eq!(refused(Outputs { split_light: false, ..ALL }, "geometry", demodulation), None);
     }

@@ -2,9 +2,8 @@
 //! a CPU, an Intel Core 2 Duo E6850, its guides drawn by a GPU).
 use super::frames::View;
 use crate::Args;
-use tallow::denoise::Denoiser;
-use tallow::denoise::composition::Demodulation;
 use tallow::denoise::filter::{self, FilterSettings};
+use tallow::denoise::{Demodulation, Denoiser};
 use tallow::gpu::{FrameResources, Gpu, PassTime};
 use tallow::render::{Outputs, Renderer};
 use tallow::report::table;

@@ -1,8 +1,9 @@
 //! A noisy image taken apart, and the image that it should become.
 use anyhow::anyhow;
 use std::path::Path;
-use tallow::denoise::composition::{self, Demodulation, Parts};
+use tallow::denoise::Demodulation;
 use tallow::denoise::filter::{self, FilterSettings, Row};
+use tallow::denoise::twin::{self, Parts};
 use tallow::gpu::Gpu;
 use tallow::image::aov::{Aovs, Names};
 use tallow::image::source::Source;
@@ -34,12 +35,12 @@ impl Case {
 
     /// The whole image with what a filter returned.
     pub fn whole(&self, filtered: &[vec4]) -> Picture {
-        Picture { pixels: self.parts.join(filtered), ..self.noisy.clone() }
+        Picture { pixels: self.parts.remodulate(filtered), ..self.noisy.clone() }
     }
 
     /// The same with the direct light and the albedo of the reference, so that nothing but the filtered light differs.
     pub fn filtered_light(&self, filtered: &[vec4]) -> Picture {
-        Picture { pixels: self.truth.join(filtered), ..self.noisy.clone() }
+        Picture { pixels: self.truth.remodulate(filtered), ..self.noisy.clone() }
     }
 
     /// The settings that a search starts from.
@@ -61,7 +62,7 @@ impl Case {
 
 fn parts(source: &Source, demodulation: Demodulation) -> anyhow::Result<Parts> {
     let aovs = Aovs::find(&source.film, &Names::new()).map_err(|what| anyhow!(what))?;
-    Ok(composition::split(&aovs, demodulation))
+    Ok(twin::split(&aovs, demodulation))
 }
 
 fn picture(source: &Source) -> anyhow::Result<Picture> {

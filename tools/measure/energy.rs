@@ -2,7 +2,7 @@
 use super::case::Case;
 use super::ranking::VIEWS;
 use crate::Args;
-use tallow::denoise::composition::Demodulation;
+use tallow::denoise::Demodulation;
 use tallow::denoise::filter::{self, AtrousForm};
 use tallow::gpu::Gpu;
 use tallow::layout::vec4;

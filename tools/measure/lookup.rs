@@ -6,7 +6,7 @@ use super::sweep;
 use crate::Args;
 use anyhow::anyhow;
 use rayon::prelude::*;
-use tallow::denoise::composition::Demodulation;
+use tallow::denoise::Demodulation;
 use tallow::denoise::filter;
 use tallow::gpu::Gpu;
 use tallow::image::Picture;

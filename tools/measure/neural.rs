@@ -7,7 +7,7 @@ use crate::Args;
 use anyhow::{Context, bail};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use tallow::denoise::composition::Demodulation;
+use tallow::denoise::Demodulation;
 use tallow::denoise::filter::FILTERS;
 use tallow::gpu::Gpu;
 use tallow::image::source::Source;

@@ -4,7 +4,7 @@ use super::frames::View;
 use super::sheet::{self, Tile};
 use super::sweep;
 use crate::Args;
-use tallow::denoise::composition::Demodulation;
+use tallow::denoise::Demodulation;
 use tallow::denoise::filter;
 use tallow::gpu::Gpu;
 

@@ -1,6 +1,6 @@
 //! What can be set about layers and filters.
 use crate::cli::common::with_ranges;
-use crate::denoise::filter::{FILTERS, FilterInput, FilterOverrides, FilterSettings, Row};
+use crate::denoise::filter::{FILTERS, FilterOverrides, FilterSettings, Row};
 use crate::image::aov::{Aov, Names};
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
@@ -59,9 +59,9 @@ pub struct Overrides {
 }
 
 impl Overrides {
-    /// The settings for an image: scaled to it, and replaced where they were given.
-    pub fn settings(&self, input: &FilterInput) -> FilterSettings {
-        let mut settings = FilterSettings::default().scaled_to(input);
+    /// The settings of an image's own, replaced where others were given.
+    pub fn settings(&self, own: FilterSettings) -> FilterSettings {
+        let mut settings = own;
         self.given.apply(&mut settings);
         settings
     }

@@ -1,9 +1,9 @@
 //! `--scene`: filtered light is looked up along eye rays.
-use crate::denoise::composition::Parts;
+use crate::denoise::Filtered;
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, PassTime};
 use crate::image::aov::{Aov, Aovs};
-use crate::layout::{vec3, vec4};
+use crate::layout::vec3;
 use crate::render::provenance::Provenance;
 use crate::render::settings::{Allocate, Settings};
 use crate::render::{Outputs, Renderer};
@@ -34,8 +34,7 @@ impl Supersampling {
         gpu: &Gpu,
         image: &Path,
         aovs: &Aovs,
-        parts: &Parts,
-        filtered: &[vec4],
+        filtered: &Filtered,
     ) -> Result<Option<(Vec<vec3>, Vec<PassTime>)>> {
         let Some(path) = &self.scene else { return Ok(None) };
         let of_image = |what| Error::input(image, what);
@@ -44,7 +43,8 @@ impl Supersampling {
         let scene = Scene::load(path, &|s| *s = settings.clone())?;
         provenance.shows(&scene).map_err(of_image)?;
         let renderer = Renderer::new(gpu, &scene, Outputs::default())?;
-        renderer.look_up(&parts.input.guide, filtered, self.eye_rays).map(Some)
+        let (guide, light) = (filtered.guide().read()?, filtered.light().read()?);
+        renderer.look_up(&guide, &light, self.eye_rays).map(Some)
     }
 }
 

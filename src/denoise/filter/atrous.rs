@@ -14,6 +14,7 @@ use glam::Vec3;
 pub const ROW: Row = Row {
     name: "atrous",
     about: "edge-avoiding À-Trous wavelets, steered by radiance, normal and position",
+    bytes: super::pack::BYTES + 16,
     make: |gpu, settings, size| Ok(Box::new(Atrous::new(gpu, settings, size)?)),
     reference,
 };

@@ -13,6 +13,7 @@ use glam::Vec3;
 pub const ROW: Row = Row {
     name: "bilateral",
     about: "exact bilateral filter, joint with normal and position",
+    bytes: super::pack::BYTES + 16,
     make: |gpu, settings, size| Ok(Box::new(Bilateral::new(gpu, settings, size)?)),
     reference,
 };

@@ -1,8 +1,6 @@
 //! How alike two pixels are. Twin of `glsl/shared/edge.glsl`.
-use super::FilterInput;
 use super::atrous::{AtrousForm, AtrousSettings};
 use super::pack::Packed;
-use super::pixel::known_radiance;
 use crate::layout::vec3;
 use crate::settings::{FINITE_ABOVE_0, FROM_0, settings};
 use crate::shaders::shared::edge::{Constants, LEAST};
@@ -26,23 +24,6 @@ settings! {
             /// Distance that counts as an edge, in units of --extent; inf switches it off.
             sigma_x: f32 = 0.05, FROM_0;
         }
-    }
-}
-
-impl EdgeSettings {
-    /// The same with `intensity` and `extent` taken from an image: its largest known channel, and the diagonal of the
-    /// box around the hits, or where there are no positions the largest depth. 1 where there is nothing to measure.
-    pub fn scaled_to(mut self, input: &FilterInput) -> Self {
-        let usable = |v: f32| if v.is_normal() && v > 0.0 { v } else { 1.0 };
-        let channels = input.radiance.iter().filter_map(|c| known_radiance(*c).map(|c| c.max_element()));
-        self.intensity = usable(channels.fold(0.0, f32::max));
-        let hits = || input.guide.iter().filter(|g| g.depth > 0.0 || g.position != [0.0; 3]);
-        let places = || hits().map(|g| Vec3::from(g.position)).filter(|p| p.is_finite());
-        let low = places().fold(Vec3::INFINITY, Vec3::min);
-        let diagonal = (places().fold(low, Vec3::max) - low).length();
-        let deepest = hits().map(|g| g.depth).filter(|d| d.is_finite()).fold(0.0, f32::max);
-        self.extent = usable(if diagonal > 0.0 { diagonal } else { deepest });
-        self
     }
 }
 

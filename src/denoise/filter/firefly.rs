@@ -1,7 +1,8 @@
 //! Outliers cut before filtering, as a step of its own that says what it took away. Kernel: `glsl/filter/firefly.comp`.
-use super::FilterInput;
 use super::noise_estimate::luminance;
 use super::pixel::known_radiance;
+use super::{FilterInput, Planes};
+use crate::denoise::windows;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, FrameResources, Gpu, Kernel, Location, Recorder};
 use crate::layout::{FireflyPush, vec4};
@@ -49,31 +50,62 @@ impl Fireflies {
 /// [`Error::Usage`] for a factor below 1 or planes of wrong sizes, [`Error::Device`] when the device fails.
 pub fn remove_fireflies(gpu: &Gpu, input: &mut FilterInput, factor: f32) -> Result<Removed> {
     input.validate()?;
+    let mut planes = Planes::new(gpu, input)?;
+    let removed = cut(gpu, &mut planes, factor)?;
+    input.radiance = planes.radiance.read()?;
+    Ok(removed)
+}
+
+/// The same on the device.
+///
+/// # Errors
+/// As [`remove_fireflies`].
+pub fn cut(gpu: &Gpu, planes: &mut Planes, factor: f32) -> Result<Removed> {
     if !(factor >= 1.0 && factor.is_finite()) {
         return Err(Error::Usage(format!("the firefly factor is {factor}: choose a finite number of at least 1")));
     }
-    let radiance = Buffer::from_slice(gpu, "radiance", &input.radiance)?;
-    let cut = Buffer::new(gpu, "cut", input.radiance.len(), Location::Device)?;
+    let cut = Buffer::new(gpu, "cut", planes.radiance.len(), Location::Device)?;
     let kernel = Fireflies::new(gpu)?;
-    let size = [input.width, input.height];
-    gpu.run(&mut FrameResources::new(gpu)?, |rec| kernel.record(rec, size, factor, &radiance, &cut))?;
-    let cut = cut.read()?;
-    let removed = removed(&input.radiance, &cut);
-    input.radiance = cut;
-    Ok(removed)
+    let record = |rec: &mut Recorder| kernel.record(rec, planes.size, factor, &planes.radiance, &cut);
+    gpu.run(&mut FrameResources::new(gpu)?, record)?;
+    let mut tally = Tally::default();
+    for window in windows(cut.len()) {
+        tally.add(&planes.radiance.read_range(window.clone())?, &cut.read_range(window)?);
+    }
+    planes.radiance = cut;
+    Ok(tally.removed())
 }
 
 /// What is missing in `after`.
 pub fn removed(before: &[vec4], after: &[vec4]) -> Removed {
-    let (mut pixels, mut radiance, mut all) = (0, [0.0; 3], 0.0);
-    for (before, after) in before.iter().zip(after) {
-        let Some(before) = known_radiance(*before) else { continue };
-        pixels += usize::from(before.to_array() != after[..3]);
-        (0..3).for_each(|c| radiance[c] += f64::from(before[c]) - f64::from(after[c]));
-        all += before.as_dvec3().element_sum();
+    let mut tally = Tally::default();
+    tally.add(before, after);
+    tally.removed()
+}
+
+/// Sums over pixels.
+#[derive(Default)]
+struct Tally {
+    pixels: usize,
+    radiance: [f64; 3],
+    all: f64,
+}
+
+impl Tally {
+    fn add(&mut self, before: &[vec4], after: &[vec4]) {
+        for (before, after) in before.iter().zip(after) {
+            let Some(before) = known_radiance(*before) else { continue };
+            self.pixels += usize::from(before.to_array() != after[..3]);
+            (0..3).for_each(|c| self.radiance[c] += f64::from(before[c]) - f64::from(after[c]));
+            self.all += before.as_dvec3().element_sum();
+        }
     }
-    let share = if all > 0.0 { radiance.iter().sum::<f64>() / all } else { 0.0 };
-    Removed { pixels, radiance, share }
+
+    fn removed(self) -> Removed {
+        let Self { pixels, radiance, all } = self;
+        let share = if all > 0.0 { radiance.iter().sum::<f64>() / all } else { 0.0 };
+        Removed { pixels, radiance, share }
+    }
 }
 
 /// Twin of the kernel.

@@ -16,6 +16,7 @@ use std::ops::Range;
 pub const ROW: Row = Row {
     name: "guided",
     about: "guided image filter: light as a local linear function of normal and depth",
+    bytes: 96, // colours, channels and four planes of models; tables are of small images
     make: |gpu, settings, size| {
         Ok(match settings.guided.sums {
             GuidedSums::Blocks => Box::new(Guided::new(gpu, settings, size)?),

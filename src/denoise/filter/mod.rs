@@ -13,6 +13,7 @@ mod noise_estimate;
 mod none;
 mod pack;
 mod pixel;
+mod scales;
 mod settings;
 mod svgf;
 mod wavelet;
@@ -22,6 +23,7 @@ pub use edge::{EdgeOverrides, EdgeSettings};
 pub use footprint::{FootprintOverrides, FootprintSettings};
 pub use guided::{GuidedOverrides, GuidedSettings, GuidedSums};
 pub use input::FilterInput;
+pub use scales::Scales;
 pub use settings::{FilterOverrides, FilterSettings};
 pub use svgf::{SvgfOverrides, SvgfSettings};
 pub use wavelet::{WaveletBasis, WaveletOverrides, WaveletSettings};
@@ -43,6 +45,8 @@ pub struct Row {
     pub name: &'static str,
     /// One line of help.
     pub about: &'static str,
+    /// Bytes of device memory a pixel that its own buffers take, beside the [`Planes`].
+    pub(crate) bytes: u64,
     /// On a device: see [`Row::compile`].
     pub(crate) make: Make,
     /// The same on the host, in plain Rust.

@@ -7,6 +7,9 @@ use crate::layout::{PackPush, uvec4, vec4};
 use crate::shaders::pack::Bind;
 use glam::Vec3;
 
+/// Of a pixel of both planes.
+pub const BYTES: u64 = (size_of::<vec4>() + size_of::<uvec4>()) as u64;
+
 /// The kernel and its planes.
 pub struct Pack {
     kernel: Kernel<Bind<'static>>,

@@ -1,11 +1,11 @@
 //! What all filters can be told. What one filter alone reads is written in its own file.
-use super::FilterInput;
 use super::atrous::{AtrousOverrides, AtrousSettings};
 use super::edge::{EdgeOverrides, EdgeSettings};
 use super::footprint::{FootprintOverrides, FootprintSettings};
 use super::guided::{GuidedOverrides, GuidedSettings};
 use super::svgf::{SvgfOverrides, SvgfSettings};
 use super::wavelet::{WaveletOverrides, WaveletSettings};
+use super::{FilterInput, Scales};
 use crate::error::Result;
 use crate::settings::{entry, settings};
 
@@ -38,8 +38,8 @@ impl FilterSettings {
         self
     }
 
-    /// The same with the scales of `edge` taken from an image.
+    /// The same with `intensity` and `extent` taken from an image: see [`Scales::applied_to`].
     pub fn scaled_to(self, input: &FilterInput) -> Self {
-        Self { edge: self.edge.scaled_to(input), ..self }
+        Scales::of(input).applied_to(self)
     }
 }

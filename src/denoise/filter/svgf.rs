@@ -16,6 +16,7 @@ use std::f32::consts::LOG2_E;
 pub const ROW: Row = Row {
     name: "svgf",
     about: "À-Trous wavelets whose radiance weight counts in each pixel's standard deviations",
+    bytes: super::pack::BYTES + 32, // estimate and scratch
     make: |gpu, settings, size| Ok(Box::new(Svgf::new(gpu, settings, size)?)),
     reference,
 };

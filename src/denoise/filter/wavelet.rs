@@ -18,6 +18,7 @@ use glam::Vec3;
 pub const ROW: Row = Row {
     name: "wavelet",
     about: "decimated wavelets, CDF(2,2) or red-black, edge-avoiding where there are weights",
+    bytes: super::pack::BYTES + 16,
     make: |gpu, settings, size| Ok(Box::new(Wavelet::new(gpu, settings, size)?)),
     reference,
 };

@@ -15,6 +15,8 @@ use crate::shaders::{auto, auto_error, auto_inputs, auto_leverage, auto_smooth, 
 pub const ROW: Row = Row {
     name: "auto",
     about: "per pixel the best blend of none, guided by wide, middle and narrow windows, and svgf, by estimated error",
+    // The pack's, those of four candidates twice, of the estimate, three inputs, the dim one, leverages and their surroundings.
+    bytes: super::pack::BYTES + (4 * 2 + 1 + 3 + 1 + 2) * 16 + 3 * guided::ROW.bytes + svgf::ROW.bytes,
     make: |gpu, settings, size| Ok(Box::new(Auto::new(gpu, settings, size)?)),
     reference: reference::reference,
 };

@@ -1,0 +1,152 @@
+//! A noisy image taken apart on the device, to be filtered and put together again. Kernels: those of `glsl/film` whose names
+//! tell of modulation. Twin: [`super::twin`].
+use super::filter::Planes;
+use super::{Holds, Noisy};
+use crate::error::Result;
+use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
+use crate::layout::{PackPush, SplitPush, vec3, vec4};
+use crate::shaders::shared::noisy;
+use crate::shaders::{demodulate, demodulate_direct, remodulate, remodulate_direct};
+
+/// What is kept away from the filter, where an image tells it: `colour = sharp + factor * filtered`.
+///
+/// | | filtered | factor | sharp |
+/// |---|---|---|---|
+/// | `Light` | indirect light before albedo | that albedo | direct light, emission, what smooth surfaces show |
+/// | `Albedo` | colour / albedo | albedo | what reflects nothing: lamps, sky |
+/// | `Off` | colour | 1 | nothing |
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Demodulation {
+    /// Surface colour and direct light.
+    #[default]
+    Light,
+    /// Surface colour.
+    Albedo,
+    /// Nothing.
+    Off,
+}
+
+impl Demodulation {
+    /// One line for the user.
+    pub fn note(self) -> &'static str {
+        match self {
+            Self::Light => "filtered: indirect light before albedo; direct light stays as it is",
+            Self::Albedo => "filtered: colour / albedo; what has no albedo, and its rim, stays as it is",
+            Self::Off => "filtered: the colour, without demodulation",
+        }
+    }
+}
+
+/// The kernels and planes of one image.
+pub struct Demodulated {
+    split: Kernel<demodulate::Bind<'static>>,
+    join: Kernel<remodulate::Bind<'static>>,
+    /// What goes through the filter, and what comes out.
+    pub planes: Planes,
+    /// One element where none is known, and then no part of the planes.
+    variance: Buffer<vec3>,
+    factor: Buffer<vec4>,
+    /// What is not filtered; [`Demodulated::record_join`] makes it the whole image.
+    pub picture: Buffer<vec4>,
+    direct: Option<Direct>,
+}
+
+/// Direct light before albedo, where some pixels have none of their own: a filter in-paints it.
+struct Direct {
+    split: Kernel<demodulate_direct::Bind<'static>>,
+    join: Kernel<remodulate_direct::Bind<'static>>,
+    plane: Buffer<vec4>,
+}
+
+impl Demodulated {
+    /// For `noisy` and images that hold the same. With `in_paint`, pixels without direct light take it from the others.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when the planes do not fit.
+    pub fn new(gpu: &Gpu, noisy: &Noisy, demodulation: Demodulation, in_paint: bool) -> Result<Self> {
+        let (holds, pixels) = (noisy.holds, noisy.stats.len());
+        let measured = holds.variance_of_filtered(demodulation);
+        let constants = demodulate::Constants {
+            demodulation: demodulation as u32,
+            indirect_variance: holds.indirect_variance,
+            measured,
+            noisy: noisy::Constants { of_file: holds.of_file },
+            ..Default::default()
+        };
+        let plane = |name| Buffer::new(gpu, name, pixels, Location::Device);
+        let variance = Buffer::new(gpu, "variance", if measured { pixels } else { 1 }, Location::Device)?;
+        Ok(Self {
+            split: Kernel::new(gpu, &constants)?,
+            join: Kernel::new(gpu, &Default::default())?,
+            planes: Planes {
+                size: noisy.size,
+                radiance: plane("radiance")?,
+                guide: noisy.guide.clone(),
+                variance: measured.then(|| variance.clone()),
+                output: plane("filtered")?,
+            },
+            variance,
+            factor: plane("factor")?,
+            picture: plane("picture")?,
+            direct: in_paint.then(|| Direct::new(gpu, holds, pixels)).transpose()?,
+        })
+    }
+
+    /// stats\[P\], light\[P\], guide\[P\] -> radiance\[P\], variance\[P\], factor\[P\], picture\[P\], direct\[P\]
+    pub fn record_split(&self, rec: &mut Recorder, noisy: &Noisy) -> Result<()> {
+        let (planes, count) = (&self.planes, self.planes.pixels());
+        let image = noisy::Bind { stats: &noisy.stats, light: &noisy.light, guide: &noisy.guide };
+        let bind = demodulate::Bind {
+            noisy: image,
+            radiance: &planes.radiance,
+            variance: &self.variance,
+            factor: &self.factor,
+            sharp: &self.picture,
+        };
+        rec.dispatch_threads(&self.split, bind, &SplitPush { size: planes.size }, count)?;
+        let Some(direct) = &self.direct else { return Ok(()) };
+        let image = noisy::Bind { stats: &noisy.stats, light: &noisy.light, guide: &noisy.guide };
+        let bind = demodulate_direct::Bind { noisy: image, direct: &direct.plane };
+        rec.dispatch_threads(&direct.split, bind, &PackPush { count }, count)
+    }
+
+    /// Direct light for a filter, where it is to be in-painted: what comes out takes the place of the radiance, which must have
+    /// been filtered by then.
+    pub fn direct_planes(&self) -> Option<Planes> {
+        let Planes { size, radiance, guide, .. } = &self.planes;
+        let (guide, output) = (guide.clone(), radiance.clone());
+        self.direct.as_ref().map(|d| Planes { size: *size, radiance: d.plane.clone(), guide, variance: None, output })
+    }
+
+    /// direct\[P\], and what a filter made of it -> picture\[P\] of the pixels that lack it
+    pub fn record_direct_join(&self, rec: &mut Recorder) -> Result<()> {
+        let Some(direct) = &self.direct else { return Ok(()) };
+        let (planes, count) = (&self.planes, self.planes.pixels());
+        let bind = remodulate_direct::Bind {
+            guide: &planes.guide,
+            direct: &direct.plane,
+            filtered: &planes.radiance,
+            sharp: &self.picture,
+        };
+        rec.dispatch_threads(&direct.join, bind, &PackPush { count }, count)
+    }
+
+    /// filtered\[P\], factor\[P\] -> picture\[P\]: once for each split, since the picture takes the place of the light that was
+    /// not filtered.
+    pub fn record_join(&self, rec: &mut Recorder) -> Result<()> {
+        let count = self.planes.pixels();
+        let bind = remodulate::Bind { filtered: &self.planes.output, factor: &self.factor, picture: &self.picture };
+        rec.dispatch_threads(&self.join, bind, &PackPush { count }, count)
+    }
+}
+
+impl Direct {
+    fn new(gpu: &Gpu, holds: Holds, pixels: usize) -> Result<Self> {
+        let noisy = noisy::Constants { of_file: holds.of_file };
+        Ok(Self {
+            split: Kernel::new(gpu, &demodulate_direct::Constants { noisy, ..Default::default() })?,
+            join: Kernel::new(gpu, &Default::default())?,
+            plane: Buffer::new(gpu, "direct light", pixels, Location::Device)?,
+        })
+    }
+}

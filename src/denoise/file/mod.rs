@@ -1,0 +1,126 @@
+//! Image files of any renderer as noisy images: which AOV fills which plane, and what has to be made up.
+mod places;
+
+use super::noisy::{Holds, Noisy};
+use super::windows;
+use crate::error::Result;
+use crate::gpu::{Buffer, Gpu, Location};
+use crate::image::Samples;
+use crate::image::aov::{Aov, Aovs};
+use crate::layout::{Guide, NONE, PixelLight, PixelStats};
+use bytemuck::Pod;
+use glam::Vec3;
+use places::Places;
+
+/// The AOVs of a file, read pixel by pixel as the planes of a [`Noisy`] image: nothing is copied before it is asked for.
+pub struct Layers<'a> {
+    aovs: &'a Aovs<'a>,
+    places: Places,
+    indirect_m2: Option<&'a [f32]>,
+    /// pbrt writes the samples of all pixels into the file's head.
+    samples_of_all: Option<f32>,
+    /// pbrt stores the variance of one sample, others that of each pixel's mean.
+    of_one_sample: bool,
+    /// What had to be made up: one line each.
+    pub notes: Vec<String>,
+}
+
+impl<'a> Layers<'a> {
+    /// Looks at all that must be known before the first pixel.
+    pub fn new(aovs: &'a Aovs<'a>) -> Self {
+        let (film, mut notes) = (aovs.film, Vec::new());
+        let indirect_m2 = match film.channel("indirect.m2") {
+            Some(Samples::F32(m2)) => Some(m2.as_slice()),
+            _ => None,
+        };
+        Self {
+            aovs,
+            places: Places::new(aovs, &mut notes),
+            indirect_m2,
+            samples_of_all: film.metadata.get("samplesPerPixel").and_then(|n| n.parse::<f32>().ok()),
+            of_one_sample: film.channels.iter().any(|c| c.name.starts_with("RelativeVariance.")),
+            notes,
+        }
+    }
+
+    /// What the planes will hold.
+    pub fn holds(&self) -> Holds {
+        let has = |aov| self.aovs.get(aov).is_some();
+        Holds {
+            of_file: true,
+            albedo: has(Aov::Albedo),
+            light: has(Aov::Direct) && has(Aov::Indirect),
+            variance: has(Aov::Variance),
+            indirect_variance: self.indirect_m2.is_some(),
+        }
+    }
+
+    /// Copies the file's pixels to the device.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when they do not fit.
+    pub fn upload(&self, gpu: &Gpu) -> Result<Noisy> {
+        let (pixels, holds) = (self.aovs.film.pixels(), self.holds());
+        Ok(Noisy {
+            size: [self.aovs.film.width, self.aovs.film.height],
+            stats: filled(gpu, "stats", pixels, |i| self.stats(i))?,
+            light: filled(gpu, "light", if holds.light { pixels } else { 1 }, |i| self.light(i))?,
+            guide: filled(gpu, "guide", pixels, |i| self.guide(i))?,
+            holds,
+        })
+    }
+
+    /// Colour and variance with their samples: those of the pixel, or of all; 1 where the file does not say; 0 where it holds
+    /// nothing.
+    pub fn stats(&self, i: usize) -> PixelStats {
+        let said = self.aovs.scalar(Aov::Samples, i).or(self.samples_of_all).unwrap_or(1.0);
+        let count = if self.aovs.holds(i) { said } else { 0.0 };
+        let stored = self.aovs.get(Aov::Variance).map_or([0.0; 3], |plane| plane.at(i));
+        let m2 = if self.of_one_sample { stored.map(|v| v / count.max(1.0)) } else { stored };
+        let mean = self.aovs.get(Aov::Colour).map_or([0.0; 3], |plane| plane.at(i));
+        PixelStats { mean, count: count.to_bits(), m2, remainder: 0 }
+    }
+
+    /// Direct and indirect light, 0 where the file does not keep them apart.
+    pub fn light(&self, i: usize) -> PixelLight {
+        let at = |aov| self.aovs.get(aov).map_or([0.0; 3], |plane| plane.at(i));
+        PixelLight {
+            direct: at(Aov::Direct),
+            indirect_m2: self.indirect_m2.map_or(0.0, |m2| m2[i]),
+            indirect: at(Aov::Indirect),
+            remainder: 0,
+        }
+    }
+
+    /// The surface, zero where nothing is known.
+    pub fn guide(&self, i: usize) -> Guide {
+        // Means over a pixel's samples are shorter than 1.
+        let normal = vector(self.aovs, Aov::Normal, i).normalize_or_zero();
+        let (position, depth) = self.places.at(self.aovs, i);
+        let hit = self.aovs.holds(i) && depth > 0.0;
+        Guide {
+            normal: normal.into(),
+            depth,
+            position: position.into(),
+            object: if hit || normal != Vec3::ZERO { 0 } else { NONE },
+            albedo: self.aovs.get(Aov::Albedo).map_or([0.0; 3], |plane| plane.at(i)),
+            material: NONE,
+        }
+    }
+}
+
+/// 0 where there is none, or what there is is no number.
+fn vector(aovs: &Aovs, aov: Aov, i: usize) -> Vec3 {
+    let plane = aovs.get(aov).map(|plane| Vec3::from(plane.at(i)));
+    plane.filter(|v| v.is_finite()).unwrap_or_default()
+}
+
+/// A buffer on the device, filled a window at a time.
+fn filled<T: Pod>(gpu: &Gpu, name: &str, len: usize, value: impl Fn(usize) -> T) -> Result<Buffer<T>> {
+    let buffer = Buffer::new(gpu, name, len, Location::Device)?;
+    for window in windows(len) {
+        let first = window.start;
+        buffer.write(first, &window.map(&value).collect::<Vec<_>>())?;
+    }
+    Ok(buffer)
+}

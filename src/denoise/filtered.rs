@@ -1,0 +1,122 @@
+//! One image filtered with scales of its own, as the command line does: of a film, or of a file.
+use super::demodulated::{Demodulated, Demodulation};
+use super::filter::firefly::{self, Removed};
+use super::filter::{self, FilterSettings, Planes, Row, Scales};
+use super::noisy::Noisy;
+use super::windows;
+use crate::error::Result;
+use crate::gpu::{Buffer, FrameResources, Gpu, PassTime, Recorder};
+use crate::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
+
+/// How an image is to be filtered.
+pub struct Recipe<'a> {
+    /// By which filter.
+    pub row: &'a Row,
+    /// What is kept away from the filter, where the image tells it.
+    pub demodulation: Demodulation,
+    /// Pixels so many times brighter than all but one around them are cut first.
+    pub fireflies: Option<f32>,
+    /// The settings for light of these scales.
+    pub settings: &'a dyn Fn(&Scales) -> FilterSettings,
+}
+
+/// An image whose light is filtered, still taken apart.
+pub struct Filtered {
+    parts: Demodulated,
+    /// What each pass took.
+    pub times: Vec<PassTime>,
+    /// What was cut beforehand, if anything was to be.
+    pub removed: Option<Removed>,
+    /// Whether some pixels took direct light from others.
+    pub in_painted: bool,
+}
+
+/// Linear radiance (Rec. 709), one plane a channel, row-major.
+pub type Colour = [Vec<f32>; 3];
+
+impl Filtered {
+    /// Filters `noisy`, whose planes are freed as soon as they are taken apart. Where pixels lack direct light, the filter in-paints
+    /// it, with settings for its scale.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Usage`] for settings out of range, [`crate::error::Error::Device`] when the image is too large or the
+    /// device fails.
+    pub fn new(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Self> {
+        filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
+        let demodulation = noisy.holds().demodulation(recipe.demodulation);
+        noisy.round_as_file()?;
+        let in_painted = demodulation == Demodulation::Light && noisy.lacks_direct_light()?;
+        let mut parts = Demodulated::new(gpu, &noisy, demodulation, in_painted)?;
+        let mut times = run(gpu, |rec| parts.record_split(rec, &noisy))?;
+        drop(noisy);
+        let cut = |factor| firefly::cut(gpu, &mut parts.planes, factor);
+        let removed = recipe.fireflies.map(cut).transpose()?;
+        let scales = Scales::of_planes(&parts.planes)?;
+        times.extend(run_filter(gpu, recipe, &scales, &parts.planes)?);
+        if let Some(direct) = parts.direct_planes() {
+            times.extend(run_filter(gpu, recipe, &scales.with_light(&direct.radiance)?, &direct)?);
+            times.extend(run(gpu, |rec| parts.record_direct_join(rec))?);
+        }
+        Ok(Self { parts, times, removed, in_painted })
+    }
+
+    /// Puts the image together.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub fn join(mut self, gpu: &Gpu) -> Result<(Colour, Vec<PassTime>)> {
+        self.times.extend(run(gpu, |rec| self.parts.record_join(rec))?);
+        Ok((colour(&self.parts.picture)?, self.times))
+    }
+
+    /// Puts the image together from light that has been multiplied by surface colour already, as a look-up returns it; one value
+    /// per pixel.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub fn join_reflected(&self, light: &[vec3]) -> Result<Colour> {
+        let mut whole = colour(&self.parts.picture)?;
+        for (c, plane) in whole.iter_mut().enumerate() {
+            plane.iter_mut().zip(light).for_each(|(sharp, light)| *sharp += light[c]);
+        }
+        Ok(whole)
+    }
+
+    /// The surfaces.
+    pub fn guide(&self) -> &Buffer<Guide> {
+        &self.parts.planes.guide
+    }
+
+    /// What the filter returned.
+    pub fn light(&self) -> &Buffer<vec4> {
+        &self.parts.planes.output
+    }
+}
+
+/// Device memory that a pixel takes at most while [`Filtered`] is made: its guide, the six planes of an image taken apart, and what
+/// it was taken from or, later, the filter's own. The host holds a window.
+pub fn bytes_per_pixel(row: &Row) -> u64 {
+    let planes = size_of::<Guide>() + 5 * size_of::<vec4>() + size_of::<vec3>();
+    let taken_from = size_of::<PixelStats>() + size_of::<PixelLight>();
+    planes as u64 + row.bytes.max(taken_from as u64)
+}
+
+/// The filter's own buffers last no longer than this.
+fn run_filter(gpu: &Gpu, recipe: &Recipe, scales: &Scales, planes: &Planes) -> Result<Vec<PassTime>> {
+    let filter = recipe.row.compile(gpu, &(recipe.settings)(scales), planes.size)?;
+    run(gpu, |rec| filter.record(rec, planes))
+}
+
+fn run(gpu: &Gpu, record: impl FnOnce(&mut Recorder) -> Result<()>) -> Result<Vec<PassTime>> {
+    gpu.run(&mut FrameResources::new(gpu)?, record)
+}
+
+fn colour(picture: &Buffer<vec4>) -> Result<Colour> {
+    let mut planes = [0; 3].map(|_| Vec::with_capacity(picture.len()));
+    for window in windows(picture.len()) {
+        for pixel in picture.read_range(window)? {
+            planes.iter_mut().zip(pixel).for_each(|(plane, v)| plane.push(v));
+        }
+    }
+    Ok(planes)
+}

@@ -1,0 +1,115 @@
+//! A noisy image on the device, and what is known of its surfaces.
+use super::{Demodulation, windows};
+use crate::error::{Error, Result};
+use crate::gpu::Buffer;
+use crate::layout::{Guide, PixelLight, PixelStats};
+use crate::render::Renderer;
+use glam::Vec3;
+
+/// What the planes of a [`Noisy`] image hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Holds {
+    /// [`PixelStats::count`] holds the bits of a float, and [`PixelStats::m2`] the variance of the mean.
+    pub of_file: bool,
+    /// [`Guide::albedo`] is known.
+    pub albedo: bool,
+    /// Direct and indirect light are kept apart.
+    pub light: bool,
+    /// The variance of the colour is known.
+    pub variance: bool,
+    /// The variance of indirect light is known.
+    pub indirect_variance: bool,
+}
+
+impl Holds {
+    /// What a renderer leaves.
+    pub fn film(split_light: bool) -> Self {
+        Self { of_file: false, albedo: true, light: split_light, variance: true, indirect_variance: split_light }
+    }
+
+    /// What of `wanted` the planes allow.
+    pub fn demodulation(&self, wanted: Demodulation) -> Demodulation {
+        match wanted {
+            _ if !self.albedo => Demodulation::Off,
+            Demodulation::Light if !self.light => Demodulation::Albedo,
+            wanted => wanted,
+        }
+    }
+
+    /// Whether the variance of what is filtered is known.
+    pub fn variance_of_filtered(&self, demodulation: Demodulation) -> bool {
+        self.variance || (demodulation == Demodulation::Light && self.indirect_variance)
+    }
+}
+
+/// A noisy image: radiance with its samples and what is known of the surfaces behind it, row-major. It is the film of a
+/// renderer, where it lies ([`Noisy::of_film`]), or comes from a file ([`super::file::Layers::upload`]).
+pub struct Noisy {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    pub(super) stats: Buffer<PixelStats>,
+    /// One element where direct and indirect light are not kept apart.
+    pub(super) light: Buffer<PixelLight>,
+    pub(super) guide: Buffer<Guide>,
+    pub(super) holds: Holds,
+}
+
+impl Noisy {
+    /// The film of `renderer`, which was made with [`Outputs::guides`](crate::render::Outputs::guides). Nothing is copied: it is
+    /// what the renderer's steps leave there, and outlives the renderer.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a renderer without guides, and for a film in more than one piece.
+    pub fn of_film(renderer: &Renderer) -> Result<Self> {
+        let (outputs, settings, tiles) = (renderer.outputs(), renderer.settings(), &renderer.film().tiles);
+        let lacks = [
+            (outputs.guides, "its guides: make the renderer with Outputs::guides"),
+            (tiles.len() == 1, "a film in one piece: choose a smaller one"),
+        ];
+        if let Some((_, what)) = lacks.iter().find(|(there, _)| !there) {
+            return Err(Error::Usage(format!("a frame cannot be filtered without {what}")));
+        }
+        Ok(Self {
+            size: [settings.width, settings.height],
+            stats: tiles[0].stats.clone(),
+            light: tiles[0].light.clone(),
+            guide: tiles[0].guide.clone(),
+            holds: Holds::film(outputs.split_light),
+        })
+    }
+
+    /// What the planes hold.
+    pub fn holds(&self) -> Holds {
+        self.holds
+    }
+
+    /// Makes a film's normals unit as those of a file are. They are but for rounding, which this makes the same: a film and its file
+    /// become one picture, to the bit.
+    ///
+    /// # Errors
+    /// [`Error::Device`].
+    pub(super) fn round_as_file(&self) -> Result<()> {
+        for window in windows(self.guide.len()).filter(|_| !self.holds.of_file) {
+            let mut guide = self.guide.read_range(window.clone())?;
+            guide.iter_mut().for_each(|g| g.normal = Vec3::from(g.normal).normalize_or_zero().into());
+            self.guide.write(window.start, &guide)?;
+        }
+        Ok(())
+    }
+
+    /// Whether direct light, which is kept apart, is missing or no number somewhere: such pixels take it from the others.
+    ///
+    /// # Errors
+    /// [`Error::Device`].
+    pub fn lacks_direct_light(&self) -> Result<bool> {
+        for window in windows(self.stats.len()) {
+            let (stats, light) = (self.stats.read_range(window.clone())?, self.light.read_range(window)?);
+            // A count of zero is 0 as a float, too.
+            let unlit = |(s, l): (&PixelStats, &PixelLight)| s.count == 0 || !l.direct.iter().all(|v| v.is_finite());
+            if stats.iter().zip(&light).any(unlit) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+}
