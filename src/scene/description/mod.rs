@@ -82,7 +82,7 @@ pub struct Render {
     pub sampler: Option<Sampler>,
 }
 
-/// The `[environment]` table; orientation: see `environment.rs`.
+/// The `[environment]` table; orientation: see `build/environment.rs`.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct EnvironmentTable {
