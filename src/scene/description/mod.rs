@@ -53,7 +53,7 @@ pub struct Description {
     pub bitmap: Vec<Bitmap>,
 }
 
-/// The `[environment]` table; orientation: see `environment.rs`.
+/// The `[environment]` table; orientation: see `build/environment.rs`.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct EnvironmentTable {

@@ -7,7 +7,7 @@ use std::f32::consts::{PI, TAU};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Shape {
-    /// Unit sphere around the origin, its poles on z; tessellated where it cannot stay exact (`place.rs`).
+    /// Unit sphere around the origin, its poles on z; tessellated where it cannot stay exact (`build/plan.rs`).
     Sphere,
     /// [-1, 1] x [-1, 1] in the plane z = 0, normal +z.
     Rectangle,

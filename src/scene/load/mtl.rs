@@ -1,5 +1,5 @@
 //! MTL files through tobj: in any case and spelling, with the line of every mistake, options of maps and file names with
-//! spaces. What the statements mean for a material is decided in `material.rs`.
+//! spaces. What the statements mean for a material is decided in `mtl_material.rs`.
 use super::texture::Mapping;
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};

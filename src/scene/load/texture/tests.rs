@@ -1,0 +1,94 @@
+//! Pictures and what becomes of them.
+use super::*;
+
+fn decode(bytes: &[u8], name: &str, kind: Kind) -> Result<Decoded> {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join(name), bytes).unwrap();
+    let (mut set, mut warnings) = (TextureSet::default(), Vec::new());
+    let index = set.request(dir.path(), name, kind, Mapping::default(), &mut warnings);
+    assert_eq!((index, warnings.len()), (0, 0));
+    assert_eq!(set.request(dir.path(), name, kind, Mapping::default(), &mut warnings), 0, "each picture once");
+    crate::threads::within(|| set.decode())
+}
+
+fn encoded(picture: &image::RgbImage, format: image::ImageFormat) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, format).unwrap();
+    bytes.into_inner()
+}
+
+fn png(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
+    let picture = image::RgbImage::from_raw(width, height, pixels.to_vec()).unwrap();
+    encoded(&picture, image::ImageFormat::Png)
+}
+
+fn jpeg(width: u32, height: u32) -> Vec<u8> {
+    let picture = image::RgbImage::from_fn(width, height, |x, y| image::Rgb([6 * x as u8, 6 * y as u8, 77]));
+    encoded(&picture, image::ImageFormat::Jpeg)
+}
+
+#[test]
+fn the_mean_is_taken_in_linear_light() {
+    let color = decode(&png(2, 1, &[0, 0, 0, 255, 255, 255]), "a.png", Kind::Color).unwrap();
+    assert_eq!(color.texels, [0xff000000, 0xffffffff]);
+    assert_eq!(mean(&color.textures[0], &color.texels), [0.5; 3]);
+    // sRGB 188 is half of full light; 128 is a fifth.
+    let grey = decode(&png(1, 1, &[188, 188, 128]), "a.png", Kind::Color).unwrap();
+    let light = mean(&grey.textures[0], &grey.texels);
+    assert!((light[0] - 0.5).abs() < 0.005 && (light[2] - 0.2158).abs() < 0.005, "{light:?}");
+}
+
+#[test]
+fn channels_are_picked_by_kind() {
+    let found = decode(&png(1, 1, &[10, 20, 30]), "a.png", Kind::Roughness).unwrap();
+    assert_eq!(found.texels[0].to_le_bytes(), [20; 4]);
+    let found = decode(&png(1, 1, &[10, 20, 30]), "a.png", Kind::Mask).unwrap();
+    assert_eq!(found.texels[0].to_le_bytes(), [10; 4]);
+}
+
+#[test]
+fn damage_is_an_error_with_the_file() {
+    let whole = png(40, 40, &[7; 4800]);
+    for bytes in [&whole[..whole.len() / 2], &whole[..20], b"not a picture"] {
+        let error = decode(bytes, "a.png", Kind::Color).unwrap_err().to_string();
+        assert!(error.contains("a.png: is no usable picture") && !error.contains('\n'), "{error}");
+    }
+    assert!(decode(&whole, "a.png", Kind::Color).is_ok(), "control");
+    let whole = jpeg(40, 40);
+    for end in [whole.len() / 2, whole.len() - 40, whole.len() - 2] {
+        let error = decode(&whole[..end], "a.jpg", Kind::Color).unwrap_err();
+        assert_eq!(error.exit_code(), 3);
+        assert!(error.to_string().contains("a.jpg: is a JPEG without its end"), "{error}");
+    }
+    assert!(decode(&whole, "a.jpg", Kind::Color).is_ok(), "control");
+}
+
+#[test]
+fn large_pictures_are_decoded_where_memory_allows() {
+    use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+    use image::{ExtendedColorType, ImageEncoder};
+    // 517 MiB as it is decoded, which the decoder's own limit refuses.
+    const SIDE: u32 = 8230;
+    let mut bytes = Vec::new();
+    PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::NoFilter)
+        .write_image(&vec![0; 8 * SIDE as usize * SIDE as usize], SIDE, SIDE, ExtendedColorType::Rgba16)
+        .unwrap();
+    let found = decode(&bytes, "a.png", Kind::Color).unwrap();
+    assert!(found.texels.len() == SIDE as usize * SIDE as usize && found.texels.iter().all(|&t| t == 0));
+}
+
+#[test]
+fn a_missing_file_is_a_warning_and_case_is_mended() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::create_dir(dir.path().join("Tex")).unwrap();
+    std::fs::write(dir.path().join("Tex/Wood.PNG"), png(1, 1, &[1, 2, 3])).unwrap();
+    let (mut set, mut warnings) = (TextureSet::default(), Vec::new());
+    assert_eq!(set.request(dir.path(), "no.png", Kind::Color, Mapping::default(), &mut warnings), NONE);
+    for name in ["tex/wood.png", "C:/elsewhere/../Tex/wood.png"] {
+        assert_eq!(
+            set.request(dir.path(), name, Kind::Color, Mapping::default(), &mut warnings),
+            if name.starts_with('C') { NONE } else { 0 }
+        );
+    }
+    assert!(warnings[0].contains("no such file") && warnings[1].contains("found as"));
+}
