@@ -69,8 +69,9 @@ impl Origin {
 
     /// # Errors
     /// When the film is of another scene.
-    pub fn shows(&self, scene: &Scene) -> std::result::Result<(), String> {
-        if self.scene == scene.fingerprint.to_string() {
+    pub fn shows(&self, scene: &Scene, settings: &Settings) -> std::result::Result<(), String> {
+        let shown = scene.fingerprint([settings.width, settings.height]).map_err(|e| e.to_string())?;
+        if self.scene == shown.to_string() {
             return Ok(());
         }
         Err("shows another scene, or this one before it was changed".into())
@@ -110,12 +111,12 @@ fn json(what: &impl Serialize) -> Result<String> {
 ///
 /// # Errors
 /// [`Error::Usage`] when the film has no layer of counts.
-pub fn metadata(scene: &Scene, film: &Film) -> Result<[(&'static str, String); 3]> {
-    let settings = &scene.settings;
+pub fn metadata(scene: &Scene, settings: &Settings, film: &Film) -> Result<[(&'static str, String); 3]> {
+    let fingerprint = scene.fingerprint([settings.width, settings.height])?;
     let counts = layers::counts(film, "samples").map_err(Error::Usage)?;
     let count = counts.into_iter().max().unwrap_or(0);
     let range = SampleRange { seed: settings.seed, first: settings.first_sample, count };
-    Ok([(SETTINGS, json(settings)?), (SCENE, scene.fingerprint.to_string()), (SAMPLES, json(&[range])?)])
+    Ok([(SETTINGS, json(settings)?), (SCENE, fingerprint.to_string()), (SAMPLES, json(&[range])?)])
 }
 
 /// Says that a film is of these samples.

@@ -22,7 +22,7 @@ use crate::memory;
 use crate::render::settings::Settings;
 use crate::render::{self, FilmBuffers, Outputs, Renderer};
 use crate::report::trace::chrome_trace;
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneFile};
 use crate::statistics::BrokenSamples;
 use shot::Shot;
 use std::ops::ControlFlow;
@@ -107,23 +107,23 @@ impl Args {
 pub fn run(args: &Args) -> Result<Exit> {
     check_outputs(args)?;
     let mut host = Spans::default();
-    let scene = host.time("load scene", || Scene::load(&args.scene, &|s| args.overrides.apply(s)))?;
-    let earlier = args.resume.as_deref().map(|path| Earlier::read(path, &scene)).transpose()?;
+    let (scene, settings) = host.time("load scene", || load(args))?;
+    let earlier = args.resume.as_deref().map(|path| Earlier::read(path, &scene, &settings)).transpose()?;
     if args.common.talkative() {
         scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
     }
     let gpu = host.time("open device", || args.common.open())?;
     let wanted = args.wanted();
-    check_memory(args, &scene.settings, &gpu)?;
-    args.denoise.map_or(Ok(()), |_| {
-        filter::check_size(&gpu, [scene.settings.width, scene.settings.height], filter::GUIDE_TEXELS)
-    })?;
+    check_memory(args, &settings, &gpu)?;
+    args.denoise
+        .map_or(Ok(()), |_| filter::check_size(&gpu, [settings.width, settings.height], filter::GUIDE_TEXELS))?;
     let mut effects = match args.effects {
-        EffectChoice::Auto => render::called_for(&scene, wanted),
-        EffectChoice::All => render::all_effects(&scene),
+        EffectChoice::Auto => render::called_for(&scene, &settings, wanted),
+        EffectChoice::All => render::all_effects(&scene, &settings),
     };
     effects.adaptive |= earlier.is_some();
-    let renderer = host.time("upload and compile", || Renderer::specialised(&gpu, &scene, wanted, effects))?;
+    let renderer =
+        host.time("upload and compile", || Renderer::specialised(&gpu, &scene, &settings, wanted, effects))?;
     let broken_before = earlier.as_ref().and_then(|earlier| earlier.broken);
     let shot = Shot { args, gpu: &gpu, scene: &scene, renderer: &renderer, broken_before };
     let mut files = Files::new(args.resume.as_deref());
@@ -164,6 +164,15 @@ pub fn run(args: &Args) -> Result<Exit> {
         return Ok(Exit::Interrupted);
     }
     Ok(Exit::Done)
+}
+
+/// The settings are checked before what may take long.
+fn load(args: &Args) -> Result<(Scene, Settings)> {
+    let file = SceneFile::open(&args.scene)?;
+    let mut settings = file.settings()?;
+    args.overrides.apply(&mut settings);
+    settings.validate()?;
+    Ok((file.load()?.scene, settings))
 }
 
 /// Takes the samples, and writes checkpoints on the way.

@@ -70,8 +70,8 @@ impl Renderer {
     /// # Errors
     /// [`crate::error::Error::Usage`] for settings out of range, [`crate::error::Error::Scene`] for a scene that
     /// [`Scene::check`] refuses, [`crate::error::Error::Device`] when the device refuses something.
-    pub fn new(gpu: &Gpu, scene: &Scene, outputs: Outputs) -> Result<Self> {
-        Self::specialised(gpu, scene, outputs, called_for(scene, outputs))
+    pub fn new(gpu: &Gpu, scene: &Scene, settings: &Settings, outputs: Outputs) -> Result<Self> {
+        Self::specialised(gpu, scene, settings, outputs, called_for(scene, settings, outputs))
     }
 
     /// [`Renderer::new`] with other effects compiled in: more of them change nothing but the speed, fewer leave things
@@ -79,8 +79,13 @@ impl Renderer {
     ///
     /// # Errors
     /// As [`Renderer::new`].
-    pub fn specialised(gpu: &Gpu, scene: &Scene, outputs: Outputs, effects: Effects) -> Result<Self> {
-        let settings = scene.settings.clone();
+    pub fn specialised(
+        gpu: &Gpu,
+        scene: &Scene,
+        settings: &Settings,
+        outputs: Outputs,
+        effects: Effects,
+    ) -> Result<Self> {
         settings.validate()?;
         scene.check()?;
         let policy = settings.allocate.policy;
@@ -94,7 +99,7 @@ impl Renderer {
         };
         let pixels = settings.pixels() as u32;
         let allocation = effects.adaptive.then(|| allocation(gpu, policy, pixels)).transpose()?;
-        let paths = paths_in_flight(gpu, &settings, &effects);
+        let paths = paths_in_flight(gpu, settings, &effects);
         let film = FilmBuffers::new(gpu, pixels, paths, &effects, outputs.guides || policy.guides)?;
         // Offsets are the widest records that are bound whole.
         let most = (gpu.info().max_storage_range / 8 - 1).min(film.tiles[0].pixels.into());
@@ -104,7 +109,7 @@ impl Renderer {
                  or --allocate uniform"
             )));
         }
-        let (push, priority) = (path_push(scene), priority_push(scene));
+        let (push, priority) = (path_push(scene, settings)?, priority_push(scene, settings));
         let scene = DeviceScene::new(gpu, scene, &effects)?;
         Ok(Self {
             gpu: gpu.clone(),
@@ -114,7 +119,7 @@ impl Renderer {
             film,
             effects,
             outputs,
-            settings,
+            settings: settings.clone(),
             push,
             priority,
             paths,
@@ -327,13 +332,13 @@ impl Renderer {
 }
 
 /// The effects that a scene, its settings and the outputs call for.
-pub fn called_for(scene: &Scene, outputs: Outputs) -> Effects {
-    scene::effects(scene, outputs.split_light, outputs.counters).0
+pub fn called_for(scene: &Scene, settings: &Settings, outputs: Outputs) -> Effects {
+    scene::effects(scene, settings, outputs.split_light, outputs.counters).0
 }
 
 /// Every effect of light and matter; the random numbers stay those that the settings chose.
-pub fn all_effects(scene: &Scene) -> Effects {
-    let independent_sampler = scene.settings.sampler == Sampler::Independent;
+pub fn all_effects(scene: &Scene, settings: &Settings) -> Effects {
+    let independent_sampler = settings.sampler == Sampler::Independent;
     Effects { independent_sampler, large_lamps: scene.large_lamps, ..Effects::ALL }
 }
 
@@ -361,8 +366,8 @@ fn allocation(gpu: &Gpu, policy: &Row, pixels: u32) -> Result<Allocation> {
 }
 
 /// What the policies are told of a scene.
-pub fn priority_push(scene: &Scene) -> PriorityPush {
-    let (s, a) = (&scene.settings, &scene.settings.allocate);
+pub fn priority_push(scene: &Scene, s: &Settings) -> PriorityPush {
+    let a = &s.allocate;
     let [low, high] = scene.bounds.map(glam::Vec3::from);
     let sigma = (a.geometry.sigma_position * high.distance(low)).max(f32::MIN_POSITIVE.sqrt());
     PriorityPush {
@@ -379,11 +384,13 @@ pub fn priority_push(scene: &Scene) -> PriorityPush {
 }
 
 /// What the kernels are told of a scene; the batch is still to be filled in.
-pub fn path_push(scene: &Scene) -> PathPush {
-    let settings = &scene.settings;
+///
+/// # Errors
+/// Those of [`Scene::camera`].
+pub fn path_push(scene: &Scene, settings: &Settings) -> Result<PathPush> {
     let environment = scene.lights.iter().position(|l| l.kind == LIGHT_ENVIRONMENT);
-    PathPush {
-        camera: scene.camera,
+    Ok(PathPush {
+        camera: scene.camera([settings.width, settings.height])?,
         size: [settings.width, settings.height],
         first_sample: settings.first_sample,
         seed: settings.seed,
@@ -397,5 +404,5 @@ pub fn path_push(scene: &Scene) -> PathPush {
         environment_width: scene.environment.as_ref().map_or(0, |e| e.width),
         root: scene.root | if scene.instances.is_empty() { 0 } else { ROOT_OF_INSTANCES },
         ..PathPush::default()
-    }
+    })
 }

@@ -120,8 +120,8 @@ impl<'a> Assembly<'a> {
         self.lights(scene)?;
         let plan = self.plan()?;
         let stored = self.store(&plan)?;
-        scene.fingerprint.add(&self.geometry.triangles);
-        scene.fingerprint.add(&self.geometry.shading);
+        scene.content.add(&self.geometry.triangles);
+        scene.content.add(&self.geometry.shading);
         self.build(&plan, stored, scene)
     }
 
@@ -235,8 +235,8 @@ impl<'a> Assembly<'a> {
                 let (material, object) = (copy.material.unwrap_or(NONE), scene.names.objects.len() as u32);
                 let placed = Instance { material, object, ..instance(&copy.affine, root) };
                 // Nodes are counted differently by another builder, triangles are not.
-                scene.fingerprint.add(&[Instance { root: mesh.range.start as u32, ..placed }]);
-                scene.fingerprint.add(&[mesh.range.end as u32]);
+                scene.content.add(&[Instance { root: mesh.range.start as u32, ..placed }]);
+                scene.content.add(&[mesh.range.end as u32]);
                 scene.instances.push(placed);
                 scene.names.objects.extend(mesh.objects.iter().cloned());
             }
@@ -314,7 +314,7 @@ fn turned(i: &Instance) -> Instance {
 
 /// Adds to the fingerprint what surfaces and lights look like; the rest of them is derived from that.
 fn add_appearance(scene: &mut Scene) {
-    let fingerprint = &mut scene.fingerprint;
+    let fingerprint = &mut scene.content;
     fingerprint.add(&scene.materials);
     fingerprint.add(&scene.textures);
     fingerprint.add(&scene.texels);

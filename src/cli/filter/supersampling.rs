@@ -7,7 +7,7 @@ use crate::image::aov::{Aov, Aovs};
 use crate::layout::{vec3, vec4};
 use crate::render::settings::{Allocate, Settings};
 use crate::render::{Outputs, Renderer};
-use crate::scene::Scene;
+use crate::scene::{Loaded, Scene};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -41,9 +41,10 @@ impl Supersampling {
         let of_image = |what| Error::input(image, what);
         let origin = Origin::of(aovs.film).map_err(of_image)?;
         let settings = settings(aovs, &origin).map_err(of_image)?;
-        let scene = Scene::load(path, &|s| *s = settings.clone())?;
-        origin.shows(&scene).map_err(of_image)?;
-        let renderer = Renderer::new(gpu, &scene, Outputs::default())?;
+        settings.validate()?;
+        let Loaded { scene, .. } = Scene::load(path)?;
+        origin.shows(&scene, &settings).map_err(of_image)?;
+        let renderer = Renderer::new(gpu, &scene, &settings, Outputs::default())?;
         renderer.look_up(&parts.input.guide, filtered, self.eye_rays).map(Some)
     }
 }

@@ -42,7 +42,8 @@ impl Shot<'_> {
     pub fn film(&self, end: &End, seconds: f64, whole: bool) -> Result<Film> {
         let mut film = layers::film(self.renderer)?;
         film.metadata = metadata(self.args, self.gpu, seconds, end.allocations);
-        film.metadata.extend(origin::metadata(self.scene, &film)?.map(|(k, v)| (k.to_owned(), v)));
+        film.metadata
+            .extend(origin::metadata(self.scene, self.renderer.settings(), &film)?.map(|(k, v)| (k.to_owned(), v)));
         layers::set_broken_samples(&mut film, self.broken_samples()?);
         if !whole {
             let pending = resume::pending(self.renderer, &film, end)?;
