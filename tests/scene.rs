@@ -68,7 +68,10 @@ fn the_fingerprint_is_that_of_what_is_seen() {
 [[light]]\ntype = \"point\"\nposition = [0, 1, 1]\nintensity = 3
 [environment]\nradiance = 0.1";
     let text = format!("{BOX}{more}");
-    let of = |text: &str| parse(text).unwrap().fingerprint([32, 16]).unwrap();
+    let of = |text: &str| {
+        let Loaded { scene, settings } = parse(text).unwrap();
+        scene.fingerprint([settings.width, settings.height]).unwrap()
+    };
     for threads in [1, 2, 5] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         assert_eq!(pool.install(|| of(&text)), of(&text), "by {threads} threads");
