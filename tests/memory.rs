@@ -39,17 +39,19 @@ fn ten_million_triangles_load_within_four_gibibytes_and_render() {
     let path = dir.path().join("grid.obj");
     write_grid(&path, 2237).unwrap();
     let start = Instant::now();
-    let scene = Scene::load(&path, &|s| (s.width, s.height, s.spp) = (32, 18, 1)).unwrap();
+    let scene = Scene::load(&path).map(|scene| scene.with(|s| (s.width, s.height, s.spp) = (32, 18, 1))).unwrap();
     assert!(scene.triangles.len() > 10_000_000);
     let peak = peak_memory().expect("Linux tells") as f64 / f64::from(1 << 30);
     println!("{} triangles in {:.1} s, peak {peak:.2} GiB", scene.triangles.len(), start.elapsed().as_secs_f64());
     assert!(peak < 4.0);
     let gpu = support::gpu();
-    let renderer = Renderer::new(&gpu, &scene, Outputs { guides: true, ..Outputs::default() }).unwrap();
+    let renderer =
+        Renderer::new(&gpu, &scene, &scene.settings, Outputs { guides: true, ..Outputs::default() }).unwrap();
     let stats = support::render(&gpu, &renderer);
     assert!(stats.iter().all(|s| s.mean.iter().all(|v| v.is_finite())));
     let hits = renderer.film().tiles[0].guide.read().unwrap();
-    let twins: Vec<_> = (0..stats.len() as u32).map(|p| guide(&scene, &frame_constants(&scene), p)).collect();
+    let twins: Vec<_> =
+        (0..stats.len() as u32).map(|p| guide(&scene, &frame_constants(&scene, &scene.settings).unwrap(), p)).collect();
     let apart = hits.iter().zip(&twins).filter(|(a, b)| (a.depth - b.depth).abs() > 1e-4 * b.depth).count();
     let surface = hits.iter().filter(|hit| hit.depth > 0.0).count();
     println!("{surface} of {} pixels show the mesh, {apart} of them elsewhere than the twin", stats.len());

@@ -4,7 +4,7 @@ use crate::compare::Picture;
 use glam::{Vec3, vec2};
 use rayon::prelude::*;
 use std::path::Path;
-use tallow::layout::NONE;
+use tallow::layout::{Camera, NONE};
 use tallow::math::warp::warp_sphere;
 use tallow::scene::Scene;
 use tallow::twins::camera::{camera_ray, film_from_pixel};
@@ -18,19 +18,21 @@ use tallow::twins::traverse::traverse_from;
 /// # Errors
 /// When the scene cannot be loaded.
 pub fn render(scene: &Path, spp: u32, reach: f32) -> anyhow::Result<Picture> {
-    let scene = Scene::load(scene, &|_| {})?;
+    let scene = Scene::load(scene)?;
     let (width, height) = (scene.settings.width, scene.settings.height);
-    let mean = |pixel: u32| (0..spp).map(|i| sample(&scene, pixel, i, reach)).sum::<f32>() / spp as f32;
+    let camera = scene.camera([width, height])?;
+    let mean = |pixel: u32| {
+        (0..spp).map(|i| sample(&scene, &camera, [width, height], pixel, i, reach)).sum::<f32>() / spp as f32
+    };
     let rgb = (0..width * height).into_par_iter().map(|pixel| [mean(pixel); 3]).collect();
     Ok(Picture { width: width as usize, height: height as usize, rgb })
 }
 
 /// 1 where nothing is met, as Nori has it for rays that leave the scene.
-fn sample(scene: &Scene, pixel: u32, index: u32, reach: f32) -> f32 {
-    let size = [scene.settings.width, scene.settings.height];
+fn sample(scene: &Scene, camera: &Camera, size: [u32; 2], pixel: u32, index: u32, reach: f32) -> f32 {
     let random = sampler_start(pixel, index, 0, false);
     let at = vec2((pixel % size[0]) as f32, (pixel / size[0]) as f32) + sample_2d(random, 0);
-    let ray = camera_ray(&scene.camera, film_from_pixel(at, size), vec2(0.5, 0.5));
+    let ray = camera_ray(camera, film_from_pixel(at, size), vec2(0.5, 0.5));
     let meets =
         |from, origin: Vec3, direction, t_max, any| traverse_from(scene, from, origin, direction, t_max, any, 0);
     let hit = meets([NONE; 2], ray.origin, ray.direction, INFINITE_DISTANCE, false);

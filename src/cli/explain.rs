@@ -6,7 +6,7 @@ use crate::layout::*;
 use crate::render::settings::{Allocate, Settings};
 use crate::render::{Job, Outputs, Renderer};
 use crate::report::table::{self, milliseconds};
-use crate::scene::{self, Scene};
+use crate::scene::{self, Loaded, Scene};
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -114,9 +114,9 @@ struct Variant {
 }
 
 impl Variant {
-    fn new(args: &Args, scene: &Scene, outputs: Outputs, effects: Effects) -> Result<Self> {
+    fn new(args: &Args, scene: &Loaded, outputs: Outputs, effects: Effects) -> Result<Self> {
         let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), ..DeviceOptions::default() })?;
-        let renderer = Renderer::specialised(&gpu, scene, outputs, effects)?;
+        let renderer = Renderer::specialised(&gpu, scene, &scene.settings, outputs, effects)?;
         let created: f64 = renderer.compile_times().iter().map(|(_, ms)| ms).sum();
         let cost = Cost { gpu_ms: f64::INFINITY, compile_ms: created, bytes: gpu.allocated_bytes() };
         let mut variant = Self { renderer, frame: FrameResources::new(&gpu)?, cost };
@@ -136,9 +136,9 @@ impl Variant {
 }
 
 fn rows(args: &Args) -> Result<Vec<Row>> {
-    let scene = Scene::load(&args.scene, &shrink)?;
+    let scene = Scene::load(&args.scene)?.with(shrink);
     let outputs = Outputs { split_light: true, guides: true, counters: false };
-    let (base, reasons) = scene::effects(&scene, outputs.split_light, outputs.counters);
+    let (base, reasons) = scene::effects(&scene, &scene.settings, outputs.split_light, outputs.counters);
     let called_for_by = |effect| reasons.iter().find(|(of, _)| *of == effect).map_or("", |(_, by)| by).to_owned();
     let names: Vec<_> = Effect::ALL.iter().map(|effect| effect.name()).chain([GUIDES]).collect();
     if let Some(unknown) = args.effects.iter().find(|name| !names.contains(&name.as_str())) {

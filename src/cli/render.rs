@@ -20,7 +20,7 @@ use crate::memory;
 use crate::render::settings::Settings;
 use crate::render::{self, Checkpoint, FilmBuffers, Job, Outputs, Renderer, Status, StopReason};
 use crate::report::trace::chrome_trace;
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneFile};
 use crate::statistics::BrokenSamples;
 use shot::Shot;
 use std::ops::ControlFlow;
@@ -105,23 +105,23 @@ impl Args {
 pub fn run(args: &Args) -> Result<Exit> {
     check_outputs(args)?;
     let mut host = Spans::default();
-    let scene = host.time("load scene", || Scene::load(&args.scene, &|s| args.overrides.apply(s)))?;
-    let earlier = args.resume.as_deref().map(|path| Checkpoint::read(path, &scene)).transpose()?;
+    let (scene, settings) = host.time("load scene", || load(args))?;
+    let earlier = args.resume.as_deref().map(|path| Checkpoint::read(path, &scene, &settings)).transpose()?;
     if args.common.talkative() {
         scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
     }
     let gpu = host.time("open device", || args.common.open())?;
     let wanted = args.wanted();
-    check_memory(args, &scene.settings, &gpu)?;
-    args.denoise.map_or(Ok(()), |_| {
-        filter::check_size(&gpu, [scene.settings.width, scene.settings.height], filter::GUIDE_TEXELS)
-    })?;
+    check_memory(args, &settings, &gpu)?;
+    args.denoise
+        .map_or(Ok(()), |_| filter::check_size(&gpu, [settings.width, settings.height], filter::GUIDE_TEXELS))?;
     let mut effects = match args.effects {
-        EffectChoice::Auto => render::called_for(&scene, wanted),
-        EffectChoice::All => render::all_effects(&scene),
+        EffectChoice::Auto => render::called_for(&scene, &settings, wanted),
+        EffectChoice::All => render::all_effects(&scene, &settings),
     };
     effects.adaptive |= earlier.is_some();
-    let renderer = host.time("upload and compile", || Renderer::specialised(&gpu, &scene, wanted, effects))?;
+    let renderer =
+        host.time("upload and compile", || Renderer::specialised(&gpu, &scene, &settings, wanted, effects))?;
     let noisy = args.denoise.map(|_| Noisy::of_film(&renderer)).transpose()?;
     let job = Job { checkpoint: earlier.as_ref(), ..Job::new(&renderer) };
     let shot = Shot { args, gpu: &gpu, job };
@@ -162,6 +162,15 @@ pub fn run(args: &Args) -> Result<Exit> {
         return Ok(Exit::Interrupted);
     }
     Ok(Exit::Done)
+}
+
+/// The settings are checked before what may take long.
+fn load(args: &Args) -> Result<(Scene, Settings)> {
+    let file = SceneFile::open(&args.scene)?;
+    let mut settings = file.settings()?;
+    args.overrides.apply(&mut settings);
+    settings.validate()?;
+    Ok((file.load()?.scene, settings))
 }
 
 /// Takes the samples, shows how far it is, and writes checkpoints on the way.

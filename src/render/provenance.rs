@@ -70,8 +70,9 @@ impl Provenance {
 
     /// # Errors
     /// When the film is of another scene.
-    pub(crate) fn shows(&self, scene: &Scene) -> std::result::Result<(), String> {
-        if self.scene == scene.fingerprint.to_string() {
+    pub(crate) fn shows(&self, scene: &Scene, settings: &Settings) -> std::result::Result<(), String> {
+        let shown = scene.fingerprint([settings.width, settings.height]).map_err(|e| e.to_string())?;
+        if self.scene == shown.to_string() {
             return Ok(());
         }
         Err("shows another scene, or this one before it was changed".into())

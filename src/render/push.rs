@@ -1,11 +1,13 @@
 //! What the kernels are told of a scene and its settings, besides the scene's own records.
+use crate::error::Result;
 use crate::layout::{FrameConstants, LIGHT_ENVIRONMENT, NONE, PriorityPush, ROOT_OF_INSTANCES};
 use crate::render::schedule;
+use crate::render::settings::Settings;
 use crate::scene::Scene;
 
 /// What the policies are told of a scene.
-pub fn priority_push(scene: &Scene) -> PriorityPush {
-    let (s, a) = (&scene.settings, &scene.settings.allocate);
+pub fn priority_push(scene: &Scene, s: &Settings) -> PriorityPush {
+    let a = &s.allocate;
     let [low, high] = scene.bounds.map(glam::Vec3::from);
     let sigma = (a.geometry.sigma_position * high.distance(low)).max(f32::MIN_POSITIVE.sqrt());
     PriorityPush {
@@ -23,11 +25,13 @@ pub fn priority_push(scene: &Scene) -> PriorityPush {
 }
 
 /// What the kernels are told of a scene and its camera.
-pub fn frame_constants(scene: &Scene) -> FrameConstants {
-    let settings = &scene.settings;
+///
+/// # Errors
+/// Those of [`Scene::camera`].
+pub fn frame_constants(scene: &Scene, settings: &Settings) -> Result<FrameConstants> {
     let environment = scene.lights.iter().position(|l| l.kind == LIGHT_ENVIRONMENT);
-    FrameConstants {
-        camera: scene.camera,
+    Ok(FrameConstants {
+        camera: scene.camera([settings.width, settings.height])?,
         size: [settings.width, settings.height],
         seed: settings.seed,
         max_depth: settings.max_depth,
@@ -40,5 +44,5 @@ pub fn frame_constants(scene: &Scene) -> FrameConstants {
         environment_width: scene.environment.as_ref().map_or(0, |e| e.width),
         root: scene.root | if scene.instances.is_empty() { 0 } else { ROOT_OF_INSTANCES },
         ..Default::default()
-    }
+    })
 }

@@ -60,8 +60,8 @@ impl Renderer {
     /// # Errors
     /// [`crate::error::Error::Usage`] for settings out of range, [`crate::error::Error::Scene`] for a scene that
     /// [`Scene::check`] refuses, [`crate::error::Error::Device`] when the device refuses something.
-    pub fn new(gpu: &Gpu, scene: &Scene, outputs: Outputs) -> Result<Self> {
-        Self::specialised(gpu, scene, outputs, called_for(scene, outputs))
+    pub fn new(gpu: &Gpu, scene: &Scene, settings: &Settings, outputs: Outputs) -> Result<Self> {
+        Self::specialised(gpu, scene, settings, outputs, called_for(scene, settings, outputs))
     }
 
     /// [`Renderer::new`] with other effects compiled in: more of them change nothing but the speed, fewer leave things
@@ -69,8 +69,13 @@ impl Renderer {
     ///
     /// # Errors
     /// As [`Renderer::new`].
-    pub fn specialised(gpu: &Gpu, scene: &Scene, outputs: Outputs, effects: Effects) -> Result<Self> {
-        let settings = scene.settings.clone();
+    pub fn specialised(
+        gpu: &Gpu,
+        scene: &Scene,
+        settings: &Settings,
+        outputs: Outputs,
+        effects: Effects,
+    ) -> Result<Self> {
         settings.validate()?;
         scene.check()?;
         let policy = settings.allocate.policy;
@@ -78,8 +83,8 @@ impl Renderer {
         let effects = Effects { split_light, counters: outputs.counters, ..effects };
         let kernels = Kernels::new(gpu, effects, scene.stack)?;
         let pixels = settings.pixels() as u32;
-        let allocation = effects.adaptive.then(|| Allocation::new(gpu, policy, &settings)).transpose()?;
-        let paths = paths_in_flight(gpu, &settings, &effects);
+        let allocation = effects.adaptive.then(|| Allocation::new(gpu, policy, settings)).transpose()?;
+        let paths = paths_in_flight(gpu, settings, &effects);
         let film = FilmBuffers::new(gpu, pixels, paths, &effects, outputs.guides || policy.guides)?;
         // Offsets are the widest records that are bound whole.
         let most = (gpu.info().max_storage_range / 8 - 1).min(film.tiles[0].pixels.into());
@@ -89,11 +94,11 @@ impl Renderer {
                  or --allocate uniform"
             )));
         }
-        let (constants, priority_push) = (frame_constants(scene), priority_push(scene));
-        let fingerprint = Some(scene.fingerprint.clone());
+        let (constants, priority_push) = (frame_constants(scene, settings)?, priority_push(scene, settings));
+        let fingerprint = Some(scene.fingerprint([settings.width, settings.height])?);
         let scene = DeviceScene::new(gpu, scene, &effects)?;
-        let frame =
-            Frame { scene, film, kernels, allocation, constants, first_sample: settings.first_sample, priority_push };
+        let (settings, first_sample) = (settings.clone(), settings.first_sample);
+        let frame = Frame { scene, film, kernels, allocation, constants, first_sample, priority_push };
         Ok(Self { gpu: gpu.clone(), frame, effects, outputs, settings, paths, fingerprint })
     }
 
@@ -250,13 +255,13 @@ impl Renderer {
 }
 
 /// The effects that a scene, its settings and the outputs call for.
-pub fn called_for(scene: &Scene, outputs: Outputs) -> Effects {
-    scene::effects(scene, outputs.split_light, outputs.counters).0
+pub fn called_for(scene: &Scene, settings: &Settings, outputs: Outputs) -> Effects {
+    scene::effects(scene, settings, outputs.split_light, outputs.counters).0
 }
 
 /// Every effect of light and matter; the random numbers stay those that the settings chose.
-pub fn all_effects(scene: &Scene) -> Effects {
-    let independent_sampler = scene.settings.sampler == Sampler::Independent;
+pub fn all_effects(scene: &Scene, settings: &Settings) -> Effects {
+    let independent_sampler = settings.sampler == Sampler::Independent;
     Effects { independent_sampler, large_lamps: scene.large_lamps, ..Effects::ALL }
 }
 

@@ -37,15 +37,15 @@ impl Checkpoint {
     ///
     /// # Errors
     /// [`Error::Input`] when it is no such file.
-    pub fn read(path: &Path, scene: &Scene) -> Result<Self> {
+    pub fn read(path: &Path, scene: &Scene, settings: &Settings) -> Result<Self> {
         let film = image::read(path)?;
-        Self::of(&film, scene).map_err(|what| Error::input(path, what))
+        Self::of(&film, scene, settings).map_err(|what| Error::input(path, what))
     }
 
-    fn of(film: &Film, scene: &Scene) -> std::result::Result<Self, String> {
+    fn of(film: &Film, scene: &Scene, settings: &Settings) -> std::result::Result<Self, String> {
         let rendered = Rendered::of(film)?;
-        check(&rendered.provenance, scene)?;
-        let (settings, priority) = (&scene.settings, rendered.priority(film)?);
+        check(&rendered.provenance, scene, settings)?;
+        let priority = rendered.priority(film)?;
         let Rendered { pixels, broken, pending, .. } = rendered;
         let pending = match pending {
             _ if settings.allocate.is_even() => {
@@ -98,8 +98,7 @@ impl Renderer {
 }
 
 /// Whether a render of this scene can go on where the file's ended.
-fn check(provenance: &Provenance, scene: &Scene) -> std::result::Result<(), String> {
-    let settings = &scene.settings;
+fn check(provenance: &Provenance, scene: &Scene, settings: &Settings) -> std::result::Result<(), String> {
     let uniform = settings.allocate.is_even();
     // By way of text: a number's shortest decimal is not its value in double precision.
     let text = serde_json::to_string(settings).map_err(|e| e.to_string())?;
@@ -114,7 +113,7 @@ fn check(provenance: &Provenance, scene: &Scene) -> std::result::Result<(), Stri
         let free = if uniform { "; only spp may differ" } else { "" };
         return Err(format!("was rendered with other settings{free}: {}", provenance.settings));
     }
-    provenance.shows(scene)?;
+    provenance.shows(scene, settings)?;
     // A pixel goes on at the index of its first sample plus their number.
     match &provenance.samples[..] {
         [one] if (one.seed, one.first) == (settings.seed, settings.first_sample) => Ok(()),

@@ -23,7 +23,7 @@ enum Level {
 
 impl Scene {
     /// Whether every index leads into its array, the nodes form trees that [`Scene::stack`] is deep enough for, parallel arrays
-    /// have the same length and the camera is of finite numbers. In time that is linear in all of that; making a
+    /// have the same length. In time that is linear in all of that; making a
     /// [`Renderer`](crate::render::Renderer) asks.
     ///
     /// # Errors
@@ -33,8 +33,7 @@ impl Scene {
             .and_then(|()| self.surfaces_fit())
             .and_then(|()| self.textures_fit())
             .and_then(|()| self.lights_fit())
-            .map_err(Error::Scene)?;
-        check_camera(&self.camera)
+            .map_err(Error::Scene)
     }
 
     fn nodes_fit(&self) -> Checked {

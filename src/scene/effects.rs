@@ -2,11 +2,16 @@
 use super::Scene;
 use super::build::{geometry, lights};
 use crate::layout::*;
-use crate::render::settings::{PixelFilter, Sampler};
+use crate::render::settings::{PixelFilter, Sampler, Settings};
 
 /// The effects of a scene with its settings, and for each one that is on the first object, material, light or setting
 /// that calls for it. `split_light`: direct and indirect light are wanted apart. `counters`: rays are counted.
-pub fn effects(scene: &Scene, split_light: bool, counters: bool) -> (Effects, Vec<(Effect, String)>) {
+pub fn effects(
+    scene: &Scene,
+    settings: &Settings,
+    split_light: bool,
+    counters: bool,
+) -> (Effects, Vec<(Effect, String)>) {
     let mut reasons = Vec::new();
     let used = used_materials(scene);
     let mut material = |name, calls: &dyn Fn(&Material) -> bool| {
@@ -38,7 +43,9 @@ pub fn effects(scene: &Scene, split_light: bool, counters: bool) -> (Effects, Ve
         ..Effects::default()
     };
     light_effects(scene, &mut found, &mut reasons);
-    other_effects(scene, split_light, counters, &mut found, &mut reasons);
+    scene_effects(scene, &mut found, &mut reasons);
+    setting_effects(settings, &mut found, &mut reasons);
+    output_effects(split_light, counters, &mut found, &mut reasons);
     reasons.sort_by_key(|r| r.0);
     (found, reasons)
 }
@@ -80,20 +87,18 @@ fn light_name(scene: &Scene, index: usize) -> String {
     }
 }
 
-fn other_effects(
-    scene: &Scene,
-    split_light: bool,
-    counters: bool,
-    found: &mut Effects,
-    reasons: &mut Vec<(Effect, String)>,
-) {
-    let s = &scene.settings;
-    let mut because = |name, on: bool, why: String| {
-        if on {
-            reasons.push((name, why));
-        }
-        on
-    };
+type Reasons = Vec<(Effect, String)>;
+
+/// Notes why an effect is on.
+fn because(reasons: &mut Reasons, name: Effect, on: bool, why: String) -> bool {
+    if on {
+        reasons.push((name, why));
+    }
+    on
+}
+
+fn scene_effects(scene: &Scene, found: &mut Effects, reasons: &mut Reasons) {
+    let mut because = |name, on, why| because(reasons, name, on, why);
     let bent = scene.shading.iter().position(|s| s.normal != geometry::FLAT);
     let object =
         bent.and_then(|i| scene.triangles.get(i)).map(|t| t.object as usize).and_then(|o| scene.names.objects.get(o));
@@ -102,22 +107,29 @@ fn other_effects(
     let ball = scene.triangles.iter().find(|t| t.primitive & SPHERE != 0);
     let object = ball.and_then(|t| scene.names.objects.get(t.object as usize));
     found.spheres = because(Effect::spheres, ball.is_some(), format!("object \"{}\"", object.map_or("", |o| o)));
-    found.lens = because(Effect::lens, scene.camera.lens_radius > 0.0, "camera lens_radius".into());
+    found.lens = because(Effect::lens, scene.view.lens_radius > 0.0, "camera lens_radius".into());
     let instances = scene.instances.len();
     found.instances = because(Effect::instances, instances > 0, format!("{instances} instances"));
+}
+
+fn setting_effects(s: &Settings, found: &mut Effects, reasons: &mut Reasons) {
+    let mut because = |name, on, why| because(reasons, name, on, why);
     found.indirect = because(Effect::indirect, s.max_depth > 2, format!("max_depth {}", s.max_depth));
     found.roulette = because(Effect::roulette, s.roulette_depth > 0, format!("roulette_depth {}", s.roulette_depth));
     found.clamp = because(Effect::clamp, s.clamp_indirect > 0.0, format!("clamp_indirect {}", s.clamp_indirect));
     found.pixel_filter = because(Effect::pixel_filter, s.filter != PixelFilter::Box, format!("filter {:?}", s.filter));
-    found.split_light =
-        because(Effect::split_light, split_light, "an output that keeps direct and indirect light apart".into());
     let independent = s.sampler == Sampler::Independent;
     found.independent_sampler = because(Effect::independent_sampler, independent, "sampler independent".into());
     let policy = s.allocate.policy.name;
     found.adaptive = because(Effect::adaptive, !s.allocate.is_even(), format!("allocate {policy}"));
     let most = s.spp.max(s.allocate.max_spp);
     found.many_samples = because(Effect::many_samples, most > 4096, format!("{most} samples of a pixel"));
-    found.counters = because(Effect::counters, counters, "ray counters".into());
+}
+
+fn output_effects(split_light: bool, counters: bool, found: &mut Effects, reasons: &mut Reasons) {
+    let why = "an output that keeps direct and indirect light apart";
+    found.split_light = because(reasons, Effect::split_light, split_light, why.into());
+    found.counters = because(reasons, Effect::counters, counters, "ray counters".into());
 }
 
 #[cfg(test)]
@@ -134,12 +146,12 @@ mod tests {
         scene.names.materials = vec!["wall".into(), "mirror".into()];
         scene.names.objects = vec!["box".into()];
         scene.triangles = vec![Triangle::default()];
-        scene.settings.max_depth = 2;
-        let (found, reasons) = effects(&scene, false, false);
+        let settings = Settings { max_depth: 2, ..Settings::default() };
+        let (found, reasons) = effects(&scene, &settings, false, false);
         assert_eq!(found, Effects { diffuse: true, ..Effects::default() });
         assert_eq!(reasons, [(Effect::diffuse, "material \"wall\"".to_owned())]);
         scene.triangles[0].material = 1;
-        let (found, reasons) = effects(&scene, true, false);
+        let (found, reasons) = effects(&scene, &settings, true, false);
         let expected = Effects { conductor: true, smooth_interface: true, split_light: true, ..Effects::default() };
         assert_eq!(found, expected);
         assert_eq!(reasons[0], (Effect::conductor, "material \"mirror\"".to_owned()));

@@ -9,7 +9,8 @@ use crate::render::settings::Settings;
 use crate::threads;
 use build::assemble::assemble;
 use description::Description;
-use std::path::Path;
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
 
 mod build;
 mod check;
@@ -36,10 +37,8 @@ const BYTES_OF_TOML: u64 = 40;
 /// Everything a render reads, in the form that kernels read it. Whoever edits it keeps what [`Scene::check`] asks for.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
-    /// World-space camera; made for the film's aspect ratio.
-    pub camera: Camera,
-    /// The scene file's own settings; the command line overrides them.
-    pub settings: Settings,
+    /// The `[camera]` table; [`Scene::camera`] makes a camera of it for a film.
+    pub view: description::Camera,
     /// All nodes of all levels; indices inside are global.
     pub nodes: Vec<BvhNode>,
     /// Node where traversal starts: the top level with instances, else the only one.
@@ -70,9 +69,9 @@ pub struct Scene {
     pub large_lamps: bool,
     /// The environment image, when the environment is not a constant.
     pub environment: Option<Environment>,
-    /// Of all that decides the picture but the settings, in the order of the files: triangles are added before the
+    /// Of all that decides the picture but camera and settings, in the order of the files: triangles are added before the
     /// hierarchy sorts them, which may do so otherwise in another version or on another machine.
-    pub fingerprint: Fingerprint,
+    pub content: Fingerprint,
     /// World-space bounds of all geometry; zero when there is none.
     pub bounds: [[f32; 3]; 2],
     /// What calls for what, for `tallow explain`: names by index of object and material.
@@ -105,35 +104,108 @@ pub struct Names {
     pub materials: Vec<String>,
 }
 
-impl Scene {
-    /// Reads a scene file (`.toml`) or a model (`.obj`). `overrides` changes the file's settings before the camera is
-    /// built, which depends on the shape of the film. A model alone gets a camera that frames it and, when nothing in it
-    /// emits light, a sky of radiance 1.
+/// A scene, and what its file says of how to render it.
+#[derive(Clone, Debug, Default)]
+pub struct Loaded {
+    /// What is rendered.
+    pub scene: Scene,
+    /// The file's settings over the defaults.
+    pub settings: Settings,
+}
+
+impl Loaded {
+    /// The same with other settings.
+    pub fn with(mut self, change: impl FnOnce(&mut Settings)) -> Self {
+        change(&mut self.settings);
+        self
+    }
+}
+
+impl std::ops::Deref for Loaded {
+    type Target = Scene;
+
+    fn deref(&self) -> &Scene {
+        &self.scene
+    }
+}
+
+impl std::ops::DerefMut for Loaded {
+    fn deref_mut(&mut self) -> &mut Scene {
+        &mut self.scene
+    }
+}
+
+/// A scene file that was read; the models and images that it names were not yet.
+pub struct SceneFile<'a> {
+    path: PathBuf,
+    description: Cow<'a, Description>,
+    /// Whether a scene without light gets a sky of radiance 1.
+    sky: bool,
+}
+
+impl SceneFile<'_> {
+    /// Reads a scene file (`.toml`), or takes a model (`.obj`) for one.
     ///
     /// # Errors
-    /// [`Error::Input`] with file, place and remedy; [`Error::Usage`] for settings out of range after `overrides`.
-    pub fn load(path: &Path, overrides: &dyn Fn(&mut Settings)) -> Result<Self> {
+    /// [`Error::Input`] with file, place and remedy.
+    pub fn open(path: &Path) -> Result<Self> {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_lowercase();
-        match extension.as_str() {
+        let (description, sky) = match extension.as_str() {
             "toml" => {
                 let text = String::from_utf8(input::read_text(path, BYTES_OF_TOML)?);
                 let text = text.map_err(|_| Error::input(path, "is no text: write it in UTF-8"))?;
-                Self::parse(path, &text, overrides)
+                (description::parse(path, &text)?, false)
             }
-            "obj" => Self::from_description(path, &model(path), true, overrides),
+            "obj" => (model(path), true),
             other => {
                 input::open(path)?; // a missing file is that first of all
-                Err(Error::input(path, format!("is no scene: \"{other}\" is neither toml nor obj")))
+                return Err(Error::input(path, format!("is no scene: \"{other}\" is neither toml nor obj")));
             }
-        }
+        };
+        Ok(Self { path: path.to_owned(), description: Cow::Owned(description), sky })
+    }
+
+    /// The file's settings over the defaults.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with the setting that is out of range.
+    pub fn settings(&self) -> Result<Settings> {
+        let settings = self.description.settings();
+        settings.validate().map_err(|e| Error::input(&self.path, e))?;
+        Ok(settings)
+    }
+
+    /// Reads what the file names and makes the scene.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with file, place and remedy.
+    pub fn load(&self) -> Result<Loaded> {
+        let settings = self.settings()?;
+        let mut scene = Scene { view: self.description.camera.clone(), ..Scene::default() };
+        threads::within(|| assemble(&self.path, &self.description, self.sky, &mut scene))?;
+        let camera = scene.view.build([settings.width, settings.height], scene.bounds);
+        camera.map_err(|what| Error::input_at(&self.path, "[camera]", what))?;
+        Ok(Loaded { scene, settings })
+    }
+}
+
+impl Scene {
+    /// Reads a scene file (`.toml`) or a model (`.obj`). A model alone gets a camera that frames it and, when nothing in it
+    /// emits light, a sky of radiance 1. [`SceneFile`] does the same in two steps.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with file, place and remedy.
+    pub fn load(path: &Path) -> Result<Loaded> {
+        SceneFile::open(path)?.load()
     }
 
     /// Reads a scene file's text; `path` is for messages and for what it names.
     ///
     /// # Errors
     /// See [`Scene::load`].
-    pub fn parse(path: &Path, text: &str, overrides: &dyn Fn(&mut Settings)) -> Result<Self> {
-        Self::from_description(path, &description::parse(path, text)?, false, overrides)
+    pub fn parse(path: &Path, text: &str) -> Result<Loaded> {
+        let description = Cow::Owned(description::parse(path, text)?);
+        SceneFile { path: path.to_owned(), description, sky: false }.load()
     }
 
     /// A scene from memory: the tables of a scene file, whose meshes, textures and environment may be data. What files they
@@ -141,25 +213,26 @@ impl Scene {
     ///
     /// # Errors
     /// See [`Scene::load`].
-    pub fn build(description: &Description, overrides: &dyn Fn(&mut Settings)) -> Result<Self> {
-        Self::from_description(Path::new("scene"), description, false, overrides)
+    pub fn build(description: &Description) -> Result<Loaded> {
+        SceneFile { path: "scene".into(), description: Cow::Borrowed(description), sky: false }.load()
     }
 
-    fn from_description(
-        path: &Path,
-        description: &Description,
-        sky: bool,
-        overrides: &dyn Fn(&mut Settings),
-    ) -> Result<Self> {
-        let mut scene = Self { settings: description.settings(), ..Self::default() };
-        scene.settings.validate().map_err(|e| Error::input(path, e))?;
-        overrides(&mut scene.settings);
-        scene.settings.validate()?;
-        threads::within(|| assemble(path, description, sky, &mut scene))?;
-        let camera = description.camera.build(&scene.settings, scene.bounds);
-        scene.camera = camera.map_err(|what| Error::input_at(path, "[camera]", what))?;
-        scene.fingerprint.add(&[scene.camera]);
-        Ok(scene)
+    /// The camera for a film of (width, height) pixels, in world space.
+    ///
+    /// # Errors
+    /// [`Error::Scene`] with the key of the `[camera]` table that is at fault.
+    pub fn camera(&self, size: [u32; 2]) -> Result<Camera> {
+        self.view.build(size, self.bounds).map_err(|what| Error::Scene(format!("[camera]: {what}")))
+    }
+
+    /// Of all that decides the picture but the settings.
+    ///
+    /// # Errors
+    /// Those of [`Scene::camera`].
+    pub fn fingerprint(&self, size: [u32; 2]) -> Result<Fingerprint> {
+        let mut fingerprint = self.content.clone();
+        fingerprint.add(&[self.camera(size)?]);
+        Ok(fingerprint)
     }
 }
 

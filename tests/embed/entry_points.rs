@@ -15,15 +15,17 @@ use tallow::error::Error;
 use tallow::gpu::{Buffer, FrameResources, Gpu, RawDevice, Recorder};
 use tallow::render::settings::Settings;
 use tallow::render::{Outputs, Renderer, Step};
-use tallow::scene::Scene;
+use tallow::scene::{Loaded, Scene};
 
 /// Counts are asked for, so that every kind of pass takes part.
-fn scene() -> Scene {
+fn scene() -> Loaded {
     let small = |s: &mut Settings| {
         (s.width, s.height, s.spp) = (33, 17, 4);
         s.allocate.policy = &tallow::allocate::both::ROW;
     };
-    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml"), &small).unwrap()
+    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml"))
+        .map(|scene| scene.with(&small))
+        .unwrap()
 }
 
 #[test]
@@ -34,7 +36,7 @@ fn nothing_is_created_after_the_first_frame() {
     let gpu = unsafe { Gpu::from_raw(raw) }.unwrap();
     let scene = scene();
     let outputs = Outputs { split_light: true, guides: true, counters: true };
-    let renderer = Renderer::new(&gpu, &scene, outputs).unwrap();
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, outputs).unwrap();
     let (row, settings) = (filter::find("auto").unwrap(), FilterSettings::default());
     let denoiser = Denoiser::new(&gpu, &renderer, row, &settings, Demodulation::Light).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
@@ -61,7 +63,8 @@ fn a_lost_device_is_one_line_and_exit_code_4() {
     let raw = hooks::between(engine.raw());
     // SAFETY: the engine's handles are valid and outlive what is made from them.
     let gpu = unsafe { Gpu::from_raw(raw) }.unwrap();
-    let renderer = Renderer::new(&gpu, &scene(), Outputs::default()).unwrap();
+    let scene = scene();
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
     hooks::LOSE.store(true, SeqCst);
     let lost = renderer.run(&mut frame, &Step::Start).map(drop);
@@ -79,7 +82,8 @@ fn a_wait_that_fails_leaves_nothing_in_flight() {
     let engine = Engine::new();
     // SAFETY: the engine's handles are valid and outlive what is made from them.
     let gpu = unsafe { Gpu::from_raw(hooks::between(engine.raw())) }.unwrap();
-    let renderer = Renderer::new(&gpu, &scene(), Outputs::default()).unwrap();
+    let scene = scene();
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
     hooks::take_calls();
     hooks::WAIT.store(vk::Result::ERROR_OUT_OF_HOST_MEMORY.as_raw(), SeqCst);

@@ -71,9 +71,9 @@ fn an_engine_gets_the_bits_of_the_command_line_frame_after_frame() {
 }
 
 fn agrees(engine: &Engine, gpu: &Gpu, policy: &str) {
-    let scene = Scene::load(&scene_file(), &|s| small(s, policy)).unwrap();
+    let scene = Scene::load(&scene_file()).map(|scene| scene.with(|s| small(s, policy))).unwrap();
     let outputs = Outputs { split_light: true, guides: true, counters: false };
-    let mut renderer = Renderer::new(gpu, &scene, outputs).unwrap();
+    let mut renderer = Renderer::new(gpu, &scene, &scene.settings, outputs).unwrap();
     let mut frame = FrameResources::new(gpu).unwrap();
     let pixels = (WIDTH * HEIGHT) as usize;
     let download = Buffer::<vec3>::new(gpu, "download", pixels, Location::Readback).unwrap();
@@ -93,14 +93,14 @@ fn agrees(engine: &Engine, gpu: &Gpu, policy: &str) {
         assert!(record(&renderer) == expected, "{policy}: the engine's pixels are not those of the command line");
     }
     // Control: another camera must change the picture.
-    let mut camera = scene.camera;
+    let mut camera = scene.camera([scene.settings.width, scene.settings.height]).unwrap();
     camera.position[0] += 0.1;
     renderer.set_camera(camera).unwrap();
     assert!(record(&renderer) != expected, "{policy}: the comparison cannot fail");
     let lens = Camera { lens_radius: 0.1, ..camera };
     assert_eq!(renderer.set_camera(lens).unwrap_err().exit_code(), 2, "the kernels were compiled for a pinhole");
     let effects = Effects { lens: true, ..*renderer.effects() };
-    Renderer::specialised(gpu, &scene, outputs, effects).unwrap().set_camera(lens).unwrap();
+    Renderer::specialised(gpu, &scene, &scene.settings, outputs, effects).unwrap().set_camera(lens).unwrap();
 }
 
 /// The layers of the command line's file, as the engine finds them.
@@ -109,8 +109,10 @@ fn an_engine_gets_every_layer() {
     let engine = Engine::new();
     // SAFETY: the engine's handles are valid and outlive what is made from them.
     let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
-    let scene = Scene::load(&scene_file(), &|s| small(s, "uniform")).unwrap();
-    let renderer = Renderer::new(&gpu, &scene, Outputs { split_light: true, guides: true, counters: false }).unwrap();
+    let scene = Scene::load(&scene_file()).map(|scene| scene.with(|s| small(s, "uniform"))).unwrap();
+    let renderer =
+        Renderer::new(&gpu, &scene, &scene.settings, Outputs { split_light: true, guides: true, counters: false })
+            .unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
     let pixels = (WIDTH * HEIGHT) as usize;
     let vectors = Buffer::<vec3>::new(&gpu, "vectors", pixels, Location::Readback).unwrap();
@@ -147,8 +149,8 @@ fn an_engine_gets_every_layer() {
         assert!(words.read().unwrap() == expected, "{layer:?}");
     }
     // Of one pixel, so that the size of a buffer does not tell whether a layer is kept.
-    let one = Scene::load(&scene_file(), &|s| (s.width, s.height) = (1, 1)).unwrap();
-    let plain = Renderer::new(&gpu, &one, Outputs::default()).unwrap();
+    let one = Scene::load(&scene_file()).map(|scene| scene.with(|s| (s.width, s.height) = (1, 1))).unwrap();
+    let plain = Renderer::new(&gpu, &one, &one.settings, Outputs::default()).unwrap();
     assert!(plain.views(Layer::Radiance).is_ok());
     assert!([Layer::Indirect, Layer::Depth].iter().all(|&layer| plain.views(layer).unwrap_err().exit_code() == 2));
     assert_eq!(engine.messages(), Vec::<String>::new());
@@ -160,9 +162,9 @@ fn an_engine_filters_its_frames_where_they_are() {
     let engine = Engine::new();
     // SAFETY: the engine's handles are valid and outlive what is made from them.
     let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
-    let scene = Scene::load(&scene_file(), &|s| small(s, "uniform")).unwrap();
+    let scene = Scene::load(&scene_file()).map(|scene| scene.with(|s| small(s, "uniform"))).unwrap();
     let outputs = Outputs { split_light: true, guides: true, counters: false };
-    let renderer = Renderer::new(&gpu, &scene, outputs).unwrap();
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, outputs).unwrap();
     let film = command_line("uniform");
     let aovs = Aovs::find(&film, &Names::new()).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();

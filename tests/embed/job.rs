@@ -8,17 +8,17 @@ use tallow::image::{self, Film, Samples, WriteOptions};
 use tallow::layout::{Camera, Effects};
 use tallow::render::settings::Settings;
 use tallow::render::{Checkpoint, Gap, Job, Outputs, Renderer, Status, StopReason, called_for, merge};
-use tallow::scene::Scene;
+use tallow::scene::{Loaded, Scene};
 
 const OUTPUTS: Outputs = Outputs { split_light: true, guides: true, counters: false };
 
-fn scene(change: impl Fn(&mut Settings)) -> Scene {
+fn scene(change: impl Fn(&mut Settings)) -> Loaded {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml");
     let small = |s: &mut Settings| {
         (s.width, s.height, s.spp, s.max_depth) = (33, 17, 32, 3);
         change(s);
     };
-    Scene::load(&file, &small).unwrap()
+    Scene::load(&file).unwrap().with(small)
 }
 
 /// Some pixels reach it, and some do not before they are full.
@@ -26,9 +26,9 @@ fn to_a_threshold(s: &mut Settings) {
     (s.allocate.policy, s.allocate.noise_threshold) = (tallow::allocate::policy("variance").unwrap(), 0.08);
 }
 
-fn resumable(gpu: &Gpu, scene: &Scene) -> Renderer {
-    let effects = Effects { adaptive: true, ..called_for(scene, OUTPUTS) };
-    Renderer::specialised(gpu, scene, OUTPUTS, effects).unwrap()
+fn resumable(gpu: &Gpu, scene: &Loaded) -> Renderer {
+    let effects = Effects { adaptive: true, ..called_for(scene, &scene.settings, OUTPUTS) };
+    Renderer::specialised(gpu, scene, &scene.settings, OUTPUTS, effects).unwrap()
 }
 
 /// Runs a job, which stops before the first step by which it has traced so many samples, and writes its film.
@@ -72,7 +72,7 @@ fn an_engine_renders_to_a_threshold_and_resumes_where_it_was_interrupted() {
         let part = run(&gpu, &job, &file("part.exr"), whole.traced / 2);
         assert_eq!(part.stopped, StopReason::Interrupted);
         assert!(part.traced >= whole.traced / 2 && part.traced < whole.traced, "{policy}");
-        let checkpoint = Checkpoint::read(&file("part.exr"), &scene).unwrap();
+        let checkpoint = Checkpoint::read(&file("part.exr"), &scene, &scene.settings).unwrap();
         let rest = Job { checkpoint: Some(&checkpoint), ..Job::new(&renderer) };
         let rest = run(&gpu, &rest, &file("resumed.exr"), u64::MAX);
         assert_eq!((rest.stopped, part.traced + rest.traced), (whole.stopped, whole.traced), "{policy}");
@@ -94,7 +94,7 @@ fn an_engine_merges_what_it_rendered_by_two_seeds() {
     let file = |name: &str| folder.path().join(name);
     for (name, seed, first) in [("a.exr", 0, 0), ("b.exr", 1, 0), ("c.exr", 1, 8)] {
         let scene = scene(|s| (s.spp, s.seed, s.first_sample) = (4, seed, first));
-        let renderer = Renderer::new(&gpu, &scene, OUTPUTS).unwrap();
+        let renderer = Renderer::new(&gpu, &scene, &scene.settings, OUTPUTS).unwrap();
         run(&gpu, &Job::new(&renderer), &file(name), u64::MAX);
     }
     let merged = merge(&["a.exr", "b.exr", "c.exr"].map(file)).unwrap();
@@ -123,10 +123,10 @@ fn a_film_of_a_moved_camera_cannot_be_resumed() {
     let scene = scene(|s| s.spp = 2);
     let mut renderer = resumable(&gpu, &scene);
     run(&gpu, &Job::new(&renderer), &file, u64::MAX);
-    Checkpoint::read(&file, &scene).unwrap();
-    renderer.set_camera(Camera { position: [0.1, 0.2, 0.3], ..scene.camera }).unwrap();
+    Checkpoint::read(&file, &scene, &scene.settings).unwrap();
+    renderer.set_camera(Camera { position: [0.1, 0.2, 0.3], ..scene.camera([33, 17]).unwrap() }).unwrap();
     run(&gpu, &Job::new(&renderer), &file, u64::MAX);
-    let error = Checkpoint::read(&file, &scene).unwrap_err();
+    let error = Checkpoint::read(&file, &scene, &scene.settings).unwrap_err();
     assert!(error.exit_code() == 3 && error.to_string().contains("settings"), "{error}");
     assert_silent(&gpu);
 }

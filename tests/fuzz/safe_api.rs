@@ -15,7 +15,7 @@ use tallow::render::settings::Settings;
 use tallow::render::{
     Batch, Choice, Job, Outputs, PathRange, Plan, Renderer, Share, Status, Step, called_for, frame_constants,
 };
-use tallow::scene::Scene;
+use tallow::scene::{Loaded, Scene};
 use tallow::shaders::shared;
 use tallow::twins::path::{Strategy as Ways, Tracer};
 
@@ -78,14 +78,14 @@ intensity = 10
 ";
 
 /// A scene of two levels with every kind of array.
-static SCENE: LazyLock<Scene> = LazyLock::new(|| {
+static SCENE: LazyLock<Loaded> = LazyLock::new(|| {
     let folder = tempfile::tempdir().expect("a folder");
     let mut sky = Film::new(8, 4);
     sky.add("Y", Samples::F32((0..32).map(|i| i as f32).collect()));
     tallow::image::write(&folder.path().join("sky.exr"), &sky, &WriteOptions::default()).expect("written");
     let texel = |x, y| image::Rgba([x as u8 * 60, y as u8 * 60, 7, x as u8 * 80]);
     image::RgbaImage::from_fn(3, 4, texel).save(folder.path().join("checks.png")).expect("written");
-    let scene = Scene::parse(&folder.path().join("s.toml"), TEXT, &|_| {}).expect("a scene");
+    let scene = Scene::parse(&folder.path().join("s.toml"), TEXT).expect("a scene");
     let arrays =
         [scene.nodes.len(), scene.instances.len(), scene.shading.len(), scene.textures.len(), scene.lights.len()];
     assert!(arrays.iter().all(|&len| len > 0) && scene.environment.is_some(), "{arrays:?}");
@@ -116,7 +116,7 @@ fn scribble<T: bytemuck::Pod>(array: &mut Vec<T>, at: usize, value: u32, resize:
 }
 
 /// One edit of what a caller may edit.
-fn edit(scene: &mut Scene, part: u32, at: usize, value: u32, resize: bool) {
+fn edit(scene: &mut Loaded, part: u32, at: usize, value: u32, resize: bool) {
     let sky = scene.environment.get_or_insert_default();
     match part % 19 {
         0..=2 => scribble(&mut scene.nodes, at, value, resize),
@@ -135,9 +135,13 @@ fn edit(scene: &mut Scene, part: u32, at: usize, value: u32, resize: bool) {
         15 => scene.root = value,
         16 => scene.stack = value,
         17 => {
-            let words: &mut [u32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut scene.camera));
-            let count = words.len();
-            words[at % count] = value;
+            let number = f32::from_bits(value);
+            match at % 4 {
+                0 => scene.view.near = number,
+                1 => scene.view.lens_radius = number,
+                2 => scene.view.fov = Some(number.into()),
+                _ => scene.view.position = Some([number.into(), 1.0, 2.0]),
+            }
         }
         _ if resize => scene.names = Default::default(),
         _ => scene.settings.max_depth = value,
@@ -147,22 +151,27 @@ fn edit(scene: &mut Scene, part: u32, at: usize, value: u32, resize: bool) {
 /// Of the scenes that are taken, so many go to the device, which compiles kernels for each.
 static RENDERED: AtomicU32 = AtomicU32::new(0);
 
-fn try_scene(scene: &Scene) {
-    called_for(scene, Outputs::default());
-    let checked = scene.check().and(scene.settings.validate());
+fn try_scene(scene: &Loaded) {
+    called_for(scene, &scene.settings, Outputs::default());
+    let camera = || frame_constants(scene, &scene.settings).map(|_| ());
+    let checked = scene.check().and(scene.settings.validate()).and_then(|()| camera());
     if let Err(error) = checked {
         assert!(matches!(error, Error::Scene(_) | Error::Usage(_)) && !error.to_string().contains('\n'), "{error}");
-        assert!(Renderer::new(&GPU, scene, Outputs::default()).is_err());
+        assert!(Renderer::new(&GPU, scene, &scene.settings, Outputs::default()).is_err());
         return;
     }
     // The twin looks every index up in a slice: what it survives leads nowhere else in a kernel either.
-    let quick = Settings { max_depth: scene.settings.max_depth.min(4), ..scene.settings.clone() };
-    let scene = &Scene { settings: quick, ..scene.clone() };
-    let tracer = Tracer { scene, frame: frame_constants(scene), effects: Effects::ALL, strategy: Ways::Both };
+    let scene = &scene.clone().with(|s| s.max_depth = s.max_depth.min(4));
+    let tracer = Tracer {
+        scene,
+        frame: frame_constants(scene, &scene.settings).unwrap(),
+        effects: Effects::ALL,
+        strategy: Ways::Both,
+    };
     (0..scene.settings.pixels() as u32).for_each(|pixel| assert!(tracer.sample(pixel, 0).rays > 0));
     if RENDERED.fetch_add(1, Relaxed) < number().div_ceil(10) {
         let outputs = Outputs { split_light: true, guides: true, counters: true };
-        let renderer = Renderer::new(&GPU, scene, outputs).expect("a scene that fits");
+        let renderer = Renderer::new(&GPU, scene, &scene.settings, outputs).expect("a scene that fits");
         let mut frame = FrameResources::new(&GPU).expect("a frame");
         Job::new(&renderer).run_to_end(&mut frame).expect("a device that goes on");
     }
@@ -204,7 +213,8 @@ fn renderers() -> Vec<Renderer> {
     let made = |policy: &str| {
         let mut scene = SCENE.clone();
         scene.settings.allocate.policy = tallow::allocate::policy(policy).unwrap();
-        Renderer::new(&GPU, &scene, Outputs { split_light: true, guides: true, counters: true }).expect("a renderer")
+        Renderer::new(&GPU, &scene, &scene.settings, Outputs { split_light: true, guides: true, counters: true })
+            .expect("a renderer")
     };
     ["uniform", "both", "threshold"].map(made).into()
 }
@@ -233,7 +243,7 @@ proptest! {
         (a.geometry.sigma_normal, a.geometry.sigma_position, a.noise_threshold, a.both.filtered) = (floats[1], floats[2], floats[3], floats[4]);
         a.policy = tallow::allocate::POLICIES[numbers[3] as usize % tallow::allocate::POLICIES.len()];
         if s.validate().is_err() {
-            prop_assert!(Renderer::new(&GPU, &scene, Outputs::default()).is_err());
+            prop_assert!(Renderer::new(&GPU, &scene, &scene.settings, Outputs::default()).is_err());
         }
     }
 
@@ -358,10 +368,10 @@ fn poke<T: bytemuck::Pod>(buffer: &Buffer<T>, at: usize, value: u32) {
 /// The cases of the report that this file began with.
 #[test]
 fn stacks_indices_and_cycles_that_were_believed_once() {
-    let refused = |name: &str, edit: &dyn Fn(&mut Scene)| {
+    let refused = |name: &str, edit: &dyn Fn(&mut Loaded)| {
         let mut scene = SCENE.clone();
         edit(&mut scene);
-        let error = Renderer::new(&GPU, &scene, Outputs::default()).err();
+        let error = Renderer::new(&GPU, &scene, &scene.settings, Outputs::default()).err();
         assert!(matches!(error, Some(Error::Scene(_))), "{name}: {error:?}");
         assert_eq!(error.unwrap().exit_code(), 3);
     };
@@ -393,11 +403,12 @@ fn stacks_indices_and_cycles_that_were_believed_once() {
         (coat.kind, coat.alpha, coat.coat_table) = (BSDF_COATED, 0.5, 1 << 30);
     });
     refused("no nodes", &|s| s.nodes.clear());
-    refused("a camera nowhere", &|s| s.camera.position[0] = f32::NAN);
-    assert!(Renderer::new(&GPU, &SCENE, Outputs::default()).is_ok(), "control");
-    let mut renderer = Renderer::new(&GPU, &SCENE, Outputs::default()).unwrap();
-    assert!(renderer.set_camera(Camera { near: f32::INFINITY, ..SCENE.camera }).is_err());
-    assert!(renderer.set_camera(SCENE.camera).is_ok());
+    refused("a camera nowhere", &|s| s.view.position = Some([f64::NAN; 3]));
+    assert!(Renderer::new(&GPU, &SCENE, &SCENE.settings, Outputs::default()).is_ok(), "control");
+    let mut renderer = Renderer::new(&GPU, &SCENE, &SCENE.settings, Outputs::default()).unwrap();
+    let camera = SCENE.camera([16, 16]).unwrap();
+    assert!(renderer.set_camera(Camera { near: f32::INFINITY, ..camera }).is_err());
+    assert!(renderer.set_camera(camera).is_ok());
 }
 
 /// Kernels whose numbers would make them overrun what they have, or the device.

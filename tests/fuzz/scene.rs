@@ -19,8 +19,8 @@ fn feed(name: &str, bytes: &[u8], start: &str) {
         std::fs::write(at("m.obj"), OBJ).expect("written");
         std::fs::write(at(name), bytes).expect("written");
         let outcome = match start {
-            "m.obj" => Scene::load(&at("m.obj"), &|_| {}),
-            text => Scene::parse(&at("s.toml"), text, &|_| {}),
+            "m.obj" => Scene::load(&at("m.obj")),
+            text => Scene::parse(&at("s.toml"), text),
         };
         if let Err(e) = outcome {
             assert!(!e.to_string().contains('\n') && !e.to_string().is_empty(), "{e}");
@@ -224,10 +224,10 @@ fn the_undamaged_files_load() {
     save("a.jpg", small_jpeg());
     save("sky.hdr", small_hdr());
     save("sky.exr", small_exr());
-    let load = |text: &str| Scene::parse(&Path::new(dir.path()).join("s.toml"), text, &|_| {}).unwrap();
+    let load = |text: &str| Scene::parse(&Path::new(dir.path()).join("s.toml"), text).unwrap();
     assert_eq!([PICTURE, PHOTO].map(|text| load(text).textures.len()), [1, 1]);
     for text in [SKY, SKY_EXR] {
-        let sky = load(text).environment.unwrap();
+        let sky = load(text).scene.environment.unwrap();
         assert_eq!((sky.width, sky.height, sky.table.len()), (16, 4, 64));
         assert!((sky.texels.iter().map(|t| t[3]).sum::<f32>() - 1.0).abs() < 1e-5);
     }

@@ -9,20 +9,20 @@ use tallow::image::{self, WriteOptions};
 use tallow::render::schedule::{self, Cut};
 use tallow::render::settings::Settings;
 use tallow::render::{Checkpoint, Job, Outputs, Renderer, Status, Step, frame_constants};
-use tallow::scene::Scene;
+use tallow::scene::{Loaded, Scene};
 use tallow::statistics::{Pixel, join};
 
 const POLICIES: [&str; 3] = ["geometry", "variance", "both"];
 const SIZE: [u32; 2] = [33, 17];
 
-fn scene(change: impl Fn(&mut Settings)) -> Scene {
+fn scene(change: impl Fn(&mut Settings)) -> Loaded {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml");
     let small = |s: &mut Settings| {
         [s.width, s.height] = SIZE;
         (s.spp, s.max_depth) = (8, 3);
         change(s);
     };
-    Scene::load(&file, &small).unwrap()
+    Scene::load(&file).map(|scene| scene.with(&small)).unwrap()
 }
 
 fn split() -> Outputs {
@@ -57,8 +57,8 @@ fn run_steps(renderer: &Renderer, frame: &mut FrameResources, steps: &[Step]) ->
     read(renderer)
 }
 
-fn render(gpu: &Gpu, scene: &Scene) -> Vec<Pixel> {
-    let renderer = Renderer::new(gpu, scene, split()).unwrap();
+fn render(gpu: &Gpu, scene: &Loaded) -> Vec<Pixel> {
+    let renderer = Renderer::new(gpu, scene, &scene.settings, split()).unwrap();
     run(&renderer, &mut FrameResources::new(gpu).unwrap())
 }
 
@@ -75,7 +75,7 @@ fn a_pixel_may_have_any_number_of_samples() {
             ([s.width, s.height], s.spp, s.max_depth) = ([2, 1], 200_000, 2);
             s.allocate.policy = tallow::allocate::policy(policy).unwrap();
         });
-        let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
+        let renderer = Renderer::new(&gpu, &scene, &scene.settings, split()).unwrap();
         let mut frame = FrameResources::new(&gpu).unwrap();
         let whole = run(&renderer, &mut frame);
         assert_eq!(total(&whole), 400_000, "{policy}");
@@ -90,7 +90,7 @@ fn the_budget_is_met_and_no_cut_changes_a_bit() {
     let gpu = gpu();
     for policy in POLICIES {
         let scene = scene(|s| s.allocate.policy = tallow::allocate::policy(policy).unwrap());
-        let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
+        let renderer = Renderer::new(&gpu, &scene, &scene.settings, split()).unwrap();
         let mut frame = FrameResources::new(&gpu).unwrap();
         let whole = run(&renderer, &mut frame);
         assert_eq!(total(&whole), 8 * 33 * 17, "{policy}");
@@ -128,7 +128,7 @@ fn a_falling_threshold_gives_at_most_one_sample_a_round() {
     let counts = |pixels: &[Pixel]| pixels.iter().map(|p| p.stats.count).collect::<Vec<_>>();
     let (frozen, scene) = (counts(&render(&gpu, &with(16))), with(80));
     assert!(frozen.iter().all(|n| (2..=16).contains(n)), "{frozen:?}");
-    let renderer = Renderer::new(&gpu, &scene, split()).unwrap();
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, split()).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
     let whole = run(&renderer, &mut frame);
     let later: Vec<u32> = counts(&whole).iter().zip(&frozen).map(|(all, before)| all - before).collect();
@@ -163,7 +163,8 @@ fn batches_of_one_path_and_rounds_in_any_number_or_order_change_no_bit() {
     for rounds in [2, 3, 100] {
         assert!(bits(&render(&gpu, &with(rounds))) == bits(&whole), "{rounds} rounds");
     }
-    let renderer = Renderer::new(&gpu, &with(4), split()).unwrap();
+    let scene = with(4);
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, split()).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
     assert!(bits(&run_by(&renderer, &mut frame, 1)) == bits(&whole), "one path");
     // The rounds backwards: a pixel's next sample is its next, whichever round asks for it.
@@ -185,7 +186,7 @@ fn interrupted(job: &Job, frame: &mut FrameResources, scene: &Scene, stop: usize
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("interrupted.exr");
     image::write(&file, &job.film(&status).unwrap(), &WriteOptions::default()).unwrap();
-    Checkpoint::read(&file, scene).unwrap()
+    Checkpoint::read(&file, scene, job.renderer.settings()).unwrap()
 }
 
 #[test]
@@ -198,8 +199,9 @@ fn a_render_resumed_anywhere_has_the_bits_of_one_that_never_stopped() {
             s.allocate.max_spp = if policy == "threshold" { 5 } else { 0 };
         });
         let whole = render(&gpu, &scene);
-        let effects = tallow::layout::Effects { adaptive: true, ..tallow::render::called_for(&scene, split()) };
-        let renderer = Renderer::specialised(&gpu, &scene, split(), effects).unwrap();
+        let effects =
+            tallow::layout::Effects { adaptive: true, ..tallow::render::called_for(&scene, &scene.settings, split()) };
+        let renderer = Renderer::specialised(&gpu, &scene, &scene.settings, split(), effects).unwrap();
         let mut frame = FrameResources::new(&gpu).unwrap();
         let cut = Cut { pixels: SIZE[0] * SIZE[1], tile: 1 << 20, paths: 300 };
         let all = schedule::steps(&scene.settings, &cut).count();
@@ -219,7 +221,8 @@ fn a_render_resumed_anywhere_has_the_bits_of_one_that_never_stopped() {
 fn records_of_another_film_are_an_error() {
     let gpu = gpu();
     let scene = scene(|s| s.allocate.policy = &tallow::allocate::both::ROW);
-    let (renderer, mut frame) = (Renderer::new(&gpu, &scene, split()).unwrap(), FrameResources::new(&gpu).unwrap());
+    let (renderer, mut frame) =
+        (Renderer::new(&gpu, &scene, &scene.settings, split()).unwrap(), FrameResources::new(&gpu).unwrap());
     let pixels = (SIZE[0] * SIZE[1]) as usize;
     let mut resume = |size: usize, priority: usize, lacks: usize| {
         let (pixels, priority, pending) = (vec![Pixel::default(); size], vec![0.0; priority], vec![0; lacks]);
@@ -247,7 +250,8 @@ fn a_start_leaves_priorities_as_they_are() {
     let checkpoint = Checkpoint { pixels: vec![Pixel::default(); pixels], priority, pending, ..Checkpoint::default() };
     for policy in ["geometry", "variance", "both", "threshold"] {
         let scene = scene(|s| s.allocate.policy = tallow::allocate::policy(policy).unwrap());
-        let (renderer, mut frame) = (Renderer::new(&gpu, &scene, split()).unwrap(), FrameResources::new(&gpu).unwrap());
+        let (renderer, mut frame) =
+            (Renderer::new(&gpu, &scene, &scene.settings, split()).unwrap(), FrameResources::new(&gpu).unwrap());
         renderer.resume(&mut frame, &checkpoint).unwrap();
         renderer.run(&mut frame, &Step::Start).unwrap();
         assert_eq!(renderer.film().priority.read().unwrap(), checkpoint.priority, "{policy}");
@@ -358,7 +362,8 @@ fn a_film_of_several_storage_bindings_is_placed() {
         })
     };
     let outputs = Outputs { guides: true, ..split() };
-    let placed = Renderer::new(&gpu, &sized("both", 3), outputs).unwrap();
+    let scene = sized("both", 3);
+    let placed = Renderer::new(&gpu, &scene, &scene.settings, outputs).unwrap();
     let windows = placed.film().tiles[0].windows().count();
     assert!(windows == 2 || gpu.info().max_storage_range > 1 << 27, "{windows} windows");
     let pixels = run(&placed, &mut FrameResources::new(&gpu).unwrap());
@@ -368,7 +373,7 @@ fn a_film_of_several_storage_bindings_is_placed() {
     assert!(two.iter().filter(|&&i| i >= 2048 * 1370).count() > 1000, "the last rows have too few to compare");
     assert!(two.iter().all(|&i| bits(&pixels[i..=i]) == bits(&alike[i..=i])), "a pixel of two samples has other light");
     let (scene, guide) = (sized("both", 3), placed.film().tiles[0].guide.read().unwrap());
-    let frame = frame_constants(&scene);
+    let frame = frame_constants(&scene, &scene.settings).unwrap();
     let wrong = |&p: &u32| tallow::twins::primary_hit::guide(&scene, &frame, p).object != guide[p as usize].object;
     assert!((0..2048 * 1400).step_by(997).filter(wrong).count() < 10, "primary hits");
     assert_silent(&gpu);

@@ -6,14 +6,14 @@ use glam::{DVec2, DVec3, dvec2, dvec3, vec3};
 use std::f64::consts::PI;
 use tallow::layout::{BSDF_COATED, PixelStats};
 use tallow::render::{Outputs, Renderer};
-use tallow::scene::Scene;
+use tallow::scene::Loaded;
 use tallow::twins::bsdf::Bsdf;
 
 const SIDE: u32 = 64;
 
-fn rendered(scene: &Scene) -> Vec<PixelStats> {
+fn rendered(scene: &Loaded) -> Vec<PixelStats> {
     let gpu = support::gpu();
-    let renderer = Renderer::new(&gpu, scene, Outputs::default()).unwrap();
+    let renderer = Renderer::new(&gpu, scene, &scene.settings, Outputs::default()).unwrap();
     let stats = support::render(&gpu, &renderer);
     support::assert_silent(&gpu);
     stats
@@ -31,7 +31,7 @@ const ALBEDO: f64 = 0.5;
 const INTENSITY: f64 = 7.0;
 
 /// Looks down from 4 above at 4 by 4 of a floor, which the spot alone lights.
-fn spot_over_floor() -> Scene {
+fn spot_over_floor() -> Loaded {
     Workplace::new().scene(&format!(
         "[film]\nwidth = {SIDE}\nheight = {SIDE}\nfilter = 'point'\n[camera]\nposition = [0.0, 4.0, 0.0]\n\
          target = [0.0, 0.0, 0.0]\nup = [0.0, 0.0, -1.0]\nfov = 53.13010235\n[render]\nspp = 1\nmax_depth = 2\n\
@@ -95,7 +95,7 @@ const DEPTH: f64 = 2.0;
 const HALF: f64 = 0.1;
 const PLACE: DVec2 = dvec2(0.25, -0.1);
 
-fn square_out_of_focus(lens: f64) -> Scene {
+fn square_out_of_focus(lens: f64) -> Loaded {
     Workplace::new().scene(&format!(
         "[film]\nwidth = {SIDE}\nheight = {SIDE}\n[camera]\nposition = [0.0, 0.0, {DEPTH}]\ntarget = [0.0, 0.0, 0.0]\n\
          fov = 53.13010235\nlens_radius = {lens}\nfocus_distance = {FOCUS}\n[render]\nspp = 1024\nmax_depth = 1\n\
@@ -143,7 +143,7 @@ fn a_lens_blurs_over_its_circle_of_confusion() {
 }
 
 /// A sheet in the plane z = 0 in a sky of radiance 1, seen from afar, `degrees` from +z.
-fn sheet_in_the_sky(material: &str, degrees: f32) -> Scene {
+fn sheet_in_the_sky(material: &str, degrees: f32) -> Loaded {
     let (s, c) = degrees.to_radians().sin_cos();
     Workplace::new().scene(&format!(
         "[film]\nwidth = 32\nheight = 32\n[camera]\nposition = [{}, 0.0, {}]\ntarget = [0.0, 0.0, 0.0]\nfov = 0.1\n\

@@ -10,7 +10,7 @@ use tallow::image::{self, Film, Picture};
 use tallow::layout::{Guide, NONE};
 use tallow::render::settings::Settings;
 use tallow::render::{Outputs, Renderer};
-use tallow::scene::Scene;
+use tallow::scene::{Loaded, Scene};
 
 const SIZE: u32 = 128;
 const SPP: u32 = 1024;
@@ -33,18 +33,19 @@ struct Estimate {
     error2: Vec<[f32; 3]>,
 }
 
-fn scene(file: &str, depth: u32) -> Scene {
+fn scene(file: &str, depth: u32) -> Loaded {
     let path: PathBuf = root().join("scenes/cornell-box").join(file);
     let size = |s: &mut Settings| {
         (s.width, s.height, s.spp, s.max_depth) = (SIZE, SIZE, SPP, depth);
         s.roulette_depth = 0;
     };
-    Scene::load(&path, &size).unwrap()
+    Scene::load(&path).map(|scene| scene.with(&size)).unwrap()
 }
 
 fn render(file: &str, depth: u32) -> Estimate {
     let gpu = support::gpu();
-    let renderer = Renderer::new(&gpu, &scene(file, depth), Outputs::default()).unwrap();
+    let scene = scene(file, depth);
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
     let stats = support::render(&gpu, &renderer);
     support::assert_silent(&gpu);
     let error2 = |m2: f32, n: f32| m2 / (n * (n - 1.0));
@@ -154,7 +155,7 @@ fn first_hits_match_at_pixel_centres() {
     for (file, variant, metal) in variants {
         let mut scene = scene(file, 1);
         scene.settings.spp = 1; // guides take no samples
-        let renderer = Renderer::new(&gpu, &scene, outputs).unwrap();
+        let renderer = Renderer::new(&gpu, &scene, &scene.settings, outputs).unwrap();
         support::render(&gpu, &renderer);
         let guide = renderer.film().tiles[0].guide.read().unwrap();
         let centre = reference(&format!("center_{variant}.exr"));
@@ -177,7 +178,7 @@ fn first_hits_match_at_pixel_centres() {
 }
 
 /// A square with a map of hills (3 across, 2 along; heights times `scale`, or normals), lit from low on the left.
-fn hills(map: &str, material: &str, scale: f32) -> Scene {
+fn hills(map: &str, material: &str, scale: f32) -> Loaded {
     let wave = |i: u32, periods: u32| (TAU * f64::from(periods) * (f64::from(i) + 0.5) / 64.0).sin();
     let height = |x: u32, y: u32| [(127.5 + 127.5 * wave(x, 3) * wave(y, 2)).round() as u8; 3];
     let normal = |x: u32, y: u32| {
@@ -204,9 +205,9 @@ fn hills(map: &str, material: &str, scale: f32) -> Scene {
 }
 
 /// Of blocks of 4 by 4 pixels the largest relative difference, beyond four standard errors.
-fn worst_block(scene: &Scene, name: &str) -> f64 {
+fn worst_block(scene: &Loaded, name: &str) -> f64 {
     let gpu = support::gpu();
-    let renderer = Renderer::new(&gpu, scene, Outputs::default()).unwrap();
+    let renderer = Renderer::new(&gpu, scene, &scene.settings, Outputs::default()).unwrap();
     let ours = support::render(&gpu, &renderer);
     support::assert_silent(&gpu);
     let (mean, error) = (colour(&format!("{name}.exr")).pixels, colour(&format!("{name}_se.exr")).pixels);

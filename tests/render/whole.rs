@@ -9,11 +9,13 @@ use tallow::layout::{
 };
 use tallow::render::settings::{PixelFilter, Sampler, Settings};
 use tallow::render::{self, Batch, Job, Outputs, Renderer, Step};
-use tallow::scene::Scene;
+use tallow::scene::{Loaded, Scene};
 use tallow::statistics::BrokenSamples;
 
-fn scene(file: &str, change: impl Fn(&mut Settings)) -> Scene {
-    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file), &change).unwrap()
+fn scene(file: &str, change: impl Fn(&mut Settings)) -> Loaded {
+    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file))
+        .map(|scene| scene.with(&change))
+        .unwrap()
 }
 
 fn small(s: &mut Settings) {
@@ -45,7 +47,9 @@ fn samples_know_their_rays() {
     let gpu = support::gpu();
     for split_light in [false, true] {
         let scene = scene("cornell-box/glass.toml", small);
-        let renderer = Renderer::new(&gpu, &scene, Outputs { split_light, guides: false, counters: true }).unwrap();
+        let renderer =
+            Renderer::new(&gpu, &scene, &scene.settings, Outputs { split_light, guides: false, counters: true })
+                .unwrap();
         support::render(&gpu, &renderer); // one batch
         let records = if split_light { 3 } else { 1 };
         let samples = renderer.film().samples.read().unwrap();
@@ -62,16 +66,17 @@ fn samples_know_their_rays() {
 fn a_recorded_frame_keeps_its_camera() {
     let gpu = support::gpu();
     let scene = scene("cornell-box/scene.toml", small);
-    let moved = tallow::layout::Camera { near: scene.camera.near + 0.1, position: [0.1, 1.0, 6.0], ..scene.camera };
-    let mut renderer = Renderer::new(&gpu, &scene, Outputs::default()).unwrap();
-    let expected = [scene.camera, moved].map(|camera| {
+    let still = scene.camera([scene.settings.width, scene.settings.height]).unwrap();
+    let moved = tallow::layout::Camera { near: still.near + 0.1, position: [0.1, 1.0, 6.0], ..still };
+    let mut renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
+    let expected = [still, moved].map(|camera| {
         renderer.set_camera(camera).unwrap();
         support::render(&gpu, &renderer)
     });
     let copies = ["first", "second"].map(|name| Buffer::new(&gpu, name, 33 * 17, Location::Readback).unwrap());
     let stats = renderer.film().tiles[0].stats.clone();
     gpu.run(&mut FrameResources::new(&gpu).unwrap(), |rec| {
-        for (camera, copy) in [scene.camera, moved].into_iter().zip(&copies) {
+        for (camera, copy) in [still, moved].into_iter().zip(&copies) {
             renderer.set_camera(camera)?;
             renderer.steps().try_for_each(|step| renderer.record(rec, &step))?;
             rec.copy(&stats, copy)?;
@@ -87,22 +92,23 @@ fn a_recorded_frame_keeps_its_camera() {
 }
 
 /// The effects that change the picture when they are compiled in alone, for the message of a failure.
-fn culprits(gpu: &Gpu, scene: &Scene, expected: &[PixelStats]) -> String {
-    let called_for = render::called_for(scene, Outputs::default());
+fn culprits(gpu: &Gpu, scene: &Loaded, expected: &[PixelStats]) -> String {
+    let called_for = render::called_for(scene, &scene.settings, Outputs::default());
     let effects = Effect::ALL.iter().copied().zip(called_for.switches());
     let off = effects.filter(|&(effect, on)| !on && effect != Effect::independent_sampler).map(|(effect, _)| effect);
     let changes = |&effect: &Effect| {
-        let other = Renderer::specialised(gpu, scene, Outputs::default(), called_for.toggled(effect)).unwrap();
+        let other =
+            Renderer::specialised(gpu, scene, &scene.settings, Outputs::default(), called_for.toggled(effect)).unwrap();
         bits(&support::render(gpu, &other)) != bits(expected)
     };
     off.filter(changes).map(Effect::name).collect::<Vec<_>>().join(", ")
 }
 
 /// What is called for, and all effects.
-fn plain_and_all(gpu: &Gpu, scene: &Scene) -> [Renderer; 2] {
+fn plain_and_all(gpu: &Gpu, scene: &Loaded) -> [Renderer; 2] {
     let outputs = Outputs { split_light: true, guides: true, counters: false };
-    let all = Renderer::specialised(gpu, scene, outputs, render::all_effects(scene));
-    [Renderer::new(gpu, scene, outputs).unwrap(), all.unwrap()]
+    let all = Renderer::specialised(gpu, scene, &scene.settings, outputs, render::all_effects(scene, &scene.settings));
+    [Renderer::new(gpu, scene, &scene.settings, outputs).unwrap(), all.unwrap()]
 }
 
 /// llvmpipe rounds as the source says. Other drivers fuse and reorder arithmetic in one kernel and not in another; what
@@ -152,9 +158,12 @@ fn renders_that_rounding_tells_apart_are_alike_and_faults_are_not() {
             more_samples(s);
             s.seed = seed;
         });
-        let mut effects = render::called_for(&scene, Outputs::default());
+        let mut effects = render::called_for(&scene, &scene.settings, Outputs::default());
         change(&mut effects);
-        support::render(&gpu, &Renderer::specialised(&gpu, &scene, Outputs::default(), effects).unwrap())
+        support::render(
+            &gpu,
+            &Renderer::specialised(&gpu, &scene, &scene.settings, Outputs::default(), effects).unwrap(),
+        )
     };
     let scaled = |s: PixelStats, by: f32| PixelStats { mean: s.mean.map(|v| v * by), ..s };
     for file in ["cornell-box/scene.toml", "cornell-box/glass.toml", "grass/scene.toml"] {
@@ -187,7 +196,7 @@ fn renders_that_rounding_tells_apart_are_alike_and_faults_are_not() {
 fn the_cut_into_batches_changes_no_bit() {
     let gpu = support::gpu();
     let scene = scene("cornell-box/scene.toml", small);
-    let renderer = Renderer::new(&gpu, &scene, Outputs::default()).unwrap();
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
     let whole = support::render(&gpu, &renderer);
     let pixels = 33 * 17;
     for (run, depth) in [(1, 4), (31, 1), (64, 3), (65, 2), (pixels, 1)] {
@@ -226,7 +235,7 @@ fn furnace(file: &str, depth: u32, spp: u32) -> [(f64, f64); 3] {
     let scene = scene(file, |s| {
         (s.width, s.height, s.spp, s.max_depth, s.roulette_depth) = (64, 64, spp, depth, 0);
     });
-    let renderer = Renderer::new(&gpu, &scene, Outputs::default()).unwrap();
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
     let stats = support::render(&gpu, &renderer);
     support::assert_silent(&gpu);
     mean(&stats)
@@ -268,7 +277,7 @@ fn every_pixel_of_a_mirror_in_the_furnace_is_white() {
     let worst = |specular: f32| {
         let mut scene = scene("furnace/mirror.toml", |s| (s.width, s.height, s.spp) = (64, 64, 32));
         scene.materials.iter_mut().for_each(|m| m.specular = [specular; 3]);
-        let stats = support::render(&gpu, &Renderer::new(&gpu, &scene, Outputs::default()).unwrap());
+        let stats = support::render(&gpu, &Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap());
         stats.iter().flat_map(|s| s.mean).map(|v| (v - 1.0).abs()).fold(0.0, f32::max)
     };
     let off = worst(1.0);
@@ -285,7 +294,7 @@ fn roulette_knows_that_glass_loses_no_light() {
     let scene = scene("furnace/glass.toml", |s| {
         (s.width, s.height, s.spp, s.max_depth, s.roulette_depth) = (64, 64, 64, 512, 1);
     });
-    let stats = support::render(&gpu, &Renderer::new(&gpu, &scene, Outputs::default()).unwrap());
+    let stats = support::render(&gpu, &Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap());
     for (mean, error) in mean(&stats) {
         assert!((mean - 1.0).abs() <= 4.0 * error + 1e-3, "{mean} +- {error}");
     }
@@ -296,7 +305,7 @@ fn roulette_knows_that_glass_loses_no_light() {
 }
 
 /// A Cornell box whose floor is black plastic, or black without a coat.
-fn black_floor(coated: bool) -> Scene {
+fn black_floor(coated: bool) -> Loaded {
     let mut scene = scene("cornell-box/scene.toml", |s| (s.width, s.height, s.spp) = (32, 32, 64));
     let plastic = Material {
         kind: if coated { BSDF_COATED } else { BSDF_DIFFUSE },
@@ -315,9 +324,9 @@ fn black_floor(coated: bool) -> Scene {
 }
 
 /// Radiance, light and guides.
-fn apart(gpu: &Gpu, scene: &Scene) -> (Vec<PixelStats>, Vec<PixelLight>, Vec<Guide>) {
+fn apart(gpu: &Gpu, scene: &Loaded) -> (Vec<PixelStats>, Vec<PixelLight>, Vec<Guide>) {
     let outputs = Outputs { split_light: true, guides: true, counters: false };
-    let renderer = Renderer::new(gpu, scene, outputs).unwrap();
+    let renderer = Renderer::new(gpu, scene, &scene.settings, outputs).unwrap();
     let stats = support::render(gpu, &renderer);
     let tile = &renderer.film().tiles[0];
     (stats, tile.light.read().unwrap(), tile.guide.read().unwrap())
@@ -343,14 +352,15 @@ fn what_a_smooth_coat_mirrors_is_direct_light() {
     let albedo = guide.iter().find(|g| shows_floor(g)).unwrap().albedo[1];
     assert!((0.002..0.0049).contains(&albedo), "{albedo}");
     // Keeping light apart changes no bit of the radiance.
-    let whole = support::render(&gpu, &Renderer::new(&gpu, &black_floor(true), Outputs::default()).unwrap());
+    let scene = black_floor(true);
+    let whole = support::render(&gpu, &Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap());
     assert!(bits(&whole) == bits(&coated));
     support::assert_silent(&gpu);
 }
 
 /// A point light so near to a floor, below what pixel 2, 2 of 5 x 5 shows, that its irradiance is no number there: 1e30 W/sr
 /// over (1e-5)^2.
-fn too_bright(change: impl Fn(&mut Settings)) -> Scene {
+fn too_bright(change: impl Fn(&mut Settings)) -> Loaded {
     let text = "[camera]\nposition = [0.0, 0.0, 2.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 45.0\n\
                 [film]\nwidth = 5\nheight = 5\n[render]\nspp = 4\nmax_depth = 2\n\
                 [[light]]\ntype = 'point'\nposition = [0.0, 0.0, 1e-5]\nintensity = [1e30, 1e30, 1e30]\n\
@@ -359,7 +369,7 @@ fn too_bright(change: impl Fn(&mut Settings)) -> Scene {
         s.filter = PixelFilter::Point;
         change(s);
     };
-    Scene::parse(Path::new("too_bright.toml"), text, &centres).unwrap()
+    Scene::parse(Path::new("too_bright.toml"), text).map(|scene| scene.with(&centres)).unwrap()
 }
 
 #[test]
@@ -369,7 +379,7 @@ fn samples_that_are_no_numbers_are_black_and_told() {
         let scene =
             too_bright(|s| (s.allocate.policy, s.first_sample) = (tallow::allocate::policy(policy).unwrap(), 10));
         let outputs = Outputs { split_light: true, guides: true, counters: false };
-        let renderer = Renderer::new(&gpu, &scene, outputs).unwrap();
+        let renderer = Renderer::new(&gpu, &scene, &scene.settings, outputs).unwrap();
         let mut frame = FrameResources::new(&gpu).unwrap();
         Job::new(&renderer).run_to_end(&mut frame).unwrap();
         let (stats, broken) = (support::stats(&renderer), renderer.broken_samples().unwrap().unwrap());
@@ -392,7 +402,7 @@ fn samples_that_are_no_numbers_are_black_and_told() {
 fn the_first_broken_sample_does_not_depend_on_batches() {
     let gpu = support::gpu();
     let scene = too_bright(|_| {});
-    let renderer = Renderer::new(&gpu, &scene, Outputs::default()).unwrap();
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
     let mut frame = FrameResources::new(&gpu).unwrap();
     let batch = |first_pixel, pixels, first_sample, samples| Batch { first_pixel, pixels, first_sample, samples };
     let cuts = [
@@ -428,7 +438,7 @@ fn filters_and_samplers_agree_on_the_mean() {
         let scene = scene("cornell-box/scene.toml", |s| {
             (s.width, s.height, s.spp, s.max_depth, s.filter, s.sampler) = (64, 64, 64, 3, filter, sampler);
         });
-        mean(&support::render(&gpu, &Renderer::new(&gpu, &scene, Outputs::default()).unwrap()))
+        mean(&support::render(&gpu, &Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap()))
     };
     let reference = render(PixelFilter::Box, Sampler::Sobol);
     let independent = render(PixelFilter::Box, Sampler::Independent);
@@ -450,9 +460,12 @@ fn an_effect_that_is_called_for_and_left_out_shows() {
     // Control of the bit comparison above: without indirect light the box must differ.
     let gpu = support::gpu();
     let scene = scene("cornell-box/scene.toml", small);
-    let effects = render::called_for(&scene, Outputs::default());
+    let effects = render::called_for(&scene, &scene.settings, Outputs::default());
     let without = Effects { emissive: false, ..effects };
-    let a = support::render(&gpu, &Renderer::new(&gpu, &scene, Outputs::default()).unwrap());
-    let b = support::render(&gpu, &Renderer::specialised(&gpu, &scene, Outputs::default(), without).unwrap());
+    let a = support::render(&gpu, &Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap());
+    let b = support::render(
+        &gpu,
+        &Renderer::specialised(&gpu, &scene, &scene.settings, Outputs::default(), without).unwrap(),
+    );
     assert!(bits(&a) != bits(&b));
 }

@@ -5,7 +5,7 @@ use image::codecs::png::PngEncoder;
 use std::fs::File;
 use std::process::{Command, Output};
 use tallow::render::{Outputs, Renderer, frame_constants};
-use tallow::scene::Scene;
+use tallow::scene::{Loaded, Scene};
 use tallow::twins::primary_hit::guide;
 use tempfile::TempDir;
 
@@ -17,8 +17,8 @@ fn folder(files: &[(&str, &str)]) -> TempDir {
     folder
 }
 
-fn load(folder: &TempDir, name: &str) -> tallow::error::Result<Scene> {
-    Scene::load(&folder.path().join(name), &|_| {})
+fn load(folder: &TempDir, name: &str) -> tallow::error::Result<Loaded> {
+    Scene::load(&folder.path().join(name))
 }
 
 /// Renders under limits, in a shell; the address space in KiB.
@@ -45,7 +45,7 @@ fn what_is_missing_is_said_once() {
     let named = "mtllib no.mtl\n".repeat(200_000);
     let worn: String = (0..100).map(|i| format!("usemtl n{i:03}\nf 1//1 2//1 3//1\n")).collect();
     let folder = folder(&[("a.obj", &format!("{named}{TRIANGLE}{worn}"))]);
-    let said = load(&folder, "a.obj").unwrap().warnings;
+    let said = load(&folder, "a.obj").unwrap().scene.warnings;
     let grey: Vec<_> = said.iter().filter(|w| w.contains("grey")).collect();
     assert_eq!(grey.len(), 1, "{said:?}");
     assert!(grey[0].ends_with("n006, n007 and 92 more (no such library: no.mtl)"), "{}", grey[0]);
@@ -58,7 +58,7 @@ fn grey_is_not_spoken_of_where_the_scene_gives_a_material() {
     let said = |rest: &str| {
         let mesh = "[[material]]\nname = \"red\"\n[[mesh]]\nname = \"m\"\nfile = \"a.obj\"\n";
         let text = format!("{mesh}{rest}\n[environment]");
-        Scene::parse(&folder.path().join("s.toml"), &text, &|_| {}).unwrap().warnings
+        Scene::parse(&folder.path().join("s.toml"), &text).unwrap().scene.warnings
     };
     let instance = "[[instance]]\nmesh = \"m\"\n";
     assert_eq!(said("material = \"red\""), Vec::<String>::new());
@@ -141,7 +141,7 @@ fn coordinates_reach_to_the_limit_and_no_further() {
     let scene = |at: &str, rest: &str| {
         let mesh = "[[mesh]]\nname = \"m\"\nshape = \"rectangle\"\n";
         let text = format!("{mesh}transform = {{ scale = {at} }}\n[environment]\n{rest}");
-        Scene::parse(std::path::Path::new("s.toml"), &text, &|_| {})
+        Scene::parse(std::path::Path::new("s.toml"), &text)
     };
     assert!(scene("1e12", "[camera]\nposition = [0, 0, 1e12]\ntarget = [0, 0, 0]").is_ok());
     for (at, rest, what) in [
@@ -171,11 +171,13 @@ fn a_triangle_at_the_limit_is_hit() {
     let folder = folder(&[("a.obj", corners), ("s.toml", text)]);
     let scene = load(&folder, "s.toml").unwrap();
     let gpu = support::gpu();
-    let renderer = Renderer::new(&gpu, &scene, Outputs { guides: true, ..Outputs::default() }).unwrap();
+    let renderer =
+        Renderer::new(&gpu, &scene, &scene.settings, Outputs { guides: true, ..Outputs::default() }).unwrap();
     let stats = support::render(&gpu, &renderer);
     assert!(stats.iter().all(|s| s.count == 1 && s.mean.iter().all(|v| v.is_finite())));
     let depths: Vec<_> = renderer.film().tiles[0].guide.read().unwrap().iter().map(|g| g.depth).collect();
-    let twins: Vec<_> = (0..64).map(|p| guide(&scene, &frame_constants(&scene), p).depth).collect();
+    let twins: Vec<_> =
+        (0..64).map(|p| guide(&scene, &frame_constants(&scene, &scene.settings).unwrap(), p).depth).collect();
     for found in [depths, twins] {
         let hits: Vec<_> = found.into_iter().filter(|&depth| depth > 0.0).collect();
         assert!(hits.len() >= 16 && hits.iter().all(|depth| (1.9e12..4e12).contains(depth)), "{hits:?}");

@@ -3,8 +3,8 @@ use image::codecs::png::PngEncoder;
 use std::fs::File;
 use std::path::PathBuf;
 use tallow::image::{Picture, WriteOptions};
-use tallow::scene::Scene;
 use tallow::scene::description::*;
+use tallow::scene::{Loaded, Scene};
 
 const FILES: &str = "
 [film]
@@ -71,7 +71,7 @@ fn obj(extras: bool) -> String {
     text
 }
 
-fn from_files() -> Scene {
+fn from_files() -> Loaded {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     std::fs::write(at("wall.obj"), obj(true)).unwrap();
@@ -81,7 +81,7 @@ fn from_files() -> Scene {
     let mut film = tallow::image::Film::new(4, 2);
     film.add_vec3("", ["R", "G", "B"], &sky().pixels);
     tallow::image::write(&at("sky.exr"), &film, &WriteOptions::default()).unwrap();
-    Scene::parse(&at("scene.toml"), FILES, &|s| s.spp = 7).unwrap()
+    Scene::parse(&at("scene.toml"), FILES).map(|scene| scene.with(|s| s.spp = 7)).unwrap()
 }
 
 fn described() -> Description {
@@ -135,25 +135,32 @@ fn described() -> Description {
     }
 }
 
-fn build(description: &Description) -> tallow::error::Result<Scene> {
-    Scene::build(description, &|s| s.spp = 7)
+fn build(description: &Description) -> tallow::error::Result<Loaded> {
+    Scene::build(description).map(|scene| scene.with(|s| s.spp = 7))
 }
 
 #[test]
 fn a_scene_in_memory_is_that_of_the_files() {
     let (files, memory) = (from_files(), build(&described()).unwrap());
-    assert_eq!(files.fingerprint.to_string(), memory.fingerprint.to_string());
+    assert_eq!(files.fingerprint([2, 1]).unwrap().to_string(), memory.fingerprint([2, 1]).unwrap().to_string());
     assert_eq!((&files.nodes, &files.instances), (&memory.nodes, &memory.instances));
     assert_eq!((&files.triangles, &files.shading), (&memory.triangles, &memory.shading));
     assert_eq!((&files.materials, &files.textures), (&memory.materials, &memory.textures));
     assert_eq!((&files.texels, &files.lights), (&memory.texels, &memory.lights));
-    assert_eq!((files.camera, files.settings.spp), (memory.camera, memory.settings.spp));
-    assert_eq!(files.environment.unwrap().texels, memory.environment.unwrap().texels);
+    assert_eq!(
+        (files.camera([2, 1]).unwrap(), files.settings.spp),
+        (memory.camera([2, 1]).unwrap(), memory.settings.spp)
+    );
+    assert_eq!(files.environment.as_ref().unwrap().texels, memory.environment.as_ref().unwrap().texels);
     assert_eq!((files.texels.len(), files.triangles.len(), files.instances.len()), (12, 4, 3), "control: all is there");
     assert_eq!(memory.warnings, Vec::<String>::new());
     let mut other = described();
     other.mesh[0].data.as_mut().unwrap().positions[2][2] = 0.5;
-    assert_ne!(files.fingerprint.to_string(), build(&other).unwrap().fingerprint.to_string(), "control");
+    assert_ne!(
+        files.fingerprint([2, 1]).unwrap().to_string(),
+        build(&other).unwrap().fingerprint([2, 1]).unwrap().to_string(),
+        "control"
+    );
 }
 
 /// The one line that is said when `change` is made.
@@ -202,7 +209,7 @@ fn what_can_be_mended_is_counted() {
 
 #[test]
 fn an_empty_scene_is_black_and_says_so() {
-    let empty = Scene::build(&Description::default(), &|_| {}).unwrap();
+    let empty = Scene::build(&Description::default()).unwrap();
     assert_eq!((empty.triangles.len(), empty.settings.width), (0, tallow::render::settings::Settings::default().width));
     assert!(empty.warnings.iter().any(|w| w.contains("no light")), "{:?}", empty.warnings);
 }

@@ -3,7 +3,7 @@ use image::codecs::png::PngEncoder;
 use std::fs::File;
 use std::path::Path;
 use tallow::layout::*;
-use tallow::scene::{Scene, effects};
+use tallow::scene::{Loaded, Scene, effects};
 use tallow::twins::texture::texture_sample;
 
 const BOX: &str = "
@@ -33,8 +33,8 @@ transform = { translate = [0, 0, 2], scale = 0.5 }
 material = \"lamp\"
 ";
 
-fn parse(text: &str) -> tallow::error::Result<Scene> {
-    Scene::parse(Path::new("scene.toml"), text, &|_| {})
+fn parse(text: &str) -> tallow::error::Result<Loaded> {
+    Scene::parse(Path::new("scene.toml"), text)
 }
 
 fn error(text: &str) -> String {
@@ -51,13 +51,12 @@ fn a_small_scene_becomes_arrays() {
     assert_eq!((scene.triangles.len(), scene.shading.len(), scene.instances.len()), (4, 0, 0));
     assert_eq!(scene.bounds, [[-1.0, -1.0, 0.0], [1.0, 1.0, 2.0]]);
     assert_eq!(scene.names.objects, ["floor", "lamp"]);
-    assert_eq!(scene.camera.right[0], scene.camera.up[1] * 2.0, "twice as wide as high");
+    let shape = |size| scene.camera(size).map(|camera| camera.right[0] / camera.up[1]).unwrap();
+    assert_eq!([shape([32, 16]), shape([64, 16])], [2.0, 4.0], "the camera follows the film");
     assert_eq!((scene.lights.len(), scene.warnings.len()), (2, 0));
-    let (found, why) = effects(&scene, false, false);
+    let (found, why) = effects(&scene, &scene.settings, false, false);
     assert_eq!(found, Effects { diffuse: true, emissive: true, large_lamps: true, ..Effects::default() });
     assert_eq!(why[1].1, "material \"lamp\"");
-    let wide = Scene::parse(Path::new("s.toml"), BOX, &|s| s.width = 64).unwrap();
-    assert_eq!(wide.camera.right[0], wide.camera.up[1] * 4.0, "the camera follows the override");
 }
 
 #[test]
@@ -69,7 +68,10 @@ fn the_fingerprint_is_that_of_what_is_seen() {
 [[light]]\ntype = \"point\"\nposition = [0, 1, 1]\nintensity = 3
 [environment]\nradiance = 0.1";
     let text = format!("{BOX}{more}");
-    let of = |text: &str| parse(text).unwrap().fingerprint;
+    let of = |text: &str| {
+        let Loaded { scene, settings } = parse(text).unwrap();
+        scene.fingerprint([settings.width, settings.height]).unwrap()
+    };
     for threads in [1, 2, 5] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         assert_eq!(pool.install(|| of(&text)), of(&text), "by {threads} threads");
@@ -113,9 +115,9 @@ fn a_texel_counts() {
         let picture = image::RgbImage::from_raw(2, 1, vec![1, 2, 3, 4, 5, blue]).unwrap();
         save(&picture, &folder.path().join("a.png"));
         let text = BOX.replacen("color = [0.1, 0.2, 0.3]", "color_texture = \"a.png\"", 1);
-        let scene = Scene::parse(&folder.path().join("scene.toml"), &text, &|_| {}).unwrap();
+        let scene = Scene::parse(&folder.path().join("scene.toml"), &text).unwrap();
         assert_eq!(scene.texels.len(), 2);
-        scene.fingerprint
+        scene.fingerprint([32, 16]).unwrap()
     };
     assert_eq!(of(6), of(6));
     assert_ne!(of(6), of(7));
@@ -176,7 +178,7 @@ fn instances_make_two_levels_and_carry_their_lights() {
         assert!((b - a).cross(c - a).dot(a - center) > 0.0);
     }
     assert!(scene.bounds[0][0] < -5.9 && scene.bounds[1][0] > 5.9);
-    assert!(effects(&scene, false, false).0.instances);
+    assert!(effects(&scene, &scene.settings, false, false).0.instances);
 }
 
 #[test]
@@ -228,7 +230,7 @@ fn missing_normals_are_counted_unless_they_are_meant_to_be() {
     std::fs::write(dir.path().join("none.obj"), format!("{corners}f 1 2 3\n")).unwrap();
     let said = |mesh: &str| {
         let text = format!("{BOX}[[mesh]]\nname = \"a\"\n{mesh}");
-        Scene::parse(&dir.path().join("scene.toml"), &text, &|_| {}).unwrap().warnings
+        Scene::parse(&dir.path().join("scene.toml"), &text).unwrap().scene.warnings
     };
     let repaired = |n| [format!("mesh \"a\": triangles repaired: {n} without vertex normals shaded flat")];
     assert_eq!(said("file = \"some.obj\""), repaired(2));
@@ -243,7 +245,7 @@ fn models_alone_get_a_camera_and_a_sky() {
     let dir = tempfile::tempdir().unwrap();
     let load = |name: &str, text: &str| {
         std::fs::write(dir.path().join(name), text).unwrap();
-        Scene::load(&dir.path().join(name), &|_| {})
+        Scene::load(&dir.path().join(name))
     };
     load("m.mtl", "newmtl lamp\nKe 1 1 1\n").unwrap_err(); // no scene, but now the file is there
     let triangle = "v 0 0 0\nv 4 0 0\nv 0 4 0\nv nan 0 0\n";
@@ -251,8 +253,9 @@ fn models_alone_get_a_camera_and_a_sky() {
     assert_eq!((scene.triangles.len(), scene.lights[0].kind), (1, LIGHT_ENVIRONMENT));
     let repaired = &scene.warnings[0];
     assert!(repaired.contains("1 with NaN or infinite coordinates dropped, 1 without area dropped"), "{repaired}");
-    let eye = glam::Vec3::from(scene.camera.position) - glam::Vec3::new(2.0, 2.0, 0.0);
-    assert!(eye.normalize().dot(glam::Vec3::from(scene.camera.forward)) < -0.999, "it looks at the middle");
+    let camera = scene.camera([512, 512]).unwrap();
+    let eye = glam::Vec3::from(camera.position) - glam::Vec3::new(2.0, 2.0, 0.0);
+    assert!(eye.normalize().dot(glam::Vec3::from(camera.forward)) < -0.999, "it looks at the middle");
     let lit = load("b.obj", &format!("mtllib m.mtl\n{triangle}usemtl lamp\nf 1 2 3\n")).unwrap();
     assert_eq!((lit.lights.len(), lit.lights[0].kind), (1, LIGHT_TRIANGLE), "no sky over a lamp");
     let far = load("c.obj", "v 0 0 0\nv 2e12 0 0\nv 0 1 0\nf 1 2 3").unwrap_err().to_string();
@@ -275,7 +278,7 @@ fn mtl_rules_by_example() {
     let faces: String = blocks.iter().map(|(name, _)| format!("usemtl {name}\nf 1 2 3\n")).collect();
     std::fs::write(dir.path().join("m.mtl"), mtl).unwrap();
     std::fs::write(dir.path().join("m.obj"), format!("mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{faces}")).unwrap();
-    let scene = Scene::load(&dir.path().join("m.obj"), &|_| {}).unwrap();
+    let scene = Scene::load(&dir.path().join("m.obj")).unwrap();
     let [diffuse, coated, metal, mirror, glass, tinted, veil] = scene.materials[..] else { panic!("seven materials") };
     assert_eq!((diffuse.kind, diffuse.base_color), (BSDF_DIFFUSE, [0.5, 0.4, 0.3]));
     assert_eq!((coated.kind, coated.eta[0]), (BSDF_COATED, 1.5));
@@ -301,7 +304,7 @@ fn maps_are_scaled_and_moved() {
     std::fs::write(dir.path().join("m.mtl"), mtl).unwrap();
     let text = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl plain\nf 1 2 3\nusemtl moved\nf 1 2 3\n";
     std::fs::write(dir.path().join("m.obj"), text).unwrap();
-    let scene = Scene::load(&dir.path().join("m.obj"), &|_| {}).unwrap();
+    let scene = Scene::load(&dir.path().join("m.obj")).unwrap();
     let [plain, moved] = [0, 1].map(|i| scene.materials[i].base_texture);
     let sample = |texture, u, v| texture_sample(&scene, texture, glam::vec2(u, v));
     for (u, v) in [(0.0, 0.0), (0.3, 0.2), (0.9, 0.7), (-0.4, 1.6)] {
@@ -328,7 +331,7 @@ fn rough_coats_share_a_table_by_index_and_distribution() {
     let coat = |name: &str, rest: &str| format!("[[material]]\nname = '{name}'\ntype = 'coated'\n{rest}\n");
     let text = coat("a", "alpha = 0.2") + &coat("b", "alpha = 0.7\nnonlinear = true") + &coat("smooth", "");
     let text = text + &coat("ggx", "alpha = 0.2\ndistribution = 'ggx'") + "[[mesh]]\nshape = 'cube'\nmaterial = 'a'\n";
-    let scene = Scene::parse(Path::new("scene.toml"), &text, &|_| {}).unwrap();
+    let scene = Scene::parse(Path::new("scene.toml"), &text).unwrap();
     let length = COAT_ROWS * COAT_COLUMNS;
     let at: Vec<_> = scene.materials[..4].iter().map(|m| m.coat_table).collect();
     assert_eq!((at, scene.texels.len()), (vec![0, 0, 0, length], 2 * length as usize));

@@ -5,7 +5,7 @@ use crate::twin::{Random, Workplace};
 use glam::{Mat3, Vec3, dvec3, vec3};
 use std::f64::consts::{PI, TAU};
 use tallow::layout::{LIGHT_ENVIRONMENT, Light, NONE};
-use tallow::scene::Scene;
+use tallow::scene::Loaded;
 use tallow::twins::light::*;
 use tallow::twins::sampler::{sample_2d, sample_2d_bits, sampler_start};
 use tallow::twins::scene::triangle_vertices;
@@ -25,7 +25,7 @@ struct Grid {
 }
 
 impl Grid {
-    fn new(scene: &Scene) -> Self {
+    fn new(scene: &Loaded) -> Self {
         let sky = scene.lights.iter().find(|l| l.kind == LIGHT_ENVIRONMENT);
         let axes = |l: &Light| Mat3::from_cols(l.a.into(), l.b.into(), l.c.into());
         Self { world_from_sky: sky.map_or(Mat3::IDENTITY, axes) }
@@ -53,7 +53,7 @@ impl Grid {
     }
 
     /// Integrals over the cells of what is claimed.
-    fn integrate(&self, scene: &Scene) -> Vec<f64> {
+    fn integrate(&self, scene: &Loaded) -> Vec<f64> {
         let mut cells = vec![0.0; COLUMNS * ROWS];
         self.directions().for_each(|(cell, direction, area)| cells[cell] += density(scene, direction) * area);
         cells
@@ -61,7 +61,7 @@ impl Grid {
 }
 
 /// Of the sky, and of every emissive triangle whose front lies in that direction.
-fn density(scene: &Scene, direction: Vec3) -> f64 {
+fn density(scene: &Loaded, direction: Vec3) -> f64 {
     let sky = scene.lights.iter().find(|l| l.kind == LIGHT_ENVIRONMENT);
     let sky = sky.map_or(0.0, |l| environment_radiance(scene, l, direction).1);
     let ray = ray_space(HERE, direction);
@@ -74,7 +74,7 @@ fn density(scene: &Scene, direction: Vec3) -> f64 {
     f64::from(sky) + (0..scene.triangles.len()).filter_map(lamp).map(f64::from).sum::<f64>()
 }
 
-fn samples(scene: &Scene, count: u32, seed: u32) -> impl Iterator<Item = LightSample> {
+fn samples(scene: &Loaded, count: u32, seed: u32) -> impl Iterator<Item = LightSample> {
     (0..count).map(move |i| {
         let s = sampler_start(0, i, seed, true);
         light_sample(scene, HERE, sample_2d_bits(s, 0)[0], sample_2d(s, 1))
@@ -83,7 +83,7 @@ fn samples(scene: &Scene, count: u32, seed: u32) -> impl Iterator<Item = LightSa
 
 const LAMP: [Vec3; 3] = [vec3(-1.0, -0.8, -1.2), vec3(1.6, -0.5, -0.6), vec3(0.1, 1.2, -2.0)];
 
-fn one_lamp() -> Scene {
+fn one_lamp() -> Loaded {
     let place = Workplace::new().obj("lamp.obj", &[LAMP]);
     let text = "[[material]]\nname = 'a'\nemission = [2.0, 3.0, 5.0]\n[[mesh]]\nfile = 'lamp.obj'\nmaterial = 'a'\n";
     let scene = place.scene(text);
@@ -91,12 +91,12 @@ fn one_lamp() -> Scene {
     scene
 }
 
-fn constant_sky() -> Scene {
+fn constant_sky() -> Loaded {
     Workplace::new().scene("[environment]\nradiance = [2.0, 3.0, 5.0]\n")
 }
 
 /// A sun, a gradient, and a part that is black.
-fn image_sky(width: u32, height: u32) -> Scene {
+fn image_sky(width: u32, height: u32) -> Loaded {
     let light = |x: u32, y: u32| match (2 * x / width, y) {
         (_, 1) if x == width - 1 => 40.0,
         (0, _) => 0.0,
@@ -107,7 +107,7 @@ fn image_sky(width: u32, height: u32) -> Scene {
 }
 
 /// Triangles of three strengths, half of which face away, below an image, with lights that no ray can hit.
-fn many_lights() -> Scene {
+fn many_lights() -> Loaded {
     let mut random = Random::new(5);
     let mut triangle = || {
         let centre = HERE + 3.0 * random.point().normalize();
@@ -126,8 +126,9 @@ fn many_lights() -> Scene {
     place.scene(&text)
 }
 
-fn single_lights() -> [(&'static str, Scene); 4] {
-    let by_area = Scene { large_lamps: false, ..one_lamp() };
+fn single_lights() -> [(&'static str, Loaded); 4] {
+    let mut by_area = one_lamp();
+    by_area.large_lamps = false;
     [
         ("triangle", one_lamp()),
         ("triangle by area", by_area),
@@ -161,7 +162,7 @@ fn directions_follow_the_density() {
 fn lights_are_drawn_with_their_probabilities() {
     let mut scene = many_lights();
     assert_eq!(scene.lights.len(), 31, "27 triangles, three lights and the sky");
-    let p = |scene: &Scene| {
+    let p = |scene: &Loaded| {
         let mut observed = vec![0.0; scene.lights.len()];
         let words = (0..1 << 18).map(|i| sample_2d_bits(sampler_start(0, i, 9, true), 0)[0]);
         words.for_each(|word| observed[alias_choose(&scene.light_table, word).0 as usize] += 1.0);
@@ -174,7 +175,7 @@ fn lights_are_drawn_with_their_probabilities() {
 }
 
 /// Share of samples of `scene` whose density and light are not what `claimed` says of their directions.
-fn unlike(scene: &Scene, claimed: &Scene) -> f64 {
+fn unlike(scene: &Loaded, claimed: &Loaded) -> f64 {
     let light = &claimed.lights[0];
     let differs = |s: &LightSample| {
         let radiance = match light.kind {
@@ -208,7 +209,7 @@ fn samples_know_their_density_and_their_light() {
 fn the_density_of_a_sky_integrates_to_one() {
     for (width, height) in [(16, 8), (4, 2), (32, 4)] {
         let mut scene = image_sky(width, height);
-        let sum = |scene: &Scene| Grid::new(scene).integrate(scene).iter().sum::<f64>();
+        let sum = |scene: &Loaded| Grid::new(scene).integrate(scene).iter().sum::<f64>();
         let whole = sum(&scene);
         assert!((whole - 1.0).abs() < 1e-4, "{width} x {height}: {whole}");
         let seen = |d| environment_radiance(&scene, &scene.lights[0], d);
@@ -240,7 +241,7 @@ fn what_is_left_of_a_choice_is_independent_of_it() {
 }
 
 /// Variance of the mean of 64 light samples' irradiance on a floor, over many pixels.
-fn variance(scene: &Scene, independent: bool) -> f64 {
+fn variance(scene: &Loaded, independent: bool) -> f64 {
     let irradiance = |pixel: u32| {
         let sample = |i| {
             let s = sampler_start(pixel, i, 1, independent);

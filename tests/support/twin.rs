@@ -9,7 +9,7 @@ use tallow::image::{Film, Samples, WriteOptions};
 use tallow::layout::Effects;
 use tallow::render::frame_constants;
 use tallow::render::settings::Sampler;
-use tallow::scene::Scene;
+use tallow::scene::{Loaded, Scene};
 use tallow::twins::path::{Strategy, Tracer};
 use tallow::twins::scene::world_from_object;
 
@@ -73,9 +73,9 @@ impl Workplace {
         self
     }
 
-    pub fn scene(&self, text: &str) -> Scene {
+    pub fn scene(&self, text: &str) -> Loaded {
         let path = self.0.path().join("scene.toml");
-        Scene::parse(&path, text, &|_| {}).unwrap_or_else(|e| panic!("{e}"))
+        Scene::parse(&path, text).unwrap_or_else(|e| panic!("{e}"))
     }
 }
 
@@ -83,13 +83,13 @@ impl Workplace {
 pub const BALL: Vec3 = vec3(0.3, -0.2, 5.0);
 
 /// A closed mesh of radius 1 in world space.
-pub fn ball() -> Scene {
+pub fn ball() -> Loaded {
     let sphere = "[[mesh]]\nshape = 'sphere'\nsegments = 128\ntransform = { translate = [0.3, -0.2, 5.0] }\n";
     Workplace::new().scene(sphere)
 }
 
 /// [`ball`] as an instance that is turned.
-pub fn instanced_ball() -> Scene {
+pub fn instanced_ball() -> Loaded {
     let sphere = "[[mesh]]\nname = 'ball'\nshape = 'sphere'\nsegments = 128\n[[instance]]\nmesh = 'ball'\n";
     let turned = "transform = { translate = [0.3, -0.2, 5.0], rotate = [20.0, 40.0, 60.0] }\n";
     let scene = Workplace::new().scene(&format!("{sphere}{turned}"));
@@ -98,7 +98,7 @@ pub fn instanced_ball() -> Scene {
 }
 
 /// A room under a panel that is as wide as its ceiling.
-pub fn under_a_panel() -> Scene {
+pub fn under_a_panel() -> Loaded {
     Workplace::new().scene(
         "[film]\nwidth = 16\nheight = 16\n[camera]\nposition = [0.2, -0.4, 0.9]\ntarget = [0.0, 0.3, -1.0]\nfov = 80.0\n\
          [render]\nmax_depth = 3\n[[material]]\nname = 'wall'\ncolor = 0.5\n\
@@ -121,7 +121,7 @@ pub struct Aim {
 
 /// Ray `i` of many from `origin(random)` to vertices and to points on edges of a ball, in turn. `None` from outside
 /// near the silhouette, where a ray may pass beside it.
-pub fn aimed_at_seam(scene: &Scene, i: usize, origin: impl Fn(&mut Random) -> Vec3) -> Option<Aim> {
+pub fn aimed_at_seam(scene: &Loaded, i: usize, origin: impl Fn(&mut Random) -> Vec3) -> Option<Aim> {
     let mut random = Random::stream(i);
     let t = scene.triangles[(random.unit() * scene.triangles.len() as f32) as usize];
     let place = |p: [f32; 3]| match scene.instances.first() {
@@ -157,10 +157,15 @@ impl Estimate {
 }
 
 /// The picture's mean over `samples` independent samples per pixel (Sobol points would hide the error).
-pub fn mean(scene: &Scene, strategy: Strategy, samples: u32) -> Estimate {
+pub fn mean(scene: &Loaded, strategy: Strategy, samples: u32) -> Estimate {
     let mut scene = scene.clone();
     scene.settings.sampler = Sampler::Independent;
-    let tracer = Tracer { scene: &scene, frame: frame_constants(&scene), effects: Effects::ALL, strategy };
+    let tracer = Tracer {
+        scene: &scene,
+        frame: frame_constants(&scene, &scene.settings).unwrap(),
+        effects: Effects::ALL,
+        strategy,
+    };
     let pixels = scene.settings.pixels() as u32;
     // Per pixel, the mean over samples and its variance: pixels differ, which is no error of the picture's mean.
     let of_pixel = |pixel| {

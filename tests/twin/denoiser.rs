@@ -150,7 +150,8 @@ fn renderer(gpu: &Gpu, size: [u32; 2], outputs: Outputs, policy: &str) -> Render
         (s.allocate.policy, s.allocate.min_spp) = (tallow::allocate::policy(policy).unwrap(), 0);
     };
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml");
-    Renderer::new(gpu, &Scene::load(&file, &small).unwrap(), outputs).unwrap()
+    let scene = Scene::load(&file).unwrap().with(small);
+    Renderer::new(gpu, &scene, &scene.settings, outputs).unwrap()
 }
 
 #[test]

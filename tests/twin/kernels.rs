@@ -11,7 +11,7 @@ use tallow::gpu::{Buffer, FrameResources, Gpu, Kernel, Location};
 use tallow::layout::*;
 use tallow::render::settings::{PixelFilter, Settings};
 use tallow::render::{Batch, Outputs, Renderer, Step, all_effects, called_for, frame_constants};
-use tallow::scene::Scene;
+use tallow::scene::{Loaded, Scene};
 use tallow::shaders::shared;
 use tallow::twins::accumulate::fold;
 use tallow::twins::path::{Strategy, Tracer};
@@ -38,13 +38,15 @@ fn small(s: &mut Settings) {
     (s.width, s.height, s.spp, s.max_depth) = (SIDE, SIDE, SAMPLES, s.max_depth.min(4));
 }
 
-fn shipped(file: &str) -> Scene {
-    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file), &small).unwrap()
+fn shipped(file: &str) -> Loaded {
+    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file))
+        .map(|scene| scene.with(&small))
+        .unwrap()
 }
 
 /// Textures of every use, masks (of the lamp too), a normal map, an environment image, a spot light, a lens, a mirrored
 /// instance, roulette and a clamp.
-fn pictures() -> Scene {
+fn pictures() -> Loaded {
     let checks = |x: u32, y: u32| if (x / 4 + y / 4).is_multiple_of(2) { [230, 120, 40] } else { [60, 150, 220] };
     let bumps = |x: u32, y: u32| [128 + (x * 7 % 60) as u8, 128 + (y * 5 % 60) as u8, 235];
     let place = Workplace::new()
@@ -79,7 +81,7 @@ fn pictures() -> Scene {
 }
 
 /// A ball under a sky whose columns need more than 16 bits to count.
-fn wide_sky() -> Scene {
+fn wide_sky() -> Loaded {
     let mut scene = Workplace::new().sky("sky.exr", 70_000, 2, |x, _| if x < 20_000 { 3.0 } else { 0.1 }).scene(
         "[camera]\nposition = [0.0, 0.0, 4.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 45.0\n[environment]\nfile = 'sky.exr'\n\
          [[mesh]]\nshape = 'sphere'\nsegments = 16\n",
@@ -89,7 +91,7 @@ fn wide_sky() -> Scene {
 }
 
 /// Exact spheres of every kind: of glass, masked, with maps, as lamps, mirrored and stretched instances.
-fn spheres() -> Scene {
+fn spheres() -> Loaded {
     let bumps = |x: u32, y: u32| [128 + (x * 7 % 60) as u8, 128 + (y * 5 % 60) as u8, 235];
     let place = Workplace::new()
         .picture(
@@ -127,9 +129,9 @@ struct Pair {
     light: [Vec<PixelLight>; 2],
 }
 
-fn run(gpu: &Gpu, scene: &Scene, effects: Effects) -> Pair {
+fn run(gpu: &Gpu, scene: &Loaded, effects: Effects) -> Pair {
     let outputs = Outputs { split_light: true, guides: true, counters: false };
-    let renderer = Renderer::specialised(gpu, scene, outputs, effects).unwrap();
+    let renderer = Renderer::specialised(gpu, scene, &scene.settings, outputs, effects).unwrap();
     let mut frame = FrameResources::new(gpu).unwrap();
     let pixels = SIDE * SIDE;
     let batch = Batch { first_pixel: 0, pixels, first_sample: 0, samples: SAMPLES };
@@ -140,7 +142,7 @@ fn run(gpu: &Gpu, scene: &Scene, effects: Effects) -> Pair {
     let device: Vec<_> = words[..3 * (pixels * SAMPLES) as usize].iter().map(|&v| Vec4::from(v).truncate()).collect();
     let rays: f32 = words[..device.len()].iter().map(|v| v[3]).sum();
 
-    let (frame, effects) = (frame_constants(scene), *renderer.effects());
+    let (frame, effects) = (frame_constants(scene, &scene.settings).unwrap(), *renderer.effects());
     let tracer = Tracer { scene, frame, effects, strategy: Strategy::Both };
     let sample = |i: u32| {
         let s = tracer.sample(i % pixels, i / pixels);
@@ -209,21 +211,23 @@ fn renders_agree_with_their_twins() {
     let outputs = Outputs { split_light: true, guides: true, counters: false };
     for file in SCENES {
         let scene = shipped(file);
-        check(file, &run(&gpu, &scene, called_for(&scene, outputs)));
+        check(file, &run(&gpu, &scene, called_for(&scene, &scene.settings, outputs)));
     }
-    check("wide sky", &run(&gpu, &wide_sky(), called_for(&wide_sky(), outputs)));
+    let sky = wide_sky();
+    check("wide sky", &run(&gpu, &sky, called_for(&sky, &sky.settings, outputs)));
     let mut panel = under_a_panel();
     small(&mut panel.settings);
-    check("panel", &run(&gpu, &panel, called_for(&panel, outputs)));
-    check("spheres", &run(&gpu, &spheres(), called_for(&spheres(), outputs)));
+    check("panel", &run(&gpu, &panel, called_for(&panel, &panel.settings, outputs)));
+    let balls = spheres();
+    check("spheres", &run(&gpu, &balls, called_for(&balls, &balls.settings, outputs)));
     let scene = pictures();
-    let mut pair = run(&gpu, &scene, called_for(&scene, outputs));
+    let mut pair = run(&gpu, &scene, called_for(&scene, &scene.settings, outputs));
     check("pictures", &pair);
     for samples in &pair.samples {
         let largest = samples.chunks(3).map(|s| s[1].max_element()).fold(0.0, f32::max);
         assert!((largest - 1.0).abs() < 1e-5, "indirect light of {largest}, clamped to 1");
     }
-    check("pictures, all effects", &run(&gpu, &scene, all_effects(&scene)));
+    check("pictures, all effects", &run(&gpu, &scene, all_effects(&scene, &scene.settings)));
     // Control: the twin's samples of the neighbouring pixels.
     pair.samples[1].rotate_right(3);
     assert!(agreement(&pair.samples) < 0.5, "control: other samples are told apart");
@@ -337,8 +341,8 @@ fn squares_of_the_brightest_samples_stay_finite() {
 }
 
 /// What the kernel finds.
-fn traversed(gpu: &Gpu, scene: &Scene, effects: Effects, rays: &[RayQuery], any_hit: bool) -> Vec<RayHit> {
-    let renderer = Renderer::specialised(gpu, scene, Outputs::default(), effects).unwrap();
+fn traversed(gpu: &Gpu, scene: &Loaded, effects: Effects, rays: &[RayQuery], any_hit: bool) -> Vec<RayHit> {
+    let renderer = Renderer::specialised(gpu, scene, &scene.settings, Outputs::default(), effects).unwrap();
     let traverse = shared::traverse::Constants { stack: scene.stack };
     let thread = shared::thread::Constants { workgroup: 32, stripes: 1 };
     let kernel = Kernel::new(gpu, &traverse_kernel::Constants { effects, thread, traverse }).unwrap();
@@ -347,7 +351,7 @@ fn traversed(gpu: &Gpu, scene: &Scene, effects: Effects, rays: &[RayQuery], any_
     let hits = Buffer::new(gpu, "hits", rays.len(), Location::Device).unwrap();
     let push = TraversePush {
         count: rays.len() as u32,
-        root: frame_constants(scene).root,
+        root: frame_constants(scene, &scene.settings).unwrap().root,
         any_hit: u32::from(any_hit),
         ..Default::default()
     };
@@ -360,7 +364,7 @@ fn traversed(gpu: &Gpu, scene: &Scene, effects: Effects, rays: &[RayQuery], any_
     hits.read().unwrap()
 }
 
-fn queries(scene: &Scene, count: usize) -> Vec<RayQuery> {
+fn queries(scene: &Loaded, count: usize) -> Vec<RayQuery> {
     let [low, high] = scene.bounds.map(Vec3::from);
     let mut random = Random::stream(11);
     let mut query = |i: usize| {
@@ -380,7 +384,7 @@ fn queries(scene: &Scene, count: usize) -> Vec<RayQuery> {
 }
 
 /// Rays on which kernel and twin differ.
-fn differing(scene: &Scene, rays: &[RayQuery], hits: &[RayHit], any_hit: bool) -> usize {
+fn differing(scene: &Loaded, rays: &[RayQuery], hits: &[RayHit], any_hit: bool) -> usize {
     let differs = |(ray, hit): (&RayQuery, &RayHit)| {
         let twin = traverse(scene, ray.origin.into(), ray.direction.into(), ray.t_max, any_hit, ray.mask_seed);
         let same = twin.triangle == hit.triangle && twin.instance == hit.instance;
@@ -398,7 +402,7 @@ fn traversal_agrees_with_its_twin() {
     scenes.extend([("pictures", pictures()), ("spheres", spheres())]);
     for (name, scene) in &scenes {
         let rays = queries(scene, 5000);
-        for effects in [called_for(scene, Outputs::default()), all_effects(scene)] {
+        for effects in [called_for(scene, &scene.settings, Outputs::default()), all_effects(scene, &scene.settings)] {
             for any_hit in [false, true] {
                 let mut hits = traversed(&gpu, scene, effects, &rays, any_hit);
                 let found = hits.iter().filter(|h| h.triangle != NONE).count();
@@ -414,7 +418,7 @@ fn traversal_agrees_with_its_twin() {
 
 /// Rays at shared vertices and edges of a ball: from inside, from the centre along the axes too, and from as far as the
 /// twin lets none through.
-fn aims(scene: &Scene) -> Vec<Aim> {
+fn aims(scene: &Loaded) -> Vec<Aim> {
     type From = fn(&mut Random) -> Vec3;
     let from: [(usize, From); 4] = [
         (100_000, |r| BALL + 0.5 * r.point()),
@@ -427,14 +431,15 @@ fn aims(scene: &Scene) -> Vec<Aim> {
 }
 
 /// Those that the kernel lets through, on the way to the closest hit or to any before an end behind the surface.
-fn leaks(gpu: &Gpu, scene: &Scene, any_hit: bool) -> Vec<Aim> {
+fn leaks(gpu: &Gpu, scene: &Loaded, any_hit: bool) -> Vec<Aim> {
     let mut aims = aims(scene);
     let query = |a: &Aim| {
         let t_max = if any_hit { a.distance + 0.2 } else { 3e38 };
         RayQuery { origin: a.origin.into(), t_max, direction: a.direction.into(), mask_seed: 0, ..Default::default() }
     };
     let queries: Vec<_> = aims.iter().map(query).collect();
-    let mut hits = traversed(gpu, scene, called_for(scene, Outputs::default()), &queries, any_hit).into_iter();
+    let mut hits =
+        traversed(gpu, scene, called_for(scene, &scene.settings, Outputs::default()), &queries, any_hit).into_iter();
     aims.retain(|a| hits.next().is_some_and(|hit| hit.triangle == NONE || hit.t > a.distance + 0.2));
     aims
 }
@@ -455,7 +460,7 @@ fn closed_meshes_do_not_leak() {
 }
 
 /// A lamp, a point light, a sky, a smooth ball twice (one is an instance), a coat and glass, all `scale` times as large.
-fn scaled(scale: f64) -> Scene {
+fn scaled(scale: f64) -> Loaded {
     let v = |x: f64, y: f64, z: f64| format!("[{:e}, {:e}, {:e}]", x * scale, y * scale, z * scale);
     let mut scene = Workplace::new().scene(&format!(
         "[camera]\nposition = {}\ntarget = {}\nfov = 45.0\n[render]\nmax_depth = 4\n[environment]\nradiance = 0.2\n\
@@ -489,7 +494,7 @@ fn the_unit_of_length_does_not_matter() {
     let gpu = gpu();
     let samples = |scale: f64| {
         let scene = scaled(scale);
-        let effects = called_for(&scene, Outputs { split_light: true, guides: true, counters: false });
+        let effects = called_for(&scene, &scene.settings, Outputs { split_light: true, guides: true, counters: false });
         run(&gpu, &scene, effects).samples
     };
     let [device, twin] = samples(1.0);

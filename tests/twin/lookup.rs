@@ -7,7 +7,7 @@ use tallow::gpu::Gpu;
 use tallow::layout::{Effects, Guide, NONE, vec3, vec4};
 use tallow::render::settings::PixelFilter;
 use tallow::render::{Outputs, Renderer, frame_constants};
-use tallow::scene::Scene;
+use tallow::scene::{Loaded, Scene};
 use tallow::twins::guide_lookup::{GuideRays, look_up};
 use tallow::twins::path::{Strategy, Tracer};
 use tallow::twins::primary_hit::guide;
@@ -72,14 +72,14 @@ fn guide_rays_without_light_are_never_chosen() {
     assert_eq!(chosen(&guide, &[[0.0; 4]; 4], eye, vec2(0.9, 0.9)), None);
 }
 
-fn scene(file: &str, size: [u32; 2], filter: PixelFilter) -> Scene {
+fn scene(file: &str, size: [u32; 2], filter: PixelFilter) -> Loaded {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file);
-    Scene::load(&path, &|s| ([s.width, s.height], s.filter) = (size, filter)).unwrap()
+    Scene::load(&path).map(|scene| scene.with(|s| ([s.width, s.height], s.filter) = (size, filter))).unwrap()
 }
 
 /// What guide rays meet, and light that differs from pixel to pixel, a few having none.
-fn guides(scene: &Scene) -> (Vec<Guide>, Vec<vec4>) {
-    let frame = frame_constants(scene);
+fn guides(scene: &Loaded) -> (Vec<Guide>, Vec<vec4>) {
+    let frame = frame_constants(scene, &scene.settings).unwrap();
     let light = |i: u32| {
         let unit = |k: u32| (hash(4 * i + k) >> 8) as f32 / (1 << 24) as f32;
         [unit(0), unit(1), unit(2), if i % 7 == 6 { 0.0 } else { 1.0 }]
@@ -89,20 +89,20 @@ fn guides(scene: &Scene) -> (Vec<Guide>, Vec<vec4>) {
 }
 
 /// Of the device and of the twin.
-fn both(gpu: &Gpu, scene: &Scene, guide: &[Guide], filtered: &[vec4]) -> [Vec<vec3>; 2] {
-    let renderer = Renderer::new(gpu, scene, Outputs::default()).unwrap();
+fn both(gpu: &Gpu, scene: &Loaded, guide: &[Guide], filtered: &[vec4]) -> [Vec<vec3>; 2] {
+    let renderer = Renderer::new(gpu, scene, &scene.settings, Outputs::default()).unwrap();
     let (device, _) = renderer.look_up(guide, filtered, EYE_RAYS).unwrap();
     [device, twin(scene, renderer.effects(), guide, filtered)]
 }
 
-fn twin(scene: &Scene, effects: &Effects, guide: &[Guide], filtered: &[vec4]) -> Vec<vec3> {
+fn twin(scene: &Loaded, effects: &Effects, guide: &[Guide], filtered: &[vec4]) -> Vec<vec3> {
     let tracer = tracer(scene, *effects);
     let guides = GuideRays { size: tracer.frame.size, guide, filtered };
     (0..guide.len() as u32).map(|p| look_up(&tracer, &guides, p, 0..EYE_RAYS)).collect()
 }
 
-fn tracer(scene: &Scene, effects: Effects) -> Tracer<'_> {
-    Tracer { scene, frame: frame_constants(scene), effects, strategy: Strategy::Both }
+fn tracer(scene: &Loaded, effects: Effects) -> Tracer<'_> {
+    Tracer { scene, frame: frame_constants(scene, &scene.settings).unwrap(), effects, strategy: Strategy::Both }
 }
 
 /// A software device ends loops early, silently: all rays of a pixel in one loop brought a twentieth of the light.
@@ -111,7 +111,7 @@ fn tens_of_thousands_of_eye_rays_bring_what_a_few_do() {
     let gpu = gpu();
     let scene = scene("cornell-box/scene.toml", [4, 2], PixelFilter::Box);
     let (guide, filtered) = guides(&scene);
-    let renderer = Renderer::new(&gpu, &scene, Outputs::default()).unwrap();
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
     let [few, many] = [4096, 1 << 16].map(|n| renderer.look_up(&guide, &filtered, n).unwrap().0);
     let apart =
         |a: &[vec3], b: &[vec3]| a.iter().zip(b).map(|(a, b)| (a[1] - b[1]).abs() / b[1].max(0.01)).fold(0.0, f32::max);
@@ -202,7 +202,7 @@ fn no_guide_ray_spoils_the_image() {
 fn what_does_not_fit_the_film_is_refused() {
     let gpu = gpu();
     let scene = scene("cornell-box/scene.toml", [4, 3], PixelFilter::Box);
-    let renderer = Renderer::new(&gpu, &scene, Outputs::default()).unwrap();
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
     let (guide, filtered) = guides(&scene);
     assert!(renderer.look_up(&guide, &filtered, 1).is_ok(), "control");
     for error in [

@@ -4,7 +4,7 @@ use crate::twin::*;
 use glam::{DVec3, Vec2, Vec3, vec2, vec3};
 use rayon::prelude::*;
 use tallow::layout::{Light, NONE};
-use tallow::scene::Scene;
+use tallow::scene::Loaded;
 use tallow::twins::light::light_sample;
 use tallow::twins::path::{SHADOW_END, Strategy};
 use tallow::twins::surface::surface_at;
@@ -12,16 +12,16 @@ use tallow::twins::traverse::{Hit, traverse, traverse_from};
 
 const FAR: f32 = 3e38;
 
-fn closest(scene: &Scene, origin: Vec3, direction: Vec3) -> Hit {
+fn closest(scene: &Loaded, origin: Vec3, direction: Vec3) -> Hit {
     traverse(scene, origin, direction, FAR, false, 0)
 }
 
-fn occluded(scene: &Scene, origin: Vec3, direction: Vec3, t_max: f32) -> bool {
+fn occluded(scene: &Loaded, origin: Vec3, direction: Vec3, t_max: f32) -> bool {
     traverse(scene, origin, direction, t_max, true, 0).any()
 }
 
 /// Moeller and Trumbore in 64 bits: distance, and the smallest barycentric weight (negative outside).
-fn reference_hit(scene: &Scene, triangle: usize, origin: Vec3, direction: Vec3) -> (f64, f64) {
+fn reference_hit(scene: &Loaded, triangle: usize, origin: Vec3, direction: Vec3) -> (f64, f64) {
     let t = &scene.triangles[triangle];
     let [a, b, c] = [t.v0, t.v1, t.v2].map(|v| DVec3::from(v.map(f64::from)));
     let (origin, direction) = (origin.as_dvec3(), direction.as_dvec3());
@@ -33,7 +33,7 @@ fn reference_hit(scene: &Scene, triangle: usize, origin: Vec3, direction: Vec3) 
 }
 
 /// The closest hit by brute force: triangle, distance. `None` when an edge or a second surface is too near to tell.
-fn brute_force(scene: &Scene, origin: Vec3, direction: Vec3) -> Option<(u32, f64)> {
+fn brute_force(scene: &Loaded, origin: Vec3, direction: Vec3) -> Option<(u32, f64)> {
     let mut best = (NONE, f64::INFINITY);
     for i in 0..scene.triangles.len() {
         let (t, inside) = reference_hit(scene, i, origin, direction);
@@ -61,7 +61,7 @@ fn rays(count: usize, reach: f32) -> Vec<(Vec3, Vec3)> {
 }
 
 /// (rays that disagree with brute force, rays compared, rays that hit)
-fn disagreements(scene: &Scene, rays: &[(Vec3, Vec3)]) -> (usize, usize, usize) {
+fn disagreements(scene: &Loaded, rays: &[(Vec3, Vec3)]) -> (usize, usize, usize) {
     let judge = |&(origin, direction): &(Vec3, Vec3)| {
         let (triangle, t) = brute_force(scene, origin, direction)?;
         let hit = closest(scene, origin, direction);
@@ -96,7 +96,7 @@ fn traversal_agrees_with_brute_force() {
 }
 
 /// Of `count` rays at shared vertices and edges of a ball, those that pass through it.
-fn leaks(scene: &Scene, count: usize, origin: impl Fn(&mut Random) -> Vec3 + Sync) -> usize {
+fn leaks(scene: &Loaded, count: usize, origin: impl Fn(&mut Random) -> Vec3 + Sync) -> usize {
     let aimed = |i| aimed_at_seam(scene, i, &origin);
     let leaks = |aim: &Aim| closest(scene, aim.origin, aim.direction).t > aim.distance + 0.2;
     (0..count).into_par_iter().filter_map(aimed).filter(leaks).count()
@@ -130,7 +130,7 @@ const PLACES: [&str; 4] = [
 ];
 
 /// (rays whose first hits differ, rays that hit)
-fn differences(a: &Scene, b: &Scene, rays: &[(Vec3, Vec3)]) -> (usize, usize) {
+fn differences(a: &Loaded, b: &Loaded, rays: &[(Vec3, Vec3)]) -> (usize, usize) {
     let judge = |&(origin, direction): &(Vec3, Vec3)| {
         let hits = [a, b].map(|s| (s, closest(s, origin, direction)));
         let [p, q] = hits.map(|(scene, hit)| hit.any().then(|| surface_at(scene, &hit)));
@@ -180,7 +180,7 @@ const MIDDLE: Vec2 = vec2(0.8 / 2.6, 1.0 / 2.6);
 
 /// A slanted triangle of this `size` some way from the origin and a copy of it, whose corners start elsewhere or turn the other
 /// way: both in one level, or the copy placed by an instance.
-fn coplanar(size: f32, from_origin: Vec3, turned: bool, instanced: bool) -> Scene {
+fn coplanar(size: f32, from_origin: Vec3, turned: bool, instanced: bool) -> Loaded {
     let [a, b] = [vec3(-1.0, -0.55, 0.8), vec3(0.9, 0.25, -0.3)];
     let [a, b, c] = [a, b, -0.8 * (a + b)].map(|p| from_origin + size * p);
     let copy = if turned { [a, c, b] } else { [b, c, a] };
@@ -196,7 +196,7 @@ fn coplanar(size: f32, from_origin: Vec3, turned: bool, instanced: bool) -> Scen
 
 /// Of `count` rays that leave points of the first triangle in all directions, or `upward` where it looks, those that meet the
 /// other one. Rays start at `times` their distance from the plane.
-fn copies_met(scene: &Scene, count: usize, times: f32, upward: bool) -> usize {
+fn copies_met(scene: &Loaded, count: usize, times: f32, upward: bool) -> usize {
     let instance = if scene.instances.is_empty() { NONE } else { 0 };
     let root = scene.instances.first().map(|placed| placed.root);
     let triangle = root.map_or(0, |root| scene.nodes[root as usize].primitive_base);
@@ -264,7 +264,7 @@ fn shadow_rays_end_before_the_lamp() {
 }
 
 /// A box that is one big emitter: every path of d edges gathers E (1 + rho + ... + rho^(d - 1)).
-fn furnace(rho: f32, depth: u32, transform: &str) -> Scene {
+fn furnace(rho: f32, depth: u32, transform: &str) -> Loaded {
     Workplace::new().scene(&format!(
         "[film]\nwidth = 16\nheight = 16\n[camera]\nposition = [0.2, -0.1, 0.3]\ntarget = [0.0, 0.0, -1.0]\nfov = 90.0\n\
          [render]\nmax_depth = {depth}\n[[material]]\nname = 'wall'\ncolor = {rho}\nemission = 1.0\n\
@@ -288,7 +288,7 @@ fn furnace_radiance_is_exact() {
     assert!(!estimate.is((1.0 - 0.5f64.powi(5)) / 0.5), "control: another albedo is seen, {estimate:?}");
 }
 
-fn ball_in_sky(albedo: f32) -> Scene {
+fn ball_in_sky(albedo: f32) -> Loaded {
     Workplace::new().scene(&format!(
         "[film]\nwidth = 16\nheight = 16\n[camera]\nposition = [0.0, 0.0, 4.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 40.0\n\
          [render]\nmax_depth = 4\n[environment]\nradiance = 1.0\n[[material]]\nname = 'white'\ncolor = {albedo}\n\
@@ -308,7 +308,7 @@ fn white_convex_object_vanishes_in_a_white_sky() {
 }
 
 /// A white ball of few facets and smooth normals, which fills a third of the picture, in a white sky.
-fn coarse_ball_in_sky(material: &str, segments: u32) -> Scene {
+fn coarse_ball_in_sky(material: &str, segments: u32) -> Loaded {
     Workplace::new().scene(&format!(
         "[film]\nwidth = 24\nheight = 24\n[camera]\nposition = [0.0, 0.7, 3.9]\ntarget = [0.0, 0.0, 0.0]\nfov = 40.0\n\
          [render]\nmax_depth = 2\n[environment]\nradiance = 1.0\n[[material]]\nname = 'white'\n{material}\n\
@@ -335,7 +335,7 @@ fn rims_of_coarse_smooth_meshes_stay_bright() {
 }
 
 /// A room with a slanted area light (`lamp` goes on with its material, `width` below 0 mirrors it), a coat, glossy metal and, behind a gap, a sky with a sun in it.
-fn room(lamp: &str, width: f32) -> Scene {
+fn room(lamp: &str, width: f32) -> Loaded {
     let place = Workplace::new().sky("sky.exr", 64, 32, |x, y| if (x, y) == (20, 6) { 200.0 } else { 0.5 });
     let place = place.picture("mask.png", 16, |x, y| [if x + y < 16 { 255 } else { 20 }; 3]);
     let place = place.picture("waves.png", 16, |x, y| [(x * 7 % 16 * 8 + y * 5 % 16 * 8) as u8; 3]);
@@ -358,20 +358,22 @@ fn room(lamp: &str, width: f32) -> Scene {
 fn large_lamps_are_sampled_by_solid_angle() {
     let scene = under_a_panel();
     assert!(scene.large_lamps);
-    let by_area = Scene { large_lamps: false, ..scene.clone() };
+    let mut by_area = scene.clone();
+    by_area.large_lamps = false;
     let [near, far] = [&scene, &by_area].map(|s| mean(s, Strategy::Light, 256));
     let [both, bsdf] = [Strategy::Both, Strategy::Bsdf].map(|strategy| mean(&scene, strategy, 256));
     assert!(near.agrees(&far) && near.agrees(&both) && near.agrees(&bsdf), "{near:?} {far:?} {both:?} {bsdf:?}");
     assert!(near.error < 0.8 * far.error, "{near:?} {far:?}");
     // Control: one density for the choice, the other for the weight.
-    let other = Scene { triangle_pdf_scale: 0.25 * scene.triangle_pdf_scale, ..scene };
+    let mut other = scene;
+    other.triangle_pdf_scale *= 0.25;
     let wrong = mean(&other, Strategy::Both, 256);
     assert!(!wrong.agrees(&near), "control: {wrong:?} {near:?}");
 }
 
 #[test]
 fn either_way_to_find_light_gives_the_same_picture() {
-    let compared = |scene: &Scene| {
+    let compared = |scene: &Loaded| {
         let strategies = [Strategy::Both, Strategy::Light, Strategy::Bsdf];
         let [both, light, bsdf] = strategies.map(|strategy| mean(scene, strategy, 1024));
         assert!(both.agrees(&light) && both.agrees(&bsdf), "both {both:?}\nlight {light:?}\nBSDF {bsdf:?}");

@@ -2,19 +2,19 @@
 use crate::twin::*;
 use glam::{DVec3, Vec3, vec3};
 use tallow::layout::{LIGHT_SPHERE, LIGHT_TRIANGLE, NONE, SPHERE};
-use tallow::scene::Scene;
+use tallow::scene::{Loaded, Scene};
 use tallow::twins::path::Strategy;
 use tallow::twins::surface::{Surface, surface_at};
 use tallow::twins::traverse::{Hit, traverse, traverse_from};
 
 const FAR: f32 = 3e38;
 
-fn closest(scene: &Scene, origin: Vec3, direction: Vec3) -> Hit {
+fn closest(scene: &Loaded, origin: Vec3, direction: Vec3) -> Hit {
     traverse(scene, origin, direction, FAR, false, 0)
 }
 
 /// Distance along a unit direction to the nearest of all spheres, in 64 bits; `None` where a graze is too near to tell.
-fn nearest(scene: &Scene, origin: Vec3, direction: Vec3) -> Option<f64> {
+fn nearest(scene: &Loaded, origin: Vec3, direction: Vec3) -> Option<f64> {
     let (origin, direction) = (origin.as_dvec3(), direction.as_dvec3().normalize());
     let mut best = f64::INFINITY;
     for t in &scene.triangles {
@@ -32,7 +32,7 @@ fn nearest(scene: &Scene, origin: Vec3, direction: Vec3) -> Option<f64> {
 }
 
 /// Rays whose hit is elsewhere than in 64 bits, and rays that hit.
-fn misjudged(scene: &Scene) -> (usize, usize) {
+fn misjudged(scene: &Loaded) -> (usize, usize) {
     let mut random = Random::new(5);
     let (mut wrong, mut hits) = (0, 0);
     for _ in 0..20_000 {
@@ -77,7 +77,7 @@ const PLACES: [&str; 6] = [
 ];
 
 /// One ball: placed, or an instance that is placed once more; with a texture and a height map, so that all of it is asked.
-fn placed(place: &str, instance: bool, more: &str) -> Scene {
+fn placed(place: &str, instance: bool, more: &str) -> Loaded {
     let picture = Workplace::new().picture("p.png", 8, |x, y| [(20 * x + 8 * y) as u8, 0, 0]);
     let material = "[[material]]\nname = 'm'\ncolor_texture = 'p.png'\nbump = 'p.png'\nbump_scale = 0.2\n";
     let copy = "[[instance]]\nmesh = 'b'\ntransform = { scale = [0.6, 1.0, -0.8], rotate = [10.0, 0.0, 50.0] }\n";
@@ -88,7 +88,7 @@ fn placed(place: &str, instance: bool, more: &str) -> Scene {
 }
 
 /// Largest differences between the surfaces that rays meet: in position, normal, mapped normal and texture coordinates.
-fn apart(exact: &Scene, mesh: &Scene) -> [f32; 4] {
+fn apart(exact: &Loaded, mesh: &Loaded) -> [f32; 4] {
     let mut random = Random::new(9);
     let (mut worst, mut met) = ([0f32; 4], 0);
     for i in 0..6000 {
@@ -178,7 +178,7 @@ fn spheres_of_any_size_anywhere_do_not_meet_themselves() {
 }
 
 /// A floor of albedo 1/2 below a lamp of radius `radius`, seen from beside; one pixel at the foot of the lamp.
-fn lamp_over_floor(lamp: &str, more: &str) -> Scene {
+fn lamp_over_floor(lamp: &str, more: &str) -> Loaded {
     Workplace::new().scene(&format!(
         "[film]\nwidth = 2\nheight = 2\nfilter = 'point'\n[camera]\nposition = [4.0, 0.5, 0.0]\ntarget = [0.0, 0.0, 0.0]\n\
          fov = 0.01\n[render]\nmax_depth = 2\n[[material]]\nname = 'lamp'\ncolor = 0.0\nemission = 3.0\n\
@@ -221,7 +221,7 @@ fn a_sphere_lamp_lights_by_the_square_of_its_sine() {
 }
 
 /// Lights by kind of a scene's only lamp.
-fn kinds(scene: &Scene) -> [usize; 2] {
+fn kinds(scene: &Loaded) -> [usize; 2] {
     [LIGHT_SPHERE, LIGHT_TRIANGLE].map(|kind| scene.lights.iter().filter(|l| l.kind == kind).count())
 }
 
@@ -278,7 +278,7 @@ fn a_glass_ball_keeps_no_light() {
 fn radii_are_refused_where_numbers_end() {
     let load = |place: &str| {
         let text = format!("[environment]\n[[mesh]]\nshape = 'sphere'\ntransform = {place}\n");
-        Scene::parse(std::path::Path::new("s.toml"), &text, &|_| {})
+        Scene::parse(std::path::Path::new("s.toml"), &text)
     };
     assert!(load("{ scale = 2e12 }").unwrap_err().to_string().contains("the limit is 1e12"));
     assert!(load("{ scale = 9e11, translate = [2e11, 0, 0] }").is_err());

@@ -15,7 +15,7 @@ use tallow::layout::{self, Effects, NONE, RayHit, RayQuery, TraversePush};
 use tallow::math::warp::{basis_from_normal, warp_cosine_hemisphere};
 use tallow::render::settings::Settings;
 use tallow::render::{Outputs, Renderer};
-use tallow::scene::Scene;
+use tallow::scene::{Loaded, Scene};
 use tallow::shaders::shared;
 use tallow::twins::light::INFINITE_DISTANCE;
 use tallow::twins::sampler::{sample_2d, sampler_start};
@@ -43,7 +43,7 @@ const RAYS_GPU: u32 = 16;
 type Found = (f32, u32);
 
 /// The bounce of the ray through pixel `i`, from the hall of Sponza towards its far end; `None` where that leaves the scene.
-fn bounce(scene: &Scene, i: u32) -> Option<RayQuery> {
+fn bounce(scene: &Loaded, i: u32) -> Option<RayQuery> {
     let [low, high] = scene.bounds.map(Vec3::from);
     let eye = low + (high - low) * Vec3::new(0.2, 0.3, 0.5);
     let random = sampler_start(i, 0, 1, true);
@@ -70,7 +70,7 @@ struct Host {
 }
 
 impl Host {
-    fn new(scene: &Scene, rays: &[RayQuery]) -> Result<Self> {
+    fn new(scene: &Loaded, rays: &[RayQuery]) -> Result<Self> {
         let triangle = |t: &layout::Triangle| RtTriangle::new(t.v0.into(), t.v1.into(), t.v2.into());
         let ray = |r: &RayQuery| Ray::new_inf(Vec3A::from(r.origin), Vec3A::from(r.direction));
         let nodes = scene.nodes.iter().map(|n| bytemuck::cast(*n)).collect();
@@ -117,7 +117,7 @@ struct Device {
 }
 
 impl Device {
-    fn new(scene: &Scene, rays: &[RayQuery]) -> Result<Self> {
+    fn new(scene: &Loaded, rays: &[RayQuery]) -> Result<Self> {
         let gpu =
             Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), ..DeviceOptions::default() })?;
         // obvhs knows no masks, so neither side tests them.
@@ -127,7 +127,7 @@ impl Device {
         Ok(Self {
             frame: FrameResources::new(&gpu)?,
             kernel: Kernel::new(&gpu, &constants)?,
-            renderer: Renderer::specialised(&gpu, scene, Outputs::default(), effects)?,
+            renderer: Renderer::specialised(&gpu, scene, &scene.settings, Outputs::default(), effects)?,
             rays: Buffer::from_slice(&gpu, "rays", rays)?,
             hits: Buffer::new(&gpu, "hits", rays.len(), Location::Device)?,
             root: scene.root,
@@ -187,7 +187,8 @@ fn main() -> Result<()> {
     };
     let rounds = std::env::args().nth(1).map_or(Ok(7), |n| n.parse()).context("ROUNDS is a number")?;
     let small = |s: &mut Settings| (s.width, s.height, s.spp) = (16, 16, 1);
-    let scene = Scene::load(&Path::new(&data).join("scenes/crytek-sponza/sponza.obj"), &small)?;
+    let scene =
+        Scene::load(&Path::new(&data).join("scenes/crytek-sponza/sponza.obj")).map(|scene| scene.with(&small))?;
     let rays: Vec<_> = (0..SIDE * SIDE).into_par_iter().filter_map(|i| bounce(&scene, i)).collect();
     ensure!(rays.len() as u32 > SIDE * SIDE * 9 / 10, "the camera sees little of the scene");
     let host = Host::new(&scene, &rays)?;

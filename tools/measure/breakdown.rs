@@ -49,12 +49,14 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
 }
 
 fn one(gpu: &Gpu, args: &Args, view: &View) -> anyhow::Result<Milliseconds> {
-    let scene = Scene::load(&view.scene_file(&args.data, &args.output)?, &|s| {
-        [s.width, s.height] = view.size;
-        (s.max_depth, s.spp) = (view.depth, 1);
+    let scene = Scene::load(&view.scene_file(&args.data, &args.output)?).map(|scene| {
+        scene.with(|s| {
+            [s.width, s.height] = view.size;
+            (s.max_depth, s.spp) = (view.depth, 1);
+        })
     })?;
     let outputs = Outputs { guides: true, split_light: true, counters: false };
-    let renderer = Renderer::new(gpu, &scene, outputs)?;
+    let renderer = Renderer::new(gpu, &scene, &scene.settings, outputs)?;
     let row = filter::find("atrous").expect("a row of the table");
     let denoiser = Denoiser::new(gpu, &renderer, row, &FilterSettings::default(), Demodulation::Light)?;
     let mut frame = FrameResources::new(gpu)?;

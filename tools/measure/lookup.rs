@@ -13,7 +13,7 @@ use tallow::image::Picture;
 use tallow::layout::{Effects, Guide, vec3, vec4};
 use tallow::render::{Outputs, Renderer, frame_constants};
 use tallow::report::table;
-use tallow::scene::Scene;
+use tallow::scene::{Loaded, Scene};
 use tallow::twins::guide_lookup::{GuideRays, eye_hit};
 use tallow::twins::path::{Strategy, Tracer};
 
@@ -51,11 +51,13 @@ fn one(gpu: &Gpu, args: &Args, view: &View) -> anyhow::Result<()> {
     let best = sweep::best(row, noisy.start(), error)?;
     let filtered = noisy.run(gpu, row, &best.settings)?;
 
-    let scene = Scene::load(&view.scene_file(&args.data, &args.output)?, &|s| {
-        [s.width, s.height] = view.size;
-        s.max_depth = view.depth;
+    let scene = Scene::load(&view.scene_file(&args.data, &args.output)?).map(|scene| {
+        scene.with(|s| {
+            [s.width, s.height] = view.size;
+            s.max_depth = view.depth;
+        })
     })?;
-    let renderer = Renderer::new(gpu, &scene, Outputs::default())?;
+    let renderer = Renderer::new(gpu, &scene, &scene.settings, Outputs::default())?;
     let lost = lost(&scene, renderer.effects(), &noisy.parts.input.guide, &filtered);
     let lost_pixels: Vec<bool> = lost.iter().map(|&share| share > LOST).collect();
 
@@ -101,8 +103,8 @@ fn line(light: &str, image: &str, case: &Case, lost: &[bool], picture: &Picture)
 }
 
 /// Per pixel, the share of its eye rays for which none of the guide rays stands that they may choose from.
-fn lost(scene: &Scene, effects: &Effects, guide: &[Guide], filtered: &[vec4]) -> Vec<f32> {
-    let (frame, effects) = (frame_constants(scene), *effects);
+fn lost(scene: &Loaded, effects: &Effects, guide: &[Guide], filtered: &[vec4]) -> Vec<f32> {
+    let (frame, effects) = (frame_constants(scene, &scene.settings).unwrap(), *effects);
     let tracer = Tracer { scene, frame, effects, strategy: Strategy::Both };
     let guides = GuideRays { size: frame.size, guide, filtered };
     let is_lost = |pixel: u32, index: u32| {

@@ -6,7 +6,7 @@ use tallow::image::{self, Film, WriteOptions};
 use tallow::layout::{Guide, PixelStats, vec3, vec4};
 use tallow::render::settings::Settings;
 use tallow::render::{Job, Outputs, Renderer, Step};
-use tallow::scene::Scene;
+use tallow::scene::{Loaded, Scene};
 use tallow::statistics::Pixel;
 
 pub mod geometry;
@@ -28,12 +28,12 @@ pub struct Rendered {
 
 impl View {
     /// The scene with these settings.
-    pub fn load(&self, args: &Args, change: impl Fn(&mut Settings)) -> anyhow::Result<Scene> {
+    pub fn load(&self, args: &Args, change: impl Fn(&mut Settings)) -> anyhow::Result<Loaded> {
         let all = |s: &mut Settings| {
             ([s.width, s.height], s.max_depth, s.roulette_depth) = (self.size, self.depth, 0);
             change(s);
         };
-        Ok(Scene::load(&self.scene_file(&args.data, &args.output)?, &all)?)
+        Ok(Scene::load(&self.scene_file(&args.data, &args.output)?).map(|scene| scene.with(&all))?)
     }
 
     /// Means of radiance and of indirect irradiance over many samples of another seed, kept in a file.
@@ -70,8 +70,9 @@ const ONE_OF_EACH: [fn(&Step) -> bool; 5] = [
 ];
 
 /// Renders a scene by its settings, after one run of each kernel that does not count: drivers compile on it.
-pub fn render(gpu: &Gpu, scene: &Scene) -> anyhow::Result<Rendered> {
-    let renderer = Renderer::new(gpu, scene, Outputs { split_light: true, guides: true, counters: false })?;
+pub fn render(gpu: &Gpu, scene: &Loaded) -> anyhow::Result<Rendered> {
+    let renderer =
+        Renderer::new(gpu, scene, &scene.settings, Outputs { split_light: true, guides: true, counters: false })?;
     let mut frame = FrameResources::new(gpu)?;
     for kind in ONE_OF_EACH {
         renderer.steps().find(|step| kind(step)).map_or(Ok(Vec::new()), |step| renderer.run(&mut frame, &step))?;

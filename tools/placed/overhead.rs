@@ -44,7 +44,7 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
                 (spp, &tallow::allocate::geometry::ROW, 1, 1);
             s.allocate.geometry.window = window;
         })?;
-        Ok(Renderer::new(gpu, &scene, Outputs { split_light: true, guides: true, counters: false })?)
+        Ok(Renderer::new(gpu, &scene, &scene.settings, Outputs { split_light: true, guides: true, counters: false })?)
     };
     let allocation = |r: &Renderer| -> anyhow::Result<(f64, f64)> {
         let steps: Vec<Step> = r.steps().filter(|s| matches!(s, Step::Allocate(_))).collect();

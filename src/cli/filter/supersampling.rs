@@ -7,7 +7,7 @@ use crate::layout::vec3;
 use crate::render::provenance::Provenance;
 use crate::render::settings::{Allocate, Settings};
 use crate::render::{Outputs, Renderer};
-use crate::scene::Scene;
+use crate::scene::{Loaded, Scene};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -40,9 +40,10 @@ impl Supersampling {
         let of_image = |what| Error::input(image, what);
         let provenance = Provenance::of(aovs.film).map_err(of_image)?;
         let settings = settings(aovs, &provenance).map_err(of_image)?;
-        let scene = Scene::load(path, &|s| *s = settings.clone())?;
-        provenance.shows(&scene).map_err(of_image)?;
-        let renderer = Renderer::new(gpu, &scene, Outputs::default())?;
+        settings.validate()?;
+        let Loaded { scene, .. } = Scene::load(path)?;
+        provenance.shows(&scene, &settings).map_err(of_image)?;
+        let renderer = Renderer::new(gpu, &scene, &settings, Outputs::default())?;
         let (guide, light) = (filtered.guide().read()?, filtered.light().read()?);
         renderer.look_up(&guide, &light, self.eye_rays).map(Some)
     }

@@ -56,8 +56,8 @@ fn geometry(sources: &mut Sources, scene: &mut Scene) -> Result<hierarchy::Range
     let plan = plan::plan(sources)?;
     let mut geometry = Geometry::default();
     let stored = store::store(sources, &plan, &mut geometry)?;
-    scene.fingerprint.add(&geometry.triangles);
-    scene.fingerprint.add(&geometry.shading);
+    scene.content.add(&geometry.triangles);
+    scene.content.add(&geometry.shading);
     let ranges = hierarchy::build(sources, &plan, stored, &mut geometry, scene)?;
     (scene.triangles, scene.shading) = (geometry.triangles, geometry.shading);
     Ok(ranges)
@@ -80,7 +80,7 @@ fn add_materials(mut library: Library, scene: &mut Scene) -> Vec<String> {
 
 /// Adds to the fingerprint what surfaces and lights look like; the rest of them is derived from that.
 fn add_appearance(scene: &mut Scene) {
-    let fingerprint = &mut scene.fingerprint;
+    let fingerprint = &mut scene.content;
     fingerprint.add(&scene.materials);
     fingerprint.add(&scene.textures);
     fingerprint.add(&scene.texels);

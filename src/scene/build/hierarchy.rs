@@ -80,8 +80,8 @@ fn lower_levels(
             let (material, object) = (copy.material.unwrap_or(NONE), scene.names.objects.len() as u32);
             let placed = Instance { material, object, ..instance(&copy.affine, root) };
             // Nodes are counted differently by another builder, triangles are not.
-            scene.fingerprint.add(&[Instance { root: mesh.range.start as u32, ..placed }]);
-            scene.fingerprint.add(&[mesh.range.end as u32]);
+            scene.content.add(&[Instance { root: mesh.range.start as u32, ..placed }]);
+            scene.content.add(&[mesh.range.end as u32]);
             scene.instances.push(placed);
             scene.names.objects.extend(mesh.objects.iter().cloned());
         }

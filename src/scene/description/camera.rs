@@ -1,6 +1,5 @@
 //! From the `[camera]` table and the film's shape to the camera that kernels read.
 use crate::layout;
-use crate::render::settings::Settings;
 use crate::scene::MAX_COORDINATE;
 use glam::{DMat4, DVec3};
 use serde::Deserialize;
@@ -49,12 +48,12 @@ pub struct Camera {
 type Frame = (DVec3, [DVec3; 3]);
 
 impl Camera {
-    /// The device's camera for a film of `settings`' shape, looking at a scene of these bounds if nothing else is said.
+    /// The device's camera for a film of (width, height) pixels, looking at a scene of these bounds if nothing else is said.
     ///
     /// # Errors
     /// A sentence that names the key at fault.
-    pub fn build(&self, settings: &Settings, bounds: [[f32; 3]; 2]) -> Result<layout::Camera, String> {
-        let (tan_x, tan_y) = self.half_tangents(settings)?;
+    pub fn build(&self, size: [u32; 2], bounds: [[f32; 3]; 2]) -> Result<layout::Camera, String> {
+        let (tan_x, tan_y) = self.half_tangents(size)?;
         let (position, [right, up, forward]) = match &self.world_from_camera {
             Some(rows) => frame_from_matrix(rows)?,
             None => self.frame_from_target(bounds, tan_x.min(tan_y))?,
@@ -82,13 +81,13 @@ impl Camera {
     }
 
     /// Tangents of half the horizontal and the vertical field of view.
-    fn half_tangents(&self, settings: &Settings) -> Result<(f64, f64), String> {
+    fn half_tangents(&self, [width, height]: [u32; 2]) -> Result<(f64, f64), String> {
         let fov = self.fov.unwrap_or(40.0);
         if !(fov > 0.0 && fov < 180.0) {
             return Err(format!("fov is {fov}: choose degrees above 0 and below 180"));
         }
         let tan = (fov.to_radians() / 2.0).tan();
-        let aspect = f64::from(settings.width) / f64::from(settings.height);
+        let aspect = f64::from(width) / f64::from(height);
         let along_x = match self.fov_axis {
             FovAxis::X => true,
             FovAxis::Y => false,
@@ -145,19 +144,15 @@ fn finite(position: DVec3) -> Result<(), String> {
 mod tests {
     use super::*;
 
-    fn film(width: u32, height: u32) -> Settings {
-        Settings { width, height, ..Settings::default() }
-    }
-
     #[test]
     fn looks_at_its_target_with_a_vertical_fov() {
         let camera =
             Camera { position: Some([0.0, 0.0, 5.0]), target: Some([0.0; 3]), fov: Some(90.0), ..Camera::default() };
-        let found = camera.build(&film(200, 100), [[0.0; 3]; 2]).unwrap();
+        let found = camera.build([200, 100], [[0.0; 3]; 2]).unwrap();
         assert_eq!(found.forward, [0.0, 0.0, -1.0]);
         assert!((found.right[0] - 2.0).abs() < 1e-6 && (found.up[1] - 1.0).abs() < 1e-6);
         assert_eq!(found.focus_distance, 5.0);
-        let wide = Camera { fov_axis: FovAxis::Larger, ..camera }.build(&film(200, 100), [[0.0; 3]; 2]).unwrap();
+        let wide = Camera { fov_axis: FovAxis::Larger, ..camera }.build([200, 100], [[0.0; 3]; 2]).unwrap();
         assert!((wide.right[0] - 1.0).abs() < 1e-6 && (wide.up[1] - 0.5).abs() < 1e-6);
     }
 
@@ -166,7 +161,7 @@ mod tests {
         #[rustfmt::skip]
         let rows = [-2.0, 0.0, 0.0, 1.0,  0.0, 1.0, 0.0, 2.0,  0.0, 0.0, 1.0, 3.0,  0.0, 0.0, 0.0, 1.0];
         let camera = Camera { world_from_camera: Some(rows), fov: Some(90.0), ..Camera::default() };
-        let found = camera.build(&film(64, 64), [[0.0; 3]; 2]).unwrap();
+        let found = camera.build([64, 64], [[0.0; 3]; 2]).unwrap();
         assert_eq!(found.position, [1.0, 2.0, 3.0]);
         assert!((found.right[0] + 1.0).abs() < 1e-6, "the mirrored right axis points along -x");
         assert_eq!(found.forward, [0.0, 0.0, -1.0]);
@@ -174,7 +169,7 @@ mod tests {
 
     #[test]
     fn bad_cameras_are_named() {
-        let build = |c: Camera| c.build(&film(8, 8), [[0.0; 3], [1.0; 3]]);
+        let build = |c: Camera| c.build([8, 8], [[0.0; 3], [1.0; 3]]);
         assert!(build(Camera::default()).is_ok());
         assert!(build(Camera { fov: Some(180.0), ..Camera::default() }).unwrap_err().contains("fov"));
         assert!(build(Camera { near: f32::NAN, ..Camera::default() }).unwrap_err().contains("near"));
