@@ -2,7 +2,7 @@
 use crate::error::Result;
 use crate::gpu::{Buffer, DeviceInfo, Gpu, Location, PART, thread_items};
 use crate::layout::*;
-use crate::render::pass::apportion::Counts;
+use crate::render::pass::counts::Counts;
 use crate::render::schedule::Batch;
 use crate::scene::Scene;
 use std::borrow::Cow;

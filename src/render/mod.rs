@@ -13,7 +13,7 @@ mod rendered;
 mod renderer;
 mod resume;
 pub mod schedule;
-pub mod settings;
+pub use crate::scene::description::settings;
 mod supersampling;
 mod views;
 

@@ -2,7 +2,7 @@
 use super::Scene;
 use super::build::{geometry, lights};
 use crate::layout::*;
-use crate::render::settings::{PixelFilter, Sampler, Settings};
+use crate::scene::description::settings::{PixelFilter, Sampler, Settings};
 
 /// The effects of a scene with its settings, and for each one that is on the first object, material, light or setting
 /// that calls for it. `split_light`: direct and indirect light are wanted apart. `counters`: rays are counted.

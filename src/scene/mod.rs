@@ -5,7 +5,7 @@
 use crate::error::{Error, Result};
 use crate::image::input;
 use crate::layout::{AliasEntry, BvhNode, Camera, Instance, Light, Material, Shading, Texture, Triangle};
-use crate::render::settings::Settings;
+use crate::scene::description::settings::Settings;
 use crate::threads;
 use build::assemble::assemble;
 use description::Description;

@@ -1,13 +1,14 @@
 //! Guided image filter (He, Sun, Tang, ECCV 2010) on normals and depth, as Bauszat, Eisemann and Magnor (EGSR 2011) use
 //! it. Kernels: `glsl/guided_*.comp`. Its time hardly depends on the radius.
+use super::guided_pack::{BESIDE, Packed};
 use super::guided_table::GuidedTable;
 use super::pixel::{known_channel, known_radiance};
 use super::{Filter, FilterInput, FilterSettings, Planes, Row};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::layout::{Guide, GuidedPackPush, GuidedPush, vec4};
+use crate::layout::{Guide, GuidedPush, vec4};
 use crate::settings::{Is, choices, settings};
-use crate::shaders::{guided_columns, guided_mean_columns, guided_mean_rows, guided_pack, guided_rows, shared};
+use crate::shaders::{guided_columns, guided_mean_columns, guided_mean_rows, guided_rows, shared};
 use glam::{DVec3, DVec4};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -26,8 +27,6 @@ pub const ROW: Row = Row {
     reference,
 };
 
-/// Columns of a plane that lie beside each other, and rows of a strip, as in `glsl/shared/tiled_index.glsl`.
-const BESIDE: u32 = 8;
 /// `vec4`s of a pixel's record in a strip.
 const RECORD: u64 = 8;
 
@@ -72,35 +71,6 @@ fn per_channel(text: &str) -> std::result::Result<vec4, String> {
         Ok([n]) => Ok([*n; 4]),
         Ok(&[a, b, c, d]) => Ok([a, b, c, d]),
         _ => Err("expected one number, or four with commas between them".to_owned()),
-    }
-}
-
-/// What the kernels read of an image.
-pub struct Packed {
-    kernel: Kernel<guided_pack::Bind<'static>>,
-    /// Radiance and the samples behind it, all zero where nothing is known.
-    pub colour: Buffer<vec4>,
-    /// The guide.
-    pub channels: Buffer<vec4>,
-}
-
-impl Packed {
-    /// For images of (width, height).
-    pub fn new(gpu: &Gpu, settings: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
-        let pixels = width.next_multiple_of(BESIDE) as usize * height as usize;
-        Ok(Self {
-            kernel: Kernel::new(gpu, &guided_pack::Constants { channels: settings.guided.channels })?,
-            colour: Buffer::new(gpu, "colour", pixels, Location::Device)?,
-            channels: Buffer::new(gpu, "channels", pixels, Location::Device)?,
-        })
-    }
-
-    /// radiance\[P\], guide\[P\] -> colour\[P\], channels\[P\]
-    pub fn record(&self, rec: &mut Recorder, planes: &Planes, settings: &FilterSettings) -> Result<()> {
-        let (radiance, guide) = (&planes.radiance, &planes.guide);
-        let bind = guided_pack::Bind { radiance, guide, colour: &self.colour, channels: &self.channels };
-        let push = GuidedPackPush { size: planes.size, depth_scale: 1.0 / settings.edge.extent, ..Default::default() };
-        rec.dispatch(&self.kernel, bind, &push, self.kernel.groups(planes.size))
     }
 }
 

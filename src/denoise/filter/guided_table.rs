@@ -1,6 +1,6 @@
 //! The guided filter by summed-area tables, as Bauszat, Eisemann and Magnor (EGSR 2011) have it: kept to be measured
 //! against [`super::guided`], whose sums keep their digits. Kernels: `glsl/guided_table_*.comp`.
-use super::guided::Packed;
+use super::guided_pack::Packed;
 use super::{Filter, FilterSettings, Planes};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};

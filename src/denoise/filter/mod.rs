@@ -7,6 +7,7 @@ mod edge;
 pub mod firefly;
 mod footprint;
 mod guided;
+mod guided_pack;
 mod guided_table;
 mod input;
 mod noise_estimate;

@@ -18,11 +18,12 @@
 //!                  |
 //!                count
 //! ```
+use super::counts::Counts;
 use super::scan::Blocks;
 use crate::error::Result;
-use crate::gpu::{Buffer, Gpu, Location, Recorder};
-use crate::gpu::{PerBlock, block_count};
-use crate::layout::{ApportionPush, Apportionment, BlockSums, NONE, PixelStats, uvec2};
+use crate::gpu::PerBlock;
+use crate::gpu::{Buffer, Gpu, Recorder};
+use crate::layout::{ApportionPush, NONE, PixelStats};
 use crate::render::schedule::{Plan, Share};
 use crate::shaders::{
     give_remainders, lack_of_accuracy, lack_of_share, quantise_priority, quota, radix_count, radix_select,
@@ -31,48 +32,6 @@ use crate::shaders::{
 
 /// Digits of a remainder, and the values of each.
 const DIGITS: u32 = 8;
-const BINS: usize = 256;
-
-/// The counts, and what finding them takes, the offsets of the scan included.
-pub struct Counts {
-    /// 12.20 fixed point; then, unless they are shares of the next samples, what a pixel lacks.
-    pub weight: Buffer<u32>,
-    /// Samples of every pixel.
-    pub count: Buffer<u32>,
-    /// First path of every pixel, and the number of all: 64 bits, low word first. Before the scan, the remainders.
-    pub offset: Buffer<uvec2>,
-    /// One: read it for what was not finite.
-    pub state: Buffer<Apportionment>,
-    sums: Buffer<BlockSums>,
-    blocks: Buffer<uvec2>,
-    histogram: Buffer<u32>,
-}
-
-impl Counts {
-    /// Weight, count and offset.
-    pub const BYTES_PER_PIXEL: usize = 16;
-
-    /// For a film of `pixels`, and kernels whose threads have so many each.
-    ///
-    /// # Errors
-    /// [`crate::error::Error::Device`] when it does not fit.
-    pub fn new(gpu: &Gpu, pixels: u32, thread_items: u32) -> Result<Self> {
-        let (n, of_blocks) = (pixels as usize, block_count(pixels, thread_items) as usize);
-        Ok(Self {
-            weight: Buffer::new(gpu, "weight", n, Location::Device)?,
-            count: Buffer::new(gpu, "count", n, Location::Device)?,
-            offset: Buffer::new(gpu, "offset", n + 1, Location::Device)?,
-            state: Buffer::new(gpu, "apportionment", 1, Location::Device)?,
-            sums: Buffer::new(gpu, "sums", of_blocks, Location::Device)?,
-            blocks: Buffer::new(gpu, "blocks", of_blocks, Location::Device)?,
-            histogram: Buffer::from_slice(gpu, "histogram", &[0; BINS])?,
-        })
-    }
-
-    pub(super) fn blocks(&self) -> &Buffer<uvec2> {
-        &self.blocks
-    }
-}
 
 /// The kernels.
 pub struct Apportion {

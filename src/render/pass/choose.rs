@@ -1,6 +1,6 @@
 //! Turns priorities into one sample or none for every pixel. Kernel: `glsl/allocate/choose.comp`. Twin:
 //! [`crate::twins::apportion::choose`].
-use super::apportion::Counts;
+use super::counts::Counts;
 use crate::error::Result;
 use crate::gpu::{Buffer, Kernel, Recorder};
 use crate::layout::ChoosePush;

@@ -2,6 +2,7 @@
 pub(crate) mod accumulate;
 pub mod apportion;
 pub mod choose;
+pub mod counts;
 pub(crate) mod guide_lookup;
 pub(crate) mod path;
 pub(crate) mod primary_hit;

@@ -1,7 +1,7 @@
 //! Exclusive scan of the counts: where every pixel's paths start. Reduce, then scan, in three passes, with
 //! no assumption about forward progress or subgroups. Kernels: `glsl/{reduce,blocks,offsets}.comp`. Twin:
 //! [`crate::twins::apportion::offsets`].
-use super::apportion::Counts;
+use super::counts::Counts;
 use crate::error::Result;
 use crate::gpu::PerBlock;
 use crate::gpu::{Buffer, Gpu, Recorder};

@@ -12,6 +12,7 @@ pub(super) mod mesh;
 pub(super) mod shape;
 pub(super) mod value;
 
+pub mod settings;
 pub use camera::{Camera, FovAxis};
 pub use light::{LightTable, Type as LightType};
 pub use material::{Distribution, MaterialTable, Type as MaterialType};
@@ -21,9 +22,9 @@ pub use value::{Rgb, Transform};
 
 use crate::error::{Error, Result};
 use crate::image::Picture;
-use crate::render::settings::Settings;
-pub use crate::render::settings::{Allocate, Film, Render};
 use serde::Deserialize;
+use settings::Settings;
+pub use settings::{Allocate, Film, Render};
 use std::path::{Path, PathBuf};
 
 /// A whole scene file.
@@ -213,7 +214,10 @@ mod tests {
         assert_eq!(empty.settings(), Settings::default());
         let text = "[film]\nwidth = 8\nfilter = \"tent\"\n[environment]\nradiance = 2\n[[material]]\nname = \"a\"\ncolor = [1, 0.5, 0]";
         let d = parse(Path::new("s.toml"), text).unwrap();
-        assert_eq!((d.settings().width, d.settings().filter), (8, crate::render::settings::PixelFilter::Tent));
+        assert_eq!(
+            (d.settings().width, d.settings().filter),
+            (8, crate::scene::description::settings::PixelFilter::Tent)
+        );
         assert_eq!(d.environment.unwrap().radiance, Some(Rgb([2.0; 3])));
         assert_eq!(d.material[0].color, Some(Rgb([1.0, 0.5, 0.0])));
     }
