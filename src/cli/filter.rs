@@ -179,7 +179,7 @@ fn filtered(args: &Args, gpu: &Gpu, aovs: &Aovs) -> Result<(Colour, Vec<PassTime
         row: args.filter,
         demodulation: layers.holds().demodulation(demodulation(args)),
         fireflies: args.fireflies,
-        settings: &|scales| args.overrides.settings(scales.applied_to(FilterSettings::default())),
+        settings: &|scales| args.overrides.settings(FilterSettings::default().scaled_by(scales)),
     };
     let filtered = Filtered::new(gpu, layers.upload(gpu)?, &recipe)?;
     let mut notes = vec![recipe.demodulation.note().to_owned()];

@@ -245,7 +245,7 @@ fn warn_of_broken(broken: &BrokenSamples) {
 
 /// With the filter's default settings, scaled to the image.
 fn denoised(gpu: &Gpu, row: &Row, noisy: Noisy, film: &mut Film) -> Result<Vec<PassTime>> {
-    let settings = |scales: &filter::Scales| scales.applied_to(FilterSettings::default());
+    let settings = |scales: &filter::Scales| FilterSettings::default().scaled_by(scales);
     let recipe = Recipe { row, demodulation: Demodulation::default(), fireflies: None, settings: &settings };
     let (colour, times) = Filtered::new(gpu, noisy, &recipe)?.join(gpu)?;
     // The mean of the samples stays as a layer.

@@ -1,41 +1,12 @@
 //! A noisy image taken apart on the device, to be filtered and put together again. Kernels: those of `glsl/film` whose names
 //! tell of modulation. Twin: [`super::twin`].
 use super::filter::Planes;
-use super::{Holds, Noisy};
+use super::{Demodulation, Holds, Noisy};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{PackPush, SplitPush, vec3, vec4};
 use crate::shaders::shared::noisy;
 use crate::shaders::{demodulate, demodulate_direct, remodulate, remodulate_direct};
-
-/// What is kept away from the filter, where an image tells it: `colour = sharp + factor * filtered`.
-///
-/// | | filtered | factor | sharp |
-/// |---|---|---|---|
-/// | `Light` | indirect light before albedo | that albedo | direct light, emission, what smooth surfaces show |
-/// | `Albedo` | colour / albedo | albedo | what reflects nothing: lamps, sky |
-/// | `Off` | colour | 1 | nothing |
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Demodulation {
-    /// Surface colour and direct light.
-    #[default]
-    Light,
-    /// Surface colour.
-    Albedo,
-    /// Nothing.
-    Off,
-}
-
-impl Demodulation {
-    /// One line for the user.
-    pub fn note(self) -> &'static str {
-        match self {
-            Self::Light => "filtered: indirect light before albedo; direct light stays as it is",
-            Self::Albedo => "filtered: colour / albedo; what has no albedo, and its rim, stays as it is",
-            Self::Off => "filtered: the colour, without demodulation",
-        }
-    }
-}
 
 /// The kernels and planes of one image.
 pub struct Demodulated {

@@ -1,5 +1,6 @@
 //! Filtered frames: what a renderer leaves in its buffers goes through a filter in the same command buffer.
-use super::demodulated::{Demodulated, Demodulation};
+use super::demodulated::Demodulated;
+use super::demodulation::Demodulation;
 use super::noisy::Noisy;
 use crate::denoise::filter::{self, Filter, FilterSettings, Row};
 use crate::error::{Error, Result};

@@ -1,5 +1,6 @@
 //! One image filtered with scales of its own, as the command line does: of a film, or of a file.
-use super::demodulated::{Demodulated, Demodulation};
+use super::demodulated::Demodulated;
+use super::demodulation::Demodulation;
 use super::filter::firefly::{self, Removed};
 use super::filter::{self, FilterSettings, Planes, Row, Scales};
 use super::noisy::Noisy;

@@ -1,6 +1,7 @@
 //! Denoising: what turns a render into light that filters can take, the filters, and the way back. The same kernels serve the
 //! film of a renderer ([`Denoiser`], within an engine's frame) and the file of any renderer ([`Filtered`], once).
 mod demodulated;
+mod demodulation;
 mod denoiser;
 pub mod file;
 pub mod filter;
@@ -9,7 +10,7 @@ mod noisy;
 #[doc(hidden)]
 pub mod twin;
 
-pub use demodulated::Demodulation;
+pub use demodulation::Demodulation;
 pub use denoiser::Denoiser;
 pub use filtered::{Colour, Filtered, Recipe, bytes_per_pixel};
 pub use noisy::{Holds, Noisy};

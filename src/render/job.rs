@@ -126,7 +126,7 @@ impl<'a> Job<'a> {
         film.metadata.insert(resume::ALLOCATIONS.to_owned(), status.allocations.to_string());
         film::set_broken_samples(&mut film, self.broken_samples()?);
         if status.stopped == StopReason::Interrupted {
-            let pending = resume::pending(self.renderer, &film, status)?;
+            let pending = resume::pending(self.renderer, &film, status.last.as_ref())?;
             film.add(film::PENDING, Samples::U32(pending));
         }
         Ok(film)

@@ -1,7 +1,7 @@
 //! Taking up a render where it stopped: everything that it needs is in the EXR file that it wrote.
 use super::provenance::Provenance;
 use super::rendered::Rendered;
-use super::{Progress, Renderer, Status, Step, film};
+use super::{PathRange, Progress, Renderer, Step, film};
 use crate::error::{Error, Result};
 use crate::gpu::FrameResources;
 use crate::image::{self, Film};
@@ -132,12 +132,13 @@ fn allocations(film: &Film) -> std::result::Result<u32, String> {
         .ok_or_else(|| format!("has no number of {ALLOCATIONS}: take the file as tallow wrote it"))
 }
 
-/// What the pixels of an interrupted render still lack of what they were to have by then.
+/// What the pixels of an interrupted render still lack of what they were to have by then. `last`: what was traced last of the last
+/// allocation; none before the first.
 ///
 /// # Errors
 /// [`Error::Device`].
-pub(super) fn pending(renderer: &Renderer, film: &Film, status: &Status) -> Result<Vec<u32>> {
-    let Some(last) = &status.last else {
+pub(super) fn pending(renderer: &Renderer, film: &Film, last: Option<&PathRange>) -> Result<Vec<u32>> {
+    let Some(last) = last else {
         let first = schedule::first_spp(renderer.settings());
         let counts = film::counts(film, "samples").map_err(Error::Usage)?;
         return Ok(counts.iter().map(|n| first - n).collect());

@@ -221,7 +221,7 @@ fn a_film_and_its_file_become_one_picture() {
         let film = frame.film();
         let aovs = Aovs::find(&film, &Names::new()).unwrap();
         for row in FILTERS {
-            let settings = |scales: &Scales| scales.applied_to(FilterSettings::default());
+            let settings = |scales: &Scales| FilterSettings::default().scaled_by(scales);
             let recipe = Recipe { row, demodulation: Demodulation::Light, fireflies: Some(3.0), settings: &settings };
             let images = [Noisy::of_film(&renderer).unwrap(), Layers::new(&aovs).upload(&gpu).unwrap()];
             let [of_film, of_file] = images.map(|noisy| {

@@ -1,8 +1,8 @@
 //! Edge-avoiding À-Trous wavelet filter (Dammertz, Sewtz, Hanika, Lensch, HPG 2010). Kernel: `glsl/filter/atrous.comp`.
-use super::edge::{Rates, edge_weight};
+use super::edge::{EdgeSettings, Rates, edge_weight};
 use super::footprint::FootprintSettings;
 use super::pack::{Pack, Packed};
-use super::{Filter, FilterInput, FilterSettings, Planes, Row};
+use super::{Filter, FilterInput, Planes, Row};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{AtrousPush, vec4};
@@ -15,8 +15,8 @@ pub const ROW: Row = Row {
     name: "atrous",
     about: "edge-avoiding À-Trous wavelets, steered by radiance, normal and position",
     bytes: super::pack::BYTES + 16,
-    make: |gpu, settings, size| Ok(Box::new(Atrous::new(gpu, settings, size)?)),
-    reference,
+    make: |gpu, s, size| Ok(Box::new(Atrous::new(gpu, &s.edge, &s.atrous, s.footprint.levels, size)?)),
+    reference: |input, s| reference(input, &s.edge, &s.atrous, s.footprint.levels),
 };
 
 choices! {
@@ -57,18 +57,35 @@ struct Atrous {
     /// With the radiance weight, and without it for the levels that in-paint.
     kernels: [Kernel<Bind<'static>>; 2],
     scratch: Buffer<vec4>,
-    settings: FilterSettings,
+    /// One per level.
+    rates: Vec<Rates>,
+    rt_from_level: u32,
+}
+
+impl AtrousSettings {
+    /// Of a level: the sigma of radiance halves from one to the next, and the listing's of normals doubles.
+    fn rates(&self, edge: &EdgeSettings, level: u32) -> Rates {
+        let spacing = (1 << level) as f32;
+        let per_distance = if self.form == AtrousForm::Listing { spacing } else { 1.0 };
+        let sigma_rt = if level < self.rt_from_level { f32::INFINITY } else { edge.sigma_rt / spacing };
+        let scaled = EdgeSettings { sigma_rt, sigma_n: edge.sigma_n * per_distance, ..*edge };
+        Rates::new(&scaled).per_square(self.form != AtrousForm::Printed)
+    }
 }
 
 impl Atrous {
-    fn new(gpu: &Gpu, settings: &FilterSettings, size: [u32; 2]) -> Result<Self> {
+    fn new(gpu: &Gpu, edge: &EdgeSettings, own: &AtrousSettings, levels: u32, size: [u32; 2]) -> Result<Self> {
         let kernel = |level: u32| {
-            let edge = Rates::at_level(&settings.edge, &settings.atrous, level).constants();
-            Kernel::new(gpu, &Constants { edge, conserve: settings.atrous.conserve_energy })
+            Kernel::new(gpu, &Constants { edge: own.rates(edge, level).constants(), conserve: own.conserve_energy })
         };
         let pack = Pack::new(gpu, size)?;
-        let scratch = Buffer::new(gpu, "atrous", pack.colour.len(), Location::Device)?;
-        Ok(Self { pack, kernels: [kernel(0)?, kernel(settings.atrous.rt_from_level)?], scratch, settings: *settings })
+        Ok(Self {
+            kernels: [kernel(0)?, kernel(own.rt_from_level)?],
+            scratch: Buffer::new(gpu, "atrous", pack.colour.len(), Location::Device)?,
+            rates: (0..levels).map(|level| own.rates(edge, level)).collect(),
+            rt_from_level: own.rt_from_level,
+            pack,
+        })
     }
 }
 
@@ -77,16 +94,15 @@ impl Filter for Atrous {
         self.pack.record(rec, planes)?;
         let [width, height] = planes.size;
         let mut from = &self.pack.colour;
-        for level in 0..self.settings.footprint.levels {
-            let last = level + 1 == self.settings.footprint.levels;
-            let to = match last {
+        for (level, rates) in (0..).zip(&self.rates) {
+            let to = match level + 1 == self.rates.len() {
                 true => &planes.output,
                 false if level % 2 == 0 => &self.scratch,
                 false => &self.pack.colour,
             };
-            let (rates, spacing) = (Rates::at_level(&self.settings.edge, &self.settings.atrous, level), 1 << level);
+            let spacing = 1 << level;
             let push = AtrousPush { size: planes.size, spacing, rates: rates.as_array(), ..Default::default() };
-            let kernel = &self.kernels[usize::from(level >= self.settings.atrous.rt_from_level)];
+            let kernel = &self.kernels[usize::from(level >= self.rt_from_level as usize)];
             let bind = Bind { colour: from, place: &self.pack.place, filtered: to };
             let columns = height.div_ceil(ROWS as u32 * spacing) * spacing;
             rec.dispatch(kernel, bind, &push, kernel.groups([width, columns]))?;
@@ -96,40 +112,44 @@ impl Filter for Atrous {
     }
 }
 
+/// One level over an image.
+struct Level<'a> {
+    image: &'a [Packed],
+    size: [i64; 2],
+    spacing: i64,
+    rates: Rates,
+    conserve: bool,
+}
+
 /// Every level in turn, tap by tap.
-fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
-    let mut image = Packed::reference(input);
-    for level in 0..settings.footprint.levels {
-        let rates = Rates::at_level(&settings.edge, &settings.atrous, level);
-        let pixel = |at: usize| filtered(&image, [input.width, input.height], at, 1 << level, &rates, settings);
-        image = (0..image.len()).map(pixel).collect();
+fn reference(input: &FilterInput, edge: &EdgeSettings, own: &AtrousSettings, levels: u32) -> Vec<vec4> {
+    let (mut image, size) = (Packed::reference(input), [input.width, input.height].map(i64::from));
+    for level in 0..levels {
+        let (rates, conserve) = (own.rates(edge, level), own.conserve_energy);
+        let filter = Level { image: &image, size, spacing: 1 << level, rates, conserve };
+        image = (0..image.len()).map(|at| filter.filtered(at)).collect();
     }
     image.iter().map(Packed::output).collect()
 }
 
-fn filtered(
-    image: &[Packed],
-    [width, height]: [u32; 2],
-    at: usize,
-    spacing: i64,
-    rates: &Rates,
-    settings: &FilterSettings,
-) -> Packed {
-    const B3: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
-    let (x, y) = (at as i64 % i64::from(width), at as i64 / i64::from(width));
-    let p = image[at];
-    let (mut sum, mut total) = (Vec3::ZERO, 0.0);
-    for (i, j) in (-2i64..=2).flat_map(|i| (-2i64..=2).map(move |j| (i, j))) {
-        let (u, v) = (x + i * spacing, y + j * spacing);
-        if (0..i64::from(width)).contains(&u) && (0..i64::from(height)).contains(&v) {
-            let q = image[(v * i64::from(width) + u) as usize];
-            let h = B3[i.unsigned_abs() as usize] * B3[j.unsigned_abs() as usize];
-            let trust = if settings.atrous.conserve_energy { 1.0 } else { q.count.min(MOST_SAMPLES).sqrt() };
-            let w = h * trust * edge_weight(&q, rates.exponent(&p, &q));
-            sum += w * (q.colour - p.colour);
-            total += w;
+impl Level<'_> {
+    fn filtered(&self, at: usize) -> Packed {
+        const B3: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
+        let ([width, height], p) = (self.size, self.image[at]);
+        let (x, y) = (at as i64 % width, at as i64 / width);
+        let (mut sum, mut total) = (Vec3::ZERO, 0.0);
+        for (i, j) in (-2i64..=2).flat_map(|i| (-2i64..=2).map(move |j| (i, j))) {
+            let (u, v) = (x + i * self.spacing, y + j * self.spacing);
+            if (0..width).contains(&u) && (0..height).contains(&v) {
+                let q = self.image[(v * width + u) as usize];
+                let h = B3[i.unsigned_abs() as usize] * B3[j.unsigned_abs() as usize];
+                let trust = if self.conserve { 1.0 } else { q.count.min(MOST_SAMPLES).sqrt() };
+                let w = h * trust * edge_weight(&q, self.rates.exponent(&p, &q));
+                sum += w * (q.colour - p.colour);
+                total += w;
+            }
         }
+        let kept = self.conserve && p.count > 0.0;
+        p.moved_by(sum, if kept { 1.0 } else { total })
     }
-    let kept = settings.atrous.conserve_energy && p.count > 0.0;
-    p.moved_by(sum, if kept { 1.0 } else { total })
 }

@@ -2,7 +2,7 @@
 //! quality. Kernel: `glsl/filter/bilateral.comp`.
 use super::edge::{Rates, edge_weight, rate};
 use super::pack::{Pack, Packed};
-use super::{Filter, FilterInput, FilterSettings, Planes, Row};
+use super::{Filter, FilterInput, Planes, Row};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{BilateralPush, vec4};
@@ -14,8 +14,8 @@ pub const ROW: Row = Row {
     name: "bilateral",
     about: "exact bilateral filter, joint with normal and position",
     bytes: super::pack::BYTES + 16,
-    make: |gpu, settings, size| Ok(Box::new(Bilateral::new(gpu, settings, size)?)),
-    reference,
+    make: |gpu, s, size| Ok(Box::new(Bilateral::new(gpu, Rates::new(&s.edge), s.footprint.radius, size)?)),
+    reference: |input, s| reference(input, &Rates::new(&s.edge), s.footprint.radius),
 };
 
 /// Pixels of a column that a thread filters.
@@ -29,17 +29,20 @@ struct Bilateral {
     kernel: Kernel<Bind<'static>>,
     /// One element where one dispatch is enough.
     sums: Buffer<vec4>,
+    /// No more than there is around a pixel.
     radius: u32,
-    settings: FilterSettings,
+    rate_space: f32,
+    rates: Rates,
 }
 
 impl Bilateral {
-    fn new(gpu: &Gpu, settings: &FilterSettings, size: [u32; 2]) -> Result<Self> {
-        let (pack, radius) = (Pack::new(gpu, size)?, settings.footprint.radius.min(size[0].max(size[1]) - 1));
+    fn new(gpu: &Gpu, rates: Rates, radius: u32, size: [u32; 2]) -> Result<Self> {
+        let (pack, rate_space) = (Pack::new(gpu, size)?, rate_space(radius));
+        let radius = radius.min(size[0].max(size[1]) - 1);
         let banded = bands(radius).0 > 1;
-        let kernel = Kernel::new(gpu, &Constants { edge: Rates::new(&settings.edge).constants(), bands: banded })?;
+        let kernel = Kernel::new(gpu, &Constants { edge: rates.constants(), bands: banded })?;
         let sums = Buffer::new(gpu, "sums", if banded { pack.colour.len() } else { 1 }, Location::Device)?;
-        Ok(Self { pack, kernel, sums, radius, settings: *settings })
+        Ok(Self { pack, kernel, sums, radius, rate_space, rates })
     }
 }
 
@@ -51,8 +54,8 @@ fn bands(radius: u32) -> (u32, u32) {
 }
 
 /// Of a Gaussian whose standard deviation is half the radius.
-fn rate_space(settings: &FilterSettings) -> f32 {
-    rate(settings.footprint.radius.max(1) as f32 * std::f32::consts::FRAC_1_SQRT_2)
+fn rate_space(radius: u32) -> f32 {
+    rate(radius.max(1) as f32 * std::f32::consts::FRAC_1_SQRT_2)
 }
 
 impl Filter for Bilateral {
@@ -63,8 +66,8 @@ impl Filter for Bilateral {
         let push = BilateralPush {
             size: planes.size,
             radius: self.radius,
-            rate_space: rate_space(&self.settings),
-            rates: Rates::new(&self.settings.edge).as_array(),
+            rate_space: self.rate_space,
+            rates: self.rates.as_array(),
             band: 0,
             band_rows,
             ..Default::default()
@@ -78,10 +81,10 @@ impl Filter for Bilateral {
     }
 }
 
-fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
+fn reference(input: &FilterInput, rates: &Rates, radius: u32) -> Vec<vec4> {
     let image = Packed::reference(input);
-    let (rates, space) = (Rates::new(&settings.edge), rate_space(settings));
-    let (width, height, radius) = (input.width as i64, input.height as i64, i64::from(settings.footprint.radius));
+    let space = rate_space(radius);
+    let (width, height, radius) = (input.width as i64, input.height as i64, i64::from(radius));
     let pixel = |at: usize| {
         let (x, y) = (at as i64 % width, at as i64 / width);
         let p = image[at];

@@ -1,5 +1,4 @@
 //! How alike two pixels are. Twin of `glsl/shared/edge.glsl`.
-use super::atrous::{AtrousForm, AtrousSettings};
 use super::pack::Packed;
 use crate::layout::vec3;
 use crate::settings::{FINITE_ABOVE_0, FROM_0, settings};
@@ -50,13 +49,9 @@ impl Rates {
         Self { rt: rate(s.sigma_rt * s.intensity), n: rate(s.sigma_n), x: rate(s.sigma_x * s.extent), squared: true }
     }
 
-    /// On a level of EAW: the sigma of radiance halves, and the listing's of normals doubles.
-    pub fn at_level(s: &EdgeSettings, atrous: &AtrousSettings, level: u32) -> Self {
-        let spacing = (1 << level) as f32;
-        let per_distance = if atrous.form == AtrousForm::Listing { spacing } else { 1.0 };
-        let sigma_rt = if level < atrous.rt_from_level { f32::INFINITY } else { s.sigma_rt / spacing };
-        let scaled = EdgeSettings { sigma_rt, sigma_n: s.sigma_n * per_distance, ..*s };
-        Self { squared: atrous.form != AtrousForm::Printed, ..Self::new(&scaled) }
+    /// The same, per squared difference or per plain one.
+    pub fn per_square(self, squared: bool) -> Self {
+        Self { squared, ..self }
     }
 
     /// Without the weight of radiance.

@@ -7,8 +7,6 @@ mod edge;
 pub mod firefly;
 mod footprint;
 mod guided;
-mod guided_pack;
-mod guided_table;
 mod input;
 mod noise_estimate;
 mod none;

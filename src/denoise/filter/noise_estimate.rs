@@ -1,7 +1,7 @@
 //! What is known of each pixel's noise. Kernel: `glsl/filter/noise_estimate.comp`. Twin: [`reference`].
-use super::edge::{Rates, edge_weight};
+use super::edge::{EdgeSettings, Rates, edge_weight};
 use super::pack::{Pack, Packed};
-use super::{FilterInput, FilterSettings, Planes};
+use super::{FilterInput, Planes};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{SvgfPush, vec3, vec4};
@@ -17,6 +17,7 @@ const REACH: i64 = noise_estimate::REACH as i64;
 pub struct Estimate {
     kernels: [Kernel<Bind<'static>>; 2],
     nothing: Buffer<vec3>,
+    rates: Rates,
     /// Radiance, and the variance of its luminance; -1 where nothing is known.
     pub plane: Buffer<vec4>,
 }
@@ -26,19 +27,20 @@ impl Estimate {
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when it does not fit.
-    pub fn new(gpu: &Gpu, settings: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
-        let kernel =
-            |measured| Kernel::new(gpu, &Constants { edge: Rates::of_surfaces(&settings.edge).constants(), measured });
+    pub fn new(gpu: &Gpu, edge: &EdgeSettings, [width, height]: [u32; 2]) -> Result<Self> {
+        let rates = Rates::of_surfaces(edge);
+        let kernel = |measured| Kernel::new(gpu, &Constants { edge: rates.constants(), measured });
         Ok(Self {
             kernels: [kernel(false)?, kernel(true)?],
             nothing: Buffer::from_slice(gpu, "no variance", &[])?,
             plane: Buffer::new(gpu, "estimate", width as usize * height as usize, Location::Device)?,
+            rates,
         })
     }
 
     /// colour\[P\], place\[P\], variance\[P\] -> plane\[P\]
-    pub fn record(&self, rec: &mut Recorder, planes: &Planes, pack: &Pack, settings: &FilterSettings) -> Result<()> {
-        let rates = Rates::of_surfaces(&settings.edge).as_array();
+    pub fn record(&self, rec: &mut Recorder, planes: &Planes, pack: &Pack) -> Result<()> {
+        let rates = self.rates.as_array();
         let push = SvgfPush { size: planes.size, spacing: 1, rate_l: 0.0, rates, ..Default::default() };
         let variance = planes.variance.as_ref().unwrap_or(&self.nothing);
         let bind = Bind { colour: &pack.colour, place: &pack.place, variance, estimate: &self.plane };
@@ -58,8 +60,8 @@ pub fn contrast(a: Vec3, b: Vec3) -> f32 {
 }
 
 /// The variance of every pixel's luminance; -1 where nothing is known.
-pub fn reference(input: &FilterInput, image: &[Packed], settings: &FilterSettings) -> Vec<f32> {
-    let rates = Rates::of_surfaces(&settings.edge);
+pub fn reference(input: &FilterInput, image: &[Packed], edge: &EdgeSettings) -> Vec<f32> {
+    let rates = Rates::of_surfaces(edge);
     let variance = |at: usize| {
         let measured = input.variance.as_ref().map(|v| Vec3::from(v[at]));
         match measured.filter(|v| v.is_finite() && v.min_element() >= 0.0) {

@@ -2,7 +2,7 @@
 //! of kernels. Largest values do not depend on the order in which pixels are looked at, so that windows of planes tell the same as
 //! whole images.
 use super::pixel::known_radiance;
-use super::{EdgeSettings, FilterInput, FilterSettings, Planes};
+use super::{EdgeSettings, FilterInput, Planes};
 use crate::denoise::windows;
 use crate::error::Result;
 use crate::gpu::Buffer;
@@ -74,13 +74,12 @@ impl Scales {
         }
     }
 
-    /// `settings` with `intensity` and `extent` of the image: its largest known channel, and the diagonal of the box around the
+    /// `edge` with `intensity` and `extent` of the image: its largest known channel, and the diagonal of the box around the
     /// hits, or where there are no positions the largest depth. 1 where there is nothing to measure.
-    pub fn applied_to(&self, settings: FilterSettings) -> FilterSettings {
+    pub fn applied_to(&self, edge: EdgeSettings) -> EdgeSettings {
         let usable = |v: f32| if v.is_normal() && v > 0.0 { v } else { 1.0 };
         let diagonal = if self.low.x <= self.high.x { (self.high - self.low).length() } else { 0.0 };
         let extent = usable(if diagonal > 0.0 { diagonal } else { self.deepest });
-        let edge = EdgeSettings { intensity: usable(self.brightest), extent, ..settings.edge };
-        FilterSettings { edge, ..settings }
+        EdgeSettings { intensity: usable(self.brightest), extent, ..edge }
     }
 }

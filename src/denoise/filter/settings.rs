@@ -38,8 +38,13 @@ impl FilterSettings {
         self
     }
 
-    /// The same with `intensity` and `extent` taken from an image: see [`Scales::applied_to`].
+    /// The same with `intensity` and `extent` of an image: see [`Scales::applied_to`].
+    pub fn scaled_by(self, scales: &Scales) -> Self {
+        Self { edge: scales.applied_to(self.edge), ..self }
+    }
+
+    /// The same for this image.
     pub fn scaled_to(self, input: &FilterInput) -> Self {
-        Scales::of(input).applied_to(self)
+        self.scaled_by(&Scales::of(input))
     }
 }

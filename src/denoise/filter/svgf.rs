@@ -1,9 +1,9 @@
 //! À-Trous wavelets steered by each pixel's variance: the spatial half of SVGF (Schied et al., HPG 2017). Kernel:
 //! `glsl/filter/svgf.comp`.
-use super::edge::{Rates, edge_weight};
+use super::edge::{EdgeSettings, Rates, edge_weight};
 use super::noise_estimate::{self, Estimate, contrast};
 use super::pack::{Pack, Packed};
-use super::{Filter, FilterInput, FilterSettings, Planes, Row};
+use super::{Filter, FilterInput, Planes, Row};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{SvgfPush, vec4};
@@ -17,14 +17,9 @@ pub const ROW: Row = Row {
     name: "svgf",
     about: "À-Trous wavelets whose radiance weight counts in each pixel's standard deviations",
     bytes: super::pack::BYTES + 32, // estimate and scratch
-    make: |gpu, settings, size| Ok(Box::new(Svgf::new(gpu, settings, size)?)),
-    reference,
+    make: |gpu, s, size| Ok(Box::new(Svgf::new(gpu, &s.edge, &s.svgf, s.footprint.levels, size)?)),
+    reference: |input, s| reference(input, &s.edge, &s.svgf, s.footprint.levels),
 };
-
-/// Per standard deviation, in base 2; finite also over a deviation of [`LEAST_DEVIATION`].
-fn rate_l(settings: &FilterSettings) -> f32 {
-    (LOG2_E / settings.svgf.sigma_l).min(1e8)
-}
 
 /// Stands for 0, so that equal pixels are alike where nothing varies.
 const LEAST_DEVIATION: f32 = 1e-30;
@@ -47,26 +42,42 @@ struct Svgf {
     /// All levels but the last, and the last.
     kernels: [Kernel<Bind<'static>>; 2],
     scratch: Buffer<vec4>,
-    settings: FilterSettings,
+    rates: Rates,
+    rate_l: f32,
+    levels: u32,
+}
+
+impl SvgfSettings {
+    /// Per standard deviation, in base 2; finite also over a deviation of [`LEAST_DEVIATION`].
+    fn rate_l(&self) -> f32 {
+        (LOG2_E / self.sigma_l).min(1e8)
+    }
 }
 
 impl Svgf {
-    fn new(gpu: &Gpu, settings: &FilterSettings, size: [u32; 2]) -> Result<Self> {
-        let kernel = |last| Kernel::new(gpu, &Constants { edge: Rates::of_surfaces(&settings.edge).constants(), last });
+    fn new(gpu: &Gpu, edge: &EdgeSettings, own: &SvgfSettings, levels: u32, size: [u32; 2]) -> Result<Self> {
+        let rates = Rates::of_surfaces(edge);
+        let kernel = |last| Kernel::new(gpu, &Constants { edge: rates.constants(), last });
         let pack = Pack::new(gpu, size)?;
-        let scratch = Buffer::new(gpu, "svgf", pack.colour.len(), Location::Device)?;
-        let estimate = Estimate::new(gpu, settings, size)?;
-        Ok(Self { pack, estimate, kernels: [kernel(false)?, kernel(true)?], scratch, settings: *settings })
+        Ok(Self {
+            estimate: Estimate::new(gpu, edge, size)?,
+            kernels: [kernel(false)?, kernel(true)?],
+            scratch: Buffer::new(gpu, "svgf", pack.colour.len(), Location::Device)?,
+            rates,
+            rate_l: own.rate_l(),
+            levels,
+            pack,
+        })
     }
 }
 
 impl Filter for Svgf {
     fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
         self.pack.record(rec, planes)?;
-        self.estimate.record(rec, planes, &self.pack, &self.settings)?;
+        self.estimate.record(rec, planes, &self.pack)?;
         let mut from = &self.estimate.plane;
-        for level in 0..self.settings.footprint.levels {
-            let last = level + 1 == self.settings.footprint.levels;
+        for level in 0..self.levels {
+            let last = level + 1 == self.levels;
             let to = match last {
                 true => &planes.output,
                 false if level % 2 == 0 => &self.scratch,
@@ -75,8 +86,8 @@ impl Filter for Svgf {
             let push = SvgfPush {
                 size: planes.size,
                 spacing: 1 << level,
-                rate_l: rate_l(&self.settings),
-                rates: Rates::of_surfaces(&self.settings.edge).as_array(),
+                rate_l: self.rate_l,
+                rates: self.rates.as_array(),
                 ..Default::default()
             };
             let bind = Bind { estimate: from, place: &self.pack.place, colour: &self.pack.colour, filtered: to };
@@ -91,40 +102,63 @@ impl Filter for Svgf {
 /// A pixel with the variance of its luminance, -1 where it is unknown.
 type Noisy = (Packed, f32);
 
-fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
+/// One level over an image.
+struct Level<'a> {
+    image: &'a [Noisy],
+    size: [i64; 2],
+    spacing: i64,
+    rates: Rates,
+    rate_l: f32,
+}
+
+fn reference(input: &FilterInput, edge: &EdgeSettings, own: &SvgfSettings, levels: u32) -> Vec<vec4> {
     let packed = Packed::reference(input);
-    let noise = noise_estimate::reference(input, &packed, settings);
+    let noise = noise_estimate::reference(input, &packed, edge);
     let mut image: Vec<Noisy> = packed.into_iter().zip(noise).collect();
-    for level in 0..settings.footprint.levels {
+    let (rates, rate_l) = (Rates::of_surfaces(edge), own.rate_l());
+    for level in 0..levels {
         let size = [i64::from(input.width), i64::from(input.height)];
-        image = (0..image.len()).map(|at| filtered(&image, size, at, 1 << level, settings)).collect();
+        let filter = Level { image: &image, size, spacing: 1 << level, rates, rate_l };
+        image = (0..image.len()).map(|at| filter.filtered(at)).collect();
     }
     image.iter().map(|(pixel, _)| pixel.output()).collect()
 }
 
-fn filtered(image: &[Noisy], [width, height]: [i64; 2], at: usize, spacing: i64, settings: &FilterSettings) -> Noisy {
-    const B3: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
-    let (p, noise) = image[at];
-    let tap = |i: i64, j: i64| {
+impl Level<'_> {
+    /// The pixel so many columns and rows away, if it is in the image.
+    fn tap(&self, at: usize, i: i64, j: i64) -> Option<&Noisy> {
+        let [width, height] = self.size;
         let (u, v) = (at as i64 % width + i, at as i64 / width + j);
-        ((0..width).contains(&u) && (0..height).contains(&v)).then(|| &image[(v * width + u) as usize])
-    };
-    let around = |reach: i64| (-reach..=reach).flat_map(move |i| (-reach..=reach).map(move |j| (i, j)));
-    let near = around(1).filter_map(|(i, j)| Some((tap(i, j)?, 1.0 / (4 << (i.abs() + j.abs())) as f32)));
-    let (total, sum) = near
-        .filter(|((_, variance), _)| *variance >= 0.0)
-        .fold((0.0, 0.0), |(total, sum), ((_, variance), w)| (total + w, sum + w * variance));
-    let rate = rate_l(settings) / (f32::sqrt(sum / total) + LEAST_DEVIATION);
-    let rates = Rates::of_surfaces(&settings.edge);
-    let (mut sum, mut total, mut spread) = (Vec3::ZERO, 0.0, 0.0);
-    for (i, j) in around(2) {
-        let Some((q, variance)) = tap(i * spacing, j * spacing) else { continue };
-        let steps = if noise >= 0.0 { rate * contrast(q.colour, p.colour).abs() } else { 0.0 };
-        let exponent = rates.exponent(&p, q) - steps;
-        let w = B3[i.unsigned_abs() as usize] * B3[j.unsigned_abs() as usize] * edge_weight(q, exponent);
-        sum += w * (q.colour - p.colour);
-        total += w;
-        spread += w * w * variance;
+        ((0..width).contains(&u) && (0..height).contains(&v)).then(|| &self.image[(v * width + u) as usize])
     }
-    (p.moved_by(sum, total), if total > 0.0 { spread / (total * total) } else { noise })
+
+    /// Per difference of luminance, in base 2, from the smoothed variance around a pixel.
+    fn rate_at(&self, at: usize) -> f32 {
+        let near = around(1).filter_map(|(i, j)| Some((self.tap(at, i, j)?, 1.0 / (4 << (i.abs() + j.abs())) as f32)));
+        let (total, sum) = near
+            .filter(|((_, variance), _)| *variance >= 0.0)
+            .fold((0.0, 0.0), |(total, sum), ((_, variance), w)| (total + w, sum + w * variance));
+        self.rate_l / (f32::sqrt(sum / total) + LEAST_DEVIATION)
+    }
+
+    fn filtered(&self, at: usize) -> Noisy {
+        const B3: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
+        let ((p, noise), rate) = (self.image[at], self.rate_at(at));
+        let (mut sum, mut total, mut spread) = (Vec3::ZERO, 0.0, 0.0);
+        for (i, j) in around(2) {
+            let Some((q, variance)) = self.tap(at, i * self.spacing, j * self.spacing) else { continue };
+            let steps = if noise >= 0.0 { rate * contrast(q.colour, p.colour).abs() } else { 0.0 };
+            let exponent = self.rates.exponent(&p, q) - steps;
+            let w = B3[i.unsigned_abs() as usize] * B3[j.unsigned_abs() as usize] * edge_weight(q, exponent);
+            sum += w * (q.colour - p.colour);
+            total += w;
+            spread += w * w * variance;
+        }
+        (p.moved_by(sum, total), if total > 0.0 { spread / (total * total) } else { noise })
+    }
+}
+
+/// Steps to the neighbours, column by column.
+fn around(reach: i64) -> impl Iterator<Item = (i64, i64)> {
+    (-reach..=reach).flat_map(move |i| (-reach..=reach).map(move |j| (i, j)))
 }

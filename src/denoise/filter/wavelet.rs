@@ -6,7 +6,7 @@
 //! neighbours, where Fattal keeps the weights of the way down.
 use super::edge::{Rates, edge_weight};
 use super::pack::{Pack, Packed};
-use super::{Filter, FilterInput, FilterSettings, Planes, Row};
+use super::{Filter, FilterInput, Planes, Row};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{WaveletPush, vec4};
@@ -19,8 +19,11 @@ pub const ROW: Row = Row {
     name: "wavelet",
     about: "decimated wavelets, CDF(2,2) or red-black, edge-avoiding where there are weights",
     bytes: super::pack::BYTES + 16,
-    make: |gpu, settings, size| Ok(Box::new(Wavelet::new(gpu, settings, size)?)),
-    reference,
+    make: |gpu, s, size| {
+        let steps = steps(s.footprint.levels, s.wavelet.basis);
+        Ok(Box::new(Wavelet::new(gpu, Rates::new(&s.edge), steps, size)?))
+    },
+    reference: |input, s| reference(input, Rates::new(&s.edge), steps(s.footprint.levels, s.wavelet.basis)),
 };
 
 /// Neighbours by stencil: along rows, along columns, side by side, diagonally.
@@ -31,13 +34,16 @@ const AROUND: [&[[i64; 2]]; 4] = [
     &[[-1, -1], [1, -1], [-1, 1], [1, 1]],
 ];
 
-/// Every lifting step: (spacing, stencil, whether it goes back).
-fn steps(settings: &FilterSettings) -> Vec<(u32, u32, bool)> {
-    let stencils = match settings.wavelet.basis {
+/// A lifting step: (spacing, stencil, whether it goes back).
+type Lifting = (u32, u32, bool);
+
+/// All of them in turn.
+fn steps(levels: u32, basis: WaveletBasis) -> Vec<Lifting> {
+    let stencils = match basis {
         WaveletBasis::Cdf22 => [0, 1],
         WaveletBasis::RedBlack => [2, 3],
     };
-    let forward: Vec<_> = (0..settings.footprint.levels).flat_map(|l| stencils.map(|s| (1 << l, s, false))).collect();
+    let forward: Vec<_> = (0..levels).flat_map(|l| stencils.map(|s| (1 << l, s, false))).collect();
     let back: Vec<_> = forward.iter().rev().map(|&(spacing, stencil, _)| (spacing, stencil, true)).collect();
     [forward, back].concat()
 }
@@ -70,30 +76,30 @@ struct Wavelet {
     /// Forward, then back.
     kernels: [Kernel<Bind<'static>>; 2],
     scratch: Buffer<vec4>,
-    settings: FilterSettings,
+    rates: Rates,
+    steps: Vec<Lifting>,
 }
 
 impl Wavelet {
-    fn new(gpu: &Gpu, settings: &FilterSettings, size: [u32; 2]) -> Result<Self> {
-        let kernel = |inverse| Kernel::new(gpu, &Constants { edge: Rates::new(&settings.edge).constants(), inverse });
+    fn new(gpu: &Gpu, rates: Rates, steps: Vec<Lifting>, size: [u32; 2]) -> Result<Self> {
+        let kernel = |inverse| Kernel::new(gpu, &Constants { edge: rates.constants(), inverse });
         let pack = Pack::new(gpu, size)?;
         let scratch = Buffer::new(gpu, "wavelet", pack.colour.len(), Location::Device)?;
-        Ok(Self { pack, kernels: [kernel(false)?, kernel(true)?], scratch, settings: *settings })
+        Ok(Self { pack, kernels: [kernel(false)?, kernel(true)?], scratch, rates, steps })
     }
 }
 
 impl Filter for Wavelet {
     fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
         self.pack.record(rec, planes)?;
-        let steps = steps(&self.settings);
         let mut from = &self.pack.colour;
-        for (i, (spacing, stencil, inverse)) in steps.iter().copied().enumerate() {
-            let to = match i + 1 == steps.len() {
+        for (i, (spacing, stencil, inverse)) in self.steps.iter().copied().enumerate() {
+            let to = match i + 1 == self.steps.len() {
                 true => &planes.output,
                 false if i % 2 == 0 => &self.scratch,
                 false => &self.pack.colour,
             };
-            let rates = Rates::new(&self.settings.edge).as_array();
+            let rates = self.rates.as_array();
             let push = WaveletPush { size: planes.size, spacing, stencil, rates, ..Default::default() };
             let bind = Bind { colour: from, place: &self.pack.place, filtered: to };
             let kernel = &self.kernels[usize::from(inverse)];
@@ -113,11 +119,10 @@ struct Step<'a> {
     rates: Rates,
 }
 
-fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
+fn reference(input: &FilterInput, rates: Rates, steps: Vec<Lifting>) -> Vec<vec4> {
     let mut image = Packed::reference(input);
     let size = [i64::from(input.width), i64::from(input.height)];
-    for (spacing, stencil, inverse) in steps(settings) {
-        let rates = Rates::new(&settings.edge);
+    for (spacing, stencil, inverse) in steps {
         let step = Step { image: &image, size, spacing: i64::from(spacing), stencil: stencil as usize, rates };
         image = (0..image.len()).map(|at| step.lifted(at as i64, inverse)).collect();
     }

@@ -141,7 +141,7 @@ impl Auto {
             Kernel::new(gpu, &auto_smooth::Constants { edge, three })
         };
         Ok(Self {
-            estimate: Estimate::new(gpu, settings, size)?,
+            estimate: Estimate::new(gpu, &settings.edge, size)?,
             inputs: Kernel::new(gpu, &Default::default())?,
             leverage: Kernel::new(gpu, &Default::default())?,
             error: Kernel::new(gpu, &Default::default())?,
@@ -274,7 +274,7 @@ impl Auto {
 impl Filter for Auto {
     fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
         self.pack.record(rec, planes)?;
-        self.estimate.record(rec, planes, &self.pack, &self.settings)?;
+        self.estimate.record(rec, planes, &self.pack)?;
         self.record_candidates(rec, planes)?;
         self.record_smoothing(rec, planes, [[&self.leverages; 3], [&self.surroundings; 3]], false)?;
         self.record_errors(rec, planes)?;

@@ -75,7 +75,7 @@ impl Results {
 /// The twin.
 pub fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
     let (image, floor) = (Packed::reference(input), floor(settings));
-    let noise = noise_estimate::reference(input, &image, settings);
+    let noise = noise_estimate::reference(input, &image, &settings.edge);
     let results = Results::new(input, &image, settings);
     let rates = Rates::of_surfaces(&alike(&settings.edge));
     let size = [input.width, input.height].map(i64::from);

@@ -1,30 +1,32 @@
 //! Guided image filter (He, Sun, Tang, ECCV 2010) on normals and depth, as Bauszat, Eisemann and Magnor (EGSR 2011) use
 //! it. Kernels: `glsl/guided_*.comp`. Its time hardly depends on the radius.
-use super::guided_pack::{BESIDE, Packed};
-use super::guided_table::GuidedTable;
-use super::pixel::{known_channel, known_radiance};
-use super::{Filter, FilterInput, FilterSettings, Planes, Row};
+mod pack;
+mod reference;
+mod table;
+
+use super::{Filter, Planes, Row};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::layout::{Guide, GuidedPush, vec4};
+use crate::layout::{GuidedPush, vec4};
 use crate::settings::{Is, choices, settings};
 use crate::shaders::{guided_columns, guided_mean_columns, guided_mean_rows, guided_rows, shared};
-use glam::{DVec3, DVec4};
-use rayon::prelude::*;
-use std::ops::Range;
+use pack::{BESIDE, Packed};
+use table::GuidedTable;
 
 /// See [`super::FILTERS`].
 pub const ROW: Row = Row {
     name: "guided",
     about: "guided image filter: light as a local linear function of normal and depth",
     bytes: 96, // colours, channels and four planes of models; tables are of small images
-    make: |gpu, settings, size| {
-        Ok(match settings.guided.sums {
-            GuidedSums::Blocks => Box::new(Guided::new(gpu, settings, size)?),
-            GuidedSums::Table => Box::new(GuidedTable::new(gpu, settings, size)?),
+    make: |gpu, s, size| {
+        let pack = Packed::new(gpu, s.guided.channels, s.edge.extent, size)?;
+        let (radius, eps) = (s.footprint.radius, s.guided.eps);
+        Ok(match s.guided.sums {
+            GuidedSums::Blocks => Box::new(Guided::new(gpu, pack, radius, eps, size)?),
+            GuidedSums::Table => Box::new(GuidedTable::new(gpu, pack, radius, eps, size)?),
         })
     },
-    reference,
+    reference: |input, s| reference::reference(input, &s.guided, s.footprint.radius, s.edge.extent),
 };
 
 /// `vec4`s of a pixel's record in a strip.
@@ -87,7 +89,8 @@ struct Guided {
     down: Walk,
     along: Walk,
     strip_rows: u32,
-    settings: FilterSettings,
+    radius: u32,
+    eps: vec4,
 }
 
 /// How windows along a line are summed, by `glsl/shared/windows.glsl`.
@@ -133,9 +136,8 @@ impl Walk {
 }
 
 impl Guided {
-    fn new(gpu: &Gpu, settings: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
-        let [down, along] = [height, width].map(|edge| Walk::new(gpu, settings.footprint.radius, edge));
-        let pack = Packed::new(gpu, settings, [width, height])?;
+    fn new(gpu: &Gpu, pack: Packed, radius: u32, eps: vec4, [width, height]: [u32; 2]) -> Result<Self> {
+        let [down, along] = [height, width].map(|edge| Walk::new(gpu, radius, edge));
         let strip_rows =
             strip_rows(gpu.tuning().strip_bytes, gpu.info().max_storage_range, down.window, [width, height]);
         let plane = |name| Buffer::new(gpu, name, pack.colour.len(), Location::Device);
@@ -156,24 +158,18 @@ impl Guided {
             down,
             along,
             strip_rows,
-            settings: *settings,
+            radius,
+            eps,
             pack,
         })
     }
 
     /// Columns, then rows of every strip: (push, workgroups of the two).
     fn strips(&self, size: [u32; 2]) -> impl Iterator<Item = (GuidedPush, [[u32; 3]; 2])> {
-        let ([width, height], settings, strip) = (size, self.settings, self.strip_rows);
+        let ([width, height], radius, eps, strip) = (size, self.radius, self.eps, self.strip_rows);
         (0..height).step_by(strip as usize).map(move |first_row| {
             let rows = strip.min(height - first_row);
-            let push = GuidedPush {
-                size,
-                first_row,
-                rows,
-                radius: settings.footprint.radius,
-                eps: settings.guided.eps,
-                ..Default::default()
-            };
+            let push = GuidedPush { size, first_row, rows, radius, eps, ..Default::default() };
             (push, [self.down.groups(width, rows), self.along.groups(rows, width)])
         })
     }
@@ -212,109 +208,10 @@ fn strip_rows(target: u64, limit: u64, window: u32, [width, height]: [u32; 2]) -
 
 impl Filter for Guided {
     fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
-        self.pack.record(rec, planes, &self.settings)?;
+        self.pack.record(rec, planes)?;
         self.record_models(rec, planes.size)?;
         self.record_means(rec, planes)
     }
-}
-
-/// A pixel in double precision.
-struct Pixel {
-    colour: Option<DVec3>,
-    guide: DVec4,
-}
-
-/// A window's model, with the value at the window's centre.
-#[derive(Clone, Copy)]
-struct Model {
-    slopes: [DVec4; 3],
-    mean: DVec3,
-    mean_guide: DVec4,
-}
-
-/// Window by window, in double precision: the definition.
-fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
-    let pixel = |(c, g): (&vec4, &Guide)| Pixel {
-        colour: known_radiance(*c).map(|c| c.as_dvec3()),
-        guide: channels(g, settings),
-    };
-    let pixels: Vec<Pixel> = input.radiance.iter().zip(&input.guide).map(pixel).collect();
-    let size = [input.width, input.height];
-    let models: Vec<Option<Model>> = (0..pixels.len())
-        .into_par_iter()
-        .map(|at| model(&pixels, window(size, at, settings.footprint.radius), settings))
-        .collect();
-    let mean = |at: usize| {
-        let values = window(size, at, settings.footprint.radius).filter_map(|k| models[k]).map(|m| {
-            let off = pixels[at].guide - m.mean_guide;
-            m.mean + DVec3::from(m.slopes.map(|slope| slope.dot(off)))
-        });
-        let (count, sum) = values.fold((0.0, DVec3::ZERO), |(n, sum), v| (n + 1.0, sum + v));
-        let own = pixels[at].colour.map(|c| c.as_vec3().extend(input.radiance[at][3]));
-        let value = (sum / count).as_vec3();
-        // A model that no float can hold, or no known pixel in reach: the pixel stays as it is.
-        match value.is_finite() {
-            true => value.extend(own.map_or(1.0, |own| own.w)).into(),
-            false => own.unwrap_or_default().into(),
-        }
-    };
-    (0..pixels.len()).into_par_iter().map(mean).collect()
-}
-
-fn channels(g: &Guide, settings: &FilterSettings) -> DVec4 {
-    let n = glam::Vec3::from(g.normal.map(known_channel)) * 0.5;
-    let depth = known_channel(g.depth * (1.0 / settings.edge.extent));
-    match settings.guided.channels {
-        1 => glam::vec4((n.x + n.y + n.z) / 3.0, 0.0, 0.0, 0.0),
-        3 => n.extend(0.0),
-        _ => n.extend(depth),
-    }
-    .as_dvec4()
-}
-
-/// Indices of the pixels of a window, clipped to the image.
-fn window([width, height]: [u32; 2], at: usize, radius: u32) -> impl Iterator<Item = usize> {
-    let (x, y) = (at as u32 % width, at as u32 / width);
-    let around = move |v: u32, edge: u32| -> Range<u32> { v.saturating_sub(radius)..(v + radius + 1).min(edge) };
-    around(y, height).flat_map(move |v| around(x, width).map(move |u| (v * width + u) as usize))
-}
-
-fn model(pixels: &[Pixel], window: impl Iterator<Item = usize>, settings: &FilterSettings) -> Option<Model> {
-    let known: Vec<(DVec3, DVec4)> =
-        window.filter_map(|k| pixels[k].colour.map(|colour| (colour, pixels[k].guide))).collect();
-    let share = 1.0 / known.len().max(1) as f64;
-    let mean = known.iter().map(|(c, _)| c * share).sum::<DVec3>();
-    let mean_guide = known.iter().map(|(_, g)| g * share).sum::<DVec4>();
-    let (mut guide, mut colour) = ([[0.0; 4]; 4], [DVec4::ZERO; 3]);
-    for (c, g) in &known {
-        let (off, c) = (*g - mean_guide, *c - mean);
-        for i in 0..4 {
-            (0..4).for_each(|j| guide[i][j] += off[i] * off[j] * share);
-        }
-        (0..3).for_each(|i| colour[i] += off * c[i] * share);
-    }
-    (0..4).for_each(|i| guide[i][i] += f64::from(settings.guided.eps[i]));
-    (!known.is_empty()).then(|| Model { slopes: colour.map(|rhs| solve(guide, rhs)), mean, mean_guide })
-}
-
-/// Gaussian elimination without exchanges, for symmetric matrices that are not negative; a channel that the others
-/// explain takes no part.
-fn solve(mut a: [[f64; 4]; 4], mut rhs: DVec4) -> DVec4 {
-    let diagonal = [0, 1, 2, 3].map(|i| a[i][i]);
-    let usable = |i: usize, pivot: f64| pivot > 1e-5 * diagonal[i] && pivot > 1e-20;
-    for i in 0..4 {
-        for j in i + 1..4 {
-            let factor = if usable(i, a[i][i]) { a[j][i] / a[i][i] } else { 0.0 };
-            (i..4).for_each(|k| a[j][k] -= factor * a[i][k]);
-            rhs[j] -= factor * rhs[i];
-        }
-    }
-    let mut x = DVec4::ZERO;
-    for i in (0..4).rev() {
-        let rest: f64 = (i + 1..4).map(|k| a[i][k] * x[k]).sum();
-        x[i] = if usable(i, a[i][i]) { (rhs[i] - rest) / a[i][i] } else { 0.0 };
-    }
-    x
 }
 
 #[cfg(test)]

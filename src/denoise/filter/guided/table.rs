@@ -1,7 +1,7 @@
 //! The guided filter by summed-area tables, as Bauszat, Eisemann and Magnor (EGSR 2011) have it: kept to be measured
 //! against [`super::guided`], whose sums keep their digits. Kernels: `glsl/guided_table_*.comp`.
-use super::guided_pack::Packed;
-use super::{Filter, FilterSettings, Planes};
+use super::pack::Packed;
+use crate::denoise::filter::{Filter, Planes};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{GuidedPush, vec4};
@@ -24,7 +24,8 @@ pub struct GuidedTable {
     /// Summed along rows, and then down columns too.
     rows: Buffer<vec4>,
     table: Buffer<vec4>,
-    settings: FilterSettings,
+    radius: u32,
+    eps: vec4,
 }
 
 impl GuidedTable {
@@ -32,8 +33,7 @@ impl GuidedTable {
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when the tables, 128 bytes per pixel, do not fit.
-    pub fn new(gpu: &Gpu, settings: &FilterSettings, size: [u32; 2]) -> Result<Self> {
-        let pack = Packed::new(gpu, settings, size)?;
+    pub fn new(gpu: &Gpu, pack: Packed, radius: u32, eps: vec4, size: [u32; 2]) -> Result<Self> {
         let plane = |name| Buffer::new(gpu, name, pack.colour.len(), Location::Device);
         let table =
             |name| Buffer::new(gpu, name, size[0] as usize * size[1] as usize * MOMENTS as usize, Location::Device);
@@ -46,7 +46,8 @@ impl GuidedTable {
             model: [plane("slope_r")?, plane("slope_g")?, plane("slope_b")?, plane("value")?],
             rows: table("rows")?,
             table: table("table")?,
-            settings: *settings,
+            radius,
+            eps,
             pack,
         })
     }
@@ -54,7 +55,7 @@ impl GuidedTable {
 
 impl Filter for GuidedTable {
     fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
-        let ([width, height], radius, eps) = (planes.size, self.settings.footprint.radius, self.settings.guided.eps);
+        let ([width, height], radius, eps) = (planes.size, self.radius, self.eps);
         let [slope_r, slope_g, slope_b, value] = &self.model;
         let Packed { colour, channels, .. } = &self.pack;
         let (rows, table, filtered) = (&self.rows, &self.table, &planes.output);
@@ -63,7 +64,7 @@ impl Filter for GuidedTable {
         let lines = self.moments.groups([height, 1]);
         let pixels = self.models.groups([width, height]);
         let columns = |record: u32| (push(record * width), self.columns.groups([record * width, 1]));
-        self.pack.record(rec, planes, &self.settings)?;
+        self.pack.record(rec, planes)?;
 
         let bind = guided_table_moments::Bind { colour, channels, table: rows };
         rec.dispatch(&self.moments, bind, &push(width), lines)?;

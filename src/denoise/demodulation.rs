@@ -1,0 +1,30 @@
+//! Which part of an image's light goes through a filter.
+
+/// What is kept away from the filter, where an image tells it: `colour = sharp + factor * filtered`.
+///
+/// | | filtered | factor | sharp |
+/// |---|---|---|---|
+/// | `Light` | indirect light before albedo | that albedo | direct light, emission, what smooth surfaces show |
+/// | `Albedo` | colour / albedo | albedo | what reflects nothing: lamps, sky |
+/// | `Off` | colour | 1 | nothing |
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Demodulation {
+    /// Surface colour and direct light.
+    #[default]
+    Light,
+    /// Surface colour.
+    Albedo,
+    /// Nothing.
+    Off,
+}
+
+impl Demodulation {
+    /// One line for the user.
+    pub fn note(self) -> &'static str {
+        match self {
+            Self::Light => "filtered: indirect light before albedo; direct light stays as it is",
+            Self::Albedo => "filtered: colour / albedo; what has no albedo, and its rim, stays as it is",
+            Self::Off => "filtered: the colour, without demodulation",
+        }
+    }
+}
