@@ -11,7 +11,7 @@ pub mod twin;
 
 pub use demodulated::Demodulation;
 pub use denoiser::Denoiser;
-pub use filtered::{Colour, Filtered, Recipe, bytes_per_pixel};
+pub use filtered::{Colour, Filtered, Recipe, bytes_per_pixel, host_bytes};
 pub use noisy::{Holds, Noisy};
 
 use std::ops::Range;
