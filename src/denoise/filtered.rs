@@ -8,6 +8,8 @@ use super::windows;
 use crate::error::Result;
 use crate::gpu::{Buffer, FrameResources, Gpu, PassTime, Recorder};
 use crate::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
+use crate::render::film;
+use crate::render::settings::Settings;
 
 /// How an image is to be filtered.
 pub struct Recipe<'a> {
@@ -100,6 +102,13 @@ pub fn bytes_per_pixel(row: &Row) -> u64 {
     let planes = size_of::<Guide>() + 5 * size_of::<vec4>() + size_of::<vec3>();
     let taken_from = size_of::<PixelStats>() + size_of::<PixelLight>();
     planes as u64 + row.bytes.max(taken_from as u64)
+}
+
+/// Bytes of host memory that filtering the film of a render takes at most once its renderer is gone: the film that was read
+/// back, the filtered colour, and where the device is `unified`, as for [`film::host_bytes`], its buffers too.
+pub fn host_bytes(row: &Row, settings: &Settings, unified: bool) -> u64 {
+    let device = if unified { bytes_per_pixel(row) } else { 0 };
+    film::host_bytes(settings, false) + settings.pixels() as u64 * (device + size_of::<vec3>() as u64)
 }
 
 /// The filter's own buffers last no longer than this.

@@ -12,7 +12,7 @@ pub mod twin;
 
 pub use demodulation::Demodulation;
 pub use denoiser::Denoiser;
-pub use filtered::{Colour, Filtered, Recipe, bytes_per_pixel};
+pub use filtered::{Colour, Filtered, Recipe, bytes_per_pixel, host_bytes};
 pub use noisy::{Holds, Noisy};
 
 use std::ops::Range;

@@ -98,6 +98,7 @@ mod scene;
 pub use allocate::*;
 pub use constants::*;
 pub use effects::*;
+#[doc(hidden)] // what the filters tell their own kernels; tests tell the same to their CPU twins
 pub use filter::*;
 pub use path::*;
 pub use pixel::*;

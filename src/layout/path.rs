@@ -69,6 +69,7 @@ gpu_structs! {
     }
 
     /// A ray for `traverse.comp`.
+    #[doc(hidden)] // tests and benches alone use it
     struct RayQuery {
         /// World units.
         origin: vec3,
@@ -81,6 +82,7 @@ gpu_structs! {
     }
 
     /// What `traverse.comp` finds.
+    #[doc(hidden)] // tests and benches alone use it
     struct RayHit {
         /// In lengths of the ray's direction; its `t_max` on a miss.
         t: float,
@@ -93,6 +95,7 @@ gpu_structs! {
     }
 
     /// Push constants of `traverse.comp`.
+    #[doc(hidden)] // tests and benches alone use it
     struct TraversePush {
         /// Rays.
         count: uint,
@@ -103,6 +106,7 @@ gpu_structs! {
     }
 
     /// Push block of the kernels under glsl/test.
+    #[doc(hidden)] // tests and benches alone use it
     struct TestPush {
         /// Threads with work to do.
         count: uint,

@@ -186,8 +186,6 @@ pub struct FilmBuffers {
     /// (pixel, sample index) of the paths in flight, where samples are placed.
     pub paths: Buffer<uvec2>,
     /// Per pixel, where samples are placed.
-    pub priority: Buffer<f32>,
-    /// Per pixel, where samples are placed.
     pub counts: Counts,
 }
 
@@ -204,7 +202,6 @@ impl FilmBuffers {
         let placed = |n: u32| if effects.adaptive { n } else { 1 };
         Ok(Self {
             paths: Buffer::new(gpu, "paths", placed(paths) as usize, Location::Device)?,
-            priority: Buffer::new(gpu, "priority", placed(pixels) as usize, Location::Device)?,
             counts: Counts::new(gpu, placed(pixels), thread_items(gpu, pixels))?,
             samples: Buffer::new(gpu, "samples", records, Location::Device)?,
             tiles: starts.map(tile).collect::<Result<_>>()?,
@@ -215,7 +212,7 @@ impl FilmBuffers {
 
     /// What a pixel takes where all outputs are wanted, samples in flight not counted.
     pub fn bytes_per_pixel(placed: bool) -> u64 {
-        const PLACED: usize = Counts::BYTES_PER_PIXEL + size_of::<[f32; 2]>(); // priority, and a policy's own
+        const PLACED: usize = Counts::BYTES_PER_PIXEL + size_of::<f32>(); // and a policy's own
         let records = size_of::<PixelStats>() + size_of::<PixelLight>() + size_of::<Guide>();
         (records + if placed { PLACED } else { 0 }) as u64
     }

@@ -3,7 +3,8 @@ use crate::error::Result;
 use crate::image::{Film, NOISY, Samples};
 use crate::layout::{Guide, PixelLight, PixelStats, vec3};
 use crate::memory;
-use crate::render::Renderer;
+use crate::render::settings::Settings;
+use crate::render::{FilmBuffers, Renderer};
 use crate::statistics::{BrokenSamples, Pixel, variance_of_mean};
 
 const RGB: [&str; 3] = ["R", "G", "B"];
@@ -35,6 +36,15 @@ pub(crate) fn bytes_per_pixel(placed: bool) -> u64 {
     (size_of::<f32>() * (CHANNELS + if placed { 2 } else { 0 })) as u64 // priority, pending
 }
 
+/// Bytes of host memory that a render with these settings takes at most when its film is read back, the scene not counted.
+/// `unified`: the device has no memory of its own ([`DeviceInfo::unified`](crate::gpu::DeviceInfo::unified)), so that its
+/// buffers count.
+pub fn host_bytes(settings: &Settings, unified: bool) -> u64 {
+    let placed = !settings.allocate.is_even();
+    let device = if unified { FilmBuffers::bytes_per_pixel(placed) } else { 0 };
+    settings.pixels() as u64 * (device + bytes_per_pixel(placed))
+}
+
 /// Reads the buffers back into a film with the layers that the renderer was asked for. [`super::Job::film`] adds where
 /// they come from, so that the file can be resumed and merged.
 ///
@@ -58,7 +68,7 @@ pub fn read_back(renderer: &Renderer) -> Result<Film> {
     }
     drop_remainders_of_none(&mut film);
     if !settings.allocate.is_even() {
-        film.add(PRIORITY, Samples::F32(renderer.film().priority.read()?));
+        film.add(PRIORITY, Samples::F32(renderer.film().counts.priority.read()?));
     }
     Ok(film)
 }
@@ -200,6 +210,15 @@ pub(crate) fn replace_pixels(film: &mut Film, pixels: &[Pixel]) {
     film.channels.extend(fresh.channels);
 }
 
+/// Makes `colour`, a plane a channel, the picture of a film. What it showed, the mean of its samples, stays as the layer
+/// [`NOISY`].
+pub fn replace_colour(film: &mut Film, colour: [Vec<f32>; 3]) {
+    for channel in film.channels.iter_mut().filter(|c| RGB.contains(&c.name.as_str())) {
+        channel.name = format!("{NOISY}.{}", channel.name);
+    }
+    RGB.into_iter().zip(colour).for_each(|(name, plane)| film.add(name, Samples::F32(plane)));
+}
+
 /// A layer of counts.
 ///
 /// # Errors
@@ -222,6 +241,25 @@ fn add_guide(film: &mut Film, guide: &[Guide]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_film_takes_its_records_and_its_channels() {
+        // 32 bytes of statistics, 32 of light, 48 of guide; 30 channels. Placed: 24 more, and 2 channels.
+        let mut settings = Settings { width: 3, height: 2, ..Settings::default() };
+        assert_eq!(host_bytes(&settings, true), 6 * (112 + 4 * 30));
+        settings.allocate.policy = &crate::allocate::both::ROW;
+        assert_eq!(host_bytes(&settings, false), 6 * 4 * 32);
+        assert_eq!(host_bytes(&settings, true), 6 * (112 + 24 + 4 * 32));
+    }
+
+    #[test]
+    fn a_filtered_colour_leaves_the_noisy_one_beside_it() {
+        let mut film = Film::new(1, 1);
+        add_pixels(&mut film, &[PixelStats { mean: [1.0, 2.0, 3.0], ..PixelStats::default() }], &[]);
+        replace_colour(&mut film, [4.0, 5.0, 6.0].map(|v| vec![v]));
+        assert_eq!(rgb(&film, "").unwrap(), [[4.0], [5.0], [6.0]]);
+        assert_eq!(rgb(&film, NOISY).unwrap(), [[1.0], [2.0], [3.0]]);
+    }
 
     #[test]
     fn a_film_with_everything_has_so_many_channels() {

@@ -5,6 +5,7 @@ use crate::gpu::Recorder;
 use crate::layout::{FrameConstants, NONE, PriorityPush};
 use crate::render::buffers::{DeviceScene, FilmBuffers};
 use crate::render::kernels::{Allocation, Kernels};
+use crate::render::pass::sample_list::Bind;
 use crate::render::pass::{accumulate, choose, path, primary_hit, sample_list};
 use crate::render::schedule::Step;
 
@@ -32,7 +33,11 @@ impl Frame {
     /// # Errors
     /// [`Error::Usage`] when there are none.
     pub fn allocation(&self) -> Result<&Allocation> {
-        let without = || Error::Usage("this renderer was made without the effect \"adaptive\"".into());
+        let without = || {
+            Error::Usage(
+                "this renderer was made without the effect \"adaptive\": make it with Renderer::resumable".into(),
+            )
+        };
         self.allocation.as_ref().ok_or_else(without)
     }
 }
@@ -66,23 +71,23 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
         Step::Allocate(plan) => {
             let (a, stats) = (frame.allocation()?, &film.tiles[0].stats);
             a.policy.record(rec, &inputs(film), priority_push)?; // guide[P], stats[P] -> priority[P]
-            a.apportion.record(rec, &film.priority, stats, &film.counts, plan)?; // priority[P] -> count[P]
+            a.apportion.record(rec, stats, &film.counts, plan)?; // priority[P] -> count[P]
             a.scan.record(rec, &film.counts)?; // count[P] -> offset[P + 1]
         }
         Step::Choose(choice) => {
             let (a, counts, seed) = (frame.allocation()?, &film.counts, constants.seed);
             let push = PriorityPush { round: choice.round, ..*priority_push };
             a.policy.record(rec, &inputs(film), &push)?; // stats[P] -> priority[P]
-            choose::record(&a.choose, rec, &film.priority, counts, choice, seed)?; // priority[P] -> count[P], 0 or 1
+            choose::record(&a.choose, rec, counts, choice, seed)?; // priority[P] -> count[P], 0 or 1
             a.scan.record(rec, counts)?; // count[P] -> offset[P + 1]
         }
         Step::Listed(range) => {
             let (a, push) = (frame.allocation()?, path::push_of_list(range.paths));
-            let (offset, stats, first) = (&film.counts.offset, &film.tiles[0].stats, frame.first_sample);
+            let bind = Bind { offset: &film.counts.offset, stats: &film.tiles[0].stats, paths: &film.paths };
             if a.list_may_be_short {
                 rec.fill(&film.paths, NONE)?; // NONE -> paths[B]
             }
-            sample_list::record(&a.sample_list, rec, offset, stats, &film.paths, range, first)?; // offset -> paths[B]
+            sample_list::record(&a.sample_list, rec, bind, range, frame.first_sample)?; // offset -> paths[B]
             path::record(&kernels.path, rec, scene, film, &push)?; // paths[B] -> samples[B]
             accumulate::record_listed(&kernels.accumulate, rec, film, range)?; // samples[B] -> stats[P], light[P]
         }
@@ -93,5 +98,5 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
 /// Samples are placed on films of one tile alone.
 fn inputs(film: &FilmBuffers) -> Inputs<'_> {
     let tile = &film.tiles[0];
-    Inputs { guide: &tile.guide, stats: &tile.stats, light: &tile.light, priority: &film.priority }
+    Inputs { guide: &tile.guide, stats: &tile.stats, light: &tile.light, priority: &film.counts.priority }
 }

@@ -13,7 +13,7 @@ use std::ops::ControlFlow;
 pub struct Job<'a> {
     /// What runs it.
     pub renderer: &'a Renderer,
-    /// Where it goes on from, if it does not begin anew. The renderer then needs the effect `adaptive`.
+    /// Where it goes on from, if it does not begin anew. Make the renderer with [`Renderer::resumable`] then.
     pub checkpoint: Option<&'a Checkpoint>,
     /// Paths that one step traces at most, at least 1; the renderer's own limit where that is lower. Fewer paths make
     /// shorter steps, and change no bit of the result.

@@ -6,12 +6,14 @@ mod frame;
 mod job;
 mod kernels;
 mod merge;
+#[doc(hidden)] // Renderer::record runs the passes; tests and benches run them one by one
 pub mod pass;
 pub(crate) mod provenance;
 mod push;
 mod rendered;
 mod renderer;
 mod resume;
+#[doc(hidden)] // what an engine needs of it is named below; tests and benches cut work in ways of their own
 pub mod schedule;
 pub use crate::scene::description::settings;
 mod supersampling;
@@ -20,6 +22,7 @@ mod views;
 pub use buffers::{DeviceScene, FilmBuffers, FilmTile};
 pub use job::{Job, Status, StopReason};
 pub use merge::{Gap, Merged, merge};
+#[doc(hidden)] // a renderer tells its kernels; tests tell the same to their CPU twins
 pub use push::{frame_constants, priority_push};
 pub use renderer::*;
 pub use resume::Checkpoint;

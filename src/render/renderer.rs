@@ -64,6 +64,16 @@ impl Renderer {
         Self::specialised(gpu, scene, settings, outputs, called_for(scene, settings, outputs))
     }
 
+    /// [`Renderer::new`] for a render that goes on from a [`Checkpoint`](super::Checkpoint). One that places samples can do so
+    /// by itself; one that spreads them evenly gets the kernels and the buffers that give each pixel what it lacks.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn resumable(gpu: &Gpu, scene: &Scene, settings: &Settings, outputs: Outputs) -> Result<Self> {
+        let effects = Effects { adaptive: true, ..called_for(scene, settings, outputs) };
+        Self::specialised(gpu, scene, settings, outputs, effects)
+    }
+
     /// [`Renderer::new`] with other effects compiled in: more of them change nothing but the speed, fewer leave things
     /// out of the picture. The effects that the outputs stand for are taken from `outputs`.
     ///

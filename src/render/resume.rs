@@ -64,12 +64,11 @@ impl Checkpoint {
 }
 
 impl Renderer {
-    /// Puts back what an earlier render had, as [`super::Job`] does before it goes on. Needs the effect `adaptive`, which
-    /// renders that spread their samples evenly do not have by themselves: make the renderer with
-    /// [`Renderer::specialised`].
+    /// Puts back what an earlier render had, as [`super::Job`] does before it goes on. Make the renderer
+    /// with [`Renderer::resumable`].
     ///
     /// # Errors
-    /// [`Error::Usage`] when there is no such effect, or when the checkpoint is of a film of another size;
+    /// [`Error::Usage`] when the renderer cannot go on, or when the checkpoint is of a film of another size;
     /// [`Error::Device`].
     pub fn resume(&self, frame: &mut FrameResources, checkpoint: &Checkpoint) -> Result<()> {
         let allocation = self.frame.allocation()?;
@@ -90,7 +89,7 @@ impl Renderer {
         if self.effects.split_light {
             film.tiles[0].light.write(0, &pixels.iter().map(|p| p.light).collect::<Vec<PixelLight>>())?;
         }
-        film.priority.write(0, priority)?;
+        film.counts.priority.write(0, priority)?;
         film.counts.count.write(0, pending)?;
         self.gpu.run(frame, |rec| allocation.scan.record(rec, &film.counts))?;
         Ok(())

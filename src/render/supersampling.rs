@@ -3,7 +3,7 @@ use super::Renderer;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, FrameResources, Kernel, Location, PassTime};
 use crate::layout::{Guide, PathPush, vec3, vec4};
-use crate::render::pass::guide_lookup;
+use crate::render::pass::guide_lookup::{self, Bind};
 use crate::render::settings::Settings;
 use crate::shaders;
 
@@ -50,7 +50,9 @@ impl Renderer {
             let first_sample = self.settings.first_sample + first_sample;
             let push = PathPush { first_pixel: 0, pixels: pixels as u32, first_sample, samples, ..Default::default() };
             times.extend(gpu.run(&mut frame, |rec| {
-                guide_lookup::record(&kernel, rec, &self.frame.scene, &guide, &filtered, &indirect, &push)
+                let (scene, frame) = (self.frame.scene.bind(), self.frame.scene.bind_frame());
+                let (guides, filtered, indirect) = (&guide, &filtered, &indirect);
+                guide_lookup::record(&kernel, rec, Bind { scene, frame, guides, filtered, indirect }, &push)
             })?);
         }
         let light = indirect.read()?.into_iter().map(|sum| sum.map(|v| v / eye_rays as f32));

@@ -1,4 +1,4 @@
-//! A setting is written once. One row of [`settings!`] gives the field and its default, the range and the message of a value
+//! A setting is written once. One row of `settings!` gives the field and its default, the range and the message of a value
 //! beyond it, the key in TOML, the option of the command line and the option's help.
 pub mod entry;
 mod range;

@@ -5,9 +5,9 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::image::{self, Film, Samples, WriteOptions};
-use tallow::layout::{Camera, Effects};
+use tallow::layout::Camera;
 use tallow::render::settings::Settings;
-use tallow::render::{Checkpoint, Gap, Job, Outputs, Renderer, Status, StopReason, called_for, merge};
+use tallow::render::{Checkpoint, Gap, Job, Outputs, Renderer, Status, StopReason, merge};
 use tallow::scene::{Loaded, Scene};
 
 const OUTPUTS: Outputs = Outputs { split_light: true, guides: true, counters: false };
@@ -24,11 +24,6 @@ fn scene(change: impl Fn(&mut Settings)) -> Loaded {
 /// Some pixels reach it, and some do not before they are full.
 fn to_a_threshold(s: &mut Settings) {
     (s.allocate.policy, s.allocate.noise_threshold) = (tallow::allocate::policy("variance").unwrap(), 0.08);
-}
-
-fn resumable(gpu: &Gpu, scene: &Loaded) -> Renderer {
-    let effects = Effects { adaptive: true, ..called_for(scene, &scene.settings, OUTPUTS) };
-    Renderer::specialised(gpu, scene, &scene.settings, OUTPUTS, effects).unwrap()
 }
 
 /// Runs a job, which stops before the first step by which it has traced so many samples, and writes its film.
@@ -61,7 +56,7 @@ fn an_engine_renders_to_a_threshold_and_resumes_where_it_was_interrupted() {
     let file = |name: &str| folder.path().join(name);
     for (policy, spread) in [("to a threshold", false), ("evenly", true)] {
         let scene = scene(|s| if spread { s.spp = 4 } else { to_a_threshold(s) });
-        let renderer = resumable(&gpu, &scene);
+        let renderer = Renderer::resumable(&gpu, &scene, &scene.settings, OUTPUTS).unwrap();
         // Short steps, so that there are some to stop between.
         let job = Job { paths_at_once: 300, ..Job::new(&renderer) };
         let whole = run(&gpu, &job, &file("whole.exr"), u64::MAX);
@@ -121,7 +116,7 @@ fn a_film_of_a_moved_camera_cannot_be_resumed() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("moved.exr");
     let scene = scene(|s| s.spp = 2);
-    let mut renderer = resumable(&gpu, &scene);
+    let mut renderer = Renderer::resumable(&gpu, &scene, &scene.settings, OUTPUTS).unwrap();
     run(&gpu, &Job::new(&renderer), &file, u64::MAX);
     Checkpoint::read(&file, &scene, &scene.settings).unwrap();
     renderer.set_camera(Camera { position: [0.1, 0.2, 0.3], ..scene.camera([33, 17]).unwrap() }).unwrap();

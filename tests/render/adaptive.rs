@@ -199,9 +199,7 @@ fn a_render_resumed_anywhere_has_the_bits_of_one_that_never_stopped() {
             s.allocate.max_spp = if policy == "threshold" { 5 } else { 0 };
         });
         let whole = render(&gpu, &scene);
-        let effects =
-            tallow::layout::Effects { adaptive: true, ..tallow::render::called_for(&scene, &scene.settings, split()) };
-        let renderer = Renderer::specialised(&gpu, &scene, &scene.settings, split(), effects).unwrap();
+        let renderer = Renderer::resumable(&gpu, &scene, &scene.settings, split()).unwrap();
         let mut frame = FrameResources::new(&gpu).unwrap();
         let cut = Cut { pixels: SIZE[0] * SIZE[1], tile: 1 << 20, paths: 300 };
         let all = schedule::steps(&scene.settings, &cut).count();
@@ -254,7 +252,7 @@ fn a_start_leaves_priorities_as_they_are() {
             (Renderer::new(&gpu, &scene, &scene.settings, split()).unwrap(), FrameResources::new(&gpu).unwrap());
         renderer.resume(&mut frame, &checkpoint).unwrap();
         renderer.run(&mut frame, &Step::Start).unwrap();
-        assert_eq!(renderer.film().priority.read().unwrap(), checkpoint.priority, "{policy}");
+        assert_eq!(renderer.film().counts.priority.read().unwrap(), checkpoint.priority, "{policy}");
     }
     assert_silent(&gpu);
 }

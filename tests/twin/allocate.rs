@@ -4,13 +4,12 @@ use crate::support::{assert_silent, gpu, words};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 use tallow::allocate::{HostInputs, Inputs, POLICIES, Placing, policy};
-use tallow::gpu::PerBlock;
-use tallow::gpu::{Buffer, FrameResources, Gpu, Location};
+use tallow::gpu::{Buffer, FrameResources, Gpu, Location, PerBlock, Recorder};
 use tallow::layout::*;
 use tallow::render::pass::apportion::{Apportion, fixed_threshold};
 use tallow::render::pass::choose::{self, Choose};
 use tallow::render::pass::counts::Counts;
-use tallow::render::pass::sample_list::{self, Batches};
+use tallow::render::pass::sample_list::{self, Batches, Bind};
 use tallow::render::pass::scan::Scan;
 use tallow::render::schedule::{Choice, PathRange, Plan, Share};
 use tallow::twins::apportion as twin;
@@ -50,11 +49,12 @@ impl Bench {
 
     fn counts(&self, priority: &[f32], have: &[u32], plan: &Plan) -> Counts {
         let counts = Counts::new(&self.gpu, plan.pixels, self.thread_items).unwrap();
-        let (priority, stats) = (Buffer::from_slice(&self.gpu, "priority", priority).unwrap(), self.stats(have));
+        counts.priority.write(0, priority).unwrap();
+        let stats = self.stats(have);
         let mut frame = FrameResources::new(&self.gpu).unwrap();
         self.gpu
             .run(&mut frame, |rec| {
-                self.apportion.record(rec, &priority, &stats, &counts, plan)?;
+                self.apportion.record(rec, &stats, &counts, plan)?;
                 self.scan.record(rec, &counts)
             })
             .unwrap();
@@ -227,11 +227,11 @@ fn every_path_of_every_batch_is_listed_once() {
                             let n = u64::from(paths).min(dealt[size] - first) as u32;
                             let range = PathRange { first, paths: n, round: round as u32, rounds };
                             let list = Buffer::new(&bench.gpu, "paths", n as usize, Location::Device).unwrap();
-                            let (b, offset) = (&bench.batch, &counts.offset);
-                            bench
-                                .gpu
-                                .run(&mut frame, |rec| sample_list::record(b, rec, offset, &stats, &list, &range, 7))
-                                .unwrap();
+                            let record = |rec: &mut Recorder| {
+                                let bind = Bind { offset: &counts.offset, stats: &stats, paths: &list };
+                                sample_list::record(&bench.batch, rec, bind, &range, 7)
+                            };
+                            bench.gpu.run(&mut frame, record).unwrap();
                             assert_eq!(list.read().unwrap(), twin::batch(dealt, &next, first, n), "{size} {range:?}");
                         }
                     }
@@ -352,11 +352,11 @@ fn one_sample_or_none_agrees_with_its_reference() {
             .enumerate()
             .map(|(i, p)| if i % 3 == 0 { odd(i / 3) } else { p / 1100.0 })
             .collect();
-        let on_device = Buffer::from_slice(&gpu, "priority", &priority).unwrap();
         let counts = Counts::new(&gpu, size as u32, RUNS[0]).unwrap();
+        counts.priority.write(0, &priority).unwrap();
         for (round, threshold) in [(3, 1.0), (4, 0.25), (17, 0.0), (u32::MAX, 0.0)] {
             let choice = Choice { pixels: size as u32, round, threshold };
-            gpu.run(&mut frame, |rec| choose::record(&choose, rec, &on_device, &counts, &choice, 7)).unwrap();
+            gpu.run(&mut frame, |rec| choose::record(&choose, rec, &counts, &choice, 7)).unwrap();
             assert_eq!(counts.count.read().unwrap(), twin::choose(&priority, round, 7, threshold), "{size} {choice:?}");
         }
     }

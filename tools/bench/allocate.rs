@@ -22,11 +22,11 @@ fn main() -> Result<()> {
     println!("{width} x {height} on {}", gpu.info().name);
     let mut random = fastrand::Rng::with_seed(1);
     let priority: Vec<f32> = (0..pixels).map(|_| random.f32()).collect();
-    let priority = Buffer::from_slice(&gpu, "priority", &priority)?;
     let stats = Buffer::from_slice(&gpu, "stats", &vec![PixelStats::default(); pixels as usize])?;
     let paths = Buffer::new(&gpu, "paths", pixels as usize, Location::Device)?;
     let items = thread_items(&gpu, pixels);
     let counts = Counts::new(&gpu, pixels, items)?;
+    counts.priority.write(0, &priority)?;
     let (apportion, scan) = (Apportion::new(&gpu, items)?, Scan::new(&gpu, items)?);
     let lists = PerBlock::new(&gpu, items)?;
     let mut frame = FrameResources::new(&gpu)?;
@@ -36,9 +36,10 @@ fn main() -> Result<()> {
         let mut passes: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
         for _ in 0..=RUNS {
             let times = gpu.run(&mut frame, |rec| {
-                apportion.record(rec, &priority, &stats, &counts, &plan)?;
+                apportion.record(rec, &stats, &counts, &plan)?;
                 scan.record(rec, &counts)?;
-                sample_list::record(&lists, rec, &counts.offset, &stats, &paths, &range, 0)
+                let bind = sample_list::Bind { offset: &counts.offset, stats: &stats, paths: &paths };
+                sample_list::record(&lists, rec, bind, &range, 0)
             })?;
             let mut sums: BTreeMap<&str, f64> = BTreeMap::new();
             for t in &times {

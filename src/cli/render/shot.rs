@@ -1,11 +1,17 @@
-//! Films of a render, while it goes on and at its end.
+//! A render that goes on, and its films then and at its end.
 use super::Args;
+use crate::cli::checkpoint::{self, CheckpointFile};
+use crate::cli::files::Files;
+use crate::cli::interrupt;
+use crate::cli::progress::Progress;
 use crate::error::Result;
-use crate::gpu::Gpu;
+use crate::gpu::{FrameResources, Gpu};
 use crate::image::Film;
 use crate::render::{Job, Status};
 use std::collections::BTreeMap;
-use std::time::SystemTime;
+use std::ops::ControlFlow;
+use std::sync::atomic::Ordering;
+use std::time::{Instant, SystemTime};
 
 /// What a film is made of while its render goes on, and at its end.
 #[derive(Clone, Copy)]
@@ -27,6 +33,36 @@ impl Shot<'_> {
         let mut film = self.job.film(status)?;
         film.metadata.extend(metadata(self.args, self.gpu, seconds));
         Ok(film)
+    }
+
+    /// Takes the samples, shows how far it is, and writes checkpoints on the way.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub fn trace(&self, files: &mut Files) -> Result<(Status, Option<CheckpointFile>)> {
+        let Shot { args, gpu, job } = *self;
+        let place = || checkpoint::path(&args.output_files(), &args.scene);
+        let mut checkpoint = args.checkpoint.map(|every| CheckpointFile::new(every, place()));
+        let (begun, mut progress) = (Instant::now(), None);
+        // Until here there is nothing to keep, and a signal ends the process.
+        let stop = interrupt::flag();
+        let mut between = |status: &Status| {
+            let progress = progress.get_or_insert_with(|| Progress::new(status.planned, !args.common.talkative()));
+            progress.set(status.done);
+            if progress.wants_speed() {
+                progress.set_speed(job.rays_of_a_few(status)?);
+            }
+            if stop.load(Ordering::SeqCst) {
+                return Ok(ControlFlow::Break(()));
+            }
+            if let Some(checkpoint) = checkpoint.as_mut().filter(|c| status.traced > 0 && c.is_due()) {
+                checkpoint.write(files, &self.film(status, begun.elapsed().as_secs_f64())?);
+            }
+            Ok(ControlFlow::Continue(()))
+        };
+        let status = job.run(&mut FrameResources::new(gpu)?, &mut between)?;
+        progress.iter().for_each(Progress::finish);
+        Ok((status, checkpoint))
     }
 }
 

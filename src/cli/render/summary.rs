@@ -1,4 +1,4 @@
-//! What is said of a render at its status.
+//! What is said of a render at its end.
 use super::{Args, Spans};
 use crate::cli::{print, print_json};
 use crate::error::Result;
@@ -57,17 +57,19 @@ pub struct Outcome<'a> {
     /// What was rendered.
     pub scene: &'a Scene,
     /// Its image.
-    pub film: &'a Film,
+    pub film: Film,
     /// What the host did.
-    pub host: &'a Spans,
+    pub host: Spans,
     /// How it ended.
-    pub status: &'a Status,
+    pub status: Status,
+    /// Rays and nodes, where they were counted.
+    pub counters: Option<Counters>,
 }
 
 impl Outcome<'_> {
     /// In numbers, with the files that were written.
-    pub fn summary(&self, written: &[PathBuf], counters: Option<Counters>) -> Summary {
-        let Self { gpu, scene, film, host, status } = *self;
+    pub fn summary(&self, written: &[PathBuf]) -> Summary {
+        let Self { gpu, scene, film, host, status, counters } = self;
         let counts = film::counts(film, "samples").unwrap_or_default();
         Summary {
             files: written.iter().map(|f| f.display().to_string()).collect(),
@@ -80,7 +82,7 @@ impl Outcome<'_> {
             stopped: status.stopped,
             broken_priorities: status.broken_priorities,
             broken_samples: status.broken_samples,
-            counters,
+            counters: *counters,
             load_seconds: host.seconds("load scene"),
             compile_seconds: host.seconds("upload and compile"),
             seconds: host.seconds("render"),

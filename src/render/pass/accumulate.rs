@@ -6,7 +6,6 @@ use crate::layout::FoldPush;
 use crate::render::buffers::{FilmBuffers, FilmTile};
 use crate::render::schedule::{Batch, PathRange};
 use crate::shaders::accumulate::Bind;
-use std::ops::Range;
 
 /// The specialised kernel.
 pub type Fold = Kernel<Bind<'static>>;
@@ -18,7 +17,7 @@ pub fn record(k: &Fold, rec: &mut Recorder, f: &FilmBuffers, b: &Batch) -> Resul
     let window = first_pixel / tile.window * tile.window;
     let (tile_first, pixels, samples) = (tile.first_pixel, b.pixels, b.samples);
     let push = FoldPush { first_pixel, pixels, tile: tile_first, window, samples, ..FoldPush::default() };
-    fold(k, rec, f, tile, window..tile.pixels.min(window + tile.window), &push)
+    fold(k, rec, f, tile, &push)
 }
 
 /// samples\[batch\], offset\[P + 1\] -> stats\[P\], light\[P\]
@@ -38,19 +37,14 @@ pub fn record_listed(k: &Fold, rec: &mut Recorder, f: &FilmBuffers, range: &Path
             rounds,
             ..Default::default()
         };
-        fold(k, rec, f, &f.tiles[0], w, &push)
+        fold(k, rec, f, &f.tiles[0], &push)
     })
 }
 
-fn fold(
-    k: &Fold,
-    rec: &mut Recorder,
-    f: &FilmBuffers,
-    tile: &FilmTile,
-    window: Range<u32>,
-    push: &FoldPush,
-) -> Result<()> {
-    let bound = window.start as usize..window.end as usize;
+/// Binds the window of the tile that begins at `push.window`.
+fn fold(k: &Fold, rec: &mut Recorder, f: &FilmBuffers, tile: &FilmTile, push: &FoldPush) -> Result<()> {
+    let end = tile.pixels.min(push.window + tile.window);
+    let bound = push.window as usize..end as usize;
     let folded_stats = &tile.stats.part(bound.clone())?;
     let apart = tile.light.len() == tile.pixels as usize; // else one unused element
     let folded_light = &if apart { tile.light.part(bound)? } else { tile.light.clone() };

@@ -73,16 +73,10 @@ impl Apportion {
     ///
     /// # Errors
     /// [`crate::error::Error::Device`].
-    pub fn record(
-        &self,
-        rec: &mut Recorder,
-        priority: &Buffer<f32>,
-        stats: &Buffer<PixelStats>,
-        c: &Counts,
-        plan: &Plan,
-    ) -> Result<()> {
+    pub fn record(&self, rec: &mut Recorder, stats: &Buffer<PixelStats>, c: &Counts, plan: &Plan) -> Result<()> {
         let (push, n) = (|round| push(plan, round), plan.pixels);
-        self.weigh.record(rec, quantise_priority::Bind { priority, weight: &c.weight, sums: &c.sums }, &push(0), n)?;
+        let bind = quantise_priority::Bind { priority: &c.priority, weight: &c.weight, sums: &c.sums };
+        self.weigh.record(rec, bind, &push(0), n)?;
         self.total.record_one(rec, sum_weights::Bind { sums: &c.sums, state: &c.state }, &push(0))?;
         match plan.share {
             Share::Next => {}
@@ -91,12 +85,8 @@ impl Apportion {
                 self.deficit.record(rec, bind, &push(0), n)?;
             }
             Share::Need { .. } => {
-                self.need.record(
-                    rec,
-                    lack_of_accuracy::Bind { stats, weight: &c.weight, sums: &c.sums },
-                    &push(0),
-                    n,
-                )?;
+                let bind = lack_of_accuracy::Bind { stats, weight: &c.weight, sums: &c.sums };
+                self.need.record(rec, bind, &push(0), n)?;
             }
         }
         if plan.share != Share::Next {

@@ -2,7 +2,7 @@
 //! [`crate::twins::apportion::choose`].
 use super::counts::Counts;
 use crate::error::Result;
-use crate::gpu::{Buffer, Kernel, Recorder};
+use crate::gpu::{Kernel, Recorder};
 use crate::layout::ChoosePush;
 use crate::render::schedule::Choice;
 use crate::shaders::choose::Bind;
@@ -14,15 +14,8 @@ pub type Choose = Kernel<Bind<'static>>;
 ///
 /// # Errors
 /// [`crate::error::Error::Device`].
-pub fn record(
-    k: &Choose,
-    rec: &mut Recorder,
-    priority: &Buffer<f32>,
-    c: &Counts,
-    choice: &Choice,
-    seed: u32,
-) -> Result<()> {
+pub fn record(k: &Choose, rec: &mut Recorder, c: &Counts, choice: &Choice, seed: u32) -> Result<()> {
     let Choice { pixels, round, threshold } = *choice;
     let push = ChoosePush { pixels, round, seed, threshold, ..Default::default() };
-    rec.dispatch_threads(k, Bind { priority, count: &c.count }, &push, pixels)
+    rec.dispatch_threads(k, Bind { priority: &c.priority, count: &c.count }, &push, pixels)
 }

@@ -8,6 +8,8 @@ pub const BINS: usize = 256;
 
 /// The counts, and what finding them takes, the offsets of the scan included.
 pub struct Counts {
+    /// What a policy says of every pixel: how much it is worth samples.
+    pub priority: Buffer<f32>,
     /// 12.20 fixed point; then, unless they are shares of the next samples, what a pixel lacks.
     pub weight: Buffer<u32>,
     /// Samples of every pixel.
@@ -22,8 +24,8 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Weight, count and offset.
-    pub const BYTES_PER_PIXEL: usize = 16;
+    /// Priority, weight, count and offset.
+    pub const BYTES_PER_PIXEL: usize = 20;
 
     /// For a film of `pixels`, and kernels whose threads have so many each.
     ///
@@ -32,6 +34,7 @@ impl Counts {
     pub fn new(gpu: &Gpu, pixels: u32, thread_items: u32) -> Result<Self> {
         let (n, of_blocks) = (pixels as usize, block_count(pixels, thread_items) as usize);
         Ok(Self {
+            priority: Buffer::new(gpu, "priority", n, Location::Device)?,
             weight: Buffer::new(gpu, "weight", n, Location::Device)?,
             count: Buffer::new(gpu, "count", n, Location::Device)?,
             offset: Buffer::new(gpu, "offset", n + 1, Location::Device)?,

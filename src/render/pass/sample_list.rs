@@ -2,28 +2,19 @@
 //! [`crate::twins::apportion::batch`].
 use super::pair;
 use crate::error::Result;
-use crate::gpu::PerBlock;
-use crate::gpu::{Buffer, Recorder};
-use crate::layout::{BatchPush, PixelStats, uvec2};
+use crate::gpu::{PerBlock, Recorder};
+use crate::layout::BatchPush;
 use crate::render::schedule::PathRange;
-use crate::shaders::sample_list::Bind;
+pub use crate::shaders::sample_list::Bind;
 
 /// The kernel.
 pub type Batches = PerBlock<Bind<'static>>;
 
 /// offset\[P + 1\], stats\[P\] -> paths\[batch\]
-pub fn record(
-    k: &Batches,
-    rec: &mut Recorder,
-    offset: &Buffer<uvec2>,
-    stats: &Buffer<PixelStats>,
-    paths: &Buffer<uvec2>,
-    range: &PathRange,
-    first_sample: u32,
-) -> Result<()> {
-    let pixels = offset.len() as u32 - 1;
+pub fn record(k: &Batches, rec: &mut Recorder, bind: Bind, range: &PathRange, first_sample: u32) -> Result<()> {
+    let pixels = bind.offset.len() as u32 - 1;
     let PathRange { first, paths: n, round, rounds } = *range;
     let push =
         BatchPush { pixels, paths: n, first_path: pair(first), round, rounds, first_sample, ..Default::default() };
-    k.record(rec, Bind { offset, stats, paths }, &push, pixels)
+    k.record(rec, bind, &push, pixels)
 }

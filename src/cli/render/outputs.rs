@@ -1,0 +1,85 @@
+//! The files that a render writes.
+use super::Args;
+use crate::cli::checkpoint::{self, CheckpointFile};
+use crate::cli::files::{Files, Item, check_distinct};
+use crate::cli::{check_png, complain};
+use crate::error::Result;
+use crate::image::difference::false_colours;
+use crate::image::output::{self, Stream};
+use crate::image::{self, Film, WriteOptions};
+use crate::render::film;
+use std::path::{Path, PathBuf};
+
+/// A render may take hours; what cannot be written, or would replace what it is not to, is told before.
+///
+/// # Errors
+/// [`crate::error::Error::Usage`] and [`crate::error::Error::Output`].
+pub fn check(args: &Args) -> Result<()> {
+    let (images, checkpoint) = (args.output_files(), checkpoint::path(&args.output_files(), &args.scene));
+    images.iter().try_for_each(|path| image::check_writable(path))?;
+    args.heatmap.iter().try_for_each(|path| check_png("--heatmap", path))?;
+    args.profile.iter().try_for_each(|path| output::check(path))?;
+    args.checkpoint.map_or(Ok(()), |_| output::check(&checkpoint))?;
+    let (layers, colours): (Vec<_>, Vec<_>) =
+        images.iter().map(|path| ("-o", path.as_path())).partition(|(_, path)| image::has_layers(path));
+    let maps = args.heatmap.iter().map(|path| ("--heatmap", path.as_path()));
+    let traces = args.profile.iter().map(|path| ("--profile", path.as_path()));
+    let others: Vec<_> = colours.into_iter().chain(maps).chain(traces).collect();
+    let resumed: Vec<_> = args.resume.iter().map(|path| ("--resume", path.as_path())).collect();
+    // A resumed file may become the complete one.
+    check_distinct(&others, &resumed)?;
+    let partial = args.checkpoint.map(|_| ("--checkpoint", checkpoint.as_path()));
+    let all: Vec<_> = layers.into_iter().chain(others).chain(partial).collect();
+    check_distinct(&all, &[("the scene", &args.scene)])
+}
+
+/// Writes the images that are files, and brings the checkpoint up to date or removes it: where an image has all layers, or
+/// the render is complete, it is not needed any more.
+pub fn save(
+    args: &Args,
+    film: &Film,
+    files: &mut Files,
+    checkpoint: Option<CheckpointFile>,
+    whole: bool,
+) -> Vec<PathBuf> {
+    let broken = film.picture(None).map_or(0, |p| p.non_finite());
+    if broken > 0 {
+        complain(&format!("warning: {broken} pixels are not finite"));
+    }
+    let mut written = files.save(&items(args, film), whole);
+    let Some(mut checkpoint) = checkpoint else { return written };
+    if !whole && !written.iter().any(|path| image::has_layers(path)) {
+        written.extend(checkpoint.write(files, film));
+    }
+    if files.failure().is_none() {
+        checkpoint.remove(&written);
+    }
+    written
+}
+
+/// The images: a film's own, and that of its samples.
+pub fn items<'a>(args: &'a Args, film: &'a Film) -> Vec<Item<'a>> {
+    let options = args.common.write_options();
+    let images = args.output_files().into_iter().map(|path| Item::image(path, film, options));
+    let heatmap = |path: &PathBuf| Item { path: path.clone(), fill: Box::new(|stream| heatmap(film, stream)) };
+    images.chain(args.heatmap.iter().map(heatmap)).collect()
+}
+
+/// Says where what there is was written.
+pub fn interruption(written: &[PathBuf]) -> String {
+    let names = written.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
+    let resumable = written.iter().find(|path| image::has_layers(path));
+    let how = resumable.map(|path| format!("; --resume {} continues it", path.display())).unwrap_or_default();
+    format!("interrupted: what there is was written to {names}{how}")
+}
+
+/// Samples per pixel from 0 (dark) to the largest number (bright).
+fn heatmap(film: &Film, stream: &mut dyn Stream) -> std::io::Result<()> {
+    let counts = film::counts(film, "samples").unwrap_or_default();
+    let most = counts.iter().copied().max().unwrap_or(0).max(1);
+    let values: Vec<f32> = counts.iter().map(|&n| n as f32).collect();
+    let picture = false_colours(film.width, &values, most as f32);
+    let mut map = Film::new(picture.width, picture.height);
+    map.add_vec3("", ["R", "G", "B"], &picture.pixels);
+    image::encode(Path::new("map.png"), &map, &WriteOptions::default(), stream)
+}
