@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# Sourced by tools/tallow and tools/test: finds out what is missing, installs it or says how, and finds cargo.
+# Sourced by tools/tallow, tools/test and tools/package: finds out what is missing, installs it or says how, and finds cargo.
 # Everything that is said goes to stderr, because stdout belongs to the program that is started in the end.
 set -euo pipefail
 

@@ -74,11 +74,11 @@ impl Demodulated {
             factor: &self.factor,
             sharp: &self.picture,
         };
-        rec.dispatch_threads(&self.split, bind, &SplitPush { size: planes.size }, count)?;
+        rec.dispatch_threads(&self.split, bind, &SplitPush { size: planes.size, ..Default::default() }, count)?;
         let Some(direct) = &self.direct else { return Ok(()) };
         let image = noisy::Bind { stats: &noisy.stats, light: &noisy.light, guide: &noisy.guide };
         let bind = demodulate_direct::Bind { noisy: image, direct: &direct.plane };
-        rec.dispatch_threads(&direct.split, bind, &PackPush { count }, count)
+        rec.dispatch_threads(&direct.split, bind, &PackPush { count, ..Default::default() }, count)
     }
 
     /// Direct light for a filter, where it is to be in-painted: what comes out takes the place of the radiance, which must have
@@ -99,7 +99,7 @@ impl Demodulated {
             filtered: &planes.radiance,
             sharp: &self.picture,
         };
-        rec.dispatch_threads(&direct.join, bind, &PackPush { count }, count)
+        rec.dispatch_threads(&direct.join, bind, &PackPush { count, ..Default::default() }, count)
     }
 
     /// filtered\[P\], factor\[P\] -> picture\[P\]: once for each split, since the picture takes the place of the light that was
@@ -107,7 +107,7 @@ impl Demodulated {
     pub fn record_join(&self, rec: &mut Recorder) -> Result<()> {
         let count = self.planes.pixels();
         let bind = remodulate::Bind { filtered: &self.planes.output, factor: &self.factor, picture: &self.picture };
-        rec.dispatch_threads(&self.join, bind, &PackPush { count }, count)
+        rec.dispatch_threads(&self.join, bind, &PackPush { count, ..Default::default() }, count)
     }
 }
 

@@ -32,10 +32,8 @@ const fn view(name: &'static str, scene: &'static str) -> View {
 /// When a scene cannot be found, or the device fails.
 pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
     println!("EAW, table 1, 512x512, one path per pixel, one indirect bounce, À-Trous with 5 levels and 3 weights:");
-    println!(
-        "milliseconds of the device, means of {FRAMES} frames, ours / published for a scene of that kind; split and"
-    );
-    println!("join stand where the paper uploads\n");
+    println!("milliseconds of the device, means of {FRAMES} frames, ours / published for a scene of that kind;");
+    println!("demodulation and remodulation stand where the paper uploads\n");
     let mut rows = Vec::new();
     for (view, theirs, published, rate) in VIEWS {
         let ours = one(gpu, args, view)?;
@@ -44,7 +42,7 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
         row.push(format!("{:.2} / {rate:.2}", 1e3 / ours.iter().sum::<f64>()));
         rows.push(row);
     }
-    println!("{}", table::text(&["scene", "paths", "guides", "split, join", "À-Trous", "frames a second"], &rows));
+    println!("{}", table::text(&["scene", "paths", "guides", "demodulation", "À-Trous", "frames a second"], &rows));
     Ok(())
 }
 

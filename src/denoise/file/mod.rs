@@ -78,7 +78,7 @@ impl<'a> Layers<'a> {
         let stored = self.aovs.get(Aov::Variance).map_or([0.0; 3], |plane| plane.at(i));
         let m2 = if self.of_one_sample { stored.map(|v| v / count.max(1.0)) } else { stored };
         let mean = self.aovs.get(Aov::Colour).map_or([0.0; 3], |plane| plane.at(i));
-        PixelStats { mean, count: count.to_bits(), m2, remainder: 0 }
+        PixelStats { mean, count: count.to_bits(), m2, ..Default::default() }
     }
 
     /// Direct and indirect light, 0 where the file does not keep them apart.
@@ -88,7 +88,7 @@ impl<'a> Layers<'a> {
             direct: at(Aov::Direct),
             indirect_m2: self.indirect_m2.map_or(0.0, |m2| m2[i]),
             indirect: at(Aov::Indirect),
-            remainder: 0,
+            ..Default::default()
         }
     }
 
@@ -105,6 +105,7 @@ impl<'a> Layers<'a> {
             object: if hit || normal != Vec3::ZERO { 0 } else { NONE },
             albedo: self.aovs.get(Aov::Albedo).map_or([0.0; 3], |plane| plane.at(i)),
             material: NONE,
+            ..Default::default()
         }
     }
 }
