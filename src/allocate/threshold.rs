@@ -1,5 +1,6 @@
-//! RAS as published: noise against a threshold that falls, then a probability that is frozen. Kernel:
-//! `glsl/allocate/threshold.comp`; `stage::choose` turns its priorities into samples.
+//! The policy `threshold` (RAS as published): the noise of a pixel is compared with a threshold that falls from round to
+//! round; after the last round, each pixel keeps a fixed probability. Kernel: `glsl/allocate/threshold.comp`;
+//! `render::pass::choose` turns its priorities into samples.
 use super::variance::moments;
 use super::{HostInputs, Inputs, Placing, Policy, Row};
 use crate::error::Result;
@@ -7,7 +8,7 @@ use crate::gpu::{Kernel, Recorder};
 use crate::layout::{PixelStats, PriorityPush};
 use crate::shaders::threshold::Bind;
 
-/// See [`super::POLICIES`].
+/// The entry of this policy in [`super::POLICIES`].
 pub const ROW: Row = Row {
     name: "threshold",
     about: "RAS as published: a sample a round where noise reaches a threshold that falls to 0 by --max-spp, then by chance",

@@ -1,10 +1,10 @@
-//! The same for every pixel: what the others are measured against.
+//! The policy `uniform`: the same number of samples for every pixel. It is the baseline of the other policies.
 use super::{HostInputs, Inputs, Placing, Policy, Row};
 use crate::error::Result;
 use crate::gpu::Recorder;
 use crate::layout::PriorityPush;
 
-/// See [`super::POLICIES`].
+/// The entry of this policy in [`super::POLICIES`].
 pub const ROW: Row = Row {
     name: "uniform",
     about: "the same number for every pixel",
