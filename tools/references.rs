@@ -31,7 +31,7 @@ enum Reference {
 }
 
 /// One row of the table: a render and its reference.
-struct Row {
+struct Scenario {
     /// A name known to the converter, or a scene file of the repository.
     scene: &'static str,
     /// Largest number of path edges, if not that of the scene file.
@@ -46,17 +46,17 @@ struct Row {
     known: f64,
 }
 
-const fn row(scene: &'static str, spp: u32, reference: Reference, tolerance: f64) -> Row {
-    Row { scene, depth: None, size: None, spp, reference, tolerance, known: significance::COLOUR }
+const fn row(scene: &'static str, spp: u32, reference: Reference, tolerance: f64) -> Scenario {
+    Scenario { scene, depth: None, size: None, spp, reference, tolerance, known: significance::COLOUR }
 }
 
-const fn known(known: f64, row: Row) -> Row {
-    Row { known, ..row }
+const fn known(known: f64, row: Scenario) -> Scenario {
+    Scenario { known, ..row }
 }
 
 /// A reference by Mitsuba 3, whose scene has exactly the same numbers.
-const fn cornell(scene: &'static str, depth: u32, reference: &'static str) -> Row {
-    Row { depth: Some(depth), size: Some(128), known: 1e-5, ..row(scene, 1024, Mean(reference), 5e-3) }
+const fn cornell(scene: &'static str, depth: u32, reference: &'static str) -> Scenario {
+    Scenario { depth: Some(depth), size: Some(128), known: 1e-5, ..row(scene, 1024, Mean(reference), 5e-3) }
 }
 
 const CORNELL: &str = "scenes/cornell-box/scene.toml";
@@ -69,7 +69,7 @@ const IGNIS_EMITTED: &str = "scenes/cornell-box/ignis/ref-cbox-d1-4096.exr";
 const WOOD: &str = "scenes/mitsuba-tests/refs/test_textured_diffuse_ref_rgb.exr";
 
 /// All rows. The tolerance is 2 % for a reference that is itself noisy.
-const ROWS: &[Row] = &[
+const ROWS: &[Scenario] = &[
     cornell(CORNELL, 2, "references/ref_diffuse_d2.exr"),
     cornell(CORNELL, 3, "references/ref_diffuse_d3.exr"),
     cornell(CORNELL, 4, "references/ref_diffuse_d4.exr"),
@@ -79,7 +79,7 @@ const ROWS: &[Row] = &[
     cornell(POINT, 2, "references/ref_point_d2.exr"),
     cornell(POINT, 3, "references/ref_point_d3.exr"),
     cornell(POINT, 4, "references/ref_point_d4.exr"),
-    Row { depth: Some(1), ..row("cornell-box-ignis", 256, Mean(IGNIS_EMITTED), 0.01) },
+    Scenario { depth: Some(1), ..row("cornell-box-ignis", 256, Mean(IGNIS_EMITTED), 0.01) },
     row("cornell-box-ignis", 256, Mean("scenes/cornell-box/ignis/ref-cbox-d6-4096.exr"), 0.01),
     row("bitterli-cornell-box", 64, Mean("scenes/bitterli-cornell-box/TungstenRender.exr"), 0.01),
     row("bitterli-veach-mis", 64, Mean("scenes/bitterli-veach-mis/TungstenRender.exr"), 0.02),
@@ -129,8 +129,9 @@ struct Args {
 
 fn main() -> anyhow::Result<ExitCode> {
     let args = Args::parse();
-    let chosen = |row: &&Row| args.only.is_empty() || args.only.iter().any(|word| row.scene.contains(word.as_str()));
-    let rows: Vec<&Row> = ROWS.iter().filter(chosen).collect();
+    let chosen =
+        |row: &&Scenario| args.only.is_empty() || args.only.iter().any(|word| row.scene.contains(word.as_str()));
+    let rows: Vec<&Scenario> = ROWS.iter().filter(chosen).collect();
     ensure!(!rows.is_empty(), "no row's scene contains {}", args.only.join(" or "));
     std::fs::create_dir_all(&args.output).with_context(|| format!("{}", args.output.display()))?;
     println!(
@@ -143,7 +144,7 @@ fn main() -> anyhow::Result<ExitCode> {
 }
 
 /// Prints a row and returns whether it passed.
-fn report(row: &Row, args: &Args) -> bool {
+fn report(row: &Scenario, args: &Args) -> bool {
     let name = title(row);
     print!("{name:<34} {:>5} ", row.spp);
     let (c, s) = match judge(row, args) {
@@ -165,7 +166,7 @@ fn report(row: &Row, args: &Args) -> bool {
 }
 
 /// The scene's name, with the depth if the row sets it.
-fn title(row: &Row) -> String {
+fn title(row: &Scenario) -> String {
     let short = row.scene.trim_start_matches("scenes/").trim_end_matches(".toml");
     match (row.depth, row.reference) {
         (Some(depth), _) => format!("{short} d{depth}"),
@@ -174,13 +175,13 @@ fn title(row: &Row) -> String {
     }
 }
 
-fn passes(row: &Row, c: &compare::Comparison, s: Option<&Significance>) -> bool {
+fn passes(row: &Scenario, c: &compare::Comparison, s: Option<&Significance>) -> bool {
     let near = |ratio: f64| (ratio - 1.0).abs() <= row.tolerance;
     c.ratio.into_iter().all(near) && s.map_or(c.structure <= 3.0 * row.tolerance, Significance::passes)
 }
 
 /// Renders, writes the difference, and measures.
-fn judge(row: &Row, args: &Args) -> anyhow::Result<(compare::Comparison, Option<Significance>)> {
+fn judge(row: &Scenario, args: &Args) -> anyhow::Result<(compare::Comparison, Option<Significance>)> {
     let file = |suffix| args.output.join(title(row).replace('/', "_").replace(' ', "-") + suffix);
     let scene = match row.scene.ends_with(".toml") {
         true => Path::new(env!("CARGO_MANIFEST_DIR")).join(row.scene),
@@ -217,7 +218,7 @@ fn absolute(mut picture: compare::Picture) -> compare::Picture {
     picture
 }
 
-fn run(row: &Row, scene: &Path, render: &Path, tallow: &Path) -> anyhow::Result<()> {
+fn run(row: &Scenario, scene: &Path, render: &Path, tallow: &Path) -> anyhow::Result<()> {
     let mut command = Command::new(tallow);
     command.arg("render").arg(scene).arg("-o").arg(render).arg("--spp").arg(row.spp.to_string());
     for (option, value) in [("--width", row.size), ("--height", row.size), ("--max-depth", row.depth)] {

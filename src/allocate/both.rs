@@ -3,7 +3,7 @@
 //! and from the differences between their means. Kernels: `glsl/allocate/likeness.comp`, `glsl/allocate/both.comp`.
 use super::geometry::Geometry;
 use super::variance::{moments, noise, square};
-use super::{HostInputs, Inputs, Placing, Policy, Row, geometry};
+use super::{HostInputs, Inputs, Placing, Policy, PolicyPass, geometry};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{Guide, NONE, PixelLight, PixelStats, PriorityPush, vec3};
@@ -17,7 +17,7 @@ use glam::Vec3;
 use serde::Serialize;
 
 /// The entry of this policy in [`super::POLICIES`].
-pub const ROW: Row = Row {
+pub const ROW: Policy = Policy {
     name: "both",
     about: "noise that the samples show, less what a geometry-aware filter will remove; geometry until samples tell",
     guides: true,
@@ -60,7 +60,7 @@ impl Both {
     }
 }
 
-impl Policy for Both {
+impl PolicyPass for Both {
     fn prepare(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
         if push.filtered > 0.0 {
             self.geometry.record(rec, &Inputs { priority: &self.words, ..*b }, push)?;

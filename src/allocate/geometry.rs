@@ -1,6 +1,6 @@
 //! The policy `geometry` (GEO): importance from normals and positions, before any radiance is known. Kernel:
 //! `glsl/allocate/geometry.comp`.
-use super::{HostInputs, Inputs, Placing, Policy, Row};
+use super::{HostInputs, Inputs, Placing, Policy, PolicyPass};
 use crate::error::Result;
 use crate::gpu::{Gpu, Kernel, Recorder};
 use crate::layout::{Guide, NONE, PriorityPush};
@@ -10,7 +10,7 @@ use crate::shaders::geometry::Bind;
 use serde::Serialize;
 
 /// The entry of this policy in [`super::POLICIES`].
-pub const ROW: Row = Row {
+pub const ROW: Policy = Policy {
     name: "geometry",
     about: "more where neighbours differ in normal and position, so that a filter has little to gather (GEO)",
     guides: true,
@@ -44,7 +44,7 @@ impl Geometry {
     }
 }
 
-impl Policy for Geometry {
+impl PolicyPass for Geometry {
     fn record(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
         rec.dispatch_threads(&self.0, Bind { guides: b.guide, priority: b.priority }, push, push.size[0] * push.size[1])
     }

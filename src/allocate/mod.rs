@@ -18,7 +18,7 @@ pub mod variance;
 pub use settings::{Allocate, AllocateOverrides};
 
 /// The compiled kernels of a policy, which record its passes.
-pub trait Policy: Send + Sync {
+pub trait PolicyPass: Send + Sync {
     /// Computes what does not change between rounds from guide\[P\], where P is the number of pixels. Runs once per camera.
     ///
     /// # Errors
@@ -76,8 +76,8 @@ pub enum Placing {
     Chosen,
 }
 
-/// An allocation policy.
-pub struct Row {
+/// An allocation policy, as an entry of [`POLICIES`].
+pub struct Policy {
     /// Name on the command line, and basename of its Rust and GLSL files.
     pub name: &'static str,
     /// Description in one line for the help.
@@ -89,40 +89,40 @@ pub struct Row {
     /// How its priorities become samples.
     pub placing: Placing,
     /// Compiles its kernels for a film of `pixels` pixels.
-    pub make: fn(&Gpu, pixels: u32) -> Result<Box<dyn Policy>>,
+    pub make: fn(&Gpu, pixels: u32) -> Result<Box<dyn PolicyPass>>,
     /// CPU twin of its kernels: returns the priority of every pixel.
     pub reference: fn(&HostInputs) -> Vec<f32>,
 }
 
 /// All policies, in the order of the help.
-pub const POLICIES: &[&Row] = &[&uniform::ROW, &geometry::ROW, &variance::ROW, &both::ROW, &threshold::ROW];
+pub const POLICIES: &[&Policy] = &[&uniform::ROW, &geometry::ROW, &variance::ROW, &both::ROW, &threshold::ROW];
 
 /// Finds a policy by its name.
-pub fn policy(name: &str) -> Option<&'static Row> {
+pub fn policy(name: &str) -> Option<&'static Policy> {
     POLICIES.iter().copied().find(|row| row.name == name)
 }
 
-impl PartialEq for Row {
+impl PartialEq for Policy {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name
     }
 }
 
-impl fmt::Debug for Row {
+impl fmt::Debug for Policy {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(self.name)
     }
 }
 
 /// A policy is written as its name.
-impl Serialize for Row {
+impl Serialize for Policy {
     fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
         serializer.serialize_str(self.name)
     }
 }
 
 /// A policy is read by its name.
-impl<'de> Deserialize<'de> for &'static Row {
+impl<'de> Deserialize<'de> for &'static Policy {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
         let name = String::deserialize(deserializer)?;
         let names = || POLICIES.iter().map(|row| row.name).collect::<Vec<_>>().join(", ");

@@ -2,13 +2,13 @@
 use super::both::{BothOverrides, BothSettings};
 use super::geometry::{GeometryOverrides, GeometrySettings};
 use super::variance::{VarianceOverrides, VarianceSettings};
-use super::{Placing, Row, uniform};
+use super::{Placing, Policy, uniform};
 use crate::error::{Error, Result};
 use crate::settings::entry::Value;
 use crate::settings::{FROM_0, settings};
 use serde::{Deserialize, Serialize};
 
-impl Value for &'static Row {
+impl Value for &'static Policy {
     fn text(&self) -> String {
         self.name.to_owned()
     }
@@ -22,7 +22,7 @@ settings! {
         /// The settings of the `[allocate]` table that are given; the others are `None`.
         AllocateOverrides {
             /// Policy [default: uniform; variance with --noise-threshold]
-            policy: &'static Row = &uniform::ROW, .., [long = "allocate", value_name = "POLICY"];
+            policy: &'static Policy = &uniform::ROW, .., [long = "allocate", value_name = "POLICY"];
             /// Samples that every pixel gets before any is placed.
             min_spp: u32 = 2, 0..=Self::MAX_SPP;
             /// Samples that no pixel exceeds; 0 is off. Of threshold: the rounds until chance decides; 0 is --spp.

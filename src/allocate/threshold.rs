@@ -2,14 +2,14 @@
 //! round; after the last round, each pixel keeps a fixed probability. Kernel: `glsl/allocate/threshold.comp`;
 //! `render::pass::choose` turns its priorities into samples.
 use super::variance::moments;
-use super::{HostInputs, Inputs, Placing, Policy, Row};
+use super::{HostInputs, Inputs, Placing, Policy, PolicyPass};
 use crate::error::Result;
 use crate::gpu::{Kernel, Recorder};
 use crate::layout::{PixelStats, PriorityPush};
 use crate::shaders::threshold::Bind;
 
 /// The entry of this policy in [`super::POLICIES`].
-pub const ROW: Row = Row {
+pub const ROW: Policy = Policy {
     name: "threshold",
     about: "RAS as published: a sample a round where noise reaches a threshold that falls to 0 by --max-spp, then by chance",
     guides: false,
@@ -21,7 +21,7 @@ pub const ROW: Row = Row {
 
 struct Threshold(Kernel<Bind<'static>>);
 
-impl Policy for Threshold {
+impl PolicyPass for Threshold {
     fn record(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
         rec.dispatch_threads(&self.0, Bind { stats: b.stats, priority: b.priority }, push, push.size[0] * push.size[1])
     }

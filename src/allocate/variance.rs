@@ -1,5 +1,5 @@
 //! The policy `variance` (RAS, but with the noise estimated anew in every round). Kernel: `glsl/allocate/variance.comp`.
-use super::{HostInputs, Inputs, Placing, Policy, Row};
+use super::{HostInputs, Inputs, Placing, Policy, PolicyPass};
 use crate::error::Result;
 use crate::gpu::{Kernel, Recorder};
 use crate::layout::{PixelStats, PriorityPush};
@@ -10,7 +10,7 @@ use crate::statistics::luminance;
 use serde::Serialize;
 
 /// The entry of this policy in [`super::POLICIES`].
-pub const ROW: Row = Row {
+pub const ROW: Policy = Policy {
     name: "variance",
     about: "more where samples differ, relative to their luminance, estimated anew every round (RAS)",
     guides: false,
@@ -34,7 +34,7 @@ settings! {
 
 struct Variance(Kernel<Bind<'static>>);
 
-impl Policy for Variance {
+impl PolicyPass for Variance {
     fn record(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
         rec.dispatch_threads(&self.0, Bind { stats: b.stats, priority: b.priority }, push, push.size[0] * push.size[1])
     }

@@ -31,7 +31,7 @@ pub struct Args {
 
 /// One effect of a render that writes an EXR file. Costs that were not measured are `None`.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Row {
+pub struct EffectRow {
     /// Name of the effect.
     pub effect: &'static str,
     /// Whether the scene calls for it.
@@ -138,7 +138,7 @@ impl Variant {
     }
 }
 
-fn rows(args: &Args) -> Result<Vec<Row>> {
+fn rows(args: &Args) -> Result<Vec<EffectRow>> {
     let scene = Scene::load(&args.scene)?.with(shrink);
     let outputs = Outputs { split_light: true, guides: true, counters: false };
     let (base, reasons) = scene::effects(&scene, &scene.settings, outputs.split_light, outputs.counters);
@@ -155,7 +155,7 @@ fn rows(args: &Args) -> Result<Vec<Row>> {
         let (usual, other) = in_turn(usual, other)?;
         let (with, without) = if on { (usual, other) } else { (other, usual) };
         bar.inc(1);
-        Ok::<_, Error>(Row {
+        Ok::<_, Error>(EffectRow {
             effect,
             on,
             called_for_by: String::new(),
@@ -172,14 +172,14 @@ fn rows(args: &Args) -> Result<Vec<Row>> {
         let outputs_then = Outputs { split_light: then.split_light, counters: then.counters, ..outputs };
         let row = price((effect.name(), on), outputs_then, then)?;
         let bytes = row.bytes + scene_bytes(effect, &scene);
-        let row = Row { called_for_by: called_for_by(effect), bytes, ..row };
+        let row = EffectRow { called_for_by: called_for_by(effect), bytes, ..row };
         // With and without it are different renders and not one picture at two costs; tools/adaptive compares them.
-        let unknown = Row { gpu_ms_with: None, gpu_ms_without: None, compile_ms: None, ..row.clone() };
+        let unknown = EffectRow { gpu_ms_with: None, gpu_ms_without: None, compile_ms: None, ..row.clone() };
         rows.push(if effect == Effect::adaptive { unknown } else { row });
     }
     if wanted(GUIDES) {
         let guides = price((GUIDES, true), Outputs { guides: false, ..outputs }, base)?;
-        rows.push(Row { called_for_by: "an output that keeps primary hits".to_owned(), ..guides });
+        rows.push(EffectRow { called_for_by: "an output that keeps primary hits".to_owned(), ..guides });
     }
     bar.finish_and_clear();
     Ok(rows)
@@ -261,9 +261,9 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
 }
 
 /// Formats the rows as a table, with a dash for costs that were not measured.
-pub fn text(rows: &[Row]) -> String {
+pub fn text(rows: &[EffectRow]) -> String {
     let ms = |value: Option<f64>| value.map_or("-".to_owned(), milliseconds);
-    let cells = |r: &Row| {
+    let cells = |r: &EffectRow| {
         vec![
             r.effect.to_owned(),
             if r.on { "on" } else { "off" }.to_owned(),
@@ -280,12 +280,13 @@ pub fn text(rows: &[Row]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Row, text};
+    use super::{EffectRow, text};
 
     #[test]
     fn costs_not_measured_are_dashes() {
-        let on = Row { effect: "ggx", on: true, called_for_by: "vase".to_owned(), bytes: 64, ..Row::default() };
-        let table = text(&[on, Row { effect: "lens", ..Row::default() }]);
+        let on =
+            EffectRow { effect: "ggx", on: true, called_for_by: "vase".to_owned(), bytes: 64, ..EffectRow::default() };
+        let table = text(&[on, EffectRow { effect: "lens", ..EffectRow::default() }]);
         let last = |line: usize| table.lines().nth(line).unwrap().split_whitespace().collect::<Vec<_>>();
         assert_eq!(last(1), ["ggx", "on", "-", "-", "-", "64", "vase"]);
         assert_eq!(last(2), ["lens", "off", "-", "-", "-", "0"]);

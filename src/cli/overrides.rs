@@ -1,6 +1,6 @@
 //! Settings on the command line, which replace those of the scene file.
 use super::common::with_ranges;
-use crate::allocate::{POLICIES, Placing, Row};
+use crate::allocate::{POLICIES, Placing, Policy};
 use crate::render::settings::{AllocateOverrides, Film, Render, Sequence, Settings};
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
@@ -23,7 +23,7 @@ pub struct Overrides {
     pub allocate: AllocateOverrides,
 }
 
-impl ValueEnum for &'static Row {
+impl ValueEnum for &'static Policy {
     fn value_variants<'a>() -> &'a [Self] {
         POLICIES
     }
@@ -37,7 +37,7 @@ impl Overrides {
     /// Replaces the settings that were given. A noise threshold without a learning policy selects the first such policy,
     /// `variance`.
     pub fn apply(&self, settings: &mut Settings) {
-        let learns = |row: &Row| row.placing == Placing::Learning;
+        let learns = |row: &Policy| row.placing == Placing::Learning;
         let threshold = self.allocate.noise_threshold.is_some_and(|e| e > 0.0);
         if threshold && !learns(settings.allocate.policy) {
             settings.allocate.policy = POLICIES.iter().find(|row| learns(row)).expect("the policy variance learns");
