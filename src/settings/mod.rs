@@ -1,4 +1,4 @@
-//! Declaration of settings. One row of [`settings!`] gives a field and its default, the range and the error message for a
+//! Declaration of settings. One row of `settings!` gives a field and its default, the range and the error message for a
 //! value outside it, the key in TOML, and the command line option with its help.
 pub mod entry;
 mod range;
