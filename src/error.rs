@@ -1,10 +1,10 @@
-//! The errors a caller can tell apart. Each carries what failed, where, and what to do about it.
+//! The errors that a caller can tell apart. Each says what failed, where, and what to do about it.
 use std::path::{Path, PathBuf};
 
-/// Result of everything that can fail for a reason outside the program.
+/// Result of operations that can fail for a reason outside the program.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// What went wrong, by who can mend it. [`Error::exit_code`] is what the command line returns.
+/// The kinds of errors, distinguished by what can be done about them. [`Error::exit_code`] is the command line's exit code.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -14,7 +14,7 @@ pub enum Error {
     /// A file that cannot be read, or does not hold what it should.
     #[error("{}{}: {what}", path.display(), place.as_deref().map(|p| format!(", {p}")).unwrap_or_default())]
     Input {
-        /// The file.
+        /// Path of the file that was read.
         path: PathBuf,
         /// Where in the file: a line, a key, a mesh.
         place: Option<String>,
@@ -36,7 +36,7 @@ pub enum Error {
     /// A file that cannot be written.
     #[error("{}: {what}", path.display())]
     Output {
-        /// The file.
+        /// Path of the file to be written.
         path: PathBuf,
         /// What is wrong and how to mend it.
         what: String,
@@ -54,12 +54,12 @@ impl Error {
         Self::Input { path: path.as_ref().to_owned(), place: Some(place.to_string()), what: what.to_string() }
     }
 
-    /// An [`Error::Output`].
+    /// An [`Error::Output`] about a file.
     pub fn output(path: impl AsRef<Path>, what: impl ToString) -> Self {
         Self::Output { path: path.as_ref().to_owned(), what: what.to_string() }
     }
 
-    /// 2 usage, 3 input, 4 device or memory, 5 output.
+    /// Exit code of the command line: 2 usage, 3 input, 4 device or memory, 5 output.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,

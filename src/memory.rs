@@ -1,17 +1,18 @@
-//! What the machine can still hold: systems promise more, and end the process when it is touched.
+//! Checks of free host memory before large allocations. Operating systems grant more memory than there is and kill the
+//! process when it uses it, so the amount is checked first.
 use crate::error::{Error, Result};
 use std::fmt::Display;
 use sysinfo::{MemoryRefreshKind, System};
 
-/// Refuses what needs more bytes than are free, those of the process's control group and address space included.
+/// Checks that `needed` bytes are free on the machine, in the process's control group and in its address space.
 ///
 /// # Errors
-/// How much is needed and how much is free.
+/// A message with the needed and the free amount.
 pub fn check(needed: u64) -> std::result::Result<(), String> {
     let mut system = System::new();
     system.refresh_memory_specifics(MemoryRefreshKind::nothing().with_ram());
     let group = system.cgroup_limits().map_or(u64::MAX, |limits| limits.free_memory);
-    // Systems that do not tell say 0.
+    // 0 means that the system does not tell.
     let machine = Some(system.available_memory()).filter(|&bytes| bytes > 0).unwrap_or(u64::MAX);
     let free = machine.min(group).min(free_addresses().unwrap_or(u64::MAX));
     if needed > free {
@@ -20,7 +21,7 @@ pub fn check(needed: u64) -> std::result::Result<(), String> {
     Ok(())
 }
 
-/// [`check`] on behalf of `what`, a plural noun with its place.
+/// As [`check`], with an error about `what`, such as a file.
 ///
 /// # Errors
 /// [`Error::Memory`].
@@ -28,7 +29,7 @@ pub fn need(what: impl Display, bytes: u64) -> Result<()> {
     check(bytes).map_err(|lack| Error::Memory(format!("{what}: {lack}; free some, or make the scene smaller")))
 }
 
-/// A vector with room for exactly `len` values.
+/// Makes a vector with capacity for exactly `len` values.
 ///
 /// # Errors
 /// [`Error::Memory`].
@@ -36,17 +37,17 @@ pub fn vector<T>(what: impl Display, len: usize) -> Result<Vec<T>> {
     reserved(len).map_err(|lack| Error::Memory(format!("{what}: {lack}")))
 }
 
-/// A vector with room for exactly `len` values.
+/// As [`vector`], with a bare message as the error.
 ///
 /// # Errors
-/// How much memory the system did not give.
+/// A message with the amount of memory that the system refused.
 pub fn reserved<T>(len: usize) -> std::result::Result<Vec<T>, String> {
     let mut vector = Vec::new();
     reserve_exact(&mut vector, len)?;
     Ok(vector)
 }
 
-/// Room for exactly `more` values behind those that `vector` has.
+/// Reserves capacity for exactly `more` values in addition to those in `vector`.
 ///
 /// # Errors
 /// [`Error::Memory`].
@@ -60,7 +61,7 @@ fn reserve_exact<T>(vector: &mut Vec<T>, more: usize) -> std::result::Result<(),
     vector.try_reserve_exact(more).map_err(refused)
 }
 
-/// What a limit of the address space (`ulimit -v`) leaves; only Linux tells.
+/// Bytes left under a limit of the address space (`ulimit -v`). `None` without a limit and on systems other than Linux.
 fn free_addresses() -> Option<u64> {
     let read = |file: &str| std::fs::read_to_string(format!("/proc/self/{file}")).ok();
     let limit = number_after(&read("limits")?, "Max address space")?;
@@ -68,7 +69,7 @@ fn free_addresses() -> Option<u64> {
     Some(limit.saturating_sub(used))
 }
 
-/// The number that follows `key` at the beginning of a line; `None` where it says "unlimited".
+/// Returns the number after `key` at the beginning of a line; `None` for "unlimited".
 fn number_after(text: &str, key: &str) -> Option<u64> {
     text.lines().find_map(|line| line.strip_prefix(key))?.split_whitespace().next()?.parse().ok()
 }

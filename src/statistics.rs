@@ -1,31 +1,31 @@
-//! What is known of a pixel after some of its samples, and how two such records become one.
+//! The statistics of a pixel's samples, and how those of two disjoint sets of samples are combined.
 use crate::layout::{PixelLight, PixelStats, vec3};
 use serde::{Deserialize, Serialize};
 
-/// One pixel of a render.
+/// The statistics of one pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pixel {
-    /// Radiance.
+    /// Mean and squared deviations of the radiance, and the number of samples.
     pub stats: PixelStats,
-    /// Direct and indirect light, zero where they are not kept apart.
+    /// Direct and indirect light; zero if they are not kept separately.
     pub light: PixelLight,
 }
 
-/// Samples that were no number, and counted as black.
+/// Samples that were NaN or infinite and were counted as black.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BrokenSamples {
-    /// How many.
+    /// Number of such samples.
     pub count: u64,
-    /// Column and row of one: of the first pixel, row by row, that has such a sample.
+    /// Column and row of the first pixel, row by row, that has such a sample.
     pub pixel: [u32; 2],
-    /// Its index, the lowest of that pixel.
+    /// The lowest index of such a sample in that pixel.
     pub sample: u32,
-    /// The seed of its render.
+    /// The seed of the render that it belongs to.
     pub seed: u32,
 }
 
 impl BrokenSamples {
-    /// Those of two disjoint sets of samples.
+    /// Combines the records of two disjoint sets of samples.
     pub fn join(a: Option<Self>, b: Option<Self>) -> Option<Self> {
         let (Some(x), Some(y)) = (a, b) else { return a.or(b) };
         let place = |s: &Self| (s.pixel[1], s.pixel[0], s.sample, s.seed);
@@ -34,20 +34,20 @@ impl BrokenSamples {
     }
 }
 
-/// Sums of squares are cut there, as in `glsl/film/accumulate.comp`.
+/// Upper limit of sums of squares, as in `glsl/film/accumulate.comp`.
 const WIDEST: f64 = 1e35;
 
-/// Rec. 709.
+/// Luminance of a linear Rec. 709 colour.
 pub fn luminance([r, g, b]: vec3) -> f32 {
     0.2126 * r + 0.7152 * g + 0.0722 * b
 }
 
-/// The record of two disjoint sets of samples (Chan, Golub and LeVeque 1979): with d the difference of the means, the
-/// mean moves by d n_b / n and M2 grows by d^2 n_a n_b / n. In double precision, rounded once: means within 2^-24 relative
-/// of exact arithmetic on the records, M2 likewise.
+/// Combines the statistics of two disjoint sets of samples (Chan, Golub and LeVeque 1979): with d the difference of the
+/// means, the mean moves by d n_b / n and M2 grows by d^2 n_a n_b / n. The result is computed in double precision and
+/// rounded once, so means and M2 are within a relative 2^-24 of exact arithmetic.
 ///
 /// # Panics
-/// When they have 2^32 samples and more together.
+/// When they have 2^32 samples or more in total.
 pub fn join(a: &Pixel, b: &Pixel) -> Pixel {
     let (na, nb) = (f64::from(a.stats.count), f64::from(b.stats.count));
     let n = na + nb;
@@ -81,13 +81,14 @@ pub fn join(a: &Pixel, b: &Pixel) -> Pixel {
     }
 }
 
-/// Index of the pixel's next sample; 0 is the render's first. It is the count while all samples behind the mean are of this
-/// render: samples carried over from an earlier frame would be subtracted here, as in `glsl/shared/next_sample.glsl`.
+/// Index of the pixel's next sample; 0 is the first of the render. It equals the count as long as all samples in the mean
+/// belong to this render; samples carried over from an earlier frame would be subtracted here, as in
+/// `glsl/shared/next_sample.glsl`.
 pub fn next_sample(s: &PixelStats) -> u32 {
     s.count
 }
 
-/// Squared standard error of a pixel: m2 / (n (n - 1)); 0 for fewer than two samples, which tell nothing.
+/// Squared standard error of a pixel's mean: m2 / (n (n - 1)), or 0 for fewer than two samples, which give no estimate.
 pub fn variance_of_mean(s: &PixelStats) -> vec3 {
     let n = s.count as f32;
     s.m2.map(|m2| if s.count > 1 { m2 / (n * (n - 1.0)) } else { 0.0 })

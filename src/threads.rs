@@ -1,8 +1,8 @@
-//! Threads for work on the host: as many as the machine has, or as many as the system will start.
+//! The thread pool for work on the host, with as many threads as the machine has cores or as the system will start.
 use rayon::ThreadPoolBuilder;
 
-/// Runs `work` in the pool that the caller is in, else in a new one: of a thread for each core, of fewer where so many
-/// cannot be started, and in the end of the caller's thread alone. Rayon's own pool would panic where it cannot start.
+/// Runs `work` in the caller's thread pool if it is in one, else in a new pool. That has one thread per core, fewer if the
+/// system refuses so many, and in the last resort only the caller's thread. Rayon's global pool would panic instead.
 pub fn within<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     if rayon::current_thread_index().is_some() {
         return work();

@@ -1,5 +1,5 @@
-//! Measures what placing samples costs and gains, and prints the tables of the papers with our figures beside the
-//! published ones. `tools/adaptive` builds what this needs and runs it.
+//! Measures the cost and the benefit of adaptive sampling, and prints the tables of the papers with our figures beside the
+//! published ones. The script `tools/adaptive` builds what this needs and runs it.
 use anyhow::Context;
 use clap::{Parser, ValueEnum};
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ mod view;
 
 use placed::{geometry, overhead, policies, spread};
 
-/// One table.
+/// The tables that can be measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Part {
     /// GEO's tables 1 and 2: what importance and placing cost.

@@ -1,18 +1,18 @@
-//! Reads two images of the same scene and measures how far apart they are, with the noise of both set aside.
+//! Measures the difference between two images of the same scene beyond the noise of both.
 use anyhow::{Context, ensure};
 use image::codecs::png::PngEncoder;
 use std::fs::File;
 use std::path::Path;
 use tallow::image::{Film, Samples, WriteOptions};
 
-/// Linear RGB, row 0 at the top.
+/// An image in linear RGB, with row 0 at the top.
 pub struct Picture {
     pub width: usize,
     pub height: usize,
     pub rgb: Vec<[f32; 3]>,
 }
 
-/// What a pair of images is judged by.
+/// The measures of the difference between an image and its reference.
 #[derive(Debug)]
 pub struct Comparison {
     /// Image mean over reference mean, per channel.
@@ -26,7 +26,7 @@ pub struct Comparison {
     pub absolute: f64,
 }
 
-/// Reads three channels by name, wherever in the file they are.
+/// Reads three channels of an image file by name.
 ///
 /// # Errors
 /// When the file cannot be read, a channel is missing, or a value is not finite.
@@ -41,7 +41,7 @@ pub fn read(path: &Path, channels: [&str; 3]) -> anyhow::Result<Picture> {
     Ok(Picture { width: film.width as usize, height: film.height as usize, rgb })
 }
 
-/// Mean of the three channels: no colour matters more than another here.
+/// Mean of the three channels, all of which count alike.
 fn grey(rgb: [f32; 3]) -> f64 {
     rgb.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0
 }
@@ -51,13 +51,15 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     values.sum::<f64>() / count
 }
 
+/// Computes all measures of a comparison.
+///
 /// # Errors
 /// When the sizes differ.
 pub fn compare(image: &Picture, reference: &Picture) -> anyhow::Result<Comparison> {
     let (size, wanted) = ((image.width, image.height), (reference.width, reference.height));
     ensure!(size == wanted, "the image is {} x {}, the reference {} x {}", size.0, size.1, wanted.0, wanted.1);
     let channel = |p: &Picture, c: usize| mean(p.rgb.iter().map(|v| f64::from(v[c])));
-    // Black against black is agreement.
+    // Two black images agree.
     let ratio = |a: f64, b: f64| if a == b { 1.0 } else { a / b };
     let absolute = image.rgb.iter().flatten().zip(reference.rgb.iter().flatten());
     Ok(Comparison {
@@ -77,7 +79,7 @@ fn median_ratio(image: &Picture, reference: &Picture) -> f64 {
     ratios.get(ratios.len() / 2).copied().unwrap_or(1.0)
 }
 
-/// Image minus reference.
+/// Returns the image minus the reference.
 pub fn difference(image: &Picture, reference: &Picture) -> Picture {
     let pairs = image.rgb.iter().zip(&reference.rgb);
     let rgb = pairs.map(|(a, b)| std::array::from_fn(|c| a[c] - b[c])).collect();
@@ -99,8 +101,8 @@ fn structure(image: &Picture, reference: &Picture) -> f64 {
     mean(excess).max(0.0).sqrt()
 }
 
-/// What is to be known of the pixels of square blocks, about 32 along the shorter side, of at least 16 pixels but for those
-/// at the rim.
+/// Calls `of_pixel` for every pixel and groups the results by square blocks. There are about 32 blocks along the shorter
+/// side, of at least 16 pixels each except at the right and lower edges.
 pub fn blocks<T>(picture: &Picture, of_pixel: impl Fn(usize) -> T) -> Vec<Vec<T>> {
     let edge = (picture.width.min(picture.height) / 32).clamp(4, 32);
     let columns = picture.width.div_ceil(edge);
@@ -112,8 +114,8 @@ pub fn blocks<T>(picture: &Picture, of_pixel: impl Fn(usize) -> T) -> Vec<Vec<T>
     blocks
 }
 
-/// Writes the difference as `STEM.exr` and as `STEM.png`, where middle grey is agreement and black or white is off by
-/// the reference's mean.
+/// Writes the difference as `STEM.exr` and as `STEM.png`. In the latter, middle grey means agreement, and black and white
+/// mean a difference of the reference's mean or more.
 pub fn write_difference(difference: &Picture, reference: &Picture, stem: &Path) -> anyhow::Result<()> {
     let (width, height) = (difference.width as u32, difference.height as u32);
     let mut film = Film::new(width, height);

@@ -1,5 +1,5 @@
-//! Measures every filter and prints the tables that the papers have, with our figures beside the published ones; writes
-//! the pictures. `tools/filters` builds what this needs and runs it.
+//! Measures every filter, writes the pictures, and prints the tables of the papers with our figures beside the published
+//! ones. The script `tools/filters` builds what this needs and runs it.
 use anyhow::Context;
 use clap::{Parser, ValueEnum};
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ mod view;
 
 use measure::{breakdown, energy, lookup, neural, ranking, textures, times};
 
-/// One table or set of pictures.
+/// The tables and sets of pictures that can be measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Part {
     /// Times beside those of EAW's tables 1 and 2 and GIF's table 2.

@@ -76,7 +76,7 @@ fn write_obj(mesh: &Mesh, path: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Those of an ordinary new file; temporary files are private by default.
+/// The permissions of an ordinary new file; temporary files are private by default.
 fn permissions() -> std::fs::Permissions {
     std::os::unix::fs::PermissionsExt::from_mode(0o644)
 }

@@ -1,5 +1,6 @@
-//! Renders every scene that has an independent reference with the `tallow` program, compares, prints a table, and writes
-//! the differences. Exit code 1 when a row fails. `tools/references` builds what this needs and runs it.
+//! Renders every scene that has an independent reference with the program `tallow`, compares the two, prints a table and
+//! writes the differences. The exit code is 1 if a row fails. The script `tools/references` builds what this needs and
+//! runs it.
 use anyhow::{Context, bail, ensure};
 use clap::Parser;
 use significance::Significance;
@@ -15,60 +16,60 @@ mod visibility;
 
 use Reference::{Constant, Mean, Normals, Visibility};
 
-/// What a render is compared with. Paths are below the data's folder.
+/// The reference of a render. Paths are relative to the data folder.
 #[derive(Clone, Copy)]
 enum Reference {
-    /// An image; each channel's mean and the structure of the difference are judged: by standard errors where a file beside
-    /// it says what they are.
+    /// An image. The mean of each channel and the structure of the difference are judged, in units of the standard error if a
+    /// file beside the image contains it.
     Mean(&'static str),
-    /// Every pixel has this value, by derivation.
+    /// A value that every pixel has by derivation.
     Constant(f32),
     /// An image of the absolute values of the shading normal.
     Normals(&'static str),
-    /// An image of the average visibility within so many world units.
+    /// An image of the average visibility within this distance in world units.
     Visibility(&'static str, f32),
 }
 
-/// One line of the table.
-struct Row {
+/// One row of the table: a render and its reference.
+struct Scenario {
     /// A name known to the converter, or a scene file of the repository.
     scene: &'static str,
-    /// Path edges, where they are not those of the scene file.
+    /// Largest number of path edges, if not that of the scene file.
     depth: Option<u32>,
-    /// Pixels each way, where they are not those of the scene file.
+    /// Width and height in pixels, if not those of the scene file.
     size: Option<u32>,
     spp: u32,
     reference: Reference,
-    /// Relative; structure may be three times as large.
+    /// Relative tolerance of the means; the structure may be three times as large.
     tolerance: f64,
-    /// Relative difference of a block that is explained; what is beyond is judged by standard errors.
+    /// Relative difference of a block that has a known reason; only the excess is judged by standard errors.
     known: f64,
 }
 
-const fn row(scene: &'static str, spp: u32, reference: Reference, tolerance: f64) -> Row {
-    Row { scene, depth: None, size: None, spp, reference, tolerance, known: significance::COLOUR }
+const fn row(scene: &'static str, spp: u32, reference: Reference, tolerance: f64) -> Scenario {
+    Scenario { scene, depth: None, size: None, spp, reference, tolerance, known: significance::COLOUR }
 }
 
-const fn known(known: f64, row: Row) -> Row {
-    Row { known, ..row }
+const fn known(known: f64, row: Scenario) -> Scenario {
+    Scenario { known, ..row }
 }
 
-/// Mitsuba 3's, whose scenes say the same to the last digit.
-const fn cornell(scene: &'static str, depth: u32, reference: &'static str) -> Row {
-    Row { depth: Some(depth), size: Some(128), known: 1e-5, ..row(scene, 1024, Mean(reference), 5e-3) }
+/// A reference by Mitsuba 3, whose scene has exactly the same numbers.
+const fn cornell(scene: &'static str, depth: u32, reference: &'static str) -> Scenario {
+    Scenario { depth: Some(depth), size: Some(128), known: 1e-5, ..row(scene, 1024, Mean(reference), 5e-3) }
 }
 
 const CORNELL: &str = "scenes/cornell-box/scene.toml";
 const CONDUCTOR: &str = "scenes/cornell-box/conductor.toml";
 const POINT: &str = "scenes/cornell-box/point.toml";
 
-/// The lamp alone.
+/// A render by Ignis that shows only the lamp.
 const IGNIS_EMITTED: &str = "scenes/cornell-box/ignis/ref-cbox-d1-4096.exr";
-/// Its texture was larger than the copy in the outside data.
+/// The reference was rendered with a larger texture than the copy in the outside data.
 const WOOD: &str = "scenes/mitsuba-tests/refs/test_textured_diffuse_ref_rgb.exr";
 
-/// 2 % where the reference is itself noisy.
-const ROWS: &[Row] = &[
+/// All rows. The tolerance is 2 % for a reference that is itself noisy.
+const ROWS: &[Scenario] = &[
     cornell(CORNELL, 2, "references/ref_diffuse_d2.exr"),
     cornell(CORNELL, 3, "references/ref_diffuse_d3.exr"),
     cornell(CORNELL, 4, "references/ref_diffuse_d4.exr"),
@@ -78,7 +79,7 @@ const ROWS: &[Row] = &[
     cornell(POINT, 2, "references/ref_point_d2.exr"),
     cornell(POINT, 3, "references/ref_point_d3.exr"),
     cornell(POINT, 4, "references/ref_point_d4.exr"),
-    Row { depth: Some(1), ..row("cornell-box-ignis", 256, Mean(IGNIS_EMITTED), 0.01) },
+    Scenario { depth: Some(1), ..row("cornell-box-ignis", 256, Mean(IGNIS_EMITTED), 0.01) },
     row("cornell-box-ignis", 256, Mean("scenes/cornell-box/ignis/ref-cbox-d6-4096.exr"), 0.01),
     row("bitterli-cornell-box", 64, Mean("scenes/bitterli-cornell-box/TungstenRender.exr"), 0.01),
     row("bitterli-veach-mis", 64, Mean("scenes/bitterli-veach-mis/TungstenRender.exr"), 0.02),
@@ -89,9 +90,9 @@ const ROWS: &[Row] = &[
     row("mitsuba-arealight", 8192, Mean("scenes/mitsuba-tests/refs/test_arealight_ref_rgb.exr"), 0.01),
     row("mitsuba-constant", 4096, Mean("scenes/mitsuba-tests/refs/test_constant_ref_rgb.exr"), 0.01),
     row("mitsuba-directional", 4096, Mean("scenes/mitsuba-tests/refs/test_directional_ref_rgb.exr"), 0.01),
-    // Mitsuba counts a mask that is passed as a hit, so that at depth 2 no light comes through the leaves.
+    // Mitsuba counts passing a mask as a hit, so at depth 2 no light comes through the leaves.
     known(0.01, row("mitsuba-envmap", 4096, Mean("scenes/mitsuba-tests/refs/test_envmap_ref_rgb.exr"), 0.01)),
-    // Mitsuba tabulates what a rough coat lets through: at the terminator twice of what a smooth one does.
+    // Mitsuba tabulates the transmission of a rough coat: at the terminator it is twice that of a smooth one.
     known(2e-3, row("mitsuba-pointlight", 8192, Mean("scenes/mitsuba-tests/refs/test_pointlight_ref_rgb.exr"), 0.01)),
     row("mitsuba-roughdielectric", 8192, Mean("scenes/mitsuba-tests/refs/test_roughdielectric_ref_rgb.exr"), 0.01),
     known(5e-3, row("mitsuba-textured-diffuse", 4096, Mean(WOOD), 0.01)),
@@ -128,8 +129,9 @@ struct Args {
 
 fn main() -> anyhow::Result<ExitCode> {
     let args = Args::parse();
-    let chosen = |row: &&Row| args.only.is_empty() || args.only.iter().any(|word| row.scene.contains(word.as_str()));
-    let rows: Vec<&Row> = ROWS.iter().filter(chosen).collect();
+    let chosen =
+        |row: &&Scenario| args.only.is_empty() || args.only.iter().any(|word| row.scene.contains(word.as_str()));
+    let rows: Vec<&Scenario> = ROWS.iter().filter(chosen).collect();
     ensure!(!rows.is_empty(), "no row's scene contains {}", args.only.join(" or "));
     std::fs::create_dir_all(&args.output).with_context(|| format!("{}", args.output.display()))?;
     println!(
@@ -141,8 +143,8 @@ fn main() -> anyhow::Result<ExitCode> {
     Ok(if failed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Prints a row and says whether it passed.
-fn report(row: &Row, args: &Args) -> bool {
+/// Prints a row and returns whether it passed.
+fn report(row: &Scenario, args: &Args) -> bool {
     let name = title(row);
     print!("{name:<34} {:>5} ", row.spp);
     let (c, s) = match judge(row, args) {
@@ -163,8 +165,8 @@ fn report(row: &Row, args: &Args) -> bool {
     passed
 }
 
-/// The scene's name, with the depth where the row sets it.
-fn title(row: &Row) -> String {
+/// The scene's name, with the depth if the row sets it.
+fn title(row: &Scenario) -> String {
     let short = row.scene.trim_start_matches("scenes/").trim_end_matches(".toml");
     match (row.depth, row.reference) {
         (Some(depth), _) => format!("{short} d{depth}"),
@@ -173,13 +175,13 @@ fn title(row: &Row) -> String {
     }
 }
 
-fn passes(row: &Row, c: &compare::Comparison, s: Option<&Significance>) -> bool {
+fn passes(row: &Scenario, c: &compare::Comparison, s: Option<&Significance>) -> bool {
     let near = |ratio: f64| (ratio - 1.0).abs() <= row.tolerance;
     c.ratio.into_iter().all(near) && s.map_or(c.structure <= 3.0 * row.tolerance, Significance::passes)
 }
 
 /// Renders, writes the difference, and measures.
-fn judge(row: &Row, args: &Args) -> anyhow::Result<(compare::Comparison, Option<Significance>)> {
+fn judge(row: &Scenario, args: &Args) -> anyhow::Result<(compare::Comparison, Option<Significance>)> {
     let file = |suffix| args.output.join(title(row).replace('/', "_").replace(' ', "-") + suffix);
     let scene = match row.scene.ends_with(".toml") {
         true => Path::new(env!("CARGO_MANIFEST_DIR")).join(row.scene),
@@ -216,7 +218,7 @@ fn absolute(mut picture: compare::Picture) -> compare::Picture {
     picture
 }
 
-fn run(row: &Row, scene: &Path, render: &Path, tallow: &Path) -> anyhow::Result<()> {
+fn run(row: &Scenario, scene: &Path, render: &Path, tallow: &Path) -> anyhow::Result<()> {
     let mut command = Command::new(tallow);
     command.arg("render").arg(scene).arg("-o").arg(render).arg("--spp").arg(row.spp.to_string());
     for (option, value) in [("--width", row.size), ("--height", row.size), ("--max-depth", row.depth)] {

@@ -1,33 +1,34 @@
-//! Whether an image differs from its reference by more than the noise of both, where a file says how noisy the
-//! reference is.
+//! Tests whether an image differs from its reference by more than the noise of both. This needs a file with the noise of
+//! the reference.
 use crate::compare::{self, Picture};
 use crate::statistics::sidak_quantile;
 use anyhow::{Context, ensure};
 use std::path::Path;
 
-/// Linear Rec. 709 to CIE XYZ. Mitsuba takes variances in XYZ and converts them as if they were colours, so that only
-/// there they are variances again. All tests are made in XYZ.
+/// Matrix from linear Rec. 709 to CIE XYZ. Mitsuba computes variances in XYZ and converts them to RGB like colours, so
+/// they are variances only after they are converted back. All tests are made in XYZ.
 const XYZ_FROM_RGB: [[f64; 3]; 3] =
     [[0.412453, 0.357580, 0.180423], [0.212671, 0.715160, 0.072169], [0.019334, 0.119193, 0.950227]];
 
-/// Samples per pixel of the references of Mitsuba's tests: the default of the script that renders them (the residuals
-/// of Mitsuba 3.9.1 say 31,800 and 35,800 for the two that it repeats best).
+/// Samples per pixel of the references of Mitsuba's tests, from the default of the script that renders them. (For the two
+/// that Mitsuba 3.9.1 reproduces best, the residuals suggest 31,800 and 35,800.)
 const MITSUBA_SPP: f64 = 32_000.0;
 
-/// Relative differences up to this are let pass: Mitsuba 2 converted colours so (its white sky is 1.0011 0.9997 0.9997).
+/// Relative differences up to this are accepted, because Mitsuba 2 converted colours with such an error (its white sky is
+/// 1.0011 0.9997 0.9997).
 pub const COLOUR: f64 = 5e-4;
 
 /// Squared standard errors per pixel, in XYZ.
 pub type Errors = Vec<[f64; 3]>;
 
-/// How many standard errors beyond the known difference, and how many chance explains (Sidak: all channels, or all blocks
-/// and channels, together fail once in a hundred times).
+/// The differences in standard errors beyond the known difference, with the limits that chance explains (by Sidak: with
+/// noise alone, all channels, or all blocks and channels, together fail once in a hundred times).
 #[derive(Debug)]
 pub struct Significance {
-    /// Of the image's mean: the largest of three channels.
+    /// Difference of the image's mean, the largest of the three channels.
     pub mean: f64,
     pub mean_limit: f64,
-    /// Of the means of blocks: the largest of all blocks and channels.
+    /// Difference of the means of blocks, the largest of all blocks and channels.
     pub block: f64,
     pub block_limit: f64,
 }
@@ -42,10 +43,10 @@ fn xyz(rgb: [f64; 3]) -> [f64; 3] {
     XYZ_FROM_RGB.map(|row| (0..3).map(|c| row[c] * rgb[c]).sum())
 }
 
-/// What is known of a reference's noise: `STEM_se.exr` holds standard errors, `STEM_var.exr` variances of samples.
+/// Reads the noise of a reference: `STEM_se.exr` holds standard errors, `STEM_var.exr` the variances of samples.
 ///
 /// # Errors
-/// When the file is there and cannot be read.
+/// When the file exists but cannot be read.
 pub fn of_reference(path: &Path) -> anyhow::Result<Option<Errors>> {
     let stem = path.file_stem().context("a file")?.to_string_lossy();
     let beside = |suffix: &str| Some(path.with_file_name(format!("{stem}{suffix}.exr"))).filter(|p| p.is_file());
@@ -57,7 +58,7 @@ pub fn of_reference(path: &Path) -> anyhow::Result<Option<Errors>> {
     }
 }
 
-/// Of a render, by its layer of variances. Points of low discrepancy err less than that.
+/// Reads the noise of a render from its variance layer. With low-discrepancy points the actual error is smaller.
 ///
 /// # Errors
 /// When the layer cannot be read.
@@ -69,13 +70,14 @@ fn read(path: &Path, channels: [&str; 3], error2: impl Fn([f64; 3]) -> [f64; 3])
     Ok(compare::read(path, channels)?.rgb.into_iter().map(|v| error2(v.map(f64::from))).collect())
 }
 
-/// Of standard errors in RGB. How the channels' errors hang together is not known; most they do when all are one light's.
+/// Squared standard errors in XYZ from standard errors in RGB. The correlation of the channels is unknown, so full
+/// correlation is assumed, which is the worst case.
 fn together(errors: [f64; 3]) -> [f64; 3] {
     xyz(errors).map(|e| e * e)
 }
 
-/// `known`: the difference of a block, and of the image, that is explained otherwise: relative to its own mean, and to the
-/// image's in darker blocks.
+/// Tests an image against a reference, given the noise of both. `known` is the difference of the image and of each block
+/// that has a known reason, relative to its mean or, in darker blocks, to the mean of the image.
 ///
 /// # Errors
 /// When the sizes differ.
@@ -108,7 +110,7 @@ struct Pixel {
     error2: [f64; 3],
 }
 
-/// Standard errors by which the mean of a channel over some pixels is off beyond what is known.
+/// The difference between the means of a channel over some pixels, less the known difference, in standard errors.
 fn excess(pixels: &[Pixel], c: usize, known: f64, floor: f64) -> f64 {
     let sum = |of: fn(&Pixel) -> [f64; 3]| pixels.iter().map(|p| of(p)[c]).sum::<f64>();
     let beyond = sum(|p| p.difference).abs() - known * sum(|p| p.reference).max(floor * pixels.len() as f64);

@@ -1,23 +1,23 @@
-//! A scene as the measuring tools render it.
+//! The scenes that the measuring tools render, with size, depth and samples.
 use crate::scenes;
 use std::path::{Path, PathBuf};
 
-/// A scene, small, so that a software device needs minutes.
+/// A scene with the parameters of its renders, which are small enough to take only minutes on a software device.
 pub struct View {
-    /// For files and tables.
+    /// Name for files and tables.
     pub name: &'static str,
     /// A name known to the converter, or a scene file of the repository.
     pub scene: &'static str,
-    /// Pixels.
+    /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Path edges.
+    /// Largest number of path edges.
     pub depth: u32,
     /// Samples per pixel of the reference.
     pub reference: u32,
 }
 
 impl View {
-    /// Its scene file; one of the outside scenes, below `data`, is converted into the folder `output`.
+    /// Returns the path of the scene file. An outside scene, from the folder `data`, is converted into the folder `output`.
     ///
     /// # Errors
     /// When the scene cannot be found.

@@ -1,5 +1,6 @@
-//! The average visibility of Nori's first assignment: the share of the hemisphere, all directions alike, in which nothing
-//! lies within a given distance of the first hit. No light transport, so the twins of the kernels compute it.
+//! Renders the average visibility of Nori's first assignment: the share of the hemisphere, with all directions weighted
+//! alike, in which nothing lies within a given distance of the first hit. This is not light transport, so no kernel
+//! computes it; the CPU twins of the kernels do.
 use crate::compare::Picture;
 use glam::{Vec3, vec2};
 use rayon::prelude::*;
@@ -13,7 +14,7 @@ use tallow::twins::sampler::{sample_2d, sampler_start};
 use tallow::twins::surface::surface_at;
 use tallow::twins::traverse::traverse_from;
 
-/// Of the scene's film, with `spp` samples a pixel; `reach` in world units.
+/// Renders the scene's film with `spp` samples per pixel. `reach` is the distance in world units.
 ///
 /// # Errors
 /// When the scene cannot be loaded.
@@ -28,7 +29,7 @@ pub fn render(scene: &Path, spp: u32, reach: f32) -> anyhow::Result<Picture> {
     Ok(Picture { width: width as usize, height: height as usize, rgb })
 }
 
-/// 1 where nothing is met, as Nori has it for rays that leave the scene.
+/// One sample: 1 if nothing is hit, which as in Nori includes rays that leave the scene, else 0.
 fn sample(scene: &Scene, camera: &Camera, size: [u32; 2], pixel: u32, index: u32, reach: f32) -> f32 {
     let random = sampler_start(pixel, index, 0, false);
     let at = vec2((pixel % size[0]) as f32, (pixel / size[0]) as f32) + sample_2d(random, 0);

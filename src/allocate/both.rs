@@ -1,8 +1,9 @@
-//! Geometry first, noise as it becomes known, less what a filter of indirect light will remove. Noise is estimated among neighbours that look
-//! alike: from their samples, and from how far their means are apart. Kernels: `glsl/allocate/likeness.comp`, `glsl/allocate/both.comp`.
+//! The policy `both`. It starts from geometry and moves to the noise of the samples as this becomes known, less what a
+//! filter of indirect light will remove. Noise is estimated over similar neighbours, from the variance of their samples
+//! and from the differences between their means. Kernels: `glsl/allocate/likeness.comp`, `glsl/allocate/both.comp`.
 use super::geometry::Geometry;
 use super::variance::{moments, noise, square};
-use super::{HostInputs, Inputs, Placing, Policy, Row, geometry};
+use super::{HostInputs, Inputs, Placing, Policy, PolicyPass, geometry};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{Guide, NONE, PixelLight, PixelStats, PriorityPush, vec3};
@@ -15,8 +16,8 @@ use crate::statistics::luminance;
 use glam::Vec3;
 use serde::Serialize;
 
-/// See [`super::POLICIES`].
-pub const ROW: Row = Row {
+/// The entry of this policy in [`super::POLICIES`].
+pub const ROW: Policy = Policy {
     name: "both",
     about: "noise that the samples show, less what a geometry-aware filter will remove; geometry until samples tell",
     guides: true,
@@ -27,10 +28,10 @@ pub const ROW: Row = Row {
 };
 
 settings! {
-    /// What becomes of the picture.
+    /// How the render will be used after sampling.
     #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
     pub struct BothSettings {
-        /// What is given of them.
+        /// The settings of [`BothSettings`] that are given; the others are `None`.
         BothOverrides {
             /// Share of the variance that a filter will remove where neighbours are alike; 0 is none.
             filtered: f32 = 0.5, 0.0..=1.0;
@@ -42,7 +43,8 @@ struct Both {
     geometry: Geometry,
     kinship: Kernel<likeness::Bind<'static>>,
     join: Kernel<both::Bind<'static>>,
-    /// Importance, then what it and [`kinship`] come to, a word a pixel: priorities of a render that goes on stay as they are.
+    /// One word per pixel: first the importance, then importance and [`kinship`] in packed form. It is a buffer of its own so
+    /// that the priorities of a resumed render are kept.
     words: Buffer<f32>,
 }
 
@@ -58,7 +60,7 @@ impl Both {
     }
 }
 
-impl Policy for Both {
+impl PolicyPass for Both {
     fn prepare(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
         if push.filtered > 0.0 {
             self.geometry.record(rec, &Inputs { priority: &self.words, ..*b }, push)?;
@@ -73,7 +75,7 @@ impl Policy for Both {
     }
 }
 
-/// How much a neighbour's noise says of a pixel's, 0 to 1.
+/// How much the noise of a neighbour tells about that of a pixel, 0 to 1.
 fn kinship(a: &Guide, b: &Guide, push: &PriorityPush) -> f32 {
     let apart = |of: fn(&Guide) -> vec3| squared_distance(of(a), of(b));
     let x = apart(|g| g.normal) * push.normal_scale + apart(|g| g.albedo) * 25.0;
@@ -82,7 +84,7 @@ fn kinship(a: &Guide, b: &Guide, push: &PriorityPush) -> f32 {
     (sevenths / SEVENTHS).max(MIN_KINSHIP)
 }
 
-/// Squared deviations, mean over channels, of indirect light, out of those of its luminance before albedo.
+/// Squared deviations of indirect light, as the mean over the channels, derived from those of its luminance before albedo.
 fn indirect_squares(stats: &PixelStats, light: &PixelLight) -> f32 {
     let level = luminance(light.indirect);
     let tint = (Vec3::from(stats.mean) - Vec3::from(light.direct)) / level;
@@ -90,8 +92,8 @@ fn indirect_squares(stats: &PixelStats, light: &PixelLight) -> f32 {
     (light.indirect_m2 * tint.length_squared() / 3.0).min(moments(stats)[0])
 }
 
-/// What pixels around one say of its noise, as [`moments`] does, and which share of it is that of indirect light; each by its
-/// kinship.
+/// Returns the moments (see [`moments`]) of the pixels around one, weighted by kinship, and the share of their squared
+/// deviations that is due to indirect light.
 fn surroundings(inputs: &HostInputs, pixel: usize) -> ([f32; 4], f32) {
     let HostInputs { guide, stats, light, push, .. } = inputs;
     let mut around = [0.0; 4];
@@ -154,7 +156,7 @@ mod tests {
         assert!(close, "{shares:?}");
     }
 
-    /// Two pixels in one row, of one albedo or not.
+    /// Noise of two pixels in one row whose albedos differ by `albedo`.
     fn pair(stats: [PixelStats; 2], albedo: f32) -> [f32; 2] {
         let push = PriorityPush { size: [2, 1], window: 2, luminance_floor: 0.0, limit: 99, ..PriorityPush::default() };
         let guide = [0.0, albedo].map(|albedo| Guide { albedo: [albedo; 3], ..Guide::default() });

@@ -1,5 +1,6 @@
-//! GEO: importance from normals and positions, before any radiance is known. Kernel: `glsl/allocate/geometry.comp`.
-use super::{HostInputs, Inputs, Placing, Policy, Row};
+//! The policy `geometry` (GEO): importance from normals and positions, before any radiance is known. Kernel:
+//! `glsl/allocate/geometry.comp`.
+use super::{HostInputs, Inputs, Placing, Policy, PolicyPass};
 use crate::error::Result;
 use crate::gpu::{Gpu, Kernel, Recorder};
 use crate::layout::{Guide, NONE, PriorityPush};
@@ -8,8 +9,8 @@ use crate::settings::{ABOVE_0, settings};
 use crate::shaders::geometry::Bind;
 use serde::Serialize;
 
-/// See [`super::POLICIES`].
-pub const ROW: Row = Row {
+/// The entry of this policy in [`super::POLICIES`].
+pub const ROW: Policy = Policy {
     name: "geometry",
     about: "more where neighbours differ in normal and position, so that a filter has little to gather (GEO)",
     guides: true,
@@ -20,10 +21,10 @@ pub const ROW: Row = Row {
 };
 
 settings! {
-    /// What counts as alike.
+    /// Which pixels count as similar.
     #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
     pub struct GeometrySettings {
-        /// What is given of them.
+        /// The settings of [`GeometrySettings`] that are given; the others are `None`.
         GeometryOverrides {
             /// Edge of the square of pixels whose geometry is compared.
             window: u32 = 4, 2..=10;
@@ -43,13 +44,13 @@ impl Geometry {
     }
 }
 
-impl Policy for Geometry {
+impl PolicyPass for Geometry {
     fn record(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
         rec.dispatch_threads(&self.0, Bind { guides: b.guide, priority: b.priority }, push, push.size[0] * push.size[1])
     }
 }
 
-/// [`exp_negative`] of the scaled distances, in units of 2^-16.
+/// Similarity of two pixels, in units of 2^-16: [`exp_negative`] of the scaled squared distances.
 fn similarity(a: &Guide, b: &Guide, push: &PriorityPush) -> u32 {
     if (a.object == NONE) != (b.object == NONE) {
         return 0;

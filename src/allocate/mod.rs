@@ -1,5 +1,6 @@
-//! What makes a pixel worth samples: one file per policy, one row in [`POLICIES`]. A policy writes a priority per pixel;
-//! `stage::apportion` turns priorities into counts that sum to the budget exactly, `stage::choose` into one sample or none.
+//! Allocation policies, which decide how many samples each pixel gets. Each has a file of its own and an entry in
+//! [`POLICIES`]. A policy writes one priority per pixel. From these, `render::pass::apportion` computes counts that sum
+//! exactly to the budget, or `render::pass::choose` decides for each pixel between one sample and none.
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Recorder};
 use crate::layout::{Guide, PixelLight, PixelStats, PriorityPush};
@@ -16,9 +17,9 @@ pub mod variance;
 
 pub use settings::{Allocate, AllocateOverrides};
 
-/// A policy, ready to be recorded.
-pub trait Policy: Send + Sync {
-    /// guide\[P\] -> what stays the same from round to round, if there is any; once per camera.
+/// The compiled kernels of a policy, which record its passes.
+pub trait PolicyPass: Send + Sync {
+    /// Computes what does not change between rounds from guide\[P\], where P is the number of pixels. Runs once per camera.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`].
@@ -26,102 +27,102 @@ pub trait Policy: Send + Sync {
         Ok(())
     }
 
-    /// guide\[P\], stats\[P\] -> priority\[P\]
+    /// Computes priority\[P\] from guide\[P\], stats\[P\] and light\[P\], where P is the number of pixels.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`].
     fn record(&self, rec: &mut Recorder, buffers: &Inputs, push: &PriorityPush) -> Result<()>;
 }
 
-/// What a policy reads, and the priorities it writes.
+/// The buffers that a policy reads, and the priorities that it writes.
 #[derive(Clone, Copy)]
 pub struct Inputs<'a> {
-    /// Primary hits; of the policies that do not ask for them, one unused element.
+    /// Primary hits; one unused element for policies that do not ask for them.
     pub guide: &'a Buffer<Guide>,
-    /// What the samples so far have said.
+    /// Statistics of the samples so far.
     pub stats: &'a Buffer<PixelStats>,
-    /// Direct and indirect light; of the policies that do not ask for it, one unused element.
+    /// Direct and indirect light; one unused element for policies that do not ask for it.
     pub light: &'a Buffer<PixelLight>,
-    /// Shares of the samples, at least 0, in any unit up to 4095.
+    /// Shares of the samples, from 0 to 4095, in any unit.
     pub priority: &'a Buffer<f32>,
 }
 
-/// The same on the host, for the twins.
+/// The same inputs on the host, for the CPU twins of the kernels.
 #[derive(Clone, Copy, Debug)]
 pub struct HostInputs<'a> {
-    /// Of every pixel.
+    /// Primary hit of every pixel.
     pub guide: &'a [Guide],
-    /// Of every pixel.
+    /// Statistics of every pixel's samples.
     pub stats: &'a [PixelStats],
-    /// Of every pixel, for policies that ask for it.
+    /// Direct and indirect light of every pixel, for policies that ask for it.
     pub light: &'a [PixelLight],
-    /// Those of the round before.
+    /// Priorities of the previous round.
     pub priority: &'a [f32],
-    /// What the kernel gets.
+    /// Push constants of the kernel.
     pub push: PriorityPush,
 }
 
-/// What priorities mean.
+/// How priorities become samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Placing {
-    /// As many samples for every pixel: nothing is placed.
+    /// Every pixel gets the same number of samples; priorities are not used.
     Even,
-    /// Shares of the budget, found once.
+    /// Priorities are shares of the budget and are computed once.
     Once,
-    /// Shares of all samples, past and next, found anew for every round.
+    /// Priorities are shares of all samples, past and future, and are computed anew for every round.
     Learning,
-    /// Every round, pixels whose priority reaches a threshold get a sample; after the last threshold priorities are
+    /// In every round, pixels whose priority reaches a threshold get a sample; after the last threshold, priorities are
     /// probabilities.
     Chosen,
 }
 
-/// One policy.
-pub struct Row {
-    /// Name on the command line and basename of its files.
+/// An allocation policy, as an entry of [`POLICIES`].
+pub struct Policy {
+    /// Name on the command line, and basename of its Rust and GLSL files.
     pub name: &'static str,
-    /// One line for the help.
+    /// Description in one line for the help.
     pub about: &'static str,
     /// Whether it reads primary hits.
     pub guides: bool,
-    /// Whether it reads direct and indirect light apart.
+    /// Whether it reads direct and indirect light separately.
     pub split_light: bool,
-    /// What becomes of its priorities.
+    /// How its priorities become samples.
     pub placing: Placing,
-    /// Compiles it for a film of so many pixels.
-    pub make: fn(&Gpu, pixels: u32) -> Result<Box<dyn Policy>>,
-    /// The kernel's twin.
+    /// Compiles its kernels for a film of `pixels` pixels.
+    pub make: fn(&Gpu, pixels: u32) -> Result<Box<dyn PolicyPass>>,
+    /// CPU twin of its kernels: returns the priority of every pixel.
     pub reference: fn(&HostInputs) -> Vec<f32>,
 }
 
-/// Every policy, in the order of the help.
-pub const POLICIES: &[&Row] = &[&uniform::ROW, &geometry::ROW, &variance::ROW, &both::ROW, &threshold::ROW];
+/// All policies, in the order of the help.
+pub const POLICIES: &[&Policy] = &[&uniform::ROW, &geometry::ROW, &variance::ROW, &both::ROW, &threshold::ROW];
 
-/// The policy of this name.
-pub fn policy(name: &str) -> Option<&'static Row> {
+/// Finds a policy by its name.
+pub fn policy(name: &str) -> Option<&'static Policy> {
     POLICIES.iter().copied().find(|row| row.name == name)
 }
 
-impl PartialEq for Row {
+impl PartialEq for Policy {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name
     }
 }
 
-impl fmt::Debug for Row {
+impl fmt::Debug for Policy {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(self.name)
     }
 }
 
-/// Its name.
-impl Serialize for Row {
+/// A policy is written as its name.
+impl Serialize for Policy {
     fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
         serializer.serialize_str(self.name)
     }
 }
 
-/// By its name.
-impl<'de> Deserialize<'de> for &'static Row {
+/// A policy is read by its name.
+impl<'de> Deserialize<'de> for &'static Policy {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
         let name = String::deserialize(deserializer)?;
         let names = || POLICIES.iter().map(|row| row.name).collect::<Vec<_>>().join(", ");

@@ -1,28 +1,28 @@
-//! Where samples go, and what the policies can be told. What a policy alone reads is written in its own file.
+//! The settings of sample allocation. Those that only one policy reads are declared in its own file.
 use super::both::{BothOverrides, BothSettings};
 use super::geometry::{GeometryOverrides, GeometrySettings};
 use super::variance::{VarianceOverrides, VarianceSettings};
-use super::{Placing, Row, uniform};
+use super::{Placing, Policy, uniform};
 use crate::error::{Error, Result};
 use crate::settings::entry::Value;
 use crate::settings::{FROM_0, settings};
 use serde::{Deserialize, Serialize};
 
-impl Value for &'static Row {
+impl Value for &'static Policy {
     fn text(&self) -> String {
         self.name.to_owned()
     }
 }
 
 settings! {
-    /// Where samples go. The `[allocate]` table of a scene file.
+    /// The `[allocate]` table of a scene file, which says how samples are distributed over the pixels.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(from = "AllocateOverrides")]
     pub struct Allocate {
-        /// What is given of the `[allocate]` table.
+        /// The settings of the `[allocate]` table that are given; the others are `None`.
         AllocateOverrides {
             /// Policy [default: uniform; variance with --noise-threshold]
-            policy: &'static Row = &uniform::ROW, .., [long = "allocate", value_name = "POLICY"];
+            policy: &'static Policy = &uniform::ROW, .., [long = "allocate", value_name = "POLICY"];
             /// Samples that every pixel gets before any is placed.
             min_spp: u32 = 2, 0..=Self::MAX_SPP;
             /// Samples that no pixel exceeds; 0 is off. Of threshold: the rounds until chance decides; 0 is --spp.
@@ -42,15 +42,15 @@ impl Allocate {
     /// The largest number of samples per pixel.
     pub const MAX_SPP: u32 = 1 << 24;
 
-    /// Whether all pixels get as many samples, and none is placed.
+    /// Whether every pixel gets the same number of samples.
     pub fn is_even(&self) -> bool {
         self.policy.placing == Placing::Even
     }
 
-    /// What no range of a single setting says.
+    /// Checks the constraints that involve more than one setting.
     ///
     /// # Errors
-    /// [`Error::Usage`] with the settings that do not go together.
+    /// [`Error::Usage`] naming the settings that contradict each other.
     pub fn check_together(&self) -> Result<()> {
         let Self { policy, min_spp, max_spp, noise_threshold, .. } = self;
         if *noise_threshold > 0.0 && policy.placing != Placing::Learning {

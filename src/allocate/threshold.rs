@@ -1,14 +1,15 @@
-//! RAS as published: noise against a threshold that falls, then a probability that is frozen. Kernel:
-//! `glsl/allocate/threshold.comp`; `stage::choose` turns its priorities into samples.
+//! The policy `threshold` (RAS as published): the noise of a pixel is compared with a threshold that falls from round to
+//! round; after the last round, each pixel keeps a fixed probability. Kernel: `glsl/allocate/threshold.comp`;
+//! `render::pass::choose` turns its priorities into samples.
 use super::variance::moments;
-use super::{HostInputs, Inputs, Placing, Policy, Row};
+use super::{HostInputs, Inputs, Placing, Policy, PolicyPass};
 use crate::error::Result;
 use crate::gpu::{Kernel, Recorder};
 use crate::layout::{PixelStats, PriorityPush};
 use crate::shaders::threshold::Bind;
 
-/// See [`super::POLICIES`].
-pub const ROW: Row = Row {
+/// The entry of this policy in [`super::POLICIES`].
+pub const ROW: Policy = Policy {
     name: "threshold",
     about: "RAS as published: a sample a round where noise reaches a threshold that falls to 0 by --max-spp, then by chance",
     guides: false,
@@ -20,7 +21,7 @@ pub const ROW: Row = Row {
 
 struct Threshold(Kernel<Bind<'static>>);
 
-impl Policy for Threshold {
+impl PolicyPass for Threshold {
     fn record(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
         rec.dispatch_threads(&self.0, Bind { stats: b.stats, priority: b.priority }, push, push.size[0] * push.size[1])
     }

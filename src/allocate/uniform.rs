@@ -1,11 +1,11 @@
-//! The same for every pixel: what the others are measured against.
-use super::{HostInputs, Inputs, Placing, Policy, Row};
+//! The policy `uniform`: the same number of samples for every pixel. It is the baseline of the other policies.
+use super::{HostInputs, Inputs, Placing, Policy, PolicyPass};
 use crate::error::Result;
 use crate::gpu::Recorder;
 use crate::layout::PriorityPush;
 
-/// See [`super::POLICIES`].
-pub const ROW: Row = Row {
+/// The entry of this policy in [`super::POLICIES`].
+pub const ROW: Policy = Policy {
     name: "uniform",
     about: "the same number for every pixel",
     guides: false,
@@ -17,7 +17,7 @@ pub const ROW: Row = Row {
 
 struct Uniform;
 
-impl Policy for Uniform {
+impl PolicyPass for Uniform {
     fn record(&self, rec: &mut Recorder, b: &Inputs, _: &PriorityPush) -> Result<()> {
         rec.fill(b.priority, 1.0_f32.to_bits())
     }

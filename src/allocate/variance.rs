@@ -1,5 +1,5 @@
-//! RAS, kept up to date: the noise that the samples show. Kernel: `glsl/allocate/variance.comp`.
-use super::{HostInputs, Inputs, Placing, Policy, Row};
+//! The policy `variance` (RAS, but with the noise estimated anew in every round). Kernel: `glsl/allocate/variance.comp`.
+use super::{HostInputs, Inputs, Placing, Policy, PolicyPass};
 use crate::error::Result;
 use crate::gpu::{Kernel, Recorder};
 use crate::layout::{PixelStats, PriorityPush};
@@ -9,8 +9,8 @@ use crate::shaders::variance::Bind;
 use crate::statistics::luminance;
 use serde::Serialize;
 
-/// See [`super::POLICIES`].
-pub const ROW: Row = Row {
+/// The entry of this policy in [`super::POLICIES`].
+pub const ROW: Policy = Policy {
     name: "variance",
     about: "more where samples differ, relative to their luminance, estimated anew every round (RAS)",
     guides: false,
@@ -21,10 +21,10 @@ pub const ROW: Row = Row {
 };
 
 settings! {
-    /// How noise is weighed, here and in the policies [`both`](super::both) and [`threshold`](super::threshold).
+    /// How noise is measured, in this policy and in [`both`](super::both) and [`threshold`](super::threshold).
     #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
     pub struct VarianceSettings {
-        /// What is given of them.
+        /// The settings of [`VarianceSettings`] that are given; the others are `None`.
         VarianceOverrides {
             /// Luminance added before noise is compared with it; negative: noise counts by itself.
             luminance_floor: f32 = 0.05, NUMBER;
@@ -34,13 +34,14 @@ settings! {
 
 struct Variance(Kernel<Bind<'static>>);
 
-impl Policy for Variance {
+impl PolicyPass for Variance {
     fn record(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
         rec.dispatch_threads(&self.0, Bind { stats: b.stats, priority: b.priority }, push, push.size[0] * push.size[1])
     }
 }
 
-/// Squared deviations summed (mean over channels), degrees of freedom, luminance times samples, samples.
+/// Returns the sum of squared deviations (mean over channels), the degrees of freedom, the luminance times the number of
+/// samples, and that number.
 pub(super) fn moments(s: &PixelStats) -> [f32; 4] {
     if s.count == 0 {
         return [0.0; 4];
@@ -49,7 +50,7 @@ pub(super) fn moments(s: &PixelStats) -> [f32; 4] {
     [(s.m2[0] + s.m2[1] + s.m2[2]) / 3.0, n - 1.0, luminance(s.mean).min(MAX_LUMINANCE) * n, n]
 }
 
-/// Of the 3 x 3 pixels around one, those on the film, row by row.
+/// The pixels of the 3 x 3 square around one that lie on the film, row by row.
 pub(super) fn square(push: &PriorityPush, pixel: usize) -> impl Iterator<Item = usize> {
     let [width, height] = push.size.map(|n| n as usize);
     let [x, y] = [pixel % width, pixel / width];

@@ -1,11 +1,12 @@
-//! `--checkpoint`: what there is of a render is written every so often, so that nothing but a part of it can be lost.
+//! `--checkpoint`: writes an unfinished render to a file at regular intervals, so that a crash loses only the work since
+//! the last one.
 use super::complain;
 use super::files::{Files, Item, partial_name};
 use crate::image::{self, Film, WriteOptions};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// When to write, and where.
+/// The checkpoint file of a render, and the time of the last checkpoint.
 pub struct CheckpointFile {
     every: Duration,
     last: Instant,
@@ -14,42 +15,42 @@ pub struct CheckpointFile {
     complained: bool,
 }
 
-/// Where checkpoints of a render go that writes these files: beside its first one with all layers, or in the working folder
-/// under the name of the scene.
+/// Path for the checkpoints of a render with these outputs: beside the first output that holds all layers, or in the
+/// working folder under the name of the scene.
 pub fn path(outputs: &[PathBuf], scene: &Path) -> PathBuf {
     let first = outputs.iter().find(|path| image::has_layers(path));
     partial_name(&first.cloned().unwrap_or_else(|| default_output(scene)))
 }
 
-/// The scene's name + .exr, in the working folder.
+/// Default output: the name of the scene with the extension .exr, in the working folder.
 pub fn default_output(scene: &Path) -> PathBuf {
-    // A folder has no name of its own to give: `.` and `..`.
+    // `.` and `..` have no file name.
     let mut name = scene.file_stem().unwrap_or("image".as_ref()).to_owned();
     name.push(".exr");
     name.into()
 }
 
-/// A length of time in minutes, as the command line takes it.
+/// Parses a duration that is given in minutes.
 pub fn minutes(text: &str) -> std::result::Result<Duration, String> {
     match text.parse::<f64>() {
-        // What no clock can measure never comes.
+        // A time that is too long to be represented never comes.
         Ok(minutes) if minutes > 0.0 => Ok(Duration::try_from_secs_f64(60.0 * minutes).unwrap_or(Duration::MAX)),
         _ => Err("expected a number of minutes above 0".to_owned()),
     }
 }
 
 impl CheckpointFile {
-    /// Begins to count now.
+    /// Starts the first interval now.
     pub fn new(every: Duration, path: PathBuf) -> Self {
         Self { every, last: Instant::now(), path, written: None, complained: false }
     }
 
-    /// Whether it is time.
+    /// Whether the interval since the last checkpoint is over.
     pub fn is_due(&self) -> bool {
         self.last.elapsed() >= self.every
     }
 
-    /// Writes `film`, and returns where. A failure is told once, and the render goes on.
+    /// Writes `film` and returns the path of the latest checkpoint. A failure is reported once, and the render continues.
     pub fn write(&mut self, files: &mut Files, film: &Film) -> Option<PathBuf> {
         let item = Item::image(self.path.clone(), film, WriteOptions::default());
         match files.add(&self.path, &item) {
@@ -64,7 +65,7 @@ impl CheckpointFile {
         self.written.clone()
     }
 
-    /// Removes the file, unless it is one of those that are to stay.
+    /// Removes the file, unless it is in `keep`.
     pub fn remove(self, keep: &[PathBuf]) {
         if let Some(path) = self.written.filter(|path| !keep.contains(path)) {
             let _ = std::fs::remove_file(path);

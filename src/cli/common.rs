@@ -1,4 +1,4 @@
-//! Options of every command that runs on a device and writes pictures.
+//! Options shared by all commands that run on a device and write pictures.
 use super::finite;
 use crate::error::Result;
 use crate::gpu::{self, DeviceOptions, Gpu};
@@ -6,8 +6,8 @@ use crate::image::{WriteOptions, tone::ToneMap};
 use crate::settings::entry::Entry;
 use clap::{Arg, ArgAction};
 
-/// Adds range, default and placeholder to the help of the options that set `defaults`. Options that say what their default depends
-/// on keep it.
+/// Adds range, default and placeholder to the help of the options for the settings in `defaults`. An option whose help
+/// already states its default keeps it.
 pub fn with_ranges(defaults: Vec<Entry>) -> impl FnMut(Arg) -> Arg {
     move |arg| {
         let entry = defaults.iter().find(|e| arg.get_long() == Some(&*e.name));
@@ -25,7 +25,7 @@ pub fn with_ranges(defaults: Vec<Entry>) -> impl FnMut(Arg) -> Arg {
     }
 }
 
-/// The options.
+/// Options for the device and the output files.
 #[derive(clap::Args)]
 pub struct Common {
     /// Device, by index or part of its name [default: the best one]
@@ -49,12 +49,12 @@ pub struct Common {
 }
 
 impl Common {
-    /// Whether a table and warnings are wanted.
+    /// Whether to print a table and warnings.
     pub fn talkative(&self) -> bool {
         !self.quiet && !self.json
     }
 
-    /// Opens the device.
+    /// Opens the device that the options select.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`].
@@ -67,7 +67,7 @@ impl Common {
         })
     }
 
-    /// How PNG files are made.
+    /// How radiance is converted for PNG files.
     pub fn write_options(&self) -> WriteOptions {
         WriteOptions { exposure: self.exposure as f32, tone_map: self.tonemap }
     }

@@ -1,4 +1,4 @@
-//! `tallow compare`: how far an image is from its reference.
+//! `tallow compare`: measures how far an image is from its reference.
 use super::files::check_distinct;
 use super::{Exit, check_png, complain, finite, print, print_json, readable};
 use crate::error::{Error, Result};
@@ -32,7 +32,7 @@ pub struct Args {
     limits: Limits,
 }
 
-/// What each limit does when it is passed: a line on stderr, and exit code 1.
+/// Limits of the metrics. One that is exceeded gives a line on stderr and exit code 1.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Limits (exit code 1 when exceeded)")]
 struct Limits {
@@ -53,7 +53,7 @@ struct Limits {
     min_ssim: Option<f64>,
 }
 
-/// What metrics take beside the two pictures: 75 were measured at 2048 x 2048.
+/// Bytes per pixel that the metrics take in addition to the two pictures; 75 were measured at 2048 x 2048.
 const BYTES_PER_PIXEL: u64 = 80;
 
 /// Runs the subcommand.
@@ -78,7 +78,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     Ok(if exceeded.is_empty() { Exit::Done } else { Exit::LimitExceeded })
 }
 
-/// Reads what metrics can compare: every pixel is finite.
+/// Reads a layer of an image and checks that every pixel is finite, as metrics need it.
 ///
 /// # Errors
 /// [`Error::Input`].
@@ -96,6 +96,8 @@ pub fn load(path: &Path, layer: Option<&str>) -> Result<Picture> {
     }
 }
 
+/// Checks that two pictures have the same size.
+///
 /// # Errors
 /// [`Error::Input`] about the first file.
 pub fn check_sizes((a_path, a): (&Path, &Picture), (b_path, b): (&Path, &Picture)) -> Result<()> {
@@ -107,10 +109,10 @@ pub fn check_sizes((a_path, a): (&Path, &Picture), (b_path, b): (&Path, &Picture
     Err(Error::input(a_path, what))
 }
 
-/// What the metrics are called.
+/// Names of the metrics.
 pub const NAMES: [&str; 5] = ["MSE", "relMSE", "PSNR", "SSIM", "FLIP"];
 
-/// In the order of [`NAMES`].
+/// Formats the metrics, in the order of [`NAMES`].
 pub fn values(m: &Metrics) -> [String; 5] {
     [
         format!("{:.6e}", m.mse),
@@ -141,7 +143,7 @@ impl Limits {
     }
 }
 
-/// Returns the value at the top of the colour scale.
+/// Writes the heat map and returns the value at the top of its colour scale.
 fn write_diff(path: &Path, a: &Picture, b: &Picture) -> Result<f32> {
     let (map, top) = heat_map(a, b);
     let mut film = Film::new(a.width + WIDER, a.height);

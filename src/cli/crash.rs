@@ -1,13 +1,13 @@
-//! Panics, which are bugs: one line, and an exit code of their own.
+//! Reports panics, which are bugs, in one line and ends the process with an exit code of their own.
 use super::{complain, interrupt};
 use std::panic::PanicHookInfo;
 use std::sync::Mutex;
 
-/// Exit code of a bug; sysexits.h calls it EX_SOFTWARE.
+/// Exit code after a panic, EX_SOFTWARE of sysexits.h.
 pub const EXIT_CODE: i32 = 70;
 
-/// From now on a panic on any thread ends the process, unless it is in a decoder, where it becomes an error of the file.
-/// `RUST_BACKTRACE=1` adds where it came from.
+/// Installs a hook by which a panic on any thread ends the process, unless it is in a decoder, where it becomes an error
+/// about the file. `RUST_BACKTRACE=1` adds a backtrace.
 pub fn report_panics() {
     static FIRST: Mutex<()> = Mutex::new(());
     let tell = std::panic::take_hook();
@@ -15,7 +15,7 @@ pub fn report_panics() {
         if crate::image::is_decoding() {
             return;
         }
-        // Threads that panic too wait here for the end.
+        // Other threads that panic wait here until the process ends.
         let _first = FIRST.lock();
         complain(&line(panic));
         if std::env::var_os("RUST_BACKTRACE").is_some_and(|wanted| wanted != "0") {
@@ -37,7 +37,7 @@ fn line(panic: &PanicHookInfo) -> String {
 mod tests {
     use std::process::{Command, Output};
 
-    /// Runs the test below once more in a process of its own, which panics in this way.
+    /// Runs the test below again in a process of its own that panics in the given way.
     fn ended_by(way: &str, backtrace: &str) -> Output {
         let mut again = Command::new(std::env::current_exe().unwrap());
         again.args(["--exact", "cli::crash::tests::a_panic_is_one_line_and_its_own_exit_code", "--nocapture"]);

@@ -1,4 +1,4 @@
-//! `tallow devices`: what Vulkan offers here, and what is missing.
+//! `tallow devices`: lists the Vulkan devices with their limits and missing features.
 use super::{Exit, print, print_json};
 use crate::error::Result;
 use crate::gpu;
@@ -16,19 +16,19 @@ pub struct Args {
 /// One device, as printed.
 #[derive(Clone, Debug, Serialize)]
 pub struct Device {
-    /// What `render --device` takes besides the name.
+    /// Index, which `--device` accepts instead of the name.
     pub index: usize,
     /// The driver's name for it.
     pub name: String,
-    /// discrete, integrated, virtual, CPU or other.
+    /// Kind: "discrete GPU", "integrated GPU", "virtual GPU", "CPU" or "other".
     pub kind: String,
-    /// Name and version.
+    /// Name and version of the driver.
     pub driver: String,
-    /// Vulkan version, major.minor.patch.
+    /// Highest Vulkan version that it supports, as major.minor.patch.
     pub api: String,
-    /// Name and value of each limit that matters here.
+    /// Name and value of each limit that matters to Tallow.
     pub limits: Vec<(String, u64)>,
-    /// Required features and versions that it lacks; empty when it can be used.
+    /// Required features and versions that it lacks; empty if it can be used.
     pub missing: Vec<String>,
 }
 
@@ -71,7 +71,7 @@ fn device(index: usize, info: gpu::DeviceInfo) -> Device {
     }
 }
 
-/// A table of the devices, then the limits and what is missing, device by device.
+/// Formats a table of the devices, followed by the limits and the missing features of each.
 fn text(devices: &[Device]) -> String {
     let usable = |d: &Device| if d.missing.is_empty() { "yes" } else { "no" }.to_owned();
     let cells = |d: &Device| {

@@ -1,4 +1,4 @@
-//! `tallow explain`: what a scene calls for, and what that costs.
+//! `tallow explain`: lists the effects that a scene needs and measures what each of them costs.
 use super::{Exit, print, print_json, readable};
 use crate::error::{Error, Result};
 use crate::gpu::{DeviceOptions, FrameResources, Gpu, PassTime};
@@ -29,26 +29,27 @@ pub struct Args {
     pub json: bool,
 }
 
-/// One effect of a render that writes an EXR file. Costs are none where they were not measured.
+/// One effect of a render that writes an EXR file. Costs that were not measured are `None`.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Row {
+pub struct EffectRow {
     /// Name of the effect.
     pub effect: &'static str,
     /// Whether the scene calls for it.
     pub on: bool,
-    /// Object, material or setting that does; empty when off.
+    /// Object, material or setting that calls for it; empty if it is off.
     pub called_for_by: String,
-    /// GPU time of one sample per pixel with the effect compiled in.
+    /// GPU time in ms of one sample per pixel with the effect compiled in.
     pub gpu_ms_with: Option<f64>,
-    /// The same without it.
+    /// GPU time in ms without it.
     pub gpu_ms_without: Option<f64>,
-    /// Time to compile the pipelines with the effect, less that without it; 0 where they cannot be told apart.
+    /// Time in ms to compile the pipelines with the effect, less that without it; 0 if there is no measurable difference.
     pub compile_ms: Option<f64>,
-    /// Device memory that the effect adds: records of the scene that nothing else reads, and those of the render.
+    /// Bytes of device memory that the effect adds: records of the scene that nothing else reads, and buffers of the render.
     pub bytes: u64,
 }
 
-/// Runs the subcommand, in a process whose drivers keep no compiled kernels: they would hide what compilation costs.
+/// Runs the subcommand in a process whose drivers cache no compiled kernels, because a cache would hide the cost of
+/// compilation.
 ///
 /// # Errors
 /// As a render of the scene.
@@ -65,14 +66,15 @@ pub fn run(args: &Args) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// Of the outputs, that which is no effect of a kernel.
+/// Name of the output that is no effect of a kernel but is listed like one.
 const GUIDES: &str = "guides";
 
-/// Drivers read these when they are loaded: Mesa's, NVIDIA's, and where Tallow keeps its own pipelines, which cannot be there.
+/// Environment variables that switch caches off: those of Mesa and NVIDIA, which drivers read when they are loaded, and the
+/// folder of Tallow's own pipeline cache, set to one that cannot exist.
 const COLD: [(&str, &str); 3] =
     [("MESA_SHADER_CACHE_DISABLE", "true"), ("__GL_SHADER_DISK_CACHE", "0"), ("XDG_CACHE_HOME", "/dev/null")];
 
-/// The same command once more, in the place of this one: signals reach it, and its end is the end that the caller sees.
+/// Replaces this process by the same command with [`COLD`] set, so that signals reach it and the caller sees its exit code.
 #[cfg(unix)]
 fn run_cold() -> Result<Exit> {
     use std::os::unix::process::CommandExt;
@@ -80,7 +82,7 @@ fn run_cold() -> Result<Exit> {
     Err(Error::Device(format!("this program cannot be started once more: {}", again.unwrap_or_else(|e| e))))
 }
 
-/// The same command once more, whose messages and exit code are this one's.
+/// Runs the same command with [`COLD`] set and ends with its exit code.
 #[cfg(not(unix))]
 fn run_cold() -> Result<Exit> {
     let ended = std::env::current_exe().and_then(|program| again(&program).status());
@@ -95,18 +97,19 @@ fn again(program: &Path) -> Command {
     again
 }
 
-/// What was measured so far.
+/// The costs measured so far.
 #[derive(Clone, Copy)]
 struct Cost {
-    /// The least of all passes of one sample per pixel.
+    /// Least time of all passes together for one sample per pixel.
     gpu_ms: f64,
-    /// Creation of the pipelines, and what the first run took longer than a later one: compilation that the driver put off.
+    /// Time to create the pipelines, plus the time by which the first run was slower than a later one, because drivers may
+    /// compile then.
     compile_ms: f64,
-    /// Device memory.
+    /// Bytes of device memory that the renderer allocates.
     bytes: u64,
 }
 
-/// A renderer on a device of its own, so that nothing of it was compiled before.
+/// A renderer on a device of its own, for which nothing was compiled before.
 struct Variant {
     renderer: Renderer,
     frame: FrameResources,
@@ -126,7 +129,7 @@ impl Variant {
         Ok(variant)
     }
 
-    /// Milliseconds.
+    /// Renders once and returns the GPU time in milliseconds.
     fn run(&mut self) -> Result<f64> {
         let times = Job::new(&self.renderer).run_to_end(&mut self.frame)?.times;
         let ms = times.iter().map(PassTime::duration_ns).sum::<u64>() as f64 * 1e-6;
@@ -135,7 +138,7 @@ impl Variant {
     }
 }
 
-fn rows(args: &Args) -> Result<Vec<Row>> {
+fn rows(args: &Args) -> Result<Vec<EffectRow>> {
     let scene = Scene::load(&args.scene)?.with(shrink);
     let outputs = Outputs { split_light: true, guides: true, counters: false };
     let (base, reasons) = scene::effects(&scene, &scene.settings, outputs.split_light, outputs.counters);
@@ -152,7 +155,7 @@ fn rows(args: &Args) -> Result<Vec<Row>> {
         let (usual, other) = in_turn(usual, other)?;
         let (with, without) = if on { (usual, other) } else { (other, usual) };
         bar.inc(1);
-        Ok::<_, Error>(Row {
+        Ok::<_, Error>(EffectRow {
             effect,
             on,
             called_for_by: String::new(),
@@ -169,20 +172,21 @@ fn rows(args: &Args) -> Result<Vec<Row>> {
         let outputs_then = Outputs { split_light: then.split_light, counters: then.counters, ..outputs };
         let row = price((effect.name(), on), outputs_then, then)?;
         let bytes = row.bytes + scene_bytes(effect, &scene);
-        let row = Row { called_for_by: called_for_by(effect), bytes, ..row };
-        // With and without it are different renders, not one picture at two prices: tools/adaptive compares those.
-        let unknown = Row { gpu_ms_with: None, gpu_ms_without: None, compile_ms: None, ..row.clone() };
+        let row = EffectRow { called_for_by: called_for_by(effect), bytes, ..row };
+        // With and without it are different renders and not one picture at two costs; tools/adaptive compares them.
+        let unknown = EffectRow { gpu_ms_with: None, gpu_ms_without: None, compile_ms: None, ..row.clone() };
         rows.push(if effect == Effect::adaptive { unknown } else { row });
     }
     if wanted(GUIDES) {
         let guides = price((GUIDES, true), Outputs { guides: false, ..outputs }, base)?;
-        rows.push(Row { called_for_by: "an output that keeps primary hits".to_owned(), ..guides });
+        rows.push(EffectRow { called_for_by: "an output that keeps primary hits".to_owned(), ..guides });
     }
     bar.finish_and_clear();
     Ok(rows)
 }
 
-/// A small film tells enough about cost, and a kernel per effect is timed. All samples are spread evenly.
+/// Reduces the film, which is enough to compare costs, to about 65,536 pixels with one sample each, since kernels are timed
+/// for every effect.
 fn shrink(settings: &mut Settings) {
     let scale = (65_536.0 / settings.pixels() as f64).sqrt().min(1.0);
     let shrunk = |edge: u32| ((f64::from(edge) * scale) as u32).max(1);
@@ -191,7 +195,8 @@ fn shrink(settings: &mut Settings) {
     settings.allocate = Allocate { policy: settings.allocate.policy, ..Allocate::default() };
 }
 
-/// Both compiled twice and run three times, in turn, so that a machine that changes its speed changes both: the least counts.
+/// Compiles both variants twice and runs them three times, alternating, so that changes in the machine's speed affect
+/// both. The least times count.
 fn in_turn(a: impl Fn() -> Result<Variant>, b: impl Fn() -> Result<Variant>) -> Result<(Cost, Cost)> {
     let first = [a()?.cost, b()?.cost];
     let (mut a, mut b) = (a()?, b()?);
@@ -203,7 +208,7 @@ fn in_turn(a: impl Fn() -> Result<Variant>, b: impl Fn() -> Result<Variant>) -> 
     Ok((least(first[0], a.cost), least(first[1], b.cost)))
 }
 
-/// Device memory of the scene's records that nothing but this effect reads. A new effect must say here what it takes.
+/// Bytes of the scene's records that only this effect reads. Every new effect needs an entry here.
 fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
     let maps = |of: fn(&Material) -> [u32; 4]| {
         let named: BTreeSet<u32> = scene.materials.iter().flat_map(of).filter(|&map| map != NONE).collect();
@@ -229,9 +234,9 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
         Effect::spot_lights => lights(LIGHT_SPOT),
         Effect::directional_lights => lights(LIGHT_DIRECTIONAL),
         Effect::environment => lights(LIGHT_ENVIRONMENT),
-        // A sphere lies in the records of a triangle, and a large lamp is a lamp that is sampled in another way.
+        // A sphere takes the record of a triangle, and a large lamp is only sampled in another way.
         Effect::spheres | Effect::large_lamps => 0,
-        // What materials are made of: every material has room for all of it.
+        // Every material has room for the parameters of all BSDFs.
         Effect::diffuse
         | Effect::conductor
         | Effect::dielectric
@@ -240,7 +245,7 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
         | Effect::smooth_interface
         | Effect::beckmann
         | Effect::ggx => 0,
-        // What settings and outputs ask for: no record of the scene.
+        // Settings and outputs call for these; they take no record of the scene.
         Effect::lens
         | Effect::indirect
         | Effect::roulette
@@ -255,10 +260,10 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
     bytes as u64
 }
 
-/// The rows as a table; a dash stands for what was not measured.
-pub fn text(rows: &[Row]) -> String {
+/// Formats the rows as a table, with a dash for costs that were not measured.
+pub fn text(rows: &[EffectRow]) -> String {
     let ms = |value: Option<f64>| value.map_or("-".to_owned(), milliseconds);
-    let cells = |r: &Row| {
+    let cells = |r: &EffectRow| {
         vec![
             r.effect.to_owned(),
             if r.on { "on" } else { "off" }.to_owned(),
@@ -275,12 +280,13 @@ pub fn text(rows: &[Row]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Row, text};
+    use super::{EffectRow, text};
 
     #[test]
     fn costs_not_measured_are_dashes() {
-        let on = Row { effect: "ggx", on: true, called_for_by: "vase".to_owned(), bytes: 64, ..Row::default() };
-        let table = text(&[on, Row { effect: "lens", ..Row::default() }]);
+        let on =
+            EffectRow { effect: "ggx", on: true, called_for_by: "vase".to_owned(), bytes: 64, ..EffectRow::default() };
+        let table = text(&[on, EffectRow { effect: "lens", ..EffectRow::default() }]);
         let last = |line: usize| table.lines().nth(line).unwrap().split_whitespace().collect::<Vec<_>>();
         assert_eq!(last(1), ["ggx", "on", "-", "-", "-", "64", "vase"]);
         assert_eq!(last(2), ["lens", "off", "-", "-", "-", "0"]);

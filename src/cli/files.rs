@@ -1,4 +1,5 @@
-//! The files that a command writes: each is tried, whatever becomes of the others, and none is replaced by less than it holds.
+//! The files that a command writes. A failure of one does not keep the others from being written, and an incomplete result
+//! does not replace a file of an earlier run.
 use super::interrupt;
 use crate::error::{Error, Result};
 use crate::image::output::{self, Stream};
@@ -6,40 +7,40 @@ use crate::image::{self, Film, WriteOptions};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// A file to write, and what writes it.
+/// A file to write, and the function that writes its content.
 pub struct Item<'a> {
-    /// Where it should go.
+    /// The requested path.
     pub path: PathBuf,
-    /// What goes there.
+    /// The function that writes the content.
     pub fill: Fill<'a>,
 }
 
-/// Writes a file; may be called again when a first place fails.
+/// Writes the content of a file. It is called again if writing to the first path fails.
 type Fill<'a> = Box<dyn Fn(&mut dyn Stream) -> std::io::Result<()> + 'a>;
 
 impl<'a> Item<'a> {
-    /// An image, in the format that the name says.
+    /// An image in the format of the file extension.
     pub fn image(path: PathBuf, film: &'a Film, options: WriteOptions) -> Self {
         let name = path.clone();
         Self { path, fill: Box::new(move |stream| image::encode(&name, film, &options, stream)) }
     }
 
-    /// Any file.
+    /// A file with the given bytes.
     pub fn bytes(path: PathBuf, bytes: Vec<u8>) -> Self {
         Self { path, fill: Box::new(move |stream| stream.write_all(&bytes)) }
     }
 }
 
-/// Files of one run.
+/// The files written by one run.
 #[derive(Default)]
 pub struct Files {
-    /// Where this run has put a file, by where it was to go, links followed. This run may replace those.
+    /// Paths of the files that this run has written and may replace, by their requested paths with links followed.
     own: BTreeMap<PathBuf, PathBuf>,
-    /// What was wanted and could not be written, and where it is instead.
+    /// Requested paths that could not be written, with the error and where the file is instead.
     failures: Vec<(PathBuf, String)>,
 }
 
-/// `a.partial.exr` for `a.exr`.
+/// Name for an incomplete file: `a.partial.exr` for `a.exr`.
 pub fn partial_name(path: &Path) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_owned();
     name.push(".partial");
@@ -50,28 +51,30 @@ pub fn partial_name(path: &Path) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// Two paths of one file have one key.
+/// A key that is the same for all paths of one file.
 fn key(path: &Path) -> PathBuf {
     output::resolve(path).unwrap_or_else(|_| path.to_owned())
 }
 
 impl Files {
-    /// `resumed` is the file that this run goes on from, which it may replace.
+    /// `resumed` is the file that this run continues and therefore may replace.
     pub fn new(resumed: Option<&Path>) -> Self {
         let own = resumed.map(|path| (key(path), path.to_owned())).into_iter().collect();
         Self { own, failures: Vec::new() }
     }
 
-    /// Writes all that are files, and returns where they are. What is not `whole` goes beside a file that it did not write,
-    /// under the name of [`partial_name`]. Signals wait until all is written. Pipes are left for [`Self::pipe`].
+    /// Writes all items that are regular files and returns their paths. If the result is not `whole`, a file of an earlier run
+    /// is kept and [`partial_name`] is used instead. Signals take effect only after all are written. Pipes are left to
+    /// [`Self::pipe`].
     pub fn save(&mut self, items: &[Item], whole: bool) -> Vec<PathBuf> {
         interrupt::flag();
         let files = items.iter().filter(|item| !output::is_special(&item.path));
         files.filter_map(|item| self.save_one(item, whole)).collect()
     }
 
-    /// Writes what goes to pipes and devices, and returns where it went. A pipe may have no reader, so that a signal ends the
-    /// process now; so does one that came while the other files were written, unless it is why they are not `whole`.
+    /// Writes the items that are pipes or devices and returns their paths. A pipe may have no reader, so from here on a signal
+    /// ends the process at once. So does one that came while the other files were written, unless it is the reason why they
+    /// are not `whole`.
     pub fn pipe(&mut self, items: &[Item], whole: bool) -> Vec<PathBuf> {
         let pipes = items.iter().filter(|item| output::is_special(&item.path));
         let written = pipes.filter_map(|item| self.pipe_one(item, whole)).collect();
@@ -79,14 +82,14 @@ impl Files {
         written
     }
 
-    /// All failures so far as one.
+    /// All failures so far as one error.
     pub fn failure(&self) -> Option<Error> {
         let ((path, first), more) = self.failures.split_first()?;
         let more = more.iter().map(|(path, what)| format!("; {}: {what}", path.display())).collect::<String>();
         Some(Error::output(path, format!("{first}{more}")))
     }
 
-    /// This line, and what has failed.
+    /// Appends all failures so far to `line`.
     pub fn with_failures(&self, line: &str) -> String {
         self.failure().map_or(line.to_owned(), |e| format!("{line}; {e}"))
     }
@@ -112,7 +115,7 @@ impl Files {
         }
     }
 
-    /// Writes where it should go, or where this run has put it before.
+    /// Writes to the requested path, or to where this run has written the file before.
     fn replace(&mut self, item: &Item) -> Result<PathBuf> {
         let key = key(&item.path);
         let place = self.own.get(&key).cloned().unwrap_or_else(|| item.path.clone());
@@ -121,7 +124,7 @@ impl Files {
         Ok(place)
     }
 
-    /// Writes to `path` if this run has written there before, and else to a new file of that name or one with a number.
+    /// Writes to `path` if this run has written it before, else to a new file of that name or of that name with a number.
     ///
     /// # Errors
     /// [`Error::Output`].
@@ -136,7 +139,7 @@ impl Files {
         Ok(place)
     }
 
-    /// Keeps what a failed write would lose: in the working folder, or in that for temporary files.
+    /// Saves a file that could not be written in the working folder or in the folder for temporary files.
     fn put_elsewhere(&mut self, item: &Item, failure: &Error) -> Option<PathBuf> {
         let name = item.path.file_name()?;
         let places = [PathBuf::from(name), std::env::temp_dir().join(name)];
@@ -157,8 +160,8 @@ impl Files {
     }
 }
 
-/// Refuses outputs that are one file, or an input. Each is an option, or what the user calls it, and a path. Pipes and
-/// devices may be written to more than once.
+/// Checks that no output is the same file as another output or an input. Each is given as the option or another name for
+/// messages, and a path. Pipes and devices may be written to more than once.
 ///
 /// # Errors
 /// [`Error::Usage`].

@@ -1,4 +1,4 @@
-//! `tallow filter`: a noisy image becomes a clean one.
+//! `tallow filter`: denoises an image file.
 mod options;
 mod supersampling;
 
@@ -50,49 +50,49 @@ pub struct Args {
     /// First cut pixels that are more than N times brighter than all but one around them, and say what that took away
     #[arg(long, value_name = "N")]
     pub fireflies: Option<f32>,
-    /// Device and output.
+    /// Options for the device and the output files.
     #[command(flatten)]
     pub common: Common,
-    /// Where the layers are.
+    /// Names of the layers.
     #[command(flatten)]
     pub layers: Layers,
-    /// Filtered light along eye rays.
+    /// Options of the lookup along eye rays.
     #[command(flatten)]
     pub supersampling: Supersampling,
-    /// Replace the filters' own settings.
+    /// Settings of the filters.
     #[command(flatten)]
     pub overrides: Overrides,
 }
 
-/// What `--json` prints.
+/// The object that `--json` prints.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
-    /// Files written; what is not UTF-8 in their names is replaced.
+    /// Files written; anything in their names that is not UTF-8 is replaced.
     pub files: Vec<String>,
     /// Name of the filter.
     pub filter: &'static str,
-    /// Pixels, stored ones, shown or not.
+    /// Width of the stored image in pixels.
     pub width: u32,
-    /// Pixels.
+    /// Height of the stored image in pixels.
     pub height: u32,
-    /// What was found in the file, what was missing and what was made of it.
+    /// Layers that were found or missing in the file, and how they were used.
     pub notes: Vec<String>,
-    /// Wall time of filtering without reading and writing.
+    /// Wall time of filtering in seconds, without reading and writing.
     pub seconds: f64,
     /// Name of the device.
     pub device: String,
     /// GPU time by pass.
     pub passes: Vec<PassRow>,
-    /// Distance from the reference; none without `--reference`, or where a pixel is NaN or infinite.
+    /// Metrics of the noisy image against the reference; `None` without `--reference` or if a pixel is NaN or infinite.
     pub before: Option<Metrics>,
-    /// The same of the result.
+    /// Metrics of the filtered image, in the same way.
     pub after: Option<Metrics>,
 }
 
 /// Runs the subcommand.
 ///
 /// # Errors
-/// Of every kind; nothing is written then.
+/// Errors of every kind. No file is written unless the error is about writing.
 pub fn run(args: &Args) -> Result<Exit> {
     check_outputs(args)?;
     let file = Unread::open(&args.image)?;
@@ -125,16 +125,15 @@ pub fn run(args: &Args) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// Bytes of host memory that a pixel takes beside the file's channels: those of the filtered colour, and then while it is filtered
-/// the device's planes, where these lie in the same memory, or while it is put into the file the file itself, encoded and decoded
-/// once more.
+/// Bytes of host memory per pixel in addition to the file's channels: the filtered colour, and the larger of the planes on
+/// the device, if they are in the same memory, and the file, which is encoded and decoded once more.
 fn bytes_per_pixel(filter: &Row, unified: bool) -> u64 {
     const COLOUR: u64 = size_of::<vec3>() as u64;
     const REPLACED: u64 = 400;
     COLOUR + if unified { denoise::bytes_per_pixel(filter).max(REPLACED) } else { REPLACED }
 }
 
-/// Large images take minutes to be read and prepared; what cannot be filtered is told before.
+/// Checks before decoding, which can take minutes, that the image can be filtered.
 fn check_room(args: &Args, gpu: &Gpu, claim: &Claim) -> Result<()> {
     filter::check_size(gpu, claim.size, filter::GUIDE_TEXELS)?;
     let bytes = claim.bytes.saturating_add(claim.pixels() * bytes_per_pixel(args.filter, gpu.info().unified));
@@ -143,7 +142,7 @@ fn check_room(args: &Args, gpu: &Gpu, claim: &Claim) -> Result<()> {
     memory::check(bytes).map_err(|what| Error::Memory(refused(what)))
 }
 
-/// The image may be filtered in place.
+/// Checks the paths of the outputs. They may include the image itself.
 fn check_outputs(args: &Args) -> Result<()> {
     args.outputs.iter().try_for_each(|path| image::check_writable(path))?;
     let outputs: Vec<_> = args.outputs.iter().map(|path| ("-o", path.as_path())).collect();
@@ -198,7 +197,8 @@ fn filtered(args: &Args, gpu: &Gpu, aovs: &Aovs) -> Result<(Colour, Vec<PassTime
     Ok((colour, times, notes))
 }
 
-/// The file with the filtered colour; the noisy one stays as a layer. Where its three channels are one, that holds their mean.
+/// Puts the filtered colour into the file and keeps the noisy one as a layer. A single grey channel gets the mean of the
+/// three.
 fn replaced(args: &Args, source: &Source, aovs: &Aovs, mut colour: Colour) -> Result<Source> {
     if aovs.colour[0] == aovs.colour[1] {
         let [r, g, b] = &colour;
@@ -209,7 +209,7 @@ fn replaced(args: &Args, source: &Source, aovs: &Aovs, mut colour: Colour) -> Re
     source.replaced(&channels, aovs.keep_as(), (crate::render::film::FILTERED, args.filter.name))
 }
 
-/// Read before anything long, and of the size of the image.
+/// Reads the reference, before any long work, and checks that it has the size of the image.
 fn reference(args: &Args, source: &Source) -> Result<Option<Picture>> {
     let Some(path) = &args.reference else { return Ok(None) };
     let reference = compare::load(path, None)?;
@@ -244,7 +244,7 @@ fn text(args: &Args, s: &Summary) -> String {
     text
 }
 
-/// A column is dashes where no metric can weigh the image.
+/// Formats the metrics before and after, with dashes for an image that is not finite.
 fn metrics_table(before: &Option<Metrics>, after: &Option<Metrics>) -> String {
     let column = |m: &Option<Metrics>| m.as_ref().map(compare::values);
     let (before, after) = (column(before), column(after));

@@ -1,4 +1,4 @@
-//! Signals that ask a command to stop: Ctrl-C (INT), TERM and HUP.
+//! Handling of the signals that ask a command to stop: Ctrl-C (INT), TERM and HUP.
 use super::{Exit, complain};
 use crate::image::output;
 use std::io::{IsTerminal, Write};
@@ -9,19 +9,19 @@ use std::time::{Duration, Instant};
 static ASKED: AtomicBool = AtomicBool::new(false);
 static LISTENER: Mutex<Listener> = Mutex::new(Listener { first_ctrl_c: None, leave: true, line: String::new() });
 
-/// Keys that repeat and impatient fingers send more than one Ctrl-C; the one that kills comes so much later than the first.
+/// A second Ctrl-C ends the process only if it comes this long after the first, because key repeat sends several.
 const MEANT: Duration = Duration::from_secs(1);
 
 struct Listener {
     first_ctrl_c: Option<Instant>,
     /// Whether a signal ends the process, because there is nothing to save.
     leave: bool,
-    /// What is said then.
+    /// The message that is printed then.
     line: String,
 }
 
 impl Listener {
-    /// Whether the process is to end at once. TERM and HUP only ask, however often they come.
+    /// Returns whether the process must end at once. TERM and HUP never end it when there is something to save.
     fn hear(&mut self, ctrl_c: bool, first_ask: bool, now: Instant) -> bool {
         let again = match (ctrl_c, self.first_ctrl_c) {
             (true, Some(first)) => now.duration_since(first) >= MEANT,
@@ -39,9 +39,9 @@ fn listener() -> MutexGuard<'static, Listener> {
     LISTENER.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// From now on a signal sets this flag: whoever works in steps looks at it between two of them, and returns
-/// [`Exit::Interrupted`] with what there is. A second Ctrl-C that comes a second after the first still ends the process;
-/// files are safe even then, as they get their names only when complete.
+/// From now on a signal sets the returned flag. Code that works in steps checks it between steps and returns
+/// [`Exit::Interrupted`] with the result so far. A second Ctrl-C at least a second after the first still ends the process.
+/// Files are safe even then, because they get their names only when they are complete.
 pub fn flag() -> &'static AtomicBool {
     let mut listener = listener();
     listener.leave = false;
@@ -49,7 +49,7 @@ pub fn flag() -> &'static AtomicBool {
     &ASKED
 }
 
-/// From now on a signal ends the process with this line. Returns whether one came before, and was not acted on.
+/// From now on a signal ends the process with this line. Returns whether one came before.
 pub fn leave_at_once(line: &str) -> bool {
     let mut listener = listener();
     listener.leave = true;
@@ -57,18 +57,18 @@ pub fn leave_at_once(line: &str) -> bool {
     ASKED.load(Ordering::SeqCst)
 }
 
-/// Ends the process as a signal does.
+/// Prints `line` and ends the process as a signal does.
 pub fn leave(line: &str) -> ! {
     let mut stderr = std::io::stderr();
     if stderr.is_terminal() {
-        // A progress bar may stand there.
+        // A progress bar may be on the line.
         let _ = stderr.write_all(b"\r\x1b[K");
     }
     complain(line);
     exit(Exit::Interrupted as i32)
 }
 
-/// Ends the process from any thread. Nothing is unwound: a driver may be in the middle of anything.
+/// Ends the process from any thread without unwinding, because a driver may be in the middle of a call.
 pub fn exit(code: i32) -> ! {
     output::remove_unfinished();
     #[cfg(unix)]
@@ -77,8 +77,8 @@ pub fn exit(code: i32) -> ! {
     std::process::exit(code)
 }
 
-/// Begins to listen; for the command line's start. What the caller has switched off (`nohup`, `&` in a script) stays off.
-/// Where no thread can be started, signals end the process as they end any other.
+/// Begins to listen for signals, at the start of the command line. Signals that the caller ignores (`nohup`, `&` in a
+/// script) stay ignored. If no thread can be started, signals have their default effect.
 pub fn install() {
     leave_at_once("interrupted: nothing was written");
     #[cfg(unix)]
@@ -95,7 +95,7 @@ pub fn install() {
 mod tests {
     use super::*;
 
-    /// What each of some signals, given by seconds and whether it is Ctrl-C, does: whether it ends the process.
+    /// Returns for each signal, given by its time in seconds and whether it is Ctrl-C, whether it ends the process.
     fn ends(leave: bool, signals: &[(f64, bool)]) -> Vec<bool> {
         let mut listener = Listener { first_ctrl_c: None, leave, line: String::new() };
         let begin = Instant::now();
@@ -122,7 +122,7 @@ mod tests {
     fn what_nobody_would_miss_is_left_at_once() {
         assert_eq!(ends(true, &[(0.0, true)]), [true]);
         assert_eq!(ends(true, &[(0.0, false)]), [true]);
-        // Asked before, while there was something to save: TERM again changes nothing, the first Ctrl-C does.
+        // If a signal came while there was something to save, another TERM changes nothing, but the first Ctrl-C does.
         let mut listener = Listener { first_ctrl_c: None, leave: true, line: String::new() };
         assert!(!listener.hear(false, false, Instant::now()));
         assert!(listener.hear(true, false, Instant::now()));
@@ -135,11 +135,11 @@ mod signals {
     use signal_hook::iterator::Signals;
     use std::sync::mpsc;
 
-    /// Calls `heard` on a thread of its own, with whether it was Ctrl-C.
+    /// Starts a thread that calls `heard` for every signal, with whether it is Ctrl-C.
     pub fn listen(heard: fn(bool)) {
         let ignored = std::fs::read_to_string("/proc/self/status").map_or(0, |status| ignored(&status));
         let wanted = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| ignored & (1 << (signal - 1)) == 0);
-        // It comes with an error of the write, which says more than the end of the process that it is by default.
+        // By default SIGXFSZ ends the process. It is caught because the write also fails, with a better message.
         let signals: Vec<_> = wanted.chain([SIGXFSZ]).collect();
         let (ready, wait) = mpsc::channel();
         let listener = move || {
@@ -152,7 +152,7 @@ mod signals {
         }
     }
 
-    /// A bit for each signal that this process ignores, by what Linux says of it; other systems do not say.
+    /// Returns a bit for each signal that this process ignores, from Linux's `/proc`; other systems do not tell.
     fn ignored(status: &str) -> u64 {
         let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
         mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)

@@ -1,4 +1,4 @@
-//! `tallow merge`: renders of the same picture by different samples become one.
+//! `tallow merge`: combines renders of the same picture with different samples into one.
 use super::{Exit, complain};
 use crate::error::Result;
 use crate::image::{self, WriteOptions};

@@ -1,4 +1,4 @@
-//! The command line: one file per subcommand.
+//! The command line. Each subcommand has a file of its own; this one parses, dispatches and prints.
 pub mod checkpoint;
 pub mod common;
 pub mod compare;
@@ -51,18 +51,18 @@ enum Command {
     Devices(devices::Args),
 }
 
-/// How a command ended when nothing failed.
+/// How a command ended without an error. The value is the exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Exit {
-    /// All done.
+    /// Everything was done.
     Done = 0,
-    /// A limit of the user's is exceeded.
+    /// A limit given by the user was exceeded.
     LimitExceeded = 1,
-    /// Stopped by Ctrl-C.
+    /// The command was stopped by Ctrl-C or another signal.
     Interrupted = 130,
 }
 
-/// Runs the command line and returns its exit code. What fails is told in one line on stderr.
+/// Runs the command line and returns its exit code. An error is printed in one line on stderr.
 pub fn main() -> ExitCode {
     crash::report_panics();
     interrupt::install();
@@ -79,7 +79,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// A number that is negative is a value and not an option, whether the option that it is given to takes it or not.
+/// Parses the command line. A negative number is always the value of an option and never an option itself.
 fn parse(words: impl IntoIterator<Item = OsString>) -> std::result::Result<Cli, clap::Error> {
     let numbers = |arg: Arg| match arg.get_long().is_some() && arg.get_action().takes_values() {
         true => arg.allow_negative_numbers(true),
@@ -100,7 +100,7 @@ fn run(command: Command) -> Result<Exit> {
     }
 }
 
-/// clap's help and version are no errors; of its messages, the problem and the tip are kept and made one line.
+/// Prints clap's help or version, or turns its error message into one line with the problem and the tip.
 fn usage(e: &clap::Error) -> Result<Exit> {
     let text = e.render().to_string();
     if !e.use_stderr() {
@@ -117,9 +117,9 @@ fn usage(e: &clap::Error) -> Result<Exit> {
     Err(Error::Usage(format!("{} (see tallow --help)", message.trim_start_matches("error: "))))
 }
 
-/// Control characters become visible: names out of files may hold what a terminal obeys, or a line break.
+/// Escapes control characters, because names in files may contain terminal commands or line breaks.
 pub fn readable(text: &str) -> String {
-    // These turn the direction of what follows them.
+    // These change the direction of the text that follows.
     let turns = |c| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     let shown = |c: char| match c.is_control() || turns(c) {
         true => c.escape_default().to_string(),
@@ -128,12 +128,12 @@ pub fn readable(text: &str) -> String {
     text.chars().map(shown).collect()
 }
 
-/// Writes one line to stderr. A closed stderr is no reason to fail.
+/// Writes one line to stderr. A closed stderr is ignored.
 pub fn complain(message: &str) {
     let _ = writeln!(std::io::stderr(), "{}", readable(message));
 }
 
-/// Writes lines to stdout. A reader that has seen enough (`| head`) is no error; a full disk behind it is one.
+/// Writes lines to stdout. A reader that stops early (`| head`) is no error, but a full disk is.
 ///
 /// # Errors
 /// [`Error::Output`].
@@ -141,13 +141,13 @@ pub fn print(text: &str) -> Result<()> {
     write_out(&text.split('\n').map(readable).collect::<Vec<_>>().join("\n"))
 }
 
-/// Prints a value as one line of JSON; numbers that JSON does not know (infinities) become null.
+/// Prints a value as one line of JSON. Infinities, which JSON cannot express, become null.
 ///
 /// # Errors
 /// As [`print()`].
 pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
     let text = serde_json::to_string(value).map_err(|e| Error::output("standard output", e))?;
-    // What JSON allows as it is, terminals may obey.
+    // JSON allows some control characters unescaped that terminals would execute.
     let shown = |c: char| if c.is_control() { format!("\\u{:04x}", u32::from(c)) } else { c.to_string() };
     write_out(&(text.chars().map(shown).collect::<String>() + "\n"))
 }
@@ -160,7 +160,7 @@ fn write_out(text: &str) -> Result<()> {
     }
 }
 
-/// With `--validation`, any message is a failure.
+/// Fails on any message of the validation layers; there are none without `--validation`.
 fn fail_on_messages(gpu: &Gpu) -> Result<()> {
     match gpu.validation_messages().first() {
         Some(message) => Err(Error::Device(format!("validation: {message}"))),
@@ -168,7 +168,7 @@ fn fail_on_messages(gpu: &Gpu) -> Result<()> {
     }
 }
 
-/// Checks that a picture in false colours can be written.
+/// Checks that a picture in false colours can be written to `path`, which must end in .png.
 fn check_png(option: &str, path: &Path) -> Result<()> {
     match path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
         true => crate::image::check_writable(path),
@@ -176,7 +176,7 @@ fn check_png(option: &str, path: &Path) -> Result<()> {
     }
 }
 
-/// A finite number, for options where NaN would switch a check off.
+/// Parses a finite number, for options where NaN would disable a check.
 fn finite(text: &str) -> std::result::Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),

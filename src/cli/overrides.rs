@@ -1,6 +1,6 @@
-//! Settings that the command line gives over those of the scene file.
+//! Settings on the command line, which replace those of the scene file.
 use super::common::with_ranges;
-use crate::allocate::{POLICIES, Placing, Row};
+use crate::allocate::{POLICIES, Placing, Policy};
 use crate::render::settings::{AllocateOverrides, Film, Render, Sequence, Settings};
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
@@ -9,21 +9,21 @@ use clap::builder::PossibleValue;
 #[derive(clap::Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Settings", mut_args(with_ranges(Settings::default().entries())))]
 pub struct Overrides {
-    /// Of the film.
+    /// Settings of the film.
     #[command(flatten)]
     pub film: Film,
-    /// Of the paths.
+    /// Settings of the paths.
     #[command(flatten)]
     pub render: Render,
-    /// Of the random numbers.
+    /// Settings of the random numbers.
     #[command(flatten)]
     pub sequence: Sequence,
-    /// Where samples go.
+    /// Settings of sample allocation.
     #[command(flatten, next_help_heading = "Where samples go")]
     pub allocate: AllocateOverrides,
 }
 
-impl ValueEnum for &'static Row {
+impl ValueEnum for &'static Policy {
     fn value_variants<'a>() -> &'a [Self] {
         POLICIES
     }
@@ -34,9 +34,10 @@ impl ValueEnum for &'static Row {
 }
 
 impl Overrides {
-    /// Replaces those settings that were given. A noise threshold without a policy that learns gets the first that does.
+    /// Replaces the settings that were given. A noise threshold without a learning policy selects the first such policy,
+    /// `variance`.
     pub fn apply(&self, settings: &mut Settings) {
-        let learns = |row: &Row| row.placing == Placing::Learning;
+        let learns = |row: &Policy| row.placing == Placing::Learning;
         let threshold = self.allocate.noise_threshold.is_some_and(|e| e > 0.0);
         if threshold && !learns(settings.allocate.policy) {
             settings.allocate.policy = POLICIES.iter().find(|row| learns(row)).expect("the policy variance learns");

@@ -3,7 +3,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
-/// Percent, speed and time left. Silent when stderr is no terminal.
+/// A bar with percent, speed and remaining time. It is hidden if stderr is no terminal.
 pub struct Progress {
     bar: ProgressBar,
     start: Instant,
@@ -11,7 +11,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// A bar for so many samples in all; `quiet` hides it.
+    /// Makes a bar for a total of `total_samples` samples; `quiet` hides it.
     pub fn new(total_samples: u64, quiet: bool) -> Self {
         let hidden = quiet || !std::io::stderr().is_terminal();
         let target = if hidden { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(10) };
@@ -22,17 +22,17 @@ impl Progress {
         Self { bar, start: Instant::now(), shown: None }
     }
 
-    /// Shows how many samples are done.
+    /// Shows the number of samples that are done.
     pub fn set(&mut self, samples: u64) {
         self.bar.set_position(samples);
     }
 
-    /// Whether somebody sees it, and has seen the last speed for a while.
+    /// Whether the bar is visible and its speed older than 200 ms.
     pub fn wants_speed(&self) -> bool {
         !self.bar.is_hidden() && self.shown.is_none_or(|shown| shown.elapsed() > Duration::from_millis(200))
     }
 
-    /// Shows the speed, by the rays of some of the samples: (rays, samples).
+    /// Shows the speed, extrapolated from the number of rays of some of the samples: [rays, samples].
     pub fn set_speed(&mut self, rays_of: [u64; 2]) {
         self.shown = Some(Instant::now());
         self.bar.set_message(speed(self.bar.position(), rays_of, self.start.elapsed().as_secs_f64()));

@@ -1,10 +1,10 @@
-//! Who touches what: the one table from accesses to Vulkan's masks, and the barriers that follow from it.
+//! Buffer accesses of passes: the table that maps them to Vulkan's stage and access masks, and the barriers that follow.
 use super::Untyped;
 use ash::vk;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// How one pass touches one buffer.
+/// How one pass accesses one buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
     /// Storage buffer marked `readonly`.
@@ -13,9 +13,9 @@ pub enum Access {
     Write,
     /// Storage buffer with neither mark.
     ReadWrite,
-    /// Uniform texel buffer.
+    /// Uniform texel buffer, which kernels can only read.
     TexelRead,
-    /// Uniform buffer.
+    /// Uniform buffer, which kernels can only read.
     UniformRead,
     /// Source of a copy.
     CopySource,
@@ -33,7 +33,7 @@ const ALL: [Access; 7] = [
     Access::CopyTarget,
 ];
 
-/// The only place that knows which stages and accesses an [`Access`] means: (stage, reads, writes).
+/// Returns (stage, reads, writes) of an access. No other code maps accesses to masks.
 fn masks(access: Access) -> (vk::PipelineStageFlags2, vk::AccessFlags2, vk::AccessFlags2) {
     use vk::{AccessFlags2 as A, PipelineStageFlags2 as S};
     match access {
@@ -57,8 +57,8 @@ impl Access {
     }
 }
 
-/// From everything that passes do to everything that passes do. It is as wide as that, so that whatever came before
-/// it needs no second barrier for a later pass of another kind.
+/// A barrier between all accesses that passes can make. Because it covers every kind of access, a later pass of another
+/// kind needs no second barrier for the same earlier work.
 fn between_passes() -> vk::MemoryBarrier2<'static> {
     let (mut stages, mut reads, mut writes) =
         (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE, vk::AccessFlags2::NONE);
@@ -72,7 +72,8 @@ fn between_passes() -> vk::MemoryBarrier2<'static> {
         .dst_access_mask(reads | writes)
 }
 
-/// Makes whatever any stage wrote before visible to whatever reads later, the host included: the edges of a recording.
+/// Makes everything written before visible to everything that reads later, the host included. A recording begins and
+/// ends with it.
 ///
 /// # Safety
 /// `commands` is recording on `device`.
@@ -95,11 +96,11 @@ pub(super) unsafe fn pass_barrier(device: &ash::Device, commands: vk::CommandBuf
 unsafe fn emit(device: &ash::Device, commands: vk::CommandBuffer, barrier: vk::MemoryBarrier2<'_>) {
     let barriers = [barrier];
     let info = vk::DependencyInfo::default().memory_barriers(&barriers);
-    // SAFETY: by the contract of the callers.
+    // SAFETY: the callers guarantee that `commands` is recording on `device`.
     unsafe { device.cmd_pipeline_barrier2(commands, &info) };
 }
 
-/// What was done to each buffer since the last barrier.
+/// How each buffer was accessed since the last barrier.
 #[derive(Default)]
 pub(super) struct Hazards {
     touched: HashMap<vk::Buffer, Touch>,
@@ -114,7 +115,7 @@ struct Touch {
 }
 
 impl Hazards {
-    /// Notes a pass's accesses; true when a barrier must come before it.
+    /// Records the accesses of a pass and returns whether a barrier must precede it.
     pub fn note(&mut self, accesses: &[(&Arc<Untyped>, Access)]) -> bool {
         for (buffer, _) in accesses {
             self.kept.entry(buffer.raw).or_insert_with(|| (*buffer).clone());
@@ -138,7 +139,7 @@ impl Hazards {
         conflict
     }
 
-    /// Lets go of everything; the work that used it is complete.
+    /// Forgets all accesses and releases the buffers. The work that used them must be complete.
     pub fn clear(&mut self) {
         self.touched.clear();
         self.kept.clear();
@@ -150,7 +151,7 @@ mod tests {
     use super::*;
     use ash::vk::Handle;
 
-    /// Which of these passes need a barrier before them.
+    /// Returns for each pass whether it needs a barrier before it.
     fn barriers(passes: &[&[(u64, Access)]]) -> Vec<bool> {
         let mut hazards = Hazards::default();
         let raw = |pass: &[(u64, Access)]| pass.iter().map(|(b, a)| (vk::Buffer::from_raw(*b), *a)).collect::<Vec<_>>();

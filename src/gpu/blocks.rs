@@ -1,16 +1,17 @@
-//! Dispatches over blocks of pixels.
+//! Dispatches of kernels whose workgroups each process one block of consecutive pixels.
 use super::{Bindings, Gpu, Kernel, Recorder};
 use crate::error::{Error, Result};
 use crate::shaders::shared::block;
 
-/// A kernel whose workgroups each own a block of pixels, a run of them each thread; or one that closes what those began.
+/// A kernel whose workgroups each process one block of pixels and whose threads each process a run of pixels within it;
+/// or the single-workgroup kernel that combines the results of the blocks.
 pub struct PerBlock<B> {
     kernel: Kernel<B>,
     thread_items: u32,
 }
 
 impl<B: Bindings<Constants: From<block::Constants>>> PerBlock<B> {
-    /// Compiles the kernel for blocks of threads with so many pixels: see [`thread_items`].
+    /// Compiles the kernel for `thread_items` pixels per thread (see [`thread_items`]).
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when the driver refuses it, [`Error::Usage`] for more than 1024 pixels or none.
@@ -21,7 +22,7 @@ impl<B: Bindings<Constants: From<block::Constants>>> PerBlock<B> {
         Ok(Self { kernel: Kernel::new(gpu, &block::Constants { thread_items }.into())?, thread_items })
     }
 
-    /// Records it over all blocks of a film.
+    /// Records one workgroup for every block of a film of `pixels` pixels.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`].
@@ -29,7 +30,7 @@ impl<B: Bindings<Constants: From<block::Constants>>> PerBlock<B> {
         rec.dispatch(&self.kernel, bind, push, [block_count(pixels, self.thread_items), 1, 1])
     }
 
-    /// Records one workgroup of it.
+    /// Records a single workgroup.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`].
@@ -38,19 +39,19 @@ impl<B: Bindings<Constants: From<block::Constants>>> PerBlock<B> {
     }
 }
 
-/// Workgroups along one axis that every Vulkan device can run.
+/// Number of workgroups along one axis that every Vulkan device supports.
 const MAX_GROUPS: u32 = 65_535;
 
-/// Pixels of a thread of a [`PerBlock`] kernel at most.
+/// Largest number of pixels per thread of a [`PerBlock`] kernel.
 const MOST_ITEMS: u32 = 1024;
 
-/// Blocks of a film.
+/// Number of blocks that cover `pixels` pixels.
 pub fn block_count(pixels: u32, thread_items: u32) -> u32 {
     pixels.div_ceil(block::BLOCK_THREADS * thread_items)
 }
 
-/// Pixels that a thread of a [`PerBlock`] kernel walks over: as many as suit the device, or more where a film would need too
-/// many blocks.
+/// Number of pixels that each thread of a [`PerBlock`] kernel processes: the device's preferred number, or 64 where a film
+/// would otherwise need more blocks than a dispatch can have.
 pub fn thread_items(gpu: &Gpu, pixels: u32) -> u32 {
     const MOST: u32 = 64;
     let suited = gpu.tuning().thread_items;

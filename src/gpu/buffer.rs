@@ -1,4 +1,4 @@
-//! Device memory with a type and a name.
+//! Typed, named buffers in device memory: allocation, binding, and element access from the host.
 use super::{At, Gpu};
 use crate::error::{Error, Result};
 use ash::vk;
@@ -10,14 +10,14 @@ use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Parts of buffers begin at multiples of so many elements, each of 4 bytes at least: no device asks for offsets of bindings
-/// that are multiples of more than 256 bytes.
+/// A part of a buffer begins at a multiple of this many elements. An element has at least 4 bytes, so the offset is a
+/// multiple of 256 bytes, the largest alignment that Vulkan lets a device require.
 pub const PART: usize = 64;
 
-/// Where a buffer lies. On devices with unified memory all three are the same memory, mapped.
+/// The memory that holds a buffer. On devices with unified memory all three are the same mapped memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Location {
-    /// Fastest for kernels.
+    /// The memory that kernels access fastest.
     Device,
     /// Written by the host, read by kernels or copies.
     Upload,
@@ -25,76 +25,75 @@ pub enum Location {
     Readback,
 }
 
-/// A buffer as Vulkan knows it, for code that binds it elsewhere.
+/// A range of a Vulkan buffer, for code that binds it itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RawBuffer {
-    /// `VkBuffer`.
+    /// The `VkBuffer` handle.
     pub handle: u64,
     /// Bytes from the start of the buffer.
     pub offset: u64,
-    /// Bytes.
+    /// Size of the range in bytes.
     pub size: u64,
 }
 
-/// How the values of one pixel lie in memory: `as i32`, the `VkFormat` of the same name.
+/// How the values of one pixel are laid out in memory. `as i32` gives the `VkFormat` of the same name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(i32)]
 pub enum PixelFormat {
-    /// One unsigned integer.
+    /// One unsigned 32-bit integer.
     R32Uint = vk::Format::R32_UINT.as_raw(),
-    /// One float.
+    /// One 32-bit float.
     R32Sfloat = vk::Format::R32_SFLOAT.as_raw(),
-    /// Three floats.
+    /// Three 32-bit floats without padding.
     R32G32B32Sfloat = vk::Format::R32G32B32_SFLOAT.as_raw(),
-    /// Four floats.
+    /// Four 32-bit floats.
     R32G32B32A32Sfloat = vk::Format::R32G32B32A32_SFLOAT.as_raw(),
 }
 
-/// `len` values of `T`, readable by kernels as storage, as texels and as a uniform block, and copied from and to.
+/// A buffer of `len` values of `T`. Kernels can bind it as storage, as texels or as a uniform block, and it can be copied.
 pub struct Buffer<T> {
     untyped: Arc<Untyped>,
-    /// Index of the first element; 0 but in a part.
+    /// Index of the first element within the memory; 0 unless this is a part.
     first: usize,
     len: usize,
     of: PhantomData<fn() -> T>,
 }
 
-/// Another handle to the same memory.
+/// A clone is another handle to the same memory.
 impl<T> Clone for Buffer<T> {
     fn clone(&self) -> Self {
         Self { untyped: self.untyped.clone(), first: self.first, len: self.len, of: PhantomData }
     }
 }
 
-/// What a kernel gets of a buffer. Public for the generated code alone.
+/// The range of a buffer that a kernel binds. It is public only for generated code.
 #[doc(hidden)]
 #[derive(Clone, Copy)]
 pub struct Bound<'a> {
     pub(super) buffer: &'a Arc<Untyped>,
-    /// Bytes to the first element.
+    /// Offset of the first element in bytes.
     pub(super) offset: u64,
-    /// Bytes.
     pub(super) size: u64,
 }
 
-/// What a buffer is without its type. Public for the generated code alone.
+/// A buffer without its element type. It is public only for generated code.
 #[doc(hidden)]
 pub struct Untyped {
     pub(super) gpu: Gpu,
     pub(super) name: String,
     pub(super) raw: vk::Buffer,
-    /// Bytes, a multiple of 4.
+    /// Size in bytes, a multiple of 4.
     pub(super) size: u64,
     /// Bytes of one element.
     stride: usize,
-    /// `None` only while being made. The lock also keeps host accesses apart.
+    /// `None` only during construction. The lock also serialises accesses by the host.
     memory: Mutex<Option<Allocation>>,
     views: Mutex<Vec<(vk::Format, vk::BufferView)>>,
 }
 
 impl<T: Pod> Buffer<T> {
-    /// Room for `len` values of one or more 32-bit words, contents undefined; `name` appears in messages and captures. A
-    /// length of 0 becomes 1, since there is no empty Vulkan buffer.
+    /// Allocates room for `len` values, each of one or more 32-bit words, with undefined contents. `name` appears in messages
+    /// and captures. A length of 0 becomes 1, because Vulkan has no empty buffers.
     ///
     /// # Errors
     /// [`Error::Device`] with the name, the size and the limit when the device cannot hold it.
@@ -109,8 +108,8 @@ impl<T: Pod> Buffer<T> {
         Ok(Self { untyped, first: 0, len, of: PhantomData })
     }
 
-    /// Elements `range`, in the same memory, to be bound as storage where all are too many for one binding. It begins at a
-    /// multiple of [`PART`].
+    /// Returns the elements in `range`, in the same memory, for a storage binding that could not hold all of them. The range
+    /// must begin at a multiple of [`PART`].
     ///
     /// # Errors
     /// [`Error::Device`] when there is no such part.
@@ -121,8 +120,8 @@ impl<T: Pod> Buffer<T> {
         Ok(Self { first: self.first + range.start, len: range.len(), ..self.clone() })
     }
 
-    /// A [`Location::Device`] buffer that holds `values`. No values become a single zero, so that absent data can be
-    /// bound like any other.
+    /// Makes a [`Location::Device`] buffer that holds `values`. An empty slice becomes a single zero, so that absent data can
+    /// be bound like any other.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -135,7 +134,7 @@ impl<T: Pod> Buffer<T> {
         Ok(buffer)
     }
 
-    /// [`Self::from_slice`] of what kernels read as texels: more than they can see is told before it is uploaded.
+    /// As [`Self::from_slice`], for data that kernels read as texels: the device's limit is checked before the upload.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -144,14 +143,14 @@ impl<T: Pod> Buffer<T> {
         Self::from_slice(gpu, name, values)
     }
 
-    /// Elements, at least 1.
+    /// Number of elements, at least 1.
     #[allow(clippy::len_without_is_empty)]
     pub fn len(&self) -> usize {
         self.len
     }
 
-    /// Replaces elements from `offset` on, once what [`Gpu::run`] has submitted is done. Of what was recorded by
-    /// [`super::Recorder::external`], see there.
+    /// Waits for the work that [`Gpu::run`] submitted, then replaces the elements from `offset` on. For work recorded with
+    /// [`super::Recorder::external`], see its safety section.
     ///
     /// # Errors
     /// [`Error::Device`] when they do not fit, or the copy fails.
@@ -163,8 +162,8 @@ impl<T: Pod> Buffer<T> {
         self.untyped.write((self.first + offset) * size_of::<T>(), bytemuck::cast_slice(values))
     }
 
-    /// All elements, once what [`Gpu::run`] has submitted is done. Of what was recorded by
-    /// [`super::Recorder::external`], see there.
+    /// Waits for the work that [`Gpu::run`] submitted, then returns all elements. For work recorded with
+    /// [`super::Recorder::external`], see its safety section.
     ///
     /// # Errors
     /// [`Error::Device`] when the copy fails.
@@ -172,10 +171,10 @@ impl<T: Pod> Buffer<T> {
         self.read_range(0..self.len)
     }
 
-    /// Some elements, as [`Self::read`].
+    /// Returns the elements in `range`; otherwise as [`Self::read`].
     ///
     /// # Errors
-    /// [`Error::Device`] when there are not so many, or the copy fails.
+    /// [`Error::Device`] when the range exceeds the buffer, or the copy fails.
     pub fn read_range(&self, range: Range<usize>) -> Result<Vec<T>> {
         if range.start > range.end || range.end > self.len {
             return Err(self.no_part(&range));
@@ -190,7 +189,7 @@ impl<T: Pod> Buffer<T> {
         Error::Device(format!("buffer \"{name}\": {range:?} is no part of its {len} elements"))
     }
 
-    /// The Vulkan buffer behind this one. It is alive as long as this one is.
+    /// The Vulkan buffer behind this one. It lives as long as this handle or a clone of it.
     pub fn raw(&self) -> RawBuffer {
         let Bound { buffer, offset, size } = self.bound();
         RawBuffer { handle: buffer.raw.as_raw(), offset, size }
@@ -198,7 +197,7 @@ impl<T: Pod> Buffer<T> {
 }
 
 impl<T> Buffer<T> {
-    /// For the generated code alone.
+    /// The range to bind. It is public only for generated code.
     #[doc(hidden)]
     pub fn bound(&self) -> Bound<'_> {
         let bytes = |elements: usize| (elements * self.untyped.stride) as u64;
@@ -217,17 +216,17 @@ impl Bound<'_> {
         Ok(vk::DescriptorBufferInfo::default().buffer(*raw).offset(self.offset).range(self.size))
     }
 
-    /// The first element. By the contract of `Bindings` no device refuses its size.
+    /// The first element. By the contract of `Bindings` its size is within every device's limit.
     pub(super) fn uniform(&self) -> vk::DescriptorBufferInfo {
         let range = self.buffer.stride as u64;
         vk::DescriptorBufferInfo::default().buffer(self.buffer.raw).offset(self.offset).range(range)
     }
 
-    /// A view as texels of 16 bytes where elements are a multiple of that, of 8 where they are one of 8, else of 4. Made once,
-    /// then kept.
+    /// Returns a view whose texels have 16 bytes where the element size is a multiple of 16, else 8 where it is a multiple of
+    /// 8, else 4. A view is made once and then kept.
     ///
     /// # Errors
-    /// When the buffer has more texels than one view may have, or this is but a part of it.
+    /// When the buffer has more texels than one view may have, or this is only a part of it.
     pub(super) fn texels(&self, floats: bool) -> Result<vk::BufferView> {
         let whole = &**self.buffer;
         if self.offset > 0 || self.size.next_multiple_of(4) < whole.size {
@@ -271,7 +270,7 @@ impl Untyped {
         let raw = unsafe { gpu.0.device.create_buffer(&info, None) }.at(&what)?;
         gpu.0.name(raw, name);
         let (memory, views) = Default::default();
-        // From here on Drop cleans up, whichever line below fails.
+        // From here on, Drop cleans up if a line below fails.
         let buffer = Self { gpu: gpu.clone(), name: name.to_owned(), raw, size, stride, memory, views };
         let remedy = "choose a smaller film or scene, or a device with more memory";
         buffer.allocate(location).map_err(|e| Error::Device(format!("{what}: {e}: {remedy}")))?;
@@ -283,7 +282,7 @@ impl Untyped {
         // SAFETY: a live buffer of this device.
         let requirements = unsafe { device.get_buffer_memory_requirements(self.raw) };
         let location = match location {
-            // Of the one memory there is, ask for the kind that is mapped.
+            // There is only one memory: ask for it mapped.
             Location::Device if self.gpu.0.info.unified => MemoryLocation::CpuToGpu,
             Location::Device => MemoryLocation::GpuOnly,
             Location::Upload => MemoryLocation::CpuToGpu,
@@ -303,7 +302,8 @@ impl Untyped {
         Ok(bound?)
     }
 
-    /// Hands `access` the mapped bytes, or returns `None` where the memory is not mapped, coherent and all that.
+    /// Calls `access` with the mapped bytes. Returns `None` if the memory is not mapped, not coherent, or lacks a property in
+    /// `also`.
     pub(super) fn mapped<R>(&self, also: vk::MemoryPropertyFlags, access: impl FnOnce(&mut [u8]) -> R) -> Option<R> {
         let mut memory = self.memory.lock().unwrap_or_else(PoisonError::into_inner);
         let memory = memory.as_mut()?;
@@ -323,14 +323,14 @@ impl Drop for Untyped {
                 device.destroy_buffer(self.raw, None);
             }
             if let (Some(memory), Some(allocator)) = (memory, self.gpu.0.lock_allocator().as_mut()) {
-                // It fails only for memory of another allocator.
+                // Freeing fails only for memory of another allocator.
                 let _ = allocator.free(memory);
             }
         });
     }
 }
 
-/// Of one texel of a view of elements of `stride` bytes.
+/// Bytes per texel in a view of elements of `stride` bytes.
 fn texel_bytes(stride: usize) -> u64 {
     match stride {
         n if n.is_multiple_of(16) => 16,

@@ -1,6 +1,6 @@
-//! One pipeline cache per device, kept on disk between runs where the caller asks for it:
-//! `<device, driver, kernels>.bin` in a folder. A cache is a convenience: whatever goes wrong with the file, it is left
-//! aside. Drivers believe what they get back, so that nothing is read that somebody else could have written.
+//! The pipeline cache of a device. If the caller names a folder, it is kept there between runs, in one file for each
+//! combination of device, driver and kernels. The cache only saves time: a file that cannot be used is ignored. Drivers
+//! trust the data that they get back, so files that another user could have written are not read.
 use super::At;
 use super::info::Candidate;
 use crate::error::Result;
@@ -12,17 +12,17 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-/// The file starts with these, then FNV-1a of the rest, then what the driver returned.
+/// The file starts with these bytes, followed by the FNV-1a checksum of the driver's data and by that data.
 const MAGIC: &[u8; 8] = b"TALLOWP1";
-/// Bytes of a file at most; all kernels of a driver are a few million.
+/// Largest file that is read, in bytes. All kernels together take a few million bytes.
 const LARGEST: u64 = 64 << 20;
-/// Caches that are kept at most: of other devices, and of earlier drivers and kernels, the newest.
+/// Number of cache files to keep. The newest stay, whether of this or of other devices, drivers and kernels.
 const KEPT: usize = 16;
-/// A file in the making that is older was left behind by a run that was ended.
+/// A temporary file older than this was left behind by a run that was killed.
 const ABANDONED: Duration = Duration::from_secs(3600);
 
-/// `tallow` in the user's folder of caches, where the command line keeps compiled pipelines: `$XDG_CACHE_HOME` or `~/.cache`, on
-/// Windows the local application data.
+/// The folder where the command line keeps compiled pipelines: `tallow` in `$XDG_CACHE_HOME` or `~/.cache`, or on Windows
+/// in the local application data.
 pub fn cache_folder() -> Option<PathBuf> {
     let folder = etcetera::choose_base_strategy().ok()?.cache_dir();
     folder.is_absolute().then(|| folder.join("tallow"))
@@ -32,7 +32,7 @@ pub fn cache_folder() -> Option<PathBuf> {
 pub(super) struct PipelineCache {
     pub raw: vk::PipelineCache,
     file: Option<PathBuf>,
-    /// What was read at the start, so that an unchanged cache is not written again.
+    /// Checksum of the data that were read, so that an unchanged cache is not written again.
     loaded: u64,
 }
 
@@ -55,11 +55,11 @@ impl PipelineCache {
             return;
         }
         if let Some(file) = &self.file
-            // SAFETY: by contract.
+            // SAFETY: `device` made this cache, by contract.
             && let Ok(data) = unsafe { device.get_pipeline_cache_data(self.raw) }
             && checksum(&data) != self.loaded
         {
-            // No error is worth failing for: the next run compiles again.
+            // A failure is harmless: the next run compiles again.
             let _ = write(file, &data);
         }
         unsafe { device.destroy_pipeline_cache(self.raw, None) };
@@ -71,7 +71,7 @@ fn file_name(candidate: &Candidate) -> String {
     format!("{uuid}-{}-{:016x}.bin", candidate.info.driver_version, crate::shaders::HASH)
 }
 
-/// The driver's data, if the file is whole and nobody else's.
+/// Returns the driver's data if the file is complete and only the user can write it.
 fn read(file: &Path) -> Option<Vec<u8>> {
     let folder = std::fs::metadata(file.parent()?).ok()?;
     if !(folder.is_dir() && is_private(&folder)) {
@@ -84,7 +84,7 @@ fn read(file: &Path) -> Option<Vec<u8>> {
     (bytes.len() as u64 <= LARGEST && checksum(data) == u64::from_le_bytes(*sum)).then(|| data.to_vec())
 }
 
-/// Written beside its target and renamed, so that a reader sees all of it or none.
+/// Writes a temporary file in the same folder and renames it, so that a reader sees all of it or nothing.
 fn write(file: &Path, data: &[u8]) -> std::io::Result<()> {
     let folder = file.parent().unwrap_or(Path::new("."));
     make_folder(folder)?;
@@ -99,7 +99,7 @@ fn write(file: &Path, data: &[u8]) -> std::io::Result<()> {
     prune(folder)
 }
 
-/// Removes files in the making that nobody finished, and all but the newest caches.
+/// Removes abandoned temporary files, and all but the newest [`KEPT`] caches.
 fn prune(folder: &Path) -> std::io::Result<()> {
     let (mut temporary, mut caches) = (Vec::new(), Vec::new());
     for entry in std::fs::read_dir(folder)? {
@@ -117,7 +117,7 @@ fn prune(folder: &Path) -> std::io::Result<()> {
     left.chain(caches.into_iter().skip(KEPT)).try_for_each(|(_, path)| std::fs::remove_file(path))
 }
 
-/// Whether [`file_name`] makes such names.
+/// Whether `name` has the form that [`file_name`] gives.
 fn is_cache(name: &str) -> bool {
     let hex = |part: &str, digits| part.len() == digits && part.bytes().all(|b| b.is_ascii_hexdigit());
     let parts = name.strip_suffix(".bin").and_then(|name| name.split_once('-'));
@@ -126,7 +126,7 @@ fn is_cache(name: &str) -> bool {
         .is_some_and(|(uuid, kernels)| hex(uuid, 2 * vk::UUID_SIZE) && hex(kernels, 16))
 }
 
-/// Opens what is at the path itself, no matter what it is, without waiting.
+/// Opens the path without following a link and without blocking on a pipe.
 #[cfg(unix)]
 fn open(path: &Path) -> Option<File> {
     use rustix::fs::{Mode, OFlags};
@@ -140,7 +140,7 @@ fn open(path: &Path) -> Option<File> {
     File::open(path).ok()
 }
 
-/// Whether it is the user's, and nobody else may write it. Root is not at home in a user's folder.
+/// Whether the user owns the file and nobody else may write it. Root does not trust a user's files either.
 #[cfg(unix)]
 fn is_private(kind: &Metadata) -> bool {
     use std::os::unix::fs::MetadataExt;
@@ -157,8 +157,8 @@ fn is_private(_: &Metadata) -> bool {
     true
 }
 
-/// Makes the folder and those above it, open to nobody else; but none below a folder of somebody else's, where `sudo` can
-/// lead and where the owner could no longer use it.
+/// Makes the folder and its missing parents, accessible to the user alone. It refuses to do so below another user's
+/// folder: under `sudo`, the result would belong to root and be of no use to that user.
 #[cfg(unix)]
 fn make_folder(folder: &Path) -> std::io::Result<()> {
     use std::os::unix::fs::{DirBuilderExt, MetadataExt};
@@ -175,7 +175,7 @@ fn make_folder(folder: &Path) -> std::io::Result<()> {
     std::fs::create_dir_all(folder)
 }
 
-/// Whether the header (`VkPipelineCacheHeaderVersionOne`) names this very device.
+/// Whether the header (`VkPipelineCacheHeaderVersionOne`) names this device and driver build.
 fn fits(data: &[u8], candidate: &Candidate) -> bool {
     let word = |at: usize| data.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     word(4) == Some(vk::PipelineCacheHeaderVersion::ONE.as_raw() as u32)
@@ -184,7 +184,7 @@ fn fits(data: &[u8], candidate: &Candidate) -> bool {
         && data.get(16..32) == Some(&candidate.cache_uuid)
 }
 
-/// FNV-1a, 64 bits: against accidents.
+/// FNV-1a of 64 bits. It detects accidental damage, not tampering.
 fn checksum(data: &[u8]) -> u64 {
     data.iter().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0000_0100_0000_01b3))
 }
@@ -286,7 +286,7 @@ mod tests {
         assert_eq!(left, expected);
     }
 
-    /// VkPipelineCacheHeaderVersionOne: its length, 1, the vendor, the device, 16 bytes of the driver's.
+    /// A `VkPipelineCacheHeaderVersionOne` (length, version 1, vendor, device, 16 bytes of the driver), then some data.
     fn header(c: &Candidate) -> Vec<u8> {
         let words = [32, vk::PipelineCacheHeaderVersion::ONE.as_raw() as u32, c.vendor, c.id];
         words.iter().flat_map(|w| w.to_le_bytes()).chain(c.cache_uuid).chain(*b"data").collect()

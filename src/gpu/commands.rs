@@ -1,4 +1,4 @@
-//! One command buffer with its pool and fence: record, submit, wait.
+//! A command buffer with its pool and fence, which is recorded, submitted and waited for.
 use super::{At, Gpu, explain};
 use crate::error::{Error, Result};
 use ash::vk;
@@ -13,7 +13,7 @@ pub(super) struct Commands {
 impl Commands {
     pub fn new(gpu: &Gpu) -> Result<Self> {
         let (pool, fence, buffer) = Default::default();
-        // From here on Drop cleans up, whichever line below fails; null handles may be destroyed.
+        // From here on, Drop cleans up if a line below fails; null handles may be destroyed.
         let mut commands = Self { gpu: gpu.clone(), pool, fence, buffer };
         let device = &gpu.0.device;
         let info = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.0.queue_family);
@@ -27,7 +27,7 @@ impl Commands {
         Ok(commands)
     }
 
-    /// Starts anew; what was recorded before is dropped.
+    /// Begins a new recording and discards the one before.
     ///
     /// # Errors
     /// The device is out of memory, or was abandoned.
@@ -42,8 +42,8 @@ impl Commands {
         }
     }
 
-    /// Ends, submits, waits as long as `progress` goes on. `last_pass` names what was running when the device was lost, if
-    /// anybody can tell.
+    /// Ends and submits the recording, and waits as long as the value of `progress` keeps changing. `last_pass` names the last
+    /// pass that started, if it is known, for the message about a lost device.
     ///
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::Device`]. Nothing of the submission runs then, unless the device was abandoned.

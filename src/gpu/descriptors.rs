@@ -1,10 +1,10 @@
-//! The descriptor sets of one frame: taken from pools that are reset, not from new ones.
+//! The descriptor sets of one frame. Their pools are reset and reused by the next recording.
 use super::kernel::Parts;
 use super::{At, Bound, Gpu, Slot, SlotKind};
 use crate::error::Result;
 use ash::vk;
 
-/// Sets per pool, and descriptors of each kind per set on average.
+/// Number of sets per pool, and average number of descriptors of each kind per set.
 const SETS: u32 = 128;
 const PER_SET: u32 = 8;
 
@@ -15,7 +15,7 @@ pub(super) struct Descriptors {
     current: usize,
 }
 
-/// What a slot is bound to; arrays of one, since Vulkan wants slices.
+/// The resource bound to a slot. The arrays have one element because Vulkan takes slices.
 enum Resource {
     Buffer([vk::DescriptorBufferInfo; 1]),
     Texels([vk::BufferView; 1]),
@@ -26,10 +26,10 @@ impl Descriptors {
         Self { gpu: gpu.clone(), pools: Vec::new(), current: 0 }
     }
 
-    /// Takes all sets back; the work that used them is complete.
+    /// Returns all sets to their pools. The work that used them must be complete.
     ///
     /// # Errors
-    /// None on any known driver: the specification lets resetting fail.
+    /// Those that the specification allows; no known driver fails here.
     pub fn reset(&mut self) -> Result<()> {
         let flags = vk::DescriptorPoolResetFlags::empty();
         for pool in &self.pools {
@@ -40,7 +40,7 @@ impl Descriptors {
         Ok(())
     }
 
-    /// A set of `kernel` that holds `buffers`, one for each of `slots`.
+    /// Allocates a descriptor set of `kernel` and writes `buffers` into it, one for each of `slots`.
     ///
     /// # Errors
     /// When a buffer is too large to be bound in its slot, or memory is out.

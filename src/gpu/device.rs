@@ -1,4 +1,4 @@
-//! Opening a device, and what the rest of the layer needs of it.
+//! Opening a device, submitting work to it, and the state that the rest of the layer shares.
 use super::At;
 use super::cache::PipelineCache;
 use super::info::{self, Candidate, DeviceInfo, DeviceKind, Features};
@@ -14,11 +14,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockWriteGuard};
 use std::time::Duration;
 
-/// How long a GPU is waited for while no pass begins or ends, unless it is said otherwise: passes are cut to take a
-/// fraction of a second, so that a machine a thousand times slower is still waited for.
+/// Default time to wait for a GPU while no pass begins or ends. Passes are sized to take a fraction of a second, so even
+/// a device a thousand times slower stays within this limit.
 const WAIT_LIMIT: Duration = Duration::from_secs(600);
 
-/// Which device, and how to treat it.
+/// Which device to open, and how to use it.
 #[derive(Clone, Debug, Default)]
 pub struct DeviceOptions {
     /// Index in [`super::survey`], or a part of the device's name in any case. `None` prefers discrete over
@@ -26,20 +26,20 @@ pub struct DeviceOptions {
     pub device: Option<String>,
     /// Run under the validation layers with synchronization validation; see [`Gpu::validation_messages`].
     pub validation: bool,
-    /// Folder where compiled pipelines are kept from run to run, such as [`super::cache_folder`]; made where it is missing.
-    /// Drivers trust what they read back, so that only files are read that nobody but the user can write. `None`: nothing
-    /// is kept.
+    /// Folder in which compiled pipelines are kept between runs, such as [`super::cache_folder`]. It is made if missing.
+    /// Drivers trust this data, so only files that nobody but the user can write are read. `None` keeps nothing.
     pub cache: Option<PathBuf>,
-    /// How long to wait while no pass of a submission begins or ends: then the device is given up as lost. `None`: 10
-    /// minutes, and for ever on CPUs, whose drivers end endless loops by themselves and whose passes can take hours.
+    /// How long to wait while no pass of a submission begins or ends before the device is given up as lost. `None` waits
+    /// 10 minutes on GPUs and without limit on CPUs, whose drivers end endless loops by themselves and whose passes can take
+    /// hours.
     pub wait_limit: Option<Duration>,
 }
 
-/// An open device. Clones share it; it closes when the last buffer, kernel and frame made with it is gone.
+/// An open device. Clones share it. It closes when the last clone, buffer, kernel and frame made with it is dropped.
 #[derive(Clone)]
 pub struct Gpu(pub(super) Arc<Inner>);
 
-/// [`Drop::drop`] destroys what the fields hold, the instance last.
+/// The shared state of a device. [`Drop::drop`] destroys the Vulkan objects, the instance last.
 pub(super) struct Inner {
     pub device: ash::Device,
     pub physical: vk::PhysicalDevice,
@@ -50,18 +50,18 @@ pub(super) struct Inner {
     pub info: DeviceInfo,
     pub calibrated: Option<ext::calibrated_timestamps::Device>,
     queue: Mutex<vk::Queue>,
-    /// Shared by submissions from before they are submitted until they are done; the host's accesses to memory exclude them.
+    /// Each submission holds a read lock until it is complete; accesses to device memory by the host take the write lock.
     running: RwLock<()>,
-    /// Nanoseconds.
+    /// Limit of [`Self::wait`] in nanoseconds.
     wait_limit: u64,
-    /// Whether work may run for ever: nothing is freed any more, since that work may use it.
+    /// Whether work was left running that may never end. Nothing is freed any more then, because that work may use it.
     abandoned: AtomicBool,
-    /// `None` only while making and dropping.
+    /// `None` only during construction and destruction.
     allocator: Mutex<Option<Allocator>>,
     instance: ManuallyDrop<Instance>,
 }
 
-/// What there is once a device is open.
+/// The parts of an open device, before they are put together.
 pub(super) struct Opened {
     pub instance: Instance,
     pub candidate: Candidate,
@@ -94,12 +94,12 @@ impl Gpu {
         Self::assemble(opened, options.cache.clone(), options.wait_limit)
     }
 
-    /// Puts the parts together; on failure an owned device is destroyed.
+    /// Puts the parts together. On failure an owned device is destroyed.
     pub(super) fn assemble(opened: Opened, cache: Option<PathBuf>, wait_limit: Option<Duration>) -> Result<Self> {
         let Opened { instance, candidate, queue_family, device, queue, debug, calibrated } = opened;
         let limit =
             wait_limit.unwrap_or(if candidate.info.kind == DeviceKind::Cpu { Duration::MAX } else { WAIT_LIMIT });
-        // From here on Drop cleans up, whichever line below fails.
+        // From here on, Drop cleans up if a line below fails.
         let mut inner = Inner {
             physical: candidate.physical,
             queue_family,
@@ -129,18 +129,18 @@ impl Gpu {
         Ok(Self(Arc::new(inner)))
     }
 
-    /// What the device is and can do.
+    /// The properties and limits of the device.
     pub fn info(&self) -> &DeviceInfo {
         &self.0.info
     }
 
-    /// Bytes of all buffers that were made on the device and still are.
+    /// Bytes of device memory held by all buffers that exist on the device.
     pub fn allocated_bytes(&self) -> u64 {
         self.0.lock_allocator().as_ref().map_or(0, |a| a.generate_report().total_allocated_bytes)
     }
 
     /// # Errors
-    /// When `what` was made on another device: its handles mean nothing on this one.
+    /// When `what` was made on another device, where its handles are not valid.
     pub(super) fn owns(&self, what: &str, maker: &Gpu) -> Result<()> {
         match Arc::ptr_eq(&self.0, &maker.0) {
             true => Ok(()),
@@ -148,12 +148,13 @@ impl Gpu {
         }
     }
 
-    /// What the validation layers have said so far, oldest first; empty without [`DeviceOptions::validation`].
+    /// Messages of the validation layers so far, oldest first; empty without [`DeviceOptions::validation`].
     pub fn validation_messages(&self) -> Vec<String> {
         self.0.instance.messages.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// The messages themselves, which outlive the device and so tell what it forgot to destroy.
+    /// A shared handle to the messages. It outlives the device, so it also receives those about objects that were not
+    /// destroyed.
     #[doc(hidden)]
     pub fn validation_log(&self) -> Messages {
         self.0.instance.messages.clone()
@@ -161,12 +162,13 @@ impl Gpu {
 }
 
 impl Inner {
-    /// The allocator, which is there as long as the device is open.
+    /// Locks the allocator, which exists as long as the device is open.
     pub fn lock_allocator(&self) -> MutexGuard<'_, Option<Allocator>> {
         self.allocator.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Submits one command buffer and waits for `fence`, as long as `progress`, which begins at 0, changes within the limit.
+    /// Submits one command buffer and waits for `fence`, as long as the value of `progress`, which begins at 0, changes within
+    /// the time limit.
     ///
     /// # Errors
     /// Those of Vulkan, `TIMEOUT` included. Nothing of the submission runs then, unless the device was abandoned.
@@ -201,13 +203,13 @@ impl Inner {
         }
     }
 
-    /// After a wait that failed: makes sure that nothing is freed which still runs. What is lost runs no more; what hangs
-    /// would be waited for in vain.
+    /// Ensures after a failed wait that nothing which running work may use is freed. A lost device runs nothing any more; one
+    /// that hangs cannot be waited for, so it is marked as abandoned.
     fn settle(&self, failure: vk::Result) {
         let stopped = match failure {
             vk::Result::ERROR_DEVICE_LOST => true,
             vk::Result::TIMEOUT => false,
-            // SAFETY: the lock keeps the queue to this thread. Other queues, of an engine's device, have work of others.
+            // SAFETY: the lock keeps the queue to this thread. Only this queue is waited for, as an engine may use others.
             _ => matches!(
                 unsafe { self.device.queue_wait_idle(*self.lock_queue()) },
                 Ok(()) | Err(vk::Result::ERROR_DEVICE_LOST)
@@ -220,7 +222,7 @@ impl Inner {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Until it is dropped, no submission runs.
+    /// Waits until no submission runs. None can begin until the returned lock is dropped.
     pub fn idle(&self) -> RwLockWriteGuard<'_, ()> {
         self.running.write().unwrap_or_else(PoisonError::into_inner)
     }
@@ -234,7 +236,7 @@ impl Inner {
         }
     }
 
-    /// Destroys something with `destroy`, unless work was left behind that may use it.
+    /// Calls `destroy`, unless abandoned work may still use what it destroys.
     pub fn free(&self, destroy: impl FnOnce(&ash::Device)) {
         if self.answers().is_ok() {
             destroy(&self.device);
@@ -253,7 +255,7 @@ impl Inner {
 impl Drop for Inner {
     fn drop(&mut self) {
         if self.answers().is_err() {
-            // Work of it may run for ever, and the loader and the driver with it.
+            // Its work may still be running, so the allocator, the loader and the driver are leaked.
             std::mem::forget(self.lock_allocator().take());
             return;
         }
@@ -272,14 +274,14 @@ impl Drop for Inner {
     }
 }
 
-/// Hold it while a device is made, destroyed or asked for its functions: the loader walks its list of devices for the last
-/// while another thread may change it (Vulkan-Loader's issue 2018).
+/// Returns a lock to hold while a device is created, destroyed or asked for its functions: the loader walks its list of
+/// devices for the last of these without protection against changes by other threads (issue 2018 of Vulkan-Loader).
 pub(super) fn one_at_a_time() -> MutexGuard<'static, ()> {
     static DEVICES: Mutex<()> = Mutex::new(());
     DEVICES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// `candidates` are not none.
+/// Chooses a device by index or name, or the best one. `candidates` must not be empty.
 fn choose(mut candidates: Vec<Candidate>, wanted: Option<&str>) -> Result<Candidate> {
     let best =
         || (0..candidates.len()).min_by_key(|&i| (!candidates[i].info.missing.is_empty(), candidates[i].info.kind));
@@ -296,7 +298,7 @@ fn find(candidates: &[Candidate], wanted: &str) -> Option<usize> {
     by_index.or_else(|| candidates.iter().position(|c| c.info.name.to_lowercase().contains(&wanted)))
 }
 
-/// The queue family, if the device has all that is required.
+/// Returns the queue family if the device has all required features.
 pub(super) fn usable(candidate: &Candidate) -> Result<u32> {
     let DeviceInfo { name, missing, driver_name, driver_version, .. } = &candidate.info;
     if !missing.is_empty() {
@@ -330,7 +332,7 @@ fn create_device(
     let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&[1.0])];
     let extensions: Vec<_> = calibrated.then_some(ext::calibrated_timestamps::NAME.as_ptr()).into_iter().collect();
     let mut features = Features::required();
-    // Every device has it.
+    // Every device supports it.
     features.core.robust_buffer_access = vk::TRUE;
     let info = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)

@@ -1,4 +1,5 @@
-//! A device that an engine made, handed over as raw handles so that Vulkan bindings and their versions need not match.
+//! Use of a device that an engine made. It is handed over as raw handles, so the engine can use other Vulkan bindings or
+//! another version of them.
 use super::Gpu;
 use super::device::{Opened, one_at_a_time, usable};
 use super::info;
@@ -10,15 +11,15 @@ use std::ffi::{CStr, c_void};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// The caller's handles, as the numbers that Vulkan's C interface uses (pointers for dispatchable handles), and how to treat
-/// the device.
+/// The caller's handles, as the numbers of Vulkan's C interface (pointers for dispatchable handles), and how to use the
+/// device.
 #[derive(Clone, Debug)]
 pub struct RawDevice {
     /// `vkGetInstanceProcAddr` of the loader that made the rest.
     pub get_instance_proc_addr: *const c_void,
     /// `VkInstance`, made for Vulkan 1.3 or later.
     pub instance: u64,
-    /// `VkPhysicalDevice`.
+    /// The `VkPhysicalDevice` that `device` was made from.
     pub physical_device: u64,
     /// `VkDevice`, made with all of [`super::REQUIRED_FEATURES`] enabled.
     pub device: u64,
@@ -28,25 +29,25 @@ pub struct RawDevice {
     pub queue_family: u32,
     /// Whether the device was made with `robustBufferAccess` enabled, which every device has; see [`Gpu::from_raw`].
     pub robust_buffer_access: bool,
-    /// See [`super::DeviceOptions::cache`].
+    /// Folder for compiled pipelines; see [`super::DeviceOptions::cache`].
     pub cache: Option<PathBuf>,
-    /// See [`super::DeviceOptions::wait_limit`].
+    /// How long to wait for a device that stands still; see [`super::DeviceOptions::wait_limit`].
     pub wait_limit: Option<Duration>,
 }
 
 impl Gpu {
-    /// Works on a device made elsewhere. Destroys nothing that it did not make. Passes carry debug labels when the
-    /// instance has VK_EXT_debug_utils enabled; [`Gpu::calibrate`] works when the device has VK_EXT_calibrated_timestamps.
+    /// Uses a device made elsewhere and destroys only what it makes itself. Passes carry debug labels if the instance has
+    /// VK_EXT_debug_utils enabled; [`Gpu::calibrate`] works if the device has VK_EXT_calibrated_timestamps enabled.
     ///
     /// # Safety
     /// - The handles are valid, belong together, and outlive everything made from the returned `Gpu`.
     /// - The device was made with every one of [`super::REQUIRED_FEATURES`] enabled.
     /// - Nobody else uses the queue while [`Gpu::run`] or a [`super::Buffer`]'s reads and writes do.
-    /// - Without `robust_buffer_access`, kernels get nothing to read but what a [`Renderer`](crate::render::Renderer), a
-    ///   [`Denoiser`](crate::denoise::Denoiser) and [`filter::run`](crate::denoise::filter::run) give them by themselves, which is
-    ///   checked: no [`super::Buffer`] of theirs is written, no stage, policy or filter recorded apart from them, and no
-    ///   step but those of [`Renderer::steps`](crate::render::Renderer::steps) in their order. What is out of a buffer's
-    ///   bounds would be read and written.
+    /// - Without `robust_buffer_access`, kernels read only what a [`Renderer`](crate::render::Renderer), a
+    ///   [`Denoiser`](crate::denoise::Denoiser) and [`filter::run`](crate::denoise::filter::run) give them, which is checked:
+    ///   none of their [`super::Buffer`]s is written by others, no pass, policy or filter is recorded apart from them, and
+    ///   the steps are those of [`Renderer::steps`](crate::render::Renderer::steps) in their order. Otherwise kernels might
+    ///   read and write outside their buffers.
     ///
     /// # Errors
     /// [`Error::Device`] when a handle is null, the device cannot do what is required, or the family cannot compute.
@@ -98,7 +99,7 @@ fn check_family(instance: &ash::Instance, physical: vk::PhysicalDevice, family: 
     }
 }
 
-/// The loader returns functions of extensions only where these are enabled.
+/// Whether the functions of an extension are there; the loader returns them only if the extension is enabled.
 fn enabled(instance: &ash::Instance, device: &ash::Device, names: &[&CStr]) -> bool {
     // SAFETY: valid handles by the contract of `from_raw`.
     names.iter().all(|name| unsafe { instance.get_device_proc_addr(device.handle(), name.as_ptr()) }.is_some())

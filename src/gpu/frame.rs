@@ -1,4 +1,4 @@
-//! What recording a frame uses up, kept between frames so that nothing is created after the first ones.
+//! The resources that recording a frame needs. They are reused by later frames, so that only the first ones create any.
 use super::access::Hazards;
 use super::commands::Commands;
 use super::descriptors::Descriptors;
@@ -9,8 +9,8 @@ use crate::error::Result;
 use ash::vk;
 use std::sync::Arc;
 
-/// Command buffer, descriptor sets and timestamps of one frame in flight. It grows to what a frame needs, and is then
-/// reused by every recording into it; it also keeps the buffers and kernels of the last recording alive.
+/// Command buffer, descriptor sets and timestamps of one frame in flight. They grow to what a frame needs and are reused
+/// by every recording. The frame also keeps the buffers and kernels of the last recording alive.
 pub struct FrameResources {
     commands: Commands,
     pub(super) descriptors: Descriptors,
@@ -32,7 +32,7 @@ impl FrameResources {
         })
     }
 
-    /// When each pass of the last recording ran, in order; empty where the queue has no timestamps.
+    /// Begin and end of each pass of the last recording, in order; empty if the queue has no timestamps.
     ///
     /// # Errors
     /// When that work is not complete.
@@ -44,8 +44,8 @@ impl FrameResources {
         self.timer.gpu()
     }
 
-    /// Ready for the next recording. The work of the last one is complete: `Gpu::run` waits, and
-    /// `Recorder::external` makes its caller promise so.
+    /// Prepares for the next recording. The work of the last one is complete: `Gpu::run` waits for it, and the contract of
+    /// `Recorder::external` requires it.
     ///
     /// # Errors
     /// The device was abandoned, with the work on it.

@@ -1,4 +1,4 @@
-//! What a device is, what it can do, and what Tallow requires of it.
+//! The properties of devices, and the features that Tallow requires of them.
 use super::At;
 use super::instance::Instance;
 use crate::error::{Error, Result};
@@ -10,11 +10,11 @@ use serde::Serialize;
 pub struct Feature {
     /// As the Vulkan specification spells it.
     pub name: &'static str,
-    /// Where it lies among all features, for asking and for enabling alike.
+    /// Returns its field among all features, which serves both to query and to enable it.
     field: fn(&mut Features) -> &mut vk::Bool32,
 }
 
-/// All that Tallow requires of a device. Whoever hands over a device ([`super::Gpu::from_raw`]) enables these.
+/// All features that Tallow requires of a device. A device handed over to [`super::Gpu::from_raw`] must have them enabled.
 pub const REQUIRED_FEATURES: &[Feature] = &[
     Feature { name: "Vulkan 1.3", field: |f| &mut f.vulkan_1_3 },
     Feature { name: "synchronization2", field: |f| &mut f.v13.synchronization2 },
@@ -34,7 +34,7 @@ pub(super) struct Features {
 }
 
 impl Features {
-    /// Exactly the required ones.
+    /// Exactly the required features.
     pub fn required() -> Self {
         let mut features = Self::default();
         REQUIRED_FEATURES.iter().for_each(|feature| *(feature.field)(&mut features) = vk::TRUE);
@@ -52,7 +52,7 @@ impl Features {
             features.core = all.features;
             features.vulkan_1_3 = vk::TRUE;
         }
-        // The chain pointed into locals.
+        // The chain pointed to local variables.
         features.v12.p_next = std::ptr::null_mut();
         features.v13.p_next = std::ptr::null_mut();
         features
@@ -63,7 +63,7 @@ impl Features {
     }
 }
 
-/// What a device is made of, in the order of preference.
+/// The kinds of devices, in the order of preference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub enum DeviceKind {
     /// A graphics card with memory of its own.
@@ -78,7 +78,7 @@ pub enum DeviceKind {
     /// Software, such as Mesa's lavapipe.
     #[serde(rename = "CPU")]
     Cpu,
-    /// None of these.
+    /// A kind that the driver does not tell, or another one.
     #[serde(rename = "other")]
     Other,
 }
@@ -107,47 +107,47 @@ impl std::fmt::Display for DeviceKind {
     }
 }
 
-/// A device as `tallow devices` prints it.
+/// The description of a device. `tallow devices` prints most of it.
 #[derive(Clone, Debug, Serialize)]
 pub struct DeviceInfo {
-    /// As the driver calls it.
+    /// Name of the device, as the driver gives it.
     pub name: String,
-    /// What it is made of.
+    /// Kind of device.
     pub kind: DeviceKind,
-    /// Whether host and device share one memory, so that buffers are written in place.
+    /// Whether host and device share one memory, so that the host writes buffers in place.
     pub unified: bool,
     /// Short name of the driver.
     pub driver_name: String,
-    /// The driver's own words about its build.
+    /// The driver's description of its build.
     pub driver_info: String,
-    /// Decoded as its vendor encodes it.
+    /// Version of the driver, decoded by the vendor's scheme.
     pub driver_version: String,
-    /// Highest Vulkan version, such as "1.3.224".
+    /// Highest Vulkan version that it supports, such as "1.3.224".
     pub api_version: String,
-    /// Bytes of one storage buffer binding.
+    /// Largest storage buffer binding in bytes.
     pub max_storage_range: u64,
-    /// Texels of one texel buffer view.
+    /// Largest texel buffer view in texels.
     pub max_texel_elements: u64,
-    /// Bytes of one buffer.
+    /// Largest buffer in bytes.
     pub max_buffer_size: u64,
-    /// Bytes of one allocation.
+    /// Largest memory allocation in bytes.
     pub max_allocation: u64,
-    /// Bytes of the largest device-local heap.
+    /// Size of the largest device-local heap in bytes.
     pub memory_heap: u64,
-    /// Invocations of a subgroup.
+    /// Number of invocations in a subgroup.
     pub subgroup_size: u32,
-    /// Meaningful bits of a timestamp; 0 means that passes cannot be timed.
+    /// Number of valid bits in a timestamp; 0 if passes cannot be timed.
     pub timestamp_bits: u32,
-    /// Nanoseconds per tick.
+    /// Nanoseconds per tick of the timestamp counter.
     pub timestamp_period: f32,
-    /// Whether kernels that read or write out of a buffer's bounds reach nothing else (`robustBufferAccess`): always on
-    /// devices that are opened here; of one that was handed over, what its maker said.
+    /// Whether accesses outside a buffer's bounds are prevented from reaching other memory (`robustBufferAccess`). It is
+    /// always enabled on devices opened here; for a device handed over, its owner tells.
     pub robust_buffer_access: bool,
     /// Names of required features that the device lacks.
     pub missing: Vec<&'static str>,
 }
 
-/// A device, its description and what is needed to open it.
+/// A device with its description and all that is needed to open it.
 pub(super) struct Candidate {
     pub physical: vk::PhysicalDevice,
     pub info: DeviceInfo,
@@ -155,11 +155,11 @@ pub(super) struct Candidate {
     pub cache_uuid: [u8; vk::UUID_SIZE],
     pub vendor: u32,
     pub id: u32,
-    /// First family with compute, with timestamps if there is one.
+    /// First queue family with compute and timestamps, or else the first with compute.
     pub queue_family: Option<u32>,
 }
 
-/// Every device of this machine, in the loader's order; the index is what `DeviceOptions::device` takes.
+/// Describes every device of this machine, in the loader's order. `DeviceOptions::device` accepts the index.
 ///
 /// # Errors
 /// No loader, no driver or no device.
@@ -216,7 +216,8 @@ pub(super) fn describe(instance: &ash::Instance, physical: vk::PhysicalDevice, q
     Candidate { physical, info, limits, cache_uuid, vendor, id, queue_family }
 }
 
-/// Zero for a device below 1.3, which cannot be used and must not be asked.
+/// Properties added by Vulkan 1.1 to 1.3. They are zero for a device below 1.3, which cannot be used and must not be
+/// queried for them.
 fn newer_properties(
     instance: &ash::Instance,
     physical: vk::PhysicalDevice,
@@ -251,7 +252,7 @@ fn version(v: u32) -> String {
     format!("{}.{}.{}", vk::api_version_major(v), vk::api_version_minor(v), vk::api_version_patch(v))
 }
 
-/// NVIDIA packs 10, 8, 8 and 6 bits; the others pack as the API version does.
+/// Decodes a driver version. NVIDIA packs 10, 8, 8 and 6 bits; other vendors pack it like the API version.
 fn driver_version(vendor: u32, v: u32) -> String {
     const NVIDIA: u32 = 0x10de;
     match vendor {

@@ -1,4 +1,4 @@
-//! The Vulkan loader and instance, with the validation layers when asked for.
+//! The Vulkan loader and instance, with the validation layers if they are requested.
 use super::At;
 use crate::error::{Error, Result};
 use ash::{ext, vk};
@@ -7,10 +7,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
-/// What the validation layers said, shared with the callback and with whoever outlives the device.
+/// Messages of the validation layers, shared with the callback and with code that outlives the device.
 pub(super) type Messages = Arc<Mutex<Vec<String>>>;
 
-/// An instance; destroys itself when it made itself.
+/// An instance. It is destroyed on drop only if it was made here.
 pub(super) struct Instance {
     /// Keeps the loader's library open.
     pub _entry: ash::Entry,
@@ -44,7 +44,7 @@ impl Instance {
         Ok(instance)
     }
 
-    /// An instance made by somebody else, who also destroys it.
+    /// Wraps an instance that the caller made and will destroy.
     pub fn borrowed(entry: ash::Entry, raw: ash::Instance) -> Self {
         let messages = Messages::default();
         Self { _entry: entry, raw, owned: false, debug_utils: false, messages, messenger: None }
@@ -107,7 +107,7 @@ fn load() -> Result<ash::Entry> {
     Ok(entry)
 }
 
-/// Whether the loader and the drivers, or a layer, have an extension of the instance.
+/// Whether the loader and the drivers, or the given layer, support an instance extension.
 fn offers(entry: &ash::Entry, layer: Option<&CStr>, extension: &CStr) -> Result<bool> {
     // SAFETY: no preconditions.
     let extensions = unsafe { entry.enumerate_instance_extension_properties(layer) }.at("instance extensions")?;
@@ -122,7 +122,7 @@ fn has_validation(entry: &ash::Entry) -> Result<bool> {
 
 fn switched_on(name: &CStr) -> vk::LayerSettingEXT<'_> {
     static ON: vk::Bool32 = vk::TRUE;
-    // By hand: `values` would count bytes.
+    // The fields are set directly because `values` would count bytes.
     vk::LayerSettingEXT { value_count: 1, p_values: (&raw const ON).cast(), ..Default::default() }
         .layer_name(VALIDATION_LAYER)
         .setting_name(name)
@@ -141,7 +141,7 @@ fn create(entry: &ash::Entry, debug_utils: bool, validation: bool) -> Result<ash
     }
     let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
     let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
-    // Since July 2024 the layers (pull request 8279) take no notice of what shaders access unless they are told to.
+    // Since July 2024 (pull request 8279) the layers ignore accesses by shaders unless this is switched on.
     let switches = [c"validate_sync", c"syncval_shader_accesses_heuristic"].map(switched_on);
     let mut settings = vk::LayerSettingsCreateInfoEXT::default().settings(&switches);
     let mut info = vk::InstanceCreateInfo::default()

@@ -1,4 +1,5 @@
-//! A compute pipeline and what it binds.
+//! A compiled compute pipeline, and the interface that generated code gives every kernel: bindings, push constants and
+//! specialisation constants.
 use super::access::Access;
 use super::{At, Bound, Gpu};
 use crate::error::{Error, Result};
@@ -11,13 +12,13 @@ use std::time::{Duration, Instant};
 /// How a kernel sees a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SlotKind {
-    /// Storage buffer.
+    /// Storage buffer, bound as a whole or in part.
     Storage,
-    /// `usamplerBuffer`.
+    /// Texel buffer of unsigned integers (`usamplerBuffer`).
     UintTexels,
-    /// `samplerBuffer`.
+    /// Texel buffer of floats (`samplerBuffer`).
     FloatTexels,
-    /// Uniform block: the first element.
+    /// Uniform block, which holds the first element of the buffer.
     Uniform,
 }
 
@@ -34,27 +35,27 @@ impl SlotKind {
 /// One binding of a kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Slot {
-    /// Name in the GLSL.
+    /// Its name in the GLSL source.
     pub name: &'static str,
-    /// Number in set 0.
+    /// Binding number in set 0.
     pub binding: u32,
-    /// How the kernel sees it.
+    /// How the kernel sees the buffer.
     pub kind: SlotKind,
-    /// What the kernel does to it.
+    /// How the kernel accesses the buffer.
     pub access: Access,
 }
 
-/// What a kernel binds; the build script implements it for the `Bind` struct of every kernel.
+/// The interface of a kernel. The build script implements it for the `Bind` struct of every kernel.
 ///
 /// # Safety
 /// - [`Self::SPIRV`] is valid code for Vulkan 1.3 and the features in [`super::REQUIRED_FEATURES`], with an entry point
 ///   `main` for compute; [`Self::SLOTS`] are its descriptors, all in set 0, with numbers that differ.
 /// - [`Self::Push`] is its push constants: at most 128 bytes, a multiple of 4. Elements of [`SlotKind::Uniform`] have at most
 ///   16384 bytes.
-/// - [`Self::buffers`] returns as many as there are slots.
-/// - Whatever buffers, push constants and specialisation constants its owner lets others choose, it accesses nothing but
-///   its buffers. Accesses beyond their ends are allowed on devices with robust buffer access; those beyond the ends of
-///   its own arrays are not.
+/// - [`Self::buffers`] returns one buffer per slot.
+/// - Whatever buffers, push constants and specialisation constants the owner of the type lets others choose, the kernel
+///   accesses nothing but its buffers. Accesses beyond their ends are allowed on devices with robust buffer access; those
+///   beyond the ends of its own arrays are not.
 ///
 /// Safe code cannot implement it:
 /// ```compile_fail,E0200
@@ -71,7 +72,7 @@ pub struct Slot {
 ///     }
 /// }
 /// ```
-/// The same by somebody who vouches for it:
+/// Unsafe code that guarantees the above can:
 /// ```
 /// # use tallow::gpu::{Bindings, Bound, Slot};
 /// struct Mine;
@@ -89,27 +90,27 @@ pub struct Slot {
 pub unsafe trait Bindings {
     /// The push constants, at most 128 bytes.
     type Push: Pod;
-    /// The specialisation constants.
+    /// The specialisation constants, fixed when the kernel is compiled.
     type Constants: Specialise;
-    /// Basename of the GLSL file, label of the pass.
+    /// Basename of the GLSL file, which is also the label of the pass.
     const NAME: &'static str;
-    /// The compiled code.
+    /// The compiled code of the kernel.
     const SPIRV: &'static [u8];
-    /// In the order of the fields.
+    /// The slots, in the order of the fields of the `Bind` struct.
     const SLOTS: &'static [Slot];
-    /// One for each of [`Self::SLOTS`].
+    /// The buffers to bind, one for each of [`Self::SLOTS`].
     fn buffers(&self) -> Vec<Bound<'_>>;
 }
 
-/// Specialisation constants; the build script implements it for the `Constants` struct of every kernel.
+/// Specialisation constants. The build script implements it for the `Constants` struct of every kernel.
 pub trait Specialise {
-    /// (constant id, value) of all.
+    /// All constants as (constant id, value).
     fn entries(&self) -> Vec<(u32, u32)>;
-    /// Threads of a workgroup along x and y.
+    /// Number of threads in a workgroup along x and y.
     fn local_size(&self) -> [u32; 2];
 }
 
-/// No constants, and workgroups of one thread.
+/// A kernel without constants has workgroups of one thread.
 impl Specialise for () {
     fn entries(&self) -> Vec<(u32, u32)> {
         Vec::new()
@@ -120,7 +121,7 @@ impl Specialise for () {
     }
 }
 
-/// Workgroups along one axis that every Vulkan device can run.
+/// Number of workgroups along one axis that every Vulkan device supports.
 const MAX_GROUPS: u32 = 65_535;
 
 /// A compiled kernel, specialised by its constants. `B` is the kernel's `Bind` struct.
@@ -144,12 +145,12 @@ impl<B: Bindings> Kernel<B> {
     /// Compiles the kernel for these constants.
     ///
     /// # Errors
-    /// [`Error::Device`] when the driver refuses, or a workgroup is larger than the device's.
+    /// [`Error::Device`] when the driver refuses it, or a workgroup exceeds the device's limit.
     pub fn new(gpu: &Gpu, constants: &B::Constants) -> Result<Self> {
         let begun = Instant::now();
         check_workgroup(B::NAME, constants.local_size(), &gpu.0.limits)?;
         let (set_layout, layout, pipeline) = Default::default();
-        // From here on Drop cleans up, whichever line below fails; null handles may be destroyed.
+        // From here on, Drop cleans up if a line below fails; null handles may be destroyed.
         let mut parts = Parts { gpu: gpu.clone(), set_layout, layout, pipeline };
         parts.create_layouts(B::SLOTS, size_of::<B::Push>() as u32).at(B::NAME)?;
         parts.create_pipeline(B::NAME, B::SPIRV, &constants.entries())?;
@@ -158,18 +159,18 @@ impl<B: Bindings> Kernel<B> {
         Ok(Self { parts: Arc::new(parts), compile_time, local_size, of: PhantomData })
     }
 
-    /// What creating the pipeline took. Some drivers (lavapipe) compile more on the first dispatch.
+    /// Time that creating the pipeline took. Some drivers, such as lavapipe, compile more on the first dispatch.
     pub fn compile_time(&self) -> Duration {
         self.compile_time
     }
 
-    /// Workgroups that cover a grid of threads.
+    /// Number of workgroups that cover a grid of x times y threads.
     pub fn groups(&self, [x, y]: [u32; 2]) -> [u32; 3] {
         [x.div_ceil(self.local_size[0]), y.div_ceil(self.local_size[1]), 1]
     }
 
-    /// Workgroups that cover threads in a row, folded into several rows of groups where the device would refuse one;
-    /// `thread_index()` of `shared/thread.glsl` unfolds them.
+    /// Number of workgroups that cover a row of threads. A row too long for the device is folded into several rows of groups,
+    /// which `thread_index()` in `glsl/shared/thread.glsl` unfolds.
     pub fn folded_groups(&self, threads: u32) -> [u32; 3] {
         folded(threads.div_ceil(self.local_size[0]))
     }
@@ -240,7 +241,7 @@ impl Parts {
 
 impl Drop for Parts {
     fn drop(&mut self) {
-        // SAFETY: made on this device; whoever recorded them keeps this until the work is complete.
+        // SAFETY: made on this device; a frame that recorded them keeps this until the work is complete.
         self.gpu.0.free(|device| unsafe {
             device.destroy_pipeline(self.pipeline, None);
             device.destroy_pipeline_layout(self.layout, None);

@@ -1,15 +1,17 @@
-//! The only `unsafe`, the only `vk::`. Everything above this module is safe Rust that names buffers and kernels.
+//! The Vulkan layer. It holds all of the crate's `unsafe` code and all of its Vulkan calls; everything above it is safe
+//! Rust that names buffers and kernels.
 //!
-//! What the layer promises to its callers:
-//! - A handle that a call uses is alive: buffers and pipelines are kept by the frame that recorded them until that
-//!   frame is reset, and everything keeps the device by a counted [`Gpu`].
+//! The layer promises its callers:
+//! - A handle that a call uses is alive: a frame keeps the buffers and pipelines recorded into it until it is reset, and
+//!   every object holds a counted reference to the device ([`Gpu`]).
 //! - Barriers are derived from the accesses that a kernel declares in its GLSL; no caller writes one.
-//! - Device memory is plain data (`Pod`), so that any bits are a value.
-//! - The host touches no memory while work runs that was submitted here, and nothing is freed that such work uses.
-//! - Kernels that are told nonsense, or read it from buffers, compute nonsense, but access nothing beyond their buffers
-//!   (robust buffer access) and their own arrays ([`Bindings`]).
+//! - Device memory holds plain data (`Pod`), for which every bit pattern is a valid value.
+//! - While work submitted here runs, the host does not touch device memory, and nothing that the work uses is freed.
+//! - A kernel that gets invalid data computes an invalid result, but it accesses nothing outside its buffers (robust
+//!   buffer access) and its own arrays ([`Bindings`]).
 //!
-//! What it relies on: whoever hands over raw handles keeps the contract of [`Gpu::from_raw`] and [`Recorder::external`].
+//! In return, a caller that hands over raw handles must keep the contracts of [`Gpu::from_raw`] and
+//! [`Recorder::external`].
 #![allow(unsafe_code)]
 mod access;
 mod blocks;
@@ -45,7 +47,7 @@ pub use tuning::Tuning;
 use crate::error::{Error, Result};
 use ash::vk;
 
-/// Says what was being done when Vulkan refused.
+/// Adds to a Vulkan error what was being done when it occurred.
 trait At<T> {
     fn at(self, what: &str) -> Result<T>;
 }

@@ -1,4 +1,4 @@
-//! The one place that records work: barrier, label, timestamps, bind, push, dispatch.
+//! Recording of work. Every pass gets its barrier, debug label and timestamps here, and kernels are bound and dispatched.
 use super::{Access, Bindings, Bound, Buffer, FrameResources, Gpu, Kernel, PassTime, Untyped, access};
 use crate::error::{Error, Result};
 use ash::vk;
@@ -16,12 +16,13 @@ pub struct Recorder<'a> {
 }
 
 impl Gpu {
-    /// Records work with `record`, submits it, waits for it, and returns what each pass took, in order. The times are
-    /// empty where the queue has no timestamps. Everything that earlier runs wrote is visible to this one, and what
-    /// this one writes to the host.
+    /// Records work with `record`, submits it, waits for it, and returns the times of the passes, in order; there are none if
+    /// the queue has no timestamps. Everything that earlier runs wrote is visible to this one, and everything that it writes
+    /// is visible to the host.
     ///
     /// # Errors
-    /// Those of `record`, in which case nothing was submitted, and [`Error::Device`] when the device fails.
+    /// Those of `record`, in which case nothing was submitted, and [`Error::Device`] or [`Error::DeviceLost`] when the device
+    /// fails.
     pub fn run(
         &self,
         frame: &mut FrameResources,
@@ -43,19 +44,18 @@ impl<'a> Recorder<'a> {
         Ok(Self::start(gpu, frame, commands))
     }
 
-    /// Records into a `VkCommandBuffer` of the caller's, given as the number that it is in Vulkan's C interface. What
-    /// the caller recorded or submitted before is visible to the passes, and what they write is visible, once this
-    /// recorder is dropped, to all that follows and to the host. The bound compute pipeline, descriptor set 0 and push
-    /// constants are changed.
+    /// Records into the caller's `VkCommandBuffer`, given as the number that it is in Vulkan's C interface. The passes see
+    /// what the caller recorded or submitted before. Once this recorder is dropped, what they write is visible to everything
+    /// that follows and to the host. The bound compute pipeline, descriptor set 0 and push constants are changed.
     ///
     /// # Safety
     /// - The command buffer was made for the device and queue family of `gpu`, is recording outside a render pass, and
-    ///   nobody else records into it meanwhile.
+    ///   nobody else records into it until the recorder is dropped.
     /// - It is submitted at most once, to a queue of that device.
     /// - `frame` is neither recorded into again nor dropped before that submission is complete.
-    /// - Nor is, from the submission until it is complete, any buffer read or written that it uses: by [`Buffer::read`],
+    /// - No buffer that it uses is read or written from the submission until it is complete: by [`Buffer::read`],
     ///   [`Buffer::read_range`] or [`Buffer::write`], by what calls them (of a [`Renderer`](crate::render::Renderer):
-    ///   `resume`, `counters`, `apportionment`, `listed`, `priorities_of`), by [`Gpu::run`] and what runs by it, or by
+    ///   `resume`, `counters`, `apportionment`, `listed`, `priorities_of`), by [`Gpu::run`] and what calls it, or by
     ///   another such submission, unless a semaphore orders the two. All of these are safe functions, and nothing but this
     ///   promise keeps them from memory that the device is writing.
     /// - The recorder is dropped before the command buffer is ended.
@@ -77,7 +77,7 @@ impl<'a> Recorder<'a> {
         Self { gpu, frame, commands, barriers: true }
     }
 
-    /// Runs `kernel` on what `bind` names, with at least `threads` threads, which are numbered by `thread_index()`.
+    /// Runs `kernel` on the buffers in `bind` with at least `threads` threads, which `thread_index()` numbers in the kernel.
     ///
     /// # Errors
     /// As [`Self::dispatch`].
@@ -91,7 +91,7 @@ impl<'a> Recorder<'a> {
         self.dispatch(kernel, bind, push, kernel.folded_groups(threads))
     }
 
-    /// Runs `kernel` on what `bind` names, with `groups` workgroups.
+    /// Runs `kernel` on the buffers in `bind` with `groups` workgroups along x, y and z.
     ///
     /// # Errors
     /// [`Error::Device`] when a group count is 0 or over the device's limit, a buffer is too large for its slot, or
@@ -154,7 +154,7 @@ impl<'a> Recorder<'a> {
         })
     }
 
-    /// Replaces the first element of `buffer`, in the order of the passes: those before read the old value, those after the new.
+    /// Replaces the first element of `buffer`. Passes recorded before it read the old value, later ones the new one.
     ///
     /// # Errors
     /// [`Error::Device`] when memory is out.
@@ -168,7 +168,7 @@ impl<'a> Recorder<'a> {
         })
     }
 
-    /// From here on no barriers come between passes: a fault to plant, for tests of the validation that would find it.
+    /// Omits the barriers between all later passes. Tests plant this fault to prove that validation finds it.
     #[doc(hidden)]
     pub fn suppress_barriers(&mut self) {
         self.barriers = false;
@@ -186,7 +186,7 @@ impl<'a> Recorder<'a> {
     ) -> Result<()> {
         let times = self.frame.timer.open(name)?;
         let (inner, commands) = (&self.gpu.0, self.commands);
-        // Both stamps wait for all earlier work, so that a pass is not charged with another's tail.
+        // Both timestamps wait for all earlier work, so that a pass is not charged for the end of another.
         let stamp = |offset: u32| {
             if let Some((pool, query)) = times {
                 let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
@@ -206,7 +206,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Puts `record` under a label for capture tools, where there are labels.
+    /// Calls `record` under a debug label for capture tools, if labels are available.
     fn label(&self, name: &str, record: impl FnOnce()) {
         let (Some(debug), Ok(name)) = (&self.gpu.0.debug, CString::new(name)) else { return record() };
         let label = vk::DebugUtilsLabelEXT::default().label_name(&name);

@@ -1,14 +1,14 @@
-//! Uploads and read-backs: directly where the host can map the memory, else by copies through a mapped buffer.
+//! Uploads and read-backs. The host accesses mapped memory directly; other memory is copied through a mapped buffer.
 use super::commands::Commands;
 use super::{Gpu, Location, Untyped, access};
 use crate::error::{Error, Result};
 use ash::vk;
 
-/// Bytes of the mapped buffer, at most.
+/// Largest size of the mapped buffer in bytes.
 const CHUNK: usize = 64 << 20;
 
 impl Untyped {
-    /// Writes `bytes` from byte `offset` on, and waits for the device first.
+    /// Waits for the device, then writes `bytes` from byte `offset` on.
     ///
     /// # Errors
     /// Those of the device.
@@ -25,13 +25,13 @@ impl Untyped {
         }
     }
 
-    /// Reads from byte `offset` on, and waits for the device first.
+    /// Waits for the device, then reads from byte `offset` on.
     ///
     /// # Errors
     /// Those of the device.
     pub(super) fn read(&self, offset: usize, bytes: &mut [u8]) -> Result<()> {
         self.gpu.0.answers()?;
-        // Integrated GPUs map memory that only writes are quick to.
+        // Integrated GPUs can map uncached memory, which is fast to write but slow to read.
         let (length, cached) = (bytes.len(), vk::MemoryPropertyFlags::HOST_CACHED);
         let copied = {
             let _idle = self.gpu.0.idle();
@@ -82,7 +82,7 @@ impl Staging {
             .ok_or_else(|| Error::Device("the device has no memory that the host can map".into()))
     }
 
-    /// Copies and waits.
+    /// Copies one region and waits until the copy is complete.
     fn copy(&self, from: &Untyped, to: &Untyped, region: vk::BufferCopy) -> Result<()> {
         self.commands.begin()?;
         // SAFETY: both buffers live through the submission, which is waited for, and hold the region.
@@ -105,7 +105,7 @@ mod tests {
     use super::*;
     use crate::gpu::{Buffer, DeviceOptions};
 
-    /// Devices with unified memory never come here by themselves.
+    /// Called directly, because devices with unified memory never take this path.
     #[test]
     fn copies_cross_chunks_both_ways() {
         let gpu = Gpu::open(&DeviceOptions { validation: true, ..DeviceOptions::default() }).unwrap();

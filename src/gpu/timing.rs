@@ -1,4 +1,4 @@
-//! When each pass began and ended, by timestamps of the device.
+//! Begin and end of each pass, measured with the device's timestamps.
 use super::{At, Gpu};
 use crate::error::{Error, Result};
 use ash::vk;
@@ -8,33 +8,33 @@ use std::time::Instant;
 /// Queries per pool; a pass takes two.
 const POOL: u32 = 1024;
 
-/// One pass of a frame. Both times are on the device's clock, which [`super::Gpu::calibrate`] ties to the host's.
+/// The times of one pass. Both are on the device's clock, which [`super::Gpu::calibrate`] relates to the host's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PassTime {
-    /// The kernel's name, or `copy` or `fill`.
+    /// The kernel's name, or `copy`, `fill` or `update`.
     pub name: &'static str,
-    /// Nanoseconds.
+    /// Begin of the pass in nanoseconds.
     pub begin_ns: u64,
-    /// Nanoseconds, not before `begin_ns`.
+    /// End of the pass in nanoseconds, not before `begin_ns`.
     pub end_ns: u64,
 }
 
 impl PassTime {
-    /// Nanoseconds that it took.
+    /// Duration of the pass in nanoseconds.
     pub fn duration_ns(&self) -> u64 {
         self.end_ns.saturating_sub(self.begin_ns)
     }
 }
 
-/// Nanoseconds since this was first called, on a clock that never goes back.
+/// Nanoseconds since the first call of this function, on a monotonic clock.
 pub fn host_ns() -> u64 {
     static START: OnceLock<Instant> = OnceLock::new();
     START.get_or_init(Instant::now).elapsed().as_nanos() as u64
 }
 
 impl Gpu {
-    /// One moment on both clocks: (GPU ns as in [`PassTime`], host ns as in [`host_ns`]). `None` where the
-    /// device cannot tell (VK_EXT_calibrated_timestamps).
+    /// One moment on both clocks: (device ns as in [`PassTime`], host ns as in [`host_ns`]). `None` if the device does not
+    /// support VK_EXT_calibrated_timestamps.
     pub fn calibrate(&self) -> Option<(u64, u64)> {
         let extension = self.0.calibrated.as_ref()?;
         let domain = [vk::CalibratedTimestampInfoEXT::default().time_domain(vk::TimeDomainEXT::DEVICE)];
@@ -59,7 +59,6 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// The device's.
     fn of(gpu: &Gpu) -> Self {
         Self { bits: gpu.info().timestamp_bits, period: gpu.info().timestamp_period }
     }
@@ -75,21 +74,21 @@ impl Clock {
         self.between(0, ticks)
     }
 
-    /// When a pass ran whose ticks are `begin` and `end`, in a recording that began at `first`.
+    /// Converts the ticks `begin` and `end` of a pass, in a recording whose first pass began at the tick `first`.
     fn pass(self, name: &'static str, first: u64, [begin, end]: [u64; 2]) -> PassTime {
         let begin_ns = self.absolute(first).saturating_add(self.between(first, begin));
         PassTime { name, begin_ns, end_ns: begin_ns.saturating_add(self.between(begin, end)) }
     }
 }
 
-/// Exact for a period of 1, and good to 2^-24 for others: in 40-bit fixed point, since 64-bit ticks exceed a double. Ticks
-/// whose nanoseconds exceed 64 bits, of some counter that ran for centuries, become the most that there are.
+/// Converts ticks to nanoseconds, with the period in 40-bit fixed point because a double cannot hold 64-bit ticks. The
+/// result is exact for a period of 1 and within a relative 2^-24 otherwise. It is limited to 64 bits.
 fn scale(ticks: u64, period: f32) -> u64 {
     let fixed = (f64::from(period) * (1u64 << 40) as f64) as u128;
     ((u128::from(ticks) * fixed) >> 40).try_into().unwrap_or(u64::MAX)
 }
 
-/// The queries of one frame.
+/// The timestamp queries of one frame.
 pub(super) struct Timer {
     gpu: Gpu,
     pools: Vec<vk::QueryPool>,
@@ -105,14 +104,14 @@ impl Timer {
         &self.gpu
     }
 
-    /// Forgets the passes; the work that they timed is complete.
+    /// Forgets the passes. The work that they timed must be complete.
     pub fn reset(&mut self) {
         // SAFETY: the queries are not in use, and hostQueryReset is a required feature.
         self.pools.iter().for_each(|pool| unsafe { self.gpu.0.device.reset_query_pool(*pool, 0, POOL) });
         self.passes.clear();
     }
 
-    /// Where the next pass writes its two timestamps; `None` where the queue has none.
+    /// Returns the query to which the next pass writes the first of its two timestamps; `None` if the queue has none.
     pub fn open(&mut self, name: &'static str) -> Result<Option<(vk::QueryPool, u32)>> {
         if self.gpu.0.info.timestamp_bits == 0 {
             return Ok(None);
@@ -148,25 +147,25 @@ impl Timer {
         Ok(self.passes.iter().zip(&ticks).map(|(name, ticks)| clock.pass(name, first, *ticks)).collect())
     }
 
-    /// The last pass that began, for a message about a lost device; it still answers on most drivers.
+    /// The last pass that began, for a message about a lost device. Most drivers still return the queries then.
     pub fn last_started(&self) -> Option<&'static str> {
         let started = |index: &usize| matches!(self.query(2 * index), Some([_, available]) if available != 0);
         (0..self.passes.len()).rev().find(started).map(|index| self.passes[index])
     }
 
-    /// How many times there are so far: more and more while the work goes on.
+    /// Number of timestamps written so far. It grows as the work proceeds.
     pub fn written(&self) -> usize {
         let there = |index: &usize| matches!(self.query(*index), Some([_, available]) if available != 0);
         (0..2 * self.passes.len()).filter(there).count()
     }
 
-    /// Begin and end of every pass; `None` when one is not there yet.
+    /// Begin and end of every pass in ticks; `None` when one is not available yet.
     fn ticks(&self) -> Option<Vec<[u64; 2]>> {
         let read = |index| self.query(index).filter(|[_, available]| *available != 0).map(|[ticks, _]| ticks);
         (0..self.passes.len()).map(|pass| Some([read(2 * pass)?, read(2 * pass + 1)?])).collect()
     }
 
-    /// (ticks, whether they are there) of one query.
+    /// (ticks, availability) of one query; availability is 0 until the timestamp is written.
     fn query(&self, index: usize) -> Option<[u64; 2]> {
         let (pool, query) = (self.pools[index / POOL as usize], (index % POOL as usize) as u32);
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WITH_AVAILABILITY;

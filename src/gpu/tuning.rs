@@ -1,31 +1,31 @@
-//! How work is cut for a kind of device: every decision between processors and GPUs, with its reason.
+//! Sizes into which work is divided, for CPUs and for GPUs. Every such choice is made here, with its reason.
 use super::Gpu;
 use super::info::DeviceKind;
 use crate::shaders::shared;
 
-/// What suits a kind of device. No choice changes a bit of any image.
+/// The sizes that suit a kind of device. No choice changes a bit of any image.
 #[derive(Debug)]
 pub struct Tuning {
-    /// Threads of a workgroup that traces rays. lavapipe is fastest at 32 (against 16 and 64); GPUs get two subgroups of the
-    /// most common width.
+    /// Threads in a workgroup that traces rays. lavapipe is fastest with 32 (against 16 and 64); GPUs get two subgroups of
+    /// the most common width.
     pub workgroup: u32,
-    /// Runs of a list of paths that are begun at once, so that expensive pixels are spread over all of lavapipe's threads:
-    /// placed samples of Cornell box, Sponza, bust and grass trace in 0.95 to 0.97 of the time. GPUs deal out small groups
-    /// anyway.
+    /// Number of stripes into which a list of paths is divided and that are traced in parallel, which spreads expensive
+    /// pixels over all of lavapipe's threads. Adaptive samples of Cornell box, Sponza, bust and grass take 0.95 to 0.97 of
+    /// the time. GPUs schedule small groups anyway.
     pub stripes: u32,
-    /// Paths of a dispatch at most: enough to fill the device, few enough that it ends within a fraction of a second.
+    /// Largest number of paths in a dispatch: enough to fill the device, few enough to end within a fraction of a second.
     pub paths_in_flight: u64,
-    /// Pixels that a thread of a kernel over blocks walks over. Two cores are busy with few threads, and a long run spares
-    /// barriers; a GPU hides the time that its memory takes behind other threads, of which it wants tens of thousands.
+    /// Pixels per thread of a [`PerBlock`](super::PerBlock) kernel. A few threads keep a CPU busy, and long runs need fewer
+    /// barriers; a GPU needs tens of thousands of threads to hide the latency of its memory.
     pub thread_items: u32,
-    /// Bytes of a strip of the guided filter's sums: on a processor its caches hold much of it, a GPU is filled by more.
+    /// Bytes in a strip of the guided filter's sums. On a CPU most of it fits into the caches; a GPU needs more to be busy.
     pub strip_bytes: u64,
-    /// Whether a thread sums the windows of a whole line. Each segment of a line sums its first window anew, but a GPU needs the
-    /// threads.
+    /// Whether a thread sums the windows of a whole line of the guided filter. Shorter segments each sum their first window
+    /// anew, but a GPU needs the additional threads.
     pub whole_lines: bool,
-    /// Lines of the guided filter's windows in a workgroup.
+    /// Lines of the guided filter's windows per workgroup.
     pub lines: u32,
-    /// Pixels along an edge of a filtered image at most: see `glsl/shared/loop_limit.glsl`.
+    /// Longest edge of a filtered image in pixels; see `glsl/shared/loop_limit.glsl`.
     pub longest_edge: u64,
 }
 
@@ -52,14 +52,14 @@ const GPU: Tuning = Tuning {
 };
 
 impl Tuning {
-    /// Constants of kernels that number their threads by `shared/thread.glsl`.
+    /// Constants of kernels that number their threads with `glsl/shared/thread.glsl`.
     pub fn thread(&self) -> shared::thread::Constants {
         shared::thread::Constants { workgroup: self.workgroup, stripes: self.stripes }
     }
 }
 
 impl Gpu {
-    /// How work is cut for this device.
+    /// The sizes into which work is divided for this device.
     pub fn tuning(&self) -> &'static Tuning {
         if self.info().kind == DeviceKind::Cpu { &CPU } else { &GPU }
     }

@@ -1,15 +1,16 @@
-//! What filters can use of an image, found by the channel names of Tallow, Blender (Cycles), Mitsuba 3 and pbrt-v4.
+//! The layers of an image that filters use (AOVs, arbitrary output variables). They are found by the channel names of
+//! Tallow, Blender (Cycles), Mitsuba 3 and pbrt-v4.
 use super::film::{Channel, Film, NOISY, Samples, Window, split};
 use std::collections::BTreeMap;
 
 /// One kind of arbitrary output variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Aov {
-    /// Radiance; the only one that an image must have.
+    /// Radiance, which every image must have.
     Colour,
-    /// Tallow's own: radiance that needs no filter.
+    /// Direct light, which needs no filter; only in Tallow's own files.
     Direct,
-    /// Tallow's own: indirect radiance before albedo.
+    /// Indirect light before albedo; only in Tallow's own files.
     Indirect,
     /// Reflectance of the first hit.
     Albedo,
@@ -21,19 +22,19 @@ pub enum Aov {
     Depth,
     /// Squared standard error of the radiance.
     Variance,
-    /// Number of samples.
+    /// Number of samples per pixel.
     Samples,
 }
 
-/// An AOV, what users call it, and the names that renderers give it, the best first.
+/// An AOV, its name in messages, and the layer names that renderers give it, the best first.
 struct Known {
     aov: Aov,
     label: &'static str,
     names: &'static [&'static str],
 }
 
-/// Blender: `ViewLayer.NAME.R`; its "Denoising" passes are made for filters. Mitsuba: the user chooses the names; these
-/// are those of its documentation. pbrt: `Albedo.R`, `Ns.X`, `P.X`, `Variance.R`.
+/// Blender names channels `ViewLayer.NAME.R`; its "Denoising" passes are made for filters. In Mitsuba the user chooses the
+/// names; these are the ones in its documentation. pbrt has `Albedo.R`, `Ns.X`, `P.X`, `Variance.R`.
 const KNOWN: &[Known] = &[
     Known { aov: Aov::Colour, label: "colour", names: &[NOISY] },
     Known { aov: Aov::Direct, label: "direct light", names: &["direct"] },
@@ -50,15 +51,15 @@ const KNOWN: &[Known] = &[
     Known { aov: Aov::Samples, label: "samples", names: &["samples", "debug sample count", "sample count"] },
 ];
 
-/// Names that the user gives, for those of other renderers.
+/// Layer names given by the user, which replace the known ones.
 pub type Names = BTreeMap<Aov, String>;
 
-/// Three values per pixel where they lie in a film, the same three times where the film has one.
+/// Three values per pixel, borrowed from a film; a single channel is repeated three times.
 #[derive(Clone, Copy, Debug)]
 pub struct Plane<'a>([&'a Samples; 3]);
 
 impl Plane<'_> {
-    /// Those of a pixel.
+    /// The three values of a pixel.
     pub fn at(&self, pixel: usize) -> [f32; 3] {
         self.0.map(|samples| samples.at(pixel))
     }
@@ -66,24 +67,25 @@ impl Plane<'_> {
 
 /// The AOVs of a film, each three values per pixel.
 pub struct Aovs<'a> {
-    /// Where they are from.
+    /// The film that holds them.
     pub film: &'a Film,
     /// The channels of the colour, which a filter replaces.
     pub colour: [&'a str; 3],
     planes: BTreeMap<Aov, Plane<'a>>,
     window: Option<Window>,
-    /// What was found under which name, and what is missing: one line each.
+    /// One line per AOV: the name under which it was found, or that it is missing.
     pub notes: Vec<String>,
 }
 
 impl<'a> Aovs<'a> {
-    /// Looks for everything there is to know about.
+    /// Finds all known AOVs of a film, by the user's names first.
     ///
     /// # Errors
-    /// When there is no colour, or not what the user named, or when the file holds other pixels of it than of the colour.
+    /// When there is no colour, when a layer named by the user is missing, or when a layer covers other pixels than the
+    /// colour.
     pub fn find(film: &'a Film, names: &Names) -> Result<Self, String> {
         let given = names.get(&Aov::Colour).map(String::as_str);
-        // The noisy image is filtered, and never replaced.
+        // The noisy image is the input of the filter and is never replaced.
         let shown = film
             .find(given.filter(|name| !is_noisy(name)))
             .ok_or_else(|| film.picture(given).err().unwrap_or_default())?;
@@ -128,7 +130,7 @@ impl<'a> Aovs<'a> {
         Ok(())
     }
 
-    /// Where its values are, if the file has it.
+    /// The values of an AOV, if the file has it.
     pub fn get(&self, aov: Aov) -> Option<Plane<'a>> {
         self.planes.get(&aov).copied()
     }
@@ -138,15 +140,15 @@ impl<'a> Aovs<'a> {
         is_tallow_s(self.film)
     }
 
-    /// The layer to keep the noisy image in when the colour is replaced: none where the file has one already, or where the colour
-    /// is a layer that the user chose.
+    /// The layer in which to keep the noisy image when the colour is replaced. `None` if the file already has one or if the
+    /// colour is a layer that the user chose.
     pub fn keep_as(&self) -> Option<&'static str> {
         let has_one = self.film.layers().iter().any(|layer| is_noisy(split(layer).1));
         let is_shown = self.film.find(None).is_some_and(|shown| shown.map(|c| c.name.as_str()) == self.colour);
         (is_shown && !has_one).then_some(NOISY)
     }
 
-    /// The first of the three.
+    /// The first of the three values of a pixel.
     pub fn scalar(&self, aov: Aov, pixel: usize) -> Option<f32> {
         self.get(aov).map(|plane| plane.at(pixel)[0])
     }
@@ -159,7 +161,7 @@ impl<'a> Aovs<'a> {
 }
 
 impl Known {
-    /// A vector needs three channels; a single one of that name is something else.
+    /// Whether the channels can be this AOV: a vector needs three, so a single one of that name is something else.
     fn fits(&self, channels: &[&Channel; 3]) -> bool {
         !matches!(self.aov, Aov::Normal | Aov::Position) || channels[0].name != channels[1].name
     }
@@ -173,12 +175,12 @@ fn is_noisy(layer: &str) -> bool {
     layer.eq_ignore_ascii_case(NOISY)
 }
 
-/// Other programs may use the same names for something else.
+/// Whether Tallow wrote the file; other programs may use the same names for something else.
 fn is_tallow_s(film: &Film) -> bool {
     film.metadata.get("software").is_some_and(|name| name.starts_with("tallow "))
 }
 
-/// In the view layer of the colour, or else anywhere.
+/// Finds a layer in the view layer of the colour, or else anywhere.
 fn find<'a>(film: &'a Film, view: &str, name: &str) -> Option<[&'a Channel; 3]> {
     let own = (!view.is_empty()).then(|| film.find(Some(&format!("{view}.{name}")))).flatten();
     own.or_else(|| film.find(Some(name)))
@@ -194,7 +196,7 @@ fn extent(film: &Film, window: Option<Window>) -> String {
     format!("{}x{} pixels from ({}, {})", w.size[0], w.size[1], w.first[0], w.first[1])
 }
 
-/// `N.X N.Y N.Z`, or one name.
+/// The three names, such as `N.X N.Y N.Z`, or the one that all share.
 fn channel_names(channels: [&Channel; 3]) -> String {
     let mut names = channels.map(|c| c.name.as_str()).to_vec();
     names.dedup();

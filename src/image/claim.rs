@@ -1,52 +1,54 @@
-//! What a file's headers ask for, weighed before anything is allocated: a header of a few bytes may claim any size.
+//! The memory that decoding a file takes, computed from its headers. It is checked before anything is allocated, because a
+//! header of a few bytes can claim any size.
 use super::frame::{self, Frame};
 use exr::meta::MetaData;
 use exr::meta::attribute::{IntegerBounds, SampleType};
 use exr::meta::header::Header;
 use exr::prelude::Compression;
 
-/// What decoding a file takes.
+/// The size of a film and the memory that decoding it takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Claim {
     /// Width and height of the film.
     pub size: [u32; 2],
-    /// Memory at the worst moment, that of the file's bytes apart.
+    /// Peak memory in bytes, without the bytes of the file itself.
     pub bytes: u64,
 }
 
 impl Claim {
-    /// Pixels of the film.
+    /// Number of pixels of the film.
     pub fn pixels(&self) -> u64 {
         u64::from(self.size[0]) * u64::from(self.size[1])
     }
 }
 
-/// An entry in the table of offsets, and the smallest head of a chunk: its first line and its length.
+/// Smallest number of bytes per chunk: its entry in the offset table, and its head with first line and length.
 const BYTES_OF_CHUNK: u64 = 8 + 8;
 
-/// Pixels and samples of a film that no part of the file holds: they are 0, take memory all the same, and nothing in the file
-/// vouches for them. An 8K frame of which a corner was rendered, in 8 channels, or a 4K frame in 32.
+/// Largest number of pixels and of samples in a film that the file need not store. Pixels that are not stored are 0, but
+/// they take memory, and no data in the file confirm them. The limits allow an 8K frame in 8 channels or a 4K frame in 32
+/// of which only a corner was rendered.
 const EMPTY_PIXELS: u64 = 1 << 25;
 const EMPTY_SAMPLES: u64 = 1 << 28;
-/// A film of more than that may be so many times as large as what is stored.
+/// A film above these limits may be this many times as large as what is stored.
 const EMPTY_TIMES: u64 = 4;
 
-/// Checks the headers of an EXR file of which `behind` bytes follow them.
+/// Checks the headers of an EXR file, which are followed by `behind` bytes.
 ///
 /// # Errors
-/// Which of its sizes cannot be.
+/// A message about the size that is not possible.
 pub(super) fn of_exr(meta: &MetaData, behind: usize, frame: Frame) -> Result<Claim, String> {
     check_data(&meta.headers, behind as u64)?;
     let frame = frame::of(meta, frame);
     check_frame(&meta.headers, frame)?;
     let film = 4 * area(frame) * channels(&meta.headers);
     let stored: u64 = meta.headers.iter().map(bytes_of_pixels).fold(0, u64::saturating_add);
-    // Channels are converted one after the other.
+    // Channels are converted one at a time.
     let plane = if meta.headers.iter().all(|h| is_kept(h, frame)) { 0 } else { 4 * area(frame) };
     Ok(Claim { size: [frame.size.0 as u32, frame.size.1 as u32], bytes: stored.max(film) + plane })
 }
 
-/// The pixels and the chunks must fit what follows the headers.
+/// Checks that the claimed pixels and chunks fit into the bytes that follow the headers.
 fn check_data(headers: &[Header], behind: u64) -> Result<(), String> {
     let sum = |of: fn(&Header) -> u64| headers.iter().map(of).fold(0, u64::saturating_add);
     let least = sum(|h| bytes_of_pixels(h) / largest_ratio(h.compression))
@@ -58,7 +60,7 @@ fn check_data(headers: &[Header], behind: u64) -> Result<(), String> {
     Ok(())
 }
 
-/// Bytes of pixels that a byte can stand for.
+/// Largest number of bytes of pixels that one compressed byte can hold.
 fn largest_ratio(compression: Compression) -> u64 {
     const DEFLATE: u64 = 1032;
     match compression {
@@ -74,7 +76,7 @@ fn largest_ratio(compression: Compression) -> u64 {
         Compression::B44 | Compression::B44A => 32 / 3 + 1,
         // A square of 64 floats takes 2 bytes in each of two deflated streams; runs of 128 in 2 bytes, deflated, are as small.
         Compression::DWAA(_) | Compression::DWAB(_) => 64 * DEFLATE,
-        // Not supported: the decoder says so.
+        // The decoder does not support it and says so.
         Compression::HTJ2K32 | Compression::HTJ2K256 => u64::MAX,
     }
 }
@@ -95,7 +97,7 @@ fn check_frame(headers: &[Header], frame: IntegerBounds) -> Result<(), String> {
     Ok(())
 }
 
-/// Whether its samples become the film's as they are.
+/// Whether its samples become those of the film without conversion.
 fn is_kept(header: &Header, frame: IntegerBounds) -> bool {
     frame::window(header) == frame && header.channels.list.iter().all(|c| c.sample_type != SampleType::F16)
 }

@@ -1,15 +1,15 @@
-//! A picture of where two pictures differ.
+//! Heat maps of the differences between two pictures.
 use super::film::Picture;
 
-/// Columns of the scale bar and of the gap before it.
+/// Width in pixels of the scale bar and of the gap before it.
 const BAR: usize = 12;
 const GAP: usize = 4;
 
-/// Mean over the channels of `|test - reference|`, linear, in the colour map magma (perceptually uniform; the one that
-/// FLIP uses), with the scale as a bar at the right edge, 0 at its foot.
+/// Draws the mean over the channels of `|test - reference|`, on linear values, in the colour map magma (perceptually
+/// uniform; FLIP uses it too). A bar at the right edge shows the scale, with 0 at its lower end.
 ///
 /// Returns the picture, [`WIDER`] columns wider than its arguments, and the value at the top of the scale: the 99.9th
-/// percentile of the differences that are not 0, so that a few fireflies do not hide the rest; those above are cut.
+/// percentile of the differences that are not 0, so that a few fireflies do not hide the rest. Larger values are clamped.
 ///
 /// # Panics
 /// When the sizes differ.
@@ -18,7 +18,7 @@ pub fn heat_map(test: &Picture, reference: &Picture) -> (Picture, f32) {
     (heat_map_to(test, reference, top), top)
 }
 
-/// The same with the top of the scale given, for pictures that are to be compared with each other.
+/// As [`heat_map`] with a given top of the scale, for maps that are to be compared with each other.
 ///
 /// # Panics
 /// When the sizes differ.
@@ -26,7 +26,8 @@ pub fn heat_map_to(test: &Picture, reference: &Picture, top: f32) -> Picture {
     false_colours(test.width, &errors(test, reference), top)
 }
 
-/// Values from 0 to `top` in the colour map of [`heat_map`], with its scale; [`WIDER`] columns wider.
+/// Draws values from 0 to `top` in the colours of [`heat_map`], with its scale bar. The picture is [`WIDER`] columns wider
+/// than `width`.
 pub fn false_colours(width: u32, values: &[f32], top: f32) -> Picture {
     let magma = magma();
     let colour = |fraction: f32| magma[(fraction * 255.0).round().min(255.0) as usize];
@@ -47,10 +48,10 @@ fn errors(test: &Picture, reference: &Picture) -> Vec<f32> {
     test.pixels.iter().zip(&reference.pixels).map(error).collect()
 }
 
-/// Columns that [`heat_map`] adds.
+/// Number of columns that [`heat_map`] adds.
 pub const WIDER: u32 = (BAR + GAP) as u32;
 
-/// 1 when nothing differs.
+/// The 99.9th percentile of the errors above 0, or 1 if there are none.
 fn scale_top(errors: &[f32]) -> f32 {
     let mut some: Vec<f32> = errors.iter().copied().filter(|&e| e > 0.0).collect();
     some.sort_by(f32::total_cmp);

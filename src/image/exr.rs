@@ -1,4 +1,4 @@
-//! OpenEXR, scan lines, lossless: ours out, anybody's in.
+//! OpenEXR files. Those of any program are read; those written have scan lines with lossless compression.
 use super::claim::{self, Claim};
 use super::film::{Channel, Film, Samples, split};
 use super::frame::{Frame, held, shown, union};
@@ -18,7 +18,7 @@ use std::io::{Cursor, ErrorKind};
 
 const ENCODING: Encoding =
     Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
-/// Before the names of our attributes, as many names (`version`, `comments`...) are taken by the standard.
+/// Prefix of the names of Tallow's attributes, because the standard reserves many names (`version`, `comments`...).
 const PREFIX: &str = "tallow:";
 
 type FlatPart = Layer<AnyChannels<FlatSamples>>;
@@ -40,7 +40,7 @@ pub(super) fn encode(film: &Film, out: &mut dyn Stream) -> std::io::Result<()> {
     })
 }
 
-/// UTF-8 as it is, which is what OpenEXR's own library writes; the crate's conversions allow Latin-1 only.
+/// Text in UTF-8, as OpenEXR's own library writes it; the crate's conversions allow only Latin-1.
 fn text(s: &str) -> Text {
     Text::from_slice_unchecked(s.as_bytes())
 }
@@ -49,7 +49,7 @@ fn string(t: &Text) -> String {
     String::from_utf8_lossy(t.as_slice()).into_owned()
 }
 
-/// Planes are written from where they lie: a copy of all would be most of what a large render takes.
+/// Planes are written without a copy, which would be most of the memory that a large render takes.
 impl<'slf, 'a: 'slf> WritableSamples<'slf> for &'a Samples {
     type Writer = Lines<'a>;
 
@@ -69,7 +69,7 @@ impl<'slf, 'a: 'slf> WritableSamples<'slf> for &'a Samples {
     }
 }
 
-/// A plane as the writer asks for it.
+/// Gives the writer the lines of a plane.
 pub struct Lines<'a> {
     samples: &'a Samples,
     width: usize,
@@ -87,7 +87,7 @@ impl SamplesWriter for Lines<'_> {
     }
 }
 
-/// What its film takes, by the headers alone.
+/// The memory that decoding takes, from the headers alone.
 pub(super) fn claim(bytes: &[u8], frame: Frame) -> Result<Claim, String> {
     let mut stream = Cursor::new(bytes);
     let meta = MetaData::read_from_buffered(&mut stream, true).map_err(plain)?;
@@ -96,7 +96,7 @@ pub(super) fn claim(bytes: &[u8], frame: Frame) -> Result<Claim, String> {
     claim::of_exr(&meta, bytes.len().saturating_sub(stream.position() as usize), frame)
 }
 
-/// To be called after [`claim`] alone.
+/// Decodes a file. It must be called only after [`claim`] has accepted the headers.
 pub(super) fn decode(bytes: &[u8], frame: Frame) -> Result<Film, String> {
     let image = read(bytes)?;
     let window = match frame {
@@ -106,16 +106,16 @@ pub(super) fn decode(bytes: &[u8], frame: Frame) -> Result<Film, String> {
     film_from(image, window)
 }
 
-/// Other samples for some channels, given by their names in the film of [`Frame::Data`].
+/// New samples for some channels, which are identified by their names in the film of [`Frame::Data`].
 pub(super) struct Replacement<'a> {
     pub(super) channels: &'a [(&'a str, &'a [f32])],
-    /// The layer that keeps what was there, beside its own.
+    /// The layer in which the old samples are kept, if they are.
     pub(super) keep_as: Option<&'a str>,
-    /// Metadata: key and value.
+    /// Key and value of an entry of metadata to add.
     pub(super) entry: (&'a str, &'a str),
 }
 
-/// The file again with other samples. All else is kept, but for the compression, which is lossless.
+/// Encodes the file again with new samples. Everything else is kept except the compression, which becomes lossless.
 pub(super) fn replace(bytes: &[u8], with: &Replacement) -> Result<Vec<u8>, String> {
     let mut image = read(bytes)?;
     set_entry(&mut image, with.entry);
@@ -144,7 +144,7 @@ pub(super) fn replace(bytes: &[u8], with: &Replacement) -> Result<Vec<u8>, Strin
     Ok(out.into_inner())
 }
 
-/// What the reader took for the own attributes of parts becomes common to all.
+/// Sets an attribute for the whole file and removes it from the parts, to which the reader may have assigned it.
 fn set_entry(image: &mut FlatImage, (key, value): (&str, &str)) {
     let name = text(&format!("{PREFIX}{key}"));
     for part in &mut image.layer_data {
@@ -153,7 +153,7 @@ fn set_entry(image: &mut FlatImage, (key, value): (&str, &str)) {
     image.attributes.other.insert(name, AttributeValue::Text(text(value)));
 }
 
-/// A channel without samples, of the same view and component in another layer.
+/// Makes a channel without samples, with the same view and component in another layer.
 fn named(channel: &AnyChannel<FlatSamples>, layer: &str) -> AnyChannel<FlatSamples> {
     let name = string(&channel.name);
     let (own_layer, component) = split(&name);
@@ -180,13 +180,13 @@ fn read(bytes: &[u8]) -> Result<FlatImage, String> {
         .all_channels()
         .all_layers()
         .all_attributes()
-        // A panic on one of its own threads would abort the process, see `contained`.
+        // A panic on one of the crate's threads could not be caught; see `contained`.
         .non_parallel()
         .from_chunks(chunks)
         .map_err(plain)
 }
 
-/// The crate's words for programmers, as words for users.
+/// Translates the crate's errors, which address programmers, for users.
 fn plain(e: exr::error::Error) -> String {
     use exr::error::Error;
     let kind = |what: &str| format!("{what}, which is not supported: save it as a flat EXR with ZIP compression");
@@ -206,7 +206,7 @@ fn damaged(what: &str) -> String {
     format!("cannot be decoded: {what}; is it complete?")
 }
 
-/// The crate's reader asserts this.
+/// Refuses subsampled channels, on which the crate's reader would panic.
 fn check_sampling(meta: &MetaData) -> Result<(), String> {
     let mut channels = meta.headers.iter().flat_map(|h| &h.channels.list);
     match channels.find(|c| c.sampling != Vec2(1, 1)) {
@@ -215,7 +215,7 @@ fn check_sampling(meta: &MetaData) -> Result<(), String> {
     }
 }
 
-/// All parts in one film, channels of a second part and on under the name of their part.
+/// Puts all parts into one film. If there are several, the channel names begin with the name of the part.
 fn film_from(image: FlatImage, frame: IntegerBounds) -> Result<Film, String> {
     let mut film = Film::new(frame.size.0 as u32, frame.size.1 as u32);
     if film.pixels() == 0 {
@@ -246,7 +246,7 @@ fn texts<'a>(
     })
 }
 
-/// Some programs repeat the part's name in its channels, some do not.
+/// Puts the part's name before a channel's, unless the program that wrote the file has already done so.
 fn channel_name(part: Option<&str>, channel: &str) -> String {
     match part {
         Some(part) if !part.is_empty() && !channel.starts_with(&format!("{part}.")) => format!("{part}.{channel}"),

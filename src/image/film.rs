@@ -1,17 +1,18 @@
-//! What a render returns and what an image file holds: planes of samples under dotted names, as EXR has them.
+//! The film, which is the result of a render and the content of an image file: planes of samples with dotted names, as in
+//! EXR files.
 use crate::memory;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The layer of the colour before it was filtered: Blender's name.
+/// Name of the layer that holds the colour before it was filtered, as in Blender.
 pub const NOISY: &str = "Noisy Image";
 
 /// The samples of one channel, row-major, row 0 at the top.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Samples {
-    /// Radiance, distances, directions.
+    /// Floats, for radiance, distances and directions.
     F32(Vec<f32>),
-    /// Counts and indices.
+    /// Unsigned integers, for counts and indices.
     U32(Vec<u32>),
 }
 
@@ -22,7 +23,7 @@ pub struct Channel {
     pub name: String,
     /// `width * height` values.
     pub samples: Samples,
-    /// The pixels that the file held, where these are not all; the others are 0.
+    /// The pixels that the file stored, if it did not store all; the others are 0.
     pub window: Option<Window>,
 }
 
@@ -31,49 +32,49 @@ pub struct Channel {
 pub struct Window {
     /// First column and row.
     pub first: [u32; 2],
-    /// Columns and rows.
+    /// Number of columns and rows.
     pub size: [u32; 2],
 }
 
 /// A picture with named layers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Film {
-    /// Pixels.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels.
+    /// Height in pixels.
     pub height: u32,
-    /// In the order they were added.
+    /// All channels, in the order in which they were added.
     pub channels: Vec<Channel>,
-    /// Named texts: scene, settings, seed, device... In EXR files the attributes `tallow:scene` and so on; of files of
-    /// other programs, their text attributes.
+    /// Named texts, such as scene, settings, seed and device. In EXR files they are attributes like `tallow:scene`; those of
+    /// other programs are read too.
     pub metadata: BTreeMap<String, String>,
 }
 
 /// Three values per pixel: what metrics, PNG and HDR work on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// Pixels.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels.
+    /// Height in pixels.
     pub height: u32,
-    /// `width * height`, row-major, row 0 at the top. Colours are linear Rec. 709.
+    /// `width * height` values, row-major, row 0 at the top. Colours are linear Rec. 709.
     pub pixels: Vec<[f32; 3]>,
 }
 
 impl Picture {
-    /// Pixels with a NaN or an infinity in any component.
+    /// Number of pixels with a NaN or an infinity in any component.
     pub fn non_finite(&self) -> usize {
         self.pixels.iter().filter(|p| !p.iter().all(|v| v.is_finite())).count()
     }
 }
 
 impl Film {
-    /// An empty film.
+    /// Makes a film of this size without channels.
     pub fn new(width: u32, height: u32) -> Self {
         Self { width, height, ..Self::default() }
     }
 
-    /// Pixels.
+    /// Number of pixels.
     pub fn pixels(&self) -> usize {
         self.width as usize * self.height as usize
     }
@@ -81,7 +82,7 @@ impl Film {
     /// Adds one channel.
     ///
     /// # Panics
-    /// When the number of samples is not that of the pixels.
+    /// When the number of samples differs from the number of pixels.
     pub fn add(&mut self, name: impl Into<String>, samples: Samples) {
         let (name, len) = (name.into(), samples.len());
         assert_eq!(len, self.pixels(), "channel {name}: one sample per pixel");
@@ -92,7 +93,7 @@ impl Film {
     /// The empty layer is the colour itself.
     ///
     /// # Panics
-    /// When the number of values is not that of the pixels.
+    /// When the number of values differs from the number of pixels.
     pub fn add_vec3(&mut self, layer: &str, components: [&str; 3], values: &[[f32; 3]]) {
         for (i, component) in components.iter().enumerate() {
             let name = if layer.is_empty() { (*component).to_owned() } else { format!("{layer}.{component}") };
@@ -100,10 +101,10 @@ impl Film {
         }
     }
 
-    /// Adds the next pixels, row-major, of a film that is filled part by part: the channels are those of the first part.
+    /// Appends the next pixels, row-major, to a film that is filled part by part. The first part determines the channels.
     ///
     /// # Panics
-    /// When the channels are others.
+    /// When the channels differ from those of the first part.
     pub fn append(&mut self, part: Self) {
         if self.channels.is_empty() {
             self.channels = part.channels.iter().map(|c| c.empty(self.pixels())).collect();
@@ -129,13 +130,14 @@ impl Film {
         self.channels.iter().map(|c| split(&c.name).0).collect()
     }
 
-    /// Three values per pixel of one layer, of its R, G, B or X, Y, Z, or its only channel three times.
+    /// Returns three values per pixel of one layer: its R, G, B or X, Y, Z, or its only channel three times.
     ///
-    /// Without a name it is the colour: the channels R, G, B, or what other programs call it (`ViewLayer.Combined`,
-    /// `rgba`), or the only layer with R, G, B, or grey (Y). A name matches ignoring case, in full or by its last part.
+    /// Without a name, the layer is the colour: the channels R, G, B, or a layer that other programs use for it
+    /// (`ViewLayer.Combined`, `rgba`), or the only layer with R, G, B, or grey (Y). A name matches in full or by its last part,
+    /// regardless of case.
     ///
     /// # Errors
-    /// When there is no such layer, or more than one, which lists those there are, or no memory.
+    /// When there is no such layer or more than one, with a list of all channels, or when memory is out.
     pub fn picture(&self, layer: Option<&str>) -> Result<Picture, String> {
         let channels = self.find(layer).ok_or_else(|| self.no_such_layer(layer))?;
         let [a, b, c] = channels.map(|c| c.samples.to_f32());
@@ -205,7 +207,7 @@ impl Film {
 }
 
 impl Channel {
-    /// One of the same name and kind without samples yet, with room for so many.
+    /// Makes a channel of the same name and kind, without samples but with capacity for `capacity` of them.
     fn empty(&self, capacity: usize) -> Self {
         let samples = match self.samples {
             Samples::F32(_) => Samples::F32(Vec::with_capacity(capacity)),
@@ -216,7 +218,7 @@ impl Channel {
 }
 
 impl Samples {
-    /// Number of samples.
+    /// Number of samples in the channel.
     pub fn len(&self) -> usize {
         match self {
             Self::F32(v) => v.len(),
@@ -224,7 +226,7 @@ impl Samples {
         }
     }
 
-    /// Whether there are none.
+    /// Whether there are no samples.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -237,7 +239,7 @@ impl Samples {
         }
     }
 
-    /// As floats; counts above 2^24 are rounded.
+    /// All samples as floats; counts above 2^24 are rounded.
     pub fn to_f32(&self) -> Cow<'_, [f32]> {
         match self {
             Self::F32(v) => v.into(),

@@ -1,20 +1,21 @@
-//! Which pixels of an EXR file make a film: its parts have windows of their own.
+//! The pixels of an EXR file that make up a film. The parts of a file can cover different rectangles (data windows), and
+//! the display window is the rectangle that is shown.
 use super::film::Window;
 use crate::memory;
 use exr::meta::MetaData;
 use exr::meta::attribute::IntegerBounds;
 use exr::meta::header::Header;
 
-/// Which pixels of a file make its film.
+/// Which pixels of a file make up its film.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Frame {
-    /// Those that are shown: the display window.
+    /// The pixels that are shown: the display window.
     Display,
-    /// Those that are stored: the union of the data windows of all parts.
+    /// The pixels that are stored: the smallest rectangle that holds the data windows of all parts.
     Data,
 }
 
-/// The frame of a file, by its headers alone.
+/// The frame of a file, from its headers alone.
 pub(super) fn of(meta: &MetaData, frame: Frame) -> IntegerBounds {
     let display = meta.headers[0].shared_attributes.display_window;
     match frame {
@@ -23,7 +24,7 @@ pub(super) fn of(meta: &MetaData, frame: Frame) -> IntegerBounds {
     }
 }
 
-/// Data window of a part.
+/// The data window of a part.
 pub(super) fn window(header: &Header) -> IntegerBounds {
     IntegerBounds::new(header.own_attributes.layer_position, header.layer_size)
 }
@@ -39,7 +40,7 @@ pub(super) fn union(a: IntegerBounds, b: IntegerBounds) -> IntegerBounds {
     IntegerBounds::new((x, y), (width, height))
 }
 
-/// The part of `frame` that is stored, unless it is all.
+/// The part of `frame` that is stored; `None` if all of it is.
 pub(super) fn held(data: IntegerBounds, frame: IntegerBounds) -> Option<Window> {
     let edges = |at: i32, size: usize, start: i32, length: usize| {
         let first = (i64::from(at) - i64::from(start)).clamp(0, length as i64);
@@ -52,7 +53,8 @@ pub(super) fn held(data: IntegerBounds, frame: IntegerBounds) -> Option<Window> 
     (!all).then_some(Window { first: [x, y], size: [width, height] })
 }
 
-/// The picture is the display window: pixels outside the data window are 0, data outside the display window is dropped.
+/// Copies samples from the rectangle `data` into the rectangle `window`. Pixels outside `data` are 0, and samples outside
+/// `window` are dropped.
 pub(super) fn shown<T: Copy + Default>(
     stored: &[T],
     data: IntegerBounds,

@@ -1,11 +1,11 @@
-//! Opening files to read.
+//! Opening and reading files, with checks of their kind and of free memory.
 use crate::error::{Error, Result};
 use crate::memory;
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 
-/// Opens a file. A folder is refused, and so is a pipe: one that nobody writes to would never end.
+/// Opens a regular file. A pipe is refused because one without a writer would never end.
 ///
 /// # Errors
 /// [`Error::Input`] with what to do about it.
@@ -18,7 +18,7 @@ pub fn open(path: &Path) -> Result<File> {
     }
 }
 
-/// Reads the whole of a file.
+/// Reads a whole file.
 ///
 /// # Errors
 /// As [`open`], and [`Error::Memory`].
@@ -26,7 +26,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
     read_times(path, 1)
 }
 
-/// Reads the whole of a text, of which `times` its size will be made.
+/// Reads a whole text file, if there is memory for `times` its size, which its content will take.
 ///
 /// # Errors
 /// As [`read`], and for UTF-16.
@@ -38,10 +38,10 @@ pub fn read_text(path: &Path, times: u64) -> Result<Vec<u8>> {
     }
 }
 
-/// Bytes that tell the kind of an image.
+/// Number of bytes that identify the format of an image.
 const HEAD: u64 = 16;
 
-/// [`read`] for images: a file that begins as none is not read on.
+/// As [`read`], for images: only the beginning of another kind of file is read.
 ///
 /// # Errors
 /// As [`read`], and for a file of another kind.
@@ -55,7 +55,7 @@ pub fn read_image(path: &Path) -> Result<Vec<u8>> {
     }
 }
 
-/// Reads the whole of a file where there is memory for `times` its size.
+/// Reads a whole file, if there is memory for `times` its size.
 fn read_times(path: &Path, times: u64) -> Result<Vec<u8>> {
     read_rest(path, open(path)?, Vec::new(), times)
 }

@@ -1,9 +1,9 @@
-//! How far a picture is from its reference. Sums run over all pixels and channels in `f64`.
+//! Metrics of the difference between a picture and its reference. Sums run over all pixels and channels in `f64`.
 use super::film::Picture;
 use crate::math::srgb::srgb_from_linear;
 use serde::Serialize;
 
-/// In the denominator of relMSE, so that black reference pixels do not divide by 0.
+/// Added to the denominator of relMSE, so that black reference pixels do not divide by 0.
 const RELMSE_EPSILON: f64 = 0.01;
 
 /// Every metric of one comparison.
@@ -13,15 +13,15 @@ pub struct Metrics {
     pub mse: f64,
     /// Mean of `(a - b)^2 / (b^2 + 0.01)`, linear; `b` is the reference.
     pub relmse: f64,
-    /// `-10 log10(MSE)` in dB of the sRGB-encoded pictures cut to [0, 1], so the peak is 1; infinite when they are equal.
+    /// `-10 log10(MSE)` in dB of the sRGB-encoded pictures clamped to [0, 1], so that the peak is 1; infinite if they are equal.
     pub psnr: f64,
-    /// Mean structural similarity of the sRGB-encoded pictures; none when an edge is under 11 pixels.
+    /// Mean structural similarity of the sRGB-encoded pictures; `None` if an edge is shorter than 11 pixels.
     pub ssim: Option<f64>,
     /// Mean FLIP error of the 8-bit sRGB pictures, 0 to 1.
     pub flip: f64,
 }
 
-/// Compares `test` with `reference`.
+/// Computes every metric of `test` against `reference`.
 ///
 /// # Panics
 /// When their sizes differ.
@@ -62,18 +62,18 @@ pub fn psnr(test: &Picture, reference: &Picture) -> f64 {
     -10.0 * mean(test, reference, |a, b| (shown(a) - shown(b)).powi(2)).log10()
 }
 
-/// Wang, Bovik, Sheikh and Simoncelli 2004: Gaussian window of 11x11 pixels and standard deviation 1.5, K1 = 0.01,
-/// K2 = 0.03, mean over all windows inside the picture and over R, G, B. scikit-image returns the same with
+/// SSIM (Wang, Bovik, Sheikh and Simoncelli 2004) with a Gaussian window of 11x11 pixels and standard deviation 1.5,
+/// K1 = 0.01, K2 = 0.03, averaged over all windows inside the picture and over R, G, B. scikit-image returns the same with
 /// `gaussian_weights=True, sigma=1.5, use_sample_covariance=False`.
 fn ssim(test: &Picture, reference: &Picture) -> Option<f64> {
     let codes = |p: &Picture| values(p).map(|v| (srgb_from_linear(v) * 65_535.0).round() as u16).collect();
     let image = |p: &Picture| iqa::Image::srgb16(p.width, p.height, codes(p));
-    // The crate's only error left is a picture smaller than its window.
+    // The only remaining error of the crate is a picture smaller than the window.
     iqa::ssim(&image(reference).ok()?, &image(test).ok()?, iqa::SsimOptions::default()).ok()
 }
 
-/// Andersson et al. 2020, "FLIP: A Difference Evaluator for Alternating Images", at its default of 67 pixels per degree
-/// (a 4K screen of 0.7 m width seen from 0.7 m).
+/// FLIP (Andersson et al. 2020, "FLIP: A Difference Evaluator for Alternating Images") at its default of 67 pixels per
+/// degree, a 4K screen of 0.7 m width seen from 0.7 m.
 fn flip(test: &Picture, reference: &Picture) -> f64 {
     let codes = |p: &Picture| -> Vec<u8> { values(p).map(|v| (srgb_from_linear(v) * 255.0).round() as u8).collect() };
     let image = |p: &Picture| nv_flip::FlipImageRgb8::with_data(p.width, p.height, &codes(p));

@@ -1,4 +1,4 @@
-//! Pictures and files: a [`Film`] of named channels, its readers and writers, and the metrics between two of them.
+//! Images: the [`Film`] with its named channels, readers and writers of image files, and metrics that compare two images.
 pub mod aov;
 mod claim;
 pub mod difference;
@@ -25,12 +25,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use tone::ToneMap;
 
-/// How radiance becomes what a PNG stores. EXR and HDR files hold radiance as it is and ignore both.
+/// How radiance is converted for PNG files. EXR and HDR files hold radiance unchanged and ignore both fields.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WriteOptions {
-    /// In stops: radiance is multiplied by 2 to this power.
+    /// Exposure in stops: radiance is multiplied by 2 to this power.
     pub exposure: f32,
-    /// Curve between exposure and the sRGB transfer function.
+    /// Curve that is applied after the exposure and before the sRGB transfer function.
     pub tone_map: ToneMap,
 }
 
@@ -54,13 +54,13 @@ fn format_of(path: &Path) -> Result<Format> {
     }
 }
 
-/// Whether [`write()`] to a file of this name keeps more than the colour.
+/// Whether a file of this name can hold more layers than the colour.
 pub fn has_layers(path: &Path) -> bool {
     matches!(format_of(path), Ok(Format::Exr))
 }
 
-/// Writes a film in the format its extension names: `.exr` holds every channel and the metadata, `.png` (8-bit sRGB)
-/// and `.hdr` (Radiance RGBE, negative values as 0) the colour alone.
+/// Writes a film in the format of the file extension: `.exr` holds every channel and the metadata; `.png` (8-bit sRGB)
+/// and `.hdr` (Radiance RGBE, with negative values as 0) hold only the colour.
 ///
 /// The file appears complete or not at all (see [`output::write`]).
 ///
@@ -71,10 +71,10 @@ pub fn write(path: &Path, film: &Film, options: &WriteOptions) -> Result<()> {
     output::write_with(path, |stream| encode(path, film, options, stream))
 }
 
-/// What [`write()`] writes to a file of this name.
+/// Writes to `stream` what [`write()`] would write to a file of this name.
 ///
 /// # Errors
-/// [`std::io::ErrorKind::InvalidData`] when the film has no colour or the extension is unknown, and the stream's own.
+/// [`std::io::ErrorKind::InvalidData`] when the film has no colour or the extension is unknown, and those of the stream.
 pub fn encode(path: &Path, film: &Film, options: &WriteOptions, stream: &mut dyn Stream) -> std::io::Result<()> {
     let invalid = |what: String| std::io::Error::new(std::io::ErrorKind::InvalidData, what);
     let colour = || film.picture(None).map_err(invalid);
@@ -85,7 +85,7 @@ pub fn encode(path: &Path, film: &Film, options: &WriteOptions, stream: &mut dyn
     }
 }
 
-/// Checks before a long render that [`write()`] has a known extension and a folder it may write in.
+/// Checks, before a long render, that the extension is known and that [`write()`] could write to the folder.
 ///
 /// # Errors
 /// As [`write()`].
@@ -94,7 +94,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
     output::check(path)
 }
 
-/// Reads an EXR, PNG, JPEG or HDR file, told apart by content, into linear Rec. 709.
+/// Reads an EXR, PNG, JPEG or HDR file, recognised by its content, into linear Rec. 709.
 ///
 /// # Errors
 /// [`Error::Input`] when the file cannot be read, is of another kind, or is damaged; [`Error::Memory`].
@@ -102,16 +102,16 @@ pub fn read(path: &Path) -> Result<Film> {
     decode_file(path, &input::read_image(path)?, Frame::Display)
 }
 
-/// [`read`] for a file that is already in memory.
+/// As [`read`], for a file that is already in memory.
 ///
 /// # Errors
-/// What is wrong with the data, or that they need more memory than is free, in one line.
+/// One line that says what is wrong with the data, or that they need more memory than is free.
 pub fn decode(bytes: &[u8]) -> std::result::Result<Film, String> {
     memory::check(claim_of(bytes, Frame::Display)?.bytes)?;
     decode_frame(bytes, Frame::Display)
 }
 
-/// Looks whether there is memory to decode an image; what is damaged is told when it is decoded.
+/// Checks that there is memory to decode an image. A damaged file passes and is reported by the decoder.
 ///
 /// # Errors
 /// [`Error::Memory`].
@@ -125,8 +125,10 @@ fn decode_file(path: &Path, bytes: &[u8], frame: Frame) -> Result<Film> {
     decode_frame(bytes, frame).map_err(|what| Error::input(path, what))
 }
 
+/// Checks that `bytes` of host memory are free.
+///
 /// # Errors
-/// [`Error::Memory`] about the file when so many bytes are not free.
+/// [`Error::Memory`] about the file at `path`.
 pub fn check_memory(path: &Path, bytes: u64) -> Result<()> {
     memory::check(bytes).map_err(|what| Error::Memory(format!("{}: {what}", path.display())))
 }
@@ -135,12 +137,12 @@ fn claim_of(bytes: &[u8], frame: Frame) -> std::result::Result<Claim, String> {
     contained(|| if is_exr(bytes) { exr::claim(bytes, frame) } else { photo::claim(bytes) })
 }
 
-/// To be called after [`claim_of`] alone.
+/// Decodes a file. It must be called only after [`claim_of`] has accepted it.
 fn decode_frame(bytes: &[u8], frame: Frame) -> std::result::Result<Film, String> {
     contained(|| if is_exr(bytes) { exr::decode(bytes, frame) } else { photo::decode(bytes) })
 }
 
-/// Whether a file that begins so may be an image.
+/// Whether a file with this beginning may be an image.
 fn is_image(head: &[u8]) -> bool {
     is_exr(head) || ::image::guess_format(head).is_ok()
 }
@@ -153,17 +155,17 @@ thread_local! {
     static DECODING: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Whether this thread is inside a decoder, whose panics are caught and become errors: a panic hook keeps silent then.
+/// Whether this thread is inside a decoder. Its panics are caught and become errors, so a panic hook should stay silent.
 pub fn is_decoding() -> bool {
     DECODING.get()
 }
 
-/// The decoders are other people's, and some assert what a damaged file may break (exr 1.74: the level of a tile, sums
-/// in B44 blocks). They keep no state between calls, so that nothing is left broken behind an unwound one. A program built
-/// with `panic = "abort"` ends where they assert.
+/// Calls a decoder and turns its panics into errors. Some decoders of other crates assert what a damaged file can violate
+/// (exr 1.74: the level of a tile, sums in B44 blocks). They keep no state between calls, so unwinding leaves nothing
+/// inconsistent. A program built with `panic = "abort"` ends at such an assertion.
 ///
 /// # Errors
-/// The decoder's own in one line, or that it broke off.
+/// The decoder's error in one line, or that it panicked.
 pub fn contained<T>(decode: impl FnOnce() -> std::result::Result<T, String>) -> std::result::Result<T, String> {
     DECODING.set(true);
     let result = catch_unwind(AssertUnwindSafe(decode));

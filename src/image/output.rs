@@ -1,4 +1,4 @@
-//! Writing files so that they appear complete or not at all, and stay whose and what they were.
+//! Writing of files. A file appears complete or not at all, and one that is replaced keeps its owner and mode.
 mod temporary;
 
 use crate::error::{Error, Result};
@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 use temporary::Temporary;
 pub use temporary::remove_unfinished;
 
-/// Where the bytes of a file go.
+/// A destination for the bytes of a file.
 pub trait Stream: Write + Seek {}
 impl<T: Write + Seek> Stream for T {}
 
-/// Replaces `path` by `bytes`: see [`write_with`].
+/// Replaces the content of `path` by `bytes`; see [`write_with`].
 ///
 /// # Errors
 /// As [`write_with`].
@@ -20,14 +20,14 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     write_with(path, |stream| stream.write_all(bytes))
 }
 
-/// Replaces `path` by what `fill` writes: it goes to a temporary file in the same folder, which is then renamed, so that a run
-/// that is interrupted, or a disk that fills up, leaves the old file. Links are followed. A file that is replaced passes on
-/// its mode, and its owner and group as far as this user may give them; one that is read-only, or that has other names
-/// (hard links, which renaming would part), is not replaced. What exists and is no regular file (a pipe, `/dev/stdout`) is
-/// written to as it is.
+/// Replaces the content of `path` by what `fill` writes. This goes to a temporary file in the same folder, which is then
+/// renamed, so the old file stays if the run is interrupted or the disk fills up. Links are followed. The new file gets
+/// the mode of the old one, and its owner and group as far as this user may set them. A file that is read-only or has other
+/// names (hard links, which renaming would separate) is not replaced. A pipe or device such as `/dev/stdout` is written to
+/// directly.
 ///
 /// # Errors
-/// [`Error::Output`] with what to do about it. Of `fill`, [`ErrorKind::InvalidData`] says that there is no way to write this.
+/// [`Error::Output`] with what to do about it. `fill` returns [`ErrorKind::InvalidData`] for data that cannot be encoded.
 pub fn write_with(path: &Path, fill: impl FnOnce(&mut dyn Stream) -> std::io::Result<()>) -> Result<()> {
     let result = match is_special(path) {
         true => write_through(path, fill).map_err(|e| remedy(path, &e)),
@@ -36,8 +36,8 @@ pub fn write_with(path: &Path, fill: impl FnOnce(&mut dyn Stream) -> std::io::Re
     result.map_err(|what| Error::output(path, what))
 }
 
-/// Makes a file of what `fill` writes, and returns its name: `path`, or if that exists one with a number. Nothing is
-/// replaced.
+/// Writes what `fill` writes to a new file and returns its name: `path`, or if that exists, a name with a number. Nothing
+/// is replaced.
 ///
 /// # Errors
 /// As [`write_with`].
@@ -46,28 +46,28 @@ pub fn write_new(path: &Path, fill: impl FnOnce(&mut dyn Stream) -> std::io::Res
     made.map_err(|e| Error::output(path, remedy(path, &e)))
 }
 
-/// Checks that [`write()`] could start: the folder exists and accepts a file, and what it would replace may be replaced.
+/// Checks that [`write()`] could start: the folder exists and accepts a file, and an existing file may be replaced.
 ///
 /// # Errors
 /// As [`write()`].
 pub fn check(path: &Path) -> Result<()> {
     let result = match () {
-        // Opening a pipe and closing it again would be the end of its reader.
+        // Opening a pipe and closing it again would end its reader.
         () if is_special(path) => Ok(()),
         () => check_file(path),
     };
     result.map_err(|what| Error::output(path, what))
 }
 
-/// Whether `path` exists and is written to as it is: a pipe or a device.
+/// Whether `path` is a pipe or a device, which is written to directly.
 pub fn is_special(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir())
 }
 
-/// The file that `path` leads to, links followed, whether it exists or not: two paths of one file give the same.
+/// Resolves `path`, with links followed, to a form that is the same for every path of a file. The file need not exist.
 ///
 /// # Errors
-/// When a folder on the way is missing, or links go round in a circle.
+/// When a folder of the path is missing, or links form a cycle.
 pub fn resolve(path: &Path) -> std::io::Result<PathBuf> {
     let missing = match std::fs::canonicalize(path) {
         Err(e) if e.kind() == ErrorKind::NotFound => e,
@@ -90,7 +90,7 @@ fn check_file(path: &Path) -> std::result::Result<(), String> {
     Temporary::new_in(folder(&target)).map(drop).map_err(|e| remedy(path, &e))
 }
 
-/// Pipes cannot go back, as some formats must.
+/// Writes to a pipe or device by way of memory, because some formats seek backwards and a pipe cannot.
 fn write_through(path: &Path, fill: impl FnOnce(&mut dyn Stream) -> std::io::Result<()>) -> std::io::Result<()> {
     let mut bytes = Cursor::new(Vec::new());
     fill(&mut bytes)?;
@@ -121,18 +121,18 @@ fn filled(
     drop(stream);
     #[cfg(unix)]
     old.map_or(Ok(()), |old| owner::pass_on(&old, temporary.file()))?;
-    // Without this a crash of the system soon after the renaming could leave an empty file.
+    // Without this, a crash of the system soon after the renaming could leave an empty file.
     temporary.file().sync_all()?;
     Ok(temporary)
 }
 
-/// What is said of the file that would be replaced; nothing when there is none.
+/// Returns the metadata of the file that would be replaced, if there is one.
 fn replaceable(target: &Path) -> std::result::Result<Option<Metadata>, String> {
     let Ok(old) = std::fs::symlink_metadata(target) else { return Ok(None) };
     if old.is_dir() {
         return Err(remedy(target, &ErrorKind::IsADirectory.into()));
     }
-    // Root may write to any file: what counts is what its owner said.
+    // Root may write to any file, so the permissions are checked too.
     let opened = std::fs::OpenOptions::new().write(true).open(target);
     if old.permissions().readonly() || opened.is_err_and(|e| e.kind() == ErrorKind::PermissionDenied) {
         return Err("cannot be written: it is read-only; make it writable or choose another name".to_owned());
@@ -153,15 +153,15 @@ mod owner {
     use std::fs::{File, Metadata, Permissions};
     use std::os::unix::fs::{MetadataExt, PermissionsExt, fchown};
 
-    /// Passes on owner, group and mode. Only root may give a file away; others may give it to groups that they are in.
+    /// Copies owner, group and mode. Only root can change the owner; others can set groups that they belong to.
     pub fn pass_on(old: &Metadata, file: &File) -> std::io::Result<()> {
         let new = file.metadata()?;
         let same_group = new.gid() == old.gid() || fchown(file, None, Some(old.gid())).is_ok();
         if new.uid() != old.uid() {
-            // Where this is refused the file stays ours.
+            // If this is refused, the file stays the user's.
             let _ = fchown(file, Some(old.uid()), None);
         }
-        // Another group may do no more than everybody.
+        // Another group than before gets only the permissions of everybody.
         let mode = if same_group { old.mode() } else { old.mode() & !0o070 | (old.mode() & 0o007) << 3 };
         file.set_permissions(Permissions::from_mode(mode & 0o777))
     }
@@ -170,11 +170,11 @@ mod owner {
 fn remedy(path: &Path, e: &std::io::Error) -> String {
     let (folder, exists) = (folder(path).display(), folder(path).is_dir());
     match e.kind() {
-        // Neither the end of the link nor its folder.
+        // Neither the target of the link nor its folder exists.
         _ if path.is_symlink() && resolve(path).is_err() => {
             format!("cannot be written: it is a link that leads nowhere ({e}); remove it or choose another name")
         }
-        // Linux says so of /proc and the like.
+        // Linux returns this for /proc and similar file systems.
         ErrorKind::NotFound if exists => {
             format!("cannot be written: {folder} takes no new files; choose another folder")
         }

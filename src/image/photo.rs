@@ -1,4 +1,4 @@
-//! PNG, JPEG and Radiance HDR.
+//! Reading of PNG, JPEG and Radiance HDR files, and writing of PNG and HDR.
 use super::WriteOptions;
 use super::claim::Claim;
 use super::film::{Film, Picture, Samples};
@@ -12,10 +12,11 @@ use image::{
 };
 use std::io::{Cursor, ErrorKind};
 
-/// Pixels that a byte can stand for: PNG packs 8 into one before deflate packs 1032 of those. JPEG needs a bit for 64 pixels of
-/// one component, which may be the quarter of another each way; a line of HDR holds 2^16 pixels in 12 bytes.
+/// Largest number of pixels that one byte of a file can hold. PNG packs 8 pixels into a byte, and deflate packs 1032 bytes
+/// into one. JPEG needs a bit for 64 pixels of one component, which can be subsampled by 4 in each direction; HDR holds a
+/// line of 2^16 pixels in 12 bytes.
 const PIXELS_PER_BYTE: u64 = 8 * 1032;
-/// Bytes that colour profiles and texts beside the pixels may take.
+/// Largest number of bytes for colour profiles and texts.
 const TEXTS: u64 = 1 << 26;
 
 pub(super) fn encode_png(picture: &Picture, options: &WriteOptions) -> Result<Vec<u8>, String> {
@@ -28,7 +29,8 @@ pub(super) fn encode_png(picture: &Picture, options: &WriteOptions) -> Result<Ve
     Ok(out)
 }
 
-/// RGBE has no sign and no infinities: negative values and NaN become 0, huge ones the largest that it holds.
+/// Encodes RGBE, which has no sign and no infinities: negative values and NaN become 0, and values are limited to the
+/// largest that it holds.
 pub(super) fn encode_hdr(picture: &Picture) -> Result<Vec<u8>, String> {
     const LARGEST: f32 = 1.7e38;
     let pixels: Vec<_> =
@@ -40,10 +42,10 @@ pub(super) fn encode_hdr(picture: &Picture) -> Result<Vec<u8>, String> {
     Ok(out)
 }
 
-/// What the film of a file takes, by its header alone.
+/// The memory that decoding a file takes, from its header alone.
 ///
 /// # Errors
-/// What is wrong with the header.
+/// A message about what is wrong with the header.
 pub fn claim(bytes: &[u8]) -> Result<Claim, String> {
     const KNOWN: [ImageFormat; 3] = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Hdr];
     if !image::guess_format(bytes).is_ok_and(|format| KNOWN.contains(&format)) {
@@ -66,10 +68,10 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
     film_from(&picture(bytes)?)
 }
 
-/// A PNG, JPEG or HDR file as it was stored.
+/// Decodes a PNG, JPEG or HDR file without converting its values.
 ///
 /// # Errors
-/// What is wrong with the data, or that they need more memory than is free.
+/// A message about what is wrong with the data, or that they need more memory than is free.
 pub fn picture(bytes: &[u8]) -> Result<DynamicImage, String> {
     let claim = claim(bytes)?;
     memory::check(claim.bytes)?;
@@ -84,7 +86,7 @@ fn reader(bytes: &[u8], memory: u64) -> Result<ImageReader<Cursor<&[u8]>>, Strin
     Ok(reader)
 }
 
-/// The crate's words for programmers, as words for users.
+/// Translates the crate's errors, which address programmers, for users.
 fn plain(e: ImageError) -> String {
     let damaged = |what: &str| format!("cannot be decoded: {what}; is it complete?");
     match e {
@@ -96,8 +98,10 @@ fn plain(e: ImageError) -> String {
     }
 }
 
+/// Checks that a JPEG is complete. The decoders of other formats do so themselves.
+///
 /// # Errors
-/// For a JPEG that is not complete; other decoders notice by themselves.
+/// A message that the end of the file is missing.
 pub fn check_end(bytes: &[u8]) -> Result<(), String> {
     match image::guess_format(bytes).is_ok_and(|f| f == ImageFormat::Jpeg) && jpeg_is_cut(bytes) {
         true => Err("is a JPEG without its end: get the complete file".to_owned()),
@@ -105,12 +109,13 @@ pub fn check_end(bytes: &[u8]) -> Result<(), String> {
     }
 }
 
-/// Whether the end marker is missing: the decoder fills what is not there with grey. Segments are passed over by their
-/// lengths, so that thumbnails within them and what phones append behind the picture do not count.
+/// Whether the end marker is missing; the decoder would fill the missing part with grey. Segments are skipped by their
+/// lengths, so that thumbnails inside them and data that phones append to the picture are ignored.
 fn jpeg_is_cut(bytes: &[u8]) -> bool {
     const END_OF_IMAGE: u8 = 0xd9;
     let mut rest = bytes;
-    // In the data of a scan a 0 or a restart follows each 0xff; those, 1 and the start of the image have no length.
+    // In the data of a scan, each 0xff is followed by 0 or a restart marker. These, 1 and the start of the image have no
+    // length.
     let is_segment = |pair: &[u8]| pair[0] == 0xff && !matches!(pair[1], 0 | 1 | 0xd0..=0xd8 | 0xff);
     while let Some(at) = rest.windows(2).position(is_segment) {
         if rest[at + 1] == END_OF_IMAGE {
@@ -123,16 +128,17 @@ fn jpeg_is_cut(bytes: &[u8]) -> bool {
     true
 }
 
-/// Rows of a picture that are converted at once: whole pictures in other formats would be as large again.
+/// Number of rows that are converted at a time, because converting a whole picture would need its size in memory again.
 pub const BAND: u32 = 64;
 
-/// The picture in bands of [`BAND`] rows; the last may have fewer.
+/// Splits the picture into bands of [`BAND`] rows; the last may have fewer.
 pub fn bands(image: &DynamicImage) -> impl Iterator<Item = DynamicImage> {
     let (width, height) = (image.width(), image.height());
     (0..height).step_by(BAND as usize).map(move |y| image.crop_imm(0, y, width, BAND.min(height - y)))
 }
 
-/// Integers are taken for sRGB code values, floats for radiance. Alpha, always linear, is kept as the channel A.
+/// Converts a picture into a film. Integers are sRGB code values and floats are radiance. Alpha is always linear and
+/// becomes the channel A.
 fn film_from(image: &DynamicImage) -> Result<Film, String> {
     let is_float = matches!(image.color(), ColorType::Rgb32F | ColorType::Rgba32F);
     let names = if image.color().has_alpha() { &["R", "G", "B", "A"][..] } else { &["R", "G", "B"] };

@@ -1,9 +1,9 @@
-//! The attributes of an EXR file in the order of their names: the crate writes them in that of a hash map, another in every run,
-//! and the same film would never be the same file.
+//! Sorting of the attributes in an EXR file by name. The crate writes them in the order of a hash map, which differs
+//! between runs, so that the same film would give different files.
 use super::output::Stream;
 use std::io::{Result, Seek, SeekFrom, Write};
 
-/// Holds back the headers until they are complete.
+/// A stream that holds back the headers until they are complete and then writes them sorted.
 pub(super) struct SortedHead<'a> {
     out: &'a mut dyn Stream,
     head: Option<Vec<u8>>,
@@ -32,13 +32,13 @@ impl Write for SortedHead<'_> {
 }
 
 impl Seek for SortedHead<'_> {
-    /// The writer goes back to the table of chunks, behind the headers.
+    /// The writer seeks back only to the table of chunks, which follows the headers.
     fn seek(&mut self, to: SeekFrom) -> Result<u64> {
         self.out.seek(to)
     }
 }
 
-/// What there is with its headers sorted, once these are complete.
+/// Returns the bytes with their headers sorted, or `None` while the headers are not complete.
 fn sorted(head: &[u8]) -> Option<Vec<u8>> {
     const MANY_PARTS: u8 = 0x10;
     let (start, mut rest) = head.split_at_checked(8)?;
@@ -62,7 +62,7 @@ fn sorted(head: &[u8]) -> Option<Vec<u8>> {
     }
 }
 
-/// Of an attribute: name and kind, each with a 0 behind it, the length of the value, the value.
+/// Length of an attribute in bytes: name and type, each followed by a 0, the length of the value, and the value.
 fn length(attribute: &[u8]) -> Option<usize> {
     let name = attribute.iter().position(|&b| b == 0)? + 1;
     let kind = attribute[name..].iter().position(|&b| b == 0)? + 1;

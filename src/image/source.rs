@@ -1,4 +1,4 @@
-//! An image file that is changed in some channels and kept in all others.
+//! An image file in memory of which some channels are replaced and all others are kept.
 use super::film::Film;
 use super::frame::Frame;
 use super::output::Stream;
@@ -7,11 +7,11 @@ use crate::error::{Error, Result};
 use std::io::{Cursor, ErrorKind};
 use std::path::{Path, PathBuf};
 
-/// An image file in memory of which the header alone was looked at.
+/// An image file in memory of which only the header was decoded.
 pub struct Unread {
     path: PathBuf,
     bytes: Vec<u8>,
-    /// What decoding it takes: every pixel that is stored.
+    /// Size and memory for decoding every stored pixel.
     pub claim: Claim,
 }
 
@@ -26,7 +26,7 @@ impl Unread {
         Ok(Self { path: path.to_owned(), bytes, claim })
     }
 
-    /// Decodes it.
+    /// Decodes the pixels.
     ///
     /// # Errors
     /// As [`super::read`].
@@ -45,9 +45,9 @@ impl Unread {
 /// An image file in memory.
 pub struct Source {
     path: PathBuf,
-    /// As EXR, whatever the file was.
+    /// The content as EXR, whatever the format of the file.
     bytes: Vec<u8>,
-    /// Every pixel that is stored, shown or not, row 0 at the top.
+    /// Every stored pixel, shown or not, with row 0 at the top.
     pub film: Film,
 }
 
@@ -60,19 +60,19 @@ impl Source {
         Unread::open(path)?.decode()
     }
 
-    /// The part of it that is shown.
+    /// Decodes the part that is shown, the display window.
     ///
     /// # Errors
-    /// [`Error::Input`], [`Error::Device`] when there is not enough memory.
+    /// [`Error::Input`] when the data are damaged, [`Error::Memory`] when there is not enough memory.
     pub fn shown(&self) -> Result<Film> {
         super::decode_file(&self.path, &self.bytes, Frame::Display)
     }
 
-    /// The file with other samples, one per pixel of `film`, in the channels of these names, and with an entry of metadata
-    /// that says so. What was there stays in the layer `keep_as`, if one is named.
+    /// Replaces the samples of the named channels, one per pixel of `film`, and adds an entry of metadata. The old samples are
+    /// kept in the layer `keep_as`, if one is named.
     ///
     /// # Errors
-    /// [`Error::Input`] when it holds what cannot be written again.
+    /// [`Error::Input`] when the file holds something that cannot be written again.
     pub fn replaced(&self, channels: &[(&str, &[f32])], keep_as: Option<&str>, entry: (&str, &str)) -> Result<Self> {
         let with = exr::Replacement { channels, keep_as, entry };
         let bytes = super::contained(|| exr::replace(&self.bytes, &with));
@@ -81,7 +81,7 @@ impl Source {
         Ok(Self { path: self.path.clone(), bytes, film })
     }
 
-    /// Writes it: to `.exr` all of it, to others the colour that is shown.
+    /// Writes everything to an `.exr` file, and only the colour that is shown to other formats.
     ///
     /// # Errors
     /// As [`super::write`].
@@ -90,7 +90,7 @@ impl Source {
         output::write_with(path, |stream| self.encode(path, options, stream))
     }
 
-    /// What [`Source::write`] writes to a file of this name.
+    /// Writes to `stream` what [`Source::write`] would write to a file of this name.
     ///
     /// # Errors
     /// As [`super::encode`].

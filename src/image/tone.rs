@@ -1,4 +1,4 @@
-//! From radiance to what a screen shows.
+//! Conversion of radiance to display values: exposure, tone curve and sRGB encoding.
 use crate::math::srgb::srgb_from_linear;
 
 /// Curve applied after exposure and before the sRGB transfer function.
@@ -20,7 +20,7 @@ fn aces(x: f32) -> f32 {
 /// Exposes, tone-maps and encodes one value; the result is in [0, 1], and NaN is 0.
 pub fn display(radiance: f32, exposure: f32, tone_map: ToneMap) -> f32 {
     let exposed = radiance * exposure.exp2();
-    // A large finite value instead of infinity keeps the rational curve from inf / inf.
+    // Infinity becomes a large finite value, because the rational curve would give inf / inf.
     let exposed = if exposed > 0.0 { exposed.min(1e9) } else { 0.0 };
     match tone_map {
         ToneMap::None => srgb_from_linear(exposed),

@@ -1,5 +1,5 @@
 //! The kernels of a renderer, compiled for what its scene calls for.
-use crate::allocate::{Policy, Row};
+use crate::allocate::{Policy, PolicyPass};
 use crate::error::Result;
 use crate::gpu::{Gpu, Kernel, PerBlock, thread_items};
 use crate::layout::Effects;
@@ -39,7 +39,7 @@ impl Kernels {
 /// The kernels that decide where samples go, for renders that do not spread them evenly.
 pub struct Allocation {
     /// What makes a pixel worth samples.
-    pub policy: Box<dyn Policy>,
+    pub policy: Box<dyn PolicyPass>,
     /// Turns priorities into counts.
     pub apportion: Apportion,
     /// Turns priorities into one sample or none.
@@ -57,7 +57,7 @@ impl Allocation {
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when the driver refuses one.
-    pub fn new(gpu: &Gpu, policy: &Row, settings: &Settings) -> Result<Self> {
+    pub fn new(gpu: &Gpu, policy: &Policy, settings: &Settings) -> Result<Self> {
         let pixels = settings.pixels() as u32;
         let thread_items = thread_items(gpu, pixels);
         Ok(Self {

@@ -1,3 +1,3 @@
-//! What a run tells about itself: tables and traces.
+//! Reports about a run: text tables and traces of its passes.
 pub mod table;
 pub mod trace;

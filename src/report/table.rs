@@ -1,24 +1,24 @@
-//! Text tables, and the one of the passes of a render.
+//! Text tables, and the table of pass times in particular.
 use crate::gpu::PassTime;
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
 
-/// All calls of one pass.
+/// Statistics over all calls of one pass.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PassRow {
     /// Name of the pass.
     pub pass: &'static str,
-    /// How often it ran.
+    /// Number of times that it ran.
     pub calls: usize,
-    /// Median duration; the lower one of the middle two when there are two.
+    /// Median duration in milliseconds; of an even number of calls, the lower of the middle two.
     pub median_ms: f64,
-    /// Longest duration.
+    /// Longest duration in milliseconds.
     pub max_ms: f64,
-    /// Its part of the time of all passes, 0 to 1.
+    /// Its share of the total time of all passes, 0 to 1.
     pub share: f64,
 }
 
-/// One row per pass, in the order in which they first ran.
+/// Returns one row per pass, in the order in which the passes first ran.
 pub fn summarise(times: &[PassTime]) -> Vec<PassRow> {
     let mut passes: Vec<(&'static str, Vec<u64>)> = Vec::new();
     for time in times {
@@ -44,7 +44,7 @@ fn row(pass: &'static str, mut durations: Vec<u64>, total: u64) -> PassRow {
     }
 }
 
-/// The rows as text.
+/// Formats the rows as a text table.
 pub fn timing_table(rows: &[PassRow]) -> String {
     let cells = |r: &PassRow| {
         let share = format!("{:.1} %", 100.0 * r.share);
@@ -53,13 +53,13 @@ pub fn timing_table(rows: &[PassRow]) -> String {
     text(&["pass", "calls", "median ms", "max ms", "share"], &rows.iter().map(cells).collect::<Vec<_>>())
 }
 
-/// Three digits after the point, as the clocks of GPUs resolve about a microsecond.
+/// Formats milliseconds with three decimals, because GPU clocks resolve about a microsecond.
 pub fn milliseconds(ms: f64) -> String {
     format!("{ms:.3}")
 }
 
-/// Aligned columns under a header; a column whose cells all start with a digit or a dash is set flush right. Every line
-/// ends in a newline.
+/// Formats aligned columns under a header. A column whose cells all start with a digit or a dash is aligned right. Every
+/// line ends in a newline.
 pub fn text(header: &[&str], rows: &[Vec<String>]) -> String {
     let is_number = |row: &Vec<String>, i: usize| row[i].starts_with(|c: char| c.is_ascii_digit() || c == '-');
     let mut table = Table::new();

@@ -1,16 +1,16 @@
-//! Chrome's trace-event format, which Perfetto and chrome://tracing open.
+//! Traces in Chrome's trace-event format, which Perfetto and chrome://tracing open.
 use crate::gpu::PassTime;
 use serde_json::{Value, json};
 
 const CPU: u32 = 1;
 const GPU: u32 = 2;
 
-/// Host and device spans as two named threads on one time axis, in microseconds from the first event.
+/// Writes host and device spans as two named threads on one time axis, in microseconds from the first event.
 ///
 /// `host_minus_gpu_ns` is the host clock minus the GPU clock at one moment (calibrated timestamps). Without it the first
 /// GPU span is drawn where the first host span begins, and the GPU thread's name says that its offset is unknown.
 pub fn chrome_trace(cpu: &[PassTime], gpu: &[PassTime], host_minus_gpu_ns: Option<i64>) -> String {
-    // 128 bits: a device counts from any moment it likes, so that differences need a sign and all 64 bits.
+    // A device may count from any moment, so differences need a sign in addition to 64 bits.
     let first = |spans: &[PassTime]| spans.iter().map(|s| i128::from(s.begin_ns)).min();
     let aligned = || first(cpu).unwrap_or(0) - first(gpu).unwrap_or(0);
     let offset = host_minus_gpu_ns.map_or_else(aligned, i128::from);

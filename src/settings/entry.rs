@@ -1,15 +1,15 @@
-//! A setting as its option, its help and its error message name it.
+//! Settings as text, for options, help and error messages.
 use super::Range;
 use crate::error::{Error, Result};
 
-/// What a setting holds.
+/// A type of value that a setting can have.
 pub trait Value {
-    /// What stands for the value in the help of its option; empty where that is the option's own name.
+    /// Placeholder for the value in the help of its option; empty for clap's default, the option's name.
     const PLACEHOLDER: &'static str = "";
-    /// Whether its option takes no value: to name it is to switch it on.
+    /// Whether its option takes no value and switches the setting on.
     const IS_SWITCH: bool = false;
 
-    /// As the option takes it.
+    /// The value as the option takes it.
     fn text(&self) -> String;
 }
 
@@ -45,25 +45,25 @@ impl Value for bool {
     }
 }
 
-/// One setting and what it may be.
+/// One setting with its value and range, as text.
 #[derive(Clone, Debug)]
 pub struct Entry {
-    /// Of the option, without its dashes.
+    /// Name of the option, without its dashes.
     pub name: String,
-    /// As the option takes it.
+    /// The value as the option takes it.
     pub value: String,
-    /// What may be chosen; empty where every value of the type may.
+    /// The range in words; empty if every value of the type is allowed.
     pub range: String,
     /// Whether the value is in the range.
     pub holds: bool,
-    /// [`Value::PLACEHOLDER`]
+    /// Placeholder for the value in the help; see [`Value::PLACEHOLDER`].
     pub placeholder: &'static str,
-    /// [`Value::IS_SWITCH`]
+    /// Whether the option takes no value; see [`Value::IS_SWITCH`].
     pub is_switch: bool,
 }
 
 impl Entry {
-    /// The setting of the field `name`.
+    /// Describes the setting in the field `name`.
     pub fn new<T: Value>(name: &str, value: &T, range: impl Range<T>) -> Self {
         Self {
             name: name.replace('_', "-"),
@@ -76,6 +76,8 @@ impl Entry {
     }
 }
 
+/// Checks every setting against its range.
+///
 /// # Errors
 /// [`Error::Usage`] with the first setting that is out of range, its value and its range.
 pub fn check(entries: &[Entry]) -> Result<()> {

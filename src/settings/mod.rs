@@ -1,5 +1,5 @@
-//! A setting is written once. One row of `settings!` gives the field and its default, the range and the message of a value
-//! beyond it, the key in TOML, the option of the command line and the option's help.
+//! Declaration of settings. One row of `settings!` gives a field and its default, the range and the error message for a
+//! value outside it, the key in TOML, and the command line option with its help.
 pub mod entry;
 mod range;
 mod table;
@@ -7,7 +7,7 @@ mod table;
 pub use range::{ABOVE_0, FINITE_ABOVE_0, FINITE_FROM_0, FROM_0, Is, NUMBER, Range};
 pub use table::{Table, read};
 
-/// Makes structs out of rows of settings:
+/// Declares structs of settings, one row per setting:
 ///
 /// ```text
 /// settings! {
@@ -28,11 +28,11 @@ pub use table::{Table, read};
 /// ```
 ///
 /// `Settings` has a field for every row, with its default and, in [`entries`](entry::Entry), its range. `Film` has the same
-/// fields as options: it is read from a TOML table, whose unknown keys are refused, or with the feature `cli` from the
-/// command line, where an underscore is a hyphen and the comment is the help; what stands in brackets goes to clap as it is.
-/// `Film::apply` replaces those settings that were given. A struct may have several such parts. A row with two dots in a
-/// part is another struct's settings, in a field of their own, but keys and options of this part; one behind the parts is a
-/// field that has a table of its own.
+/// fields as `Option`s. It is read from a TOML table, where unknown keys are errors, or with the feature `cli` from the
+/// command line, where an underscore becomes a hyphen and the comment is the help; text in brackets is passed to clap.
+/// `Film::apply` replaces the settings that were given. A struct may have several such parts. A row with two dots in a part
+/// includes the settings of another struct: they get a field of their own but are keys and options of this part. Such a
+/// row after the parts is a field with a table of its own.
 macro_rules! settings {
     (
         $(#[$meta:meta])*
@@ -77,7 +77,7 @@ macro_rules! settings {
         }
 
         impl $Whole {
-            /// Every setting with its range, as messages and help name it.
+            /// Every setting with its value and range, as messages and help name it.
             pub fn entries(&self) -> Vec<$crate::settings::entry::Entry> {
                 let own = [
                     $(
@@ -108,7 +108,7 @@ macro_rules! settings {
             }
 
             impl $Part {
-                /// Replaces those settings that are given.
+                /// Replaces the settings that are given.
                 pub fn apply(&self, settings: &mut $Whole) {
                     $(
                         if let Some(value) = self.$name {
@@ -145,7 +145,7 @@ macro_rules! settings {
 }
 pub(crate) use settings;
 
-/// Makes an enum whose variants are a setting's values, named in kebab case in TOML, on the command line and in messages.
+/// Declares an enum whose variants are the values of a setting. TOML, command line and messages name them in kebab case.
 macro_rules! choices {
     ($(#[$meta:meta])* pub enum $Name:ident { $($variants:tt)* }) => {
         $(#[$meta])*

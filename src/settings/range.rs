@@ -1,13 +1,13 @@
-//! What settings may be, in words and as a test.
+//! Ranges of settings, in words and as a test.
 use std::fmt::Display;
 use std::ops::{RangeFull, RangeInclusive};
 
 /// The values that a setting of the type `T` may have.
 pub trait Range<T> {
-    /// For help and messages ("choose 1 to 16384"); empty where every value will do.
+    /// The range in words for help and messages ("choose 1 to 16384"); empty if every value is allowed.
     fn text(&self) -> String;
 
-    /// Whether the value is one of them.
+    /// Whether the value is in the range.
     fn holds(&self, value: &T) -> bool;
 }
 
@@ -31,7 +31,7 @@ impl<T: PartialOrd + Display> Range<T> for RangeInclusive<T> {
     }
 }
 
-/// A range that needs words of its own.
+/// A range given by its description and a test.
 #[derive(Clone, Copy, Debug)]
 pub struct Is<T>(pub &'static str, pub fn(&T) -> bool);
 
@@ -45,13 +45,13 @@ impl<T> Range<T> for Is<T> {
     }
 }
 
-/// Infinity included.
+/// Numbers above 0, including infinity.
 pub const ABOVE_0: Is<f32> = Is("a number above 0", |&x| x > 0.0);
-/// Infinity included.
+/// Numbers of 0 or more, including infinity.
 pub const FROM_0: Is<f32> = Is("0 or more", |&x| x >= 0.0);
-/// Neither 0 nor infinity.
+/// Numbers above 0, excluding infinity.
 pub const FINITE_ABOVE_0: Is<f32> = Is("a finite number above 0", |&x| x > 0.0 && x.is_finite());
-/// Without infinity.
+/// Numbers of 0 or more, excluding infinity.
 pub const FINITE_FROM_0: Is<f32> = Is("a finite number of 0 or more", |&x| x >= 0.0 && x.is_finite());
-/// Everything but NaN.
+/// All numbers, including the infinities but not NaN.
 pub const NUMBER: Is<f32> = Is("a number", |&x| !x.is_nan());

@@ -1,22 +1,23 @@
-//! Settings out of a TOML table.
+//! Reading of settings from a TOML table.
 use serde::de::{DeserializeSeed, Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use std::fmt;
 use std::marker::PhantomData;
 
-/// Settings that a table may give. (serde's own `flatten` neither refuses unknown keys nor keeps the line of an error.)
+/// Settings that a table can give. It replaces `flatten` of serde, which neither refuses unknown keys nor keeps the line
+/// number of an error.
 pub trait Table: Default {
-    /// All keys.
+    /// All keys that the table can have.
     fn keys() -> Vec<&'static str>;
 
-    /// Takes the value of one of the keys.
+    /// Reads the value of one of the keys.
     ///
     /// # Errors
-    /// When it is of another type.
+    /// When the value is of another type.
     fn take<'de, A: MapAccess<'de>>(&mut self, key: &str, map: &mut A) -> Result<(), A::Error>;
 }
 
-/// Reads a table.
+/// Reads a table of settings.
 ///
 /// # Errors
 /// For an unknown key and for a value of another type.
@@ -42,7 +43,7 @@ impl<'de, T: Table> Visitor<'de> for Entries<T> {
     }
 }
 
-/// A key of a list. What is refused while the key is read is told with the key's line.
+/// Reads a key that must be in the list. An error raised while a key is read carries the line of that key.
 struct Known<'a>(&'a [&'static str]);
 
 impl<'de> DeserializeSeed<'de> for Known<'_> {
@@ -53,7 +54,7 @@ impl<'de> DeserializeSeed<'de> for Known<'_> {
         if self.0.contains(&key.as_str()) {
             return Ok(key);
         }
-        // In the words of serde, as of other tables.
+        // The wording of serde, so that all tables report alike.
         let known: Vec<_> = self.0.iter().map(|known| format!("`{known}`")).collect();
         Err(D::Error::custom(format!("unknown field `{key}`, expected one of {}", known.join(", "))))
     }

@@ -1,5 +1,6 @@
-//! What placing samples costs, pass by pass: medians of 9 runs over a film of random priorities, and the same for other
-//! budgets, on which it must not depend. `cargo run --release --example bench-allocate [width height]`
+//! Measures the cost of sample allocation for each pass: medians of 9 runs over a film of random priorities. It repeats
+//! this for other budgets, on which the time must not depend.
+//! `cargo run --release --example bench-allocate [width height]`
 use anyhow::Result;
 use std::collections::BTreeMap;
 use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Location};

@@ -1,5 +1,5 @@
-//! Milliseconds of a filter on the device beside those of the program that a user would pick instead, in turn within one
-//! run; the ratio is that of the medians, after a first run of each that prepares it.
+//! Compares the time of a filter on the device with that of the program that a user would choose instead. Both alternate
+//! within one run; the ratio is that of the medians, after a first untimed run of each.
 //!   cargo run --release --example bench-filters -- atrous|guided|bilateral [ROUNDS] [PEERS]
 //! PEERS is the folder that $TALLOW_DATA/peers/setup.sh installed into; without it our filter runs alone.
 #![allow(missing_docs)]
@@ -13,13 +13,13 @@ use tallow::denoise::filter::{self, Filter, FilterInput, FilterSettings, GuidedS
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu, PassTime};
 use tallow::layout::Guide;
 
-/// After a peer's run: its threads look for more work for a while before they sleep, on the cores that we run on.
+/// Pause after a peer's run, whose threads spin for a while before they sleep and would take our cores.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// What is timed: our settings, and what the peer is asked for.
+/// What is timed: our settings, and the request to the peer.
 struct Case {
     size: [u32; 2],
-    /// The first is the one that the peer is compared with.
+    /// Our settings by name. The peer is compared with the first.
     settings: Vec<(&'static str, FilterSettings)>,
     peer: &'static str,
 }
@@ -40,7 +40,7 @@ fn case(name: &str) -> Result<Case> {
             ],
             peer: "guided 24",
         },
-        // Joint: by the guide alone, as OpenCV's jointBilateralFilter and GIF's.
+        // The joint form is weighted only by the guide, as in OpenCV's jointBilateralFilter and in GIF.
         "bilateral" => Case {
             size: [1024, 768],
             settings: vec![("radius 24", base.with(|s| s.edge.sigma_rt = f32::INFINITY))],
@@ -84,7 +84,7 @@ fn errors(gpu: &Gpu, row: &Row, near: f32) -> Result<()> {
     Ok(())
 }
 
-/// The peers' process.
+/// The process that runs the peers.
 struct Peer {
     child: Child,
     ask: ChildStdin,
@@ -112,13 +112,13 @@ impl Peer {
 
 impl Drop for Peer {
     fn drop(&mut self) {
-        // Nothing depends on how it ends.
+        // It does not matter how it ends.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// One of our settings, and the passes of every round.
+/// One of our settings, and the pass times of every round.
 struct Ours {
     name: &'static str,
     filter: Box<dyn Filter>,
@@ -132,7 +132,7 @@ impl Ours {
         median(self.runs.iter().map(run).collect())
     }
 
-    /// Every pass of filters of few passes, every kernel of others.
+    /// Prints every pass of filters with few passes, and every kernel of others.
     fn print(&self) {
         let passes: Vec<&str> = self.runs[0].iter().map(|p| p.name).collect();
         let mut kernels = passes.clone();

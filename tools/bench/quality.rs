@@ -1,4 +1,5 @@
-//! Mean squared error of every filter on the indirect light of a scene, at its default settings and over a small sweep.
+//! Measures the mean squared error of every filter on the indirect light of a scene, at its default settings and over a
+//! small sweep.
 //!   cargo run --release --example bench-quality -- SCENE [SIDE SPP REFERENCE_SPP]
 #![allow(missing_docs)]
 use anyhow::{Context, Result};
@@ -10,7 +11,7 @@ use tallow::render::settings::Settings;
 use tallow::render::{Job, Outputs, Renderer};
 use tallow::scene::Scene;
 
-/// Guides, statistics and light of a whole render.
+/// Renders a scene and returns its guides, statistics and light.
 fn render(
     gpu: &Gpu,
     file: &str,
@@ -27,7 +28,7 @@ fn render(
     Ok((tile.guide.read()?, tile.stats.read()?, tile.light.read()?))
 }
 
-/// (MSE, relative MSE with an epsilon of 0.01) over all channels.
+/// Returns (MSE, relative MSE with an epsilon of 0.01) over all channels.
 fn errors(image: &[vec4], reference: &[PixelLight]) -> (f64, f64) {
     let (mut mse, mut relative) = (0.0, 0.0);
     for (a, b) in image.iter().zip(reference) {
@@ -67,7 +68,7 @@ fn main() -> Result<()> {
     let gpu = Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), ..DeviceOptions::default() })?;
     let (_, _, reference) = render(&gpu, file, side, many, 1)?;
     let (guide, stats, light) = render(&gpu, file, side, spp, 0)?;
-    // The statistics are of direct and indirect light together, so the variance is left to be estimated.
+    // The statistics include direct light, so the filter estimates the variance of the indirect light itself.
     let radiance = light.iter().zip(&stats).map(|(l, s)| [l.indirect[0], l.indirect[1], l.indirect[2], s.count as f32]);
     let input = FilterInput { width: side, height: side, radiance: radiance.collect(), guide, variance: None };
     let base = FilterSettings::default().scaled_to(&input);

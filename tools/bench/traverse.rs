@@ -1,5 +1,5 @@
-//! Rays per second: the traversal kernel on the device against obvhs's own traversal on two threads, over the same tree
-//! and the same 512 x 512 incoherent rays of Crytek Sponza, in turn.
+//! Compares the rays per second of the traversal kernel with those of obvhs's own traversal on two threads, alternating,
+//! over the same tree and the same 512 x 512 incoherent rays of Crytek Sponza.
 //!   TALLOW_DATA=../shared cargo run --release --example bench-traverse [ROUNDS]
 #![allow(missing_docs)]
 use anyhow::{Context, Result, ensure};
@@ -32,17 +32,17 @@ use kernels::traverse::{Bind, Constants, Kernel};
 
 const SIDE: u32 = 512;
 const THREADS: usize = 2;
-/// Rays that a thread takes at a time.
+/// Number of rays that a host thread takes at a time.
 const CHUNK: usize = 4096;
-/// Rays that a thread of the device traces one after the other: lanes that are done early find work until the last of them.
-/// A CPU has few lanes to keep busy, a GPU many.
+/// Number of rays that a device thread traces one after the other, so that lanes which finish a ray early take the next. A
+/// CPU has few lanes to keep busy, a GPU many.
 const RAYS_CPU: u32 = 128;
 const RAYS_GPU: u32 = 16;
 
-/// What either side finds: distance and triangle in leaf order (any hit: any value for a hit), [`NONE`] on a miss.
+/// A hit: distance and triangle in leaf order, or [`NONE`] on a miss. For any-hit rays a hit can have any values.
 type Found = (f32, u32);
 
-/// The bounce of the ray through pixel `i`, from the hall of Sponza towards its far end; `None` where that leaves the scene.
+/// The bounce of the ray through pixel `i`, from the hall of Sponza towards its far end; `None` if that leaves the scene.
 fn bounce(scene: &Loaded, i: u32) -> Option<RayQuery> {
     let [low, high] = scene.bounds.map(Vec3::from);
     let eye = low + (high - low) * Vec3::new(0.2, 0.3, 0.5);
@@ -61,7 +61,7 @@ fn bounce(scene: &Loaded, i: u32) -> Option<RayQuery> {
     Some(RayQuery { origin, t_max: INFINITE_DISTANCE, direction, mask_seed: 0, ..Default::default() })
 }
 
-/// obvhs over the nodes that Tallow built with it.
+/// Traversal by obvhs of the nodes that Tallow built with it.
 struct Host {
     bvh: CwBvh,
     triangles: Vec<RtTriangle>,
@@ -93,7 +93,7 @@ impl Host {
         (0.0, if miss { NONE } else { 0 })
     }
 
-    /// Seconds, and what was found.
+    /// Traces all rays and returns the seconds and the hits.
     fn run(&self, any_hit: bool) -> (f64, Vec<Found>) {
         let begun = Instant::now();
         let rays = || self.rays.par_iter().with_min_len(CHUNK);
@@ -105,7 +105,7 @@ impl Host {
     }
 }
 
-/// The traversal kernel and what it reads.
+/// The traversal kernel and its buffers.
 struct Device {
     gpu: Gpu,
     frame: FrameResources,
@@ -120,7 +120,7 @@ impl Device {
     fn new(scene: &Loaded, rays: &[RayQuery]) -> Result<Self> {
         let gpu =
             Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), ..DeviceOptions::default() })?;
-        // obvhs knows no masks, so neither side tests them.
+        // obvhs does not support masks, so neither side tests them.
         let effects = Effects::default();
         let traverse = shared::traverse::Constants { stack: scene.stack };
         let constants = Constants { effects, traverse, thread: gpu.tuning().thread() };
@@ -135,7 +135,7 @@ impl Device {
         })
     }
 
-    /// Seconds by the device's timestamps, and what was found.
+    /// Traces all rays and returns the seconds by the device's timestamps, and the hits.
     fn run(&mut self, any_hit: bool) -> Result<(f64, Vec<Found>)> {
         let count = self.rays.len() as u32;
         let push = TraversePush { count, root: self.root, any_hit: u32::from(any_hit), ..Default::default() };
@@ -151,7 +151,7 @@ impl Device {
     }
 }
 
-/// Rays on which the two sides differ: in whether they hit or, for closest hits, in the distance.
+/// Number of rays on which the two sides differ in whether they hit or, for closest hits, in the distance.
 fn differing(a: &[Found], b: &[Found], any_hit: bool) -> usize {
     let differs = |(a, b): (&Found, &Found)| {
         let near = any_hit || a.1 == b.1 || (a.0 - b.0).abs() <= 1e-4 * a.0;

@@ -1,10 +1,11 @@
-//! Rust code for kernels and for the files that they share: typed bindings, specialisation constants, numbers.
+//! Generates the Rust code for kernels and for the GLSL files that they share: typed bindings, specialisation constants and
+//! numbers.
 use crate::interface::{Binding, Constant, Interface, LocalSizeX, Number};
 use anyhow::Result;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// What a shared file declares.
+/// The declarations of a shared file.
 pub struct Group {
     pub name: String,
     pub bindings: Vec<Binding>,
@@ -12,7 +13,7 @@ pub struct Group {
     pub numbers: Vec<Number>,
 }
 
-/// Fields of a struct, and the list of their buffers.
+/// Returns the fields of a `Bind` struct and the list of their buffers, both as Rust code.
 fn members(bindings: &[Binding]) -> Result<(String, String)> {
     let (mut fields, mut list) = (String::new(), String::new());
     for Binding { number, field, element, kind, access, .. } in bindings {
@@ -23,13 +24,13 @@ fn members(bindings: &[Binding]) -> Result<(String, String)> {
     Ok((fields, list))
 }
 
-/// 16 KiB is what every Vulkan device has for a uniform block.
+/// Asserts that uniform blocks have at most 16 KiB, which every Vulkan device supports.
 fn assert_sizes(bindings: &[Binding]) -> String {
     let uniform = bindings.iter().filter(|b| b.kind == "Uniform");
     uniform.map(|b| format!("    const _: () = assert!(size_of::<{}>() <= 16384);\n", b.element)).collect()
 }
 
-/// A comment of the GLSL as documentation, or the name where there is none.
+/// Turns a comment of the GLSL into documentation, or uses the name if there is none.
 fn doc(name: &str, comment: &str) -> String {
     match comment {
         "" => format!("/// `{name}` of the GLSL."),
@@ -51,7 +52,7 @@ fn numbers(list: &[Number]) -> Result<String> {
 struct Fields {
     declarations: String,
     defaults: String,
-    /// Statements that add to `all`.
+    /// Statements that add entries to `all`.
     entries: String,
     count: usize,
 }
@@ -129,7 +130,7 @@ pub fn group_module(group: &Group) -> Result<String> {
     Ok(code + "}\n")
 }
 
-/// The `Constants` of a kernel, and what tells its workgroup.
+/// The `Constants` struct of a kernel, which also gives its workgroup size.
 fn constants(interface: &Interface, root: &str) -> Result<String> {
     let mut fields = Fields::default();
     if interface.effects {
@@ -206,7 +207,7 @@ pub fn module(name: &str, file: &Path, interface: &Interface, root: &str, binary
     let constants = constants(interface, root)?;
     let asserts = assert_sizes(&interface.bindings_of(None));
     let file = file.display();
-    // Who can name a kernel of the crate can run it with any numbers, so that nobody outside can.
+    // Code that can name a kernel can run it with any numbers, so the crate's kernels are not visible outside.
     let visible = if root == "crate" { "#[allow(dead_code)]\npub(crate)" } else { "pub" };
     Ok(format!(
         r#"/// The kernel `{file}`.

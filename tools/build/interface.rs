@@ -1,64 +1,64 @@
-//! What a kernel's sources say of its interface: buffers, push constants, specialisation constants, numbers.
+//! Parses the interface of a kernel from its GLSL sources: buffers, push constants, specialisation constants and numbers.
 use anyhow::{Context, Result, bail, ensure};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// A file that a kernel is made of: name for messages, text.
+/// A source file of a kernel: its name for messages, and its text.
 pub type Source = (String, String);
 
-/// The file whose constants come from Rust in the first place.
+/// The file whose constants are generated from Rust.
 pub const EFFECTS: &str = "glsl/effects.glsl";
 
-/// A buffer.
+/// A buffer that the kernel binds.
 #[derive(Clone)]
 pub struct Binding {
-    /// Basename of the shared file that declares it; none in the kernel itself.
+    /// Basename of the shared file that declares it; `None` for the kernel itself.
     pub group: Option<String>,
     pub number: u32,
     pub field: String,
-    /// Rust's name of the type.
+    /// Rust name of the element type.
     pub element: String,
-    /// GLSL's name of it; none for texels.
+    /// GLSL name of the element type; empty for texels.
     pub in_glsl: String,
-    /// Variant of `gpu::SlotKind`.
+    /// Name of the variant of `gpu::SlotKind`.
     pub kind: &'static str,
-    /// Variant of `gpu::Access`.
+    /// Name of the variant of `gpu::Access`.
     pub access: &'static str,
 }
 
-/// A specialisation constant.
+/// A constant whose value is set when the kernel is compiled.
 #[derive(Clone)]
 pub struct Constant {
-    /// As [`Binding::group`].
+    /// The shared file that declares it, as in [`Binding::group`].
     pub group: Option<String>,
     pub id: u32,
-    /// As in the GLSL, in capitals.
+    /// Its name in the GLSL, in capitals.
     pub name: String,
-    /// Rust's name of the type.
+    /// Rust name of the type.
     pub ty: &'static str,
-    /// A literal, or the name of a number.
+    /// The default value: a literal, or the name of a number.
     pub default: String,
     pub comment: String,
 }
 
-/// A number that has a name: `const uint ROWS = 4u;`.
+/// A named number, such as `const uint ROWS = 4u;`.
 #[derive(Clone)]
 pub struct Number {
-    /// As [`Binding::group`].
+    /// The shared file that declares it, as in [`Binding::group`].
     pub group: Option<String>,
     pub name: String,
-    /// Rust's name of the type.
+    /// Rust name of the type.
     pub ty: &'static str,
-    /// A literal.
+    /// The value as a Rust literal.
     pub value: String,
     pub comment: String,
 }
 
-/// Threads of a workgroup along x.
+/// Number of threads in a workgroup along x.
 #[derive(Clone, Copy)]
 pub enum LocalSizeX {
     Fixed(u32),
-    /// Specialised by the constant of this id.
+    /// The value of the specialisation constant with this id.
     Constant(u32),
 }
 
@@ -69,12 +69,12 @@ pub struct Interface {
     pub numbers: Vec<Number>,
     pub local_size_x: LocalSizeX,
     pub local_size_y: u32,
-    /// Whether the kernel is specialised by what a scene calls for.
+    /// Whether the kernel is specialised for the effects of a scene.
     pub effects: bool,
 }
 
 impl Interface {
-    /// Reads the sources of a kernel, itself first.
+    /// Parses the sources of a kernel. The first is the kernel itself.
     pub fn of(sources: &[Source]) -> Result<Self> {
         let (mut push, mut size) = (None, None);
         let (mut bindings, mut constants, mut numbers) = (Vec::<Binding>::new(), Vec::<Constant>::new(), Vec::new());
@@ -114,17 +114,17 @@ impl Interface {
         Ok(interface)
     }
 
-    /// Shared files with bindings.
+    /// Basenames of the shared files with bindings.
     pub fn bound_groups(&self) -> BTreeSet<String> {
         self.bindings.iter().filter_map(|b| b.group.clone()).collect()
     }
 
-    /// Shared files with specialisation constants.
+    /// Basenames of the shared files with specialisation constants.
     pub fn constant_groups(&self) -> BTreeSet<String> {
         self.constants.iter().filter_map(|c| c.group.clone()).collect()
     }
 
-    /// Shared files with bindings, constants or numbers.
+    /// Basenames of the shared files with bindings, constants or numbers.
     pub fn groups(&self) -> BTreeSet<String> {
         let numbers = self.numbers.iter().filter_map(|n| n.group.clone());
         self.bound_groups().into_iter().chain(self.constant_groups()).chain(numbers).collect()
@@ -142,12 +142,13 @@ impl Interface {
         self.numbers.iter().filter(|n| n.group.as_deref() == group).cloned().collect()
     }
 
-    /// The constant that tells a kernel its own workgroup's size, if it has one.
+    /// The constant that holds the size of the kernel's workgroup, if there is one.
     pub fn workgroup(&self) -> Option<&Constant> {
         self.constants.iter().find(|c| c.name == "WORKGROUP")
     }
 
-    /// Effects have the ids below 100; two constants of one id would share a value without a word.
+    /// Checks that ids are unique, because two constants with one id would silently share a value. Effects have those below
+    /// 100.
     fn check_ids(&self, kernel: &str) -> Result<()> {
         let mut taken = BTreeSet::new();
         if let LocalSizeX::Constant(id) = self.local_size_x {
@@ -165,7 +166,7 @@ fn basename(file: &str) -> String {
     Path::new(file).file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// The words between braces, without the semicolon: a type and a name.
+/// Returns the type and the name of the member between braces.
 fn member(line: &str) -> Option<(&str, &str)> {
     let (_, rest) = line.split_once('{')?;
     rest.split_once(';')?.0.trim().split_once(' ')
@@ -178,7 +179,7 @@ fn parse_push(line: &str) -> Result<String> {
     }
 }
 
-/// The code of a line, and what is said after it.
+/// Splits a line into its code and its comment.
 fn split_comment(line: &str) -> (&str, String) {
     match line.split_once("//") {
         Some((code, comment)) => (code.trim(), comment.trim().to_owned()),
@@ -196,7 +197,7 @@ fn rust_type(glsl: &str) -> Option<&'static str> {
     }
 }
 
-/// Rust writes literals as GLSL does, but for the `u`.
+/// Converts a literal of GLSL to Rust; they differ only in the suffix `u`.
 fn rust_value(glsl: &str) -> String {
     glsl.trim().trim_end_matches('u').to_owned()
 }
@@ -214,7 +215,7 @@ fn parse_constant(line: &str) -> Result<Constant> {
     parse().context(expected)
 }
 
-/// Numbers that are given by literals; what is computed from others stays the GLSL's own.
+/// Returns the numbers that are given by literals. Those computed from others are not exported to Rust.
 fn parse_numbers(line: &str, group: &Option<String>) -> Vec<Number> {
     let (code, comment) = split_comment(line);
     let declared = code.strip_prefix("const ").and_then(|rest| rest.strip_suffix(';')?.split_once(' '));

@@ -1,5 +1,5 @@
-//! The GLSL of the structs in `src/layout`, and of the functions by which kernels read and write them: no kernel knows where in a
-//! struct a field lies.
+//! Generates GLSL for the structs in `src/layout` and for the functions with which kernels read and write them, so that no
+//! kernel depends on the offset of a field.
 use crate::interface::Binding;
 use crate::layout::{Field, GLSL_CONSTANTS, STRUCTS, Struct};
 use std::ops::Range;
@@ -8,7 +8,8 @@ fn structs() -> impl Iterator<Item = &'static Struct> {
     STRUCTS.into_iter().flatten()
 }
 
-/// What stands before the text of a kernel with these bindings: constants, structs, and the functions of those that it binds.
+/// Returns the text to put before a kernel with these bindings: constants, structs, and the functions of the structs that
+/// it binds.
 pub fn glsl(bindings: &[Binding]) -> String {
     let mut text = GLSL_CONSTANTS.to_owned();
     for s in structs() {
@@ -28,7 +29,7 @@ pub fn glsl(bindings: &[Binding]) -> String {
     text
 }
 
-/// 32-bit words of a GLSL type.
+/// Number of 32-bit words in a GLSL type.
 fn word_count(ty: &str) -> usize {
     ty.chars().last().and_then(|c| c.to_digit(10)).unwrap_or(1) as usize
 }
@@ -37,7 +38,7 @@ fn is_float(ty: &str) -> bool {
     ty == "float" || ty.starts_with("vec")
 }
 
-/// Words of one texel of a buffer of these structs: as `Bound::texels` in `src/gpu/buffer.rs` chooses.
+/// Number of words in one texel of a buffer of these structs, as `Bound::texels` in `src/gpu/buffer.rs` chooses it.
 fn texel_words(s: &Struct) -> usize {
     if s.size.is_multiple_of(16) {
         4
@@ -48,13 +49,13 @@ fn texel_words(s: &Struct) -> usize {
     }
 }
 
-/// The texels of the struct that a field lies in.
+/// The texels of the struct that hold a field.
 fn texels_of(s: &Struct, field: &Field) -> Range<usize> {
     let (first, wide) = (field.offset / 4, texel_words(s));
     first / wide..(first + word_count(field.ty)).div_ceil(wide)
 }
 
-/// A field's value; `texel(i)` is the i-th texel of the struct.
+/// GLSL expression for a field's value, where `texel(i)` is the i-th texel of the struct.
 fn value(s: &Struct, field: &Field, texel: impl Fn(usize) -> String) -> String {
     let (wide, first, count) = (texel_words(s), field.offset / 4, word_count(field.ty));
     let part = |i: usize| {
@@ -70,8 +71,8 @@ fn value(s: &Struct, field: &Field, texel: impl Fn(usize) -> String) -> String {
     if is_float(field.ty) { format!("uintBitsToFloat({words})") } else { words }
 }
 
-/// `Type_field(buffer, index)`, which fetches what the field needs, and `Type_load(buffer, index)`, which fetches every texel
-/// once; compilers drop those that are not used.
+/// Generates `Type_field(buffer, index)`, which fetches only the texels of the field, and `Type_load(buffer, index)`, which
+/// fetches every texel once. Compilers remove unused functions.
 fn readers(s: &Struct) -> String {
     let (name, texels) = (s.name, s.size / 4 / texel_words(s));
     let fetch = |i: usize| match i {
@@ -94,14 +95,15 @@ fn readers(s: &Struct) -> String {
     )
 }
 
-/// `Type_zero()`.
+/// Generates `Type_zero()`, which returns a struct of zeros.
 fn zero(s: &Struct) -> String {
     let fields: Vec<_> = s.fields.iter().map(|f| format!("{}(0)", f.ty)).collect();
     format!("{} {0}_zero() {{ return {0}({}); }}\n", s.name, fields.join(", "))
 }
 
-/// `TypeWords`, the struct as the fewest stores, and `Type_words(value)`. lavapipe stores lane by lane and member by member: 64
-/// bits at a time cost half, and one store of four is fewer instructions than two of two.
+/// Generates `TypeWords`, a form of the struct that takes the fewest stores, and `Type_words(value)`, which converts to it.
+/// lavapipe stores lane by lane and member by member: stores of 64 bits take half the time, and a store of four words is
+/// fewer instructions than two of two.
 fn words(s: &Struct) -> String {
     let of_field = |Field { name, ty, .. }: &Field| -> Vec<String> {
         let bits = |value: String| if is_float(ty) { format!("floatBitsToUint({value})") } else { value };

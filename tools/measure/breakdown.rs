@@ -1,5 +1,5 @@
-//! Where a whole frame's time goes, beside EAW's table 1 (its À-Trous column is an NVIDIA GTX 285's; its rays were traced by
-//! a CPU, an Intel Core 2 Duo E6850, its guides drawn by a GPU).
+//! Measures the parts of a frame's time, beside EAW's table 1. (There, À-Trous ran on an NVIDIA GTX 285, rays were traced on
+//! an Intel Core 2 Duo E6850, and guides were drawn by a GPU.)
 use super::frames::View;
 use crate::Args;
 use tallow::denoise::filter::{self, FilterSettings};
@@ -9,13 +9,13 @@ use tallow::render::{Outputs, Renderer};
 use tallow::report::table;
 use tallow::scene::Scene;
 
-/// As many as the paper averages over, after one that compiles.
+/// Number of frames to average over, as in the paper, after a first one in which drivers compile.
 const FRAMES: usize = 16;
 
-/// Of tracing, drawing the guides, uploading and filtering.
+/// Times of tracing, drawing the guides, uploading and filtering.
 type Milliseconds = [f64; 4];
 
-/// Ours, theirs, and their milliseconds and frames a second.
+/// Our view, the paper's scene, and its milliseconds and frames per second.
 const VIEWS: &[(View, &str, Milliseconds, f64)] = &[
     (view("cornell", "scenes/cornell-box/scene.toml"), "Box", [307.6, 2.9, 5.8, 5.6], 3.2),
     (view("sponza", "crytek-sponza"), "Sponza", [835.2, 35.5, 4.4, 5.6], 1.13),
@@ -23,7 +23,7 @@ const VIEWS: &[(View, &str, Milliseconds, f64)] = &[
     (view("grass", "scenes/grass/scene.toml"), "Outdoor", [316.4, 2.6, 6.3, 5.6], 3.0),
 ];
 
-/// One path per pixel with one indirect bounce.
+/// A view with one path per pixel and one indirect bounce.
 const fn view(name: &'static str, scene: &'static str) -> View {
     View { name, scene, size: [512, 512], depth: 3, reference: 1 }
 }

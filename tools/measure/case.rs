@@ -1,4 +1,4 @@
-//! A noisy image taken apart, and the image that it should become.
+//! Test cases for filters: a noisy image split into its parts, and its reference.
 use anyhow::anyhow;
 use std::path::Path;
 use tallow::denoise::Demodulation;
@@ -10,13 +10,13 @@ use tallow::image::source::Source;
 use tallow::image::{self, Film, Picture, WriteOptions, metrics};
 use tallow::layout::vec4;
 
-/// See above.
+/// A noisy image and its reference.
 pub struct Case {
-    /// What the filters get.
+    /// The parts of the noisy image, which the filters get.
     pub parts: Parts,
-    /// As rendered.
+    /// The noisy image as rendered.
     pub noisy: Picture,
-    /// As it should be.
+    /// The image that a perfect filter would return.
     pub reference: Picture,
     truth: Parts,
 }
@@ -33,12 +33,12 @@ impl Case {
         })
     }
 
-    /// The whole image with what a filter returned.
+    /// Joins what a filter returned with the other parts of the noisy image.
     pub fn whole(&self, filtered: &[vec4]) -> Picture {
         Picture { pixels: self.parts.remodulate(filtered), ..self.noisy.clone() }
     }
 
-    /// The same with the direct light and the albedo of the reference, so that nothing but the filtered light differs.
+    /// As [`Self::whole`] with direct light and albedo of the reference, so that only the filtered light differs from it.
     pub fn filtered_light(&self, filtered: &[vec4]) -> Picture {
         Picture { pixels: self.truth.remodulate(filtered), ..self.noisy.clone() }
     }
@@ -54,7 +54,7 @@ impl Case {
         Ok(filter::run(gpu, row, &self.parts.input, settings)?.0)
     }
 
-    /// Mean squared error in 8-bit sRGB code values, as the papers have it.
+    /// Mean squared error in 8-bit sRGB code values, as in the papers.
     pub fn mse(&self, picture: &Picture) -> f64 {
         255.0 * 255.0 * 10f64.powf(-0.1 * metrics::psnr(picture, &self.reference))
     }

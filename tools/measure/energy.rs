@@ -1,4 +1,4 @@
-//! How much light À-Trous keeps, and what keeping all of it costs in error.
+//! Measures how much light À-Trous keeps, and by how much the error grows when it keeps all of it.
 use super::case::Case;
 use super::ranking::VIEWS;
 use crate::Args;

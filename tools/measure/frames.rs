@@ -1,4 +1,4 @@
-//! Noisy images and their references.
+//! Renders noisy images and their references.
 use crate::Args;
 pub use crate::view::View;
 use anyhow::{Context, bail};
@@ -7,17 +7,17 @@ use std::process::Command;
 use tallow::image::source::Source;
 
 impl View {
-    /// Renders it, unless an earlier run has.
+    /// Renders the view, unless an earlier run has done so.
     ///
     /// # Errors
     /// When the scene cannot be found or rendered.
     pub fn render(&self, args: &Args, spp: u32) -> anyhow::Result<Source> {
-        // Another seed than the default for references: their samples must not be those of the noisy image.
+        // References have another seed, because their samples must not be those of the noisy image.
         let seed = if spp == self.reference { "1" } else { "0" };
         self.once(args, spp, &self.file(args, spp), &["--seed", seed])
     }
 
-    /// The same with other samples than [`View::render`] takes.
+    /// As [`View::render`] with other samples.
     ///
     /// # Errors
     /// As [`View::render`].
@@ -25,7 +25,7 @@ impl View {
         self.once(args, spp, &self.file(args, spp).with_extension("again.exr"), &["--seed", "3"])
     }
 
-    /// The same with all samples at the pixels' centres, and other samples than [`View::render`] takes.
+    /// As [`View::render`] with other samples, all of them at the centres of the pixels.
     ///
     /// # Errors
     /// As [`View::render`].
@@ -41,7 +41,7 @@ impl View {
         Ok(Source::read(file)?)
     }
 
-    /// Where a render of it lies.
+    /// Path of a render of the view.
     pub fn file(&self, args: &Args, spp: u32) -> PathBuf {
         let [width, height] = self.size;
         args.output.join(format!("{}-{width}x{height}-{spp}spp.exr", self.name))

@@ -1,5 +1,5 @@
-//! GIF's supersampling: the image out of one guide ray per pixel, and with filtered light looked up along eye rays; and its
-//! failing case, eye rays that meet what none of the guide rays around them meets.
+//! Measures GIF's supersampling, by which filtered light is looked up along eye rays, against an image from one guide ray
+//! per pixel; and the case in which it fails, eye rays that hit a surface which no guide ray around them hits.
 use super::case::Case;
 use super::frames::View;
 use super::sweep;
@@ -23,9 +23,9 @@ const VIEWS: &[View] = &[
     View { name: "grass", scene: "scenes/grass/scene.toml", size: [112, 63], depth: 4, reference: 256 },
 ];
 const EYE_RAYS: [u32; 2] = [4, 16];
-/// A guide ray stands for an eye ray whose normal is at most 30 degrees and whose depth is at most 5 % off.
+/// A guide ray can represent an eye ray whose normal differs by at most 30 degrees and whose depth by at most 5 %.
 const ALIKE: (f32, f32) = (0.866, 0.05);
-/// Share of a pixel's eye rays above which it counts among those that nothing stands for.
+/// A pixel counts as lost if more than this share of its eye rays is not represented.
 const LOST: f32 = 0.25;
 
 /// # Errors
@@ -102,7 +102,7 @@ fn line(light: &str, image: &str, case: &Case, lost: &[bool], picture: &Picture)
     vec![light.to_owned(), image.to_owned(), format!("{:.2}", case.mse(picture)), over(true), over(false)]
 }
 
-/// Per pixel, the share of its eye rays for which none of the guide rays stands that they may choose from.
+/// Returns for each pixel the share of its eye rays that none of their candidate guide rays represents.
 fn lost(scene: &Loaded, effects: &Effects, guide: &[Guide], filtered: &[vec4]) -> Vec<f32> {
     let (frame, effects) = (frame_constants(scene, &scene.settings).unwrap(), *effects);
     let tracer = Tracer { scene, frame, effects, strategy: Strategy::Both };

@@ -1,4 +1,4 @@
-//! What `tools/filters` measures, a file per table.
+//! The measurements of `tools/filters`, with one file per table.
 pub mod breakdown;
 mod case;
 pub mod energy;

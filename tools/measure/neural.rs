@@ -1,4 +1,4 @@
-//! The Cornell box against Open Image Denoise: the same image, albedo and normals, in one run.
+//! Compares the filters with Open Image Denoise on the Cornell box, with the same image, albedo and normals, in one run.
 use super::case::Case;
 use super::frames::View;
 use super::sheet::{self, Tile};
@@ -40,7 +40,7 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
     one(gpu, args, "Mitsuba's image", &files[0], &[("all light", case)])
 }
 
-/// One noisy image through every filter.
+/// Denoises one noisy image with every filter and prints the results.
 fn one(gpu: &Gpu, args: &Args, title: &str, noisy: &Path, cases: &[(&str, Case)]) -> anyhow::Result<()> {
     let truth = &cases[0].1.reference;
     let unfiltered = &cases[0].1.noisy;
@@ -76,7 +76,7 @@ fn line(name: &str, picture: &Picture, truth: &Picture, ms: Option<f64>, setting
     [&[name.to_owned()], &figures[..], &[settings.to_owned()]].concat()
 }
 
-/// Runs the peer, which prints `QUALITY MILLISECONDS FILE` per line: its name, picture and milliseconds.
+/// Runs Open Image Denoise, which prints lines of `QUALITY MILLISECONDS FILE`, and returns name, picture and milliseconds.
 fn denoised(peers: &Path, output: &Path, noisy: &Path) -> anyhow::Result<Vec<(String, Picture, f64)>> {
     let text = python(peers, "oidn.py", &[noisy, output])?;
     let row = |line: &str| {
@@ -87,7 +87,7 @@ fn denoised(peers: &Path, output: &Path, noisy: &Path) -> anyhow::Result<Vec<(St
     text.lines().filter_map(|line| row(line).transpose()).collect()
 }
 
-/// Runs a script of this folder with what the peers' set-up installed, and returns what it printed.
+/// Runs a script of this folder with the Python that the set-up of the peers installed, and returns its output.
 fn python(peers: &Path, script: &str, words: &[&Path]) -> anyhow::Result<String> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/measure").join(script);
     let shell = r#". "$0/env.sh" && exec "$0/venv/bin/python" "$@""#;

@@ -1,4 +1,5 @@
-//! Errors of every filter at its best settings: on GIF's three kinds of scene beside the published ones, and on two more.
+//! Measures the error of every filter at its best settings, on GIF's three kinds of scene beside the published errors, and
+//! on two more.
 use super::case::Case;
 use super::frames::View;
 use super::sheet::{self, Tile};
@@ -9,10 +10,10 @@ use tallow::denoise::filter::{FILTERS, Row};
 use tallow::gpu::Gpu;
 use tallow::report::table;
 
-/// Two bounces of indirect light, as GIF has them.
+/// Path edges for two bounces of indirect light, as in GIF.
 const DEPTH: u32 = 4;
 
-/// GIF has three kinds of scene.
+/// One scene for each of the three kinds in GIF, and two more.
 pub const VIEWS: &[View] = &[
     View { name: "bust-room", scene: "scenes/bust/room.toml", size: [180, 240], depth: DEPTH, reference: 1024 },
     View { name: "dragon", scene: "stanford-dragon", size: [256, 256], depth: DEPTH, reference: 1024 },
@@ -21,7 +22,7 @@ pub const VIEWS: &[View] = &[
     View { name: "grass", scene: "scenes/grass/scene.toml", size: [224, 126], depth: DEPTH, reference: 1024 },
 ];
 
-/// Scene, samples per pixel, and the published errors of cross bilateral, À-Trous and guided.
+/// Scene, samples per pixel, and the published errors of the cross bilateral, À-Trous and guided filters.
 const PUBLISHED: &[(&str, u32, [f64; 3])] = &[
     ("bust-room", 1, [95.5, 190.6, 74.8]),
     ("bust-room", 4, [73.5, 92.2, 65.4]),
@@ -76,7 +77,7 @@ fn one(gpu: &Gpu, args: &Args, view: &View, spp: u32) -> anyhow::Result<()> {
     sheet::write(&file("sheet.png"), &tiles, &case.reference)
 }
 
-/// What is compared with what the paper found, scenes being different.
+/// Ratios between the errors of filters, which can be compared with the paper's although the scenes differ.
 fn ratios(scene: &str, spp: u32, errors: &[(&str, f64)]) -> String {
     let ours = |name: &str| errors.iter().find(|(known, _)| *known == name).map(|(_, error)| *error);
     let theirs = |name: &str| published(scene, spp, name).parse::<f64>().ok();

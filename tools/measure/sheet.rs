@@ -1,27 +1,27 @@
-//! A picture sheet: what came out, and below it the error map, all maps with one scale.
+//! Makes sheets of pictures, with the results in the upper row and their error maps below, all on one scale.
 use super::case;
 use std::path::Path;
 use tallow::image::Picture;
 use tallow::image::difference::{heat_map, heat_map_to};
 
-/// Pixels between pictures.
+/// Gap between pictures in pixels.
 const GAP: usize = 4;
 
-/// One column.
+/// One column of the sheet: a result and its name.
 pub struct Tile {
     name: String,
     picture: Picture,
 }
 
 impl Tile {
-    /// With the name that the legend has.
+    /// Makes a column; `name` appears in the legend.
     pub fn new(name: &str, picture: &Picture) -> Self {
         Self { name: name.to_owned(), picture: picture.clone() }
     }
 }
 
-/// Writes it, with the reference as the last column, and prints its legend. The first tile is unfiltered; the scale fits
-/// the largest error of the others.
+/// Writes the sheet, with the reference as the last column, and prints its legend. The first tile is unfiltered; the scale
+/// fits the largest error of the others.
 ///
 /// # Errors
 /// When it cannot be written.
@@ -29,7 +29,7 @@ pub fn write(path: &Path, tiles: &[Tile], reference: &Picture) -> anyhow::Result
     let top = tiles[1..].iter().map(|t| heat_map(&t.picture, reference).1).fold(0.0, f32::max);
     let pictures: Vec<_> = tiles.iter().map(|t| &t.picture).chain([reference]).collect();
     let maps: Vec<_> = pictures.iter().map(|p| heat_map_to(p, reference, top)).collect();
-    // A map has a scale bar at its right edge: columns are as wide as maps.
+    // Maps are wider than pictures, because of the scale bar at their right edge.
     let (column, height) = (maps[0].width as usize + GAP, reference.height as usize);
     let mut sheet =
         Picture { width: (column * pictures.len()) as u32, height: (2 * height + GAP) as u32, pixels: vec![] };

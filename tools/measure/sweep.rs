@@ -1,7 +1,7 @@
-//! The best settings of a filter for one image, by search.
+//! Searches for the best settings of a filter for one image.
 use tallow::denoise::filter::{AtrousForm, FilterSettings, Row, WaveletBasis};
 
-/// One setting and the values that are tried: numbers, or places among the words of a choice.
+/// One setting and the values to try: numbers, or indices of the variants of a choice.
 pub struct Knob {
     name: &'static str,
     values: &'static [f32],
@@ -49,7 +49,7 @@ const BASIS: Knob = Knob {
     words: &["cdf22", "red-black"],
 };
 
-/// What is searched for a filter. A new one goes here.
+/// The settings to search for a filter. Every new filter needs an entry here.
 fn knobs(filter: &str) -> Vec<Knob> {
     match filter {
         "atrous" => vec![FORM, LEVELS, SIGMA_RT, SIGMA_N, SIGMA_X],
@@ -61,19 +61,19 @@ fn knobs(filter: &str) -> Vec<Knob> {
     }
 }
 
-/// A filter at its best.
+/// The result of a search.
 pub struct Best {
     /// The least error found.
     pub error: f64,
-    /// Where it was found.
+    /// The settings with that error.
     pub settings: FilterSettings,
-    /// The same as text.
+    /// Those settings as text.
     pub text: String,
-    /// The errors around it, a line per setting, the others being at their best.
+    /// The errors for other values, one line per setting, with all others at their best.
     pub around: String,
 }
 
-/// Descends along one setting after the other, twice, from the defaults; `error` judges.
+/// Minimises `error` along one setting after the other, twice, starting from the defaults.
 ///
 /// # Errors
 /// Those of `error`.
@@ -99,7 +99,7 @@ pub fn best(
     Ok(best)
 }
 
-/// Tries every value of one setting, and returns what came out.
+/// Tries every value of one setting and returns the errors.
 fn along(
     knob: &Knob,
     best: &mut Best,

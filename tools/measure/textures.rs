@@ -1,4 +1,4 @@
-//! Sponza's textures with and without demodulation.
+//! Compares filtering with and without demodulation on the textures of Sponza.
 use super::case::Case;
 use super::frames::View;
 use super::sheet::{self, Tile};

@@ -1,4 +1,4 @@
-//! Times beside those of EAW's table 2 and GIF's table 2, both on an NVIDIA GTX 285.
+//! Measures the filters' times, beside those of EAW's table 2 and GIF's table 2, both on an NVIDIA GTX 285.
 use tallow::denoise::filter::{self, FilterInput, FilterSettings, Planes, Row};
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::layout::Guide;
@@ -6,7 +6,7 @@ use tallow::report::table;
 
 const RUNS: usize = 3;
 
-/// EAW, table 2: for 0 to 3 weights, milliseconds of 1, 5 and 10 levels at each resolution.
+/// EAW's table 2: for each resolution and 0 to 3 weights, the milliseconds of 1, 5 and 10 levels.
 const EAW: [([u32; 2], [[f64; 3]; 4]); 3] = [
     ([512, 512], [[0.3, 1.5, 2.9], [0.5, 2.4, 4.7], [0.8, 3.5, 6.9], [1.2, 5.6, 11.0]]),
     ([1024, 1024], [[1.0, 5.0, 11.3], [1.8, 8.7, 17.2], [2.7, 12.9, 26.6], [4.2, 20.9, 41.6]]),
@@ -71,7 +71,7 @@ fn gif(gpu: &Gpu) -> anyhow::Result<Vec<Vec<String>>> {
     Ok(rows)
 }
 
-/// In the order of EAW's figure 4: radiance, normal, position.
+/// Settings with the first `weights` weights in the order of EAW's figure 4: radiance, normal, position.
 fn weighted(weights: usize, levels: u32) -> FilterSettings {
     let on = |i: usize, sigma: f32| if i < weights { sigma } else { f32::INFINITY };
     let own = FilterSettings::default();
@@ -83,7 +83,7 @@ fn weighted(weights: usize, levels: u32) -> FilterSettings {
     })
 }
 
-/// Time of all passes: the median of some runs after one that compiles.
+/// Time of all passes: the median over some runs, after one in which drivers compile.
 ///
 /// # Errors
 /// Those of the device.
@@ -101,7 +101,7 @@ pub fn milliseconds(gpu: &Gpu, row: &Row, settings: &FilterSettings, input: &Fil
     Ok(times[RUNS / 2])
 }
 
-/// Noise over a sphere on a floor: EAW says, and it holds here, that the content does not change the time.
+/// A noisy sphere on a floor. As EAW says, the content does not change the time.
 fn input([width, height]: [u32; 2]) -> FilterInput {
     let noise = |i: u32| (i.wrapping_mul(0x9e37_79b9) >> 8) as f32 / (1 << 24) as f32;
     let guide = |i: u32| {

@@ -1,4 +1,5 @@
-//! GEO's result: with a geometry-aware filter behind it, the same number of samples does more where the filter cannot.
+//! Reproduces GEO's result: before a geometry-aware filter, the same number of samples is more useful where the filter
+//! removes little.
 use super::{View, indirect, mean, render};
 use crate::Args;
 use tallow::denoise::filter::{self, AtrousForm, FilterInput, FilterSettings};
@@ -11,14 +12,14 @@ use tallow::report::table;
 struct Case {
     view: View,
     min_spp: u32,
-    /// Published MSE of uniform and of placed samples, filtered.
+    /// Published MSE of uniform and of adaptive samples after filtering.
     published: (f64, f64),
 }
 
-/// Four indirect samples of every pixel on average, two bounces of indirect light.
+/// Average number of indirect samples per pixel, with two bounces of indirect light.
 const SPP: u32 = 4;
 const SEEDS: [u32; 3] = [0, 2, 3];
-/// Of importance: the paper has the filter's own, but does not say which.
+/// Tolerance of normals for the importance. The paper uses that of the filter but does not state it.
 const SIGMA_NORMAL: f32 = 0.1;
 const SIGMA_POSITION: f32 = 0.01;
 const CASES: [Case; 2] = [
@@ -34,7 +35,7 @@ const CASES: [Case; 2] = [
     },
 ];
 
-/// All samples through the pixel's centre: what differs is the hemisphere, as in the paper.
+/// Takes all samples through the pixel's centre, as in the paper, so that only the directions in the hemisphere differ.
 fn centred(s: &mut Settings) {
     s.filter = PixelFilter::Point;
 }
@@ -44,16 +45,16 @@ struct Image {
     guide: Vec<Guide>,
 }
 
-/// Two independent references. The mean of (f - a)(f - b) is the squared error of f alone, where that of (f - a)^2 has the
-/// noise of the reference in it, which is as large as what a filter leaves.
+/// Two independent references a and b. The mean of (f - a)(f - b) is the squared error of f alone, whereas that of
+/// (f - a)^2 includes the noise of the reference, which is as large as the noise that a filter leaves.
 struct Truth {
     halves: [Vec<vec3>; 2],
-    /// Whether a surface is seen.
+    /// Whether each pixel shows a surface.
     surface: Vec<bool>,
 }
 
 impl Truth {
-    /// In 8-bit sRGB code values, one for every pixel that shows a surface.
+    /// Squared errors in 8-bit sRGB code values, one for every pixel that shows a surface.
     fn errors(&self, image: &[vec4]) -> Vec<f64> {
         let [a, b] = &self.halves;
         let off = |x: f32, y: f32| 255.0 * f64::from(srgb_from_linear(x) - srgb_from_linear(y));
@@ -69,7 +70,7 @@ fn filtered(gpu: &Gpu, image: &Image, size: [u32; 2], s: &FilterSettings) -> any
     Ok(filter::run(gpu, row, &input, &s.scaled_to(&input))?.0)
 }
 
-/// Pixels whose squared error is over so many times the median of the uniform image's.
+/// Number of pixels whose squared error is more than `times` times the median of the uniform image's.
 fn outliers(squares: &[f64], of: &[f64], times: f64) -> usize {
     let mut sorted = of.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -77,8 +78,8 @@ fn outliers(squares: &[f64], of: &[f64], times: f64) -> usize {
     squares.iter().filter(|&&e| e > limit).count()
 }
 
-/// The filter's settings with the least error on the uniform image, as in the paper the same for both. GEO weighs normals
-/// alike on every level, other than EAW's listing.
+/// Finds the filter settings with the least error on the uniform image; as in the paper, both images use them. Unlike
+/// EAW's listing, GEO weights normals alike on every level.
 fn best(gpu: &Gpu, image: &Image, truth: &Truth, size: [u32; 2], normals: &[f32]) -> anyhow::Result<FilterSettings> {
     let mut found = (f64::INFINITY, FilterSettings::default());
     for &sigma_n in normals {
@@ -102,7 +103,7 @@ fn best(gpu: &Gpu, image: &Image, truth: &Truth, size: [u32; 2], normals: &[f32]
     Ok(found.1)
 }
 
-/// Prints the table.
+/// Measures every view and prints the table.
 pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
     let mut rows = Vec::new();
     for case in &CASES {
@@ -164,7 +165,7 @@ the uniform image; the same of squared errors.
     Ok(())
 }
 
-/// Images of all seeds.
+/// The images to compare, of all seeds.
 struct Compared<'a> {
     uniform: &'a [Image],
     placed: &'a [Image],

@@ -1,4 +1,4 @@
-//! Renders of a scene by one policy, their references, and how far they are apart.
+//! Renders of a scene with one allocation policy, their references, and the errors between them.
 use crate::Args;
 pub use crate::view::View;
 use tallow::gpu::{FrameResources, Gpu, PassTime};
@@ -14,20 +14,20 @@ pub mod overhead;
 pub mod policies;
 pub mod spread;
 
-/// What a render leaves, and the device's own time for all passes in milliseconds.
+/// The result of a render, with the device's time for its passes.
 pub struct Rendered {
-    /// Radiance, direct and indirect light.
+    /// Radiance, direct and indirect light of every pixel.
     pub pixels: Vec<Pixel>,
-    /// Primary hits.
+    /// Primary hit of every pixel.
     pub guide: Vec<Guide>,
-    /// Of everything but the primary hits.
+    /// Milliseconds of all passes except the primary hits.
     pub ms: f64,
-    /// Of tracing and folding alone.
+    /// Milliseconds of tracing and accumulating alone.
     pub path_ms: f64,
 }
 
 impl View {
-    /// The scene with these settings.
+    /// Loads the scene with the settings of the view and those that `change` makes.
     pub fn load(&self, args: &Args, change: impl Fn(&mut Settings)) -> anyhow::Result<Loaded> {
         let all = |s: &mut Settings| {
             ([s.width, s.height], s.max_depth, s.roulette_depth) = (self.size, self.depth, 0);
@@ -36,7 +36,7 @@ impl View {
         Ok(Scene::load(&self.scene_file(&args.data, &args.output)?).map(|scene| scene.with(&all))?)
     }
 
-    /// Means of radiance and of indirect irradiance over many samples of another seed, kept in a file.
+    /// Returns the means of radiance and of indirect irradiance over many samples of another seed, which are kept in a file.
     pub fn reference(&self, gpu: &Gpu, args: &Args, change: impl Fn(&mut Settings)) -> anyhow::Result<[Vec<vec3>; 2]> {
         let scene = self.load(args, |s| {
             (s.spp, s.seed, s.allocate.policy) = (self.reference, 1, &tallow::allocate::uniform::ROW);
@@ -60,7 +60,7 @@ impl View {
     }
 }
 
-/// What tells the kinds of steps apart, in the order of a render.
+/// Tests for the kinds of steps, in the order of a render.
 const ONE_OF_EACH: [fn(&Step) -> bool; 5] = [
     |s| matches!(s, Step::Start),
     |s| matches!(s, Step::Uniform(_)),
@@ -69,7 +69,7 @@ const ONE_OF_EACH: [fn(&Step) -> bool; 5] = [
     |s| matches!(s, Step::Listed(_)),
 ];
 
-/// Renders a scene by its settings, after one run of each kernel that does not count: drivers compile on it.
+/// Renders a scene with its settings. Each kernel runs once before that without being timed, because drivers compile then.
 pub fn render(gpu: &Gpu, scene: &Loaded) -> anyhow::Result<Rendered> {
     let renderer =
         Renderer::new(gpu, scene, &scene.settings, Outputs { split_light: true, guides: true, counters: false })?;
@@ -89,7 +89,7 @@ pub fn render(gpu: &Gpu, scene: &Loaded) -> anyhow::Result<Rendered> {
     Ok(Rendered { pixels, guide: tile.guide.read()?, ms, path_ms })
 }
 
-/// Mean over the channels of the squared difference over the reference's square (relMSE, eps 0.01), pixel by pixel.
+/// relMSE of every pixel: the mean over the channels of the squared difference over the reference's square plus 0.01.
 pub fn relative_errors(image: &[vec3], reference: &[vec3]) -> Vec<f64> {
     let of = |(a, b): (&vec3, &vec3)| {
         (0..3).map(|c| f64::from(a[c] - b[c]).powi(2) / (f64::from(b[c]).powi(2) + 0.01)).sum::<f64>() / 3.0
@@ -97,7 +97,7 @@ pub fn relative_errors(image: &[vec3], reference: &[vec3]) -> Vec<f64> {
     image.iter().zip(reference).map(of).collect()
 }
 
-/// Mean.
+/// Arithmetic mean of the values.
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
@@ -107,7 +107,7 @@ pub fn radiance(pixels: &[Pixel]) -> Vec<vec3> {
     pixels.iter().map(|p| p.stats.mean).collect()
 }
 
-/// Indirect irradiance with the samples behind it, as filters take it.
+/// Indirect irradiance with the number of its samples, as filters take it.
 pub fn indirect(pixels: &[Pixel]) -> Vec<vec4> {
     let of = |PixelStats { count, .. }: PixelStats, [r, g, b]: vec3| [r, g, b, count as f32];
     pixels.iter().map(|p| of(p.stats, p.light.indirect)).collect()

@@ -1,4 +1,4 @@
-//! What placing costs beside tracing: GEO's tables 1 and 2.
+//! Measures the cost of sample allocation against that of tracing, as in GEO's tables 1 and 2.
 use super::View;
 use crate::Args;
 use std::collections::BTreeMap;
@@ -9,9 +9,9 @@ use tallow::report::table;
 const VIEW: View = View { name: "sponza", scene: "crytek-sponza", size: [1024, 768], depth: 4, reference: 0 };
 const RUNS: usize = 5;
 
-/// Milliseconds of GEO's table 1 (1024 x 768, GTX 285): importance and rates.
+/// GEO's table 1 (1024 x 768, GTX 285): window, and milliseconds for importance and rates.
 const WINDOWS: [(u32, f64); 5] = [(2, 8.3), (4, 26.2), (6, 50.7), (8, 84.9), (10, 128.7)];
-/// Of its table 2: generating and storing.
+/// GEO's table 2: samples per pixel, and milliseconds for generating and storing them.
 const SAMPLES: [(u32, f64); 3] = [(4, 2.3), (16, 3.6), (64, 8.5)];
 
 /// Median milliseconds of every pass of a step.
@@ -79,7 +79,7 @@ fn samples(
         for step in r.steps().filter(|s| matches!(s, Step::Allocate(_))) {
             r.run(&mut frame, &step)?;
         }
-        // The first list; the others are as long.
+        // Only the first list is timed; the others are as long.
         let listed: Vec<Step> = r.steps().filter(|s| matches!(s, Step::Listed(_))).collect();
         let first = passes(gpu, &r, &listed[..1])?;
         lists += first["sample_list"] * listed.len() as f64;
@@ -95,7 +95,7 @@ fn samples(
     share(gpu, args, renderer, allocation)
 }
 
-/// All of placing over all of tracing, at 4 samples per pixel.
+/// Time of sample allocation over that of tracing, at 4 samples per pixel.
 fn share(
     gpu: &Gpu,
     args: &Args,

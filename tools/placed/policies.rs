@@ -1,14 +1,14 @@
-//! Every policy on five scenes: relative error at equal samples, and what it comes to at equal time.
+//! Measures every policy on five scenes: the relative error at equal samples, and the resulting error at equal time.
 use super::{View, mean, radiance, relative_errors, render};
 use crate::Args;
 use tallow::allocate::{POLICIES, Placing};
 use tallow::gpu::Gpu;
 use tallow::report::table;
 
-/// Samples per pixel, and the least of a pixel.
+/// Average and least number of samples per pixel.
 const BUDGETS: [[u32; 2]; 3] = [[8, 1], [16, 2], [32, 4]];
 const SEEDS: [u32; 3] = [0, 2, 3];
-/// Each seed six times: the shortest time counts.
+/// Number of runs. Each seed runs six times, and the shortest time counts.
 const RUNS: usize = 18;
 const VIEWS: [View; 5] = [
     View { name: "cornell", scene: "scenes/cornell-box/scene.toml", size: [192, 192], depth: 4, reference: 1024 },
@@ -24,8 +24,8 @@ const VIEWS: [View; 5] = [
     },
 ];
 
-/// Prints the tables. Error falls as 1 / samples, so that at equal time it is the error times the time, over that of the
-/// uniform render.
+/// Prints the tables. The squared error falls as 1 / samples, so the error at equal time is the error times the time,
+/// relative to that product of the uniform render.
 pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
     println!("relMSE (eps 0.01), mean of {} seeds; `both` expects no filter\n", SEEDS.len());
     for [spp, least] in BUDGETS {
@@ -40,13 +40,13 @@ pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Of one scene, a row for every policy.
+/// Measures one scene and returns a row for every policy.
 fn of_view(gpu: &Gpu, args: &Args, view: &View, [spp, least]: [u32; 2]) -> anyhow::Result<Vec<Vec<String>>> {
     let reference = &view.reference(gpu, args, |_| {})?[0];
     let rows_of = POLICIES.iter().filter(|row| row.placing != Placing::Chosen);
     let mut found: Vec<_> = rows_of.map(|policy| (policy.name, 0.0, f64::INFINITY)).collect();
     for seed in SEEDS.iter().cycle().take(RUNS) {
-        // In turn, so that what else the machine does meets all alike.
+        // Policies alternate, so that other work on the machine affects all alike.
         for (policy, error, ms) in &mut found {
             let scene = view.load(args, |s| {
                 (s.spp, s.seed, s.allocate.policy, s.allocate.min_spp) =

@@ -1,4 +1,4 @@
-//! RAS's result: the spread of errors against time, for its choices of least and most samples.
+//! Reproduces RAS's result: the spread of errors against time, for its choices of least and most samples.
 use super::{View, radiance, render};
 use crate::Args;
 use plotters::prelude::*;
@@ -10,12 +10,13 @@ const VIEWS: [View; 2] = [
     View { name: "cornell", scene: "scenes/cornell-box/scene.toml", size: [96, 96], depth: 4, reference: 1024 },
     View { name: "sponza", scene: "crytek-sponza", size: [112, 63], depth: 4, reference: 1024 },
 ];
-/// Samples per pixel on average; of the published scheme, rounds of one sample at most.
+/// Average number of samples per pixel; for the published scheme, the number of rounds with at most one sample each.
 const BUDGETS: [u32; 4] = [8, 16, 32, 64];
-/// The least and the most samples, as published.
+/// The published limits: least and most samples per pixel.
 const LIMITS: [(u32, u32); 6] = [(2, 16), (4, 16), (8, 16), (2, 32), (4, 32), (8, 32)];
 
-/// (name, policy, least, most); most 0 is unlimited. Ours needs no largest number: it is held to the published ones too.
+/// Returns (name, policy, least, most), where most 0 is unlimited. Our policy needs no largest number, but it is also
+/// measured with the published ones.
 fn policies() -> Vec<(String, &'static str, u32, u32)> {
     let plain = [("uniform", "uniform", 0, 0), ("ours: min 4", "variance", 4, 0)];
     let limited = |(kind, policy)| move |(min, max)| (format!("{kind}: min {min}, max {max}"), policy, min, max);

@@ -1,12 +1,12 @@
-//! The JSON descriptions that lie beside the outside scenes: Mitsuba's words, one struct each. Unknown words are
-//! errors, so that nothing is dropped unseen.
+//! The JSON descriptions of the outside scenes, in Mitsuba's terms, with one struct for each of its plugins. Unknown keys
+//! are errors, so that nothing is dropped silently.
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::collections::BTreeMap;
 
-/// Linear RGB.
+/// A colour in linear RGB.
 pub type Rgb = [f64; 3];
-/// Row-major, for column vectors.
+/// A row-major matrix for column vectors.
 pub type Matrix = [[f64; 4]; 4];
 
 #[derive(Deserialize)]
@@ -32,7 +32,7 @@ pub enum Camera {
         origin: Rgb,
         forward: Rgb,
         up: Rgb,
-        /// Towards the right edge of the image, so it holds the mirroring.
+        /// Direction of the right edge of the image, which tells whether the image is mirrored.
         right: Rgb,
         fov_y_deg: f64,
         width: u32,
@@ -70,7 +70,7 @@ pub struct Shape {
     pub file: Option<String>,
     pub center: Option<Rgb>,
     pub radius: Option<f64>,
-    /// The material says the same.
+    /// The material holds the same value.
     #[serde(rename = "emission", default)]
     _emission: IgnoredAny,
     #[serde(rename = "triangles")]

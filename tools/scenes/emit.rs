@@ -1,16 +1,16 @@
-//! From a JSON description to the tables of a scene file.
+//! Converts a JSON description into the tables of a scene file.
 use super::description::{Bitmap, Bsdf, Camera, Color, Description, Emitter, Index, Integrator, Material, Shape};
 use super::mitsuba;
 use anyhow::{Context, bail, ensure};
 use std::path::Path;
 use toml::{Table, Value};
 
-/// Paths without a limit go on until roulette ends them; this is Tallow's own limit.
+/// Depth for paths without a limit, which only roulette ends. It is the largest that Tallow allows.
 const UNLIMITED: i64 = 1024;
-/// Long enough that roulette adds little noise.
+/// Depth at which roulette begins, large enough that it adds little noise.
 const ROULETTE_DEPTH: i64 = 16;
 
-/// What the conversion of a material needs to know beside the description.
+/// What the conversion of a material needs in addition to the description.
 pub struct Place<'a> {
     /// The scene's name, for files made beside the scene file.
     pub name: &'a str,
@@ -18,11 +18,11 @@ pub struct Place<'a> {
     pub folder: &'a Path,
     /// Folder of the scene file.
     pub out: &'a Path,
-    /// Whether to make the picture that Mitsuba makes: see the module `mitsuba`.
+    /// Whether to reproduce the picture that Mitsuba makes; see the module `mitsuba`.
     pub is_mitsuba: bool,
 }
 
-/// The scene file that says the same as the JSON description at `json`.
+/// Converts the JSON description at `json` into a scene file.
 pub fn scene(name: &str, json: &Path, out: &Path, is_mitsuba: bool) -> anyhow::Result<Table> {
     let place = Place { name, folder: json.parent().unwrap_or(Path::new(".")), out, is_mitsuba };
     let mut scene = build(&place, json).with_context(|| format!("{}", json.display()))?;
@@ -64,13 +64,13 @@ fn build(place: &Place, json: &Path) -> anyhow::Result<Table> {
     Ok(scene)
 }
 
-/// A table from pairs.
+/// Makes a table from pairs of keys and values.
 pub fn table<const N: usize>(pairs: [(&str, Value); N]) -> Table {
     pairs.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
 }
 
 pub fn numbers(values: impl IntoIterator<Item = f64>) -> Value {
-    // Negative zeros are only noise to a reader.
+    // Adding 0 turns -0 into 0, which is easier to read.
     Value::Array(values.into_iter().map(|v| Value::Float(v + 0.0)).collect())
 }
 
@@ -97,7 +97,7 @@ fn render(integrator: &Integrator) -> Table {
     table([("max_depth", depth.into()), ("roulette_depth", roulette.into())])
 }
 
-/// Absolute and there.
+/// Returns the absolute path of a file, which must exist.
 pub fn file(folder: &Path, name: &str) -> anyhow::Result<Value> {
     let path = folder.join(name);
     ensure!(path.is_file(), "{} is missing", path.display());
@@ -146,7 +146,7 @@ fn mesh(place: &Place, shape: &Shape) -> anyhow::Result<Table> {
     Ok(mesh)
 }
 
-/// The transform of the unit shape or file, row-major; none where it is the identity.
+/// The transform of the unit shape or file, row-major; `None` if it is the identity.
 fn transform(shape: &Shape) -> anyhow::Result<Option<Vec<f64>>> {
     let mut m = shape.to_world_row_major.unwrap_or(std::array::from_fn(|i| std::array::from_fn(|j| f64::from(i == j))));
     ensure!(m[3] == [0.0, 0.0, 0.0, 1.0], "its transform is not affine");
@@ -169,7 +169,7 @@ fn material(place: &Place, name: &str, material: &Material) -> anyhow::Result<Ta
     Ok(out)
 }
 
-/// Adds what the BSDF says to `out`.
+/// Adds the parameters of the BSDF to `out`.
 fn bsdf(place: &Place, model: &Bsdf, out: &mut Table) -> anyhow::Result<()> {
     let mut kind = |name: &str| _ = out.insert("type".into(), name.into());
     match model {

@@ -1,4 +1,5 @@
-//! Where Mitsuba computes something else than its words say: what a scene file has to say for the same picture.
+//! Differences between what Mitsuba computes and what its descriptions say, with the values that give the same picture in
+//! Tallow.
 use super::emit::Place;
 use anyhow::Context;
 use image::codecs::png::PngEncoder;
@@ -9,13 +10,13 @@ use tallow::math::fresnel::fresnel_dielectric;
 use tallow::scene::coat_table;
 use tallow::twins::coat::{coat_row_at, row_inside};
 
-/// Degrees. The tests' XML leaves the field of view to the default, which is that of a 50 mm lens on 36 mm x 24 mm film;
-/// the descriptions say 30, at which the references do not match. Across a square film whose diagonal is that of
-/// 36 mm x 24 mm film: 2 atan(hypot(36, 24) / (100 sqrt 2)).
+/// Field of view in degrees. The XML of the tests leaves it to the default, a 50 mm lens on 36 mm x 24 mm film; the
+/// descriptions say 30, with which the references do not match. For a square film with the diagonal of 36 mm x 24 mm it is
+/// 2 atan(hypot(36, 24) / (100 sqrt 2)).
 pub const FOV: f64 = 34.02205717235932;
 
-/// Mitsuba masks with an image's decoded luminance and ignores its alpha; Tallow takes the alpha, and linear values. So
-/// a grey image of those values is written beside the scene file.
+/// Writes a grey image for a mask beside the scene file. Mitsuba masks with the decoded luminance of an image and ignores
+/// its alpha, whereas Tallow uses alpha and linear values.
 pub fn grey_mask(place: &Place, filename: &str) -> anyhow::Result<PathBuf> {
     let source = place.folder.join(filename);
     let bytes = std::fs::read(&source).with_context(|| format!("cannot read {}", source.display()))?;
@@ -32,8 +33,9 @@ pub fn grey_mask(place: &Place, filename: &str) -> anyhow::Result<PathBuf> {
     Ok(path)
 }
 
-/// Mitsuba puts the centres of an environment's first and last row on the poles, Tallow half a row away. So an image
-/// whose rows are where Tallow expects them is written beside the scene file; finer, to bend where the rows were.
+/// Writes an environment image beside the scene file with the rows where Tallow expects them. Mitsuba puts the centres of
+/// the first and the last row on the poles, Tallow half a row away from them. The new image has more rows, so that
+/// interpolation between them reproduces the old rows.
 pub fn environment(place: &Place, filename: &str) -> anyhow::Result<PathBuf> {
     const FINER: usize = 4;
     let Picture { width, height, pixels } =
@@ -54,8 +56,8 @@ pub fn environment(place: &Place, filename: &str) -> anyhow::Result<PathBuf> {
     Ok(path)
 }
 
-/// What the colour under a rough coat of index `eta` is multiplied by. What the coat reflects inwards, an integral, is to
-/// Mitsuba the mean over 64 cosines with both ends: 63/64 of it, and 1/64 of the reflectance along the normal.
+/// Factor for the colour under a rough coat of index `eta`. Mitsuba approximates the integral of what the coat reflects
+/// inwards by the mean over 64 cosines including both ends: 63/64 of it plus 1/64 of the reflectance along the normal.
 pub fn under_rough_coat(eta: f64, alpha: f64, ggx: bool) -> f64 {
     let table: Vec<u32> = coat_table(eta as f32, ggx).into_iter().map(f32::to_bits).collect();
     let exact = f64::from(row_inside(&coat_row_at(&table, alpha as f32)));
@@ -63,7 +65,7 @@ pub fn under_rough_coat(eta: f64, alpha: f64, ggx: bool) -> f64 {
     (1.0 - exact) / (1.0 - (63.0 * exact + normal) / 64.0)
 }
 
-/// Where a picture made for the scene goes.
+/// Path for a picture that is made for the scene.
 fn beside(place: &Place, filename: &str, extension: &str) -> anyhow::Result<PathBuf> {
     let stem = PathBuf::from(filename).file_stem().unwrap_or_default().to_string_lossy().into_owned();
     Ok(place.out.canonicalize()?.join(format!("{}-{stem}.{extension}", place.name)))

@@ -1,4 +1,4 @@
-//! Scene files for the outside scenes: converted from their JSON descriptions, or from the hand-written files here.
+//! Makes scene files for the outside scenes, from their JSON descriptions or from the hand-written files in this folder.
 use anyhow::{Context, bail};
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -8,21 +8,21 @@ mod emit;
 mod mitsuba;
 mod rigid;
 
-/// Where a scene file comes from.
+/// The source of a scene file.
 enum Source {
     /// A JSON description below the data's `scenes` folder.
     Json(&'static str),
-    /// The same for one of Mitsuba's tests, told so that the picture is the one that Mitsuba makes.
+    /// The JSON description of one of Mitsuba's tests, which is adjusted to give the picture that Mitsuba makes.
     MitsubaTest(&'static str),
     /// A scene file whose paths are relative to the data's `scenes` folder.
     Written(&'static str),
-    /// The same for frame 00 of a sequence of OBJ files.
+    /// A scene file like those, for frame 00 of a sequence of OBJ files.
     Sequence(&'static str),
-    /// The rigid animation's description.
+    /// The JSON description of the rigid animation.
     Rigid(&'static str),
 }
 
-/// All scenes by name. The name is that of the scene file made for it.
+/// All scenes by name, which is also the name of the scene file.
 const SCENES: &[(&str, Source)] = &[
     ("cornell-box-rgb", Source::Json("cornell-box/cornell_box.json")),
     ("cornell-box-ignis", Source::Json("cornell-box/cornell_box_ignis.json")),
@@ -58,17 +58,17 @@ const SCENES: &[(&str, Source)] = &[
     ("rigid", Source::Rigid("animation/rigid/rigid_animation.json")),
 ];
 
-/// Frames of the fox, each an OBJ file.
+/// Number of frames of the fox, each of which is an OBJ file.
 const FOX_FRAMES: usize = 16;
 
-/// The names of all scenes. `fox` and `rigid` take a frame as well (`rigid-59`, of 60); those that have OBJ files of their
-/// own are among the names.
+/// The names of all scenes. `fox` and `rigid` can be followed by a frame (`rigid-59`, of 60); the names include frames that
+/// have OBJ files of their own.
 pub fn names() -> impl Iterator<Item = String> {
     let frames = (1..FOX_FRAMES).map(|frame| format!("fox-{frame:02}"));
     SCENES.iter().map(|(name, _)| (*name).to_owned()).chain(frames)
 }
 
-/// The scene that a name means, and its frame.
+/// Finds the scene that a name means, and its frame.
 fn find(name: &str) -> Option<(&'static str, &'static Source, usize)> {
     let known = |name: &str| SCENES.iter().find(|(known, _)| *known == name);
     if let Some((name, source)) = known(name) {
@@ -79,11 +79,11 @@ fn find(name: &str) -> Option<(&'static str, &'static Source, usize)> {
     Some((base, source, frame.parse().ok()?))
 }
 
-/// Writes `out/NAME.toml`, whose files are named by absolute path, and returns where it lies. `data` is the folder that
+/// Writes `out/NAME.toml`, which names files by absolute paths, and returns its path. `data` is the folder that
 /// TALLOW_DATA names.
 ///
 /// # Errors
-/// On an unknown name, a missing or malformed file, and anything in the description that a scene file cannot say.
+/// On an unknown name, a missing or malformed file, and anything in the description that a scene file cannot express.
 pub fn convert(name: &str, data: &Path, out: &Path) -> anyhow::Result<PathBuf> {
     let Some((base, source, frame)) = find(name) else {
         bail!("there is no scene `{name}`; the names are: {}", names().collect::<Vec<_>>().join(", "));
@@ -109,7 +109,7 @@ pub fn convert(name: &str, data: &Path, out: &Path) -> anyhow::Result<PathBuf> {
     Ok(path)
 }
 
-/// A hand-written scene file, with every path made absolute.
+/// Reads a hand-written scene file and makes every path absolute.
 fn written(text: &str, folder: &Path) -> anyhow::Result<Table> {
     let mut scene: Table = text.parse()?;
     let tables = scene.iter_mut().flat_map(|(_, value)| match value {

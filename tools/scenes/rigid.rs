@@ -1,5 +1,5 @@
-//! One frame of the rigid animation: what its JSON file says of objects, materials and camera. It has no light: a sky is
-//! added.
+//! Converts one frame of the rigid animation, whose JSON file holds objects, materials and camera. It has no light, so a
+//! sky is added.
 use super::emit::{file, numbers, table};
 use anyhow::Context;
 use serde::Deserialize;
@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use toml::{Table, Value};
 
-/// Relative to the folder of all scenes.
+/// Image of the sky, relative to the folder of all scenes.
 const SKY: &str = "hdr/spiaggia_di_mondello_1k.hdr";
 
 #[derive(Deserialize)]
@@ -16,13 +16,13 @@ const SKY: &str = "hdr/spiaggia_di_mondello_1k.hdr";
 struct Animation {
     /// OBJ files by name.
     objects: BTreeMap<String, String>,
-    /// OBJ files of what stands still, in world space.
+    /// OBJ files of the static objects, in world space.
     #[serde(rename = "static")]
     still: Vec<String>,
-    /// By name of the object, or of the file of what stands still.
+    /// Materials by the name of the object, or of the file of a static object.
     materials: BTreeMap<String, Look>,
     camera: Camera,
-    /// A map for each frame; for column vectors.
+    /// Transforms by object name, one map per frame, for column vectors.
     object_to_world_row_major: Vec<BTreeMap<String, [f64; 16]>>,
     #[serde(rename = "fps")]
     _fps: IgnoredAny,
@@ -41,7 +41,7 @@ enum Look {
     },
     /// Reflectance at normal incidence, and perceptual roughness.
     Metal { metal: [f64; 3], roughness: f64 },
-    /// Index of refraction.
+    /// A dielectric, given by its index of refraction.
     Glass { glass: f64 },
 }
 
@@ -54,7 +54,7 @@ struct Camera {
     fov_y_deg: f64,
 }
 
-/// The scene file of a frame, from 0; `json` lies below the folder of all scenes.
+/// Makes the scene file of a frame, counted from 0. `json` is relative to the folder of all scenes.
 pub fn scene(scenes: &Path, json: &str, frame: usize) -> anyhow::Result<Table> {
     let json = scenes.join(json);
     build(scenes, &json, frame).with_context(|| format!("{}", json.display()))
@@ -103,7 +103,7 @@ fn material(name: &str, look: &Look) -> Table {
     match look {
         Look::Diffuse { albedo } => out.extend(table([("type", "diffuse".into()), ("color", numbers(*albedo))])),
         Look::Metal { metal, roughness } => {
-            // Of all indices that reflect so much at normal incidence, those with n^2 + k^2 = 1, as for MTL's metals.
+            // Many indices have this reflectance at normal incidence; take those with n^2 + k^2 = 1, as for metals in MTL.
             out.extend(table([("type", "conductor".into()), ("alpha", (roughness * roughness).into())]));
             out.insert("eta".into(), numbers(metal.map(|r| (1.0 - r) / (1.0 + r))));
             out.insert("k".into(), numbers(metal.map(|r| 2.0 * r.sqrt() / (1.0 + r))));

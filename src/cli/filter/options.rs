@@ -1,11 +1,11 @@
-//! What can be set about layers and filters.
+//! Options of `tallow filter` for layers and filter settings.
 use crate::cli::common::with_ranges;
 use crate::denoise::filter::{FILTERS, FilterOverrides, FilterSettings, Row};
 use crate::image::aov::{Aov, Names};
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
 
-/// Names of layers, for those that are not found, or not the right ones.
+/// Names of layers, for those that are not found or are not the right ones.
 #[derive(clap::Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Layers (found by their usual names when not given)")]
 pub struct Layers {
@@ -33,7 +33,7 @@ pub struct Layers {
 }
 
 impl Layers {
-    /// Those that were given.
+    /// The names that were given.
     pub fn names(&self) -> Names {
         let Self { colour, albedo, normal, position, depth, variance, samples } = self;
         let all = [
@@ -53,13 +53,13 @@ impl Layers {
 #[derive(clap::Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Filter settings", mut_args(with_ranges(FilterSettings::default().entries())))]
 pub struct Overrides {
-    /// Of the filters.
+    /// Settings of all filters.
     #[command(flatten)]
     pub given: FilterOverrides,
 }
 
 impl Overrides {
-    /// The settings of an image's own, replaced where others were given.
+    /// Returns `own`, the settings that suit the image, with those replaced that were given.
     pub fn settings(&self, own: FilterSettings) -> FilterSettings {
         let mut settings = own;
         self.given.apply(&mut settings);

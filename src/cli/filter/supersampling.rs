@@ -1,4 +1,4 @@
-//! `--scene`: filtered light is looked up along eye rays.
+//! `filter --scene`: the filtered light is looked up along several eye rays per pixel.
 use crate::denoise::Filtered;
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, PassTime};
@@ -11,7 +11,7 @@ use crate::scene::{Loaded, Scene};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// Which scene, and how many rays.
+/// The scene and the number of rays.
 #[derive(clap::Args, Clone, Debug)]
 #[command(next_help_heading = "Supersampling (of images that tallow rendered)")]
 pub struct Supersampling {
@@ -25,10 +25,11 @@ pub struct Supersampling {
 }
 
 impl Supersampling {
-    /// Indirect light of every pixel, if a scene is named; `image` is for messages.
+    /// Returns the indirect light of every pixel, if a scene is given. `image` is the path for messages.
     ///
     /// # Errors
-    /// [`Error::Input`] when tallow did not render the image, or from another scene, and those of scene and device.
+    /// [`Error::Input`] when the image was not rendered by tallow or shows another scene, and errors of the scene and the
+    /// device.
     pub fn look_up(
         &self,
         gpu: &Gpu,
@@ -49,7 +50,7 @@ impl Supersampling {
     }
 }
 
-/// Of the render, without what placed its samples.
+/// The settings of the render, without those of sample allocation.
 fn settings(aovs: &Aovs, provenance: &Provenance) -> std::result::Result<Settings, String> {
     aovs.get(Aov::Direct).ok_or("has no direct light: --scene needs an .exr file of tallow render")?;
     let settings = Settings::deserialize(&provenance.settings).map_err(|e| format!("settings: {e}"))?;

@@ -1,22 +1,22 @@
-//! Files that get their name when they are complete.
+//! Temporary files, which get their final name when they are complete.
 use std::fs::File;
 use std::io::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use tempfile::NamedTempFile;
 
-/// A file that nobody sees. Where the system can, it has no name, and is gone when the process ends in whatever way;
-/// elsewhere it has a hidden one.
+/// A file that is not complete. On Linux, if the file system allows it, the file has no name and vanishes however the
+/// process ends; otherwise its name is hidden.
 pub(super) enum Temporary {
     #[cfg(target_os = "linux")]
     Nameless(File),
     Hidden(NamedTempFile),
 }
 
-/// Hidden files that this process has made, complete ones included.
+/// Paths of the hidden files that this process has made, including those completed since.
 static HIDDEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Removes what is not complete. For exits of the process that run no destructors.
+/// Removes incomplete files, for exits of the process that run no destructors.
 pub fn remove_unfinished() {
     if let Ok(hidden) = HIDDEN.try_lock() {
         // A file that was completed has another name by now.
@@ -41,12 +41,12 @@ impl Temporary {
         }
     }
 
-    /// Becomes `path`, in the same folder, in the place of what was there.
+    /// Renames the file to `path`, in the same folder, replacing any file there.
     pub fn replace(self, path: &Path) -> Result<()> {
         self.hidden(path)?.persist(path).map(drop).map_err(|e| e.error)
     }
 
-    /// Becomes `path`, in the same folder, or if that exists a file with a number in its name, which is returned.
+    /// Renames the file to `path`, in the same folder, or if that exists, to a name with a number. Returns the name.
     pub fn create(self, path: &Path) -> Result<PathBuf> {
         let mut file = self.hidden(path)?;
         for number in 1_u32.. {
@@ -60,7 +60,7 @@ impl Temporary {
         Err(Error::other("every name is taken"))
     }
 
-    /// Only what has a name can replace another file, so that a nameless one is hidden first, for a moment.
+    /// Gives a nameless file a hidden name, because only a file with a name can replace another.
     fn hidden(self, path: &Path) -> Result<NamedTempFile> {
         match self {
             #[cfg(target_os = "linux")]
@@ -77,7 +77,7 @@ fn noted(file: NamedTempFile) -> NamedTempFile {
     file
 }
 
-/// `a.exr`, `a-2.exr`, `a-3.exr`...
+/// Names numbered from 1: `a.exr`, `a-2.exr`, `a-3.exr` and so on.
 fn numbered(path: &Path, number: u32) -> PathBuf {
     if number == 1 {
         return path.to_owned();
@@ -94,7 +94,7 @@ fn numbered(path: &Path, number: u32) -> PathBuf {
 fn builder() -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".tallow-").suffix(".part");
-    // The crate's own default, 0600, would hide the image from everybody else; the umask still applies.
+    // The crate's default, 0600, would make the image unreadable for others; the umask still applies.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     builder
@@ -109,8 +109,10 @@ mod linux {
     use std::path::{Path, PathBuf};
     use tempfile::NamedTempFile;
 
+    /// Makes a file without a name.
+    ///
     /// # Errors
-    /// Where the file system knows no such files, or where they could not be given a name.
+    /// When the file system does not support this, or the file could not be given a name later.
     pub fn nameless(folder: &Path) -> Result<File> {
         let mode = Mode::from_raw_mode(0o666);
         let file = File::from(open(folder, OFlags::TMPFILE | OFlags::WRONLY | OFlags::CLOEXEC, mode)?);
@@ -118,7 +120,7 @@ mod linux {
         Ok(file)
     }
 
-    /// Gives it a hidden name in `folder`, on the file system where it was made.
+    /// Gives the file a hidden name in `folder`, which must be on the same file system.
     pub fn named(file: File, folder: &Path) -> Result<NamedTempFile> {
         let link = link(&file);
         let made =
@@ -126,7 +128,7 @@ mod linux {
         Ok(NamedTempFile::from_parts(file, made.into_temp_path()))
     }
 
-    /// Where the system shows what a process has opened.
+    /// The link by which Linux shows a file that the process has open.
     fn link(file: &File) -> PathBuf {
         format!("/proc/self/fd/{}", file.as_raw_fd()).into()
     }
