@@ -2,7 +2,7 @@
 use crate::layout::{BrokenTally, FoldPush, PixelLight, PixelStats, vec3, vec4};
 use crate::math::hash::pcg;
 use crate::shaders;
-use crate::shaders::accumulate::{FEW, MAX_DEVIATION, MAX_IRRADIANCE, MAX_M2, MIN_ALBEDO};
+use crate::shaders::accumulate::{MAX_DEVIATION, MAX_IRRADIANCE, MAX_M2, MAX_ROUNDED_SAMPLES, MIN_ALBEDO};
 use crate::statistics::{luminance, next_sample};
 use glam::{Vec3, Vec4};
 
@@ -103,7 +103,7 @@ fn fold_radiance(s: &mut PixelStats, radiance: Vec3) {
     s.count += 1;
     let off = radiance - Vec3::from(s.mean);
     let by = off * (1.0 / s.count as f32);
-    let mean = match s.count <= FEW {
+    let mean = match s.count <= MAX_ROUNDED_SAMPLES {
         true => Vec3::from(s.mean) + by,
         false => move_mean(s.mean, by, Kept { word: &mut s.remainder, count: s.count }, 0, BITS),
     };
@@ -116,7 +116,7 @@ fn fold_light(l: &mut PixelLight, (kept, irradiance): (Vec3, Vec3), count: u32) 
     let share = 1.0 / count as f32;
     let (direct, indirect) = (Vec3::from(l.direct), Vec3::from(l.indirect));
     let [by, indirect_by] = [(kept - direct) * share, (irradiance - indirect) * share];
-    let [direct, moved] = match count <= FEW {
+    let [direct, moved] = match count <= MAX_ROUNDED_SAMPLES {
         true => [direct + by, indirect + indirect_by],
         false => {
             let word = &mut l.remainder;
