@@ -1,4 +1,4 @@
-//! The GPU layer on a real device, under validation: any message fails.
+//! Tests the GPU layer on a real device under Vulkan's validation layers: any of their messages fails a test.
 mod support;
 use support::kernels::{far, mix, next};
 use support::{assert_silent, hash, words};
@@ -69,7 +69,7 @@ fn float(bits: u32) -> f32 {
     f32::from_bits(bits & 0xbf7f_ffff)
 }
 
-/// The uniform block.
+/// Contents of the uniform block.
 const BLOCK: uvec2 = [0x1234_5678, 0x9abc_def0];
 
 impl Inputs {

@@ -1,4 +1,4 @@
-//! A mesh of ten million triangles, alone in its process, so that its memory can be measured.
+//! Loads a mesh of ten million triangles, alone in its process, so that its memory can be measured.
 #![cfg(target_os = "linux")]
 mod support;
 

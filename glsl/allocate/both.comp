@@ -1,9 +1,10 @@
 #include "shared/thread.glsl"
 
-// Noise that the samples show, estimated among the surroundings that look alike, less what a geometry-aware filter will
-// remove of it. A filter that gathers a share W of its window divides the variance of indirect light, which is all that it
-// filters, by about 1 + W (pixels - 1): the deviation that is left is what needs samples. Where nothing is known of the noise yet, geometry alone decides. A thread
-// decides for ROWS pixels of a column, which share most of their neighbours.
+// Computes the priority of ROWS pixels of a column per thread (they share most of their neighbours), from the pixel
+// statistics and the words of likeness.comp. The priority is the noise of the samples, estimated over the neighbours that
+// look alike, less what a geometry-aware filter will remove. A filter that gathers a share W of its window divides the
+// variance of indirect light, which is all that it filters, by about 1 + W (pixels - 1). The deviation that remains needs
+// samples. While the noise is unknown, geometry alone decides.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
 layout(binding = 1) uniform usamplerBuffer words; // of float
@@ -13,21 +14,24 @@ layout(scalar, push_constant) uniform Push { PriorityPush push; };
 
 #include "shared/likeness_bits.glsl"
 #include "shared/pixel_noise.glsl"
-const float MIN_LEFT = 0.01; // of two pixels at least .27
-const float APART = 1e17;      // means differ by no more, so that squares are finite
-const float MAX_TINT = 100.0;
+const float MIN_LEFT = 0.01;   // two pixels leave at least 0.27, so that less is rounding
+const float APART = 1e17;      // differences of means are cut here, so that their squares are finite
+const float MAX_TINT = 100.0;  // indirect light's colour over its luminance, per channel
 
 const int ROWS = 4;
 
-// What the pixels around one say of its noise.
+// Weighted sums over the pixels around one.
 struct Surroundings {
-    vec4 around, offsets; // of the means, and how many there are
-    float squares, weights, freedom;
-    float indirect; // squared deviations of indirect light, as those of all light in `around`
+    vec4 around;    // of `moments`
+    vec4 offsets;   // of the means less the centre's mean; w: of the weights
+    float squares;  // of the squared offsets
+    float weights;  // of the squared weights
+    float freedom;  // of weight / samples
+    float indirect; // of the squared deviations of indirect light, as `around.x` holds those of all light
 };
 
-// Squared deviations, mean over channels, of indirect light, out of those of its luminance before albedo: its colour at the pixel
-// is taken for that of every sample. Whatever direct and indirect light of a sample have in common counts as direct.
+// Sum of squared deviations of indirect light (mean over channels), computed from those of its luminance before albedo. It
+// assumes that every sample has the colour of the pixel's mean. The covariance of direct and indirect light counts as direct.
 float indirect_squares(uint pixel, vec3 mean, float squares) {
     PixelLight l = PixelLight_load(light, pixel);
     float level = luminance(l.indirect);
@@ -35,7 +39,7 @@ float indirect_squares(uint pixel, vec3 mean, float squares) {
     return min(l.indirect_m2 * dot(tint, tint) / 3.0, squares);
 }
 
-// `mean` is that of a pixel with these moments, less that of the centre: small numbers, whose squares keep their digits.
+// Adds a pixel of weight `kin`. `mean` is its mean less that of the centre: squares of such small numbers keep their digits.
 void merge(inout Surroundings s, float kin, vec4 m, float indirect, vec3 mean) {
     mean = clamp(mean, -APART, APART);
     s.around += kin * m;
@@ -46,10 +50,11 @@ void merge(inout Surroundings s, float kin, vec4 m, float indirect, vec3 mean) {
     s.freedom += kin / max(m.w, 1.0);
 }
 
-// Pixels that look alike should be equally bright: how far their means are apart is noise as well, and all that shows it
-// after one sample a pixel. Of n samples it counts 1/n, since the more there are, the more of it is no noise.
+// Adds the spread of the means. Pixels that look alike should be equally bright, so that the spread of their means is noise
+// too; after one sample per pixel it is all that shows noise. It has weight 1 / n for n samples, because the part of the
+// spread that is not noise grows with n.
 vec4 with_means(Surroundings s) {
-    // The share of it that is left when the mean is taken off: 0 of one pixel, but for what division rounds.
+    // The share of the variance that remains once the mean is subtracted: 0 for one pixel, up to rounding.
     float count = s.offsets.w, left = 1.0 - s.weights / (count * count);
     float apart = max(s.squares - dot(s.offsets.rgb, s.offsets.rgb) / count, 0.0) / 3.0;
     return s.around + (count > 0.0 && left > MIN_LEFT ? vec4(apart, s.freedom * left, 0.0, 0.0) : vec4(0.0));
@@ -86,7 +91,7 @@ void main() {
         }
     }
     [[unroll]] for (int k = 0; k < ROWS; k++) {
-        // All of it while nothing is known.
+        // All noise counts as indirect while it is unknown.
         float indirect = s[k].around.x > 0.0 ? s[k].indirect / s[k].around.x : 1.0;
         float left = sqrt(max(1.0 - push.filtered * gathered_of(word[k]) * indirect, 0.0));
         if (first + k < size.y) priority[(first + k) * size.x + x] = noise(own[k], with_means(s[k])) * left;

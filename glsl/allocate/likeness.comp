@@ -1,7 +1,8 @@
 #include "shared/thread.glsl"
 
-// What the geometry alone says of a pixel, in one word: what a filter will gather around it, and how much the noise of each
-// of the eight neighbours says of its own. Where a filter will follow, the word comes in as the pixel's importance, a float.
+// Packs one word per pixel and thread out of the guides (likeness_bits.glsl): the share of its window that a filter will
+// gather, and how alike each of the eight neighbours is. Where a filter will follow, geometry.comp has left the pixel's
+// importance, a float, in the word.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform usamplerBuffer guides; // of Guide
 layout(scalar, binding = 1) buffer Words { uint words[]; }; // of float
@@ -12,18 +13,18 @@ layout(scalar, push_constant) uniform Push { PriorityPush push; };
 
 const float ALBEDO_SCALE = 25.0; // 1 / 0.2^2
 
-struct Place {
+struct Appearance {
     vec3 normal, albedo;
     bool hit;
 };
 
-Place place_at(uint pixel) {
+Appearance appearance_at(uint pixel) {
     Guide g = Guide_load(guides, pixel);
-    return Place(g.normal, g.albedo, g.material != NONE);
+    return Appearance(g.normal, g.albedo, g.material != NONE);
 }
 
-// 0 to 1, in sevenths.
-uint kinship(Place a, Place b) {
+// How alike two pixels look, 0 to 1 in sevenths.
+uint kinship(Appearance a, Appearance b) {
     if (a.hit != b.hit) return 0u;
     float normals = squared_distance(a.normal, b.normal), albedos = squared_distance(a.albedo, b.albedo);
     precise float x = normals * push.normal_scale + albedos * ALBEDO_SCALE;
@@ -38,10 +39,10 @@ void main() {
     float gathered = push.filtered > 0.0 ? 1.0 - uintBitsToFloat(words[i]) : 0.0;
     precise float rounded = gathered * GATHERED_UNIT + 0.5;
     uint word = uint(rounded);
-    Place here = place_at(i);
+    Appearance here = appearance_at(i);
     for (int n = 0; n < 9; n++) {
         ivec2 q = clamp(at + ivec2(n % 3, n / 3) - 1, ivec2(0), size - 1);
-        word |= kinship(here, place_at(uint(q.y * size.x + q.x))) << kinship_bit(n);
+        word |= kinship(here, appearance_at(uint(q.y * size.x + q.x))) << kinship_bit(n);
     }
     words[i] = word;
 }

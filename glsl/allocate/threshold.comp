@@ -1,7 +1,8 @@
 #include "shared/thread.glsl"
 
-// Priority as published (Schalk 2018, eq. 11 and 12, algorithm 1): the pixel's own noise over its luminance until round
-// `limit`; what it had of `limit` samples by then is its probability of a sample ever after.
+// Computes the priority of one pixel per thread as published (Schalk 2018, eq. 11 and 12, algorithm 1). Before round `limit`
+// it is the pixel's own noise over its luminance. At round `limit` it becomes samples / `limit`, the probability of a sample
+// from then on.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
 layout(scalar, binding = 1) buffer Priorities { float priority[]; };
@@ -16,7 +17,7 @@ void main() {
     float floored = max(push.luminance_floor, 0.0);
     float noise = (sqrt(max(m.x / m.y, 0.0)) + floored) / max(m.z / m.w + floored, 1e-20);
     if (push.luminance_floor < 0.0) noise = sqrt(max(m.x / m.y, 0.0));
-    if (m.w < 2.0) noise = 1.0; // nothing is known: the first threshold
+    if (m.w < 2.0) noise = 1.0; // one sample shows no noise; 1 is the first threshold
     if (push.round < push.limit) priority[i] = noise;
     if (push.round == push.limit) priority[i] = m.w / float(push.limit);
 }

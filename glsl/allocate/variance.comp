@@ -1,7 +1,8 @@
 #include "shared/thread.glsl"
 
-// Priority by the noise that the samples show (Schalk 2018). Squared error is least when a pixel's samples are in
-// proportion to the deviation of one of them, so the priority is a share of all samples, past ones included.
+// Computes the priority of one pixel per thread from the noise of its own and its eight neighbours' samples (Schalk 2018).
+// The squared error is least when samples are in proportion to the standard deviation of one sample, so that the priority
+// is a share of all samples, past ones included.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
 layout(scalar, binding = 1) writeonly buffer Priorities { float priority[]; };

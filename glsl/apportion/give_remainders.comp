@@ -1,8 +1,8 @@
 #include "shared/uint64.glsl"
 #include "shared/block.glsl"
 
-// Hamilton's second step: one sample beyond the quota for the largest remainders, ties to the lower pixel index. `blocks`
-// holds the exclusive scan of `ties`.
+// Hamilton's second step: gives the pixels of the largest remainders one sample beyond their quota, and ties to the lower
+// pixel index. A thread has THREAD_ITEMS pixels. `blocks` holds the scanned sums of tie_sums.comp.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer key; // of uvec2
 layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
@@ -20,8 +20,8 @@ void main() {
     uint first = first_item(), items = item_count(first, push.pixels);
     uint64_t total, before = block_scan(possible(s, first, items), total);
     before += blocks[gl_WorkGroupID.x];
-    uint64_t needed = wide(s.needed), left = needed - min(needed, before);
-    uint ties = uint(min(left, uint64_t(items))); // at most one for each
+    uint64_t needed = join64(s.needed), left = needed - min(needed, before);
+    uint ties = uint(min(left, uint64_t(items))); // samples for tied pixels, at most one for each
     uint forced = s.forced != 0u ? items : 0u, free = items - forced;
     for (uint k = 0u; k < forced; k++) {
         uint gets = uint(min(left, uint64_t(room_of(first + k) - count[first + k])));

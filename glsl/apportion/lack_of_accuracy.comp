@@ -1,15 +1,16 @@
 #include "shared/uint64.glsl"
 #include "shared/block.glsl"
 
-// Turns priorities into what a pixel lacks of the samples that its threshold needs: the error of a mean of n samples is
-// w / sqrt(n), so ceil((w / t)^2) - n; at most as many as it has, or a few, since they are all that the noise is known from.
+// Replaces each weight by the samples that the pixel lacks to reach the error threshold t. The error of a mean of n samples
+// is w / sqrt(n), so that it lacks ceil((w / t)^2) - n. It gets at most as many as it has (or INITIAL_SAMPLES), because its
+// n samples are all that the noise is known from. A thread has THREAD_ITEMS pixels, a workgroup sums one block.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
 layout(scalar, binding = 1) buffer Weights { uint weight[]; };
 layout(scalar, binding = 2) writeonly buffer Sums { BlockSums sums[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
 
-const uint FEW = 4u;
+const uint INITIAL_SAMPLES = 4u;
 
 void main() {
     uint first = first_item(), items = item_count(first, push.pixels);
@@ -18,7 +19,7 @@ void main() {
         uint i = first + k, w = weight[i], have = PixelStats_count(stats, i);
         uint64_t squared = uint64_t(w) * w, wanted = squared / per_sample;
         wanted += wanted * per_sample < squared ? 1UL : 0UL; // rounded up
-        uint most = min(max(have, FEW), push.enough - min(push.enough, have));
+        uint most = min(max(have, INITIAL_SAMPLES), push.enough - min(push.enough, have));
         uint lack = uint(min(max(wanted, have + 1UL) - have, uint64_t(most)));
         weight[i] = w > 0u ? lack : 0u;
         total += w > 0u ? lack : 0u;

@@ -1,7 +1,8 @@
 #include "shared/uint64.glsl"
 #include "shared/block.glsl"
 
-// Turns wanted shares of all samples, past and next, into what a pixel lacks: max(0, floor(total * w / W) - count).
+// Replaces each weight w, a share of all samples past and next, by the samples that the pixel lacks of that share:
+// max(0, floor(total * w / W) - count), W the sum of the weights. A thread has THREAD_ITEMS pixels, a workgroup sums one block.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
 layout(binding = 1) uniform usamplerBuffer state; // of Apportionment

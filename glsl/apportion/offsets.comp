@@ -1,7 +1,8 @@
 #include "shared/uint64.glsl"
 #include "shared/block.glsl"
 
-// Second pass of the scan: the first path of every pixel; element `pixels` is the number of all.
+// Last pass of the scan of the sample counts: writes the index of every pixel's first path; element `pixels` is the number
+// of all paths. A thread has THREAD_ITEMS pixels. `blocks` holds the sums of reduce.comp, scanned.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer counts; // of uint
 layout(scalar, binding = 1) readonly buffer Blocks { uint64_t blocks[]; }; // of uvec2

@@ -2,8 +2,14 @@
 #include "shared/block.glsl"
 #include "shared/finite.glsl"
 
-// Turns priorities into integer weights, 12.20 fixed point, so that all that follows is exact. A priority that is not
-// finite weighs nothing and is counted. One workgroup sums one block.
+// First pass of an apportionment: turns priorities into integer weights, 12.20 fixed point, so that all that follows is
+// exact. A priority that is not finite gets weight 0 and is counted. A workgroup sums one block.
+//
+// The passes in order: quantise_priority, sum_weights; then, where weights are shares or errors, lack_of_share or
+// lack_of_accuracy, and sum_weights again; quota and redistribute, repeated; radix_count and radix_select for each of the
+// remainders' 8 digits; tie_sums, scan_block_sums, give_remainders. The scan of the counts follows: reduce,
+// scan_block_sums, offsets; and sample_list for every batch. The method is Hamilton's (largest remainders), with an upper
+// limit for every pixel.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer priority; // of float
 layout(scalar, binding = 1) writeonly buffer Weights { uint weight[]; };

@@ -1,8 +1,9 @@
 #include "shared/uint64.glsl"
 #include "shared/block.glsl"
 
-// Hamilton's first step: every open pixel's quota, floor(budget * weight / weights), and its remainder as a key. A pixel
-// whose quota is no less than its room is full: it gets the room, and what it leaves is apportioned again.
+// Hamilton's first step: computes the quota floor(budget * weight / weights) of every pixel that is still open, and its
+// remainder as a key. A pixel whose quota is no less than its room becomes full: it gets its room, and redistribute.comp
+// apportions the rest again. A thread has THREAD_ITEMS pixels, a workgroup sums one block.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer weight; // of uint
 layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
@@ -26,7 +27,7 @@ void main() {
     uint settled = 0u, open = 0u;
     for (uint k = 0u; k < items; k++) {
         uint i = first + k;
-        if (push.round > 0u && is_full(unpackUint2x32(key[i]))) continue;
+        if (push.step > 0u && is_full(unpackUint2x32(key[i]))) continue;
         uint w = equal ? 1u : texelFetch(weight, int(i)).x, room = room_of(i);
         uint64_t quota, rest;
         multiply_divide(share_of, w, quota, rest);

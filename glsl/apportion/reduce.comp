@@ -1,7 +1,7 @@
 #include "shared/uint64.glsl"
 #include "shared/block.glsl"
 
-// Samples of each block, the first pass of the scan (reduce, then scan).
+// First pass of the scan of the sample counts: each workgroup sums the samples of one block.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer counts; // of uint
 layout(scalar, binding = 1) writeonly buffer Blocks { uint64_t blocks[]; }; // of uvec2

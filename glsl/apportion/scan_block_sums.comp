@@ -1,6 +1,6 @@
 #include "shared/block.glsl"
 
-// Exclusive scan of the blocks' sums, in place. One workgroup, each thread a run of them.
+// Replaces the blocks' sums by their exclusive scan. One workgroup runs, each thread with consecutive blocks.
 layout(local_size_x = 64) in;
 layout(scalar, binding = 0) buffer Blocks { uint64_t blocks[]; }; // of uvec2
 layout(scalar, push_constant) uniform Push { ScanPush push; };

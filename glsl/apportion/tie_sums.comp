@@ -1,7 +1,8 @@
 #include "shared/uint64.glsl"
 #include "shared/block.glsl"
 
-// Per block, how much its pixels could take in order of index.
+// Sums, for each block, the samples that its pixels can take where the order of index decides (tie_break.glsl). A thread has
+// THREAD_ITEMS pixels.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer key; // of uvec2
 layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats

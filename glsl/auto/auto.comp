@@ -3,8 +3,9 @@
 #include "shared/sanitise.glsl"
 #include "shared/candidates.glsl"
 
-// The blend of the image and the candidates whose mean square of what it misses a left-out pixel by is least, with weights
-// of at least 0. From the best one on, pairs trade weight until nothing is gained.
+// Blends five images per pixel and thread: the noisy one and the results of four filters (candidates). The weights are not
+// negative, sum to 1, and minimise the mean squared error at left-out pixels that auto_error.comp estimates. Starting from
+// the best candidate alone, pairs of candidates exchange weight for ROUNDS rounds (coordinate descent).
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer squares; // of vec4
 layout(binding = 1) uniform samplerBuffer products; // of vec4
@@ -22,11 +23,11 @@ layout(binding = 12) uniform samplerBuffer svgf; // of vec4
 layout(scalar, binding = 13) writeonly buffer Output { vec4 filtered[]; };
 layout(scalar, push_constant) uniform Push { PackPush push; };
 
-const uint ROUNDS = 4u;     // of trades
-const float RIDGE = 0.01;   // of every square, added: weights that the estimates cannot tell apart become alike
-const float MAX_ERROR = 1e24;   // above every error
-// Of the whole image's errors in those of a pixel, at most. What its surroundings tell is uncertain where few pixels have
-// seen light, and what is good elsewhere is rarely bad here.
+const uint ROUNDS = 4u;       // of exchanges between all pairs
+const float RIDGE = 0.01;     // share added to every squared error: candidates that hardly differ get like weights
+const float MAX_ERROR = 1e24; // is above every error
+// Largest share of the whole image's errors in those of a pixel. Local errors are uncertain where few pixels have seen light,
+// and a candidate that is good elsewhere is rarely bad here.
 const float OVERALL = 0.6;
 
 void main() {
@@ -35,19 +36,20 @@ void main() {
     int at = int(i);
     vec4 c = texelFetch(colour, at);
     vec4 a = texelFetch(wide, at), b = texelFetch(mid, at), n = texelFetch(narrow, at), d = texelFetch(svgf, at);
-    // Errors relative to the light, around the pixel and in the whole image, which count the more the noisier the pixels are.
-    // Where anything is known, light is at least 1.
+    // Errors are relative to the light. Those of the whole image count the more, the noisier the surroundings are. Light is at
+    // least 1 where a pixel is known.
     vec4 here = texelFetch(others, at), all = texelFetch(other_sum, 0);
     float light = max(here.w, 1.0), lights = max(all.w, 1.0), noisy = 0.5 * here.z / light;
     float share = OVERALL * noisy / (1.0 + noisy);
     vec4 square = mix(texelFetch(squares, at) / light, texelFetch(square_sum, 0) / lights, share);
     vec4 product = mix(texelFetch(products, at) / light, texelFetch(product_sum, 0) / lights, share);
     vec4 other = mix(here / light, all / lights, share);
-    // What few samples tell of their own variance follows their values: whoever relies on it seems better than it is. Nor is
-    // a filter of use that could not in-paint the pixel.
+    // The variance of few samples depends on their values, so that candidates which use it (the image and svgf) would seem
+    // better than they are. A filter that could not in-paint the pixel is of no use either.
     bool enough = c.w >= ENOUGH;
     bool usable[5] = bool[](enough, a.w > 0.0, b.w > 0.0, n.w > 0.0, enough && d.w > 0.0);
-    // An independent copy of the pixel misses it by both copies' noise, and has the pixel's in common with what a filter misses.
+    // Mean products of the candidates' errors. An independent copy of the pixel misses it by the noise of both, and shares
+    // the pixel's own noise with every filter's error.
     float noise = 0.5 * other.z;
     float missed[5][5] = float[][](
         float[](other.z, noise, noise, noise, noise),
@@ -64,14 +66,14 @@ void main() {
         }
         missed[k][k] *= 1.0 + RIDGE;
     }
-    // Half of what the blend's mean square grows by with each weight.
+    // Half the derivative of the blend's mean squared error by each weight.
     float growth[5];
     [[unroll]] for (int k = 0; k < 5; k++) {
         w[k] = k == best ? 1.0 : 0.0;
         [[unroll]] for (int m = 0; m < 5; m++) if (k == best) growth[m] = missed[m][k];
     }
     for (uint round = 0u; round < ROUNDS; round++) {
-        // Bounds that do not depend on each other: only loops of those are unrolled, and arrays kept in registers.
+        // The loops' bounds do not depend on each other: only then are they unrolled, and the arrays stay in registers.
         [[unroll]] for (int j = 0; j < 5; j++) {
             [[unroll]] for (int k = 0; k < 5; k++) {
                 if (j >= k) continue;
@@ -83,12 +85,12 @@ void main() {
             }
         }
     }
-    // An unknown pixel whose centre meets nothing has no guide to be fitted by.
+    // An unknown pixel whose centre ray meets nothing has no guide for the fits: the widest window fills it.
     bool adrift = usable[1] && c.w == 0.0 && unpacked_normal(texelFetch(place, at).w) == vec3(0.0);
     if (adrift) w = float[](0.0, 1.0, 0.0, 0.0, 0.0);
-    vec3 base = c.w > 0.0 ? c.rgb : a.rgb; // differences from it: a constant comes back exactly
+    vec3 base = c.w > 0.0 ? c.rgb : a.rgb; // differences from it are blended, so that a constant image stays exact
     vec3 off = w[1] * (a.rgb - base) + w[2] * (as_light(b.rgb, a.rgb) - base);
-    off += w[3] * (whole(n.rgb, a.rgb, texelFetch(wide_dim, at).rgb) - base) + w[4] * (d.rgb - base);
+    off += w[3] * (whole_light(n.rgb, a.rgb, texelFetch(wide_dim, at).rgb) - base) + w[4] * (d.rgb - base);
     bool any_usable = usable[0] || usable[1] || usable[2] || usable[3] || usable[4];
     filtered[i] = any_usable ? vec4(base + off, c.w > 0.0 ? c.w : 1.0) : vec4(0.0);
 }

@@ -2,10 +2,10 @@
 #include "shared/luminance.glsl"
 #include "shared/candidates.glsl"
 
-// What the candidates miss a pixel's luminance by when it is left out of their sums (cross-validation: Stone 1974, Craven
-// and Wahba 1979): one of leverage h misses it by (filtered - pixel) / (1 - h). The mean square of that is its error and
-// the pixel's noise; of a blend, which misses by the blend of these, it follows from their products (stacking: Wolpert
-// 1992, Breiman 1996). No filter would miss by twice the noise.
+// Estimates, per pixel and thread, the error in luminance that each candidate would make if the pixel were left out of its
+// sums (cross-validation: Stone 1974, Craven and Wahba 1979): for a leverage h it is (filtered - pixel) / (1 - h). Its mean
+// square is the candidate's error plus the pixel's noise. That of a blend follows from the products written here (stacking:
+// Wolpert 1992, Breiman 1996). The unfiltered image, an independent copy of itself, misses by twice the noise.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer estimate; // of vec4
 layout(binding = 1) uniform samplerBuffer colour; // of vec4
@@ -21,12 +21,12 @@ layout(scalar, binding = 10) writeonly buffer Products { vec4 products[]; }; // 
 layout(scalar, binding = 11) writeonly buffer Others { vec4 others[]; };     // mid svgf, narrow svgf, none, the light itself
 layout(scalar, push_constant) uniform Push { AutoPush push; };
 
-const float MOST = 0.9; // leverage: beyond it, too little is left to judge by
-// Of what the leverage of a pixel of one sample is above that of the pixels around it, which alone is not too noisy. Where a
-// pixel's is high, its noise often is: filters that keep much would seem good where noise is hundreds of times their error,
-// as it is with few samples.
+const float MOST = 0.9; // largest leverage: beyond it, too little is left to judge by
+// How far the leverage used moves from the smoothed one towards the pixel's own, larger one, at one sample. Both a pixel's
+// leverage and its noise are often high together. With few samples, where noise is hundreds of times the filters' error, its
+// own leverage would make filters seem good that keep much of the pixel.
 const float OWN = 0.3;
-const float LIMIT = 1e9; // of luminance and its differences, so that their products are finite
+const float LIMIT = 1e9; // luminance and its differences are cut here, so that their products are finite
 
 float scaled(vec3 a, vec3 b) {
     return clamp(contrast(a, b) / push.floor, -LIMIT, LIMIT);
@@ -42,12 +42,13 @@ void main() {
     vec4 own = texelFetch(leverages, at), around = texelFetch(surroundings, at);
     float count = texelFetch(colour, at).w;
     vec4 left = 1.0 - clamp(around + OWN / sqrt(max(count, 1.0)) * max(own - around, 0.0), 0.0, MOST);
-    // The narrow window leaves out what it gets of the pixel, and the wide one what it spreads for it.
+    // The narrow window filters the dimmed pixel, and the wide one the rest of its light: each misses its own part.
     vec4 missed = vec4(scaled(a, e.rgb), scaled(b, e.rgb), scaled(c, dim), scaled(d, e.rgb)) / left;
     missed.z += scaled(a - a_dim, e.rgb - dim) / left.x;
     float deviation = min(sqrt(max(e.w, 0.0)) / push.floor, LIMIT);
-    float level = scaled((a + as_light(b, a) + whole(c, a, a_dim) + d) / 4.0, vec3(0.0)), light = level * level + 1.0;
-    // Between errors relative to luminance (-1/2), which are what is seen, and equal trust in bright and dark pixels (-1).
+    float level = scaled((a + as_light(b, a) + whole_light(c, a, a_dim) + d) / 4.0, vec3(0.0)), light = level * level + 1.0;
+    // The exponent lies between -1/2, which weighs errors relative to luminance as they are seen, and -1, which trusts bright
+    // and dark pixels alike.
     float weight = count > 0.0 ? pow(light, -0.55) : 0.0;
     squares[i] = weight * missed * missed;
     products[i] = weight * missed.xxxy * missed.yzwz;

@@ -3,9 +3,10 @@
 #include "shared/candidates.glsl"
 #include "shared/perturbation.glsl"
 
-// What the candidates are run on besides the image: what the narrow window gets of it, and two known noises, of which a filter
-// keeps its divergence (Ramani, Blu, Unser 2008). Windows of fits are linear: noise alone tells what they keep, three times
-// by three channels. What svgf keeps depends on the image, to which a little is added.
+// Makes, per pixel and thread, what the candidates filter besides the image: the dimmed image for the narrow window, and two
+// known noises by which leverages are measured (Monte Carlo divergence: Ramani, Blu, Unser 2008). The guided filters are
+// linear, so that they filter noise alone, independent in each of three channels. svgf depends on the image, and filters the
+// image with a little noise added.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform samplerBuffer wide; // of vec4
@@ -21,5 +22,5 @@ void main() {
     vec3 around = texelFetch(wide, int(i)).rgb;
     dim[i] = vec4(dimmed(c.rgb, around), c.w);
     signs[i] = vec4(signs_of(i), c.w);
-    probed[i] = vec4(c.rgb + probe(i, around, push.floor), c.w);
+    probed[i] = vec4(c.rgb + perturbation(i, around, push.floor), c.w);
 }

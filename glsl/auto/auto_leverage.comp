@@ -2,8 +2,9 @@
 #include "shared/luminance.glsl"
 #include "shared/perturbation.glsl"
 
-// What the candidates keep of a pixel: its leverage, the diagonal of the matrix that a linear filter is, plus what the probe
-// brings along from neighbours, which is 0 on average (Ramani, Blu, Unser 2008).
+// Estimates, per pixel and thread, the leverage of a pixel in each candidate: the derivative of its filtered value by its own
+// value, the diagonal of the matrix of a linear filter (Ramani, Blu, Unser 2008). The estimate also holds what the noise
+// brings from neighbours, which is 0 on average.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer wide; // of vec4, of the image
 layout(binding = 1) uniform samplerBuffer svgf; // of vec4, of the image
@@ -19,7 +20,7 @@ void main() {
     if (i >= push.count) return;
     int at = int(i);
     vec3 kept = texelFetch(wide_kept, at).rgb, signs = signs_of(i) / 3.0;
-    float added = probe(i, texelFetch(wide, at).rgb, push.floor);
+    float added = perturbation(i, texelFetch(wide, at).rgb, push.floor);
     float grown = contrast(texelFetch(svgf_kept, at).rgb, texelFetch(svgf, at).rgb);
     vec4 leverage = vec4(dot(kept, signs), dot(texelFetch(mid_kept, at).rgb, signs), dot(texelFetch(narrow_kept, at).rgb, signs),
         grown / added);

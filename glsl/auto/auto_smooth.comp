@@ -1,9 +1,9 @@
 #include "shared/edge.glsl"
 #include "shared/b3_spline.glsl"
 
-// One level of A-Trous smoothing of estimates, one plane or three, which are right on average only: among alike surfaces, and
-// across others as far as they count at least.
-// Unknown pixels have nothing to estimate; they take their neighbours'.
+// One level of A-Trous smoothing, per pixel and thread, of one plane of estimates or three, which are right on average only.
+// Pixels of like surfaces count by their edge weights, others at least by `push.least`. Unknown pixels, which have no
+// estimate, take their neighbours'.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4

@@ -1,4 +1,4 @@
-// Adds up three planes, 4096 elements a workgroup; once more over its sums until one is left.
+// Adds up three planes, 4096 elements per workgroup. It runs again over its own sums until one is left.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer squares; // of vec4
 layout(binding = 1) uniform samplerBuffer products; // of vec4

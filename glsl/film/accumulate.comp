@@ -4,8 +4,8 @@
 #include "shared/luminance.glsl"
 #include "shared/pcg.glsl"
 
-// Adds a batch of samples to the statistics of their pixels. One thread folds one pixel, in order of sample index, so
-// the result does not depend on how samples were batched (Welford 1962).
+// Adds a batch of samples to the statistics of their pixels: running means and sums of squared deviations (Welford 1962).
+// One thread adds the samples of one pixel in order of their index, so that the result does not depend on the batches.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer samples; // of vec4
 layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
@@ -19,23 +19,23 @@ layout(scalar, push_constant) uniform Push { FoldPush push; };
 #include "shared/first_path.glsl"
 #include "shared/loop_limit.glsl"
 #include "shared/next_sample.glsl"
-const uint PLAIN = 2048u; // see shared/loop_limit.glsl
+const uint PLAIN = 2048u; // loop turns before strides: see shared/loop_limit.glsl
 
-// A channel whose albedo is below this cannot be divided out; its light stays with the direct light.
+// Indirect light of a channel whose albedo is not above this stays with the direct light.
 const float MIN_ALBEDO = 1e-6;
-const float MAX_IRRADIANCE = 3e38; // irradiance: what a small albedo makes of bright light stays finite
-// Deviations and sums of their squares are cut there, so that what is added up over pixels stays finite.
+const float MAX_IRRADIANCE = 3e38; // keeps bright light that is divided by a small albedo finite
+// Deviations and sums of their squares are cut here, so that sums over pixels stay finite.
 const float MAX_DEVIATION = 1e17, MAX_M2 = 1e35;
-// Samples up to which means are rounded to single precision. Those after them move a mean by little more than its last place,
-// or less: their steps are kept to more bits (Kahan 1965), or the mean of 2^22 samples would be off by 1e-5 and more. That is
-// code that takes long to compile, and is there only in renders of so many samples.
-const uint FEW = 4096u;
-const int BITS = 10, LIGHT_BITS = 5; // of the remainder of a mean, for each channel
+// Samples up to which means are rounded to single precision. Later ones move a mean by about its last place or less: what
+// rounding takes off is kept (Kahan 1965), or the mean of 2^22 samples would be off by 1e-5 and more. That code takes long to
+// compile, and exists only in renders of so many samples (FX_MANY_SAMPLES).
+const uint MAX_ROUNDED_SAMPLES = 4096u;
+const int BITS = 10, LIGHT_BITS = 5; // bits of a mean's remainder per channel: of all light, of direct and indirect
 
-// Where a pixel's samples lie in the batch: (first, step, number).
+// Returns where a pixel's samples lie in the batch: (first, step, number).
 uvec3 samples_of(uint i, uint pixel) {
     if (!FX_ADAPTIVE || push.samples > 0u) return uvec3(i, push.pixels, push.samples);
-    uint64_t begin = wide(push.first_path), end = begin + push.paths;
+    uint64_t begin = join64(push.first_path), end = begin + push.paths;
     uint64_t from = max(offset_of(pixel), begin), to = min(offset_of(pixel + 1u), end);
     return uvec3(uint(from - begin), 1u, to > from ? uint(to - from) : 0u);
 }
@@ -45,8 +45,8 @@ vec3 unit(vec3 mean, int bits) {
     return max(uintBitsToFloat(floatBitsToUint(mean) & 0x7f800000u) * 1.1920928955078125e-7 / float(1 << bits), 1e-37);
 }
 
-// Moves a mean by a step. `remainder` holds what rounding has taken off, `bits` for each channel from bit `at` on; it is rounded
-// itself, up or down by chance, since samples that repeat a value would all be rounded alike.
+// Moves a mean by the step `by`. `remainder` holds what rounding has taken off, `bits` for each channel from bit `at` on. It is
+// rounded up or down at random, since samples that repeat a value would otherwise all be rounded the same way.
 void move_mean(inout vec3 mean, vec3 by, inout uint remainder, int at, int bits, uint count) {
     ivec3 kept;
     [[unroll]] for (int c = 0; c < 3; c++) kept[c] = bitfieldExtract(int(remainder), at + c * bits, bits);
@@ -55,7 +55,7 @@ void move_mean(inout vec3 mean, vec3 by, inout uint remainder, int at, int bits,
     precise vec3 lost = added - (moved - mean);
     int end = 1 << (bits - 1);
     precise vec3 rounded = floor(lost / unit(moved, bits) + unit_interval(pcg(count)));
-    // Half of the last place above is half of it below the next number: cut, it would be lost, always in one direction.
+    // A remainder of half the last place or more moves the mean to the next number: cutting it off would bias the mean.
     precise vec3 next = moved + unit(moved, bits) * float(2 * end);
     bvec3 carries = greaterThanEqual(rounded, vec3(end));
     moved = mix(moved, next, carries);
@@ -71,7 +71,7 @@ float square(float a, float b) {
 
 void fold_light(inout PixelLight l, vec3 kept, vec3 irradiance, float share, uint count) {
     float off = luminance(irradiance) - luminance(l.indirect);
-    if (!FX_MANY_SAMPLES || count <= FEW) {
+    if (!FX_MANY_SAMPLES || count <= MAX_ROUNDED_SAMPLES) {
         l.direct += (kept - l.direct) * share;
         l.indirect += (irradiance - l.indirect) * share;
     } else {
@@ -81,7 +81,7 @@ void fold_light(inout PixelLight l, vec3 kept, vec3 irradiance, float share, uin
     l.indirect_m2 = min(l.indirect_m2 + square(off, luminance(irradiance) - luminance(l.indirect)), MAX_M2);
 }
 
-// `first_broken`: index of the first sample that was no number, which the sign of its rays tells.
+// Adds the sample at `at`. A negative number of rays marks one that was not finite; `first_broken` is the first one's index.
 void fold(inout PixelStats s, inout PixelLight l, inout uint broken_count, inout uint first_broken, int at) {
     vec4 first = texelFetch(samples, FX_SPLIT ? 3 * at : at);
     vec3 radiance = first.rgb;
@@ -98,13 +98,13 @@ void fold(inout PixelStats s, inout PixelLight l, inout uint broken_count, inout
         fold_light(l, kept, irradiance, share, s.count);
     }
     vec3 off = radiance - s.mean;
-    if (!FX_MANY_SAMPLES || s.count <= FEW) s.mean += off * share;
+    if (!FX_MANY_SAMPLES || s.count <= MAX_ROUNDED_SAMPLES) s.mean += off * share;
     else move_mean(s.mean, off * share, s.remainder, 0, BITS, s.count);
     vec3 off_moved = radiance - s.mean;
     [[unroll]] for (int c = 0; c < 3; c++) s.m2[c] = min(s.m2[c] + square(off[c], off_moved[c]), MAX_M2);
 }
 
-// The kernel that traced them has found the lowest pixel; only its own thread comes here for it.
+// path.comp has found the lowest pixel with a broken sample; that pixel's thread alone writes which sample it was.
 void report(uint pixel, uint broken_count, uint first_broken) {
     if (broken[0].count < 0x80000000u) atomicAdd(broken[0].count, broken_count);
     if (broken[0].lowest != ~pixel || broken[0].pixel == ~pixel) return;
@@ -123,7 +123,7 @@ void main() {
     PixelLight l = PixelLight_zero();
     uint broken_count = 0u, first_broken = 0u;
     if (FX_SPLIT) l = PixelLight_load(light, pixel);
-    uint plain = FX_ADAPTIVE ? min(count, PLAIN) : count; // see SAMPLES_AT_ONCE in schedule.rs
+    uint plain = FX_ADAPTIVE ? min(count, PLAIN) : count; // else at most SAMPLES_AT_ONCE (schedule.rs)
     for (uint k = 0u; k < plain; k++) fold(s, l, broken_count, first_broken, int(at + k * step));
     for (uint k = plain; FX_ADAPTIVE && k < count; k += STRIDE) {
         [[unroll]] for (uint j = 0u; j < STRIDE; j++) {

@@ -2,9 +2,10 @@
 #include "shared/noisy.glsl"
 #include "shared/albedo.glsl"
 
-// Takes a noisy image apart for a filter: colour = sharp + factor * filtered. Twin: denoise::twin::demodulate.
+// Takes one pixel per thread of a noisy image apart for a filter: colour = sharp + factor * filtered, where `sharp` is not
+// filtered and `filtered` is light before albedo. Twin: denoise::twin::demodulate.
 layout(local_size_x = 64) in;
-const uint LIGHT = 0u, ALBEDO = 1u; // denoise::Demodulation
+const uint LIGHT = 0u, ALBEDO = 1u; // values of denoise::Demodulation
 layout(constant_id = 110) const uint DEMODULATION = LIGHT;
 layout(constant_id = 112) const bool INDIRECT_VARIANCE = true; // LIGHT: indirect_m2 is known
 layout(constant_id = 113) const bool MEASURED = true; // any variance of what is filtered is known
@@ -14,8 +15,10 @@ layout(scalar, binding = 5) writeonly buffer Factor { vec4 factor[]; };
 layout(scalar, binding = 6) writeonly buffer Sharp { vec4 sharp[]; };
 layout(scalar, push_constant) uniform Push { SplitPush push; };
 
-const float WHOLE = 0.98; // a pixel with less than this part of its neighbours' albedo may show a piece of something that has none
-const float OUTLIER = 2.0; // and one with this many times the light of its neighbours
+// A pixel with less than the share WHOLE of a neighbour's albedo, or more than OUTLIER times its neighbours' median light, may
+// partly show something without albedo.
+const float WHOLE = 0.98;
+const float OUTLIER = 2.0;
 
 struct Parts {
     vec3 filtered;
@@ -23,8 +26,8 @@ struct Parts {
     vec3 sharp;
 };
 
-// The albedo that indirect light is multiplied by is that of the samples, so that edges and textures stay as smooth as the
-// samples made them; that of the pixel's centre where no sample met light.
+// The albedo that multiplies indirect light is that of the samples, so that edges and textures keep their antialiasing. Where
+// no sample met indirect light, it is that of the pixel's centre.
 float factor_of_samples(float colour, float direct, float indirect, float albedo) {
     float of_samples = (colour - direct) / indirect;
     return finite(of_samples) && indirect > 0.0 ? clamp(of_samples, 0.0, 1.0) : number(albedo);
@@ -40,8 +43,8 @@ Parts split_light(int i) {
     return p;
 }
 
-// Beside something brighter that reflects nothing, and partly of it: with less albedo than another neighbour, or, where
-// albedo is that of pixel centres, far brighter than most neighbours.
+// Whether the pixel lies at the rim of something brighter that reflects nothing and shows a part of it: it has less albedo than
+// another neighbour or, where albedo is that of pixel centres, is far brighter than most neighbours.
 bool is_rim(int i, vec3 colour, vec3 albedo) {
     ivec2 size = ivec2(push.size), at = ivec2(i % size.x, i / size.x);
     float bright = largest(colour), own = largest(albedo), others[8];
@@ -65,8 +68,8 @@ bool is_rim(int i, vec3 colour, vec3 albedo) {
     return outshone && (bright > OUTLIER * median || partly);
 }
 
-// Lamps and sky, and the pixels at their rims, are not filtered: a rim's light divided by its little albedo would outshine
-// everything around it.
+// Lamps, sky and the pixels at their rims are not filtered: a rim's light divided by its small albedo would be far brighter
+// than its surroundings.
 Parts split_albedo(int i) {
     vec3 colour = colour_at(i), albedo = albedo_at(i);
     if (!reflects(albedo) || is_rim(i, colour, albedo)) return Parts(vec3(0.0), vec3(0.0), number(colour));
@@ -79,8 +82,8 @@ Parts demodulated(int i) {
     return Parts(colour_at(i), vec3(1.0), vec3(0.0));
 }
 
-// Of the mean. That of indirect light is known of its luminance. In files that lack it, that of all light stands for it:
-// without any, `auto` had 1.04 to 4.8 times the error.
+// Variance of the pixel's mean, per channel. That of indirect light is known for its luminance. In files that lack it, the
+// variance of all light stands for it: without any, `auto` had 1.04 to 4.8 times the error.
 vec3 variance_of_filtered(int i, vec3 factor, float count) {
     float freedom = count > 1.0 ? count * (count - 1.0) : 0.0;
     if (DEMODULATION == LIGHT && INDIRECT_VARIANCE) {
@@ -96,7 +99,7 @@ void main() {
     if (i >= push.size.x * push.size.y) return;
     float count = count_at(int(i));
     Parts p = demodulated(int(i));
-    // Pixels whose filtered part is not used must not reach others.
+    // Pixels whose filtered part is not used get count 0, so that they do not reach others.
     bool known = finite(colour_at(int(i))) && any(greaterThan(p.factor, vec3(0.0)));
     radiance[i] = vec4(p.filtered, known ? count : 0.0);
     if (MEASURED) variance[i] = variance_of_filtered(int(i), p.factor, count);

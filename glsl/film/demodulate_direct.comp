@@ -2,8 +2,9 @@
 #include "shared/noisy.glsl"
 #include "shared/albedo.glsl"
 
-// Direct light before the albedo of the pixels' centres, so that textures stay sharp, and as it is where that is 0, as on a
-// lamp. Pixels that have none of their own get count 0, and a filter in-paints them. Twin: denoise::twin::demodulate_direct.
+// Divides the direct light of one pixel per thread by the albedo at the pixel's centre, so that textures stay sharp; light of
+// pixels without albedo, such as lamps, stays as it is. Pixels without a finite value get count 0, and a filter in-paints them.
+// Twin: denoise::twin::demodulate_direct.
 layout(local_size_x = 64) in;
 layout(scalar, binding = 3) writeonly buffer Direct { vec4 direct[]; };
 layout(scalar, push_constant) uniform Push { PackPush push; };

@@ -1,6 +1,6 @@
 #include "shared/thread.glsl"
 
-// Puts an image together from its filtered light: what comes in as the part that was not filtered leaves as the picture.
+// Puts one pixel per thread together again: picture = sharp + factor * filtered. `picture` holds the sharp part before.
 // Twin: denoise::twin::Parts::remodulate.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer filtered; // of vec4

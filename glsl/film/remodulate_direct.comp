@@ -1,8 +1,8 @@
 #include "shared/thread.glsl"
 #include "shared/albedo.glsl"
 
-// Gives pixels without direct light of their own what a filter made of that of the others. Twin:
-// denoise::twin::Parts::remodulate_direct.
+// Writes the sharp part of pixels whose direct light is unknown, one per thread: in-painted light times the centre's albedo.
+// Twin: denoise::twin::Parts::remodulate_direct.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer guide; // of Guide
 layout(binding = 1) uniform samplerBuffer direct; // of vec4

@@ -1,10 +1,10 @@
 #include "shared/edge.glsl"
 #include "shared/b3_spline.glsl"
 
-// One level of the edge-avoiding A-Trous wavelet transform (Dammertz et al. 2010, section 2.2): 5x5 taps that are
-// push.spacing pixels apart, each weighted by how alike the two pixels are, and by the samples behind it. A thread filters
-// ROWS pixels of a column, push.spacing apart, because they share most of their taps; neighbouring threads take
-// neighbouring columns, so that every level reads runs of memory.
+// Filters radiance by one level of the edge-avoiding A-Trous wavelet transform (Dammertz et al. 2010, section 2.2): 5x5 taps
+// that are push.spacing pixels apart, each weighted by how alike the two pixels are and by its number of samples. A thread
+// filters ROWS pixels of a column, push.spacing apart, because they share most of their taps; neighbouring threads have
+// neighbouring columns, so that every level reads contiguous memory.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
@@ -13,13 +13,14 @@ layout(scalar, push_constant) uniform Push { AtrousPush push; };
 
 #include "shared/packed_pixels.glsl"
 
-layout(constant_id = 114) const bool CONSERVE = false; // what a neighbour is refused stays with the centre
+layout(constant_id = 114) const bool CONSERVE = false; // weight that a neighbour lacks goes to the centre
 
 const int ROWS = 4;
-const float MOST_SAMPLES = 1e12; // beyond it, counts are cut, so that sums stay finite
+const float MOST_SAMPLES = 1e12; // larger counts are cut, so that sums stay finite
 
-// For images of placed samples, which EAW does not have. Where geometry placed them, noise is alike, and the number of samples
-// the best weight; where noise did, the means are alike in error, and no weight is. The root serves both.
+// Departure from the paper, for images whose pixels differ in samples. If geometry placed the samples, pixels have like noise,
+// and the number of samples is the best weight; if noise placed them, the means have like errors, and equal weights are best.
+// The root serves both.
 float trust(Pixel q) { return CONSERVE ? 1.0 : sqrt(min(q.colour.w, MOST_SAMPLES)); }
 
 void main() {
@@ -43,7 +44,7 @@ void main() {
         tap_x = clamp(tap_x, 0, size.x - 1);
         [[unroll]] for (int j = -2; j < ROWS + 2; j++) {
             int y = first + j * spacing;
-            float h = y >= 0 && y < size.y ? across : 0.0; // nothing is known outside
+            float h = y >= 0 && y < size.y ? across : 0.0; // pixels beyond the image do not count
             Pixel q = pixel_at(clamp(y, 0, size.y - 1) * size.x + tap_x);
             h *= trust(q);
             [[unroll]] for (int k = 0; k < ROWS; k++) { // constant bounds, or it would not be unrolled

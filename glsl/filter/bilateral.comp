@@ -1,7 +1,7 @@
 #include "shared/edge.glsl"
 
-// The bilateral filter (Tomasi and Manduchi 1998) as it is defined, joint where normals or positions have weights. A
-// thread filters ROWS pixels of a column, which share nearly all their taps.
+// Filters radiance by the bilateral filter (Tomasi and Manduchi 1998), evaluated over the whole window; it is a joint one
+// where normals or positions have weights. A thread filters ROWS pixels of a column, which share nearly all their taps.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
@@ -10,12 +10,12 @@ layout(scalar, binding = 3) buffer Sums { vec4 sums[]; };
 layout(scalar, push_constant) uniform Push { BilateralPush push; };
 
 #include "shared/packed_pixels.glsl"
-// Whether the window is cut into bands of rows, a dispatch each, which adds to `sums` (weighted differences, weights):
-// see shared/loop_limit.glsl.
+// Whether the window is cut into bands of rows, with one dispatch per band that adds to `sums` (weighted differences,
+// weights): see shared/loop_limit.glsl.
 layout(constant_id = 115) const bool BANDS = false;
 
 const int ROWS = 8;
-const float REFUSED = -1e30; // an exponent whose weight is 0
+const float REFUSED = -1e30; // exponent of weight 0
 
 void main() {
     ivec2 size = ivec2(push.size);

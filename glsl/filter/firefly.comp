@@ -1,8 +1,8 @@
 #include "shared/sanitise.glsl"
 #include "shared/luminance.glsl"
 
-// Cuts pixels that are push.factor times brighter than the second brightest of the 24 around them: an outlier has no
-// company, a highlight has. Pixels with fewer than two known neighbours stay.
+// Cuts one pixel per thread to push.factor times the luminance of the second brightest of the 24 pixels around it: an outlier
+// stands alone, a highlight does not. Pixels with fewer than two known neighbours stay as they are.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer radiance; // of vec4
 layout(scalar, binding = 1) writeonly buffer Output { vec4 cut[]; };

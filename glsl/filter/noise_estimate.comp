@@ -1,8 +1,9 @@
 #include "shared/edge.glsl"
 #include "shared/luminance.glsl"
 
-// Radiance with the variance of its luminance, or -1 where nothing is known. Few samples say little about their own
-// variance: there it is the spread over alike pixels of a 7x7 window (Schied et al. 2017, section 4.2).
+// Writes the radiance of one pixel per thread with the variance of its luminance, or -1 where the pixel is unknown. Few samples
+// tell little of their own variance: below ENOUGH samples it is the variance over like pixels of a 7x7 window (Schied et al.
+// 2017, section 4.2).
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
@@ -12,7 +13,7 @@ layout(scalar, push_constant) uniform Push { SvgfPush push; };
 
 #include "shared/packed_pixels.glsl"
 
-layout(constant_id = 114) const bool MEASURED = true; // `variance` has a pixel for every pixel
+layout(constant_id = 114) const bool MEASURED = true; // `variance` holds every pixel's
 const int REACH = 3;
 
 float spread(ivec2 at, Pixel p) {
@@ -34,7 +35,8 @@ float spread(ivec2 at, Pixel p) {
         } while (++i <= REACH);
     } while (++j <= REACH);
     mean /= total;
-    // Unbiased for unequal weights; one pixel alone has no spread. Not negative: the pixel is one of at most 49, at 0.
+    // The division makes it unbiased for unequal weights; one pixel alone has no variance. The result is not negative, since
+    // the pixel itself is one of at most 49 terms, with value 0.
     float others = 1.0 - squares / (total * total);
     return others > 1e-3 ? (m2 / total - mean * mean) / others : 0.0;
 }

@@ -1,7 +1,8 @@
 #include "shared/thread.glsl"
 #include "shared/sanitise.glsl"
 
-// What a filter's taps read, in two texels instead of four: radiance with its count, position with its normal.
+// Packs what a filter's taps read of one pixel per thread into two texels instead of four: radiance with its count, and
+// position with the normal.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer radiance; // of vec4
 layout(binding = 1) uniform usamplerBuffer guide; // of Guide

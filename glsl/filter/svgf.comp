@@ -2,8 +2,9 @@
 #include "shared/b3_spline.glsl"
 #include "shared/luminance.glsl"
 
-// One level of A-Trous wavelets whose radiance weight counts in standard deviations of the pixel (Schied et al. 2017,
-// section 4.4); the variance is filtered along. The last level puts the number of samples in its place.
+// Filters one pixel per thread by one level of A-Trous wavelets whose luminance weight is relative to the pixel's standard
+// deviation (Schied et al. 2017, section 4.4). It filters the variance (w) too; the last level writes the number of samples
+// in its place.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer estimate; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
@@ -17,12 +18,12 @@ int index(ivec2 at) {
     return at.y * int(push.size.x) + at.x;
 }
 
-// The pixel at `at`, or the nearest one, which does not count.
+// The pixel of the image that is nearest to `at`; one that differs from `at` has weight 0.
 ivec2 nearest(ivec2 at) {
     return clamp(at, ivec2(0), ivec2(push.size) - 1);
 }
 
-// The variance of one pixel is itself uncertain: a Gaussian of 3x3 steadies it. Of a known pixel, which counts itself.
+// Standard deviation of a known pixel, from the variance smoothed by a 3x3 Gaussian: that of one pixel is uncertain.
 float deviation(ivec2 at) {
     float sum = 0.0, total = 0.0;
     [[unroll]] for (int j = -1; j <= 1; j++) {
@@ -43,7 +44,7 @@ void main() {
     vec4 here = texelFetch(estimate, index(at));
     bool known = here.w >= 0.0;
     Pixel p = unpack_pixel(here, texelFetch(place, index(at)));
-    float rate = push.rate_l / (deviation(at) + 1e-30); // finite, so that equal pixels are alike where nothing varies
+    float rate = push.rate_l / (deviation(at) + 1e-30); // stays finite without variance, so that equal pixels weigh 1
     vec3 sum = vec3(0.0);
     float total = 0.0, spread = 0.0;
     // Tested at its end: see shared/traverse.glsl.

@@ -1,9 +1,9 @@
 #include "shared/edge.glsl"
 
-// One lifting step of a decimated wavelet transform whose details are dropped, forward or back. Odd pixels of a lattice
-// are predicted from their even neighbours, even ones are updated by half the mean of what the predictions missed:
-// CDF(2,2) along rows and columns, or red-black (Uytterhoeven and Bultheel 1998) on the quincunx. With weights for edges
-// these are Fattal's (2009). All neighbours' differences are taken from the pixel itself: a constant comes back exactly.
+// Computes one lifting step of a decimated wavelet transform whose details are dropped, forward or inverse, for one pixel per
+// thread. Odd pixels of a lattice are predicted from their even neighbours; even ones are updated by half the mean of the
+// prediction errors. It is CDF(2,2) along rows and columns, or red-black (Uytterhoeven and Bultheel 1998) on the quincunx;
+// with edge weights these are Fattal's (2009). Sums are of differences from the pixel, so that a constant image stays exact.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
@@ -14,7 +14,7 @@ layout(scalar, push_constant) uniform Push { WaveletPush push; };
 
 layout(constant_id = 114) const bool INVERSE = false;
 
-// Neighbours of a pixel by stencil, in units of the spacing; rows and columns have two.
+// Four neighbours of a pixel for each stencil, in units of the spacing; rows and columns have two.
 const ivec2 AROUND[16] = ivec2[](ivec2(-1, 0), ivec2(1, 0), ivec2(0), ivec2(0), ivec2(0, -1), ivec2(0, 1), ivec2(0), ivec2(0),
     ivec2(-1, 0), ivec2(1, 0), ivec2(0, -1), ivec2(0, 1), ivec2(-1, -1), ivec2(1, -1), ivec2(-1, 1), ivec2(1, 1));
 
@@ -26,7 +26,7 @@ Pixel pixel_at(ivec2 at) {
     return p;
 }
 
-// 0 = even, 1 = odd, 2 = not on this lattice.
+// Returns 0 for even pixels of the lattice, 1 for odd ones, and 2 for pixels that are not on it.
 int parity(ivec2 at) {
     int s = int(push.spacing);
     ivec2 cell = at / s;
@@ -42,7 +42,7 @@ ivec2 neighbour(ivec2 at, int i) {
     return at + int(push.spacing) * AROUND[4 * push.stencil + i];
 }
 
-// What the neighbours' weighted mean differs by, and the sum of their weights.
+// The difference of the neighbours' weighted mean from the pixel, and the sum of the weights.
 vec4 prediction(ivec2 at, Pixel p) {
     vec3 sum = vec3(0.0);
     float total = 0.0;
@@ -56,7 +56,7 @@ vec4 prediction(ivec2 at, Pixel p) {
     return total > 0.0 ? vec4(sum / total, total) : vec4(0.0);
 }
 
-// Half the weighted mean of what the odd neighbours have and even ones do not foretell.
+// Half the weighted mean of the odd neighbours' prediction errors.
 vec3 update(ivec2 at, Pixel p) {
     vec3 sum = vec3(0.0);
     float total = 0.0;
@@ -78,11 +78,11 @@ void main() {
     vec4 c = p.colour;
     int odd = parity(at);
     bool known = c.w > 0.0;
-    // An unknown even pixel has nothing to be updated: it takes the mean of its neighbours instead.
+    // An unknown even pixel takes the mean of its neighbours instead of an update.
     vec4 predicted = prediction(at, p);
     if ((INVERSE && odd == 1 || !INVERSE && odd == 0 && !known) && predicted.w > 0.0) {
         c = vec4(c.rgb + predicted.rgb, known ? c.w : 1.0);
-    } else if (!INVERSE && odd == 0) { // by nothing where all around is unlike
+    } else if (!INVERSE && odd == 0) { // adds 0 where no neighbour is alike
         c.rgb += update(at, p);
     }
     filtered[at.y * size.x + at.x] = c;

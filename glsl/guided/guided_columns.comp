@@ -4,7 +4,8 @@
 #define NO_SUM NO_MOMENTS
 #include "shared/windows.glsl"
 
-// Moments over the part of every window that lies in its centre's column, tile by tile of a strip.
+// First pass of the guided filter (guided_columns, guided_rows, guided_mean_columns, guided_mean_rows) over a strip of rows:
+// sums the moments of the 1 x WINDOW pixels above and below every pixel. A thread walks down SEGMENT pixels of a column.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform samplerBuffer channels; // of vec4
@@ -12,7 +13,7 @@ layout(scalar, binding = 2) writeonly buffer Sums { u64vec4 sums[]; }; // of vec
 layout(scalar, push_constant) uniform Push { GuidedPush push; };
 
 int pixel_at(int x, int y) {
-    return blocked(x, clamp(y, 0, int(push.size.y) - 1), int(push.size.y));
+    return tiled_index(x, clamp(y, 0, int(push.size.y) - 1), int(push.size.y));
 }
 
 vec4 point_at(int x, int y) {
@@ -27,7 +28,7 @@ void merge_element(inout Moments m, vec4 point, int x, int y) {
 
 void store(int x, int y, Moments whole, vec4 point) {
     whole = rebased(whole, point_at(x, y) - point);
-    int at = strip_at(x, y - int(push.first_row), int(push.size.x), MOMENTS);
+    int at = strip_index(x, y - int(push.first_row), int(push.size.x), MOMENTS);
     MOMENTS_STORE(sums, at, 8, whole);
 }
 

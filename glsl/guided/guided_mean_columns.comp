@@ -4,7 +4,8 @@
 #define NO_SUM NO_FIT
 #include "shared/windows.glsl"
 
-// Mean of the models of all windows that cover a pixel and are centred in its column, tile by tile of a strip.
+// Third pass of the guided filter: averages the models of all windows that cover a pixel and are centred in its column. A
+// thread walks down SEGMENT pixels of a column of the strip.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer slope_r; // of vec4
 layout(binding = 1) uniform samplerBuffer slope_g; // of vec4
@@ -15,7 +16,7 @@ layout(scalar, binding = 5) writeonly buffer Sums { u64vec4 sums[]; }; // of vec
 layout(scalar, push_constant) uniform Push { GuidedPush push; };
 
 int pixel_at(int x, int y) {
-    return blocked(x, clamp(y, 0, int(push.size.y) - 1), int(push.size.y));
+    return tiled_index(x, clamp(y, 0, int(push.size.y) - 1), int(push.size.y));
 }
 
 vec4 point_at(int x, int y) {
@@ -25,13 +26,13 @@ vec4 point_at(int x, int y) {
 void merge_element(inout Fit f, vec4 point, int x, int y) {
     int at = pixel_at(x, y);
     Fit model = Fit(texelFetch(slope_r, at), texelFetch(slope_g, at), texelFetch(slope_b, at), texelFetch(value, at));
-    bool is = y >= 0 && y < int(push.size.y);
-    merge(f, rebased(model, point - point_at(x, y)), is);
+    bool exists = y >= 0 && y < int(push.size.y);
+    merge(f, rebased(model, point - point_at(x, y)), exists);
 }
 
 void store(int x, int y, Fit whole, vec4 point) {
     whole = rebased(whole, point_at(x, y) - point);
-    int at = strip_at(x, y - int(push.first_row), int(push.size.x), FIT);
+    int at = strip_index(x, y - int(push.first_row), int(push.size.x), FIT);
     FIT_STORE(sums, at, 8, whole);
 }
 

@@ -4,8 +4,9 @@
 #define NO_SUM NO_MOMENTS
 #include "shared/windows.glsl"
 
-// The linear model a . I + b of every window (He et al. 2010, equation 19), from the moments of its columns, tile by
-// tile of a row. Instead of b it keeps the model's value at the window's own centre.
+// Second pass of the guided filter: solves for the linear model a . I + b of every window (He et al. 2010, equation 19) from
+// the moments of its columns. In place of b it keeps the model's value at the window's centre. A thread walks along SEGMENT
+// pixels of a row.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer columns; // of vec4
 layout(binding = 1) uniform samplerBuffer channels; // of vec4
@@ -18,7 +19,7 @@ layout(scalar, push_constant) uniform Push { GuidedPush push; };
 #define FETCH_COLUMN(at) texelFetch(columns, at)
 
 int pixel_at(int row, int x) {
-    return blocked(clamp(x, 0, int(push.size.x) - 1), int(push.first_row) + row, int(push.size.y));
+    return tiled_index(clamp(x, 0, int(push.size.x) - 1), int(push.first_row) + row, int(push.size.y));
 }
 
 vec4 point_at(int row, int x) {
@@ -27,7 +28,7 @@ vec4 point_at(int row, int x) {
 
 void merge_element(inout Moments m, vec4 point, int row, int x) {
     int width = int(push.size.x);
-    int at = strip_at(clamp(x, 0, width - 1), row, width, MOMENTS);
+    int at = strip_index(clamp(x, 0, width - 1), row, width, MOMENTS);
     Moments column = MOMENTS_LOAD(at, 8, FETCH_COLUMN);
     column.mean += point_at(row, x) - point;
     merge(m, column, x >= 0 && x < width);
@@ -38,10 +39,10 @@ void store(int row, int x, Moments whole, vec4 point) {
     solve(whole, whole.head.x * push.eps, r, g, b);
     int at = pixel_at(row, x);
     vec3 here = whole.head.yzw + vec3(dot(r, off), dot(g, off), dot(b, off));
-    slope_r[at] = paired(r);
-    slope_g[at] = paired(g);
-    slope_b[at] = paired(b);
-    value[at] = paired(vec4(here, min(whole.head.x, 1.0)));
+    slope_r[at] = pack64(r);
+    slope_g[at] = pack64(g);
+    slope_b[at] = pack64(b);
+    value[at] = pack64(vec4(here, min(whole.head.x, 1.0)));
 }
 
 void main() {

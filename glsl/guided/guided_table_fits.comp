@@ -1,7 +1,7 @@
 #include "shared/linear_model.glsl"
 #include "shared/tiled_index.glsl"
 
-// Rows of the summed-area table of the models.
+// First pass of the models' summed-area table: running sums along one row per thread.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer slope_r; // of vec4
 layout(binding = 1) uniform samplerBuffer slope_g; // of vec4
@@ -15,7 +15,7 @@ void main() {
     if (y >= height) return;
     Fit f = NO_FIT;
     for (int x = 0; x < width; x++) {
-        int at = blocked(x, y, height);
+        int at = tiled_index(x, y, height);
         f.r += texelFetch(slope_r, at);
         f.g += texelFetch(slope_g, at);
         f.b += texelFetch(slope_b, at);

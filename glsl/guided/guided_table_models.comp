@@ -2,7 +2,8 @@
 #include "shared/summed_area.glsl"
 #include "shared/tiled_index.glsl"
 
-// The linear model of every window, from the corners of a summed-area table: E[I I] - E[I] E[I], which cancels.
+// Solves for the linear model of one window per thread, from the corners of a summed-area table. Covariances are
+// E[I I] - E[I] E[I], which loses digits to cancellation.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer table; // of vec4
 layout(scalar, binding = 1) writeonly buffer SlopeR { u64vec2 slope_r[]; }; // of vec4
@@ -37,9 +38,9 @@ void main() {
     m.b -= n.b * m.mean;
     vec4 r, g, b;
     solve(m, count * push.eps, r, g, b);
-    int to = blocked(at.x, at.y, size.y);
-    slope_r[to] = paired(r);
-    slope_g[to] = paired(g);
-    slope_b[to] = paired(b);
-    value[to] = paired(vec4(n - vec3(dot(r, i), dot(g, i), dot(b, i)), min(count, 1.0)));
+    int to = tiled_index(at.x, at.y, size.y);
+    slope_r[to] = pack64(r);
+    slope_g[to] = pack64(g);
+    slope_b[to] = pack64(b);
+    value[to] = pack64(vec4(n - vec3(dot(r, i), dot(g, i), dot(b, i)), min(count, 1.0)));
 }

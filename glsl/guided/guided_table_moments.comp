@@ -1,8 +1,8 @@
 #include "shared/moments.glsl"
 #include "shared/tiled_index.glsl"
 
-// Rows of the summed-area table of N, I and their products (Crow 1984), as Bauszat et al. 2011 (section 3.3) have it:
-// plain sums about 0.
+// First pass of the summed-area table (Crow 1984) of N, I and their products, as Bauszat et al. 2011 (section 3.3) describe
+// it: running sums along one row per thread, about 0.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform samplerBuffer channels; // of vec4
@@ -14,7 +14,7 @@ void main() {
     if (y >= height) return;
     Moments m = NO_MOMENTS;
     for (int x = 0; x < width; x++) {
-        vec4 c = texelFetch(colour, blocked(x, y, height)), i = texelFetch(channels, blocked(x, y, height));
+        vec4 c = texelFetch(colour, tiled_index(x, y, height)), i = texelFetch(channels, tiled_index(x, y, height));
         if (c.w == 0.0) i = vec4(0.0);
         m.head += vec4(c.w > 0.0 ? 1.0 : 0.0, c.rgb);
         m.mean += i;

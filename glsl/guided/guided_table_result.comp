@@ -3,7 +3,8 @@
 #include "shared/sanitise.glsl"
 #include "shared/tiled_index.glsl"
 
-// The guided filter's result: the mean model of all windows that cover a pixel, from the corners of a summed-area table.
+// Last pass of the guided filter with tables: evaluates the mean model of all windows that cover a pixel, one per thread, from
+// the corners of a summed-area table.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer table; // of vec4
 layout(binding = 1) uniform samplerBuffer channels; // of vec4
@@ -25,11 +26,11 @@ void main() {
     ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(at, size))) return;
     ivec4 c = corners(at, size, int(push.radius));
-    int from = blocked(at.x, at.y, size.y);
+    int from = tiled_index(at.x, at.y, size.y);
     Fit f = rebased(FIT_LOAD(0, 1, SUM), texelFetch(channels, from));
     vec4 here = texelFetch(colour, from);
     vec3 result = f.value.rgb / f.value.w;
-    // A model that no float can hold, or no known pixel in reach: the pixel stays as it is.
+    // The pixel stays as it is where the model overflows or no known pixel is within reach.
     bool usable = f.value.w > 0.0 && finite(result);
-    filtered[at.y * size.x + at.x] = paired(usable ? vec4(result, here.w > 0.0 ? here.w : 1.0) : here);
+    filtered[at.y * size.x + at.x] = pack64(usable ? vec4(result, here.w > 0.0 ? here.w : 1.0) : here);
 }

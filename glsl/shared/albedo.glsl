@@ -1,9 +1,10 @@
-// What light is divided by. Twin: src/denoise/twin.rs.
+// The albedo that light is divided by before it is filtered. Twin: src/denoise/twin.rs.
 #include "shared/finite.glsl"
 
-const float SMALLEST_ALBEDO = 0.01; // a channel of smaller albedo is divided by this; a pixel with no larger one reflects nothing
+// Smaller albedos are divided by this; a pixel with no larger one counts as reflecting nothing.
+const float SMALLEST_ALBEDO = 0.01;
 
-// 0 for what is no number.
+// Returns 0 for NaN and infinities.
 float number(float v) { return finite(v) ? v : 0.0; }
 
 vec3 number(vec3 v) { return vec3(number(v.x), number(v.y), number(v.z)); }

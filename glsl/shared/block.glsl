@@ -1,5 +1,6 @@
-// A workgroup of 64 threads owns a block of items; each thread some that follow one another, so that scans need one step
-// across threads. Larger groups pay more for barriers on lavapipe. See stage::PerBlock.
+// Sums and scans over a block of items per workgroup of 64 threads. Each thread owns THREAD_ITEMS consecutive items, so that a
+// scan crosses threads once. That layout is for lavapipe, where barriers are slow; on a GPU it costs coalesced access. Twin of
+// the numbers: src/gpu/blocks.rs.
 const uint BLOCK_THREADS = 64u;
 layout(constant_id = 103) const uint THREAD_ITEMS = 64u;
 
@@ -9,8 +10,7 @@ uint first_item() { return (gl_WorkGroupID.x * BLOCK_THREADS + gl_LocalInvocatio
 
 uint block_count(uint all) { return (all + BLOCK_THREADS * THREAD_ITEMS - 1u) / (BLOCK_THREADS * THREAD_ITEMS); }
 
-// Items that a thread has. A count that is not constant also keeps loops over them from being unrolled and run under a mask
-// by compilers for CPUs.
+// Number of items of a thread. Since it is not a constant, compilers for CPUs do not unroll loops over the items under masks.
 uint item_count(uint first, uint all) { return first < all ? min(THREAD_ITEMS, all - first) : 0u; }
 
 // Sum over the workgroup, in every thread. All threads must call it.
@@ -27,7 +27,7 @@ uint64_t block_sum(uint64_t value) {
     return sum;
 }
 
-// Sum over the threads before this one (Hillis and Steele 1986). All threads must call it; `total` is that of all.
+// Sum over the threads before this one (Hillis and Steele 1986). All threads must call it; `total` is the sum over all.
 uint64_t block_scan(uint64_t value, out uint64_t total) {
     uint at = gl_LocalInvocationIndex;
     block_words[at] = value;

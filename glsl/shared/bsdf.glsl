@@ -20,13 +20,13 @@ struct Bsdf {
     uint coat_table;
     bool nonlinear;
     bool ggx;
-    // What `bsdf_view` finds of a coat, once for all that asks for it.
+    // bsdf_view computes these once for a coat:
     float coat_row;     // of the table at this roughness
     float coat_outside; // the share of light from the viewer that the coat does not let in
     float coat_inside;  // the mean share that it reflects of light from inside
 };
 
-// weight = f |cos| / pdf. A delta lobe has pdf 0 and carries its probability in the weight alone.
+// A sampled direction: weight = f |cos| / pdf. A delta lobe has pdf 0, and its weight includes the probability of the lobe.
 struct BsdfSample {
     vec3 wi;
     vec3 weight;
@@ -34,11 +34,10 @@ struct BsdfSample {
     bool delta;
 };
 
-// Interfaces below this roughness are smooth; directions closer to the horizon than GRAZING count as below it.
-const float GRAZING = 1e-9; // directions closer to the horizon count as below it
+const float GRAZING = 1e-9; // directions whose cosine is not above this count as below the horizon
 const vec3 UP = vec3(0.0, 0.0, 1.0);
 
-// With one kind in the scene the test for it folds away.
+// With one kind of material in the scene, the compiler removes the test for it.
 const bool ONE_KIND = uint(FX_DIFFUSE) + uint(FX_CONDUCTOR) + uint(FX_DIELECTRIC) + uint(FX_COATED) == 1u;
 
 bool is_kind(bool effect, Bsdf b, uint kind) {
@@ -49,7 +48,7 @@ bool is_smooth(Bsdf b) {
     return FX_SMOOTH && (!FX_ROUGH || b.alpha < SMOOTH_ALPHA);
 }
 
-// Unit where a + b is not zero, finite where it is.
+// Unit vector along a + b; finite where that is 0.
 vec3 half_vector(vec3 a, vec3 b) {
     vec3 h = a + b;
     return h * inversesqrt(max(dot(h, h), 1e-30));
@@ -67,15 +66,15 @@ vec4 evaluate_diffuse(Bsdf b, vec3 wi) {
     return vec4(b.albedo, 1.0) * (wi.z * INV_PI);
 }
 
-// Shadowing and masking of a sample drawn by visible normals: G1(wo) G1(wi) area(wo) / wo.z. It is G1(wi) but for the 0.4 %
-// between Walter's fit of the Beckmann G1, which f uses, and the exact one, which the pdf needs to integrate to 1.
+// Shadowing and masking of a sample drawn by visible normals: G1(wo) G1(wi) area(wo) / wo.z. It equals G1(wi) up to 0.4 %, the
+// difference of Walter's fit of the Beckmann G1, which f uses, and the exact G1, by which the pdf integrates to 1.
 float visible_weight(Bsdf b, vec3 wo, vec3 wi, float area) {
     float g = microfacet_g1(b.ggx, wo, b.alpha) * microfacet_g1(b.ggx, vec3(wi.xy, abs(wi.z)), b.alpha);
     return g * area / wo.z;
 }
 
-// Index beyond / index on the side of wo. A rough interface needs the two to differ: equal indices refract along one
-// direction only, so 1 counts as 1.001, which bends light by less than the smallest alpha.
+// Refractive index beyond the interface over that on the side of wo. For a rough interface 1 becomes 1.001, since equal indices
+// refract into a single direction; that bends light by less than the smallest alpha.
 float relative_index(Bsdf b, float wo_z) {
     float eta = !is_smooth(b) && abs(b.eta.x - 1.0) < 1e-3 ? 1.001 : b.eta.x;
     return wo_z < 0.0 ? 1.0 / eta : eta;
@@ -88,13 +87,13 @@ float scattered_density(Bsdf b, vec3 m, float n, float co, float ci) {
     return microfacet_d(b.ggx, m, b.alpha) * co * abs(ci) * n * n / max(q * q, 1e-30);
 }
 
-// Probability of the coat's own reflection: each lobe's share of the reflected energy, roughly.
+// Probability of sampling the coat's reflection: approximately its share of the reflected energy.
 float coat_probability(Bsdf b, float f) {
     float specular = f * mean3(b.specular);
     return specular / max(specular + (1.0 - f) * mean3(b.albedo), 1e-10);
 }
 
-// Twin: reference/coat.rs, which says what the table holds. `column` is an index, or lies between two of cosines.
+// Interpolates the coat's table, see COAT_ROWS. `column` may lie between two columns of cosines. Twin: src/twins/coat.rs.
 float coat_entry(Bsdf b, float column) {
     float row = b.coat_row;
     int i = min(int(row), int(COAT_ROWS) - 2), j = min(int(column), int(COAT_COLUMNS) - 2);
@@ -112,7 +111,7 @@ float coat_outside(Bsdf b, float c) {
     return coat_entry(b, sqrt(clamp(c, 0.0, 1.0)) * float(COAT_COLUMNS - 2u));
 }
 
-// To be called before a material is evaluated or sampled.
+// Must be called before a material is evaluated or sampled.
 void bsdf_view(inout Bsdf b, vec3 wo) {
     if (!is_kind(FX_COATED, b, BSDF_COATED)) return;
     b.coat_row = (log2(max(b.alpha, SMOOTH_ALPHA)) * (1.0 / 6.643856189774724) + 1.0) * float(COAT_ROWS - 1u);
@@ -120,9 +119,9 @@ void bsdf_view(inout Bsdf b, vec3 wo) {
     b.coat_inside = is_smooth(b) ? b.internal_fresnel : coat_entry(b, float(COAT_COLUMNS - 1u));
 }
 
-// Mitsuba 3's `plastic` and `roughplastic`: light enters and leaves through the interface, and what that reflects inwards adds
-// up to 1 / (1 - its mean), `nonlinear` with the base's colour in each reflection.
-// rgb multiplies the diffuse base, w is the probability of the coat's lobe.
+// Mitsuba 3's `plastic` and `roughplastic`: light enters and leaves through the interface. The light that it reflects back
+// inwards, again and again, adds the factor 1 / (1 - mean inner reflectance), which `nonlinear` multiplies by the base's colour.
+// Returns in rgb the factor of the diffuse base, in w the probability of the coat's lobe.
 vec4 coat(Bsdf b, vec3 wi) {
     float fo = b.coat_outside;
     float fi = coat_outside(b, wi.z);
@@ -130,8 +129,8 @@ vec4 coat(Bsdf b, vec3 wi) {
     return vec4((1.0 - fo) * (1.0 - fi) / (b.eta.x * b.eta.x * (1.0 - back)), coat_probability(b, fo));
 }
 
-// The kinds share their code, half vectors and distributions above all: a device that masks lanes runs that of all kinds.
-// rgb = f |cos wi|, w = density over solid angle with which bsdf_sample picks wi. Delta lobes count as 0.
+// Returns rgb = f |cos wi| and w = the density over solid angle with which bsdf_sample picks wi. Delta lobes count as 0. All
+// kinds of material share code, since a device that masks lanes runs the branches of all kinds.
 vec4 bsdf_evaluate(Bsdf b, vec3 wo, vec3 wi) {
     bool glass = is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC), metal = is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR);
     bool coated = is_kind(FX_COATED, b, BSDF_COATED);
@@ -142,7 +141,7 @@ vec4 bsdf_evaluate(Bsdf b, vec3 wo, vec3 wi) {
     }
     if (wo.z <= GRAZING || (glass ? abs(wi.z) : wi.z) <= GRAZING) return vec4(0.0);
     vec4 value = glass || metal ? vec4(0.0) : evaluate_diffuse(b, wi);
-    float share = 1.0; // of the samples
+    float share = 1.0; // probability that bsdf_sample takes this lobe
     if (coated) {
         vec4 c = coat(b, wi);
         value *= vec4(c.xyz, 1.0 - c.w);
@@ -168,7 +167,8 @@ vec4 bsdf_evaluate(Bsdf b, vec3 wo, vec3 wi) {
     return value + vec4(tint * (visible_weight(b, wo, wi, area) * density / (n * n)), share * density);
 }
 
-// False: the path is absorbed, and `s` holds nothing of use. `u_lobe` chooses the lobe, `u` the direction in it.
+// Samples a direction: `u_lobe` chooses the lobe, `u` the direction in it. Returns false where the light is absorbed; `s` is
+// then undefined.
 bool bsdf_sample(Bsdf b, vec3 wo, float u_lobe, vec2 u, out BsdfSample s) {
     bool glass = is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC), metal = is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR);
     bool coated = is_kind(FX_COATED, b, BSDF_COATED);
@@ -214,18 +214,18 @@ bool bsdf_sample(Bsdf b, vec3 wo, float u_lobe, vec2 u, out BsdfSample s) {
     return scattered;
 }
 
-// A conductor or a dielectric: light scatters at its surface alone.
+// Whether light scatters at the surface alone: conductors and dielectrics.
 bool is_interface(Bsdf b) { return is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR) || is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC); }
 
-// A lobe around the mirror image of `wo`.
+// Whether there is a lobe around the mirror image of `wo`.
 bool bsdf_is_specular(Bsdf b) { return is_interface(b) || is_kind(FX_COATED, b, BSDF_COATED); }
 
-// Every lobe is a delta: no light sample can contribute, and a filter has nothing to blur.
+// Whether every lobe is a delta: light samples cannot contribute, and no light is left for a filter to blur.
 bool bsdf_is_delta(Bsdf b) { return is_interface(b) && is_smooth(b); }
 
-// Reflectance, roughly, of the lobes whose light counts as indirect, seen at the cosine `wo_z`: what that light is divided by
-// before it is filtered. What smooth interfaces show counts as direct: mirrors and clear glass have none, and of a smooth
-// coat only the base counts, so that its texture is divided out.
+// Approximate reflectance, at the cosine `wo_z`, of the lobes whose light counts as indirect; that light is divided by it before
+// it is filtered. Light from smooth interfaces counts as direct, so that mirrors and clear glass have albedo 0, and a smooth
+// coat has that of its base.
 vec3 bsdf_albedo(Bsdf b, float wo_z) {
     bool glass = is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC), metal = is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR);
     bool coated = is_kind(FX_COATED, b, BSDF_COATED);

@@ -5,12 +5,12 @@ struct Ray {
     vec3 direction; // unit
 };
 
-// Film coordinates in pixels (x right, y down) to [-1, 1] (right, up).
+// Converts film coordinates from pixels (x right, y down) to [-1, 1] (right, up).
 vec2 film_from_pixel(vec2 pixel, uvec2 size) {
     return vec2(2.0, -2.0) * pixel / vec2(size) + vec2(-1.0, 1.0);
 }
 
-// `lens` in [0, 1)^2 is read only where the scene has a lens.
+// Ray through `film` in [-1, 1]; `lens` in [0, 1)^2 matters only where the scene has a lens.
 Ray camera_ray(Camera camera, vec2 film, vec2 lens) {
     vec3 through = camera.forward + film.x * camera.right + film.y * camera.up;
     vec3 origin = camera.position;
@@ -24,10 +24,10 @@ Ray camera_ray(Camera camera, vec2 film, vec2 lens) {
     return Ray(origin + camera.near * direction, direction);
 }
 
-// Dimension pairs of the camera; scattering events have those after them.
+// Dimension pairs of the camera; scattering events use the pairs after them.
 const uint PAIR_FILM = 0u, PAIR_LENS = 1u;
 
-// Where in the film a sample of `pixel` falls, in pixels.
+// Position on the film of a sample of `pixel`, in pixels.
 vec2 film_sample(uint pixel, Sampler random) {
     vec2 at = vec2(pixel % frame.size.x, pixel / frame.size.x);
     vec2 u = sample_2d(random, PAIR_FILM);
@@ -43,6 +43,6 @@ Ray eye_ray(vec2 film, Sampler random) {
     return camera_ray(frame.camera, film_from_pixel(film, frame.size), lens);
 }
 
-// Alpha masks along a path draw from this. The seed is hashed first, or seeds 0 and 1 would swap the numbers of neighbouring
-// pixels, and it is inverted, or they would be those of `sampler_start`.
+// Seed of the alpha masks along a path. The frame's seed is hashed, or seeds 0 and 1 would swap the numbers of neighbouring
+// pixels; it is inverted, or the numbers would be those of `sampler_start`.
 uint path_seed(uint pixel, uint index) { return pcg(pcg(pixel ^ pcg(~frame.seed)) + index); }

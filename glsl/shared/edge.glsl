@@ -1,4 +1,4 @@
-// How alike two pixels are: edge-stopping weights of radiance, normal and position (Dammertz et al. 2010, section 2.2).
+// Edge-stopping weights of two pixels by their radiance, normal and position (Dammertz et al. 2010, section 2.2).
 // Twin: src/denoise/filter/edge.rs.
 #include "shared/sanitise.glsl"
 
@@ -7,15 +7,15 @@ layout(constant_id = 111) const bool WEIGHT_N = true;
 layout(constant_id = 112) const bool WEIGHT_X = true;
 layout(constant_id = 113) const bool SQUARED = true; // false: the norms as equation 5 prints them
 
-const float LEAST = -50.0; // weights below 2^LEAST are 0, on every device; squares of the others are not
+const float LEAST = -50.0; // weights below 2^LEAST are 0, so that squares of the others do not underflow on any device
 
 struct Pixel {
-    vec4 colour; // w: 0 where nothing is known
+    vec4 colour; // w: samples, 0 where the pixel is unknown
     vec3 normal;
     vec3 position;
 };
 
-// From the two texels that pack.comp writes.
+// Unpacks the two texels that pack.comp writes.
 Pixel unpack_pixel(vec4 colour, uvec4 place) {
     return Pixel(colour, WEIGHT_N ? unpacked_normal(place.w) : vec3(0.0), uintBitsToFloat(place.xyz));
 }
@@ -25,7 +25,7 @@ float difference(vec3 d) {
     return SQUARED ? squared : sqrt(squared);
 }
 
-// In base 2; `rates` of radiance, normal and position. An unknown `p` has no radiance to compare.
+// Exponent of the weight, in base 2, by the `rates` of radiance, normal and position. An unknown `p` has no radiance to compare.
 float edge_exponent(Pixel p, Pixel q, vec3 rates) {
     float exponent = 0.0;
     if (WEIGHT_RT && p.colour.w > 0.0) exponent -= rates.x * difference(q.colour.rgb - p.colour.rgb);

@@ -1,4 +1,4 @@
-// Whether a number is one.
+// Whether a value is neither NaN nor infinite.
 bool finite(float v) {
     return (floatBitsToUint(v) & 0x7f800000u) != 0x7f800000u; // by bits: isinf may be optimised away
 }

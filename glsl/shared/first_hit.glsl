@@ -1,6 +1,6 @@
-// What a primary ray meets. Needs frame.glsl, bsdf.glsl, camera.glsl, traverse.glsl and surface.glsl before it.
+// The first hit of a camera ray, as a Guide. Needs frame.glsl, bsdf.glsl, camera.glsl, traverse.glsl and surface.glsl before it.
 
-// `delta`: a smooth surface, all of whose light counts as direct.
+// `delta` becomes true for a smooth surface, all of whose light counts as direct.
 Guide first_hit(Ray ray, uint mask_seed, out bool delta) {
     Hit hit = traverse(Segment(ray.origin, ray.direction, 3e38, mask_seed), frame.root);
     delta = false;

@@ -1,2 +1,2 @@
-// What all paths of a frame have in common. A uniform buffer, written in the order of commands: frames in flight keep theirs.
+// Constants of a frame. The command buffer writes this uniform buffer, so that a later frame does not change an earlier one's.
 layout(scalar, binding = 15) uniform Frame { FrameConstants frame; };

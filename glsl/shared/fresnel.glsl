@@ -2,9 +2,9 @@
 #ifndef FRESNEL_GLSL
 #define FRESNEL_GLSL
 
-// x: reflectance of a dielectric at cosine `c` >= 0, `eta` = index beyond / index on this side; y: cosine of the
-// refracted ray, 0 under total reflection. With g = eta cos_t both amplitudes need one root; the floor of `c` keeps
-// 0 / 0 away at grazing incidence and eta = 1.
+// Returns x: the reflectance of a dielectric at cosine `c` >= 0, `eta` = index beyond / index on this side; y: the cosine of
+// the refracted ray, 0 under total reflection. With g = eta cos_t both amplitudes need one root. The lower limit of `c`
+// prevents 0 / 0 at grazing incidence and eta = 1.
 vec2 fresnel_dielectric(float c, float eta) {
     c = max(c, 1e-10);
     float g2 = (eta - 1.0) * (eta + 1.0) + c * c;
@@ -15,7 +15,7 @@ vec2 fresnel_dielectric(float c, float eta) {
     return g2 > 0.0 ? vec2(0.5 * (rs * rs + rp * rp), min(g / eta, 1.0)) : vec2(1.0, 0.0);
 }
 
-// Reflectance of a conductor per channel. `eta2 - 1` before `c * c` keeps eta = 1, k = 0 finite and exactly 0.
+// Reflectance of a conductor per channel. Adding `c2` last makes it exactly 0 for eta = 1, k = 0.
 vec3 fresnel_conductor(float c, vec3 eta, vec3 k) {
     c = clamp(c, 1e-8, 1.0);
     float c2 = c * c;

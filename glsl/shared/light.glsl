@@ -1,4 +1,4 @@
-// Lights: choice by an alias table in proportion to power, sampling, and the densities that weigh both strategies.
+// Choice of a light by an alias table in proportion to power, sampling of a point on it, and the densities for MIS.
 
 struct LightSample {
     vec3 direction; // unit, from the surface to the light
@@ -7,10 +7,10 @@ struct LightSample {
     float pdf;      // per solid angle, for MIS; 0 for lights that no BSDF sample can hit
 };
 
-const float INFINITE_DISTANCE = 3e38; // of lights at infinity
+const float INFINITE_DISTANCE = 3e38; // stands for the distance of lights at infinity
 
-// `random` is left as a word that is independent of the choice and as well stratified as it was: where in its share of the slot
-// it fell. A hash fills up the bits that the choice used.
+// Chooses an entry of an alias table by the word `random`, and replaces that by its position within the entry's share of the
+// slot: a word independent of the choice and as well stratified. A hash fills up the bits that the choice used.
 uint alias_choose(usamplerBuffer table, uint n, inout uint random) {
     uint slot, low;
     umulExtended(random, n, slot, low);
@@ -23,8 +23,8 @@ uint alias_choose(usamplerBuffer table, uint n, inout uint random) {
     return stays ? slot : entry.alias;
 }
 
-// Environment direction: u = atan(x, -z) / 2pi, v = acos(y) / pi in the environment's own frame (row 0 is +y). acos would
-// lose rows near the poles; `sine` = length(d.xz).
+// Coordinates of a direction in the environment's own frame (row 0 is +y): u = atan(x, -z) / 2 pi, v = acos(y) / pi, the latter
+// by atan, since acos is inexact near the poles. `sine` = length(d.xz).
 vec2 environment_uv(vec3 d, float sine) {
     return vec2(atan(d.x, -d.z) * (0.5 / PI), atan(sine, d.y) / PI);
 }
@@ -86,15 +86,15 @@ void sample_environment(uint light, float chosen, uint word, vec2 u, inout Light
         float phi = 2.0 * PI * uv.x, theta = PI * uv.y;
         float sine = sin(theta);
         s.direction = transpose(environment_rotation(light)) * vec3(sin(phi) * sine, cos(theta), -cos(phi) * sine);
-        // The density of the texel that was drawn: looking it up by the direction could round into its neighbour.
+        // The density is that of the texel drawn: a look-up by direction could round into its neighbour.
         s.pdf = environment_pdf(light, texel, sine);
         s.radiance *= environment_lookup(uv);
     }
     s.radiance = s.pdf > 0.0 ? s.radiance / s.pdf : vec3(0.0);
 }
 
-// A triangle seen from a point: unit vectors to its corners, and its solid angle (Van Oosterom and Strackee 1983; the volume
-// comes from the edges, since unit vectors of a small triangle differ too little).
+// A triangle seen from a point: unit vectors to its corners, and its solid angle in steradians (Van Oosterom and Strackee 1983).
+// The volume in that formula is computed from the edges, since the unit vectors of a small triangle hardly differ.
 struct SphericalTriangle {
     vec3 a, b, c;
     float solid_angle;
@@ -109,15 +109,15 @@ SphericalTriangle spherical_triangle(vec3 a, vec3 e1, vec3 e2) {
     return t;
 }
 
-// Where sampling by solid angle pays and is exact in single precision; elsewhere triangles are sampled by area.
+// Between these limits sampling by solid angle lowers noise and is exact in single precision; elsewhere it is by area.
 const float MIN_SOLID_ANGLE = 3e-4, MAX_SOLID_ANGLE = 6.0; // steradians
 
 bool by_solid_angle(float solid_angle) {
     return FX_LARGE_LAMPS && solid_angle > MIN_SOLID_ANGLE && solid_angle < MAX_SOLID_ANGLE;
 }
 
-// Uniform by solid angle: u.x cuts off the triangle `a`, `b`, `d` with d on the arc from `a` to `c`, u.y chooses a point of the
-// arc from `b` to d (Arvo 1995). tan(ad / 2) follows from the solid angle's formula for `a`, `b`, d.
+// Samples a direction uniformly by solid angle (Arvo 1995): u.x cuts off the triangle `a`, `b`, d with d on the arc from `a` to
+// `c`, and u.y chooses a point of the arc from `b` to d. tan(ad / 2) follows from the formula of the solid angle of `a`, `b`, d.
 vec3 sample_spherical_triangle(SphericalTriangle t, vec2 u) {
     float half_angle = 0.5 * u.x * t.solid_angle;
     vec3 along = normalize(t.c - dot(t.a, t.c) * t.a);
@@ -146,7 +146,7 @@ void sample_triangle_light(vec3 p, Light light, vec2 u, inout LightSample s) {
         if (by_solid_angle(solid_angle)) bary = at;
     }
     vec3 on_light = a + bary.x * e1 + bary.y * e2;
-    // The front side is the only one that emits.
+    // Only the front side emits, so that the point is offset to that side.
     vec3 to_light = on_light + plane_clearance(n, abs(a), e1, e2) * n - p;
     float d2 = dot(to_light, to_light);
     s.distance = sqrt(d2);
@@ -157,7 +157,7 @@ void sample_triangle_light(vec3 p, Light light, vec2 u, inout LightSample s) {
         uint image = Material_emission_texture(materials, light.material);
         if (image != NONE) radiance *= texture_sample(image, texture_coordinates(light.triangle, bary), true).rgb;
     }
-    // The shadow ray ends before the light, whose mask would stop it with this probability.
+    // The shadow ray ends before the light, so that the light's own mask counts here.
     if (FX_ALPHA_MASKS) radiance *= surface_opacity(light.material, light.triangle, bary);
     bool lit = cosine > 0.0 && d2 > 0.0;
     s.pdf = lit ? light.probability * 2.0 * d2 / (cosine * doubled_area) : 0.0;
@@ -165,14 +165,14 @@ void sample_triangle_light(vec3 p, Light light, vec2 u, inout LightSample s) {
     s.radiance = lit ? radiance / s.pdf : vec3(0.0);
 }
 
-// 1 - cosine of half the angle that a sphere takes up, seen from outside; 0 from inside. Exact for small ones.
+// 1 - cosine of half the angle that a sphere subtends, seen from outside; 0 from inside. It keeps its digits for small spheres.
 float sphere_cap(vec3 to_centre, float radius) {
     float sine2 = radius * radius / max(dot(to_centre, to_centre), 1e-37);
     return sine2 < 1.0 ? sine2 / (1.0 + sqrt(1.0 - sine2)) : 0.0;
 }
 
-// Uniform by solid angle in the cone of the sphere. The point follows from the cone's own sine: a far sphere is smaller than
-// the rounding of a direction times its distance.
+// Samples a sphere uniformly by solid angle in the cone that it subtends. The point is computed from the cone's sine, since a
+// far sphere is smaller than the rounding of direction times distance.
 void sample_sphere_light(vec3 p, Light light, vec2 u, inout LightSample s) {
     float radius = light.b.x;
     vec3 to_centre = light.a - p;
@@ -191,7 +191,7 @@ void sample_sphere_light(vec3 p, Light light, vec2 u, inout LightSample s) {
     s.radiance = lit ? light.value / s.pdf : vec3(0.0);
 }
 
-// One light for the surface point `p`. Radiance is 0 when the light cannot reach the point.
+// Samples one light for the surface point `p`. The radiance is 0 when the light cannot reach the point.
 LightSample light_sample(vec3 p, uint word, vec2 u) {
     LightSample s = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0);
     uint index = frame.light_count == 1u ? 0u : alias_choose(light_table, frame.light_count, word);
@@ -221,7 +221,8 @@ LightSample light_sample(vec3 p, uint word, vec2 u) {
     return s;
 }
 
-// Density per solid angle with which light_sample chooses, from `origin`, a point of an emissive triangle or sphere hit by a ray.
+// Density per solid angle with which light_sample would choose, from `origin`, the point of an emissive triangle or sphere that
+// a ray hits at `t` under `cosine`.
 float triangle_light_pdf(Surface s, vec3 origin, float t, float cosine) {
     float density = frame.triangle_pdf_scale * Material_emission_weight(materials, s.material); // over area
     if (FX_SPHERES && s.radius > 0.0) {

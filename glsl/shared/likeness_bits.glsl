@@ -1,7 +1,7 @@
-// A word of `likeness.comp`: what a filter gathers in the lowest 5 bits, and 3 bits for each pixel of the 3 x 3 around one,
-// row by row.
+// A word of `likeness.comp`: in the lowest 5 bits the share of its window that a filter gathers, then 3 bits of likeness for
+// each pixel of the 3 x 3 around one, row by row.
 const float GATHERED_UNIT = 31.0, SEVENTHS = 7.0;
-// Pixels that look unlike still count a little: where all are, as in grass, there is no better source.
+// Unlike pixels still count a little: where all are unlike, as in grass, there is no better source.
 const float MIN_KINSHIP = 0.2;
 
 uint kinship_bit(int n) {

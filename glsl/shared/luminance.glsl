@@ -1,10 +1,10 @@
-// One number for a radiance.
+// Luminance of linear Rec. 709 radiance, and differences of it.
 
-const float ENOUGH = 4.0; // samples whose own variance is trusted
-const float STRONGEST = 1e18; // differences are cut there, so that their squares are finite
+const float ENOUGH = 4.0;     // from this number of samples on, their own variance is trusted
+const float STRONGEST = 1e18; // differences are cut here, so that their squares are finite
 
 float luminance(vec3 c) {
-    return dot(c, vec3(0.2126, 0.7152, 0.0722)); // Rec. 709
+    return dot(c, vec3(0.2126, 0.7152, 0.0722));
 }
 
 float contrast(vec3 a, vec3 b) {

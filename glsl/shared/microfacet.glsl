@@ -6,12 +6,12 @@
 
 const float INV_SQRT_PI = 0.564189583547756;
 
-// With only one distribution in the scene the other folds away.
+// With one distribution in the scene, the compiler removes the other.
 bool is_ggx(bool ggx) {
     return FX_GGX && (!FX_BECKMANN || ggx);
 }
 
-// Normal distribution D(m), per steradian. The floor of cos^2 keeps exp(-inf) / 0 away at grazing normals.
+// Normal distribution D(m), per steradian. The lower limit of cos^2 prevents exp(-inf) / 0 at grazing normals.
 float microfacet_d(bool ggx, vec3 m, float alpha) {
     float c2 = max(m.z * m.z, 1e-8);
     float a2 = alpha * alpha;
@@ -20,7 +20,7 @@ float microfacet_d(bool ggx, vec3 m, float alpha) {
     return shape * INV_PI / (a2 * c2 * c2);
 }
 
-// Smith's masking G1(w). Beckmann by Walter's rational fit (2007, eq. 27), its quotient cleared of fractions.
+// Smith's masking G1(w). Beckmann's is Walter's rational fit (2007, eq. 27), written with a single division.
 float microfacet_g1(bool ggx, vec3 w, float alpha) {
     float t = alpha * sqrt(dot(w.xy, w.xy));
     if (is_ggx(ggx)) return 2.0 * w.z / (w.z + sqrt(w.z * w.z + t * t));
@@ -37,7 +37,7 @@ float beckmann_area(float c, float s) {
     return c * (2.0 - erfc_scaled(cot) * e) + s * INV_SQRT_PI * e;
 }
 
-// Area of the visible microfacets projected along w, per unit of surface: w.z / G1 with the EXACT G1, finite at grazing
+// Area of the visible microfacets projected along w, per unit of surface: w.z / G1 with the exact G1, finite at grazing
 // angles. Visible normals have density D(m) max(w.m, 0) / area, which integrates to 1.
 float microfacet_area(bool ggx, vec3 w, float alpha) {
     float t = alpha * sqrt(dot(w.xy, w.xy));
@@ -45,8 +45,9 @@ float microfacet_area(bool ggx, vec3 w, float alpha) {
     return 0.5 * beckmann_area(w.z, t);
 }
 
-// Spherical caps (Dupuy and Benyoub 2023); `w` stretched to alpha 1. 1 - z is kept apart so that narrow lobes stay exact;
-// the floor of the last component keeps the sum of two opposite directions from vanishing.
+// Visible GGX normal by spherical caps (Dupuy and Benyoub 2023), for `w` stretched to alpha 1; not normalised. 1 - z is computed
+// without subtraction, so that narrow lobes keep their digits; the last component's lower limit keeps the sum of two opposite
+// directions from vanishing.
 vec3 ggx_visible_normal(vec3 w, vec2 u) {
     float t = u.y * (1.0 + w.z);
     return vec3(sqrt(t * (2.0 - t)) * circle_point(u.x) + w.xy, max(1.0 - t + w.z, 1e-6));
@@ -62,9 +63,9 @@ float beckmann_step(float b, float mass, float c, float s, float target) {
     return b - newton / clamp(1.0 - 0.5 * newton * curvature, 0.25, 4.0);
 }
 
-// Slope along the azimuth of (s, 0, c) from u: inverts the marginal of Heitz and d'Eon (2014). Jakob (2014) iterates in
-// erf(slope) from a power-law guess; ours takes two third-order steps in the slope itself, which need one erf and one
-// inverse: the CDF is met to about 1e-6. Beyond 4 lies less mass than a step of u.
+// Slope along the azimuth of (s, 0, c) from u: inverts the marginal distribution of Heitz and d'Eon (2014). Jakob (2014)
+// iterates in erf(slope) from a power-law guess. Departure: this takes two third-order steps in the slope itself, which need one
+// erf and one inverse, and meets the CDF to about 1e-6. Slopes beyond 4 have less probability than a step of u.
 float beckmann_slope(float c, float s, float u) {
     float cot = min(c / max(s, 1e-10), 4.0);
     float e = exp(-cot * cot);
@@ -76,7 +77,7 @@ float beckmann_slope(float c, float s, float u) {
     return clamp(beckmann_step(b, b < 0.0 ? tail : 2.0 - tail, c, s, target), -4.0, cot);
 }
 
-// `w` stretched to alpha 1; not normalised.
+// Visible Beckmann normal for `w` stretched to alpha 1; not normalised.
 vec3 beckmann_visible_normal(vec3 w, vec2 u) {
     float s2 = dot(w.xy, w.xy);
     float s = sqrt(s2);
@@ -86,7 +87,7 @@ vec3 beckmann_visible_normal(vec3 w, vec2 u) {
     return vec3(-along * azimuth + across * vec2(azimuth.y, -azimuth.x), 1.0);
 }
 
-// A normal visible from w: density D(m) max(w.m, 0) / microfacet_area(w).
+// Samples a normal visible from w with the density D(m) max(w.m, 0) / microfacet_area(w).
 vec3 microfacet_sample(bool ggx, vec3 w, float alpha, vec2 u) {
     vec3 stretched = normalize(vec3(alpha * w.xy, w.z));
     vec3 m = is_ggx(ggx) ? ggx_visible_normal(stretched, u) : beckmann_visible_normal(stretched, u);

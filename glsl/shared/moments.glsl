@@ -1,7 +1,7 @@
-// Count, means and co-moments of the guide I (four channels) and the noisy N (three) over a set of pixels, merged by
-// Chan's rule (Chan, Golub, LeVeque 1979): about the sets' own means, so that nothing cancels, and without ever
-// subtracting a pixel, so that nothing is left behind by one that has gone. The guide's means are counted from a point
-// within the window, so that far-away guides keep their digits.
+// Count, means and co-moments of the guide I (four channels) and the noisy N (three) over a set of pixels, merged by the rule
+// of Chan, Golub and LeVeque (1979). Co-moments are about the set's own means, so that nothing cancels, and pixels are never
+// subtracted, so that none leaves a rounding error behind. The guide's means are relative to a point within the window, so
+// that guides of large values keep their digits.
 #include "shared/store64.glsl"
 
 struct Moments {
@@ -11,34 +11,34 @@ struct Moments {
     vec3 yy;   // of I.y with I.yzw
     vec3 zz;   // of I.z with I.zw, then of I.w
     vec4 r;    // of N.r with I
-    vec4 g;
-    vec4 b;
+    vec4 g;    // of N.g with I
+    vec4 b;    // of N.b with I
 };
 
-const int MOMENTS = 8; // vec4s of a record, which are kept in pairs
+const int MOMENTS = 8; // vec4s of a record, stored in pairs
 const Moments NO_MOMENTS = Moments(vec4(0.0), vec4(0.0), vec4(0.0), vec3(0.0), vec3(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
 
 Moments unpacked(vec4 head, vec4 mean, vec4 xx, vec4 y, vec4 zr, vec4 rg, vec4 gb, vec4 b) {
     return Moments(head, mean, xx, y.xyz, vec3(y.w, zr.xy), vec4(zr.zw, rg.xy), vec4(rg.zw, gb.xy), vec4(gb.zw, b.xy));
 }
 
-// `at` counts pairs, and `step` is from one of a record to its next.
+// `at` is the index of a record's first pair, and `step` the distance from one pair to the next.
 #define MOMENTS_LOAD(at, step, FETCH) \
     unpacked(FETCH(2 * (at)), FETCH(2 * (at) + 1), FETCH(2 * ((at) + step)), FETCH(2 * ((at) + step) + 1), \
              FETCH(2 * ((at) + 2 * step)), FETCH(2 * ((at) + 2 * step) + 1), \
              FETCH(2 * ((at) + 3 * step)), FETCH(2 * ((at) + 3 * step) + 1))
 #define MOMENTS_STORE(to, at, step, m) \
-    to[at] = paired(m.head, m.mean); \
-    to[(at) + step] = paired(m.xx, vec4(m.yy, m.zz.x)); \
-    to[(at) + 2 * step] = paired(vec4(m.zz.yz, m.r.xy), vec4(m.r.zw, m.g.xy)); \
-    to[(at) + 3 * step].xyz = paired(vec4(m.g.zw, m.b.xy), m.b.zwzw).xyz
+    to[at] = pack64(m.head, m.mean); \
+    to[(at) + step] = pack64(m.xx, vec4(m.yy, m.zz.x)); \
+    to[(at) + 2 * step] = pack64(vec4(m.zz.yz, m.r.xy), vec4(m.r.zw, m.g.xy)); \
+    to[(at) + 3 * step].xyz = pack64(vec4(m.g.zw, m.b.xy), m.b.zwzw).xyz
 
 Moments rebased(Moments m, vec4 by) {
     m.mean -= by;
     return m;
 }
 
-// `m` with a set of these means and `count` pixels that do not vary.
+// Merges into `m` a set of `count` pixels with the means `n` and `i` and no co-moments.
 void merge_means(inout Moments m, float count, vec3 n, vec4 i) {
     vec3 off_n = n - m.head.yzw;
     vec4 off_i = i - m.mean;
@@ -54,9 +54,9 @@ void merge_means(inout Moments m, float count, vec3 n, vec4 i) {
     m.b += off_n.b * scaled;
 }
 
-// `m` with `other` if it `is` there, and as it was if not, whatever `other` holds then. Both about the same point.
-void merge(inout Moments m, Moments other, bool is) {
-    if (!is) other = Moments(vec4(0.0, m.head.yzw), m.mean, vec4(0.0), vec3(0.0), vec3(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
+// Merges `other` into `m` if it `exists`; if not, `other` may hold anything. Both are relative to the same point.
+void merge(inout Moments m, Moments other, bool exists) {
+    if (!exists) other = Moments(vec4(0.0, m.head.yzw), m.mean, vec4(0.0), vec3(0.0), vec3(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
     merge_means(m, other.head.x, other.head.yzw, other.mean);
     m.xx += other.xx;
     m.yy += other.yy;
@@ -66,9 +66,8 @@ void merge(inout Moments m, Moments other, bool is) {
     m.b += other.b;
 }
 
-// Of a sum over `count` pixels.
+// 1 / `pivot` of sums over `count` pixels; 0 leaves out a channel that is constant or depends on the others.
 float reciprocal_pivot(float pivot, float diagonal, float count) {
-    // A channel that the others explain, or that is constant, takes no part.
     return pivot > 1e-5 * diagonal && pivot > 1e-20 * count ? 1.0 / pivot : 0.0;
 }
 

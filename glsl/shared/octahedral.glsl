@@ -1,4 +1,4 @@
-// Unit vectors as points of the square [-1, 1]^2: the octahedron unfolded (Meyer et al. 2010). In 32 bits: snorm 2 x 16.
+// Unit vectors as points of the square [-1, 1]^2, an unfolded octahedron (Meyer et al. 2010); encoded as two 16-bit snorms.
 #ifndef OCTAHEDRAL_GLSL
 #define OCTAHEDRAL_GLSL
 

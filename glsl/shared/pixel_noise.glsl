@@ -1,12 +1,12 @@
-// What the samples say of a pixel's noise. Needs `push` (PriorityPush) and `stats`.
+// The noise of a pixel, estimated from the statistics of its samples. Needs `push` (PriorityPush) and `stats`.
 #include "shared/luminance.glsl"
 
-// Samples' worth of trust in the noise of the surroundings.
+// The variance of the surroundings counts as that of this many samples.
 const float PRIOR_SAMPLES = 32.0;
-// Luminance is cut there, so that its sum over samples and pixels is finite.
+// Luminance is cut here, so that its sum over samples and pixels is finite.
 const float MAX_LUMINANCE = 1e29;
 
-// (squared deviations summed, mean over channels; degrees of freedom; luminance times samples; samples)
+// Returns (sum of squared deviations, mean over channels; degrees of freedom; luminance times samples; samples).
 vec4 moments(uint pixel, out vec3 mean) {
     PixelStats s = PixelStats_load(stats, pixel);
     mean = s.mean;
@@ -19,8 +19,9 @@ vec4 moments(uint pixel) {
     return moments(pixel, mean);
 }
 
-// Standard deviation of one sample over the luminance (RAS), both steadied by the surroundings, `own` included, of which a
-// few samples say more than of the pixel alone: 1 while nothing is known, 0 where the mean is good enough or the pixel full.
+// Standard deviation of one sample over the luminance (Schalk 2018). Both are smoothed by the surroundings `around`, which
+// include `own`, since few samples tell little of one pixel. It is 1 while nothing is known, and 0 where the mean's relative
+// error is below the threshold or the pixel has `limit` samples.
 float noise(vec4 own, vec4 around) {
     if (around.y == 0.0) return 1.0;
     float variance = (own.x + PRIOR_SAMPLES * around.x / around.y) / (own.y + PRIOR_SAMPLES);

@@ -1,4 +1,4 @@
-// The budget's proportion to the weights, found once by one thread: 64-bit division is slow on every device.
+// Computes the budget's proportion to the weights once, in one thread, since 64-bit division is slow on every device.
 void set_proportion(inout Apportionment s, uint64_t budget, uint64_t weights) {
     uint64_t d = max(weights, 1UL);
     bool small = budget <= 0xffffffffUL;
@@ -11,5 +11,5 @@ void set_proportion(inout Apportionment s, uint64_t budget, uint64_t weights) {
 }
 
 Proportion proportion_of(Apportionment s) {
-    return Proportion(wide(s.budget), wide(s.weights), wide(s.ratio), wide(s.whole), wide(s.part));
+    return Proportion(join64(s.budget), join64(s.weights), join64(s.ratio), join64(s.whole), join64(s.part));
 }

@@ -1,10 +1,10 @@
-// A remainder, moved up by Apportionment.up >= 1 so that all have the same digits: 64 bits, low word first, bit 0 clear.
-// No key at all, which no sample is left for: bit 0 says so, all digits before it are the smallest.
+// Keys of the radix selection: a remainder shifted left by Apportionment.up >= 1, so that all have the same number of digits; 64
+// bits, low word first, bit 0 clear. Bit 0 marks FULL, the key of pixels that take no further sample.
 const uvec2 FULL = uvec2(1u, 0u);
 
 bool is_full(uvec2 key) { return (key.x & 1u) != 0u; }
 
-// Of a key: (1 when it is selected, 1 when its order of index decides).
+// Returns (1 when the key is selected, 1 when it is tied and the order of index decides).
 uvec2 selected_tied(Apportionment s, uvec2 key) {
     uvec2 part = key & s.mask;
     bool above = part.y > s.prefix.y || (part.y == s.prefix.y && part.x > s.prefix.x);

@@ -1,4 +1,4 @@
-// Random numbers as a function of (pixel, sample index, dimension pair, seed) only. Needs effects.glsl.
+// Random numbers that depend on (pixel, sample index, dimension pair, seed) only. Needs effects.glsl.
 #ifndef SAMPLER_GLSL
 #define SAMPLER_GLSL
 
@@ -10,7 +10,8 @@ struct Sampler {
 
 #include "shared/pcg.glsl"
 
-// Owen scrambling of a bit-reversed word: no bit depends on higher ones. Laine-Karras with Vegdahl's constants (2021).
+// Owen scrambling of a bit-reversed word, in which no bit depends on higher ones: Laine and Karras's hash with Vegdahl's
+// constants (2021).
 uint owen_reversed(uint x, uint seed) {
     x ^= x * 0x3d20adeau;
     x += seed;
@@ -20,8 +21,8 @@ uint owen_reversed(uint x, uint seed) {
     return x;
 }
 
-// Second Sobol dimension, result bit-reversed: bit j is the parity of the index bits whose position contains j
-// (Pascal's triangle mod 2, by Lucas), a Kronecker power and so five exclusive-or steps.
+// Second Sobol dimension, bit-reversed: bit j is the parity of the index bits whose position contains the bits of j (Pascal's
+// triangle mod 2, Lucas's theorem). That matrix is a Kronecker power, so that five exclusive-or steps suffice.
 uint sobol_1_reversed(uint index) {
     index ^= (index >> 1) & 0x55555555u;
     index ^= (index >> 2) & 0x33333333u;
@@ -30,13 +31,14 @@ uint sobol_1_reversed(uint index) {
     return index ^ (index >> 16);
 }
 
-// Both hashes are bijections: pixels never share a stream under one seed, nor one pixel under two seeds.
+// The random numbers of a sample. Both hashes are bijections: two pixels never share a stream under one seed, nor does one pixel
+// under two seeds.
 Sampler sampler_start(uint pixel, uint index, uint seed) {
     return Sampler(pcg(pixel + pcg(seed)), FX_INDEPENDENT ? index : bitfieldReverse(index));
 }
 
-// Two raw 32-bit words for dimensions 2 * pair and 2 * pair + 1: padded Sobol (Burley 2020). The first dimension needs
-// no matrix: it is the bit-reversed index.
+// Two 32-bit words for the dimensions 2 * pair and 2 * pair + 1: padded, shuffled and scrambled Sobol points (Burley 2020). The
+// first dimension is the bit-reversed index.
 uvec2 sample_2d_bits(Sampler s, uint pair) {
     uint h = pcg(s.seed + pair);
     if (FX_INDEPENDENT) {

@@ -1,13 +1,13 @@
-// What the filters make of a pixel before they trust it. Twin: src/denoise/filter/pixel.rs.
+// Limits that filters cut input pixels to, so that no value makes NaN or infinities. Twin: src/denoise/filter/pixel.rs.
 #include "shared/finite.glsl"
 #include "shared/octahedral.glsl"
 
 const uint NO_NORMAL = 0x80008000u; // packSnorm2x16 never returns -32768
-const float LARGEST = 1e24;         // radiance beyond it is cut, so that differences and sums stay finite
-const float FARTHEST = 1e18;        // the same for positions, whose squares are summed
-const float WIDEST = 1e7;           // the same for the guided filter's channels
+const float LARGEST = 1e24;         // radiance is cut here, so that differences and sums stay finite
+const float FARTHEST = 1e18;        // positions are cut here, whose squares are summed
+const float WIDEST = 1e7;           // the guided filter's channels are cut here
 
-// Radiance and the samples behind it; all zero where nothing is known.
+// Radiance, and in w its number of samples; all zero where it is unknown.
 vec4 known_radiance(vec4 c) {
     bool known = c.w > 0.0 && finite(c.w) && finite(c.rgb);
     return known ? vec4(clamp(c.rgb, -LARGEST, LARGEST), c.w) : vec4(0.0);

@@ -1,5 +1,5 @@
-// The scene's arrays as texel buffers, and typed access to them. Bound alike by every kernel that traces.
-// Records that mix floats and words are fetched as words: a float fetch may flush small integers, denormals, to 0.
+// The scene's arrays as texel buffers, which every kernel that traces binds, and typed access to them. Records that mix floats
+// and integers are fetched as integers: a float fetch may flush denormals, which small integers are, to 0.
 layout(binding = 0) uniform usamplerBuffer nodes; // of BvhNode
 layout(binding = 1) uniform usamplerBuffer triangles; // of Triangle
 layout(binding = 2) uniform usamplerBuffer shading; // of Shading
@@ -12,7 +12,7 @@ layout(binding = 8) uniform usamplerBuffer light_table; // of AliasEntry
 layout(binding = 9) uniform samplerBuffer environment; // of vec4
 layout(binding = 10) uniform usamplerBuffer environment_table; // of AliasEntry
 
-// Matrices for column vectors.
+// Matrices that multiply column vectors.
 mat4x3 world_from_object(uint instance) {
     return transpose(mat3x4(Instance_world0(instances, instance), Instance_world1(instances, instance),
                             Instance_world2(instances, instance)));

@@ -1,4 +1,4 @@
-// How alike a pixel's surroundings are. Needs `push` (PriorityPush) and `guides`.
+// Similarity of a pixel's surroundings by geometry. Needs `push` (PriorityPush) and `guides`.
 #include "shared/portable_math.glsl"
 
 const float SIMILARITY_UNIT = 65536.0;
@@ -13,7 +13,7 @@ uint similarity(uint p, uint q) {
     return uint(rounded);
 }
 
-// q = 1 - W_p: mean dissimilarity over the window, which for an even edge reaches one pixel further up and left. Pixels
+// q = 1 - W_p: the mean dissimilarity over the window, which for an even edge reaches one pixel further up and left. Pixels
 // beyond the film do not count.
 float importance(uint p) {
     ivec2 size = ivec2(push.size), at = ivec2(p % push.size.x, p / push.size.x);

@@ -1,5 +1,5 @@
-// Spheres, which take the place of triangles: what a hit says of them, and their texture coordinates. A hit holds the unit
-// normal, from the centre, as a point of the octahedron's square in place of two barycentric weights: no trigonometry.
+// Spheres, stored in place of triangles, and their texture coordinates. In place of two barycentric weights a hit holds the unit
+// normal, from the centre, as an octahedral point, which needs no trigonometry.
 #include "shared/octahedral.glsl"
 #include "shared/warp.glsl"
 
@@ -17,13 +17,13 @@ Sphere sphere_of(uint triangle) {
     return Sphere(t.v0, t.v1, t.v2, t.primitive);
 }
 
-// From the centre, as long as the radius, a quarter turn of azimuth from `meridian`.
+// Vector from the centre to the equator a quarter turn of azimuth from `meridian`, as long as the radius.
 vec3 sphere_side(Sphere s) {
     vec3 side = cross(s.pole, s.meridian) * inversesqrt(dot(s.pole, s.pole));
     return (s.flags & SPHERE_MIRRORED) != 0u ? -side : side;
 }
 
-// u is the azimuth, v rises from pole to pole: as those of the tessellated shape.
+// u is the azimuth, v rises from pole to pole, as on the tessellated shape.
 vec2 sphere_coordinates(Sphere s, vec3 normal) {
     float x = dot(normal, s.meridian), y = dot(normal, sphere_side(s));
     float u = atan(y, x) * (0.5 / PI);

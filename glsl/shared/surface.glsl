@@ -1,4 +1,4 @@
-// From a hit to what shading needs: position, normals, a resolved BSDF, emission.
+// Computes what shading needs of a hit: position, normals, the resolved BSDF, emission.
 #include "shared/octahedral.glsl"
 
 struct Surface {
@@ -25,9 +25,9 @@ vec3 unit_vector(vec3 v, out float len) {
     return scaled / max(l, 1e-37);
 }
 
-// How far along the unit normal a ray must start so that it meets no other triangle of the same plane. Rounding moves the
-// interpolated point by some 2^-24 of the numbers that it is a sum of (`reach`), and the distance that the triangle test
-// computes by as much of the triangle's size. A quarter of this was enough for all but one in 10^4 rays, half for all.
+// Distance along the unit normal at which a ray must start so that it meets no other triangle of the same plane. Rounding moves
+// the interpolated point by about 2^-24 of the numbers that it is a sum of (`reach`), and the distance that the triangle test
+// computes by as much of the triangle's size. A quarter of this distance sufficed for all but one in 10^4 rays, half for all.
 const float CLEARANCE = 4.76837158203125e-7; // 2^-21
 
 float plane_clearance(vec3 n, vec3 reach, vec3 e1, vec3 e2) {
@@ -35,12 +35,13 @@ float plane_clearance(vec3 n, vec3 reach, vec3 e1, vec3 e2) {
     return CLEARANCE * dot(abs(n), reach + max(edge.x, max(edge.y, edge.z)));
 }
 
-// Where a ray that leaves the surface towards `w` starts.
+// Origin of a ray that leaves the surface towards `w`.
 vec3 ray_origin(Surface s, vec3 w) {
     return s.position + (dot(w, s.geometric) < 0.0 ? -s.clearance : s.clearance) * s.geometric;
 }
 
-// Height map (Blinn 1978) or tangent-space normal map. `e1`, `e2` are edges, `d1`, `d2` their extents in uv.
+// The normal perturbed by a height map (Blinn 1978) or a tangent-space normal map. `e1`, `e2` are edges, `d1`, `d2` their
+// extents in uv.
 vec3 perturbed_normal(Surface s, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
     uint image = Material_bump_texture(materials, s.material);
     float det = d1.x * d2.y - d2.x * d1.y;
@@ -75,7 +76,7 @@ vec3 perturbed_normal(Surface s, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
     }
     float len;
     n = unit_vector(n, len);
-    return len > 0.0 && len < 1e37 ? n : s.normal; // not where uv spans no or all of space
+    return len > 0.0 && len < 1e37 ? n : s.normal; // degenerate uv coordinates leave the normal as it is
 }
 
 // The sum of the magnitudes that `m` adds up for a point of coordinates up to `p`.
@@ -141,7 +142,7 @@ Surface surface_at(Hit hit) {
         mat4x3 object = object_from_world(hit.instance);
         normals_from_object = transpose(mat3(object));
         p0 = world * vec4(p0, 1.0);
-        // Rays are taken to the object and points from it: both round.
+        // Rays are transformed to object space and points from it, which both round.
         reach = magnitude(world, magnitude(object, abs(p0)));
         e1 = mat3(world) * e1;
         e2 = mat3(world) * e2;
@@ -181,24 +182,24 @@ Surface surface_at(Hit hit) {
 // Vertex normals and maps turn the shading normal away from the plane of its triangle.
 const bool MAPS = FX_BUMP_MAPS || FX_NORMAL_MAPS, SHADING_NORMALS = FX_SMOOTH_NORMALS || MAPS;
 
-// 1 where `w` leaves the surface on the side of its normals, else -1. The plane decides, not the shading normal: that of a
-// coarse mesh turns away from the viewer before the rim.
+// 1 where `w` leaves the surface on the side of its normals, else -1. The triangle's plane decides, since the shading normal of
+// a coarse mesh turns away from the viewer before the silhouette.
 float side_of(Surface s, vec3 w) {
     return dot(s.smooth_normal, s.geometric) * dot(s.geometric, w) < 0.0 ? -1.0 : 1.0;
 }
 
-// The normals of a surface as a viewer needs them: the smooth one and the one that scatters.
+// The normals of a surface for a viewer: the smooth one, and the one that lobes are around.
 struct Facing {
     vec3 smooth_normal;
     vec3 normal;
 };
 
-const float MIN_ELEVATION = 1e-3; // sine, of what a bent normal raises above the horizon
+const float MIN_ELEVATION = 1e-3; // sine of a direction's elevation above the horizon after bending
 
-// For a viewer towards `wo`; on the viewer's side where the surface `turns`. A smooth normal that faces away is bent until
-// `wo` is above its horizon, and for surfaces with a mirror image (`mirrors`) until that is above the plane (Keller et al.
-// 2017, "The Iray light transport simulation and rendering system", A.3; here along the plane's normal, which is defined for
-// all of them). A map's normal that faces away is turned by half a turn around the smooth one, as Mitsuba 3 does.
+// Normals for a viewer towards `wo`, on the viewer's side where the surface `turns`. A smooth normal that faces away is bent until
+// `wo` is above its horizon, and for surfaces with a mirror image (`mirrors`) until that image is above the plane (Keller et al.
+// 2017, "The Iray light transport simulation and rendering system", A.3; departure: along the plane's normal, which is always
+// defined). A map's normal that faces away is turned by half a turn around the smooth one, as in Mitsuba 3.
 Facing facing_normals(Surface s, vec3 wo, bool turns, bool mirrors) {
     float side = side_of(s, wo);
     vec3 n = side * s.smooth_normal, mapped = side * s.normal;
@@ -216,9 +217,9 @@ Facing facing_normals(Surface s, vec3 wo, bool turns, bool mirrors) {
     return Facing(back * n, back * mapped);
 }
 
-// The share of a direction's light that lobes around `facing.normal` keep; `z` is the direction's component along that. None
-// where the direction is on the other side of the plane than of that normal: an opaque surface would see its own inside. Maps
-// shadow themselves: Conty Estevez, Lecocq and Stein 2019, Ray Tracing Gems, chapter 12.
+// Share of the light along `w` that lobes around `facing.normal` keep; `z` is the component of `w` along that normal. It is 0
+// where the plane and the normal disagree about the side of `w`, or an opaque surface would see its own inside. Maps shadow
+// themselves (Conty Estevez, Lecocq and Stein 2019, Ray Tracing Gems, chapter 12).
 float light_share(Surface s, Facing facing, vec3 w, float z) {
     if (!SHADING_NORMALS) return 1.0;
     bool crosses = dot(facing.normal, s.geometric) * dot(s.geometric, w) * z < 0.0;
@@ -242,7 +243,7 @@ vec3 surface_emission(Surface s) {
     return image == NONE ? emission : emission * texture_sample(image, s.uv, true).rgb;
 }
 
-// What an effect alone needs is not fetched where the scene has none of it: the compiler drops what is not used.
+// The material with its textures looked up. The compiler drops fetches for effects that the scene does not have.
 Bsdf surface_bsdf(Surface s) {
     Material m = Material_load(materials, s.material);
     Bsdf b;

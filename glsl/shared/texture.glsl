@@ -1,5 +1,6 @@
-// Textures out of one texel buffer, filtered here (bilinear): lavapipe has no descriptor indexing. There are no mip levels:
-// the samples of a pixel average a texture without the bias of a blur, and levels would cost a third more memory.
+// Bilinear lookups of textures, which share one texel buffer since lavapipe has no descriptor indexing; a GPU's texture units go
+// unused. There are no mip levels: a pixel's samples average a texture without the bias of a blur, and levels would cost a third
+// more memory.
 
 vec3 linear_from_srgb(vec3 c) {
     return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045)));
@@ -7,14 +8,14 @@ vec3 linear_from_srgb(vec3 c) {
 
 vec4 texture_texel(Texture image, ivec2 at, bool colour) {
     ivec2 edge = ivec2(image.width, image.height);
-    // Coordinates come in as floor(uv * size) with uv already wrapped to one period, so one step over is enough.
+    // Coordinates lie at most one texel outside the image, so that adding or subtracting one period wraps them.
     at = (image.flags & TEXTURE_CLAMP) != 0u ? clamp(at, ivec2(0), edge - 1) : at + mix(ivec2(0), edge, lessThan(at, ivec2(0)));
     at = mix(at, at - edge, greaterThanEqual(at, edge));
     vec4 c = unpackUnorm4x8(texelFetch(texels, int(image.first) + at.y * edge.x + at.x).x);
     return colour ? vec4(linear_from_srgb(c.rgb), c.a) : c;
 }
 
-// `colour`: TEXTURE_SRGB, known from what a texture is for, so that masks and heights are read without decoding.
+// `colour` decodes sRGB. The caller knows it from the texture's use, so that masks and heights are compiled without decoding.
 vec4 texture_sample(uint index, vec2 uv, bool colour) {
     Texture image = Texture_load(textures, index);
     uv = uv * image.scale + image.offset;
@@ -28,7 +29,7 @@ vec4 texture_sample(uint index, vec2 uv, bool colour) {
     return mix(top, low, f.y);
 }
 
-// The share of rays that a surface stops at a point of a triangle.
+// Opacity of a surface at a point of a triangle: the share of rays that it stops.
 float surface_opacity(uint material, uint triangle, vec2 barycentric) {
     if ((Material_flags(materials, material) & MATERIAL_MASKED) == 0u) return 1.0;
     float opacity = Material_opacity(materials, material);
@@ -36,8 +37,8 @@ float surface_opacity(uint material, uint triangle, vec2 barycentric) {
     return image == NONE ? opacity : opacity * texture_sample(image, texture_coordinates(triangle, barycentric), false).r;
 }
 
-// Partly transparent surfaces let a ray pass with the probability 1 - opacity, decided by a hash, so the light that
-// gets through is right on average and a cut-out mask (0 or 1) is exact.
+// Whether a partly transparent surface stops a ray. A ray passes with the probability 1 - opacity, decided by a hash, so that the
+// light that passes is right on average, and a cut-out mask (0 or 1) is exact.
 bool mask_blocks(uint triangle, uint instance, vec2 barycentric, uint seed) {
     float opacity = surface_opacity(material_of(triangle, instance), triangle, barycentric);
     // Two copies of a triangle on one ray decide independently.

@@ -1,17 +1,19 @@
-// Closest hit and any hit through eight-way compressed nodes (Ylitie, Karras, Laine, HPG 2017), as obvhs builds them,
-// and a triangle test whose edges are watertight. The including kernel binds `nodes`, `triangles`, `instances`,
-// and for masks `shading`, `materials`, `textures`, `texels`. A device that masks lanes (lavapipe) executes all of it for
-// every node: fewer variables that live from step to step, and fewer instructions, count for more than early exits. It also
-// runs a loop's body once more for no lane where the test stands at the head, so loops test at their end.
+// Closest hit and any hit of a ray through eight-way compressed nodes (Ylitie, Karras, Laine, HPG 2017), as obvhs builds them,
+// with a watertight triangle test. The including kernel binds `nodes`, `triangles`, `instances`, and for masks `shading`,
+// `materials`, `textures`, `texels`.
+//
+// The code is shaped for lavapipe, which executes all of it under masks for every node: few instructions and few variables that
+// live from step to step count for more than early exits. A loop that tests at its head would run its body once more with no
+// lane active, so loops test at their end. A GPU would gain from early exits, and loses a little by both.
 
 struct Hit {
-    float t;          // in lengths of the ray's direction
-    uint triangle;    // leaf order; NONE on a miss
+    float t;          // distance in lengths of the ray's direction
+    uint triangle;    // index in leaf order; NONE on a miss
     uint instance;    // NONE without instances
     float b1, b2;     // weights of vertices 1 and 2; of a sphere, see sphere.glsl
 };
 
-// A ray and what it asks for: hits before `t_max`, in lengths of `direction`.
+// A ray whose hits count before `t_max`, in lengths of `direction`.
 struct Segment {
     vec3 origin;
     vec3 direction;
@@ -19,8 +21,8 @@ struct Segment {
     uint mask_seed; // decides hits on partly transparent surfaces
 };
 
-// Groups that a ray of this scene can leave behind (scene::bvh::stack_size). A few stay in registers. lavapipe writes to an
-// array lane by lane, with a branch each: to write always, for nothing where no group is left, costs less than to choose.
+// Number of groups that a ray of this scene can leave on its stack (scene/build/bvh.rs). Two stay in registers. lavapipe writes
+// to an array lane by lane, with a branch each, so that an unconditional write, useless where no group is left, costs less.
 layout(constant_id = 102) const uint STACK = TRAVERSAL_STACK;
 const bool SHALLOW = STACK <= 2u;
 uvec2 stack[STACK + 1u];
@@ -32,7 +34,7 @@ void push_group(inout uint depth, uvec2 group, bool left) {
     } else {
         stack[depth] = group;
     }
-    // Whatever the nodes are, `stack` is not left: scenes need no more than it has.
+    // Valid scenes need no more than STACK; the limit keeps invalid ones within the array.
     depth = SHALLOW ? depth + uint(left) : min(depth + uint(left), STACK);
 }
 
@@ -43,14 +45,15 @@ uvec2 pop_group(inout uint depth) {
     return group;
 }
 
-// Watertight (Woop, Benthin, Wald, JCGT 2013): all triangles project a shared vertex to the same point of the plane across
-// the ray, and the two edge functions of a shared edge are exact negatives of each other (precise forbids fused
-// multiply-adds). Two axes change places where the paper permutes three: that mirrors triangles, and both windings hit.
+// A ray prepared for the watertight test (Woop, Benthin, Wald, JCGT 2013): all triangles project a shared vertex to the same point
+// of the plane across the ray, and the two edge functions of a shared edge are exact negatives of each other (precise forbids
+// fused multiply-adds). Departure: two axes are swapped where the paper permutes three, which mirrors triangles; both windings
+// hit.
 struct RaySpace {
     vec3 origin;
-    vec3 direction; // what an instance transforms, and spheres need
-    vec3 inverse;   // of the direction
-    vec3 shear;     // takes the direction to (0, 0, 1) once its largest component is the last
+    vec3 direction; // as given; instances and spheres need it
+    vec3 inverse;   // 1 / direction
+    vec3 shear;     // maps the direction to (0, 0, 1) once its largest component is the last
     bool along_x;   // the largest component is x
     bool along_y;
     uint octant;    // in every byte, 7 minus the octant that the ray points to
@@ -93,18 +96,18 @@ bool intersect_triangle(RaySpace r, uint index, float t_max, out float t, out ve
     precise float v = p.x * s.y - p.y * s.x;
     precise float w = q.x * p.y - q.y * p.x;
     float det = u + v + w;
-    // Comparisons, where minima and maxima would each have to look for NaN.
+    // Comparisons are cheaper than minima and maxima, which have to test for NaN.
     bool inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
-    // Coordinates of up to 1e12 shear to 4e12: their triangles have areas of up to 6.4e25, and the products below fit.
+    // Coordinates of up to 1e12 shear to 4e12; areas are up to 6.4e25, and the products below are finite (MAX_COORDINATE).
     float inv = 1.0 / det;
     t = (u * a.z + v * b.z + w * c.z) * (inv * r.shear.z);
     barycentric = vec2(v, w) * inv;
     return inside && det != 0.0 && t > 0.0 && t < t_max;
 }
 
-// The point of the ray that is nearest to the centre comes first, in two steps: what is left of it along the ray would count
-// for a far or small sphere (after Haines, Guenther, Akenine-Moeller 2019, Ray Tracing Gems, chapter 7). Half the chord
-// leads from there to both hits. A ray that `leaves` the sphere meets only its far side. A mask decides on each side.
+// Intersects a sphere (after Haines, Guenther, Akenine-Moeller 2019, Ray Tracing Gems, chapter 7). It finds the ray's point
+// nearest to the centre in two steps, since the first one's rounding matters for far or small spheres; both hits lie half the
+// chord from there. A ray that `leaves` the sphere meets only its far side. A mask decides on each side separately.
 bool intersect_sphere(RaySpace r, uint index, uint instance, float t_max, bool leaves, uint mask_seed, out float t,
                       out vec2 normal) {
     vec3 pole = Triangle_v1(triangles, index), from_centre = r.origin - Triangle_v0(triangles, index);
@@ -116,7 +119,7 @@ bool intersect_sphere(RaySpace r, uint index, uint instance, float t_max, bool l
     nearest -= rest * d;
     along += rest;
     float squared = dot(pole, pole) - dot(nearest, nearest);
-    float chord = sqrt(max(squared, 0.0)); // half of it
+    float chord = sqrt(max(squared, 0.0)); // half its length
     bool enters = !leaves && -along - chord > 0.0;
     normal = octahedral_point(nearest + (enters ? -chord : chord) * d);
     if (FX_ALPHA_MASKS) {
@@ -130,11 +133,12 @@ bool intersect_sphere(RaySpace r, uint index, uint instance, float t_max, bool l
     return squared >= 0.0 && t > 0.0 && t < t_max;
 }
 
-// Distances to planes round at 2^-24 in four steps each, near and far; boxes that share a face must not part (Ize 2013).
+// Near and far distances round at 2^-24 in four steps each; boxes that share a face must not leave a gap (Ize 2013).
 const int SLAB_ROUNDING = 8; // units in the last place
 
-// Tests four children; the result has one bit per inner child (24..31, in order of visit) and one per triangle (0..23).
-// Distances are compared as integers, which order floats alike as long as one of the two is not negative.
+// Tests four children. The result has one bit for each inner child hit (24..31, in order of visit) and for each of the leaf
+// children's triangles (0..23). Distances are compared as integers, which order floats correctly as long as one of the two is
+// not negative.
 uint intersect_children(uint meta, uint octant, uvec3 near_q, uvec3 far_q, vec3 scale, vec3 origin, int t_max) {
     uint inner = ((meta & (meta << 1)) & 0x10101010u) >> 4;
     uint bit_index = (meta ^ (octant & (inner * 0xffu))) & 0x1f1f1f1fu;
@@ -150,7 +154,7 @@ uint intersect_children(uint meta, uint octant, uvec3 near_q, uvec3 far_q, vec3 
     return mask;
 }
 
-// Returns the hit mask; `children` = (first inner child, first primitive, inner mask).
+// Tests all eight children. Returns the hit mask; `children` = (first inner child, first primitive, mask of inner children).
 uint intersect_node(RaySpace r, uint index, float t_max, out uvec3 children) {
     BvhNode node = BvhNode_load(nodes, index);
     uint exponents = node.e_imask;
@@ -168,24 +172,25 @@ uint intersect_node(RaySpace r, uint index, float t_max, out uvec3 children) {
            intersect_children(node.meta.y, r.octant, uvec3(x.y, y.y, z.y), uvec3(x.w, y.w, z.w), scale, origin, t);
 }
 
-// Takes the highest of `bits`, which are below 2^24: by the exponent of a float, where findMSB is a long sequence.
-// 0 for no bits: see `intersect_leaves`.
+// Removes the highest of `bits`, which are below 2^24, and returns its index; 0 for no bits, see `intersect_triangles`. It reads a
+// float's exponent, since findMSB is a long sequence on lavapipe; on a GPU findMSB would be faster.
 uint take_highest(inout uint bits) {
     uint f = floatBitsToUint(float(int(bits)));
     bits ^= uint(int(uintBitsToFloat(f & 0xff800000u)));
     return max(f >> 23, 127u) - 127u;
 }
 
-// Bits set in a byte: each copied to a place of its own, the nibbles summed by the second product.
+// Number of bits set in a byte: the first product copies each to a nibble of its own, the second sums the nibbles. It replaces
+// bitCount for lavapipe; on a GPU bitCount would be faster.
 uint count_bits(uint byte) {
     return ((((byte * 0x08040201u) >> 3) & 0x11111111u) * 0x11111111u) >> 28;
 }
 
-// Where a ray stands.
+// The state of a ray's traversal between two steps.
 struct Traversal {
     Hit hit;         // the closest so far
-    uint base;       // of the group: the first of inner children, or of instances
-    uint bits;       // hit bits (24..31) and inner mask of children, or bits below 24 of instances
+    uint base;       // current group: index of its first inner child or instance
+    uint bits;       // current group: hit bits (24..31) and mask of inner children, or hit bits below 24 of instances
     uint depth;      // groups on the stack
     uint bottom;     // depth at which `instance` was entered
     uint instance;   // NONE in the top (or only) level
@@ -215,10 +220,10 @@ void enter_instance(inout Traversal t, RaySpace world, uvec2 leaves) {
     t.bits = 0x80000000u;
 }
 
-// Tests the triangles of `left`, bits that count from `first`; true where one is met. lavapipe fetches for masked lanes too:
-// so that those miss no cache, a lane without triangles stays at the one that it tested last, or at the first of the scene.
-// An any hit ends the loop one triangle late: what to fetch next then waits for no test, and tests overlap.
-// What lives from round to round is scalar: vectors would be copied.
+// Tests the triangles whose bits are set in `left`, counted from `first`; returns whether one is hit. For lavapipe, which fetches
+// for masked lanes too, a lane without triangles keeps the index that it tested last, or the scene's first, so that it misses no
+// cache. An any hit ends the loop one triangle late, so that the next fetch waits for no test and tests overlap. Variables that
+// live from turn to turn are scalar, since vectors would be copied.
 bool intersect_triangles(inout Hit hit, RaySpace ray, uint first, uint left, uint instance, bool any_hit, uint mask_seed,
                          uvec2 from) {
     bool found = false;
@@ -246,7 +251,7 @@ bool intersect_triangles(inout Hit hit, RaySpace ray, uint first, uint left, uin
     return found;
 }
 
-// A mask is looked up of the nearest triangle alone; where it lets the ray pass, the others are tested again.
+// Tests the triangles of `leaves`. Only the nearest one's mask is looked up; where it lets the ray pass, the others are tested again.
 void intersect_leaves(inout Hit hit, RaySpace ray, uvec2 leaves, uint instance, bool any_hit, uint mask_seed, uvec2 from) {
     if (!FX_ALPHA_MASKS) {
         intersect_triangles(hit, ray, leaves.x, leaves.y, instance, any_hit, mask_seed, from);
@@ -257,15 +262,15 @@ void intersect_leaves(inout Hit hit, RaySpace ray, uvec2 leaves, uint instance, 
         Hit next = hit;
         bool found = intersect_triangles(next, ray, leaves.x, leaves.y, instance, any_hit, mask_seed, from);
         passes = found && !mask_blocks(next.triangle, instance, vec2(next.b1, next.b2), mask_seed);
-        if (FX_SPHERES && found) passes = passes && !is_sphere(next.triangle); // which has asked for each side
+        if (FX_SPHERES && found) passes = passes && !is_sphere(next.triangle); // spheres have tested their mask
         if (passes) leaves.y &= ~(1u << (next.triangle - leaves.x));
         else hit = next;
     } while (passes && leaves.y != 0u);
 }
 
-// Visits one node below `root` (with ROOT_OF_INSTANCES, a level of instances) and its triangles; true when nothing is
-// left to visit, or with `any_hit` a triangle is found. `from` is the triangle that the ray leaves, and its instance: a
-// plane is not met twice, nor the near side of a sphere, but the offset of the origin can be smaller than the error of a large triangle's distance.
+// Visits one node below `root` (with ROOT_OF_INSTANCES, a level of instances) and its triangles. Returns true when no node is left,
+// or with `any_hit` when a triangle is found. `from` is the triangle that the ray leaves, and its instance. That triangle, or the
+// near side of that sphere, is not tested, since the offset of the origin can be smaller than the error of the distance.
 bool traversal_step(inout Traversal t, RaySpace world, bool any_hit, uint root, uint mask_seed, uvec2 from) {
     bool two_levels = FX_INSTANCES && (root & ROOT_OF_INSTANCES) != 0u;
     RaySpace ray = world;
@@ -315,8 +320,8 @@ Hit traverse(Segment ray, uint root) {
     return t.hit;
 }
 
-// First, where `shadowed`, whether anything blocks `shadow` (the answer replaces `shadowed`); then, where `alive`, the
-// closest hit of `ray`. Both leave the same triangle. In one loop no lane waits for the slowest shadow ray.
+// Finds out first, where `shadowed`, whether anything blocks `shadow`, which replaces `shadowed`; then, where `alive`, the closest
+// hit of `ray`. Both rays leave the same triangle. In one loop, no lane waits for the slowest shadow ray.
 Hit trace_shadow_then_closest(Segment shadow, inout bool shadowed, Segment ray, bool alive, uint root, uvec2 from) {
     RaySpace first = ray_space(shadow.origin, shadow.direction), second = ray_space(ray.origin, ray.direction);
     bool any_hit = shadowed, done;

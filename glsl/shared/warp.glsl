@@ -5,7 +5,7 @@
 const float PI = 3.14159265358979;
 const float INV_PI = 0.318309886183791;
 
-// (cos, sin) of 2 pi u. Polynomials on a half turn (error below 3e-7): cheaper than two library calls, and the same on
+// (cos, sin) of 2 pi u by polynomials on a half turn (error below 3e-7), which are cheaper than two library calls and the same on
 // every device up to rounding.
 vec2 circle_point(float u) {
     float x = u - 0.5;
@@ -16,34 +16,36 @@ vec2 circle_point(float u) {
     return vec2(s, x < 0.0 ? c : -c);
 }
 
-// Uniform on the unit disk.
+// A point uniformly distributed on the unit disk.
 vec2 warp_disk(vec2 u) {
     return sqrt(u.x) * circle_point(u.y);
 }
 
-// Density cos / pi. Polar rather than concentric: no branch; z stays above 2e-4 because u.x < 1.
+// A direction around +z with density cos / pi. The map is polar, not concentric, and so has no branch; z stays above 2e-4 because
+// u.x < 1.
 vec3 warp_cosine_hemisphere(vec2 u) {
     return vec3(warp_disk(u), sqrt(1.0 - u.x));
 }
 
-// Uniform on the unit sphere, density 1 / (4 pi).
+// A direction uniformly distributed on the unit sphere, density 1 / (4 pi).
 vec3 warp_sphere(vec2 u) {
     return vec3(2.0 * sqrt(u.x * (1.0 - u.x)) * circle_point(u.y), 1.0 - 2.0 * u.x);
 }
 
-// Uniform in the cone around z, density 1 / (2 pi (1 - cos_max)). The sine comes from 1 - z, exact for narrow cones.
+// A direction uniformly distributed in the cone around z, density 1 / (2 pi (1 - cos_max)). The sine is computed from 1 - z, which
+// is exact for narrow cones.
 vec3 warp_cone(vec2 u, float one_minus_cos_max) {
     float t = u.x * one_minus_cos_max;
     return vec3(sqrt(t * (2.0 - t)) * circle_point(u.y), 1.0 - t);
 }
 
-// Barycentric weights of vertices 1 and 2, uniform by area (Heitz 2019, low distortion).
+// Barycentric weights of vertices 1 and 2 of a point uniformly distributed by area (low-distortion map, Heitz 2019).
 vec2 warp_triangle(vec2 u) {
     vec2 h = 0.5 * u;
     return u.x < u.y ? vec2(h.x, u.y - h.x) : vec2(u.x - h.y, h.y);
 }
 
-// Triangle filter of radius 1, one axis.
+// An offset in [-1, 1] pixels along one axis, distributed as the triangle filter of radius 1.
 float warp_tent(float u) {
     float v = 2.0 * u - 1.0;
     float r = 1.0 - sqrt(1.0 - abs(v));
@@ -73,12 +75,13 @@ float erf_inverse(float x) {
     return p * x;
 }
 
-// Gaussian filter of standard deviation 0.5 pixels cut at radius 2, one axis. 0.99993666 = erf(2 / (0.5 sqrt 2)).
+// An offset along one axis, distributed as the Gaussian filter of standard deviation 0.5 pixels, cut at 2 pixels.
+// 0.99993666 = erf(2 / (0.5 sqrt 2)).
 float warp_gaussian(float u) {
     return clamp(0.707106781 * erf_inverse(0.99993666 * (2.0 * u - 1.0)), -2.0, 2.0);
 }
 
-// Columns: tangent, bitangent, n. Right-handed for every unit n (Duff et al. 2017).
+// A right-handed frame around any unit n (Duff et al. 2017); its columns are tangent, bitangent, n.
 mat3 basis_from_normal(vec3 n) {
     float s = n.z < 0.0 ? -1.0 : 1.0;
     float a = -1.0 / (s + n.z);

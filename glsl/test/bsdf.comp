@@ -2,8 +2,9 @@
 layout(binding = 3) uniform usamplerBuffer texels; // of uint
 #include "shared/bsdf.glsl"
 
-// Case i: its Material, and inputs[3 i ..] = wo, wi, (u_lobe, u). results[5 i ..] = bsdf_evaluate; sampled wi and
-// success; weight and pdf; albedo and "is delta"; evaluate of the sampled wi.
+// Calls the functions of shared/bsdf.glsl for one case per thread. Case i reads its Material and inputs[3 i ..] = wo, wi,
+// (u_lobe, u). It writes results[5 i ..] = bsdf_evaluate; sampled wi and success; weight and pdf; albedo and whether all lobes
+// are deltas; bsdf_evaluate of the sampled wi.
 layout(local_size_x = 64) in;
 layout(scalar, binding = 0) readonly buffer Materials { Material materials[]; };
 layout(scalar, binding = 1) readonly buffer Inputs { vec3 inputs[]; };

@@ -1,4 +1,4 @@
-// Fetches one texel, however far it lies.
+// Fetches texel `push`, so that a test can read the largest texel buffer to its end.
 layout(local_size_x = 1) in;
 layout(binding = 0) uniform usamplerBuffer texels; // of uvec4
 layout(scalar, binding = 1) writeonly buffer Found { uvec4 found[]; };

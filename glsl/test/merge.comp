@@ -1,8 +1,8 @@
 #include "shared/moments.glsl"
 #include "shared/linear_model.glsl"
 
-// Thread i: a record whose numbers are all from[i] into one of ones, and not into one of ones. results[4 i ..]: of moments, a sum
-// over all numbers of the latter, then of the former; the same of fits.
+// Thread i merges a record whose numbers are all from[i] into a record of ones, once with `exists` false and once true, and
+// writes the sum of all numbers of either result: results[4 i ..] = moments without, moments with, fits without, fits with.
 layout(local_size_x = 64) in;
 layout(scalar, binding = 0) readonly buffer From { float from[]; };
 layout(scalar, binding = 1) writeonly buffer Results { float results[]; };
@@ -27,7 +27,7 @@ void main() {
     if (i >= push) return;
     Moments without = moments_of(1.0), with = without;
     Fit fit_without = fit_of(1.0), fit_with = fit_without;
-    bool never = from[i] == -1.0; // unknown when it is compiled
+    bool never = from[i] == -1.0; // false in the test, which the compiler cannot know
     merge(without, moments_of(from[i]), never);
     merge(with, moments_of(from[i]), !never);
     merge(fit_without, fit_of(from[i]), never);

@@ -1,6 +1,6 @@
 #include "effects.glsl"
 #include "test/hash.glsl"
-#include "test/hash.glsl" // a second time: served once
+#include "test/hash.glsl" // the build includes a file once
 
 // Mixes what it reads through every kind of binding, in integers, so that the CPU twin is equal.
 layout(local_size_x_id = 100) in;

@@ -1,4 +1,4 @@
-// to[i] = 3 from[n - 1 - i] + 1: reads what another thread of the previous pass wrote.
+// Writes to[i] = 3 from[n - 1 - i] + 1, which reads what another thread of the previous pass wrote.
 layout(local_size_x = 64) in;
 layout(scalar, binding = 0) readonly buffer From { uint from[]; };
 layout(scalar, binding = 1) writeonly buffer To { uint to[]; };

@@ -1,7 +1,7 @@
 #include "effects.glsl"
 #include "shared/sampler.glsl"
 
-// Raw words and floats of sample_2d for query i = (pixel, index, pair).
+// Writes the words of sample_2d_bits and the floats of sample_2d for query i = (pixel, sample index, pair) in thread i.
 layout(local_size_x = 64) in;
 layout(scalar, binding = 0) readonly buffer Queries { uvec3 queries[]; };
 layout(scalar, binding = 1) writeonly buffer Words { uvec2 words[]; };

@@ -2,8 +2,8 @@
 #include "shared/thread.glsl"
 #include "shared/scene.glsl"
 
-// Rays from a buffer: traversal by itself, for its tests and its benchmark. Thread i of n traces rays i, i + n, i + 2n ...
-// A lane that is done takes its next ray instead of waiting for the slowest of its neighbours.
+// Traces rays from a buffer, for the tests and the benchmark of traversal. Thread i of n traces rays i, i + n, i + 2n ... A
+// lane that has finished a ray takes its next one instead of waiting for the slowest of its neighbours.
 layout(local_size_x_id = 100) in;
 layout(binding = 11) uniform usamplerBuffer rays; // of RayQuery
 layout(scalar, binding = 12) writeonly buffer Hits { RayHit hits[]; };
@@ -26,7 +26,7 @@ void main() {
     uint i = thread_index(), stride = gl_NumWorkGroups.x * gl_NumWorkGroups.y * WORKGROUP;
     if (i >= push.count) return;
     do {
-        Segment ray = ray_at(i); // again and again, which is cheaper than to keep it
+        Segment ray = ray_at(i); // fetched at every step: on lavapipe cheaper than kept, on a GPU dearer
         if (done) t = traversal_start(ray.t_max, push.root);
         RaySpace space = ray_space(ray.origin, ray.direction);
         done = traversal_step(t, space, any_hit, push.root, ray.mask_seed, uvec2(NONE));

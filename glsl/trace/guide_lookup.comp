@@ -4,8 +4,9 @@
 #include "shared/frame.glsl"
 #include "shared/sanitise.glsl"
 
-// Supersampling of Bauszat, Eisemann and Magnor 2011 (EGSR), section 3.2: guide rays at pixel centres carry filtered light;
-// every eye ray takes that of the guide ray whose surface is most like its own.
+// Adds filtered indirect light times albedo over the eye rays of one pixel per thread (supersampling of Bauszat, Eisemann and
+// Magnor 2011, EGSR, section 3.2). Guide rays through pixel centres carry filtered light; every eye ray takes that of the
+// guide ray, of the four nearest, whose surface is most like its own.
 layout(local_size_x_id = 100) in;
 layout(binding = 11) uniform usamplerBuffer guides; // of Guide
 layout(binding = 12) uniform samplerBuffer filtered; // of vec4
@@ -26,10 +27,10 @@ uint nodes_visited = 0u;
 #include "shared/first_hit.glsl"
 
 // Departure from the paper, whose quotients are 0 / 0 on one plane: the largest difference counts as at least this, so that
-// rounding decides nothing. Of unit normals, and relative to depth.
+// rounding decides nothing. The first is between unit normals, the second relative to the depth.
 const float MIN_NORMAL_DIFFERENCE = 1e-3, MIN_DEPTH_DIFFERENCE = 1e-4;
 
-// Normal and depth of the guide ray through a pixel; depth 0 where it carries no light.
+// Normal and depth of the guide ray through a pixel; the depth is 0 where the ray carries no light.
 vec4 guide_ray(ivec2 at) {
     if (any(greaterThanEqual(at, ivec2(frame.size)))) return vec4(0.0);
     int q = at.y * int(frame.size.x) + at.x;
@@ -38,8 +39,8 @@ vec4 guide_ray(ivec2 at) {
     return known ? vec4(guide.normal, guide.depth) : vec4(0.0);
 }
 
-// Pixel of the guide ray with the largest S = S_n * S_d (equations 3 to 5) among the four nearest to `film`; the nearest of
-// equals, NONE where none of them carries light.
+// Pixel of the guide ray with the largest S = S_n * S_d (equations 3 to 5) among the four nearest to `film`; the nearest wins a
+// tie. NONE where none of them carries light.
 uint most_similar(Guide eye, vec2 film) {
     ivec2 size = ivec2(frame.size);
     ivec2 first = clamp(ivec2(floor(film - 0.5)), ivec2(0), max(size - 2, 0));

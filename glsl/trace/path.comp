@@ -5,10 +5,10 @@
 #include "shared/finite.glsl"
 #include "shared/store64.glsl"
 
-// One camera path per thread: next event estimation and BSDF sampling joined by the balance heuristic (Veach 1997).
-// Thread i traces sample first_sample + i / pixels of pixel first_pixel + i % pixels, or path i of a list, and writes 1 vec4 (radiance), or
-// with FX_SPLIT 3 (direct, indirect, the albedo that indirect is to be divided by); w of the first is the number of its rays, less
-// than 0 where the light was no number: such a sample is black.
+// Traces one camera path per thread: next event estimation and BSDF sampling joined by the balance heuristic (Veach 1997).
+// Thread i traces sample first_sample + i / pixels of pixel first_pixel + i % pixels, or path i of a list. It writes one vec4
+// (radiance), or three with FX_SPLIT (direct, indirect, the albedo to divide indirect by). w of the first is the number of
+// rays, negated where the light was not finite: such a sample is black.
 layout(local_size_x_id = 100) in;
 layout(scalar, binding = 11) writeonly buffer Samples { u64vec2 samples[]; }; // of vec4
 layout(scalar, binding = 12) buffer Counters { uint counters[]; };
@@ -29,25 +29,25 @@ uint nodes_visited = 0u, closest_rays = 0u, any_rays = 0u;
 #include "shared/surface.glsl"
 #include "shared/light.glsl"
 
-// Dimension pairs: those of the camera, then these for every scattering event.
+// Dimension pairs of the sampler: the camera uses the first two, every scattering event these.
 const uint PAIR_FIRST_BOUNCE = 2u, PAIRS_PER_BOUNCE = 4u;
 const uint PAIR_CHOICE = 0u, PAIR_LIGHT = 1u, PAIR_BSDF = 2u, PAIR_ROULETTE = 3u;
 
-// Shadow rays to a lamp end at this part of the way: the error of the distance at which they would meet it is some 2^-24
-// over the cosine there.
+// Shadow rays to a lamp end at this share of the distance, since the distance at which they would hit the lamp has an error of
+// about 2^-24 over the cosine there.
 const float SHADOW_END = 0.99999;
 
-const float MAX_SURVIVAL = 0.95; // of roulette
+const float MAX_SURVIVAL = 0.95; // largest survival probability of roulette
 
-// Joins the two strategies. Two densities that vanished give 0, not 0 / 0.
+// Weight of the strategy that was used, by the balance heuristic. Two densities of 0 give 0, not 0 / 0.
 float balance(float taken, float other) { return taken / max(taken + other, 1e-37); }
 
 struct Path {
     vec3 origin;
     vec3 direction;
     vec3 throughput;
-    float bsdf_pdf; // of `direction`; 0 after a smooth interface or from the camera
-    bool delta;     // no light sampling competes for what `direction` hits
+    float bsdf_pdf; // of `direction`, per steradian; 0 after a smooth interface or from the camera
+    bool delta;     // light sampling cannot produce `direction`: no MIS weight
     float eta_scale; // squared refractive index at `origin` over that at the camera
 };
 
@@ -62,7 +62,7 @@ void add_light(inout SplitLight sum, vec3 light, bool indirect) {
     sum.indirect += apart ? light : vec3(0.0);
 }
 
-// The whole sample is clamped, in place of what each bounce adds: the limit is that of what a pixel averages.
+// Clamps the largest channel of a whole sample, not of each bounce: the limit is that of the values which a pixel averages.
 vec3 clamped(vec3 light) {
     float largest = max(light.r, max(light.g, light.b));
     return light * (frame.clamp_indirect > 0.0 && largest > frame.clamp_indirect ? frame.clamp_indirect / largest : 1.0);
@@ -81,8 +81,8 @@ vec3 light_from_hit(Path path, Surface s, float t) {
     return FX_EMISSIVE && cosine > 0.0 ? surface_emission(s) * weight : vec3(0.0);
 }
 
-// Direct light at `s` by light sampling, unless something blocks `shadow`; 0 needs no ray. `basis` columns are the
-// shading frame.
+// Direct light at `s` by light sampling, which counts if nothing blocks `shadow`; where it is 0, no ray is needed. The columns
+// of `basis` are the shading frame.
 vec3 light_from_nee(Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sampler random, uint pair, uint mask_seed,
                     out Segment shadow) {
     uint word = sample_2d_bits(random, pair + PAIR_CHOICE).x;
@@ -98,7 +98,7 @@ vec3 light_from_nee(Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sa
     return f.rgb * light.radiance * (light.pdf > 0.0 ? balance(light.pdf, f.w) : 1.0);
 }
 
-// Chooses the next direction. False when the path ends.
+// Samples the next direction. Returns false when the path ends.
 bool scatter(inout Path path, Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sampler random, uint pair) {
     BsdfSample next;
     float lobe = sample_2d(random, pair + PAIR_CHOICE).y;
@@ -115,7 +115,8 @@ bool scatter(inout Path path, Surface s, Bsdf bsdf, Facing facing, mat3 basis, v
     return scattered && max(path.throughput.r, max(path.throughput.g, path.throughput.b)) > 0.0;
 }
 
-// Radiance is scaled by 1 / eta^2 on the way into glass, and back on the way out: that says nothing of what a path is worth.
+// Russian roulette. The survival probability leaves out the factors 1 / eta^2 that refraction scales radiance by, since they
+// cancel when the path leaves the glass.
 bool survives_roulette(inout Path path, Sampler random, uint pair) {
     float q = min(max(path.throughput.r, max(path.throughput.g, path.throughput.b)) * path.eta_scale, MAX_SURVIVAL);
     if (sample_2d(random, pair + PAIR_ROULETTE).x >= q) return false;
@@ -123,7 +124,7 @@ bool survives_roulette(inout Path path, Sampler random, uint pair) {
     return true;
 }
 
-// Adds what the path meets at `hit`; true where it can go on from there, from `s`.
+// Adds the light that the path meets at `hit`. Returns true where the path can continue from the surface `s`.
 bool arrive(inout SplitLight sum, Path path, Hit hit, bool indirect, out Surface s) {
     if (hit.triangle == NONE) {
         add_light(sum, path.throughput * light_from_miss(path), indirect);
@@ -142,12 +143,12 @@ SplitLight trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
     Surface s;
     bool smooth_first = false, mirrored = false;
     uint bounce = 0u;
-    // A round goes from one surface to the next, so that the last one samples no light. The light sampled at the first waits
-    // for the ray to the next: see trace_shadow_then_closest.
+    // A turn of the loop leads from one surface to the next; the last surface samples no light. Light sampled at a surface is
+    // added only once its shadow ray is traced, together with the ray to the next surface: see trace_shadow_then_closest.
     if (arrive(sum, path, hit, false, s) && frame.max_depth > 1u) do {
         uint pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
         Bsdf bsdf = surface_bsdf(s);
-        // The two sides of a dielectric differ: its normal stays on the outside.
+        // The normal of a dielectric stays on its outside, since its two sides differ.
         bool turns = (s.flags & MATERIAL_TWO_SIDED) != 0u && !is_kind(FX_DIELECTRIC, bsdf, BSDF_DIELECTRIC);
         Facing facing = facing_normals(s, -path.direction, turns, bsdf_is_specular(bsdf));
         mat3 basis = basis_from_normal(facing.normal);
@@ -178,12 +179,12 @@ SplitLight trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         if (!alive || !arrive(sum, path, hit, indirect, s)) break;
     } while (bounce + 1u < frame.max_depth);
     if (FX_CLAMP) sum.indirect = clamped(sum.indirect);
-    // What a smooth coat mirrors needs no filter. It is moved only here, so that the sum of both keeps its bits.
+    // Light that a smooth coat mirrors needs no filter. It moves only here, so that the sum of both parts keeps its bits.
     if (mirrored) sum = SplitLight(sum.direct + sum.indirect, vec3(0.0));
     return sum;
 }
 
-// 64-bit counters out of pairs of words: 64-bit atomics are not a required feature.
+// Adds to a 64-bit counter made of two words, since 64-bit atomics are not a required feature.
 void count(uint slot, uint n) {
     uint before = atomicAdd(counters[2u * slot], n);
     if (before + n < before) atomicAdd(counters[2u * slot + 1u], 1u);
@@ -191,7 +192,7 @@ void count(uint slot, uint n) {
 
 void main() {
     bool listed = FX_ADAPTIVE && push.samples == 0u;
-    uint i = listed ? striped_index() : thread_index(); // listed pixel by pixel, else sample by sample
+    uint i = listed ? striped_index() : thread_index(); // lists are ordered by pixel: stripes spread the work
     if (i >= push.pixels * (listed ? 1u : push.samples)) return;
     uint pixel = push.first_pixel + i % push.pixels;
     uint index = push.first_sample + i / push.pixels;
@@ -213,11 +214,11 @@ void main() {
         atomicMax(broken[0].lowest, ~pixel);
     }
     if (FX_SPLIT) {
-        samples[3u * i] = paired(vec4(light.direct, rays));
-        samples[3u * i + 1u] = paired(vec4(light.indirect, 0.0));
-        samples[3u * i + 2u] = paired(vec4(albedo, 0.0));
+        samples[3u * i] = pack64(vec4(light.direct, rays));
+        samples[3u * i + 1u] = pack64(vec4(light.indirect, 0.0));
+        samples[3u * i + 2u] = pack64(vec4(albedo, 0.0));
     } else {
-        samples[i] = paired(vec4(light.direct + light.indirect, rays));
+        samples[i] = pack64(vec4(light.direct + light.indirect, rays));
     }
     if (FX_COUNTERS) {
         count(0u, closest_rays);

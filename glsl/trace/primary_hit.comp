@@ -3,7 +3,8 @@
 #include "shared/scene.glsl"
 #include "shared/frame.glsl"
 
-// The primary hit through the centre of every pixel, from the middle of the lens: what filters and allocation steer by.
+// Traces the ray through the centre of one pixel per thread, from the middle of the lens, and writes its hit as a Guide, which
+// filters and sample placement use.
 layout(local_size_x_id = 100) in;
 layout(scalar, binding = 11) writeonly buffer Guides { Guide guides[]; };
 layout(scalar, push_constant) uniform Push { PathPush push; };

@@ -1,9 +1,9 @@
-//! What the kernels share that decide where samples go.
+//! Structs of the kernels that decide where samples go (`glsl/allocate`, `glsl/apportion`).
 use super::{Field, Struct, float, uint, uvec2};
 use bytemuck::{Pod, Zeroable};
 
 gpu_structs! {
-    /// Push constants of the kernels under `src/allocate`: what makes a pixel worth samples.
+    /// Push constants of the kernels that compute a pixel's priority (`glsl/allocate`).
     struct PriorityPush {
         /// Film in pixels.
         size: uvec2,
@@ -21,38 +21,39 @@ gpu_structs! {
         threshold: float,
         /// Share of the variance that a filter takes away where all neighbours are alike, 0 to 1.
         filtered: float,
-        /// Samples that a pixel has had a chance of.
+        /// Rounds before this one, each of which gives a pixel one sample or none; `threshold.comp` alone reads it.
         round: uint,
     }
 
-    /// Push constants of the kernel that gives pixels one sample or none.
+    /// Push constants of `choose.comp`, which gives pixels one sample or none.
     struct ChoosePush {
         /// Pixels of the film.
         pixels: uint,
-        /// Samples that a pixel has had a chance of.
+        /// Rounds before this one, as in [`PriorityPush`].
         round: uint,
         /// Chooses the random sequence.
         seed: uint,
-        /// Least priority that gets a sample, above 0; 0: priorities are probabilities.
+        /// Lowest priority that gets a sample, above 0; with 0, priorities are probabilities.
         threshold: float,
     }
 
-    /// Push constants of the kernels that apportion.
+    /// Push constants of the passes of an apportionment, whose order `quantise_priority.comp` lists.
     struct ApportionPush {
         /// Pixels of the film.
         pixels: uint,
         /// Largest number of samples of a pixel, those it has included; NONE when the budget can fill none.
         limit: uint,
-        /// Counts the repetitions for what full pixels leave, and the digits of remainders from the highest; in `total` 0
-        /// after `weigh`, 1 after `deficit` or `need`.
-        round: uint,
-        /// Repetitions at most.
-        rounds: uint,
+        /// How often the same kernel ran before in this apportionment. In `quota` and `redistribute` it is the repetition, in
+        /// `radix_count` and `radix_select` the digit, 0 the highest; in `sum_weights` 0 follows `quantise_priority`, and 1
+        /// `lack_of_share` or `lack_of_accuracy`.
+        step: uint,
+        /// Largest number of repetitions of `quota` and `redistribute`, at least 1.
+        repetitions: uint,
         /// Samples to place, 64 bits.
         budget: uvec2,
         /// Samples that all pixels have once these are placed, 64 bits.
         total: uvec2,
-        /// Error that is good enough, 12.20 fixed point as weights: the budget is an upper bound; 0: it is spent.
+        /// Sufficient error, 12.20 fixed point as weights are; the budget is then an upper bound. With 0 all of it is spent.
         threshold: uint,
         /// Samples at which a pixel has enough whatever its error.
         enough: uint,
@@ -60,19 +61,19 @@ gpu_structs! {
 
     /// Sums over a block of pixels.
     struct BlockSums {
-        /// Of the weights of open pixels, 64 bits.
+        /// Sum of the weights of open pixels, 64 bits.
         weights: uvec2,
         /// Samples given to pixels that became full, 64 bits.
         filled: uvec2,
-        /// Of the quotas of open pixels, 64 bits.
+        /// Sum of the quotas of open pixels, 64 bits.
         floors: uvec2,
-        /// Pixels that became full; of `weigh`: priorities that were not finite.
+        /// Pixels that became full; from `quantise_priority`: priorities that were not finite.
         settled: uint,
-        /// Pixels still open; of `weigh`: pixels of positive weight.
+        /// Pixels still open; from `quantise_priority`: pixels of positive weight.
         open: uint,
     }
 
-    /// How far an apportionment is.
+    /// State of an apportionment, from pass to pass.
     struct Apportionment {
         /// Samples for the open pixels, 64 bits.
         budget: uvec2,
@@ -84,31 +85,31 @@ gpu_structs! {
         whole: uvec2,
         /// budget mod weights for larger ones, 64 bits.
         part: uvec2,
-        /// Bits that remainders are moved up by, to the highest but one, so that all sums of weights have the same digits.
+        /// Bits that remainders are shifted left by, so that the highest bit of `weights` becomes bit 62 for any sum.
         up: uint,
-        /// Samples that go to the largest remainders, then those among the ones with `prefix`, 64 bits.
+        /// Samples that go to the largest remainders; during the search, those that go to keys with `prefix`. 64 bits.
         needed: uvec2,
         /// Leading digits of the smallest remainder that still gets a sample, 64 bits.
         prefix: uvec2,
         /// Bits of the remainders that `prefix` decides, 64 bits.
         mask: uvec2,
-        /// 1 when all weigh the same, since no open pixel has a weight.
+        /// 1 when all pixels weigh the same, since no open one has a weight.
         equal: uint,
         /// 1 when the quotas are final.
         settled: uint,
-        /// 1 when pixels were still filling up in the last repetition.
+        /// 1 when pixels still became full in the last repetition: room decides in place of remainders.
         forced: uint,
         /// 1 when `prefix` and `needed` decide every pixel.
         selected: uint,
-        /// 1 when all remainders with `prefix` get a sample.
+        /// 1 when all keys with `prefix` get a sample.
         whole_edge: uint,
-        /// Priorities that were not finite.
+        /// Number of priorities that were not finite.
         non_finite: uint,
-        /// Pixels of positive weight.
+        /// Number of pixels of positive weight.
         wanting: uint,
     }
 
-    /// Push constants of the kernels that scan.
+    /// Push constants of the kernels that scan the sample counts.
     struct ScanPush {
         /// Pixels of the film.
         pixels: uint,
@@ -122,11 +123,11 @@ gpu_structs! {
         paths: uint,
         /// Index of the batch's first path in the round, 64 bits.
         first_path: uvec2,
-        /// Of the rounds that the list of paths is dealt to, this one, from 0.
+        /// Index of this one of the `rounds`, from 0.
         round: uint,
-        /// Rounds that the list is dealt to, at least 1.
+        /// Rounds that the list of paths is dealt to, at least 1.
         rounds: uint,
-        /// Index of every pixel's first sample in its sequence.
+        /// Index of every pixel's first sample of this render in its sequence.
         first_sample: uint,
     }
 }

@@ -1,12 +1,12 @@
-//! Numbers that both sides know by name.
+//! Constants that both host and shaders know by name.
 #[cfg(doc)]
 use super::*;
 use super::{float, uint};
 
 constants! {
-    /// "No texture", "no material override", "no hit".
+    /// An index that stands for "no texture", "no material override" or "no hit".
     NONE: uint = 0xffffffff;
-    /// Groups of nodes that a traversal can put aside; scenes that need more are refused when they are loaded.
+    /// Largest number of groups of nodes on a traversal's stack; hierarchies are built so that no scene needs more.
     TRAVERSAL_STACK: uint = 32;
     /// Set in [`FrameConstants::root`] when the leaves of that level are instances.
     ROOT_OF_INSTANCES: uint = 0x80000000;
@@ -44,9 +44,9 @@ constants! {
     PIXEL_FILTER_GAUSSIAN: uint = 2;
     /// [`FrameConstants::pixel_filter`]: the pixel's centre.
     PIXEL_FILTER_POINT: uint = 3;
-    /// Roughnesses in the table of a rough coat (reference::coat).
+    /// Rows of the table of a rough coat, one for each roughness ([`crate::scene::coat_table`]).
     COAT_ROWS: uint = 32;
-    /// Numbers for each of them: [`COAT_COLUMNS`] - 1 cosines, and the mean from inside.
+    /// Numbers in a row: reflectances at [`COAT_COLUMNS`] - 1 cosines, and the mean reflectance from inside.
     COAT_COLUMNS: uint = 49;
     /// [`Texture::flags`]: RGB is stored with the sRGB curve and decoded when read.
     TEXTURE_SRGB: uint = 1;

@@ -1,15 +1,15 @@
-//! What a scene and its settings call for, as specialisation constants.
+//! The features that a scene and its settings need, as specialisation constants.
 
 macro_rules! effects {
     ($($(#[$doc:meta])* $field:ident: $glsl:ident;)+) => {
-        /// What a scene and its settings call for: one specialisation constant each. Kernels drop the rest when they are
-        /// compiled. `scene/effects.rs` fills it in and says which object asked.
+        /// The features that a scene and its settings need, one specialisation constant each. Kernels are compiled without the
+        /// others. `scene/effects.rs` fills it in and says which object needs each.
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
         pub struct Effects { $($(#[$doc])* pub $field: bool,)+ }
         impl Effects {
             /// Every effect switched on (`--effects all`).
             pub const ALL: Self = Self { $($field: true,)+ };
-            /// Which are on, in the order of their ids.
+            /// Whether each effect is on, in the order of their ids.
             pub fn switches(&self) -> [bool; Effect::ALL.len()] {
                 [$(self.$field,)+]
             }
@@ -29,7 +29,7 @@ macro_rules! effects {
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub enum Effect { $($(#[$doc])* $field,)+ }
         impl Effect {
-            /// All of them, in the order of their ids.
+            /// All effects, in the order of their ids.
             pub const ALL: &[Self] = &[$(Self::$field,)+];
 
             /// The name that users know it by.
@@ -45,7 +45,7 @@ macro_rules! effects {
 }
 
 impl Effects {
-    /// (constant id, value) of all: an effect's id is its place in the list.
+    /// (constant id, value) of all effects: an effect's id is its position in the list.
     pub fn entries(&self) -> Vec<(u32, u32)> {
         (0..).zip(self.switches().map(u32::from)).collect()
     }
@@ -56,7 +56,7 @@ effects! {
     textures: FX_TEXTURES;
     /// Vertex normals that differ from the face's.
     smooth_normals: FX_SMOOTH_NORMALS;
-    /// A height map.
+    /// A height map that perturbs normals.
     bump_maps: FX_BUMP_MAPS;
     /// A tangent-space normal map.
     normal_maps: FX_NORMAL_MAPS;
@@ -80,11 +80,11 @@ effects! {
     ggx: FX_GGX;
     /// Emissive triangles or spheres.
     emissive: FX_EMISSIVE;
-    /// Point lights.
+    /// Lights that shine from a point in all directions.
     point_lights: FX_POINT;
-    /// Spot lights.
+    /// Lights that shine from a point into a cone.
     spot_lights: FX_SPOT;
-    /// Directional lights.
+    /// Parallel light from infinitely far.
     directional_lights: FX_DIRECTIONAL;
     /// An environment, constant or an image.
     environment: FX_ENVIRONMENT;
@@ -96,21 +96,21 @@ effects! {
     instances: FX_INSTANCES;
     /// Light beyond direct (max_depth over 2).
     indirect: FX_INDIRECT;
-    /// Russian roulette.
+    /// Random ends of long paths (Russian roulette).
     roulette: FX_ROULETTE;
     /// A clamp of indirect light.
     clamp: FX_CLAMP;
     /// A pixel filter other than the box.
     pixel_filter: FX_PIXEL_FILTER;
-    /// Direct and indirect light wanted apart.
+    /// Direct and indirect light in separate layers.
     split_light: FX_SPLIT;
     /// Independent PCG numbers instead of Owen-scrambled Sobol.
     independent_sampler: FX_INDEPENDENT;
     /// Ray and node counters.
     counters: FX_COUNTERS;
-    /// Samples placed where they count: a list of paths instead of so many per pixel.
+    /// Samples placed by priority: a list of paths in place of equally many per pixel.
     adaptive: FX_ADAPTIVE;
-    /// More than 4096 samples of a pixel: means keep what rounding takes off.
+    /// More than 4096 samples per pixel, for which means keep the remainder of rounding.
     many_samples: FX_MANY_SAMPLES;
     /// Emissive triangles large enough to be sampled by solid angle.
     large_lamps: FX_LARGE_LAMPS;

@@ -1,4 +1,4 @@
-//! Push constants of the filters' kernels.
+//! Push constants of the kernels that filter and of those of `glsl/film` but `accumulate.comp`.
 use super::{Field, Struct, float, uint, uvec2, vec3, vec4};
 use bytemuck::{Pod, Zeroable};
 
@@ -9,9 +9,9 @@ gpu_structs! {
         size: uvec2,
     }
 
-    /// Push constants of `pack.comp` and of kernels of `glsl/film` that look at no neighbours.
+    /// Push constants of `pack.comp` and of other kernels that look at no neighbours.
     struct PackPush {
-        /// Pixels.
+        /// Pixels of the image.
         count: uint,
     }
 
@@ -29,7 +29,7 @@ gpu_structs! {
     struct GuidedPackPush {
         /// Image in pixels.
         size: uvec2,
-        /// 1 / extent.
+        /// Reciprocal of the depths' extent, 1 / world units.
         depth_scale: float,
     }
 
@@ -41,7 +41,7 @@ gpu_structs! {
         first_row: uint,
         /// Rows of the strip.
         rows: uint,
-        /// Pixels from a window's centre to its border; only the tables' kernels read it.
+        /// Pixels from a window's centre to its border; only the kernels with summed-area tables read it.
         radius: uint,
         /// Added to the variance of each channel of the guide.
         eps: vec4,
@@ -53,13 +53,13 @@ gpu_structs! {
         size: uvec2,
         /// Pixels from the centre to the border of the window.
         radius: uint,
-        /// As in [`AtrousPush`], per squared pixel.
+        /// Exponent of the weight of distance on the image, in base 2, per squared pixel.
         rate_space: float,
         /// As in [`AtrousPush`].
         rates: vec3,
-        /// Which band of the window's rows, from its top.
+        /// Index of the band of the window's rows, from its top.
         band: uint,
-        /// Rows of a band.
+        /// Rows of a full band.
         band_rows: uint,
     }
 
@@ -81,7 +81,7 @@ gpu_structs! {
         size: uvec2,
         /// Pixels between neighbours on the lattice of this level.
         spacing: uint,
-        /// 0 = along rows, 1 = along columns, 2 = four neighbours side by side, 3 = four neighbours diagonally.
+        /// Neighbours: 0 = two along rows, 1 = two along columns, 2 = four side by side, 3 = four diagonally.
         stencil: uint,
         /// As in [`AtrousPush`].
         rates: vec3,
@@ -97,7 +97,7 @@ gpu_structs! {
 
     /// Push constants of `auto_inputs.comp`, `auto_leverage.comp` and `auto_error.comp`.
     struct AutoPush {
-        /// Pixels.
+        /// Pixels of the image.
         count: uint,
         /// Luminance below which errors count as absolute.
         floor: float,
@@ -111,7 +111,7 @@ gpu_structs! {
         spacing: uint,
         /// As in [`AtrousPush`]; that of radiance is 0.
         rates: vec3,
-        /// Weight of a pixel that is known but not alike.
+        /// Smallest weight of a known pixel, however unlike it is, 0 to 1.
         least: float,
     }
 }

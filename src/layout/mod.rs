@@ -1,41 +1,41 @@
-//! Every struct that crosses the line between host and shader, written once. The crate compiles this file; `build.rs` includes
-//! it by `#[path]` and writes the same structs in GLSL at the head of every kernel.
+//! Every struct that host and shaders share, declared once. The crate compiles this file; `build.rs` includes it by `#[path]` and
+//! writes the same structs in GLSL at the head of every kernel.
 //!
-//! Structs are laid out as GLSL `scalar` does: members of four bytes, no padding anywhere. A kernel that binds a struct as texels
-//! reads it by functions that the build writes too: `Guide_depth(guides, i)`, `Guide_load(guides, i)`. They fetch 16 bytes at a
-//! time where the struct is a multiple of that, 8 where it is one of 8, else 4: structs that are read often have a `pad`.
+//! Structs have GLSL's `scalar` layout: members of four bytes without padding. A kernel that binds a struct as texels reads it
+//! by functions that the build writes too: `Guide_depth(guides, i)`, `Guide_load(guides, i)`. They fetch 16 bytes at a time where
+//! the size of the struct is a multiple of 16, 8 where it is one of 8, else 4; a `pad` field brings often-read structs to 16.
 #![allow(non_camel_case_types)]
 
-/// GLSL's names for the member types.
+/// GLSL's unsigned integer of 32 bits.
 pub type uint = u32;
-/// 32-bit float.
+/// GLSL's float of 32 bits.
 pub type float = f32;
-/// Two unsigned words.
+/// Two unsigned integers of 32 bits.
 pub type uvec2 = [u32; 2];
-/// Two floats.
+/// Two floats of 32 bits.
 pub type vec2 = [f32; 2];
 /// Three floats without padding (`scalar` layout).
 pub type vec3 = [f32; 3];
-/// Four floats.
+/// Four floats of 32 bits.
 pub type vec4 = [f32; 4];
-/// Three unsigned words.
+/// Three unsigned integers of 32 bits.
 pub type uvec3 = [u32; 3];
-/// Four unsigned words.
+/// Four unsigned integers of 32 bits.
 pub type uvec4 = [u32; 4];
 
 /// A struct as kernels know it, in the order of memory.
 pub struct Struct {
-    /// Name on both sides.
+    /// Name in Rust and in GLSL.
     pub name: &'static str,
-    /// Bytes.
+    /// Size in bytes.
     pub size: usize,
-    /// All of them.
+    /// Every field, in the order of memory.
     pub fields: &'static [Field],
 }
 
 /// A field of a [`Struct`].
 pub struct Field {
-    /// Name on both sides.
+    /// Name in Rust and in GLSL.
     pub name: &'static str,
     /// GLSL's name of the type.
     pub ty: &'static str,
@@ -44,7 +44,7 @@ pub struct Field {
 }
 
 /// Declares structs, and lists them in `STRUCTS` for `build.rs`. With the feature `dummy-fields` each begins with a field that
-/// nothing reads: tests that pass with it show that nobody knows the places of fields by heart.
+/// nothing reads: tests that pass with it show that no code depends on fixed offsets of fields.
 macro_rules! gpu_structs {
     ($($(#[$doc:meta])* struct $name:ident { $($(#[$unit:meta])* $field:ident: $ty:ident,)+ })+) => {
         $(
@@ -58,7 +58,7 @@ macro_rules! gpu_structs {
                 $($(#[$unit])* pub $field: $ty,)+
             }
         )+
-        /// The structs of this file.
+        /// The structs that this file declares.
         #[doc(hidden)]
         pub const STRUCTS: &[Struct] = &[$(Struct {
             name: stringify!($name),
@@ -104,6 +104,6 @@ pub use path::*;
 pub use pixel::*;
 pub use scene::*;
 
-/// Every struct, those that others have as fields first.
+/// Every struct; one that is a field of another comes before it.
 #[doc(hidden)]
 pub const STRUCTS: [&[Struct]; 5] = [scene::STRUCTS, pixel::STRUCTS, path::STRUCTS, allocate::STRUCTS, filter::STRUCTS];

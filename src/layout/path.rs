@@ -1,14 +1,14 @@
-//! What kernels that trace rays, and the one that adds up what they bring, are told and tell.
+//! Structs of the kernels that trace rays, and of `accumulate.comp`, which adds up their samples.
 #[cfg(doc)]
 use super::*;
 use super::{Camera, Field, Struct, float, uint, uvec2, vec2, vec3};
 use bytemuck::{Pod, Zeroable};
 
 gpu_structs! {
-    /// What all paths of a frame have in common: of the scene, the camera and the settings. Kernels read it as a uniform buffer,
-    /// which has room for more, where push constants end at 128 bytes.
+    /// Constants of a frame, from the scene, the camera and the settings. Kernels read them from a uniform buffer, since push
+    /// constants are limited to 128 bytes.
     struct FrameConstants {
-        /// Where rays start.
+        /// The camera that rays start from.
         camera: Camera,
         /// Film in pixels.
         size: uvec2,
@@ -20,9 +20,9 @@ gpu_structs! {
         roulette_depth: uint,
         /// Limit of an indirect sample's largest channel; 0 is off.
         clamp_indirect: float,
-        /// 0 = box, 1 = tent, 2 = Gaussian, 3 = the pixel's centre.
+        /// One of the PIXEL_FILTER_ constants.
         pixel_filter: uint,
-        /// Lights in the alias table.
+        /// Number of lights in the alias table.
         light_count: uint,
         /// Area pdf of an emissive triangle = this * its material's emission_weight.
         triangle_pdf_scale: float,
@@ -34,11 +34,11 @@ gpu_structs! {
         root: uint,
     }
 
-    /// Push constants of `path.comp`, `primary_hit.comp` and `guide_lookup.comp`: what differs from dispatch to dispatch.
+    /// Push constants of `path.comp`, `primary_hit.comp` and `guide_lookup.comp`, which differ from dispatch to dispatch.
     struct PathPush {
         /// First pixel of the batch, row-major.
         first_pixel: uint,
-        /// Pixels of the batch; its paths, with `samples` = 0.
+        /// Number of pixels of the batch; with `samples` = 0, number of its paths.
         pixels: uint,
         /// Index of the batch's first sample of every pixel.
         first_sample: uint,
@@ -54,28 +54,28 @@ gpu_structs! {
         pixels: uint,
         /// First pixel of the tile in the film.
         tile: uint,
-        /// First pixel of those that are bound, counted from the tile's first.
+        /// First pixel of those whose statistics are bound for writing, counted from the tile's first.
         window: uint,
-        /// Samples of every pixel in the batch; 0 when the round's offsets say how many.
+        /// Samples of every pixel in the batch; 0 when the list of paths determines them.
         samples: uint,
         /// With `samples` = 0: paths in the batch.
         paths: uint,
         /// With `samples` = 0: index of the batch's first path in the round, 64 bits.
         first_path: uvec2,
-        /// As in [`BatchPush`].
+        /// Index of the round, as in [`BatchPush`].
         round: uint,
-        /// As in [`BatchPush`].
+        /// Number of rounds, as in [`BatchPush`].
         rounds: uint,
     }
 
     /// A ray for `traverse.comp`.
     #[doc(hidden)] // tests and benches alone use it
     struct RayQuery {
-        /// World units.
+        /// Start of the ray, world units.
         origin: vec3,
-        /// In lengths of `direction`.
+        /// End of the ray, in lengths of `direction`.
         t_max: float,
-        /// Not 0.
+        /// Of any length but 0.
         direction: vec3,
         /// Decides hits on partly transparent surfaces.
         mask_seed: uint,
@@ -86,27 +86,26 @@ gpu_structs! {
     struct RayHit {
         /// In lengths of the ray's direction; its `t_max` on a miss.
         t: float,
-        /// In leaf order, or [`NONE`].
+        /// Index of the triangle in leaf order, or [`NONE`].
         triangle: uint,
-        /// Leaf order of the top level, or [`NONE`].
+        /// Index of the instance in leaf order of the top level, or [`NONE`].
         instance: uint,
-        /// Weights of vertices 1 and 2.
+        /// Weights of vertices 1 and 2; of a sphere, its unit normal as an octahedral point.
         barycentric: vec2,
     }
 
     /// Push constants of `traverse.comp`.
     #[doc(hidden)] // tests and benches alone use it
     struct TraversePush {
-        /// Rays.
+        /// Number of rays.
         count: uint,
-        /// As [`FrameConstants::root`].
+        /// Root node, as [`FrameConstants::root`].
         root: uint,
         /// 1 = any hit, 0 = the closest.
         any_hit: uint,
     }
 
-    /// Push block of the kernels under glsl/test.
-    #[doc(hidden)] // tests and benches alone use it
+    /// Push constants of kernels under `glsl/test`.
     struct TestPush {
         /// Threads with work to do.
         count: uint,

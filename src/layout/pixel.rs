@@ -1,4 +1,4 @@
-//! What is known of a pixel.
+//! Guides, statistics and light of a pixel, and the count of broken samples.
 #[cfg(doc)]
 use super::*;
 use super::{Field, Struct, float, uint, vec3};
@@ -11,9 +11,9 @@ gpu_structs! {
         normal: vec3,
         /// Distance from the camera position along the unit ray, world units; 0 on a miss.
         depth: float,
-        /// Hit in world units.
+        /// Point that is hit, world units.
         position: vec3,
-        /// Object index, or [`NONE`].
+        /// Index of the object, or [`NONE`].
         object: uint,
         /// Reflectance of the first hit that indirect light is divided by, linear Rec. 709; 0 for mirrors and clear glass.
         albedo: vec3,
@@ -25,18 +25,18 @@ gpu_structs! {
     struct PixelStats {
         /// Mean radiance, W/(m^2 sr).
         mean: vec3,
-        /// Samples behind `mean`.
+        /// Number of samples of `mean`.
         count: uint,
         /// Sum of squared deviations from the mean; the variance of one sample is m2 / (count - 1).
         m2: vec3,
-        /// What rounding took off `mean`: three signed numbers of 10 bits, in units of 2^-10 of its last place, red lowest;
+        /// Remainder that rounding took off `mean`: three signed numbers of 10 bits, in units of 2^-10 of its last place, red lowest;
         /// 0 up to 4096 samples.
         remainder: uint,
     }
 
     /// Running means of one pixel that the filters read; the count is that of its [`PixelStats`]. 2 texels.
     struct PixelLight {
-        /// Radiance that needs no filter: emission, direct light, and all that smooth interfaces show at the first hit.
+        /// Radiance that needs no filter: emission, direct light, and all light from a smooth interface at the first hit.
         direct: vec3,
         /// Sum of squared deviations of the luminance of `indirect`, as [`PixelStats::m2`].
         indirect_m2: float,
@@ -46,13 +46,13 @@ gpu_structs! {
         remainder: uint,
     }
 
-    /// Samples that were no number and counted as black.
+    /// Samples that were not finite and counted as black.
     struct BrokenTally {
-        /// How many, up to 2^31.
+        /// Number of such samples, up to about 2^31.
         count: uint,
-        /// Complement of the lowest pixel of such a sample; 0: none.
+        /// Complement of the lowest pixel of such a sample; 0 stands for none.
         lowest: uint,
-        /// Complement of the pixel that `index` is of; it is that of `lowest` once a batch is folded.
+        /// Complement of the pixel that `index` belongs to; it equals `lowest` once a batch is accumulated.
         pixel: uint,
         /// Index of the first such sample of that pixel, counted from its first sample of all.
         index: uint,

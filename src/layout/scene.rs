@@ -1,4 +1,4 @@
-//! A scene as kernels read it: geometry, materials, lights.
+//! Structs of a scene as kernels read it: camera, geometry, materials, lights.
 #[cfg(doc)]
 use super::*;
 use super::{Field, Struct, float, uint, uvec2, uvec3, vec2, vec3, vec4};
@@ -10,19 +10,19 @@ gpu_structs! {
     /// and `up` are already scaled by the tangent of half the field of view, so they need not be unit, nor
     /// right-handed (a mirrored camera).
     struct Camera {
-        /// World units.
+        /// Centre of the lens, world units.
         position: vec3,
-        /// World units; 0 is a pinhole.
+        /// Radius of the lens, world units; 0 is a pinhole.
         lens_radius: float,
-        /// Scaled by tan(horizontal fov / 2).
+        /// Unit vector to the right, scaled by tan(horizontal fov / 2).
         right: vec3,
         /// Distance along `forward` to the plane in focus, world units.
         focus_distance: float,
-        /// Scaled by tan(vertical fov / 2).
+        /// Unit vector up in the image, scaled by tan(vertical fov / 2).
         up: vec3,
         /// Near clip distance along the ray, world units; 0 clips nothing.
         near: float,
-        /// Unit.
+        /// Unit vector of the view direction.
         forward: vec3,
     }
 
@@ -40,49 +40,49 @@ gpu_structs! {
         primitive_base: uint,
         /// Eight bytes: kind and offset of each child.
         meta: uvec2,
-        /// Quantised bounds of the children.
+        /// Eight bytes: the children's quantised lower bounds along x; the other bounds likewise.
         min_x: uvec2,
-        /// See `min_x`.
+        /// Upper bounds along x.
         max_x: uvec2,
-        /// See `min_x`.
+        /// Lower bounds along y.
         min_y: uvec2,
-        /// See `min_x`.
+        /// Upper bounds along y.
         max_y: uvec2,
-        /// See `min_x`.
+        /// Lower bounds along z.
         min_z: uvec2,
-        /// See `min_x`.
+        /// Upper bounds along z.
         max_z: uvec2,
     }
 
-    /// What traversal reads of a triangle, in leaf order. 3 texels. One with [`SPHERE`] is a sphere instead: `v0` is its
+    /// The part of a triangle that traversal reads, in leaf order. 3 texels. One with [`SPHERE`] is a sphere instead: `v0` is its
     /// centre, `v1` and `v2` lead from there to the pole and to where the meridian of u = 0 crosses the equator.
     struct Triangle {
-        /// World units, or object units below an instance.
+        /// Vertex 0, in world units, or object units below an instance.
         v0: vec3,
         /// Index of the triangle in its mesh file, for reports; or SPHERE_ bits.
         primitive: uint,
-        /// See `v0`.
+        /// Vertex 1, as `v0`.
         v1: vec3,
-        /// Index into the materials.
+        /// Index of the material.
         material: uint,
-        /// See `v0`.
+        /// Vertex 2, as `v0`.
         v2: vec3,
         /// Index of the object (shape), the `id` layer of the outputs.
         object: uint,
     }
 
-    /// What shading reads of a triangle beyond its positions; same index as its [`Triangle`]. 3 texels.
+    /// Vertex normals and texture coordinates of the [`Triangle`] of the same index. 3 texels.
     /// Present only when a mesh of the scene has vertex normals or texture coordinates.
     struct Shading {
         /// Octahedral unit normals of the three vertices, snorm 2 x 16, x in the low half. All three 0xffffffff: flat.
         normal: uvec3,
         /// Texture coordinates of vertex 0; v points up, so row 0 of an image is v = 1.
         uv0: vec2,
-        /// Of vertex 1.
+        /// Texture coordinates of vertex 1.
         uv1: vec2,
-        /// Of vertex 2.
+        /// Texture coordinates of vertex 2.
         uv2: vec2,
-        /// Unused words, zero.
+        /// Unused words, which are zero.
         pad: uvec3,
     }
 
@@ -90,15 +90,15 @@ gpu_structs! {
     struct Instance {
         /// Row 0 of world_from_object.
         world0: vec4,
-        /// Row 1.
+        /// Row 1 of world_from_object.
         world1: vec4,
-        /// Row 2.
+        /// Row 2 of world_from_object.
         world2: vec4,
         /// Row 0 of object_from_world.
         object0: vec4,
-        /// Row 1.
+        /// Row 1 of object_from_world.
         object1: vec4,
-        /// Row 2.
+        /// Row 2 of object_from_world.
         object2: vec4,
         /// Index of the mesh's root node.
         root: uint,
@@ -115,7 +115,7 @@ gpu_structs! {
     struct Material {
         /// Diffuse albedo; multiplies `base_texture`.
         base_color: vec3,
-        /// MATERIAL_ bits.
+        /// Combination of the MATERIAL_ bits.
         flags: uint,
         /// Emitted radiance of the front side, W/(m^2 sr); 0 emits nothing.
         emission: vec3,
@@ -159,15 +159,15 @@ gpu_structs! {
     struct Texture {
         /// Index of the first texel.
         first: uint,
-        /// Texels.
+        /// Width in texels.
         width: uint,
-        /// Texels.
+        /// Height in texels.
         height: uint,
-        /// TEXTURE_ bits.
+        /// Combination of the TEXTURE_ bits.
         flags: uint,
-        /// It is read at `uv * scale + offset`.
+        /// Factor of texture coordinates: the picture is read at `uv * scale + offset`.
         scale: vec2,
-        /// See `scale`.
+        /// Added to scaled texture coordinates.
         offset: vec2,
     }
 
@@ -194,9 +194,9 @@ gpu_structs! {
     /// One slot of an alias table (Walker 1977, Vose 1991) over n entries. From a 32-bit random word r, the slot is
     /// the high word of r * n; the low word picks the slot itself when below `threshold`, its alias otherwise.
     struct AliasEntry {
-        /// Probability of staying, in units of 2^-32; 0xffffffff always stays.
+        /// Probability of the slot's own entry, in units of 2^-32; 0xffffffff stands for 1.
         threshold: uint,
-        /// The other entry.
+        /// Index of the slot's other entry.
         alias: uint,
     }
 }

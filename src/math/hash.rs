@@ -1,4 +1,4 @@
-//! Twin of the hash in `glsl/shared/sampler.glsl`: the words agree with `==`.
+//! Twin of `glsl/shared/pcg.glsl`: the words are equal.
 
 /// PCG-RXS-M-XS as a hash, a bijection (Jarzynski and Olano 2020).
 pub fn pcg(x: u32) -> u32 {

@@ -1,5 +1,5 @@
-//! Directions as points of an unfolded octahedron (Cigolle et al. 2014). Twin of the functions of these names under
-//! `glsl/shared`.
+//! Directions as points of an unfolded octahedron (Meyer et al. 2010, Cigolle et al. 2014). Twin of
+//! `glsl/shared/octahedral.glsl`.
 use glam::{Vec2, Vec3, vec2, vec3};
 
 /// Unit normal from two snorm words of 16 bits.

@@ -12,7 +12,7 @@ pub fn exp_negative(x: f32) -> f32 {
     p * f32::from_bits(((whole as i32 + 127) as u32) << 23)
 }
 
-/// Of two points.
+/// Squared distance of two points, with the same bits on every device.
 pub fn squared_distance(a: [f32; 3], b: [f32; 3]) -> f32 {
     let [x, y, z] = [0, 1, 2].map(|i| a[i] - b[i]);
     x * x + y * y + z * z

@@ -1,7 +1,7 @@
 //! Twin of `glsl/shared/warp.glsl`.
 use glam::{Mat3, Vec2, Vec3, vec2, vec3};
 
-/// 1 / pi.
+/// The reciprocal of pi.
 pub const INV_PI: f32 = std::f32::consts::FRAC_1_PI;
 
 /// (cos, sin) of 2 pi u, u in [0, 1).
@@ -14,34 +14,34 @@ pub fn circle_point(u: f32) -> Vec2 {
     vec2(s, if x < 0.0 { c } else { -c })
 }
 
-/// Uniform on the unit disk.
+/// A point uniformly distributed on the unit disk.
 pub fn warp_disk(u: Vec2) -> Vec2 {
     u.x.sqrt() * circle_point(u.y)
 }
 
-/// Density cos / pi.
+/// A direction around +z with density cos / pi.
 pub fn warp_cosine_hemisphere(u: Vec2) -> Vec3 {
     warp_disk(u).extend((1.0 - u.x).sqrt())
 }
 
-/// Uniform on the unit sphere.
+/// A direction uniformly distributed on the unit sphere.
 pub fn warp_sphere(u: Vec2) -> Vec3 {
     (2.0 * (u.x * (1.0 - u.x)).sqrt() * circle_point(u.y)).extend(1.0 - 2.0 * u.x)
 }
 
-/// Uniform in the cone around z.
+/// A direction uniformly distributed in the cone around z.
 pub fn warp_cone(u: Vec2, one_minus_cos_max: f32) -> Vec3 {
     let t = u.x * one_minus_cos_max;
     ((t * (2.0 - t)).sqrt() * circle_point(u.y)).extend(1.0 - t)
 }
 
-/// Barycentric weights of vertices 1 and 2, uniform by area.
+/// Barycentric weights of vertices 1 and 2 of a point uniformly distributed by area.
 pub fn warp_triangle(u: Vec2) -> Vec2 {
     let h = 0.5 * u;
     if u.x < u.y { vec2(h.x, u.y - h.x) } else { vec2(u.x - h.y, h.y) }
 }
 
-/// Triangle filter of radius 1, one axis.
+/// An offset in [-1, 1] pixels along one axis, distributed as the triangle filter of radius 1.
 pub fn warp_tent(u: f32) -> f32 {
     let v = 2.0 * u - 1.0;
     let r = 1.0 - (1.0 - v.abs()).sqrt();
@@ -71,12 +71,12 @@ pub fn erf_inverse(x: f32) -> f32 {
     p * x
 }
 
-/// Gaussian filter of standard deviation 0.5 pixels cut at radius 2, one axis.
+/// An offset along one axis, distributed as the Gaussian filter of standard deviation 0.5 pixels, cut at 2 pixels.
 pub fn warp_gaussian(u: f32) -> f32 {
     (0.707106781 * erf_inverse(0.99993666 * (2.0 * u - 1.0))).clamp(-2.0, 2.0)
 }
 
-/// Columns: tangent, bitangent, n; right-handed for every unit n.
+/// A right-handed frame around any unit n; its columns are tangent, bitangent, n.
 pub fn basis_from_normal(n: Vec3) -> Mat3 {
     let s = if n.z < 0.0 { -1.0 } else { 1.0 };
     let a = -1.0 / (s + n.z);

@@ -1,5 +1,5 @@
-//! Whether a scene's arrays fit together. Kernels follow indices without a look; whoever loads a scene gets right ones, but
-//! the arrays are there to be edited.
+//! Checks that a scene's arrays fit together. Kernels follow indices unchecked; loaded scenes have valid ones, but callers may
+//! edit the arrays.
 use super::build::bvh;
 use super::{Environment, Scene};
 use crate::error::{Error, Result};
@@ -11,20 +11,20 @@ use glam::Vec3;
 
 type Checked = std::result::Result<(), String>;
 
-/// How a node is reached, if it is.
+/// The kind of tree that a node belongs to, if any.
 #[derive(Clone, Copy, PartialEq)]
 enum Level {
     Unreached,
-    /// Its leaves are instances.
+    /// A node of the top level, whose leaves are instances.
     Top,
-    /// Its leaves are triangles.
+    /// A node of a mesh, whose leaves are triangles.
     Mesh,
 }
 
 impl Scene {
-    /// Whether every index leads into its array, the nodes form trees that [`Scene::stack`] is deep enough for, parallel arrays
-    /// have the same length. In time that is linear in all of that; making a
-    /// [`Renderer`](crate::render::Renderer) asks.
+    /// Checks that every index lies within its array, that nodes form trees which [`Scene::stack`] is deep enough for, and that
+    /// parallel arrays have the same length. It takes time linear in their sizes; making a
+    /// [`Renderer`](crate::render::Renderer) calls it.
     ///
     /// # Errors
     /// [`Error::Scene`] with the first thing that does not fit.
@@ -178,7 +178,7 @@ fn table_fits(name: &str, table: &[AliasEntry], entries: usize) -> Checked {
     below(&format!("entry of {name}"), "alias", entries, table.iter().map(|entry| entry.alias))
 }
 
-/// Whether all of `indices`, which number `which` in order, are below `count`.
+/// Checks that all of `indices`, which belong to `which` in order, are below `count`.
 fn below(which: &str, what: &str, count: usize, indices: impl IntoIterator<Item = u32>) -> Checked {
     match indices.into_iter().enumerate().find(|(_, index)| *index as usize >= count) {
         Some((at, index)) => Err(format!("{which} {at} names {what} {index} of {count}")),
@@ -194,7 +194,7 @@ fn below_or_none(which: &str, what: &str, count: usize, indices: impl IntoIterat
     }
 }
 
-/// Whether a camera is of finite numbers.
+/// Checks that a camera consists of finite numbers.
 ///
 /// # Errors
 /// [`Error::Scene`].

@@ -1,11 +1,11 @@
-//! What a scene and its settings call for, and who calls: kernels are compiled without the rest.
+//! Finds the effects that a scene and its settings need, and what needs each. Kernels are compiled without the others.
 use super::Scene;
 use super::build::{geometry, lights};
 use crate::layout::*;
 use crate::scene::description::settings::{PixelFilter, Sampler, Settings};
 
-/// The effects of a scene with its settings, and for each one that is on the first object, material, light or setting
-/// that calls for it. `split_light`: direct and indirect light are wanted apart. `counters`: rays are counted.
+/// The effects of a scene with its settings, and for each one that is on the first object, material, light or setting that needs
+/// it. `split_light` asks for direct and indirect light in separate layers, `counters` for counts of rays.
 pub fn effects(
     scene: &Scene,
     settings: &Settings,
@@ -50,7 +50,7 @@ pub fn effects(
     (found, reasons)
 }
 
-/// Materials that a triangle or an instance wears.
+/// Materials that some triangle or instance has.
 fn used_materials(scene: &Scene) -> Vec<bool> {
     let mut used = vec![false; scene.materials.len()];
     let triangles = scene.triangles.iter().map(|t| t.material);

@@ -1,9 +1,9 @@
-//! A number that tells scenes apart, so that samples of one are not added to those of another.
+//! A number that identifies a scene, so that samples of one are not added to those of another.
 use std::fmt;
 use xxhash_rust::xxh3::Xxh3Default;
 
-/// Of all that was added, in order, the same on every machine and in every run (xxh3, 128 bits). Against accidents, not
-/// against attacks.
+/// Hash of all that was added, in order: xxh3 of 128 bits, the same on every machine and in every run. It detects accidents, not
+/// attacks.
 #[derive(Clone, Default)]
 pub struct Fingerprint(Xxh3Default);
 
@@ -28,7 +28,7 @@ impl fmt::Debug for Fingerprint {
     }
 }
 
-/// 32 hexadecimal digits.
+/// Written as 32 hexadecimal digits.
 impl fmt::Display for Fingerprint {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "{:032x}", self.0.digest128())

@@ -25,39 +25,39 @@ pub use check::check_camera;
 pub use effects::effects;
 pub use fingerprint::Fingerprint;
 
-/// Largest coordinate M of triangles, of points that rays start from and of lights: what a ray's hit is computed from fits a
-/// 32-bit float (3.4e38). Seen from its origin a corner is within 2 M, and sheared along the ray within 4 M; an edge
+/// Largest coordinate M of triangles, of points that rays start from and of lights. With it, all numbers of the triangle test
+/// fit a 32-bit float (3.4e38): seen from the ray's origin a corner is within 2 M, and sheared along the ray within 4 M; an edge
 /// function is within 2 (4 M)^2 = 32 M^2, and the numerator of the distance, three of them times a depth, within
 /// 3 * 32 M^2 * 2 M = 192 M^3, which is 1.9e38.
 pub const MAX_COORDINATE: f64 = 1e12;
 
-/// Bytes that a byte of a scene file takes while it is read, at most.
+/// Most bytes of memory that a byte of a scene file takes while it is read.
 const BYTES_OF_TOML: u64 = 40;
 
-/// Everything a render reads, in the form that kernels read it. Whoever edits it keeps what [`Scene::check`] asks for.
+/// Everything that a render reads, in the form that kernels read. Code that edits it must keep to what [`Scene::check`] checks.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     /// The `[camera]` table; [`Scene::camera`] makes a camera of it for a film.
     pub view: description::Camera,
-    /// All nodes of all levels; indices inside are global.
+    /// Nodes of all levels; the indices in them are global.
     pub nodes: Vec<BvhNode>,
     /// Node where traversal starts: the top level with instances, else the only one.
     pub root: u32,
-    /// Groups of nodes that a ray puts aside at most; at least 1.
+    /// Largest number of groups of nodes on a ray's stack; at least 1.
     pub stack: u32,
-    /// In leaf order; spheres are among them.
+    /// Triangles, and spheres among them, in leaf order.
     pub triangles: Vec<Triangle>,
-    /// Same order as `triangles`; empty when no mesh has vertex normals or texture coordinates.
+    /// Shading records in the order of `triangles`; empty when no mesh has vertex normals or texture coordinates.
     pub shading: Vec<Shading>,
-    /// In leaf order of the top level; empty when the scene has one level.
+    /// Instances in leaf order of the top level; empty when the scene has one level.
     pub instances: Vec<Instance>,
-    /// At least one.
+    /// Materials of which there is at least one.
     pub materials: Vec<Material>,
-    /// May be empty.
+    /// Pictures that materials name; may be empty.
     pub textures: Vec<Texture>,
     /// RGBA8 texels of all textures, R in the low byte; after them the tables of rough coats, words of floats.
     pub texels: Vec<u32>,
-    /// May be empty: then only emission that paths run into is seen (none).
+    /// Lights; without any, paths see only the emission that they hit.
     pub lights: Vec<Light>,
     /// Alias table over `lights`, in proportion to power; same length.
     pub light_table: Vec<AliasEntry>,
@@ -65,18 +65,18 @@ pub struct Scene {
     /// per square world unit of drawing a point by [`Scene::light_table`] that a path has hit otherwise. 0 without
     /// emissive triangles. Exact up to the rounding of the table (2^-32 / lights) and of 32-bit floats.
     pub triangle_pdf_scale: f32,
-    /// Emissive triangles are sampled by the solid angle in which they are seen, not by area: one is large.
+    /// Whether emissive triangles are sampled by solid angle, not by area, since one of them is large.
     pub large_lamps: bool,
     /// The environment image, when the environment is not a constant.
     pub environment: Option<Environment>,
-    /// Of all that decides the picture but camera and settings, in the order of the files: triangles are added before the
-    /// hierarchy sorts them, which may do so otherwise in another version or on another machine.
+    /// Fingerprint of all that decides the picture but camera and settings, in the order of the files. Triangles are added before
+    /// the hierarchy sorts them, since another version or machine may sort them differently.
     pub content: Fingerprint,
     /// World-space bounds of all geometry; zero when there is none.
     pub bounds: [[f32; 3]; 2],
-    /// What calls for what, for `tallow explain`: names by index of object and material.
+    /// Names of objects and materials by index, for `tallow explain` and reports.
     pub names: Names,
-    /// What was repaired on loading, a readable line each.
+    /// Readable lines about what was repaired on loading.
     pub warnings: Vec<String>,
 }
 
@@ -85,29 +85,29 @@ pub struct Scene {
 /// half-integers. The density per solid angle of texel i is `texels[i].w * width * height / (2 pi^2 sin(theta))`.
 #[derive(Clone, Debug, Default)]
 pub struct Environment {
-    /// Texels across (longitude).
+    /// Width in texels (longitude).
     pub width: u32,
-    /// Texels down (latitude).
+    /// Height in texels (latitude).
     pub height: u32,
     /// Linear radiance in xyz; in w the probability that `table` returns this texel.
     pub texels: Vec<[f32; 4]>,
-    /// Alias table over `texels`.
+    /// Alias table that chooses one of `texels`.
     pub table: Vec<AliasEntry>,
 }
 
-/// Names for reports.
+/// Names of a scene's parts, for reports.
 #[derive(Clone, Debug, Default)]
 pub struct Names {
-    /// By object index.
+    /// Names of the objects, by index.
     pub objects: Vec<String>,
-    /// By material index.
+    /// Names of the materials, by index.
     pub materials: Vec<String>,
 }
 
-/// A scene, and what its file says of how to render it.
+/// A scene, and the settings that its file gives.
 #[derive(Clone, Debug, Default)]
 pub struct Loaded {
-    /// What is rendered.
+    /// The scene to be rendered.
     pub scene: Scene,
     /// The file's settings over the defaults.
     pub settings: Settings,
@@ -135,7 +135,7 @@ impl std::ops::DerefMut for Loaded {
     }
 }
 
-/// A scene file that was read; the models and images that it names were not yet.
+/// A scene file that was read, without the models and images that it names.
 pub struct SceneFile<'a> {
     path: PathBuf,
     description: Cow<'a, Description>,
@@ -225,7 +225,7 @@ impl Scene {
         self.view.build(size, self.bounds).map_err(|what| Error::Scene(format!("[camera]: {what}")))
     }
 
-    /// Of all that decides the picture but the settings.
+    /// Fingerprint of all that decides the picture but the settings.
     ///
     /// # Errors
     /// Those of [`Scene::camera`].

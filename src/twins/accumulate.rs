@@ -2,15 +2,15 @@
 use crate::layout::{BrokenTally, FoldPush, PixelLight, PixelStats, vec3, vec4};
 use crate::math::hash::pcg;
 use crate::shaders;
-use crate::shaders::accumulate::{FEW, MAX_DEVIATION, MAX_IRRADIANCE, MAX_M2, MIN_ALBEDO};
+use crate::shaders::accumulate::{MAX_DEVIATION, MAX_IRRADIANCE, MAX_M2, MAX_ROUNDED_SAMPLES, MIN_ALBEDO};
 use crate::statistics::{luminance, next_sample};
 use glam::{Vec3, Vec4};
 
-/// Of the remainder of a mean, for each channel.
+/// Bits of a mean's remainder, for each channel.
 const BITS: u32 = shaders::accumulate::BITS as u32;
 const LIGHT_BITS: u32 = shaders::accumulate::LIGHT_BITS as u32;
 
-/// What of a sample's light needs no filter, and its indirect irradiance over pi.
+/// The light of a sample that needs no filter, and its indirect irradiance over pi.
 fn split(direct: Vec3, indirect: Vec3, albedo: Vec3) -> (Vec3, Vec3) {
     let divides = albedo.cmpgt(Vec3::splat(MIN_ALBEDO));
     let before = (indirect / albedo.max(Vec3::splat(MIN_ALBEDO))).min(Vec3::splat(MAX_IRRADIANCE));
@@ -19,8 +19,8 @@ fn split(direct: Vec3, indirect: Vec3, albedo: Vec3) -> (Vec3, Vec3) {
 }
 
 /// Adds a batch to the statistics of all pixels. `samples`: sample k of pixel i at `k * push.pixels + i`, one vec4, or
-/// with `split_light` three (direct, indirect, albedo); `light` is left alone without it. Returns the samples that were no
-/// number, as the sign of w of the first tells, and the first of them.
+/// with `split_light` three (direct, indirect, albedo); without it `light` does not change. Returns how many samples were not
+/// finite, which a negative w of the first vec4 marks, and the first of them.
 pub fn fold(
     push: &FoldPush,
     split_light: bool,
@@ -63,14 +63,14 @@ fn unit(mean: f32, bits: u32) -> f32 {
     (power * f32::EPSILON / (1u32 << bits) as f32).max(1e-37)
 }
 
-/// A word of remainders, and the samples of the mean.
+/// A word of remainders, and the number of samples of the mean.
 struct Kept<'a> {
     word: &'a mut u32,
     count: u32,
 }
 
 /// Moves one channel of a mean by a step. The remainder holds what rounding has taken off, `bits` from bit `at` on; it is rounded
-/// itself, up or down by chance.
+/// up or down at random.
 fn move_channel(mean: f32, by: f32, remainder: &mut Kept, at: u32, bits: u32) -> f32 {
     let kept = ((*remainder.word << (32 - at - bits)) as i32) >> (32 - bits);
     let added = kept as f32 * unit(mean, bits) + by;
@@ -79,7 +79,7 @@ fn move_channel(mean: f32, by: f32, remainder: &mut Kept, at: u32, bits: u32) ->
     let end = (1 << (bits - 1)) as f32;
     let up = (pcg(remainder.count) >> 8) as f32 * 5.960_464_5e-8;
     let rounded = (lost / unit(moved, bits) + up).floor();
-    // Half of the last place above is half of it below the next number: cut, it would be lost, always in one direction.
+    // A remainder of half the last place or more moves the mean to the next number: cutting it off would bias the mean.
     let (moved, rounded) = match rounded >= end {
         true => (moved + unit(moved, bits) * (2.0 * end), -end),
         false => (moved, rounded),
@@ -103,7 +103,7 @@ fn fold_radiance(s: &mut PixelStats, radiance: Vec3) {
     s.count += 1;
     let off = radiance - Vec3::from(s.mean);
     let by = off * (1.0 / s.count as f32);
-    let mean = match s.count <= FEW {
+    let mean = match s.count <= MAX_ROUNDED_SAMPLES {
         true => Vec3::from(s.mean) + by,
         false => move_mean(s.mean, by, Kept { word: &mut s.remainder, count: s.count }, 0, BITS),
     };
@@ -116,7 +116,7 @@ fn fold_light(l: &mut PixelLight, (kept, irradiance): (Vec3, Vec3), count: u32) 
     let share = 1.0 / count as f32;
     let (direct, indirect) = (Vec3::from(l.direct), Vec3::from(l.indirect));
     let [by, indirect_by] = [(kept - direct) * share, (irradiance - indirect) * share];
-    let [direct, moved] = match count <= FEW {
+    let [direct, moved] = match count <= MAX_ROUNDED_SAMPLES {
         true => [direct + by, indirect + indirect_by],
         false => {
             let word = &mut l.remainder;

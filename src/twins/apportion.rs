@@ -1,8 +1,9 @@
-//! Twins of the kernels that apportion, scan and batch: plain, with 128-bit products and a sort. They agree with `==`.
+//! Twins of the kernels of `glsl/apportion` and of `choose.comp`, written plainly with 128-bit products and a sort. Their
+//! results equal the kernels' exactly.
 use crate::layout::NONE;
 use crate::math::hash::pcg;
 
-/// Priorities as 12.20 fixed point, and how many of them are not finite (they weigh nothing).
+/// Priorities as 12.20 fixed point, and the number of those that are not finite, whose weight is 0.
 pub fn weigh(priority: &[f32]) -> (Vec<u32>, u32) {
     let weight = |p: &f32| if p.is_finite() && *p > 0.0 { (p.min(4095.0) * 1_048_576.0) as u32 } else { 0 };
     let broken = priority.iter().filter(|p| !p.is_finite()).count();
@@ -20,7 +21,7 @@ pub fn choose(priority: &[f32], round: u32, seed: u32, threshold: f32) -> Vec<u3
     priority.iter().enumerate().map(chosen).map(u32::from).collect()
 }
 
-/// What pixels lack of their shares of `total` samples: max(0, floor(total * w / W) - have).
+/// Samples that pixels lack of their shares of `total` samples: max(0, floor(total * w / W) - have).
 pub fn deficit(weights: &[u32], have: &[u32], total: u64) -> Vec<u32> {
     let sum: u128 = weights.iter().map(|&w| u128::from(w)).sum();
     let share = |w: u32| match sum {
@@ -31,7 +32,7 @@ pub fn deficit(weights: &[u32], have: &[u32], total: u64) -> Vec<u32> {
     weights.iter().zip(have).map(lack).collect()
 }
 
-/// What pixels lack of the samples that bring weight / sqrt(n) to the threshold, both 12.20 fixed point:
+/// Samples that pixels lack until weight / sqrt(n) reaches the threshold, both 12.20 fixed point:
 /// ceil((w / t)^2) - have, at least 1 and at most max(have, 4) and what is left of `enough`; 0 of a weight of 0.
 pub fn need(weights: &[u32], have: &[u32], threshold: u32, enough: u32) -> Vec<u32> {
     let lack = |(&w, &have): (&u32, &u32)| {
@@ -43,16 +44,16 @@ pub fn need(weights: &[u32], have: &[u32], threshold: u32, enough: u32) -> Vec<u
     weights.iter().zip(have).map(lack).collect()
 }
 
-/// Hamilton's method with room: quotas in proportion to the weights, rounded down; pixels whose quota is no less than
-/// their room get the room, and what they leave is apportioned again among the others, up to `rounds` times in all; then
-/// one more to the largest remainders, ties to the lower index. Weights of zero everywhere (left) count as equal. What
-/// `rounds` were too few for fills the room there is in order of index. The counts sum to the smaller of budget and room.
-pub fn apportion(weights: &[u32], room: &[u32], budget: u64, rounds: u32) -> Vec<u32> {
+/// Hamilton's method with limited room. Quotas are in proportion to the weights, rounded down. Pixels whose quota is no less
+/// than their room get the room, and the rest is apportioned again among the others, up to `repetitions` times in all. Then the
+/// largest remainders get one more, ties at the lower index first. If all open pixels have weight 0, they share alike. If the
+/// repetitions were too few, what is left fills the room in order of index. The counts sum to the smaller of budget and room.
+pub fn apportion(weights: &[u32], room: &[u32], budget: u64, repetitions: u32) -> Vec<u32> {
     let mut count = vec![0_u32; weights.len()];
     let mut open: Vec<usize> = (0..weights.len()).collect();
     let mut left = u128::from(budget);
     let mut equal = weights.iter().all(|&w| w == 0);
-    for round in 0.. {
+    for repetition in 0.. {
         let weight = |i: usize| u128::from(if equal { 1 } else { weights[i] });
         let sum = open.iter().map(|&i| weight(i)).sum::<u128>().max(1);
         let (full, rest): (Vec<_>, Vec<_>) = open.iter().partition(|&&i| left * weight(i) / sum >= u128::from(room[i]));
@@ -61,7 +62,7 @@ pub fn apportion(weights: &[u32], room: &[u32], budget: u64, rounds: u32) -> Vec
         full.iter().for_each(|&i: &usize| count[i] = room[i]);
         let filled: u128 = full.iter().map(|&i| u128::from(room[i])).sum();
         open = rest;
-        if full.is_empty() || round + 1 == rounds {
+        if full.is_empty() || repetition + 1 == repetitions {
             let floors: u128 = open.iter().map(|&i| u128::from(count[i])).sum();
             let beyond = (left - filled - floors) as u64;
             match full.is_empty() {
@@ -89,7 +90,7 @@ fn fill_room(count: &mut [u32], room: &[u32], open: &[usize], mut beyond: u64) {
     }
 }
 
-/// First path of every pixel, and the number of all.
+/// Index of every pixel's first path; last, the number of all paths.
 pub fn offsets(count: &[u32]) -> Vec<u64> {
     let mut offsets = vec![0];
     for &n in count {
@@ -98,7 +99,7 @@ pub fn offsets(count: &[u32]) -> Vec<u64> {
     offsets
 }
 
-/// The same in round `round` of `rounds`, to which the list of all paths is dealt: path j goes to round j mod `rounds`.
+/// [`offsets`] within round `round` of `rounds`, to which the list of all paths is dealt: path j goes to round j mod `rounds`.
 pub fn dealt(offsets: &[u64], round: u32, rounds: u32) -> Vec<u64> {
     offsets.iter().map(|o| (o + u64::from(rounds - 1 - round)) / u64::from(rounds)).collect()
 }

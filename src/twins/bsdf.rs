@@ -12,38 +12,38 @@ use glam::{Vec2, Vec3, Vec4, vec2, vec3};
 pub struct Bsdf {
     /// One of the BSDF_ constants.
     pub kind: u32,
-    /// Diffuse albedo.
+    /// Diffuse albedo per channel.
     pub albedo: Vec3,
     /// Roughness; below [`SMOOTH_ALPHA`] the interface is smooth.
     pub alpha: f32,
     /// Index per channel (conductor), interior / exterior in x (dielectric, coated).
     pub eta: Vec3,
-    /// Extinction per channel (conductor).
+    /// Extinction of a conductor, per channel.
     pub k: Vec3,
-    /// Tint of reflection.
+    /// Tint of reflected light.
     pub specular: Vec3,
-    /// Tint of refraction.
+    /// Tint of refracted light.
     pub transmission: Vec3,
     /// Mean internal Fresnel reflectance (smooth coat).
     pub internal_fresnel: f32,
-    /// Of the table of a rough coat, at `alpha`; the kernel reads it where it needs it.
+    /// Row of a rough coat's table at `alpha`, which the kernel reads where it needs it.
     pub coat: CoatRow,
     /// Light below a coat takes on the base's colour at every turn.
     pub nonlinear: bool,
-    /// GGX instead of Beckmann.
+    /// Whether microfacets are GGX, not Beckmann.
     pub ggx: bool,
 }
 
-/// What [`bsdf_sample`] returns.
+/// A direction that [`bsdf_sample`] chose.
 #[derive(Clone, Copy, Debug)]
 pub struct BsdfSample {
-    /// Towards the light, local.
+    /// Local unit direction towards the light.
     pub wi: Vec3,
     /// f |cos| / pdf; a delta lobe's weight includes the probability of choosing it.
     pub weight: Vec3,
-    /// Per steradian; 0 for a delta lobe.
+    /// Density per steradian; 0 for a delta lobe.
     pub pdf: f32,
-    /// The lobe is a delta.
+    /// Whether the lobe is a delta.
     pub delta: bool,
 }
 
@@ -244,12 +244,12 @@ pub fn bsdf_sample(b: &Bsdf, wo: Vec3, u_lobe: f32, u: Vec2) -> (bool, BsdfSampl
     }
 }
 
-/// A lobe around the mirror image of `wo`.
+/// Whether there is a lobe around the mirror image of `wo`.
 pub fn bsdf_is_specular(b: &Bsdf) -> bool {
     matches!(b.kind, BSDF_CONDUCTOR | BSDF_DIELECTRIC | BSDF_COATED)
 }
 
-/// Every lobe is a delta.
+/// Whether every lobe is a delta.
 pub fn bsdf_is_delta(b: &Bsdf) -> bool {
     matches!(b.kind, BSDF_CONDUCTOR | BSDF_DIELECTRIC) && is_smooth(b)
 }

@@ -6,12 +6,12 @@ use crate::shaders::shared::camera::{PAIR_FILM, PAIR_LENS};
 use crate::twins::sampler::{Sampler, sample_2d};
 use glam::{Vec2, Vec3, vec2};
 
-/// A ray.
+/// A ray from the camera.
 #[derive(Clone, Copy, Debug)]
 pub struct Ray {
-    /// World units.
+    /// Start in world units.
     pub origin: Vec3,
-    /// Unit.
+    /// Unit direction.
     pub direction: Vec3,
 }
 
@@ -35,7 +35,7 @@ pub fn camera_ray(camera: &Camera, film: Vec2, lens: Vec2) -> Ray {
     Ray { origin: origin + camera.near * direction, direction }
 }
 
-/// Where in the film a sample of `pixel` falls, in pixels.
+/// Position on the film of a sample of `pixel`, in pixels.
 pub fn film_sample(frame: &FrameConstants, effects: &Effects, pixel: u32, random: Sampler) -> Vec2 {
     let at = vec2((pixel % frame.size[0]) as f32, (pixel / frame.size[0]) as f32);
     let u = sample_2d(random, PAIR_FILM);
@@ -53,7 +53,7 @@ pub fn eye_ray(frame: &FrameConstants, effects: &Effects, film: Vec2, random: Sa
     camera_ray(&frame.camera, film_from_pixel(film, frame.size), lens)
 }
 
-/// Alpha masks along a path draw from this.
+/// Seed of the alpha masks along a path.
 pub fn path_seed(frame: &FrameConstants, pixel: u32, index: u32) -> u32 {
     pcg(pcg(pixel ^ pcg(!frame.seed)).wrapping_add(index))
 }

@@ -1,4 +1,4 @@
-//! Twin of how `glsl/shared/bsdf.glsl` reads what a rough coat lets in, and what it reflects inwards, from the table that
+//! Twin of the functions of `glsl/shared/bsdf.glsl` that read the table of a rough coat, which
 //! [`coat_table`](crate::scene::coat_table) computes.
 use crate::layout::SMOOTH_ALPHA;
 use crate::layout::{COAT_COLUMNS, COAT_ROWS};
@@ -78,7 +78,7 @@ mod tests {
         sum.map(|s| s * TAU / (RADII * TURNS) as f64)
     }
 
-    /// Of 2 c R(c) over cosines inside.
+    /// Mean of 2 c R(c) over cosines inside.
     fn brute_force_inside(eta: f32, ggx: bool, alpha: f32) -> f64 {
         let cosines = (0..48).map(|i| (i as f32 + 0.5) / 48.0);
         cosines.map(|c| 2.0 * f64::from(c) * brute_force(1.0 / eta, ggx, alpha, c)[0] / 48.0).sum()

@@ -13,11 +13,11 @@ use std::ops::Range;
 /// The guide rays of a film, row-major, and the filtered light that they carry.
 #[derive(Clone, Copy, Debug)]
 pub struct GuideRays<'a> {
-    /// Pixels.
+    /// Width and height in pixels.
     pub size: [u32; 2],
-    /// What they meet; one that meets nothing has depth 0 and carries no light.
+    /// Hits of the guide rays; one that meets nothing has depth 0 and carries no light.
     pub guide: &'a [Guide],
-    /// rgb; w is the number of samples behind it, 0 where there is no light.
+    /// Filtered light in rgb; w is its number of samples, 0 where there is no light.
     pub filtered: &'a [vec4],
 }
 

@@ -13,13 +13,13 @@ use std::f32::consts::PI;
 /// One light, seen from a surface point.
 #[derive(Clone, Copy, Debug)]
 pub struct LightSample {
-    /// Unit, from the surface to the light.
+    /// Unit direction from the surface to the light.
     pub direction: Vec3,
-    /// To the offset point on the light, world units; [`INFINITE_DISTANCE`] for lights at infinity.
+    /// Distance to the offset point on the light, world units; [`INFINITE_DISTANCE`] for lights at infinity.
     pub distance: f32,
-    /// Already divided by the probability of the sample.
+    /// Radiance, divided by the probability of the sample.
     pub radiance: Vec3,
-    /// Per solid angle; 0 for lights that no BSDF sample can hit.
+    /// Density per solid angle; 0 for lights that no BSDF sample can hit.
     pub pdf: f32,
 }
 
@@ -43,7 +43,7 @@ fn environment_uv(d: Vec3, sine: f32) -> Vec2 {
     vec2(d.x.atan2(-d.z) * (0.5 / PI), sine.atan2(d.y) / PI)
 }
 
-/// world_from_environment.
+/// Rotation from environment to world space.
 fn environment_rotation(light: &Light) -> Mat3 {
     Mat3::from_cols(light.a.into(), light.b.into(), light.c.into())
 }
@@ -100,7 +100,7 @@ fn sample_environment(scene: &Scene, light: &Light, word: u32, u: Vec2) -> Light
     LightSample { direction, distance: INFINITE_DISTANCE, radiance, pdf }
 }
 
-/// A triangle seen from a point: unit vectors to its corners, and its solid angle.
+/// A triangle seen from a point: unit vectors to its corners, and its solid angle in steradians.
 struct SphericalTriangle {
     corners: [Vec3; 3],
     solid_angle: f32,

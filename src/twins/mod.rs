@@ -1,6 +1,6 @@
 //! Plain CPU twins of the kernels and of the functions under `glsl/shared`: same names, same order of operations, `f32`.
-//! Tests compare the kernels with them, and run the statistics that a GPU would only slow down. Nothing here is used in
-//! a render: what a render computes on the CPU is in [`crate::math`] and [`crate::scene`], where twins take it from.
+//! Tests compare the kernels with them, and run statistics on them that a GPU would only slow down. No render uses them: code
+//! that a render runs on the CPU is in [`crate::math`] and [`crate::scene`], and twins call it there.
 #![allow(clippy::excessive_precision, clippy::approx_constant, reason = "constants as the GLSL writes them")]
 pub mod accumulate;
 pub mod apportion;

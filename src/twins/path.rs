@@ -21,33 +21,33 @@ pub use crate::shaders::path::SHADOW_END;
 /// What one path returns, linear Rec. 709. Without [`Effects::indirect`] all light is in `direct`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PathSample {
-    /// See [`crate::layout::PixelLight::direct`].
+    /// Light that needs no filter, as [`crate::layout::PixelLight::direct`].
     pub direct: Vec3,
     /// Radiance that arrived by more than one bounce.
     pub indirect: Vec3,
     /// Reflectance of the first hit.
     pub albedo: Vec3,
-    /// Rays of both kinds.
+    /// Number of rays, shadow rays included.
     pub rays: u32,
-    /// The light was no number, and is black.
+    /// Whether the light was not finite, and counts as black.
     pub broken: bool,
 }
 
 impl PathSample {
-    /// All of it.
+    /// Direct and indirect light together.
     pub fn radiance(&self) -> Vec3 {
         self.direct + self.indirect
     }
 }
 
-/// Which of the two ways to find light are used. The kernel has only `Both`; the others test that either is enough.
+/// Sampling strategies that paths use. The kernel has only `Both`; tests show by the others that either one suffices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Strategy {
-    /// Joined by the balance heuristic.
+    /// Both, joined by the balance heuristic.
     Both,
-    /// Light sampling, wherever a light can be sampled.
+    /// Light sampling alone, wherever a light can be sampled.
     Light,
-    /// BSDF sampling: point, spot and directional lights are lost.
+    /// BSDF sampling alone, which loses point, spot and directional lights.
     Bsdf,
 }
 
@@ -63,17 +63,17 @@ struct Path {
 /// A path tracer for one scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Tracer<'a> {
-    /// The scene.
+    /// The scene that paths are traced in.
     pub scene: &'a Scene,
-    /// As the kernel's.
+    /// Constants of the frame, as the kernel reads them.
     pub frame: FrameConstants,
-    /// Roulette, clamp, pixel filter, sampler and the split of light; the rest follows from the scene.
+    /// Effects that settings decide: roulette, clamp, pixel filter, sampler, split light; the scene decides the rest.
     pub effects: Effects,
     /// [`Strategy::Both`] for the kernel's answer.
     pub strategy: Strategy,
 }
 
-/// The point being shaded.
+/// The surface point that is being shaded.
 struct Shade {
     surface: Surface,
     bsdf: Bsdf,
@@ -81,7 +81,7 @@ struct Shade {
     basis: Mat3,
     wo: Vec3,
     pair: u32,
-    /// Triangle and instance.
+    /// Triangle and instance that the next ray leaves.
     from: [u32; 2],
 }
 
@@ -125,7 +125,7 @@ impl Tracer<'_> {
         surface_emission(self.scene, s) * weight
     }
 
-    /// None where there is nothing to ask a shadow ray for.
+    /// Returns `None` where no shadow ray is needed.
     fn light_from_nee(&self, p: &Shade, random: Sampler, mask_seed: u32) -> Option<Vec3> {
         let s = &p.surface;
         let word = sample_2d_bits(random, p.pair + PAIR_CHOICE)[0];
@@ -233,7 +233,7 @@ impl Tracer<'_> {
         }
     }
 
-    /// Sample `index` of `pixel` (row-major).
+    /// Traces sample `index` of `pixel` (row-major).
     pub fn sample(&self, pixel: u32, index: u32) -> PathSample {
         let random = sampler_start(pixel, index, self.frame.seed, self.effects.independent_sampler);
         let film = film_sample(&self.frame, &self.effects, pixel, random);

@@ -9,7 +9,7 @@ pub struct Sampler {
     pub seed: u32,
     /// Sample index; bit-reversed for Sobol points.
     pub index: u32,
-    /// PCG numbers instead of Sobol points (`FX_INDEPENDENT` in the shader).
+    /// Whether numbers are PCG's, not Sobol points (`FX_INDEPENDENT` in the shader).
     pub independent: bool,
 }
 
@@ -52,7 +52,7 @@ pub fn sample_2d_bits(s: Sampler, pair: u32) -> [u32; 2] {
     [x.reverse_bits(), y.reverse_bits()]
 }
 
-/// In [0, 1), from the upper 24 bits of each word.
+/// Two numbers in [0, 1), from the upper 24 bits of each word.
 pub fn unit_floats(bits: [u32; 2]) -> Vec2 {
     Vec2::new((bits[0] >> 8) as f32, (bits[1] >> 8) as f32) * 5.9604645e-8
 }

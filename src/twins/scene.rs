@@ -9,12 +9,12 @@ use glam::{Mat3, Vec2, Vec3, Vec4};
 pub struct Rows([Vec4; 3]);
 
 impl Rows {
-    /// Of a point.
+    /// Transforms a point.
     pub fn point(&self, p: Vec3) -> Vec3 {
         Vec3::from(self.0.map(|r| r.x * p.x + r.y * p.y + r.z * p.z + r.w))
     }
 
-    /// Of a direction.
+    /// Transforms a direction.
     pub fn vector(&self, v: Vec3) -> Vec3 {
         Vec3::from(self.0.map(|r| r.x * v.x + r.y * v.y + r.z * v.z))
     }
@@ -30,23 +30,23 @@ impl Rows {
     }
 }
 
-/// world_from_object.
+/// Transform from object to world space.
 pub fn world_from_object(i: &Instance) -> Rows {
     Rows([i.world0, i.world1, i.world2].map(Vec4::from))
 }
 
-/// object_from_world.
+/// Transform from world to object space.
 pub fn object_from_world(i: &Instance) -> Rows {
     Rows([i.object0, i.object1, i.object2].map(Vec4::from))
 }
 
-/// Corners in object space (world space without instances).
+/// Corners of a triangle in object space (world space without instances).
 pub fn triangle_vertices(scene: &Scene, triangle: u32) -> [Vec3; 3] {
     let t = &scene.triangles[triangle as usize];
     [t.v0, t.v1, t.v2].map(Vec3::from)
 }
 
-/// The instance's material where it has one.
+/// Material of a triangle, which its instance may replace.
 pub fn material_of(scene: &Scene, triangle: u32, instance: u32) -> u32 {
     let material = scene.triangles[triangle as usize].material;
     match instance {
@@ -55,7 +55,7 @@ pub fn material_of(scene: &Scene, triangle: u32, instance: u32) -> u32 {
     }
 }
 
-/// Interpolated; `barycentric` weighs vertices 1 and 2.
+/// Texture coordinates at a point; `barycentric` weighs vertices 1 and 2.
 pub fn texture_coordinates(scene: &Scene, triangle: u32, barycentric: Vec2) -> Vec2 {
     if let Some(sphere) = Sphere::of(scene, triangle) {
         return sphere.coordinates_of_hit(barycentric);

@@ -8,17 +8,17 @@ use std::f32::consts::PI;
 /// A sphere in place of a triangle.
 #[derive(Clone, Copy, Debug)]
 pub struct Sphere {
-    /// In the space of its mesh.
+    /// Centre in the space of its mesh.
     pub centre: Vec3,
-    /// From the centre to v = 1.
+    /// Vector from the centre to v = 1.
     pub pole: Vec3,
-    /// From the centre to u = 0 on the equator.
+    /// Vector from the centre to u = 0 on the equator.
     pub meridian: Vec3,
     flags: u32,
 }
 
 impl Sphere {
-    /// `None` for a triangle.
+    /// The sphere in place of this triangle; `None` for a triangle.
     pub fn of(scene: &Scene, triangle: u32) -> Option<Self> {
         let t = &scene.triangles[triangle as usize];
         let sphere = Self { centre: t.v0.into(), pole: t.v1.into(), meridian: t.v2.into(), flags: t.primitive };
@@ -30,7 +30,7 @@ impl Sphere {
         self.flags & SPHERE_INWARD != 0
     }
 
-    /// From the centre, as long as the radius, a quarter turn of azimuth from `meridian`.
+    /// Vector from the centre to the equator a quarter turn of azimuth from `meridian`, as long as the radius.
     pub fn side(&self) -> Vec3 {
         let side = self.pole.cross(self.meridian) / self.pole.length();
         if self.flags & SPHERE_MIRRORED != 0 { -side } else { side }
@@ -44,7 +44,7 @@ impl Sphere {
         vec2(if u < 0.0 { u + 1.0 } else { u }, v)
     }
 
-    /// The same of a hit's point of the octahedron.
+    /// Texture coordinates of a hit's octahedral point.
     pub fn coordinates_of_hit(&self, point: Vec2) -> Vec2 {
         self.coordinates(octahedral_vector(point))
     }

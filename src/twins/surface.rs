@@ -14,32 +14,32 @@ use std::f32::consts::PI;
 /// What shading needs of a hit.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {
-    /// World units, interpolated from the vertices.
+    /// Point in world units, interpolated from the vertices.
     pub position: Vec3,
-    /// Unit, by the winding of the triangle.
+    /// Unit normal by the winding of the triangle.
     pub geometric: Vec3,
-    /// Unit, interpolated from the vertices, on the side that they point to.
+    /// Unit normal interpolated from the vertices, on the side that they point to.
     pub smooth_normal: Vec3,
     /// Unit shading normal: the smooth one perturbed by a map.
     pub normal: Vec3,
-    /// Index.
+    /// Index of the material.
     pub material: u32,
-    /// Of the material.
+    /// Flags of the material.
     pub flags: u32,
-    /// Index.
+    /// Index of the object.
     pub object: u32,
-    /// Texture coordinates.
+    /// Texture coordinates of the point.
     pub uv: Vec2,
     /// The triangle in world space: its first vertex and the edges from there.
     pub triangle: [Vec3; 3],
-    /// Of a sphere, whose centre is the first of `triangle`; 0 of a triangle.
+    /// Radius of a sphere, whose centre is the first of `triangle`; 0 for a triangle.
     pub radius: f32,
     /// Distance from the plane at which rays start, world units.
     pub clearance: f32,
 }
 
 impl Surface {
-    /// Where a ray that leaves the surface towards `w` starts.
+    /// Origin of a ray that leaves the surface towards `w`.
     pub fn ray_origin(&self, w: Vec3) -> Vec3 {
         let along = if w.dot(self.geometric) < 0.0 { -self.clearance } else { self.clearance };
         self.position + along * self.geometric
@@ -54,8 +54,8 @@ pub fn unit_vector(v: Vec3) -> (Vec3, f32) {
     (scaled / length.max(1e-37), length * largest)
 }
 
-/// How far along the unit normal `n` a ray must start so that it meets no other triangle of the same plane. `reach`: the
-/// numbers that the point is a sum of.
+/// Distance along the unit normal `n` at which a ray must start so that it meets no other triangle of the same plane. `reach`
+/// holds the magnitudes of the numbers that the point is a sum of.
 pub fn plane_clearance(n: Vec3, reach: Vec3, e1: Vec3, e2: Vec3) -> f32 {
     CLEARANCE * n.abs().dot(reach + e1.abs().max(e2.abs()).max_element())
 }
@@ -147,7 +147,7 @@ fn sphere_at(scene: &Scene, hit: &Hit, ball: &Sphere) -> Surface {
     s
 }
 
-/// Position and normals.
+/// The surface that a ray hits: position, normals, material.
 pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
     if let Some(ball) = Sphere::of(scene, hit.triangle) {
         return sphere_at(scene, hit, &ball);
@@ -200,17 +200,17 @@ pub fn side_of(s: &Surface, w: Vec3) -> f32 {
     if s.smooth_normal.dot(s.geometric) * s.geometric.dot(w) < 0.0 { -1.0 } else { 1.0 }
 }
 
-/// The normals of a surface as a viewer needs them.
+/// The normals of a surface for a viewer: the smooth one, and the one that lobes are around.
 #[derive(Clone, Copy, Debug)]
 pub struct Facing {
-    /// Unit, before a map.
+    /// Unit normal before a map.
     pub smooth_normal: Vec3,
-    /// Unit, the one that scatters.
+    /// Unit normal that lobes are around.
     pub normal: Vec3,
 }
 
-/// For a viewer towards `wo`; on the viewer's side where the surface `turns`. Smooth normals that face away, or that send the
-/// mirror image of `wo` below the plane (where the surface `mirrors`), are bent; those of maps are turned by half a turn.
+/// Normals for a viewer towards `wo`, on the viewer's side where the surface `turns`. Smooth normals that face away, or that send
+/// the mirror image of `wo` below the plane (where the surface `mirrors`), are bent; those of maps are turned by half a turn.
 pub fn facing_normals(s: &Surface, wo: Vec3, turns: bool, mirrors: bool) -> Facing {
     let side = side_of(s, wo);
     let (mut n, mut mapped) = (side * s.smooth_normal, side * s.normal);
@@ -230,7 +230,7 @@ pub fn facing_normals(s: &Surface, wo: Vec3, turns: bool, mirrors: bool) -> Faci
     Facing { smooth_normal: back * n, normal: back * mapped }
 }
 
-/// The share of a direction's light that lobes around `facing.normal` keep; `z` is the direction's component along that.
+/// Share of the light along `w` that lobes around `facing.normal` keep; `z` is the component of `w` along that normal.
 pub fn light_share(s: &Surface, facing: &Facing, w: Vec3, z: f32) -> f32 {
     let (tilt, up) = (facing.normal.dot(facing.smooth_normal), w.dot(facing.smooth_normal));
     if facing.normal.dot(s.geometric) * s.geometric.dot(w) * z < 0.0 {

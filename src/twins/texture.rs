@@ -24,7 +24,7 @@ fn texture_texel(scene: &Scene, image: &Texture, at: IVec2) -> Vec4 {
     if image.flags & TEXTURE_SRGB != 0 { c.truncate().map(linear_from_srgb).extend(c.w) } else { c }
 }
 
-/// Bilinear.
+/// Texture value at `uv`, interpolated bilinearly.
 pub fn texture_sample(scene: &Scene, index: u32, uv: Vec2) -> Vec4 {
     let image = &scene.textures[index as usize];
     let uv = uv * Vec2::from(image.scale) + Vec2::from(image.offset);
@@ -38,7 +38,7 @@ pub fn texture_sample(scene: &Scene, index: u32, uv: Vec2) -> Vec4 {
     top.lerp(low, f.y)
 }
 
-/// The share of rays that a surface stops at a point of a triangle.
+/// Opacity of a surface at a point of a triangle: the share of rays that it stops.
 pub fn surface_opacity(scene: &Scene, material: u32, triangle: u32, barycentric: Vec2) -> f32 {
     let material = &scene.materials[material as usize];
     match material.opacity_texture {

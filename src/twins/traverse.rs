@@ -11,18 +11,18 @@ use glam::{Vec2, Vec3, vec2, vec3};
 /// Where a ray meets the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// In lengths of the ray's direction; the ray's end on a miss.
+    /// Distance in lengths of the ray's direction; the ray's end on a miss.
     pub t: f32,
-    /// In leaf order; [`NONE`] on a miss.
+    /// Index of the triangle in leaf order; [`NONE`] on a miss.
     pub triangle: u32,
-    /// [`NONE`] without instances.
+    /// Index of the instance; [`NONE`] without instances.
     pub instance: u32,
     /// Weights of vertices 1 and 2; of a sphere, its unit normal as a point of the octahedron.
     pub barycentric: Vec2,
 }
 
 impl Hit {
-    /// Whether there is one.
+    /// Whether the ray hits anything.
     pub fn any(&self) -> bool {
         self.triangle != NONE
     }
@@ -30,7 +30,7 @@ impl Hit {
 
 const STACK_SIZE: usize = TRAVERSAL_STACK as usize;
 
-/// A ray as the triangle and box tests want it.
+/// A ray prepared for the triangle and box tests.
 #[derive(Clone, Copy, Debug)]
 pub struct RaySpace {
     origin: Vec3,
@@ -52,7 +52,7 @@ impl RaySpace {
     }
 }
 
-/// Any length of `direction` but 0.
+/// Prepares a ray, whose `direction` may have any length but 0.
 pub fn ray_space(origin: Vec3, direction: Vec3) -> RaySpace {
     let safe = direction.map(|d| if d.abs() < 1e-20 { 1e-20 } else { d });
     let size = direction.abs();
@@ -67,7 +67,7 @@ pub fn ray_space(origin: Vec3, direction: Vec3) -> RaySpace {
     r
 }
 
-/// Distance in lengths of the ray's direction, and barycentric weights; nothing at or beyond `t_max`.
+/// Distance of the hit in lengths of the ray's direction, and barycentric weights; `None` at or beyond `t_max`.
 pub fn intersect_triangle(r: &RaySpace, vertices: [Vec3; 3], t_max: f32) -> Option<(f32, Vec2)> {
     let [a, b, c] = vertices.map(|v| r.largest_last(v - r.origin));
     let [p, q, s] = [a, b, c].map(|v| vec2(v.x - r.shear.x * v.z, v.y - r.shear.y * v.z));
@@ -193,7 +193,7 @@ impl Traversal<'_> {
         (instance.root, 0x80000000)
     }
 
-    /// True where the ray meets it. A ray that leaves the sphere meets only its far side; a mask decides on each side.
+    /// Returns whether the ray meets the sphere. A ray that leaves it meets only its far side; a mask decides on each side.
     fn test_sphere(&mut self, index: u32, sphere: &Sphere) -> bool {
         let Some([near, far]) = intersect_sphere(&self.ray, sphere) else { return false };
         let leaves = [index, self.instance] == self.from;
@@ -213,7 +213,7 @@ impl Traversal<'_> {
         meets
     }
 
-    /// Tests triangles; true when the first hit is enough and found.
+    /// Tests triangles; returns true when any hit suffices and one is found.
     fn test(&mut self, mut leaves: Group, any_hit: bool) -> bool {
         while leaves.1 != 0 {
             let index = leaves.0 + take_highest(&mut leaves.1);

@@ -1,4 +1,4 @@
-//! Placed samples from the command line: interrupting, resuming, merging, thresholds, and what is said when they fail.
+//! Tests placed samples from the command line: interrupting, resuming, merging, thresholds, and their error messages.
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};

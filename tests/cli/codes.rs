@@ -1,4 +1,4 @@
-//! The command line through the built program: exit codes, and one readable line for what goes wrong.
+//! Tests the built program's exit codes, and that errors are one readable line.
 use crate::command::{complains, stdout, tallow};
 use crate::flat;
 use serde_json::Value;

@@ -1,4 +1,4 @@
-//! What the built program says without a Vulkan loader, driver or device, and when it loses its device in the middle.
+//! Tests the built program's messages without a Vulkan loader, driver or device, and when it loses its device while it renders.
 #![cfg(target_os = "linux")]
 use crate::command::complains;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,5 @@
-//! Only what is called for, seen from the command line: what is recorded, and what `tallow explain` says that the rest costs.
+//! Tests from the command line that a render records only the passes that it needs, and what `tallow explain` prints about the
+//! cost of the others.
 use crate::command::{complains, stdout, tallow};
 use serde_json::Value;
 use tempfile::TempDir;

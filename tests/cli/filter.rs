@@ -1,4 +1,4 @@
-//! `tallow filter` through the built program: what becomes of the image, what is printed, and what is refused.
+//! Tests `tallow filter` through the built program: the image, the printed text, and the input that it refuses.
 use crate::command::{complains, stdout, tallow};
 use tallow::image::{self, Film, Samples, WriteOptions};
 use tempfile::TempDir;
@@ -29,7 +29,7 @@ fn checker(x: u32, y: u32) -> f32 {
     if (x + y).is_multiple_of(2) { 0.2 } else { 0.8 }
 }
 
-/// In [0, 1).
+/// A number in [0, 1) that depends on the pixel.
 fn random(x: u32, y: u32) -> f32 {
     let h = (x * 7919 + y * 104_729).wrapping_mul(0x9e37_79b9);
     ((h ^ (h >> 15)).wrapping_mul(0x85eb_ca6b) >> 8) as f32 / (1 << 24) as f32
@@ -55,7 +55,7 @@ fn read(folder: &TempDir, name: &str) -> Film {
     image::read(&folder.path().join(name)).unwrap()
 }
 
-/// Renders to `noisy.exr`.
+/// Renders the scene to `noisy.exr`.
 fn render(folder: &TempDir, scene: &str, spp: &str) {
     let size = SIZE.to_string();
     let words = ["render", scene, "-o", "noisy.exr", "--width", &size, "--height", &size, "--spp", spp, "--quiet"];

@@ -1,4 +1,4 @@
-//! The built program: exit codes, what is printed, and what becomes of files.
+//! Tests of the built program: exit codes, printed text and files.
 mod adaptive;
 #[cfg(target_os = "linux")]
 #[path = "../support/child.rs"]

@@ -1,4 +1,4 @@
-//! Outputs of the built program: all are tried, none replaces an input or another, and what is printed can be read.
+//! Tests the built program's outputs: all are tried, none replaces an input or another output, and printed text can be parsed.
 #![cfg(target_os = "linux")]
 use crate::child::{LONG, OFTEN, Running, SMALL, command, scene};
 use crate::command::complains;

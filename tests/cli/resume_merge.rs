@@ -1,4 +1,4 @@
-//! What `--resume` and `merge` believe of a file, and what comes of files that are right.
+//! Tests which files `--resume` and `merge` accept, and their results.
 use crate::command::{complains, tallow};
 use std::process::Output;
 use tallow::image::{self, Film, Samples, Window};

@@ -1,4 +1,4 @@
-//! Signals to the built program: what is asked, what is ignored, and what is saved.
+//! Tests signals to the built program: which ones it obeys or ignores, and what it saves.
 #![cfg(target_os = "linux")]
 use crate::child::{LONG, OFTEN, Running, SMALL, command, scene};
 use crate::command::complains;

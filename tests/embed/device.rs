@@ -1,4 +1,4 @@
-//! The GPU layer on a device that somebody else made: own instance, own device, own command buffer, same bits.
+//! Tests the GPU layer with an engine's own instance, device and command buffer: it must give the same bits.
 #![allow(unsafe_code, reason = "an engine's side of the contract is raw Vulkan")]
 use crate::support;
 use crate::support::engine::Engine;

@@ -1,4 +1,4 @@
-//! What the renderer asks of an engine's device, seen at Vulkan's entry points.
+//! Tests at Vulkan's entry points what the renderer asks of an engine's device.
 #![allow(unsafe_code, reason = "an engine's side of the contract is raw Vulkan")]
 use crate::hooks;
 use crate::support::engine::Engine;

@@ -1,4 +1,4 @@
-//! The life of a render in an engine, by the library alone: to a noise threshold, interrupted, written, read, resumed, merged.
+//! Tests a render in an engine by the library alone: up to a noise threshold, interrupted, written, read, resumed, merged.
 
 use crate::support::{assert_silent, gpu};
 use std::ops::ControlFlow;

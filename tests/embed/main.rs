@@ -1,4 +1,4 @@
-//! The renderer on a device that an engine made, one engine at a time in the process.
+//! Tests the renderer on a device that an engine made, with one engine at a time in the process.
 mod device;
 mod entry_points;
 #[cfg(feature = "cli")] // compares with the program

@@ -1,4 +1,4 @@
-//! Damaged, random and senseless input: errors, never a panic, a signal or a hang.
+//! Tests that damaged, random and senseless input gives errors, and never a panic, a signal or a hang.
 #![forbid(unsafe_code)]
 mod safe_api;
 mod scene;

@@ -1,5 +1,5 @@
-//! The library used without `unsafe`, with numbers that nobody should give it: errors or pictures, never a signal, a panic or
-//! a hang. TALLOW_FUZZ sets the cases of every target (default 100; the slower ones take a part of it).
+//! Calls the library without `unsafe` and with absurd numbers: it must return errors or pictures, without a signal, a panic or a
+//! hang. TALLOW_FUZZ sets the cases of every target (default 100; the slower ones take a part of it).
 use proptest::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::LazyLock;

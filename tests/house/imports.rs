@@ -1,5 +1,5 @@
-//! The house's order: which files read which, without circles, and where Vulkan, `unsafe` and what only a program needs may be
-//! written.
+//! Tests the order of the modules: which ones import which, without circles, and which ones may contain Vulkan, `unsafe` and code
+//! that only a program needs.
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
@@ -103,7 +103,7 @@ fn is_mark(token: &TokenTree, mark: char) -> bool {
     matches!(token, TokenTree::Punct(found) if found.as_char() == mark)
 }
 
-/// Names after `mod`.
+/// Names of the modules that a file declares.
 fn child_modules(tokens: &TokenStream) -> BTreeSet<String> {
     let tokens: Vec<_> = tokens.clone().into_iter().collect();
     let declared = tokens.windows(3).filter(|w| matches!(&w[0], TokenTree::Ident(word) if word == "mod"));
@@ -150,7 +150,7 @@ fn use_tree(tokens: &[TokenTree], prefix: &Names, found: &mut Vec<(Names, String
     }
 }
 
-/// All sources, by module.
+/// All sources of the crate, by module.
 struct House(BTreeMap<Names, Source>);
 
 impl House {

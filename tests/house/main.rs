@@ -1,3 +1,3 @@
-//! The repository itself: who imports whom, and the scripts below `tools`.
+//! Tests of the repository itself: which modules import which, and the scripts below `tools`.
 mod imports;
 mod tools;

@@ -1,4 +1,4 @@
-//! The scripts below `tools`, run where nothing is as it is here.
+//! Runs the scripts below `tools` in an environment of stand-ins.
 #![cfg(unix)]
 use std::fs;
 use std::os::unix::fs::PermissionsExt;

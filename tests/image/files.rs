@@ -1,4 +1,4 @@
-//! Films to files and back.
+//! Tests that films survive being written to files and read back.
 use std::path::Path;
 use tallow::error::Error;
 use tallow::image::{self, Film, Samples, WriteOptions, output, tone::ToneMap};

@@ -1,4 +1,4 @@
-//! What headers may ask for: nothing that their files cannot hold, and all that they can.
+//! Tests that headers which claim more than their files can hold are refused, and all others are read.
 use crate::flat::{self, ExrHead, NO_COMPRESSION, ZIP_16_LINES};
 use tallow::image::source::Unread;
 use tallow::image::{self, Samples};

@@ -1,4 +1,4 @@
-//! Pictures and files.
+//! Tests of image files and metrics.
 mod damage;
 mod files;
 #[path = "../support/flat.rs"]

@@ -1,4 +1,4 @@
-//! Files of other programs, changed in the channels of their colour: any parts, data windows and sample types.
+//! Tests that files of other programs keep everything but their colour channels, whatever their parts, windows and sample types.
 use exr::prelude::*;
 use std::path::{Path, PathBuf};
 use tallow::error::Error;

@@ -1,5 +1,5 @@
-//! Renders that place their samples: the same bits however they are cut, interrupted or dealt to rounds, the right mean,
-//! and pixels without a sample stay well defined.
+//! Tests renders that place their samples: they have the same bits however they are cut, interrupted or dealt to rounds, the right
+//! mean, and defined values in pixels without a sample.
 use crate::support::{assert_silent, gpu};
 use std::ops::ControlFlow;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Pictures whose every value is known by derivation, on the device.
+//! Renders pictures on the device whose every value is known by derivation.
 use crate::scattering::scattered_once;
 use crate::support;
 use crate::twin::Workplace;
@@ -65,7 +65,7 @@ fn linear(angle: f64) -> f64 {
     ((25.0 - angle) / 15.0).clamp(0.0, 1.0)
 }
 
-/// Control.
+/// The control: a fall-off that is linear in the cosine.
 fn linear_in_the_cosine(angle: f64) -> f64 {
     let [angle, cone, cutoff] = [angle, 10.0, 25.0].map(|degrees: f64| degrees.to_radians().cos());
     ((angle - cutoff) / (cone - cutoff)).clamp(0.0, 1.0)

@@ -1,4 +1,4 @@
-//! Whole renders on the device: against themselves, known answers and an independent renderer.
+//! Compares whole renders on the device with each other, with known answers and with an independent renderer.
 mod adaptive;
 #[path = "../support/alike.rs"]
 mod alike;

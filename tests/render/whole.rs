@@ -1,5 +1,5 @@
-//! Whole renders: the same bits however the work is cut and, but for rounding, whatever is compiled in, furnaces whose
-//! answer is known, and no broken pixel anywhere.
+//! Tests whole renders: they have the same bits however the work is cut, differ by rounding only whatever effects are compiled in,
+//! give the known answer of furnaces, and have no broken pixel.
 use crate::alike::alike;
 use crate::support;
 use std::path::Path;
@@ -323,7 +323,7 @@ fn black_floor(coated: bool) -> Loaded {
     scene
 }
 
-/// Radiance, light and guides.
+/// Renders, and returns radiance, light and guides.
 fn apart(gpu: &Gpu, scene: &Loaded) -> (Vec<PixelStats>, Vec<PixelLight>, Vec<Guide>) {
     let outputs = Outputs { split_light: true, guides: true, counters: false };
     let renderer = Renderer::new(gpu, scene, &scene.settings, outputs).unwrap();

@@ -1,4 +1,5 @@
-//! What scene files may not do: multiply, pass for what they are not, or take more memory than there is.
+//! Tests files that scenes name: each is read once, mistakes have their place, limits hold, and memory or threads that run out give
+//! one readable line.
 use crate::command::complains;
 use crate::support;
 use image::codecs::png::PngEncoder;

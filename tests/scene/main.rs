@@ -1,4 +1,4 @@
-//! Scenes from files and from memory: what they become, and what is said about mistakes.
+//! Tests scenes from files and from memory: their arrays, and the messages about mistakes.
 #[path = "../support/command.rs"]
 #[allow(dead_code)]
 mod command;

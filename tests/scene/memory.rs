@@ -1,4 +1,4 @@
-//! Scenes that an engine has in memory: the same as from files, and what is said about mistakes.
+//! Tests that scenes from an engine's memory equal those from files, and the messages about mistakes.
 use image::codecs::png::PngEncoder;
 use std::fs::File;
 use std::path::PathBuf;

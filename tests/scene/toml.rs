@@ -1,4 +1,4 @@
-//! Scene files end to end: what they become, and what is said about mistakes.
+//! Tests scene files end to end: the arrays that they become, and the messages about mistakes.
 use image::codecs::png::PngEncoder;
 use std::fs::File;
 use std::path::Path;

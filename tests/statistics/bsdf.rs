@@ -1,5 +1,5 @@
-//! Statistics of the BSDFs on their CPU twins: what is sampled follows the pdf, the weight is f cos / pdf, light is
-//! neither made nor lost but where theory says so.
+//! Statistics of the BSDFs on their CPU twins: samples follow the pdf, weights are f cos / pdf, and light is neither made nor lost
+//! except where theory says so.
 use crate::scattering::{RINGS, SECTORS, d, g1, grids, scattered_once};
 use crate::statistics::{chi_square, sidak};
 use glam::{Vec2, Vec3, vec3};

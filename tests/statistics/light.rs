@@ -1,5 +1,5 @@
-//! Statistics of light sampling on its CPU twin: directions follow the densities that are claimed for them, those by
-//! which bounces weigh the same light.
+//! Statistics of light sampling on its CPU twin: directions follow the densities by which MIS weighs the same light when a bounce
+//! finds it.
 use crate::statistics::{chi_square, sidak};
 use crate::twin::{Random, Workplace};
 use glam::{Mat3, Vec3, dvec3, vec3};

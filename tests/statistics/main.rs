@@ -1,4 +1,4 @@
-//! What is drawn at random, on the CPU twins: it follows the densities that are claimed for it.
+//! Tests on the CPU twins that random choices follow the densities that the code claims.
 mod bsdf;
 mod light;
 mod sampler;

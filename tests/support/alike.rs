@@ -1,4 +1,4 @@
-//! Two renders of one scene by the same samples, on a device that rounds one kernel otherwise than another.
+//! Compares two renders of one scene by the same samples, whose kernels round differently.
 use crate::statistics::sidak_quantile;
 use tallow::layout::PixelStats;
 

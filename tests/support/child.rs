@@ -3,14 +3,14 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
-/// A small film.
+/// Options of a small render.
 pub const SMALL: &str = "--width 96 --height 80 --max-depth 3 --quiet";
 /// A render that ends by itself only after days.
 pub const LONG: &str = "--width 96 --height 80 --max-depth 3 --quiet --spp 10000000";
 /// Writes checkpoints all the time.
 pub const OFTEN: &str = "--checkpoint 0.000001";
 
-/// What is rendered.
+/// Path of the scene that is rendered.
 pub fn scene() -> String {
     format!("{}/scenes/cornell-box/scene.toml", env!("CARGO_MANIFEST_DIR"))
 }
@@ -45,7 +45,7 @@ impl Running {
         }
     }
 
-    /// Waits for a file.
+    /// Waits until the file exists.
     #[track_caller]
     pub fn until_there_is(&mut self, name: &str) {
         self.until(name, |folder| folder.join(name).exists());
@@ -73,7 +73,7 @@ impl Running {
         assert!(Command::new("sh").args(["-c", &script]).status().unwrap().success());
     }
 
-    /// Waits for its end.
+    /// Waits until the program ends.
     pub fn end(mut self) -> Output {
         let mut stderr = Vec::new();
         std::io::Read::read_to_end(self.child.stderr.as_mut().unwrap(), &mut stderr).unwrap();

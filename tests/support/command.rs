@@ -7,7 +7,7 @@ pub fn tallow(folder: &TempDir, words: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_tallow")).args(words).current_dir(folder.path()).output().unwrap()
 }
 
-/// What it printed.
+/// Standard output of a program.
 pub fn stdout(output: &Output) -> String {
     String::from_utf8(output.stdout.clone()).unwrap()
 }

@@ -1,4 +1,4 @@
-//! Vulkan's entry points with ours in between: they count what is created and destroyed, and fail when they are told to.
+//! Wraps Vulkan's entry points: the wrappers count objects that are created and destroyed, and fail on request.
 #![allow(unsafe_code, reason = "stands between the renderer and the driver")]
 use ash::vk;
 use std::collections::HashMap;

@@ -1,4 +1,4 @@
-//! What the tests share.
+//! Functions that several tests share.
 #![allow(dead_code)]
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu};
 use tallow::layout::PixelStats;
@@ -6,7 +6,7 @@ use tallow::render::{Job, Renderer, Step};
 
 pub mod engine;
 
-/// The kernels of `glsl/test`.
+/// Generated modules of the kernels of `glsl/test`.
 pub mod kernels {
     include!(concat!(env!("OUT_DIR"), "/test_shaders.rs"));
 }
@@ -32,14 +32,14 @@ pub fn words(count: usize, seed: u32) -> Vec<u32> {
     (0..count as u32).map(|i| hash(i ^ seed.rotate_left(16))).collect()
 }
 
-/// The same as `glsl/test/hash.glsl`.
+/// Twin of `glsl/test/hash.glsl`.
 pub fn hash(v: u32) -> u32 {
     let state = v.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
     let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
     (word >> 22) ^ word
 }
 
-/// Of all pixels.
+/// Statistics of all pixels.
 pub fn stats(renderer: &Renderer) -> Vec<PixelStats> {
     renderer.film().tiles.iter().flat_map(|tile| tile.stats.read().unwrap()).collect()
 }

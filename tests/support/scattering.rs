@@ -1,4 +1,4 @@
-//! What one scattering by microfacets leaves of the light, by quadrature in f64.
+//! The share of light that one scattering by microfacets keeps, by quadrature in f64.
 use glam::{DVec3, Vec3, dvec3};
 use std::f64::consts::{PI, TAU};
 use tallow::layout::{BSDF_COATED, BSDF_DIELECTRIC};
@@ -19,7 +19,7 @@ pub const SECTORS: usize = 16;
 const POINTS: usize = 20;
 
 impl Grid {
-    /// Of `wi`.
+    /// Index of the cell that `wi` falls into.
     pub fn cell(&self, wi: Vec3) -> usize {
         let h = self.wo + self.n * wi.as_dvec3();
         let slope = h.truncate() / (h.z * self.alpha);

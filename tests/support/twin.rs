@@ -13,7 +13,7 @@ use tallow::scene::{Loaded, Scene};
 use tallow::twins::path::{Strategy, Tracer};
 use tallow::twins::scene::world_from_object;
 
-/// Uniform numbers.
+/// A generator of uniform random numbers.
 pub struct Random(fastrand::Rng);
 
 impl Random {
@@ -26,12 +26,12 @@ impl Random {
         Self::new(i as u64)
     }
 
-    /// In [0, 1).
+    /// A number in [0, 1).
     pub fn unit(&mut self) -> f32 {
         self.0.f32()
     }
 
-    /// In [-1, 1)^3.
+    /// A point of [-1, 1)^3.
     pub fn point(&mut self) -> Vec3 {
         Vec3::from([0; 3].map(|_| 2.0 * self.unit() - 1.0))
     }
@@ -79,7 +79,7 @@ impl Workplace {
     }
 }
 
-/// Middle of [`ball`].
+/// Centre of [`ball`].
 pub const BALL: Vec3 = vec3(0.3, -0.2, 5.0);
 
 /// A closed mesh of radius 1 in world space.

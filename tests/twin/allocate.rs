@@ -1,5 +1,5 @@
-//! The kernels that place samples against their CPU twins, with `==` where they work in integers, and what must hold of
-//! every allocation: the counts sum to the budget, whatever the priorities.
+//! Compares the kernels that place samples with their CPU twins, exactly where they compute with integers, and checks that the
+//! counts sum to the budget whatever the priorities.
 use crate::support::{assert_silent, gpu, words};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};

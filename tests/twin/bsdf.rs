@@ -1,4 +1,4 @@
-//! The shading functions on the device against their CPU twins: random words by equality, radiometry by tolerance.
+//! Compares the shading functions on the device with their CPU twins: random words exactly, radiometry within tolerances.
 use crate::support::kernels::{bsdf, sampler};
 use glam::{Vec2, Vec3, Vec4, vec2, vec3};
 use std::sync::LazyLock;

@@ -1,5 +1,5 @@
-//! Noisy images filtered on the device, as frames where they were rendered and as files, against the same images taken apart,
-//! filtered and put together by the twins.
+//! Compares images that the device filters, of frames and of files, with the same images demodulated, filtered and remodulated by
+//! the twins.
 use crate::picture;
 use crate::support::{assert_silent, gpu, hash};
 use std::path::Path;
@@ -20,7 +20,7 @@ const SIZES: [[u32; 2]; 6] = [[1, 1], [31, 1], [1, 65], [64, 2], [65, 3], [33, 1
 const DEMODULATIONS: [Demodulation; 3] = [Demodulation::Light, Demodulation::Albedo, Demodulation::Off];
 const ALL: Outputs = Outputs { split_light: true, guides: true, counters: false };
 
-/// What a renderer leaves.
+/// Buffers that a renderer leaves.
 struct Frame {
     size: [u32; 2],
     stats: Vec<PixelStats>,

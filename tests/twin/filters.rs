@@ -1,4 +1,4 @@
-//! The filters on the device against their CPU twins, and the twins against examples worked by hand.
+//! Compares the filters on the device with their CPU twins, and the twins with examples worked by hand.
 use crate::picture::{self, Picture, SIZES, apart, line, red};
 use crate::support::{assert_silent, gpu};
 use tallow::denoise::filter::{FILTERS, FilterInput, FilterSettings, GuidedSums, WaveletBasis, find, firefly, run};

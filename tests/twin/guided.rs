@@ -1,4 +1,4 @@
-//! The guided filter against its twin, which is in double precision, and the twin against examples worked by hand.
+//! Compares the guided filter with its twin, which is in double precision, and the twin with examples worked by hand.
 use crate::picture::{Picture, SIZES, apart, line, red};
 use crate::support::kernels::merge;
 use crate::support::{assert_silent, gpu, hash};

@@ -1,6 +1,5 @@
-//! The kernels on the device against their CPU twins. Rounding sends a few paths another way (an edge met or missed, a mip
-//! level up or down), and a driver's arc tangent moves lookups beside a small sun: nearly all samples must agree closely,
-//! none needs to.
+//! Compares the kernels on the device with their CPU twins. Rounding sends a few paths another way (a ray that meets or misses an
+//! edge), and a driver's arc tangent moves lookups beside a small sun: nearly all samples must agree closely, but none has to.
 use crate::support::kernels::{accumulate as fold_kernel, traverse as traverse_kernel};
 use crate::support::{self, assert_silent, gpu};
 use crate::twin::{Aim, BALL, Random, Workplace, aimed_at_seam, ball, instanced_ball, under_a_panel};
@@ -279,7 +278,7 @@ fn folded(gpu: &Gpu, samples: &[vec4], depth: u32, times: u32) -> (Vec<PixelStat
     (stats.read().unwrap(), light.read().unwrap())
 }
 
-/// In double precision.
+/// Mean of `of` over one pixel's samples, in double precision.
 fn exact(samples: &[vec4], pixel: u32, of: impl Fn(&[vec4]) -> f64) -> f64 {
     let own = samples.chunks(3).skip(pixel as usize).step_by(REPEATED as usize);
     own.map(of).sum::<f64>() / f64::from(PERIOD)
@@ -340,7 +339,7 @@ fn squares_of_the_brightest_samples_stay_finite() {
     assert_silent(&gpu);
 }
 
-/// What the kernel finds.
+/// Hits that the kernel finds.
 fn traversed(gpu: &Gpu, scene: &Loaded, effects: Effects, rays: &[RayQuery], any_hit: bool) -> Vec<RayHit> {
     let renderer = Renderer::specialised(gpu, scene, &scene.settings, Outputs::default(), effects).unwrap();
     let traverse = shared::traverse::Constants { stack: scene.stack };

@@ -1,5 +1,5 @@
-//! Filtered light looked up along eye rays: the choice among four guide rays by hand, the kernel against its twin, and what
-//! no guide ray may do to it.
+//! Tests the lookup of filtered light along eye rays: the choice among four guide rays by hand, the kernel against its twin, and
+//! guide rays with invalid values.
 use crate::support::{assert_silent, gpu, hash};
 use glam::{Vec2, vec2};
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Kernels and filters on the device against their CPU twins, and the twins against exact answers.
+//! Compares kernels and filters on the device with their CPU twins, and the twins with exact answers.
 mod allocate;
 mod bsdf;
 mod denoiser;

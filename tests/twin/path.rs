@@ -1,5 +1,5 @@
-//! The CPU twins of traversal and transport against brute force, exact answers and each other. The kernels are held
-//! against the same twins where there is a device.
+//! Compares the CPU twins of traversal and transport with brute force, exact answers and each other. `kernels.rs` compares the
+//! kernels with the same twins.
 use crate::twin::*;
 use glam::{DVec3, Vec2, Vec3, vec2, vec3};
 use rayon::prelude::*;

@@ -1,4 +1,4 @@
-//! Exact spheres by the CPU twins: against 64-bit arithmetic, fine meshes and closed forms.
+//! Compares the CPU twins of exact spheres with 64-bit arithmetic, fine meshes and closed forms.
 use crate::twin::*;
 use glam::{DVec3, Vec3, vec3};
 use tallow::layout::{LIGHT_SPHERE, LIGHT_TRIANGLE, NONE, SPHERE};

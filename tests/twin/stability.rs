@@ -1,4 +1,5 @@
-//! What no input may do to a filter. Every check runs over every row of the table, on the device and on its twin.
+//! Checks what every filter must keep to whatever its input: constant images come back, invalid pixels reach no others, and no NaN
+//! comes out. Every check runs over every row of the table of filters, on the device and on its twin.
 use crate::picture::{self, Picture};
 use crate::support::{assert_silent, gpu, hash};
 use tallow::denoise::filter::{AtrousForm, FILTERS, FilterInput, FilterSettings, Row, find, run};
@@ -251,7 +252,7 @@ fn sub_sampled_images_are_in_painted() {
 }
 
 /// A wall with grooves of two pixels, lit by what faces the light: relief that a filter must not take for noise. `wavelet`
-/// does, which foretells a pixel from two neighbours however little they weigh (Fattal 2009).
+/// does, which predicts a pixel from two neighbours however small their weights (Fattal 2009).
 #[test]
 fn bumps_stay() {
     let (gpu, off) = (gpu(), f32::INFINITY);

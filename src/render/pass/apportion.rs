@@ -128,7 +128,7 @@ pub fn fixed_threshold(threshold: f32) -> u32 {
     ((threshold.min(4095.0) * 1_048_576.0) as u32).max(1)
 }
 
-fn push(plan: &Plan, round: u32) -> ApportionPush {
+fn push(plan: &Plan, step: u32) -> ApportionPush {
     let total = if let Share::All(total) = plan.share { total } else { 0 };
     let (threshold, enough) = match plan.share {
         Share::Need { threshold, limit } => (fixed_threshold(threshold), limit),
@@ -137,8 +137,8 @@ fn push(plan: &Plan, round: u32) -> ApportionPush {
     ApportionPush {
         pixels: plan.pixels,
         limit: plan.limit.unwrap_or(NONE),
-        round,
-        rounds: plan.rounds,
+        step,
+        repetitions: plan.rounds,
         budget: super::pair(plan.budget),
         total: super::pair(total),
         threshold,

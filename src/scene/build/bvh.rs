@@ -23,8 +23,7 @@ const LEAF: u32 = 3;
 /// Relative growth of every box. Quantisation in the builder and slabs in the kernel round at 2^-24: this keeps their
 /// errors from opening gaps between boxes that share a face.
 const GROWTH: f32 = 1.0 / (1 << 21) as f32;
-/// Levels of a hierarchy at most: that of the instances and that of a mesh fill a traversal's stack together. Crytek Sponza
-/// has 14.
+/// Most levels of a hierarchy: that of the instances and that of a mesh together fill a traversal's stack. Crytek Sponza has 14.
 const LEVELS: usize = TRAVERSAL_STACK as usize / 2;
 /// Levels of a two-way tree above which a part of it is halved, where the whole is too deep.
 const HALVED: usize = 24;
@@ -115,8 +114,8 @@ pub fn depth(nodes: &[BvhNode], root: u32) -> usize {
     deepest
 }
 
-/// Groups that a ray leaves behind at most: one a level below the root, and with instances the groups of nodes and of
-/// instances around the one it enters. At least 1, and at most [`TRAVERSAL_STACK`].
+/// Most groups on a ray's stack: one for each level below the root, and with instances the groups of nodes and of instances around
+/// the one that it enters. The result is at least 1 and at most [`TRAVERSAL_STACK`].
 pub fn stack_size(nodes: &[BvhNode], root: u32, instances: &[Instance]) -> u32 {
     let roots: HashSet<u32> = instances.iter().map(|i| i.root).collect();
     let below = roots.iter().map(|&mesh| depth(nodes, mesh) + 1).max().unwrap_or(0);

@@ -1,4 +1,4 @@
-//! What a rough coat lets in, and what it reflects inwards: the table that kernels read for a scene's rough coats.
+//! Computes the tables that kernels read for rough coats: the light that a coat does not let in, and what it reflects inwards.
 use super::fresnel;
 use crate::layout::SMOOTH_ALPHA;
 use crate::layout::{BSDF_COATED, COAT_COLUMNS, COAT_ROWS, MATERIAL_GGX, Material};
@@ -10,7 +10,7 @@ use std::collections::HashMap;
 
 const ROWS: usize = COAT_ROWS as usize;
 const COLUMNS: usize = COAT_COLUMNS as usize;
-/// The reflectance has a limit at the horizon, but its formulas divide by the cosine.
+/// Cosines are at least this: the reflectance has a limit at the horizon, but its formulas divide by the cosine.
 const LEAST_COSINE: f32 = 1e-4;
 /// Points per axis among microfacet normals, and cosines for the mean from inside.
 const POINTS: usize = 24;

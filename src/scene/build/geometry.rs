@@ -17,35 +17,35 @@ pub struct Geometry {
 /// How a mesh enters the scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Placement {
-    /// To the space the triangles are stored in. Invertible.
+    /// Transform to the space that triangles are stored in, which must be invertible.
     pub affine: DAffine3,
-    /// Ignore vertex normals, and do not miss them.
+    /// Whether vertex normals are ignored, and their absence is no reason for a warning.
     pub flat: bool,
-    /// Turn every triangle and its normals around.
+    /// Whether triangles and their normals are turned around.
     pub flip: bool,
-    /// Keep texture coordinates.
+    /// Whether texture coordinates are kept.
     pub uvs: bool,
 }
 
 /// One triangle of a file, in file space.
 #[derive(Clone, Copy, Debug)]
 pub struct Corners {
-    /// Positions.
+    /// Positions of the three corners.
     pub p: [Vec3; 3],
     /// Vertex normals of any length.
     pub n: Option<[Vec3; 3]>,
-    /// Texture coordinates, v up.
+    /// Texture coordinates of the corners; v points up.
     pub uv: Option<[Vec2; 3]>,
 }
 
 /// What a triangle is called in reports and shaded with.
 #[derive(Clone, Copy, Debug)]
 pub struct Tag {
-    /// Index in the file.
+    /// Index of the triangle in its file.
     pub primitive: u32,
-    /// Index into the materials.
+    /// Index of the triangle's material.
     pub material: u32,
-    /// Index of the object.
+    /// Index of the triangle's object.
     pub object: u32,
 }
 
@@ -82,7 +82,7 @@ impl Repairs {
     }
 }
 
-/// A coordinate beyond [`MAX_COORDINATE`].
+/// The error of a coordinate beyond [`MAX_COORDINATE`].
 #[derive(Clone, Copy, Debug)]
 pub struct TooFar(pub f32);
 
@@ -212,10 +212,10 @@ fn retain<T: Copy>(items: &mut Vec<T>, start: usize, keep: &[bool]) {
     items.extend(kept);
 }
 
-/// Radius of a sphere below which it is dropped: its square has to be a normal 32-bit float.
+/// Smaller spheres are dropped, since the square of a radius has to be a normal 32-bit float.
 const LEAST_RADIUS: f64 = 1e-15;
 
-/// Of a sphere; `None` of a triangle.
+/// Radius of a sphere; `None` for a triangle.
 pub fn radius(t: &Triangle) -> Option<f32> {
     (t.primitive & SPHERE != 0).then(|| Vec3::from(t.v1).length())
 }

@@ -115,7 +115,7 @@ pub fn is_large(scene: &Scene, light: &Light) -> bool {
     light.kind == LIGHT_TRIANGLE && geometry::area([light.a, light.b, light.c]) > LARGE * (high - low).length_squared()
 }
 
-/// See the module documentation.
+/// Power of a light, by the formulas of the module documentation.
 fn power(scene: &Scene, light: &Light) -> f64 {
     let [low, high] = scene.bounds.map(|b| Vec3::from(b).as_dvec3());
     let radius = ((high - low).length() / 2.0).max(if scene.triangles.is_empty() { 1.0 } else { 0.0 });

@@ -1,4 +1,4 @@
-//! Which mesh goes where: baked into world space, or stored in its own space for instances.
+//! Decides for each mesh whether it is baked into world space or stored in its own space for instances.
 use super::sources::{Sources, mesh_name};
 use crate::error::Result;
 use crate::layout::{MATERIAL_MASKED, Material, NONE};
@@ -7,14 +7,14 @@ use crate::scene::description::{self, InstanceTable, MeshTable};
 use glam::{DAffine3, DMat3};
 use std::collections::HashMap;
 
-/// A mesh and where it goes.
+/// A mesh and its destination.
 #[derive(Clone, Copy, Debug)]
 pub struct Job {
-    /// Index of the `[[mesh]]`.
+    /// Index of the mesh's `[[mesh]]` table.
     pub mesh: usize,
-    /// From its file to the space it is stored in; of a copy, from there to the world.
+    /// Transform from the mesh's file to the space it is stored in; for a copy, from that space to the world.
     pub affine: DAffine3,
-    /// Instead of all its materials.
+    /// Material that replaces all of the mesh's own.
     pub material: Option<u32>,
     /// A sphere that is stored as one, not as triangles.
     pub exact: bool,
@@ -23,11 +23,11 @@ pub struct Job {
 /// What is baked into world space, stored for instances, and placed.
 #[derive(Debug, Default)]
 pub struct Plan {
-    /// Triangles in world space.
+    /// Meshes whose triangles are stored in world space.
     pub baked: Vec<Job>,
-    /// Triangles in object space; every one is placed by a copy.
+    /// Meshes whose triangles are stored in object space; every one is placed by a copy.
     pub stored: Vec<Job>,
-    /// In the order of the file.
+    /// Copies of stored meshes, in the order of the file.
     pub copies: Vec<Job>,
 }
 
@@ -89,7 +89,7 @@ impl<'s, 'a> Planner<'s, 'a> {
         }
     }
 
-    /// Places an instance.
+    /// Adds the copy that an `[[instance]]` table places.
     fn place(&mut self, place: &str, table: &InstanceTable) -> Result<()> {
         let (sources, meshes) = (self.sources, &self.sources.description.mesh);
         let Some(&mesh) = self.named.get(table.mesh.as_str()) else {

@@ -1,4 +1,4 @@
-//! What a description names, read: materials, OBJ files and the warnings about them.
+//! Reads what a description names: materials and OBJ files, with the warnings about them.
 use crate::error::{Error, Result};
 use crate::scene::description::mesh::Mesh;
 use crate::scene::description::{self, Description, MeshTable};
@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 
 /// The sources of one scene.
 pub struct Sources<'a> {
-    /// Of the scene file, for messages and for what it names.
+    /// Path of the scene file, for messages and for the files that it names.
     pub path: &'a Path,
-    /// What to build.
+    /// The description that the scene is built from.
     pub description: &'a Description,
     /// Materials and warnings so far.
     pub library: Library,

@@ -20,9 +20,9 @@ const BYTES_OF_TRIANGLE: u64 = 400;
 pub struct Stored {
     /// Index of the `[[mesh]]`; `None`: all that is in world space.
     pub mesh: Option<usize>,
-    /// Triangles.
+    /// Indices of the mesh's triangles.
     pub range: Range<usize>,
-    /// Names of its objects.
+    /// Names of the mesh's objects.
     pub objects: Vec<String>,
 }
 
@@ -108,7 +108,7 @@ struct Addition<'a> {
     job: Job,
     table: &'a MeshTable,
     place: String,
-    /// Instead of the parts' own.
+    /// Material in place of the parts' own.
     material: Option<u32>,
     placement: Placement,
     /// Object index of the first part.

@@ -8,14 +8,14 @@ use serde::Deserialize;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FovAxis {
-    /// Height (vertical field of view).
+    /// The height: `fov` is the vertical field of view.
     #[default]
     Y,
-    /// Width.
+    /// The width: `fov` is the horizontal field of view.
     X,
-    /// The shorter edge.
+    /// The shorter edge of the film.
     Smaller,
-    /// The longer edge.
+    /// The longer edge of the film.
     Larger,
 }
 
@@ -24,7 +24,7 @@ pub enum FovAxis {
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Camera {
-    /// Where rays start.
+    /// Point that rays start from.
     pub position: Option<[f64; 3]>,
     /// A point in the middle of the image.
     pub target: Option<[f64; 3]>,
@@ -34,7 +34,7 @@ pub struct Camera {
     pub world_from_camera: Option<[f64; 16]>,
     /// Degrees along `fov_axis`, above 0 and below 180; default 40.
     pub fov: Option<f64>,
-    /// Edge that `fov` spans.
+    /// Edge of the film that `fov` spans; default the height.
     pub fov_axis: FovAxis,
     /// Radius of the lens; 0 (default) is a pinhole.
     pub lens_radius: f32,

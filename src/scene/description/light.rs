@@ -9,12 +9,12 @@ use serde::Deserialize;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Type {
-    /// In all directions from `position`.
+    /// A point light, which shines in all directions from `position`.
     #[default]
     Point,
-    /// In a cone from `position`.
+    /// A spot light, which shines into a cone from `position`.
     Spot,
-    /// Parallel light.
+    /// Parallel light from infinitely far.
     Directional,
 }
 
@@ -22,22 +22,22 @@ pub enum Type {
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LightTable {
-    /// Which.
+    /// Kind of the light, which decides the keys that it needs.
     #[serde(rename = "type")]
     pub kind: Type,
-    /// Point, spot.
+    /// Position of a point or spot light.
     pub position: Option<[f32; 3]>,
-    /// Spot, directional: the way light travels; any length.
+    /// Direction in which the light of a spot or directional light travels, of any length.
     pub direction: Option<[f32; 3]>,
-    /// Spot: a point on its axis, instead of `direction`.
+    /// A point on the axis of a spot light, in place of `direction`.
     pub target: Option<[f32; 3]>,
-    /// Point, spot (on its axis): W/sr.
+    /// Radiant intensity of a point or spot light (of a spot on its axis), W/sr.
     pub intensity: Option<Rgb>,
-    /// Directional: W/m^2 on a facing plane.
+    /// Irradiance of a directional light on a facing plane, W/m^2.
     pub irradiance: Option<Rgb>,
-    /// Spot: degrees from the axis up to which intensity is full; default three quarters of `cutoff`.
+    /// Degrees from a spot light's axis up to which its intensity is full; default three quarters of `cutoff`.
     pub cone: Option<f32>,
-    /// Spot: degrees from the axis beyond which there is none; default 20. In between intensity falls linearly with the angle.
+    /// Degrees from a spot light's axis beyond which it is dark; default 20. In between it falls linearly with the angle.
     pub cutoff: Option<f32>,
 }
 
@@ -72,7 +72,7 @@ impl LightTable {
         }
     }
 
-    /// Unit direction of travel.
+    /// Unit direction in which the light travels.
     fn axis(&self, from: Vec3) -> Result<[f32; 3], String> {
         let direction = match (self.direction, self.target) {
             (Some(d), None) => Vec3::from(d),

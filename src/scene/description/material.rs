@@ -3,31 +3,31 @@ use super::value::Rgb;
 use serde::Deserialize;
 use std::path::PathBuf;
 
-/// What a material reflects like.
+/// How a material reflects light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Type {
-    /// Lambertian.
+    /// Lambertian reflection of `color`.
     #[default]
     Diffuse,
-    /// Microfacet metal.
+    /// Metal with microfacets.
     Conductor,
-    /// Microfacet glass.
+    /// Glass with microfacets.
     Dielectric,
     /// A conductor of eta 0, k 1, whose Fresnel reflectance is 1 at every angle, tinted by `color`.
     Mirror,
-    /// Diffuse base under a dielectric coat.
+    /// A diffuse base under a dielectric coat.
     Coated,
 }
 
-/// Microfacet distribution.
+/// Distribution of microfacet normals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Distribution {
-    /// Beckmann.
+    /// Beckmann's distribution.
     #[default]
     Beckmann,
-    /// GGX (Trowbridge-Reitz).
+    /// The GGX distribution (Trowbridge-Reitz), which has longer tails.
     Ggx,
 }
 
@@ -37,48 +37,48 @@ pub enum Distribution {
 pub struct MaterialTable {
     /// What meshes and OBJ files call it; replaces an MTL material of that name.
     pub name: String,
-    /// Default diffuse.
+    /// Kind of the material; default diffuse.
     #[serde(rename = "type")]
     pub kind: Type,
     /// Albedo, or the tint of a mirror or conductor; default 0.5 (diffuse, coated without texture), else 1.
     pub color: Option<Rgb>,
-    /// sRGB picture, multiplies `color`.
+    /// sRGB picture that multiplies `color`.
     pub color_texture: Option<PathBuf>,
     /// Microfacet roughness in [0, 1]; below 0.01 smooth; default 0.
     pub alpha: f32,
-    /// Default Beckmann.
+    /// Microfacet distribution; default Beckmann.
     pub distribution: Distribution,
-    /// Conductor: index of refraction.
+    /// Index of refraction of a conductor.
     pub eta: Option<Rgb>,
-    /// Conductor: extinction.
+    /// Extinction of a conductor.
     pub k: Option<Rgb>,
-    /// Conductor: eta and k by name.
+    /// Name of the metal that gives a conductor's `eta` and `k`.
     pub metal: Option<String>,
-    /// Dielectric and coat: interior over exterior index; default 1.5.
+    /// Interior over exterior index of a dielectric or a coat; default 1.5.
     pub ior: Option<f32>,
     /// Tint of specular reflection; default 1.
     pub specular: Option<Rgb>,
-    /// sRGB picture, multiplies `specular`.
+    /// sRGB picture that multiplies `specular`.
     pub specular_texture: Option<PathBuf>,
     /// Tint of transmission; default 1.
     pub transmission: Option<Rgb>,
     /// Radiance of the front side, W/(m^2 sr).
     pub emission: Option<Rgb>,
-    /// sRGB picture, multiplies `emission` (default then 1).
+    /// sRGB picture that multiplies `emission` (default then 1).
     pub emission_texture: Option<PathBuf>,
-    /// In [0, 1]; default 1.
+    /// Opacity in [0, 1]; default 1.
     pub opacity: Option<f32>,
-    /// Mask: its alpha channel, or its red channel where it has none.
+    /// Picture that masks the surface by its alpha channel, or by its red channel where it has none.
     pub opacity_texture: Option<PathBuf>,
-    /// Height map.
+    /// Height map that perturbs normals.
     pub bump: Option<PathBuf>,
-    /// World units per unit of the height map; default 1.
+    /// Height in world units per unit of the height map; default 1.
     pub bump_scale: Option<f32>,
-    /// Tangent-space normal map, instead of `bump`.
+    /// Tangent-space normal map, in place of `bump`.
     pub normal_map: Option<PathBuf>,
     /// Perceptual roughness (root of alpha) in its green channel; multiplies the root of `alpha` (default then 1).
     pub roughness_texture: Option<PathBuf>,
-    /// Default true.
+    /// Whether both sides scatter light; default true.
     pub two_sided: Option<bool>,
     /// Coated: light that is reflected below the coat takes on the base's colour each time; default false.
     pub nonlinear: bool,

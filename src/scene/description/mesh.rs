@@ -5,13 +5,13 @@ use std::sync::Arc;
 /// Triangles: what files, shapes and engines give. Everything is per vertex.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
-    /// Object units.
+    /// Positions of the vertices in object units.
     pub positions: Vec<[f32; 3]>,
-    /// Empty, or one per position: of any length, outward.
+    /// Normals of the vertices, of any length, outward; empty, or one per position.
     pub normals: Vec<[f32; 3]>,
-    /// Empty, or one per position: v is up, so that row 0 of a picture is v = 1.
+    /// Texture coordinates of the vertices, v up, so that row 0 of a picture is v = 1; empty, or one per position.
     pub uvs: Vec<[f32; 2]>,
-    /// Three per triangle, counter-clockwise seen from outside.
+    /// Vertices of the triangles, three each, counter-clockwise seen from outside.
     pub indices: Vec<u32>,
 }
 
@@ -33,7 +33,7 @@ impl Mesh {
         }
     }
 
-    /// How many it has.
+    /// Number of triangles of the mesh.
     pub(in crate::scene) fn triangles(&self) -> usize {
         self.indices.len() / 3
     }
@@ -44,9 +44,9 @@ impl Mesh {
 pub struct Bitmap {
     /// What materials call it; wins over a file of that name.
     pub name: PathBuf,
-    /// Texels, 1 to 65536.
+    /// Width in texels, 1 to 65536.
     pub width: u32,
-    /// Texels, 1 to 65536.
+    /// Height in texels, 1 to 65536.
     pub height: u32,
     /// `width * height` texels, row-major, row 0 at the top: sRGB where a material's texture is a colour, else linear;
     /// alpha, always linear, is what masks read.

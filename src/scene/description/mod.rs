@@ -27,29 +27,29 @@ use settings::Settings;
 pub use settings::{Allocate, Film, Render};
 use std::path::{Path, PathBuf};
 
-/// A whole scene file.
+/// The tables of a scene file.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Description {
-    /// Size and filter.
+    /// Size and pixel filter of the film.
     pub film: Film,
-    /// Where from.
+    /// Position, direction and lens of the camera.
     pub camera: Camera,
-    /// How.
+    /// Number and length of paths, and their random numbers.
     pub render: Render,
-    /// Where samples go.
+    /// Distribution of the samples over the pixels.
     pub allocate: Allocate,
     /// Light from infinitely far; none when absent.
     pub environment: Option<EnvironmentTable>,
-    /// Geometry.
+    /// Meshes from files, from memory, or shapes.
     pub mesh: Vec<MeshTable>,
-    /// Placed copies.
+    /// Placed copies of meshes.
     pub instance: Vec<InstanceTable>,
-    /// Surfaces.
+    /// Materials that meshes name.
     pub material: Vec<MaterialTable>,
-    /// Lights without surface.
+    /// Point, spot and directional lights.
     pub light: Vec<LightTable>,
-    /// Textures in memory.
+    /// Textures in memory, which materials name as they name files.
     #[serde(skip)]
     pub bitmap: Vec<Bitmap>,
 }
@@ -60,16 +60,16 @@ pub struct Description {
 pub struct EnvironmentTable {
     /// Constant radiance, W/(m^2 sr); default 1.
     pub radiance: Option<Rgb>,
-    /// Latitude-longitude image (HDR, EXR, PNG, JPEG), instead of `radiance`.
+    /// Latitude-longitude image (HDR, EXR, PNG, JPEG), in place of `radiance`.
     pub file: Option<PathBuf>,
-    /// The same in memory: linear Rec. 709.
+    /// Latitude-longitude image in memory in place of `file`, linear Rec. 709.
     #[serde(skip)]
     pub picture: Option<Picture>,
-    /// Multiplies either; default 1.
+    /// Factor of `radiance` or the image; default 1.
     pub scale: Option<Rgb>,
-    /// Degrees about +y.
+    /// Rotation about +y in degrees.
     pub rotation: f64,
-    /// Nine row-major numbers, instead of `rotation`.
+    /// Rotation as nine row-major numbers, in place of `rotation`.
     pub world_from_environment: Option<[f64; 9]>,
 }
 
@@ -77,40 +77,40 @@ pub struct EnvironmentTable {
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MeshTable {
-    /// For instances and reports; default the file's or the shape's.
+    /// Name for instances and reports; default the file's or the shape's.
     pub name: Option<String>,
-    /// OBJ.
+    /// Path of an OBJ file.
     pub file: Option<PathBuf>,
-    /// Only this object or group of the file.
+    /// Object or group of the file to which the mesh is limited.
     pub group: Option<String>,
-    /// Instead of a file.
+    /// A shape in place of a file.
     pub shape: Option<Shape>,
-    /// Instead of either.
+    /// Triangles in memory in place of a file or a shape.
     #[serde(skip)]
     pub data: Option<Mesh>,
     /// Disk: edges around, 3 to 4096; default 64. A sphere is exact without, and a mesh with it; also where it is `flat`, and
     /// as a lamp that is stretched, turned inside out, textured or partly transparent.
     pub segments: Option<u32>,
-    /// world_from_object.
+    /// Transform from object to world space.
     pub transform: Transform,
-    /// A `[[material]]` for all of it.
+    /// Name of a `[[material]]` that replaces the mesh's own.
     pub material: Option<String>,
-    /// Ignore vertex normals; a file without any is then no reason for a warning.
+    /// Whether vertex normals are ignored; a file without any is then no reason for a warning.
     pub flat: bool,
-    /// Turn inside out.
+    /// Whether the surface is turned inside out.
     pub flip_normals: bool,
 }
 
-/// An `[[instance]]` table.
+/// An `[[instance]]` table: a placed copy of a mesh.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InstanceTable {
-    /// Name of a `[[mesh]]`.
+    /// Name of the `[[mesh]]` that is placed.
     pub mesh: String,
-    /// Applied after the mesh's own.
+    /// Transform that is applied after the mesh's own.
     #[serde(default)]
     pub transform: Transform,
-    /// A `[[material]]` for all of it.
+    /// Name of a `[[material]]` that replaces those of the mesh.
     pub material: Option<String>,
 }
 

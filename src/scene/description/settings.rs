@@ -22,7 +22,7 @@ choices! {
 }
 
 impl PixelFilter {
-    /// As the kernels know it.
+    /// The PIXEL_FILTER_ constant that kernels know it by.
     pub fn code(self) -> u32 {
         match self {
             Self::Box => PIXEL_FILTER_BOX,
@@ -96,7 +96,7 @@ impl Settings {
         self.allocate.check_together()
     }
 
-    /// Pixels of the film.
+    /// Number of pixels of the film.
     pub fn pixels(&self) -> usize {
         self.width as usize * self.height as usize
     }

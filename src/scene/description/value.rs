@@ -1,4 +1,4 @@
-//! Values of the scene file that may be written in more than one way.
+//! Values that a scene file may write in more than one way.
 use glam::{DAffine3, DMat4, DQuat, DVec3, EulerRot};
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor, value};
 use std::fmt;

@@ -17,7 +17,7 @@ fn decode(path: &Path, bytes: &[u8]) -> Result<Picture> {
     image::decode(bytes).and_then(|film| film.picture(None)).map_err(|what| unusable(path, &what))
 }
 
-/// What is said about an image that is damaged.
+/// The error for a damaged image.
 pub fn unusable(path: &Path, what: &str) -> Error {
     Error::input(path, format!("is no usable environment image ({what}): save it again as HDR or EXR"))
 }

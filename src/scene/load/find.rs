@@ -1,4 +1,4 @@
-//! Files as scenes name them: written on another system, or for another one.
+//! Finds files that a scene names as another system writes them.
 use std::path::{Path, PathBuf};
 
 /// The file that `written` means, below `directory`. Where it does not exist as written: the same letters in another

@@ -10,7 +10,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Names and indices of materials.
+/// Indices of materials by their names.
 type Named = Arc<[(String, u32)]>;
 
 /// Bytes that a material takes while it is read.
@@ -27,7 +27,7 @@ pub struct Library {
     mtls: HashMap<PathBuf, Named>,
     /// The grey of triangles without a material.
     grey: Option<u32>,
-    /// What was repaired.
+    /// Messages about what was repaired.
     pub warnings: Vec<String>,
 }
 

@@ -10,15 +10,15 @@ pub struct Lines<R> {
     /// What was read up to a line feed, and how much of it was taken: old files end their lines by carriage returns alone.
     chunk: Vec<u8>,
     taken: usize,
-    /// Number of the last line read, from 1.
+    /// Number of the last line that was read, from 1.
     number: usize,
 }
 
 /// A line with its continuations.
 pub struct Line<'a> {
-    /// Of the last of its lines in the file, from 1.
+    /// Number of the last of its lines in the file, from 1.
     pub number: usize,
-    /// Without the line's end.
+    /// Text without the line's end.
     pub text: Cow<'a, str>,
 }
 

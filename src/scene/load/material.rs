@@ -1,4 +1,4 @@
-//! Materials: what the `[[material]]` tables say.
+//! Makes materials of the `[[material]]` tables.
 use super::metal;
 use super::texture::{Kind, Mapping, TextureSet};
 use crate::layout::*;
@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 /// The materials of a scene and the textures they ask for.
 #[derive(Debug, Default)]
 pub struct Materials {
-    /// As kernels read them.
+    /// The materials in the form that kernels read.
     pub list: Vec<Material>,
-    /// Same order.
+    /// Names of the materials, in the same order.
     pub names: Vec<String>,
-    /// Asked for so far.
+    /// Textures that materials have asked for so far.
     pub textures: TextureSet,
     /// Materials whose bump height is a share of the scene's size, known only in the end.
     pub default_bumps: Vec<u32>,

@@ -1,4 +1,4 @@
-//! Files become meshes, pictures and materials. What reads another format stands here as a file of its own.
+//! Reads files to meshes, pictures and materials, one module for each format.
 pub mod environment;
 pub mod find;
 pub mod library;

@@ -4,14 +4,14 @@ use super::texture::Mapping;
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
-/// A map statement.
+/// A statement that names a map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Map {
-    /// As written, backslashes turned.
+    /// File name as written, but with backslashes turned to slashes.
     pub file: String,
-    /// `-bm`: height of a bump map.
+    /// Height of a bump map, from `-bm`.
     pub bump: Option<f32>,
-    /// `-clamp on`, `-s` and `-o`.
+    /// Repetition and placement, from `-clamp on`, `-s` and `-o`.
     pub mapping: Mapping,
 }
 
@@ -25,28 +25,28 @@ pub struct Mtl {
 }
 
 impl Mtl {
-    /// After `newmtl`.
+    /// Name after `newmtl`.
     pub fn name(&self) -> &str {
         &self.block.name
     }
 
-    /// Pr or Pm.
+    /// Number of a statement that tobj does not know: Pr or Pm.
     pub fn number(&self, key: &str) -> Option<f32> {
         self.block.unknown_param.get(key)?.parse().ok()
     }
 
-    /// Transmission filter.
+    /// Transmission filter `Tf`, linear RGB.
     pub fn tf(&self) -> Option<[f32; 3]> {
         color("Tf", self.block.unknown_param.get("Tf")?).ok()
     }
 
-    /// norm, or map_Pr.
+    /// Map of a statement that tobj does not know: norm or map_Pr.
     pub fn map(&self, key: &str) -> Option<Map> {
         map(self.block.unknown_param.get(key)?)
     }
 }
 
-/// What follows a statement.
+/// Kind of the values that follow a statement.
 #[derive(Clone, Copy)]
 enum Kind {
     /// One number for all channels, or three.

@@ -1,4 +1,4 @@
-//! What MTL statements are taken to mean. A block becomes, by the first rule that fits:
+//! The meaning of MTL statements. A block becomes, by the first rule that fits:
 //! 1. `Pm` of at least 0.5: a conductor whose reflectance at normal incidence is Kd. With map_Kd, the tint of a perfect
 //!    mirror, since indices cannot be textured.
 //! 2. `illum` 3 or 5 with black Kd and no map_Kd: a mirror tinted by Ks (white where Ks is black).

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// What is read of a line, or what is wrong with it.
 type Checked<T> = std::result::Result<T, String>;
 
-/// A parsed OBJ file.
+/// Contents of an OBJ file.
 #[derive(Debug, Default)]
 pub struct ObjFile<'a> {
     /// At least one. An object is split wherever its material changes, and where faces begin or cease to have normals
@@ -59,9 +59,9 @@ const BYTES_OF_TRIANGLE: u64 = 2 * 12;
 struct Parser<'a> {
     path: &'a Path,
     library: &'a mut Library,
-    /// Number of the line that is read.
+    /// Number of the line that is being read.
     line: usize,
-    /// `v`, `vt` and `vn` so far.
+    /// Values of `v`, `vt` and `vn` so far.
     positions: Vec<[f32; 3]>,
     uvs: Vec<[f32; 2]>,
     normals: Vec<[f32; 3]>,
@@ -70,12 +70,12 @@ struct Parser<'a> {
     corners: Vec<Corner>,
     /// Materials by name: the scene file's own, and those of the libraries read so far.
     names: HashMap<String, u32>,
-    /// Names after `usemtl`.
+    /// Material names after `usemtl`.
     worn: BTreeSet<String>,
     /// `mtllib` statements, and the true paths of what they name: each is read once.
     statements: HashSet<String>,
     libraries: HashSet<PathBuf>,
-    /// Libraries that are nowhere.
+    /// Names of libraries that do not exist.
     missing: BTreeSet<String>,
     /// Faces of one or two corners, dropped: how many, and the line of the first.
     short_faces: (usize, usize),

@@ -8,9 +8,9 @@ use std::borrow::Cow;
 /// Triangles of one object and one material.
 #[derive(Clone, Debug, Default)]
 pub struct Part<'a> {
-    /// Of the object or group.
+    /// Name of the object or group.
     pub name: String,
-    /// Index of the scene's material.
+    /// Index of the material.
     pub material: u32,
     /// Borrowed where an engine has it in memory.
     pub mesh: Cow<'a, Mesh>,
@@ -27,7 +27,7 @@ const LOOKS: usize = 16;
 /// The name of faces that stand before the first object.
 const UNNAMED: &str = "unnamed_object";
 
-/// Gathers faces.
+/// Collects the faces of one part.
 pub struct PartBuilder {
     name: String,
     /// Scene material, or [`NONE`] before the first known one.
@@ -59,7 +59,7 @@ impl Default for PartBuilder {
 }
 
 impl PartBuilder {
-    /// Names what follows.
+    /// Sets the name of the faces that follow.
     pub fn rename(&mut self, name: &str) {
         self.name = if name.is_empty() { UNNAMED } else { name }.to_owned();
     }

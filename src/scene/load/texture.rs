@@ -1,4 +1,4 @@
-//! Pictures to RGBA8 texels, decoded on all cores straight into the one texel array.
+//! Decodes pictures to RGBA8 texels, on all cores and straight into the one texel array.
 use super::find::find_file;
 use crate::error::{Error, Result};
 use crate::image::{BAND, bands, check_end, contained, input, picture, picture_claim};
@@ -13,9 +13,9 @@ use std::path::{Path, PathBuf};
 /// What a picture holds, which decides how it is read and which channels are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
-    /// sRGB colour.
+    /// Colour, stored with the sRGB curve.
     Color,
-    /// Heights or normals, linear.
+    /// Linear heights or normals.
     Data,
     /// Opacity: the alpha channel where the file has one, else red; copied to all channels.
     Mask,
@@ -29,9 +29,9 @@ pub enum Kind {
 pub struct Mapping {
     /// Coordinates outside [0, 1] stay at the border; otherwise they repeat.
     pub clamp: bool,
-    /// It is read at `uv * scale + offset`.
+    /// Factor of texture coordinates: the picture is read at `uv * scale + offset`.
     pub scale: [f32; 2],
-    /// See `scale`.
+    /// Added to scaled texture coordinates.
     pub offset: [f32; 2],
 }
 
@@ -63,9 +63,9 @@ pub struct TextureSet {
 /// Device arrays of all pictures.
 #[derive(Debug, Default)]
 pub struct Decoded {
-    /// In order of request.
+    /// Records of the pictures, in order of request.
     pub textures: Vec<Texture>,
-    /// Of all pictures.
+    /// Texels of all pictures, RGBA8.
     pub texels: Vec<u32>,
 }
 
@@ -246,7 +246,7 @@ fn fill(space: &mut [u32], texels: impl Iterator<Item = [u8; 4]>, kind: Kind, ha
     }
 }
 
-/// Mean linear colour.
+/// Mean linear colour of a picture.
 pub fn mean(texture: &Texture, texels: &[u32]) -> [f32; 3] {
     let count = texture.width as usize * texture.height as usize;
     let srgb = texture.flags & TEXTURE_SRGB != 0;

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 /// Boxes, sorted by centre and then by size.
 pub struct Clusters {
-    /// Indices of the boxes.
+    /// Indices of the boxes, cluster by cluster.
     pub order: Vec<u32>,
     /// Where in `order` each cluster begins, and its end.
     starts: Vec<u32>,

@@ -4,7 +4,7 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 
-/// Levels below the root.
+/// Number of levels below the root.
 pub fn height(bvh: &Bvh2) -> usize {
     Subtree::of(bvh, 0).height
 }
