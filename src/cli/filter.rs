@@ -125,19 +125,20 @@ pub fn run(args: &Args) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// Bytes of host memory that a pixel takes beside the file's channels: those of the filtered colour, and then while it is filtered
-/// the device's planes, where these lie in the same memory, or while it is put into the file the file itself, encoded and decoded
-/// once more.
-fn bytes_per_pixel(filter: &Row, unified: bool) -> u64 {
-    const COLOUR: u64 = size_of::<vec3>() as u64;
-    const REPLACED: u64 = 400;
-    COLOUR + if unified { denoise::bytes_per_pixel(filter).max(REPLACED) } else { REPLACED }
+/// Bytes of host memory that filtering takes beside the file itself: its channels; the filtered colour; and then while it is filtered
+/// the device's planes, where these lie in the same memory, or while it is put into the file that file three times, the colour added:
+/// encoded, decoded, and decoded again for what shows it.
+fn bytes_needed(args: &Args, claim: &Claim, unified: bool) -> u64 {
+    let colour = claim.pixels().saturating_mul(size_of::<vec3>() as u64);
+    let planes = if unified { claim.pixels().saturating_mul(denoise::bytes_per_pixel(args.filter)) } else { 0 };
+    let decoded = claim.bytes.saturating_add(colour);
+    decoded.saturating_add(planes.max(decoded.saturating_mul(3)))
 }
 
 /// Large images take minutes to be read and prepared; what cannot be filtered is told before.
 fn check_room(args: &Args, gpu: &Gpu, claim: &Claim) -> Result<()> {
     filter::check_size(gpu, claim.size, filter::GUIDE_TEXELS)?;
-    let bytes = claim.bytes.saturating_add(claim.pixels() * bytes_per_pixel(args.filter, gpu.info().unified));
+    let bytes = bytes_needed(args, claim, gpu.info().unified);
     let refused =
         |what| format!("{}: filtering its {} x {} pixels {what}", args.image.display(), claim.size[0], claim.size[1]);
     memory::check(bytes).map_err(|what| Error::Memory(refused(what)))
