@@ -125,18 +125,21 @@ pub fn run(args: &Args) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// Bytes of host memory per pixel in addition to the file's channels: the filtered colour, and the larger of the planes on
-/// the device, if they are in the same memory, and the file, which is encoded and decoded once more.
-fn bytes_per_pixel(filter: &Row, unified: bool) -> u64 {
-    const COLOUR: u64 = size_of::<vec3>() as u64;
-    const REPLACED: u64 = 400;
-    COLOUR + if unified { denoise::bytes_per_pixel(filter).max(REPLACED) } else { REPLACED }
+/// Bytes of host memory that filtering takes besides the file itself: the file's channels and the filtered colour, and then
+/// whichever is larger of two. While the image is filtered, these are the device's planes, if the device has no memory of its
+/// own. While the colour is put into the file, these are three copies of the file with the colour added: encoded, decoded, and
+/// decoded again to be shown.
+fn bytes_needed(args: &Args, claim: &Claim, unified: bool) -> u64 {
+    let colour = claim.pixels().saturating_mul(size_of::<vec3>() as u64);
+    let planes = if unified { claim.pixels().saturating_mul(denoise::bytes_per_pixel(args.filter)) } else { 0 };
+    let decoded = claim.bytes.saturating_add(colour);
+    decoded.saturating_add(planes.max(decoded.saturating_mul(3)))
 }
 
 /// Checks before decoding, which can take minutes, that the image can be filtered.
 fn check_room(args: &Args, gpu: &Gpu, claim: &Claim) -> Result<()> {
     filter::check_size(gpu, claim.size, filter::GUIDE_TEXELS)?;
-    let bytes = claim.bytes.saturating_add(claim.pixels() * bytes_per_pixel(args.filter, gpu.info().unified));
+    let bytes = bytes_needed(args, claim, gpu.info().unified);
     let refused =
         |what| format!("{}: filtering its {} x {} pixels {what}", args.image.display(), claim.size[0], claim.size[1]);
     memory::check(bytes).map_err(|what| Error::Memory(refused(what)))

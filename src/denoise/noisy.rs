@@ -56,7 +56,8 @@ pub struct Noisy {
 
 impl Noisy {
     /// The film of `renderer`, which was made with [`Outputs::guides`](crate::render::Outputs::guides). Nothing is copied: it is
-    /// what the renderer's steps leave there, and outlives the renderer.
+    /// what the renderer's steps leave there, and outlives the renderer. [`Filtered`](super::Filtered) rounds the film's normals in
+    /// place, as those of a file are: they stay unit but for the last bits. [`Denoiser`](super::Denoiser) leaves them as they are.
     ///
     /// # Errors
     /// [`Error::Usage`] for a renderer without guides, and for a film in more than one piece.

@@ -1,0 +1,137 @@
+use super::*;
+use crate::image::aov::Names;
+use crate::image::{Film, Samples};
+
+const RGB: [&str; 3] = ["R", "G", "B"];
+
+/// One row: a wall of albedo 0.5 lit by 2, the rim of a lamp, the lamp.
+fn film() -> Film {
+    let mut film = Film::new(4, 1);
+    film.add_vec3("", RGB, &[[1.0; 3], [1.0; 3], [25.0; 3], [50.0; 3]]);
+    film.add_vec3("albedo", RGB, &[[0.5; 3], [0.5; 3], [0.25; 3], [0.0; 3]]);
+    film
+}
+
+fn take_apart(film: &Film, demodulation: Demodulation) -> Parts {
+    split(&Aovs::find(film, &Names::new()).unwrap(), demodulation)
+}
+
+#[test]
+fn lamps_and_their_rims_reach_no_other_pixel() {
+    let parts = take_apart(&film(), Demodulation::Light);
+    assert_eq!(parts.input.radiance, [[2.0, 2.0, 2.0, 1.0], [2.0, 2.0, 2.0, 1.0], [0.0; 4], [0.0; 4]]);
+    let joined = parts.remodulate(&[[3.0, 3.0, 3.0, 1.0]; 4]);
+    assert_eq!(joined, [[1.5; 3], [1.5; 3], [25.0; 3], [50.0; 3]]);
+    // The albedo of pixel centres does not show that the third pixel is a rim; its light does.
+    let mut centre = film();
+    centre.channels.truncate(3);
+    centre.add_vec3("albedo", RGB, &[[0.5; 3], [0.5; 3], [0.5; 3], [0.0; 3]]);
+    assert_eq!(take_apart(&centre, Demodulation::Light).input.radiance[2], [0.0; 4]);
+    // Control: in plain order all of it is filtered.
+    assert!(take_apart(&film(), Demodulation::Off).input.radiance.iter().all(|c| c[3] == 1.0));
+}
+
+#[test]
+fn direct_light_is_left_out_also_where_pixels_lack_it() {
+    let mut film = film();
+    film.metadata.insert("software".to_owned(), "tallow 0.1.0".to_owned());
+    film.add_vec3("direct", RGB, &[[0.5; 3], [0.5; 3], [25.0; 3], [50.0; 3]]);
+    film.add_vec3("indirect", RGB, &[[1.0; 3], [1.0; 3], [0.0; 3], [0.0; 3]]);
+    let counts = |counts: [u32; 4]| {
+        let mut film = film.clone();
+        film.add("samples", Samples::U32(counts.to_vec()));
+        let parts = take_apart(&film, Demodulation::Light);
+        (parts.input.radiance, parts.direct.map(|direct| direct.radiance))
+    };
+    let (all, unlit) = counts([4; 4]);
+    assert_eq!((all[0], unlit), ([1.0, 1.0, 1.0, 4.0], None));
+    let (sparse, unlit) = counts([4, 0, 4, 4]);
+    assert_eq!(sparse[..2], [[1.0, 1.0, 1.0, 4.0], [1.0, 1.0, 1.0, 0.0]]);
+    // Before albedo; the lamp's own light.
+    let lit = [[1.0, 1.0, 1.0, 4.0], [0.0; 4], [100.0, 100.0, 100.0, 4.0], [50.0, 50.0, 50.0, 4.0]];
+    assert_eq!(unlit.unwrap(), lit);
+    // A broken pixel counts as one without samples.
+    let red = film.channels.iter_mut().filter(|c| ["R", "direct.R"].contains(&c.name.as_str()));
+    red.for_each(|c| c.samples = Samples::F32(vec![1.0, f32::NAN, 25.0, 50.0]));
+    let parts = take_apart(&film, Demodulation::Light);
+    assert_eq!(parts.input.radiance.iter().map(|c| c[3]).collect::<Vec<_>>(), [1.0, 0.0, 1.0, 0.0]);
+    assert_eq!(parts.remodulate(&[[1.0; 4]; 4])[1], [0.5, 1.0, 1.0]);
+    assert_eq!(parts.direct.unwrap().radiance[1], [0.0; 4]);
+}
+
+/// However the image is taken apart, and whatever its other layers hold.
+#[test]
+fn a_pixel_that_is_no_number_counts_as_not_sampled() {
+    for demodulation in [Demodulation::Light, Demodulation::Albedo, Demodulation::Off] {
+        let whole = {
+            let mut film = film();
+            film.add_vec3("direct", RGB, &[[0.5; 3], [0.5; 3], [25.0; 3], [50.0; 3]]);
+            film.add_vec3("indirect", RGB, &[[1.0; 3], [1.0; 3], [0.0; 3], [0.0; 3]]);
+            film.add("samples", Samples::U32(vec![4; 4]));
+            film
+        };
+        let clean = take_apart(&whole, demodulation).input.radiance;
+        assert!(clean[1][3] == 4.0, "control: as it is, the pixel is sampled");
+        for (bad, name) in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY].into_iter().zip(RGB) {
+            let mut film = whole.clone();
+            let channel = film.channels.iter_mut().find(|c| c.name == name).unwrap();
+            channel.samples = Samples::F32(vec![1.0, bad, 25.0, 50.0]);
+            let broken = take_apart(&film, demodulation).input.radiance;
+            assert_eq!(broken[1][3], 0.0, "{demodulation:?}, {bad} in {name}");
+            assert_eq!([broken[0], broken[2], broken[3]], [clean[0], clean[2], clean[3]], "{demodulation:?}");
+        }
+    }
+}
+
+#[test]
+fn indirect_light_has_the_variance_of_its_own_samples() {
+    let mut film = film();
+    film.metadata.insert("software".to_owned(), "tallow 0.1.0".to_owned());
+    film.add_vec3("direct", RGB, &[[0.5; 3]; 4]);
+    film.add_vec3("indirect", RGB, &[[1.0; 3]; 4]);
+    film.add_vec3("variance", RGB, &[[8.0; 3]; 4]);
+    film.add("samples", Samples::U32(vec![4, 1, 3, 0]));
+    let of = |film: &Film, demodulation| take_apart(film, demodulation).input.variance.unwrap();
+    assert_eq!(
+        of(&film, Demodulation::Light)[0],
+        [32.0; 3],
+        "of earlier versions: of all light over the squared albedo"
+    );
+    film.add("indirect.m2", Samples::F32(vec![12.0; 4]));
+    assert_eq!(of(&film, Demodulation::Light), [[1.0; 3], [0.0; 3], [2.0; 3], [0.0; 3]]);
+    assert_eq!(of(&film, Demodulation::Off)[0], [8.0; 3]);
+}
+
+#[test]
+fn the_variance_of_a_pbrt_file_is_that_of_one_sample() {
+    let mut film = film();
+    film.add_vec3("Variance", RGB, &[[8.0; 3]; 4]);
+    let first = |film: &Film| take_apart(film, Demodulation::Light).input.variance.unwrap()[0][0];
+    assert_eq!(first(&film), 32.0, "of the mean, over the squared albedo");
+    film.add_vec3("RelativeVariance", RGB, &[[8.0; 3]; 4]);
+    film.metadata.insert("samplesPerPixel".to_owned(), "16".to_owned());
+    assert_eq!(first(&film), 2.0);
+}
+
+#[test]
+fn positions_and_depths_are_made_of_each_other_and_it_is_said() {
+    let guides = |change: &dyn Fn(&mut Film)| {
+        let mut film = film();
+        film.add_vec3("N", ["X", "Y", "Z"], &[[0.0, 0.0, 0.5]; 4]);
+        change(&mut film);
+        let parts = take_apart(&film, Demodulation::Light);
+        let aovs = Aovs::find(&film, &Names::new()).unwrap();
+        (parts.input.guide, Layers::new(&aovs).notes.join("\n"))
+    };
+    let (guide, notes) = guides(&|film| film.add("Z", Samples::F32(vec![1.0, 2.0, 1e10, f32::INFINITY])));
+    assert_eq!([guide[0].depth, guide[2].depth, guide[3].depth], [1.0, 0.0, 0.0], "1e10 is Blender's sky");
+    assert!(guide[0].position[0] < 0.0 && guide[1].position[2] < guide[0].position[2], "{guide:?}");
+    assert_eq!(guide[0].normal, [0.0, 0.0, 1.0], "means of normals are made unit");
+    assert!(notes.contains("position: made of the depth"), "{notes}");
+    let hits = [[0.0, 1.0, 5.0], [0.0, 1.0, 4.0], [0.0, 1.0, 3.0], [0.0; 3]];
+    let (guide, notes) = guides(&|film| film.add_vec3("P", ["X", "Y", "Z"], &hits));
+    let depths: Vec<f32> = guide.iter().map(|g| g.depth).collect();
+    assert!(depths[0] > 0.0 && depths[1] == depths[0] + 1.0 && depths[2] == depths[0] + 2.0, "{depths:?}");
+    assert_eq!(depths[3], 0.0, "no hit");
+    assert!(notes.contains("depth: made of the position"), "{notes}");
+}
