@@ -251,7 +251,7 @@ bool intersect_triangles(inout Hit hit, RaySpace ray, uint first, uint left, uin
     return found;
 }
 
-// Tests the triangles of `leaves`. Only the nearest one's mask is looked up; where it lets the ray pass, the others are tested again.
+// Tests the triangles of `leaves`. Only the nearest one's mask is looked up; where the ray passes it, the others are tested again.
 void intersect_leaves(inout Hit hit, RaySpace ray, uvec2 leaves, uint instance, bool any_hit, uint mask_seed, uvec2 from) {
     if (!FX_ALPHA_MASKS) {
         intersect_triangles(hit, ray, leaves.x, leaves.y, instance, any_hit, mask_seed, from);

@@ -26,7 +26,7 @@ void main() {
     uint i = thread_index(), stride = gl_NumWorkGroups.x * gl_NumWorkGroups.y * WORKGROUP;
     if (i >= push.count) return;
     do {
-        Segment ray = ray_at(i); // fetched at every step: on lavapipe cheaper than kept, on a GPU dearer
+        Segment ray = ray_at(i); // fetched at every step: on lavapipe faster than keeping it, on a GPU slower
         if (done) t = traversal_start(ray.t_max, push.root);
         RaySpace space = ray_space(ray.origin, ray.direction);
         done = traversal_step(t, space, any_hit, push.root, ray.mask_seed, uvec2(NONE));

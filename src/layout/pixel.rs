@@ -29,8 +29,8 @@ gpu_structs! {
         count: uint,
         /// Sum of squared deviations from the mean; the variance of one sample is m2 / (count - 1).
         m2: vec3,
-        /// Remainder that rounding took off `mean`: three signed numbers of 10 bits, in units of 2^-10 of its last place, red lowest;
-        /// 0 up to 4096 samples.
+        /// Remainder that rounding took off `mean`: three signed numbers of 10 bits, red lowest, in units of 2^-10 of its last
+        /// place; 0 up to 4096 samples.
         remainder: uint,
     }
 

@@ -110,8 +110,8 @@ gpu_structs! {
         mirrored: uint,
     }
 
-    /// Surface appearance. 8 texels, of which a diffuse surface without textures needs the first two. Colours are linear Rec. 709 in
-    /// [0, 1] unless said otherwise.
+    /// A material. 8 texels, of which a diffuse surface without textures needs the first two. Colours are linear Rec. 709 in [0, 1]
+    /// unless said otherwise.
     struct Material {
         /// Diffuse albedo; multiplies `base_texture`.
         base_color: vec3,
@@ -119,7 +119,7 @@ gpu_structs! {
         flags: uint,
         /// Emitted radiance of the front side, W/(m^2 sr); 0 emits nothing.
         emission: vec3,
-        /// Luminance of the mean emission, times the mean opacity; emissive triangles are chosen in proportion to it times their area.
+        /// Luminance of the mean emission times the mean opacity. Emissive triangles are chosen in proportion to it times their area.
         emission_weight: float,
         /// Index of refraction per channel (conductor), or interior / exterior in `x` (dielectric, coated).
         eta: vec3,

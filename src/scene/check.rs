@@ -48,7 +48,7 @@ impl Scene {
                 level => *level = Level::Mesh,
             }
         }
-        // A node's children come after it, so that all levels are known in one go and nothing leads back.
+        // A node's children come after it, so that one pass finds all levels and there are no cycles.
         for (index, node) in self.nodes.iter().enumerate() {
             let leaves = match levels[index] {
                 Level::Unreached => continue,

@@ -155,7 +155,7 @@ mod tests {
         assert_eq!(deficit(&[3, 1, 0], &[2, 5, 1], 8), [4, 0, 0]);
         assert_eq!(deficit(&[0, 0], &[1, 0], 5), [1, 2]);
         // (w / t)^2: 4, 6.25 (7), 100; the third has 9 and may double, the fourth has 18 of 20; the fifth has enough,
-        // the sixth too, but is asked for one more all the same: its weight says that its error is above the threshold.
+        // the sixth too, but still lacks one, since its weight shows that its error is above the threshold.
         assert_eq!(need(&[4, 5, 20, 20, 0, 2], &[1, 1, 9, 18, 3, 5], 2, 20), [3, 4, 9, 2, 0, 1]);
         assert_eq!(weigh(&[0.5, f32::NAN, f32::INFINITY, -1.0]), (vec![1 << 19, 0, 0, 0], 2));
     }

@@ -25,7 +25,7 @@ pub struct LightSample {
 
 pub use crate::shaders::shared::light::INFINITE_DISTANCE;
 
-/// The entry that a random word stands for, and a word that is independent of it and as well stratified.
+/// The entry that a random word chooses, and a word that is independent of it and as well stratified.
 pub fn alias_choose(table: &[AliasEntry], random: u32) -> (u32, u32) {
     let product = u64::from(random) * table.len() as u64;
     let (slot, low) = ((product >> 32) as u32, product as u32);

@@ -196,7 +196,7 @@ fn bilateral_and_wavelets_solve_the_worked_examples() {
     // 0 - 4/2 = -2; without details the odd ones come back as 2.
     let row = red(&reference(&line(&[0.0, 0.0, 8.0, 0.0, 0.0]), &plain));
     assert_eq!(row, [-2.0, 2.0, 6.0, 2.0, -2.0]);
-    // Red-black on 3x3 with 8 in the middle, which is red: each black pixel foretells (8 + 0 + 0) / 3 and misses by that,
+    // Red-black on 3x3 with 8 in the middle, which is red: each black pixel predicts (8 + 0 + 0) / 3 and misses by that,
     // the middle becomes 8 - 4/3 and corners -4/3; on the diagonals the middle is odd and comes back as their mean.
     let mut input = Picture::new(3, 3).flat().input;
     input.radiance.fill([0.0, 0.0, 0.0, 1.0]);

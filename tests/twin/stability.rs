@@ -326,7 +326,7 @@ fn auto_changes_from_filter_to_filter_without_a_seam() {
 }
 
 /// On a floor lit by 1, a patch whose light rises with the tilt of its normals, by 20 from 0 at a tilt of .1. At -.4 a fit in the
-/// patch foretells less than 0, by a slope that `eps` makes smaller in narrow windows and next to none in wide ones: light is not
+/// patch predicts less than 0, by a slope that `eps` makes smaller in narrow windows and next to none in wide ones: light is not
 /// below 0.
 #[test]
 fn auto_makes_no_negative_light() {

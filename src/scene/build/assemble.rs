@@ -1,5 +1,5 @@
-//! From a description to the flat arrays, one step after another: files are read, meshes placed, BVHs built, textures decoded
-//! and lights chosen among.
+//! Calls the steps from a description to the flat arrays: it reads files, places meshes, builds BVHs, decodes textures and makes the
+//! table of lights.
 use super::coat;
 use super::environment;
 use super::geometry::Geometry;

@@ -176,7 +176,7 @@ fn compressed<T: Boundable + Sync>(items: &[T]) -> CwBvh {
     collapsed(&mut bvh2)
 }
 
-/// Eight-way nodes of at most [`LEVELS`] levels: what is too deep is halved, ever nearer to the root until all of it is.
+/// Eight-way nodes of at most [`LEVELS`] levels: subtrees that are too deep are replaced by balanced ones, ever nearer to the root.
 fn collapsed(bvh2: &mut Bvh2) -> CwBvh {
     for from in [32, 16, 8, 0] {
         // Eight children are seven levels deep at most, and a leaf of three triangles two.

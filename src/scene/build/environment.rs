@@ -1,4 +1,4 @@
-//! Light from infinitely far: a constant, or a latitude-longitude image.
+//! Builds the light from infinitely far: a constant, or a latitude-longitude image.
 //!
 //! Orientation is that of Mitsuba 3's `envmap`: in environment space, for a unit direction d, `u = atan2(d.x, -d.z) /
 //! (2 pi)` wrapped to [0, 1) and `v = acos(d.y) / pi`; so +y is up (row 0), column 0 begins at -z and u grows towards
@@ -42,7 +42,7 @@ pub fn add_lights(sources: &mut Sources, scene: &mut Scene) -> Result<()> {
     Ok(())
 }
 
-/// Where an environment's mistakes are.
+/// Place of the environment in error messages.
 const PLACE: &str = "[environment]";
 
 /// The environment's light; `radiance` is its constant, or what its image is multiplied by.

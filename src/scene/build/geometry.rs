@@ -38,7 +38,7 @@ pub struct Corners {
     pub uv: Option<[Vec2; 3]>,
 }
 
-/// What a triangle is called in reports and shaded with.
+/// Indices by which a triangle is named in reports and shaded.
 #[derive(Clone, Copy, Debug)]
 pub struct Tag {
     /// Index of the triangle in its file.
@@ -49,7 +49,7 @@ pub struct Tag {
     pub object: u32,
 }
 
-/// What was dropped or mended, counted for the warnings.
+/// Numbers of triangles that were dropped or repaired, for the warnings.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Repairs {
     /// Triangles dropped for a NaN or infinite coordinate.
@@ -146,7 +146,7 @@ impl Geometry {
     }
 
     /// Drops triangles from `start` on that equal an earlier one of them in all but number and object; returns how many.
-    /// A lamp that is there twice would be sampled twice as often as rays meet it.
+    /// A duplicate lamp would be sampled twice as often as rays hit it.
     pub fn drop_copies(&mut self, start: usize) -> usize {
         let all = |i: usize| (Triangle { primitive: 0, object: 0, ..self.triangles[i] }, self.shading.get(i).copied());
         let key = |i: usize| {

@@ -1,4 +1,4 @@
-//! The levels of the BVH: one over the triangles of each stored mesh, and over their instances a top level.
+//! Builds the levels of the BVH: one over the triangles of each stored mesh, and a top level over their instances.
 use super::bvh::{self, Bounds};
 use super::geometry::Geometry;
 use super::plan::{Job, Plan};
@@ -12,7 +12,7 @@ use glam::{DAffine3, Vec3};
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// Bytes of an object's name, about.
+/// Approximate bytes of an object's name.
 const BYTES_OF_NAME: u64 = 64;
 
 /// The triangles below each root that instances name.
@@ -129,7 +129,7 @@ fn top_level(sources: &Sources, boxes: &HashMap<u32, Bounds>, scene: &mut Scene)
     if is_too_far(low.abs().max(high.abs()).max_element()) {
         return Err(sources.at("instances", format!("reach beyond the limit of {MAX_COORDINATE:e}")));
     }
-    // Rays are taken to the space of each instance that they meet.
+    // Rays are transformed to the space of each instance that they meet.
     let world = [low.to_array(), high.to_array()];
     let seen =
         |i: &Instance| bvh::world_bounds(&turned(i), world).as_flattened().iter().map(|v| v.abs()).fold(0.0, f32::max);

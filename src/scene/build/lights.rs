@@ -82,13 +82,13 @@ fn add_triangles(scene: &Scene, ranges: &Ranges, lights: &mut Vec<Light>) -> Res
     Ok(())
 }
 
-/// A light takes as much again in the table, its power and its probability while they are made.
+/// Makes room for `more` lights, and checks memory for twice that: their table, powers and probabilities take as much again.
 fn reserve(lights: &mut Vec<Light>, more: usize) -> Result<()> {
     memory::need(format!("{more} emissive triangles"), 2 * (more * size_of::<Light>()) as u64)?;
     memory::reserve("lights", lights, more)
 }
 
-/// An emissive triangle or sphere; `at`: placed by an instance, which may mirror it.
+/// The light of an emissive triangle or sphere, which the instance `at` places and may mirror.
 fn surface_light(scene: &Scene, index: usize, at: Option<(Mat4, bool)>, material: Option<u32>) -> Light {
     let t = &scene.triangles[index];
     let material = material.unwrap_or(t.material);
@@ -109,7 +109,7 @@ fn surface_light(scene: &Scene, index: usize, at: Option<(Mat4, bool)>, material
 /// Area of an emissive triangle, in squares of the scene's diagonal, above which sampling by solid angle pays.
 const LARGE: f64 = 0.01;
 
-/// A lamp that fills so much of the sky of points near it that its nearest parts outshine the others.
+/// Whether a lamp is so large that, seen from points near it, its nearest parts outshine the others.
 pub fn is_large(scene: &Scene, light: &Light) -> bool {
     let [low, high] = scene.bounds.map(|b| Vec3::from(b).as_dvec3());
     light.kind == LIGHT_TRIANGLE && geometry::area([light.a, light.b, light.c]) > LARGE * (high - low).length_squared()

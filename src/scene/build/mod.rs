@@ -1,4 +1,4 @@
-//! From a description to the flat arrays that kernels read: [`assemble`] goes through the steps.
+//! Builds the flat arrays that kernels read from a description; [`assemble`] calls the steps in order.
 pub mod alias;
 pub mod assemble;
 pub mod bvh;

@@ -32,7 +32,7 @@ pub fn mesh_name(mesh: &MeshTable) -> String {
 
 impl<'a> Sources<'a> {
     /// Takes the bitmaps and materials of a description, and reads the MTL files that OBJ files name near their beginning;
-    /// others are read when they turn up.
+    /// others are read when an OBJ file reaches them.
     ///
     /// # Errors
     /// For what is wrong with them, with its place.
@@ -45,7 +45,7 @@ impl<'a> Sources<'a> {
         Ok(sources)
     }
 
-    /// What paths are relative to.
+    /// Folder that paths are relative to.
     pub fn directory(&self) -> &'a Path {
         self.path.parent().unwrap_or(Path::new(""))
     }

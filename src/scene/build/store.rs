@@ -1,4 +1,4 @@
-//! Meshes become triangles in one array: first those in world space, then one mesh after another.
+//! Puts the triangles of all meshes into one array: first those in world space, then one mesh after another.
 use super::geometry::{Corners, Geometry, Placement, Repairs, Tag, TooFar};
 use super::plan::{Job, Plan, override_of};
 use super::sources::{Sources, mesh_name};
@@ -88,7 +88,7 @@ fn segments(table: &MeshTable) -> u32 {
     table.segments.unwrap_or(64)
 }
 
-/// Says where grey stands in for a material of a file that some mesh wears.
+/// Warns where grey replaces a material of a file that some mesh uses.
 fn warn_of_grey(sources: &mut Sources, plan: &Plan) -> Result<()> {
     let meshes = &sources.description.mesh;
     let (mut worn, mut copies) = (vec![false; meshes.len()], vec![false; meshes.len()]);
@@ -118,7 +118,7 @@ struct Addition<'a> {
 impl<'a> Addition<'a> {
     fn new(sources: &Sources<'a>, job: &Job, first: u32) -> Result<Self> {
         let table = &sources.description.mesh[job.mesh];
-        // Who hands over triangles without normals means it: in memory all vertices have one or none has.
+        // Meshes from memory without normals are flat on purpose: there all vertices have one, or none has.
         let meant = table.data.as_ref().is_some_and(|mesh| mesh.normals.is_empty());
         let uvs = sources.library.materials.textures.len() > 0;
         let placement = Placement { affine: job.affine, flat: table.flat || meant, flip: table.flip_normals, uvs };

@@ -48,7 +48,7 @@ pub struct Camera {
 type Frame = (DVec3, [DVec3; 3]);
 
 impl Camera {
-    /// The device's camera for a film of (width, height) pixels, looking at a scene of these bounds if nothing else is said.
+    /// The device's camera for a film of (width, height) pixels; without a position it looks at a scene of these bounds.
     ///
     /// # Errors
     /// A sentence that names the key at fault.

@@ -80,7 +80,7 @@ impl<'de> Deserialize<'de> for Scale {
 }
 
 /// A placement: 16 row-major numbers (column vectors, last row 0 0 0 1) or `{ translate, rotate, scale }`.
-/// Not checked for being invertible: whoever uses it names the mesh.
+/// It may have no inverse: the code that uses it checks that and names the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Transform(pub DAffine3);
 

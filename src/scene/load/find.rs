@@ -2,7 +2,7 @@
 use std::path::{Path, PathBuf};
 
 /// The file that `written` means, below `directory`. Where it does not exist as written: the same letters in another
-/// case, or the bare file name next to the MTL (absolute paths of another machine). The flag says that it was mended.
+/// case, or the bare file name next to the MTL (absolute paths of another machine). The flag tells that the name was repaired.
 pub fn find_file(directory: &Path, written: &str) -> Option<(PathBuf, bool)> {
     let exact = directory.join(written);
     if exact.is_file() {

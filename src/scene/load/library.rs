@@ -16,14 +16,14 @@ type Named = Arc<[(String, u32)]>;
 /// Bytes that a material takes while it is read.
 const BYTES_OF_MATERIAL: u64 = 2048;
 
-/// What all OBJ files of a scene share.
+/// The materials that all OBJ files of a scene share.
 #[derive(Debug, Default)]
 pub struct Library {
     /// The scene's materials so far.
     pub materials: Materials,
     /// `[[material]]` tables by name: they win over MTL materials.
     pub tables: HashMap<String, u32>,
-    /// MTL files already read, by their one true path.
+    /// MTL files that were read, by their canonical path.
     mtls: HashMap<PathBuf, Named>,
     /// The grey of triangles without a material.
     grey: Option<u32>,
@@ -66,7 +66,7 @@ impl Library {
     }
 
     /// Reads the MTL files that an OBJ file names within its first 64 KiB. A file that cannot be opened is passed over, and so
-    /// are libraries that are missing: whoever reads the whole file says so.
+    /// are libraries that are missing: reading the whole file reports them.
     ///
     /// # Errors
     /// As [`Self::mtl`].

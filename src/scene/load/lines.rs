@@ -22,10 +22,10 @@ pub struct Line<'a> {
     pub text: Cow<'a, str>,
 }
 
-/// What keeps a line from being read, and its number.
+/// The reason why a line cannot be read, and its number.
 pub type Unreadable = (usize, &'static str);
 
-/// Bytes of a line, with its continuations, at most.
+/// Most bytes of a line with its continuations.
 const LONGEST: usize = 1 << 26;
 const TOO_LONG: &str = "64 MiB without a line feed: is this an OBJ file?";
 const CUT: &str = "the file could not be read to its end: mend the line or export the file again";

@@ -15,7 +15,7 @@ pub struct Materials {
     pub names: Vec<String>,
     /// Textures that materials have asked for so far.
     pub textures: TextureSet,
-    /// Materials whose bump height is a share of the scene's size, known only in the end.
+    /// Materials whose bump height is a share of the scene's size, which is known last.
     pub default_bumps: Vec<u32>,
 }
 
@@ -157,7 +157,7 @@ impl Materials {
     }
 }
 
-/// A colour that must not exceed 1; more is clamped and said so.
+/// A colour that must not exceed 1; larger values are clamped with a warning.
 ///
 /// # Errors
 /// For one that is not finite.

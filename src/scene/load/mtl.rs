@@ -107,7 +107,7 @@ pub fn parse(path: &Path, text: &str) -> Result<Vec<Mtl>> {
         let (key, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         let rest = rest.trim();
         if key.eq_ignore_ascii_case("newmtl") {
-            within = !rest.is_empty(); // what has no name cannot be worn
+            within = !rest.is_empty(); // a material without a name cannot be used
             checked.extend(within.then(|| format!("newmtl {rest}\n")));
         } else if within {
             let place = || format!("line {}", number + 1);

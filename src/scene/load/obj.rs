@@ -10,7 +10,7 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-/// What is read of a line, or what is wrong with it.
+/// The value that a line holds, or a sentence about what is wrong with it.
 type Checked<T> = std::result::Result<T, String>;
 
 /// Contents of an OBJ file.
@@ -19,7 +19,7 @@ pub struct ObjFile<'a> {
     /// At least one. An object is split wherever its material changes, and where faces begin or cease to have normals
     /// (texture coordinates); its parts follow each other.
     pub parts: Vec<Part<'a>>,
-    /// What is said when a mesh wears the file's own materials, and grey stands in for some.
+    /// The warning for a mesh with the file's own materials, some of which grey replaces.
     pub grey: Option<String>,
 }
 
@@ -48,9 +48,9 @@ pub fn parse(path: &Path, reader: impl BufRead, library: &mut Library) -> Result
     Ok(parser.finish())
 }
 
-/// Estimated bytes that a parsed file takes before memory is asked for the first time.
+/// Estimated bytes of a parsed file from which on available memory is checked.
 const UNASKED: u64 = 1 << 26;
-/// Bytes that a part takes, with its name, about. Those of the arrays below count twice: arrays double when they are full.
+/// Approximate bytes of a part with its name. The arrays below count twice, since arrays double when they are full.
 const BYTES_OF_PART: u64 = 400;
 const BYTES_OF_VERTEX: u64 = 2 * (12 + 4);
 const BYTES_OF_CORNER: u64 = 2 * (12 + 12 + 8 + 16);
@@ -79,7 +79,7 @@ struct Parser<'a> {
     missing: BTreeSet<String>,
     /// Faces of one or two corners, dropped: how many, and the line of the first.
     short_faces: (usize, usize),
-    /// Bytes that what was read so far takes, about, and how many of them memory was asked for.
+    /// Approximate bytes of what was read so far, and the number for which memory was checked.
     held: u64,
     asked: u64,
 }
@@ -107,7 +107,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// What a path tracer has no use for, lines and points among it, is passed over.
+    /// Statements that a path tracer does not need, such as lines and points, are skipped.
     fn statement(&mut self, text: &str) -> Result<()> {
         let text = text.trim_start();
         let (key, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
@@ -240,7 +240,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Asks for as much memory again whenever what is held has doubled.
+    /// Checks available memory whenever the size has doubled.
     fn ask(&mut self) -> Result<()> {
         if self.held <= self.asked {
             return Ok(());
@@ -264,7 +264,7 @@ impl<'a> Parser<'a> {
         ObjFile { grey: self.grey(), parts: self.parts }
     }
 
-    /// What is said of the names that are worn and defined nowhere.
+    /// The warning about material names that are used but not defined.
     fn grey(&self) -> Option<String> {
         let unknown: Vec<_> = self.worn.iter().filter(|name| !self.names.contains_key(*name)).collect();
         let libraries = match self.missing.is_empty() {

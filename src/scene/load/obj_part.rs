@@ -1,4 +1,4 @@
-//! A part of an OBJ file in the making: corners that name positions, texture coordinates and normals apart become vertices
+//! Collects a part of an OBJ file: corners, which index positions, texture coordinates and normals separately, become vertices
 //! that have all three.
 use super::triangulate::Triangulator;
 use crate::layout::NONE;
@@ -21,10 +21,10 @@ pub type Corner = [u32; 3];
 /// In place of a texture coordinate or normal that a corner does not have.
 pub const NO_EXTRA: u32 = u32::MAX;
 
-/// Vertices of one position that are looked at before another is made, which takes memory but changes no triangle.
+/// Vertices of one position that are compared before another is made; a duplicate takes memory but changes no triangle.
 const LOOKS: usize = 16;
 
-/// The name of faces that stand before the first object.
+/// The name of faces before the first object.
 const UNNAMED: &str = "unnamed_object";
 
 /// Collects the faces of one part.
@@ -74,7 +74,7 @@ impl PartBuilder {
         !self.is_empty() && self.has != has
     }
 
-    /// What was gathered; name and material stay.
+    /// Returns the collected part; name and material stay for the next one.
     pub fn take(&mut self) -> Part<'static> {
         for ([position, ..], _) in self.made.drain(..) {
             self.latest[position as usize] = NONE;

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// What a picture holds, which decides how it is read and which channels are kept.
+/// Contents of a picture, which decide how it is decoded and which channels are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// Colour, stored with the sRGB curve.
@@ -48,12 +48,12 @@ impl Mapping {
     }
 }
 
-/// The pictures that materials asked for: each is kept once per kind, however many mappings share it.
+/// The pictures that materials name. Each is stored once per kind, however many mappings share it.
 #[derive(Clone, Debug, Default)]
 pub struct TextureSet {
     bitmaps: HashMap<PathBuf, Bitmap>,
     pictures: Vec<(PathBuf, Kind)>,
-    /// Index of each kind of each picture, by its one true path.
+    /// Index of each kind of each picture, by its canonical path.
     known: HashMap<(PathBuf, Kind), usize>,
     /// Index of the picture and how it is mapped.
     wanted: Vec<(usize, Mapping)>,
@@ -109,7 +109,7 @@ impl TextureSet {
         })
     }
 
-    /// Textures asked for so far.
+    /// Number of textures so far.
     pub fn len(&self) -> usize {
         self.wanted.len()
     }
@@ -156,7 +156,7 @@ impl TextureSet {
     }
 }
 
-/// Bytes that the largest pictures take, one a thread, as their format has them (8 a texel at most) and as RGBA8.
+/// Bytes that the largest pictures take while each thread decodes one: as decoded (at most 8 per texel) and as RGBA8.
 fn while_decoded(sizes: &[[u32; 2]]) -> u64 {
     let mut texels: Vec<_> = sizes.iter().map(|&[width, height]| u64::from(width) * u64::from(height)).collect();
     texels.sort_unstable_by(|a, b| b.cmp(a));
