@@ -1,5 +1,6 @@
 //! The statistics of a pixel's samples, and how those of two disjoint sets of samples are combined.
 use crate::layout::{PixelLight, PixelStats, vec3};
+use crate::math::srgb::luminance;
 use serde::{Deserialize, Serialize};
 
 /// The statistics of one pixel.
@@ -36,11 +37,6 @@ impl BrokenSamples {
 
 /// Upper limit of sums of squares, as in `glsl/film/accumulate.comp`.
 const WIDEST: f64 = 1e35;
-
-/// Luminance of a linear Rec. 709 colour.
-pub fn luminance([r, g, b]: vec3) -> f32 {
-    0.2126 * r + 0.7152 * g + 0.0722 * b
-}
 
 /// Combines the statistics of two disjoint sets of samples (Chan, Golub and LeVeque 1979): with d the difference of the
 /// means, the mean moves by d n_b / n and M2 grows by d^2 n_a n_b / n. The result is computed in double precision and

@@ -8,11 +8,11 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{Guide, NONE, PixelLight, PixelStats, PriorityPush, vec3};
 use crate::math::portable::{exp_negative, squared_distance};
+use crate::math::srgb::luminance;
 use crate::settings::settings;
 use crate::shaders::both::{APART, MAX_TINT, MIN_LEFT};
 use crate::shaders::shared::likeness_bits::{GATHERED_UNIT, MIN_KINSHIP, SEVENTHS};
 use crate::shaders::{both, likeness};
-use crate::statistics::luminance;
 use glam::Vec3;
 use serde::Serialize;
 

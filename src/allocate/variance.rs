@@ -3,10 +3,10 @@ use super::{HostInputs, Inputs, Placing, Policy, PolicyPass};
 use crate::error::Result;
 use crate::gpu::{Kernel, Recorder};
 use crate::layout::{PixelStats, PriorityPush};
+use crate::math::srgb::luminance;
 use crate::settings::{NUMBER, settings};
 use crate::shaders::shared::pixel_noise::{MAX_LUMINANCE, PRIOR_SAMPLES};
 use crate::shaders::variance::Bind;
-use crate::statistics::luminance;
 use serde::Serialize;
 
 /// The entry of this policy in [`super::POLICIES`].

@@ -47,7 +47,6 @@ impl Filtered {
     pub fn new(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Self> {
         filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
         let demodulation = noisy.holds().demodulation(recipe.demodulation);
-        noisy.round_as_file()?;
         let in_painted = demodulation == Demodulation::Light && noisy.lacks_direct_light()?;
         let mut parts = Demodulated::new(gpu, &noisy, demodulation, in_painted)?;
         let mut times = run(gpu, |rec| parts.record_split(rec, &noisy))?;

@@ -4,7 +4,6 @@ use crate::error::{Error, Result};
 use crate::gpu::Buffer;
 use crate::layout::{Guide, PixelLight, PixelStats};
 use crate::render::Renderer;
-use glam::Vec3;
 
 /// What the planes of a [`Noisy`] image hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,8 +55,7 @@ pub struct Noisy {
 
 impl Noisy {
     /// The film of `renderer`, which was made with [`Outputs::guides`](crate::render::Outputs::guides). Nothing is copied: it is
-    /// what the renderer's steps leave there, and outlives the renderer. [`Filtered`](super::Filtered) rounds the film's normals in
-    /// place, as those of a file are: they stay unit but for the last bits. [`Denoiser`](super::Denoiser) leaves them as they are.
+    /// what the renderer's steps leave there, and outlives the renderer.
     ///
     /// # Errors
     /// [`Error::Usage`] for a renderer without guides, and for a film in more than one piece.
@@ -82,20 +80,6 @@ impl Noisy {
     /// What the planes hold.
     pub fn holds(&self) -> Holds {
         self.holds
-    }
-
-    /// Makes a film's normals unit as those of a file are. They are but for rounding, which this makes the same: a film and its file
-    /// become one picture, to the bit.
-    ///
-    /// # Errors
-    /// [`Error::Device`].
-    pub(super) fn round_as_file(&self) -> Result<()> {
-        for window in windows(self.guide.len()).filter(|_| !self.holds.of_file) {
-            let mut guide = self.guide.read_range(window.clone())?;
-            guide.iter_mut().for_each(|g| g.normal = Vec3::from(g.normal).normalize_or_zero().into());
-            self.guide.write(window.start, &guide)?;
-        }
-        Ok(())
     }
 
     /// Whether direct light, which is kept apart, is missing or no number somewhere: such pixels take it from the others.

@@ -1,6 +1,6 @@
 //! The layers of an image that filters use (AOVs, arbitrary output variables). They are found by the channel names of
 //! Tallow, Blender (Cycles), Mitsuba 3 and pbrt-v4.
-use super::film::{Channel, Film, NOISY, Samples, Window, split};
+use super::film::{Channel, Film, NOISY, SOFTWARE, Samples, Window, split};
 use std::collections::BTreeMap;
 
 /// One kind of arbitrary output variable.
@@ -177,7 +177,7 @@ fn is_noisy(layer: &str) -> bool {
 
 /// Whether Tallow wrote the file; other programs may use the same names for something else.
 fn is_tallow_s(film: &Film) -> bool {
-    film.metadata.get("software").is_some_and(|name| name.starts_with("tallow "))
+    film.metadata.get(SOFTWARE).is_some_and(|name| name.starts_with("tallow "))
 }
 
 /// Finds a layer in the view layer of the colour, or else anywhere.

@@ -7,6 +7,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Name of the layer that holds the colour before it was filtered, as in Blender.
 pub const NOISY: &str = "Noisy Image";
 
+/// Metadata that names the program which rendered the file: "tallow" and its version.
+pub const SOFTWARE: &str = "software";
+
 /// The samples of one channel, row-major, row 0 at the top.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Samples {

@@ -16,7 +16,7 @@ pub mod tone;
 use crate::error::{Error, Result};
 use crate::memory;
 pub use claim::Claim;
-pub use film::{Channel, Film, NOISY, Picture, Samples, Window};
+pub use film::{Channel, Film, NOISY, Picture, SOFTWARE, Samples, Window};
 use frame::Frame;
 use output::Stream;
 pub(crate) use photo::{BAND, bands, check_end, claim as picture_claim, picture};

@@ -17,3 +17,9 @@ macro_rules! linear_from_srgb {
 }
 linear_from_srgb!(linear_from_srgb, f32);
 linear_from_srgb!(linear_from_srgb_f64, f64);
+
+/// Luminance of a linear colour.
+pub fn luminance(colour: impl Into<[f32; 3]>) -> f32 {
+    let [r, g, b] = colour.into();
+    0.2126 * r + 0.7152 * g + 0.0722 * b
+}

@@ -2,7 +2,7 @@
 use super::{Checkpoint, PathRange, Renderer, Step, film, provenance, resume};
 use crate::error::Result;
 use crate::gpu::{FrameResources, PassTime};
-use crate::image::{Film, Samples};
+use crate::image::{Film, SOFTWARE, Samples};
 use crate::render::schedule::Cut;
 use crate::statistics::BrokenSamples;
 use serde::Serialize;
@@ -122,6 +122,7 @@ impl<'a> Job<'a> {
     /// [`crate::error::Error::Device`].
     pub fn film(&self, status: &Status) -> Result<Film> {
         let mut film = film::read_back(self.renderer)?;
+        film.metadata.insert(SOFTWARE.to_owned(), format!("tallow {}", env!("CARGO_PKG_VERSION")));
         film.metadata.extend(provenance::metadata(self.renderer, &film)?);
         film.metadata.insert(resume::ALLOCATIONS.to_owned(), status.allocations.to_string());
         film::set_broken_samples(&mut film, self.broken_samples()?);

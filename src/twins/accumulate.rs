@@ -1,9 +1,10 @@
 //! Twin of `glsl/film/accumulate.comp`: Welford's running mean and variance (1962), in order of sample index.
 use crate::layout::{BrokenTally, FoldPush, PixelLight, PixelStats, vec3, vec4};
 use crate::math::hash::pcg;
+use crate::math::srgb::luminance;
 use crate::shaders;
 use crate::shaders::accumulate::{MAX_DEVIATION, MAX_IRRADIANCE, MAX_M2, MAX_ROUNDED_SAMPLES, MIN_ALBEDO};
-use crate::statistics::{luminance, next_sample};
+use crate::statistics::next_sample;
 use glam::{Vec3, Vec4};
 
 /// Bits of a mean's remainder, for each channel.
@@ -124,7 +125,7 @@ fn fold_light(l: &mut PixelLight, (kept, irradiance): (Vec3, Vec3), count: u32) 
             [direct, move_mean(l.indirect, indirect_by, Kept { word, count }, 3 * LIGHT_BITS, LIGHT_BITS)]
         }
     };
-    let off = |mean: Vec3| luminance(irradiance.into()) - luminance(mean.into());
+    let off = |mean: Vec3| luminance(irradiance) - luminance(mean);
     l.indirect_m2 = (l.indirect_m2 + square(off(indirect), off(moved))).min(MAX_M2);
     (l.direct, l.indirect) = (direct.into(), moved.into());
 }

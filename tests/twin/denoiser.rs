@@ -43,7 +43,9 @@ impl Frame {
                 light = PixelLight { direct: [20.0; 3], ..PixelLight::default() };
             }
             let mut mean: vec3 = std::array::from_fn(|c| light.direct[c] + albedo[c] * light.indirect[c]);
-            let mut guide = Guide { normal: [0.0, 0.6, 0.8], depth: 2.0 + unit(6), albedo, ..Guide::default() };
+            // Unit but for rounding, as those of a render.
+            let normal = glam::Vec3::new(0.01 * unit(7), 0.6, 0.8).normalize().to_array();
+            let mut guide = Guide { normal, depth: 2.0 + unit(6), albedo, ..Guide::default() };
             guide.position = [unit(0), unit(1), -guide.depth];
             match i % 37 {
                 3 if broken => mean[1] = f32::NAN,

@@ -70,7 +70,6 @@ fn metadata(args: &Args, gpu: &Gpu, seconds: f64) -> BTreeMap<String, String> {
     let info = gpu.info();
     let since_epoch = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     let entries = [
-        ("software", format!("tallow {}", env!("CARGO_PKG_VERSION"))),
         ("scene", args.scene.display().to_string()),
         ("device", info.name.clone()),
         ("driver", format!("{} {} {}", info.driver_name, info.driver_version, info.driver_info)),

@@ -94,8 +94,10 @@ impl<'a> Layers<'a> {
 
     /// The surface, zero where nothing is known.
     pub fn guide(&self, i: usize) -> Guide {
-        // Means over a pixel's samples are shorter than 1.
-        let normal = vector(self.aovs, Aov::Normal, i).normalize_or_zero();
+        let normal = vector(self.aovs, Aov::Normal, i);
+        // Means over a pixel's samples are shorter than 1. Normals that are unit but for rounding stay as they are, so that a
+        // render and its file become the same picture, to the bit.
+        let normal = if normal.is_normalized() { normal } else { normal.normalize_or_zero() };
         let (position, depth) = self.places.at(self.aovs, i);
         let hit = self.aovs.holds(i) && depth > 0.0;
         Guide {

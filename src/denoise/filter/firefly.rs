@@ -1,11 +1,11 @@
 //! Outliers cut before filtering, as a step of its own that says what it took away. Kernel: `glsl/filter/firefly.comp`.
-use super::noise_estimate::luminance;
 use super::pixel::known_radiance;
 use super::{FilterInput, Planes};
 use crate::denoise::windows;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, FrameResources, Gpu, Kernel, Location, Recorder};
 use crate::layout::{FireflyPush, vec4};
+use crate::math::srgb::luminance;
 use crate::shaders::firefly::{Bind, Constants};
 
 /// What was cut.

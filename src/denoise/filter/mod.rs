@@ -162,6 +162,7 @@ pub fn check_size(gpu: &Gpu, [width, height]: [u32; 2], texels: u64) -> Result<(
 
 /// Texels of a pixel's guide; those of its variance are not more.
 pub const GUIDE_TEXELS: u64 = (size_of::<Guide>() / 16) as u64;
+const _: () = assert!(size_of::<Guide>().is_multiple_of(16), "kernels read guides in texels of 16 bytes");
 
 /// Filters one image: uploads it, runs `row` on it and reads the result; also what each pass took.
 ///

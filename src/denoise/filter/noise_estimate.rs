@@ -5,6 +5,7 @@ use super::{FilterInput, Planes};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{SvgfPush, vec3, vec4};
+use crate::math::srgb::luminance;
 use crate::shaders::noise_estimate::{self, Bind, Constants};
 pub use crate::shaders::shared::luminance::ENOUGH;
 use crate::shaders::shared::luminance::STRONGEST;
@@ -47,11 +48,6 @@ impl Estimate {
         let kernel = &self.kernels[usize::from(planes.variance.is_some())];
         rec.dispatch(kernel, bind, &push, kernel.groups(planes.size))
     }
-}
-
-/// Rec. 709.
-pub fn luminance(c: Vec3) -> f32 {
-    c.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 
 /// Difference of luminance.

@@ -9,6 +9,7 @@ use super::sources::Sources;
 use crate::error::{Error, Result};
 use crate::image::Picture;
 use crate::layout::{LIGHT_ENVIRONMENT, Light, NONE};
+use crate::math::srgb::luminance;
 use crate::scene::description::EnvironmentTable;
 use crate::scene::load::environment::{load, unusable};
 use crate::scene::{Environment, Scene};
@@ -69,11 +70,6 @@ fn image_of(sources: &mut Sources, table: &EnvironmentTable) -> Result<Option<En
         }
         (None, None) => Ok(None),
     }
-}
-
-/// Luminance of linear Rec. 709.
-pub fn luminance(c: [f32; 3]) -> f32 {
-    0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]
 }
 
 /// Sine of the polar angle at the centre of a row: proportional to the solid angle of its texels.

@@ -3,11 +3,12 @@
 //! Power, by luminance, in watts up to a common factor: emissive triangle or sphere `pi * area * L` (front side, L the mean over
 //! its texture times the mean opacity), point `4 pi I`, spot `2 pi I (1 - mean of the two cosines)`, directional
 //! `pi R^2 E`, environment `4 pi^2 R^2` times its mean, R the radius of the scene.
-use super::environment::{luminance, mean_luminance};
+use super::environment::mean_luminance;
 use super::hierarchy::Ranges;
 use super::{alias, geometry};
 use crate::error::Result;
 use crate::layout::*;
+use crate::math::srgb::luminance;
 use crate::memory;
 use crate::scene::Scene;
 use crate::scene::load::texture;

@@ -1,11 +1,12 @@
 //! `auto` on the host: the twin of `glsl/auto*.comp`.
 use super::{SMOOTHING, alike, candidates, floor, least};
 use crate::denoise::filter::edge::{Rates, edge_weight};
-use crate::denoise::filter::noise_estimate::{self, ENOUGH, contrast, luminance};
+use crate::denoise::filter::noise_estimate::{self, ENOUGH, contrast};
 use crate::denoise::filter::pack::Packed;
 use crate::denoise::filter::{FilterInput, FilterSettings};
 use crate::layout::vec4;
 use crate::math::hash::pcg;
+use crate::math::srgb::luminance;
 use crate::shaders::auto::{OVERALL, RIDGE, ROUNDS};
 use crate::shaders::auto_error::{LIMIT, MOST, OWN};
 use crate::shaders::shared::candidates::BRIGHT;
