@@ -29,20 +29,20 @@ const uint PAIR_FILM = 0u, PAIR_LENS = 1u;
 
 // Position on the film of a sample of `pixel`, in pixels.
 vec2 film_sample(uint pixel, Sampler random) {
-    vec2 at = vec2(pixel % frame.size.x, pixel / frame.size.x);
+    vec2 at = vec2(pixel % push.constants.size.x, pixel / push.constants.size.x);
     vec2 u = sample_2d(random, PAIR_FILM);
-    if (FX_PIXEL_FILTER && frame.pixel_filter == PIXEL_FILTER_TENT) u = 0.5 + vec2(warp_tent(u.x), warp_tent(u.y));
-    else if (FX_PIXEL_FILTER && frame.pixel_filter == PIXEL_FILTER_GAUSSIAN) u = 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y));
-    else if (FX_PIXEL_FILTER && frame.pixel_filter == PIXEL_FILTER_POINT) u = vec2(0.5);
+    if (FX_PIXEL_FILTER && push.constants.pixel_filter == PIXEL_FILTER_TENT) u = 0.5 + vec2(warp_tent(u.x), warp_tent(u.y));
+    else if (FX_PIXEL_FILTER && push.constants.pixel_filter == PIXEL_FILTER_GAUSSIAN) u = 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y));
+    else if (FX_PIXEL_FILTER && push.constants.pixel_filter == PIXEL_FILTER_POINT) u = vec2(0.5);
     return at + u;
 }
 
 // The first ray of a sample's path, through `film` in pixels.
 Ray eye_ray(vec2 film, Sampler random) {
     vec2 lens = FX_LENS ? sample_2d(random, PAIR_LENS) : vec2(0.0);
-    return camera_ray(frame.camera, film_from_pixel(film, frame.size), lens);
+    return camera_ray(camera, film_from_pixel(film, push.constants.size), lens);
 }
 
 // Seed of the alpha masks along a path. The frame's seed is hashed, or seeds 0 and 1 would swap the numbers of neighbouring
 // pixels; it is inverted, or the numbers would be those of `sampler_start`.
-uint path_seed(uint pixel, uint index) { return pcg(pcg(pixel ^ pcg(~frame.seed)) + index); }
+uint path_seed(uint pixel, uint index) { return pcg(pcg(pixel ^ pcg(~push.constants.seed)) + index); }

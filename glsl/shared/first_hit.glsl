@@ -2,7 +2,7 @@
 
 // `delta` becomes true for a smooth surface, all of whose light counts as direct.
 Guide first_hit(Ray ray, uint mask_seed, out bool delta) {
-    Hit hit = traverse(Segment(ray.origin, ray.direction, 3e38, mask_seed), frame.root);
+    Hit hit = traverse(Segment(ray.origin, ray.direction, 3e38, mask_seed), push.constants.root);
     delta = false;
     Guide guide = Guide_zero();
     guide.object = guide.material = NONE;
@@ -11,7 +11,7 @@ Guide first_hit(Ray ray, uint mask_seed, out bool delta) {
     Bsdf bsdf = surface_bsdf(s);
     delta = bsdf_is_delta(bsdf);
     guide.normal = side_of(s, -ray.direction) * s.normal;
-    guide.depth = hit.t + frame.camera.near;
+    guide.depth = hit.t + camera.near;
     guide.position = s.position;
     guide.object = s.object;
     guide.albedo = bsdf_albedo(bsdf, -dot(s.normal, ray.direction));

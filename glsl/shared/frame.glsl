@@ -1,2 +1,3 @@
-// Constants of a frame. The command buffer writes this uniform buffer, so that a later frame does not change an earlier one's.
-layout(scalar, binding = 15) uniform Frame { FrameConstants frame; };
+// What all paths of a frame have in common. The command buffer writes the uniform buffer, so that a later frame does not change
+// the camera of an earlier one. Needs `push` (PathPush) where PathConstants are read.
+layout(scalar, binding = 15) uniform View { Camera camera; };

@@ -34,7 +34,7 @@ mat3 environment_rotation(uint light) { // environment_from_world
 }
 
 uvec2 environment_extent() {
-    return uvec2(frame.environment_width, uint(textureSize(environment)) / frame.environment_width);
+    return uvec2(push.constants.environment_width, uint(textureSize(environment)) / push.constants.environment_width);
 }
 
 vec3 environment_lookup(vec2 uv) {
@@ -60,23 +60,23 @@ float environment_pdf(uint light, uint texel, float sine) {
 
 // Radiance from `direction` and the density with which light_sample would choose it (solid angle).
 vec3 environment_radiance(vec3 direction, out float pdf) {
-    vec3 scale = Light_value(lights, frame.environment);
-    pdf = Light_probability(lights, frame.environment) * (0.25 / PI);
-    if (!FX_ENVIRONMENT_MAP || frame.environment_width == 0u) return scale;
+    vec3 scale = Light_value(lights, push.constants.environment);
+    pdf = Light_probability(lights, push.constants.environment) * (0.25 / PI);
+    if (!FX_ENVIRONMENT_MAP || push.constants.environment_width == 0u) return scale;
     uvec2 size = environment_extent();
-    vec3 d = environment_rotation(frame.environment) * direction;
+    vec3 d = environment_rotation(push.constants.environment) * direction;
     float sine = length(d.xz);
     vec2 uv = environment_uv(d, sine);
     uv.x -= floor(uv.x);
     uvec2 texel = min(uvec2(uv * vec2(size)), size - 1u);
-    pdf = environment_pdf(frame.environment, texel.y * size.x + texel.x, sine);
+    pdf = environment_pdf(push.constants.environment, texel.y * size.x + texel.x, sine);
     return scale * environment_lookup(uv);
 }
 
 void sample_environment(uint light, float chosen, uint word, vec2 u, inout LightSample s) {
     s.distance = INFINITE_DISTANCE;
     s.radiance = Light_value(lights, light);
-    if (!FX_ENVIRONMENT_MAP || frame.environment_width == 0u) {
+    if (!FX_ENVIRONMENT_MAP || push.constants.environment_width == 0u) {
         s.direction = warp_sphere(u);
         s.pdf = chosen * (0.25 / PI);
     } else {
@@ -194,7 +194,7 @@ void sample_sphere_light(vec3 p, Light light, vec2 u, inout LightSample s) {
 // Samples one light for the surface point `p`. The radiance is 0 when the light cannot reach the point.
 LightSample light_sample(vec3 p, uint word, vec2 u) {
     LightSample s = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0);
-    uint index = frame.light_count == 1u ? 0u : alias_choose(light_table, frame.light_count, word);
+    uint index = push.constants.light_count == 1u ? 0u : alias_choose(light_table, push.constants.light_count, word);
     Light light = Light_load(lights, index);
     if (FX_EMISSIVE && light.kind == LIGHT_TRIANGLE) {
         sample_triangle_light(p, light, u, s);
@@ -224,7 +224,7 @@ LightSample light_sample(vec3 p, uint word, vec2 u) {
 // Density per solid angle with which light_sample would choose, from `origin`, the point of an emissive triangle or sphere that
 // a ray hits at `t` under `cosine`.
 float triangle_light_pdf(Surface s, vec3 origin, float t, float cosine) {
-    float density = frame.triangle_pdf_scale * Material_emission_weight(materials, s.material); // over area
+    float density = push.constants.triangle_pdf_scale * Material_emission_weight(materials, s.material); // over area
     if (FX_SPHERES && s.radius > 0.0) {
         float cap = sphere_cap(s.corner - origin, s.radius);
         return cap > 0.0 ? density * 2.0 * s.radius * s.radius / cap : 0.0; // times the area, over 2 pi times the cap

@@ -32,8 +32,8 @@ const float MIN_NORMAL_DIFFERENCE = 1e-3, MIN_DEPTH_DIFFERENCE = 1e-4;
 
 // Normal and depth of the guide ray through a pixel; the depth is 0 where the ray carries no light.
 vec4 guide_ray(ivec2 at) {
-    if (any(greaterThanEqual(at, ivec2(frame.size)))) return vec4(0.0);
-    int q = at.y * int(frame.size.x) + at.x;
+    if (any(greaterThanEqual(at, ivec2(push.constants.size)))) return vec4(0.0);
+    int q = at.y * int(push.constants.size.x) + at.x;
     Guide guide = Guide_load(guides, q);
     bool known = known_radiance(texelFetch(filtered, q)).w > 0.0 && finite(guide.normal) && finite(guide.depth);
     return known ? vec4(guide.normal, guide.depth) : vec4(0.0);
@@ -42,7 +42,7 @@ vec4 guide_ray(ivec2 at) {
 // Pixel of the guide ray with the largest S = S_n * S_d (equations 3 to 5) among the four nearest to `film`; the nearest wins a
 // tie. NONE where none of them carries light.
 uint most_similar(Guide eye, vec2 film) {
-    ivec2 size = ivec2(frame.size);
+    ivec2 size = ivec2(push.constants.size);
     ivec2 first = clamp(ivec2(floor(film - 0.5)), ivec2(0), max(size - 2, 0));
     ivec2 near = clamp(ivec2(floor(film)), ivec2(0), size - 1), far = 2 * first + 1 - near;
     ivec2 at[4] = ivec2[](near, ivec2(far.x, near.y), ivec2(near.x, far.y), far);
@@ -73,7 +73,7 @@ void main() {
     uint k = 0u;
     do {
         uint index = push.first_sample + k;
-        Sampler random = sampler_start(pixel, index, frame.seed);
+        Sampler random = sampler_start(pixel, index, push.constants.seed);
         vec2 film = film_sample(pixel, random);
         bool delta;
         Guide eye = first_hit(eye_ray(film, random), pcg(path_seed(pixel, index)), delta);

@@ -65,11 +65,11 @@ void add_light(inout SplitLight sum, vec3 light, bool indirect) {
 // Clamps the largest channel of a whole sample, not of each bounce: the limit is that of the values which a pixel averages.
 vec3 clamped(vec3 light) {
     float largest = max(light.r, max(light.g, light.b));
-    return light * (frame.clamp_indirect > 0.0 && largest > frame.clamp_indirect ? frame.clamp_indirect / largest : 1.0);
+    return light * (push.constants.clamp_indirect > 0.0 && largest > push.constants.clamp_indirect ? push.constants.clamp_indirect / largest : 1.0);
 }
 
 vec3 light_from_miss(Path path) {
-    if (!FX_ENVIRONMENT || frame.environment == NONE) return vec3(0.0);
+    if (!FX_ENVIRONMENT || push.constants.environment == NONE) return vec3(0.0);
     float pdf;
     vec3 radiance = environment_radiance(path.direction, pdf);
     return radiance * (path.delta ? 1.0 : balance(path.bsdf_pdf, pdf));
@@ -138,14 +138,14 @@ bool arrive(inout SplitLight sum, Path path, Hit hit, bool indirect, out Surface
 SplitLight trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
     SplitLight sum = SplitLight(vec3(0.0), vec3(0.0));
     albedo = vec3(0.0);
-    Hit hit = traverse(Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed)), frame.root);
+    Hit hit = traverse(Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed)), push.constants.root);
     closest_rays++;
     Surface s;
     bool smooth_first = false, mirrored = false;
     uint bounce = 0u;
     // A turn of the loop leads from one surface to the next; the last surface samples no light. Light sampled at a surface is
     // added only once its shadow ray is traced, together with the ray to the next surface: see trace_shadow_then_closest.
-    if (arrive(sum, path, hit, false, s) && frame.max_depth > 1u) do {
+    if (arrive(sum, path, hit, false, s) && push.constants.max_depth > 1u) do {
         uint pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
         Bsdf bsdf = surface_bsdf(s);
         // The normal of a dielectric stays on its outside, since its two sides differ.
@@ -162,10 +162,10 @@ SplitLight trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         Segment shadow;
         uint mask_seed = pcg(seed + 2u * bounce);
         vec3 sampled = path.throughput * light_from_nee(s, bsdf, facing, basis, wo, random, pair, mask_seed + 1u, shadow);
-        bool shadowed = frame.light_count > 0u && !smooth_here && max(sampled.r, max(sampled.g, sampled.b)) > 0.0;
+        bool shadowed = push.constants.light_count > 0u && !smooth_here && max(sampled.r, max(sampled.g, sampled.b)) > 0.0;
         bool alive = scatter(path, s, bsdf, facing, basis, wo, random, pair);
         if (bounce == 0u) mirrored = path.delta;
-        bool roulette = FX_ROULETTE && frame.roulette_depth > 0u && bounce + 1u >= frame.roulette_depth;
+        bool roulette = FX_ROULETTE && push.constants.roulette_depth > 0u && bounce + 1u >= push.constants.roulette_depth;
         if (roulette) alive = survives_roulette(path, random, pair) && alive;
         bounce++;
         if (!alive && !shadowed) break;
@@ -174,10 +174,10 @@ SplitLight trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         any_rays += uint(shadowed);
         bool lit = shadowed, indirect = bounce >= 2u && !smooth_first;
         Segment ray = Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed + 2u * bounce));
-        hit = trace_shadow_then_closest(shadow, shadowed, ray, alive, frame.root, uvec2(hit.triangle, hit.instance));
+        hit = trace_shadow_then_closest(shadow, shadowed, ray, alive, push.constants.root, uvec2(hit.triangle, hit.instance));
         add_light(sum, lit && !shadowed ? sampled : vec3(0.0), indirect);
         if (!alive || !arrive(sum, path, hit, indirect, s)) break;
-    } while (bounce + 1u < frame.max_depth);
+    } while (bounce + 1u < push.constants.max_depth);
     if (FX_CLAMP) sum.indirect = clamped(sum.indirect);
     // Light that a smooth coat mirrors needs no filter. It moves only here, so that the sum of both parts keeps its bits.
     if (mirrored) sum = SplitLight(sum.direct + sum.indirect, vec3(0.0));
@@ -202,7 +202,7 @@ void main() {
         index = path.y;
         if (pixel == NONE) return;
     }
-    Sampler random = sampler_start(pixel, index, frame.seed);
+    Sampler random = sampler_start(pixel, index, push.constants.seed);
     Ray ray = eye_ray(film_sample(pixel, random), random);
     Path path = Path(ray.origin, ray.direction, vec3(1.0), 0.0, true, 1.0);
     vec3 albedo;

@@ -26,10 +26,10 @@ void main() {
     uint i = thread_index();
     if (i >= push.pixels) return;
     uint pixel = push.first_pixel + i;
-    vec2 centre = vec2(pixel % frame.size.x, pixel / frame.size.x) + 0.5;
-    Camera camera = frame.camera;
-    camera.lens_radius = 0.0;
-    Ray ray = camera_ray(camera, film_from_pixel(centre, frame.size), vec2(0.5));
+    vec2 centre = vec2(pixel % push.constants.size.x, pixel / push.constants.size.x) + 0.5;
+    Camera pinhole = camera;
+    pinhole.lens_radius = 0.0;
+    Ray ray = camera_ray(pinhole, film_from_pixel(centre, push.constants.size), vec2(0.5));
     bool delta;
     guides[i] = first_hit(ray, pcg(pixel), delta);
 }

@@ -8,7 +8,7 @@ constants! {
     NONE: uint = 0xffffffff;
     /// Largest number of groups of nodes on a traversal's stack; hierarchies are built so that no scene needs more.
     TRAVERSAL_STACK: uint = 32;
-    /// Set in [`FrameConstants::root`] when the leaves of that level are instances.
+    /// Set in [`PathConstants::root`] when the leaves of that level are instances.
     ROOT_OF_INSTANCES: uint = 0x80000000;
     /// Set in [`Triangle::primitive`] of a sphere.
     SPHERE: uint = 0x80000000;
@@ -36,13 +36,13 @@ constants! {
     MATERIAL_MASKED: uint = 8;
     /// [`Material::flags`]: light that scatters below a coat takes on the base's colour at every turn.
     MATERIAL_NONLINEAR: uint = 16;
-    /// [`FrameConstants::pixel_filter`]: uniform over the pixel.
+    /// [`PathConstants::pixel_filter`]: uniform over the pixel.
     PIXEL_FILTER_BOX: uint = 0;
-    /// [`FrameConstants::pixel_filter`]: triangle of radius 1 pixel.
+    /// [`PathConstants::pixel_filter`]: triangle of radius 1 pixel.
     PIXEL_FILTER_TENT: uint = 1;
-    /// [`FrameConstants::pixel_filter`]: Gaussian of standard deviation 0.5 pixels, cut at radius 2.
+    /// [`PathConstants::pixel_filter`]: Gaussian of standard deviation 0.5 pixels, cut at radius 2.
     PIXEL_FILTER_GAUSSIAN: uint = 2;
-    /// [`FrameConstants::pixel_filter`]: the pixel's centre.
+    /// [`PathConstants::pixel_filter`]: the pixel's centre.
     PIXEL_FILTER_POINT: uint = 3;
     /// Rows of the table of a rough coat, one for each roughness ([`crate::scene::coat_table`]).
     COAT_ROWS: uint = 32;

@@ -5,11 +5,9 @@ use super::{Camera, Field, Struct, float, uint, uvec2, vec2, vec3};
 use bytemuck::{Pod, Zeroable};
 
 gpu_structs! {
-    /// Constants of a frame, from the scene, the camera and the settings. Kernels read them from a uniform buffer, since push
-    /// constants are limited to 128 bytes.
-    struct FrameConstants {
-        /// The camera that rays start from.
-        camera: Camera,
+    /// What a scene and its settings tell all paths of a frame. It steers branches and loops, and is pushed for that reason:
+    /// lavapipe compiles kernels for the values of push constants, and takes 3 % longer where they lie in a buffer.
+    struct PathConstants {
         /// Film in pixels.
         size: uvec2,
         /// Chooses the random sequence.
@@ -34,8 +32,10 @@ gpu_structs! {
         root: uint,
     }
 
-    /// Push constants of `path.comp`, `primary_hit.comp` and `guide_lookup.comp`, which differ from dispatch to dispatch.
+    /// Push constants of `path.comp`, `primary_hit.comp` and `guide_lookup.comp`, 64 of the 128 bytes that every device has.
     struct PathPush {
+        /// What stays the same during the frame.
+        constants: PathConstants,
         /// First pixel of the batch, row-major.
         first_pixel: uint,
         /// Number of pixels of the batch; with `samples` = 0, number of its paths.
@@ -99,7 +99,7 @@ gpu_structs! {
     struct TraversePush {
         /// Number of rays.
         count: uint,
-        /// Root node, as [`FrameConstants::root`].
+        /// Root node, as [`PathConstants::root`].
         root: uint,
         /// 1 = any hit, 0 = the closest.
         any_hit: uint,
@@ -112,4 +112,13 @@ gpu_structs! {
         /// Seed of the sampler.
         seed: uint,
     }
+}
+
+/// What all paths of a frame have in common. Kernels read the camera from a uniform buffer, and the rest from push constants.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FrameConstants {
+    /// The camera that rays start from.
+    pub camera: Camera,
+    /// The rest.
+    pub path: PathConstants,
 }

@@ -33,7 +33,7 @@ pub struct DeviceScene {
     /// See [`crate::scene::Environment`].
     pub environment_table: Buffer<AliasEntry>,
     /// One: what paths are told. [`Step::Start`](crate::render::Step::Start) writes it.
-    pub frame: Buffer<FrameConstants>,
+    pub camera: Buffer<Camera>,
 }
 
 impl DeviceScene {
@@ -59,7 +59,7 @@ impl DeviceScene {
                 "environment_table",
                 environment.map_or(&[], |e| &e.table[..]),
             )?,
-            frame: Buffer::from_slice(gpu, "frame constants", &[FrameConstants::default()])?,
+            camera: Buffer::from_slice(gpu, "camera", &[Camera::default()])?,
         })
     }
 
@@ -82,7 +82,7 @@ impl DeviceScene {
 
     /// What the kernels that trace paths bind as well.
     pub fn bind_frame(&self) -> crate::shaders::shared::frame::Bind<'_> {
-        crate::shaders::shared::frame::Bind { frame: &self.frame }
+        crate::shaders::shared::frame::Bind { camera: &self.camera }
     }
 
     /// Bytes of each part, largest first.

@@ -50,13 +50,13 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
     let Frame { scene, film, kernels, constants, priority_push, .. } = frame;
     match step {
         Step::Start => {
-            rec.update(&scene.frame, constants)?; // camera, film, limits -> frame
+            rec.update(&scene.camera, &constants.camera)?; // camera
             rec.fill(&film.broken, 0)?; // 0 -> broken
             for tile in &film.tiles {
                 rec.fill(&tile.stats, 0)?; // 0 -> stats[P]
                 rec.fill(&tile.light, 0)?; // 0 -> light[P]
                 if tile.has_guide() {
-                    primary_hit::record(&kernels.primary_hit, rec, scene, tile)?; // camera -> guide[P]
+                    primary_hit::record(&kernels.primary_hit, rec, scene, tile, &constants.path)?; // camera -> guide[P]
                 }
             }
             if let Some(Allocation { policy, .. }) = &frame.allocation {
@@ -64,7 +64,7 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
             }
         }
         Step::Uniform(batch) => {
-            let push = path::push_of_batch(batch);
+            let push = path::push_of_batch(&constants.path, batch);
             path::record(&kernels.path, rec, scene, film, &push)?; // batch -> samples[B]
             accumulate::record(&kernels.accumulate, rec, film, batch)?; // samples[B] -> stats[P], light[P]
         }
@@ -75,14 +75,14 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
             a.scan.record(rec, &film.counts)?; // count[P] -> offset[P + 1]
         }
         Step::Choose(choice) => {
-            let (a, counts, seed) = (frame.allocation()?, &film.counts, constants.seed);
+            let (a, counts, seed) = (frame.allocation()?, &film.counts, constants.path.seed);
             let push = PriorityPush { round: choice.round, ..*priority_push };
             a.policy.record(rec, &inputs(film), &push)?; // stats[P] -> priority[P]
             choose::record(&a.choose, rec, counts, choice, seed)?; // priority[P] -> count[P], 0 or 1
             a.scan.record(rec, counts)?; // count[P] -> offset[P + 1]
         }
         Step::Listed(range) => {
-            let (a, push) = (frame.allocation()?, path::push_of_list(range.paths));
+            let (a, push) = (frame.allocation()?, path::push_of_list(&constants.path, range.paths));
             let bind = Bind { offset: &film.counts.offset, stats: &film.tiles[0].stats, paths: &film.paths };
             if a.list_may_be_short {
                 rec.fill(&film.paths, NONE)?; // NONE -> paths[B]

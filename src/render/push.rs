@@ -1,6 +1,6 @@
 //! What the kernels are told of a scene and its settings, besides the scene's own records.
 use crate::error::Result;
-use crate::layout::{FrameConstants, LIGHT_ENVIRONMENT, NONE, PriorityPush, ROOT_OF_INSTANCES};
+use crate::layout::{FrameConstants, LIGHT_ENVIRONMENT, NONE, PathConstants, PriorityPush, ROOT_OF_INSTANCES};
 use crate::render::schedule;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
@@ -29,9 +29,15 @@ pub fn priority_push(scene: &Scene, s: &Settings) -> PriorityPush {
 /// # Errors
 /// Those of [`Scene::camera`].
 pub fn frame_constants(scene: &Scene, settings: &Settings) -> Result<FrameConstants> {
-    let environment = scene.lights.iter().position(|l| l.kind == LIGHT_ENVIRONMENT);
     Ok(FrameConstants {
         camera: scene.camera([settings.width, settings.height])?,
+        path: path_constants(scene, settings),
+    })
+}
+
+fn path_constants(scene: &Scene, settings: &Settings) -> PathConstants {
+    let environment = scene.lights.iter().position(|l| l.kind == LIGHT_ENVIRONMENT);
+    PathConstants {
         size: [settings.width, settings.height],
         seed: settings.seed,
         max_depth: settings.max_depth,
@@ -44,5 +50,5 @@ pub fn frame_constants(scene: &Scene, settings: &Settings) -> Result<FrameConsta
         environment_width: scene.environment.as_ref().map_or(0, |e| e.width),
         root: scene.root | if scene.instances.is_empty() { 0 } else { ROOT_OF_INSTANCES },
         ..Default::default()
-    })
+    }
 }

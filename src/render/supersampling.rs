@@ -41,14 +41,21 @@ impl Renderer {
         let indirect = Buffer::new(gpu, "indirect", pixels, Location::Device)?;
         let (mut frame, mut times) = (FrameResources::new(gpu)?, Vec::new());
         times.extend(gpu.run(&mut frame, |rec| {
-            rec.update(&self.frame.scene.frame, &self.frame.constants)?;
+            rec.update(&self.frame.scene.camera, &self.frame.constants.camera)?;
             rec.fill(&indirect, 0)
         })?);
         let at_once = (RAYS_AT_ONCE / pixels as u32).clamp(1, RAYS_OF_A_PIXEL);
         for first_sample in (0..eye_rays).step_by(at_once as usize) {
             let samples = at_once.min(eye_rays - first_sample);
             let first_sample = self.settings.first_sample + first_sample;
-            let push = PathPush { first_pixel: 0, pixels: pixels as u32, first_sample, samples, ..Default::default() };
+            let push = PathPush {
+                constants: self.frame.constants.path,
+                first_pixel: 0,
+                pixels: pixels as u32,
+                first_sample,
+                samples,
+                ..Default::default()
+            };
             times.extend(gpu.run(&mut frame, |rec| {
                 let (scene, frame) = (self.frame.scene.bind(), self.frame.scene.bind_frame());
                 let (guides, filtered, indirect) = (&guide, &filtered, &indirect);

@@ -37,9 +37,9 @@ pub fn camera_ray(camera: &Camera, film: Vec2, lens: Vec2) -> Ray {
 
 /// Position on the film of a sample of `pixel`, in pixels.
 pub fn film_sample(frame: &FrameConstants, effects: &Effects, pixel: u32, random: Sampler) -> Vec2 {
-    let at = vec2((pixel % frame.size[0]) as f32, (pixel / frame.size[0]) as f32);
+    let at = vec2((pixel % frame.path.size[0]) as f32, (pixel / frame.path.size[0]) as f32);
     let u = sample_2d(random, PAIR_FILM);
-    at + match frame.pixel_filter {
+    at + match frame.path.pixel_filter {
         PIXEL_FILTER_TENT if effects.pixel_filter => 0.5 + vec2(warp_tent(u.x), warp_tent(u.y)),
         PIXEL_FILTER_GAUSSIAN if effects.pixel_filter => 0.5 + vec2(warp_gaussian(u.x), warp_gaussian(u.y)),
         PIXEL_FILTER_POINT if effects.pixel_filter => Vec2::splat(0.5),
@@ -50,12 +50,12 @@ pub fn film_sample(frame: &FrameConstants, effects: &Effects, pixel: u32, random
 /// The first ray of a sample's path, through `film` in pixels.
 pub fn eye_ray(frame: &FrameConstants, effects: &Effects, film: Vec2, random: Sampler) -> Ray {
     let lens = if effects.lens { sample_2d(random, PAIR_LENS) } else { Vec2::ZERO };
-    camera_ray(&frame.camera, film_from_pixel(film, frame.size), lens)
+    camera_ray(&frame.camera, film_from_pixel(film, frame.path.size), lens)
 }
 
 /// Seed of the alpha masks along a path.
 pub fn path_seed(frame: &FrameConstants, pixel: u32, index: u32) -> u32 {
-    pcg(pcg(pixel ^ pcg(!frame.seed)).wrapping_add(index))
+    pcg(pcg(pixel ^ pcg(!frame.path.seed)).wrapping_add(index))
 }
 
 #[cfg(test)]
@@ -67,7 +67,10 @@ mod tests {
     fn seeds_share_no_numbers_of_masks() {
         // Pixel and seed joined by exclusive-or alone, seeds 0 to 3 would have the same numbers at other pixels.
         let seeds = |seed: u32| {
-            let frame = FrameConstants { seed, ..FrameConstants::default() };
+            let frame = FrameConstants {
+                path: crate::layout::PathConstants { seed, ..Default::default() },
+                ..Default::default()
+            };
             (0..4096u32).map(move |pixel| path_seed(&frame, pixel, 7))
         };
         let all: HashSet<u32> = (0..4).flat_map(seeds).collect();

@@ -65,7 +65,7 @@ impl GuideRays<'_> {
 /// surfaces.
 pub fn eye_hit(tracer: &Tracer, pixel: u32, index: u32) -> Option<(Guide, Vec2)> {
     let Tracer { scene, frame, effects, .. } = tracer;
-    let random = sampler_start(pixel, index, frame.seed, effects.independent_sampler);
+    let random = sampler_start(pixel, index, frame.path.seed, effects.independent_sampler);
     let film = film_sample(frame, effects, pixel, random);
     let ray = eye_ray(frame, effects, film, random);
     let (eye, delta) = first_hit(scene, frame, ray, pcg(path_seed(frame, pixel, index)));

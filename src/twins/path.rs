@@ -101,16 +101,16 @@ impl Tracer<'_> {
     }
 
     fn clamped(&self, light: Vec3) -> Vec3 {
-        let (largest, limit) = (light.max_element(), self.frame.clamp_indirect);
+        let (largest, limit) = (light.max_element(), self.frame.path.clamp_indirect);
         let clamps = self.effects.clamp && limit > 0.0 && largest > limit;
         if clamps { light * (limit / largest) } else { light }
     }
 
     fn light_from_miss(&self, path: &Path) -> Vec3 {
-        if self.frame.environment == NONE {
+        if self.frame.path.environment == NONE {
             return Vec3::ZERO;
         }
-        let light = &self.scene.lights[self.frame.environment as usize];
+        let light = &self.scene.lights[self.frame.path.environment as usize];
         let (radiance, pdf) = environment_radiance(self.scene, light, path.direction);
         radiance * if path.delta { 1.0 } else { self.balance(path.bsdf_pdf, pdf, Strategy::Bsdf) }
     }
@@ -202,7 +202,7 @@ impl Tracer<'_> {
             from = [hit.triangle, hit.instance];
             let s = surface_at(self.scene, &hit);
             self.add_light(&mut sum, path.throughput * self.light_from_hit(&path, &s, hit.t), indirect);
-            if bounce + 1 >= self.frame.max_depth {
+            if bounce + 1 >= self.frame.path.max_depth {
                 break;
             }
             let p = self.shade(s, path.direction, pair, from);
@@ -211,7 +211,7 @@ impl Tracer<'_> {
                 sum.albedo = bsdf_albedo(&p.bsdf, p.wo.z);
                 smooth_first = smooth_here;
             }
-            if self.frame.light_count > 0 && !smooth_here {
+            if self.frame.path.light_count > 0 && !smooth_here {
                 let light = self.light_from_nee(&p, random, mask_seed.wrapping_add(1));
                 sum.rays += u32::from(light.is_some());
                 self.add_light(&mut sum, path.throughput * light.unwrap_or_default(), bounce >= 1 && !smooth_first);
@@ -220,7 +220,7 @@ impl Tracer<'_> {
                 break;
             }
             mirrored |= bounce == 0 && path.delta;
-            let from = self.frame.roulette_depth;
+            let from = self.frame.path.roulette_depth;
             let roulette = self.effects.roulette && from > 0 && bounce + 1 >= from;
             if roulette && !self.survives_roulette(&mut path, random, pair) {
                 break;
@@ -235,7 +235,7 @@ impl Tracer<'_> {
 
     /// Traces sample `index` of `pixel` (row-major).
     pub fn sample(&self, pixel: u32, index: u32) -> PathSample {
-        let random = sampler_start(pixel, index, self.frame.seed, self.effects.independent_sampler);
+        let random = sampler_start(pixel, index, self.frame.path.seed, self.effects.independent_sampler);
         let film = film_sample(&self.frame, &self.effects, pixel, random);
         let ray = eye_ray(&self.frame, &self.effects, film, random);
         let path = Path {

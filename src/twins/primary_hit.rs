@@ -11,9 +11,9 @@ use glam::{Vec2, vec2};
 
 /// The primary hit through the centre of `pixel` (row-major), from the middle of the lens.
 pub fn guide(scene: &Scene, frame: &FrameConstants, pixel: u32) -> Guide {
-    let centre = vec2((pixel % frame.size[0]) as f32, (pixel / frame.size[0]) as f32) + 0.5;
+    let centre = vec2((pixel % frame.path.size[0]) as f32, (pixel / frame.path.size[0]) as f32) + 0.5;
     let camera = Camera { lens_radius: 0.0, ..frame.camera };
-    let ray = camera_ray(&camera, film_from_pixel(centre, frame.size), Vec2::splat(0.5));
+    let ray = camera_ray(&camera, film_from_pixel(centre, frame.path.size), Vec2::splat(0.5));
     first_hit(scene, frame, ray, pcg(pixel)).0
 }
 

@@ -2,7 +2,7 @@
 use crate::statistics::{chi_square, sidak, uniform_2d};
 use glam::{Mat3, Vec2, Vec3, vec2};
 use std::f64::consts::TAU;
-use tallow::layout::{Camera, Effects, FrameConstants};
+use tallow::layout::{Camera, Effects, FrameConstants, PathConstants};
 use tallow::math::warp::*;
 use tallow::twins::camera::{eye_ray, film_from_pixel, film_sample};
 use tallow::twins::sampler::{sample_2d, sample_2d_bits, sampler_start};
@@ -180,7 +180,10 @@ fn gaussian_cdf(x: f32) -> f64 {
 fn film_samples_follow_their_filter() {
     const PIXEL: u32 = 3 * 7 + 2;
     let from_corner = |filter: u32, i: u32| {
-        let frame = FrameConstants { size: [7, 5], pixel_filter: filter, ..FrameConstants::default() };
+        let frame = FrameConstants {
+            path: PathConstants { size: [7, 5], pixel_filter: filter, ..Default::default() },
+            ..Default::default()
+        };
         film_sample(&frame, &Effects::ALL, PIXEL, sampler_start(PIXEL, i, 4, true)) - vec2(2.0, 3.0)
     };
     type Cdf = fn(f32) -> f64;
@@ -217,9 +220,9 @@ fn lens_camera() -> Camera {
 fn rays_leave_a_uniform_lens_towards_one_point_in_focus() {
     let camera = lens_camera();
     let [position, right, up, forward] = [camera.position, camera.right, camera.up, camera.forward].map(Vec3::from);
-    let frame = FrameConstants { camera, size: [12, 5], ..FrameConstants::default() };
+    let frame = FrameConstants { camera, path: PathConstants { size: [12, 5], ..Default::default() } };
     let film = vec2(3.3, 4.1);
-    let at = film_from_pixel(film, frame.size);
+    let at = film_from_pixel(film, frame.path.size);
     let focus = position + camera.focus_distance * (forward + at.x * right + at.y * up);
     let rays = || (0..1 << 18).map(|i| eye_ray(&frame, &Effects::ALL, film, sampler_start(5, i, 1, true)));
     for ray in rays().take(1000) {
@@ -243,8 +246,10 @@ fn rays_leave_a_uniform_lens_towards_one_point_in_focus() {
 #[test]
 fn what_is_nearer_than_the_near_distance_is_skipped() {
     let ray = |near: f32| {
-        let frame =
-            FrameConstants { camera: Camera { near, ..lens_camera() }, size: [12, 5], ..FrameConstants::default() };
+        let frame = FrameConstants {
+            camera: Camera { near, ..lens_camera() },
+            path: PathConstants { size: [12, 5], ..Default::default() },
+        };
         eye_ray(&frame, &Effects::ALL, vec2(1.0, 2.0), sampler_start(5, 0, 1, false))
     };
     let (from_lens, clipped) = (ray(0.0), ray(1.5));

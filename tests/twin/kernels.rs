@@ -350,7 +350,7 @@ fn traversed(gpu: &Gpu, scene: &Loaded, effects: Effects, rays: &[RayQuery], any
     let hits = Buffer::new(gpu, "hits", rays.len(), Location::Device).unwrap();
     let push = TraversePush {
         count: rays.len() as u32,
-        root: frame_constants(scene, &scene.settings).unwrap().root,
+        root: frame_constants(scene, &scene.settings).unwrap().path.root,
         any_hit: u32::from(any_hit),
         ..Default::default()
     };

@@ -97,7 +97,7 @@ fn both(gpu: &Gpu, scene: &Loaded, guide: &[Guide], filtered: &[vec4]) -> [Vec<v
 
 fn twin(scene: &Loaded, effects: &Effects, guide: &[Guide], filtered: &[vec4]) -> Vec<vec3> {
     let tracer = tracer(scene, *effects);
-    let guides = GuideRays { size: tracer.frame.size, guide, filtered };
+    let guides = GuideRays { size: tracer.frame.path.size, guide, filtered };
     (0..guide.len() as u32).map(|p| look_up(&tracer, &guides, p, 0..EYE_RAYS)).collect()
 }
 

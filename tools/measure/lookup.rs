@@ -106,7 +106,7 @@ fn line(light: &str, image: &str, case: &Case, lost: &[bool], picture: &Picture)
 fn lost(scene: &Loaded, effects: &Effects, guide: &[Guide], filtered: &[vec4]) -> Vec<f32> {
     let (frame, effects) = (frame_constants(scene, &scene.settings).unwrap(), *effects);
     let tracer = Tracer { scene, frame, effects, strategy: Strategy::Both };
-    let guides = GuideRays { size: frame.size, guide, filtered };
+    let guides = GuideRays { size: frame.path.size, guide, filtered };
     let is_lost = |pixel: u32, index: u32| {
         let Some((eye, film)) = eye_hit(&tracer, pixel, index) else { return false };
         guides.most_similar(&eye, film).is_none_or(|q| !stands_for(&guide[q], &eye))

@@ -1,7 +1,7 @@
 //! Traces one path per thread. Kernel: `glsl/trace/path.comp`. Twin: [`crate::twins::path`].
 use crate::error::Result;
 use crate::gpu::{Kernel, Recorder};
-use crate::layout::PathPush;
+use crate::layout::{PathConstants, PathPush};
 use crate::render::buffers::{DeviceScene, FilmBuffers};
 use crate::render::schedule::Batch;
 use crate::shaders::path::Bind;
@@ -10,14 +10,21 @@ use crate::shaders::path::Bind;
 pub type Path = Kernel<Bind<'static>>;
 
 /// The same number of samples for every pixel of a run.
-pub fn push_of_batch(b: &Batch) -> PathPush {
+pub fn push_of_batch(constants: &PathConstants, b: &Batch) -> PathPush {
     let (first_pixel, first_sample) = (b.first_pixel, b.first_sample);
-    PathPush { first_pixel, pixels: b.pixels, first_sample, samples: b.samples, ..Default::default() }
+    PathPush {
+        constants: *constants,
+        first_pixel,
+        pixels: b.pixels,
+        first_sample,
+        samples: b.samples,
+        ..Default::default()
+    }
 }
 
 /// So many paths of a list.
-pub fn push_of_list(paths: u32) -> PathPush {
-    PathPush { pixels: paths, ..PathPush::default() }
+pub fn push_of_list(constants: &PathConstants, paths: u32) -> PathPush {
+    PathPush { constants: *constants, pixels: paths, ..PathPush::default() }
 }
 
 /// scene, and paths\[batch\] where they are listed -> samples\[batch\]

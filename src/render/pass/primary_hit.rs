@@ -1,7 +1,7 @@
 //! Primary hits at pixel centres. Kernel: `glsl/trace/primary_hit.comp`. Twin: [`crate::twins::primary_hit`].
 use crate::error::Result;
 use crate::gpu::{Kernel, Recorder};
-use crate::layout::PathPush;
+use crate::layout::{PathConstants, PathPush};
 use crate::render::buffers::{DeviceScene, FilmTile};
 use crate::shaders::primary_hit::Bind;
 
@@ -9,11 +9,17 @@ use crate::shaders::primary_hit::Bind;
 pub type Guides = Kernel<Bind<'static>>;
 
 /// camera -> guide\[tile\]
-pub fn record(k: &Guides, rec: &mut Recorder, s: &DeviceScene, tile: &FilmTile) -> Result<()> {
+pub fn record(
+    k: &Guides,
+    rec: &mut Recorder,
+    s: &DeviceScene,
+    tile: &FilmTile,
+    constants: &PathConstants,
+) -> Result<()> {
     tile.windows().try_for_each(|w| {
         let (first_pixel, pixels) = (tile.first_pixel + w.start, w.end - w.start);
         let guides = &tile.guide.part(w.start as usize..w.end as usize)?;
-        let push = PathPush { first_pixel, pixels, ..PathPush::default() };
+        let push = PathPush { constants: *constants, first_pixel, pixels, ..PathPush::default() };
         rec.dispatch_threads(k, Bind { scene: s.bind(), frame: s.bind_frame(), guides }, &push, pixels)
     })
 }
