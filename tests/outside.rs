@@ -57,7 +57,7 @@ fn every_obj_loads_and_renders() {
     let (mut seen, mut dark) = (Vec::new(), Vec::new());
     for path in paths {
         let start = Instant::now();
-        let scene = Scene::load(&path).map(|scene| scene.with(&tiny)).unwrap_or_else(|e| panic!("{e}"));
+        let scene = Scene::load(&path).map(|scene| scene.with(tiny)).unwrap_or_else(|e| panic!("{e}"));
         let (ms, n) = (start.elapsed().as_secs_f64() * 1e3, scene.triangles.len());
         let name = path.strip_prefix(&data).unwrap_or(&path).display().to_string();
         println!("{ms:5.0} ms {n:8} triangles {name}");
@@ -93,7 +93,7 @@ fn sponza_loads_with_its_textures() {
     // Three rounds, and more where something else keeps the machine busy.
     for round in 1.. {
         let start = Instant::now();
-        let scene = Scene::load(&path).map(|scene| scene.with(&tiny)).expect("Sponza loads");
+        let scene = Scene::load(&path).map(|scene| scene.with(tiny)).expect("Sponza loads");
         let loaded = start.elapsed().as_secs_f64();
         let _renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).expect("Sponza fits");
         best = best.min(start.elapsed().as_secs_f64());

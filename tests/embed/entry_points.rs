@@ -24,7 +24,7 @@ fn scene() -> Loaded {
         s.allocate.policy = &tallow::allocate::both::ROW;
     };
     Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml"))
-        .map(|scene| scene.with(&small))
+        .map(|scene| scene.with(small))
         .unwrap()
 }
 

@@ -22,7 +22,7 @@ fn scene(change: impl Fn(&mut Settings)) -> Loaded {
         (s.spp, s.max_depth) = (8, 3);
         change(s);
     };
-    Scene::load(&file).map(|scene| scene.with(&small)).unwrap()
+    Scene::load(&file).map(|scene| scene.with(small)).unwrap()
 }
 
 fn split() -> Outputs {

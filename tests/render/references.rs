@@ -39,7 +39,7 @@ fn scene(file: &str, depth: u32) -> Loaded {
         (s.width, s.height, s.spp, s.max_depth) = (SIZE, SIZE, SPP, depth);
         s.roulette_depth = 0;
     };
-    Scene::load(&path).map(|scene| scene.with(&size)).unwrap()
+    Scene::load(&path).map(|scene| scene.with(size)).unwrap()
 }
 
 fn render(file: &str, depth: u32) -> Estimate {

@@ -369,7 +369,7 @@ fn too_bright(change: impl Fn(&mut Settings)) -> Loaded {
         s.filter = PixelFilter::Point;
         change(s);
     };
-    Scene::parse(Path::new("too_bright.toml"), text).map(|scene| scene.with(&centres)).unwrap()
+    Scene::parse(Path::new("too_bright.toml"), text).map(|scene| scene.with(centres)).unwrap()
 }
 
 #[test]

@@ -39,7 +39,7 @@ fn small(s: &mut Settings) {
 
 fn shipped(file: &str) -> Loaded {
     Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file))
-        .map(|scene| scene.with(&small))
+        .map(|scene| scene.with(small))
         .unwrap()
 }
 

@@ -20,7 +20,7 @@ fn render(
     seed: u32,
 ) -> Result<(Vec<Guide>, Vec<PixelStats>, Vec<PixelLight>)> {
     let settings = |s: &mut Settings| (s.width, s.height, s.spp, s.seed, s.max_depth) = (side, side, spp, seed, 4);
-    let scene = Scene::load(Path::new(file)).map(|scene| scene.with(&settings))?;
+    let scene = Scene::load(Path::new(file)).map(|scene| scene.with(settings))?;
     let outputs = Outputs { split_light: true, guides: true, counters: false };
     let renderer = Renderer::new(gpu, &scene, &scene.settings, outputs)?;
     Job::new(&renderer).run_to_end(&mut FrameResources::new(gpu)?)?;

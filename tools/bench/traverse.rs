@@ -188,7 +188,7 @@ fn main() -> Result<()> {
     let rounds = std::env::args().nth(1).map_or(Ok(7), |n| n.parse()).context("ROUNDS is a number")?;
     let small = |s: &mut Settings| (s.width, s.height, s.spp) = (16, 16, 1);
     let scene =
-        Scene::load(&Path::new(&data).join("scenes/crytek-sponza/sponza.obj")).map(|scene| scene.with(&small))?;
+        Scene::load(&Path::new(&data).join("scenes/crytek-sponza/sponza.obj")).map(|scene| scene.with(small))?;
     let rays: Vec<_> = (0..SIDE * SIDE).into_par_iter().filter_map(|i| bounce(&scene, i)).collect();
     ensure!(rays.len() as u32 > SIDE * SIDE * 9 / 10, "the camera sees little of the scene");
     let host = Host::new(&scene, &rays)?;

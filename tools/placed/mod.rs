@@ -33,7 +33,7 @@ impl View {
             ([s.width, s.height], s.max_depth, s.roulette_depth) = (self.size, self.depth, 0);
             change(s);
         };
-        Ok(Scene::load(&self.scene_file(&args.data, &args.output)?).map(|scene| scene.with(&all))?)
+        Ok(Scene::load(&self.scene_file(&args.data, &args.output)?).map(|scene| scene.with(all))?)
     }
 
     /// Returns the means of radiance and of indirect irradiance over many samples of another seed, which are kept in a file.
@@ -75,7 +75,7 @@ pub fn render(gpu: &Gpu, scene: &Loaded) -> anyhow::Result<Rendered> {
         Renderer::new(gpu, scene, &scene.settings, Outputs { split_light: true, guides: true, counters: false })?;
     let mut frame = FrameResources::new(gpu)?;
     for kind in ONE_OF_EACH {
-        renderer.steps().find(|step| kind(step)).map_or(Ok(Vec::new()), |step| renderer.run(&mut frame, &step))?;
+        renderer.steps().find(kind).map_or(Ok(Vec::new()), |step| renderer.run(&mut frame, &step))?;
     }
     let times = Job::new(&renderer).run_to_end(&mut frame)?.times;
     let took = |counts: fn(&str) -> bool| {
