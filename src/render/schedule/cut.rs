@@ -11,7 +11,7 @@ pub(super) const REFILLS: u32 = 16;
 /// How the work may be cut. It changes no bit of the result.
 #[derive(Clone, Copy, Debug)]
 pub struct Cut {
-    /// Of the film.
+    /// Number of pixels of the film.
     pub pixels: u32,
     /// Pixels of one tile; batches never cross its multiples.
     pub tile: u32,

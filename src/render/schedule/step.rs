@@ -46,7 +46,7 @@ pub enum Share {
 /// What is to be apportioned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
-    /// Of the film.
+    /// Number of pixels of the film.
     pub pixels: u32,
     /// Samples to place; of [`Share::Need`] at most.
     pub budget: u64,
@@ -61,7 +61,7 @@ pub struct Plan {
 /// Who gets one more sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Choice {
-    /// Of the film.
+    /// Number of pixels of the film.
     pub pixels: u32,
     /// Samples that every pixel has had a chance of.
     pub round: u32,
