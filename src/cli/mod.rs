@@ -25,11 +25,12 @@ use std::process::ExitCode;
 const EXIT_CODES: &str = "\
 Exit codes:
   0    done
-  1    a limit given with --max-... or --min-... is exceeded
+  1    a limit given with --max-... or --min-... is exceeded, or compare --statistical finds a difference
   2    usage: an option or a setting is wrong
   3    input: a file cannot be read or is damaged
   4    device or memory: no Vulkan, no usable device, it was lost, or memory is out
   5    output: a file cannot be written
+  6    compare --statistical finds no difference, but the images are too noisy to say that there is none
   70   internal error: a bug, please report it
   130  interrupted (Ctrl-C)";
 
@@ -58,6 +59,8 @@ pub enum Exit {
     Done = 0,
     /// A limit given by the user was exceeded.
     LimitExceeded = 1,
+    /// A test found nothing, and would have missed what it was to find.
+    Undecided = 6,
     /// The command was stopped by Ctrl-C or another signal.
     Interrupted = 130,
 }

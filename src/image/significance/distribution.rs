@@ -63,8 +63,8 @@ mod tests {
     fn the_step_up_procedure_solves_the_published_example() {
         // Benjamini and Hochberg (1995), section 4: of these 15 at the level 0.05 the first four are significant.
         let p = [
-            0.0001, 0.0004, 0.0019, 0.0095, 0.0201, 0.0278, 0.0298, 0.0344, 0.0459, 0.3240, 0.4262, 0.5719, 0.6528, 0.7590,
-            1.0,
+            0.0001, 0.0004, 0.0019, 0.0095, 0.0201, 0.0278, 0.0298, 0.0344, 0.0459, 0.3240, 0.4262, 0.5719, 0.6528,
+            0.7590, 1.0,
         ];
         assert_eq!(largest_significant(p.to_vec(), 0.05), Some(0.0095));
         assert_eq!(largest_significant(p[4..].to_vec(), 0.05), None);

@@ -74,14 +74,18 @@ impl Estimate {
         let broken = self.mean.iter().filter(|m| !m.iter().all(|v| v.is_finite())).count();
         if broken > 0 {
             let all = self.mean.len();
-            return Err(format!("{broken} of {all} pixels are NaN or infinite: find the pixels with tallow compare --diff, or render them anew"));
+            return Err(format!(
+                "{broken} of {all} pixels are NaN or infinite: find the pixels with tallow compare --diff, or render them anew"
+            ));
         }
         let sound = match &self.noise {
             Noise::Samples { m2, count } => positive(m2) && count.iter().all(|n| n.is_finite() && *n >= 0.0),
             Noise::SquaredErrors(errors) => finite(errors) && positive(errors),
         };
         if !sound {
-            return Err("its variances or counts are negative, NaN or infinite: take the file as it was rendered".to_owned());
+            return Err(
+                "its variances or counts are negative, NaN or infinite: take the file as it was rendered".to_owned()
+            );
         }
         match &self.noise {
             Noise::Samples { count, .. } if count.iter().all(|n| *n < 2.0) => Err(

@@ -1,7 +1,7 @@
 //! The test of one region, and of all regions of a scale.
 use super::distribution::{largest_significant, quantile, two_sided};
 use super::region::{Partition, Scale};
-use super::{Estimate, Finding, Level, MIN_PIXELS, MIN_SAMPLES, Noise, Options, WORST};
+use super::{Estimate, Finding, Level, MIN_PIXELS, MIN_SAMPLES, Noise, Options, Outcome, WORST};
 use rayon::prelude::*;
 
 /// Standard normal quantile of 0.9: what a difference must lie beyond the limit to be found nine times in ten.
@@ -118,6 +118,26 @@ impl<'a> Judge<'a> {
         Level { scale: partition.scale, regions, different: count, visible, worst, map }
     }
 
+    /// The pixels that differ most surely by themselves, among those of the finest regions that differ, or of all if none does.
+    pub fn suspects(&self, outcome: &Outcome) -> Vec<Finding> {
+        let map = outcome.levels.iter().map(|level| &level.map).find(|map| !map.is_empty());
+        let pixels = Partition::pixels(self.images[0]);
+        let sure = |pixel: usize| {
+            let tests = [0, 1, 2].map(|c| self.of_pixel(pixel, c));
+            let deviation = |t: &Statistic| match (t.means[0] - t.means[1]).abs() {
+                0.0 => 0.0,
+                d => d / t.error,
+            };
+            tests.iter().map(deviation).fold(0.0, f64::max)
+        };
+        let within = |pixel: &usize| map.is_none_or(|map| map[*pixel] != 0.0) && self.is_usable(*pixel);
+        let mut sorted: Vec<_> = (0..pixels.regions).filter(within).map(|pixel| (sure(pixel), pixel)).collect();
+        sorted.sort_by(|x, y| y.0.total_cmp(&x.0));
+        let p = |pixel| (0..3).map(|c| self.p(&self.of_pixel(pixel, c))).fold(1.0, f64::min);
+        let found = |(_, pixel): (f64, usize)| self.finding(&pixels, &[], pixel, (3.0 * p(pixel)).min(1.0));
+        sorted.into_iter().take(WORST).map(found).collect()
+    }
+
     fn is_usable(&self, pixel: usize) -> bool {
         self.images.iter().all(|image| samples(image, pixel) >= 2.0)
     }
@@ -177,9 +197,7 @@ impl<'a> Judge<'a> {
         let freedom = if per_freedom > 0.0 { welch.powi(2) / per_freedom } else { f64::INFINITY };
         let (pooled, unequal) = match n_a.is_infinite() || n_b.is_infinite() {
             true => (welch, 1.0),
-            false => {
-                ((m2_a + m2_b) / (n_a + n_b - 2.0) * (1.0 / n_a + 1.0 / n_b), (n_a - n_b).abs() / (n_a + n_b))
-            }
+            false => ((m2_a + m2_b) / (n_a + n_b - 2.0) * (1.0 / n_a + 1.0 / n_b), (n_a - n_b).abs() / (n_a + n_b)),
         };
         PixelNoise { welch, pooled, unequal, freedom }
     }

@@ -197,9 +197,22 @@ pub fn test(a: &Estimate, b: &Estimate, options: &Options) -> Result<Outcome, St
     Ok(outcome)
 }
 
+/// The pixels that differ most surely by themselves, at most [`WORST`] of them: in the finest regions that differ, or in the
+/// whole image if none does.
+///
+/// # Panics
+/// When the sizes differ.
+pub fn suspects(a: &Estimate, b: &Estimate, outcome: &Outcome) -> Vec<Finding> {
+    assert_eq!((a.width, a.height), (b.width, b.height), "images of one size");
+    judge::Judge::new(a, b, &Options::default()).suspects(outcome)
+}
+
 fn check(a: &Estimate, b: &Estimate, options: &Options) -> Result<(), String> {
     if (a.width, a.height) != (b.width, b.height) {
-        return Err(format!("images of {}x{} and {}x{}: compare images of one size", a.width, a.height, b.width, b.height));
+        return Err(format!(
+            "images of {}x{} and {}x{}: compare images of one size",
+            a.width, a.height, b.width, b.height
+        ));
     }
     if !(options.false_alarms > 0.0 && options.false_alarms <= 0.3) {
         return Err(format!("false alarms of {}: choose a rate above 0, up to 0.3", options.false_alarms));

@@ -96,21 +96,25 @@ impl Partition {
     /// All scales at which these images can be judged, the finest first.
     pub fn all(a: &Estimate, b: &Estimate) -> Vec<Self> {
         let size = [a.width, a.height];
-        let grid = |scale, grid: [u32; 2]| Self {
-            scale,
-            regions: grid[0] as usize * grid[1] as usize,
-            size,
-            grid,
-            objects: Vec::new(),
-            ids: Vec::new(),
-        };
+        let grid = |scale, grid| Self::grid(scale, size, grid);
         let blocks = BLOCKS.into_iter().map(|edge| (edge, size.map(|s| (s / edge).max(1))));
         let enough = |(edge, [x, y]): &(u32, [u32; 2])| x * y > 1 && size.iter().all(|s| s >= edge);
-        let mut all = vec![grid(Scale::Pixel, size)];
+        let mut all = vec![Self::pixels(a)];
         all.extend(blocks.filter(enough).map(|(edge, along)| grid(Scale::Block(edge), along)));
         all.extend(Self::objects(a, b));
         all.push(grid(Scale::Image, [1, 1]));
         all
+    }
+
+    /// Every pixel by itself.
+    pub fn pixels(image: &Estimate) -> Self {
+        let size = [image.width, image.height];
+        Self::grid(Scale::Pixel, size, size)
+    }
+
+    fn grid(scale: Scale, size: [u32; 2], grid: [u32; 2]) -> Self {
+        let regions = grid[0] as usize * grid[1] as usize;
+        Self { scale, regions, size, grid, objects: Vec::new(), ids: Vec::new() }
     }
 
     /// The objects, if both images show the same ones in the same pixels.
@@ -207,12 +211,29 @@ mod tests {
 
     #[test]
     fn objects_are_regions_where_both_images_show_them() {
-        let ids = |moved: u32| Some((0..256).map(|i| if i % 16 < 4 + moved { 7 } else if i == 255 { 9 } else { 3 }).collect());
+        let ids = |moved: u32| {
+            Some(
+                (0..256)
+                    .map(|i| {
+                        if i % 16 < 4 + moved {
+                            7
+                        } else if i == 255 {
+                            9
+                        } else {
+                            3
+                        }
+                    })
+                    .collect(),
+            )
+        };
         let (a, b) = (image(16, 16, ids(0)), image(16, 16, ids(1)));
         let object = |a: &Estimate, b: &Estimate| Partition::all(a, b).into_iter().find(|p| p.scale == Scale::Object);
         assert!(object(&a, &b).is_none(), "an object moved");
         let objects = object(&a, &a).unwrap();
-        assert_eq!((objects.regions, objects.region(0), objects.region(5), objects.region(255)), (2, Some(1), Some(0), None));
+        assert_eq!(
+            (objects.regions, objects.region(0), objects.region(5), objects.region(255)),
+            (2, Some(1), Some(0), None)
+        );
         assert_eq!(objects.place(1), Where { scale: Scale::Object, first: [0, 0], last: [3, 15], object: Some(7) });
     }
 }
