@@ -14,3 +14,4 @@ mod flat;
 mod outputs;
 mod resume_merge;
 mod signals;
+mod statistical;

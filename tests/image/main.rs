@@ -5,4 +5,5 @@ mod files;
 mod flat;
 mod limits;
 mod metrics;
+mod significance;
 mod source;

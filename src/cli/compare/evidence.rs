@@ -35,7 +35,7 @@ pub fn write(folder: &Path, report: &Report) -> Result<()> {
     let [a, b] = report.sides.each_ref().map(|side| &side.estimate);
     let pixels = suspects(a, b, &report.outcome);
     let mut figures = report.figures();
-    figures["verdict"] = json!(words::verdict(&report.outcome, &report.options));
+    figures["verdict"] = json!(words::verdict(report));
     figures["pixels"] = json!(pixels);
     let text = serde_json::to_string_pretty(&figures).map_err(|e| Error::output(folder, e))?;
     output::write(&folder.join("report.json"), text.as_bytes())?;

@@ -36,11 +36,8 @@ fn case(report: &Report, level: &Level) -> TestCase {
 fn status(report: &Report, level: &Level) -> TestCaseStatus {
     let asked = level.scale == report.options.at;
     let (kind, message) = match report.outcome.verdict {
-        _ if level.different > 0 => {
-            let message = format!("{} of {} {} differ", level.different, level.regions, words::plural(level.scale));
-            (NonSuccessKind::Failure, message)
-        }
-        Verdict::TooNoisy { .. } if asked => (NonSuccessKind::Error, words::verdict(&report.outcome, &report.options)),
+        _ if level.different > 0 => (NonSuccessKind::Failure, format!("different: {}", words::count(level))),
+        Verdict::TooNoisy { .. } if asked => (NonSuccessKind::Error, words::verdict(report)),
         _ => return TestCaseStatus::success(),
     };
     let mut status = TestCaseStatus::non_success(kind);

@@ -87,7 +87,7 @@ pub fn run(a: &Path, b: &Path, json: bool, args: &Args) -> Result<Exit> {
         false => print(&report.text(args, full))?,
     }
     if failed {
-        complain(&words::verdict(&report.outcome, &report.options));
+        complain(&words::verdict(&report));
     }
     Ok(match report.outcome.verdict {
         Verdict::Same { .. } => Exit::Done,
@@ -182,7 +182,7 @@ impl Report<'_> {
     fn text(&self, args: &Args, full: Option<f32>) -> String {
         let mut text = String::new();
         if let Verdict::Same { .. } = self.outcome.verdict {
-            text += &format!("{}\n", words::verdict(&self.outcome, &self.options));
+            text += &format!("{}\n", words::verdict(self));
         }
         if self.equal() {
             text += "the images are equal bit for bit\n";

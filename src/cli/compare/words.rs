@@ -1,5 +1,6 @@
 //! The verdict of a statistical test in words and tables.
-use crate::image::significance::{Finding, Level, Options, Outcome, Scale, Verdict};
+use super::statistical::Report;
+use crate::image::significance::{Finding, Level, Noise, Outcome, Scale, Verdict};
 use crate::report::table;
 
 /// Names of the channels.
@@ -16,38 +17,63 @@ pub fn percent(share: f64) -> String {
 }
 
 /// The verdict in one line.
-pub fn verdict(outcome: &Outcome, options: &Options) -> String {
-    let places = match options.at {
-        Scale::Image => "of the whole image".to_owned(),
-        Scale::Object => "of an object".to_owned(),
-        Scale::Pixel => "of a pixel".to_owned(),
-        block => format!("of a block of {block} pixels"),
+pub fn verdict(report: &Report) -> String {
+    let place = match report.options.at {
+        Scale::Image => "the whole image".to_owned(),
+        Scale::Object => "an object".to_owned(),
+        Scale::Pixel => "a pixel".to_owned(),
+        block => format!("a block of {block} pixels"),
     };
-    match outcome.verdict {
+    match report.outcome.verdict {
         Verdict::Same { visible } => {
-            format!("same: a difference {places} would have been seen from {} on, nine times in ten", percent(visible))
+            format!(
+                "same: a difference of {place} would have been seen from {} on, nine times in ten",
+                percent(visible)
+            )
         }
-        Verdict::Different => format!("different: {}", different(outcome)),
+        Verdict::Different => format!("different: {}", different(&report.outcome)),
         Verdict::TooNoisy { visible, samples } => format!(
-            "too noisy to say: no difference is found, but {places} one would be seen only from {} on; {} takes about {} times \
-             the samples of both",
+            "too noisy to say: no difference is found, but one of {place} is seen only from {} on; {} takes about {} times the \
+             samples{}",
             percent(visible),
-            percent(options.resolve),
-            rounded_up(samples)
+            percent(report.options.resolve),
+            rounded_up(samples),
+            numbers(report, samples)
         ),
     }
 }
 
+/// How many samples a pixel that many times the samples are.
+fn numbers(report: &Report, times: f64) -> String {
+    let [a, b] = report.sides.each_ref().map(|side| match &side.estimate.noise {
+        Noise::Samples { count, .. } => Some(count.iter().map(|n| f64::from(*n)).sum::<f64>() / count.len() as f64),
+        Noise::SquaredErrors(_) => None,
+    });
+    let Some((a, b)) = a.zip(b) else { return String::new() };
+    let needed = |n: f64| (n * times).ceil();
+    match (a.max(b) - a.min(b)) / a.max(b) < UNEQUAL {
+        true => format!(", {} a pixel", needed(a)),
+        false => format!(", {} and {} a pixel (fewer if both have equally many)", needed(a), needed(b)),
+    }
+}
+
+/// Numbers of samples that are further apart than this share count as unequal.
+const UNEQUAL: f64 = 0.1;
+
 /// How many regions differ, the coarsest scale first, and the surest of them.
 fn different(outcome: &Outcome) -> String {
     let found: Vec<_> = outcome.levels.iter().rev().filter(|level| level.different > 0).collect();
-    let count = |level: &&Level| match level.scale {
-        Scale::Image => "the whole image".to_owned(),
-        _ => format!("{} of {} {}", level.different, level.regions, plural(level.scale)),
-    };
-    let counts = found.iter().map(count).collect::<Vec<_>>().join(", ");
+    let counts = found.iter().map(|level| count(level)).collect::<Vec<_>>().join(", ");
     let surest = found.first().and_then(|level| level.worst.first()).map(region);
     format!("{counts}; {}", surest.unwrap_or_default())
+}
+
+/// How many regions of a scale differ.
+pub fn count(level: &Level) -> String {
+    match level.scale {
+        Scale::Image => "the whole image".to_owned(),
+        _ => format!("{} of {} {}", level.different, level.regions, plural(level.scale)),
+    }
 }
 
 /// A region and by how much it differs.
@@ -62,7 +88,7 @@ pub fn plural(scale: Scale) -> String {
     match scale {
         Scale::Pixel => "pixels".to_owned(),
         Scale::Object => "objects".to_owned(),
-        Scale::Image => "images".to_owned(),
+        Scale::Image => "whole image".to_owned(),
         block => format!("blocks of {block}"),
     }
 }
