@@ -42,9 +42,9 @@ fn pieces(image: &Estimate) -> Vec<Estimate> {
 }
 
 #[test]
-fn of_a_thousand_pairs_of_renders_no_more_than_the_rate_are_called_different() {
+fn of_hundreds_of_pairs_of_renders_no_more_than_the_rate_are_called_different() {
     let gpu = support::gpu();
-    let images: Vec<_> = (0..12).map(|i| pieces(&render(&gpu, if i % 2 == 0 { 16 } else { 64 }, i))).collect();
+    let images: Vec<_> = (0..8).map(|i| pieces(&render(&gpu, if i % 2 == 0 { 16 } else { 64 }, i))).collect();
     let options = Options { false_alarms: 0.05, ..Options::default() };
     let (mut pairs, mut different) = (0, 0);
     for (i, a) in images.iter().enumerate() {
@@ -54,7 +54,7 @@ fn of_a_thousand_pairs_of_renders_no_more_than_the_rate_are_called_different() {
             pairs += a.len();
         }
     }
-    assert!(pairs >= 1000 && different <= pairs / 20, "{different} of {pairs}");
+    assert!(pairs > 400 && different <= pairs / 20, "{different} of {pairs}");
     // Control: a piece beside another is different.
     let other = test(&images[0][5], &images[1][6], &options).unwrap();
     assert_eq!(other.verdict, Verdict::Different);

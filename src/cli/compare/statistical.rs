@@ -19,7 +19,7 @@ pub struct Args {
     /// How often images that are the same may be called different
     #[arg(long, value_name = "RATE", value_parser = rate, default_value_t = Options::default().false_alarms, requires = "statistical")]
     false_alarms: f64,
-    /// Relative difference that must be visible, or else the images are too noisy to say
+    /// Relative difference, beyond the accepted one, that must be visible, or else the images are too noisy to say
     #[arg(long, value_name = "SHARE", value_parser = above_0, default_value_t = Options::default().resolve, requires = "statistical")]
     resolve: f64,
     /// Where it must be visible: pixel, 4x4, 16x16, 64x64, 256x256, 1024x1024, object or image

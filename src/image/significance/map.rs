@@ -1,5 +1,5 @@
 //! A picture of where two images differ.
-use super::Outcome;
+use super::{Outcome, Scale};
 use crate::image::Picture;
 use crate::math::srgb::luminance;
 
@@ -15,9 +15,14 @@ pub struct Overlay {
 const BRIGHTER: [f32; 3] = [1.0, 0.33, 0.0];
 const DARKER: [f32; 3] = [0.02, 0.25, 1.0];
 
-/// Draws where the images differ. A pixel shows the finest region that differs and holds it.
+/// Draws where the images differ. A pixel shows the finest region that differs and holds it; the whole image counts only if
+/// nothing smaller differs.
 pub fn overlay(outcome: &Outcome, reference: &Picture) -> Overlay {
-    let maps: Vec<_> = outcome.levels.iter().map(|level| &level.map).filter(|map| !map.is_empty()).collect();
+    let mut found: Vec<_> = outcome.levels.iter().filter(|level| level.different > 0).collect();
+    if found.len() > 1 {
+        found.retain(|level| level.scale != Scale::Image);
+    }
+    let maps: Vec<_> = found.into_iter().map(|level| &level.map).collect();
     let finest = |pixel: usize| maps.iter().map(|map| map[pixel]).find(|d| *d != 0.0).unwrap_or(0.0);
     let relative: Vec<f32> = (0..reference.pixels.len()).map(finest).collect();
     let full = full_colour(&relative);

@@ -67,7 +67,8 @@ pub struct Options {
     /// Differences that do not matter, relative to the mean of the region or, if that is darker, of the image. At least
     /// [`Options::ROUNDING`].
     pub accept: f64,
-    /// Relative difference that must be visible, or else the images are too noisy to be called the same.
+    /// Relative difference, beyond the accepted one, that must be visible, or else the images are too noisy to be called the
+    /// same.
     pub resolve: f64,
     /// The scale at which it must be visible.
     pub at: Scale,
@@ -188,10 +189,12 @@ pub fn test(a: &Estimate, b: &Estimate, options: &Options) -> Result<Outcome, St
         return Err(format!("there is nothing to judge at the scale \"{}\": these images have {names}", options.at));
     };
     let visible = asked.visible;
+    // What is accepted is no noise, and no number of samples makes it visible.
+    let noise = visible - options.accept;
     if outcome.levels.iter().all(|level| level.different == 0) {
-        outcome.verdict = match visible <= options.resolve {
+        outcome.verdict = match noise <= options.resolve {
             true => Verdict::Same { visible },
-            false => Verdict::TooNoisy { visible, samples: (visible / options.resolve).powi(2) },
+            false => Verdict::TooNoisy { visible, samples: (noise / options.resolve).powi(2) },
         };
     }
     Ok(outcome)
