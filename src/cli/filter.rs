@@ -159,7 +159,8 @@ fn check_outputs(args: &Args) -> Result<()> {
 /// Checks that the filter can run, and is one for what is asked of it.
 fn check_filter(args: &Args) -> Result<()> {
     if matches!(args.filter, Method::Oidn) && args.supersampling.scene.is_some() {
-        let what = "--scene looks filtered indirect light up, but oidn filters the colour whole: choose another --filter";
+        let what =
+            "--scene looks filtered indirect light up, but oidn filters the colour whole: choose another --filter";
         return Err(Error::Usage(what.to_owned()));
     }
     args.filter.check()

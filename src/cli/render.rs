@@ -9,8 +9,8 @@ use super::common::Common;
 use super::files::Files;
 use super::overrides::Overrides;
 use super::{Exit, complain, fail_on_messages, interrupt};
-use crate::denoise::filter::{self, FilterSettings, Method};
-use crate::denoise::{self, Demodulation, Filtered, Noisy, Recipe};
+use crate::denoise::filter::{self, Method};
+use crate::denoise::{self, Filtered, Noisy, Recipe};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, PassTime};
 use crate::image::{self, Film};
@@ -193,9 +193,7 @@ fn warn_of_broken(broken: &BrokenSamples) {
 
 /// With the filter's default settings, scaled to the image.
 fn denoised(gpu: &Gpu, method: Method, noisy: Noisy, film: &mut Film) -> Result<Vec<PassTime>> {
-    let settings = |scales: &filter::Scales| FilterSettings::default().scaled_by(scales);
-    let recipe = Recipe { method, demodulation: Demodulation::default(), fireflies: None, settings: &settings };
-    let (colour, times) = Filtered::new(gpu, noisy, &recipe)?.join(gpu)?;
+    let (colour, times) = Filtered::new(gpu, noisy, &Recipe::new(method))?.join(gpu)?;
     film::replace_colour(film, colour);
     Ok(times)
 }

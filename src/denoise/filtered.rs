@@ -25,6 +25,12 @@ pub struct Recipe<'a> {
 }
 
 impl Recipe<'_> {
+    /// By this filter at its default settings, as `tallow render --denoise` uses it.
+    pub fn new(method: Method) -> Self {
+        let settings = &|scales: &Scales| FilterSettings::default().scaled_by(scales);
+        Self { method, demodulation: Demodulation::default(), fireflies: None, settings }
+    }
+
     /// What is kept away from the filter of an image that holds this.
     pub fn demodulation(&self, holds: Holds) -> Demodulation {
         match self.method {
@@ -125,13 +131,7 @@ pub fn host_bytes(method: Method, settings: &Settings, unified: bool) -> u64 {
 
 /// The filter's own buffers last no longer than this. What ran on the host is timed by its clock, and stands behind what the device
 /// did before.
-fn run_filter(
-    gpu: &Gpu,
-    recipe: &Recipe,
-    scales: &Scales,
-    planes: &Planes,
-    times: &mut Vec<PassTime>,
-) -> Result<()> {
+fn run_filter(gpu: &Gpu, recipe: &Recipe, scales: &Scales, planes: &Planes, times: &mut Vec<PassTime>) -> Result<()> {
     let settings = (recipe.settings)(scales);
     match recipe.method {
         Method::Kernels(row) => {

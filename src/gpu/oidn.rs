@@ -39,7 +39,7 @@ macro_rules! functions {
         impl Functions {
             /// The library stays loaded, because it may have threads of its own.
             fn of(library: Library) -> std::result::Result<Self, String> {
-                let missing = |symbol| format!("it is no Open Image Denoise 2: it has no {symbol}");
+                let missing = |symbol| format!("it is no Open Image Denoise 2 (it has no {symbol})");
                 // SAFETY: version 2 of the library declares its functions so.
                 let functions = unsafe {
                     Self { $($name: *library.get($symbol.to_bytes()).map_err(|_| missing($symbol.to_string_lossy()))?,)* }
@@ -71,12 +71,11 @@ functions! {
 fn functions() -> Result<&'static Functions> {
     static LOADED: OnceLock<std::result::Result<Functions, String>> = OnceLock::new();
     let load = || match env::var_os(OIDN_VARIABLE).filter(|file| !file.is_empty()) {
-        Some(file) => load(&file).map_err(|what| {
-            format!("{OIDN_VARIABLE} names {}, which cannot be used: {what}: {HOW_TO_GET}", file.display())
-        }),
-        None => installed().map_err(|what| format!("Open Image Denoise cannot be loaded: {what}: {HOW_TO_GET}")),
+        Some(file) => load(&file).map_err(|what| format!("{OIDN_VARIABLE}: {what}")),
+        None => installed(),
     };
-    LOADED.get_or_init(load).as_ref().map_err(|what| Error::Device(what.clone()))
+    let refused = |what: &String| Error::Device(format!("Open Image Denoise cannot be loaded: {what}: {HOW_TO_GET}"));
+    LOADED.get_or_init(load).as_ref().map_err(refused)
 }
 
 /// The first of [`FILES`] that can be used; what is wrong with the first of all is what a user wants to know.
@@ -88,8 +87,8 @@ fn installed() -> std::result::Result<Functions, String> {
 
 fn load(file: &OsString) -> std::result::Result<Functions, String> {
     // SAFETY: what a library runs when it is loaded is trusted as that of the Vulkan loader is: the system or the user names it.
-    let library = unsafe { Library::new(file) };
-    Functions::of(library.map_err(|e| e.to_string())?)
+    let library = unsafe { Library::new(file) }.map_err(|e| e.to_string())?;
+    Functions::of(library).map_err(|what| format!("{}: {what}", file.display()))
 }
 
 /// Three floats of every pixel: they begin `offset` bytes into an element of a slice.

@@ -30,7 +30,9 @@ impl Method {
     pub fn about(self) -> &'static str {
         match self {
             Self::Kernels(row) => row.about,
-            Self::Oidn => "Open Image Denoise, where it is installed: a neural network, on the processor, for the whole colour",
+            Self::Oidn => {
+                "Open Image Denoise, where it is installed: a neural network, on the processor, for the whole colour"
+            }
         }
     }
 
