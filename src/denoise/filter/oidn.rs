@@ -32,7 +32,8 @@ settings! {
     }
 }
 
-/// Host memory that a pixel takes: its radiance before and after, its surface, and what the library takes at high quality.
+/// Host memory that a pixel takes: its radiance before and after, its surface, and what version 2.5.1 was seen to take at high
+/// quality (578 to 600 bytes at 512 x 512 to 2048 x 2048).
 pub(super) const HOST_BYTES: u64 = 2 * size_of::<vec4>() as u64 + size_of::<Guide>() as u64 + LIBRARY_BYTES;
 const LIBRARY_BYTES: u64 = 600;
 
