@@ -104,7 +104,7 @@ impl<'a> Texels<'a> {
     /// Where an element ends before the three floats do, or the floats are not aligned.
     pub fn new<T: Pod>(pixels: &'a [T], offset: usize) -> Self {
         let stride = size_of::<T>();
-        assert!(offset + size_of::<[f32; 3]>() <= stride && offset % 4 == 0 && align_of::<T>() >= 4);
+        assert!(offset + size_of::<[f32; 3]>() <= stride && offset.is_multiple_of(4) && align_of::<T>() >= 4);
         Self { pixels: bytemuck::cast_slice(pixels), stride, offset }
     }
 

@@ -22,15 +22,9 @@ pub fn table(view: &View, rows: &[Row], contenders: &[Contender]) -> String {
     let reference =
         rows.first().map(|row| format!("{:.0} spp, own relMSE {:.2e}", row.reference_spp, row.reference_relmse));
     let mut text = format!("{} {width}x{height}; reference: {}\n", view.name, reference.unwrap_or_default());
-    let names = names(contenders);
-    let header: Vec<String> = ["spp".to_owned(), String::new()]
-        .into_iter()
-        .chain(
-            names
-                .iter()
-                .flat_map(|name| [format!("{name}: relMSE"), "FLIP".to_owned(), "SSIM".to_owned(), "ms".to_owned()]),
-        )
-        .collect();
+    let of_filter = |name: &str| [&format!("{name}: relMSE"), "FLIP", "SSIM", "ms"].map(str::to_owned);
+    let of_filters = names(contenders).into_iter().flat_map(of_filter);
+    let header: Vec<String> = ["spp", ""].map(str::to_owned).into_iter().chain(of_filters).collect();
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
     text += &table::text(&header, &rows.iter().map(cells).collect::<Vec<_>>());
     text
