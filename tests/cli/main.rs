@@ -11,6 +11,7 @@ mod effects;
 mod filter;
 #[path = "../support/flat.rs"]
 mod flat;
+mod oidn;
 mod outputs;
 mod resume_merge;
 mod signals;

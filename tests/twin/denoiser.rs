@@ -200,8 +200,12 @@ fn files_are_taken_apart_and_put_together_as_their_twins() {
             let aovs = Aovs::find(&film, &Names::new()).unwrap();
             for demodulation in DEMODULATIONS {
                 let host = twins(split(&aovs, demodulation), "svgf", &settings);
-                let recipe =
-                    Recipe { row: find("svgf").unwrap(), demodulation, fireflies: None, settings: &|_| settings };
+                let recipe = Recipe {
+                    method: find("svgf").unwrap().into(),
+                    demodulation,
+                    fireflies: None,
+                    settings: &|_| settings,
+                };
                 let noisy = Layers::new(&aovs).upload(&gpu).unwrap();
                 let ([r, g, b], _) = Filtered::new(&gpu, noisy, &recipe).unwrap().join(&gpu).unwrap();
                 let device: Vec<vec4> = (0..r.len()).map(|i| [r[i], g[i], b[i], 1.0]).collect();
@@ -224,7 +228,12 @@ fn a_film_and_its_file_become_one_picture() {
         let aovs = Aovs::find(&film, &Names::new()).unwrap();
         for row in FILTERS {
             let settings = |scales: &Scales| FilterSettings::default().scaled_by(scales);
-            let recipe = Recipe { row, demodulation: Demodulation::Light, fireflies: Some(3.0), settings: &settings };
+            let recipe = Recipe {
+                method: (*row).into(),
+                demodulation: Demodulation::Light,
+                fireflies: Some(3.0),
+                settings: &settings,
+            };
             let images = [Noisy::of_film(&renderer).unwrap(), Layers::new(&aovs).upload(&gpu).unwrap()];
             let [of_film, of_file] = images.map(|noisy| {
                 let filtered = Filtered::new(&gpu, noisy, &recipe).unwrap();
