@@ -29,9 +29,11 @@ pub fn measured(document: &Document) -> impl Iterator<Item = (&Point, &Summary)>
     document.points.iter().filter_map(|point| Some((point, point.summary.as_ref()?)))
 }
 
-/// Median time of the pass in milliseconds; 0 if the point does not run it.
+/// Median time of the pass in milliseconds; 0 if the point does not run it. Figures that no clock gives, which would make axes
+/// endless, are cut.
 pub fn time_of(summary: &Summary, pass: &str) -> f64 {
-    summary.passes.iter().filter(|p| p.pass == pass).map(|p| p.ms).sum()
+    const LONGEST: f64 = 1e12;
+    summary.passes.iter().filter(|p| p.pass == pass).map(|p| p.ms.max(0.0).min(LONGEST)).sum()
 }
 
 /// What the length of a bar is.
@@ -86,8 +88,11 @@ pub fn draw(document: &Document, unit: Unit) -> String {
 /// Every named pass, even if the point does not run it, so that a colour is one pass in all bars; then all others together.
 fn segments(summary: &Summary, passes: &[String]) -> Vec<Segment> {
     let (named, rest) = passes.split_at(passes.len().min(NAMED));
-    let segment =
-        |(i, name): (usize, &String)| Segment { name: name.clone(), colour: chart::colour(i), ms: time_of(summary, name) };
+    let segment = |(i, name): (usize, &String)| Segment {
+        name: name.clone(),
+        colour: chart::colour(i),
+        ms: time_of(summary, name),
+    };
     let mut segments: Vec<Segment> = named.iter().enumerate().map(segment).collect();
     if !rest.is_empty() {
         let ms = rest.iter().map(|name| time_of(summary, name)).sum();
