@@ -1,8 +1,28 @@
 //! What accuracy costs in time: a grid of methods is measured on one scene, judged against a reference, and summed up in a
 //! [`Document`].
+//!
+//! ```text
+//! grid -> session -> judge -> summary -> findings
+//!            ^         ^
+//!          scene   reference, given or rendered until it converges
+//! ```
+mod converge;
+mod curve;
 pub mod document;
+pub mod findings;
+pub mod grid;
+pub mod interval;
+pub mod judge;
+mod machine;
+pub mod measure;
+pub mod reference;
+mod session;
+pub mod summary;
+pub mod table;
+pub mod words;
 
 pub use document::Document;
+pub use measure::{Ended, Plan, Watch, measure};
 
 use crate::image::Picture;
 
