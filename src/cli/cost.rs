@@ -1,11 +1,12 @@
 //! `tallow cost`: measures how much time buys how much accuracy, by which method.
+mod filters;
 mod options;
 mod output;
 
 use super::{Exit, complain, fail_on_messages, interrupt, print, print_json};
 use crate::cost::document::SceneInfo;
 use crate::cost::grid::{self, Candidate};
-use crate::cost::measure::{Ended, Plan, Watch, measure};
+use crate::cost::measure::{Ended, Plan, Watch, key, measure};
 use crate::cost::{Document, Images, reference};
 use crate::error::{Error, Result};
 use crate::gpu::{self, DeviceOptions, Gpu};
@@ -23,45 +24,63 @@ use std::time::Duration;
 /// What keeps every point from being measured, and errors of writing.
 pub fn run(args: &Args) -> Result<Exit> {
     let mut folder = Folder::open(&args.output)?;
-    let (scene, base, candidates) = candidates(args)?;
+    if let Some(image) = &args.filter_only {
+        return filters::run(args, image, folder);
+    }
     let path = args.scene.as_deref().ok_or_else(no_scene)?;
+    let (scene, base, candidates) = candidates(args, path)?;
     if !args.quiet && !args.json {
         scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
     }
-    let size = [base.width, base.height];
-    let given = args.reference.as_deref().map(|file| reference::read(file, size, Some((&scene, &base)))).transpose()?;
-    let gpu = open(args)?;
-    let file_settings = SceneFile::open(path)?.settings()?;
-    let plan = Plan {
-        scene: SceneInfo { path: path.display().to_string(), name: name(path), width: size[0], height: size[1] },
-        commands: candidates.iter().map(|candidate| command(path, &file_settings, candidate)).collect(),
+    let (plan, gpu) = (plan(args, path, &scene, base, candidates)?, open(args)?);
+    let earlier = folder.earlier(&key(&gpu, &scene, &plan));
+    let runs_before = earlier.as_ref().map_or(0, runs);
+    let found = watched(args, |watch| measure(&gpu, &scene, &plan, earlier, watch))?;
+    fail_on_messages(&gpu)?;
+    finish(args, folder, found, runs_before)
+}
+
+fn plan(args: &Args, path: &Path, scene: &Scene, base: Settings, candidates: Vec<Candidate>) -> Result<Plan> {
+    let [width, height] = [base.width, base.height];
+    let given = |file: &Path| reference::read(file, [width, height], Some((scene, &base)));
+    let reference = args.reference.as_deref().map(given).transpose()?;
+    let settings = SceneFile::open(path)?.settings()?;
+    Ok(Plan {
+        scene: SceneInfo { path: path.display().to_string(), name: name(path), width, height },
+        commands: candidates.iter().map(|candidate| command(path, &settings, candidate)).collect(),
         base,
         candidates,
         repeats: args.repeats,
         order_seed: args.order_seed,
         budget: args.budget(),
-        reference: given,
+        reference,
         reference_spp: args.reference_spp,
         cache: gpu::cache_folder().map(|folder| folder.join("references")),
-    };
-    let earlier = folder.earlier(&crate::cost::measure::key(&gpu, &scene, &plan));
-    let runs_before = earlier.as_ref().map_or(0, runs);
-    // From here on there is something to save.
+    })
+}
+
+/// Measures with a progress bar. From here on there is something to save, so a signal only asks it to stop.
+fn watched<T>(args: &Args, measure: impl FnOnce(&Watch) -> Result<T>) -> Result<T> {
     let stop = interrupt::flag();
     let shown = Shown::new(args.quiet || args.json);
     let progress = |what: &str, done: u64, total: u64| shown.set(what, done, total);
-    let watch = Watch { stop: &|| stop.load(Ordering::SeqCst), progress: &progress };
-    let (document, images, ended) = measure(&gpu, &scene, &plan, earlier, &watch)?;
+    let found = measure(&Watch { stop: &|| stop.load(Ordering::SeqCst), progress: &progress });
     shown.finish();
-    fail_on_messages(&gpu)?;
+    found
+}
+
+/// Writes and prints what was found.
+fn finish(
+    args: &Args,
+    mut folder: Folder,
+    (document, images, ended): (Document, Images, Ended),
+    runs_before: usize,
+) -> Result<Exit> {
     if ended == Ended::Stopped && runs(&document) == runs_before {
         complain("interrupted before a run was complete: nothing was written");
         return Ok(Exit::Interrupted);
     }
-    finish(args, folder, &document, &images, ended)
-}
-
-fn finish(args: &Args, mut folder: Folder, document: &Document, images: &Images, ended: Ended) -> Result<Exit> {
+    let (document, images) = (&document, &images);
     let written = folder.write(document, images, ended == Ended::Complete);
     match (args.json, args.quiet) {
         (true, _) => print_json(document)?,
@@ -80,8 +99,8 @@ fn finish(args: &Args, mut folder: Folder, document: &Document, images: &Images,
 }
 
 /// The scene, its settings with those of the options, and the points.
-fn candidates(args: &Args) -> Result<(Scene, Settings, Vec<Candidate>)> {
-    let file = SceneFile::open(args.scene.as_deref().ok_or_else(no_scene)?)?;
+fn candidates(args: &Args, path: &Path) -> Result<(Scene, Settings, Vec<Candidate>)> {
+    let file = SceneFile::open(path)?;
     let mut base = file.settings()?;
     args.film.apply(&mut base);
     options::overrides(&args.with)?.apply(&mut base);

@@ -110,17 +110,25 @@ pub fn measure(
         None => measuring.converge(gpu, scene, begun)?,
     };
     measuring.rounds(&reference);
-    let ended = measuring.ended();
-    if ended == Ended::Complete {
-        measuring.missing_pictures();
-    }
+    measuring.missing_pictures();
     let Measuring { points, pictures, .. } = measuring;
-    let images = Images {
-        reference: reference.picture.clone(),
-        points: pictures.into_iter().enumerate().filter_map(|(i, picture)| Some((i, picture?))).collect(),
+    let outline = Outline {
+        scene: &plan.scene,
+        seeds: seeds(&plan.base, plan.repeats),
+        order_seed: plan.order_seed,
+        budget: plan.budget,
+        key: key(gpu, scene, plan),
     };
-    let key = key(gpu, scene, plan);
-    Ok((document(plan, points, machine, &reference, key, ended), images, ended))
+    Ok(put_together(&outline, points, pictures, machine, &reference, watch))
+}
+
+/// The frame of a document.
+pub(super) struct Outline<'a> {
+    pub scene: &'a SceneInfo,
+    pub seeds: Vec<u32>,
+    pub order_seed: u64,
+    pub budget: Option<Duration>,
+    pub key: String,
 }
 
 /// Identifies what is measured, where and how.
@@ -183,15 +191,6 @@ fn points(plan: &Plan, earlier: Option<Document>) -> Vec<Point> {
 impl Measuring<'_> {
     fn stopped(&self) -> bool {
         (self.watch.stop)() || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
-    }
-
-    fn ended(&self) -> Ended {
-        let lacks = |point: &Point| point.failed.is_none() && point.runs.len() < self.plan.repeats as usize;
-        match (self.points.iter().any(lacks), (self.watch.stop)()) {
-            (false, _) => Ended::Complete,
-            (true, true) => Ended::Stopped,
-            (true, false) => Ended::Budget,
-        }
     }
 
     /// Renders the reference until its noise is small beside the smallest error, which the points of most samples tell, or until a
@@ -273,7 +272,7 @@ impl Measuring<'_> {
         for (point, result) in outcome {
             match result {
                 Ok(found) => measured.push(found),
-                Err(e) => self.points[point].failed = Some(one_line(&e)),
+                Err(e) => self.points[point].failed = Some(failure(&e)),
             }
         }
         let judged = |found: &Measured| judge(&found.picture, &reference.picture, reference.noise);
@@ -291,6 +290,9 @@ impl Measuring<'_> {
 
     /// Pictures of points all of whose runs were made before this program was started.
     fn missing_pictures(&mut self) {
+        if self.points.iter().any(|point| lacks_runs(point, self.plan.repeats)) {
+            return;
+        }
         let seed = seeds(&self.plan.base, self.plan.repeats)[0];
         for (index, shot) in self.shots.iter().enumerate() {
             let lacks = |i: &usize| self.pictures[*i].is_none() && self.points[*i].failed.is_none();
@@ -326,37 +328,51 @@ fn with_note(mut reference: Reference, is_short: bool) -> Reference {
     reference
 }
 
-fn one_line(e: &Error) -> String {
+/// Why a point failed, in one line.
+pub(super) fn failure(e: &Error) -> String {
     e.to_string().replace('\n', " ")
 }
 
-fn document(
-    plan: &Plan,
+fn lacks_runs(point: &Point, repeats: u32) -> bool {
+    point.failed.is_none() && point.runs.len() < repeats as usize
+}
+
+/// The document of what was measured, the images, and how it ended.
+pub(super) fn put_together(
+    outline: &Outline,
     mut points: Vec<Point>,
+    pictures: Vec<Option<Picture>>,
     machine: Machine,
     reference: &Reference,
-    key: String,
-    ended: Ended,
-) -> Document {
+    watch: &Watch,
+) -> (Document, Images, Ended) {
+    let repeats = outline.seeds.len() as u32;
+    let ended = match (points.iter().any(|point| lacks_runs(point, repeats)), (watch.stop)()) {
+        (false, _) => Ended::Complete,
+        (true, true) => Ended::Stopped,
+        (true, false) => Ended::Budget,
+    };
     summarise(&mut points, CONFIDENCE);
     let clocks = machine.cpu_mhz.zip(machine::cpu_mhz()).map(|([first, _], last)| [first, last]);
-    Document {
+    let document = Document {
         schema: SCHEMA,
         complete: ended == Ended::Complete,
         software: machine::software(),
-        scene: plan.scene.clone(),
+        scene: outline.scene.clone(),
         machine: Machine { cpu_mhz: clocks, ..machine },
         reference: reference.info.clone(),
         measurement: Measurement {
-            repeats: plan.repeats,
-            seeds: seeds(&plan.base, plan.repeats),
-            order_seed: plan.order_seed,
-            budget_minutes: plan.budget.map(|budget| budget.as_secs_f64() / 60.0),
+            repeats,
+            seeds: outline.seeds.clone(),
+            order_seed: outline.order_seed,
+            budget_minutes: outline.budget.map(|budget| budget.as_secs_f64() / 60.0),
             confidence: CONFIDENCE,
-            key,
+            key: outline.key.clone(),
         },
         front: front(&points),
         findings: findings(&points, CONFIDENCE),
         points,
-    }
+    };
+    let points = pictures.into_iter().enumerate().filter_map(|(i, picture)| Some((i, picture?))).collect();
+    (document, Images { reference: reference.picture.clone(), points }, ended)
 }

@@ -9,6 +9,7 @@
 mod converge;
 mod curve;
 pub mod document;
+pub mod filter_only;
 pub mod findings;
 pub mod grid;
 pub mod interval;

@@ -36,10 +36,10 @@ pub struct Args {
     /// Rounds of policies that learn; 0 is their own choice
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "0")]
     pub rounds: Vec<u32>,
-    /// Options of tallow render for all points and the reference, such as "--max-depth 4"
+    /// Options of tallow render for all points and the reference, such as "--max-depth 4"; with --filter-only of tallow filter
     #[arg(long, value_name = "OPTIONS", allow_hyphen_values = true, default_value = "")]
     pub with: String,
-    /// Measure the whole grid also with these options of tallow render, such as "--min-spp 4"; may be given several times
+    /// Measure everything also with these options, such as "--min-spp 4"; may be given several times
     #[arg(long = "variant", value_name = "OPTIONS", allow_hyphen_values = true)]
     pub variants: Vec<String>,
     /// Runs of each point, each with another seed
@@ -113,12 +113,15 @@ pub fn overrides(text: &str) -> Result<Overrides> {
         #[command(flatten)]
         overrides: Overrides,
     }
-    let refused = |e: clap::Error| {
-        let line = e.to_string();
-        let line = line.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
-        Error::Usage(format!("\"{text}\": {line} (see the settings of tallow render --help)"))
-    };
-    Ok(Words::try_parse_from(text.split_whitespace()).map_err(refused)?.overrides)
+    let parsed = Words::try_parse_from(text.split_whitespace());
+    Ok(parsed.map_err(|e| refused(text, "render", &e))?.overrides)
+}
+
+/// Options in a text that a command does not take.
+pub fn refused(text: &str, command: &str, e: &clap::Error) -> Error {
+    let line = e.to_string();
+    let line = line.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
+    Error::Usage(format!("\"{}\": {line} (see tallow {command} --help)", text.trim()))
 }
 
 fn minutes(text: &str) -> std::result::Result<f64, String> {
