@@ -1,9 +1,10 @@
 //! The same for filters alone, on a given image of any renderer: its noise is what it is, so only times vary between runs.
 use super::Images;
+use super::assemble::{Ended, Outline, failure, put_together, unmeasured};
 use super::document::{Document, Method, Point, Run, SceneInfo, WarmUp};
 use super::judge::judge;
 use super::machine;
-use super::measure::{Ended, Outline, Watch, failure, put_together};
+use super::measure::Watch;
 use super::reference::Reference;
 use super::session::{add_filter, check_clock, finite, interleaved};
 use crate::denoise::filter::{self, FilterSettings, Row};
@@ -87,25 +88,18 @@ pub fn measure_filters(gpu: &Gpu, plan: &FilterPlan, watch: &Watch) -> Result<(D
         budget: plan.budget,
         key: String::new(),
     };
-    Ok(put_together(&outline, points, pictures, machine, &plan.reference, watch))
+    Ok(put_together(&outline, points, pictures, machine, &plan.reference, (watch.stop)()))
 }
 
 fn point(candidate: &FilterCandidate) -> Point {
-    Point {
-        method: Method {
-            allocate: String::new(),
-            filter: candidate.row.name.to_owned(),
-            rounds: None,
-            options: candidate.options.clone(),
-            spp: 0,
-        },
-        command: candidate.command.clone(),
-        runs: Vec::new(),
-        warm_up: None,
-        device_bytes: None,
-        summary: None,
-        failed: None,
-    }
+    let method = Method {
+        allocate: String::new(),
+        filter: candidate.row.name.to_owned(),
+        rounds: None,
+        options: candidate.options.clone(),
+        spp: 0,
+    };
+    unmeasured(method, candidate.command.clone())
 }
 
 /// One run: times without errors, costs of the first use, memory, and the image.

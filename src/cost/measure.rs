@@ -1,14 +1,13 @@
 //! Measures a grid: the reference first, then rounds in which every point runs once, in an order that is random anew each time.
 use super::Images;
+use super::assemble::{Ended, Outline, failure, lacks_runs, put_together, unmeasured};
 use super::converge::{Converging, FEWEST_PARTS, PART_SPP};
-use super::document::{Document, Machine, Measurement, Method, Point, Run, SCHEMA, SceneInfo};
-use super::findings::findings;
+use super::document::{Document, Method, Point, Run, SceneInfo};
 use super::grid::{Candidate, Shot, shots};
 use super::judge::judge;
 use super::machine;
 use super::reference::Reference;
 use super::session::{Measured, Session};
-use super::summary::{front, summarise};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::image::Picture;
@@ -20,8 +19,6 @@ use rayon::prelude::*;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// Confidence level of all intervals.
-pub const CONFIDENCE: f64 = 0.95;
 /// The noise of a reference is rendered down to this share of the smallest relMSE: a tenth of its root.
 const NOISE_SHARE: f64 = 0.01;
 /// Part of the budget that the reference may take.
@@ -57,17 +54,6 @@ pub struct Watch<'a> {
     pub stop: &'a dyn Fn() -> bool,
     /// Told what is done, how much of it, and of how much.
     pub progress: &'a dyn Fn(&str, u64, u64),
-}
-
-/// Why a measurement ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ended {
-    /// Every run was made or has failed.
-    Complete,
-    /// The budget was used up.
-    Budget,
-    /// The user stopped it.
-    Stopped,
 }
 
 /// A measurement that is under way.
@@ -119,16 +105,7 @@ pub fn measure(
         budget: plan.budget,
         key: key(gpu, scene, plan),
     };
-    Ok(put_together(&outline, points, pictures, machine, &reference, watch))
-}
-
-/// The frame of a document.
-pub(super) struct Outline<'a> {
-    pub scene: &'a SceneInfo,
-    pub seeds: Vec<u32>,
-    pub order_seed: u64,
-    pub budget: Option<Duration>,
-    pub key: String,
+    Ok(put_together(&outline, points, pictures, machine, &reference, (watch.stop)()))
 }
 
 /// Identifies what is measured, where and how.
@@ -155,6 +132,19 @@ fn text(value: &impl serde::Serialize) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }
 
+/// The points of the plan, with what an earlier measurement found. What failed is tried again.
+fn points(plan: &Plan, earlier: Option<Document>) -> Vec<Point> {
+    let earlier = earlier.map(|document| document.points).unwrap_or_default();
+    let point = |(candidate, command): (&Candidate, &String)| {
+        let (method, command) = (candidate.method.clone(), command.clone());
+        match earlier.iter().find(|known| known.method == method) {
+            Some(known) => Point { failed: None, summary: None, command, ..known.clone() },
+            None => unmeasured(method, command),
+        }
+    };
+    plan.candidates.iter().zip(&plan.commands).map(point).collect()
+}
+
 /// Seeds of the runs.
 pub fn seeds(base: &Settings, repeats: u32) -> Vec<u32> {
     (0..repeats).map(|i| base.seed.wrapping_add(i)).collect()
@@ -167,25 +157,6 @@ fn check_room(plan: &Plan) -> Result<()> {
     memory::check(bytes).map_err(|what| {
         Error::Memory(format!("a grid of {} points {what}: choose fewer, or a smaller film", plan.candidates.len()))
     })
-}
-
-/// The points of the plan, with what an earlier measurement found. What failed is tried again.
-fn points(plan: &Plan, earlier: Option<Document>) -> Vec<Point> {
-    let earlier = earlier.map(|document| document.points).unwrap_or_default();
-    let fresh = |(candidate, command): (&Candidate, &String)| Point {
-        method: candidate.method.clone(),
-        command: command.clone(),
-        runs: Vec::new(),
-        warm_up: None,
-        device_bytes: None,
-        summary: None,
-        failed: None,
-    };
-    let begun = |point: Point| match earlier.iter().find(|known| known.method == point.method) {
-        Some(known) => Point { failed: None, summary: None, command: point.command, ..known.clone() },
-        None => point,
-    };
-    plan.candidates.iter().zip(&plan.commands).map(fresh).map(begun).collect()
 }
 
 impl Measuring<'_> {
@@ -326,53 +297,4 @@ fn with_note(mut reference: Reference, is_short: bool) -> Reference {
         );
     }
     reference
-}
-
-/// Why a point failed, in one line.
-pub(super) fn failure(e: &Error) -> String {
-    e.to_string().replace('\n', " ")
-}
-
-fn lacks_runs(point: &Point, repeats: u32) -> bool {
-    point.failed.is_none() && point.runs.len() < repeats as usize
-}
-
-/// The document of what was measured, the images, and how it ended.
-pub(super) fn put_together(
-    outline: &Outline,
-    mut points: Vec<Point>,
-    pictures: Vec<Option<Picture>>,
-    machine: Machine,
-    reference: &Reference,
-    watch: &Watch,
-) -> (Document, Images, Ended) {
-    let repeats = outline.seeds.len() as u32;
-    let ended = match (points.iter().any(|point| lacks_runs(point, repeats)), (watch.stop)()) {
-        (false, _) => Ended::Complete,
-        (true, true) => Ended::Stopped,
-        (true, false) => Ended::Budget,
-    };
-    summarise(&mut points, CONFIDENCE);
-    let clocks = machine.cpu_mhz.zip(machine::cpu_mhz()).map(|([first, _], last)| [first, last]);
-    let document = Document {
-        schema: SCHEMA,
-        complete: ended == Ended::Complete,
-        software: machine::software(),
-        scene: outline.scene.clone(),
-        machine: Machine { cpu_mhz: clocks, ..machine },
-        reference: reference.info.clone(),
-        measurement: Measurement {
-            repeats,
-            seeds: outline.seeds.clone(),
-            order_seed: outline.order_seed,
-            budget_minutes: outline.budget.map(|budget| budget.as_secs_f64() / 60.0),
-            confidence: CONFIDENCE,
-            key: outline.key.clone(),
-        },
-        front: front(&points),
-        findings: findings(&points, CONFIDENCE),
-        points,
-    };
-    let points = pictures.into_iter().enumerate().filter_map(|(i, picture)| Some((i, picture?))).collect();
-    (document, Images { reference: reference.picture.clone(), points }, ended)
 }

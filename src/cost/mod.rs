@@ -6,6 +6,7 @@
 //!            ^         ^
 //!          scene   reference, given or rendered until it converges
 //! ```
+mod assemble;
 mod converge;
 mod curve;
 pub mod document;
@@ -22,8 +23,9 @@ pub mod summary;
 pub mod table;
 pub mod words;
 
+pub use assemble::Ended;
 pub use document::Document;
-pub use measure::{Ended, Plan, Watch, measure};
+pub use measure::{Plan, Watch, measure};
 
 use crate::image::Picture;
 

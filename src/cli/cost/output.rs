@@ -7,13 +7,13 @@ use crate::cost::words::{factor, milliseconds, number};
 use crate::cost::{Images, table};
 use crate::error::{Error, Result};
 use crate::image::{input, output};
-use crate::report::table as text_table;
+use crate::report::{html, table as text_table};
 use serde_json::Value;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 /// Names of the results.
-const NAMES: [&str; 2] = ["cost.json", "cost.csv"];
+const NAMES: [&str; 3] = ["cost.json", "cost.csv", "cost.html"];
 
 /// The folder of the results.
 pub struct Folder {
@@ -53,9 +53,10 @@ impl Folder {
     }
 
     /// Writes the results and returns their paths. What is not whole replaces no earlier result.
-    pub fn write(&mut self, document: &Document, _images: &Images, whole: bool) -> Vec<PathBuf> {
+    pub fn write(&mut self, document: &Document, images: &Images, whole: bool) -> Vec<PathBuf> {
         let json = serde_json::to_vec_pretty(document).unwrap_or_default();
-        let contents = [json, table::csv(document)];
+        let page = html::cost(document, Some(images)).into_bytes();
+        let contents = [json, table::csv(document), page];
         let items: Vec<_> =
             NAMES.iter().zip(contents).map(|(name, bytes)| Item::bytes(self.path.join(name), bytes)).collect();
         let written = self.files.save(&items, whole);

@@ -59,7 +59,8 @@ impl CostPage<'_> {
 fn facts(document: &Document) -> Vec<(String, String)> {
     let Document { scene, machine, measurement, software, .. } = document;
     let commit = software.commit.as_ref().map(|commit| format!(", commit {commit}")).unwrap_or_default();
-    let runs = format!("{} runs of each point, {} % intervals", measurement.repeats, short(100.0 * measurement.confidence));
+    let runs =
+        format!("{} runs of each point, {} % intervals", measurement.repeats, short(100.0 * measurement.confidence));
     let cores = if machine.cores == 1 { "1 core".to_owned() } else { format!("{} cores", machine.cores) };
     let facts = [
         ("scene", format!("{}, {} x {} pixels", scene.path, scene.width, scene.height)),

@@ -86,8 +86,11 @@ pub fn draw(document: &Document, unit: Unit) -> String {
 /// Every named pass, even if the point does not run it, so that a colour is one pass in all bars; then all others together.
 fn segments(summary: &Summary, passes: &[String]) -> Vec<Segment> {
     let (named, rest) = passes.split_at(passes.len().min(NAMED));
-    let segment =
-        |(i, name): (usize, &String)| Segment { name: name.clone(), colour: chart::colour(i), ms: time_of(summary, name) };
+    let segment = |(i, name): (usize, &String)| Segment {
+        name: name.clone(),
+        colour: chart::colour(i),
+        ms: time_of(summary, name),
+    };
     let mut segments: Vec<Segment> = named.iter().enumerate().map(segment).collect();
     if !rest.is_empty() {
         let ms = rest.iter().map(|name| time_of(summary, name)).sum();

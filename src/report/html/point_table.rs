@@ -7,7 +7,8 @@ use crate::cost::document::{Document, Errors, Estimate, Factor, Point, Summary};
 pub fn measured(document: &Document) -> Table {
     let errors = Errors::<Estimate>::NAMES;
     let before = ["method", "runs", "GPU ms", "wall ms"];
-    let behind = ["inefficiency", "speed-up", "error gain", "samples", "rays", "device MiB", "compile ms", "first run ms"];
+    let behind =
+        ["inefficiency", "speed-up", "error gain", "samples", "rays", "device MiB", "compile ms", "first run ms"];
     let header: Vec<&str> = before.into_iter().chain(errors).chain(behind).collect();
     let mut table = Table::new("", &header);
     for (index, point) in document.points.iter().enumerate() {
