@@ -6,8 +6,7 @@ mod output;
 use super::{Exit, complain, fail_on_messages, interrupt, print, print_json};
 use crate::cost::document::SceneInfo;
 use crate::cost::grid::{self, Candidate};
-use crate::cost::measure::{Plan, Watch, key, measure};
-use crate::cost::{Document, Ended, Images, reference};
+use crate::cost::{Document, Ended, Images, Plan, Watch, key, measure, reference};
 use crate::error::{Error, Result};
 use crate::gpu::{self, DeviceOptions, Gpu};
 use crate::render::settings::Settings;
@@ -23,9 +22,9 @@ use std::time::Duration;
 /// # Errors
 /// What keeps every point from being measured, and errors of writing.
 pub fn run(args: &Args) -> Result<Exit> {
-    let mut folder = Folder::open(&args.output)?;
+    let folder = Folder::open(&args.output)?;
     if let Some(image) = &args.filter_only {
-        return filters::run(args, image, folder);
+        return filters::run(args, image, &folder);
     }
     let path = args.scene.as_deref().ok_or_else(no_scene)?;
     let (scene, base, candidates) = candidates(args, path)?;
@@ -35,9 +34,9 @@ pub fn run(args: &Args) -> Result<Exit> {
     let (plan, gpu) = (plan(args, path, &scene, base, candidates)?, open(args)?);
     let earlier = folder.earlier(&key(&gpu, &scene, &plan));
     let runs_before = earlier.as_ref().map_or(0, runs);
-    let found = watched(args, |watch| measure(&gpu, &scene, &plan, earlier, watch))?;
+    let found = watched(args, &folder, |watch| measure(&gpu, &scene, &plan, earlier, watch))?;
     fail_on_messages(&gpu)?;
-    finish(args, folder, found, runs_before)
+    finish(args, &folder, found, runs_before)
 }
 
 fn plan(args: &Args, path: &Path, scene: &Scene, base: Settings, candidates: Vec<Candidate>) -> Result<Plan> {
@@ -60,11 +59,12 @@ fn plan(args: &Args, path: &Path, scene: &Scene, base: Settings, candidates: Vec
 }
 
 /// Measures with a progress bar. From here on there is something to save, so a signal only asks it to stop.
-fn watched<T>(args: &Args, measure: impl FnOnce(&Watch) -> Result<T>) -> Result<T> {
+fn watched<T>(args: &Args, folder: &Folder, measure: impl FnOnce(&Watch) -> Result<T>) -> Result<T> {
     let stop = interrupt::flag();
     let shown = Shown::new(args.quiet || args.json);
     let progress = |what: &str, done: u64, total: u64| shown.set(what, done, total);
-    let found = measure(&Watch { stop: &|| stop.load(Ordering::SeqCst), progress: &progress });
+    let keep = |document: &Document| folder.keep(document);
+    let found = measure(&Watch { stop: &|| stop.load(Ordering::SeqCst), progress: &progress, keep: &keep });
     shown.finish();
     found
 }
@@ -72,7 +72,7 @@ fn watched<T>(args: &Args, measure: impl FnOnce(&Watch) -> Result<T>) -> Result<
 /// Writes and prints what was found.
 fn finish(
     args: &Args,
-    mut folder: Folder,
+    folder: &Folder,
     (document, images, ended): (Document, Images, Ended),
     runs_before: usize,
 ) -> Result<Exit> {
@@ -106,10 +106,10 @@ fn candidates(args: &Args, path: &Path) -> Result<(Scene, Settings, Vec<Candidat
     options::overrides(&args.with)?.apply(&mut base);
     base.validate()?;
     let mut all = grid::grid(&base, &args.axes())?;
+    all.iter().try_for_each(|candidate| candidate.settings.validate())?;
     for variant in &args.variants {
         let mut settings = base.clone();
         options::overrides(variant)?.apply(&mut settings);
-        settings.validate()?;
         let varied = grid::grid(&settings, &args.axes())?;
         all.extend(varied.into_iter().map(|mut candidate| {
             candidate.method.options = vec![variant.trim().to_owned()];

@@ -27,6 +27,8 @@ pub enum Ended {
 pub struct Outline<'a> {
     /// What was rendered or filtered.
     pub scene: &'a SceneInfo,
+    /// Where it runs.
+    pub machine: Machine,
     /// Seeds of the runs.
     pub seeds: Vec<u32>,
     /// Seed of the random order.
@@ -52,15 +54,13 @@ pub fn lacks_runs(point: &Point, repeats: u32) -> bool {
     point.failed.is_none() && point.runs.len() < repeats as usize
 }
 
-/// The document of what was measured, the images, and how it ended.
-pub fn put_together(
+/// The document of what was measured so far, and how that ended.
+pub fn document(
     outline: &Outline,
     mut points: Vec<Point>,
-    pictures: Vec<Option<Picture>>,
-    machine: Machine,
     reference: &Reference,
     is_stopped: bool,
-) -> (Document, Images, Ended) {
+) -> (Document, Ended) {
     let repeats = outline.seeds.len() as u32;
     let ended = match (points.iter().any(|point| lacks_runs(point, repeats)), is_stopped) {
         (false, _) => Ended::Complete,
@@ -68,13 +68,14 @@ pub fn put_together(
         (true, false) => Ended::Budget,
     };
     summarise(&mut points, CONFIDENCE);
+    let machine = &outline.machine;
     let clocks = machine.cpu_mhz.zip(machine::cpu_mhz()).map(|([first, _], last)| [first, last]);
     let document = Document {
         schema: SCHEMA,
         complete: ended == Ended::Complete,
         software: machine::software(),
         scene: outline.scene.clone(),
-        machine: Machine { cpu_mhz: clocks, ..machine },
+        machine: Machine { cpu_mhz: clocks, ..machine.clone() },
         reference: reference.info.clone(),
         measurement: Measurement {
             repeats,
@@ -88,6 +89,11 @@ pub fn put_together(
         findings: findings(&points, CONFIDENCE),
         points,
     };
+    (document, ended)
+}
+
+/// The pictures of the points that have one, and the reference.
+pub fn images(pictures: Vec<Option<Picture>>, reference: &Reference) -> Images {
     let points = pictures.into_iter().enumerate().filter_map(|(i, picture)| Some((i, picture?))).collect();
-    (document, Images { reference: reference.picture.clone(), points }, ended)
+    Images { reference: reference.picture.clone(), points }
 }

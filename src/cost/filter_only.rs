@@ -1,10 +1,10 @@
 //! The same for filters alone, on a given image of any renderer: its noise is what it is, so only times vary between runs.
 use super::Images;
-use super::assemble::{Ended, Outline, failure, put_together, unmeasured};
+use super::assemble::{Ended, Outline, document, failure, images, unmeasured};
 use super::document::{Document, Method, Point, Run, SceneInfo, WarmUp};
 use super::judge::judge;
 use super::machine;
-use super::measure::Watch;
+use super::plan::Watch;
 use super::reference::Reference;
 use super::session::{add_filter, check_clock, finite, interleaved};
 use crate::denoise::filter::{self, FilterSettings, Row};
@@ -56,7 +56,6 @@ pub struct FilterPlan<'a> {
 pub fn measure_filters(gpu: &Gpu, plan: &FilterPlan, watch: &Watch) -> Result<(Document, Images, Ended)> {
     let begun = Instant::now();
     check_clock(gpu)?;
-    let machine = machine::describe(gpu.info());
     let aovs = Aovs::find(plan.film, &Names::new()).map_err(|what| Error::input(plan.path, what))?;
     let layers = file::Layers::new(&aovs);
     let mut points: Vec<Point> = plan.candidates.iter().map(point).collect();
@@ -83,12 +82,14 @@ pub fn measure_filters(gpu: &Gpu, plan: &FilterPlan, watch: &Watch) -> Result<(D
     }
     let outline = Outline {
         scene: &plan.scene,
+        machine: machine::describe(gpu.info()),
         seeds: (0..plan.repeats).collect(),
         order_seed: plan.order_seed,
         budget: plan.budget,
         key: String::new(),
     };
-    Ok(put_together(&outline, points, pictures, machine, &plan.reference, (watch.stop)()))
+    let (document, ended) = document(&outline, points, &plan.reference, (watch.stop)());
+    Ok((document, images(pictures, &plan.reference), ended))
 }
 
 fn point(candidate: &FilterCandidate) -> Point {

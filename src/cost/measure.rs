@@ -1,65 +1,30 @@
 //! Measures a grid: the reference first, then rounds in which every point runs once, in an order that is random anew each time.
 use super::Images;
-use super::assemble::{Ended, Outline, failure, lacks_runs, put_together, unmeasured};
-use super::converge::{Converging, FEWEST_PARTS, PART_SPP};
-use super::document::{Document, Method, Point, Run, SceneInfo};
+use super::assemble::{Ended, Outline, document, failure, images, lacks_runs, unmeasured};
+use super::converge::Converging;
+use super::document::{Document, Point, Run};
 use super::grid::{Candidate, Shot, shots};
 use super::judge::judge;
 use super::machine;
+use super::plan::{Plan, Watch, check_room, key, seeds};
 use super::reference::Reference;
 use super::session::{Measured, Session};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::image::Picture;
-use crate::memory;
-use crate::render::settings::Settings;
-use crate::scene::{Fingerprint, Scene};
+use crate::scene::Scene;
 use crate::threads;
 use rayon::prelude::*;
-use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-/// The noise of a reference is rendered down to this share of the smallest relMSE: a tenth of its root.
-const NOISE_SHARE: f64 = 0.01;
 /// Part of the budget that the reference may take.
 const REFERENCE_SHARE: u32 = 2;
-
-/// What is to be measured, and how.
-pub struct Plan {
-    /// The scene, for the reader of the document.
-    pub scene: SceneInfo,
-    /// Settings of the scene, which the candidates change.
-    pub base: Settings,
-    /// The points.
-    pub candidates: Vec<Candidate>,
-    /// Command lines of the points.
-    pub commands: Vec<String>,
-    /// Runs of each point.
-    pub repeats: u32,
-    /// Seed of the random order.
-    pub order_seed: u64,
-    /// Time for everything.
-    pub budget: Option<Duration>,
-    /// A reference of the user's.
-    pub reference: Option<Reference>,
-    /// Most samples per pixel of a reference that is rendered.
-    pub reference_spp: u32,
-    /// Folder in which rendered references are kept.
-    pub cache: Option<PathBuf>,
-}
-
-/// How a measurement is watched and stopped.
-pub struct Watch<'a> {
-    /// Whether the user wants it to stop.
-    pub stop: &'a dyn Fn() -> bool,
-    /// Told what is done, how much of it, and of how much.
-    pub progress: &'a dyn Fn(&str, u64, u64),
-}
 
 /// A measurement that is under way.
 struct Measuring<'a> {
     plan: &'a Plan,
     watch: &'a Watch<'a>,
+    outline: Outline<'a>,
     shots: &'a [Shot],
     session: Session<'a>,
     deadline: Option<Instant>,
@@ -80,11 +45,19 @@ pub fn measure(
 ) -> Result<(Document, Images, Ended)> {
     let begun = Instant::now();
     check_room(plan)?;
-    let machine = machine::describe(gpu.info());
     let shots = shots(&plan.candidates);
+    let outline = Outline {
+        scene: &plan.scene,
+        machine: machine::describe(gpu.info()),
+        seeds: seeds(&plan.base, plan.repeats),
+        order_seed: plan.order_seed,
+        budget: plan.budget,
+        key: key(gpu, scene, plan),
+    };
     let mut measuring = Measuring {
         plan,
         watch,
+        outline,
         shots: &shots,
         session: Session::new(gpu, scene, &plan.candidates, &shots)?,
         deadline: plan.budget.map(|budget| begun + budget),
@@ -93,43 +66,18 @@ pub fn measure(
     };
     let reference = match &plan.reference {
         Some(reference) => reference.clone(),
-        None => measuring.converge(gpu, scene, begun)?,
+        None => {
+            let limit = plan.budget.map(|budget| begun + budget / REFERENCE_SHARE);
+            let pilots = measuring.pilots();
+            let mut growing = Converging::new(gpu, scene, &plan.base, plan.cache.as_deref())?;
+            growing.grow_below(&pilots, plan.reference_spp, limit, watch)?
+        }
     };
     measuring.rounds(&reference);
     measuring.missing_pictures();
-    let Measuring { points, pictures, .. } = measuring;
-    let outline = Outline {
-        scene: &plan.scene,
-        seeds: seeds(&plan.base, plan.repeats),
-        order_seed: plan.order_seed,
-        budget: plan.budget,
-        key: key(gpu, scene, plan),
-    };
-    Ok(put_together(&outline, points, pictures, machine, &reference, (watch.stop)()))
-}
-
-/// Identifies what is measured, where and how.
-pub fn key(gpu: &Gpu, scene: &Scene, plan: &Plan) -> String {
-    let mut key = Fingerprint::default();
-    let scene = scene.fingerprint([plan.base.width, plan.base.height]).map(|f| f.to_string()).unwrap_or_default();
-    let methods: Vec<&Method> = plan.candidates.iter().map(|candidate| &candidate.method).collect();
-    let given = plan.reference.as_ref().map(|reference| &reference.info);
-    let info = gpu.info();
-    let parts = [
-        scene,
-        text(&plan.base),
-        text(&methods),
-        text(&given),
-        text(&(plan.repeats, plan.order_seed)),
-        text(&(&info.name, &info.driver_name, &info.driver_version)),
-    ];
-    parts.iter().for_each(|part| key.add(part.as_bytes()));
-    key.add(&crate::shaders::HASH.to_le_bytes());
-    key.to_string()
-}
-
-fn text(value: &impl serde::Serialize) -> String {
-    serde_json::to_string(value).unwrap_or_default()
+    let Measuring { points, pictures, outline, .. } = measuring;
+    let (document, ended) = document(&outline, points, &reference, (watch.stop)());
+    Ok((document, images(pictures, &reference), ended))
 }
 
 /// The points of the plan, with what an earlier measurement found. What failed is tried again.
@@ -145,53 +93,9 @@ fn points(plan: &Plan, earlier: Option<Document>) -> Vec<Point> {
     plan.candidates.iter().zip(&plan.commands).map(point).collect()
 }
 
-/// Seeds of the runs.
-pub fn seeds(base: &Settings, repeats: u32) -> Vec<u32> {
-    (0..repeats).map(|i| base.seed.wrapping_add(i)).collect()
-}
-
-/// The pictures of all points, the reference and what judging takes must fit into memory.
-fn check_room(plan: &Plan) -> Result<()> {
-    let pictures = plan.candidates.len() as u64 + 16;
-    let bytes = plan.base.pixels() as u64 * size_of::<[f32; 3]>() as u64 * pictures;
-    memory::check(bytes).map_err(|what| {
-        Error::Memory(format!("a grid of {} points {what}: choose fewer, or a smaller film", plan.candidates.len()))
-    })
-}
-
 impl Measuring<'_> {
     fn stopped(&self) -> bool {
         (self.watch.stop)() || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
-    }
-
-    /// Renders the reference until its noise is small beside the smallest error, which the points of most samples tell, or until a
-    /// limit.
-    fn converge(&mut self, gpu: &Gpu, scene: &Scene, begun: Instant) -> Result<Reference> {
-        let plan = self.plan;
-        let limit = plan.budget.map(|budget| begun + budget / REFERENCE_SHARE);
-        let pilots = self.pilots();
-        let mut growing = Converging::new(gpu, scene, &plan.base, plan.cache.as_deref())?;
-        let stop = self.watch.stop;
-        let most = (plan.reference_spp / PART_SPP).max(FEWEST_PARTS);
-        let mut goal = FEWEST_PARTS;
-        loop {
-            while growing.spp() / PART_SPP < goal {
-                (self.watch.progress)("reference", growing.spp().into(), (goal * PART_SPP).into());
-                let in_time = limit.is_none_or(|limit| Instant::now() < limit);
-                let enough = growing.spp() / PART_SPP >= FEWEST_PARTS;
-                if (enough && !in_time) || !growing.grow(stop)? {
-                    goal = 0;
-                }
-            }
-            let reference = growing.reference();
-            let wanted = parts_wanted(&reference, &pilots, growing.spp() / PART_SPP);
-            let parts = growing.spp() / PART_SPP;
-            if wanted <= parts || parts >= most || goal == 0 {
-                growing.keep();
-                return Ok(with_note(reference, wanted > parts));
-            }
-            goal = wanted.min(2 * parts).min(most);
-        }
     }
 
     /// Images of the points with most samples: the smallest error is among theirs.
@@ -229,6 +133,8 @@ impl Measuring<'_> {
                 let done = self.points.iter().map(|point| point.runs.len() as u64).sum();
                 (self.watch.progress)("runs", done, total);
             }
+            let (so_far, _) = document(&self.outline, self.points.clone(), reference, true);
+            (self.watch.keep)(&so_far);
         }
     }
 
@@ -276,25 +182,4 @@ impl Measuring<'_> {
             }
         }
     }
-}
-
-/// Independent renders that a reference needs to be far below the smallest error.
-fn parts_wanted(reference: &Reference, pilots: &[Picture], parts: u32) -> u32 {
-    let noise = reference.noise.relmse;
-    let error = |picture: &Picture| crate::image::metrics::relmse(picture, &reference.picture) - noise;
-    // An error that drowns in the noise is taken to be as large as the noise, and is looked at again once that is smaller.
-    let smallest = pilots.iter().map(error).fold(f64::INFINITY, f64::min).max(noise);
-    let times = noise / (NOISE_SHARE * smallest);
-    if times.is_finite() { (f64::from(parts) * times).ceil().min(1e9) as u32 } else { parts }
-}
-
-fn with_note(mut reference: Reference, is_short: bool) -> Reference {
-    if is_short {
-        reference.info.notes.push(
-            "a limit of time or samples was reached before the standard error of the reference was a tenth of the smallest \
-             error; its noise is subtracted from MSE and relMSE, but not from the other errors"
-                .to_owned(),
-        );
-    }
-    reference
 }

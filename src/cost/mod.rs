@@ -16,7 +16,10 @@ pub mod grid;
 pub mod interval;
 pub mod judge;
 mod machine;
-pub mod measure;
+mod measure;
+mod parts;
+mod plan;
+mod point;
 pub mod reference;
 mod session;
 pub mod summary;
@@ -25,7 +28,8 @@ pub mod words;
 
 pub use assemble::Ended;
 pub use document::Document;
-pub use measure::{Plan, Watch, measure};
+pub use measure::measure;
+pub use plan::{Plan, Watch, key};
 
 use crate::image::Picture;
 

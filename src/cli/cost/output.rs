@@ -18,7 +18,7 @@ const NAMES: [&str; 3] = ["cost.json", "cost.csv", "cost.html"];
 /// The folder of the results.
 pub struct Folder {
     path: PathBuf,
-    files: Files,
+    files: RefCell<Files>,
     /// Documents that were not complete, with their files.
     begun: Vec<(PathBuf, Document)>,
 }
@@ -39,37 +39,44 @@ impl Folder {
                 begun.push((file, document));
             }
         }
-        Ok(Self { path: path.to_owned(), files: Files::default(), begun })
+        Ok(Self { path: path.to_owned(), files: RefCell::default(), begun })
     }
 
     /// A measurement of this key that is not complete yet. Its files may be replaced.
-    pub fn earlier(&mut self, key: &str) -> Option<Document> {
-        let index = self.begun.iter().position(|(_, document)| document.measurement.key == key)?;
-        let (file, document) = self.begun.swap_remove(index);
-        let csv = file.with_extension("csv");
-        let html = file.with_extension("html");
-        self.files.own([file, csv, html]);
-        Some(document)
+    pub fn earlier(&self, key: &str) -> Option<Document> {
+        let (file, document) = self.begun.iter().find(|(_, document)| document.measurement.key == key)?;
+        self.files.borrow_mut().own(["json", "csv", "html"].map(|extension| file.with_extension(extension)));
+        Some(document.clone())
+    }
+
+    /// Writes what there is while the measurement goes on.
+    pub fn keep(&self, document: &Document) {
+        let item = Item::bytes(self.path.join(NAMES[0]), json(document));
+        self.files.borrow_mut().save(&[item], false);
     }
 
     /// Writes the results and returns their paths. What is not whole replaces no earlier result.
-    pub fn write(&mut self, document: &Document, images: &Images, whole: bool) -> Vec<PathBuf> {
-        let json = serde_json::to_vec_pretty(document).unwrap_or_default();
+    pub fn write(&self, document: &Document, images: &Images, whole: bool) -> Vec<PathBuf> {
+        let mut files = self.files.borrow_mut();
         let page = html::cost(document, Some(images)).into_bytes();
-        let contents = [json, table::csv(document), page];
+        let contents = [json(document), table::csv(document), page];
         let items: Vec<_> =
             NAMES.iter().zip(contents).map(|(name, bytes)| Item::bytes(self.path.join(name), bytes)).collect();
-        let written = self.files.save(&items, whole);
-        if whole && self.files.failure().is_none() {
-            self.files.remove_partial(&items);
+        let written = files.save(&items, whole);
+        if whole && files.failure().is_none() {
+            files.remove_partial(&items);
         }
         written
     }
 
     /// Everything that could not be written, as one error.
     pub fn failure(&self) -> Option<Error> {
-        self.files.failure()
+        self.files.borrow().failure()
     }
+}
+
+fn json(document: &Document) -> Vec<u8> {
+    serde_json::to_vec_pretty(document).unwrap_or_default()
 }
 
 /// Reads a document, of this version or an older one.
