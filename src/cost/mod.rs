@@ -1,8 +1,35 @@
 //! What accuracy costs in time: a grid of methods is measured on one scene, judged against a reference, and summed up in a
 //! [`Document`].
+//!
+//! ```text
+//! grid -> session -> judge -> summary -> findings
+//!            ^         ^
+//!          scene   reference, given or rendered until it converges
+//! ```
+mod assemble;
+mod converge;
+mod curve;
 pub mod document;
+pub mod filter_only;
+pub mod findings;
+pub mod grid;
+pub mod interval;
+pub mod judge;
+mod machine;
+mod measure;
+mod parts;
+mod plan;
+mod point;
+pub mod reference;
+mod session;
+pub mod summary;
+pub mod table;
+pub mod words;
 
+pub use assemble::Ended;
 pub use document::Document;
+pub use measure::measure;
+pub use plan::{Plan, Watch, key};
 
 use crate::image::Picture;
 
