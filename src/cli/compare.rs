@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 ///
 /// MSE and relMSE, the mean of (a - b)^2 / (b^2 + 0.01), are taken on linear values; PSNR (peak 1), SSIM and FLIP on
 /// the sRGB-encoded images cut to [0, 1]. With --statistical, two renders are tested instead for a difference that their noise
-/// does not explain; exit code 0 says that they are the same, 1 that they differ, 6 that they are too noisy to say.
+/// does not explain; exit code 0 says that they are the same, 1 that they differ, 7 that they are too noisy to say.
 #[derive(clap::Args)]
 pub struct Args {
     /// Image to judge (EXR, PNG, JPEG or HDR)

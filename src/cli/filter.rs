@@ -1,5 +1,5 @@
 //! `tallow filter`: denoises an image file.
-mod options;
+pub mod options;
 mod supersampling;
 
 use super::common::Common;

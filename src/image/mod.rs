@@ -20,6 +20,8 @@ pub use claim::Claim;
 pub use film::{Channel, FILTERED, Film, NOISY, Picture, SOFTWARE, Samples, Window};
 use frame::Frame;
 use output::Stream;
+#[cfg(feature = "cli")]
+pub(crate) use photo::encode_png;
 pub(crate) use photo::{BAND, bands, check_end, claim as picture_claim, picture};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
