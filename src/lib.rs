@@ -37,7 +37,6 @@ pub mod gpu;
 pub mod guide;
 pub mod image;
 pub mod layout;
-#[cfg(feature = "cli")]
 mod machine;
 #[doc(hidden)] // an engine needs no kernel's mathematics; tests and benches do
 pub mod math;

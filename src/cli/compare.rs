@@ -1,6 +1,7 @@
 //! `tallow compare`: measures how far an image is from its reference, or tests whether both have one expectation.
 mod evidence;
 mod junit;
+mod page;
 mod replay;
 mod statistical;
 mod words;

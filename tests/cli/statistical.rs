@@ -88,6 +88,19 @@ fn junit_has_a_case_for_every_scale() {
 }
 
 #[test]
+fn the_page_has_the_verdict_and_the_images_and_asks_nothing_of_the_network() {
+    let folder = folder();
+    std::fs::rename(folder.path().join("bright.exr"), folder.path().join("<b>.exr")).unwrap();
+    complains(&compare(&folder, "<b>.exr b.exr --html t.html"), 1, &["different"]);
+    let page = std::fs::read_to_string(folder.path().join("t.html")).unwrap();
+    for part in ["different: the whole image", "data-name=\"map\"", "data-name=\"A\"", "block (0, 0) to (15, 15)"] {
+        assert!(page.contains(part), "{part}");
+    }
+    assert!(!page.contains("<b>.exr") && !page.contains("http://") && !page.contains("https://"));
+    complains(&compare(&folder, "b.exr b.exr --html b.exr"), 2, &["--html", "same file as"]);
+}
+
+#[test]
 fn what_cannot_be_tested_is_one_line() {
     let folder = folder();
     write(&folder, "small.exr", 16, 0.02, 1.0, 1);
@@ -169,7 +182,7 @@ fn one_percent_of_one_material_is_found_and_its_pixels_render_again_to_the_same_
 /// Runs the first command of the evidence.
 fn replayed(folder: &TempDir) {
     let file = |name: &str| folder.path().join("found").join(name);
-    for name in ["a.exr", "b.exr", "a.png", "b.png", "map.png", "report.json"] {
+    for name in ["a.exr", "b.exr", "a.png", "b.png", "map.png", "report.html", "report.json"] {
         assert!(file(name).is_file(), "{name}");
     }
     let report: Value = serde_json::from_slice(&std::fs::read(file("report.json")).unwrap()).unwrap();

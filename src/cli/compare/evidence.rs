@@ -22,7 +22,7 @@ pub fn check(folder: &Path) -> Result<()> {
     output::check(&folder.join("report.json"))
 }
 
-/// Writes both images, the map, all figures, and the worst pixels with the commands that render them again.
+/// Writes both images, the map, the page, all figures, and the worst pixels with the commands that render them again.
 ///
 /// # Errors
 /// [`Error::Output`], and [`Error::Input`] when an image is gone.
@@ -32,6 +32,7 @@ pub fn write(folder: &Path, report: &Report) -> Result<()> {
         write_png(&folder.join(format!("{name}.png")), &side.picture())?;
     }
     report.write_map(&folder.join("map.png"))?;
+    output::write(&folder.join("report.html"), super::page::html(report).as_bytes())?;
     let [a, b] = report.sides.each_ref().map(|side| &side.estimate);
     let pixels = suspects(a, b, &report.outcome);
     let mut figures = report.figures();

@@ -1,5 +1,5 @@
 //! `tallow compare --statistical`: tests whether two renders have the same expectation.
-use super::{check_sizes, evidence, junit, words};
+use super::{check_sizes, evidence, junit, page, words};
 use crate::cli::files::check_distinct;
 use crate::cli::{Exit, check_png, complain, finite, print, print_json, readable};
 use crate::error::{Error, Result};
@@ -34,11 +34,14 @@ pub struct Args {
     /// Write where the images differ to a .png: orange where A is brighter, blue where it is darker
     #[arg(long, value_name = "FILE", requires = "statistical")]
     map: Option<PathBuf>,
+    /// Write the verdict, the images, the map and all figures as one web page
+    #[arg(long, value_name = "FILE", requires = "statistical")]
+    html: Option<PathBuf>,
     /// Write the verdict as JUnit XML, a test case for each scale
     #[arg(long, value_name = "FILE", requires = "statistical")]
     junit: Option<PathBuf>,
-    /// Unless the images are the same, write them, the map, all figures and commands that render the worst pixels again to
-    /// this folder
+    /// Unless the images are the same, write them, the map, the page, all figures and commands that render the worst pixels
+    /// again to this folder
     #[arg(long, value_name = "FOLDER", requires = "statistical")]
     evidence: Option<PathBuf>,
 }
@@ -79,6 +82,7 @@ pub fn run(a: &Path, b: &Path, json: bool, args: &Args) -> Result<Exit> {
     let report = Report { sides: &sides, options, outcome };
     let full = args.map.as_ref().map(|path| report.write_map(path)).transpose()?;
     args.junit.as_ref().map_or(Ok(()), |path| output::write(path, junit::text(&report)?.as_bytes()))?;
+    args.html.as_ref().map_or(Ok(()), |path| output::write(path, page::html(&report).as_bytes()))?;
     let failed = !matches!(report.outcome.verdict, Verdict::Same { .. });
     let folder = args.evidence.as_ref().filter(|_| failed);
     folder.map_or(Ok(()), |folder| evidence::write(folder, &report))?;
@@ -105,9 +109,11 @@ fn check_outputs(a: &Path, b: &Path, args: &Args) -> Result<()> {
         check_png("--map", map)?;
         outputs.push(("--map", map));
     }
-    if let Some(junit) = &args.junit {
-        output::check(junit)?;
-        outputs.push(("--junit", junit));
+    for (option, path) in [("--junit", &args.junit), ("--html", &args.html)] {
+        if let Some(path) = path {
+            output::check(path)?;
+            outputs.push((option, path));
+        }
     }
     let mut inputs = vec![("A", a), ("B", b)];
     inputs.extend(args.errors.as_deref().map(|errors| ("--errors", errors)));

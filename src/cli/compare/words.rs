@@ -4,7 +4,7 @@ use crate::image::significance::{Finding, Level, Noise, Outcome, Scale, Verdict}
 use crate::report::table;
 
 /// Names of the channels.
-const CHANNELS: [&str; 3] = ["R", "G", "B"];
+pub const CHANNELS: [&str; 3] = ["R", "G", "B"];
 
 /// Most rows of the table of regions.
 const ROWS: usize = 8;
