@@ -19,6 +19,7 @@ layout(scalar, push_constant) uniform Push { SplitPush push; };
 // partly show something without albedo.
 const float WHOLE = 0.98;
 const float OUTLIER = 2.0;
+const float MIRRORED = 0.6; // 6 of 9 pixels, which the rim of a mirror has around it
 
 struct Parts {
     vec3 filtered;
@@ -68,10 +69,29 @@ bool is_rim(int i, vec3 colour, vec3 albedo) {
     return outshone && (bright > OUTLIER * median || partly);
 }
 
+bool is_noisy_without_albedo(int i) {
+    return !reflects(albedo_at(i)) && Guide_depth(guide, i) > 0.0 && largest(PixelStats_m2(stats, i)) > 0.0;
+}
+
+// Whether a pixel shows a mirror or clear glass: it is noisy, has no albedo, and so have MIRRORED of the pixels around it that the
+// image has. Lamps have no noise but at their rims, which are thin.
+bool is_mirror(int i) {
+    ivec2 size = ivec2(push.size), at = ivec2(i % size.x, i / size.x);
+    int alike = 0, count = 0;
+    for (int k = 0; k < 9; k++) {
+        ivec2 tap = at + ivec2(k % 3, k / 3) - 1;
+        if (any(lessThan(tap, ivec2(0))) || any(greaterThanEqual(tap, size))) continue;
+        alike += int(is_noisy_without_albedo(tap.y * size.x + tap.x));
+        count++;
+    }
+    return float(alike) > MIRRORED * float(count) && is_noisy_without_albedo(i);
+}
+
 // Lamps, sky and the pixels at their rims are not filtered: a rim's light divided by its small albedo would be far brighter
-// than its surroundings.
+// than its surroundings. What mirrors and clear glass show is filtered as it is.
 Parts split_albedo(int i) {
     vec3 colour = colour_at(i), albedo = albedo_at(i);
+    if (is_mirror(i)) return Parts(colour, vec3(1.0), vec3(0.0));
     if (!reflects(albedo) || is_rim(i, colour, albedo)) return Parts(vec3(0.0), vec3(0.0), number(colour));
     return Parts(colour / divisor(albedo), divisor(albedo), vec3(0.0));
 }

@@ -123,6 +123,7 @@ impl<'a> Job<'a> {
     pub fn film(&self, status: &Status) -> Result<Film> {
         let mut film = film::read_back(self.renderer)?;
         film.metadata.insert(SOFTWARE.to_owned(), format!("tallow {}", env!("CARGO_PKG_VERSION")));
+        film.metadata.insert(film::DELTA_LIGHTS.to_owned(), self.renderer.delta_lights().to_string());
         film.metadata.extend(provenance::metadata(self.renderer, &film)?);
         film.metadata.insert(resume::ALLOCATIONS.to_owned(), status.allocations.to_string());
         film::set_broken_samples(&mut film, self.broken_samples()?);
