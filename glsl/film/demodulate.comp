@@ -69,22 +69,26 @@ bool is_rim(int i, vec3 colour, vec3 albedo) {
     return outshone && (bright > OUTLIER * median || partly);
 }
 
-bool is_noisy_without_albedo(int i) {
-    return !reflects(albedo_at(i)) && Guide_depth(guide, i) > 0.0 && largest(PixelStats_m2(stats, i)) > 0.0;
+// Of hits without albedo: x is 1 where the pixel is noisy, y where it is noisy or black. Few samples of glass may all be black.
+ivec2 without_albedo(int i) {
+    if (reflects(albedo_at(i)) || !(Guide_depth(guide, i) > 0.0)) return ivec2(0);
+    bool noisy = largest(PixelStats_m2(stats, i)) > 0.0;
+    return ivec2(noisy, noisy || largest(colour_at(i)) == 0.0);
 }
 
-// Whether a pixel shows a mirror or clear glass: it is noisy, has no albedo, and so have MIRRORED of the pixels around it that the
-// image has. Lamps have no noise but at their rims, which are thin.
+// Whether a pixel shows a mirror or clear glass: it has no albedo and is noisy or black, and so are MIRRORED of the pixels around
+// it that the image has, one of them noisy. Lamps have no noise but at their rims, which are thin.
 bool is_mirror(int i) {
-    ivec2 size = ivec2(push.size), at = ivec2(i % size.x, i / size.x);
-    int alike = 0, count = 0;
+    if (without_albedo(i).y == 0) return false;
+    ivec2 size = ivec2(push.size), at = ivec2(i % size.x, i / size.x), alike = ivec2(0);
+    int count = 0;
     for (int k = 0; k < 9; k++) {
         ivec2 tap = at + ivec2(k % 3, k / 3) - 1;
         if (any(lessThan(tap, ivec2(0))) || any(greaterThanEqual(tap, size))) continue;
-        alike += int(is_noisy_without_albedo(tap.y * size.x + tap.x));
+        alike += without_albedo(tap.y * size.x + tap.x);
         count++;
     }
-    return float(alike) > MIRRORED * float(count) && is_noisy_without_albedo(i);
+    return alike.x > 0 && float(alike.y) > MIRRORED * float(count);
 }
 
 // Lamps, sky and the pixels at their rims are not filtered: a rim's light divided by its small albedo would be far brighter

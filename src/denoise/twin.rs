@@ -198,15 +198,14 @@ fn is_rim(pixels: &Pixels, i: usize) -> bool {
     light(i) > OUTLIER * median || neighbours().any(|q| largest(albedo(i)) < WHOLE * largest(albedo(q)))
 }
 
-/// Noisy without albedo, as most pixels around it are.
+/// Noisy or black without albedo, as most pixels around it are.
 fn is_mirror(pixels: &Pixels, i: usize) -> bool {
-    let alike = |q: usize| {
-        let (guide, stats) = (&pixels.guide[q], &pixels.stats[q]);
-        !reflects(&guide.albedo) && guide.depth > 0.0 && largest(&stats.m2) > 0.0
-    };
-    let around: Vec<bool> = neighbours(pixels.size, i).chain([i]).map(alike).collect();
-    let count = around.iter().filter(|&&alike| alike).count();
-    alike(i) && count as f32 > MIRRORED * around.len() as f32
+    let around = || neighbours(pixels.size, i).chain([i]);
+    let smooth = |q: usize| !reflects(&pixels.guide[q].albedo) && pixels.guide[q].depth > 0.0;
+    let noisy = |q: usize| smooth(q) && largest(&pixels.stats[q].m2) > 0.0;
+    let alike = |q: usize| noisy(q) || smooth(q) && largest(&pixels.stats[q].mean) == 0.0;
+    let count = around().filter(|&q| alike(q)).count() as f32;
+    alike(i) && around().any(noisy) && count > MIRRORED * around().count() as f32
 }
 
 /// Up to eight.
