@@ -20,6 +20,7 @@
 //! - [`layout`]: the structs that kernels and host share; [`render::Layer`]s and buffers are read by them.
 //! - [`statistics`]: what is known of a pixel after some of its samples.
 //! - [`settings`]: the tables in which settings have their ranges, defaults and descriptions.
+//! - [`cost`]: how much time buys how much accuracy, measured.
 //! - [`report`]: tables of GPU time, and traces.
 //! - [`error`]: what can fail, and the exit codes for it.
 //! - [`guide`]: how to embed the renderer, filter what it makes, and place its samples.
@@ -29,12 +30,14 @@
 pub mod allocate;
 #[cfg(feature = "cli")]
 pub mod cli;
+pub mod cost;
 pub mod denoise;
 pub mod error;
 pub mod gpu;
 pub mod guide;
 pub mod image;
 pub mod layout;
+mod machine;
 #[doc(hidden)] // an engine needs no kernel's mathematics; tests and benches do
 pub mod math;
 mod memory;

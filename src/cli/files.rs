@@ -63,6 +63,20 @@ impl Files {
         Self { own, failures: Vec::new() }
     }
 
+    /// From now on these files may be replaced, because an earlier run of the same work wrote them.
+    pub fn own(&mut self, paths: impl IntoIterator<Item = PathBuf>) {
+        self.own.extend(paths.into_iter().map(|path| (key(&path), path)));
+    }
+
+    /// Removes the incomplete files that this run owns, once the items are whole.
+    pub fn remove_partial(&mut self, items: &[Item]) {
+        for partial in items.iter().map(|item| partial_name(&item.path)) {
+            if let Some(place) = self.own.remove(&key(&partial)) {
+                let _ = std::fs::remove_file(place);
+            }
+        }
+    }
+
     /// Writes all items that are regular files and returns their paths. If the result is not `whole`, a file of an earlier run
     /// is kept and [`partial_name`] is used instead. Signals take effect only after all are written. Pipes are left to
     /// [`Self::pipe`].

@@ -1,5 +1,5 @@
 //! `tallow filter`: denoises an image file.
-mod options;
+pub mod options;
 mod supersampling;
 
 use super::common::Common;
@@ -236,7 +236,7 @@ fn replaced(args: &Args, source: &Source, aovs: &Aovs, mut colour: Colour) -> Re
         colour = [0; 3].map(|_| grey.clone());
     }
     let channels: Vec<_> = aovs.colour.into_iter().zip(colour.iter().map(Vec::as_slice)).collect();
-    source.replaced(&channels, aovs.keep_as(), (crate::render::film::FILTERED, args.filter.name()))
+    source.replaced(&channels, aovs.keep_as(), (image::FILTERED, args.filter.name()))
 }
 
 /// Reads the reference, before any long work, and checks that it has the size of the image.

@@ -2,6 +2,7 @@
 pub mod checkpoint;
 pub mod common;
 pub mod compare;
+pub mod cost;
 mod crash;
 pub mod devices;
 pub mod explain;
@@ -25,11 +26,13 @@ use std::process::ExitCode;
 const EXIT_CODES: &str = "\
 Exit codes:
   0    done
-  1    a limit given with --max-... or --min-... is exceeded
+  1    a limit given with --max-... or --min-... is exceeded, or compare --statistical finds a difference
   2    usage: an option or a setting is wrong
   3    input: a file cannot be read or is damaged
   4    device or memory: no Vulkan, no usable device, it was lost, or memory is out
   5    output: a file cannot be written
+  6    some points of a measurement failed; the others are written
+  7    too noisy to say: compare --statistical finds no difference, but could have missed one
   70   internal error: a bug, please report it
   130  interrupted (Ctrl-C)";
 
@@ -46,6 +49,7 @@ enum Command {
     Render(Box<render::Args>),
     Filter(Box<filter::Args>),
     Compare(compare::Args),
+    Cost(Box<cost::Args>),
     Merge(merge::Args),
     Explain(explain::Args),
     Devices(devices::Args),
@@ -58,6 +62,10 @@ pub enum Exit {
     Done = 0,
     /// A limit given by the user was exceeded.
     LimitExceeded = 1,
+    /// Some points of a measurement failed; the others were measured and written.
+    PartlyFailed = 6,
+    /// A test found nothing, and would have missed what it was to find.
+    Undecided = 7,
     /// The command was stopped by Ctrl-C or another signal.
     Interrupted = 130,
 }
@@ -94,6 +102,7 @@ fn run(command: Command) -> Result<Exit> {
         Command::Render(args) => render::run(&args),
         Command::Filter(args) => filter::run(&args),
         Command::Compare(args) => compare::run(&args),
+        Command::Cost(args) => cost::run(&args),
         Command::Merge(args) => merge::run(&args),
         Command::Explain(args) => explain::run(&args),
         Command::Devices(args) => devices::run(&args),
@@ -108,7 +117,7 @@ fn usage(e: &clap::Error) -> Result<Exit> {
     }
     if e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         return Err(Error::Usage(
-            "name a command: render, filter, compare, merge, explain or devices (see tallow --help)".to_owned(),
+            "name a command: render, filter, compare, cost, merge, explain or devices (see tallow --help)".to_owned(),
         ));
     }
     let one_line = |paragraph: &str| paragraph.split_whitespace().collect::<Vec<_>>().join(" ");

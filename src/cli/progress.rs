@@ -27,6 +27,13 @@ impl Progress {
         self.bar.set_position(samples);
     }
 
+    /// Shows how much of a stage is done, of a total that may grow.
+    pub fn set_of(&mut self, stage: &str, done: u64, total: u64) {
+        self.bar.set_length(total);
+        self.bar.set_position(done);
+        self.bar.set_message(stage.to_owned());
+    }
+
     /// Whether the bar is visible and its speed older than 200 ms.
     pub fn wants_speed(&self) -> bool {
         !self.bar.is_hidden() && self.shown.is_none_or(|shown| shown.elapsed() > Duration::from_millis(200))

@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Gpu, PassTime};
 use crate::image::{self, Film};
 use crate::memory;
-use crate::render::settings::Settings;
+use crate::render::settings::{Allocate, Settings};
 use crate::render::{Checkpoint, Job, Outputs, Renderer, StopReason, all_effects, film};
 use crate::scene::{Scene, SceneFile};
 use crate::statistics::BrokenSamples;
@@ -64,6 +64,11 @@ pub struct Args {
     /// Filter the image as `tallow filter` does with the file; the noisy one stays as the layer "Noisy Image"
     #[arg(long, value_name = "FILTER")]
     pub denoise: Option<Method>,
+    /// Render only the pixel in this column and row, with the samples that it has in the whole image, wherever those were
+    /// placed: --spp says how many
+    #[arg(long, value_name = "X,Y", value_parser = pixel,
+          conflicts_with_all = ["resume", "checkpoint", "denoise"])]
+    pub pixel: Option<[u32; 2]>,
     /// Count rays and visited nodes
     #[arg(long)]
     pub counters: bool,
@@ -111,7 +116,8 @@ pub fn run(args: &Args) -> Result<Exit> {
     check_room(args, &settings, &gpu)?;
     let renderer = host.time("upload and compile", || renderer(args, &gpu, &scene, &settings))?;
     let noisy = args.denoise.map(|_| Noisy::of_film(&renderer)).transpose()?;
-    let job = Job { checkpoint: earlier.as_ref(), ..Job::new(&renderer) };
+    let pixel = args.pixel.map(|[x, y]| y * settings.width + x);
+    let job = Job { checkpoint: earlier.as_ref(), pixel, ..Job::new(&renderer) };
     let shot = Shot { args, gpu: &gpu, job };
     let mut files = Files::new(args.resume.as_deref());
     let (status, checkpoint) = host.time("render", || shot.trace(&mut files))?;
@@ -168,8 +174,24 @@ fn load(args: &Args) -> Result<(Scene, Settings)> {
     let file = SceneFile::open(&args.scene)?;
     let mut settings = file.settings()?;
     args.overrides.apply(&mut settings);
+    if let Some([x, y]) = args.pixel {
+        settings.allocate = Allocate::default();
+        if x >= settings.width || y >= settings.height {
+            let size = format!("{}x{}", settings.width, settings.height);
+            return Err(Error::Usage(format!("--pixel {x},{y} is outside of the film, which is {size}")));
+        }
+    }
     settings.validate()?;
     Ok((file.load()?.scene, settings))
+}
+
+/// Parses a column and a row.
+fn pixel(text: &str) -> std::result::Result<[u32; 2], String> {
+    let numbers = text.split_once(',').map(|(x, y)| (x.trim().parse(), y.trim().parse()));
+    match numbers {
+        Some((Ok(x), Ok(y))) => Ok([x, y]),
+        _ => Err("expected a column and a row, such as 12,34".to_owned()),
+    }
 }
 
 /// With the kernels that the scene calls for, or with all.

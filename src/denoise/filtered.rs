@@ -153,7 +153,11 @@ fn run(gpu: &Gpu, record: impl FnOnce(&mut Recorder) -> Result<()>) -> Result<Ve
     gpu.run(&mut FrameResources::new(gpu)?, record)
 }
 
-fn colour(picture: &Buffer<vec4>) -> Result<Colour> {
+/// Reads back an image, a window at a time.
+///
+/// # Errors
+/// [`crate::error::Error::Device`].
+pub(super) fn colour(picture: &Buffer<vec4>) -> Result<Colour> {
     let mut planes = [0; 3].map(|_| Vec::with_capacity(picture.len()));
     for window in windows(picture.len()) {
         for pixel in picture.read_range(window)? {

@@ -7,6 +7,7 @@ pub mod file;
 pub mod filter;
 mod filtered;
 mod noisy;
+mod timed;
 #[doc(hidden)]
 pub mod twin;
 
@@ -14,6 +15,7 @@ pub use demodulation::Demodulation;
 pub use denoiser::Denoiser;
 pub use filtered::{Colour, Filtered, Recipe, bytes_per_pixel, host_bytes};
 pub use noisy::{Holds, Noisy};
+pub use timed::{Timed, timed};
 
 use std::ops::Range;
 

@@ -27,7 +27,7 @@ pub struct Metrics {
 /// When their sizes differ.
 pub fn compare(test: &Picture, reference: &Picture) -> Metrics {
     Metrics {
-        mse: mean(test, reference, |a, b| (a - b) * (a - b)),
+        mse: mse(test, reference),
         relmse: relmse(test, reference),
         psnr: psnr(test, reference),
         ssim: ssim(test, reference),
@@ -51,6 +51,63 @@ fn mean(test: &Picture, reference: &Picture, error: impl Fn(f64, f64) -> f64) ->
 /// When their sizes differ.
 pub fn relmse(test: &Picture, reference: &Picture) -> f64 {
     mean(test, reference, |a, b| (a - b) * (a - b) / (b * b + RELMSE_EPSILON))
+}
+
+/// See [`Metrics::mse`].
+///
+/// # Panics
+/// When their sizes differ.
+pub fn mse(test: &Picture, reference: &Picture) -> f64 {
+    mean(test, reference, |a, b| (a - b) * (a - b))
+}
+
+/// The contribution of every pixel to relMSE: its mean is [`Metrics::relmse`].
+///
+/// # Panics
+/// When their sizes differ.
+pub fn relative_squares(test: &Picture, reference: &Picture) -> Vec<f64> {
+    assert_eq!((test.width, test.height), (reference.width, reference.height), "pictures of one size");
+    let square = |a: f32, b: f32| {
+        let (a, b) = (f64::from(a), f64::from(b));
+        (a - b) * (a - b) / (b * b + RELMSE_EPSILON)
+    };
+    let pixel = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).map(|c| square(a[c], b[c])).sum::<f64>() / 3.0;
+    test.pixels.iter().zip(&reference.pixels).map(pixel).collect()
+}
+
+/// Mean of the values without the largest ones, of which there are `share` times their number, rounded down.
+pub fn trimmed_mean(mut values: Vec<f64>, share: f64) -> f64 {
+    let kept = values.len() - (share * values.len() as f64) as usize;
+    if kept == 0 {
+        return 0.0;
+    }
+    values.select_nth_unstable_by(kept - 1, f64::total_cmp);
+    values[..kept].iter().sum::<f64>() / kept as f64
+}
+
+/// Expected relMSE between a reference and the true image, from the squared standard error of each of its pixels.
+///
+/// # Panics
+/// When there is not one variance per pixel.
+pub fn relative_noise(reference: &Picture, variance: &[[f32; 3]]) -> f64 {
+    assert_eq!(reference.pixels.len(), variance.len(), "one variance per pixel");
+    let relative = |(v, b): (&f32, f32)| f64::from(*v) / (f64::from(b).powi(2) + RELMSE_EPSILON);
+    variance.iter().flatten().zip(values(reference)).map(relative).sum::<f64>() / (3 * variance.len()) as f64
+}
+
+/// Mean HDR-FLIP error (Andersson et al. 2021, "Visualizing Errors in Rendered High Dynamic Range Images"): the largest FLIP
+/// error of every pixel over exposures that suit the reference. `None` where no exposure does: the reference is black.
+///
+/// # Panics
+/// When their sizes differ.
+pub fn hdr_flip(test: &Picture, reference: &Picture) -> Option<f64> {
+    assert_eq!((test.width, test.height), (reference.width, reference.height), "pictures of one size");
+    let image = |p: &Picture| flip_rs::RgbImage::new(p.width as usize, p.height as usize, values(p).collect()).ok();
+    let mut options = flip_rs::HdrOptions::default();
+    options.return_exposure_map = false;
+    let result = flip_rs::hdr_flip(&image(reference)?, &image(test)?, options).ok()?;
+    let map = result.error_map.pixels();
+    Some(map.iter().map(|&e| f64::from(e)).sum::<f64>() / map.len() as f64)
 }
 
 /// See [`Metrics::psnr`].

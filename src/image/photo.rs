@@ -19,7 +19,11 @@ const PIXELS_PER_BYTE: u64 = 8 * 1032;
 /// Largest number of bytes for colour profiles and texts.
 const TEXTS: u64 = 1 << 26;
 
-pub(super) fn encode_png(picture: &Picture, options: &WriteOptions) -> Result<Vec<u8>, String> {
+/// Encodes 8-bit sRGB.
+///
+/// # Errors
+/// When the picture has no pixels.
+pub fn encode_png(picture: &Picture, options: &WriteOptions) -> Result<Vec<u8>, String> {
     let code = |v: &f32| (tone::display(*v, options.exposure, options.tone_map) * 255.0).round() as u8;
     let bytes: Vec<u8> = picture.pixels.iter().flatten().map(code).collect();
     let mut out = Vec::new();

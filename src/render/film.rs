@@ -1,6 +1,6 @@
 //! What a renderer's buffers hold, as the channels of an image file, and back.
 use crate::error::Result;
-use crate::image::{Film, NOISY, Samples};
+use crate::image::{FILTERED, Film, NOISY, Samples};
 use crate::layout::{Guide, PixelLight, PixelStats, vec3};
 use crate::memory;
 use crate::render::settings::Settings;
@@ -18,9 +18,6 @@ pub(crate) const PENDING: &str = "pending";
 
 /// Metadata: whether point, spot or directional lights shine in the scene, whose shadows are sharp. Filters ask for it.
 pub(crate) const DELTA_LIGHTS: &str = "deltaLights";
-
-/// Metadata of what `tallow filter` wrote: the filter.
-pub(crate) const FILTERED: &str = "filtered";
 
 /// Sum of squared deviations of the luminance of indirect light before albedo.
 pub(crate) const INDIRECT_M2: &str = "indirect.m2";

@@ -205,6 +205,12 @@ impl Renderer {
         Ok(())
     }
 
+    /// Chooses another random sequence from the next [`Step::Start`] on; what was accumulated belongs to the old one.
+    pub fn set_seed(&mut self, seed: u32) {
+        self.frame.constants.path.seed = seed;
+        self.settings.seed = seed;
+    }
+
     /// The buffers, for reading back and for stages of the caller's own.
     pub fn film(&self) -> &FilmBuffers {
         &self.frame.film

@@ -1,3 +1,5 @@
-//! Reports about a run: text tables and traces of its passes.
+//! Reports about a run: text tables, traces of its passes, and web pages.
+#[cfg(feature = "cli")]
+pub mod html;
 pub mod table;
 pub mod trace;

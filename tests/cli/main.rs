@@ -15,3 +15,4 @@ mod oidn;
 mod outputs;
 mod resume_merge;
 mod signals;
+mod statistical;

@@ -1,0 +1,99 @@
+//! From a plan to its points, and from their runs to a document.
+use super::Images;
+use super::document::{Document, Machine, Measurement, Method, Point, SCHEMA, SceneInfo};
+use super::findings::findings;
+use super::machine;
+use super::reference::Reference;
+use super::summary::{front, summarise};
+use crate::error::Error;
+use crate::image::Picture;
+use std::time::Duration;
+
+/// Confidence level of all intervals.
+pub const CONFIDENCE: f64 = 0.95;
+
+/// Why a measurement ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// Every run was made or has failed.
+    Complete,
+    /// The budget was used up.
+    Budget,
+    /// The user stopped it.
+    Stopped,
+}
+
+/// The frame of a document.
+pub struct Outline<'a> {
+    /// What was rendered or filtered.
+    pub scene: &'a SceneInfo,
+    /// Where it runs.
+    pub machine: Machine,
+    /// Seeds of the runs.
+    pub seeds: Vec<u32>,
+    /// Seed of the random order.
+    pub order_seed: u64,
+    /// Time for everything.
+    pub budget: Option<Duration>,
+    /// See [`Measurement::key`].
+    pub key: String,
+}
+
+/// A point that nothing is known of yet.
+pub fn unmeasured(method: Method, command: String) -> Point {
+    Point { method, command, runs: Vec::new(), warm_up: None, device_bytes: None, summary: None, failed: None }
+}
+
+/// Why a point failed, in one line.
+pub fn failure(e: &Error) -> String {
+    e.to_string().replace('\n', " ")
+}
+
+/// Whether runs are still to be made.
+pub fn lacks_runs(point: &Point, repeats: u32) -> bool {
+    point.failed.is_none() && point.runs.len() < repeats as usize
+}
+
+/// The document of what was measured so far, and how that ended.
+pub fn document(
+    outline: &Outline,
+    mut points: Vec<Point>,
+    reference: &Reference,
+    is_stopped: bool,
+) -> (Document, Ended) {
+    let repeats = outline.seeds.len() as u32;
+    let ended = match (points.iter().any(|point| lacks_runs(point, repeats)), is_stopped) {
+        (false, _) => Ended::Complete,
+        (true, true) => Ended::Stopped,
+        (true, false) => Ended::Budget,
+    };
+    summarise(&mut points, CONFIDENCE);
+    let machine = &outline.machine;
+    let clocks = machine.cpu_mhz.zip(machine::cpu_mhz()).map(|([first, _], last)| [first, last]);
+    let document = Document {
+        schema: SCHEMA,
+        complete: ended == Ended::Complete,
+        software: machine::software(),
+        scene: outline.scene.clone(),
+        machine: Machine { cpu_mhz: clocks, ..machine.clone() },
+        reference: reference.info.clone(),
+        measurement: Measurement {
+            repeats,
+            seeds: outline.seeds.clone(),
+            order_seed: outline.order_seed,
+            budget_minutes: outline.budget.map(|budget| budget.as_secs_f64() / 60.0),
+            confidence: CONFIDENCE,
+            key: outline.key.clone(),
+        },
+        front: front(&points),
+        findings: findings(&points, CONFIDENCE),
+        points,
+    };
+    (document, ended)
+}
+
+/// The pictures of the points that have one, and the reference.
+pub fn images(pictures: Vec<Option<Picture>>, reference: &Reference) -> Images {
+    let points = pictures.into_iter().enumerate().filter_map(|(i, picture)| Some((i, picture?))).collect();
+    Images { reference: reference.picture.clone(), points }
+}

@@ -1,0 +1,258 @@
+//! What the data of a measurement say, in words. A statement is made only where the data tell; a tie is said to be one.
+use super::curve::Curve;
+use super::document::{Estimate, Finding, Method, Point, Verdict};
+use super::interval;
+use super::summary::curves;
+use super::words::{factor, list, milliseconds, number, percent};
+use std::collections::BTreeMap;
+
+/// Number of times at which methods are compared.
+const LEVELS: usize = 8;
+/// Largest number of errors for which the time to reach them is told.
+const GOALS: usize = 4;
+
+/// A method with a curve for every seed.
+struct Candidate {
+    name: String,
+    curves: BTreeMap<u32, Curve>,
+}
+
+impl Candidate {
+    /// Times that the curves of all seeds cover.
+    fn times(&self) -> [f64; 2] {
+        let covered = |[low, high]: [f64; 2], [first, last]: [f64; 2]| [low.max(first), high.min(last)];
+        self.curves.values().map(Curve::times).fold([0.0, f64::INFINITY], covered)
+    }
+
+    fn covers(&self, time: f64) -> bool {
+        let [first, last] = self.times();
+        (first..=last).contains(&time)
+    }
+
+    /// Mean logarithm of what `read` finds on every curve.
+    fn mean(&self, read: &dyn Fn(&Curve) -> f64) -> f64 {
+        self.curves.values().map(|curve| read(curve).ln()).sum::<f64>() / self.curves.len() as f64
+    }
+
+    /// Logarithms of the quotient of what `read` finds for this method and for another one, seed by seed.
+    fn against(&self, other: &Self, read: &dyn Fn(&Curve) -> f64) -> Vec<f64> {
+        let both = |(seed, curve): (&u32, &Curve)| Some((read(curve) / read(other.curves.get(seed)?)).ln());
+        self.curves.iter().filter_map(both).collect()
+    }
+}
+
+/// Which candidate has the lowest value, and which cannot be told from it.
+#[derive(Debug, PartialEq)]
+struct Ranking {
+    /// The best one first.
+    best: Vec<usize>,
+}
+
+/// Says what the points show. Comparisons between methods use the runs of the same seed, and each family of them keeps the
+/// probability of a false statement below 1 - `confidence`.
+pub fn findings(points: &[Point], confidence: f64) -> Vec<Finding> {
+    let candidates = candidates(points);
+    let mut all: Vec<Finding> = candidates.iter().filter_map(|c| halving(c, confidence)).collect();
+    all.extend(best_by_time(&candidates, confidence));
+    all.extend(goals(&candidates, confidence));
+    all.extend(singles(points, confidence));
+    all
+}
+
+/// Methods whose points did not fail, in the order of the points.
+fn candidates(points: &[Point]) -> Vec<Candidate> {
+    let mut groups: Vec<(Method, Vec<&Point>)> = Vec::new();
+    for point in points.iter().filter(|point| point.failed.is_none() && point.method.spp > 0) {
+        let method = Method { spp: 0, ..point.method.clone() };
+        match groups.iter_mut().find(|(found, _)| *found == method) {
+            Some((_, points)) => points.push(point),
+            None => groups.push((method, vec![point])),
+        }
+    }
+    let candidate =
+        |(method, points): (Method, Vec<&Point>)| Candidate { name: method.name(), curves: curves(&points) };
+    groups.into_iter().map(candidate).filter(|candidate| !candidate.curves.is_empty()).collect()
+}
+
+/// What it costs to halve the error.
+fn halving(candidate: &Candidate, confidence: f64) -> Option<Finding> {
+    let factors: Vec<f64> = candidate.curves.values().filter_map(Curve::halving).collect();
+    let name = &candidate.name;
+    if factors.is_empty() {
+        return None;
+    }
+    let [low, high] = range(candidate);
+    let falls = factors.iter().all(|f| f.is_finite() && *f > 1.0);
+    let estimate = falls.then(|| interval::geometric_mean(&factors, confidence));
+    let told = |e: &Estimate| e.low.is_some_and(|low| low > 1.0) && e.high.is_some_and(|high| high < 100.0);
+    Some(match estimate.filter(told) {
+        Some(estimate) => clear(format!(
+            "To halve relMSE costs {} times the time with {name} (between {} and {}).",
+            factor(&estimate),
+            number(low),
+            number(high)
+        )),
+        None => noisy(format!("What it costs to halve relMSE with {name} cannot be told from these runs.")),
+    })
+}
+
+/// Smallest and largest error of a method, by the geometric mean over seeds.
+fn range(candidate: &Candidate) -> [f64; 2] {
+    [0, 1].map(|end| candidate.mean(&|curve| curve.errors()[end]).exp())
+}
+
+/// Which method is best at which time.
+fn best_by_time(candidates: &[Candidate], confidence: f64) -> Vec<Finding> {
+    let times = levels(candidates);
+    if times.is_empty() {
+        return Vec::new();
+    }
+    let alpha = (1.0 - confidence) / (times.len() * (candidates.len() - 1)).max(1) as f64;
+    let rank = |&time: &f64| {
+        let there: Vec<usize> = (0..candidates.len()).filter(|&i| candidates[i].covers(time)).collect();
+        ranking(candidates, &there, &|curve| curve.error_at(time).value, alpha)
+    };
+    let rankings: Vec<Ranking> = times.iter().map(rank).collect();
+    let mut found = Vec::new();
+    let mut first = 0;
+    for end in 1..=times.len() {
+        if end == times.len() || !same(&rankings[end], &rankings[first]) {
+            found.push(best_between(candidates, &rankings[first], &times[first..end]));
+            first = end;
+        }
+    }
+    found
+}
+
+fn same(a: &Ranking, b: &Ranking) -> bool {
+    let sorted = |ranking: &Ranking| {
+        let mut best = ranking.best.clone();
+        best.sort_unstable();
+        best
+    };
+    sorted(a) == sorted(b)
+}
+
+fn best_between(candidates: &[Candidate], ranking: &Ranking, times: &[f64]) -> Finding {
+    let (first, last) = (times[0], times[times.len() - 1]);
+    let when = match first == last {
+        true => format!("At {}", milliseconds(first)),
+        false => format!("From {} to {}", milliseconds(first), milliseconds(last)),
+    };
+    let names: Vec<&str> = ranking.best.iter().map(|&i| candidates[i].name.as_str()).collect();
+    let middle = (first * last).sqrt();
+    let error = number(candidates[ranking.best[0]].mean(&|curve| curve.error_at(middle).value).exp());
+    let at = milliseconds(middle);
+    match names[..] {
+        [name] => clear(format!("{when}, {name} has the lowest relMSE ({error} at {at}).")),
+        _ => noisy(format!(
+            "{when}, the data cannot tell between {}: the lowest relMSE is about {error} at {at}.",
+            list(&names)
+        )),
+    }
+}
+
+/// Times that at least two methods cover, evenly spaced on a logarithmic axis.
+fn levels(candidates: &[Candidate]) -> Vec<f64> {
+    let mut ends: Vec<f64> = candidates.iter().flat_map(Candidate::times).collect();
+    ends.sort_by(f64::total_cmp);
+    let contested = |time: &f64| candidates.iter().filter(|c| c.covers(*time)).count() > 1;
+    let all: Vec<f64> = ends.iter().copied().filter(contested).collect();
+    let (Some(&low), Some(&high)) = (all.first(), all.last()) else { return Vec::new() };
+    let at = |i: usize| low * (high / low).powf(i as f64 / (LEVELS - 1) as f64);
+    let times = if low < high { (0..LEVELS).map(at).collect() } else { vec![low] };
+    times.into_iter().map(|time: f64| time.clamp(low, high)).filter(contested).collect()
+}
+
+/// The lowest of what `read` finds, and all that a test at the level `alpha` cannot tell from it.
+fn ranking(candidates: &[Candidate], there: &[usize], read: &dyn Fn(&Curve) -> f64, alpha: f64) -> Ranking {
+    let value = |&i: &usize| candidates[i].mean(read);
+    let first = there.iter().copied().min_by(|a, b| value(a).total_cmp(&value(b)));
+    let Some(first) = first else { return Ranking { best: Vec::new() } };
+    let is_worse = |i: usize| interval::differs_from_0(&candidates[i].against(&candidates[first], read), alpha);
+    let ties = there.iter().copied().filter(|&i| i != first && !is_worse(i));
+    Ranking { best: std::iter::once(first).chain(ties).collect() }
+}
+
+/// The time to reach some errors, and by which method.
+fn goals(candidates: &[Candidate], confidence: f64) -> Vec<Finding> {
+    let goals = round_errors(candidates);
+    let alpha = (1.0 - confidence) / (goals.len() * candidates.len().saturating_sub(1)).max(1) as f64;
+    goals.into_iter().filter_map(|error| goal(candidates, error, alpha, confidence)).collect()
+}
+
+fn goal(candidates: &[Candidate], error: f64, alpha: f64, confidence: f64) -> Option<Finding> {
+    let reaches = |c: &Candidate| c.curves.values().all(|curve| !curve.time_of(error).extrapolated);
+    let there: Vec<usize> = (0..candidates.len()).filter(|&i| reaches(&candidates[i])).collect();
+    let read = |curve: &Curve| curve.time_of(error).value;
+    let Ranking { best } = ranking(candidates, &there, &read, alpha);
+    let fastest = &candidates[*best.first()?];
+    let times: Vec<f64> = fastest.curves.values().map(read).collect();
+    let Estimate { value, low, high } = interval::geometric_mean(&times, confidence);
+    let between = low.zip(high).map(|(l, h)| format!(" ({} to {})", milliseconds(l), milliseconds(h)));
+    let (error, time, between) = (number(error), milliseconds(value), between.unwrap_or_default());
+    let names: Vec<&str> = best.iter().map(|&i| candidates[i].name.as_str()).collect();
+    Some(match names[..] {
+        [name] => clear(format!("relMSE {error} takes at least {time}{between}, with {name}.")),
+        _ => noisy(format!(
+            "relMSE {error} takes at least {time}{between}; the data cannot tell between {}.",
+            list(&names)
+        )),
+    })
+}
+
+/// Errors of the series 1, 2, 5 that some method reaches and that it does not begin with.
+fn round_errors(candidates: &[Candidate]) -> Vec<f64> {
+    let ranges: Vec<[f64; 2]> = candidates.iter().map(range).collect();
+    let series = (-9..3).flat_map(|power| [1.0, 2.0, 5.0].map(|digit: f64| digit * 10.0_f64.powi(power)));
+    let inside = |e: &f64| ranges.iter().any(|[low, high]| (low..high).contains(&e));
+    let all: Vec<f64> = series.filter(inside).collect();
+    let step = all.len().div_ceil(GOALS).max(1);
+    all.into_iter().step_by(step).collect()
+}
+
+/// Comparison of points that do not depend on samples: filters of a given image, whose errors have no noise.
+fn singles(points: &[Point], confidence: f64) -> Vec<Finding> {
+    let usable = |point: &&Point| point.failed.is_none() && point.method.spp == 0 && !point.runs.is_empty();
+    let points: Vec<&Point> = points.iter().filter(usable).collect();
+    let error = |point: &Point| point.runs[0].errors.relmse.unwrap_or(f64::INFINITY);
+    let Some(best) = points.iter().copied().min_by(|a, b| error(a).total_cmp(&error(b))) else { return Vec::new() };
+    let lowest = error(best);
+    let ties: Vec<String> = points.iter().filter(|p| error(p) == lowest).map(|p| p.method.name()).collect();
+    let names: Vec<&str> = ties.iter().map(String::as_str).collect();
+    let mut found = vec![match names[..] {
+        [name] => clear(format!("{name} has the lowest relMSE, {}.", number(lowest))),
+        _ => noisy(format!("{} have the same relMSE, {}.", list(&names), number(lowest))),
+    }];
+    let others = points.iter().filter(|point| point.method != best.method && point.method.filter != "none");
+    found.extend(others.map(|point| beside(point, best, confidence)));
+    found
+}
+
+/// Time and error of one filter beside the most accurate one.
+fn beside(point: &Point, best: &Point, confidence: f64) -> Finding {
+    let ratio = |(a, b): (&super::document::Run, &super::document::Run)| a.gpu_ms / b.gpu_ms;
+    let ratios: Vec<f64> = point.runs.iter().zip(&best.runs).map(ratio).collect();
+    let times = interval::geometric_mean(&ratios, confidence);
+    let logarithms: Vec<f64> = ratios.iter().map(|r| r.ln()).collect();
+    let (name, other) = (point.method.name(), best.method.name());
+    let error = |point: &Point| point.runs[0].errors.relmse.unwrap_or_default();
+    let more = percent(error(point) / error(best) - 1.0);
+    match interval::differs_from_0(&logarithms, 1.0 - confidence) {
+        true => clear(format!(
+            "{name} takes {} times the time of {other}, and its relMSE is {more} higher.",
+            factor(&times)
+        )),
+        false => {
+            noisy(format!("Whether {name} or {other} is faster the data cannot tell; its relMSE is {more} higher."))
+        }
+    }
+}
+
+fn clear(text: String) -> Finding {
+    Finding { verdict: Verdict::Clear, text }
+}
+
+fn noisy(text: String) -> Finding {
+    Finding { verdict: Verdict::TooNoisy, text }
+}

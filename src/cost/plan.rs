@@ -1,0 +1,86 @@
+//! What is to be measured, and how it is watched.
+use super::document::{Document, Method, SceneInfo};
+use super::grid::Candidate;
+use super::reference::Reference;
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::memory;
+use crate::render::settings::Settings;
+use crate::scene::{Fingerprint, Scene};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// What is to be measured, and how.
+pub struct Plan {
+    /// The scene, for the reader of the document.
+    pub scene: SceneInfo,
+    /// Settings of the scene, which the candidates change.
+    pub base: Settings,
+    /// The points.
+    pub candidates: Vec<Candidate>,
+    /// Command lines of the points.
+    pub commands: Vec<String>,
+    /// Runs of each point.
+    pub repeats: u32,
+    /// Seed of the random order.
+    pub order_seed: u64,
+    /// Time for everything.
+    pub budget: Option<Duration>,
+    /// A reference of the user's.
+    pub reference: Option<Reference>,
+    /// Most samples per pixel of a reference that is rendered.
+    pub reference_spp: u32,
+    /// Folder in which rendered references are kept.
+    pub cache: Option<PathBuf>,
+}
+
+/// How a measurement is watched and stopped.
+pub struct Watch<'a> {
+    /// Whether the user wants it to stop.
+    pub stop: &'a dyn Fn() -> bool,
+    /// Told what is done, how much of it, and of how much.
+    pub progress: &'a dyn Fn(&str, u64, u64),
+    /// Given what there is after every round, so that a crash loses no more than one.
+    pub keep: &'a dyn Fn(&Document),
+}
+
+/// Identifies what is measured, where and how.
+pub fn key(gpu: &Gpu, scene: &Scene, plan: &Plan) -> String {
+    let mut key = Fingerprint::default();
+    let scene = scene.fingerprint([plan.base.width, plan.base.height]).map(|f| f.to_string()).unwrap_or_default();
+    let methods: Vec<&Method> = plan.candidates.iter().map(|candidate| &candidate.method).collect();
+    let given = plan.reference.as_ref().map(|reference| &reference.info);
+    let info = gpu.info();
+    let parts = [
+        scene,
+        text(&plan.base),
+        text(&methods),
+        text(&given),
+        text(&(plan.repeats, plan.order_seed)),
+        text(&(&info.name, &info.driver_name, &info.driver_version)),
+    ];
+    parts.iter().for_each(|part| key.add(part.as_bytes()));
+    key.add(&crate::shaders::HASH.to_le_bytes());
+    key.to_string()
+}
+
+fn text(value: &impl serde::Serialize) -> String {
+    serde_json::to_string(value).unwrap_or_default()
+}
+
+/// Seeds of the runs.
+pub fn seeds(base: &Settings, repeats: u32) -> Vec<u32> {
+    (0..repeats).map(|i| base.seed.wrapping_add(i)).collect()
+}
+
+/// The pictures of all points, the reference and what judging takes must fit into memory.
+///
+/// # Errors
+/// [`Error::Memory`].
+pub fn check_room(plan: &Plan) -> Result<()> {
+    let pictures = plan.candidates.len() as u64 + 16;
+    let bytes = plan.base.pixels() as u64 * size_of::<[f32; 3]>() as u64 * pictures;
+    memory::check(bytes).map_err(|what| {
+        Error::Memory(format!("a grid of {} points {what}: choose fewer, or a smaller film", plan.candidates.len()))
+    })
+}

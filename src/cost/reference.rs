@@ -1,0 +1,86 @@
+//! The image that errors are measured against: given by the user, or rendered until its own noise is small beside the errors.
+use super::document::{NoiseKind, ReferenceInfo, ReferenceSource};
+use super::judge::Noise;
+use crate::error::{Error, Result};
+use crate::image::metrics;
+use crate::image::{self, Film, Picture};
+use crate::render::provenance::Provenance;
+use crate::render::settings::Settings;
+use crate::scene::Scene;
+use std::path::Path;
+
+/// A reference, and what is known of its noise.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    /// The image.
+    pub picture: Picture,
+    /// Its measured noise; 0 where it was not measured.
+    pub noise: Noise,
+    /// Where it comes from.
+    pub info: ReferenceInfo,
+}
+
+/// Reads a reference of the user's and checks that it can be one for a film of `size`. With a scene, a file that Tallow rendered
+/// must show it.
+///
+/// # Errors
+/// [`Error::Input`] and [`Error::Memory`].
+pub fn read(path: &Path, size: [u32; 2], shows: Option<(&Scene, &Settings)>) -> Result<Reference> {
+    let film = image::read(path)?;
+    let wrong = |what: String| Error::input(path, what);
+    if [film.width, film.height] != size {
+        let what = format!(
+            "is {}x{}, but {}x{} is measured: take a reference of that size",
+            film.width, film.height, size[0], size[1]
+        );
+        return Err(wrong(what));
+    }
+    let picture = film.picture(None).map_err(wrong)?;
+    if picture.non_finite() > 0 {
+        return Err(wrong(format!("{} pixels are NaN or infinite, which no metric can weigh", picture.non_finite())));
+    }
+    let provenance = Provenance::of(&film).ok();
+    let mut notes = Vec::new();
+    if let (Some(provenance), Some((scene, settings))) = (&provenance, shows) {
+        provenance.shows(scene, settings).map_err(|what| wrong(format!("{what}: it is no reference for that")))?;
+        notes.extend(differences(&provenance.settings, settings));
+    }
+    let bound = bound(&film, &picture);
+    Ok(Reference {
+        noise: Noise::default(),
+        info: ReferenceInfo {
+            source: ReferenceSource::Given,
+            path: Some(path.display().to_string()),
+            spp: provenance.map(|provenance| provenance.samples_per_pixel()),
+            noise: if bound.is_some() { NoiseKind::Bound } else { NoiseKind::Unknown },
+            mse: bound.map(|noise| noise.mse),
+            relmse: bound.map(|noise| noise.relmse),
+            notes,
+        },
+        picture,
+    })
+}
+
+/// Upper bound of a file's noise, from its layer of variances.
+fn bound(film: &Film, picture: &Picture) -> Option<Noise> {
+    let variance = film.picture(Some("variance")).ok().filter(|variance| variance.non_finite() == 0)?;
+    let noise = noise_of(picture, &variance.pixels);
+    (noise.mse > 0.0).then_some(noise)
+}
+
+/// Expected errors of a picture with these squared standard errors.
+pub fn noise_of(picture: &Picture, variance: &[[f32; 3]]) -> Noise {
+    let sum: f64 = variance.iter().flatten().map(|&v| f64::from(v)).sum();
+    Noise { mse: sum / (3 * variance.len()) as f64, relmse: metrics::relative_noise(picture, variance) }
+}
+
+/// Settings that change the expected image and that a file was rendered with other values of.
+fn differences(of_file: &serde_json::Value, settings: &Settings) -> Vec<String> {
+    let ours = serde_json::to_value(settings).unwrap_or_default();
+    let differs = |key: &&str| of_file.get(*key).is_some_and(|value| ours.get(*key) != Some(value));
+    let note = |key: &str| {
+        let (theirs, ours) = (&of_file[key], &ours[key]);
+        format!("the reference was rendered with {} {theirs} instead of {ours}", key.replace('_', "-"))
+    };
+    ["filter", "max_depth", "clamp_indirect"].into_iter().filter(differs).map(note).collect()
+}

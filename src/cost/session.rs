@@ -1,0 +1,249 @@
+//! Renders the shots of a grid and filters them, with the clock on.
+use super::converge::picture;
+use super::document::{Pass, Run, WarmUp};
+use super::grid::{Candidate, Shot};
+use crate::denoise::filter::Method;
+use crate::denoise::{Colour, Demodulation, Noisy, Recipe, Timed, filter, host_bytes, timed};
+use crate::error::{Error, Result};
+use crate::gpu::{FrameResources, Gpu, PassTime};
+use crate::image::Picture;
+use crate::memory;
+use crate::render::{Job, Renderer, Status, StopReason, film};
+use crate::scene::Scene;
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+/// Part of the device's largest heap that warm renderers may take together.
+const KEPT_SHARE: u64 = 4;
+
+/// Renderers that are kept warm, and what they render.
+pub struct Session<'a> {
+    gpu: &'a Gpu,
+    scene: &'a Scene,
+    candidates: &'a [Candidate],
+    shots: &'a [Shot],
+    warm: Vec<Option<Warm>>,
+    frame: FrameResources,
+}
+
+/// A renderer that has rendered its shot once.
+struct Warm {
+    renderer: Renderer,
+    costs: WarmUp,
+    device_bytes: u64,
+}
+
+/// One measured point, not judged yet.
+pub struct Measured {
+    /// Index of the candidate.
+    pub point: usize,
+    /// Its times; the errors are missing.
+    pub run: Run,
+    /// Its image.
+    pub picture: Picture,
+    /// What its first use took.
+    pub warm_up: WarmUp,
+    /// Device memory that it took.
+    pub device_bytes: u64,
+}
+
+/// The points of one shot, each measured or failed. Empty if it was stopped.
+pub type Outcome = Vec<(usize, Result<Measured>)>;
+
+/// The render of a shot.
+struct Rendered {
+    gpu_ms: f64,
+    wall: Duration,
+    passes: Vec<Pass>,
+    samples: u64,
+    rays: u64,
+}
+
+impl<'a> Session<'a> {
+    /// Begins with no renderer.
+    ///
+    /// # Errors
+    /// [`Error::Device`], also for a device that does not tell times.
+    pub fn new(gpu: &'a Gpu, scene: &'a Scene, candidates: &'a [Candidate], shots: &'a [Shot]) -> Result<Self> {
+        check_clock(gpu)?;
+        let warm = shots.iter().map(|_| None).collect();
+        Ok(Self { gpu, scene, candidates, shots, warm, frame: FrameResources::new(gpu)? })
+    }
+
+    /// Renders a shot with a seed and filters it for its points, in the order of `points`.
+    pub fn run(&mut self, shot: usize, seed: u32, points: &[usize], stop: &dyn Fn() -> bool) -> Outcome {
+        let failed = |e: Error| points.iter().map(|&point| (point, Err(again(&e)))).collect();
+        let rendered = match self.render(shot, seed, stop) {
+            Ok(Some(rendered)) => rendered,
+            Ok(None) => return Vec::new(),
+            Err(e) => {
+                self.warm[shot] = None;
+                return failed(e);
+            }
+        };
+        points.iter().map(|&point| (point, self.measured(shot, seed, point, &rendered))).collect()
+    }
+
+    /// `None` if it was stopped.
+    fn render(&mut self, shot: usize, seed: u32, stop: &dyn Fn() -> bool) -> Result<Option<Rendered>> {
+        if self.warm[shot].is_none() && !self.warm_up(shot, seed, stop)? {
+            return Ok(None);
+        }
+        let Some(Warm { renderer, .. }) = &mut self.warm[shot] else { return Ok(None) };
+        renderer.set_seed(seed);
+        let Some((status, wall)) = trace(renderer, &mut self.frame, stop)? else { return Ok(None) };
+        if let Some(broken) = status.broken_samples {
+            return Err(Error::Device(format!("{} samples were no number", broken.count)));
+        }
+        let [rays, of] = Job::new(renderer).rays_of_a_few(&status)?;
+        let passes = passes(&status.times);
+        Ok(Some(Rendered {
+            gpu_ms: passes.iter().map(|pass| pass.ms).sum(),
+            wall,
+            passes,
+            samples: status.traced,
+            rays: (status.traced as f64 * rays as f64 / of.max(1) as f64) as u64,
+        }))
+    }
+
+    /// Makes a renderer and runs it once, so that the driver has compiled everything. Returns false if it was stopped.
+    fn warm_up(&mut self, shot: usize, seed: u32, stop: &dyn Fn() -> bool) -> Result<bool> {
+        let Shot { settings, outputs, .. } = &self.shots[shot];
+        let info = self.gpu.info();
+        if self.gpu.allocated_bytes() > info.memory_heap / KEPT_SHARE {
+            self.warm.iter_mut().for_each(|warm| *warm = None);
+        }
+        self.check_room(shot)?;
+        let before = self.gpu.allocated_bytes();
+        let begun = Instant::now();
+        let mut renderer = Renderer::new(self.gpu, self.scene, settings, *outputs)?;
+        let compile_ms = milliseconds(begun.elapsed());
+        renderer.set_seed(seed);
+        let Some((_, wall)) = trace(&renderer, &mut self.frame, stop)? else { return Ok(false) };
+        let device_bytes = self.gpu.allocated_bytes().saturating_sub(before);
+        let costs = WarmUp { compile_ms, first_run_ms: milliseconds(wall) };
+        self.warm[shot] = Some(Warm { renderer, costs, device_bytes });
+        Ok(true)
+    }
+
+    fn check_room(&self, shot: usize) -> Result<()> {
+        let Shot { settings, points, .. } = &self.shots[shot];
+        let unified = self.gpu.info().unified;
+        let filters = points.iter().filter_map(|&point| self.candidates[point].filter);
+        let filtered = filters.map(|row| host_bytes(Method::Kernels(row), settings, unified)).max().unwrap_or(0);
+        let bytes = film::host_bytes(settings, unified).max(filtered);
+        memory::check(bytes).map_err(|what| Error::Memory(format!("rendering {what}: choose a smaller film")))
+    }
+
+    fn measured(&self, shot: usize, seed: u32, point: usize, rendered: &Rendered) -> Result<Measured> {
+        let Some(Warm { renderer, costs, device_bytes }) = &self.warm[shot] else {
+            return Err(Error::Device("the renderer is gone".to_owned()));
+        };
+        let mut run = Run {
+            seed,
+            gpu_ms: rendered.gpu_ms,
+            wall_ms: milliseconds(rendered.wall),
+            passes: rendered.passes.clone(),
+            samples: rendered.samples,
+            rays: Some(rendered.rays),
+            errors: Default::default(),
+        };
+        let candidate = &self.candidates[point];
+        let Some(row) = candidate.filter else {
+            let picture = finite(picture(renderer)?)?;
+            return Ok(Measured { point, run, picture, warm_up: *costs, device_bytes: *device_bytes });
+        };
+        let settings = |scales: &filter::Scales| candidate.filter_settings.scaled_by(scales);
+        let recipe = Recipe {
+            method: Method::Kernels(row),
+            demodulation: Demodulation::default(),
+            fireflies: None,
+            settings: &settings,
+        };
+        let filtered = timed(self.gpu, Noisy::of_film(renderer)?, &recipe)?;
+        let warm_up = add_filter(&mut run, costs, &filtered);
+        let device_bytes = device_bytes + filtered.device_bytes;
+        let size = [renderer.settings().width, renderer.settings().height];
+        let picture = finite(interleaved(size, &filtered.colour))?;
+        Ok(Measured { point, run, picture, warm_up, device_bytes })
+    }
+}
+
+/// Checks that a device tells times.
+///
+/// # Errors
+/// [`Error::Device`].
+pub fn check_clock(gpu: &Gpu) -> Result<()> {
+    match gpu.info().timestamp_bits {
+        0 => Err(Error::Device(format!("{} has no timestamps: choose another device", gpu.info().name))),
+        _ => Ok(()),
+    }
+}
+
+/// Adds the times of a filter to those of a render, and returns what the first use of both took.
+pub fn add_filter(run: &mut Run, render: &WarmUp, filtered: &Timed) -> WarmUp {
+    let passes = passes(&filtered.times);
+    run.gpu_ms += passes.iter().map(|pass| pass.ms).sum::<f64>();
+    run.wall_ms += milliseconds(filtered.wall);
+    run.passes.extend(passes);
+    WarmUp {
+        compile_ms: render.compile_ms + milliseconds(filtered.compile),
+        first_run_ms: render.first_run_ms + milliseconds(filtered.first_run),
+    }
+}
+
+/// A picture of three planes.
+pub fn interleaved([width, height]: [u32; 2], [r, g, b]: &Colour) -> Picture {
+    let pixels = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
+    Picture { width, height, pixels }
+}
+
+/// Refuses what no metric can weigh.
+///
+/// # Errors
+/// [`Error::Device`].
+pub fn finite(picture: Picture) -> Result<Picture> {
+    match picture.non_finite() {
+        0 => Ok(picture),
+        n => Err(Error::Device(format!("{n} of {} pixels are NaN or infinite", picture.pixels.len()))),
+    }
+}
+
+/// Runs a whole render, and returns its wall time. `None` if it was stopped.
+fn trace(
+    renderer: &Renderer,
+    frame: &mut FrameResources,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<(Status, Duration)>> {
+    let mut between = |_: &Status| Ok(if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) });
+    let begun = Instant::now();
+    let status = Job::new(renderer).run(frame, &mut between)?;
+    let wall = begun.elapsed();
+    Ok((status.stopped != StopReason::Interrupted).then_some((status, wall)))
+}
+
+/// Sums of the times by pass, in the order in which the passes first ran.
+fn passes(times: &[PassTime]) -> Vec<Pass> {
+    let mut passes: Vec<Pass> = Vec::new();
+    for time in times {
+        let ms = time.duration_ns() as f64 * 1e-6;
+        match passes.iter_mut().find(|pass| pass.pass == time.name) {
+            Some(pass) => (pass.calls, pass.ms) = (pass.calls + 1, pass.ms + ms),
+            None => passes.push(Pass { pass: time.name.to_owned(), calls: 1, ms }),
+        }
+    }
+    passes
+}
+
+/// The same error once more, for each of several points.
+fn again(e: &Error) -> Error {
+    match e {
+        Error::Usage(what) => Error::Usage(what.clone()),
+        Error::Memory(what) => Error::Memory(what.clone()),
+        other => Error::Device(other.to_string()),
+    }
+}
+
+fn milliseconds(time: Duration) -> f64 {
+    time.as_secs_f64() * 1e3
+}

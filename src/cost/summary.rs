@@ -1,0 +1,118 @@
+//! From raw runs to summaries: medians, means, intervals, and factors relative to uniform unfiltered rendering.
+use super::curve::{Curve, Reading};
+use super::document::{Errors, Estimate, Factor, Pass, Point, Run, Summary};
+use super::interval;
+use std::collections::BTreeMap;
+
+/// Curves of uniform unfiltered rendering by seed.
+type Baseline = BTreeMap<u32, Curve>;
+
+/// Fills in the summary of every point that has runs.
+pub fn summarise(points: &mut [Point], confidence: f64) {
+    let baseline = baseline(points);
+    for point in points.iter_mut().filter(|point| !point.runs.is_empty()) {
+        point.summary = Some(summary(&point.runs, &baseline, confidence));
+    }
+}
+
+/// The Pareto front of the medians: indices of points that no other point beats in both time and relMSE, the fastest first. Of
+/// points that are equal in both, the first stays.
+pub fn front(points: &[Point]) -> Vec<usize> {
+    let mut candidates: Vec<_> = (0..points.len()).filter_map(|i| Some((place(&points[i])?, i))).collect();
+    candidates.sort_by(|((t, e), i), ((u, f), j)| t.total_cmp(u).then(e.total_cmp(f)).then(i.cmp(j)));
+    let mut lowest = f64::INFINITY;
+    let mut front = Vec::new();
+    for ((_, error), index) in candidates {
+        if error < lowest {
+            lowest = error;
+            front.push(index);
+        }
+    }
+    front
+}
+
+/// Time and relMSE of a point that did not fail.
+fn place(point: &Point) -> Option<(f64, f64)> {
+    let summary = point.summary.as_ref().filter(|_| point.failed.is_none())?;
+    Some((summary.gpu_ms.value, summary.errors.relmse?.value))
+}
+
+/// The curves that factors refer to. Seeds that not all of its points have run yet are left out, so that every seed has the same
+/// points.
+fn baseline(points: &[Point]) -> Baseline {
+    let usable = |point: &&Point| point.method.is_baseline() && point.failed.is_none() && !point.runs.is_empty();
+    curves(&points.iter().filter(usable).collect::<Vec<_>>())
+}
+
+/// Curves through the runs of some points, by seed, where all points have run it and have an error above 0.
+pub(super) fn curves(points: &[&Point]) -> Baseline {
+    let mut places: BTreeMap<u32, Vec<(f64, f64)>> = BTreeMap::new();
+    for run in points.iter().flat_map(|point| &point.runs) {
+        places.entry(run.seed).or_default().extend(run.errors.relmse.map(|error| (run.gpu_ms, error)));
+    }
+    places.retain(|_, places| places.len() == points.len());
+    places.into_iter().filter_map(|(seed, places)| Some((seed, Curve::new(&places)?))).collect()
+}
+
+fn summary(runs: &[Run], baseline: &Baseline, confidence: f64) -> Summary {
+    let median = |of: fn(&Run) -> f64| interval::median(&runs.iter().map(of).collect::<Vec<_>>(), confidence);
+    let inefficiency = |run: &Run| Some(run.errors.relmse? * run.gpu_ms * 1e-3);
+    Summary {
+        gpu_ms: median(|run| run.gpu_ms),
+        wall_ms: median(|run| run.wall_ms),
+        passes: passes(runs),
+        errors: errors(runs, confidence),
+        inefficiency: mean_of_all(runs, confidence, inefficiency),
+        speed_up: factor(runs, baseline, confidence, |curve, run, error| {
+            let Reading { value, extrapolated } = curve.time_of(error);
+            Reading { value: value / run.gpu_ms, extrapolated }
+        }),
+        error_gain: factor(runs, baseline, confidence, |curve, run, error| {
+            let Reading { value, extrapolated } = curve.error_at(run.gpu_ms);
+            Reading { value: value / error, extrapolated }
+        }),
+    }
+}
+
+/// Median time of every pass, in the order of the first run.
+fn passes(runs: &[Run]) -> Vec<Pass> {
+    let of = |name: &str| -> Vec<f64> {
+        let found = |run: &Run| run.passes.iter().find(|pass| pass.pass == name).map_or(0.0, |pass| pass.ms);
+        runs.iter().map(found).collect()
+    };
+    let median = |pass: &Pass| Pass { ms: interval::median(&of(&pass.pass), 0.0).value, ..pass.clone() };
+    runs[0].passes.iter().map(median).collect()
+}
+
+fn errors(runs: &[Run], confidence: f64) -> Errors<Estimate> {
+    let metric = |i: usize| mean_of_all(runs, confidence, |run| run.errors.values()[i]);
+    Errors::from_values(std::array::from_fn(metric))
+}
+
+/// The mean over all runs; `None` if one of them has no value.
+fn mean_of_all(runs: &[Run], confidence: f64, of: impl Fn(&Run) -> Option<f64>) -> Option<Estimate> {
+    let values: Option<Vec<f64>> = runs.iter().map(of).collect();
+    values.map(|values| interval::mean(&values, confidence))
+}
+
+/// A factor of every run relative to the curve of its own seed, and the geometric mean of these factors.
+fn factor(
+    runs: &[Run],
+    baseline: &Baseline,
+    confidence: f64,
+    of: impl Fn(&Curve, &Run, f64) -> Reading,
+) -> Option<Factor> {
+    let reading = |run: &Run| {
+        let error = run.errors.relmse.filter(|&error| error > 0.0)?;
+        Some(of(baseline.get(&run.seed)?, run, error))
+    };
+    let readings: Vec<Reading> = runs.iter().filter_map(reading).collect();
+    if readings.is_empty() {
+        return None;
+    }
+    let values: Vec<f64> = readings.iter().map(|reading| reading.value).collect();
+    Some(Factor {
+        estimate: interval::geometric_mean(&values, confidence),
+        extrapolated: readings.iter().any(|reading| reading.extrapolated),
+    })
+}

@@ -1,0 +1,92 @@
+//! One image filtered as [`Filtered`](super::Filtered) does it, to the same bits, but with kernels that have run before: what the
+//! filter costs once its first use is over.
+use super::demodulated::Demodulated;
+use super::demodulation::Demodulation;
+use super::filter::{self, Filter, Method, Planes, Scales};
+use super::filtered::{Colour, Recipe, colour};
+use super::noisy::Noisy;
+use crate::error::{Error, Result};
+use crate::gpu::{FrameResources, Gpu, PassTime, Recorder};
+use std::time::{Duration, Instant};
+
+/// A filtered image, and what it took.
+pub struct Timed {
+    /// The image.
+    pub colour: Colour,
+    /// Every pass of one command buffer that filters the image.
+    pub times: Vec<PassTime>,
+    /// Wall time of that command buffer.
+    pub wall: Duration,
+    /// Wall time of making kernels, planes and pipelines.
+    pub compile: Duration,
+    /// Wall time of the first run, in which drivers compile what they put off.
+    pub first_run: Duration,
+    /// Device memory in bytes that the filter and its planes take.
+    pub device_bytes: u64,
+}
+
+/// The compiled kernels and planes for one image.
+struct Chain<'a> {
+    noisy: Noisy,
+    parts: Demodulated,
+    filter: Box<dyn Filter>,
+    /// For direct light that some pixels lack.
+    direct: Option<(Planes, Box<dyn Filter>)>,
+    gpu: &'a Gpu,
+}
+
+/// Filters `noisy` twice and times the second run. Fireflies are not cut.
+///
+/// # Errors
+/// [`crate::error::Error::Usage`] for settings out of range, [`crate::error::Error::Device`] when the image is too large or the
+/// device fails.
+pub fn timed(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Timed> {
+    let before = gpu.allocated_bytes();
+    let begun = Instant::now();
+    let chain = Chain::new(gpu, noisy, recipe)?;
+    let compile = begun.elapsed();
+    let device_bytes = gpu.allocated_bytes().saturating_sub(before);
+    let (_, first_run) = chain.run()?;
+    let (times, wall) = chain.run()?;
+    Ok(Timed { colour: colour(&chain.parts.picture)?, times, wall, compile, first_run, device_bytes })
+}
+
+impl<'a> Chain<'a> {
+    fn new(gpu: &'a Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Self> {
+        filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
+        let demodulation = noisy.holds().demodulation(recipe.demodulation);
+        let in_paint = demodulation == Demodulation::Light && noisy.lacks_direct_light()?;
+        let parts = Demodulated::new(gpu, &noisy, demodulation, in_paint)?;
+        // The scales that settings count in are those of the light that is filtered.
+        gpu.run(&mut FrameResources::new(gpu)?, |rec| parts.record_split(rec, &noisy))?;
+        let scales = Scales::of_planes(&parts.planes)?;
+        let Method::Kernels(row) = recipe.method else {
+            return Err(Error::Usage("oidn has no passes to time: choose another filter".to_owned()));
+        };
+        let compiled = |scales: &Scales| row.compile(gpu, &(recipe.settings)(scales), parts.planes.size);
+        let of_direct = |planes: Planes| {
+            let filter = compiled(&scales.with_light(&planes.radiance)?)?;
+            Ok((planes, filter))
+        };
+        let direct = parts.direct_planes().map(of_direct).transpose()?;
+        Ok(Self { filter: compiled(&scales)?, direct, parts, noisy, gpu })
+    }
+
+    /// All passes in one command buffer, as an engine would record them.
+    fn run(&self) -> Result<(Vec<PassTime>, Duration)> {
+        let mut frame = FrameResources::new(self.gpu)?;
+        let begun = Instant::now();
+        let times = self.gpu.run(&mut frame, |rec| self.record(rec))?;
+        Ok((times, begun.elapsed()))
+    }
+
+    fn record(&self, rec: &mut Recorder) -> Result<()> {
+        self.parts.record_split(rec, &self.noisy)?;
+        self.filter.record(rec, &self.parts.planes)?;
+        if let Some((planes, filter)) = &self.direct {
+            filter.record(rec, planes)?;
+            self.parts.record_direct_join(rec)?;
+        }
+        self.parts.record_join(rec)
+    }
+}

@@ -1,0 +1,48 @@
+//! What all charts of a page have in common. Colours are variables of `style.css`, so that one chart fits light and dark pages.
+use kuva::render::layout::Layout;
+use kuva::render::plots::Plot;
+use kuva::render::theme::Theme;
+
+/// Number of colours in `style.css`: `--c0`, `--c1` and so on.
+const COLOURS: usize = 8;
+
+/// The colour of the series with this index.
+pub fn colour(index: usize) -> String {
+    format!("var(--c{})", index % COLOURS)
+}
+
+/// Colour of what belongs to no series.
+pub const INK: &str = "var(--ink)";
+/// Colour of what is less important.
+pub const FAINT: &str = "var(--faint)";
+
+/// Layout for these plots.
+pub fn layout(plots: &[Plot], width: f64, height: f64) -> Layout {
+    let ink = || INK.to_owned();
+    let theme = Theme {
+        background: "none".to_owned(),
+        axis_color: ink(),
+        grid_color: "var(--grid)".to_owned(),
+        tick_color: ink(),
+        text_color: ink(),
+        legend_bg: "none".to_owned(),
+        legend_border: "none".to_owned(),
+        ..Theme::light()
+    };
+    let layout = Layout::auto_from_plots(plots).with_theme(theme).with_width(width).with_height(height);
+    layout.with_font_family("system-ui, sans-serif").with_legend_box(false)
+}
+
+/// Draws SVG to be put into a page: it scales with the page, and names no address of a schema.
+pub fn svg(plots: Vec<Plot>, layout: Layout, label: &str) -> String {
+    let svg = kuva::render_to_svg(plots, layout);
+    let size = |name: &str| {
+        let rest = svg.split_once(&format!("{name}=\""))?.1;
+        rest.split_once('"')?.0.parse::<f64>().ok()
+    };
+    let (width, height) = (size("width").unwrap_or(1.0), size("height").unwrap_or(1.0));
+    // Inside HTML the namespace is known.
+    let plain = svg.replacen(r#" xmlns="http://www.w3.org/2000/svg""#, "", 1);
+    let head = format!(r#"<svg viewBox="0 0 {width} {height}" role="img" aria-label="{label}""#);
+    plain.replacen("<svg", &head, 1)
+}

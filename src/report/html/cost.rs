@@ -1,0 +1,115 @@
+//! The page of a cost measurement.
+use super::error_chart::{self, Chart, METRICS};
+use super::number::{percent, short};
+use super::page::Table;
+use super::pass_chart::{self, Unit};
+use super::viewer::{Image, Viewer};
+use super::{Frame, pass_table, point_table};
+use crate::cost::Images;
+use crate::cost::document::{Document, NoiseKind, Point, ReferenceInfo, ReferenceSource, Verdict};
+use askama::Template;
+
+/// What `cost.html` shows.
+#[derive(Template)]
+#[template(path = "cost.html")]
+struct CostPage<'a> {
+    frame: Frame<'a>,
+    document: &'a Document,
+    facts: Vec<(String, String)>,
+    confidence: String,
+    reference_notes: &'a [String],
+    charts: Vec<Chart>,
+    points: Table,
+    milliseconds: String,
+    shares: String,
+    passes: Table,
+    failed: Table,
+    not_reached: Vec<String>,
+    commands: Table,
+    viewer: String,
+}
+
+/// The page of a measurement, as the content of a file. Points without an image are in its tables and plots all the same.
+pub fn cost(document: &Document, images: Option<&Images>) -> String {
+    let title = format!("What accuracy costs: {}", document.scene.name);
+    let page = CostPage {
+        frame: Frame::new(&title),
+        document,
+        facts: facts(document),
+        confidence: percent(document.measurement.confidence),
+        reference_notes: &document.reference.notes,
+        charts: METRICS.iter().map(|&metric| error_chart::draw(document, metric)).collect(),
+        points: point_table::measured(document),
+        milliseconds: pass_chart::draw(document, Unit::Milliseconds),
+        shares: pass_chart::draw(document, Unit::Share),
+        passes: pass_table::table(document),
+        failed: point_table::failed(document),
+        not_reached: point_table::not_reached(document),
+        commands: point_table::commands(document),
+        viewer: images.map(|images| viewer(document, images).html()).unwrap_or_default(),
+    };
+    page.to_string()
+}
+
+impl CostPage<'_> {
+    /// Whether a finding leaves its question open.
+    fn is_open(verdict: &Verdict) -> bool {
+        *verdict == Verdict::TooNoisy
+    }
+}
+
+fn facts(document: &Document) -> Vec<(String, String)> {
+    let Document { scene, machine, measurement, software, .. } = document;
+    let commit = software.commit.as_ref().map(|commit| format!(", commit {commit}")).unwrap_or_default();
+    let runs = format!("{} runs of each point, {} % intervals", measurement.repeats, percent(measurement.confidence));
+    let cores = if machine.cores == 1 { "1 core".to_owned() } else { format!("{} cores", machine.cores) };
+    let facts = [
+        ("scene", format!("{}, {} x {} pixels", scene.path, scene.width, scene.height)),
+        ("device", format!("{} ({}), {}", machine.device, machine.kind, machine.driver)),
+        ("processor", format!("{}, {cores}", machine.cpu)),
+        ("reference", reference(&document.reference)),
+        ("measured", runs),
+        ("program", format!("Tallow {}{commit}", software.version)),
+    ];
+    facts.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+}
+
+fn reference(reference: &ReferenceInfo) -> String {
+    let mut text = match (reference.source, &reference.path) {
+        (ReferenceSource::Given, Some(path)) => path.clone(),
+        (ReferenceSource::Given, None) => "given".to_owned(),
+        (ReferenceSource::Rendered, _) => "rendered".to_owned(),
+    };
+    if let Some(spp) = reference.spp {
+        text += &format!(", {spp} samples per pixel");
+    }
+    let relmse = reference.relmse.map(short);
+    text += &match (reference.noise, relmse) {
+        (NoiseKind::Measured, Some(relmse)) => format!("; its own relMSE, {relmse}, is subtracted"),
+        (NoiseKind::Bound, Some(relmse)) => format!("; its own relMSE, not subtracted, is at most {relmse}"),
+        _ => "; its own noise is unknown".to_owned(),
+    };
+    text
+}
+
+/// Every point that has an image, and the reference. If the page would be too large, points off the front go first, and of these
+/// the last.
+fn viewer<'a>(document: &Document, images: &'a Images) -> Viewer<'a> {
+    let mut shots: Vec<Image> = Vec::new();
+    for (index, picture) in &images.points {
+        let Some(point) = document.points.get(*index) else { continue };
+        let place = 1 + shots.len();
+        let is_first = document.front.contains(index) || point.method.is_baseline();
+        let rank = if is_first { place } else { place + images.points.len() };
+        shots.push(Image { name: point.method.label(), caption: caption(point), picture, rank });
+    }
+    let reference = Image { name: "reference".into(), caption: String::new(), picture: &images.reference, rank: 0 };
+    shots.push(reference);
+    Viewer { group: "points".to_owned(), reference: Some(shots.len() - 1), images: shots }
+}
+
+fn caption(point: &Point) -> String {
+    let Some(summary) = &point.summary else { return String::new() };
+    let relmse = summary.errors.relmse.map(|e| format!(", relMSE {}", short(e.value))).unwrap_or_default();
+    format!("{} ms{relmse}", short(summary.gpu_ms.value))
+}
