@@ -1,4 +1,5 @@
 //! Tests of image files and metrics.
+mod cost;
 mod damage;
 mod files;
 #[path = "../support/flat.rs"]
