@@ -18,7 +18,8 @@ const METHODS: [(&str, &str, f64, f64, f64); 7] = [
 /// A measurement of the scene of this name, with one point that failed and one that was not reached.
 pub fn document(name: &str) -> Document {
     let mut points: Vec<Point> = METHODS.iter().flat_map(|method| SPP.map(|spp| measured(*method, spp))).collect();
-    let method = Method { allocate: "both".into(), filter: "svgf".into(), rounds: Some(3), options: Vec::new(), spp: 4 };
+    let method =
+        Method { allocate: "both".into(), filter: "svgf".into(), rounds: Some(3), options: Vec::new(), spp: 4 };
     points.push(Point { failed: Some("filter svgf: the image has no normals".into()), ..empty(method.clone()) });
     points.push(empty(Method { spp: 16, ..method }));
     let front = vec![0, 30, 31, 32, 33, 34];
@@ -93,7 +94,11 @@ fn measured((allocate, filter, filter_ms, at_one, stays): (&str, &str, f64, f64,
         passes.extend([pass("apportion", 0.6), pass("scan", 0.3), pass("sample_list", 0.4), pass("counts", 0.2)]);
     }
     if filter_ms > 0.0 {
-        passes.extend([pass(filter, 0.8 * filter_ms), pass("demodulate", 0.1 * filter_ms), pass("copy", 0.1 * filter_ms)]);
+        passes.extend([
+            pass(filter, 0.8 * filter_ms),
+            pass("demodulate", 0.1 * filter_ms),
+            pass("copy", 0.1 * filter_ms),
+        ]);
     }
     let gpu_ms: f64 = passes.iter().map(|p| p.ms).sum();
     let factor = |value| Some(Factor { estimate: estimate(value, 0.1), extrapolated: spp == 256 });

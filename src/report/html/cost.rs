@@ -1,6 +1,6 @@
 //! The page of a cost measurement.
 use super::error_chart::{self, Chart, METRICS};
-use super::number::short;
+use super::number::{percent, short};
 use super::page::Table;
 use super::pass_chart::{self, Unit};
 use super::viewer::{Image, Viewer};
@@ -16,6 +16,7 @@ struct CostPage<'a> {
     frame: Frame<'a>,
     document: &'a Document,
     facts: Vec<(String, String)>,
+    confidence: String,
     reference_notes: &'a [String],
     charts: Vec<Chart>,
     points: Table,
@@ -35,6 +36,7 @@ pub fn cost(document: &Document, images: Option<&Images>) -> String {
         frame: Frame::new(&title),
         document,
         facts: facts(document),
+        confidence: percent(document.measurement.confidence),
         reference_notes: &document.reference.notes,
         charts: METRICS.iter().map(|&metric| error_chart::draw(document, metric)).collect(),
         points: point_table::measured(document),
@@ -59,8 +61,7 @@ impl CostPage<'_> {
 fn facts(document: &Document) -> Vec<(String, String)> {
     let Document { scene, machine, measurement, software, .. } = document;
     let commit = software.commit.as_ref().map(|commit| format!(", commit {commit}")).unwrap_or_default();
-    let runs =
-        format!("{} runs of each point, {} % intervals", measurement.repeats, short(100.0 * measurement.confidence));
+    let runs = format!("{} runs of each point, {} % intervals", measurement.repeats, percent(measurement.confidence));
     let cores = if machine.cores == 1 { "1 core".to_owned() } else { format!("{} cores", machine.cores) };
     let facts = [
         ("scene", format!("{}, {} x {} pixels", scene.path, scene.width, scene.height)),

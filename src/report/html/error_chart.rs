@@ -4,8 +4,9 @@ use super::number::{interval, short};
 use crate::cost::document::{Document, Errors, Estimate, Point, Summary};
 use kuva::plot::scatter::MarkerShape;
 use kuva::plot::{LinePlot, ScatterPlot};
-use kuva::render::layout::Layout;
+use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::plots::Plot;
+use std::sync::Arc;
 
 /// A metric that is drawn over time; lower is better.
 #[derive(Clone, Copy)]
@@ -54,7 +55,7 @@ pub fn draw(document: &Document, metric: Metric) -> Chart {
     let measured = document.points.iter().filter_map(|point| Some((point, point.summary.as_ref()?)));
     let (marks, others): (Vec<_>, Vec<_>) = measured
         .map(|(point, summary)| (point, summary, (metric.of)(&summary.errors)))
-        .partition(|(_, summary, error)| summary.gpu_ms.value > 0.0 && error.is_some_and(|error| error.value > 0.0));
+        .partition(|(_, summary, error)| is_drawn(&summary.gpu_ms) && error.is_some_and(|error| is_drawn(&error)));
     let missing = others.into_iter().map(|(point, ..)| point.method.label()).collect();
     let marks: Vec<Mark> = marks
         .into_iter()
@@ -62,6 +63,11 @@ pub fn draw(document: &Document, metric: Metric) -> Chart {
         .collect();
     let svg = if marks.is_empty() { String::new() } else { plot(&marks, metric.name) };
     Chart { name: metric.name, svg, missing }
+}
+
+/// Whether logarithmic axes have a place for the value. The plotting crate draws nothing below 1e-10, and a tick for each decade.
+fn is_drawn(estimate: &Estimate) -> bool {
+    (1e-9..1e12).contains(&estimate.value)
 }
 
 fn plot(marks: &[Mark], name: &str) -> String {
@@ -77,6 +83,7 @@ fn plot(marks: &[Mark], name: &str) -> String {
     let plots: Vec<Plot> = lines.into_iter().chain([Plot::Line(front)]).chain(scatters).collect();
     let layout = chart::layout(&plots, 1000.0, 560.0).with_log_scale();
     let layout = limits(layout, marks).with_x_label("GPU time in ms").with_y_label(name);
+    let layout = layout.with_tick_format(TickFormat::Custom(Arc::new(tick)));
     chart::svg(plots, layout, &format!("{name} against GPU time, both logarithmic, with the Pareto front"))
 }
 
@@ -129,10 +136,11 @@ fn scatter(series: &Series, name: &str) -> ScatterPlot {
         .with_tooltip_labels(series.marks.iter().map(|m| tooltip(m, name)))
 }
 
-/// Lengths of an error bar. Its lower end stops at a tenth of the value, because a logarithmic axis has no 0.
+/// Lengths of an error bar. It ends at a tenth of the value, because a logarithmic axis has no 0, and at its tenfold, so that a
+/// point of few runs does not push all others together.
 fn arms(estimate: &Estimate) -> (f64, f64) {
     let low = estimate.low.unwrap_or(estimate.value).max(0.1 * estimate.value);
-    let high = estimate.high.unwrap_or(estimate.value);
+    let high = estimate.high.unwrap_or(estimate.value).min(10.0 * estimate.value);
     ((estimate.value - low).max(0.0), (high - estimate.value).max(0.0))
 }
 
@@ -163,6 +171,16 @@ fn front(marks: &[Mark]) -> Vec<(f64, f64)> {
         better
     });
     sorted
+}
+
+/// The shortest text of a tick, which is 1, 2 or 5 times a power of 10.
+fn tick(v: f64) -> String {
+    // Computed powers of 10 may be off by a few bits.
+    let rounded = format!("{v:.0e}");
+    match v {
+        1e-4..1e6 => rounded.parse().map(|v: f64| v.to_string()).unwrap_or(rounded),
+        _ => rounded,
+    }
 }
 
 /// Axes that hold every point and its bars with a margin.

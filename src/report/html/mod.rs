@@ -22,11 +22,13 @@ pub use page::{Cell, Page, Row, Table};
 struct Frame<'a> {
     title: &'a str,
     style: &'static str,
+    /// Each is a block of its own, so that its names are.
     scripts: [&'static str; 2],
 }
 
 impl<'a> Frame<'a> {
     fn new(title: &'a str) -> Self {
-        Self { title, style: include_str!("style.css"), scripts: [include_str!("page.js"), include_str!("viewer.js")] }
+        let viewer = concat!(include_str!("pixels.js"), include_str!("panes.js"), include_str!("viewer.js"));
+        Self { title, style: include_str!("style.css"), scripts: [include_str!("page.js"), viewer] }
     }
 }

@@ -16,6 +16,12 @@ pub fn short(v: f64) -> String {
     }
 }
 
+/// A share in percent with at most one decimal, such as 95 or 99.9.
+pub fn percent(share: f64) -> String {
+    let text = format!("{:.1}", 100.0 * share);
+    text.trim_end_matches(".0").to_owned()
+}
+
 /// A count with its digits in groups of three, separated by narrow spaces that do not break lines.
 pub fn count(n: u64) -> String {
     let digits = n.to_string();
@@ -58,6 +64,7 @@ mod tests {
 
     #[test]
     fn counts_are_grouped_and_half_an_interval_is_none() {
+        assert_eq!((percent(0.95), percent(0.999), percent(0.57)), ("95".into(), "99.9".into(), "57".into()));
         assert_eq!((count(7), count(1234), count(1_234_567)), ("7".into(), "1 234".into(), "1 234 567".into()));
         let whole = Estimate { value: 1.0, low: Some(0.5), high: Some(2.0) };
         assert_eq!(interval(&whole).unwrap(), "0.500 to 2.00");

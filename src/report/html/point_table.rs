@@ -5,12 +5,7 @@ use crate::cost::document::{Document, Errors, Estimate, Factor, Point, Summary};
 
 /// A row for each point with a summary. Points of the front are emphasised.
 pub fn measured(document: &Document) -> Table {
-    let errors = Errors::<Estimate>::NAMES;
-    let before = ["method", "runs", "GPU ms", "wall ms"];
-    let behind =
-        ["inefficiency", "speed-up", "error gain", "samples", "rays", "device MiB", "compile ms", "first run ms"];
-    let header: Vec<&str> = before.into_iter().chain(errors).chain(behind).collect();
-    let mut table = Table::new("", &header);
+    let mut table = Table::new("", &COLUMNS);
     for (index, point) in document.points.iter().enumerate() {
         if let Some(summary) = &point.summary {
             let image = Some(point.method.label());
@@ -20,23 +15,59 @@ pub fn measured(document: &Document) -> Table {
     table
 }
 
+/// Columns of the table of measured points, the most important first.
+const COLUMNS: [&str; 20] = [
+    "method",
+    "GPU ms",
+    "relMSE",
+    "FLIP",
+    "speed-up",
+    "error gain",
+    "inefficiency",
+    "relMSE less 0.1 %",
+    "MSE",
+    "PSNR",
+    "SSIM",
+    "HDR-FLIP",
+    "outliers",
+    "wall ms",
+    "runs",
+    "samples",
+    "rays",
+    "device MiB",
+    "compile ms",
+    "first run ms",
+];
+
 fn cells(point: &Point, summary: &Summary) -> Vec<Cell> {
     let first = point.runs.first();
     let whole = |n: u64| Cell { text: count(n), small: String::new(), value: Some(n as f64) };
     let maybe = |n: Option<u64>| n.map_or_else(nothing, whole);
     let time = |ms: Option<f64>| ms.map_or_else(nothing, Cell::number);
-    let mut cells = vec![
+    let Errors { mse, relmse, relmse_trimmed, psnr, ssim, flip, hdr_flip, outliers } = summary.errors;
+    let cells: [Cell; COLUMNS.len()] = [
         Cell::text(point.method.label()),
-        whole(point.runs.len() as u64),
         estimate(Some(summary.gpu_ms)),
+        estimate(relmse),
+        estimate(flip),
+        factor(summary.speed_up),
+        factor(summary.error_gain),
+        estimate(summary.inefficiency),
+        estimate(relmse_trimmed),
+        estimate(mse),
+        estimate(psnr),
+        estimate(ssim),
+        estimate(hdr_flip),
+        estimate(outliers),
         estimate(Some(summary.wall_ms)),
+        whole(point.runs.len() as u64),
+        maybe(first.map(|run| run.samples)),
+        maybe(first.and_then(|run| run.rays)),
+        time(point.device_bytes.map(|bytes| bytes as f64 / f64::from(1 << 20))),
+        time(point.warm_up.map(|warm_up| warm_up.compile_ms)),
+        time(point.warm_up.map(|warm_up| warm_up.first_run_ms)),
     ];
-    cells.extend(summary.errors.values().map(estimate));
-    cells.extend([estimate(summary.inefficiency), factor(summary.speed_up), factor(summary.error_gain)]);
-    cells.extend([maybe(first.map(|run| run.samples)), maybe(first.and_then(|run| run.rays))]);
-    cells.push(time(point.device_bytes.map(|bytes| bytes as f64 / f64::from(1 << 20))));
-    cells.extend([time(point.warm_up.map(|w| w.compile_ms)), time(point.warm_up.map(|w| w.first_run_ms))]);
-    cells
+    cells.into()
 }
 
 fn nothing() -> Cell {

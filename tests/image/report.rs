@@ -1,0 +1,140 @@
+//! Pages of reports, made of a document that nothing was measured for.
+use crate::measurement;
+use tallow::cost::document::{Document, Estimate, Verdict};
+use tallow::report::html;
+use tallow::report::html::viewer::{Image, Viewer};
+use tallow::report::html::{Cell, Page, Table};
+
+/// Ends texts, attributes, scripts and comments, and would run a script.
+const HOSTILE: &str = r#"x"'></title></script><script>alert(1)</script><img src=x onerror=alert(2)>&amp;<!--"#;
+const ESCAPED: &str = "&#60;script&#62;alert(1)&#60;/script&#62;";
+
+/// A page with the images of all its points.
+fn page(document: &Document) -> String {
+    html::cost(document, Some(&measurement::images(document)))
+}
+
+/// What readers see: the page without the scripts that it ends with.
+fn content(page: &str) -> &str {
+    &page[..page.rfind("</main>").unwrap()]
+}
+
+/// Values of all attributes of this name.
+fn attributes<'a>(page: &'a str, name: &str) -> Vec<&'a str> {
+    let start = format!(" {name}=\"");
+    page.split(start.as_str()).skip(1).map(|rest| rest.split('"').next().unwrap()).collect()
+}
+
+#[test]
+fn every_point_is_in_plots_tables_and_viewer_or_has_a_reason() {
+    let document = measurement::document("box");
+    let page = page(&document);
+    let measured = document.points.iter().filter(|point| point.summary.is_some());
+    let labels: Vec<String> = measured.map(|point| point.method.label()).collect();
+    assert_eq!(labels.len(), 35);
+    for label in &labels {
+        assert!(page.contains(&format!("<td>{label}</td>")), "{label}: in no table");
+        assert!(page.contains(&format!("<title>{label}\nGPU time")), "{label}: in no plot");
+        assert!(page.contains(&format!("<title>{label}\npath ")), "{label}: has no bar");
+    }
+    let names = attributes(&page, "data-name");
+    assert_eq!(names, labels.iter().map(String::as_str).chain(["reference"]).collect::<Vec<_>>());
+    assert!(page.contains("filter svgf: the image has no normals"));
+    assert!(page.contains("both + svgf, 3 rounds, 16 spp."), "the point that was not reached");
+    assert!(page.contains("is not complete"));
+    for finding in &document.findings {
+        assert!(page.contains(&finding.text.replace('\'', "&#39;")), "{}", finding.text);
+    }
+    assert_eq!(page.matches(">undecided<").count(), 1);
+}
+
+#[test]
+fn a_page_asks_nothing_of_the_network() {
+    let page = page(&measurement::document("box"));
+    assert!(page.contains("default-src 'none'"));
+    for word in ["http:", "https:", "//cdn", "@import", "<link", "<iframe", "fetch(", "XMLHttpRequest"] {
+        assert!(!page.contains(word), "{word}");
+    }
+    // A drawing refers to its own parts.
+    assert_eq!(page.matches("url(").count(), page.matches("url(#").count());
+    assert!(attributes(&page, "src").iter().all(|source| source.starts_with("data:image/png;base64,")));
+    assert!(attributes(&page, "href").is_empty());
+}
+
+#[test]
+fn no_text_of_a_document_becomes_markup() {
+    let mut document = measurement::document(HOSTILE);
+    document.machine.device = HOSTILE.into();
+    document.reference.notes = vec![HOSTILE.into()];
+    document.findings[0].text = HOSTILE.into();
+    document.findings[0].verdict = Verdict::TooNoisy;
+    for point in &mut document.points {
+        point.method.options = vec![HOSTILE.into()];
+        point.command = HOSTILE.into();
+        point.failed = point.failed.as_ref().map(|_| HOSTILE.into());
+        point.summary.iter_mut().flat_map(|s| &mut s.passes).for_each(|pass| pass.pass += HOSTILE);
+    }
+    let page = page(&document);
+    assert!(!page.contains("<script>alert") && !page.contains("<img src=x") && !page.contains("<!--\""));
+    assert!(page.contains(ESCAPED));
+    // Two of the page, and one of pixels for each image.
+    let images = document.points.iter().filter(|point| point.summary.is_some()).count() + 1;
+    assert_eq!(page.matches("<script").count(), 2 + images);
+}
+
+#[test]
+fn a_document_without_measured_points_gives_a_page() {
+    let empty = html::cost(&measurement::nothing_measured("box"), None);
+    assert!(empty.contains("No point was measured.") && !empty.contains("<svg"));
+    let mut failed = measurement::document("box");
+    failed.points.retain(|point| point.summary.is_none());
+    failed.front.clear();
+    let failed = page(&failed);
+    assert!(failed.contains("No point was measured.") && failed.contains("the image has no normals"));
+    assert_eq!(attributes(&failed, "data-name"), ["reference"]);
+}
+
+#[test]
+fn figures_that_are_zero_unknown_or_no_numbers_leave_no_nan() {
+    let mut document = measurement::document("box");
+    for (i, point) in document.points.iter_mut().enumerate() {
+        let Some(summary) = &mut point.summary else { continue };
+        let bad = [0.0, -1e-6, f64::NAN, f64::INFINITY, 1e-300, 1e300][i % 6];
+        let estimate = Estimate { value: bad, low: None, high: Some(bad) };
+        summary.errors.relmse = Some(estimate);
+        summary.errors.flip = Some(Estimate { low: Some(-bad), ..estimate });
+        summary.inefficiency = Some(estimate);
+        if i % 4 == 0 {
+            summary.gpu_ms = estimate;
+            summary.passes.iter_mut().for_each(|pass| pass.ms = bad);
+        }
+    }
+    let page = page(&document);
+    for word in ["NaN", "inf\"", "inf,", "Infinity", ">inf"] {
+        assert!(!content(&page).contains(word), "{word}");
+    }
+    assert!(page.contains("Not shown"));
+}
+
+#[test]
+fn a_plain_page_has_its_texts_tables_and_viewers() {
+    let images = measurement::images(&measurement::document("box"));
+    let image = |name: &str| Image { name: name.into(), caption: HOSTILE.into(), picture: &images.reference, rank: 0 };
+    let viewer = || Viewer { group: "all".into(), images: vec![image("a.exr"), image("b.exr")], reference: Some(1) };
+    let mut table = Table::new("Metrics", &["metric", "value"]);
+    table.push(vec![Cell::text("PSNR"), Cell::number(f64::INFINITY)]);
+    table.push(vec![Cell::text(HOSTILE), Cell::number(2.5)]);
+    let page = Page {
+        title: HOSTILE.into(),
+        facts: vec![("verdict".into(), HOSTILE.into())],
+        texts: vec!["No block differs.".into()],
+        viewers: vec![viewer(), viewer()],
+        tables: vec![table],
+    };
+    let page = page.html();
+    assert!(page.contains("<p>No block differs.</p>") && page.contains("<h2>Metrics</h2>"));
+    assert!(page.contains("<td>–</td>") && page.contains("data-order=\"2.5\""));
+    assert_eq!(attributes(&page, "data-group"), ["all", "all"]);
+    assert_eq!(attributes(&page, "data-name"), ["a.exr", "b.exr", "a.exr", "b.exr"]);
+    assert!(page.contains(ESCAPED) && !page.contains("<script>alert") && !page.contains("<img src=x"));
+}
