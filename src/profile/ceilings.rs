@@ -8,20 +8,31 @@ use serde::{Deserialize, Serialize};
 
 /// Runs of each kernel; the fastest counts.
 const REPEATS: usize = 10;
-/// Bytes of each of the two buffers, where the device lets kernels bind so much: more than its caches hold.
-const COPIED_BYTES: u64 = 256 << 20;
+/// Bytes that are copied: from what the caches near a processor hold to what none does.
+const COPIED_BYTES: [u64; 5] = [1 << 20, 4 << 20, 16 << 20, 64 << 20, 256 << 20];
+/// Bytes that are copied in all at each size, so that small copies are timed as well as large ones.
+const MOVED_BYTES: u64 = 64 << 20;
 /// Nanoseconds that the kernel which computes runs at least.
 const LEAST_NS: u64 = 5_000_000;
 /// Threads that it has at first, and at most.
 const THREADS: [u32; 2] = [1 << 11, 1 << 22];
 
 /// The fastest that kernels were seen to copy and to compute.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ceilings {
-    /// Billions of bytes per second; what is read and what is written both count.
-    pub copy_gb_s: f64,
+    /// Copies of growing size.
+    pub copies: Vec<CopySpeed>,
     /// Billions of operations per second in single precision; a multiplication and an addition are two.
     pub arithmetic_gop_s: f64,
+}
+
+/// The fastest copy of a size.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CopySpeed {
+    /// Bytes that it reads and writes, which both count.
+    pub bytes: u64,
+    /// Billions of bytes per second.
+    pub gb_s: f64,
 }
 
 impl Ceilings {
@@ -30,14 +41,26 @@ impl Ceilings {
     /// # Errors
     /// [`crate::error::Error::Device`].
     pub fn measure(gpu: &Gpu) -> Result<Self> {
-        Ok(Self { copy_gb_s: copy_gb_s(gpu)?, arithmetic_gop_s: arithmetic_gop_s(gpu)? })
+        Ok(Self { copies: copies(gpu)?, arithmetic_gop_s: arithmetic_gop_s(gpu)? })
+    }
+
+    /// Billions of bytes per second that a pass can move whose buffers have `working_set` bytes: those of the smallest copy that is
+    /// as large, or of the largest.
+    pub fn copy_gb_s(&self, working_set: u64) -> f64 {
+        let fits = self.copies.iter().find(|copy| copy.bytes >= working_set);
+        fits.or(self.copies.last()).map_or(f64::INFINITY, |copy| copy.gb_s)
     }
 }
 
-fn copy_gb_s(gpu: &Gpu) -> Result<f64> {
+fn copies(gpu: &Gpu) -> Result<Vec<CopySpeed>> {
     let info = gpu.info();
-    let bytes = COPIED_BYTES.min(info.max_storage_range).min(info.memory_heap / 16);
-    let elements = (bytes / size_of::<vec4>() as u64).max(1) as usize;
+    let most = (2 * info.max_storage_range).min(info.memory_heap / 8).max(COPIED_BYTES[0]);
+    COPIED_BYTES.into_iter().filter(|&bytes| bytes <= most).map(|bytes| copy(gpu, bytes)).collect()
+}
+
+fn copy(gpu: &Gpu, bytes: u64) -> Result<CopySpeed> {
+    let elements = (bytes / 2 / size_of::<vec4>() as u64) as usize;
+    let calls = MOVED_BYTES.div_ceil(bytes);
     let source = Buffer::<vec4>::new(gpu, "ceiling source", elements, Location::Device)?;
     let target = Buffer::<vec4>::new(gpu, "ceiling target", elements, Location::Device)?;
     let kernel = Kernel::new(gpu, &gpu.tuning().thread().into())?;
@@ -45,12 +68,14 @@ fn copy_gb_s(gpu: &Gpu) -> Result<f64> {
     gpu.run(&mut frame, |rec| rec.fill(&source, 0))?; // memory that was never written may not exist yet
     let mut least = u64::MAX;
     for _ in 0..=REPEATS {
-        let bind = ceiling_copy::Bind { source: &source, target: &target };
+        let bind = || ceiling_copy::Bind { source: &source, target: &target };
         let threads = elements as u32;
-        let times = gpu.run(&mut frame, |rec| rec.dispatch_threads(&kernel, bind, &threads, threads))?;
+        let times = gpu.run(&mut frame, |rec| {
+            (0..calls).try_for_each(|_| rec.dispatch_threads(&kernel, bind(), &threads, threads))
+        })?;
         least = least.min(duration_ns(&times));
     }
-    Ok(2.0 * (elements * size_of::<vec4>()) as f64 / least as f64)
+    Ok(CopySpeed { bytes, gb_s: (calls * bytes) as f64 / least as f64 })
 }
 
 /// Billions of operations per second, for clocks that may change: it takes a few hundredths of a second.

@@ -119,3 +119,6 @@ fn reachable(module: &Module, from: u32, end: Option<u32>) -> BTreeSet<u32> {
     }
     seen
 }
+
+#[cfg(test)]
+mod tests;

@@ -101,7 +101,7 @@ pub struct PassProfile {
     pub gb_s: f64,
     /// Billions of operations per second at the median.
     pub gop_s: f64,
-    /// `gb_s` of what a copy reaches; more than 1 is possible, as caches are faster than memory.
+    /// `gb_s` of what a copy of [`Work::working_set`] bytes reaches.
     pub memory_share: f64,
     /// `gop_s` of what arithmetic reaches.
     pub arithmetic_share: f64,
@@ -149,7 +149,7 @@ impl Profile {
                 quantum_ns: quantum_ns(timed.iter().flat_map(|passes| passes.iter())),
                 calibration_deviation_ns: measured.calibration.map(|moment| moment.deviation_ns),
             },
-            ceilings: *ceilings,
+            ceilings: ceilings.clone(),
             arithmetic_gop_s_after: measured.arithmetic_gop_s_after,
             frame_ms,
             passes,
@@ -186,7 +186,8 @@ impl PassProfile {
     fn new(pass: String, ms: Spread, work: Work, frame_ms: f64, ceilings: &Ceilings) -> Self {
         let per_second = |count: u64| count as f64 * 1e-6 / ms.median.max(1e-9);
         let (gb_s, gop_s) = (per_second(work.bytes.count), per_second(work.operations.count));
-        let [memory_share, arithmetic_share] = [gb_s / ceilings.copy_gb_s, gop_s / ceilings.arithmetic_gop_s];
+        let [memory_share, arithmetic_share] =
+            [gb_s / ceilings.copy_gb_s(work.working_set), gop_s / ceilings.arithmetic_gop_s];
         let limit = Limit::of(memory_share, arithmetic_share);
         let share = ms.median / frame_ms.max(1e-9);
         Self { pass, ms, share, work, gb_s, gop_s, memory_share, arithmetic_share, limit }
@@ -251,6 +252,7 @@ fn greatest_common_divisor(mut a: u64, mut b: u64) -> u64 {
 mod tests {
     use super::*;
     use crate::gpu::PassShape;
+    use crate::profile::ceilings::CopySpeed;
 
     fn pass(name: &'static str, begin_ns: u64, end_ns: u64) -> Pass {
         let shape = PassShape { groups: [1; 3], threads: 1, ranges: Vec::new(), code: None };
@@ -271,9 +273,11 @@ mod tests {
         assert_eq!(Limit::of(0.5, 0.2), Limit::Memory);
         assert_eq!(Limit::of(0.1, 0.2), Limit::Arithmetic);
         assert_eq!(Limit::of(0.09, 0.09), Limit::Neither);
-        let ceilings = Ceilings { copy_gb_s: 10.0, arithmetic_gop_s: 100.0 };
+        let copies = [(1000, 20.0), (2000, 10.0)].map(|(bytes, gb_s)| CopySpeed { bytes, gb_s }).into();
+        let ceilings = Ceilings { copies, arithmetic_gop_s: 100.0 };
+        assert_eq!([1000, 1001, 9999].map(|bytes| ceilings.copy_gb_s(bytes)), [20.0, 10.0, 10.0]);
         let mut work = Work::default();
-        (work.bytes.count, work.operations.count) = (8_000_000, 20_000_000);
+        (work.bytes.count, work.operations.count, work.working_set) = (8_000_000, 20_000_000, 2000);
         let row = PassProfile::new("a".into(), Spread::of(vec![2.0]), work, 8.0, &ceilings);
         assert_eq!((row.share, row.gb_s, row.gop_s), (0.25, 4.0, 10.0));
         assert_eq!((row.memory_share, row.arithmetic_share, row.limit), (0.4, 0.1, Limit::Memory));

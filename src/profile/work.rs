@@ -39,6 +39,8 @@ pub struct Work {
     pub workgroups: u64,
     /// Threads of all workgroups.
     pub threads: u64,
+    /// Bytes of the buffers that the largest call touches: what must fit a cache to stay in it.
+    pub working_set: u64,
     /// Bytes read and written.
     pub bytes: Amount,
     /// Operations.
@@ -81,6 +83,7 @@ impl FrameWork {
         work.calls += 1;
         work.workgroups += shape.groups.iter().map(|&n| u64::from(n)).product::<u64>();
         work.threads += shape.threads;
+        work.working_set = work.working_set.max(self.working_set(pass, paths));
         let (bytes, is_least) = self.bytes(pass, paths);
         work.bytes.add(bytes, is_least);
         let Some(code) = &shape.code else { return };
@@ -112,6 +115,16 @@ impl FrameWork {
                 (sum(&touched), false)
             }
             _ => (sum(&|range| range.bytes), false),
+        }
+    }
+
+    /// Each byte once. Rays may visit all nodes.
+    fn working_set(&self, pass: &Pass, paths: u64) -> u64 {
+        let ranges = &pass.shape.ranges;
+        let nodes = ranges.iter().filter(|range| range.name == "nodes").map(|range| range.bytes).sum::<u64>();
+        match pass.time.name {
+            "path" | "primary_hit" => self.bytes(pass, paths).0 + nodes,
+            _ => ranges.iter().map(|range| range.bytes).sum(),
         }
     }
 

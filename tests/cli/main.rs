@@ -12,5 +12,6 @@ mod filter;
 #[path = "../support/flat.rs"]
 mod flat;
 mod outputs;
+mod profile;
 mod resume_merge;
 mod signals;

@@ -1,5 +1,6 @@
 //! A profile as text tables and as lines of numbers.
 use crate::cli::readable;
+use crate::profile::ceilings::CopySpeed;
 use crate::profile::{Change, Comparison, Limit, PassProfile, Profile, Spread, Verdict, work::Amount};
 use crate::report::table::{self, milliseconds};
 use std::fmt::Write;
@@ -19,7 +20,7 @@ pub fn of_profile(p: &Profile) -> String {
         p.host.driver,
         p.host.cpu
     );
-    let total = vec![String::new(); 8];
+    let total = vec!["-".to_owned(); 8];
     let rows = p.passes.iter().map(cells).chain([[times("frame", &p.frame_ms, 1.0), total].concat()]);
     let header = [
         "pass",
@@ -46,17 +47,19 @@ fn below(p: &Profile) -> String {
     let (ceilings, counters, overhead) = (&p.ceilings, &p.counters, &p.overhead);
     let per_ray = counters.nodes as f64 / counters.rays().max(1) as f64;
     let share = 100.0 * overhead.cost_ms / overhead.untimed_ms.median.max(1e-9);
+    let copy = |copy: &CopySpeed| format!("{:.1} GB/s of {} MiB", copy.gb_s, copy.bytes >> 20);
+    let copies: Vec<_> = ceilings.copies.iter().map(copy).collect();
     let clocks = match p.timer.calibration_deviation_ns {
-        Some(ns) => format!("clocks of device and host tied within {:.1} us", ns as f64 * 1e-3),
+        Some(ns) => format!("clocks of device and host tied within {:.3} us", ns as f64 * 1e-3),
         None => "clocks of device and host not tied".to_owned(),
     };
     format!(
         "\nrays: {} per frame, {:.2} Mrays/s, {per_ray:.1} nodes each\n\
-         ceilings: copy {:.1} GB/s, arithmetic {:.1} Gop/s before and {:.1} after the frames\n\
+         ceilings: copy {}; arithmetic {:.1} Gop/s before and {:.1} after the frames\n\
          timestamps cost {} ms of a frame of {} ms ({share:.1} %); steps of {} ns; {clocks}\n",
         counters.rays(),
         p.mrays_s,
-        ceilings.copy_gb_s,
+        copies.join(", "),
         ceilings.arithmetic_gop_s,
         p.arithmetic_gop_s_after,
         milliseconds(overhead.cost_ms),

@@ -35,7 +35,7 @@ fn profile(frame: &[f64], passes: Vec<PassProfile>) -> Profile {
         denoise: None,
         host: Host { device: text(), driver: text(), cpu: text() },
         timer: Timer { period_ns: 1.0, quantum_ns: 1, calibration_deviation_ns: None },
-        ceilings: Ceilings { copy_gb_s: 1.0, arithmetic_gop_s: 100.0 },
+        ceilings: Ceilings { copies: Vec::new(), arithmetic_gop_s: 100.0 },
         arithmetic_gop_s_after: 99.0,
         frame_ms: Spread::of(frame.to_vec()),
         passes,
