@@ -8,7 +8,7 @@ use super::plan::Watch;
 use super::reference::Reference;
 use super::session::{add_filter, check_clock, finite, interleaved};
 use crate::denoise::filter::{self, FilterSettings, Row};
-use crate::denoise::{Demodulation, Recipe, file, timed};
+use crate::denoise::{Recipe, file, timed};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::image::aov::{Aovs, Names};
@@ -113,8 +113,7 @@ fn filtered(
 ) -> Result<(Run, WarmUp, u64, Picture)> {
     let FilterCandidate { row, settings, .. } = &plan.candidates[index];
     let scaled = |scales: &filter::Scales| settings.scaled_by(scales);
-    let demodulation = layers.holds().demodulation(Demodulation::default());
-    let recipe = Recipe { method: filter::Method::Kernels(row), demodulation, fireflies: None, settings: &scaled };
+    let recipe = Recipe { settings: &scaled, ..Recipe::new(filter::Method::Kernels(row)) };
     let filtered = timed(gpu, layers.upload(gpu)?, &recipe)?;
     let mut run = Run {
         seed: round,

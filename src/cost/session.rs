@@ -3,7 +3,7 @@ use super::converge::picture;
 use super::document::{Pass, Run, WarmUp};
 use super::grid::{Candidate, Shot};
 use crate::denoise::filter::Method;
-use crate::denoise::{Colour, Demodulation, Noisy, Recipe, Timed, filter, host_bytes, timed};
+use crate::denoise::{Colour, Noisy, Recipe, Timed, filter, host_bytes, timed};
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu, PassTime};
 use crate::image::Picture;
@@ -154,12 +154,7 @@ impl<'a> Session<'a> {
             return Ok(Measured { point, run, picture, warm_up: *costs, device_bytes: *device_bytes });
         };
         let settings = |scales: &filter::Scales| candidate.filter_settings.scaled_by(scales);
-        let recipe = Recipe {
-            method: Method::Kernels(row),
-            demodulation: Demodulation::default(),
-            fireflies: None,
-            settings: &settings,
-        };
+        let recipe = Recipe { settings: &settings, ..Recipe::new(Method::Kernels(row)) };
         let filtered = timed(self.gpu, Noisy::of_film(renderer)?, &recipe)?;
         let warm_up = add_filter(&mut run, costs, &filtered);
         let device_bytes = device_bytes + filtered.device_bytes;

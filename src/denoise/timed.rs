@@ -54,7 +54,7 @@ pub fn timed(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Timed> {
 impl<'a> Chain<'a> {
     fn new(gpu: &'a Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Self> {
         filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
-        let demodulation = noisy.holds().demodulation(recipe.demodulation);
+        let demodulation = recipe.demodulation(noisy.holds());
         let in_paint = demodulation == Demodulation::Light && noisy.lacks_direct_light()?;
         let parts = Demodulated::new(gpu, &noisy, demodulation, in_paint)?;
         // The scales that settings count in are those of the light that is filtered.

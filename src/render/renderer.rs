@@ -38,7 +38,7 @@ pub struct Renderer {
 }
 
 /// Ray counts since the renderer was made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Counters {
     /// Rays that look for the closest hit.
     pub closest: u64,
