@@ -6,6 +6,7 @@ mod child;
 mod codes;
 #[path = "../support/command.rs"]
 mod command;
+mod cost;
 mod device;
 mod effects;
 mod filter;
