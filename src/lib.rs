@@ -37,6 +37,7 @@ pub mod gpu;
 pub mod guide;
 pub mod image;
 pub mod layout;
+mod machine;
 #[doc(hidden)] // an engine needs no kernel's mathematics; tests and benches do
 pub mod math;
 mod memory;

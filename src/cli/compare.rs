@@ -1,4 +1,11 @@
-//! `tallow compare`: measures how far an image is from its reference.
+//! `tallow compare`: measures how far an image is from its reference, or tests whether both have one expectation.
+mod evidence;
+mod junit;
+mod page;
+mod replay;
+mod statistical;
+mod words;
+
 use super::files::check_distinct;
 use super::{Exit, check_png, complain, finite, print, print_json, readable};
 use crate::error::{Error, Result};
@@ -12,7 +19,8 @@ use std::path::{Path, PathBuf};
 /// Compare an image with its reference: MSE, relMSE, PSNR, SSIM and FLIP
 ///
 /// MSE and relMSE, the mean of (a - b)^2 / (b^2 + 0.01), are taken on linear values; PSNR (peak 1), SSIM and FLIP on
-/// the sRGB-encoded images cut to [0, 1].
+/// the sRGB-encoded images cut to [0, 1]. With --statistical, two renders are tested instead for a difference that their noise
+/// does not explain; exit code 0 says that they are the same, 1 that they differ, 7 that they are too noisy to say.
 #[derive(clap::Args)]
 pub struct Args {
     /// Image to judge (EXR, PNG, JPEG or HDR)
@@ -30,6 +38,8 @@ pub struct Args {
     json: bool,
     #[command(flatten)]
     limits: Limits,
+    #[command(flatten)]
+    test: statistical::Args,
 }
 
 /// Limits of the metrics. One that is exceeded gives a line on stderr and exit code 1.
@@ -61,6 +71,9 @@ const BYTES_PER_PIXEL: u64 = 80;
 /// # Errors
 /// When a file cannot be read or written, has no such layer, holds NaN or infinities, or sizes differ.
 pub fn run(args: &Args) -> Result<Exit> {
+    if args.test.statistical {
+        return statistical::run(&args.a, &args.b, args.json, &args.test);
+    }
     if let Some(diff) = &args.diff {
         check_png("--diff", diff)?;
         check_distinct(&[("--diff", diff)], &[("A", &args.a), ("B", &args.b)])?;

@@ -6,7 +6,7 @@ use super::common::Common;
 use super::compare::{self, check_sizes};
 use super::files::{Files, Item, check_distinct};
 use super::{Exit, fail_on_messages, print, print_json, readable};
-use crate::denoise::filter::{self, FilterSettings, Row};
+use crate::denoise::filter::{self, FilterSettings, Method};
 use crate::denoise::{self, Colour, Demodulation, Filtered, Recipe, file};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, PassTime};
@@ -23,27 +23,37 @@ use std::path::PathBuf;
 use std::time::Instant;
 use supersampling::Supersampling;
 
+/// Which light of an image is filtered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Light {
+    /// All but lamps and sky that are seen directly.
+    All,
+    /// Indirect light, where the file holds it apart.
+    Indirect,
+}
+
 /// Filter a noisy image, of this renderer or another
 ///
 /// Takes albedo, normals, positions, depth and variance from the layers of an EXR file, as Tallow, Blender, Mitsuba 3 and
 /// pbrt-v4 name them, and does without those that are missing. Surface colour is divided out before and multiplied back
-/// after; in Tallow's own files, direct light stays as it is.
+/// after. In Tallow's own files of scenes with point, spot or directional lights, direct light stays as it is.
 #[derive(clap::Args)]
 pub struct Args {
     /// Image to filter (EXR; PNG, JPEG and HDR hold no layers)
     pub image: PathBuf,
     /// Filter to apply
     #[arg(long, default_value = "auto")]
-    pub filter: &'static Row,
+    pub filter: Method,
     /// Image to write: .exr (all layers, the colour filtered), .png or .hdr; may be given several times
     #[arg(short, long = "output", value_name = "FILE", required = true)]
     pub outputs: Vec<PathBuf>,
     /// Print how far the image is from this one, before and after
     #[arg(long, value_name = "FILE")]
     pub reference: Option<PathBuf>,
-    /// Filter direct light too, where the file holds it apart (Tallow's own do)
-    #[arg(long)]
-    pub filter_direct: bool,
+    /// Light to filter, where the file holds direct light apart (Tallow's own do) [default: all, but indirect where point,
+    /// spot or directional lights cast sharp shadows]
+    #[arg(long, value_enum, conflicts_with = "no_demodulate")]
+    pub light: Option<Light>,
     /// Filter the colour as it is: textures blur too
     #[arg(long)]
     pub no_demodulate: bool,
@@ -95,6 +105,7 @@ pub struct Summary {
 /// Errors of every kind. No file is written unless the error is about writing.
 pub fn run(args: &Args) -> Result<Exit> {
     check_outputs(args)?;
+    check_filter(args)?;
     let file = Unread::open(&args.image)?;
     let gpu = args.common.open()?;
     check_room(args, &gpu, &file.claim)?;
@@ -110,7 +121,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let distance = |image: &Source| reference.as_ref().map_or(Ok(None), |r| distance(args, image, r));
     let summary = Summary {
         files: written,
-        filter: args.filter.name,
+        filter: args.filter.name(),
         width: source.film.width,
         height: source.film.height,
         notes: [aovs.notes, notes].concat(),
@@ -133,7 +144,8 @@ fn bytes_needed(args: &Args, claim: &Claim, unified: bool) -> u64 {
     let colour = claim.pixels().saturating_mul(size_of::<vec3>() as u64);
     let planes = if unified { claim.pixels().saturating_mul(denoise::bytes_per_pixel(args.filter)) } else { 0 };
     let decoded = claim.bytes.saturating_add(colour);
-    decoded.saturating_add(planes.max(decoded.saturating_mul(3)))
+    let filtering = planes.saturating_add(claim.pixels().saturating_mul(args.filter.host_bytes()));
+    decoded.saturating_add(filtering.max(decoded.saturating_mul(3)))
 }
 
 /// Checks before decoding, which can take minutes, that the image can be filtered.
@@ -154,6 +166,19 @@ fn check_outputs(args: &Args) -> Result<()> {
     check_distinct(&outputs, &reference.chain(scene).collect::<Vec<_>>())
 }
 
+/// Checks that the filter can run, and is one for what is asked of it.
+fn check_filter(args: &Args) -> Result<()> {
+    if args.light == Some(Light::All) && args.supersampling.scene.is_some() {
+        return Err(Error::Usage("--scene looks filtered indirect light up: leave --light all out".to_owned()));
+    }
+    if matches!(args.filter, Method::Oidn) && args.supersampling.scene.is_some() {
+        let what =
+            "--scene looks filtered indirect light up, but oidn filters the colour whole: choose another --filter";
+        return Err(Error::Usage(what.to_owned()));
+    }
+    args.filter.check()
+}
+
 fn write<'a>(args: &'a Args, clean: &'a Source) -> (Vec<String>, Files) {
     let options = args.common.write_options();
     let item = |path: &'a PathBuf| Item {
@@ -167,24 +192,26 @@ fn write<'a>(args: &'a Args, clean: &'a Source) -> (Vec<String>, Files) {
     (written.iter().map(|path| path.display().to_string()).collect(), files)
 }
 
-fn demodulation(args: &Args) -> Demodulation {
-    match (args.no_demodulate, args.filter_direct) {
-        (true, _) => Demodulation::Off,
-        (false, true) => Demodulation::Albedo,
-        (false, false) => Demodulation::Light,
+fn demodulation(args: &Args) -> Option<Demodulation> {
+    let looked_up = args.supersampling.scene.is_some();
+    match args.light {
+        _ if args.no_demodulate => Some(Demodulation::Off),
+        Some(Light::All) => Some(Demodulation::Albedo),
+        Some(Light::Indirect) => Some(Demodulation::Light),
+        None => looked_up.then_some(Demodulation::Light),
     }
 }
 
 fn filtered(args: &Args, gpu: &Gpu, aovs: &Aovs) -> Result<(Colour, Vec<PassTime>, Vec<String>)> {
     let layers = file::Layers::new(aovs);
     let recipe = Recipe {
-        row: args.filter,
-        demodulation: layers.holds().demodulation(demodulation(args)),
+        method: args.filter,
+        demodulation: demodulation(args),
         fireflies: args.fireflies,
         settings: &|scales| args.overrides.settings(FilterSettings::default().scaled_by(scales)),
     };
     let filtered = Filtered::new(gpu, layers.upload(gpu)?, &recipe)?;
-    let mut notes = vec![recipe.demodulation.note().to_owned()];
+    let mut notes = vec![recipe.demodulation(layers.holds()).note().to_owned()];
     notes.extend(layers.notes);
     if filtered.in_painted {
         notes.push("direct light of pixels without a sample is made of that of the others".to_owned());
@@ -209,7 +236,7 @@ fn replaced(args: &Args, source: &Source, aovs: &Aovs, mut colour: Colour) -> Re
         colour = [0; 3].map(|_| grey.clone());
     }
     let channels: Vec<_> = aovs.colour.into_iter().zip(colour.iter().map(Vec::as_slice)).collect();
-    source.replaced(&channels, aovs.keep_as(), (crate::render::film::FILTERED, args.filter.name))
+    source.replaced(&channels, aovs.keep_as(), (image::FILTERED, args.filter.name()))
 }
 
 /// Reads the reference, before any long work, and checks that it has the size of the image.

@@ -26,12 +26,13 @@ use std::process::ExitCode;
 const EXIT_CODES: &str = "\
 Exit codes:
   0    done
-  1    a limit given with --max-... or --min-... is exceeded
+  1    a limit given with --max-... or --min-... is exceeded, or compare --statistical finds a difference
   2    usage: an option or a setting is wrong
   3    input: a file cannot be read or is damaged
   4    device or memory: no Vulkan, no usable device, it was lost, or memory is out
   5    output: a file cannot be written
   6    some points of a measurement failed; the others are written
+  7    too noisy to say: compare --statistical finds no difference, but could have missed one
   70   internal error: a bug, please report it
   130  interrupted (Ctrl-C)";
 
@@ -63,6 +64,8 @@ pub enum Exit {
     LimitExceeded = 1,
     /// Some points of a measurement failed; the others were measured and written.
     PartlyFailed = 6,
+    /// A test found nothing, and would have missed what it was to find.
+    Undecided = 7,
     /// The command was stopped by Ctrl-C or another signal.
     Interrupted = 130,
 }

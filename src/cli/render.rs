@@ -9,13 +9,13 @@ use super::common::Common;
 use super::files::Files;
 use super::overrides::Overrides;
 use super::{Exit, complain, fail_on_messages, interrupt};
-use crate::denoise::filter::{self, FilterSettings, Row};
-use crate::denoise::{self, Demodulation, Filtered, Noisy, Recipe};
+use crate::denoise::filter::{self, Method};
+use crate::denoise::{self, Filtered, Noisy, Recipe};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, PassTime};
 use crate::image::{self, Film};
 use crate::memory;
-use crate::render::settings::Settings;
+use crate::render::settings::{Allocate, Settings};
 use crate::render::{Checkpoint, Job, Outputs, Renderer, StopReason, all_effects, film};
 use crate::scene::{Scene, SceneFile};
 use crate::statistics::BrokenSamples;
@@ -63,7 +63,12 @@ pub struct Args {
     pub heatmap: Option<PathBuf>,
     /// Filter the image as `tallow filter` does with the file; the noisy one stays as the layer "Noisy Image"
     #[arg(long, value_name = "FILTER")]
-    pub denoise: Option<&'static Row>,
+    pub denoise: Option<Method>,
+    /// Render only the pixel in this column and row, with the samples that it has in the whole image, wherever those were
+    /// placed: --spp says how many
+    #[arg(long, value_name = "X,Y", value_parser = pixel,
+          conflicts_with_all = ["resume", "checkpoint", "denoise"])]
+    pub pixel: Option<[u32; 2]>,
     /// Count rays and visited nodes
     #[arg(long)]
     pub counters: bool,
@@ -100,6 +105,7 @@ impl Args {
 /// an output that fails keeps no other from being written.
 pub fn run(args: &Args) -> Result<Exit> {
     outputs::check(args)?;
+    args.denoise.map_or(Ok(()), Method::check)?;
     let mut host = Spans::default();
     let (scene, settings) = host.time("load scene", || load(args))?;
     let earlier = args.resume.as_deref().map(|path| Checkpoint::read(path, &scene, &settings)).transpose()?;
@@ -110,7 +116,8 @@ pub fn run(args: &Args) -> Result<Exit> {
     check_room(args, &settings, &gpu)?;
     let renderer = host.time("upload and compile", || renderer(args, &gpu, &scene, &settings))?;
     let noisy = args.denoise.map(|_| Noisy::of_film(&renderer)).transpose()?;
-    let job = Job { checkpoint: earlier.as_ref(), ..Job::new(&renderer) };
+    let pixel = args.pixel.map(|[x, y]| y * settings.width + x);
+    let job = Job { checkpoint: earlier.as_ref(), pixel, ..Job::new(&renderer) };
     let shot = Shot { args, gpu: &gpu, job };
     let mut files = Files::new(args.resume.as_deref());
     let (status, checkpoint) = host.time("render", || shot.trace(&mut files))?;
@@ -140,12 +147,12 @@ fn finish(
     let Outcome { gpu, film, host, status, .. } = &mut outcome;
     let mut written = host.time("write", || Ok(outputs::save(args, film, &mut files, checkpoint, whole)))?;
     // By now what took hours is safe, whatever becomes of the filter.
-    if let Some((row, noisy)) = args.denoise.zip(noisy).filter(|_| whole) {
+    if let Some((method, noisy)) = args.denoise.zip(noisy).filter(|_| whole) {
         let line = files.with_failures("interrupted: the noisy image was written, --denoise was not finished");
         if interrupt::leave_at_once(&line) {
             interrupt::leave(&line);
         }
-        status.times.extend(host.time("denoise", || denoised(gpu, row, noisy, film))?);
+        status.times.extend(host.time("denoise", || denoised(gpu, method, noisy, film))?);
         host.time("write", || Ok(outputs::save(args, film, &mut files, None, true)))?;
     }
     fail_on_messages(gpu)?;
@@ -167,8 +174,24 @@ fn load(args: &Args) -> Result<(Scene, Settings)> {
     let file = SceneFile::open(&args.scene)?;
     let mut settings = file.settings()?;
     args.overrides.apply(&mut settings);
+    if let Some([x, y]) = args.pixel {
+        settings.allocate = Allocate::default();
+        if x >= settings.width || y >= settings.height {
+            let size = format!("{}x{}", settings.width, settings.height);
+            return Err(Error::Usage(format!("--pixel {x},{y} is outside of the film, which is {size}")));
+        }
+    }
     settings.validate()?;
     Ok((file.load()?.scene, settings))
+}
+
+/// Parses a column and a row.
+fn pixel(text: &str) -> std::result::Result<[u32; 2], String> {
+    let numbers = text.split_once(',').map(|(x, y)| (x.trim().parse(), y.trim().parse()));
+    match numbers {
+        Some((Ok(x), Ok(y))) => Ok([x, y]),
+        _ => Err("expected a column and a row, such as 12,34".to_owned()),
+    }
 }
 
 /// With the kernels that the scene calls for, or with all.
@@ -191,10 +214,8 @@ fn warn_of_broken(broken: &BrokenSamples) {
 }
 
 /// With the filter's default settings, scaled to the image.
-fn denoised(gpu: &Gpu, row: &Row, noisy: Noisy, film: &mut Film) -> Result<Vec<PassTime>> {
-    let settings = |scales: &filter::Scales| FilterSettings::default().scaled_by(scales);
-    let recipe = Recipe { row, demodulation: Demodulation::default(), fireflies: None, settings: &settings };
-    let (colour, times) = Filtered::new(gpu, noisy, &recipe)?.join(gpu)?;
+fn denoised(gpu: &Gpu, method: Method, noisy: Noisy, film: &mut Film) -> Result<Vec<PassTime>> {
+    let (colour, times) = Filtered::new(gpu, noisy, &Recipe::new(method))?.join(gpu)?;
     film::replace_colour(film, colour);
     Ok(times)
 }
@@ -202,7 +223,7 @@ fn denoised(gpu: &Gpu, row: &Row, noisy: Noisy, film: &mut Film) -> Result<Vec<P
 /// A system that is out of memory ends the process hours later without a word; what the filter cannot bind is told before, too.
 fn check_room(args: &Args, settings: &Settings, gpu: &Gpu) -> Result<()> {
     let (size, unified) = ([settings.width, settings.height], gpu.info().unified);
-    let while_filtered = args.denoise.map_or(0, |row| denoise::host_bytes(row, settings, unified));
+    let while_filtered = args.denoise.map_or(0, |method| denoise::host_bytes(method, settings, unified));
     let bytes = film::host_bytes(settings, unified).max(while_filtered);
     let refused = |what| format!("a film of {} x {} {what}: choose a smaller film", size[0], size[1]);
     memory::check(bytes).map_err(|what| Error::Device(refused(what)))?;

@@ -114,7 +114,7 @@ fn filtered(
     let FilterCandidate { row, settings, .. } = &plan.candidates[index];
     let scaled = |scales: &filter::Scales| settings.scaled_by(scales);
     let demodulation = layers.holds().demodulation(Demodulation::default());
-    let recipe = Recipe { row, demodulation, fireflies: None, settings: &scaled };
+    let recipe = Recipe { method: filter::Method::Kernels(row), demodulation, fireflies: None, settings: &scaled };
     let filtered = timed(gpu, layers.upload(gpu)?, &recipe)?;
     let mut run = Run {
         seed: round,

@@ -7,12 +7,11 @@ use sysinfo::{CpuRefreshKind, RefreshKind, System};
 pub fn describe(info: &DeviceInfo) -> Machine {
     let system =
         System::new_with_specifics(RefreshKind::nothing().with_cpu(CpuRefreshKind::nothing().with_frequency()));
-    let first = system.cpus().first();
     Machine {
         device: info.name.clone(),
         kind: info.kind.to_string(),
         driver: format!("{} {} {}", info.driver_name, info.driver_version, info.driver_info).trim().to_owned(),
-        cpu: first.map_or("unknown", |cpu| cpu.brand().trim()).to_owned(),
+        cpu: crate::machine::cpu(),
         cores: std::thread::available_parallelism().map_or(1, usize::from),
         cpu_mhz: clock(&system).map(|mhz| [mhz; 2]),
     }

@@ -2,8 +2,9 @@
 use super::demodulated::Demodulated;
 use super::demodulation::Demodulation;
 use super::filter::firefly::{self, Removed};
-use super::filter::{self, FilterSettings, Planes, Row, Scales};
-use super::noisy::Noisy;
+use super::filter::oidn;
+use super::filter::{self, FilterSettings, Method, Planes, Scales};
+use super::noisy::{Holds, Noisy};
 use super::windows;
 use crate::error::Result;
 use crate::gpu::{Buffer, FrameResources, Gpu, PassTime, Recorder};
@@ -14,13 +15,32 @@ use crate::render::settings::Settings;
 /// How an image is to be filtered.
 pub struct Recipe<'a> {
     /// By which filter.
-    pub row: &'a Row,
-    /// What is kept away from the filter, where the image tells it.
-    pub demodulation: Demodulation,
+    pub method: Method,
+    /// What is kept away from the filter, where the image tells it and the filter does not want the colour whole. By default
+    /// [`Holds::usual_demodulation`].
+    pub demodulation: Option<Demodulation>,
     /// Pixels so many times brighter than all but one around them are cut first.
     pub fireflies: Option<f32>,
     /// The settings for light of these scales.
     pub settings: &'a dyn Fn(&Scales) -> FilterSettings,
+}
+
+impl Recipe<'_> {
+    /// By this filter at its default settings, as `tallow render --denoise` uses it.
+    pub fn new(method: Method) -> Self {
+        let settings = &|scales: &Scales| FilterSettings::default().scaled_by(scales);
+        Self { method, demodulation: None, fireflies: None, settings }
+    }
+
+    /// What is kept away from the filter of an image that holds this.
+    pub fn demodulation(&self, holds: Holds) -> Demodulation {
+        match self.method {
+            Method::Kernels(_) => {
+                self.demodulation.map_or(holds.usual_demodulation(), |wanted| holds.demodulation(wanted))
+            }
+            Method::Oidn => Demodulation::Off,
+        }
+    }
 }
 
 /// An image whose light is filtered, still taken apart.
@@ -46,7 +66,7 @@ impl Filtered {
     /// device fails.
     pub fn new(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Self> {
         filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
-        let demodulation = noisy.holds().demodulation(recipe.demodulation);
+        let demodulation = recipe.demodulation(noisy.holds());
         let in_painted = demodulation == Demodulation::Light && noisy.lacks_direct_light()?;
         let mut parts = Demodulated::new(gpu, &noisy, demodulation, in_painted)?;
         let mut times = run(gpu, |rec| parts.record_split(rec, &noisy))?;
@@ -54,9 +74,9 @@ impl Filtered {
         let cut = |factor| firefly::cut(gpu, &mut parts.planes, factor);
         let removed = recipe.fireflies.map(cut).transpose()?;
         let scales = Scales::of_planes(&parts.planes)?;
-        times.extend(run_filter(gpu, recipe, &scales, &parts.planes)?);
+        run_filter(gpu, recipe, &scales, &parts.planes, &mut times)?;
         if let Some(direct) = parts.direct_planes() {
-            times.extend(run_filter(gpu, recipe, &scales.with_light(&direct.radiance)?, &direct)?);
+            run_filter(gpu, recipe, &scales.with_light(&direct.radiance)?, &direct, &mut times)?;
             times.extend(run(gpu, |rec| parts.record_direct_join(rec))?);
         }
         Ok(Self { parts, times, removed, in_painted })
@@ -97,23 +117,38 @@ impl Filtered {
 
 /// Device memory that a pixel takes at most while [`Filtered`] is made: its guide, the six planes of an image taken apart, and what
 /// it was taken from or, later, the filter's own. The host holds a window.
-pub fn bytes_per_pixel(row: &Row) -> u64 {
+pub fn bytes_per_pixel(method: Method) -> u64 {
     let planes = size_of::<Guide>() + 5 * size_of::<vec4>() + size_of::<vec3>();
     let taken_from = size_of::<PixelStats>() + size_of::<PixelLight>();
-    planes as u64 + row.bytes.max(taken_from as u64)
+    planes as u64 + method.device_bytes().max(taken_from as u64)
 }
 
 /// Bytes of host memory that filtering the film of a render takes at most once its renderer is gone: the film that was read
-/// back, the filtered colour, and where the device is `unified`, as for [`film::host_bytes`], its buffers too.
-pub fn host_bytes(row: &Row, settings: &Settings, unified: bool) -> u64 {
-    let device = if unified { bytes_per_pixel(row) } else { 0 };
-    film::host_bytes(settings, false) + settings.pixels() as u64 * (device + size_of::<vec3>() as u64)
+/// back, the filtered colour, what the filter takes of the host, and where the device is `unified`, as for [`film::host_bytes`], its
+/// buffers too.
+pub fn host_bytes(method: Method, settings: &Settings, unified: bool) -> u64 {
+    let device = if unified { bytes_per_pixel(method) } else { 0 };
+    let colour = size_of::<vec3>() as u64;
+    film::host_bytes(settings, false) + settings.pixels() as u64 * (device + colour + method.host_bytes())
 }
 
-/// The filter's own buffers last no longer than this.
-fn run_filter(gpu: &Gpu, recipe: &Recipe, scales: &Scales, planes: &Planes) -> Result<Vec<PassTime>> {
-    let filter = recipe.row.compile(gpu, &(recipe.settings)(scales), planes.size)?;
-    run(gpu, |rec| filter.record(rec, planes))
+/// The filter's own buffers last no longer than this. What ran on the host is timed by its clock, and stands behind what the device
+/// did before.
+fn run_filter(gpu: &Gpu, recipe: &Recipe, scales: &Scales, planes: &Planes, times: &mut Vec<PassTime>) -> Result<()> {
+    let settings = (recipe.settings)(scales);
+    match recipe.method {
+        Method::Kernels(row) => {
+            let filter = row.compile(gpu, &settings, planes.size)?;
+            times.extend(run(gpu, |rec| filter.record(rec, planes))?);
+        }
+        Method::Oidn => {
+            for (name, took) in oidn::filter(&settings, planes)? {
+                let begin_ns = times.last().map_or(0, |before| before.end_ns);
+                times.push(PassTime { name, begin_ns, end_ns: begin_ns.saturating_add(took.as_nanos() as u64) });
+            }
+        }
+    }
+    Ok(())
 }
 
 fn run(gpu: &Gpu, record: impl FnOnce(&mut Recorder) -> Result<()>) -> Result<Vec<PassTime>> {

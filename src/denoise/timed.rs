@@ -2,10 +2,10 @@
 //! filter costs once its first use is over.
 use super::demodulated::Demodulated;
 use super::demodulation::Demodulation;
-use super::filter::{self, Filter, Planes, Scales};
+use super::filter::{self, Filter, Method, Planes, Scales};
 use super::filtered::{Colour, Recipe, colour};
 use super::noisy::Noisy;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu, PassTime, Recorder};
 use std::time::{Duration, Instant};
 
@@ -60,7 +60,10 @@ impl<'a> Chain<'a> {
         // The scales that settings count in are those of the light that is filtered.
         gpu.run(&mut FrameResources::new(gpu)?, |rec| parts.record_split(rec, &noisy))?;
         let scales = Scales::of_planes(&parts.planes)?;
-        let compiled = |scales: &Scales| recipe.row.compile(gpu, &(recipe.settings)(scales), parts.planes.size);
+        let Method::Kernels(row) = recipe.method else {
+            return Err(Error::Usage("oidn has no passes to time: choose another filter".to_owned()));
+        };
+        let compiled = |scales: &Scales| row.compile(gpu, &(recipe.settings)(scales), parts.planes.size);
         let of_direct = |planes: Planes| {
             let filter = compiled(&scales.with_light(&planes.radiance)?)?;
             Ok((planes, filter))

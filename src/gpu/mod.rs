@@ -1,5 +1,5 @@
 //! The Vulkan layer. It holds all of the crate's `unsafe` code and all of its Vulkan calls; everything above it is safe
-//! Rust that names buffers and kernels.
+//! Rust that names buffers and kernels. The one other foreign library is here for the same reason: [`Oidn`].
 //!
 //! The layer promises its callers:
 //! - A handle that a call uses is alive: a frame keeps the buffers and pipelines recorded into it until it is reset, and
@@ -25,6 +25,7 @@ mod frame;
 mod info;
 mod instance;
 mod kernel;
+mod oidn;
 mod recorder;
 mod staging;
 mod timing;
@@ -40,6 +41,7 @@ pub use external::RawDevice;
 pub use frame::FrameResources;
 pub use info::{DeviceInfo, DeviceKind, Feature, REQUIRED_FEATURES, survey};
 pub use kernel::{Bindings, Kernel, Slot, SlotKind, Specialise};
+pub use oidn::{OIDN_VARIABLE, Oidn, OidnInput, Texels};
 pub use recorder::Recorder;
 pub use timing::{PassTime, host_ns};
 pub use tuning::Tuning;

@@ -10,6 +10,9 @@ pub const NOISY: &str = "Noisy Image";
 /// Metadata that names the program which rendered the file: "tallow" and its version.
 pub const SOFTWARE: &str = "software";
 
+/// Metadata of what `tallow filter` wrote: the filter.
+pub const FILTERED: &str = "filtered";
+
 /// The samples of one channel, row-major, row 0 at the top.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Samples {

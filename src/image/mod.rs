@@ -9,6 +9,7 @@ pub mod input;
 pub mod metrics;
 pub mod output;
 mod photo;
+pub mod significance;
 mod sorted_head;
 pub mod source;
 pub mod tone;
@@ -16,7 +17,7 @@ pub mod tone;
 use crate::error::{Error, Result};
 use crate::memory;
 pub use claim::Claim;
-pub use film::{Channel, Film, NOISY, Picture, SOFTWARE, Samples, Window};
+pub use film::{Channel, FILTERED, Film, NOISY, Picture, SOFTWARE, Samples, Window};
 use frame::Frame;
 use output::Stream;
 #[cfg(feature = "cli")]

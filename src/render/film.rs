@@ -1,6 +1,6 @@
 //! What a renderer's buffers hold, as the channels of an image file, and back.
 use crate::error::Result;
-use crate::image::{Film, NOISY, Samples};
+use crate::image::{FILTERED, Film, NOISY, Samples};
 use crate::layout::{Guide, PixelLight, PixelStats, vec3};
 use crate::memory;
 use crate::render::settings::Settings;
@@ -16,8 +16,8 @@ pub(crate) const PRIORITY: &str = "priority";
 /// Samples that a pixel still lacks of what it was to have: only in files of renders that were interrupted.
 pub(crate) const PENDING: &str = "pending";
 
-/// Metadata of what `tallow filter` wrote: the filter.
-pub(crate) const FILTERED: &str = "filtered";
+/// Metadata: whether point, spot or directional lights shine in the scene, whose shadows are sharp. Filters ask for it.
+pub(crate) const DELTA_LIGHTS: &str = "deltaLights";
 
 /// Sum of squared deviations of the luminance of indirect light before albedo.
 pub(crate) const INDIRECT_M2: &str = "indirect.m2";

@@ -18,6 +18,11 @@ pub struct Job<'a> {
     /// Paths that one step traces at most, at least 1; the renderer's own limit where that is lower. Fewer paths make
     /// shorter steps, and change no bit of the result.
     pub paths_at_once: u32,
+    /// The only pixel to render, by its row-major index; all pixels if none. It gets [`Settings::spp`] samples, those that it has
+    /// in the whole render, however its renderer places them. Such a film can be neither resumed nor merged.
+    ///
+    /// [`Settings::spp`]: crate::render::settings::Settings::spp
+    pub pixel: Option<u32>,
 }
 
 /// Why a render ended.
@@ -63,7 +68,7 @@ pub struct Status {
 impl<'a> Job<'a> {
     /// A render from its beginning to its end.
     pub fn new(renderer: &'a Renderer) -> Self {
-        Self { renderer, checkpoint: None, paths_at_once: u32::MAX }
+        Self { renderer, checkpoint: None, paths_at_once: u32::MAX, pixel: None }
     }
 
     /// Runs it. Before each step `between` is told how far it is, may read the renderer's buffers (the renderer waits), and
@@ -123,7 +128,10 @@ impl<'a> Job<'a> {
     pub fn film(&self, status: &Status) -> Result<Film> {
         let mut film = film::read_back(self.renderer)?;
         film.metadata.insert(SOFTWARE.to_owned(), format!("tallow {}", env!("CARGO_PKG_VERSION")));
-        film.metadata.extend(provenance::metadata(self.renderer, &film)?);
+        film.metadata.insert(film::DELTA_LIGHTS.to_owned(), self.renderer.delta_lights().to_string());
+        if self.pixel.is_none() {
+            film.metadata.extend(provenance::metadata(self.renderer, &film)?);
+        }
         film.metadata.insert(resume::ALLOCATIONS.to_owned(), status.allocations.to_string());
         film::set_broken_samples(&mut film, self.broken_samples()?);
         if status.stopped == StopReason::Interrupted {
@@ -158,6 +166,9 @@ impl<'a> Job<'a> {
         let cut = self.renderer.cut();
         let cut = Cut { paths: cut.paths.min(self.paths_at_once).max(1), ..cut };
         let settings = self.renderer.settings();
+        if let Some(pixel) = self.pixel {
+            return Box::new(super::schedule::steps_of_pixel(settings, &cut, pixel));
+        }
         match self.checkpoint {
             Some(checkpoint) => Box::new(super::schedule::rest(settings, &cut, checkpoint.progress())),
             None => Box::new(super::schedule::steps(settings, &cut)),

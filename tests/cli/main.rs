@@ -12,6 +12,8 @@ mod effects;
 mod filter;
 #[path = "../support/flat.rs"]
 mod flat;
+mod oidn;
 mod outputs;
 mod resume_merge;
 mod signals;
+mod statistical;

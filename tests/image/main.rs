@@ -1,4 +1,4 @@
-//! Tests of image files, metrics, and the pages that show them.
+//! Tests of image files, metrics, cost measurements, and the pages that show them.
 mod cost;
 mod damage;
 mod files;
@@ -9,4 +9,5 @@ mod limits;
 mod measurement;
 mod metrics;
 mod report;
+mod significance;
 mod source;

@@ -7,6 +7,7 @@ mod references;
 #[path = "../support/scattering.rs"]
 #[allow(dead_code)]
 mod scattering;
+mod significance;
 #[path = "../support/statistics.rs"]
 mod statistics;
 #[path = "../support/mod.rs"]

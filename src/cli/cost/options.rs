@@ -4,10 +4,11 @@ use crate::cli::common::with_ranges;
 use crate::cli::finite;
 use crate::cli::overrides::Overrides;
 use crate::cost::grid::Axes;
-use crate::denoise::filter::Row;
+use crate::denoise::filter::{FILTERS, Row};
 use crate::error::{Error, Result};
 use crate::render::settings::{Film, Settings};
-use clap::Parser;
+use clap::builder::PossibleValue;
+use clap::{Parser, ValueEnum};
 use std::path::PathBuf;
 
 /// Measure how much time buys how much accuracy, by which method
@@ -128,4 +129,13 @@ fn minutes(text: &str) -> std::result::Result<f64, String> {
     let value = finite(text)?;
     // A million minutes are two years.
     if (0.0..=1e6).contains(&value) { Ok(value) } else { Err("expected a number of minutes, or 0 for no limit".into()) }
+}
+impl ValueEnum for &'static Row {
+    fn value_variants<'a>() -> &'a [Self] {
+        FILTERS
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.name).help(self.about))
+    }
 }

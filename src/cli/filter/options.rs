@@ -1,9 +1,10 @@
 //! Options of `tallow filter` for layers and filter settings.
 use crate::cli::common::with_ranges;
-use crate::denoise::filter::{FILTERS, FilterOverrides, FilterSettings, Row};
+use crate::denoise::filter::{FilterOverrides, FilterSettings, Method};
 use crate::image::aov::{Aov, Names};
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
+use std::sync::LazyLock;
 
 /// Names of layers, for those that are not found or are not the right ones.
 #[derive(clap::Args, Clone, Debug, Default)]
@@ -67,20 +68,21 @@ impl Overrides {
     }
 }
 
-impl ValueEnum for &'static Row {
+impl ValueEnum for Method {
     fn value_variants<'a>() -> &'a [Self] {
-        FILTERS
+        static ALL: LazyLock<Vec<Method>> = LazyLock::new(|| Method::all().collect());
+        &ALL
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.name).help(self.about))
+        Some(PossibleValue::new(self.name()).help(self.about()))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::denoise::filter::{AtrousForm, GuidedSums, WaveletBasis};
+    use crate::denoise::filter::{AtrousForm, GuidedSums, OidnQuality, WaveletBasis};
     use crate::render::settings::{PixelFilter, Sampler};
     use crate::settings::entry::Value;
     use clap::{Args, Command};
@@ -104,5 +106,6 @@ mod tests {
     fn messages_name_choices_as_options_do() {
         assert!(named_alike::<PixelFilter>() && named_alike::<Sampler>());
         assert!(named_alike::<AtrousForm>() && named_alike::<GuidedSums>() && named_alike::<WaveletBasis>());
+        assert!(named_alike::<OidnQuality>());
     }
 }

@@ -8,8 +8,10 @@ pub mod firefly;
 mod footprint;
 mod guided;
 mod input;
+mod method;
 mod noise_estimate;
 mod none;
+pub(super) mod oidn;
 mod pack;
 mod pixel;
 mod scales;
@@ -22,6 +24,8 @@ pub use edge::{EdgeOverrides, EdgeSettings};
 pub use footprint::{FootprintOverrides, FootprintSettings};
 pub use guided::{GuidedOverrides, GuidedSettings, GuidedSums};
 pub use input::FilterInput;
+pub use method::Method;
+pub use oidn::{OidnOverrides, OidnQuality, OidnSettings};
 pub use scales::Scales;
 pub use settings::{FilterOverrides, FilterSettings};
 pub use svgf::{SvgfOverrides, SvgfSettings};
@@ -31,7 +35,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Buffer, FrameResources, Gpu, Location, PassTime, Recorder};
 use crate::layout::{Guide, vec3, vec4};
 
-/// Every filter, in the order of `--help`; the twin and stability tests run each row.
+/// Every filter of our own, in the order of `--help`; the twin and stability tests run each row.
 pub const FILTERS: &[&Row] =
     &[&none::ROW, &atrous::ROW, &bilateral::ROW, &guided::ROW, &wavelet::ROW, &svgf::ROW, &auto::ROW];
 

@@ -3,6 +3,7 @@ use super::atrous::{AtrousOverrides, AtrousSettings};
 use super::edge::{EdgeOverrides, EdgeSettings};
 use super::footprint::{FootprintOverrides, FootprintSettings};
 use super::guided::{GuidedOverrides, GuidedSettings};
+use super::oidn::{OidnOverrides, OidnSettings};
 use super::svgf::{SvgfOverrides, SvgfSettings};
 use super::wavelet::{WaveletOverrides, WaveletSettings};
 use super::{FilterInput, Scales};
@@ -21,6 +22,7 @@ settings! {
             ..guided: GuidedSettings, GuidedOverrides;
             ..wavelet: WaveletSettings, WaveletOverrides;
             ..svgf: SvgfSettings, SvgfOverrides;
+            ..oidn: OidnSettings, OidnOverrides;
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The rounds of a render: first the samples that every pixel gets, then those that a policy places.
 use super::cut::{Cut, REFILLS, deal, uniform};
-use super::{Choice, Plan, Share, Step};
+use super::{Batch, Choice, Plan, Share, Step};
 use crate::render::settings::{Placing, Settings};
 use std::iter::once;
 
@@ -9,6 +9,13 @@ use std::iter::once;
 pub fn steps(settings: &Settings, cut: &Cut) -> impl Iterator<Item = Step> + use<> {
     let even = uniform(cut, settings.first_sample, first_spp(settings)).map(Step::Uniform);
     once(Step::Start).chain(even).chain(rounds(settings, cut, 0))
+}
+
+/// All samples for one pixel, and none for the others.
+pub fn steps_of_pixel(settings: &Settings, cut: &Cut, pixel: u32) -> impl Iterator<Item = Step> + use<> {
+    let alone = Cut { pixels: 1, tile: 1, ..*cut };
+    let batches = uniform(&alone, settings.first_sample, settings.spp);
+    once(Step::Start).chain(batches.map(move |batch| Step::Uniform(Batch { first_pixel: pixel, ..batch })))
 }
 
 /// Samples that every pixel gets before any is placed.

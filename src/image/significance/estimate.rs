@@ -1,0 +1,125 @@
+//! What a file says of an image's expectation: means, and how far they may be off.
+use crate::image::aov::{Aov, Aovs, Names};
+use crate::image::{FILTERED, Film, Picture, Samples};
+
+/// How far the mean of a pixel may be from its expectation.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Noise {
+    /// What the samples show.
+    Samples {
+        /// Sums of squared deviations from the mean.
+        m2: Vec<[f32; 3]>,
+        /// Numbers of samples.
+        count: Vec<f32>,
+    },
+    /// Squared standard errors, where the number of samples is not known.
+    SquaredErrors(Vec<[f32; 3]>),
+}
+
+/// An image with its noise.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Means per pixel and channel, row-major.
+    pub mean: Vec<[f32; 3]>,
+    /// How far they may be off.
+    pub noise: Noise,
+    /// The object that each pixel shows, if the file says.
+    pub objects: Option<Vec<u32>>,
+}
+
+impl Estimate {
+    /// Takes the means, the noise and the objects of a film. Of a filtered film the noisy image is taken.
+    ///
+    /// # Errors
+    /// When the film has no noise, or is filtered and has only the filtered colour, or a value is not finite.
+    pub fn of_film(film: &Film) -> Result<Self, String> {
+        let mean = mean(film)?;
+        let aovs = Aovs::find(film, &Names::new())?;
+        let pixels = 0..film.pixels();
+        let layer = |aov| aovs.get(aov).map(|plane| pixels.clone().map(|i| plane.at(i)).collect::<Vec<_>>());
+        let count = layer(Aov::Samples).map(|c| c.into_iter().map(|[n, _, _]| n).collect::<Vec<_>>());
+        let m2 = film.picture(Some("m2")).ok().filter(|_| aovs.is_tallow_s()).map(|m2| m2.pixels);
+        let noise = match (m2, count, layer(Aov::Variance)) {
+            (Some(m2), Some(count), _) => Noise::Samples { m2, count },
+            (None, Some(count), Some(variance)) => Noise::Samples { m2: m2_of(&variance, &count), count },
+            (_, None, Some(variance)) => Noise::SquaredErrors(variance),
+            (_, _, None) => return Err(without_noise(film)),
+        };
+        let objects = match film.channel("id") {
+            Some(Samples::U32(objects)) if aovs.is_tallow_s() => Some(objects.clone()),
+            _ => None,
+        };
+        Self { width: film.width, height: film.height, mean, noise, objects }.checked()
+    }
+
+    /// Makes a film's colour an estimate with standard errors that another image holds.
+    ///
+    /// # Errors
+    /// When sizes differ, or a value is not finite or a standard error negative.
+    pub fn with_errors(film: &Film, errors: &Picture) -> Result<Self, String> {
+        if (film.width, film.height) != (errors.width, errors.height) {
+            return Err(format!("the standard errors are {}x{}, its image is not", errors.width, errors.height));
+        }
+        let noise = Noise::SquaredErrors(errors.pixels.iter().map(|e| e.map(|e| e * e)).collect());
+        Self { width: film.width, height: film.height, mean: mean(film)?, noise, objects: None }.checked()
+    }
+
+    fn checked(self) -> Result<Self, String> {
+        let finite = |values: &[[f32; 3]]| values.iter().flatten().all(|v| v.is_finite());
+        let positive = |values: &[[f32; 3]]| values.iter().flatten().all(|v| v.is_finite() && *v >= 0.0);
+        let broken = self.mean.iter().filter(|m| !m.iter().all(|v| v.is_finite())).count();
+        if broken > 0 {
+            let all = self.mean.len();
+            return Err(format!(
+                "{broken} of {all} pixels are NaN or infinite: find the pixels with tallow compare --diff, or render them anew"
+            ));
+        }
+        let sound = match &self.noise {
+            Noise::Samples { m2, count } => positive(m2) && count.iter().all(|n| n.is_finite() && *n >= 0.0),
+            Noise::SquaredErrors(errors) => finite(errors) && positive(errors),
+        };
+        if !sound {
+            return Err(
+                "its variances or counts are negative, NaN or infinite: take the file as it was rendered".to_owned()
+            );
+        }
+        match &self.noise {
+            Noise::Samples { count, .. } if count.iter().all(|n| *n < 2.0) => Err(
+                "no pixel has two samples, so that nothing tells its noise: render it with --spp 2 or more, 16 to judge \
+                 pixels by themselves"
+                    .to_owned(),
+            ),
+            _ => Ok(self),
+        }
+    }
+}
+
+/// The colour, or what it was before it was filtered.
+fn mean(film: &Film) -> Result<Vec<[f32; 3]>, String> {
+    let noisy = film.picture(Some(crate::image::NOISY));
+    if let (Err(_), Some(filter)) = (&noisy, film.metadata.get(FILTERED)) {
+        return Err(format!(
+            "was filtered ({filter}), and the mean of its samples is gone: take the file before that, since a filter's bias is \
+             no noise"
+        ));
+    }
+    noisy.or_else(|_| film.picture(None)).map(|picture| picture.pixels)
+}
+
+fn without_noise(film: &Film) -> String {
+    let names: Vec<_> = film.channels.iter().map(|c| c.name.as_str()).collect();
+    format!(
+        "does not say how noisy it is (layers m2 and samples, or variance; it has {}): take an .exr that tallow render or merge \
+         wrote, or name a file of standard errors for B with --errors",
+        names.join(", ")
+    )
+}
+
+/// The variance of a mean is m2 / (n (n - 1)).
+fn m2_of(variance: &[[f32; 3]], count: &[f32]) -> Vec<[f32; 3]> {
+    variance.iter().zip(count).map(|(v, n)| v.map(|v| v * n * (n - 1.0).max(0.0))).collect()
+}

@@ -1,0 +1,223 @@
+//! Tests `tallow compare --statistical`: verdicts, exit codes and files.
+use crate::command::{complains, stdout, tallow};
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
+use tallow::image::{self, Film, Samples, WriteOptions};
+use tempfile::TempDir;
+
+/// Writes an image like a render: every pixel is off by noise of this standard error, and the left half is brighter.
+fn write(folder: &TempDir, name: &str, size: u32, error: f32, left: f32, seed: u64) {
+    let mut random = fastrand::Rng::with_seed(seed);
+    let mut film = Film::new(size, size);
+    // Uniform noise of width w has standard deviation w / sqrt 12.
+    let noise = |random: &mut fastrand::Rng| 1.0 + error * 12f32.sqrt() * (random.f32() - 0.5);
+    let half = |i: usize| if i as u32 % size < size / 2 { left } else { 1.0 };
+    let colour: Vec<_> = (0..film.pixels()).map(|i| [half(i) * noise(&mut random); 3]).collect();
+    film.add_vec3("", ["R", "G", "B"], &colour);
+    film.add_vec3("m2", ["R", "G", "B"], &vec![[error * error * 64.0 * 63.0; 3]; film.pixels()]);
+    film.add("samples", Samples::U32(vec![64; film.pixels()]));
+    film.metadata.insert("software".to_owned(), "tallow 0.1.0".to_owned());
+    film.metadata.insert("cpu".to_owned(), "a & b\n\"c\"".to_owned());
+    image::write(&folder.path().join(name), &film, &WriteOptions::default()).unwrap();
+}
+
+fn compare(folder: &TempDir, words: &str) -> Output {
+    let words: Vec<_> = ["compare"].into_iter().chain(words.split_whitespace()).chain(["--statistical"]).collect();
+    tallow(folder, &words)
+}
+
+fn folder() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "a.exr", 32, 0.02, 1.0, 1);
+    write(&folder, "b.exr", 32, 0.02, 1.0, 2);
+    write(&folder, "bright.exr", 32, 0.02, 1.05, 3);
+    folder
+}
+
+#[test]
+fn each_verdict_has_its_exit_code() {
+    let folder = folder();
+    let same = compare(&folder, "a.exr b.exr");
+    assert!(same.status.code() == Some(0) && same.stderr.is_empty(), "{same:?}");
+    // 1024 pixels of 0.02 sqrt 2: 0.0009, of which four and a half can be seen.
+    assert!(stdout(&same).starts_with("same: a difference of the whole image would have been seen from 0.4"));
+    complains(&compare(&folder, "bright.exr b.exr"), 1, &["different: the whole image", "by +2.", "%"]);
+    complains(&compare(&folder, "a.exr b.exr --resolve 0.001"), 7, &["too noisy to say", "0.10 %", "times", "a pixel"]);
+    complains(&compare(&folder, "a.exr b.exr --at 16x16"), 7, &["a block of 16x16 pixels"]);
+    assert_eq!(compare(&folder, "bright.exr b.exr --accept 0.1").status.code(), Some(0));
+    let itself = compare(&folder, "a.exr a.exr");
+    assert!(itself.status.success() && stdout(&itself).contains("equal bit for bit"));
+    assert!(stdout(&tallow(&folder, &["--help"])).contains("\n  7    too noisy to say: compare --statistical"));
+}
+
+#[test]
+fn all_figures_are_in_the_json() {
+    let folder = folder();
+    let output = compare(&folder, "bright.exr b.exr --json --map map.png");
+    let json: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(json["outcome"]["verdict"] == "different" && json["equal"] == false, "{json}");
+    let levels = json["outcome"]["levels"].as_array().unwrap();
+    let scales: Vec<_> = levels.iter().map(|level| level["scale"].as_str().unwrap()).collect();
+    assert_eq!(scales, ["pixel", "4x4", "16x16", "image"]);
+    let worst = &levels[2]["worst"][0];
+    assert!((worst["difference"].as_f64().unwrap() - 0.05).abs() < 0.01, "{worst}");
+    assert!(worst["place"]["first"][0] == 0, "the left half: {worst}");
+    // Orange on the left, grey on the right.
+    let map = image::read(&folder.path().join("map.png")).unwrap().picture(None).unwrap();
+    let is_grey = |[r, g, b]: [f32; 3]| (r - g).abs() < 0.01 && (g - b).abs() < 0.01;
+    assert!((0..32).all(|y| map.pixels[32 * y][0] > map.pixels[32 * y][2] + 0.1 && is_grey(map.pixels[32 * y + 31])));
+    let json: Value = serde_json::from_slice(&compare(&folder, "a.exr b.exr --json").stdout).unwrap();
+    assert!(json["outcome"]["verdict"] == "same" && json["outcome"]["visible"].as_f64().unwrap() < 0.01, "{json}");
+}
+
+#[test]
+fn junit_has_a_case_for_every_scale() {
+    let folder = folder();
+    let junit = |words: &str| {
+        compare(&folder, &format!("{words} --junit t.xml"));
+        std::fs::read_to_string(folder.path().join("t.xml")).unwrap()
+    };
+    let same = junit("a.exr b.exr");
+    assert!(same.contains("tests=\"4\"") && same.contains("failures=\"0\"") && !same.contains("<failure"), "{same}");
+    assert!(same.contains("a &amp; b"), "{same}");
+    let different = junit("bright.exr b.exr");
+    assert!(different.contains("<failure message=\"different: the whole image\">"), "{different}");
+    let noisy = junit("a.exr b.exr --resolve 0.001");
+    assert!(noisy.contains("errors=\"1\"") && noisy.contains("<error message=\"too noisy to say"), "{noisy}");
+}
+
+#[test]
+fn the_page_has_the_verdict_and_the_images_and_asks_nothing_of_the_network() {
+    let folder = folder();
+    std::fs::rename(folder.path().join("bright.exr"), folder.path().join("<b>.exr")).unwrap();
+    complains(&compare(&folder, "<b>.exr b.exr --html t.html"), 1, &["different"]);
+    let page = std::fs::read_to_string(folder.path().join("t.html")).unwrap();
+    for part in ["different: the whole image", "data-name=\"map\"", "data-name=\"A\"", "block (0, 0) to (15, 15)"] {
+        assert!(page.contains(part), "{part}");
+    }
+    assert!(!page.contains("<b>.exr") && !page.contains("http://") && !page.contains("https://"));
+    complains(&compare(&folder, "b.exr b.exr --html b.exr"), 2, &["--html", "same file as"]);
+}
+
+#[test]
+fn what_cannot_be_tested_is_one_line() {
+    let folder = folder();
+    write(&folder, "small.exr", 16, 0.02, 1.0, 1);
+    write(&folder, "nan.exr", 32, f32::NAN, 1.0, 1);
+    let mut bare = image::read(&folder.path().join("b.exr")).unwrap();
+    bare.channels.retain(|c| c.name.len() == 1);
+    let save =
+        |film: &Film, name: &str| image::write(&folder.path().join(name), film, &WriteOptions::default()).unwrap();
+    save(&bare, "bare.exr");
+    save(&bare, "bare.png");
+    let mut once = image::read(&folder.path().join("b.exr")).unwrap();
+    once.channels.retain(|c| c.name != "samples");
+    once.add("samples", Samples::U32(vec![1; 1024]));
+    save(&once, "once.exr");
+    complains(&compare(&folder, "a.exr small.exr"), 3, &["32x32", "16x16"]);
+    complains(&compare(&folder, "a.exr nan.exr"), 3, &["nan.exr", "1024 of 1024 pixels"]);
+    complains(&compare(&folder, "a.exr bare.exr"), 3, &["bare.exr", "does not say how noisy", "--errors"]);
+    complains(&compare(&folder, "a.exr bare.png"), 3, &["bare.png", "--errors"]);
+    complains(&compare(&folder, "a.exr once.exr"), 3, &["once.exr", "--spp 2"]);
+    complains(&compare(&folder, "a.exr b.exr --at 256x256"), 3, &["256x256", "pixel, 4x4, 16x16, image"]);
+    complains(&compare(&folder, "a.exr b.exr --at 5x5"), 2, &["'5x5'", "16x16"]);
+    complains(&compare(&folder, "a.exr b.exr --false-alarms 0"), 2, &["above 0"]);
+    complains(&compare(&folder, "a.exr b.exr --resolve 0"), 2, &["above 0"]);
+    complains(&compare(&folder, "a.exr b.exr --layer N"), 2, &["--layer"]);
+    complains(&compare(&folder, "a.exr b.exr --max-mse 1"), 2, &["--max-mse"]);
+    complains(&compare(&folder, "a.exr b.exr --map a.exr"), 2, &["a.exr", ".png"]);
+    complains(&compare(&folder, "a.exr b.exr --junit b.exr"), 2, &["--junit", "same file as B"]);
+    complains(&compare(&folder, "a.exr b.exr --evidence a.exr"), 5, &["a.exr", "--evidence"]);
+    complains(&tallow(&folder, &["compare", "a.exr", "b.exr", "--map", "m.png"]), 2, &["--statistical"]);
+    // A reference without variance counts by its standard errors.
+    let errors = {
+        let mut film = Film::new(32, 32);
+        film.add_vec3("", ["R", "G", "B"], &[[0.02; 3]; 1024]);
+        film
+    };
+    save(&errors, "errors.exr");
+    assert_eq!(compare(&folder, "a.exr bare.exr --errors errors.exr").status.code(), Some(0));
+}
+
+const CORNELL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box");
+
+fn render(folder: &TempDir, scene: &Path, seed: &str, output: &str) {
+    let words = ["render", scene.to_str().unwrap(), "--seed", seed, "-o", output];
+    let small = ["--width", "64", "--height", "64", "--spp", "256", "--quiet", "--validation"];
+    let output = tallow(folder, &[&words[..], &small].concat());
+    assert!(output.status.success(), "{output:?}");
+}
+
+#[test]
+fn one_percent_of_one_material_is_found_and_its_pixels_render_again_to_the_same_bits() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = Path::new(CORNELL).join("scene.toml");
+    let text = std::fs::read_to_string(&scene).unwrap();
+    let red = text
+        .replace("[0.65, 0.05, 0.05]", "[0.6565, 0.0505, 0.0505]")
+        .replace("file = \"", &format!("file = \"{CORNELL}/"));
+    assert_ne!(text, red);
+    let changed = folder.path().join("red wall.toml");
+    std::fs::write(&changed, red).unwrap();
+    render(&folder, &changed, "1", "changed.exr");
+    render(&folder, &scene, "2", "b.exr");
+    render(&folder, &scene, "3", "c.exr");
+    let same = compare(&folder, "c.exr b.exr --evidence nothing --json");
+    assert_eq!(same.status.code(), Some(0), "{same:?}");
+    let found = compare(&folder, "changed.exr b.exr --evidence found --json");
+    let json: Value = serde_json::from_slice(&found.stdout).unwrap();
+    assert_eq!(json["outcome"]["verdict"], "different");
+    let objects =
+        json["outcome"]["levels"].as_array().unwrap().iter().find(|level| level["scale"] == "object").unwrap();
+    let worst = &objects["worst"][0];
+    // The red wall is at the left.
+    assert!(worst["place"]["last"][0].as_u64().unwrap() < 16, "{worst}");
+    let [difference, error] = ["difference", "error"].map(|key| worst[key].as_f64().unwrap());
+    assert!(error < 0.004 && (difference - 0.01).abs() < 3.0 * error, "{worst}");
+    assert_eq!(std::fs::read_dir(folder.path().join("nothing")).unwrap().count(), 0, "they are the same");
+    replayed(&folder);
+}
+
+/// Runs the first command of the evidence.
+fn replayed(folder: &TempDir) {
+    let file = |name: &str| folder.path().join("found").join(name);
+    for name in ["a.exr", "b.exr", "a.png", "b.png", "map.png", "report.html", "report.json"] {
+        assert!(file(name).is_file(), "{name}");
+    }
+    let report: Value = serde_json::from_slice(&std::fs::read(file("report.json")).unwrap()).unwrap();
+    assert!(report["a"]["device"].is_string() && report["b"]["driver"].is_string() && report["a"]["cpu"].is_string());
+    let script = std::fs::read_to_string(file("replay.sh")).unwrap();
+    let line = script.lines().find(|line| line.starts_with("tallow render")).unwrap();
+    let program = format!("tallow() {{ \"{}\" \"$@\"; }}; {line}", env!("CARGO_BIN_EXE_tallow"));
+    let output = Command::new("sh").args(["-c", &program]).current_dir(folder.path()).output().unwrap();
+    assert!(output.status.success(), "{line}: {output:?}");
+    let name = line.rsplit(' ').next().unwrap();
+    let [alone, whole] = [name, "changed.exr"].map(|name| image::read(&folder.path().join(name)).unwrap());
+    let pixel = report["pixels"][0]["place"]["first"].as_array().unwrap();
+    let at = (pixel[1].as_u64().unwrap() * 64 + pixel[0].as_u64().unwrap()) as usize;
+    for channel in ["R", "G", "B", "m2.R", "samples"] {
+        let [alone, whole] = [&alone, &whole].map(|film| film.channel(channel).unwrap());
+        assert_eq!(alone.at(at).to_bits(), whole.at(at).to_bits(), "{channel} of {line}");
+    }
+    let Some(Samples::U32(counts)) = alone.channel("samples") else { panic!("counts") };
+    assert!(counts.iter().enumerate().all(|(i, n)| *n == if i == at { 256 } else { 0 }), "no other pixel has samples");
+}
+
+#[test]
+fn a_pixel_outside_of_the_film_and_a_file_of_one_pixel_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = Path::new(CORNELL).join("scene.toml");
+    let words = |pixel: &'static str| {
+        let scene = scene.to_str().unwrap().to_owned();
+        let words = [
+            "render", &scene, "--pixel", pixel, "--width", "8", "--height", "8", "--spp", "4", "--quiet", "-o", "p.exr",
+        ];
+        tallow(&folder, &words)
+    };
+    complains(&words("8,0"), 2, &["--pixel 8,0", "8x8"]);
+    complains(&words("8"), 2, &["12,34"]);
+    assert!(words("7,7").status.success());
+    let resume = ["render", scene.to_str().unwrap(), "--resume", "p.exr", "--width", "8", "--height", "8", "--quiet"];
+    complains(&tallow(&folder, &resume), 3, &["p.exr", "metadata"]);
+}

@@ -1,0 +1,114 @@
+//! Noisy images of a scene, and what every filter makes of them.
+use crate::Args;
+use crate::reference::Reference;
+use crate::strip;
+use crate::view::View;
+use anyhow::{Result, anyhow};
+use tallow::denoise::filter::{FilterSettings, Method, OidnQuality, Scales};
+use tallow::denoise::{Filtered, Noisy, Recipe};
+use tallow::gpu::{FrameResources, Gpu, PassTime};
+use tallow::image::{Picture, metrics};
+use tallow::render::settings::Settings;
+use tallow::render::{Job, Outputs, Renderer};
+use tallow::scene::{Loaded, Scene};
+
+/// A filter at its defaults.
+pub struct Contender {
+    pub name: String,
+    pub method: Method,
+    pub quality: OidnQuality,
+}
+
+/// How far one image is from its reference.
+pub struct Score {
+    pub relmse: f64,
+    pub ssim: f64,
+    pub flip: f64,
+    pub ms: Option<f64>,
+}
+
+/// One noisy image.
+pub struct Row {
+    pub view: &'static str,
+    pub spp: u32,
+    pub reference_spp: f64,
+    pub reference_relmse: f64,
+    /// The noisy image, then what the contenders made of it.
+    pub scores: Vec<Score>,
+}
+
+/// Renders a view at every number of samples, filters it, and draws what came out.
+pub fn of_view(gpu: &Gpu, args: &Args, view: &'static View, contenders: &[Contender]) -> Result<Vec<Row>> {
+    let file = view.scene_file(args.data.as_deref(), &args.output.join("scenes"))?;
+    let Loaded { scene, settings } = Scene::load(&file)?;
+    let folder = args.references.clone().unwrap_or_else(|| args.output.join("references"));
+    std::fs::create_dir_all(&folder)?;
+    let of_reference = Settings { spp: args.reference_spp, ..settings.clone() };
+    let reference = Reference::new(gpu, view, &scene, &of_reference, &folder.join(format!("{}.exr", view.name)))?;
+    let mut rows = Vec::new();
+    for &spp in &args.spp {
+        let (noisy, filtered) = images(gpu, args, &scene, &view.settings(&settings, spp, 0), contenders)?;
+        let pictures: Vec<&Picture> = filtered.iter().map(|(picture, _)| picture).collect();
+        let of_filters = filtered.iter().map(|(picture, ms)| score(picture, &reference, Some(*ms)));
+        let scores = [score(&noisy, &reference, None)].into_iter().chain(of_filters).collect();
+        let (name, reference_spp, reference_relmse) = (view.name, reference.spp, reference.relmse);
+        rows.push(Row { view: name, spp, reference_spp, reference_relmse, scores });
+        let strip = strip::draw(&noisy, &pictures, &reference.picture);
+        strip::write(&strip, &args.output.join(format!("{name}-{spp}spp.png")))?;
+    }
+    Ok(rows)
+}
+
+/// The noisy image, and every contender's with its milliseconds.
+fn images(
+    gpu: &Gpu,
+    args: &Args,
+    scene: &Scene,
+    settings: &Settings,
+    contenders: &[Contender],
+) -> Result<(Picture, Vec<(Picture, f64)>)> {
+    let renderer = Renderer::new(gpu, scene, settings, Outputs { guides: true, split_light: true, counters: false })?;
+    let job = Job::new(&renderer);
+    let status = job.run_to_end(&mut FrameResources::new(gpu)?)?;
+    let noisy = job.film(&status)?.picture(None).map_err(|what| anyhow!(what))?;
+    let filtered = contenders.iter().map(|contender| {
+        let mut milliseconds = Vec::new();
+        let mut picture = noisy.clone();
+        // The first run makes kernels and loads weights.
+        for _ in 0..=args.runs {
+            let (pixels, ms) = contender.filter(gpu, Noisy::of_film(&renderer)?)?;
+            picture.pixels = pixels;
+            milliseconds.push(ms);
+        }
+        milliseconds[1..].sort_unstable_by(f64::total_cmp);
+        Ok((picture, milliseconds[1 + (milliseconds.len() - 2) / 2]))
+    });
+    let filtered = filtered.collect::<Result<Vec<_>>>()?;
+    Ok((noisy, filtered))
+}
+
+impl Contender {
+    /// As `tallow render --denoise` does it, and the milliseconds of its passes: by the device's clock, or for a library by the
+    /// host's.
+    fn filter(&self, gpu: &Gpu, noisy: Noisy) -> Result<(Vec<[f32; 3]>, f64)> {
+        let quality = self.quality;
+        let settings =
+            |scales: &Scales| FilterSettings::default().scaled_by(scales).with(|s| s.oidn.oidn_quality = quality);
+        let recipe = Recipe { settings: &settings, ..Recipe::new(self.method) };
+        let ([r, g, b], times) = Filtered::new(gpu, noisy, &recipe)?.join(gpu)?;
+        let pixels = r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect();
+        Ok((pixels, times.iter().map(PassTime::duration_ns).sum::<u64>() as f64 * 1e-6))
+    }
+}
+
+fn score(picture: &Picture, reference: &Reference, ms: Option<f64>) -> Score {
+    let m = metrics::compare(picture, &reference.picture);
+    Score { relmse: m.relmse, ssim: m.ssim.unwrap_or(f64::NAN), flip: m.flip, ms }
+}
+
+impl Row {
+    /// The least error of a contender: a reference is good enough whose own is a tenth of it.
+    pub fn least_relmse(&self) -> f64 {
+        self.scores.iter().map(|score| score.relmse).fold(f64::INFINITY, f64::min)
+    }
+}
