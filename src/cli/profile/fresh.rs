@@ -56,7 +56,7 @@ fn trace(measured: &Measured) -> String {
 /// As for a render: what takes more memory than there is, is told before.
 fn check_room(args: &Args, settings: &Settings, gpu: &Gpu) -> Result<()> {
     let (size, unified) = ([settings.width, settings.height], gpu.info().unified);
-    let filtered = args.denoise.map_or(0, |row| denoise::host_bytes(row, settings, unified));
+    let filtered = args.denoise.map_or(0, |row| denoise::host_bytes(row.into(), settings, unified));
     let refused = |what| Error::Device(format!("a film of {} x {} {what}: choose a smaller film", size[0], size[1]));
     memory::check(film::host_bytes(settings, unified).max(filtered)).map_err(refused)?;
     args.denoise.map_or(Ok(()), |_| filter::check_size(gpu, size, filter::GUIDE_TEXELS))
