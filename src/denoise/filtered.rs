@@ -35,7 +35,9 @@ impl Recipe<'_> {
     /// What is kept away from the filter of an image that holds this.
     pub fn demodulation(&self, holds: Holds) -> Demodulation {
         match self.method {
-            Method::Kernels(_) => self.demodulation.map_or(holds.usual_demodulation(), |wanted| holds.demodulation(wanted)),
+            Method::Kernels(_) => {
+                self.demodulation.map_or(holds.usual_demodulation(), |wanted| holds.demodulation(wanted))
+            }
             Method::Oidn => Demodulation::Off,
         }
     }

@@ -127,9 +127,7 @@ fn part(pixels: &Pixels, demodulation: Demodulation, i: usize) -> Part {
     let (colour, albedo) = (pixels.stats[i].mean, pixels.guide[i].albedo);
     match demodulation {
         Demodulation::Light => split_light(&colour, &albedo, &pixels.light[i]),
-        Demodulation::Albedo if is_mirror(pixels, i) => {
-            Part { filtered: colour, factor: [1.0; 3], sharp: [0.0; 3] }
-        }
+        Demodulation::Albedo if is_mirror(pixels, i) => Part { filtered: colour, factor: [1.0; 3], sharp: [0.0; 3] },
         Demodulation::Albedo if !reflects(&albedo) || is_rim(pixels, i) => {
             Part { filtered: [0.0; 3], factor: [0.0; 3], sharp: colour.map(number) }
         }
