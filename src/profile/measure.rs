@@ -3,7 +3,7 @@ use super::ceilings::{self, Ceilings};
 use super::frames::{Frames, Workload};
 use super::work::FrameWork;
 use crate::denoise::filter::{FilterSettings, Row};
-use crate::denoise::{Demodulation, Denoiser};
+use crate::denoise::{Denoiser, Noisy};
 use crate::error::{Error, Result};
 use crate::gpu::{Calibration, FrameResources, Gpu};
 use crate::render::settings::Settings;
@@ -30,7 +30,8 @@ pub struct Measured {
 /// # Errors
 /// As [`Denoiser::new`] and [`Job::run`].
 pub fn denoiser(gpu: &Gpu, renderer: &Renderer, row: &Row) -> Result<Denoiser> {
-    let make = |settings: &FilterSettings| Denoiser::new(gpu, renderer, row, settings, Demodulation::default());
+    let demodulation = Noisy::of_film(renderer)?.holds().usual_demodulation();
+    let make = |settings: &FilterSettings| Denoiser::new(gpu, renderer, row, settings, demodulation);
     let (first, mut frame) = (make(&FilterSettings::default())?, FrameResources::new(gpu)?);
     Job::new(renderer).run_to_end(&mut frame)?;
     gpu.run(&mut frame, |rec| first.record(rec))?;
