@@ -19,6 +19,7 @@ layout(scalar, push_constant) uniform Push { SplitPush push; };
 // partly show something without albedo.
 const float WHOLE = 0.98;
 const float OUTLIER = 2.0;
+const float MIRRORED = 0.6; // 6 of 9 pixels, which the rim of a mirror has around it
 
 struct Parts {
     vec3 filtered;
@@ -68,10 +69,33 @@ bool is_rim(int i, vec3 colour, vec3 albedo) {
     return outshone && (bright > OUTLIER * median || partly);
 }
 
+// Of hits without albedo: x is 1 where the pixel is noisy, y where it is noisy or black. Few samples of glass may all be black.
+ivec2 without_albedo(int i) {
+    if (reflects(albedo_at(i)) || !(Guide_depth(guide, i) > 0.0)) return ivec2(0);
+    bool noisy = largest(PixelStats_m2(stats, i)) > 0.0;
+    return ivec2(noisy, noisy || largest(colour_at(i)) == 0.0);
+}
+
+// Whether a pixel shows a mirror or clear glass: it has no albedo and is noisy or black, and so are MIRRORED of the pixels around
+// it that the image has, one of them noisy. Lamps have no noise but at their rims, which are thin.
+bool is_mirror(int i) {
+    if (without_albedo(i).y == 0) return false;
+    ivec2 size = ivec2(push.size), at = ivec2(i % size.x, i / size.x), alike = ivec2(0);
+    int count = 0;
+    for (int k = 0; k < 9; k++) {
+        ivec2 tap = at + ivec2(k % 3, k / 3) - 1;
+        if (any(lessThan(tap, ivec2(0))) || any(greaterThanEqual(tap, size))) continue;
+        alike += without_albedo(tap.y * size.x + tap.x);
+        count++;
+    }
+    return alike.x > 0 && float(alike.y) > MIRRORED * float(count);
+}
+
 // Lamps, sky and the pixels at their rims are not filtered: a rim's light divided by its small albedo would be far brighter
-// than its surroundings.
+// than its surroundings. What mirrors and clear glass show is filtered as it is.
 Parts split_albedo(int i) {
     vec3 colour = colour_at(i), albedo = albedo_at(i);
+    if (is_mirror(i)) return Parts(colour, vec3(1.0), vec3(0.0));
     if (!reflects(albedo) || is_rim(i, colour, albedo)) return Parts(vec3(0.0), vec3(0.0), number(colour));
     return Parts(colour / divisor(albedo), divisor(albedo), vec3(0.0));
 }

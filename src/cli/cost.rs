@@ -138,7 +138,7 @@ fn command(scene: &Path, from: &Settings, candidate: &Candidate) -> String {
     let words = grid::options(from, &candidate.settings).join(" ");
     let scene = quoted(&scene.display().to_string());
     match candidate.filter {
-        Some(row) => format!("tallow render {scene} {words} --denoise {} -o point.exr", row.name),
+        Some(filter) => format!("tallow render {scene} {words} --denoise {} -o point.exr", filter.name()),
         None => format!("tallow render {scene} {words} -o point.hdr"),
     }
 }

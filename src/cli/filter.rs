@@ -23,11 +23,20 @@ use std::path::PathBuf;
 use std::time::Instant;
 use supersampling::Supersampling;
 
+/// Which light of an image is filtered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Light {
+    /// All but lamps and sky that are seen directly.
+    All,
+    /// Indirect light, where the file holds it apart.
+    Indirect,
+}
+
 /// Filter a noisy image, of this renderer or another
 ///
 /// Takes albedo, normals, positions, depth and variance from the layers of an EXR file, as Tallow, Blender, Mitsuba 3 and
 /// pbrt-v4 name them, and does without those that are missing. Surface colour is divided out before and multiplied back
-/// after; in Tallow's own files, direct light stays as it is.
+/// after. In Tallow's own files of scenes with point, spot or directional lights, direct light stays as it is.
 #[derive(clap::Args)]
 pub struct Args {
     /// Image to filter (EXR; PNG, JPEG and HDR hold no layers)
@@ -41,9 +50,10 @@ pub struct Args {
     /// Print how far the image is from this one, before and after
     #[arg(long, value_name = "FILE")]
     pub reference: Option<PathBuf>,
-    /// Filter direct light too, where the file holds it apart (Tallow's own do)
-    #[arg(long)]
-    pub filter_direct: bool,
+    /// Light to filter, where the file holds direct light apart (Tallow's own do) [default: all, but indirect where point,
+    /// spot or directional lights cast sharp shadows]
+    #[arg(long, value_enum, conflicts_with = "no_demodulate")]
+    pub light: Option<Light>,
     /// Filter the colour as it is: textures blur too
     #[arg(long)]
     pub no_demodulate: bool,
@@ -158,6 +168,9 @@ fn check_outputs(args: &Args) -> Result<()> {
 
 /// Checks that the filter can run, and is one for what is asked of it.
 fn check_filter(args: &Args) -> Result<()> {
+    if args.light == Some(Light::All) && args.supersampling.scene.is_some() {
+        return Err(Error::Usage("--scene looks filtered indirect light up: leave --light all out".to_owned()));
+    }
     if matches!(args.filter, Method::Oidn) && args.supersampling.scene.is_some() {
         let what =
             "--scene looks filtered indirect light up, but oidn filters the colour whole: choose another --filter";
@@ -179,11 +192,13 @@ fn write<'a>(args: &'a Args, clean: &'a Source) -> (Vec<String>, Files) {
     (written.iter().map(|path| path.display().to_string()).collect(), files)
 }
 
-fn demodulation(args: &Args) -> Demodulation {
-    match (args.no_demodulate, args.filter_direct) {
-        (true, _) => Demodulation::Off,
-        (false, true) => Demodulation::Albedo,
-        (false, false) => Demodulation::Light,
+fn demodulation(args: &Args) -> Option<Demodulation> {
+    let looked_up = args.supersampling.scene.is_some();
+    match args.light {
+        _ if args.no_demodulate => Some(Demodulation::Off),
+        Some(Light::All) => Some(Demodulation::Albedo),
+        Some(Light::Indirect) => Some(Demodulation::Light),
+        None => looked_up.then_some(Demodulation::Light),
     }
 }
 

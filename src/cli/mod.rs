@@ -11,6 +11,7 @@ pub mod filter;
 pub mod interrupt;
 pub mod merge;
 pub mod overrides;
+pub mod profile;
 pub mod progress;
 pub mod render;
 
@@ -26,13 +27,13 @@ use std::process::ExitCode;
 const EXIT_CODES: &str = "\
 Exit codes:
   0    done
-  1    a limit given with --max-... or --min-... is exceeded, or compare --statistical finds a difference
+  1    a limit given with --max-... or --min-... is exceeded, compare --statistical finds a difference, or a profile has changed
   2    usage: an option or a setting is wrong
   3    input: a file cannot be read or is damaged
   4    device or memory: no Vulkan, no usable device, it was lost, or memory is out
   5    output: a file cannot be written
   6    some points of a measurement failed; the others are written
-  7    too noisy to say: compare --statistical finds no difference, but could have missed one
+  7    too noisy to say: compare --statistical finds no difference, but could have missed one, or profiles cannot be compared
   70   internal error: a bug, please report it
   130  interrupted (Ctrl-C)";
 
@@ -52,6 +53,7 @@ enum Command {
     Cost(Box<cost::Args>),
     Merge(merge::Args),
     Explain(explain::Args),
+    Profile(Box<profile::Args>),
     Devices(devices::Args),
 }
 
@@ -60,11 +62,11 @@ enum Command {
 pub enum Exit {
     /// Everything was done.
     Done = 0,
-    /// A limit given by the user was exceeded.
+    /// A limit given by the user was exceeded, or what was to stay the same has changed.
     LimitExceeded = 1,
     /// Some points of a measurement failed; the others were measured and written.
     PartlyFailed = 6,
-    /// A test found nothing, and would have missed what it was to find.
+    /// A test found nothing, and would have missed what it was to find; or profiles cannot be compared.
     Undecided = 7,
     /// The command was stopped by Ctrl-C or another signal.
     Interrupted = 130,
@@ -105,6 +107,7 @@ fn run(command: Command) -> Result<Exit> {
         Command::Cost(args) => cost::run(&args),
         Command::Merge(args) => merge::run(&args),
         Command::Explain(args) => explain::run(&args),
+        Command::Profile(args) => profile::run(&args),
         Command::Devices(args) => devices::run(&args),
     }
 }
@@ -117,7 +120,8 @@ fn usage(e: &clap::Error) -> Result<Exit> {
     }
     if e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         return Err(Error::Usage(
-            "name a command: render, filter, compare, cost, merge, explain or devices (see tallow --help)".to_owned(),
+            "name a command: render, filter, compare, cost, merge, explain, profile or devices (see tallow --help)"
+                .to_owned(),
         ));
     }
     let one_line = |paragraph: &str| paragraph.split_whitespace().collect::<Vec<_>>().join(" ");

@@ -7,8 +7,8 @@ use super::machine;
 use super::plan::Watch;
 use super::reference::Reference;
 use super::session::{add_filter, check_clock, finite, interleaved};
-use crate::denoise::filter::{self, FilterSettings, Row};
-use crate::denoise::{Demodulation, Recipe, file, timed};
+use crate::denoise::filter::{self, FilterSettings};
+use crate::denoise::{Recipe, file, timed};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::image::aov::{Aovs, Names};
@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 /// A filter to measure.
 pub struct FilterCandidate {
     /// The filter.
-    pub row: &'static Row,
+    pub filter: filter::Method,
     /// Its settings, which are scaled to the image.
     pub settings: FilterSettings,
     /// Options of `tallow filter` that gave these settings.
@@ -95,7 +95,7 @@ pub fn measure_filters(gpu: &Gpu, plan: &FilterPlan, watch: &Watch) -> Result<(D
 fn point(candidate: &FilterCandidate) -> Point {
     let method = Method {
         allocate: String::new(),
-        filter: candidate.row.name.to_owned(),
+        filter: candidate.filter.name().to_owned(),
         rounds: None,
         options: candidate.options.clone(),
         spp: 0,
@@ -111,10 +111,9 @@ fn filtered(
     index: usize,
     round: u32,
 ) -> Result<(Run, WarmUp, u64, Picture)> {
-    let FilterCandidate { row, settings, .. } = &plan.candidates[index];
+    let FilterCandidate { filter, settings, .. } = &plan.candidates[index];
     let scaled = |scales: &filter::Scales| settings.scaled_by(scales);
-    let demodulation = layers.holds().demodulation(Demodulation::default());
-    let recipe = Recipe { method: filter::Method::Kernels(row), demodulation, fireflies: None, settings: &scaled };
+    let recipe = Recipe { settings: &scaled, ..Recipe::new(*filter) };
     let filtered = timed(gpu, layers.upload(gpu)?, &recipe)?;
     let mut run = Run {
         seed: round,

@@ -41,15 +41,17 @@ impl Candidate {
     }
 }
 
-/// Which candidate has the lowest value, and which cannot be told from it.
-#[derive(Debug, PartialEq)]
+/// Which candidate has the lowest value of those that were measured at the place in question.
+#[derive(Debug, Default)]
 struct Ranking {
-    /// The best one first.
+    /// The lowest one, and then those that cannot be told from it.
     best: Vec<usize>,
+    /// Those that were not measured that far, and that might be as good if they went on as unbiased methods do.
+    open: Vec<usize>,
 }
 
-/// Says what the points show. Comparisons between methods use the runs of the same seed, and each family of them keeps the
-/// probability of a false statement below 1 - `confidence`.
+/// Says what the points show. Comparisons between methods use the runs of the same seed, and all of them together keep the
+/// probability of naming a wrong winner below 1 - `confidence`.
 pub fn findings(points: &[Point], confidence: f64) -> Vec<Finding> {
     let candidates = candidates(points);
     let mut all: Vec<Finding> = candidates.iter().filter_map(|c| halving(c, confidence)).collect();
@@ -104,13 +106,12 @@ fn range(candidate: &Candidate) -> [f64; 2] {
 /// Which method is best at which time.
 fn best_by_time(candidates: &[Candidate], confidence: f64) -> Vec<Finding> {
     let times = levels(candidates);
-    if times.is_empty() {
-        return Vec::new();
-    }
-    let alpha = (1.0 - confidence) / (times.len() * (candidates.len() - 1)).max(1) as f64;
+    let alpha = level(confidence, times.len(), candidates.len());
     let rank = |&time: &f64| {
-        let there: Vec<usize> = (0..candidates.len()).filter(|&i| candidates[i].covers(time)).collect();
-        ranking(candidates, &there, &|curve| curve.error_at(time).value, alpha)
+        let is_there = |c: &Candidate| c.covers(time);
+        // What begins later is no choice at this time.
+        let begins_later = |c: &Candidate| c.times()[0] > time;
+        ranking(candidates, &is_there, &begins_later, &|curve| curve.error_at(time).value, alpha)
     };
     let rankings: Vec<Ranking> = times.iter().map(rank).collect();
     let mut found = Vec::new();
@@ -124,13 +125,18 @@ fn best_by_time(candidates: &[Candidate], confidence: f64) -> Vec<Finding> {
     found
 }
 
+/// Level of each of the tests in one of two families, so that all together are right with the wanted confidence.
+fn level(confidence: f64, places: usize, candidates: usize) -> f64 {
+    (1.0 - confidence) / (2 * places * candidates.saturating_sub(1)).max(1) as f64
+}
+
 fn same(a: &Ranking, b: &Ranking) -> bool {
-    let sorted = |ranking: &Ranking| {
-        let mut best = ranking.best.clone();
-        best.sort_unstable();
-        best
+    let sorted = |indices: &[usize]| {
+        let mut indices = indices.to_vec();
+        indices.sort_unstable();
+        indices
     };
-    sorted(a) == sorted(b)
+    sorted(&a.best) == sorted(&b.best) && sorted(&a.open) == sorted(&b.open)
 }
 
 fn best_between(candidates: &[Candidate], ranking: &Ranking, times: &[f64]) -> Finding {
@@ -139,17 +145,29 @@ fn best_between(candidates: &[Candidate], ranking: &Ranking, times: &[f64]) -> F
         true => format!("At {}", milliseconds(first)),
         false => format!("From {} to {}", milliseconds(first), milliseconds(last)),
     };
-    let names: Vec<&str> = ranking.best.iter().map(|&i| candidates[i].name.as_str()).collect();
     let middle = (first * last).sqrt();
-    let error = number(candidates[ranking.best[0]].mean(&|curve| curve.error_at(middle).value).exp());
-    let at = milliseconds(middle);
-    match names[..] {
-        [name] => clear(format!("{when}, {name} has the lowest relMSE ({error} at {at}).")),
+    let best = &candidates[ranking.best[0]];
+    let error = number(best.mean(&|curve| curve.error_at(middle).value).exp());
+    let at = if first == last { String::new() } else { format!(" at {}", milliseconds(middle)) };
+    match ranking.best[..] {
+        [_] => with_open(candidates, ranking, format!("{when}, {} has the lowest relMSE ({error}{at})", best.name)),
         _ => noisy(format!(
-            "{when}, the data cannot tell between {}: the lowest relMSE is about {error} at {at}.",
-            list(&names)
+            "{when}, the data cannot tell between {}: the lowest relMSE is about {error}{at}.",
+            names(candidates, &ranking.best)
         )),
     }
+}
+
+/// A statement about one method, with those that were not measured far enough to contest it.
+fn with_open(candidates: &[Candidate], ranking: &Ranking, text: String) -> Finding {
+    match ranking.open[..] {
+        [] => clear(text + "."),
+        _ => noisy(format!("{text}, but {} may do as well and end before that.", names(candidates, &ranking.open))),
+    }
+}
+
+fn names(candidates: &[Candidate], indices: &[usize]) -> String {
+    list(&indices.iter().map(|&i| candidates[i].name.as_str()).collect::<Vec<_>>())
 }
 
 /// Times that at least two methods cover, evenly spaced on a logarithmic axis.
@@ -164,44 +182,53 @@ fn levels(candidates: &[Candidate]) -> Vec<f64> {
     times.into_iter().map(|time: f64| time.clamp(low, high)).filter(contested).collect()
 }
 
-/// The lowest of what `read` finds, and all that a test at the level `alpha` cannot tell from it.
-fn ranking(candidates: &[Candidate], there: &[usize], read: &dyn Fn(&Curve) -> f64, alpha: f64) -> Ranking {
-    let value = |&i: &usize| candidates[i].mean(read);
-    let first = there.iter().copied().min_by(|a, b| value(a).total_cmp(&value(b)));
-    let Some(first) = first else { return Ranking { best: Vec::new() } };
-    let is_worse = |i: usize| interval::differs_from_0(&candidates[i].against(&candidates[first], read), alpha);
+/// The lowest of what `read` finds, and all that a test at the level `alpha` cannot tell from it. Candidates for which neither
+/// `is_there` nor `is_out` holds are read where their curves are continued.
+fn ranking(
+    candidates: &[Candidate],
+    is_there: &dyn Fn(&Candidate) -> bool,
+    is_out: &dyn Fn(&Candidate) -> bool,
+    read: &dyn Fn(&Curve) -> f64,
+    alpha: f64,
+) -> Ranking {
+    let (there, others): (Vec<usize>, Vec<usize>) = (0..candidates.len()).partition(|&i| is_there(&candidates[i]));
+    let value = |i: usize| candidates[i].mean(read);
+    let Some(first) = there.iter().copied().min_by(|&a, &b| value(a).total_cmp(&value(b))) else {
+        return Ranking::default();
+    };
+    let is_worse = |i: usize| {
+        value(i) > value(first) && interval::differs_from_0(&candidates[i].against(&candidates[first], read), alpha)
+    };
     let ties = there.iter().copied().filter(|&i| i != first && !is_worse(i));
-    Ranking { best: std::iter::once(first).chain(ties).collect() }
+    let best = std::iter::once(first).chain(ties).collect();
+    let open = others.into_iter().filter(|&i| !is_out(&candidates[i]) && !is_worse(i)).collect();
+    Ranking { best, open }
 }
 
 /// The time to reach some errors, and by which method.
 fn goals(candidates: &[Candidate], confidence: f64) -> Vec<Finding> {
     let goals = round_errors(candidates);
-    let alpha = (1.0 - confidence) / (goals.len() * candidates.len().saturating_sub(1)).max(1) as f64;
+    let alpha = level(confidence, goals.len(), candidates.len());
     goals.into_iter().filter_map(|error| goal(candidates, error, alpha, confidence)).collect()
 }
 
 fn goal(candidates: &[Candidate], error: f64, alpha: f64, confidence: f64) -> Option<Finding> {
-    let reaches = |c: &Candidate| c.curves.values().all(|curve| !curve.time_of(error).extrapolated);
-    let there: Vec<usize> = (0..candidates.len()).filter(|&i| reaches(&candidates[i])).collect();
-    let read = |curve: &Curve| curve.time_of(error).value;
-    let Ranking { best } = ranking(candidates, &there, &read, alpha);
-    let fastest = &candidates[*best.first()?];
+    // A method whose first point is better than the goal reaches it there.
+    let read = |curve: &Curve| curve.time_of(error).value.max(curve.times()[0]);
+    let reaches = |c: &Candidate| c.curves.values().all(|curve| curve.errors()[0] <= error);
+    let ranking = ranking(candidates, &reaches, &|_| false, &read, alpha);
+    let fastest = &candidates[*ranking.best.first()?];
     let times: Vec<f64> = fastest.curves.values().map(read).collect();
     let Estimate { value, low, high } = interval::geometric_mean(&times, confidence);
     let between = low.zip(high).map(|(l, h)| format!(" ({} to {})", milliseconds(l), milliseconds(h)));
-    let (error, time, between) = (number(error), milliseconds(value), between.unwrap_or_default());
-    let names: Vec<&str> = best.iter().map(|&i| candidates[i].name.as_str()).collect();
-    Some(match names[..] {
-        [name] => clear(format!("relMSE {error} takes at least {time}{between}, with {name}.")),
-        _ => noisy(format!(
-            "relMSE {error} takes at least {time}{between}; the data cannot tell between {}.",
-            list(&names)
-        )),
+    let text = format!("relMSE {} takes {}{}", number(error), milliseconds(value), between.unwrap_or_default());
+    Some(match ranking.best[..] {
+        [_] => with_open(candidates, &ranking, format!("{text} with {}, the fastest", fastest.name)),
+        _ => noisy(format!("{text} at least; the data cannot tell between {}.", names(candidates, &ranking.best))),
     })
 }
 
-/// Errors of the series 1, 2, 5 that some method reaches and that it does not begin with.
+/// Errors of the series 1, 2, 5 that some method reaches and does not begin with.
 fn round_errors(candidates: &[Candidate]) -> Vec<f64> {
     let ranges: Vec<[f64; 2]> = candidates.iter().map(range).collect();
     let series = (-9..3).flat_map(|power| [1.0, 2.0, 5.0].map(|digit: f64| digit * 10.0_f64.powi(power)));

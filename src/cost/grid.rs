@@ -2,7 +2,7 @@
 //! several points share.
 use super::document::Method;
 use crate::allocate::{Placing, Policy};
-use crate::denoise::filter::{FilterSettings, Row};
+use crate::denoise::filter::{self, FilterSettings};
 use crate::error::{Error, Result};
 use crate::render::Outputs;
 use crate::render::settings::Settings;
@@ -16,7 +16,7 @@ pub struct Axes {
     /// Allocation policies.
     pub allocate: Vec<&'static Policy>,
     /// Filters; `none` renders what no filter needs.
-    pub filters: Vec<&'static Row>,
+    pub filters: Vec<filter::Method>,
     /// Samples per pixel.
     pub spp: Vec<u32>,
     /// Rounds of policies that learn; 0 is the policy's own choice.
@@ -31,7 +31,7 @@ pub struct Candidate {
     /// What is rendered.
     pub settings: Settings,
     /// The filter behind the render.
-    pub filter: Option<&'static Row>,
+    pub filter: Option<filter::Method>,
     /// Settings of the filter, which are scaled to the image.
     pub filter_settings: FilterSettings,
 }
@@ -54,10 +54,10 @@ pub struct Shot {
 pub fn grid(base: &Settings, axes: &Axes) -> Result<Vec<Candidate>> {
     let mut all: Vec<Candidate> = Vec::new();
     for &policy in &axes.allocate {
-        for &row in &axes.filters {
+        for &filter in &axes.filters {
             for &rounds in &axes.rounds {
                 for &spp in &axes.spp {
-                    let candidate = candidate(base, policy, row, rounds, spp);
+                    let candidate = candidate(base, policy, filter, [rounds, spp]);
                     if all.iter().all(|other| other.method != candidate.method) {
                         all.push(candidate);
                     }
@@ -72,19 +72,19 @@ pub fn grid(base: &Settings, axes: &Axes) -> Result<Vec<Candidate>> {
     }
 }
 
-fn candidate(base: &Settings, policy: &'static Policy, row: &'static Row, rounds: u32, spp: u32) -> Candidate {
+fn candidate(base: &Settings, policy: &'static Policy, filter: filter::Method, [rounds, spp]: [u32; 2]) -> Candidate {
     let mut settings = Settings { spp, ..base.clone() };
     settings.allocate.policy = policy;
     let learns = policy.placing == Placing::Learning;
     settings.allocate.rounds = if learns { rounds } else { base.allocate.rounds };
     let method = Method {
         allocate: policy.name.to_owned(),
-        filter: row.name.to_owned(),
+        filter: filter.name().to_owned(),
         rounds: Some(rounds).filter(|&rounds| learns && rounds > 0),
         options: Vec::new(),
         spp,
     };
-    let filter = Some(row).filter(|row| row.name != "none");
+    let filter = Some(filter).filter(|filter| filter.name() != "none");
     Candidate { method, settings, filter, filter_settings: FilterSettings::default() }
 }
 
@@ -120,7 +120,7 @@ mod tests {
     fn axes(allocate: &[&str], filters: &[&str]) -> Axes {
         Axes {
             allocate: allocate.iter().map(|name| policy(name).unwrap()).collect(),
-            filters: filters.iter().map(|name| filter::find(name).unwrap()).collect(),
+            filters: filters.iter().map(|name| filter::find(name).unwrap().into()).collect(),
             spp: vec![1, 4],
             rounds: vec![0, 2],
         }

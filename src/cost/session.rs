@@ -2,8 +2,7 @@
 use super::converge::picture;
 use super::document::{Pass, Run, WarmUp};
 use super::grid::{Candidate, Shot};
-use crate::denoise::filter::Method;
-use crate::denoise::{Colour, Demodulation, Noisy, Recipe, Timed, filter, host_bytes, timed};
+use crate::denoise::{Colour, Noisy, Recipe, Timed, filter, host_bytes, timed};
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu, PassTime};
 use crate::image::Picture;
@@ -130,7 +129,7 @@ impl<'a> Session<'a> {
         let Shot { settings, points, .. } = &self.shots[shot];
         let unified = self.gpu.info().unified;
         let filters = points.iter().filter_map(|&point| self.candidates[point].filter);
-        let filtered = filters.map(|row| host_bytes(Method::Kernels(row), settings, unified)).max().unwrap_or(0);
+        let filtered = filters.map(|filter| host_bytes(filter, settings, unified)).max().unwrap_or(0);
         let bytes = film::host_bytes(settings, unified).max(filtered);
         memory::check(bytes).map_err(|what| Error::Memory(format!("rendering {what}: choose a smaller film")))
     }
@@ -149,17 +148,12 @@ impl<'a> Session<'a> {
             errors: Default::default(),
         };
         let candidate = &self.candidates[point];
-        let Some(row) = candidate.filter else {
+        let Some(method) = candidate.filter else {
             let picture = finite(picture(renderer)?)?;
             return Ok(Measured { point, run, picture, warm_up: *costs, device_bytes: *device_bytes });
         };
         let settings = |scales: &filter::Scales| candidate.filter_settings.scaled_by(scales);
-        let recipe = Recipe {
-            method: Method::Kernels(row),
-            demodulation: Demodulation::default(),
-            fireflies: None,
-            settings: &settings,
-        };
+        let recipe = Recipe { settings: &settings, ..Recipe::new(method) };
         let filtered = timed(self.gpu, Noisy::of_film(renderer)?, &recipe)?;
         let warm_up = add_filter(&mut run, costs, &filtered);
         let device_bytes = device_bytes + filtered.device_bytes;

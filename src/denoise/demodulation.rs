@@ -7,10 +7,9 @@
 /// | `Light` | indirect light before albedo | that albedo | direct light, emission, what smooth surfaces show |
 /// | `Albedo` | colour / albedo | albedo | what reflects nothing: lamps, sky |
 /// | `Off` | colour | 1 | nothing |
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Demodulation {
     /// Surface colour and direct light.
-    #[default]
     Light,
     /// Surface colour.
     Albedo,

@@ -79,7 +79,15 @@ impl Denoiser {
         }
     }
 
-    /// The same, for reading back.
+    /// The scales of the light and the surfaces that were filtered last, for the settings of another denoiser of such frames.
+    ///
+    /// # Errors
+    /// [`Error::Device`].
+    pub fn scales(&self) -> Result<filter::Scales> {
+        filter::Scales::of_planes(&self.parts.planes)
+    }
+
+    /// The same as [`Self::radiance`], for reading back.
     pub fn picture(&self) -> &Buffer<vec4> {
         &self.parts.picture
     }

@@ -16,8 +16,9 @@ use crate::render::settings::Settings;
 pub struct Recipe<'a> {
     /// By which filter.
     pub method: Method,
-    /// What is kept away from the filter, where the image tells it and the filter does not want the colour whole.
-    pub demodulation: Demodulation,
+    /// What is kept away from the filter, where the image tells it and the filter does not want the colour whole. By default
+    /// [`Holds::usual_demodulation`].
+    pub demodulation: Option<Demodulation>,
     /// Pixels so many times brighter than all but one around them are cut first.
     pub fireflies: Option<f32>,
     /// The settings for light of these scales.
@@ -28,13 +29,15 @@ impl Recipe<'_> {
     /// By this filter at its default settings, as `tallow render --denoise` uses it.
     pub fn new(method: Method) -> Self {
         let settings = &|scales: &Scales| FilterSettings::default().scaled_by(scales);
-        Self { method, demodulation: Demodulation::default(), fireflies: None, settings }
+        Self { method, demodulation: None, fireflies: None, settings }
     }
 
     /// What is kept away from the filter of an image that holds this.
     pub fn demodulation(&self, holds: Holds) -> Demodulation {
         match self.method {
-            Method::Kernels(_) => holds.demodulation(self.demodulation),
+            Method::Kernels(_) => {
+                self.demodulation.map_or(holds.usual_demodulation(), |wanted| holds.demodulation(wanted))
+            }
             Method::Oidn => Demodulation::Off,
         }
     }
@@ -139,7 +142,7 @@ fn run_filter(gpu: &Gpu, recipe: &Recipe, scales: &Scales, planes: &Planes, time
             times.extend(run(gpu, |rec| filter.record(rec, planes))?);
         }
         Method::Oidn => {
-            for (name, took) in oidn::filter(&settings, planes)? {
+            for (name, took) in oidn::filter(settings.oidn, planes)? {
                 let begin_ns = times.last().map_or(0, |before| before.end_ns);
                 times.push(PassTime { name, begin_ns, end_ns: begin_ns.saturating_add(took.as_nanos() as u64) });
             }

@@ -18,12 +18,21 @@ pub struct Holds {
     pub variance: bool,
     /// The variance of indirect light is known.
     pub indirect_variance: bool,
+    /// Point, spot or directional lights are, or may be, among what shines.
+    pub delta_lights: bool,
 }
 
 impl Holds {
     /// What a renderer leaves.
-    pub fn film(split_light: bool) -> Self {
-        Self { of_file: false, albedo: true, light: split_light, variance: true, indirect_variance: split_light }
+    pub fn film(split_light: bool, delta_lights: bool) -> Self {
+        let (albedo, variance) = (true, true);
+        Self { of_file: false, albedo, light: split_light, variance, indirect_variance: split_light, delta_lights }
+    }
+
+    /// What is best kept away from a filter. Lamps and skies leave noise in direct light, which is filtered with all the rest. The
+    /// shadows of delta lights are sharp, and no guide shows them: where there are such lights, direct light stays as it is.
+    pub fn usual_demodulation(&self) -> Demodulation {
+        self.demodulation(if self.delta_lights { Demodulation::Light } else { Demodulation::Albedo })
     }
 
     /// What of `wanted` the planes allow.
@@ -73,7 +82,7 @@ impl Noisy {
             stats: tiles[0].stats.clone(),
             light: tiles[0].light.clone(),
             guide: tiles[0].guide.clone(),
-            holds: Holds::film(outputs.split_light),
+            holds: Holds::film(outputs.split_light, renderer.delta_lights()),
         })
     }
 

@@ -2,10 +2,10 @@
 //! filter costs once its first use is over.
 use super::demodulated::Demodulated;
 use super::demodulation::Demodulation;
-use super::filter::{self, Filter, Method, Planes, Scales};
+use super::filter::{self, Filter, Method, Planes, Row, Scales, oidn};
 use super::filtered::{Colour, Recipe, colour};
 use super::noisy::Noisy;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::{FrameResources, Gpu, PassTime, Recorder};
 use std::time::{Duration, Instant};
 
@@ -43,7 +43,11 @@ struct Chain<'a> {
 pub fn timed(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Timed> {
     let before = gpu.allocated_bytes();
     let begun = Instant::now();
-    let chain = Chain::new(gpu, noisy, recipe)?;
+    let row = match recipe.method {
+        Method::Kernels(row) => row,
+        Method::Oidn => return timed_on_host(gpu, noisy, recipe),
+    };
+    let chain = Chain::new(gpu, noisy, recipe, row)?;
     let compile = begun.elapsed();
     let device_bytes = gpu.allocated_bytes().saturating_sub(before);
     let (_, first_run) = chain.run()?;
@@ -51,18 +55,43 @@ pub fn timed(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Timed> {
     Ok(Timed { colour: colour(&chain.parts.picture)?, times, wall, compile, first_run, device_bytes })
 }
 
+/// The same for Open Image Denoise: its own pass is timed by the host's clock, and loading the library is part of the first run.
+fn timed_on_host(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Timed> {
+    let before = gpu.allocated_bytes();
+    let begun = Instant::now();
+    let parts = Demodulated::new(gpu, &noisy, recipe.demodulation(noisy.holds()), false)?;
+    let compile = begun.elapsed();
+    let device_bytes = gpu.allocated_bytes().saturating_sub(before);
+    let once = || -> Result<(Vec<PassTime>, Duration)> {
+        let begun = Instant::now();
+        let mut times = gpu.run(&mut FrameResources::new(gpu)?, |rec| parts.record_split(rec, &noisy))?;
+        let mut wall = begun.elapsed();
+        let settings = (recipe.settings)(&Scales::of_planes(&parts.planes)?);
+        let passes = oidn::filter(settings.oidn, &parts.planes)?;
+        if let Some((name, took)) = passes.last() {
+            times.push(PassTime { name, begin_ns: 0, end_ns: took.as_nanos() as u64 });
+            wall += *took;
+        }
+        let begun = Instant::now();
+        times.extend(gpu.run(&mut FrameResources::new(gpu)?, |rec| parts.record_join(rec))?);
+        Ok((times, wall + begun.elapsed()))
+    };
+    let begun = Instant::now();
+    once()?;
+    let first_run = begun.elapsed();
+    let (times, wall) = once()?;
+    Ok(Timed { colour: colour(&parts.picture)?, times, wall, compile, first_run, device_bytes })
+}
+
 impl<'a> Chain<'a> {
-    fn new(gpu: &'a Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Self> {
+    fn new(gpu: &'a Gpu, noisy: Noisy, recipe: &Recipe, row: &Row) -> Result<Self> {
         filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
-        let demodulation = noisy.holds().demodulation(recipe.demodulation);
+        let demodulation = recipe.demodulation(noisy.holds());
         let in_paint = demodulation == Demodulation::Light && noisy.lacks_direct_light()?;
         let parts = Demodulated::new(gpu, &noisy, demodulation, in_paint)?;
         // The scales that settings count in are those of the light that is filtered.
         gpu.run(&mut FrameResources::new(gpu)?, |rec| parts.record_split(rec, &noisy))?;
         let scales = Scales::of_planes(&parts.planes)?;
-        let Method::Kernels(row) = recipe.method else {
-            return Err(Error::Usage("oidn has no passes to time: choose another filter".to_owned()));
-        };
         let compiled = |scales: &Scales| row.compile(gpu, &(recipe.settings)(scales), parts.planes.size);
         let of_direct = |planes: Planes| {
             let filter = compiled(&scales.with_light(&planes.radiance)?)?;

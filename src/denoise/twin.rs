@@ -4,7 +4,7 @@ use super::filter::FilterInput;
 use super::{Demodulation, Holds};
 use crate::image::aov::Aovs;
 use crate::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
-use crate::shaders::demodulate::{OUTLIER, WHOLE};
+use crate::shaders::demodulate::{MIRRORED, OUTLIER, WHOLE};
 use crate::shaders::shared::albedo::SMALLEST_ALBEDO;
 
 /// A noisy image on the host: see [`super::Noisy`].
@@ -127,6 +127,7 @@ fn part(pixels: &Pixels, demodulation: Demodulation, i: usize) -> Part {
     let (colour, albedo) = (pixels.stats[i].mean, pixels.guide[i].albedo);
     match demodulation {
         Demodulation::Light => split_light(&colour, &albedo, &pixels.light[i]),
+        Demodulation::Albedo if is_mirror(pixels, i) => Part { filtered: colour, factor: [1.0; 3], sharp: [0.0; 3] },
         Demodulation::Albedo if !reflects(&albedo) || is_rim(pixels, i) => {
             Part { filtered: [0.0; 3], factor: [0.0; 3], sharp: colour.map(number) }
         }
@@ -193,6 +194,16 @@ fn is_rim(pixels: &Pixels, i: usize) -> bool {
     others.sort_by(f32::total_cmp);
     let median = others.get(others.len() / 2).copied().unwrap_or(0.0);
     light(i) > OUTLIER * median || neighbours().any(|q| largest(albedo(i)) < WHOLE * largest(albedo(q)))
+}
+
+/// Noisy or black without albedo, as most pixels around it are.
+fn is_mirror(pixels: &Pixels, i: usize) -> bool {
+    let around = || neighbours(pixels.size, i).chain([i]);
+    let smooth = |q: usize| !reflects(&pixels.guide[q].albedo) && pixels.guide[q].depth > 0.0;
+    let noisy = |q: usize| smooth(q) && largest(&pixels.stats[q].m2) > 0.0;
+    let alike = |q: usize| noisy(q) || smooth(q) && largest(&pixels.stats[q].mean) == 0.0;
+    let count = around().filter(|&q| alike(q)).count() as f32;
+    alike(i) && around().any(noisy) && count > MIRRORED * around().count() as f32
 }
 
 /// Up to eight.

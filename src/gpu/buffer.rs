@@ -1,5 +1,5 @@
 //! Typed, named buffers in device memory: allocation, binding, and element access from the host.
-use super::{At, Gpu};
+use super::{At, Gpu, SlotKind};
 use crate::error::{Error, Result};
 use ash::vk;
 use ash::vk::Handle;
@@ -220,6 +220,11 @@ impl Bound<'_> {
     pub(super) fn uniform(&self) -> vk::DescriptorBufferInfo {
         let range = self.buffer.stride as u64;
         vk::DescriptorBufferInfo::default().buffer(self.buffer.raw).offset(self.offset).range(range)
+    }
+
+    /// Bytes that a slot of this kind shows a kernel.
+    pub(super) fn bytes(&self, kind: SlotKind) -> u64 {
+        if kind == SlotKind::Uniform { self.buffer.stride as u64 } else { self.size }
     }
 
     /// Returns a view whose texels have 16 bytes where the element size is a multiple of 16, else 8 where it is a multiple of

@@ -1,6 +1,7 @@
 //! Opening a device, submitting work to it, and the state that the rest of the layer shares.
 use super::At;
 use super::cache::PipelineCache;
+use super::calibrated::{self, CalibratedClock, CalibratedExtension};
 use super::info::{self, Candidate, DeviceInfo, DeviceKind, Features};
 use super::instance::{Instance, Messages};
 use crate::error::{Error, Result};
@@ -48,7 +49,7 @@ pub(super) struct Inner {
     pub cache: PipelineCache,
     pub debug: Option<ext::debug_utils::Device>,
     pub info: DeviceInfo,
-    pub calibrated: Option<ext::calibrated_timestamps::Device>,
+    pub calibrated: Option<CalibratedClock>,
     queue: Mutex<vk::Queue>,
     /// Each submission holds a read lock until it is complete; accesses to device memory by the host take the write lock.
     running: RwLock<()>,
@@ -69,7 +70,7 @@ pub(super) struct Opened {
     pub device: ash::Device,
     pub queue: vk::Queue,
     pub debug: Option<ext::debug_utils::Device>,
-    pub calibrated: Option<ext::calibrated_timestamps::Device>,
+    pub calibrated: Option<CalibratedClock>,
 }
 
 impl Gpu {
@@ -82,11 +83,11 @@ impl Gpu {
         let instance = Instance::new(options.validation)?;
         let candidate = choose(info::candidates(&instance.raw)?, options.device.as_deref())?;
         let queue_family = usable(&candidate)?;
-        let calibrated = can_calibrate(&instance, candidate.physical)?;
+        let calibrated = calibrated::offered(&instance, candidate.physical)?;
         let alone = one_at_a_time();
         let device = create_device(&instance.raw, candidate.physical, queue_family, calibrated)?;
         let debug = instance.debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &device));
-        let calibrated = calibrated.then(|| ext::calibrated_timestamps::Device::new(&instance.raw, &device));
+        let calibrated = calibrated.map(|extension| CalibratedClock::new(extension, &instance.raw, &device));
         drop(alone);
         // SAFETY: the device was made with one queue of this family.
         let queue = unsafe { device.get_device_queue(queue_family, 0) };
@@ -311,26 +312,14 @@ pub(super) fn usable(candidate: &Candidate) -> Result<u32> {
     candidate.queue_family.ok_or_else(|| Error::Device(format!("{name} has no compute queue: choose another device")))
 }
 
-fn can_calibrate(instance: &Instance, physical: vk::PhysicalDevice) -> Result<bool> {
-    // SAFETY: `physical` belongs to `instance`; the second call follows only where the extension is present.
-    let extensions = unsafe { instance.raw.enumerate_device_extension_properties(physical) }.at("device extensions")?;
-    let named = |e: &vk::ExtensionProperties| e.extension_name_as_c_str() == Ok(ext::calibrated_timestamps::NAME);
-    if !extensions.iter().any(named) {
-        return Ok(false);
-    }
-    let loader = ext::calibrated_timestamps::Instance::new(&instance._entry, &instance.raw);
-    let domains = unsafe { loader.get_physical_device_calibrateable_time_domains(physical) }.at("time domains")?;
-    Ok(domains.contains(&vk::TimeDomainEXT::DEVICE))
-}
-
 fn create_device(
     instance: &ash::Instance,
     physical: vk::PhysicalDevice,
     queue_family: u32,
-    calibrated: bool,
+    calibrated: Option<CalibratedExtension>,
 ) -> Result<ash::Device> {
     let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&[1.0])];
-    let extensions: Vec<_> = calibrated.then_some(ext::calibrated_timestamps::NAME.as_ptr()).into_iter().collect();
+    let extensions: Vec<_> = calibrated.iter().map(|extension| extension.name().as_ptr()).collect();
     let mut features = Features::required();
     // Every device supports it.
     features.core.robust_buffer_access = vk::TRUE;

@@ -1,6 +1,7 @@
 //! Use of a device that an engine made. It is handed over as raw handles, so the engine can use other Vulkan bindings or
 //! another version of them.
 use super::Gpu;
+use super::calibrated::{CalibratedClock, CalibratedExtension};
 use super::device::{Opened, one_at_a_time, usable};
 use super::info;
 use super::instance::Instance;
@@ -37,7 +38,8 @@ pub struct RawDevice {
 
 impl Gpu {
     /// Uses a device made elsewhere and destroys only what it makes itself. Passes carry debug labels if the instance has
-    /// VK_EXT_debug_utils enabled; [`Gpu::calibrate`] works if the device has VK_EXT_calibrated_timestamps enabled.
+    /// VK_EXT_debug_utils enabled; [`Gpu::calibrate`] works if the device has VK_KHR_calibrated_timestamps or
+    /// VK_EXT_calibrated_timestamps enabled.
     ///
     /// # Safety
     /// - The handles are valid, belong together, and outlive everything made from the returned `Gpu`.
@@ -78,8 +80,8 @@ impl Gpu {
         let labels = [c"vkCmdBeginDebugUtilsLabelEXT", c"vkCmdEndDebugUtilsLabelEXT", c"vkSetDebugUtilsObjectNameEXT"];
         let has = |names: &[&CStr]| enabled(&instance, &device, names);
         let debug = has(&labels).then(|| ext::debug_utils::Device::new(&instance, &device));
-        let calibrated = has(&[c"vkGetCalibratedTimestampsEXT"]);
-        let calibrated = calibrated.then(|| ext::calibrated_timestamps::Device::new(&instance, &device));
+        let calibrated = CalibratedExtension::BY_PREFERENCE.into_iter().find(|extension| has(&[extension.function()]));
+        let calibrated = calibrated.map(|extension| CalibratedClock::new(extension, &instance, &device));
         drop(alone);
         let queue = vk::Queue::from_raw(raw.queue);
         let instance = Instance::borrowed(entry, instance);

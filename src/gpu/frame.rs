@@ -3,6 +3,7 @@ use super::access::Hazards;
 use super::commands::Commands;
 use super::descriptors::Descriptors;
 use super::kernel::Parts;
+use super::shape::{Pass, PassObserver, PassShape};
 use super::timing::{PassTime, Timer};
 use super::{Gpu, Kernel};
 use crate::error::Result;
@@ -17,6 +18,9 @@ pub struct FrameResources {
     pub(super) timer: Timer,
     pub(super) hazards: Hazards,
     kernels: Vec<Arc<Parts>>,
+    /// One for each pass of the last recording.
+    pub(super) shapes: Vec<PassShape>,
+    observer: Option<PassObserver>,
 }
 
 impl FrameResources {
@@ -29,6 +33,8 @@ impl FrameResources {
             timer: Timer::new(gpu),
             hazards: Hazards::default(),
             kernels: Vec::new(),
+            shapes: Vec::new(),
+            observer: None,
         })
     }
 
@@ -38,6 +44,44 @@ impl FrameResources {
     /// When that work is not complete.
     pub fn times(&self) -> Result<Vec<PassTime>> {
         self.timer.times()
+    }
+
+    /// The passes of the last recording, in order, with what they were recorded with; empty if they were not timed.
+    ///
+    /// # Errors
+    /// When that work is not complete.
+    pub fn passes(&self) -> Result<Vec<Pass>> {
+        let shapes = self.shapes.iter().cloned();
+        Ok(self.times()?.into_iter().zip(shapes).map(|(time, shape)| Pass { time, shape }).collect())
+    }
+
+    /// Tells `observer` of the passes of every later [`Gpu::run`] with this frame, once they are complete: the place to hand
+    /// them to a profiler of the engine's own. It replaces an earlier observer. What was recorded with
+    /// [`super::Recorder::external`] is submitted by the engine, which asks for [`Self::passes`] when it is complete.
+    pub fn observe(&mut self, observer: impl FnMut(&[Pass]) + Send + Sync + 'static) {
+        self.observer = Some(Box::new(observer));
+    }
+
+    /// Whether passes are timed from the next recording on; at first they are. Without timestamps a frame that hangs is not told
+    /// from one that is slow: the device's wait limit is that of the whole submission.
+    pub fn set_timed(&mut self, timed: bool) {
+        self.timer.timed = timed;
+    }
+
+    /// Tells the observer, if there is one, that the last recording is complete.
+    ///
+    /// # Errors
+    /// As [`Self::passes`].
+    pub(super) fn tell(&mut self) -> Result<()> {
+        if let Some(mut observer) = self.observer.take() {
+            let passes = self.passes();
+            if let Ok(passes) = &passes {
+                observer(passes);
+            }
+            self.observer = Some(observer);
+            passes?;
+        }
+        Ok(())
     }
 
     pub(super) fn gpu(&self) -> &Gpu {
@@ -54,6 +98,7 @@ impl FrameResources {
         self.timer.reset();
         self.hazards.clear();
         self.kernels.clear();
+        self.shapes.clear();
         self.descriptors.reset()
     }
 

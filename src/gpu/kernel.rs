@@ -127,8 +127,9 @@ const MAX_GROUPS: u32 = 65_535;
 /// A compiled kernel, specialised by its constants. `B` is the kernel's `Bind` struct.
 pub struct Kernel<B> {
     pub(super) parts: Arc<Parts>,
+    pub(super) constants: Arc<[(u32, u32)]>,
     compile_time: Duration,
-    local_size: [u32; 2],
+    pub(super) local_size: [u32; 2],
     /// Covariant, so that a kernel kept as `Kernel<Bind<'static>>` takes shorter borrows.
     of: PhantomData<fn() -> B>,
 }
@@ -153,10 +154,11 @@ impl<B: Bindings> Kernel<B> {
         // From here on, Drop cleans up if a line below fails; null handles may be destroyed.
         let mut parts = Parts { gpu: gpu.clone(), set_layout, layout, pipeline };
         parts.create_layouts(B::SLOTS, size_of::<B::Push>() as u32).at(B::NAME)?;
-        parts.create_pipeline(B::NAME, B::SPIRV, &constants.entries())?;
+        let entries = constants.entries();
+        parts.create_pipeline(B::NAME, B::SPIRV, &entries)?;
         gpu.0.name(parts.pipeline, B::NAME);
         let (compile_time, local_size) = (begun.elapsed(), constants.local_size());
-        Ok(Self { parts: Arc::new(parts), compile_time, local_size, of: PhantomData })
+        Ok(Self { parts: Arc::new(parts), constants: entries.into(), compile_time, local_size, of: PhantomData })
     }
 
     /// Time that creating the pipeline took. Some drivers, such as lavapipe, compile more on the first dispatch.

@@ -1,4 +1,5 @@
 //! Recording of work. Every pass gets its barrier, debug label and timestamps here, and kernels are bound and dispatched.
+use super::shape::{KernelCode, PassShape};
 use super::{Access, Bindings, Bound, Buffer, FrameResources, Gpu, Kernel, PassTime, Untyped, access};
 use crate::error::{Error, Result};
 use ash::vk;
@@ -32,6 +33,7 @@ impl Gpu {
         record(&mut recorder)?;
         drop(recorder);
         frame.submit_and_wait()?;
+        frame.tell()?;
         frame.times()
     }
 }
@@ -112,8 +114,11 @@ impl<'a> Recorder<'a> {
         self.frame.keep(kernel);
         let (pipeline, layout, push) = (kernel.parts.pipeline, kernel.parts.layout, bytemuck::bytes_of(push));
         let compute = vk::PipelineBindPoint::COMPUTE;
+        let code = KernelCode { spirv: B::SPIRV, constants: kernel.constants.clone() };
+        let bytes = B::SLOTS.iter().zip(&buffers).map(|(slot, bound)| bound.bytes(slot.kind));
+        let shape = PassShape::of_kernel(groups, kernel.local_size, B::SLOTS, bytes, code);
         // SAFETY: the frame keeps the kernel, the set and every buffer until the work is complete.
-        self.pass(B::NAME, &accesses, |device, commands| unsafe {
+        self.pass(B::NAME, &accesses, shape, |device, commands| unsafe {
             device.cmd_bind_pipeline(commands, compute, pipeline);
             device.cmd_bind_descriptor_sets(commands, compute, layout, 0, &[set], &[]);
             device.cmd_push_constants(commands, layout, vk::ShaderStageFlags::COMPUTE, 0, push);
@@ -136,7 +141,8 @@ impl<'a> Recorder<'a> {
         let region = [vk::BufferCopy { src_offset: source.offset, dst_offset: target.offset, size: source.size }];
         let accesses = [(from, Access::CopySource), (to, Access::CopyTarget)];
         // SAFETY: two live buffers of one size, kept by the frame.
-        self.pass("copy", &accesses, |device, commands| unsafe {
+        let shape = PassShape::of_transfer(&accesses.map(|(_, access)| access), source.size);
+        self.pass("copy", &accesses, shape, |device, commands| unsafe {
             device.cmd_copy_buffer(commands, from.raw, to.raw, &region);
         })
     }
@@ -149,7 +155,8 @@ impl<'a> Recorder<'a> {
         let Bound { buffer: target, offset, size } = buffer.bound();
         self.owns(&[buffer.bound()])?;
         // SAFETY: a live buffer whose size is a multiple of four, kept by the frame.
-        self.pass("fill", &[(target, Access::CopyTarget)], |device, commands| unsafe {
+        let shape = PassShape::of_transfer(&[Access::CopyTarget], size);
+        self.pass("fill", &[(target, Access::CopyTarget)], shape, |device, commands| unsafe {
             device.cmd_fill_buffer(commands, target.raw, offset, size, value);
         })
     }
@@ -163,7 +170,8 @@ impl<'a> Recorder<'a> {
         let Bound { buffer: target, offset, .. } = buffer.bound();
         self.owns(&[buffer.bound()])?;
         // SAFETY: a live buffer of one element or more, whole words, kept by the frame.
-        self.pass("update", &[(target, Access::CopyTarget)], |device, commands| unsafe {
+        let shape = PassShape::of_transfer(&[Access::CopyTarget], size_of::<T>() as u64);
+        self.pass("update", &[(target, Access::CopyTarget)], shape, |device, commands| unsafe {
             device.cmd_update_buffer(commands, target.raw, offset, bytemuck::bytes_of(value));
         })
     }
@@ -182,9 +190,11 @@ impl<'a> Recorder<'a> {
         &mut self,
         name: &'static str,
         accesses: &[(&Arc<Untyped>, Access)],
+        shape: PassShape,
         record: impl FnOnce(&ash::Device, vk::CommandBuffer),
     ) -> Result<()> {
         let times = self.frame.timer.open(name)?;
+        self.frame.shapes.push(shape);
         let (inner, commands) = (&self.gpu.0, self.commands);
         // Both timestamps wait for all earlier work, so that a pass is not charged for the end of another.
         let stamp = |offset: u32| {

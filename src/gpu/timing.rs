@@ -32,22 +32,40 @@ pub fn host_ns() -> u64 {
     START.get_or_init(Instant::now).elapsed().as_nanos() as u64
 }
 
+/// One moment on the clocks of device and host.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Calibration {
+    /// Nanoseconds of the device's clock, as in [`PassTime`].
+    pub device_ns: u64,
+    /// Nanoseconds of the host's clock, as in [`host_ns`].
+    pub host_ns: u64,
+    /// Nanoseconds by which the two moments may lie apart: the deviation that the driver tells, and half the time that
+    /// asking it took.
+    pub deviation_ns: u64,
+}
+
+impl Calibration {
+    /// The host's clock minus the device's.
+    pub fn host_minus_device_ns(&self) -> i64 {
+        self.host_ns.wrapping_sub(self.device_ns) as i64
+    }
+}
+
 impl Gpu {
-    /// One moment on both clocks: (device ns as in [`PassTime`], host ns as in [`host_ns`]). `None` if the device does not
-    /// support VK_EXT_calibrated_timestamps.
-    pub fn calibrate(&self) -> Option<(u64, u64)> {
-        let extension = self.0.calibrated.as_ref()?;
-        let domain = [vk::CalibratedTimestampInfoEXT::default().time_domain(vk::TimeDomainEXT::DEVICE)];
+    /// One moment on both clocks. `None` if the device supports neither VK_KHR_calibrated_timestamps nor
+    /// VK_EXT_calibrated_timestamps.
+    pub fn calibrate(&self) -> Option<Calibration> {
+        let clock = self.0.calibrated.as_ref()?;
         // The host's clock is read on both sides of the device's; the tightest of a few tries is kept.
         let tries = (0..5).filter_map(|_| {
             let before = host_ns();
             // SAFETY: the extension is enabled and knows the device's own domain (checked when opened).
-            let (ticks, _) = unsafe { extension.get_calibrated_timestamps(&domain) }.ok()?;
-            let after = host_ns();
-            Some((after - before, ticks[0], before + (after - before) / 2))
+            let (ticks, deviation) = unsafe { clock.now() }.ok()?;
+            let half = (host_ns() - before).div_ceil(2);
+            Some((deviation.saturating_add(half), ticks, before + half))
         });
-        let (_, ticks, host) = tries.min()?;
-        Some((Clock::of(self).absolute(ticks), host))
+        let (deviation_ns, ticks, host_ns) = tries.min()?;
+        Some(Calibration { device_ns: Clock::of(self).absolute(ticks), host_ns, deviation_ns })
     }
 }
 
@@ -93,11 +111,13 @@ pub(super) struct Timer {
     gpu: Gpu,
     pools: Vec<vk::QueryPool>,
     passes: Vec<&'static str>,
+    /// Whether passes are timed.
+    pub timed: bool,
 }
 
 impl Timer {
     pub fn new(gpu: &Gpu) -> Self {
-        Self { gpu: gpu.clone(), pools: Vec::new(), passes: Vec::new() }
+        Self { gpu: gpu.clone(), pools: Vec::new(), passes: Vec::new(), timed: true }
     }
 
     pub fn gpu(&self) -> &Gpu {
@@ -111,9 +131,10 @@ impl Timer {
         self.passes.clear();
     }
 
-    /// Returns the query to which the next pass writes the first of its two timestamps; `None` if the queue has none.
+    /// Returns the query to which the next pass writes the first of its two timestamps; `None` if the queue has none, or
+    /// passes are not to be timed.
     pub fn open(&mut self, name: &'static str) -> Result<Option<(vk::QueryPool, u32)>> {
-        if self.gpu.0.info.timestamp_bits == 0 {
+        if self.gpu.0.info.timestamp_bits == 0 || !self.timed {
             return Ok(None);
         }
         let first = 2 * self.passes.len() as u32;

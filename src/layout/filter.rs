@@ -101,6 +101,8 @@ gpu_structs! {
         count: uint,
         /// Luminance below which errors count as absolute.
         floor: float,
+        /// Image in pixels.
+        size: uvec2,
     }
 
     /// Push constants of `auto_smooth.comp`.

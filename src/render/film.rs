@@ -16,6 +16,9 @@ pub(crate) const PRIORITY: &str = "priority";
 /// Samples that a pixel still lacks of what it was to have: only in files of renders that were interrupted.
 pub(crate) const PENDING: &str = "pending";
 
+/// Metadata: whether point, spot or directional lights shine in the scene, whose shadows are sharp. Filters ask for it.
+pub(crate) const DELTA_LIGHTS: &str = "deltaLights";
+
 /// Sum of squared deviations of the luminance of indirect light before albedo.
 pub(crate) const INDIRECT_M2: &str = "indirect.m2";
 

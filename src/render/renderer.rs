@@ -33,11 +33,12 @@ pub struct Renderer {
     pub(super) outputs: Outputs,
     pub(super) settings: Settings,
     paths: u32,
+    delta_lights: bool,
     fingerprint: Option<Fingerprint>,
 }
 
 /// Ray counts since the renderer was made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Counters {
     /// Rays that look for the closest hit.
     pub closest: u64,
@@ -105,11 +106,17 @@ impl Renderer {
             )));
         }
         let (constants, priority_push) = (frame_constants(scene, settings)?, priority_push(scene, settings));
+        let delta_lights = scene.has_delta_lights();
         let fingerprint = Some(scene.fingerprint([settings.width, settings.height])?);
         let scene = DeviceScene::new(gpu, scene, &effects)?;
         let (settings, first_sample) = (settings.clone(), settings.first_sample);
         let frame = Frame { scene, film, kernels, allocation, constants, first_sample, priority_push };
-        Ok(Self { gpu: gpu.clone(), frame, effects, outputs, settings, paths, fingerprint })
+        Ok(Self { gpu: gpu.clone(), frame, effects, outputs, settings, paths, delta_lights, fingerprint })
+    }
+
+    /// [`Scene::has_delta_lights`] of its scene.
+    pub fn delta_lights(&self) -> bool {
+        self.delta_lights
     }
 
     /// The work of a whole render, in the order that it must be recorded in. The result does not depend on how the work

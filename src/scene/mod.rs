@@ -5,6 +5,7 @@
 use crate::error::{Error, Result};
 use crate::image::input;
 use crate::layout::{AliasEntry, BvhNode, Camera, Instance, Light, Material, Shading, Texture, Triangle};
+use crate::layout::{LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT};
 use crate::scene::description::settings::Settings;
 use crate::threads;
 use build::assemble::assemble;
@@ -206,6 +207,11 @@ impl Scene {
     pub fn parse(path: &Path, text: &str) -> Result<Loaded> {
         let description = Cow::Owned(description::parse(path, text)?);
         SceneFile { path: path.to_owned(), description, sky: false }.load()
+    }
+
+    /// Whether point, spot or directional lights shine: they have no extent, and their shadows are sharp.
+    pub fn has_delta_lights(&self) -> bool {
+        self.lights.iter().any(|light| matches!(light.kind, LIGHT_POINT | LIGHT_SPOT | LIGHT_DIRECTIONAL))
     }
 
     /// A scene from memory: the tables of a scene file, whose meshes, textures and environment may be data. What files they

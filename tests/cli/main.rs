@@ -6,6 +6,7 @@ mod child;
 mod codes;
 #[path = "../support/command.rs"]
 mod command;
+mod cost;
 mod device;
 mod effects;
 mod filter;
@@ -13,6 +14,7 @@ mod filter;
 mod flat;
 mod oidn;
 mod outputs;
+mod profile;
 mod resume_merge;
 mod signals;
 mod statistical;

@@ -1,4 +1,5 @@
-//! Tests of image files, metrics, and the pages that show them.
+//! Tests of image files, metrics, cost measurements, and the pages that show them.
+mod cost;
 mod damage;
 mod files;
 #[path = "../support/flat.rs"]

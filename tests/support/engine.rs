@@ -66,9 +66,10 @@ unsafe fn device(instance: &ash::Instance, physical: vk::PhysicalDevice) -> ash:
     let mut v12 = vk::PhysicalDeviceVulkan12Features::default().scalar_block_layout(true).host_query_reset(true);
     let mut v13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).maintenance4(true);
     let offered = unsafe { instance.enumerate_device_extension_properties(physical) }.unwrap();
-    let calibrated = ash::ext::calibrated_timestamps::NAME;
-    let offered = offered.iter().any(|e| e.extension_name_as_c_str() == Ok(calibrated));
-    let extensions: Vec<_> = offered.then_some(calibrated.as_ptr()).into_iter().collect();
+    let calibrated = [ash::khr::calibrated_timestamps::NAME, ash::ext::calibrated_timestamps::NAME];
+    let is_offered = |name: &CStr| offered.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+    let extensions: Vec<_> =
+        calibrated.into_iter().find(|name| is_offered(name)).map(CStr::as_ptr).into_iter().collect();
     let info = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_extension_names(&extensions)

@@ -34,8 +34,8 @@ impl Frame {
         let mut frame = Self { size, stats: Vec::new(), light: Vec::new(), guide: Vec::new() };
         for i in 0..size[0] * size[1] {
             let unit = |salt: u32| hash(i.wrapping_mul(8) + salt) as f32 / 4_294_967_296.0;
-            let is_lamp = i % 23 == 7;
-            let albedo = if is_lamp { [0.0; 3] } else { [0, 1, 2].map(|c| 0.005 + 0.9 * unit(c)) };
+            let (is_lamp, is_glass) = (i % 23 == 7, i % size[0] % 16 < 4);
+            let albedo = if is_lamp || is_glass { [0.0; 3] } else { [0, 1, 2].map(|c| 0.005 + 0.9 * unit(c)) };
             let indirect = [unit(4), 0.3 * unit(5), 1.0];
             let mut light =
                 PixelLight { direct: [unit(3); 3], indirect_m2: 2.0 * unit(7), indirect, ..PixelLight::default() };
@@ -108,7 +108,7 @@ impl Frame {
     ) -> Vec<vec4> {
         let Self { size, stats, light, guide } = self;
         let (stats, light, guide) = (stats.clone(), light.clone(), guide.clone());
-        let pixels = Pixels { size: *size, holds: Holds::film(true), stats, light, guide };
+        let pixels = Pixels { size: *size, holds: Holds::film(true, true), stats, light, guide };
         twins(demodulate(&pixels, demodulation, in_paint), filter, settings)
     }
 
@@ -202,7 +202,7 @@ fn files_are_taken_apart_and_put_together_as_their_twins() {
                 let host = twins(split(&aovs, demodulation), "svgf", &settings);
                 let recipe = Recipe {
                     method: find("svgf").unwrap().into(),
-                    demodulation,
+                    demodulation: Some(demodulation),
                     fireflies: None,
                     settings: &|_| settings,
                 };
@@ -230,7 +230,7 @@ fn a_film_and_its_file_become_one_picture() {
             let settings = |scales: &Scales| FilterSettings::default().scaled_by(scales);
             let recipe = Recipe {
                 method: (*row).into(),
-                demodulation: Demodulation::Light,
+                demodulation: Some(Demodulation::Light),
                 fireflies: Some(3.0),
                 settings: &settings,
             };

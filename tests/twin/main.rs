@@ -1,6 +1,7 @@
 //! Compares kernels and filters on the device with their CPU twins, and the twins with exact answers.
 mod allocate;
 mod bsdf;
+mod ceilings;
 mod denoiser;
 mod filters;
 mod guided;

@@ -5,7 +5,7 @@ use crate::cli::{Exit, fail_on_messages};
 use crate::cost::document::SceneInfo;
 use crate::cost::filter_only::{FilterCandidate, FilterPlan, measure_filters};
 use crate::cost::reference;
-use crate::denoise::filter::{FilterSettings, Row};
+use crate::denoise::filter::{FilterSettings, Method};
 use crate::error::{Error, Result};
 use crate::image;
 use clap::Parser;
@@ -40,23 +40,23 @@ fn candidates(args: &Args, image: &Path) -> Result<Vec<FilterCandidate>> {
     let mut all = Vec::new();
     let own = (!args.with.trim().is_empty()).then_some(args.with.as_str());
     for variant in std::iter::once(None).chain(args.variants.iter().map(Some)) {
-        for &row in &args.denoise {
+        for &filter in &args.denoise {
             let words = [own.unwrap_or_default(), variant.map_or("", String::as_str)].map(str::trim);
-            all.push(candidate(image, row, words)?);
+            all.push(candidate(image, filter, words)?);
         }
     }
     Ok(all)
 }
 
-fn candidate(image: &Path, row: &'static Row, [shared, variant]: [&str; 2]) -> Result<FilterCandidate> {
+fn candidate(image: &Path, filter: Method, [shared, variant]: [&str; 2]) -> Result<FilterCandidate> {
     let words = format!("{shared} {variant}");
     let settings = overrides(&words)?.settings(FilterSettings::default());
     settings.validate()?;
     let options = Some(variant.to_owned()).filter(|variant| !variant.is_empty());
     let path = quoted(&image.display().to_string());
     let words = words.split_whitespace().map(|word| format!(" {word}")).collect::<String>();
-    let command = format!("tallow filter {path} --filter {}{words} -o point.exr", row.name);
-    Ok(FilterCandidate { row, settings, options: options.into_iter().collect(), command })
+    let command = format!("tallow filter {path} --filter {}{words} -o point.exr", filter.name());
+    Ok(FilterCandidate { filter, settings, options: options.into_iter().collect(), command })
 }
 
 /// Parses settings of `tallow filter` in one text.

@@ -4,11 +4,10 @@ use crate::cli::common::with_ranges;
 use crate::cli::finite;
 use crate::cli::overrides::Overrides;
 use crate::cost::grid::Axes;
-use crate::denoise::filter::{FILTERS, Row};
+use crate::denoise::filter::Method;
 use crate::error::{Error, Result};
 use crate::render::settings::{Film, Settings};
-use clap::builder::PossibleValue;
-use clap::{Parser, ValueEnum};
+use clap::Parser;
 use std::path::PathBuf;
 
 /// Measure how much time buys how much accuracy, by which method
@@ -30,7 +29,7 @@ pub struct Args {
     pub allocate: Vec<&'static Policy>,
     /// Filters; none is the plain render
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "none,atrous,auto")]
-    pub denoise: Vec<&'static Row>,
+    pub denoise: Vec<Method>,
     /// Samples per pixel
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "1,2,4,8,16")]
     pub spp: Vec<u32>,
@@ -129,13 +128,4 @@ fn minutes(text: &str) -> std::result::Result<f64, String> {
     let value = finite(text)?;
     // A million minutes are two years.
     if (0.0..=1e6).contains(&value) { Ok(value) } else { Err("expected a number of minutes, or 0 for no limit".into()) }
-}
-impl ValueEnum for &'static Row {
-    fn value_variants<'a>() -> &'a [Self] {
-        FILTERS
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.name).help(self.about))
-    }
 }

@@ -1,6 +1,6 @@
 //! Options of `tallow filter` for layers and filter settings.
 use crate::cli::common::with_ranges;
-use crate::denoise::filter::{FilterOverrides, FilterSettings, Method};
+use crate::denoise::filter::{FILTERS, FilterOverrides, FilterSettings, Method, Row};
 use crate::image::aov::{Aov, Names};
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
@@ -76,6 +76,16 @@ impl ValueEnum for Method {
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
         Some(PossibleValue::new(self.name()).help(self.about()))
+    }
+}
+
+impl ValueEnum for &'static Row {
+    fn value_variants<'a>() -> &'a [Self] {
+        FILTERS
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.name).help(self.about))
     }
 }
 

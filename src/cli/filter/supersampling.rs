@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 #[command(next_help_heading = "Supersampling (of images that tallow rendered)")]
 pub struct Supersampling {
     /// Look the filtered light up along eye rays through this scene, the one that the image shows
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["filter_direct", "no_demodulate"])]
+    #[arg(long, value_name = "FILE", conflicts_with = "no_demodulate")]
     pub scene: Option<PathBuf>,
     /// Eye rays per pixel, 1 to 4096
     #[arg(long, value_name = "N", requires = "scene", default_value_t = 16,

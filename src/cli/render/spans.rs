@@ -29,7 +29,6 @@ impl Spans {
 
     /// A file of them beside the passes on the device.
     pub fn item(&self, path: &Path, gpu: &Gpu, passes: &[PassTime]) -> Item<'static> {
-        let offset = gpu.calibrate().map(|(gpu_ns, host_ns)| host_ns as i64 - gpu_ns as i64);
-        Item::bytes(path.to_owned(), chrome_trace(&self.0, passes, offset).into_bytes())
+        Item::bytes(path.to_owned(), chrome_trace(&self.0, passes, gpu.calibrate()).into_bytes())
     }
 }

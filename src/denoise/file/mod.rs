@@ -8,6 +8,7 @@ use crate::gpu::{Buffer, Gpu, Location};
 use crate::image::Samples;
 use crate::image::aov::{Aov, Aovs};
 use crate::layout::{Guide, NONE, PixelLight, PixelStats};
+use crate::render::film::DELTA_LIGHTS;
 use bytemuck::Pod;
 use glam::Vec3;
 use places::Places;
@@ -52,6 +53,7 @@ impl<'a> Layers<'a> {
             light: has(Aov::Direct) && has(Aov::Indirect),
             variance: has(Aov::Variance),
             indirect_variance: self.indirect_m2.is_some(),
+            delta_lights: self.aovs.film.metadata.get(DELTA_LIGHTS).is_none_or(|said| said != "false"),
         }
     }
 

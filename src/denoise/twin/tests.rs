@@ -31,6 +31,22 @@ fn lamps_and_their_rims_reach_no_other_pixel() {
     assert!(take_apart(&film(), Demodulation::Off).input.radiance.iter().all(|c| c[3] == 1.0));
 }
 
+/// Three columns of glass, one of a wall, two of a lamp and its rim to the left, three of noisy sky. The middle of the glass is black by chance.
+#[test]
+fn what_mirrors_and_glass_show_is_filtered_as_it_is_and_lamps_and_sky_stay() {
+    let mut film = Film::new(10, 3);
+    let columns = |values: [f32; 10]| -> Vec<vec3> { (0..30).map(|i| [values[i % 10]; 3]).collect() };
+    film.add_vec3("", RGB, &columns([3.0, 0.0, 5.0, 1.0, 25.0, 50.0, 50.0, 7.0, 8.0, 9.0]));
+    film.add_vec3("albedo", RGB, &columns([0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]));
+    film.add_vec3("variance", RGB, &columns([1.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0]));
+    film.add("Z", Samples::F32((0..30).map(|i| if i % 10 < 7 { 2.0 } else { 0.0 }).collect()));
+    let parts = take_apart(&film, Demodulation::Albedo);
+    let row = |of: &dyn Fn(usize) -> f32| -> Vec<f32> { (10..20).map(of).collect() };
+    assert_eq!(row(&|i| parts.input.radiance[i][0]), [3.0, 0.0, 5.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    assert_eq!(row(&|i| parts.factor[i][0]), [1.0, 1.0, 1.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    assert_eq!(row(&|i| parts.sharp[i][0]), [0.0, 0.0, 0.0, 0.0, 25.0, 50.0, 50.0, 7.0, 8.0, 9.0]);
+}
+
 #[test]
 fn direct_light_is_left_out_also_where_pixels_lack_it() {
     let mut film = film();

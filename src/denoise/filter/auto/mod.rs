@@ -168,7 +168,7 @@ impl Auto {
         let [wide, middle, narrow, svgf] = &self.candidates;
         let ([dim, signs, probed], count) = (&self.planes, planes.pixels());
         wide.record(rec, planes, &planes.radiance, &wide.result)?;
-        let push = AutoPush { count, floor: floor(&self.settings), ..Default::default() };
+        let push = AutoPush { count, floor: floor(&self.settings), size: planes.size, ..Default::default() };
         let bind = auto_inputs::Bind { colour: &self.pack.colour, wide: &wide.result, dim, signs, probed };
         rec.dispatch_threads(&self.inputs, bind, &push, count)?;
         wide.record(rec, planes, dim, &self.wide_dim)?;
@@ -209,7 +209,7 @@ impl Auto {
             others,
         };
         let count = planes.pixels();
-        let push = AutoPush { count, floor: floor(&self.settings), ..Default::default() };
+        let push = AutoPush { count, floor: floor(&self.settings), size: planes.size, ..Default::default() };
         rec.dispatch_threads(&self.error, bind, &push, count)
     }
 

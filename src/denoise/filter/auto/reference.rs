@@ -8,7 +8,7 @@ use crate::layout::vec4;
 use crate::math::hash::pcg;
 use crate::math::srgb::luminance;
 use crate::shaders::auto::{OVERALL, RIDGE, ROUNDS};
-use crate::shaders::auto_error::{LIMIT, MOST, OWN};
+use crate::shaders::auto_error::{LIMIT, MOST, NOISE, OWN, REACH};
 use crate::shaders::shared::candidates::BRIGHT;
 use glam::{DVec4, Vec3, Vec4, Vec4Swizzles};
 use std::array::from_fn;
@@ -102,8 +102,9 @@ pub fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
     let errors = |i: usize| {
         let m = missed(i);
         let light = scaled(results.blended(i).iter().sum::<Vec3>() / 4.0, Vec3::ZERO).powi(2) + 1.0;
-        let weight = if image[i].count > 0.0 { light.powf(-0.55) } else { 0.0 };
-        let unfiltered = 2.0 * (noise[i].max(0.0).sqrt() / floor).min(LIMIT).powi(2);
+        let uncertain = light + NOISE * variance_around(&noise, size, i as i64, floor);
+        let weight = if image[i].count > 0.0 { uncertain.recip() } else { 0.0 };
+        let unfiltered = 2.0 * squared_deviation(noise[i], floor);
         let others = weight * Vec4::new(m.y * m.w, m.z * m.w, unfiltered, light);
         [weight * m * m, weight * m.xxxy() * m.yzwz(), others]
     };
@@ -117,6 +118,24 @@ pub fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
     };
     let blended = |i: usize| blend(&image[i], &matrix(expected(i)), results.usable(i), results.blended(i));
     (0..image.len()).map(blended).collect()
+}
+
+fn squared_deviation(variance: f32, floor: f32) -> f32 {
+    (variance.max(0.0).sqrt() / floor).min(LIMIT).powi(2)
+}
+
+fn variance_around(noise: &[f32], [width, height]: [i64; 2], at: i64, floor: f32) -> f32 {
+    const REACH: i64 = self::REACH as i64;
+    let (mut sum, mut total) = (0.0, 0.0);
+    for (i, j) in (-REACH..=REACH).flat_map(|j| (-REACH..=REACH).map(move |i| (i, j))) {
+        let (u, v) = ((at % width + i).clamp(0, width - 1), (at / width + j).clamp(0, height - 1));
+        let variance = noise[(v * width + u) as usize];
+        let tent = ((REACH + 1 - i.abs()) * (REACH + 1 - j.abs())) as f32;
+        let w = if variance < 0.0 { 0.0 } else { tent };
+        sum += w * squared_deviation(variance, floor);
+        total += w;
+    }
+    if total > 0.0 { sum / total } else { 0.0 }
 }
 
 /// As `glsl/shared/candidates.glsl`.

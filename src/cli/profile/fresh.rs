@@ -1,0 +1,72 @@
+//! Runs the frames of a profile.
+use super::Args;
+use crate::cli::{complain, fail_on_messages};
+use crate::denoise::{self, filter, filter::Method, filter::Row};
+use crate::error::{Error, Result};
+use crate::gpu::{self, DeviceOptions, Gpu, PassTime};
+use crate::memory;
+use crate::profile::{Measured, Profile, measure};
+use crate::render::film;
+use crate::render::settings::Settings;
+use crate::report::trace::chrome_trace;
+use crate::scene::SceneFile;
+use indicatif::{ProgressBar, ProgressDrawTarget};
+
+/// The profile of a scene, and the trace of its frames.
+///
+/// # Errors
+/// As a render of the scene.
+pub fn profile(args: &Args) -> Result<(Profile, Option<String>)> {
+    let filter = args.denoise.map(row).transpose()?;
+    let file = SceneFile::open(&args.scene)?;
+    let mut settings = file.settings()?;
+    args.overrides.apply(&mut settings);
+    settings.validate()?;
+    let scene = file.load()?.scene;
+    let is_talkative = !args.quiet && !args.json;
+    if is_talkative {
+        scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
+    }
+    let gpu = Gpu::open(&DeviceOptions {
+        device: args.device.clone(),
+        validation: args.validation,
+        cache: gpu::cache_folder(),
+        wait_limit: None,
+    })?;
+    check_room(args, &settings, &gpu)?;
+    let count = usize::from(args.frames);
+    let bar = ProgressBar::new(2 * count as u64 + 1);
+    if !is_talkative {
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+    }
+    let measured = measure(&gpu, &scene, &settings, filter, count, &mut || bar.inc(1))?;
+    bar.finish_and_clear();
+    fail_on_messages(&gpu)?;
+    let denoise = filter.map(|row| row.name.to_owned());
+    let profile = Profile { denoise, ..Profile::new(&gpu, &args.scene, &scene, &settings, &measured)? };
+    Ok((profile, args.trace.is_some().then(|| trace(&measured))))
+}
+
+/// The kernels of a filter.
+fn row(method: Method) -> Result<&'static Row> {
+    match method {
+        Method::Kernels(row) => Ok(row),
+        Method::Oidn => Err(Error::Usage("oidn has no passes to time: choose another filter".to_owned())),
+    }
+}
+
+fn trace(measured: &Measured) -> String {
+    let frames = &measured.frames;
+    let host: Vec<PassTime> = frames.timed.iter().chain(&frames.untimed).map(|run| run.wall).collect();
+    let passes: Vec<PassTime> = frames.timed.iter().flat_map(|run| &run.passes).map(|pass| pass.time).collect();
+    chrome_trace(&host, &passes, measured.calibration)
+}
+
+/// As for a render: what takes more memory than there is, is told before.
+fn check_room(args: &Args, settings: &Settings, gpu: &Gpu) -> Result<()> {
+    let (size, unified) = ([settings.width, settings.height], gpu.info().unified);
+    let filtered = args.denoise.map_or(0, |method| denoise::host_bytes(method, settings, unified));
+    let refused = |what| Error::Device(format!("a film of {} x {} {what}: choose a smaller film", size[0], size[1]));
+    memory::check(film::host_bytes(settings, unified).max(filtered)).map_err(refused)?;
+    args.denoise.map_or(Ok(()), |_| filter::check_size(gpu, size, filter::GUIDE_TEXELS))
+}

@@ -1,0 +1,81 @@
+//! Everything that a profile is made of, measured in its order.
+use super::ceilings::{self, Ceilings};
+use super::frames::{Frames, Workload};
+use super::work::FrameWork;
+use crate::denoise::filter::{FilterSettings, Row};
+use crate::denoise::{Denoiser, Noisy};
+use crate::error::{Error, Result};
+use crate::gpu::{Calibration, FrameResources, Gpu};
+use crate::render::settings::Settings;
+use crate::render::{Counters, Job, Outputs, Renderer};
+use crate::scene::Scene;
+
+/// What was measured.
+pub struct Measured {
+    /// The frames.
+    pub frames: Frames,
+    /// What their passes have in common.
+    pub frame_work: FrameWork,
+    /// What the device can do at most.
+    pub ceilings: Ceilings,
+    /// [`Ceilings::arithmetic_gop_s`] again, after the frames.
+    pub arithmetic_gop_s_after: f64,
+    /// The clocks after the frames.
+    pub calibration: Option<Calibration>,
+}
+
+/// A filter for the frames of `renderer`, with its default settings and the scales of the renderer's own light, as `tallow render
+/// --denoise` chooses them. It renders a frame for that.
+///
+/// # Errors
+/// As [`Denoiser::new`] and [`Job::run`].
+pub fn denoiser(gpu: &Gpu, renderer: &Renderer, row: &Row) -> Result<Denoiser> {
+    let demodulation = Noisy::of_film(renderer)?.holds().usual_demodulation();
+    let make = |settings: &FilterSettings| Denoiser::new(gpu, renderer, row, settings, demodulation);
+    let (first, mut frame) = (make(&FilterSettings::default())?, FrameResources::new(gpu)?);
+    Job::new(renderer).run_to_end(&mut frame)?;
+    gpu.run(&mut frame, |rec| first.record(rec))?;
+    let scales = first.scales()?;
+    drop(first);
+    make(&FilterSettings::default().scaled_by(&scales))
+}
+
+/// Measures `count` frames of a scene. Its rays are counted in a frame of their own, because counting takes time. `done` is told of
+/// each of the other frames: twice `count`, and one.
+///
+/// # Errors
+/// [`Error::Device`] for a device without timestamps, and those of a render.
+pub fn measure(
+    gpu: &Gpu,
+    scene: &Scene,
+    settings: &Settings,
+    filter: Option<&Row>,
+    count: usize,
+    done: &mut dyn FnMut(),
+) -> Result<Measured> {
+    if gpu.info().timestamp_bits == 0 {
+        let name = &gpu.info().name;
+        return Err(Error::Device(format!("{name} has no timestamps: choose another device to profile on")));
+    }
+    let layers = filter.is_some();
+    let outputs = Outputs { split_light: layers, guides: layers, counters: false };
+    let counters = count_rays(gpu, scene, settings, Outputs { counters: true, ..outputs })?;
+    let ceilings = Ceilings::measure(gpu)?;
+    let renderer = Renderer::new(gpu, scene, settings, outputs)?;
+    let denoiser = filter.map(|row| denoiser(gpu, &renderer, row)).transpose()?;
+    let frames = Workload { gpu, renderer: &renderer, denoiser: denoiser.as_ref() }.run(count, done)?;
+    let split_light = renderer.effects().split_light;
+    Ok(Measured {
+        frames,
+        frame_work: FrameWork { pixels: settings.pixels() as u64, split_light, counters },
+        ceilings,
+        arithmetic_gop_s_after: ceilings::arithmetic_gop_s(gpu)?,
+        calibration: gpu.calibrate(),
+    })
+}
+
+fn count_rays(gpu: &Gpu, scene: &Scene, settings: &Settings, outputs: Outputs) -> Result<Counters> {
+    let renderer = Renderer::new(gpu, scene, settings, outputs)?;
+    Job::new(&renderer).run_to_end(&mut FrameResources::new(gpu)?)?;
+    renderer.counters()
+}

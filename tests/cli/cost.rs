@@ -1,0 +1,206 @@
+//! Tests `tallow cost` on a small film: what is in its files, that a point can be rendered again to the same bits, and what it
+//! does when it is interrupted or when points fail.
+#![cfg(target_os = "linux")]
+use crate::child::{Running, command, scene};
+use crate::command::complains;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use tallow::cost::Document;
+use tallow::cost::document::{NoiseKind, Point};
+use tallow::image;
+use tallow::image::metrics::relmse;
+use tempfile::TempDir;
+
+const FILM: &str = "--width 24 --height 24 --reference-spp 64 --validation";
+
+/// A folder whose cache is its own.
+fn within(folder: &TempDir, words: &str) -> Command {
+    let mut command = command(folder.path(), words);
+    command.env("XDG_CACHE_HOME", folder.path().join("cache"));
+    command
+}
+
+fn cost(folder: &TempDir, words: &str) -> Output {
+    within(folder, &format!("cost {} {FILM} {words}", scene())).output().unwrap()
+}
+
+#[track_caller]
+fn text(output: &Output, code: i32) -> String {
+    assert_eq!(output.status.code(), Some(code), "{output:?}");
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+fn document(folder: &TempDir, name: &str) -> Document {
+    serde_json::from_slice(&std::fs::read(folder.path().join(name)).unwrap()).unwrap()
+}
+
+fn point<'a>(document: &'a Document, label: &str) -> &'a Point {
+    document.points.iter().find(|point| point.method.label() == label).unwrap()
+}
+
+/// The reference that was rendered and kept.
+fn reference(folder: &TempDir) -> PathBuf {
+    let kept = std::fs::read_dir(folder.path().join("cache/tallow/references")).unwrap();
+    kept.map(|entry| entry.unwrap().path()).next().unwrap()
+}
+
+#[test]
+fn a_grid_is_measured_and_each_point_can_be_rendered_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = "--allocate uniform,both --denoise none,atrous --spp 1,4 --repeats 2 -o all";
+    let printed = text(&cost(&folder, words), 0);
+    assert!(printed.contains("uniform + atrous, 4 spp") && printed.contains("halve relMSE"), "{printed}");
+    let document = document(&folder, "all/cost.json");
+    assert!(document.complete && document.points.len() == 8, "{document:?}");
+    for point in &document.points {
+        assert!(point.runs.len() == 2 && point.summary.is_some() && point.failed.is_none(), "{point:?}");
+        let sum: f64 = point.runs[0].passes.iter().map(|pass| pass.ms).sum();
+        assert!((sum - point.runs[0].gpu_ms).abs() < 1e-6 && point.runs[0].rays.unwrap() > 576);
+    }
+    assert!(document.reference.noise == NoiseKind::Measured && document.reference.spp == Some(64));
+    replays(&folder, &document, "uniform + atrous, 4 spp");
+    replays(&folder, &document, "both + atrous, 4 spp");
+    tables(&folder, &document);
+}
+
+/// Renders a point by its command line, whose image must have the very error of the point's first run.
+#[track_caller]
+fn replays(folder: &TempDir, document: &Document, label: &str) {
+    let point = point(document, label);
+    let words = point.command.strip_prefix("tallow ").unwrap();
+    let output = within(folder, words).output().unwrap();
+    assert!(output.status.success(), "{words}: {output:?}");
+    let picture = |path: &Path| image::read(path).unwrap().picture(None).unwrap();
+    let (image, reference) = (picture(&folder.path().join("point.exr")), picture(&reference(folder)));
+    let error = relmse(&image, &reference) - document.reference.relmse.unwrap();
+    let told = point.runs[0].errors.relmse.unwrap();
+    assert!((error - told).abs() < 1e-9 * told, "{words}: {error} is not {told}");
+    // Control: another seed has another error.
+    assert_ne!(point.runs[0].errors, point.runs[1].errors);
+}
+
+fn tables(folder: &TempDir, document: &Document) {
+    let table = std::fs::read_to_string(folder.path().join("all/cost.csv")).unwrap();
+    let columns = |line: &str| line.split(',').count();
+    let lines: Vec<&str> = table.lines().collect();
+    assert_eq!(lines.len(), 1 + document.points.len());
+    assert!(lines.iter().all(|line| columns(line) == columns(lines[0])), "{table}");
+    let page = std::fs::read_to_string(folder.path().join("all/cost.html")).unwrap();
+    assert!(page.contains("cornell-box"));
+}
+
+#[test]
+fn what_is_missing_is_completed_and_nothing_else_is_measured_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = "--allocate uniform --denoise none --spp 1,2 --repeats 3 -o all --quiet";
+    text(&cost(&folder, words), 0);
+    let whole = document(&folder, "all/cost.json");
+    let mut partial = whole.clone();
+    partial.complete = false;
+    partial.points[1].runs.pop();
+    let write = |document: &Document| {
+        std::fs::write(folder.path().join("all/cost.json"), serde_json::to_vec(document).unwrap()).unwrap();
+    };
+    write(&partial);
+    text(&cost(&folder, words), 0);
+    let again = document(&folder, "all/cost.json");
+    assert!(again.complete && again.points[0].runs == whole.points[0].runs, "kept to the last digit of their times");
+    assert_eq!(again.points[1].runs[..2], whole.points[1].runs[..2]);
+    assert_eq!(again.points[1].runs[2].errors, whole.points[1].runs[2].errors);
+    assert_ne!(again.points[1].runs[2].gpu_ms, whole.points[1].runs[2].gpu_ms, "control: this one was measured");
+    // Another measurement begins anew, and does not replace a whole one by a part.
+    let other = "--allocate uniform --denoise none --spp 1,2 --repeats 4 -o all --budget-minutes 0.000001";
+    let printed = text(&cost(&folder, other), 0);
+    assert!(printed.contains("not complete: 8 runs are missing") && printed.contains("cost.partial.json"), "{printed}");
+    assert_eq!(document(&folder, "all/cost.json"), again);
+}
+
+#[test]
+fn an_interrupted_measurement_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = |repeats| {
+        let grid = format!("--allocate uniform --denoise none --spp 1 --repeats {repeats} -o all --budget-minutes 0");
+        format!("cost {} {FILM} {grid} --quiet", scene())
+    };
+    let mut running = Running::start(within(&folder, &words(1000)), folder.path());
+    running.until_there_is("all/cost.json");
+    running.send(&["INT"]);
+    complains(&running.end(), 130, &["interrupted: what there is was written", "the same command goes on"]);
+    let partial = document(&folder, "all/cost.json");
+    let runs = partial.points[0].runs.len();
+    assert!(!partial.complete && (1..1000).contains(&runs), "{runs}");
+    let mut running = Running::start(within(&folder, &words(1000)), folder.path());
+    running.until("more runs", |at| {
+        let bytes = std::fs::read(at.join("all/cost.json")).unwrap();
+        serde_json::from_slice::<Document>(&bytes).unwrap().points[0].runs.len() > runs
+    });
+    running.send(&["TERM"]);
+    assert_eq!(running.end().status.code(), Some(130));
+    let more = document(&folder, "all/cost.json");
+    assert_eq!(more.points[0].runs[..runs], partial.points[0].runs[..]);
+    assert!(!folder.path().join("all/cost.partial.json").exists());
+}
+
+#[test]
+fn a_point_that_fails_is_told_and_the_others_are_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut limited = within(&folder, &format!("cost {} {FILM} -o all", scene()));
+    limited.args("--allocate both --denoise none --spp 4 --repeats 2".split(' '));
+    let output = limited.args(["--variant", "--min-spp 8 --max-spp 4"]).output().unwrap();
+    let printed = text(&output, 6);
+    assert!(printed.contains("failed: both, min-spp 8 --max-spp 4, 4 spp: min-spp is 8"), "{printed}");
+    let document = document(&folder, "all/cost.json");
+    assert!(document.complete && point(&document, "both, 4 spp").runs.len() == 2);
+    assert!(document.points[1].failed.is_some() && document.points[1].runs.is_empty());
+}
+
+#[test]
+fn filters_are_measured_on_a_given_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let render = |spp, name| {
+        let words = format!("render {} --width 24 --height 24 --quiet --spp {spp} -o {name}", scene());
+        assert!(within(&folder, &words).status().unwrap().success());
+    };
+    render(2, "noisy.exr");
+    render(256, "clean.exr");
+    let words =
+        "cost --filter-only noisy.exr --reference clean.exr --denoise none,atrous,auto --repeats 2 --validation";
+    let printed = text(&within(&folder, words).output().unwrap(), 0);
+    assert!(printed.contains("has the lowest relMSE"), "{printed}");
+    let document = document(&folder, "cost/cost.json");
+    assert!(document.complete && document.reference.noise == NoiseKind::Bound, "{document:?}");
+    let error = |i: usize| document.points[i].runs[0].errors.relmse.unwrap();
+    assert!(error(1) < error(0) && error(2) < error(0), "{} {} {}", error(0), error(1), error(2));
+    // The filter's own command line has the same error.
+    let words = document.points[2].command.strip_prefix("tallow ").unwrap();
+    assert!(within(&folder, &format!("{words} --quiet")).status().unwrap().success());
+    let picture = |name: &str| image::read(&folder.path().join(name)).unwrap().picture(None).unwrap();
+    assert!((relmse(&picture("point.exr"), &picture("clean.exr")) / error(2) - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn what_cannot_be_measured_is_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("newer")).unwrap();
+    let newer = folder.path().join("newer/cost.json");
+    std::fs::write(&newer, "{\"schema\": 99}").unwrap();
+    complains(&cost(&folder, "-o newer"), 3, &["newer/cost.json: is of a newer version (schema 99, this one knows 1)"]);
+    assert_eq!(std::fs::read(&newer).unwrap(), b"{\"schema\": 99}");
+    let words = format!("render {} --width 24 --height 20 --quiet --spp 1 -o other.exr", scene());
+    assert!(within(&folder, &words).status().unwrap().success());
+    complains(&cost(&folder, "--reference other.exr"), 3, &["other.exr: is 24x20, but 24x24 is measured"]);
+    let words = format!(
+        "render {} --width 24 --height 24 --quiet --spp 1 -o other.exr",
+        scene().replace("scene.toml", "mirror.toml")
+    );
+    assert!(within(&folder, &words).status().unwrap().success());
+    complains(&cost(&folder, "--reference other.exr"), 3, &["other.exr: shows another scene"]);
+    complains(&within(&folder, "cost").output().unwrap(), 2, &["SCENE"]);
+    complains(&within(&folder, "cost missing.toml").output().unwrap(), 3, &["missing.toml"]);
+    complains(&cost(&folder, "--spp 0"), 2, &["spp is 0"]);
+    complains(&cost(&folder, "--denoise blur"), 2, &["blur"]);
+    complains(&cost(&folder, "--repeats 1"), 2, &["1"]);
+    complains(&within(&folder, "cost --filter-only other.exr").output().unwrap(), 2, &["--reference"]);
+    let output = within(&folder, &format!("cost {}", scene())).args(["--with", "--blue 4"]).output().unwrap();
+    complains(&output, 2, &["\"--blue 4\"", "tallow render --help"]);
+}

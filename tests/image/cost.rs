@@ -1,0 +1,218 @@
+//! The judgement of cost measurements, on made-up runs whose truth is known.
+use tallow::cost::document::{Errors, Estimate, Finding, Method, Point, Run, Verdict};
+use tallow::cost::findings::findings;
+use tallow::cost::judge::{Noise, judge};
+use tallow::cost::reference::noise_of;
+use tallow::cost::summary::{front, summarise};
+use tallow::image::Picture;
+use tallow::image::metrics::{hdr_flip, relmse};
+
+const CONFIDENCE: f64 = 0.95;
+const SPP: [u32; 4] = [1, 4, 16, 64];
+
+/// How a made-up method behaves: 10 ms and an error of 1 for one sample per pixel, times these factors.
+#[derive(Clone, Copy)]
+struct Truth {
+    allocate: &'static str,
+    time: f64,
+    error: f64,
+}
+
+const UNIFORM: Truth = Truth { allocate: "uniform", time: 1.0, error: 1.0 };
+
+/// Relative noise of the times and of the errors between runs.
+#[derive(Clone, Copy)]
+struct Spread {
+    time: f64,
+    error: f64,
+}
+
+struct Normal(fastrand::Rng);
+
+impl Normal {
+    /// Exponential of a normal number of this standard deviation.
+    fn factor(&mut self, deviation: f64) -> f64 {
+        let (u, v) = (self.0.f64().max(1e-12), self.0.f64());
+        (deviation * (-2.0 * u.ln()).sqrt() * (2.0 * std::f64::consts::PI * v).cos()).exp()
+    }
+}
+
+fn run(seed: u32, gpu_ms: f64, relmse: f64) -> Run {
+    let errors = Errors { relmse: Some(relmse), ..Errors::from_values([None; 8]) };
+    Run { seed, gpu_ms, wall_ms: gpu_ms, passes: Vec::new(), samples: 1, rays: None, errors }
+}
+
+fn point(truth: Truth, spp: u32, runs: Vec<Run>) -> Point {
+    let method =
+        Method { allocate: truth.allocate.into(), filter: "none".into(), rounds: None, options: Vec::new(), spp };
+    Point { method, command: String::new(), runs, warm_up: None, device_bytes: None, summary: None, failed: None }
+}
+
+/// Points of several methods. `same_images`: all methods have the errors of the first, run by run.
+fn points(truths: &[Truth], spread: Spread, same_images: bool, seed: u64) -> Vec<Point> {
+    let mut all: Vec<Point> = Vec::new();
+    for (index, &truth) in truths.iter().enumerate() {
+        let mut times = Normal(fastrand::Rng::with_seed(seed + 1000 * index as u64));
+        let error_seed = if same_images { seed } else { seed + 77 + index as u64 };
+        let mut errors = Normal(fastrand::Rng::with_seed(error_seed));
+        for spp in SPP {
+            let n = f64::from(spp);
+            let one = |seed| {
+                let ms = 10.0 * n * truth.time * times.factor(spread.time);
+                run(seed, ms, truth.error / n * errors.factor(spread.error))
+            };
+            let runs = (0..5).map(one).collect();
+            all.push(point(truth, spp, runs));
+        }
+    }
+    summarise(&mut all, CONFIDENCE);
+    all
+}
+
+fn winners(findings: &[Finding]) -> Vec<&str> {
+    let names =
+        |f: &&Finding| f.verdict == Verdict::Clear && (f.text.contains("lowest") || f.text.contains("the fastest"));
+    findings.iter().filter(names).map(|f| f.text.as_str()).collect()
+}
+
+#[test]
+fn the_same_images_under_two_names_have_no_winner() {
+    let twin = Truth { allocate: "twin", ..UNIFORM };
+    let spread = Spread { time: 0.03, error: 0.1 };
+    let named = |same_images| {
+        let is_named = |seed: &u64| {
+            let points = points(&[UNIFORM, twin], spread, same_images, 31 * seed);
+            !winners(&findings(&points, CONFIDENCE)).is_empty()
+        };
+        (0..200_u64).filter(is_named).count()
+    };
+    // Times and goals are one family of comparisons each, of at most 5 %.
+    let (same, other) = (named(true), named(false));
+    assert!(same <= 20 && other <= 20, "of 200: {same} with the same images, {other} with images of the same noise");
+    // Control: 20 % less error is found.
+    let better = Truth { error: 0.8, ..twin };
+    let points = points(&[UNIFORM, better], Spread { time: 0.01, error: 0.02 }, false, 5);
+    let found = findings(&points, CONFIDENCE);
+    assert!(winners(&found).iter().all(|text| text.contains("twin")) && !winners(&found).is_empty(), "{found:#?}");
+}
+
+#[test]
+fn ties_are_said_to_be_ties() {
+    let twin = Truth { allocate: "twin", ..UNIFORM };
+    let points = points(&[UNIFORM, twin], Spread { time: 0.0, error: 0.0 }, true, 1);
+    let found = findings(&points, CONFIDENCE);
+    assert!(winners(&found).is_empty(), "{found:#?}");
+    let tie = |f: &Finding| f.verdict == Verdict::TooNoisy && f.text.contains("cannot tell between uniform and twin");
+    assert!(found.iter().any(tie), "{found:#?}");
+}
+
+#[test]
+fn a_method_slowed_by_a_known_factor_gives_that_factor() {
+    let slow = Truth { allocate: "slow", time: 1.3, error: 1.0 };
+    let mut covered = 0;
+    for seed in 0..50 {
+        let points = points(&[UNIFORM, slow], Spread { time: 0.02, error: 0.05 }, true, 9000 + seed);
+        for point in &points[4..] {
+            let summary = point.summary.as_ref().unwrap();
+            let Estimate { value, low, high } = summary.speed_up.unwrap().estimate;
+            assert!((value * 1.3 - 1.0).abs() < 0.05, "{value}");
+            covered += usize::from(low.unwrap() < 1.0 / 1.3 && high.unwrap() > 1.0 / 1.3);
+            let gain = summary.error_gain.unwrap().estimate.value;
+            assert!((gain * 1.3 - 1.0).abs() < 0.05, "{gain}");
+        }
+    }
+    // The intervals are of 95 %.
+    assert!((180..=199).contains(&covered), "{covered} of 200 intervals hold the factor");
+    let points = points(&[UNIFORM, slow], Spread { time: 0.02, error: 0.05 }, true, 9);
+    let own = points[2].summary.as_ref().unwrap().speed_up.unwrap();
+    assert!((own.estimate.value - 1.0).abs() < 1e-9 && !own.extrapolated);
+    assert_eq!(front(&points), [0, 1, 2, 3], "the slow one is nowhere on the front");
+}
+
+#[test]
+fn methods_of_known_added_error_are_ranked_so() {
+    let added = |allocate, error| Truth { allocate, time: 1.0, error };
+    let truths = [added("second", 1.5), UNIFORM, added("third", 2.25)];
+    let points = points(&truths, Spread { time: 0.01, error: 0.05 }, false, 4);
+    let found = findings(&points, CONFIDENCE);
+    let named = winners(&found);
+    assert!(named.len() > 2 && named.iter().all(|text| text.contains("uniform")), "{found:#?}");
+    // One sample takes all methods equally long, so chance decides which of them is the fastest.
+    let front: Vec<usize> = front(&points).into_iter().filter(|i| i % SPP.len() > 0).collect();
+    assert_eq!(front, [5, 6, 7]);
+    for (first, expected) in [(0, 1.0 / 1.5), (8, 1.0 / 2.25)] {
+        let gain = points[first + 2].summary.as_ref().unwrap().error_gain.unwrap().estimate;
+        assert!((gain.value / expected - 1.0).abs() < 0.1, "{gain:?} is not {expected}");
+    }
+    // The law of Monte Carlo: half the error for twice the time.
+    let halving = found.iter().find(|f| f.text.contains("halve") && f.text.contains("with uniform")).unwrap();
+    let factor: f64 = halving.text.split_whitespace().nth(4).unwrap().parse().unwrap();
+    assert!((factor - 2.0).abs() < 0.1, "{}", halving.text);
+}
+
+#[test]
+fn points_that_failed_are_in_no_comparison() {
+    let better = Truth { allocate: "broken", time: 0.1, error: 0.1 };
+    let mut points = points(&[UNIFORM, better], Spread { time: 0.01, error: 0.01 }, false, 2);
+    points[4..].iter_mut().for_each(|point| point.failed = Some("out of memory".into()));
+    assert!(front(&points).iter().all(|&i| i < 4));
+    assert!(findings(&points, CONFIDENCE).iter().all(|f| !f.text.contains("broken")));
+}
+
+fn picture(values: impl Iterator<Item = f32>) -> Picture {
+    let pixels: Vec<[f32; 3]> = values.map(|v| [v; 3]).collect();
+    Picture { width: 64, height: pixels.len() as u32 / 64, pixels }
+}
+
+#[test]
+fn the_noise_of_a_reference_is_taken_off() {
+    const PIXELS: usize = 64 * 64;
+    let mut random = fastrand::Rng::with_seed(3);
+    // Of variance 1.
+    let mut noise = move || (0..12).map(|_| random.f32()).sum::<f32>() - 6.0;
+    let truth = |i: usize| 1.0 + i as f32 / PIXELS as f32;
+    let image = picture((0..PIXELS).map(|i| truth(i) + 0.1 * noise()));
+    let reference = picture((0..PIXELS).map(|i| truth(i) + 0.05 * noise()));
+    let known = noise_of(&reference, &vec![[0.05 * 0.05; 3]; PIXELS]);
+    let exact = picture((0..PIXELS).map(truth));
+    let corrected = judge(&image, &reference, known);
+    let against_truth = judge(&image, &exact, Noise::default());
+    let near = |a: Option<f64>, b: Option<f64>| (a.unwrap() / b.unwrap() - 1.0).abs() < 0.03;
+    assert!(near(corrected.mse, against_truth.mse), "{corrected:?} {against_truth:?}");
+    assert!(near(corrected.relmse, against_truth.relmse), "{corrected:?} {against_truth:?}");
+    // Control: as it is, a quarter of the noise comes from the reference.
+    assert!(relmse(&image, &reference) / against_truth.relmse.unwrap() > 1.2);
+    // An image that is the reference has no negative error.
+    assert_eq!(judge(&reference, &reference, known).relmse, Some(0.0));
+}
+
+#[test]
+fn outliers_are_counted_and_trimmed() {
+    let reference = picture((0..64 * 64).map(|_| 1.0));
+    let with_fireflies = picture((0..64 * 64).map(|i| if i % 1024 == 5 { 101.0 } else { 1.1 }));
+    let errors = judge(&with_fireflies, &reference, Noise::default());
+    // 4 of 4096 pixels, which is the largest 0.1 %, rounded down: 4.096.
+    assert_eq!(errors.outliers, Some(4.0 / 4096.0));
+    assert!((errors.relmse_trimmed.unwrap() - 0.01 / 1.01).abs() < 1e-4, "{errors:?}");
+    assert!(errors.relmse.unwrap() > 9.0);
+}
+
+#[test]
+fn hdr_flip_is_that_of_the_reference_implementation() {
+    let pattern = |disturbed: bool, scale: f32| {
+        let at = |x: u32, y: u32| {
+            let base = ((x * 7 + y * 13) % 31) as f32 / 31.0;
+            let pixel = [base, base * base, 1.0 - base];
+            let off = 0.05 * (((x * 5 + y * 3) % 7) as f32 / 7.0);
+            pixel.map(|v| scale * if disturbed { v * 0.9 + off } else { v })
+        };
+        Picture { width: 32, height: 24, pixels: (0..24).flat_map(|y| (0..32).map(move |x| at(x, y))).collect() }
+    };
+    // flip-evaluator 1.7, HDR, automatic exposures. They follow the brightness of the reference.
+    for scale in [1.0, 8.0] {
+        let flip = hdr_flip(&pattern(true, scale), &pattern(false, scale)).unwrap();
+        assert!((flip - 0.148_911).abs() < 1e-5, "{flip}");
+    }
+    assert_eq!(hdr_flip(&pattern(false, 1.0), &pattern(false, 1.0)), Some(0.0));
+    assert_eq!(hdr_flip(&pattern(true, 0.0), &pattern(false, 0.0)), None, "no exposure suits black");
+}
