@@ -1,4 +1,4 @@
-//! Tests that renders with different seeds are rarely called different, and that samples placed by noise are not.
+//! Tests that renders with different seeds are rarely called different.
 use crate::support;
 use std::path::Path;
 use tallow::gpu::Gpu;

@@ -125,7 +125,7 @@ impl Partition {
         let judged: Vec<u32> = pixels.into_iter().filter(|(_, n)| *n >= MIN_PIXELS).map(|(id, _)| id).collect();
         let place = |id: &u32| judged.binary_search(id).map_or(u32::MAX, |i| i as u32);
         let objects = ids.iter().map(place).collect();
-        (judged.len() > 1).then(|| Self {
+        (judged.len() > 1).then_some(Self {
             scale: Scale::Object,
             regions: judged.len(),
             size: [a.width, a.height],
