@@ -74,7 +74,8 @@ fn build() -> Result<()> {
     let (tests, own) =
         kernels(Path::new("glsl"))?.into_iter().partition::<Vec<_>, _>(|file| file.starts_with("glsl/test"));
     generate(&own, "crate", &out.join("shaders.rs"))?;
-    let tested = [&tests[..], &[PathBuf::from("glsl/film/accumulate.comp")]].concat();
+    let alone = ["glsl/film/accumulate.comp", "glsl/profile/ceiling_arithmetic.comp", "glsl/profile/ceiling_copy.comp"];
+    let tested = [&tests[..], &alone.map(PathBuf::from)].concat();
     generate(&tested, "tallow", &out.join("test_shaders.rs"))
 }
 

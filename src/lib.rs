@@ -21,7 +21,7 @@
 //! - [`statistics`]: what is known of a pixel after some of its samples.
 //! - [`settings`]: the tables in which settings have their ranges, defaults and descriptions.
 //! - [`cost`]: how much time buys how much accuracy, measured.
-//! - [`report`]: tables of GPU time, and traces.
+//! - [`report`]: tables of GPU time, traces, and web pages.
 //! - [`profile`]: where a frame's time goes, how near its passes are to what the device can do, and what changed.
 //! - [`error`]: what can fail, and the exit codes for it.
 //! - [`guide`]: how to embed the renderer, filter what it makes, and place its samples.

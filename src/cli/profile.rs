@@ -5,7 +5,7 @@ mod text;
 use super::files::{Files, Item, check_distinct};
 use super::overrides::Overrides;
 use super::{Exit, print, print_json};
-use crate::denoise::filter::Row;
+use crate::denoise::filter::Method;
 use crate::error::{Error, Result};
 use crate::image::output;
 use crate::profile::{Comparison, Profile, Verdict};
@@ -24,7 +24,8 @@ pub struct Args {
     /// Frames to time, and as many more without timestamps; 20 and more for a 95th percentile
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u16).range(1..=10_000))]
     pub frames: u16,
-    /// Compare with an earlier profile that --json printed: exit code 1 when something changed by more than its noise
+    /// Compare with an earlier profile that --json printed: exit code 1 when something changed by more than
+    /// its noise, 7 when that cannot be said
     #[arg(long, value_name = "FILE")]
     pub compare: Option<PathBuf>,
     /// Write the times of every frame to a .csv
@@ -35,7 +36,7 @@ pub struct Args {
     pub trace: Option<PathBuf>,
     /// Filter every frame
     #[arg(long, value_name = "FILTER")]
-    pub denoise: Option<&'static Row>,
+    pub denoise: Option<Method>,
     /// Device, by index or part of its name [default: the best one]
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
@@ -85,7 +86,8 @@ pub fn run(args: &Args) -> Result<Exit> {
     files.failure().map_or(Ok(()), Err)?;
     Ok(match comparison.map(|found| found.verdict) {
         Some(Verdict::Changed) => Exit::LimitExceeded,
-        _ => Exit::Done,
+        Some(Verdict::Inconclusive) => Exit::Undecided,
+        Some(Verdict::Same) | None => Exit::Done,
     })
 }
 

@@ -142,7 +142,7 @@ fn run_filter(gpu: &Gpu, recipe: &Recipe, scales: &Scales, planes: &Planes, time
             times.extend(run(gpu, |rec| filter.record(rec, planes))?);
         }
         Method::Oidn => {
-            for (name, took) in oidn::filter(&settings, planes)? {
+            for (name, took) in oidn::filter(settings.oidn, planes)? {
                 let begin_ns = times.last().map_or(0, |before| before.end_ns);
                 times.push(PassTime { name, begin_ns, end_ns: begin_ns.saturating_add(took.as_nanos() as u64) });
             }

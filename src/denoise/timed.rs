@@ -67,7 +67,7 @@ fn timed_on_host(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Timed> {
         let mut times = gpu.run(&mut FrameResources::new(gpu)?, |rec| parts.record_split(rec, &noisy))?;
         let mut wall = begun.elapsed();
         let settings = (recipe.settings)(&Scales::of_planes(&parts.planes)?);
-        let passes = oidn::filter(&settings, &parts.planes)?;
+        let passes = oidn::filter(settings.oidn, &parts.planes)?;
         if let Some((name, took)) = passes.last() {
             times.push(PassTime { name, begin_ns: 0, end_ns: took.as_nanos() as u64 });
             wall += *took;

@@ -130,7 +130,7 @@ fn a_profile_is_the_same_as_itself_and_a_slower_one_is_not() {
     other["host"]["device"] = "another".into();
     write(&folder, "other.json", &other);
     let unknown = tallow(&folder, &["profile", "other.json", "--compare", "old.json", "--quiet"]);
-    assert_eq!(unknown.status.code(), Some(0));
+    assert_eq!(unknown.status.code(), Some(7));
     assert!(stdout(&unknown).starts_with("inconclusive: devices differ"), "{}", stdout(&unknown));
 }
 
@@ -149,6 +149,7 @@ fn bad_profiles_and_options_are_one_line() {
     complains(&run(&["missing.json"]), 3, &["missing.json", "No such file"]);
     complains(&run(&[BOX, "--compare", "missing.json"]), 3, &["missing.json", "No such file"]);
     complains(&run(&["missing.toml"]), 3, &["missing.toml"]);
+    complains(&run(&[BOX, "--denoise", "oidn"]), 2, &["oidn", "passes"]);
     complains(&run(&[BOX, "--frames", "0"]), 2, &["--frames"]);
     complains(&run(&[BOX, "--csv", "a", "--trace", "a"]), 2, &["same file"]);
     complains(&run(&["half.json", "--csv", "half.json"]), 2, &["same file as the scene"]);

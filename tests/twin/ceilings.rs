@@ -1,9 +1,9 @@
 //! Compares the kernels that measure what a device can do with their CPU twins.
+use crate::support::kernels::{ceiling_arithmetic, ceiling_copy};
 use crate::support::{assert_silent, gpu, words};
 use tallow::gpu::{Buffer, FrameResources, Kernel, Location};
 use tallow::layout::vec4;
 use tallow::profile::ceilings;
-use tallow::shaders::{ceiling_arithmetic, ceiling_copy};
 
 #[test]
 fn a_copy_has_every_bit_and_ends_where_it_is_told() {

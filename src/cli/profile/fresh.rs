@@ -1,7 +1,7 @@
 //! Runs the frames of a profile.
 use super::Args;
 use crate::cli::{complain, fail_on_messages};
-use crate::denoise::{self, filter};
+use crate::denoise::{self, filter, filter::Method, filter::Row};
 use crate::error::{Error, Result};
 use crate::gpu::{self, DeviceOptions, Gpu, PassTime};
 use crate::memory;
@@ -17,6 +17,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget};
 /// # Errors
 /// As a render of the scene.
 pub fn profile(args: &Args) -> Result<(Profile, Option<String>)> {
+    let filter = args.denoise.map(row).transpose()?;
     let file = SceneFile::open(&args.scene)?;
     let mut settings = file.settings()?;
     args.overrides.apply(&mut settings);
@@ -38,12 +39,20 @@ pub fn profile(args: &Args) -> Result<(Profile, Option<String>)> {
     if !is_talkative {
         bar.set_draw_target(ProgressDrawTarget::hidden());
     }
-    let measured = measure(&gpu, &scene, &settings, args.denoise, count, &mut || bar.inc(1))?;
+    let measured = measure(&gpu, &scene, &settings, filter, count, &mut || bar.inc(1))?;
     bar.finish_and_clear();
     fail_on_messages(&gpu)?;
-    let denoise = args.denoise.map(|row| row.name.to_owned());
+    let denoise = filter.map(|row| row.name.to_owned());
     let profile = Profile { denoise, ..Profile::new(&gpu, &args.scene, &scene, &settings, &measured)? };
     Ok((profile, args.trace.is_some().then(|| trace(&measured))))
+}
+
+/// The kernels of a filter.
+fn row(method: Method) -> Result<&'static Row> {
+    match method {
+        Method::Kernels(row) => Ok(row),
+        Method::Oidn => Err(Error::Usage("oidn has no passes to time: choose another filter".to_owned())),
+    }
 }
 
 fn trace(measured: &Measured) -> String {
@@ -56,7 +65,7 @@ fn trace(measured: &Measured) -> String {
 /// As for a render: what takes more memory than there is, is told before.
 fn check_room(args: &Args, settings: &Settings, gpu: &Gpu) -> Result<()> {
     let (size, unified) = ([settings.width, settings.height], gpu.info().unified);
-    let filtered = args.denoise.map_or(0, |row| denoise::host_bytes(row.into(), settings, unified));
+    let filtered = args.denoise.map_or(0, |method| denoise::host_bytes(method, settings, unified));
     let refused = |what| Error::Device(format!("a film of {} x {} {what}: choose a smaller film", size[0], size[1]));
     memory::check(film::host_bytes(settings, unified).max(filtered)).map_err(refused)?;
     args.denoise.map_or(Ok(()), |_| filter::check_size(gpu, size, filter::GUIDE_TEXELS))

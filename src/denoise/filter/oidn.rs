@@ -1,5 +1,5 @@
 //! Open Image Denoise, the learned filter that others are measured against. It runs on the host's processor, where it is installed.
-use super::{FilterSettings, Planes};
+use super::Planes;
 use crate::error::Result;
 use crate::gpu::{Oidn, OidnInput, Texels};
 use crate::layout::{Guide, vec3, vec4};
@@ -45,7 +45,7 @@ type Took = (&'static str, Duration);
 ///
 /// # Errors
 /// [`crate::error::Error::Device`] where the library is not installed, or with its own message.
-pub fn filter(settings: &FilterSettings, planes: &Planes) -> Result<Vec<Took>> {
+pub fn filter(settings: OidnSettings, planes: &Planes) -> Result<Vec<Took>> {
     let begun = Instant::now();
     let oidn = Oidn::open()?;
     let opened = begun.elapsed();
@@ -56,7 +56,7 @@ pub fn filter(settings: &FilterSettings, planes: &Planes) -> Result<Vec<Took>> {
         colour: Texels::new(&radiance, 0),
         albedo: any(|g| g.albedo).then(|| Texels::new(&guide, offset_of!(Guide, albedo))),
         normal: any(|g| g.normal).then(|| Texels::new(&guide, offset_of!(Guide, normal))),
-        quality: settings.oidn.oidn_quality as i32,
+        quality: settings.oidn_quality as i32,
     };
     let mut output = vec![[0.0, 0.0, 0.0, 1.0]; radiance.len()];
     let begun = Instant::now();

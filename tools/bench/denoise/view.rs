@@ -17,14 +17,15 @@ const fn view(name: &'static str, scene: &'static str, size: [u32; 2]) -> View {
     View { name, scene, size }
 }
 
-/// Indoors and outdoors, with sky, sun, lamps, textures, gloss and glass.
+/// Indoors and outdoors, with sky, sun, lamps, textures, gloss and glass. Sibenik by daylight is not among them: after 512 samples the
+/// image of it that others would be compared with is as noisy as what a filter makes of 64.
 pub const VIEWS: &[View] = &[
     view("crytek-sponza", "crytek-sponza", [320, 180]),
     view("stanford-dragon", "stanford-dragon", [256, 256]),
     view("pine-grove", "pine-grove", [256, 192]),
     view("bitterli-veach-mis", "bitterli-veach-mis", [256, 144]),
     view("nori-table", "nori-table", [256, 192]),
-    view("sibenik", "sibenik", [256, 192]),
+    view("sibenik-lamps", "sibenik-lamps", [256, 192]),
     view("forest", "forest", [256, 192]),
     view("bust", "scenes/bust/scene.toml", [192, 256]),
     view("grass", "scenes/grass/scene.toml", [256, 144]),
