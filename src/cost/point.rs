@@ -40,7 +40,7 @@ pub struct Method {
 pub struct Run {
     /// Seed of the random sequence.
     pub seed: u32,
-    /// Sum of all passes by the device's timestamps, in milliseconds.
+    /// Sum of all passes in milliseconds: by the device's timestamps, but for what runs on the host and says so in its name.
     pub gpu_ms: f64,
     /// Wall time of rendering and filtering in milliseconds, without reading results back and judging them.
     pub wall_ms: f64,

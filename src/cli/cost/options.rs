@@ -27,7 +27,7 @@ pub struct Args {
     /// Allocation policies
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "uniform,both")]
     pub allocate: Vec<&'static Policy>,
-    /// Filters; none is the plain render
+    /// Filters, as for tallow render --denoise; none is the plain render
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "none,atrous,auto")]
     pub denoise: Vec<Method>,
     /// Samples per pixel
