@@ -65,7 +65,10 @@ mod tests {
     #[test]
     fn counts_are_grouped_and_half_an_interval_is_none() {
         assert_eq!((percent(0.95), percent(0.999), percent(0.57)), ("95".into(), "99.9".into(), "57".into()));
-        assert_eq!((count(7), count(1234), count(1_234_567)), ("7".into(), "1\u{202f}234".into(), "1\u{202f}234\u{202f}567".into()));
+        assert_eq!(
+            (count(7), count(1234), count(1_234_567)),
+            ("7".into(), "1\u{202f}234".into(), "1\u{202f}234\u{202f}567".into())
+        );
         let whole = Estimate { value: 1.0, low: Some(0.5), high: Some(2.0) };
         assert_eq!(interval(&whole).unwrap(), "0.500 to 2.00");
         assert_eq!(interval(&Estimate { low: None, ..whole }), None);
