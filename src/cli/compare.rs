@@ -3,6 +3,7 @@ mod evidence;
 mod junit;
 mod page;
 mod replay;
+mod report;
 mod statistical;
 mod words;
 

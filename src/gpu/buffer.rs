@@ -1,5 +1,5 @@
 //! Typed, named buffers in device memory: allocation, binding, and element access from the host.
-use super::{At, Gpu, SlotKind};
+use super::{At, Gpu};
 use crate::error::{Error, Result};
 use ash::vk;
 use ash::vk::Handle;
@@ -222,9 +222,9 @@ impl Bound<'_> {
         vk::DescriptorBufferInfo::default().buffer(self.buffer.raw).offset(self.offset).range(range)
     }
 
-    /// Bytes that a slot of this kind shows a kernel.
-    pub(super) fn bytes(&self, kind: SlotKind) -> u64 {
-        if kind == SlotKind::Uniform { self.buffer.stride as u64 } else { self.size }
+    /// Bytes that a kernel is shown: of a uniform block the first element, else all.
+    pub(super) fn bytes(&self, uniform: bool) -> u64 {
+        if uniform { self.buffer.stride as u64 } else { self.size }
     }
 
     /// Returns a view whose texels have 16 bytes where the element size is a multiple of 16, else 8 where it is a multiple of

@@ -1,6 +1,6 @@
 //! Recording of work. Every pass gets its barrier, debug label and timestamps here, and kernels are bound and dispatched.
 use super::shape::{KernelCode, PassShape};
-use super::{Access, Bindings, Bound, Buffer, FrameResources, Gpu, Kernel, PassTime, Untyped, access};
+use super::{Access, Bindings, Bound, Buffer, FrameResources, Gpu, Kernel, PassTime, SlotKind, Untyped, access};
 use crate::error::{Error, Result};
 use ash::vk;
 use ash::vk::Handle;
@@ -115,7 +115,7 @@ impl<'a> Recorder<'a> {
         let (pipeline, layout, push) = (kernel.parts.pipeline, kernel.parts.layout, bytemuck::bytes_of(push));
         let compute = vk::PipelineBindPoint::COMPUTE;
         let code = KernelCode { spirv: B::SPIRV, constants: kernel.constants.clone() };
-        let bytes = B::SLOTS.iter().zip(&buffers).map(|(slot, bound)| bound.bytes(slot.kind));
+        let bytes = B::SLOTS.iter().zip(&buffers).map(|(slot, bound)| bound.bytes(slot.kind == SlotKind::Uniform));
         let shape = PassShape::of_kernel(groups, kernel.local_size, B::SLOTS, bytes, code);
         // SAFETY: the frame keeps the kernel, the set and every buffer until the work is complete.
         self.pass(B::NAME, &accesses, shape, |device, commands| unsafe {

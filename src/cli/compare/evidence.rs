@@ -1,6 +1,6 @@
 //! The folder with all that shows why two images are not the same.
 use super::replay;
-use super::statistical::{Report, Side, write_png};
+use super::report::{Report, Side, write_png};
 use super::words;
 use crate::error::{Error, Result};
 use crate::image::output;

@@ -1,5 +1,5 @@
 //! The verdict of a statistical test as JUnit XML, which CI services show.
-use super::statistical::Report;
+use super::report::Report;
 use super::words;
 use crate::error::{Error, Result};
 use crate::image::significance::{Level, Verdict};

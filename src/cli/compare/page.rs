@@ -1,5 +1,5 @@
 //! The result of a statistical test as a web page.
-use super::statistical::Report;
+use super::report::Report;
 use super::{replay, words};
 use crate::image::significance::{Finding, Level, overlay, suspects};
 use crate::report::html::viewer::{Image, Viewer};

@@ -1,10 +1,11 @@
 //! `tallow compare --statistical`: tests whether two renders have the same expectation.
+use super::report::{Report, Side};
 use super::{check_sizes, evidence, junit, page, words};
 use crate::cli::files::check_distinct;
 use crate::cli::{Exit, check_png, complain, finite, print, print_json, readable};
 use crate::error::{Error, Result};
-use crate::image::significance::{self, Estimate, Options, Outcome, Scale, Verdict, overlay};
-use crate::image::{self, Film, Picture, WriteOptions, output};
+use crate::image::significance::{self, Options, Scale, Verdict};
+use crate::image::{self, output};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -46,33 +47,13 @@ pub struct Args {
     evidence: Option<PathBuf>,
 }
 
-/// One of the two images.
-pub struct Side {
-    /// Where it was read.
-    pub path: PathBuf,
-    /// All of it.
-    pub film: Film,
-    /// What it says of its expectation.
-    pub estimate: Estimate,
-}
-
-/// All that was found.
-pub struct Report<'a> {
-    /// The images A and B.
-    pub sides: &'a [Side; 2],
-    /// What was asked.
-    pub options: Options,
-    /// What was found.
-    pub outcome: Outcome,
-}
-
 /// Runs the test.
 ///
 /// # Errors
 /// When a file cannot be read or written, does not tell its noise, or sizes differ.
 pub fn run(a: &Path, b: &Path, json: bool, args: &Args) -> Result<Exit> {
     check_outputs(a, b, args)?;
-    let sides = [side(a, None)?, side(b, args.errors.as_deref())?];
+    let sides = [Side::read(a, None)?, Side::read(b, args.errors.as_deref())?];
     let [a_colour, b_colour] = sides.each_ref().map(Side::picture);
     check_sizes((a, &a_colour), (b, &b_colour))?;
     image::check_memory(a, a_colour.pixels.len() as u64 * BYTES_PER_PIXEL)?;
@@ -87,8 +68,8 @@ pub fn run(a: &Path, b: &Path, json: bool, args: &Args) -> Result<Exit> {
     let folder = args.evidence.as_ref().filter(|_| failed);
     folder.map_or(Ok(()), |folder| evidence::write(folder, &report))?;
     match json {
-        true => print_json(&report.json(args, full))?,
-        false => print(&report.text(args, full))?,
+        true => print_json(&summary(&report, args, full))?,
+        false => print(&text(&report, args, full))?,
     }
     if failed {
         complain(&words::verdict(&report));
@@ -121,100 +102,32 @@ fn check_outputs(a: &Path, b: &Path, args: &Args) -> Result<()> {
     args.evidence.as_ref().map_or(Ok(()), |folder| evidence::check(folder))
 }
 
-fn side(path: &Path, errors: Option<&Path>) -> Result<Side> {
-    let film = image::read(path)?;
-    let estimate = match errors {
-        None => Estimate::of_film(&film).map_err(|what| Error::input(path, what)),
-        Some(file) => {
-            let errors = image::read(file)?.picture(None).map_err(|what| Error::input(file, what))?;
-            Estimate::with_errors(&film, &errors).map_err(|what| Error::input(file, what))
-        }
-    }?;
-    Ok(Side { path: path.to_owned(), film, estimate })
+fn summary(report: &Report, args: &Args, full: Option<f32>) -> Value {
+    let mut figures = report.figures();
+    figures["map"] = json!(args.map.as_ref().zip(full).map(|(path, full)| json!({ "file": path, "full": full })));
+    figures["evidence"] = json!(args.evidence);
+    figures
 }
 
-impl Side {
-    /// The means that were tested.
-    pub fn picture(&self) -> Picture {
-        let Estimate { width, height, mean, .. } = &self.estimate;
-        Picture { width: *width, height: *height, pixels: mean.clone() }
+fn text(report: &Report, args: &Args, full: Option<f32>) -> String {
+    let mut text = String::new();
+    if let Verdict::Same { .. } = report.outcome.verdict {
+        text += &format!("{}\n", words::verdict(report));
     }
-
-    /// What the file says of where it was rendered.
-    pub fn origin(&self) -> Value {
-        const KEYS: [&str; 8] =
-            ["software", "scene", "sceneFingerprint", "device", "driver", "cpu", "sampleRanges", "settings"];
-        let said = |key: &str| Some((key.to_owned(), Value::from(self.film.metadata.get(key)?.clone())));
-        let mut origin: serde_json::Map<_, _> = KEYS.iter().filter_map(|key| said(key)).collect();
-        origin.insert("file".to_owned(), json!(self.path));
-        Value::Object(origin)
+    if report.equal() {
+        text += "the images are equal bit for bit\n";
     }
-}
-
-impl Report<'_> {
-    /// Whether both images are equal bit for bit.
-    fn equal(&self) -> bool {
-        self.sides[0].estimate.mean == self.sides[1].estimate.mean
+    if report.outcome.left_out > 0 {
+        text += &format!("{} pixels with fewer than two samples were left out\n", report.outcome.left_out);
     }
-
-    /// Writes the map and returns the relative difference of full colours.
-    ///
-    /// # Errors
-    /// [`Error::Output`].
-    pub fn write_map(&self, path: &Path) -> Result<f32> {
-        let overlay = overlay(&self.outcome, &self.sides[1].picture());
-        write_png(path, &overlay.picture)?;
-        Ok(overlay.full)
+    text += &words::tables(&report.outcome);
+    if let Some((path, full)) = args.map.as_ref().zip(full) {
+        let (path, full) = (readable(&path.display().to_string()), words::percent(full.into()));
+        text += &format!(
+            "{path}: orange where A is brighter than B, blue where it is darker; full colour from {full} on\n"
+        );
     }
-
-    /// All figures.
-    pub fn figures(&self) -> Value {
-        json!({
-            "equal": self.equal(),
-            "a": self.sides[0].origin(),
-            "b": self.sides[1].origin(),
-            "options": self.options,
-            "outcome": self.outcome,
-        })
-    }
-
-    fn json(&self, args: &Args, full: Option<f32>) -> Value {
-        let mut figures = self.figures();
-        figures["map"] = json!(args.map.as_ref().zip(full).map(|(path, full)| json!({ "file": path, "full": full })));
-        figures["evidence"] = json!(args.evidence);
-        figures
-    }
-
-    fn text(&self, args: &Args, full: Option<f32>) -> String {
-        let mut text = String::new();
-        if let Verdict::Same { .. } = self.outcome.verdict {
-            text += &format!("{}\n", words::verdict(self));
-        }
-        if self.equal() {
-            text += "the images are equal bit for bit\n";
-        }
-        if self.outcome.left_out > 0 {
-            text += &format!("{} pixels with fewer than two samples were left out\n", self.outcome.left_out);
-        }
-        text += &words::tables(&self.outcome);
-        if let Some((path, full)) = args.map.as_ref().zip(full) {
-            let (path, full) = (readable(&path.display().to_string()), words::percent(full.into()));
-            text += &format!(
-                "{path}: orange where A is brighter than B, blue where it is darker; full colour from {full} on\n"
-            );
-        }
-        text
-    }
-}
-
-/// Writes linear colours to a .png.
-///
-/// # Errors
-/// [`Error::Output`].
-pub fn write_png(path: &Path, picture: &Picture) -> Result<()> {
-    let mut film = Film::new(picture.width, picture.height);
-    film.add_vec3("", ["R", "G", "B"], &picture.pixels);
-    image::write(path, &film, &WriteOptions::default())
+    text
 }
 
 fn rate(text: &str) -> std::result::Result<f64, String> {

@@ -1,5 +1,5 @@
 //! The verdict of a statistical test in words and tables.
-use super::statistical::Report;
+use super::report::Report;
 use crate::image::significance::{Finding, Level, Noise, Outcome, Scale, Verdict};
 use crate::report::table;
 

@@ -1,5 +1,5 @@
 //! The constants of a SPIR-V module, those that a kernel is specialised by included.
-use super::module::Instruction;
+use super::instruction::Instruction;
 use std::collections::BTreeMap;
 
 /// Values of 32-bit numbers and truths by id; a truth is 0 or 1.
