@@ -34,7 +34,7 @@ impl Frame {
         let mut frame = Self { size, stats: Vec::new(), light: Vec::new(), guide: Vec::new() };
         for i in 0..size[0] * size[1] {
             let unit = |salt: u32| hash(i.wrapping_mul(8) + salt) as f32 / 4_294_967_296.0;
-            let (is_lamp, is_glass) = (i % 23 == 7, i % size[0] % 16 < 4);
+            let (is_lamp, is_glass) = (i % 23 == 7, size[0] > 16 && i % size[0] % 16 < 4);
             let albedo = if is_lamp || is_glass { [0.0; 3] } else { [0, 1, 2].map(|c| 0.005 + 0.9 * unit(c)) };
             let indirect = [unit(4), 0.3 * unit(5), 1.0];
             let mut light =
