@@ -49,7 +49,7 @@ struct Cli {
 enum Command {
     Render(Box<render::Args>),
     Filter(Box<filter::Args>),
-    Compare(compare::Args),
+    Compare(Box<compare::Args>),
     Cost(Box<cost::Args>),
     Merge(merge::Args),
     Explain(explain::Args),
