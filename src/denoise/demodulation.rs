@@ -5,7 +5,7 @@
 /// | | filtered | factor | sharp |
 /// |---|---|---|---|
 /// | `Light` | indirect light before albedo | that albedo | direct light, emission, what smooth surfaces show |
-/// | `Albedo` | colour / albedo | albedo | what reflects nothing: lamps, sky |
+/// | `Albedo` | colour / albedo, or what a noisy mirror or clear glass shows | albedo, or 1 | lamps, sky |
 /// | `Off` | colour | 1 | nothing |
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Demodulation {
@@ -22,7 +22,7 @@ impl Demodulation {
     pub fn note(self) -> &'static str {
         match self {
             Self::Light => "filtered: indirect light before albedo; direct light stays as it is",
-            Self::Albedo => "filtered: colour / albedo; what has no albedo, and its rim, stays as it is",
+            Self::Albedo => "filtered: colour / albedo; lamps and sky, and their rims, stay as they are",
             Self::Off => "filtered: the colour, without demodulation",
         }
     }

@@ -11,7 +11,7 @@ use askama::Template;
 
 /// What `cost.html` shows.
 #[derive(Template)]
-#[template(path = "cost.html")]
+#[template(path = "cost.html", config = "src/report/html/askama.toml")]
 struct CostPage<'a> {
     frame: Frame<'a>,
     document: &'a Document,

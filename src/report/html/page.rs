@@ -113,7 +113,7 @@ impl Cell {
 
 /// What `plain_page.html` shows.
 #[derive(Template)]
-#[template(path = "plain_page.html")]
+#[template(path = "plain_page.html", config = "src/report/html/askama.toml")]
 struct PlainPage<'a> {
     frame: Frame<'a>,
     page: &'a Page<'a>,

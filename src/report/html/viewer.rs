@@ -37,7 +37,7 @@ pub struct Viewer<'a> {
 
 /// What `viewer.html` shows.
 #[derive(Template)]
-#[template(path = "viewer.html")]
+#[template(path = "viewer.html", config = "src/report/html/askama.toml")]
 struct Content<'a> {
     group: &'a str,
     shots: Vec<Shot<'a>>,
