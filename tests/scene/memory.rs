@@ -1,7 +1,6 @@
 //! Tests that scenes from an engine's memory equal those from files, and the messages about mistakes.
 use image::codecs::png::PngEncoder;
 use std::fs::File;
-use std::path::PathBuf;
 use tallow::image::{Picture, WriteOptions};
 use tallow::scene::description::*;
 use tallow::scene::{Loaded, Scene};
@@ -85,8 +84,13 @@ fn from_files() -> Loaded {
 }
 
 fn described() -> Description {
-    let wall =
-        Mesh { positions: CORNERS.to_vec(), normals: NORMALS.to_vec(), uvs: UVS.to_vec(), indices: INDICES.to_vec() };
+    let wall = Mesh {
+        positions: CORNERS.to_vec(),
+        normals: NORMALS.to_vec(),
+        uvs: UVS.to_vec(),
+        indices: INDICES.to_vec(),
+        ..Mesh::default()
+    };
     let lamp = Mesh { normals: Vec::new(), uvs: Vec::new(), ..wall.clone() };
     let mesh = |name: &str, data| MeshTable {
         name: Some(name.to_owned()),
@@ -99,7 +103,7 @@ fn described() -> Description {
         transform: [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 0.0, 1.0].into(),
         ..InstanceTable::default()
     };
-    let checks = Some(PathBuf::from("pictures/checks"));
+    let checks = Some(TextureTable::from("pictures/checks"));
     Description {
         film: Film { width: Some(32), height: Some(16), ..Film::default() },
         camera: Camera { position: Some([1.0, 2.0, 9.0]), target: Some([0.0; 3]), ..Camera::default() },
@@ -212,4 +216,31 @@ fn an_empty_scene_is_black_and_says_so() {
     let empty = Scene::build(&Description::default()).unwrap();
     assert_eq!((empty.triangles.len(), empty.settings.width), (0, tallow::render::settings::Settings::default().width));
     assert!(empty.warnings.iter().any(|w| w.contains("no light")), "{:?}", empty.warnings);
+}
+
+fn described_metal(material: MaterialTable) -> Description {
+    let mut description = described();
+    description.material[0] = MaterialTable {
+        name: "wall".to_owned(),
+        kind: MaterialType::MetallicRoughness,
+        color_texture: Some("pictures/checks".into()),
+        ..material
+    };
+    description
+}
+
+#[test]
+fn a_metallic_roughness_material_is_built() {
+    let loaded = Scene::build(&described_metal(MaterialTable::default())).unwrap();
+    let wall = &loaded.scene.materials[0];
+    assert_eq!(wall.alpha, 1.0);
+    assert!(loaded.scene.warnings.len() <= 1, "{:?}", loaded.scene.warnings);
+    let opaque = MaterialTable { alpha_mode: Some(AlphaMode::Opaque), opacity: Some(0.5), ..MaterialTable::default() };
+    assert_eq!(Scene::build(&described_metal(opaque)).unwrap().scene.materials[0].opacity, 1.0);
+    let bad = MaterialTable { roughness: Some(1.5), ..MaterialTable::default() };
+    let error = Scene::build(&described_metal(bad)).unwrap_err().to_string();
+    assert!(error.contains("material \"wall\": roughness is 1.5: choose a value from 0 to 1"), "{error}");
+    let bad =
+        MaterialTable { alpha_mode: Some(AlphaMode::Mask), alpha_cutoff: Some(f32::NAN), ..MaterialTable::default() };
+    assert!(Scene::build(&described_metal(bad)).unwrap_err().to_string().contains("alpha_cutoff"));
 }

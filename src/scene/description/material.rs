@@ -1,7 +1,7 @@
 //! The `[[material]]` tables.
+use super::texture::TextureTable;
 use super::value::Rgb;
 use serde::Deserialize;
-use std::path::PathBuf;
 
 /// How a material reflects light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
@@ -18,6 +18,22 @@ pub enum Type {
     Mirror,
     /// A diffuse base under a dielectric coat.
     Coated,
+    /// The material of glTF 2.0: a mixture of a metal and of a dielectric above a diffuse or thin transparent base.
+    #[serde(rename = "metallic-roughness")]
+    MetallicRoughness,
+}
+
+/// Whether rays pass through a metallic-roughness surface, by its alpha: `opacity` times the alpha channel of `color_texture`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum AlphaMode {
+    /// None pass.
+    #[default]
+    Opaque,
+    /// All pass where alpha is below `alpha_cutoff`.
+    Mask,
+    /// They pass with the probability 1 - alpha.
+    Blend,
 }
 
 /// Distribution of microfacet normals.
@@ -40,10 +56,11 @@ pub struct MaterialTable {
     /// Kind of the material; default diffuse.
     #[serde(rename = "type")]
     pub kind: Type,
-    /// Albedo, or the tint of a mirror or conductor; default 0.5 (diffuse, coated without texture), else 1.
+    /// Albedo, or the tint of a mirror or conductor; default 0.5 (diffuse, coated without texture), else 1. The vertex colours of a
+    /// mesh multiply it.
     pub color: Option<Rgb>,
     /// sRGB picture that multiplies `color`.
-    pub color_texture: Option<PathBuf>,
+    pub color_texture: Option<TextureTable>,
     /// Microfacet roughness in [0, 1]; below 0.01 smooth; default 0.
     pub alpha: f32,
     /// Microfacet distribution; default Beckmann.
@@ -54,32 +71,65 @@ pub struct MaterialTable {
     pub k: Option<Rgb>,
     /// Name of the metal that gives a conductor's `eta` and `k`.
     pub metal: Option<String>,
-    /// Interior over exterior index of a dielectric or a coat; default 1.5.
+    /// Interior over exterior index of a dielectric, a coat or the dielectric part of metallic-roughness; default 1.5.
     pub ior: Option<f32>,
     /// Tint of specular reflection; default 1.
     pub specular: Option<Rgb>,
     /// sRGB picture that multiplies `specular`.
-    pub specular_texture: Option<PathBuf>,
+    pub specular_texture: Option<TextureTable>,
     /// Tint of transmission; default 1.
     pub transmission: Option<Rgb>,
     /// Radiance of the front side, W/(m^2 sr).
     pub emission: Option<Rgb>,
     /// sRGB picture that multiplies `emission` (default then 1).
-    pub emission_texture: Option<PathBuf>,
+    pub emission_texture: Option<TextureTable>,
     /// Opacity in [0, 1]; default 1.
     pub opacity: Option<f32>,
     /// Picture that masks the surface by its alpha channel, or by its red channel where it has none.
-    pub opacity_texture: Option<PathBuf>,
+    pub opacity_texture: Option<TextureTable>,
     /// Height map that perturbs normals.
-    pub bump: Option<PathBuf>,
+    pub bump: Option<TextureTable>,
     /// Height in world units per unit of the height map; default 1.
     pub bump_scale: Option<f32>,
     /// Tangent-space normal map, in place of `bump`.
-    pub normal_map: Option<PathBuf>,
+    pub normal_map: Option<TextureTable>,
     /// Perceptual roughness (root of alpha) in its green channel; multiplies the root of `alpha` (default then 1).
-    pub roughness_texture: Option<PathBuf>,
+    pub roughness_texture: Option<TextureTable>,
     /// Whether both sides scatter light; default true.
     pub two_sided: Option<bool>,
     /// Coated: light that is reflected below the coat takes on the base's colour each time; default false.
     pub nonlinear: bool,
+    /// Factor of `emission`, from 0; default 1.
+    pub emission_strength: Option<f32>,
+    /// Factor of the x and y components of `normal_map`; default 1.
+    pub normal_scale: Option<f32>,
+    /// Metallic-roughness: share of metal in [0, 1]; default 1. (Then `color` is the base colour, default 1, and `specular` with
+    /// `specular_texture` the colour of the dielectric's reflection head on.)
+    pub metallic: Option<f32>,
+    /// Metallic-roughness: the root of alpha, in [0, 1]; default 1.
+    pub roughness: Option<f32>,
+    /// Metallic-roughness: a linear picture whose green channel multiplies `roughness`, and whose blue one `metallic`.
+    pub metallic_roughness_texture: Option<TextureTable>,
+    /// Metallic-roughness: factor of the dielectric's reflection in [0, 1]; default 1.
+    pub specular_factor: Option<f32>,
+    /// Metallic-roughness: a picture whose alpha channel multiplies `specular_factor`.
+    pub specular_factor_texture: Option<TextureTable>,
+    /// Metallic-roughness: share of the dielectric in [0, 1] that lets light through a thin wall; default 0. `color` tints that light.
+    pub transmission_factor: Option<f32>,
+    /// Metallic-roughness: a picture whose red channel multiplies `transmission_factor`.
+    pub transmission_texture: Option<TextureTable>,
+    /// Metallic-roughness: strength in [0, 1] of a clear coat of index 1.5 above all; default 0.
+    pub clearcoat: Option<f32>,
+    /// Metallic-roughness: a picture whose red channel multiplies `clearcoat`.
+    pub clearcoat_texture: Option<TextureTable>,
+    /// Metallic-roughness: the root of the clear coat's alpha, in [0, 1]; default 0.
+    pub clearcoat_roughness: Option<f32>,
+    /// Metallic-roughness: a picture whose green channel multiplies `clearcoat_roughness`.
+    pub clearcoat_roughness_texture: Option<TextureTable>,
+    /// Metallic-roughness: what alpha does; without it alpha is ignored, but `opacity` and `opacity_texture` count.
+    pub alpha_mode: Option<AlphaMode>,
+    /// Metallic-roughness, `alpha_mode = "mask"`: the least alpha that stops rays; default 0.5.
+    pub alpha_cutoff: Option<f32>,
+    /// Metallic-roughness: the surface shows `color` in any light: it emits it and scatters none; default false.
+    pub unlit: bool,
 }

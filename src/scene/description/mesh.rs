@@ -11,6 +11,14 @@ pub struct Mesh {
     pub normals: Vec<[f32; 3]>,
     /// Texture coordinates of the vertices, v up, so that row 0 of a picture is v = 1; empty, or one per position.
     pub uvs: Vec<[f32; 2]>,
+    /// A second set of texture coordinates, as `uvs`, for textures that ask for set 1.
+    pub uvs2: Vec<[f32; 2]>,
+    /// Colours of the vertices, linear Rec. 709 and opacity, in [0, 1], which multiply a material's `color` and alpha; empty, or
+    /// one per position.
+    pub colors: Vec<[f32; 4]>,
+    /// Tangents for normal maps: a direction along +u, and +1 or -1, by which `cross(normal, tangent)` becomes a direction along
+    /// +v; empty, or one per position.
+    pub tangents: Vec<[f32; 4]>,
     /// Vertices of the triangles, three each, counter-clockwise seen from outside.
     pub indices: Vec<u32>,
 }
@@ -20,7 +28,13 @@ impl Mesh {
     /// A sentence that says what does not fit together.
     pub(in crate::scene) fn check(&self) -> Result<(), String> {
         let vertices = self.positions.len();
-        let extras = [("normals", self.normals.len()), ("uvs", self.uvs.len())];
+        let extras = [
+            ("normals", self.normals.len()),
+            ("uvs", self.uvs.len()),
+            ("uvs2", self.uvs2.len()),
+            ("colors", self.colors.len()),
+            ("tangents", self.tangents.len()),
+        ];
         if let Some((name, count)) = extras.iter().find(|(_, count)| ![0, vertices].contains(count)) {
             return Err(format!("has {vertices} positions but {count} {name}: give one per position, or none"));
         }

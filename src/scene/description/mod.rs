@@ -10,14 +10,16 @@ pub(super) mod light;
 pub(super) mod material;
 pub(super) mod mesh;
 pub(super) mod shape;
+pub(super) mod texture;
 pub(super) mod value;
 
 pub mod settings;
 pub use camera::{Camera, FovAxis};
 pub use light::{LightTable, Type as LightType};
-pub use material::{Distribution, MaterialTable, Type as MaterialType};
+pub use material::{AlphaMode, Distribution, MaterialTable, Type as MaterialType};
 pub use mesh::{Bitmap, Mesh};
 pub use shape::Shape;
+pub use texture::{TextureFilter, TextureTable, Wrap};
 pub use value::{Rgb, Transform};
 
 use crate::error::{Error, Result};

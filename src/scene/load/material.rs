@@ -1,10 +1,12 @@
 //! Makes materials of the `[[material]]` tables.
+use super::mapping::Mapping;
 use super::metal;
-use super::texture::{Kind, Mapping, TextureSet};
+use super::texture::{Kind, TextureSet};
 use crate::layout::*;
 use crate::scene::description::material::{Distribution, MaterialTable, Type};
+use crate::scene::description::texture::TextureTable;
 use crate::scene::description::value::Rgb;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The materials of a scene and the textures they ask for.
 #[derive(Debug, Default)]
@@ -62,6 +64,9 @@ impl Materials {
         let tint = |v: Option<Rgb>, or: f32, key: &str, warn: &mut Vec<String>| {
             reflectance(v.map_or([or; 3], |v| v.0), &named(key), warn)
         };
+        if t.kind == Type::MetallicRoughness {
+            return self.push_metallic(t, directory, warn);
+        }
         let body = matches!(t.kind, Type::Diffuse | Type::Coated);
         let default = if body && t.color_texture.is_none() { 0.5 } else { 1.0 };
         m.base_color = tint(t.color, default, "color", warn)?;
@@ -73,7 +78,7 @@ impl Materials {
         m.opacity = within(t.opacity.unwrap_or(1.0), 1.0, "opacity")?;
         let rough = t.roughness_texture.is_some() && t.alpha == 0.0;
         m.alpha = if rough { 1.0 } else { within(t.alpha, 1.0, "alpha")? };
-        m.emission = radiance(t.emission.map_or([f32::from(t.emission_texture.is_some()); 3], |v| v.0))?;
+        m.emission = emission(t)?;
         self.interface(&mut m, t)?;
         if t.two_sided == Some(false) {
             m.flags &= !MATERIAL_TWO_SIDED;
@@ -98,7 +103,7 @@ impl Materials {
             Type::Diffuse => BSDF_DIFFUSE,
             Type::Dielectric => BSDF_DIELECTRIC,
             Type::Coated => BSDF_COATED,
-            Type::Mirror | Type::Conductor => BSDF_CONDUCTOR,
+            Type::Mirror | Type::Conductor | Type::MetallicRoughness => BSDF_CONDUCTOR,
         };
         if m.kind == BSDF_CONDUCTOR {
             (m.eta, m.k) = ([0.0; 3], [1.0; 3]);
@@ -127,12 +132,9 @@ impl Materials {
         if t.bump.is_some() && t.normal_map.is_some() {
             return Err("has both bump and normal_map: choose one".into());
         }
-        let mut ask = |file: Option<&PathBuf>, kind| match file.map(|f| f.to_string_lossy().replace('\\', "/")) {
-            Some(file) => self.textures.request(directory, &file, kind, Mapping::default(), warn),
-            None => NONE,
-        };
+        let mut ask = |texture: Option<&TextureTable>, kind| self.ask(t, texture, kind, directory, warn);
         if body {
-            m.base_texture = ask(t.color_texture.as_ref(), Kind::Color);
+            m.base_texture = ask(t.color_texture.as_ref(), Kind::Color)?;
         }
         if m.kind != BSDF_DIFFUSE {
             let tint = if body {
@@ -140,12 +142,12 @@ impl Materials {
             } else {
                 t.specular_texture.as_ref().map_or(&t.color_texture, |_| &t.specular_texture)
             };
-            m.specular_texture = ask(tint.as_ref(), Kind::Color);
-            m.roughness_texture = ask(t.roughness_texture.as_ref(), Kind::Roughness);
+            m.specular_texture = ask(tint.as_ref(), Kind::Color)?;
+            m.roughness_texture = ask(t.roughness_texture.as_ref(), Kind::Roughness)?;
         }
-        m.opacity_texture = ask(t.opacity_texture.as_ref(), Kind::Mask);
-        m.emission_texture = ask(t.emission_texture.as_ref(), Kind::Color);
-        m.bump_texture = ask(t.bump.as_ref().or(t.normal_map.as_ref()), Kind::Data);
+        m.opacity_texture = ask(t.opacity_texture.as_ref(), Kind::Mask)?;
+        m.emission_texture = ask(t.emission_texture.as_ref(), Kind::Color)?;
+        m.bump_texture = ask(t.bump.as_ref().or(t.normal_map.as_ref()), Kind::Data)?;
         if t.normal_map.is_some() && m.bump_texture != NONE {
             m.flags |= MATERIAL_NORMAL_MAP;
         }
@@ -155,6 +157,45 @@ impl Materials {
             false => Err("bump_scale is not a finite number".into()),
         }
     }
+}
+
+impl Materials {
+    /// Index of a texture of material `t`, or [`NONE`].
+    ///
+    /// # Errors
+    /// For settings that are out of range.
+    pub fn ask(
+        &mut self,
+        t: &MaterialTable,
+        texture: Option<&TextureTable>,
+        kind: Kind,
+        directory: &Path,
+        warn: &mut Vec<String>,
+    ) -> Result<u32, String> {
+        let Some(texture) = texture else { return Ok(NONE) };
+        let file = texture.file.to_string_lossy().replace('\\', "/");
+        texture.check().map_err(|what| format!("texture {file}: {what}"))?;
+        let mapping = Mapping::from(texture);
+        mapping.missing().for_each(|what| warn_once(warn, what, &t.name));
+        Ok(self.textures.request(directory, &file, kind, mapping, warn))
+    }
+}
+
+/// Warns of something that is not rendered once for all materials.
+pub fn warn_once(warn: &mut Vec<String>, what: &str, material: &str) {
+    if !warn.iter().any(|w| w.starts_with(what)) {
+        warn.push(format!("{what} first in material \"{material}\""));
+    }
+}
+
+/// Radiance that a table asks for.
+///
+/// # Errors
+/// For one that is out of range.
+pub fn emission(t: &MaterialTable) -> Result<[f32; 3], String> {
+    let strength = t.emission_strength.unwrap_or(1.0);
+    let emission = t.emission.map_or([f32::from(t.emission_texture.is_some()); 3], |v| v.0);
+    radiance(emission.map(|v| v * strength))
 }
 
 /// A colour that must not exceed 1; larger values are clamped with a warning.
@@ -183,7 +224,11 @@ pub fn radiance(color: [f32; 3]) -> Result<[f32; 3], String> {
     }
 }
 
-fn within(v: f32, max: f32, key: &str) -> Result<f32, String> {
+/// A number from 0 to `max`.
+///
+/// # Errors
+/// With the key, for another one.
+pub fn within(v: f32, max: f32, key: &str) -> Result<f32, String> {
     match v {
         v if (0.0..=max).contains(&v) => Ok(v),
         v => Err(format!("{key} is {v}: choose a value from 0 to {max}")),

@@ -1,7 +1,8 @@
 //! MTL files through tobj: in any case and spelling, with the line of every mistake, options of maps and file names with
 //! spaces. What the statements mean for a material is decided in `mtl_material.rs`.
-use super::texture::Mapping;
+use super::mapping::Mapping;
 use crate::error::{Error, Result};
+use crate::scene::description::texture::Wrap;
 use std::path::{Path, PathBuf};
 
 /// A statement that names a map.
@@ -174,7 +175,7 @@ pub fn map(rest: &str) -> Option<Map> {
             }
             match name {
                 "-bm" => found.bump = word.parse().ok().filter(|v: &f32| v.is_finite()),
-                "-clamp" => found.mapping.clamp = word == "on",
+                "-clamp" => found.mapping.wrap = [if word == "on" { Wrap::Clamp } else { Wrap::Repeat }; 2],
                 "-s" => place(&mut found.mapping.scale, i, word),
                 "-o" => place(&mut found.mapping.offset, i, word),
                 _ => {}
@@ -225,7 +226,7 @@ mod tests {
 
     #[test]
     fn maps_have_options_spaces_and_backslashes() {
-        let mapping = Mapping { clamp: true, scale: [2.0, -3.0], offset: [0.5, 0.0] };
+        let mapping = Mapping { wrap: [Wrap::Clamp; 2], scale: [2.0, -3.0], offset: [0.5, 0.0], ..Mapping::default() };
         let m = one("map_Kd -s 2 -3 1 -clamp on -o 0.5 tex\\my wood.png\nmap_Bump -bm 0.02 b.png\nnorm \"n 1.png\"");
         let of = |text: &Option<String>| map(text.as_ref().unwrap()).unwrap();
         assert_eq!(of(&m.block.diffuse_texture), Map { file: "tex/my wood.png".into(), bump: None, mapping });

@@ -56,7 +56,7 @@ impl Materials {
         let of = |text: &Option<String>| text.as_deref().and_then(map);
         match kind {
             Type::Conductor => m.specular_texture = ask(of(&mtl.block.diffuse_texture), Kind::Color),
-            Type::Mirror | Type::Dielectric => {}
+            Type::Mirror | Type::Dielectric | Type::MetallicRoughness => {}
             Type::Diffuse => m.base_texture = ask(of(&mtl.block.diffuse_texture), Kind::Color),
             Type::Coated => {
                 m.base_texture = ask(of(&mtl.block.diffuse_texture), Kind::Color);
@@ -111,7 +111,7 @@ fn mtl_interface(m: &mut Material, mtl: &Mtl, kind: Type, ks: [f32; 3], warn: &m
     let index = mtl.block.optical_density.filter(|n| (0.1..=10.0).contains(n));
     match kind {
         Type::Diffuse => m.kind = BSDF_DIFFUSE,
-        Type::Conductor | Type::Mirror => {
+        Type::Conductor | Type::Mirror | Type::MetallicRoughness => {
             m.kind = BSDF_CONDUCTOR;
             (m.eta, m.k) = ([0.0; 3], [1.0; 3]);
             let white = if ks == [0.0; 3] { [1.0; 3] } else { ks };

@@ -1,8 +1,9 @@
 //! Decodes pictures to RGBA8 texels, on all cores and straight into the one texel array.
 use super::find::find_file;
+use super::mapping::Mapping;
 use crate::error::{Error, Result};
 use crate::image::{BAND, bands, check_end, contained, input, picture, picture_claim};
-use crate::layout::{NONE, TEXTURE_CLAMP, TEXTURE_SRGB, Texture};
+use crate::layout::{NONE, TEXTURE_SRGB, Texture};
 use crate::math::srgb::linear_from_srgb_f64;
 use crate::memory;
 use crate::scene::description::mesh::Bitmap;
@@ -19,33 +20,11 @@ pub enum Kind {
     Data,
     /// Opacity: the alpha channel where the file has one, else red; copied to all channels.
     Mask,
+    /// Opacity: the alpha channel where the file has one, else 1; copied to all channels.
+    Alpha,
     /// Perceptual roughness: the green channel, copied to all (grey pictures have it there, and so has glTF's
     /// occlusion-roughness-metallic packing).
     Roughness,
-}
-
-/// How texture coordinates become places in a picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mapping {
-    /// Coordinates outside [0, 1] stay at the border; otherwise they repeat.
-    pub clamp: bool,
-    /// Factor of texture coordinates: the picture is read at `uv * scale + offset`.
-    pub scale: [f32; 2],
-    /// Added to scaled texture coordinates.
-    pub offset: [f32; 2],
-}
-
-impl Default for Mapping {
-    fn default() -> Self {
-        Self { clamp: false, scale: [1.0; 2], offset: [0.0; 2] }
-    }
-}
-
-impl Mapping {
-    fn bits(self) -> [u32; 5] {
-        let [[a, b], [c, d]] = [self.scale, self.offset].map(|v| v.map(f32::to_bits));
-        [u32::from(self.clamp), a, b, c, d]
-    }
 }
 
 /// The pictures that materials name. Each is stored once per kind, however many mappings share it.
@@ -57,7 +36,7 @@ pub struct TextureSet {
     known: HashMap<(PathBuf, Kind), usize>,
     /// Index of the picture and how it is mapped.
     wanted: Vec<(usize, Mapping)>,
-    index: HashMap<(PathBuf, Kind, [u32; 5]), u32>,
+    index: HashMap<(PathBuf, Kind, [u32; 7]), u32>,
 }
 
 /// Device arrays of all pictures.
@@ -130,9 +109,9 @@ impl TextureSet {
         if total > u64::from(u32::MAX) {
             return Err(too_many(&self.pictures[0].0));
         }
-        let texture = |&(picture, Mapping { clamp, scale, offset }): &(usize, Mapping)| {
-            let bits = [(self.pictures[picture].1 == Kind::Color, TEXTURE_SRGB), (clamp, TEXTURE_CLAMP)];
-            let flags = bits.iter().filter(|b| b.0).map(|b| b.1).sum();
+        let texture = |&(picture, mapping): &(usize, Mapping)| {
+            let srgb = if self.pictures[picture].1 == Kind::Color { TEXTURE_SRGB } else { 0 };
+            let (flags, Mapping { scale, offset, .. }) = (srgb | mapping.flags(), mapping);
             let [width, height] = sizes[picture];
             Texture { first: firsts[picture], width, height, flags, scale, offset, ..Default::default() }
         };
@@ -241,6 +220,7 @@ fn fill(space: &mut [u32], texels: impl Iterator<Item = [u8; 4]>, kind: Kind, ha
         *texel = match kind {
             Kind::Color | Kind::Data => u32::from_le_bytes(rgba),
             Kind::Mask => same(if has_alpha { rgba[3] } else { rgba[0] }),
+            Kind::Alpha => same(if has_alpha { rgba[3] } else { 255 }),
             Kind::Roughness => same(rgba[1]),
         };
     }
