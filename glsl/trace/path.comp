@@ -7,7 +7,8 @@
 
 // Traces one camera path per thread: next event estimation and BSDF sampling joined by the balance heuristic (Veach 1997).
 // Thread i traces sample first_sample + i / pixels of pixel first_pixel + i % pixels, or path i of a list. It writes one vec4
-// (radiance), or three with FX_SPLIT (direct, indirect, the albedo to divide indirect by). w of the first is the number of
+// (radiance), or three with FX_SPLIT (direct, indirect, the albedo to divide indirect by). With FX_SOFT what lamps and sky bring
+// to the first hit goes with indirect light, since it is as noisy. w of the first is the number of
 // rays, negated where the light was not finite: such a sample is black.
 layout(local_size_x_id = 100) in;
 layout(scalar, binding = 11) writeonly buffer Samples { u64vec2 samples[]; }; // of vec4
@@ -54,12 +55,23 @@ struct Path {
 struct SplitLight {
     vec3 direct;
     vec3 indirect;
+    vec3 soft; // with FX_SOFT what lamps and sky bring to the first hit, until the path's end; else zero
 };
 
-void add_light(inout SplitLight sum, vec3 light, bool indirect) {
-    bool apart = FX_INDIRECT && indirect;
-    sum.direct += apart ? vec3(0.0) : light;
-    sum.indirect += apart ? light : vec3(0.0);
+const uint DIRECT = 0u, INDIRECT = 1u, SOFT = 2u;
+
+void add_light(inout SplitLight sum, vec3 light, uint kind) {
+    bool indirect = FX_INDIRECT && kind == INDIRECT, soft = FX_SOFT && kind == SOFT;
+    sum.direct += indirect || soft ? vec3(0.0) : light;
+    sum.indirect += indirect ? light : vec3(0.0);
+    sum.soft += soft ? light : vec3(0.0);
+}
+
+// What light is that reaches surface number `bounce` of a path, the first hit being number 1; a smooth first surface shows all
+// light as it is.
+uint kind_of_light(uint bounce, bool smooth_first, bool delta) {
+    if (smooth_first) return DIRECT;
+    return bounce >= 2u ? INDIRECT : delta ? DIRECT : SOFT;
 }
 
 // Clamps the largest channel of a whole sample, not of each bounce: the limit is that of the values which a pixel averages.
@@ -84,9 +96,10 @@ vec3 light_from_hit(Path path, Surface s, float t) {
 // Direct light at `s` by light sampling, which counts if nothing blocks `shadow`; where it is 0, no ray is needed. The columns
 // of `basis` are the shading frame.
 vec3 light_from_nee(Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sampler random, uint pair, uint mask_seed,
-                    out Segment shadow) {
+                    out Segment shadow, out bool delta) {
     uint word = sample_2d_bits(random, pair + PAIR_CHOICE).x;
     LightSample light = light_sample(s.position, word, sample_2d(random, pair + PAIR_LIGHT));
+    delta = light.pdf == 0.0;
     vec3 wi = light.direction * basis; // row vector times matrix: into the frame
     vec4 f = bsdf_evaluate(bsdf, wo, wi);
     f.rgb *= light_share(s, facing, light.direction, wi.z);
@@ -125,18 +138,18 @@ bool survives_roulette(inout Path path, Sampler random, uint pair) {
 }
 
 // Adds the light that the path meets at `hit`. Returns true where the path can continue from the surface `s`.
-bool arrive(inout SplitLight sum, Path path, Hit hit, bool indirect, out Surface s) {
+bool arrive(inout SplitLight sum, Path path, Hit hit, uint kind, out Surface s) {
     if (hit.triangle == NONE) {
-        add_light(sum, path.throughput * light_from_miss(path), indirect);
+        add_light(sum, path.throughput * light_from_miss(path), kind);
         return false;
     }
     s = surface_at(hit);
-    add_light(sum, path.throughput * light_from_hit(path, s, hit.t), indirect);
+    add_light(sum, path.throughput * light_from_hit(path, s, hit.t), kind);
     return true;
 }
 
 SplitLight trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
-    SplitLight sum = SplitLight(vec3(0.0), vec3(0.0));
+    SplitLight sum = SplitLight(vec3(0.0), vec3(0.0), vec3(0.0));
     albedo = vec3(0.0);
     Hit hit = traverse(Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed)), push.constants.root);
     closest_rays++;
@@ -145,7 +158,7 @@ SplitLight trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
     uint bounce = 0u;
     // A turn of the loop leads from one surface to the next; the last surface samples no light. Light sampled at a surface is
     // added only once its shadow ray is traced, together with the ray to the next surface: see trace_shadow_then_closest.
-    if (arrive(sum, path, hit, false, s) && push.constants.max_depth > 1u) do {
+    if (arrive(sum, path, hit, DIRECT, s) && push.constants.max_depth > 1u) do {
         uint pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
         Bsdf bsdf = surface_bsdf(s);
         // The normal of a dielectric stays on its outside, since its two sides differ.
@@ -161,7 +174,8 @@ SplitLight trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         }
         Segment shadow;
         uint mask_seed = pcg(seed + 2u * bounce);
-        vec3 sampled = path.throughput * light_from_nee(s, bsdf, facing, basis, wo, random, pair, mask_seed + 1u, shadow);
+        bool delta;
+        vec3 sampled = path.throughput * light_from_nee(s, bsdf, facing, basis, wo, random, pair, mask_seed + 1u, shadow, delta);
         bool shadowed = push.constants.light_count > 0u && !smooth_here && max(sampled.r, max(sampled.g, sampled.b)) > 0.0;
         bool alive = scatter(path, s, bsdf, facing, basis, wo, random, pair);
         if (bounce == 0u) mirrored = path.delta;
@@ -172,15 +186,16 @@ SplitLight trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
 
         closest_rays += uint(alive);
         any_rays += uint(shadowed);
-        bool lit = shadowed, indirect = bounce >= 2u && !smooth_first;
+        bool lit = shadowed;
         Segment ray = Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed + 2u * bounce));
         hit = trace_shadow_then_closest(shadow, shadowed, ray, alive, push.constants.root, uvec2(hit.triangle, hit.instance));
-        add_light(sum, lit && !shadowed ? sampled : vec3(0.0), indirect);
-        if (!alive || !arrive(sum, path, hit, indirect, s)) break;
+        add_light(sum, lit && !shadowed ? sampled : vec3(0.0), kind_of_light(bounce, smooth_first, delta));
+        if (!alive || !arrive(sum, path, hit, kind_of_light(bounce, smooth_first, false), s)) break;
     } while (bounce + 1u < push.constants.max_depth);
     if (FX_CLAMP) sum.indirect = clamped(sum.indirect);
+    if (FX_SOFT) sum.indirect += sum.soft;
     // Light that a smooth coat mirrors needs no filter. It moves only here, so that the sum of both parts keeps its bits.
-    if (mirrored) sum = SplitLight(sum.direct + sum.indirect, vec3(0.0));
+    if (mirrored) sum = SplitLight(sum.direct + sum.indirect, vec3(0.0), vec3(0.0));
     return sum;
 }
 
@@ -209,7 +224,7 @@ void main() {
     SplitLight light = trace_path(path, random, path_seed(pixel, index), albedo);
     float rays = float(closest_rays + any_rays);
     if (!finite(light.direct + light.indirect)) {
-        light = SplitLight(vec3(0.0), vec3(0.0));
+        light = SplitLight(vec3(0.0), vec3(0.0), vec3(0.0));
         rays = -rays;
         atomicMax(broken[0].lowest, ~pixel);
     }

@@ -252,6 +252,7 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
         | Effect::clamp
         | Effect::pixel_filter
         | Effect::split_light
+        | Effect::soft_light
         | Effect::independent_sampler
         | Effect::counters
         | Effect::adaptive

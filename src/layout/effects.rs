@@ -116,4 +116,6 @@ effects! {
     large_lamps: FX_LARGE_LAMPS;
     /// Exact spheres among the triangles.
     spheres: FX_SPHERES;
+    /// What lamps and sky bring to the first hit goes with indirect light.
+    soft_light: FX_SOFT;
 }

@@ -282,10 +282,11 @@ pub fn called_for(scene: &Scene, settings: &Settings, outputs: Outputs) -> Effec
     scene::effects(scene, settings, outputs.split_light, outputs.counters).0
 }
 
-/// Every effect of light and matter; the random numbers stay those that the settings chose.
+/// Every effect of light and matter; random numbers and layers stay those that the settings chose.
 pub fn all_effects(scene: &Scene, settings: &Settings) -> Effects {
     let independent_sampler = settings.sampler == Sampler::Independent;
-    Effects { independent_sampler, large_lamps: scene.large_lamps, ..Effects::ALL }
+    let soft_light = scene::keeps_soft_light_apart(scene, settings);
+    Effects { independent_sampler, large_lamps: scene.large_lamps, soft_light, ..Effects::ALL }
 }
 
 /// Paths per dispatch, whose samples fit a storage buffer.

@@ -2,7 +2,8 @@
 use super::Scene;
 use super::build::{geometry, lights};
 use crate::layout::*;
-use crate::scene::description::settings::{PixelFilter, Sampler, Settings};
+use crate::scene::description::settings::{PixelFilter, Sampler, Settings, Split};
+use crate::settings::entry::Value;
 
 /// The effects of a scene with its settings, and for each one that is on the first object, material, light or setting that needs
 /// it. `split_light` asks for direct and indirect light in separate layers, `counters` for counts of rays.
@@ -45,6 +46,8 @@ pub fn effects(
     light_effects(scene, &mut found, &mut reasons);
     scene_effects(scene, &mut found, &mut reasons);
     setting_effects(settings, &mut found, &mut reasons);
+    let soft = keeps_soft_light_apart(scene, settings);
+    found.soft_light = because(&mut reasons, Effect::soft_light, soft, format!("split {}", settings.split.text()));
     output_effects(split_light, counters, &mut found, &mut reasons);
     reasons.sort_by_key(|r| r.0);
     (found, reasons)
@@ -124,6 +127,16 @@ fn setting_effects(s: &Settings, found: &mut Effects, reasons: &mut Reasons) {
     found.adaptive = because(Effect::adaptive, !s.allocate.is_even(), format!("allocate {policy}"));
     let most = s.spp.max(s.allocate.max_spp);
     found.many_samples = because(Effect::many_samples, most > 4096, format!("{most} samples of a pixel"));
+}
+
+/// Whether what lamps and sky bring to the first hit is kept with indirect light. Shadows of delta lights are sharp and free of
+/// noise, those of lamps and sky are neither: where both shine, they are told apart.
+pub fn keeps_soft_light_apart(scene: &Scene, settings: &Settings) -> bool {
+    match settings.split {
+        Split::Auto => scene.has_delta_lights() && scene.has_soft_lights(),
+        Split::Soft => true,
+        Split::Indirect => false,
+    }
 }
 
 fn output_effects(split_light: bool, counters: bool, found: &mut Effects, reasons: &mut Reasons) {

@@ -23,7 +23,7 @@ mod load;
 pub use build::coat::{CoatRow, coat_table};
 pub use build::fresnel::mean_internal as mean_internal_fresnel;
 pub use check::check_camera;
-pub use effects::effects;
+pub use effects::{effects, keeps_soft_light_apart};
 pub use fingerprint::Fingerprint;
 
 /// Largest coordinate M of triangles, of points that rays start from and of lights. With it, all numbers of the triangle test
@@ -212,6 +212,11 @@ impl Scene {
     /// Whether point, spot or directional lights shine: they have no extent, and their shadows are sharp.
     pub fn has_delta_lights(&self) -> bool {
         self.lights.iter().any(|light| matches!(light.kind, LIGHT_POINT | LIGHT_SPOT | LIGHT_DIRECTIONAL))
+    }
+
+    /// Whether lamps or a sky shine: they have an extent, and their shadows are soft.
+    pub fn has_soft_lights(&self) -> bool {
+        !self.lights.iter().all(|light| matches!(light.kind, LIGHT_POINT | LIGHT_SPOT | LIGHT_DIRECTIONAL))
     }
 
     /// A scene from memory: the tables of a scene file, whose meshes, textures and environment may be data. What files they

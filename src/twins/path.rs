@@ -18,12 +18,12 @@ use glam::{Mat3, Vec3};
 
 pub use crate::shaders::path::SHADOW_END;
 
-/// What one path returns, linear Rec. 709. Without [`Effects::indirect`] all light is in `direct`.
+/// What one path returns, linear Rec. 709. Without [`Effects::indirect`] and [`Effects::soft_light`] all light is in `direct`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PathSample {
     /// Light that needs no filter, as [`crate::layout::PixelLight::direct`].
     pub direct: Vec3,
-    /// Radiance that arrived by more than one bounce.
+    /// Radiance that arrived by more than one bounce; with [`Effects::soft_light`] also what lamps and sky bring to the first hit.
     pub indirect: Vec3,
     /// Reflectance of the first hit.
     pub albedo: Vec3,
@@ -51,6 +51,32 @@ pub enum Strategy {
     Bsdf,
 }
 
+/// The parts that a path's light is added up in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Direct,
+    Indirect,
+    Soft,
+}
+
+/// As `kind_of_light` of the kernel.
+fn kind_of_light(bounce: u32, smooth_first: bool, delta: bool) -> Kind {
+    match bounce {
+        _ if smooth_first => Kind::Direct,
+        2.. => Kind::Indirect,
+        _ if delta => Kind::Direct,
+        _ => Kind::Soft,
+    }
+}
+
+/// Light by the kernel's sums: what is soft is added to indirect light at the path's end.
+#[derive(Default)]
+struct Sum {
+    direct: Vec3,
+    indirect: Vec3,
+    soft: Vec3,
+}
+
 struct Path {
     origin: Vec3,
     direction: Vec3,
@@ -67,7 +93,7 @@ pub struct Tracer<'a> {
     pub scene: &'a Scene,
     /// Constants of the frame, as the kernel reads them.
     pub frame: FrameConstants,
-    /// Effects that settings decide: roulette, clamp, pixel filter, sampler, split light; the scene decides the rest.
+    /// Effects that settings decide: roulette, clamp, pixel filter, sampler, split and soft light; the scene decides the rest.
     pub effects: Effects,
     /// [`Strategy::Both`] for the kernel's answer.
     pub strategy: Strategy,
@@ -93,10 +119,11 @@ impl Tracer<'_> {
         }
     }
 
-    fn add_light(&self, sum: &mut PathSample, light: Vec3, indirect: bool) {
-        match self.effects.indirect && indirect {
-            true => sum.indirect += light,
-            false => sum.direct += light,
+    fn add_light(&self, sum: &mut Sum, light: Vec3, kind: Kind) {
+        match kind {
+            Kind::Indirect if self.effects.indirect => sum.indirect += light,
+            Kind::Soft if self.effects.soft_light => sum.soft += light,
+            _ => sum.direct += light,
         }
     }
 
@@ -125,8 +152,8 @@ impl Tracer<'_> {
         surface_emission(self.scene, s) * weight
     }
 
-    /// Returns `None` where no shadow ray is needed.
-    fn light_from_nee(&self, p: &Shade, random: Sampler, mask_seed: u32) -> Option<Vec3> {
+    /// The light, and whether it is of a delta light; `None` where no shadow ray is needed.
+    fn light_from_nee(&self, p: &Shade, random: Sampler, mask_seed: u32) -> Option<(Vec3, bool)> {
         let s = &p.surface;
         let word = sample_2d_bits(random, p.pair + PAIR_CHOICE)[0];
         let light = light_sample(self.scene, s.position, word, sample_2d(random, p.pair + PAIR_LIGHT));
@@ -148,7 +175,7 @@ impl Tracer<'_> {
             distance = SHADOW_END;
         }
         let blocker = traverse_from(self.scene, p.from, origin, direction, distance, true, mask_seed);
-        Some(if blocker.any() { Vec3::ZERO } else { contribution })
+        Some((if blocker.any() { Vec3::ZERO } else { contribution }, light.pdf == 0.0))
     }
 
     fn scatter(&self, path: &mut Path, p: &Shade, random: Sampler) -> bool {
@@ -186,35 +213,36 @@ impl Tracer<'_> {
     }
 
     fn trace_path(&self, mut path: Path, random: Sampler, seed: u32) -> PathSample {
-        let mut sum = PathSample::default();
+        let (mut sum, mut rays, mut albedo) = (Sum::default(), 0, Vec3::ZERO);
         let (mut smooth_first, mut mirrored) = (false, false);
         let mut from = [NONE; 2];
         for bounce in 0u32.. {
             let pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
             let mask_seed = pcg(seed.wrapping_add(2 * bounce));
-            sum.rays += 1;
+            rays += 1;
             let hit = traverse_from(self.scene, from, path.origin, path.direction, INFINITE_DISTANCE, false, mask_seed);
-            let indirect = bounce >= 2 && !smooth_first;
+            let kind = if bounce == 0 { Kind::Direct } else { kind_of_light(bounce, smooth_first, false) };
             if !hit.any() {
-                self.add_light(&mut sum, path.throughput * self.light_from_miss(&path), indirect);
+                self.add_light(&mut sum, path.throughput * self.light_from_miss(&path), kind);
                 break;
             }
             from = [hit.triangle, hit.instance];
             let s = surface_at(self.scene, &hit);
-            self.add_light(&mut sum, path.throughput * self.light_from_hit(&path, &s, hit.t), indirect);
+            self.add_light(&mut sum, path.throughput * self.light_from_hit(&path, &s, hit.t), kind);
             if bounce + 1 >= self.frame.path.max_depth {
                 break;
             }
             let p = self.shade(s, path.direction, pair, from);
             let smooth_here = bsdf_is_delta(&p.bsdf);
             if bounce == 0 {
-                sum.albedo = bsdf_albedo(&p.bsdf, p.wo.z);
+                albedo = bsdf_albedo(&p.bsdf, p.wo.z);
                 smooth_first = smooth_here;
             }
             if self.frame.path.light_count > 0 && !smooth_here {
                 let light = self.light_from_nee(&p, random, mask_seed.wrapping_add(1));
-                sum.rays += u32::from(light.is_some());
-                self.add_light(&mut sum, path.throughput * light.unwrap_or_default(), bounce >= 1 && !smooth_first);
+                rays += u32::from(light.is_some());
+                let (light, delta) = light.unwrap_or_default();
+                self.add_light(&mut sum, path.throughput * light, kind_of_light(bounce + 1, smooth_first, delta));
             }
             if !self.scatter(&mut path, &p, random) {
                 break;
@@ -226,7 +254,13 @@ impl Tracer<'_> {
                 break;
             }
         }
-        sum.indirect = self.clamped(sum.indirect);
+        let sum = PathSample {
+            direct: sum.direct,
+            indirect: self.clamped(sum.indirect) + sum.soft,
+            albedo,
+            rays,
+            broken: false,
+        };
         match mirrored {
             true => PathSample { direct: sum.radiance(), indirect: Vec3::ZERO, ..sum },
             false => sum,

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use std::path::Path;
 use tallow::gpu::{Buffer, FrameResources, Gpu, Kernel, Location};
 use tallow::layout::*;
-use tallow::render::settings::{PixelFilter, Settings};
+use tallow::render::settings::{PixelFilter, Settings, Split};
 use tallow::render::{Batch, Outputs, Renderer, Step, all_effects, called_for, frame_constants};
 use tallow::scene::{Loaded, Scene};
 use tallow::shaders::shared;
@@ -219,14 +219,19 @@ fn renders_agree_with_their_twins() {
     check("panel", &run(&gpu, &panel, called_for(&panel, &panel.settings, outputs)));
     let balls = spheres();
     check("spheres", &run(&gpu, &balls, called_for(&balls, &balls.settings, outputs)));
+    // Its point, spot and area lights and its sky are told apart.
     let scene = pictures();
+    let effects = called_for(&scene, &scene.settings, outputs);
+    assert!(effects.soft_light);
+    check("pictures", &run(&gpu, &scene, effects));
+    check("pictures, all effects", &run(&gpu, &scene, all_effects(&scene, &scene.settings)));
+    let scene = scene.with(|s| s.split = Split::Indirect);
     let mut pair = run(&gpu, &scene, called_for(&scene, &scene.settings, outputs));
-    check("pictures", &pair);
+    check("pictures, indirect light apart", &pair);
     for samples in &pair.samples {
         let largest = samples.chunks(3).map(|s| s[1].max_element()).fold(0.0, f32::max);
         assert!((largest - 1.0).abs() < 1e-5, "indirect light of {largest}, clamped to 1");
     }
-    check("pictures, all effects", &run(&gpu, &scene, all_effects(&scene, &scene.settings)));
     // Control: the twin's samples of the neighbouring pixels.
     pair.samples[1].rotate_right(3);
     assert!(agreement(&pair.samples) < 0.5, "control: other samples are told apart");

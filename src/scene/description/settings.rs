@@ -44,6 +44,20 @@ choices! {
     }
 }
 
+choices! {
+    /// What the layers `direct` and `indirect` hold, and so what a filter gets where direct light is kept from it.
+    pub enum Split {
+        /// As `soft` where delta lights and others both shine, else as `indirect`.
+        #[default]
+        Auto,
+        /// `indirect` holds light of two bounces and more.
+        Indirect,
+        /// `indirect` also holds what lamps and sky bring directly, which is noisy; `direct` the emission that is seen and what
+        /// point, spot and directional lights bring, whose shadows are sharp.
+        Soft,
+    }
+}
+
 settings! {
     /// The settings of a render.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -71,6 +85,8 @@ settings! {
             seed: u32 = 0, ..;
             /// Random numbers.
             sampler: Sampler = Sampler::Sobol, ..;
+            /// What the layers `direct` and `indirect` hold.
+            split: Split = Split::Auto, ..;
         }
         /// Where in its sequence a pixel begins, which no scene file says.
         Sequence {
