@@ -6,6 +6,7 @@
 #include "shared/warp.glsl"
 #include "shared/fresnel.glsl"
 #include "shared/microfacet.glsl"
+#include "shared/metallic.glsl"
 
 // A material resolved at the hit. Members as in Material.
 struct Bsdf {
@@ -20,6 +21,7 @@ struct Bsdf {
     uint coat_table;
     bool nonlinear;
     bool ggx;
+    Metallic metallic; // of that kind, which has no other members
     // bsdf_view computes these once for a coat:
     float coat_row;     // of the table at this roughness
     float coat_outside; // the share of light from the viewer that the coat does not let in
@@ -38,7 +40,7 @@ const float GRAZING = 1e-9; // directions whose cosine is not above this count a
 const vec3 UP = vec3(0.0, 0.0, 1.0);
 
 // With one kind of material in the scene, the compiler removes the test for it.
-const bool ONE_KIND = uint(FX_DIFFUSE) + uint(FX_CONDUCTOR) + uint(FX_DIELECTRIC) + uint(FX_COATED) == 1u;
+const bool ONE_KIND = uint(FX_DIFFUSE) + uint(FX_CONDUCTOR) + uint(FX_DIELECTRIC) + uint(FX_COATED) + uint(FX_METALLIC) == 1u;
 
 bool is_kind(bool effect, Bsdf b, uint kind) {
     return effect && (ONE_KIND || b.kind == kind);
@@ -134,6 +136,7 @@ vec4 coat(Bsdf b, vec3 wi) {
 vec4 bsdf_evaluate(Bsdf b, vec3 wo, vec3 wi) {
     bool glass = is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC), metal = is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR);
     bool coated = is_kind(FX_COATED, b, BSDF_COATED);
+    if (is_kind(FX_METALLIC, b, BSDF_METALLIC)) return min(wo.z, abs(wi.z)) > GRAZING ? metallic_evaluate(b.metallic, wo, wi) : vec4(0.0);
     float eta = glass ? relative_index(b, wo.z) : b.eta.x;
     if (glass) { // on the side of wo: both z flip together when wo is inside
         wi.z = wo.z < 0.0 ? -wi.z : wi.z;
@@ -167,6 +170,16 @@ vec4 bsdf_evaluate(Bsdf b, vec3 wo, vec3 wi) {
     return value + vec4(tint * (visible_weight(b, wo, wi, area) * density / (n * n)), share * density);
 }
 
+bool sample_metallic(Bsdf b, vec3 wo, float u_lobe, vec2 u, out BsdfSample s) {
+    s.pdf = 0.0;
+    if (!metallic_sample(b.metallic, wo, u_lobe, u, s.wi, s.weight, s.delta)) return false;
+    if (s.delta) return true;
+    vec4 value = bsdf_evaluate(b, wo, s.wi);
+    s.weight = value.rgb / max(value.w, 1e-30);
+    s.pdf = value.w;
+    return value.w > 0.0;
+}
+
 // Samples a direction: `u_lobe` chooses the lobe, `u` the direction in it. Returns false where the light is absorbed; `s` is
 // then undefined.
 bool bsdf_sample(Bsdf b, vec3 wo, float u_lobe, vec2 u, out BsdfSample s) {
@@ -175,6 +188,7 @@ bool bsdf_sample(Bsdf b, vec3 wo, float u_lobe, vec2 u, out BsdfSample s) {
     vec3 wi = warp_cosine_hemisphere(u);
     s = BsdfSample(wi, b.albedo, wi.z * INV_PI, false);
     if (!glass && wo.z <= GRAZING) return false;
+    if (is_kind(FX_METALLIC, b, BSDF_METALLIC)) return sample_metallic(b, wo, u_lobe, u, s);
     if (!(glass || metal || coated)) return true;
     s.delta = is_smooth(b);
     float side = wo.z < 0.0 ? -1.0 : 1.0;
@@ -218,10 +232,14 @@ bool bsdf_sample(Bsdf b, vec3 wo, float u_lobe, vec2 u, out BsdfSample s) {
 bool is_interface(Bsdf b) { return is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR) || is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC); }
 
 // Whether there is a lobe around the mirror image of `wo`.
-bool bsdf_is_specular(Bsdf b) { return is_interface(b) || is_kind(FX_COATED, b, BSDF_COATED); }
+bool bsdf_is_specular(Bsdf b) {
+    return is_interface(b) || is_kind(FX_COATED, b, BSDF_COATED) || is_kind(FX_METALLIC, b, BSDF_METALLIC);
+}
 
 // Whether every lobe is a delta: light samples cannot contribute, and no light is left for a filter to blur.
-bool bsdf_is_delta(Bsdf b) { return is_interface(b) && is_smooth(b); }
+bool bsdf_is_delta(Bsdf b) {
+    return is_kind(FX_METALLIC, b, BSDF_METALLIC) ? metallic_is_delta(b.metallic) : is_interface(b) && is_smooth(b);
+}
 
 // Approximate reflectance, at the cosine `wo_z`, of the lobes whose light counts as indirect; that light is divided by it before
 // it is filtered. Light from smooth interfaces counts as direct, so that mirrors and clear glass have albedo 0, and a smooth
@@ -229,6 +247,7 @@ bool bsdf_is_delta(Bsdf b) { return is_interface(b) && is_smooth(b); }
 vec3 bsdf_albedo(Bsdf b, float wo_z) {
     bool glass = is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC), metal = is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR);
     bool coated = is_kind(FX_COATED, b, BSDF_COATED);
+    if (is_kind(FX_METALLIC, b, BSDF_METALLIC)) return metallic_albedo(b.metallic, abs(wo_z));
     if (!(glass || metal || coated)) return b.albedo;
     vec3 specular = is_smooth(b) ? vec3(0.0) : b.specular;
     if (metal) return specular * fresnel_conductor(abs(wo_z), b.eta, b.k);

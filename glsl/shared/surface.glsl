@@ -243,6 +243,15 @@ vec3 surface_emission(Surface s) {
     return image == NONE ? emission : emission * texture_sample(image, s.uv, true).rgb;
 }
 
+// The layers of a metallic-roughness material, whose base colour is known.
+Metallic surface_metallic(Material m, vec3 base, Surface s) {
+    vec3 factors = vec3(1.0); // of roughness in g, of metal in b
+    if (FX_TEXTURES && m.roughness_texture != NONE) factors = texture_sample(m.roughness_texture, s.uv, false).rgb;
+    vec3 f0 = textured(m.specular, m.specular_texture, s);
+    return metallic_layers(base, m.metallic * factors.b, f0, m.specular_factor, m.transmission_factor,
+                           m.alpha * factors.g * factors.g, m.clearcoat, m.clearcoat_alpha);
+}
+
 // The material with its textures looked up. The compiler drops fetches for effects that the scene does not have.
 Bsdf surface_bsdf(Surface s) {
     Material m = Material_load(materials, s.material);
@@ -261,6 +270,7 @@ Bsdf surface_bsdf(Surface s) {
     b.coat_outside = 0.0;
     b.coat_inside = 0.0;
     b.nonlinear = (s.flags & MATERIAL_NONLINEAR) != 0u;
+    if (is_kind(FX_METALLIC, b, BSDF_METALLIC)) b.metallic = surface_metallic(m, b.albedo, s);
     if (FX_CONDUCTOR || FX_DIELECTRIC || FX_COATED) {
         b.eta = m.eta;
         b.k = m.k;

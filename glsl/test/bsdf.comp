@@ -16,7 +16,9 @@ void main() {
     if (i >= push.count) return;
     Material m = materials[i];
     Bsdf b = Bsdf(m.kind, m.base_color, m.alpha, m.eta, m.k, m.specular, m.transmission, m.internal_fresnel, m.coat_table,
-                  (m.flags & MATERIAL_NONLINEAR) != 0u, (m.flags & MATERIAL_GGX) != 0u, 0.0, 0.0, 0.0);
+                  (m.flags & MATERIAL_NONLINEAR) != 0u, (m.flags & MATERIAL_GGX) != 0u,
+                  metallic_layers(m.base_color, m.metallic, m.specular, m.specular_factor, m.transmission_factor, m.alpha,
+                                  m.clearcoat, m.clearcoat_alpha), 0.0, 0.0, 0.0);
     vec3 wo = inputs[3 * i];
     bsdf_view(b, wo);
     vec3 u = inputs[3 * i + 2];

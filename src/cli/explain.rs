@@ -241,6 +241,9 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
         | Effect::conductor
         | Effect::dielectric
         | Effect::coated
+        | Effect::metallic
+        | Effect::clearcoat
+        | Effect::thin_walls
         | Effect::rough
         | Effect::smooth_interface
         | Effect::beckmann

@@ -24,6 +24,8 @@ constants! {
     BSDF_DIELECTRIC: uint = 2;
     /// [`Material::kind`]: diffuse base under a dielectric coat of index `eta[0]`, roughness `alpha`.
     BSDF_COATED: uint = 3;
+    /// [`Material::kind`]: metallic-roughness of glTF 2.0.
+    BSDF_METALLIC: uint = 4;
     /// An interface whose [`Material::alpha`] is below this is smooth.
     SMOOTH_ALPHA: float = 0.01;
     /// [`Material::flags`]: the GGX distribution instead of Beckmann.

@@ -70,6 +70,12 @@ effects! {
     dielectric: FX_DIELECTRIC;
     /// A diffuse base under a coat.
     coated: FX_COATED;
+    /// A metallic-roughness material.
+    metallic: FX_METALLIC;
+    /// A clear coat on one.
+    clearcoat: FX_CLEARCOAT;
+    /// One that lets light through as a thin wall.
+    thin_walls: FX_THIN;
     /// An interface with alpha of at least 0.01.
     rough: FX_ROUGH;
     /// An interface with alpha below 0.01.

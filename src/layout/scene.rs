@@ -110,7 +110,7 @@ gpu_structs! {
         mirrored: uint,
     }
 
-    /// A material. 8 texels, of which a diffuse surface without textures needs the first two. Colours are linear Rec. 709 in [0, 1]
+    /// A material. 10 texels, of which a diffuse surface without textures needs the first two. Colours are linear Rec. 709 in [0, 1]
     /// unless said otherwise.
     struct Material {
         /// Diffuse albedo; multiplies `base_texture`.
@@ -129,7 +129,7 @@ gpu_structs! {
         k: vec3,
         /// Microfacet roughness (alpha itself, not its root); see [`SMOOTH_ALPHA`].
         alpha: float,
-        /// Tint of specular reflection; multiplies `specular_texture`.
+        /// Tint of specular reflection, or the dielectric's reflectance head on (metallic); multiplies `specular_texture`.
         specular: vec3,
         /// Height of a bump map in world units per unit of texture value.
         bump_scale: float,
@@ -143,7 +143,8 @@ gpu_structs! {
         opacity_texture: uint,
         /// Height map, or normal map with MATERIAL_NORMAL_MAP.
         bump_texture: uint,
-        /// Perceptual roughness r in its red channel, multiplies sqrt(alpha).
+        /// Perceptual roughness r in its red channel, multiplies sqrt(alpha). Metallic: r in its green channel, and in its blue one a
+        /// factor of `metallic`.
         roughness_texture: uint,
         /// Multiplies `emission`.
         emission_texture: uint,
@@ -153,6 +154,18 @@ gpu_structs! {
         kind: uint,
         /// Index of the first word of a coat's table among the texels (coated, where rough); else zero.
         coat_table: uint,
+        /// Share of metal (metallic, as the fields that follow).
+        metallic: float,
+        /// Factor of `specular`, and the dielectric's reflectance at grazing angles.
+        specular_factor: float,
+        /// Share of the dielectric that lets light through a thin wall.
+        transmission_factor: float,
+        /// Strength of the clear coat.
+        clearcoat: float,
+        /// Microfacet roughness of the clear coat.
+        clearcoat_alpha: float,
+        /// Unused words, which are zero.
+        pad: uvec3,
     }
 
     /// A picture in the texel buffer: RGBA8 texels (R in the low byte), row 0 at the top. 2 texels.

@@ -24,8 +24,15 @@ pub fn effects(
     let bumped =
         |m: &Material, normal_map| m.bump_texture != NONE && (m.flags & MATERIAL_NORMAL_MAP != 0) == normal_map;
     // A roughness map may take any part of the surface below the line.
-    let smooth = |m: &Material| interface(m) && (m.alpha < SMOOTH_ALPHA || m.roughness_texture != NONE);
-    let rough = |m: &Material| interface(m) && m.alpha >= SMOOTH_ALPHA;
+    let coated = |m: &Material| m.kind == BSDF_METALLIC && m.clearcoat > 0.0;
+    let smooth = |m: &Material| {
+        let coat = coated(m) && m.clearcoat_alpha < SMOOTH_ALPHA;
+        interface(m) && (m.alpha < SMOOTH_ALPHA || m.roughness_texture != NONE) || coat
+    };
+    let rough = |m: &Material| {
+        let coat = coated(m) && m.clearcoat_alpha >= SMOOTH_ALPHA;
+        interface(m) && m.alpha >= SMOOTH_ALPHA || coat
+    };
     let mut found = Effects {
         textures: material(Effect::textures, &|m| {
             [m.base_texture, m.specular_texture, m.roughness_texture, m.emission_texture].iter().any(|&t| t != NONE)
@@ -37,6 +44,9 @@ pub fn effects(
         conductor: material(Effect::conductor, &|m| m.kind == BSDF_CONDUCTOR),
         dielectric: material(Effect::dielectric, &|m| m.kind == BSDF_DIELECTRIC),
         coated: material(Effect::coated, &|m| m.kind == BSDF_COATED),
+        metallic: material(Effect::metallic, &|m| m.kind == BSDF_METALLIC),
+        clearcoat: material(Effect::clearcoat, &coated),
+        thin_walls: material(Effect::thin_walls, &|m| m.kind == BSDF_METALLIC && m.transmission_factor > 0.0),
         rough: material(Effect::rough, &rough),
         smooth_interface: material(Effect::smooth_interface, &smooth),
         beckmann: material(Effect::beckmann, &|m| rough(m) && m.flags & MATERIAL_GGX == 0),

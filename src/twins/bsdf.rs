@@ -1,10 +1,13 @@
 //! Twin of `glsl/shared/bsdf.glsl`. Local frame: z = shading normal on the front side; both directions leave the surface.
-use crate::layout::{BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, MATERIAL_GGX, MATERIAL_NONLINEAR, Material};
+use crate::layout::{
+    BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_METALLIC, MATERIAL_GGX, MATERIAL_NONLINEAR, Material,
+};
 use crate::math::fresnel::{fresnel_conductor, fresnel_dielectric};
 use crate::math::microfacet::{microfacet_area, microfacet_d, microfacet_g1, microfacet_sample};
 use crate::math::warp::{INV_PI, warp_cosine_hemisphere};
 use crate::scene::CoatRow;
 use crate::twins::coat::{coat_row_at, row_inside, row_outside};
+use crate::twins::metallic::{Metallic, Parameters};
 use glam::{Vec2, Vec3, Vec4, vec2, vec3};
 
 /// A material resolved at the hit. Members as in [`Material`].
@@ -32,6 +35,8 @@ pub struct Bsdf {
     pub nonlinear: bool,
     /// Whether microfacets are GGX, not Beckmann.
     pub ggx: bool,
+    /// Of that kind, which has no other members.
+    pub metallic: Metallic,
 }
 
 /// A direction that [`bsdf_sample`] chose.
@@ -60,7 +65,16 @@ impl Bsdf {
         let has_table = kind == BSDF_COATED && alpha >= SMOOTH_ALPHA;
         let table = texels.get(m.coat_table as usize..).filter(|_| has_table).unwrap_or(&[]);
         let coat = coat_row_at(table, alpha);
-        Self { kind, albedo, alpha, eta, k, specular, transmission, internal_fresnel, coat, nonlinear, ggx }
+        let metallic = Metallic::new(&Parameters {
+            base: albedo,
+            metallic: m.metallic,
+            f0: specular,
+            f90: m.specular_factor,
+            transmission: m.transmission_factor,
+            alpha,
+            coat: [m.clearcoat, m.clearcoat_alpha],
+        });
+        Self { kind, albedo, alpha, eta, k, specular, transmission, internal_fresnel, coat, nonlinear, ggx, metallic }
     }
 }
 
@@ -216,12 +230,25 @@ fn sample_coated(b: &Bsdf, wo: Vec3, u_lobe: f32, u: Vec2) -> (bool, BsdfSample)
     (above, s)
 }
 
+fn sample_metallic(b: &Bsdf, wo: Vec3, u_lobe: f32, u: Vec2) -> (bool, BsdfSample) {
+    let lobe = b.metallic.sample(wo, u_lobe, u);
+    let mut s = BsdfSample { wi: lobe.wi, weight: lobe.weight, pdf: 0.0, delta: lobe.delta };
+    if !lobe.scattered || lobe.delta {
+        return (lobe.scattered, s);
+    }
+    let value = bsdf_evaluate(b, wo, s.wi);
+    s.weight = value.truncate() / value.w.max(1e-30);
+    s.pdf = value.w;
+    (value.w > 0.0, s)
+}
+
 /// rgb = f |cos wi|, w = density over solid angle with which [`bsdf_sample`] picks `wi`. Delta lobes count as 0.
 pub fn bsdf_evaluate(b: &Bsdf, wo: Vec3, wi: Vec3) -> Vec4 {
     if b.kind == BSDF_DIELECTRIC {
         return evaluate_dielectric(b, wo, wi);
     }
     match b.kind {
+        BSDF_METALLIC if wo.z.min(wi.z.abs()) > GRAZING => b.metallic.evaluate(wo, wi),
         _ if wo.z.min(wi.z) <= GRAZING => Vec4::ZERO,
         BSDF_CONDUCTOR => evaluate_conductor(b, wo, wi),
         BSDF_COATED => evaluate_coated(b, wo, wi),
@@ -240,18 +267,22 @@ pub fn bsdf_sample(b: &Bsdf, wo: Vec3, u_lobe: f32, u: Vec2) -> (bool, BsdfSampl
         _ if wo.z <= GRAZING => (false, diffuse),
         BSDF_CONDUCTOR => sample_conductor(b, wo, u),
         BSDF_COATED => sample_coated(b, wo, u_lobe, u),
+        BSDF_METALLIC => sample_metallic(b, wo, u_lobe, u),
         _ => (true, diffuse),
     }
 }
 
 /// Whether there is a lobe around the mirror image of `wo`.
 pub fn bsdf_is_specular(b: &Bsdf) -> bool {
-    matches!(b.kind, BSDF_CONDUCTOR | BSDF_DIELECTRIC | BSDF_COATED)
+    matches!(b.kind, BSDF_CONDUCTOR | BSDF_DIELECTRIC | BSDF_COATED | BSDF_METALLIC)
 }
 
 /// Whether every lobe is a delta.
 pub fn bsdf_is_delta(b: &Bsdf) -> bool {
-    matches!(b.kind, BSDF_CONDUCTOR | BSDF_DIELECTRIC) && is_smooth(b)
+    match b.kind {
+        BSDF_METALLIC => b.metallic.is_delta(),
+        _ => matches!(b.kind, BSDF_CONDUCTOR | BSDF_DIELECTRIC) && is_smooth(b),
+    }
 }
 
 /// Reflectance, roughly, of the lobes whose light counts as indirect, seen at the cosine `wo_z`: what that light is divided by
@@ -265,6 +296,7 @@ pub fn bsdf_albedo(b: &Bsdf, wo_z: f32) -> Vec3 {
         BSDF_DIELECTRIC if is_smooth(b) => Vec3::ZERO,
         BSDF_DIELECTRIC => layered(relative_index(b, wo_z), b.transmission),
         BSDF_COATED => layered(b.eta.x, b.albedo),
+        BSDF_METALLIC => b.metallic.albedo(cosine),
         _ => b.albedo,
     }
 }
@@ -286,6 +318,16 @@ mod tests {
         coat: [0.0; COAT_COLUMNS as usize],
         nonlinear: false,
         ggx: false,
+        metallic: Metallic {
+            diffuse: Vec3::ZERO,
+            through: Vec3::ZERO,
+            f0: Vec3::ZERO,
+            f90: 0.0,
+            dielectric: [0.0; 2],
+            alpha: 0.0,
+            coat: 0.0,
+            coat_alpha: 0.0,
+        },
     };
 
     #[test]

@@ -9,6 +9,7 @@ pub mod camera;
 pub mod coat;
 pub mod guide_lookup;
 pub mod light;
+pub mod metallic;
 pub mod path;
 pub mod primary_hit;
 pub mod sampler;

@@ -1,9 +1,10 @@
 //! Twin of `glsl/shared/surface.glsl`.
-use crate::layout::{MATERIAL_NORMAL_MAP, Material, NONE};
+use crate::layout::{BSDF_METALLIC, MATERIAL_NORMAL_MAP, Material, NONE};
 use crate::math::octahedral::{octahedral_decode, octahedral_vector};
 use crate::scene::Scene;
 use crate::shaders::shared::surface::{CLEARANCE, MIN_ELEVATION};
 use crate::twins::bsdf::Bsdf;
+use crate::twins::metallic::{Metallic, Parameters};
 use crate::twins::scene::{material_of, object_from_world, triangle_vertices, world_from_object};
 use crate::twins::sphere::Sphere;
 use crate::twins::texture::texture_sample;
@@ -264,6 +265,23 @@ pub fn surface_emission(scene: &Scene, s: &Surface) -> Vec3 {
     }
 }
 
+/// What the textures of a metallic-roughness material give, whose colours are known.
+fn metallic_parameters(scene: &Scene, material: &Material, b: &Bsdf, s: &Surface) -> Parameters {
+    let factors = match material.roughness_texture {
+        NONE => Vec3::ONE,
+        image => texture_sample(scene, image, s.uv).truncate(),
+    };
+    Parameters {
+        base: b.albedo,
+        metallic: material.metallic * factors.z,
+        f0: b.specular,
+        f90: material.specular_factor,
+        transmission: material.transmission_factor,
+        alpha: material.alpha * factors.y * factors.y,
+        coat: [material.clearcoat, material.clearcoat_alpha],
+    }
+}
+
 /// The material with its textures looked up.
 pub fn surface_bsdf(scene: &Scene, s: &Surface) -> Bsdf {
     let material = &scene.materials[s.material as usize];
@@ -275,5 +293,8 @@ pub fn surface_bsdf(scene: &Scene, s: &Surface) -> Bsdf {
     let mut b = Bsdf::new(material, alpha, &scene.texels);
     b.albedo = textured(scene, material.base_color, material.base_texture, s);
     b.specular = textured(scene, material.specular, material.specular_texture, s);
+    if material.kind == BSDF_METALLIC {
+        b.metallic = Metallic::new(&metallic_parameters(scene, material, &b, s));
+    }
     b
 }

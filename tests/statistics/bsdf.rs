@@ -10,10 +10,11 @@ use tallow::layout::{BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE,
 use tallow::scene::{CoatRow, coat_table, mean_internal_fresnel};
 use tallow::twins::bsdf::{Bsdf, BsdfSample, SMOOTH_ALPHA, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
 use tallow::twins::coat::coat_row_at;
+use tallow::twins::metallic::Metallic;
 use tallow::twins::sampler::{sample_2d, sampler_start};
 
-const ALPHAS: [f32; 5] = [0.01, 0.05, 0.2, 0.5, 1.0];
-const DEGREES: [f32; 5] = [0.0, 35.0, 60.0, 86.0, 89.5];
+pub const ALPHAS: [f32; 5] = [0.01, 0.05, 0.2, 0.5, 1.0];
+pub const DEGREES: [f32; 5] = [0.0, 35.0, 60.0, 86.0, 89.5];
 
 /// At one roughness, of coats that are asked for again and again.
 fn coat(alpha: f32, ggx: bool, eta: f32) -> CoatRow {
@@ -22,7 +23,7 @@ fn coat(alpha: f32, ggx: bool, eta: f32) -> CoatRow {
     coat_row_at(TABLES.lock().unwrap().entry((eta.to_bits(), ggx)).or_insert_with(words), alpha)
 }
 
-fn bsdf(kind: u32, alpha: f32, ggx: bool, eta: f32) -> Bsdf {
+pub fn bsdf(kind: u32, alpha: f32, ggx: bool, eta: f32) -> Bsdf {
     let rough_coat = kind == BSDF_COATED && alpha >= SMOOTH_ALPHA;
     Bsdf {
         kind,
@@ -36,6 +37,7 @@ fn bsdf(kind: u32, alpha: f32, ggx: bool, eta: f32) -> Bsdf {
         coat: if rough_coat { coat(alpha, ggx, eta) } else { [0.0; COAT_COLUMNS as usize] },
         nonlinear: false,
         ggx,
+        metallic: Metallic::default(),
     }
 }
 
@@ -96,7 +98,13 @@ fn rough_cases() -> Vec<(String, Bsdf, Vec3)> {
 }
 
 /// `count` samples of `b`; points of one Sobol sequence or independent numbers.
-fn samples(b: Bsdf, wo: Vec3, count: u32, independent: bool, seed: u32) -> impl Iterator<Item = (bool, BsdfSample)> {
+pub fn samples(
+    b: Bsdf,
+    wo: Vec3,
+    count: u32,
+    independent: bool,
+    seed: u32,
+) -> impl Iterator<Item = (bool, BsdfSample)> {
     (0..count).map(move |i| {
         let s = sampler_start(0, i, seed, independent);
         bsdf_sample(&b, wo, sample_2d(s, 0).x, sample_2d(s, 1))
@@ -105,7 +113,7 @@ fn samples(b: Bsdf, wo: Vec3, count: u32, independent: bool, seed: u32) -> impl 
 
 /// Quadrature errs by up to 8e-4 of all samples (a diffuse base in the slopes of a narrow coat): a last cell that
 /// expects no more joins the largest.
-fn join_what_cannot_be_told(observed: &mut Vec<f64>, expected: &mut Vec<f64>) {
+pub fn join_what_cannot_be_told(observed: &mut Vec<f64>, expected: &mut Vec<f64>) {
     if expected[expected.len() - 1] < 1e-3 * expected.iter().sum::<f64>() {
         let largest = (0..expected.len()).max_by(|&a, &b| expected[a].total_cmp(&expected[b])).unwrap();
         expected[largest] += expected.pop().unwrap();
@@ -199,7 +207,7 @@ fn reciprocal() {
 }
 
 /// Flux that leaves for one unit that arrives along wo (by reciprocity): refracted radiance times eta^2.
-fn energy(b: Bsdf, wo: Vec3, count: u32) -> f64 {
+pub fn energy(b: Bsdf, wo: Vec3, count: u32) -> f64 {
     let eta = if wo.z < 0.0 { 1.0 / b.eta.x } else { b.eta.x };
     let flux = |s: &BsdfSample| f64::from(s.weight.x * if s.wi.z * wo.z < 0.0 { eta * eta } else { 1.0 });
     samples(b, wo, count, false, 11).filter(|(sampled, _)| *sampled).map(|(_, s)| flux(&s)).sum::<f64>()

@@ -1,6 +1,7 @@
 //! Tests on the CPU twins that random choices follow the densities that the code claims.
 mod bsdf;
 mod light;
+mod metallic;
 mod sampler;
 #[path = "../support/scattering.rs"]
 mod scattering;

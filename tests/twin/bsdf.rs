@@ -5,8 +5,8 @@ use std::sync::LazyLock;
 use tallow::error::Result;
 use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Location};
 use tallow::layout::{
-    BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE, Effects, MATERIAL_GGX, MATERIAL_NONLINEAR, Material,
-    TestPush,
+    BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE, BSDF_METALLIC, Effects, MATERIAL_GGX,
+    MATERIAL_NONLINEAR, Material, TestPush,
 };
 use tallow::scene::{coat_table, mean_internal_fresnel};
 use tallow::twins::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
@@ -56,6 +56,11 @@ fn cases(kinds: &[u32], ggx: &[u32]) -> Vec<Case> {
             internal_fresnel: mean_internal_fresnel(eta),
             flags: if ggx[i / 4 % ggx.len()] == 1 { MATERIAL_GGX } else { 0 }
                 | if i / 16 % 3 == 1 { MATERIAL_NONLINEAR } else { 0 },
+            metallic: [0.0, 1.0, c.x][i / 5 % 3],
+            specular_factor: if (i / 7).is_multiple_of(2) { 1.0 } else { d.y },
+            transmission_factor: if (i / 11).is_multiple_of(2) { 0.0 } else { a.y },
+            clearcoat: if (i / 13).is_multiple_of(2) { 0.0 } else { a.x },
+            clearcoat_alpha: if (i / 17).is_multiple_of(2) { 0.0 } else { b.x },
             coat_table: (i % TABLES * tables().len() / TABLES) as u32,
             ..Material::default()
         };
@@ -114,6 +119,9 @@ fn only(kinds: &[u32], beckmann: bool, ggx: bool) -> Effects {
         diffuse: has(BSDF_DIFFUSE) || has(BSDF_COATED),
         conductor: has(BSDF_CONDUCTOR),
         dielectric: has(BSDF_DIELECTRIC),
+        metallic: has(BSDF_METALLIC),
+        clearcoat: has(BSDF_METALLIC),
+        thin_walls: has(BSDF_METALLIC),
         coated: has(BSDF_COATED),
         rough: true,
         smooth_interface: true,
@@ -126,9 +134,15 @@ fn only(kinds: &[u32], beckmann: bool, ggx: bool) -> Effects {
 #[test]
 fn bsdfs_equal_their_twins() -> Result<()> {
     let gpu = Gpu::open(&DeviceOptions::default())?;
-    let all = [BSDF_DIFFUSE, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_COATED];
-    let runs: [(&[u32], &[u32]); 5] =
-        [(&all, &[0, 1]), (&all[..1], &[0]), (&all[1..2], &[0]), (&all[2..3], &[1]), (&all[3..], &[0])];
+    let all = [BSDF_DIFFUSE, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_COATED, BSDF_METALLIC];
+    let runs: [(&[u32], &[u32]); 6] = [
+        (&all, &[0, 1]),
+        (&all[..1], &[0]),
+        (&all[1..2], &[0]),
+        (&all[2..3], &[1]),
+        (&all[3..4], &[0]),
+        (&all[4..], &[1]),
+    ];
     for (kinds, ggx) in runs {
         let cases = cases(kinds, ggx);
         let special = on_device(&gpu, &only(kinds, ggx.contains(&0), ggx.contains(&1)), &cases)?;
@@ -146,6 +160,22 @@ fn bsdfs_equal_their_twins() -> Result<()> {
         let mut planted = cases.clone();
         planted.iter_mut().for_each(|c| (c.0.base_color[1], c.0.specular[0]) = (c.0.base_color[1] * 1.01, 1.01));
         assert!(disagreements(&special, &planted).len() > CASES / 10, "control");
+        if kinds == [BSDF_METALLIC] {
+            // Controls: a little of each of its own numbers.
+            let of = |plant: fn(&mut Material)| {
+                let mut planted = cases.clone();
+                planted.iter_mut().for_each(|c| plant(&mut c.0));
+                disagreements(&special, &planted).len()
+            };
+            let plants: [fn(&mut Material); 5] = [
+                |m| m.metallic *= 0.98,
+                |m| m.specular_factor *= 0.95,
+                |m| m.transmission_factor *= 0.95,
+                |m| m.clearcoat *= 0.95,
+                |m| m.clearcoat_alpha *= 0.9,
+            ];
+            assert!(plants.iter().all(|&plant| of(plant) > CASES / 50), "control: {:?}", plants.map(of));
+        }
         if kinds.contains(&BSDF_COATED) {
             // Control: another coat's table, and light that keeps the base's colour once.
             let of = |plant: fn(&mut Material)| {

@@ -23,28 +23,50 @@ impl Materials {
         let metallic = unit(t.metallic, 1.0, "metallic")?;
         m.alpha = unit(t.roughness, 1.0, "roughness")?.powi(2);
         m.emission = emission(t)?;
+        m.kind = BSDF_METALLIC;
         m.flags |= MATERIAL_GGX;
-        let color = self.ask(t, t.color_texture.as_ref(), Kind::Color, directory, warn)?;
-        m.roughness_texture = self.ask(t, t.metallic_roughness_texture.as_ref(), Kind::Roughness, directory, warn)?;
-        warn_once(warn, "metallic-roughness is rendered as a conductor or a coat:", &t.name);
-        if metallic >= 0.5 {
-            (m.kind, m.eta, m.k) = (BSDF_CONDUCTOR, [0.0; 3], [1.0; 3]);
-            (m.specular, m.specular_texture) = (base, color);
-        } else {
-            m.kind = BSDF_COATED;
-            (m.base_color, m.base_texture) = (base, color);
-        }
+        (m.base_color, m.metallic) = (base, metallic);
+        m.base_texture = self.ask(t, t.color_texture.as_ref(), Kind::Color, directory, warn)?;
+        m.roughness_texture = self.ask(t, t.metallic_roughness_texture.as_ref(), Kind::Data, directory, warn)?;
+        self.specular(&mut m, t, directory, warn)?;
+        m.transmission_factor = unit(t.transmission_factor, 0.0, "transmission_factor")?;
+        m.clearcoat = unit(t.clearcoat, 0.0, "clearcoat")?;
+        m.clearcoat_alpha = unit(t.clearcoat_roughness, 0.0, "clearcoat_roughness")?.powi(2);
         self.opacity(&mut m, t, directory, warn)?;
         m.emission_texture = self.ask(t, t.emission_texture.as_ref(), Kind::Color, directory, warn)?;
         m.bump_texture = self.ask(t, t.normal_map.as_ref(), Kind::Data, directory, warn)?;
         if m.bump_texture != NONE {
             m.flags |= MATERIAL_NORMAL_MAP;
         }
-        if t.two_sided == Some(false) {
+        // The two sides of a thin wall are alike.
+        if t.two_sided == Some(false) && m.transmission_factor == 0.0 {
             m.flags &= !MATERIAL_TWO_SIDED;
         }
         missing(t, warn);
         Ok(self.push(&t.name, m))
+    }
+
+    /// The dielectric's reflectance head on, `((ior - 1) / (ior + 1))^2` times `specular`, which kernels limit to 1.
+    fn specular(
+        &mut self,
+        m: &mut Material,
+        t: &MaterialTable,
+        directory: &Path,
+        warn: &mut Vec<String>,
+    ) -> Result<(), String> {
+        let ior = t.ior.unwrap_or(1.5);
+        if !(0.1..=10.0).contains(&ior) {
+            return Err(format!("ior is {ior}: choose a value from 0.1 to 10"));
+        }
+        let f0 = ((ior - 1.0) / (ior + 1.0)).powi(2);
+        let color = t.specular.map_or([1.0; 3], |v| v.0);
+        if !color.iter().all(|v| (0.0..=1e6).contains(v)) {
+            return Err(format!("specular {color:?} is negative, NaN or above 1e6"));
+        }
+        m.specular = color.map(|v| v * f0);
+        m.specular_texture = self.ask(t, t.specular_texture.as_ref(), Kind::Color, directory, warn)?;
+        m.specular_factor = within(t.specular_factor.unwrap_or(1.0), 1.0, "specular_factor")?;
+        Ok(())
     }
 
     fn opacity(
@@ -81,13 +103,12 @@ impl Materials {
 /// Warns of what is not rendered.
 fn missing(t: &MaterialTable, warn: &mut Vec<String>) {
     let set = |v: Option<f32>, default: f32| v.is_some_and(|v| v != default);
-    let specular = t.specular.is_some() || t.specular_texture.is_some();
     let all = [
         (set(t.normal_scale, 1.0), "normal_scale is not rendered:"),
-        (set(t.specular_factor, 1.0) || specular || t.specular_factor_texture.is_some(), "specular is not rendered:"),
-        (set(t.ior, 1.5), "ior of metallic-roughness is not rendered:"),
-        (set(t.transmission_factor, 0.0), "transmission is not rendered:"),
-        (set(t.clearcoat, 0.0), "clearcoat is not rendered:"),
+        (t.specular_factor_texture.is_some(), "specular_factor_texture is not rendered:"),
+        (t.transmission_texture.is_some(), "transmission_texture is not rendered:"),
+        (t.clearcoat_texture.is_some(), "clearcoat_texture is not rendered:"),
+        (t.clearcoat_roughness_texture.is_some(), "clearcoat_roughness_texture is not rendered:"),
         (t.unlit, "unlit is not rendered:"),
     ];
     all.iter().filter(|a| a.0).for_each(|a| warn_once(warn, a.1, &t.name));

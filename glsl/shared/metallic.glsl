@@ -1,0 +1,155 @@
+// The material of glTF 2.0, appendix B, with its extensions for specular reflection, thin transmission and a clear coat: a mixture
+// of a metal and of a dielectric above a base, which is diffuse or lets light through. Local frame and conventions: see bsdf.glsl.
+// Fresnel reflectances are Schlick's, F(c) = f0 + (f90 - f0) (1 - c)^5 at the cosine c; microfacets are GGX.
+#ifndef METALLIC_GLSL
+#define METALLIC_GLSL
+#include "shared/warp.glsl"
+#include "shared/microfacet.glsl"
+
+struct Metallic {
+    vec3 diffuse;    // base colour of the share that is neither metal nor transparent
+    vec3 through;    // base colour of the transparent share
+    vec3 f0;         // reflectance head on, of metal and dielectric together
+    float f90;       // and at grazing angles
+    vec2 dielectric; // largest channel of the dielectric's reflectance head on, and at grazing angles
+    float alpha;
+    float coat;      // strength of the clear coat
+    float coat_alpha;
+};
+
+const float COAT_F0 = 0.04; // reflectance head on of a clear coat, of index 1.5
+
+// The probability of the specular lobe is at least this share of f90, since its reflectance at the half vector may be above 0
+// where that at the normal is 0.
+const float LEAST_ODDS = 0.02;
+
+float schlick_weight(float c) {
+    float x = clamp(1.0 - c, 0.0, 1.0);
+    return x * x * x * x * x;
+}
+
+// Share of light at the cosine `c` that the dielectric lets in, at most: of all channels alike, so that it keeps its colour.
+float let_in(Metallic b, float c) {
+    return 1.0 - mix(b.dielectric.x, b.dielectric.y, schlick_weight(c));
+}
+
+// The same for the clear coat.
+float coat_lets_in(Metallic b, float c) {
+    return 1.0 - b.coat * mix(COAT_F0, 1.0, schlick_weight(c));
+}
+
+bool smooth_alpha(float alpha) {
+    return FX_SMOOTH && (!FX_ROUGH || alpha < SMOOTH_ALPHA);
+}
+
+bool has_coat(Metallic b) {
+    return FX_CLEARCOAT && b.coat > 0.0;
+}
+
+Metallic metallic_layers(vec3 base, float metallic, vec3 f0, float f90, float transmission, float alpha, float coat, float coat_alpha) {
+    Metallic b;
+    b.diffuse = base * (1.0 - metallic);
+    b.through = vec3(0.0);
+    if (FX_THIN) {
+        b.through = b.diffuse * transmission;
+        b.diffuse *= 1.0 - transmission;
+    }
+    f0 = min(f0, 1.0) * f90;
+    b.f0 = mix(f0, base, metallic);
+    b.f90 = mix(f90, 1.0, metallic);
+    b.dielectric = vec2(max(f0.r, max(f0.g, f0.b)), f90);
+    b.alpha = alpha;
+    b.coat = coat;
+    b.coat_alpha = coat_alpha;
+    return b;
+}
+
+// Probabilities of the lobes, about in proportion to what they reflect: the coat's, the specular one, the diffuse one, and the one
+// through a thin wall. All 0 where the material is black.
+vec4 metallic_odds(Metallic b, float c) {
+    float inner = has_coat(b) ? coat_lets_in(b, c) : 1.0, base = inner * let_in(b, c);
+    vec3 f = mix(b.f0, vec3(b.f90), schlick_weight(c));
+    vec4 odds = vec4(1.0 - inner, inner * (dot(f, vec3(1.0 / 3.0)) + LEAST_ODDS * b.f90), base * dot(b.diffuse, vec3(1.0 / 3.0)),
+                     base * dot(b.through, vec3(1.0 / 3.0)));
+    return odds / max(odds.x + odds.y + odds.z + odds.w, 1e-10);
+}
+
+// Reflection by GGX microfacets without Fresnel factor: x = f cos, y = density per solid angle, z = cosine at the microfacet.
+vec3 metallic_lobe(vec3 wo, vec3 wi, float alpha) {
+    vec3 h = wo + wi;
+    vec3 m = h * inversesqrt(max(dot(h, h), 1e-30));
+    float area = microfacet_area(true, wo, alpha);
+    float density = microfacet_d(true, m, alpha) / (4.0 * area);
+    float g = microfacet_g1(true, wo, alpha) * microfacet_g1(true, wi, alpha);
+    return vec3(g * area / wo.z * density, density, clamp(dot(wo, m), 0.0, 1.0));
+}
+
+// rgb = f |cos wi|, w = density with which metallic_sample picks wi; both are above the horizon, or wi lies beyond a thin wall.
+// The diffuse base is what appendix B calls fresnel_mix, but for its factor 1 - F at the half vector: with it, and a reflection
+// of F(wo.z) at grazing angles, a white dielectric would give back up to 1.7 times the light that it gets. Here light passes the
+// interface on its way in and out (Ashikhmin and Shirley 2000), scaled so that the base gives back what it is let: its
+// share of a white furnace is 1 - F(wo.z), since the mean of let_in over a diffuse hemisphere is
+// 1 - f0 - (f90 - f0) 2 Int c (1 - c)^5 dc = 1 - f0 - (f90 - f0) / 21. Microfacets reflect F(wo.z) where they are smooth, and where
+// rough at most 0.002 more for f0 up to 0.08: single scattering loses more than Schlick's curve gains by its curvature. The clear
+// coat takes its share on the way in and out, unscaled, since what is below it may reflect light into any direction.
+vec4 metallic_evaluate(Metallic b, vec3 wo, vec3 wi) {
+    bool beyond = wi.z < 0.0;
+    if (beyond && !FX_THIN) return vec4(0.0);
+    wi.z = abs(wi.z);
+    vec4 odds = metallic_odds(b, wo.z);
+    vec4 value = vec4(0.0);
+    if (!beyond) {
+        float mean = 1.0 - b.dielectric.x - (b.dielectric.y - b.dielectric.x) * (1.0 / 21.0);
+        value = vec4(b.diffuse * (let_in(b, wo.z) * let_in(b, wi.z) / max(mean, 1e-3)), odds.z) * (wi.z * INV_PI);
+    }
+    if (!smooth_alpha(b.alpha)) {
+        vec3 lobe = metallic_lobe(wo, wi, b.alpha);
+        vec3 f = beyond ? b.through * let_in(b, lobe.z) : mix(b.f0, vec3(b.f90), schlick_weight(lobe.z));
+        value += vec4(f * lobe.x, (beyond ? odds.w : odds.y) * lobe.y);
+    }
+    if (!has_coat(b)) return value;
+    value.rgb *= coat_lets_in(b, wo.z) * coat_lets_in(b, wi.z);
+    if (beyond || smooth_alpha(b.coat_alpha)) return value;
+    vec3 lobe = metallic_lobe(wo, wi, b.coat_alpha);
+    return value + vec4(vec3((1.0 - coat_lets_in(b, lobe.z)) * lobe.x), odds.x * lobe.y);
+}
+
+// Samples a direction. Returns false where the light is absorbed. A smooth lobe is a delta: then `weight` is its own, else it and
+// the density are those of metallic_evaluate.
+bool metallic_sample(Metallic b, vec3 wo, float u_lobe, vec2 u, out vec3 wi, out vec3 weight, out bool delta) {
+    vec4 odds = metallic_odds(b, wo.z);
+    bool coat = u_lobe < odds.x;
+    bool through = !coat && FX_THIN && u_lobe < odds.x + odds.w;
+    bool specular = !coat && !through && u_lobe < odds.x + odds.w + odds.y;
+    wi = warp_cosine_hemisphere(u);
+    weight = vec3(0.0);
+    delta = false;
+    if (!(coat || through || specular)) return true;
+    float alpha = coat ? b.coat_alpha : b.alpha;
+    delta = smooth_alpha(alpha);
+    vec3 m = vec3(0.0, 0.0, 1.0);
+    if (!delta) m = microfacet_sample(true, wo, alpha, u);
+    wi = 2.0 * dot(wo, m) * m - wo;
+    bool above = wi.z > 1e-9;
+    float inner = has_coat(b) ? coat_lets_in(b, wo.z) : 1.0;
+    if (coat) weight = vec3((1.0 - inner) / odds.x);
+    else weight = (through ? b.through * let_in(b, wo.z) : mix(b.f0, vec3(b.f90), schlick_weight(wo.z))) *
+                  (inner * inner / max(through ? odds.w : odds.y, 1e-10));
+    wi.z = through ? -wi.z : wi.z;
+    return above;
+}
+
+// Approximate reflectance at the cosine `c` of the lobes that are not deltas.
+vec3 metallic_albedo(Metallic b, float c) {
+    float inner = has_coat(b) ? coat_lets_in(b, c) : 1.0;
+    vec3 albedo = b.diffuse * let_in(b, c);
+    if (!smooth_alpha(b.alpha)) albedo += mix(b.f0, vec3(b.f90), schlick_weight(c)) + b.through * let_in(b, c);
+    return albedo * inner + (smooth_alpha(b.coat_alpha) ? 0.0 : 1.0 - inner);
+}
+
+// Whether every lobe is a delta.
+bool metallic_is_delta(Metallic b) {
+    return smooth_alpha(b.alpha) && b.diffuse == vec3(0.0) && (!has_coat(b) || smooth_alpha(b.coat_alpha));
+}
+
+#endif
