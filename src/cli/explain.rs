@@ -16,7 +16,7 @@ use std::process::Command;
 /// List every effect: on or off, what calls for it, and what it costs
 #[derive(clap::Args)]
 pub struct Args {
-    /// Scene file (.toml) or model (.obj)
+    /// Scene file (.toml, .gltf, .glb) or model (.obj)
     pub scene: PathBuf,
     /// Effects to measure [default: all of them]
     #[arg(value_name = "EFFECT")]

@@ -40,7 +40,7 @@ pub enum EffectChoice {
 /// Options override the settings of the scene file; defaults are for what it does not set.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Scene file (.toml) or model (.obj)
+    /// Scene file (.toml, .gltf, .glb) or model (.obj)
     pub scene: PathBuf,
     /// Image to write: .exr (all layers), .png or .hdr; may be given several times [default: the scene's name + .exr]
     #[arg(short, long = "output", value_name = "FILE")]
@@ -69,6 +69,9 @@ pub struct Args {
     #[arg(long, value_name = "X,Y", value_parser = pixel,
           conflicts_with_all = ["resume", "checkpoint", "denoise"])]
     pub pixel: Option<[u32; 2]>,
+    /// Look through this camera of a glTF file [default: its first one, or one that frames it]
+    #[arg(long, value_name = "NAME")]
+    pub camera: Option<String>,
     /// Count rays and visited nodes
     #[arg(long)]
     pub counters: bool,
@@ -171,7 +174,8 @@ fn finish(
 
 /// The settings are checked before what may take long.
 fn load(args: &Args) -> Result<(Scene, Settings)> {
-    let file = SceneFile::open(&args.scene)?;
+    let mut file = SceneFile::open(&args.scene)?;
+    args.camera.as_deref().map_or(Ok(()), |name| file.look_through(name))?;
     let mut settings = file.settings()?;
     args.overrides.apply(&mut settings);
     if let Some([x, y]) = args.pixel {

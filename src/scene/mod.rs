@@ -10,6 +10,7 @@ use crate::scene::description::settings::Settings;
 use crate::threads;
 use build::assemble::assemble;
 use description::Description;
+use load::gltf;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -142,15 +143,24 @@ pub struct SceneFile<'a> {
     description: Cow<'a, Description>,
     /// Whether a scene without light gets a sky of radiance 1.
     sky: bool,
+    /// The cameras that a glTF file holds.
+    cameras: Vec<gltf::Named>,
+    /// What was repaired or passed over so far.
+    warnings: Vec<String>,
 }
 
-impl SceneFile<'_> {
-    /// Reads a scene file (`.toml`), or takes a model (`.obj`) for one.
+impl<'a> SceneFile<'a> {
+    fn of(path: &Path, description: Cow<'a, Description>) -> Self {
+        Self { path: path.to_owned(), description, sky: false, cameras: Vec::new(), warnings: Vec::new() }
+    }
+
+    /// Reads a scene file (`.toml`, `.gltf`, `.glb`), or takes a model (`.obj`) for one.
     ///
     /// # Errors
     /// [`Error::Input`] with file, place and remedy.
     pub fn open(path: &Path) -> Result<Self> {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_lowercase();
+        let (mut cameras, mut warnings) = (Vec::new(), Vec::new());
         let (description, sky) = match extension.as_str() {
             "toml" => {
                 let text = String::from_utf8(input::read_text(path, BYTES_OF_TOML)?);
@@ -158,12 +168,37 @@ impl SceneFile<'_> {
                 (description::parse(path, &text)?, false)
             }
             "obj" => (model(path), true),
+            "gltf" | "glb" => {
+                let model = gltf::load(path)?;
+                (cameras, warnings) = (model.cameras, model.warnings);
+                (model.description, false)
+            }
             other => {
                 input::open(path)?; // a missing file is that first of all
-                return Err(Error::input(path, format!("is no scene: \"{other}\" is neither toml nor obj")));
+                return Err(Error::input(path, format!("is no scene: \"{other}\" is none of toml, obj, gltf, glb")));
             }
         };
-        Ok(Self { path: path.to_owned(), description: Cow::Owned(description), sky })
+        Ok(Self { path: path.to_owned(), description: Cow::Owned(description), sky, cameras, warnings })
+    }
+
+    /// Looks through the camera of this name, which a glTF file holds.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the names of the cameras that there are.
+    pub fn look_through(&mut self, name: &str) -> Result<()> {
+        let named = self.cameras.iter().find(|camera| camera.name == name);
+        let chosen = named.and_then(|camera| camera.camera.clone());
+        let names: Vec<_> = self.cameras.iter().map(|camera| format!("\"{}\"", camera.name)).collect();
+        let what = match (named, names.is_empty()) {
+            (Some(_), _) if chosen.is_none() => "is orthographic, which is not rendered".to_owned(),
+            (None, true) => "is not there: only glTF files have named cameras, and this one has none".to_owned(),
+            (None, false) => format!("is not there: choose one of {}", names.join(", ")),
+            (Some(_), _) => {
+                self.description.to_mut().camera = chosen.unwrap_or_default();
+                return Ok(());
+            }
+        };
+        Err(Error::Usage(format!("{}: camera \"{name}\" {what}", self.path.display())))
     }
 
     /// The file's settings over the defaults.
@@ -184,6 +219,7 @@ impl SceneFile<'_> {
         let settings = self.settings()?;
         let mut scene = Scene { view: self.description.camera.clone(), ..Scene::default() };
         threads::within(|| assemble(&self.path, &self.description, self.sky, &mut scene))?;
+        scene.warnings.splice(0..0, self.warnings.iter().cloned());
         let camera = scene.view.build([settings.width, settings.height], scene.bounds);
         camera.map_err(|what| Error::input_at(&self.path, "[camera]", what))?;
         Ok(Loaded { scene, settings })
@@ -191,7 +227,7 @@ impl SceneFile<'_> {
 }
 
 impl Scene {
-    /// Reads a scene file (`.toml`) or a model (`.obj`). A model alone gets a camera that frames it and, when nothing in it
+    /// Reads a scene file (`.toml`, `.gltf`, `.glb`) or a model (`.obj`). A model alone gets a camera that frames it and, when nothing in it
     /// emits light, a sky of radiance 1. [`SceneFile`] does the same in two steps.
     ///
     /// # Errors
@@ -206,7 +242,7 @@ impl Scene {
     /// See [`Scene::load`].
     pub fn parse(path: &Path, text: &str) -> Result<Loaded> {
         let description = Cow::Owned(description::parse(path, text)?);
-        SceneFile { path: path.to_owned(), description, sky: false }.load()
+        SceneFile::of(path, description).load()
     }
 
     /// Whether point, spot or directional lights shine: they have no extent, and their shadows are sharp.
@@ -225,7 +261,7 @@ impl Scene {
     /// # Errors
     /// See [`Scene::load`].
     pub fn build(description: &Description) -> Result<Loaded> {
-        SceneFile { path: "scene".into(), description: Cow::Borrowed(description), sky: false }.load()
+        SceneFile::of(Path::new("scene"), Cow::Borrowed(description)).load()
     }
 
     /// The camera for a film of (width, height) pixels, in world space.

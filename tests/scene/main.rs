@@ -3,6 +3,10 @@
 #[allow(dead_code)]
 mod command;
 mod files;
+mod gltf;
+mod gltf_bad;
+#[path = "../support/gltf.rs"]
+mod gltf_file;
 mod memory;
 #[path = "../support/mod.rs"]
 mod support;

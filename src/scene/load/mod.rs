@@ -1,6 +1,7 @@
 //! Reads files to meshes, pictures and materials, one module for each format.
 pub mod environment;
 pub mod find;
+pub mod gltf;
 pub mod library;
 pub mod lines;
 pub mod mapping;

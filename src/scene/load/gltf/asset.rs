@@ -1,0 +1,126 @@
+//! A glTF file in memory: what its JSON says, and its buffers.
+use super::glb;
+use super::uri::{self, Target};
+use crate::error::{Error, Result};
+use crate::image::input;
+use crate::memory;
+use gltf_json::Root;
+use std::fmt::Display;
+use std::path::Path;
+
+/// A file that was read. Indices and lengths in `root` are as the file has them: see `check`.
+pub struct Asset<'a> {
+    /// Path of the file, for messages and for the files that it names.
+    pub path: &'a Path,
+    /// The JSON.
+    pub root: Root,
+    /// Contents of the buffers, each as long as the JSON says.
+    pub buffers: Vec<Vec<u8>>,
+}
+
+/// Most bytes that the objects and list entries of the JSON take when they are parsed.
+const BYTES_OF_OBJECT: u64 = 800;
+const BYTES_OF_ENTRY: u64 = 72;
+
+impl<'a> Asset<'a> {
+    /// Reads a `.gltf` or `.glb` file and its buffers, but not its pictures.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a file that is no glTF 2.0, and for a buffer that is missing or too short; [`Error::Memory`].
+    pub fn read(path: &'a Path) -> Result<Self> {
+        let bytes = input::read(path)?;
+        let (json, binary) = glb::split(&bytes).map_err(|what| Error::input(path, what))?;
+        let count = |byte: u8| json.iter().filter(|&&b| b == byte).count() as u64;
+        let parsed = BYTES_OF_OBJECT * count(b'{') + BYTES_OF_ENTRY * count(b',');
+        memory::need(path.display(), parsed + 2 * json.len() as u64)?;
+        let mut asset = Self { path, root: parse(path, json)?, buffers: Vec::new() };
+        asset.check_version()?;
+        for index in 0..asset.root.buffers.len() {
+            let content = asset.buffer(index, binary)?;
+            asset.buffers.push(content);
+        }
+        Ok(asset)
+    }
+
+    /// An error at a place in the file.
+    pub fn at(&self, place: impl Display, what: impl Display) -> Error {
+        Error::input_at(self.path, place, what)
+    }
+
+    /// Folder that URIs are relative to.
+    pub fn folder(&self) -> &'a Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+
+    /// Bytes of a buffer view.
+    ///
+    /// # Errors
+    /// For a view that ends beyond its buffer.
+    pub fn view(&self, index: usize) -> Result<&[u8]> {
+        let at = |what: String| self.at(format!("buffer view {index}"), what);
+        let none = || at(format!("is not there: there are {}", self.root.buffer_views.len()));
+        let view = self.root.buffer_views.get(index).ok_or_else(none)?;
+        let buffers = self.buffers.len();
+        let named = view.buffer.value();
+        let buffer = self.buffers.get(named).ok_or_else(|| at(format!("names buffer {named} of {buffers}")))?;
+        let first = u128::from(view.byte_offset.unwrap_or_default().0);
+        let end = first + u128::from(view.byte_length.0);
+        match end <= buffer.len() as u128 {
+            true => Ok(&buffer[first as usize..end as usize]),
+            false => Err(at(format!("ends at byte {end} of buffer {named}, which has {}", buffer.len()))),
+        }
+    }
+
+    fn check_version(&self) -> Result<()> {
+        let asset = &self.root.asset;
+        let newer = asset.min_version.as_deref().filter(|v| *v != "2.0");
+        match newer.or(Some(&asset.version)).filter(|v| newer.is_some() || !v.starts_with("2.")) {
+            Some(version) => {
+                Err(Error::input(self.path, format!("is glTF of version {}: export it as glTF 2.0", one_line(version))))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The content of a buffer, cut to the length that the JSON gives.
+    fn buffer(&self, index: usize, binary: Option<&[u8]>) -> Result<Vec<u8>> {
+        let (buffer, place) = (&self.root.buffers[index], format!("buffer {index}"));
+        let mut bytes = match (&buffer.uri, binary) {
+            (Some(uri), _) => match uri::resolve(self.folder(), uri).map_err(|what| self.at(&place, what))? {
+                Target::Data(bytes) => bytes,
+                Target::File(path) => input::read(&path)?,
+            },
+            (None, Some(binary)) if index == 0 => {
+                memory::need(self.path.display(), binary.len() as u64)?;
+                binary.to_vec()
+            }
+            (None, _) => return Err(self.at(place, "has no uri and no binary chunk: export the file again")),
+        };
+        let length = buffer.byte_length.0;
+        if (bytes.len() as u64) < length {
+            let what = format!("has {} bytes where {length} are announced: take another copy of it", bytes.len());
+            return Err(self.at(place, what));
+        }
+        bytes.truncate(length as usize);
+        Ok(bytes)
+    }
+}
+
+fn parse(path: &Path, json: &[u8]) -> Result<Root> {
+    serde_json::from_slice(json).map_err(|e| {
+        let (text, place) = (e.to_string(), format!("line {}, column {}", e.line(), e.column()));
+        let what = text.rsplit_once(" at line ").map_or(text.as_str(), |(what, _)| what);
+        Error::input_at(path, place, format!("is no glTF: {}", one_line(what)))
+    })
+}
+
+/// A name of the file as messages and reports show it: without line ends and other control characters, and not too long.
+pub fn one_line(name: &str) -> String {
+    const LONGEST: usize = 100;
+    let plain = |c: char| if c.is_control() { '?' } else { c };
+    let mut short: String = name.chars().take(LONGEST).map(plain).collect();
+    if name.chars().nth(LONGEST).is_some() {
+        short.push_str("...");
+    }
+    short
+}

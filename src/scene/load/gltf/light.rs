@@ -1,0 +1,61 @@
+//! `KHR_lights_punctual` becomes `[[light]]` tables.
+//!
+//! Units: glTF gives luminous intensity in candela (lm/sr), illuminance in lux (lm/m^2), and the luminance of emissive surfaces
+//! in nits (lm/(m^2 sr)). All are radiometric quantities (W/sr, W/m^2, W/(m^2 sr)) times the same factor, 683 lm/W times the
+//! luminous efficiency of the spectrum, and a picture is linear in light: with lumens in place of watts everywhere, lights, lamps
+//! and surfaces keep their proportions, and numbers are taken as they are.
+use super::asset::{Asset, one_line};
+use super::extension::{self, Light};
+use crate::error::Result;
+use crate::scene::description::{LightTable, LightType, Rgb};
+use glam::{DAffine3, DVec3};
+
+/// The lights of a file.
+///
+/// # Errors
+/// For a damaged extension.
+pub fn read(asset: &Asset) -> Result<Vec<Light>> {
+    let all = asset.root.extensions.as_ref().map(|e| &e.others);
+    let found = extension::read::<extension::Lights>(asset, all, "KHR_lights_punctual", "the file")?;
+    Ok(found.map_or_else(Vec::new, |found| found.lights))
+}
+
+/// The light that `node` holds, placed by `world`: it shines along the node's -z axis.
+///
+/// # Errors
+/// For a light that is not there or of an unknown type.
+pub fn of_node(asset: &Asset, node: usize, world: &DAffine3, lights: &[Light]) -> Result<Option<LightTable>> {
+    let place = format!("node {node}");
+    let all = asset.root.nodes[node].extensions.as_ref().map(|e| &e.others);
+    let named = extension::read::<extension::NodeLight>(asset, all, "KHR_lights_punctual", &place)?;
+    let Some(index) = named.map(|named| named.light) else { return Ok(None) };
+    let missing = || asset.at(&place, format!("names light {index}, and there are {}", lights.len()));
+    let light = lights.get(index).ok_or_else(missing)?;
+    let kind = match light.kind.as_str() {
+        "directional" => LightType::Directional,
+        "point" => LightType::Point,
+        "spot" => LightType::Spot,
+        other => {
+            let what = format!("has the type \"{}\": it must be directional, point or spot", one_line(other));
+            return Err(asset.at(format!("light {index}"), what));
+        }
+    };
+    let value = Some(Rgb(light.color.map(|c| c * light.intensity)));
+    let axis = world.transform_vector3(DVec3::NEG_Z).try_normalize().unwrap_or(DVec3::NEG_Z);
+    let (inner, outer) = (light.spot.inner_cone_angle, light.spot.outer_cone_angle);
+    let table = LightTable { kind, ..LightTable::default() };
+    let position = Some(world.translation.as_vec3().to_array());
+    Ok(Some(match kind {
+        LightType::Directional => LightTable { direction: Some(axis.as_vec3().to_array()), irradiance: value, ..table },
+        LightType::Point => LightTable { position, intensity: value, ..table },
+        // glTF leaves the falloff within the cone to the renderer.
+        LightType::Spot => LightTable {
+            position,
+            intensity: value,
+            direction: Some(axis.as_vec3().to_array()),
+            cone: Some(inner.to_degrees()),
+            cutoff: Some(outer.to_degrees()),
+            ..table
+        },
+    }))
+}

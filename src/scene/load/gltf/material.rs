@@ -1,0 +1,188 @@
+//! Materials of glTF become `metallic-roughness` tables. Occlusion textures are left out: a path tracer finds occlusion itself.
+use super::asset::{Asset, one_line};
+use super::extension;
+use super::picture::{Pictures, TextureInfo};
+use crate::error::Result;
+use crate::scene::description::{AlphaMode, MaterialTable, MaterialType, Rgb, TextureTable};
+use gltf_json::material::{AlphaMode as Mode, Material, NormalTexture};
+use gltf_json::texture::Info;
+use gltf_json::validation::Checked;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+
+/// The name of what has no material: glTF's default, white metal that is fully rough.
+pub const DEFAULT: &str = "default";
+
+#[derive(Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct EmissiveStrength {
+    emissive_strength: f32,
+}
+
+impl Default for EmissiveStrength {
+    fn default() -> Self {
+        Self { emissive_strength: 1.0 }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(default)]
+struct Ior {
+    ior: f32,
+}
+
+impl Default for Ior {
+    fn default() -> Self {
+        Self { ior: 1.5 }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct Specular {
+    specular_factor: f32,
+    specular_texture: Option<TextureInfo>,
+    specular_color_factor: [f32; 3],
+    specular_color_texture: Option<TextureInfo>,
+}
+
+impl Default for Specular {
+    fn default() -> Self {
+        let (specular_texture, specular_color_texture) = (None, None);
+        Self { specular_factor: 1.0, specular_texture, specular_color_factor: [1.0; 3], specular_color_texture }
+    }
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct Transmission {
+    transmission_factor: f32,
+    transmission_texture: Option<TextureInfo>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct Clearcoat {
+    clearcoat_factor: f32,
+    clearcoat_texture: Option<TextureInfo>,
+    clearcoat_roughness_factor: f32,
+    clearcoat_roughness_texture: Option<TextureInfo>,
+    clearcoat_normal_texture: Option<TextureInfo>,
+}
+
+/// The table of what has no material.
+pub fn default_table() -> MaterialTable {
+    let (name, kind) = (DEFAULT.to_owned(), MaterialType::MetallicRoughness);
+    MaterialTable { name, kind, ..MaterialTable::default() }
+}
+
+/// The table of material `index`, which is to be called `name`.
+///
+/// # Errors
+/// [`crate::error::Error::Input`] for textures that lead nowhere and damaged extensions.
+pub fn table(asset: &Asset, index: usize, name: String, pictures: &mut Pictures) -> Result<MaterialTable> {
+    let material = &asset.root.materials[index];
+    let mut reader = Reader { asset, place: format!("material {index}"), pictures };
+    let mut table = reader.core(material, name)?;
+    if let Some(extensions) = &material.extensions {
+        reader.extend(&mut table, &extensions.others)?;
+    }
+    Ok(table)
+}
+
+struct Reader<'a> {
+    asset: &'a Asset<'a>,
+    /// The material, for messages.
+    place: String,
+    pictures: &'a mut Pictures,
+}
+
+impl Reader<'_> {
+    fn core(&mut self, material: &Material, name: String) -> Result<MaterialTable> {
+        let surface = &material.pbr_metallic_roughness;
+        let [red, green, blue, alpha] = surface.base_color_factor.0;
+        let normal = material.normal_texture.as_ref();
+        let Checked::Valid(mode) = material.alpha_mode else {
+            return Err(self.asset.at(&self.place, "has an alphaMode other than OPAQUE, MASK and BLEND"));
+        };
+        let emission = Some(material.emissive_factor.0).filter(|factor| *factor != [0.0; 3]);
+        let emissive = material.emissive_texture.as_ref().filter(|_| emission.is_some());
+        Ok(MaterialTable {
+            name,
+            kind: MaterialType::MetallicRoughness,
+            color: Some(Rgb([red, green, blue])),
+            opacity: Some(alpha),
+            color_texture: self.texture(surface.base_color_texture.as_ref().map(plain))?,
+            metallic: Some(surface.metallic_factor.0),
+            roughness: Some(surface.roughness_factor.0),
+            metallic_roughness_texture: self.texture(surface.metallic_roughness_texture.as_ref().map(plain))?,
+            normal_map: self.texture(normal.map(of_normal))?,
+            normal_scale: normal.map(|normal| normal.scale),
+            emission: emission.map(Rgb),
+            emission_texture: self.texture(emissive.map(plain))?,
+            alpha_mode: Some(match mode {
+                Mode::Opaque => AlphaMode::Opaque,
+                Mode::Mask => AlphaMode::Mask,
+                Mode::Blend => AlphaMode::Blend,
+            }),
+            alpha_cutoff: material.alpha_cutoff.map(|cutoff| cutoff.0),
+            ..MaterialTable::default()
+        })
+    }
+
+    fn extend(&mut self, table: &mut MaterialTable, all: &Map<String, Value>) -> Result<()> {
+        table.unlit = all.contains_key("KHR_materials_unlit");
+        if let Some(found) = self.extension::<EmissiveStrength>(all, "KHR_materials_emissive_strength")? {
+            table.emission_strength = table.emission.map(|_| found.emissive_strength);
+        }
+        if let Some(found) = self.extension::<Ior>(all, "KHR_materials_ior")? {
+            // 0 stands for an index that reflects everything, which no finite index does.
+            table.ior = Some(if found.ior == 0.0 { LARGEST_IOR } else { found.ior });
+        }
+        if let Some(found) = self.extension::<Specular>(all, "KHR_materials_specular")? {
+            table.specular_factor = Some(found.specular_factor);
+            table.specular_factor_texture = self.texture(found.specular_texture)?;
+            table.specular = Some(Rgb(found.specular_color_factor));
+            table.specular_texture = self.texture(found.specular_color_texture)?;
+        }
+        if let Some(found) = self.extension::<Transmission>(all, "KHR_materials_transmission")? {
+            table.transmission_factor = Some(found.transmission_factor);
+            table.transmission_texture = self.texture(found.transmission_texture)?;
+        }
+        if let Some(found) = self.extension::<Clearcoat>(all, "KHR_materials_clearcoat")? {
+            table.clearcoat = Some(found.clearcoat_factor);
+            table.clearcoat_texture = self.texture(found.clearcoat_texture)?;
+            table.clearcoat_roughness = Some(found.clearcoat_roughness_factor);
+            table.clearcoat_roughness_texture = self.texture(found.clearcoat_roughness_texture)?;
+            if found.clearcoat_normal_texture.is_some() && found.clearcoat_factor > 0.0 {
+                let name = one_line(&table.name);
+                self.pictures
+                    .warnings
+                    .push(format!("material \"{name}\": the normals of its clear coat are not rendered"));
+            }
+        }
+        Ok(())
+    }
+
+    fn texture(&mut self, info: Option<TextureInfo>) -> Result<Option<TextureTable>> {
+        info.map_or(Ok(None), |info| self.pictures.table(self.asset, &info, &self.place))
+    }
+
+    fn extension<T: DeserializeOwned>(&self, all: &Map<String, Value>, name: &str) -> Result<Option<T>> {
+        extension::read(self.asset, Some(all), name, &self.place)
+    }
+}
+
+/// Reflects 98 % head on.
+const LARGEST_IOR: f32 = 200.0;
+
+fn plain(info: &Info) -> TextureInfo {
+    let extensions = info.extensions.as_ref().map_or_else(Map::new, |e| e.others.clone());
+    TextureInfo { index: info.index.value(), tex_coord: info.tex_coord, extensions }
+}
+
+fn of_normal(info: &NormalTexture) -> TextureInfo {
+    let extensions = info.extensions.as_ref().map_or_else(Map::new, |e| e.others.clone());
+    TextureInfo { index: info.index.value(), tex_coord: info.tex_coord, extensions }
+}

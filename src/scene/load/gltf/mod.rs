@@ -1,0 +1,80 @@
+//! glTF 2.0 files become descriptions: meshes in memory, materials, instances, lights and cameras.
+//!
+//! The crate `gltf-json` parses the JSON. What it says is checked here, and buffers are read here: the crate `gltf`, which would
+//! do so, panics on counts of 0 and wrong types, and reads files anywhere.
+mod accessor;
+mod asset;
+mod camera;
+mod check;
+mod deform;
+mod extension;
+mod glb;
+mod light;
+mod material;
+mod node;
+mod picture;
+mod place;
+mod primitive;
+mod uri;
+
+use crate::error::Result;
+use crate::memory;
+use crate::scene::description::{Description, EnvironmentTable};
+use asset::Asset;
+pub use camera::Named;
+use node::Tree;
+use place::Placer;
+use std::path::Path;
+
+/// What a glTF file holds.
+#[derive(Clone, Debug, Default)]
+pub struct Model {
+    /// The default scene, seen by its first camera, or by one that frames it.
+    pub description: Description,
+    /// All cameras of the scene, in the order of its nodes.
+    pub cameras: Vec<Named>,
+    /// Readable lines about what is not rendered or was repaired.
+    pub warnings: Vec<String>,
+}
+
+/// Reads a `.gltf` or `.glb` file. A file without lights of `KHR_lights_punctual` gets a sky of radiance 1, since glTF has no
+/// other place for the light that its models are shown in.
+///
+/// # Errors
+/// [`crate::error::Error::Input`] with file, place and remedy; [`crate::error::Error::Memory`].
+pub fn load(path: &Path) -> Result<Model> {
+    let asset = Asset::read(path)?;
+    let mut model = Model::default();
+    model.warnings.extend(extension::check(&asset)?);
+    check::check(&asset)?;
+    let tree = Tree::new(&asset)?;
+    let surfaces = asset.root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let bytes = surfaces.map(|surface| primitive::bytes(&asset, surface)).fold(0, u64::saturating_add);
+    memory::need(path.display(), bytes)?;
+    let (worlds, lights) = (tree.worlds(&tree.locals), light::read(&asset)?);
+    let mut placer = Placer::new(&asset, &worlds);
+    for &node in &tree.shown {
+        placer.node(node)?;
+        model.description.light.extend(light::of_node(&asset, node, &worlds[node], &lights)?);
+        model.cameras.extend(camera::of_node(&asset, node, &worlds[node]));
+    }
+    placer.finish(&mut model.description, &mut model.warnings)?;
+    if model.description.light.is_empty() {
+        model.description.environment = Some(EnvironmentTable::default());
+    }
+    look(&mut model);
+    Ok(model)
+}
+
+/// Looks through the first camera.
+fn look(model: &mut Model) {
+    let Some(first) = model.cameras.first() else { return };
+    match &first.camera {
+        Some(camera) => model.description.camera = camera.clone(),
+        None => {
+            let line =
+                format!("camera \"{}\" is orthographic, which is not rendered: one frames the scene", first.name);
+            model.warnings.push(line);
+        }
+    }
+}

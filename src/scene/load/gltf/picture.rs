@@ -1,0 +1,135 @@
+//! Textures of glTF: pictures in files are named to the renderer, those within the asset are decoded.
+use super::asset::{Asset, one_line};
+use super::extension;
+use super::uri::{self, Target};
+use crate::error::Result;
+use crate::image::{contained, picture};
+use crate::scene::description::{Bitmap, TextureFilter, TextureTable, Wrap};
+use gltf_json::texture::{MagFilter, MinFilter, Sampler, WrappingMode};
+use gltf_json::validation::Checked;
+use gltf_json::{Image, Texture};
+use serde::Deserialize;
+use serde_json::{Map, Value};
+use std::collections::HashMap;
+use std::path::PathBuf;
+
+/// A reference to a texture, as all kinds of them have it.
+#[derive(Clone, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct TextureInfo {
+    /// Index of the texture.
+    pub index: usize,
+    /// Set of texture coordinates.
+    #[serde(default)]
+    pub tex_coord: u32,
+    /// Extensions of the reference, such as `KHR_texture_transform`.
+    #[serde(default)]
+    pub extensions: Map<String, Value>,
+}
+
+/// `KHR_texture_transform`: coordinates are scaled, turned counter-clockwise by `rotation` radians, and moved.
+#[derive(Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct TextureTransform {
+    offset: [f32; 2],
+    rotation: f32,
+    scale: [f32; 2],
+    tex_coord: Option<u32>,
+}
+
+impl Default for TextureTransform {
+    fn default() -> Self {
+        Self { offset: [0.0; 2], rotation: 0.0, scale: [1.0; 2], tex_coord: None }
+    }
+}
+
+/// The pictures that materials have asked for.
+#[derive(Default)]
+pub struct Pictures {
+    /// Those within the asset.
+    pub bitmaps: Vec<Bitmap>,
+    /// By index of the image: what materials name it by; `None` for one that cannot be had.
+    names: HashMap<usize, Option<PathBuf>>,
+    /// Messages about what is missing.
+    pub warnings: Vec<String>,
+}
+
+impl Pictures {
+    /// The table of a texture, or `None` with a warning where it has no picture.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Input`] for an index that leads nowhere, and for a picture that cannot be decoded.
+    pub fn table(&mut self, asset: &Asset, info: &TextureInfo, place: &str) -> Result<Option<TextureTable>> {
+        let textures = &asset.root.textures;
+        let missing = || asset.at(place, format!("names texture {} of {}", info.index, textures.len()));
+        let texture = textures.get(info.index).ok_or_else(missing)?;
+        let Some(file) = self.file(asset, texture, info.index)? else { return Ok(None) };
+        let name = "KHR_texture_transform";
+        let transform: TextureTransform =
+            extension::read(asset, Some(&info.extensions), name, place)?.unwrap_or_default();
+        let TextureTransform { offset, rotation, scale, tex_coord } = transform;
+        let set = tex_coord.unwrap_or(info.tex_coord);
+        if set > 1 {
+            self.warnings.push(format!("{place}: uses texture coordinates {set}: 0 and 1 can be used; 0 is taken"));
+        }
+        let uv = if set == 1 { 1 } else { 0 };
+        let sampler = texture.sampler.map(|index| &asset.root.samplers[index.value()]);
+        let (wrap, filter) = sampler.map_or_else(Default::default, sampling);
+        Ok(Some(TextureTable { file, wrap, filter, uv, offset, rotate: rotation.to_degrees(), scale }))
+    }
+
+    /// What the picture of a texture is called.
+    fn file(&mut self, asset: &Asset, texture: &Texture, index: usize) -> Result<Option<PathBuf>> {
+        let source = texture.source.value();
+        let Some(image) = asset.root.images.get(source) else {
+            self.warnings.push(format!("texture {index}: has no PNG or JPEG; its constant colour is used"));
+            return Ok(None);
+        };
+        if let Some(known) = self.names.get(&source) {
+            return Ok(known.clone());
+        }
+        let name = self.named(asset, image, &format!("image {source}"))?;
+        self.names.insert(source, name.clone());
+        Ok(name)
+    }
+
+    fn named(&mut self, asset: &Asset, image: &Image, place: &str) -> Result<Option<PathBuf>> {
+        let bytes = match (image.buffer_view, &image.uri) {
+            (Some(view), _) => asset.view(view.value())?.to_vec(),
+            (None, Some(uri)) => match uri::resolve(asset.folder(), uri).map_err(|what| asset.at(place, what))? {
+                Target::Data(bytes) => bytes,
+                Target::File(path) => {
+                    // The renderer finds it from the folder on, as it finds the pictures of other scenes.
+                    return Ok(Some(path.strip_prefix(asset.folder()).unwrap_or(&path).to_owned()));
+                }
+            },
+            (None, None) => {
+                self.warnings.push(format!("{place}: has no picture; the constant colour is used"));
+                return Ok(None);
+            }
+        };
+        let decoded = contained(|| picture(&bytes)).map_err(|what| asset.at(place, one_line(&what)))?;
+        let texels = decoded.into_rgba8();
+        let (width, height) = texels.dimensions();
+        let name = PathBuf::from(format!("{place} of {}", asset.path.display()));
+        let rgba = texels.pixels().map(|p| p.0).collect();
+        self.bitmaps.push(Bitmap { name: name.clone(), width, height, rgba });
+        Ok(Some(name))
+    }
+}
+
+/// How a sampler repeats a picture and fills the space between texels. Of the filters that shrink pictures only those without
+/// mipmaps say something about a path tracer's samples, which are magnified where they are averaged.
+fn sampling(sampler: &Sampler) -> ([Wrap; 2], TextureFilter) {
+    let wrap = |mode| match mode {
+        Checked::Valid(WrappingMode::ClampToEdge) => Wrap::Clamp,
+        Checked::Valid(WrappingMode::MirroredRepeat) => Wrap::Mirror,
+        _ => Wrap::Repeat,
+    };
+    let filter = match (sampler.mag_filter, sampler.min_filter) {
+        (Some(Checked::Valid(MagFilter::Nearest)), _) => TextureFilter::Nearest,
+        (None, Some(Checked::Valid(MinFilter::Nearest))) => TextureFilter::Nearest,
+        _ => TextureFilter::Linear,
+    };
+    ([wrap(sampler.wrap_s), wrap(sampler.wrap_t)], filter)
+}
