@@ -3,9 +3,9 @@
 //! ```text
 //! scene -> effects -> kernels                 what a scene calls for is compiled into its kernels, and nothing else
 //!
-//! guide -> priority -> apportion -> scan -> list -> path -> accumulate -> filter -> output
-//!             ^         where samples are placed      ^          |
-//!             +---------------- statistics -----------+----------+
+//! guide -> reproject -> priority -> apportion -> scan -> list -> path -> accumulate -> filter -> output
+//!                          ^         where samples are placed      ^          |
+//!                          +---------------- statistics -----------+----------+
 //! ```
 //!
 //! An engine loads a [`scene`], makes a [`render::Renderer`] on a [`gpu::Gpu`] and records its steps; [`guide::embedding`]

@@ -77,9 +77,9 @@ pub fn join(a: &Pixel, b: &Pixel) -> Pixel {
     }
 }
 
-/// Index of the pixel's next sample; 0 is the first of the render. It equals the count as long as all samples in the mean
-/// belong to this render; samples carried over from an earlier frame would be subtracted here, as in
-/// `glsl/shared/next_sample.glsl`.
+/// Index of the pixel's next sample; 0 is the first of the render. It equals the count where all samples in the mean belong to
+/// this render; from those that were carried over from earlier frames, `glsl/shared/next_sample.glsl` and
+/// [`crate::render::Renderer::broken_samples`] take off their number.
 pub fn next_sample(s: &PixelStats) -> u32 {
     s.count
 }

@@ -6,12 +6,14 @@
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer offset; // of uvec2
 layout(binding = 1) uniform usamplerBuffer stats; // of PixelStats
+layout(binding = 3) uniform usamplerBuffer carried; // of uint
 layout(scalar, binding = 2) writeonly buffer Paths { uint64_t paths[]; }; // of uvec2
 layout(scalar, push_constant) uniform Push { BatchPush push; };
 
 #include "shared/first_path.glsl"
 #include "shared/loop_limit.glsl"
 #include "shared/next_sample.glsl"
+#include "shared/history.glsl"
 
 const uint PLAIN = 32u; // loop turns for each of a thread's 64 pixels at most: see shared/loop_limit.glsl
 
@@ -22,7 +24,10 @@ uvec2 paths_in_batch(uint64_t from, uint64_t to, uint64_t begin, uint64_t end) {
 }
 
 // Index of the pixel's first sample in this batch: the statistics already hold those of the round's earlier batches.
-uint first_index(uint pixel) { return push.first_sample + next_sample(PixelStats_count(stats, pixel)); }
+uint first_index(uint pixel) {
+    uint of_earlier_frames = push.carries == 0u ? 0u : carried_of(texelFetch(carried, int(pixel)).x).count;
+    return push.first_sample + next_sample(PixelStats_count(stats, pixel), of_earlier_frames);
+}
 
 void main() {
     uint first = first_item();

@@ -85,7 +85,7 @@ void fold_light(inout PixelLight l, vec3 kept, vec3 irradiance, float share, uin
 void fold(inout PixelStats s, inout PixelLight l, inout uint broken_count, inout uint first_broken, int at) {
     vec4 first = texelFetch(samples, FX_SPLIT ? 3 * at : at);
     vec3 radiance = first.rgb;
-    if (first.w < 0.0 && broken_count++ == 0u) first_broken = next_sample(s.count);
+    if (first.w < 0.0 && broken_count++ == 0u) first_broken = next_sample(s.count, 0u); // the host knows what is carried
     s.count++;
     float share = 1.0 / float(s.count);
     if (FX_SPLIT) {

@@ -1,6 +1,3 @@
-// Index of the next sample of a pixel with `count` samples behind its mean; 0 is the render's first.
-//
-// It equals the count while all samples are of this render. Samples carried over from an earlier frame would count for the mean,
-// but not in this render's sequence: their number would have to be subtracted here and in the twin (`statistics::next_sample`).
-// No other kernel uses a count as an index.
-uint next_sample(uint count) { return count; }
+// Index of the next sample of a pixel with `count` samples behind its mean, of which `carried` are of earlier frames; 0 is the
+// frame's first. Carried samples count for the mean, but not in this frame's sequence. No other kernel uses a count as an index.
+uint next_sample(uint count, uint carried) { return count - min(carried, count); }

@@ -6,7 +6,9 @@
 // Traces the ray through the centre of one pixel per thread, from the middle of the lens, and writes its hit as a Guide, which
 // filters and sample placement use.
 layout(local_size_x_id = 100) in;
+layout(constant_id = 110) const bool POINTS = false; // writes where the surface was hit, too
 layout(scalar, binding = 11) writeonly buffer Guides { Guide guides[]; };
+layout(scalar, binding = 12) writeonly buffer Points { SurfacePoint points[]; };
 layout(scalar, push_constant) uniform Push { PathPush push; };
 
 uint nodes_visited = 0u;
@@ -31,5 +33,7 @@ void main() {
     pinhole.lens_radius = 0.0;
     Ray ray = camera_ray(pinhole, film_from_pixel(centre, push.constants.size), vec2(0.5));
     bool delta;
-    guides[i] = first_hit(ray, pcg(pixel), delta);
+    Hit hit;
+    guides[i] = first_hit(ray, pcg(pixel), delta, hit);
+    if (POINTS) points[i] = SurfacePoint(hit.triangle, hit.instance, vec2(hit.b1, hit.b2));
 }

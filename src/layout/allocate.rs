@@ -129,5 +129,7 @@ gpu_structs! {
         rounds: uint,
         /// Index of every pixel's first sample of this render in its sequence.
         first_sample: uint,
+        /// 1 where pixels may have samples of earlier frames.
+        carries: uint,
     }
 }

@@ -93,6 +93,8 @@ mod filter;
 mod path;
 #[path = "pixel.rs"]
 mod pixel;
+#[path = "reproject.rs"]
+mod reproject;
 #[path = "scene.rs"]
 mod scene;
 pub use allocate::*;
@@ -102,8 +104,10 @@ pub use effects::*;
 pub use filter::*;
 pub use path::*;
 pub use pixel::*;
+pub use reproject::*;
 pub use scene::*;
 
 /// Every struct; one that is a field of another comes before it.
 #[doc(hidden)]
-pub const STRUCTS: [&[Struct]; 5] = [scene::STRUCTS, pixel::STRUCTS, path::STRUCTS, allocate::STRUCTS, filter::STRUCTS];
+pub const STRUCTS: [&[Struct]; 6] =
+    [scene::STRUCTS, pixel::STRUCTS, path::STRUCTS, allocate::STRUCTS, filter::STRUCTS, reproject::STRUCTS];

@@ -144,6 +144,8 @@ pub struct FilmTile {
     pub light: Buffer<PixelLight>,
     /// Per pixel, where guides are wanted.
     pub guide: Buffer<Guide>,
+    /// Per pixel, where a history is kept: the points that its samples are of.
+    pub points: Buffer<SurfacePoint>,
 }
 
 impl FilmTile {
@@ -158,6 +160,11 @@ impl FilmTile {
         self.guide.len() == self.pixels as usize
     }
 
+    /// Whether it holds the points of primary hits.
+    pub fn has_points(&self) -> bool {
+        self.points.len() == self.pixels as usize
+    }
+
     fn new(gpu: &Gpu, range: Range<u32>, window: u32, effects: &Effects, guides: bool) -> Result<Self> {
         let pixels = range.end - range.start;
         let room = |on: bool| if on { pixels as usize } else { 1 };
@@ -168,6 +175,7 @@ impl FilmTile {
             stats: Buffer::new(gpu, "stats", pixels as usize, Location::Device)?,
             light: Buffer::new(gpu, "light", room(effects.split_light), Location::Device)?,
             guide: Buffer::new(gpu, "guide", room(guides), Location::Device)?,
+            points: Buffer::new(gpu, "points", 1, Location::Device)?, // Renderer::keep_history makes room
         })
     }
 }
@@ -187,6 +195,8 @@ pub struct FilmBuffers {
     pub paths: Buffer<uvec2>,
     /// Per pixel, where samples are placed.
     pub counts: Counts,
+    /// One element, which says that no samples are of an earlier frame.
+    pub none_carried: Buffer<u32>,
 }
 
 impl FilmBuffers {
@@ -206,6 +216,7 @@ impl FilmBuffers {
             samples: Buffer::new(gpu, "samples", records, Location::Device)?,
             tiles: starts.map(tile).collect::<Result<_>>()?,
             counters: Buffer::from_slice(gpu, "counters", &[0; 6])?,
+            none_carried: Buffer::from_slice(gpu, "none carried", &[0])?,
             broken: Buffer::from_slice(gpu, "broken samples", &[BrokenTally::default()])?,
         })
     }

@@ -4,9 +4,10 @@ use crate::error::{Error, Result};
 use crate::gpu::Recorder;
 use crate::layout::{FrameConstants, NONE, PriorityPush};
 use crate::render::buffers::{DeviceScene, FilmBuffers};
+use crate::render::history::History;
 use crate::render::kernels::{Allocation, Kernels};
 use crate::render::pass::sample_list::Bind;
-use crate::render::pass::{accumulate, choose, path, primary_hit, sample_list};
+use crate::render::pass::{accumulate, choose, path, primary_hit, reproject, sample_list};
 use crate::render::schedule::Step;
 
 /// What the frames of a renderer are recorded from: what they read, what they write, and the kernels between.
@@ -19,6 +20,8 @@ pub struct Frame {
     pub kernels: Kernels,
     /// The kernels that place samples, where samples are placed.
     pub allocation: Option<Allocation>,
+    /// What is carried from frame to frame, where anything is.
+    pub history: Option<History>,
     /// What all paths of a frame have in common.
     pub constants: FrameConstants,
     /// Index of every pixel's first sample.
@@ -40,6 +43,19 @@ impl Frame {
         };
         self.allocation.as_ref().ok_or_else(without)
     }
+
+    /// What is carried from frame to frame.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when nothing is, or when the camera has a lens.
+    pub fn history(&self) -> Result<&History> {
+        if self.constants.camera.lens_radius > 0.0 {
+            let what = "samples through a lens show many points: nothing can be carried; render with lens_radius 0";
+            return Err(Error::Usage(what.into()));
+        }
+        let without = || Error::Usage("this renderer keeps no history: call Renderer::keep_history first".into());
+        self.history.as_ref().ok_or_else(without)
+    }
 }
 
 /// Records the passes of one step. Beside each stands what it reads and what it writes.
@@ -52,6 +68,9 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
         Step::Start => {
             rec.update(&scene.camera, &constants.camera)?; // camera
             rec.fill(&film.broken, 0)?; // 0 -> broken
+            if let Some(history) = &frame.history {
+                rec.fill(&history.carried, 0)?; // 0 -> carried[P]
+            }
             for tile in &film.tiles {
                 rec.fill(&tile.stats, 0)?; // 0 -> stats[P]
                 rec.fill(&tile.light, 0)?; // 0 -> light[P]
@@ -59,6 +78,18 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
                     primary_hit::record(&kernels.primary_hit, rec, scene, tile, &constants.path)?; // camera -> guide[P]
                 }
             }
+            if let Some(Allocation { policy, .. }) = &frame.allocation {
+                policy.prepare(rec, &inputs(film), priority_push)?; // guide[P] -> the policy's own
+            }
+        }
+        Step::Reproject => {
+            let (history, tile) = (frame.history()?, &film.tiles[0]);
+            rec.copy(&scene.camera, &history.previous)?; // camera -> previous camera
+            rec.update(&scene.camera, &constants.camera)?; // camera
+            rec.fill(&film.broken, 0)?; // 0 -> broken
+            reproject::remember(rec, history, scene, tile, &constants.path)?; // guide[P], stats[P] -> history[P]
+            primary_hit::record(&kernels.primary_hit, rec, scene, tile, &constants.path)?; // camera -> guide[P], points[P]
+            reproject::carry(rec, history, scene, tile, &constants.path)?; // history[P], points[P] -> stats[P], light[P]
             if let Some(Allocation { policy, .. }) = &frame.allocation {
                 policy.prepare(rec, &inputs(film), priority_push)?; // guide[P] -> the policy's own
             }
@@ -83,7 +114,9 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
         }
         Step::Listed(range) => {
             let (a, push) = (frame.allocation()?, path::push_of_list(&constants.path, range.paths));
-            let bind = Bind { offset: &film.counts.offset, stats: &film.tiles[0].stats, paths: &film.paths };
+            let carried = frame.history.as_ref().map_or(&film.none_carried, |history| &history.carried);
+            let (offset, stats, paths) = (&film.counts.offset, &film.tiles[0].stats, &film.paths);
+            let bind = Bind { offset, stats, carried, paths };
             if a.list_may_be_short {
                 rec.fill(&film.paths, NONE)?; // NONE -> paths[B]
             }

@@ -220,7 +220,7 @@ impl Status {
         match step {
             Some(Step::Allocate(_) | Step::Choose(_)) => self.allocations += 1,
             Some(Step::Listed(range)) => self.last = Some(*range),
-            Some(Step::Start | Step::Uniform(_)) | None => {}
+            Some(Step::Start | Step::Reproject | Step::Uniform(_)) | None => {}
         }
     }
 }

@@ -29,11 +29,23 @@ impl Kernels {
     pub fn new(gpu: &Gpu, effects: Effects, stack: u32) -> Result<Self> {
         let (thread, traverse) = (gpu.tuning().thread(), traverse::Constants { stack });
         Ok(Self {
-            primary_hit: Kernel::new(gpu, &shaders::primary_hit::Constants { effects, thread, traverse })?,
+            primary_hit: Kernel::new(
+                gpu,
+                &shaders::primary_hit::Constants { effects, thread, traverse, points: false },
+            )?,
             path: Kernel::new(gpu, &shaders::path::Constants { effects, thread, traverse })?,
             accumulate: Kernel::new(gpu, &shaders::accumulate::Constants { effects, thread })?,
         })
     }
+}
+
+/// The kernel that finds primary hits, for films that keep a history: it writes their points as well.
+///
+/// # Errors
+/// [`crate::error::Error::Device`] when the driver refuses it.
+pub fn primary_points(gpu: &Gpu, effects: Effects, stack: u32) -> Result<primary_hit::Guides> {
+    let (thread, traverse) = (gpu.tuning().thread(), traverse::Constants { stack });
+    Kernel::new(gpu, &shaders::primary_hit::Constants { effects, thread, traverse, points: true })
 }
 
 /// The kernels that decide where samples go, for renders that do not spread them evenly.

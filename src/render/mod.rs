@@ -3,9 +3,11 @@
 pub mod buffers;
 pub mod film;
 mod frame;
+mod history;
 mod job;
 mod kernels;
 mod merge;
+mod moving;
 #[doc(hidden)] // Renderer::record runs the passes; tests and benches run them one by one
 pub mod pass;
 pub(crate) mod provenance;
@@ -20,6 +22,7 @@ mod supersampling;
 mod views;
 
 pub use buffers::{DeviceScene, FilmBuffers, FilmTile};
+pub use history::{Carriage, History, Reproject, ReprojectOverrides, carried_samples};
 pub use job::{Job, Status, StopReason};
 pub use merge::{Gap, Merged, merge};
 #[doc(hidden)] // a renderer tells its kernels; tests tell the same to their CPU twins

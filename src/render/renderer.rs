@@ -33,6 +33,7 @@ pub struct Renderer {
     pub(super) outputs: Outputs,
     pub(super) settings: Settings,
     paths: u32,
+    pub(super) stack: u32,
     delta_lights: bool,
     fingerprint: Option<Fingerprint>,
 }
@@ -106,12 +107,13 @@ impl Renderer {
             )));
         }
         let (constants, priority_push) = (frame_constants(scene, settings)?, priority_push(scene, settings));
-        let delta_lights = scene.has_delta_lights();
+        let (delta_lights, stack) = (scene.has_delta_lights(), scene.stack);
         let fingerprint = Some(scene.fingerprint([settings.width, settings.height])?);
         let scene = DeviceScene::new(gpu, scene, &effects)?;
         let (settings, first_sample) = (settings.clone(), settings.first_sample);
-        let frame = Frame { scene, film, kernels, allocation, constants, first_sample, priority_push };
-        Ok(Self { gpu: gpu.clone(), frame, effects, outputs, settings, paths, delta_lights, fingerprint })
+        let history = None;
+        let frame = Frame { scene, film, kernels, allocation, history, constants, first_sample, priority_push };
+        Ok(Self { gpu: gpu.clone(), frame, effects, outputs, settings, paths, stack, delta_lights, fingerprint })
     }
 
     /// [`Scene::has_delta_lights`] of its scene.
@@ -258,10 +260,11 @@ impl Renderer {
     pub fn broken_samples(&self) -> Result<Option<BrokenSamples>> {
         let found = self.frame.film.broken.read()?[0];
         let (pixel, Settings { width, first_sample, seed, .. }) = (!found.pixel, &self.settings);
+        let carried = if found.count > 0 { self.carried_at(pixel)? } else { 0 };
         Ok((found.count > 0).then(|| BrokenSamples {
             count: found.count.into(),
             pixel: [pixel % width, pixel / width],
-            sample: first_sample.wrapping_add(found.index),
+            sample: first_sample.wrapping_add(found.index.wrapping_sub(carried)),
             seed: *seed,
         }))
     }

@@ -20,6 +20,23 @@ pub fn film_from_pixel(pixel: Vec2, size: [u32; 2]) -> Vec2 {
     vec2(2.0, -2.0) * pixel / vec2(size[0] as f32, size[1] as f32) + vec2(-1.0, 1.0)
 }
 
+/// Film coordinates in pixels of a point in the scene, and its distance along the view direction, not above 0 for one that is not
+/// in front of the camera. Twin of the function in `glsl/shared/surface_point.glsl`.
+pub fn film_from_point(camera: &Camera, point: Vec3, size: [u32; 2]) -> Vec3 {
+    let [forward, right, up] = [camera.forward, camera.right, camera.up].map(Vec3::from);
+    let (off, across) = (point - Vec3::from(camera.position), right.cross(up));
+    let det = forward.dot(across);
+    let along = off.dot(across) / det;
+    let film = vec2(off.dot(up.cross(forward)), off.dot(forward.cross(right))) / (det * along);
+    ((film * vec2(0.5, -0.5) + 0.5) * vec2(size[0] as f32, size[1] as f32)).extend(along)
+}
+
+/// Width of a pixel in the middle of the film, at distance 1.
+pub fn pixel_width(camera: &Camera, size: [u32; 2]) -> f32 {
+    let of = |edge: [f32; 3], pixels: u32| Vec3::from(edge).length() / pixels as f32;
+    2.0 * of(camera.right, size[0]).max(of(camera.up, size[1]))
+}
+
 /// `lens` in [0, 1)^2 matters only to a lens of positive radius.
 pub fn camera_ray(camera: &Camera, film: Vec2, lens: Vec2) -> Ray {
     let [forward, right, up] = [camera.forward, camera.right, camera.up].map(Vec3::from);

@@ -12,6 +12,7 @@ pub mod light;
 pub mod metallic;
 pub mod path;
 pub mod primary_hit;
+pub mod reproject;
 pub mod sampler;
 pub mod scene;
 pub mod sphere;

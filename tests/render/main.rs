@@ -3,7 +3,10 @@ mod adaptive;
 #[path = "../support/alike.rs"]
 mod alike;
 mod analytic;
+#[path = "../support/moving.rs"]
+mod moving;
 mod references;
+mod reproject;
 #[path = "../support/scattering.rs"]
 #[allow(dead_code)]
 mod scattering;

@@ -208,7 +208,13 @@ fn every_path_of_every_batch_is_listed_once() {
     for bench in RUNS.map(Bench::with) {
         for size in [1, 65, 4097] {
             let have: Vec<u32> = words(size, 3).into_iter().map(|w| w % 5).collect();
-            let next: Vec<u32> = have.iter().map(|n| n + 7).collect();
+            // Of the larger films, some samples are of earlier frames; what else is in a word does not matter.
+            let carried: Vec<u32> = match size {
+                1 => vec![0],
+                _ => have.iter().zip(words(size, 8)).map(|(&n, w)| (w % (n + 1)) | (w & 0xffff_0000)).collect(),
+            };
+            let next: Vec<u32> = have.iter().zip(&carried).map(|(n, word)| n + 7 - (word & 0xffff)).collect();
+            let carried = Buffer::from_slice(&bench.gpu, "carried", &carried).unwrap();
             let budget = 3 * size as u64 + 1;
             let counts = bench.counts(&priorities(size, 4), &have, &plan(size, budget));
             let (stats, offsets) = (bench.stats(&have), twin::offsets(&counts.count.read().unwrap()));
@@ -228,7 +234,8 @@ fn every_path_of_every_batch_is_listed_once() {
                             let range = PathRange { first, paths: n, round: round as u32, rounds };
                             let list = Buffer::new(&bench.gpu, "paths", n as usize, Location::Device).unwrap();
                             let record = |rec: &mut Recorder| {
-                                let bind = Bind { offset: &counts.offset, stats: &stats, paths: &list };
+                                let bind =
+                                    Bind { offset: &counts.offset, stats: &stats, carried: &carried, paths: &list };
                                 sample_list::record(&bench.batch, rec, bind, &range, 7)
                             };
                             bench.gpu.run(&mut frame, record).unwrap();

@@ -7,9 +7,12 @@ mod filters;
 mod guided;
 mod kernels;
 mod lookup;
+#[path = "../support/moving.rs"]
+mod moving;
 mod path;
 #[path = "../support/picture.rs"]
 mod picture;
+mod reproject;
 mod sphere;
 mod stability;
 #[path = "../support/mod.rs"]

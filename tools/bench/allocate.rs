@@ -30,6 +30,7 @@ fn main() -> Result<()> {
     counts.priority.write(0, &priority)?;
     let (apportion, scan) = (Apportion::new(&gpu, items)?, Scan::new(&gpu, items)?);
     let lists = PerBlock::new(&gpu, items)?;
+    let carried = Buffer::from_slice(&gpu, "carried", &[0])?;
     let mut frame = FrameResources::new(&gpu)?;
     for spp in [1, 4, 64] {
         let plan = Plan { pixels, budget: u64::from(pixels) * spp, limit: None, share: Share::Next, rounds: 1 };
@@ -39,7 +40,8 @@ fn main() -> Result<()> {
             let times = gpu.run(&mut frame, |rec| {
                 apportion.record(rec, &stats, &counts, &plan)?;
                 scan.record(rec, &counts)?;
-                let bind = sample_list::Bind { offset: &counts.offset, stats: &stats, paths: &paths };
+                let bind =
+                    sample_list::Bind { offset: &counts.offset, stats: &stats, carried: &carried, paths: &paths };
                 sample_list::record(&lists, rec, bind, &range, 0)
             })?;
             let mut sums: BTreeMap<&str, f64> = BTreeMap::new();

@@ -6,6 +6,7 @@ pub mod counts;
 pub(crate) mod guide_lookup;
 pub(crate) mod path;
 pub(crate) mod primary_hit;
+pub mod reproject;
 pub mod sample_list;
 pub mod scan;
 

@@ -8,7 +8,7 @@ use crate::shaders::primary_hit::Bind;
 /// The specialised kernel.
 pub type Guides = Kernel<Bind<'static>>;
 
-/// camera -> guide\[tile\]
+/// camera -> guide\[tile\], and where a history is kept points\[tile\]
 pub fn record(
     k: &Guides,
     rec: &mut Recorder,
@@ -18,8 +18,10 @@ pub fn record(
 ) -> Result<()> {
     tile.windows().try_for_each(|w| {
         let (first_pixel, pixels) = (tile.first_pixel + w.start, w.end - w.start);
-        let guides = &tile.guide.part(w.start as usize..w.end as usize)?;
+        let part = w.start as usize..w.end as usize;
+        let guides = &tile.guide.part(part.clone())?;
+        let points = &if tile.has_points() { tile.points.part(part)? } else { tile.points.clone() };
         let push = PathPush { constants: *constants, first_pixel, pixels, ..PathPush::default() };
-        rec.dispatch_threads(k, Bind { scene: s.bind(), frame: s.bind_frame(), guides }, &push, pixels)
+        rec.dispatch_threads(k, Bind { scene: s.bind(), frame: s.bind_frame(), guides, points }, &push, pixels)
     })
 }

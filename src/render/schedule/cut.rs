@@ -23,7 +23,7 @@ impl Cut {
     /// Whether a renderer that cuts its work so has the buffers for a step.
     pub fn has_room_for(&self, step: &Step) -> bool {
         match *step {
-            Step::Start => true,
+            Step::Start | Step::Reproject => true,
             Step::Uniform(b) => {
                 let end = u64::from(b.first_pixel) + u64::from(b.pixels);
                 let within = b.pixels > 0 && end <= u64::from(self.pixels);

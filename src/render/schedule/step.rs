@@ -74,6 +74,8 @@ pub struct Choice {
 pub enum Step {
     /// Forgets all samples; finds the primary hits, if anybody reads them.
     Start,
+    /// Starts the next frame with the samples of the last that still show the same: [`crate::render::Renderer::keep_history`].
+    Reproject,
     /// The same number of samples for a run of pixels.
     Uniform(Batch),
     /// Decides how many samples each pixel gets next.
@@ -96,7 +98,7 @@ impl Step {
     /// Paths that it traces, at most.
     pub fn paths(&self) -> u64 {
         match self {
-            Self::Start | Self::Allocate(_) | Self::Choose(_) => 0,
+            Self::Start | Self::Reproject | Self::Allocate(_) | Self::Choose(_) => 0,
             Self::Uniform(b) => u64::from(b.pixels) * u64::from(b.samples),
             Self::Listed(r) => u64::from(r.paths),
         }

@@ -1,0 +1,31 @@
+// Points of surfaces as they are kept from frame to frame. Includes what surface_at and surface_bsdf need.
+uint nodes_visited = 0u; // traverse.glsl counts
+
+#include "shared/pcg.glsl"
+#include "shared/warp.glsl"
+#include "shared/fresnel.glsl"
+#include "shared/microfacet.glsl"
+#include "shared/bsdf.glsl"
+#include "shared/texture.glsl"
+#include "shared/traverse.glsl"
+#include "shared/surface.glsl"
+
+Surface surface_of(uint triangle, uint instance, vec2 weights) {
+    return surface_at(Hit(0.0, triangle, instance, weights.x, weights.y));
+}
+
+Surface surface_of(SurfacePoint p) { return surface_of(p.triangle, p.instance, p.weights); }
+
+// Film coordinates in pixels of a point in the scene, and in z its distance along the view direction, which is not above 0 for a
+// point that is not in front of the camera. A camera whose axes lie in one plane gives no numbers.
+vec3 film_from_point(Camera camera, vec3 point, uvec2 size) {
+    vec3 off = point - camera.position, across = cross(camera.right, camera.up);
+    float det = dot(camera.forward, across), along = dot(off, across) / det;
+    vec2 film = vec2(dot(off, cross(camera.up, camera.forward)), dot(off, cross(camera.forward, camera.right))) / (det * along);
+    return vec3((film * vec2(0.5, -0.5) + 0.5) * vec2(size), along);
+}
+
+// Width of a pixel in the middle of the film, at distance 1.
+float pixel_width(Camera camera, uvec2 size) {
+    return 2.0 * max(length(camera.right) / float(size.x), length(camera.up) / float(size.y));
+}

@@ -1,0 +1,63 @@
+//! Structs of the kernels that carry samples from frame to frame (`glsl/reproject`).
+#[cfg(doc)]
+use super::*;
+use super::{Field, Struct, float, uint, uvec2, vec2, vec3};
+use bytemuck::{Pod, Zeroable};
+
+gpu_structs! {
+    /// A point of a surface, named by its triangle, so that it moves with its mesh. 1 texel.
+    struct SurfacePoint {
+        /// Index of the triangle in leaf order, or [`NONE`] where there is no surface.
+        triangle: uint,
+        /// Index of the instance in leaf order of the top level, or [`NONE`].
+        instance: uint,
+        /// Weights of vertices 1 and 2; of a sphere, its unit normal as an octahedral point.
+        weights: vec2,
+    }
+
+    /// What a pixel of the last frame hands on. Their number is in a word of its own (`glsl/shared/history.glsl`).
+    struct History {
+        /// The point that the samples are of, as [`SurfacePoint::triangle`].
+        triangle: uint,
+        /// As [`SurfacePoint::instance`].
+        instance: uint,
+        /// As [`SurfacePoint::weights`].
+        weights: vec2,
+        /// As [`PixelStats::mean`].
+        mean: vec3,
+        /// As [`PixelStats::m2`], of the samples that are handed on.
+        m2: vec3,
+    }
+
+    /// The light of a [`History`], where direct and indirect light are kept apart.
+    struct HistoryLight {
+        /// As [`PixelLight::direct`].
+        direct: vec3,
+        /// As [`PixelLight::indirect`].
+        indirect: vec3,
+        /// As [`PixelLight::indirect_m2`], of the samples that are handed on.
+        indirect_m2: float,
+    }
+
+    /// Push constants of `glsl/reproject`.
+    struct ReprojectPush {
+        /// Film in pixels.
+        size: uvec2,
+        /// First pixel of the dispatch.
+        first_pixel: uint,
+        /// Pixels of the dispatch.
+        pixels: uint,
+        /// Largest error that a pixel's carried samples are accounted, W/(m^2 sr).
+        max_error: float,
+        /// Largest distance of a neighbour's first hit from the plane of the pixel's own, in widths of the pixel there.
+        aliasing: float,
+        /// Largest number of samples that a pixel hands on.
+        max_samples: uint,
+        /// Largest number of times that samples may move, at most 255.
+        max_age: uint,
+        /// Samples that the new frame gives a pixel: carried samples that are fewer take on the new frame's point.
+        spp: uint,
+        /// 1 where something in the scene has moved besides the camera.
+        moved: uint,
+    }
+}

@@ -1,0 +1,66 @@
+//! Frames that begin with the samples of the last: what a renderer needs for it, and what became of them.
+use super::history::{Carriage, History, Reproject, carried_samples};
+use super::{Renderer, Step, kernels};
+use crate::error::{Error, Result};
+use crate::gpu::{Buffer, Location};
+use crate::layout::PixelStats;
+
+impl Renderer {
+    /// From now on frames can begin with [`Step::Reproject`] in place of [`Step::Start`]: with the samples of the last frame that
+    /// show the same surface from the new camera. Call it once, before anything is recorded; the renderer must have been made with
+    /// [`super::Outputs::guides`]. The first [`Step::Reproject`] of all carries nothing.
+    ///
+    /// Carried samples count in the mean, in its variance and in the number of samples of a pixel. They are no part of the
+    /// sequence that new samples come from: give each frame its own by [`Self::set_first_sample`], or its own seed.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a setting out of range, for a renderer without guides and for a film that is too large;
+    /// [`Error::Device`].
+    pub fn keep_history(&mut self, settings: Reproject) -> Result<()> {
+        let (pixels, spp) = (self.settings.pixels() as u32, self.settings.spp);
+        if !self.frame.film.tiles[0].has_guide() || self.frame.film.tiles.len() > 1 {
+            let what =
+                "a history needs primary hits, and a film that fits one buffer: make the renderer with Outputs::guides";
+            return Err(Error::Usage(what.into()));
+        }
+        let history = History::new(&self.gpu, self.effects, self.stack, pixels, spp, settings)?;
+        let tile = &mut self.frame.film.tiles[0];
+        tile.points = Buffer::new(&self.gpu, "points", pixels as usize, Location::Device)?;
+        tile.stats.write(0, &vec![PixelStats::default(); pixels as usize])?;
+        self.frame.kernels.primary_hit = kernels::primary_points(&self.gpu, self.effects, self.stack)?;
+        self.frame.history = Some(history);
+        Ok(())
+    }
+
+    /// What is carried from frame to frame; none without [`Self::keep_history`].
+    pub fn history(&self) -> Option<&History> {
+        self.frame.history.as_ref()
+    }
+
+    /// The work of a frame that begins with the samples of the last: [`Self::steps`], but for its beginning.
+    pub fn steps_on(&self) -> impl Iterator<Item = Step> + use<> {
+        std::iter::once(Step::Reproject).chain(self.steps().skip(1))
+    }
+
+    /// Chooses the index of each pixel's first sample in its sequence, from the next [`Step::Start`] or [`Step::Reproject`] on.
+    pub fn set_first_sample(&mut self, first_sample: u32) {
+        self.frame.first_sample = first_sample;
+        self.settings.first_sample = first_sample;
+    }
+
+    /// What became of the pixels at the last [`Step::Reproject`].
+    ///
+    /// # Errors
+    /// [`Error::Usage`] without a history, [`Error::Device`].
+    pub fn carriage(&self) -> Result<Carriage> {
+        let history = self.frame.history()?;
+        Ok(Carriage::of(&history.offered.read()?, &history.carried.read()?))
+    }
+
+    /// Samples of a pixel that are not of this frame.
+    pub(super) fn carried_at(&self, pixel: u32) -> Result<u32> {
+        let Some(history) = &self.frame.history else { return Ok(0) };
+        let at = pixel as usize;
+        Ok(carried_samples(history.carried.read_range(at..at + 1)?[0]))
+    }
+}

@@ -1,0 +1,63 @@
+//! Carries the samples of the last frame to the pixels of a new one. Kernels: `glsl/reproject/*.comp`. Twins:
+//! [`crate::twins::reproject`].
+use crate::error::Result;
+use crate::gpu::Recorder;
+use crate::layout::{NONE, PathConstants};
+use crate::render::buffers::{DeviceScene, FilmTile};
+use crate::render::history::History;
+use crate::shaders::{carry, project, remember};
+
+/// Before the new frame's primary hits: guide\[P\], points\[P\], stats\[P\], light\[P\] -> history\[P\]
+pub fn remember(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, c: &PathConstants) -> Result<()> {
+    t.windows().try_for_each(|w| {
+        let part = w.start as usize..w.end as usize;
+        let apart = h.light.len() == t.pixels as usize; // else one unused element
+        let bind = remember::Bind {
+            scene: s.bind(),
+            frame: s.bind_frame(),
+            guide: &t.guide,
+            stats: &t.stats,
+            light: &t.light,
+            points: &t.points,
+            previous: &h.previous,
+            carried: &h.carried,
+            history: &h.records.part(part.clone())?,
+            history_light: &if apart { h.light.part(part.clone())? } else { h.light.clone() },
+            offered: &h.offered.part(part)?,
+        };
+        rec.dispatch_threads(&h.remember, bind, &h.push(c, w.start, w.end - w.start), w.end - w.start)
+    })
+}
+
+/// After them: history\[P\], points\[P\] -> stats\[P\], light\[P\], carried\[P\]
+pub fn carry(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, c: &PathConstants) -> Result<()> {
+    rec.fill(&h.carried, NONE)?; // NONE -> winner[P]
+    let bind = project::Bind {
+        scene: s.bind(),
+        frame: s.bind_frame(),
+        history: &h.records,
+        points: &t.points,
+        previous: &h.previous,
+        offered: &h.offered,
+        winner: &h.carried,
+    };
+    rec.dispatch_threads(&h.project, bind, &h.push(c, 0, t.pixels), t.pixels)?;
+    t.windows().try_for_each(|w| {
+        let part = w.start as usize..w.end as usize;
+        let apart = h.light.len() == t.pixels as usize;
+        let bind = carry::Bind {
+            scene: s.bind(),
+            frame: s.bind_frame(),
+            guide: &t.guide,
+            history: &h.records,
+            history_light: &h.light,
+            offered: &h.offered,
+            previous: &h.previous,
+            stats: &t.stats.part(part.clone())?,
+            light: &if apart { t.light.part(part.clone())? } else { t.light.clone() },
+            points: &t.points.part(part.clone())?,
+            winner: &h.carried.part(part)?,
+        };
+        rec.dispatch_threads(&h.carry, bind, &h.push(c, w.start, w.end - w.start), w.end - w.start)
+    })
+}

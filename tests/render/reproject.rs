@@ -1,0 +1,284 @@
+//! Tests frames that begin with the samples of the last: what must be carried to the bit, what must not be carried at all, and
+//! that what is carried is of the right surface. A naive arm, which keeps all samples where they are on the film, fails every
+//! check of truth.
+use crate::moving::{Film, shifted, turned};
+use crate::support::{self, assert_silent, gpu};
+use crate::twin::Workplace;
+use std::path::Path;
+use tallow::gpu::Gpu;
+use tallow::layout::{Camera, PixelStats};
+use tallow::render::settings::Settings;
+use tallow::render::{Carriage, Outputs, Renderer, Reproject, Step, carried_samples};
+use tallow::scene::{Loaded, Scene};
+
+fn scene(file: &str, change: impl Fn(&mut Settings)) -> Loaded {
+    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file))
+        .map(|scene| scene.with(&change))
+        .unwrap()
+}
+
+fn small(s: &mut Settings) {
+    (s.width, s.height, s.spp, s.max_depth) = (49, 33, 4, 4);
+}
+
+fn bits<T: bytemuck::Pod>(values: &[T]) -> Vec<u32> {
+    bytemuck::cast_slice(values).to_vec()
+}
+
+#[test]
+fn a_camera_at_rest_accumulates_to_the_bit() {
+    let gpu = gpu();
+    for file in ["cornell-box/scene.toml", "cornell-box/glass.toml", "veach-mis/scene.toml"] {
+        let whole = scene(file, |s| (small(s), s.spp = 12).0);
+        let outputs = Outputs { split_light: true, guides: true, counters: false };
+        let renderer = Renderer::new(&gpu, &whole, &whole.settings, outputs).unwrap();
+        let expected = support::render(&gpu, &renderer);
+        let light = renderer.film().tiles[0].light.read().unwrap();
+
+        let parts = scene(file, small);
+        // Limits are those of samples that move.
+        let strict =
+            Reproject { reproject_samples: 1, reproject_age: 0, reproject_error: 0.0, reproject_aliasing: 0.0 };
+        let mut film = Film::new(&gpu, &parts, strict);
+        (0..3).for_each(|_| film.frame(film.camera));
+        assert!(bits(&film.stats()) == bits(&expected) && bits(&film.light()) == bits(&light), "{file}");
+        assert!(film.carried().iter().all(|&word| word == 8), "{file}: all of two frames, and none has moved");
+
+        let mut repeats = Film::new(&gpu, &parts, strict);
+        (0..3).for_each(|_| {
+            repeats.renderer.set_first_sample(0);
+            repeats.frame(repeats.camera);
+        });
+        assert!(bits(&repeats.stats()) != bits(&expected), "control: the same samples three times");
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn the_size_of_batches_changes_no_bit() {
+    let gpu = gpu();
+    let scene = scene("cornell-box/glossy.toml", small);
+    let frames = |cut: Option<u32>| {
+        let mut film = Film::new(&gpu, &scene, Reproject { reproject_error: 1.0, ..Reproject::default() });
+        for k in 0..3_u32 {
+            let camera = shifted(turned(film.camera, 1.7 * k as f32), [0.01 * k as f32, 0.0, 0.0]);
+            match cut {
+                None => film.frame(camera),
+                Some(pixels) => {
+                    film.begin(camera);
+                    for first_pixel in (0..49 * 33).step_by(pixels as usize) {
+                        let pixels = pixels.min(49 * 33 - first_pixel);
+                        let batch = |first, samples| {
+                            Step::Uniform(tallow::render::Batch {
+                                first_pixel,
+                                pixels,
+                                first_sample: 4 * k + first,
+                                samples,
+                            })
+                        };
+                        film.step(&batch(0, 1));
+                        film.step(&batch(1, 3));
+                    }
+                }
+            }
+        }
+        (film.stats(), film.carried())
+    };
+    let (whole, words) = frames(None);
+    assert!(words.iter().filter(|&&word| carried_samples(word) > 0).count() > 300, "control");
+    for pixels in [64, 77, 1000] {
+        let (cut, cut_words) = frames(Some(pixels));
+        assert!(bits(&cut) == bits(&whole) && cut_words == words, "{pixels} pixels at a time");
+    }
+    assert_silent(&gpu);
+}
+
+/// A floor, a diffuse and a glossy ball, a lamp and a small box behind them, all `scale` times as large.
+fn scaled(scale: f64) -> Loaded {
+    let v = |x: f64, y: f64, z: f64| format!("[{:e}, {:e}, {:e}]", x * scale, y * scale, z * scale);
+    let mut scene = Workplace::new().scene(&format!(
+        "[camera]\nposition = {}\ntarget = {}\nfov = 45.0\n[render]\nmax_depth = 3\n\
+         [[material]]\nname = 'gloss'\ntype = 'conductor'\nmetal = 'Al'\nalpha = 0.4\n[[material]]\nname = 'lamp'\nemission = 9.0\n\
+         [[mesh]]\nshape = 'rectangle'\ntransform = {{ rotate = [-90.0, 0.0, 0.0], scale = {:e} }}\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'lamp'\n\
+         transform = {{ rotate = [75.0, 0.0, 0.0], scale = {:e}, translate = {} }}\n\
+         [[mesh]]\nname = 'ball'\nshape = 'sphere'\nsegments = 64\n\
+         [[instance]]\nmesh = 'ball'\nmaterial = 'gloss'\ntransform = {{ scale = {:e}, translate = {} }}\n\
+         [[instance]]\nmesh = 'ball'\ntransform = {{ scale = {:e}, translate = {} }}\n\
+         [[mesh]]\nshape = 'cube'\ntransform = {{ rotate = [0.0, 30.0, 0.0], scale = {:e}, translate = {} }}\n",
+        v(0.0, 1.4, 5.0),
+        v(0.0, 0.7, 0.0),
+        4.0 * scale,
+        0.5 * scale,
+        v(0.0, 3.0, 0.5),
+        0.7 * scale,
+        v(-0.8, 0.7, 0.0),
+        0.5 * scale,
+        v(0.9, 0.5, 0.5),
+        0.3 * scale,
+        v(0.2, 0.3, -1.0),
+    ));
+    small(&mut scene.settings);
+    scene
+}
+
+/// Of every pixel after two frames: samples carried, how often they moved, the point that they are of; and why others were dropped.
+fn kept(gpu: &Gpu, scale: f32) -> Vec<[u32; 4]> {
+    let scene = scaled(f64::from(scale));
+    let mut film = Film::new(gpu, &scene, Reproject { reproject_error: 0.5, ..Reproject::default() });
+    film.frame(film.camera);
+    film.frame(shifted(turned(film.camera, 1.3), [0.02 * scale, 0.01 * scale, 0.3 * scale]));
+    film.begin(shifted(turned(film.camera, 2.1), [0.07 * scale, 0.02 * scale, 0.5 * scale]));
+    let found = film.renderer.carriage().unwrap();
+    assert!(found.carried > 400 && found.edge > 50 && found.outside > 20, "control: {found:?}");
+    let pixels = film.carried().into_iter().zip(film.points()).zip(film.offered());
+    // The error is of light, whose last bits differ.
+    pixels.map(|((word, p), offered)| [word & 0xff_ffff, p.triangle, p.instance, offered & 0xff_ffff]).collect()
+}
+
+#[test]
+fn the_unit_of_length_does_not_matter() {
+    let gpu = gpu();
+    let whole = kept(&gpu, 1.0);
+    for scale in [1e-3, 1e3, 1e-6, 1e6] {
+        let differ = kept(&gpu, scale).iter().zip(&whole).filter(|(a, b)| a != b).count();
+        assert_eq!(differ, 0, "{scale:e}: pixels that keep other samples");
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn nothing_is_carried_where_nothing_is_to_be_seen_again() {
+    let gpu = gpu();
+    let scene = scene("cornell-box/scene.toml", small);
+    let all = 49 * 33;
+    let mut film = Film::new(&gpu, &scene, Reproject::default());
+    let at = film.camera;
+    // The first frame of all may begin like any other.
+    film.begin(at);
+    assert_eq!(film.renderer.carriage().unwrap(), Carriage { new: all, ..Carriage::default() });
+    assert!(film.stats().iter().all(|s| *s == PixelStats::default()));
+    film.frame(at);
+
+    // A half turn puts every point behind the camera.
+    film.begin(turned(at, 180.0));
+    let found = film.renderer.carriage().unwrap();
+    assert!(found.carried == 0 && found.samples == 0 && found.outside + found.edge + found.sky == all, "{found:?}");
+    assert!(film.stats().iter().all(|s| *s == PixelStats::default()));
+
+    // Cuts to where the wall hides all, to within a point, to axes that lie in one plane.
+    for cut in [
+        shifted(at, [0.0, 0.0, -400.0]),
+        Camera { right: at.up, ..at },
+        Camera { forward: at.right, up: [0.0; 3], ..at },
+        Camera { right: [0.0; 3], up: [0.0; 3], ..at },
+    ] {
+        let mut film = Film::new(&gpu, &scene, Reproject::default());
+        film.frame(at);
+        film.frame(cut);
+        assert!(film.stats().iter().all(|s| s.mean.iter().chain(&s.m2).all(|v| v.is_finite())), "{cut:?}");
+        film.frame(at);
+        assert!(film.stats().iter().all(|s| s.mean.iter().chain(&s.m2).all(|v| v.is_finite())), "{cut:?}, and back");
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn limits_hold() {
+    let gpu = gpu();
+    let scene = scene("cornell-box/scene.toml", small);
+    let of = |settings: Reproject| {
+        let mut film = Film::new(&gpu, &scene, settings);
+        let words: Vec<Vec<u32>> = (0..6)
+            .map(|k| {
+                film.frame(turned(film.camera, 0.9 * k as f32));
+                film.carried()
+            })
+            .collect();
+        let most = |of: fn(u32) -> u32| words.iter().flatten().map(|&word| of(word)).max().unwrap();
+        [most(carried_samples), most(|word| if carried_samples(word) > 0 { word >> 16 & 0xff } else { 0 })]
+    };
+    assert_eq!(of(Reproject::default()), [20, 5], "control: five frames of four samples");
+    assert_eq!(of(Reproject { reproject_samples: 7, ..Reproject::default() }), [7, 5]);
+    assert_eq!(of(Reproject { reproject_age: 2, ..Reproject::default() })[1], 2);
+    assert_eq!(of(Reproject { reproject_age: 0, ..Reproject::default() }), [0, 0]);
+    let mut film = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
+    let error = film.keep_history(Reproject::default()).unwrap_err().to_string();
+    assert!(error.contains("Outputs::guides"), "{error}");
+    let outputs = Outputs { guides: true, ..Outputs::default() };
+    let mut film = Renderer::new(&gpu, &scene, &scene.settings, outputs).unwrap();
+    let error = film.keep_history(Reproject { reproject_age: 256, ..Reproject::default() }).unwrap_err().to_string();
+    assert!(error.contains("reproject-age is 256"), "{error}");
+    assert!(film.run(&mut tallow::gpu::FrameResources::new(&gpu).unwrap(), &Step::Reproject).is_err());
+    assert_silent(&gpu);
+}
+
+/// Share of pixels, of those with samples carried, whose mean is farther than four standard errors from that of a direct render,
+/// and the mean of the errors of all in units of the picture's brightness.
+fn truth(stats: &[PixelStats], words: &[u32], direct: &[PixelStats]) -> [f64; 2] {
+    let (mut wrong, mut all, mut off, mut light) = (0.0, 0.0, 0.0, 0.0);
+    for ((s, d), _) in stats.iter().zip(direct).zip(words).filter(|(_, word)| carried_samples(**word) > 0) {
+        let variance = |s: &PixelStats| f64::from(s.m2[1]) / f64::from(s.count) / f64::from(s.count.max(2) - 1);
+        let difference = f64::from(s.mean[1]) - f64::from(d.mean[1]);
+        // The deviation of the direct render stands for that of the few samples, which may be alike by chance.
+        let error = (variance(d) * f64::from(d.count) / f64::from(s.count) + variance(d)).sqrt();
+        wrong += f64::from(u8::from(difference.abs() > 4.0 * error + 1e-3));
+        (all, off, light) = (all + 1.0, off + difference, light + f64::from(d.mean[1]));
+    }
+    [wrong / all, off / light]
+}
+
+#[test]
+fn every_way_to_a_view_shows_what_is_there() {
+    let gpu = gpu();
+    for file in ["cornell-box/scene.toml", "cornell-box/glossy.toml"] {
+        let scene = scene(file, |s| (small(s), s.spp = 8).0);
+        let long = scene.clone().with(|s| s.spp = 1024);
+        let reach = glam::Vec3::from(scene.bounds[1]).distance(scene.bounds[0].into());
+        let end = |c: Camera| shifted(turned(c, 6.0), [0.05 * reach, 0.0, 0.05 * reach]);
+        let mut direct = Film::new(&gpu, &long, Reproject::default());
+        direct.renderer.set_seed(7);
+        direct.frame(end(direct.camera));
+        let direct = direct.stats();
+        // Three ways there: turning first, moving first, and from the other side.
+        let way = |way: usize, t: f32, c: Camera| {
+            let [turn, shift] = [[2.0 * t, 2.0 * t - 1.0], [2.0 * t - 1.0, 2.0 * t], [2.0 - t, 2.0 - t]][way]
+                .map(|t| if way == 2 { t } else { t.clamp(0.0, 1.0) });
+            shifted(turned(c, 6.0 * turn), [0.05 * shift * reach, 0.0, 0.05 * shift * reach])
+        };
+        for path in 0..3 {
+            let mut film = Film::new(&gpu, &scene, Reproject::default());
+            let start = film.camera;
+            (0..=8).for_each(|k| film.frame(way(path, k as f32 / 8.0, start)));
+            film.frame(end(start)); // the end of all three, but for rounding
+            let found = film.renderer.carriage().unwrap();
+            assert!(found.carried > 400, "{file} way {path}: {found:?}");
+            let [wrong, off] = truth(&film.stats(), &film.carried(), &direct);
+            assert!(
+                wrong < 0.01 && off.abs() < 0.01,
+                "{file} way {path}: {wrong} of pixels wrong, off by {off}: {found:?}"
+            );
+        }
+        // The naive arm: what lies on the film stays there.
+        let mut naive = Film::new(&gpu, &scene, Reproject::default());
+        let start = naive.camera;
+        for k in 0..=8 {
+            naive.renderer.set_camera(way(0, k as f32 / 8.0, start)).unwrap();
+            let steps: Vec<Step> = naive.renderer.steps().collect();
+            if k == 0 {
+                naive.step(&Step::Start);
+            } else {
+                // The camera that rays start from is written by a start alone: its statistics are put back.
+                let stats = naive.stats();
+                naive.step(&Step::Start);
+                naive.renderer.film().tiles[0].stats.write(0, &stats).unwrap();
+            }
+            naive.renderer.set_first_sample(8 * k + 8);
+            steps[1..].iter().for_each(|step| naive.step(step));
+        }
+        let words = vec![64; 49 * 33];
+        let [wrong, _] = truth(&naive.stats(), &words, &direct);
+        assert!(wrong > 0.05, "control: the naive arm passes: {wrong}");
+    }
+    assert_silent(&gpu);
+}

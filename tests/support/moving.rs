@@ -1,0 +1,81 @@
+//! Cameras that move, and renderers whose frames follow them.
+#![allow(dead_code)]
+use glam::{Quat, Vec3};
+use tallow::gpu::{FrameResources, Gpu};
+use tallow::layout::{Camera, PixelLight, PixelStats, SurfacePoint};
+use tallow::render::{Outputs, Renderer, Reproject, Step};
+use tallow::scene::Loaded;
+
+/// The camera turned to the left around its own vertical axis, in degrees.
+pub fn turned(camera: Camera, degrees: f32) -> Camera {
+    let turn = Quat::from_axis_angle(Vec3::from(camera.up).normalize(), degrees.to_radians());
+    let of = |v: [f32; 3]| (turn * Vec3::from(v)).to_array();
+    Camera { right: of(camera.right), forward: of(camera.forward), up: of(camera.up), ..camera }
+}
+
+/// The camera moved by lengths along its own unit axes: to the right, up, forward.
+pub fn shifted(camera: Camera, by: [f32; 3]) -> Camera {
+    let axes = [camera.right, camera.up, camera.forward].map(|axis| Vec3::from(axis).normalize());
+    let off = by[0] * axes[0] + by[1] * axes[1] + by[2] * axes[2];
+    Camera { position: (Vec3::from(camera.position) + off).to_array(), ..camera }
+}
+
+/// A renderer whose frames begin with the last one's samples.
+pub struct Film {
+    pub renderer: Renderer,
+    frame: FrameResources,
+    pub camera: Camera,
+    /// Whether the next frame is the first.
+    begun: bool,
+}
+
+impl Film {
+    pub fn new(gpu: &Gpu, scene: &Loaded, settings: Reproject) -> Self {
+        let outputs = Outputs { split_light: true, guides: true, counters: false };
+        let mut renderer = Renderer::new(gpu, scene, &scene.settings, outputs).unwrap();
+        renderer.keep_history(settings).unwrap();
+        let camera = scene.camera([scene.settings.width, scene.settings.height]).unwrap();
+        Self { renderer, frame: FrameResources::new(gpu).unwrap(), camera, begun: false }
+    }
+
+    pub fn step(&mut self, step: &Step) {
+        self.renderer.run(&mut self.frame, step).unwrap();
+    }
+
+    /// Renders a frame from `camera`, with samples that no frame before had.
+    pub fn frame(&mut self, camera: Camera) {
+        self.renderer.set_camera(camera).unwrap();
+        let steps: Vec<Step> =
+            if self.begun { self.renderer.steps_on().collect() } else { self.renderer.steps().collect() };
+        steps.iter().for_each(|step| self.step(step));
+        let (first, spp) = (self.renderer.settings().first_sample, self.renderer.settings().spp);
+        self.renderer.set_first_sample(first + spp);
+        self.begun = true;
+    }
+
+    /// Begins a frame from `camera`, and renders nothing.
+    pub fn begin(&mut self, camera: Camera) {
+        self.renderer.set_camera(camera).unwrap();
+        self.step(&Step::Reproject);
+    }
+
+    pub fn stats(&self) -> Vec<PixelStats> {
+        self.renderer.film().tiles[0].stats.read().unwrap()
+    }
+
+    pub fn light(&self) -> Vec<PixelLight> {
+        self.renderer.film().tiles[0].light.read().unwrap()
+    }
+
+    pub fn points(&self) -> Vec<SurfacePoint> {
+        self.renderer.film().tiles[0].points.read().unwrap()
+    }
+
+    pub fn carried(&self) -> Vec<u32> {
+        self.renderer.history().unwrap().carried.read().unwrap()
+    }
+
+    pub fn offered(&self) -> Vec<u32> {
+        self.renderer.history().unwrap().offered.read().unwrap()
+    }
+}
