@@ -143,6 +143,16 @@ impl<T: Pod> Buffer<T> {
         Self::from_slice(gpu, name, values)
     }
 
+    /// As [`Self::new`], in [`Location::Device`], for data that kernels read as texels.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn for_texels(gpu: &Gpu, name: &str, len: usize) -> Result<Self> {
+        let bytes = len.saturating_mul(size_of::<T>()) as u64;
+        check_texels(name, bytes, size_of::<T>(), gpu.0.info.max_texel_elements)?;
+        Self::new(gpu, name, len, Location::Device)
+    }
+
     /// Number of elements, at least 1.
     #[allow(clippy::len_without_is_empty)]
     pub fn len(&self) -> usize {

@@ -5,6 +5,7 @@ use super::descriptors::Descriptors;
 use super::kernel::Parts;
 use super::shape::{Pass, PassObserver, PassShape};
 use super::timing::{PassTime, Timer};
+use super::upload::Uploads;
 use super::{Gpu, Kernel};
 use crate::error::Result;
 use ash::vk;
@@ -17,6 +18,7 @@ pub struct FrameResources {
     pub(super) descriptors: Descriptors,
     pub(super) timer: Timer,
     pub(super) hazards: Hazards,
+    pub(super) uploads: Uploads,
     kernels: Vec<Arc<Parts>>,
     /// One for each pass of the last recording.
     pub(super) shapes: Vec<PassShape>,
@@ -32,6 +34,7 @@ impl FrameResources {
             descriptors: Descriptors::new(gpu),
             timer: Timer::new(gpu),
             hazards: Hazards::default(),
+            uploads: Uploads::default(),
             kernels: Vec::new(),
             shapes: Vec::new(),
             observer: None,
@@ -97,6 +100,7 @@ impl FrameResources {
         self.gpu().0.answers()?;
         self.timer.reset();
         self.hazards.clear();
+        self.uploads.reset();
         self.kernels.clear();
         self.shapes.clear();
         self.descriptors.reset()

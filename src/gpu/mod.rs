@@ -32,6 +32,7 @@ mod shape;
 mod staging;
 mod timing;
 mod tuning;
+mod upload;
 
 pub use access::Access;
 pub use blocks::{PerBlock, block_count, thread_items};

@@ -176,6 +176,42 @@ impl<'a> Recorder<'a> {
         })
     }
 
+    /// Replaces parts of `buffer`, each the elements from an index on, by way of memory of the frame's own: the values are read now,
+    /// and may change while the frame is in flight. Passes recorded before it read the old values, later ones the new. Parts of
+    /// one call may not overlap.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when a part exceeds the buffer, or memory is out.
+    pub fn upload<T: Pod>(&mut self, buffer: &Buffer<T>, parts: &[(usize, &[T])]) -> Result<()> {
+        let parts: Vec<_> = parts.iter().filter(|(_, values)| !values.is_empty()).collect();
+        if let Some((at, values)) = parts.iter().find(|(at, v)| at.saturating_add(v.len()) > buffer.len()) {
+            let (name, count, len) = (&buffer.bound().buffer.name, values.len(), buffer.len());
+            return Err(Error::Device(format!("buffer \"{name}\": {count} elements at {at} exceed its {len}")));
+        }
+        if parts.is_empty() {
+            return Ok(());
+        }
+        let Bound { buffer: target, offset, .. } = buffer.bound();
+        self.owns(&[buffer.bound()])?;
+        let bytes = parts.iter().map(|(_, values)| size_of_val(*values)).sum();
+        let slices = parts.iter().map(|(_, values)| bytemuck::cast_slice(values));
+        let (staged, first) = self.frame.uploads.write(self.gpu, bytes, slices)?;
+        let source = staged.bound().buffer;
+        let mut from = first as u64;
+        let region = |(at, values): &&(usize, &[T])| {
+            let (size, src_offset) = (size_of_val(*values) as u64, from);
+            from += size;
+            vk::BufferCopy { src_offset, dst_offset: offset + (at * size_of::<T>()) as u64, size }
+        };
+        let regions: Vec<_> = parts.iter().map(region).collect();
+        let accesses = [(source, Access::CopySource), (target, Access::CopyTarget)];
+        // SAFETY: two live buffers that hold the regions, kept by the frame.
+        let shape = PassShape::of_transfer(&accesses.map(|(_, access)| access), bytes as u64);
+        self.pass("upload", &accesses, shape, |device, commands| unsafe {
+            device.cmd_copy_buffer(commands, source.raw, target.raw, &regions);
+        })
+    }
+
     /// Omits the barriers between all later passes. Tests plant this fault to prove that validation finds it.
     #[doc(hidden)]
     pub fn suppress_barriers(&mut self) {

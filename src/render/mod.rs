@@ -19,6 +19,7 @@ mod resume;
 pub mod schedule;
 pub use crate::scene::description::settings;
 mod supersampling;
+mod update;
 mod views;
 
 pub use buffers::{DeviceScene, FilmBuffers, FilmTile};

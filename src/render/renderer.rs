@@ -32,10 +32,10 @@ pub struct Renderer {
     pub(super) effects: Effects,
     pub(super) outputs: Outputs,
     pub(super) settings: Settings,
-    paths: u32,
     pub(super) stack: u32,
-    delta_lights: bool,
-    fingerprint: Option<Fingerprint>,
+    paths: u32,
+    pub(super) delta_lights: bool,
+    pub(super) fingerprint: Option<Fingerprint>,
 }
 
 /// Ray counts since the renderer was made.

@@ -53,7 +53,7 @@ pub fn effects(
         ggx: material(Effect::ggx, &|m| rough(m) && m.flags & MATERIAL_GGX != 0),
         ..Effects::default()
     };
-    light_effects(scene, &mut found, &mut reasons);
+    add_light_effects(scene, &mut found, &mut reasons);
     scene_effects(scene, &mut found, &mut reasons);
     setting_effects(settings, &mut found, &mut reasons);
     let soft = keeps_soft_light_apart(scene, settings);
@@ -76,7 +76,14 @@ fn used_materials(scene: &Scene) -> Vec<bool> {
     used
 }
 
-fn light_effects(scene: &Scene, found: &mut Effects, reasons: &mut Vec<(Effect, String)>) {
+/// Those of the effects that lights and the camera's lens call for.
+pub fn light_effects(scene: &Scene) -> Effects {
+    let mut found = Effects { lens: scene.view.lens_radius > 0.0, ..Effects::default() };
+    add_light_effects(scene, &mut found, &mut Vec::new());
+    found
+}
+
+fn add_light_effects(scene: &Scene, found: &mut Effects, reasons: &mut Vec<(Effect, String)>) {
     let mut light = |name, kind| {
         let first = scene.lights.iter().position(|l| l.kind == kind);
         first.inspect(|&i| reasons.push((name, light_name(scene, i)))).is_some()

@@ -14,18 +14,25 @@ use load::gltf;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
+mod apply;
 mod build;
+mod change;
 mod check;
 pub mod description;
 mod effects;
 mod fingerprint;
 mod load;
+mod pose;
+mod rig;
 
 pub use build::coat::{CoatRow, coat_table};
 pub use build::fresnel::mean_internal as mean_internal_fresnel;
+pub use change::{Change, Deformed};
 pub use check::check_camera;
-pub use effects::{effects, keeps_soft_light_apart};
+pub use effects::{effects, keeps_soft_light_apart, light_effects};
 pub use fingerprint::Fingerprint;
+pub use pose::{EnvironmentChange, MaterialChange, Pose, REBUILD_ABOVE, Vertices};
+pub use rig::Rig;
 
 /// Largest coordinate M of triangles, of points that rays start from and of lights. With it, all numbers of the triangle test
 /// fit a 32-bit float (3.4e38): seen from the ray's origin a corner is within 2 M, and sheared along the ray within 4 M; an edge
@@ -76,6 +83,8 @@ pub struct Scene {
     pub content: Fingerprint,
     /// World-space bounds of all geometry; zero when there is none.
     pub bounds: [[f32; 3]; 2],
+    /// What can move: see [`Scene::apply`].
+    pub rig: Rig,
     /// Names of objects and materials by index, for `tallow explain` and reports.
     pub names: Names,
     /// Readable lines about what was repaired on loading.

@@ -5,6 +5,9 @@ mod alike;
 mod analytic;
 #[path = "../support/moving.rs"]
 mod moving;
+mod pose;
+#[path = "../support/poses.rs"]
+mod poses;
 mod references;
 mod reproject;
 #[path = "../support/scattering.rs"]

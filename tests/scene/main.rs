@@ -8,6 +8,9 @@ mod gltf_bad;
 #[path = "../support/gltf.rs"]
 mod gltf_file;
 mod memory;
+mod pose;
+#[path = "../support/poses.rs"]
+mod poses;
 #[path = "../support/mod.rs"]
 mod support;
 mod toml;

@@ -27,8 +27,9 @@ pub fn assemble(path: &Path, description: &Description, sky: bool, scene: &mut S
     let mut sources = Sources::new(path, description)?;
     // Textures are decoded while geometry is read: on two cores Crytek Sponza is ready a quarter sooner.
     let early = sources.library.materials.textures.clone();
-    let (decoded, ranges) = rayon::join(|| early.decode(), || geometry(&mut sources, scene));
-    let (ranges, textures) = (ranges?, &sources.library.materials.textures);
+    let (decoded, done) = rayon::join(|| early.decode(), || geometry(&mut sources, scene));
+    done?;
+    let textures = &sources.library.materials.textures;
     let decoded = if textures.len() == early.len() { decoded? } else { textures.decode()? };
     (scene.textures, scene.texels) = (decoded.textures, decoded.texels);
     let mut warnings = add_materials(sources.library, scene);
@@ -38,19 +39,22 @@ pub fn assemble(path: &Path, description: &Description, sky: bool, scene: &mut S
     }
     add_appearance(scene);
     coat::add_tables(&mut scene.materials, &mut scene.texels);
-    lights::finish(scene, &ranges)?;
+    lights::finish(scene)?;
     if !scene.lights.iter().any(|l| l.kind == LIGHT_ENVIRONMENT) {
         scene.environment = None;
+        scene.rig.lights.retain(|l| l.kind != LIGHT_ENVIRONMENT);
     }
     if scene.lights.is_empty() {
         warnings.push("the scene has no light: its image will be black".into());
     }
     scene.warnings = warnings;
+    scene.rig.name(description, &scene.materials);
+    scene.rig.content = scene.content.clone();
     Ok(())
 }
 
-/// Everything but textures; returns the triangles below each root that instances name.
-fn geometry(sources: &mut Sources, scene: &mut Scene) -> Result<hierarchy::Ranges> {
+/// Everything but textures.
+fn geometry(sources: &mut Sources, scene: &mut Scene) -> Result<()> {
     sources.read_files()?;
     environment::add_lights(sources, scene)?;
     let plan = plan::plan(sources)?;
@@ -58,9 +62,9 @@ fn geometry(sources: &mut Sources, scene: &mut Scene) -> Result<hierarchy::Range
     let stored = store::store(sources, &plan, &mut geometry)?;
     scene.content.add(&geometry.triangles);
     scene.content.add(&geometry.shading);
-    let ranges = hierarchy::build(sources, &plan, stored, &mut geometry, scene)?;
+    hierarchy::build(sources, &plan, stored, &mut geometry, scene)?;
     (scene.triangles, scene.shading) = (geometry.triangles, geometry.shading);
-    Ok(ranges)
+    Ok(())
 }
 
 /// Moves the materials into the scene; returns the warnings.

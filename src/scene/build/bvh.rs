@@ -17,6 +17,10 @@ use std::ops::Range;
 
 mod clusters;
 mod level;
+mod refit;
+mod shallow;
+
+pub use refit::refit;
 
 /// Triangles in a leaf; the node format holds up to 3.
 const LEAF: u32 = 3;
@@ -24,7 +28,7 @@ const LEAF: u32 = 3;
 /// errors from opening gaps between boxes that share a face.
 const GROWTH: f32 = 1.0 / (1 << 21) as f32;
 /// Most levels of a hierarchy: that of the instances and that of a mesh together fill a traversal's stack. Crytek Sponza has 14.
-const LEVELS: usize = TRAVERSAL_STACK as usize / 2;
+pub const LEVELS: usize = TRAVERSAL_STACK as usize / 2;
 /// Levels of a two-way tree above which a part of it is halved, where the whole is too deep.
 const HALVED: usize = 24;
 
@@ -70,23 +74,28 @@ pub fn bounds(triangles: &[Triangle]) -> Option<Bounds> {
     (!triangles.is_empty()).then(|| [low.to_array(), high.to_array()])
 }
 
-/// Builds the BVH of the triangles in `range`, which become leaf-ordered, and returns its root.
-pub fn build_mesh(geometry: &mut Geometry, range: Range<usize>, nodes: &mut Vec<BvhNode>) -> u32 {
-    let (root, order) = build(&geometry.triangles[range.clone()], range.start as u32, nodes);
+/// Builds the BVH of the triangles in `range`, which become leaf-ordered, and returns its root and that order.
+pub fn build_mesh(geometry: &mut Geometry, range: Range<usize>, nodes: &mut Vec<BvhNode>) -> (u32, Vec<u32>) {
+    let (root, order) = build(&geometry.triangles[range.clone()], range.start as u32, nodes, LEVELS);
     reorder(&mut geometry.triangles[range.clone()], &order);
     if !geometry.shading.is_empty() {
         reorder(&mut geometry.shading[range], &order);
     }
-    root
+    (root, order)
 }
 
-/// Builds the top level over instances of meshes with these object-space bounds, and returns its root. The instances
-/// become leaf-ordered.
-pub fn build_top(instances: &mut [Instance], object_bounds: &[Bounds], nodes: &mut Vec<BvhNode>) -> u32 {
+/// Builds the top level over instances of meshes with these object-space bounds, and returns its root and the order of the
+/// instances, which are sorted so.
+pub fn build_top(
+    instances: &mut [Instance],
+    object_bounds: &[Bounds],
+    nodes: &mut Vec<BvhNode>,
+    levels: usize,
+) -> (u32, Vec<u32>) {
     let boxes: Vec<_> = instances.iter().zip(object_bounds).map(|(i, &b)| Placed(world_bounds(i, b))).collect();
-    let (root, order) = build(&boxes, 0, nodes);
+    let (root, order) = build(&boxes, 0, nodes, levels);
     reorder(instances, &order);
-    root
+    (root, order)
 }
 
 /// World-space bounds of a placed box.
@@ -122,22 +131,28 @@ pub fn stack_size(nodes: &[BvhNode], root: u32, instances: &[Instance]) -> u32 {
     (depth(nodes, root) - 1 + below).max(1) as u32
 }
 
-/// Appends the nodes over `items`, numbered from `first` on; returns the root and the leaf order.
-fn build<T: Boundable + Sync>(items: &[T], first: u32, nodes: &mut Vec<BvhNode>) -> (u32, Vec<u32>) {
+/// Appends the nodes over `items`, numbered from `first` on; returns the root and the leaf order. A tree of more than `levels` is
+/// replaced by one that has the fewest.
+pub fn build<T: Boundable + Sync>(items: &[T], first: u32, nodes: &mut Vec<BvhNode>, levels: usize) -> (u32, Vec<u32>) {
     let root = nodes.len() as u32;
     if items.is_empty() {
         nodes.push(BvhNode::default()); // eight empty children: every ray misses
         return (root, Vec::new());
     }
     let bvh = compressed(items);
-    nodes.reserve_exact(bvh.nodes.len());
+    let (mut built, mut order): (Vec<_>, _) = (bvh.nodes.iter().map(node_of).collect(), bvh.primitive_indices);
+    if levels < LEVELS && depth(&built, 0) > levels {
+        let boxes: Vec<_> = items.iter().map(Boundable::aabb).collect();
+        (built, order) = shallow::build(&boxes);
+    }
+    nodes.reserve_exact(built.len());
     // Indices become global.
-    nodes.extend(bvh.nodes.iter().map(node_of).map(|node| BvhNode {
+    nodes.extend(built.into_iter().map(|node| BvhNode {
         child_base: node.child_base + root,
         primitive_base: node.primitive_base + first,
         ..node
     }));
-    (root, bvh.primitive_indices)
+    (root, order)
 }
 
 fn node_of(n: &CwBvhNode) -> BvhNode {
@@ -191,7 +206,8 @@ fn collapsed(bvh2: &mut Bvh2) -> CwBvh {
     bvh2_to_cwbvh(bvh2, LEAF, true, false)
 }
 
-fn reorder<T: Copy>(items: &mut [T], order: &[u32]) {
+/// Puts items in leaf order.
+pub fn reorder<T: Copy>(items: &mut [T], order: &[u32]) {
     let sorted: Vec<T> = order.iter().map(|&i| items[i as usize]).collect();
     items.copy_from_slice(&sorted);
 }

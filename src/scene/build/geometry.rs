@@ -25,6 +25,8 @@ pub struct Placement {
     pub flip: bool,
     /// Whether texture coordinates are kept.
     pub uvs: bool,
+    /// Whether triangles without area are kept, since they may have one in another frame.
+    pub keep: bool,
 }
 
 /// One triangle of a file, in file space.
@@ -103,10 +105,11 @@ impl Geometry {
         if swap {
             p.swap(1, 2);
         }
-        let Some(face) = face_normal(p) else {
+        let face = face_normal(p);
+        if face.is_none() && !at.keep {
             repairs.no_area += 1;
             return Ok(());
-        };
+        }
         let normal = self.normals(c, at, swap, face, repairs);
         let uv = c.uv.filter(|_| at.uvs).map(|uv| sane_uvs(uv, swap, repairs));
         self.shade(normal, uv);
@@ -170,7 +173,7 @@ impl Geometry {
     }
 
     /// Packed vertex normals; `FLAT` where they say no more than the face does.
-    fn normals(&self, c: &Corners, at: &Placement, swap: bool, face: Vec3, repairs: &mut Repairs) -> [u32; 3] {
+    fn normals(&self, c: &Corners, at: &Placement, swap: bool, face: Option<Vec3>, repairs: &mut Repairs) -> [u32; 3] {
         let Some(mut n) = c.n.filter(|_| !at.flat) else {
             repairs.no_normals += usize::from(!at.flat);
             return FLAT;
@@ -186,7 +189,7 @@ impl Geometry {
             return FLAT;
         };
         match [a, b, c].map(encode_normal) {
-            codes if codes == [encode_normal(face); 3] => FLAT,
+            codes if face.is_some_and(|face| codes == [encode_normal(face); 3]) => FLAT,
             codes => codes,
         }
     }

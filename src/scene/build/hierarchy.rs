@@ -2,23 +2,21 @@
 use super::bvh::{self, Bounds};
 use super::geometry::Geometry;
 use super::plan::{Job, Plan};
+use super::soft;
 use super::sources::Sources;
 use super::store::Stored;
 use crate::error::Result;
-use crate::layout::{Instance, NONE};
+use crate::layout::{Instance, NONE, TRAVERSAL_STACK};
 use crate::memory;
+use crate::scene::rig::Tree;
 use crate::scene::{MAX_COORDINATE, Scene};
 use glam::{DAffine3, Vec3};
-use std::collections::HashMap;
-use std::ops::Range;
+use std::collections::{HashMap, HashSet};
 
 /// Approximate bytes of an object's name.
 const BYTES_OF_NAME: u64 = 64;
 
-/// The triangles below each root that instances name.
-pub type Ranges = HashMap<u32, Range<usize>>;
-
-/// Builds the BVHs, which puts triangles in leaf order; sets the scene's nodes, root, stack, bounds, instances and names of
+/// Builds the BVHs, which puts triangles in leaf order; sets the scene's nodes, root, stack, bounds, instances, rig and names of
 /// objects. `stored[0]` is world space.
 ///
 /// # Errors
@@ -29,28 +27,52 @@ pub fn build(
     stored: Vec<Stored>,
     geometry: &mut Geometry,
     scene: &mut Scene,
-) -> Result<Ranges> {
-    let ranges = match plan.copies.is_empty() {
-        true => {
-            one_level(stored, geometry, scene);
-            Ranges::new()
-        }
-        false => {
-            let copies = copies_of(sources, plan, &stored)?;
-            let (ranges, boxes) = lower_levels(&copies, stored, geometry, scene);
-            top_level(sources, &boxes, scene)?;
-            ranges
-        }
-    };
-    scene.stack = bvh::stack_size(&scene.nodes, scene.root, &scene.instances);
-    Ok(ranges)
+) -> Result<()> {
+    if plan.copies.is_empty() {
+        one_level(stored, geometry, scene);
+    } else {
+        let copies = copies_of(sources, plan, &stored)?;
+        let most = plan.copies.iter().map(|copy| copy.placement + 1).max().unwrap_or(0);
+        scene.rig.placed = vec![NONE; most.max(sources.description.instance.len() as u32) as usize];
+        lower_levels(&copies, stored, geometry, scene);
+        top_level(sources, scene)?;
+    }
+    size_stack(scene);
+    Ok(())
+}
+
+/// Sets the stack that kernels are compiled with: trees of what moves may come to be this much deeper than now.
+fn size_stack(scene: &mut Scene) {
+    const TOP: u32 = 1;
+    const MESH: u32 = 2;
+    let stack = bvh::stack_size(&scene.nodes, scene.root, &scene.instances);
+    let room = TRAVERSAL_STACK - stack;
+    let top = if scene.instances.is_empty() { 0 } else { TOP.min(room) };
+    let soft = scene.rig.trees.iter().any(|tree| tree.soft.is_some());
+    let mesh = if soft { MESH.min(room - top) } else { 0 };
+    scene.stack = stack + top + mesh;
+    let deepest = scene.rig.trees.iter().map(|tree| bvh::depth(&scene.nodes, tree.nodes.start as u32)).max();
+    scene.rig.levels = [bvh::depth(&scene.nodes, scene.root) + top as usize, deepest.unwrap_or(1) + mesh as usize];
 }
 
 fn one_level(stored: Vec<Stored>, geometry: &mut Geometry, scene: &mut Scene) {
-    let world = stored.into_iter().next().expect("world space is always there");
-    scene.root = bvh::build_mesh(geometry, world.range, &mut scene.nodes);
-    scene.names.objects = world.objects;
+    let mut world = stored.into_iter().next().expect("world space is always there");
+    scene.names.objects = std::mem::take(&mut world.objects);
     scene.bounds = bvh::bounds(&geometry.triangles).unwrap_or_default();
+    scene.root = add_tree(world, scene.bounds, geometry, scene);
+}
+
+/// Builds the BVH of a mesh; returns its root.
+fn add_tree(mesh: Stored, bounds: Bounds, geometry: &mut Geometry, scene: &mut Scene) -> u32 {
+    let Stored { mesh, range, mut soft, .. } = mesh;
+    let (root, order) = bvh::build_mesh(geometry, range.clone(), &mut scene.nodes);
+    let nodes = root as usize..scene.nodes.len();
+    if let Some(soft) = &mut soft {
+        soft.order = order;
+        soft.cost = soft::refit(&mut scene.nodes, nodes.clone(), &geometry.triangles[range.clone()], &range);
+    }
+    scene.rig.trees.push(Tree { mesh, nodes, range, bounds, lit: Vec::new(), soft });
+    root
 }
 
 /// The copies of each stored mesh; world space has itself.
@@ -60,35 +82,40 @@ fn copies_of(sources: &Sources, plan: &Plan, stored: &[Stored]) -> Result<Vec<Ve
     let names = |mesh: &Stored| mesh.mesh.and_then(|m| copies.get(&m)).map_or(0, Vec::len) * mesh.objects.len();
     let names: u64 = stored.iter().map(|mesh| names(mesh) as u64).sum();
     memory::need(format!("{}: {names} objects", sources.path.display()), names.saturating_mul(BYTES_OF_NAME))?;
-    let itself = Job { mesh: 0, affine: DAffine3::IDENTITY, material: None, exact: false };
+    let itself = Job::new(0, DAffine3::IDENTITY);
     let of = |mesh: &Stored| mesh.mesh.map_or(vec![itself], |mesh| copies.remove(&mesh).unwrap_or_default());
     Ok(stored.iter().map(of).collect())
 }
 
-/// A BVH for each mesh that has triangles, and its instances; returns the triangles below each root, and their bounds.
-fn lower_levels(
-    copies: &[Vec<Job>],
-    stored: Vec<Stored>,
-    geometry: &mut Geometry,
-    scene: &mut Scene,
-) -> (Ranges, HashMap<u32, Bounds>) {
-    let (mut ranges, mut boxes) = (Ranges::new(), HashMap::new());
+/// A BVH for each mesh that has triangles, and its instances.
+fn lower_levels(copies: &[Vec<Job>], stored: Vec<Stored>, geometry: &mut Geometry, scene: &mut Scene) {
     for (mesh, copies) in stored.into_iter().zip(copies) {
         let Some(bounds) = bvh::bounds(&geometry.triangles[mesh.range.clone()]) else { continue };
-        let root = bvh::build_mesh(geometry, mesh.range.clone(), &mut scene.nodes);
+        let (range, objects, tree) = (mesh.range.clone(), mesh.objects.clone(), scene.rig.trees.len() as u32);
+        let root = add_tree(mesh, bounds, geometry, scene);
         for copy in copies {
             let (material, object) = (copy.material.unwrap_or(NONE), scene.names.objects.len() as u32);
             let placed = Instance { material, object, ..instance(&copy.affine, root) };
             // Nodes are counted differently by another builder, triangles are not.
-            scene.content.add(&[Instance { root: mesh.range.start as u32, ..placed }]);
-            scene.content.add(&[mesh.range.end as u32]);
+            scene.content.add(&[Instance { root: range.start as u32, ..placed }]);
+            scene.content.add(&[range.end as u32]);
+            note(copy, tree, scene);
             scene.instances.push(placed);
-            scene.names.objects.extend(mesh.objects.iter().cloned());
+            scene.names.objects.extend(objects.iter().cloned());
         }
-        ranges.insert(root, mesh.range);
-        boxes.insert(root, bounds);
     }
-    (ranges, boxes)
+}
+
+/// Tells the rig of the next copy.
+fn note(copy: &Job, tree: u32, scene: &mut Scene) {
+    let number = scene.instances.len() as u32;
+    scene.rig.tree_of.push(tree);
+    if let Some(place) = scene.rig.placed.get_mut(copy.placement as usize) {
+        *place = number;
+    }
+    if copy.own != DAffine3::IDENTITY {
+        scene.rig.own.insert(number, copy.own);
+    }
 }
 
 /// The device's form of a placement; the caller sets `material` and `object`.
@@ -116,32 +143,63 @@ pub fn instance(affine: &DAffine3, root: u32) -> Instance {
     }
 }
 
-fn top_level(sources: &Sources, boxes: &HashMap<u32, Bounds>, scene: &mut Scene) -> Result<()> {
-    let object_bounds: Vec<_> = scene.instances.iter().map(|i| boxes[&i.root]).collect();
-    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for (instance, &bounds) in scene.instances.iter().zip(&object_bounds) {
-        let [l, h] = bvh::world_bounds(instance, bounds).map(Vec3::from);
-        (low, high) = (low.min(l), high.max(h));
-    }
-    if scene.instances.is_empty() {
-        (low, high) = (Vec3::ZERO, Vec3::ZERO);
-    }
-    if is_too_far(low.abs().max(high.abs()).max_element()) {
-        return Err(sources.at("instances", format!("reach beyond the limit of {MAX_COORDINATE:e}")));
-    }
-    // Rays are transformed to the space of each instance that they meet.
-    let world = [low.to_array(), high.to_array()];
-    let seen =
-        |i: &Instance| bvh::world_bounds(&turned(i), world).as_flattened().iter().map(|v| v.abs()).fold(0.0, f32::max);
-    if let Some(i) = scene.instances.iter().find(|i| is_too_far(seen(i))) {
+fn top_level(sources: &Sources, scene: &mut Scene) -> Result<()> {
+    let copies = std::mem::take(&mut scene.instances);
+    let bounds: Vec<_> = scene.rig.trees.iter().map(|tree| tree.bounds).collect();
+    let reached = reach(&bounds, &scene.rig.tree_of, &scene.rig.hidden, &copies);
+    scene.bounds = reached.map_err(|what| sources.at("instances", what))?;
+    if let Some(i) = copies.iter().find(|i| is_lost(i, scene.bounds)) {
         let name = &scene.names.objects[i.object as usize];
         let what =
             format!("seen from it, the scene reaches beyond the limit of {MAX_COORDINATE:e}: choose a larger scale");
         return Err(sources.at(format!("an instance of \"{name}\""), what));
     }
-    scene.bounds = world;
-    scene.root = bvh::build_top(&mut scene.instances, &object_bounds, &mut scene.nodes);
+    place(scene, copies, bvh::LEVELS);
     Ok(())
+}
+
+/// World-space bounds of the copies that are not `hidden`; `tree_of` says which tree each places, and `bounds` how far that reaches.
+///
+/// # Errors
+/// A sentence, where that is too far.
+pub fn reach(
+    bounds: &[Bounds],
+    tree_of: &[u32],
+    hidden: &HashSet<u32>,
+    copies: &[Instance],
+) -> std::result::Result<Bounds, String> {
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for (number, copy) in (0..).zip(copies).filter(|(number, _)| !hidden.contains(number)) {
+        let [l, h] = bvh::world_bounds(copy, bounds[tree_of[number as usize] as usize]).map(Vec3::from);
+        (low, high) = (low.min(l), high.max(h));
+    }
+    if hidden.len() == copies.len() {
+        (low, high) = (Vec3::ZERO, Vec3::ZERO);
+    }
+    match is_too_far(low.abs().max(high.abs()).max_element()) {
+        true => Err(format!("reach beyond the limit of {MAX_COORDINATE:e}")),
+        false => Ok([low.to_array(), high.to_array()]),
+    }
+}
+
+/// Whether a copy is so small that the world, in its space, is too large: rays are transformed to the space of each instance that
+/// they meet.
+pub fn is_lost(copy: &Instance, world: Bounds) -> bool {
+    let seen = bvh::world_bounds(&turned(copy), world);
+    is_too_far(seen.as_flattened().iter().map(|v| v.abs()).fold(0.0, f32::max))
+}
+
+/// Builds the top level over the copies that are seen, of so many levels at most; those that are hidden come last among the
+/// instances, where no leaf leads to them.
+pub fn place(scene: &mut Scene, copies: Vec<Instance>, levels: usize) {
+    let rig = &mut scene.rig;
+    let (hidden, seen): (Vec<u32>, Vec<u32>) = (0..copies.len() as u32).partition(|copy| rig.hidden.contains(copy));
+    let mut instances: Vec<_> = seen.iter().map(|&copy| copies[copy as usize]).collect();
+    let boxes: Vec<_> = seen.iter().map(|&copy| rig.trees[rig.tree_of[copy as usize] as usize].bounds).collect();
+    let (root, order) = bvh::build_top(&mut instances, &boxes, &mut scene.nodes, levels);
+    instances.extend(hidden.iter().map(|&copy| copies[copy as usize]));
+    rig.order = order.into_iter().map(|slot| seen[slot as usize]).chain(hidden).collect();
+    (scene.root, scene.instances) = (root, instances);
 }
 
 fn is_too_far(coordinate: f32) -> bool {

@@ -4,7 +4,6 @@
 //! its texture times the mean opacity), point `4 pi I`, spot `2 pi I (1 - mean of the two cosines)`, directional
 //! `pi R^2 E`, environment `4 pi^2 R^2` times its mean, R the radius of the scene.
 use super::environment::mean_luminance;
-use super::hierarchy::Ranges;
 use super::{alias, geometry};
 use crate::error::Result;
 use crate::layout::*;
@@ -12,20 +11,28 @@ use crate::math::srgb::luminance;
 use crate::memory;
 use crate::scene::Scene;
 use crate::scene::load::texture;
+use crate::scene::rig::Tree;
 use glam::{Mat4, Vec3, Vec4};
-use std::collections::HashMap;
 use std::f64::consts::PI;
-use std::ops::Range;
 
 /// Adds the emissive triangles to the scene's lights (which hold the others), drops lights without power, and builds
 /// the table. Sets [`Material::emission_weight`], [`Light::probability`] and [`Scene::triangle_pdf_scale`].
 ///
 /// # Errors
 /// [`Error::Memory`](crate::error::Error::Memory).
-pub fn finish(scene: &mut Scene, ranges: &Ranges) -> Result<()> {
-    let mut means = HashMap::new(); // many materials may share a picture
-    let mut mean = |image: u32| match scene.textures.get(image as usize) {
-        Some(t) => *means.entry((t.first, t.flags & TEXTURE_SRGB)).or_insert_with(|| texture::mean(t, &scene.texels)),
+pub fn finish(scene: &mut Scene) -> Result<()> {
+    scene.rig.lights = std::mem::take(&mut scene.lights);
+    scene.rig.sky = scene.environment.as_ref().map_or(1.0, mean_luminance);
+    weigh(scene);
+    list(scene)
+}
+
+/// Sets [`Material::emission_weight`] of all materials, and finds the triangles that emit.
+pub fn weigh(scene: &mut Scene) {
+    let (textures, texels, means) = (&scene.textures, &scene.texels, &mut scene.rig.means);
+    // Many materials may share a picture.
+    let mut mean = |image: u32| match textures.get(image as usize) {
+        Some(t) => *means.entry((t.first, t.flags & TEXTURE_SRGB)).or_insert_with(|| texture::mean(t, texels)),
         None => [1.0; 3],
     };
     for m in &mut scene.materials {
@@ -35,8 +42,21 @@ pub fn finish(scene: &mut Scene, ranges: &Ranges) -> Result<()> {
         let opacity = if masked { m.opacity * mean(m.opacity_texture)[0] } else { 1.0 };
         m.emission_weight = luminance(emission) * opacity;
     }
-    let mut lights = std::mem::take(&mut scene.lights);
-    add_triangles(scene, ranges, &mut lights)?;
+    let (triangles, materials) = (&scene.triangles, &scene.materials);
+    for tree in &mut scene.rig.trees {
+        let lit = |&i: &usize| materials[triangles[i].material as usize].emission_weight > 0.0;
+        tree.lit = tree.range.clone().filter(lit).map(|i| i as u32).collect();
+        tree.sort_lit();
+    }
+}
+
+/// Makes the scene's lights of those without surface and of the triangles that emit, and the table over them.
+///
+/// # Errors
+/// As [`finish`].
+pub fn list(scene: &mut Scene) -> Result<()> {
+    let mut lights = scene.rig.lights.clone();
+    add_triangles(scene, &mut lights)?;
     let mut powers: Vec<f64> = lights.iter().map(|l| power(scene, l)).collect();
     let mut kept = powers.iter();
     lights.retain(|_| kept.next().is_some_and(|&p| p > 0.0));
@@ -51,33 +71,32 @@ pub fn finish(scene: &mut Scene, ranges: &Ranges) -> Result<()> {
     Ok(())
 }
 
-/// Emissive triangles in world space: of the only level, or of every instance. `ranges` are the triangles below
-/// each root that instances name.
-fn add_triangles(scene: &Scene, ranges: &Ranges, lights: &mut Vec<Light>) -> Result<()> {
-    let emits = |material: u32| scene.materials[material as usize].emission_weight > 0.0;
-    let own = |range: Range<usize>| range.filter(|&i| emits(scene.triangles[i].material)).collect::<Vec<_>>();
+/// Emissive triangles in world space: of the only level, or of every instance that is seen.
+fn add_triangles(scene: &Scene, lights: &mut Vec<Light>) -> Result<()> {
+    let rig = &scene.rig;
     if scene.instances.is_empty() {
-        let lit = own(0..scene.triangles.len());
-        reserve(lights, lit.len())?;
-        lit.into_iter().for_each(|index| lights.push(surface_light(scene, index, None, None)));
+        let lit = || rig.trees.iter().flat_map(|tree| &tree.lit);
+        reserve(lights, lit().count())?;
+        lit().for_each(|&index| lights.push(surface_light(scene, index as usize, None, None)));
         return Ok(());
     }
-    let own: HashMap<u32, Vec<usize>> = ranges.iter().map(|(&root, range)| (root, own(range.clone()))).collect();
-    let lit = |instance: &Instance| match instance.material {
-        NONE => own[&instance.root].len(),
-        worn if emits(worn) => ranges[&instance.root].len(),
+    let emits = |material: u32| scene.materials[material as usize].emission_weight > 0.0;
+    let lit = |tree: &Tree, instance: &Instance| match instance.material {
+        NONE => tree.lit.len(),
+        worn if emits(worn) => tree.range.len(),
         _ => 0,
     };
-    reserve(lights, scene.instances.iter().map(lit).sum())?;
-    for instance in scene.instances.iter().filter(|instance| lit(instance) > 0) {
+    let placed = || rig.seen(scene).filter(|(tree, instance)| lit(tree, instance) > 0);
+    reserve(lights, placed().map(|(tree, instance)| lit(tree, instance)).sum())?;
+    for (tree, instance) in placed() {
         let rows = [instance.world0, instance.world1, instance.world2].map(Vec4::from);
         let world = Mat4::from_cols(rows[0], rows[1], rows[2], Vec4::W).transpose();
         let material = (instance.material != NONE).then_some(instance.material);
         let at = Some((world, instance.mirrored == 1));
         let mut add = |index| lights.push(surface_light(scene, index, at, material));
         match material {
-            Some(_) => ranges[&instance.root].clone().for_each(&mut add),
-            None => own[&instance.root].iter().copied().for_each(&mut add),
+            Some(_) => tree.whole().for_each(&mut add),
+            None => tree.lit.iter().for_each(|&index| add(index as usize)),
         }
     }
     Ok(())
@@ -133,6 +152,6 @@ fn power(scene: &Scene, light: &Light) -> f64 {
         LIGHT_POINT => 4.0 * PI * value,
         LIGHT_SPOT => 2.0 * PI * value * (1.0 - f64::from(light.c[0] + light.c[1]) / 2.0),
         LIGHT_DIRECTIONAL => PI * radius * radius * value,
-        _ => 4.0 * PI * PI * radius * radius * value * scene.environment.as_ref().map_or(1.0, mean_luminance),
+        _ => 4.0 * PI * PI * radius * radius * value * scene.rig.sky,
     }
 }

@@ -9,5 +9,6 @@ pub mod geometry;
 pub mod hierarchy;
 pub mod lights;
 pub mod plan;
+pub mod soft;
 pub mod sources;
 pub mod store;

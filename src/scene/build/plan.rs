@@ -18,6 +18,17 @@ pub struct Job {
     pub material: Option<u32>,
     /// A sphere that is stored as one, not as triangles.
     pub exact: bool,
+    /// Of a copy, its number among all that is placed: those of the `[[instance]]` tables, then meshes that are stored without.
+    pub placement: u32,
+    /// Of a copy, the part of `affine` that is the mesh's own.
+    pub own: DAffine3,
+}
+
+impl Job {
+    /// A mesh where its table puts it.
+    pub fn new(mesh: usize, affine: DAffine3) -> Self {
+        Self { mesh, affine, material: None, exact: false, placement: NONE, own: DAffine3::IDENTITY }
+    }
 }
 
 /// What is baked into world space, stored for instances, and placed.
@@ -38,7 +49,7 @@ pub struct Plan {
 pub fn plan(sources: &Sources) -> Result<Plan> {
     let mut planner = Planner::new(sources);
     for (number, table) in sources.description.instance.iter().enumerate() {
-        planner.place(&format!("instance {} of mesh \"{}\"", number + 1, table.mesh), table)?;
+        planner.place(number as u32, table)?;
     }
     for mesh in 0..sources.description.mesh.len() {
         planner.keep(mesh)?;
@@ -60,6 +71,8 @@ pub fn override_of(sources: &Sources, job: &Job) -> Result<Option<u32>> {
 struct Planner<'s, 'a> {
     sources: &'s Sources<'a>,
     plan: Plan,
+    /// Number of the next placement without a table of its own.
+    next: u32,
     /// Of a name, the first mesh.
     named: HashMap<&'a str, usize>,
     /// By mesh: whether an instance names it, and whether one of them is a copy.
@@ -80,6 +93,7 @@ impl<'s, 'a> Planner<'s, 'a> {
         Self {
             sources,
             plan: Plan::default(),
+            next: sources.description.instance.len() as u32,
             named: named.collect(),
             instanced: vec![false; meshes.len()],
             copied: vec![false; meshes.len()],
@@ -90,7 +104,8 @@ impl<'s, 'a> Planner<'s, 'a> {
     }
 
     /// Adds the copy that an `[[instance]]` table places.
-    fn place(&mut self, place: &str, table: &InstanceTable) -> Result<()> {
+    fn place(&mut self, number: u32, table: &InstanceTable) -> Result<()> {
+        let place = &format!("instance {} of mesh \"{}\"", number + 1, table.mesh);
         let (sources, meshes) = (self.sources, &self.sources.description.mesh);
         let Some(&mesh) = self.named.get(table.mesh.as_str()) else {
             let names = meshes.iter().filter_map(|m| m.name.as_deref());
@@ -101,14 +116,14 @@ impl<'s, 'a> Planner<'s, 'a> {
         let affine = invertible(sources, table.transform.0, place)?;
         let material = table.material.as_ref().map(|m| sources.material(m, place)).transpose()?;
         let own = invertible(sources, meshes[mesh].transform.0, place)?;
-        let whole = Job { mesh, affine: affine * own, material, exact: false };
+        let whole = Job { material, placement: number, own, ..Job::new(mesh, affine * own) };
         // Textures of a light are looked up by the corners' order, which a mirrored light has to swap: bake it.
         let baked = affine.matrix3.determinant() < 0.0 && self.is_textured_light(&whole)?;
         self.exact[mesh] = self.exact[mesh] && may_be_exact(sources, &whole)?;
         match baked {
             true => self.plan.baked.push(whole),
             false if self.stretched[mesh] => self.plan.copies.push(whole),
-            false => self.plan.copies.push(Job { affine, ..whole }),
+            false => self.plan.copies.push(Job { affine, own: DAffine3::IDENTITY, ..whole }),
         }
         self.copied[mesh] |= !baked;
         Ok(())
@@ -118,14 +133,15 @@ impl<'s, 'a> Planner<'s, 'a> {
     fn keep(&mut self, mesh: usize) -> Result<()> {
         let table = &self.sources.description.mesh[mesh];
         let affine = invertible(self.sources, table.transform.0, &format!("mesh \"{}\"", mesh_name(table)))?;
-        let job = Job { mesh, affine, material: None, exact: false };
+        let job = Job::new(mesh, affine);
         let (exact, stretched) = (self.exact[mesh], self.stretched[mesh]);
         if !self.instanced[mesh] {
             let exact = exact && may_be_exact(self.sources, &job)?;
-            match exact && stretched {
+            match exact && stretched || table.moving {
                 true => {
                     self.plan.stored.push(Job { affine: DAffine3::IDENTITY, exact, ..job });
-                    self.plan.copies.push(job);
+                    self.plan.copies.push(Job { placement: self.next, ..job });
+                    self.next += 1;
                 }
                 false => self.plan.baked.push(Job { exact, ..job }),
             }
@@ -167,11 +183,15 @@ fn may_be_exact(sources: &Sources, job: &Job) -> Result<bool> {
 }
 
 fn invertible(sources: &Sources, affine: DAffine3, place: &str) -> Result<DAffine3> {
-    let det = affine.matrix3.determinant();
-    match affine.is_finite() && det.abs() > 1e-60 && affine.inverse().is_finite() {
+    match has_inverse(&affine) {
         true => Ok(affine),
         false => Err(sources.at(place, "its transform has no inverse: choose scales other than 0")),
     }
+}
+
+/// Whether rays can be brought to the space of what it places.
+pub fn has_inverse(affine: &DAffine3) -> bool {
+    affine.is_finite() && affine.matrix3.determinant().abs() > 1e-60 && affine.inverse().is_finite()
 }
 
 /// A sphere that need not be tessellated: nobody asks for its segments or facets.
@@ -180,7 +200,7 @@ fn is_sphere(table: &MeshTable) -> bool {
 }
 
 /// Whether spheres stay spheres, up to what six digits of a matrix leave open.
-fn is_even(affine: &DAffine3) -> bool {
+pub fn is_even(affine: &DAffine3) -> bool {
     let gram = affine.matrix3.transpose() * affine.matrix3;
     let mean = (gram.x_axis.x + gram.y_axis.y + gram.z_axis.z) / 3.0;
     (gram * (1.0 / mean)).abs_diff_eq(DMat3::IDENTITY, 1e-5)

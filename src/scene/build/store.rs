@@ -1,6 +1,7 @@
 //! Puts the triangles of all meshes into one array: first those in world space, then one mesh after another.
 use super::geometry::{Corners, Geometry, Placement, Repairs, Tag, TooFar};
 use super::plan::{Job, Plan, override_of};
+use super::soft::Soft;
 use super::sources::{Sources, mesh_name};
 use crate::error::{Error, Result};
 use crate::memory;
@@ -24,6 +25,8 @@ pub struct Stored {
     pub range: Range<usize>,
     /// Names of the mesh's objects.
     pub objects: Vec<String>,
+    /// What it takes to deform the mesh, if it is one that may be.
+    pub soft: Option<Soft>,
 }
 
 /// Puts all triangles into the array; world space comes first, and is always there. Files are dropped after their last use.
@@ -39,18 +42,18 @@ pub fn store(sources: &mut Sources, plan: &Plan, geometry: &mut Geometry) -> Res
     let file = |job: &Job| description.mesh[job.mesh].file.as_ref();
     let latest: HashMap<_, _> = jobs.iter().enumerate().map(|(i, job)| (file(job), i)).collect();
     let last: Vec<bool> = jobs.iter().enumerate().map(|(i, job)| latest[&file(job)] == i).collect();
-    let mut stored = vec![Stored { mesh: None, range: 0..0, objects: Vec::new() }];
+    let mut stored = vec![Stored { mesh: None, range: 0..0, objects: Vec::new(), soft: None }];
     for (i, job) in jobs.into_iter().enumerate() {
         let start = geometry.triangles.len();
         let baked = i < plan.baked.len();
         let first = if baked { stored[0].objects.len() as u32 } else { 0 };
-        let objects = Addition::new(sources, job, first)?.add(sources, geometry, last[i])?;
+        let (objects, soft) = Addition::new(sources, job, first)?.add(sources, geometry, last[i])?;
         let end = geometry.triangles.len();
         if baked {
             stored[0].objects.extend(objects);
             stored[0].range.end = end;
         } else {
-            stored.push(Stored { mesh: Some(job.mesh), range: start..end, objects });
+            stored.push(Stored { mesh: Some(job.mesh), range: start..end, objects, soft });
         }
     }
     sources.files.clear();
@@ -121,13 +124,19 @@ impl<'a> Addition<'a> {
         // Meshes from memory without normals are flat on purpose: there all vertices have one, or none has.
         let meant = table.data.as_ref().is_some_and(|mesh| mesh.normals.is_empty());
         let uvs = sources.library.materials.textures.len() > 0;
-        let placement = Placement { affine: job.affine, flat: table.flat || meant, flip: table.flip_normals, uvs };
+        let (affine, flat, keep) = (job.affine, table.flat || meant, table.moving);
+        let placement = Placement { affine, flat, flip: table.flip_normals, uvs, keep };
         let place = format!("mesh \"{}\"", mesh_name(table));
         Ok(Self { job: *job, table, place, material: override_of(sources, job)?, placement, first })
     }
 
-    /// Adds the triangles; returns the names of the objects.
-    fn add(&self, sources: &mut Sources<'a>, geometry: &mut Geometry, last_use: bool) -> Result<Vec<String>> {
+    /// Adds the triangles; returns the names of the objects, and what it takes to deform them.
+    fn add(
+        &self,
+        sources: &mut Sources<'a>,
+        geometry: &mut Geometry,
+        last_use: bool,
+    ) -> Result<(Vec<String>, Option<Soft>)> {
         let file = self.take_file(sources);
         self.check_group(sources, &file)?;
         let before = geometry.triangles.len();
@@ -140,7 +149,12 @@ impl<'a> Addition<'a> {
         let objects = self.add_parts(&file, geometry, &mut repairs).map_err(|TooFar(v)| {
             sources.at(&self.place, format!("has a coordinate of {v:e}: the limit is {MAX_COORDINATE:e}"))
         })?;
-        repairs.copies = geometry.drop_copies(before);
+        if self.table.moving {
+            self.check_moving(sources, &repairs)?;
+        } else {
+            repairs.copies = geometry.drop_copies(before);
+        }
+        let soft = (self.table.moving && !self.job.exact).then(|| self.soft(&file));
         let repaired = repairs.warning(&self.place);
         if geometry.triangles.len() == before {
             let why = repaired.as_deref().unwrap_or("no face is in it: is it an OBJ file?");
@@ -153,7 +167,24 @@ impl<'a> Addition<'a> {
         if let (Some(path), false) = (sources.file_of(self.table), last_use) {
             sources.files.insert(path, file);
         }
-        Ok(objects)
+        Ok((objects, soft))
+    }
+
+    /// The triangles of a mesh that may be deformed are counted, so that none may be dropped.
+    fn check_moving(&self, sources: &Sources, repairs: &Repairs) -> Result<()> {
+        match repairs.not_finite {
+            0 => Ok(()),
+            n => {
+                Err(sources
+                    .at(&self.place, format!("has {n} triangles with NaN or infinite coordinates: it is moving")))
+            }
+        }
+    }
+
+    fn soft(&self, file: &ObjFile) -> Soft {
+        let whole = joined(self.table, file);
+        let placement = Placement { flat: self.table.flat, ..self.placement };
+        Soft::new(whole.positions.len(), whole.indices, placement)
     }
 
     /// The parsed file, taken out of the store, or a shape, or what is in memory.
@@ -200,6 +231,20 @@ impl<'a> Addition<'a> {
         }
         Ok(names)
     }
+}
+
+/// The triangles of a mesh in one piece, in the order of its parts. Parts without normals get zeros where others have some.
+pub fn joined(table: &MeshTable, file: &ObjFile) -> Mesh {
+    let mut whole = Mesh::default();
+    let bent = parts_of(table, file).any(|(part, _)| !part.mesh.normals.is_empty());
+    for (part, _) in parts_of(table, file) {
+        let first = whole.positions.len() as u32;
+        whole.positions.extend_from_slice(&part.mesh.positions);
+        whole.normals.extend_from_slice(&part.mesh.normals);
+        whole.normals.resize(if bent { whole.positions.len() } else { 0 }, [0.0; 3]);
+        whole.indices.extend(part.mesh.indices.iter().map(|i| first + i));
+    }
+    whole
 }
 
 fn object_name(mesh: &str, object: &str) -> String {

@@ -25,6 +25,8 @@ pub struct LightTable {
     /// Kind of the light, which decides the keys that it needs.
     #[serde(rename = "type")]
     pub kind: Type,
+    /// Name for what moves it.
+    pub name: Option<String>,
     /// Position of a point or spot light.
     pub position: Option<[f32; 3]>,
     /// Direction in which the light of a spot or directional light travels, of any length.

@@ -101,6 +101,9 @@ pub struct MeshTable {
     pub flat: bool,
     /// Whether the surface is turned inside out.
     pub flip_normals: bool,
+    /// Whether it is placed or deformed anew between frames. It is stored apart then, and keeps triangles without area and copies of
+    /// others, since they may change. Without it only what `[[instance]]` tables place can be moved, and nothing be deformed.
+    pub moving: bool,
 }
 
 /// An `[[instance]]` table: a placed copy of a mesh.
@@ -114,6 +117,8 @@ pub struct InstanceTable {
     pub transform: Transform,
     /// Name of a `[[material]]` that replaces those of the mesh.
     pub material: Option<String>,
+    /// Name for what moves it.
+    pub name: Option<String>,
 }
 
 /// Reads a scene file.

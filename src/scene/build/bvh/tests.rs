@@ -102,7 +102,7 @@ fn every_size_agrees_with_brute_force() {
     for count in [1, 2, 3, 4, 9, 100, 5000] {
         let mut geometry = random_geometry(count, 0.2, &mut random);
         let mut nodes = Vec::new();
-        let root = build_mesh(&mut geometry, 0..count, &mut nodes);
+        let root = build_mesh(&mut geometry, 0..count, &mut nodes).0;
         assert_eq!(compare(&geometry, &nodes, root, 0..count, &mut random), 0, "{count} triangles");
         let mut seen: Vec<_> = geometry.triangles.iter().map(|t| t.primitive).collect();
         seen.sort_unstable();
@@ -115,7 +115,7 @@ fn the_comparison_can_fail() {
     let mut random = Random::new(2);
     let mut geometry = random_geometry(1000, 0.3, &mut random);
     let mut nodes = Vec::new();
-    let root = build_mesh(&mut geometry, 0..1000, &mut nodes);
+    let root = build_mesh(&mut geometry, 0..1000, &mut nodes).0;
     let shrink = |words: [u32; 2]| bytemuck::cast(bytes(words).map(|b| b.saturating_sub(60)));
     nodes.iter_mut().for_each(|n| n.max_x = shrink(n.max_x));
     assert!(compare(&geometry, &nodes, root, 0..1000, &mut random) > 0);
@@ -126,7 +126,7 @@ fn two_meshes_share_the_arrays() {
     let mut random = Random::new(3);
     let mut geometry = random_geometry(300, 0.3, &mut random);
     let mut nodes = Vec::new();
-    let roots = [build_mesh(&mut geometry, 0..100, &mut nodes), build_mesh(&mut geometry, 100..300, &mut nodes)];
+    let roots = [build_mesh(&mut geometry, 0..100, &mut nodes).0, build_mesh(&mut geometry, 100..300, &mut nodes).0];
     assert_eq!(compare(&geometry, &nodes, roots[0], 0..100, &mut random), 0);
     assert_eq!(compare(&geometry, &nodes, roots[1], 100..300, &mut random), 0);
     assert!(compare(&geometry, &nodes, roots[1], 0..300, &mut random) > 0, "control: the second BVH lacks the first");
@@ -137,12 +137,12 @@ fn instances_are_found_through_the_top_level() {
     let mut random = Random::new(4);
     let mut geometry = random_geometry(50, 0.5, &mut random);
     let mut nodes = Vec::new();
-    let root = build_mesh(&mut geometry, 0..50, &mut nodes);
+    let root = build_mesh(&mut geometry, 0..50, &mut nodes).0;
     let object = bounds(&geometry.triangles).unwrap();
     let places: Vec<_> = (0..40).map(|_| DAffine3::from_scale(random.point() * 0.2)).collect();
     let mut instances: Vec<_> =
         places.iter().map(|a| instance(&(DAffine3::from_translation(random.point()) * *a), root)).collect();
-    let top = build_top(&mut instances, &vec![object; 40], &mut nodes);
+    let top = build_top(&mut instances, &vec![object; 40], &mut nodes, LEVELS).0;
     for _ in 0..300 {
         let (origin, direction) = (random.point() * 2.0, random.point());
         let in_object = |i: &Instance| {
@@ -163,7 +163,7 @@ fn instances_are_found_through_the_top_level() {
 #[test]
 fn empty_geometry_builds() {
     let (mut geometry, mut nodes) = (Geometry::default(), Vec::new());
-    let root = build_mesh(&mut geometry, 0..0, &mut nodes);
+    let root = build_mesh(&mut geometry, 0..0, &mut nodes).0;
     assert_eq!((stack_size(&nodes, root, &[]), depth(&nodes, root)), (1, 1));
     let mut leaves = 0;
     traverse(&nodes, root, DVec3::ZERO, DVec3::ONE, &mut |_| leaves += 1);
@@ -180,7 +180,7 @@ fn around(center: DVec3, size: f64, turn: usize, primitive: u32) -> Triangle {
 
 fn builds_flat(geometry: &mut Geometry) -> (Vec<BvhNode>, u32) {
     let (count, mut nodes) = (geometry.triangles.len(), Vec::new());
-    let root = build_mesh(geometry, 0..count, &mut nodes);
+    let root = build_mesh(geometry, 0..count, &mut nodes).0;
     // Eight-way, ten levels hold 8^10 leaves; twice that is far from a chain.
     assert!(depth(&nodes, root) <= 20, "{} levels", depth(&nodes, root));
     assert!(stack_size(&nodes, root, &[]) <= TRAVERSAL_STACK);
@@ -217,10 +217,10 @@ fn coincident_instances_make_a_flat_tree() {
     let mut random = Random::new(6);
     let mut geometry = random_geometry(9, 0.5, &mut random);
     let mut nodes = Vec::new();
-    let root = build_mesh(&mut geometry, 0..9, &mut nodes);
+    let root = build_mesh(&mut geometry, 0..9, &mut nodes).0;
     let mut instances = vec![instance(&DAffine3::IDENTITY, root); 50_000];
     let object = bounds(&geometry.triangles).unwrap();
-    let top = build_top(&mut instances, &vec![object; 50_000], &mut nodes);
+    let top = build_top(&mut instances, &vec![object; 50_000], &mut nodes, LEVELS).0;
     assert!(stack_size(&nodes, top, &instances) <= TRAVERSAL_STACK);
 }
 
@@ -242,6 +242,41 @@ fn a_fan_makes_a_flat_tree() {
     let mut instances = vec![instance(&DAffine3::IDENTITY, root); 2000];
     let nested: Vec<_> = (1..=2000).map(|i| [[0.0; 3], [i as f32, 1.0, 1.0]]).collect();
     let mut nodes = nodes;
-    let top = build_top(&mut instances, &nested, &mut nodes);
+    let top = build_top(&mut instances, &nested, &mut nodes, LEVELS).0;
     assert!(stack_size(&nodes, top, &instances) <= TRAVERSAL_STACK, "two levels of fans");
+}
+
+#[test]
+fn a_refitted_tree_finds_what_has_moved() {
+    let mut random = Random::new(8);
+    let mut geometry = random_geometry(1000, 0.2, &mut random);
+    let mut nodes = Vec::new();
+    let (root, _) = build_mesh(&mut geometry, 0..1000, &mut nodes);
+    for scale in [1.0, 0.01, 300.0] {
+        for t in &mut geometry.triangles {
+            let by = (random.point() * 0.3 * scale).as_vec3();
+            let moved = |p: [f32; 3]| (Vec3::from(p) * scale as f32 + by).to_array();
+            (t.v0, t.v1, t.v2) = (moved(t.v0), moved(t.v1), moved(t.v2));
+        }
+        let boxes: Vec<_> = geometry.triangles.iter().map(Boundable::aabb).collect();
+        let all = 0..nodes.len();
+        refit(&mut nodes, all, |i| boxes[i as usize]);
+        assert_eq!(compare(&geometry, &nodes, root, 0..1000, &mut random), 0);
+    }
+    let lost = geometry.triangles[0];
+    geometry.triangles.iter_mut().for_each(|t| t.v0 = [9e3; 3]);
+    assert!(compare(&geometry, &nodes, root, 0..1000, &mut random) > 0, "control: {lost:?} and others moved on");
+}
+
+#[test]
+fn the_shallowest_tree_is_as_deep_as_its_number_needs() {
+    let mut random = Random::new(9);
+    for (count, levels) in [(1, 1), (24, 1), (25, 2), (192, 2), (193, 3), (1000, 3)] {
+        let mut geometry = random_geometry(count, 0.2, &mut random);
+        let mut nodes = Vec::new();
+        let (root, order) = build(&geometry.triangles, 0, &mut nodes, 0);
+        reorder(&mut geometry.triangles, &order);
+        assert_eq!(depth(&nodes, root), levels, "{count}");
+        assert_eq!(compare(&geometry, &nodes, root, 0..geometry.triangles.len(), &mut random), 0, "{count}");
+    }
 }

@@ -1,7 +1,7 @@
 //! Placement, repair and packing of single triangles.
 use super::*;
 
-const PLAIN: Placement = Placement { affine: DAffine3::IDENTITY, flat: false, flip: false, uvs: true };
+const PLAIN: Placement = Placement { affine: DAffine3::IDENTITY, flat: false, flip: false, uvs: true, keep: false };
 const TAG: Tag = Tag { primitive: 0, material: 0, object: 0 };
 const P: [Vec3; 3] = [Vec3::ZERO, Vec3::X, Vec3::Y];
 

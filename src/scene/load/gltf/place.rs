@@ -169,8 +169,12 @@ impl<'a> Placer<'a> {
         let material = Some(self.material(material)?);
         let transform = if let [only] = copies[..] { only } else { DAffine3::IDENTITY };
         if copies.len() > 1 {
-            let instance =
-                |at: &DAffine3| InstanceTable { mesh: name.clone(), transform: Transform(*at), material: None };
+            let instance = |at: &DAffine3| InstanceTable {
+                mesh: name.clone(),
+                transform: Transform(*at),
+                material: None,
+                name: None,
+            };
             self.instances.extend(copies.iter().map(instance));
         }
         // A mesh without normals is meant to be flat: glTF 2.0, section 3.7.2.1.

@@ -1,0 +1,151 @@
+//! Puts into a scene's arrays what a pose makes of it.
+use super::material::reads_table;
+use super::next::{Next, NextCopies, NextMesh};
+use crate::error::Result;
+use crate::layout::{BvhNode, Instance, Light, Material, Shading};
+use crate::scene::build::geometry::FLAT;
+use crate::scene::build::{bvh, coat, hierarchy, lights, soft};
+use crate::scene::pose::Pose;
+use crate::scene::{Change, Deformed, Scene};
+
+/// Changes the scene.
+///
+/// # Errors
+/// [`Error::Memory`](crate::error::Error::Memory), before which a change of lights may be half done.
+pub fn commit(scene: &mut Scene, next: Next, pose: &Pose) -> Result<Change> {
+    let mut change = Change::default();
+    if let Some(materials) = next.materials {
+        wear(scene, materials, &mut change);
+    }
+    let mut copies = next.copies;
+    if let Some(copies) = &mut copies {
+        next.meshes.into_iter().for_each(|mesh| deform(scene, mesh, &mut copies.all, pose.rebuild_above, &mut change));
+    }
+    if let Some(NextCopies { all, hidden, world }) = copies {
+        (scene.bounds, scene.rig.hidden) = (world, hidden);
+        scene.nodes.truncate(scene.root as usize);
+        hierarchy::place(scene, all, scene.rig.levels[0]);
+        change.nodes.push(scene.root as usize..scene.nodes.len());
+        (change.instances, change.lights) = (true, true);
+    }
+    if let Some(lights) = next.lights {
+        (scene.rig.lights, change.lights) = (lights, true);
+    }
+    if change.lights {
+        lights::list(scene)?;
+    }
+    if let Some(camera) = &pose.camera {
+        (scene.view, change.camera) = (camera.clone(), true);
+    }
+    // A camera without a position looks at where the scene reaches now.
+    change.camera |= change.instances && (scene.view.position.is_none() || scene.view.target.is_none());
+    identify(scene);
+    Ok(change)
+}
+
+fn wear(scene: &mut Scene, materials: Vec<Material>, change: &mut Change) {
+    scene.materials = materials;
+    for index in 0..scene.materials.len() {
+        if reads_table(&scene.materials[index]) && scene.rig.tabled.insert(index as u32) {
+            coat::add_tables(&mut scene.materials[index..=index], &mut scene.texels);
+            change.texels = true;
+        }
+    }
+    lights::weigh(scene);
+    (change.materials, change.lights) = (true, true);
+}
+
+/// Moves the triangles of a mesh, and fits its hierarchy to them or builds another.
+fn deform(scene: &mut Scene, mesh: NextMesh, copies: &mut [Instance], rebuild_above: f32, change: &mut Change) {
+    let tree = &mut scene.rig.trees[mesh.tree];
+    let (range, nodes) = (tree.range.clone(), tree.nodes.clone());
+    tree.bounds = mesh.bounds;
+    if scene.shading.is_empty() && mesh.normals.iter().any(|codes| *codes != FLAT) {
+        // The first vertex normals of the scene: all triangles get a record.
+        scene.shading = vec![Shading { normal: FLAT, ..Shading::default() }; scene.triangles.len()];
+        change.triangles.push(0..scene.triangles.len());
+    }
+    scene.triangles[range.clone()].copy_from_slice(&mesh.triangles);
+    if !scene.shading.is_empty() {
+        soft::bend(&mut scene.shading[range.clone()], &mesh.normals);
+    }
+    let Some(soft) = &mut tree.soft else { return };
+    soft.pose = mesh.pose;
+    let cost = soft::refit(&mut scene.nodes, nodes.clone(), &scene.triangles[range.clone()], &range);
+    let rebuilt = cost > rebuild_above * soft.cost || rebuild_above == 0.0;
+    let ratio = if soft.cost > 0.0 { cost / soft.cost } else { 1.0 };
+    change.deformed.push(Deformed { mesh: tree.mesh.unwrap_or_default(), cost: ratio, rebuilt });
+    change.triangles.push(range);
+    change.nodes.push(nodes);
+    if rebuilt {
+        rebuild(scene, mesh.tree, copies, change);
+    }
+}
+
+/// Builds the hierarchy of a mesh as if it were loaded.
+fn rebuild(scene: &mut Scene, index: usize, copies: &mut [Instance], change: &mut Change) {
+    let levels = scene.rig.levels[1];
+    let tree = &mut scene.rig.trees[index];
+    let Some(soft) = &mut tree.soft else { return };
+    let range = tree.range.clone();
+    let mut triangles = soft.unsorted(&scene.triangles[range.clone()]);
+    let mut built = Vec::new();
+    let (_, order) = bvh::build(&triangles, range.start as u32, &mut built, levels);
+    bvh::reorder(&mut triangles, &order);
+    scene.triangles[range.clone()].copy_from_slice(&triangles);
+    if !scene.shading.is_empty() {
+        let mut shading = soft.unsorted(&scene.shading[range.clone()]);
+        bvh::reorder(&mut shading, &order);
+        scene.shading[range.clone()].copy_from_slice(&shading);
+    }
+    soft.order = order;
+    let lit = |&i: &usize| scene.materials[scene.triangles[i].material as usize].emission_weight > 0.0;
+    tree.lit = range.clone().filter(lit).map(|i| i as u32).collect();
+    tree.sort_lit();
+    let from = put(scene, index, built, copies);
+    change.nodes.push(from..scene.nodes.len());
+    let tree = &mut scene.rig.trees[index];
+    let cost = soft::refit(&mut scene.nodes, tree.nodes.clone(), &scene.triangles[range.clone()], &range);
+    if let Some(soft) = &mut tree.soft {
+        soft.cost = cost;
+    }
+}
+
+/// Puts another tree in the place of one. Where it does not fit, what lies behind moves, and some room is left for the next. Returns
+/// the first node that changed.
+fn put(scene: &mut Scene, index: usize, built: Vec<BvhNode>, copies: &mut [Instance]) -> usize {
+    let old = scene.rig.trees[index].nodes.clone();
+    let start = old.start as u32;
+    let room = if built.len() > old.len() { built.len() + built.len() / 4 } else { old.len() };
+    let more = room - old.len();
+    let mut built: Vec<_> = built.into_iter().map(|n| BvhNode { child_base: n.child_base + start, ..n }).collect();
+    built.resize(room, BvhNode::default());
+    scene.nodes[old.end..].iter_mut().for_each(|n| n.child_base += more as u32);
+    scene.nodes.splice(old.clone(), built);
+    scene.rig.trees[index].nodes.end += more;
+    let behind = |at: u32| at as usize >= old.end;
+    for tree in scene.rig.trees.iter_mut().filter(|tree| behind(tree.nodes.start as u32)) {
+        tree.nodes = tree.nodes.start + more..tree.nodes.end + more;
+    }
+    copies.iter_mut().filter(|copy| behind(copy.root)).for_each(|copy| copy.root += more as u32);
+    scene.root += if behind(scene.root) { more as u32 } else { 0 };
+    old.start
+}
+
+/// Makes the fingerprint that of the scene as it was loaded and of all that can have changed since: the way here does not count.
+fn identify(scene: &mut Scene) {
+    let (rig, mut content) = (&scene.rig, scene.rig.content.clone());
+    let mut copies: Vec<_> = scene.instances.clone();
+    for (&copy, instance) in rig.order.iter().zip(&scene.instances) {
+        let hidden = u32::from(rig.hidden.contains(&copy));
+        copies[copy as usize] = match hidden {
+            0 => Instance { root: rig.tree_of[copy as usize], ..*instance },
+            _ => Instance::default(),
+        };
+    }
+    content.add(&copies);
+    content.add(&scene.materials.iter().map(|m| Material { coat_table: 0, ..*m }).collect::<Vec<Material>>());
+    content.add::<Light>(&rig.lights);
+    rig.trees.iter().filter_map(|t| t.soft.as_ref()).for_each(|soft| content.add(soft.pose.as_bytes()));
+    scene.content = content;
+}

@@ -1,0 +1,43 @@
+//! New numbers of a material, with the ranges that its table has.
+use crate::layout::{BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, MATERIAL_MASKED, Material, NONE, SMOOTH_ALPHA};
+use crate::scene::load::material::{radiance, reflectance, within};
+use crate::scene::pose::MaterialChange;
+
+/// The material with these numbers. Colours are clamped to [0, 1], since curves may overshoot.
+///
+/// # Errors
+/// A sentence that names the number at fault.
+pub fn changed(m: &Material, to: &MaterialChange) -> Result<Material, String> {
+    let tint = |value: [f32; 3], what: &str| reflectance(value, what, &mut Vec::new());
+    let mut m = *m;
+    if let Some(color) = to.color {
+        match m.kind {
+            BSDF_DIELECTRIC => return Err("a dielectric has no color: change specular or transmission".to_owned()),
+            BSDF_CONDUCTOR => m.specular = tint(color, "color")?,
+            _ => m.base_color = tint(color, "color")?,
+        }
+    }
+    if let Some(specular) = to.specular {
+        m.specular = tint(specular, "specular")?;
+    }
+    if let Some(transmission) = to.transmission {
+        m.transmission = tint(transmission, "transmission")?;
+    }
+    if let Some(emission) = to.emission {
+        m.emission = radiance(emission)?;
+    }
+    if let Some(alpha) = to.alpha {
+        m.alpha = within(alpha, 1.0, "alpha")?;
+    }
+    if let Some(opacity) = to.opacity {
+        m.opacity = within(opacity, 1.0, "opacity")?;
+        let masked = m.kind != BSDF_DIELECTRIC && (m.opacity < 1.0 || m.opacity_texture != NONE);
+        m.flags = m.flags & !MATERIAL_MASKED | if masked { MATERIAL_MASKED } else { 0 };
+    }
+    Ok(m)
+}
+
+/// Whether it reads a table of its coat.
+pub fn reads_table(m: &Material) -> bool {
+    m.kind == BSDF_COATED && m.alpha >= SMOOTH_ALPHA
+}

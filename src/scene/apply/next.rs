@@ -1,0 +1,193 @@
+//! What a scene becomes by a pose, found and checked before anything is changed.
+use super::material::changed;
+use crate::layout::{Instance, LIGHT_ENVIRONMENT, Light, MATERIAL_MASKED, Material, NONE, SPHERE, Triangle};
+use crate::scene::build::bvh::{self, Bounds};
+use crate::scene::build::environment::{self, rotation};
+use crate::scene::build::hierarchy::{instance, is_lost, reach};
+use crate::scene::build::plan::{has_inverse, is_even};
+use crate::scene::load::material::radiance;
+use crate::scene::pose::{EnvironmentChange, Pose, Vertices};
+use crate::scene::{Fingerprint, Scene};
+use glam::{DAffine3, DMat3, Vec3};
+use std::collections::HashSet;
+
+type Checked<T> = Result<T, String>;
+
+/// What is new.
+#[derive(Default)]
+pub struct Next {
+    pub meshes: Vec<NextMesh>,
+    pub copies: Option<NextCopies>,
+    pub materials: Option<Vec<Material>>,
+    pub lights: Option<Vec<Light>>,
+}
+
+/// Where copies are.
+pub struct NextCopies {
+    /// In the order of their numbers.
+    pub all: Vec<Instance>,
+    /// Numbers of those that are not seen.
+    pub hidden: HashSet<u32>,
+    /// What the others reach.
+    pub world: Bounds,
+}
+
+/// A mesh in another pose.
+pub struct NextMesh {
+    /// Index of its tree.
+    pub tree: usize,
+    /// In leaf order, as the packed normals.
+    pub triangles: Vec<Triangle>,
+    pub normals: Vec<[u32; 3]>,
+    pub bounds: Bounds,
+    /// What identifies the vertices.
+    pub pose: String,
+}
+
+impl Next {
+    /// # Errors
+    /// A sentence with what cannot be.
+    pub fn of(scene: &Scene, pose: &Pose) -> Checked<Self> {
+        let moves = !(pose.instances.is_empty() && pose.meshes.is_empty());
+        let shines = !(pose.materials.is_empty() && pose.lights.is_empty()) || pose.environment.is_some();
+        if scene.rig.trees.is_empty() && (moves || shines) {
+            return Err("the scene was neither loaded nor built from a description: only its camera can move".into());
+        }
+        let meshes = pose.meshes.iter().map(|(mesh, to)| next_mesh(scene, *mesh, to)).collect::<Checked<Vec<_>>>()?;
+        let materials = next_materials(scene, pose)?;
+        let copies = match moves {
+            true => Some(next_copies(scene, pose, &meshes, materials.as_deref().unwrap_or(&scene.materials))?),
+            false => None,
+        };
+        if let Some(camera) = &pose.camera {
+            let bounds = copies.as_ref().map_or(scene.bounds, |copies| copies.world);
+            camera.build([1, 1], bounds).map_err(|what| format!("camera: {what}"))?;
+        }
+        Ok(Self { meshes, copies, materials, lights: next_lights(scene, pose)? })
+    }
+}
+
+fn next_mesh(scene: &Scene, mesh: usize, to: &Vertices) -> Checked<NextMesh> {
+    let found = scene.rig.trees.iter().position(|tree| tree.mesh == Some(mesh) && tree.soft.is_some());
+    let Some((tree, soft)) = found.and_then(|i| Some((i, scene.rig.trees[i].soft.as_ref()?))) else {
+        return Err(format!("mesh {mesh} cannot be deformed: it needs `moving = true`, and triangles"));
+    };
+    let before = &scene.triangles[scene.rig.trees[tree].range.clone()];
+    let (triangles, normals) = soft.place(to, before).map_err(|what| format!("mesh {mesh} {what}"))?;
+    let bounds = bvh::bounds(&triangles).unwrap_or_default();
+    let mut pose = Fingerprint::default();
+    pose.add(&to.positions);
+    pose.add(&to.normals);
+    pose.add(&to.indices);
+    Ok(NextMesh { tree, triangles, normals, bounds, pose: pose.to_string() })
+}
+
+fn next_copies(scene: &Scene, pose: &Pose, meshes: &[NextMesh], materials: &[Material]) -> Checked<NextCopies> {
+    let (mut hidden, tree_of) = (scene.rig.hidden.clone(), &scene.rig.tree_of);
+    let mut copies = scene.instances.clone();
+    scene.rig.order.iter().zip(&scene.instances).for_each(|(&copy, instance)| copies[copy as usize] = *instance);
+    for (number, transform) in &pose.instances {
+        let Some(&copy) = scene.rig.placed.get(*number) else {
+            let count = scene.rig.placed.len();
+            return Err(format!(
+                "instance {number} of {count}: only instances and meshes that are `moving` can be placed"
+            ));
+        };
+        if copy == NONE {
+            return Err(format!(
+                "instance {number} is fixed: it has no triangles, or is a mirrored lamp with a texture"
+            ));
+        }
+        let affine = scene.rig.own.get(&copy).map_or(transform.0, |own| transform.0 * *own);
+        if !affine.is_finite() {
+            return Err(format!("instance {number} gets a transform with NaN or infinite numbers"));
+        }
+        if !has_inverse(&affine) {
+            hidden.insert(copy);
+            continue;
+        }
+        hidden.remove(&copy);
+        let Instance { root, material, object, .. } = copies[copy as usize];
+        copies[copy as usize] = Instance { material, object, ..instance(&affine, root) };
+        shines_right(scene, copy, &copies[copy as usize], &affine, materials)
+            .map_err(|what| format!("instance {number} {what}"))?;
+    }
+    let mut bounds: Vec<_> = scene.rig.trees.iter().map(|tree| tree.bounds).collect();
+    meshes.iter().for_each(|mesh| bounds[mesh.tree] = mesh.bounds);
+    let mut world = reach(&bounds, tree_of, &hidden, &copies).map_err(|what| format!("instances {what}"))?;
+    // What has shrunk to less than a 1e-12 of the scene cannot be seen.
+    let lost: Vec<u32> = (0..).zip(&copies).filter(|(_, i)| is_lost(i, world)).map(|(copy, _)| copy).collect();
+    if !lost.is_empty() {
+        hidden.extend(lost);
+        world = reach(&bounds, tree_of, &hidden, &copies).map_err(|what| format!("instances {what}"))?;
+    }
+    Ok(NextCopies { all: copies, hidden, world })
+}
+
+/// Lamps are sampled where they are hit: a sphere as a sphere, and a texture by corners whose order a mirror would swap.
+fn shines_right(scene: &Scene, copy: u32, at: &Instance, affine: &DAffine3, materials: &[Material]) -> Checked<()> {
+    let even = is_even(affine);
+    if even && at.mirrored == 0 {
+        return Ok(());
+    }
+    let tree = &scene.rig.trees[scene.rig.tree_of[copy as usize] as usize];
+    for triangle in &scene.triangles[tree.range.clone()] {
+        let worn = if at.material == NONE { triangle.material } else { at.material };
+        let m = &materials[worn as usize];
+        if m.emission == [0.0; 3] {
+            continue;
+        }
+        if !even && triangle.primitive & SPHERE != 0 {
+            return Err("stretches a lamp that is a sphere: give its mesh segments".to_owned());
+        }
+        let textured = m.emission_texture != NONE || m.opacity_texture != NONE && m.flags & MATERIAL_MASKED != 0;
+        if at.mirrored != 0 && textured {
+            return Err("mirrors a lamp with a texture: mirror its mesh instead".to_owned());
+        }
+    }
+    Ok(())
+}
+
+fn next_materials(scene: &Scene, pose: &Pose) -> Checked<Option<Vec<Material>>> {
+    if pose.materials.is_empty() {
+        return Ok(None);
+    }
+    let mut materials = scene.materials.clone();
+    for (index, to) in &pose.materials {
+        let count = materials.len();
+        let m = materials.get_mut(*index).ok_or_else(|| format!("material {index} of {count}: there is none"))?;
+        *m = changed(m, to).map_err(|what| format!("material {index}: {what}"))?;
+    }
+    Ok(Some(materials))
+}
+
+fn next_lights(scene: &Scene, pose: &Pose) -> Checked<Option<Vec<Light>>> {
+    if pose.lights.is_empty() && pose.environment.is_none() {
+        return Ok(None);
+    }
+    let mut lights = scene.rig.lights.clone();
+    let sky = lights.iter().position(|light| light.kind == LIGHT_ENVIRONMENT);
+    let count = sky.unwrap_or(lights.len());
+    for (index, table) in &pose.lights {
+        let built = table.build().map_err(|what| format!("light {index}: {what}"))?;
+        *lights[..count].get_mut(*index).ok_or_else(|| format!("light {index} of {count}: there is none"))? = built;
+    }
+    if let Some(to) = &pose.environment {
+        let sky = sky.ok_or("the scene has no environment that could change")?;
+        lights[sky] = next_sky(&lights[sky], to)?;
+    }
+    Ok(Some(lights))
+}
+
+fn next_sky(sky: &Light, to: &EnvironmentChange) -> Checked<Light> {
+    let value = radiance(to.radiance.unwrap_or(sky.value)).map_err(|what| format!("environment: {what}"))?;
+    let turned = match to.rotation {
+        Some(degrees) if !degrees.is_finite() => return Err("environment: its rotation is no number".to_owned()),
+        Some(degrees) => rotation(degrees, None)?,
+        None => {
+            let [x, y, z] = [sky.a, sky.b, sky.c].map(|v| Vec3::from(v).as_dvec3());
+            DMat3::from_cols(x, y, z)
+        }
+    };
+    Ok(environment::light(value, turned))
+}

@@ -1,0 +1,48 @@
+//! What a pose has changed in a scene's arrays.
+use std::ops::Range;
+
+/// What [`Scene::apply`](super::Scene::apply) has changed, for those who copy it to a device.
+#[derive(Clone, Debug, Default)]
+pub struct Change {
+    /// The camera.
+    pub camera: bool,
+    /// Parts of [`Scene::nodes`](super::Scene::nodes).
+    pub nodes: Vec<Range<usize>>,
+    /// Parts of [`Scene::triangles`](super::Scene::triangles) and, where there are any, of the shading records.
+    pub triangles: Vec<Range<usize>>,
+    /// The instances.
+    pub instances: bool,
+    /// The materials.
+    pub materials: bool,
+    /// The texels, of which there are more.
+    pub texels: bool,
+    /// The lights and their table.
+    pub lights: bool,
+    /// The meshes that were deformed, and what their hierarchies cost.
+    pub deformed: Vec<Deformed>,
+}
+
+/// A mesh that was deformed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Deformed {
+    /// Number of its `[[mesh]]`.
+    pub mesh: usize,
+    /// What rays pay in its refitted hierarchy over what they did when that was built: its SAH cost.
+    pub cost: f32,
+    /// Whether it was built anew for that.
+    pub rebuilt: bool,
+}
+
+impl Change {
+    /// Adds what a later pose has changed.
+    pub fn add(&mut self, later: Self) {
+        self.camera |= later.camera;
+        self.nodes.extend(later.nodes);
+        self.triangles.extend(later.triangles);
+        self.instances |= later.instances;
+        self.materials |= later.materials;
+        self.texels |= later.texels;
+        self.lights |= later.lights;
+        self.deformed.extend(later.deformed);
+    }
+}

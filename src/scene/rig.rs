@@ -1,0 +1,124 @@
+//! What can move in a scene: what is kept of its description so that a [`Pose`](super::Pose) finds it.
+use super::Scene;
+use super::build::bvh::Bounds;
+use super::build::soft::Soft;
+use super::description::Description;
+use super::fingerprint::Fingerprint;
+use crate::layout::{BSDF_COATED, Instance, Light, Material, NONE, SMOOTH_ALPHA};
+use glam::DAffine3;
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
+
+/// What can move in a scene, by the names and numbers that its description gives. A scene that was not loaded or built has
+/// nothing of it.
+#[derive(Clone, Debug, Default)]
+pub struct Rig {
+    /// World space, where anything is in it, and the meshes that instances place.
+    pub(in crate::scene) trees: Vec<Tree>,
+    /// The numbers of the copies in the order of [`Scene::instances`]; copies are numbered tree by tree.
+    pub(in crate::scene) order: Vec<u32>,
+    /// By copy, its tree.
+    pub(in crate::scene) tree_of: Vec<u32>,
+    /// Of copies that do not place a mesh as it is stored, what comes before their transform.
+    pub(in crate::scene) own: HashMap<u32, DAffine3>,
+    /// Copies that are not seen.
+    pub(in crate::scene) hidden: HashSet<u32>,
+    /// Copies by the numbers that a pose calls them; [`NONE`] for one that is fixed.
+    pub(in crate::scene) placed: Vec<u32>,
+    /// Levels of the top and of the deepest tree, which kernels are compiled for.
+    pub(in crate::scene) levels: [usize; 2],
+    /// Lights without surface; the environment is the last.
+    pub(in crate::scene) lights: Vec<Light>,
+    /// Mean luminance of the environment's image, or 1.
+    pub(in crate::scene) sky: f64,
+    /// Mean colours of pictures that emit or mask, by first texel and transfer curve.
+    pub(in crate::scene) means: HashMap<(u32, u32), [f32; 3]>,
+    /// Materials that have a table of their coat.
+    pub(in crate::scene) tabled: HashSet<u32>,
+    /// Fingerprint of the scene as it was loaded.
+    pub(in crate::scene) content: Fingerprint,
+    placements: HashMap<String, usize>,
+    moving: HashMap<String, usize>,
+    lamps: HashMap<String, usize>,
+}
+
+/// A hierarchy over triangles.
+#[derive(Clone, Debug)]
+pub(in crate::scene) struct Tree {
+    /// Number of its `[[mesh]]`; `None`: world space.
+    pub mesh: Option<usize>,
+    /// Its nodes: the root is the first, and some at the end may be unused.
+    pub nodes: Range<usize>,
+    /// Its triangles.
+    pub range: Range<usize>,
+    /// What they reach.
+    pub bounds: Bounds,
+    /// Those that emit light, in an order that does not depend on where the hierarchy has them if it may be built again.
+    pub lit: Vec<u32>,
+    /// What it takes to deform it.
+    pub soft: Option<Soft>,
+}
+
+impl Tree {
+    /// Its triangles, in an order as that of `lit`.
+    pub fn whole(&self) -> impl Iterator<Item = usize> {
+        let mut all: Vec<_> = self.range.clone().collect();
+        if let Some(soft) = &self.soft {
+            all.sort_unstable_by_key(|i| soft.order[i - self.range.start]);
+        }
+        all.into_iter()
+    }
+
+    /// Puts `lit` in its order.
+    pub fn sort_lit(&mut self) {
+        if let Some(soft) = &self.soft {
+            self.lit.sort_unstable_by_key(|&i| soft.order[i as usize - self.range.start]);
+        }
+    }
+}
+
+impl Rig {
+    /// Number of the instance of this name, or of the mesh of this name that is `moving` and has no instance.
+    pub fn placement(&self, name: &str) -> Option<usize> {
+        self.placements.get(name).copied()
+    }
+
+    /// How many placements there are: the `[[instance]]` tables in order, then meshes that are `moving` and have none.
+    pub fn placements(&self) -> usize {
+        self.placed.len()
+    }
+
+    /// Number of the `[[mesh]]` of this name that can be deformed.
+    pub fn mesh(&self, name: &str) -> Option<usize> {
+        self.moving.get(name).copied()
+    }
+
+    /// Number of the `[[light]]` of this name.
+    pub fn light(&self, name: &str) -> Option<usize> {
+        self.lamps.get(name).copied()
+    }
+
+    /// The instances that are seen, in the order of the hierarchy, each with its tree.
+    pub(in crate::scene) fn seen<'s>(&'s self, scene: &'s Scene) -> impl Iterator<Item = (&'s Tree, &'s Instance)> {
+        let seen = self.order.iter().zip(&scene.instances).filter(|(copy, _)| !self.hidden.contains(copy));
+        seen.map(|(&copy, instance)| (&self.trees[self.tree_of[copy as usize] as usize], instance))
+    }
+
+    /// Notes what the description calls its parts.
+    pub(in crate::scene) fn name(&mut self, from: &Description, materials: &[Material]) {
+        let tabled = |m: &Material| m.kind == BSDF_COATED && m.alpha >= SMOOTH_ALPHA;
+        self.tabled = (0..).zip(materials).filter(|(_, m)| tabled(m)).map(|(i, _)| i).collect();
+        let named = |(i, name): (usize, &Option<String>)| Some((name.clone()?, i));
+        // Of several things of one name the first has it.
+        self.placements.extend(from.instance.iter().map(|i| &i.name).enumerate().rev().filter_map(named));
+        self.lamps.extend(from.light.iter().map(|l| &l.name).enumerate().rev().filter_map(named));
+        let soft = self.trees.iter().filter(|tree| tree.soft.is_some()).filter_map(|tree| tree.mesh);
+        self.moving.extend(soft.filter_map(|mesh| named((mesh, &from.mesh[mesh].name))));
+        for (number, &copy) in self.placed.iter().enumerate().skip(from.instance.len()).filter(|(_, c)| **c != NONE) {
+            let mesh = self.trees[self.tree_of[copy as usize] as usize].mesh;
+            if let Some(name) = mesh.and_then(|mesh| from.mesh[mesh].name.clone()) {
+                self.placements.entry(name).or_insert(number);
+            }
+        }
+    }
+}

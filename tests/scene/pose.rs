@@ -1,0 +1,135 @@
+//! Tests that a scene in another pose is the scene that would have been loaded in that pose, and the messages about poses that
+//! cannot be.
+use crate::poses::{MOMENTS, Moment, at, pose};
+use bytemuck::{Pod, cast_slice};
+use tallow::layout::Instance;
+use tallow::scene::description::Transform;
+use tallow::scene::{Pose, Scene, Vertices};
+
+/// Bytes of all arrays that kernels read. Trees that were not built anew have another shape, and other nodes.
+fn arrays(scene: &Scene) -> Vec<(&'static str, Vec<u8>)> {
+    fn bytes<T: Pod>(values: &[T]) -> Vec<u8> {
+        cast_slice(values).to_vec()
+    }
+    vec![
+        ("nodes", bytes(&scene.nodes)),
+        ("triangles", bytes(&scene.triangles)),
+        ("shading", bytes(&scene.shading)),
+        ("instances", bytes(&scene.instances.iter().map(|i| Instance { root: 0, ..*i }).collect::<Vec<_>>())),
+        ("materials", bytes(&scene.materials)),
+        ("lights", bytes(&scene.lights)),
+        ("light_table", bytes(&scene.light_table)),
+        ("scale", bytes(&[scene.triangle_pdf_scale])),
+        ("bounds", bytes(scene.bounds.as_flattened())),
+        ("camera", bytes(&[scene.camera([4, 3]).unwrap()])),
+    ]
+}
+
+fn differing(a: &Scene, b: &Scene) -> Vec<&'static str> {
+    arrays(a).into_iter().zip(arrays(b)).filter(|(a, b)| a != b).map(|(a, _)| a.0).collect()
+}
+
+fn none() -> Vec<&'static str> {
+    Vec::new()
+}
+
+#[test]
+fn a_pose_has_the_arrays_of_a_scene_that_was_loaded_in_it() {
+    let mut scene = at(&Moment::default()).scene;
+    for moment in MOMENTS.iter().chain(MOMENTS.iter().rev()) {
+        scene.apply(&pose(&scene, moment, 0.0)).unwrap();
+        scene.check().unwrap();
+        let fresh = at(moment).scene;
+        // Room that was left for larger trees moves the nodes behind it.
+        let found = differing(&scene, &fresh);
+        assert!(found.iter().all(|name| *name == "nodes"), "{moment:?}: {found:?}");
+        let other = at(&Moment { turn: 0.5, ..*moment }).scene;
+        assert!(differing(&scene, &other).contains(&"instances"), "control");
+    }
+}
+
+#[test]
+fn a_refitted_mesh_keeps_its_lights_and_instances_and_the_way_does_not_count() {
+    let mut scene = at(&Moment::default()).scene;
+    let size = [4, 3];
+    for moment in &MOMENTS {
+        let change = scene.apply(&pose(&scene, moment, f32::INFINITY)).unwrap();
+        assert!(change.deformed.iter().all(|d| !d.rebuilt && d.cost > 0.0), "{change:?}");
+        scene.check().unwrap();
+        let found = differing(&scene, &at(moment).scene);
+        assert!(found.iter().all(|name| ["nodes", "triangles", "shading"].contains(name)), "{moment:?}: {found:?}");
+        // Straight from how it was loaded it is known by the same fingerprint.
+        let mut straight = at(&Moment::default()).scene;
+        straight.apply(&pose(&straight, moment, f32::INFINITY)).unwrap();
+        assert_eq!(scene.fingerprint(size).unwrap(), straight.fingerprint(size).unwrap());
+        assert_eq!(differing(&scene, &straight), none());
+        let loaded = at(&Moment::default()).scene;
+        assert_ne!(scene.fingerprint(size).unwrap(), loaded.fingerprint(size).unwrap());
+    }
+}
+
+#[test]
+fn a_tree_that_has_become_bad_is_built_anew() {
+    let mut scene = at(&Moment::default()).scene;
+    let mesh = scene.rig.mesh("cloth").unwrap();
+    let mut positions: Vec<[f32; 3]> = Vec::new();
+    let mut random = fastrand::Rng::with_seed(1);
+    positions.resize_with(24 * 24, || std::array::from_fn(|_| random.f32()));
+    let to = Vertices { positions, ..Vertices::default() };
+    let pose = Pose { meshes: vec![(mesh, to)], ..Pose::default() };
+    let first = scene.apply(&pose).unwrap().deformed[0];
+    assert!(first.rebuilt && first.cost > 1.4, "{first:?}");
+    scene.check().unwrap();
+    let second = scene.apply(&pose).unwrap().deformed[0];
+    assert!(!second.rebuilt && (second.cost - 1.0).abs() < 1e-3, "{second:?}");
+}
+
+#[test]
+fn what_is_hidden_comes_back() {
+    let mut scene = at(&Moment::default()).scene;
+    let whole = scene.clone();
+    let lights = scene.lights.len();
+    let gone = Transform::from([0.0; 16]);
+    let hide = Pose { instances: (0..3).map(|i| (i, gone)).collect(), ..Pose::default() };
+    scene.apply(&hide).unwrap();
+    scene.check().unwrap();
+    assert_eq!(scene.lights.len(), lights - 2, "the panel's two triangles shine no more");
+    let tiny = Transform::from([1e-14, 0., 0., 0., 0., 1e-14, 0., 0., 0., 0., 1e-14, 0., 0., 0., 0., 1.]);
+    scene.apply(&Pose { instances: vec![(0, tiny)], ..Pose::default() }).unwrap();
+    scene.apply(&pose(&scene, &Moment::default(), 1.4)).unwrap();
+    assert_eq!(differing(&scene, &whole), none());
+}
+
+#[test]
+fn poses_that_cannot_be_are_one_line_and_change_nothing() {
+    let mut scene = at(&Moment::default()).scene;
+    let (before, mesh) = (arrays(&scene), scene.rig.mesh("cloth").unwrap());
+    let place = |number, rows| Pose { instances: vec![(number, Transform::from(rows))], ..Pose::default() };
+    let deform = |mesh, positions: Vec<[f32; 3]>, normals| Pose {
+        meshes: vec![(mesh, Vertices { positions, normals, ..Vertices::default() })],
+        ..Pose::default()
+    };
+    let still = vec![[0.0; 3]; 576];
+    let mut broken = still.clone();
+    broken[99][1] = f32::NAN;
+    let mut far = still.clone();
+    far[3][0] = 2e12;
+    let cases = [
+        (place(0, [f64::NAN; 16]), "instance 0 gets a transform with NaN"),
+        (place(9, [1.0; 16]), "instance 9 of 4"),
+        (deform(mesh, still[..9].to_vec(), Vec::new()), "has 576 vertices, not 9"),
+        (deform(mesh, still.clone(), vec![[0.0; 3]; 5]), "576 positions but 5 normals"),
+        (deform(mesh, broken, Vec::new()), "a vertex with a NaN"),
+        (deform(mesh, far, Vec::new()), "the limit is 1e12"),
+        (deform(0, still, Vec::new()), "mesh 0 cannot be deformed"),
+        (Pose { materials: vec![(7, Default::default())], ..Pose::default() }, "material 7 of"),
+        (Pose { lights: vec![(0, Default::default())], ..Pose::default() }, "light 0: needs intensity"),
+        (Pose { lights: vec![(1, Default::default())], ..Pose::default() }, "light 1"),
+    ];
+    for (pose, line) in cases {
+        let error = scene.apply(&pose).unwrap_err();
+        let said = error.to_string();
+        assert!(said.contains(line) && !said.contains('\n') && error.exit_code() == 2, "{said}");
+        assert!(arrays(&scene) == before, "{said}");
+    }
+}
