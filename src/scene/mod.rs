@@ -220,6 +220,11 @@ impl<'a> SceneFile<'a> {
         Ok(settings)
     }
 
+    /// What the file says, to be changed before it is loaded: another camera, another sky.
+    pub fn description_mut(&mut self) -> &mut Description {
+        self.description.to_mut()
+    }
+
     /// Reads what the file names and makes the scene.
     ///
     /// # Errors

@@ -71,7 +71,7 @@ pub fn read(asset: &Asset, primitive: &Json, place: &str) -> Result<Option<Primi
     let vertices = Elements::of(asset, positions.value())?.count();
     let reader = Reader { asset, primitive, place, vertices };
     let uv_up = |uvs: Vec<[f32; 2]>| uvs.into_iter().map(|[u, v]| [u, 1.0 - v]).collect();
-    let mesh = Mesh {
+    let mut mesh = Mesh {
         positions: reader.numbers(Semantic::Positions)?,
         normals: reader.numbers(Semantic::Normals)?,
         uvs: uv_up(reader.numbers(Semantic::TexCoords(0))?),
@@ -80,9 +80,19 @@ pub fn read(asset: &Asset, primitive: &Json, place: &str) -> Result<Option<Primi
         tangents: reader.numbers(Semantic::Tangents)?,
         indices: reader.triangles()?,
     };
+    if primitive.targets.is_none() {
+        drop_joints_of_strips(&mut mesh);
+    }
     let targets = primitive.targets.iter().flatten().map(|target| reader.target(target)).collect::<Result<_>>()?;
     let material = primitive.material.map(|material| material.value());
     Ok(Some(Primitive { mesh, material, targets, joints: reader.joints()? }))
+}
+
+/// Drops triangles with two corners at one place, as strips and spheres have them on purpose: they are no reason for a warning.
+fn drop_joints_of_strips(mesh: &mut Mesh) {
+    let at = |corner: u32| mesh.positions[corner as usize];
+    let open = |t: &&[u32]| at(t[0]) != at(t[1]) && at(t[1]) != at(t[2]) && at(t[2]) != at(t[0]);
+    mesh.indices = mesh.indices.chunks_exact(3).filter(open).flatten().copied().collect();
 }
 
 fn attribute(primitive: &Json, semantic: Semantic) -> Option<&Index<Accessor>> {

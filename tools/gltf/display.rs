@@ -1,0 +1,71 @@
+//! Pictures as displays show them, and how far they are from each other.
+use tallow::image::Picture;
+
+/// A picture of display values in [0, 1], multiplied by its alpha.
+pub struct Shown {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Colours over black.
+    pub pixels: Vec<[f32; 3]>,
+    /// Share of each pixel that the model covers.
+    pub alpha: Vec<f32>,
+}
+
+/// The ACES curve of three.js, by S. Hill: rows of the matrices before and after it.
+const INTO: [[f32; 3]; 3] = [[0.59719, 0.35458, 0.04823], [0.076, 0.90834, 0.01566], [0.0284, 0.13383, 0.83777]];
+const OUT: [[f32; 3]; 3] =
+    [[1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]];
+
+impl Shown {
+    /// Radiance as the other renderers were told to show it: divided by 0.6, by the ACES curve and a gamma of 2.2.
+    pub fn of(picture: &Picture) -> Self {
+        let times = |m: &[[f32; 3]; 3], v: [f32; 3]| m.map(|row| row.iter().zip(v).map(|(a, b)| a * b).sum());
+        let curve = |v: f32| (v * (v + 0.0245786) - 0.000090537) / (v * (0.983729 * v + 0.432951) + 0.238081);
+        let show = |p: &[f32; 3]| {
+            let v: [f32; 3] = times(&INTO, p.map(|v| v / 0.6));
+            times(&OUT, v.map(curve)).map(|v: f32| v.clamp(0.0, 1.0).powf(1.0 / 2.2))
+        };
+        let pixels: Vec<_> = picture.pixels.iter().map(show).collect();
+        Self { size: [picture.width, picture.height], alpha: vec![1.0; pixels.len()], pixels }
+    }
+
+    /// Averages `bytes` of so many channels to another size.
+    pub fn shrunk(bytes: &[u8], channels: usize, from: [u32; 2], size: [u32; 2]) -> Self {
+        let (mut pixels, mut alpha) = (Vec::new(), Vec::new());
+        for y in 0..size[1] {
+            for x in 0..size[0] {
+                let (mut sum, mut covered, mut count) = ([0.0; 3], 0.0, 0.0);
+                let range =
+                    |at: u32, axis: usize| at * from[axis] / size[axis]..((at + 1) * from[axis]).div_ceil(size[axis]);
+                for (row, column) in range(y, 1).flat_map(|row| range(x, 0).map(move |column| (row, column))) {
+                    let texel = &bytes[(row * from[0] + column) as usize * channels..][..channels];
+                    let a = texel.get(3).map_or(1.0, |&a| f32::from(a) / 255.0);
+                    (0..3).for_each(|c| sum[c] += a * f32::from(texel[c]) / 255.0);
+                    (covered, count) = (covered + a, count + 1.0);
+                }
+                pixels.push(sum.map(|v| v / count));
+                alpha.push(covered / count);
+            }
+        }
+        Self { size, pixels, alpha }
+    }
+
+    /// Keeps what another picture's alpha covers.
+    pub fn cut_out(&mut self, alpha: &[f32]) {
+        self.alpha = alpha.to_vec();
+        self.pixels.iter_mut().zip(alpha).for_each(|(pixel, a)| *pixel = pixel.map(|v| v * a));
+    }
+
+    /// Root mean square difference of the values, over what either shows.
+    pub fn difference(&self, other: &Self) -> f64 {
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for i in 0..self.pixels.len() {
+            let share = f64::from(self.alpha[i].max(other.alpha[i]));
+            let squares =
+                self.pixels[i].iter().zip(other.pixels[i]).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
+            sum += share.min(1.0) * squares / 3.0;
+            weight += share;
+        }
+        (sum / f64::max(weight, 1.0)).sqrt()
+    }
+}
