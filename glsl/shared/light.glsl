@@ -155,8 +155,10 @@ void sample_triangle_light(vec3 p, Light light, vec2 u, inout LightSample s) {
     vec3 radiance = light.value;
     if (FX_TEXTURES) {
         uint image = Material_emission_texture(materials, light.material);
-        if (image != NONE) radiance *= texture_sample(image, texture_coordinates(light.triangle, bary), true).rgb;
+        if (image != NONE) radiance *= texture_sample(image, texture_coordinates(image, light.triangle, bary), true).rgb;
     }
+    if (FX_VERTEX_COLORS && (Material_flags(materials, light.material) & MATERIAL_UNLIT) != 0u)
+        radiance *= vertex_color(Shading_load(shading, light.triangle), bary).rgb;
     // The shadow ray ends before the light, so that the light's own mask counts here.
     if (FX_ALPHA_MASKS) radiance *= surface_opacity(light.material, light.triangle, bary);
     bool lit = cosine > 0.0 && d2 > 0.0;

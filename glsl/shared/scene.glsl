@@ -33,9 +33,12 @@ uint material_of(uint triangle, uint instance) {
 }
 
 #include "shared/sphere.glsl"
+#include "shared/attributes.glsl"
 
-vec2 texture_coordinates(uint triangle, vec2 barycentric) {
+// Coordinates at which a point of a triangle reads the picture `image`.
+vec2 texture_coordinates(uint image, uint triangle, vec2 barycentric) {
     if (FX_SPHERES && is_sphere(triangle)) return sphere_coordinates(sphere_of(triangle), octahedral_vector(barycentric));
     Shading s = Shading_load(shading, triangle);
+    if (FX_SECOND_UV && (Texture_flags(textures, image) & TEXTURE_SECOND_UV) != 0u) take_second_coordinates(s);
     return s.uv0 + barycentric.x * (s.uv1 - s.uv0) + barycentric.y * (s.uv2 - s.uv0);
 }

@@ -10,6 +10,9 @@ struct Surface {
     uint flags;     // of the material
     uint object;
     vec2 uv;
+    vec2 second_uv; // as `uv` where the mesh has no second set
+    vec4 color;     // of the vertices: linear, and opacity
+    vec4 tangent;   // of the vertices: in world space, and the sign of the bitangent; 0 where the mesh has none
     vec3 corner, e1, e2; // the triangle in world space: its first vertex, and the edges from there
     float radius;    // of a sphere, whose centre is `corner`; 0 of a triangle
     float clearance; // distance from the plane at which rays start, world units
@@ -40,33 +43,45 @@ vec3 ray_origin(Surface s, vec3 w) {
     return s.position + (dot(w, s.geometric) < 0.0 ? -s.clearance : s.clearance) * s.geometric;
 }
 
+// Coordinates at which a surface reads a picture.
+vec2 uv_of(Surface s, uint image) {
+    return FX_SECOND_UV && (Texture_flags(textures, image) & TEXTURE_SECOND_UV) != 0u ? s.second_uv : s.uv;
+}
+
 // The normal perturbed by a height map (Blinn 1978) or a tangent-space normal map. `e1`, `e2` are edges, `d1`, `d2` their
 // extents in uv.
 vec3 perturbed_normal(Surface s, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
     uint image = Material_bump_texture(materials, s.material);
     float det = d1.x * d2.y - d2.x * d1.y;
-    if (image == NONE || det == 0.0) return s.normal;
+    bool mapped = FX_NORMAL_MAPS && (!FX_BUMP_MAPS || (s.flags & MATERIAL_NORMAL_MAP) != 0u);
+    bool given = FX_TANGENTS && mapped && s.tangent.w != 0.0;
+    if (image == NONE || (det == 0.0 && !given)) return s.normal;
     vec3 dpdu = (d2.y * e1 - d1.y * e2) / det;
     vec3 dpdv = (d1.x * e2 - d2.x * e1) / det;
-    bool mapped = FX_NORMAL_MAPS && (!FX_BUMP_MAPS || (s.flags & MATERIAL_NORMAL_MAP) != 0u);
+    vec2 uv = uv_of(s, image);
     Texture map = Texture_load(textures, image);
-    vec2 texel = 1.0 / (vec2(map.width, map.height) * max(abs(map.scale), 1e-6));
+    vec2 extent = abs(map.scale);
+    if (FX_TEXTURE_MODES) extent = sqrt(map.scale * map.scale + map.shear.yx * map.shear.yx);
+    vec2 texel = 1.0 / (vec2(map.width, map.height) * max(extent, 1e-6));
     // The normal, or differences of heights half a texel to either side: along u, then along v.
     vec3 value;
     vec2 rise = vec2(0.0);
     int k = 0;
     do {
         vec2 offset = (k < 2 ? vec2(texel.x, 0.0) : vec2(0.0, texel.y)) * (k % 2 == 0 ? 0.5 : -0.5);
-        value = texture_sample(image, mapped ? s.uv : s.uv + offset, false).xyz;
+        value = texture_sample(image, mapped ? uv : uv + offset, false).xyz;
         rise += sign(offset) * value.r;
     } while (FX_BUMP_MAPS && !mapped && ++k < 4);
     vec3 n;
     if (mapped) {
         vec3 m = 2.0 * value - 1.0;
-        float extent;
-        vec3 t = unit_vector(dpdu - s.normal * dot(s.normal, dpdu), extent);
+        m.xy *= Material_normal_scale(materials, s.material);
+        vec3 along = given ? s.tangent.xyz : dpdu;
+        float length_along;
+        vec3 t = unit_vector(along - s.normal * dot(s.normal, along), length_along);
         vec3 b = cross(s.normal, t);
-        n = m.x * t + m.y * (dot(b, dpdv) < 0.0 ? -b : b) + m.z * s.normal;
+        bool flipped = given ? s.tangent.w < 0.0 : dot(b, dpdv) < 0.0;
+        n = m.x * t + m.y * (flipped ? -b : b) + m.z * s.normal;
     } else {
         float height = Material_bump_scale(materials, s.material);
         vec3 pu = dpdu + s.normal * (height * (rise.x / texel.x) - dot(s.normal, dpdu));
@@ -121,6 +136,9 @@ Surface sphere_at(Hit hit) {
     s.smooth_normal = s.normal = s.geometric;
     s.uv = vec2(0.0);
     if (FX_TEXTURES || FX_BUMP_MAPS || FX_NORMAL_MAPS) s.uv = sphere_coordinates(ball, n);
+    s.second_uv = s.uv;
+    s.color = vec4(1.0);
+    s.tangent = vec4(0.0);
     if (FX_BUMP_MAPS || FX_NORMAL_MAPS) s.normal = perturbed_normal(s, e1, e2, vec2(1.0, 0.0), vec2(0.0, 1.0));
     return s;
 }
@@ -160,8 +178,10 @@ Surface surface_at(Hit hit) {
     s.geometric = unit_vector(scaled, doubled_area); // a needle that rounds to no area scatters nothing
     s.clearance = plane_clearance(s.geometric, reach, e1, e2);
     s.smooth_normal = s.normal = s.geometric;
-    s.uv = vec2(0.0);
-    if (!(FX_SMOOTH_NORMALS || FX_TEXTURES || FX_BUMP_MAPS || FX_NORMAL_MAPS)) return s;
+    s.uv = s.second_uv = vec2(0.0);
+    s.color = vec4(1.0);
+    s.tangent = vec4(0.0);
+    if (!(FX_SMOOTH_NORMALS || FX_VERTEX_COLORS || FX_TEXTURES || FX_BUMP_MAPS || FX_NORMAL_MAPS)) return s;
 
     Shading at = Shading_load(shading, hit.triangle);
     if (FX_SMOOTH_NORMALS && (at.normal.x & at.normal.y & at.normal.z) != 0xffffffffu) {
@@ -171,9 +191,26 @@ Surface surface_at(Hit hit) {
         n = unit_vector(normals_from_object * n, len);
         s.smooth_normal = s.normal = len > 0.0 ? n : s.geometric;
     }
+    if (FX_VERTEX_COLORS) s.color = vertex_color(at, vec2(hit.b1, hit.b2));
+    if (FX_TANGENTS) {
+        s.tangent = vertex_tangent(at, vec2(hit.b1, hit.b2));
+        if (FX_INSTANCES && hit.instance != NONE) {
+            s.tangent.xyz = mat3(world_from_object(hit.instance)) * s.tangent.xyz;
+            s.tangent.w = mirrored ? -s.tangent.w : s.tangent.w;
+        }
+    }
     if (FX_TEXTURES || FX_BUMP_MAPS || FX_NORMAL_MAPS) {
         vec2 d1 = at.uv1 - at.uv0, d2 = at.uv2 - at.uv0;
-        s.uv = at.uv0 + hit.b1 * d1 + hit.b2 * d2;
+        s.uv = s.second_uv = at.uv0 + hit.b1 * d1 + hit.b2 * d2;
+        if (FX_SECOND_UV) {
+            take_second_coordinates(at);
+            s.second_uv = at.uv0 + hit.b1 * (at.uv1 - at.uv0) + hit.b2 * (at.uv2 - at.uv0);
+            uint bump = Material_bump_texture(materials, s.material);
+            if (bump != NONE && (Texture_flags(textures, bump) & TEXTURE_SECOND_UV) != 0u) {
+                d1 = at.uv1 - at.uv0;
+                d2 = at.uv2 - at.uv0;
+            }
+        }
         if (FX_BUMP_MAPS || FX_NORMAL_MAPS) s.normal = perturbed_normal(s, e1, e2, d1, d2);
     }
     return s;
@@ -232,24 +269,40 @@ float light_share(Surface s, Facing facing, vec3 w, float z) {
 
 vec3 textured(vec3 constant, uint image, Surface s) {
     if (!FX_TEXTURES || image == NONE) return constant;
-    return constant * texture_sample(image, s.uv, true).rgb;
+    return constant * texture_sample(image, uv_of(s, image), true).rgb;
+}
+
+// A number times the red channel of a picture.
+float scaled(float constant, uint image, Surface s) {
+    if (!FX_TEXTURES || image == NONE) return constant;
+    return constant * texture_sample(image, uv_of(s, image), false).r;
 }
 
 // Radiance that the surface emits from its front side.
 vec3 surface_emission(Surface s) {
     vec3 emission = Material_emission(materials, s.material);
+    if (FX_VERTEX_COLORS && (s.flags & MATERIAL_UNLIT) != 0u) emission *= s.color.rgb;
     if (!FX_TEXTURES) return emission;
     uint image = Material_emission_texture(materials, s.material);
-    return image == NONE ? emission : emission * texture_sample(image, s.uv, true).rgb;
+    return image == NONE ? emission : emission * texture_sample(image, uv_of(s, image), true).rgb;
 }
 
 // The layers of a metallic-roughness material, whose base colour is known.
 Metallic surface_metallic(Material m, vec3 base, Surface s) {
     vec3 factors = vec3(1.0); // of roughness in g, of metal in b
-    if (FX_TEXTURES && m.roughness_texture != NONE) factors = texture_sample(m.roughness_texture, s.uv, false).rgb;
+    if (FX_TEXTURES && m.roughness_texture != NONE)
+        factors = texture_sample(m.roughness_texture, uv_of(s, m.roughness_texture), false).rgb;
     vec3 f0 = textured(m.specular, m.specular_texture, s);
-    return metallic_layers(base, m.metallic * factors.b, f0, m.specular_factor, m.transmission_factor,
-                           m.alpha * factors.g * factors.g, m.clearcoat, m.clearcoat_alpha);
+    float through = 0.0;
+    if (FX_THIN) through = scaled(m.transmission_factor, m.transmission_texture, s);
+    vec2 coat = vec2(0.0);
+    if (FX_CLEARCOAT && m.clearcoat > 0.0) {
+        coat.x = scaled(m.clearcoat, m.clearcoat_texture, s);
+        float r = scaled(1.0, m.clearcoat_roughness_texture, s);
+        coat.y = m.clearcoat_alpha * r * r;
+    }
+    return metallic_layers(base, m.metallic * factors.b, f0, scaled(m.specular_factor, m.specular_factor_texture, s), through,
+                           m.alpha * factors.g * factors.g, coat.x, coat.y);
 }
 
 // The material with its textures looked up. The compiler drops fetches for effects that the scene does not have.
@@ -258,6 +311,7 @@ Bsdf surface_bsdf(Surface s) {
     Bsdf b;
     b.kind = ONE_KIND ? BSDF_DIFFUSE : m.kind;
     b.albedo = textured(m.base_color, m.base_texture, s);
+    if (FX_VERTEX_COLORS) b.albedo *= s.color.rgb;
     b.transmission = m.transmission;
     b.ggx = (s.flags & MATERIAL_GGX) != 0u;
     b.alpha = 0.0;
@@ -281,7 +335,7 @@ Bsdf surface_bsdf(Surface s) {
             b.coat_table = m.coat_table;
         }
         if (FX_TEXTURES && m.roughness_texture != NONE) {
-            float r = texture_sample(m.roughness_texture, s.uv, false).r; // perceptual: alpha = r^2
+            float r = texture_sample(m.roughness_texture, uv_of(s, m.roughness_texture), false).r; // perceptual: alpha = r^2
             b.alpha *= r * r;
         }
     }

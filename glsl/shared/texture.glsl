@@ -6,10 +6,17 @@ vec3 linear_from_srgb(vec3 c) {
     return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045)));
 }
 
+// Whether what lies beyond an edge of the picture, along each axis, looks like its border: a mirrored picture goes on with it.
+bvec2 texture_keeps_border(Texture image) {
+    if (!FX_TEXTURE_MODES) return bvec2((image.flags & TEXTURE_CLAMP) != 0u);
+    const uvec2 MODES = uvec2(TEXTURE_CLAMP | TEXTURE_CLAMP_U | TEXTURE_MIRROR_U, TEXTURE_CLAMP | TEXTURE_CLAMP_V | TEXTURE_MIRROR_V);
+    return notEqual(uvec2(image.flags) & MODES, uvec2(0u));
+}
+
 vec4 texture_texel(Texture image, ivec2 at, bool colour) {
     ivec2 edge = ivec2(image.width, image.height);
     // Coordinates lie at most one texel outside the image, so that adding or subtracting one period wraps them.
-    at = (image.flags & TEXTURE_CLAMP) != 0u ? clamp(at, ivec2(0), edge - 1) : at + mix(ivec2(0), edge, lessThan(at, ivec2(0)));
+    at = mix(at + mix(ivec2(0), edge, lessThan(at, ivec2(0))), clamp(at, ivec2(0), edge - 1), texture_keeps_border(image));
     at = mix(at, at - edge, greaterThanEqual(at, edge));
     vec4 c = unpackUnorm4x8(texelFetch(texels, int(image.first) + at.y * edge.x + at.x).x);
     return colour ? vec4(linear_from_srgb(c.rgb), c.a) : c;
@@ -18,9 +25,16 @@ vec4 texture_texel(Texture image, ivec2 at, bool colour) {
 // `colour` decodes sRGB. The caller knows it from the texture's use, so that masks and heights are compiled without decoding.
 vec4 texture_sample(uint index, vec2 uv, bool colour) {
     Texture image = Texture_load(textures, index);
+    vec2 turned = uv.yx * image.shear;
     uv = uv * image.scale + image.offset;
-    vec2 wrapped = (image.flags & TEXTURE_CLAMP) != 0u ? clamp(uv, 0.0, 1.0) : fract(uv);
+    if (FX_TEXTURE_MODES && (image.flags & TEXTURE_SHEARED) != 0u) uv += turned;
+    vec2 wrapped = mix(fract(uv), clamp(uv, 0.0, 1.0), texture_keeps_border(image));
+    if (FX_TEXTURE_MODES) { // there and back, in turns of two pictures
+        bvec2 mirrors = notEqual(uvec2(image.flags) & uvec2(TEXTURE_MIRROR_U, TEXTURE_MIRROR_V), uvec2(0u));
+        wrapped = mix(wrapped, 1.0 - abs(2.0 * fract(0.5 * uv) - 1.0), mirrors);
+    }
     vec2 at = vec2(wrapped.x, 1.0 - wrapped.y) * vec2(image.width, image.height) - 0.5; // v points up, rows go down
+    if (FX_TEXTURE_MODES && (image.flags & TEXTURE_NEAREST) != 0u) at = floor(at + 0.5);
     ivec2 corner = ivec2(floor(at));
     vec2 f = at - vec2(corner);
     vec4 top = mix(texture_texel(image, corner, colour), texture_texel(image, corner + ivec2(1, 0), colour), f.x);
@@ -34,7 +48,13 @@ float surface_opacity(uint material, uint triangle, vec2 barycentric) {
     if ((Material_flags(materials, material) & MATERIAL_MASKED) == 0u) return 1.0;
     float opacity = Material_opacity(materials, material);
     uint image = Material_opacity_texture(materials, material);
-    return image == NONE ? opacity : opacity * texture_sample(image, texture_coordinates(triangle, barycentric), false).r;
+    if (image != NONE) opacity *= texture_sample(image, texture_coordinates(image, triangle, barycentric), false).r;
+    if (FX_VERTEX_COLORS) opacity *= vertex_color(Shading_load(shading, triangle), barycentric).a;
+    if (FX_CUTOFF) {
+        float cutoff = Material_alpha_cutoff(materials, material);
+        opacity = cutoff > 0.0 ? float(opacity >= cutoff) : opacity;
+    }
+    return opacity;
 }
 
 // Whether a partly transparent surface stops a ray. A ray passes with the probability 1 - opacity, decided by a hash, so that the

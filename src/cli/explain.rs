@@ -210,6 +210,10 @@ fn in_turn(a: impl Fn() -> Result<Variant>, b: impl Fn() -> Result<Variant>) -> 
 
 /// Bytes of the scene's records that only this effect reads. Every new effect needs an entry here.
 fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
+    let attributes = |bit: u32| {
+        let records = scene.shading.iter().filter(|s| s.attributes & bit != 0).count();
+        records * scene::attribute_words(bit) as usize * size_of::<u32>()
+    };
     let maps = |of: fn(&Material) -> [u32; 4]| {
         let named: BTreeSet<u32> = scene.materials.iter().flat_map(of).filter(|&map| map != NONE).collect();
         let texels = |map: u32| (scene.textures[map as usize].width * scene.textures[map as usize].height) as usize;
@@ -224,6 +228,9 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
         Effect::bump_maps => maps(|m| [if m.flags & MATERIAL_NORMAL_MAP == 0 { m.bump_texture } else { NONE }; 4]),
         Effect::normal_maps => maps(|m| [if m.flags & MATERIAL_NORMAL_MAP != 0 { m.bump_texture } else { NONE }; 4]),
         Effect::alpha_masks => maps(|m| [m.opacity_texture; 4]),
+        Effect::vertex_colors => attributes(ATTRIBUTE_COLORS),
+        Effect::second_uv => attributes(ATTRIBUTE_SECOND_UV),
+        Effect::tangents => attributes(ATTRIBUTE_TANGENTS),
         Effect::smooth_normals => size_of_val(&scene.shading[..]),
         Effect::instances => size_of_val(&scene.instances[..]),
         Effect::environment_map => {
@@ -236,6 +243,8 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
         Effect::environment => lights(LIGHT_ENVIRONMENT),
         // A sphere takes the record of a triangle, and a large lamp is only sampled in another way.
         Effect::spheres | Effect::large_lamps => 0,
+        // Every texture has room for these, and every material for its cutoff.
+        Effect::texture_modes | Effect::alpha_cutoff => 0,
         // Every material has room for the parameters of all BSDFs.
         Effect::diffuse
         | Effect::conductor

@@ -38,6 +38,8 @@ constants! {
     MATERIAL_MASKED: uint = 8;
     /// [`Material::flags`]: light that scatters below a coat takes on the base's colour at every turn.
     MATERIAL_NONLINEAR: uint = 16;
+    /// [`Material::flags`]: the colours of vertices multiply `emission`.
+    MATERIAL_UNLIT: uint = 32;
     /// [`PathConstants::pixel_filter`]: uniform over the pixel.
     PIXEL_FILTER_BOX: uint = 0;
     /// [`PathConstants::pixel_filter`]: triangle of radius 1 pixel.
@@ -54,6 +56,28 @@ constants! {
     TEXTURE_SRGB: uint = 1;
     /// [`Texture::flags`]: coordinates outside [0, 1] clamp to the border texel; otherwise they repeat.
     TEXTURE_CLAMP: uint = 2;
+    /// [`Texture::flags`]: the same along u alone.
+    TEXTURE_CLAMP_U: uint = 4;
+    /// [`Texture::flags`]: the same along v alone.
+    TEXTURE_CLAMP_V: uint = 8;
+    /// [`Texture::flags`]: along u every other repetition is mirrored.
+    TEXTURE_MIRROR_U: uint = 16;
+    /// [`Texture::flags`]: along v every other repetition is mirrored.
+    TEXTURE_MIRROR_V: uint = 32;
+    /// [`Texture::flags`]: the texel that holds the point, without interpolation.
+    TEXTURE_NEAREST: uint = 64;
+    /// [`Texture::flags`]: coordinates are multiplied by `shear` too.
+    TEXTURE_SHEARED: uint = 128;
+    /// [`Texture::flags`]: the second set of coordinates is read.
+    TEXTURE_SECOND_UV: uint = 256;
+    /// [`Shading::attributes`]: three colours, of two words of unorm 2 x 16 each: red and green, blue and opacity.
+    ATTRIBUTE_COLORS: uint = 1;
+    /// [`Shading::attributes`]: a second set of texture coordinates, of two floats each.
+    ATTRIBUTE_SECOND_UV: uint = 2;
+    /// [`Shading::attributes`]: three tangents, octahedral as normals.
+    ATTRIBUTE_TANGENTS: uint = 4;
+    /// [`Shading::attributes`]: `-cross(normal, tangent)`, not `cross(normal, tangent)`, is the direction along +v.
+    ATTRIBUTE_FLIPPED: uint = 8;
     /// [`Light::kind`]: emissive triangle `a`, `b`, `c` (vertices in world units), radiance `value`.
     LIGHT_TRIANGLE: uint = 0;
     /// [`Light::kind`]: point at `a`, radiant intensity `value` in W/sr.

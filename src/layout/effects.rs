@@ -58,6 +58,16 @@ effects! {
     smooth_normals: FX_SMOOTH_NORMALS;
     /// A height map that perturbs normals.
     bump_maps: FX_BUMP_MAPS;
+    /// A texture that is mirrored, clamped along one axis, turned, or not interpolated.
+    texture_modes: FX_TEXTURE_MODES;
+    /// A texture that reads the second set of coordinates.
+    second_uv: FX_SECOND_UV;
+    /// Colours of vertices.
+    vertex_colors: FX_VERTEX_COLORS;
+    /// Tangents of vertices.
+    tangents: FX_TANGENTS;
+    /// Opacity that is either all or nothing.
+    alpha_cutoff: FX_CUTOFF;
     /// A tangent-space normal map.
     normal_maps: FX_NORMAL_MAPS;
     /// Opacity below 1, constant or by texture.

@@ -82,8 +82,12 @@ gpu_structs! {
         uv1: vec2,
         /// Texture coordinates of vertex 2.
         uv2: vec2,
-        /// Unused words, which are zero.
-        pad: uvec3,
+        /// Combination of the ATTRIBUTE_ bits.
+        attributes: uint,
+        /// Index among the texels of the first word of the attributes, which follow each other in the order of their bits.
+        first: uint,
+        /// Unused word, which is zero.
+        pad: uint,
     }
 
     /// A placed mesh. 7 texels. Matrices are three rows of four, `x_world = rows * (x_object, 1)`.
@@ -110,7 +114,7 @@ gpu_structs! {
         mirrored: uint,
     }
 
-    /// A material. 10 texels, of which a diffuse surface without textures needs the first two. Colours are linear Rec. 709 in [0, 1]
+    /// A material. 11 texels, of which a diffuse surface without textures needs the first two. Colours are linear Rec. 709 in [0, 1]
     /// unless said otherwise.
     struct Material {
         /// Diffuse albedo; multiplies `base_texture`.
@@ -164,11 +168,23 @@ gpu_structs! {
         clearcoat: float,
         /// Microfacet roughness of the clear coat.
         clearcoat_alpha: float,
-        /// Unused words, which are zero.
-        pad: uvec3,
+        /// Factor of the x and y components of a normal map.
+        normal_scale: float,
+        /// Opacity from which on the surface stops all rays, and below which none; 0: opacity is a probability.
+        alpha_cutoff: float,
+        /// Multiplies `specular_factor` (metallic, as the textures that follow; of each the red channel); texture index or [`NONE`].
+        specular_factor_texture: uint,
+        /// Multiplies `transmission_factor`.
+        transmission_texture: uint,
+        /// Multiplies `clearcoat`.
+        clearcoat_texture: uint,
+        /// Perceptual roughness, multiplies sqrt(`clearcoat_alpha`).
+        clearcoat_roughness_texture: uint,
+        /// Unused word, which is zero.
+        pad: uint,
     }
 
-    /// A picture in the texel buffer: RGBA8 texels (R in the low byte), row 0 at the top. 2 texels.
+    /// A picture in the texel buffer: RGBA8 texels (R in the low byte), row 0 at the top. 3 texels.
     struct Texture {
         /// Index of the first texel.
         first: uint,
@@ -178,10 +194,14 @@ gpu_structs! {
         height: uint,
         /// Combination of the TEXTURE_ bits.
         flags: uint,
-        /// Factor of texture coordinates: the picture is read at `uv * scale + offset`.
+        /// Factor of texture coordinates: the picture is read at `uv * scale + offset`, with [`TEXTURE_SHEARED`] plus `vu * shear`.
         scale: vec2,
         /// Added to scaled texture coordinates.
         offset: vec2,
+        /// Factor of the other texture coordinate.
+        shear: vec2,
+        /// Unused words, which are zero.
+        pad: uvec2,
     }
 
     /// A light. 4 texels; what the vectors mean depends on `kind`.

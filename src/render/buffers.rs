@@ -106,7 +106,7 @@ impl DeviceScene {
 /// The scene's own records, or flat ones where kernels read what the scene does not have (`--effects all`).
 fn shading<'a>(scene: &'a Scene, effects: &Effects) -> Cow<'a, [Shading]> {
     let maps = effects.textures || effects.bump_maps || effects.normal_maps || effects.alpha_masks;
-    let read = effects.smooth_normals || maps;
+    let read = effects.smooth_normals || effects.vertex_colors || maps;
     if read && scene.shading.is_empty() {
         return vec![Shading { normal: [u32::MAX; 3], ..Shading::default() }; scene.triangles.len()].into();
     }

@@ -1,11 +1,12 @@
 //! Checks that a scene's arrays fit together. Kernels follow indices unchecked; loaded scenes have valid ones, but callers may
 //! edit the arrays.
+use super::build::attributes::words_of;
 use super::build::bvh;
 use super::{Environment, Scene};
 use crate::error::{Error, Result};
 use crate::layout::{
-    AliasEntry, BSDF_COATED, BvhNode, COAT_COLUMNS, COAT_ROWS, Camera, LIGHT_SPHERE, LIGHT_TRIANGLE, Light, Material,
-    NONE, SMOOTH_ALPHA, SPHERE, TRAVERSAL_STACK, Texture, Triangle,
+    AliasEntry, BSDF_COATED, BSDF_METALLIC, BvhNode, COAT_COLUMNS, COAT_ROWS, Camera, LIGHT_SPHERE, LIGHT_TRIANGLE,
+    Light, Material, NONE, SMOOTH_ALPHA, SPHERE, Shading, TRAVERSAL_STACK, Texture, Triangle,
 };
 use glam::Vec3;
 
@@ -106,6 +107,11 @@ impl Scene {
         if ![0, triangles].contains(&self.shading.len()) {
             return Err(format!("there are {} records of shading for {triangles} triangles", self.shading.len()));
         }
+        let words = self.texels.len() as u64;
+        let past = |s: &Shading| s.attributes != 0 && u64::from(s.first) + u64::from(words_of(s.attributes)) > words;
+        if let Some(index) = self.shading.iter().position(past) {
+            return Err(format!("the attributes of triangle {index} end beyond the {words} texels"));
+        }
         let materials = self.materials.len();
         below("triangle", "material", materials, self.triangles.iter().map(|t| t.material))?;
         if let Some(index) = self.triangles.iter().position(|t| t.primitive & SPHERE != 0 && !is_sphere(t)) {
@@ -123,8 +129,14 @@ impl Scene {
                 m.emission_texture,
             ])
         };
+        let layers = |m: &Material| {
+            let coat = [m.clearcoat_texture, m.clearcoat_roughness_texture];
+            let metallic = m.kind == BSDF_METALLIC;
+            [m.specular_factor_texture, m.transmission_texture].into_iter().chain(coat).filter(move |_| metallic)
+        };
         for (index, material) in self.materials.iter().enumerate() {
-            below_or_none("map", "texture", all, of(material)).map_err(|what| format!("material {index}: {what}"))?;
+            let maps = of(material).chain(layers(material));
+            below_or_none("map", "texture", all, maps).map_err(|what| format!("material {index}: {what}"))?;
         }
         let texels = self.texels.len() as u64;
         let coat = u64::from(COAT_ROWS * COAT_COLUMNS);

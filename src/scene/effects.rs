@@ -24,9 +24,21 @@ pub fn effects(
     let bumped =
         |m: &Material, normal_map| m.bump_texture != NONE && (m.flags & MATERIAL_NORMAL_MAP != 0) == normal_map;
     // A roughness map may take any part of the surface below the line.
+    let layers = |m: &Material| match m.kind {
+        BSDF_METALLIC => {
+            let coat = [m.clearcoat_texture, m.clearcoat_roughness_texture];
+            [m.specular_factor_texture, m.transmission_texture, coat[0], coat[1]]
+        }
+        _ => [NONE; 4],
+    };
+    let flagged = |m: &Material, flags: u32| {
+        let maps = [m.base_texture, m.specular_texture, m.opacity_texture, m.bump_texture, m.roughness_texture];
+        let maps = maps.into_iter().chain([m.emission_texture]).chain(layers(m));
+        maps.filter_map(|t| scene.textures.get(t as usize)).any(|t| t.flags & flags != 0)
+    };
     let coated = |m: &Material| m.kind == BSDF_METALLIC && m.clearcoat > 0.0;
     let smooth = |m: &Material| {
-        let coat = coated(m) && m.clearcoat_alpha < SMOOTH_ALPHA;
+        let coat = coated(m) && (m.clearcoat_alpha < SMOOTH_ALPHA || m.clearcoat_roughness_texture != NONE);
         interface(m) && (m.alpha < SMOOTH_ALPHA || m.roughness_texture != NONE) || coat
     };
     let rough = |m: &Material| {
@@ -35,8 +47,12 @@ pub fn effects(
     };
     let mut found = Effects {
         textures: material(Effect::textures, &|m| {
-            [m.base_texture, m.specular_texture, m.roughness_texture, m.emission_texture].iter().any(|&t| t != NONE)
+            let maps = [m.base_texture, m.specular_texture, m.roughness_texture, m.emission_texture];
+            maps.iter().chain(&layers(m)).any(|&t| t != NONE)
         }),
+        texture_modes: material(Effect::texture_modes, &|m| flagged(m, MODES)),
+        second_uv: material(Effect::second_uv, &|m| flagged(m, TEXTURE_SECOND_UV)),
+        alpha_cutoff: material(Effect::alpha_cutoff, &|m| m.flags & MATERIAL_MASKED != 0 && m.alpha_cutoff > 0.0),
         bump_maps: material(Effect::bump_maps, &|m| bumped(m, false)),
         normal_maps: material(Effect::normal_maps, &|m| bumped(m, true)),
         alpha_masks: material(Effect::alpha_masks, &|m| m.flags & MATERIAL_MASKED != 0),
@@ -62,6 +78,10 @@ pub fn effects(
     reasons.sort_by_key(|r| r.0);
     (found, reasons)
 }
+
+/// What only some textures do.
+const MODES: u32 =
+    TEXTURE_CLAMP_U | TEXTURE_CLAMP_V | TEXTURE_MIRROR_U | TEXTURE_MIRROR_V | TEXTURE_NEAREST | TEXTURE_SHEARED;
 
 /// Materials that some triangle or instance has.
 fn used_materials(scene: &Scene) -> Vec<bool> {
@@ -124,6 +144,13 @@ fn scene_effects(scene: &Scene, found: &mut Effects, reasons: &mut Reasons) {
         bent.and_then(|i| scene.triangles.get(i)).map(|t| t.object as usize).and_then(|o| scene.names.objects.get(o));
     let named = format!("object \"{}\"", object.map_or("", |o| o));
     found.smooth_normals = because(Effect::smooth_normals, bent.is_some(), named);
+    let mut attribute = |name, bit: u32| {
+        let first = scene.shading.iter().position(|s| s.attributes & bit != 0).and_then(|i| scene.triangles.get(i));
+        let object = first.and_then(|t| scene.names.objects.get(t.object as usize));
+        because(name, first.is_some(), format!("object \"{}\"", object.map_or("", |o| o)))
+    };
+    found.vertex_colors = attribute(Effect::vertex_colors, ATTRIBUTE_COLORS);
+    found.tangents = found.normal_maps && attribute(Effect::tangents, ATTRIBUTE_TANGENTS);
     let ball = scene.triangles.iter().find(|t| t.primitive & SPHERE != 0);
     let object = ball.and_then(|t| scene.names.objects.get(t.object as usize));
     found.spheres = because(Effect::spheres, ball.is_some(), format!("object \"{}\"", object.map_or("", |o| o)));

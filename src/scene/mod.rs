@@ -25,6 +25,7 @@ mod load;
 mod pose;
 mod rig;
 
+pub use build::attributes::words_of as attribute_words;
 pub use build::coat::{CoatRow, coat_table};
 pub use build::fresnel::mean_internal as mean_internal_fresnel;
 pub use change::{Change, Deformed};
@@ -64,7 +65,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Pictures that materials name; may be empty.
     pub textures: Vec<Texture>,
-    /// RGBA8 texels of all textures, R in the low byte; after them the tables of rough coats, words of floats.
+    /// RGBA8 texels of all textures, R in the low byte; after them the words of vertices' colours, second coordinates and tangents
+    /// ([`Shading::attributes`]), and the tables of rough coats, words of floats.
     pub texels: Vec<u32>,
     /// Lights; without any, paths see only the emission that they hit.
     pub lights: Vec<Light>,

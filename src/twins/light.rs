@@ -6,7 +6,7 @@ use crate::scene::{Environment, Scene};
 use crate::shaders::shared::light::{MAX_SOLID_ANGLE, MIN_SOLID_ANGLE};
 use crate::twins::scene::texture_coordinates;
 use crate::twins::surface::{Surface, plane_clearance, unit_vector};
-use crate::twins::texture::{surface_opacity, texture_sample};
+use crate::twins::texture::{surface_opacity, texture_sample, vertex_color};
 use glam::{Mat3, Vec2, Vec3, Vec3Swizzles, vec2, vec3};
 use std::f32::consts::PI;
 
@@ -155,8 +155,11 @@ fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> Ligh
     let mut radiance = Vec3::from(light.value);
     let image = scene.materials[light.material as usize].emission_texture;
     if image != NONE {
-        let uv = texture_coordinates(scene, light.triangle, bary);
+        let uv = texture_coordinates(scene, image, light.triangle, bary);
         radiance *= texture_sample(scene, image, uv).truncate();
+    }
+    if scene.materials[light.material as usize].flags & MATERIAL_UNLIT != 0 {
+        radiance *= vertex_color(scene, light.triangle, bary).truncate();
     }
     radiance *= surface_opacity(scene, light.material, light.triangle, bary);
     let lit = cosine > 0.0 && d2 > 0.0;

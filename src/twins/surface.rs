@@ -1,15 +1,16 @@
 //! Twin of `glsl/shared/surface.glsl`.
-use crate::layout::{BSDF_METALLIC, MATERIAL_NORMAL_MAP, Material, NONE};
+use crate::layout::{BSDF_METALLIC, MATERIAL_NORMAL_MAP, MATERIAL_UNLIT, Material, NONE};
 use crate::math::octahedral::{octahedral_decode, octahedral_vector};
 use crate::scene::Scene;
 use crate::shaders::shared::surface::{CLEARANCE, MIN_ELEVATION};
+use crate::twins::attributes::Attributes;
 use crate::twins::bsdf::Bsdf;
 use crate::twins::metallic::{Metallic, Parameters};
-use crate::twins::scene::{material_of, object_from_world, triangle_vertices, world_from_object};
+use crate::twins::scene::{material_of, object_from_world, reads_second, triangle_vertices, world_from_object};
 use crate::twins::sphere::Sphere;
 use crate::twins::texture::texture_sample;
 use crate::twins::traverse::Hit;
-use glam::{Vec2, Vec3, vec2};
+use glam::{Vec2, Vec3, Vec4, vec2, vec3};
 use std::f32::consts::PI;
 
 /// What shading needs of a hit.
@@ -31,6 +32,12 @@ pub struct Surface {
     pub object: u32,
     /// Texture coordinates of the point.
     pub uv: Vec2,
+    /// The second set of them; as the first where there is none.
+    pub second_uv: Vec2,
+    /// Linear colour of the vertices, and opacity.
+    pub color: Vec4,
+    /// Tangent of the vertices in world space, and the sign of the bitangent; 0 where there is none.
+    pub tangent: Vec4,
     /// The triangle in world space: its first vertex and the edges from there.
     pub triangle: [Vec3; 3],
     /// Radius of a sphere, whose centre is the first of `triangle`; 0 for a triangle.
@@ -69,19 +76,30 @@ struct Edges {
     d2: Vec2,
 }
 
+/// Coordinates at which a surface reads a picture.
+fn uv_of(scene: &Scene, s: &Surface, image: u32) -> Vec2 {
+    if reads_second(scene, image) { s.second_uv } else { s.uv }
+}
+
 fn normal_from_map(scene: &Scene, s: &Surface, image: u32, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
-    let m = 2.0 * texture_sample(scene, image, s.uv).truncate() - 1.0;
-    let (t, _) = unit_vector(dpdu - s.normal * s.normal.dot(dpdu));
+    let scale = scene.materials[s.material as usize].normal_scale;
+    let m = (2.0 * texture_sample(scene, image, uv_of(scene, s, image)).truncate() - 1.0) * vec3(scale, scale, 1.0);
+    let given = s.tangent.w != 0.0;
+    let along = if given { s.tangent.truncate() } else { dpdu };
+    let (t, _) = unit_vector(along - s.normal * s.normal.dot(along));
     let b = s.normal.cross(t);
-    m.x * t + m.y * (if b.dot(dpdv) < 0.0 { -b } else { b }) + m.z * s.normal
+    let flipped = if given { s.tangent.w < 0.0 } else { b.dot(dpdv) < 0.0 };
+    m.x * t + m.y * (if flipped { -b } else { b }) + m.z * s.normal
 }
 
 fn normal_from_height(scene: &Scene, s: &Surface, material: &Material, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
     let image = material.bump_texture;
     let texture = &scene.textures[image as usize];
-    let scale = Vec2::from(texture.scale).abs().max(Vec2::splat(1e-6));
+    let turned = vec2(texture.scale[0].hypot(texture.shear[1]), texture.scale[1].hypot(texture.shear[0]));
+    let scale = turned.max(Vec2::splat(1e-6));
     let texel = 1.0 / (vec2(texture.width as f32, texture.height as f32) * scale);
-    let height = |offset| texture_sample(scene, image, s.uv + offset).x;
+    let uv = uv_of(scene, s, image);
+    let height = |offset| texture_sample(scene, image, uv + offset).x;
     let rise = |half: Vec2| height(half) - height(-half);
     let hu = rise(vec2(0.5 * texel.x, 0.0)) / texel.x;
     let hv = rise(vec2(0.0, 0.5 * texel.y)) / texel.y;
@@ -95,7 +113,8 @@ fn perturbed_normal(scene: &Scene, s: &Surface, e: &Edges) -> Vec3 {
     let material = &scene.materials[s.material as usize];
     let image = material.bump_texture;
     let det = e.d1.x * e.d2.y - e.d2.x * e.d1.y;
-    if image == NONE || det == 0.0 {
+    let given = s.flags & MATERIAL_NORMAL_MAP != 0 && s.tangent.w != 0.0;
+    if image == NONE || (det == 0.0 && !given) {
         return s.normal;
     }
     let dpdu = (e.d2.y * e.e1 - e.d1.y * e.e2) / det;
@@ -140,6 +159,9 @@ fn sphere_at(scene: &Scene, hit: &Hit, ball: &Sphere) -> Surface {
         flags: scene.materials[material as usize].flags,
         object,
         uv: ball.coordinates(n),
+        second_uv: ball.coordinates(n),
+        color: Vec4::ONE,
+        tangent: Vec4::ZERO,
         triangle: [centre, Vec3::ZERO, Vec3::ZERO],
         radius,
         clearance: plane_clearance(geometric, reach, point, Vec3::splat(radius)),
@@ -177,6 +199,9 @@ pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
         flags: scene.materials[material as usize].flags,
         object,
         uv: Vec2::ZERO,
+        second_uv: Vec2::ZERO,
+        color: Vec4::ONE,
+        tangent: Vec4::ZERO,
         triangle: [p0, e1, e2],
         radius: 0.0,
         clearance: plane_clearance(geometric, reach, e1, e2),
@@ -190,8 +215,24 @@ pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
         s.smooth_normal = s.normal;
     }
     let [uv0, uv1, uv2] = [shading.uv0, shading.uv1, shading.uv2].map(Vec2::from);
-    let (d1, d2) = (uv1 - uv0, uv2 - uv0);
-    s.uv = uv0 + hit.barycentric.x * d1 + hit.barycentric.y * d2;
+    let (mut d1, mut d2) = (uv1 - uv0, uv2 - uv0);
+    let b = hit.barycentric;
+    s.uv = uv0 + b.x * d1 + b.y * d2;
+    s.second_uv = s.uv;
+    let attributes = Attributes::of(scene, shading);
+    s.color = attributes.color(b);
+    s.tangent = attributes.tangent(b);
+    if let Some(i) = instance {
+        let sign = if mirrored { -s.tangent.w } else { s.tangent.w };
+        s.tangent = world_from_object(i).vector(s.tangent.truncate()).extend(sign);
+    }
+    if let Some([uv0, uv1, uv2]) = attributes.second_coordinates() {
+        s.second_uv = uv0 + b.x * (uv1 - uv0) + b.y * (uv2 - uv0);
+        let bump = scene.materials[material as usize].bump_texture;
+        if bump != NONE && reads_second(scene, bump) {
+            (d1, d2) = (uv1 - uv0, uv2 - uv0);
+        }
+    }
     s.normal = perturbed_normal(scene, &s, &Edges { e1, e2, d1, d2 });
     s
 }
@@ -252,16 +293,18 @@ fn textured(scene: &Scene, constant: [f32; 3], image: u32, s: &Surface) -> Vec3 
     let constant = Vec3::from(constant);
     match image {
         NONE => constant,
-        _ => constant * texture_sample(scene, image, s.uv).truncate(),
+        _ => constant * texture_sample(scene, image, uv_of(scene, s, image)).truncate(),
     }
 }
 
 /// Radiance that the surface emits from its front side.
 pub fn surface_emission(scene: &Scene, s: &Surface) -> Vec3 {
     let material = &scene.materials[s.material as usize];
+    let unlit = material.flags & MATERIAL_UNLIT != 0;
+    let emission = Vec3::from(material.emission) * if unlit { s.color.truncate() } else { Vec3::ONE };
     match material.emission_texture {
-        NONE => material.emission.into(),
-        image => Vec3::from(material.emission) * texture_sample(scene, image, s.uv).truncate(),
+        NONE => emission,
+        image => emission * texture_sample(scene, image, uv_of(scene, s, image)).truncate(),
     }
 }
 
@@ -269,16 +312,21 @@ pub fn surface_emission(scene: &Scene, s: &Surface) -> Vec3 {
 fn metallic_parameters(scene: &Scene, material: &Material, b: &Bsdf, s: &Surface) -> Parameters {
     let factors = match material.roughness_texture {
         NONE => Vec3::ONE,
-        image => texture_sample(scene, image, s.uv).truncate(),
+        image => texture_sample(scene, image, uv_of(scene, s, image)).truncate(),
     };
+    let scaled = |constant: f32, image: u32| match image {
+        NONE => constant,
+        _ => constant * texture_sample(scene, image, uv_of(scene, s, image)).x,
+    };
+    let r = scaled(1.0, material.clearcoat_roughness_texture);
     Parameters {
         base: b.albedo,
         metallic: material.metallic * factors.z,
         f0: b.specular,
-        f90: material.specular_factor,
-        transmission: material.transmission_factor,
+        f90: scaled(material.specular_factor, material.specular_factor_texture),
+        transmission: scaled(material.transmission_factor, material.transmission_texture),
         alpha: material.alpha * factors.y * factors.y,
-        coat: [material.clearcoat, material.clearcoat_alpha],
+        coat: [scaled(material.clearcoat, material.clearcoat_texture), material.clearcoat_alpha * r * r],
     }
 }
 
@@ -287,11 +335,11 @@ pub fn surface_bsdf(scene: &Scene, s: &Surface) -> Bsdf {
     let material = &scene.materials[s.material as usize];
     let mut alpha = material.alpha;
     if material.roughness_texture != NONE {
-        let r = texture_sample(scene, material.roughness_texture, s.uv).x;
+        let r = texture_sample(scene, material.roughness_texture, uv_of(scene, s, material.roughness_texture)).x;
         alpha *= r * r;
     }
     let mut b = Bsdf::new(material, alpha, &scene.texels);
-    b.albedo = textured(scene, material.base_color, material.base_texture, s);
+    b.albedo = textured(scene, material.base_color, material.base_texture, s) * s.color.truncate();
     b.specular = textured(scene, material.specular, material.specular_texture, s);
     if material.kind == BSDF_METALLIC {
         b.metallic = Metallic::new(&metallic_parameters(scene, material, &b, s));

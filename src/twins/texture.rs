@@ -1,10 +1,14 @@
 //! Twin of `glsl/shared/texture.glsl`.
-use crate::layout::{MATERIAL_MASKED, NONE, TEXTURE_CLAMP, TEXTURE_SRGB, Texture};
+use crate::layout::{
+    MATERIAL_MASKED, NONE, TEXTURE_CLAMP, TEXTURE_CLAMP_U, TEXTURE_CLAMP_V, TEXTURE_MIRROR_U, TEXTURE_MIRROR_V,
+    TEXTURE_NEAREST, TEXTURE_SHEARED, TEXTURE_SRGB, Texture,
+};
 use crate::math::hash::pcg;
 use crate::math::srgb::linear_from_srgb;
 use crate::scene::Scene;
+use crate::twins::attributes::Attributes;
 use crate::twins::scene::{material_of, texture_coordinates};
-use glam::{IVec2, Vec2, Vec4, ivec2, vec2};
+use glam::{IVec2, Vec2, Vec2Swizzles, Vec4, ivec2, vec2};
 
 /// One coordinate brought into `0..edge`, at most one period away.
 fn into_range(at: i32, edge: i32, clamp: bool) -> i32 {
@@ -16,9 +20,26 @@ fn into_range(at: i32, edge: i32, clamp: bool) -> i32 {
     }
 }
 
+/// Along u and v: whether the picture is clamped, and whether it is mirrored.
+fn modes(image: &Texture) -> [[bool; 2]; 2] {
+    let has = |bits: u32| image.flags & bits != 0;
+    let clamped = [has(TEXTURE_CLAMP | TEXTURE_CLAMP_U), has(TEXTURE_CLAMP | TEXTURE_CLAMP_V)];
+    [clamped, [has(TEXTURE_MIRROR_U), has(TEXTURE_MIRROR_V)]]
+}
+
+/// A coordinate brought into [0, 1].
+fn wrapped(x: f32, clamped: bool, mirrored: bool) -> f32 {
+    match x {
+        x if mirrored => 1.0 - (x.rem_euclid(2.0) - 1.0).abs(),
+        x if clamped => x.clamp(0.0, 1.0),
+        x => x - x.floor(),
+    }
+}
+
 fn texture_texel(scene: &Scene, image: &Texture, at: IVec2) -> Vec4 {
-    let (edge, clamp) = (ivec2(image.width as i32, image.height as i32), image.flags & TEXTURE_CLAMP != 0);
-    let (x, y) = (into_range(at.x, edge.x, clamp), into_range(at.y, edge.y, clamp));
+    let edge = ivec2(image.width as i32, image.height as i32);
+    let [clamped, mirrored] = modes(image);
+    let [x, y] = [0, 1].map(|i| into_range(at[i], edge[i], clamped[i] || mirrored[i]));
     let bytes = scene.texels[image.first as usize + (y * edge.x + x) as usize].to_le_bytes();
     let c = Vec4::from(bytes.map(|b| f32::from(b) / 255.0));
     if image.flags & TEXTURE_SRGB != 0 { c.truncate().map(linear_from_srgb).extend(c.w) } else { c }
@@ -27,9 +48,12 @@ fn texture_texel(scene: &Scene, image: &Texture, at: IVec2) -> Vec4 {
 /// Texture value at `uv`, interpolated bilinearly.
 pub fn texture_sample(scene: &Scene, index: u32, uv: Vec2) -> Vec4 {
     let image = &scene.textures[index as usize];
-    let uv = uv * Vec2::from(image.scale) + Vec2::from(image.offset);
-    let wrapped = if image.flags & TEXTURE_CLAMP != 0 { uv.clamp(Vec2::ZERO, Vec2::ONE) } else { uv - uv.floor() };
-    let at = vec2(wrapped.x, 1.0 - wrapped.y) * vec2(image.width as f32, image.height as f32) - 0.5;
+    let turned = if image.flags & TEXTURE_SHEARED != 0 { uv.yx() * Vec2::from(image.shear) } else { Vec2::ZERO };
+    let uv = uv * Vec2::from(image.scale) + Vec2::from(image.offset) + turned;
+    let [clamped, mirrored] = modes(image);
+    let [x, y] = [0, 1].map(|i| wrapped(uv[i], clamped[i], mirrored[i]));
+    let at = vec2(x, 1.0 - y) * vec2(image.width as f32, image.height as f32) - 0.5;
+    let at = if image.flags & TEXTURE_NEAREST != 0 { (at + 0.5).floor() } else { at };
     let corner = at.floor().as_ivec2();
     let f = at - corner.as_vec2();
     let texel = |dx, dy| texture_texel(scene, image, corner + ivec2(dx, dy));
@@ -41,14 +65,26 @@ pub fn texture_sample(scene: &Scene, index: u32, uv: Vec2) -> Vec4 {
 /// Opacity of a surface at a point of a triangle: the share of rays that it stops.
 pub fn surface_opacity(scene: &Scene, material: u32, triangle: u32, barycentric: Vec2) -> f32 {
     let material = &scene.materials[material as usize];
-    match material.opacity_texture {
-        _ if material.flags & MATERIAL_MASKED == 0 => 1.0,
+    if material.flags & MATERIAL_MASKED == 0 {
+        return 1.0;
+    }
+    let textured = match material.opacity_texture {
         NONE => material.opacity,
         image => {
-            let uv = texture_coordinates(scene, triangle, barycentric);
+            let uv = texture_coordinates(scene, image, triangle, barycentric);
             material.opacity * texture_sample(scene, image, uv).x
         }
+    };
+    let opacity = textured * vertex_color(scene, triangle, barycentric).w;
+    match material.alpha_cutoff {
+        cutoff if cutoff > 0.0 => f32::from(u8::from(opacity >= cutoff)),
+        _ => opacity,
     }
+}
+
+/// Linear colour and opacity of the vertices at a point; white where there is none.
+pub fn vertex_color(scene: &Scene, triangle: u32, barycentric: Vec2) -> Vec4 {
+    scene.shading.get(triangle as usize).map_or(Vec4::ONE, |s| Attributes::of(scene, s).color(barycentric))
 }
 
 /// Whether a partly transparent surface stops a ray, decided by a hash of `seed`.

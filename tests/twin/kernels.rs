@@ -33,7 +33,7 @@ const SCENES: [&str; 9] = [
     "bust/scene.toml",
 ];
 
-fn small(s: &mut Settings) {
+pub fn small(s: &mut Settings) {
     (s.width, s.height, s.spp, s.max_depth) = (SIDE, SIDE, SAMPLES, s.max_depth.min(4));
 }
 
@@ -121,14 +121,14 @@ fn spheres() -> Loaded {
 }
 
 /// Everything that a render leaves behind, and the twin's answers to the same questions.
-struct Pair {
-    samples: [Vec<Vec3>; 2],
+pub struct Pair {
+    pub samples: [Vec<Vec3>; 2],
     guides: [Vec<Guide>; 2],
     stats: [Vec<PixelStats>; 2],
     light: [Vec<PixelLight>; 2],
 }
 
-fn run(gpu: &Gpu, scene: &Loaded, effects: Effects) -> Pair {
+pub fn run(gpu: &Gpu, scene: &Loaded, effects: Effects) -> Pair {
     let outputs = Outputs { split_light: true, guides: true, counters: false };
     let renderer = Renderer::specialised(gpu, scene, &scene.settings, outputs, effects).unwrap();
     let mut frame = FrameResources::new(gpu).unwrap();
@@ -168,7 +168,7 @@ fn near(a: impl Into<Vec3>, b: impl Into<Vec3>, tolerance: f32) -> bool {
 }
 
 /// Share of samples whose direct and indirect light and albedo agree.
-fn agreement(samples: &[Vec<Vec3>; 2]) -> f64 {
+pub fn agreement(samples: &[Vec<Vec3>; 2]) -> f64 {
     let pairs = samples[0].chunks(3).zip(samples[1].chunks(3));
     let agree = pairs.filter(|(a, b)| a.iter().zip(*b).all(|(a, b)| near(*a, *b, 2e-3))).count();
     agree as f64 / (samples[0].len() / 3) as f64
@@ -183,7 +183,7 @@ fn guides_agree(a: &Guide, b: &Guide) -> bool {
         && (a.depth - b.depth).abs() <= 1e-4 * (1.0 + a.depth)
 }
 
-fn check(name: &str, pair: &Pair) {
+pub fn check(name: &str, pair: &Pair) {
     let share = agreement(&pair.samples);
     // Rounding decides a lobe, a texel or an edge here and there; bumps at full texture resolution magnify it most.
     assert!(share > 0.98, "{name}: {share} of samples agree");

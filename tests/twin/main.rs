@@ -7,6 +7,7 @@ mod filters;
 mod guided;
 mod kernels;
 mod lookup;
+mod materials;
 #[path = "../support/moving.rs"]
 mod moving;
 mod path;

@@ -8,8 +8,9 @@ use super::lights;
 use super::plan;
 use super::sources::Sources;
 use super::store;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::layout::{LIGHT_ENVIRONMENT, Triangle};
+use crate::memory;
 use crate::scene::Scene;
 use crate::scene::description::Description;
 use crate::scene::load::library::Library;
@@ -31,7 +32,9 @@ pub fn assemble(path: &Path, description: &Description, sky: bool, scene: &mut S
     done?;
     let textures = &sources.library.materials.textures;
     let decoded = if textures.len() == early.len() { decoded? } else { textures.decode()? };
-    (scene.textures, scene.texels) = (decoded.textures, decoded.texels);
+    let attributes = std::mem::replace(&mut scene.texels, decoded.texels);
+    scene.textures = decoded.textures;
+    add_attributes(path, attributes, scene)?;
     let mut warnings = add_materials(sources.library, scene);
     let emits = |t: &Triangle| scene.materials[t.material as usize].emission != [0.0; 3];
     if sky && scene.lights.is_empty() && !scene.triangles.iter().any(emits) {
@@ -53,6 +56,21 @@ pub fn assemble(path: &Path, description: &Description, sky: bool, scene: &mut S
     Ok(())
 }
 
+/// Puts the words of vertices' attributes after the texels of textures.
+fn add_attributes(path: &Path, words: Vec<u32>, scene: &mut Scene) -> Result<()> {
+    let first = scene.texels.len() as u64;
+    if words.is_empty() {
+        return Ok(());
+    }
+    if first + words.len() as u64 > u64::from(u32::MAX) {
+        return Err(Error::input(path, "textures and vertex colours have more than 2^32 texels together: reduce them"));
+    }
+    memory::reserve("vertex colours", &mut scene.texels, words.len())?;
+    scene.texels.extend(words);
+    scene.shading.iter_mut().filter(|s| s.attributes != 0).for_each(|s| s.first += first as u32);
+    Ok(())
+}
+
 /// Everything but textures.
 fn geometry(sources: &mut Sources, scene: &mut Scene) -> Result<()> {
     sources.read_files()?;
@@ -64,6 +82,7 @@ fn geometry(sources: &mut Sources, scene: &mut Scene) -> Result<()> {
     scene.content.add(&geometry.shading);
     hierarchy::build(sources, &plan, stored, &mut geometry, scene)?;
     (scene.triangles, scene.shading) = (geometry.triangles, geometry.shading);
+    scene.texels = geometry.attributes; // until textures are decoded
     Ok(())
 }
 

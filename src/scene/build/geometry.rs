@@ -1,4 +1,6 @@
 //! The growing triangle arrays: placement, repair of what can be repaired, packing of normals.
+use super::attributes::Extras;
+use super::encode::encode_normal;
 use crate::layout::{NONE, SPHERE, SPHERE_INWARD, SPHERE_MIRRORED, Shading, Triangle};
 use crate::scene::MAX_COORDINATE;
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
@@ -12,6 +14,8 @@ pub struct Geometry {
     pub triangles: Vec<Triangle>,
     /// Empty, or as long as `triangles`.
     pub shading: Vec<Shading>,
+    /// Words of vertices' colours, second coordinates and tangents, which `shading` tells the places of.
+    pub attributes: Vec<u32>,
 }
 
 /// How a mesh enters the scene.
@@ -38,6 +42,8 @@ pub struct Corners {
     pub n: Option<[Vec3; 3]>,
     /// Texture coordinates of the corners; v points up.
     pub uv: Option<[Vec2; 3]>,
+    /// What else there is.
+    pub extras: Extras,
 }
 
 /// Indices by which a triangle is named in reports and shaded.
@@ -112,7 +118,9 @@ impl Geometry {
         }
         let normal = self.normals(c, at, swap, face, repairs);
         let uv = c.uv.filter(|_| at.uvs).map(|uv| sane_uvs(uv, swap, repairs));
-        self.shade(normal, uv);
+        let first = self.attributes.len() as u32;
+        let attributes = c.extras.pack(&at.affine.matrix3, swap, &mut self.attributes);
+        self.shade(normal, uv, attributes, first);
         let Tag { primitive, material, object } = tag;
         let [v0, v1, v2] = p.map(|p| p.to_array());
         self.triangles.push(Triangle { v0, primitive, v1, material, v2, object, ..Default::default() });
@@ -135,7 +143,7 @@ impl Geometry {
         let axis = |a: DVec3| (a.normalize() * radius).as_vec3().to_array();
         let inward = if at.flip { SPHERE_INWARD } else { 0 };
         let mirrored = if determinant < 0.0 { SPHERE_MIRRORED } else { 0 };
-        self.shade(FLAT, None);
+        self.shade(FLAT, None, 0, 0);
         self.triangles.push(Triangle {
             v0: at.affine.translation.as_vec3().to_array(),
             primitive: SPHERE | inward | mirrored,
@@ -151,7 +159,8 @@ impl Geometry {
     /// Drops triangles from `start` on that equal an earlier one of them in all but number and object; returns how many.
     /// A duplicate lamp would be sampled twice as often as rays hit it.
     pub fn drop_copies(&mut self, start: usize) -> usize {
-        let all = |i: usize| (Triangle { primitive: 0, object: 0, ..self.triangles[i] }, self.shading.get(i).copied());
+        let shading = |i: usize| self.shading.get(i).map(|s| Shading { first: 0, ..*s });
+        let all = |i: usize| (Triangle { primitive: 0, object: 0, ..self.triangles[i] }, shading(i));
         let key = |i: usize| {
             let ((triangle, shading), mut hasher) = (all(i), DefaultHasher::new());
             (bytemuck::bytes_of(&triangle), shading.as_ref().map(bytemuck::bytes_of)).hash(&mut hasher);
@@ -194,16 +203,17 @@ impl Geometry {
         }
     }
 
-    fn shade(&mut self, normal: [u32; 3], uv: Option<[Vec2; 3]>) {
+    fn shade(&mut self, normal: [u32; 3], uv: Option<[Vec2; 3]>, attributes: u32, first: u32) {
         if self.shading.is_empty() {
-            if normal == FLAT && uv.is_none() {
+            if normal == FLAT && uv.is_none() && attributes == 0 {
                 return;
             }
             let flat = Shading { normal: FLAT, ..Shading::default() };
             self.shading = vec![flat; self.triangles.len()];
         }
         let [uv0, uv1, uv2] = uv.unwrap_or_default().map(|uv| uv.to_array());
-        self.shading.push(Shading { normal, uv0, uv1, uv2, pad: [0; 3], ..Default::default() });
+        let first = if attributes == 0 { 0 } else { first };
+        self.shading.push(Shading { normal, uv0, uv1, uv2, attributes, first, ..Default::default() });
     }
 }
 
@@ -250,18 +260,6 @@ fn sane_uvs(mut uv: [Vec2; 3], swap: bool, repairs: &mut Repairs) -> [Vec2; 3] {
         uv.swap(1, 2);
     }
     uv
-}
-
-/// Octahedral map of a unit vector (Cigolle et al. 2014), snorm 2 x 16, x in the low half.
-pub fn encode_normal(n: Vec3) -> u32 {
-    let p = n.truncate() / (n.x.abs() + n.y.abs() + n.z.abs());
-    let sign = Vec2::new(1f32.copysign(p.x), 1f32.copysign(p.y));
-    let p = if n.z < 0.0 { (1.0 - Vec2::new(p.y, p.x).abs()) * sign } else { p };
-    let snorm = |v: f32| u32::from((v.clamp(-1.0, 1.0) * 32767.0).round() as i16 as u16);
-    match snorm(p.x) | snorm(p.y) << 16 {
-        NONE => NONE << 16, // means "flat": the neighbouring code is 4e-5 radians away
-        code => code,
-    }
 }
 
 /// Inverse of [`encode_normal`], as kernels compute it.

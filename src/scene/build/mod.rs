@@ -1,8 +1,10 @@
 //! Builds the flat arrays that kernels read from a description; [`assemble`] calls the steps in order.
 pub mod alias;
 pub mod assemble;
+pub mod attributes;
 pub mod bvh;
 pub mod coat;
+pub mod encode;
 pub mod environment;
 pub mod fresnel;
 pub mod geometry;

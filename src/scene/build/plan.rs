@@ -1,7 +1,7 @@
 //! Decides for each mesh whether it is baked into world space or stored in its own space for instances.
 use super::sources::{Sources, mesh_name};
 use crate::error::Result;
-use crate::layout::{MATERIAL_MASKED, Material, NONE};
+use crate::layout::{MATERIAL_MASKED, MATERIAL_UNLIT, Material, NONE};
 use crate::scene::description::shape::Shape;
 use crate::scene::description::{self, InstanceTable, MeshTable};
 use glam::{DAffine3, DMat3};
@@ -159,7 +159,8 @@ impl<'s, 'a> Planner<'s, 'a> {
         let sources = self.sources;
         let textured = |i: u32| {
             let m = &sources.library.materials.list[i as usize];
-            m.emission != [0.0; 3] && (m.emission_texture != NONE || m.opacity_texture != NONE)
+            let varies = m.emission_texture != NONE || m.opacity_texture != NONE;
+            m.emission != [0.0; 3] && (varies || m.flags & MATERIAL_UNLIT != 0)
         };
         let file = sources.file_of(&sources.description.mesh[job.mesh]).and_then(|path| sources.files.get(&path));
         let found = match (override_of(sources, job)?, file) {

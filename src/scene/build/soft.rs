@@ -1,4 +1,5 @@
 //! A mesh whose vertices may move: what is kept of it to place its triangles again.
+use super::attributes::Extras;
 use super::bvh;
 use super::geometry::{Corners, FLAT, Geometry, Placement, Repairs, Tag, TooFar};
 use crate::layout::{BvhNode, NONE, Shading, Triangle};
@@ -81,7 +82,7 @@ impl Soft {
             let corners = [0, 1, 2].map(|c| indices[3 * triangle as usize + c] as usize);
             let of = |values: &[[f32; 3]]| corners.map(|i| Vec3::from(values[i]));
             let n = (!to.normals.is_empty()).then(|| of(&to.normals));
-            let c = Corners { p: of(&to.positions), n, uv: None };
+            let c = Corners { p: of(&to.positions), n, uv: None, extras: Extras::default() };
             let placed = geometry.push(&c, tag, &self.placement, &mut repairs);
             placed.map_err(|TooFar(v)| format!("gets a coordinate of {v:e}: the limit is {MAX_COORDINATE:e}"))?;
         }

@@ -64,6 +64,8 @@ impl<'a> Sources<'a> {
     }
 
     fn add_materials(&mut self) -> Result<()> {
+        let mut colors = self.description.mesh.iter().flat_map(|m| m.data.iter().flat_map(|mesh| &mesh.colors));
+        self.library.materials.vertices_have_alpha = colors.any(|c| c[3] < 1.0);
         for table in &self.description.material {
             let place = format!("material \"{}\"", table.name);
             let directory = self.directory();
@@ -87,7 +89,6 @@ impl<'a> Sources<'a> {
     pub fn read_files(&mut self) -> Result<()> {
         for mesh in &self.description.mesh {
             self.check(mesh)?;
-            self.warn_of_missing(mesh);
             let Some(path) = self.file_of(mesh) else { continue };
             if !self.files.contains_key(&path) {
                 let parsed = obj::load(&path, &mut self.library)?;
@@ -95,22 +96,6 @@ impl<'a> Sources<'a> {
             }
         }
         Ok(())
-    }
-
-    /// Warns, once per kind, of what a mesh has and is not rendered.
-    fn warn_of_missing(&mut self, table: &MeshTable) {
-        let Some(mesh) = &table.data else { return };
-        let all = [
-            (mesh.colors.is_empty(), "vertex colours are not rendered:"),
-            (mesh.uvs2.is_empty(), "a second set of texture coordinates is not rendered:"),
-            (mesh.tangents.is_empty(), "tangents are made of texture coordinates:"),
-        ];
-        let warnings = &mut self.library.warnings;
-        for (_, what) in all.iter().filter(|(empty, _)| !empty) {
-            if !warnings.iter().any(|w| w.starts_with(what)) {
-                warnings.push(format!("{what} first in mesh \"{}\"", mesh_name(table)));
-            }
-        }
     }
 
     fn check(&self, mesh: &MeshTable) -> Result<()> {

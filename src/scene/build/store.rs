@@ -1,9 +1,11 @@
 //! Puts the triangles of all meshes into one array: first those in world space, then one mesh after another.
+use super::attributes::{Extras, MOST_WORDS, corners};
 use super::geometry::{Corners, Geometry, Placement, Repairs, Tag, TooFar};
 use super::plan::{Job, Plan, override_of};
 use super::soft::Soft;
 use super::sources::{Sources, mesh_name};
 use crate::error::{Error, Result};
+use crate::layout::MATERIAL_NORMAL_MAP;
 use crate::memory;
 use crate::scene::MAX_COORDINATE;
 use crate::scene::description::mesh::Mesh;
@@ -36,7 +38,9 @@ pub struct Stored {
 pub fn store(sources: &mut Sources, plan: &Plan, geometry: &mut Geometry) -> Result<Vec<Stored>> {
     let jobs: Vec<&Job> = plan.baked.iter().chain(&plan.stored).collect();
     let triangles: u64 = jobs.iter().map(|job| triangles_of(sources, job)).sum();
-    memory::need(format!("{}: {triangles} triangles", sources.path.display()), triangles * BYTES_OF_TRIANGLE)?;
+    let words = jobs.iter().map(|job| attribute_words(sources, job)).sum::<u64>();
+    let bytes = triangles * BYTES_OF_TRIANGLE + words * size_of::<u32>() as u64;
+    memory::need(format!("{}: {triangles} triangles", sources.path.display()), bytes)?;
     warn_of_grey(sources, plan)?;
     let description = sources.description;
     let file = |job: &Job| description.mesh[job.mesh].file.as_ref();
@@ -65,6 +69,13 @@ fn triangles_of(sources: &Sources, job: &Job) -> u64 {
     let table = &sources.description.mesh[job.mesh];
     let file = sources.file_of(table).and_then(|path| sources.files.get(&path));
     if job.exact { 1 } else { triangles(table, file) }
+}
+
+/// Words that the attributes of a mesh's vertices may take.
+fn attribute_words(sources: &Sources, job: &Job) -> u64 {
+    let data = sources.description.mesh[job.mesh].data.as_ref();
+    let has = |m: &&Mesh| !(m.colors.is_empty() && m.uvs2.is_empty() && m.tangents.is_empty());
+    data.filter(has).map_or(0, |m| (m.triangles() * MOST_WORDS) as u64)
 }
 
 fn triangles(table: &MeshTable, file: Option<&ObjFile>) -> u64 {
@@ -116,6 +127,9 @@ struct Addition<'a> {
     placement: Placement,
     /// Object index of the first part.
     first: u32,
+    /// Whether some texture reads second coordinates, and whether there are normal maps.
+    second: bool,
+    tangents: bool,
 }
 
 impl<'a> Addition<'a> {
@@ -126,8 +140,12 @@ impl<'a> Addition<'a> {
         let uvs = sources.library.materials.textures.len() > 0;
         let (affine, flat, keep) = (job.affine, table.flat || meant, table.moving);
         let placement = Placement { affine, flat, flip: table.flip_normals, uvs, keep };
+        let materials = &sources.library.materials;
+        let second = materials.textures.any_second();
+        let tangents = materials.list.iter().any(|m| m.flags & MATERIAL_NORMAL_MAP != 0);
         let place = format!("mesh \"{}\"", mesh_name(table));
-        Ok(Self { job: *job, table, place, material: override_of(sources, job)?, placement, first })
+        let material = override_of(sources, job)?;
+        Ok(Self { job: *job, table, place, material, placement, first, second, tangents })
     }
 
     /// Adds the triangles; returns the names of the objects, and what it takes to deform them.
@@ -226,10 +244,35 @@ impl<'a> Addition<'a> {
             let tag = Tag { primitive, material: self.material.unwrap_or(part.material), object };
             match self.job.exact {
                 true => geometry.push_sphere(tag, &self.placement, repairs)?,
-                false => add_mesh(geometry, &part.mesh, tag, &self.placement, repairs)?,
+                false => self.add_mesh(geometry, &part.mesh, tag, repairs)?,
             }
         }
         Ok(names)
+    }
+
+    fn add_mesh(
+        &self,
+        geometry: &mut Geometry,
+        mesh: &Mesh,
+        first: Tag,
+        repairs: &mut Repairs,
+    ) -> std::result::Result<(), TooFar> {
+        for (t, triangle) in (0..).zip(mesh.indices.as_chunks().0) {
+            let triangle: [usize; 3] = triangle.map(|i| i as usize);
+            let extras = Extras {
+                colors: corners(&mesh.colors, triangle),
+                uvs: corners(&mesh.uvs2, triangle).filter(|_| self.second),
+                tangents: corners(&mesh.tangents, triangle).filter(|_| self.tangents),
+            };
+            let c = Corners {
+                p: triangle.map(|i| mesh.positions[i].into()),
+                n: corners(&mesh.normals, triangle),
+                uv: corners(&mesh.uvs, triangle),
+                extras,
+            };
+            geometry.push(&c, Tag { primitive: first.primitive + t, ..first }, &self.placement, repairs)?;
+        }
+        Ok(())
     }
 }
 
@@ -249,23 +292,4 @@ pub fn joined(table: &MeshTable, file: &ObjFile) -> Mesh {
 
 fn object_name(mesh: &str, object: &str) -> String {
     if object.is_empty() || object == "unnamed_object" { mesh.to_owned() } else { format!("{mesh}/{object}") }
-}
-
-fn add_mesh(
-    geometry: &mut Geometry,
-    mesh: &Mesh,
-    first: Tag,
-    at: &Placement,
-    repairs: &mut Repairs,
-) -> std::result::Result<(), TooFar> {
-    for (t, corners) in (0..).zip(mesh.indices.as_chunks().0) {
-        let corners: [usize; 3] = corners.map(|i| i as usize);
-        let c = Corners {
-            p: corners.map(|i| mesh.positions[i].into()),
-            n: (!mesh.normals.is_empty()).then(|| corners.map(|i| mesh.normals[i].into())),
-            uv: (!mesh.uvs.is_empty()).then(|| corners.map(|i| mesh.uvs[i].into())),
-        };
-        geometry.push(&c, Tag { primitive: first.primitive + t, ..first }, at, repairs)?;
-    }
-    Ok(())
 }

@@ -13,8 +13,8 @@ pub struct Mesh {
     pub uvs: Vec<[f32; 2]>,
     /// A second set of texture coordinates, as `uvs`, for textures that ask for set 1.
     pub uvs2: Vec<[f32; 2]>,
-    /// Colours of the vertices, linear Rec. 709 and opacity, in [0, 1], which multiply a material's `color` and alpha; empty, or
-    /// one per position.
+    /// Colours of the vertices, linear Rec. 709 and opacity, in [0, 1] (others are clamped), which multiply the `color` of diffuse,
+    /// coated and metallic-roughness materials, and the alpha of those that have an opacity; empty, or one per position.
     pub colors: Vec<[f32; 4]>,
     /// Tangents for normal maps: a direction along +u, and +1 or -1, by which `cross(normal, tangent)` becomes a direction along
     /// +v; empty, or one per position.

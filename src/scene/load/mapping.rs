@@ -1,5 +1,8 @@
 //! How texture coordinates become places in a picture.
-use crate::layout::TEXTURE_CLAMP;
+use crate::layout::{
+    TEXTURE_CLAMP, TEXTURE_CLAMP_U, TEXTURE_CLAMP_V, TEXTURE_MIRROR_U, TEXTURE_MIRROR_V, TEXTURE_NEAREST,
+    TEXTURE_SECOND_UV, TEXTURE_SHEARED,
+};
 use crate::scene::description::texture::{TextureFilter, TextureTable, Wrap};
 
 /// How texture coordinates, whose v points up, become places in a picture.
@@ -61,19 +64,18 @@ impl Mapping {
 
     /// TEXTURE_ bits of a texture of this mapping.
     pub fn flags(self) -> u32 {
-        if self.wrap == [Wrap::Clamp; 2] { TEXTURE_CLAMP } else { 0 }
-    }
-
-    /// What of it is not rendered.
-    pub fn missing(&self) -> impl Iterator<Item = &'static str> {
-        let wrap = self.wrap != [Wrap::Clamp; 2] && self.wrap != [Wrap::Repeat; 2];
-        let all = [
-            (wrap, "a texture that is mirrored, or clamped along one axis, repeats:"),
-            (self.filter == TextureFilter::Nearest, "a texture without interpolation is interpolated:"),
-            (self.second, "a texture of the second coordinates takes the first:"),
-            (self.shear != [0.0; 2], "a texture's rotation is not rendered:"),
+        let [u, v] = self.wrap;
+        let bits = [
+            (u == Wrap::Clamp && v == Wrap::Clamp, TEXTURE_CLAMP),
+            (u == Wrap::Clamp && v != Wrap::Clamp, TEXTURE_CLAMP_U),
+            (u != Wrap::Clamp && v == Wrap::Clamp, TEXTURE_CLAMP_V),
+            (u == Wrap::Mirror, TEXTURE_MIRROR_U),
+            (v == Wrap::Mirror, TEXTURE_MIRROR_V),
+            (self.filter == TextureFilter::Nearest, TEXTURE_NEAREST),
+            (self.shear != [0.0; 2], TEXTURE_SHEARED),
+            (self.second, TEXTURE_SECOND_UV),
         ];
-        all.into_iter().filter(|a| a.0).map(|a| a.1)
+        bits.iter().filter(|b| b.0).map(|b| b.1).sum()
     }
 }
 

@@ -19,6 +19,8 @@ pub struct Materials {
     pub textures: TextureSet,
     /// Materials whose bump height is a share of the scene's size, which is known last.
     pub default_bumps: Vec<u32>,
+    /// Whether some mesh has vertices of an opacity below 1.
+    pub vertices_have_alpha: bool,
 }
 
 impl Materials {
@@ -39,6 +41,11 @@ impl Materials {
             bump_texture: NONE,
             roughness_texture: NONE,
             emission_texture: NONE,
+            normal_scale: 1.0,
+            specular_factor_texture: NONE,
+            transmission_texture: NONE,
+            clearcoat_texture: NONE,
+            clearcoat_roughness_texture: NONE,
             ..Material::default()
         }
     }
@@ -132,7 +139,7 @@ impl Materials {
         if t.bump.is_some() && t.normal_map.is_some() {
             return Err("has both bump and normal_map: choose one".into());
         }
-        let mut ask = |texture: Option<&TextureTable>, kind| self.ask(t, texture, kind, directory, warn);
+        let mut ask = |texture: Option<&TextureTable>, kind| self.ask(texture, kind, directory, warn);
         if body {
             m.base_texture = ask(t.color_texture.as_ref(), Kind::Color)?;
         }
@@ -151,22 +158,22 @@ impl Materials {
         if t.normal_map.is_some() && m.bump_texture != NONE {
             m.flags |= MATERIAL_NORMAL_MAP;
         }
+        m.normal_scale = t.normal_scale.unwrap_or(1.0);
         m.bump_scale = t.bump_scale.unwrap_or(1.0);
-        match m.bump_scale.is_finite() {
+        match m.bump_scale.is_finite() && m.normal_scale.is_finite() {
             true => Ok(()),
-            false => Err("bump_scale is not a finite number".into()),
+            false => Err("bump_scale or normal_scale is not a finite number".into()),
         }
     }
 }
 
 impl Materials {
-    /// Index of a texture of material `t`, or [`NONE`].
+    /// Index of a texture, or [`NONE`].
     ///
     /// # Errors
     /// For settings that are out of range.
     pub fn ask(
         &mut self,
-        t: &MaterialTable,
         texture: Option<&TextureTable>,
         kind: Kind,
         directory: &Path,
@@ -176,15 +183,7 @@ impl Materials {
         let file = texture.file.to_string_lossy().replace('\\', "/");
         texture.check().map_err(|what| format!("texture {file}: {what}"))?;
         let mapping = Mapping::from(texture);
-        mapping.missing().for_each(|what| warn_once(warn, what, &t.name));
         Ok(self.textures.request(directory, &file, kind, mapping, warn))
-    }
-}
-
-/// Warns of something that is not rendered once for all materials.
-pub fn warn_once(warn: &mut Vec<String>, what: &str, material: &str) {
-    if !warn.iter().any(|w| w.starts_with(what)) {
-        warn.push(format!("{what} first in material \"{material}\""));
     }
 }
 

@@ -1,9 +1,17 @@
 //! Makes materials of `[[material]]` tables of type `metallic-roughness`.
-use super::material::{Materials, emission, reflectance, warn_once, within};
+use super::material::{Materials, emission, reflectance, within};
 use super::texture::Kind;
 use crate::layout::*;
 use crate::scene::description::material::{AlphaMode, MaterialTable};
+use crate::scene::description::texture::TextureTable;
 use std::path::Path;
+
+/// What a material is made of.
+struct Source<'a> {
+    table: &'a MaterialTable,
+    directory: &'a Path,
+    warn: &'a mut Vec<String>,
+}
 
 impl Materials {
     /// Adds a material of glTF 2.0.
@@ -12,104 +20,100 @@ impl Materials {
     /// A sentence that names the key at fault.
     pub fn push_metallic(
         &mut self,
-        t: &MaterialTable,
+        table: &MaterialTable,
         directory: &Path,
         warn: &mut Vec<String>,
     ) -> Result<u32, String> {
-        let mut m = Self::plain([1.0; 3]);
-        let unit = |v: Option<f32>, default: f32, key: &str| within(v.unwrap_or(default), 1.0, key);
-        let what = format!("material \"{}\": color", t.name);
-        let base = reflectance(t.color.map_or([1.0; 3], |v| v.0), &what, warn)?;
-        let metallic = unit(t.metallic, 1.0, "metallic")?;
-        m.alpha = unit(t.roughness, 1.0, "roughness")?.powi(2);
-        m.emission = emission(t)?;
-        m.kind = BSDF_METALLIC;
+        let (mut m, mut s) = (Self::plain([1.0; 3]), Source { table, directory, warn });
+        let what = format!("material \"{}\": color", table.name);
+        m.base_color = reflectance(table.color.map_or([1.0; 3], |v| v.0), &what, s.warn)?;
+        m.emission = emission(table)?;
         m.flags |= MATERIAL_GGX;
-        (m.base_color, m.metallic) = (base, metallic);
-        m.base_texture = self.ask(t, t.color_texture.as_ref(), Kind::Color, directory, warn)?;
-        m.roughness_texture = self.ask(t, t.metallic_roughness_texture.as_ref(), Kind::Data, directory, warn)?;
-        self.specular(&mut m, t, directory, warn)?;
-        m.transmission_factor = unit(t.transmission_factor, 0.0, "transmission_factor")?;
-        m.clearcoat = unit(t.clearcoat, 0.0, "clearcoat")?;
-        m.clearcoat_alpha = unit(t.clearcoat_roughness, 0.0, "clearcoat_roughness")?.powi(2);
-        self.opacity(&mut m, t, directory, warn)?;
-        m.emission_texture = self.ask(t, t.emission_texture.as_ref(), Kind::Color, directory, warn)?;
-        m.bump_texture = self.ask(t, t.normal_map.as_ref(), Kind::Data, directory, warn)?;
+        m.base_texture = self.texture(&mut s, &table.color_texture, Kind::Color)?;
+        m.emission_texture = self.texture(&mut s, &table.emission_texture, Kind::Color)?;
+        self.opacity(&mut m, &mut s)?;
+        m.normal_scale = table.normal_scale.unwrap_or(1.0);
+        if !m.normal_scale.is_finite() {
+            return Err("normal_scale is not a finite number".to_owned());
+        }
+        self.layers(&mut m, &mut s)?;
+        m.bump_texture = self.texture(&mut s, &table.normal_map, Kind::Data)?;
         if m.bump_texture != NONE {
             m.flags |= MATERIAL_NORMAL_MAP;
         }
         // The two sides of a thin wall are alike.
-        if t.two_sided == Some(false) && m.transmission_factor == 0.0 {
+        if table.two_sided == Some(false) && m.transmission_factor == 0.0 {
             m.flags &= !MATERIAL_TWO_SIDED;
         }
-        missing(t, warn);
-        Ok(self.push(&t.name, m))
+        if table.unlit {
+            make_unlit(&mut m);
+        }
+        Ok(self.push(&table.name, m))
     }
 
-    /// The dielectric's reflectance head on, `((ior - 1) / (ior + 1))^2` times `specular`, which kernels limit to 1.
-    fn specular(
-        &mut self,
-        m: &mut Material,
-        t: &MaterialTable,
-        directory: &Path,
-        warn: &mut Vec<String>,
-    ) -> Result<(), String> {
+    fn texture(&mut self, s: &mut Source, texture: &Option<TextureTable>, kind: Kind) -> Result<u32, String> {
+        self.ask(texture.as_ref(), kind, s.directory, s.warn)
+    }
+
+    fn layers(&mut self, m: &mut Material, s: &mut Source) -> Result<(), String> {
+        let t = s.table;
+        let unit = |v: Option<f32>, default: f32, key: &str| within(v.unwrap_or(default), 1.0, key);
+        m.kind = BSDF_METALLIC;
+        m.metallic = unit(t.metallic, 1.0, "metallic")?;
+        m.alpha = unit(t.roughness, 1.0, "roughness")?.powi(2);
+        m.roughness_texture = self.texture(s, &t.metallic_roughness_texture, Kind::Data)?;
+        // Kernels limit the reflectance head on, ((ior - 1) / (ior + 1))^2 times `specular`, to 1.
         let ior = t.ior.unwrap_or(1.5);
-        if !(0.1..=10.0).contains(&ior) {
-            return Err(format!("ior is {ior}: choose a value from 0.1 to 10"));
+        if !(0.1..=1000.0).contains(&ior) {
+            return Err(format!("ior is {ior}: choose a value from 0.1 to 1000"));
         }
-        let f0 = ((ior - 1.0) / (ior + 1.0)).powi(2);
         let color = t.specular.map_or([1.0; 3], |v| v.0);
         if !color.iter().all(|v| (0.0..=1e6).contains(v)) {
             return Err(format!("specular {color:?} is negative, NaN or above 1e6"));
         }
-        m.specular = color.map(|v| v * f0);
-        m.specular_texture = self.ask(t, t.specular_texture.as_ref(), Kind::Color, directory, warn)?;
-        m.specular_factor = within(t.specular_factor.unwrap_or(1.0), 1.0, "specular_factor")?;
+        m.specular = color.map(|v| v * ((ior - 1.0) / (ior + 1.0)).powi(2));
+        m.specular_texture = self.texture(s, &t.specular_texture, Kind::Color)?;
+        m.specular_factor = unit(t.specular_factor, 1.0, "specular_factor")?;
+        m.specular_factor_texture = self.texture(s, &t.specular_factor_texture, Kind::Alpha)?;
+        m.transmission_factor = unit(t.transmission_factor, 0.0, "transmission_factor")?;
+        m.clearcoat = unit(t.clearcoat, 0.0, "clearcoat")?;
+        m.clearcoat_alpha = unit(t.clearcoat_roughness, 0.0, "clearcoat_roughness")?.powi(2);
+        if m.transmission_factor > 0.0 {
+            m.transmission_texture = self.texture(s, &t.transmission_texture, Kind::Red)?;
+        }
+        if m.clearcoat > 0.0 {
+            m.clearcoat_texture = self.texture(s, &t.clearcoat_texture, Kind::Red)?;
+            m.clearcoat_roughness_texture = self.texture(s, &t.clearcoat_roughness_texture, Kind::Roughness)?;
+        }
         Ok(())
     }
 
-    fn opacity(
-        &mut self,
-        m: &mut Material,
-        t: &MaterialTable,
-        directory: &Path,
-        warn: &mut Vec<String>,
-    ) -> Result<(), String> {
+    fn opacity(&mut self, m: &mut Material, s: &mut Source) -> Result<(), String> {
+        let t = s.table;
         let alpha = within(t.opacity.unwrap_or(1.0), 1.0, "opacity")?;
-        within(t.alpha_cutoff.unwrap_or(0.5), 1e6, "alpha_cutoff")?;
+        let cutoff = within(t.alpha_cutoff.unwrap_or(0.5), 1e6, "alpha_cutoff")?;
         match t.alpha_mode {
-            Some(AlphaMode::Opaque) => {}
-            None => {
-                m.opacity = alpha;
-                m.opacity_texture = self.ask(t, t.opacity_texture.as_ref(), Kind::Mask, directory, warn)?;
-            }
-            Some(mode) => {
-                if mode == AlphaMode::Mask {
-                    warn_once(warn, "alpha_mode mask is rendered as blend:", &t.name);
-                }
-                m.opacity = alpha;
-                let texture = t.opacity_texture.as_ref();
-                m.opacity_texture = match texture {
-                    Some(_) => self.ask(t, texture, Kind::Mask, directory, warn)?,
-                    None => self.ask(t, t.color_texture.as_ref(), Kind::Alpha, directory, warn)?,
-                };
-            }
+            Some(AlphaMode::Mask) if cutoff > 0.0 => m.alpha_cutoff = cutoff,
+            Some(AlphaMode::Opaque | AlphaMode::Mask) => return Ok(()),
+            _ => {}
+        }
+        m.opacity = alpha;
+        m.opacity_texture = match (&t.opacity_texture, t.alpha_mode) {
+            (Some(_), _) => self.texture(s, &t.opacity_texture, Kind::Mask)?,
+            (None, Some(_)) => self.texture(s, &t.color_texture, Kind::Alpha)?,
+            (None, None) => NONE,
+        };
+        // Vertices may have an alpha below 1 where nothing else has.
+        if t.alpha_mode.is_some() && (self.vertices_have_alpha || cutoff > 1.0) {
+            m.flags |= MATERIAL_MASKED;
         }
         Ok(())
     }
 }
 
-/// Warns of what is not rendered.
-fn missing(t: &MaterialTable, warn: &mut Vec<String>) {
-    let set = |v: Option<f32>, default: f32| v.is_some_and(|v| v != default);
-    let all = [
-        (set(t.normal_scale, 1.0), "normal_scale is not rendered:"),
-        (t.specular_factor_texture.is_some(), "specular_factor_texture is not rendered:"),
-        (t.transmission_texture.is_some(), "transmission_texture is not rendered:"),
-        (t.clearcoat_texture.is_some(), "clearcoat_texture is not rendered:"),
-        (t.clearcoat_roughness_texture.is_some(), "clearcoat_roughness_texture is not rendered:"),
-        (t.unlit, "unlit is not rendered:"),
-    ];
-    all.iter().filter(|a| a.0).for_each(|a| warn_once(warn, a.1, &t.name));
+/// The surface emits its base colour, and scatters no light.
+fn make_unlit(m: &mut Material) {
+    (m.emission, m.emission_texture) = (m.base_color, m.base_texture);
+    (m.base_color, m.base_texture, m.kind) = ([0.0; 3], NONE, BSDF_DIFFUSE);
+    m.flags |= MATERIAL_UNLIT;
 }

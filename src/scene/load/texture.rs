@@ -22,6 +22,8 @@ pub enum Kind {
     Mask,
     /// Opacity: the alpha channel where the file has one, else 1; copied to all channels.
     Alpha,
+    /// A factor: the red channel, copied to all.
+    Red,
     /// Perceptual roughness: the green channel, copied to all (grey pictures have it there, and so has glTF's
     /// occlusion-roughness-metallic packing).
     Roughness,
@@ -88,6 +90,11 @@ impl TextureSet {
         })
     }
 
+    /// Whether a texture is read at the second set of coordinates.
+    pub fn any_second(&self) -> bool {
+        self.wanted.iter().any(|(_, mapping)| mapping.second)
+    }
+
     /// Number of textures so far.
     pub fn len(&self) -> usize {
         self.wanted.len()
@@ -111,9 +118,9 @@ impl TextureSet {
         }
         let texture = |&(picture, mapping): &(usize, Mapping)| {
             let srgb = if self.pictures[picture].1 == Kind::Color { TEXTURE_SRGB } else { 0 };
-            let (flags, Mapping { scale, offset, .. }) = (srgb | mapping.flags(), mapping);
+            let (flags, Mapping { scale, shear, offset, .. }) = (srgb | mapping.flags(), mapping);
             let [width, height] = sizes[picture];
-            Texture { first: firsts[picture], width, height, flags, scale, offset, ..Default::default() }
+            Texture { first: firsts[picture], width, height, flags, scale, shear, offset, ..Default::default() }
         };
         let textures = self.wanted.iter().map(texture).collect();
         memory::need(format!("textures of {total} texels"), 4 * total + while_decoded(&sizes))?;
@@ -220,6 +227,7 @@ fn fill(space: &mut [u32], texels: impl Iterator<Item = [u8; 4]>, kind: Kind, ha
         *texel = match kind {
             Kind::Color | Kind::Data => u32::from_le_bytes(rgba),
             Kind::Mask => same(if has_alpha { rgba[3] } else { rgba[0] }),
+            Kind::Red => same(rgba[0]),
             Kind::Alpha => same(if has_alpha { rgba[3] } else { 255 }),
             Kind::Roughness => same(rgba[1]),
         };

@@ -27,7 +27,7 @@ fn normals_survive_packing() {
 
 #[test]
 fn normals_equal_to_the_face_are_flat_and_others_are_not() {
-    let face = Corners { p: P, n: Some([Vec3::Z * 3.0; 3]), uv: None };
+    let face = Corners { p: P, n: Some([Vec3::Z * 3.0; 3]), uv: None, extras: Extras::default() };
     assert!(push(face, PLAIN).0.shading.is_empty());
     let bent = Corners { n: Some([Vec3::Z, Vec3::Z, Vec3::new(0.1, 0.0, 1.0)]), ..face };
     assert_eq!(push(bent, PLAIN).0.shading.len(), 1);
@@ -37,7 +37,8 @@ fn normals_equal_to_the_face_are_flat_and_others_are_not() {
 #[test]
 fn a_mirror_keeps_the_outside_outside() {
     let affine = DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
-    let face = Corners { p: P, n: Some([Vec3::Z; 3]), uv: Some([Vec2::ZERO, Vec2::X, Vec2::Y]) };
+    let face =
+        Corners { p: P, n: Some([Vec3::Z; 3]), uv: Some([Vec2::ZERO, Vec2::X, Vec2::Y]), extras: Extras::default() };
     let (g, _) = push(face, Placement { affine, ..PLAIN });
     let t = g.triangles[0];
     assert_eq!(face_normal([t.v0, t.v1, t.v2].map(Vec3::from)), Some(Vec3::Z));
@@ -49,7 +50,7 @@ fn a_mirror_keeps_the_outside_outside() {
 
 #[test]
 fn what_cannot_be_kept_is_counted() {
-    let plain = Corners { p: P, n: None, uv: None };
+    let plain = Corners { p: P, n: None, uv: None, extras: Extras::default() };
     let nan = Corners { p: [Vec3::ZERO, Vec3::NAN, Vec3::Y], ..plain };
     let line = Corners { p: [Vec3::ZERO, Vec3::X, Vec3::X * 2.0], ..plain };
     assert_eq!(push(nan, PLAIN).1, Repairs { not_finite: 1, ..Repairs::default() });
@@ -65,7 +66,7 @@ fn what_cannot_be_kept_is_counted() {
 }
 #[test]
 fn copies_are_dropped_and_what_differs_is_kept() {
-    let plain = Corners { p: P, n: None, uv: None };
+    let plain = Corners { p: P, n: None, uv: None, extras: Extras::default() };
     let bent = Corners { n: Some([Vec3::Z, Vec3::Z, Vec3::X]), ..plain };
     let turned = Corners { p: [P[1], P[2], P[0]], ..plain };
     let (mut g, mut r) = <(Geometry, Repairs)>::default();

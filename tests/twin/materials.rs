@@ -1,0 +1,324 @@
+//! What glTF's materials and meshes have beyond others: kernels agree with their twins on all of it, and the twins with what each
+//! setting means.
+use crate::kernels::{agreement, check, run, small};
+use crate::support::{assert_silent, gpu};
+use glam::{Vec2, Vec3, vec2, vec3};
+use tallow::layout::{ATTRIBUTE_FLIPPED, Effects, MATERIAL_MASKED, TEXTURE_NEAREST};
+use tallow::render::{Outputs, all_effects, called_for};
+use tallow::scene::description::*;
+use tallow::scene::{Loaded, Scene};
+use tallow::twins::surface::{Surface, surface_at, surface_bsdf};
+use tallow::twins::texture::{mask_blocks, surface_opacity, texture_sample};
+use tallow::twins::traverse::traverse;
+
+/// A change, and its name.
+type Plant = (&'static str, fn(&mut Loaded));
+
+const SIDE: u32 = 8;
+
+/// A wavy square of [-1, 1] in x and y with everything that a vertex may have.
+fn patch() -> Mesh {
+    let mut mesh = Mesh::default();
+    for i in 0..=SIDE * SIDE + 2 * SIDE {
+        let [u, v] = [i % (SIDE + 1), i / (SIDE + 1)].map(|k| k as f32 / SIDE as f32);
+        let wave = (5.0 * u).sin();
+        mesh.positions.push([2.0 * u - 1.0, 2.0 * v - 1.0, 0.1 * wave]);
+        mesh.normals.push(vec3(-0.25 * (5.0 * u).cos(), 0.0, 1.0).normalize().to_array());
+        mesh.uvs.push([u, v]);
+        mesh.uvs2.push([1.0 - v, 0.3 * u]);
+        mesh.colors.push([1.0 - 0.5 * u, 0.6 + 0.4 * v, 0.8, 0.4 + 0.6 * v]);
+        mesh.tangents.push([0.8, 0.6, 0.0, -1.0]);
+    }
+    for i in (0..SIDE * (SIDE + 1)).filter(|i| i % (SIDE + 1) < SIDE) {
+        mesh.indices.extend([0, 1, SIDE + 2, 0, SIDE + 2, SIDE + 1].map(|k| i + k));
+    }
+    mesh
+}
+
+fn bitmap(name: &str, texel: impl Fn(u32, u32) -> [u8; 4]) -> Bitmap {
+    let rgba = (0..256).map(|i| texel(i % 16, i / 16)).collect::<Vec<_>>().into();
+    Bitmap { name: name.into(), width: 16, height: 16, rgba }
+}
+
+fn texture(name: &str) -> Option<TextureTable> {
+    Some(name.into())
+}
+
+fn materials() -> Vec<MaterialTable> {
+    let metallic = |name: &str| MaterialTable {
+        name: name.into(),
+        kind: MaterialType::MetallicRoughness,
+        roughness: Some(0.6),
+        ..MaterialTable::default()
+    };
+    let checks = TextureTable {
+        wrap: [Wrap::Mirror, Wrap::Clamp],
+        filter: TextureFilter::Nearest,
+        scale: [2.5, 1.5],
+        rotate: 30.0,
+        offset: [0.1, -0.2],
+        .."checks".into()
+    };
+    let second = TextureTable { uv: 1, wrap: [Wrap::Clamp, Wrap::Mirror], ..TextureTable::from("bumps") };
+    vec![
+        MaterialTable {
+            color_texture: Some(checks.clone()),
+            metallic: Some(0.6),
+            metallic_roughness_texture: texture("checks"),
+            normal_map: Some(second),
+            normal_scale: Some(0.7),
+            specular: Some(Rgb([1.0, 0.5, 0.9])),
+            specular_factor_texture: texture("checks"),
+            ..metallic("enamel")
+        },
+        MaterialTable {
+            metallic: Some(0.0),
+            clearcoat: Some(0.9),
+            clearcoat_roughness: Some(0.5),
+            clearcoat_texture: texture("bumps"),
+            clearcoat_roughness_texture: texture("checks"),
+            ..metallic("lacquer")
+        },
+        MaterialTable {
+            color_texture: Some(TextureTable { filter: TextureFilter::Nearest, ..TextureTable::from("checks") }),
+            metallic: Some(0.0),
+            alpha_mode: Some(AlphaMode::Mask),
+            ..metallic("leaf")
+        },
+        MaterialTable {
+            metallic: Some(0.0),
+            color: Some(Rgb([0.9, 0.6, 0.3])),
+            transmission_factor: Some(0.9),
+            transmission_texture: texture("bumps"),
+            ..metallic("pane")
+        },
+        MaterialTable { color_texture: Some(checks), unlit: true, ..metallic("sign") },
+    ]
+}
+
+fn place(translate: [f64; 3], sign: f64) -> Transform {
+    let [x, y, z] = translate;
+    [sign, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0].into()
+}
+
+/// A patch of each material, one of them placed twice, once mirrored.
+fn described() -> Description {
+    let checks =
+        |x: u32, y: u32| if (x / 4 + y / 4).is_multiple_of(2) { [230, 120, 40, 255] } else { [60, 150, 220, 90] };
+    let bumps = |x: u32, y: u32| [100 + (x * 7 % 60) as u8, 100 + (y * 9 % 60) as u8, 235, 255];
+    let at = |name: &str, x: f64, y: f64| MeshTable {
+        name: Some(name.into()),
+        material: Some(name.into()),
+        data: Some(patch()),
+        transform: place([x, y, 0.0], 1.0),
+        ..MeshTable::default()
+    };
+    let instance = |x: f64, sign: f64| InstanceTable {
+        mesh: "enamel".into(),
+        transform: place([x, 1.1, 0.0], sign),
+        ..InstanceTable::default()
+    };
+    Description {
+        camera: Camera { position: Some([0.3, 0.2, 6.0]), target: Some([0.0; 3]), ..Camera::default() },
+        environment: Some(EnvironmentTable { radiance: Some(Rgb([0.7, 0.8, 1.0])), ..EnvironmentTable::default() }),
+        material: materials(),
+        mesh: vec![
+            at("enamel", 0.0, 0.0),
+            at("lacquer", 2.2, 1.1),
+            at("leaf", -2.2, -1.1),
+            at("pane", 0.0, -1.1),
+            at("sign", 2.2, -1.1),
+        ],
+        instance: vec![instance(0.0, 1.0), instance(-2.2, -1.0)],
+        light: vec![LightTable {
+            kind: LightType::Point,
+            position: Some([1.0, 3.0, 4.0]),
+            intensity: Some(Rgb([40.0; 3])),
+            ..LightTable::default()
+        }],
+        bitmap: vec![bitmap("checks", checks), bitmap("bumps", bumps)],
+        ..Description::default()
+    }
+}
+
+fn scene() -> Loaded {
+    let mut scene = Scene::build(&described()).unwrap();
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    small(&mut scene.settings);
+    scene
+}
+
+#[test]
+fn materials_of_gltf_agree_with_their_twins() {
+    let (gpu, scene) = (gpu(), scene());
+    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    let effects = called_for(&scene, &scene.settings, outputs);
+    let Effects { texture_modes, second_uv, vertex_colors, tangents, alpha_cutoff, .. } = effects;
+    assert_eq!([texture_modes, second_uv, vertex_colors, tangents, alpha_cutoff], [true; 5]);
+    assert_eq!([effects.metallic, effects.clearcoat, effects.thin_walls], [true; 3]);
+    let pair = run(&gpu, &scene, effects);
+    check("materials", &pair);
+    check("materials, all effects", &run(&gpu, &scene, all_effects(&scene, &scene.settings)));
+    let whole = agreement(&pair.samples);
+    // Controls: the twin's samples of scenes in which one thing is another.
+    let plants: [Plant; 5] = [
+        ("interpolation", |s| s.textures.iter_mut().for_each(|t| t.flags &= !TEXTURE_NEAREST)),
+        ("turn", |s| s.textures.iter_mut().for_each(|t| t.shear = [0.0; 2])),
+        ("bitangents", |s| s.shading.iter_mut().for_each(|r| r.attributes ^= ATTRIBUTE_FLIPPED)),
+        ("cutoff", |s| s.materials.iter_mut().for_each(|m| m.alpha_cutoff = 0.0)),
+        ("normal scale", |s| s.materials.iter_mut().for_each(|m| m.normal_scale = 1.0)),
+    ];
+    for (name, plant) in plants {
+        let mut other = scene.clone();
+        plant(&mut other);
+        let others = run(&gpu, &other, effects).samples;
+        let share = agreement(&[pair.samples[0].clone(), others[1].clone()]);
+        assert!(share < whole - 0.004, "control: {name}: {share} of {whole}");
+    }
+    assert_silent(&gpu);
+}
+
+/// The surface that a ray along -z at (x, y) meets, of a scene without perspective.
+fn surface(scene: &Scene, x: f32, y: f32) -> Surface {
+    let hit = traverse(scene, vec3(x, y, 5.0), Vec3::NEG_Z, 100.0, false, 0);
+    assert!(hit.any(), "nothing at {x}, {y}");
+    surface_at(scene, &hit)
+}
+
+/// One patch of one material in world space.
+fn one(material: MaterialTable, mesh: Mesh, transform: Transform, flip_normals: bool) -> Scene {
+    let whole = described();
+    let name = material.name.clone();
+    let table = MeshTable { material: Some(name), data: Some(mesh), transform, flip_normals, ..MeshTable::default() };
+    Scene::build(&Description { material: vec![material], mesh: vec![table], instance: Vec::new(), ..whole })
+        .unwrap()
+        .scene
+}
+
+#[test]
+fn given_tangents_are_those_of_the_coordinates_in_every_placement() {
+    let mapped = || MaterialTable {
+        name: "m".into(),
+        kind: MaterialType::MetallicRoughness,
+        normal_map: texture("bumps"),
+        ..MaterialTable::default()
+    };
+    let flat = || {
+        let mut mesh = patch();
+        mesh.positions.iter_mut().for_each(|p| p[2] = 0.0);
+        mesh.normals.iter_mut().for_each(|n| *n = [0.0, 0.0, 1.0]);
+        mesh
+    };
+    let given = || {
+        let mut mesh = flat();
+        mesh.tangents.iter_mut().for_each(|t| *t = [2.0, 0.0, 0.0, 1.0]);
+        mesh
+    };
+    let derived = || Mesh { tangents: Vec::new(), ..flat() };
+    for (transform, flip) in
+        [(1.0, false), (-1.0, false), (1.0, true), (-1.0, true)].map(|(s, f)| (place([0.0; 3], s), f))
+    {
+        let [a, b] = [given(), derived()].map(|mesh| one(mapped(), mesh, transform, flip));
+        let [with, without] = [&a, &b].map(|s| surface(s, 0.3, -0.4));
+        assert!(with.tangent.w != 0.0 && without.tangent.w == 0.0);
+        assert!((with.normal - without.normal).length() < 1e-4, "{transform:?} {flip}: {with:?} {without:?}");
+        assert!((with.normal - with.smooth_normal).length() > 0.01, "control: a map that does nothing");
+    }
+}
+
+#[test]
+fn vertex_colours_multiply_the_base_colour() {
+    let plain = |name: &str, kind| MaterialTable {
+        name: name.into(),
+        kind,
+        color: Some(Rgb([0.5; 3])),
+        metallic: Some(0.0),
+        ..MaterialTable::default()
+    };
+    for kind in [MaterialType::Diffuse, MaterialType::MetallicRoughness] {
+        let scene = one(plain("m", kind), patch(), place([0.0; 3], 1.0), false);
+        let s = surface(&scene, 0.5, -0.25); // u = 0.75, v = 0.375
+        let found = surface_bsdf(&scene, &s);
+        let color = if kind == MaterialType::Diffuse { found.albedo } else { found.metallic.diffuse };
+        let expected = 0.5 * vec3(0.625, 0.75, 0.8);
+        assert!((color - expected).length() < 1e-3, "{color} {expected}");
+    }
+}
+
+#[test]
+fn wrap_modes_and_filters_are_what_they_say() {
+    // Reads the red channel, which tells the texel: 16 columns, of value 10 * column; v = 0.5 + is row 7.
+    let ramp = |t: TextureTable| {
+        let material = MaterialTable {
+            name: "m".into(),
+            kind: MaterialType::MetallicRoughness,
+            metallic_roughness_texture: Some(TextureTable { file: "ramp".into(), ..t }),
+            ..MaterialTable::default()
+        };
+        let mesh = MeshTable { material: Some("m".into()), data: Some(patch()), ..MeshTable::default() };
+        let picture = bitmap("ramp", |x, y| [10 * x as u8, 10 * y as u8, 0, 0]);
+        Scene::build(&Description {
+            material: vec![material],
+            mesh: vec![mesh],
+            bitmap: vec![picture],
+            ..Default::default()
+        })
+        .unwrap()
+        .scene
+    };
+    let read = |scene: &Scene, u: f32, v: f32| -> Vec2 {
+        let c = texture_sample(scene, scene.materials[0].roughness_texture, vec2(u, v));
+        vec2(c.x, c.y) * 25.5
+    };
+    let close = |found: Vec2, x: f32, y: f32| assert!((found - vec2(x, y)).length() < 1e-3, "{found} ({x}, {y})");
+    let nearest = |wrap| TextureTable { filter: TextureFilter::Nearest, wrap, ..TextureTable::default() };
+    let s = ramp(nearest([Wrap::Repeat; 2]));
+    // The upper left texel is (0, 0), and v points up.
+    close(read(&s, 0.01, 0.99), 0.0, 0.0);
+    close(read(&s, 0.26, 0.99), 4.0, 0.0);
+    close(read(&s, 1.26, 0.01), 4.0, 15.0);
+    let s = ramp(nearest([Wrap::Mirror, Wrap::Clamp]));
+    close(read(&s, 1.26, 0.99), 11.0, 0.0);
+    close(read(&s, -0.26, 1.7), 4.0, 0.0);
+    close(read(&s, 2.26, -0.7), 4.0, 15.0);
+    let s = ramp(nearest([Wrap::Clamp, Wrap::Repeat]));
+    close(read(&s, 1.26, -0.01), 15.0, 0.0);
+    close(read(&s, -3.0, 0.01), 0.0, 15.0);
+    // Between two texels; a mirrored border goes on with itself.
+    let s = ramp(TextureTable { wrap: [Wrap::Mirror, Wrap::Repeat], ..TextureTable::default() });
+    close(read(&s, 2.0 / 16.0, 0.5), 1.5, 7.5);
+    close(read(&s, 1.0, 0.5), 15.0, 7.5);
+    // A quarter counter-clockwise of coordinates whose v points down: (u, w) reads (w, -u).
+    let s = ramp(TextureTable { rotate: 90.0, ..nearest([Wrap::Repeat; 2]) });
+    let w = 0.3; // v = 0.7
+    close(read(&s, 0.1, 1.0 - w), (16.0f32 * w).floor(), (16.0f32 * 0.9).floor());
+}
+
+#[test]
+fn a_cutoff_masks_all_or_nothing() {
+    let leaf = |mode, cutoff| MaterialTable {
+        name: "m".into(),
+        kind: MaterialType::MetallicRoughness,
+        alpha_mode: Some(mode),
+        alpha_cutoff: cutoff,
+        ..MaterialTable::default()
+    };
+    // Alpha is 0.4 + 0.6 v by the vertices alone.
+    let opacities = |material| {
+        let scene = one(material, patch(), place([0.0; 3], 1.0), false);
+        let at = |y: f32| {
+            let hit = traverse(&scene, vec3(0.0, y, 5.0), Vec3::NEG_Z, 100.0, false, 0);
+            let masked = scene.materials[0].flags & MATERIAL_MASKED != 0;
+            let opacity = |t| surface_opacity(&scene, 0, t, hit.barycentric);
+            if hit.any() { if masked { opacity(hit.triangle) } else { 1.0 } } else { 0.0 }
+        };
+        [at(-0.9), at(0.9)]
+    };
+    assert_eq!(opacities(leaf(AlphaMode::Mask, None)), [0.0, 1.0]);
+    assert_eq!(opacities(leaf(AlphaMode::Mask, Some(0.0))), [1.0, 1.0]);
+    assert_eq!(opacities(leaf(AlphaMode::Opaque, None)), [1.0, 1.0]);
+    let scene = one(leaf(AlphaMode::Blend, None), patch(), place([0.0; 3], 1.0), false);
+    let passed = (0..2000).filter(|&seed| !mask_blocks(&scene, 0, u32::MAX, vec2(0.1, 0.1), seed)).count();
+    let opacity = surface_opacity(&scene, 0, 0, vec2(0.1, 0.1));
+    assert!((passed as f32 / 2000.0 - (1.0 - opacity)).abs() < 0.05, "{passed} of 2000 pass {opacity}");
+}
