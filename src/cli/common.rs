@@ -26,7 +26,7 @@ pub fn with_ranges(defaults: Vec<Entry>) -> impl FnMut(Arg) -> Arg {
 }
 
 /// Options for the device and the output files.
-#[derive(clap::Args)]
+#[derive(Clone, clap::Args)]
 pub struct Common {
     /// Device, by index or part of its name [default: the best one]
     #[arg(long, value_name = "NAME")]

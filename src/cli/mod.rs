@@ -14,6 +14,7 @@ pub mod overrides;
 pub mod profile;
 pub mod progress;
 pub mod render;
+pub mod sequence;
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -32,7 +33,7 @@ Exit codes:
   3    input: a file cannot be read or is damaged
   4    device or memory: no Vulkan, no usable device, it was lost, or memory is out
   5    output: a file cannot be written
-  6    some points of a measurement failed; the others are written
+  6    some points of a measurement, or frames of a sequence, failed; the others are written
   7    too noisy to say: compare --statistical finds no difference, but could have missed one, or profiles cannot be compared
   70   internal error: a bug, please report it
   130  interrupted (Ctrl-C)";
@@ -48,6 +49,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::Args>),
+    Sequence(Box<sequence::Args>),
     Filter(Box<filter::Args>),
     Compare(Box<compare::Args>),
     Cost(Box<cost::Args>),
@@ -64,7 +66,7 @@ pub enum Exit {
     Done = 0,
     /// A limit given by the user was exceeded, or what was to stay the same has changed.
     LimitExceeded = 1,
-    /// Some points of a measurement failed; the others were measured and written.
+    /// Some points of a measurement, or frames of a sequence, failed; the others are there.
     PartlyFailed = 6,
     /// A test found nothing, and would have missed what it was to find; or profiles cannot be compared.
     Undecided = 7,
@@ -102,6 +104,7 @@ fn parse(words: impl IntoIterator<Item = OsString>) -> std::result::Result<Cli, 
 fn run(command: Command) -> Result<Exit> {
     match command {
         Command::Render(args) => render::run(&args),
+        Command::Sequence(args) => sequence::run(&args),
         Command::Filter(args) => filter::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Cost(args) => cost::run(&args),
@@ -120,7 +123,7 @@ fn usage(e: &clap::Error) -> Result<Exit> {
     }
     if e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         return Err(Error::Usage(
-            "name a command: render, filter, compare, cost, merge, explain, profile or devices (see tallow --help)"
+            "name a command: render, sequence, filter, compare, cost, merge, explain, profile or devices (see tallow --help)"
                 .to_owned(),
         ));
     }

@@ -1,5 +1,5 @@
 //! `tallow render`: a scene becomes image files.
-mod outputs;
+pub mod outputs;
 mod shot;
 mod spans;
 mod summary;
@@ -17,10 +17,10 @@ use crate::image::{self, Film};
 use crate::memory;
 use crate::render::settings::{Allocate, Settings};
 use crate::render::{Checkpoint, Job, Outputs, Renderer, StopReason, all_effects, film};
-use crate::scene::{Scene, SceneFile};
+use crate::scene::{Loaded, Scene, SceneFile};
 use crate::statistics::BrokenSamples;
 use shot::Shot;
-use spans::Spans;
+pub use spans::Spans;
 use std::path::PathBuf;
 use std::time::Duration;
 use summary::{Outcome, report};
@@ -38,7 +38,7 @@ pub enum EffectChoice {
 /// Render a scene to image files
 ///
 /// Options override the settings of the scene file; defaults are for what it does not set.
-#[derive(clap::Args)]
+#[derive(Clone, clap::Args)]
 pub struct Args {
     /// Scene file (.toml, .gltf, .glb) or model (.obj)
     pub scene: PathBuf,
@@ -93,7 +93,7 @@ impl Args {
     }
 
     /// More than radiance is kept only where a file or a filter takes it.
-    fn wanted(&self) -> Outputs {
+    pub fn wanted(&self) -> Outputs {
         let layers = self.denoise.is_some()
             || self.checkpoint.is_some()
             || self.output_files().iter().any(|file| image::has_layers(file));
@@ -118,62 +118,94 @@ pub fn run(args: &Args) -> Result<Exit> {
     let gpu = host.time("open device", || args.common.open())?;
     check_room(args, &settings, &gpu)?;
     let renderer = host.time("upload and compile", || renderer(args, &gpu, &scene, &settings))?;
-    let noisy = args.denoise.map(|_| Noisy::of_film(&renderer)).transpose()?;
-    let pixel = args.pixel.map(|[x, y]| y * settings.width + x);
-    let job = Job { checkpoint: earlier.as_ref(), pixel, ..Job::new(&renderer) };
-    let shot = Shot { args, gpu: &gpu, job };
+    let taken = shoot(args, &gpu, &scene, &renderer, earlier.as_ref(), host)?;
+    // The film is all that is left to write and to filter, and large films need the memory.
+    drop(renderer);
+    taken.map_or(Ok(Exit::Interrupted), |mut taken| taken.finish(args))
+}
+
+/// A render that is over, and nowhere written yet.
+pub struct Taken<'a> {
+    outcome: Outcome<'a>,
+    noisy: Option<Noisy>,
+    files: Files,
+    checkpoint: Option<CheckpointFile>,
+}
+
+/// Takes the samples; none when it was interrupted before the first.
+///
+/// # Errors
+/// [`Error::Device`].
+pub fn shoot<'a>(
+    args: &Args,
+    gpu: &'a Gpu,
+    scene: &'a Scene,
+    renderer: &Renderer,
+    earlier: Option<&Checkpoint>,
+    mut host: Spans,
+) -> Result<Option<Taken<'a>>> {
+    let noisy = args.denoise.map(|_| Noisy::of_film(renderer)).transpose()?;
+    let pixel = args.pixel.map(|[x, y]| y * renderer.settings().width + x);
+    let job = Job { checkpoint: earlier, pixel, ..Job::new(renderer) };
+    let shot = Shot { args, gpu, job };
     let mut files = Files::new(args.resume.as_deref());
     let (status, checkpoint) = host.time("render", || shot.trace(&mut files))?;
     if status.stopped == StopReason::Interrupted && status.traced == 0 {
         complain("interrupted before the first sample: nothing was written");
-        return Ok(Exit::Interrupted);
+        return Ok(None);
     }
     status.broken_samples.iter().for_each(warn_of_broken);
     let seconds = host.seconds("render");
     let film = host.time("read back", || shot.film(&status, seconds))?;
     let counters = args.counters.then(|| renderer.counters()).transpose()?;
-    // The film is all that is left to write and to filter, and large films need the memory.
-    drop(renderer);
-    let outcome = Outcome { gpu: &gpu, scene: &scene, film, host, status, counters };
-    finish(args, outcome, noisy, files, checkpoint)
+    let outcome = Outcome { gpu, scene, film, host, status, counters };
+    Ok(Some(Taken { outcome, noisy, files, checkpoint }))
 }
 
-/// Writes what was rendered, filters it, and tells how it went.
-fn finish(
-    args: &Args,
-    mut outcome: Outcome,
-    noisy: Option<Noisy>,
-    mut files: Files,
-    checkpoint: Option<CheckpointFile>,
-) -> Result<Exit> {
-    let whole = outcome.status.stopped != StopReason::Interrupted;
-    let Outcome { gpu, film, host, status, .. } = &mut outcome;
-    let mut written = host.time("write", || Ok(outputs::save(args, film, &mut files, checkpoint, whole)))?;
-    // By now what took hours is safe, whatever becomes of the filter.
-    if let Some((method, noisy)) = args.denoise.zip(noisy).filter(|_| whole) {
-        let line = files.with_failures("interrupted: the noisy image was written, --denoise was not finished");
-        if interrupt::leave_at_once(&line) {
-            interrupt::leave(&line);
+impl Taken<'_> {
+    /// What was rendered, filtered once [`Taken::finish`] has done so.
+    pub fn film(&self) -> &Film {
+        &self.outcome.film
+    }
+
+    /// Writes what was rendered, filters it, and tells how it went.
+    ///
+    /// # Errors
+    /// Of every kind; an output that fails keeps no other from being written.
+    pub fn finish(&mut self, args: &Args) -> Result<Exit> {
+        let Self { outcome, noisy, files, checkpoint } = self;
+        let whole = outcome.status.stopped != StopReason::Interrupted;
+        let Outcome { gpu, film, host, status, .. } = &mut *outcome;
+        let mut written = host.time("write", || Ok(outputs::save(args, film, files, checkpoint.take(), whole)))?;
+        // By now what took hours is safe, whatever becomes of the filter.
+        if let Some((method, noisy)) = args.denoise.zip(noisy.take()).filter(|_| whole) {
+            let line = files.with_failures("interrupted: the noisy image was written, --denoise was not finished");
+            if interrupt::leave_at_once(&line) {
+                interrupt::leave(&line);
+            }
+            status.times.extend(host.time("denoise", || denoised(gpu, method, noisy, film))?);
+            host.time("write", || Ok(outputs::save(args, film, files, None, true)))?;
         }
-        status.times.extend(host.time("denoise", || denoised(gpu, method, noisy, film))?);
-        host.time("write", || Ok(outputs::save(args, film, &mut files, None, true)))?;
+        fail_on_messages(gpu)?;
+        let trace: Vec<_> = args.profile.iter().map(|path| host.item(path, gpu, &status.times)).collect();
+        files.save(&trace, whole);
+        written.extend(files.pipe(&outputs::items(args, film), whole));
+        files.pipe(&trace, whole);
+        report(args, &outcome.summary(&written))?;
+        files.failure().map_or(Ok(()), Err)?;
+        if !whole {
+            complain(&outputs::interruption(&written));
+            return Ok(Exit::Interrupted);
+        }
+        Ok(Exit::Done)
     }
-    fail_on_messages(gpu)?;
-    let trace: Vec<_> = args.profile.iter().map(|path| host.item(path, gpu, &status.times)).collect();
-    files.save(&trace, whole);
-    written.extend(files.pipe(&outputs::items(args, film), whole));
-    files.pipe(&trace, whole);
-    report(args, &outcome.summary(&written))?;
-    files.failure().map_or(Ok(()), Err)?;
-    if !whole {
-        complain(&outputs::interruption(&written));
-        return Ok(Exit::Interrupted);
-    }
-    Ok(Exit::Done)
 }
 
 /// The settings are checked before what may take long.
-fn load(args: &Args) -> Result<(Scene, Settings)> {
+///
+/// # Errors
+/// Of usage and input.
+pub fn load(args: &Args) -> Result<(Loaded, Settings)> {
     let mut file = SceneFile::open(&args.scene)?;
     args.camera.as_deref().map_or(Ok(()), |name| file.look_through(name))?;
     let mut settings = file.settings()?;
@@ -186,7 +218,7 @@ fn load(args: &Args) -> Result<(Scene, Settings)> {
         }
     }
     settings.validate()?;
-    Ok((file.load()?.scene, settings))
+    Ok((file.load()?, settings))
 }
 
 /// Parses a column and a row.
@@ -225,7 +257,10 @@ fn denoised(gpu: &Gpu, method: Method, noisy: Noisy, film: &mut Film) -> Result<
 }
 
 /// A system that is out of memory ends the process hours later without a word; what the filter cannot bind is told before, too.
-fn check_room(args: &Args, settings: &Settings, gpu: &Gpu) -> Result<()> {
+///
+/// # Errors
+/// [`Error::Device`].
+pub fn check_room(args: &Args, settings: &Settings, gpu: &Gpu) -> Result<()> {
     let (size, unified) = ([settings.width, settings.height], gpu.info().unified);
     let while_filtered = args.denoise.map_or(0, |method| denoise::host_bytes(method, settings, unified));
     let bytes = film::host_bytes(settings, unified).max(while_filtered);

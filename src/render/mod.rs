@@ -29,6 +29,6 @@ pub use merge::{Gap, Merged, merge};
 #[doc(hidden)] // a renderer tells its kernels; tests tell the same to their CPU twins
 pub use push::{frame_constants, priority_push};
 pub use renderer::*;
-pub use resume::Checkpoint;
+pub use resume::{Checkpoint, finished};
 pub use schedule::{Batch, Choice, PathRange, Plan, Progress, Share, Step};
 pub use views::{Layer, OutputView};

@@ -96,6 +96,19 @@ impl Renderer {
     }
 }
 
+/// The film of an EXR file that holds all samples of a render of this scene with these settings, and none else; `None` for any other
+/// file, or none.
+pub fn finished(path: &Path, scene: &Scene, settings: &Settings) -> Option<Film> {
+    let film = image::read(path).ok()?;
+    let rendered = Rendered::of(&film).ok()?;
+    check(&rendered.provenance, scene, settings).ok()?;
+    let done = match settings.allocate.is_even() {
+        true => rendered.pixels.iter().all(|pixel| pixel.stats.count == settings.spp),
+        false => rendered.pending.is_none(),
+    };
+    done.then_some(film)
+}
+
 /// Whether a render of this scene can go on where the file's ended.
 fn check(provenance: &Provenance, scene: &Scene, settings: &Settings) -> std::result::Result<(), String> {
     let uniform = settings.allocate.is_even();

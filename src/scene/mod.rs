@@ -8,12 +8,15 @@ use crate::layout::{AliasEntry, BvhNode, Camera, Instance, Light, Material, Shad
 use crate::layout::{LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT};
 use crate::scene::description::settings::Settings;
 use crate::threads;
+use animation::{Animation, Mover};
 use build::assemble::assemble;
 use description::Description;
 use load::gltf;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+pub mod animation;
 mod apply;
 mod build;
 mod change;
@@ -124,6 +127,8 @@ pub struct Loaded {
     pub scene: Scene,
     /// The file's settings over the defaults.
     pub settings: Settings,
+    /// What moves in the scene.
+    pub animation: Animation,
 }
 
 impl Loaded {
@@ -158,11 +163,14 @@ pub struct SceneFile<'a> {
     cameras: Vec<gltf::Named>,
     /// What was repaired or passed over so far.
     warnings: Vec<String>,
+    /// What the loader of the file makes move, besides the description's own tables.
+    movers: Vec<Arc<dyn Mover>>,
 }
 
 impl<'a> SceneFile<'a> {
     fn of(path: &Path, description: Cow<'a, Description>) -> Self {
-        Self { path: path.to_owned(), description, sky: false, cameras: Vec::new(), warnings: Vec::new() }
+        let (cameras, warnings, movers) = Default::default();
+        Self { path: path.to_owned(), description, sky: false, cameras, warnings, movers }
     }
 
     /// Reads a scene file (`.toml`, `.gltf`, `.glb`), or takes a model (`.obj`) for one.
@@ -189,7 +197,14 @@ impl<'a> SceneFile<'a> {
                 return Err(Error::input(path, format!("is no scene: \"{other}\" is none of toml, obj, gltf, glb")));
             }
         };
-        Ok(Self { path: path.to_owned(), description: Cow::Owned(description), sky, cameras, warnings })
+        Ok(Self {
+            path: path.to_owned(),
+            description: Cow::Owned(description),
+            sky,
+            cameras,
+            warnings,
+            movers: Vec::new(),
+        })
     }
 
     /// Looks through the camera of this name, which a glTF file holds.
@@ -234,11 +249,13 @@ impl<'a> SceneFile<'a> {
     pub fn load(&self) -> Result<Loaded> {
         let settings = self.settings()?;
         let mut scene = Scene { view: self.description.camera.clone(), ..Scene::default() };
-        threads::within(|| assemble(&self.path, &self.description, self.sky, &mut scene))?;
+        let description = animation::with_freed_meshes(&self.description);
+        threads::within(|| assemble(&self.path, &description, self.sky, &mut scene))?;
         scene.warnings.splice(0..0, self.warnings.iter().cloned());
         let camera = scene.view.build([settings.width, settings.height], scene.bounds);
         camera.map_err(|what| Error::input_at(&self.path, "[camera]", what))?;
-        Ok(Loaded { scene, settings })
+        let animation = animation::load(&self.path, &description, &self.movers, &scene)?;
+        Ok(Loaded { scene, settings, animation })
     }
 }
 

@@ -16,5 +16,6 @@ mod oidn;
 mod outputs;
 mod profile;
 mod resume_merge;
+mod sequence;
 mod signals;
 mod statistical;

@@ -1,4 +1,5 @@
 //! Tests scenes from files and from memory: their arrays, and the messages about mistakes.
+mod animation;
 #[path = "../support/command.rs"]
 #[allow(dead_code)]
 mod command;

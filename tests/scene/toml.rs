@@ -69,7 +69,7 @@ fn the_fingerprint_is_that_of_what_is_seen() {
 [environment]\nradiance = 0.1";
     let text = format!("{BOX}{more}");
     let of = |text: &str| {
-        let Loaded { scene, settings } = parse(text).unwrap();
+        let Loaded { scene, settings, .. } = parse(text).unwrap();
         scene.fingerprint([settings.width, settings.height]).unwrap()
     };
     for threads in [1, 2, 5] {

@@ -5,6 +5,7 @@
 //!
 //! An engine fills in the same tables for [`Scene::build`](super::Scene::build), with [`MeshTable::data`],
 //! [`Description::bitmap`] and [`EnvironmentTable::picture`] in place of files.
+pub(super) mod animation;
 pub(super) mod camera;
 pub(super) mod light;
 pub(super) mod material;
@@ -14,12 +15,15 @@ pub(super) mod texture;
 pub(super) mod value;
 
 pub mod settings;
+pub use animation::{AnimationTable, Interpolation, Key, Numbers, numbered};
+pub(super) use animation::{mesh_number, meshes_to_free};
 pub use camera::{Camera, FovAxis};
 pub use light::{LightTable, Type as LightType};
 pub use material::{AlphaMode, Distribution, MaterialTable, Type as MaterialType};
 pub use mesh::{Bitmap, Mesh};
 pub use shape::Shape;
 pub use texture::{TextureFilter, TextureTable, Wrap};
+pub(super) use value::rotation;
 pub use value::{Rgb, Transform};
 
 use crate::error::{Error, Result};
@@ -51,6 +55,8 @@ pub struct Description {
     pub material: Vec<MaterialTable>,
     /// Point, spot and directional lights.
     pub light: Vec<LightTable>,
+    /// What moves, and when.
+    pub animation: Vec<AnimationTable>,
     /// Textures in memory, which materials name as they name files.
     #[serde(skip)]
     pub bitmap: Vec<Bitmap>,

@@ -54,18 +54,25 @@ struct Rotation(DQuat);
 
 impl<'de> Deserialize<'de> for Rotation {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let v = Vec::<f64>::deserialize(deserializer)?;
-        match v[..] {
-            [x, y, z] => {
-                let [x, y, z] = [x, y, z].map(f64::to_radians);
-                Ok(Self(DQuat::from_euler(EulerRot::ZYX, z, y, x)))
-            }
-            [x, y, z, angle] => match DVec3::new(x, y, z).try_normalize() {
-                Some(axis) => Ok(Self(DQuat::from_axis_angle(axis, angle.to_radians()))),
-                None => Err(D::Error::custom("the axis of rotate is zero")),
-            },
-            _ => Err(D::Error::custom(format!("rotate takes 3 angles or axis and angle, not {} numbers", v.len()))),
+        rotation(&Vec::<f64>::deserialize(deserializer)?).map(Self).map_err(D::Error::custom)
+    }
+}
+
+/// The rotation of three angles in degrees, or of an axis and an angle.
+///
+/// # Errors
+/// A sentence about other numbers.
+pub fn rotation(v: &[f64]) -> Result<DQuat, String> {
+    match *v {
+        [x, y, z] => {
+            let [x, y, z] = [x, y, z].map(f64::to_radians);
+            Ok(DQuat::from_euler(EulerRot::ZYX, z, y, x))
         }
+        [x, y, z, angle] => match DVec3::new(x, y, z).try_normalize() {
+            Some(axis) => Ok(DQuat::from_axis_angle(axis, angle.to_radians())),
+            None => Err("the axis of rotate is zero".to_owned()),
+        },
+        _ => Err(format!("rotate takes 3 angles or axis and angle, not {} numbers", v.len())),
     }
 }
 

@@ -40,7 +40,7 @@ pub struct Row {
 /// Renders a view at every number of samples, filters it, and draws what came out.
 pub fn of_view(gpu: &Gpu, args: &Args, view: &'static View, contenders: &[Contender]) -> Result<Vec<Row>> {
     let file = view.scene_file(args.data.as_deref(), &args.output.join("scenes"))?;
-    let Loaded { scene, settings } = Scene::load(&file)?;
+    let Loaded { scene, settings, .. } = Scene::load(&file)?;
     let folder = args.references.clone().unwrap_or_else(|| args.output.join("references"));
     std::fs::create_dir_all(&folder)?;
     let of_reference = Settings { spp: args.reference_spp, ..settings.clone() };

@@ -1,0 +1,193 @@
+//! `tallow sequence`: a scene becomes the frames of an animation.
+mod preview;
+mod range;
+mod stage;
+
+use super::render::{self, outputs};
+use super::{Exit, complain, fail_on_messages, finite, print, print_json};
+use crate::error::{Error, Result};
+use crate::scene::description::numbered;
+use preview::Preview;
+use serde::Serialize;
+use stage::Stage;
+use std::ops::Range;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// Render the frames of an animation
+///
+/// Frame n shows the scene n / fps seconds after the start of its [[animation]] tables. Files have `####` for the number of the
+/// frame, with that many digits. A frame whose .exr file holds all samples of this scene, pose and settings is not rendered
+/// again. A frame that fails does not stop the others: the exit code is 6 then.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Frames: 0..96 are 96 frames, 0..=96 one more, 7 is one
+    #[arg(long, value_name = "FIRST..END", value_parser = range::parse)]
+    pub frames: Range<u32>,
+    /// Of them, render only these; what they show stays the same
+    #[arg(long, value_name = "FIRST..END", value_parser = range::parse)]
+    pub only: Option<Range<u32>>,
+    /// Frames per second
+    #[arg(long, default_value = "24", value_parser = finite)]
+    pub fps: f64,
+    /// Give each frame random numbers of its own (the seed plus its number), for those who average over frames. With one seed for
+    /// all, noise stands still where nothing moves
+    #[arg(long)]
+    pub seed_per_frame: bool,
+    /// Turn the camera about what it looks at, by so many degrees over all of --frames
+    #[arg(long, value_name = "DEGREES", value_parser = finite)]
+    pub turntable: Option<f64>,
+    /// Write a small animated .gif of all frames
+    #[arg(long, value_name = "FILE")]
+    pub preview: Option<PathBuf>,
+    /// Render finished frames again
+    #[arg(long)]
+    pub again: bool,
+    /// How each frame is rendered.
+    #[command(flatten)]
+    pub render: render::Args,
+}
+
+impl Args {
+    /// The options of one frame, whose files have its number.
+    fn of_frame(&self, number: u32) -> Result<render::Args> {
+        let mut args = self.render.clone();
+        let default = || self.render.scene.with_extension("").file_name().map(|s| s.to_string_lossy().into_owned());
+        if args.outputs.is_empty() {
+            args.outputs = vec![format!("{}.####.exr", default().unwrap_or_else(|| "frame".to_owned())).into()];
+        }
+        let files = args.outputs.iter_mut().chain(&mut args.heatmap).chain(&mut args.profile);
+        for file in files {
+            let name = numbered(&file.to_string_lossy(), number).ok_or_else(|| {
+                let stem = file.with_extension("");
+                let example = format!("{}.####.{}", stem.display(), file.extension().unwrap_or_default().display());
+                Error::Usage(format!(
+                    "{}: every frame would be written there: choose a name as {example}",
+                    file.display()
+                ))
+            })?;
+            *file = name.into();
+        }
+        (args.common.quiet, args.common.json) = (true, false);
+        Ok(args)
+    }
+
+    /// Numbers of the frames to render, in order.
+    fn numbers(&self) -> Range<u32> {
+        let only = self.only.as_ref().unwrap_or(&self.frames);
+        only.start.max(self.frames.start)..only.end.min(self.frames.end)
+    }
+
+    fn check(&self) -> Result<()> {
+        let of_one = [("--resume", self.render.resume.is_some()), ("--pixel", self.render.pixel.is_some())];
+        if let Some((option, _)) = of_one.iter().find(|(_, given)| *given) {
+            return Err(Error::Usage(format!(
+                "{option} is for one image: a sequence goes on where it stopped by itself"
+            )));
+        }
+        if !(self.fps > 0.0 && self.fps <= 1e6) {
+            return Err(Error::Usage(format!("--fps {}: choose a number above 0", self.fps)));
+        }
+        if self.numbers().is_empty() {
+            return Err(Error::Usage("none of the frames is in --frames and --only: 0..96 are 96 frames".to_owned()));
+        }
+        self.preview.iter().try_for_each(|path| preview::check(path))?;
+        outputs::check(&self.of_frame(self.numbers().start)?)
+    }
+}
+
+/// What became of a frame.
+#[derive(Clone, Debug, Serialize)]
+pub struct FrameReport {
+    /// Its number.
+    pub frame: u32,
+    /// Whether it was found finished.
+    pub skipped: bool,
+    /// Why it failed, if it did.
+    pub error: Option<String>,
+    /// Wall time of all that was done for it.
+    pub seconds: f64,
+    /// Wall time of moving the scene: hierarchies, lights, what is uploaded.
+    pub pose_seconds: f64,
+    /// What rays pay in the worst of the refitted hierarchies over when that was built; none when nothing is deformed.
+    pub refit_cost: Option<f32>,
+    /// Meshes whose hierarchies were built anew.
+    pub rebuilt: usize,
+}
+
+/// What `--json` prints.
+#[derive(Clone, Debug, Serialize)]
+struct Summary {
+    frames: Vec<FrameReport>,
+    failed: usize,
+    seconds: f64,
+    device: String,
+}
+
+/// Runs the subcommand.
+///
+/// # Errors
+/// What fails before the first frame, and the loss of the device.
+pub fn run(args: &Args) -> Result<Exit> {
+    args.check()?;
+    let begun = Instant::now();
+    let mut stage = Stage::new(args)?;
+    let mut preview = args.preview.as_ref().map(|_| Preview::default());
+    let (numbers, mut reports) = (args.numbers(), Vec::new());
+    for number in numbers.clone() {
+        let frame = stage.frame(number, preview.as_mut());
+        if let Err(error @ Error::DeviceLost(_)) = frame.result {
+            return Err(error);
+        }
+        if matches!(frame.result, Ok(Exit::Interrupted)) {
+            return Ok(Exit::Interrupted);
+        }
+        let report = frame.report();
+        tell(args, &report, numbers.end - number - 1, &reports);
+        reports.push(report);
+    }
+    if let (Some(preview), Some(path)) = (&preview, &args.preview) {
+        preview.write(path, args.fps)?;
+    }
+    fail_on_messages(stage.gpu())?;
+    let failed = reports.iter().filter(|report| report.error.is_some()).count();
+    let (seconds, device) = (begun.elapsed().as_secs_f64(), stage.gpu().info().name.clone());
+    if args.render.common.json {
+        print_json(&Summary { frames: reports, failed, seconds, device })?;
+    }
+    Ok(if failed == 0 { Exit::Done } else { Exit::PartlyFailed })
+}
+
+/// One line for a frame; a failure is always told.
+fn tell(args: &Args, report: &FrameReport, left: u32, before: &[FrameReport]) {
+    if let Some(error) = &report.error {
+        complain(&format!("error: frame {}: {error}", report.frame));
+        return;
+    }
+    if !args.render.common.talkative() {
+        return;
+    }
+    let rendered: Vec<f64> = before.iter().chain([report]).filter(|r| !r.skipped).map(|r| r.seconds).collect();
+    let mean = rendered.iter().sum::<f64>() / rendered.len().max(1) as f64;
+    let rest = match left {
+        0 => String::new(),
+        n => format!("; {n} more, {} left", clock(mean * f64::from(n))),
+    };
+    let did = match (report.skipped, report.rebuilt) {
+        (true, _) => "is finished".to_owned(),
+        (false, 0) => format!("{:.2} s", report.seconds),
+        (false, n) => format!("{:.2} s, {n} hierarchies built anew", report.seconds),
+    };
+    // A closed stdout ends no sequence.
+    let _ = print(&format!("frame {}: {did}{rest}\n", report.frame));
+}
+
+/// Hours, minutes and seconds.
+fn clock(seconds: f64) -> String {
+    let whole = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX).as_secs();
+    match whole {
+        0..60 => format!("{whole} s"),
+        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
+        _ => format!("{} h {:02} min", whole / 3600, whole / 60 % 60),
+    }
+}

@@ -1,0 +1,183 @@
+//! What a sequence keeps from frame to frame: the scene, its motion, and the renderer.
+use super::preview::Preview;
+use super::{Args, FrameReport};
+use crate::cli::render::{self, EffectChoice, Spans, outputs};
+use crate::cli::{Exit, complain};
+use crate::error::{Error, Result};
+use crate::gpu::{FrameResources, Gpu};
+
+use crate::image::{self, Film, NOISY};
+use crate::layout::{Effect, Effects};
+use crate::render::settings::Settings;
+use crate::render::{Renderer, all_effects, called_for, finished};
+use crate::scene::animation::{Animation, Turntable};
+use crate::scene::{Change, Loaded, Scene};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// All that is kept.
+pub struct Stage<'a> {
+    args: &'a Args,
+    gpu: Gpu,
+    scene: Scene,
+    animation: Animation,
+    settings: Settings,
+    /// Effects of the scene as it was loaded. Whether lamps are sampled as large ones is decided by that alone, so that a frame
+    /// has the same bits whichever came before.
+    rest: Effects,
+    renderer: Option<Renderer>,
+    /// What the renderer has not been told of.
+    change: Change,
+}
+
+/// A frame that is over.
+pub struct FrameEnd {
+    number: u32,
+    skipped: bool,
+    seconds: f64,
+    pose_seconds: f64,
+    refit_cost: Option<f32>,
+    rebuilt: usize,
+    /// How it ended.
+    pub result: Result<Exit>,
+}
+
+impl FrameEnd {
+    /// In words and numbers.
+    pub fn report(self) -> FrameReport {
+        FrameReport {
+            frame: self.number,
+            skipped: self.skipped,
+            error: self.result.err().map(|e| e.to_string()),
+            seconds: self.seconds,
+            pose_seconds: self.pose_seconds,
+            refit_cost: self.refit_cost,
+            rebuilt: self.rebuilt,
+        }
+    }
+}
+
+impl<'a> Stage<'a> {
+    /// Loads the scene and opens the device.
+    ///
+    /// # Errors
+    /// Of every kind.
+    pub fn new(args: &'a Args) -> Result<Self> {
+        let (Loaded { scene, mut animation, .. }, settings) = render::load(&args.render)?;
+        if args.render.common.talkative() {
+            scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
+        }
+        if let Some(degrees) = args.turntable {
+            let size = [settings.width, settings.height];
+            let period = f64::from(args.frames.end) / args.fps;
+            animation.movers.push(Arc::new(Turntable::new(&scene, size, degrees, period)));
+        }
+        if animation.is_empty() && args.render.common.talkative() {
+            complain(
+                "warning: nothing moves in the scene: all frames are alike (add [[animation]] tables, or --turntable)",
+            );
+        }
+        let gpu = args.render.common.open()?;
+        render::check_room(&args.render, &settings, &gpu)?;
+        let rest = called_for(&scene, &settings, args.render.wanted());
+        Ok(Self { args, gpu, scene, animation, settings, rest, renderer: None, change: Change::default() })
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Renders a frame, if it is not finished. Nothing that fails here keeps later frames from being rendered.
+    pub fn frame(&mut self, number: u32, preview: Option<&mut Preview>) -> FrameEnd {
+        let begun = Instant::now();
+        let (pose_seconds, refit_cost, rebuilt, result) = (0.0, None, 0, Ok(Exit::Done));
+        let mut end = FrameEnd { number, skipped: false, seconds: 0.0, pose_seconds, refit_cost, rebuilt, result };
+        end.result = self.try_frame(number, preview, &mut end);
+        end.seconds = begun.elapsed().as_secs_f64();
+        end
+    }
+
+    fn try_frame(&mut self, number: u32, preview: Option<&mut Preview>, end: &mut FrameEnd) -> Result<Exit> {
+        let args = self.args.of_frame(number)?;
+        let mut settings = self.settings.clone();
+        if self.args.seed_per_frame {
+            settings.seed = settings.seed.wrapping_add(number);
+        }
+        let begun = Instant::now();
+        self.pose(number, end)?;
+        end.pose_seconds = begun.elapsed().as_secs_f64();
+        if let Some(film) = self.finished_film(&args, &settings).filter(|_| !self.args.again) {
+            end.skipped = true;
+            return show(preview, &film, &args).map(|()| Exit::Done);
+        }
+        outputs::check(&args)?;
+        let begun = Instant::now();
+        self.prepare(&settings)?;
+        end.pose_seconds += begun.elapsed().as_secs_f64();
+        let renderer = self.renderer.as_ref().ok_or_else(|| Error::Usage("there is no renderer".into()))?;
+        let shot = render::shoot(&args, &self.gpu, &self.scene, renderer, None, Spans::default())?;
+        let Some(mut shot) = shot else { return Ok(Exit::Interrupted) };
+        let exit = shot.finish(&args)?;
+        if exit == Exit::Done {
+            show(preview, shot.film(), &args)?;
+        }
+        Ok(exit)
+    }
+
+    /// Moves the scene to where it is in a frame.
+    fn pose(&mut self, number: u32, end: &mut FrameEnd) -> Result<()> {
+        let pose = self.animation.at(f64::from(number) / self.args.fps)?;
+        let change = self.scene.apply(&pose)?;
+        end.refit_cost = change.deformed.iter().map(|d| d.cost).reduce(f32::max);
+        end.rebuilt = change.deformed.iter().filter(|d| d.rebuilt).count();
+        self.change.add(change);
+        Ok(())
+    }
+
+    /// Tells the renderer of what has changed, or makes one with the effects that this frame calls for too.
+    fn prepare(&mut self, settings: &Settings) -> Result<()> {
+        if let Some(renderer) = &mut self.renderer {
+            renderer.set_seed(settings.seed);
+            let (scene, change) = (&self.scene, &self.change);
+            let mut frame = FrameResources::new(&self.gpu)?;
+            match self.gpu.run(&mut frame, |rec| renderer.update(rec, scene, change)) {
+                Err(Error::Usage(_)) => self.renderer = None,
+                other => {
+                    other?;
+                    self.change = Change::default();
+                    return Ok(());
+                }
+            }
+        }
+        let wanted = self.args.render.wanted();
+        let effects = match self.args.render.effects {
+            EffectChoice::All => all_effects(&self.scene, settings),
+            EffectChoice::Auto => self.union(called_for(&self.scene, settings, wanted)),
+        };
+        let effects = Effects { large_lamps: self.rest.large_lamps, ..effects };
+        self.renderer = Some(Renderer::specialised(&self.gpu, &self.scene, settings, wanted, effects)?);
+        (self.rest, self.change) = (effects, Change::default());
+        Ok(())
+    }
+
+    /// Effects of now and of all frames so far.
+    fn union(&self, now: Effects) -> Effects {
+        let lacks = self.rest.switches().into_iter().zip(now.switches()).map(|(rest, now)| rest && !now);
+        Effect::ALL.iter().zip(lacks).filter(|(_, lacks)| *lacks).fold(now, |all, (effect, _)| all.toggled(*effect))
+    }
+
+    /// The film of a frame that an earlier run has finished, by what its first file with all layers holds.
+    fn finished_film(&self, args: &render::Args, settings: &Settings) -> Option<Film> {
+        let files = args.output_files();
+        let first = files.iter().find(|path| image::has_layers(path))?;
+        let film = finished(first, &self.scene, settings)?;
+        let filtered = film.channels.iter().any(|channel| channel.name.starts_with(NOISY));
+        (files.iter().all(|path| path.exists()) && filtered == args.denoise.is_some()).then_some(film)
+    }
+}
+
+fn show(preview: Option<&mut Preview>, film: &Film, args: &render::Args) -> Result<()> {
+    let Some(preview) = preview else { return Ok(()) };
+    preview.add(film, &args.common.write_options()).map_err(|what| Error::Usage(format!("--preview: {what}")))
+}

@@ -1,0 +1,201 @@
+//! Makes movers of the `[[animation]]` tables.
+use super::curve::Curve;
+use super::frames::Frames;
+use super::keyed::{Keyed, Target, parts};
+use super::{Animation, Mover};
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+use crate::scene::description::{
+    self, AnimationTable, Description, Interpolation, mesh_number, meshes_to_free, numbered, rotation,
+};
+use crate::scene::description::{Key, Transform};
+use glam::DAffine3;
+use std::borrow::Cow;
+use std::collections::HashSet;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+
+type Checked<T> = std::result::Result<T, String>;
+
+/// The description whose meshes are stored apart where an animation moves them.
+pub fn with_freed_meshes(description: &Description) -> Cow<'_, Description> {
+    let mut freed = Cow::Borrowed(description);
+    for (number, file) in meshes_to_free(description) {
+        let mesh = &mut freed.to_mut().mesh[number];
+        mesh.moving = true;
+        mesh.file = file.or(mesh.file.take());
+    }
+    freed
+}
+
+/// The movers of a scene file's tables, after those that its loader has.
+///
+/// # Errors
+/// [`Error::Input`] with the table at fault.
+pub fn load(path: &Path, description: &Description, movers: &[Arc<dyn Mover>], scene: &Scene) -> Result<Animation> {
+    let mut animation = Animation { movers: movers.to_vec() };
+    let mut moved = HashSet::new();
+    for (number, table) in (1..).zip(&description.animation) {
+        let place = format!("animation {number}");
+        let at = |what: String| Error::input_at(path, &place, what);
+        let (what, mover) = mover(path, table, description, scene).map_err(at)?;
+        if !moved.insert(what.clone()) {
+            return Err(at(format!("{what} is moved by an earlier table: put all keys into one")));
+        }
+        animation.movers.push(mover);
+    }
+    Ok(animation)
+}
+
+fn mover(path: &Path, table: &AnimationTable, from: &Description, scene: &Scene) -> Checked<(String, Arc<dyn Mover>)> {
+    let targets = [&table.instance, &table.light, &table.material, &table.mesh].map(Option::is_some);
+    let count = targets.into_iter().chain([table.camera, table.environment]).filter(|on| *on).count();
+    if count != 1 {
+        return Err("needs one of camera, instance, light, material, environment and mesh".to_owned());
+    }
+    if let Some(name) = &table.mesh {
+        let number = scene.rig.mesh(name).ok_or_else(|| unknown("mesh", name, from.mesh.iter().map(|m| &m.name)))?;
+        return Ok((format!("mesh \"{name}\""), Arc::new(frames(path, table, from, number)?)));
+    }
+    if table.file.is_some() {
+        return Err("has a file, which is for a mesh".to_owned());
+    }
+    let (what, target) = target(table, from, scene)?;
+    let curves = curves(table, &target)?;
+    Ok((what, Arc::new(Keyed { target, curves })))
+}
+
+fn target(table: &AnimationTable, from: &Description, scene: &Scene) -> Checked<(String, Target)> {
+    if table.camera {
+        return Ok(("the camera".to_owned(), Target::Camera(from.camera.clone())));
+    }
+    if let Some(name) = &table.instance {
+        let names = from.instance.iter().map(|i| &i.name).chain(from.mesh.iter().map(|m| &m.name));
+        let number = scene.rig.placement(name).ok_or_else(|| unknown("instance", name, names))?;
+        let rest = match from.instance.get(number) {
+            Some(instance) => instance.transform.0,
+            None => mesh_number(from, name).map_or(DAffine3::IDENTITY, |number| from.mesh[number].transform.0),
+        };
+        return Ok((format!("instance \"{name}\""), Target::Placement(number, rest)));
+    }
+    if let Some(name) = &table.light {
+        let found = scene.rig.light(name).ok_or_else(|| unknown("light", name, from.light.iter().map(|l| &l.name)))?;
+        return Ok((format!("light \"{name}\""), Target::Light(found, from.light[found].clone())));
+    }
+    if let Some(name) = &table.material {
+        let all: Vec<_> = scene.names.materials.iter().map(|name| Some(name.clone())).collect();
+        let found = scene.names.materials.iter().position(|n| n == name);
+        let found = found.ok_or_else(|| unknown("material", name, all.iter()))?;
+        return Ok((format!("material \"{name}\""), Target::Material(found)));
+    }
+    match from.environment {
+        Some(_) => Ok(("the environment".to_owned(), Target::Environment)),
+        None => Err("there is no [environment]".to_owned()),
+    }
+}
+
+fn unknown<'a>(kind: &str, name: &str, known: impl Iterator<Item = &'a Option<String>>) -> String {
+    let near = description::nearest(name, known.flatten().map(String::as_str)).unwrap_or("(none has a name)");
+    format!("no {kind} \"{name}\" that can be moved: did you mean \"{near}\"?")
+}
+
+fn curves(table: &AnimationTable, target: &Target) -> Checked<Vec<(&'static str, Curve)>> {
+    if table.keys.is_empty() {
+        return Err("has no keys".to_owned());
+    }
+    let times: Vec<_> = table.keys.iter().map(|key| (key.time, Vec::new())).collect();
+    let end = Curve::new(times, Interpolation::Step, false)?.end();
+    for (number, key) in (1..).zip(&table.keys) {
+        check(key, target).map_err(|what| format!("key {number}, at {}: {what}", key.time))?;
+    }
+    let mut curves = Vec::new();
+    for &(name, counts) in target.channels() {
+        let of = |key: &Key| Some((key.time, widened(key.values.get(name)?.list(), counts)));
+        let keys: Vec<_> = table.keys.iter().filter_map(of).collect();
+        if !keys.is_empty() {
+            add(name, keys, table.interpolation, &mut curves)?;
+        }
+    }
+    let repeated = |(name, curve): (_, Curve)| (name, if table.repeat { curve.repeated(end) } else { curve });
+    Ok(curves.into_iter().map(repeated).collect())
+}
+
+/// One number where three may stand counts for all of them.
+fn widened(values: Vec<f64>, counts: &[usize]) -> Vec<f64> {
+    if counts == [3, 1] && values.len() == 1 { vec![values[0]; 3] } else { values }
+}
+
+/// Rotations become quaternions; and so do those in matrices without shear, which would shrink on the way.
+fn add(
+    name: &'static str,
+    keys: Vec<(f64, Vec<f64>)>,
+    interpolation: Interpolation,
+    curves: &mut Vec<(&'static str, Curve)>,
+) -> Checked<()> {
+    if name == "rotate" {
+        let turned = |(time, v): &(f64, Vec<f64>)| Ok((*time, rotation(v)?.to_array().to_vec()));
+        let keys = keys.iter().map(turned).collect::<Checked<Vec<_>>>()?;
+        curves.push((name, Curve::new(keys, interpolation, true)?));
+        return Ok(());
+    }
+    let matrix = |(_, v): &(f64, Vec<f64>)| Some(Transform::from(<[f64; 16]>::try_from(&v[..]).ok()?).0);
+    let split: Option<Vec<_>> = keys.iter().map(|key| parts(&matrix(key)?)).collect();
+    match split.filter(|_| name == "transform" && interpolation == Interpolation::Linear) {
+        Some(split) => {
+            let of = |value: &dyn Fn(usize) -> Vec<f64>| (0..keys.len()).map(|i| (keys[i].0, value(i))).collect();
+            let scale = Curve::new(of(&|i| split[i].0.to_array().to_vec()), interpolation, false)?;
+            let turn = Curve::new(of(&|i| split[i].1.to_array().to_vec()), interpolation, true)?;
+            let shift = Curve::new(of(&|i| split[i].2.to_array().to_vec()), interpolation, false)?;
+            curves.extend([("scale", scale), ("rotate", turn), ("translate", shift)]);
+        }
+        None => curves.push((name, Curve::new(keys, interpolation, false)?)),
+    }
+    Ok(())
+}
+
+/// Checks that a key says what the target has, in as many numbers.
+fn check(key: &Key, target: &Target) -> Checked<()> {
+    let channels = target.channels();
+    for (name, numbers) in &key.values {
+        let Some((_, counts)) = channels.iter().find(|(known, _)| known == name) else {
+            let known: Vec<_> = channels.iter().map(|(known, _)| *known).collect();
+            return Err(format!("unknown key \"{name}\": choose from {}", known.join(", ")));
+        };
+        let count = numbers.list().len();
+        if !counts.contains(&count) {
+            return Err(format!("{name} has {count} numbers, not {}", counts[0]));
+        }
+        if name == "transform" && numbers.list()[12..] != [0.0, 0.0, 0.0, 1.0] {
+            return Err("the last row of transform is not 0 0 0 1".to_owned());
+        }
+    }
+    let splits = ["translate", "rotate", "scale"].iter().any(|name| key.values.contains_key(*name));
+    match splits && key.values.contains_key("transform") {
+        true => Err("has a transform and parts of one: choose".to_owned()),
+        false => Ok(()),
+    }
+}
+
+fn frames(path: &Path, table: &AnimationTable, from: &Description, mesh: usize) -> Checked<Frames> {
+    let file =
+        table.file.as_ref().ok_or("deforms a mesh, which takes a file of every pose: file = \"pose.####.obj\"")?;
+    let pattern = path.parent().unwrap_or(Path::new("")).join(file.to_string_lossy().replace('\\', "/"));
+    let fps = table.fps.unwrap_or(24.0);
+    if !table.keys.is_empty() {
+        return Err("has keys and files: choose".to_owned());
+    }
+    if !(fps > 0.0 && fps <= 1e6) {
+        return Err(format!("fps is {fps}: choose a number above 0"));
+    }
+    if table.last < table.first || numbered(&pattern.to_string_lossy(), 0).is_none() {
+        let [first, last] = [table.first, table.last];
+        return Err(format!(
+            "file \"{}\", {first} to {last}: give `#` for the number, and a last that is no less",
+            file.display()
+        ));
+    }
+    let count = (table.last - table.first).saturating_add(1);
+    let (first, interpolation, repeat) = (table.first, table.interpolation, table.repeat);
+    let (table, read) = (from.mesh[mesh].clone(), Mutex::default());
+    Ok(Frames { mesh, table, pattern, first, count, fps, interpolation, repeat, read })
+}

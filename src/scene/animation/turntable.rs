@@ -1,0 +1,54 @@
+//! A camera that goes around what it looks at.
+use super::Mover;
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+use crate::scene::description::Camera;
+use crate::scene::pose::Pose;
+use glam::{DQuat, DVec3, Vec3};
+
+/// Turns the camera about its target, or the middle of the scene, around its `up`: the whole of `degrees` in `period` seconds,
+/// counter-clockwise seen from above. Where others move the camera, it turns what they make of it: let it be the last mover.
+#[derive(Clone, Debug)]
+pub struct Turntable {
+    camera: Camera,
+    bounds: [[f32; 3]; 2],
+    size: [u32; 2],
+    degrees: f64,
+    period: f64,
+}
+
+impl Turntable {
+    /// Around a scene as it is now, for a film of (width, height) pixels.
+    pub fn new(scene: &Scene, size: [u32; 2], degrees: f64, period: f64) -> Self {
+        Self { camera: scene.view.clone(), bounds: scene.bounds, size, degrees, period }
+    }
+
+    fn turned(&self, camera: &Camera, angle: f64) -> std::result::Result<Camera, String> {
+        let built = camera.build(self.size, self.bounds)?;
+        let [low, high] = self.bounds.map(|b| DVec3::from(b.map(f64::from)));
+        let pivot = camera.target.map_or((low + high) / 2.0, DVec3::from);
+        let around = camera.up.and_then(|up| DVec3::from(up).try_normalize()).unwrap_or(DVec3::Y);
+        let turn = DQuat::from_axis_angle(around, angle);
+        let axis = |v: [f32; 3]| turn * Vec3::from(v).as_dvec3().normalize();
+        let (x, y, z) = (axis(built.right), axis(built.up), -axis(built.forward));
+        let p = pivot + turn * (Vec3::from(built.position).as_dvec3() - pivot);
+        #[rustfmt::skip]
+        let rows = [x.x, y.x, z.x, p.x, x.y, y.y, z.y, p.y, x.z, y.z, z.z, p.z, 0.0, 0.0, 0.0, 1.0];
+        Ok(Camera { world_from_camera: Some(rows), focus_distance: Some(built.focus_distance), ..camera.clone() })
+    }
+}
+
+impl Mover for Turntable {
+    fn pose(&self, seconds: f64, pose: &mut Pose) -> Result<()> {
+        let camera = pose.camera.as_ref().unwrap_or(&self.camera);
+        let angle = (self.degrees * seconds / self.period).to_radians();
+        let turned =
+            self.turned(camera, angle).map_err(|what| Error::Usage(format!("the turntable's camera: {what}")))?;
+        pose.camera = Some(turned);
+        Ok(())
+    }
+
+    fn end(&self) -> f64 {
+        self.period
+    }
+}

@@ -1,0 +1,99 @@
+//! Tests of `tallow sequence`: frames alone and in a row, finished ones, and those that fail.
+use crate::command::{stdout, tallow};
+use std::fs;
+use std::process::Output;
+use tallow::image::{self, Film, Samples};
+use tempfile::TempDir;
+
+const SMALL: &str = "--width 40 --height 25 --spp 2";
+
+fn stage() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/moving/scene.toml");
+    fs::copy(scene, folder.path().join("s.toml")).unwrap();
+    folder
+}
+
+fn run(folder: &TempDir, words: &str) -> Output {
+    let all = format!("sequence s.toml {SMALL} {words}");
+    tallow(folder, &all.split_whitespace().collect::<Vec<_>>())
+}
+
+fn well(folder: &TempDir, words: &str) -> String {
+    let output = run(folder, words);
+    assert!(output.status.success() && output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+    stdout(&output)
+}
+
+/// Bits of all channels.
+fn bits(folder: &TempDir, file: &str) -> Vec<(String, Vec<u32>)> {
+    let Film { channels, .. } = image::read(&folder.path().join(file)).unwrap();
+    let bits = |samples: Samples| match samples {
+        Samples::F32(values) => values.into_iter().map(f32::to_bits).collect(),
+        Samples::U32(values) => values,
+    };
+    channels.into_iter().map(|c| (c.name, bits(c.samples))).collect()
+}
+
+#[test]
+fn a_frame_alone_is_that_of_the_sequence_and_a_finished_one_is_kept() {
+    let folder = stage();
+    let told = well(&folder, "--frames 0..48 --only 9..=12 --fps 6 -o a.####.exr --preview a.gif");
+    assert!(told.contains("frame 12: ") && told.contains("3 more"), "{told}");
+    well(&folder, "--frames 0..48 --only 12 --fps 6 -o b.##.exr");
+    assert!(bits(&folder, "a.0012.exr") == bits(&folder, "b.12.exr"), "frame 12 alone");
+    assert!(bits(&folder, "a.0012.exr") != bits(&folder, "a.0011.exr"), "control");
+    let gif = fs::read(folder.path().join("a.gif")).unwrap();
+    assert!(gif.starts_with(b"GIF89a") && gif.len() > 2000);
+    // What was finished is kept, what is damaged or of other settings is not.
+    let made = |file: &str| fs::metadata(folder.path().join(file)).unwrap().modified().unwrap();
+    let before = made("a.0010.exr");
+    fs::write(folder.path().join("a.0011.exr"), "cut").unwrap();
+    let told = well(&folder, "--frames 0..48 --only 9..=12 --fps 6 -o a.####.exr");
+    assert!(told.contains("frame 10: is finished") && !told.contains("frame 11: is finished"), "{told}");
+    assert_eq!(made("a.0010.exr"), before);
+    let told = well(&folder, "--frames 0..48 --only 10 --fps 12 -o a.####.exr");
+    assert!(!told.contains("is finished"), "at another time the scene is another: {told}");
+    let told = well(&folder, "--frames 0..48 --only 9 --fps 6 --seed-per-frame -o a.####.exr");
+    assert!(!told.contains("is finished"), "{told}");
+}
+
+#[test]
+fn a_turntable_comes_around() {
+    let folder = stage();
+    let scene = fs::read_to_string(folder.path().join("s.toml")).unwrap();
+    fs::write(folder.path().join("s.toml"), scene.split("[[animation]]").next().unwrap()).unwrap();
+    well(&folder, "--frames 0..4 --turntable 360 -o t.#.exr --denoise none --quiet");
+    let all: Vec<_> = (0..4).map(|n| bits(&folder, &format!("t.{n}.exr"))).collect();
+    assert!((1..4).all(|n| all[n] != all[n - 1]));
+}
+
+#[test]
+fn a_frame_that_fails_does_not_stop_the_others() {
+    let folder = stage();
+    fs::create_dir(folder.path().join("f.0001.exr")).unwrap();
+    let output = run(&folder, "--frames 0..3 -o f.####.exr --json");
+    let line = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(6), "{line}");
+    assert!(line.starts_with("error: frame 1: f.0001.exr") && line.lines().count() == 1, "{line}");
+    assert!(folder.path().join("f.0002.exr").is_file());
+    let summary: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert_eq!((&summary["failed"], summary["frames"].as_array().unwrap().len()), (&1.into(), 3));
+}
+
+#[test]
+fn options_that_cannot_be_are_one_line() {
+    let folder = stage();
+    for (words, part) in [
+        ("--frames 0..3 -o f.exr", "choose a name as f.####.exr"),
+        ("--frames 3..3", "expected frames such as 0..96"),
+        ("--frames 0..3 --only 5", "none of the frames"),
+        ("--frames 0..3 --fps 0", "--fps 0: choose a number above 0"),
+        ("--frames 0..3 --pixel 1,1", "--pixel is for one image"),
+        ("--frames 0..3 --preview a.png", "a preview goes to a .gif"),
+    ] {
+        let output = run(&folder, words);
+        let line = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(2) && line.contains(part) && line.lines().count() == 1, "{words}: {line}");
+    }
+}

@@ -1,0 +1,149 @@
+//! Tests of the `[[animation]]` tables: where they put things, and the messages about mistakes.
+use std::fs;
+use std::path::Path;
+use tallow::scene::{Pose, Scene};
+
+const STAGE: &str = "
+[camera]
+position = [0, 0, 9]
+target = [0, 0, 0]
+[environment]
+radiance = 1
+[[material]]
+name = \"grey\"
+[[mesh]]
+name = \"cube\"
+shape = \"cube\"
+material = \"grey\"
+[[mesh]]
+name = \"lid\"
+shape = \"rectangle\"
+material = \"grey\"
+[[instance]]
+name = \"box\"
+mesh = \"cube\"
+transform = { translate = [1, 2, 3], scale = 2 }
+[[light]]
+name = \"bulb\"
+type = \"point\"
+position = [0, 3, 0]
+intensity = 10
+";
+
+fn pose(tables: &str, seconds: f64) -> Pose {
+    let loaded = Scene::parse(Path::new("s.toml"), &(STAGE.to_owned() + tables)).unwrap();
+    let (mut scene, pose) = (loaded.scene, loaded.animation.at(seconds).unwrap());
+    scene.apply(&pose).unwrap();
+    pose
+}
+
+fn error(tables: &str) -> String {
+    let error = Scene::parse(Path::new("s.toml"), &(STAGE.to_owned() + tables)).unwrap_err();
+    let line = error.to_string();
+    assert!(error.exit_code() == 3 && !line.contains('\n'), "{line}");
+    line
+}
+
+#[test]
+fn keys_say_where_things_are() {
+    let tables = "
+[[animation]]
+instance = \"box\"
+keys = [{ time = 0, rotate = [0, 0, 0] }, { time = 1, rotate = [0, 90, 0], translate = [5, 0, 0] }]
+[[animation]]
+instance = \"lid\"
+interpolation = \"step\"
+keys = [{ time = 0, translate = [0, 1, 0] }, { time = 2, translate = [0, 7, 0], scale = 3 }]
+[[animation]]
+light = \"bulb\"
+keys = [{ time = 0, position = [0, 3, 0] }, { time = 4, position = [8, 3, 0], intensity = 2 }]
+[[animation]]
+material = \"grey\"
+keys = [{ time = 0, color = 0 }, { time = 2, color = [1, 0.5, 0] }]
+[[animation]]
+camera = true
+keys = [{ time = 0, fov = 40 }, { time = 1, fov = 60, position = [0, 1, 9] }]
+[[animation]]
+environment = true
+keys = [{ time = 0, radiance = 1 }, { time = 1, radiance = [3, 2, 1] }]
+";
+    let at = pose(tables, 0.5);
+    let turned = at.instances[0].1.0;
+    assert_eq!(at.instances[0].0, 0);
+    assert!(turned.translation.abs_diff_eq(glam::dvec3(5.0, 0.0, 0.0), 1e-12), "one key says it for all times");
+    let half = 2.0 * 45f64.to_radians().cos();
+    assert!((turned.matrix3.x_axis.x - half).abs() < 1e-9, "the scale of the table stays: {turned:?}");
+    assert_eq!(at.instances[1].0, 1, "after the [[instance]] tables come moving meshes without one");
+    assert_eq!(at.instances[1].1.0.translation.y, 1.0);
+    assert_eq!(at.lights[0].1.position, Some([1.0, 3.0, 0.0]));
+    assert_eq!(at.lights[0].1.intensity.unwrap().0, [2.0; 3]);
+    assert_eq!(at.materials[0].1.color, Some([0.25, 0.125, 0.0]));
+    let camera = at.camera.unwrap();
+    assert_eq!((camera.fov, camera.position, camera.target), (Some(50.0), Some([0.0, 1.0, 9.0]), Some([0.0; 3])));
+    assert_eq!(at.environment.unwrap().radiance, Some([2.0, 1.5, 1.0]));
+}
+
+#[test]
+fn mistakes_are_one_line_with_the_table_and_the_key() {
+    let instance = |keys: &str| format!("[[animation]]\ninstance = \"box\"\nkeys = [{keys}]");
+    let cases = [
+        (
+            instance("{ time = 1, scale = 1 }, { time = 0.5, scale = 2 }"),
+            "animation 1: keys 1 and 2 are out of order, 1 and",
+        ),
+        (instance("{ time = 1, scale = 1 }, { time = 1, scale = 2 }"), "keys 1 and 2 are at one time"),
+        (instance("{ time = nan, scale = 1 }"), "key 1, at NaN"),
+        (instance("{ time = 0, translate = [nan, 0, 0] }"), "has a number that is NaN"),
+        (instance("{ time = 0, translat = [0, 0, 0] }"), "unknown key \"translat\": choose from translate, rotate"),
+        (instance("{ time = 0, translate = [0, 0] }"), "translate has 2 numbers, not 3"),
+        (instance("{ time = 0, scale = 1, transform = [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1] }"), "choose"),
+        (instance(""), "has no keys"),
+        (instance("{ time = 0, rotate = [0, 0, 0, 9] }"), "the axis of rotate is zero"),
+        ("[[animation]]\ninstance = \"bux\"\nkeys = [{ time = 0, scale = 1 }]".into(), "did you mean \"box\"?"),
+        ("[[animation]]\nkeys = [{ time = 0, scale = 1 }]".into(), "needs one of camera, instance"),
+        ("[[animation]]\ncamera = true\nlight = \"bulb\"".into(), "needs one of camera, instance"),
+        ("[[animation]]\nmesh = \"lid\"".into(), "takes a file of every pose"),
+        ("[[animation]]\nmesh = \"lid\"\nfile = \"a.obj\"".into(), "give `#` for the number"),
+        (
+            instance("{ time = 0, scale = 1 }") + "\n" + &instance("{ time = 0, scale = 1 }"),
+            "animation 2: instance \"box\"",
+        ),
+    ];
+    for (tables, part) in cases {
+        let line = error(&tables);
+        assert!(line.contains(part), "{line}, not: {part}");
+    }
+    assert!(error("[[animation]]\nloop = true").contains("unknown key \"loop\""));
+}
+
+#[test]
+fn a_mesh_goes_through_the_poses_of_its_files() {
+    let folder = tempfile::tempdir().unwrap();
+    for (number, height) in [1.0, 3.0, 7.0].iter().enumerate() {
+        let text = format!("v 0 0 0\nv 1 0 0\nv 0 {height} 0\nvn 0 0 1\nf 1//1 2//1 3//1\n");
+        fs::write(folder.path().join(format!("p_{number:02}.obj")), text).unwrap();
+    }
+    let tables = "[[animation]]\nmesh = \"flag\"\nfile = \"p_##.obj\"\nlast = 2\nfps = 2\n[[mesh]]\nname = \"flag\"\n";
+    let load =
+        |more: &str| Scene::parse(&folder.path().join("s.toml"), &(STAGE.to_owned() + &tables.replace("fps", more)));
+    let heights = |more: &str, times: &[f64]| -> Vec<f32> {
+        let mut loaded = load(more).unwrap();
+        let top = |&seconds: &f64| {
+            let pose = loaded.animation.at(seconds).unwrap();
+            loaded.scene.apply(&pose).unwrap();
+            let triangles = &loaded.scene.triangles;
+            triangles.iter().find(|t| t.v1[0] == 1.0 && t.v2[0] == 0.0).unwrap().v2[1]
+        };
+        times.iter().map(top).collect()
+    };
+    assert_eq!(heights("fps", &[0.0, 0.25, 0.5, 0.75, 9.0]), [1.0, 2.0, 3.0, 5.0, 7.0]);
+    assert_eq!(heights("interpolation = \"step\"\nfps", &[0.25, 0.5]), [1.0, 3.0]);
+    assert_eq!(heights("repeat = true\nfps", &[1.25, 1.5]), [4.0, 1.0], "from the last to the first");
+    fs::write(folder.path().join("p_01.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 3 2\n").unwrap();
+    let mut loaded = load("fps").unwrap();
+    let wrong = loaded.animation.at(0.5).unwrap();
+    let line = loaded.scene.apply(&wrong).unwrap_err().to_string();
+    assert!(line.contains("has 1 triangles, not 2"), "{line}");
+    fs::remove_file(folder.path().join("p_02.obj")).unwrap();
+    assert!(loaded.animation.at(1.0).unwrap_err().to_string().contains("p_02.obj"));
+}
