@@ -159,8 +159,9 @@ pub struct SceneFile<'a> {
     description: Cow<'a, Description>,
     /// Whether a scene without light gets a sky of radiance 1.
     sky: bool,
-    /// The cameras that a glTF file holds.
+    /// The cameras that a glTF file holds, and the number of the one that is looked through.
     cameras: Vec<gltf::Named>,
+    through: usize,
     /// What was repaired or passed over so far.
     warnings: Vec<String>,
     /// What the loader of the file makes move, besides the description's own tables.
@@ -169,8 +170,8 @@ pub struct SceneFile<'a> {
 
 impl<'a> SceneFile<'a> {
     fn of(path: &Path, description: Cow<'a, Description>) -> Self {
-        let (cameras, warnings, movers) = Default::default();
-        Self { path: path.to_owned(), description, sky: false, cameras, warnings, movers }
+        let (cameras, through, warnings, movers) = Default::default();
+        Self { path: path.to_owned(), description, sky: false, cameras, through, warnings, movers }
     }
 
     /// Reads a scene file (`.toml`, `.gltf`, `.glb`), or takes a model (`.obj`) for one.
@@ -179,7 +180,7 @@ impl<'a> SceneFile<'a> {
     /// [`Error::Input`] with file, place and remedy.
     pub fn open(path: &Path) -> Result<Self> {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_lowercase();
-        let (mut cameras, mut warnings) = (Vec::new(), Vec::new());
+        let mut asset = gltf::Model::default();
         let (description, sky) = match extension.as_str() {
             "toml" => {
                 let text = String::from_utf8(input::read_text(path, BYTES_OF_TOML)?);
@@ -188,22 +189,24 @@ impl<'a> SceneFile<'a> {
             }
             "obj" => (model(path), true),
             "gltf" | "glb" => {
-                let model = gltf::load(path)?;
-                (cameras, warnings) = (model.cameras, model.warnings);
-                (model.description, false)
+                asset = gltf::load(path)?;
+                (std::mem::take(&mut asset.description), false)
             }
             other => {
                 input::open(path)?; // a missing file is that first of all
                 return Err(Error::input(path, format!("is no scene: \"{other}\" is none of toml, obj, gltf, glb")));
             }
         };
+        let gltf::Model { cameras, warnings, mover, .. } = asset;
+        let (through, movers) = (0, mover.into_iter().collect());
         Ok(Self {
             path: path.to_owned(),
             description: Cow::Owned(description),
             sky,
             cameras,
+            through,
             warnings,
-            movers: Vec::new(),
+            movers,
         })
     }
 
@@ -212,14 +215,15 @@ impl<'a> SceneFile<'a> {
     /// # Errors
     /// [`Error::Usage`] with the names of the cameras that there are.
     pub fn look_through(&mut self, name: &str) -> Result<()> {
-        let named = self.cameras.iter().find(|camera| camera.name == name);
-        let chosen = named.and_then(|camera| camera.camera.clone());
+        let place = self.cameras.iter().position(|camera| camera.name == name);
+        let chosen = place.and_then(|place| self.cameras[place].camera.clone());
         let names: Vec<_> = self.cameras.iter().map(|camera| format!("\"{}\"", camera.name)).collect();
-        let what = match (named, names.is_empty()) {
+        let what = match (place, names.is_empty()) {
             (Some(_), _) if chosen.is_none() => "is orthographic, which is not rendered".to_owned(),
             (None, true) => "is not there: only glTF files have named cameras, and this one has none".to_owned(),
             (None, false) => format!("is not there: choose one of {}", names.join(", ")),
-            (Some(_), _) => {
+            (Some(place), _) => {
+                self.through = place;
                 self.description.to_mut().camera = chosen.unwrap_or_default();
                 return Ok(());
             }
@@ -254,7 +258,12 @@ impl<'a> SceneFile<'a> {
         scene.warnings.splice(0..0, self.warnings.iter().cloned());
         let camera = scene.view.build([settings.width, settings.height], scene.bounds);
         camera.map_err(|what| Error::input_at(&self.path, "[camera]", what))?;
-        let animation = animation::load(&self.path, &description, &self.movers, &scene)?;
+        let carried = self.cameras.get(self.through).and_then(|camera| camera.mover.clone());
+        let movers: Vec<_> = self.movers.iter().cloned().chain(carried).collect();
+        let animation = animation::load(&self.path, &description, &movers, &scene)?;
+        if !animation.is_empty() {
+            scene.view.framed = Some(scene.bounds);
+        }
         Ok(Loaded { scene, settings, animation })
     }
 }

@@ -18,7 +18,15 @@ fn feed(name: &str, bytes: &[u8]) {
         let path = dir.path().join(name);
         std::fs::write(&path, bytes).expect("written");
         match Scene::load(&path) {
-            Ok(scene) => scene.check().expect("arrays that fit together"),
+            Ok(loaded) => {
+                loaded.check().expect("arrays that fit together");
+                let mut scene = loaded.scene.clone();
+                let pose = loaded.animation.at(0.7).expect("a pose, which reads no file");
+                match scene.apply(&pose) {
+                    Ok(_) => scene.check().expect("arrays that fit together in another pose"),
+                    Err(e) => assert!(!e.to_string().contains(char::is_control) && !e.to_string().is_empty(), "{e}"),
+                }
+            }
             Err(e) => assert!(!e.to_string().contains(char::is_control) && !e.to_string().is_empty(), "{e}"),
         }
     });
@@ -90,6 +98,17 @@ static RICH: LazyLock<Value> = LazyLock::new(|| {
     ];
     rich.into_iter().for_each(|node| push(&mut json, "nodes", node));
     json["scenes"][0]["nodes"] = json!([0, 1, 2]);
+    // Keys at 0, 1 and 2 seconds; the triangle's corners are translations, and the skin's weights rotations.
+    let times = floats(&[0.0, 1.0, 2.0]);
+    push(&mut json, "buffers", json!({ "byteLength": 12, "uri": data(&times) }));
+    push(&mut json, "bufferViews", json!({ "buffer": 2, "byteLength": 12 }));
+    push(&mut json, "accessors", json!({ "bufferView": 8, "componentType": 5126, "count": 3, "type": "SCALAR" }));
+    let channel =
+        |sampler: u32, node: u32, path: &str| json!({ "sampler": sampler, "target": { "node": node, "path": path } });
+    json["animations"] = json!([{
+        "samplers": [{ "input": 7, "output": 0 }, { "input": 7, "output": 4, "interpolation": "STEP" }, { "input": 7, "output": 7 }],
+        "channels": [channel(0, 0, "translation"), channel(1, 3, "rotation"), channel(2, 3, "weights")]
+    }]);
     json
 });
 
@@ -226,6 +245,7 @@ fn the_undamaged_files_load_with_all_their_parts() {
             scene.textures.len()
         );
         assert!(scene.lights.iter().any(|light| light.kind == tallow::layout::LIGHT_SPOT));
+        assert_eq!(scene.animation.end(), 2.0);
         let missing = scene.warnings.iter().filter(|line| line.contains("none.png")).count();
         assert!(missing > 0, "{:?}", scene.warnings);
     }

@@ -8,6 +8,7 @@ mod gltf;
 mod gltf_bad;
 #[path = "../support/gltf.rs"]
 mod gltf_file;
+mod gltf_motion;
 mod memory;
 mod pose;
 #[path = "../support/poses.rs"]

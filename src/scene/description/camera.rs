@@ -42,6 +42,10 @@ pub struct Camera {
     pub focus_distance: Option<f32>,
     /// Nothing nearer than this along a ray is seen; default 0.
     pub near: f32,
+    /// What a camera without position has in view; default the bounds of the scene. A scene that moves is framed as it was loaded:
+    /// a frame that followed its bounds would make the camera breathe.
+    #[serde(skip)]
+    pub framed: Option<[[f32; 3]; 2]>,
 }
 
 /// Position and orthonormal axes (right, up, forward).
@@ -98,7 +102,7 @@ impl Camera {
     }
 
     fn frame_from_target(&self, bounds: [[f32; 3]; 2], tan: f64) -> Result<Frame, String> {
-        let [low, high] = bounds.map(|b| DVec3::from(b.map(f64::from)));
+        let [low, high] = self.framed.unwrap_or(bounds).map(|b| DVec3::from(b.map(f64::from)));
         let target = self.target.map_or((low + high) / 2.0, DVec3::from);
         let position = self.position.map_or_else(|| overview(target, low, high, tan), DVec3::from);
         let up = self.up.map_or(DVec3::Y, DVec3::from);

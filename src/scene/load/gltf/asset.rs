@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::image::input;
 use crate::memory;
 use gltf_json::Root;
+use serde_json::Value;
 use std::fmt::Display;
 use std::path::Path;
 
@@ -107,11 +108,25 @@ impl<'a> Asset<'a> {
 }
 
 fn parse(path: &Path, json: &[u8]) -> Result<Root> {
-    serde_json::from_slice(json).map_err(|e| {
+    let parsed = serde_json::from_slice(json).or_else(|e| match e.to_string().starts_with("missing field `node`") {
+        true => without_pointers(json).unwrap_or(Err(e)),
+        false => Err(e),
+    });
+    parsed.map_err(|e| {
         let (text, place) = (e.to_string(), format!("line {}, column {}", e.line(), e.column()));
         let what = text.rsplit_once(" at line ").map_or(text.as_str(), |(what, _)| what);
         Error::input_at(path, place, format!("is no glTF: {}", one_line(what)))
     })
+}
+
+/// The file without the animation channels that move no node. Extensions have them, and the parser insists on nodes.
+fn without_pointers(json: &[u8]) -> Option<serde_json::Result<Root>> {
+    let mut root: Value = serde_json::from_slice(json).ok()?;
+    for animation in root.get_mut("animations")?.as_array_mut()? {
+        let channels = animation.get_mut("channels")?.as_array_mut()?;
+        channels.retain(|channel| channel.pointer("/target/node").is_some());
+    }
+    Some(serde_json::from_value(root))
 }
 
 /// A name of the file as messages and reports show it: without line ends and other control characters, and not too long.

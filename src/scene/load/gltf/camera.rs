@@ -1,9 +1,11 @@
 //! Cameras of nodes become `[camera]` tables.
 use super::asset::{Asset, one_line};
+use crate::scene::animation::Mover;
 use crate::scene::description::{Camera, FovAxis};
 use glam::{DAffine3, DMat4};
 use gltf_json::camera::Type;
 use gltf_json::validation::Checked;
+use std::sync::Arc;
 
 /// A camera of the scene.
 #[derive(Clone, Debug)]
@@ -12,6 +14,10 @@ pub struct Named {
     pub name: String,
     /// `None` where its projection is not supported.
     pub camera: Option<Camera>,
+    /// What moves it.
+    pub mover: Option<Arc<dyn Mover>>,
+    /// The node that holds it.
+    pub(super) node: usize,
 }
 
 /// The camera that `node` holds, placed by `world`: it looks along the node's -z axis, +y is up. The scale of nodes does not
@@ -29,5 +35,5 @@ pub fn of_node(asset: &Asset, node: usize, world: &DAffine3) -> Option<Named> {
         fov_axis: FovAxis::Y,
         ..Camera::default()
     });
-    Some(Named { name, camera })
+    Some(Named { name, camera, mover: None, node })
 }

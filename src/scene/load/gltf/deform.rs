@@ -7,9 +7,10 @@ use crate::scene::description::Mesh;
 use glam::{DAffine3, DMat4, DVec3, Vec3};
 
 /// A skin: its joints, and where they were when it was bound to them.
+#[derive(Debug)]
 pub struct Skin {
     /// Nodes that are joints.
-    joints: Vec<usize>,
+    pub joints: Vec<usize>,
     /// By joint: from the mesh's space to the joint's, as it was when the skin was bound.
     inverse_binds: Vec<DAffine3>,
 }

@@ -4,7 +4,6 @@ use crate::error::{Error, Result};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
-use std::collections::BTreeMap;
 
 /// Extensions that are read.
 const READ: &[&str] = &[
@@ -63,13 +62,6 @@ pub fn read<T: DeserializeOwned>(
     let Some(value) = all.and_then(|all| all.get(name)) else { return Ok(None) };
     let read = T::deserialize(value);
     read.map(Some).map_err(|e| asset.at(place, format!("has {name} that is damaged: {}", one_line(&e.to_string()))))
-}
-
-/// `EXT_mesh_gpu_instancing` of a node: accessors of `TRANSLATION`, `ROTATION` and `SCALE`.
-#[derive(Deserialize)]
-pub struct Instancing {
-    /// Indices of accessors by the name of what they hold.
-    pub attributes: BTreeMap<String, usize>,
 }
 
 /// `KHR_lights_punctual` of a file.

@@ -20,7 +20,7 @@ pub fn read(asset: &Asset) -> Result<Vec<Light>> {
     Ok(found.map_or_else(Vec::new, |found| found.lights))
 }
 
-/// The light that `node` holds, placed by `world`: it shines along the node's -z axis.
+/// The light that `node` holds, placed by `world`.
 ///
 /// # Errors
 /// For a light that is not there or of an unknown type.
@@ -41,21 +41,27 @@ pub fn of_node(asset: &Asset, node: usize, world: &DAffine3, lights: &[Light]) -
         }
     };
     let value = Some(Rgb(light.color.map(|c| c * light.intensity)));
-    let axis = world.transform_vector3(DVec3::NEG_Z).try_normalize().unwrap_or(DVec3::NEG_Z);
     let (inner, outer) = (light.spot.inner_cone_angle, light.spot.outer_cone_angle);
     let table = LightTable { kind, ..LightTable::default() };
-    let position = Some(world.translation.as_vec3().to_array());
-    Ok(Some(match kind {
-        LightType::Directional => LightTable { direction: Some(axis.as_vec3().to_array()), irradiance: value, ..table },
-        LightType::Point => LightTable { position, intensity: value, ..table },
+    let table = match kind {
+        LightType::Directional => LightTable { irradiance: value, ..table },
+        LightType::Point => LightTable { intensity: value, ..table },
         // glTF leaves the falloff within the cone to the renderer.
-        LightType::Spot => LightTable {
-            position,
-            intensity: value,
-            direction: Some(axis.as_vec3().to_array()),
-            cone: Some(inner.to_degrees()),
-            cutoff: Some(outer.to_degrees()),
-            ..table
-        },
-    }))
+        LightType::Spot => {
+            let (cone, cutoff) = (Some(inner.to_degrees()), Some(outer.to_degrees()));
+            LightTable { intensity: value, cone, cutoff, ..table }
+        }
+    };
+    Ok(Some(placed(&table, world)))
+}
+
+/// The light where its node is at `world`, along whose -z axis it shines.
+pub fn placed(table: &LightTable, world: &DAffine3) -> LightTable {
+    let axis = world.transform_vector3(DVec3::NEG_Z).try_normalize().unwrap_or(DVec3::NEG_Z);
+    let (position, direction) = (world.translation.as_vec3().to_array(), axis.as_vec3().to_array());
+    LightTable {
+        position: (table.kind != LightType::Directional).then_some(position),
+        direction: (table.kind != LightType::Point).then_some(direction),
+        ..table.clone()
+    }
 }

@@ -6,11 +6,15 @@ mod accessor;
 mod asset;
 mod camera;
 mod check;
+mod clip;
+mod curve;
 mod deform;
 mod extension;
 mod glb;
+mod instancing;
 mod light;
 mod material;
+mod motion;
 mod node;
 mod picture;
 mod place;
@@ -19,12 +23,15 @@ mod uri;
 
 use crate::error::Result;
 use crate::memory;
+use crate::scene::animation::Mover;
 use crate::scene::description::{Description, EnvironmentTable};
 use asset::Asset;
 pub use camera::Named;
+use motion::{CameraMotion, Motion, MovedLight};
 use node::Tree;
-use place::Placer;
+use place::{Moved, Placer};
 use std::path::Path;
+use std::sync::Arc;
 
 /// What a glTF file holds.
 #[derive(Clone, Debug, Default)]
@@ -33,6 +40,8 @@ pub struct Model {
     pub description: Description,
     /// All cameras of the scene, in the order of its nodes.
     pub cameras: Vec<Named>,
+    /// What moves besides cameras.
+    pub mover: Option<Arc<dyn Mover>>,
     /// Readable lines about what is not rendered or was repaired.
     pub warnings: Vec<String>,
 }
@@ -52,13 +61,30 @@ pub fn load(path: &Path) -> Result<Model> {
     let bytes = surfaces.map(|surface| primitive::bytes(&asset, surface)).fold(0, u64::saturating_add);
     memory::need(path.display(), bytes)?;
     let (worlds, lights) = (tree.worlds(&tree.locals), light::read(&asset)?);
-    let mut placer = Placer::new(&asset, &worlds);
+    let channels = clip::read(&asset, &tree, &mut model.warnings)?;
+    let moved = Moved::new(&tree, &channels);
+    let mut placer = Placer::new(&asset, &worlds, &moved);
+    let mut moved_lights = Vec::new();
     for &node in &tree.shown {
         placer.node(node)?;
-        model.description.light.extend(light::of_node(&asset, node, &worlds[node], &lights)?);
+        if let Some(table) = light::of_node(&asset, node, &worlds[node], &lights)? {
+            let number = model.description.light.len();
+            moved_lights.extend(moved.nodes[node].then(|| MovedLight { number, node, table: table.clone() }));
+            model.description.light.push(table);
+        }
         model.cameras.extend(camera::of_node(&asset, node, &worlds[node]));
     }
-    placer.finish(&mut model.description, &mut model.warnings)?;
+    let placed = placer.finish(&mut model.description, &mut model.warnings)?;
+    let moves = moved.nodes;
+    let motion = Motion { tree, channels, instances: placed.instances, meshes: placed.meshes, lights: moved_lights };
+    let motion = Arc::new(motion);
+    if !motion.channels.is_empty() {
+        for named in model.cameras.iter_mut().filter(|named| moves[named.node]) {
+            let Some(camera) = named.camera.clone() else { continue };
+            named.mover = Some(Arc::new(CameraMotion { motion: motion.clone(), node: named.node, camera }));
+        }
+        model.mover = Some(motion);
+    }
     if model.description.light.is_empty() {
         model.description.environment = Some(EnvironmentTable::default());
     }

@@ -48,6 +48,7 @@ impl Local {
 }
 
 /// The nodes of a file, all trees of which are known to end.
+#[derive(Debug)]
 pub struct Tree {
     /// By node: its transform relative to its parent as the file has it.
     pub locals: Vec<Local>,
@@ -110,6 +111,16 @@ impl Tree {
             Some(node) => Err(asset.at(format!("node {node}"), "has a transform with numbers that are too large")),
             None => Ok(Self { locals, parents, order, shown }),
         }
+    }
+
+    /// By node: whether it moves when `nodes` do, as all nodes below them.
+    pub fn moved(&self, nodes: impl Iterator<Item = usize>) -> Vec<bool> {
+        let mut moved = vec![false; self.locals.len()];
+        nodes.for_each(|node| moved[node] = true);
+        for &node in &self.order {
+            moved[node] |= self.parents[node].is_some_and(|parent| moved[parent]);
+        }
+        moved
     }
 
     /// World transforms of all nodes, where `locals` are those relative to their parents.

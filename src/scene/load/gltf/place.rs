@@ -1,30 +1,73 @@
 //! Puts the meshes of nodes into a description: baked where one node shows them, as instances where several do, and in a copy
 //! of their own where joints or morph targets move them.
-use super::accessor::Elements;
 use super::asset::{Asset, one_line};
+use super::clip::Channel;
 use super::deform::{Skin, deformed};
-use super::extension::{self, Instancing};
+use super::instancing;
 use super::material;
+use super::motion::{MovedInstance, MovedMesh};
+use super::node::Tree;
 use super::picture::Pictures;
 use super::primitive::{self, Primitive};
 use crate::error::Result;
 use crate::memory;
 use crate::scene::description::{Description, InstanceTable, MaterialTable, Mesh, MeshTable, Transform};
-use glam::{DAffine3, DQuat, DVec3};
+use glam::{DAffine3, DVec3};
 use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
+
+/// Bytes of a vertex that joints or morph targets have moved.
+const BYTES_OF_BENT_VERTEX: usize = 72;
 
 /// Bytes of an instance while a scene is made.
 const BYTES_OF_INSTANCE: u64 = 1024;
+
+/// Which nodes move.
+pub struct Moved {
+    /// By node: whether it moves, itself or with its ancestors.
+    pub nodes: Vec<bool>,
+    /// By node: whether the weights of its morph targets change.
+    weights: Vec<bool>,
+}
+
+impl Moved {
+    /// By these channels.
+    pub fn new(tree: &Tree, channels: &[Channel]) -> Self {
+        let mut weights = vec![false; tree.locals.len()];
+        channels.iter().filter(|channel| channel.is_morph()).for_each(|channel| weights[channel.node] = true);
+        let nodes = channels.iter().filter(|channel| !channel.is_morph()).map(|channel| channel.node);
+        Self { nodes: tree.moved(nodes), weights }
+    }
+}
+
+/// A place where a node shows a mesh.
+#[derive(Clone, Copy)]
+struct Copy {
+    node: usize,
+    /// Seen from the node.
+    own: DAffine3,
+}
+
+/// What nodes move, by its numbers in the description.
+pub struct Placed {
+    /// Instances.
+    pub instances: Vec<MovedInstance>,
+    /// Meshes that are deformed.
+    pub meshes: Vec<MovedMesh>,
+}
 
 /// Collects what nodes show.
 pub struct Placer<'a> {
     asset: &'a Asset<'a>,
     /// By node.
     worlds: &'a [DAffine3],
+    moved: &'a Moved,
     /// Primitives of the meshes that were read.
-    meshes: HashMap<usize, Vec<Primitive>>,
-    /// By mesh: the nodes that show it at rest, and where.
-    placed: BTreeMap<usize, Vec<DAffine3>>,
+    meshes: HashMap<usize, Vec<Arc<Primitive>>>,
+    skins: HashMap<usize, Arc<Skin>>,
+    /// By mesh: where nodes show it at rest.
+    placed: BTreeMap<usize, Vec<Copy>>,
+    found: Placed,
     tables: Vec<MeshTable>,
     instances: Vec<InstanceTable>,
     materials: Vec<MaterialTable>,
@@ -40,12 +83,15 @@ pub struct Placer<'a> {
 }
 
 impl<'a> Placer<'a> {
-    /// With the world transforms of all nodes.
-    pub fn new(asset: &'a Asset<'a>, worlds: &'a [DAffine3]) -> Self {
+    /// With the world transforms of all nodes at rest.
+    pub fn new(asset: &'a Asset<'a>, worlds: &'a [DAffine3], moved: &'a Moved) -> Self {
         Self {
             asset,
             worlds,
+            moved,
             meshes: HashMap::new(),
+            skins: HashMap::new(),
+            found: Placed { instances: Vec::new(), meshes: Vec::new() },
             placed: BTreeMap::new(),
             tables: Vec::new(),
             instances: Vec::new(),
@@ -68,45 +114,71 @@ impl<'a> Placer<'a> {
         let json = &self.asset.root.nodes[node];
         let Some(mesh) = json.mesh.map(|mesh| mesh.value()) else { return Ok(()) };
         self.read(mesh)?;
-        let skin = json.skin.map(|skin| Skin::read(self.asset, skin.value())).transpose()?;
-        let matrices = skin.map(|skin| skin.matrices(self.worlds));
+        let skin = json.skin.map(|skin| self.skin(skin.value())).transpose()?;
         let weights = json.weights.as_ref().or(self.asset.root.meshes[mesh].weights.as_ref());
-        let moved = self.meshes[&mesh].iter().any(|primitive| {
-            let skinned = matrices.is_some() && !primitive.joints.is_empty();
-            skinned || weights.is_some() && !primitive.targets.is_empty()
-        });
+        let weighted = weights.is_some() || self.moved.weights[node];
+        let bends = |primitive: &Arc<Primitive>| {
+            skin.is_some() && !primitive.joints.is_empty() || weighted && !primitive.targets.is_empty()
+        };
         let copies = self.copies(node)?;
-        if !moved {
+        if !self.meshes[&mesh].iter().any(bends) {
             self.placed.entry(mesh).or_default().extend(copies);
             return Ok(());
         }
-        let weights = weights.map_or(&[][..], Vec::as_slice);
         let name = json.name.as_ref().or(self.asset.root.meshes[mesh].name.as_ref());
         let name = name.map_or_else(|| format!("node {node}"), |name| one_line(name));
-        let primitives = self.meshes.remove(&mesh).unwrap_or_default();
-        for primitive in &primitives {
-            let skin = matrices.as_deref().filter(|_| !primitive.joints.is_empty());
-            let (vertices, triangles) = (primitive.mesh.positions.len(), primitive.mesh.triangles());
-            memory::need(self.asset.path.display(), 72 * vertices as u64 + 12 * triangles as u64)?;
-            let surface = deformed(primitive, weights, skin);
-            // A skin moves vertices to where they are in the world: the node that shows it does not count.
-            let at = if skin.is_some() { vec![DAffine3::IDENTITY] } else { copies.clone() };
-            self.add(&name, surface, primitive.material, at)?;
+        for primitive in self.meshes[&mesh].clone() {
+            let skin = skin.clone().filter(|_| !primitive.joints.is_empty());
+            let weights = weights.cloned().unwrap_or_default();
+            self.add_bent(&name, MovedMesh { number: self.tables.len(), node, primitive, skin, weights }, &copies)?;
         }
-        self.meshes.insert(mesh, primitives);
         Ok(())
+    }
+
+    /// Adds a mesh in the pose of the file, and notes that it moves if it does.
+    fn add_bent(&mut self, name: &str, bent: MovedMesh, copies: &[Copy]) -> Result<()> {
+        let mesh = &bent.primitive.mesh;
+        let bytes = BYTES_OF_BENT_VERTEX * mesh.positions.len() + size_of::<u32>() * mesh.indices.len();
+        memory::need(self.asset.path.display(), bytes as u64)?;
+        let matrices = bent.skin.as_ref().map(|skin| skin.matrices(self.worlds));
+        let surface = deformed(&bent.primitive, &bent.weights, matrices.as_deref());
+        let joints = bent.skin.iter().flat_map(|skin| &skin.joints);
+        let moves = self.moved.weights[bent.node] || joints.into_iter().any(|&joint| self.moved.nodes[joint]);
+        let material = bent.primitive.material;
+        // A skin moves vertices to where they are in the world: the node that shows it does not count.
+        match &bent.skin {
+            Some(_) => self.add_fixed(name, surface, material)?,
+            None => self.add(name, surface, material, copies)?,
+        }
+        // A mesh that is shown nowhere has no table.
+        if let Some(table) = self.tables.get_mut(bent.number).filter(|_| moves) {
+            table.moving = true;
+            self.found.meshes.push(bent);
+        }
+        Ok(())
+    }
+
+    fn skin(&mut self, index: usize) -> Result<Arc<Skin>> {
+        if let Some(skin) = self.skins.get(&index) {
+            return Ok(skin.clone());
+        }
+        let skin = Arc::new(Skin::read(self.asset, index)?);
+        self.skins.insert(index, skin.clone());
+        Ok(skin)
     }
 
     /// Adds what nodes show at rest, and moves all to the description.
     ///
     /// # Errors
     /// [`crate::error::Error::Input`] for materials and pictures that cannot be read.
-    pub fn finish(mut self, description: &mut Description, warnings: &mut Vec<String>) -> Result<()> {
+    pub fn finish(mut self, description: &mut Description, warnings: &mut Vec<String>) -> Result<Placed> {
         for (mesh, copies) in std::mem::take(&mut self.placed) {
             let name = self.asset.root.meshes[mesh].name.as_ref().map(|name| one_line(name));
             let name = name.filter(|name| !name.is_empty()).unwrap_or_else(|| format!("mesh {mesh}"));
             for primitive in self.meshes.remove(&mesh).unwrap_or_default() {
-                self.add(&name, primitive.mesh, primitive.material, copies.clone())?;
+                let material = primitive.material;
+                let surface = Arc::try_unwrap(primitive).map_or_else(|shared| shared.mesh.clone(), |own| own.mesh);
+                self.add(&name, surface, material, &copies)?;
             }
         }
         let rows = [
@@ -120,7 +192,7 @@ impl<'a> Placer<'a> {
         description.instance = self.instances;
         description.material = self.materials;
         description.bitmap = self.pictures.bitmaps;
-        Ok(())
+        Ok(self.found)
     }
 
     fn read(&mut self, mesh: usize) -> Result<()> {
@@ -134,7 +206,7 @@ impl<'a> Placer<'a> {
                 continue;
             }
             match primitive::read(self.asset, json, &place)? {
-                Some(primitive) => primitives.push(primitive),
+                Some(primitive) => primitives.push(Arc::new(primitive)),
                 None => self.without_positions += 1,
             }
         }
@@ -143,44 +215,54 @@ impl<'a> Placer<'a> {
     }
 
     /// Where a node shows its mesh: once, or as often as `EXT_mesh_gpu_instancing` says. What is flattened is left out.
-    fn copies(&mut self, node: usize) -> Result<Vec<DAffine3>> {
+    fn copies(&mut self, node: usize) -> Result<Vec<Copy>> {
         let all = self.asset.root.nodes[node].extensions.as_ref().map(|e| &e.others);
         let place = format!("node {node}");
-        let several: Option<Instancing> = extension::read(self.asset, all, "EXT_mesh_gpu_instancing", &place)?;
-        let world = self.worlds[node];
-        let mut copies = match several {
-            Some(Instancing { attributes }) => instances(self.asset, &attributes, &place)?,
-            None => vec![DAffine3::IDENTITY],
-        };
-        copies.iter_mut().for_each(|copy| *copy = world * *copy);
-        let before = copies.len();
-        copies.retain(has_inverse);
-        self.flat += before - copies.len();
+        let several = instancing::read(self.asset, all, &place)?;
+        memory::need(self.asset.path.display(), BYTES_OF_INSTANCE * several.as_ref().map_or(0, Vec::len) as u64)?;
+        let owns = several.unwrap_or_else(|| vec![DAffine3::IDENTITY]);
+        let mut copies: Vec<_> = owns.into_iter().map(|own| Copy { node, own }).collect();
+        // What moves may be flat at rest alone.
+        copies.retain(|copy| self.moved.nodes[node] || has_inverse(&self.world(copy)));
+        self.flat += usize::from(copies.is_empty());
         Ok(copies)
     }
 
-    /// Adds a mesh at every one of `copies`.
-    fn add(&mut self, name: &str, mesh: Mesh, material: Option<usize>, copies: Vec<DAffine3>) -> Result<()> {
+    fn world(&self, copy: &Copy) -> DAffine3 {
+        self.worlds[copy.node] * copy.own
+    }
+
+    /// Adds a mesh at every one of `copies`: as instances where there are several, or where its node moves.
+    fn add(&mut self, name: &str, mesh: Mesh, material: Option<usize>, copies: &[Copy]) -> Result<()> {
         if copies.is_empty() {
             return Ok(());
         }
         memory::need(self.asset.path.display(), BYTES_OF_INSTANCE * copies.len() as u64)?;
-        let name = self.mesh_names.unused(name);
-        let material = Some(self.material(material)?);
-        let transform = if let [only] = copies[..] { only } else { DAffine3::IDENTITY };
-        if copies.len() > 1 {
-            let instance = |at: &DAffine3| InstanceTable {
-                mesh: name.clone(),
-                transform: Transform(*at),
-                material: None,
-                name: None,
-            };
-            self.instances.extend(copies.iter().map(instance));
+        let at = self.tables.len();
+        self.add_fixed(name, mesh, material)?;
+        if let [only] = copies
+            && !self.moved.nodes[only.node]
+        {
+            self.tables[at].transform = Transform(self.world(only));
+            return Ok(());
         }
+        let mesh = self.tables[at].name.clone().unwrap_or_default();
+        for copy in copies {
+            let (number, Copy { node, own }) = (self.instances.len(), *copy);
+            self.found.instances.extend(self.moved.nodes[node].then_some(MovedInstance { number, node, own }));
+            let world = self.world(copy);
+            let transform = Transform(if has_inverse(&world) { world } else { speck(&world) });
+            self.instances.push(InstanceTable { mesh: mesh.clone(), transform, ..InstanceTable::default() });
+        }
+        Ok(())
+    }
+
+    /// Adds a mesh whose vertices are where they are in the world.
+    fn add_fixed(&mut self, name: &str, mesh: Mesh, material: Option<usize>) -> Result<()> {
+        let (name, material) = (Some(self.mesh_names.unused(name)), Some(self.material(material)?));
         // A mesh without normals is meant to be flat: glTF 2.0, section 3.7.2.1.
         let flat = mesh.normals.is_empty();
-        let (name, data, transform) = (Some(name), Some(mesh), Transform(transform));
-        self.tables.push(MeshTable { name, data, material, transform, flat, ..MeshTable::default() });
+        self.tables.push(MeshTable { name, data: Some(mesh), material, flat, ..MeshTable::default() });
         Ok(())
     }
 
@@ -227,36 +309,8 @@ fn has_inverse(affine: &DAffine3) -> bool {
     affine.is_finite() && affine.matrix3.determinant().abs() > 1e-60 && affine.inverse().is_finite()
 }
 
-/// The transforms that `EXT_mesh_gpu_instancing` lists.
-fn instances(asset: &Asset, attributes: &BTreeMap<String, usize>, place: &str) -> Result<Vec<DAffine3>> {
-    let at = |what: String| asset.at(place, what);
-    let translations = optional::<3>(asset, attributes, "TRANSLATION", place)?;
-    let rotations = optional::<4>(asset, attributes, "ROTATION", place)?;
-    let scales = optional::<3>(asset, attributes, "SCALE", place)?;
-    let counts = [translations.len(), rotations.len(), scales.len()];
-    let count = counts.into_iter().max().unwrap_or(0);
-    if counts.iter().any(|other| ![0, count].contains(other)) {
-        return Err(at(format!("places {count} instances, but not all of them have all attributes")));
-    }
-    memory::need(asset.path.display(), BYTES_OF_INSTANCE * count as u64)?;
-    let triple = |list: &[[f32; 3]], i: usize, or: DVec3| list.get(i).map_or(or, |v| DVec3::from(v.map(f64::from)));
-    let turn = |i: usize| {
-        let rotation = rotations.get(i).map(|r| DQuat::from_array(r.map(f64::from)));
-        rotation.filter(|r| r.length() > 1e-30 && r.is_finite()).map_or(DQuat::IDENTITY, DQuat::normalize)
-    };
-    let one = |i: usize| {
-        let (scale, moved) = (triple(&scales, i, DVec3::ONE), triple(&translations, i, DVec3::ZERO));
-        DAffine3::from_scale_rotation_translation(scale, turn(i), moved)
-    };
-    Ok((0..count).map(one).collect())
-}
-
-fn optional<const N: usize>(
-    asset: &Asset,
-    attributes: &BTreeMap<String, usize>,
-    name: &str,
-    place: &str,
-) -> Result<Vec<[f32; N]>> {
-    let Some(&index) = attributes.get(name) else { return Ok(Vec::new()) };
-    Elements::of(asset, index)?.numbers().map_err(|what| asset.at(format!("{place}, accessor {index}"), what))
+/// Stands in at rest for what is flat then, and moves: so small that it is not seen.
+fn speck(affine: &DAffine3) -> DAffine3 {
+    const SIZE: f64 = 1e-6;
+    DAffine3 { translation: affine.translation, ..DAffine3::from_scale(DVec3::splat(SIZE)) }
 }

@@ -10,6 +10,7 @@ use gltf_json::mesh::{Mode, MorphTarget, Primitive as Json, Semantic};
 use gltf_json::validation::Checked;
 
 /// The surface of a primitive, at rest.
+#[derive(Debug)]
 pub struct Primitive {
     /// Vertices and triangles.
     pub mesh: Mesh,
@@ -22,6 +23,7 @@ pub struct Primitive {
 }
 
 /// Four of the joints that move each vertex.
+#[derive(Debug)]
 pub struct Influence {
     /// Whole numbers: which of the skin's joints.
     pub joints: Vec<[f32; 4]>,
@@ -30,7 +32,7 @@ pub struct Influence {
 }
 
 /// What a morph target of weight 1 adds to each vertex; an empty list adds nothing.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct Target {
     /// Added to positions.
     pub positions: Vec<[f32; 3]>,
@@ -80,12 +82,14 @@ pub fn read(asset: &Asset, primitive: &Json, place: &str) -> Result<Option<Primi
         tangents: reader.numbers(Semantic::Tangents)?,
         indices: reader.triangles()?,
     };
-    if primitive.targets.is_none() {
+    let joints = reader.joints()?;
+    // What moves may part corners that rest at one place.
+    if primitive.targets.is_none() && joints.is_empty() {
         drop_joints_of_strips(&mut mesh);
     }
     let targets = primitive.targets.iter().flatten().map(|target| reader.target(target)).collect::<Result<_>>()?;
     let material = primitive.material.map(|material| material.value());
-    Ok(Some(Primitive { mesh, material, targets, joints: reader.joints()? }))
+    Ok(Some(Primitive { mesh, material, targets, joints }))
 }
 
 /// Drops triangles with two corners at one place, as strips and spheres have them on purpose: they are no reason for a warning.
