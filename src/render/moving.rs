@@ -1,8 +1,9 @@
 //! Frames that begin with the samples of the last: what a renderer needs for it, and what became of them.
 use super::history::{Carriage, History, Reproject, carried_samples};
+use super::schedule::{self, Begun};
 use super::{Renderer, Step, kernels};
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, Location};
+use crate::gpu::{Buffer, FrameResources, Location, PassTime};
 use crate::layout::PixelStats;
 
 impl Renderer {
@@ -37,9 +38,44 @@ impl Renderer {
         self.frame.history.as_ref()
     }
 
-    /// The work of a frame that begins with the samples of the last: [`Self::steps`], but for its beginning.
+    /// The work of a frame that begins with the samples of the last: [`Self::steps`], but for its beginning. Every pixel gets its
+    /// least number of samples anew; [`Self::begin_frame`] counts carried ones.
     pub fn steps_on(&self) -> impl Iterator<Item = Step> + use<> {
         std::iter::once(Step::Reproject).chain(self.steps().skip(1))
+    }
+
+    /// Runs [`Step::Reproject`] and returns the GPU time of its passes and the rest of the frame's work, in which carried samples count: of the frame's budget, `spp`
+    /// samples for each pixel on average, pixels with fewer than `min_spp` get what they lack of those first. The rest is placed
+    /// by the policy, which compares what pixels have with their shares of all samples, carried ones included. The samples of the
+    /// frame sum to the budget exactly. Pixels get different numbers of them, so that frames need seeds of their own:
+    /// [`Self::set_seed`].
+    ///
+    /// It waits for the device, which alone knows what is carried.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] without a history, and for settings under which no budget is placed: a noise threshold, a largest number of
+    /// samples or a policy that chooses; [`Error::Device`].
+    pub fn begin_frame(&self, frame: &mut FrameResources) -> Result<(Vec<PassTime>, Vec<Step>)> {
+        let (settings, film) = (&self.settings, &self.frame.film);
+        let history = self.frame.history()?;
+        let allocate = &settings.allocate;
+        if allocate.is_even() {
+            return Ok((self.run(frame, &Step::Reproject)?, self.steps().skip(1).collect()));
+        }
+        if schedule::list_may_be_short(settings) || allocate.max_spp > 0 {
+            let what = "carried samples count where a budget is placed: set neither noise_threshold nor max_spp, and choose one of the \
+                        policies uniform, geometry, variance and both";
+            return Err(Error::Usage(what.into()));
+        }
+        let times = self.run(frame, &Step::Reproject)?;
+        let have: Vec<u32> = history.carried.read()?.into_iter().map(carried_samples).collect();
+        let lacks: Vec<u32> = have.iter().map(|n| schedule::first_spp(settings).saturating_sub(*n)).collect();
+        let sum = |counts: &[u32]| counts.iter().map(|&n| u64::from(n)).sum();
+        film.counts.count.write(0, &lacks)?;
+        let allocation = self.frame.allocation()?;
+        self.gpu.run(frame, |rec| allocation.scan.record(rec, &film.counts))?;
+        let begun = Begun { placed: sum(&lacks), carried: sum(&have) };
+        Ok((times, schedule::frame(settings, &self.cut(), begun).collect()))
     }
 
     /// Chooses the index of each pixel's first sample in its sequence, from the next [`Step::Start`] or [`Step::Reproject`] on.

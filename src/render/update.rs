@@ -11,7 +11,9 @@ use std::ops::Range;
 
 impl Renderer {
     /// Records the upload of what a pose has changed: see [`Scene::apply`]. Frames that were recorded before keep the scene as it was,
-    /// done or not; what was accumulated belongs to it, so that a [`Step::Start`](super::Step::Start) has to follow. `scene` is
+    /// done or not; what was accumulated belongs to it, so that a [`Step::Start`](super::Step::Start) has to follow. A
+    /// [`Step::Reproject`](super::Step::Reproject) may follow in its place: it carries nothing unless the camera alone has changed, since light
+    /// and the numbers of triangles may have. `scene` is
     /// that of [`Renderer::new`] in another pose.
     ///
     /// Nothing is compiled. Memory is allocated where there is more of something than ever before, such as nodes of a hierarchy or
@@ -34,6 +36,9 @@ impl Renderer {
         }
         let gpu = self.gpu.clone();
         upload(&gpu, rec, &mut self.frame.scene, scene, change)?;
+        if self.frame.history.is_some() && !change.is_of_camera_alone() {
+            rec.fill(&self.frame.film.tiles[0].stats, 0)?; // pixels without samples hand on none
+        }
         self.frame.constants = constants;
         self.frame.priority_push = priority_push(scene, &self.settings);
         self.delta_lights = scene.has_delta_lights();

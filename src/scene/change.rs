@@ -34,6 +34,13 @@ pub struct Deformed {
 }
 
 impl Change {
+    /// Whether nothing but the camera has changed.
+    pub fn is_of_camera_alone(&self) -> bool {
+        let Self { camera: _, nodes, triangles, instances, materials, texels, lights, deformed } = self;
+        let arrays = nodes.is_empty() && triangles.is_empty() && deformed.is_empty();
+        arrays && !(*instances || *materials || *texels || *lights)
+    }
+
     /// Adds what a later pose has changed.
     pub fn add(&mut self, later: Self) {
         self.camera |= later.camera;

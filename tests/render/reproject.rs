@@ -2,6 +2,7 @@
 //! that what is carried is of the right surface. A naive arm, which keeps all samples where they are on the film, fails every
 //! check of truth.
 use crate::moving::{Film, shifted, turned};
+use crate::poses::{Moment, at, pose};
 use crate::support::{self, assert_silent, gpu};
 use crate::twin::Workplace;
 use std::path::Path;
@@ -9,7 +10,7 @@ use tallow::gpu::Gpu;
 use tallow::layout::{Camera, PixelStats};
 use tallow::render::settings::Settings;
 use tallow::render::{Carriage, Outputs, Renderer, Reproject, Step, carried_samples};
-use tallow::scene::{Loaded, Scene};
+use tallow::scene::{Loaded, Pose, Scene};
 
 fn scene(file: &str, change: impl Fn(&mut Settings)) -> Loaded {
     Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file))
@@ -210,6 +211,102 @@ fn limits_hold() {
     let error = film.keep_history(Reproject { reproject_age: 256, ..Reproject::default() }).unwrap_err().to_string();
     assert!(error.contains("reproject-age is 256"), "{error}");
     assert!(film.run(&mut tallow::gpu::FrameResources::new(&gpu).unwrap(), &Step::Reproject).is_err());
+    assert_silent(&gpu);
+}
+
+#[test]
+fn budgets_are_exact_and_fresh_pixels_come_first() {
+    let gpu = gpu();
+    for policy in ["geometry", "variance", "both", "uniform"] {
+        let scene = scene("cornell-box/scene.toml", |s| {
+            small(s);
+            s.allocate.policy = tallow::allocate::policy(policy).unwrap();
+            s.allocate.min_spp = 2;
+        });
+        let mut film = Film::new(&gpu, &scene, Reproject::default());
+        for k in 0..4_u32 {
+            let begun = film.placed_frame(turned(film.camera, 1.5 * k as f32), k);
+            let stats = film.stats();
+            let new: Vec<u32> = stats.iter().zip(&begun).map(|(after, before)| after.count - before.count).collect();
+            assert_eq!(new.iter().sum::<u32>(), 4 * 49 * 33, "{policy} frame {k}: the budget");
+            assert!(stats.iter().all(|s| s.count >= 2), "{policy} frame {k}: the least number");
+            assert!(stats.iter().all(|s| s.mean.iter().chain(&s.m2).all(|v| v.is_finite())), "{policy} frame {k}");
+            // Of those that see the box at all; the sky beside it is without noise.
+            let mean = |fresh: bool| {
+                let seen = |i: &usize| stats[*i].mean[1] > 0.0 && (begun[*i].count == 0) == fresh;
+                let of: Vec<u32> = (0..new.len()).filter(seen).map(|i| new[i]).collect();
+                of.iter().sum::<u32>() as f64 / of.len().max(1) as f64
+            };
+            if k > 1 && policy != "uniform" {
+                assert!(
+                    mean(true) > mean(false) + 0.5,
+                    "{policy} frame {k}: fresh {} carried {}",
+                    mean(true),
+                    mean(false)
+                );
+            }
+        }
+    }
+    let scene = scene("cornell-box/scene.toml", |s| {
+        small(s);
+        s.allocate.policy = tallow::allocate::policy("threshold").unwrap();
+    });
+    let film = Film::new(&gpu, &scene, Reproject::default());
+    let error =
+        film.renderer.begin_frame(&mut tallow::gpu::FrameResources::new(&gpu).unwrap()).unwrap_err().to_string();
+    assert!(error.contains("noise_threshold"), "{error}");
+    assert_silent(&gpu);
+}
+
+/// A bright panel before a dark wall, and a camera that steps aside: samples of the wall whose points the panel hides, and those of
+/// the panel's edges, may not end on the other. No neighbour tells edges here.
+#[test]
+fn what_is_hidden_stays_behind() {
+    let gpu = gpu();
+    let mut scene = Workplace::new().scene(
+        "[camera]\nposition = [-1.5, 0.0, 6.0]\ntarget = [-1.5, 0.0, 0.0]\nfov = 45.0\n[render]\nmax_depth = 2\n\
+         [environment]\nradiance = 1.0\n[[material]]\nname = 'dark'\ncolor = 0.1\n[[material]]\nname = 'bright'\ncolor = 0.9\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'dark'\ntransform = { scale = 30.0, translate = [0.0, 0.0, -3.0] }\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'bright'\ntransform = { scale = 0.9, translate = [0.0, 0.0, 1.0] }\n",
+    );
+    small(&mut scene.settings);
+    let mut film = Film::new(&gpu, &scene, Reproject { reproject_aliasing: 1e9, ..Reproject::default() });
+    film.frame(film.camera);
+    film.frame(shifted(film.camera, [3.0, 0.0, 0.0]));
+    let found = film.renderer.carriage().unwrap();
+    assert!(found.carried > 700 && found.hidden > 50, "control: {found:?}");
+    let guide = film.renderer.film().tiles[0].guide.read().unwrap();
+    let surface = |object: u32| if object == 0 { 0.0..0.75 } else { 0.25..1.0 }; // pixels at edges show both
+    let (stats, words) = (film.stats(), film.carried());
+    let wrong = |i: &usize| !surface(guide[*i].object).contains(&stats[*i].mean[1]);
+    let carried: Vec<usize> = (0..guide.len()).filter(|&i| carried_samples(words[i]) > 0).collect();
+    let wrong = carried.iter().filter(|i| wrong(i)).count();
+    assert!(wrong * 50 < carried.len(), "{wrong} of {} show the other: {found:?}", carried.len());
+}
+
+/// Light that has changed leaves no ghost, wherever it came from; a camera that moves by a pose carries as any does.
+#[test]
+fn a_changed_scene_begins_anew() {
+    let gpu = gpu();
+    let before = Moment { light: 2.5, ..Moment::default() };
+    for (dim, keeps) in [(true, false), (false, true)] {
+        let mut scene = at(&before);
+        let mut film = Film::new(&gpu, &scene, Reproject::default());
+        film.frame(film.camera);
+        let next = Moment { light: if dim { 0.01 } else { 2.5 }, step: 0.05, ..before };
+        let whole = pose(&scene, &next, 1.0);
+        let change = match dim {
+            true => scene.apply(&whole).unwrap(),
+            false => scene.apply(&Pose { camera: whole.camera, ..Pose::default() }).unwrap(),
+        };
+        film.record(|renderer, rec| renderer.update(rec, &scene, &change));
+        let camera = scene.camera([48, 32]).unwrap();
+        film.begin(camera);
+        let found = film.renderer.carriage().unwrap();
+        assert!(if keeps { found.carried > 200 } else { found.carried == 0 }, "dim {dim}: {found:?}");
+        let seen = film.stats();
+        assert!(keeps || seen.iter().all(|s| *s == PixelStats::default()), "nothing is left of the light");
+    }
     assert_silent(&gpu);
 }
 

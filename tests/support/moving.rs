@@ -1,7 +1,7 @@
 //! Cameras that move, and renderers whose frames follow them.
 #![allow(dead_code)]
 use glam::{Quat, Vec3};
-use tallow::gpu::{FrameResources, Gpu};
+use tallow::gpu::{FrameResources, Gpu, Recorder};
 use tallow::layout::{Camera, PixelLight, PixelStats, SurfacePoint};
 use tallow::render::{Outputs, Renderer, Reproject, Step};
 use tallow::scene::Loaded;
@@ -23,6 +23,7 @@ pub fn shifted(camera: Camera, by: [f32; 3]) -> Camera {
 /// A renderer whose frames begin with the last one's samples.
 pub struct Film {
     pub renderer: Renderer,
+    gpu: Gpu,
     frame: FrameResources,
     pub camera: Camera,
     /// Whether the next frame is the first.
@@ -35,11 +36,17 @@ impl Film {
         let mut renderer = Renderer::new(gpu, scene, &scene.settings, outputs).unwrap();
         renderer.keep_history(settings).unwrap();
         let camera = scene.camera([scene.settings.width, scene.settings.height]).unwrap();
-        Self { renderer, frame: FrameResources::new(gpu).unwrap(), camera, begun: false }
+        Self { gpu: gpu.clone(), renderer, frame: FrameResources::new(gpu).unwrap(), camera, begun: false }
     }
 
     pub fn step(&mut self, step: &Step) {
         self.renderer.run(&mut self.frame, step).unwrap();
+    }
+
+    /// Runs what changes the renderer as it is recorded.
+    pub fn record(&mut self, record: impl FnOnce(&mut Renderer, &mut Recorder) -> tallow::error::Result<()>) {
+        let (gpu, renderer) = (&self.gpu, &mut self.renderer);
+        gpu.run(&mut self.frame, |rec| record(renderer, rec)).unwrap();
     }
 
     /// Renders a frame from `camera`, with samples that no frame before had.
@@ -51,6 +58,16 @@ impl Film {
         let (first, spp) = (self.renderer.settings().first_sample, self.renderer.settings().spp);
         self.renderer.set_first_sample(first + spp);
         self.begun = true;
+    }
+
+    /// Renders a frame from `camera` by a policy, with a seed of its own. Returns what it began with.
+    pub fn placed_frame(&mut self, camera: Camera, seed: u32) -> Vec<PixelStats> {
+        self.renderer.set_camera(camera).unwrap();
+        self.renderer.set_seed(seed);
+        let (_, steps) = self.renderer.begin_frame(&mut self.frame).unwrap();
+        let begun = self.stats();
+        steps.iter().for_each(|step| self.step(step));
+        begun
     }
 
     /// Begins a frame from `camera`, and renders nothing.

@@ -44,8 +44,27 @@ pub(super) fn rounds(settings: &Settings, cut: &Cut, done: u32) -> Box<dyn Itera
     match settings.allocate.policy.placing {
         Placing::Chosen => Box::new(choices(settings, cut, done)),
         Placing::Learning if settings.allocate.noise_threshold > 0.0 => Box::new(needed(settings, cut, done)),
-        placing => Box::new(allocated(settings, placing == Placing::Learning, cut, done)),
+        placing => {
+            let placed = u64::from(first_spp(settings)) * u64::from(cut.pixels);
+            Box::new(allocated(settings, placing == Placing::Learning, cut, done, Begun { placed, carried: 0 }))
+        }
     }
+}
+
+/// What a frame begins with, before any of its rounds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Begun {
+    /// Samples of the frame that its pixels have got, or are about to get, for their least number.
+    pub placed: u64,
+    /// Samples of earlier frames.
+    pub carried: u64,
+}
+
+/// The rest of a frame that begins with samples of earlier ones: what its pixels lack of their least number is listed, and then all
+/// that is left of its budget is placed. Of policies that place a budget.
+pub fn frame(settings: &Settings, cut: &Cut, begun: Begun) -> impl Iterator<Item = Step> + use<> {
+    let learns = settings.allocate.policy.placing == Placing::Learning;
+    deal(begun.placed, 1, cut.paths).chain(allocated(settings, learns, cut, 0, begun))
 }
 
 /// As the paper has it: the threshold is 1 after the least number of samples and falls to 0 at the largest.
@@ -86,11 +105,16 @@ fn needed(settings: &Settings, cut: &Cut, done: u32) -> impl Iterator<Item = Ste
     (done..rounds).flat_map(move |_| once(Step::Allocate(plan)).chain(deal(budget, 1, paths)))
 }
 
-fn allocated(settings: &Settings, learns: bool, cut: &Cut, done: u32) -> impl Iterator<Item = Step> + use<> {
+fn allocated(
+    settings: &Settings,
+    learns: bool,
+    cut: &Cut,
+    done: u32,
+    Begun { placed: first, carried }: Begun,
+) -> impl Iterator<Item = Step> + use<> {
     let Cut { pixels, paths, .. } = *cut;
-    let first = u64::from(first_spp(settings)) * u64::from(pixels);
     let rest = (u64::from(settings.spp) * u64::from(pixels)).saturating_sub(first);
-    let rounds = round_count(settings, learns, settings.spp - first_spp(settings));
+    let rounds = round_count(settings, learns, (rest / u64::from(pixels.max(1))) as u32);
     let (all, dealt) = if learns { (rounds, 1) } else { (1, rounds) };
     let limit = limit(settings);
     let room = u64::from(limit) * u64::from(pixels);
@@ -102,7 +126,7 @@ fn allocated(settings: &Settings, learns: bool, cut: &Cut, done: u32) -> impl It
             pixels,
             budget,
             limit: fills.then_some(limit),
-            share: if learns { Share::All(total) } else { Share::Next },
+            share: if learns { Share::All(total + carried) } else { Share::Next },
             rounds: if fills { REFILLS } else { 1 },
         };
         once(Step::Allocate(plan)).chain(deal(budget, dealt, paths))
