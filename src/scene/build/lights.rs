@@ -1,4 +1,4 @@
-//! The list of lights and the table that chooses one in proportion to its power.
+//! The list of lights and the table that chooses one in proportion to its power, delta lights [`DELTA_WEIGHT`] times as often.
 //!
 //! Power, by luminance, in watts up to a common factor: emissive triangle or sphere `pi * area * L` (front side, L the mean over
 //! its texture times the mean opacity), point `4 pi I`, spot `2 pi I (1 - mean of the two cosines)`, directional
@@ -57,7 +57,7 @@ pub fn weigh(scene: &mut Scene) {
 pub fn list(scene: &mut Scene) -> Result<()> {
     let mut lights = scene.rig.lights.clone();
     add_triangles(scene, &mut lights)?;
-    let mut powers: Vec<f64> = lights.iter().map(|l| power(scene, l)).collect();
+    let mut powers: Vec<f64> = lights.iter().map(|l| weight(l) * power(scene, l)).collect();
     let mut kept = powers.iter();
     lights.retain(|_| kept.next().is_some_and(|&p| p > 0.0));
     powers.retain(|&p| p > 0.0);
@@ -133,6 +133,15 @@ const LARGE: f64 = 0.01;
 pub fn is_large(scene: &Scene, light: &Light) -> bool {
     let [low, high] = scene.bounds.map(|b| Vec3::from(b).as_dvec3());
     light.kind == LIGHT_TRIANGLE && geometry::area([light.a, light.b, light.c]) > LARGE * (high - low).length_squared()
+}
+
+/// How much more often than by their power delta lights are chosen. Lamps and sky are found by BSDF sampling as well, delta lights by
+/// light sampling alone. Measured at 8 samples a pixel (`scenes/grass`, sun and sky): weights of 1, 4, 8 and 16 leave a relMSE of .0216, .0135,
+/// .0120 and .0112; Crytek Sponza at 4 samples behaves alike. More would starve lamps beside a strong sun.
+const DELTA_WEIGHT: f64 = 8.0;
+
+fn weight(light: &Light) -> f64 {
+    if matches!(light.kind, LIGHT_POINT | LIGHT_SPOT | LIGHT_DIRECTIONAL) { DELTA_WEIGHT } else { 1.0 }
 }
 
 /// Power of a light, by the formulas of the module documentation.
