@@ -21,6 +21,7 @@
 //! - [`statistics`]: what is known of a pixel after some of its samples.
 //! - [`settings`]: the tables in which settings have their ranges, defaults and descriptions.
 //! - [`cost`]: how much time buys how much accuracy, measured.
+//! - [`plan`](mod@plan): what to render for a time or an error that is given.
 //! - [`report`]: tables of GPU time, traces, and web pages.
 //! - [`profile`]: where a frame's time goes, how near its passes are to what the device can do, and what changed.
 //! - [`error`]: what can fail, and the exit codes for it.
@@ -42,6 +43,7 @@ mod machine;
 #[doc(hidden)] // an engine needs no kernel's mathematics; tests and benches do
 pub mod math;
 mod memory;
+pub mod plan;
 pub mod profile;
 pub mod render;
 pub mod report;

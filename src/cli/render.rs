@@ -1,5 +1,6 @@
 //! `tallow render`: a scene becomes image files.
 pub mod outputs;
+mod planned;
 mod shot;
 mod spans;
 mod summary;
@@ -64,6 +65,17 @@ pub struct Args {
     /// Filter the image as `tallow filter` does with the file; the noisy one stays as the layer "Noisy Image"
     #[arg(long, value_name = "FILTER")]
     pub denoise: Option<Method>,
+    /// Render the best image within a GPU time, such as 200ms, 2s or "1m 30s": a short probe of the scene on this device tells how many
+    /// samples fit, and whether to filter (with --denoise, that filter is taken)
+    #[arg(long, value_name = "DURATION", value_parser = planned::duration,
+          conflicts_with_all = ["error", "spp", "resume", "pixel"])]
+    pub time: Option<Duration>,
+    /// Render in the least time an image of this relMSE, which is estimated without a reference
+    #[arg(long, value_name = "RELMSE", conflicts_with_all = ["spp", "resume", "pixel"])]
+    pub error: Option<f64>,
+    /// With --time or --error: where to write what was planned. Without: the plan to render, to the same bits
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["spp", "resume", "pixel"])]
+    pub plan: Option<PathBuf>,
     /// Render only the pixel in this column and row, with the samples that it has in the whole image, wherever those were
     /// placed: --spp says how many
     #[arg(long, value_name = "X,Y", value_parser = pixel,
@@ -110,15 +122,25 @@ pub fn run(args: &Args) -> Result<Exit> {
     outputs::check(args)?;
     args.denoise.map_or(Ok(()), Method::check)?;
     let mut host = Spans::default();
+    let plan = planned::read(args)?;
     let (scene, settings) = host.time("load scene", || load(args))?;
+    let settings = plan.as_ref().map_or(Ok(settings), |plan| planned::settings(args, plan, &scene))?;
     let earlier = args.resume.as_deref().map(|path| Checkpoint::read(path, &scene, &settings)).transpose()?;
     if args.common.talkative() {
         scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
     }
     let gpu = host.time("open device", || args.common.open())?;
     check_room(args, &settings, &gpu)?;
-    let renderer = host.time("upload and compile", || renderer(args, &gpu, &scene, &settings))?;
-    let taken = shoot(args, &gpu, &scene, &renderer, earlier.as_ref(), host)?;
+    let plan = match plan {
+        Some(plan) => Some(plan),
+        None => host.time("plan", || planned::make(args, &gpu, &scene, &settings))?,
+    };
+    let (args, settings) = &planned::applied(args, settings, plan.as_ref())?;
+    let renderer = host.time("upload and compile", || renderer(args, &gpu, &scene, settings))?;
+    let mut taken = shoot(args, &gpu, &scene, &renderer, earlier.as_ref(), host)?;
+    if let Some(taken) = &mut taken {
+        taken.outcome.plan = plan;
+    }
     // The film is all that is left to write and to filter, and large films need the memory.
     drop(renderer);
     taken.map_or(Ok(Exit::Interrupted), |mut taken| taken.finish(args))
@@ -158,7 +180,7 @@ pub fn shoot<'a>(
     let seconds = host.seconds("render");
     let film = host.time("read back", || shot.film(&status, seconds))?;
     let counters = args.counters.then(|| renderer.counters()).transpose()?;
-    let outcome = Outcome { gpu, scene, film, host, status, counters };
+    let outcome = Outcome { gpu, scene, film, host, status, counters, plan: None };
     Ok(Some(Taken { outcome, noisy, files, checkpoint }))
 }
 
@@ -175,7 +197,7 @@ impl Taken<'_> {
     pub fn finish(&mut self, args: &Args) -> Result<Exit> {
         let Self { outcome, noisy, files, checkpoint } = self;
         let whole = outcome.status.stopped != StopReason::Interrupted;
-        let Outcome { gpu, film, host, status, .. } = &mut *outcome;
+        let Outcome { gpu, film, host, status, plan, .. } = &mut *outcome;
         let mut written = host.time("write", || Ok(outputs::save(args, film, files, checkpoint.take(), whole)))?;
         // By now what took hours is safe, whatever becomes of the filter.
         if let Some((method, noisy)) = args.denoise.zip(noisy.take()).filter(|_| whole) {
@@ -187,10 +209,11 @@ impl Taken<'_> {
             host.time("write", || Ok(outputs::save(args, film, files, None, true)))?;
         }
         fail_on_messages(gpu)?;
-        let trace: Vec<_> = args.profile.iter().map(|path| host.item(path, gpu, &status.times)).collect();
-        files.save(&trace, whole);
+        let mut more: Vec<_> = args.profile.iter().map(|path| host.item(path, gpu, &status.times)).collect();
+        more.extend(planned::item(args, plan.as_ref())?);
+        files.save(&more, whole);
         written.extend(files.pipe(&outputs::items(args, film), whole));
-        files.pipe(&trace, whole);
+        files.pipe(&more, whole);
         report(args, &outcome.summary(&written))?;
         files.failure().map_or(Ok(()), Err)?;
         if !whole {

@@ -107,7 +107,7 @@ impl Converging {
         if status.stopped == StopReason::Interrupted {
             return Ok(false);
         }
-        self.parts.add(&picture(&self.renderer)?);
+        self.parts.add(&self.renderer.picture()?);
         Ok(true)
     }
 
@@ -135,22 +135,6 @@ impl Converging {
             let _ = self.parts.store(file);
         }
     }
-}
-
-/// Radiance of all pixels that a renderer holds.
-///
-/// # Errors
-/// [`crate::error::Error::Device`].
-pub fn picture(renderer: &Renderer) -> Result<Picture> {
-    let settings = renderer.settings();
-    let mut pixels = Vec::with_capacity(settings.pixels());
-    for tile in &renderer.film().tiles {
-        for window in tile.windows() {
-            let stats = tile.stats.read_range(window.start as usize..window.end as usize)?;
-            pixels.extend(stats.iter().map(|s| s.mean));
-        }
-    }
-    Ok(Picture { width: settings.width, height: settings.height, pixels })
 }
 
 /// Everything that the image depends on.

@@ -1,5 +1,4 @@
 //! Renders the shots of a grid and filters them, with the clock on.
-use super::converge::picture;
 use super::document::{Pass, Run, WarmUp};
 use super::grid::{Candidate, Shot};
 use crate::denoise::{Colour, Noisy, Recipe, Timed, filter, host_bytes, timed};
@@ -149,7 +148,7 @@ impl<'a> Session<'a> {
         };
         let candidate = &self.candidates[point];
         let Some(method) = candidate.filter else {
-            let picture = finite(picture(renderer)?)?;
+            let picture = finite(renderer.picture()?)?;
             return Ok(Measured { point, run, picture, warm_up: *costs, device_bytes: *device_bytes });
         };
         let settings = |scales: &filter::Scales| candidate.filter_settings.scaled_by(scales);

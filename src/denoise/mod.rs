@@ -15,6 +15,7 @@ pub use demodulation::Demodulation;
 pub use denoiser::Denoiser;
 pub use filtered::{Colour, Filtered, Recipe, bytes_per_pixel, host_bytes};
 pub use noisy::{Holds, Noisy};
+pub(crate) use timed::Chain;
 pub use timed::{Timed, timed};
 
 use std::ops::Range;

@@ -25,8 +25,8 @@ pub struct Timed {
     pub device_bytes: u64,
 }
 
-/// The compiled kernels and planes for one image.
-struct Chain<'a> {
+/// The compiled kernels and planes for one image, which may change between runs.
+pub(crate) struct Chain<'a> {
     noisy: Noisy,
     parts: Demodulated,
     filter: Box<dyn Filter>,
@@ -52,7 +52,7 @@ pub fn timed(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Timed> {
     let device_bytes = gpu.allocated_bytes().saturating_sub(before);
     let (_, first_run) = chain.run()?;
     let (times, wall) = chain.run()?;
-    Ok(Timed { colour: colour(&chain.parts.picture)?, times, wall, compile, first_run, device_bytes })
+    Ok(Timed { colour: chain.colour()?, times, wall, compile, first_run, device_bytes })
 }
 
 /// The same for Open Image Denoise: its own pass is timed by the host's clock, and loading the library is part of the first run.
@@ -84,7 +84,11 @@ fn timed_on_host(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Timed> {
 }
 
 impl<'a> Chain<'a> {
-    fn new(gpu: &'a Gpu, noisy: Noisy, recipe: &Recipe, row: &Row) -> Result<Self> {
+    /// Its settings are scaled to the image as it is now.
+    ///
+    /// # Errors
+    /// Those of [`timed`].
+    pub(crate) fn new(gpu: &'a Gpu, noisy: Noisy, recipe: &Recipe, row: &Row) -> Result<Self> {
         filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
         let demodulation = recipe.demodulation(noisy.holds());
         let in_paint = demodulation == Demodulation::Light && noisy.lacks_direct_light()?;
@@ -102,11 +106,22 @@ impl<'a> Chain<'a> {
     }
 
     /// All passes in one command buffer, as an engine would record them.
-    fn run(&self) -> Result<(Vec<PassTime>, Duration)> {
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub(crate) fn run(&self) -> Result<(Vec<PassTime>, Duration)> {
         let mut frame = FrameResources::new(self.gpu)?;
         let begun = Instant::now();
         let times = self.gpu.run(&mut frame, |rec| self.record(rec))?;
         Ok((times, begun.elapsed()))
+    }
+
+    /// What the last run made of the image.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub(crate) fn colour(&self) -> Result<Colour> {
+        colour(&self.parts.picture)
     }
 
     fn record(&self, rec: &mut Recorder) -> Result<()> {

@@ -4,7 +4,7 @@ use crate::math::srgb::srgb_from_linear;
 use serde::Serialize;
 
 /// Added to the denominator of relMSE, so that black reference pixels do not divide by 0.
-const RELMSE_EPSILON: f64 = 0.01;
+pub(crate) const RELMSE_EPSILON: f64 = 0.01;
 
 /// Every metric of one comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

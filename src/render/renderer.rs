@@ -3,6 +3,7 @@
 use crate::allocate::HostInputs;
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu, PassTime, Recorder};
+use crate::image::Picture;
 use crate::layout::{Apportionment, Camera, Effects, PixelStats, PriorityPush};
 use crate::render::buffers::{DeviceScene, FilmBuffers};
 use crate::render::frame::{self, Frame};
@@ -125,6 +126,27 @@ impl Renderer {
     /// is cut into batches.
     pub fn steps(&self) -> impl Iterator<Item = Step> + use<> {
         schedule::steps(&self.settings, &self.cut())
+    }
+
+    /// Steps behind [`Step::Start`] that give every pixel `count` samples, from its sample `first` on ([`Settings::first_sample`] not
+    /// counted). Who renders so decides from frame to frame how many there are; the buffers are those for [`Settings::spp`].
+    pub fn samples(&self, first: u32, count: u32) -> impl Iterator<Item = Step> + use<> {
+        schedule::uniform(&self.cut(), self.settings.first_sample.saturating_add(first), count).map(Step::Uniform)
+    }
+
+    /// Reads back the mean radiance of every pixel.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub fn picture(&self) -> Result<Picture> {
+        let mut pixels = Vec::with_capacity(self.settings.pixels());
+        for tile in &self.frame.film.tiles {
+            for window in tile.windows() {
+                let stats = tile.stats.read_range(window.start as usize..window.end as usize)?;
+                pixels.extend(stats.iter().map(|s| s.mean));
+            }
+        }
+        Ok(Picture { width: self.settings.width, height: self.settings.height, pixels })
     }
 
     pub(super) fn cut(&self) -> Cut {

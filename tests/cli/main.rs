@@ -14,6 +14,7 @@ mod filter;
 mod flat;
 mod oidn;
 mod outputs;
+mod plan;
 mod profile;
 mod resume_merge;
 mod sequence;

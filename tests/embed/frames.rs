@@ -7,14 +7,16 @@ use ash::vk::Handle;
 use bytemuck::Pod;
 use std::path::Path;
 use std::process::Command;
+use std::time::Duration;
 use tallow::denoise::filter::{self, FilterSettings};
 use tallow::denoise::{Demodulation, Denoiser, twin};
 use tallow::gpu::{Buffer, FrameResources, Gpu, Location, PixelFormat, Recorder};
 use tallow::image::aov::{Aovs, Names};
 use tallow::image::{self, Film, Samples};
 use tallow::layout::{Camera, Effects, vec3, vec4};
+use tallow::plan::FramePacer;
 use tallow::render::settings::Settings;
-use tallow::render::{Job, Layer, OutputView, Outputs, Renderer};
+use tallow::render::{Job, Layer, OutputView, Outputs, Renderer, Step};
 use tallow::scene::Scene;
 
 const WIDTH: u32 = 65;
@@ -101,6 +103,34 @@ fn agrees(engine: &Engine, gpu: &Gpu, policy: &str) {
     assert_eq!(renderer.set_camera(lens).unwrap_err().exit_code(), 2, "the kernels were compiled for a pinhole");
     let effects = Effects { lens: true, ..*renderer.effects() };
     Renderer::specialised(gpu, &scene, &scene.settings, outputs, effects).unwrap().set_camera(lens).unwrap();
+}
+
+/// However fast the device is, a frame loop settles at the samples that its budget has room for.
+#[test]
+fn an_engine_keeps_a_steady_frame_time() {
+    let engine = Engine::new();
+    // SAFETY: the engine's handles are valid and outlive what is made from them.
+    let gpu = unsafe { Gpu::from_raw(engine.raw()) }.unwrap();
+    let scene = Scene::load(&scene_file()).map(|scene| scene.with(|s| small(s, "uniform"))).unwrap();
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let mut pacer = FramePacer::new(Duration::from_millis(16), 64);
+    let mut chosen = Vec::new();
+    for _ in 0..12 {
+        let samples = pacer.samples();
+        engine.run(|commands| {
+            // SAFETY: the engine's command buffer is in the recording state.
+            let mut rec = unsafe { Recorder::external(&gpu, &mut frame, commands.as_raw()).unwrap() };
+            renderer.record(&mut rec, &Step::Start).unwrap();
+            renderer.samples(0, samples).for_each(|step| renderer.record(&mut rec, &step).unwrap());
+        });
+        pacer.observe_passes(samples, &frame.times().unwrap());
+        chosen.push(samples);
+        let counts = renderer.film().tiles[0].stats.read().unwrap();
+        assert!(counts.iter().all(|s| s.count == samples), "every pixel has the frame's samples");
+    }
+    assert!(chosen[0] == 1 && chosen.iter().all(|n| (1..=64).contains(n)), "{chosen:?}");
+    assert_eq!(engine.messages(), Vec::<String>::new());
 }
 
 /// The layers of the command line's file, as the engine finds them.

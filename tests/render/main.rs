@@ -5,6 +5,7 @@ mod alike;
 mod analytic;
 #[path = "../support/moving.rs"]
 mod moving;
+mod plan;
 mod pose;
 #[path = "../support/poses.rs"]
 mod poses;

@@ -1,5 +1,5 @@
 //! The files that a render writes.
-use super::Args;
+use super::{Args, planned};
 use crate::cli::checkpoint::{self, CheckpointFile};
 use crate::cli::files::{Files, Item, check_distinct};
 use crate::cli::{check_png, complain};
@@ -20,11 +20,13 @@ pub fn check(args: &Args) -> Result<()> {
     args.heatmap.iter().try_for_each(|path| check_png("--heatmap", path))?;
     args.profile.iter().try_for_each(|path| output::check(path))?;
     args.checkpoint.map_or(Ok(()), |_| output::check(&checkpoint))?;
+    planned::to_write(args).map_or(Ok(()), |path| output::check(path))?;
     let (layers, colours): (Vec<_>, Vec<_>) =
         images.iter().map(|path| ("-o", path.as_path())).partition(|(_, path)| image::has_layers(path));
     let maps = args.heatmap.iter().map(|path| ("--heatmap", path.as_path()));
     let traces = args.profile.iter().map(|path| ("--profile", path.as_path()));
-    let others: Vec<_> = colours.into_iter().chain(maps).chain(traces).collect();
+    let plans = planned::to_write(args).map(|path| ("--plan", path));
+    let others: Vec<_> = colours.into_iter().chain(maps).chain(traces).chain(plans).collect();
     let resumed: Vec<_> = args.resume.iter().map(|path| ("--resume", path.as_path())).collect();
     // A resumed file may become the complete one.
     check_distinct(&others, &resumed)?;

@@ -4,6 +4,7 @@ use crate::cli::{print, print_json};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::image::Film;
+use crate::plan::Plan;
 use crate::render::{Counters, Status, StopReason, film};
 use crate::report::table::{self, PassRow};
 use crate::scene::Scene;
@@ -34,6 +35,8 @@ pub struct Summary {
     pub broken_priorities: u32,
     /// Samples that were no number and counted as black, those of a resumed file included.
     pub broken_samples: Option<BrokenSamples>,
+    /// What was planned, where it was.
+    pub plan: Option<Plan>,
     /// Rays and nodes; none without `--counters`.
     pub counters: Option<Counters>,
     /// Wall time of reading the scene and building its hierarchy.
@@ -44,6 +47,8 @@ pub struct Summary {
     pub seconds: f64,
     /// Name of the device.
     pub device: String,
+    /// GPU time of all passes in milliseconds.
+    pub gpu_ms: f64,
     /// GPU time by pass.
     pub passes: Vec<PassRow>,
     /// What was repaired in the scene.
@@ -64,12 +69,14 @@ pub struct Outcome<'a> {
     pub status: Status,
     /// Rays and nodes, where they were counted.
     pub counters: Option<Counters>,
+    /// What was planned, where it was.
+    pub plan: Option<Plan>,
 }
 
 impl Outcome<'_> {
     /// In numbers, with the files that were written.
     pub fn summary(&self, written: &[PathBuf]) -> Summary {
-        let Self { gpu, scene, film, host, status, counters } = self;
+        let Self { gpu, scene, film, host, status, counters, plan } = self;
         let counts = film::counts(film, "samples").unwrap_or_default();
         Summary {
             files: written.iter().map(|f| f.display().to_string()).collect(),
@@ -82,11 +89,13 @@ impl Outcome<'_> {
             stopped: status.stopped,
             broken_priorities: status.broken_priorities,
             broken_samples: status.broken_samples,
+            plan: plan.clone(),
             counters: *counters,
             load_seconds: host.seconds("load scene"),
             compile_seconds: host.seconds("upload and compile"),
             seconds: host.seconds("render"),
             device: gpu.info().name.clone(),
+            gpu_ms: status.times.iter().map(|pass| pass.duration_ns() as f64 * 1e-6).sum(),
             passes: table::summarise(&status.times),
             warnings: scene.warnings.clone(),
         }
@@ -115,6 +124,7 @@ fn text(s: &Summary) -> String {
         let mean = s.samples as f64 / (f64::from(s.width) * f64::from(s.height));
         text += &format!("{} to {} samples per pixel, {mean:.2} on average\n", s.least_samples, s.most_samples);
     }
+    text += &s.plan.as_ref().map_or_else(String::new, |plan| plan_lines(plan, s.gpu_ms));
     text += &stop_line(s.stopped);
     if s.broken_priorities > 0 {
         text += &format!("warning: {} priorities were not finite and counted for nothing\n", s.broken_priorities);
@@ -124,6 +134,12 @@ fn text(s: &Summary) -> String {
         text += &format!("{} closest-hit rays, {} any-hit rays, {per_ray:.1} nodes each\n", c.closest, c.any);
     }
     text + &table::timing_table(&s.passes)
+}
+
+/// What was planned, and what came of it.
+fn plan_lines(plan: &Plan, took: f64) -> String {
+    let reasons: String = plan.reasons().into_iter().map(|line| line + "\n").collect();
+    format!("{reasons}it took {took:.1} ms of GPU time\n")
 }
 
 /// What is worth saying of why it ended, with a line break; nothing when all went as planned. An interruption is told when it

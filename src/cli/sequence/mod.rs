@@ -79,7 +79,14 @@ impl Args {
     }
 
     fn check(&self) -> Result<()> {
-        let of_one = [("--resume", self.render.resume.is_some()), ("--pixel", self.render.pixel.is_some())];
+        let render = &self.render;
+        let of_one = [
+            ("--resume", render.resume.is_some()),
+            ("--pixel", render.pixel.is_some()),
+            ("--time", render.time.is_some()),
+            ("--error", render.error.is_some()),
+            ("--plan", render.plan.is_some()),
+        ];
         if let Some((option, _)) = of_one.iter().find(|(_, given)| *given) {
             return Err(Error::Usage(format!(
                 "{option} is for one image: a sequence goes on where it stopped by itself"

@@ -1,0 +1,94 @@
+//! What a method will take and reach with more samples than a probe took: time is linear in samples, error a power of them.
+use super::probe::Level;
+use crate::render::settings::Settings;
+
+/// Powers of the number of samples by which error falls. Without a filter it is 1 for independent samples and up to about 1.6 for Sobol
+/// points; what a filter blurs for good falls more slowly.
+const POWERS: [f64; 2] = [0.2, 1.6];
+/// Where one level alone was measured.
+const USUAL_POWER: f64 = 1.0;
+/// Errors below this are rounding.
+const LEAST_ERROR: f64 = 1e-12;
+
+/// Time and error of a method by samples per pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct Forecast {
+    /// Milliseconds that do not depend on samples.
+    fixed: f64,
+    /// Milliseconds of a sample of every pixel.
+    per_sample: f64,
+    /// Samples at which the error was measured last.
+    spp: f64,
+    error: f64,
+    power: f64,
+}
+
+impl Forecast {
+    /// From the levels of a probe, fewest samples first.
+    pub fn new(levels: &[Level], method: usize) -> Self {
+        let last = &levels[levels.len() - 1];
+        let error = |level: &Level| level.methods[method].error.max(LEAST_ERROR);
+        let power = match levels {
+            [.., before, last] => {
+                let samples = f64::from(last.spp) / f64::from(before.spp);
+                ((error(before) / error(last)).ln() / samples.ln()).clamp(POWERS[0], POWERS[1])
+            }
+            _ => USUAL_POWER,
+        };
+        Self {
+            fixed: last.start_ms + last.methods[method].ms,
+            per_sample: last.samples_ms / f64::from(last.spp),
+            spp: f64::from(last.spp),
+            error: error(last),
+            power,
+        }
+    }
+
+    /// GPU time in milliseconds.
+    pub fn time_of(&self, spp: u32) -> f64 {
+        self.fixed + self.per_sample * f64::from(spp)
+    }
+
+    /// RelMSE.
+    pub fn error_of(&self, spp: u32) -> f64 {
+        self.error * (self.spp / f64::from(spp)).powf(self.power)
+    }
+
+    /// Samples that fit a time; none if not even one does.
+    pub fn samples_within(&self, ms: f64) -> Option<u32> {
+        let samples = ((ms - self.fixed) / self.per_sample).floor();
+        (samples >= 1.0).then(|| samples.min(f64::from(Settings::MAX_SPP)) as u32)
+    }
+
+    /// Samples that reach an error; none if more were needed than a pixel can have.
+    pub fn samples_for(&self, error: f64) -> Option<u32> {
+        let samples = (self.spp * (self.error / error).powf(1.0 / self.power)).ceil().max(1.0);
+        (samples <= f64::from(Settings::MAX_SPP)).then_some(samples as u32)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::probe::Measured;
+    use super::*;
+
+    fn level(spp: u32, error: f64) -> Level {
+        let methods = vec![Measured { error, ms: 30.0 }];
+        Level { spp, start_ms: 5.0, samples_ms: 10.0 * f64::from(spp), methods }
+    }
+
+    #[test]
+    fn time_is_a_line_and_error_a_power() {
+        let forecast = Forecast::new(&[level(1, 0.4), level(4, 0.1)], 0);
+        assert_eq!(forecast.time_of(10), 135.0);
+        assert_eq!(forecast.samples_within(135.0), Some(10));
+        assert_eq!((forecast.samples_within(134.9), forecast.samples_within(44.0)), (Some(9), None));
+        assert!((forecast.error_of(16) - 0.025).abs() < 1e-12);
+        assert_eq!((forecast.samples_for(0.0251), forecast.samples_for(9.0)), (Some(16), Some(1)));
+        // As fast as Sobol points, and as slow as what is blurred: the powers have ends.
+        assert!((Forecast::new(&[level(1, 1.0), level(4, 1e-9)], 0).power - 1.6).abs() < 1e-12);
+        let stuck = Forecast::new(&[level(1, 0.1), level(4, 0.1)], 0);
+        assert_eq!(stuck.samples_for(1e-6), None);
+        assert_eq!(Forecast::new(&[level(2, 0.1)], 0).samples_for(0.05), Some(4));
+    }
+}

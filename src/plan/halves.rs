@@ -1,0 +1,96 @@
+//! Errors without a reference: two images of the same expectation that share no random numbers tell how far each is from it.
+use crate::image::metrics::RELMSE_EPSILON;
+use rayon::prelude::*;
+
+/// An image's pixels, linear radiance.
+pub type Pixels = [[f32; 3]];
+
+/// Around each pixel, how many are averaged for what errors are relative to.
+const REACH: usize = 2;
+
+/// What squared errors are divided by: the square of the radiance, smoothed over 5 x 5 pixels of the mean of both images, plus
+/// relMSE's constant. Unsmoothed, noise would make dark pixels count too much.
+pub fn scales(width: usize, [a, b]: [&Pixels; 2]) -> Vec<[f64; 3]> {
+    let height = a.len() / width.max(1);
+    let scale = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        let columns = x.saturating_sub(REACH)..(x + REACH + 1).min(width);
+        let rows = y.saturating_sub(REACH)..(y + REACH + 1).min(height);
+        let count = (columns.len() * rows.len()) as f64;
+        let mut sum = [0.0; 3];
+        for j in rows.flat_map(|row| columns.clone().map(move |column| row * width + column)) {
+            (0..3).for_each(|c| sum[c] += 0.5 * (f64::from(a[j][c]) + f64::from(b[j][c])));
+        }
+        sum.map(|sum| (sum / count).powi(2) + RELMSE_EPSILON)
+    };
+    (0..a.len()).into_par_iter().map(scale).collect()
+}
+
+/// Relative mean square error of either of two unbiased images: half the square of their difference.
+pub fn error([a, b]: [&Pixels; 2], scales: &[[f64; 3]]) -> f64 {
+    mean(scales, |i, c| 0.5 * (f64::from(a[i][c]) - f64::from(b[i][c])).powi(2))
+}
+
+/// Relative mean square error of either of two filtered images, whose bias counts too. A filtered image `f_a` and the unfiltered one
+/// `b` of the other half share no noise, so that `E[f_a b] = E[f_a] r` for the true radiance `r`, and
+/// `E[(f_a - r)^2] = E[f_a^2] - 2 E[f_a b] + E[a b]`. Bright outliers of `a` and `b` enter by themselves, not squared.
+pub fn error_of_filtered([fa, fb]: [&Pixels; 2], [a, b]: [&Pixels; 2], scales: &[[f64; 3]]) -> f64 {
+    mean(scales, |i, c| {
+        let [fa, fb, a, b] = [fa, fb, a, b].map(|image| f64::from(image[i][c]));
+        0.5 * (fa * fa + fb * fb) - fa * b - fb * a + a * b
+    })
+}
+
+fn mean(scales: &[[f64; 3]], square: impl Fn(usize, usize) -> f64) -> f64 {
+    let sum: f64 =
+        (0..scales.len()).flat_map(|i| (0..3).map(move |c| (i, c))).map(|(i, c)| square(i, c) / scales[i][c]).sum();
+    sum / (3 * scales.len()).max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(values: &[f32]) -> Vec<[f32; 3]> {
+        values.iter().map(|&v| [v; 3]).collect()
+    }
+
+    #[test]
+    fn a_worked_example() {
+        // Two pixels of true radiance 1: noise of +-1, and a filter that halves it and darkens by .2.
+        let (a, b) = (image(&[2.0, 0.0]), image(&[0.0, 2.0]));
+        let (fa, fb) = (image(&[1.3, 0.3]), image(&[0.3, 1.3]));
+        let scales = scales(2, [&a, &b]);
+        assert!((scales[0][0] - 1.01).abs() < 1e-12);
+        assert!((error([&a, &b], &scales) - 2.0 / 1.01).abs() < 1e-9);
+        // By hand: (1.69 + .09) / 2 - 0 - .3 * 2 + 0 and the same of the other pixel.
+        let found = error_of_filtered([&fa, &fb], [&a, &b], &scales);
+        assert!((found - (0.89 - 0.6) / 1.01).abs() < 1e-6, "{found}");
+    }
+
+    #[test]
+    fn estimates_are_those_of_the_true_radiance() {
+        let mut random = fastrand::Rng::with_seed(5);
+        let (truth, size) = (0.7f32, 200);
+        let mut noisy = || image(&(0..size * size).map(|_| truth + 2.0 * (random.f32() - 0.5)).collect::<Vec<_>>());
+        let (a, b) = (noisy(), noisy());
+        // The mean of 4 x 4 blocks, a tenth too bright.
+        let filter = |image: &[[f32; 3]]| -> Vec<[f32; 3]> {
+            let block = |i: usize| (i / size / 4 * 4, i % size / 4 * 4);
+            let value = |i: usize| {
+                let (y, x) = block(i);
+                let sum: f32 = (0..16).map(|k| image[(y + k / 4) * size + x + k % 4][0]).sum();
+                [1.1 * sum / 16.0; 3]
+            };
+            (0..image.len()).map(value).collect()
+        };
+        let (fa, fb) = (filter(&a), filter(&b));
+        let scales = vec![[1.0; 3]; a.len()];
+        let true_error = |image: &[[f32; 3]]| image.iter().map(|p| f64::from(p[0] - truth).powi(2)).sum::<f64>() / 4e4;
+        let (of_noise, of_filter) = (error([&a, &b], &scales), error_of_filtered([&fa, &fb], [&a, &b], &scales));
+        assert!((of_noise / true_error(&a) - 1.0).abs() < 0.03, "{of_noise}");
+        assert!((of_filter / true_error(&fa) - 1.0).abs() < 0.1, "{of_filter} {}", true_error(&fa));
+        // Control: images that share their noise look free of error.
+        assert!(error([&a, &a], &scales) == 0.0);
+    }
+}

@@ -1,0 +1,233 @@
+//! What to render for a time or an error that is given: samples per pixel, and whether to filter, planned from a short probe of this
+//! scene on this device.
+//!
+//! ```text
+//! probe: two independent images of m samples a pixel, of 4 m, of 16 m ...   error and GPU time of each, filtered and not
+//! plan:  error ~ samples^-p, time = fixed + samples * t                     the method that is cheapest, or most accurate
+//! ```
+//!
+//! [`FramePacer`] is the other planner: it keeps the frames of an engine near a time, from one frame to the next.
+mod forecast;
+mod halves;
+mod pacer;
+mod probe;
+
+pub use pacer::FramePacer;
+
+use crate::denoise::filter::{self, Method};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::render::Outputs;
+use crate::render::settings::Settings;
+use crate::scene::Scene;
+use forecast::Forecast;
+use probe::{Level, Probe};
+use serde::{Deserialize, Serialize};
+
+/// Version of a plan's file.
+const VERSION: u32 = 1;
+
+/// What a render may take, or how good it is to be.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Target {
+    /// GPU time of the render and its filter in milliseconds, above 0. Kernels that a driver compiles at their first use are not
+    /// part of it.
+    GpuMs(f64),
+    /// The image's relMSE (mean of squared errors over the squared radiance plus 0.01), above 0.
+    RelMse(f64),
+}
+
+/// A method, the samples that it would take, and what is expected of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Expected {
+    /// The filter; none without.
+    pub denoise: Option<String>,
+    /// Samples per pixel.
+    pub spp: u32,
+    /// GPU time in milliseconds.
+    pub gpu_ms: f64,
+    /// RelMSE of the image.
+    pub relmse: f64,
+}
+
+/// What is to be rendered, and why.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Of this format.
+    pub version: u32,
+    /// What was asked for.
+    pub target: Target,
+    /// [`Scene::fingerprint`] of the scene.
+    pub scene: String,
+    /// Device that the probe ran on.
+    pub device: String,
+    /// All settings of the render.
+    pub settings: Settings,
+    /// What was chosen.
+    pub chosen: Expected,
+    /// The other methods that could have been.
+    pub others: Vec<Expected>,
+    /// GPU time that the probe took in milliseconds.
+    pub probe_ms: f64,
+}
+
+/// Plans a render of `scene` with `settings`, whose samples per pixel are what is looked for. `methods` are the filters to choose
+/// among, [`filter::find`] of `none` standing for no filter.
+///
+/// # Errors
+/// [`Error::Usage`] for a target out of range or out of reach, for settings that place samples (the probe spreads them evenly), and
+/// for an empty list of methods; [`Error::Device`].
+pub fn plan(gpu: &Gpu, scene: &Scene, settings: &Settings, methods: &[Method], target: Target) -> Result<Plan> {
+    check(settings, methods, target)?;
+    let mut probe = Probe::new(gpu, scene, settings, methods)?;
+    let levels = probe.levels(target)?;
+    let forecasts = forecasts(&levels, methods);
+    let expected = |forecast: &Forecast| match target {
+        Target::GpuMs(ms) => forecast.samples_within(ms),
+        Target::RelMse(error) => forecast.samples_for(error),
+    };
+    let considered = methods.iter().zip(&forecasts).filter_map(|(method, forecast)| {
+        let spp = expected(forecast)?;
+        let denoise = Some(method.name().to_owned()).filter(|name| name != "none");
+        Some(Expected { denoise, spp, gpu_ms: forecast.time_of(spp), relmse: forecast.error_of(spp) })
+    });
+    let mut considered: Vec<Expected> = considered.collect();
+    let cost = |e: &Expected| match target {
+        Target::GpuMs(_) => e.relmse,
+        Target::RelMse(_) => e.gpu_ms,
+    };
+    considered.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+    if considered.is_empty() {
+        return Err(out_of_reach(target, &forecasts));
+    }
+    let chosen = considered.remove(0);
+    Ok(Plan {
+        version: VERSION,
+        target,
+        scene: scene.fingerprint([settings.width, settings.height])?.to_string(),
+        device: gpu.info().name.clone(),
+        settings: Settings { spp: chosen.spp, ..settings.clone() },
+        chosen,
+        others: considered,
+        probe_ms: probe.spent_ms,
+    })
+}
+
+fn check(settings: &Settings, methods: &[Method], target: Target) -> Result<()> {
+    let (value, article, name) = match target {
+        Target::GpuMs(ms) => (ms, "a", "time"),
+        Target::RelMse(error) => (error, "an", "error"),
+    };
+    if !(value.is_finite() && value > 0.0) {
+        return Err(Error::Usage(format!("{article} {name} of {value}: give a number above 0")));
+    }
+    if !settings.allocate.is_even() {
+        let policy = settings.allocate.policy.name;
+        return Err(Error::Usage(format!(
+            "samples placed by \"{policy}\" cannot be planned: choose --allocate uniform"
+        )));
+    }
+    if methods.is_empty() {
+        return Err(Error::Usage("no method to choose among: name a filter, or none".to_owned()));
+    }
+    settings.validate()
+}
+
+fn forecasts(levels: &[Level], methods: &[Method]) -> Vec<Forecast> {
+    (0..methods.len()).map(|method| Forecast::new(levels, method)).collect()
+}
+
+fn out_of_reach(target: Target, forecasts: &[Forecast]) -> Error {
+    let least = forecasts.iter().map(|forecast| forecast.time_of(1)).fold(f64::INFINITY, f64::min);
+    Error::Usage(match target {
+        Target::GpuMs(ms) => {
+            format!(
+                "one sample a pixel takes {least:.3} ms here, {ms} ms were given: allow more, or choose a smaller film"
+            )
+        }
+        Target::RelMse(error) => {
+            format!("a relMSE of {error} takes more than {} samples a pixel: allow more error", Settings::MAX_SPP)
+        }
+    })
+}
+
+/// What a render without a filter needs, and one with.
+pub(crate) fn outputs(methods: &[Method]) -> Outputs {
+    let layers = methods.iter().any(|method| method.name() != "none");
+    Outputs { split_light: layers, guides: layers, counters: false }
+}
+
+impl Plan {
+    /// Reads the text of a plan's file.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with one line for what is no plan, and for one of another version.
+    pub fn parse(text: &str) -> Result<Self> {
+        #[derive(Deserialize)]
+        struct Header {
+            version: u32,
+        }
+        let no_plan = |e: serde_json::Error| Error::Usage(format!("is no plan of tallow: {e}"));
+        let Header { version } = serde_json::from_str(text).map_err(no_plan)?;
+        if version != VERSION {
+            return Err(Error::Usage(format!("is a plan of version {version}, this program knows version {VERSION}")));
+        }
+        let plan: Self = serde_json::from_str(text).map_err(no_plan)?;
+        plan.settings.validate()?;
+        plan.method()?;
+        Ok(plan)
+    }
+
+    /// The text of its file.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when JSON cannot say it (a bug).
+    pub fn text(&self) -> Result<String> {
+        serde_json::to_string_pretty(self).map_err(|e| Error::Usage(e.to_string()))
+    }
+
+    /// Whether it was made for this scene, whatever device is to render it.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for another scene.
+    pub fn check_scene(&self, scene: &Scene) -> Result<()> {
+        let found = scene.fingerprint([self.settings.width, self.settings.height])?.to_string();
+        match found == self.scene {
+            true => Ok(()),
+            false => {
+                Err(Error::Usage("the plan is for another scene, or for this one before it was changed".to_owned()))
+            }
+        }
+    }
+
+    /// The filter, if one was chosen.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a name that no filter has.
+    pub fn method(&self) -> Result<Option<Method>> {
+        let Some(name) = &self.chosen.denoise else { return Ok(None) };
+        let known = Method::all().find(|method| method.name() == name);
+        known.map(Some).ok_or_else(|| Error::Usage(format!("the plan's filter \"{name}\" is not known")))
+    }
+
+    /// What was chosen and why, in one line each.
+    pub fn reasons(&self) -> Vec<String> {
+        let of = |e: &Expected| {
+            let filter =
+                e.denoise.as_ref().map_or_else(|| "without a filter".to_owned(), |name| format!("with {name}"));
+            format!("{} samples a pixel {filter}: relMSE {:.2e} in {:.1} ms", e.spp, e.relmse, e.gpu_ms)
+        };
+        let target = match self.target {
+            Target::GpuMs(ms) => format!("{ms} ms of GPU time"),
+            Target::RelMse(error) => format!("a relMSE of {error}"),
+        };
+        let chosen = format!("planned for {target}: {} (the probe took {:.1} ms)", of(&self.chosen), self.probe_ms);
+        std::iter::once(chosen).chain(self.others.iter().map(|other| format!("rather than {}", of(other)))).collect()
+    }
+}
+
+/// What a render chooses among that names no filter: none, and `auto`.
+pub fn usual_methods() -> Vec<Method> {
+    ["none", "auto"].iter().filter_map(|name| filter::find(name)).map(Method::Kernels).collect()
+}

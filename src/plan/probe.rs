@@ -1,0 +1,204 @@
+//! Renders few samples, twice with different random numbers, and measures time and error.
+use super::halves::{self, Pixels};
+use super::{Target, outputs};
+use crate::denoise::filter::Method;
+use crate::denoise::{Chain, Colour, Noisy, Recipe, timed};
+use crate::error::{Error, Result};
+use crate::gpu::{FrameResources, Gpu, PassTime};
+use crate::render::settings::Settings;
+use crate::render::{Renderer, Step};
+use crate::scene::Scene;
+
+/// Each level has so many times the samples of the one before.
+const GROWTH: u32 = 4;
+/// A level is taken while both of its images together cost no more than this share of the time that is planned for.
+const SHARE: f64 = 0.5;
+/// The first levels are taken whatever they cost: one tells no power.
+const LEAST_LEVELS: usize = 2;
+/// The last level has at least the planned samples over this.
+const REACH: u32 = 16;
+
+/// What a method makes of a level's images.
+#[derive(Clone, Copy, Debug)]
+pub struct Measured {
+    /// RelMSE of one image.
+    pub error: f64,
+    /// GPU milliseconds of its filter, 0 without.
+    pub ms: f64,
+}
+
+/// What images of so many samples cost, and how far they are off.
+#[derive(Clone, Debug)]
+pub struct Level {
+    /// Samples per pixel.
+    pub spp: u32,
+    /// GPU milliseconds before the first sample.
+    pub start_ms: f64,
+    /// GPU milliseconds of all samples.
+    pub samples_ms: f64,
+    /// By method.
+    pub methods: Vec<Measured>,
+}
+
+/// A warm renderer for the probes of one scene.
+pub struct Probe<'a> {
+    gpu: &'a Gpu,
+    renderer: Renderer,
+    frame: FrameResources,
+    methods: &'a [Method],
+    /// By method, from the first image on.
+    chains: Vec<Option<Chain<'a>>>,
+    seeds: [u32; 2],
+    /// GPU milliseconds so far.
+    pub spent_ms: f64,
+}
+
+/// An image, and what each method makes of it.
+struct Image {
+    noisy: Vec<[f32; 3]>,
+    filtered: Vec<Option<Vec<[f32; 3]>>>,
+    start_ms: f64,
+    samples_ms: f64,
+    filter_ms: Vec<f64>,
+}
+
+impl<'a> Probe<'a> {
+    /// Makes the renderer and runs it once, so that its kernels are compiled.
+    ///
+    /// # Errors
+    /// Those of [`Renderer::new`], and [`Error::Device`] for a device that tells no times.
+    pub fn new(gpu: &'a Gpu, scene: &Scene, settings: &Settings, methods: &'a [Method]) -> Result<Self> {
+        if gpu.info().timestamp_bits == 0 {
+            return Err(Error::Device(format!("{} has no timestamps: choose another device", gpu.info().name)));
+        }
+        // Batches are as large as those of a render of many samples.
+        let settings = Settings { spp: Settings::MAX_SPP.min(4096), ..settings.clone() };
+        let renderer = Renderer::new(gpu, scene, &settings, outputs(methods))?;
+        // Their random numbers are not those of the render, which would look as good as it is at the probe's expense.
+        let seeds = [1, 2].map(|k| settings.seed.wrapping_add(k));
+        let frame = FrameResources::new(gpu)?;
+        let mut probe = Self {
+            gpu,
+            renderer,
+            frame,
+            methods,
+            chains: methods.iter().map(|_| None).collect(),
+            seeds,
+            spent_ms: 0.0,
+        };
+        probe.image(probe.seeds[0], 1)?;
+        probe.spent_ms = 0.0;
+        Ok(probe)
+    }
+
+    /// Levels up to what the target needs.
+    ///
+    /// # Errors
+    /// [`Error::Device`], also for pixels that are no numbers.
+    pub fn levels(&mut self, target: Target) -> Result<Vec<Level>> {
+        let mut pairs: Vec<(u32, [Image; 2])> = Vec::new();
+        loop {
+            let spp = pairs.last().map_or(1, |(spp, _)| spp * GROWTH);
+            let [first, second] = self.seeds;
+            pairs.push((spp, [self.image(first, spp)?, self.image(second, spp)?]));
+            let levels = self.judged(&pairs);
+            if pairs.len() >= LEAST_LEVELS && !self.wants_more(&levels, target) {
+                return Ok(levels);
+            }
+        }
+    }
+
+    fn wants_more(&self, levels: &[Level], target: Target) -> bool {
+        let last = &levels[levels.len() - 1];
+        let next_ms = 2.0 * f64::from(GROWTH) * last.samples_ms;
+        let forecasts = super::forecasts(levels, self.methods);
+        match target {
+            Target::GpuMs(ms) => next_ms <= SHARE * ms,
+            Target::RelMse(error) => {
+                let wanted = forecasts.iter().filter_map(|forecast| forecast.samples_for(error)).min();
+                wanted.is_none_or(|wanted| wanted.div_ceil(REACH) > last.spp)
+                    && last.spp < Settings::MAX_SPP / (GROWTH * REACH)
+            }
+        }
+    }
+
+    /// Errors of all levels, relative to the radiance of the last.
+    fn judged(&self, pairs: &[(u32, [Image; 2])]) -> Vec<Level> {
+        let width = self.renderer.settings().width as usize;
+        let best = |image: &Image| image.filtered.iter().flatten().next().unwrap_or(&image.noisy).clone();
+        let [a, b] = pairs[pairs.len() - 1].1.each_ref().map(best);
+        let scales = halves::scales(width, [&a, &b]);
+        let measured = |[a, b]: &[Image; 2], method: usize| {
+            let noisy: [&Pixels; 2] = [&a.noisy, &b.noisy];
+            let error = match (&a.filtered[method], &b.filtered[method]) {
+                (Some(fa), Some(fb)) => halves::error_of_filtered([fa, fb], noisy, &scales),
+                _ => halves::error(noisy, &scales),
+            };
+            Measured { error, ms: a.filter_ms[method].min(b.filter_ms[method]) }
+        };
+        let level = |(spp, pair): &(u32, [Image; 2])| Level {
+            spp: *spp,
+            start_ms: 0.5 * (pair[0].start_ms + pair[1].start_ms),
+            samples_ms: 0.5 * (pair[0].samples_ms + pair[1].samples_ms),
+            methods: (0..self.methods.len()).map(|method| measured(pair, method)).collect(),
+        };
+        pairs.iter().map(level).collect()
+    }
+
+    fn image(&mut self, seed: u32, spp: u32) -> Result<Image> {
+        self.renderer.set_seed(seed);
+        let start_ms = milliseconds(&self.renderer.run(&mut self.frame, &Step::Start)?);
+        let mut samples_ms = 0.0;
+        for step in self.renderer.samples(0, spp) {
+            samples_ms += milliseconds(&self.renderer.run(&mut self.frame, &step)?);
+        }
+        let noisy = finite(self.renderer.picture()?.pixels)?;
+        let mut image = Image { noisy, filtered: Vec::new(), start_ms, samples_ms, filter_ms: Vec::new() };
+        for method in 0..self.methods.len() {
+            let (colour, times) = self.filtered(method)?.unzip();
+            let pixels = colour.map(|[r, g, b]| (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect());
+            image.filtered.push(pixels.map(finite).transpose()?);
+            image.filter_ms.push(times.map_or(0.0, |times| milliseconds(&times)));
+        }
+        self.spent_ms += start_ms + samples_ms + image.filter_ms.iter().sum::<f64>();
+        Ok(image)
+    }
+}
+
+impl Probe<'_> {
+    /// What a method makes of the image that the renderer holds; nothing without a filter. Kernels are compiled once.
+    fn filtered(&mut self, method: usize) -> Result<Option<(Colour, Vec<PassTime>)>> {
+        let recipe = Recipe::new(self.methods[method]);
+        let row = match self.methods[method] {
+            Method::Kernels(row) if row.name == "none" => return Ok(None),
+            Method::Kernels(row) => row,
+            Method::Oidn => {
+                let found = timed(self.gpu, Noisy::of_film(&self.renderer)?, &recipe)?;
+                return Ok(Some((found.colour, found.times)));
+            }
+        };
+        let chain = match self.chains[method].take() {
+            Some(chain) => chain,
+            None => {
+                let chain = Chain::new(self.gpu, Noisy::of_film(&self.renderer)?, &recipe, row)?;
+                chain.run()?;
+                chain
+            }
+        };
+        let (times, _) = chain.run()?;
+        let colour = chain.colour()?;
+        self.chains[method] = Some(chain);
+        Ok(Some((colour, times)))
+    }
+}
+
+fn finite(pixels: Vec<[f32; 3]>) -> Result<Vec<[f32; 3]>> {
+    match pixels.iter().filter(|pixel| !pixel.iter().all(|v| v.is_finite())).count() {
+        0 => Ok(pixels),
+        n => Err(Error::Device(format!("{n} pixels of a probe are NaN or infinite"))),
+    }
+}
+
+fn milliseconds(times: &[PassTime]) -> f64 {
+    times.iter().map(|time| time.duration_ns() as f64 * 1e-6).sum()
+}

@@ -1,0 +1,79 @@
+//! Tests `tallow render --time`, `--error` and `--plan`.
+use crate::command::{complains, stdout, tallow};
+use serde_json::Value;
+use std::path::Path;
+use std::process::Output;
+use tallow::image;
+use tempfile::TempDir;
+
+const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/scene.toml");
+
+fn render(folder: &TempDir, scene: &str, words: &str) -> Output {
+    let words: Vec<_> = ["render", scene].into_iter().chain(words.split_whitespace()).collect();
+    tallow(folder, &words)
+}
+
+const SMALL: &str = "--width 33 --height 32 --max-depth 3";
+
+#[test]
+fn a_plan_is_rendered_and_rendered_again_to_the_same_bits() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = render(&folder, SCENE, &format!("{SMALL} --error 0.02 --plan plan.json -o a.exr"));
+    assert!(first.status.success(), "{first:?}");
+    let text = stdout(&first);
+    assert!(text.contains("planned for a relMSE of 0.02: ") && text.contains("rather than "), "{text}");
+    let plan: Value = serde_json::from_slice(&std::fs::read(folder.path().join("plan.json")).unwrap()).unwrap();
+    assert!(
+        plan["chosen"]["relmse"].as_f64().unwrap() <= 0.0201 && plan["others"].as_array().unwrap().len() == 1,
+        "{plan}"
+    );
+    let again = render(&folder, SCENE, "--plan plan.json -o b.exr --json");
+    let json: Value = serde_json::from_slice(&again.stdout).unwrap();
+    assert!(json["plan"] == plan && json["gpu_ms"].as_f64().unwrap() > 0.0, "{json}");
+    assert_eq!(json["samples"].as_u64().unwrap(), 33 * 32 * plan["chosen"]["spp"].as_u64().unwrap());
+    let picture = |name: &str| image::read(&folder.path().join(name)).unwrap().picture(None).unwrap().pixels;
+    assert!(picture("a.exr") == picture("b.exr"));
+    // Control: other samples are other bits.
+    assert!(render(&folder, SCENE, &format!("{SMALL} --error 0.02 --seed 7 -o c.exr")).status.success());
+    assert!(picture("a.exr") != picture("c.exr"));
+}
+
+#[test]
+fn a_time_decides_the_samples_and_a_given_filter_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let spp = |time: &str| {
+        let output = render(&folder, SCENE, &format!("{SMALL} --time {time} --denoise none -o a.exr --json"));
+        let json: Value = serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{e}: {output:?}"));
+        assert!(
+            json["plan"]["chosen"]["denoise"].is_null() && json["plan"]["others"] == serde_json::json!([]),
+            "{json}"
+        );
+        json["plan"]["chosen"]["spp"].as_u64().unwrap()
+    };
+    // Ten times the time is several times the samples even where other programs run.
+    let [few, many] = ["100ms", "2s"].map(spp);
+    assert!(many > 3 * few, "{few} and {many} samples");
+}
+
+#[test]
+fn what_cannot_be_planned_is_told_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let small = |words: &str| render(&folder, SCENE, &format!("{SMALL} -o a.exr {words}"));
+    complains(&small("--time 1us"), 2, &["one sample a pixel takes", "0.001 ms were given", "smaller film"]);
+    complains(&small("--time 5"), 2, &["--time", "200ms"]);
+    complains(&small("--error=-1"), 2, &["an error of -1", "above 0"]);
+    complains(&small("--error 1e-30"), 2, &["relMSE", "samples a pixel"]);
+    complains(&small("--time 1s --allocate both"), 2, &["\"both\" cannot be planned", "--allocate uniform"]);
+    complains(&small("--time 1s --spp 4"), 2, &["--spp"]);
+    complains(&small("--plan none.json"), 3, &["none.json"]);
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("old.json", "{\"version\": 99}");
+    complains(&small("--plan old.json"), 3, &["old.json", "version 99"]);
+    write("other.json", "[]");
+    complains(&small("--plan other.json"), 3, &["is no plan"]);
+    assert!(small("--error 0.5 --plan plan.json").status.success());
+    let glass = Path::new(SCENE).with_file_name("glass.toml");
+    complains(&render(&folder, glass.to_str().unwrap(), "--plan plan.json -o b.exr"), 2, &["another scene"]);
+    complains(&render(&folder, SCENE, "--plan plan.json --seed 9 -o b.exr"), 2, &["leave out options"]);
+    assert!(!folder.path().join("b.exr").exists());
+}

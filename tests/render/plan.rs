@@ -1,0 +1,59 @@
+//! Tests that errors which are estimated without a reference are those that a reference shows.
+use crate::support;
+use std::path::Path;
+use tallow::denoise::filter::{self, Method};
+use tallow::denoise::{Filtered, Noisy, Recipe};
+use tallow::gpu::Gpu;
+use tallow::image::{Picture, metrics};
+use tallow::plan::{Target, plan};
+use tallow::render::{Outputs, Renderer};
+use tallow::scene::{Loaded, Scene};
+
+const OUTPUTS: Outputs = Outputs { split_light: true, guides: true, counters: false };
+
+fn scene(file: &str, spp: u32, seed: u32) -> Loaded {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file);
+    let small = |s: &mut tallow::render::settings::Settings| {
+        (s.width, s.height, s.spp, s.seed, s.max_depth) = (48, 48, spp, seed, 4);
+    };
+    Scene::load(&path).unwrap().with(small)
+}
+
+fn rendered(gpu: &Gpu, scene: &Loaded, filter: Option<Method>) -> Picture {
+    let renderer = Renderer::new(gpu, scene, &scene.settings, OUTPUTS).unwrap();
+    support::render(gpu, &renderer);
+    let Some(method) = filter else { return renderer.picture().unwrap() };
+    let noisy = Noisy::of_film(&renderer).unwrap();
+    let ([r, g, b], _) = Filtered::new(gpu, noisy, &Recipe::new(method)).unwrap().join(gpu).unwrap();
+    let pixels = (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect();
+    Picture { width: 48, height: 48, pixels }
+}
+
+#[test]
+fn planned_errors_are_true_ones() {
+    let gpu = support::gpu();
+    for (file, error) in [("cornell-box/scene.toml", 0.03), ("veach-mis/scene.toml", 0.05)] {
+        let reference = rendered(&gpu, &scene(file, 2048, 1000), None);
+        for name in ["none", "svgf"] {
+            let method = Method::Kernels(filter::find(name).unwrap());
+            let found =
+                plan(&gpu, &scene(file, 1, 3), &scene(file, 1, 3).settings, &[method], Target::RelMse(error)).unwrap();
+            assert!(found.chosen.relmse <= error * 1.001, "{file}, {name}: {found:?}");
+            let of = Some(method).filter(|_| name != "none");
+            let image = rendered(&gpu, &scene(file, found.chosen.spp, 3), of);
+            let ratio = metrics::relmse(&image, &reference) / found.chosen.relmse;
+            assert!(
+                (1.0 / 1.5..1.5).contains(&ratio),
+                "{file}, {name}: {ratio} of what was expected, {:?}",
+                found.chosen
+            );
+            // Control: a quarter of the samples has another error.
+            if name == "none" && found.chosen.spp >= 8 {
+                let few = rendered(&gpu, &scene(file, found.chosen.spp / 4, 3), of);
+                let ratio = metrics::relmse(&few, &reference) / found.chosen.relmse;
+                assert!(ratio > 2.0, "control: {ratio}");
+            }
+        }
+    }
+    support::assert_silent(&gpu);
+}

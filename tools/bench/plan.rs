@@ -1,0 +1,123 @@
+//! Measures how well `--time` and `--error` are kept: renders what is planned for several times and errors, with several seeds, and
+//! prints GPU time over the time that was given, and true relMSE over the error that was asked for.
+//!   cargo run --release --example bench-plan -- [--reference-spp N] [--runs N] SCENE...
+#![allow(missing_docs)]
+use anyhow::{Context, Result};
+use clap::Parser;
+use std::path::PathBuf;
+use tallow::denoise::{Filtered, Noisy, Recipe};
+use tallow::gpu::{DeviceOptions, FrameResources, Gpu};
+use tallow::image::{Picture, metrics};
+use tallow::plan::{Plan, Target, plan, usual_methods};
+use tallow::profile::median;
+use tallow::render::settings::Settings;
+use tallow::render::{Job, Outputs, Renderer};
+use tallow::scene::{Loaded, Scene};
+
+#[derive(Parser)]
+struct Args {
+    /// Scenes, at their own settings but for the size
+    scenes: Vec<PathBuf>,
+    /// Film size
+    #[arg(long, default_value_t = 256)]
+    width: u32,
+    #[arg(long, default_value_t = 192)]
+    height: u32,
+    /// GPU times in milliseconds
+    #[arg(long, value_delimiter = ',', default_values_t = [500.0, 2000.0])]
+    times: Vec<f64>,
+    /// Values of relMSE
+    #[arg(long, value_delimiter = ',', default_values_t = [0.05, 0.01])]
+    errors: Vec<f64>,
+    /// Seeds
+    #[arg(long, default_value_t = 10)]
+    runs: u32,
+    #[arg(long, default_value_t = 1024)]
+    reference_spp: u32,
+}
+
+/// GPU milliseconds and image of a planned render, as the command line makes it.
+fn rendered(gpu: &Gpu, scene: &Loaded, plan: &Plan) -> Result<(f64, Picture)> {
+    let method = plan.method()?;
+    let layers = method.is_some();
+    let outputs = Outputs { split_light: layers, guides: layers, counters: false };
+    let renderer = Renderer::new(gpu, scene, &plan.settings, outputs)?;
+    let mut times = Job::new(&renderer).run_to_end(&mut FrameResources::new(gpu)?)?.times;
+    let mut picture = renderer.picture()?;
+    if let Some(method) = method {
+        let ([r, g, b], more) = {
+            let filtered = Filtered::new(gpu, Noisy::of_film(&renderer)?, &Recipe::new(method))?;
+            times.extend(filtered.times.iter().copied());
+            filtered.join(gpu)?
+        };
+        times.extend(more.last().copied());
+        picture.pixels = (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect();
+    }
+    Ok((times.iter().map(|time| time.duration_ns() as f64 * 1e-6).sum(), picture))
+}
+
+fn line(what: &str, plans: &[Plan], ratios: &[f64], limits: [f64; 2]) {
+    let within = |limit: f64| ratios.iter().filter(|r| (1.0 / limit..=limit).contains(*r)).count();
+    let [near, far] = limits.map(within);
+    let spp: Vec<_> = plans.iter().map(|p| p.chosen.spp.to_string()).collect();
+    let filtered = plans.iter().filter(|p| p.chosen.denoise.is_some()).count();
+    let all: Vec<_> = ratios.iter().map(|r| format!("{r:.2}")).collect();
+    println!(
+        "  {what}: median {:.3}, {near} of {} within {}, {far} within {}; filtered {filtered}; spp {}; ratios {}",
+        median(ratios),
+        ratios.len(),
+        limits[0],
+        limits[1],
+        spp.join(" "),
+        all.join(" ")
+    );
+}
+
+fn main() -> Result<()> {
+    let args = Args::parse();
+    let gpu = Gpu::open(&DeviceOptions::default())?;
+    println!("device: {}, {}", gpu.info().name, gpu.info().driver_info);
+    for path in &args.scenes {
+        let size = |s: &mut Settings| (s.width, s.height) = (args.width, args.height);
+        let scene = Scene::load(path).with_context(|| path.display().to_string())?.with(size);
+        println!("{}, {}x{}", path.display(), args.width, args.height);
+        for &ms in &args.times {
+            measure(&gpu, &scene, args.runs, Target::GpuMs(ms), None)?;
+        }
+        if args.errors.is_empty() {
+            continue;
+        }
+        let reference = reference(&gpu, &scene, args.reference_spp)?;
+        for &error in &args.errors {
+            measure(&gpu, &scene, args.runs, Target::RelMse(error), Some(&reference))?;
+        }
+    }
+    Ok(())
+}
+
+fn reference(gpu: &Gpu, scene: &Loaded, spp: u32) -> Result<Picture> {
+    let settings = Settings { spp, seed: 99_991, ..scene.settings.clone() };
+    let renderer = Renderer::new(gpu, scene, &settings, Outputs::default())?;
+    Job::new(&renderer).run_to_end(&mut FrameResources::new(gpu)?)?;
+    Ok(renderer.picture()?)
+}
+
+fn measure(gpu: &Gpu, scene: &Loaded, runs: u32, target: Target, reference: Option<&Picture>) -> Result<()> {
+    let (mut plans, mut ratios) = (Vec::new(), Vec::new());
+    for run in 0..runs {
+        let settings = Settings { seed: 10 * run, ..scene.settings.clone() };
+        let planned = plan(gpu, scene, &settings, &usual_methods(), target)?;
+        let (ms, picture) = rendered(gpu, scene, &planned)?;
+        ratios.push(match (target, reference) {
+            (Target::RelMse(error), Some(reference)) => metrics::relmse(&picture, reference) / error,
+            (Target::GpuMs(given), _) => ms / given,
+            (Target::RelMse(_), None) => f64::NAN,
+        });
+        plans.push(planned);
+    }
+    match target {
+        Target::GpuMs(ms) => line(&format!("{ms} ms"), &plans, &ratios, [1.1, 1.2]),
+        Target::RelMse(error) => line(&format!("relMSE {error}"), &plans, &ratios, [1.5, 2.0]),
+    }
+    Ok(())
+}
