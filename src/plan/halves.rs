@@ -5,23 +5,32 @@ use rayon::prelude::*;
 /// An image's pixels, linear radiance.
 pub type Pixels = [[f32; 3]];
 
-/// Around each pixel, how many are averaged for what errors are relative to.
+/// Pixels to each side that the surroundings of a pixel reach.
 const REACH: usize = 2;
 
-/// What squared errors are divided by: the square of the radiance, smoothed over 5 x 5 pixels of the mean of both images, plus
-/// relMSE's constant. Unsmoothed, noise would make dark pixels count too much.
+/// What squared errors are divided by: the square of the radiance, plus relMSE's constant. The radiance is the mean of both images, moved
+/// towards that of 5 x 5 pixels around by the share that noise has in what the two differ by (James and Stein 1961): unmoved, a bright
+/// outlier would divide its own error, and moved wholly, a dark pixel beside a lamp would count for nothing.
 pub fn scales(width: usize, [a, b]: [&Pixels; 2]) -> Vec<[f64; 3]> {
     let height = a.len() / width.max(1);
+    let mean = |i: usize, c: usize| 0.5 * (f64::from(a[i][c]) + f64::from(b[i][c]));
     let scale = |i: usize| {
         let (x, y) = (i % width, i / width);
         let columns = x.saturating_sub(REACH)..(x + REACH + 1).min(width);
         let rows = y.saturating_sub(REACH)..(y + REACH + 1).min(height);
         let count = (columns.len() * rows.len()) as f64;
-        let mut sum = [0.0; 3];
-        for j in rows.flat_map(|row| columns.clone().map(move |column| row * width + column)) {
-            (0..3).for_each(|c| sum[c] += 0.5 * (f64::from(a[j][c]) + f64::from(b[j][c])));
-        }
-        sum.map(|sum| (sum / count).powi(2) + RELMSE_EPSILON)
+        let around = |c: usize| {
+            let sum: f64 =
+                rows.clone().flat_map(|row| columns.clone().map(move |x| row * width + x)).map(|j| mean(j, c)).sum();
+            sum / count
+        };
+        [0, 1, 2].map(|c| {
+            let variance = (f64::from(a[i][c]) - f64::from(b[i][c])).powi(2) / 4.0;
+            let (own, around) = (mean(i, c), around(c));
+            let off = around - own;
+            let share = variance / (variance + off * off + f64::MIN_POSITIVE);
+            (own + share * off).powi(2) + RELMSE_EPSILON
+        })
     };
     (0..a.len()).into_par_iter().map(scale).collect()
 }

@@ -15,6 +15,8 @@ const GROWTH: u32 = 4;
 const SHARE: f64 = 0.5;
 /// The first levels are taken whatever they cost: one tells no power.
 const LEAST_LEVELS: usize = 2;
+/// Levels after which an error that seems out of reach is.
+const MOST_OUT_OF_REACH: usize = 4;
 /// The last level has at least the planned samples over this.
 const REACH: u32 = 16;
 
@@ -116,8 +118,8 @@ impl<'a> Probe<'a> {
             Target::GpuMs(ms) => next_ms <= SHARE * ms,
             Target::RelMse(error) => {
                 let wanted = forecasts.iter().filter_map(|forecast| forecast.samples_for(error)).min();
-                wanted.is_none_or(|wanted| wanted.div_ceil(REACH) > last.spp)
-                    && last.spp < Settings::MAX_SPP / (GROWTH * REACH)
+                // What is out of reach by far is so after few levels.
+                wanted.map_or(levels.len() < MOST_OUT_OF_REACH, |wanted| wanted.div_ceil(REACH) > last.spp)
             }
         }
     }
