@@ -6,5 +6,8 @@ mod frames;
 #[path = "../support/hooks.rs"]
 mod hooks;
 mod job;
+mod moving;
+#[path = "../support/poses.rs"]
+mod poses;
 #[path = "../support/mod.rs"]
 mod support;

@@ -134,6 +134,30 @@ impl Engine {
         }
     }
 
+    /// As [`Self::run`], without waiting: what is returned goes to [`Self::wait`].
+    pub fn submit(&self, record: impl FnOnce(vk::CommandBuffer)) -> (vk::Fence, vk::CommandBuffer) {
+        unsafe {
+            let info = vk::CommandBufferAllocateInfo::default().command_pool(self.pool).command_buffer_count(1);
+            let commands = self.device.allocate_command_buffers(&info).unwrap();
+            self.device.begin_command_buffer(commands[0], &vk::CommandBufferBeginInfo::default()).unwrap();
+            record(commands[0]);
+            self.device.end_command_buffer(commands[0]).unwrap();
+            let fence = self.device.create_fence(&vk::FenceCreateInfo::default(), None).unwrap();
+            let submit = [vk::SubmitInfo::default().command_buffers(&commands)];
+            self.device.queue_submit(self.queue, &submit, fence).unwrap();
+            (fence, commands[0])
+        }
+    }
+
+    /// Waits until a submission is complete.
+    pub fn wait(&self, (fence, commands): (vk::Fence, vk::CommandBuffer)) {
+        unsafe {
+            self.device.wait_for_fences(&[fence], true, u64::MAX).unwrap();
+            self.device.destroy_fence(fence, None);
+            self.device.free_command_buffers(self.pool, &[commands]);
+        }
+    }
+
     /// Leaves the device as it is for ever, with what was left on it.
     pub fn abandon(mut self) {
         self.alone = None;

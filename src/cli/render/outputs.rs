@@ -20,7 +20,7 @@ pub fn check(args: &Args) -> Result<()> {
     args.heatmap.iter().try_for_each(|path| check_png("--heatmap", path))?;
     args.profile.iter().try_for_each(|path| output::check(path))?;
     args.checkpoint.map_or(Ok(()), |_| output::check(&checkpoint))?;
-    planned::to_write(args).map_or(Ok(()), |path| output::check(path))?;
+    planned::to_write(args).map_or(Ok(()), output::check)?;
     let (layers, colours): (Vec<_>, Vec<_>) =
         images.iter().map(|path| ("-o", path.as_path())).partition(|(_, path)| image::has_layers(path));
     let maps = args.heatmap.iter().map(|path| ("--heatmap", path.as_path()));
