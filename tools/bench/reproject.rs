@@ -54,7 +54,8 @@ struct Row {
     arm: &'static str,
     error: f64,
     filtered: f64,
-    /// GPU time of the last frame: in all, and of what begins it with carried samples.
+    /// GPU time of a frame, the median of all but the first two, whose kernels are compiled: in all, and of what begins it with carried
+    /// samples.
     frame_ms: f64,
     reproject_ms: f64,
     carriage: Option<Carriage>,
@@ -63,7 +64,14 @@ struct Row {
 const CARRYING: [&str; 3] = ["remember", "project", "carry"];
 
 fn milliseconds(times: &[PassTime], of: impl Fn(&str) -> bool) -> f64 {
-    times.iter().filter(|t| of(t.name)).map(|t| t.duration_ns() as f64 * 1e-6).sum()
+    times.iter().filter(|t| of(t.name)).fold(0.0, |sum, t| sum + t.duration_ns() as f64 * 1e-6)
+}
+
+/// Median of all frames but the first two.
+fn median(frames: &[[f64; 2]], column: usize) -> f64 {
+    let mut later: Vec<f64> = frames.iter().skip(2).map(|f| f[column]).collect();
+    later.sort_by(f64::total_cmp);
+    later.get(later.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 fn radiance(renderer: &Renderer, size: [u32; 2]) -> Result<Picture> {
@@ -79,7 +87,7 @@ fn run(gpu: &Gpu, scene: &Loaded, arm: &Arm, turn: &Turn, reference: &Picture) -
     let scene = scene.clone().with(|s| {
         s.spp = turn.spp;
         s.allocate.policy = policy(arm.policy).unwrap_or(s.allocate.policy);
-        s.allocate.min_spp = 1;
+        s.allocate.min_spp = 2.min(turn.spp); // of one sample, no noise is known
     });
     let size = [scene.settings.width, scene.settings.height];
     let outputs = Outputs { split_light: true, guides: true, counters: false };
@@ -87,11 +95,11 @@ fn run(gpu: &Gpu, scene: &Loaded, arm: &Arm, turn: &Turn, reference: &Picture) -
     if arm.carries {
         renderer.keep_history(Reproject::default())?;
     }
-    let (first, mut frame, mut times) = (scene.camera(size)?, FrameResources::new(gpu)?, Vec::new());
+    let (first, mut frame, mut frames) = (scene.camera(size)?, FrameResources::new(gpu)?, Vec::new());
     for step in 0..=turn.steps {
         renderer.set_camera(turn.camera(&first, step))?;
         renderer.set_seed(step);
-        times.clear();
+        let mut times = Vec::new();
         let steps: Vec<Step> = match arm.carries {
             true => {
                 let (began, rest) = renderer.begin_frame(&mut frame)?;
@@ -103,6 +111,7 @@ fn run(gpu: &Gpu, scene: &Loaded, arm: &Arm, turn: &Turn, reference: &Picture) -
         for step in &steps {
             times.extend(renderer.run(&mut frame, step)?);
         }
+        frames.push([milliseconds(&times, |_| true), milliseconds(&times, |name| CARRYING.contains(&name))]);
     }
     let picture = radiance(&renderer, size)?;
     let method = Method::all().find(|method| method.name() == "atrous").context("a filter of that name")?;
@@ -114,8 +123,8 @@ fn run(gpu: &Gpu, scene: &Loaded, arm: &Arm, turn: &Turn, reference: &Picture) -
         arm: arm.name,
         error: error(&picture, reference),
         filtered: error(&filtered, reference),
-        frame_ms: milliseconds(&times, |_| true),
-        reproject_ms: milliseconds(&times, |name| CARRYING.contains(&name)),
+        frame_ms: median(&frames, 0),
+        reproject_ms: median(&frames, 1),
         carriage: if arm.carries { Some(renderer.carriage()?) } else { None },
     })
 }
