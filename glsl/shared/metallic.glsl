@@ -147,6 +147,12 @@ vec3 metallic_albedo(Metallic b, float c) {
     return albedo * inner + (smooth_alpha(b.coat_alpha) ? 0.0 : 1.0 - inner);
 }
 
+// Share of the light head on that the surface reflects, of all that comes back.
+float metallic_specular(Metallic b) {
+    float f0 = dot(b.f0, vec3(1.0)), base = dot(b.diffuse + b.through, vec3(1.0));
+    return f0 / max(f0 + base, 1e-10);
+}
+
 // Whether every lobe is a delta.
 bool metallic_is_delta(Metallic b) {
     return smooth_alpha(b.alpha) && b.diffuse == vec3(0.0) && (!has_coat(b) || smooth_alpha(b.coat_alpha));

@@ -229,6 +229,7 @@ float side_of(Surface s, vec3 w) {
 struct Facing {
     vec3 smooth_normal;
     vec3 normal;
+    float shadowed; // share of the lobes that maps shadow, see light_share
 };
 
 const float MIN_ELEVATION = 1e-3; // sine of a direction's elevation above the horizon after bending
@@ -251,7 +252,22 @@ Facing facing_normals(Surface s, vec3 wo, bool turns, bool mirrors) {
         if (MAPS && dot(mapped, wo) < 0.0) mapped = 2.0 * dot(mapped, n) * n - mapped;
     }
     float back = turns ? 1.0 : side;
-    return Facing(back * n, back * mapped);
+    return Facing(back * n, back * mapped, 1.0);
+}
+
+// The normals for a material that reflects the share `specular` of its light at its surface. A map's slope may send the mirror image
+// of `wo` into the surface: of metals, nothing would be left of it, so that slopes would be black. The surface reflects it once
+// more: the normal is that between `wo` and the image turned up again. Nor do maps shadow what a metal mirrors.
+Facing facing_of_metal(Surface s, Facing f, vec3 wo, float specular) {
+    if (!MAPS || s.normal == s.smooth_normal) return f;
+    f.shadowed = 1.0 - specular;
+    vec3 plane = dot(f.smooth_normal, s.geometric) < 0.0 ? -s.geometric : s.geometric;
+    vec3 image = 2.0 * dot(f.normal, wo) * f.normal - wo;
+    float height = dot(image, plane);
+    if (specular < 0.5 || height >= 0.0 || dot(plane, wo) <= 0.0) return f;
+    vec3 between = wo + image - 2.0 * height * plane;
+    f.normal = between * inversesqrt(max(dot(between, between), 1e-30));
+    return f;
 }
 
 // Share of the light along `w` that lobes around `facing.normal` keep; `z` is the component of `w` along that normal. It is 0
@@ -264,7 +280,8 @@ float light_share(Surface s, Facing facing, vec3 w, float z) {
     float tilt = dot(facing.normal, facing.smooth_normal), up = dot(w, facing.smooth_normal);
     if (up * z <= 0.0) return 0.0;
     float alpha2 = min(0.125 * (1.0 / max(tilt * tilt, 1e-6) - 1.0), 1.0);
-    return 2.0 / (1.0 + sqrt(1.0 + max(alpha2, 0.0) * max(1.0 / max(up * up, 1e-12) - 1.0, 0.0)));
+    float share = 2.0 / (1.0 + sqrt(1.0 + max(alpha2, 0.0) * max(1.0 / max(up * up, 1e-12) - 1.0, 0.0)));
+    return FX_METALLIC ? mix(1.0, share, facing.shadowed) : share;
 }
 
 vec3 textured(vec3 constant, uint image, Surface s) {

@@ -164,6 +164,8 @@ SplitLight trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         // The normal of a dielectric stays on its outside, since its two sides differ.
         bool turns = (s.flags & MATERIAL_TWO_SIDED) != 0u && !is_kind(FX_DIELECTRIC, bsdf, BSDF_DIELECTRIC);
         Facing facing = facing_normals(s, -path.direction, turns, bsdf_is_specular(bsdf));
+        if (is_kind(FX_METALLIC, bsdf, BSDF_METALLIC))
+            facing = facing_of_metal(s, facing, -path.direction, metallic_specular(bsdf.metallic));
         mat3 basis = basis_from_normal(facing.normal);
         vec3 wo = -path.direction * basis;
         bsdf_view(bsdf, wo);

@@ -188,6 +188,12 @@ impl Metallic {
         albedo * inner + if smooth(self.coat_alpha) { 0.0 } else { 1.0 - inner }
     }
 
+    /// Share of the light head on that the surface reflects, of all that comes back.
+    pub fn specular(&self) -> f32 {
+        let (f0, base) = (self.f0.element_sum(), (self.diffuse + self.through).element_sum());
+        f0 / (f0 + base).max(1e-10)
+    }
+
     /// Whether every lobe is a delta.
     pub fn is_delta(&self) -> bool {
         smooth(self.alpha) && self.diffuse == Vec3::ZERO && (self.coat == 0.0 || smooth(self.coat_alpha))

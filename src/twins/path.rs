@@ -1,5 +1,5 @@
 //! Twin of `glsl/trace/path.comp`.
-use crate::layout::{BSDF_DIELECTRIC, Effects, FrameConstants, MATERIAL_TWO_SIDED, NONE};
+use crate::layout::{BSDF_DIELECTRIC, BSDF_METALLIC, Effects, FrameConstants, MATERIAL_TWO_SIDED, NONE};
 use crate::math::hash::pcg;
 use crate::math::warp::basis_from_normal;
 use crate::scene::Scene;
@@ -12,7 +12,9 @@ use crate::twins::bsdf::{
 use crate::twins::camera::{eye_ray, film_sample, path_seed};
 use crate::twins::light::*;
 use crate::twins::sampler::{Sampler, sample_2d, sample_2d_bits, sampler_start};
-use crate::twins::surface::{Facing, Surface, facing_normals, light_share, surface_at, surface_bsdf, surface_emission};
+use crate::twins::surface::{
+    Facing, Surface, facing_normals, facing_of_metal, light_share, surface_at, surface_bsdf, surface_emission,
+};
 use crate::twins::traverse::traverse_from;
 use glam::{Mat3, Vec3};
 
@@ -207,7 +209,10 @@ impl Tracer<'_> {
     fn shade(&self, surface: Surface, direction: Vec3, pair: u32, from: [u32; 2]) -> Shade {
         let bsdf = surface_bsdf(self.scene, &surface);
         let turns = surface.flags & MATERIAL_TWO_SIDED != 0 && bsdf.kind != BSDF_DIELECTRIC;
-        let facing = facing_normals(&surface, -direction, turns, bsdf_is_specular(&bsdf));
+        let mut facing = facing_normals(&surface, -direction, turns, bsdf_is_specular(&bsdf));
+        if bsdf.kind == BSDF_METALLIC {
+            facing = facing_of_metal(&surface, facing, -direction, bsdf.metallic.specular());
+        }
         let basis = basis_from_normal(facing.normal);
         Shade { bsdf, surface, facing, basis, wo: basis.transpose() * -direction, pair, from }
     }

@@ -249,6 +249,8 @@ pub struct Facing {
     pub smooth_normal: Vec3,
     /// Unit normal that lobes are around.
     pub normal: Vec3,
+    /// Share of the lobes that maps shadow.
+    pub shadowed: f32,
 }
 
 /// Normals for a viewer towards `wo`, on the viewer's side where the surface `turns`. Smooth normals that face away, or that send
@@ -269,7 +271,24 @@ pub fn facing_normals(s: &Surface, wo: Vec3, turns: bool, mirrors: bool) -> Faci
         mapped = 2.0 * mapped.dot(n) * n - mapped;
     }
     let back = if turns { 1.0 } else { side };
-    Facing { smooth_normal: back * n, normal: back * mapped }
+    Facing { smooth_normal: back * n, normal: back * mapped, shadowed: 1.0 }
+}
+
+/// The normals for a material that reflects the share `specular` of its light at its surface: a metal's slope, which would send
+/// the mirror image of `wo` into the surface, has a normal that turns it up again.
+pub fn facing_of_metal(s: &Surface, facing: Facing, wo: Vec3, specular: f32) -> Facing {
+    if s.normal == s.smooth_normal {
+        return facing;
+    }
+    let turned = Facing { shadowed: 1.0 - specular, ..facing };
+    let plane = if facing.smooth_normal.dot(s.geometric) < 0.0 { -s.geometric } else { s.geometric };
+    let image = 2.0 * facing.normal.dot(wo) * facing.normal - wo;
+    let height = image.dot(plane);
+    if specular < 0.5 || height >= 0.0 || plane.dot(wo) <= 0.0 {
+        return turned;
+    }
+    let between = wo + image - 2.0 * height * plane;
+    Facing { normal: between / between.length_squared().max(1e-30).sqrt(), ..turned }
 }
 
 /// Share of the light along `w` that lobes around `facing.normal` keep; `z` is the component of `w` along that normal.
@@ -286,7 +305,8 @@ pub fn light_share(s: &Surface, facing: &Facing, w: Vec3, z: f32) -> f32 {
     }
     let tan2 = |cosine2: f32, least: f32| (1.0 / cosine2.max(least) - 1.0).max(0.0);
     let alpha2 = (0.125 * tan2(tilt * tilt, 1e-6)).min(1.0);
-    2.0 / (1.0 + (1.0 + alpha2 * tan2(up * up, 1e-12)).sqrt())
+    let share = 2.0 / (1.0 + (1.0 + alpha2 * tan2(up * up, 1e-12)).sqrt());
+    1.0 + (share - 1.0) * facing.shadowed
 }
 
 fn textured(scene: &Scene, constant: [f32; 3], image: u32, s: &Surface) -> Vec3 {

@@ -7,7 +7,7 @@ use tallow::layout::{ATTRIBUTE_FLIPPED, Effects, MATERIAL_MASKED, TEXTURE_NEARES
 use tallow::render::{Outputs, all_effects, called_for};
 use tallow::scene::description::*;
 use tallow::scene::{Loaded, Scene};
-use tallow::twins::surface::{Surface, surface_at, surface_bsdf};
+use tallow::twins::surface::{Facing, Surface, facing_normals, facing_of_metal, surface_at, surface_bsdf};
 use tallow::twins::texture::{mask_blocks, surface_opacity, texture_sample};
 use tallow::twins::traverse::traverse;
 
@@ -321,4 +321,28 @@ fn a_cutoff_masks_all_or_nothing() {
     let passed = (0..2000).filter(|&seed| !mask_blocks(&scene, 0, u32::MAX, vec2(0.1, 0.1), seed)).count();
     let opacity = surface_opacity(&scene, 0, 0, vec2(0.1, 0.1));
     assert!((passed as f32 / 2000.0 - (1.0 - opacity)).abs() < 0.05, "{passed} of 2000 pass {opacity}");
+}
+
+#[test]
+fn a_slope_of_metal_mirrors_nothing_into_the_surface() {
+    let gold = MaterialTable {
+        name: "m".into(),
+        kind: MaterialType::MetallicRoughness,
+        normal_map: texture("bumps"),
+        normal_scale: Some(6.0),
+        ..MaterialTable::default()
+    };
+    let scene = one(gold, patch(), place([0.0; 3], 1.0), false);
+    let mut below = 0;
+    for i in 0..400 {
+        let s = surface(&scene, -0.9 + 0.09 * (i % 20) as f32, -0.9 + 0.09 * (i / 20) as f32);
+        let wo = vec3(0.6, 0.2, 0.5).normalize();
+        let facing = facing_normals(&s, wo, true, true);
+        let height = |f: &Facing| (2.0 * f.normal.dot(wo) * f.normal - wo).dot(s.geometric);
+        below += usize::from(height(&facing) < -0.01);
+        let metal = facing_of_metal(&s, facing, wo, 1.0);
+        assert!(height(&metal) > -1e-4 && (metal.normal.length() - 1.0).abs() < 1e-4, "{facing:?} {metal:?}");
+        assert_eq!(facing_of_metal(&s, facing, wo, 0.1).normal, facing.normal, "a dielectric keeps its slopes");
+    }
+    assert!(below > 20, "control: only {below} slopes are steep");
 }
