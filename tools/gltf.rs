@@ -75,7 +75,7 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// All files of models; of one that is there in several forms, the first.
+/// All files of models; of one that is there in several forms, one of those that the published pictures show.
 fn models(scenes: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let (mut found, mut open) = (Vec::new(), vec![scenes.join("gltf"), scenes.join("gltf-samples")]);
     while let Some(folder) = open.pop() {
@@ -89,7 +89,7 @@ fn models(scenes: &Path) -> anyhow::Result<Vec<PathBuf>> {
             }
         }
     }
-    found.sort_by_key(|path| (path.file_stem().map(ToOwned::to_owned), path.clone()));
+    found.sort_by_key(|path| (path.file_stem().map(ToOwned::to_owned), std::cmp::Reverse(path.clone())));
     found.dedup_by_key(|path| path.file_stem().map(ToOwned::to_owned));
     Ok(found)
 }

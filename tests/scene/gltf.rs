@@ -222,6 +222,13 @@ fn cameras_are_chosen_by_name() {
 }
 
 #[test]
+fn a_scene_file_does_not_take_it_for_a_mesh() {
+    let text = "[[mesh]]\nname = \"fox\"\nfile = \"a.GLB\"\n";
+    let error = Scene::parse(std::path::Path::new("s.toml"), text).map(|_| ()).unwrap_err().to_string();
+    assert_eq!(error, "s.toml, mesh \"fox\": is a glTF file, which is a scene of its own: render it as it is");
+}
+
+#[test]
 fn what_is_not_rendered_is_named() {
     let mut json = triangle();
     json["extensionsUsed"] = json!(["KHR_materials_sheen", "KHR_xmp", "KHR_materials_ior", "VENDOR_b"]);

@@ -104,6 +104,10 @@ impl<'a> Sources<'a> {
         if sources.into_iter().filter(|there| *there).count() != 1 {
             return Err(self.at(place(), "needs either a file or a shape (or, in memory, data)"));
         }
+        let extension = mesh.file.as_ref().and_then(|file| file.extension()?.to_str()).map(str::to_lowercase);
+        if extension.is_some_and(|extension| ["gltf", "glb"].contains(&extension.as_str())) {
+            return Err(self.at(place(), "is a glTF file, which is a scene of its own: render it as it is"));
+        }
         mesh.data.as_ref().map_or(Ok(()), Mesh::check).map_err(|what| self.at(place(), what))?;
         match mesh.segments.filter(|n| !(3..=4096).contains(n)) {
             Some(n) => Err(self.at(place(), format!("segments is {n}: choose a value from 3 to 4096"))),
