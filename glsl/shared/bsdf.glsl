@@ -13,6 +13,7 @@ struct Bsdf {
     uint kind;
     vec3 albedo;
     float alpha;
+    float stretch; // roughness along y over alpha, that along x
     vec3 eta;
     vec3 k;
     vec3 specular;
@@ -50,6 +51,24 @@ bool is_smooth(Bsdf b) {
     return FX_SMOOTH && (!FX_ROUGH || b.alpha < SMOOTH_ALPHA);
 }
 
+// Microfacets whose roughness depends on the direction are those of roughness alpha, drawn out along y: Heitz 2014,
+// "Understanding the masking-shadowing function in microfacet-based BRDFs", section 5.3. Seen from there, a direction is:
+vec3 undrawn(Bsdf b, vec3 w) {
+    return FX_ANISOTROPIC ? vec3(w.x, w.y * b.stretch, w.z) : w;
+}
+
+// D(m) of the microfacets, per steradian.
+float facet_density(Bsdf b, vec3 m) {
+    if (!FX_ANISOTROPIC) return microfacet_d(b.ggx, m, b.alpha);
+    return microfacet_d(b.ggx, vec3(m.x, m.y / b.stretch, m.z), b.alpha) / b.stretch;
+}
+
+// A normal visible from w.
+vec3 facet_sample(Bsdf b, vec3 w, vec2 u) {
+    vec3 m = microfacet_sample(b.ggx, undrawn(b, w), b.alpha, u);
+    return FX_ANISOTROPIC ? normalize(undrawn(b, m)) : m;
+}
+
 // Unit vector along a + b; finite where that is 0.
 vec3 half_vector(vec3 a, vec3 b) {
     vec3 h = a + b;
@@ -71,7 +90,8 @@ vec4 evaluate_diffuse(Bsdf b, vec3 wi) {
 // Shadowing and masking of a sample drawn by visible normals: G1(wo) G1(wi) area(wo) / wo.z. It equals G1(wi) up to 0.4 %, the
 // difference of Walter's fit of the Beckmann G1, which f uses, and the exact G1, by which the pdf integrates to 1.
 float visible_weight(Bsdf b, vec3 wo, vec3 wi, float area) {
-    float g = microfacet_g1(b.ggx, wo, b.alpha) * microfacet_g1(b.ggx, vec3(wi.xy, abs(wi.z)), b.alpha);
+    vec3 from = undrawn(b, wo), to = undrawn(b, vec3(wi.xy, abs(wi.z)));
+    float g = microfacet_g1(b.ggx, from, b.alpha) * microfacet_g1(b.ggx, to, b.alpha);
     return g * area / wo.z;
 }
 
@@ -86,7 +106,7 @@ float relative_index(Bsdf b, float wo_z) {
 // (Walter et al. 2007, eq. 17; with n = 1 it is eq. 14). `co` = wo.m, `ci` = wi.m.
 float scattered_density(Bsdf b, vec3 m, float n, float co, float ci) {
     float q = co + n * ci;
-    return microfacet_d(b.ggx, m, b.alpha) * co * abs(ci) * n * n / max(q * q, 1e-30);
+    return facet_density(b, m) * co * abs(ci) * n * n / max(q * q, 1e-30);
 }
 
 // Probability of sampling the coat's reflection: approximately its share of the reflected energy.
@@ -165,7 +185,7 @@ vec4 bsdf_evaluate(Bsdf b, vec3 wo, vec3 wi) {
         if (glass) share = reflected ? f : 1.0 - f;
         tint *= glass ? share : f;
     }
-    float area = microfacet_area(b.ggx, wo, b.alpha);
+    float area = microfacet_area(b.ggx, undrawn(b, wo), b.alpha);
     float density = scattered_density(b, m, n, co, ci) / area;
     return value + vec4(tint * (visible_weight(b, wo, wi, area) * density / (n * n)), share * density);
 }
@@ -193,7 +213,7 @@ bool bsdf_sample(Bsdf b, vec3 wo, float u_lobe, vec2 u, out BsdfSample s) {
     s.delta = is_smooth(b);
     float side = wo.z < 0.0 ? -1.0 : 1.0;
     vec3 above = vec3(wo.xy, side * wo.z), m = UP;
-    if (!s.delta) m = microfacet_sample(b.ggx, above, b.alpha, u);
+    if (!s.delta) m = facet_sample(b, above, u);
     float co = dot(above, m), ci = co, n = 1.0;
     float eta = glass ? relative_index(b, wo.z) : b.eta.x;
     bool specular = true, reflected = true;

@@ -14,6 +14,10 @@ vec2 film_from_pixel(vec2 pixel, uvec2 size) {
 Ray camera_ray(Camera camera, vec2 film, vec2 lens) {
     vec3 through = camera.forward + film.x * camera.right + film.y * camera.up;
     vec3 origin = camera.position;
+    if (FX_ORTHOGRAPHIC && camera.orthographic != 0u) {
+        origin += film.x * camera.right + film.y * camera.up;
+        through = camera.forward;
+    }
     if (FX_LENS) {
         vec2 disk = camera.lens_radius * warp_disk(lens);
         vec3 shift = disk.x * normalize(camera.right) + disk.y * normalize(camera.up);

@@ -15,6 +15,7 @@ struct Metallic {
     float alpha;
     float coat;      // strength of the clear coat
     float coat_alpha;
+    vec3 coat_normal; // in the local frame, above the horizon of the viewer
 };
 
 const float COAT_F0 = 0.04; // reflectance head on of a clear coat, of index 1.5
@@ -36,6 +37,11 @@ float let_in(Metallic b, float c) {
 // The same for the clear coat.
 float coat_lets_in(Metallic b, float c) {
     return 1.0 - b.coat * mix(COAT_F0, 1.0, schlick_weight(c));
+}
+
+// Cosine at which the clear coat sees a direction.
+float coat_cosine(Metallic b, vec3 w) {
+    return FX_COAT_NORMALS ? dot(w, b.coat_normal) : w.z;
 }
 
 bool smooth_alpha(float alpha) {
@@ -61,13 +67,15 @@ Metallic metallic_layers(vec3 base, float metallic, vec3 f0, float f90, float tr
     b.alpha = alpha;
     b.coat = coat;
     b.coat_alpha = coat_alpha;
+    b.coat_normal = vec3(0.0, 0.0, 1.0);
     return b;
 }
 
 // Probabilities of the lobes, about in proportion to what they reflect: the coat's, the specular one, the diffuse one, and the one
 // through a thin wall. All 0 where the material is black.
-vec4 metallic_odds(Metallic b, float c) {
-    float inner = has_coat(b) ? coat_lets_in(b, c) : 1.0, base = inner * let_in(b, c);
+vec4 metallic_odds(Metallic b, vec3 wo) {
+    float c = wo.z;
+    float inner = has_coat(b) ? coat_lets_in(b, coat_cosine(b, wo)) : 1.0, base = inner * let_in(b, c);
     vec3 f = mix(b.f0, vec3(b.f90), schlick_weight(c));
     vec4 odds = vec4(1.0 - inner, inner * (dot(f, vec3(1.0 / 3.0)) + LEAST_ODDS * b.f90), base * dot(b.diffuse, vec3(1.0 / 3.0)),
                      base * dot(b.through, vec3(1.0 / 3.0)));
@@ -96,7 +104,7 @@ vec4 metallic_evaluate(Metallic b, vec3 wo, vec3 wi) {
     bool beyond = wi.z < 0.0;
     if (beyond && !FX_THIN) return vec4(0.0);
     wi.z = abs(wi.z);
-    vec4 odds = metallic_odds(b, wo.z);
+    vec4 odds = metallic_odds(b, wo);
     vec4 value = vec4(0.0);
     if (!beyond) {
         float mean = 1.0 - b.dielectric.x - (b.dielectric.y - b.dielectric.x) * (1.0 / 21.0);
@@ -108,8 +116,14 @@ vec4 metallic_evaluate(Metallic b, vec3 wo, vec3 wi) {
         value += vec4(f * lobe.x, (beyond ? odds.w : odds.y) * lobe.y);
     }
     if (!has_coat(b)) return value;
-    value.rgb *= coat_lets_in(b, wo.z) * coat_lets_in(b, wi.z);
+    value.rgb *= coat_lets_in(b, coat_cosine(b, wo)) * coat_lets_in(b, coat_cosine(b, wi));
     if (beyond || smooth_alpha(b.coat_alpha)) return value;
+    if (FX_COAT_NORMALS) {
+        mat3 frame = basis_from_normal(b.coat_normal);
+        wo = wo * frame; // row vector times matrix: into the frame
+        wi = wi * frame;
+        if (min(wo.z, wi.z) <= 1e-9) return value;
+    }
     vec3 lobe = metallic_lobe(wo, wi, b.coat_alpha);
     return value + vec4(vec3((1.0 - coat_lets_in(b, lobe.z)) * lobe.x), odds.x * lobe.y);
 }
@@ -117,7 +131,7 @@ vec4 metallic_evaluate(Metallic b, vec3 wo, vec3 wi) {
 // Samples a direction. Returns false where the light is absorbed. A smooth lobe is a delta: then `weight` is its own, else it and
 // the density are those of metallic_evaluate.
 bool metallic_sample(Metallic b, vec3 wo, float u_lobe, vec2 u, out vec3 wi, out vec3 weight, out bool delta) {
-    vec4 odds = metallic_odds(b, wo.z);
+    vec4 odds = metallic_odds(b, wo);
     bool coat = u_lobe < odds.x;
     bool through = !coat && FX_THIN && u_lobe < odds.x + odds.w;
     bool specular = !coat && !through && u_lobe < odds.x + odds.w + odds.y;
@@ -127,14 +141,24 @@ bool metallic_sample(Metallic b, vec3 wo, float u_lobe, vec2 u, out vec3 wi, out
     if (!(coat || through || specular)) return true;
     float alpha = coat ? b.coat_alpha : b.alpha;
     delta = smooth_alpha(alpha);
-    vec3 m = vec3(0.0, 0.0, 1.0);
-    if (!delta) m = microfacet_sample(true, wo, alpha, u);
-    wi = 2.0 * dot(wo, m) * m - wo;
+    vec3 m = vec3(0.0, 0.0, 1.0), seen = wo;
+    mat3 frame = mat3(1.0);
+    if (FX_COAT_NORMALS && coat) {
+        frame = basis_from_normal(b.coat_normal);
+        seen = wo * frame;
+    }
+    if (!delta) m = microfacet_sample(true, seen, alpha, u);
+    wi = 2.0 * dot(seen, m) * m - seen;
     bool above = wi.z > 1e-9;
-    float inner = has_coat(b) ? coat_lets_in(b, wo.z) : 1.0;
+    float inner = has_coat(b) ? coat_lets_in(b, coat_cosine(b, wo)) : 1.0, outer = inner;
+    if (FX_COAT_NORMALS) {
+        wi = frame * wi;
+        above = above && wi.z > 1e-9;
+        if (has_coat(b)) outer = coat_lets_in(b, coat_cosine(b, wi));
+    }
     if (coat) weight = vec3((1.0 - inner) / odds.x);
     else weight = (through ? b.through * let_in(b, wo.z) : mix(b.f0, vec3(b.f90), schlick_weight(wo.z))) *
-                  (inner * inner / max(through ? odds.w : odds.y, 1e-10));
+                  (inner * outer / max(through ? odds.w : odds.y, 1e-10));
     wi.z = through ? -wi.z : wi.z;
     return above;
 }

@@ -6,13 +6,15 @@ struct Surface {
     vec3 geometric; // unit, by the winding of the triangle
     vec3 smooth_normal; // unit, interpolated from the vertices, on the side that they point to
     vec3 normal;        // unit shading normal: the smooth one perturbed by a map
+    vec3 coat_normal;   // the same of a clear coat, by a map of its own; with FX_COAT_NORMALS
     uint material;
     uint flags;     // of the material
     uint object;
     vec2 uv;
     vec2 second_uv; // as `uv` where the mesh has no second set
     vec4 color;     // of the vertices: linear, and opacity
-    vec4 tangent;   // of the vertices: in world space, and the sign of the bitangent; 0 where the mesh has none
+    vec4 tangent;   // of the vertices: in world space, and the sign of the bitangent; 0 where the mesh has none, but with
+                    // FX_ANISOTROPIC the direction of u
     vec3 corner, e1, e2; // the triangle in world space: its first vertex, and the edges from there
     float radius;    // of a sphere, whose centre is `corner`; 0 of a triangle
     float clearance; // distance from the plane at which rays start, world units
@@ -48,51 +50,7 @@ vec2 uv_of(Surface s, uint image) {
     return FX_SECOND_UV && (Texture_flags(textures, image) & TEXTURE_SECOND_UV) != 0u ? s.second_uv : s.uv;
 }
 
-// The normal perturbed by a height map (Blinn 1978) or a tangent-space normal map. `e1`, `e2` are edges, `d1`, `d2` their
-// extents in uv.
-vec3 perturbed_normal(Surface s, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
-    uint image = Material_bump_texture(materials, s.material);
-    float det = d1.x * d2.y - d2.x * d1.y;
-    bool mapped = FX_NORMAL_MAPS && (!FX_BUMP_MAPS || (s.flags & MATERIAL_NORMAL_MAP) != 0u);
-    bool given = FX_TANGENTS && mapped && s.tangent.w != 0.0;
-    if (image == NONE || (det == 0.0 && !given)) return s.normal;
-    vec3 dpdu = (d2.y * e1 - d1.y * e2) / det;
-    vec3 dpdv = (d1.x * e2 - d2.x * e1) / det;
-    vec2 uv = uv_of(s, image);
-    Texture map = Texture_load(textures, image);
-    vec2 extent = abs(map.scale);
-    if (FX_TEXTURE_MODES) extent = sqrt(map.scale * map.scale + map.shear.yx * map.shear.yx);
-    vec2 texel = 1.0 / (vec2(map.width, map.height) * max(extent, 1e-6));
-    // The normal, or differences of heights half a texel to either side: along u, then along v.
-    vec3 value;
-    vec2 rise = vec2(0.0);
-    int k = 0;
-    do {
-        vec2 offset = (k < 2 ? vec2(texel.x, 0.0) : vec2(0.0, texel.y)) * (k % 2 == 0 ? 0.5 : -0.5);
-        value = texture_sample(image, mapped ? uv : uv + offset, false).xyz;
-        rise += sign(offset) * value.r;
-    } while (FX_BUMP_MAPS && !mapped && ++k < 4);
-    vec3 n;
-    if (mapped) {
-        vec3 m = 2.0 * value - 1.0;
-        m.xy *= Material_normal_scale(materials, s.material);
-        vec3 along = given ? s.tangent.xyz : dpdu;
-        float length_along;
-        vec3 t = unit_vector(along - s.normal * dot(s.normal, along), length_along);
-        vec3 b = cross(s.normal, t);
-        bool flipped = given ? s.tangent.w < 0.0 : dot(b, dpdv) < 0.0;
-        n = m.x * t + m.y * (flipped ? -b : b) + m.z * s.normal;
-    } else {
-        float height = Material_bump_scale(materials, s.material);
-        vec3 pu = dpdu + s.normal * (height * (rise.x / texel.x) - dot(s.normal, dpdu));
-        vec3 pv = dpdv + s.normal * (height * (rise.y / texel.y) - dot(s.normal, dpdv));
-        n = cross(pu, pv);
-        n = dot(n, s.normal) < 0.0 ? -n : n;
-    }
-    float len;
-    n = unit_vector(n, len);
-    return len > 0.0 && len < 1e37 ? n : s.normal; // degenerate uv coordinates leave the normal as it is
-}
+#include "shared/normal_map.glsl"
 
 // The sum of the magnitudes that `m` adds up for a point of coordinates up to `p`.
 vec3 magnitude(mat4x3 m, vec3 p) {
@@ -133,13 +91,13 @@ Surface sphere_at(Hit hit) {
     s.e1 = s.e2 = vec3(0.0);
     s.radius = radius;
     s.clearance = plane_clearance(s.geometric, reach, point, vec3(radius));
-    s.smooth_normal = s.normal = s.geometric;
+    s.smooth_normal = s.normal = s.coat_normal = s.geometric;
     s.uv = vec2(0.0);
-    if (FX_TEXTURES || FX_BUMP_MAPS || FX_NORMAL_MAPS) s.uv = sphere_coordinates(ball, n);
+    if (COORDINATES) s.uv = sphere_coordinates(ball, n);
     s.second_uv = s.uv;
     s.color = vec4(1.0);
     s.tangent = vec4(0.0);
-    if (FX_BUMP_MAPS || FX_NORMAL_MAPS) s.normal = perturbed_normal(s, e1, e2, vec2(1.0, 0.0), vec2(0.0, 1.0));
+    if (SLOPES) perturb(s, Slopes(e1, e2, true));
     return s;
 }
 
@@ -177,11 +135,11 @@ Surface surface_at(Hit hit) {
     float doubled_area;
     s.geometric = unit_vector(scaled, doubled_area); // a needle that rounds to no area scatters nothing
     s.clearance = plane_clearance(s.geometric, reach, e1, e2);
-    s.smooth_normal = s.normal = s.geometric;
+    s.smooth_normal = s.normal = s.coat_normal = s.geometric;
     s.uv = s.second_uv = vec2(0.0);
     s.color = vec4(1.0);
     s.tangent = vec4(0.0);
-    if (!(FX_SMOOTH_NORMALS || FX_VERTEX_COLORS || FX_TEXTURES || FX_BUMP_MAPS || FX_NORMAL_MAPS)) return s;
+    if (!(FX_SMOOTH_NORMALS || FX_VERTEX_COLORS || COORDINATES)) return s;
 
     Shading at = Shading_load(shading, hit.triangle);
     if (FX_SMOOTH_NORMALS && (at.normal.x & at.normal.y & at.normal.z) != 0xffffffffu) {
@@ -189,7 +147,7 @@ Surface surface_at(Hit hit) {
                  hit.b2 * (octahedral_decode(at.normal.z) - octahedral_decode(at.normal.x));
         float len;
         n = unit_vector(normals_from_object * n, len);
-        s.smooth_normal = s.normal = len > 0.0 ? n : s.geometric;
+        s.smooth_normal = s.normal = s.coat_normal = len > 0.0 ? n : s.geometric;
     }
     if (FX_VERTEX_COLORS) s.color = vertex_color(at, vec2(hit.b1, hit.b2));
     if (FX_TANGENTS) {
@@ -199,7 +157,7 @@ Surface surface_at(Hit hit) {
             s.tangent.w = mirrored ? -s.tangent.w : s.tangent.w;
         }
     }
-    if (FX_TEXTURES || FX_BUMP_MAPS || FX_NORMAL_MAPS) {
+    if (COORDINATES) {
         vec2 d1 = at.uv1 - at.uv0, d2 = at.uv2 - at.uv0;
         s.uv = s.second_uv = at.uv0 + hit.b1 * d1 + hit.b2 * d2;
         if (FX_SECOND_UV) {
@@ -211,7 +169,7 @@ Surface surface_at(Hit hit) {
                 d2 = at.uv2 - at.uv0;
             }
         }
-        if (FX_BUMP_MAPS || FX_NORMAL_MAPS) s.normal = perturbed_normal(s, e1, e2, d1, d2);
+        if (SLOPES) perturb(s, slopes_of(e1, e2, d1, d2));
     }
     return s;
 }
@@ -268,6 +226,24 @@ Facing facing_of_metal(Surface s, Facing f, vec3 wo, float specular) {
     vec3 between = wo + image - 2.0 * height * plane;
     f.normal = between * inversesqrt(max(dot(between, between), 1e-30));
     return f;
+}
+
+// The frame of lobes around `n`: x leads along the tangent where roughness depends on the direction.
+mat3 shading_basis(Surface s, Bsdf b, vec3 n) {
+    if (FX_ANISOTROPIC && b.stretch != 1.0) {
+        float length_along;
+        vec3 t = unit_vector(s.tangent.xyz - n * dot(n, s.tangent.xyz), length_along);
+        if (length_along > 0.0) return mat3(t, cross(n, t), n);
+    }
+    return basis_from_normal(n);
+}
+
+// The normal of a clear coat in the frame `basis`; that of the frame where the viewer towards `wo` would be below it.
+vec3 local_coat_normal(Surface s, Facing f, mat3 basis, vec3 wo) {
+    vec3 n = dot(f.smooth_normal, s.smooth_normal) < 0.0 ? -s.coat_normal : s.coat_normal;
+    if (s.coat_normal == s.smooth_normal) n = f.smooth_normal;
+    n = n * basis; // row vector times matrix: into the frame
+    return dot(n, wo) > MIN_ELEVATION ? n : UP;
 }
 
 // Share of the light along `w` that lobes around `facing.normal` keep; `z` is the component of `w` along that normal. It is 0
@@ -332,6 +308,7 @@ Bsdf surface_bsdf(Surface s) {
     b.transmission = m.transmission;
     b.ggx = (s.flags & MATERIAL_GGX) != 0u;
     b.alpha = 0.0;
+    b.stretch = 1.0;
     b.eta = vec3(1.0);
     b.k = vec3(0.0);
     b.specular = vec3(0.0);
@@ -346,6 +323,7 @@ Bsdf surface_bsdf(Surface s) {
         b.eta = m.eta;
         b.k = m.k;
         b.alpha = m.alpha;
+        if (FX_ANISOTROPIC) b.stretch = 1.0 + m.anisotropy;
         b.specular = textured(m.specular, m.specular_texture, s);
         if (FX_COATED) {
             b.internal_fresnel = m.internal_fresnel;

@@ -18,7 +18,13 @@ vec4 texture_texel(Texture image, ivec2 at, bool colour) {
     // Coordinates lie at most one texel outside the image, so that adding or subtracting one period wraps them.
     at = mix(at + mix(ivec2(0), edge, lessThan(at, ivec2(0))), clamp(at, ivec2(0), edge - 1), texture_keeps_border(image));
     at = mix(at, at - edge, greaterThanEqual(at, edge));
-    vec4 c = unpackUnorm4x8(texelFetch(texels, int(image.first) + at.y * edge.x + at.x).x);
+    uint word = texelFetch(texels, int(image.first) + at.y * edge.x + at.x).x;
+    if (FX_HDR_TEXTURES && (image.flags & TEXTURE_FLOAT) != 0u) return vec4(uintBitsToFloat(word));
+    if (FX_HDR_TEXTURES && (image.flags & TEXTURE_RGB9E5) != 0u) {
+        float unit = uintBitsToFloat(((word >> 27) + 103u) << 23); // 2^(exponent - 24)
+        return vec4(vec3(uvec3(word, word >> 9, word >> 18) & 511u) * unit, 1.0);
+    }
+    vec4 c = unpackUnorm4x8(word);
     return colour ? vec4(linear_from_srgb(c.rgb), c.a) : c;
 }
 

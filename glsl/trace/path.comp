@@ -166,8 +166,9 @@ SplitLight trace_path(Path path, Sampler random, uint seed, out vec3 albedo) {
         Facing facing = facing_normals(s, -path.direction, turns, bsdf_is_specular(bsdf));
         if (is_kind(FX_METALLIC, bsdf, BSDF_METALLIC))
             facing = facing_of_metal(s, facing, -path.direction, metallic_specular(bsdf.metallic));
-        mat3 basis = basis_from_normal(facing.normal);
+        mat3 basis = shading_basis(s, bsdf, facing.normal);
         vec3 wo = -path.direction * basis;
+        if (FX_COAT_NORMALS) bsdf.metallic.coat_normal = local_coat_normal(s, facing, basis, wo);
         bsdf_view(bsdf, wo);
         bool smooth_here = bsdf_is_delta(bsdf);
         if (bounce == 0u) {

@@ -16,7 +16,7 @@ use std::process::Command;
 /// List every effect: on or off, what calls for it, and what it costs
 #[derive(clap::Args)]
 pub struct Args {
-    /// Scene file (.toml, .gltf, .glb) or model (.obj)
+    /// Scene file (.toml, .gltf, .glb) or model (.obj, .ply)
     pub scene: PathBuf,
     /// Effects to measure [default: all of them]
     #[arg(value_name = "EFFECT")]
@@ -244,7 +244,7 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
         // A sphere takes the record of a triangle, and a large lamp is only sampled in another way.
         Effect::spheres | Effect::large_lamps => 0,
         // Every texture has room for these, and every material for its cutoff.
-        Effect::texture_modes | Effect::alpha_cutoff => 0,
+        Effect::texture_modes | Effect::hdr_textures | Effect::alpha_cutoff => 0,
         // Every material has room for the parameters of all BSDFs.
         Effect::diffuse
         | Effect::conductor
@@ -252,6 +252,8 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
         | Effect::coated
         | Effect::metallic
         | Effect::clearcoat
+        | Effect::coat_normals
+        | Effect::anisotropic
         | Effect::thin_walls
         | Effect::rough
         | Effect::smooth_interface
@@ -259,6 +261,7 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
         | Effect::ggx => 0,
         // Settings and outputs call for these; they take no record of the scene.
         Effect::lens
+        | Effect::orthographic
         | Effect::indirect
         | Effect::roulette
         | Effect::clamp

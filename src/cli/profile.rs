@@ -19,7 +19,7 @@ use std::path::PathBuf;
 /// more than was counted. Options override the settings of the scene file; defaults are for what it does not set.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Scene file (.toml, .gltf, .glb), model (.obj), or the .json of an earlier profile, to compare it without another run
+    /// Scene file (.toml, .gltf, .glb), model (.obj, .ply), or the .json of an earlier profile, to compare it without another run
     pub scene: PathBuf,
     /// Frames to time, and as many more without timestamps; 20 and more for a 95th percentile
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u16).range(1..=10_000))]

@@ -41,7 +41,7 @@ pub enum EffectChoice {
 /// Options override the settings of the scene file; defaults are for what it does not set.
 #[derive(Clone, clap::Args)]
 pub struct Args {
-    /// Scene file (.toml, .gltf, .glb) or model (.obj)
+    /// Scene file (.toml, .gltf, .glb) or model (.obj, .ply)
     pub scene: PathBuf,
     /// Image to write: .exr (all layers), .png or .hdr; may be given several times [default: the scene's name + .exr]
     #[arg(short, long = "output", value_name = "FILE")]
@@ -84,6 +84,9 @@ pub struct Args {
     /// Look through this camera of a glTF file [default: its first one, or one that frames it]
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
+    /// Play only this animation of a glTF file [default: all that do not move the same as an earlier one]
+    #[arg(long, value_name = "NAME")]
+    pub clip: Option<String>,
     /// Count rays and visited nodes
     #[arg(long)]
     pub counters: bool,
@@ -143,7 +146,22 @@ pub fn run(args: &Args) -> Result<Exit> {
     }
     // The film is all that is left to write and to filter, and large films need the memory.
     drop(renderer);
-    taken.map_or(Ok(Exit::Interrupted), |mut taken| taken.finish(args))
+    let Some(mut taken) = taken else {
+        complain("interrupted before the first sample: nothing was written");
+        return Ok(Exit::Interrupted);
+    };
+    let Ended { exit, written } = taken.finish(args)?;
+    if exit == Exit::Interrupted {
+        complain(&outputs::interruption(&written));
+    }
+    Ok(exit)
+}
+
+/// How a render ended, and the files that it was written to.
+pub struct Ended {
+    /// [`Exit::Done`] or [`Exit::Interrupted`].
+    pub exit: Exit,
+    written: Vec<PathBuf>,
 }
 
 /// A render that is over, and nowhere written yet.
@@ -173,7 +191,6 @@ pub fn shoot<'a>(
     let mut files = Files::new(args.resume.as_deref());
     let (status, checkpoint) = host.time("render", || shot.trace(&mut files))?;
     if status.stopped == StopReason::Interrupted && status.traced == 0 {
-        complain("interrupted before the first sample: nothing was written");
         return Ok(None);
     }
     status.broken_samples.iter().for_each(warn_of_broken);
@@ -194,7 +211,7 @@ impl Taken<'_> {
     ///
     /// # Errors
     /// Of every kind; an output that fails keeps no other from being written.
-    pub fn finish(&mut self, args: &Args) -> Result<Exit> {
+    pub fn finish(&mut self, args: &Args) -> Result<Ended> {
         let Self { outcome, noisy, files, checkpoint } = self;
         let whole = outcome.status.stopped != StopReason::Interrupted;
         let Outcome { gpu, film, host, status, plan, .. } = &mut *outcome;
@@ -216,11 +233,7 @@ impl Taken<'_> {
         files.pipe(&more, whole);
         report(args, &outcome.summary(&written))?;
         files.failure().map_or(Ok(()), Err)?;
-        if !whole {
-            complain(&outputs::interruption(&written));
-            return Ok(Exit::Interrupted);
-        }
-        Ok(Exit::Done)
+        Ok(Ended { exit: if whole { Exit::Done } else { Exit::Interrupted }, written })
     }
 }
 
@@ -229,7 +242,7 @@ impl Taken<'_> {
 /// # Errors
 /// Of usage and input.
 pub fn load(args: &Args) -> Result<(Loaded, Settings)> {
-    let mut file = SceneFile::open(&args.scene)?;
+    let mut file = SceneFile::open_clip(&args.scene, args.clip.as_deref())?;
     args.camera.as_deref().map_or(Ok(()), |name| file.look_through(name))?;
     let mut settings = file.settings()?;
     args.overrides.apply(&mut settings);

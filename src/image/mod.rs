@@ -22,7 +22,7 @@ use frame::Frame;
 use output::Stream;
 #[cfg(feature = "cli")]
 pub(crate) use photo::encode_png;
-pub(crate) use photo::{BAND, bands, check_end, claim as picture_claim, picture};
+pub(crate) use photo::{BAND, bands, check_end, picture};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -112,6 +112,19 @@ pub fn read(path: &Path) -> Result<Film> {
 pub fn decode(bytes: &[u8]) -> std::result::Result<Film, String> {
     memory::check(claim_of(bytes, Frame::Display)?.bytes)?;
     decode_frame(bytes, Frame::Display)
+}
+
+/// Size and memory of an image, by its header.
+///
+/// # Errors
+/// One line that says what is wrong with it.
+pub(crate) fn claim(bytes: &[u8]) -> std::result::Result<Claim, String> {
+    claim_of(bytes, Frame::Display)
+}
+
+/// Whether a file holds floats, as EXR and HDR do.
+pub(crate) fn holds_floats(bytes: &[u8]) -> bool {
+    is_exr(bytes) || matches!(::image::guess_format(bytes), Ok(::image::ImageFormat::Hdr))
 }
 
 /// Checks that there is memory to decode an image. A damaged file passes and is reported by the decoder.

@@ -70,6 +70,10 @@ constants! {
     TEXTURE_SHEARED: uint = 128;
     /// [`Texture::flags`]: the second set of coordinates is read.
     TEXTURE_SECOND_UV: uint = 256;
+    /// [`Texture::flags`]: a texel is not RGBA8 but three linear numbers of 9 bits that share an exponent, from 0 to 65408.
+    TEXTURE_RGB9E5: uint = 512;
+    /// [`Texture::flags`]: a texel is one float, which stands in all channels.
+    TEXTURE_FLOAT: uint = 1024;
     /// [`Shading::attributes`]: three colours, of two words of unorm 2 x 16 each: red and green, blue and opacity.
     ATTRIBUTE_COLORS: uint = 1;
     /// [`Shading::attributes`]: a second set of texture coordinates, of two floats each.

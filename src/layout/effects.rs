@@ -60,6 +60,8 @@ effects! {
     bump_maps: FX_BUMP_MAPS;
     /// A texture that is mirrored, clamped along one axis, turned, or not interpolated.
     texture_modes: FX_TEXTURE_MODES;
+    /// A texture of a file that holds floats.
+    hdr_textures: FX_HDR_TEXTURES;
     /// A texture that reads the second set of coordinates.
     second_uv: FX_SECOND_UV;
     /// Colours of vertices.
@@ -84,8 +86,12 @@ effects! {
     metallic: FX_METALLIC;
     /// A clear coat on one.
     clearcoat: FX_CLEARCOAT;
+    /// Clear coats whose normals are not those of what is below.
+    coat_normals: FX_COAT_NORMALS;
     /// One that lets light through as a thin wall.
     thin_walls: FX_THIN;
+    /// A conductor or dielectric whose roughness depends on the direction.
+    anisotropic: FX_ANISOTROPIC;
     /// An interface with alpha of at least 0.01.
     rough: FX_ROUGH;
     /// An interface with alpha below 0.01.
@@ -108,6 +114,8 @@ effects! {
     environment_map: FX_ENVIRONMENT_MAP;
     /// A lens of finite radius.
     lens: FX_LENS;
+    /// A camera whose rays are parallel.
+    orthographic: FX_ORTHOGRAPHIC;
     /// Instances: a second BVH level.
     instances: FX_INSTANCES;
     /// Light beyond direct (max_depth over 2).

@@ -8,22 +8,25 @@ gpu_structs! {
     /// Camera rays start at `position` (pinhole) or on a disk of `lens_radius` around it. For film coordinates
     /// `sx`, `sy` in [-1, 1] (right, up): `direction = forward + sx * right + sy * up`, all in world space; `right`
     /// and `up` are already scaled by the tangent of half the field of view, so they need not be unit, nor
-    /// right-handed (a mirrored camera).
+    /// right-handed (a mirrored camera). An orthographic camera's rays start at `position + sx * right + sy * up` along `forward`;
+    /// `right` and `up` are half of the film's edges then, in world units.
     struct Camera {
         /// Centre of the lens, world units.
         position: vec3,
         /// Radius of the lens, world units; 0 is a pinhole.
         lens_radius: float,
-        /// Unit vector to the right, scaled by tan(horizontal fov / 2).
+        /// Unit vector to the right, scaled by tan(horizontal fov / 2), or by half the width of an orthographic film.
         right: vec3,
         /// Distance along `forward` to the plane in focus, world units.
         focus_distance: float,
-        /// Unit vector up in the image, scaled by tan(vertical fov / 2).
+        /// Unit vector up in the image, scaled as `right`.
         up: vec3,
         /// Near clip distance along the ray, world units; 0 clips nothing.
         near: float,
         /// Unit vector of the view direction.
         forward: vec3,
+        /// 1 when rays are parallel, else 0.
+        orthographic: uint,
     }
 
     /// One eight-way compressed node (Ylitie et al. 2017) as obvhs lays it out; child and triangle indices are
@@ -114,7 +117,7 @@ gpu_structs! {
         mirrored: uint,
     }
 
-    /// A material. 11 texels, of which a diffuse surface without textures needs the first two. Colours are linear Rec. 709 in [0, 1]
+    /// A material. 12 texels, of which a diffuse surface without textures needs the first two. Colours are linear Rec. 709 in [0, 1]
     /// unless said otherwise.
     struct Material {
         /// Diffuse albedo; multiplies `base_texture`.
@@ -180,11 +183,17 @@ gpu_structs! {
         clearcoat_texture: uint,
         /// Perceptual roughness, multiplies sqrt(`clearcoat_alpha`).
         clearcoat_roughness_texture: uint,
-        /// Unused word, which is zero.
-        pad: uint,
+        /// Roughness along the bitangent over `alpha`, which is that along the tangent then, less 1 (conductor, dielectric).
+        anisotropy: float,
+        /// Normal map of the clear coat; texture index or [`NONE`].
+        clearcoat_normal_texture: uint,
+        /// Factor of the x and y components of the clear coat's normal map.
+        clearcoat_normal_scale: float,
+        /// Unused words, which are zero.
+        pad: uvec2,
     }
 
-    /// A picture in the texel buffer: RGBA8 texels (R in the low byte), row 0 at the top. 3 texels.
+    /// A picture in the texel buffer: RGBA8 texels (R in the low byte) unless flags say otherwise, row 0 at the top. 3 texels.
     struct Texture {
         /// Index of the first texel.
         first: uint,

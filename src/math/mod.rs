@@ -6,5 +6,6 @@ pub mod hash;
 pub mod microfacet;
 pub mod octahedral;
 pub mod portable;
+pub mod rgb9e5;
 pub mod srgb;
 pub mod warp;

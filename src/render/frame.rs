@@ -47,8 +47,11 @@ impl Frame {
     /// What is carried from frame to frame.
     ///
     /// # Errors
-    /// [`Error::Usage`] when nothing is, or when the camera has a lens.
+    /// [`Error::Usage`] when nothing is, or when the camera has a lens or is orthographic.
     pub fn history(&self) -> Result<&History> {
+        if self.constants.camera.orthographic != 0 {
+            return Err(Error::Usage("nothing can be carried between views of an orthographic camera".into()));
+        }
         if self.constants.camera.lens_radius > 0.0 {
             let what = "samples through a lens show many points: nothing can be carried; render with lens_radius 0";
             return Err(Error::Usage(what.into()));

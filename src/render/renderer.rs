@@ -218,11 +218,15 @@ impl Renderer {
     /// # Errors
     /// [`crate::error::Error::Scene`] for a number that is not finite, and
     /// [`crate::error::Error::Usage`] for a lens when the scene was loaded with a pinhole: the kernels have no lens then.
-    /// Ask [`Renderer::specialised`] for the effect `lens`, or load the scene with one.
+    /// Ask [`Renderer::specialised`] for the effect `lens`, or load the scene with one. Likewise for parallel rays and the effect
+    /// `orthographic`.
     pub fn set_camera(&mut self, camera: Camera) -> Result<()> {
         scene::check_camera(&camera)?;
         if camera.lens_radius > 0.0 && !self.effects.lens {
             return Err(Error::Usage("this renderer was made without the effect \"lens\"".into()));
+        }
+        if camera.orthographic != 0 && !self.effects.orthographic {
+            return Err(Error::Usage("this renderer was made without the effect \"orthographic\"".into()));
         }
         self.frame.constants.camera = camera;
         self.fingerprint = None;

@@ -49,16 +49,14 @@ impl Renderer {
         Ok(())
     }
 
-    /// Large lamps may be sampled as small ones: that costs noise, and no light.
     fn check_effects(&self, scene: &Scene, change: &Change) -> Result<()> {
         // Whether surfaces call for something takes a look at all of them.
         let called = match change.materials || !change.triangles.is_empty() {
             true => called_for(scene, &self.settings, self.outputs),
             false => light_effects(scene),
         };
-        let called = Effects { large_lamps: false, split_light: false, ..called };
-        let lacks =
-            |(effect, (calls, has)): &(&Effect, (bool, bool))| *calls && !has && **effect != Effect::large_lamps;
+        let called = Effects { split_light: false, ..called };
+        let lacks = |(_, (calls, has)): &(&Effect, (bool, bool))| *calls && !has;
         let both = called.switches().into_iter().zip(self.effects.switches());
         match Effect::ALL.iter().zip(both).find(lacks) {
             Some((effect, _)) => Err(Error::Usage(format!(
@@ -86,9 +84,7 @@ fn upload(gpu: &Gpu, rec: &mut Recorder, to: &mut DeviceScene, scene: &Scene, ch
     if change.materials {
         whole(gpu, rec, "materials", &mut to.materials, &scene.materials)?;
     }
-    if change.texels {
-        whole(gpu, rec, "texels of textures", &mut to.texels, &scene.texels)?;
-    }
+    parts(gpu, rec, "texels of textures", &mut to.texels, &scene.texels, &change.texels, 0)?;
     if change.lights {
         whole(gpu, rec, "lights", &mut to.lights, &scene.lights)?;
         whole(gpu, rec, "light_table", &mut to.light_table, &scene.light_table)?;

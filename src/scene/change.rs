@@ -14,8 +14,8 @@ pub struct Change {
     pub instances: bool,
     /// The materials.
     pub materials: bool,
-    /// The texels, of which there are more.
-    pub texels: bool,
+    /// Parts of [`Scene::texels`](super::Scene::texels), of which there may be more.
+    pub texels: Vec<Range<usize>>,
     /// The lights and their table.
     pub lights: bool,
     /// The meshes that were deformed, and what their hierarchies cost.
@@ -37,8 +37,8 @@ impl Change {
     /// Whether nothing but the camera has changed.
     pub fn is_of_camera_alone(&self) -> bool {
         let Self { camera: _, nodes, triangles, instances, materials, texels, lights, deformed } = self;
-        let arrays = nodes.is_empty() && triangles.is_empty() && deformed.is_empty();
-        arrays && !(*instances || *materials || *texels || *lights)
+        let arrays = nodes.is_empty() && triangles.is_empty() && texels.is_empty() && deformed.is_empty();
+        arrays && !(*instances || *materials || *lights)
     }
 
     /// Adds what a later pose has changed.
@@ -48,7 +48,7 @@ impl Change {
         self.triangles.extend(later.triangles);
         self.instances |= later.instances;
         self.materials |= later.materials;
-        self.texels |= later.texels;
+        self.texels.extend(later.texels);
         self.lights |= later.lights;
         self.deformed.extend(later.deformed);
     }

@@ -1,6 +1,7 @@
 //! Finds the effects that a scene and its settings need, and what needs each. Kernels are compiled without the others.
 use super::Scene;
 use super::build::{geometry, lights};
+use super::load::material::has_normal_map;
 use crate::layout::*;
 use crate::scene::description::settings::{PixelFilter, Sampler, Settings, Split};
 use crate::settings::entry::Value;
@@ -26,10 +27,10 @@ pub fn effects(
     // A roughness map may take any part of the surface below the line.
     let layers = |m: &Material| match m.kind {
         BSDF_METALLIC => {
-            let coat = [m.clearcoat_texture, m.clearcoat_roughness_texture];
-            [m.specular_factor_texture, m.transmission_texture, coat[0], coat[1]]
+            let coat = [m.clearcoat_texture, m.clearcoat_roughness_texture, m.clearcoat_normal_texture];
+            [m.specular_factor_texture, m.transmission_texture, coat[0], coat[1], coat[2]]
         }
-        _ => [NONE; 4],
+        _ => [NONE; 5],
     };
     let flagged = |m: &Material, flags: u32| {
         let maps = [m.base_texture, m.specular_texture, m.opacity_texture, m.bump_texture, m.roughness_texture];
@@ -51,6 +52,7 @@ pub fn effects(
             maps.iter().chain(&layers(m)).any(|&t| t != NONE)
         }),
         texture_modes: material(Effect::texture_modes, &|m| flagged(m, MODES)),
+        hdr_textures: material(Effect::hdr_textures, &|m| flagged(m, TEXTURE_RGB9E5 | TEXTURE_FLOAT)),
         second_uv: material(Effect::second_uv, &|m| flagged(m, TEXTURE_SECOND_UV)),
         alpha_cutoff: material(Effect::alpha_cutoff, &|m| m.flags & MATERIAL_MASKED != 0 && m.alpha_cutoff > 0.0),
         bump_maps: material(Effect::bump_maps, &|m| bumped(m, false)),
@@ -62,7 +64,9 @@ pub fn effects(
         coated: material(Effect::coated, &|m| m.kind == BSDF_COATED),
         metallic: material(Effect::metallic, &|m| m.kind == BSDF_METALLIC),
         clearcoat: material(Effect::clearcoat, &coated),
+        coat_normals: material(Effect::coat_normals, &|m| coated(m) && has_normal_map(m)),
         thin_walls: material(Effect::thin_walls, &|m| m.kind == BSDF_METALLIC && m.transmission_factor > 0.0),
+        anisotropic: material(Effect::anisotropic, &|m| m.anisotropy != 0.0),
         rough: material(Effect::rough, &rough),
         smooth_interface: material(Effect::smooth_interface, &smooth),
         beckmann: material(Effect::beckmann, &|m| rough(m) && m.flags & MATERIAL_GGX == 0),
@@ -98,7 +102,8 @@ fn used_materials(scene: &Scene) -> Vec<bool> {
 
 /// Those of the effects that lights and the camera's lens call for.
 pub fn light_effects(scene: &Scene) -> Effects {
-    let mut found = Effects { lens: scene.view.lens_radius > 0.0, ..Effects::default() };
+    let (lens, orthographic) = (scene.view.lens_radius > 0.0, scene.view.orthographic.is_some());
+    let mut found = Effects { lens, orthographic, ..Effects::default() };
     add_light_effects(scene, &mut found, &mut Vec::new());
     found
 }
@@ -115,7 +120,8 @@ fn add_light_effects(scene: &Scene, found: &mut Effects, reasons: &mut Vec<(Effe
     found.environment = light(Effect::environment, LIGHT_ENVIRONMENT);
     found.environment_map = scene.environment.is_some() && light(Effect::environment_map, LIGHT_ENVIRONMENT);
     let large = scene.lights.iter().position(|l| lights::is_large(scene, l));
-    found.large_lamps = large.inspect(|&i| reasons.push((Effect::large_lamps, light_name(scene, i)))).is_some();
+    let name = large.map_or_else(|| "lamps as they were loaded".to_owned(), |i| light_name(scene, i));
+    found.large_lamps = because(reasons, Effect::large_lamps, scene.large_lamps, name);
 }
 
 fn light_name(scene: &Scene, index: usize) -> String {
@@ -150,11 +156,13 @@ fn scene_effects(scene: &Scene, found: &mut Effects, reasons: &mut Reasons) {
         because(name, first.is_some(), format!("object \"{}\"", object.map_or("", |o| o)))
     };
     found.vertex_colors = attribute(Effect::vertex_colors, ATTRIBUTE_COLORS);
-    found.tangents = found.normal_maps && attribute(Effect::tangents, ATTRIBUTE_TANGENTS);
+    let directed = found.normal_maps || found.coat_normals || found.anisotropic;
+    found.tangents = directed && attribute(Effect::tangents, ATTRIBUTE_TANGENTS);
     let ball = scene.triangles.iter().find(|t| t.primitive & SPHERE != 0);
     let object = ball.and_then(|t| scene.names.objects.get(t.object as usize));
     found.spheres = because(Effect::spheres, ball.is_some(), format!("object \"{}\"", object.map_or("", |o| o)));
     found.lens = because(Effect::lens, scene.view.lens_radius > 0.0, "camera lens_radius".into());
+    found.orthographic = because(Effect::orthographic, scene.view.orthographic.is_some(), "camera orthographic".into());
     let instances = scene.instances.len();
     found.instances = because(Effect::instances, instances > 0, format!("{instances} instances"));
 }

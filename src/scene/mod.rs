@@ -11,7 +11,8 @@ use crate::threads;
 use animation::{Animation, Mover};
 use build::assemble::assemble;
 use description::Description;
-use load::gltf;
+use load::mesh_file::Format;
+use load::{gltf, include};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -79,7 +80,8 @@ pub struct Scene {
     /// per square world unit of drawing a point by [`Scene::light_table`] that a path has hit otherwise. 0 without
     /// emissive triangles. Exact up to the rounding of the table (2^-32 / lights) and of 32-bit floats.
     pub triangle_pdf_scale: f32,
-    /// Whether emissive triangles are sampled by solid angle, not by area, since one of them is large.
+    /// Whether emissive triangles are sampled by solid angle, not by area, since one of them is large. It stays as the scene was loaded,
+    /// however its lamps move: the light is the same on average, and no frame depends on those before it.
     pub large_lamps: bool,
     /// The environment image, when the environment is not a constant.
     pub environment: Option<Environment>,
@@ -174,29 +176,42 @@ impl<'a> SceneFile<'a> {
         Self { path: path.to_owned(), description, sky: false, cameras, through, warnings, movers }
     }
 
-    /// Reads a scene file (`.toml`, `.gltf`, `.glb`), or takes a model (`.obj`) for one.
+    /// Reads a scene file (`.toml`, `.gltf`, `.glb`), or takes a model (`.obj`, `.ply`, `.ply.gz`) for one.
     ///
     /// # Errors
     /// [`Error::Input`] with file, place and remedy.
     pub fn open(path: &Path) -> Result<Self> {
+        Self::open_clip(path, None)
+    }
+
+    /// As [`SceneFile::open`], but of a glTF file only the animation `clip` is played, if one is named.
+    ///
+    /// # Errors
+    /// As [`SceneFile::open`]; [`Error::Usage`] for a clip of another kind of file.
+    pub fn open_clip(path: &Path, clip: Option<&str>) -> Result<Self> {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_lowercase();
         let mut asset = gltf::Model::default();
-        let (description, sky) = match extension.as_str() {
-            "toml" => {
+        let (description, sky) = match (extension.as_str(), Format::of(path)) {
+            (_, Format::Gltf) => {
+                asset = gltf::load(path, path.parent().unwrap_or(Path::new("")), clip)?;
+                (std::mem::take(&mut asset.description), false)
+            }
+            ("toml", _) => {
                 let text = String::from_utf8(input::read_text(path, BYTES_OF_TOML)?);
                 let text = text.map_err(|_| Error::input(path, "is no text: write it in UTF-8"))?;
                 (description::parse(path, &text)?, false)
             }
-            "obj" => (model(path), true),
-            "gltf" | "glb" => {
-                asset = gltf::load(path)?;
-                (std::mem::take(&mut asset.description), false)
-            }
-            other => {
+            ("obj", _) | (_, Format::Ply) => (model(path), true),
+            (other, _) => {
                 input::open(path)?; // a missing file is that first of all
-                return Err(Error::input(path, format!("is no scene: \"{other}\" is none of toml, obj, gltf, glb")));
+                let what = format!("is no scene: \"{other}\" is none of toml, obj, ply, ply.gz, gltf, glb");
+                return Err(Error::input(path, what));
             }
         };
+        if let (Some(clip), false) = (clip, Format::of(path) == Format::Gltf) {
+            let what = format!("{}: clip \"{clip}\" is not there: only glTF files have clips", path.display());
+            return Err(Error::Usage(what));
+        }
         let gltf::Model { cameras, warnings, mover, .. } = asset;
         let (through, movers) = (0, mover.into_iter().collect());
         Ok(Self {
@@ -215,18 +230,15 @@ impl<'a> SceneFile<'a> {
     /// # Errors
     /// [`Error::Usage`] with the names of the cameras that there are.
     pub fn look_through(&mut self, name: &str) -> Result<()> {
-        let place = self.cameras.iter().position(|camera| camera.name == name);
-        let chosen = place.and_then(|place| self.cameras[place].camera.clone());
+        if let Some(place) = self.cameras.iter().position(|camera| camera.name == name) {
+            self.through = place;
+            self.description.to_mut().camera = self.cameras[place].camera.clone();
+            return Ok(());
+        }
         let names: Vec<_> = self.cameras.iter().map(|camera| format!("\"{}\"", camera.name)).collect();
-        let what = match (place, names.is_empty()) {
-            (Some(_), _) if chosen.is_none() => "is orthographic, which is not rendered".to_owned(),
-            (None, true) => "is not there: only glTF files have named cameras, and this one has none".to_owned(),
-            (None, false) => format!("is not there: choose one of {}", names.join(", ")),
-            (Some(place), _) => {
-                self.through = place;
-                self.description.to_mut().camera = chosen.unwrap_or_default();
-                return Ok(());
-            }
+        let what = match names.is_empty() {
+            true => "is not there: only glTF files have named cameras, and this one has none".to_owned(),
+            false => format!("is not there: choose one of {}", names.join(", ")),
         };
         Err(Error::Usage(format!("{}: camera \"{name}\" {what}", self.path.display())))
     }
@@ -253,13 +265,14 @@ impl<'a> SceneFile<'a> {
     pub fn load(&self) -> Result<Loaded> {
         let settings = self.settings()?;
         let mut scene = Scene { view: self.description.camera.clone(), ..Scene::default() };
-        let description = animation::with_freed_meshes(&self.description);
+        let (description, included, warnings) = include::models(&self.path, &self.description)?;
+        let description = animation::with_freed_meshes(&description);
         threads::within(|| assemble(&self.path, &description, self.sky, &mut scene))?;
-        scene.warnings.splice(0..0, self.warnings.iter().cloned());
+        scene.warnings.splice(0..0, self.warnings.iter().chain(&warnings).cloned());
         let camera = scene.view.build([settings.width, settings.height], scene.bounds);
         camera.map_err(|what| Error::input_at(&self.path, "[camera]", what))?;
         let carried = self.cameras.get(self.through).and_then(|camera| camera.mover.clone());
-        let movers: Vec<_> = self.movers.iter().cloned().chain(carried).collect();
+        let movers: Vec<_> = self.movers.iter().cloned().chain(included).chain(carried).collect();
         let animation = animation::load(&self.path, &description, &movers, &scene)?;
         if !animation.is_empty() {
             scene.view.framed = Some(scene.bounds);
@@ -269,7 +282,7 @@ impl<'a> SceneFile<'a> {
 }
 
 impl Scene {
-    /// Reads a scene file (`.toml`, `.gltf`, `.glb`) or a model (`.obj`). A model alone gets a camera that frames it and, when nothing in it
+    /// Reads a scene file (`.toml`, `.gltf`, `.glb`) or a model (`.obj`, `.ply`). A model alone gets a camera that frames it and, when nothing in it
     /// emits light, a sky of radiance 1. [`SceneFile`] does the same in two steps.
     ///
     /// # Errors

@@ -47,6 +47,9 @@ pub struct Vertices {
     pub positions: Vec<[f32; 3]>,
     /// Normals of any length, outward; none, and facets are seen, or one per position.
     pub normals: Vec<[f32; 3]>,
+    /// Tangents as those of [`Mesh`](super::description::Mesh), whose signs stay: one per position of a mesh that has some; none, and
+    /// they stay too.
+    pub tangents: Vec<[f32; 4]>,
     /// Vertices of the triangles, three each, where those of the mesh do not fit: as many as before. Triangles keep their order,
     /// their materials and their texture coordinates.
     pub indices: Vec<u32>,

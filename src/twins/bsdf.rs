@@ -19,6 +19,8 @@ pub struct Bsdf {
     pub albedo: Vec3,
     /// Roughness; below [`SMOOTH_ALPHA`] the interface is smooth.
     pub alpha: f32,
+    /// Roughness along y over `alpha`, which is that along x.
+    pub stretch: f32,
     /// Index per channel (conductor), interior / exterior in x (dielectric, coated).
     pub eta: Vec3,
     /// Extinction of a conductor, per channel.
@@ -74,12 +76,47 @@ impl Bsdf {
             alpha,
             coat: [m.clearcoat, m.clearcoat_alpha],
         });
-        Self { kind, albedo, alpha, eta, k, specular, transmission, internal_fresnel, coat, nonlinear, ggx, metallic }
+        let stretch = 1.0 + m.anisotropy;
+        Self {
+            kind,
+            albedo,
+            alpha,
+            stretch,
+            eta,
+            k,
+            specular,
+            transmission,
+            internal_fresnel,
+            coat,
+            nonlinear,
+            ggx,
+            metallic,
+        }
     }
 }
 
 fn is_smooth(b: &Bsdf) -> bool {
     b.alpha < SMOOTH_ALPHA
+}
+
+/// A direction seen from microfacets of roughness alpha that were drawn out along y.
+fn undrawn(b: &Bsdf, w: Vec3) -> Vec3 {
+    vec3(w.x, w.y * b.stretch, w.z)
+}
+
+/// D(m) of the microfacets, per steradian.
+fn facet_density(b: &Bsdf, m: Vec3) -> f32 {
+    microfacet_d(b.ggx, vec3(m.x, m.y / b.stretch, m.z), b.alpha) / b.stretch
+}
+
+/// Projected area of the microfacets visible along w.
+fn facet_area(b: &Bsdf, w: Vec3) -> f32 {
+    microfacet_area(b.ggx, undrawn(b, w), b.alpha)
+}
+
+/// A normal visible from w.
+fn facet_sample(b: &Bsdf, w: Vec3, u: Vec2) -> Vec3 {
+    undrawn(b, microfacet_sample(b.ggx, undrawn(b, w), b.alpha, u)).normalize()
 }
 
 fn half_vector(a: Vec3, b: Vec3) -> Vec3 {
@@ -101,14 +138,15 @@ fn evaluate_diffuse(b: &Bsdf, wi: Vec3) -> Vec4 {
 
 /// G1(wo) G1(wi) area(wo) / wo.z: the weight of a visible-normal sample before its Fresnel factor.
 fn visible_weight(b: &Bsdf, wo: Vec3, wi: Vec3, area: f32) -> f32 {
-    let g = microfacet_g1(b.ggx, wo, b.alpha) * microfacet_g1(b.ggx, vec3(wi.x, wi.y, wi.z.abs()), b.alpha);
+    let g1 = |w: Vec3| microfacet_g1(b.ggx, undrawn(b, w), b.alpha);
+    let g = g1(wo) * g1(vec3(wi.x, wi.y, wi.z.abs()));
     g * area / wo.z
 }
 
 /// Torrance-Sparrow reflection without its Fresnel factor: x = f cos, y = pdf.
 fn evaluate_reflection(b: &Bsdf, wo: Vec3, wi: Vec3, m: Vec3) -> Vec2 {
-    let area = microfacet_area(b.ggx, wo, b.alpha);
-    let pdf = microfacet_d(b.ggx, m, b.alpha) / (4.0 * area);
+    let area = facet_area(b, wo);
+    let pdf = facet_density(b, m) / (4.0 * area);
     vec2(visible_weight(b, wo, wi, area) * pdf, pdf)
 }
 
@@ -123,13 +161,13 @@ fn evaluate_conductor(b: &Bsdf, wo: Vec3, wi: Vec3) -> Vec4 {
 
 fn sample_conductor(b: &Bsdf, wo: Vec3, u: Vec2) -> (bool, BsdfSample) {
     let delta = is_smooth(b);
-    let m = if delta { Vec3::Z } else { microfacet_sample(b.ggx, wo, b.alpha, u) };
+    let m = if delta { Vec3::Z } else { facet_sample(b, wo, u) };
     let weight = b.specular * fresnel_conductor(wo.dot(m), b.eta, b.k);
     let mut s = BsdfSample { wi: mirror(wo, m), weight, pdf: 0.0, delta };
     if !delta {
-        let area = microfacet_area(b.ggx, wo, b.alpha);
+        let area = facet_area(b, wo);
         s.weight *= visible_weight(b, wo, s.wi, area);
-        s.pdf = microfacet_d(b.ggx, m, b.alpha) / (4.0 * area);
+        s.pdf = facet_density(b, m) / (4.0 * area);
     }
     (s.wi.z > GRAZING && wo.dot(m) > 0.0, s)
 }
@@ -143,7 +181,7 @@ pub fn relative_index(b: &Bsdf, wo_z: f32) -> f32 {
 /// Density of wi over solid angle times area(wo) (Walter et al. 2007, eq. 17); n = index on wi's side / on wo's.
 fn scattered_density(b: &Bsdf, m: Vec3, n: f32, co: f32, ci: f32) -> f32 {
     let q = co + n * ci;
-    microfacet_d(b.ggx, m, b.alpha) * co * ci.abs() * n * n / (q * q).max(1e-30)
+    facet_density(b, m) * co * ci.abs() * n * n / (q * q).max(1e-30)
 }
 
 fn evaluate_dielectric(b: &Bsdf, mut wo: Vec3, mut wi: Vec3) -> Vec4 {
@@ -159,7 +197,7 @@ fn evaluate_dielectric(b: &Bsdf, mut wo: Vec3, mut wi: Vec3) -> Vec4 {
         return Vec4::ZERO;
     }
     let f = fresnel_dielectric(co, eta).x;
-    let area = microfacet_area(b.ggx, wo, b.alpha);
+    let area = facet_area(b, wo);
     let pdf = (if reflected { f } else { 1.0 - f }) * scattered_density(b, m, n, co, ci) / area;
     let tint = if reflected { b.specular } else { b.transmission };
     (tint * (visible_weight(b, wo, wi, area) * pdf / (n * n))).extend(pdf)
@@ -170,7 +208,7 @@ fn sample_dielectric(b: &Bsdf, mut wo: Vec3, u_lobe: f32, u: Vec2) -> (bool, Bsd
     let eta = relative_index(b, wo.z);
     let side = if wo.z < 0.0 { -1.0 } else { 1.0 };
     wo.z = wo.z.abs();
-    let m = if delta { Vec3::Z } else { microfacet_sample(b.ggx, wo, b.alpha, u) };
+    let m = if delta { Vec3::Z } else { facet_sample(b, wo, u) };
     let co = wo.dot(m);
     let f = fresnel_dielectric(co, eta);
     let reflected = u_lobe < f.x;
@@ -180,7 +218,7 @@ fn sample_dielectric(b: &Bsdf, mut wo: Vec3, u_lobe: f32, u: Vec2) -> (bool, Bsd
     let weight = (if reflected { b.specular } else { b.transmission }) / (n * n);
     let mut s = BsdfSample { wi: vec3(wi.x, wi.y, side * wi.z), weight, pdf: 0.0, delta };
     if !delta {
-        let area = microfacet_area(b.ggx, wo, b.alpha);
+        let area = facet_area(b, wo);
         s.weight *= visible_weight(b, wo, wi, area);
         s.pdf = (if reflected { f.x } else { 1.0 - f.x }) * scattered_density(b, m, n, co, ci) / area;
     }
@@ -218,7 +256,7 @@ fn sample_coated(b: &Bsdf, wo: Vec3, u_lobe: f32, u: Vec2) -> (bool, BsdfSample)
     let p = coat_probability(b, f);
     let specular = u_lobe < p;
     let delta = specular && is_smooth(b);
-    let m = if specular && !delta { microfacet_sample(b.ggx, wo, b.alpha, u) } else { Vec3::Z };
+    let m = if specular && !delta { facet_sample(b, wo, u) } else { Vec3::Z };
     let wi = if specular { mirror(wo, m) } else { warp_cosine_hemisphere(u) };
     let mut s = BsdfSample { wi, weight: b.specular * (f / p.max(1e-10)), pdf: 0.0, delta };
     let above = s.wi.z > GRAZING;
@@ -310,6 +348,7 @@ mod tests {
         kind: BSDF_DIELECTRIC,
         albedo: Vec3::ONE,
         alpha: 0.0,
+        stretch: 1.0,
         eta: Vec3::splat(1.5),
         k: Vec3::ZERO,
         specular: Vec3::ONE,
@@ -327,6 +366,7 @@ mod tests {
             alpha: 0.0,
             coat: 0.0,
             coat_alpha: 0.0,
+            coat_normal: Vec3::Z,
         },
     };
 

@@ -42,6 +42,10 @@ pub fn camera_ray(camera: &Camera, film: Vec2, lens: Vec2) -> Ray {
     let [forward, right, up] = [camera.forward, camera.right, camera.up].map(Vec3::from);
     let mut through = forward + film.x * right + film.y * up;
     let mut origin = Vec3::from(camera.position);
+    if camera.orthographic != 0 {
+        origin += film.x * right + film.y * up;
+        through = forward;
+    }
     if camera.lens_radius > 0.0 {
         let disk = camera.lens_radius * warp_disk(lens);
         let shift = disk.x * right.normalize() + disk.y * up.normalize();

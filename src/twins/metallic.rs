@@ -1,12 +1,12 @@
 //! Twin of `glsl/shared/metallic.glsl`: the material of glTF 2.0. Local frame: z = shading normal on the viewer's side.
 use crate::layout::SMOOTH_ALPHA;
 use crate::math::microfacet::{microfacet_area, microfacet_d, microfacet_g1, microfacet_sample};
-use crate::math::warp::{INV_PI, warp_cosine_hemisphere};
+use crate::math::warp::{INV_PI, basis_from_normal, warp_cosine_hemisphere};
 use crate::shaders::shared::metallic::{COAT_F0, LEAST_ODDS};
 use glam::{Vec2, Vec3, Vec4, vec3, vec4};
 
 /// A metallic-roughness material resolved at the hit.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Metallic {
     /// Base colour of the share that is neither metal nor transparent.
     pub diffuse: Vec3,
@@ -24,6 +24,8 @@ pub struct Metallic {
     pub coat: f32,
     /// Microfacet roughness of the clear coat.
     pub coat_alpha: f32,
+    /// Normal of the clear coat in the local frame, above the horizon of the viewer.
+    pub coat_normal: Vec3,
 }
 
 /// What a material's textures and factors give at a point.
@@ -85,6 +87,19 @@ fn lobe(wo: Vec3, wi: Vec3, alpha: f32) -> Lobe {
     Lobe { value: g * area / wo.z * density, density, cosine: wo.dot(m).clamp(0.0, 1.0) }
 }
 
+/// The mirror image of `wo` by a visible microfacet, and whether there is only one.
+fn mirrored(wo: Vec3, alpha: f32, u: Vec2) -> (Vec3, bool) {
+    let delta = smooth(alpha);
+    let m = if delta { Vec3::Z } else { microfacet_sample(true, wo, alpha, u) };
+    (2.0 * wo.dot(m) * m - wo, delta)
+}
+
+impl Default for Metallic {
+    fn default() -> Self {
+        Self::new(&Parameters::default())
+    }
+}
+
 impl Metallic {
     /// Mixes metal and dielectric.
     pub fn new(p: &Parameters) -> Self {
@@ -99,6 +114,7 @@ impl Metallic {
             alpha: p.alpha,
             coat: p.coat[0],
             coat_alpha: p.coat[1],
+            coat_normal: Vec3::Z,
         }
     }
 
@@ -116,9 +132,9 @@ impl Metallic {
     }
 
     /// Probabilities of the coat's lobe, the specular, the diffuse one, and that through a thin wall.
-    fn odds(&self, c: f32) -> Vec4 {
-        let mean = |v: Vec3| v.element_sum() / 3.0;
-        let inner = self.coat_lets_in(c);
+    fn odds(&self, wo: Vec3) -> Vec4 {
+        let (c, mean) = (wo.z, |v: Vec3| v.element_sum() / 3.0);
+        let inner = self.coat_lets_in(wo.dot(self.coat_normal));
         let base = inner * self.let_in(c);
         let specular = inner * (mean(self.fresnel(c)) + LEAST_ODDS * self.f90);
         let odds = vec4(1.0 - inner, specular, base * mean(self.diffuse), base * mean(self.through));
@@ -128,7 +144,7 @@ impl Metallic {
     /// rgb = f |cos wi|, w = density over solid angle with which [`Self::sample`] picks `wi`. `wo` is above the horizon.
     pub fn evaluate(&self, wo: Vec3, wi: Vec3) -> Vec4 {
         let (beyond, wi) = (wi.z < 0.0, vec3(wi.x, wi.y, wi.z.abs()));
-        let (odds, mut value) = (self.odds(wo.z), Vec4::ZERO);
+        let (odds, mut value) = (self.odds(wo), Vec4::ZERO);
         if !beyond {
             let [f0, f90] = self.dielectric;
             let mean = 1.0 - f0 - (f90 - f0) / 21.0;
@@ -143,9 +159,14 @@ impl Metallic {
             };
             value += (f * lobe.value).extend(p * lobe.density);
         }
-        let inner = self.coat_lets_in(wo.z) * self.coat_lets_in(wi.z);
+        let inner = [wo, wi].map(|w| self.coat_lets_in(w.dot(self.coat_normal))).iter().product::<f32>();
         let value = (value.truncate() * inner).extend(value.w);
         if beyond || self.coat == 0.0 || smooth(self.coat_alpha) {
+            return value;
+        }
+        let to_coat = basis_from_normal(self.coat_normal).transpose();
+        let (wo, wi) = (to_coat * wo, to_coat * wi);
+        if wo.z.min(wi.z) <= 1e-9 {
             return value;
         }
         let lobe = lobe(wo, wi, self.coat_alpha);
@@ -155,27 +176,29 @@ impl Metallic {
 
     /// Samples a lobe and a direction in it. `u_lobe`, `u` in [0, 1).
     pub fn sample(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> LobeSample {
-        let odds = self.odds(wo.z);
-        let inner = self.coat_lets_in(wo.z);
+        let odds = self.odds(wo);
+        let inner = self.coat_lets_in(wo.dot(self.coat_normal));
         let (alpha, weight, beyond) = match u_lobe {
-            x if x < odds.x => (self.coat_alpha, Vec3::splat((1.0 - inner) / odds.x), false),
-            x if x < odds.x + odds.w => {
-                (self.alpha, self.through * self.let_in(wo.z) * (inner * inner / odds.w.max(1e-10)), true)
-            }
-            x if x < odds.x + odds.w + odds.y => {
-                (self.alpha, self.fresnel(wo.z) * (inner * inner / odds.y.max(1e-10)), false)
-            }
+            x if x < odds.x => return self.sample_coat(wo, u, (1.0 - inner) / odds.x),
+            x if x < odds.x + odds.w => (self.alpha, self.through * self.let_in(wo.z) / odds.w.max(1e-10), true),
+            x if x < odds.x + odds.w + odds.y => (self.alpha, self.fresnel(wo.z) / odds.y.max(1e-10), false),
             _ => {
                 let wi = warp_cosine_hemisphere(u);
                 return LobeSample { wi, weight: Vec3::ZERO, delta: false, scattered: true };
             }
         };
-        let delta = smooth(alpha);
-        let m = if delta { Vec3::Z } else { microfacet_sample(true, wo, alpha, u) };
-        let wi = 2.0 * wo.dot(m) * m - wo;
+        let (wi, delta) = mirrored(wo, alpha, u);
+        let weight = weight * (inner * self.coat_lets_in(wi.dot(self.coat_normal)));
         let scattered = wi.z > 1e-9;
         let wi = if beyond { vec3(wi.x, wi.y, -wi.z) } else { wi };
         LobeSample { wi, weight, delta, scattered }
+    }
+
+    fn sample_coat(&self, wo: Vec3, u: Vec2, weight: f32) -> LobeSample {
+        let frame = basis_from_normal(self.coat_normal);
+        let (own, delta) = mirrored(frame.transpose() * wo, self.coat_alpha, u);
+        let wi = frame * own;
+        LobeSample { wi, weight: Vec3::splat(weight), delta, scattered: own.z.min(wi.z) > 1e-9 }
     }
 
     /// Approximate reflectance at the cosine `c` of the lobes that are not deltas.
@@ -233,7 +256,7 @@ mod tests {
         let wo = vec3(0.6, 0.0, 0.8);
         let s = b.sample(wo, 0.0, Vec2::ZERO);
         assert!(s.scattered && s.delta && (s.wi + wo).length() < 1e-6, "{s:?}");
-        let expected = b.through * b.let_in(0.8) / b.odds(0.8).w;
+        let expected = b.through * b.let_in(0.8) / b.odds(wo).w;
         assert!((s.weight - expected).length() < 1e-6);
         assert!(!Metallic::new(&Parameters { alpha: 0.0, ..WHITE }).is_delta(), "a diffuse base");
     }

@@ -1,7 +1,6 @@
 //! Twin of `glsl/trace/path.comp`.
 use crate::layout::{BSDF_DIELECTRIC, BSDF_METALLIC, Effects, FrameConstants, MATERIAL_TWO_SIDED, NONE};
 use crate::math::hash::pcg;
-use crate::math::warp::basis_from_normal;
 use crate::scene::Scene;
 use crate::shaders::path::{
     MAX_SURVIVAL, PAIR_BSDF, PAIR_CHOICE, PAIR_FIRST_BOUNCE, PAIR_LIGHT, PAIR_ROULETTE, PAIRS_PER_BOUNCE,
@@ -13,7 +12,8 @@ use crate::twins::camera::{eye_ray, film_sample, path_seed};
 use crate::twins::light::*;
 use crate::twins::sampler::{Sampler, sample_2d, sample_2d_bits, sampler_start};
 use crate::twins::surface::{
-    Facing, Surface, facing_normals, facing_of_metal, light_share, surface_at, surface_bsdf, surface_emission,
+    Facing, Surface, facing_normals, facing_of_metal, light_share, local_coat_normal, shading_basis, surface_at,
+    surface_bsdf, surface_emission,
 };
 use crate::twins::traverse::traverse_from;
 use glam::{Mat3, Vec3};
@@ -207,14 +207,18 @@ impl Tracer<'_> {
     }
 
     fn shade(&self, surface: Surface, direction: Vec3, pair: u32, from: [u32; 2]) -> Shade {
-        let bsdf = surface_bsdf(self.scene, &surface);
+        let mut bsdf = surface_bsdf(self.scene, &surface);
         let turns = surface.flags & MATERIAL_TWO_SIDED != 0 && bsdf.kind != BSDF_DIELECTRIC;
         let mut facing = facing_normals(&surface, -direction, turns, bsdf_is_specular(&bsdf));
         if bsdf.kind == BSDF_METALLIC {
             facing = facing_of_metal(&surface, facing, -direction, bsdf.metallic.specular());
         }
-        let basis = basis_from_normal(facing.normal);
-        Shade { bsdf, surface, facing, basis, wo: basis.transpose() * -direction, pair, from }
+        let basis = shading_basis(&surface, &bsdf, facing.normal);
+        let wo = basis.transpose() * -direction;
+        if self.effects.coat_normals {
+            bsdf.metallic.coat_normal = local_coat_normal(&surface, &facing, &basis, wo);
+        }
+        Shade { bsdf, surface, facing, basis, wo, pair, from }
     }
 
     fn trace_path(&self, mut path: Path, random: Sampler, seed: u32) -> PathSample {

@@ -1,6 +1,7 @@
-//! Twin of `glsl/shared/surface.glsl`.
+//! Twin of `glsl/shared/surface.glsl` and `glsl/shared/normal_map.glsl`.
 use crate::layout::{BSDF_METALLIC, MATERIAL_NORMAL_MAP, MATERIAL_UNLIT, Material, NONE};
 use crate::math::octahedral::{octahedral_decode, octahedral_vector};
+use crate::math::warp::basis_from_normal;
 use crate::scene::Scene;
 use crate::shaders::shared::surface::{CLEARANCE, MIN_ELEVATION};
 use crate::twins::attributes::Attributes;
@@ -10,7 +11,7 @@ use crate::twins::scene::{material_of, object_from_world, reads_second, triangle
 use crate::twins::sphere::Sphere;
 use crate::twins::texture::texture_sample;
 use crate::twins::traverse::Hit;
-use glam::{Vec2, Vec3, Vec4, vec2, vec3};
+use glam::{Mat3, Vec2, Vec3, Vec4, vec2, vec3};
 use std::f32::consts::PI;
 
 /// What shading needs of a hit.
@@ -24,6 +25,8 @@ pub struct Surface {
     pub smooth_normal: Vec3,
     /// Unit shading normal: the smooth one perturbed by a map.
     pub normal: Vec3,
+    /// The same of a clear coat, by a map of its own.
+    pub coat_normal: Vec3,
     /// Index of the material.
     pub material: u32,
     /// Flags of the material.
@@ -36,7 +39,8 @@ pub struct Surface {
     pub second_uv: Vec2,
     /// Linear colour of the vertices, and opacity.
     pub color: Vec4,
-    /// Tangent of the vertices in world space, and the sign of the bitangent; 0 where there is none.
+    /// Tangent of the vertices in world space, and the sign of the bitangent, which is 0 where there is none: then the direction
+    /// along which u rises, if it is known.
     pub tangent: Vec4,
     /// The triangle in world space: its first vertex and the edges from there.
     pub triangle: [Vec3; 3],
@@ -68,31 +72,33 @@ pub fn plane_clearance(n: Vec3, reach: Vec3, e1: Vec3, e2: Vec3) -> f32 {
     CLEARANCE * n.abs().dot(reach + e1.abs().max(e2.abs()).max_element())
 }
 
-/// The edges of a triangle in space and in texture coordinates.
-struct Edges {
-    e1: Vec3,
-    e2: Vec3,
-    d1: Vec2,
-    d2: Vec2,
-}
-
 /// Coordinates at which a surface reads a picture.
 fn uv_of(scene: &Scene, s: &Surface, image: u32) -> Vec2 {
     if reads_second(scene, image) { s.second_uv } else { s.uv }
 }
 
-fn normal_from_map(scene: &Scene, s: &Surface, image: u32, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
-    let scale = scene.materials[s.material as usize].normal_scale;
-    let m = (2.0 * texture_sample(scene, image, uv_of(scene, s, image)).truncate() - 1.0) * vec3(scale, scale, 1.0);
-    let given = s.tangent.w != 0.0;
-    let along = if given { s.tangent.truncate() } else { dpdu };
-    let (t, _) = unit_vector(along - s.normal * s.normal.dot(along));
-    let b = s.normal.cross(t);
-    let flipped = if given { s.tangent.w < 0.0 } else { b.dot(dpdv) < 0.0 };
-    m.x * t + m.y * (if flipped { -b } else { b }) + m.z * s.normal
+/// Directions along which u and v rise, in world units, if texture coordinates say so.
+type Slopes = Option<[Vec3; 2]>;
+
+/// By the edges of a triangle in space and in texture coordinates.
+fn slopes_of(e1: Vec3, e2: Vec3, d1: Vec2, d2: Vec2) -> Slopes {
+    let det = d1.x * d2.y - d2.x * d1.y;
+    (det != 0.0).then(|| [(d2.y * e1 - d1.y * e2) / det, (d1.x * e2 - d2.x * e1) / det])
 }
 
-fn normal_from_height(scene: &Scene, s: &Surface, material: &Material, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
+/// The smooth normal perturbed by a normal map, not normalised; `None` where nothing says how it lies on the surface.
+fn normal_from_map(scene: &Scene, s: &Surface, image: u32, scale: f32, slopes: Slopes) -> Option<Vec3> {
+    let given = s.tangent.w != 0.0;
+    let along = if given { s.tangent.truncate() } else { slopes?[0] };
+    let m = (2.0 * texture_sample(scene, image, uv_of(scene, s, image)).truncate() - 1.0) * vec3(scale, scale, 1.0);
+    let n = s.smooth_normal;
+    let (t, _) = unit_vector(along - n * n.dot(along));
+    let b = n.cross(t);
+    let flipped = if given { s.tangent.w < 0.0 } else { b.dot(slopes?[1]) < 0.0 };
+    Some(m.x * t + m.y * (if flipped { -b } else { b }) + m.z * n)
+}
+
+fn normal_from_height(scene: &Scene, s: &Surface, material: &Material, [dpdu, dpdv]: [Vec3; 2]) -> Vec3 {
     let image = material.bump_texture;
     let texture = &scene.textures[image as usize];
     let turned = vec2(texture.scale[0].hypot(texture.shear[1]), texture.scale[1].hypot(texture.shear[0]));
@@ -109,22 +115,28 @@ fn normal_from_height(scene: &Scene, s: &Surface, material: &Material, dpdu: Vec
     if n.dot(s.normal) < 0.0 { -n } else { n }
 }
 
-fn perturbed_normal(scene: &Scene, s: &Surface, e: &Edges) -> Vec3 {
+/// `n` normalised, or the smooth normal where there is none.
+fn normal_or_smooth(s: &Surface, n: Option<Vec3>) -> Vec3 {
+    let Some((n, length)) = n.map(unit_vector) else { return s.smooth_normal };
+    if length > 0.0 && length < 1e37 { n } else { s.smooth_normal }
+}
+
+/// Perturbs the normals of a surface, whose normal is the smooth one so far.
+fn perturb(scene: &Scene, s: &mut Surface, slopes: Slopes) {
     let material = &scene.materials[s.material as usize];
-    let image = material.bump_texture;
-    let det = e.d1.x * e.d2.y - e.d2.x * e.d1.y;
-    let given = s.flags & MATERIAL_NORMAL_MAP != 0 && s.tangent.w != 0.0;
-    if image == NONE || (det == 0.0 && !given) {
-        return s.normal;
-    }
-    let dpdu = (e.d2.y * e.e1 - e.d1.y * e.e2) / det;
-    let dpdv = (e.d1.x * e.e2 - e.d2.x * e.e1) / det;
-    let n = match s.flags & MATERIAL_NORMAL_MAP {
-        0 => normal_from_height(scene, s, material, dpdu, dpdv),
-        _ => normal_from_map(scene, s, image, dpdu, dpdv),
+    let (image, coat) = (material.bump_texture, material.clearcoat_normal_texture);
+    let own = match s.flags & MATERIAL_NORMAL_MAP {
+        _ if image == NONE => None,
+        0 => slopes.map(|slopes| normal_from_height(scene, s, material, slopes)),
+        _ => normal_from_map(scene, s, image, material.normal_scale, slopes),
     };
-    let (n, length) = unit_vector(n);
-    if length > 0.0 && length < 1e37 { n } else { s.normal }
+    let coat =
+        if coat == NONE { None } else { normal_from_map(scene, s, coat, material.clearcoat_normal_scale, slopes) };
+    s.normal = normal_or_smooth(s, own);
+    s.coat_normal = normal_or_smooth(s, coat);
+    if let Some([along, _]) = slopes.filter(|_| s.tangent.w == 0.0) {
+        s.tangent = along.extend(0.0);
+    }
 }
 
 /// As [`surface_at`], for a hit on a sphere.
@@ -155,6 +167,7 @@ fn sphere_at(scene: &Scene, hit: &Hit, ball: &Sphere) -> Surface {
         geometric,
         smooth_normal: geometric,
         normal: geometric,
+        coat_normal: geometric,
         material,
         flags: scene.materials[material as usize].flags,
         object,
@@ -166,7 +179,7 @@ fn sphere_at(scene: &Scene, hit: &Hit, ball: &Sphere) -> Surface {
         radius,
         clearance: plane_clearance(geometric, reach, point, Vec3::splat(radius)),
     };
-    s.normal = perturbed_normal(scene, &s, &Edges { e1, e2, d1: Vec2::X, d2: Vec2::Y });
+    perturb(scene, &mut s, Some([e1, e2]));
     s
 }
 
@@ -195,6 +208,7 @@ pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
         geometric,
         smooth_normal: geometric,
         normal: geometric,
+        coat_normal: geometric,
         material,
         flags: scene.materials[material as usize].flags,
         object,
@@ -233,7 +247,7 @@ pub fn surface_at(scene: &Scene, hit: &Hit) -> Surface {
             (d1, d2) = (uv1 - uv0, uv2 - uv0);
         }
     }
-    s.normal = perturbed_normal(scene, &s, &Edges { e1, e2, d1, d2 });
+    perturb(scene, &mut s, slopes_of(e1, e2, d1, d2));
     s
 }
 
@@ -289,6 +303,25 @@ pub fn facing_of_metal(s: &Surface, facing: Facing, wo: Vec3, specular: f32) -> 
     }
     let between = wo + image - 2.0 * height * plane;
     Facing { normal: between / between.length_squared().max(1e-30).sqrt(), ..turned }
+}
+
+/// The frame of lobes around `n`: x leads along the tangent where roughness depends on the direction.
+pub fn shading_basis(s: &Surface, b: &Bsdf, n: Vec3) -> Mat3 {
+    let (t, length) = unit_vector(s.tangent.truncate() - n * n.dot(s.tangent.truncate()));
+    match b.stretch != 1.0 && length > 0.0 {
+        true => Mat3::from_cols(t, n.cross(t), n),
+        false => basis_from_normal(n),
+    }
+}
+
+/// The normal of a clear coat in the frame `basis`; that of the frame where the viewer towards `wo` would be below it.
+pub fn local_coat_normal(s: &Surface, facing: &Facing, basis: &Mat3, wo: Vec3) -> Vec3 {
+    let n = match facing.smooth_normal.dot(s.smooth_normal) < 0.0 {
+        _ if s.coat_normal == s.smooth_normal => facing.smooth_normal,
+        turned => s.coat_normal * if turned { -1.0 } else { 1.0 },
+    };
+    let n = basis.transpose() * n;
+    if n.dot(wo) > MIN_ELEVATION { n } else { Vec3::Z }
 }
 
 /// Share of the light along `w` that lobes around `facing.normal` keep; `z` is the component of `w` along that normal.

@@ -1,14 +1,15 @@
 //! Twin of `glsl/shared/texture.glsl`.
 use crate::layout::{
-    MATERIAL_MASKED, NONE, TEXTURE_CLAMP, TEXTURE_CLAMP_U, TEXTURE_CLAMP_V, TEXTURE_MIRROR_U, TEXTURE_MIRROR_V,
-    TEXTURE_NEAREST, TEXTURE_SHEARED, TEXTURE_SRGB, Texture,
+    MATERIAL_MASKED, NONE, TEXTURE_CLAMP, TEXTURE_CLAMP_U, TEXTURE_CLAMP_V, TEXTURE_FLOAT, TEXTURE_MIRROR_U,
+    TEXTURE_MIRROR_V, TEXTURE_NEAREST, TEXTURE_RGB9E5, TEXTURE_SHEARED, TEXTURE_SRGB, Texture,
 };
 use crate::math::hash::pcg;
+use crate::math::rgb9e5;
 use crate::math::srgb::linear_from_srgb;
 use crate::scene::Scene;
 use crate::twins::attributes::Attributes;
 use crate::twins::scene::{material_of, texture_coordinates};
-use glam::{IVec2, Vec2, Vec2Swizzles, Vec4, ivec2, vec2};
+use glam::{IVec2, Vec2, Vec2Swizzles, Vec3, Vec4, ivec2, vec2};
 
 /// One coordinate brought into `0..edge`, at most one period away.
 fn into_range(at: i32, edge: i32, clamp: bool) -> i32 {
@@ -40,7 +41,14 @@ fn texture_texel(scene: &Scene, image: &Texture, at: IVec2) -> Vec4 {
     let edge = ivec2(image.width as i32, image.height as i32);
     let [clamped, mirrored] = modes(image);
     let [x, y] = [0, 1].map(|i| into_range(at[i], edge[i], clamped[i] || mirrored[i]));
-    let bytes = scene.texels[image.first as usize + (y * edge.x + x) as usize].to_le_bytes();
+    let word = scene.texels[image.first as usize + (y * edge.x + x) as usize];
+    if image.flags & TEXTURE_FLOAT != 0 {
+        return Vec4::splat(f32::from_bits(word));
+    }
+    if image.flags & TEXTURE_RGB9E5 != 0 {
+        return Vec3::from(rgb9e5::unpack(word)).extend(1.0);
+    }
+    let bytes = word.to_le_bytes();
     let c = Vec4::from(bytes.map(|b| f32::from(b) / 255.0));
     if image.flags & TEXTURE_SRGB != 0 { c.truncate().map(linear_from_srgb).extend(c.w) } else { c }
 }

@@ -59,6 +59,32 @@ fn a_frame_alone_is_that_of_the_sequence_and_a_finished_one_is_kept() {
 }
 
 #[test]
+fn a_frame_in_another_light_is_another() {
+    let folder = stage();
+    let file = folder.path().join("s.toml");
+    let words = "--frames 0..48 --only 0..=1 --fps 1 -o l.#.exr";
+    well(&folder, words);
+    let scene = fs::read_to_string(&file).unwrap();
+    let other = scene.replace("time = 1, intensity = [1, 2, 6]", "time = 1, intensity = [1, 2, 7]");
+    assert_ne!(scene, other);
+    fs::write(&file, other).unwrap();
+    let told = well(&folder, words);
+    assert!(told.contains("frame 0: is finished") && !told.contains("frame 1: is finished"), "{told}");
+}
+
+#[test]
+fn without_frames_all_of_the_animation_is_rendered() {
+    let folder = stage();
+    let told = well(&folder, "--fps 1 --width 8 --height 5 -o n.#.png");
+    assert!(told.contains("frame 2: ") && !told.contains("frame 3"), "{told}");
+    let still = "[[mesh]]\nshape = \"cube\"\n[environment]\n";
+    fs::write(folder.path().join("s.toml"), still).unwrap();
+    let output = run(&folder, "-o n.#.png --turntable 90 --quiet");
+    let line = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(2) && line.contains("nothing moves; give --frames"), "{line}");
+}
+
+#[test]
 fn a_turntable_comes_around() {
     let folder = stage();
     let scene = fs::read_to_string(folder.path().join("s.toml")).unwrap();
@@ -91,6 +117,7 @@ fn options_that_cannot_be_are_one_line() {
         ("--frames 0..3 --fps 0", "--fps 0: choose a number above 0"),
         ("--frames 0..3 --pixel 1,1", "--pixel is for one image"),
         ("--frames 0..3 --preview a.png", "a preview goes to a .gif"),
+        ("--only 99999", "none of the frames"),
     ] {
         let output = run(&folder, words);
         let line = String::from_utf8_lossy(&output.stderr).into_owned();

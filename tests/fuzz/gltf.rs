@@ -65,7 +65,8 @@ static RICH: LazyLock<Value> = LazyLock::new(|| {
         "meshes",
         json!({ "primitives": [
         { "attributes": attributes, "mode": 5, "material": 1, "targets": [{ "POSITION": 6, "NORMAL": 0 }] },
-        { "attributes": { "POSITION": 6 }, "mode": 6 }, { "attributes": { "POSITION": 0 }, "mode": 1 }
+        { "attributes": { "POSITION": 6 }, "mode": 6 }, { "attributes": { "POSITION": 0 }, "mode": 1 },
+        { "attributes": { "POSITION": 0, "NORMAL": 6, "TEXCOORD_0": 2 }, "material": 1, "targets": [{ "NORMAL": 0 }] }
     ], "weights": [0.5] }),
     );
     json["images"] = json!([{ "bufferView": 7, "mimeType": "image/png" }, { "uri": "none.png" }]);
@@ -81,9 +82,15 @@ static RICH: LazyLock<Value> = LazyLock::new(|| {
         "normalTexture": { "index": 0, "scale": 0.5 }, "emissiveTexture": texture, "emissiveFactor": [1, 1, 1],
         "alphaMode": "MASK", "alphaCutoff": 0.3, "doubleSided": true, "extensions": {
             "KHR_materials_ior": { "ior": 1.4 }, "KHR_materials_emissive_strength": { "emissiveStrength": 3 },
-            "KHR_materials_clearcoat": { "clearcoatFactor": 1, "clearcoatTexture": texture },
+            "KHR_materials_clearcoat": { "clearcoatFactor": 1, "clearcoatTexture": texture,
+                "clearcoatNormalTexture": { "index": 0, "scale": 0.5 } },
             "KHR_materials_transmission": { "transmissionFactor": 0.5 }, "KHR_materials_unlit": {},
             "KHR_materials_specular": { "specularFactor": 0.5, "specularColorTexture": texture } } }),
+    );
+    json["cameras"].as_array_mut().expect("a list").insert(
+        0,
+        json!({ "type": "orthographic",
+        "orthographic": { "xmag": 2, "ymag": 3, "zfar": 9, "znear": 0 } }),
     );
     json["skins"] = json!([{ "joints": [0], "inverseBindMatrices": 5 }]);
     json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [{ "type": "spot", "intensity": 3,

@@ -2,7 +2,7 @@
 use crate::gltf_file::{data, floats, glb, triangle, triangle_bytes};
 use serde_json::{Value, json};
 use std::path::PathBuf;
-use tallow::layout::{LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT};
+use tallow::layout::{ATTRIBUTE_TANGENTS, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT};
 use tallow::scene::{Loaded, Scene, SceneFile};
 
 fn save(bytes: &[u8], name: &str) -> (tempfile::TempDir, PathBuf) {
@@ -203,7 +203,7 @@ fn lights_shine_along_minus_z_in_the_files_own_units() {
 fn cameras_are_chosen_by_name() {
     let mut json = triangle();
     json["cameras"].as_array_mut().unwrap().push(json!({ "name": "flat", "type": "orthographic",
-        "orthographic": { "xmag": 1, "ymag": 1, "znear": 0, "zfar": 9 } }));
+        "orthographic": { "xmag": 1, "ymag": 2, "znear": 0, "zfar": 9 } }));
     json["nodes"]
         .as_array_mut()
         .unwrap()
@@ -216,16 +216,65 @@ fn cameras_are_chosen_by_name() {
         assert!(error.exit_code() == 2 && error.to_string().contains(word), "{error}");
     };
     refused(&mut file, "ear", "choose one of \"eye\", \"flat\", \"camera 0\"");
-    refused(&mut file, "flat", "orthographic");
+    file.look_through("flat").unwrap();
+    let flat = file.load().unwrap().camera([8, 4]).unwrap();
+    assert_eq!((flat.orthographic, flat.right, flat.up), (1, [4.0, 0.0, 0.0], [0.0, 2.0, 0.0]));
     file.look_through("camera 0").unwrap();
     assert_eq!(file.load().unwrap().camera([8, 8]).unwrap().position, [9.0, 0.0, 0.0]);
 }
 
 #[test]
-fn a_scene_file_does_not_take_it_for_a_mesh() {
-    let text = "[[mesh]]\nname = \"fox\"\nfile = \"a.GLB\"\n";
-    let error = Scene::parse(std::path::Path::new("s.toml"), text).map(|_| ()).unwrap_err().to_string();
-    assert_eq!(error, "s.toml, mesh \"fox\": is a glTF file, which is a scene of its own: render it as it is");
+fn numbers_beyond_what_gltf_allows_are_clamped_and_named_once() {
+    let mut json = triangle();
+    json["materials"][0] = json!({
+        "emissiveFactor": [3.0, -1.0, 0.0],
+        "pbrMetallicRoughness": { "baseColorFactor": [2.0, -1.0, 0.5, 3.0], "metallicFactor": 1.5, "roughnessFactor": -2 },
+        "extensions": {
+            "KHR_materials_ior": { "ior": 0.5 },
+            "KHR_materials_specular": { "specularFactor": 2.0, "specularColorFactor": [-1.0, 1.0, 1e9] },
+            "KHR_materials_transmission": { "transmissionFactor": 7 },
+            "KHR_materials_clearcoat": { "clearcoatFactor": 2, "clearcoatRoughnessFactor": 9 },
+            "KHR_materials_emissive_strength": { "emissiveStrength": 1e30 }
+        }
+    });
+    json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [
+        { "type": "spot", "intensity": -5.0, "spot": { "innerConeAngle": 2.0, "outerConeAngle": -1.0 } }, { "type": "point" }
+    ] } });
+    json["nodes"][0]["extensions"] = json!({ "KHR_lights_punctual": { "light": 0 } });
+    let scene = load(&json);
+    let m = &scene.materials[0];
+    assert_eq!((m.base_color, m.metallic, m.alpha), ([1.0, 0.0, 0.5], 1.0, 0.0));
+    assert_eq!((m.specular_factor, m.transmission_factor, m.clearcoat, m.clearcoat_alpha), (1.0, 1.0, 1.0, 1.0));
+    assert_eq!(m.emission, [1e18, 0.0, 0.0]);
+    let clamped: Vec<_> = said(&scene).into_iter().filter(|line| line.contains("clamped")).collect();
+    assert_eq!(clamped.len(), 2, "{clamped:?}");
+    assert_eq!(clamped[0], "numbers beyond what glTF allows are clamped: 1 lights");
+    assert!(clamped[1].ends_with("baseColorFactor of material 0 and 10 more"), "{clamped:?}");
+}
+
+#[test]
+fn surfaces_with_normal_maps_get_tangents() {
+    let mut png = std::io::Cursor::new(Vec::new());
+    image::RgbImage::new(1, 1).write_to(&mut png, image::ImageFormat::Png).unwrap();
+    let mut json = triangle();
+    json["images"] = json!([{ "uri": data(&png.into_inner()) }]);
+    json["textures"] = json!([{ "source": 0 }]);
+    let normals = floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0]);
+    json["buffers"].as_array_mut().unwrap().push(json!({ "byteLength": 36, "uri": data(&normals) }));
+    json["bufferViews"].as_array_mut().unwrap().push(json!({ "buffer": 1, "byteLength": 36 }));
+    let accessor = json!({ "bufferView": 3, "componentType": 5126, "count": 3, "type": "VEC3" });
+    json["accessors"].as_array_mut().unwrap().push(accessor);
+    let tangents = |json: &Value| load(json).shading.iter().filter(|s| s.attributes & ATTRIBUTE_TANGENTS != 0).count();
+    json["materials"][0]["normalTexture"] = json!({ "index": 0 });
+    assert_eq!(tangents(&json), 0, "without normals it is flat");
+    json["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = json!(3);
+    assert_eq!(tangents(&json), 1);
+    json["materials"][0]["normalTexture"] = json!({ "index": 0, "texCoord": 1 });
+    assert_eq!(tangents(&json), 0, "there are no such coordinates");
+    json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_1"] = json!(2);
+    assert_eq!(tangents(&json), 1);
+    json["materials"][0].as_object_mut().unwrap().remove("normalTexture");
+    assert_eq!(tangents(&json), 0, "control: nothing reads them");
 }
 
 #[test]

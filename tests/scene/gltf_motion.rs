@@ -151,7 +151,12 @@ fn clips_that_move_the_same_are_named() {
     assert_eq!(corners(&loaded, 2.0)[0], [4.0, 0.0, 0.0]);
     let pose = loaded.animation.at(2.0).unwrap();
     assert_eq!(pose.camera.unwrap().build([8, 8], [[0.0; 3]; 2]).unwrap().position, [0.0, 0.0, 5.0]);
-    assert!(loaded.warnings.iter().any(|line| line.contains("an earlier animation moves the same: Run")));
+    assert!(
+        loaded
+            .warnings
+            .iter()
+            .any(|line| line.contains("an earlier animation moves the same (a clip can be chosen): Run"))
+    );
 }
 
 #[test]

@@ -10,6 +10,7 @@ mod gltf_bad;
 mod gltf_file;
 mod gltf_motion;
 mod memory;
+mod models;
 mod pose;
 #[path = "../support/poses.rs"]
 mod poses;

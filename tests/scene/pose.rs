@@ -94,6 +94,7 @@ fn what_is_hidden_comes_back() {
     scene.apply(&hide).unwrap();
     scene.check().unwrap();
     assert_eq!(scene.lights.len(), lights - 2, "the panel's two triangles shine no more");
+    assert!(whole.large_lamps && scene.large_lamps, "lamps are sampled as they were when the scene was loaded");
     let tiny = Transform::from([1e-14, 0., 0., 0., 0., 1e-14, 0., 0., 0., 0., 1e-14, 0., 0., 0., 0., 1.]);
     scene.apply(&Pose { instances: vec![(0, tiny)], ..Pose::default() }).unwrap();
     scene.apply(&pose(&scene, &Moment::default(), 1.4)).unwrap();
@@ -132,4 +133,45 @@ fn poses_that_cannot_be_are_one_line_and_change_nothing() {
         assert!(said.contains(line) && !said.contains('\n') && error.exit_code() == 2, "{said}");
         assert!(arrays(&scene) == before, "{said}");
     }
+}
+
+/// A square with tangents that turn by `angle` about its normal.
+fn mapped(angle: f32) -> (Scene, Vertices) {
+    use tallow::scene::description::{Bitmap, Description, MaterialTable, Mesh, MeshTable};
+    let (sin, cos) = angle.sin_cos();
+    let positions = vec![[0.0, 0.0, angle], [1.0, 0.0, 0.0], [1.0, 1.0, angle], [0.0, 1.0, 0.0]];
+    let mesh = Mesh {
+        positions: positions.clone(),
+        normals: vec![[0.0, 0.0, 1.0]; 4],
+        uvs: positions.iter().map(|p| [p[0], p[1]]).collect(),
+        colors: vec![[0.5; 4]; 4],
+        tangents: vec![[cos, sin, 0.0, 1.0]; 4],
+        indices: vec![0, 1, 2, 0, 2, 3],
+        ..Mesh::default()
+    };
+    let Mesh { normals, tangents, .. } = mesh.clone();
+    let material = MaterialTable { name: "m".into(), normal_map: Some("n".into()), ..MaterialTable::default() };
+    let table = MeshTable { data: Some(mesh), material: Some("m".into()), moving: true, ..MeshTable::default() };
+    let bitmap = Bitmap { name: "n".into(), width: 1, height: 1, rgba: vec![[128, 128, 255, 255]].into() };
+    let (mesh, material, bitmap) = (vec![table], vec![material], vec![bitmap]);
+    let loaded = Scene::build(&Description { mesh, material, bitmap, ..Description::default() }).unwrap();
+    (loaded.scene, Vertices { positions, normals, tangents, ..Vertices::default() })
+}
+
+#[test]
+fn tangents_follow_a_deformed_mesh() {
+    let (mut scene, _) = mapped(0.0);
+    let (fresh, to) = mapped(0.7);
+    let before = scene.texels.clone();
+    let deform = |to: Vertices| Pose { meshes: vec![(0, to)], ..Pose::default() };
+    let change = scene.apply(&deform(Vertices { tangents: Vec::new(), ..to.clone() })).unwrap();
+    assert!(change.texels.is_empty() && scene.texels == before, "none are given: they stay");
+    let change = scene.apply(&deform(to.clone())).unwrap();
+    assert_eq!(scene.texels, fresh.texels);
+    // Of two triangles the colours and then the tangents, of which the latter have changed: from the first to the last word.
+    assert_eq!(change.texels, [1 + 6..1 + 9 + 9]);
+    assert_ne!(scene.texels, before, "control");
+    let few = Vertices { tangents: to.tangents[..3].to_vec(), ..to };
+    let said = scene.apply(&deform(few)).unwrap_err().to_string();
+    assert!(said.contains("4 positions but 3 tangents"), "{said}");
 }

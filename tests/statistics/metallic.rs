@@ -3,7 +3,7 @@
 use crate::bsdf::{ALPHAS, DEGREES, bsdf, energy, join_what_cannot_be_told, samples};
 use crate::scattering::{RINGS, SECTORS, d, g1, grids};
 use crate::statistics::{chi_square, sidak};
-use glam::{DVec3, Vec3, vec3};
+use glam::{DVec2, DVec3, Vec3, vec3};
 use rayon::prelude::*;
 use tallow::layout::BSDF_METALLIC;
 use tallow::twins::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
@@ -21,6 +21,13 @@ const WHITE: Parameters = Parameters {
 
 fn of(p: Parameters) -> Bsdf {
     Bsdf { metallic: Metallic::new(&p), ..bsdf(BSDF_METALLIC, p.alpha, true, 1.0) }
+}
+
+/// With a clear coat whose normal is tilted by 20 degrees.
+fn tilted(p: Parameters) -> Bsdf {
+    let mut b = of(p);
+    b.metallic.coat_normal = vec3(0.2, 0.3, 0.94).normalize();
+    b
 }
 
 /// Along `degrees` from the normal, away from the x axis, so that a wrong azimuth shows.
@@ -52,6 +59,11 @@ fn cases() -> Vec<(String, Bsdf, Vec3)> {
         cases.push((format!("lacquer {degrees} degrees"), of(lacquer), along(degrees)));
         let smooth = Parameters { alpha: 0.0, coat: [1.0, 0.0], base, ..WHITE };
         cases.push((format!("smooth {degrees} degrees"), of(smooth), along(degrees)));
+        // The viewer is above the horizon of the coat, too.
+        if degrees < 80.0 {
+            cases.push((format!("tilted lacquer {degrees} degrees"), tilted(lacquer), along(degrees)));
+            cases.push((format!("tilted smooth lacquer {degrees} degrees"), tilted(smooth), along(degrees)));
+        }
     }
     cases
 }
@@ -96,7 +108,8 @@ fn weight_is_value_over_pdf_and_reciprocal() {
         for (_, s) in samples(b, wo, 2048, false, 7).filter(|(sampled, s)| *sampled && !s.delta) {
             let value = bsdf_evaluate(&b, wo, s.wi);
             assert!((value.truncate() - s.weight * s.pdf).abs().max_element() <= 1e-4 * s.pdf, "{name}: {s:?}");
-            if s.wi.z.abs() < 1e-3 {
+            // A tilted coat is not reciprocal: f is over the cosine at another normal.
+            if s.wi.z.abs() < 1e-3 || b.metallic.coat_normal != Vec3::Z {
                 continue;
             }
             // Both sides of a wall are alike: from behind, the same light comes back.
@@ -112,7 +125,7 @@ fn weight_is_value_over_pdf_and_reciprocal() {
 fn appendix_b(p: &Parameters, wo: DVec3, wi: DVec3) -> f64 {
     let m = (wo + wi).normalize();
     let alpha = f64::from(p.alpha);
-    let vd = d(true, m, alpha) * g1(true, wo.z, alpha) * g1(true, wi.z, alpha) / (4.0 * wo.z * wi.z);
+    let vd = d(true, m, DVec2::splat(alpha)) * g1(true, wo.z, alpha) * g1(true, wi.z, alpha) / (4.0 * wo.z * wi.z);
     let schlick = |f0: f64, f90: f64| f0 + (f90 - f0) * (1.0 - wo.dot(m)).powi(5);
     let [base, metallic, f0, f90] = [p.base.x, p.metallic, p.f0.x * p.f90, p.f90].map(f64::from);
     let (metal, dielectric) = (vd * schlick(base, 1.0), vd * schlick(f0, f90));
@@ -150,6 +163,12 @@ fn no_light_is_made() {
         ("lacquer", Parameters { coat: [1.0, 0.2], metallic: 1.0, ..WHITE }),
         ("lacquered wood", Parameters { coat: [1.0, 0.0], ..WHITE }),
     ];
+    for coat in [0.0, 0.2, 1.0].map(|alpha| [1.0, alpha]) {
+        for degrees in [0.0, 20.0, 40.0, 60.0] {
+            let e = energy(tilted(Parameters { coat, ..WHITE }), along(degrees), 1 << 14);
+            assert!(e > 0.3 && e < 1.004, "a tilted coat {coat:?} at {degrees} degrees: {e}");
+        }
+    }
     for ((name, p), alpha) in kinds.iter().flat_map(|k| [0.0, 0.05, 0.1, 0.25, 0.5, 1.0].map(|alpha| (k, alpha))) {
         for degrees in [0.0, 20.0, 40.0, 50.0, 60.0, 75.0, 86.0, 89.5] {
             let e = energy(of(Parameters { alpha, ..*p }), along(degrees), 1 << 14);
@@ -195,7 +214,8 @@ fn finite_for_every_input() {
         });
     for p in parameters {
         for cos in [0.0, 1e-30, 1e-7, 1e-4, 0.5, 1.0, -0.7] {
-            let (b, wo) = (of(p), vec3((1.0f32 - cos * cos).sqrt(), 0.0, cos));
+            let wo = vec3((1.0f32 - cos * cos).sqrt(), 0.0, cos);
+            let b = if p.alpha == 0.3 { tilted(p) } else { of(p) };
             for u in numbers.iter().flat_map(|&x| numbers.map(|y| glam::vec2(x, y))) {
                 let (sampled, s) = bsdf_sample(&b, wo, u.y, u);
                 let fine = s.weight.is_finite() && s.weight.min_element() >= 0.0 && s.pdf.is_finite();

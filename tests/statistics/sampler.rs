@@ -244,6 +244,30 @@ fn rays_leave_a_uniform_lens_towards_one_point_in_focus() {
 }
 
 #[test]
+fn rays_of_an_orthographic_camera_are_parallel() {
+    let still = Camera { orthographic: 1, lens_radius: 0.0, ..lens_camera() };
+    let [position, right, up, forward] = [still.position, still.right, still.up, still.forward].map(Vec3::from);
+    let ray = |camera: Camera, film: Vec2, i: u32| {
+        let frame = FrameConstants { camera, path: PathConstants { size: [12, 5], ..Default::default() } };
+        let at = film_from_pixel(film, frame.path.size);
+        (at, eye_ray(&frame, &Effects::ALL, film, sampler_start(5, i, 1, true)))
+    };
+    for i in 0..100 {
+        let film = vec2((i % 12) as f32 + 0.3, (i % 5) as f32 + 0.8);
+        let (at, from) = ray(still, film, i);
+        assert!((from.direction - forward).length() < 1e-6, "{from:?}");
+        let start = position + at.x * right + at.y * up;
+        assert!((from.origin - start).length() < 1e-5, "{from:?} starts at {start}");
+        // Through a lens all rays of a point of the film meet where it is sharp.
+        let (_, through) = ray(Camera { lens_radius: 0.3, ..still }, film, i);
+        let focus = start + still.focus_distance * forward;
+        assert!((focus - through.origin).cross(through.direction).length() < 1e-5, "{through:?} misses {focus}");
+        let perspective = ray(Camera { orthographic: 0, ..still }, film, i).1;
+        assert!((perspective.direction - forward).length() > 1e-3, "control");
+    }
+}
+
+#[test]
 fn what_is_nearer_than_the_near_distance_is_skipped() {
     let ray = |near: f32| {
         let frame = FrameConstants {

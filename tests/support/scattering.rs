@@ -1,5 +1,5 @@
 //! The share of light that one scattering by microfacets keeps, by quadrature in f64.
-use glam::{DVec3, Vec3, dvec3};
+use glam::{DVec2, DVec3, Vec3, dvec2, dvec3};
 use std::f64::consts::{PI, TAU};
 use tallow::layout::{BSDF_COATED, BSDF_DIELECTRIC};
 use tallow::twins::bsdf::{Bsdf, SMOOTH_ALPHA};
@@ -10,7 +10,8 @@ pub struct Grid {
     wo: DVec3,
     /// Index on wi's side / on wo's: 1 for reflection.
     n: f64,
-    alpha: f64,
+    /// Roughness along x and along y.
+    alpha: DVec2,
 }
 
 pub const RINGS: usize = 16;
@@ -35,7 +36,7 @@ impl Grid {
         let radius = (t / (1.0 - t)).exp_m1();
         let (sin, cos) = (TAU * turn).sin_cos();
         let side = self.wo.z.signum();
-        let m = dvec3(radius * self.alpha * cos, radius * self.alpha * sin, 1.0).normalize() * side;
+        let m = dvec3(radius * self.alpha.x * cos, radius * self.alpha.y * sin, 1.0).normalize() * side;
         let co = self.wo.dot(m);
         let ct2 = 1.0 - (1.0 - co * co) / (self.n * self.n);
         if co <= 0.0 || ct2 <= 0.0 {
@@ -43,7 +44,7 @@ impl Grid {
         }
         let (ci, reflected) = if self.n == 1.0 { (co, true) } else { (-ct2.sqrt(), false) };
         let wi = (co / self.n + ci) * m - self.wo / self.n;
-        let slope_area = radius * (1.0 + radius) * TAU * self.alpha * self.alpha / (1.0 - t).powi(2);
+        let slope_area = radius * (1.0 + radius) * TAU * self.alpha.x * self.alpha.y / (1.0 - t).powi(2);
         // Walter et al. 2007: d omega_m = d slope cos^3; d omega_i = (co + n ci)^2 / (n^2 |ci|) d omega_m.
         let jacobian = (co + self.n * ci).powi(2) / (self.n * self.n * ci.abs()) * (m.z * side).powi(3);
         ((wi.z * side > 0.0) == reflected).then(|| (wi.as_vec3(), slope_area * jacobian))
@@ -68,10 +69,22 @@ impl Grid {
 /// The grid of the reflected lobe, and of the refracted one where there is one.
 pub fn grids(b: &Bsdf, wo: Vec3) -> Vec<Grid> {
     // A diffuse lobe without a rough coat spreads over all slopes.
-    let alpha = f64::from(if b.alpha < SMOOTH_ALPHA { 1.0 } else { b.alpha });
+    let alpha = if b.alpha < SMOOTH_ALPHA { DVec2::ONE } else { alphas(b) };
     let eta = f64::from(if wo.z < 0.0 { 1.0 / b.eta.x } else { b.eta.x });
     let indices = if b.kind == BSDF_DIELECTRIC { vec![1.0, eta] } else { vec![1.0] };
     indices.into_iter().map(|n| Grid { wo: wo.as_dvec3(), n, alpha }).collect()
+}
+
+/// Roughness along x and along y.
+pub fn alphas(b: &Bsdf) -> DVec2 {
+    let alpha = f64::from(b.alpha);
+    dvec2(alpha, alpha * f64::from(b.stretch))
+}
+
+/// Smith G1 of microfacets whose roughness depends on the direction: that of the roughness in the plane of `w`.
+pub fn g1_along(ggx: bool, w: DVec3, alpha: DVec2) -> f64 {
+    let across = w.truncate().length().max(1e-300);
+    g1(ggx, w.z.abs(), (alpha * w.truncate()).length() / across)
 }
 
 /// Smith G1 in f64, written apart from the twin.
@@ -85,10 +98,10 @@ pub fn g1(ggx: bool, z: f64, alpha: f64) -> f64 {
 }
 
 /// Normal distribution, per steradian.
-pub fn d(ggx: bool, m: DVec3, alpha: f64) -> f64 {
-    let (c2, a2) = ((m.z * m.z).max(1e-30), alpha * alpha);
-    let x = (1.0 - c2) / (c2 * a2);
-    (if ggx { 1.0 / (1.0 + x).powi(2) } else { (-x).exp() }) / (PI * a2 * c2 * c2)
+pub fn d(ggx: bool, m: DVec3, alpha: DVec2) -> f64 {
+    let c2 = (m.z * m.z).max(1e-30);
+    let x = (m.truncate() / alpha).length_squared() / c2;
+    (if ggx { 1.0 / (1.0 + x).powi(2) } else { (-x).exp() }) / (PI * alpha.x * alpha.y * c2 * c2)
 }
 
 /// Reflectance of a dielectric in f64, written apart from the twin; `n` = index beyond / on this side.
@@ -112,7 +125,7 @@ fn microfacets(b: &Bsdf, eta: f64, wo: DVec3, wi: DVec3) -> f64 {
     let share = if n == 1.0 { fresnel(co, eta) } else { 1.0 - fresnel(co, eta) };
     // h_r points between the two, h_t away from both: the projections add up there, and subtract here.
     let q = if n == 1.0 { 2.0 * co } else { co - n * ci };
-    let (alpha, g) = (f64::from(b.alpha), |w: DVec3| g1(b.ggx, w.z.abs(), f64::from(b.alpha)));
+    let (alpha, g) = (alphas(b), |w: DVec3| g1_along(b.ggx, w, alphas(b)));
     share * d(b.ggx, m, alpha) * g(wo) * g(wi) * co * ci * n * n / (q * q) / wo.z.abs()
 }
 
@@ -122,7 +135,7 @@ fn interface(b: &Bsdf, eta: f64, c: f64, through: bool) -> f64 {
         return if through { 1.0 - fresnel(c, eta) } else { fresnel(c, eta) };
     }
     let wo = dvec3((1.0 - c * c).sqrt(), 0.0, c);
-    let grid = Grid { wo, n: if through { eta } else { 1.0 }, alpha: f64::from(b.alpha) };
+    let grid = Grid { wo, n: if through { eta } else { 1.0 }, alpha: alphas(b) };
     grid.integrate(|wi| microfacets(b, eta, wo, wi.as_dvec3())).iter().sum()
 }
 

@@ -13,8 +13,8 @@ use tallow::twins::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_
 use tallow::twins::sampler::{sample_2d, sample_2d_bits, sampler_start};
 
 const CASES: usize = 20_000;
-/// [`Material`], (wo, wi, (u_lobe, u)).
-type Case = (Material, [Vec3; 3]);
+/// [`Material`], (wo, wi, (u_lobe, u), normal of the clear coat).
+type Case = (Material, [Vec3; 4]);
 
 fn numbers(case: usize, pair: u32) -> Vec2 {
     sample_2d(sampler_start(case as u32, 0, 5, true), pair)
@@ -62,16 +62,24 @@ fn cases(kinds: &[u32], ggx: &[u32]) -> Vec<Case> {
             clearcoat: if (i / 13).is_multiple_of(2) { 0.0 } else { a.x },
             clearcoat_alpha: if (i / 17).is_multiple_of(2) { 0.0 } else { b.x },
             coat_table: (i % TABLES * tables().len() / TABLES) as u32,
+            anisotropy: match kind {
+                BSDF_CONDUCTOR | BSDF_DIELECTRIC if i / 19 % 2 == 1 => [-0.7, 1.5][i / 38 % 2],
+                _ => 0.0,
+            },
             ..Material::default()
         };
-        (material, [wo, wi, u])
+        // Half of the coats are tilted, unless the viewer would be below them.
+        let tilt = vec3(a.x - 0.5, b.x - 0.5, 1.0).normalize();
+        let coat = if (i / 23).is_multiple_of(2) || tilt.dot(wo) < 1e-3 { Vec3::Z } else { tilt };
+        (material, [wo, wi, u, coat])
     };
     (0..CASES).map(case).collect()
 }
 
 /// What `glsl/test/bsdf.comp` writes for one case.
-fn twin((material, [wo, wi, u]): &Case) -> [Vec4; 5] {
-    let b = Bsdf::new(material, material.alpha, tables());
+fn twin((material, [wo, wi, u, coat]): &Case) -> [Vec4; 5] {
+    let mut b = Bsdf::new(material, material.alpha, tables());
+    b.metallic.coat_normal = *coat;
     let (sampled, s) = bsdf_sample(&b, *wo, u.x, vec2(u.y, u.z));
     let flag = |on: bool| f32::from(u8::from(on));
     [
@@ -121,6 +129,8 @@ fn only(kinds: &[u32], beckmann: bool, ggx: bool) -> Effects {
         dielectric: has(BSDF_DIELECTRIC),
         metallic: has(BSDF_METALLIC),
         clearcoat: has(BSDF_METALLIC),
+        coat_normals: has(BSDF_METALLIC),
+        anisotropic: has(BSDF_CONDUCTOR) || has(BSDF_DIELECTRIC),
         thin_walls: has(BSDF_METALLIC),
         coated: has(BSDF_COATED),
         rough: true,
@@ -175,6 +185,14 @@ fn bsdfs_equal_their_twins() -> Result<()> {
                 |m| m.clearcoat_alpha *= 0.9,
             ];
             assert!(plants.iter().all(|&plant| of(plant) > CASES / 50), "control: {:?}", plants.map(of));
+            let mut planted = cases.clone();
+            planted.iter_mut().for_each(|c| c.1[3] = Vec3::Z);
+            assert!(disagreements(&special, &planted).len() > CASES / 50, "control: coats that are not tilted");
+        }
+        if kinds == [BSDF_CONDUCTOR] {
+            let mut planted = cases.clone();
+            planted.iter_mut().for_each(|c| c.0.anisotropy *= 0.95);
+            assert!(disagreements(&special, &planted).len() > CASES / 20, "control: another roughness along y");
         }
         if kinds.contains(&BSDF_COATED) {
             // Control: another coat's table, and light that keeps the base's colour once.

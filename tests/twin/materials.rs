@@ -3,11 +3,14 @@
 use crate::kernels::{agreement, check, run, small};
 use crate::support::{assert_silent, gpu};
 use glam::{Vec2, Vec3, vec2, vec3};
+use tallow::image::{self, Film, Samples, WriteOptions};
 use tallow::layout::{ATTRIBUTE_FLIPPED, Effects, MATERIAL_MASKED, TEXTURE_NEAREST};
 use tallow::render::{Outputs, all_effects, called_for};
 use tallow::scene::description::*;
 use tallow::scene::{Loaded, Scene};
-use tallow::twins::surface::{Facing, Surface, facing_normals, facing_of_metal, surface_at, surface_bsdf};
+use tallow::twins::surface::{
+    Facing, Surface, facing_normals, facing_of_metal, shading_basis, surface_at, surface_bsdf,
+};
 use tallow::twins::texture::{mask_blocks, surface_opacity, texture_sample};
 use tallow::twins::traverse::traverse;
 
@@ -77,7 +80,16 @@ fn materials() -> Vec<MaterialTable> {
             clearcoat_roughness: Some(0.5),
             clearcoat_texture: texture("bumps"),
             clearcoat_roughness_texture: texture("checks"),
+            clearcoat_normal_map: texture("bumps"),
+            clearcoat_normal_scale: Some(1.5),
             ..metallic("lacquer")
+        },
+        MaterialTable {
+            kind: MaterialType::Conductor,
+            alpha: 0.5,
+            alpha_v: Some(0.1),
+            distribution: Distribution::Ggx,
+            ..metallic("brushed")
         },
         MaterialTable {
             color_texture: Some(TextureTable { filter: TextureFilter::Nearest, ..TextureTable::from("checks") }),
@@ -119,7 +131,7 @@ fn described() -> Description {
         ..InstanceTable::default()
     };
     Description {
-        camera: Camera { position: Some([0.3, 0.2, 6.0]), target: Some([0.0; 3]), ..Camera::default() },
+        camera: Camera { position: Some([0.3, 1.0, 9.0]), target: Some([0.0, 1.0, 0.0]), ..Camera::default() },
         environment: Some(EnvironmentTable { radiance: Some(Rgb([0.7, 0.8, 1.0])), ..EnvironmentTable::default() }),
         material: materials(),
         mesh: vec![
@@ -128,6 +140,7 @@ fn described() -> Description {
             at("leaf", -2.2, -1.1),
             at("pane", 0.0, -1.1),
             at("sign", 2.2, -1.1),
+            at("brushed", 0.0, 3.2),
         ],
         instance: vec![instance(0.0, 1.0), instance(-2.2, -1.0)],
         light: vec![LightTable {
@@ -156,16 +169,19 @@ fn materials_of_gltf_agree_with_their_twins() {
     let Effects { texture_modes, second_uv, vertex_colors, tangents, alpha_cutoff, .. } = effects;
     assert_eq!([texture_modes, second_uv, vertex_colors, tangents, alpha_cutoff], [true; 5]);
     assert_eq!([effects.metallic, effects.clearcoat, effects.thin_walls], [true; 3]);
+    assert_eq!([effects.coat_normals, effects.anisotropic], [true; 2]);
     let pair = run(&gpu, &scene, effects);
     check("materials", &pair);
     check("materials, all effects", &run(&gpu, &scene, all_effects(&scene, &scene.settings)));
     let whole = agreement(&pair.samples);
     // Controls: the twin's samples of scenes in which one thing is another.
-    let plants: [Plant; 5] = [
+    let plants: [Plant; 7] = [
         ("interpolation", |s| s.textures.iter_mut().for_each(|t| t.flags &= !TEXTURE_NEAREST)),
         ("turn", |s| s.textures.iter_mut().for_each(|t| t.shear = [0.0; 2])),
         ("bitangents", |s| s.shading.iter_mut().for_each(|r| r.attributes ^= ATTRIBUTE_FLIPPED)),
         ("cutoff", |s| s.materials.iter_mut().for_each(|m| m.alpha_cutoff = 0.0)),
+        ("coat normals", |s| s.materials.iter_mut().for_each(|m| m.clearcoat_normal_scale = 0.0)),
+        ("brushing", |s| s.materials.iter_mut().for_each(|m| m.anisotropy = 0.0)),
         ("normal scale", |s| s.materials.iter_mut().for_each(|m| m.normal_scale = 1.0)),
     ];
     for (name, plant) in plants {
@@ -345,4 +361,124 @@ fn a_slope_of_metal_mirrors_nothing_into_the_surface() {
         assert_eq!(facing_of_metal(&s, facing, wo, 0.1).normal, facing.normal, "a dielectric keeps its slopes");
     }
     assert!(below > 20, "control: only {below} slopes are steep");
+}
+
+#[test]
+fn an_orthographic_camera_agrees_with_its_twin() {
+    let gpu = gpu();
+    let view = |orthographic| {
+        let camera = Camera { orthographic, ..described().camera };
+        let mut scene = Scene::build(&Description { camera, ..described() }).unwrap();
+        small(&mut scene.settings);
+        scene
+    };
+    let scene = view(Some(4.4));
+    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    let effects = called_for(&scene, &scene.settings, outputs);
+    assert!(effects.orthographic && !called_for(&view(None), &scene.settings, outputs).orthographic);
+    let pair = run(&gpu, &scene, effects);
+    check("orthographic", &pair);
+    check("orthographic, all effects", &run(&gpu, &scene, all_effects(&scene, &scene.settings)));
+    // Control: in perspective the picture is another.
+    let others = run(&gpu, &view(None), Effects { orthographic: false, ..effects }).samples;
+    assert!(agreement(&[others[0].clone(), pair.samples[1].clone()]) < agreement(&pair.samples) - 0.1, "control");
+    assert_silent(&gpu);
+}
+
+/// A picture of floats up to 3, with an alpha channel.
+fn floats(folder: &std::path::Path) -> TextureTable {
+    let mut film = Film::new(8, 8);
+    let ramp = |scale: f32, shift: usize| (0..64).map(|i| scale * ((i * 5 + shift) % 64) as f32 / 63.0).collect();
+    for (name, scale, shift) in [("R", 3.0, 0), ("G", 1.0, 17), ("B", 0.4, 40), ("A", 1.0, 9)] {
+        film.add(name, Samples::F32(ramp(scale, shift)));
+    }
+    let path = folder.join("floats.exr");
+    image::write(&path, &film, &WriteOptions::default()).unwrap();
+    path.as_path().into()
+}
+
+#[test]
+fn pictures_of_floats_agree_with_their_twins() {
+    let (gpu, folder) = (gpu(), tempfile::tempdir().unwrap());
+    let picture = || Some(floats(folder.path()));
+    let mut description = described();
+    for table in &mut description.material {
+        match table.name.as_str() {
+            "enamel" => (table.color_texture, table.metallic_roughness_texture) = (picture(), picture()),
+            "lacquer" => (table.emission_texture, table.clearcoat_roughness_texture) = (picture(), picture()),
+            "leaf" => table.color_texture = picture(),
+            _ => {}
+        }
+    }
+    let mut scene = Scene::build(&description).unwrap();
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    small(&mut scene.settings);
+    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    let effects = called_for(&scene, &scene.settings, outputs);
+    assert!(effects.hdr_textures);
+    let pair = run(&gpu, &scene, effects);
+    check("floats", &pair);
+    let others = run(&gpu, &scene, Effects { hdr_textures: false, ..effects }).samples;
+    assert!(agreement(&[others[0].clone(), pair.samples[1].clone()]) < agreement(&pair.samples) - 0.05, "control");
+    assert_silent(&gpu);
+}
+
+#[test]
+fn metal_is_smoother_along_v_where_its_coordinates_say_so() {
+    let brushed = |alpha_v| MaterialTable {
+        name: "m".into(),
+        kind: MaterialType::Conductor,
+        alpha: 0.4,
+        alpha_v,
+        ..MaterialTable::default()
+    };
+    let flat = |turned: bool| {
+        let mut mesh = patch();
+        mesh.positions.iter_mut().for_each(|p| p[2] = 0.0);
+        mesh.normals.iter_mut().for_each(|n| *n = [0.0, 0.0, 1.0]);
+        mesh.tangents.clear();
+        if turned {
+            mesh.uvs.iter_mut().for_each(|uv| *uv = [uv[1], uv[0]]);
+        }
+        mesh
+    };
+    let frame = |material, mesh, transform| {
+        let scene = one(material, mesh, transform, false);
+        let s = surface(&scene, 0.3, -0.4);
+        let b = surface_bsdf(&scene, &s);
+        (shading_basis(&s, &b, s.normal), b.alpha, b.stretch)
+    };
+    for (turned, expected) in [(false, Vec3::X), (true, Vec3::Y)] {
+        let (basis, alpha, stretch) = frame(brushed(Some(0.1)), flat(turned), place([0.0; 3], 1.0));
+        assert!(basis.x_axis.dot(expected).abs() > 0.999, "{basis}");
+        assert!(alpha == 0.4 && (stretch - 0.25).abs() < 1e-6);
+        assert!((basis.determinant() - 1.0).abs() < 1e-5 && basis.z_axis.z > 0.999);
+    }
+    // Given tangents take the place of coordinates.
+    let mut mesh = flat(false);
+    mesh.tangents = vec![[0.6, 0.8, 0.0, 1.0]; mesh.positions.len()];
+    let (basis, ..) = frame(brushed(Some(0.1)), mesh, place([0.0; 3], 1.0));
+    assert!(basis.x_axis.dot(vec3(0.6, 0.8, 0.0)).abs() > 0.999, "{basis}");
+    assert_eq!(frame(brushed(None), flat(false), place([0.0; 3], 1.0)).2, 1.0);
+}
+
+#[test]
+fn a_clear_coat_has_normals_of_its_own() {
+    let coated = |own: bool, base: bool| MaterialTable {
+        name: "m".into(),
+        kind: MaterialType::MetallicRoughness,
+        clearcoat: Some(1.0),
+        clearcoat_normal_map: if own { texture("bumps") } else { None },
+        normal_map: if base { texture("bumps") } else { None },
+        ..MaterialTable::default()
+    };
+    let at = |own, base| surface(&one(coated(own, base), patch(), place([0.0; 3], 1.0), false), 0.3, -0.4);
+    let [both, coat, below, none] = [(true, true), (true, false), (false, true), (false, false)].map(|(o, b)| at(o, b));
+    assert!((both.normal - both.coat_normal).length() < 1e-6 && both.normal != both.smooth_normal);
+    assert!(coat.normal == coat.smooth_normal && coat.coat_normal == both.coat_normal);
+    assert!(
+        below.normal == both.normal && below.coat_normal == below.smooth_normal,
+        "the base's map is not the coat's"
+    );
+    assert!(none.normal == none.smooth_normal && none.coat_normal == none.smooth_normal);
 }

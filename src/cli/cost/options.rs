@@ -18,7 +18,7 @@ use std::path::PathBuf;
 /// budget, the same command goes on where it was.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Scene file (.toml, .gltf, .glb) or model (.obj)
+    /// Scene file (.toml, .gltf, .glb) or model (.obj, .ply)
     #[arg(required_unless_present = "filter_only")]
     pub scene: Option<PathBuf>,
     /// Folder for the results; it is made if missing

@@ -21,9 +21,9 @@ use std::time::{Duration, Instant};
 /// again. A frame that fails does not stop the others: the exit code is 6 then.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Frames: 0..96 are 96 frames, 0..=96 one more, 7 is one
+    /// Frames: 0..96 are 96 frames, 0..=96 one more, 7 is one [default: up to the last key of all that moves]
     #[arg(long, value_name = "FIRST..END", value_parser = range::parse)]
-    pub frames: Range<u32>,
+    pub frames: Option<Range<u32>>,
     /// Of them, render only these; what they show stays the same
     #[arg(long, value_name = "FIRST..END", value_parser = range::parse)]
     pub only: Option<Range<u32>>,
@@ -72,10 +72,17 @@ impl Args {
         Ok(args)
     }
 
-    /// Numbers of the frames to render, in order.
-    fn numbers(&self) -> Range<u32> {
-        let only = self.only.as_ref().unwrap_or(&self.frames);
-        only.start.max(self.frames.start)..only.end.min(self.frames.end)
+    /// Numbers of the frames to render, in order, of a sequence that consists of `frames`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when there are none.
+    fn numbers(&self, frames: &Range<u32>) -> Result<Range<u32>> {
+        let only = self.only.as_ref().unwrap_or(frames);
+        let numbers = only.start.max(frames.start)..only.end.min(frames.end);
+        match numbers.is_empty() {
+            true => Err(Error::Usage("none of the frames is in --frames and --only: 0..96 are 96 frames".to_owned())),
+            false => Ok(numbers),
+        }
     }
 
     fn check(&self) -> Result<()> {
@@ -95,11 +102,12 @@ impl Args {
         if !(self.fps > 0.0 && self.fps <= 1e6) {
             return Err(Error::Usage(format!("--fps {}: choose a number above 0", self.fps)));
         }
-        if self.numbers().is_empty() {
-            return Err(Error::Usage("none of the frames is in --frames and --only: 0..96 are 96 frames".to_owned()));
-        }
+        let first = match &self.frames {
+            Some(frames) => self.numbers(frames)?.start,
+            None => 0,
+        };
         self.preview.iter().try_for_each(|path| preview::check(path))?;
-        outputs::check(&self.of_frame(self.numbers().start)?)
+        outputs::check(&self.of_frame(first)?)
     }
 }
 
@@ -140,13 +148,16 @@ pub fn run(args: &Args) -> Result<Exit> {
     let begun = Instant::now();
     let mut stage = Stage::new(args)?;
     let mut preview = args.preview.as_ref().map(|_| Preview::default());
-    let (numbers, mut reports) = (args.numbers(), Vec::new());
+    let (numbers, mut reports) = (args.numbers(stage.frames())?, Vec::new());
     for number in numbers.clone() {
         let frame = stage.frame(number, preview.as_mut());
         if let Err(error @ Error::DeviceLost(_)) = frame.result {
             return Err(error);
         }
         if matches!(frame.result, Ok(Exit::Interrupted)) {
+            complain(&format!(
+                "interrupted in frame {number}: finished frames stay, and the same command goes on there"
+            ));
             return Ok(Exit::Interrupted);
         }
         let report = frame.report();

@@ -5,13 +5,13 @@ use crate::cli::render::{self, EffectChoice, Spans, outputs};
 use crate::cli::{Exit, complain};
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu};
-
 use crate::image::{self, Film, NOISY};
 use crate::layout::{Effect, Effects};
 use crate::render::settings::Settings;
 use crate::render::{Renderer, all_effects, called_for, finished};
 use crate::scene::animation::{Animation, Turntable};
 use crate::scene::{Change, Loaded, Scene};
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -21,9 +21,10 @@ pub struct Stage<'a> {
     gpu: Gpu,
     scene: Scene,
     animation: Animation,
+    /// Numbers of all frames.
+    frames: Range<u32>,
     settings: Settings,
-    /// Effects of the scene as it was loaded. Whether lamps are sampled as large ones is decided by that alone, so that a frame
-    /// has the same bits whichever came before.
+    /// Effects of the scene as it was loaded, and of all frames so far.
     rest: Effects,
     renderer: Option<Renderer>,
     /// What the renderer has not been told of.
@@ -67,9 +68,10 @@ impl<'a> Stage<'a> {
         if args.render.common.talkative() {
             scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
         }
+        let frames = args.frames.clone().map_or_else(|| whole(&animation, args.fps), Ok)?;
         if let Some(degrees) = args.turntable {
             let size = [settings.width, settings.height];
-            let period = f64::from(args.frames.end) / args.fps;
+            let period = f64::from(frames.end) / args.fps;
             animation.movers.push(Arc::new(Turntable::new(&scene, size, degrees, period)));
         }
         if animation.is_empty() && args.render.common.talkative() {
@@ -80,7 +82,12 @@ impl<'a> Stage<'a> {
         let gpu = args.render.common.open()?;
         render::check_room(&args.render, &settings, &gpu)?;
         let rest = called_for(&scene, &settings, args.render.wanted());
-        Ok(Self { args, gpu, scene, animation, settings, rest, renderer: None, change: Change::default() })
+        Ok(Self { args, gpu, scene, animation, frames, settings, rest, renderer: None, change: Change::default() })
+    }
+
+    /// Numbers of all frames.
+    pub fn frames(&self) -> &Range<u32> {
+        &self.frames
     }
 
     /// The device.
@@ -118,7 +125,7 @@ impl<'a> Stage<'a> {
         let renderer = self.renderer.as_ref().ok_or_else(|| Error::Usage("there is no renderer".into()))?;
         let shot = render::shoot(&args, &self.gpu, &self.scene, renderer, None, Spans::default())?;
         let Some(mut shot) = shot else { return Ok(Exit::Interrupted) };
-        let exit = shot.finish(&args)?;
+        let exit = shot.finish(&args)?.exit;
         if exit == Exit::Done {
             show(preview, shot.film(), &args)?;
         }
@@ -155,7 +162,6 @@ impl<'a> Stage<'a> {
             EffectChoice::All => all_effects(&self.scene, settings),
             EffectChoice::Auto => self.union(called_for(&self.scene, settings, wanted)),
         };
-        let effects = Effects { large_lamps: self.rest.large_lamps, ..effects };
         self.renderer = Some(Renderer::specialised(&self.gpu, &self.scene, settings, wanted, effects)?);
         (self.rest, self.change) = (effects, Change::default());
         Ok(())
@@ -175,6 +181,21 @@ impl<'a> Stage<'a> {
         let filtered = film.channels.iter().any(|channel| channel.name.starts_with(NOISY));
         (files.iter().all(|path| path.exists()) && filtered == args.denoise.is_some()).then_some(film)
     }
+}
+
+/// Most frames that are rendered without being asked for.
+const MOST_FRAMES: f64 = 1e6;
+
+/// The frames up to the last key.
+fn whole(animation: &Animation, fps: f64) -> Result<Range<u32>> {
+    let last = (animation.end() * fps).floor();
+    if last < 1.0 {
+        return Err(Error::Usage("how many frames there are is not known: nothing moves; give --frames 0..96".into()));
+    }
+    if last > MOST_FRAMES {
+        return Err(Error::Usage(format!("{last} frames last to the end of what moves: choose some by --frames")));
+    }
+    Ok(0..last as u32 + 1)
 }
 
 fn show(preview: Option<&mut Preview>, film: &Film, args: &render::Args) -> Result<()> {

@@ -1,10 +1,10 @@
-//! Meshes that have an OBJ file for each pose.
+//! Meshes that have a file, OBJ or PLY, for each pose.
 use super::Mover;
 use crate::error::{Error, Result};
 use crate::scene::build::store::joined;
 use crate::scene::description::{Interpolation, Mesh, MeshTable, numbered};
 use crate::scene::load::library::Library;
-use crate::scene::load::obj;
+use crate::scene::load::mesh_file;
 use crate::scene::pose::{Pose, Vertices};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -44,7 +44,7 @@ impl Frames {
             return Ok(mesh.clone());
         }
         let name = numbered(&self.pattern.to_string_lossy(), self.first + index).unwrap_or_default();
-        let file = obj::load(name.as_ref(), &mut Library::default())?;
+        let file = mesh_file::load(name.as_ref(), &mut Library::default())?;
         let mesh = Arc::new(joined(&self.table, &file));
         if mesh.positions.is_empty() {
             return Err(Error::input(name, "has no triangles of this mesh: every file has to have all"));
@@ -88,7 +88,8 @@ impl Mover for Frames {
         let normals = if b.normals.len() == b.positions.len() { mix(&a.normals, &b.normals) } else { Vec::new() };
         // A mesh without normals has none in between either.
         let normals = if normals.len() == positions.len() { normals } else { Vec::new() };
-        pose.meshes.push((self.mesh, Vertices { positions, normals, indices: a.indices.clone() }));
+        pose.meshes
+            .push((self.mesh, Vertices { positions, normals, tangents: Vec::new(), indices: a.indices.clone() }));
         Ok(())
     }
 

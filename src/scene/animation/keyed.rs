@@ -33,6 +33,7 @@ impl Target {
                 ("target", &[3]),
                 ("up", &[3]),
                 ("fov", &[1]),
+                ("orthographic", &[1]),
                 ("focus_distance", &[1]),
                 ("lens_radius", &[1]),
             ],
@@ -93,6 +94,7 @@ impl Keyed {
             target: self.three("target", at).or(rest.target),
             up: self.three("up", at).or(rest.up),
             fov: self.one("fov", at).or(rest.fov),
+            orthographic: self.one("orthographic", at).or(rest.orthographic),
             focus_distance: self.one("focus_distance", at).map(|v| v as f32).or(rest.focus_distance),
             lens_radius: self.one("lens_radius", at).map_or(rest.lens_radius, |v| v as f32),
             ..rest.clone()

@@ -4,7 +4,8 @@ use super::next::{Next, NextCopies, NextMesh};
 use crate::error::Result;
 use crate::layout::{BvhNode, Instance, Light, Material, Shading};
 use crate::scene::build::geometry::FLAT;
-use crate::scene::build::{bvh, coat, hierarchy, lights, soft};
+use crate::scene::build::soft::{self, Placed};
+use crate::scene::build::{bvh, coat, hierarchy, lights};
 use crate::scene::pose::Pose;
 use crate::scene::{Change, Deformed, Scene};
 
@@ -47,8 +48,9 @@ fn wear(scene: &mut Scene, materials: Vec<Material>, change: &mut Change) {
     scene.materials = materials;
     for index in 0..scene.materials.len() {
         if reads_table(&scene.materials[index]) && scene.rig.tabled.insert(index as u32) {
+            let first = scene.texels.len();
             coat::add_tables(&mut scene.materials[index..=index], &mut scene.texels);
-            change.texels = true;
+            change.texels.push(first..scene.texels.len());
         }
     }
     lights::weigh(scene);
@@ -60,14 +62,17 @@ fn deform(scene: &mut Scene, mesh: NextMesh, copies: &mut [Instance], rebuild_ab
     let tree = &mut scene.rig.trees[mesh.tree];
     let (range, nodes) = (tree.range.clone(), tree.nodes.clone());
     tree.bounds = mesh.bounds;
-    if scene.shading.is_empty() && mesh.normals.iter().any(|codes| *codes != FLAT) {
+    let Placed { triangles, normals, tangents } = &mesh.placed;
+    if scene.shading.is_empty() && normals.iter().any(|codes| *codes != FLAT) {
         // The first vertex normals of the scene: all triangles get a record.
         scene.shading = vec![Shading { normal: FLAT, ..Shading::default() }; scene.triangles.len()];
         change.triangles.push(0..scene.triangles.len());
     }
-    scene.triangles[range.clone()].copy_from_slice(&mesh.triangles);
+    scene.triangles[range.clone()].copy_from_slice(triangles);
     if !scene.shading.is_empty() {
-        soft::bend(&mut scene.shading[range.clone()], &mesh.normals);
+        let records = &mut scene.shading[range.clone()];
+        soft::bend(records, normals);
+        change.texels.extend(soft::twist(&mut scene.texels, records, tangents));
     }
     let Some(soft) = &mut tree.soft else { return };
     soft.pose = mesh.pose;

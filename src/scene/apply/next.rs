@@ -1,10 +1,11 @@
 //! What a scene becomes by a pose, found and checked before anything is changed.
 use super::material::changed;
-use crate::layout::{Instance, LIGHT_ENVIRONMENT, Light, MATERIAL_MASKED, Material, NONE, SPHERE, Triangle};
+use crate::layout::{Instance, LIGHT_ENVIRONMENT, Light, MATERIAL_MASKED, Material, NONE, SPHERE};
 use crate::scene::build::bvh::{self, Bounds};
 use crate::scene::build::environment::{self, rotation};
 use crate::scene::build::hierarchy::{instance, is_lost, reach};
 use crate::scene::build::plan::{has_inverse, is_even};
+use crate::scene::build::soft::Placed;
 use crate::scene::load::material::radiance;
 use crate::scene::pose::{EnvironmentChange, Pose, Vertices};
 use crate::scene::{Fingerprint, Scene};
@@ -36,9 +37,7 @@ pub struct NextCopies {
 pub struct NextMesh {
     /// Index of its tree.
     pub tree: usize,
-    /// In leaf order, as the packed normals.
-    pub triangles: Vec<Triangle>,
-    pub normals: Vec<[u32; 3]>,
+    pub placed: Placed,
     pub bounds: Bounds,
     /// What identifies the vertices.
     pub pose: String,
@@ -73,13 +72,14 @@ fn next_mesh(scene: &Scene, mesh: usize, to: &Vertices) -> Checked<NextMesh> {
         return Err(format!("mesh {mesh} cannot be deformed: it needs `moving = true`, and triangles"));
     };
     let before = &scene.triangles[scene.rig.trees[tree].range.clone()];
-    let (triangles, normals) = soft.place(to, before).map_err(|what| format!("mesh {mesh} {what}"))?;
-    let bounds = bvh::bounds(&triangles).unwrap_or_default();
+    let placed = soft.place(to, before).map_err(|what| format!("mesh {mesh} {what}"))?;
+    let bounds = bvh::bounds(&placed.triangles).unwrap_or_default();
     let mut pose = Fingerprint::default();
     pose.add(&to.positions);
     pose.add(&to.normals);
+    pose.add(&to.tangents);
     pose.add(&to.indices);
-    Ok(NextMesh { tree, triangles, normals, bounds, pose: pose.to_string() })
+    Ok(NextMesh { tree, placed, bounds, pose: pose.to_string() })
 }
 
 fn next_copies(scene: &Scene, pose: &Pose, meshes: &[NextMesh], materials: &[Material]) -> Checked<NextCopies> {

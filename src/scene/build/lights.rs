@@ -16,7 +16,7 @@ use glam::{Mat4, Vec3, Vec4};
 use std::f64::consts::PI;
 
 /// Adds the emissive triangles to the scene's lights (which hold the others), drops lights without power, and builds
-/// the table. Sets [`Material::emission_weight`], [`Light::probability`] and [`Scene::triangle_pdf_scale`].
+/// the table. Sets [`Material::emission_weight`], [`Light::probability`], [`Scene::triangle_pdf_scale`] and [`Scene::large_lamps`].
 ///
 /// # Errors
 /// [`Error::Memory`](crate::error::Error::Memory).
@@ -24,7 +24,9 @@ pub fn finish(scene: &mut Scene) -> Result<()> {
     scene.rig.lights = std::mem::take(&mut scene.lights);
     scene.rig.sky = scene.environment.as_ref().map_or(1.0, mean_luminance);
     weigh(scene);
-    list(scene)
+    list(scene)?;
+    scene.large_lamps = scene.lights.iter().any(|l| is_large(scene, l));
+    Ok(())
 }
 
 /// Sets [`Material::emission_weight`] of all materials, and finds the triangles that emit.
@@ -32,7 +34,9 @@ pub fn weigh(scene: &mut Scene) {
     let (textures, texels, means) = (&scene.textures, &scene.texels, &mut scene.rig.means);
     // Many materials may share a picture.
     let mut mean = |image: u32| match textures.get(image as usize) {
-        Some(t) => *means.entry((t.first, t.flags & TEXTURE_SRGB)).or_insert_with(|| texture::mean(t, texels)),
+        Some(t) => *means
+            .entry((t.first, t.flags & (TEXTURE_SRGB | TEXTURE_RGB9E5 | TEXTURE_FLOAT)))
+            .or_insert_with(|| texture::mean(t, texels)),
         None => [1.0; 3],
     };
     for m in &mut scene.materials {
@@ -63,7 +67,6 @@ pub fn list(scene: &mut Scene) -> Result<()> {
     powers.retain(|&p| p > 0.0);
     let total: f64 = powers.iter().sum();
     scene.triangle_pdf_scale = if total > 0.0 { (PI / total) as f32 } else { 0.0 };
-    scene.large_lamps = lights.iter().any(|l| is_large(scene, l));
     scene.light_table = alias::build(&powers);
     let probabilities = alias::probabilities(&scene.light_table);
     lights.iter_mut().zip(probabilities).for_each(|(l, p)| l.probability = p as f32);

@@ -1,8 +1,8 @@
 //! A mesh whose vertices may move: what is kept of it to place its triangles again.
-use super::attributes::Extras;
+use super::attributes::{Extras, corners, words_of};
 use super::bvh;
 use super::geometry::{Corners, FLAT, Geometry, Placement, Repairs, Tag, TooFar};
-use crate::layout::{BvhNode, NONE, Shading, Triangle};
+use crate::layout::{ATTRIBUTE_TANGENTS, BvhNode, NONE, Shading, Triangle};
 use crate::scene::MAX_COORDINATE;
 use crate::scene::pose::Vertices;
 use glam::Vec3;
@@ -27,32 +27,52 @@ pub struct Soft {
     pub pose: String,
 }
 
+/// The triangles of a mesh in another pose, in leaf order.
+#[derive(Debug, Default)]
+pub struct Placed {
+    pub triangles: Vec<Triangle>,
+    /// Packed normals.
+    pub normals: Vec<[u32; 3]>,
+    /// Packed tangents, where there are any.
+    pub tangents: Vec<Option<[u32; 3]>>,
+}
+
+impl Placed {
+    fn add(&mut self, part: Geometry) {
+        let count = part.triangles.len();
+        let words = |s: &Shading| part.attributes[s.first as usize..].first_chunk().copied();
+        let tangents = |s: &Shading| words(s).filter(|_| s.attributes & ATTRIBUTE_TANGENTS != 0);
+        self.normals.extend(part.shading.iter().map(|s| s.normal));
+        self.tangents.extend(part.shading.iter().map(tangents));
+        // Triangles without vertex normals or tangents have no records.
+        let lack = if part.shading.is_empty() { count } else { 0 };
+        self.normals.extend(std::iter::repeat_n(FLAT, lack));
+        self.tangents.extend(std::iter::repeat_n(None, lack));
+        self.triangles.extend(part.triangles);
+    }
+}
+
 impl Soft {
     /// Of a mesh of so many vertices, of which `indices` make triangles.
     pub fn new(vertices: usize, indices: Vec<u32>, placement: Placement) -> Self {
         Self { vertices, indices, placement, order: Vec::new(), cost: 0.0, pose: String::new() }
     }
 
-    /// The triangles in leaf order with these vertices, and their packed normals. `before` are the records that they replace.
+    /// The triangles with these vertices. `before` are the records that they replace.
     ///
     /// # Errors
     /// A sentence about what does not fit.
-    pub fn place(&self, to: &Vertices, before: &[Triangle]) -> Result<(Vec<Triangle>, Vec<[u32; 3]>), String> {
+    pub fn place(&self, to: &Vertices, before: &[Triangle]) -> Result<Placed, String> {
         let indices = if to.indices.is_empty() { &self.indices } else { &to.indices };
         self.check(to, indices)?;
         let place = |part: &[u32]| self.place_part(to, indices, part);
         let parts = self.order.par_chunks(PART).map(place).collect::<Result<Vec<_>, _>>()?;
-        let (mut triangles, mut normals) = (Vec::with_capacity(before.len()), Vec::with_capacity(before.len()));
-        for part in parts {
-            let flat = part.shading.is_empty();
-            normals.extend(part.shading.iter().map(|s| s.normal));
-            normals.resize(normals.len() + if flat { part.triangles.len() } else { 0 }, FLAT);
-            triangles.extend(part.triangles);
-        }
-        for (to, from) in triangles.iter_mut().zip(before) {
+        let mut placed = Placed::default();
+        parts.into_iter().for_each(|part| placed.add(part));
+        for (to, from) in placed.triangles.iter_mut().zip(before) {
             (to.primitive, to.material, to.object) = (from.primitive, from.material, from.object);
         }
-        Ok((triangles, normals))
+        Ok(placed)
     }
 
     fn check(&self, to: &Vertices, indices: &[u32]) -> Result<(), String> {
@@ -62,6 +82,10 @@ impl Soft {
         }
         if ![0, vertices].contains(&normals) {
             return Err(format!("gets {vertices} positions but {normals} normals: give one per position, or none"));
+        }
+        if ![0, vertices].contains(&to.tangents.len()) {
+            let tangents = to.tangents.len();
+            return Err(format!("gets {vertices} positions but {tangents} tangents: give one per position, or none"));
         }
         if indices.len() != self.indices.len() {
             return Err(format!(
@@ -79,10 +103,10 @@ impl Soft {
         let (mut geometry, mut repairs) = (Geometry::default(), Repairs::default());
         let tag = Tag { primitive: 0, material: NONE, object: 0 };
         for &triangle in part {
-            let corners = [0, 1, 2].map(|c| indices[3 * triangle as usize + c] as usize);
-            let of = |values: &[[f32; 3]]| corners.map(|i| Vec3::from(values[i]));
-            let n = (!to.normals.is_empty()).then(|| of(&to.normals));
-            let c = Corners { p: of(&to.positions), n, uv: None, extras: Extras::default() };
+            let vertices = [0, 1, 2].map(|c| indices[3 * triangle as usize + c] as usize);
+            let p = vertices.map(|i| Vec3::from(to.positions[i]));
+            let extras = Extras { tangents: corners(&to.tangents, vertices), ..Extras::default() };
+            let c = Corners { p, n: corners(&to.normals, vertices), uv: None, extras };
             let placed = geometry.push(&c, tag, &self.placement, &mut repairs);
             placed.map_err(|TooFar(v)| format!("gets a coordinate of {v:e}: the limit is {MAX_COORDINATE:e}"))?;
         }
@@ -103,6 +127,20 @@ impl Soft {
 /// Replaces the normals of shading records.
 pub fn bend(shading: &mut [Shading], normals: &[[u32; 3]]) {
     shading.iter_mut().zip(normals).for_each(|(record, normal)| record.normal = *normal);
+}
+
+/// Replaces the words of tangents among the texels, where triangles have some; returns the part that has changed.
+pub fn twist(texels: &mut [u32], shading: &[Shading], tangents: &[Option<[u32; 3]>]) -> Option<Range<usize>> {
+    let mut changed: Option<Range<usize>> = None;
+    for (record, tangents) in shading.iter().zip(tangents) {
+        let Some(words) = tangents.filter(|_| record.attributes & ATTRIBUTE_TANGENTS != 0) else { continue };
+        let first = (record.first + words_of(record.attributes & !ATTRIBUTE_TANGENTS)) as usize;
+        let range = first..first + words.len();
+        texels[range.clone()].copy_from_slice(&words);
+        let so_far = changed.unwrap_or(range.clone());
+        changed = Some(so_far.start.min(range.start)..so_far.end.max(range.end));
+    }
+    changed
 }
 
 /// Fits a tree to triangles that have moved, numbered from the start of `range` on; returns its cost, see [`bvh::refit`].

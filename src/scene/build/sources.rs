@@ -1,9 +1,10 @@
-//! Reads what a description names: materials and OBJ files, with the warnings about them.
+//! Reads what a description names: materials and files of meshes, with the warnings about them.
 use crate::error::{Error, Result};
 use crate::scene::description::mesh::Mesh;
 use crate::scene::description::{self, Description, MeshTable};
 use crate::scene::load::library::Library;
-use crate::scene::load::obj::{self, ObjFile};
+use crate::scene::load::mesh_file::{self, Format};
+use crate::scene::load::obj::ObjFile;
 use std::collections::{BTreeSet, HashMap};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -40,7 +41,8 @@ impl<'a> Sources<'a> {
         let mut sources = Self { path, description, library: Library::default(), files: HashMap::new() };
         sources.add_bitmaps()?;
         sources.add_materials()?;
-        let paths: BTreeSet<_> = description.mesh.iter().filter_map(|m| sources.file_of(m)).collect();
+        let of_obj = |path: &PathBuf| Format::of(path) == Format::Obj;
+        let paths: BTreeSet<_> = description.mesh.iter().filter_map(|m| sources.file_of(m)).filter(of_obj).collect();
         paths.iter().try_for_each(|path| sources.library.read_ahead(path))?;
         Ok(sources)
     }
@@ -81,7 +83,7 @@ impl<'a> Sources<'a> {
         Ok(())
     }
 
-    /// Parses every OBJ file. All are needed before the first is placed: whether texture coordinates are kept depends on all
+    /// Parses every file of meshes. All are needed before the first is placed: whether texture coordinates are kept depends on all
     /// materials.
     ///
     /// # Errors
@@ -91,7 +93,7 @@ impl<'a> Sources<'a> {
             self.check(mesh)?;
             let Some(path) = self.file_of(mesh) else { continue };
             if !self.files.contains_key(&path) {
-                let parsed = obj::load(&path, &mut self.library)?;
+                let parsed = mesh_file::load(&path, &mut self.library)?;
                 self.files.insert(path, parsed);
             }
         }
@@ -104,9 +106,8 @@ impl<'a> Sources<'a> {
         if sources.into_iter().filter(|there| *there).count() != 1 {
             return Err(self.at(place(), "needs either a file or a shape (or, in memory, data)"));
         }
-        let extension = mesh.file.as_ref().and_then(|file| file.extension()?.to_str()).map(str::to_lowercase);
-        if extension.is_some_and(|extension| ["gltf", "glb"].contains(&extension.as_str())) {
-            return Err(self.at(place(), "is a glTF file, which is a scene of its own: render it as it is"));
+        if mesh.clip.is_some() {
+            return Err(self.at(place(), "has a clip, which is for glTF files"));
         }
         mesh.data.as_ref().map_or(Ok(()), Mesh::check).map_err(|what| self.at(place(), what))?;
         match mesh.segments.filter(|n| !(3..=4096).contains(n)) {
@@ -115,7 +116,7 @@ impl<'a> Sources<'a> {
         }
     }
 
-    /// Path of a mesh's OBJ file.
+    /// Path of a mesh's file.
     pub fn file_of(&self, table: &MeshTable) -> Option<PathBuf> {
         Some(self.directory().join(table.file.as_ref()?.to_string_lossy().replace('\\', "/")))
     }

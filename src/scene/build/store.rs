@@ -5,11 +5,11 @@ use super::plan::{Job, Plan, override_of};
 use super::soft::Soft;
 use super::sources::{Sources, mesh_name};
 use crate::error::{Error, Result};
-use crate::layout::MATERIAL_NORMAL_MAP;
 use crate::memory;
 use crate::scene::MAX_COORDINATE;
 use crate::scene::description::mesh::Mesh;
 use crate::scene::description::{self, MeshTable};
+use crate::scene::load::material::has_normal_map;
 use crate::scene::load::obj::ObjFile;
 use crate::scene::load::obj_part::Part;
 use std::borrow::Cow;
@@ -73,9 +73,11 @@ fn triangles_of(sources: &Sources, job: &Job) -> u64 {
 
 /// Words that the attributes of a mesh's vertices may take.
 fn attribute_words(sources: &Sources, job: &Job) -> u64 {
-    let data = sources.description.mesh[job.mesh].data.as_ref();
+    let table = &sources.description.mesh[job.mesh];
+    let file = sources.file_of(table).and_then(|path| sources.files.get(&path));
+    let parts = file.iter().flat_map(|file| parts_of(table, file)).map(|(part, _)| &*part.mesh);
     let has = |m: &&Mesh| !(m.colors.is_empty() && m.uvs2.is_empty() && m.tangents.is_empty());
-    data.filter(has).map_or(0, |m| (m.triangles() * MOST_WORDS) as u64)
+    table.data.iter().chain(parts).filter(has).map(|m| (m.triangles() * MOST_WORDS) as u64).sum()
 }
 
 fn triangles(table: &MeshTable, file: Option<&ObjFile>) -> u64 {
@@ -127,7 +129,7 @@ struct Addition<'a> {
     placement: Placement,
     /// Object index of the first part.
     first: u32,
-    /// Whether some texture reads second coordinates, and whether there are normal maps.
+    /// Whether some texture reads second coordinates, and whether some material needs tangents.
     second: bool,
     tangents: bool,
 }
@@ -137,12 +139,13 @@ impl<'a> Addition<'a> {
         let table = &sources.description.mesh[job.mesh];
         // Meshes from memory without normals are flat on purpose: there all vertices have one, or none has.
         let meant = table.data.as_ref().is_some_and(|mesh| mesh.normals.is_empty());
-        let uvs = sources.library.materials.textures.len() > 0;
+        let stretched = sources.library.materials.list.iter().any(|m| m.anisotropy != 0.0);
+        let uvs = stretched || sources.library.materials.textures.len() > 0;
         let (affine, flat, keep) = (job.affine, table.flat || meant, table.moving);
         let placement = Placement { affine, flat, flip: table.flip_normals, uvs, keep };
         let materials = &sources.library.materials;
         let second = materials.textures.any_second();
-        let tangents = materials.list.iter().any(|m| m.flags & MATERIAL_NORMAL_MAP != 0);
+        let tangents = stretched || materials.list.iter().any(has_normal_map);
         let place = format!("mesh \"{}\"", mesh_name(table));
         let material = override_of(sources, job)?;
         Ok(Self { job: *job, table, place, material, placement, first, second, tangents })

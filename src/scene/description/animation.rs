@@ -39,7 +39,7 @@ pub struct AnimationTable {
     pub repeat: bool,
     /// The keys, by their time.
     pub keys: Vec<Key>,
-    /// OBJ files of a mesh in one pose each; `####` stands for their number with that many digits.
+    /// OBJ or PLY files of a mesh in one pose each; `####` stands for their number with that many digits.
     pub file: Option<PathBuf>,
     /// Number of the first file.
     pub first: u32,

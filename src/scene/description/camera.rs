@@ -36,6 +36,8 @@ pub struct Camera {
     pub fov: Option<f64>,
     /// Edge of the film that `fov` spans; default the height.
     pub fov_axis: FovAxis,
+    /// Length of that edge in world units, above 0, in place of `fov`: rays are parallel, and what is far is as large as what is near.
+    pub orthographic: Option<f64>,
     /// Radius of the lens; 0 (default) is a pinhole.
     pub lens_radius: f32,
     /// Distance along the view direction that is in focus; default the distance to `target`, or 1.
@@ -57,10 +59,12 @@ impl Camera {
     /// # Errors
     /// A sentence that names the key at fault.
     pub fn build(&self, size: [u32; 2], bounds: [[f32; 3]; 2]) -> Result<layout::Camera, String> {
-        let (tan_x, tan_y) = self.half_tangents(size)?;
+        let (half_x, half_y) = self.half_film(size)?;
         let (position, [right, up, forward]) = match &self.world_from_camera {
             Some(rows) => frame_from_matrix(rows)?,
-            None => self.frame_from_target(bounds, tan_x.min(tan_y))?,
+            // An orthographic camera sees the same from any distance: from there, a film of 40 degrees would show all.
+            None if self.orthographic.is_some() => self.frame_from_target(bounds, 20f64.to_radians().tan())?,
+            None => self.frame_from_target(bounds, half_x.min(half_y))?,
         };
         finite(position)?;
         let positive = |name: &str, v: f32| match v {
@@ -75,22 +79,19 @@ impl Camera {
         Ok(layout::Camera {
             position: position.as_vec3().to_array(),
             lens_radius: positive("lens_radius", self.lens_radius)?,
-            right: (right * tan_x).as_vec3().to_array(),
+            right: (right * half_x).as_vec3().to_array(),
             focus_distance,
-            up: (up * tan_y).as_vec3().to_array(),
+            up: (up * half_y).as_vec3().to_array(),
             near: positive("near", self.near)?,
             forward: forward.as_vec3().to_array(),
+            orthographic: self.orthographic.is_some().into(),
             ..Default::default()
         })
     }
 
-    /// Tangents of half the horizontal and the vertical field of view.
-    fn half_tangents(&self, [width, height]: [u32; 2]) -> Result<(f64, f64), String> {
-        let fov = self.fov.unwrap_or(40.0);
-        if !(fov > 0.0 && fov < 180.0) {
-            return Err(format!("fov is {fov}: choose degrees above 0 and below 180"));
-        }
-        let tan = (fov.to_radians() / 2.0).tan();
+    /// Half of the film's width and height: at distance 1, or anywhere if rays are parallel.
+    fn half_film(&self, [width, height]: [u32; 2]) -> Result<(f64, f64), String> {
+        let half = self.half_edge()?;
         let aspect = f64::from(width) / f64::from(height);
         let along_x = match self.fov_axis {
             FovAxis::X => true,
@@ -98,7 +99,18 @@ impl Camera {
             FovAxis::Smaller => aspect < 1.0,
             FovAxis::Larger => aspect > 1.0,
         };
-        Ok(if along_x { (tan, tan / aspect) } else { (tan * aspect, tan) })
+        Ok(if along_x { (half, half / aspect) } else { (half * aspect, half) })
+    }
+
+    fn half_edge(&self) -> Result<f64, String> {
+        let fov = self.fov.unwrap_or(40.0);
+        match self.orthographic {
+            Some(_) if self.fov.is_some() => Err("has both fov and orthographic: choose one".into()),
+            Some(edge) if edge > 0.0 && edge <= MAX_COORDINATE => Ok(edge / 2.0),
+            Some(edge) => Err(format!("orthographic is {edge}: choose a length above 0 and up to {MAX_COORDINATE:e}")),
+            None if fov > 0.0 && fov < 180.0 => Ok((fov.to_radians() / 2.0).tan()),
+            None => Err(format!("fov is {fov}: choose degrees above 0 and below 180")),
+        }
     }
 
     fn frame_from_target(&self, bounds: [[f32; 3]; 2], tan: f64) -> Result<Frame, String> {
@@ -158,6 +170,24 @@ mod tests {
         assert_eq!(found.focus_distance, 5.0);
         let wide = Camera { fov_axis: FovAxis::Larger, ..camera }.build([200, 100], [[0.0; 3]; 2]).unwrap();
         assert!((wide.right[0] - 1.0).abs() < 1e-6 && (wide.up[1] - 0.5).abs() < 1e-6);
+    }
+
+    #[test]
+    fn an_orthographic_film_has_edges_in_world_units() {
+        let camera = Camera {
+            position: Some([0.0, 0.0, 5.0]),
+            target: Some([0.0; 3]),
+            orthographic: Some(3.0),
+            ..Camera::default()
+        };
+        let found = camera.build([200, 100], [[0.0; 3]; 2]).unwrap();
+        assert_eq!((found.orthographic, found.right, found.up), (1, [3.0, 0.0, 0.0], [0.0, 1.5, 0.0]));
+        let both = Camera { fov: Some(40.0), ..camera.clone() };
+        assert!(both.build([8, 8], [[0.0; 3]; 2]).unwrap_err().contains("choose one"));
+        for edge in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let wrong = Camera { orthographic: Some(edge), ..camera.clone() };
+            assert!(wrong.build([8, 8], [[0.0; 3]; 2]).unwrap_err().contains("orthographic is"));
+        }
     }
 
     #[test]

@@ -63,6 +63,9 @@ pub struct MaterialTable {
     pub color_texture: Option<TextureTable>,
     /// Microfacet roughness in [0, 1]; below 0.01 smooth; default 0.
     pub alpha: f32,
+    /// Conductor, dielectric: roughness along v of the texture coordinates, where it differs from `alpha`, which is that along u
+    /// then; the mesh's tangents, where it has some, take the place of u.
+    pub alpha_v: Option<f32>,
     /// Microfacet distribution; default Beckmann.
     pub distribution: Distribution,
     /// Index of refraction of a conductor.
@@ -126,6 +129,10 @@ pub struct MaterialTable {
     pub clearcoat_roughness: Option<f32>,
     /// Metallic-roughness: a picture whose green channel multiplies `clearcoat_roughness`.
     pub clearcoat_roughness_texture: Option<TextureTable>,
+    /// Metallic-roughness: tangent-space normal map of the clear coat, which `normal_map` does not perturb.
+    pub clearcoat_normal_map: Option<TextureTable>,
+    /// Metallic-roughness: factor of the x and y components of `clearcoat_normal_map`; default 1.
+    pub clearcoat_normal_scale: Option<f32>,
     /// Metallic-roughness: what alpha does; without it alpha is ignored, but `opacity` and `opacity_texture` count.
     pub alpha_mode: Option<AlphaMode>,
     /// Metallic-roughness, `alpha_mode = "mask"`: the least alpha that stops rays; default 0.5.

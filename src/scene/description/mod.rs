@@ -81,14 +81,17 @@ pub struct EnvironmentTable {
     pub world_from_environment: Option<[f64; 9]>,
 }
 
-/// A `[[mesh]]` table: an OBJ file, a shape, or triangles in memory.
+/// A `[[mesh]]` table: a file, a shape, or triangles in memory.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MeshTable {
     /// Name for instances and reports; default the file's or the shape's.
     pub name: Option<String>,
-    /// Path of an OBJ file.
+    /// Path of an OBJ file, of a PLY file (`.ply`, `.ply.gz`), or of a glTF file, whose meshes, lights and what moves them take the
+    /// place of this table.
     pub file: Option<PathBuf>,
+    /// Of a glTF file, the name of the animation that is played; default all that do not move the same as an earlier one.
+    pub clip: Option<String>,
     /// Object or group of the file to which the mesh is limited.
     pub group: Option<String>,
     /// A shape in place of a file.

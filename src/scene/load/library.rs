@@ -25,8 +25,9 @@ pub struct Library {
     pub tables: HashMap<String, u32>,
     /// MTL files that were read, by their canonical path.
     mtls: HashMap<PathBuf, Named>,
-    /// The grey of triangles without a material.
+    /// The grey of triangles without a material, and the white of those whose vertices have colours.
     grey: Option<u32>,
+    white: Option<u32>,
     /// Messages about what was repaired.
     pub warnings: Vec<String>,
 }
@@ -36,6 +37,12 @@ impl Library {
     pub fn grey(&mut self) -> u32 {
         let materials = &mut self.materials;
         *self.grey.get_or_insert_with(|| materials.push("(default)", Materials::plain([0.6; 3])))
+    }
+
+    /// Index of the white that the colours of vertices are seen in.
+    pub fn white(&mut self) -> u32 {
+        let materials = &mut self.materials;
+        *self.white.get_or_insert_with(|| materials.push("(vertex colours)", Materials::plain([1.0; 3])))
     }
 
     /// The materials of an MTL file, read once however its path is written.

@@ -46,6 +46,8 @@ impl Materials {
             transmission_texture: NONE,
             clearcoat_texture: NONE,
             clearcoat_roughness_texture: NONE,
+            clearcoat_normal_texture: NONE,
+            clearcoat_normal_scale: 1.0,
             ..Material::default()
         }
     }
@@ -87,6 +89,9 @@ impl Materials {
         m.alpha = if rough { 1.0 } else { within(t.alpha, 1.0, "alpha")? };
         m.emission = emission(t)?;
         self.interface(&mut m, t)?;
+        if let Some(alpha_v) = t.alpha_v {
+            stretch(&mut m, alpha_v)?;
+        }
         if t.two_sided == Some(false) {
             m.flags &= !MATERIAL_TWO_SIDED;
         }
@@ -153,8 +158,11 @@ impl Materials {
             m.roughness_texture = ask(t.roughness_texture.as_ref(), Kind::Roughness)?;
         }
         m.opacity_texture = ask(t.opacity_texture.as_ref(), Kind::Mask)?;
-        m.emission_texture = ask(t.emission_texture.as_ref(), Kind::Color)?;
-        m.bump_texture = ask(t.bump.as_ref().or(t.normal_map.as_ref()), Kind::Data)?;
+        m.emission_texture = ask(t.emission_texture.as_ref(), Kind::Light)?;
+        m.bump_texture = match &t.normal_map {
+            Some(normals) => ask(Some(normals), Kind::Data)?,
+            None => ask(t.bump.as_ref(), Kind::Height)?,
+        };
         if t.normal_map.is_some() && m.bump_texture != NONE {
             m.flags |= MATERIAL_NORMAL_MAP;
         }
@@ -185,6 +193,27 @@ impl Materials {
         let mapping = Mapping::from(texture);
         Ok(self.textures.request(directory, &file, kind, mapping, warn))
     }
+}
+
+/// Gives an interface another roughness along v. None is smooth along one direction alone.
+///
+/// # Errors
+/// For a number out of range and for other kinds of materials.
+fn stretch(m: &mut Material, alpha_v: f32) -> Result<(), String> {
+    within(alpha_v, 1.0, "alpha_v")?;
+    if !matches!(m.kind, BSDF_CONDUCTOR | BSDF_DIELECTRIC) {
+        return Err("has alpha_v, which is for conductors and dielectrics".to_owned());
+    }
+    if m.alpha.max(alpha_v) >= SMOOTH_ALPHA {
+        m.alpha = m.alpha.max(SMOOTH_ALPHA);
+        m.anisotropy = alpha_v.max(SMOOTH_ALPHA) / m.alpha - 1.0;
+    }
+    Ok(())
+}
+
+/// Whether its normals, or those of its clear coat, come from a map in tangent space.
+pub fn has_normal_map(m: &Material) -> bool {
+    m.flags & MATERIAL_NORMAL_MAP != 0 || m.clearcoat_normal_texture != NONE
 }
 
 /// Radiance that a table asks for.

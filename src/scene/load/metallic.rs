@@ -30,13 +30,13 @@ impl Materials {
         m.emission = emission(table)?;
         m.flags |= MATERIAL_GGX;
         m.base_texture = self.texture(&mut s, &table.color_texture, Kind::Color)?;
-        m.emission_texture = self.texture(&mut s, &table.emission_texture, Kind::Color)?;
+        m.emission_texture = self.texture(&mut s, &table.emission_texture, Kind::Light)?;
         self.opacity(&mut m, &mut s)?;
         m.normal_scale = table.normal_scale.unwrap_or(1.0);
-        if !m.normal_scale.is_finite() {
-            return Err("normal_scale is not a finite number".to_owned());
-        }
         self.layers(&mut m, &mut s)?;
+        if !(m.normal_scale.is_finite() && m.clearcoat_normal_scale.is_finite()) {
+            return Err("normal_scale or clearcoat_normal_scale is not a finite number".to_owned());
+        }
         m.bump_texture = self.texture(&mut s, &table.normal_map, Kind::Data)?;
         if m.bump_texture != NONE {
             m.flags |= MATERIAL_NORMAL_MAP;
@@ -84,6 +84,8 @@ impl Materials {
         if m.clearcoat > 0.0 {
             m.clearcoat_texture = self.texture(s, &t.clearcoat_texture, Kind::Red)?;
             m.clearcoat_roughness_texture = self.texture(s, &t.clearcoat_roughness_texture, Kind::Roughness)?;
+            m.clearcoat_normal_texture = self.texture(s, &t.clearcoat_normal_map, Kind::Data)?;
+            m.clearcoat_normal_scale = t.clearcoat_normal_scale.unwrap_or(1.0);
         }
         Ok(())
     }

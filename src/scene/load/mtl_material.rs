@@ -72,12 +72,12 @@ impl Materials {
             m.opacity_texture = ask(of(&mtl.block.dissolve_texture), Kind::Mask);
         }
         if m.emission != [0.0; 3] {
-            m.emission_texture = ask(mtl.map("map_Ke"), Kind::Color);
+            m.emission_texture = ask(mtl.map("map_Ke"), Kind::Light);
         }
         let (norm, bump) = (mtl.map("norm"), bump(mtl));
         m.bump_scale = bump.as_ref().and_then(|b| b.bump).unwrap_or(1.0);
         let normal_map = norm.is_some();
-        m.bump_texture = ask(norm.or(bump), Kind::Data);
+        m.bump_texture = ask(norm.or(bump), if normal_map { Kind::Data } else { Kind::Height });
         if m.bump_texture != NONE && normal_map {
             m.flags |= MATERIAL_NORMAL_MAP;
         }

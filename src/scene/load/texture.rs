@@ -2,8 +2,9 @@
 use super::find::find_file;
 use super::mapping::Mapping;
 use crate::error::{Error, Result};
-use crate::image::{BAND, bands, check_end, contained, input, picture, picture_claim};
-use crate::layout::{NONE, TEXTURE_SRGB, Texture};
+use crate::image::{BAND, bands, check_end, claim, contained, decode, holds_floats, input, picture};
+use crate::layout::{NONE, TEXTURE_FLOAT, TEXTURE_RGB9E5, TEXTURE_SRGB, Texture};
+use crate::math::rgb9e5;
 use crate::math::srgb::linear_from_srgb_f64;
 use crate::memory;
 use crate::scene::description::mesh::Bitmap;
@@ -14,10 +15,14 @@ use std::path::{Path, PathBuf};
 /// Contents of a picture, which decide how it is decoded and which channels are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
-    /// Colour, stored with the sRGB curve.
+    /// Colour in [0, 1], stored with the sRGB curve unless as floats.
     Color,
-    /// Linear heights or normals.
+    /// Emitted light, as colour but without a limit of floats.
+    Light,
+    /// Linear numbers in [0, 1], such as normals.
     Data,
+    /// Heights: the red channel, of floats without limits.
+    Height,
     /// Opacity: the alpha channel where the file has one, else red; copied to all channels.
     Mask,
     /// Opacity: the alpha channel where the file has one, else 1; copied to all channels.
@@ -27,6 +32,33 @@ pub enum Kind {
     /// Perceptual roughness: the green channel, copied to all (grey pictures have it there, and so has glTF's
     /// occlusion-roughness-metallic packing).
     Roughness,
+}
+
+impl Kind {
+    /// The TEXTURE_ bits of a picture of bytes.
+    fn of_bytes(self) -> u32 {
+        if matches!(self, Self::Color | Self::Light) { TEXTURE_SRGB } else { 0 }
+    }
+
+    /// The TEXTURE_ bits of a picture of floats.
+    fn of_floats(self) -> u32 {
+        if matches!(self, Self::Color | Self::Light | Self::Data) { TEXTURE_RGB9E5 } else { TEXTURE_FLOAT }
+    }
+
+    /// The texel of a picture of floats.
+    fn word(self, [r, g, b]: [f32; 3], alpha: Option<f32>) -> u32 {
+        let unit = |v: f32| if v.is_nan() { 0.0 } else { v.clamp(0.0, 1.0) };
+        let one = |v: f32| unit(v).to_bits();
+        match self {
+            Self::Color | Self::Data => rgb9e5::pack([r, g, b].map(unit)),
+            Self::Light => rgb9e5::pack([r, g, b]),
+            Self::Height => (if r.is_finite() { r } else { 0.0 }).to_bits(),
+            Self::Mask => one(alpha.unwrap_or(r)),
+            Self::Alpha => one(alpha.unwrap_or(1.0)),
+            Self::Red => one(r),
+            Self::Roughness => one(g),
+        }
+    }
 }
 
 /// The pictures that materials name. Each is stored once per kind, however many mappings share it.
@@ -103,10 +135,11 @@ impl TextureSet {
     /// Reads every picture.
     ///
     /// # Errors
-    /// [`Error::Input`] with the file that is truncated, damaged, or in a form other than PNG or JPEG.
+    /// [`Error::Input`] with the file that is truncated, damaged, or in a form other than PNG, JPEG, EXR and HDR.
     pub fn decode(&self) -> Result<Decoded> {
         let sources: Vec<_> = self.pictures.par_iter().map(|(path, _)| self.source(path)).collect::<Result<_>>()?;
         let sizes: Vec<_> = sources.iter().map(Source::size).collect();
+        let floats: Vec<_> = sources.iter().map(|source| matches!(source, Source::Floats(..))).collect();
         let mut firsts = Vec::with_capacity(sizes.len());
         let mut total = 0u64;
         for ([width, height], (path, _)) in sizes.iter().zip(&self.pictures) {
@@ -117,8 +150,9 @@ impl TextureSet {
             return Err(too_many(&self.pictures[0].0));
         }
         let texture = |&(picture, mapping): &(usize, Mapping)| {
-            let srgb = if self.pictures[picture].1 == Kind::Color { TEXTURE_SRGB } else { 0 };
-            let (flags, Mapping { scale, shear, offset, .. }) = (srgb | mapping.flags(), mapping);
+            let kind = self.pictures[picture].1;
+            let form = if floats[picture] { kind.of_floats() } else { kind.of_bytes() };
+            let (flags, Mapping { scale, shear, offset, .. }) = (form | mapping.flags(), mapping);
             let [width, height] = sizes[picture];
             Texture { first: firsts[picture], width, height, flags, scale, shear, offset, ..Default::default() }
         };
@@ -166,7 +200,7 @@ fn too_many(path: &Path) -> Error {
 }
 
 fn damaged(path: &Path, what: String) -> Error {
-    Error::input(path, format!("is no usable picture ({what}): save it again as PNG or JPEG"))
+    Error::input(path, format!("is no usable picture ({what}): save it again as PNG, JPEG or EXR"))
 }
 
 fn check_size(width: u32, height: u32) -> std::result::Result<(), String> {
@@ -180,6 +214,8 @@ fn check_size(width: u32, height: u32) -> std::result::Result<(), String> {
 enum Source {
     /// The bytes of a file, and the size that its header says.
     File(Vec<u8>, [u32; 2]),
+    /// The same of an EXR or HDR file.
+    Floats(Vec<u8>, [u32; 2]),
     Bitmap(Bitmap),
 }
 
@@ -187,15 +223,15 @@ impl Source {
     fn read(path: &Path) -> Result<Self> {
         let bytes = input::read(path)?;
         check_end(&bytes).map_err(|what| Error::input(path, what))?;
-        let claim = contained(|| picture_claim(&bytes)).map_err(|what| damaged(path, what))?;
-        let [width, height] = claim.size;
+        let [width, height] = claim(&bytes).map_err(|what| damaged(path, what))?.size;
         check_size(width, height).map_err(|what| Error::input(path, what))?;
-        Ok(Self::File(bytes, [width, height]))
+        let floats = holds_floats(&bytes);
+        Ok(if floats { Self::Floats(bytes, [width, height]) } else { Self::File(bytes, [width, height]) })
     }
 
     fn size(&self) -> [u32; 2] {
         match self {
-            Self::File(_, size) => *size,
+            Self::File(_, size) | Self::Floats(_, size) => *size,
             Self::Bitmap(bitmap) => [bitmap.width, bitmap.height],
         }
     }
@@ -206,6 +242,7 @@ impl Source {
                 fill(space, bitmap.rgba.iter().copied(), kind, true);
                 return Ok(());
             }
+            Self::Floats(bytes, size) => return fill_floats(space, &bytes, size, kind),
             Self::File(bytes, size) => (bytes, size),
         };
         let picture = picture(&bytes)?;
@@ -221,11 +258,23 @@ impl Source {
     }
 }
 
+fn fill_floats(space: &mut [u32], bytes: &[u8], size: [u32; 2], kind: Kind) -> std::result::Result<(), String> {
+    let film = decode(bytes)?;
+    if [film.width, film.height] != size {
+        return Err("its header says another size".to_owned());
+    }
+    let (colour, alpha) = (film.picture(None)?.pixels, film.channel("A"));
+    for (i, (texel, rgb)) in space.iter_mut().zip(colour).enumerate() {
+        *texel = kind.word(rgb, alpha.map(|alpha| alpha.at(i)));
+    }
+    Ok(())
+}
+
 fn fill(space: &mut [u32], texels: impl Iterator<Item = [u8; 4]>, kind: Kind, has_alpha: bool) {
     let same = |v: u8| u32::from_le_bytes([v; 4]);
     for (texel, rgba) in space.iter_mut().zip(texels) {
         *texel = match kind {
-            Kind::Color | Kind::Data => u32::from_le_bytes(rgba),
+            Kind::Color | Kind::Light | Kind::Data | Kind::Height => u32::from_le_bytes(rgba),
             Kind::Mask => same(if has_alpha { rgba[3] } else { rgba[0] }),
             Kind::Red => same(rgba[0]),
             Kind::Alpha => same(if has_alpha { rgba[3] } else { 255 }),
@@ -237,13 +286,23 @@ fn fill(space: &mut [u32], texels: impl Iterator<Item = [u8; 4]>, kind: Kind, ha
 /// Mean linear colour of a picture.
 pub fn mean(texture: &Texture, texels: &[u32]) -> [f32; 3] {
     let count = texture.width as usize * texture.height as usize;
+    let own = &texels[texture.first as usize..][..count];
+    if texture.flags & (TEXTURE_RGB9E5 | TEXTURE_FLOAT) != 0 {
+        let floats = texture.flags & TEXTURE_FLOAT != 0;
+        let of = |word: u32| if floats { [f32::from_bits(word); 3] } else { rgb9e5::unpack(word) };
+        let sum = own.iter().fold([0f64; 3], |sum, &word| {
+            let rgb = of(word);
+            std::array::from_fn(|c| sum[c] + f64::from(rgb[c]))
+        });
+        return sum.map(|s| (s / count as f64) as f32);
+    }
     let srgb = texture.flags & TEXTURE_SRGB != 0;
     let curve: [f64; 256] = std::array::from_fn(|byte| {
         let code = byte as f64 / 255.0;
         if srgb { linear_from_srgb_f64(code) } else { code }
     });
     let mut sum = [0.0; 3];
-    for texel in &texels[texture.first as usize..][..count] {
+    for texel in own {
         let bytes = texel.to_le_bytes();
         (0..3).for_each(|c| sum[c] += curve[bytes[c] as usize]);
     }

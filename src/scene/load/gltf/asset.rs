@@ -13,6 +13,8 @@ use std::path::Path;
 pub struct Asset<'a> {
     /// Path of the file, for messages and for the files that it names.
     pub path: &'a Path,
+    /// Folder that pictures are named relative to, where they lie below it.
+    pub base: &'a Path,
     /// The JSON.
     pub root: Root,
     /// Contents of the buffers, each as long as the JSON says.
@@ -28,13 +30,13 @@ impl<'a> Asset<'a> {
     ///
     /// # Errors
     /// [`Error::Input`] for a file that is no glTF 2.0, and for a buffer that is missing or too short; [`Error::Memory`].
-    pub fn read(path: &'a Path) -> Result<Self> {
+    pub fn read(path: &'a Path, base: &'a Path) -> Result<Self> {
         let bytes = input::read(path)?;
         let (json, binary) = glb::split(&bytes).map_err(|what| Error::input(path, what))?;
         let count = |byte: u8| json.iter().filter(|&&b| b == byte).count() as u64;
         let parsed = BYTES_OF_OBJECT * count(b'{') + BYTES_OF_ENTRY * count(b',');
         memory::need(path.display(), parsed + 2 * json.len() as u64)?;
-        let mut asset = Self { path, root: parse(path, json)?, buffers: Vec::new() };
+        let mut asset = Self { path, base, root: parse(path, json)?, buffers: Vec::new() };
         asset.check_version()?;
         for index in 0..asset.root.buffers.len() {
             let content = asset.buffer(index, binary)?;

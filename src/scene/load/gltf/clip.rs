@@ -47,15 +47,25 @@ impl Channel {
     }
 }
 
-/// The channels of all animations that can be played together: an animation that moves what an earlier one moves is left out. What
-/// cannot be played is named in `warnings`, one line for each animation.
+/// The channels of the animation that is called `clip`, or of all that can be played together: an animation that moves what an
+/// earlier one moves is left out. What cannot be played is named in `warnings`, one line for each animation.
 ///
 /// # Errors
-/// [`crate::error::Error::Memory`].
-pub fn read(asset: &Asset, tree: &Tree, warnings: &mut Vec<String>) -> Result<Vec<Channel>> {
+/// [`crate::error::Error::Input`] for a clip that is not there, [`crate::error::Error::Memory`].
+pub fn read(asset: &Asset, tree: &Tree, clip: Option<&str>, warnings: &mut Vec<String>) -> Result<Vec<Channel>> {
     let (mut played, mut taken, mut left) = (Vec::new(), HashSet::new(), Vec::new());
-    for (index, animation) in asset.root.animations.iter().enumerate() {
-        let name = animation.name.as_deref().map_or_else(|| format!("animation {index}"), one_line);
+    let named = |(index, animation): (usize, &Animation)| match animation.name.as_deref().map(one_line) {
+        Some(name) if !name.is_empty() => name,
+        _ => format!("animation {index}"),
+    };
+    let names: Vec<_> = asset.root.animations.iter().enumerate().map(named).collect();
+    if let Some(clip) = clip.filter(|clip| !names.iter().any(|name| name == clip)) {
+        return Err(asset.at(format!("clip \"{clip}\""), missing(&names)));
+    }
+    for (animation, name) in asset.root.animations.iter().zip(names) {
+        if clip.is_some_and(|clip| name != clip) {
+            continue;
+        }
         let (channels, fault) = channels(asset, tree, animation)?;
         warnings.extend(fault.map(|what| format!("animation \"{name}\": {what}")));
         let parts: Vec<_> = channels.iter().map(|channel| (channel.node, channel.property as u32)).collect();
@@ -70,9 +80,21 @@ pub fn read(asset: &Asset, tree: &Tree, warnings: &mut Vec<String>) -> Result<Ve
         let more = left.len().saturating_sub(LONGEST_LIST);
         left.truncate(LONGEST_LIST);
         let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
-        warnings.push(format!("not played, since an earlier animation moves the same: {}{rest}", left.join(", ")));
+        let names = left.join(", ");
+        warnings.push(format!(
+            "not played, since an earlier animation moves the same (a clip can be chosen): {names}{rest}"
+        ));
     }
     Ok(played)
+}
+
+/// What is said of a clip that is not among those of these names.
+fn missing(names: &[String]) -> String {
+    let some: Vec<_> = names.iter().take(LONGEST_LIST).map(|name| format!("\"{name}\"")).collect();
+    match some.is_empty() {
+        true => "is not there: the file has no animations".to_owned(),
+        false => format!("is not there: choose one of {}", some.join(", ")),
+    }
 }
 
 /// Most names of a message.

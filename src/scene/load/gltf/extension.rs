@@ -79,7 +79,7 @@ pub struct NodeLight {
 }
 
 /// A light of `KHR_lights_punctual`. Its `range` is a hint for renderers that cut light off, which this one does not.
-#[derive(Deserialize)]
+#[derive(Deserialize, PartialEq)]
 #[serde(default)]
 pub struct Light {
     /// `directional`, `point` or `spot`.
@@ -100,7 +100,7 @@ impl Default for Light {
 }
 
 /// Cone of a spot light; angles from its axis in radians.
-#[derive(Deserialize)]
+#[derive(Clone, Copy, Deserialize, PartialEq)]
 #[serde(default, rename_all = "camelCase")]
 pub struct Spot {
     /// Angle up to which the intensity is full.

@@ -5,19 +5,42 @@
 //! luminous efficiency of the spectrum, and a picture is linear in light: with lumens in place of watts everywhere, lights, lamps
 //! and surfaces keep their proportions, and numbers are taken as they are.
 use super::asset::{Asset, one_line};
-use super::extension::{self, Light};
+use super::extension::{self, Light, Spot};
 use crate::error::Result;
 use crate::scene::description::{LightTable, LightType, Rgb};
 use glam::{DAffine3, DVec3};
+use std::f32::consts::FRAC_PI_2;
 
-/// The lights of a file.
+/// The lights of a file; numbers beyond what glTF allows are clamped, with one warning.
 ///
 /// # Errors
 /// For a damaged extension.
-pub fn read(asset: &Asset) -> Result<Vec<Light>> {
+pub fn read(asset: &Asset, warnings: &mut Vec<String>) -> Result<Vec<Light>> {
     let all = asset.root.extensions.as_ref().map(|e| &e.others);
     let found = extension::read::<extension::Lights>(asset, all, "KHR_lights_punctual", "the file")?;
-    Ok(found.map_or_else(Vec::new, |found| found.lights))
+    let mut lights = found.map_or_else(Vec::new, |found| found.lights);
+    let clamped = lights.iter_mut().map(clamp).filter(|changed| *changed).count();
+    if clamped > 0 {
+        warnings.push(format!("numbers beyond what glTF allows are clamped: {clamped} lights"));
+    }
+    Ok(lights)
+}
+
+/// Brightest light, and the narrowest cone in radians.
+const BRIGHTEST: f32 = 1e15;
+const NARROWEST: f32 = 1e-3;
+
+/// Whether anything had to be changed.
+fn clamp(light: &mut Light) -> bool {
+    let sane = |v: f32, low: f32, high: f32| if v.is_nan() { low } else { v.clamp(low, high) };
+    let outer = sane(light.spot.outer_cone_angle, NARROWEST, FRAC_PI_2);
+    let spot = Spot { inner_cone_angle: sane(light.spot.inner_cone_angle, 0.0, outer), outer_cone_angle: outer };
+    let spot = if light.kind == "spot" { spot } else { light.spot };
+    let color = light.color.map(|c| sane(c, 0.0, BRIGHTEST));
+    let new = Light { kind: light.kind.clone(), color, intensity: sane(light.intensity, 0.0, BRIGHTEST), spot };
+    let changed = new != *light;
+    *light = new;
+    changed
 }
 
 /// The light that `node` holds, placed by `world`.

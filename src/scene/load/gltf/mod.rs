@@ -19,6 +19,7 @@ mod node;
 mod picture;
 mod place;
 mod primitive;
+mod tangent;
 mod uri;
 
 use crate::error::Result;
@@ -47,21 +48,24 @@ pub struct Model {
 }
 
 /// Reads a `.gltf` or `.glb` file. A file without lights of `KHR_lights_punctual` gets a sky of radiance 1, since glTF has no
-/// other place for the light that its models are shown in.
+/// other place for the light that its models are shown in. Pictures are named relative to `base`, where they lie below it. `clip`
+/// names the animation that is played; without, all are that do not move the same as an earlier one.
 ///
 /// # Errors
-/// [`crate::error::Error::Input`] with file, place and remedy; [`crate::error::Error::Memory`].
-pub fn load(path: &Path) -> Result<Model> {
-    let asset = Asset::read(path)?;
+/// [`crate::error::Error::Input`] with file, place and remedy, also for a clip that is not there; [`crate::error::Error::Memory`].
+pub fn load(path: &Path, base: &Path, clip: Option<&str>) -> Result<Model> {
+    let asset = Asset::read(path, base)?;
     let mut model = Model::default();
     model.warnings.extend(extension::check(&asset)?);
     check::check(&asset)?;
     let tree = Tree::new(&asset)?;
     let surfaces = asset.root.meshes.iter().flat_map(|mesh| &mesh.primitives);
-    let bytes = surfaces.map(|surface| primitive::bytes(&asset, surface)).fold(0, u64::saturating_add);
+    let bytes =
+        surfaces.map(|surface| primitive::bytes(&asset, surface).saturating_add(tangent::bytes(&asset, surface)));
+    let bytes = bytes.fold(0, u64::saturating_add);
     memory::need(path.display(), bytes)?;
-    let (worlds, lights) = (tree.worlds(&tree.locals), light::read(&asset)?);
-    let channels = clip::read(&asset, &tree, &mut model.warnings)?;
+    let (worlds, lights) = (tree.worlds(&tree.locals), light::read(&asset, &mut model.warnings)?);
+    let channels = clip::read(&asset, &tree, clip, &mut model.warnings)?;
     let moved = Moved::new(&tree, &channels);
     let mut placer = Placer::new(&asset, &worlds, &moved);
     let mut moved_lights = Vec::new();
@@ -80,27 +84,16 @@ pub fn load(path: &Path) -> Result<Model> {
     let motion = Arc::new(motion);
     if !motion.channels.is_empty() {
         for named in model.cameras.iter_mut().filter(|named| moves[named.node]) {
-            let Some(camera) = named.camera.clone() else { continue };
-            named.mover = Some(Arc::new(CameraMotion { motion: motion.clone(), node: named.node, camera }));
+            let (motion, node, camera) = (motion.clone(), named.node, named.camera.clone());
+            named.mover = Some(Arc::new(CameraMotion { motion, node, camera }));
         }
         model.mover = Some(motion);
     }
     if model.description.light.is_empty() {
         model.description.environment = Some(EnvironmentTable::default());
     }
-    look(&mut model);
-    Ok(model)
-}
-
-/// Looks through the first camera.
-fn look(model: &mut Model) {
-    let Some(first) = model.cameras.first() else { return };
-    match &first.camera {
-        Some(camera) => model.description.camera = camera.clone(),
-        None => {
-            let line =
-                format!("camera \"{}\" is orthographic, which is not rendered: one frames the scene", first.name);
-            model.warnings.push(line);
-        }
+    if let Some(first) = model.cameras.first() {
+        model.description.camera = first.camera.clone();
     }
+    Ok(model)
 }

@@ -6,7 +6,7 @@ use super::node::Tree;
 use super::primitive::Primitive;
 use crate::error::Result;
 use crate::scene::animation::Mover;
-use crate::scene::description::{Camera, LightTable, Transform};
+use crate::scene::description::{Camera, LightTable, Mesh, Transform};
 use crate::scene::pose::{Pose, Vertices};
 use glam::{DAffine3, DMat4};
 use std::collections::HashMap;
@@ -84,8 +84,8 @@ impl Mover for Motion {
             let matrices = moved.skin.as_ref().map(|skin| skin.matrices(&worlds));
             let weights = weights.get(&moved.node).unwrap_or(&moved.weights);
             let mesh = deformed(&moved.primitive, weights, matrices.as_deref());
-            let (positions, normals) = (mesh.positions, mesh.normals);
-            pose.meshes.push((moved.number, Vertices { positions, normals, indices: Vec::new() }));
+            let Mesh { positions, normals, tangents, .. } = mesh;
+            pose.meshes.push((moved.number, Vertices { positions, normals, tangents, indices: Vec::new() }));
         }
         Ok(())
     }

@@ -99,8 +99,8 @@ impl Pictures {
             (None, Some(uri)) => match uri::resolve(asset.folder(), uri).map_err(|what| asset.at(place, what))? {
                 Target::Data(bytes) => bytes,
                 Target::File(path) => {
-                    // The renderer finds it from the folder on, as it finds the pictures of other scenes.
-                    return Ok(Some(path.strip_prefix(asset.folder()).unwrap_or(&path).to_owned()));
+                    // The renderer finds it from the scene's folder on, as it finds the pictures of other scenes.
+                    return Ok(Some(path.strip_prefix(asset.base).unwrap_or(&path).to_owned()));
                 }
             },
             (None, None) => {
@@ -116,6 +116,12 @@ impl Pictures {
         self.bitmaps.push(Bitmap { name: name.clone(), width, height, rgba });
         Ok(Some(name))
     }
+}
+
+/// The set of texture coordinates of a reference: an extension may name another.
+pub fn set_of(set: u32, extensions: Option<&Map<String, Value>>) -> u32 {
+    let other = extensions.and_then(|all| all.get("KHR_texture_transform")?.get("texCoord")?.as_u64());
+    other.map_or(set, |other| other as u32)
 }
 
 /// How a sampler repeats a picture and fills the space between texels. Of the filters that shrink pictures only those without

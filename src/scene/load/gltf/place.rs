@@ -9,6 +9,7 @@ use super::motion::{MovedInstance, MovedMesh};
 use super::node::Tree;
 use super::picture::Pictures;
 use super::primitive::{self, Primitive};
+use super::tangent;
 use crate::error::Result;
 use crate::memory;
 use crate::scene::description::{Description, InstanceTable, MaterialTable, Mesh, MeshTable, Transform};
@@ -76,6 +77,8 @@ pub struct Placer<'a> {
     mesh_names: Names,
     material_names: Names,
     pictures: Pictures,
+    /// Numbers of materials that were clamped.
+    clamped: Vec<String>,
     /// Numbers of what was left out, for the warnings.
     without_surface: usize,
     without_positions: usize,
@@ -100,6 +103,7 @@ impl<'a> Placer<'a> {
             mesh_names: Names::default(),
             material_names: Names::default(),
             pictures: Pictures::default(),
+            clamped: Vec::new(),
             without_surface: 0,
             without_positions: 0,
             flat: 0,
@@ -188,6 +192,11 @@ impl<'a> Placer<'a> {
         ];
         warnings.extend(rows.iter().filter(|row| row.0 > 0).map(|(count, what)| format!("{count} {what}")));
         warnings.append(&mut self.pictures.warnings);
+        if let Some(first) = self.clamped.first() {
+            let more = self.clamped.len() - 1;
+            let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
+            warnings.push(format!("numbers beyond what glTF allows are clamped: {first}{rest}"));
+        }
         description.mesh = self.tables;
         description.instance = self.instances;
         description.material = self.materials;
@@ -206,7 +215,10 @@ impl<'a> Placer<'a> {
                 continue;
             }
             match primitive::read(self.asset, json, &place)? {
-                Some(primitive) => primitives.push(Arc::new(primitive)),
+                Some(mut primitive) => {
+                    tangent::add(self.asset, &mut primitive);
+                    primitives.push(Arc::new(primitive));
+                }
                 None => self.without_positions += 1,
             }
         }
@@ -275,7 +287,8 @@ impl<'a> Placer<'a> {
             Some(index) => {
                 let named = self.asset.root.materials[index].name.as_deref().map(one_line);
                 let named = named.filter(|name| !name.is_empty()).unwrap_or_else(|| format!("material {index}"));
-                material::table(self.asset, index, self.material_names.unused(&named), &mut self.pictures)?
+                let name = self.material_names.unused(&named);
+                material::table(self.asset, index, name, &mut self.pictures, &mut self.clamped)?
             }
             None => MaterialTable { name: self.material_names.unused(material::DEFAULT), ..material::default_table() },
         };

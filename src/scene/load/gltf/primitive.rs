@@ -55,12 +55,19 @@ pub fn has_surface(primitive: &Json) -> bool {
 
 /// Bytes that reading a primitive takes, at most. Its accessors must have been checked.
 pub fn bytes(asset: &Asset, primitive: &Json) -> u64 {
-    let count = |index: Option<&Index<Accessor>>| index.map_or(0, |i| asset.root.accessors[i.value()].count.0);
-    let vertices = count(attribute(primitive, Semantic::Positions));
+    let vertices = count(asset, attribute(primitive, Semantic::Positions));
     let targets = primitive.targets.as_ref().map_or(0, |targets| targets.len() as u64);
-    let corners = primitive.indices.as_ref().map_or(vertices, |index| count(Some(index)));
     let of_vertices = vertices.saturating_mul(BYTES_OF_VERTEX + targets.saturating_mul(BYTES_OF_TARGET));
-    of_vertices.saturating_add(corners.saturating_mul(BYTES_OF_CORNERS))
+    of_vertices.saturating_add(corners(asset, primitive).saturating_mul(BYTES_OF_CORNERS))
+}
+
+/// Number of corners that a primitive's triangles have, or strips and fans share.
+pub fn corners(asset: &Asset, primitive: &Json) -> u64 {
+    count(asset, primitive.indices.as_ref().or_else(|| attribute(primitive, Semantic::Positions)))
+}
+
+fn count(asset: &Asset, index: Option<&Index<Accessor>>) -> u64 {
+    index.map_or(0, |i| asset.root.accessors[i.value()].count.0)
 }
 
 /// Reads a primitive that has a surface; `None` for one without positions, which extensions may fill.

@@ -92,3 +92,36 @@ fn a_missing_file_is_a_warning_and_case_is_mended() {
     }
     assert!(warnings[0].contains("no such file") && warnings[1].contains("found as"));
 }
+
+#[test]
+fn pictures_of_floats_keep_their_range() {
+    use crate::image::{Film, Samples, WriteOptions, encode};
+    let file = |name: &str| {
+        let mut film = Film::new(2, 1);
+        for (channel, values) in [("R", [2.0, -3.5]), ("G", [0.5, 0.25]), ("B", [0.25, 0.0]), ("A", [0.25, 7.0])] {
+            film.add(channel, Samples::F32(values.to_vec()));
+        }
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        encode(Path::new(name), &film, &WriteOptions::default(), &mut bytes).unwrap();
+        bytes.into_inner()
+    };
+    let exr = |kind| decode(&file("a.exr"), "a.exr", kind).unwrap();
+    let colours = |found: &Decoded| found.texels.iter().map(|&word| rgb9e5::unpack(word)).collect::<Vec<_>>();
+    let numbers = |kind| exr(kind).texels.into_iter().map(f32::from_bits).collect::<Vec<_>>();
+    let light = exr(Kind::Light);
+    assert_eq!(colours(&light), [[2.0, 0.5, 0.25], [0.0, 0.25, 0.0]]);
+    assert_eq!(light.textures[0].flags, TEXTURE_RGB9E5);
+    assert_eq!(mean(&light.textures[0], &light.texels), [1.0, 0.375, 0.125]);
+    // What a surface reflects is no more than all.
+    assert_eq!(colours(&exr(Kind::Color)), [[1.0, 0.5, 0.25], [0.0, 0.25, 0.0]]);
+    assert_eq!(numbers(Kind::Height), [2.0, -3.5]);
+    assert_eq!([numbers(Kind::Mask), numbers(Kind::Alpha)], [[0.25, 1.0], [0.25, 1.0]]);
+    assert_eq!([numbers(Kind::Red), numbers(Kind::Roughness)], [[1.0, 0.0], [0.5, 0.25]]);
+    assert_eq!(exr(Kind::Mask).textures[0].flags, TEXTURE_FLOAT);
+    let hdr = decode(&file("a.hdr"), "a.hdr", Kind::Light).unwrap();
+    assert_eq!(colours(&hdr), [[2.0, 0.5, 0.25], [0.0, 0.25, 0.0]]);
+    for end in [5, 60, 200] {
+        let error = decode(&file("a.exr")[..end], "a.exr", Kind::Color).unwrap_err().to_string();
+        assert!(error.contains("a.exr") && !error.contains('\n'), "{error}");
+    }
+}

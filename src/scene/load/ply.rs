@@ -1,0 +1,253 @@
+//! PLY files: text or binary of either byte order, also within gzip. The crate `ply-rs-bw` reads them; what their headers claim is
+//! compared with what there is before.
+//!
+//! Of vertices `x y z`, `nx ny nz`, `u v` (or `s t`, `texture_u texture_v`), and `red green blue alpha` are read; integers are
+//! sRGB code values, as scanners and modellers write them, and floats are linear. Faces are polygons, or strips of triangles.
+use super::library::Library;
+use super::obj::ObjFile;
+use super::obj_part::Part;
+use super::triangulate::Triangulator;
+use crate::error::{Error, Result};
+use crate::image::{contained, input};
+use crate::math::srgb::linear_from_srgb;
+use crate::memory;
+use crate::scene::description::mesh::Mesh;
+use flate2::read::GzDecoder;
+use ply_rs_bw::parser::{ParseError, Parser, Reader};
+use ply_rs_bw::ply::{BeginList, ElementDef, Header, Property, PropertyAccess, PropertyAccessResult};
+use std::borrow::Cow;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+/// The value, or a sentence about what is wrong with the file.
+type Checked<T> = std::result::Result<T, String>;
+
+/// Bytes of a vertex, and of a face of three or four corners, as read and as a part of the mesh.
+const BYTES_OF_VERTEX: u64 = 2 * 48;
+const BYTES_OF_FACE: u64 = 24 + 32 + 24;
+
+/// Largest number of bytes that one of gzip can stand for.
+const DEFLATE: u64 = 1032;
+
+/// Reads a PLY file.
+///
+/// # Errors
+/// [`Error::Input`] with file, what is wrong and what to do; [`Error::Memory`].
+pub fn load(path: &Path, library: &mut Library) -> Result<ObjFile<'static>> {
+    let file = input::open(path)?;
+    let size = file.metadata().map_or(u64::MAX, |m| m.len());
+    let packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
+    let file = BufReader::with_capacity(1 << 18, file);
+    let read = || match packed {
+        true => parse(path, BufReader::with_capacity(1 << 18, GzDecoder::new(file)), size.saturating_mul(DEFLATE)),
+        false => parse(path, file, size),
+    };
+    // The memory that is missing is found before the crate is asked for anything.
+    let mesh = contained(|| Ok(read())).map_err(|what| Error::input(path, what))??;
+    let material = if mesh.colors.is_empty() { library.grey() } else { library.white() };
+    let part = Part { name: String::new(), material, mesh: Cow::Owned(mesh) };
+    Ok(ObjFile { parts: vec![part], grey: None })
+}
+
+fn parse(path: &Path, mut reader: impl BufRead, size: u64) -> Result<Mesh> {
+    if !reader.fill_buf().is_ok_and(|head| head.starts_with(b"ply")) {
+        return Err(Error::input(path, "is no PLY file"));
+    }
+    let mut file = File { reader: Reader::new(reader) };
+    let about = |what| Error::input(path, what);
+    let header = Parser::<Vertex>::new().read_header(&mut file.reader).map_err(|e| about(file.damaged(&e)))?;
+    check(&header, size).map_err(about)?;
+    let count = |name| header.elements.get(name).map_or(0, |e| e.count as u64);
+    let bytes = count("vertex") * BYTES_OF_VERTEX + (count("face") + count("tristrips")) * BYTES_OF_FACE;
+    memory::need(path.display(), bytes)?;
+    file.mesh(&header).map_err(about)
+}
+
+/// Compares the header with the bytes that there can be: every property of an element takes at least one.
+fn check(header: &Header, size: u64) -> Checked<()> {
+    for (name, element) in &header.elements {
+        let least = (element.count as u64).saturating_mul(element.properties.len().max(1) as u64);
+        if least > size {
+            let count = element.count;
+            return Err(format!("claims {count} of \"{}\", more than it has bytes for; is it complete?", short(name)));
+        }
+    }
+    let Some(vertex) = header.elements.get("vertex") else { return Err("has no vertices: is it a mesh?".into()) };
+    let missing = ["x", "y", "z"].into_iter().find(|axis| !has(vertex, &[axis]));
+    missing.map_or(Ok(()), |axis| Err(format!("its vertices have no {axis}")))
+}
+
+/// A name of the file for a message.
+fn short(name: &str) -> String {
+    name.chars().filter(|c| !c.is_control()).take(40).collect()
+}
+
+fn has(element: &ElementDef, names: &[&str]) -> bool {
+    names.iter().all(|name| element.properties.contains_key(*name))
+}
+
+struct File<R: BufRead> {
+    reader: Reader<R>,
+}
+
+impl<R: BufRead> File<R> {
+    fn damaged(&self, e: &ParseError) -> String {
+        let line = e.line().map_or_else(String::new, |line| format!(" in line {line}"));
+        format!("is damaged or ends too early{line}: save it again as PLY 1.0")
+    }
+
+    fn rows<E: PropertyAccess>(&mut self, element: &ElementDef, header: &Header) -> Checked<Vec<E>> {
+        let rows = Parser::new().read_payload_for_element(&mut self.reader, element, header);
+        rows.map_err(|e| self.damaged(&e))
+    }
+
+    fn mesh(&mut self, header: &Header) -> Checked<Mesh> {
+        let (mut mesh, mut faces, mut strips) = (Mesh::default(), Vec::<Face>::new(), Vec::<Face>::new());
+        for (name, element) in &header.elements {
+            match name.as_str() {
+                "vertex" => add_vertices(self.rows(element, header)?, element, &mut mesh),
+                "face" => faces = self.rows(element, header)?,
+                "tristrips" => strips = self.rows(element, header)?,
+                _ => drop(self.rows::<Nothing>(element, header)?),
+            }
+        }
+        if faces.is_empty() && strips.is_empty() {
+            return Err("has no faces: points alone have no surface".to_owned());
+        }
+        let mut triangulator = Triangulator::default();
+        for face in faces {
+            let corners = face.corners(mesh.positions.len(), &face.0)?;
+            if corners.len() >= 3 {
+                triangulator.add(&mesh.positions, &corners, &mut mesh.indices);
+            }
+        }
+        strips.iter().try_for_each(|strip| strip.add_strips(&mut mesh))?;
+        Ok(mesh)
+    }
+}
+
+fn add_vertices(rows: Vec<Vertex>, element: &ElementDef, mesh: &mut Mesh) {
+    mesh.positions = rows.iter().map(|row| row.position).collect();
+    if has(element, &["nx", "ny", "nz"]) {
+        mesh.normals = rows.iter().map(|row| row.normal).collect();
+    }
+    if [["u", "v"], ["s", "t"], ["texture_u", "texture_v"]].iter().any(|names| has(element, names)) {
+        mesh.uvs = rows.iter().map(|row| row.uv).collect();
+    }
+    if has(element, &["red", "green", "blue"]) {
+        mesh.colors = rows.iter().map(|row| row.color).collect();
+    }
+}
+
+/// A row of `vertex`.
+struct Vertex {
+    position: [f32; 3],
+    normal: [f32; 3],
+    uv: [f32; 2],
+    color: [f32; 4],
+}
+
+impl PropertyAccess for Vertex {
+    fn new() -> Self {
+        Self { position: [0.0; 3], normal: [0.0; 3], uv: [0.0; 2], color: [1.0; 4] }
+    }
+
+    fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
+        let slot = match name {
+            "x" => &mut self.position[0],
+            "y" => &mut self.position[1],
+            "z" => &mut self.position[2],
+            "nx" => &mut self.normal[0],
+            "ny" => &mut self.normal[1],
+            "nz" => &mut self.normal[2],
+            "u" | "s" | "texture_u" => &mut self.uv[0],
+            "v" | "t" | "texture_v" => &mut self.uv[1],
+            "red" | "green" | "blue" | "alpha" => return self.set_color(name, &value),
+            _ => return PropertyAccessResult::Ignored,
+        };
+        let Some(number) = value.to_f32_lossy() else { return PropertyAccessResult::UnsupportedType };
+        *slot = number;
+        PropertyAccessResult::Set
+    }
+}
+
+impl Vertex {
+    fn set_color(&mut self, name: &str, value: &Property) -> PropertyAccessResult {
+        let Some(number) = value.to_f32_lossy() else { return PropertyAccessResult::UnsupportedType };
+        let code = match value {
+            Property::UChar(_) => Some(number / 255.0),
+            Property::UShort(_) => Some(number / 65535.0),
+            Property::Float(_) | Property::Double(_) => None,
+            _ => return PropertyAccessResult::UnsupportedType,
+        };
+        let linear = code.map_or(number, linear_from_srgb);
+        match name {
+            "red" => self.color[0] = linear,
+            "green" => self.color[1] = linear,
+            "blue" => self.color[2] = linear,
+            _ => self.color[3] = code.unwrap_or(number),
+        }
+        PropertyAccessResult::Set
+    }
+}
+
+/// Corners of a row of `face`, or of `tristrips`, where -1 ends a strip.
+struct Face(Vec<i32>);
+
+impl PropertyAccess for Face {
+    fn new() -> Self {
+        Self(Vec::new())
+    }
+
+    fn begin_list_int(&mut self, name: &str, _len: usize) -> BeginList<'_, i32> {
+        if is_corners(name) { BeginList::Fill(&mut self.0) } else { BeginList::UseSetter }
+    }
+
+    fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
+        if !is_corners(name) {
+            return PropertyAccessResult::Ignored;
+        }
+        let Some(corners) = value.to_u32_list() else { return PropertyAccessResult::UnsupportedType };
+        // What no 32-bit index reaches becomes negative, which is refused.
+        self.0 = corners.into_iter().map(|corner| corner as i32).collect();
+        PropertyAccessResult::Set
+    }
+}
+
+fn is_corners(name: &str) -> bool {
+    matches!(name, "vertex_indices" | "vertex_index")
+}
+
+impl Face {
+    fn corners(&self, vertices: usize, of: &[i32]) -> Checked<Vec<u32>> {
+        let known = |&corner: &i32| u32::try_from(corner).ok().filter(|&i| (i as usize) < vertices).ok_or(corner);
+        of.iter()
+            .map(known)
+            .collect::<std::result::Result<_, i32>>()
+            .map_err(|corner| format!("has an index of {corner}, and {vertices} vertices: save it again"))
+    }
+
+    /// Every other triangle of a strip is turned around.
+    fn add_strips(&self, mesh: &mut Mesh) -> Checked<()> {
+        for strip in self.0.split(|&corner| corner == -1) {
+            let corners = self.corners(mesh.positions.len(), strip)?;
+            for (i, three) in corners.windows(3).enumerate() {
+                let turned = i % 2;
+                mesh.indices.extend([three[0], three[1 + turned], three[2 - turned]]);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A row of what is passed over.
+struct Nothing;
+
+impl PropertyAccess for Nothing {
+    fn new() -> Self {
+        Self
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,173 @@
+use super::*;
+use std::io::Write;
+
+/// How numbers are written.
+#[derive(Clone, Copy, PartialEq)]
+enum Form {
+    Text,
+    Little,
+    Big,
+}
+
+/// Writes rows of a PLY file in one of its forms.
+struct Writer(Form, Vec<u8>);
+
+impl Writer {
+    fn new(form: Form, header: &str) -> Self {
+        let name = match form {
+            Form::Text => "ascii",
+            Form::Little => "binary_little_endian",
+            Form::Big => "binary_big_endian",
+        };
+        Self(form, format!("ply\nformat {name} 1.0\ncomment a test\n{header}end_header\n").into_bytes())
+    }
+
+    fn float(&mut self, v: f32) {
+        match self.0 {
+            Form::Text => write!(self.1, "{v} ").unwrap(),
+            Form::Little => self.1.extend(v.to_le_bytes()),
+            Form::Big => self.1.extend(v.to_be_bytes()),
+        }
+    }
+
+    fn byte(&mut self, v: u8) {
+        match self.0 {
+            Form::Text => write!(self.1, "{v} ").unwrap(),
+            _ => self.1.push(v),
+        }
+    }
+
+    fn int(&mut self, v: i32) {
+        match self.0 {
+            Form::Text => write!(self.1, "{v} ").unwrap(),
+            Form::Little => self.1.extend(v.to_le_bytes()),
+            Form::Big => self.1.extend(v.to_be_bytes()),
+        }
+    }
+
+    fn end_row(&mut self) {
+        if self.0 == Form::Text {
+            self.1.push(b'\n');
+        }
+    }
+}
+
+const HEADER: &str = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty float quality\n\
+    property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float s\nproperty float t\n\
+    element mark 1\nproperty list uchar float words\nelement face 2\nproperty uchar flags\n\
+    property list uchar int vertex_indices\n";
+
+/// A unit square as a quad, and one of its halves as a triangle.
+fn square(form: Form) -> Vec<u8> {
+    let mut w = Writer::new(form, HEADER);
+    for [x, y] in [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]] {
+        [x, y, 0.0, 7.0].into_iter().for_each(|v| w.float(v));
+        [255, 188, 0].into_iter().for_each(|v| w.byte(v));
+        [x, y].into_iter().for_each(|v| w.float(v));
+        w.end_row();
+    }
+    w.byte(2);
+    [1.0, 2.0].into_iter().for_each(|v| w.float(v));
+    w.end_row();
+    for face in [&[0, 1, 2, 3][..], &[0, 1, 2]] {
+        w.byte(9);
+        w.byte(face.len() as u8);
+        face.iter().for_each(|&i| w.int(i));
+        w.end_row();
+    }
+    w.1
+}
+
+fn read(bytes: &[u8], name: &str) -> Result<Mesh> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes).unwrap();
+    Ok(load(&path, &mut Library::default())?.parts.remove(0).mesh.into_owned())
+}
+
+fn refusal(bytes: &[u8]) -> String {
+    let line = read(bytes, "a.ply").unwrap_err().to_string();
+    assert!(!line.contains('\n'), "{line}");
+    line
+}
+
+fn text(header: &str, rows: &str) -> String {
+    format!("ply\nformat ascii 1.0\n{header}end_header\n{rows}")
+}
+
+#[test]
+fn every_form_is_the_same_mesh() {
+    let packed = |bytes: &[u8]| {
+        let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        gzip.write_all(bytes).unwrap();
+        gzip.finish().unwrap()
+    };
+    let text = square(Form::Text);
+    let windows = String::from_utf8(text.clone()).unwrap().replace('\n', "\r\n").into_bytes();
+    let files = [
+        (text.clone(), "a.ply"),
+        (windows, "a.ply"),
+        (square(Form::Little), "a.PLY"),
+        (square(Form::Big), "a.ply"),
+        (packed(&text), "a.ply.gz"),
+        (packed(&square(Form::Big)), "a.ply.gz"),
+    ];
+    for (i, (bytes, name)) in files.iter().enumerate() {
+        let mesh = read(bytes, name).unwrap_or_else(|e| panic!("file {i}: {e}"));
+        assert_eq!(mesh.positions, [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]], "file {i}");
+        assert_eq!(mesh.indices, [0, 1, 2, 0, 2, 3, 0, 1, 2], "file {i}");
+        assert_eq!(mesh.uvs[2], [1.0, 1.0], "file {i}");
+        // Code 188 is about half of the light of code 255.
+        let [r, g, b, a] = mesh.colors[0];
+        assert!(r == 1.0 && (g - 0.5).abs() < 0.01 && b == 0.0 && a == 1.0, "file {i}: {:?}", mesh.colors[0]);
+        assert!(mesh.normals.is_empty(), "file {i}");
+    }
+}
+
+#[test]
+fn strips_keep_their_side() {
+    let header = "element vertex 4\nproperty double x\nproperty double y\nproperty double z\nelement tristrips 1\n\
+                  property list int int vertex_indices\n";
+    let mesh = read(text(header, "0 0 0\n1 0 0\n0 1 0\n1 1 0\n8 0 1 2 3 -1 0 1 2\n").as_bytes(), "a.ply").unwrap();
+    assert_eq!(mesh.indices, [0, 1, 2, 1, 3, 2, 0, 1, 2]);
+}
+
+#[test]
+fn what_is_wrong_is_one_line() {
+    let vertex = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
+    let face = "element face 1\nproperty list uchar uint vertex_indices\n";
+    let header = format!("{vertex}{face}");
+    let rows = "0 0 0\n1 0 0\n0 1 0\n";
+    assert!(read(text(&header, &format!("{rows}3 0 1 2\n")).as_bytes(), "a.ply").is_ok());
+    assert!(refusal(text(&header, &format!("{rows}3 0 1 3\n")).as_bytes()).contains("an index of 3, and 3 vertices"));
+    assert!(refusal(text(&header, &format!("{rows}3 0 1\n")).as_bytes()).contains("damaged or ends too early"));
+    assert!(refusal(text(&header, rows).as_bytes()).contains("ends too early"));
+    assert!(refusal(text(vertex, rows).as_bytes()).contains("has no faces"));
+    assert!(refusal(text(face, "3 0 1 2\n").as_bytes()).contains("has no vertices"));
+    assert!(refusal(text(&header.replace(" z", " w"), rows).as_bytes()).contains("no z"));
+    assert!(refusal(b"solid cube\n").contains("is no PLY file"));
+    assert!(refusal(b"ply").contains("damaged"));
+    // Claims that no file holds, of rows with and without properties.
+    let huge = header.replace("face 1", "face 4000000000000");
+    assert!(refusal(text(&huge, rows).as_bytes()).contains("claims 4000000000000 of \"face\""));
+    let empty = format!("element nothing 99999999999999999\n{header}");
+    assert!(refusal(text(&empty, rows).as_bytes()).contains("claims"));
+}
+
+/// Bytes of a file are changed one at a time: whatever is read then has corners that are there.
+#[test]
+fn damaged_files_end_in_an_error_or_in_a_mesh() {
+    for form in [Form::Text, Form::Little, Form::Big] {
+        let whole = square(form);
+        for at in 0..whole.len() {
+            let mut bytes = whole.clone();
+            bytes[at] ^= 1 << (at % 8);
+            if let Ok(mesh) = read(&bytes, "a.ply") {
+                assert!(mesh.check().is_ok(), "byte {at}");
+            }
+        }
+        for end in 0..whole.len() {
+            let _ = read(&whole[..end], "a.ply");
+        }
+    }
+}
