@@ -56,16 +56,14 @@ impl Shown {
         self.pixels.iter_mut().zip(alpha).for_each(|(pixel, a)| *pixel = pixel.map(|v| v * a));
     }
 
-    /// Root mean square difference of the values, over what either shows.
-    pub fn difference(&self, other: &Self) -> f64 {
-        let (mut sum, mut weight) = (0.0, 0.0);
-        for i in 0..self.pixels.len() {
-            let share = f64::from(self.alpha[i].max(other.alpha[i]));
-            let squares =
-                self.pixels[i].iter().zip(other.pixels[i]).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
-            sum += share.min(1.0) * squares / 3.0;
-            weight += share;
+    /// Root mean square difference of the values, over the pixels that are compared.
+    pub fn difference(&self, other: &Self, compared: &[bool]) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for i in (0..self.pixels.len()).filter(|&i| compared[i]) {
+            let pairs = self.pixels[i].iter().zip(other.pixels[i]);
+            sum += pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>() / 3.0;
+            count += 1.0;
         }
-        (sum / f64::max(weight, 1.0)).sqrt()
+        (sum / f64::max(count, 1.0)).sqrt()
     }
 }

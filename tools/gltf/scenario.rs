@@ -14,11 +14,13 @@ pub struct Scenario {
     pub aspect: f64,
     /// Whether the sky is seen.
     pub sky: bool,
+    /// The environment map that the pictures were lit by.
+    pub lighting: String,
 }
 
 impl Default for Scenario {
     fn default() -> Self {
-        Self { camera: None, aspect: 1.0, sky: true }
+        Self { camera: None, aspect: 1.0, sky: true, lighting: String::new() }
     }
 }
 
@@ -46,5 +48,6 @@ fn scenario(value: &Value) -> anyhow::Result<Scenario> {
         camera: Some(camera),
         aspect: number("/dimensions/width")? / number("/dimensions/height")?,
         sky: value["renderSkybox"] == true,
+        lighting: value["lighting"].as_str().unwrap_or_default().to_owned(),
     })
 }

@@ -1,10 +1,8 @@
-//! Measures what moving a scene costs beside a frame of one sample per pixel: 100 instances in Crytek Sponza, and a cloth of 100,000
-//! triangles that is refitted or built anew. Medians, after a first frame.
-//!   TALLOW_DATA=../shared cargo run --release --example bench-motion [FRAMES]
+//! What moving a scene costs beside a frame of one sample per pixel.
 use anyhow::{Context, Result};
 use std::path::Path;
 use std::time::Instant;
-use tallow::gpu::{DeviceOptions, FrameResources, Gpu};
+use tallow::gpu::{FrameResources, Gpu};
 use tallow::render::{Outputs, Renderer};
 use tallow::report::table;
 use tallow::scene::description::*;
@@ -13,27 +11,20 @@ use tallow::scene::{Loaded, Pose, Scene, Vertices};
 /// Vertices along an edge of the cloth: 2 * 224^2 triangles.
 const EDGE: u32 = 225;
 
-fn main() -> Result<()> {
-    let frames = std::env::args().nth(1).map_or(Ok(9), |n| n.parse())?;
-    let gpu = Gpu::open(&DeviceOptions::default())?;
-    println!("640 x 360, 1 sample per pixel, max_depth 8, on {}", gpu.info().name);
-    let mut rows = Vec::new();
-    match std::env::var_os("TALLOW_DATA") {
-        Some(data) => {
-            let mut hall = hall(&Path::new(&data).join("scenes/crytek-sponza/sponza.obj"))?;
-            rows.push(measure("Sponza, 100 instances", &gpu, &mut hall, frames, |_, n| Ok(rigid(n)))?);
-        }
-        None => println!("without Sponza: TALLOW_DATA names no folder of outside data"),
-    }
+/// Prints the costs of 100 instances in Crytek Sponza and of a cloth. Medians, after a first frame.
+pub fn report(gpu: &Gpu, data: &Path, frames: u32) -> Result<()> {
+    let mut hall = hall(&data.join("scenes/crytek-sponza/sponza.obj"))?;
+    let mut rows = vec![measure("Sponza, 100 instances", gpu, &mut hall, frames, |_, n| Ok(rigid(n)))?];
     for (name, rebuild_above) in [("cloth, refitted", f32::INFINITY), ("cloth, built anew", 0.0)] {
         let mut scene = cloth()?;
         let deform = |scene: &Scene, n| Ok(Pose { rebuild_above, ..waves(scene, n)? });
-        rows.push(measure(name, &gpu, &mut scene, frames, deform)?);
+        rows.push(measure(name, gpu, &mut scene, frames, deform)?);
     }
+    println!("What moving costs, 640 x 360, 1 sample per pixel, max_depth 8");
     let head = ["scene", "pose", "record", "upload", "paths", "share of paths", "cost", "buffers made"];
     println!("{}", table::text(&head, &rows));
     println!("milliseconds; pose: hierarchies and lights on the host; upload and paths: on the device");
-    println!("cost: of the refitted hierarchy over that when it was built, at the last frame");
+    println!("cost: of the refitted hierarchy over that when it was built, at the last frame\n");
     Ok(())
 }
 
@@ -77,7 +68,8 @@ fn measure(
     Ok([name.to_owned()].into_iter().chain(numbers).chain([format!("{cost:.3}"), made.to_string()]).collect())
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
+/// The middle one of some values.
+pub fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values[values.len() / 2]
 }
@@ -131,7 +123,7 @@ fn vertices(number: u32) -> Vertices {
             1.2 * (5.0 * x + phase).sin() * (4.0 * z - phase).sin(),
         ]
     };
-    Vertices { positions, normals: all().map(slope).collect(), indices: Vec::new() }
+    Vertices { positions, normals: all().map(slope).collect(), ..Vertices::default() }
 }
 
 fn cloth() -> Result<Loaded> {
