@@ -37,13 +37,17 @@ struct Args {
     /// Width of each picture in pixels
     #[arg(long, default_value_t = 128)]
     width: u32,
-    /// Samples per pixel
+    /// Samples per pixel of a picture that is four times as large, and is shrunk as it is shown
     #[arg(long, default_value_t = 32)]
     spp: u32,
     /// Device, by index or part of its name
     #[arg(long)]
     device: Option<String>,
 }
+
+/// The others' pictures are several times as large as those that are compared, and are shrunk as displays show them, which makes small
+/// black letters on white darker than shrinking their light would: ours are rendered so many times as wide.
+const DETAIL: u32 = 4;
 
 /// A model with all pictures of it, ours first.
 struct Row {
@@ -67,10 +71,10 @@ fn main() -> anyhow::Result<()> {
         }
         let scenario = scenarios.get(&name).cloned().unwrap_or_default();
         let ours = render(&gpu, &path, &scenario, &args).with_context(|| name.clone())?;
-        let others = golden::read(&goldens.join(&name), [ours.width, ours.height])?;
+        let others = golden::read(&goldens.join(&name), [ours.width, ours.height].map(|n| n / DETAIL))?;
         let pictures = shown(&ours, others, &scenario);
         let covered = |pixel: usize| pictures.iter().all(|(_, shown)| shown.alpha[pixel] > WHOLE);
-        let compared = (0..ours.pixels.len()).map(|pixel| scenario.sky || covered(pixel)).collect();
+        let compared = (0..pictures[0].1.pixels.len()).map(|pixel| scenario.sky || covered(pixel)).collect();
         let row = Row { name, pictures, compared };
         println!("{}", verdict(&row, &scenario));
         rows.push(row);
@@ -107,8 +111,8 @@ fn render(gpu: &Gpu, path: &Path, scenario: &Scenario, args: &Args) -> anyhow::R
     description.environment = Some(EnvironmentTable { file: Some(sky), rotation: 90.0, ..Default::default() });
     description.camera = scenario.camera.clone().unwrap_or_else(|| description.camera.clone());
     let loaded = file.load()?.with(|settings| {
-        settings.width = args.width;
-        settings.height = (f64::from(args.width) / scenario.aspect).round().max(1.0) as u32;
+        let height = (f64::from(args.width) / scenario.aspect).round().max(1.0) as u32;
+        (settings.width, settings.height) = (DETAIL * args.width, DETAIL * height);
         settings.spp = args.spp;
     });
     loaded.warnings.iter().for_each(|line| eprintln!("{}: {line}", path.display()));
@@ -120,7 +124,7 @@ fn render(gpu: &Gpu, path: &Path, scenario: &Scenario, args: &Args) -> anyhow::R
 
 /// All pictures of a model. Ours are cut out as the others are, since they show no sky.
 fn shown(ours: &Picture, others: Vec<(String, Shown)>, scenario: &Scenario) -> Vec<(String, Shown)> {
-    let mut ours = Shown::of(ours);
+    let mut ours = Shown::of(ours).smaller(DETAIL);
     if let (Some((_, first)), false) = (others.first(), scenario.sky) {
         ours.cut_out(&first.alpha);
     }

@@ -56,6 +56,11 @@ fn a_frame_alone_is_that_of_the_sequence_and_a_finished_one_is_kept() {
     assert!(!told.contains("is finished"), "at another time the scene is another: {told}");
     let told = well(&folder, "--frames 0..48 --only 9 --fps 6 --seed-per-frame -o a.####.exr");
     assert!(!told.contains("is finished"), "{told}");
+    // A film of another size is another, too.
+    let words = "sequence s.toml --width 40 --height 26 --spp 2 --frames 0..48 --only 11..=12 --fps 6 -o a.####.exr";
+    let sized = || stdout(&tallow(&folder, &words.split_whitespace().collect::<Vec<_>>()));
+    assert!(!sized().contains("is finished"));
+    assert!(sized().contains("frame 12: is finished"), "control");
 }
 
 #[test]

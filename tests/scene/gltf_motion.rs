@@ -138,6 +138,10 @@ fn joints_and_weights_move_vertices() {
     // A joint that is flattened leaves no NaN.
     animate(&mut json, 2, "scale", &[1.0, 1.0, 1.0, 0.0, 0.0, 0.0], "VEC3");
     assert!(corners(&load(&json), 2.0).iter().flatten().all(|v| v.is_finite()));
+    // Nor does a skin whose matrices have no inverse: it shrinks to a point.
+    let nothing = add(&mut json, &[0.0; 16], "MAT4");
+    json["skins"][0]["inverseBindMatrices"] = json!(nothing);
+    assert_eq!(corners(&load(&json), 1.0), [[0.0; 3]; 3]);
 }
 
 #[test]

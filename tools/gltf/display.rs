@@ -29,6 +29,21 @@ impl Shown {
         Self { size: [picture.width, picture.height], alpha: vec![1.0; pixels.len()], pixels }
     }
 
+    /// Averages squares of so many pixels.
+    pub fn smaller(&self, times: u32) -> Self {
+        let [width, height] = self.size.map(|n| n / times);
+        let square = |at: u32| {
+            let corner = at / width * times * self.size[0] + at % width * times;
+            let place = move |k: u32| (corner + k / times * self.size[0] + k % times) as usize;
+            let sum = (0..times * times)
+                .map(place)
+                .fold([0.0; 3], |sum: [f32; 3], i| std::array::from_fn(|c| sum[c] + self.pixels[i][c]));
+            sum.map(|v| v / (times * times) as f32)
+        };
+        let pixels: Vec<_> = (0..width * height).map(square).collect();
+        Self { size: [width, height], alpha: vec![1.0; pixels.len()], pixels }
+    }
+
     /// Averages `bytes` of so many channels to another size.
     pub fn shrunk(bytes: &[u8], channels: usize, from: [u32; 2], size: [u32; 2]) -> Self {
         let (mut pixels, mut alpha) = (Vec::new(), Vec::new());

@@ -20,6 +20,11 @@ use std::time::{Duration, Instant};
 /// frame, with that many digits. A frame whose .exr file holds all samples of this scene, pose and settings is not rendered
 /// again. A frame that fails does not stop the others: the exit code is 6 then.
 #[derive(clap::Args)]
+#[command(
+    mut_arg("outputs", |arg| arg.help("Image to write: .exr (all layers), .png or .hdr, with #### for the number of the frame; may be \
+        given several times [default: the scene's name + .####.exr]")),
+    mut_args(|arg| { let hide = OF_ONE.contains(&arg.get_id().as_str()); if hide { arg.hide(true) } else { arg } }),
+)]
 pub struct Args {
     /// Frames: 0..96 are 96 frames, 0..=96 one more, 7 is one [default: up to the last key of all that moves]
     #[arg(long, value_name = "FIRST..END", value_parser = range::parse)]
@@ -47,6 +52,9 @@ pub struct Args {
     #[command(flatten)]
     pub render: render::Args,
 }
+
+/// Options for one image, which a sequence refuses.
+const OF_ONE: [&str; 5] = ["resume", "pixel", "time", "error", "plan"];
 
 impl Args {
     /// The options of one frame, whose files have its number.

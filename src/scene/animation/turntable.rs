@@ -20,7 +20,9 @@ pub struct Turntable {
 impl Turntable {
     /// Around a scene as it is now, for a film of (width, height) pixels.
     pub fn new(scene: &Scene, size: [u32; 2], degrees: f64, period: f64) -> Self {
-        Self { camera: scene.view.clone(), bounds: scene.bounds, size, degrees, period }
+        let bounds = scene.view.framed.unwrap_or(scene.bounds);
+        let camera = Camera { framed: Some(swept(bounds)), ..scene.view.clone() };
+        Self { camera, bounds: scene.bounds, size, degrees, period }
     }
 
     fn turned(&self, camera: &Camera, angle: f64) -> std::result::Result<Camera, String> {
@@ -38,6 +40,14 @@ impl Turntable {
     }
 }
 
+/// What a box reaches that is turned about its middle, so that a camera which frames it has it in view from all sides.
+fn swept([low, high]: [[f32; 3]; 2]) -> [[f32; 3]; 2] {
+    let reach = ((high[0] - low[0]) / 2.0).hypot((high[2] - low[2]) / 2.0);
+    let middle = [0, 2].map(|axis| (low[axis] + high[axis]) / 2.0);
+    let end = |y: f32, sign: f32| [middle[0] + sign * reach, y, middle[1] + sign * reach];
+    [end(low[1], -1.0), end(high[1], 1.0)]
+}
+
 impl Mover for Turntable {
     fn pose(&self, seconds: f64, pose: &mut Pose) -> Result<()> {
         let camera = pose.camera.as_ref().unwrap_or(&self.camera);
@@ -50,5 +60,31 @@ impl Mover for Turntable {
 
     fn end(&self) -> f64 {
         self.period
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_is_in_view_from_every_side() {
+        let bounds = [[-4.0, 0.0, 2.0], [6.0, 1.0, 3.0]];
+        let (size, scene) = ([100, 100], Scene { bounds, ..Scene::default() });
+        let table = Turntable::new(&scene, size, 360.0, 8.0);
+        let mut reach: f32 = 0.0;
+        for second in 0..8 {
+            let mut pose = Pose::default();
+            table.pose(f64::from(second), &mut pose).unwrap();
+            let camera = pose.camera.unwrap().build(size, bounds).unwrap();
+            let [position, right, up, forward] =
+                [camera.position, camera.right, camera.up, camera.forward].map(Vec3::from);
+            for k in 0..8 {
+                let off = Vec3::from([0, 1, 2].map(|axis| bounds[k >> axis & 1][axis])) - position;
+                let film = [right, up].map(|axis| (off.dot(axis) / axis.length_squared() / off.dot(forward)).abs());
+                reach = reach.max(film[0]).max(film[1]);
+            }
+        }
+        assert!(reach > 0.7 && reach <= 1.0, "the farthest corner is at {reach} of the film");
     }
 }

@@ -63,8 +63,8 @@ impl Camera {
         let (position, [right, up, forward]) = match &self.world_from_camera {
             Some(rows) => frame_from_matrix(rows)?,
             // An orthographic camera sees the same from any distance: from there, a film of 40 degrees would show all.
-            None if self.orthographic.is_some() => self.frame_from_target(bounds, 20f64.to_radians().tan())?,
-            None => self.frame_from_target(bounds, half_x.min(half_y))?,
+            None if self.orthographic.is_some() => self.frame_from_target(bounds, [20f64.to_radians().tan(); 2])?,
+            None => self.frame_from_target(bounds, [half_x, half_y])?,
         };
         finite(position)?;
         let positive = |name: &str, v: f32| match v {
@@ -113,7 +113,7 @@ impl Camera {
         }
     }
 
-    fn frame_from_target(&self, bounds: [[f32; 3]; 2], tan: f64) -> Result<Frame, String> {
+    fn frame_from_target(&self, bounds: [[f32; 3]; 2], tan: [f64; 2]) -> Result<Frame, String> {
         let [low, high] = self.framed.unwrap_or(bounds).map(|b| DVec3::from(b.map(f64::from)));
         let target = self.target.map_or((low + high) / 2.0, DVec3::from);
         let position = self.position.map_or_else(|| overview(target, low, high, tan), DVec3::from);
@@ -131,11 +131,20 @@ impl Camera {
     }
 }
 
-/// A point from which a sphere around the bounds fills the view, above and to the side.
-fn overview(target: DVec3, low: DVec3, high: DVec3, tan: f64) -> DVec3 {
-    let radius = ((high - low).length() / 2.0).max(1e-6);
-    let sin = tan / (1.0 + tan * tan).sqrt();
-    target + DVec3::new(0.45, 0.35, 1.0).normalize() * (radius / sin)
+/// A point above and to the side from which the bounds fill a film of these half edges at distance 1, but for a margin.
+fn overview(target: DVec3, low: DVec3, high: DVec3, tan: [f64; 2]) -> DVec3 {
+    const MARGIN: f64 = 1.05;
+    let back = DVec3::new(0.45, 0.35, 1.0).normalize();
+    let right = DVec3::Y.cross(back).normalize();
+    let up = back.cross(right);
+    // The corner at `off` from the target is on the film's edge when seen from so far.
+    let distance = |off: DVec3| {
+        let across = (off.dot(right).abs() / tan[0]).max(off.dot(up).abs() / tan[1]);
+        off.dot(back) + MARGIN * across
+    };
+    let corner = |k: u32| DVec3::from([0, 1, 2].map(|axis| if k >> axis & 1 == 0 { low[axis] } else { high[axis] }));
+    let least = (high - low).length().max(1e-6) / 2.0;
+    target + back * (0..8).map(|k| distance(corner(k) - target)).fold(least, f64::max)
 }
 
 fn frame_from_matrix(rows: &[f64; 16]) -> Result<Frame, String> {
@@ -199,6 +208,27 @@ mod tests {
         assert_eq!(found.position, [1.0, 2.0, 3.0]);
         assert!((found.right[0] + 1.0).abs() < 1e-6, "the mirrored right axis points along -x");
         assert_eq!(found.forward, [0.0, 0.0, -1.0]);
+    }
+
+    #[test]
+    fn a_camera_without_position_has_all_in_view_and_fills_the_film() {
+        for (size, high) in [([200, 100], [1.0, 1.0, 9.0]), ([100, 200], [5.0, 1.0, 1.0]), ([64, 64], [1.0, 1.0, 1.0])]
+        {
+            let bounds = [[-high[0], -high[1], -high[2]], high];
+            let found = Camera::default().build(size, bounds).unwrap();
+            let [position, right, up, forward] =
+                [found.position, found.right, found.up, found.forward].map(|v| glam::Vec3::from(v).as_dvec3());
+            let mut reach: f64 = 0.0;
+            for k in 0..8 {
+                let corner = DVec3::from([0, 1, 2].map(|axis| f64::from(bounds[k >> axis & 1][axis])));
+                let off = corner - position;
+                let depth = off.dot(forward);
+                let film = [right, up].map(|axis| (off.dot(axis) / axis.length_squared() / depth).abs());
+                assert!(depth > 0.0 && film[0].max(film[1]) <= 1.0, "{size:?} {high:?}: {film:?}");
+                reach = reach.max(film[0]).max(film[1]);
+            }
+            assert!(reach > 0.85, "{size:?} {high:?}: the scene reaches {reach} of the way to the edge");
+        }
     }
 
     #[test]
