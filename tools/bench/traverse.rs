@@ -1,8 +1,9 @@
 //! Compares the rays per second of the traversal kernel with those of obvhs's own traversal on two threads, alternating,
-//! over the same tree and the same 512 x 512 incoherent rays of Crytek Sponza.
-//!   TALLOW_DATA=../shared cargo run --release --example bench-traverse [ROUNDS]
+//! over the same tree and the same incoherent rays of Crytek Sponza: on a CPU a quarter of a million, on a GPU four millions.
+//!   TALLOW_DATA=../shared cargo run --release --example bench-traverse [ROUNDS] [cpu|gpu]
+//! The last word chooses how many rays there are and how they are launched; else the kind of the device does.
 #![allow(missing_docs)]
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use glam::{Vec3, Vec3A, vec2};
 use obvhs::cwbvh::CwBvh;
 use obvhs::ray::{Ray, RayHit as HostHit};
@@ -30,24 +31,32 @@ mod kernels {
 
 use kernels::traverse::{Bind, Constants, Kernel};
 
-const SIDE: u32 = 512;
 const THREADS: usize = 2;
 /// Number of rays that a host thread takes at a time.
 const CHUNK: usize = 4096;
-/// Number of rays that a device thread traces one after the other, so that lanes which finish a ray early take the next. A
-/// CPU has few lanes to keep busy, a GPU many.
-const RAYS_CPU: u32 = 128;
-const RAYS_GPU: u32 = 16;
+/// How rays are launched.
+#[derive(Clone, Copy)]
+struct Launch {
+    /// Rays along each edge of the film that they bounce from.
+    side: u32,
+    /// Rays that a thread traces one after the other.
+    per_thread: u32,
+}
+
+/// A CPU has few lanes to keep busy: those that finish a ray early take the next one.
+const CPU: Launch = Launch { side: 512, per_thread: 128 };
+/// A GPU hides the latency of its memory by hundreds of thousands of threads, and schedules the next ones by itself.
+const GPU: Launch = Launch { side: 2048, per_thread: 1 };
 
 /// A hit: distance and triangle in leaf order, or [`NONE`] on a miss. For any-hit rays a hit can have any values.
 type Found = (f32, u32);
 
 /// The bounce of the ray through pixel `i`, from the hall of Sponza towards its far end; `None` if that leaves the scene.
-fn bounce(scene: &Loaded, i: u32) -> Option<RayQuery> {
+fn bounce(scene: &Loaded, side: u32, i: u32) -> Option<RayQuery> {
     let [low, high] = scene.bounds.map(Vec3::from);
     let eye = low + (high - low) * Vec3::new(0.2, 0.3, 0.5);
     let random = sampler_start(i, 0, 1, true);
-    let film = 2.0 * (vec2((i % SIDE) as f32, (i / SIDE) as f32) + 0.5) / SIDE as f32 - vec2(1.0, 1.0);
+    let film = 2.0 * (vec2((i % side) as f32, (i / side) as f32) + 0.5) / side as f32 - vec2(1.0, 1.0);
     let direction = Vec3::new(1.0, -film.y, film.x).normalize();
     let hit = traverse(scene, eye, direction, INFINITE_DISTANCE, false, 0);
     if !hit.any() {
@@ -114,12 +123,11 @@ struct Device {
     rays: Buffer<RayQuery>,
     hits: Buffer<RayHit>,
     root: u32,
+    per_thread: u32,
 }
 
 impl Device {
-    fn new(scene: &Loaded, rays: &[RayQuery]) -> Result<Self> {
-        let gpu =
-            Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), ..DeviceOptions::default() })?;
+    fn new(gpu: Gpu, scene: &Loaded, rays: &[RayQuery], per_thread: u32) -> Result<Self> {
         // obvhs does not support masks, so neither side tests them.
         let effects = Effects::default();
         let traverse = shared::traverse::Constants { stack: scene.stack };
@@ -131,8 +139,13 @@ impl Device {
             rays: Buffer::from_slice(&gpu, "rays", rays)?,
             hits: Buffer::new(&gpu, "hits", rays.len(), Location::Device)?,
             root: scene.root,
+            per_thread,
             gpu,
         })
+    }
+
+    fn threads(&self) -> u32 {
+        (self.rays.len() as u32).div_ceil(self.per_thread)
     }
 
     /// Traces all rays and returns the seconds by the device's timestamps, and the hits.
@@ -140,10 +153,10 @@ impl Device {
         let count = self.rays.len() as u32;
         let push = TraversePush { count, root: self.root, any_hit: u32::from(any_hit), ..Default::default() };
         let s = self.renderer.scene();
-        let rays = if self.gpu.info().kind == DeviceKind::Cpu { RAYS_CPU } else { RAYS_GPU };
+        let threads = self.threads();
         let times = self.gpu.run(&mut self.frame, |rec| {
             let bind = Bind { scene: s.bind(), rays: &self.rays, hits: &self.hits };
-            rec.dispatch_threads(&self.kernel, bind, &push, count.div_ceil(rays))
+            rec.dispatch_threads(&self.kernel, bind, &push, threads)
         })?;
         let pass = times.first().context("the device has no timestamps")?;
         let found = self.hits.read()?.iter().map(|h| (h.t, h.triangle)).collect();
@@ -186,14 +199,28 @@ fn main() -> Result<()> {
         return Ok(());
     };
     let rounds = std::env::args().nth(1).map_or(Ok(7), |n| n.parse()).context("ROUNDS is a number")?;
+    let gpu = Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), ..DeviceOptions::default() })?;
+    let Launch { side, per_thread } = match std::env::args().nth(2).as_deref() {
+        Some("cpu") => CPU,
+        Some("gpu") => GPU,
+        None if gpu.info().kind == DeviceKind::Cpu => CPU,
+        None => GPU,
+        Some(other) => bail!("\"{other}\" is neither cpu nor gpu"),
+    };
     let small = |s: &mut Settings| (s.width, s.height, s.spp) = (16, 16, 1);
     let scene =
         Scene::load(&Path::new(&data).join("scenes/crytek-sponza/sponza.obj")).map(|scene| scene.with(small))?;
-    let rays: Vec<_> = (0..SIDE * SIDE).into_par_iter().filter_map(|i| bounce(&scene, i)).collect();
-    ensure!(rays.len() as u32 > SIDE * SIDE * 9 / 10, "the camera sees little of the scene");
+    let rays: Vec<_> = (0..side * side).into_par_iter().filter_map(|i| bounce(&scene, side, i)).collect();
+    ensure!(rays.len() as u32 > side * side * 9 / 10, "the camera sees little of the scene");
     let host = Host::new(&scene, &rays)?;
-    let mut device = Device::new(&scene, &rays)?;
-    println!("{}: {} triangles, {} rays, median of {rounds}", device.gpu.info().name, host.triangles.len(), rays.len());
+    let mut device = Device::new(gpu, &scene, &rays, per_thread)?;
+    let (info, threads) = (device.gpu.info().clone(), device.threads());
+    println!("{}: {} triangles, {} rays, median of {rounds}", info.name, host.triangles.len(), rays.len());
+    println!(
+        "{threads} rays in flight at most, in {} subgroups of {}; each thread traces {per_thread}, one after the other",
+        threads.div_ceil(info.subgroup_size),
+        info.subgroup_size
+    );
     compare("closest", &host, &mut device, rounds, false)?;
     compare("any", &host, &mut device, rounds, true)
 }

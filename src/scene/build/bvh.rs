@@ -1,4 +1,4 @@
-//! Eight-way compressed BVHs (Ylitie et al. 2017) by obvhs: PLOC (Meister and Bittner 2018) and reinsertion. Triangles
+//! Eight-way compressed BVHs (Ylitie et al. 2017) of two-way trees by obvhs: PLOC (Meister and Bittner 2018) and reinsertion. Triangles
 //! and their shading are put in leaf order; child and primitive indices are made global, so one array holds all levels.
 use super::geometry::{self, Geometry};
 use crate::layout::{BvhNode, Instance, TRAVERSAL_STACK, Triangle};
@@ -8,22 +8,20 @@ use obvhs::Boundable;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::cwbvh::CwBvh;
-use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
-use obvhs::cwbvh::node::CwBvhNode;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+use rayon::prelude::*;
 use std::collections::HashSet;
 use std::ops::Range;
+use wide::Wide;
 
 mod clusters;
 mod level;
 mod refit;
 mod shallow;
+mod wide;
 
 pub use refit::refit;
 
-/// Triangles in a leaf; the node format holds up to 3.
-const LEAF: u32 = 3;
 /// Relative growth of every box. Quantisation in the builder and slabs in the kernel round at 2^-24: this keeps their
 /// errors from opening gaps between boxes that share a face.
 const GROWTH: f32 = 1.0 / (1 << 21) as f32;
@@ -139,9 +137,8 @@ pub fn build<T: Boundable + Sync>(items: &[T], first: u32, nodes: &mut Vec<BvhNo
         nodes.push(BvhNode::default()); // eight empty children: every ray misses
         return (root, Vec::new());
     }
-    let bvh = compressed(items);
-    let (mut built, mut order): (Vec<_>, _) = (bvh.nodes.iter().map(node_of).collect(), bvh.primitive_indices);
-    if levels < LEVELS && depth(&built, 0) > levels {
+    let Wide { nodes: mut built, mut order, levels: found } = compressed(items);
+    if found > levels {
         let boxes: Vec<_> = items.iter().map(Boundable::aabb).collect();
         (built, order) = shallow::build(&boxes);
     }
@@ -155,60 +152,46 @@ pub fn build<T: Boundable + Sync>(items: &[T], first: u32, nodes: &mut Vec<BvhNo
     (root, order)
 }
 
-fn node_of(n: &CwBvhNode) -> BvhNode {
-    let [x, y, z] = n.e;
-    BvhNode {
-        p: n.p.into(),
-        e_imask: u32::from_le_bytes([x, y, z, n.imask]),
-        child_base: n.child_base_idx,
-        primitive_base: n.primitive_base_idx,
-        meta: bytemuck::cast(n.child_meta),
-        min_x: bytemuck::cast(n.child_min_x),
-        max_x: bytemuck::cast(n.child_max_x),
-        min_y: bytemuck::cast(n.child_min_y),
-        max_y: bytemuck::cast(n.child_max_y),
-        min_z: bytemuck::cast(n.child_min_z),
-        max_z: bytemuck::cast(n.child_max_z),
-        ..Default::default()
-    }
-}
-
 /// Search distance 6, then reinsertion. On Crytek Sponza, reinserting 10 % of the nodes instead of 2 % builds in 0.42 s
 /// instead of 0.21 s and visits 5 % fewer nodes per ray (Sibenik 4 %, a 100k dragon 3 %); larger search distances visit
 /// no fewer. Meshes so large that loading takes seconds keep to 2 %.
-fn compressed<T: Boundable + Sync>(items: &[T]) -> CwBvh {
+fn compressed<T: Boundable + Sync>(items: &[T]) -> Wide {
     let clusters = Clusters::new(items);
-    let mut bvh2 = {
-        let boxes = clusters.boxes(items);
-        let indices = (0..boxes.len() as u32).collect();
-        let mut builder = PlocBuilder::with_capacity(boxes.len());
-        builder.build(PlocSearchDistance::Low, &boxes, indices, SortPrecision::U64, 2)
+    let mut bvh2 = match &clusters {
+        Some(clusters) => paired(&clusters.boxes(items)),
+        None => paired(items),
     };
     let share = if items.len() > 1_000_000 { 0.02 } else { 0.1 };
     ReinsertionOptimizer::default().run(&mut bvh2, share, None);
     bvh2.parents = Vec::new();
-    clusters.unfold(&mut bvh2, items);
+    if let Some(clusters) = clusters {
+        clusters.unfold(&mut bvh2, items);
+    }
     collapsed(&mut bvh2)
 }
 
+/// The two-way tree of PLOC.
+fn paired<T: Boundable + Sync>(items: &[T]) -> Bvh2 {
+    let indices = (0..items.len() as u32).collect();
+    let mut builder = PlocBuilder::with_capacity(items.len());
+    builder.build(PlocSearchDistance::Low, items, indices, SortPrecision::U64, 2)
+}
+
 /// Eight-way nodes of at most [`LEVELS`] levels: subtrees that are too deep are replaced by balanced ones, ever nearer to the root.
-fn collapsed(bvh2: &mut Bvh2) -> CwBvh {
+fn collapsed(bvh2: &mut Bvh2) -> Wide {
     for from in [32, 16, 8, 0] {
         // Eight children are seven levels deep at most, and a leaf of three triangles two.
-        if level::height(bvh2) <= 7 * LEVELS + 2 {
-            let bvh = bvh2_to_cwbvh(bvh2, LEAF, true, false);
-            if depth(&bvh.nodes.iter().map(node_of).collect::<Vec<_>>(), 0) <= LEVELS {
-                return bvh;
-            }
+        match wide::collapse(bvh2, 7 * LEVELS + 2) {
+            Some(wide) if wide.levels <= LEVELS => return wide,
+            _ => level::level(bvh2, from, if from == 0 { 0 } else { HALVED }),
         }
-        level::level(bvh2, from, if from == 0 { 0 } else { HALVED });
     }
-    bvh2_to_cwbvh(bvh2, LEAF, true, false)
+    wide::collapse(bvh2, usize::MAX).expect("any tree is within so many levels")
 }
 
 /// Puts items in leaf order.
-pub fn reorder<T: Copy>(items: &mut [T], order: &[u32]) {
-    let sorted: Vec<T> = order.iter().map(|&i| items[i as usize]).collect();
+pub fn reorder<T: Copy + Send + Sync>(items: &mut [T], order: &[u32]) {
+    let sorted: Vec<T> = order.par_iter().map(|&i| items[i as usize]).collect();
     items.copy_from_slice(&sorted);
 }
 

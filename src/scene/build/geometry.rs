@@ -5,7 +5,8 @@ use crate::layout::{NONE, SPHERE, SPHERE_INWARD, SPHERE_MIRRORED, Shading, Trian
 use crate::scene::MAX_COORDINATE;
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::ops::AddAssign;
+use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 
 /// Triangles and, once one of them needs it, their shading records. All meshes of a scene share one.
 #[derive(Debug, Default)]
@@ -72,6 +73,18 @@ pub struct Repairs {
     pub bad_normals: usize,
     /// Triangles whose texture coordinates are not finite: set to zero.
     pub bad_uvs: usize,
+}
+
+impl AddAssign for Repairs {
+    fn add_assign(&mut self, other: Self) {
+        let Self { not_finite, no_area, copies, no_normals, bad_normals, bad_uvs } = other;
+        self.not_finite += not_finite;
+        self.no_area += no_area;
+        self.copies += copies;
+        self.no_normals += no_normals;
+        self.bad_normals += bad_normals;
+        self.bad_uvs += bad_uvs;
+    }
 }
 
 impl Repairs {
@@ -156,15 +169,29 @@ impl Geometry {
         Ok(())
     }
 
+    /// Adds what another one holds.
+    pub fn append(&mut self, other: Self) {
+        let (triangles, words) = (self.triangles.len(), self.attributes.len() as u32);
+        self.triangles.extend_from_slice(&other.triangles);
+        self.attributes.extend(other.attributes);
+        if self.shading.is_empty() && other.shading.is_empty() {
+            return;
+        }
+        self.shading.resize(triangles, plain());
+        let first = |s: &Shading| if s.attributes == 0 { 0 } else { words + s.first };
+        self.shading.extend(other.shading.iter().map(|s| Shading { first: first(s), ..*s }));
+        self.shading.resize(self.triangles.len(), plain());
+    }
+
     /// Drops triangles from `start` on that equal an earlier one of them in all but number and object; returns how many.
     /// A duplicate lamp would be sampled twice as often as rays hit it.
     pub fn drop_copies(&mut self, start: usize) -> usize {
         let shading = |i: usize| self.shading.get(i).map(|s| Shading { first: 0, ..*s });
         let all = |i: usize| (Triangle { primitive: 0, object: 0, ..self.triangles[i] }, shading(i));
         let key = |i: usize| {
-            let ((triangle, shading), mut hasher) = (all(i), DefaultHasher::new());
-            (bytemuck::bytes_of(&triangle), shading.as_ref().map(bytemuck::bytes_of)).hash(&mut hasher);
-            (hasher.finish(), i as u32)
+            let (triangle, shading) = all(i);
+            let seed = shading.map_or(0, |s| xxh3_64(bytemuck::bytes_of(&s)));
+            (xxh3_64_with_seed(bytemuck::bytes_of(&triangle), seed), i as u32)
         };
         let mut keys: Vec<_> = (start..self.triangles.len()).into_par_iter().map(key).collect();
         keys.par_sort_unstable();
@@ -208,8 +235,7 @@ impl Geometry {
             if normal == FLAT && uv.is_none() && attributes == 0 {
                 return;
             }
-            let flat = Shading { normal: FLAT, ..Shading::default() };
-            self.shading = vec![flat; self.triangles.len()];
+            self.shading = vec![plain(); self.triangles.len()];
         }
         let [uv0, uv1, uv2] = uv.unwrap_or_default().map(|uv| uv.to_array());
         let first = if attributes == 0 { 0 } else { first };
@@ -235,6 +261,11 @@ pub fn radius(t: &Triangle) -> Option<f32> {
 
 /// The code of a triangle without vertex normals.
 pub const FLAT: [u32; 3] = [NONE; 3];
+
+/// The record of a triangle of which nothing else is known.
+fn plain() -> Shading {
+    Shading { normal: FLAT, ..Shading::default() }
+}
 
 /// Unit normal by the right-hand rule, or `None` where rounding leaves no area (below 1e-12 of the longest edge squared).
 fn face_normal(p: [Vec3; 3]) -> Option<Vec3> {

@@ -126,11 +126,13 @@ impl<'a> Sources<'a> {
     /// # Errors
     /// With the nearest name, when there is none of that name.
     pub fn material(&self, name: &str, place: &str) -> Result<u32> {
-        let known = self.library.tables.keys().map(String::as_str);
-        match (self.library.tables.get(name), description::nearest(name, known)) {
-            (Some(&index), _) => Ok(index),
-            (None, Some(near)) => Err(self.at(place, format!("no material \"{name}\": did you mean \"{near}\"?"))),
-            (None, None) => Err(self.at(place, format!("no material \"{name}\": add a [[material]] table"))),
+        if let Some(&index) = self.library.tables.get(name) {
+            return Ok(index);
         }
+        let remedy = match description::nearest(name, self.library.tables.keys().map(String::as_str)) {
+            Some(near) => format!("did you mean \"{near}\"?"),
+            None => "add a [[material]] table".to_owned(),
+        };
+        Err(self.at(place, format!("no material \"{name}\": {remedy}")))
     }
 }

@@ -12,12 +12,17 @@ use crate::scene::description::{self, MeshTable};
 use crate::scene::load::material::has_normal_map;
 use crate::scene::load::obj::ObjFile;
 use crate::scene::load::obj_part::Part;
+use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
 
 /// Bytes that a triangle takes while the hierarchy over it is built, with what it is made of and its shading: 316 to build.
 const BYTES_OF_TRIANGLE: u64 = 400;
+
+/// Triangles that a thread places at a time, and how many such parts are placed before they are put together.
+const PART: usize = 1 << 14;
+const PARTS: usize = 64;
 
 /// A mesh in the triangle array: where, and how it is called.
 pub struct Stored {
@@ -253,6 +258,7 @@ impl<'a> Addition<'a> {
         Ok(names)
     }
 
+    /// Parts of the mesh are placed in parallel, so many at a time that they take little memory beside what they become.
     fn add_mesh(
         &self,
         geometry: &mut Geometry,
@@ -260,8 +266,30 @@ impl<'a> Addition<'a> {
         first: Tag,
         repairs: &mut Repairs,
     ) -> std::result::Result<(), TooFar> {
-        for (t, triangle) in (0..).zip(mesh.indices.as_chunks().0) {
-            let triangle: [usize; 3] = triangle.map(|i| i as usize);
+        let parts: Vec<_> = mesh.indices.as_chunks().0.chunks(PART).zip(0..).collect();
+        for parts in parts.chunks(PARTS) {
+            let tag = |part: u32| Tag { primitive: first.primitive + part * PART as u32, ..first };
+            let placed = parts.par_iter().map(|&(triangles, part)| self.place(mesh, triangles, tag(part)));
+            for part in placed.collect::<Vec<_>>() {
+                let (part, found) = part?;
+                geometry.append(part);
+                *repairs += found;
+            }
+        }
+        Ok(())
+    }
+
+    /// Places triangles of a mesh, the first of which is `first`.
+    fn place(
+        &self,
+        mesh: &Mesh,
+        triangles: &[[u32; 3]],
+        first: Tag,
+    ) -> std::result::Result<(Geometry, Repairs), TooFar> {
+        let (mut geometry, mut repairs) = (Geometry::default(), Repairs::default());
+        geometry.triangles.reserve_exact(triangles.len());
+        for (t, triangle) in (0..).zip(triangles) {
+            let triangle = triangle.map(|i| i as usize);
             let extras = Extras {
                 colors: corners(&mesh.colors, triangle),
                 uvs: corners(&mesh.uvs2, triangle).filter(|_| self.second),
@@ -273,9 +301,9 @@ impl<'a> Addition<'a> {
                 uv: corners(&mesh.uvs, triangle),
                 extras,
             };
-            geometry.push(&c, Tag { primitive: first.primitive + t, ..first }, &self.placement, repairs)?;
+            geometry.push(&c, Tag { primitive: first.primitive + t, ..first }, &self.placement, &mut repairs)?;
         }
-        Ok(())
+        Ok((geometry, repairs))
     }
 }
 

@@ -1,10 +1,10 @@
 //! Reads files to meshes, pictures and materials, one module for each format.
+pub mod blocks;
 pub mod environment;
 pub mod find;
 pub mod gltf;
 pub mod include;
 pub mod library;
-pub mod lines;
 pub mod mapping;
 pub mod material;
 pub mod mesh_file;
@@ -13,6 +13,7 @@ pub mod metallic;
 pub mod mtl;
 pub mod mtl_material;
 pub mod obj;
+pub mod obj_block;
 pub mod obj_part;
 pub mod ply;
 pub mod texture;

@@ -1,17 +1,18 @@
-//! OBJ files: statements become meshes line by line, so that every mistake has its line.
+//! OBJ files: blocks of statements, parsed in parallel, become meshes in the order of the file. Every mistake has its line.
+use super::blocks::Blocks;
 use super::library::{self, Library};
-use super::lines::Lines;
+use super::obj_block::{Checked, Indices, NO_INDEX, ObjBlock, Statement};
 use super::obj_part::{Corner, NO_EXTRA, Part, PartBuilder};
 use crate::error::{Error, Result};
 use crate::image::input;
 use crate::layout::NONE;
 use crate::memory;
+use crate::threads;
+use rayon::prelude::*;
 use std::collections::{BTreeSet, HashMap, HashSet};
-use std::io::{BufRead, BufReader};
+use std::fmt::Display;
+use std::io::Read;
 use std::path::{Path, PathBuf};
-
-/// The value that a line holds, or a sentence about what is wrong with it.
-type Checked<T> = std::result::Result<T, String>;
 
 /// Contents of an OBJ file.
 #[derive(Debug, Default)]
@@ -28,26 +29,39 @@ pub struct ObjFile<'a> {
 /// # Errors
 /// [`Error::Input`] with file, line, what is wrong and what to do; [`Error::Memory`].
 pub fn load(path: &Path, library: &mut Library) -> Result<ObjFile<'static>> {
-    parse(path, BufReader::with_capacity(1 << 18, input::open(path)?), library)
+    parse(path, input::open(path)?, library)
 }
 
 /// [`load`] from any reader; `path` is for messages and for finding the MTL files.
 ///
 /// # Errors
 /// See [`load`].
-pub fn parse(path: &Path, reader: impl BufRead, library: &mut Library) -> Result<ObjFile<'static>> {
-    let mut lines = Lines::new(reader);
-    let mut parser = Parser::new(path, library);
-    while let Some(line) =
-        lines.next().map_err(|(number, what)| Error::input_at(path, format!("line {number}"), what))?
-    {
-        parser.line = line.number;
-        parser.statement(&line.text)?;
-        parser.ask()?;
-    }
-    Ok(parser.finish())
+pub fn parse(path: &Path, reader: impl Read + Send, library: &mut Library) -> Result<ObjFile<'static>> {
+    threads::within(|| read(Blocks::new(reader), Parser::new(path, library)))
 }
 
+fn read(mut blocks: Blocks<impl Read + Send>, mut parser: Parser) -> Result<ObjFile<'static>> {
+    let mut parsed: Vec<ObjBlock> = Vec::new();
+    loop {
+        let next = || {
+            let texts = blocks.take(BLOCKS * rayon::current_num_threads());
+            texts.par_iter().map(|text| ObjBlock::parse(text)).collect()
+        };
+        // While some blocks are put together, the next ones are parsed.
+        let (next, added) = rayon::join(next, || parsed.drain(..).try_for_each(|block| parser.add(block)));
+        added?;
+        parsed = next;
+        if parsed.is_empty() {
+            return match blocks.broken() {
+                Some(what) => Err(parser.wrong(parser.above.max(1), what)),
+                None => Ok(parser.finish()),
+            };
+        }
+    }
+}
+
+/// Blocks per thread that are parsed at a time.
+const BLOCKS: usize = 4;
 /// Estimated bytes of a parsed file from which on available memory is checked.
 const UNASKED: u64 = 1 << 26;
 /// Approximate bytes of a part with its name. The arrays below count twice, since arrays double when they are full.
@@ -59,8 +73,8 @@ const BYTES_OF_TRIANGLE: u64 = 2 * 12;
 struct Parser<'a> {
     path: &'a Path,
     library: &'a mut Library,
-    /// Number of the line that is being read.
-    line: usize,
+    /// Number of lines above the block that is being added.
+    above: usize,
     /// Values of `v`, `vt` and `vn` so far.
     positions: Vec<[f32; 3]>,
     uvs: Vec<[f32; 2]>,
@@ -90,7 +104,7 @@ impl<'a> Parser<'a> {
             path,
             names: library.tables.clone(),
             library,
-            line: 0,
+            above: 0,
             positions: Vec::new(),
             uvs: Vec::new(),
             normals: Vec::new(),
@@ -107,71 +121,58 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Statements that a path tracer does not need, such as lines and points, are skipped.
-    fn statement(&mut self, text: &str) -> Result<()> {
-        let text = text.trim_start();
-        let (key, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
-        let outcome = match key {
-            "v" => self.vertex(rest),
-            "vt" => self.uv(rest),
-            "vn" => self.normal(rest),
-            "f" => self.face(rest),
-            "o" | "g" => {
-                self.end_part();
-                self.part.rename(rest.trim());
-                Ok(())
-            }
-            "usemtl" => self.wear(rest.trim()),
-            "mtllib" => return self.read_libraries(rest.trim()),
-            _ => Ok(()),
-        };
-        outcome.map_err(|what| Error::input_at(self.path, format!("line {}", self.line), what))
+    fn wrong(&self, line: usize, what: impl Display) -> Error {
+        Error::input_at(self.path, format!("line {line}"), what)
     }
 
-    /// A fourth number is a weight that the others are divided by; five numbers or more end in a colour, which is dropped.
-    fn vertex(&mut self, rest: &str) -> Checked<()> {
-        let what = "a vertex needs three numbers after v";
-        let mut position = numbers(rest, what)?;
-        let mut more = rest.split_whitespace().skip(3);
-        if let (Some(w), None) = (more.next(), more.next()) {
-            let [w]: [f32; 1] = numbers(w, what)?;
-            if w == 0.0 {
-                return Err(mend("the fourth number of a vertex (w) is 0"));
-            }
-            position = position.map(|v: f32| v / w);
+    fn add(&mut self, block: ObjBlock) -> Result<()> {
+        let above = [self.positions.len(), self.uvs.len(), self.normals.len()];
+        self.positions.extend(block.positions);
+        self.uvs.extend(block.uvs);
+        self.normals.extend(block.normals);
+        let [v, vt, vn] = [self.positions.len(), self.uvs.len(), self.normals.len()];
+        self.held +=
+            BYTES_OF_VERTEX * (v - above[0]) as u64 + 16 * (vt - above[1]) as u64 + 24 * (vn - above[2]) as u64;
+        let mut corners = &block.corners[..];
+        for (line, statement) in block.statements {
+            let line = self.above + line as usize;
+            let done = match statement {
+                Statement::Face(count, defined) => {
+                    let (face, others) = corners.split_at(count as usize);
+                    corners = others;
+                    self.face(line, face, std::array::from_fn(|i| above[i] as i64 + i64::from(defined[i])))
+                }
+                Statement::Name(name) => Ok(self.rename(&name)),
+                Statement::Wear(name) => Ok(self.wear(name)),
+                Statement::Libraries(names) => {
+                    self.read_libraries(names)?;
+                    Ok(())
+                }
+            };
+            done.map_err(|what| self.wrong(line, what))?;
         }
-        self.positions.push(position);
-        self.held += BYTES_OF_VERTEX;
-        Ok(())
+        if let Some((line, what)) = block.mistake {
+            return Err(self.wrong(self.above + line as usize, what));
+        }
+        self.above += block.lines as usize;
+        self.ask()
     }
 
-    fn uv(&mut self, rest: &str) -> Checked<()> {
-        self.uvs.push(numbers(rest, "a texture coordinate needs two numbers after vt")?);
-        self.held += 16;
-        Ok(())
-    }
-
-    fn normal(&mut self, rest: &str) -> Checked<()> {
-        self.normals.push(numbers(rest, "a normal needs three numbers after vn")?);
-        self.held += 24;
-        Ok(())
+    fn rename(&mut self, name: &str) {
+        self.end_part();
+        self.part.rename(name);
     }
 
     /// The corners of a face have the texture coordinates (normals) that all of them have, or none.
-    fn face(&mut self, rest: &str) -> Checked<()> {
+    fn face(&mut self, line: usize, written: &[Indices], defined: [i64; 3]) -> Checked<()> {
         self.corners.clear();
-        for word in rest.split_ascii_whitespace() {
-            let corner = self.corner(word)?;
-            self.corners.push(corner);
+        for indices in written {
+            self.corners.push(corner(indices, defined)?);
         }
-        match self.corners.len() {
-            0 => return Err("the face names no vertices: delete the line".into()),
-            1 | 2 => {
-                let (count, first) = self.short_faces;
-                self.short_faces = (count + 1, if count == 0 { self.line } else { first });
-                return Ok(());
-            }
-            _ => {}
+        if self.corners.len() < 3 {
+            let (count, first) = self.short_faces;
+            self.short_faces = (count + 1, if count == 0 { line } else { first });
+            return Ok(());
         }
         let has = [1, 2].map(|extra| self.corners.iter().all(|corner| corner[extra] != NO_EXTRA));
         if self.part.differs(has) {
@@ -182,47 +183,21 @@ impl<'a> Parser<'a> {
         Ok(())
     }
 
-    /// The indices of `v/vt/vn`, from 0 on. Negative ones count back from the last one defined.
-    fn corner(&self, word: &str) -> Checked<Corner> {
-        const KINDS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
-        let defined = [self.positions.len(), self.uvs.len(), self.normals.len()];
-        let mut corner = [NO_EXTRA; 3];
-        for (i, part) in word.split('/').enumerate() {
-            if part.is_empty() && i > 0 {
-                continue;
-            }
-            let count = *defined.get(i).ok_or_else(|| format!("\"{word}\" has more than two slashes"))? as i64;
-            let index: i64 = part.parse().map_err(|_| format!("\"{word}\" is no vertex of a face"))?;
-            if index == 0 || index > count || index < -count {
-                let what = format!("the face uses {} {index}, but {count} are defined above it", KINDS[i]);
-                return Err(format!("{what}: export the file again"));
-            }
-            let place = if index > 0 { index - 1 } else { count + index };
-            corner[i] = u32::try_from(place).map_err(|_| "the file has more than 2^32 vertices: split it")?;
-        }
-        Ok(corner)
-    }
-
-    fn wear(&mut self, name: &str) -> Checked<()> {
-        if name.is_empty() {
-            return Err(mend("usemtl names no material"));
-        }
-        if !self.worn.contains(name) {
-            self.worn.insert(name.to_owned());
-        }
-        let material = self.names.get(name).copied().unwrap_or(NONE);
+    fn wear(&mut self, name: String) {
+        let material = self.names.get(&name).copied().unwrap_or(NONE);
+        self.worn.insert(name);
         if self.part.material != material {
             self.end_part();
             self.part.material = material;
         }
-        Ok(())
     }
 
-    fn read_libraries(&mut self, statement: &str) -> Result<()> {
-        if !self.statements.insert(statement.to_owned()) {
+    fn read_libraries(&mut self, statement: String) -> Result<()> {
+        if self.statements.contains(&statement) {
             return Ok(());
         }
-        let (found, missing) = library::find(self.path, statement);
+        let (found, missing) = library::find(self.path, &statement);
+        self.statements.insert(statement);
         self.missing.extend(missing);
         for path in found {
             if self.libraries.insert(path.canonicalize().unwrap_or_else(|_| path.clone())) {
@@ -247,7 +222,7 @@ impl<'a> Parser<'a> {
         }
         self.asked = 2 * self.held;
         let about =
-            |lack| Error::Memory(format!("{}, line {}: {lack}; split the file", self.path.display(), self.line));
+            |lack| Error::Memory(format!("{}, line {}: {lack}; split the file", self.path.display(), self.above));
         memory::check(self.held).map_err(about)
     }
 
@@ -276,17 +251,19 @@ impl<'a> Parser<'a> {
     }
 }
 
-/// The first numbers of a statement.
-fn numbers<const N: usize>(rest: &str, what: &str) -> Checked<[f32; N]> {
-    let (mut words, mut found) = (rest.split_whitespace(), [0.0; N]);
-    for number in &mut found {
-        *number = words.next().and_then(|word| word.parse().ok()).ok_or_else(|| mend(what))?;
+/// The places of what a corner refers to, from 0 on, where so many are defined. Negative indices count back from the last one.
+fn corner(indices: &Indices, defined: [i64; 3]) -> Checked<Corner> {
+    const KINDS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
+    let mut corner = [NO_EXTRA; 3];
+    for (i, (&index, count)) in indices.iter().zip(defined).enumerate().filter(|(_, (index, _))| **index != NO_INDEX) {
+        if index == 0 || index > count || index < -count {
+            let what = format!("the face uses {} {index}, but {count} are defined above it", KINDS[i]);
+            return Err(format!("{what}: export the file again"));
+        }
+        let place = if index > 0 { index - 1 } else { count + index };
+        corner[i] = u32::try_from(place).map_err(|_| "the file has more than 2^32 vertices: split it")?;
     }
-    Ok(found)
-}
-
-fn mend(what: &str) -> String {
-    format!("{what}: mend the line or export the file again")
+    Ok(corner)
 }
 
 /// The first names of a list, and how many more there are.

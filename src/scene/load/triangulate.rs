@@ -14,11 +14,14 @@ pub struct Triangulator {
     earcut: Earcut<f64>,
     refiner: Refiner,
     corners: Vec<u32>,
+    points: Vec<DVec3>,
+    flat: Vec<[f64; 2]>,
 }
 
 impl Default for Triangulator {
     fn default() -> Self {
-        Self { earcut: Earcut::new(), refiner: Refiner::new(), corners: Vec::new() }
+        let (corners, points, flat) = Default::default();
+        Self { earcut: Earcut::new(), refiner: Refiner::new(), corners, points, flat }
     }
 }
 
@@ -30,11 +33,11 @@ impl Triangulator {
             triangles.extend(face);
             return;
         }
-        let flat = flattened(positions, face);
+        self.flatten(positions, face);
         self.corners.clear();
-        if (face.len() > FAN || !is_convex(&flat)) && face.len() <= MOST_CORNERS {
-            self.earcut.earcut_slice(&flat, &[], &mut self.corners);
-            self.refiner.refine(&mut self.corners, &flat);
+        if (face.len() > FAN || !is_convex(&self.flat)) && face.len() <= MOST_CORNERS {
+            self.earcut.earcut_slice(&self.flat, &[], &mut self.corners);
+            self.refiner.refine(&mut self.corners, &self.flat);
         }
         // Of a face without area (as a whole: it may cross itself) nothing may be left.
         match self.corners.is_empty() {
@@ -42,21 +45,23 @@ impl Triangulator {
             false => triangles.extend(self.corners.iter().map(|&corner| face[corner as usize])),
         }
     }
-}
 
-/// The corners seen along the face's normal, counter-clockwise as a whole.
-fn flattened(positions: &[[f32; 3]], face: &[u32]) -> Vec<[f64; 2]> {
-    let point = |&i: &u32| DVec3::from(positions[i as usize].map(f64::from));
-    let first = point(&face[0]);
-    let points: Vec<DVec3> = face.iter().map(|i| point(i) - first).collect();
-    let normal: DVec3 = points.windows(2).map(|w| w[0].cross(w[1])).sum();
-    let size = normal.abs();
-    let drop_axis = |p: &DVec3| match size.max_element() {
-        m if m == size.x => [p.y, p.z * normal.x.signum()],
-        m if m == size.y => [p.z, p.x * normal.y.signum()],
-        _ => [p.x, p.y * normal.z.signum()],
-    };
-    points.iter().map(drop_axis).collect()
+    /// The corners seen along the face's normal, counter-clockwise as a whole.
+    fn flatten(&mut self, positions: &[[f32; 3]], face: &[u32]) {
+        let point = |&i: &u32| DVec3::from(positions[i as usize].map(f64::from));
+        let first = point(&face[0]);
+        self.points.clear();
+        self.points.extend(face.iter().map(|i| point(i) - first));
+        let normal: DVec3 = self.points.windows(2).map(|w| w[0].cross(w[1])).sum();
+        let size = normal.abs();
+        let drop_axis = |p: &DVec3| match size.max_element() {
+            m if m == size.x => [p.y, p.z * normal.x.signum()],
+            m if m == size.y => [p.z, p.x * normal.y.signum()],
+            _ => [p.x, p.y * normal.z.signum()],
+        };
+        self.flat.clear();
+        self.flat.extend(self.points.iter().map(drop_axis));
+    }
 }
 
 /// Whether every corner turns left.

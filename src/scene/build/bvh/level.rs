@@ -4,11 +4,6 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 
-/// Number of levels below the root.
-pub fn height(bvh: &Bvh2) -> usize {
-    Subtree::of(bvh, 0).height
-}
-
 /// Halves every subtree that begins at level `from` and is higher than `most`.
 pub fn level(bvh: &mut Bvh2, from: usize, most: usize) {
     let mut open = vec![(0, 0)];

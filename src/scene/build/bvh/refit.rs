@@ -4,8 +4,8 @@ use glam::Vec3A;
 use obvhs::aabb::Aabb;
 use std::ops::Range;
 
-/// Cost of a primitive where a node costs 1, as in the builder.
-const PRIMITIVE: f32 = 0.3;
+/// Cost of a primitive where a node costs 1.
+pub const PRIMITIVE: f32 = 0.3;
 /// Extents below this count as it: exponents stay those of normal floats.
 const LEAST_EXTENT: f32 = 1e-20;
 
@@ -58,7 +58,7 @@ fn area(of: &Aabb) -> f32 {
 
 /// Stores boxes on the grid of Ylitie et al. 2017, rounded outward: a cell is the least power of two of which 255 reach across.
 /// The rounding of the differences themselves, at 2^-24, is within what every box was grown by.
-fn quantise(node: &mut BvhNode, whole: &Aabb, children: &[Aabb; 8]) {
+pub fn quantise(node: &mut BvhNode, whole: &Aabb, children: &[Aabb; 8]) {
     let cells = ((whole.max - whole.min).max(Vec3A::splat(LEAST_EXTENT)) / 255.0).to_array();
     let exponents = cells.map(|cell| (cell.to_bits() >> 23) + u32::from(cell.to_bits() << 9 != 0));
     let inverse = Vec3A::from(exponents.map(|e| 1.0 / f32::from_bits(e << 23)));

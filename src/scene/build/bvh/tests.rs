@@ -212,6 +212,21 @@ fn concentric_and_coincident_triangles_among_others_are_found() {
     assert_eq!(compare(&geometry, &nodes, root, 0..5000, &mut random), 0);
 }
 
+/// The halves of a square have one box, and with it a centre.
+#[test]
+fn squares_lose_neither_half() {
+    let mut random = Random::new(10);
+    let corner = |i: u32, dx: u32, dy: u32| [(i % 80 + dx) as f32, (i / 80 + dy) as f32, 0.5].map(|v| v / 40.0 - 1.0);
+    let half = |i: u32, turn: u32| {
+        let (v1, primitive) = (corner(i, turn, 1 - turn), 2 * i + turn);
+        Triangle { v0: corner(i, 0, 0), v1, v2: corner(i, 1, 1), primitive, ..Triangle::default() }
+    };
+    let triangles = (0..6400).flat_map(|i| [0, 1].map(|turn| half(i, turn))).collect();
+    let mut geometry = Geometry { triangles, ..Geometry::default() };
+    let (nodes, root) = builds_flat(&mut geometry);
+    assert_eq!(compare(&geometry, &nodes, root, 0..12_800, &mut random), 0);
+}
+
 #[test]
 fn coincident_instances_make_a_flat_tree() {
     let mut random = Random::new(6);
