@@ -1,17 +1,20 @@
 //! `tallow cost`: measures how much time buys how much accuracy, by which method.
 mod filters;
+mod knobs;
 mod options;
 mod output;
 
 use super::{Exit, complain, fail_on_messages, interrupt, print, print_json};
 use crate::cost::document::SceneInfo;
 use crate::cost::grid::{self, Candidate};
-use crate::cost::{Document, Ended, Images, Plan, Watch, key, measure, reference};
+use crate::cost::{Document, Ended, Images, Plan, Watch, key, measure, others, reference};
+use crate::denoise::filter::{FilterSettings, Method};
 use crate::error::{Error, Result};
 use crate::gpu::{self, DeviceOptions, Gpu};
 use crate::render::settings::Settings;
 use crate::scene::{Scene, SceneFile};
 pub use options::Args;
+use options::Words;
 use output::{Folder, Shown, text};
 use std::path::Path;
 use std::sync::atomic::Ordering;
@@ -49,6 +52,7 @@ fn plan(args: &Args, path: &Path, scene: &Scene, base: Settings, candidates: Vec
         commands: candidates.iter().map(|candidate| command(path, &settings, candidate)).collect(),
         base,
         candidates,
+        others: args.points.as_deref().map_or(Ok(Vec::new()), others::read)?,
         repeats: args.repeats,
         order_seed: args.order_seed,
         budget: args.budget(),
@@ -101,22 +105,35 @@ fn finish(
 /// The scene, its settings with those of the options, and the points.
 fn candidates(args: &Args, path: &Path) -> Result<(Scene, Settings, Vec<Candidate>)> {
     let file = SceneFile::open(path)?;
-    let mut base = file.settings()?;
+    let (mut base, mut filters) = (file.settings()?, FilterSettings::default());
     args.film.apply(&mut base);
-    options::overrides(&args.with)?.apply(&mut base);
+    Words::parse(&args.with)?.apply(&mut base, &mut filters);
     base.validate()?;
-    let mut all = grid::grid(&base, &args.axes())?;
+    filters.validate()?;
+    let mut all = grid::grid(&base, &filters, &args.axes());
     all.iter().try_for_each(|candidate| candidate.settings.validate())?;
-    for variant in &args.variants {
-        let mut settings = base.clone();
-        options::overrides(variant)?.apply(&mut settings);
-        let varied = grid::grid(&settings, &args.axes())?;
-        all.extend(varied.into_iter().map(|mut candidate| {
-            candidate.method.options = vec![variant.trim().to_owned()];
-            candidate
-        }));
-    }
+    all.extend(varied(args, &all)?);
     Ok((file.load()?.scene, base, all))
+}
+
+/// Each point of the grid with the options of every variant, and with every step of the knobs that it has.
+fn varied(args: &Args, grid: &[Candidate]) -> Result<Vec<Candidate>> {
+    let mut all = Vec::new();
+    for text in &args.variants {
+        let words = Words::parse(text)?.checked_as_variant(text)?;
+        let before = all.len();
+        all.extend(grid.iter().filter_map(|point| point.varied(text.trim(), |s, filters| words.apply(s, filters))));
+        if all.len() == before {
+            return Err(Error::Usage(format!("\"{}\" changes no point of the grid", text.trim())));
+        }
+    }
+    for point in grid.iter().filter(|_| args.ablate) {
+        for step in knobs::steps(point) {
+            let words = Words::parse(&step)?;
+            all.extend(point.varied(&step, |s, filters| words.apply(s, filters)));
+        }
+    }
+    Ok(all)
 }
 
 fn open(args: &Args) -> Result<Gpu> {
@@ -133,13 +150,15 @@ fn no_scene() -> Error {
 }
 
 /// The command that renders a point's first image. Unfiltered points go to .hdr: for an .exr more layers are kept, which takes
-/// longer than what was measured.
+/// longer than what was measured. Filters with settings of their own run behind the render, to the same bits.
 fn command(scene: &Path, from: &Settings, candidate: &Candidate) -> String {
-    let words = grid::options(from, &candidate.settings).join(" ");
-    let scene = quoted(&scene.display().to_string());
-    match candidate.filter {
-        Some(filter) => format!("tallow render {scene} {words} --denoise {} -o point.exr", filter.name()),
-        None => format!("tallow render {scene} {words} -o point.hdr"),
+    let words = |words: Vec<String>| words.into_iter().map(|word| format!(" {word}")).collect::<String>();
+    let render = words(grid::options(&from.entries(), &candidate.settings.entries()));
+    let render = format!("tallow render {}{render}", quoted(&scene.display().to_string()));
+    let Some(filter) = candidate.filter.map(Method::name) else { return format!("{render} -o point.hdr") };
+    match &words(grid::options(&FilterSettings::default().entries(), &candidate.filter_settings.entries()))[..] {
+        "" => format!("{render} --denoise {filter} -o point.exr"),
+        own => format!("{render} -o noisy.exr && tallow filter noisy.exr --filter {filter}{own} -o point.exr"),
     }
 }
 

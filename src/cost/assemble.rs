@@ -1,6 +1,6 @@
 //! From a plan to its points, and from their runs to a document.
 use super::Images;
-use super::document::{Document, Machine, Measurement, Method, Point, SCHEMA, SceneInfo};
+use super::document::{Document, Machine, Measurement, Point, SCHEMA, SceneInfo};
 use super::findings::findings;
 use super::machine;
 use super::reference::Reference;
@@ -39,11 +39,6 @@ pub struct Outline<'a> {
     pub key: String,
 }
 
-/// A point that nothing is known of yet.
-pub fn unmeasured(method: Method, command: String) -> Point {
-    Point { method, command, runs: Vec::new(), warm_up: None, device_bytes: None, summary: None, failed: None }
-}
-
 /// Why a point failed, in one line.
 pub fn failure(e: &Error) -> String {
     e.to_string().replace('\n', " ")
@@ -51,7 +46,7 @@ pub fn failure(e: &Error) -> String {
 
 /// Whether runs are still to be made.
 pub fn lacks_runs(point: &Point, repeats: u32) -> bool {
-    point.failed.is_none() && point.runs.len() < repeats as usize
+    !point.is_other && point.failed.is_none() && point.runs.len() < repeats as usize
 }
 
 /// The document of what was measured so far, and how that ended.
@@ -68,14 +63,12 @@ pub fn document(
         (true, false) => Ended::Budget,
     };
     summarise(&mut points, CONFIDENCE);
-    let machine = &outline.machine;
-    let clocks = machine.cpu_mhz.zip(machine::cpu_mhz()).map(|([first, _], last)| [first, last]);
     let document = Document {
         schema: SCHEMA,
         complete: ended == Ended::Complete,
         software: machine::software(),
         scene: outline.scene.clone(),
-        machine: Machine { cpu_mhz: clocks, ..machine.clone() },
+        machine: outline.machine.clone(),
         reference: reference.info.clone(),
         measurement: Measurement {
             repeats,

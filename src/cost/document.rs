@@ -67,8 +67,11 @@ pub struct Machine {
     pub cpu: String,
     /// Logical cores that this process may use.
     pub cores: usize,
-    /// Clock of the first core in MHz at the beginning and at the end; `None` where the system does not tell.
+    /// Lowest and highest clock of the fastest core in MHz that was seen behind a run; `None` where the system does not tell.
     pub cpu_mhz: Option<[u64; 2]>,
+    /// The same of the device.
+    #[serde(default)]
+    pub device_mhz: Option<[u64; 2]>,
 }
 
 /// Where a reference comes from.

@@ -1,6 +1,6 @@
 //! The same for filters alone, on a given image of any renderer: its noise is what it is, so only times vary between runs.
 use super::Images;
-use super::assemble::{Ended, Outline, document, failure, images, unmeasured};
+use super::assemble::{Ended, Outline, document, failure, images};
 use super::document::{Document, Method, Point, Run, SceneInfo, WarmUp};
 use super::judge::judge;
 use super::machine;
@@ -62,6 +62,7 @@ pub fn measure_filters(gpu: &Gpu, plan: &FilterPlan, watch: &Watch) -> Result<(D
     let mut pictures: Vec<Option<Picture>> = plan.candidates.iter().map(|_| None).collect();
     let in_time = || plan.budget.is_none_or(|budget| begun.elapsed() < budget) && !(watch.stop)();
     let total = points.len() as u64 * u64::from(plan.repeats);
+    let mut machine = machine::describe(gpu.info());
     for round in 0..plan.repeats {
         let mut order: Vec<usize> = (0..points.len()).filter(|&i| points[i].failed.is_none()).collect();
         fastrand::Rng::with_seed(plan.order_seed.wrapping_add(round.into())).shuffle(&mut order);
@@ -77,12 +78,13 @@ pub fn measure_filters(gpu: &Gpu, plan: &FilterPlan, watch: &Watch) -> Result<(D
                 }
                 Err(e) => points[index].failed = Some(failure(&e)),
             }
+            machine.see_clocks(gpu.info());
             (watch.progress)("runs", points.iter().map(|point| point.runs.len() as u64).sum(), total);
         }
     }
     let outline = Outline {
         scene: &plan.scene,
-        machine: machine::describe(gpu.info()),
+        machine,
         seeds: (0..plan.repeats).collect(),
         order_seed: plan.order_seed,
         budget: plan.budget,
@@ -100,7 +102,7 @@ fn point(candidate: &FilterCandidate) -> Point {
         options: candidate.options.clone(),
         spp: 0,
     };
-    unmeasured(method, candidate.command.clone())
+    Point::unmeasured(method, candidate.command.clone())
 }
 
 /// One run: times without errors, costs of the first use, memory, and the image.

@@ -1,6 +1,8 @@
 //! What the data of a measurement say, in words. A statement is made only where the data tell; a tie is said to be one.
+use super::changes;
 use super::curve::Curve;
 use super::document::{Estimate, Finding, Method, Point, Verdict};
+use super::gain;
 use super::interval;
 use super::summary::curves;
 use super::words::{factor, list, milliseconds, number, percent};
@@ -12,14 +14,16 @@ const LEVELS: usize = 8;
 const GOALS: usize = 4;
 
 /// A method with a curve for every seed.
-struct Candidate {
-    name: String,
+pub(super) struct Candidate {
+    pub(super) name: String,
+    /// Whether it is uniform unfiltered rendering.
+    pub(super) is_baseline: bool,
     curves: BTreeMap<u32, Curve>,
 }
 
 impl Candidate {
     /// Times that the curves of all seeds cover.
-    fn times(&self) -> [f64; 2] {
+    pub(super) fn times(&self) -> [f64; 2] {
         let covered = |[low, high]: [f64; 2], [first, last]: [f64; 2]| [low.max(first), high.min(last)];
         self.curves.values().map(Curve::times).fold([0.0, f64::INFINITY], covered)
     }
@@ -30,12 +34,12 @@ impl Candidate {
     }
 
     /// Mean logarithm of what `read` finds on every curve.
-    fn mean(&self, read: &dyn Fn(&Curve) -> f64) -> f64 {
+    pub(super) fn mean(&self, read: &dyn Fn(&Curve) -> f64) -> f64 {
         self.curves.values().map(|curve| read(curve).ln()).sum::<f64>() / self.curves.len() as f64
     }
 
     /// Logarithms of the quotient of what `read` finds for this method and for another one, seed by seed.
-    fn against(&self, other: &Self, read: &dyn Fn(&Curve) -> f64) -> Vec<f64> {
+    pub(super) fn against(&self, other: &Self, read: &dyn Fn(&Curve) -> f64) -> Vec<f64> {
         let both = |(seed, curve): (&u32, &Curve)| Some((read(curve) / read(other.curves.get(seed)?)).ln());
         self.curves.iter().filter_map(both).collect()
     }
@@ -55,13 +59,16 @@ struct Ranking {
 pub fn findings(points: &[Point], confidence: f64) -> Vec<Finding> {
     let candidates = candidates(points);
     let mut all: Vec<Finding> = candidates.iter().filter_map(|c| halving(c, confidence)).collect();
+    all.extend(gain::finding(&candidates, confidence));
     all.extend(best_by_time(&candidates, confidence));
     all.extend(goals(&candidates, confidence));
     all.extend(singles(points, confidence));
+    all.extend(changes::findings(points, confidence));
     all
 }
 
-/// Methods whose points did not fail, in the order of the points.
+/// Methods whose points did not fail, in the order of the points. What has options and a single point is no method of its own: it is
+/// compared with the same point without them.
 fn candidates(points: &[Point]) -> Vec<Candidate> {
     let mut groups: Vec<(Method, Vec<&Point>)> = Vec::new();
     for point in points.iter().filter(|point| point.failed.is_none() && point.method.spp > 0) {
@@ -71,8 +78,12 @@ fn candidates(points: &[Point]) -> Vec<Candidate> {
             None => groups.push((method, vec![point])),
         }
     }
-    let candidate =
-        |(method, points): (Method, Vec<&Point>)| Candidate { name: method.name(), curves: curves(&points) };
+    let candidate = |(method, points): (Method, Vec<&Point>)| Candidate {
+        name: method.name(),
+        is_baseline: method.is_baseline(),
+        curves: curves(&points),
+    };
+    groups.retain(|(method, points)| method.options.is_empty() || points.len() > 1);
     groups.into_iter().map(candidate).filter(|candidate| !candidate.curves.is_empty()).collect()
 }
 
@@ -239,9 +250,9 @@ fn round_errors(candidates: &[Candidate]) -> Vec<f64> {
 }
 
 /// Comparison of points that do not depend on samples: filters of a given image, whose errors have no noise.
-fn singles(points: &[Point], confidence: f64) -> Vec<Finding> {
+fn singles(all: &[Point], confidence: f64) -> Vec<Finding> {
     let usable = |point: &&Point| point.failed.is_none() && point.method.spp == 0 && !point.runs.is_empty();
-    let points: Vec<&Point> = points.iter().filter(usable).collect();
+    let points: Vec<&Point> = all.iter().filter(usable).collect();
     let error = |point: &Point| point.runs[0].errors.relmse.unwrap_or(f64::INFINITY);
     let Some(best) = points.iter().copied().min_by(|a, b| error(a).total_cmp(&error(b))) else { return Vec::new() };
     let lowest = error(best);
@@ -251,7 +262,8 @@ fn singles(points: &[Point], confidence: f64) -> Vec<Finding> {
         [name] => clear(format!("{name} has the lowest relMSE, {}.", number(lowest))),
         _ => noisy(format!("{} have the same relMSE, {}.", list(&names), number(lowest))),
     }];
-    let others = points.iter().filter(|point| point.method != best.method && point.method.filter != "none");
+    let is_other = |point: &&&Point| point.method != best.method && point.method.filter != "none";
+    let others = points.iter().filter(is_other).filter(|point| changes::plain(all, point).is_none());
     found.extend(others.map(|point| beside(point, best, confidence)));
     found
 }

@@ -3,12 +3,9 @@
 use super::document::Method;
 use crate::allocate::{Placing, Policy};
 use crate::denoise::filter::{self, FilterSettings};
-use crate::error::{Error, Result};
 use crate::render::Outputs;
 use crate::render::settings::Settings;
-
-/// Most points of a grid.
-const MOST: usize = 1000;
+use crate::settings::entry::Entry;
 
 /// The lists that a grid is made of.
 #[derive(Clone)]
@@ -47,17 +44,16 @@ pub struct Shot {
     pub points: Vec<usize>,
 }
 
-/// All points of a grid, in the order of the lists. What the lists do not name is as in `base`.
-///
-/// # Errors
-/// [`Error::Usage`] for an empty list and too many points. Settings out of range become points that fail.
-pub fn grid(base: &Settings, axes: &Axes) -> Result<Vec<Candidate>> {
+/// All points of a grid, in the order of the lists. What the lists do not name is as in `base`, and filters have the settings
+/// `filters`. Settings out of range become points that fail.
+pub fn grid(base: &Settings, filters: &FilterSettings, axes: &Axes) -> Vec<Candidate> {
     let mut all: Vec<Candidate> = Vec::new();
     for &policy in &axes.allocate {
         for &filter in &axes.filters {
             for &rounds in &axes.rounds {
                 for &spp in &axes.spp {
-                    let candidate = candidate(base, policy, filter, [rounds, spp]);
+                    let candidate =
+                        Candidate { filter_settings: *filters, ..candidate(base, policy, filter, [rounds, spp]) };
                     if all.iter().all(|other| other.method != candidate.method) {
                         all.push(candidate);
                     }
@@ -65,10 +61,17 @@ pub fn grid(base: &Settings, axes: &Axes) -> Result<Vec<Candidate>> {
             }
         }
     }
-    match all.len() {
-        0 => Err(Error::Usage("the grid has no point: name at least one policy, filter and number of samples".into())),
-        n if n > MOST => Err(Error::Usage(format!("the grid has {n} points: choose at most {MOST}"))),
-        _ => Ok(all),
+    all
+}
+
+impl Candidate {
+    /// The same with other settings, as `change` makes them, and named by `option`. `None` if they are no others.
+    pub fn varied(&self, option: &str, change: impl FnOnce(&mut Settings, &mut FilterSettings)) -> Option<Self> {
+        let mut varied = self.clone();
+        change(&mut varied.settings, &mut varied.filter_settings);
+        let filters_alike = self.filter.is_none() || self.filter_settings == varied.filter_settings;
+        varied.method.options = vec![option.to_owned()];
+        (varied.settings != self.settings || !filters_alike).then_some(varied)
     }
 }
 
@@ -103,12 +106,17 @@ pub fn shots(candidates: &[Candidate]) -> Vec<Shot> {
     shots
 }
 
-/// Options of `tallow render` that turn `from` into `to`, such as `--spp 8`.
-pub fn options(from: &Settings, to: &Settings) -> Vec<String> {
-    let entries = from.entries().into_iter().zip(to.entries());
-    let changed = entries.filter(|(from, to)| from.value != to.value);
-    let word = |name: &str| if name == "policy" { "allocate".to_owned() } else { name.to_owned() };
-    changed.map(|(_, to)| format!("--{} {}", word(&to.name), to.value)).collect()
+/// Options of a command that turn settings with the entries `from` into those with the entries `to`, such as `--spp 8`.
+pub fn options(from: &[Entry], to: &[Entry]) -> Vec<String> {
+    let changed = from.iter().zip(to).filter(|(from, to)| from.value != to.value).map(|(_, to)| to);
+    let option = |Entry { name, value, is_switch, .. }: &Entry| match (name.as_str(), is_switch) {
+        ("policy", _) => format!("--allocate {value}"),
+        (_, true) => format!("--{name}"),
+        // A hyphen behind a space would begin an option.
+        _ if value.starts_with('-') => format!("--{name}={value}"),
+        _ => format!("--{name} {value}"),
+    };
+    changed.map(option).collect()
 }
 
 #[cfg(test)]
@@ -126,9 +134,13 @@ mod tests {
         }
     }
 
+    fn made(allocate: &[&str], filters: &[&str]) -> Vec<Candidate> {
+        grid(&Settings::default(), &FilterSettings::default(), &axes(allocate, filters))
+    }
+
     #[test]
     fn filters_share_renders_and_rounds_are_for_policies_that_learn() {
-        let all = grid(&Settings::default(), &axes(&["uniform", "both"], &["none", "atrous", "auto"])).unwrap();
+        let all = made(&["uniform", "both"], &["none", "atrous", "auto"]);
         assert_eq!(all.len(), 3 * 2 + 3 * 4);
         assert_eq!(all[0].method.label(), "uniform, 1 spp");
         assert_eq!(all[all.len() - 1].method.label(), "both + auto, 2 rounds, 4 spp");
@@ -136,13 +148,26 @@ mod tests {
         assert_eq!(shots.len(), 2 * 2 + 2 * 4);
         assert_eq!(shots[2].points, [2, 4], "atrous and auto at 1 spp");
         assert!(!shots[0].outputs.guides && shots[2].outputs.guides);
-        let empty = Axes { spp: Vec::new(), ..axes(&["both"], &["none"]) };
-        assert_eq!(grid(&Settings::default(), &empty).err().map(|e| e.exit_code()), Some(2));
     }
 
     #[test]
     fn options_are_those_that_differ() {
-        let all = grid(&Settings::default(), &axes(&["both"], &["none"])).unwrap();
-        assert_eq!(options(&Settings::default(), &all[3].settings), ["--spp 4", "--allocate both", "--rounds 2"]);
+        let all = made(&["both"], &["none"]);
+        let from = Settings::default().entries();
+        assert_eq!(options(&from, &all[3].settings.entries()), ["--spp 4", "--allocate both", "--rounds 2"]);
+        let darker = all[0].varied("", |s, _| s.allocate.variance.luminance_floor = -1.0).unwrap();
+        assert_eq!(options(&all[0].settings.entries(), &darker.settings.entries()), ["--luminance-floor=-1"]);
+        let changed = FilterSettings::default().with(|s| s.atrous.conserve_energy = true);
+        assert_eq!(options(&FilterSettings::default().entries(), &changed.entries()), ["--conserve-energy"]);
+    }
+
+    #[test]
+    fn what_changes_nothing_is_no_other_point() {
+        let all = made(&["uniform"], &["none", "atrous"]);
+        let fewer_levels = |_: &mut Settings, filters: &mut FilterSettings| filters.footprint.levels = 3;
+        assert!(all[0].varied("--levels 3", fewer_levels).is_none(), "nothing is filtered");
+        let varied = all[2].varied("--levels 3", fewer_levels).unwrap();
+        assert_eq!(varied.method.label(), "uniform + atrous, levels 3, 1 spp");
+        assert!(all[2].varied("--max-depth 8", |s, _| s.max_depth = 8).is_none(), "it is 8");
     }
 }

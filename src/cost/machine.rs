@@ -1,32 +1,35 @@
 //! What a measurement ran on.
 use super::document::{Machine, Software};
 use crate::gpu::DeviceInfo;
-use sysinfo::{CpuRefreshKind, RefreshKind, System};
+use crate::machine::{cpu, cpu_mhz, device_mhz};
 
-/// Describes a device and this host.
+/// Describes a device and this host; no clock was seen yet.
 pub fn describe(info: &DeviceInfo) -> Machine {
-    let system =
-        System::new_with_specifics(RefreshKind::nothing().with_cpu(CpuRefreshKind::nothing().with_frequency()));
     Machine {
         device: info.name.clone(),
         kind: info.kind.to_string(),
         driver: format!("{} {} {}", info.driver_name, info.driver_version, info.driver_info).trim().to_owned(),
-        cpu: crate::machine::cpu(),
+        cpu: cpu(),
         cores: std::thread::available_parallelism().map_or(1, usize::from),
-        cpu_mhz: clock(&system).map(|mhz| [mhz; 2]),
+        cpu_mhz: None,
+        device_mhz: None,
     }
 }
 
-/// The clock of the first core in MHz; `None` where the system does not tell.
-pub fn cpu_mhz() -> Option<u64> {
-    clock(&System::new_with_specifics(RefreshKind::nothing().with_cpu(CpuRefreshKind::nothing().with_frequency())))
+impl Machine {
+    /// Extends the ranges of the clocks to those of now, while the device has just been busy.
+    pub fn see_clocks(&mut self, info: &DeviceInfo) {
+        let extend = |range: &mut Option<[u64; 2]>, now: Option<u64>| {
+            let Some(now) = now else { return };
+            let [least, most] = range.unwrap_or([now; 2]);
+            *range = Some([least.min(now), most.max(now)]);
+        };
+        extend(&mut self.cpu_mhz, cpu_mhz());
+        extend(&mut self.device_mhz, device_mhz(info));
+    }
 }
 
 /// Describes this program.
 pub fn software() -> Software {
     Software { version: env!("CARGO_PKG_VERSION").to_owned(), commit: option_env!("TALLOW_COMMIT").map(str::to_owned) }
-}
-
-fn clock(system: &System) -> Option<u64> {
-    system.cpus().first().map(sysinfo::Cpu::frequency).filter(|&mhz| mhz > 0)
 }

@@ -1,12 +1,13 @@
 //! Measures a grid: the reference first, then rounds in which every point runs once, in an order that is random anew each time.
 use super::Images;
-use super::assemble::{Ended, Outline, document, failure, images, lacks_runs, unmeasured};
+use super::assemble::{Ended, Outline, document, failure, images, lacks_runs};
 use super::converge::Converging;
 use super::document::{Document, Point, Run};
 use super::grid::{Candidate, Shot, shots};
 use super::judge::judge;
 use super::machine;
-use super::plan::{Plan, Watch, check_room, key, seeds};
+use super::others;
+use super::plan::{self, Plan, Watch, key, seeds};
 use super::reference::Reference;
 use super::session::{Measured, Session};
 use crate::error::Result;
@@ -22,6 +23,7 @@ const REFERENCE_SHARE: u32 = 2;
 
 /// A measurement that is under way.
 struct Measuring<'a> {
+    gpu: &'a Gpu,
     plan: &'a Plan,
     watch: &'a Watch<'a>,
     outline: Outline<'a>,
@@ -44,7 +46,7 @@ pub fn measure(
     watch: &Watch,
 ) -> Result<(Document, Images, Ended)> {
     let begun = Instant::now();
-    check_room(plan)?;
+    plan::check(plan)?;
     let shots = shots(&plan.candidates);
     let outline = Outline {
         scene: &plan.scene,
@@ -55,6 +57,7 @@ pub fn measure(
         key: key(gpu, scene, plan),
     };
     let mut measuring = Measuring {
+        gpu,
         plan,
         watch,
         outline,
@@ -73,6 +76,7 @@ pub fn measure(
             growing.grow_below(&pilots, plan.reference_spp, limit, watch)?
         }
     };
+    measuring.add_others(&reference);
     measuring.rounds(&reference);
     measuring.missing_pictures();
     let Measuring { points, pictures, outline, .. } = measuring;
@@ -87,7 +91,7 @@ fn points(plan: &Plan, earlier: Option<Document>) -> Vec<Point> {
         let (method, command) = (candidate.method.clone(), command.clone());
         match earlier.iter().find(|known| known.method == method) {
             Some(known) => Point { failed: None, summary: None, command, ..known.clone() },
-            None => unmeasured(method, command),
+            None => Point::unmeasured(method, command),
         }
     };
     plan.candidates.iter().zip(&plan.commands).map(point).collect()
@@ -113,8 +117,17 @@ impl Measuring<'_> {
         pictures
     }
 
+    /// Puts the points of other renderers behind ours.
+    fn add_others(&mut self, reference: &Reference) {
+        for (point, picture) in others::judged(&self.plan.others, reference) {
+            self.points.push(point);
+            self.pictures.push(picture);
+        }
+    }
+
     fn rounds(&mut self, reference: &Reference) {
-        let total = (self.points.len() * self.plan.repeats as usize) as u64;
+        let ours = self.plan.candidates.len();
+        let total = (ours * self.plan.repeats as usize) as u64;
         for (round, seed) in seeds(&self.plan.base, self.plan.repeats).into_iter().enumerate() {
             let mut random = fastrand::Rng::with_seed(self.plan.order_seed.wrapping_add(round as u64));
             let mut order: Vec<usize> = (0..self.shots.len()).collect();
@@ -128,9 +141,10 @@ impl Measuring<'_> {
                 }
                 if !points.is_empty() {
                     let outcome = self.session.run(shot, seed, &points, self.watch.stop);
+                    self.outline.machine.see_clocks(self.gpu.info());
                     self.take(outcome, reference);
                 }
-                let done = self.points.iter().map(|point| point.runs.len() as u64).sum();
+                let done = self.points[..ours].iter().map(|point| point.runs.len() as u64).sum();
                 (self.watch.progress)("runs", done, total);
             }
             let (so_far, _) = document(&self.outline, self.points.clone(), reference, true);

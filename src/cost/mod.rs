@@ -7,16 +7,19 @@
 //!          scene   reference, given or rendered until it converges
 //! ```
 mod assemble;
+pub mod changes;
 mod converge;
 mod curve;
 pub mod document;
 pub mod filter_only;
 pub mod findings;
+mod gain;
 pub mod grid;
 pub mod interval;
 pub mod judge;
 mod machine;
 mod measure;
+pub mod others;
 mod parts;
 mod plan;
 mod point;

@@ -1,14 +1,19 @@
 //! What is to be measured, and how it is watched.
 use super::document::{Document, Method, SceneInfo};
 use super::grid::Candidate;
+use super::others::OtherRun;
 use super::reference::Reference;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::memory;
 use crate::render::settings::Settings;
 use crate::scene::{Fingerprint, Scene};
+use crate::settings::entry::Entry;
 use std::path::PathBuf;
 use std::time::Duration;
+
+/// Most points of a measurement.
+const MOST: usize = 1000;
 
 /// What is to be measured, and how.
 pub struct Plan {
@@ -20,6 +25,8 @@ pub struct Plan {
     pub candidates: Vec<Candidate>,
     /// Command lines of the points.
     pub commands: Vec<String>,
+    /// Runs of other renderers, to be seen beside ours.
+    pub others: Vec<OtherRun>,
     /// Runs of each point.
     pub repeats: u32,
     /// Seed of the random order.
@@ -49,12 +56,15 @@ pub fn key(gpu: &Gpu, scene: &Scene, plan: &Plan) -> String {
     let mut key = Fingerprint::default();
     let scene = scene.fingerprint([plan.base.width, plan.base.height]).map(|f| f.to_string()).unwrap_or_default();
     let methods: Vec<&Method> = plan.candidates.iter().map(|candidate| &candidate.method).collect();
+    let filters: Vec<_> =
+        plan.candidates.iter().map(|candidate| values(&candidate.filter_settings.entries())).collect();
     let given = plan.reference.as_ref().map(|reference| &reference.info);
     let info = gpu.info();
     let parts = [
         scene,
         text(&plan.base),
         text(&methods),
+        text(&filters),
         text(&given),
         text(&(plan.repeats, plan.order_seed)),
         text(&(&info.name, &info.driver_name, &info.driver_version)),
@@ -68,17 +78,29 @@ fn text(value: &impl serde::Serialize) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }
 
+fn values(settings: &[Entry]) -> Vec<String> {
+    settings.iter().map(|entry| entry.value.clone()).collect()
+}
+
 /// Seeds of the runs.
 pub fn seeds(base: &Settings, repeats: u32) -> Vec<u32> {
     (0..repeats).map(|i| base.seed.wrapping_add(i)).collect()
 }
 
-/// The pictures of all points, the reference and what judging takes must fit into memory.
+/// There must be points, and their pictures, the reference and what judging takes must fit into memory.
 ///
 /// # Errors
-/// [`Error::Memory`].
-pub fn check_room(plan: &Plan) -> Result<()> {
-    let pictures = plan.candidates.len() as u64 + 16;
+/// [`Error::Usage`] and [`Error::Memory`].
+pub fn check(plan: &Plan) -> Result<()> {
+    match plan.candidates.len() {
+        0 => {
+            let what = "the grid has no point: name at least one policy, filter and number of samples";
+            return Err(Error::Usage(what.to_owned()));
+        }
+        n if n > MOST => return Err(Error::Usage(format!("the grid has {n} points: choose at most {MOST}"))),
+        _ => {}
+    }
+    let pictures = (plan.candidates.len() + plan.others.len()) as u64 + 16;
     let bytes = plan.base.pixels() as u64 * size_of::<[f32; 3]>() as u64 * pictures;
     memory::check(bytes).map_err(|what| {
         Error::Memory(format!("a grid of {} points {what}: choose fewer, or a smaller film", plan.candidates.len()))

@@ -18,6 +18,17 @@ pub struct Point {
     pub summary: Option<Summary>,
     /// Why the point could not be measured, in one line; `None` for points that did not fail.
     pub failed: Option<String>,
+    /// Whether another renderer made its images: its times are wall times that were given.
+    #[serde(default)]
+    pub is_other: bool,
+}
+
+impl Point {
+    /// A point that nothing is known of yet.
+    pub fn unmeasured(method: Method, command: String) -> Self {
+        let (runs, warm_up, device_bytes, summary) = (Vec::new(), None, None, None);
+        Self { method, command, runs, warm_up, device_bytes, summary, failed: None, is_other: false }
+    }
 }
 
 /// The settings of a point. Points that differ only in `spp` belong to one method.
@@ -40,7 +51,8 @@ pub struct Method {
 pub struct Run {
     /// Seed of the random sequence.
     pub seed: u32,
-    /// Sum of all passes in milliseconds: by the device's timestamps, but for what runs on the host and says so in its name.
+    /// Sum of all passes in milliseconds: by the device's timestamps, but for what runs on the host and says so in its name. Of another
+    /// renderer, the wall time.
     pub gpu_ms: f64,
     /// Wall time of rendering and filtering in milliseconds, without reading results back and judging them.
     pub wall_ms: f64,
@@ -134,6 +146,21 @@ pub struct Summary {
     pub speed_up: Option<Factor>,
     /// relMSE of uniform unfiltered rendering in this point's GPU time, divided by this point's relMSE.
     pub error_gain: Option<Factor>,
+    /// What the point's options change; `None` for a point without options.
+    #[serde(default)]
+    pub change: Option<Change>,
+}
+
+/// Factors relative to the same point without its options, run by run of the same seed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Change {
+    /// Of GPU time.
+    pub time: Option<Estimate>,
+    /// Of relMSE.
+    pub relmse: Option<Estimate>,
+    /// Of relMSE times GPU time: an option that lowers it buys more accuracy than as much time for samples would, of a method whose
+    /// error is inversely proportional to time.
+    pub product: Option<Estimate>,
 }
 
 impl Method {

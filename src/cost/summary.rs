@@ -1,4 +1,5 @@
 //! From raw runs to summaries: medians, means, intervals, and factors relative to uniform unfiltered rendering.
+use super::changes;
 use super::curve::{Curve, Reading};
 use super::document::{Errors, Estimate, Factor, Pass, Point, Run, Summary};
 use super::interval;
@@ -13,6 +14,7 @@ pub fn summarise(points: &mut [Point], confidence: f64) {
     for point in points.iter_mut().filter(|point| !point.runs.is_empty()) {
         point.summary = Some(summary(&point.runs, &baseline, confidence));
     }
+    changes::fill_in(points, confidence);
 }
 
 /// The Pareto front of the medians: indices of points that no other point beats in both time and relMSE, the fastest first. Of
@@ -71,6 +73,7 @@ fn summary(runs: &[Run], baseline: &Baseline, confidence: f64) -> Summary {
             let Reading { value, extrapolated } = curve.error_at(run.gpu_ms);
             Reading { value: value / error, extrapolated }
         }),
+        change: None,
     }
 }
 

@@ -179,8 +179,8 @@ fn make_folder(folder: &Path) -> std::io::Result<()> {
 fn fits(data: &[u8], candidate: &Candidate) -> bool {
     let word = |at: usize| data.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     word(4) == Some(vk::PipelineCacheHeaderVersion::ONE.as_raw() as u32)
-        && word(8) == Some(candidate.vendor)
-        && word(12) == Some(candidate.id)
+        && word(8) == Some(candidate.info.vendor_id)
+        && word(12) == Some(candidate.info.device_id)
         && data.get(16..32) == Some(&candidate.cache_uuid)
 }
 
@@ -288,7 +288,7 @@ mod tests {
 
     /// A `VkPipelineCacheHeaderVersionOne` (length, version 1, vendor, device, 16 bytes of the driver), then some data.
     fn header(c: &Candidate) -> Vec<u8> {
-        let words = [32, vk::PipelineCacheHeaderVersion::ONE.as_raw() as u32, c.vendor, c.id];
+        let words = [32, vk::PipelineCacheHeaderVersion::ONE.as_raw() as u32, c.info.vendor_id, c.info.device_id];
         words.iter().flat_map(|w| w.to_le_bytes()).chain(c.cache_uuid).chain(*b"data").collect()
     }
 

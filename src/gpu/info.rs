@@ -114,6 +114,10 @@ pub struct DeviceInfo {
     pub name: String,
     /// Kind of device.
     pub kind: DeviceKind,
+    /// PCI number of its maker.
+    pub vendor_id: u32,
+    /// PCI number of the device among those of its maker.
+    pub device_id: u32,
     /// Whether host and device share one memory, so that the host writes buffers in place.
     pub unified: bool,
     /// Short name of the driver.
@@ -153,8 +157,6 @@ pub(super) struct Candidate {
     pub info: DeviceInfo,
     pub limits: vk::PhysicalDeviceLimits,
     pub cache_uuid: [u8; vk::UUID_SIZE],
-    pub vendor: u32,
-    pub id: u32,
     /// First queue family with compute and timestamps, or else the first with compute.
     pub queue_family: Option<u32>,
 }
@@ -193,6 +195,8 @@ pub(super) fn describe(instance: &ash::Instance, physical: vk::PhysicalDevice, q
     let info = DeviceInfo {
         name: text(basic.device_name_as_c_str().ok()),
         kind: DeviceKind::of(basic.device_type),
+        vendor_id: basic.vendor_id,
+        device_id: basic.device_id,
         unified: matches!(basic.device_type, vk::PhysicalDeviceType::CPU | vk::PhysicalDeviceType::INTEGRATED_GPU),
         driver_name: text(v12.driver_name_as_c_str().ok()),
         driver_info: text(v12.driver_info_as_c_str().ok()),
@@ -212,8 +216,7 @@ pub(super) fn describe(instance: &ash::Instance, physical: vk::PhysicalDevice, q
         missing: Features::supported(instance, physical, basic.api_version).missing(),
     };
     let (cache_uuid, limits) = (basic.pipeline_cache_uuid, basic.limits);
-    let (vendor, id) = (basic.vendor_id, basic.device_id);
-    Candidate { physical, info, limits, cache_uuid, vendor, id, queue_family }
+    Candidate { physical, info, limits, cache_uuid, queue_family }
 }
 
 /// Properties added by Vulkan 1.1 to 1.3. They are zero for a device below 1.3, which cannot be used and must not be

@@ -76,8 +76,8 @@ pub struct Plan {
 /// among, [`filter::find`] of `none` standing for no filter.
 ///
 /// # Errors
-/// [`Error::Usage`] for a target out of range or out of reach, for settings that place samples (the probe spreads them evenly), and
-/// for an empty list of methods; [`Error::Device`].
+/// [`Error::Usage`] for a target out of range or out of reach, for settings with a noise threshold, and for an empty list of methods;
+/// [`Error::Device`].
 pub fn plan(gpu: &Gpu, scene: &Scene, settings: &Settings, methods: &[Method], target: Target) -> Result<Plan> {
     check(settings, methods, target)?;
     let mut probe = Probe::new(gpu, scene, settings, methods)?;
@@ -122,11 +122,9 @@ fn check(settings: &Settings, methods: &[Method], target: Target) -> Result<()> 
     if !(value.is_finite() && value > 0.0) {
         return Err(Error::Usage(format!("{article} {name} of {value}: give a number above 0")));
     }
-    if !settings.allocate.is_even() {
-        let policy = settings.allocate.policy.name;
-        return Err(Error::Usage(format!(
-            "samples placed by \"{policy}\" cannot be planned: choose --allocate uniform"
-        )));
+    if settings.allocate.noise_threshold > 0.0 {
+        let what = "a noise threshold ends a render by itself: give it, or a time or an error";
+        return Err(Error::Usage(what.to_owned()));
     }
     if methods.is_empty() {
         return Err(Error::Usage("no method to choose among: name a filter, or none".to_owned()));

@@ -35,7 +35,7 @@ pub struct Measured {
 pub struct Level {
     /// Samples per pixel.
     pub spp: u32,
-    /// GPU milliseconds before the first sample.
+    /// GPU milliseconds that more samples do not add to: before the first sample, and of deciding where samples go.
     pub start_ms: f64,
     /// GPU milliseconds of all samples.
     pub samples_ms: f64,
@@ -46,6 +46,8 @@ pub struct Level {
 /// A warm renderer for the probes of one scene.
 pub struct Probe<'a> {
     gpu: &'a Gpu,
+    scene: &'a Scene,
+    /// Its samples per pixel are those of a level where samples are placed, else more than any level has.
     renderer: Renderer,
     frame: FrameResources,
     methods: &'a [Method],
@@ -70,18 +72,20 @@ impl<'a> Probe<'a> {
     ///
     /// # Errors
     /// Those of [`Renderer::new`], and [`Error::Device`] for a device that tells no times.
-    pub fn new(gpu: &'a Gpu, scene: &Scene, settings: &Settings, methods: &'a [Method]) -> Result<Self> {
+    pub fn new(gpu: &'a Gpu, scene: &'a Scene, settings: &Settings, methods: &'a [Method]) -> Result<Self> {
         if gpu.info().timestamp_bits == 0 {
             return Err(Error::Device(format!("{} has no timestamps: choose another device", gpu.info().name)));
         }
         // Batches are as large as those of a render of many samples.
-        let settings = Settings { spp: Settings::MAX_SPP.min(4096), ..settings.clone() };
+        let spp = if settings.allocate.is_even() { Settings::MAX_SPP.min(4096) } else { 1 };
+        let settings = Settings { spp, ..settings.clone() };
         let renderer = Renderer::new(gpu, scene, &settings, outputs(methods))?;
         // Their random numbers are not those of the render, which would look as good as it is at the probe's expense.
         let seeds = [1, 2].map(|k| settings.seed.wrapping_add(k));
         let frame = FrameResources::new(gpu)?;
         let mut probe = Self {
             gpu,
+            scene,
             renderer,
             frame,
             methods,
@@ -149,11 +153,13 @@ impl<'a> Probe<'a> {
     }
 
     fn image(&mut self, seed: u32, spp: u32) -> Result<Image> {
+        let steps = self.steps(spp)?;
         self.renderer.set_seed(seed);
-        let start_ms = milliseconds(&self.renderer.run(&mut self.frame, &Step::Start)?);
-        let mut samples_ms = 0.0;
-        for step in self.renderer.samples(0, spp) {
-            samples_ms += milliseconds(&self.renderer.run(&mut self.frame, &step)?);
+        let (mut start_ms, mut samples_ms) = (0.0, 0.0);
+        for step in steps {
+            let ms = milliseconds(&self.renderer.run(&mut self.frame, &step)?);
+            let traces = matches!(step, Step::Uniform(_) | Step::Listed(_));
+            *(if traces { &mut samples_ms } else { &mut start_ms }) += ms;
         }
         let noisy = finite(self.renderer.picture()?.pixels)?;
         let mut image = Image { noisy, filtered: Vec::new(), start_ms, samples_ms, filter_ms: Vec::new() };
@@ -169,6 +175,24 @@ impl<'a> Probe<'a> {
 }
 
 impl Probe<'_> {
+    /// The steps of an image of so many samples. Where they are placed depends on how many there are, so that each number has a
+    /// renderer of its own, which runs once before it is timed.
+    fn steps(&mut self, spp: u32) -> Result<Vec<Step>> {
+        let settings = self.renderer.settings();
+        if settings.allocate.is_even() {
+            return Ok([Step::Start].into_iter().chain(self.renderer.samples(0, spp)).collect());
+        }
+        if settings.spp != spp {
+            let settings = Settings { spp, ..settings.clone() };
+            self.chains.iter_mut().for_each(|chain| *chain = None);
+            self.renderer = Renderer::new(self.gpu, self.scene, &settings, outputs(self.methods))?;
+            for step in self.renderer.steps() {
+                self.spent_ms += milliseconds(&self.renderer.run(&mut self.frame, &step)?);
+            }
+        }
+        Ok(self.renderer.steps().collect())
+    }
+
     /// What a method makes of the image that the renderer holds; nothing without a filter. Kernels are compiled once.
     fn filtered(&mut self, method: usize) -> Result<Option<(Colour, Vec<PassTime>)>> {
         let recipe = Recipe::new(self.methods[method]);

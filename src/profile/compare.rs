@@ -10,7 +10,7 @@ const RANGES: f64 = 3.0;
 const QUANTA: f64 = 2.0;
 const LEAST_MS: f64 = 0.05;
 const LEAST_SHARE: f64 = 0.005;
-/// The share by which arithmetic may be faster or slower at the same clocks.
+/// The share by which clocks may differ, and by which arithmetic may be faster or slower at the same clocks.
 const SAME_CLOCKS: f64 = 0.05;
 
 /// What became of a pass, or of a frame.
@@ -148,9 +148,13 @@ fn differences(old: &Profile, new: &Profile) -> Vec<String> {
     ];
     let differ = names.into_iter().filter(|(_, old, new)| old != new);
     let mut reasons: Vec<_> = differ.map(|(what, old, new)| format!("{what} differ: {old} and {new}")).collect();
+    let clocks = old.device_mhz.zip(new.device_mhz).map(|(old, new)| [old, new].concat());
+    let [least, most] = clocks.map_or([0.0; 2], |mhz| range(mhz.iter().map(|&mhz| mhz as f64)));
+    if least < (1.0 - SAME_CLOCKS) * most {
+        reasons.push(format!("clocks differ: {least} to {most} MHz"));
+    }
     let rates = |p: &Profile| [p.ceilings.arithmetic_gop_s, p.arithmetic_gop_s_after];
-    let all = [rates(old), rates(new)].concat();
-    let [least, most] = [all.iter().copied().fold(f64::INFINITY, f64::min), all.iter().copied().fold(0.0, f64::max)];
+    let [least, most] = range([rates(old), rates(new)].concat().into_iter());
     if least < (1.0 - SAME_CLOCKS) * most {
         let share = 100.0 * (1.0 - least / most.max(1e-9));
         reasons.push(format!(
@@ -158,6 +162,11 @@ fn differences(old: &Profile, new: &Profile) -> Vec<String> {
         ));
     }
     reasons
+}
+
+/// The least and the most.
+fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, 0.0], |[least, most], value| [least.min(value), most.max(value)])
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use crate::denoise::filter::{FilterSettings, Row};
 use crate::denoise::{Denoiser, Noisy};
 use crate::error::{Error, Result};
 use crate::gpu::{Calibration, FrameResources, Gpu};
+use crate::machine::device_mhz;
 use crate::render::settings::Settings;
 use crate::render::{Counters, Job, Outputs, Renderer};
 use crate::scene::Scene;
@@ -20,7 +21,9 @@ pub struct Measured {
     pub ceilings: Ceilings,
     /// [`Ceilings::arithmetic_gop_s`] again, after the frames.
     pub arithmetic_gop_s_after: f64,
-    /// The clocks after the frames.
+    /// Clock of the device in MHz before and after the frames, where the system tells it.
+    pub device_mhz: Option<[u64; 2]>,
+    /// The device's timestamps and the host's clock after the frames.
     pub calibration: Option<Calibration>,
 }
 
@@ -63,13 +66,16 @@ pub fn measure(
     let ceilings = Ceilings::measure(gpu)?;
     let renderer = Renderer::new(gpu, scene, settings, outputs)?;
     let denoiser = filter.map(|row| denoiser(gpu, &renderer, row)).transpose()?;
+    let before = device_mhz(gpu.info());
     let frames = Workload { gpu, renderer: &renderer, denoiser: denoiser.as_ref() }.run(count, done)?;
+    let device_mhz = before.zip(device_mhz(gpu.info())).map(|(before, after)| [before, after]);
     let split_light = renderer.effects().split_light;
     Ok(Measured {
         frames,
         frame_work: FrameWork { pixels: settings.pixels() as u64, split_light, counters },
         ceilings,
         arithmetic_gop_s_after: ceilings::arithmetic_gop_s(gpu)?,
+        device_mhz,
         calibration: gpu.calibrate(),
     })
 }

@@ -5,12 +5,12 @@ use super::work::Work;
 use super::{Ceilings, FrameRun};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Pass, PassTime};
+use crate::machine;
 use crate::render::Counters;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use sysinfo::{CpuRefreshKind, RefreshKind, System};
 
 /// Version of what [`Profile`] is written as.
 pub const SCHEMA: u32 = 1;
@@ -40,6 +40,10 @@ pub struct Profile {
     pub ceilings: Ceilings,
     /// [`Ceilings::arithmetic_gop_s`] after the frames: it differs where clocks have changed.
     pub arithmetic_gop_s_after: f64,
+    /// Clock of the device in MHz before and after the frames, of the processor where that is the device; `None` where the system does
+    /// not tell.
+    #[serde(default)]
+    pub device_mhz: Option<[u64; 2]>,
     /// Milliseconds of all passes of a frame.
     pub frame_ms: Spread,
     /// Its passes, in the order in which they first ran.
@@ -151,6 +155,7 @@ impl Profile {
             },
             ceilings: ceilings.clone(),
             arithmetic_gop_s_after: measured.arithmetic_gop_s_after,
+            device_mhz: measured.device_mhz,
             frame_ms,
             passes,
             counters: frame_work.counters,
@@ -209,11 +214,10 @@ impl Host {
     /// The machine of this device.
     pub fn of(gpu: &Gpu) -> Self {
         let info = gpu.info();
-        let system = System::new_with_specifics(RefreshKind::nothing().with_cpu(CpuRefreshKind::nothing()));
         Self {
             device: info.name.clone(),
             driver: format!("{} {} {}", info.driver_name, info.driver_version, info.driver_info),
-            cpu: system.cpus().first().map_or_else(String::new, |cpu| cpu.brand().trim().to_owned()),
+            cpu: machine::cpu(),
         }
     }
 }

@@ -47,11 +47,12 @@ fn reference(folder: &TempDir) -> PathBuf {
 #[test]
 fn a_grid_is_measured_and_each_point_can_be_rendered_again() {
     let folder = tempfile::tempdir().unwrap();
-    let words = "--allocate uniform,both --denoise none,atrous --spp 1,4 --repeats 2 -o all";
-    let printed = text(&cost(&folder, words), 0);
+    let words = "--allocate uniform,both --denoise none,atrous --spp 1,4 --repeats 2 -o all --variant";
+    let mut command = within(&folder, &format!("cost {} {FILM} {words}", scene()));
+    let printed = text(&command.arg("--levels 2 --sigma-n inf").output().unwrap(), 0);
     assert!(printed.contains("uniform + atrous, 4 spp") && printed.contains("halve relMSE"), "{printed}");
     let document = document(&folder, "all/cost.json");
-    assert!(document.complete && document.points.len() == 8, "{document:?}");
+    assert!(document.complete && document.points.len() == 8 + 4, "what is not filtered has no levels: {document:?}");
     for point in &document.points {
         assert!(point.runs.len() == 2 && point.summary.is_some() && point.failed.is_none(), "{point:?}");
         let sum: f64 = point.runs[0].passes.iter().map(|pass| pass.ms).sum();
@@ -60,6 +61,7 @@ fn a_grid_is_measured_and_each_point_can_be_rendered_again() {
     assert!(document.reference.noise == NoiseKind::Measured && document.reference.spp == Some(64));
     replays(&folder, &document, "uniform + atrous, 4 spp");
     replays(&folder, &document, "both + atrous, 4 spp");
+    replays(&folder, &document, "both + atrous, levels 2 --sigma-n inf, 4 spp");
     tables(&folder, &document);
 }
 
@@ -67,26 +69,51 @@ fn a_grid_is_measured_and_each_point_can_be_rendered_again() {
 #[track_caller]
 fn replays(folder: &TempDir, document: &Document, label: &str) {
     let point = point(document, label);
-    let words = point.command.strip_prefix("tallow ").unwrap();
-    let output = within(folder, words).output().unwrap();
-    assert!(output.status.success(), "{words}: {output:?}");
+    for words in point.command.split(" && ").map(|command| command.strip_prefix("tallow ").unwrap()) {
+        let output = within(folder, words).output().unwrap();
+        assert!(output.status.success(), "{words}: {output:?}");
+    }
     let picture = |path: &Path| image::read(path).unwrap().picture(None).unwrap();
     let (image, reference) = (picture(&folder.path().join("point.exr")), picture(&reference(folder)));
     let error = relmse(&image, &reference) - document.reference.relmse.unwrap();
     let told = point.runs[0].errors.relmse.unwrap();
-    assert!((error - told).abs() < 1e-9 * told, "{words}: {error} is not {told}");
+    assert!((error - told).abs() < 1e-9 * told, "{}: {error} is not {told}", point.command);
     // Control: another seed has another error.
     assert_ne!(point.runs[0].errors, point.runs[1].errors);
 }
 
 fn tables(folder: &TempDir, document: &Document) {
     let table = std::fs::read_to_string(folder.path().join("all/cost.csv")).unwrap();
-    let columns = |line: &str| line.split(',').count();
+    // Every second part is within quotation marks.
+    let columns = |line: &str| line.split('"').step_by(2).map(|part| part.matches(',').count()).sum::<usize>();
     let lines: Vec<&str> = table.lines().collect();
     assert_eq!(lines.len(), 1 + document.points.len());
     assert!(lines.iter().all(|line| columns(line) == columns(lines[0])), "{table}");
     let page = std::fs::read_to_string(folder.path().join("all/cost.html")).unwrap();
     assert!(page.contains("cornell-box"));
+}
+
+#[test]
+fn an_ablation_turns_every_knob_by_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    let printed = text(&cost(&folder, "--ablate --allocate uniform --denoise none --spp 16 --repeats 2 -o all"), 0);
+    assert!(printed.contains("factors by options"), "{printed}");
+    let document = document(&folder, "all/cost.json");
+    let change = |option: &str| {
+        let point = point(&document, &format!("uniform, {option}, 16 spp"));
+        let change = point.summary.as_ref().unwrap().change.unwrap();
+        [change.time.unwrap().value, change.relmse.unwrap().value]
+    };
+    // Direct light alone takes less time, and lacks the rest of the light.
+    let [time, error] = change("max-depth 2");
+    assert!(time < 0.9 && error > 2.0, "{time} {error}");
+    assert_ne!(change("sampler independent")[1], 1.0, "other random numbers");
+    let own = &document.points[0];
+    assert!(own.method.options.is_empty() && own.summary.as_ref().unwrap().change.is_none());
+    let options: Vec<_> = document.points[1..].iter().map(|point| &point.method.options).collect();
+    assert!(options.iter().all(|option| option.len() == 1) && options.len() == 6 + 2 + 1, "{options:?}");
+    let page = std::fs::read_to_string(folder.path().join("all/cost.html")).unwrap();
+    assert!(page.contains("<h2>What options change</h2>"));
 }
 
 #[test]
@@ -203,4 +230,14 @@ fn what_cannot_be_measured_is_one_line() {
     complains(&within(&folder, "cost --filter-only other.exr").output().unwrap(), 2, &["--reference"]);
     let output = within(&folder, &format!("cost {}", scene())).args(["--with", "--blue 4"]).output().unwrap();
     complains(&output, 2, &["\"--blue 4\"", "tallow render --help"]);
+    for (option, words, says) in [
+        ("--variant", "--spp 3", "give --spp itself, as a list"),
+        ("--with", "--allocate both", "give --allocate itself"),
+        ("--variant", "--width 9", "--width is the same for all points"),
+        ("--variant", "--window 4", "\"--window 4\" changes no point"),
+        ("--variant", "--radius 4", "\"--radius 4\" changes no point"),
+    ] {
+        let mut command = within(&folder, &format!("cost {} --denoise none", scene()));
+        complains(&command.args([option, words]).output().unwrap(), 2, &[says]);
+    }
 }

@@ -45,7 +45,7 @@ fn run(seed: u32, gpu_ms: f64, relmse: f64) -> Run {
 fn point(truth: Truth, spp: u32, runs: Vec<Run>) -> Point {
     let method =
         Method { allocate: truth.allocate.into(), filter: "none".into(), rounds: None, options: Vec::new(), spp };
-    Point { method, command: String::new(), runs, warm_up: None, device_bytes: None, summary: None, failed: None }
+    Point { runs, ..Point::unmeasured(method, String::new()) }
 }
 
 /// Points of several methods. `same_images`: all methods have the errors of the first, run by run.
@@ -144,10 +144,65 @@ fn methods_of_known_added_error_are_ranked_so() {
         let gain = points[first + 2].summary.as_ref().unwrap().error_gain.unwrap().estimate;
         assert!((gain.value / expected - 1.0).abs() < 0.1, "{gain:?} is not {expected}");
     }
+    // At the first time nothing else has begun for sure; everywhere the best of the others has 1.5 times the error.
+    let gain = found.iter().find(|f| f.text.contains("times the relMSE of the best other method")).unwrap();
+    let words: Vec<f64> = gain.text.split(' ').filter_map(|word| word.parse().ok()).collect();
+    assert!(
+        gain.text.contains("(second at") && words.iter().filter(|w| (0.6..0.75).contains(*w)).count() == 2,
+        "{}",
+        gain.text
+    );
     // The law of Monte Carlo: half the error for twice the time.
     let halving = found.iter().find(|f| f.text.contains("halve") && f.text.contains("with uniform")).unwrap();
     let factor: f64 = halving.text.split_whitespace().nth(4).unwrap().parse().unwrap();
     assert!((factor - 2.0).abs() < 0.1, "{}", halving.text);
+}
+
+/// The points of uniform rendering at 4 samples per pixel, and the same with options that change time and error by known factors.
+fn with_options(options: &[(&str, f64, f64)], spread: Spread, seed: u64) -> Vec<Point> {
+    let mut all = vec![points(&[UNIFORM], Spread { time: 0.02, error: 0.3 }, false, seed).remove(1)];
+    let mut noise = Normal(fastrand::Rng::with_seed(seed));
+    for (option, time, error) in options {
+        let mut point = all[0].clone();
+        point.method.options = vec![format!("--{option}")];
+        for run in &mut point.runs {
+            run.gpu_ms *= time * noise.factor(spread.time);
+            run.errors.relmse = run.errors.relmse.map(|relmse| relmse * error * noise.factor(spread.error));
+        }
+        all.push(point);
+    }
+    summarise(&mut all, CONFIDENCE);
+    all
+}
+
+#[test]
+fn what_options_change_is_told_run_by_run() {
+    // Errors vary by 30 % from seed to seed, but the options act on each seed alike.
+    let options = [("depth 4", 0.7, 1.1), ("same", 1.0, 1.0), ("worse", 0.9, 1.5)];
+    let points = with_options(&options, Spread { time: 0.01, error: 0.01 }, 12);
+    for (point, (_, time, error)) in points[1..].iter().zip(options) {
+        let change = point.summary.as_ref().unwrap().change.unwrap();
+        for (found, truth) in [(change.time, time), (change.relmse, error), (change.product, time * error)] {
+            let Estimate { value, low, high } = found.unwrap();
+            assert!((value / truth - 1.0).abs() < 0.03 && high.unwrap() / low.unwrap() < 1.1, "{value} is not {truth}");
+        }
+    }
+    let found = findings(&points, CONFIDENCE);
+    let texts: Vec<_> = found.iter().map(|finding| finding.text.as_str()).collect();
+    assert!(texts[0].starts_with("With depth 4, uniform, 4 spp takes 0.70 ("), "{texts:?}");
+    assert!(found[1].verdict == Verdict::TooNoisy && texts[1].contains("gains by same the data"), "{texts:?}");
+    assert_eq!(texts.len(), 2, "what is worse is no gain, and a single point has no curve: {texts:?}");
+}
+
+#[test]
+fn options_that_change_nothing_are_rarely_named() {
+    let options: Vec<_> = (0..20).map(|_| ("same", 1.0, 1.0)).collect();
+    let named = |seed: &u64| {
+        let points = with_options(&options, Spread { time: 0.03, error: 0.1 }, *seed);
+        findings(&points, CONFIDENCE).iter().any(|finding| finding.text.starts_with("With "))
+    };
+    let wrong = (0..200).filter(named).count();
+    assert!(wrong <= 18, "{wrong} of 200, of which 5 % are allowed");
 }
 
 #[test]

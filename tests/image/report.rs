@@ -31,7 +31,7 @@ fn every_point_is_in_plots_tables_and_viewer_or_has_a_reason() {
     let page = page(&document);
     let measured = document.points.iter().filter(|point| point.summary.is_some());
     let labels: Vec<String> = measured.map(|point| point.method.label()).collect();
-    assert_eq!(labels.len(), 35);
+    assert_eq!(labels.len(), 36);
     for label in &labels {
         assert!(page.contains(&format!("<td>{label}</td>")), "{label}: in no table");
         assert!(page.contains(&format!("<title>{label}\nGPU time")), "{label}: in no plot");
@@ -46,6 +46,9 @@ fn every_point_is_in_plots_tables_and_viewer_or_has_a_reason() {
         assert!(page.contains(&finding.text.replace('\'', "&#39;")), "{}", finding.text);
     }
     assert!(page.contains("What the data cannot tell (1)"));
+    let change = "<td>both + auto, 4 spp</td><td>max-depth 4</td><td data-order=\"0.7\" class=\"number\">0.700 ×<small>0.636 to 0.770</small>";
+    assert!(page.contains(change), "no row of what options change");
+    assert!(page.contains("<title>both + auto, max-depth 4, 4 spp\nGPU time 0.700 × (0.636 to 0.770)\nrelMSE 1.20 ×"));
 }
 
 #[test]
@@ -104,6 +107,7 @@ fn figures_that_are_zero_unknown_or_no_numbers_leave_no_nan() {
         summary.errors.relmse = Some(estimate);
         summary.errors.flip = Some(Estimate { low: Some(-bad), ..estimate });
         summary.inefficiency = Some(estimate);
+        summary.change.iter_mut().for_each(|change| change.relmse = Some(estimate));
         if i % 4 == 0 {
             summary.gpu_ms = estimate;
             summary.passes.iter_mut().for_each(|pass| pass.ms = bad);

@@ -1,6 +1,7 @@
 //! Tests that errors which are estimated without a reference are those that a reference shows.
 use crate::support;
 use std::path::Path;
+use tallow::allocate;
 use tallow::denoise::filter::{self, Method};
 use tallow::denoise::{Filtered, Noisy, Recipe};
 use tallow::gpu::Gpu;
@@ -11,10 +12,11 @@ use tallow::scene::{Loaded, Scene};
 
 const OUTPUTS: Outputs = Outputs { split_light: true, guides: true, counters: false };
 
-fn scene(file: &str, spp: u32, seed: u32) -> Loaded {
+fn scene(file: &str, policy: &str, spp: u32, seed: u32) -> Loaded {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file);
     let small = |s: &mut tallow::render::settings::Settings| {
         (s.width, s.height, s.spp, s.seed, s.max_depth) = (64, 64, spp, seed, 4);
+        s.allocate.policy = allocate::policy(policy).unwrap();
     };
     Scene::load(&path).unwrap().with(small)
 }
@@ -35,27 +37,28 @@ fn planned_errors_are_true_ones() {
     // Where a lamp is seen, the few pixels at its rim decide the error of what a filter makes: half of it in so small a film.
     let both: &[&str] = &["none", "svgf"];
     let cases = [
-        ("cornell-box/scene.toml", 0.01, &both[..1]),
-        ("furnace/coated.toml", 0.001, both),
-        ("bust/scene.toml", 0.02, both),
+        ("cornell-box/scene.toml", "uniform", 0.01, &both[..1]),
+        ("furnace/coated.toml", "uniform", 0.001, both),
+        ("bust/scene.toml", "uniform", 0.02, both),
+        ("bust/scene.toml", "both", 0.02, &both[..1]),
     ];
-    for (file, error, names) in cases {
-        let reference = rendered(&gpu, &scene(file, 2048, 1000), None);
+    for (file, policy, error, names) in cases {
+        let reference = rendered(&gpu, &scene(file, "uniform", 2048, 1000), None);
         for &name in names {
             let method = Method::Kernels(filter::find(name).unwrap());
-            let found =
-                plan(&gpu, &scene(file, 1, 3), &scene(file, 1, 3).settings, &[method], Target::RelMse(error)).unwrap();
-            assert!(found.chosen.relmse <= error * 1.001, "{file}, {name}: {found:?}");
+            let first = scene(file, policy, 1, 3);
+            let found = plan(&gpu, &first, &first.settings, &[method], Target::RelMse(error)).unwrap();
+            assert!(found.chosen.relmse <= error * 1.001, "{file}, {policy}, {name}: {found:?}");
             let of = Some(method).filter(|_| name != "none");
             // Few pixels decide the error of one image, where lamps are seen: four images tell it better.
             let true_error = |spp: u32| {
-                let images = (3..7).map(|seed| rendered(&gpu, &scene(file, spp, seed), of));
+                let images = (3..7).map(|seed| rendered(&gpu, &scene(file, policy, spp, seed), of));
                 images.map(|image| metrics::relmse(&image, &reference)).sum::<f64>() / 4.0
             };
             let ratio = true_error(found.chosen.spp) / found.chosen.relmse;
             assert!(
                 (1.0 / 1.5..1.5).contains(&ratio),
-                "{file}, {name}: {ratio} of what was expected, {:?}",
+                "{file}, {policy}, {name}: {ratio} of what was expected, {:?}",
                 found.chosen
             );
             // Control: a quarter of the samples has another error.

@@ -18,6 +18,7 @@ const METHODS: [(&str, &str, f64, f64, f64); 7] = [
 /// A measurement of the scene of this name, with one point that failed and one that was not reached.
 pub fn document(name: &str) -> Document {
     let mut points: Vec<Point> = METHODS.iter().flat_map(|method| SPP.map(|spp| measured(*method, spp))).collect();
+    points.push(shallow(points[31].clone()));
     let method =
         Method { allocate: "both".into(), filter: "svgf".into(), rounds: Some(3), options: Vec::new(), spp: 4 };
     points.push(Point { failed: Some("filter svgf: the image has no normals".into()), ..empty(method.clone()) });
@@ -46,6 +47,7 @@ pub fn nothing_measured(name: &str) -> Document {
             cpu: "Imaginary CPU".into(),
             cores: 2,
             cpu_mhz: Some([3000, 3000]),
+            device_mhz: Some([1800, 1950]),
         },
         reference: ReferenceInfo {
             source: ReferenceSource::Rendered,
@@ -76,7 +78,7 @@ fn finding(verdict: Verdict, text: &str) -> Finding {
 
 fn empty(method: Method) -> Point {
     let command = format!("tallow render scene.toml --spp {}", method.spp);
-    Point { method, command, runs: Vec::new(), warm_up: None, device_bytes: None, summary: None, failed: None }
+    Point::unmeasured(method, command)
 }
 
 fn estimate(value: f64, spread: f64) -> Estimate {
@@ -119,6 +121,7 @@ fn measured((allocate, filter, filter_ms, at_one, stays): (&str, &str, f64, f64,
         inefficiency: Some(estimate(relmse * gpu_ms * 1e-3, 0.15)),
         speed_up: factor(1.2 * n / relmse / gpu_ms),
         error_gain: factor(1.2 / relmse / gpu_ms),
+        change: None,
     };
     let run = |seed| Run {
         seed,
@@ -136,6 +139,14 @@ fn measured((allocate, filter, filter_ms, at_one, stays): (&str, &str, f64, f64,
         summary: Some(summary),
         ..empty(method)
     }
+}
+
+/// A point with paths that end early.
+fn shallow(mut point: Point) -> Point {
+    point.method.options = vec!["--max-depth 4".to_owned()];
+    let [time, relmse, product] = [0.7, 1.2, 0.84].map(|factor| Some(estimate(factor, 0.1)));
+    point.summary.as_mut().unwrap().change = Some(Change { time, relmse, product });
+    point
 }
 
 /// A smooth reference, and for each measured point the same with noise of that point's error.

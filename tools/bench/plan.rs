@@ -29,6 +29,9 @@ struct Args {
     /// Values of relMSE
     #[arg(long, value_delimiter = ',', default_values_t = [0.05, 0.01])]
     errors: Vec<f64>,
+    /// Allocation policy
+    #[arg(long, default_value = "uniform")]
+    allocate: String,
     /// Seeds
     #[arg(long, default_value_t = 10)]
     runs: u32,
@@ -57,14 +60,20 @@ fn rendered(gpu: &Gpu, scene: &Loaded, plan: &Plan) -> Result<(f64, Picture)> {
 }
 
 fn line(what: &str, plans: &[Plan], ratios: &[f64], limits: [f64; 2]) {
+    let told = |plan: &Plan, ratio: f64| match plan.target {
+        Target::RelMse(error) => ratio * error / plan.chosen.relmse,
+        Target::GpuMs(ms) => ratio * ms / plan.chosen.gpu_ms,
+    };
+    let told: Vec<f64> = plans.iter().zip(ratios).map(|(plan, &ratio)| told(plan, ratio)).collect();
     let within = |limit: f64| ratios.iter().filter(|r| (1.0 / limit..=limit).contains(*r)).count();
     let [near, far] = limits.map(within);
     let spp: Vec<_> = plans.iter().map(|p| p.chosen.spp.to_string()).collect();
     let filtered = plans.iter().filter(|p| p.chosen.denoise.is_some()).count();
     let all: Vec<_> = ratios.iter().map(|r| format!("{r:.2}")).collect();
     println!(
-        "  {what}: median {:.3}, {near} of {} within {}, {far} within {}; filtered {filtered}; spp {}; ratios {}",
+        "  {what}: median {:.3} (of what was told {:.3}), {near} of {} within {}, {far} within {}; filtered {filtered}; spp {}; ratios {}",
         median(ratios),
+        median(&told),
         ratios.len(),
         limits[0],
         limits[1],
@@ -78,7 +87,8 @@ fn main() -> Result<()> {
     let gpu = Gpu::open(&DeviceOptions::default())?;
     println!("device: {}, {}", gpu.info().name, gpu.info().driver_info);
     for path in &args.scenes {
-        let size = |s: &mut Settings| (s.width, s.height) = (args.width, args.height);
+        let policy = tallow::allocate::policy(&args.allocate).context("no policy of this name")?;
+        let size = |s: &mut Settings| (s.width, s.height, s.allocate.policy) = (args.width, args.height, policy);
         let scene = Scene::load(path).with_context(|| path.display().to_string())?.with(size);
         println!("{}, {}x{}", path.display(), args.width, args.height);
         for &ms in &args.times {
@@ -96,7 +106,8 @@ fn main() -> Result<()> {
 }
 
 fn reference(gpu: &Gpu, scene: &Loaded, spp: u32) -> Result<Picture> {
-    let settings = Settings { spp, seed: 99_991, ..scene.settings.clone() };
+    let mut settings = Settings { spp, seed: 99_991, ..scene.settings.clone() };
+    settings.allocate.policy = &tallow::allocate::uniform::ROW;
     let renderer = Renderer::new(gpu, scene, &settings, Outputs::default())?;
     Job::new(&renderer).run_to_end(&mut FrameResources::new(gpu)?)?;
     Ok(renderer.picture()?)

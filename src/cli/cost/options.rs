@@ -1,10 +1,11 @@
 //! Options of `tallow cost`.
-use crate::allocate::Policy;
+use crate::allocate::{AllocateOverrides as Allocate, Policy};
 use crate::cli::common::with_ranges;
+use crate::cli::filter::options as filter;
 use crate::cli::finite;
 use crate::cli::overrides::Overrides;
 use crate::cost::grid::Axes;
-use crate::denoise::filter::Method;
+use crate::denoise::filter::{FilterSettings, Method};
 use crate::error::{Error, Result};
 use crate::render::settings::{Film, Settings};
 use clap::Parser;
@@ -25,23 +26,49 @@ pub struct Args {
     #[arg(short, long, value_name = "FOLDER", default_value = "cost")]
     pub output: PathBuf,
     /// Allocation policies
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "uniform,both")]
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "uniform,both",
+        default_value_if("ablate", "true", "both")
+    )]
     pub allocate: Vec<&'static Policy>,
     /// Filters, as for tallow render --denoise; none is the plain render
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "none,atrous,auto")]
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "none,atrous,auto",
+        default_value_if("ablate", "true", "auto")
+    )]
     pub denoise: Vec<Method>,
     /// Samples per pixel
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "1,2,4,8,16")]
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "1,2,4,8,16",
+        default_value_if("ablate", "true", "4")
+    )]
     pub spp: Vec<u32>,
     /// Rounds of policies that learn; 0 is their own choice
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "0")]
     pub rounds: Vec<u32>,
-    /// Options of tallow render for all points and the reference, such as "--max-depth 4"; with --filter-only of tallow filter
+    /// Options of tallow render and settings of tallow filter for all points, and of the render for the reference too, such as
+    /// "--max-depth 4"; with --filter-only of tallow filter alone
     #[arg(long, value_name = "OPTIONS", allow_hyphen_values = true, default_value = "")]
     pub with: String,
-    /// Measure everything also with these options, such as "--min-spp 4"; may be given several times
+    /// Measure everything also with these options, such as "--min-spp 4" or "--radius 12"; may be given several times
     #[arg(long = "variant", value_name = "OPTIONS", allow_hyphen_values = true)]
     pub variants: Vec<String>,
+    /// Measure everything also with each other value of every knob that it has: what it takes in time, and gives in error [grid:
+    /// both + auto, 4 spp, if no lists are given]
+    #[arg(long)]
+    pub ablate: bool,
+    /// Points of other renderers to put beside: a .csv with the columns method, filter, spp, seed, ms (wall time) and image (a file)
+    #[arg(long, value_name = "FILE", conflicts_with = "filter_only")]
+    pub points: Option<PathBuf>,
     /// Runs of each point, each with another seed
     #[arg(long, value_name = "N", default_value = "5", value_parser = clap::value_parser!(u32).range(2..=1000))]
     pub repeats: u32,
@@ -102,19 +129,58 @@ impl Args {
     }
 }
 
-/// Parses options of `tallow render` in one text.
-///
-/// # Errors
-/// [`Error::Usage`].
-pub fn overrides(text: &str) -> Result<Overrides> {
-    #[derive(Parser)]
-    #[command(no_binary_name = true, disable_help_flag = true)]
-    struct Words {
-        #[command(flatten)]
-        overrides: Overrides,
+/// Options of `tallow render` and settings of `tallow filter`, parsed from one text.
+#[derive(Parser)]
+#[command(no_binary_name = true, disable_help_flag = true)]
+pub struct Words {
+    #[command(flatten)]
+    render: Overrides,
+    #[command(flatten)]
+    filter: filter::Overrides,
+}
+
+impl Words {
+    /// Parses `text`, in which nothing may stand that the lists of the grid say.
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub fn parse(text: &str) -> Result<Self> {
+        let words = Self::try_parse_from(text.split_whitespace()).map_err(|e| refused(text, "render", &e))?;
+        let Allocate { policy, rounds, .. } = &words.render.allocate;
+        let lists =
+            [("spp", words.render.render.spp.is_some()), ("allocate", policy.is_some()), ("rounds", rounds.is_some())];
+        match lists.iter().find(|(_, given)| *given) {
+            Some((name, _)) => Err(Error::Usage(format!("\"{}\": give --{name} itself, as a list", text.trim()))),
+            None => Ok(words),
+        }
     }
-    let parsed = Words::try_parse_from(text.split_whitespace());
-    Ok(parsed.map_err(|e| refused(text, "render", &e))?.overrides)
+
+    /// Refuses what must be the same for all points: the size, and the seeds that they share.
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub fn checked_as_variant(self, text: &str) -> Result<Self> {
+        let Overrides { film, render, sequence, .. } = &self.render;
+        let shared = [
+            ("width", film.width.is_some()),
+            ("height", film.height.is_some()),
+            ("seed", render.seed.is_some()),
+            ("first-sample", sequence.first_sample.is_some()),
+        ];
+        match shared.iter().find(|(_, given)| *given) {
+            Some((name, _)) => Err(Error::Usage(format!(
+                "\"{}\": --{name} is the same for all points; give it in --with",
+                text.trim()
+            ))),
+            None => Ok(self),
+        }
+    }
+
+    /// Replaces the settings that were given.
+    pub fn apply(&self, settings: &mut Settings, filters: &mut FilterSettings) {
+        self.render.apply(settings);
+        *filters = self.filter.settings(*filters);
+    }
 }
 
 /// Options in a text that a command does not take.

@@ -2,6 +2,7 @@
 use crate::cli::files::{Files, Item, partial_name};
 use crate::cli::progress::Progress;
 use crate::cli::readable;
+use crate::cost::changes::{option, plain};
 use crate::cost::document::{Document, Point, SCHEMA};
 use crate::cost::words::{factor, milliseconds, number};
 use crate::cost::{Images, table};
@@ -130,6 +131,11 @@ pub fn text(document: &Document, written: &[PathBuf]) -> String {
     let head = ["point", "GPU time", "relMSE", "+-", "FLIP", "speed-up", "on the front"];
     let rows: Vec<_> = (0..document.points.len()).filter_map(|i| row(document, i)).collect();
     let mut text = text_table::text(&head, &rows);
+    let changes: Vec<_> = document.points.iter().filter_map(|point| change(document, point)).collect();
+    if !changes.is_empty() {
+        let head = ["without the option", "option", "GPU time", "relMSE", "relMSE x time"];
+        text += &format!("\nfactors by options\n{}", text_table::text(&head, &changes));
+    }
     for point in &document.points {
         if let Some(reason) = &point.failed {
             text += &format!("failed: {}: {}\n", readable(&point.method.label()), readable(reason));
@@ -146,9 +152,18 @@ pub fn text(document: &Document, written: &[PathBuf]) -> String {
     text + &format!("written: {}\n", files.join(", "))
 }
 
+/// What the option of a point changes.
+fn change(document: &Document, point: &Point) -> Option<Vec<String>> {
+    let change = point.summary.as_ref()?.change?;
+    let method = plain(&document.points, point)?.method.label();
+    let factors = [change.time, change.relmse, change.product];
+    let factors = factors.map(|estimate| estimate.map_or_else(|| "-".to_owned(), |estimate| factor(&estimate)));
+    Some([method, option(point).to_owned()].into_iter().chain(factors).collect())
+}
+
 fn missing(document: &Document, point: &Point) -> usize {
     let wanted = document.measurement.repeats as usize;
-    if point.failed.is_some() { 0 } else { wanted.saturating_sub(point.runs.len()) }
+    if point.failed.is_some() || point.is_other { 0 } else { wanted.saturating_sub(point.runs.len()) }
 }
 
 fn row(document: &Document, index: usize) -> Option<Vec<String>> {

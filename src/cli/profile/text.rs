@@ -53,10 +53,13 @@ fn below(p: &Profile) -> String {
         Some(ns) => format!("clocks of device and host tied within {:.3} us", ns as f64 * 1e-3),
         None => "clocks of device and host not tied".to_owned(),
     };
+    let mhz =
+        p.device_mhz.map(|[before, after]| format!("device at {before} MHz before and {after} after the frames\n"));
+    let mhz = mhz.unwrap_or_default();
     format!(
         "\nrays: {} per frame, {:.2} Mrays/s, {per_ray:.1} nodes each\n\
          ceilings: copy {}; arithmetic {:.1} Gop/s before and {:.1} after the frames\n\
-         timestamps cost {} ms of a frame of {} ms ({share:.1} %); steps of {} ns; {clocks}\n",
+         timestamps cost {} ms of a frame of {} ms ({share:.1} %); steps of {} ns; {clocks}\n{mhz}",
         counters.rays(),
         p.mrays_s,
         copies.join(", "),

@@ -37,6 +37,7 @@ fn profile(frame: &[f64], passes: Vec<PassProfile>) -> Profile {
         timer: Timer { period_ns: 1.0, quantum_ns: 1, calibration_deviation_ns: None },
         ceilings: Ceilings { copies: Vec::new(), arithmetic_gop_s: 100.0 },
         arithmetic_gop_s_after: 99.0,
+        device_mhz: Some([1800, 1750]),
         frame_ms: Spread::of(frame.to_vec()),
         passes,
         counters: Counters::default(),
@@ -99,6 +100,7 @@ fn other_machines_clocks_and_too_few_frames_are_inconclusive() {
     inconclusive(&|p| p.host.driver = "other".into(), "drivers differ");
     inconclusive(&|p| p.host.cpu = "other".into(), "processors differ");
     inconclusive(&|p| p.arithmetic_gop_s_after = 94.0, "clocks differ");
+    inconclusive(&|p| p.device_mhz = Some([1800, 1600]), "clocks differ: 1600 to 1800 MHz");
     inconclusive(&|p| p.frame_ms = Spread::of(vec![10.0; 3]), "too few frames");
     assert_eq!(beside(&|p| p.arithmetic_gop_s_after = 96.0).unwrap().0, Verdict::Same);
     let refused = |change: &dyn Fn(&mut Profile), word: &str| {

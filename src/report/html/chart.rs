@@ -1,14 +1,32 @@
 //! What all charts of a page have in common. Colours are variables of `style.css`, so that one chart fits light and dark pages.
-use kuva::render::layout::Layout;
+use kuva::plot::scatter::MarkerShape;
+use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::plots::Plot;
 use kuva::render::theme::Theme;
+use std::sync::Arc;
 
 /// Number of colours in `style.css`: `--c0`, `--c1` and so on.
-const COLOURS: usize = 8;
+pub const COLOURS: usize = 8;
+
+const SHAPES: [MarkerShape; 8] = [
+    MarkerShape::Circle,
+    MarkerShape::Square,
+    MarkerShape::Triangle,
+    MarkerShape::Diamond,
+    MarkerShape::TriangleDown,
+    MarkerShape::Star,
+    MarkerShape::Pentagon,
+    MarkerShape::Cross,
+];
 
 /// The colour of the series with this index.
 pub fn colour(index: usize) -> String {
     format!("var(--c{})", index % COLOURS)
+}
+
+/// The marker of the series with this index.
+pub fn shape(index: usize) -> MarkerShape {
+    SHAPES[index % SHAPES.len()]
 }
 
 /// Colour of what belongs to no series.
@@ -31,6 +49,26 @@ pub fn layout(plots: &[Plot], width: f64, height: f64) -> Layout {
     };
     let layout = Layout::auto_from_plots(plots).with_theme(theme).with_width(width).with_height(height);
     layout.with_font_family("system-ui, sans-serif").with_legend_box(false)
+}
+
+/// Whether logarithmic axes have a place for the value. The plotting crate draws nothing below 1e-10, and a tick for each decade.
+pub fn is_drawn(value: f64) -> bool {
+    (1e-9..1e12).contains(&value)
+}
+
+/// Ticks of logarithmic axes as their shortest text.
+pub fn plain_ticks(layout: Layout) -> Layout {
+    layout.with_tick_format(TickFormat::Custom(Arc::new(tick)))
+}
+
+/// The shortest text of a tick, which is 1, 2 or 5 times a power of 10.
+fn tick(v: f64) -> String {
+    // Computed powers of 10 may be off by a few bits.
+    let rounded = format!("{v:.0e}");
+    match v {
+        1e-4..1e6 => rounded.parse().map(|v: f64| v.to_string()).unwrap_or(rounded),
+        _ => rounded,
+    }
 }
 
 /// Draws SVG to be put into a page: it scales with the page, and names no address of a schema.

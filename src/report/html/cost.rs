@@ -4,9 +4,9 @@ use super::number::{percent, short};
 use super::page::Table;
 use super::pass_chart::{self, Unit};
 use super::viewer::{Image, Viewer};
-use super::{Frame, pass_table, point_table};
+use super::{Frame, changes, pass_table, point_table};
 use crate::cost::Images;
-use crate::cost::document::{Document, NoiseKind, Point, ReferenceInfo, ReferenceSource, Verdict};
+use crate::cost::document::{Document, Machine, NoiseKind, Point, ReferenceInfo, ReferenceSource, Verdict};
 use askama::Template;
 
 /// What `cost.html` shows.
@@ -20,6 +20,9 @@ struct CostPage<'a> {
     open_findings: usize,
     reference_notes: &'a [String],
     charts: Vec<Chart>,
+    has_others: bool,
+    change_chart: String,
+    changes: Table,
     points: Table,
     milliseconds: String,
     shares: String,
@@ -41,6 +44,9 @@ pub fn cost(document: &Document, images: Option<&Images>) -> String {
         open_findings: document.findings.iter().filter(|finding| CostPage::is_open(&finding.verdict)).count(),
         reference_notes: &document.reference.notes,
         charts: METRICS.iter().map(|&metric| error_chart::draw(document, metric)).collect(),
+        has_others: document.points.iter().any(|point| point.is_other),
+        change_chart: changes::draw(document),
+        changes: changes::table(document),
         points: point_table::measured(document),
         milliseconds: pass_chart::draw(document, Unit::Milliseconds),
         shares: pass_chart::draw(document, Unit::Share),
@@ -65,7 +71,7 @@ fn facts(document: &Document) -> Vec<(String, String)> {
     let commit = software.commit.as_ref().map(|commit| format!(", commit {commit}")).unwrap_or_default();
     let runs = format!("{} runs of each point, {} % intervals", measurement.repeats, percent(measurement.confidence));
     let cores = if machine.cores == 1 { "1 core".to_owned() } else { format!("{} cores", machine.cores) };
-    let facts = [
+    let mut facts = vec![
         ("scene", format!("{}, {} x {} pixels", scene.path, scene.width, scene.height)),
         ("device", format!("{} ({}), {}", machine.device, machine.kind, machine.driver)),
         ("processor", format!("{}, {cores}", machine.cpu)),
@@ -73,7 +79,21 @@ fn facts(document: &Document) -> Vec<(String, String)> {
         ("measured", runs),
         ("program", format!("Tallow {}{commit}", software.version)),
     ];
+    if let Some(clocks) = clocks(machine) {
+        facts.push(("clocks", clocks));
+    }
     facts.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+}
+
+/// Where the system tells them.
+fn clocks(machine: &Machine) -> Option<String> {
+    let range = |name: &str, mhz: Option<[u64; 2]>| {
+        let [least, most] = mhz?;
+        Some(if least == most { format!("{name} {least} MHz") } else { format!("{name} {least} to {most} MHz") })
+    };
+    let all: Vec<_> =
+        [range("processor", machine.cpu_mhz), range("device", machine.device_mhz)].into_iter().flatten().collect();
+    (!all.is_empty()).then(|| all.join(", "))
 }
 
 fn reference(reference: &ReferenceInfo) -> String {

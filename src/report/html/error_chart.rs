@@ -4,9 +4,8 @@ use super::number::{interval, short};
 use crate::cost::document::{Document, Errors, Estimate, Point, Summary};
 use kuva::plot::scatter::MarkerShape;
 use kuva::plot::{LinePlot, ScatterPlot};
-use kuva::render::layout::{Layout, TickFormat};
+use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
-use std::sync::Arc;
 
 /// A metric that is drawn over time; lower is better.
 #[derive(Clone, Copy)]
@@ -38,24 +37,14 @@ struct Mark<'a> {
     error: Estimate,
 }
 
-/// Marker shapes by allocation; colours tell filters apart.
-const SHAPES: [MarkerShape; 8] = [
-    MarkerShape::Circle,
-    MarkerShape::Square,
-    MarkerShape::Triangle,
-    MarkerShape::Diamond,
-    MarkerShape::TriangleDown,
-    MarkerShape::Star,
-    MarkerShape::Pentagon,
-    MarkerShape::Cross,
-];
-
 /// Draws one metric over GPU time on logarithmic axes.
 pub fn draw(document: &Document, metric: Metric) -> Chart {
     let measured = document.points.iter().filter_map(|point| Some((point, point.summary.as_ref()?)));
     let (marks, others): (Vec<_>, Vec<_>) = measured
         .map(|(point, summary)| (point, summary, (metric.of)(&summary.errors)))
-        .partition(|(_, summary, error)| is_drawn(&summary.gpu_ms) && error.is_some_and(|error| is_drawn(&error)));
+        .partition(|(_, summary, error)| {
+            chart::is_drawn(summary.gpu_ms.value) && error.is_some_and(|error| chart::is_drawn(error.value))
+        });
     let missing = others.into_iter().map(|(point, ..)| point.method.label()).collect();
     let marks: Vec<Mark> = marks
         .into_iter()
@@ -63,11 +52,6 @@ pub fn draw(document: &Document, metric: Metric) -> Chart {
         .collect();
     let svg = if marks.is_empty() { String::new() } else { plot(&marks, metric.name) };
     Chart { name: metric.name, svg, missing }
-}
-
-/// Whether logarithmic axes have a place for the value. The plotting crate draws nothing below 1e-10, and a tick for each decade.
-fn is_drawn(estimate: &Estimate) -> bool {
-    (1e-9..1e12).contains(&estimate.value)
 }
 
 fn plot(marks: &[Mark], name: &str) -> String {
@@ -83,8 +67,11 @@ fn plot(marks: &[Mark], name: &str) -> String {
     let plots: Vec<Plot> = lines.into_iter().chain([Plot::Line(front)]).chain(scatters).collect();
     let layout = chart::layout(&plots, 1000.0, 560.0).with_log_scale();
     let layout = limits(layout, marks).with_x_label("GPU time in ms").with_y_label(name);
-    let layout = layout.with_tick_format(TickFormat::Custom(Arc::new(tick)));
-    chart::svg(plots, layout, &format!("{name} against GPU time, both logarithmic, with the Pareto front"))
+    chart::svg(
+        plots,
+        chart::plain_ticks(layout),
+        &format!("{name} against GPU time, both logarithmic, with the Pareto front"),
+    )
 }
 
 /// Points of one method, which differ only in their samples per pixel.
@@ -109,7 +96,7 @@ fn series<'a>(marks: &'a [Mark<'a>]) -> Vec<Series<'a>> {
         }
         let colour = chart::colour(index_of(&mut filters, &method.filter));
         let other = index_of(&mut others, &(&method.allocate, method.rounds, &method.options));
-        all.push(Series { name, colour, shape: SHAPES[other % SHAPES.len()], marks: vec![mark] });
+        all.push(Series { name, colour, shape: chart::shape(other), marks: vec![mark] });
     }
     all
 }
@@ -124,16 +111,18 @@ fn index_of<T: PartialEq + Clone>(list: &mut Vec<T>, item: &T) -> usize {
 
 fn scatter(series: &Series, name: &str) -> ScatterPlot {
     let at = |m: &&Mark| (m.time.value, m.error.value);
-    ScatterPlot::new()
+    let plot = ScatterPlot::new()
         .with_data(series.marks.iter().map(at))
         .with_x_err_asymmetric(series.marks.iter().map(|m| arms(&m.time)))
         .with_y_err_asymmetric(series.marks.iter().map(|m| arms(&m.error)))
         .with_color(series.colour.clone())
         .with_marker(series.shape)
         .with_size(5.0)
-        .with_legend(series.name.clone())
         .with_tooltips()
-        .with_tooltip_labels(series.marks.iter().map(|m| tooltip(m, name)))
+        .with_tooltip_labels(series.marks.iter().map(|m| tooltip(m, name)));
+    // The many single points of an ablation have a chart of their own.
+    let is_step = series.marks.len() == 1 && !series.marks[0].point.method.options.is_empty();
+    if is_step { plot.with_size(3.0) } else { plot.with_legend(series.name.clone()) }
 }
 
 /// Lengths of an error bar. It ends at a tenth of the value, because a logarithmic axis has no 0, and at its tenfold, so that a
@@ -171,16 +160,6 @@ fn front(marks: &[Mark]) -> Vec<(f64, f64)> {
         better
     });
     sorted
-}
-
-/// The shortest text of a tick, which is 1, 2 or 5 times a power of 10.
-fn tick(v: f64) -> String {
-    // Computed powers of 10 may be off by a few bits.
-    let rounded = format!("{v:.0e}");
-    match v {
-        1e-4..1e6 => rounded.parse().map(|v: f64| v.to_string()).unwrap_or(rounded),
-        _ => rounded,
-    }
 }
 
 /// Axes that hold every point and its bars with a margin.

@@ -4,6 +4,7 @@
 //! - [`cost()`] is the page of a cost measurement.
 //! - [`Page`] is a page of texts, tables and images for everything else, such as a comparison.
 //! - [`viewer`] is what shows images in both.
+mod changes;
 mod chart;
 mod cost;
 mod error_chart;

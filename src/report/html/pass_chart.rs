@@ -24,9 +24,10 @@ pub fn passes(document: &Document) -> Vec<String> {
     totals.into_iter().map(|(name, _)| name).collect()
 }
 
-/// The points that have a summary.
+/// The points whose passes were timed.
 pub fn measured(document: &Document) -> impl Iterator<Item = (&Point, &Summary)> {
-    document.points.iter().filter_map(|point| Some((point, point.summary.as_ref()?)))
+    let measured = document.points.iter().filter_map(|point| Some((point, point.summary.as_ref()?)));
+    measured.filter(|(_, summary)| !summary.passes.is_empty())
 }
 
 /// Median time of the pass in milliseconds; 0 if the point does not run it. Figures that no clock gives, which would make axes
@@ -56,7 +57,7 @@ struct Segment {
 pub fn draw(document: &Document, unit: Unit) -> String {
     let passes = passes(document);
     // Bars are drawn from the bottom up.
-    let points: Vec<_> = measured(document).filter(|(_, summary)| !summary.passes.is_empty()).collect();
+    let points: Vec<_> = measured(document).collect();
     if points.is_empty() {
         return String::new();
     }

@@ -1,0 +1,168 @@
+//! The knobs that `tallow cost --ablate` turns, one at a time.
+use crate::allocate::Placing;
+use crate::cost::grid::Candidate;
+
+/// A knob, and the values that are tried of it: what a user would write behind `--`.
+struct Knob {
+    name: &'static str,
+    /// A switch has none, and is switched on.
+    values: &'static [&'static str],
+    read_by: Reader,
+}
+
+/// Which points a knob changes.
+enum Reader {
+    /// All.
+    Paths,
+    /// What is filtered, because the filter gets another part of the light.
+    Filtered,
+    /// What is placed.
+    Placed,
+    /// What is placed by one of these policies.
+    Policies(&'static [&'static str]),
+    /// What is filtered by one of these filters.
+    Filters(&'static [&'static str]),
+}
+use Reader::{Filtered, Filters, Paths, Placed, Policies};
+
+const fn knob(name: &'static str, values: &'static [&'static str], read_by: Reader) -> Knob {
+    Knob { name, values, read_by }
+}
+
+/// All knobs. Values are an octave or so to each side of the defaults, and what switches the knob off.
+const KNOBS: &[Knob] = &[
+    knob("max-depth", &["2", "3", "4", "5", "6", "7", "8"], Paths),
+    knob("roulette-depth", &["0", "3", "5"], Paths),
+    knob("sampler", &["sobol", "independent"], Paths),
+    knob("split", &["auto", "indirect", "soft"], Filtered),
+    knob("min-spp", &["0", "1", "2", "4"], Placed),
+    knob("max-spp", &["0", "8", "16", "32", "64"], Placed),
+    knob("window", &["2", "4", "8"], Policies(&["geometry", "both"])),
+    knob("sigma-normal", &["0.1", "0.35", "1"], Policies(&["geometry", "both"])),
+    knob("sigma-position", &["0.01", "0.03", "0.1"], Policies(&["geometry", "both"])),
+    knob("luminance-floor", &["0.01", "0.05", "0.2"], Policies(&["variance", "both"])),
+    knob("filtered", &["0", "0.5", "0.9"], Policies(&["both"])),
+    knob("levels", &["3", "4", "5", "6"], Filters(&["atrous", "wavelet", "svgf"])),
+    knob("radius", &["6", "12", "24", "48"], Filters(&["bilateral", "guided", "auto"])),
+    knob("sigma-rt", &["0.3", "1", "3", "inf"], Filters(&["atrous", "bilateral", "wavelet"])),
+    knob("sigma-n", &["0.1", "0.3", "1", "inf"], Filters(&["atrous", "bilateral", "wavelet", "svgf", "auto"])),
+    knob("sigma-x", &["0.02", "0.05", "0.15", "inf"], Filters(&["atrous", "bilateral", "wavelet", "svgf", "auto"])),
+    knob("form", &["listing", "squared", "printed"], Filters(&["atrous"])),
+    knob("conserve-energy", &[], Filters(&["atrous"])),
+    knob("channels", &["1", "3", "4"], Filters(&["guided", "auto"])),
+    knob("eps", &["0.001", "0.003", "0.03", "0.1"], Filters(&["guided", "auto"])),
+    knob("sums", &["blocks", "table"], Filters(&["guided", "auto"])),
+    knob("sigma-l", &["2", "4", "8"], Filters(&["svgf", "auto"])),
+    knob("basis", &["cdf22", "red-black"], Filters(&["wavelet"])),
+    knob("oidn-quality", &["fast", "balanced", "high"], Filters(&["oidn"])),
+];
+
+/// The options that change one knob of a point to another value, such as `--levels 4`.
+pub fn steps(candidate: &Candidate) -> Vec<String> {
+    KNOBS.iter().filter(|knob| knob.read_by.holds(candidate)).flat_map(|knob| knob.steps(candidate)).collect()
+}
+
+impl Knob {
+    fn steps(&self, candidate: &Candidate) -> Vec<String> {
+        let entries = [candidate.settings.entries(), candidate.filter_settings.entries()].concat();
+        let own = entries.into_iter().find(|entry| entry.name == self.name).map(|entry| entry.value);
+        let allowed = |value: &str| {
+            // Fewer at most than there are on average would leave samples over.
+            self.name != "max-spp" || value.parse().is_ok_and(|most: u32| most == 0 || most > candidate.settings.spp)
+        };
+        let others = self.values.iter().filter(|&&value| own.as_deref() != Some(value) && allowed(value));
+        let switch = self.values.is_empty().then(|| format!("--{}", self.name));
+        others.map(|value| format!("--{} {value}", self.name)).chain(switch).collect()
+    }
+}
+
+impl Reader {
+    fn holds(&self, candidate: &Candidate) -> bool {
+        let policy = candidate.settings.allocate.policy;
+        match self {
+            Paths => true,
+            Filtered => candidate.filter.is_some(),
+            Placed => policy.placing != Placing::Even,
+            Policies(names) => names.contains(&policy.name),
+            Filters(names) => candidate.filter.is_some_and(|filter| names.contains(&filter.name())),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::options::Words;
+    use super::*;
+    use crate::allocate::{POLICIES, policy};
+    use crate::cost::grid::{Axes, grid};
+    use crate::denoise::filter::{FILTERS, FilterInput, FilterSettings, Method};
+    use crate::layout::{Guide, vec4};
+    use crate::render::settings::Settings;
+
+    /// Far pixels count, so that every level of a filter changes something.
+    fn candidate(policy_name: &str, filter: Method, spp: u32) -> Candidate {
+        let axes = Axes {
+            allocate: vec![policy(policy_name).unwrap()],
+            filters: vec![filter],
+            spp: vec![spp],
+            rounds: vec![0],
+        };
+        let filters = FilterSettings::default().with(|s| s.edge.sigma_x = 2.0);
+        grid(&Settings::default(), &filters, &axes).remove(0)
+    }
+
+    /// The settings with one option.
+    fn with(candidate: &Candidate, option: &str) -> Option<Candidate> {
+        let words = Words::parse(option).unwrap();
+        candidate.varied(option, |settings, filters| words.apply(settings, filters))
+    }
+
+    #[test]
+    fn every_step_is_an_option_in_its_range_that_changes_something() {
+        for policy in POLICIES {
+            for filter in Method::all() {
+                let candidate = candidate(policy.name, filter, 4);
+                for step in steps(&candidate) {
+                    let varied = with(&candidate, &step).unwrap_or_else(|| panic!("{step} changes nothing"));
+                    varied.settings.validate().unwrap();
+                    varied.filter_settings.validate().unwrap();
+                }
+            }
+        }
+        let of_16 = steps(&candidate("both", Method::all().next().unwrap(), 16));
+        assert!(of_16.contains(&"--max-spp 32".to_owned()) && !of_16.contains(&"--max-spp 16".to_owned()));
+    }
+
+    /// Noise on two walls that meet at an edge.
+    fn input() -> FilterInput {
+        let (width, height) = (20, 16);
+        let mut random = fastrand::Rng::with_seed(3);
+        let guide = |i: u32| {
+            let (x, y) = ((i % width) as f32, (i / width) as f32);
+            let normal = if x < 9.0 { [1.0, 0.0, 0.0] } else { [0.0, 0.6, 0.8] };
+            Guide { normal, depth: 2.0 + 0.1 * x, position: [0.1 * x, 0.1 * y, 2.0 + 0.1 * x], ..Guide::default() }
+        };
+        let radiance =
+            (0..width * height).map(|_| vec4::from([random.f32(), random.f32(), random.f32(), 4.0])).collect();
+        FilterInput { width, height, radiance, guide: (0..width * height).map(guide).collect(), variance: None }
+    }
+
+    #[test]
+    fn filters_read_the_knobs_that_name_them_and_no_others() {
+        let input = input();
+        let of_filters =
+            |knob: &&Knob| matches!(knob.read_by, Filters(_)) && !["oidn-quality", "sums"].contains(&knob.name);
+        for filter in FILTERS {
+            let candidate = candidate("uniform", Method::Kernels(filter), 4);
+            let filtered = |settings: &FilterSettings| (filter.reference)(&input, &settings.scaled_to(&input));
+            let plain = filtered(&candidate.filter_settings);
+            for knob in KNOBS.iter().filter(of_filters) {
+                let differs = |step: &String| {
+                    with(&candidate, step).is_some_and(|varied| filtered(&varied.filter_settings) != plain)
+                };
+                let reads = knob.steps(&candidate).iter().any(differs);
+                assert_eq!(reads, knob.read_by.holds(&candidate), "{} of {}", knob.name, filter.name);
+            }
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! How much less error the best method has than uniform unfiltered rendering in the same time.
+use super::curve::Curve;
+use super::document::{Estimate, Finding, Verdict};
+use super::findings::Candidate;
+use super::interval;
+use super::words::{factor, milliseconds, number};
+
+/// Number of times at which methods are compared, evenly spaced on a logarithmic axis.
+const LEVELS: usize = 16;
+
+/// What the best method gains at a time.
+struct Gain<'a> {
+    time: f64,
+    by: &'a str,
+    /// relMSE of uniform unfiltered rendering over that of the best method.
+    factor: Estimate,
+}
+
+/// The least and the most that is gained over the times that uniform unfiltered rendering was measured at. `None` without it, and
+/// without another method that is there as early.
+pub fn finding(candidates: &[Candidate], confidence: f64) -> Option<Finding> {
+    let baseline = candidates.iter().find(|candidate| candidate.is_baseline)?;
+    // Times of few samples may vary more between seeds than between numbers of samples.
+    let [first, last] = Some(baseline.times()).filter(|[first, last]| first < last)?;
+    let time = |i: usize| first * (last / first).powf(i as f64 / (LEVELS - 1) as f64);
+    let gains: Vec<Gain> =
+        (0..LEVELS).filter_map(|i| gain(candidates, baseline, time(i).clamp(first, last), confidence)).collect();
+    let by_factor = |a: &&Gain, b: &&Gain| a.factor.value.total_cmp(&b.factor.value);
+    let (least, most) = (gains.iter().min_by(by_factor)?, gains.iter().max_by(by_factor)?);
+    let text = format!(
+        "From {} to {}, uniform unfiltered rendering has at least {} times the relMSE of the best other method in the same time ({} at \
+         {}), and at most {} times ({} at {}).",
+        milliseconds(gains[0].time),
+        milliseconds(last),
+        factor(&least.factor),
+        least.by,
+        milliseconds(least.time),
+        number(most.factor.value),
+        most.by,
+        milliseconds(most.time)
+    );
+    Some(Finding { verdict: Verdict::Clear, text })
+}
+
+/// What is gained at a time by the best of the methods that have begun. One that ends before keeps its last image.
+fn gain<'a>(candidates: &'a [Candidate], baseline: &Candidate, time: f64, confidence: f64) -> Option<Gain<'a>> {
+    let error = |curve: &Curve| curve.error_at(time.min(curve.times()[1])).value;
+    let others = candidates.iter().filter(|candidate| !candidate.is_baseline && candidate.times()[0] <= time);
+    let best = others.min_by(|a, b| a.mean(&error).total_cmp(&b.mean(&error)))?;
+    let factors: Vec<f64> = baseline.against(best, &error).into_iter().map(f64::exp).collect();
+    (!factors.is_empty()).then(|| Gain { time, by: &best.name, factor: interval::geometric_mean(&factors, confidence) })
+}

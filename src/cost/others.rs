@@ -1,0 +1,137 @@
+//! Points of other renderers, to be seen beside ours: a table names their images and how long each took.
+use super::document::{Method, Point, Run};
+use super::judge::judge;
+use super::reference::Reference;
+use super::session::finite;
+use crate::error::{Error, Result};
+use crate::image::{self, Picture, input};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// Bytes of memory that a byte of a table takes at most while it is read.
+const BYTES_OF_ROW: u64 = 16;
+
+/// A row of the table.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Row {
+    /// Name of the renderer.
+    method: String,
+    /// What filtered its image; "none" without.
+    filter: String,
+    /// Samples per pixel.
+    spp: u32,
+    /// Tells runs of the same point apart.
+    seed: u32,
+    /// Wall time in milliseconds.
+    ms: f64,
+    /// File of the image, relative to the table.
+    image: PathBuf,
+}
+
+/// One run of another renderer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OtherRun {
+    /// How the point is called in the document.
+    pub method: Method,
+    /// Tells runs of the same point apart.
+    pub seed: u32,
+    /// Wall time in milliseconds.
+    pub ms: f64,
+    /// File of the image.
+    pub image: PathBuf,
+}
+
+/// Reads a table of comma-separated values with the columns method, filter, spp, seed, ms and image.
+///
+/// # Errors
+/// [`Error::Input`] with the line that is wrong, and [`Error::Memory`].
+pub fn read(path: &Path) -> Result<Vec<OtherRun>> {
+    let text = input::read_text(path, BYTES_OF_ROW)?;
+    let wrong = |what: String| Error::input(path, what);
+    let run = |row: csv::Result<Row>| {
+        let Row { method, filter, spp, seed, ms, image } = row.map_err(|e| wrong(e.to_string().replace('\n', " ")))?;
+        if !(ms.is_finite() && ms > 0.0) {
+            return Err(wrong(format!("a time of {ms} ms: give a number above 0")));
+        }
+        let method = Method { allocate: method, filter, rounds: None, options: Vec::new(), spp };
+        Ok(OtherRun { method, seed, ms, image: path.parent().unwrap_or(Path::new("")).join(image) })
+    };
+    csv::Reader::from_reader(&text[..]).deserialize().map(run).collect()
+}
+
+/// The points of these runs, judged, each with its first image. A point with an image that cannot be judged has failed.
+pub fn judged(runs: &[OtherRun], reference: &Reference) -> Vec<(Point, Option<Picture>)> {
+    let mut points: Vec<(Point, Option<Picture>)> = Vec::new();
+    for run in runs {
+        let index = points.iter().position(|(point, _)| point.method == run.method).unwrap_or_else(|| {
+            points.push((Point { is_other: true, ..Point::unmeasured(run.method.clone(), String::new()) }, None));
+            points.len() - 1
+        });
+        let (point, first) = &mut points[index];
+        match one(run, reference) {
+            Ok((judged, picture)) => {
+                point.runs.push(judged);
+                first.get_or_insert(picture);
+            }
+            Err(e) => point.failed = Some(e.to_string().replace('\n', " ")),
+        }
+    }
+    points
+}
+
+fn one(run: &OtherRun, reference: &Reference) -> Result<(Run, Picture)> {
+    let picture = image::read(&run.image)?.picture(None).map_err(|what| Error::input(&run.image, what))?;
+    let [size, wanted] = [&picture, &reference.picture].map(|picture| [picture.width, picture.height]);
+    if size != wanted {
+        let what = format!("is {}x{}, but {}x{} is measured", size[0], size[1], wanted[0], wanted[1]);
+        return Err(Error::input(&run.image, what));
+    }
+    let picture = finite(picture)?;
+    let judged = Run {
+        seed: run.seed,
+        gpu_ms: run.ms,
+        wall_ms: run.ms,
+        passes: Vec::new(),
+        samples: picture.pixels.len() as u64 * u64::from(run.method.spp),
+        rays: None,
+        errors: judge(&picture, &reference.picture, reference.noise),
+    };
+    Ok((judged, picture))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(text: &str) -> Result<Vec<OtherRun>> {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("points.csv");
+        std::fs::write(&file, text).unwrap();
+        let within =
+            |run: OtherRun| OtherRun { image: run.image.strip_prefix(folder.path()).unwrap().to_owned(), ..run };
+        read(&file).map(|runs| runs.into_iter().map(within).collect())
+    }
+
+    #[test]
+    fn a_table_names_images_and_times() {
+        let runs =
+            table("method,filter,spp,seed,ms,image\nOther,none,4,7,12.5,a/b.exr\nOther,oidn,4,7,20,c.exr\n").unwrap();
+        let labels: Vec<_> = runs.iter().map(|run| run.method.label()).collect();
+        assert_eq!(labels, ["Other, 4 spp", "Other + oidn, 4 spp"]);
+        assert_eq!((runs[0].seed, runs[0].ms, &runs[0].image), (7, 12.5, &PathBuf::from("a/b.exr")));
+    }
+
+    #[test]
+    fn what_is_no_table_is_one_line() {
+        let says = |text: &str, word: &str| {
+            let line = table(text).unwrap_err().to_string();
+            assert!(line.contains(word) && !line.contains('\n'), "{line}");
+        };
+        says("method,filter,spp,seed,ms,image\nA,none,4,7,0,a.exr\n", "a time of 0 ms");
+        says("method,filter,spp,seed,ms,image\nA,none,4,7,inf,a.exr\n", "a time of inf ms");
+        says("method,filter,spp,seed,ms,image\nA,none,x,7,1,a.exr\n", "line: 2");
+        says("method,filter,spp,seed,ms,image\nA,none,4,7\n", "line: 2");
+        says("method,spp\nA,4\n", "missing field");
+    }
+}
