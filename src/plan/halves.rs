@@ -35,6 +35,16 @@ pub fn scales(width: usize, [a, b]: [&Pixels; 2]) -> Vec<[f64; 3]> {
     (0..a.len()).into_par_iter().map(scale).collect()
 }
 
+/// The same where both images are filtered: their mean as it is. Moved towards the pixels around, the rims of lamps, where few pixels
+/// have most of the error, would count for too little: in the Cornell box at 2 and 4 samples, filtered by `auto`, 0.69 and 0.72 of the
+/// error was seen, where this sees 0.83 and 0.96.
+pub fn scales_of_filtered([a, b]: [&Pixels; 2]) -> Vec<[f64; 3]> {
+    let scale = |(a, b): (&[f32; 3], &[f32; 3])| {
+        [0, 1, 2].map(|c| (0.5 * (f64::from(a[c]) + f64::from(b[c]))).powi(2) + RELMSE_EPSILON)
+    };
+    a.iter().zip(b).map(scale).collect()
+}
+
 /// Relative mean square error of either of two unbiased images: half the square of their difference.
 pub fn error([a, b]: [&Pixels; 2], scales: &[[f64; 3]]) -> f64 {
     mean(scales, |i, c| 0.5 * (f64::from(a[i][c]) - f64::from(b[i][c])).powi(2))
@@ -72,6 +82,9 @@ mod tests {
         let scales = scales(2, [&a, &b]);
         assert!((scales[0][0] - 1.01).abs() < 1e-12);
         assert!((error([&a, &b], &scales) - 2.0 / 1.01).abs() < 1e-9);
+        // The means of the filtered pixels are .8.
+        let of_filtered = scales_of_filtered([&fa, &fb]);
+        assert!(of_filtered.iter().flatten().all(|scale| (scale - (0.64 + RELMSE_EPSILON)).abs() < 1e-6));
         // By hand: (1.69 + .09) / 2 - 0 - .3 * 2 + 0 and the same of the other pixel.
         let found = error_of_filtered([&fa, &fb], [&a, &b], &scales);
         assert!((found - (0.89 - 0.6) / 1.01).abs() < 1e-6, "{found}");

@@ -132,9 +132,12 @@ impl<'a> Probe<'a> {
     /// Errors of all levels, relative to the radiance of the last.
     fn judged(&self, pairs: &[(u32, [Image; 2])]) -> Vec<Level> {
         let width = self.renderer.settings().width as usize;
-        let best = |image: &Image| image.filtered.iter().flatten().next().unwrap_or(&image.noisy).clone();
-        let [a, b] = pairs[pairs.len() - 1].1.each_ref().map(best);
-        let scales = halves::scales(width, [&a, &b]);
+        let last = &pairs[pairs.len() - 1].1;
+        let filtered = last.each_ref().map(|image| image.filtered.iter().flatten().next());
+        let scales = match filtered {
+            [Some(a), Some(b)] => halves::scales_of_filtered([a, b]),
+            _ => halves::scales(width, last.each_ref().map(|image| &image.noisy[..])),
+        };
         let measured = |[a, b]: &[Image; 2], method: usize| {
             let noisy: [&Pixels; 2] = [&a.noisy, &b.noisy];
             let error = match (&a.filtered[method], &b.filtered[method]) {
