@@ -1,9 +1,9 @@
 #include "shared/edge.glsl"
-#include "shared/b3_spline.glsl"
+#include "shared/atrous_taps.glsl"
 
-// One level of A-Trous smoothing, per pixel and thread, of one plane of estimates or three, which are right on average only.
-// Pixels of like surfaces count by their edge weights, others at least by `push.least`. Unknown pixels, which have no
-// estimate, take their neighbours'.
+// One level of A-Trous smoothing of one plane of estimates or three, which are right on average only. Pixels of like surfaces
+// count by their edge weights, others at least by `push.least`. Unknown pixels, which have no estimate, take their neighbours'.
+// A thread smooths ROWS pixels of a column.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
@@ -20,33 +20,54 @@ layout(scalar, push_constant) uniform Push { AutoSmoothPush push; };
 layout(constant_id = 114) const bool THREE = true; // false: the first plane alone
 
 void main() {
-    ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(at, size))) return;
-    Pixel p = pixel_at(at.y * size.x + at.x);
-    vec4 sum_1 = vec4(0.0), sum_2 = vec4(0.0), sum_3 = vec4(0.0);
-    float total = 0.0;
+    ivec2 size = ivec2(push.size);
+    int spacing = int(push.spacing), x = int(gl_GlobalInvocationID.x), column = int(gl_GlobalInvocationID.y);
+    int first_y = first_row(column, spacing);
+    if (x >= size.x || first_y >= size.y) return;
+    Pixel centre[ROWS];
+    vec4 sum_1[ROWS], sum_2[ROWS], sum_3[ROWS];
+    float total[ROWS];
+    [[unroll]] for (int k = 0; k < ROWS; k++) {
+        centre[k] = pixel_at(min(first_y + k * spacing, size.y - 1) * size.x + x);
+        sum_1[k] = vec4(0.0);
+        sum_2[k] = vec4(0.0);
+        sum_3[k] = vec4(0.0);
+        total[k] = 0.0;
+    }
     // Tested at its end: see shared/traverse.glsl.
-    int j = -2;
+    int i = -2;
     do {
-        [[unroll]] for (int i = -2; i <= 2; i++) {
-            ivec2 tap = clamp(at + int(push.spacing) * ivec2(i, j), ivec2(0), size - 1); // borders repeat
-            int there = tap.y * size.x + tap.x;
+        int tap_x = clamp(x + i * spacing, 0, size.x - 1); // borders repeat
+        [[unroll]] for (int j = -2; j < ROWS + 2; j++) {
+            int there = clamp(first_y + j * spacing, 0, size.y - 1) * size.x + tap_x;
             Pixel q = pixel_at(there);
-            float alike = edge_weight(q, edge_exponent(p, q, push.rates));
-            float w = b3_spline(i) * b3_spline(j) * (q.colour.w > 0.0 ? max(alike, push.least) : 0.0);
-            sum_1 += w * texelFetch(first, there);
+            vec4 value_1 = texelFetch(first, there), value_2 = vec4(0.0), value_3 = vec4(0.0);
             if (THREE) {
-                sum_2 += w * texelFetch(second, there);
-                sum_3 += w * texelFetch(third, there);
+                value_2 = texelFetch(second, there);
+                value_3 = texelFetch(third, there);
             }
-            total += w;
+            [[unroll]] for (int k = 0; k < ROWS; k++) { // constant bounds, or it would not be unrolled
+                if (abs(j - k) <= 2) {
+                    float alike = edge_weight(q, edge_exponent(centre[k], q, push.rates));
+                    float w = b3_spline(i) * b3_spline(j - k) * (q.colour.w > 0.0 ? max(alike, push.least) : 0.0);
+                    sum_1[k] += w * value_1;
+                    if (THREE) {
+                        sum_2[k] += w * value_2;
+                        sum_3[k] += w * value_3;
+                    }
+                    total[k] += w;
+                }
+            }
         }
-    } while (++j <= 2);
-    int here = at.y * size.x + at.x;
-    float share = total > 0.0 ? 1.0 / total : 0.0;
-    first_smoothed[here] = share * sum_1;
-    if (THREE) {
-        second_smoothed[here] = share * sum_2;
-        third_smoothed[here] = share * sum_3;
+    } while (++i <= 2);
+    [[unroll]] for (int k = 0; k < ROWS; k++) {
+        int y = first_y + k * spacing, here = y * size.x + x;
+        if (y >= size.y) continue;
+        float share = total[k] > 0.0 ? 1.0 / total[k] : 0.0;
+        first_smoothed[here] = share * sum_1[k];
+        if (THREE) {
+            second_smoothed[here] = share * sum_2[k];
+            third_smoothed[here] = share * sum_3[k];
+        }
     }
 }

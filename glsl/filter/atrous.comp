@@ -1,10 +1,9 @@
 #include "shared/edge.glsl"
-#include "shared/b3_spline.glsl"
+#include "shared/atrous_taps.glsl"
 
 // Filters radiance by one level of the edge-avoiding A-Trous wavelet transform (Dammertz et al. 2010, section 2.2): 5x5 taps
 // that are push.spacing pixels apart, each weighted by how alike the two pixels are and by its number of samples. A thread
-// filters ROWS pixels of a column, push.spacing apart, because they share most of their taps; neighbouring threads have
-// neighbouring columns, so that every level reads contiguous memory.
+// filters ROWS pixels of a column.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
@@ -15,7 +14,6 @@ layout(scalar, push_constant) uniform Push { AtrousPush push; };
 
 layout(constant_id = 114) const bool CONSERVE = false; // weight that a neighbour lacks goes to the centre
 
-const int ROWS = 4;
 const float MOST_SAMPLES = 1e12; // larger counts are cut, so that sums stay finite
 
 // Departure from the paper, for images whose pixels differ in samples. If geometry placed the samples, pixels have like noise,
@@ -26,7 +24,7 @@ float trust(Pixel q) { return CONSERVE ? 1.0 : sqrt(min(q.colour.w, MOST_SAMPLES
 void main() {
     ivec2 size = ivec2(push.size);
     int spacing = int(push.spacing), x = int(gl_GlobalInvocationID.x), column = int(gl_GlobalInvocationID.y);
-    int first = column / spacing * (ROWS * spacing) + column % spacing;
+    int first = first_row(column, spacing);
     if (x >= size.x || first >= size.y) return;
     Pixel centre[ROWS];
     vec3 sum[ROWS];

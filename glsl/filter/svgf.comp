@@ -1,10 +1,10 @@
 #include "shared/edge.glsl"
-#include "shared/b3_spline.glsl"
+#include "shared/atrous_taps.glsl"
 #include "shared/luminance.glsl"
 
-// Filters one pixel per thread by one level of A-Trous wavelets whose luminance weight is relative to the pixel's standard
-// deviation (Schied et al. 2017, section 4.4). It filters the variance (w) too; the last level writes the number of samples
-// in its place.
+// Filters by one level of A-Trous wavelets whose luminance weight is relative to the pixel's standard deviation (Schied et al.
+// 2017, section 4.4). It filters the variance (w) too; the last level writes the number of samples in its place. A thread filters
+// ROWS pixels of a column.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer estimate; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
@@ -39,32 +39,52 @@ float deviation(ivec2 at) {
 }
 
 void main() {
-    ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(at, size))) return;
-    vec4 here = texelFetch(estimate, index(at));
-    bool known = here.w >= 0.0;
-    Pixel p = unpack_pixel(here, texelFetch(place, index(at)));
-    float rate = push.rate_l / (deviation(at) + 1e-30); // stays finite without variance, so that equal pixels weigh 1
-    vec3 sum = vec3(0.0);
-    float total = 0.0, spread = 0.0;
+    ivec2 size = ivec2(push.size);
+    int spacing = int(push.spacing), x = int(gl_GlobalInvocationID.x), column = int(gl_GlobalInvocationID.y);
+    int first = first_row(column, spacing);
+    if (x >= size.x || first >= size.y) return;
+    vec4 centre[ROWS];
+    Pixel pixel[ROWS];
+    float rate[ROWS], total[ROWS], spread[ROWS];
+    vec3 sum[ROWS];
+    [[unroll]] for (int k = 0; k < ROWS; k++) {
+        ivec2 at = nearest(ivec2(x, first + k * spacing));
+        centre[k] = texelFetch(estimate, index(at));
+        pixel[k] = unpack_pixel(centre[k], texelFetch(place, index(at)));
+        // Stays finite without variance, so that equal pixels weigh 1. An unknown pixel has no luminance to compare.
+        rate[k] = centre[k].w >= 0.0 ? push.rate_l / (deviation(at) + 1e-30) : 0.0;
+        sum[k] = vec3(0.0);
+        total[k] = 0.0;
+        spread[k] = 0.0;
+    }
     // Tested at its end: see shared/traverse.glsl.
     int i = -2;
     do {
-        [[unroll]] for (int j = -2; j <= 2; j++) {
-            ivec2 tap = at + int(push.spacing) * ivec2(i, j), inside = nearest(tap);
+        [[unroll]] for (int j = -2; j < ROWS + 2; j++) {
+            ivec2 tap = ivec2(x + i * spacing, first + j * spacing), inside = nearest(tap);
             vec4 there = texelFetch(estimate, index(inside));
             float counts = there.w >= 0.0 && tap == inside ? 1.0 : 0.0;
             Pixel q = unpack_pixel(vec4(there.rgb, counts), texelFetch(place, index(inside)));
-            float exponent = edge_exponent(p, q, push.rates);
-            if (known) exponent -= rate * abs(contrast(q.colour.rgb, p.colour.rgb));
-            float w = b3_spline(i) * b3_spline(j) * edge_weight(q, exponent);
-            sum += w * (q.colour.rgb - p.colour.rgb);
-            total += w;
-            spread += w * w * there.w;
+            [[unroll]] for (int k = 0; k < ROWS; k++) { // constant bounds, or it would not be unrolled
+                if (abs(j - k) <= 2) {
+                    float steps = rate[k] * abs(contrast(q.colour.rgb, pixel[k].colour.rgb));
+                    float w = b3_spline(i) * b3_spline(j - k) * edge_weight(q, edge_exponent(pixel[k], q, push.rates) - steps);
+                    sum[k] += w * (q.colour.rgb - pixel[k].colour.rgb);
+                    total[k] += w;
+                    spread[k] += w * w * there.w;
+                }
+            }
         }
     } while (++i <= 2);
-    if (total > 0.0) here = vec4(here.rgb + sum / total, spread / (total * total));
-    float count = texelFetch(colour, index(at)).w;
-    if (LAST) here.w = count > 0.0 ? count : here.w >= 0.0 ? 1.0 : 0.0;
-    filtered[index(at)] = here;
+    [[unroll]] for (int k = 0; k < ROWS; k++) {
+        ivec2 at = ivec2(x, first + k * spacing);
+        if (at.y >= size.y) continue;
+        vec4 here = centre[k];
+        if (total[k] > 0.0) here = vec4(here.rgb + sum[k] / total[k], spread[k] / (total[k] * total[k]));
+        if (LAST) {
+            float count = texelFetch(colour, index(at)).w;
+            here.w = count > 0.0 ? count : here.w >= 0.0 ? 1.0 : 0.0;
+        }
+        filtered[index(at)] = here;
+    }
 }

@@ -1,4 +1,5 @@
 //! Edge-avoiding À-Trous wavelet filter (Dammertz, Sewtz, Hanika, Lensch, HPG 2010). Kernel: `glsl/filter/atrous.comp`.
+use super::atrous_taps::threads;
 use super::edge::{EdgeSettings, Rates, edge_weight};
 use super::footprint::FootprintSettings;
 use super::pack::{Pack, Packed};
@@ -7,7 +8,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{AtrousPush, vec4};
 use crate::settings::{choices, settings};
-use crate::shaders::atrous::{Bind, Constants, MOST_SAMPLES, ROWS};
+use crate::shaders::atrous::{Bind, Constants, MOST_SAMPLES};
 use glam::Vec3;
 
 /// See [`super::FILTERS`].
@@ -92,7 +93,6 @@ impl Atrous {
 impl Filter for Atrous {
     fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
         self.pack.record(rec, planes)?;
-        let [width, height] = planes.size;
         let mut from = &self.pack.colour;
         for (level, rates) in (0..).zip(&self.rates) {
             let to = match level + 1 == self.rates.len() {
@@ -104,8 +104,7 @@ impl Filter for Atrous {
             let push = AtrousPush { size: planes.size, spacing, rates: rates.as_array(), ..Default::default() };
             let kernel = &self.kernels[usize::from(level >= self.rt_from_level as usize)];
             let bind = Bind { colour: from, place: &self.pack.place, filtered: to };
-            let columns = height.div_ceil(ROWS as u32 * spacing) * spacing;
-            rec.dispatch(kernel, bind, &push, kernel.groups([width, columns]))?;
+            rec.dispatch(kernel, bind, &push, kernel.groups(threads(planes.size, spacing)))?;
             from = to;
         }
         Ok(())

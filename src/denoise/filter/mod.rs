@@ -1,6 +1,7 @@
 //! Reconstructing the light between the samples. A filter is a row of [`FILTERS`]: a Rust file that records its kernels
 //! and has their CPU twin, and GLSL files of the same names.
 mod atrous;
+mod atrous_taps;
 mod auto;
 mod bilateral;
 mod edge;

@@ -1,5 +1,6 @@
 //! À-Trous wavelets steered by each pixel's variance: the spatial half of SVGF (Schied et al., HPG 2017). Kernel:
 //! `glsl/filter/svgf.comp`.
+use super::atrous_taps::threads;
 use super::edge::{EdgeSettings, Rates, edge_weight};
 use super::noise_estimate::{self, Estimate, contrast};
 use super::pack::{Pack, Packed};
@@ -83,16 +84,12 @@ impl Filter for Svgf {
                 false if level % 2 == 0 => &self.scratch,
                 false => &self.estimate.plane,
             };
-            let push = SvgfPush {
-                size: planes.size,
-                spacing: 1 << level,
-                rate_l: self.rate_l,
-                rates: self.rates.as_array(),
-                ..Default::default()
-            };
+            let (spacing, rates) = (1 << level, self.rates.as_array());
+            let push =
+                SvgfPush { size: planes.size, spacing, rate_l: self.rate_l, rates, ..Default::default() };
             let bind = Bind { estimate: from, place: &self.pack.place, colour: &self.pack.colour, filtered: to };
             let kernel = &self.kernels[usize::from(last)];
-            rec.dispatch(kernel, bind, &push, kernel.groups(planes.size))?;
+            rec.dispatch(kernel, bind, &push, kernel.groups(threads(planes.size, spacing)))?;
             from = to;
         }
         Ok(())

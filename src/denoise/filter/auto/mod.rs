@@ -2,6 +2,7 @@
 //! `glsl/auto*.comp`.
 mod reference;
 
+use super::atrous_taps::threads;
 use super::edge::{EdgeSettings, Rates};
 use super::noise_estimate::Estimate;
 use super::pack::Pack;
@@ -259,14 +260,9 @@ impl Auto {
                 second_smoothed,
                 third_smoothed,
             };
-            let push = AutoSmoothPush {
-                size: planes.size,
-                spacing: 1 << level,
-                rates,
-                least: least(level, across),
-                ..Default::default()
-            };
-            rec.dispatch(smooth, bind, &push, smooth.groups(planes.size))
+            let (spacing, least) = (1 << level, least(level, across));
+            let push = AutoSmoothPush { size: planes.size, spacing, rates, least, ..Default::default() };
+            rec.dispatch(smooth, bind, &push, smooth.groups(threads(planes.size, spacing)))
         })
     }
 }
