@@ -2,14 +2,21 @@
 #include "shared/thread.glsl"
 #include "shared/scene.glsl"
 #include "shared/frame.glsl"
+#include "shared/finite.glsl"
 
-// Finds for each pixel of the last frame the pixel of the new one that its point has moved to (forward reprojection, Schalk 2018,
-// 3.2), and offers its samples there if that pixel shows the same surface and the light towards the new view differs little. Of
-// several offers the one nearest to the pixel's centre wins, then that of the lowest old pixel: an atomic minimum of integers,
-// whose result does not depend on the order of threads.
+// Finds for each pixel of the last frame the point of the new film that its samples' point has moved to (forward reprojection,
+// Schalk 2018, 3.2), and offers its samples to the four pixels around, where those show the same surface and the light towards the
+// new view differs little. Where something else has moved, points have moved with it, and what has become of their light is known
+// from probes: as if the scene changed first, before the last camera, and then the camera moved.
+//
+// Of several offers the one nearest to the pixel's centre wins, then that of the lowest old pixel: an atomic minimum of integers,
+// whose result does not depend on the order of threads. A point within a pixel is nearer than one outside, which so comes in where
+// there is no other: departure from the paper, which offers to one pixel alone. Where the image grows or shrinks by 1 % a frame, a
+// quarter of all pixels would find no point within them, and after 16 frames a pixel would have two samples, not 17.
 layout(local_size_x_id = 100) in;
 layout(binding = 11) uniform usamplerBuffer history; // of History
-layout(binding = 12) uniform usamplerBuffer points; // of SurfacePoint
+layout(binding = 12) uniform usamplerBuffer guide; // of Guide
+layout(binding = 13) uniform usamplerBuffer changes; // of LightChange
 layout(scalar, binding = 16) uniform Previous { Camera previous; };
 layout(scalar, binding = 17) buffer Offers { uint offered[]; };
 layout(scalar, binding = 18) buffer Winners { uint winner[]; };
@@ -17,21 +24,19 @@ layout(scalar, push_constant) uniform Push { ReprojectPush push; };
 
 #include "shared/surface_point.glsl"
 #include "shared/history.glsl"
+#include "shared/cell.glsl"
 
 // A key's upper 6 bits are the distance from the pixel's centre, its lower 26 the old pixel.
 const uint PIXEL_BITS = 26u;
-// Two hits are of one surface if one lies no farther from the plane of the other than this, in widths of a pixel there, and if
-// the normals of their triangles are no farther apart than this cosine. Neighbours of a curved mesh differ by less.
-const float PLANE_DISTANCE = 0.5, NORMAL_COSINE = 0.9;
+// A hit is of the surface of a point if it lies no farther from the plane there than this, in widths of a pixel.
+const float PLANE_DISTANCE = 0.5;
 // An albedo below this does not make more of the light that arrives: the quotient would only show noise.
 const float LEAST_ALBEDO = 0.05;
 
-bool same_surface(Surface old, Surface seen) {
-    float width = pixel_width(camera, push.size) * distance(seen.position, camera.position);
-    bool plane = abs(dot(seen.geometric, old.position - seen.position)) <= PLANE_DISTANCE * width;
-    bool side = dot(old.geometric, previous.position - old.position) * dot(old.geometric, camera.position - old.position) > 0.0;
-    bool alike = old.object == seen.object && old.material == seen.material;
-    return alike && side && plane && dot(old.geometric, seen.geometric) >= NORMAL_COSINE;
+bool shows(uint pixel, Surface s) {
+    float off = abs(dot(s.geometric, Guide_position(guide, pixel) - s.position));
+    bool near = off <= PLANE_DISTANCE * pixel_width(camera, push.size) * Guide_depth(guide, pixel);
+    return near && Guide_object(guide, pixel) == s.object && Guide_material(guide, pixel) == s.material;
 }
 
 // Light of the pixels around one: that of a single pixel would let noise decide, and dark samples would be kept more often.
@@ -49,8 +54,9 @@ vec3 light_around(uint pixel) {
 vec3 scattered(Surface s, Bsdf bsdf, vec3 wo, vec3 wi) {
     bool turns = (s.flags & MATERIAL_TWO_SIDED) != 0u;
     Facing facing = facing_normals(s, wo, turns, true);
-    mat3 basis = basis_from_normal(facing.normal);
+    mat3 basis = shading_basis(s, bsdf, facing.normal);
     vec3 towards = wo * basis, from = wi * basis;
+    if (FX_COAT_NORMALS) bsdf.metallic.coat_normal = local_coat_normal(s, facing, basis, towards);
     bsdf_view(bsdf, towards);
     return bsdf_evaluate(bsdf, towards, from).rgb / max(from.z, 1e-3);
 }
@@ -75,26 +81,35 @@ float view_error(Surface s, uint pixel, vec3 before, vec3 after) {
 // Lambertian reflection alone is the same in every direction.
 const bool DEPENDS_ON_VIEW = !ONE_KIND || !FX_DIFFUSE;
 
-// Returns the word of the samples in their new pixel, or why they stay behind; `key` is what they offer to the pixel `to`.
-uint moved(uint pixel, Carried c, out uint to, out uint key) {
-    to = 0u;
-    key = NONE;
-    Surface s = surface_of(History_triangle(history, pixel), History_instance(history, pixel), History_weights(history, pixel));
-    vec3 film = film_from_point(camera, s.position, push.size);
-    bool inside = film.x >= 0.0 && film.y >= 0.0 && film.x < float(push.size.x) && film.y < float(push.size.y);
-    if (!(film.z > 0.0) || !inside) return dropped(DROPPED_OUTSIDE);
-    to = min(uint(film.y), push.size.y - 1u) * push.size.x + min(uint(film.x), push.size.x - 1u);
-    SurfacePoint at = SurfacePoint_load(points, to);
-    if (at.triangle == NONE || !same_surface(s, surface_of(at))) return dropped(DROPPED_HIDDEN);
-    if (DEPENDS_ON_VIEW) {
-        float error = view_error(s, pixel, normalize(previous.position - s.position), normalize(camera.position - s.position));
-        if (!(error <= push.max_error)) return dropped(DROPPED_VIEW);
-        c.error += uint(ceil(error * float(ERROR_PARTS) / max(push.max_error, 1e-30)));
-        if (c.error > ERROR_PARTS) return dropped(DROPPED_VIEW);
+// Offers the samples of a pixel to those around `film`, a point of the film. Returns why none takes them, or 0.
+uint offer(uint pixel, Surface s, vec2 film) {
+    ivec2 size = ivec2(push.size), corner = ivec2(floor(clamp(film, vec2(-2.0), vec2(size) + 2.0) - 0.5));
+    uint reason = DROPPED_OUTSIDE;
+    for (int k = 0; k < 4; k++) {
+        ivec2 at = corner + ivec2(k & 1, k >> 1);
+        if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size))) continue;
+        uint to = uint(at.y * size.x + at.x);
+        bool taken = shows(to, s);
+        vec2 off = abs(film - vec2(at) - 0.5);
+        if (taken) atomicMin(winner[to], min(uint(max(off.x, off.y) * 64.0), 63u) << PIXEL_BITS | pixel);
+        reason = taken ? 0u : reason == 0u ? 0u : DROPPED_HIDDEN;
     }
-    vec2 off = abs(fract(film.xy) - 0.5);
-    key = uint(max(off.x, off.y) * 126.0) << PIXEL_BITS | pixel;
-    return word_of(Carried(c.count, c.age + 1u, c.error));
+    return reason;
+}
+
+// Moves the samples of a pixel. Returns their word in their new pixel, or why they stay behind.
+uint moved(uint pixel, Carried c) {
+    Surface s = surface_of(History_triangle(history, pixel), History_instance(history, pixel), History_weights(history, pixel));
+    if (c.back != (dot(s.geometric, camera.position - s.position) < 0.0)) return dropped(DROPPED_HIDDEN);
+    float light = push.moved != 0u ? LightChange_error(changes, cell_of(pixel, push.size)) : 0.0, view = 0.0;
+    if (DEPENDS_ON_VIEW)
+        view = view_error(s, pixel, normalize(previous.position - s.position), normalize(camera.position - s.position));
+    bool small = light + view <= push.max_error;
+    c.error += small ? uint(ceil((light + view) * float(ERROR_PARTS) / max(push.max_error, 1e-30))) : 0u;
+    if (!small || c.error > ERROR_PARTS) return dropped(light > view ? DROPPED_LIGHT : DROPPED_VIEW);
+    vec3 film = film_from_point(camera, s.position, push.size);
+    uint reason = film.z > 0.0 && finite(film) ? offer(pixel, s, film.xy) : DROPPED_OUTSIDE;
+    return reason == 0u ? word_of(Carried(c.count, c.age + 1u, c.error, c.back)) : dropped(reason);
 }
 
 void main() {
@@ -103,10 +118,6 @@ void main() {
     uint pixel = push.first_pixel + i;
     Carried c = carried_of(offered[pixel]);
     if (c.count == 0u) return;
-    uint to = pixel, key = pixel;
-    if (push.moved != 0u || previous != camera) {
-        offered[pixel] = c.age < push.max_age ? moved(pixel, c, to, key) : dropped(DROPPED_OLD);
-        if (c.age >= push.max_age) return;
-    }
-    if (key != NONE) atomicMin(winner[to], key);
+    if (push.moved == 0u && previous == camera) winner[pixel] = pixel;
+    else offered[pixel] = c.age < push.max_age ? moved(pixel, c) : dropped(DROPPED_OLD);
 }

@@ -140,7 +140,8 @@ pub fn run(args: &Args) -> Result<Exit> {
     };
     let (args, settings) = &planned::applied(args, settings, plan.as_ref())?;
     let renderer = host.time("upload and compile", || renderer(args, &gpu, &scene, settings))?;
-    let mut taken = shoot(args, &gpu, &scene, &renderer, earlier.as_ref(), host)?;
+    let begun = Begun { earlier: earlier.as_ref(), carries: false };
+    let mut taken = shoot(args, &gpu, &scene, &renderer, begun, host)?;
     if let Some(taken) = &mut taken {
         taken.outcome.plan = plan;
     }
@@ -172,6 +173,15 @@ pub struct Taken<'a> {
     checkpoint: Option<CheckpointFile>,
 }
 
+/// What a render begins with.
+#[derive(Clone, Copy, Default)]
+pub struct Begun<'a> {
+    /// The render that it continues.
+    pub earlier: Option<&'a Checkpoint>,
+    /// Whether with samples of the frame before.
+    pub carries: bool,
+}
+
 /// Takes the samples; none when it was interrupted before the first.
 ///
 /// # Errors
@@ -181,12 +191,13 @@ pub fn shoot<'a>(
     gpu: &'a Gpu,
     scene: &'a Scene,
     renderer: &Renderer,
-    earlier: Option<&Checkpoint>,
+    begun: Begun,
     mut host: Spans,
 ) -> Result<Option<Taken<'a>>> {
     let noisy = args.denoise.map(|_| Noisy::of_film(renderer)).transpose()?;
     let pixel = args.pixel.map(|[x, y]| y * renderer.settings().width + x);
-    let job = Job { checkpoint: earlier, pixel, ..Job::new(renderer) };
+    let Begun { earlier: checkpoint, carries } = begun;
+    let job = Job { checkpoint, pixel, carries, ..Job::new(renderer) };
     let shot = Shot { args, gpu, job };
     let mut files = Files::new(args.resume.as_deref());
     let (status, checkpoint) = host.time("render", || shot.trace(&mut files))?;
@@ -205,6 +216,11 @@ impl Taken<'_> {
     /// What was rendered, filtered once [`Taken::finish`] has done so.
     pub fn film(&self) -> &Film {
         &self.outcome.film
+    }
+
+    /// The same, before it is written.
+    pub fn film_mut(&mut self) -> &mut Film {
+        &mut self.outcome.film
     }
 
     /// Writes what was rendered, filters it, and tells how it went.

@@ -1,7 +1,7 @@
 //! Structs of the kernels that carry samples from frame to frame (`glsl/reproject`).
 #[cfg(doc)]
 use super::*;
-use super::{Field, Struct, float, uint, uvec2, vec2, vec3};
+use super::{Field, PathConstants, Struct, float, uint, uvec2, vec2, vec3};
 use bytemuck::{Pod, Zeroable};
 
 gpu_structs! {
@@ -17,7 +17,7 @@ gpu_structs! {
 
     /// What a pixel of the last frame hands on. Their number is in a word of its own (`glsl/shared/history.glsl`).
     struct History {
-        /// The point that the samples are of, as [`SurfacePoint::triangle`].
+        /// The point that the samples are of, as [`SurfacePoint::triangle`], numbered as in the new frame.
         triangle: uint,
         /// As [`SurfacePoint::instance`].
         instance: uint,
@@ -57,7 +57,49 @@ gpu_structs! {
         max_age: uint,
         /// Samples that the new frame gives a pixel: carried samples that are fewer take on the new frame's point.
         spp: uint,
-        /// 1 where something in the scene has moved besides the camera.
+        /// 1 where something in the scene has changed besides the camera.
         moved: uint,
+        /// 1 where instances are numbered anew.
+        instances: uint,
+        /// 1 where triangles are numbered anew.
+        triangles: uint,
+    }
+
+    /// Of a cell, a square of the film: one path, as the light was before the scene changed. 1 texel.
+    struct Probe {
+        /// Radiance, W/(m^2 sr).
+        light: vec3,
+        /// The pixel that its first point is of, or [`NONE`] where no pixel of the cell hands on samples.
+        pixel: uint,
+    }
+
+    /// How light has changed at the paths of a cell, or of the cells around it, linear Rec. 709. 2 texels.
+    struct LightChange {
+        /// Sum of the differences of radiance, W/(m^2 sr).
+        sum: vec3,
+        /// The change that is certain, W/(m^2 sr).
+        error: float,
+        /// Sum of the squares of the differences.
+        squares: vec3,
+        /// Number of paths.
+        count: uint,
+    }
+
+    /// Push constants of `probe.comp`.
+    struct ProbePush {
+        /// As [`PathPush::constants`], with a seed of the probes' own.
+        constants: PathConstants,
+        /// Cells.
+        cells: uint,
+        /// 1 once the scene has changed.
+        after: uint,
+    }
+
+    /// Push constants of `light_change.comp`.
+    struct LightChangePush {
+        /// Cells across and down.
+        cells: uvec2,
+        /// Distance between the cells that are summed, in cells.
+        spacing: uint,
     }
 }

@@ -6,8 +6,9 @@ use crate::layout::{FrameConstants, NONE, PriorityPush};
 use crate::render::buffers::{DeviceScene, FilmBuffers};
 use crate::render::history::History;
 use crate::render::kernels::{Allocation, Kernels};
+use crate::render::moving::check_camera;
 use crate::render::pass::sample_list::Bind;
-use crate::render::pass::{accumulate, choose, path, primary_hit, reproject, sample_list};
+use crate::render::pass::{accumulate, choose, light_change, path, primary_hit, reproject, sample_list};
 use crate::render::schedule::Step;
 
 /// What the frames of a renderer are recorded from: what they read, what they write, and the kernels between.
@@ -49,13 +50,7 @@ impl Frame {
     /// # Errors
     /// [`Error::Usage`] when nothing is, or when the camera has a lens or is orthographic.
     pub fn history(&self) -> Result<&History> {
-        if self.constants.camera.orthographic != 0 {
-            return Err(Error::Usage("nothing can be carried between views of an orthographic camera".into()));
-        }
-        if self.constants.camera.lens_radius > 0.0 {
-            let what = "samples through a lens show many points: nothing can be carried; render with lens_radius 0";
-            return Err(Error::Usage(what.into()));
-        }
+        check_camera(&self.constants.camera)?;
         let without = || Error::Usage("this renderer keeps no history: call Renderer::keep_history first".into());
         self.history.as_ref().ok_or_else(without)
     }
@@ -73,6 +68,7 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
             rec.fill(&film.broken, 0)?; // 0 -> broken
             if let Some(history) = &frame.history {
                 rec.fill(&history.carried, 0)?; // 0 -> carried[P]
+                history.settle();
             }
             for tile in &film.tiles {
                 rec.fill(&tile.stats, 0)?; // 0 -> stats[P]
@@ -90,9 +86,14 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
             rec.copy(&scene.camera, &history.previous)?; // camera -> previous camera
             rec.update(&scene.camera, &constants.camera)?; // camera
             rec.fill(&film.broken, 0)?; // 0 -> broken
-            reproject::remember(rec, history, scene, tile, &constants.path)?; // guide[P], stats[P] -> history[P]
+            if history.has_changed() {
+                light_change::after(rec, history, scene, tile, &constants.path)?; // probes[cells], history[P] -> changes[cells]
+            } else {
+                reproject::remember(rec, history, scene, tile, &constants.path)?; // guide[P], stats[P] -> history[P]
+            }
             primary_hit::record(&kernels.primary_hit, rec, scene, tile, &constants.path)?; // camera -> guide[P], points[P]
             reproject::carry(rec, history, scene, tile, &constants.path)?; // history[P], points[P] -> stats[P], light[P]
+            history.settle();
             if let Some(Allocation { policy, .. }) = &frame.allocation {
                 policy.prepare(rec, &inputs(film), priority_push)?; // guide[P] -> the policy's own
             }
@@ -129,6 +130,18 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Records what a history needs of the last frame before more than the camera changes: [`Step::Reproject`] does the rest.
+///
+/// # Errors
+/// As [`record`].
+pub fn record_change(rec: &mut Recorder, frame: &Frame) -> Result<()> {
+    let Frame { scene, film, constants, .. } = frame;
+    let (history, tile) = (frame.history()?, &film.tiles[0]);
+    rec.copy(&scene.camera, &history.previous)?; // camera -> previous camera
+    reproject::remember(rec, history, scene, tile, &constants.path)?; // guide[P], stats[P] -> history[P]
+    light_change::before(rec, history, scene, tile, &constants.path) // points[P] -> probes[cells]
 }
 
 /// Samples are placed on films of one tile alone.

@@ -1,12 +1,20 @@
 //! What is kept from frame to frame: the samples of each pixel, and the points of the scene that they are of.
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Gpu, Kernel, Location};
-use crate::layout::{Camera, Effects, History as Record, HistoryLight, PathConstants, ReprojectPush};
+use crate::layout::{
+    AliasEntry, Camera, Effects, History as Record, HistoryLight, Light, LightChange, PathConstants, Probe,
+    ReprojectPush, SurfacePoint,
+};
+use crate::math::hash::pcg;
+use crate::render::buffers::DeviceScene;
+use crate::scene::{Change, Relit};
 use crate::settings::{FROM_0, entry, settings};
 use crate::shaders;
+use crate::shaders::shared::cell::CELL;
 use crate::shaders::shared::history::{MOST_CARRIED, *};
-use crate::shaders::shared::traverse;
+use crate::shaders::shared::{scene, traverse};
 use serde::Serialize;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 settings! {
     /// Which samples of a frame are carried to the next.
@@ -14,7 +22,7 @@ settings! {
     pub struct Reproject {
         /// The settings of [`Reproject`] that are given; the others are `None`.
         ReprojectOverrides {
-            /// Largest error by the changed view that carried samples may have, in units of radiance.
+            /// Largest error by changed view and changed light that carried samples may have, in units of radiance.
             reproject_error: f32 = 1.0 / 256.0, FROM_0;
             /// Largest distance of the hits around a pixel from its surface's plane, in widths of the pixel there.
             reproject_aliasing: f32 = 0.5, FROM_0;
@@ -30,7 +38,8 @@ settings! {
 const MOST_PIXELS: u32 = 1 << shaders::project::PIXEL_BITS;
 
 /// The kernels and buffers of reprojection. `P` pixels; 64 bytes each, with [`crate::render::FilmTile::points`], and 28 more where
-/// direct and indirect light are kept apart.
+/// direct and indirect light are kept apart. Where more changes than the camera, 5 more for the cells of the film in which light is
+/// probed, 4x4 pixels each.
 pub struct History {
     /// Writes what pixels hand on.
     pub(super) remember: Kernel<shaders::remember::Bind<'static>>,
@@ -48,6 +57,29 @@ pub struct History {
     pub carried: Buffer<u32>,
     /// The camera of the last frame.
     pub(super) previous: Buffer<Camera>,
+    /// Finds how light has changed.
+    pub(super) probe: Kernel<shaders::probe::Bind<'static>>,
+    /// Sums it over neighbouring cells.
+    pub(super) light_change: Kernel<shaders::light_change::Bind<'static>>,
+    /// Cells across and down.
+    pub(super) cells: [u32; 2],
+    /// A path of each cell.
+    pub(super) probes: Buffer<Probe>,
+    /// How light has changed in each cell: two, of which the levels read and write one each.
+    pub(super) changes: [Buffer<LightChange>; 2],
+    /// Where lights have changed: those before and those now, as probes choose them, and the table that chooses.
+    pub(super) lights: [Buffer<Light>; 2],
+    pub(super) light_table: Buffer<AliasEntry>,
+    /// By their numbers in the last frame, those of instances and triangles in this one; unused unless `numbered` says so.
+    pub(super) instance_now: Buffer<u32>,
+    pub(super) triangle_now: Buffer<u32>,
+    /// What the paths of probes are told in place of the frame's constants; none where lights are as they were.
+    relit: Option<PathConstants>,
+    probe_seed: u32,
+    /// Whether instances and triangles are numbered anew.
+    numbered: [bool; 2],
+    /// Whether more than the camera has changed since the last frame.
+    changed: AtomicBool,
     settings: Reproject,
     spp: u32,
 }
@@ -56,10 +88,10 @@ impl History {
     /// Bytes of a pixel, the point of its first hit included.
     pub fn bytes_per_pixel(split_light: bool) -> usize {
         let light = if split_light { size_of::<HistoryLight>() } else { 0 };
-        size_of::<Record>() + 2 * size_of::<u32>() + size_of::<crate::layout::SurfacePoint>() + light
+        size_of::<Record>() + 2 * size_of::<u32>() + size_of::<SurfacePoint>() + light
     }
 
-    /// For a film of `pixels` pixels, which get `spp` samples a frame. `stack` is [`crate::scene::Scene::stack`].
+    /// For a film of `size` pixels, which get `spp` samples a frame. `stack` is [`crate::scene::Scene::stack`].
     ///
     /// # Errors
     /// [`Error::Usage`] for a setting out of range and for a film that is too large, [`Error::Device`].
@@ -67,11 +99,12 @@ impl History {
         gpu: &Gpu,
         effects: Effects,
         stack: u32,
-        pixels: u32,
+        size: [u32; 2],
         spp: u32,
         settings: Reproject,
     ) -> Result<Self> {
         entry::check(&settings.entries())?;
+        let (pixels, cells) = (size[0] * size[1], size.map(|n| n.div_ceil(CELL)));
         let most = u64::from(MOST_PIXELS).min(gpu.info().max_storage_range / size_of::<u32>() as u64);
         if u64::from(pixels) > most {
             return Err(Error::Usage(format!(
@@ -80,6 +113,7 @@ impl History {
         }
         let (thread, traverse) = (gpu.tuning().thread(), traverse::Constants { stack });
         let room = |on: bool| if on { pixels as usize } else { 1 };
+        let none = |name: &str| Buffer::from_slice(gpu, name, &[]);
         Ok(Self {
             remember: Kernel::new(gpu, &shaders::remember::Constants { effects, thread, traverse })?,
             project: Kernel::new(gpu, &shaders::project::Constants { effects, thread, traverse })?,
@@ -89,13 +123,93 @@ impl History {
             offered: Buffer::from_slice(gpu, "offered samples", &vec![0; pixels as usize])?,
             carried: Buffer::from_slice(gpu, "carried samples", &vec![0; pixels as usize])?,
             previous: Buffer::from_slice(gpu, "previous camera", &[Camera::default()])?,
+            probe: Kernel::new(gpu, &shaders::probe::Constants { effects, thread, traverse })?,
+            light_change: Kernel::new(gpu, &thread.into())?,
+            cells,
+            probes: Buffer::new(gpu, "probes", 1, Location::Device)?,
+            changes: [none("changes of light")?, none("changes of light")?],
+            lights: [Buffer::from_slice(gpu, "lights", &[])?, Buffer::from_slice(gpu, "lights", &[])?],
+            light_table: Buffer::from_slice(gpu, "light_table", &[])?,
+            relit: None,
+            instance_now: Buffer::from_slice(gpu, "instances now", &[])?,
+            triangle_now: Buffer::from_slice(gpu, "triangles now", &[])?,
+            probe_seed: 0,
+            numbered: [false; 2],
+            changed: AtomicBool::new(false),
             settings,
             spp,
         })
     }
 
+    /// Makes room for what changes besides the camera, once.
+    pub(super) fn follow(&mut self, gpu: &Gpu) -> Result<()> {
+        let cells = (self.cells[0] * self.cells[1]) as usize;
+        if self.probes.len() < cells {
+            let changes = || Buffer::new(gpu, "changes of light", cells, Location::Device);
+            self.changes = [changes()?, changes()?];
+            self.probes = Buffer::new(gpu, "probes", cells, Location::Device)?;
+        }
+        Ok(())
+    }
+
+    /// Notes that more than the camera changes, after a frame of these constants and this first sample.
+    pub(super) fn note(&mut self, change: &Change, relit: Option<&Relit>, c: &PathConstants, first_sample: u32) {
+        self.numbered = [&change.instance_now, &change.triangle_now].map(|now| !now.is_empty());
+        self.probe_seed = pcg(pcg(!c.seed).wrapping_add(first_sample));
+        self.relit = relit.map(|relit| PathConstants {
+            light_count: relit.table.len() as u32,
+            environment: relit.environment,
+            triangle_pdf_scale: c.triangle_pdf_scale * relit.pdf_scale,
+            ..PathConstants::default()
+        });
+        self.changed.store(true, Relaxed);
+    }
+
+    /// What the paths of probes are told, before the scene changes as after it.
+    pub(super) fn probe_constants(&self, frame: &PathConstants) -> PathConstants {
+        let own = PathConstants { seed: self.probe_seed, ..*frame };
+        self.relit.map_or(own, |relit| PathConstants {
+            light_count: relit.light_count,
+            environment: relit.environment,
+            triangle_pdf_scale: relit.triangle_pdf_scale,
+            ..own
+        })
+    }
+
+    /// What they bind of a scene.
+    pub(super) fn probe_scene<'a>(&'a self, scene: &'a DeviceScene, after: bool) -> scene::Bind<'a> {
+        match self.relit {
+            None => scene.bind(),
+            Some(_) => {
+                scene::Bind { lights: &self.lights[usize::from(after)], light_table: &self.light_table, ..scene.bind() }
+            }
+        }
+    }
+
+    /// Whether more than the camera has changed since the last frame.
+    pub(super) fn has_changed(&self) -> bool {
+        self.changed.load(Relaxed)
+    }
+
+    /// Notes that a frame has begun with what there is now.
+    pub(super) fn settle(&self) {
+        self.changed.store(false, Relaxed);
+    }
+
+    /// How light had changed in each cell of 4x4 pixels of the last frame at the last [`Step::Reproject`](super::Step::Reproject) that followed a
+    /// change of more than the camera.
+    pub fn light_change(&self) -> &Buffer<LightChange> {
+        &self.changes[1]
+    }
+
+    /// The error that one part of a pixel's word stands for.
+    pub(super) fn error_part(&self) -> f32 {
+        self.settings.reproject_error.max(1e-30) / ERROR_PARTS as f32
+    }
+
     /// What its kernels are told of pixels from `first_pixel` on.
     pub(super) fn push(&self, constants: &PathConstants, first_pixel: u32, pixels: u32) -> ReprojectPush {
+        let [instances, triangles] = self.numbered.map(u32::from);
         let Reproject { reproject_error, reproject_aliasing, reproject_samples, reproject_age } = self.settings;
         ReprojectPush {
             size: constants.size,
@@ -106,9 +220,42 @@ impl History {
             max_samples: reproject_samples,
             max_age: reproject_age,
             spp: self.spp,
-            moved: 0,
+            moved: self.has_changed().into(),
+            instances,
+            triangles,
             ..Default::default()
         }
+    }
+}
+
+/// The samples that a pixel has from earlier frames, as one word holds them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Carried {
+    /// Their number.
+    pub count: u32,
+    /// How many times they have moved.
+    pub age: u32,
+    /// Error that they are accounted, in 127ths of the largest one.
+    pub error: u32,
+    /// Whether they show the side of the surface that its triangle's normal points away from.
+    pub back: bool,
+}
+
+impl Carried {
+    /// Out of a word of `glsl/shared/history.glsl`.
+    pub fn of(word: u32) -> Self {
+        Self { count: word & 0xffff, age: (word >> 16) & 0xff, error: (word >> 24) & 0x7f, back: word >> 31 != 0 }
+    }
+
+    /// Of a pixel of [`History::carried`], where a word without samples may say why.
+    pub(super) fn of_pixel(word: u32) -> Self {
+        let all = Self::of(word);
+        if all.count > 0 { all } else { Self::default() }
+    }
+
+    /// As a word.
+    pub fn word(self) -> u32 {
+        self.count | self.age << 16 | self.error << 24 | u32::from(self.back) << 31
     }
 }
 
@@ -128,8 +275,8 @@ pub struct Carriage {
     pub new_edges: u64,
     /// Samples that the new frame begins with.
     pub samples: u64,
-    /// Pixels of the last frame whose samples another pixel's were preferred to, or that lie at an edge of the new frame.
-    pub lost: u64,
+    /// Pixels of the last frame that have offered theirs to pixels of the new one, not all of which took them.
+    pub offered: u64,
     /// Pixels of the last frame that show no surface.
     pub sky: u64,
     /// Those with a smooth or refractive surface.
@@ -144,6 +291,8 @@ pub struct Carriage {
     pub hidden: u64,
     /// Those that would look different from the new view.
     pub view: u64,
+    /// Those whose light has changed.
+    pub light: u64,
 }
 
 impl Carriage {
@@ -157,8 +306,7 @@ impl Carriage {
                 (n, _) => (sum.carried, sum.samples) = (sum.carried + 1, sum.samples + u64::from(n)),
             }
         }
-        let offers = offered.iter().filter(|&&word| carried_samples(word) > 0).count() as u64;
-        sum.lost = offers - sum.carried.min(offers);
+        sum.offered = offered.iter().filter(|&&word| carried_samples(word) > 0).count() as u64;
         for &word in offered.iter().filter(|&&word| carried_samples(word) == 0) {
             let reason = match word >> 16 {
                 DROPPED_SKY => &mut sum.sky,
@@ -168,6 +316,7 @@ impl Carriage {
                 DROPPED_OUTSIDE => &mut sum.outside,
                 DROPPED_HIDDEN => &mut sum.hidden,
                 DROPPED_VIEW => &mut sum.view,
+                DROPPED_LIGHT => &mut sum.light,
                 _ => continue,
             };
             *reason += 1;

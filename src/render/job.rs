@@ -23,6 +23,9 @@ pub struct Job<'a> {
     ///
     /// [`Settings::spp`]: crate::render::settings::Settings::spp
     pub pixel: Option<u32>,
+    /// Whether it begins with the samples of the last frame, as [`Renderer::begin_frame`] has it. Such a film can be neither resumed
+    /// nor merged.
+    pub carries: bool,
 }
 
 /// Why a render ended.
@@ -68,7 +71,7 @@ pub struct Status {
 impl<'a> Job<'a> {
     /// A render from its beginning to its end.
     pub fn new(renderer: &'a Renderer) -> Self {
-        Self { renderer, checkpoint: None, paths_at_once: u32::MAX, pixel: None }
+        Self { renderer, checkpoint: None, paths_at_once: u32::MAX, pixel: None, carries: false }
     }
 
     /// Runs it. Before each step `between` is told how far it is, may read the renderer's buffers (the renderer waits), and
@@ -84,7 +87,9 @@ impl<'a> Job<'a> {
     ) -> Result<Status> {
         let renderer = self.renderer;
         self.checkpoint.map_or(Ok(()), |checkpoint| renderer.resume(frame, checkpoint))?;
-        let (mut status, mut steps, mut listed) = (self.at_start(), self.steps().peekable(), u64::MAX);
+        let (begun, steps) = self.begin(frame)?;
+        let (mut status, mut steps, mut listed) = (self.at_start(), steps.peekable(), u64::MAX);
+        status.times.extend(begun);
         while let Some(planned) = steps.next() {
             if between(&status)?.is_break() {
                 return self.ended(status);
@@ -175,18 +180,36 @@ impl<'a> Job<'a> {
         }
     }
 
+    /// What is left to do once it has begun, and what its beginning took.
+    fn begin(&self, frame: &mut FrameResources) -> Result<(Vec<PassTime>, Box<dyn Iterator<Item = Step>>)> {
+        if !self.carries {
+            return Ok((Vec::new(), self.steps()));
+        }
+        let (times, steps) = self.renderer.begin_frame(frame)?;
+        Ok((times, Box::new(steps.into_iter())))
+    }
+
     fn at_start(&self) -> Status {
         Status {
             times: Vec::new(),
             traced: 0,
             traced_last: 0,
             done: 0,
-            planned: self.steps().map(|step| step.paths()).sum(),
+            planned: self.planned(),
             allocations: self.checkpoint.map_or(0, |checkpoint| checkpoint.allocations),
             broken_priorities: 0,
             broken_samples: None,
             stopped: StopReason::Interrupted,
             last: self.checkpoint.map(|_| nothing_of(self.steps().next().as_ref())),
+        }
+    }
+
+    /// Samples to take at most.
+    fn planned(&self) -> u64 {
+        let settings = self.renderer.settings();
+        match self.carries {
+            true => u64::from(settings.spp) * settings.pixels() as u64,
+            false => self.steps().map(|step| step.paths()).sum(),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Renders: settings, the schedule of their work, the buffers it runs over, what is recorded for it, the loop that runs it,
 //! and its life in files.
 pub mod buffers;
+mod carried;
 pub mod film;
 mod frame;
 mod history;
@@ -23,12 +24,14 @@ mod update;
 mod views;
 
 pub use buffers::{DeviceScene, FilmBuffers, FilmTile};
-pub use history::{Carriage, History, Reproject, ReprojectOverrides, carried_samples};
+pub use history::{Carriage, Carried, History, Reproject, ReprojectOverrides, carried_samples};
 pub use job::{Job, Status, StopReason};
 pub use merge::{Gap, Merged, merge};
+pub use moving::can_carry;
+pub use provenance::{HISTORY, of_frame as metadata_of_frame};
 #[doc(hidden)] // a renderer tells its kernels; tests tell the same to their CPU twins
 pub use push::{frame_constants, priority_push};
 pub use renderer::*;
-pub use resume::{Checkpoint, finished};
+pub use resume::{Checkpoint, finished, is_frame};
 pub use schedule::{Batch, Choice, PathRange, Plan, Progress, Share, Step};
 pub use views::{Layer, OutputView};

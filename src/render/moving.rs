@@ -3,8 +3,10 @@ use super::history::{Carriage, History, Reproject, carried_samples};
 use super::schedule::{self, Begun};
 use super::{Renderer, Step, kernels};
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, FrameResources, Location, PassTime};
-use crate::layout::PixelStats;
+use crate::gpu::{Buffer, FrameResources, PassTime};
+use crate::layout::{Camera, NONE, PixelStats, SurfacePoint};
+use crate::render::settings::Settings;
+use crate::scene::Scene;
 
 impl Renderer {
     /// From now on frames can begin with [`Step::Reproject`] in place of [`Step::Start`]: with the samples of the last frame that
@@ -18,16 +20,17 @@ impl Renderer {
     /// [`Error::Usage`] for a setting out of range, for a renderer without guides and for a film that is too large;
     /// [`Error::Device`].
     pub fn keep_history(&mut self, settings: Reproject) -> Result<()> {
-        let (pixels, spp) = (self.settings.pixels() as u32, self.settings.spp);
+        let (pixels, size) = (self.settings.pixels(), [self.settings.width, self.settings.height]);
         if !self.frame.film.tiles[0].has_guide() || self.frame.film.tiles.len() > 1 {
             let what =
                 "a history needs primary hits, and a film that fits one buffer: make the renderer with Outputs::guides";
             return Err(Error::Usage(what.into()));
         }
-        let history = History::new(&self.gpu, self.effects, self.stack, pixels, spp, settings)?;
+        let history = History::new(&self.gpu, self.effects, self.stack, size, self.settings.spp, settings)?;
         let tile = &mut self.frame.film.tiles[0];
-        tile.points = Buffer::new(&self.gpu, "points", pixels as usize, Location::Device)?;
-        tile.stats.write(0, &vec![PixelStats::default(); pixels as usize])?;
+        let none = SurfacePoint { triangle: NONE, instance: NONE, ..SurfacePoint::default() };
+        tile.points = Buffer::from_slice(&self.gpu, "points", &vec![none; pixels])?;
+        tile.stats.write(0, &vec![PixelStats::default(); pixels])?;
         self.frame.kernels.primary_hit = kernels::primary_points(&self.gpu, self.effects, self.stack)?;
         self.frame.history = Some(history);
         Ok(())
@@ -62,11 +65,7 @@ impl Renderer {
         if allocate.is_even() {
             return Ok((self.run(frame, &Step::Reproject)?, self.steps().skip(1).collect()));
         }
-        if schedule::list_may_be_short(settings) || allocate.max_spp > 0 {
-            let what = "carried samples count where a budget is placed: set neither noise_threshold nor max_spp, and choose one of the \
-                        policies uniform, geometry, variance and both";
-            return Err(Error::Usage(what.into()));
-        }
+        check_placing(settings)?;
         let times = self.run(frame, &Step::Reproject)?;
         let have: Vec<u32> = history.carried.read()?.into_iter().map(carried_samples).collect();
         let lacks: Vec<u32> = have.iter().map(|n| schedule::first_spp(settings).saturating_sub(*n)).collect();
@@ -98,5 +97,38 @@ impl Renderer {
         let Some(history) = &self.frame.history else { return Ok(0) };
         let at = pixel as usize;
         Ok(carried_samples(history.carried.read_range(at..at + 1)?[0]))
+    }
+}
+
+/// Whether frames of a scene can begin with samples of the last.
+///
+/// # Errors
+/// [`Error::Usage`] with what speaks against it: a lens, parallel rays, or settings under which no budget is placed.
+pub fn can_carry(scene: &Scene, settings: &Settings) -> Result<()> {
+    check_camera(&scene.camera([settings.width, settings.height])?)?;
+    check_placing(settings)
+}
+
+/// # Errors
+/// [`Error::Usage`] for a camera with a lens or parallel rays.
+pub(super) fn check_camera(camera: &Camera) -> Result<()> {
+    let what = match camera {
+        Camera { orthographic: 1.., .. } => "nothing can be carried between views of an orthographic camera",
+        Camera { lens_radius, .. } if *lens_radius > 0.0 => {
+            "samples through a lens show many points: nothing can be carried; render with lens_radius 0"
+        }
+        _ => return Ok(()),
+    };
+    Err(Error::Usage(what.into()))
+}
+
+fn check_placing(settings: &Settings) -> Result<()> {
+    match schedule::list_may_be_short(settings) || settings.allocate.max_spp > 0 {
+        true => Err(Error::Usage(
+            "carried samples count where a budget is placed: set neither noise_threshold nor max_spp, and choose one of the policies \
+             uniform, geometry, variance and both"
+                .into(),
+        )),
+        false => Ok(()),
     }
 }

@@ -12,6 +12,8 @@ use std::collections::BTreeMap;
 const SETTINGS: &str = "settings";
 const SCENE: &str = "sceneFingerprint";
 const SAMPLES: &str = "sampleRanges";
+/// Metadata that tells of the frames before one that begins with their samples.
+pub const HISTORY: &str = "history";
 
 /// Samples of one render. A pixel has no others, and may lack some at the end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -58,6 +60,9 @@ impl Provenance {
     /// # Errors
     /// What is missing or damaged.
     pub(crate) fn of(film: &Film) -> std::result::Result<Self, String> {
+        if film.metadata.contains_key(HISTORY) {
+            return Err("has samples of earlier frames: it can be neither resumed nor merged".to_owned());
+        }
         let (settings, samples) = (parsed(film, SETTINGS)?, parsed::<Vec<SampleRange>>(film, SAMPLES)?);
         check_ranges(&samples)?;
         Ok(Self { settings, scene: said(film, SCENE)?.to_owned(), samples })
@@ -108,12 +113,26 @@ fn json(what: &impl Serialize) -> Result<String> {
     serde_json::to_string(what).map_err(|e| Error::Usage(e.to_string()))
 }
 
-/// The metadata of a render's film; none when the renderer's camera was moved, since no scene has those samples.
+/// The metadata of a frame that begins with samples of earlier ones. It names no ranges of samples: such a film can be neither
+/// resumed nor merged. `history` is what tells the frames before from others.
+///
+/// # Errors
+/// Those of [`Scene::fingerprint`].
+pub fn of_frame(scene: &Scene, settings: &Settings, history: &str) -> Result<BTreeMap<String, String>> {
+    let shown = scene.fingerprint([settings.width, settings.height])?;
+    let entries = [(SETTINGS, json(settings)?), (SCENE, shown.to_string()), (HISTORY, history.to_owned())];
+    Ok(entries.map(|(key, value)| (key.to_owned(), value)).into())
+}
+
+/// The metadata of a render's film; none when the renderer's camera was moved, since no scene has those samples, and none where a
+/// history is kept: see [`of_frame`].
 ///
 /// # Errors
 /// [`Error::Usage`] when the film has no layer of counts.
 pub(crate) fn metadata(renderer: &Renderer, film: &Film) -> Result<BTreeMap<String, String>> {
-    let Some(scene) = renderer.fingerprint() else { return Ok(BTreeMap::new()) };
+    let Some(scene) = renderer.fingerprint().filter(|_| renderer.history().is_none()) else {
+        return Ok(BTreeMap::new());
+    };
     let settings = renderer.settings();
     let counts = film::counts(film, "samples").map_err(Error::Usage)?;
     let count = counts.into_iter().max().unwrap_or(0);

@@ -1,5 +1,5 @@
 //! Taking up a render where it stopped: everything that it needs is in the EXR file that it wrote.
-use super::provenance::Provenance;
+use super::provenance::{self, Provenance};
 use super::rendered::Rendered;
 use super::{PathRange, Progress, Renderer, Step, film};
 use crate::error::{Error, Result};
@@ -109,6 +109,14 @@ pub fn finished(path: &Path, scene: &Scene, settings: &Settings) -> Option<Film>
     done.then_some(film)
 }
 
+/// Whether a film is the whole of a frame that begins with samples of earlier ones: of this scene and these settings, with what
+/// `history` says of those.
+pub fn is_frame(film: &Film, scene: &Scene, settings: &Settings, history: &str) -> bool {
+    let wanted = provenance::of_frame(scene, settings, history);
+    let says = |(key, value): (&String, &String)| film.metadata.get(key) == Some(value);
+    wanted.is_ok_and(|wanted| wanted.iter().all(says)) && film.channel(film::PENDING).is_none()
+}
+
 /// Whether a render of this scene can go on where the file's ended.
 fn check(provenance: &Provenance, scene: &Scene, settings: &Settings) -> std::result::Result<(), String> {
     let uniform = settings.allocate.is_even();
@@ -153,7 +161,7 @@ pub(super) fn pending(renderer: &Renderer, film: &Film, last: Option<&PathRange>
     let Some(last) = last else {
         let first = schedule::first_spp(renderer.settings());
         let counts = film::counts(film, "samples").map_err(Error::Usage)?;
-        return Ok(counts.iter().map(|n| first - n).collect());
+        return Ok(counts.iter().map(|n| first.saturating_sub(*n)).collect()); // some may be carried
     };
     Ok(schedule::pending(&renderer.film().counts.count.read()?, last))
 }

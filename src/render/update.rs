@@ -1,20 +1,22 @@
 //! Brings a scene that has changed to the device, within the commands of a frame.
 use super::buffers::DeviceScene;
+use super::frame;
 use super::push::{frame_constants, priority_push};
 use super::renderer::{Renderer, called_for};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Gpu, Recorder};
 use crate::layout::{Effect, Effects};
-use crate::scene::{Change, Scene, light_effects};
+use crate::scene::{Change, Relit, Scene, light_effects};
 use bytemuck::Pod;
 use std::ops::Range;
 
 impl Renderer {
     /// Records the upload of what a pose has changed: see [`Scene::apply`]. Frames that were recorded before keep the scene as it was,
-    /// done or not; what was accumulated belongs to it, so that a [`Step::Start`](super::Step::Start) has to follow. A
-    /// [`Step::Reproject`](super::Step::Reproject) may follow in its place: it carries nothing unless the camera alone has changed, since light
-    /// and the numbers of triangles may have. `scene` is
-    /// that of [`Renderer::new`] in another pose.
+    /// done or not; what was accumulated belongs to it, so that a [`Step::Start`](super::Step::Start) has to follow, or, where a history is
+    /// kept, a [`Step::Reproject`](super::Step::Reproject): samples move with the surfaces that they are of, and stay behind where their light
+    /// has changed. That is found by paths traced here and there, two for 16 pixels, of which a change of the camera alone needs none. Of
+    /// two updates between frames the second carries nothing: [`Change::add`] makes them one. `scene` is that of [`Renderer::new`] in
+    /// another pose.
     ///
     /// Nothing is compiled. Memory is allocated where there is more of something than ever before, such as nodes of a hierarchy or
     /// lights, with room for more.
@@ -34,11 +36,10 @@ impl Renderer {
         if !change.camera {
             constants.camera = self.frame.constants.camera;
         }
-        let gpu = self.gpu.clone();
-        upload(&gpu, rec, &mut self.frame.scene, scene, change)?;
-        if self.frame.history.is_some() && !change.is_of_camera_alone() {
-            rec.fill(&self.frame.film.tiles[0].stats, 0)?; // pixels without samples hand on none
+        if !change.is_of_camera_alone() {
+            self.remember(rec, scene, change)?;
         }
+        upload(&self.gpu, rec, &mut self.frame.scene, scene, change)?;
         self.frame.constants = constants;
         self.frame.priority_push = priority_push(scene, &self.settings);
         self.delta_lights = scene.has_delta_lights();
@@ -47,6 +48,30 @@ impl Renderer {
             self.fingerprint = Some(scene.fingerprint(size)?);
         }
         Ok(())
+    }
+
+    /// Before the scene changes: what frames that begin with samples of the last need of it as it was.
+    fn remember(&mut self, rec: &mut Recorder, scene: &Scene, change: &Change) -> Result<()> {
+        let Some(history) = &mut self.frame.history else { return Ok(()) };
+        if history.has_changed() {
+            return rec.fill(&history.offered, 0); // nothing is handed on
+        }
+        history.follow(&self.gpu)?;
+        let relit = change.lights.then(|| Relit::of(&change.lights_before, scene)).flatten();
+        history.note(change, relit.as_ref(), &self.frame.constants.path, self.settings.first_sample);
+        if let Some(relit) = &relit {
+            whole(&self.gpu, rec, "lights before", &mut history.lights[0], &relit.before)?;
+            whole(&self.gpu, rec, "lights after", &mut history.lights[1], &relit.after)?;
+            whole(&self.gpu, rec, "table of both", &mut history.light_table, &relit.table)?;
+        }
+        for (to, now) in
+            [(&mut history.instance_now, &change.instance_now), (&mut history.triangle_now, &change.triangle_now)]
+        {
+            if !now.is_empty() {
+                whole(&self.gpu, rec, "numbers now", to, now)?;
+            }
+        }
+        frame::record_change(rec, &self.frame)
     }
 
     fn check_effects(&self, scene: &Scene, change: &Change) -> Result<()> {

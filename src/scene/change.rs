@@ -1,4 +1,5 @@
 //! What a pose has changed in a scene's arrays.
+use crate::layout::Light;
 use std::ops::Range;
 
 /// What [`Scene::apply`](super::Scene::apply) has changed, for those who copy it to a device.
@@ -12,12 +13,18 @@ pub struct Change {
     pub triangles: Vec<Range<usize>>,
     /// The instances.
     pub instances: bool,
+    /// By the index of an instance in [`Scene::instances`](super::Scene::instances) before, its index now; empty where all keep theirs.
+    pub instance_now: Vec<u32>,
+    /// The same of triangles.
+    pub triangle_now: Vec<u32>,
     /// The materials.
     pub materials: bool,
     /// Parts of [`Scene::texels`](super::Scene::texels), of which there may be more.
     pub texels: Vec<Range<usize>>,
     /// The lights and their table.
     pub lights: bool,
+    /// The lights as they were, where they have changed, each with a number that it keeps; ascending.
+    pub lights_before: Vec<(u64, Light)>,
     /// The meshes that were deformed, and what their hierarchies cost.
     pub deformed: Vec<Deformed>,
 }
@@ -36,9 +43,9 @@ pub struct Deformed {
 impl Change {
     /// Whether nothing but the camera has changed.
     pub fn is_of_camera_alone(&self) -> bool {
-        let Self { camera: _, nodes, triangles, instances, materials, texels, lights, deformed } = self;
+        let Self { camera: _, nodes, triangles, instances, materials, texels, lights, deformed, .. } = self;
         let arrays = nodes.is_empty() && triangles.is_empty() && texels.is_empty() && deformed.is_empty();
-        arrays && !(*instances || *materials || *lights)
+        arrays && !(*instances || *materials || *lights) // without these, no numbers are new
     }
 
     /// Adds what a later pose has changed.
@@ -47,9 +54,53 @@ impl Change {
         self.nodes.extend(later.nodes);
         self.triangles.extend(later.triangles);
         self.instances |= later.instances;
+        number(&mut self.instance_now, later.instance_now);
+        number(&mut self.triangle_now, later.triangle_now);
         self.materials |= later.materials;
         self.texels.extend(later.texels);
+        if !self.lights {
+            self.lights_before = later.lights_before;
+        }
         self.lights |= later.lights;
         self.deformed.extend(later.deformed);
+    }
+}
+
+/// Follows a change of numbers by a later one.
+fn number(now: &mut Vec<u32>, later: Vec<u32>) {
+    match (now.is_empty(), later.is_empty()) {
+        (true, _) => *now = later,
+        (false, true) => {}
+        (false, false) => now.iter_mut().for_each(|index| *index = later[*index as usize]),
+    }
+}
+
+/// By its index before, the index now of each of the same things, which are given in both orders; empty where that is the same.
+pub(super) fn numbers(before: &[u32], now: &[u32]) -> Vec<u32> {
+    if before == now {
+        return Vec::new();
+    }
+    let mut index_of = vec![0; now.len()];
+    (0..).zip(now).for_each(|(index, &thing)| index_of[thing as usize] = index);
+    before.iter().map(|&thing| index_of[thing as usize]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_follow_things_through_changes() {
+        let [a, b, c] = [[0, 1, 2, 3], [2, 0, 3, 1], [3, 2, 1, 0]];
+        assert_eq!(numbers(&a, &b), [1, 3, 0, 2]);
+        assert!(numbers(&b, &b).is_empty());
+        let change = |from: &[u32], to: &[u32]| Change { instance_now: numbers(from, to), ..Change::default() };
+        let mut all = change(&a, &b);
+        all.add(change(&b, &b));
+        all.add(change(&b, &c));
+        assert_eq!(all.instance_now, numbers(&a, &c));
+        let mut still = Change::default();
+        still.add(change(&b, &c));
+        assert_eq!(still.instance_now, numbers(&b, &c));
     }
 }

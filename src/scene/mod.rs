@@ -26,7 +26,9 @@ pub mod description;
 mod effects;
 mod fingerprint;
 mod load;
+mod numbers;
 mod pose;
+mod relit;
 mod rig;
 
 pub use build::attributes::words_of as attribute_words;
@@ -37,6 +39,7 @@ pub use check::check_camera;
 pub use effects::{effects, keeps_soft_light_apart, light_effects};
 pub use fingerprint::Fingerprint;
 pub use pose::{EnvironmentChange, MaterialChange, Pose, REBUILD_ABOVE, Vertices};
+pub use relit::Relit;
 pub use rig::Rig;
 
 /// Largest coordinate M of triangles, of points that rays start from and of lights. With it, all numbers of the triangle test

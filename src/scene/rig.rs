@@ -29,6 +29,8 @@ pub struct Rig {
     pub(in crate::scene) levels: [usize; 2],
     /// Lights without surface; the environment is the last.
     pub(in crate::scene) lights: Vec<Light>,
+    /// Numbers of [`Scene::lights`] that no pose changes, ascending.
+    pub(in crate::scene) light_numbers: Vec<u64>,
     /// Mean luminance of the environment's image, or 1.
     pub(in crate::scene) sky: f64,
     /// Mean colours of pictures that emit or mask, by first texel and transfer curve.
@@ -69,6 +71,12 @@ impl Tree {
         all.into_iter()
     }
 
+    /// The number of a triangle that no pose changes.
+    pub fn number_of(&self, index: u32) -> u32 {
+        let first = self.range.start as u32;
+        self.soft.as_ref().map_or(index, |soft| first + soft.order[(index - first) as usize])
+    }
+
     /// Puts `lit` in its order.
     pub fn sort_lit(&mut self) {
         if let Some(soft) = &self.soft {
@@ -98,10 +106,15 @@ impl Rig {
         self.lamps.get(name).copied()
     }
 
-    /// The instances that are seen, in the order of the hierarchy, each with its tree.
-    pub(in crate::scene) fn seen<'s>(&'s self, scene: &'s Scene) -> impl Iterator<Item = (&'s Tree, &'s Instance)> {
-        let seen = self.order.iter().zip(&scene.instances).filter(|(copy, _)| !self.hidden.contains(copy));
-        seen.map(|(&copy, instance)| (&self.trees[self.tree_of[copy as usize] as usize], instance))
+    /// The instances that are seen, by their numbers, each with its tree.
+    pub(in crate::scene) fn seen<'s>(
+        &'s self,
+        scene: &'s Scene,
+    ) -> impl Iterator<Item = (u32, &'s Tree, &'s Instance)> {
+        let all = self.order.iter().zip(&scene.instances);
+        let mut seen: Vec<_> = all.filter(|(copy, _)| !self.hidden.contains(copy)).collect();
+        seen.sort_unstable_by_key(|(copy, _)| **copy);
+        seen.into_iter().map(|(&copy, instance)| (copy, &self.trees[self.tree_of[copy as usize] as usize], instance))
     }
 
     /// Notes what the description calls its parts.

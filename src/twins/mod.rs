@@ -10,6 +10,7 @@ pub mod camera;
 pub mod coat;
 pub mod guide_lookup;
 pub mod light;
+pub mod light_change;
 pub mod metallic;
 pub mod path;
 pub mod primary_hit;

@@ -1,8 +1,8 @@
-//! Twin of `glsl/trace/path.comp`.
-use crate::layout::{BSDF_DIELECTRIC, BSDF_METALLIC, Effects, FrameConstants, MATERIAL_TWO_SIDED, NONE};
+//! Twin of `glsl/trace/path.comp` and of `glsl/shared/trace_path.glsl`.
+use crate::layout::{BSDF_DIELECTRIC, BSDF_METALLIC, Effects, FrameConstants, MATERIAL_TWO_SIDED, NONE, SurfacePoint};
 use crate::math::hash::pcg;
 use crate::scene::Scene;
-use crate::shaders::path::{
+use crate::shaders::shared::trace_path::{
     MAX_SURVIVAL, PAIR_BSDF, PAIR_CHOICE, PAIR_FIRST_BOUNCE, PAIR_LIGHT, PAIR_ROULETTE, PAIRS_PER_BOUNCE,
 };
 use crate::twins::bsdf::{
@@ -15,10 +15,10 @@ use crate::twins::surface::{
     Facing, Surface, facing_normals, facing_of_metal, light_share, local_coat_normal, shading_basis, surface_at,
     surface_bsdf, surface_emission,
 };
-use crate::twins::traverse::traverse_from;
+use crate::twins::traverse::{Hit, traverse, traverse_from};
 use glam::{Mat3, Vec3};
 
-pub use crate::shaders::path::SHADOW_END;
+pub use crate::shaders::shared::trace_path::SHADOW_END;
 
 /// What one path returns, linear Rec. 709. Without [`Effects::indirect`] and [`Effects::soft_light`] all light is in `direct`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -86,6 +86,12 @@ struct Path {
     bsdf_pdf: f32,
     delta: bool,
     eta_scale: f32,
+}
+
+impl Path {
+    fn new(origin: Vec3, direction: Vec3) -> Self {
+        Self { origin, direction, throughput: Vec3::ONE, bsdf_pdf: 0.0, delta: true, eta_scale: 1.0 }
+    }
 }
 
 /// A path tracer for one scene.
@@ -221,7 +227,8 @@ impl Tracer<'_> {
         Shade { bsdf, surface, facing, basis, wo, pair, from }
     }
 
-    fn trace_path(&self, mut path: Path, random: Sampler, seed: u32) -> PathSample {
+    /// `first` is what the path's first ray finds.
+    fn trace_path(&self, mut path: Path, first: Hit, random: Sampler, seed: u32) -> PathSample {
         let (mut sum, mut rays, mut albedo) = (Sum::default(), 0, Vec3::ZERO);
         let (mut smooth_first, mut mirrored) = (false, false);
         let mut from = [NONE; 2];
@@ -229,7 +236,10 @@ impl Tracer<'_> {
             let pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
             let mask_seed = pcg(seed.wrapping_add(2 * bounce));
             rays += 1;
-            let hit = traverse_from(self.scene, from, path.origin, path.direction, INFINITE_DISTANCE, false, mask_seed);
+            let hit = match bounce {
+                0 => first,
+                _ => traverse_from(self.scene, from, path.origin, path.direction, INFINITE_DISTANCE, false, mask_seed),
+            };
             let kind = if bounce == 0 { Kind::Direct } else { kind_of_light(bounce, smooth_first, false) };
             if !hit.any() {
                 self.add_light(&mut sum, path.throughput * self.light_from_miss(&path), kind);
@@ -281,18 +291,21 @@ impl Tracer<'_> {
         let random = sampler_start(pixel, index, self.frame.path.seed, self.effects.independent_sampler);
         let film = film_sample(&self.frame, &self.effects, pixel, random);
         let ray = eye_ray(&self.frame, &self.effects, film, random);
-        let path = Path {
-            origin: ray.origin,
-            direction: ray.direction,
-            throughput: Vec3::ONE,
-            bsdf_pdf: 0.0,
-            delta: true,
-            eta_scale: 1.0,
-        };
-        let sample = self.trace_path(path, random, path_seed(&self.frame, pixel, index));
+        let seed = path_seed(&self.frame, pixel, index);
+        let first = traverse(self.scene, ray.origin, ray.direction, INFINITE_DISTANCE, false, pcg(seed));
+        let sample = self.trace_path(Path::new(ray.origin, ray.direction), first, random, seed);
         match sample.radiance().is_finite() {
             true => sample,
             false => PathSample { direct: Vec3::ZERO, indirect: Vec3::ZERO, broken: true, ..sample },
         }
+    }
+    /// Radiance from a point towards `eye`, by the path that `probe.comp` traces with this sample.
+    pub fn light_from(&self, at: SurfacePoint, eye: Vec3, index: u32) -> Vec3 {
+        let mut hit = Hit { t: 0.0, triangle: at.triangle, instance: at.instance, barycentric: at.weights.into() };
+        let off = surface_at(self.scene, &hit).position - eye;
+        hit.t = off.length();
+        let random = sampler_start(0, index, self.frame.path.seed, self.effects.independent_sampler);
+        let path = Path::new(eye, off / hit.t.max(1e-37));
+        self.trace_path(path, hit, random, path_seed(&self.frame, 0, index)).radiance()
     }
 }

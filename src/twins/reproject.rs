@@ -1,52 +1,38 @@
 //! Twin of `glsl/reproject/*.comp`.
 use crate::layout::{
-    BSDF_DIELECTRIC, BSDF_METALLIC, Camera, Guide, History, HistoryLight, MATERIAL_TWO_SIDED, NONE, PixelLight,
-    PixelStats, ReprojectPush, SurfacePoint,
+    BSDF_DIELECTRIC, BSDF_METALLIC, Camera, Guide, History, HistoryLight, LightChange, MATERIAL_TWO_SIDED, NONE,
+    PixelLight, PixelStats, ReprojectPush, SurfacePoint,
 };
-use crate::math::warp::basis_from_normal;
+pub use crate::render::Carried;
 use crate::scene::Scene;
 use crate::shaders::carry::OLD_PIXEL;
-use crate::shaders::project::{LEAST_ALBEDO, NORMAL_COSINE, PIXEL_BITS, PLANE_DISTANCE};
+use crate::shaders::project::{LEAST_ALBEDO, PIXEL_BITS, PLANE_DISTANCE};
 use crate::shaders::shared::history::*;
 use crate::twins::bsdf::{Bsdf, SMOOTH_ALPHA, bsdf_albedo, bsdf_evaluate, bsdf_is_specular};
 use crate::twins::camera::{film_from_point, pixel_width};
-use crate::twins::surface::{Surface, facing_normals, surface_at, surface_bsdf};
+use crate::twins::light_change::cell_of;
+use crate::twins::surface::{Surface, facing_normals, shading_basis, surface_at, surface_bsdf};
 use crate::twins::traverse::Hit;
 use glam::{Vec2, Vec3, vec2};
 use std::f32::consts::PI;
-
-/// The samples that a pixel has from earlier frames, as one word holds them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Carried {
-    /// Their number.
-    pub count: u32,
-    /// How many times they have moved.
-    pub age: u32,
-    /// Error that they are accounted, in 255ths of the largest one.
-    pub error: u32,
-}
-
-impl Carried {
-    /// Out of a word of `glsl/shared/history.glsl`.
-    pub fn of(word: u32) -> Self {
-        Self { count: word & 0xffff, age: (word >> 16) & 0xff, error: word >> 24 }
-    }
-
-    /// As a word.
-    pub fn word(self) -> u32 {
-        self.count | self.age << 16 | self.error << 24
-    }
-}
 
 fn dropped(reason: u32) -> u32 {
     reason << 16
 }
 
-/// Between two frames: the scene, both cameras, and what the kernels are told.
+/// Between two frames: the scene before and now, both cameras, and what the kernels are told.
 #[derive(Clone, Copy)]
 pub struct Reprojection<'a> {
-    /// The scene of both frames.
+    /// The scene of the last frame.
+    pub before: &'a Scene,
+    /// The scene of the new frame.
     pub scene: &'a Scene,
+    /// As [`crate::scene::Change::instance_now`].
+    pub instance_now: &'a [u32],
+    /// As [`crate::scene::Change::triangle_now`].
+    pub triangle_now: &'a [u32],
+    /// How light has changed in each cell, where more than the camera has.
+    pub changes: &'a [LightChange],
     /// The camera of the last frame.
     pub previous: Camera,
     /// The camera of the new one.
@@ -104,7 +90,7 @@ fn is_sharp(b: &Bsdf) -> bool {
 /// The BSDF towards `wo`, without the cosine, for light from `wi`.
 fn scattered(s: &Surface, bsdf: &Bsdf, wo: Vec3, wi: Vec3) -> Vec3 {
     let facing = facing_normals(s, wo, s.flags & MATERIAL_TWO_SIDED != 0, true);
-    let to_local = basis_from_normal(facing.normal).transpose();
+    let to_local = shading_basis(s, bsdf, facing.normal).transpose();
     let (towards, from) = (to_local * wo, to_local * wi);
     bsdf_evaluate(bsdf, towards, from).truncate() / from.z.max(1e-3)
 }
@@ -132,18 +118,30 @@ impl Reprojection<'_> {
         })
     }
 
-    fn reason_to_keep(&self, left: &Left, pixel: usize) -> u32 {
+    /// Why, and whether the samples show the back of the surface.
+    fn reason_to_keep(&self, left: &Left, pixel: usize) -> (u32, bool) {
         let at = left.points[pixel];
         if at.triangle == NONE {
-            return DROPPED_SKY;
+            return (DROPPED_SKY, false);
         }
-        let s = surface_of(self.scene, at.triangle, at.instance, at.weights);
-        let bsdf = surface_bsdf(self.scene, &s);
+        let s = surface_of(self.before, at.triangle, at.instance, at.weights);
+        let back = s.geometric.dot(Vec3::from(self.previous.position) - s.position) < 0.0;
+        let bsdf = surface_bsdf(self.before, &s);
         if is_sharp(&bsdf) {
-            return DROPPED_SPECULAR;
+            return (DROPPED_SPECULAR, back);
         }
         let whole = self.is_whole(left.guide, pixel, s.geometric, pixel_width(&self.previous, self.push.size));
-        if whole { 0 } else { DROPPED_EDGE }
+        (if whole { 0 } else { DROPPED_EDGE }, back)
+    }
+
+    fn numbered_anew(&self, mut at: SurfacePoint) -> SurfacePoint {
+        if self.push.instances != 0 && at.instance != NONE {
+            at.instance = self.instance_now[at.instance as usize];
+        }
+        if self.push.triangles != 0 && at.triangle != NONE {
+            at.triangle = self.triangle_now[at.triangle as usize];
+        }
+        at
     }
 
     /// Twin of `remember.comp`.
@@ -151,13 +149,14 @@ impl Reprojection<'_> {
         let mut handed = Handed::default();
         for (pixel, s) in left.stats.iter().enumerate() {
             let (at, l) = (left.points[pixel], left.light[pixel]);
-            let reason = if self.still() || s.count == 0 { 0 } else { self.reason_to_keep(left, pixel) };
+            let stays = self.still() || s.count == 0;
+            let (reason, back) = if stays { (0, false) } else { self.reason_to_keep(left, pixel) };
             let kept = s.count.min(if self.still() { MOST_CARRIED } else { self.push.max_samples });
             let before = Some(Carried::of(left.carried[pixel])).filter(|c| c.count > 0).unwrap_or_default();
-            let now = Carried { count: kept, ..before };
+            let now = Carried { count: kept, back, ..before };
             handed.offered.push(if reason == 0 { now.word() } else { dropped(reason) });
             let m2 = s.m2.map(|m2| part_of_m2(m2, kept, s.count));
-            let SurfacePoint { triangle, instance, weights, .. } = at;
+            let SurfacePoint { triangle, instance, weights, .. } = self.numbered_anew(at);
             handed.records.push(History { triangle, instance, weights, mean: s.mean, m2, ..Default::default() });
             let indirect_m2 = part_of_m2(l.indirect_m2, kept, s.count);
             let light = HistoryLight { direct: l.direct, indirect: l.indirect, indirect_m2, ..Default::default() };
@@ -166,13 +165,10 @@ impl Reprojection<'_> {
         handed
     }
 
-    fn same_surface(&self, old: &Surface, seen: &Surface) -> bool {
-        let [before, after] = [self.previous.position, self.camera.position].map(Vec3::from);
-        let width = pixel_width(&self.camera, self.push.size) * seen.position.distance(after);
-        let plane = seen.geometric.dot(old.position - seen.position).abs() <= PLANE_DISTANCE * width;
-        let side = old.geometric.dot(before - old.position) * old.geometric.dot(after - old.position) > 0.0;
-        let alike = old.object == seen.object && old.material == seen.material;
-        alike && side && plane && old.geometric.dot(seen.geometric) >= NORMAL_COSINE
+    fn shows(&self, seen: &Guide, s: &Surface) -> bool {
+        let off = s.geometric.dot(Vec3::from(seen.position) - s.position).abs();
+        let near = off <= PLANE_DISTANCE * pixel_width(&self.camera, self.push.size) * seen.depth;
+        near && seen.object == s.object && seen.material == s.material
     }
 
     fn view_error(&self, s: &Surface, irradiance_of: Vec3, before: Vec3, after: Vec3) -> f32 {
@@ -191,49 +187,59 @@ impl Reprojection<'_> {
         of(before).max(of(after))
     }
 
-    /// Where a pixel's samples go, and their key there; with neither, the word says why.
-    fn moved(&self, handed: &Handed, points: &[SurfacePoint], pixel: usize, c: Carried) -> (u32, Option<(usize, u32)>) {
-        let [width, height] = self.push.size;
-        let h = &handed.records[pixel];
-        let s = surface_of(self.scene, h.triangle, h.instance, h.weights);
-        let film = film_from_point(&self.camera, s.position, self.push.size);
-        let inside = film.x >= 0.0 && film.y >= 0.0 && film.x < width as f32 && film.y < height as f32;
-        if !inside || film.z <= 0.0 || film.z.is_nan() {
-            return (dropped(DROPPED_OUTSIDE), None);
+    /// Offers a pixel's samples to those around a point of the film. Returns why none takes them, or 0.
+    fn offer(&self, guide: &[Guide], winner: &mut [u32], pixel: usize, s: &Surface, film: Vec2) -> u32 {
+        let [width, height] = self.push.size.map(|n| n as i32);
+        let (x, y) = ((film.x - 0.5).floor() as i32, (film.y - 0.5).floor() as i32);
+        let around = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
+        let mut reason = DROPPED_OUTSIDE;
+        for (x, y) in around.into_iter().filter(|(x, y)| (0..width).contains(x) && (0..height).contains(y)) {
+            let to = (y * width + x) as usize;
+            if self.shows(&guide[to], s) {
+                let off = (film - vec2(x as f32, y as f32) - 0.5).abs().max_element();
+                winner[to] = winner[to].min(((off * 64.0) as u32).min(63) << PIXEL_BITS | pixel as u32);
+                reason = 0;
+            } else if reason != 0 {
+                reason = DROPPED_HIDDEN;
+            }
         }
-        let to = ((film.y as u32).min(height - 1) * width + (film.x as u32).min(width - 1)) as usize;
-        let at = points[to];
-        if at.triangle == NONE || !self.same_surface(&s, &surface_of(self.scene, at.triangle, at.instance, at.weights))
-        {
-            return (dropped(DROPPED_HIDDEN), None);
-        }
-        let views = [self.previous, self.camera].map(|c| (Vec3::from(c.position) - s.position).normalize());
-        let light: Vec3 = self.around(pixel).map(|q| Vec3::from(handed.records[q].mean)).sum();
-        let error = self.view_error(&s, light / 9.0, views[0], views[1]);
-        let parts = (error * ERROR_PARTS as f32 / self.push.max_error.max(1e-30)).ceil();
-        // A number that is none fails both comparisons.
-        if !(error <= self.push.max_error && c.error as f32 + parts <= ERROR_PARTS as f32) {
-            return (dropped(DROPPED_VIEW), None);
-        }
-        let off: Vec2 = (vec2(film.x, film.y).fract() - 0.5).abs();
-        let key = ((off.max_element() * 126.0) as u32) << PIXEL_BITS | pixel as u32;
-        (Carried { age: c.age + 1, error: c.error + parts as u32, ..c }.word(), Some((to, key)))
+        reason
     }
 
-    /// Twin of `project.comp`: the winner's key of every new pixel. `points` are those of the new frame.
-    pub fn project(&self, handed: &mut Handed, points: &[SurfacePoint]) -> Vec<u32> {
-        let mut winner = vec![NONE; points.len()];
-        for pixel in 0..points.len() {
+    /// Moves a pixel's samples. Returns their word in their new pixel, or why they stay behind.
+    fn moved(&self, handed: &Handed, guide: &[Guide], winner: &mut [u32], pixel: usize, c: Carried) -> u32 {
+        let h = &handed.records[pixel];
+        let s = surface_of(self.scene, h.triangle, h.instance, h.weights);
+        if c.back != (s.geometric.dot(Vec3::from(self.camera.position) - s.position) < 0.0) {
+            return dropped(DROPPED_HIDDEN);
+        }
+        let views = [self.previous, self.camera].map(|c| (Vec3::from(c.position) - s.position).normalize());
+        let around: Vec3 = self.around(pixel).map(|q| Vec3::from(handed.records[q].mean)).sum();
+        let view = self.view_error(&s, around / 9.0, views[0], views[1]);
+        let cell = cell_of(pixel as u32, self.push.size) as usize;
+        let light = if self.push.moved != 0 { self.changes[cell].error } else { 0.0 };
+        let parts = ((light + view) * ERROR_PARTS as f32 / self.push.max_error.max(1e-30)).ceil();
+        // A number that is none fails both comparisons.
+        if !(light + view <= self.push.max_error && c.error as f32 + parts <= ERROR_PARTS as f32) {
+            return dropped(if light > view { DROPPED_LIGHT } else { DROPPED_VIEW });
+        }
+        let film = film_from_point(&self.camera, s.position, self.push.size);
+        let ahead = film.z > 0.0 && film.is_finite();
+        let reason = if ahead { self.offer(guide, winner, pixel, &s, film.truncate()) } else { DROPPED_OUTSIDE };
+        let word = Carried { age: c.age + 1, error: c.error + parts as u32, ..c }.word();
+        if reason == 0 { word } else { dropped(reason) }
+    }
+
+    /// Twin of `project.comp`: the winner's key of every new pixel. `guide` is that of the new frame.
+    pub fn project(&self, handed: &mut Handed, guide: &[Guide]) -> Vec<u32> {
+        let mut winner = vec![NONE; guide.len()];
+        for pixel in 0..guide.len() {
             let c = Carried::of(handed.offered[pixel]);
-            let (word, offer) = match c.count {
-                0 => continue,
-                _ if self.still() => (c.word(), Some((pixel, pixel as u32))),
-                _ if c.age >= self.push.max_age => (dropped(DROPPED_OLD), None),
-                _ => self.moved(handed, points, pixel, c),
-            };
-            handed.offered[pixel] = word;
-            if let Some((to, key)) = offer {
-                winner[to] = winner[to].min(key);
+            match c.count {
+                0 => {}
+                _ if self.still() => winner[pixel] = pixel as u32,
+                _ if c.age >= self.push.max_age => handed.offered[pixel] = dropped(DROPPED_OLD),
+                _ => handed.offered[pixel] = self.moved(handed, guide, &mut winner, pixel, c),
             }
         }
         winner

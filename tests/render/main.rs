@@ -3,6 +3,7 @@ mod adaptive;
 #[path = "../support/alike.rs"]
 mod alike;
 mod analytic;
+mod ghosts;
 #[path = "../support/moving.rs"]
 mod moving;
 mod plan;
@@ -11,6 +12,7 @@ mod pose;
 mod poses;
 mod references;
 mod reproject;
+mod rides;
 #[path = "../support/scattering.rs"]
 #[allow(dead_code)]
 mod scattering;

@@ -1,8 +1,7 @@
 //! Tests frames that begin with the samples of the last: what must be carried to the bit, what must not be carried at all, and
 //! that what is carried is of the right surface. A naive arm, which keeps all samples where they are on the film, fails every
 //! check of truth.
-use crate::moving::{Film, shifted, turned};
-use crate::poses::{Moment, at, pose};
+use crate::moving::{Film, shifted, truth, turned};
 use crate::support::{self, assert_silent, gpu};
 use crate::twin::Workplace;
 use std::path::Path;
@@ -10,7 +9,7 @@ use tallow::gpu::Gpu;
 use tallow::layout::{Camera, PixelStats};
 use tallow::render::settings::Settings;
 use tallow::render::{Carriage, Outputs, Renderer, Reproject, Step, carried_samples};
-use tallow::scene::{Loaded, Pose, Scene};
+use tallow::scene::{Loaded, Scene};
 
 fn scene(file: &str, change: impl Fn(&mut Settings)) -> Loaded {
     Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file))
@@ -282,47 +281,6 @@ fn what_is_hidden_stays_behind() {
     let carried: Vec<usize> = (0..guide.len()).filter(|&i| carried_samples(words[i]) > 0).collect();
     let wrong = carried.iter().filter(|i| wrong(i)).count();
     assert!(wrong * 50 < carried.len(), "{wrong} of {} show the other: {found:?}", carried.len());
-}
-
-/// Light that has changed leaves no ghost, wherever it came from; a camera that moves by a pose carries as any does.
-#[test]
-fn a_changed_scene_begins_anew() {
-    let gpu = gpu();
-    let before = Moment { light: 2.5, ..Moment::default() };
-    for (dim, keeps) in [(true, false), (false, true)] {
-        let mut scene = at(&before);
-        let mut film = Film::new(&gpu, &scene, Reproject::default());
-        film.frame(film.camera);
-        let next = Moment { light: if dim { 0.01 } else { 2.5 }, step: 0.05, ..before };
-        let whole = pose(&scene, &next, 1.0);
-        let change = match dim {
-            true => scene.apply(&whole).unwrap(),
-            false => scene.apply(&Pose { camera: whole.camera, ..Pose::default() }).unwrap(),
-        };
-        film.record(|renderer, rec| renderer.update(rec, &scene, &change));
-        let camera = scene.camera([48, 32]).unwrap();
-        film.begin(camera);
-        let found = film.renderer.carriage().unwrap();
-        assert!(if keeps { found.carried > 200 } else { found.carried == 0 }, "dim {dim}: {found:?}");
-        let seen = film.stats();
-        assert!(keeps || seen.iter().all(|s| *s == PixelStats::default()), "nothing is left of the light");
-    }
-    assert_silent(&gpu);
-}
-
-/// Share of pixels, of those with samples carried, whose mean is farther than four standard errors from that of a direct render,
-/// and the mean of the errors of all in units of the picture's brightness.
-fn truth(stats: &[PixelStats], words: &[u32], direct: &[PixelStats]) -> [f64; 2] {
-    let (mut wrong, mut all, mut off, mut light) = (0.0, 0.0, 0.0, 0.0);
-    for ((s, d), _) in stats.iter().zip(direct).zip(words).filter(|(_, word)| carried_samples(**word) > 0) {
-        let variance = |s: &PixelStats| f64::from(s.m2[1]) / f64::from(s.count) / f64::from(s.count.max(2) - 1);
-        let difference = f64::from(s.mean[1]) - f64::from(d.mean[1]);
-        // The deviation of the direct render stands for that of the few samples, which may be alike by chance.
-        let error = (variance(d) * f64::from(d.count) / f64::from(s.count) + variance(d)).sqrt();
-        wrong += f64::from(u8::from(difference.abs() > 4.0 * error + 1e-3));
-        (all, off, light) = (all + 1.0, off + difference, light + f64::from(d.mean[1]));
-    }
-    [wrong / all, off / light]
 }
 
 #[test]

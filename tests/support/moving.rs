@@ -3,7 +3,7 @@
 use glam::{Quat, Vec3};
 use tallow::gpu::{FrameResources, Gpu, Recorder};
 use tallow::layout::{Camera, PixelLight, PixelStats, SurfacePoint};
-use tallow::render::{Outputs, Renderer, Reproject, Step};
+use tallow::render::{Outputs, Renderer, Reproject, Step, carried_samples};
 use tallow::scene::Loaded;
 
 /// The camera turned to the left around its own vertical axis, in degrees.
@@ -95,4 +95,19 @@ impl Film {
     pub fn offered(&self) -> Vec<u32> {
         self.renderer.history().unwrap().offered.read().unwrap()
     }
+}
+
+/// Share of pixels, of those with samples carried, whose mean is farther than four standard errors from that of a direct render,
+/// and the mean of the errors of all in units of the picture's brightness.
+pub fn truth(stats: &[PixelStats], words: &[u32], direct: &[PixelStats]) -> [f64; 2] {
+    let (mut wrong, mut all, mut off, mut light) = (0.0, 0.0, 0.0, 0.0);
+    for ((s, d), _) in stats.iter().zip(direct).zip(words).filter(|(_, word)| carried_samples(**word) > 0) {
+        let variance = |s: &PixelStats| f64::from(s.m2[1]) / f64::from(s.count) / f64::from(s.count.max(2) - 1);
+        let difference = f64::from(s.mean[1]) - f64::from(d.mean[1]);
+        // The deviation of the direct render stands for that of the few samples, which may be alike by chance.
+        let error = (variance(d) * f64::from(d.count) / f64::from(s.count) + variance(d)).sqrt();
+        wrong += f64::from(u8::from(difference.abs() > 4.0 * error + 1e-3));
+        (all, off, light) = (all + 1.0, off + difference, light + f64::from(d.mean[1]));
+    }
+    [wrong / all, off / light]
 }

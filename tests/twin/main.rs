@@ -13,6 +13,8 @@ mod moving;
 mod path;
 #[path = "../support/picture.rs"]
 mod picture;
+#[path = "../support/poses.rs"]
+mod poses;
 mod reproject;
 mod sphere;
 mod stability;

@@ -1,13 +1,18 @@
 //! Compares the kernels of reprojection with their CPU twin. Rounding moves a few points to another pixel: nearly all pixels must
 //! begin with the same samples, bit for bit.
 use crate::moving::{Film, shifted, turned};
+use crate::poses::{MOMENTS, Moment, at, pose};
 use crate::support::{assert_silent, gpu};
 use glam::Vec3;
 use std::path::Path;
-use tallow::layout::{Camera, FrameConstants, Guide, PixelLight, PixelStats, ReprojectPush};
+use tallow::layout::{Camera, FrameConstants, Guide, LightChange, PixelLight, PixelStats, ReprojectPush, SurfacePoint};
+use tallow::math::hash::pcg;
+use tallow::render::pass::light_change::SPACINGS;
 use tallow::render::{Carriage, Reproject, carried_samples, frame_constants};
-use tallow::scene::{Loaded, Scene};
+use tallow::scene::{Loaded, Pose, Relit, Scene};
 use tallow::twins::camera::{camera_ray, film_from_pixel, film_from_point};
+use tallow::twins::light_change;
+use tallow::twins::path::{Strategy, Tracer};
 use tallow::twins::primary_hit::{guide, point};
 use tallow::twins::reproject::{Left, Reprojection};
 
@@ -31,7 +36,6 @@ fn push(scene: &Loaded, s: Reproject) -> ReprojectPush {
         max_samples: s.reproject_samples,
         max_age: s.reproject_age,
         spp: settings.spp,
-        moved: 0,
         ..Default::default()
     }
 }
@@ -45,13 +49,15 @@ fn both(film: &mut Film, scene: &Loaded, settings: Reproject, camera: Camera) ->
     let (guides, stats) = (tile.guide.read().unwrap(), film.stats());
     let (points, light, carried) = (film.points(), film.light(), film.carried());
     let left = Left { guide: &guides, points: &points, stats: &stats, light: &light, carried: &carried };
-    let reprojection = Reprojection { scene, previous: film.camera, camera, push: push(scene, settings) };
+    let (changes, instance_now, triangle_now) = (&[][..], &[][..], &[][..]);
+    let (before, previous, push) = (scene, film.camera, push(scene, settings));
+    let reprojection = Reprojection { before, scene, instance_now, triangle_now, changes, previous, camera, push };
     let mut handed = reprojection.remember(&left);
     let frame = FrameConstants { camera, ..frame_constants(scene, &scene.settings).unwrap() };
     let pixels = 0..scene.settings.pixels() as u32;
     let seen: Vec<Guide> = pixels.clone().map(|i| guide(scene, &frame, i)).collect();
     let mut points: Vec<_> = pixels.map(|i| point(scene, &frame, i)).collect();
-    let mut words = reprojection.project(&mut handed, &points);
+    let mut words = reprojection.project(&mut handed, &seen);
     let twin = reprojection.carry(&handed, &mut words, &seen, &mut points);
 
     film.begin(camera);
@@ -60,6 +66,137 @@ fn both(film: &mut Film, scene: &Loaded, settings: Reproject, camera: Camera) ->
     let differ = film.offered().iter().zip(&handed.offered).filter(|(a, b)| a != b).count();
     assert!(differ * 50 <= words.len(), "{differ} pixels of {} hand on something else", words.len());
     [(film.carried(), begun), (words, twin)]
+}
+
+/// Brings a scene into another pose and the camera to another place. Returns what pixels begin with, by the kernels and by the twin,
+/// and how many cells agree about their light.
+fn both_where_all_moves(
+    film: &mut Film,
+    scene: &mut Loaded,
+    settings: Reproject,
+    pose: &Pose,
+    camera: Camera,
+) -> ([Begun; 2], usize) {
+    let tile = &film.renderer.film().tiles[0];
+    let (guides, stats) = (tile.guide.read().unwrap(), film.stats());
+    let (points, light, carried) = (film.points(), film.light(), film.carried());
+    let left = Left { guide: &guides, points: &points, stats: &stats, light: &light, carried: &carried };
+    let before = scene.scene.clone();
+    let seed = pcg(pcg(!film.renderer.settings().seed).wrapping_add(film.renderer.settings().first_sample));
+    let effects = *film.renderer.effects();
+    let frame_of = |scene: &Scene, camera: Camera| {
+        let frame = frame_constants(scene, film.renderer.settings()).unwrap();
+        FrameConstants { camera, path: tallow::layout::PathConstants { seed, ..frame.path } }
+    };
+    fn tracer(scene: &Scene, frame: FrameConstants, effects: tallow::layout::Effects) -> Tracer<'_> {
+        Tracer { scene, frame, effects, strategy: Strategy::Both }
+    }
+    let previous = film.camera;
+    let change = scene.apply(pose).unwrap();
+    let flags = [&change.instance_now, &change.triangle_now].map(|now| u32::from(!now.is_empty()));
+    let push = ReprojectPush { moved: 1, instances: flags[0], triangles: flags[1], ..push(scene, settings) };
+    let (instance_now, triangle_now) = (&change.instance_now[..], &change.triangle_now[..]);
+    let leaving =
+        Reprojection { before: &before, scene, instance_now, triangle_now, changes: &[], previous, camera, push };
+    let mut handed = leaving.remember(&left);
+    let relit = Relit::of(&change.lights_before, scene);
+    let scale = frame_of(&before, previous).path.triangle_pdf_scale;
+    // As probes choose lights.
+    let lit = |scene: &Scene, frame: FrameConstants, after: bool| match &relit {
+        None => (scene.clone(), frame),
+        Some(r) => {
+            let lights = if after { &r.after } else { &r.before };
+            let (light_count, triangle_pdf_scale) = (lights.len() as u32, scale * r.pdf_scale);
+            let path = tallow::layout::PathConstants {
+                light_count,
+                environment: r.environment,
+                triangle_pdf_scale,
+                ..frame.path
+            };
+            let lit = Scene { lights: lights.clone(), light_table: r.table.clone(), ..scene.clone() };
+            (lit, FrameConstants { path, ..frame })
+        }
+    };
+    let (old, old_frame) = lit(&before, frame_of(&before, previous), false);
+    let (new, new_frame) = lit(scene, frame_of(scene, camera), true);
+    let probes = light_change::before(&tracer(&old, old_frame, effects), &previous, &points, &handed.offered);
+    let moved: Vec<_> = handed
+        .records
+        .iter()
+        .map(|h| SurfacePoint { triangle: h.triangle, instance: h.instance, weights: h.weights, ..Default::default() })
+        .collect();
+    let mut changes = light_change::after(&tracer(&new, new_frame, effects), &previous, &moved, &probes);
+    for spacing in SPACINGS {
+        changes = light_change::sums(&changes, light_change::cells_of(push.size), spacing);
+    }
+    let reprojection = Reprojection { changes: &changes, ..leaving };
+    let frame = frame_of(scene, camera);
+    let pixels = 0..scene.settings.pixels() as u32;
+    let seen: Vec<Guide> = pixels.clone().map(|i| guide(scene, &frame, i)).collect();
+    let mut points: Vec<_> = pixels.map(|i| point(scene, &frame, i)).collect();
+    let mut words = reprojection.project(&mut handed, &seen);
+    let twin = reprojection.carry(&handed, &mut words, &seen, &mut points);
+
+    film.record(|renderer, rec| renderer.update(rec, scene, &change));
+    film.begin(camera);
+    film.camera = camera;
+    let begun: Vec<_> = film.stats().into_iter().zip(film.light()).collect();
+    let found = film.renderer.history().unwrap().light_change().read().unwrap();
+    let alike = |(a, b): &(&LightChange, &LightChange)| {
+        a.count == b.count && (a.error - b.error).abs() <= 1e-3 * (1.0 + b.error)
+    };
+    let cells = found.iter().zip(&changes).filter(alike).count();
+    ([(film.carried(), begun), (words, twin)], cells)
+}
+
+#[test]
+fn kernels_agree_with_their_twin_where_all_moves() {
+    let gpu = gpu();
+    let settings = Reproject { reproject_error: 0.1, ..Reproject::default() };
+    let mut scene = at(&Moment::default()).with(|s| (s.width, s.height) = (65, 33));
+    let mut film = Film::new(&gpu, &scene, settings);
+    film.frame(film.camera);
+    let cells = 17 * 9;
+    let (mut lit, mut carried) = (0, 0);
+    for (k, moment) in MOMENTS.iter().enumerate() {
+        // Every other time hierarchies are built anew.
+        let pose = pose(
+            &scene,
+            &Moment { light: 1.0 + 0.02 * k as f32, ..*moment },
+            if k % 2 == 0 { 0.0 } else { f32::INFINITY },
+        );
+        let camera = shifted(film.camera, [0.01, 0.0, 0.02]);
+        let (begun, alike) = both_where_all_moves(&mut film, &mut scene, settings, &pose, camera);
+        let (n, agree) = (begun[0].0.len(), agreeing(&begun));
+        assert!(agree * 20 >= n * 19, "{moment:?}: {agree} of {n}");
+        assert!(alike * 20 >= cells * 19, "{moment:?}: {alike} of {cells} cells");
+        let found = Carriage::of(&film.offered(), &film.carried());
+        (lit, carried) = (lit + found.light, carried + found.carried);
+        film.renderer.steps().skip(1).for_each(|step| film.step(&step));
+    }
+    assert!(lit > 1000 && carried > 1000, "control: {lit} pixels' light has changed, {carried} are carried");
+    assert_silent(&gpu);
+}
+
+#[test]
+fn certain_changes_are_those_that_noise_does_not_explain() {
+    // One cell alone: a difference of 1 of one path is within its own noise.
+    let change =
+        |by: f32| LightChange { sum: [by, 0.0, 0.0], squares: [by * by, 0.0, 0.0], count: 1, ..Default::default() };
+    let error = |found: &[LightChange], spacing| light_change::sums(found, [3, 3], spacing)[4].error;
+    let mut one = vec![change(0.0); 9];
+    one[4] = change(1.0);
+    assert_eq!(error(&one, 1), 0.0);
+    // Three that agree are no chance: 3 > 1.7 sqrt(3). Two are.
+    one[0] = change(1.0);
+    assert_eq!(error(&one, 1), 0.0);
+    one[7] = change(1.0);
+    assert!((error(&one, 1) - 3.0 / 9.0).abs() < 1e-6);
+    assert_eq!(error(&[change(-1.0); 9], 1), 1.0);
+    assert_eq!(error(&[1.0, -1.0, 1.0, -1.0, 0.0, 1.0, -1.0, 1.0, 1.0].map(change), 1), 0.0);
+    // Neighbours that are farther away are outside of three cells.
+    assert_eq!(error(&[change(-1.0); 9], 3), 0.0);
+    assert_eq!([light_change::cell_of(0, [9, 9]), light_change::cell_of(9 * 4 + 8, [9, 9])], [0, 5]);
 }
 
 fn agreeing([a, b]: &[Begun; 2]) -> usize {

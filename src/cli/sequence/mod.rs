@@ -1,4 +1,5 @@
 //! `tallow sequence`: a scene becomes the frames of an animation.
+mod chain;
 mod preview;
 mod range;
 mod stage;
@@ -6,6 +7,7 @@ mod stage;
 use super::render::{self, outputs};
 use super::{Exit, complain, fail_on_messages, finite, print, print_json};
 use crate::error::{Error, Result};
+use crate::render::{Carriage, ReprojectOverrides};
 use crate::scene::description::numbered;
 use preview::Preview;
 use serde::Serialize;
@@ -19,6 +21,10 @@ use std::time::{Duration, Instant};
 /// Frame n shows the scene n / fps seconds after the start of its [[animation]] tables. Files have `####` for the number of the
 /// frame, with that many digits. A frame whose .exr file holds all samples of this scene, pose and settings is not rendered
 /// again. A frame that fails does not stop the others: the exit code is 6 then.
+///
+/// With --reproject forward a frame begins with samples of the one before, and so depends on all before it. The first frame that is
+/// asked for, and one after a frame that failed, begins anew: --only 40..48 is the same sequence begun at frame 40. A run that goes
+/// on takes up the .exr file of the last finished frame, to the same bits.
 #[derive(clap::Args)]
 #[command(
     mut_arg("outputs", |arg| arg.help("Image to write: .exr (all layers), .png or .hdr, with #### for the number of the frame; may be \
@@ -48,6 +54,13 @@ pub struct Args {
     /// Render finished frames again
     #[arg(long)]
     pub again: bool,
+    /// Whether frames begin with the samples of the last that still hold [default: forward, where something moves, the camera has no
+    /// lens, and samples are placed by no threshold or limit]
+    #[arg(long, value_enum, value_name = "HOW")]
+    pub reproject: Option<Reprojection>,
+    /// Which samples those are.
+    #[command(flatten, next_help_heading = "Samples of earlier frames")]
+    pub carry: ReprojectOverrides,
     /// How each frame is rendered.
     #[command(flatten)]
     pub render: render::Args,
@@ -55,6 +68,15 @@ pub struct Args {
 
 /// Options for one image, which a sequence refuses.
 const OF_ONE: [&str; 5] = ["resume", "pixel", "time", "error", "plan"];
+
+/// How frames come to samples of the last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Reprojection {
+    /// Not at all: every frame alone.
+    Off,
+    /// Samples move to where their points are now (Schalk 2018).
+    Forward,
+}
 
 impl Args {
     /// The options of one frame, whose files have its number.
@@ -136,6 +158,8 @@ pub struct FrameReport {
     pub refit_cost: Option<f32>,
     /// Meshes whose hierarchies were built anew.
     pub rebuilt: usize,
+    /// What became of the pixels of the frame before; none where a frame begins anew.
+    pub carriage: Option<Carriage>,
 }
 
 /// What `--json` prints.

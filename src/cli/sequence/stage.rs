@@ -1,6 +1,7 @@
 //! What a sequence keeps from frame to frame: the scene, its motion, and the renderer.
+use super::chain::Chain;
 use super::preview::Preview;
-use super::{Args, FrameReport};
+use super::{Args, FrameReport, Reprojection};
 use crate::cli::render::{self, EffectChoice, Spans, outputs};
 use crate::cli::{Exit, complain};
 use crate::error::{Error, Result};
@@ -8,7 +9,7 @@ use crate::gpu::{FrameResources, Gpu};
 use crate::image::{self, Film, NOISY};
 use crate::layout::{Effect, Effects};
 use crate::render::settings::Settings;
-use crate::render::{Renderer, all_effects, called_for, finished};
+use crate::render::{Carriage, Outputs, Renderer, Reproject, all_effects, called_for, can_carry, finished};
 use crate::scene::animation::{Animation, Turntable};
 use crate::scene::{Change, Loaded, Scene};
 use std::ops::Range;
@@ -29,6 +30,12 @@ pub struct Stage<'a> {
     renderer: Option<Renderer>,
     /// What the renderer has not been told of.
     change: Change,
+    /// How samples are carried, if they are.
+    reproject: Option<Reproject>,
+    /// The frames before the one that is next.
+    chain: Chain,
+    /// The frame that the renderer's history is of.
+    held: Option<u32>,
 }
 
 /// A frame that is over.
@@ -39,6 +46,7 @@ pub struct FrameEnd {
     pose_seconds: f64,
     refit_cost: Option<f32>,
     rebuilt: usize,
+    carriage: Option<Carriage>,
     /// How it ended.
     pub result: Result<Exit>,
 }
@@ -54,6 +62,7 @@ impl FrameEnd {
             pose_seconds: self.pose_seconds,
             refit_cost: self.refit_cost,
             rebuilt: self.rebuilt,
+            carriage: self.carriage,
         }
     }
 }
@@ -82,7 +91,9 @@ impl<'a> Stage<'a> {
         let gpu = args.render.common.open()?;
         render::check_room(&args.render, &settings, &gpu)?;
         let rest = called_for(&scene, &settings, args.render.wanted());
-        Ok(Self { args, gpu, scene, animation, frames, settings, rest, renderer: None, change: Change::default() })
+        let reproject = carrying(args, &scene, &settings, !animation.is_empty())?;
+        let (renderer, change, chain, held) = (None, Change::default(), Chain::default(), None);
+        Ok(Self { args, gpu, scene, animation, frames, settings, rest, renderer, change, reproject, chain, held })
     }
 
     /// Numbers of all frames.
@@ -99,37 +110,88 @@ impl<'a> Stage<'a> {
     pub fn frame(&mut self, number: u32, preview: Option<&mut Preview>) -> FrameEnd {
         let begun = Instant::now();
         let (pose_seconds, refit_cost, rebuilt, result) = (0.0, None, 0, Ok(Exit::Done));
-        let mut end = FrameEnd { number, skipped: false, seconds: 0.0, pose_seconds, refit_cost, rebuilt, result };
+        let (skipped, carriage) = (false, None);
+        let mut end = FrameEnd { number, skipped, seconds: 0.0, pose_seconds, refit_cost, rebuilt, carriage, result };
         end.result = self.try_frame(number, preview, &mut end);
+        if end.result.is_err() {
+            (self.chain, self.held) = (Chain::default(), None);
+        }
         end.seconds = begun.elapsed().as_secs_f64();
         end
     }
 
     fn try_frame(&mut self, number: u32, preview: Option<&mut Preview>, end: &mut FrameEnd) -> Result<Exit> {
-        let args = self.args.of_frame(number)?;
-        let mut settings = self.settings.clone();
-        if self.args.seed_per_frame {
-            settings.seed = settings.seed.wrapping_add(number);
-        }
+        let (args, settings) = (self.args.of_frame(number)?, self.settings_of(number));
         let begun = Instant::now();
         self.pose(number, end)?;
         end.pose_seconds = begun.elapsed().as_secs_f64();
         if let Some(film) = self.finished_film(&args, &settings).filter(|_| !self.args.again) {
             end.skipped = true;
+            self.chain = self.chain.or_of(&film).with(&self.scene, &settings, self.reproject)?;
             return show(preview, &film, &args).map(|()| Exit::Done);
         }
         outputs::check(&args)?;
         let begun = Instant::now();
+        self.hold(number, end)?;
         self.prepare(&settings)?;
         end.pose_seconds += begun.elapsed().as_secs_f64();
-        let renderer = self.renderer.as_ref().ok_or_else(|| Error::Usage("there is no renderer".into()))?;
-        let shot = render::shoot(&args, &self.gpu, &self.scene, renderer, None, Spans::default())?;
+        let carries = number.checked_sub(1).is_some_and(|before| self.held == Some(before));
+        if !carries {
+            self.chain = Chain::default();
+        }
+        let shot = self.shoot(&args, &settings, carries)?;
         let Some(mut shot) = shot else { return Ok(Exit::Interrupted) };
+        if carries {
+            end.carriage = self.renderer.as_ref().map(Renderer::carriage).transpose()?;
+        }
         let exit = shot.finish(&args)?.exit;
         if exit == Exit::Done {
             show(preview, shot.film(), &args)?;
+            self.chain = self.chain.with(&self.scene, &settings, self.reproject)?;
+            self.held = self.reproject.map(|_| number);
         }
         Ok(exit)
+    }
+
+    /// Frames whose samples are carried need numbers of their own.
+    fn settings_of(&self, number: u32) -> Settings {
+        let mut settings = self.settings.clone();
+        if self.args.seed_per_frame || self.reproject.is_some() {
+            settings.seed = settings.seed.wrapping_add(number);
+        }
+        settings
+    }
+
+    /// Takes the samples of a frame.
+    fn shoot(&self, args: &render::Args, settings: &Settings, carries: bool) -> Result<Option<render::Taken<'_>>> {
+        let renderer = self.renderer.as_ref().ok_or_else(|| Error::Usage("there is no renderer".into()))?;
+        let begun = render::Begun { earlier: None, carries };
+        let mut shot = render::shoot(args, &self.gpu, &self.scene, renderer, begun, Spans::default())?;
+        if let Some(shot) = shot.as_mut().filter(|_| self.reproject.is_some()) {
+            renderer.add_history(shot.film_mut(), &self.scene)?;
+            self.chain.tell(shot.film_mut(), &self.scene, settings)?;
+        }
+        Ok(shot)
+    }
+
+    /// Sees to it that the renderer has the history of the frame before this one, where there is a file that holds it.
+    fn hold(&mut self, number: u32, end: &mut FrameEnd) -> Result<()> {
+        let Some(before) = number.checked_sub(1).filter(|&n| self.reproject.is_some() && self.held != Some(n)) else {
+            return Ok(());
+        };
+        self.held = None;
+        let Some(film) = self.chain.is_begun().then(|| self.film_of(before)).flatten() else { return Ok(()) };
+        self.pose(before, end)?;
+        self.prepare(&self.settings_of(before))?;
+        let renderer = self.renderer.as_ref().ok_or_else(|| Error::Usage("there is no renderer".into()))?;
+        renderer.take_up(&mut FrameResources::new(&self.gpu)?, &film, &self.scene)?;
+        self.held = Some(before);
+        self.pose(number, end)
+    }
+
+    fn film_of(&self, number: u32) -> Option<Film> {
+        let files = self.args.of_frame(number).ok()?.output_files();
+        image::read(files.iter().find(|path| image::has_layers(path))?).ok()
     }
 
     /// Moves the scene to where it is in a frame.
@@ -157,14 +219,22 @@ impl<'a> Stage<'a> {
                 }
             }
         }
-        let wanted = self.args.render.wanted();
+        let wanted = self.wanted();
         let effects = match self.args.render.effects {
             EffectChoice::All => all_effects(&self.scene, settings),
             EffectChoice::Auto => self.union(called_for(&self.scene, settings, wanted)),
         };
-        self.renderer = Some(Renderer::specialised(&self.gpu, &self.scene, settings, wanted, effects)?);
+        let mut renderer = Renderer::specialised(&self.gpu, &self.scene, settings, wanted, effects)?;
+        self.reproject.map_or(Ok(()), |how| renderer.keep_history(how))?;
+        (self.renderer, self.held) = (Some(renderer), None);
         (self.rest, self.change) = (effects, Change::default());
         Ok(())
+    }
+
+    /// A history needs primary hits.
+    fn wanted(&self) -> Outputs {
+        let wanted = self.args.render.wanted();
+        Outputs { guides: wanted.guides || self.reproject.is_some(), ..wanted }
     }
 
     /// Effects of now and of all frames so far.
@@ -177,7 +247,10 @@ impl<'a> Stage<'a> {
     fn finished_film(&self, args: &render::Args, settings: &Settings) -> Option<Film> {
         let files = args.output_files();
         let first = files.iter().find(|path| image::has_layers(path))?;
-        let film = finished(first, &self.scene, settings)?;
+        let film = match self.reproject {
+            Some(_) => image::read(first).ok().filter(|film| self.chain.ends_in(film, &self.scene, settings))?,
+            None => finished(first, &self.scene, settings)?,
+        };
         let filtered = film.channels.iter().any(|channel| channel.name.starts_with(NOISY));
         (files.iter().all(|path| path.exists()) && filtered == args.denoise.is_some()).then_some(film)
     }
@@ -201,4 +274,17 @@ fn whole(animation: &Animation, fps: f64) -> Result<Range<u32>> {
 fn show(preview: Option<&mut Preview>, film: &Film, args: &render::Args) -> Result<()> {
     let Some(preview) = preview else { return Ok(()) };
     preview.add(film, &args.common.write_options()).map_err(|what| Error::Usage(format!("--preview: {what}")))
+}
+
+/// How samples are carried: as asked for, or where something moves and nothing speaks against it.
+fn carrying(args: &Args, scene: &Scene, settings: &Settings, moves: bool) -> Result<Option<Reproject>> {
+    let able = can_carry(scene, settings);
+    let carries = match args.reproject {
+        Some(Reprojection::Off) => false,
+        Some(Reprojection::Forward) => able.map(|()| true)?,
+        None => moves && able.is_ok(),
+    };
+    let mut how = Reproject::default();
+    args.carry.apply(&mut how);
+    Ok(carries.then_some(how))
 }

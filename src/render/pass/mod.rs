@@ -4,6 +4,7 @@ pub mod apportion;
 pub mod choose;
 pub mod counts;
 pub(crate) mod guide_lookup;
+pub mod light_change;
 pub(crate) mod path;
 pub(crate) mod primary_hit;
 pub mod reproject;

@@ -7,7 +7,7 @@ use crate::render::buffers::{DeviceScene, FilmTile};
 use crate::render::history::History;
 use crate::shaders::{carry, project, remember};
 
-/// Before the new frame's primary hits: guide\[P\], points\[P\], stats\[P\], light\[P\] -> history\[P\]
+/// Before the scene changes, and before the new frame's primary hits: guide\[P\], points\[P\], stats\[P\], light\[P\] -> history\[P\]
 pub fn remember(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, c: &PathConstants) -> Result<()> {
     t.windows().try_for_each(|w| {
         let part = w.start as usize..w.end as usize;
@@ -24,19 +24,22 @@ pub fn remember(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, 
             history: &h.records.part(part.clone())?,
             history_light: &if apart { h.light.part(part.clone())? } else { h.light.clone() },
             offered: &h.offered.part(part)?,
+            instance_now: &h.instance_now,
+            triangle_now: &h.triangle_now,
         };
         rec.dispatch_threads(&h.remember, bind, &h.push(c, w.start, w.end - w.start), w.end - w.start)
     })
 }
 
-/// After them: history\[P\], points\[P\] -> stats\[P\], light\[P\], carried\[P\]
+/// After them: history\[P\], guide\[P\], points\[P\], changes\[cells\] -> stats\[P\], light\[P\], carried\[P\]
 pub fn carry(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, c: &PathConstants) -> Result<()> {
     rec.fill(&h.carried, NONE)?; // NONE -> winner[P]
     let bind = project::Bind {
         scene: s.bind(),
         frame: s.bind_frame(),
         history: &h.records,
-        points: &t.points,
+        guide: &t.guide,
+        changes: h.light_change(),
         previous: &h.previous,
         offered: &h.offered,
         winner: &h.carried,

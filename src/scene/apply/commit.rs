@@ -6,8 +6,10 @@ use crate::layout::{BvhNode, Instance, Light, Material, Shading};
 use crate::scene::build::geometry::FLAT;
 use crate::scene::build::soft::{self, Placed};
 use crate::scene::build::{bvh, coat, hierarchy, lights};
+use crate::scene::change::numbers;
 use crate::scene::pose::Pose;
 use crate::scene::{Change, Deformed, Scene};
+use std::ops::Range;
 
 /// Changes the scene.
 ///
@@ -25,7 +27,9 @@ pub fn commit(scene: &mut Scene, next: Next, pose: &Pose) -> Result<Change> {
     if let Some(NextCopies { all, hidden, world }) = copies {
         (scene.bounds, scene.rig.hidden) = (world, hidden);
         scene.nodes.truncate(scene.root as usize);
+        let before = std::mem::take(&mut scene.rig.order);
         hierarchy::place(scene, all, scene.rig.levels[0]);
+        change.instance_now = numbers(&before, &scene.rig.order);
         change.nodes.push(scene.root as usize..scene.nodes.len());
         (change.instances, change.lights) = (true, true);
     }
@@ -33,6 +37,7 @@ pub fn commit(scene: &mut Scene, next: Next, pose: &Pose) -> Result<Change> {
         (scene.rig.lights, change.lights) = (lights, true);
     }
     if change.lights {
+        change.lights_before = scene.rig.light_numbers.iter().copied().zip(scene.lights.iter().copied()).collect();
         lights::list(scene)?;
     }
     if let Some(camera) = &pose.camera {
@@ -103,7 +108,8 @@ fn rebuild(scene: &mut Scene, index: usize, copies: &mut [Instance], change: &mu
         bvh::reorder(&mut shading, &order);
         scene.shading[range.clone()].copy_from_slice(&shading);
     }
-    soft.order = order;
+    let before = std::mem::replace(&mut soft.order, order);
+    renumber(&mut change.triangle_now, &range, &numbers(&before, &soft.order), scene.triangles.len());
     let lit = |&i: &usize| scene.materials[scene.triangles[i].material as usize].emission_weight > 0.0;
     tree.lit = range.clone().filter(lit).map(|i| i as u32).collect();
     tree.sort_lit();
@@ -114,6 +120,15 @@ fn rebuild(scene: &mut Scene, index: usize, copies: &mut [Instance], change: &mu
     if let Some(soft) = &mut tree.soft {
         soft.cost = cost;
     }
+}
+
+/// Notes that the triangles of `range`, of so many in all, have new numbers, counted from its start.
+fn renumber(triangle_now: &mut Vec<u32>, range: &Range<usize>, now: &[u32], all: usize) {
+    if triangle_now.is_empty() && !now.is_empty() {
+        triangle_now.extend(0..all as u32);
+    }
+    let first = range.start as u32;
+    triangle_now.iter_mut().skip(range.start).zip(now).for_each(|(to, index)| *to = first + index);
 }
 
 /// Puts another tree in the place of one. Where it does not fit, what lies behind moves, and some room is left for the next. Returns

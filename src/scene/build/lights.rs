@@ -60,27 +60,31 @@ pub fn weigh(scene: &mut Scene) {
 /// As [`finish`].
 pub fn list(scene: &mut Scene) -> Result<()> {
     let mut lights = scene.rig.lights.clone();
-    add_triangles(scene, &mut lights)?;
+    let mut numbers: Vec<u64> = (0..lights.len() as u64).collect();
+    add_triangles(scene, &mut lights, &mut numbers)?;
     let mut powers: Vec<f64> = lights.iter().map(|l| weight(l) * power(scene, l)).collect();
-    let mut kept = powers.iter();
+    let (mut kept, mut named) = (powers.iter(), powers.iter());
     lights.retain(|_| kept.next().is_some_and(|&p| p > 0.0));
+    numbers.retain(|_| named.next().is_some_and(|&p| p > 0.0));
     powers.retain(|&p| p > 0.0);
     let total: f64 = powers.iter().sum();
     scene.triangle_pdf_scale = if total > 0.0 { (PI / total) as f32 } else { 0.0 };
     scene.light_table = alias::build(&powers);
     let probabilities = alias::probabilities(&scene.light_table);
     lights.iter_mut().zip(probabilities).for_each(|(l, p)| l.probability = p as f32);
-    scene.lights = lights;
+    (scene.lights, scene.rig.light_numbers) = (lights, numbers);
     Ok(())
 }
 
-/// Emissive triangles in world space: of the only level, or of every instance that is seen.
-fn add_triangles(scene: &Scene, lights: &mut Vec<Light>) -> Result<()> {
+/// Emissive triangles in world space: of the only level, or of every instance that is seen. Their numbers are those of triangle and
+/// instance, above the numbers of lights without surface.
+fn add_triangles(scene: &Scene, lights: &mut Vec<Light>, numbers: &mut Vec<u64>) -> Result<()> {
     let rig = &scene.rig;
     if scene.instances.is_empty() {
         let lit = || rig.trees.iter().flat_map(|tree| &tree.lit);
         reserve(lights, lit().count())?;
         lit().for_each(|&index| lights.push(surface_light(scene, index as usize, None, None)));
+        numbers.extend(lit().map(|&index| 1 << 32 | u64::from(index)));
         return Ok(());
     }
     let emits = |material: u32| scene.materials[material as usize].emission_weight > 0.0;
@@ -89,14 +93,17 @@ fn add_triangles(scene: &Scene, lights: &mut Vec<Light>) -> Result<()> {
         worn if emits(worn) => tree.range.len(),
         _ => 0,
     };
-    let placed = || rig.seen(scene).filter(|(tree, instance)| lit(tree, instance) > 0);
-    reserve(lights, placed().map(|(tree, instance)| lit(tree, instance)).sum())?;
-    for (tree, instance) in placed() {
+    let placed = || rig.seen(scene).filter(|(_, tree, instance)| lit(tree, instance) > 0);
+    reserve(lights, placed().map(|(_, tree, instance)| lit(tree, instance)).sum())?;
+    for (copy, tree, instance) in placed() {
         let rows = [instance.world0, instance.world1, instance.world2].map(Vec4::from);
         let world = Mat4::from_cols(rows[0], rows[1], rows[2], Vec4::W).transpose();
         let material = (instance.material != NONE).then_some(instance.material);
         let at = Some((world, instance.mirrored == 1));
-        let mut add = |index| lights.push(surface_light(scene, index, at, material));
+        let mut add = |index: usize| {
+            lights.push(surface_light(scene, index, at, material));
+            numbers.push(u64::from(copy + 1) << 32 | u64::from(tree.number_of(index as u32)));
+        };
         match material {
             Some(_) => tree.whole().for_each(&mut add),
             None => tree.lit.iter().for_each(|&index| add(index as usize)),

@@ -1,0 +1,96 @@
+#include "effects.glsl"
+#include "shared/thread.glsl"
+#include "shared/scene.glsl"
+#include "shared/frame.glsl"
+#include "shared/finite.glsl"
+
+// Traces one path per cell of the film twice, with the same random numbers: before the scene changes, and after it. A path starts
+// at the point that a pixel's samples are of, which moves with its surface, and is seen from where the last frame's camera was. It
+// differs where something that it meets has changed: the samples of the pixels around are then of another light. This stands for
+// the gradient samples of Schied, Peters and Dachsbacher 2018 ("Gradient Estimation for Real-Time Adaptive Temporal Filtering"),
+// who compare new samples with single old ones; statistics of old samples hold none.
+layout(local_size_x_id = 100) in;
+layout(binding = 11) uniform usamplerBuffer points; // of SurfacePoint
+layout(binding = 12) uniform usamplerBuffer history; // of History
+layout(binding = 13) uniform usamplerBuffer offered; // of uint
+layout(scalar, binding = 16) uniform Previous { Camera previous; };
+layout(scalar, binding = 17) buffer Probes { Probe probes[]; };
+layout(scalar, binding = 18) writeonly buffer Changes { LightChange changes[]; };
+layout(scalar, push_constant) uniform Push { ProbePush push; };
+
+uint nodes_visited = 0u;
+
+#include "shared/sampler.glsl"
+#include "shared/warp.glsl"
+#include "shared/fresnel.glsl"
+#include "shared/microfacet.glsl"
+#include "shared/bsdf.glsl"
+#include "shared/texture.glsl"
+#include "shared/camera.glsl"
+#include "shared/traverse.glsl"
+#include "shared/surface.glsl"
+#include "shared/light.glsl"
+#include "shared/trace_path.glsl"
+#include "shared/history.glsl"
+#include "shared/cell.glsl"
+
+// One of the cell's pixels that hand on samples, the first from a random one on; NONE where none does.
+uint chosen_pixel(uint cell) {
+    uvec2 size = push.constants.size, cells = cells_of(size);
+    uvec2 corner = CELL * uvec2(cell % cells.x, cell / cells.x);
+    uint first = pcg(cell + pcg(push.constants.seed)), chosen = NONE;
+    for (uint k = 0u; k < CELL * CELL && chosen == NONE; k++) {
+        uint place = (first + k) % (CELL * CELL);
+        uvec2 at = corner + uvec2(place % CELL, place / CELL);
+        uint pixel = at.y * size.x + at.x;
+        if (all(lessThan(at, size)) && carried_of(texelFetch(offered, int(pixel)).x).count > 0u) chosen = pixel;
+    }
+    return chosen;
+}
+
+// Index of a cell's sample in the sequence that all cells share: such that those of any window of light_change.comp are spread
+// evenly over lights and directions, or nearly so. Cells 27 apart have the same.
+uint sample_of(uint cell) {
+    uint across = cells_of(push.constants.size).x, x = cell % across, y = cell / across, index = 0u;
+    for (uint part = 9u; part > 0u; part /= 3u) index = 9u * index + 3u * (y / part % 3u) + x / part % 3u;
+    return index;
+}
+
+// Radiance from a point towards the last frame's camera, by one path.
+vec3 light_from(SurfacePoint at, uint index) {
+    if (at.triangle == NONE) return vec3(0.0);
+    vec3 off = surface_at(Hit(0.0, at.triangle, at.instance, at.weights.x, at.weights.y)).position - previous.position;
+    float depth = length(off);
+    Path path = Path(previous.position, off / max(depth, 1e-37), vec3(1.0), 0.0, true, 1.0);
+    Hit hit = Hit(depth, at.triangle, at.instance, at.weights.x, at.weights.y);
+    vec3 albedo;
+    SplitLight light = trace_path(path, hit, sampler_start(0u, index, push.constants.seed), path_seed(0u, index), albedo);
+    return light.direct + light.indirect;
+}
+
+void main() {
+    uint i = thread_index();
+    if (i >= push.cells) return;
+    bool after = push.after != 0u;
+    Probe before = probes[i];
+    uint pixel = after ? before.pixel : chosen_pixel(i), known = pixel == NONE ? 0u : pixel;
+    SurfacePoint at = SurfacePoint_load(points, known);
+    if (after) {
+        at.triangle = History_triangle(history, known);
+        at.instance = History_instance(history, known);
+        at.weights = History_weights(history, known);
+    }
+    if (pixel == NONE) at.triangle = NONE;
+    vec3 light = light_from(at, sample_of(i));
+    if (!after) {
+        probes[i].light = light;
+        probes[i].pixel = pixel;
+        return;
+    }
+    LightChange change = LightChange_zero();
+    vec3 difference = light - before.light;
+    change.count = uint(pixel != NONE && finite(difference));
+    change.sum = change.count > 0u ? difference : vec3(0.0);
+    change.squares = change.sum * change.sum;
+    changes[i] = change;
+}

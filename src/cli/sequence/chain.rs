@@ -1,0 +1,53 @@
+//! What the samples of a frame come from besides its own scene and settings: the frames before it.
+use crate::error::Result;
+use crate::image::Film;
+use crate::render::settings::Settings;
+use crate::render::{HISTORY, Reproject, is_frame, metadata_of_frame};
+use crate::scene::{Fingerprint, Scene};
+
+/// The frames up to one, as a number that tells them from others; none where the next frame begins anew.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Chain(Option<String>);
+
+impl Chain {
+    /// Whether there is a frame that the next one can go on from.
+    pub fn is_begun(&self) -> bool {
+        self.0.is_some()
+    }
+
+    fn text(&self) -> &str {
+        self.0.as_deref().unwrap_or("none")
+    }
+
+    /// The chain that a finished film goes on, where this one has not begun.
+    pub fn or_of(&self, film: &Film) -> Self {
+        let said = || film.metadata.get(HISTORY).filter(|text| *text != "none").cloned();
+        Self(self.0.clone().or_else(said))
+    }
+
+    /// Goes on by a frame.
+    ///
+    /// # Errors
+    /// Those of [`Scene::fingerprint`].
+    pub fn with(&self, scene: &Scene, settings: &Settings, how: Option<Reproject>) -> Result<Self> {
+        let mut all = Fingerprint::default();
+        let of_frame = metadata_of_frame(scene, settings, self.text())?;
+        of_frame.values().for_each(|text| all.add(text.as_bytes()));
+        all.add(format!("{how:?}").as_bytes());
+        Ok(Self(Some(all.to_string())))
+    }
+
+    /// Makes a film say that it goes on from here.
+    ///
+    /// # Errors
+    /// Those of [`Scene::fingerprint`].
+    pub fn tell(&self, film: &mut Film, scene: &Scene, settings: &Settings) -> Result<()> {
+        film.metadata.extend(metadata_of_frame(scene, settings, self.text())?);
+        Ok(())
+    }
+
+    /// Whether a film is the next frame. The first frame of a run may go on from frames that this run knows nothing of.
+    pub fn ends_in(&self, film: &Film, scene: &Scene, settings: &Settings) -> bool {
+        is_frame(film, scene, settings, self.or_of(film).text())
+    }
+}

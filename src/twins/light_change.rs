@@ -1,0 +1,94 @@
+//! Twin of `glsl/reproject/probe.comp` and `glsl/reproject/light_change.comp`.
+use crate::layout::{Camera, LightChange, NONE, Probe, SurfacePoint};
+use crate::math::hash::pcg;
+use crate::shaders::light_change::CERTAIN;
+use crate::shaders::shared::cell::CELL;
+use crate::twins::path::Tracer;
+use crate::twins::reproject::Carried;
+use glam::Vec3;
+
+/// Cells across and down of a film.
+pub fn cells_of(size: [u32; 2]) -> [u32; 2] {
+    size.map(|n| n.div_ceil(CELL))
+}
+
+/// The cell of a pixel, row-major.
+pub fn cell_of(pixel: u32, size: [u32; 2]) -> u32 {
+    pixel / size[0] / CELL * cells_of(size)[0] + pixel % size[0] / CELL
+}
+
+/// Index of a cell's sample in the sequence that all share.
+fn sample_of(cell: u32, size: [u32; 2]) -> u32 {
+    let across = cells_of(size)[0];
+    let digit = |of: u32| of % 3;
+    let [x, y] = [cell % across, cell / across];
+    [9, 3, 1].iter().fold(0, |index, part| 9 * index + 3 * digit(y / part) + digit(x / part))
+}
+
+/// The pixel whose point a cell's path starts at, or [`NONE`].
+pub fn chosen_pixel(cell: u32, size: [u32; 2], seed: u32, offered: &[u32]) -> u32 {
+    let across = cells_of(size)[0];
+    let (x, y) = (CELL * (cell % across), CELL * (cell / across));
+    let first = pcg(cell.wrapping_add(pcg(seed)));
+    let places = (0..CELL * CELL).map(|k| first.wrapping_add(k) % (CELL * CELL));
+    let pixels =
+        places.map(|place| [x + place % CELL, y + place / CELL]).filter(|at| at[0] < size[0] && at[1] < size[1]);
+    let mut pixels = pixels.map(|[x, y]| y * size[0] + x);
+    pixels.find(|&pixel| Carried::of(offered[pixel as usize]).count > 0).unwrap_or(NONE)
+}
+
+/// Paths of all cells before the scene changes. The tracer's seed is that of the probes.
+pub fn before(tracer: &Tracer, eye: &Camera, points: &[SurfacePoint], offered: &[u32]) -> Vec<Probe> {
+    let (size, seed) = (tracer.frame.path.size, tracer.frame.path.seed);
+    let [across, down] = cells_of(size);
+    let probe = |cell| match chosen_pixel(cell, size, seed, offered) {
+        NONE => Probe { pixel: NONE, ..Probe::default() },
+        pixel => {
+            let light = tracer.light_from(points[pixel as usize], eye.position.into(), sample_of(cell, size)).into();
+            Probe { light, pixel, ..Probe::default() }
+        }
+    };
+    (0..across * down).map(probe).collect()
+}
+
+/// What has changed on the same paths; `points` as the changed scene numbers them.
+pub fn after(tracer: &Tracer, eye: &Camera, points: &[SurfacePoint], probes: &[Probe]) -> Vec<LightChange> {
+    let size = tracer.frame.path.size;
+    let change = |(cell, probe): (u32, &Probe)| {
+        if probe.pixel == NONE {
+            return LightChange::default();
+        }
+        let light = tracer.light_from(points[probe.pixel as usize], eye.position.into(), sample_of(cell, size));
+        let difference = light - Vec3::from(probe.light);
+        match difference.is_finite() {
+            true => LightChange {
+                sum: difference.into(),
+                squares: (difference * difference).into(),
+                count: 1,
+                ..LightChange::default()
+            },
+            false => LightChange::default(),
+        }
+    };
+    (0..).zip(probes).map(change).collect()
+}
+
+/// One level: sums of 3x3 cells that are `spacing` cells apart.
+pub fn sums(found: &[LightChange], cells: [u32; 2], spacing: u32) -> Vec<LightChange> {
+    let [width, height] = cells.map(|n| n as i32);
+    let sum = |i: i32| {
+        let around =
+            (0..9).map(|k| [i % width + (k % 3 - 1) * spacing as i32, i / width + (k / 3 - 1) * spacing as i32]);
+        let inside = around.filter(|[x, y]| (0..width).contains(x) && (0..height).contains(y));
+        let mut all = LightChange { error: found[i as usize].error, ..LightChange::default() };
+        for other in inside.map(|[x, y]| &found[(y * width + x) as usize]) {
+            all.sum = (Vec3::from(all.sum) + Vec3::from(other.sum)).into();
+            all.squares = (Vec3::from(all.squares) + Vec3::from(other.squares)).into();
+            all.count += other.count;
+        }
+        let (sum, noise) = (Vec3::from(all.sum).abs(), CERTAIN * Vec3::from(all.squares).map(f32::sqrt));
+        let certain = Vec3::select(sum.cmpgt(noise), sum / all.count.max(1) as f32, Vec3::ZERO);
+        LightChange { error: all.error.max(certain.max_element()), ..all }
+    };
+    (0..width * height).map(sum).collect()
+}

@@ -1,0 +1,129 @@
+//! Renders frames one after another, and compares them with references.
+use anyhow::{Context, Result};
+use tallow::allocate::policy;
+use tallow::denoise::filter::Method;
+use tallow::denoise::{Filtered, Noisy, Recipe};
+use tallow::gpu::{FrameResources, Gpu, PassTime};
+use tallow::image::{Picture, metrics};
+use tallow::layout::Camera;
+use tallow::render::{Job, Outputs, Renderer, Reproject, Step};
+use tallow::scene::{Change, Loaded};
+use tallow::statistics::variance_of_mean;
+
+/// Share of the pixels that are left out of an error, those where it is largest: fireflies would decide it alone.
+const TRIMMED: f64 = 0.001;
+
+/// How frames are rendered.
+#[derive(Clone, Copy)]
+pub struct Arm {
+    pub name: &'static str,
+    pub policy: &'static str,
+    pub carries: Option<Reproject>,
+    pub filter: Option<&'static str>,
+}
+
+/// A renderer of an arm, and what it needs.
+pub struct Film {
+    pub renderer: Renderer,
+    gpu: Gpu,
+    frame: FrameResources,
+    arm: Arm,
+    size: [u32; 2],
+}
+
+pub fn milliseconds(times: &[PassTime], of: impl Fn(&str) -> bool) -> f64 {
+    times.iter().filter(|t| of(t.name)).fold(0.0, |sum, t| sum + t.duration_ns() as f64 * 1e-6)
+}
+
+/// Passes that carry samples, and those that find how light has changed.
+pub fn carries(name: &str) -> bool {
+    ["remember", "project", "carry", "probe", "light_change"].contains(&name)
+}
+
+impl Film {
+    pub fn new(gpu: &Gpu, scene: &Loaded, arm: Arm, spp: u32) -> Result<Self> {
+        let scene = scene.clone().with(|s| {
+            s.spp = spp;
+            s.allocate.policy = policy(arm.policy).unwrap_or(s.allocate.policy);
+            s.allocate.min_spp = 2.min(spp); // of one sample, no noise is known
+        });
+        let outputs = Outputs { split_light: true, guides: true, counters: false };
+        let mut renderer = Renderer::new(gpu, &scene, &scene.settings, outputs)?;
+        arm.carries.map_or(Ok(()), |settings| renderer.keep_history(settings))?;
+        let size = [scene.settings.width, scene.settings.height];
+        Ok(Self { renderer, gpu: gpu.clone(), frame: FrameResources::new(gpu)?, arm, size })
+    }
+
+    /// Renders a frame from a camera, after what has changed in the scene. Returns its passes.
+    pub fn shoot(&mut self, camera: Camera, change: Option<(&Loaded, &Change)>, seed: u32) -> Result<Vec<PassTime>> {
+        let (gpu, renderer) = (&self.gpu, &mut self.renderer);
+        let mut times = Vec::new();
+        if let Some((scene, change)) = change {
+            times.extend(gpu.run(&mut self.frame, |rec| renderer.update(rec, scene, change))?);
+        }
+        renderer.set_camera(camera)?;
+        renderer.set_seed(seed);
+        let steps: Vec<Step> = match self.arm.carries {
+            Some(_) => {
+                let (began, rest) = renderer.begin_frame(&mut self.frame)?;
+                times.extend(began);
+                rest
+            }
+            None => renderer.steps().collect(),
+        };
+        for step in &steps {
+            times.extend(renderer.run(&mut self.frame, step)?);
+        }
+        Ok(times)
+    }
+
+    /// What is shown: the mean, or what the arm's filter makes of it; and what that took.
+    pub fn picture(&self) -> Result<(Picture, f64)> {
+        let stats = self.renderer.film().tiles[0].stats.read()?;
+        let [width, height] = self.size;
+        let picture = Picture { width, height, pixels: stats.iter().map(|s| s.mean).collect() };
+        let Some(name) = self.arm.filter else { return Ok((picture, 0.0)) };
+        let method = Method::all().find(|method| method.name() == name).context("a filter of that name")?;
+        let ([r, g, b], times) =
+            Filtered::new(&self.gpu, Noisy::of_film(&self.renderer)?, &Recipe::new(method))?.join(&self.gpu)?;
+        let pixels = r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect();
+        Ok((Picture { pixels, ..picture }, milliseconds(&times, |_| true)))
+    }
+}
+
+/// A converged image, and the noise that it has itself.
+pub struct Reference {
+    picture: Picture,
+    noise: f64,
+}
+
+impl Reference {
+    pub fn render(gpu: &Gpu, scene: &Loaded, camera: Camera, spp: u32) -> Result<Self> {
+        let long = scene.clone().with(|s| (s.spp, s.seed) = (spp, 1 << 20));
+        let mut renderer = Renderer::new(gpu, &long, &long.settings, Outputs::default())?;
+        renderer.set_camera(camera)?;
+        Job::new(&renderer).run_to_end(&mut FrameResources::new(gpu)?)?;
+        let stats = renderer.film().tiles[0].stats.read()?;
+        let picture = renderer.picture()?;
+        let variance: Vec<_> = stats.iter().map(variance_of_mean).collect();
+        let noise = metrics::relative_noise(&picture, &variance);
+        Ok(Self { picture, noise })
+    }
+
+    /// The relative MSE without the largest 0.1 % of pixels.
+    pub fn error(&self, picture: &Picture) -> f64 {
+        metrics::trimmed_mean(metrics::relative_squares(picture, &self.picture), TRIMMED)
+    }
+
+    /// What of an error is the reference's own, about.
+    pub fn noise(&self) -> f64 {
+        self.noise
+    }
+
+    /// How far a picture is off, in units of the reference's brightness there.
+    pub fn off(&self, picture: &Picture) -> Vec<f64> {
+        let light = |p: &[f32; 3]| p.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0;
+        let pairs = picture.pixels.iter().zip(&self.picture.pixels);
+        pairs.map(|(a, b)| (light(a) - light(b)) / (light(b) + 0.01)).collect()
+    }
+}

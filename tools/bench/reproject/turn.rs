@@ -1,0 +1,175 @@
+//! The experiment of Schalk 2018, 4.3: the camera turns by a total angle in steps, with so many samples for each, and rests. From then on
+//! error is measured against time.
+use crate::film::{Arm, Film, Reference, carries, milliseconds};
+use crate::{View, plot};
+use anyhow::Result;
+use glam::{Quat, Vec3};
+use tallow::gpu::Gpu;
+use tallow::layout::{Camera, vec3};
+use tallow::render::{Carriage, Reproject};
+use tallow::report::table;
+
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    view: View,
+    /// Degrees that the camera turns by
+    #[arg(long, default_value_t = 100.0)]
+    degrees: f32,
+    /// Degrees of a step
+    #[arg(long, value_delimiter = ',', default_values_t = [5.0, 10.0, 20.0, 50.0])]
+    steps: Vec<f32>,
+    /// Samples of a pixel for each step
+    #[arg(long, default_value_t = 8)]
+    spp: u32,
+    /// Frames after the last step
+    #[arg(long, default_value_t = 6)]
+    rest: u32,
+    /// Limits of the error, in 256ths
+    #[arg(long, value_delimiter = ',', default_values_t = [1.0, 4.0, 8.0])]
+    errors: Vec<f32>,
+}
+
+fn turned(first: &Camera, degrees: f32) -> Camera {
+    let turn = Quat::from_axis_angle(Vec3::from(first.up).normalize(), degrees.to_radians());
+    let of = |v: vec3| (turn * Vec3::from(v)).to_array();
+    Camera { right: of(first.right), up: of(first.up), forward: of(first.forward), ..*first }
+}
+
+/// What was seen of an arm from the last step on: milliseconds since then and the error, frame by frame.
+pub struct Line {
+    pub name: String,
+    pub points: Vec<(f64, f64)>,
+    frame_ms: f64,
+    carrying_ms: f64,
+    carriage: Option<Carriage>,
+}
+
+fn arms(errors: &[f32]) -> Vec<(String, Arm)> {
+    let arm = |name, policy, carries| Arm { name, policy, carries, filter: None };
+    let mut arms = vec![("uniform".to_owned(), arm("uniform", "uniform", None))];
+    arms.push(("placed".to_owned(), arm("placed", "variance", None)));
+    for &error in errors {
+        let carries = Some(Reproject { reproject_error: error / 256.0, ..Reproject::default() });
+        arms.push((format!("reprojection, E = {error}/256"), arm("reprojection", "uniform", carries)));
+        arms.push((format!("both, E = {error}/256"), arm("both", "variance", carries)));
+    }
+    arms
+}
+
+fn measure(gpu: &Gpu, args: &Args, step: f32, name: String, arm: Arm, reference: &Reference) -> Result<Line> {
+    let scene = args.view.load()?;
+    let first = scene.camera([args.view.width, args.view.height])?;
+    let mut film = Film::new(gpu, &scene, arm, args.spp)?;
+    let count = (args.degrees / step).round() as u32;
+    let (mut points, mut clock, mut carriage, mut frame_ms, mut carrying_ms) = (Vec::new(), 0.0, None, 0.0, 0.0);
+    let (mut means, mut weight) = (Vec::new(), 0.0);
+    for k in 0..=count + args.rest {
+        let camera = turned(&first, args.degrees.min(step * k as f32));
+        let times = film.shoot(camera, None, k)?;
+        if k < count {
+            continue;
+        }
+        let ms = milliseconds(&times, |_| true);
+        clock += ms;
+        let picture = film.picture()?.0;
+        // Without carried samples a camera at rest accumulates its frames.
+        if arm.carries.is_none() {
+            means = accumulated(means, &picture.pixels, weight);
+            weight += 1.0;
+        }
+        let shown = if arm.carries.is_none() { &means } else { &picture.pixels };
+        let shown = tallow::image::Picture { pixels: shown.clone(), ..picture };
+        points.push((clock, reference.error(&shown)));
+        if k == count && arm.carries.is_some() {
+            carriage = Some(film.renderer.carriage()?);
+            carrying_ms = milliseconds(&times, carries);
+        }
+        frame_ms = ms;
+    }
+    Ok(Line { name, points, frame_ms, carrying_ms, carriage })
+}
+
+fn accumulated(means: Vec<vec3>, new: &[vec3], weight: f32) -> Vec<vec3> {
+    if means.is_empty() {
+        return new.to_vec();
+    }
+    let mean = |(a, b): (&vec3, &vec3)| std::array::from_fn(|c| (a[c] * weight + b[c]) / (weight + 1.0));
+    means.iter().zip(new).map(mean).collect()
+}
+
+pub fn run(gpu: &Gpu, args: &Args) -> Result<()> {
+    args.view.tell(gpu);
+    let scene = args.view.load()?;
+    let size = [args.view.width, args.view.height];
+    let reference =
+        Reference::render(gpu, &scene, turned(&scene.camera(size)?, args.degrees), args.view.reference_spp)?;
+    println!(
+        "{} degrees, {} samples a pixel for each step; relative MSE (the reference's own: {:.4}) of the frame after the last step and of \
+         those that follow it",
+        args.degrees,
+        args.spp,
+        reference.noise()
+    );
+    for &step in &args.steps {
+        let lines = arms(&args.errors)
+            .into_iter()
+            .map(|(name, arm)| measure(gpu, args, step, name, arm, &reference))
+            .collect::<Result<Vec<_>>>()?;
+        print(step, &lines, size[0] * size[1]);
+        if let Some(path) = &args.view.plot {
+            let path = path.with_extension(format!("{step}.svg"));
+            let series: Vec<_> = lines.iter().map(|l| (l.name.clone(), l.points.clone())).collect();
+            plot::lines(
+                &path,
+                &format!("steps of {step} degrees"),
+                ["ms after the last step", "relative MSE"],
+                &series,
+            )?;
+        }
+    }
+    Ok(())
+}
+
+fn print(step: f32, lines: &[Line], pixels: u32) {
+    let base = &lines[0].points;
+    let share = |n: u64| format!("{:.0} %", 100.0 * n as f64 / f64::from(pixels));
+    let row = |line: &Line| {
+        let at =
+            |k: usize| line.points.get(k).map_or(String::new(), |p| format!("{:.4} ({:.2})", p.1, p.1 / base[k].1));
+        let last = line.points.len() - 1;
+        let times = [line.frame_ms, line.carrying_ms].map(|ms| format!("{ms:.1}"));
+        let what = line.carriage.map_or([String::new(), String::new()], |c| {
+            [share(c.carried), format!("{:.1}", c.samples as f64 / c.carried.max(1) as f64)]
+        });
+        let reasons = line.carriage.map_or(String::new(), |c| {
+            let of = [
+                ("edge", c.edge),
+                ("outside", c.outside),
+                ("hidden", c.hidden),
+                ("view", c.view),
+                ("specular", c.specular),
+            ];
+            of.iter()
+                .filter(|(_, n)| *n > 0)
+                .map(|(why, n)| format!("{why} {}", share(*n)))
+                .collect::<Vec<_>>()
+                .join(", ")
+        });
+        let mut cells = vec![line.name.clone(), at(0), at(1), at(last)];
+        cells.extend(times.into_iter().chain(what).chain([reasons]));
+        cells
+    };
+    let head = [
+        "arm",
+        "error (of uniform)",
+        "a frame later",
+        "at the end",
+        "frame ms",
+        "carrying ms",
+        "carried",
+        "samples each",
+        "dropped",
+    ];
+    println!("\nsteps of {step} degrees\n{}", table::text(&head, &lines.iter().map(row).collect::<Vec<_>>()));
+}
