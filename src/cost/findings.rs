@@ -1,49 +1,16 @@
 //! What the data of a measurement say, in words. A statement is made only where the data tell; a tie is said to be one.
+use super::candidate::{Candidate, candidates};
 use super::changes;
 use super::curve::Curve;
-use super::document::{Estimate, Finding, Method, Point, Verdict};
+use super::document::{Estimate, Finding, Point, Verdict};
 use super::gain;
 use super::interval;
-use super::summary::curves;
 use super::words::{factor, list, milliseconds, number, percent};
-use std::collections::BTreeMap;
 
 /// Number of times at which methods are compared.
 const LEVELS: usize = 8;
 /// Largest number of errors for which the time to reach them is told.
 const GOALS: usize = 4;
-
-/// A method with a curve for every seed.
-pub(super) struct Candidate {
-    pub(super) name: String,
-    /// Whether it is uniform unfiltered rendering.
-    pub(super) is_baseline: bool,
-    curves: BTreeMap<u32, Curve>,
-}
-
-impl Candidate {
-    /// Times that the curves of all seeds cover.
-    pub(super) fn times(&self) -> [f64; 2] {
-        let covered = |[low, high]: [f64; 2], [first, last]: [f64; 2]| [low.max(first), high.min(last)];
-        self.curves.values().map(Curve::times).fold([0.0, f64::INFINITY], covered)
-    }
-
-    fn covers(&self, time: f64) -> bool {
-        let [first, last] = self.times();
-        (first..=last).contains(&time)
-    }
-
-    /// Mean logarithm of what `read` finds on every curve.
-    pub(super) fn mean(&self, read: &dyn Fn(&Curve) -> f64) -> f64 {
-        self.curves.values().map(|curve| read(curve).ln()).sum::<f64>() / self.curves.len() as f64
-    }
-
-    /// Logarithms of the quotient of what `read` finds for this method and for another one, seed by seed.
-    pub(super) fn against(&self, other: &Self, read: &dyn Fn(&Curve) -> f64) -> Vec<f64> {
-        let both = |(seed, curve): (&u32, &Curve)| Some((read(curve) / read(other.curves.get(seed)?)).ln());
-        self.curves.iter().filter_map(both).collect()
-    }
-}
 
 /// Which candidate has the lowest value of those that were measured at the place in question.
 #[derive(Debug, Default)]
@@ -65,26 +32,6 @@ pub fn findings(points: &[Point], confidence: f64) -> Vec<Finding> {
     all.extend(singles(points, confidence));
     all.extend(changes::findings(points, confidence));
     all
-}
-
-/// Methods whose points did not fail, in the order of the points. What has options and a single point is no method of its own: it is
-/// compared with the same point without them.
-fn candidates(points: &[Point]) -> Vec<Candidate> {
-    let mut groups: Vec<(Method, Vec<&Point>)> = Vec::new();
-    for point in points.iter().filter(|point| point.failed.is_none() && point.method.spp > 0) {
-        let method = Method { spp: 0, ..point.method.clone() };
-        match groups.iter_mut().find(|(found, _)| *found == method) {
-            Some((_, points)) => points.push(point),
-            None => groups.push((method, vec![point])),
-        }
-    }
-    let candidate = |(method, points): (Method, Vec<&Point>)| Candidate {
-        name: method.name(),
-        is_baseline: method.is_baseline(),
-        curves: curves(&points),
-    };
-    groups.retain(|(method, points)| method.options.is_empty() || points.len() > 1);
-    groups.into_iter().map(candidate).filter(|candidate| !candidate.curves.is_empty()).collect()
 }
 
 /// What it costs to halve the error.

@@ -1,7 +1,7 @@
 //! How much less error the best method has than uniform unfiltered rendering in the same time.
+use super::candidate::Candidate;
 use super::curve::Curve;
 use super::document::{Estimate, Finding, Verdict};
-use super::findings::Candidate;
 use super::interval;
 use super::words::{factor, milliseconds, number};
 

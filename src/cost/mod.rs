@@ -7,6 +7,7 @@
 //!          scene   reference, given or rendered until it converges
 //! ```
 mod assemble;
+mod candidate;
 pub mod changes;
 mod converge;
 mod curve;

@@ -63,7 +63,7 @@ fn input_errors_name_the_file_and_exit_3() {
     let render = |scene: &str| tallow(&folder, &["render", scene]);
     complains(&render("missing"), 3, &["error: missing: cannot be read: No such file"]);
     complains(&render("missing.blend"), 3, &["missing.blend: cannot be read: No such file"]);
-    complains(&render("text.png"), 3, &["text.png", "is no scene", "toml, obj, gltf, glb"]);
+    complains(&render("text.png"), 3, &["text.png", "is no scene", "toml, obj, ply, ply.gz, gltf, glb"]);
     // Control: what is right gives no line.
     let good = compare("a.exr");
     assert_eq!((good.status.code(), good.stderr.len()), (Some(0), 0));

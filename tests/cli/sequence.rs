@@ -38,9 +38,9 @@ fn bits(folder: &TempDir, file: &str) -> Vec<(String, Vec<u32>)> {
 #[test]
 fn a_frame_alone_is_that_of_the_sequence_and_a_finished_one_is_kept() {
     let folder = stage();
-    let told = well(&folder, "--frames 0..48 --only 9..=12 --fps 6 -o a.####.exr --preview a.gif");
+    let told = well(&folder, "--reproject off --frames 0..48 --only 9..=12 --fps 6 -o a.####.exr --preview a.gif");
     assert!(told.contains("frame 12: ") && told.contains("3 more"), "{told}");
-    well(&folder, "--frames 0..48 --only 12 --fps 6 -o b.##.exr");
+    well(&folder, "--reproject off --frames 0..48 --only 12 --fps 6 -o b.##.exr");
     assert!(bits(&folder, "a.0012.exr") == bits(&folder, "b.12.exr"), "frame 12 alone");
     assert!(bits(&folder, "a.0012.exr") != bits(&folder, "a.0011.exr"), "control");
     let gif = fs::read(folder.path().join("a.gif")).unwrap();
@@ -49,15 +49,15 @@ fn a_frame_alone_is_that_of_the_sequence_and_a_finished_one_is_kept() {
     let made = |file: &str| fs::metadata(folder.path().join(file)).unwrap().modified().unwrap();
     let before = made("a.0010.exr");
     fs::write(folder.path().join("a.0011.exr"), "cut").unwrap();
-    let told = well(&folder, "--frames 0..48 --only 9..=12 --fps 6 -o a.####.exr");
+    let told = well(&folder, "--reproject off --frames 0..48 --only 9..=12 --fps 6 -o a.####.exr");
     assert!(told.contains("frame 10: is finished") && !told.contains("frame 11: is finished"), "{told}");
     assert_eq!(made("a.0010.exr"), before);
-    let told = well(&folder, "--frames 0..48 --only 10 --fps 12 -o a.####.exr");
+    let told = well(&folder, "--reproject off --frames 0..48 --only 10 --fps 12 -o a.####.exr");
     assert!(!told.contains("is finished"), "at another time the scene is another: {told}");
-    let told = well(&folder, "--frames 0..48 --only 9 --fps 6 --seed-per-frame -o a.####.exr");
+    let told = well(&folder, "--reproject off --frames 0..48 --only 9 --fps 6 --seed-per-frame -o a.####.exr");
     assert!(!told.contains("is finished"), "{told}");
     // A film of another size is another, too.
-    let words = "sequence s.toml --width 40 --height 26 --spp 2 --frames 0..48 --only 11..=12 --fps 6 -o a.####.exr";
+    let words = "sequence s.toml --width 40 --height 26 --spp 2 --reproject off --frames 0..48 --only 11..=12 --fps 6 -o a.####.exr";
     let sized = || stdout(&tallow(&folder, &words.split_whitespace().collect::<Vec<_>>()));
     assert!(!sized().contains("is finished"));
     assert!(sized().contains("frame 12: is finished"), "control");
@@ -80,7 +80,7 @@ fn a_frame_in_another_light_is_another() {
 #[test]
 fn without_frames_all_of_the_animation_is_rendered() {
     let folder = stage();
-    let told = well(&folder, "--fps 1 --width 8 --height 5 -o n.#.png");
+    let told = well(&folder, "--fps 1 -o n.#.png");
     assert!(told.contains("frame 2: ") && !told.contains("frame 3"), "{told}");
     let still = "[[mesh]]\nshape = \"cube\"\n[environment]\n";
     fs::write(folder.path().join("s.toml"), still).unwrap();

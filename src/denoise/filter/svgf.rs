@@ -85,8 +85,7 @@ impl Filter for Svgf {
                 false => &self.estimate.plane,
             };
             let (spacing, rates) = (1 << level, self.rates.as_array());
-            let push =
-                SvgfPush { size: planes.size, spacing, rate_l: self.rate_l, rates, ..Default::default() };
+            let push = SvgfPush { size: planes.size, spacing, rate_l: self.rate_l, rates, ..Default::default() };
             let bind = Bind { estimate: from, place: &self.pack.place, colour: &self.pack.colour, filtered: to };
             let kernel = &self.kernels[usize::from(last)];
             rec.dispatch(kernel, bind, &push, kernel.groups(threads(planes.size, spacing)))?;
