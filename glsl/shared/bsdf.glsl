@@ -66,7 +66,7 @@ float facet_density(Bsdf b, vec3 m) {
 // A normal visible from w.
 vec3 facet_sample(Bsdf b, vec3 w, vec2 u) {
     vec3 m = microfacet_sample(b.ggx, undrawn(b, w), b.alpha, u);
-    return FX_ANISOTROPIC ? normalize(undrawn(b, m)) : m;
+    return FX_ANISOTROPIC && b.stretch != 1.0 ? normalize(undrawn(b, m)) : m;
 }
 
 // Unit vector along a + b; finite where that is 0.

@@ -116,7 +116,8 @@ fn facet_area(b: &Bsdf, w: Vec3) -> f32 {
 
 /// A normal visible from w.
 fn facet_sample(b: &Bsdf, w: Vec3, u: Vec2) -> Vec3 {
-    undrawn(b, microfacet_sample(b.ggx, undrawn(b, w), b.alpha, u)).normalize()
+    let m = microfacet_sample(b.ggx, undrawn(b, w), b.alpha, u);
+    if b.stretch == 1.0 { m } else { undrawn(b, m).normalize() }
 }
 
 fn half_vector(a: Vec3, b: Vec3) -> Vec3 {
