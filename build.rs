@@ -50,6 +50,9 @@ const HEADER: &str = "#version 460
 #extension GL_GOOGLE_include_directive : require
 ";
 
+/// Kernels that mention it are compiled once more with it defined, for devices whose subgroups cannot shuffle.
+const PLAIN: &str = "NO_SHUFFLE";
+
 fn main() {
     if let Err(error) = build() {
         eprintln!("{error:#}");
@@ -104,13 +107,19 @@ fn generate(files: &[PathBuf], root: &str, target: &Path) -> Result<()> {
         let name = file.file_stem().and_then(|s| s.to_str()).context("kernel names are ASCII")?;
         let (text, sources) = preprocess(file)?;
         let interface = Interface::of(&sources)?;
-        let whole = [HEADER, &structs::glsl(&interface.bindings), &text].concat();
-        let label = format!("{name}-{:016x}.spv", xxh3_64(whole.as_bytes()));
-        let spirv = fs::read(Path::new("spirv").join(&label)).or_else(|_| compile(file, &whole))?;
-        hash.update(&spirv);
-        let binary = compiled.join(&label);
-        fs::write(&binary, &spirv)?;
-        code += &emit::module(name, file, &interface, root, &binary)?;
+        let text = structs::glsl(&interface.bindings) + &text;
+        let mut binary = |defines: &str| {
+            let whole = [HEADER, defines, &text].concat();
+            let label = format!("{name}-{:016x}.spv", xxh3_64(whole.as_bytes()));
+            let spirv = fs::read(Path::new("spirv").join(&label)).or_else(|_| compile(file, &whole))?;
+            hash.update(&spirv);
+            let binary = compiled.join(&label);
+            fs::write(&binary, &spirv)?;
+            anyhow::Ok(binary)
+        };
+        let usual = binary("")?;
+        let plain = if text.contains(PLAIN) { binary(&format!("#define {PLAIN}\n"))? } else { usual.clone() };
+        code += &emit::module(name, file, &interface, root, [&usual, &plain])?;
         groups.extend(interface.groups().into_iter().map(|group| (group.clone(), declared(&interface, group))));
     }
     // The integration tests take these from the crate.

@@ -122,8 +122,8 @@ bool arrive(inout SplitLight sum, Path path, Hit hit, uint kind, out Surface s) 
     return true;
 }
 
-// The light of a path whose first ray has found `hit`.
-SplitLight trace_path(Path path, Hit hit, Sampler random, uint seed, out vec3 albedo) {
+// The light of a path whose first ray has found `hit`. One that is not `on` keeps the other lanes company where triangles are dealt.
+SplitLight trace_path(Path path, bool on, Hit hit, Sampler random, uint seed, out vec3 albedo) {
     SplitLight sum = SplitLight(vec3(0.0), vec3(0.0), vec3(0.0));
     albedo = vec3(0.0);
     closest_rays++;
@@ -132,7 +132,8 @@ SplitLight trace_path(Path path, Hit hit, Sampler random, uint seed, out vec3 al
     uint bounce = 0u;
     // A turn of the loop leads from one surface to the next; the last surface samples no light. Light sampled at a surface is
     // added only once its shadow ray is traced, together with the ray to the next surface: see trace_shadow_then_closest.
-    if (arrive(sum, path, hit, DIRECT, s) && push.constants.max_depth > 1u) do {
+    bool going = arrive(sum, path, hit, DIRECT, s) && push.constants.max_depth > 1u && on;
+    if (any_lane(going)) do {
         uint pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
         Bsdf bsdf = surface_bsdf(s);
         // The normal of a dielectric stays on its outside, since its two sides differ.
@@ -145,7 +146,7 @@ SplitLight trace_path(Path path, Hit hit, Sampler random, uint seed, out vec3 al
         if (FX_COAT_NORMALS) bsdf.metallic.coat_normal = local_coat_normal(s, facing, basis, wo);
         bsdf_view(bsdf, wo);
         bool smooth_here = bsdf_is_delta(bsdf);
-        if (bounce == 0u) {
+        if (bounce == 0u && going) {
             albedo = bsdf_albedo(bsdf, wo.z);
             smooth_first = smooth_here;
         }
@@ -153,22 +154,25 @@ SplitLight trace_path(Path path, Hit hit, Sampler random, uint seed, out vec3 al
         uint mask_seed = pcg(seed + 2u * bounce);
         bool delta;
         vec3 sampled = path.throughput * light_from_nee(s, bsdf, facing, basis, wo, random, pair, mask_seed + 1u, shadow, delta);
-        bool shadowed = push.constants.light_count > 0u && !smooth_here && max(sampled.r, max(sampled.g, sampled.b)) > 0.0;
-        bool alive = scatter(path, s, bsdf, facing, basis, wo, random, pair);
-        if (bounce == 0u) mirrored = path.delta;
+        bool shadowed = going && push.constants.light_count > 0u && !smooth_here && max(sampled.r, max(sampled.g, sampled.b)) > 0.0;
+        bool alive = scatter(path, s, bsdf, facing, basis, wo, random, pair) && going;
+        if (bounce == 0u && going) mirrored = path.delta;
         bool roulette = FX_ROULETTE && push.constants.roulette_depth > 0u && bounce + 1u >= push.constants.roulette_depth;
         if (roulette) alive = survives_roulette(path, random, pair) && alive;
         bounce++;
-        if (!alive && !shadowed) break;
+        if (!DEALT && !alive && !shadowed) break;
 
         closest_rays += uint(alive);
         any_rays += uint(shadowed);
         bool lit = shadowed;
         Segment ray = Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed + 2u * bounce));
-        hit = trace_shadow_then_closest(shadow, shadowed, ray, alive, push.constants.root, uvec2(hit.triangle, hit.instance));
+        uvec2 from = uvec2(hit.triangle, hit.instance);
+        if (DEALT) hit = deal_shadow_then_closest(shadow, shadowed, ray, alive, push.constants.root, from);
+        else hit = trace_shadow_then_closest(shadow, shadowed, ray, alive, push.constants.root, from);
         add_light(sum, lit && !shadowed ? sampled : vec3(0.0), kind_of_light(bounce, smooth_first, delta));
-        if (!alive || !arrive(sum, path, hit, kind_of_light(bounce, smooth_first, false), s)) break;
-    } while (bounce + 1u < push.constants.max_depth);
+        going = alive && arrive(sum, path, hit, kind_of_light(bounce, smooth_first, false), s);
+        going = going && bounce + 1u < push.constants.max_depth;
+    } while (any_lane(going));
     if (FX_CLAMP) sum.indirect = clamped(sum.indirect);
     if (FX_SOFT) sum.indirect += sum.soft;
     // Light that a smooth coat mirrors needs no filter. It moves only here, so that the sum of both parts keeps its bits.

@@ -220,23 +220,31 @@ void enter_instance(inout Traversal t, RaySpace world, uvec2 leaves) {
     t.bits = 0x80000000u;
 }
 
-// Tests the triangles whose bits are set in `left`, counted from `first`; returns whether one is hit. For lavapipe, which fetches
-// for masked lanes too, a lane without triangles keeps the index that it tested last, or the scene's first, so that it misses no
-// cache. An any hit ends the loop one triangle late, so that the next fetch waits for no test and tests overlap. Variables that
-// live from turn to turn are scalar, since vectors would be copied.
-bool intersect_triangles(inout Hit hit, RaySpace ray, uint first, uint left, uint instance, bool any_hit, uint mask_seed,
-                         uvec2 from) {
+// Triangles to test: bits counted from the triangle `first`, and the ray in the space of their instance.
+struct Leaves {
+    RaySpace ray;
+    uint first;
+    uint bits;
+    uint instance;
+};
+
+// Tests all `leaves`; returns whether one is hit. For lavapipe, which fetches for masked lanes too, a lane without triangles keeps
+// the index that it tested last, or the scene's first, so that it misses no cache. An any hit ends the loop one triangle late, so
+// that the next fetch waits for no test and tests overlap. Variables that live from turn to turn are scalar, since vectors would
+// be copied.
+bool intersect_triangles(inout Hit hit, Leaves leaves, bool any_hit, uint mask_seed, uvec2 from) {
+    uint left = leaves.bits, instance = leaves.instance;
     bool found = false;
     if (left != 0u) do {
-        uint index = first + take_highest(left);
+        uint index = leaves.first + take_highest(left);
         if (found && any_hit) left = 0u;
         float distance;
         vec2 barycentric;
-        bool meets = intersect_triangle(ray, index, hit.t, distance, barycentric) && !(found && any_hit) &&
+        bool meets = intersect_triangle(leaves.ray, index, hit.t, distance, barycentric) && !(found && any_hit) &&
                      (index != from.x || (FX_INSTANCES && instance != from.y));
         if (FX_SPHERES && is_sphere(index)) {
-            bool leaves = index == from.x && (!FX_INSTANCES || instance == from.y);
-            meets = intersect_sphere(ray, index, instance, hit.t, leaves, mask_seed, distance, barycentric) &&
+            bool inside = index == from.x && (!FX_INSTANCES || instance == from.y);
+            meets = intersect_sphere(leaves.ray, index, instance, hit.t, inside, mask_seed, distance, barycentric) &&
                     !(found && any_hit);
         }
         if (meets) {
@@ -252,61 +260,70 @@ bool intersect_triangles(inout Hit hit, RaySpace ray, uint first, uint left, uin
 }
 
 // Tests the triangles of `leaves`. Only the nearest one's mask is looked up; where the ray passes it, the others are tested again.
-void intersect_leaves(inout Hit hit, RaySpace ray, uvec2 leaves, uint instance, bool any_hit, uint mask_seed, uvec2 from) {
+void intersect_leaves(inout Hit hit, Leaves leaves, bool any_hit, uint mask_seed, uvec2 from) {
     if (!FX_ALPHA_MASKS) {
-        intersect_triangles(hit, ray, leaves.x, leaves.y, instance, any_hit, mask_seed, from);
+        intersect_triangles(hit, leaves, any_hit, mask_seed, from);
         return;
     }
     bool passes;
-    if (leaves.y != 0u) do {
+    if (leaves.bits != 0u) do {
         Hit next = hit;
-        bool found = intersect_triangles(next, ray, leaves.x, leaves.y, instance, any_hit, mask_seed, from);
-        passes = found && !mask_blocks(next.triangle, instance, vec2(next.b1, next.b2), mask_seed);
+        bool found = intersect_triangles(next, leaves, any_hit, mask_seed, from);
+        passes = found && !mask_blocks(next.triangle, leaves.instance, vec2(next.b1, next.b2), mask_seed);
         if (FX_SPHERES && found) passes = passes && !is_sphere(next.triangle); // spheres have tested their mask
-        if (passes) leaves.y &= ~(1u << (next.triangle - leaves.x));
+        if (passes) leaves.bits &= ~(1u << (next.triangle - leaves.first));
         else hit = next;
-    } while (passes && leaves.y != 0u);
+    } while (passes && leaves.bits != 0u);
 }
 
-// Visits one node below `root` (with ROOT_OF_INSTANCES, a level of instances) and its triangles. Returns true when no node is left,
-// or with `any_hit` when a triangle is found. `from` is the triangle that the ray leaves, and its instance. That triangle, or the
-// near side of that sphere, is not tested, since the offset of the origin can be smaller than the error of the distance.
-bool traversal_step(inout Traversal t, RaySpace world, bool any_hit, uint root, uint mask_seed, uvec2 from) {
+// Visits one node below `root` (with ROOT_OF_INSTANCES, a level of instances) of a ray that is `on`. Returns true when no node is
+// left.
+bool visit_node(inout Traversal t, RaySpace world, bool on, uint root, out Leaves leaves) {
     bool two_levels = FX_INSTANCES && (root & ROOT_OF_INSTANCES) != 0u;
     RaySpace ray = world;
     if (FX_INSTANCES) ray = select_ray(t.instance != NONE, t.inside, world);
-    uvec2 leaves = uvec2(t.base, t.bits); // instances that an earlier node left on the stack
+    uvec2 group = uvec2(t.base, t.bits); // instances that an earlier node left on the stack
     if (!two_levels || t.bits > 0x00ffffffu) {
         uint hits = t.bits >> 24, inner = t.bits & 0xffu;
         uint slot = take_highest(hits) ^ (ray.octant & 0xffu);
-        push_group(t.depth, uvec2(t.base, (hits << 24) | inner), hits != 0u);
+        push_group(t.depth, uvec2(t.base, (hits << 24) | inner), on && hits != 0u);
         uvec3 children;
         uint mask = intersect_node(ray, t.base + count_bits(inner & ~(0xffffffffu << slot)), t.hit.t, children);
-        if (FX_COUNTERS) nodes_visited++;
+        if (FX_COUNTERS) nodes_visited += uint(on);
         t.base = children.x;
         t.bits = (mask & 0xff000000u) | children.z;
-        leaves.y = mask & 0x00ffffffu;
-        leaves.x = leaves.y != 0u ? children.y : 0u;
+        group.y = mask & 0x00ffffffu;
+        group.x = group.y != 0u ? children.y : 0u;
     } else {
         t.bits = 0u;
     }
-    if (two_levels && t.instance == NONE && leaves.y != 0u) {
-        enter_instance(t, world, leaves);
-        leaves.y = 0u;
+    group.y = on ? group.y : 0u;
+    if (two_levels && t.instance == NONE && group.y != 0u) {
+        enter_instance(t, world, group);
+        group.y = 0u;
     }
-    uint instance = t.instance;
-    bool done = t.bits <= 0x00ffffffu && t.depth == 0u;
-    if (t.bits <= 0x00ffffffu && !done) {
+    leaves = Leaves(ray, group.x, group.y, t.instance);
+    bool last = t.bits <= 0x00ffffffu && t.depth == 0u;
+    if (t.bits <= 0x00ffffffu && !last) {
         if (FX_INSTANCES && t.depth == t.bottom) {
             t.instance = NONE;
             t.bottom = 0u;
         }
-        uvec2 group = pop_group(t.depth);
+        group = pop_group(t.depth);
         t.base = group.x;
         t.bits = group.y;
     }
-    intersect_leaves(t.hit, ray, leaves, instance, any_hit, mask_seed, from);
-    return done || (any_hit && t.hit.triangle != NONE);
+    return last;
+}
+
+// Visits a node and its triangles. Returns true when no node is left, or with `any_hit` when a triangle is found. `from` is the
+// triangle that the ray leaves, and its instance. That triangle, or the near side of that sphere, is not tested, since the offset
+// of the origin can be smaller than the error of the distance.
+bool traversal_step(inout Traversal t, RaySpace world, bool any_hit, uint root, uint mask_seed, uvec2 from) {
+    Leaves leaves;
+    bool last = visit_node(t, world, true, root, leaves);
+    intersect_leaves(t.hit, leaves, any_hit, mask_seed, from);
+    return last || (any_hit && t.hit.triangle != NONE);
 }
 
 // The closest hit of a ray that leaves no triangle.

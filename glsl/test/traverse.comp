@@ -14,6 +14,7 @@ uint nodes_visited = 0u;
 #include "shared/sampler.glsl"
 #include "shared/texture.glsl"
 #include "shared/traverse.glsl"
+#include "shared/deal.glsl"
 
 Segment ray_at(uint i) {
     RayQuery ray = RayQuery_load(rays, i);
@@ -21,21 +22,26 @@ Segment ray_at(uint i) {
 }
 
 void main() {
-    bool any_hit = push.any_hit != 0u, done = true;
-    Traversal t = traversal_start(0.0, push.root);
+    bool any_hit = push.any_hit != 0u;
     uint i = thread_index(), stride = gl_NumWorkGroups.x * gl_NumWorkGroups.y * WORKGROUP;
-    if (i >= push.count) return;
-    do {
-        Segment ray = ray_at(i); // fetched at every step: on lavapipe faster than keeping it, on a GPU slower
-        if (done) t = traversal_start(ray.t_max, push.root);
-        RaySpace space = ray_space(ray.origin, ray.direction);
-        done = traversal_step(t, space, any_hit, push.root, ray.mask_seed, uvec2(NONE));
-        if (done) {
-            hits[i].t = t.hit.t;
-            hits[i].triangle = t.hit.triangle;
-            hits[i].instance = t.hit.instance;
-            hits[i].barycentric = vec2(t.hit.b1, t.hit.b2);
+    bool on = i < push.count;
+    if (!DEALT && !on) return;
+    Segment ray = ray_at(i);
+    Walk w = walk_start(ray, ray_space(ray.origin, ray.direction), on, any_hit, push.root);
+    if (any_lane(on)) do {
+        bool ends;
+        if (DEALT) ends = walk_on(w, push.root, uvec2(NONE));
+        else ends = traversal_step(w.t, w.world, any_hit, push.root, w.mask_seed, uvec2(NONE));
+        if (ends) {
+            Hit hit = w.t.hit;
+            hits[i].t = hit.t;
+            hits[i].triangle = hit.triangle;
+            hits[i].instance = hit.instance;
+            hits[i].barycentric = vec2(hit.b1, hit.b2);
             i += stride;
+            on = i < push.count;
+            ray = ray_at(i);
+            w = walk_start(ray, ray_space(ray.origin, ray.direction), on, any_hit && on, push.root);
         }
-    } while (i < push.count);
+    } while (any_lane(on));
 }

@@ -27,6 +27,7 @@ uint nodes_visited = 0u;
 #include "shared/texture.glsl"
 #include "shared/camera.glsl"
 #include "shared/traverse.glsl"
+#include "shared/deal.glsl"
 #include "shared/surface.glsl"
 #include "shared/light.glsl"
 #include "shared/trace_path.glsl"
@@ -40,14 +41,18 @@ void count(uint slot, uint n) {
 void main() {
     bool listed = FX_ADAPTIVE && push.samples == 0u;
     uint i = listed ? striped_index() : thread_index(); // lists are ordered by pixel: stripes spread the work
-    if (i >= push.pixels * (listed ? 1u : push.samples)) return;
+    bool on = i < push.pixels * (listed ? 1u : push.samples);
+    if (!DEALT && !on) return;
+    i = on ? i : 0u;
     uint pixel = push.first_pixel + i % push.pixels;
     uint index = push.first_sample + i / push.pixels;
     if (listed) {
         uvec2 path = texelFetch(paths, int(i)).xy;
         pixel = path.x;
         index = path.y;
-        if (pixel == NONE) return;
+        on = on && pixel != NONE;
+        if (!DEALT && !on) return;
+        pixel = on ? pixel : push.first_pixel;
     }
     Sampler random = sampler_start(pixel, index, push.constants.seed);
     Ray ray = eye_ray(film_sample(pixel, random), random);
@@ -55,7 +60,8 @@ void main() {
     uint seed = path_seed(pixel, index);
     Hit first = traverse(Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed)), push.constants.root);
     vec3 albedo;
-    SplitLight light = trace_path(path, first, random, seed, albedo);
+    SplitLight light = trace_path(path, on, first, random, seed, albedo);
+    if (!on) return;
     float rays = float(closest_rays + any_rays);
     if (!finite(light.direct + light.indirect)) {
         light = SplitLight(vec3(0.0), vec3(0.0), vec3(0.0));

@@ -259,7 +259,7 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
         | Effect::smooth_interface
         | Effect::beckmann
         | Effect::ggx => 0,
-        // Settings and outputs call for these; they take no record of the scene.
+        // These take no record of the scene.
         Effect::lens
         | Effect::orthographic
         | Effect::indirect
@@ -271,7 +271,8 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
         | Effect::independent_sampler
         | Effect::counters
         | Effect::adaptive
-        | Effect::many_samples => 0,
+        | Effect::many_samples
+        | Effect::dealt_triangles => 0,
     };
     bytes as u64
 }

@@ -140,6 +140,10 @@ pub struct DeviceInfo {
     pub memory_heap: u64,
     /// Number of invocations in a subgroup.
     pub subgroup_size: u32,
+    /// Whether all subgroups of compute kernels have that size.
+    pub subgroup_size_fixed: bool,
+    /// Whether the invocations of a subgroup can read each other's values in compute kernels.
+    pub subgroup_shuffle: bool,
     /// Number of valid bits in a timestamp; 0 if passes cannot be timed.
     pub timestamp_bits: u32,
     /// Nanoseconds per tick of the timestamp counter.
@@ -208,6 +212,9 @@ pub(super) fn describe(instance: &ash::Instance, physical: vk::PhysicalDevice, q
         max_allocation: v11.max_memory_allocation_size,
         memory_heap: largest_heap(&memory),
         subgroup_size: v11.subgroup_size,
+        subgroup_size_fixed: v13.min_subgroup_size == v13.max_subgroup_size,
+        subgroup_shuffle: v11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
+            && v11.subgroup_supported_operations.contains(vk::SubgroupFeatureFlags::SHUFFLE),
         timestamp_bits: queue_family
             .and_then(|f| families.get(f as usize))
             .map_or(0, |family| family.timestamp_valid_bits),

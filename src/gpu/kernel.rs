@@ -48,8 +48,8 @@ pub struct Slot {
 /// The interface of a kernel. The build script implements it for the `Bind` struct of every kernel.
 ///
 /// # Safety
-/// - [`Self::SPIRV`] is valid code for Vulkan 1.3 and the features in [`super::REQUIRED_FEATURES`], with an entry point
-///   `main` for compute; [`Self::SLOTS`] are its descriptors, all in set 0, with numbers that differ.
+/// - [`Self::SPIRV`] and [`Self::PLAIN_SPIRV`] are valid code for Vulkan 1.3 and the features in [`super::REQUIRED_FEATURES`],
+///   with an entry point `main` for compute; [`Self::SLOTS`] are their descriptors, all in set 0, with numbers that differ.
 /// - [`Self::Push`] is its push constants: at most 128 bytes, a multiple of 4. Elements of [`SlotKind::Uniform`] have at most
 ///   16384 bytes.
 /// - [`Self::buffers`] returns one buffer per slot.
@@ -94,8 +94,10 @@ pub unsafe trait Bindings {
     type Constants: Specialise;
     /// Basename of the GLSL file, which is also the label of the pass.
     const NAME: &'static str;
-    /// The compiled code of the kernel.
+    /// The compiled code of the kernel. Its subgroups may shuffle.
     const SPIRV: &'static [u8];
+    /// The code for devices whose subgroups cannot.
+    const PLAIN_SPIRV: &'static [u8] = Self::SPIRV;
     /// The slots, in the order of the fields of the `Bind` struct.
     const SLOTS: &'static [Slot];
     /// The buffers to bind, one for each of [`Self::SLOTS`].
@@ -127,6 +129,7 @@ const MAX_GROUPS: u32 = 65_535;
 /// A compiled kernel, specialised by its constants. `B` is the kernel's `Bind` struct.
 pub struct Kernel<B> {
     pub(super) parts: Arc<Parts>,
+    pub(super) spirv: &'static [u8],
     pub(super) constants: Arc<[(u32, u32)]>,
     compile_time: Duration,
     pub(super) local_size: [u32; 2],
@@ -155,10 +158,11 @@ impl<B: Bindings> Kernel<B> {
         let mut parts = Parts { gpu: gpu.clone(), set_layout, layout, pipeline };
         parts.create_layouts(B::SLOTS, size_of::<B::Push>() as u32).at(B::NAME)?;
         let entries = constants.entries();
-        parts.create_pipeline(B::NAME, B::SPIRV, &entries)?;
+        let spirv = if gpu.info().subgroup_shuffle { B::SPIRV } else { B::PLAIN_SPIRV };
+        parts.create_pipeline(B::NAME, spirv, &entries)?;
         gpu.0.name(parts.pipeline, B::NAME);
         let (compile_time, local_size) = (begun.elapsed(), constants.local_size());
-        Ok(Self { parts: Arc::new(parts), constants: entries.into(), compile_time, local_size, of: PhantomData })
+        Ok(Self { parts: Arc::new(parts), spirv, constants: entries.into(), compile_time, local_size, of: PhantomData })
     }
 
     /// Time that creating the pipeline took. Some drivers, such as lavapipe, compile more on the first dispatch.
@@ -259,5 +263,21 @@ mod tests {
         assert_eq!(super::folded(2), [2, 1, 1]);
         assert_eq!(super::folded(65_535), [65_535, 1, 1]);
         assert_eq!(super::folded(65_536), [65_535, 2, 1]);
+    }
+
+    /// Whether code declares a capability, which takes two words: opcode 17 with its length, and the number.
+    fn declares(spirv: &[u8], capability: u32) -> bool {
+        let words: Vec<_> = spirv.chunks_exact(4).map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]])).collect();
+        words.windows(2).any(|pair| pair == [2 << 16 | 17, capability])
+    }
+
+    #[test]
+    fn plain_code_runs_where_subgroups_cannot_shuffle() {
+        use crate::shaders::path::{PLAIN_SPIRV, SPIRV};
+        const GROUP_NON_UNIFORM: u32 = 61;
+        const GROUP_NON_UNIFORM_SHUFFLE: u32 = 65;
+        assert!(declares(SPIRV, GROUP_NON_UNIFORM_SHUFFLE));
+        assert!(!declares(PLAIN_SPIRV, GROUP_NON_UNIFORM_SHUFFLE) && !declares(PLAIN_SPIRV, GROUP_NON_UNIFORM));
+        assert!(declares(PLAIN_SPIRV, 1), "control: every kernel declares Shader");
     }
 }

@@ -114,7 +114,7 @@ impl<'a> Recorder<'a> {
         self.frame.keep(kernel);
         let (pipeline, layout, push) = (kernel.parts.pipeline, kernel.parts.layout, bytemuck::bytes_of(push));
         let compute = vk::PipelineBindPoint::COMPUTE;
-        let code = KernelCode { spirv: B::SPIRV, constants: kernel.constants.clone() };
+        let code = KernelCode { spirv: kernel.spirv, constants: kernel.constants.clone() };
         let bytes = B::SLOTS.iter().zip(&buffers).map(|(slot, bound)| bound.bytes(slot.kind == SlotKind::Uniform));
         let shape = PassShape::of_kernel(groups, kernel.local_size, B::SLOTS, bytes, code);
         // SAFETY: the frame keeps the kernel, the set and every buffer until the work is complete.

@@ -25,6 +25,8 @@ pub struct Tuning {
     pub whole_lines: bool,
     /// Lines of the guided filter's windows per workgroup.
     pub lines: u32,
+    /// Whether lanes test the triangles of each other's rays, see `glsl/shared/deal.glsl`. Not tried on a GPU.
+    pub deals: bool,
     /// Longest edge of a filtered image in pixels; see `glsl/shared/loop_limit.glsl`.
     pub longest_edge: u64,
 }
@@ -37,6 +39,7 @@ const CPU: Tuning = Tuning {
     strip_bytes: 32 << 20,
     whole_lines: true,
     lines: 8,
+    deals: true,
     longest_edge: 60_000,
 };
 
@@ -48,6 +51,7 @@ const GPU: Tuning = Tuning {
     strip_bytes: 256 << 20,
     whole_lines: false,
     lines: 32,
+    deals: false,
     longest_edge: u64::MAX,
 };
 
@@ -59,6 +63,15 @@ impl Tuning {
 }
 
 impl Gpu {
+    /// Among how many lanes kernels deal triangles; none where they do not.
+    pub fn deal(&self) -> shared::deal::Constants {
+        let (info, tuning) = (self.info(), self.tuning());
+        let lanes = info.subgroup_size;
+        let whole =
+            info.subgroup_size_fixed && matches!(lanes, 4 | 8 | 16 | 32) && tuning.workgroup.is_multiple_of(lanes);
+        shared::deal::Constants { lanes: if tuning.deals && info.subgroup_shuffle && whole { lanes } else { 0 } }
+    }
+
     /// The sizes into which work is divided for this device.
     pub fn tuning(&self) -> &'static Tuning {
         if self.info().kind == DeviceKind::Cpu { &CPU } else { &GPU }

@@ -142,4 +142,6 @@ effects! {
     spheres: FX_SPHERES;
     /// What lamps and sky bring to the first hit goes with indirect light.
     soft_light: FX_SOFT;
+    /// A hierarchy deep enough that rays of a subgroup gain from testing each other's triangles.
+    dealt_triangles: FX_DEALT;
 }

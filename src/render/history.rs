@@ -12,7 +12,7 @@ use crate::settings::{FROM_0, entry, settings};
 use crate::shaders;
 use crate::shaders::shared::cell::CELL;
 use crate::shaders::shared::history::{MOST_CARRIED, *};
-use crate::shaders::shared::{scene, traverse};
+use crate::shaders::shared::{deal, scene, traverse};
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -123,7 +123,10 @@ impl History {
             offered: Buffer::from_slice(gpu, "offered samples", &vec![0; pixels as usize])?,
             carried: Buffer::from_slice(gpu, "carried samples", &vec![0; pixels as usize])?,
             previous: Buffer::from_slice(gpu, "previous camera", &[Camera::default()])?,
-            probe: Kernel::new(gpu, &shaders::probe::Constants { effects, thread, traverse })?,
+            probe: Kernel::new(
+                gpu,
+                &shaders::probe::Constants { effects, thread, traverse, deal: deal::Constants::default() },
+            )?,
             light_change: Kernel::new(gpu, &thread.into())?,
             cells,
             probes: Buffer::new(gpu, "probes", 1, Location::Device)?,

@@ -33,7 +33,7 @@ impl Kernels {
                 gpu,
                 &shaders::primary_hit::Constants { effects, thread, traverse, points: false },
             )?,
-            path: Kernel::new(gpu, &shaders::path::Constants { effects, thread, traverse })?,
+            path: Kernel::new(gpu, &shaders::path::Constants { effects, thread, traverse, deal: gpu.deal() })?,
             accumulate: Kernel::new(gpu, &shaders::accumulate::Constants { effects, thread })?,
         })
     }

@@ -37,7 +37,7 @@ pub fn small(s: &mut Settings) {
     (s.width, s.height, s.spp, s.max_depth) = (SIDE, SIDE, SAMPLES, s.max_depth.min(4));
 }
 
-fn shipped(file: &str) -> Loaded {
+pub fn shipped(file: &str) -> Loaded {
     Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file))
         .map(|scene| scene.with(small))
         .unwrap()
@@ -45,7 +45,7 @@ fn shipped(file: &str) -> Loaded {
 
 /// Textures of every use, masks (of the lamp too), a normal map, an environment image, a spot light, a lens, a mirrored
 /// instance, roulette and a clamp.
-fn pictures() -> Loaded {
+pub fn pictures() -> Loaded {
     let checks = |x: u32, y: u32| if (x / 4 + y / 4).is_multiple_of(2) { [230, 120, 40] } else { [60, 150, 220] };
     let bumps = |x: u32, y: u32| [128 + (x * 7 % 60) as u8, 128 + (y * 5 % 60) as u8, 235];
     let place = Workplace::new()
@@ -344,31 +344,49 @@ fn squares_of_the_brightest_samples_stay_finite() {
     assert_silent(&gpu);
 }
 
-/// Hits that the kernel finds.
-fn traversed(gpu: &Gpu, scene: &Loaded, effects: Effects, rays: &[RayQuery], any_hit: bool) -> Vec<RayHit> {
-    let renderer = Renderer::specialised(gpu, scene, &scene.settings, Outputs::default(), effects).unwrap();
-    let traverse = shared::traverse::Constants { stack: scene.stack };
-    let thread = shared::thread::Constants { workgroup: 32, stripes: 1 };
-    let kernel = Kernel::new(gpu, &traverse_kernel::Constants { effects, thread, traverse }).unwrap();
-    let s = renderer.scene();
-    let queries = Buffer::from_slice(gpu, "rays", rays).unwrap();
-    let hits = Buffer::new(gpu, "hits", rays.len(), Location::Device).unwrap();
-    let push = TraversePush {
-        count: rays.len() as u32,
-        root: frame_constants(scene, &scene.settings).unwrap().path.root,
-        any_hit: u32::from(any_hit),
-        ..Default::default()
-    };
-    let mut frame = FrameResources::new(gpu).unwrap();
-    gpu.run(&mut frame, |rec| {
-        let bind = traverse_kernel::Bind { scene: s.bind(), rays: &queries, hits: &hits };
-        rec.dispatch_threads(&kernel, bind, &push, rays.len().div_ceil(3) as u32) // some threads have fewer than 3
-    })
-    .unwrap();
-    hits.read().unwrap()
+/// The kernel that traces given rays, and a scene for it.
+pub struct Traversal {
+    gpu: Gpu,
+    renderer: Renderer,
+    kernel: Kernel<traverse_kernel::Bind<'static>>,
+    root: u32,
 }
 
-fn queries(scene: &Loaded, count: usize) -> Vec<RayQuery> {
+impl Traversal {
+    pub fn new(gpu: &Gpu, scene: &Loaded, effects: Effects) -> Self {
+        let renderer = Renderer::specialised(gpu, scene, &scene.settings, Outputs::default(), effects).unwrap();
+        let traverse = shared::traverse::Constants { stack: scene.stack };
+        let thread = shared::thread::Constants { workgroup: 32, stripes: 1 };
+        let constants = traverse_kernel::Constants { effects, thread, traverse, deal: dealing(gpu) };
+        let kernel = Kernel::new(gpu, &constants).unwrap();
+        let root = frame_constants(scene, &scene.settings).unwrap().path.root;
+        Self { gpu: gpu.clone(), renderer, kernel, root }
+    }
+
+    /// Hits that the kernel finds.
+    pub fn hits(&self, rays: &[RayQuery], any_hit: bool) -> Vec<RayHit> {
+        let Self { gpu, renderer, kernel, root } = self;
+        let queries = Buffer::from_slice(gpu, "rays", rays).unwrap();
+        let hits = Buffer::new(gpu, "hits", rays.len(), Location::Device).unwrap();
+        let (count, any_hit) = (rays.len() as u32, u32::from(any_hit));
+        let push = TraversePush { count, root: *root, any_hit, ..Default::default() };
+        gpu.run(&mut FrameResources::new(gpu).unwrap(), |rec| {
+            let bind = traverse_kernel::Bind { scene: renderer.scene().bind(), rays: &queries, hits: &hits };
+            rec.dispatch_threads(kernel, bind, &push, count.div_ceil(3)) // some threads have fewer than 3
+        })
+        .unwrap();
+        hits.read().unwrap()
+    }
+}
+
+/// All lanes of this device's subgroups, whether or not it gains from dealing triangles to them.
+fn dealing(gpu: &Gpu) -> shared::deal::Constants {
+    let info = gpu.info();
+    let able = info.subgroup_shuffle && info.subgroup_size_fixed && matches!(info.subgroup_size, 4 | 8 | 16 | 32);
+    shared::deal::Constants { lanes: if able { info.subgroup_size } else { 0 } }
+}
+
+pub fn queries(scene: &Loaded, count: usize) -> Vec<RayQuery> {
     let [low, high] = scene.bounds.map(Vec3::from);
     let mut random = Random::stream(11);
     let mut query = |i: usize| {
@@ -407,8 +425,9 @@ fn traversal_agrees_with_its_twin() {
     for (name, scene) in &scenes {
         let rays = queries(scene, 5000);
         for effects in [called_for(scene, &scene.settings, Outputs::default()), all_effects(scene, &scene.settings)] {
+            let kernel = Traversal::new(&gpu, scene, effects);
             for any_hit in [false, true] {
-                let mut hits = traversed(&gpu, scene, effects, &rays, any_hit);
+                let mut hits = kernel.hits(&rays, any_hit);
                 let found = hits.iter().filter(|h| h.triangle != NONE).count();
                 let wrong = differing(scene, &rays, &hits, any_hit);
                 assert!(wrong <= 10 && found > 300, "{name} any_hit {any_hit}: {wrong} differ, {found} hit");
@@ -442,8 +461,8 @@ fn leaks(gpu: &Gpu, scene: &Loaded, any_hit: bool) -> Vec<Aim> {
         RayQuery { origin: a.origin.into(), t_max, direction: a.direction.into(), mask_seed: 0, ..Default::default() }
     };
     let queries: Vec<_> = aims.iter().map(query).collect();
-    let mut hits =
-        traversed(gpu, scene, called_for(scene, &scene.settings, Outputs::default()), &queries, any_hit).into_iter();
+    let kernel = Traversal::new(gpu, scene, called_for(scene, &scene.settings, Outputs::default()));
+    let mut hits = kernel.hits(&queries, any_hit).into_iter();
     aims.retain(|a| hits.next().is_some_and(|hit| hit.triangle == NONE || hit.t > a.distance + 0.2));
     aims
 }

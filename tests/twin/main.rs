@@ -2,6 +2,7 @@
 mod allocate;
 mod bsdf;
 mod ceilings;
+mod dealt;
 mod denoiser;
 mod filters;
 mod guided;

@@ -129,9 +129,9 @@ struct Device {
 impl Device {
     fn new(gpu: Gpu, scene: &Loaded, rays: &[RayQuery], per_thread: u32) -> Result<Self> {
         // obvhs does not support masks, so neither side tests them.
-        let effects = Effects::default();
+        let effects = Effects { dealt_triangles: true, ..Effects::default() };
         let traverse = shared::traverse::Constants { stack: scene.stack };
-        let constants = Constants { effects, traverse, thread: gpu.tuning().thread() };
+        let constants = Constants { effects, traverse, thread: gpu.tuning().thread(), deal: gpu.deal() };
         Ok(Self {
             frame: FrameResources::new(&gpu)?,
             kernel: Kernel::new(&gpu, &constants)?,

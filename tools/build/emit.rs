@@ -186,8 +186,14 @@ fn constants(interface: &Interface, root: &str) -> Result<String> {
     Ok(code)
 }
 
-/// The Rust module of one kernel.
-pub fn module(name: &str, file: &Path, interface: &Interface, root: &str, binary: &Path) -> Result<String> {
+/// The Rust module of one kernel, compiled for most devices and for those whose subgroups cannot shuffle.
+pub fn module(
+    name: &str,
+    file: &Path,
+    interface: &Interface,
+    root: &str,
+    [usual, plain]: [&Path; 2],
+) -> Result<String> {
     let push = &interface.push;
     let (mut fields, list) = members(&interface.bindings_of(None))?;
     let (mut slots, mut groups, mut order) = (String::new(), String::new(), interface.bindings_of(None));
@@ -220,7 +226,9 @@ pub fn module(name: &str, file: &Path, interface: &Interface, root: &str, binary
     /// Basename of the file, label of the pass.
     pub const NAME: &str = {name:?};
     /// The compiled code.
-    pub static SPIRV: &[u8] = include_bytes!({binary:?});
+    pub static SPIRV: &[u8] = include_bytes!({usual:?});
+    /// The same for devices whose subgroups cannot shuffle.
+    pub static PLAIN_SPIRV: &[u8] = include_bytes!({plain:?});
     /// This kernel, specialised.
     pub type Kernel = {root}::gpu::Kernel<Bind<'static>>;
 {numbers}{asserts}{constants}    /// What the kernel reads and writes.
@@ -233,6 +241,7 @@ pub fn module(name: &str, file: &Path, interface: &Interface, root: &str, binary
         type Constants = Constants;
         const NAME: &'static str = NAME;
         const SPIRV: &'static [u8] = SPIRV;
+        const PLAIN_SPIRV: &'static [u8] = PLAIN_SPIRV;
         const SLOTS: &'static [Slot] = &[
 {slots}        ];
         fn buffers(&self) -> Vec<Bound<'_>> {{

@@ -45,6 +45,7 @@ const SCENES: &[(&str, Source)] = &[
     ("furnace-sphere", Source::Written(include_str!("furnace-sphere.toml"))),
     ("furnace-box", Source::Written(include_str!("furnace-box.toml"))),
     ("crytek-sponza", Source::Written(include_str!("crytek-sponza.toml"))),
+    ("bare-sponza", Source::Written(include_str!("bare-sponza.toml"))),
     ("sibenik", Source::Written(include_str!("sibenik.toml"))),
     ("sibenik-lamps", Source::Written(include_str!("sibenik-lamps.toml"))),
     ("forest", Source::Written(include_str!("forest.toml"))),

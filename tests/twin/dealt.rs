@@ -1,0 +1,60 @@
+//! Rays that test each other's triangles find the bits that each finds alone.
+use crate::kernels::{Traversal, pictures, queries, shipped};
+use crate::support::{assert_silent, gpu, render};
+use tallow::allocate::policy as policy_of;
+use tallow::gpu::DeviceKind;
+use tallow::layout::*;
+use tallow::render::{Outputs, Renderer, called_for};
+use tallow::scene::Loaded;
+
+/// A hierarchy of many triangles, and one with instances and masks.
+fn scenes() -> [(&'static str, Loaded); 2] {
+    [("bust", shipped("bust/scene.toml")), ("pictures", pictures())]
+}
+
+fn bits(hit: &RayHit) -> [u32; 5] {
+    let [u, v] = hit.barycentric.map(f32::to_bits);
+    [hit.t.to_bits(), hit.triangle, hit.instance, u, v]
+}
+
+#[test]
+fn rays_find_the_same_hits_together() {
+    let gpu = gpu();
+    assert!(gpu.info().kind != DeviceKind::Cpu || gpu.deal().lanes > 0, "nothing is dealt on {:?}", gpu.info());
+    for (name, scene) in scenes() {
+        let effects = Effects { dealt_triangles: false, ..called_for(&scene, &scene.settings, Outputs::default()) };
+        let together = Effects { dealt_triangles: true, ..effects };
+        let kernels = [effects, together].map(|effects| Traversal::new(&gpu, &scene, effects));
+        for count in [1, 31, 64, 65, 5000] {
+            let rays = queries(&scene, count);
+            let [alone, dealt] = kernels.each_ref().map(|kernel| kernel.hits(&rays, false));
+            assert!(alone.iter().map(bits).eq(dealt.iter().map(bits)), "{name}: {count} closest hits");
+            // Of several triangles any may stop a ray.
+            let [alone, dealt] = kernels.each_ref().map(|kernel| kernel.hits(&rays, true));
+            let stopped = |hits: &[RayHit]| hits.iter().map(|hit| hit.triangle != NONE).collect::<Vec<_>>();
+            assert_eq!(stopped(&alone), stopped(&dealt), "{name}: {count} any hits");
+        }
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn pictures_have_the_same_bits_together() {
+    let gpu = gpu();
+    for (name, mut scene) in scenes() {
+        for (width, height, policy) in [(7, 5, "uniform"), (33, 31, "variance")] {
+            (scene.settings.width, scene.settings.height) = (width, height);
+            scene.settings.allocate.policy = policy_of(policy).unwrap();
+            let outputs = Outputs { split_light: true, ..Outputs::default() };
+            let render = |dealt_triangles| {
+                let effects = Effects { dealt_triangles, ..called_for(&scene, &scene.settings, outputs) };
+                let renderer = Renderer::specialised(&gpu, &scene, &scene.settings, outputs, effects).unwrap();
+                render(&gpu, &renderer)
+            };
+            let [alone, dealt] = [false, true].map(render);
+            let same = bytemuck::cast_slice::<_, u8>(&alone) == bytemuck::cast_slice::<_, u8>(&dealt);
+            assert!(same, "{name}, {width} x {height}, {policy}");
+        }
+    }
+    assert_silent(&gpu);
+}
