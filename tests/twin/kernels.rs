@@ -409,6 +409,9 @@ pub fn queries(scene: &Loaded, count: usize) -> Vec<RayQuery> {
 fn differing(scene: &Loaded, rays: &[RayQuery], hits: &[RayHit], any_hit: bool) -> usize {
     let differs = |(ray, hit): (&RayQuery, &RayHit)| {
         let twin = traverse(scene, ray.origin.into(), ray.direction.into(), ray.t_max, any_hit, ray.mask_seed);
+        if any_hit {
+            return (twin.triangle == NONE) != (hit.triangle == NONE); // of several triangles any may stop a ray
+        }
         let same = twin.triangle == hit.triangle && twin.instance == hit.instance;
         let near = |a: f32, b: f32, scale: f32| (a - b).abs() <= 1e-4 * scale;
         let [u, v] = hit.barycentric;
