@@ -98,10 +98,12 @@ fn a_constant_image_stands_any_guide() {
     for row in FILTERS {
         let mut mixed = holed();
         for (i, fill) in fills.iter().enumerate() {
-            let mut input = holed();
-            input.guide.fill(*fill);
-            assert_all(row.name, &outputs(&gpu, row, &input, &extremes()), &input, 3.0, IN_PAINTED);
             mixed.guide.iter_mut().skip(i).step_by(11).for_each(|g| *g = *fill);
+        }
+        for fill in [f32::NAN, f32::MAX] {
+            let mut input = holed();
+            input.guide.fill(bad(fill));
+            assert_all(row.name, &outputs(&gpu, row, &input, &extremes()), &input, 3.0, IN_PAINTED);
         }
         assert_all(row.name, &outputs(&gpu, row, &mixed, &extremes()), &mixed, 3.0, IN_PAINTED);
     }
