@@ -173,7 +173,7 @@ fn rows(args: &Args) -> Result<Vec<EffectRow>> {
         let row = price((effect.name(), on), outputs_then, then)?;
         let bytes = row.bytes + scene_bytes(effect, &scene);
         let row = EffectRow { called_for_by: called_for_by(effect), bytes, ..row };
-        // With and without it are different renders and not one picture at two costs; tools/adaptive compares them.
+        // With and without it are different renders and not one picture at two costs; `tools/papers policies` compares them.
         let unknown = EffectRow { gpu_ms_with: None, gpu_ms_without: None, compile_ms: None, ..row.clone() };
         rows.push(if effect == Effect::adaptive { unknown } else { row });
     }

@@ -3,7 +3,7 @@ use crate::measurement;
 use tallow::cost::document::{Document, Estimate, Verdict};
 use tallow::report::html;
 use tallow::report::html::viewer::{Image, Viewer};
-use tallow::report::html::{Cell, Page, Table};
+use tallow::report::html::{Cell, Page, Section, Table};
 
 /// Ends texts, attributes, scripts and comments, and would run a script.
 const HOSTILE: &str = r#"x"'></title></script><script>alert(1)</script><img src=x onerror=alert(2)>&amp;<!--"#;
@@ -128,15 +128,20 @@ fn a_plain_page_has_its_texts_tables_and_viewers() {
     let mut table = Table::new("Metrics", &["metric", "value"]);
     table.push(vec![Cell::text("PSNR"), Cell::number(f64::INFINITY)]);
     table.push(vec![Cell::text(HOSTILE), Cell::number(2.5)]);
+    let section = |title: &str, viewers| Section {
+        title: title.into(),
+        texts: vec!["No block differs.".into()],
+        viewers,
+        tables: vec![table.clone()],
+    };
     let page = Page {
         title: HOSTILE.into(),
         facts: vec![("verdict".into(), HOSTILE.into())],
-        texts: vec!["No block differs.".into()],
-        viewers: vec![viewer(), viewer()],
-        tables: vec![table],
+        sections: vec![section("", vec![viewer(), viewer()]), section(HOSTILE, Vec::new())],
     };
     let page = page.html();
-    assert!(page.contains("<p>No block differs.</p>") && page.contains("<h2>Metrics</h2>"));
+    assert!(page.contains("<p>No block differs.</p>"));
+    assert!(page.contains("<h2>Metrics</h2>") && page.contains("<h3>Metrics</h3>"), "below a heading, one level down");
     assert!(page.contains("<td>–</td>") && page.contains("data-order=\"2.5\""));
     assert_eq!(attributes(&page, "data-group"), ["all", "all"]);
     assert_eq!(attributes(&page, "data-name"), ["a.exr", "b.exr", "a.exr", "b.exr"]);

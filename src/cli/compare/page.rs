@@ -3,7 +3,7 @@ use super::report::Report;
 use super::{replay, words};
 use crate::image::significance::{Finding, Level, overlay, suspects};
 use crate::report::html::viewer::{Image, Viewer};
-use crate::report::html::{Cell, Page, Table};
+use crate::report::html::{Cell, Page, Section, Table};
 
 /// A page with the verdict, both images and the map side by side, what was found at every scale, and how the worst pixels are
 /// rendered again.
@@ -21,14 +21,9 @@ pub fn html(report: &Report) -> String {
         image("map", legend, &overlay.picture, 2),
         image("B", b_path.clone(), &b, 0),
     ];
-    let page = Page {
-        title: format!("{a_path} and {b_path}"),
-        facts: facts(report),
-        texts: texts(report),
-        viewers: vec![Viewer { group: "images".to_owned(), images, reference: Some(2) }],
-        tables: tables(report),
-    };
-    page.html()
+    let viewers = vec![Viewer { group: "images".to_owned(), images, reference: Some(2) }];
+    let section = Section { title: String::new(), texts: texts(report), viewers, tables: tables(report) };
+    Page { title: format!("{a_path} and {b_path}"), facts: facts(report), sections: vec![section] }.html()
 }
 
 fn facts(report: &Report) -> Vec<(String, String)> {

@@ -17,7 +17,7 @@ mod point_table;
 pub mod viewer;
 
 pub use cost::cost;
-pub use page::{Cell, Page, Row, Table};
+pub use page::{Cell, Page, Row, Section, Table};
 
 /// What stands around the content of every page; the template is `page.html`.
 struct Frame<'a> {

@@ -1,4 +1,4 @@
-//! Pages of texts, tables and images.
+//! Pages of sections with texts, tables and images.
 use super::Frame;
 use super::viewer::Viewer;
 use askama::Template;
@@ -8,19 +8,19 @@ use askama::Template;
 /// ```
 /// use tallow::image::Picture;
 /// use tallow::report::html::viewer::{Image, Viewer};
-/// use tallow::report::html::{Cell, Page, Table};
+/// use tallow::report::html::{Cell, Page, Section, Table};
 ///
 /// let picture = Picture { width: 1, height: 1, pixels: vec![[0.5; 3]] };
 /// let image = |name: &str| Image { name: name.into(), caption: String::new(), picture: &picture, rank: 0 };
 /// let viewer = Viewer { group: "all".into(), images: vec![image("a.exr"), image("b.exr")], reference: Some(1) };
 /// let mut table = Table::new("Metrics", &["metric", "value"]);
 /// table.push(vec![Cell::text("MSE"), Cell::number(0.0)]);
+/// let texts = vec!["No block differs by more than its noise.".into()];
+/// let section = Section { title: String::new(), texts, viewers: vec![viewer], tables: vec![table] };
 /// let page = Page {
 ///     title: "a.exr against b.exr".into(),
 ///     facts: vec![("verdict".into(), "same".into())],
-///     texts: vec!["No block differs by more than its noise.".into()],
-///     viewers: vec![viewer],
-///     tables: vec![table],
+///     sections: vec![section],
 /// };
 /// assert!(page.html().contains("<h2>Metrics</h2>"));
 /// ```
@@ -30,6 +30,15 @@ pub struct Page<'a> {
     pub title: String,
     /// Short facts below the title: name and value.
     pub facts: Vec<(String, String)>,
+    /// What follows, in this order.
+    pub sections: Vec<Section<'a>>,
+}
+
+/// A part of a [`Page`].
+#[derive(Clone, Debug, Default)]
+pub struct Section<'a> {
+    /// Heading; may be empty.
+    pub title: String,
     /// Paragraphs.
     pub texts: Vec<String>,
     /// Viewers of images.
@@ -76,8 +85,18 @@ pub struct Cell {
 impl Page<'_> {
     /// The page as the content of a file.
     pub fn html(&self) -> String {
-        let viewers = self.viewers.iter().map(Viewer::html).collect();
-        PlainPage { frame: Frame::new(&self.title), page: self, viewers }.to_string()
+        PlainPage { frame: Frame::new(&self.title), page: self }.to_string()
+    }
+}
+
+impl Section<'_> {
+    /// Level of the headings of its tables.
+    fn heading(&self) -> &'static str {
+        if self.title.is_empty() { "h2" } else { "h3" }
+    }
+
+    fn viewers(&self) -> Vec<String> {
+        self.viewers.iter().map(Viewer::html).collect()
     }
 }
 
@@ -117,5 +136,4 @@ impl Cell {
 struct PlainPage<'a> {
     frame: Frame<'a>,
     page: &'a Page<'a>,
-    viewers: Vec<String>,
 }

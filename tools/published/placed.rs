@@ -1,18 +1,13 @@
-//! Renders of a scene with one allocation policy, their references, and the errors between them.
+//! Renders with one allocation policy, with the device's time for them, and errors against references.
+use super::view::View;
 use crate::Args;
-pub use crate::view::View;
+use anyhow::anyhow;
 use tallow::gpu::{FrameResources, Gpu, PassTime};
-use tallow::image::{self, Film, WriteOptions};
 use tallow::layout::{Guide, PixelStats, vec3, vec4};
 use tallow::render::settings::Settings;
 use tallow::render::{Job, Outputs, Renderer, Step};
 use tallow::scene::{Loaded, Scene};
 use tallow::statistics::Pixel;
-
-pub mod geometry;
-pub mod overhead;
-pub mod policies;
-pub mod spread;
 
 /// The result of a render, with the device's time for its passes.
 pub struct Rendered {
@@ -28,35 +23,23 @@ pub struct Rendered {
 
 impl View {
     /// Loads the scene with the settings of the view and those that `change` makes.
+    ///
+    /// # Errors
+    /// When the scene cannot be found or loaded.
     pub fn load(&self, args: &Args, change: impl Fn(&mut Settings)) -> anyhow::Result<Loaded> {
         let all = |s: &mut Settings| {
-            ([s.width, s.height], s.max_depth, s.roulette_depth) = (self.size, self.depth, 0);
+            ([s.width, s.height], s.max_depth, s.roulette_depth) = (self.size(args), self.depth, 0);
             change(s);
         };
-        Ok(Scene::load(&self.scene_file(&args.data, &args.output)?).map(|scene| scene.with(all))?)
+        Ok(Scene::load(&self.scene_file(args)?).map(|scene| scene.with(all))?)
     }
 
-    /// Returns the means of radiance and of indirect irradiance over many samples of another seed, which are kept in a file.
-    pub fn reference(&self, gpu: &Gpu, args: &Args, change: impl Fn(&mut Settings)) -> anyhow::Result<[Vec<vec3>; 2]> {
-        let scene = self.load(args, |s| {
-            (s.spp, s.seed, s.allocate.policy) = (self.reference, 1, &tallow::allocate::uniform::ROW);
-            change(s);
-        })?;
-        let [width, height] = self.size;
-        let kind = format!("{:?}", scene.settings.filter).to_lowercase();
-        let samples = format!("{}spp-from-{}", self.reference, scene.settings.first_sample);
-        let file = args.output.join(format!("{}-{width}x{height}-{kind}-{samples}.exr", self.name));
-        if !file.exists() {
-            eprintln!("rendering {}", file.display());
-            let pixels = render(gpu, &scene)?.pixels;
-            let mut film = Film::new(width, height);
-            film.add_vec3("", ["R", "G", "B"], &pixels.iter().map(|p| p.stats.mean).collect::<Vec<_>>());
-            film.add_vec3("indirect", ["R", "G", "B"], &pixels.iter().map(|p| p.light.indirect).collect::<Vec<_>>());
-            image::write(&file, &film, &WriteOptions::default())?;
-        }
-        let film = image::read(&file)?;
-        let layer = |name| film.picture(name).map(|p| p.pixels).map_err(anyhow::Error::msg);
-        Ok([layer(None)?, layer(Some("indirect"))?])
+    /// Radiance of the reference.
+    ///
+    /// # Errors
+    /// As [`View::render`].
+    pub fn radiance(&self, args: &Args) -> anyhow::Result<Vec<vec3>> {
+        Ok(self.reference(args)?.film.picture(None).map_err(|what| anyhow!(what))?.pixels)
     }
 }
 

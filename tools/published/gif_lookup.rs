@@ -1,8 +1,8 @@
-//! Measures GIF's supersampling, by which filtered light is looked up along eye rays, against an image from one guide ray
+//! GIF's supersampling, by which filtered light is looked up along eye rays, against an image from one guide ray
 //! per pixel; and the case in which it fails, eye rays that hit a surface which no guide ray around them hits.
 use super::case::Case;
-use super::frames::View;
-use super::sweep;
+use super::view::View;
+use super::{Section, push, sweep};
 use crate::Args;
 use anyhow::anyhow;
 use rayon::prelude::*;
@@ -12,15 +12,19 @@ use tallow::gpu::Gpu;
 use tallow::image::Picture;
 use tallow::layout::{Effects, Guide, vec3, vec4};
 use tallow::render::{Outputs, Renderer, frame_constants};
-use tallow::report::table;
-use tallow::scene::{Loaded, Scene};
+use tallow::report::html::Table;
+use tallow::scene::Loaded;
 use tallow::twins::guide_lookup::{GuideRays, eye_hit};
 use tallow::twins::path::{Strategy, Tracer};
 
+const fn view(name: &'static str, scene: &'static str, size: [u32; 2]) -> View {
+    View { name, scene, size, full: [1024, 768], depth: 4, reference: 256 }
+}
+
 const VIEWS: &[View] = &[
-    View { name: "sponza", scene: "crytek-sponza", size: [256, 144], depth: 4, reference: 256 },
-    View { name: "grass", scene: "scenes/grass/scene.toml", size: [224, 126], depth: 4, reference: 256 },
-    View { name: "grass", scene: "scenes/grass/scene.toml", size: [112, 63], depth: 4, reference: 256 },
+    view("sponza", "crytek-sponza", [256, 144]),
+    view("grass", "scenes/grass/scene.toml", [224, 126]),
+    view("grass", "scenes/grass/scene.toml", [112, 63]),
 ];
 const EYE_RAYS: [u32; 2] = [4, 16];
 /// A guide ray can represent an eye ray whose normal differs by at most 30 degrees and whose depth by at most 5 %.
@@ -30,57 +34,50 @@ const LOST: f32 = 0.25;
 
 /// # Errors
 /// When a scene cannot be rendered, or the device fails.
-pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
-    println!(
-        "GIF's supersampling: mean squared error in 8-bit sRGB code values against 256 samples per pixel, with the"
-    );
-    println!(
-        "reference's direct light. Lost: no guide ray stands for more than a quarter of the pixel's eye rays (normal"
-    );
-    println!("more than 30 degrees off, or depth more than 5 %).\n");
-    VIEWS.iter().try_for_each(|view| one(gpu, args, view))
+pub fn measure(gpu: &Gpu, args: &Args) -> anyhow::Result<Section> {
+    let how = "The paper shows pictures of it and prints no errors. MSE in 8-bit sRGB code values against 256 samples per pixel, with \
+        the reference's direct light; indirect light of one path per pixel through its centre, filtered by guided, or without noise. \
+        Lost: no guide ray stands for more than a quarter of the pixel's eye rays (normal more than 30 degrees off, or depth more \
+        than 5 %).";
+    let mut section = Section::new("GIF: supersampling by looking filtered light up", &[how]);
+    for view in VIEWS {
+        section.tables.push(one(gpu, args, view)?);
+    }
+    Ok(section)
 }
 
-fn one(gpu: &Gpu, args: &Args, view: &View) -> anyhow::Result<()> {
-    let reference = view.render(args, view.reference)?;
+fn one(gpu: &Gpu, args: &Args, view: &View) -> anyhow::Result<Table> {
+    let reference = view.reference(args)?;
     let direct = reference.film.picture(Some("direct")).map_err(|what| anyhow!(what))?.pixels;
-    let case = |spp| Case::new(&view.render_centres(args, spp)?, &reference, Demodulation::Light);
+    let centres = |spp| view.render(args, spp, 2, "-centres", &["--filter", "point"]);
+    let case = |spp| Case::new(&centres(spp)?, &reference, Demodulation::Light);
     let (noisy, settled) = (case(1)?, case(view.reference)?);
     let row = filter::find("guided").expect("a row of the table");
     let error = |settings: &_| Ok(noisy.mse(&noisy.filtered_light(&noisy.run(gpu, row, settings)?)));
     let best = sweep::best(row, noisy.start(), error)?;
     let filtered = noisy.run(gpu, row, &best.settings)?;
-
-    let scene = Scene::load(&view.scene_file(&args.data, &args.output)?).map(|scene| {
-        scene.with(|s| {
-            [s.width, s.height] = view.size;
-            s.max_depth = view.depth;
-        })
-    })?;
+    let scene = view.load(args, |_| {})?;
     let renderer = Renderer::new(gpu, &scene, &scene.settings, Outputs::default())?;
     let lost = lost(&scene, renderer.effects(), &noisy.parts.input.guide, &filtered);
     let lost_pixels: Vec<bool> = lost.iter().map(|&share| share > LOST).collect();
-
-    println!("{}, {}x{}; guided: {}", view.name, view.size[0], view.size[1], best.text);
+    let mut table = Table::new(&view.label(args), &["light of the guide rays", "image", "all", "lost", "others"]);
     let share = 100.0 * lost.iter().sum::<f32>() / lost.len() as f32;
     let pixels = 100.0 * lost_pixels.iter().filter(|&&l| l).count() as f32 / lost.len() as f32;
-    println!("{share:.1} % of eye rays and {pixels:.1} % of pixels are lost");
-    let mut rows = Vec::new();
+    table.note = format!("{share:.1} % of eye rays and {pixels:.1} % of pixels are lost. guided: {}", best.text);
     for (light, case, filtered) in
         [("1 path, guided", &noisy, &filtered), ("noise-free", &settled, &settled.parts.input.radiance)]
     {
         let guide = &case.parts.input.guide;
         let centre = guide.iter().zip(filtered).map(reflected).collect();
-        rows.push(line(light, "guide ray alone", case, &lost_pixels, &lit(case, &direct, centre)));
-        rows.push(line(light, "own light, mean albedo", case, &lost_pixels, &case.filtered_light(filtered)));
+        push(&mut table, line(light, "guide ray alone", case, &lost_pixels, &lit(case, &direct, centre)));
+        push(&mut table, line(light, "own light, mean albedo", case, &lost_pixels, &case.filtered_light(filtered)));
         for eye_rays in EYE_RAYS {
             let (indirect, _) = renderer.look_up(guide, filtered, eye_rays)?;
             let name = format!("look-up, {eye_rays} eye rays");
-            rows.push(line(light, &name, case, &lost_pixels, &lit(case, &direct, indirect)));
+            push(&mut table, line(light, &name, case, &lost_pixels, &lit(case, &direct, indirect)));
         }
     }
-    println!("{}", table::text(&["light of the guide rays", "image", "all", "lost", "others"], &rows));
-    Ok(())
+    Ok(table)
 }
 
 fn reflected((guide, light): (&Guide, &vec4)) -> vec3 {

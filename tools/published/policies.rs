@@ -1,48 +1,50 @@
-//! Measures every policy on five scenes: the relative error at equal samples, and the resulting error at equal time.
-use super::{View, mean, radiance, relative_errors, render};
+//! Every policy on five scenes: the relative error at equal samples, and the resulting error at equal time.
+use super::placed::{mean, radiance, relative_errors, render};
+use super::view::View;
+use super::{Section, push};
 use crate::Args;
 use tallow::allocate::{POLICIES, Placing};
 use tallow::gpu::Gpu;
-use tallow::report::table;
+use tallow::report::html::Table;
 
 /// Average and least number of samples per pixel.
 const BUDGETS: [[u32; 2]; 3] = [[8, 1], [16, 2], [32, 4]];
 const SEEDS: [u32; 3] = [0, 2, 3];
 /// Number of runs. Each seed runs six times, and the shortest time counts.
 const RUNS: usize = 18;
+const fn view(name: &'static str, scene: &'static str, size: [u32; 2]) -> View {
+    View { name, scene, size, full: [1280, 720], depth: 4, reference: 1024 }
+}
+
 const VIEWS: [View; 5] = [
-    View { name: "cornell", scene: "scenes/cornell-box/scene.toml", size: [192, 192], depth: 4, reference: 1024 },
-    View { name: "sponza", scene: "crytek-sponza", size: [112, 63], depth: 4, reference: 1024 },
-    View { name: "bust", scene: "scenes/bust/scene.toml", size: [180, 240], depth: 4, reference: 1024 },
-    View { name: "grass", scene: "scenes/grass/scene.toml", size: [224, 126], depth: 4, reference: 1024 },
-    View {
-        name: "directional",
-        scene: "scenes/cornell-box/directional.toml",
-        size: [192, 192],
-        depth: 4,
-        reference: 1024,
-    },
+    view("cornell", "scenes/cornell-box/scene.toml", [192, 192]),
+    view("sponza", "crytek-sponza", [112, 63]),
+    view("bust", "scenes/bust/scene.toml", [180, 240]),
+    view("grass", "scenes/grass/scene.toml", [224, 126]),
+    view("directional", "scenes/cornell-box/directional.toml", [192, 192]),
 ];
 
-/// Prints the tables. The squared error falls as 1 / samples, so the error at equal time is the error times the time,
-/// relative to that product of the uniform render.
-pub fn print(gpu: &Gpu, args: &Args) -> anyhow::Result<()> {
-    println!("relMSE (eps 0.01), mean of {} seeds; `both` expects no filter\n", SEEDS.len());
+/// # Errors
+/// When a scene cannot be rendered, or the device fails.
+pub fn measure(gpu: &Gpu, args: &Args) -> anyhow::Result<Section> {
+    let how = "relMSE (eps 0.01), mean of 3 seeds; both expects no filter. The squared error falls as 1 / samples, so the error at equal \
+        time is the error times the time, relative to that product of the uniform render.";
+    let mut section = Section::new("Every policy on five scenes", &[how]);
     for [spp, least] in BUDGETS {
-        let mut rows = Vec::new();
+        let title = format!("{spp} samples per pixel, least {least}");
+        let mut table =
+            Table::new(&title, &["scene", "policy", "relMSE", "ms", "of uniform, equal samples", "equal time"]);
         for view in &VIEWS {
-            rows.extend(of_view(gpu, args, view, [spp, least])?);
+            of_view(gpu, args, view, [spp, least])?.into_iter().for_each(|row| push(&mut table, row));
         }
-        println!("{spp} samples per pixel, least {least}\n");
-        let header = ["scene", "policy", "relMSE", "ms", "of uniform, equal samples", "equal time"];
-        println!("{}", table::text(&header, &rows));
+        section.tables.push(table);
     }
-    Ok(())
+    Ok(section)
 }
 
 /// Measures one scene and returns a row for every policy.
 fn of_view(gpu: &Gpu, args: &Args, view: &View, [spp, least]: [u32; 2]) -> anyhow::Result<Vec<Vec<String>>> {
-    let reference = &view.reference(gpu, args, |_| {})?[0];
+    let reference = &view.radiance(args)?;
     let rows_of = POLICIES.iter().filter(|row| row.placing != Placing::Chosen);
     let mut found: Vec<_> = rows_of.map(|policy| (policy.name, 0.0, f64::INFINITY)).collect();
     for seed in SEEDS.iter().cycle().take(RUNS) {

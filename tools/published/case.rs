@@ -1,13 +1,12 @@
 //! Test cases for filters: a noisy image split into its parts, and its reference.
 use anyhow::anyhow;
-use std::path::Path;
 use tallow::denoise::Demodulation;
 use tallow::denoise::filter::{self, FilterSettings, Row};
 use tallow::denoise::twin::{self, Parts};
 use tallow::gpu::Gpu;
 use tallow::image::aov::{Aovs, Names};
 use tallow::image::source::Source;
-use tallow::image::{self, Film, Picture, WriteOptions, metrics};
+use tallow::image::{Picture, metrics};
 use tallow::layout::vec4;
 
 /// A noisy image and its reference.
@@ -60,19 +59,15 @@ impl Case {
     }
 }
 
-fn parts(source: &Source, demodulation: Demodulation) -> anyhow::Result<Parts> {
+/// Takes an image apart as a filter gets it.
+///
+/// # Errors
+/// When the file lacks its colour.
+pub fn parts(source: &Source, demodulation: Demodulation) -> anyhow::Result<Parts> {
     let aovs = Aovs::find(&source.film, &Names::new()).map_err(|what| anyhow!(what))?;
     Ok(twin::split(&aovs, demodulation))
 }
 
 fn picture(source: &Source) -> anyhow::Result<Picture> {
     source.film.picture(None).map_err(|what| anyhow!(what))
-}
-
-/// # Errors
-/// When it cannot be written.
-pub fn write(picture: &Picture, path: &Path) -> anyhow::Result<()> {
-    let mut film = Film::new(picture.width, picture.height);
-    film.add_vec3("", ["R", "G", "B"], &picture.pixels);
-    Ok(image::write(path, &film, &WriteOptions::default())?)
 }

@@ -1,8 +1,9 @@
-//! Measures the filters' times, beside those of EAW's table 2 and GIF's table 2, both on an NVIDIA GTX 285.
+//! The filters' times, beside those of EAW's table 2 and GIF's table 2, both on an NVIDIA GTX 285.
+use super::{Section, push};
 use tallow::denoise::filter::{self, FilterInput, FilterSettings, Planes, Row};
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::layout::Guide;
-use tallow::report::table;
+use tallow::report::html::Table;
 
 const RUNS: usize = 3;
 
@@ -36,39 +37,37 @@ const GIF: &[Line] = &[
 
 /// # Errors
 /// Those of the device.
-pub fn print(gpu: &Gpu) -> anyhow::Result<()> {
-    println!("EAW, table 2: milliseconds, ours / published");
-    let atrous = filter::find("atrous").expect("a row of the table");
+pub fn measure(gpu: &Gpu) -> anyhow::Result<Section> {
+    let how = "Milliseconds of the device, medians of 3 runs, on a noisy sphere on a floor: the content does not change the time. \
+        The papers' device is a GTX 285.";
+    let mut section = Section::new("EAW, table 2, and GIF, table 2: times of the filters", &[how]);
     for (size, published) in EAW {
-        let input = input(size);
-        let mut rows = Vec::new();
-        for (weights, published) in published.iter().enumerate() {
-            let mut row = vec![weights.to_string()];
-            for (levels, published) in LEVELS.into_iter().zip(published) {
-                let ms = milliseconds(gpu, atrous, &weighted(weights, levels), &input)?;
-                row.push(format!("{ms:.2} / {published:.1}"));
-            }
-            rows.push(row);
-        }
-        println!("\n{}x{}", size[0], size[1]);
-        print!("{}", table::text(&["weights", "1 level", "5 levels", "10 levels"], &rows));
+        section.tables.push(eaw(gpu, size, &published)?);
     }
-    println!("\nGIF, table 2, 1024x768: milliseconds");
-    println!("{}", table::text(&["filter", "settings", "ours", "published"], &gif(gpu)?));
-    Ok(())
+    let mut table = Table::new("GIF, table 2, 1024x768", &["filter", "settings", "ours", "published"]);
+    let input = input([1024, 768]);
+    for line in GIF {
+        let row = filter::find(line.filter).expect("a row of the table");
+        let ms = milliseconds(gpu, row, &FilterSettings::default().with(line.set), &input)?;
+        push(&mut table, [line.filter.into(), line.what.into(), format!("{ms:.2}"), format!("{:.0}", line.published)]);
+    }
+    section.tables.push(table);
+    Ok(section)
 }
 
-fn gif(gpu: &Gpu) -> anyhow::Result<Vec<Vec<String>>> {
-    let input = input([1024, 768]);
-    let mut rows = Vec::new();
-    for line in GIF {
-        let Some(row) = filter::find(line.filter) else { continue };
-        let mut settings = FilterSettings::default();
-        (line.set)(&mut settings);
-        let ms = milliseconds(gpu, row, &settings, &input)?;
-        rows.push(vec![line.filter.into(), line.what.into(), format!("{ms:.2}"), format!("{:.0}", line.published)]);
+fn eaw(gpu: &Gpu, size: [u32; 2], published: &[[f64; 3]; 4]) -> anyhow::Result<Table> {
+    let title = format!("EAW, table 2, {}x{}: ours / published", size[0], size[1]);
+    let mut table = Table::new(&title, &["weights", "1 level", "5 levels", "10 levels"]);
+    let (atrous, input) = (filter::find("atrous").expect("a row of the table"), input(size));
+    for (weights, published) in published.iter().enumerate() {
+        let mut row = vec![weights.to_string()];
+        for (levels, published) in LEVELS.into_iter().zip(published) {
+            let ms = milliseconds(gpu, atrous, &weighted(weights, levels), &input)?;
+            row.push(format!("{ms:.2} / {published:.1}"));
+        }
+        push(&mut table, row);
     }
-    Ok(rows)
+    Ok(table)
 }
 
 /// Settings with the first `weights` weights in the order of EAW's figure 4: radiance, normal, position.

@@ -69,8 +69,6 @@ pub struct Best {
     pub settings: FilterSettings,
     /// Those settings as text.
     pub text: String,
-    /// The errors for other values, one line per setting, with all others at their best.
-    pub around: String,
 }
 
 /// Minimises `error` along one setting after the other, twice, starting from the defaults.
@@ -83,13 +81,11 @@ pub fn best(
     mut error: impl FnMut(&FilterSettings) -> anyhow::Result<f64>,
 ) -> anyhow::Result<Best> {
     let knobs = knobs(row.name);
-    let mut best = Best { error: error(&start)?, settings: start, text: String::new(), around: String::new() };
+    let mut best = Best { error: error(&start)?, settings: start, text: String::new() };
     let mut chosen = vec![None; knobs.len()];
     for _ in 0..2 {
-        best.around.clear();
         for (knob, chosen) in knobs.iter().zip(&mut chosen) {
-            let line = along(knob, &mut best, chosen, &mut error)?;
-            best.around += &format!("{} {}:{line}\n", row.name, knob.name);
+            along(knob, &mut best, chosen, &mut error)?;
         }
     }
     let name = |(knob, value): (&Knob, &Option<f32>)| {
@@ -99,22 +95,23 @@ pub fn best(
     Ok(best)
 }
 
-/// Tries every value of one setting and returns the errors.
+/// Tries every value of one setting.
 fn along(
     knob: &Knob,
     best: &mut Best,
     chosen: &mut Option<f32>,
     error: &mut impl FnMut(&FilterSettings) -> anyhow::Result<f64>,
-) -> anyhow::Result<String> {
-    let mut line = String::new();
+) -> anyhow::Result<()> {
     for &value in knob.values {
+        if *chosen == Some(value) {
+            continue;
+        }
         let mut settings = best.settings;
         (knob.set)(&mut settings, value);
-        let found = if *chosen == Some(value) { best.error } else { error(&settings)? };
+        let found = error(&settings)?;
         if found < best.error {
             (best.error, best.settings, *chosen) = (found, settings, Some(value));
         }
-        line += &format!(" {} -> {found:.4};", knob.text(value));
     }
-    Ok(line)
+    Ok(())
 }
