@@ -36,11 +36,12 @@ impl Candidate {
     }
 }
 
-/// Methods whose points did not fail, in the order of the points. What has options and a single point is no method of its own: it is
-/// compared with the same point without them.
+/// Methods with runs, in the order of the points. What has options and a single point is no method of its own: it is compared with the
+/// same point without them.
 pub(super) fn candidates(points: &[Point]) -> Vec<Candidate> {
     let mut groups: Vec<(Method, Vec<&Point>)> = Vec::new();
-    for point in points.iter().filter(|point| point.failed.is_none() && point.method.spp > 0) {
+    let is_measured = |point: &&Point| point.failed.is_none() && point.method.spp > 0 && !point.runs.is_empty();
+    for point in points.iter().filter(is_measured) {
         let method = Method { spp: 0, ..point.method.clone() };
         match groups.iter_mut().find(|(found, _)| *found == method) {
             Some((_, points)) => points.push(point),

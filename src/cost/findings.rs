@@ -181,6 +181,7 @@ fn goal(candidates: &[Candidate], error: f64, alpha: f64, confidence: f64) -> Op
     let between = low.zip(high).map(|(l, h)| format!(" ({} to {})", milliseconds(l), milliseconds(h)));
     let text = format!("relMSE {} takes {}{}", number(error), milliseconds(value), between.unwrap_or_default());
     Some(match ranking.best[..] {
+        [_] if candidates.len() == 1 => clear(format!("{text} with {}.", fastest.name)),
         [_] => with_open(candidates, &ranking, format!("{text} with {}, the fastest", fastest.name)),
         _ => noisy(format!("{text} at least; the data cannot tell between {}.", names(candidates, &ranking.best))),
     })

@@ -214,6 +214,17 @@ fn points_that_failed_are_in_no_comparison() {
     assert!(findings(&points, CONFIDENCE).iter().all(|f| !f.text.contains("broken")));
 }
 
+#[test]
+fn methods_of_an_interrupted_measurement_are_compared_by_the_points_that_were_run() {
+    let better = Truth { allocate: "better", time: 1.0, error: 0.1 };
+    let mut points = points(&[UNIFORM, better], Spread { time: 0.01, error: 0.01 }, false, 3);
+    (points[4].runs, points[4].summary) = (Vec::new(), None);
+    let found = findings(&points, CONFIDENCE);
+    assert!(winners(&found).iter().all(|text| text.contains("better")) && !winners(&found).is_empty(), "{found:#?}");
+    let alone = findings(&points[..4], CONFIDENCE);
+    assert!(winners(&alone).is_empty(), "a method alone is not the fastest: {alone:#?}");
+}
+
 fn picture(values: impl Iterator<Item = f32>) -> Picture {
     let pixels: Vec<[f32; 3]> = values.map(|v| [v; 3]).collect();
     Picture { width: 64, height: pixels.len() as u32 / 64, pixels }

@@ -89,6 +89,7 @@ fn no_text_of_a_document_becomes_markup() {
 fn a_document_without_measured_points_gives_a_page() {
     let empty = html::cost(&measurement::nothing_measured("box"), None);
     assert!(empty.contains("No point was measured.") && !empty.contains("<svg"));
+    assert!(empty.contains("up to 0 of 5 runs of each point"), "not what was wanted but what was made");
     let mut failed = measurement::document("box");
     failed.points.retain(|point| point.summary.is_none());
     failed.front.clear();

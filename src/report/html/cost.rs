@@ -69,7 +69,7 @@ impl CostPage<'_> {
 fn facts(document: &Document) -> Vec<(String, String)> {
     let Document { scene, machine, measurement, software, .. } = document;
     let commit = software.commit.as_ref().map(|commit| format!(", commit {commit}")).unwrap_or_default();
-    let runs = format!("{} runs of each point, {} % intervals", measurement.repeats, percent(measurement.confidence));
+    let runs = format!("{} runs of each point, {} % intervals", runs(document), percent(measurement.confidence));
     let cores = if machine.cores == 1 { "1 core".to_owned() } else { format!("{} cores", machine.cores) };
     let mut facts = vec![
         ("scene", format!("{}, {} x {} pixels", scene.path, scene.width, scene.height)),
@@ -83,6 +83,13 @@ fn facts(document: &Document) -> Vec<(String, String)> {
         facts.push(("clocks", clocks));
     }
     facts.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+}
+
+/// How many runs each point has, and should have.
+fn runs(document: &Document) -> String {
+    let repeats = document.measurement.repeats;
+    let made = document.points.iter().filter(|point| !point.is_other).map(|point| point.runs.len());
+    if document.complete { repeats.to_string() } else { format!("up to {} of {repeats}", made.max().unwrap_or(0)) }
 }
 
 /// Where the system tells them.
