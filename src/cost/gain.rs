@@ -39,7 +39,9 @@ pub fn finding(candidates: &[Candidate], confidence: f64) -> Option<Finding> {
         most.by,
         milliseconds(most.time)
     );
-    Some(Finding { verdict: Verdict::Clear, text })
+    // Of a single seed nobody knows how far another would be off.
+    let verdict = if least.factor.low.is_some() { Verdict::Clear } else { Verdict::TooNoisy };
+    Some(Finding { verdict, text })
 }
 
 /// What is gained at a time by the best of the methods that have begun. One that ends before keeps its last image.

@@ -223,6 +223,9 @@ fn methods_of_an_interrupted_measurement_are_compared_by_the_points_that_were_ru
     assert!(winners(&found).iter().all(|text| text.contains("better")) && !winners(&found).is_empty(), "{found:#?}");
     let alone = findings(&points[..4], CONFIDENCE);
     assert!(winners(&alone).is_empty(), "a method alone is not the fastest: {alone:#?}");
+    points.iter_mut().for_each(|point| point.runs.truncate(1));
+    let found = findings(&points, CONFIDENCE);
+    assert!(found.iter().all(|finding| finding.verdict == Verdict::TooNoisy), "one seed tells nothing: {found:#?}");
 }
 
 fn picture(values: impl Iterator<Item = f32>) -> Picture {
