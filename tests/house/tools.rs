@@ -14,7 +14,7 @@ case \"$*\" in
 esac
 ";
 
-/// The words that `tools/test` hands to cargo beyond its own, and its last line.
+/// The words that `tools/test` first hands to cargo beyond its own, and its last line.
 fn tested(data: Option<&Path>, words: &str) -> (String, String) {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
@@ -42,11 +42,12 @@ fn tested(data: Option<&Path>, words: &str) -> (String, String) {
 fn tests_with_outside_data_run_where_it_is_and_are_skipped_where_not() {
     let data = tempfile::tempdir().unwrap();
     assert_eq!(tested(None, "--test scene"), ("--test scene".into(), "1 passed, 0 failed, 2 skipped".into()));
-    let all = "3 passed, 0 failed, 0 skipped";
-    assert_eq!(tested(Some(data.path()), ""), ("-- --include-ignored".into(), all.into()));
+    // All tests, and then those of the documentation.
+    let all = "6 passed, 0 failed, 0 skipped";
+    assert_eq!(tested(Some(data.path()), ""), ("--tests -- --include-ignored".into(), all.into()));
     let with = |words| tested(Some(data.path()), words).0;
     assert_eq!(with("--test scene"), "--test scene -- --include-ignored");
     assert_eq!(with("--test scene -- --nocapture a"), "--test scene -- --nocapture a --include-ignored");
-    assert_eq!(with("-- --ignored"), "-- --ignored");
-    assert_eq!(with("-- --include-ignored"), "-- --include-ignored");
+    assert_eq!(with("-- --ignored"), "--tests -- --ignored");
+    assert_eq!(with("-- --include-ignored"), "--tests -- --include-ignored");
 }
