@@ -304,7 +304,7 @@ fn geometry_is_unbiased_and_learning_nearly_so() {
         // Standard error of a mean of eight.
         (mean, (average(means.iter().map(|m| (m - mean).powi(2))) / 7.0).sqrt())
     };
-    let reference = picture("uniform", 512, 2);
+    let reference = picture("uniform", 256, 2);
     for (policy, min_spp, bias) in [("geometry", 2, 0.0), ("variance", 4, 0.02), ("both", 4, 0.02), ("both", 1, 0.02)] {
         let (mean, error) = picture(policy, 32, min_spp);
         let off = (mean - reference.0).abs();
