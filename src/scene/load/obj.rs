@@ -142,8 +142,14 @@ impl<'a> Parser<'a> {
                     corners = others;
                     self.face(line, face, std::array::from_fn(|i| above[i] as i64 + i64::from(defined[i])))
                 }
-                Statement::Name(name) => Ok(self.rename(&name)),
-                Statement::Wear(name) => Ok(self.wear(name)),
+                Statement::Name(name) => {
+                    self.rename(&name);
+                    Ok(())
+                }
+                Statement::Wear(name) => {
+                    self.wear(name);
+                    Ok(())
+                }
                 Statement::Libraries(names) => {
                     self.read_libraries(names)?;
                     Ok(())

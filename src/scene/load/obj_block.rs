@@ -62,8 +62,14 @@ impl ObjBlock {
         let name = || rest.trim().to_owned();
         let statement = match key {
             "v" => return self.vertex(rest),
-            "vt" => return Ok(self.uvs.push(numbers(rest, "a texture coordinate needs two numbers after vt")?)),
-            "vn" => return Ok(self.normals.push(numbers(rest, "a normal needs three numbers after vn")?)),
+            "vt" => {
+                self.uvs.push(numbers(rest, "a texture coordinate needs two numbers after vt")?);
+                return Ok(());
+            }
+            "vn" => {
+                self.normals.push(numbers(rest, "a normal needs three numbers after vn")?);
+                return Ok(());
+            }
             "f" => self.face(rest)?,
             "o" | "g" => Statement::Name(name()),
             "usemtl" if rest.trim().is_empty() => return Err(mend("usemtl names no material")),

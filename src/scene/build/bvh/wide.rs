@@ -273,8 +273,9 @@ impl Wide {
         let (nodes, first) = (self.nodes.len() as u32 - 1, self.order.len() as u32);
         let moved =
             |n: &BvhNode| BvhNode { child_base: n.child_base + nodes, primitive_base: n.primitive_base + first, ..*n };
-        self.nodes[slot] = moved(&part.nodes[0]);
-        self.nodes.extend(part.nodes[1..].iter().map(moved));
+        let mut moved = part.nodes.iter().map(moved);
+        self.nodes[slot] = moved.next().expect("a subtree has a root");
+        self.nodes.extend(moved);
         self.order.extend_from_slice(&part.order);
         self.levels = self.levels.max(level + part.levels);
     }
