@@ -77,7 +77,7 @@ gpu_structs! {
     struct LightChange {
         /// Sum of the differences of radiance, W/(m^2 sr).
         sum: vec3,
-        /// The change that is certain, W/(m^2 sr).
+        /// The largest mean change so far that is certain, W/(m^2 sr).
         error: float,
         /// Sum of the squares of the differences.
         squares: vec3,

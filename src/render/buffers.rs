@@ -123,6 +123,11 @@ fn extents(info: &DeviceInfo) -> [u32; 2] {
     whole_windows(info.max_allocation.min(info.max_buffer_size).min(texels), info.max_storage_range)
 }
 
+/// Most pixels of a film that fits one tile.
+pub(super) fn most_of_one_tile(info: &DeviceInfo) -> u32 {
+    extents(info)[0]
+}
+
 /// The same for bytes of a tile and of a storage binding.
 fn whole_windows(tile: u64, binding: u64) -> [u32; 2] {
     let pixels = |bytes: u64| ((bytes / WIDEST / PART as u64).clamp(1, 1 << 22) * PART as u64) as u32;

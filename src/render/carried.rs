@@ -4,8 +4,9 @@ use crate::error::{Error, Result};
 use crate::gpu::FrameResources;
 use crate::image::{Film, Samples};
 use crate::layout::{NONE, SurfacePoint};
-use crate::render::history::Carried;
+use crate::render::carriage::Carried;
 use crate::scene::Scene;
+use crate::shaders::shared::history::{ERROR_PARTS, MOST_CARRIED};
 
 /// Samples of a pixel that are of earlier frames.
 const SAMPLES: &str = "carried.samples";
@@ -57,8 +58,13 @@ impl Renderer {
         let [samples, age] = [SAMPLES, AGE].map(|name| film::counts(film, name).map_err(lacks));
         let (samples, age, error) = (samples?, age?, floats(film, ERROR)?);
         let part = history.error_part();
-        let word =
-            |i: usize| Carried { count: samples[i], age: age[i], error: (error[i] / part).round() as u32, back: false };
+        // Numbers of a damaged file stay within their bits.
+        let word = |i: usize| Carried {
+            count: samples[i].min(MOST_CARRIED),
+            age: age[i].min(255),
+            error: ((error[i] / part).round() as u32).min(ERROR_PARTS),
+            back: false,
+        };
         let points = points(film, scene)?;
         self.run(frame, &Step::Start)?;
         let tile = &self.frame.film.tiles[0];

@@ -6,12 +6,12 @@ use crate::layout::{
     ReprojectPush, SurfacePoint,
 };
 use crate::math::hash::pcg;
-use crate::render::buffers::DeviceScene;
+use crate::render::buffers::{DeviceScene, most_of_one_tile};
 use crate::scene::{Change, Relit};
 use crate::settings::{FROM_0, entry, settings};
 use crate::shaders;
 use crate::shaders::shared::cell::CELL;
-use crate::shaders::shared::history::{MOST_CARRIED, *};
+use crate::shaders::shared::history::ERROR_PARTS;
 use crate::shaders::shared::{deal, scene, traverse};
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -91,6 +91,20 @@ impl History {
         size_of::<Record>() + 2 * size_of::<u32>() + size_of::<SurfacePoint>() + light
     }
 
+    /// # Errors
+    /// [`Error::Usage`] for a film of too many pixels.
+    pub(super) fn check_room(gpu: &Gpu, pixels: u32) -> Result<()> {
+        let info = gpu.info();
+        let words = info.max_storage_range / size_of::<u32>() as u64;
+        let most = words.min(MOST_PIXELS.min(most_of_one_tile(info)).into());
+        match u64::from(pixels) > most {
+            true => Err(Error::Usage(format!(
+                "a film of {pixels} pixels is too large to reproject on this device: choose at most {most} pixels"
+            ))),
+            false => Ok(()),
+        }
+    }
+
     /// For a film of `size` pixels, which get `spp` samples a frame. `stack` is [`crate::scene::Scene::stack`].
     ///
     /// # Errors
@@ -105,12 +119,7 @@ impl History {
     ) -> Result<Self> {
         entry::check(&settings.entries())?;
         let (pixels, cells) = (size[0] * size[1], size.map(|n| n.div_ceil(CELL)));
-        let most = u64::from(MOST_PIXELS).min(gpu.info().max_storage_range / size_of::<u32>() as u64);
-        if u64::from(pixels) > most {
-            return Err(Error::Usage(format!(
-                "a film of {pixels} pixels is too large to reproject on this device: choose at most {most} pixels"
-            )));
-        }
+        Self::check_room(gpu, pixels)?;
         let (thread, traverse) = (gpu.tuning().thread(), traverse::Constants { stack });
         let room = |on: bool| if on { pixels as usize } else { 1 };
         let none = |name: &str| Buffer::from_slice(gpu, name, &[]);
@@ -228,102 +237,5 @@ impl History {
             triangles,
             ..Default::default()
         }
-    }
-}
-
-/// The samples that a pixel has from earlier frames, as one word holds them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Carried {
-    /// Their number.
-    pub count: u32,
-    /// How many times they have moved.
-    pub age: u32,
-    /// Error that they are accounted, in 127ths of the largest one.
-    pub error: u32,
-    /// Whether they show the side of the surface that its triangle's normal points away from.
-    pub back: bool,
-}
-
-impl Carried {
-    /// Out of a word of `glsl/shared/history.glsl`.
-    pub fn of(word: u32) -> Self {
-        Self { count: word & 0xffff, age: (word >> 16) & 0xff, error: (word >> 24) & 0x7f, back: word >> 31 != 0 }
-    }
-
-    /// Of a pixel of [`History::carried`], where a word without samples may say why.
-    pub(super) fn of_pixel(word: u32) -> Self {
-        let all = Self::of(word);
-        if all.count > 0 { all } else { Self::default() }
-    }
-
-    /// As a word.
-    pub fn word(self) -> u32 {
-        self.count | self.age << 16 | self.error << 24 | u32::from(self.back) << 31
-    }
-}
-
-/// How many samples of a pixel are carried, by its word in [`History::carried`].
-pub fn carried_samples(word: u32) -> u32 {
-    word & MOST_CARRIED
-}
-
-/// What became of the pixels at the start of a frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Carriage {
-    /// Pixels of the new frame that begin with samples of the last.
-    pub carried: u64,
-    /// Pixels of the new frame that nobody offered any.
-    pub new: u64,
-    /// Pixels of the new frame at edges, which took none.
-    pub new_edges: u64,
-    /// Samples that the new frame begins with.
-    pub samples: u64,
-    /// Pixels of the last frame that have offered theirs to pixels of the new one, not all of which took them.
-    pub offered: u64,
-    /// Pixels of the last frame that show no surface.
-    pub sky: u64,
-    /// Those with a smooth or refractive surface.
-    pub specular: u64,
-    /// Those at an edge.
-    pub edge: u64,
-    /// Those whose samples have moved too many times.
-    pub old: u64,
-    /// Those whose point is outside the new film.
-    pub outside: u64,
-    /// Those whose point is hidden in the new frame.
-    pub hidden: u64,
-    /// Those that would look different from the new view.
-    pub view: u64,
-    /// Those whose light has changed.
-    pub light: u64,
-}
-
-impl Carriage {
-    /// Counts the words of both frames.
-    pub fn of(offered: &[u32], carried: &[u32]) -> Self {
-        let mut sum = Self::default();
-        for &word in carried {
-            match (carried_samples(word), word >> 16) {
-                (0, DROPPED_EDGE) => sum.new_edges += 1,
-                (0, _) => sum.new += 1,
-                (n, _) => (sum.carried, sum.samples) = (sum.carried + 1, sum.samples + u64::from(n)),
-            }
-        }
-        sum.offered = offered.iter().filter(|&&word| carried_samples(word) > 0).count() as u64;
-        for &word in offered.iter().filter(|&&word| carried_samples(word) == 0) {
-            let reason = match word >> 16 {
-                DROPPED_SKY => &mut sum.sky,
-                DROPPED_SPECULAR => &mut sum.specular,
-                DROPPED_EDGE => &mut sum.edge,
-                DROPPED_OLD => &mut sum.old,
-                DROPPED_OUTSIDE => &mut sum.outside,
-                DROPPED_HIDDEN => &mut sum.hidden,
-                DROPPED_VIEW => &mut sum.view,
-                DROPPED_LIGHT => &mut sum.light,
-                _ => continue,
-            };
-            *reason += 1;
-        }
-        sum
     }
 }

@@ -1,6 +1,7 @@
 //! Renders: settings, the schedule of their work, the buffers it runs over, what is recorded for it, the loop that runs it,
 //! and its life in files.
 pub mod buffers;
+mod carriage;
 mod carried;
 pub mod film;
 mod frame;
@@ -24,7 +25,8 @@ mod update;
 mod views;
 
 pub use buffers::{DeviceScene, FilmBuffers, FilmTile};
-pub use history::{Carriage, Carried, History, Reproject, ReprojectOverrides, carried_samples};
+pub use carriage::{Carriage, Carried, carried_samples};
+pub use history::{History, Reproject, ReprojectOverrides};
 pub use job::{Job, Status, StopReason};
 pub use merge::{Gap, Merged, merge};
 pub use moving::can_carry;

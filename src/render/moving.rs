@@ -1,9 +1,10 @@
 //! Frames that begin with the samples of the last: what a renderer needs for it, and what became of them.
-use super::history::{Carriage, History, Reproject, carried_samples};
+use super::carriage::{Carriage, carried_samples};
+use super::history::{History, Reproject};
 use super::schedule::{self, Begun};
 use super::{Renderer, Step, kernels};
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, FrameResources, PassTime};
+use crate::gpu::{Buffer, FrameResources, Gpu, PassTime};
 use crate::layout::{Camera, NONE, PixelStats, SurfacePoint};
 use crate::render::settings::Settings;
 use crate::scene::Scene;
@@ -21,9 +22,8 @@ impl Renderer {
     /// [`Error::Device`].
     pub fn keep_history(&mut self, settings: Reproject) -> Result<()> {
         let (pixels, size) = (self.settings.pixels(), [self.settings.width, self.settings.height]);
-        if !self.frame.film.tiles[0].has_guide() || self.frame.film.tiles.len() > 1 {
-            let what =
-                "a history needs primary hits, and a film that fits one buffer: make the renderer with Outputs::guides";
+        if !self.frame.film.tiles[0].has_guide() {
+            let what = "a history needs primary hits: make the renderer with Outputs::guides";
             return Err(Error::Usage(what.into()));
         }
         let history = History::new(&self.gpu, self.effects, self.stack, size, self.settings.spp, settings)?;
@@ -47,11 +47,11 @@ impl Renderer {
         std::iter::once(Step::Reproject).chain(self.steps().skip(1))
     }
 
-    /// Runs [`Step::Reproject`] and returns the GPU time of its passes and the rest of the frame's work, in which carried samples count: of the frame's budget, `spp`
-    /// samples for each pixel on average, pixels with fewer than `min_spp` get what they lack of those first. The rest is placed
-    /// by the policy, which compares what pixels have with their shares of all samples, carried ones included. The samples of the
-    /// frame sum to the budget exactly. Pixels get different numbers of them, so that frames need seeds of their own:
-    /// [`Self::set_seed`].
+    /// Runs [`Step::Reproject`] and returns the GPU time of its passes and the rest of the frame's work, in which carried samples
+    /// count: of the frame's budget, `spp` samples for each pixel on average, pixels with fewer than `min_spp` get what they lack
+    /// of those first. The rest is placed by the policy, which compares what pixels have with their shares of all samples, carried
+    /// ones included. The samples of the frame sum to the budget exactly. Pixels get different numbers of them, so that frames
+    /// need seeds of their own: [`Self::set_seed`].
     ///
     /// It waits for the device, which alone knows what is carried.
     ///
@@ -103,9 +103,10 @@ impl Renderer {
 /// Whether frames of a scene can begin with samples of the last.
 ///
 /// # Errors
-/// [`Error::Usage`] with what speaks against it: a lens, parallel rays, or settings under which no budget is placed.
-pub fn can_carry(scene: &Scene, settings: &Settings) -> Result<()> {
+/// [`Error::Usage`] with what speaks against it: a lens, parallel rays, too many pixels, or settings under which no budget is placed.
+pub fn can_carry(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Result<()> {
     check_camera(&scene.camera([settings.width, settings.height])?)?;
+    History::check_room(gpu, settings.pixels() as u32)?;
     check_placing(settings)
 }
 

@@ -86,7 +86,8 @@ pub fn sums(found: &[LightChange], cells: [u32; 2], spacing: u32) -> Vec<LightCh
             all.squares = (Vec3::from(all.squares) + Vec3::from(other.squares)).into();
             all.count += other.count;
         }
-        let (sum, noise) = (Vec3::from(all.sum).abs(), CERTAIN * Vec3::from(all.squares).map(f32::sqrt));
+        let limit = if spacing == 3 { 0.0 } else { CERTAIN };
+        let (sum, noise) = (Vec3::from(all.sum).abs(), limit * Vec3::from(all.squares).map(f32::sqrt));
         let certain = Vec3::select(sum.cmpgt(noise), sum / all.count.max(1) as f32, Vec3::ZERO);
         LightChange { error: all.error.max(certain.max_element()), ..all }
     };

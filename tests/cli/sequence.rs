@@ -77,6 +77,39 @@ fn a_frame_in_another_light_is_another() {
     assert!(told.contains("frame 0: is finished") && !told.contains("frame 1: is finished"), "{told}");
 }
 
+/// Frames hold what the next one begins with, and know the ones before.
+#[test]
+fn a_sequence_that_carries_goes_on_to_the_same_bits() {
+    let folder = stage();
+    let words = |more: &str| {
+        format!("--reproject forward --reproject-error 1 --frames 0..48 --only 9..=12 --fps 6 -o a.####.exr {more}")
+    };
+    let file = |name: &str| folder.path().join(name);
+    well(&folder, &words(""));
+    let all = ["a.0011.exr", "a.0012.exr"].map(|name| bits(&folder, name));
+    let carried = |channels: &[(String, Vec<u32>)]| {
+        channels.iter().any(|(name, samples)| name == "carried.samples" && samples.iter().any(|&n| n > 2))
+    };
+    assert!(all.iter().all(|channels| carried(channels)), "control: frames hold samples of two frames before");
+    fs::remove_file(file("a.0011.exr")).unwrap();
+    let told = well(&folder, &words(""));
+    assert!(told.contains("frame 10: is finished") && told.contains("frame 12: is finished"), "{told}");
+    fs::remove_file(file("a.0011.exr")).unwrap();
+    fs::remove_file(file("a.0012.exr")).unwrap();
+    let told = well(&folder, &words(""));
+    assert!(told.contains("frame 10: is finished") && !told.contains("frame 11: is finished"), "{told}");
+    assert!(["a.0011.exr", "a.0012.exr"].map(|name| bits(&folder, name)) == all);
+    // What is carried is part of what a frame is; the first began with nothing.
+    let told = well(&folder, &words("--reproject-samples 9"));
+    assert!(told.contains("frame 9: is finished") && !told.contains("frame 10: is finished"), "{told}");
+    // Neither can such a frame go on as an image of its own.
+    for words in ["render s.toml --resume a.0012.exr -o r.exr", "merge a.0011.exr a.0012.exr -o m.exr"] {
+        let output = tallow(&folder, &words.split_whitespace().collect::<Vec<_>>());
+        let line = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!output.status.success() && line.contains("has samples of earlier frames"), "{words}: {line}");
+    }
+}
+
 #[test]
 fn without_frames_all_of_the_animation_is_rendered() {
     let folder = stage();
@@ -123,6 +156,8 @@ fn options_that_cannot_be_are_one_line() {
         ("--frames 0..3 --pixel 1,1", "--pixel is for one image"),
         ("--frames 0..3 --preview a.png", "a preview goes to a .gif"),
         ("--only 99999", "none of the frames"),
+        ("--frames 0..3 --reproject forward --max-spp 9", "set neither noise_threshold nor max_spp"),
+        ("--frames 0..3 --reproject-error -1", "--reproject-error"),
     ] {
         let output = run(&folder, words);
         let line = String::from_utf8_lossy(&output.stderr).into_owned();

@@ -8,7 +8,7 @@ use std::path::Path;
 use tallow::gpu::Gpu;
 use tallow::layout::{Camera, PixelStats};
 use tallow::render::settings::Settings;
-use tallow::render::{Carriage, Outputs, Renderer, Reproject, Step, carried_samples};
+use tallow::render::{Carriage, Carried, Outputs, Renderer, Reproject, Step, carried_samples};
 use tallow::scene::{Loaded, Scene};
 
 fn scene(file: &str, change: impl Fn(&mut Settings)) -> Loaded {
@@ -281,6 +281,25 @@ fn what_is_hidden_stays_behind() {
     let carried: Vec<usize> = (0..guide.len()).filter(|&i| carried_samples(words[i]) > 0).collect();
     let wrong = carried.iter().filter(|i| wrong(i)).count();
     assert!(wrong * 50 < carried.len(), "{wrong} of {} show the other: {found:?}", carried.len());
+}
+
+#[test]
+fn the_changed_view_is_accounted() {
+    let gpu = gpu();
+    let scene = scene("cornell-box/glossy.toml", small);
+    let reach = glam::Vec3::from(scene.bounds[1]).distance(scene.bounds[0].into());
+    let way = |camera: Camera, k: u32| shifted(camera, [0.006 * k as f32 * reach, 0.0, 0.006 * k as f32 * reach]);
+    let found = [0.0, 1.0 / 256.0, 1e9].map(|reproject_error| {
+        let mut film = Film::new(&gpu, &scene, Reproject { reproject_error, ..Reproject::default() });
+        let start = film.camera;
+        (0..4).for_each(|k| film.frame(way(start, k)));
+        let errors = film.carried().into_iter().map(Carried::of).filter(|c| c.count > 0).map(|c| c.error);
+        (film.renderer.carriage().unwrap().view, errors.max().unwrap())
+    });
+    let [(all, none), (some, more), (kept, least)] = found;
+    assert!(all > some && some > 0 && kept == 0, "pixels that the view has changed: {found:?}");
+    assert!(none == 0 && more > 1 && least <= 3, "largest error, in parts of its limit: {found:?}");
+    assert_silent(&gpu);
 }
 
 #[test]

@@ -43,6 +43,11 @@ impl Film {
         self.renderer.run(&mut self.frame, step).unwrap();
     }
 
+    /// Lets the next frame begin with nothing.
+    pub fn restart(&mut self) {
+        self.begun = false;
+    }
+
     /// Runs what changes the renderer as it is recorded.
     pub fn record(&mut self, record: impl FnOnce(&mut Renderer, &mut Recorder) -> tallow::error::Result<()>) {
         let (gpu, renderer) = (&self.gpu, &mut self.renderer);

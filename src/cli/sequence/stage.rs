@@ -12,6 +12,7 @@ use crate::render::settings::Settings;
 use crate::render::{Carriage, Outputs, Renderer, Reproject, all_effects, called_for, can_carry, finished};
 use crate::scene::animation::{Animation, Turntable};
 use crate::scene::{Change, Loaded, Scene};
+use crate::settings::entry;
 use std::ops::Range;
 use std::sync::Arc;
 use std::time::Instant;
@@ -91,7 +92,7 @@ impl<'a> Stage<'a> {
         let gpu = args.render.common.open()?;
         render::check_room(&args.render, &settings, &gpu)?;
         let rest = called_for(&scene, &settings, args.render.wanted());
-        let reproject = carrying(args, &scene, &settings, !animation.is_empty())?;
+        let reproject = carrying(args, &gpu, &scene, &settings, !animation.is_empty())?;
         let (renderer, change, chain, held) = (None, Change::default(), Chain::default(), None);
         Ok(Self { args, gpu, scene, animation, frames, settings, rest, renderer, change, reproject, chain, held })
     }
@@ -277,8 +278,8 @@ fn show(preview: Option<&mut Preview>, film: &Film, args: &render::Args) -> Resu
 }
 
 /// How samples are carried: as asked for, or where something moves and nothing speaks against it.
-fn carrying(args: &Args, scene: &Scene, settings: &Settings, moves: bool) -> Result<Option<Reproject>> {
-    let able = can_carry(scene, settings);
+fn carrying(args: &Args, gpu: &Gpu, scene: &Scene, settings: &Settings, moves: bool) -> Result<Option<Reproject>> {
+    let able = can_carry(gpu, scene, settings);
     let carries = match args.reproject {
         Some(Reprojection::Off) => false,
         Some(Reprojection::Forward) => able.map(|()| true)?,
@@ -286,5 +287,6 @@ fn carrying(args: &Args, scene: &Scene, settings: &Settings, moves: bool) -> Res
     };
     let mut how = Reproject::default();
     args.carry.apply(&mut how);
+    entry::check(&how.entries())?;
     Ok(carries.then_some(how))
 }

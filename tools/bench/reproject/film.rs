@@ -16,7 +16,6 @@ const TRIMMED: f64 = 0.001;
 /// How frames are rendered.
 #[derive(Clone, Copy)]
 pub struct Arm {
-    pub name: &'static str,
     pub policy: &'static str,
     pub carries: Option<Reproject>,
     pub filter: Option<&'static str>,

@@ -102,12 +102,12 @@ pub fn run(gpu: &Gpu, args: &Args) -> Result<()> {
     );
     let carries = Some(Reproject::default());
     let mut arms = vec![
-        ("nothing".to_owned(), Arm { name: "", policy: "uniform", carries: None, filter: None }),
-        ("reprojection".to_owned(), Arm { name: "", policy: "uniform", carries, filter: None }),
+        ("nothing".to_owned(), Arm { policy: "uniform", carries: None, filter: None }),
+        ("reprojection".to_owned(), Arm { policy: "uniform", carries, filter: None }),
     ];
     for filter in &args.filters {
         let filter: &'static str = filter.clone().leak();
-        let arm = |policy, carries| Arm { name: "", policy, carries, filter: Some(filter) };
+        let arm = |policy, carries| Arm { policy, carries, filter: Some(filter) };
         arms.push((filter.to_owned(), arm("uniform", None)));
         arms.push((format!("reprojection, {filter}"), arm("uniform", carries)));
         arms.push((format!("reprojection, placed by geometry and variance, {filter}"), arm("both", carries)));

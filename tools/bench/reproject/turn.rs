@@ -46,13 +46,12 @@ pub struct Line {
 }
 
 fn arms(errors: &[f32]) -> Vec<(String, Arm)> {
-    let arm = |name, policy, carries| Arm { name, policy, carries, filter: None };
-    let mut arms = vec![("uniform".to_owned(), arm("uniform", "uniform", None))];
-    arms.push(("placed".to_owned(), arm("placed", "variance", None)));
+    let arm = |policy, carries| Arm { policy, carries, filter: None };
+    let mut arms = vec![("uniform".to_owned(), arm("uniform", None)), ("placed".to_owned(), arm("variance", None))];
     for &error in errors {
         let carries = Some(Reproject { reproject_error: error / 256.0, ..Reproject::default() });
-        arms.push((format!("reprojection, E = {error}/256"), arm("reprojection", "uniform", carries)));
-        arms.push((format!("both, E = {error}/256"), arm("both", "variance", carries)));
+        arms.push((format!("reprojection, E = {error}/256"), arm("uniform", carries)));
+        arms.push((format!("both, E = {error}/256"), arm("variance", carries)));
     }
     arms
 }
