@@ -1,6 +1,7 @@
 //! The statistics of a pixel's samples, and how those of two disjoint sets of samples are combined.
 use crate::layout::{PixelLight, PixelStats, vec3};
 use crate::math::srgb::luminance;
+use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 /// The statistics of one pixel.
@@ -10,6 +11,15 @@ pub struct Pixel {
     pub stats: PixelStats,
     /// Direct and indirect light; zero if they are not kept separately.
     pub light: PixelLight,
+}
+
+impl Pixel {
+    /// The light that needs a filter, before the reflectance that it has been multiplied by: radiance less direct light, over
+    /// albedo. 0 where there is none.
+    pub fn indirect(&self) -> vec3 {
+        let (Pixel { stats, light }, known) = (self, |v: f32| if v.is_finite() { v } else { 0.0 });
+        std::array::from_fn(|c| known((stats.mean[c] - light.direct[c]) / light.albedo[c]))
+    }
 }
 
 /// Samples that were NaN or infinite and were counted as black.
@@ -58,7 +68,8 @@ pub fn join(a: &Pixel, b: &Pixel) -> Pixel {
         let d = f64::from(b.stats.mean[i]) - f64::from(a.stats.mean[i]);
         squares([a.stats.m2[i], b.stats.m2[i]], d)
     });
-    let off = f64::from(luminance(b.light.indirect)) - f64::from(luminance(a.light.indirect));
+    let other = |p: &Pixel| f64::from(luminance(Vec3::from(p.stats.mean) - Vec3::from(p.light.direct)));
+    let off = other(b) - other(a);
     Pixel {
         stats: PixelStats {
             mean: mean(a.stats.mean, b.stats.mean),
@@ -70,7 +81,7 @@ pub fn join(a: &Pixel, b: &Pixel) -> Pixel {
         light: PixelLight {
             direct: mean(a.light.direct, b.light.direct),
             indirect_m2: squares([a.light.indirect_m2, b.light.indirect_m2], off),
-            indirect: mean(a.light.indirect, b.light.indirect),
+            albedo: mean(a.light.albedo, b.light.albedo),
             remainder: 0,
             ..Default::default()
         },
@@ -105,7 +116,7 @@ mod tests {
             remainder: 0,
             ..Default::default()
         };
-        let light = PixelLight { indirect: stats.mean, indirect_m2: m2 as f32, ..PixelLight::default() };
+        let light = PixelLight { albedo: stats.mean, indirect_m2: m2 as f32, ..PixelLight::default() };
         Pixel { stats, light }
     }
 
@@ -115,7 +126,7 @@ mod tests {
         for (a, b) in [(&[1.0][..], &[3.0, 5.0, 7.0][..]), (&[1.0, 3.0], &[5.0, 7.0]), (&[5.0, 1.0, 3.0], &[7.0])] {
             let Pixel { stats: whole, light } = join(&of(a), &of(b));
             assert_eq!((whole.count, whole.mean, whole.m2), (4, [4.0; 3], [20.0; 3]));
-            assert!(light.indirect == [4.0; 3] && (light.indirect_m2 - 20.0).abs() < 1e-4, "{light:?}");
+            assert!(light.albedo == [4.0; 3] && (light.indirect_m2 - 20.0).abs() < 1e-4, "{light:?}");
         }
         let some = of(&[1.0, 2.0]);
         assert_eq!((join(&some, &Pixel::default()), join(&Pixel::default(), &some)), (some, some));
@@ -137,7 +148,7 @@ mod tests {
     fn squares_of_records_far_apart_stay_finite() {
         let far = |mean: f32| Pixel {
             stats: PixelStats { mean: [mean; 3], count: 1, ..PixelStats::default() },
-            light: PixelLight { indirect: [mean; 3], ..PixelLight::default() },
+            light: PixelLight::default(),
         };
         let whole = join(&far(0.0), &far(1e38));
         assert_eq!((whole.stats.m2, whole.light.indirect_m2), ([1e35; 3], 1e35));

@@ -30,12 +30,12 @@ struct Surroundings {
     float indirect; // of the squared deviations of indirect light, as `around.x` holds those of all light
 };
 
-// Sum of squared deviations of indirect light (mean over channels), computed from those of its luminance before albedo. It
-// assumes that every sample has the colour of the pixel's mean. The covariance of direct and indirect light counts as direct.
+// Sum of squared deviations of indirect light (mean over channels), computed from those of its luminance. It assumes that every sample has the colour of the pixel's mean. The covariance of direct and indirect light counts as direct.
 float indirect_squares(uint pixel, vec3 mean, float squares) {
     PixelLight l = PixelLight_load(light, pixel);
-    float level = luminance(l.indirect);
-    vec3 tint = level > 0.0 ? min((mean - l.direct) / level, vec3(MAX_TINT)) : vec3(0.0);
+    vec3 indirect = mean - l.direct;
+    float level = luminance(indirect);
+    vec3 tint = level > 0.0 ? min(indirect / level, vec3(MAX_TINT)) : vec3(0.0);
     return min(l.indirect_m2 * dot(tint, tint) / 3.0, squares);
 }
 

@@ -23,14 +23,13 @@ const uint PLAIN = 2048u; // loop turns before strides: see shared/loop_limit.gl
 
 // Indirect light of a channel whose albedo is not above this stays with the direct light.
 const float MIN_ALBEDO = 1e-6;
-const float MAX_IRRADIANCE = 3e38; // keeps bright light that is divided by a small albedo finite
 // Deviations and sums of their squares are cut here, so that sums over pixels stay finite.
 const float MAX_DEVIATION = 1e17, MAX_M2 = 1e35;
 // Samples up to which means are rounded to single precision. Later ones move a mean by about its last place or less: what
 // rounding takes off is kept (Kahan 1965), or the mean of 2^22 samples would be off by 1e-5 and more. That code takes long to
 // compile, and exists only in renders of so many samples (FX_MANY_SAMPLES).
 const uint MAX_ROUNDED_SAMPLES = 4096u;
-const int BITS = 10, LIGHT_BITS = 5; // bits of a mean's remainder per channel: of all light, of direct and indirect
+const int BITS = 10, LIGHT_BITS = 5; // bits of a mean's remainder per channel: of all light, of direct light and of albedo
 
 // Returns where a pixel's samples lie in the batch: (first, step, number).
 uvec3 samples_of(uint i, uint pixel) {
@@ -69,16 +68,14 @@ float square(float a, float b) {
     return clamp(a, -MAX_DEVIATION, MAX_DEVIATION) * clamp(b, -MAX_DEVIATION, MAX_DEVIATION);
 }
 
-void fold_light(inout PixelLight l, vec3 kept, vec3 irradiance, float share, uint count) {
-    float off = luminance(irradiance) - luminance(l.indirect);
+void fold_light(inout PixelLight l, vec3 kept, vec3 albedo, float share, uint count) {
     if (!FX_MANY_SAMPLES || count <= MAX_ROUNDED_SAMPLES) {
         l.direct += (kept - l.direct) * share;
-        l.indirect += (irradiance - l.indirect) * share;
+        l.albedo += (albedo - l.albedo) * share;
     } else {
         move_mean(l.direct, (kept - l.direct) * share, l.remainder, 0, LIGHT_BITS, count);
-        move_mean(l.indirect, (irradiance - l.indirect) * share, l.remainder, 3 * LIGHT_BITS, LIGHT_BITS, count);
+        move_mean(l.albedo, (albedo - l.albedo) * share, l.remainder, 3 * LIGHT_BITS, LIGHT_BITS, count);
     }
-    l.indirect_m2 = min(l.indirect_m2 + square(off, luminance(irradiance) - luminance(l.indirect)), MAX_M2);
 }
 
 // Adds the sample at `at`. A negative number of rays marks one that was not finite; `first_broken` is the first one's index.
@@ -87,21 +84,22 @@ void fold(inout PixelStats s, inout PixelLight l, inout uint broken_count, inout
     vec3 radiance = first.rgb;
     if (first.w < 0.0 && broken_count++ == 0u) first_broken = next_sample(s.count, 0u); // the host knows what is carried
     s.count++;
-    float share = 1.0 / float(s.count);
+    float share = 1.0 / float(s.count), other = 0.0, off_other = 0.0;
     if (FX_SPLIT) {
         vec3 direct = first.rgb, indirect = texelFetch(samples, 3 * at + 1).rgb;
         vec3 albedo = texelFetch(samples, 3 * at + 2).rgb;
-        bvec3 divides = greaterThan(albedo, vec3(MIN_ALBEDO));
-        vec3 irradiance = mix(vec3(0.0), min(indirect / max(albedo, vec3(MIN_ALBEDO)), vec3(MAX_IRRADIANCE)), divides);
-        vec3 kept = direct + mix(indirect, vec3(0.0), divides);
+        bvec3 kept = lessThanEqual(albedo, vec3(MIN_ALBEDO));
+        other = luminance(mix(indirect, vec3(0.0), kept));
+        off_other = other - luminance(s.mean - l.direct);
         radiance = direct + indirect;
-        fold_light(l, kept, irradiance, share, s.count);
+        fold_light(l, direct + mix(vec3(0.0), indirect, kept), albedo, share, s.count);
     }
     vec3 off = radiance - s.mean;
     if (!FX_MANY_SAMPLES || s.count <= MAX_ROUNDED_SAMPLES) s.mean += off * share;
     else move_mean(s.mean, off * share, s.remainder, 0, BITS, s.count);
     vec3 off_moved = radiance - s.mean;
     [[unroll]] for (int c = 0; c < 3; c++) s.m2[c] = min(s.m2[c] + square(off[c], off_moved[c]), MAX_M2);
+    if (FX_SPLIT) l.indirect_m2 = clamp(l.indirect_m2 + square(off_other, other - luminance(s.mean - l.direct)), 0.0, MAX_M2);
 }
 
 // path.comp has found the lowest pixel with a broken sample; that pixel's thread alone writes which sample it was.

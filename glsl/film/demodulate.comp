@@ -1,6 +1,7 @@
 #include "shared/thread.glsl"
 #include "shared/noisy.glsl"
 #include "shared/albedo.glsl"
+#include "shared/luminance.glsl"
 
 // Takes one pixel per thread of a noisy image apart for a filter: colour = sharp + factor * filtered, where `sharp` is not
 // filtered and `filtered` is light before albedo. Twin: denoise::twin::demodulate.
@@ -27,21 +28,11 @@ struct Parts {
     vec3 sharp;
 };
 
-// The albedo that multiplies indirect light is that of the samples, so that edges and textures keep their antialiasing. Where
-// no sample met indirect light, it is that of the pixel's centre.
-float factor_of_samples(float colour, float direct, float indirect, float albedo) {
-    float of_samples = (colour - direct) / indirect;
-    return finite(of_samples) && indirect > 0.0 ? clamp(of_samples, 0.0, 1.0) : number(albedo);
-}
-
+// The albedo that light is divided by and multiplied with is that of the samples, so that edges and textures keep their
+// antialiasing: a pixel that shows a surface in part has a part of its albedo.
 Parts split_light(int i) {
-    vec3 colour = colour_at(i), albedo = albedo_at(i);
-    PixelLight l = PixelLight_load(light, i);
-    Parts p = Parts(l.indirect, vec3(0.0), number(l.direct));
-    for (int k = 0; k < 3; k++) {
-        p.factor[k] = factor_of_samples(colour[k], l.direct[k], l.indirect[k], albedo[k]);
-    }
-    return p;
+    vec3 factor = max(number(albedo_at(i)), vec3(0.0)), direct = PixelLight_direct(light, i);
+    return Parts(number((colour_at(i) - direct) / factor), factor, number(direct));
 }
 
 // Whether the pixel lies at the rim of something brighter that reflects nothing and shows a part of it: it has less albedo than
@@ -106,12 +97,17 @@ Parts demodulated(int i) {
     return Parts(colour_at(i), vec3(1.0), vec3(0.0));
 }
 
-// Variance of the pixel's mean, per channel. That of indirect light is known for its luminance. In files that lack it, the
-// variance of all light stands for it: without any, `auto` had 1.04 to 4.8 times the error.
-vec3 variance_of_filtered(int i, vec3 factor, float count) {
+// Variance of the pixel's mean, per channel. That of indirect light is known for its luminance: samples of one pixel count as
+// having one colour. In files that lack it, the variance of all light stands for it: without any, `auto` had 1.04 to 4.8 times
+// the error.
+vec3 variance_of_filtered(int i, Parts p, float count) {
+    vec3 factor = p.factor;
     float freedom = count > 1.0 ? count * (count - 1.0) : 0.0;
     if (DEMODULATION == LIGHT && INDIRECT_VARIANCE) {
-        return vec3(freedom > 0.0 ? PixelLight_indirect_m2(light, i) / freedom : 0.0);
+        PixelLight l = PixelLight_load(light, i);
+        float of_mean = freedom > 0.0 ? l.indirect_m2 / freedom : 0.0;
+        vec3 deviation = p.filtered * number(sqrt(of_mean) / abs(luminance(colour_at(i) - l.direct)));
+        return deviation * deviation;
     }
     vec3 m2 = PixelStats_m2(stats, i);
     vec3 of_mean = OF_FILE ? m2 : freedom > 0.0 ? m2 / freedom : vec3(0.0);
@@ -126,7 +122,7 @@ void main() {
     // Pixels whose filtered part is not used get count 0, so that they do not reach others.
     bool known = finite(colour_at(int(i))) && any(greaterThan(p.factor, vec3(0.0)));
     radiance[i] = vec4(p.filtered, known ? count : 0.0);
-    if (MEASURED) variance[i] = variance_of_filtered(int(i), p.factor, count);
+    if (MEASURED) variance[i] = variance_of_filtered(int(i), p, count);
     factor[i] = vec4(p.factor, 0.0);
     sharp[i] = vec4(p.sharp, 0.0);
 }

@@ -46,7 +46,7 @@ void main() {
         if (FX_SPLIT) {
             HistoryLight taken = HistoryLight_load(history_light, from);
             l.direct = taken.direct;
-            l.indirect = taken.indirect;
+            l.albedo = taken.albedo;
             l.indirect_m2 = taken.indirect_m2;
         }
         if (c.count >= push.spp) points[i] = SurfacePoint(h.triangle, h.instance, h.weights);

@@ -72,6 +72,6 @@ void main() {
     if (FX_SPLIT) {
         PixelLight l = PixelLight_load(light, pixel);
         // Not as 64-bit words: seven words are no multiple of those.
-        history_light[i] = HistoryLight(l.direct, l.indirect, part_of_m2(l.indirect_m2, kept, s.count));
+        history_light[i] = HistoryLight(l.direct, l.albedo, part_of_m2(l.indirect_m2, kept, s.count));
     }
 }

@@ -256,24 +256,28 @@ bool bsdf_is_specular(Bsdf b) {
     return is_interface(b) || is_kind(FX_COATED, b, BSDF_COATED) || is_kind(FX_METALLIC, b, BSDF_METALLIC);
 }
 
-// Whether every lobe is a delta: light samples cannot contribute, and no light is left for a filter to blur.
+// Whether every lobe is a delta: light samples cannot contribute, and what is behind the surface is seen in it.
 bool bsdf_is_delta(Bsdf b) {
     return is_kind(FX_METALLIC, b, BSDF_METALLIC) ? metallic_is_delta(b.metallic) : is_interface(b) && is_smooth(b);
 }
 
-// Approximate reflectance, at the cosine `wo_z`, of the lobes whose light counts as indirect; that light is divided by it before
-// it is filtered. Light from smooth interfaces counts as direct, so that mirrors and clear glass have albedo 0, and a smooth
-// coat has that of its base.
+// Whether a surface whose every lobe is a delta lets light take one of two ways.
+bool bsdf_chooses(Bsdf b) {
+    if (is_kind(FX_METALLIC, b, BSDF_METALLIC)) return has_coat(b.metallic) || b.metallic.through != vec3(0.0);
+    return is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC);
+}
+
+// Approximate reflectance at the cosine `wo_z`: light is divided by it before it is filtered. Mirrors and clear glass, which show
+// what is behind them, have none of their own.
 vec3 bsdf_albedo(Bsdf b, float wo_z) {
+    if (bsdf_is_delta(b)) return vec3(0.0);
     bool glass = is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC), metal = is_kind(FX_CONDUCTOR, b, BSDF_CONDUCTOR);
     bool coated = is_kind(FX_COATED, b, BSDF_COATED);
     if (is_kind(FX_METALLIC, b, BSDF_METALLIC)) return metallic_albedo(b.metallic, abs(wo_z));
     if (!(glass || metal || coated)) return b.albedo;
-    vec3 specular = is_smooth(b) ? vec3(0.0) : b.specular;
-    if (metal) return specular * fresnel_conductor(abs(wo_z), b.eta, b.k);
+    if (metal) return b.specular * fresnel_conductor(abs(wo_z), b.eta, b.k);
     float f = fresnel_dielectric(abs(wo_z), glass ? relative_index(b, wo_z) : b.eta.x).x;
-    vec3 beneath = glass ? (is_smooth(b) ? vec3(0.0) : b.transmission) : b.albedo;
-    return mix(beneath, specular, f);
+    return mix(glass ? b.transmission : b.albedo, b.specular, f);
 }
 
 #endif

@@ -1,6 +1,6 @@
 // The first hit of a camera ray, as a Guide. Needs frame.glsl, bsdf.glsl, camera.glsl, traverse.glsl and surface.glsl before it.
 
-// `delta` becomes true for a smooth surface, all of whose light counts as direct.
+// `delta` becomes true for a smooth surface, which shows what is behind it.
 Guide first_hit(Ray ray, uint mask_seed, out bool delta, out Hit hit) {
     hit = traverse(Segment(ray.origin, ray.direction, 3e38, mask_seed), push.constants.root);
     delta = false;
@@ -17,9 +17,4 @@ Guide first_hit(Ray ray, uint mask_seed, out bool delta, out Hit hit) {
     guide.albedo = bsdf_albedo(bsdf, -dot(s.normal, ray.direction));
     guide.material = s.material;
     return guide;
-}
-
-Guide first_hit(Ray ray, uint mask_seed, out bool delta) {
-    Hit hit;
-    return first_hit(ray, mask_seed, delta, hit);
 }

@@ -163,12 +163,11 @@ bool metallic_sample(Metallic b, vec3 wo, float u_lobe, vec2 u, out vec3 wi, out
     return above;
 }
 
-// Approximate reflectance at the cosine `c` of the lobes that are not deltas.
+// Approximate reflectance at the cosine `c`.
 vec3 metallic_albedo(Metallic b, float c) {
     float inner = has_coat(b) ? coat_lets_in(b, c) : 1.0;
-    vec3 albedo = b.diffuse * let_in(b, c);
-    if (!smooth_alpha(b.alpha)) albedo += mix(b.f0, vec3(b.f90), schlick_weight(c)) + b.through * let_in(b, c);
-    return albedo * inner + (smooth_alpha(b.coat_alpha) ? 0.0 : 1.0 - inner);
+    vec3 albedo = (b.diffuse + b.through) * let_in(b, c) + mix(b.f0, vec3(b.f90), schlick_weight(c));
+    return albedo * inner + 1.0 - inner;
 }
 
 // Share of the light head on that the surface reflects, of all that comes back.

@@ -41,11 +41,11 @@ void add_light(inout SplitLight sum, vec3 light, uint kind) {
     sum.soft += soft ? light : vec3(0.0);
 }
 
-// What light is that reaches surface number `bounce` of a path, the first hit being number 1; a smooth first surface shows all
-// light as it is.
-uint kind_of_light(uint bounce, bool smooth_first, bool delta) {
-    if (smooth_first) return DIRECT;
-    return bounce >= 2u ? INDIRECT : delta ? DIRECT : SOFT;
+// What light is that comes to a path by way of `scattered` surfaces that are not smooth. Smooth ones show light as it is, with
+// noise where `chosen`: where the path took one of two ways.
+uint kind_of_light(uint scattered, bool delta, bool chosen) {
+    if (scattered == 0u) return chosen ? SOFT : DIRECT;
+    return scattered >= 2u ? INDIRECT : delta ? DIRECT : SOFT;
 }
 
 // Clamps the largest channel of a whole sample, not of each bounce: the limit is that of the values which a pixel averages.
@@ -128,8 +128,8 @@ SplitLight trace_path(Path path, bool on, Hit hit, Sampler random, uint seed, ou
     albedo = vec3(0.0);
     closest_rays++;
     Surface s;
-    bool smooth_first = false, mirrored = false;
-    uint bounce = 0u;
+    uint bounce = 0u, scattered = 0u;
+    bool chosen = false;
     // A turn of the loop leads from one surface to the next; the last surface samples no light. Light sampled at a surface is
     // added only once its shadow ray is traced, together with the ray to the next surface: see trace_shadow_then_closest.
     bool going = arrive(sum, path, hit, DIRECT, s) && push.constants.max_depth > 1u && on;
@@ -146,9 +146,9 @@ SplitLight trace_path(Path path, bool on, Hit hit, Sampler random, uint seed, ou
         if (FX_COAT_NORMALS) bsdf.metallic.coat_normal = local_coat_normal(s, facing, basis, wo);
         bsdf_view(bsdf, wo);
         bool smooth_here = bsdf_is_delta(bsdf);
-        if (bounce == 0u && going) {
-            albedo = bsdf_albedo(bsdf, wo.z);
-            smooth_first = smooth_here;
+        if (scattered == 0u && !chosen && going) {
+            chosen = smooth_here && bsdf_chooses(bsdf);
+            albedo = min(path.throughput, vec3(1.0)) * (chosen ? vec3(1.0) : bsdf_albedo(bsdf, wo.z)); // roulette may exceed 1
         }
         Segment shadow;
         uint mask_seed = pcg(seed + 2u * bounce);
@@ -156,7 +156,7 @@ SplitLight trace_path(Path path, bool on, Hit hit, Sampler random, uint seed, ou
         vec3 sampled = path.throughput * light_from_nee(s, bsdf, facing, basis, wo, random, pair, mask_seed + 1u, shadow, delta);
         bool shadowed = going && push.constants.light_count > 0u && !smooth_here && max(sampled.r, max(sampled.g, sampled.b)) > 0.0;
         bool alive = scatter(path, s, bsdf, facing, basis, wo, random, pair) && going;
-        if (bounce == 0u && going) mirrored = path.delta;
+        scattered += smooth_here ? 0u : 1u;
         bool roulette = FX_ROULETTE && push.constants.roulette_depth > 0u && bounce + 1u >= push.constants.roulette_depth;
         if (roulette) alive = survives_roulette(path, random, pair) && alive;
         bounce++;
@@ -169,13 +169,11 @@ SplitLight trace_path(Path path, bool on, Hit hit, Sampler random, uint seed, ou
         uvec2 from = uvec2(hit.triangle, hit.instance);
         if (DEALT) hit = deal_shadow_then_closest(shadow, shadowed, ray, alive, push.constants.root, from);
         else hit = trace_shadow_then_closest(shadow, shadowed, ray, alive, push.constants.root, from);
-        add_light(sum, lit && !shadowed ? sampled : vec3(0.0), kind_of_light(bounce, smooth_first, delta));
-        going = alive && arrive(sum, path, hit, kind_of_light(bounce, smooth_first, false), s);
+        add_light(sum, lit && !shadowed ? sampled : vec3(0.0), kind_of_light(scattered, delta, chosen));
+        going = alive && arrive(sum, path, hit, kind_of_light(scattered, false, chosen), s);
         going = going && bounce + 1u < push.constants.max_depth;
     } while (any_lane(going));
     if (FX_CLAMP) sum.indirect = clamped(sum.indirect);
     if (FX_SOFT) sum.indirect += sum.soft;
-    // Light that a smooth coat mirrors needs no filter. It moves only here, so that the sum of both parts keeps its bits.
-    if (mirrored) sum = SplitLight(sum.direct + sum.indirect, vec3(0.0), vec3(0.0));
     return sum;
 }

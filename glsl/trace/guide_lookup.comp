@@ -25,6 +25,7 @@ uint nodes_visited = 0u;
 #include "shared/traverse.glsl"
 #include "shared/surface.glsl"
 #include "shared/first_hit.glsl"
+#include "shared/seen_hit.glsl"
 
 // Departure from the paper, whose quotients are 0 / 0 on one plane: the largest difference counts as at least this, so that
 // rounding decides nothing. The first is between unit normals, the second relative to the depth.
@@ -76,8 +77,12 @@ void main() {
         Sampler random = sampler_start(pixel, index, push.constants.seed);
         vec2 film = film_sample(pixel, random);
         bool delta;
-        Guide eye = first_hit(eye_ray(film, random), pcg(path_seed(pixel, index)), delta);
-        if (eye.object == NONE || delta) continue;
+        uint mask_seed = pcg(path_seed(pixel, index));
+        Ray ray = eye_ray(film, random);
+        Hit hit;
+        Guide eye = first_hit(ray, mask_seed, delta, hit);
+        if (FX_SMOOTH && delta) eye = seen_hit(ray, hit, eye, mask_seed);
+        if (eye.albedo == vec3(0.0)) continue;
         uint chosen = most_similar(eye, film);
         if (chosen != NONE) sum += eye.albedo * known_radiance(texelFetch(filtered, int(chosen))).rgb;
     } while (++k < push.samples);

@@ -4,11 +4,12 @@
 #include "shared/frame.glsl"
 
 // Traces the ray through the centre of one pixel per thread, from the middle of the lens, and writes its hit as a Guide, which
-// filters and sample placement use.
+// sample placement uses, and what it shows as another, which filters use.
 layout(local_size_x_id = 100) in;
 layout(constant_id = 110) const bool POINTS = false; // writes where the surface was hit, too
 layout(scalar, binding = 11) writeonly buffer Guides { Guide guides[]; };
 layout(scalar, binding = 12) writeonly buffer Points { SurfacePoint points[]; };
+layout(scalar, binding = 13) writeonly buffer Seen { Guide seen[]; };
 layout(scalar, push_constant) uniform Push { PathPush push; };
 
 uint nodes_visited = 0u;
@@ -23,6 +24,7 @@ uint nodes_visited = 0u;
 #include "shared/traverse.glsl"
 #include "shared/surface.glsl"
 #include "shared/first_hit.glsl"
+#include "shared/seen_hit.glsl"
 
 void main() {
     uint i = thread_index();
@@ -34,6 +36,11 @@ void main() {
     Ray ray = camera_ray(pinhole, film_from_pixel(centre, push.constants.size), vec2(0.5));
     bool delta;
     Hit hit;
-    guides[i] = first_hit(ray, pcg(pixel), delta, hit);
+    Guide guide = first_hit(ray, pcg(pixel), delta, hit);
+    guides[i] = guide;
+    if (FX_SMOOTH) {
+        if (delta) guide = seen_hit(ray, hit, guide, pcg(pixel));
+        seen[i] = guide;
+    }
     if (POINTS) points[i] = SurfacePoint(hit.triangle, hit.instance, vec2(hit.b1, hit.b2));
 }

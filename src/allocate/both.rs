@@ -84,10 +84,11 @@ fn kinship(a: &Guide, b: &Guide, push: &PriorityPush) -> f32 {
     (sevenths / SEVENTHS).max(MIN_KINSHIP)
 }
 
-/// Squared deviations of indirect light, as the mean over the channels, derived from those of its luminance before albedo.
+/// Squared deviations of indirect light, as the mean over the channels, derived from those of its luminance.
 fn indirect_squares(stats: &PixelStats, light: &PixelLight) -> f32 {
-    let level = luminance(light.indirect);
-    let tint = (Vec3::from(stats.mean) - Vec3::from(light.direct)) / level;
+    let indirect = Vec3::from(stats.mean) - Vec3::from(light.direct);
+    let level = luminance(indirect);
+    let tint = indirect / level;
     let tint = if level > 0.0 { tint.min(Vec3::splat(MAX_TINT)) } else { Vec3::ZERO };
     (light.indirect_m2 * tint.length_squared() / 3.0).min(moments(stats)[0])
 }
@@ -137,12 +138,12 @@ mod tests {
     #[test]
     fn a_filter_removes_the_noise_of_indirect_light_alone() {
         // One pixel: gathered is 1, so that a filter of share 0.5 leaves half of the variance of indirect light. Radiance 3 of
-        // which 1 is direct, irradiance 4, albedo 0.5; of the squared deviations 8, indirect light has 16 * 0.5^2 = 4.
+        // which 1 is direct; of the squared deviations 8, indirect light has 4.
         let push =
             PriorityPush { size: [1, 1], window: 2, luminance_floor: -1.0, limit: 99, ..PriorityPush::default() };
         let of = |indirect_m2: f32, filtered: f32| {
             let light =
-                [PixelLight { direct: [1.0; 3], indirect: [4.0; 3], indirect_m2, remainder: 0, ..Default::default() }];
+                [PixelLight { direct: [1.0; 3], albedo: [0.5; 3], indirect_m2, remainder: 0, ..Default::default() }];
             let (guide, stats) = ([Guide::default()], [pixel(3.0, 2, 8.0)]);
             let push = PriorityPush { filtered, ..push };
             let [noise] = reference(&HostInputs { guide: &guide, stats: &stats, light: &light, priority: &[], push })
@@ -150,8 +151,8 @@ mod tests {
                 .unwrap();
             noise * noise
         };
-        let whole = of(16.0, 0.0);
-        let shares = [0.0, 16.0, 32.0, 99.0].map(|m2: f32| of(m2, 0.5) / whole);
+        let whole = of(4.0, 0.0);
+        let shares = [0.0, 4.0, 8.0, 99.0].map(|m2: f32| of(m2, 0.5) / whole);
         let close = shares.iter().zip([1.0, 0.75, 0.5, 0.5]).all(|(a, b)| (a - b).abs() < 1e-6);
         assert!(close, "{shares:?}");
     }

@@ -41,7 +41,7 @@ impl Demodulated {
             demodulation: demodulation as u32,
             indirect_variance: holds.indirect_variance,
             measured,
-            noisy: noisy::Constants { of_file: holds.of_file },
+            noisy: holds.constants(),
             ..Default::default()
         };
         let plane = |name| Buffer::new(gpu, name, pixels, Location::Device);
@@ -113,7 +113,7 @@ impl Demodulated {
 
 impl Direct {
     fn new(gpu: &Gpu, holds: Holds, pixels: usize) -> Result<Self> {
-        let noisy = noisy::Constants { of_file: holds.of_file };
+        let noisy = holds.constants();
         Ok(Self {
             split: Kernel::new(gpu, &demodulate_direct::Constants { noisy, ..Default::default() })?,
             join: Kernel::new(gpu, &Default::default())?,

@@ -4,7 +4,7 @@
 ///
 /// | | filtered | factor | sharp |
 /// |---|---|---|---|
-/// | `Light` | indirect light before albedo | that albedo | direct light, emission, what smooth surfaces show |
+/// | `Light` | all light but direct light, before albedo | that albedo | direct light: the emission that is seen, and what delta lights bring |
 /// | `Albedo` | colour / albedo, or what a noisy mirror or clear glass shows | albedo, or 1 | lamps, sky |
 /// | `Off` | colour | 1 | nothing |
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,7 +21,7 @@ impl Demodulation {
     /// One line for the user.
     pub fn note(self) -> &'static str {
         match self {
-            Self::Light => "filtered: indirect light before albedo; direct light stays as it is",
+            Self::Light => "filtered: light before albedo; direct light stays as it is",
             Self::Albedo => "filtered: colour / albedo; lamps and sky, and their rims, stay as they are",
             Self::Off => "filtered: the colour, without demodulation",
         }

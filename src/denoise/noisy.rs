@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::gpu::Buffer;
 use crate::layout::{Guide, PixelLight, PixelStats};
 use crate::render::Renderer;
+use crate::shaders::shared::noisy;
 
 /// What the planes of a [`Noisy`] image hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,21 +19,21 @@ pub struct Holds {
     pub variance: bool,
     /// The variance of indirect light is known.
     pub indirect_variance: bool,
-    /// Point, spot or directional lights are, or may be, among what shines.
-    pub delta_lights: bool,
+    /// Direct light holds none of lamps and sky.
+    pub sharp_direct: bool,
 }
 
 impl Holds {
     /// What a renderer leaves.
-    pub fn film(split_light: bool, delta_lights: bool) -> Self {
+    pub fn film(split_light: bool, sharp_direct: bool) -> Self {
         let (albedo, variance) = (true, true);
-        Self { of_file: false, albedo, light: split_light, variance, indirect_variance: split_light, delta_lights }
+        Self { of_file: false, albedo, light: split_light, variance, indirect_variance: split_light, sharp_direct }
     }
 
-    /// What is best kept away from a filter. Lamps and skies leave noise in direct light, which is filtered with all the rest. The
-    /// shadows of delta lights are sharp, and no guide shows them: where there are such lights, direct light stays as it is.
+    /// What is best kept away from a filter: direct light of delta lights, whose shadows are sharp and no guide shows them. Lamps and
+    /// skies leave noise in direct light: where it holds any of theirs, it is filtered with all the rest.
     pub fn usual_demodulation(&self) -> Demodulation {
-        self.demodulation(if self.delta_lights { Demodulation::Light } else { Demodulation::Albedo })
+        self.demodulation(if self.sharp_direct { Demodulation::Light } else { Demodulation::Albedo })
     }
 
     /// What of `wanted` the planes allow.
@@ -42,6 +43,11 @@ impl Holds {
             Demodulation::Light if !self.light => Demodulation::Albedo,
             wanted => wanted,
         }
+    }
+
+    /// For kernels that read the planes.
+    pub(super) fn constants(&self) -> noisy::Constants {
+        noisy::Constants { of_file: self.of_file, apart: self.light }
     }
 
     /// Whether the variance of what is filtered is known.
@@ -81,8 +87,8 @@ impl Noisy {
             size: [settings.width, settings.height],
             stats: tiles[0].stats.clone(),
             light: tiles[0].light.clone(),
-            guide: tiles[0].guide.clone(),
-            holds: Holds::film(outputs.split_light, renderer.delta_lights()),
+            guide: if tiles[0].has_seen() { &tiles[0].seen } else { &tiles[0].guide }.clone(),
+            holds: Holds::film(outputs.split_light, renderer.sharp_direct()),
         })
     }
 

@@ -4,8 +4,10 @@ use super::filter::FilterInput;
 use super::{Demodulation, Holds};
 use crate::image::aov::Aovs;
 use crate::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
+use crate::math::srgb::luminance;
 use crate::shaders::demodulate::{MIRRORED, OUTLIER, WHOLE};
 use crate::shaders::shared::albedo::SMALLEST_ALBEDO;
+use glam::Vec3;
 
 /// A noisy image on the host: see [`super::Noisy`].
 #[derive(Clone, Debug)]
@@ -47,6 +49,12 @@ impl Pixels {
         }
     }
 
+    /// What the samples say of it or, without samples, the ray through the pixel's centre.
+    fn albedo(&self, i: usize) -> &vec3 {
+        let sampled = self.holds.light && self.count(i) > 0.0;
+        if sampled { &self.light[i].albedo } else { &self.guide[i].albedo }
+    }
+
     fn count(&self, i: usize) -> f32 {
         if self.holds.of_file { f32::from_bits(self.stats[i].count) } else { self.stats[i].count as f32 }
     }
@@ -73,7 +81,7 @@ pub fn demodulate(pixels: &Pixels, demodulation: Demodulation, in_paint: bool) -
         [r, g, b, if known { pixels.count(i) } else { 0.0 }]
     };
     let measured = pixels.holds.variance_of_filtered(demodulation);
-    let variance = measured.then(|| all.clone().map(|i| variance(pixels, demodulation, i, &factor[i])).collect());
+    let variance = measured.then(|| all.clone().map(|i| variance(pixels, demodulation, i, &parts[i])).collect());
     let [width, height] = pixels.size;
     let radiance = all.map(radiance).collect();
     let input = FilterInput { width, height, radiance, guide: pixels.guide.clone(), variance };
@@ -84,7 +92,7 @@ pub fn demodulate(pixels: &Pixels, demodulation: Demodulation, in_paint: bool) -
 /// Twin of `demodulate_direct.comp`.
 fn demodulate_direct(pixels: &Pixels) -> Vec<vec4> {
     let pixel = |i: usize| {
-        let (direct, factor) = (pixels.light[i].direct, factor_of_direct(&pixels.guide[i].albedo));
+        let (direct, factor) = (pixels.light[i].direct, factor_of_direct(pixels.albedo(i)));
         let [r, g, b] = std::array::from_fn(|c| direct[c] / factor[c]);
         let lit = pixels.count(i) != 0.0 && direct.iter().all(|v| v.is_finite());
         if lit { [r, g, b, pixels.count(i)] } else { [0.0; 4] }
@@ -124,36 +132,36 @@ struct Part {
 }
 
 fn part(pixels: &Pixels, demodulation: Demodulation, i: usize) -> Part {
-    let (colour, albedo) = (pixels.stats[i].mean, pixels.guide[i].albedo);
+    let (colour, albedo) = (pixels.stats[i].mean, pixels.albedo(i));
     match demodulation {
-        Demodulation::Light => split_light(&colour, &albedo, &pixels.light[i]),
+        Demodulation::Light => split_light(pixels, i),
         Demodulation::Albedo if is_mirror(pixels, i) => Part { filtered: colour, factor: [1.0; 3], sharp: [0.0; 3] },
-        Demodulation::Albedo if !reflects(&albedo) || is_rim(pixels, i) => {
+        Demodulation::Albedo if !reflects(albedo) || is_rim(pixels, i) => {
             Part { filtered: [0.0; 3], factor: [0.0; 3], sharp: colour.map(number) }
         }
         Demodulation::Albedo => {
-            let factor = divisor(&albedo);
+            let factor = divisor(albedo);
             Part { filtered: std::array::from_fn(|c| colour[c] / factor[c]), factor, sharp: [0.0; 3] }
         }
         Demodulation::Off => Part { filtered: colour, factor: [1.0; 3], sharp: [0.0; 3] },
     }
 }
 
-fn split_light(colour: &vec3, albedo: &vec3, light: &PixelLight) -> Part {
-    let factor = |c: usize| {
-        let of_samples = (colour[c] - light.direct[c]) / light.indirect[c];
-        let known = of_samples.is_finite() && light.indirect[c] > 0.0;
-        if known { of_samples.clamp(0.0, 1.0) } else { number(albedo[c]) }
-    };
-    Part { filtered: light.indirect, factor: std::array::from_fn(factor), sharp: light.direct.map(number) }
+fn split_light(pixels: &Pixels, i: usize) -> Part {
+    let (direct, colour) = (pixels.light[i].direct, pixels.stats[i].mean);
+    let factor = pixels.albedo(i).map(|a| number(a).max(0.0));
+    let filtered = |c: usize| number((colour[c] - direct[c]) / factor[c]);
+    Part { filtered: std::array::from_fn(filtered), factor, sharp: direct.map(number) }
 }
 
 /// Of the mean of what is filtered.
-fn variance(pixels: &Pixels, demodulation: Demodulation, i: usize, factor: &vec3) -> vec3 {
+fn variance(pixels: &Pixels, demodulation: Demodulation, i: usize, Part { filtered, factor, .. }: &Part) -> vec3 {
     let (n, PixelStats { m2, .. }) = (pixels.count(i), pixels.stats[i]);
     let of_mean = |m2: f32| if n > 1.0 { m2 / (n * (n - 1.0)) } else { 0.0 };
     if demodulation == Demodulation::Light && pixels.holds.indirect_variance {
-        return [of_mean(pixels.light[i].indirect_m2); 3];
+        let other = Vec3::from(pixels.stats[i].mean) - Vec3::from(pixels.light[i].direct);
+        let relative = number(of_mean(pixels.light[i].indirect_m2).sqrt() / luminance(other).abs());
+        return filtered.map(|light| (light * relative).powi(2));
     }
     let all = if pixels.holds.of_file { m2 } else { m2.map(of_mean) };
     std::array::from_fn(|c| if factor[c] > 0.0 { all[c] / (factor[c] * factor[c]) } else { 0.0 })
@@ -186,7 +194,7 @@ fn largest(v: &vec3) -> f32 {
 fn is_rim(pixels: &Pixels, i: usize) -> bool {
     let neighbours = || neighbours(pixels.size, i);
     let light = |q: usize| largest(&pixels.stats[q].mean);
-    let albedo = |q: usize| &pixels.guide[q].albedo;
+    let albedo = |q: usize| pixels.albedo(q);
     if !neighbours().any(|q| !reflects(albedo(q)) && light(q) > light(i)) {
         return false;
     }
@@ -199,7 +207,7 @@ fn is_rim(pixels: &Pixels, i: usize) -> bool {
 /// Noisy or black without albedo, as most pixels around it are.
 fn is_mirror(pixels: &Pixels, i: usize) -> bool {
     let around = || neighbours(pixels.size, i).chain([i]);
-    let smooth = |q: usize| !reflects(&pixels.guide[q].albedo) && pixels.guide[q].depth > 0.0;
+    let smooth = |q: usize| !reflects(pixels.albedo(q)) && pixels.guide[q].depth > 0.0;
     let noisy = |q: usize| smooth(q) && largest(&pixels.stats[q].m2) > 0.0;
     let alike = |q: usize| noisy(q) || smooth(q) && largest(&pixels.stats[q].mean) == 0.0;
     let count = around().filter(|&q| alike(q)).count() as f32;

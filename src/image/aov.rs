@@ -45,7 +45,7 @@ const KNOWN: &[Known] = &[
         label: "normal",
         names: &["denoising normal", "ns", "n", "sh_normal", "normal", "normals", "nn", "geo_normal", "ng"],
     },
-    Known { aov: Aov::Position, label: "position", names: &["p", "position", "pos"] },
+    Known { aov: Aov::Position, label: "position", names: &["denoising position", "p", "position", "pos"] },
     Known { aov: Aov::Depth, label: "depth", names: &["denoising depth", "z", "depth", "dd.y", "dd"] },
     Known { aov: Aov::Variance, label: "variance", names: &["variance"] },
     Known { aov: Aov::Samples, label: "samples", names: &["samples", "debug sample count", "sample count"] },

@@ -36,14 +36,13 @@ gpu_structs! {
 
     /// Running means of one pixel that the filters read; the count is that of its [`PixelStats`]. 2 texels.
     struct PixelLight {
-        /// Radiance that needs no filter: emission, direct light (with FX_SOFT that of delta lights alone), and all light from a
-        /// smooth interface at the first hit.
+        /// Radiance that needs no filter: emission that is seen, and direct light (with FX_SOFT that of delta lights alone).
         direct: vec3,
-        /// Sum of squared deviations of the luminance of `indirect`, as [`PixelStats::m2`].
+        /// Sum of squared deviations of the luminance of all other light, as [`PixelStats::m2`].
         indirect_m2: float,
-        /// Incident indirect irradiance over pi at the first hit: indirect radiance before its albedo; with FX_SOFT also what lamps
-        /// and sky bring.
-        indirect: vec3,
+        /// Reflectance that all other light has been multiplied by: that of the first hit or, seen in mirrors, of the first that is
+        /// none, times theirs. Clear glass counts as 1, and samples that show emission alone as 0.
+        albedo: vec3,
         /// As [`PixelStats::remainder`]: six numbers of 5 bits, in units of 2^-5; those of `direct` are the lowest.
         remainder: uint,
     }

@@ -33,8 +33,8 @@ gpu_structs! {
     struct HistoryLight {
         /// As [`PixelLight::direct`].
         direct: vec3,
-        /// As [`PixelLight::indirect`].
-        indirect: vec3,
+        /// As [`PixelLight::albedo`].
+        albedo: vec3,
         /// As [`PixelLight::indirect_m2`], of the samples that are handed on.
         indirect_m2: float,
     }

@@ -149,6 +149,8 @@ pub struct FilmTile {
     pub light: Buffer<PixelLight>,
     /// Per pixel, where guides are wanted.
     pub guide: Buffer<Guide>,
+    /// Per pixel, where guides are wanted and the scene has smooth surfaces: what they show, and all others themselves.
+    pub seen: Buffer<Guide>,
     /// Per pixel, where a history is kept: the points that its samples are of.
     pub points: Buffer<SurfacePoint>,
 }
@@ -163,6 +165,11 @@ impl FilmTile {
     /// Whether it holds primary hits.
     pub fn has_guide(&self) -> bool {
         self.guide.len() == self.pixels as usize
+    }
+
+    /// Whether it holds what is seen in smooth surfaces.
+    pub fn has_seen(&self) -> bool {
+        self.seen.len() == self.pixels as usize
     }
 
     /// Whether it holds the points of primary hits.
@@ -180,6 +187,7 @@ impl FilmTile {
             stats: Buffer::new(gpu, "stats", pixels as usize, Location::Device)?,
             light: Buffer::new(gpu, "light", room(effects.split_light), Location::Device)?,
             guide: Buffer::new(gpu, "guide", room(guides), Location::Device)?,
+            seen: Buffer::new(gpu, "seen", room(guides && effects.smooth_interface), Location::Device)?,
             points: Buffer::new(gpu, "points", 1, Location::Device)?, // Renderer::keep_history makes room
         })
     }
@@ -229,7 +237,7 @@ impl FilmBuffers {
     /// What a pixel takes where all outputs are wanted, samples in flight not counted.
     pub fn bytes_per_pixel(placed: bool) -> u64 {
         const PLACED: usize = Counts::BYTES_PER_PIXEL + size_of::<f32>(); // and a policy's own
-        let records = size_of::<PixelStats>() + size_of::<PixelLight>() + size_of::<Guide>();
+        let records = size_of::<PixelStats>() + size_of::<PixelLight>() + 2 * size_of::<Guide>();
         (records + if placed { PLACED } else { 0 }) as u64
     }
 

@@ -16,10 +16,10 @@ pub(crate) const PRIORITY: &str = "priority";
 /// Samples that a pixel still lacks of what it was to have: only in files of renders that were interrupted.
 pub(crate) const PENDING: &str = "pending";
 
-/// Metadata: whether point, spot or directional lights shine in the scene, whose shadows are sharp. Filters ask for it.
-pub(crate) const DELTA_LIGHTS: &str = "deltaLights";
+/// Metadata: whether the layer of direct light holds none of lamps and sky, which is noisy. Filters ask for it.
+pub(crate) const SHARP_DIRECT: &str = "sharpDirect";
 
-/// Sum of squared deviations of the luminance of indirect light before albedo.
+/// Sum of squared deviations of the luminance of indirect light times albedo.
 pub(crate) const INDIRECT_M2: &str = "indirect.m2";
 
 /// What rounding took off the means of pixels with thousands of samples: only in files that have such pixels.
@@ -29,7 +29,7 @@ const REMAINDERS: [&str; 2] = ["remainder", "light.remainder"];
 const BROKEN: &str = "brokenSamples";
 
 /// Of a film with everything.
-const CHANNELS: usize = 30;
+const CHANNELS: usize = 37;
 
 /// What a pixel takes in a film with everything.
 pub(crate) fn bytes_per_pixel(placed: bool) -> u64 {
@@ -58,10 +58,17 @@ pub fn read_back(renderer: &Renderer) -> Result<Film> {
         for range in tile.windows() {
             let window = range.start as usize..range.end as usize;
             let mut part = Film::new(window.len() as u32, 1);
-            let light = if outputs.split_light { tile.light.read_range(window.clone())? } else { Vec::new() };
-            add_pixels(&mut part, &tile.stats.read_range(window.clone())?, &light);
+            let stats = tile.stats.read_range(window.clone())?;
+            let guide = if outputs.guides { tile.guide.read_range(window.clone())? } else { Vec::new() };
+            let mut light = if outputs.split_light { tile.light.read_range(window.clone())? } else { Vec::new() };
+            let unsampled = stats.iter().zip(&guide).zip(&mut light).filter(|((stats, _), _)| stats.count == 0);
+            unsampled.for_each(|((_, guide), light)| light.albedo = guide.albedo);
+            add_pixels(&mut part, &stats, &light);
             if outputs.guides {
-                add_guide(&mut part, &tile.guide.read_range(window)?);
+                add_guide(&mut part, &guide);
+            }
+            if tile.has_seen() {
+                add_seen(&mut part, &tile.seen.read_range(window)?);
             }
             film.append(part);
         }
@@ -81,8 +88,10 @@ fn add_pixels(film: &mut Film, stats: &[PixelStats], light: &[PixelLight]) {
     film.add_vec3("m2", RGB, &vec3s(|s| s.m2));
     film.add("samples", Samples::U32(stats.iter().map(|s| s.count).collect()));
     if !light.is_empty() {
+        let indirect = stats.iter().zip(light).map(|(&stats, &light)| Pixel { stats, light }.indirect());
         film.add_vec3("direct", RGB, &light.iter().map(|l| l.direct).collect::<Vec<_>>());
-        film.add_vec3("indirect", RGB, &light.iter().map(|l| l.indirect).collect::<Vec<_>>());
+        film.add_vec3("indirect", RGB, &indirect.collect::<Vec<_>>());
+        film.add_vec3("albedo", RGB, &light.iter().map(|l| l.albedo).collect::<Vec<_>>());
         film.add(INDIRECT_M2, Samples::F32(light.iter().map(|l| l.indirect_m2).collect()));
     }
     let remainders = [stats.iter().map(|s| s.remainder).collect(), light.iter().map(|l| l.remainder).collect()];
@@ -126,10 +135,11 @@ pub(crate) fn pixels(film: &Film) -> std::result::Result<Vec<Pixel>, String> {
             remainder: word(&remainder, i),
             ..Default::default()
         },
-        light: light.map_or_else(PixelLight::default, |(direct, indirect, indirect_m2)| PixelLight {
+        // Without a sample, the layer holds the albedo at the pixel's centre.
+        light: light.filter(|_| count[i] > 0).map_or_else(PixelLight::default, |(direct, albedo, indirect_m2)| PixelLight {
             direct: at(direct, i),
             indirect_m2: indirect_m2[i],
-            indirect: at(indirect, i),
+            albedo: at(albedo, i),
             remainder: word(&light_remainder, i),
             ..Default::default()
         }),
@@ -164,7 +174,7 @@ fn rgb<'a>(film: &'a Film, layer: &str) -> std::result::Result<[&'a [f32]; 3], S
     Ok([plane("R")?, plane("G")?, plane("B")?])
 }
 
-/// Direct light, indirect light and its M2, where they are kept apart.
+/// Direct light, the albedo of all other light and its M2, where they are kept apart.
 type Light<'a> = ([&'a [f32]; 3], [&'a [f32]; 3], &'a [f32]);
 
 fn light(film: &Film) -> std::result::Result<Option<Light<'_>>, String> {
@@ -177,7 +187,7 @@ fn light(film: &Film) -> std::result::Result<Option<Light<'_>>, String> {
              to add samples render it anew"
         ));
     };
-    Ok(Some((rgb(film, "direct")?, rgb(film, "indirect")?, m2)))
+    Ok(Some((rgb(film, "direct")?, rgb(film, "albedo")?, m2)))
 }
 
 /// What the file says of samples that were no number.
@@ -202,7 +212,12 @@ pub(crate) fn set_broken_samples(film: &mut Film, broken: Option<BrokenSamples>)
 pub(crate) fn replace_pixels(film: &mut Film, pixels: &[Pixel]) {
     let split = film.channel("direct.R").is_some();
     let mut fresh = Film::new(film.width, film.height);
-    let light: Vec<_> = pixels.iter().filter(|_| split).map(|p| p.light).collect();
+    let unsampled = |i: usize| rgb(film, "albedo").map_or([0.0; 3], |albedo| albedo.map(|plane| plane[i]));
+    let light = |(i, p): (usize, &Pixel)| match p.stats.count {
+        0 => PixelLight { albedo: unsampled(i), ..p.light },
+        _ => p.light,
+    };
+    let light: Vec<_> = pixels.iter().enumerate().filter(|_| split).map(light).collect();
     add_pixels(&mut fresh, &pixels.iter().map(|p| p.stats).collect::<Vec<_>>(), &light);
     film.channels.retain(|c| fresh.channel(&c.name).is_none() && !c.name.starts_with(NOISY));
     drop_remainders_of_none(&mut fresh);
@@ -231,11 +246,21 @@ pub(crate) fn counts(film: &Film, name: &str) -> std::result::Result<Vec<u32>, S
 }
 
 fn add_guide(film: &mut Film, guide: &[Guide]) {
-    film.add_vec3("albedo", RGB, &guide.iter().map(|g| g.albedo).collect::<Vec<_>>());
+    // What the samples say of it is better.
+    if film.channel("albedo.R").is_none() {
+        film.add_vec3("albedo", RGB, &guide.iter().map(|g| g.albedo).collect::<Vec<_>>());
+    }
     film.add_vec3("N", XYZ, &guide.iter().map(|g| g.normal).collect::<Vec<_>>());
     film.add_vec3("P", XYZ, &guide.iter().map(|g| g.position).collect::<Vec<_>>());
     film.add("Z", Samples::F32(guide.iter().map(|g| g.depth).collect()));
     film.add("id", Samples::U32(guide.iter().map(|g| g.object).collect()));
+}
+
+/// What is seen in smooth surfaces, by the names of Blender's layers for filters.
+fn add_seen(film: &mut Film, seen: &[Guide]) {
+    film.add_vec3("denoising normal", XYZ, &seen.iter().map(|g| g.normal).collect::<Vec<_>>());
+    film.add_vec3("denoising position", XYZ, &seen.iter().map(|g| g.position).collect::<Vec<_>>());
+    film.add("denoising depth", Samples::F32(seen.iter().map(|g| g.depth).collect()));
 }
 
 #[cfg(test)]
@@ -244,12 +269,12 @@ mod tests {
 
     #[test]
     fn a_film_takes_its_records_and_its_channels() {
-        // 32 bytes of statistics, 32 of light, 48 of guide; 30 channels. Placed: 24 more, and 2 channels.
+        // 32 bytes of statistics, 32 of light, 48 of guide and of what is seen; 37 channels. Placed: 24 more, and 2 channels.
         let mut settings = Settings { width: 3, height: 2, ..Settings::default() };
-        assert_eq!(host_bytes(&settings, true), 6 * (112 + 4 * 30));
+        assert_eq!(host_bytes(&settings, true), 6 * (160 + 4 * 37));
         settings.allocate.policy = &crate::allocate::both::ROW;
-        assert_eq!(host_bytes(&settings, false), 6 * 4 * 32);
-        assert_eq!(host_bytes(&settings, true), 6 * (112 + 24 + 4 * 32));
+        assert_eq!(host_bytes(&settings, false), 6 * 4 * 39);
+        assert_eq!(host_bytes(&settings, true), 6 * (160 + 24 + 4 * 39));
     }
 
     #[test]
@@ -266,6 +291,7 @@ mod tests {
         let mut film = Film::new(1, 1);
         add_pixels(&mut film, &[PixelStats::default()], &[PixelLight::default()]);
         add_guide(&mut film, &[Guide::default()]);
+        add_seen(&mut film, &[Guide::default()]);
         assert_eq!(film.channels.len(), CHANNELS);
     }
 }

@@ -94,7 +94,7 @@ fn broken(pixel: &Pixel) -> Option<(&'static str, f32)> {
         ("R, G, B", stats.mean),
         ("m2", stats.m2),
         ("direct", light.direct),
-        ("indirect", light.indirect),
+        ("albedo", light.albedo),
         (film::INDIRECT_M2, [light.indirect_m2; 3]),
     ];
     layers.into_iter().find_map(|(name, values)| {

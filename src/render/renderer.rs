@@ -35,7 +35,7 @@ pub struct Renderer {
     pub(super) settings: Settings,
     pub(super) stack: u32,
     paths: u32,
-    pub(super) delta_lights: bool,
+    pub(super) soft_lights: bool,
     pub(super) fingerprint: Option<Fingerprint>,
 }
 
@@ -108,18 +108,18 @@ impl Renderer {
             )));
         }
         let (constants, priority_push) = (frame_constants(scene, settings)?, priority_push(scene, settings));
-        let (delta_lights, stack) = (scene.has_delta_lights(), scene.stack);
+        let (soft_lights, stack) = (scene.has_soft_lights(), scene.stack);
         let fingerprint = Some(scene.fingerprint([settings.width, settings.height])?);
         let scene = DeviceScene::new(gpu, scene, &effects)?;
         let (settings, first_sample) = (settings.clone(), settings.first_sample);
         let history = None;
         let frame = Frame { scene, film, kernels, allocation, history, constants, first_sample, priority_push };
-        Ok(Self { gpu: gpu.clone(), frame, effects, outputs, settings, paths, stack, delta_lights, fingerprint })
+        Ok(Self { gpu: gpu.clone(), frame, effects, outputs, settings, paths, stack, soft_lights, fingerprint })
     }
 
-    /// [`Scene::has_delta_lights`] of its scene.
-    pub fn delta_lights(&self) -> bool {
-        self.delta_lights
+    /// Whether direct light, where it is kept apart, holds none of lamps and sky: their shadows are soft and noisy.
+    pub fn sharp_direct(&self) -> bool {
+        self.effects.soft_light || !self.soft_lights
     }
 
     /// The work of a whole render, in the order that it must be recorded in. The result does not depend on how the work

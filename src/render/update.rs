@@ -42,7 +42,7 @@ impl Renderer {
         upload(&self.gpu, rec, &mut self.frame.scene, scene, change)?;
         self.frame.constants = constants;
         self.frame.priority_push = priority_push(scene, &self.settings);
-        self.delta_lights = scene.has_delta_lights();
+        self.soft_lights = scene.has_soft_lights();
         let size = [self.settings.width, self.settings.height];
         if change.camera || self.fingerprint.is_some() {
             self.fingerprint = Some(scene.fingerprint(size)?);

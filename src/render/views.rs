@@ -32,11 +32,9 @@ pub enum Layer {
     M2,
     /// Samples behind the mean.
     Samples,
-    /// Radiance that needs no filter: emission, direct light, and what a smooth first hit shows.
+    /// Radiance that needs no filter: see [`PixelLight::direct`].
     Direct,
-    /// Incident indirect irradiance over pi at the first hit: what its albedo multiplies.
-    Indirect,
-    /// Reflectance of the primary hit.
+    /// Reflectance that all other light has been multiplied by; where light is not kept apart, that of the primary hit.
     Albedo,
     /// Its shading normal in world space.
     Normal,
@@ -56,8 +54,9 @@ impl Renderer {
     pub fn views(&self, layer: Layer) -> Result<Vec<OutputView>> {
         let kept = match layer {
             Layer::Radiance | Layer::M2 | Layer::Samples => true,
-            Layer::Direct | Layer::Indirect => self.outputs.split_light,
-            Layer::Albedo | Layer::Normal | Layer::Position | Layer::Depth | Layer::Object => self.outputs.guides,
+            Layer::Direct => self.outputs.split_light,
+            Layer::Albedo => self.outputs.split_light || self.outputs.guides,
+            Layer::Normal | Layer::Position | Layer::Depth | Layer::Object => self.outputs.guides,
         };
         if !kept {
             return Err(Error::Usage(format!("the renderer keeps no {layer:?}: make it with the Outputs that do")));
@@ -69,12 +68,13 @@ impl Renderer {
 fn view(tile: &FilmTile, layer: Layer) -> OutputView {
     use PixelFormat::{R32G32B32Sfloat, R32Sfloat, R32Uint};
     let (stats, light, guide) = (&tile.stats, &tile.light, &tile.guide);
+    let apart = light.len() == stats.len();
     match layer {
         Layer::Radiance => within(tile, stats, offset_of!(PixelStats, mean), R32G32B32Sfloat),
         Layer::M2 => within(tile, stats, offset_of!(PixelStats, m2), R32G32B32Sfloat),
         Layer::Samples => within(tile, stats, offset_of!(PixelStats, count), R32Uint),
         Layer::Direct => within(tile, light, offset_of!(PixelLight, direct), R32G32B32Sfloat),
-        Layer::Indirect => within(tile, light, offset_of!(PixelLight, indirect), R32G32B32Sfloat),
+        Layer::Albedo if apart => within(tile, light, offset_of!(PixelLight, albedo), R32G32B32Sfloat),
         Layer::Albedo => within(tile, guide, offset_of!(Guide, albedo), R32G32B32Sfloat),
         Layer::Normal => within(tile, guide, offset_of!(Guide, normal), R32G32B32Sfloat),
         Layer::Position => within(tile, guide, offset_of!(Guide, position), R32G32B32Sfloat),

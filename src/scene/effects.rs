@@ -189,13 +189,9 @@ fn setting_effects(s: &Settings, found: &mut Effects, reasons: &mut Reasons) {
 }
 
 /// Whether what lamps and sky bring to the first hit is kept with indirect light. Shadows of delta lights are sharp and free of
-/// noise, those of lamps and sky are neither: where both shine, they are told apart.
+/// noise, those of lamps and sky are neither.
 pub fn keeps_soft_light_apart(scene: &Scene, settings: &Settings) -> bool {
-    match settings.split {
-        Split::Auto => scene.has_delta_lights() && scene.has_soft_lights(),
-        Split::Soft => true,
-        Split::Indirect => false,
-    }
+    settings.split == Split::Soft && scene.has_soft_lights()
 }
 
 fn output_effects(split_light: bool, counters: bool, found: &mut Effects, reasons: &mut Reasons) {

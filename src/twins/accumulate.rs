@@ -3,7 +3,7 @@ use crate::layout::{BrokenTally, FoldPush, PixelLight, PixelStats, vec3, vec4};
 use crate::math::hash::pcg;
 use crate::math::srgb::luminance;
 use crate::shaders;
-use crate::shaders::accumulate::{MAX_DEVIATION, MAX_IRRADIANCE, MAX_M2, MAX_ROUNDED_SAMPLES, MIN_ALBEDO};
+use crate::shaders::accumulate::{MAX_DEVIATION, MAX_M2, MAX_ROUNDED_SAMPLES, MIN_ALBEDO};
 use crate::statistics::next_sample;
 use glam::{Vec3, Vec4};
 
@@ -11,12 +11,19 @@ use glam::{Vec3, Vec4};
 const BITS: u32 = shaders::accumulate::BITS as u32;
 const LIGHT_BITS: u32 = shaders::accumulate::LIGHT_BITS as u32;
 
-/// The light of a sample that needs no filter, and its indirect irradiance over pi.
-fn split(direct: Vec3, indirect: Vec3, albedo: Vec3) -> (Vec3, Vec3) {
-    let divides = albedo.cmpgt(Vec3::splat(MIN_ALBEDO));
-    let before = (indirect / albedo.max(Vec3::splat(MIN_ALBEDO))).min(Vec3::splat(MAX_IRRADIANCE));
-    let irradiance = Vec3::select(divides, before, Vec3::ZERO);
-    (direct + Vec3::select(divides, Vec3::ZERO, indirect), irradiance)
+/// What a sample brings besides its radiance.
+struct Split {
+    /// Light that needs no filter.
+    kept: Vec3,
+    /// All other light.
+    other: Vec3,
+    albedo: Vec3,
+}
+
+fn split(direct: Vec3, indirect: Vec3, albedo: Vec3) -> Split {
+    let keeps = albedo.cmple(Vec3::splat(MIN_ALBEDO));
+    let kept = direct + Vec3::select(keeps, indirect, Vec3::ZERO);
+    Split { kept, other: Vec3::select(keeps, Vec3::ZERO, indirect), albedo }
 }
 
 /// Adds a batch to the statistics of all pixels. `samples`: sample k of pixel i at `k * push.pixels + i`, one vec4, or
@@ -40,8 +47,12 @@ pub fn fold(
             }
             if split_light {
                 let [direct, indirect, albedo] = [0, 1, 2].map(|j| Vec4::from(samples[record + j]).truncate());
+                let (split, before) = (split(direct, indirect, albedo), other(&stats[pixel], &light[pixel]));
                 fold_radiance(&mut stats[pixel], direct + indirect);
-                fold_light(&mut light[pixel], split(direct, indirect, albedo), stats[pixel].count);
+                fold_light(&mut light[pixel], &split, stats[pixel].count);
+                let (added, l) = (luminance(split.other), &mut light[pixel]);
+                let squares = square(added - before, added - other(&stats[pixel], l));
+                l.indirect_m2 = (l.indirect_m2 + squares).clamp(0.0, MAX_M2);
             } else {
                 fold_radiance(&mut stats[pixel], Vec4::from(samples[record]).truncate());
             }
@@ -113,21 +124,24 @@ fn fold_radiance(s: &mut PixelStats, radiance: Vec3) {
     s.m2 = std::array::from_fn(|c| (s.m2[c] + square(off[c], moved[c])).min(MAX_M2));
 }
 
-fn fold_light(l: &mut PixelLight, (kept, irradiance): (Vec3, Vec3), count: u32) {
+/// Luminance of the mean of all light that is not kept.
+fn other(s: &PixelStats, l: &PixelLight) -> f32 {
+    luminance(Vec3::from(s.mean) - Vec3::from(l.direct))
+}
+
+fn fold_light(l: &mut PixelLight, s: &Split, count: u32) {
     let share = 1.0 / count as f32;
-    let (direct, indirect) = (Vec3::from(l.direct), Vec3::from(l.indirect));
-    let [by, indirect_by] = [(kept - direct) * share, (irradiance - indirect) * share];
-    let [direct, moved] = match count <= MAX_ROUNDED_SAMPLES {
-        true => [direct + by, indirect + indirect_by],
+    let (direct, albedo) = (Vec3::from(l.direct), Vec3::from(l.albedo));
+    let [by, albedo_by] = [(s.kept - direct) * share, (s.albedo - albedo) * share];
+    let [direct, albedo] = match count <= MAX_ROUNDED_SAMPLES {
+        true => [direct + by, albedo + albedo_by],
         false => {
             let word = &mut l.remainder;
             let direct = move_mean(l.direct, by, Kept { word, count }, 0, LIGHT_BITS);
-            [direct, move_mean(l.indirect, indirect_by, Kept { word, count }, 3 * LIGHT_BITS, LIGHT_BITS)]
+            [direct, move_mean(l.albedo, albedo_by, Kept { word, count }, 3 * LIGHT_BITS, LIGHT_BITS)]
         }
     };
-    let off = |mean: Vec3| luminance(irradiance) - luminance(mean);
-    l.indirect_m2 = (l.indirect_m2 + square(off(indirect), off(moved))).min(MAX_M2);
-    (l.direct, l.indirect) = (direct.into(), moved.into());
+    (l.direct, l.albedo) = (direct.into(), albedo.into());
 }
 
 #[cfg(test)]
@@ -146,7 +160,19 @@ mod tests {
 
     #[test]
     fn light_without_albedo_stays_direct() {
-        let (kept, irradiance) = split(Vec3::ONE, Vec3::splat(2.0), glam::vec3(0.5, 0.0, 1.0));
-        assert_eq!((kept, irradiance), (glam::vec3(1.0, 3.0, 1.0), glam::vec3(4.0, 0.0, 2.0)));
+        let s = split(Vec3::ONE, Vec3::splat(2.0), glam::vec3(0.5, 0.0, 1.0));
+        assert_eq!((s.kept, s.other), (glam::vec3(1.0, 3.0, 1.0), glam::vec3(2.0, 0.0, 2.0)));
+    }
+
+    #[test]
+    fn squares_are_those_of_the_light_that_is_not_kept() {
+        // Direct light 8 and 0; 1, 3 besides: mean 2, squared deviations 1 + 1. Albedo .25 and .75.
+        let sample = |direct: f32, other: f32, albedo: f32| [[direct; 4], [other; 4], [albedo; 4]];
+        let samples = [sample(8.0, 1.0, 0.25), sample(0.0, 3.0, 0.75)].concat();
+        let (mut stats, mut light) = ([PixelStats::default()], [PixelLight::default()]);
+        fold(&FoldPush { pixels: 1, samples: 2, ..FoldPush::default() }, true, &samples, &mut stats, &mut light);
+        let PixelLight { direct, indirect_m2, albedo, .. } = light[0];
+        assert_eq!((stats[0].mean, direct, albedo), ([6.0; 3], [4.0; 3], [0.5; 3]));
+        assert!((indirect_m2 - 2.0).abs() < 1e-5, "{indirect_m2}");
     }
 }

@@ -324,15 +324,22 @@ pub fn bsdf_is_delta(b: &Bsdf) -> bool {
     }
 }
 
-/// Reflectance, roughly, of the lobes whose light counts as indirect, seen at the cosine `wo_z`: what that light is divided by
-/// before it is filtered.
+/// Whether a surface whose every lobe is a delta lets light take one of two ways.
+pub fn bsdf_chooses(b: &Bsdf) -> bool {
+    match b.kind {
+        BSDF_METALLIC => b.metallic.chooses(),
+        _ => b.kind == BSDF_DIELECTRIC,
+    }
+}
+
+/// Reflectance, roughly, seen at the cosine `wo_z`: what light is divided by before it is filtered. Mirrors and clear glass have
+/// none of their own.
 pub fn bsdf_albedo(b: &Bsdf, wo_z: f32) -> Vec3 {
     let cosine = wo_z.abs();
-    let specular = if is_smooth(b) { Vec3::ZERO } else { b.specular };
-    let layered = |eta: f32, beneath: Vec3| beneath.lerp(specular, fresnel_dielectric(cosine, eta).x);
+    let layered = |eta: f32, beneath: Vec3| beneath.lerp(b.specular, fresnel_dielectric(cosine, eta).x);
     match b.kind {
-        BSDF_CONDUCTOR => specular * fresnel_conductor(cosine, b.eta, b.k),
-        BSDF_DIELECTRIC if is_smooth(b) => Vec3::ZERO,
+        _ if bsdf_is_delta(b) => Vec3::ZERO,
+        BSDF_CONDUCTOR => b.specular * fresnel_conductor(cosine, b.eta, b.k),
         BSDF_DIELECTRIC => layered(relative_index(b, wo_z), b.transmission),
         BSDF_COATED => layered(b.eta.x, b.albedo),
         BSDF_METALLIC => b.metallic.albedo(cosine),
@@ -383,7 +390,7 @@ mod tests {
     }
 
     #[test]
-    fn albedo_is_that_of_the_lobes_whose_light_is_indirect() {
+    fn albedo_is_that_of_all_lobes_and_none_of_mirrors_and_clear_glass() {
         let base = Bsdf { albedo: Vec3::splat(0.5), specular: Vec3::splat(0.8), ..GLASS };
         let of = |kind, alpha, cosine| {
             let mut b = base;
@@ -399,7 +406,7 @@ mod tests {
         let close = |a: f32, b: f32| assert!((a - b).abs() < 1e-5, "{a} {b}");
         close(of(BSDF_COATED, 0.2, 1.0), 0.512);
         close(of(BSDF_COATED, 0.2, 0.3), 0.5 * (1.0 - f) + 0.8 * f);
-        close(of(BSDF_COATED, 0.0, 0.3), 0.5 * (1.0 - f));
+        close(of(BSDF_COATED, 0.0, 0.3), 0.5 * (1.0 - f) + 0.8 * f);
         close(of(BSDF_DIELECTRIC, 0.2, 1.0), 0.96 + 0.8 * 0.04);
         close(of(BSDF_CONDUCTOR, 0.2, 1.0), 0.8 * (0.25 + 16.0) / (6.25 + 16.0));
     }

@@ -1,11 +1,11 @@
 //! Twin of `glsl/trace/guide_lookup.comp`.
-use crate::layout::{Guide, NONE, vec3, vec4};
+use crate::layout::{Guide, vec3, vec4};
 use crate::math::hash::pcg;
 use crate::shaders::guide_lookup::{MIN_DEPTH_DIFFERENCE, MIN_NORMAL_DIFFERENCE};
 use crate::shaders::shared::sanitise::LARGEST;
 use crate::twins::camera::{eye_ray, film_sample, path_seed};
 use crate::twins::path::Tracer;
-use crate::twins::primary_hit::first_hit;
+use crate::twins::primary_hit::seen_hit;
 use crate::twins::sampler::sampler_start;
 use glam::{IVec2, Vec2, Vec3, ivec2};
 use std::ops::Range;
@@ -61,15 +61,14 @@ impl GuideRays<'_> {
     }
 }
 
-/// What sample `index` of `pixel` meets first, and where it passes the film (pixels); none for the sky and for smooth
-/// surfaces.
+/// What sample `index` of `pixel` shows, and where it passes the film (pixels); none for the sky.
 pub fn eye_hit(tracer: &Tracer, pixel: u32, index: u32) -> Option<(Guide, Vec2)> {
     let Tracer { scene, frame, effects, .. } = tracer;
     let random = sampler_start(pixel, index, frame.path.seed, effects.independent_sampler);
     let film = film_sample(frame, effects, pixel, random);
     let ray = eye_ray(frame, effects, film, random);
-    let (eye, delta) = first_hit(scene, frame, ray, pcg(path_seed(frame, pixel, index)));
-    (eye.object != NONE && !delta).then_some((eye, film))
+    let eye = seen_hit(scene, frame, &ray, pcg(path_seed(frame, pixel, index)));
+    (eye.albedo != [0.0; 3]).then_some((eye, film))
 }
 
 /// Mean over the eye rays of these samples, one at least, of albedo times the light of the guide ray that is most alike.

@@ -201,20 +201,22 @@ impl Metallic {
         LobeSample { wi, weight: Vec3::splat(weight), delta, scattered: own.z.min(wi.z) > 1e-9 }
     }
 
-    /// Approximate reflectance at the cosine `c` of the lobes that are not deltas.
+    /// Approximate reflectance at the cosine `c`.
     pub fn albedo(&self, c: f32) -> Vec3 {
         let inner = self.coat_lets_in(c);
-        let mut albedo = self.diffuse * self.let_in(c);
-        if !smooth(self.alpha) {
-            albedo += self.fresnel(c) + self.through * self.let_in(c);
-        }
-        albedo * inner + if smooth(self.coat_alpha) { 0.0 } else { 1.0 - inner }
+        let albedo = (self.diffuse + self.through) * self.let_in(c) + self.fresnel(c);
+        albedo * inner + 1.0 - inner
     }
 
     /// Share of the light head on that the surface reflects, of all that comes back.
     pub fn specular(&self) -> f32 {
         let (f0, base) = (self.f0.element_sum(), (self.diffuse + self.through).element_sum());
         f0 / (f0 + base).max(1e-10)
+    }
+
+    /// Whether light takes one of two ways where every lobe is a delta.
+    pub fn chooses(&self) -> bool {
+        self.coat != 0.0 || self.through != Vec3::ZERO
     }
 
     /// Whether every lobe is a delta.

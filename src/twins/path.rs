@@ -6,7 +6,7 @@ use crate::shaders::shared::trace_path::{
     MAX_SURVIVAL, PAIR_BSDF, PAIR_CHOICE, PAIR_FIRST_BOUNCE, PAIR_LIGHT, PAIR_ROULETTE, PAIRS_PER_BOUNCE,
 };
 use crate::twins::bsdf::{
-    Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_is_specular, bsdf_sample, relative_index,
+    Bsdf, bsdf_albedo, bsdf_chooses, bsdf_evaluate, bsdf_is_delta, bsdf_is_specular, bsdf_sample, relative_index,
 };
 use crate::twins::camera::{eye_ray, film_sample, path_seed};
 use crate::twins::light::*;
@@ -27,7 +27,7 @@ pub struct PathSample {
     pub direct: Vec3,
     /// Radiance that arrived by more than one bounce; with [`Effects::soft_light`] also what lamps and sky bring to the first hit.
     pub indirect: Vec3,
-    /// Reflectance of the first hit.
+    /// What that radiance has been multiplied by: see [`crate::layout::PixelLight::albedo`].
     pub albedo: Vec3,
     /// Number of rays, shadow rays included.
     pub rays: u32,
@@ -62,13 +62,25 @@ enum Kind {
 }
 
 /// As `kind_of_light` of the kernel.
-fn kind_of_light(bounce: u32, smooth_first: bool, delta: bool) -> Kind {
-    match bounce {
-        _ if smooth_first => Kind::Direct,
-        2.. => Kind::Indirect,
-        _ if delta => Kind::Direct,
-        _ => Kind::Soft,
+fn kind_of_light(seen: &Seen, delta: bool) -> Kind {
+    match seen.scattered {
+        0 if seen.chosen => Kind::Soft,
+        0 => Kind::Direct,
+        1 if delta => Kind::Direct,
+        1 => Kind::Soft,
+        _ => Kind::Indirect,
     }
+}
+
+/// What a path has met.
+#[derive(Default)]
+struct Seen {
+    /// Surfaces that are not smooth.
+    scattered: u32,
+    /// Whether a smooth one before them let light take one of two ways.
+    chosen: bool,
+    /// What their light has been multiplied by when it reaches the camera; 1 for what is seen in one that chooses.
+    albedo: Vec3,
 }
 
 /// Light by the kernel's sums: what is soft is added to indirect light at the path's end.
@@ -229,8 +241,7 @@ impl Tracer<'_> {
 
     /// `first` is what the path's first ray finds.
     fn trace_path(&self, mut path: Path, first: Hit, random: Sampler, seed: u32) -> PathSample {
-        let (mut sum, mut rays, mut albedo) = (Sum::default(), 0, Vec3::ZERO);
-        let (mut smooth_first, mut mirrored) = (false, false);
+        let (mut sum, mut rays, mut seen) = (Sum::default(), 0, Seen::default());
         let mut from = [NONE; 2];
         for bounce in 0u32.. {
             let pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
@@ -240,7 +251,7 @@ impl Tracer<'_> {
                 0 => first,
                 _ => traverse_from(self.scene, from, path.origin, path.direction, INFINITE_DISTANCE, false, mask_seed),
             };
-            let kind = if bounce == 0 { Kind::Direct } else { kind_of_light(bounce, smooth_first, false) };
+            let kind = kind_of_light(&seen, false);
             if !hit.any() {
                 self.add_light(&mut sum, path.throughput * self.light_from_miss(&path), kind);
                 break;
@@ -253,36 +264,33 @@ impl Tracer<'_> {
             }
             let p = self.shade(s, path.direction, pair, from);
             let smooth_here = bsdf_is_delta(&p.bsdf);
-            if bounce == 0 {
-                albedo = bsdf_albedo(&p.bsdf, p.wo.z);
-                smooth_first = smooth_here;
+            if seen.scattered == 0 && !seen.chosen {
+                seen.chosen = smooth_here && bsdf_chooses(&p.bsdf);
+                let albedo = if seen.chosen { Vec3::ONE } else { bsdf_albedo(&p.bsdf, p.wo.z) };
+                seen.albedo = path.throughput.min(Vec3::ONE) * albedo;
             }
+            seen.scattered += u32::from(!smooth_here);
             if self.frame.path.light_count > 0 && !smooth_here {
                 let light = self.light_from_nee(&p, random, mask_seed.wrapping_add(1));
                 rays += u32::from(light.is_some());
                 let (light, delta) = light.unwrap_or_default();
-                self.add_light(&mut sum, path.throughput * light, kind_of_light(bounce + 1, smooth_first, delta));
+                self.add_light(&mut sum, path.throughput * light, kind_of_light(&seen, delta));
             }
             if !self.scatter(&mut path, &p, random) {
                 break;
             }
-            mirrored |= bounce == 0 && path.delta;
             let from = self.frame.path.roulette_depth;
             let roulette = self.effects.roulette && from > 0 && bounce + 1 >= from;
             if roulette && !self.survives_roulette(&mut path, random, pair) {
                 break;
             }
         }
-        let sum = PathSample {
+        PathSample {
             direct: sum.direct,
             indirect: self.clamped(sum.indirect) + sum.soft,
-            albedo,
+            albedo: seen.albedo,
             rays,
             broken: false,
-        };
-        match mirrored {
-            true => PathSample { direct: sum.radiance(), indirect: Vec3::ZERO, ..sum },
-            false => sum,
         }
     }
 

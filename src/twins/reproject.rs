@@ -159,7 +159,7 @@ impl Reprojection<'_> {
             let SurfacePoint { triangle, instance, weights, .. } = self.numbered_anew(at);
             handed.records.push(History { triangle, instance, weights, mean: s.mean, m2, ..Default::default() });
             let indirect_m2 = part_of_m2(l.indirect_m2, kept, s.count);
-            let light = HistoryLight { direct: l.direct, indirect: l.indirect, indirect_m2, ..Default::default() };
+            let light = HistoryLight { direct: l.direct, albedo: l.albedo, indirect_m2, ..Default::default() };
             handed.light.push(light);
         }
         handed
@@ -272,8 +272,8 @@ impl Reprojection<'_> {
                 (at.triangle, at.instance, at.weights) = (h.triangle, h.instance, h.weights);
             }
             let stats = PixelStats { mean: h.mean, m2: h.m2, count, ..Default::default() };
-            let (direct, indirect, indirect_m2) = (l.direct, l.indirect, l.indirect_m2);
-            (stats, PixelLight { direct, indirect, indirect_m2, ..Default::default() })
+            let (direct, albedo, indirect_m2) = (l.direct, l.albedo, l.indirect_m2);
+            (stats, PixelLight { direct, albedo, indirect_m2, ..Default::default() })
         };
         winner.iter_mut().zip(points).enumerate().map(begin).collect()
     }

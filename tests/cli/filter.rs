@@ -110,7 +110,7 @@ fn direct_light_of_our_own_files_stays_as_it_is_and_other_layers_too() {
     assert!(error(&filter(&folder, &["--filter", "atrous", "--light", "all"]), lit) > 0.2);
     // Without lights whose shadows are sharp, all light is filtered unless the user says otherwise.
     let mut soft = film.clone();
-    soft.metadata.insert("deltaLights".to_owned(), "false".to_owned());
+    soft.metadata.insert("sharpDirect".to_owned(), "false".to_owned());
     write(&folder, "noisy.exr", &soft);
     assert!(error(&filter(&folder, &["--filter", "atrous"]), lit) > 0.2);
     assert!(error(&filter(&folder, &["--filter", "atrous", "--light", "indirect"]), lit) < 0.3 * before);

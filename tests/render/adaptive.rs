@@ -269,7 +269,7 @@ fn disjoint_sample_ranges_join_to_one_render() {
         |x: &[f32; 3], y: &[f32; 3]| x.iter().zip(y).all(|(x, y)| (x - y).abs() <= 3e-6 * x.abs().max(y.abs()) + 1e-9);
     for (one, two) in whole.iter().zip(&joined) {
         assert_eq!(one.stats.count, two.stats.count);
-        assert!(close(&one.stats.mean, &two.stats.mean) && close(&one.light.indirect, &two.light.indirect));
+        assert!(close(&one.stats.mean, &two.stats.mean) && close(&one.indirect(), &two.indirect()));
         assert!(
             one.stats.m2.iter().zip(&two.stats.m2).all(|(x, y)| (x - y).abs() <= 1e-5 * x + 1e-6),
             "{one:?} {two:?}"

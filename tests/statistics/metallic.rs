@@ -182,7 +182,7 @@ fn no_light_is_made() {
 }
 
 #[test]
-fn albedo_is_near_the_share_that_is_not_mirrored() {
+fn albedo_is_near_the_share_that_comes_back() {
     for degrees in [0.0, 30.0, 60.0] {
         let b = of(Parameters { base: Vec3::splat(0.6), ..WHITE });
         let (albedo, e) = (f64::from(bsdf_albedo(&b, along(degrees).z).x), energy(b, along(degrees), 1 << 14));

@@ -284,7 +284,7 @@ fn surroundings(pixels: usize, width: usize) -> (Vec<Guide>, Vec<PixelStats>, Ve
     let light = |i: usize| PixelLight {
         direct: [0.5 * unit(i), unit(i), 0.0],
         indirect_m2: [unit(4 * i + 1), 0.0, 1e35][i % 7 % 3],
-        indirect: if i % 11 == 3 { [0.0; 3] } else { [unit(4 * i + 2), 1.0, 0.5] },
+        albedo: if i % 11 == 3 { [0.0; 3] } else { [unit(4 * i + 2), 1.0, 0.5] },
         remainder: 0,
         ..Default::default()
     };

@@ -14,7 +14,7 @@ use tallow::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
 use tallow::render::settings::Settings;
 use tallow::render::{Outputs, Renderer};
 use tallow::scene::Scene;
-use tallow::statistics::variance_of_mean;
+use tallow::statistics::{Pixel, variance_of_mean};
 
 const SIZES: [[u32; 2]; 6] = [[1, 1], [31, 1], [1, 65], [64, 2], [65, 3], LARGEST];
 const LARGEST: [u32; 2] = [33, 17];
@@ -39,11 +39,11 @@ impl Frame {
             let albedo = if is_lamp || is_glass { [0.0; 3] } else { [0, 1, 2].map(|c| 0.005 + 0.9 * unit(c)) };
             let indirect = [unit(4), 0.3 * unit(5), 1.0];
             let mut light =
-                PixelLight { direct: [unit(3); 3], indirect_m2: 2.0 * unit(7), indirect, ..PixelLight::default() };
+                PixelLight { direct: [unit(3); 3], indirect_m2: 2.0 * unit(7), albedo, ..PixelLight::default() };
             if is_lamp {
                 light = PixelLight { direct: [20.0; 3], ..PixelLight::default() };
             }
-            let mut mean: vec3 = std::array::from_fn(|c| light.direct[c] + albedo[c] * light.indirect[c]);
+            let mut mean: vec3 = std::array::from_fn(|c| light.direct[c] + light.albedo[c] * indirect[c]);
             // Unit but for rounding, as those of a render.
             let normal = glam::Vec3::new(0.01 * unit(7), 0.6, 0.8).normalize().to_array();
             let mut guide = Guide { normal, depth: 2.0 + unit(6), albedo, ..Guide::default() };
@@ -51,9 +51,9 @@ impl Frame {
             match i % 37 {
                 3 if broken => mean[1] = f32::NAN,
                 5 if broken => light.direct[2] = f32::INFINITY,
-                9 if broken => light.indirect = [0.0, -1.0, f32::NAN],
-                11 if broken => guide.albedo[0] = f32::NAN,
-                14 if broken => guide.albedo = [f32::INFINITY; 3],
+                9 if broken => light.albedo = [0.0, -1.0, f32::NAN],
+                11 if broken => (guide.albedo[0], light.albedo[0]) = (f32::NAN, f32::NAN),
+                14 if broken => (guide.albedo, light.albedo) = ([f32::INFINITY; 3], [f32::INFINITY; 3]),
                 17 if broken => mean = [0.0; 3],
                 _ => {}
             }
@@ -81,8 +81,8 @@ impl Frame {
         add("", |f, i| f.stats[i].mean);
         add("variance", |f, i| variance_of_mean(&f.stats[i]));
         add("direct", |f, i| f.light[i].direct);
-        add("indirect", |f, i| f.light[i].indirect);
-        add("albedo", |f, i| f.guide[i].albedo);
+        add("indirect", |f, i| Pixel { stats: f.stats[i], light: f.light[i] }.indirect());
+        add("albedo", |f, i| if f.stats[i].count > 0 { f.light[i].albedo } else { f.guide[i].albedo });
         add("N", |f, i| f.guide[i].normal);
         add("P", |f, i| f.guide[i].position);
         film.add("indirect.m2", Samples::F32(self.light.iter().map(|l| l.indirect_m2).collect()));

@@ -6,7 +6,8 @@ use anyhow::{Context, Result};
 use std::path::Path;
 use tallow::denoise::filter::{FILTERS, FilterInput, FilterSettings, run};
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu};
-use tallow::layout::{Guide, PixelLight, PixelStats, vec4};
+use tallow::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
+use tallow::statistics::Pixel;
 use tallow::render::settings::Settings;
 use tallow::render::{Job, Outputs, Renderer};
 use tallow::scene::Scene;
@@ -29,10 +30,10 @@ fn render(
 }
 
 /// Returns (MSE, relative MSE with an epsilon of 0.01) over all channels.
-fn errors(image: &[vec4], reference: &[PixelLight]) -> (f64, f64) {
+fn errors(image: &[vec4], reference: &[vec3]) -> (f64, f64) {
     let (mut mse, mut relative) = (0.0, 0.0);
     for (a, b) in image.iter().zip(reference) {
-        for (a, b) in a.iter().zip(b.indirect) {
+        for (a, b) in a.iter().zip(b) {
             let (off, level) = (f64::from(a - b).powi(2), f64::from(b).powi(2));
             mse += off;
             relative += off / (level + 0.01);
@@ -66,10 +67,15 @@ fn main() -> Result<()> {
     let number = |i: usize, or: u32| args.get(i).map_or(Ok(or), |a| a.parse());
     let (side, spp, many) = (number(1, 256)?, number(2, 4)?, number(3, 1024)?);
     let gpu = Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), ..DeviceOptions::default() })?;
-    let (_, _, reference) = render(&gpu, file, side, many, 1)?;
+    let of_pixels = |stats: &[PixelStats], light: &[PixelLight]| -> Vec<vec3> {
+        stats.iter().zip(light).map(|(&stats, &light)| Pixel { stats, light }.indirect()).collect()
+    };
+    let (_, stats, light) = render(&gpu, file, side, many, 1)?;
+    let reference = of_pixels(&stats, &light);
     let (guide, stats, light) = render(&gpu, file, side, spp, 0)?;
     // The statistics include direct light, so the filter estimates the variance of the indirect light itself.
-    let radiance = light.iter().zip(&stats).map(|(l, s)| [l.indirect[0], l.indirect[1], l.indirect[2], s.count as f32]);
+    let light = of_pixels(&stats, &light);
+    let radiance = light.iter().zip(&stats).map(|(&[r, g, b], s)| [r, g, b, s.count as f32]);
     let input = FilterInput { width: side, height: side, radiance: radiance.collect(), guide, variance: None };
     let base = FilterSettings::default().scaled_to(&input);
     println!("{file}, {side}x{side}, {spp} spp against {many}: MSE, relMSE at default settings; least MSE of a sweep");

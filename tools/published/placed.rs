@@ -93,5 +93,5 @@ pub fn radiance(pixels: &[Pixel]) -> Vec<vec3> {
 /// Indirect irradiance with the number of its samples, as filters take it.
 pub fn indirect(pixels: &[Pixel]) -> Vec<vec4> {
     let of = |PixelStats { count, .. }: PixelStats, [r, g, b]: vec3| [r, g, b, count as f32];
-    pixels.iter().map(|p| of(p.stats, p.light.indirect)).collect()
+    pixels.iter().map(|p| of(p.stats, p.indirect())).collect()
 }

@@ -34,7 +34,7 @@ const KNOBS: &[Knob] = &[
     knob("max-depth", &["2", "3", "4", "5", "6", "7", "8"], Paths),
     knob("roulette-depth", &["0", "3", "5"], Paths),
     knob("sampler", &["sobol", "independent"], Paths),
-    knob("split", &["auto", "indirect", "soft"], Filtered),
+    knob("split", &["soft", "indirect"], Filtered),
     knob("min-spp", &["0", "1", "2", "4"], Placed),
     knob("max-spp", &["0", "8", "16", "32", "64"], Placed),
     knob("window", &["2", "4", "8"], Policies(&["geometry", "both"])),

@@ -8,7 +8,7 @@ use crate::gpu::{Buffer, Gpu, Location};
 use crate::image::Samples;
 use crate::image::aov::{Aov, Aovs};
 use crate::layout::{Guide, NONE, PixelLight, PixelStats};
-use crate::render::film::DELTA_LIGHTS;
+use crate::render::film::SHARP_DIRECT;
 use bytemuck::Pod;
 use glam::Vec3;
 use places::Places;
@@ -53,7 +53,7 @@ impl<'a> Layers<'a> {
             light: has(Aov::Direct) && has(Aov::Indirect),
             variance: has(Aov::Variance),
             indirect_variance: self.indirect_m2.is_some(),
-            delta_lights: self.aovs.film.metadata.get(DELTA_LIGHTS).is_none_or(|said| said != "false"),
+            sharp_direct: self.aovs.film.metadata.get(SHARP_DIRECT).is_none_or(|said| said != "false"),
         }
     }
 
@@ -83,13 +83,13 @@ impl<'a> Layers<'a> {
         PixelStats { mean, count: count.to_bits(), m2, ..Default::default() }
     }
 
-    /// Direct and indirect light, 0 where the file does not keep them apart.
+    /// Direct light and the albedo of all other light, 0 where the file does not keep them apart.
     pub fn light(&self, i: usize) -> PixelLight {
         let at = |aov| self.aovs.get(aov).map_or([0.0; 3], |plane| plane.at(i));
         PixelLight {
             direct: at(Aov::Direct),
             indirect_m2: self.indirect_m2.map_or(0.0, |m2| m2[i]),
-            indirect: at(Aov::Indirect),
+            albedo: at(Aov::Albedo),
             ..Default::default()
         }
     }

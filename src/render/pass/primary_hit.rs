@@ -8,7 +8,7 @@ use crate::shaders::primary_hit::Bind;
 /// The specialised kernel.
 pub type Guides = Kernel<Bind<'static>>;
 
-/// camera -> guide\[tile\], and where a history is kept points\[tile\]
+/// camera -> guide\[tile\]; where they are kept seen\[tile\], points\[tile\]
 pub fn record(
     k: &Guides,
     rec: &mut Recorder,
@@ -20,8 +20,9 @@ pub fn record(
         let (first_pixel, pixels) = (tile.first_pixel + w.start, w.end - w.start);
         let part = w.start as usize..w.end as usize;
         let guides = &tile.guide.part(part.clone())?;
-        let points = &if tile.has_points() { tile.points.part(part)? } else { tile.points.clone() };
+        let points = &if tile.has_points() { tile.points.part(part.clone())? } else { tile.points.clone() };
+        let seen = &if tile.has_seen() { tile.seen.part(part)? } else { tile.seen.clone() };
         let push = PathPush { constants: *constants, first_pixel, pixels, ..PathPush::default() };
-        rec.dispatch_threads(k, Bind { scene: s.bind(), frame: s.bind_frame(), guides, points }, &push, pixels)
+        rec.dispatch_threads(k, Bind { scene: s.bind(), frame: s.bind_frame(), guides, points, seen }, &push, pixels)
     })
 }

@@ -47,13 +47,11 @@ choices! {
 choices! {
     /// What the layers `direct` and `indirect` hold, and so what a filter gets where direct light is kept from it.
     pub enum Split {
-        /// As `soft` where delta lights and others both shine, else as `indirect`.
-        #[default]
-        Auto,
         /// `indirect` holds light of two bounces and more.
         Indirect,
         /// `indirect` also holds what lamps and sky bring directly, which is noisy; `direct` the emission that is seen and what
         /// point, spot and directional lights bring, whose shadows are sharp.
+        #[default]
         Soft,
     }
 }
@@ -86,7 +84,7 @@ settings! {
             /// Random numbers.
             sampler: Sampler = Sampler::Sobol, ..;
             /// What the layers `direct` and `indirect` hold.
-            split: Split = Split::Auto, ..;
+            split: Split = Split::Soft, ..;
         }
         /// Where in its sequence a pixel begins, which no scene file says.
         Sequence {
