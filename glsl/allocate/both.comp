@@ -30,7 +30,8 @@ struct Surroundings {
     float indirect; // of the squared deviations of indirect light, as `around.x` holds those of all light
 };
 
-// Sum of squared deviations of indirect light (mean over channels), computed from those of its luminance. It assumes that every sample has the colour of the pixel's mean. The covariance of direct and indirect light counts as direct.
+// Sum of squared deviations of indirect light (mean over channels), computed from those of its luminance. It assumes that every
+// sample has the colour of the pixel's mean. The covariance of direct and indirect light counts as direct.
 float indirect_squares(uint pixel, vec3 mean, float squares) {
     PixelLight l = PixelLight_load(light, pixel);
     vec3 indirect = mean - l.direct;

@@ -5,7 +5,8 @@
 
 // Blends five images per pixel and thread: the noisy one and the results of four filters (candidates). The weights are not
 // negative, sum to 1, and minimise the mean squared error at left-out pixels that auto_error.comp estimates. Starting from
-// the best candidate alone, pairs of candidates exchange weight for ROUNDS rounds (coordinate descent).
+// the best candidate alone, pairs of candidates exchange weight for ROUNDS rounds (coordinate descent). The blend comes with the
+// variance of the pixel's luminance: UNMEASURED where its samples tell none, and UNFILTERED where there is no blend.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer squares; // of vec4
 layout(binding = 1) uniform samplerBuffer products; // of vec4
@@ -20,7 +21,9 @@ layout(binding = 9) uniform samplerBuffer mid; // of vec4
 layout(binding = 10) uniform samplerBuffer narrow; // of vec4, of what it gets
 layout(binding = 11) uniform samplerBuffer wide_dim; // of vec4, of the same
 layout(binding = 12) uniform samplerBuffer svgf; // of vec4
-layout(scalar, binding = 13) writeonly buffer Output { vec4 filtered[]; };
+layout(binding = 13) uniform samplerBuffer variance; // of vec3
+layout(scalar, binding = 14) writeonly buffer Blend { vec4 blend[]; };
+layout(constant_id = 114) const bool MEASURED = true; // `variance` holds every pixel's
 layout(scalar, push_constant) uniform Push { PackPush push; };
 
 const uint ROUNDS = 4u;       // of exchanges between all pairs
@@ -29,6 +32,14 @@ const float MAX_ERROR = 1e24; // is above every error
 // Largest share of the whole image's errors in those of a pixel. Local errors are uncertain where few pixels have seen light,
 // and a candidate that is good elsewhere is rarely bad here.
 const float OVERALL = 0.6;
+
+// What the pixel's samples say of the variance of their mean.
+float own_variance(uint i, float count) {
+    vec3 v = MEASURED ? vec3(texelFetch(variance, int(3u * i)).x, texelFetch(variance, int(3u * i + 1u)).x, texelFetch(variance, int(3u * i + 2u)).x) : vec3(-1.0);
+    bool measured = count >= 2.0 && finite(v) && all(greaterThanEqual(v, vec3(0.0)));
+    float deviation = min(luminance(sqrt(v)), STRONGEST); // as in noise_estimate.comp
+    return measured ? deviation * deviation : UNMEASURED;
+}
 
 void main() {
     uint i = thread_index();
@@ -92,5 +103,5 @@ void main() {
     vec3 off = w[1] * (a.rgb - base) + w[2] * (as_light(b.rgb, a.rgb) - base);
     off += w[3] * (whole_light(n.rgb, a.rgb, texelFetch(wide_dim, at).rgb) - base) + w[4] * (d.rgb - base);
     bool any_usable = usable[0] || usable[1] || usable[2] || usable[3] || usable[4];
-    filtered[i] = any_usable ? vec4(base + off, c.w > 0.0 ? c.w : 1.0) : vec4(0.0);
+    blend[i] = any_usable ? vec4(base + off, own_variance(i, c.w)) : vec4(vec3(0.0), UNFILTERED);
 }

@@ -17,3 +17,6 @@ vec3 as_light(vec3 fitted, vec3 wide) {
 vec3 whole_light(vec3 narrow, vec3 wide, vec3 wide_dim) {
     return as_light(narrow + (wide - wide_dim), wide);
 }
+
+// Instead of the variance that comes with the blend.
+const float UNMEASURED = -1.0, UNFILTERED = -2.0;

@@ -8,7 +8,6 @@ layout(binding = 2) uniform usamplerBuffer guide; // of Guide
 
 vec3 colour_at(int i) { return PixelStats_mean(stats, i); }
 
-
 // Number of samples of a pixel.
 float count_at(int i) {
     uint count = PixelStats_count(stats, i);

@@ -105,6 +105,16 @@ gpu_structs! {
         size: uvec2,
     }
 
+    /// Push constants of `auto_residual.comp`.
+    struct AutoResidualPush {
+        /// Image in pixels.
+        size: uvec2,
+        /// As in [`AutoPush`].
+        floor: float,
+        /// As in [`AtrousPush`]; that of radiance is 0.
+        rates: vec3,
+    }
+
     /// Push constants of `auto_smooth.comp`.
     struct AutoSmoothPush {
         /// Image in pixels.

@@ -136,12 +136,14 @@ pub(crate) fn pixels(film: &Film) -> std::result::Result<Vec<Pixel>, String> {
             ..Default::default()
         },
         // Without a sample, the layer holds the albedo at the pixel's centre.
-        light: light.filter(|_| count[i] > 0).map_or_else(PixelLight::default, |(direct, albedo, indirect_m2)| PixelLight {
-            direct: at(direct, i),
-            indirect_m2: indirect_m2[i],
-            albedo: at(albedo, i),
-            remainder: word(&light_remainder, i),
-            ..Default::default()
+        light: light.filter(|_| count[i] > 0).map_or_else(PixelLight::default, |(direct, albedo, indirect_m2)| {
+            PixelLight {
+                direct: at(direct, i),
+                indirect_m2: indirect_m2[i],
+                albedo: at(albedo, i),
+                remainder: word(&light_remainder, i),
+                ..Default::default()
+            }
         }),
     };
     let mut pixels = memory::reserved(film.pixels())?;

@@ -36,7 +36,7 @@ pub enum Layer {
     Direct,
     /// Reflectance that all other light has been multiplied by; where light is not kept apart, that of the primary hit.
     Albedo,
-    /// Its shading normal in world space.
+    /// Shading normal of the primary hit in world space.
     Normal,
     /// The hit in world units.
     Position,

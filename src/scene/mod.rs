@@ -303,12 +303,7 @@ impl Scene {
         SceneFile::of(path, description).load()
     }
 
-    /// Whether point, spot or directional lights shine: they have no extent, and their shadows are sharp.
-    pub fn has_delta_lights(&self) -> bool {
-        self.lights.iter().any(|light| matches!(light.kind, LIGHT_POINT | LIGHT_SPOT | LIGHT_DIRECTIONAL))
-    }
-
-    /// Whether lamps or a sky shine: they have an extent, and their shadows are soft.
+    /// Whether lamps or a sky shine: they have an extent, and their shadows are soft. Point, spot and directional lights have none.
     pub fn has_soft_lights(&self) -> bool {
         !self.lights.iter().all(|light| matches!(light.kind, LIGHT_POINT | LIGHT_SPOT | LIGHT_DIRECTIONAL))
     }

@@ -337,7 +337,8 @@ fn apart(gpu: &Gpu, scene: &Loaded) -> (Vec<PixelStats>, Vec<PixelLight>, Vec<Gu
 #[test]
 fn what_a_smooth_coat_mirrors_is_light_over_the_share_that_it_mirrors() {
     let gpu = support::gpu();
-    let [(coated, light, guide), (plain, plain_light, _)] = [true, false].map(|coated| apart(&gpu, &black_floor(coated)));
+    let [(coated, light, guide), (plain, plain_light, _)] =
+        [true, false].map(|coated| apart(&gpu, &black_floor(coated)));
     let floor = |of: &dyn Fn(usize) -> f32| {
         let seen: Vec<f64> = (0..guide.len())
             .filter(|&i| guide[i].material != NONE && guide[i].position[1].abs() < 1e-3)
@@ -346,9 +347,8 @@ fn what_a_smooth_coat_mirrors_is_light_over_the_share_that_it_mirrors() {
         assert!(seen.len() > 50, "{} pixels show the floor", seen.len());
         seen.iter().sum::<f64>() / seen.len() as f64
     };
-    let indirect = |stats: &[PixelStats], light: &[PixelLight], i: usize| {
-        Pixel { stats: stats[i], light: light[i] }.indirect()[1]
-    };
+    let indirect =
+        |stats: &[PixelStats], light: &[PixelLight], i: usize| Pixel { stats: stats[i], light: light[i] }.indirect()[1];
     let share = floor(&|i| indirect(&coated, &light, i)) / floor(&|i| indirect(&plain, &plain_light, i));
     assert!((0.5..1.5).contains(&share), "irradiance under the coat is {share} of that without it");
     assert!((0.04..0.3).contains(&floor(&|i| light[i].albedo[1])));

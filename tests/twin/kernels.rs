@@ -14,7 +14,7 @@ use tallow::scene::{Loaded, Scene};
 use tallow::shaders::shared;
 use tallow::twins::accumulate::fold;
 use tallow::twins::path::{Strategy, Tracer};
-use tallow::twins::primary_hit::guide;
+use tallow::twins::primary_hit::{guide, seen};
 use tallow::twins::traverse::traverse;
 
 const SIDE: u32 = 48;
@@ -124,6 +124,8 @@ fn spheres() -> Loaded {
 pub struct Pair {
     pub samples: [Vec<Vec3>; 2],
     guides: [Vec<Guide>; 2],
+    /// What smooth surfaces show; nothing in scenes without.
+    seen: [Vec<Guide>; 2],
     stats: [Vec<PixelStats>; 2],
     light: [Vec<PixelLight>; 2],
 }
@@ -154,8 +156,10 @@ pub fn run(gpu: &Gpu, scene: &Loaded, effects: Effects) -> Pair {
         (vec![PixelStats::default(); pixels as usize], vec![PixelLight::default(); pixels as usize]);
     let push_fold = FoldPush { pixels, samples: SAMPLES, ..FoldPush::default() };
     fold(&push_fold, true, &words, &mut stats, &mut light); // of the device's samples: only rounding may differ
+    let shown = if tile.has_seen() { tile.seen.read().unwrap() } else { Vec::new() };
     Pair {
         samples: [device, host],
+        seen: [shown.clone(), (0..shown.len() as u32).into_par_iter().map(|p| seen(scene, &frame, p)).collect()],
         guides: [tile.guide.read().unwrap(), (0..pixels).into_par_iter().map(|p| guide(scene, &frame, p)).collect()],
         stats: [tile.stats.read().unwrap(), stats],
         light: [tile.light.read().unwrap(), light],
@@ -193,6 +197,9 @@ pub fn check(name: &str, pair: &Pair) {
 
     let wrong = pair.guides[0].iter().zip(&pair.guides[1]).filter(|(a, b)| !guides_agree(a, b)).count();
     assert!(wrong <= pair.guides[0].len() / 500, "{name}: {wrong} guides differ");
+    // Each surface on the way magnifies what rounding makes of its normal.
+    let wrong = pair.seen[0].iter().zip(&pair.seen[1]).filter(|(a, b)| !guides_agree(a, b)).count();
+    assert!(wrong <= pair.seen[0].len() / 50, "{name}: {wrong} guides of what is seen differ");
 
     for (a, b) in pair.stats[0].iter().zip(&pair.stats[1]) {
         assert!(a.count == b.count && near(a.mean, b.mean, 1e-5) && near(a.m2, b.m2, 1e-4), "{name}: {a:?} {b:?}");

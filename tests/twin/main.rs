@@ -5,6 +5,7 @@ mod ceilings;
 mod dealt;
 mod denoiser;
 mod filters;
+mod gloss;
 mod guided;
 mod kernels;
 mod lookup;

@@ -7,10 +7,10 @@ use std::path::Path;
 use tallow::denoise::filter::{FILTERS, FilterInput, FilterSettings, run};
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu};
 use tallow::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
-use tallow::statistics::Pixel;
 use tallow::render::settings::Settings;
 use tallow::render::{Job, Outputs, Renderer};
 use tallow::scene::Scene;
+use tallow::statistics::Pixel;
 
 /// Renders a scene and returns its guides, statistics and light.
 fn render(

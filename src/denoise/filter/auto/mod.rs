@@ -9,8 +9,8 @@ use super::pack::Pack;
 use super::{Filter, FilterSettings, Planes, Row, guided, svgf};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::layout::{AutoPush, AutoSmoothPush, PackPush, vec4};
-use crate::shaders::{auto, auto_error, auto_inputs, auto_leverage, auto_smooth, auto_sum};
+use crate::layout::{AutoPush, AutoResidualPush, AutoSmoothPush, PackPush, vec3, vec4};
+use crate::shaders::{auto, auto_error, auto_inputs, auto_leverage, auto_residual, auto_smooth, auto_sum};
 
 /// See [`super::FILTERS`].
 pub const ROW: Row = Row {
@@ -110,7 +110,10 @@ struct Auto {
     sum: Kernel<auto_sum::Bind<'static>>,
     /// Of leverages, and of errors.
     smooth: [Kernel<auto_smooth::Bind<'static>>; 2],
-    blend: Kernel<auto::Bind<'static>>,
+    /// Without and with a variance to read.
+    blend: [Kernel<auto::Bind<'static>>; 2],
+    nothing: Buffer<vec3>,
+    residual: Kernel<auto_residual::Bind<'static>>,
     /// Wide, middle and narrow windows, svgf.
     candidates: [Candidate; 4],
     /// What candidates are run on besides the image: see `glsl/auto/auto_inputs.comp`. Then squares and products of what is missed:
@@ -141,6 +144,7 @@ impl Auto {
             let edge = Rates::of_surfaces(&alike(&settings.edge)).constants();
             Kernel::new(gpu, &auto_smooth::Constants { edge, three })
         };
+        let blend = |measured| Kernel::new(gpu, &auto::Constants { measured, ..Default::default() });
         Ok(Self {
             estimate: Estimate::new(gpu, &settings.edge, size)?,
             inputs: Kernel::new(gpu, &Default::default())?,
@@ -148,7 +152,12 @@ impl Auto {
             error: Kernel::new(gpu, &Default::default())?,
             sum: Kernel::new(gpu, &Default::default())?,
             smooth: [smooth(false)?, smooth(true)?],
-            blend: Kernel::new(gpu, &Default::default())?,
+            blend: [blend(false)?, blend(true)?],
+            nothing: Buffer::from_slice(gpu, "no variance", &[])?,
+            residual: Kernel::new(
+                gpu,
+                &auto_residual::Constants { edge: Rates::of_surfaces(&settings.edge).constants() },
+            )?,
             candidates: [wide?, middle?, narrow?, svgf?],
             planes: [
                 plane("dim, squared errors")?,
@@ -265,6 +274,22 @@ impl Auto {
             rec.dispatch(smooth, bind, &push, smooth.groups(threads(planes.size, spacing)))
         })
     }
+
+    /// The blend, which lies where leverages were, and what it has lost -> output\[P\]
+    fn record_residual(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
+        let bind = auto_residual::Bind {
+            colour: &self.pack.colour,
+            place: &self.pack.place,
+            estimate: &self.estimate.plane,
+            others: &self.planes[2],
+            blend: &self.leverages,
+            filtered: &planes.output,
+        };
+        let rates = Rates::of_surfaces(&self.settings.edge).as_array();
+        let (size, floor) = (planes.size, floor(&self.settings));
+        let push = AutoResidualPush { size, floor, rates, ..Default::default() };
+        rec.dispatch(&self.residual, bind, &push, self.residual.groups(planes.size))
+    }
 }
 
 impl Filter for Auto {
@@ -292,9 +317,12 @@ impl Filter for Auto {
             narrow,
             wide_dim: &self.wide_dim,
             svgf,
-            filtered: &planes.output,
+            variance: planes.variance.as_ref().unwrap_or(&self.nothing),
+            blend: &self.leverages,
         };
         let count = planes.pixels();
-        rec.dispatch_threads(&self.blend, bind, &PackPush { count, ..Default::default() }, count)
+        let blend = &self.blend[usize::from(planes.variance.is_some())];
+        rec.dispatch_threads(blend, bind, &PackPush { count, ..Default::default() }, count)?;
+        self.record_residual(rec, planes)
     }
 }

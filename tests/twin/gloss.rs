@@ -1,0 +1,62 @@
+//! What `auto` makes of two lamps' reflections on a rough plate: bright and noisy, on dark without noise, and no guide shows them.
+use crate::support::{assert_silent, gpu, hash};
+use tallow::denoise::filter::{FilterInput, FilterSettings, find, run};
+use tallow::layout::{Guide, vec4};
+
+const SIZE: [u32; 2] = [64, 40];
+/// Of a sample that finds a lamp.
+const BRIGHT: f32 = 60.0;
+
+/// The chance that a sample of pixel `i` finds a lamp.
+fn chance(i: u32) -> f32 {
+    let [x, y] = [i % SIZE[0], i / SIZE[0]].map(|at| at as f32 + 0.5);
+    let lobe = |centre: f32, width: f32| (-((x - centre).powi(2) + (y - 20.0).powi(2)) / (2.0 * width * width)).exp();
+    (0.7 * (lobe(16.0, 2.5) + lobe(46.0, 4.0))).min(1.0)
+}
+
+/// The plate at so many samples per pixel.
+fn plate(spp: u32) -> FilterInput {
+    let pixels = SIZE[0] * SIZE[1];
+    let found = |i: u32| {
+        let random = |k: u32| hash(hash(i) ^ (k + 1)) as f32 / u32::MAX as f32;
+        (0..spp).filter(|&k| random(k) < chance(i)).count() as f32
+    };
+    let mean = |i: u32| BRIGHT * found(i) / spp as f32;
+    // Of the mean of `spp` values that are 0 or BRIGHT.
+    let variance = |i: u32| mean(i) * (BRIGHT - mean(i)) / (spp - 1) as f32;
+    let at = |i: u32| [(i % SIZE[0]) as f32, (i / SIZE[0]) as f32, 0.0];
+    let guide =
+        |i: u32| Guide { normal: [0.0, 0.0, 1.0], depth: 5.0, position: at(i).map(|x| 0.05 * x), ..Guide::default() };
+    FilterInput {
+        width: SIZE[0],
+        height: SIZE[1],
+        radiance: (0..pixels).map(|i| [mean(i), mean(i), mean(i), spp as f32]).collect(),
+        guide: (0..pixels).map(guide).collect(),
+        variance: Some((0..pixels).map(|i| [variance(i); 3]).collect()),
+    }
+}
+
+/// As `tallow compare` has it.
+fn relmse(image: &[vec4]) -> f32 {
+    let error = |(i, c): (u32, &vec4)| {
+        let truth = BRIGHT * chance(i);
+        (c[0] - truth).powi(2) / (truth * truth + 0.01)
+    };
+    (0..).zip(image).map(error).sum::<f32>() / image.len() as f32
+}
+
+#[test]
+fn auto_is_not_worse_than_noise_between_reflections() {
+    let (gpu, auto) = (gpu(), find("auto").unwrap());
+    for spp in [4, 16, 64] {
+        let input = plate(spp);
+        let settings = FilterSettings::default().scaled_to(&input);
+        let (output, twin) = (run(&gpu, auto, &input, &settings).unwrap().0, (auto.reference)(&input, &settings));
+        let errors = [&output, &twin, &input.radiance].map(|image| relmse(image));
+        println!("{spp} samples: kernel, twin, noisy {errors:.4?}");
+        assert!(errors[0] < errors[2] && errors[1] < errors[2], "{spp} samples: {errors:?}");
+        let apart = output.iter().zip(&twin).map(|(a, b)| (a[0] - b[0]).abs()).fold(0.0, f32::max);
+        assert!(apart < 1e-3 * BRIGHT, "{apart}");
+    }
+    assert_silent(&gpu);
+}
