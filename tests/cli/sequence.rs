@@ -157,7 +157,7 @@ fn options_that_cannot_be_are_one_line() {
         ("--frames 0..3 --preview a.png", "a preview goes to a .gif"),
         ("--only 99999", "none of the frames"),
         ("--frames 0..3 --reproject forward --max-spp 9", "set neither noise_threshold nor max_spp"),
-        ("--frames 0..3 --reproject-error -1", "--reproject-error"),
+        ("--frames 0..3 --reproject-error -1", "reproject-error is -1: choose 0 or more"),
     ] {
         let output = run(&folder, words);
         let line = String::from_utf8_lossy(&output.stderr).into_owned();

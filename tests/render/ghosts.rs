@@ -140,7 +140,6 @@ fn light_that_has_changed_leaves_no_ghost() {
             found.push((event.0, moves, stage.ghost(event, moves)));
         }
     }
-    println!("{found:?}");
     assert!(found.iter().all(|(_, _, left)| left.abs() < 0.01), "(event, camera moves, what is left): {found:?}");
     let mut keeps_all = Stage::new(&gpu, Reproject { reproject_error: 1e9, ..Reproject::default() });
     let left = keeps_all.ghost(&EVENTS[0], false);

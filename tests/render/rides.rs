@@ -94,7 +94,11 @@ fn moving_scenes_show_what_is_there() {
             let pose = Pose { camera: None, lights: Vec::new(), ..pose(&scene, &moment(k), rebuild_above) };
             let pose = Pose { materials: Vec::new(), environment: None, ..pose };
             let change = scene.apply(&pose).unwrap();
-            assert!(rebuild_above > 0.0 || !change.triangle_now.is_empty(), "control: triangles have other numbers");
+            assert!(
+                change.deformed.iter().all(|d| d.rebuilt == (rebuild_above == 0.0)),
+                "control: {:?}",
+                change.deformed
+            );
             film.record(|renderer, rec| renderer.update(rec, &scene, &change));
             film.frame(shifted(start, [0.02 * k as f32, 0.0, 0.0]));
         }
@@ -102,7 +106,6 @@ fn moving_scenes_show_what_is_there() {
         let direct = direct(&gpu, &scene, shifted(start, [0.12, 0.0, 0.0]));
         let [wrong, off] = truth(&film.stats(), &film.carried(), &direct);
         assert!(found.carried > 100, "{found:?}");
-        println!("{wrong} of pixels wrong, off by {off}: {found:?}");
         // Light that changes slowly is found late: see `reproject_error`.
         assert!(wrong < 0.015 && off.abs() < 0.035, "{wrong} of pixels wrong, off by {off}: {found:?}");
     }
@@ -134,8 +137,7 @@ fn what_appears_vanishes_and_flips_is_seen_as_it_is() {
     }
     let direct = direct(&gpu, &scene, start);
     let [wrong, off] = truth(&film.stats(), &vec![1; direct.len()], &direct);
-    println!("what appears: {wrong} off {off}");
-    assert!(wrong < 0.015 && off.abs() < 0.05, "{wrong} of pixels wrong, off by {off}");
+    assert!(wrong < 0.015 && off.abs() < 0.02, "{wrong} of pixels wrong, off by {off}");
 
     // Of two updates between frames the second carries nothing.
     for _ in 0..2 {
@@ -195,7 +197,7 @@ fn a_sheet_that_passes_itself_shows_the_nearer_flap() {
         seen += pixels.len();
         assert!(wrong == 0, "frame {k}: {wrong} of {}", pixels.len());
     }
-    assert!(seen > 1500, "control: {seen} pixels carry samples");
+    assert!(seen > 1000, "control: {seen} pixels carry samples");
     assert_silent(&gpu);
 }
 

@@ -129,14 +129,6 @@ fn both_where_all_moves(
     for spacing in SPACINGS {
         changes = light_change::sums(&changes, light_change::cells_of(push.size), spacing);
     }
-    let reprojection = Reprojection { changes: &changes, ..leaving };
-    let frame = frame_of(scene, camera);
-    let pixels = 0..scene.settings.pixels() as u32;
-    let seen: Vec<Guide> = pixels.clone().map(|i| guide(scene, &frame, i)).collect();
-    let mut points: Vec<_> = pixels.map(|i| point(scene, &frame, i)).collect();
-    let mut words = reprojection.project(&mut handed, &seen);
-    let twin = reprojection.carry(&handed, &mut words, &seen, &mut points);
-
     film.record(|renderer, rec| renderer.update(rec, scene, &change));
     film.begin(camera);
     film.camera = camera;
@@ -146,6 +138,15 @@ fn both_where_all_moves(
         a.count == b.count && (a.error - b.error).abs() <= 1e-3 * (1.0 + b.error)
     };
     let cells = found.iter().zip(&changes).filter(alike).count();
+    // Rounding of one path may be in the errors of all cells around: from here on those of the kernels count.
+    let reprojection = Reprojection { changes: &found, ..leaving };
+    let frame = frame_of(scene, camera);
+    let pixels = 0..scene.settings.pixels() as u32;
+    let seen: Vec<Guide> = pixels.clone().map(|i| guide(scene, &frame, i)).collect();
+    let mut points: Vec<_> = pixels.map(|i| point(scene, &frame, i)).collect();
+    let mut words = reprojection.project(&mut handed, &seen);
+    let twin = reprojection.carry(&handed, &mut words, &seen, &mut points);
+
     ([(film.carried(), begun), (words, twin)], cells)
 }
 
