@@ -116,22 +116,8 @@ fn sponza_loads_with_its_textures() {
     let _alone = ALONE.lock();
     let (data, gpu) = (data(), support::gpu());
     let path = data.join("scenes/crytek-sponza/sponza.obj");
-    let mut best = f64::INFINITY;
-    // Three rounds, and more where something else keeps the machine busy.
-    for round in 1.. {
-        let start = Instant::now();
-        let scene = Scene::load(&path).map(|scene| scene.with(tiny)).expect("Sponza loads");
-        let loaded = start.elapsed().as_secs_f64();
-        let _renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).expect("Sponza fits");
-        best = best.min(start.elapsed().as_secs_f64());
-        let (n, bytes) = (scene.triangles.len(), scene.texels.len() * 4);
-        println!("Sponza: {n} triangles, {} textures, {bytes} bytes, loaded in {loaded:.2} s", scene.textures.len());
-        assert!(n > 262_000 && scene.textures.len() > 40);
-        if round >= 3 && best < 2.0 || round == 10 {
-            break;
-        }
-    }
-    println!("Sponza is ready in {best:.2} s, uploaded and its kernels compiled");
-    assert!(best < 2.0, "{best} s");
+    let scene = Scene::load(&path).map(|scene| scene.with(tiny)).expect("Sponza loads");
+    let _renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).expect("Sponza fits");
+    assert!(scene.triangles.len() > 262_000 && scene.textures.len() > 40);
     support::assert_silent(&gpu);
 }

@@ -53,6 +53,7 @@ impl Demodulated {
                 size: noisy.size,
                 radiance: plane("radiance")?,
                 guide: noisy.guide.clone(),
+                light: noisy.holds.light.then(|| noisy.light.clone()),
                 variance: measured.then(|| variance.clone()),
                 output: plane("filtered")?,
             },
@@ -86,7 +87,8 @@ impl Demodulated {
     pub fn direct_planes(&self) -> Option<Planes> {
         let Planes { size, radiance, guide, .. } = &self.planes;
         let (guide, output) = (guide.clone(), radiance.clone());
-        self.direct.as_ref().map(|d| Planes { size: *size, radiance: d.plane.clone(), guide, variance: None, output })
+        let planes = |radiance| Planes { size: *size, radiance, guide, light: None, variance: None, output };
+        self.direct.as_ref().map(|d| planes(d.plane.clone()))
     }
 
     /// direct\[P\], and what a filter made of it -> picture\[P\] of the pixels that lack it

@@ -34,7 +34,7 @@ pub use wavelet::{WaveletBasis, WaveletOverrides, WaveletSettings};
 
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, FrameResources, Gpu, Location, PassTime, Recorder};
-use crate::layout::{Guide, vec3, vec4};
+use crate::layout::{Guide, PixelLight, vec3, vec4};
 
 /// Every filter of our own, in the order of `--help`; the twin and stability tests run each row.
 pub const FILTERS: &[&Row] =
@@ -112,6 +112,8 @@ pub struct Planes {
     pub radiance: Buffer<vec4>,
     /// Centre-ray hits.
     pub guide: Buffer<Guide>,
+    /// Holds the mean albedo of the samples of every pixel that has any.
+    pub light: Option<Buffer<PixelLight>>,
     /// One element where there is none.
     pub variance: Option<Buffer<vec3>>,
     /// rgb, and the samples behind it: 1 where a pixel was in-painted, 0 where nothing reached it.
@@ -129,6 +131,7 @@ impl Planes {
             size: [input.width, input.height],
             radiance: Buffer::from_slice(gpu, "radiance", &input.radiance)?,
             guide: Buffer::from_slice(gpu, "guide", &input.guide)?,
+            light: None,
             variance: variance.map(|v| Buffer::from_slice(gpu, "variance", v)).transpose()?,
             output: Buffer::new(gpu, "filtered", input.radiance.len(), Location::Device)?,
         })

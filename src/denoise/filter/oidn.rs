@@ -49,7 +49,7 @@ pub fn filter(settings: OidnSettings, planes: &Planes) -> Result<Vec<Took>> {
     let begun = Instant::now();
     let oidn = Oidn::open()?;
     let opened = begun.elapsed();
-    let (radiance, guide) = (read_radiance(planes)?, planes.guide.read()?);
+    let (radiance, guide) = (read_radiance(planes)?, read_guide(planes)?);
     let any = |of: fn(&Guide) -> vec3| guide.iter().any(|g| of(g) != [0.0; 3]);
     let input = OidnInput {
         size: planes.size,
@@ -64,6 +64,16 @@ pub fn filter(settings: OidnSettings, planes: &Planes) -> Result<Vec<Took>> {
     let filtered = begun.elapsed();
     planes.output.write(0, &output)?;
     Ok(vec![("oidn start (wall clock)", opened), ("oidn (wall clock)", filtered)])
+}
+
+/// Surfaces with the albedo of the samples, where a pixel has any.
+fn read_guide(planes: &Planes) -> Result<Vec<Guide>> {
+    let mut guide = planes.guide.read()?;
+    let Some(light) = &planes.light else { return Ok(guide) };
+    for ((guide, light), radiance) in guide.iter_mut().zip(light.read()?).zip(planes.radiance.read()?) {
+        guide.albedo = if radiance[3] > 0.0 { light.albedo } else { guide.albedo };
+    }
+    Ok(guide)
 }
 
 fn read_radiance(planes: &Planes) -> Result<Vec<vec4>> {

@@ -97,7 +97,8 @@ impl Candidate {
         output: &Buffer<vec4>,
     ) -> Result<()> {
         let (radiance, guide, variance) = (radiance.clone(), planes.guide.clone(), planes.variance.clone());
-        self.filter.record(rec, &Planes { size: planes.size, radiance, guide, variance, output: output.clone() })
+        let (size, output) = (planes.size, output.clone());
+        self.filter.record(rec, &Planes { size, radiance, guide, light: None, variance, output })
     }
 }
 
