@@ -129,6 +129,7 @@ fn both_where_all_moves(
     for spacing in SPACINGS {
         changes = light_change::sums(&changes, light_change::cells_of(push.size), spacing);
     }
+    let frame = frame_of(scene, camera);
     film.record(|renderer, rec| renderer.update(rec, scene, &change));
     film.begin(camera);
     film.camera = camera;
@@ -140,7 +141,6 @@ fn both_where_all_moves(
     let cells = found.iter().zip(&changes).filter(alike).count();
     // Rounding of one path may be in the errors of all cells around: from here on those of the kernels count.
     let reprojection = Reprojection { changes: &found, ..leaving };
-    let frame = frame_of(scene, camera);
     let pixels = 0..scene.settings.pixels() as u32;
     let seen: Vec<Guide> = pixels.clone().map(|i| guide(scene, &frame, i)).collect();
     let mut points: Vec<_> = pixels.map(|i| point(scene, &frame, i)).collect();
