@@ -55,7 +55,8 @@ fn a_small_scene_becomes_arrays() {
     assert_eq!([shape([32, 16]), shape([64, 16])], [2.0, 4.0], "the camera follows the film");
     assert_eq!((scene.lights.len(), scene.warnings.len()), (2, 0));
     let (found, why) = effects(&scene, &scene.settings, false, false);
-    assert_eq!(found, Effects { diffuse: true, emissive: true, large_lamps: true, ..Effects::default() });
+    let expected = Effects { diffuse: true, emissive: true, large_lamps: true, soft_light: true, ..Effects::default() };
+    assert_eq!(found, expected);
     assert_eq!(why[1].1, "material \"lamp\"");
 }
 
