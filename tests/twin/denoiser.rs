@@ -173,7 +173,7 @@ fn frames_are_taken_apart_and_put_together_as_their_twins() {
                     let in_paint = policy != "uniform" && demodulation == Demodulation::Light;
                     let host = frame.on_the_host(filter, &settings, demodulation, in_paint);
                     let off = picture::apart(&device, &host, 1e-3);
-                    assert!(off < 1e-4, "{filter} {demodulation:?} {policy} {size:?}: {off}");
+                    assert!(off < 3e-4, "{filter} {demodulation:?} {policy} {size:?}: {off}");
                     assert!(device.iter().flatten().all(|v| v.is_finite()), "{filter} {demodulation:?} {size:?}");
                     device
                 };
@@ -214,7 +214,7 @@ fn files_are_taken_apart_and_put_together_as_their_twins() {
                 let ([r, g, b], _) = Filtered::new(&gpu, noisy, &recipe).unwrap().join(&gpu).unwrap();
                 let device: Vec<vec4> = (0..r.len()).map(|i| [r[i], g[i], b[i], 1.0]).collect();
                 let off = picture::apart(&device, &host, 1e-3);
-                assert!(off < 1e-4, "{demodulation:?} {size:?} without {missing:?}: {off}");
+                assert!(off < 3e-4, "{demodulation:?} {size:?} without {missing:?}: {off}");
             }
         }
     }
