@@ -49,7 +49,7 @@ fn a_grid_is_measured_and_each_point_can_be_rendered_again() {
     let folder = tempfile::tempdir().unwrap();
     let words = "--allocate uniform,both --denoise none,atrous --spp 1,4 --repeats 2 -o all --variant";
     let mut command = within(&folder, &format!("cost {} {FILM} {words}", scene()));
-    let printed = text(&command.arg("--levels 2 --sigma-n inf").output().unwrap(), 0);
+    let printed = text(&command.args(["--levels 2 --sigma-n inf"]).output().unwrap(), 0);
     assert!(printed.contains("uniform + atrous, 4 spp") && printed.contains("halve relMSE"), "{printed}");
     let document = document(&folder, "all/cost.json");
     assert!(document.complete && document.points.len() == 8 + 4, "what is not filtered has no levels: {document:?}");

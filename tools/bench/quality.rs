@@ -34,7 +34,7 @@ fn errors(image: &[vec4], reference: &[vec3]) -> (f64, f64) {
     let (mut mse, mut relative) = (0.0, 0.0);
     for (a, b) in image.iter().zip(reference) {
         for (a, b) in a.iter().zip(b) {
-            let (off, level) = (f64::from(a - b).powi(2), f64::from(b).powi(2));
+            let (off, level) = (f64::from(a - b).powi(2), f64::from(*b).powi(2));
             mse += off;
             relative += off / (level + 0.01);
         }
