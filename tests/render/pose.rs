@@ -45,8 +45,8 @@ fn a_pose_has_the_picture_of_a_scene_that_was_loaded_in_it() {
             let (found, expected) = (render(&gpu, &renderer), fresh(&gpu, &at(moment)));
             let off = found.iter().zip(&expected).filter(|(a, b)| a != b).count();
             assert_eq!(off, 0, "{moment:?}, built anew above {rebuild_above}: pixels differ");
-            assert!(found != fresh(&gpu, &at(&Moment { step: 3.0, ..*moment })), "control");
             if number == 0 {
+                assert!(found != fresh(&gpu, &at(&Moment { step: 3.0, ..*moment })), "control");
                 made = handles(&renderer);
             }
             // A tree that is built anew may have more nodes than any before.

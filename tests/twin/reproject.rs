@@ -218,7 +218,9 @@ fn kernels_agree_with_their_twin() {
         ("cornell-box/glass.toml", settings, 0.15),
         ("grass/scene.toml", loose, 0.004),
     ] {
-        for size in SIZES {
+        // Sizes do not depend on materials.
+        let sizes = if file == "cornell-box/scene.toml" { &SIZES[..] } else { &SIZES[5..] };
+        for &size in sizes {
             let scene = scene(file, size);
             let mut film = Film::new(&gpu, &scene, settings);
             film.frame(film.camera);

@@ -70,7 +70,7 @@ fn constant_images_come_back() {
     let gpu = gpu();
     for row in FILTERS {
         let sizes = [(1, 1), (40, 1)].map(|size| (size, 0.5));
-        let values = [0.0, 1e-30, 65504.0, 1e20].map(|value| ((33, 18), value));
+        let values = [0.0, 1e-30, 1e20].map(|value| ((33, 18), value));
         for ((width, height), value) in sizes.into_iter().chain(values) {
             let input = constant(width, height, value);
             let outputs = outputs(&gpu, row, &input, &extremes());
