@@ -1,5 +1,5 @@
 //! The descriptor sets of one frame. Their pools are reset and reused by the next recording.
-use super::kernel::Parts;
+use super::pipelines::Pipeline;
 use super::{At, Bound, Gpu, Slot, SlotKind};
 use crate::error::Result;
 use ash::vk;
@@ -40,11 +40,11 @@ impl Descriptors {
         Ok(())
     }
 
-    /// Allocates a descriptor set of `kernel` and writes `buffers` into it, one for each of `slots`.
+    /// Allocates a descriptor set of `pipeline` and writes `buffers` into it, one for each of `slots`.
     ///
     /// # Errors
     /// When a buffer is too large to be bound in its slot, or memory is out.
-    pub fn set(&mut self, kernel: &Parts, slots: &[Slot], buffers: &[Bound]) -> Result<vk::DescriptorSet> {
+    pub fn set(&mut self, pipeline: &Pipeline, slots: &[Slot], buffers: &[Bound]) -> Result<vk::DescriptorSet> {
         let resource = |(slot, bound): (&Slot, &Bound)| {
             Ok(match slot.kind {
                 SlotKind::Storage => Resource::Buffer([bound.storage()?]),
@@ -53,7 +53,7 @@ impl Descriptors {
             })
         };
         let resources = slots.iter().zip(buffers).map(resource).collect::<Result<Vec<_>>>()?;
-        let set = self.allocate(kernel.set_layout)?;
+        let set = self.allocate(pipeline.set_layout)?;
         let writes: Vec<_> = slots
             .iter()
             .zip(&resources)

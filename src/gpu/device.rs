@@ -4,6 +4,7 @@ use super::cache::PipelineCache;
 use super::calibrated::{self, CalibratedClock, CalibratedExtension};
 use super::info::{self, Candidate, DeviceInfo, DeviceKind, Features};
 use super::instance::{Instance, Messages};
+use super::pipelines::Pipelines;
 use crate::error::{Error, Result};
 use ash::vk::Handle;
 use ash::{ext, vk};
@@ -47,6 +48,7 @@ pub(super) struct Inner {
     pub queue_family: u32,
     pub limits: vk::PhysicalDeviceLimits,
     pub cache: PipelineCache,
+    pub pipelines: Pipelines,
     pub debug: Option<ext::debug_utils::Device>,
     pub info: DeviceInfo,
     pub calibrated: Option<CalibratedClock>,
@@ -106,6 +108,7 @@ impl Gpu {
             queue_family,
             limits: candidate.limits,
             cache: PipelineCache::default(),
+            pipelines: Pipelines::default(),
             debug,
             info: candidate.info.clone(),
             calibrated,
@@ -264,6 +267,7 @@ impl Drop for Inner {
         // submits through the layer waits, and `Recorder::external` makes its caller promise so. The instance is dropped
         // once, here.
         unsafe {
+            self.pipelines.destroy(&self.device);
             self.cache.store_and_destroy(&self.device);
             *self.lock_allocator() = None;
             if self.instance.owned {

@@ -2,7 +2,7 @@
 use super::access::Hazards;
 use super::commands::Commands;
 use super::descriptors::Descriptors;
-use super::kernel::Parts;
+use super::pipelines::Pipeline;
 use super::shape::{Pass, PassObserver, PassShape};
 use super::timing::{PassTime, Timer};
 use super::upload::Uploads;
@@ -19,7 +19,7 @@ pub struct FrameResources {
     pub(super) timer: Timer,
     pub(super) hazards: Hazards,
     pub(super) uploads: Uploads,
-    kernels: Vec<Arc<Parts>>,
+    pipelines: Vec<Arc<Pipeline>>,
     /// One for each pass of the last recording.
     pub(super) shapes: Vec<PassShape>,
     observer: Option<PassObserver>,
@@ -35,7 +35,7 @@ impl FrameResources {
             timer: Timer::new(gpu),
             hazards: Hazards::default(),
             uploads: Uploads::default(),
-            kernels: Vec::new(),
+            pipelines: Vec::new(),
             shapes: Vec::new(),
             observer: None,
         })
@@ -101,7 +101,7 @@ impl FrameResources {
         self.timer.reset();
         self.hazards.clear();
         self.uploads.reset();
-        self.kernels.clear();
+        self.pipelines.clear();
         self.shapes.clear();
         self.descriptors.reset()
     }
@@ -119,8 +119,8 @@ impl FrameResources {
 
     /// Keeps a kernel until the next reset.
     pub(super) fn keep<B>(&mut self, kernel: &Kernel<B>) {
-        if !self.kernels.iter().any(|kept| Arc::ptr_eq(kept, &kernel.parts)) {
-            self.kernels.push(kernel.parts.clone());
+        if !self.pipelines.iter().any(|kept| Arc::ptr_eq(kept, &kernel.pipeline)) {
+            self.pipelines.push(kernel.pipeline.clone());
         }
     }
 }

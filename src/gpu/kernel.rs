@@ -1,7 +1,8 @@
 //! A compiled compute pipeline, and the interface that generated code gives every kernel: bindings, push constants and
 //! specialisation constants.
 use super::access::Access;
-use super::{At, Bound, Gpu};
+use super::pipelines::{Pipeline, Recipe};
+use super::{Bound, Gpu};
 use crate::error::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;
@@ -128,7 +129,8 @@ const MAX_GROUPS: u32 = 65_535;
 
 /// A compiled kernel, specialised by its constants. `B` is the kernel's `Bind` struct.
 pub struct Kernel<B> {
-    pub(super) parts: Arc<Parts>,
+    pub(super) gpu: Gpu,
+    pub(super) pipeline: Arc<Pipeline>,
     pub(super) spirv: &'static [u8],
     pub(super) constants: Arc<[(u32, u32)]>,
     compile_time: Duration,
@@ -137,32 +139,23 @@ pub struct Kernel<B> {
     of: PhantomData<fn() -> B>,
 }
 
-/// The Vulkan objects of a kernel.
-pub(super) struct Parts {
-    pub gpu: Gpu,
-    pub set_layout: vk::DescriptorSetLayout,
-    pub layout: vk::PipelineLayout,
-    pub pipeline: vk::Pipeline,
-}
-
 impl<B: Bindings> Kernel<B> {
-    /// Compiles the kernel for these constants.
+    /// Compiles the kernel for these constants. The device keeps what was compiled: making the same kernel again takes no time, even
+    /// when the first is dropped.
     ///
     /// # Errors
     /// [`Error::Device`] when the driver refuses it, or a workgroup exceeds the device's limit.
     pub fn new(gpu: &Gpu, constants: &B::Constants) -> Result<Self> {
         let begun = Instant::now();
-        check_workgroup(B::NAME, constants.local_size(), &gpu.0.limits)?;
-        let (set_layout, layout, pipeline) = Default::default();
-        // From here on, Drop cleans up if a line below fails; null handles may be destroyed.
-        let mut parts = Parts { gpu: gpu.clone(), set_layout, layout, pipeline };
-        parts.create_layouts(B::SLOTS, size_of::<B::Push>() as u32).at(B::NAME)?;
-        let entries = constants.entries();
+        let local_size = constants.local_size();
+        check_workgroup(B::NAME, local_size, &gpu.0.limits)?;
         let spirv = if gpu.info().subgroup_shuffle { B::SPIRV } else { B::PLAIN_SPIRV };
-        parts.create_pipeline(B::NAME, spirv, &entries)?;
-        gpu.0.name(parts.pipeline, B::NAME);
-        let (compile_time, local_size) = (begun.elapsed(), constants.local_size());
-        Ok(Self { parts: Arc::new(parts), spirv, constants: entries.into(), compile_time, local_size, of: PhantomData })
+        let constants: Arc<[_]> = constants.entries().into();
+        let push_bytes = size_of::<B::Push>() as u32;
+        let recipe = Recipe { spirv, slots: B::SLOTS, push_bytes, constants: constants.clone() };
+        let pipeline = gpu.0.pipeline(B::NAME, &recipe)?;
+        let compile_time = begun.elapsed();
+        Ok(Self { gpu: gpu.clone(), pipeline, spirv, constants, compile_time, local_size, of: PhantomData })
     }
 
     /// Time that creating the pipeline took. Some drivers, such as lavapipe, compile more on the first dispatch.
@@ -192,68 +185,6 @@ fn check_workgroup(kernel: &str, [x, y]: [u32; 2], limits: &vk::PhysicalDeviceLi
         return Ok(());
     }
     Err(Error::Device(format!("{kernel}: a workgroup of {x} x {y} threads: choose 1 to {most}")))
-}
-
-impl Parts {
-    fn create_layouts(&mut self, slots: &[Slot], push_bytes: u32) -> std::result::Result<(), vk::Result> {
-        let binding = |slot: &Slot| {
-            vk::DescriptorSetLayoutBinding::default()
-                .binding(slot.binding)
-                .descriptor_type(slot.kind.descriptor())
-                .descriptor_count(1)
-                .stage_flags(vk::ShaderStageFlags::COMPUTE)
-        };
-        let bindings: Vec<_> = slots.iter().map(binding).collect();
-        let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
-        let push = [vk::PushConstantRange { stage_flags: vk::ShaderStageFlags::COMPUTE, offset: 0, size: push_bytes }];
-        // SAFETY: complete infos; the build script checked that binding numbers differ and that the push fits.
-        unsafe {
-            let device = &self.gpu.0.device;
-            self.set_layout = device.create_descriptor_set_layout(&info, None)?;
-            let sets = [self.set_layout];
-            let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets).push_constant_ranges(&push);
-            self.layout = device.create_pipeline_layout(&info, None)?;
-        }
-        Ok(())
-    }
-
-    fn create_pipeline(&mut self, name: &str, spirv: &[u8], constants: &[(u32, u32)]) -> Result<()> {
-        let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv))
-            .map_err(|e| Error::Device(format!("{name}: its code is damaged ({e}): build again")))?;
-        let values: Vec<u32> = constants.iter().map(|(_, value)| *value).collect();
-        let entry = |(index, (id, _)): (usize, &(u32, u32))| {
-            vk::SpecializationMapEntry::default().constant_id(*id).offset(4 * index as u32).size(4)
-        };
-        let entries: Vec<_> = constants.iter().enumerate().map(entry).collect();
-        let special = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&values));
-        let device = &self.gpu.0.device;
-        // SAFETY: the code was compiled for Vulkan 1.3 by the build script; the module is needed only for this call.
-        unsafe {
-            let module =
-                device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None).at(name)?;
-            let stage = vk::PipelineShaderStageCreateInfo::default()
-                .stage(vk::ShaderStageFlags::COMPUTE)
-                .module(module)
-                .name(c"main")
-                .specialization_info(&special);
-            let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout)];
-            let made = device.create_compute_pipelines(self.gpu.0.cache.raw, &info, None);
-            device.destroy_shader_module(module, None);
-            self.pipeline = made.map_err(|(_, code)| code).at(name)?[0];
-        }
-        Ok(())
-    }
-}
-
-impl Drop for Parts {
-    fn drop(&mut self) {
-        // SAFETY: made on this device; a frame that recorded them keeps this until the work is complete.
-        self.gpu.0.free(|device| unsafe {
-            device.destroy_pipeline(self.pipeline, None);
-            device.destroy_pipeline_layout(self.layout, None);
-            device.destroy_descriptor_set_layout(self.set_layout, None);
-        });
-    }
 }
 
 #[cfg(test)]

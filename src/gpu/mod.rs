@@ -27,6 +27,7 @@ mod info;
 mod instance;
 mod kernel;
 mod oidn;
+mod pipelines;
 mod recorder;
 mod shape;
 mod staging;

@@ -106,13 +106,13 @@ impl<'a> Recorder<'a> {
         groups: [u32; 3],
     ) -> Result<()> {
         check_groups(B::NAME, groups, self.gpu.0.limits.max_compute_work_group_count)?;
-        self.gpu.owns(B::NAME, &kernel.parts.gpu)?;
+        self.gpu.owns(B::NAME, &kernel.gpu)?;
         let buffers = bind.buffers();
         self.owns(&buffers)?;
-        let set = self.frame.descriptors.set(&kernel.parts, B::SLOTS, &buffers)?;
+        let set = self.frame.descriptors.set(&kernel.pipeline, B::SLOTS, &buffers)?;
         let accesses: Vec<_> = buffers.iter().map(|b| b.buffer).zip(B::SLOTS.iter().map(|slot| slot.access)).collect();
         self.frame.keep(kernel);
-        let (pipeline, layout, push) = (kernel.parts.pipeline, kernel.parts.layout, bytemuck::bytes_of(push));
+        let (pipeline, layout, push) = (kernel.pipeline.raw, kernel.pipeline.layout, bytemuck::bytes_of(push));
         let compute = vk::PipelineBindPoint::COMPUTE;
         let code = KernelCode { spirv: kernel.spirv, constants: kernel.constants.clone() };
         let bytes = B::SLOTS.iter().zip(&buffers).map(|(slot, bound)| bound.bytes(slot.kind == SlotKind::Uniform));

@@ -17,7 +17,9 @@ pub fn scene() -> String {
 
 /// The program with these words.
 pub fn command(folder: &Path, words: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tallow"));
+    // A shell starts what runs in its background with INT ignored, and the tests would pass that on.
+    let mut command = Command::new("env");
+    command.arg("--default-signal=INT,HUP,TERM").arg(env!("CARGO_BIN_EXE_tallow"));
     command.current_dir(folder).args(words.split_whitespace());
     command
 }
