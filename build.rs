@@ -25,6 +25,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::{env, fs};
 use xxhash_rust::xxh3::{Xxh3Default, xxh3_64};
 
@@ -98,29 +99,75 @@ fn kernels(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Compiles `files`; `root` is the path by which the generated code reaches the crate.
-fn generate(files: &[PathBuf], root: &str, target: &Path) -> Result<()> {
-    let (mut code, mut hash) = (String::new(), Xxh3Default::new());
-    let compiled = target.with_file_name("spirv");
-    let mut groups = BTreeMap::new();
-    for file in files {
+/// A kernel as it goes to the compiler.
+struct Kernel<'a> {
+    name: &'a str,
+    file: &'a Path,
+    interface: Interface,
+    /// Its code, and once more for devices whose subgroups cannot shuffle if that differs.
+    code: Vec<Code<'a>>,
+}
+
+struct Code<'a> {
+    file: &'a Path,
+    whole: String,
+    binary: PathBuf,
+}
+
+impl<'a> Kernel<'a> {
+    fn read(file: &'a Path, compiled: &Path) -> Result<Self> {
         let name = file.file_stem().and_then(|s| s.to_str()).context("kernel names are ASCII")?;
         let (text, sources) = preprocess(file)?;
         let interface = Interface::of(&sources)?;
         let text = structs::glsl(&interface.bindings) + &text;
-        let mut binary = |defines: &str| {
+        let code = |defines: &str| {
             let whole = [HEADER, defines, &text].concat();
-            let label = format!("{name}-{:016x}.spv", xxh3_64(whole.as_bytes()));
-            let spirv = fs::read(Path::new("spirv").join(&label)).or_else(|_| compile(file, &whole))?;
-            hash.update(&spirv);
-            let binary = compiled.join(&label);
-            fs::write(&binary, &spirv)?;
-            anyhow::Ok(binary)
+            let binary = compiled.join(format!("{name}-{:016x}.spv", xxh3_64(whole.as_bytes())));
+            Code { file, whole, binary }
         };
-        let usual = binary("")?;
-        let plain = if text.contains(PLAIN) { binary(&format!("#define {PLAIN}\n"))? } else { usual.clone() };
-        code += &emit::module(name, file, &interface, root, [&usual, &plain])?;
-        groups.extend(interface.groups().into_iter().map(|group| (group.clone(), declared(&interface, group))));
+        let plain = text.contains(PLAIN).then(|| code(&format!("#define {PLAIN}\n")));
+        Ok(Self { name, file, code: [code("")].into_iter().chain(plain).collect(), interface })
+    }
+}
+
+impl Code<'_> {
+    fn compile(&self) -> Result<()> {
+        let packaged = Path::new("spirv").join(self.binary.file_name().context("a file")?);
+        let spirv = fs::read(packaged).or_else(|_| compile(self.file, &self.whole))?;
+        Ok(fs::write(&self.binary, &spirv)?)
+    }
+}
+
+/// Compiles on all cores: each thread takes the next one until none is left.
+fn compile_all(code: &[&Code]) -> Result<()> {
+    let next = AtomicUsize::new(0);
+    let work = || {
+        while let Some(code) = code.get(next.fetch_add(1, Ordering::Relaxed)) {
+            code.compile()?;
+        }
+        anyhow::Ok(())
+    };
+    std::thread::scope(|scope| {
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        let running: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+        running.into_iter().try_for_each(|thread| thread.join().expect("compiling does not panic"))
+    })
+}
+
+/// Compiles `files`; `root` is the path by which the generated code reaches the crate.
+fn generate(files: &[PathBuf], root: &str, target: &Path) -> Result<()> {
+    let (mut code, mut hash) = (String::new(), Xxh3Default::new());
+    let folder = target.with_file_name("spirv");
+    let kernels = files.iter().map(|file| Kernel::read(file, &folder)).collect::<Result<Vec<_>>>()?;
+    compile_all(&kernels.iter().flat_map(|kernel| &kernel.code).collect::<Vec<_>>())?;
+    let mut groups = BTreeMap::new();
+    for Kernel { name, file, interface, code: compiled } in &kernels {
+        for compiled in compiled {
+            hash.update(&fs::read(&compiled.binary)?);
+        }
+        let [usual, plain] = [compiled.first(), compiled.last()].map(|code| &code.expect("one at least").binary);
+        code += &emit::module(name, file, interface, root, [usual, plain])?;
+        groups.extend(interface.groups().into_iter().map(|group| (group.clone(), declared(interface, group))));
     }
     // The integration tests take these from the crate.
     if root == "crate" {

@@ -265,7 +265,7 @@ fn recorded_buffers_and_kernels_live_until_the_work_is_done() {
 
 #[test]
 fn nothing_is_left_when_the_device_closes() {
-    let gpu = support::gpu();
+    let gpu = support::own_gpu();
     let log = gpu.validation_log();
     let mut frame = FrameResources::new(&gpu).unwrap();
     chain(&gpu, &mut frame, 64, true);

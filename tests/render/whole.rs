@@ -131,22 +131,36 @@ fn more_samples(s: &mut Settings) {
 
 #[test]
 fn every_scene_renders_finite_pixels_and_the_same_with_all_effects() {
-    let gpu = support::gpu();
     let files = scenes();
-    for file in &files {
-        let scene = scene(file, small);
-        let [plain, all] = plain_and_all(&gpu, &scene);
-        let (a, b) = (support::render(&gpu, &plain), support::render(&gpu, &all));
-        assert!(a.iter().all(|s| s.mean.iter().chain(&s.m2).all(|v| v.is_finite())), "{file}: broken pixels");
-        assert!(a.iter().any(|s| s.mean != [0.0; 3]), "{file}: black");
-        if bits(&a) != bits(&b) {
-            alike_with_all_effects(&gpu, file, files.len())
-                .unwrap_or_else(|e| panic!("{file}: {e}; effects that change it: {}", culprits(&gpu, &scene, &a)));
+    // Most of the time kernels are compiled, by one thread.
+    std::thread::scope(|scope| {
+        for half in 0..2 {
+            let files = &files;
+            scope.spawn(move || {
+                let gpu = support::gpu();
+                files
+                    .iter()
+                    .skip(half)
+                    .step_by(2)
+                    .for_each(|file| renders_the_same_with_all_effects(&gpu, file, files.len()));
+                support::assert_silent(&gpu);
+            });
         }
-        let light = plain.film().tiles[0].light.read().unwrap();
-        assert!(light.iter().all(|l| l.direct.iter().chain(&l.albedo).all(|v| v.is_finite())), "{file}");
+    });
+}
+
+fn renders_the_same_with_all_effects(gpu: &Gpu, file: &str, renders: usize) {
+    let scene = scene(file, small);
+    let [plain, all] = plain_and_all(gpu, &scene);
+    let (a, b) = (support::render(gpu, &plain), support::render(gpu, &all));
+    assert!(a.iter().all(|s| s.mean.iter().chain(&s.m2).all(|v| v.is_finite())), "{file}: broken pixels");
+    assert!(a.iter().any(|s| s.mean != [0.0; 3]), "{file}: black");
+    if bits(&a) != bits(&b) {
+        alike_with_all_effects(gpu, file, renders)
+            .unwrap_or_else(|e| panic!("{file}: {e}; effects that change it: {}", culprits(gpu, &scene, &a)));
     }
-    support::assert_silent(&gpu);
+    let light = plain.film().tiles[0].light.read().unwrap();
+    assert!(light.iter().all(|l| l.direct.iter().chain(&l.albedo).all(|v| v.is_finite())), "{file}");
 }
 
 /// The z-test that other devices are judged by, on any device.

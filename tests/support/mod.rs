@@ -1,5 +1,6 @@
 //! Functions that several tests share.
 #![allow(dead_code)]
+use std::sync::Mutex;
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu};
 use tallow::layout::PixelStats;
 use tallow::render::{Job, Renderer, Step};
@@ -11,11 +12,39 @@ pub mod kernels {
     include!(concat!(env!("OUT_DIR"), "/test_shaders.rs"));
 }
 
-/// A device under core and synchronization validation. `TALLOW_DEVICE` chooses one by index or name.
+/// A device under core and synchronization validation, for one test at a time: the next test finds what this one has compiled. One
+/// with a message, or of a test that failed, is not lent again.
+pub struct Lent(Gpu);
+
+static IDLE: Mutex<Vec<Gpu>> = Mutex::new(Vec::new());
+
+/// A device that no other test uses meanwhile.
+pub fn gpu() -> Lent {
+    let idle = IDLE.lock().unwrap().pop();
+    Lent(idle.unwrap_or_else(own_gpu))
+}
+
+impl std::ops::Deref for Lent {
+    type Target = Gpu;
+
+    fn deref(&self) -> &Gpu {
+        &self.0
+    }
+}
+
+impl Drop for Lent {
+    fn drop(&mut self) {
+        if !std::thread::panicking() && self.0.validation_messages().is_empty() {
+            IDLE.lock().unwrap().push(self.0.clone());
+        }
+    }
+}
+
+/// A device of the test's own, for what is left of it when it closes. `TALLOW_DEVICE` chooses it by index or name.
 ///
 /// # Panics
 /// With the remedy when there is no device or the layers are missing: a test that needs a GPU never passes without.
-pub fn gpu() -> Gpu {
+pub fn own_gpu() -> Gpu {
     let device = std::env::var("TALLOW_DEVICE").ok();
     Gpu::open(&DeviceOptions { device, validation: true, ..DeviceOptions::default() })
         .unwrap_or_else(|e| panic!("this test needs a Vulkan device and the validation layers: {e}"))

@@ -1,10 +1,10 @@
 //! Compares the kernels that place samples with their CPU twins, exactly where they compute with integers, and checks that the
 //! counts sum to the budget whatever the priorities.
-use crate::support::{assert_silent, gpu, words};
+use crate::support::{Lent, assert_silent, gpu, words};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 use tallow::allocate::{HostInputs, Inputs, POLICIES, Placing, policy};
-use tallow::gpu::{Buffer, FrameResources, Gpu, Location, PerBlock, Recorder};
+use tallow::gpu::{Buffer, FrameResources, Location, PerBlock, Recorder};
 use tallow::layout::*;
 use tallow::render::pass::apportion::{Apportion, fixed_threshold};
 use tallow::render::pass::choose::{self, Choose};
@@ -21,11 +21,12 @@ const RUNS: [u32; 2] = [64, 16];
 const SIZES: [usize; 9] = [1, 15, 31, 64, 65, 1023, 1024, 1025, 70_001];
 
 struct Bench {
-    gpu: Gpu,
     apportion: Apportion,
     scan: Scan,
     batch: Batches,
     thread_items: u32,
+    /// Lent to the next test when all else is gone.
+    gpu: Lent,
 }
 
 impl Bench {
