@@ -4,7 +4,8 @@ use anyhow::Context;
 use clap::Parser;
 use std::path::{Path, PathBuf};
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu};
-use tallow::image::Picture;
+use tallow::image::Samples;
+use tallow::layout::NONE;
 use tallow::render::{Job, Outputs, Renderer};
 use tallow::scene::SceneFile;
 use tallow::scene::description::EnvironmentTable;
@@ -37,24 +38,22 @@ struct Args {
     /// Width of each picture in pixels
     #[arg(long, default_value_t = 128)]
     width: u32,
-    /// Samples per pixel of a picture that is four times as large, and is shrunk as it is shown
-    #[arg(long, default_value_t = 32)]
+    /// How many times as wide ours are rendered, before they are shrunk as displays show them. The others' pictures were 1024 pixels
+    /// wide and more, and shrinking what is shown makes small black letters on white darker than shrinking their light
+    #[arg(long, default_value_t = 8)]
+    detail: u32,
+    /// Samples per pixel of the large picture
+    #[arg(long, default_value_t = 16)]
     spp: u32,
     /// Device, by index or part of its name
     #[arg(long)]
     device: Option<String>,
 }
 
-/// The others' pictures are several times as large as those that are compared, and are shrunk as displays show them, which makes small
-/// black letters on white darker than shrinking their light would: ours are rendered so many times as wide.
-const DETAIL: u32 = 4;
-
 /// A model with all pictures of it, ours first.
 struct Row {
     name: String,
     pictures: Vec<(String, Shown)>,
-    /// Which pixels are compared. Where a model covers a part of one, ours show the sky beside it, and the others nothing.
-    compared: Vec<bool>,
 }
 
 fn main() -> anyhow::Result<()> {
@@ -62,7 +61,9 @@ fn main() -> anyhow::Result<()> {
     let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), ..DeviceOptions::default() })?;
     let goldens = args.data.join("scenes/gltf-samples/goldens");
     let scenarios = scenario::read(&goldens.join("scenarios.json"))?;
-    println!("| model | ours from the nearest | of | they from each other | |\n|---|---|---|---|---|");
+    println!(
+        "| model | ours from the nearest | of | they from each other | | covered otherwise |\n|---|---|---|---|---|---|"
+    );
     let mut rows = Vec::new();
     for path in models(&args.data.join("scenes"))? {
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
@@ -71,11 +72,8 @@ fn main() -> anyhow::Result<()> {
         }
         let scenario = scenarios.get(&name).cloned().unwrap_or_default();
         let ours = render(&gpu, &path, &scenario, &args).with_context(|| name.clone())?;
-        let others = golden::read(&goldens.join(&name), [ours.width, ours.height].map(|n| n / DETAIL))?;
-        let pictures = shown(&ours, others, &scenario);
-        let covered = |pixel: usize| pictures.iter().all(|(_, shown)| shown.alpha[pixel] > WHOLE);
-        let compared = (0..pictures[0].1.pixels.len()).map(|pixel| scenario.sky || covered(pixel)).collect();
-        let row = Row { name, pictures, compared };
+        let others = golden::read(&goldens.join(&name), ours.size)?;
+        let row = Row { name, pictures: std::iter::once(("tallow".to_owned(), ours)).chain(others).collect() };
         println!("{}", verdict(&row, &scenario));
         rows.push(row);
     }
@@ -103,7 +101,7 @@ fn models(scenes: &Path) -> anyhow::Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-fn render(gpu: &Gpu, path: &Path, scenario: &Scenario, args: &Args) -> anyhow::Result<Picture> {
+fn render(gpu: &Gpu, path: &Path, scenario: &Scenario, args: &Args) -> anyhow::Result<Shown> {
     let mut file = SceneFile::open(path)?;
     let description = file.description_mut();
     let sky = args.data.join("scenes/gltf-samples/goldens/environment/lightroom_14b_1k.hdr");
@@ -112,50 +110,44 @@ fn render(gpu: &Gpu, path: &Path, scenario: &Scenario, args: &Args) -> anyhow::R
     description.camera = scenario.camera.clone().unwrap_or_else(|| description.camera.clone());
     let loaded = file.load()?.with(|settings| {
         let height = (f64::from(args.width) / scenario.aspect).round().max(1.0) as u32;
-        (settings.width, settings.height) = (DETAIL * args.width, DETAIL * height);
+        (settings.width, settings.height) = (args.detail * args.width, args.detail * height);
         settings.spp = args.spp;
     });
     loaded.warnings.iter().for_each(|line| eprintln!("{}: {line}", path.display()));
-    let renderer = Renderer::new(gpu, &loaded, &loaded.settings, Outputs::default())?;
+    let renderer = Renderer::new(gpu, &loaded, &loaded.settings, Outputs { guides: true, ..Outputs::default() })?;
     let job = Job::new(&renderer);
     let status = job.run_to_end(&mut FrameResources::new(gpu)?)?;
-    job.film(&status)?.picture(None).map_err(|what| anyhow::anyhow!(what))
-}
-
-/// All pictures of a model. Ours are cut out as the others are, since they show no sky.
-fn shown(ours: &Picture, others: Vec<(String, Shown)>, scenario: &Scenario) -> Vec<(String, Shown)> {
-    let mut ours = Shown::of(ours).smaller(DETAIL);
-    if let (Some((_, first)), false) = (others.first(), scenario.sky) {
-        ours.cut_out(&first.alpha);
+    let film = job.film(&status)?;
+    let mut ours = Shown::of(&film.picture(None).map_err(|what| anyhow::anyhow!(what))?);
+    if !scenario.sky {
+        let Some(Samples::U32(objects)) = film.channel("id") else { anyhow::bail!("no channel id") };
+        ours.cut_out(objects.iter().map(|&object| if object == NONE { 0.0 } else { 1.0 }).collect());
     }
-    std::iter::once(("tallow".to_owned(), ours)).chain(others).collect()
+    Ok(ours.smaller(args.detail))
 }
 
 /// The environment map that there is.
 const LIGHTING: &str = "lightroom_14b.hdr";
 
-/// Least alpha of a pixel that shows nothing but the model.
-const WHOLE: f32 = 0.995;
-
-/// A line of the table: root mean square differences of display values in [0, 1].
+/// A line of the table: root mean square differences of display values in [0, 1] where both show the model, and the share of
+/// the pixels of either in which one shows it and the other does not.
 fn verdict(row: &Row, scenario: &Scenario) -> String {
-    let (ours, others) = row.pictures.split_first().expect("ours is the first");
+    let ((_, ours), others) = row.pictures.split_first().expect("ours is the first");
+    let name = &row.name;
     if !others.is_empty() && scenario.lighting != LIGHTING {
-        return format!("| {} | | | | lit by {}, which is not here |", row.name, scenario.lighting);
+        return format!("| {name} | | | | lit by {}, which is not here | |", scenario.lighting);
     }
-    let from_ours = others.iter().map(|(name, other)| (ours.1.difference(other, &row.compared), name));
-    let Some((nearest, engine)) = from_ours.min_by(|a, b| a.0.total_cmp(&b.0)) else {
-        return format!("| {} | | | | no picture to compare with |", row.name);
+    let (others, empty): (Vec<_>, Vec<_>) = others.iter().partition(|(_, other)| other.alpha.iter().any(|&a| a > 0.0));
+    let empty: String = empty.iter().map(|(engine, _)| format!("; {engine} shows nothing")).collect();
+    let nearest = others.iter().map(|(engine, other)| (ours.difference(other), engine, ours.covered_otherwise(other)));
+    let Some((nearest, engine, otherwise)) = nearest.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+        return format!("| {name} | | | | no picture to compare with{empty} | |");
     };
-    let pairs = others
-        .iter()
-        .enumerate()
-        .flat_map(|(i, (_, a))| others[..i].iter().map(move |(_, b)| a.difference(b, &row.compared)));
-    let spread = pairs.fold(0.0, f64::max);
-    let word = match others.len() {
-        1 => "only one",
-        _ if nearest <= spread => "within",
-        _ => "beyond",
+    let pairs = others.iter().enumerate().flat_map(|(i, (_, a))| others[..i].iter().map(move |(_, b)| a.difference(b)));
+    let (spread, word) = match pairs.reduce(f64::max) {
+        None => (String::new(), "only one"),
+        Some(spread) if nearest <= spread => (format!("{spread:.4}"), "within"),
+        Some(spread) => (format!("{spread:.4}"), "beyond"),
     };
-    format!("| {} | {nearest:.4} | {engine} | {spread:.4} | {word} |", row.name)
+    format!("| {name} | {nearest:.4} | {engine} | {spread} | {word}{empty} | {:.1} % |", 100.0 * otherwise)
 }

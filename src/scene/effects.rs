@@ -113,15 +113,16 @@ fn add_light_effects(scene: &Scene, found: &mut Effects, reasons: &mut Vec<(Effe
         let first = scene.lights.iter().position(|l| l.kind == kind);
         first.inspect(|&i| reasons.push((name, light_name(scene, i)))).is_some()
     };
-    found.emissive = light(Effect::emissive, LIGHT_TRIANGLE) || light(Effect::emissive, LIGHT_SPHERE);
+    let panels = light(Effect::emissive, LIGHT_TRIANGLE);
+    found.emissive = panels || light(Effect::emissive, LIGHT_SPHERE);
     found.point_lights = light(Effect::point_lights, LIGHT_POINT);
     found.spot_lights = light(Effect::spot_lights, LIGHT_SPOT);
     found.directional_lights = light(Effect::directional_lights, LIGHT_DIRECTIONAL);
     found.environment = light(Effect::environment, LIGHT_ENVIRONMENT);
     found.environment_map = scene.environment.is_some() && light(Effect::environment_map, LIGHT_ENVIRONMENT);
     let large = scene.lights.iter().position(|l| lights::is_large(scene, l));
-    let name = large.map_or_else(|| "lamps as they were loaded".to_owned(), |i| light_name(scene, i));
-    found.large_lamps = because(reasons, Effect::large_lamps, scene.large_lamps, name);
+    let name = large.map_or_else(|| "lamps that were or may come to be large".to_owned(), |i| light_name(scene, i));
+    found.large_lamps = because(reasons, Effect::large_lamps, panels && scene.large_lamps, name);
 }
 
 fn light_name(scene: &Scene, index: usize) -> String {

@@ -83,8 +83,9 @@ pub struct Scene {
     /// per square world unit of drawing a point by [`Scene::light_table`] that a path has hit otherwise. 0 without
     /// emissive triangles. Exact up to the rounding of the table (2^-32 / lights) and of 32-bit floats.
     pub triangle_pdf_scale: f32,
-    /// Whether emissive triangles are sampled by solid angle, not by area, since one of them is large. It stays as the scene was loaded,
-    /// however its lamps move: the light is the same on average, and no frame depends on those before it.
+    /// Whether emissive triangles are sampled by solid angle, not by area, since one of them is large, or may come to be while an
+    /// animation moves the scene. It stays as the scene was loaded, so that no frame depends on those before it. An engine whose lamps grow
+    /// sets it before it makes a renderer; without, the light is the same on average, with more noise near them.
     pub large_lamps: bool,
     /// The environment image, when the environment is not a constant.
     pub environment: Option<Environment>,
@@ -279,6 +280,7 @@ impl<'a> SceneFile<'a> {
         let animation = animation::load(&self.path, &description, &movers, &scene)?;
         if !animation.is_empty() {
             scene.view.framed = Some(scene.bounds);
+            scene.large_lamps = scene.large_lamps || animation.moves_surfaces();
         }
         Ok(Loaded { scene, settings, animation })
     }

@@ -126,6 +126,29 @@ fn ctrl_c_is_heard_while_a_filter_runs() {
     complains(&running.end(), 130, &["pipe.exr"]);
 }
 
+/// A run that goes on after finished frames has frames to speak of before it has written one itself.
+#[test]
+fn an_interrupted_sequence_says_that_finished_frames_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    let words =
+        format!("sequence {} --width 16 --height 16 --spp 1 --quiet --frames 0..100000 -o a.#####.exr", scene());
+    let mut running = start(&folder, &words);
+    running.until_there_is("a.00001.exr");
+    running.send(&["INT"]);
+    complains(
+        &running.end(),
+        130,
+        &["interrupted in frame ", "finished frames stay, and the same command goes on there"],
+    );
+    let before = names(folder.path());
+    assert!(before.len() > 1 && before.iter().all(|name| name.ends_with(".exr")), "{before:?}");
+    let mut running = start(&folder, &words);
+    running.until_it_listens();
+    running.send(&["INT"]);
+    complains(&running.end(), 130, &["finished frames stay"]);
+    assert!(before.iter().all(|name| folder.path().join(name).is_file()));
+}
+
 #[test]
 fn explain_is_one_process() {
     let folder = tempfile::tempdir().unwrap();

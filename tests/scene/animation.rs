@@ -1,7 +1,7 @@
 //! Tests of the `[[animation]]` tables: where they put things, and the messages about mistakes.
 use std::fs;
 use std::path::Path;
-use tallow::scene::{Pose, Scene};
+use tallow::scene::{Loaded, Pose, Scene, effects};
 
 const STAGE: &str = "
 [camera]
@@ -81,6 +81,34 @@ keys = [{ time = 0, radiance = 1 }, { time = 1, radiance = [3, 2, 1] }]
     let camera = at.camera.unwrap();
     assert_eq!((camera.fov, camera.position, camera.target), (Some(50.0), Some([0.0, 1.0, 9.0]), Some([0.0; 3])));
     assert_eq!(at.environment.unwrap().radiance, Some([2.0, 1.5, 1.0]));
+}
+
+/// A frame alone cannot know how large a lamp is in the others.
+#[test]
+fn lamps_that_may_grow_are_sampled_as_large_ones() {
+    const PANEL: &str = "
+[[material]]
+name = \"lamp\"
+emission = 5
+[[mesh]]
+name = \"panel\"
+shape = \"rectangle\"
+material = \"lamp\"
+transform = { scale = 0.01 }
+";
+    let load = |tables: &str| Scene::parse(Path::new("s.toml"), &(STAGE.to_owned() + tables)).unwrap();
+    let large = |scene: &Scene| effects(scene, &Default::default(), false, false).0.large_lamps;
+    let camera = "[[animation]]\ncamera = true\nkeys = [{ time = 0, fov = 40 }, { time = 1, fov = 60 }]";
+    let grows = "[[animation]]\ninstance = \"panel\"\nkeys = [{ time = 0, scale = 0.01 }, { time = 1, scale = 2 }]";
+    assert!(!large(&load(PANEL)) && !large(&load(&(PANEL.to_owned() + camera))));
+    let Loaded { mut scene, animation, .. } = load(&(PANEL.to_owned() + grows));
+    for seconds in [0.0, 1.0, 0.0] {
+        scene.apply(&animation.at(seconds).unwrap()).unwrap();
+        assert!(large(&scene), "at {seconds} s");
+    }
+    let dark = grows.replace("panel", "box");
+    assert!(!large(&load(&dark)), "without lamps there is nothing to sample");
+    assert!(large(&load(&PANEL.replace("0.01", "2"))), "control: one that is large and stays");
 }
 
 #[test]

@@ -2,6 +2,7 @@
 //! cannot be.
 use crate::poses::{MOMENTS, Moment, at, pose};
 use bytemuck::{Pod, cast_slice};
+use glam::{DVec3, Vec3};
 use tallow::layout::Instance;
 use tallow::scene::description::Transform;
 use tallow::scene::{Pose, Scene, Vertices};
@@ -68,6 +69,60 @@ fn a_refitted_mesh_keeps_its_lights_and_instances_and_the_way_does_not_count() {
     }
 }
 
+/// Checks that all corners below a node lie in the boxes of its children, which reach beyond them by two cells of their grid, and what
+/// boxes are grown by, at most; returns the corners.
+fn check_boxes(scene: &Scene, index: u32) -> Vec<DVec3> {
+    let node = &scene.nodes[index as usize];
+    let bytes = |words: [u32; 2]| bytemuck::cast::<_, [u8; 8]>(words);
+    let [x, y, z, inner] = node.e_imask.to_le_bytes();
+    let cell = DVec3::from([x, y, z].map(|e| f64::from(f32::from_bits(u32::from(e) << 23))));
+    let (mut next, mut all) = (node.child_base, Vec::new());
+    for (slot, meta) in bytes(node.meta).into_iter().enumerate().filter(|(_, meta)| *meta != 0) {
+        let corners = if inner >> slot & 1 == 1 {
+            next += 1;
+            check_boxes(scene, next - 1)
+        } else {
+            let first = (node.primitive_base + u32::from(meta & 31)) as usize;
+            let leaf = &scene.triangles[first..first + (meta >> 5).count_ones() as usize];
+            leaf.iter().flat_map(|t| [t.v0, t.v1, t.v2].map(|p| Vec3::from(p).as_dvec3())).collect()
+        };
+        let end = |words: [[u32; 2]; 3]| {
+            Vec3::from(node.p).as_dvec3() + cell * DVec3::from(words.map(|w| f64::from(bytes(w)[slot])))
+        };
+        let (low, high) = (end([node.min_x, node.min_y, node.min_z]), end([node.max_x, node.max_y, node.max_z]));
+        let least = corners.iter().fold(DVec3::INFINITY, |low, p| low.min(*p));
+        let most = corners.iter().fold(DVec3::NEG_INFINITY, |high, p| high.max(*p));
+        assert!(low.cmple(least).all() && most.cmple(high).all(), "a corner is outside: {low} {least} {most} {high}");
+        let (spare, grown) = ((least - low).max(high - most), 1e-6 * least.abs().max(most.abs()).max_element());
+        assert!(spare.cmple(2.0 * cell + grown).all(), "larger than what it holds by {spare}, in cells of {cell}");
+        all.extend(corners);
+    }
+    all
+}
+
+/// Rays seldom meet what lies between a corner and a box that is a cell too small; the boxes themselves tell.
+#[test]
+fn refitted_boxes_hold_what_is_in_them_and_little_more() {
+    let mut scene = at(&Moment::default()).scene;
+    let mesh = scene.rig.mesh("cloth").unwrap();
+    let check = |scene: &Scene| {
+        let cloth = scene.instances.iter().find(|i| scene.names.objects[i.object as usize] == "cloth").unwrap();
+        assert_eq!(check_boxes(scene, cloth.root).len(), 3 * 2 * 23 * 23);
+    };
+    check(&scene);
+    for moment in &MOMENTS {
+        scene.apply(&pose(&scene, moment, f32::INFINITY)).unwrap();
+        check(&scene);
+    }
+    let mut random = fastrand::Rng::with_seed(11);
+    for scale in [1.0, 1e-3, 3e4] {
+        let positions = (0..24 * 24).map(|_| std::array::from_fn(|_| scale * (random.f32() + 0.2))).collect();
+        let meshes = vec![(mesh, Vertices { positions, ..Vertices::default() })];
+        scene.apply(&Pose { meshes, rebuild_above: f32::INFINITY, ..Pose::default() }).unwrap();
+        check(&scene);
+    }
+}
+
 #[test]
 fn a_tree_that_has_become_bad_is_built_anew() {
     let mut scene = at(&Moment::default()).scene;
@@ -82,6 +137,36 @@ fn a_tree_that_has_become_bad_is_built_anew() {
     scene.check().unwrap();
     let second = scene.apply(&pose).unwrap().deformed[0];
     assert!(!second.rebuilt && (second.cost - 1.0).abs() < 1e-3, "{second:?}");
+}
+
+#[test]
+fn a_mesh_that_shrinks_to_nothing_or_turns_inside_out_comes_back() {
+    let mut scene = at(&Moment::default()).scene;
+    let back = |scene: &Scene| pose(scene, &Moment::default(), 0.0);
+    scene.apply(&back(&scene)).unwrap();
+    let whole = scene.clone();
+    let (number, cloth) = back(&scene).meshes.remove(0);
+    let scales: [[f32; 3]; 6] =
+        [[0.0; 3], [1.0, -1.0, 1.0], [0.0, 1.0, 1.0], [-1.0; 3], [1e-30; 3], [f32::MIN_POSITIVE, 0.0, 1e9]];
+    for rebuild_above in [f32::INFINITY, 1.4, 0.0] {
+        for by in scales {
+            let scaled = |v: &[f32; 3]| std::array::from_fn(|axis| v[axis] * by[axis]);
+            let positions = cloth.positions.iter().map(scaled).collect();
+            // Normals of no length at all are repaired, as those of files are.
+            let normals = cloth.normals.iter().map(scaled).collect();
+            let to = Vertices { positions, normals, ..Vertices::default() };
+            let pose = Pose { meshes: vec![(number, to)], rebuild_above, ..Pose::default() };
+            let change = scene.apply(&pose).unwrap();
+            scene.check().unwrap();
+            assert!(change.deformed.iter().all(|d| d.cost.is_finite()), "{by:?}: {change:?}");
+            let finite = |v: [f32; 3]| v.iter().all(|v| v.is_finite());
+            assert!(scene.bounds.into_iter().all(finite) && scene.nodes.iter().all(|n| finite(n.p)), "{by:?}");
+            assert!(scene.lights.iter().all(|light| light.probability.is_finite()), "{by:?}");
+        }
+    }
+    scene.apply(&back(&scene)).unwrap();
+    let found = differing(&scene, &whole);
+    assert!(found.iter().all(|name| *name == "nodes"), "{found:?}");
 }
 
 #[test]

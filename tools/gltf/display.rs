@@ -34,14 +34,13 @@ impl Shown {
         let [width, height] = self.size.map(|n| n / times);
         let square = |at: u32| {
             let corner = at / width * times * self.size[0] + at % width * times;
-            let place = move |k: u32| (corner + k / times * self.size[0] + k % times) as usize;
-            let sum = (0..times * times)
-                .map(place)
-                .fold([0.0; 3], |sum: [f32; 3], i| std::array::from_fn(|c| sum[c] + self.pixels[i][c]));
-            sum.map(|v| v / (times * times) as f32)
+            (0..times * times).map(move |k| (corner + k / times * self.size[0] + k % times) as usize)
         };
-        let pixels: Vec<_> = (0..width * height).map(square).collect();
-        Self { size: [width, height], alpha: vec![1.0; pixels.len()], pixels }
+        let share = 1.0 / (times * times) as f32;
+        let add = |sum: [f32; 3], i: usize| std::array::from_fn(|c| sum[c] + share * self.pixels[i][c]);
+        let pixels = (0..width * height).map(|at| square(at).fold([0.0; 3], add)).collect();
+        let alpha = (0..width * height).map(|at| square(at).map(|i| share * self.alpha[i]).sum()).collect();
+        Self { size: [width, height], pixels, alpha }
     }
 
     /// Averages `bytes` of so many channels to another size.
@@ -65,20 +64,35 @@ impl Shown {
         Self { size, pixels, alpha }
     }
 
-    /// Keeps what another picture's alpha covers.
-    pub fn cut_out(&mut self, alpha: &[f32]) {
-        self.alpha = alpha.to_vec();
-        self.pixels.iter_mut().zip(alpha).for_each(|(pixel, a)| *pixel = pixel.map(|v| v * a));
+    /// Keeps what `alpha` covers.
+    pub fn cut_out(&mut self, alpha: Vec<f32>) {
+        self.pixels.iter_mut().zip(&alpha).for_each(|(pixel, a)| *pixel = pixel.map(|v| v * a));
+        self.alpha = alpha;
     }
 
-    /// Root mean square difference of the values, over the pixels that are compared.
-    pub fn difference(&self, other: &Self, compared: &[bool]) -> f64 {
+    /// Root mean square difference of the values, over the pixels that the model covers whole in both pictures: infinite where
+    /// there are none.
+    pub fn difference(&self, other: &Self) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
-        for i in (0..self.pixels.len()).filter(|&i| compared[i]) {
+        let whole = |i: &usize| self.alpha[*i] > WHOLE && other.alpha[*i] > WHOLE;
+        for i in (0..self.pixels.len()).filter(whole) {
             let pairs = self.pixels[i].iter().zip(other.pixels[i]);
             sum += pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>() / 3.0;
             count += 1.0;
         }
-        (sum / f64::max(count, 1.0)).sqrt()
+        if count > 0.0 { f64::sqrt(sum / count) } else { f64::INFINITY }
+    }
+
+    /// Of the pixels that either covers at least half, the share that the other does not.
+    pub fn covered_otherwise(&self, other: &Self) -> f64 {
+        let (mut either, mut one) = (0.0, 0.0);
+        for (a, b) in self.alpha.iter().zip(&other.alpha).map(|(a, b)| (*a >= 0.5, *b >= 0.5)) {
+            either += f64::from(u8::from(a || b));
+            one += f64::from(u8::from(a != b));
+        }
+        one / f64::max(either, 1.0)
     }
 }
+
+/// Least alpha of a pixel that shows nothing but the model.
+const WHOLE: f32 = 0.995;

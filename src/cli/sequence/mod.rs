@@ -5,7 +5,7 @@ mod range;
 mod stage;
 
 use super::render::{self, outputs};
-use super::{Exit, complain, fail_on_messages, finite, print, print_json};
+use super::{Exit, complain, fail_on_messages, finite, interrupt, print, print_json};
 use crate::error::{Error, Result};
 use crate::render::{Carriage, ReprojectOverrides};
 use crate::scene::description::numbered;
@@ -178,19 +178,22 @@ struct Summary {
 /// What fails before the first frame, and the loss of the device.
 pub fn run(args: &Args) -> Result<Exit> {
     args.check()?;
+    interrupt::leave_at_once(&interruption("before the first frame"));
     let begun = Instant::now();
     let mut stage = Stage::new(args)?;
     let mut preview = args.preview.as_ref().map(|_| Preview::default());
     let (numbers, mut reports) = (args.numbers(stage.frames())?, Vec::new());
     for number in numbers.clone() {
+        let line = interruption(&format!("in frame {number}"));
+        if interrupt::leave_at_once(&line) {
+            interrupt::leave(&line);
+        }
         let frame = stage.frame(number, preview.as_mut());
         if let Err(error @ Error::DeviceLost(_)) = frame.result {
             return Err(error);
         }
         if matches!(frame.result, Ok(Exit::Interrupted)) {
-            complain(&format!(
-                "interrupted in frame {number}: finished frames stay, and the same command goes on there"
-            ));
+            complain(&line);
             return Ok(Exit::Interrupted);
         }
         let report = frame.report();
@@ -207,6 +210,10 @@ pub fn run(args: &Args) -> Result<Exit> {
         print_json(&Summary { frames: reports, failed, seconds, device })?;
     }
     Ok(if failed == 0 { Exit::Done } else { Exit::PartlyFailed })
+}
+
+fn interruption(place: &str) -> String {
+    format!("interrupted {place}: finished frames stay, and the same command goes on there")
 }
 
 /// One line for a frame; a failure is always told.

@@ -55,6 +55,11 @@ impl Animation {
         self.movers.iter().map(|mover| mover.end()).fold(0.0, f64::max)
     }
 
+    /// Whether more moves than cameras, lights without surface and materials. Where a file is missing, the frame that needs it says so.
+    pub(super) fn moves_surfaces(&self) -> bool {
+        self.at(0.0).map_or(true, |pose| !(pose.instances.is_empty() && pose.meshes.is_empty()))
+    }
+
     /// Whether nothing moves.
     pub fn is_empty(&self) -> bool {
         self.movers.is_empty()

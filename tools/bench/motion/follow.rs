@@ -43,14 +43,15 @@ pub fn report(gpu: &Gpu, data: &Path, frames: u32) -> Result<()> {
     let head = ["scene", "triangles", "pose refitted", "built anew", "Mray/s refitted", "built anew", "cost"];
     println!("{}", table::text(&head, &trees));
     println!("pose: milliseconds of the host; cost: the largest of a refitted hierarchy over that when it was built\n");
-    println!(
-        "Filter and samples, 160 x 100, {SPP} samples per pixel placed by `both`, means of relMSE over {frames} frames"
-    );
-    let head = ["scene", "noisy", "guided", "guided, last frame's", "samples on it", "on the ground"];
+    println!("Filter and samples, 160 x 100, {SPP} samples per pixel, means of relMSE over {frames} frames");
+    let head =
+        ["scene", "uniform", "placed", "of uniform", "guided", "of placed", "last frame's", "on it", "on the ground"];
     println!("{}", table::text(&head, &pictures));
     println!(
-        "last frame's: the picture of the frame before, in this one's place; samples: per pixel, the sky has the rest"
+        "placed: by the policy `both`; guided: those, filtered; of uniform, of placed: in the best and the worst frame"
     );
+    println!("last frame's: the filtered picture of the frame before, in this one's place");
+    println!("on it, on the ground: placed samples per pixel; the sky has the rest");
     Ok(())
 }
 
@@ -130,25 +131,34 @@ fn hierarchies(gpu: &Gpu, name: &str, loaded: &Loaded, frames: u32) -> Result<Ve
 fn pictures_of(gpu: &Gpu, name: &str, loaded: &Loaded, frames: u32) -> Result<Vec<String>> {
     let size = [160, 100];
     let ground = loaded.names.objects.iter().position(|n| n == "ground").context("the ground")? as u32;
-    let (mut errors, mut samples, mut last) = ([const { Vec::new() }; 3], [const { Vec::new() }; 2], None);
+    let (mut errors, mut samples, mut last) = ([const { Vec::new() }; 4], [const { Vec::new() }; 2], None);
     play(loaded, frames, f32::INFINITY, |scene, _, _| {
         let reference = picture(gpu, scene, &Settings { seed: 1, ..film(loaded, size, REFERENCE_SPP) })?.0;
+        let error = |picture: &Picture| metrics::compare(picture, &reference).relmse;
+        errors[0].push(error(&picture(gpu, scene, &film(loaded, size, SPP))?.0));
         let mut settings = film(loaded, size, SPP);
         settings.allocate.policy = policy("both").context("a policy of that name")?;
         let (noisy, film, filtered) = picture(gpu, scene, &settings)?;
-        let error = |picture: &Picture| metrics::compare(picture, &reference).relmse;
-        errors[0].push(error(&noisy));
-        errors[1].push(error(&filtered));
-        errors[2].extend(last.replace(filtered).map(|last| error(&last)));
+        errors[1].push(error(&noisy));
+        errors[2].push(error(&filtered));
+        errors[3].extend(last.replace(filtered).map(|last| error(&last)));
         let [on_it, on_ground] = samples_on(&film, ground)?;
         samples[0].push(on_it);
         samples[1].push(on_ground);
         Ok(())
     })?;
-    let mean = |values: &Vec<f64>| values.iter().sum::<f64>() / values.len().max(1) as f64;
-    let errors = errors.iter().map(|e| format!("{:.4}", mean(e)));
-    let samples = samples.iter().map(|s| format!("{:.2}", mean(s)));
-    Ok([name.to_owned()].into_iter().chain(errors).chain(samples).collect())
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let [uniform, placed, guided, last] = &errors;
+    let [e_uniform, e_placed, e_guided, e_last] = [uniform, placed, guided, last].map(|e| format!("{:.4}", mean(e)));
+    let [on_it, on_ground] = samples.map(|s| format!("{:.2}", mean(&s)));
+    let (of_uniform, of_placed) = (ratios(placed, uniform), ratios(guided, placed));
+    Ok(vec![name.to_owned(), e_uniform, e_placed, of_uniform, e_guided, of_placed, e_last, on_it, on_ground])
+}
+
+/// The smallest and the largest ratio of two errors of a frame.
+fn ratios(of: &[f64], to: &[f64]) -> String {
+    let all = || of.iter().zip(to).map(|(a, b)| a / b);
+    format!("{:.2} to {:.2}", all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max))
 }
 
 /// The noisy picture, its film, and what the guided filter makes of it.
