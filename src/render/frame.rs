@@ -86,10 +86,10 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
             rec.copy(&scene.camera, &history.previous)?; // camera -> previous camera
             rec.update(&scene.camera, &constants.camera)?; // camera
             rec.fill(&film.broken, 0)?; // 0 -> broken
-            if history.has_changed() {
-                light_change::after(rec, history, scene, tile, &constants.path)?; // probes[cells], history[P] -> changes[cells]
-            } else {
+            if !history.has_changed() {
                 reproject::remember(rec, history, scene, tile, &constants.path)?; // guide[P], stats[P] -> history[P]
+            } else if let Some(probes) = &history.probes {
+                light_change::after(rec, history, probes, scene, tile, &constants.path)?; // probes[cells], history[P] -> changes[cells]
             }
             primary_hit::record(&kernels.primary_hit, rec, scene, tile, &constants.path)?; // camera -> guide[P], points[P]
             reproject::carry(rec, history, scene, tile, &constants.path)?; // history[P], points[P] -> stats[P], light[P]
@@ -139,9 +139,12 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
 pub fn record_change(rec: &mut Recorder, frame: &Frame) -> Result<()> {
     let Frame { scene, film, constants, .. } = frame;
     let (history, tile) = (frame.history()?, &film.tiles[0]);
+    let Some(probes) = &history.probes else {
+        return rec.fill(&history.offered, 0); // 0 -> offered[P]
+    };
     rec.copy(&scene.camera, &history.previous)?; // camera -> previous camera
     reproject::remember(rec, history, scene, tile, &constants.path)?; // guide[P], stats[P] -> history[P]
-    light_change::before(rec, history, scene, tile, &constants.path) // points[P] -> probes[cells]
+    light_change::before(rec, history, probes, scene, tile, &constants.path) // points[P] -> probes[cells]
 }
 
 /// Samples are placed on films of one tile alone.

@@ -22,11 +22,12 @@ pub mod schedule;
 pub use crate::scene::description::settings;
 mod supersampling;
 mod update;
+mod upload;
 mod views;
 
 pub use buffers::{DeviceScene, FilmBuffers, FilmTile};
 pub use carriage::{Carriage, Carried, carried_samples};
-pub use history::{History, Reproject, ReprojectOverrides};
+pub use history::{History, Moves, Reproject, ReprojectOverrides};
 pub use job::{Job, Status, StopReason};
 pub use merge::{Gap, Merged, merge};
 pub use moving::can_carry;

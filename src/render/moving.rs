@@ -1,6 +1,6 @@
 //! Frames that begin with the samples of the last: what a renderer needs for it, and what became of them.
 use super::carriage::{Carriage, carried_samples};
-use super::history::{History, Reproject};
+use super::history::{History, Moves, Reproject};
 use super::schedule::{self, Begun};
 use super::{Renderer, Step, kernels};
 use crate::error::{Error, Result};
@@ -12,7 +12,7 @@ use crate::scene::Scene;
 impl Renderer {
     /// From now on frames can begin with [`Step::Reproject`] in place of [`Step::Start`]: with the samples of the last frame that
     /// show the same surface from the new camera. Call it once, before anything is recorded; the renderer must have been made with
-    /// [`super::Outputs::guides`]. The first [`Step::Reproject`] of all carries nothing.
+    /// [`super::Outputs::guides`]. The first [`Step::Reproject`] of all carries nothing. `moves` says what may change between frames.
     ///
     /// Carried samples count in the mean, in its variance and in the number of samples of a pixel. They are no part of the
     /// sequence that new samples come from: give each frame its own by [`Self::set_first_sample`], or its own seed.
@@ -20,13 +20,13 @@ impl Renderer {
     /// # Errors
     /// [`Error::Usage`] for a setting out of range, for a renderer without guides and for a film that is too large;
     /// [`Error::Device`].
-    pub fn keep_history(&mut self, settings: Reproject) -> Result<()> {
+    pub fn keep_history(&mut self, settings: Reproject, moves: Moves) -> Result<()> {
         let (pixels, size) = (self.settings.pixels(), [self.settings.width, self.settings.height]);
         if !self.frame.film.tiles[0].has_guide() {
             let what = "a history needs primary hits: make the renderer with Outputs::guides";
             return Err(Error::Usage(what.into()));
         }
-        let history = History::new(&self.gpu, self.effects, self.stack, size, self.settings.spp, settings)?;
+        let history = History::new(&self.gpu, self.effects, self.stack, size, self.settings.spp, (settings, moves))?;
         let tile = &mut self.frame.film.tiles[0];
         let none = SurfacePoint { triangle: NONE, instance: NONE, ..SurfacePoint::default() };
         tile.points = Buffer::from_slice(&self.gpu, "points", &vec![none; pixels])?;

@@ -3,12 +3,11 @@ use super::buffers::DeviceScene;
 use super::frame;
 use super::push::{frame_constants, priority_push};
 use super::renderer::{Renderer, called_for};
+use super::upload::{parts, whole};
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, Gpu, Recorder};
+use crate::gpu::{Gpu, Recorder};
 use crate::layout::{Effect, Effects};
-use crate::scene::{Change, Relit, Scene, light_effects};
-use bytemuck::Pod;
-use std::ops::Range;
+use crate::scene::{Change, Scene, light_effects};
 
 impl Renderer {
     /// Records the upload of what a pose has changed: see [`Scene::apply`]. Frames that were recorded before keep the scene as it was,
@@ -56,21 +55,7 @@ impl Renderer {
         if history.has_changed() {
             return rec.fill(&history.offered, 0); // nothing is handed on
         }
-        history.follow(&self.gpu)?;
-        let relit = change.lights.then(|| Relit::of(&change.lights_before, scene)).flatten();
-        history.note(change, relit.as_ref(), &self.frame.constants.path, self.settings.first_sample);
-        if let Some(relit) = &relit {
-            whole(&self.gpu, rec, "lights before", &mut history.lights[0], &relit.before)?;
-            whole(&self.gpu, rec, "lights after", &mut history.lights[1], &relit.after)?;
-            whole(&self.gpu, rec, "table of both", &mut history.light_table, &relit.table)?;
-        }
-        for (to, now) in
-            [(&mut history.instance_now, &change.instance_now), (&mut history.triangle_now, &change.triangle_now)]
-        {
-            if !now.is_empty() {
-                whole(&self.gpu, rec, "numbers now", to, now)?;
-            }
-        }
+        history.note(&self.gpu, rec, (scene, change), &self.frame.constants.path, self.settings.first_sample)?;
         frame::record_change(rec, &self.frame)
     }
 
@@ -115,54 +100,4 @@ fn upload(gpu: &Gpu, rec: &mut Recorder, to: &mut DeviceScene, scene: &Scene, ch
         whole(gpu, rec, "light_table", &mut to.light_table, &scene.light_table)?;
     }
     Ok(())
-}
-
-fn whole<T: Pod>(gpu: &Gpu, rec: &mut Recorder, name: &str, to: &mut Buffer<T>, values: &[T]) -> Result<()> {
-    parts(gpu, rec, name, to, values, std::slice::from_ref(&(0..values.len())), values.len() / 4)
-}
-
-/// Uploads the parts of an array that changed, or all of it where it has outgrown its buffer: to a new one with room for `spare`
-/// more. Frames in flight keep the old one.
-fn parts<T: Pod>(
-    gpu: &Gpu,
-    rec: &mut Recorder,
-    name: &str,
-    to: &mut Buffer<T>,
-    values: &[T],
-    changed: &[Range<usize>],
-    spare: usize,
-) -> Result<()> {
-    if changed.is_empty() {
-        return Ok(());
-    }
-    if values.len() > to.len() {
-        *to = Buffer::for_texels(gpu, name, values.len() + spare)?;
-        return rec.upload(to, &[(0, values)]);
-    }
-    let parts = joined(changed, values.len());
-    rec.upload(to, &parts.into_iter().map(|range| (range.start, &values[range])).collect::<Vec<_>>())
-}
-
-/// Sorted ranges that do not overlap, within an array of so many elements.
-fn joined(ranges: &[Range<usize>], len: usize) -> Vec<Range<usize>> {
-    let mut sorted: Vec<_> = ranges.iter().map(|r| r.start.min(len)..r.end.min(len)).collect();
-    sorted.sort_unstable_by_key(|range| range.start);
-    let mut joined: Vec<Range<usize>> = Vec::new();
-    for range in sorted {
-        match joined.last_mut().filter(|last| range.start <= last.end) {
-            Some(last) => last.end = last.end.max(range.end),
-            None => joined.push(range),
-        }
-    }
-    joined
-}
-
-#[cfg(test)]
-mod tests {
-    use super::joined;
-
-    #[test]
-    fn parts_do_not_overlap() {
-        assert_eq!(joined(&[5..9, 0..2, 2..3, 6..12, 20..30], 10), [0..3, 5..10]);
-    }
 }

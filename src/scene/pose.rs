@@ -26,6 +26,15 @@ pub struct Pose {
     pub rebuild_above: f32,
 }
 
+impl Pose {
+    /// Whether it says where the camera is, and of nothing else.
+    pub fn is_of_camera_alone(&self) -> bool {
+        let Self { camera: _, instances, meshes, materials, lights, environment, rebuild_above: _ } = self;
+        let tables = instances.is_empty() && meshes.is_empty() && materials.is_empty() && lights.is_empty();
+        tables && environment.is_none()
+    }
+}
+
 impl Default for Pose {
     fn default() -> Self {
         Self {

@@ -87,7 +87,7 @@ impl Stage {
         let scene = room();
         let long = scene.clone().with(|s| (s.spp, s.seed) = (64, 99));
         let still = Renderer::new(gpu, &long, &long.settings, Outputs::default()).unwrap();
-        Self { gpu: gpu.clone(), film: Film::new(gpu, &scene, settings), still, scene }
+        Self { gpu: gpu.clone(), film: Film::moving(gpu, &scene, settings), still, scene }
     }
 
     fn pose(&mut self, pose: fn(&Scene) -> Pose) {
@@ -152,7 +152,7 @@ fn light_that_has_changed_leaves_no_ghost() {
 fn what_brings_no_change_drops_nothing() {
     let gpu = gpu();
     let mut scene = room();
-    let mut film = Film::new(&gpu, &scene, Reproject::default());
+    let mut film = Film::moving(&gpu, &scene, Reproject::default());
     film.frame(film.camera);
     for x in [0.3, 0.31] {
         // The board where it is; then another camera at once; then the ball of light behind the wall, where nothing sees it.

@@ -8,7 +8,7 @@ use std::path::Path;
 use tallow::gpu::Gpu;
 use tallow::layout::{Camera, PixelStats};
 use tallow::render::settings::Settings;
-use tallow::render::{Carriage, Carried, Outputs, Renderer, Reproject, Step, carried_samples};
+use tallow::render::{Carriage, Carried, Moves, Outputs, Renderer, Reproject, Step, carried_samples};
 use tallow::scene::{Loaded, Scene};
 
 fn scene(file: &str, change: impl Fn(&mut Settings)) -> Loaded {
@@ -203,11 +203,14 @@ fn limits_hold() {
     assert_eq!(of(Reproject { reproject_age: 2, ..Reproject::default() })[1], 2);
     assert_eq!(of(Reproject { reproject_age: 0, ..Reproject::default() }), [0, 0]);
     let mut film = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
-    let error = film.keep_history(Reproject::default()).unwrap_err().to_string();
+    let error = film.keep_history(Reproject::default(), Moves::Camera).unwrap_err().to_string();
     assert!(error.contains("Outputs::guides"), "{error}");
     let outputs = Outputs { guides: true, ..Outputs::default() };
     let mut film = Renderer::new(&gpu, &scene, &scene.settings, outputs).unwrap();
-    let error = film.keep_history(Reproject { reproject_age: 256, ..Reproject::default() }).unwrap_err().to_string();
+    let error = film
+        .keep_history(Reproject { reproject_age: 256, ..Reproject::default() }, Moves::Camera)
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("reproject-age is 256"), "{error}");
     assert!(film.run(&mut tallow::gpu::FrameResources::new(&gpu).unwrap(), &Step::Reproject).is_err());
     assert_silent(&gpu);
@@ -257,6 +260,40 @@ fn budgets_are_exact_and_fresh_pixels_come_first() {
     assert_silent(&gpu);
 }
 
+/// Carried samples count in a pixel's mean, and are no part of the sequence that its new ones come from: those are its first.
+#[test]
+fn new_samples_begin_the_sequence_of_their_frame() {
+    let gpu = gpu();
+    let scene = scene("cornell-box/scene.toml", |s| {
+        small(s);
+        s.allocate.policy = tallow::allocate::policy("variance").unwrap();
+        s.allocate.min_spp = 2;
+    });
+    let mut film = Film::new(&gpu, &scene, Reproject::default());
+    let start = film.camera;
+    (0..2).for_each(|k| drop(film.placed_frame(turned(start, 1.5 * k as f32), k)));
+    let begun = film.placed_frame(turned(start, 3.0), 9);
+    let stats = film.stats();
+    let mut compared = 0;
+    for spp in [2, 3] {
+        let even = tallow::allocate::policy("uniform").unwrap();
+        let even = scene.clone().with(|s| (s.spp, s.seed, s.allocate.policy) = (spp, 9, even));
+        let mut alone = Renderer::new(&gpu, &even, &even.settings, Outputs::default()).unwrap();
+        alone.set_camera(turned(start, 3.0)).unwrap();
+        let alone = support::render(&gpu, &alone);
+        let gained = |i: &usize| begun[*i].count > 0 && stats[*i].count == begun[*i].count + spp;
+        for i in (0..stats.len()).filter(gained) {
+            let sum = |s: &PixelStats| f64::from(s.count) * f64::from(s.mean[1]);
+            let new = (sum(&stats[i]) - sum(&begun[i])) / f64::from(spp);
+            let expected = f64::from(alone[i].mean[1]);
+            assert!((new - expected).abs() < 1e-4 * (1.0 + expected), "pixel {i}: {new}, alone {expected}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 100, "control: {compared} pixels");
+    assert_silent(&gpu);
+}
+
 /// A bright panel before a dark wall, and a camera that steps aside: samples of the wall whose points the panel hides, and those of
 /// the panel's edges, may not end on the other. No neighbour tells edges here.
 #[test]
@@ -299,6 +336,40 @@ fn the_changed_view_is_accounted() {
     let [(all, none), (some, more), (kept, least)] = found;
     assert!(all > some && some > 0 && kept == 0, "pixels that the view has changed: {found:?}");
     assert!(none == 0 && more > 1 && least <= 3, "largest error, in parts of its limit: {found:?}");
+    assert_silent(&gpu);
+}
+
+/// A camera that moves past a floor of rough metal, in which a lamp is seen: its highlight is where the view puts it, and leaves nothing
+/// behind on the floor.
+#[test]
+fn highlights_do_not_smear() {
+    let gpu = gpu();
+    let mut scene = Workplace::new().scene(
+        "[camera]\nposition = [-0.8, 1.2, 4.0]\ntarget = [-0.8, 0.2, 0.0]\nfov = 45.0\n[render]\nmax_depth = 2\n\
+         [environment]\nradiance = 0.2\n[[material]]\nname = 'metal'\ntype = 'conductor'\nmetal = 'Al'\nalpha = 0.15\n\
+         [[material]]\nname = 'lamp'\nemission = 20.0\n[[mesh]]\nshape = 'rectangle'\nmaterial = 'metal'\n\
+         transform = { rotate = [-90.0, 0.0, 0.0], scale = 9.0 }\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'lamp'\ntransform = { scale = 0.4, translate = [0.0, 1.5, -3.0] }\n",
+    );
+    small(&mut scene.settings);
+    scene.settings.spp = 32;
+    let end = |camera: Camera| shifted(camera, [1.2, 0.0, 0.0]);
+    let long = scene.clone().with(|s| s.spp = 512);
+    let mut direct = Film::new(&gpu, &long, Reproject::default());
+    direct.renderer.set_seed(7);
+    direct.frame(end(direct.camera));
+    let direct = direct.stats();
+    let wrong = [1.0 / 256.0, 1e9].map(|reproject_error| {
+        let mut film = Film::new(&gpu, &scene, Reproject { reproject_error, ..Reproject::default() });
+        let start = film.camera;
+        (0..8).for_each(|k| film.frame(shifted(start, [0.15 * k as f32, 0.0, 0.0])));
+        film.frame(end(start));
+        truth(&film.stats(), &vec![1; direct.len()], &direct)[0]
+    });
+    assert!(
+        wrong[0] < 0.01 && wrong[1] > 0.1,
+        "share of pixels that are wrong, and where every view counts alike: {wrong:?}"
+    );
     assert_silent(&gpu);
 }
 

@@ -45,7 +45,7 @@ fn card_at(scene: &Loaded, frame: u32) -> Pose {
 fn samples_ride_on_what_moves() {
     let gpu = gpu();
     let mut scene = card();
-    let mut film = Film::new(&gpu, &scene, Reproject::default());
+    let mut film = Film::moving(&gpu, &scene, Reproject::default());
     let start = film.camera;
     for k in 0..9 {
         let pose = card_at(&scene, k);
@@ -82,12 +82,31 @@ fn samples_ride_on_what_moves() {
 }
 
 #[test]
+fn a_history_of_the_camera_alone_ends_where_more_moves() {
+    let gpu = gpu();
+    let mut scene = card();
+    let mut film = Film::new(&gpu, &scene, Reproject::default());
+    let start = film.camera;
+    let carried = |film: &Film| film.renderer.carriage().unwrap().carried;
+    for k in 0..6 {
+        if k == 3 {
+            let pose = card_at(&scene, 4);
+            let change = scene.apply(&pose).unwrap();
+            film.record(|renderer, rec| renderer.update(rec, &scene, &change));
+        }
+        film.frame(turned(start, 0.2 * k as f32));
+        assert_eq!(carried(&film) > 300, k != 0 && k != 3, "frame {k}: {:?}", film.renderer.carriage());
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
 fn moving_scenes_show_what_is_there() {
     let gpu = gpu();
     // A hierarchy that is built anew numbers its triangles anew.
     for rebuild_above in [f32::INFINITY, 0.0] {
         let mut scene = at(&Moment::default()).with(|s| s.spp = 8);
-        let mut film = Film::new(&gpu, &scene, Reproject::default());
+        let mut film = Film::moving(&gpu, &scene, Reproject::default());
         let start = film.camera;
         let moment = |k: u32| Moment { turn: 0.01 * f64::from(k), wave: 0.1 + 0.01 * k as f32, ..Moment::default() };
         for k in 0..7 {
@@ -116,7 +135,7 @@ fn moving_scenes_show_what_is_there() {
 fn what_appears_vanishes_and_flips_is_seen_as_it_is() {
     let gpu = gpu();
     let mut scene = at(&Moment::default());
-    let mut film = Film::new(&gpu, &scene, Reproject::default());
+    let mut film = Film::moving(&gpu, &scene, Reproject::default());
     let start = film.camera;
     let scales = [1.0, 0.0, 1.0, -1.0, 1e-9, -1e-9, 0.5, f64::from(f32::MIN_POSITIVE), 1.0]
         .map(|scale| Moment { scale, ..Moment::default() });
@@ -172,7 +191,7 @@ fn a_sheet_that_passes_itself_shows_the_nearer_flap() {
     let mut scene = tallow::scene::Scene::build(&description)
         .unwrap()
         .with(|s| (s.width, s.height, s.spp, s.max_depth) = (49, 33, 32, 2));
-    let mut film = Film::new(&gpu, &scene, Reproject::default());
+    let mut film = Film::moving(&gpu, &scene, Reproject::default());
     let (start, mut seen) = (film.camera, 0);
     for k in 0..12 {
         let vertices = Vertices { positions: flaps(-2.5 + 0.45 * k as f32), ..Vertices::default() };

@@ -3,7 +3,7 @@
 use glam::{Quat, Vec3};
 use tallow::gpu::{FrameResources, Gpu, Recorder};
 use tallow::layout::{Camera, PixelLight, PixelStats, SurfacePoint};
-use tallow::render::{Outputs, Renderer, Reproject, Step, carried_samples};
+use tallow::render::{Moves, Outputs, Renderer, Reproject, Step, carried_samples};
 use tallow::scene::Loaded;
 
 /// The camera turned to the left around its own vertical axis, in degrees.
@@ -31,10 +31,20 @@ pub struct Film {
 }
 
 impl Film {
+    /// Of a scene in which the camera alone moves.
     pub fn new(gpu: &Gpu, scene: &Loaded, settings: Reproject) -> Self {
+        Self::following(gpu, scene, settings, Moves::Camera)
+    }
+
+    /// Of one in which anything may.
+    pub fn moving(gpu: &Gpu, scene: &Loaded, settings: Reproject) -> Self {
+        Self::following(gpu, scene, settings, Moves::Scene)
+    }
+
+    fn following(gpu: &Gpu, scene: &Loaded, settings: Reproject, moves: Moves) -> Self {
         let outputs = Outputs { split_light: true, guides: true, counters: false };
         let mut renderer = Renderer::new(gpu, scene, &scene.settings, outputs).unwrap();
-        renderer.keep_history(settings).unwrap();
+        renderer.keep_history(settings, moves).unwrap();
         let camera = scene.camera([scene.settings.width, scene.settings.height]).unwrap();
         Self { gpu: gpu.clone(), renderer, frame: FrameResources::new(gpu).unwrap(), camera, begun: false }
     }

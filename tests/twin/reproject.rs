@@ -156,7 +156,7 @@ fn kernels_agree_with_their_twin_where_all_moves() {
     let gpu = gpu();
     let settings = Reproject { reproject_error: 0.1, ..Reproject::default() };
     let mut scene = at(&Moment::default()).with(|s| (s.width, s.height) = (65, 33));
-    let mut film = Film::new(&gpu, &scene, settings);
+    let mut film = Film::moving(&gpu, &scene, settings);
     film.frame(film.camera);
     let cells = 17 * 9;
     let (mut lit, mut carried) = (0, 0);

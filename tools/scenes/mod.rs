@@ -56,6 +56,7 @@ const SCENES: &[(&str, Source)] = &[
     ("glass-dragon", Source::Written(include_str!("glass-dragon.toml"))),
     ("nefertiti", Source::Written(include_str!("nefertiti.toml"))),
     ("fox", Source::Sequence(include_str!("fox.toml"))),
+    ("running-fox", Source::Written(include_str!("running-fox.toml"))),
     ("rigid", Source::Rigid("animation/rigid/rigid_animation.json")),
 ];
 

@@ -9,7 +9,7 @@ use crate::gpu::{FrameResources, Gpu};
 use crate::image::{self, Film, NOISY};
 use crate::layout::{Effect, Effects};
 use crate::render::settings::Settings;
-use crate::render::{Carriage, Outputs, Renderer, Reproject, all_effects, called_for, can_carry, finished};
+use crate::render::{Carriage, Moves, Outputs, Renderer, Reproject, all_effects, called_for, can_carry, finished};
 use crate::scene::animation::{Animation, Turntable};
 use crate::scene::{Change, Loaded, Scene};
 use crate::settings::entry;
@@ -33,6 +33,8 @@ pub struct Stage<'a> {
     change: Change,
     /// How samples are carried, if they are.
     reproject: Option<Reproject>,
+    /// What moves.
+    moves: Moves,
     /// The frames before the one that is next.
     chain: Chain,
     /// The frame that the renderer's history is of.
@@ -93,8 +95,24 @@ impl<'a> Stage<'a> {
         render::check_room(&args.render, &settings, &gpu)?;
         let rest = called_for(&scene, &settings, args.render.wanted());
         let reproject = carrying(args, &gpu, &scene, &settings, !animation.is_empty())?;
+        // Every pose says of all that ever moves where it is.
+        let moves = if animation.at(0.0)?.is_of_camera_alone() { Moves::Camera } else { Moves::Scene };
         let (renderer, change, chain, held) = (None, Change::default(), Chain::default(), None);
-        Ok(Self { args, gpu, scene, animation, frames, settings, rest, renderer, change, reproject, chain, held })
+        Ok(Self {
+            args,
+            gpu,
+            scene,
+            animation,
+            frames,
+            settings,
+            rest,
+            renderer,
+            change,
+            reproject,
+            moves,
+            chain,
+            held,
+        })
     }
 
     /// Numbers of all frames.
@@ -226,7 +244,7 @@ impl<'a> Stage<'a> {
             EffectChoice::Auto => self.union(called_for(&self.scene, settings, wanted)),
         };
         let mut renderer = Renderer::specialised(&self.gpu, &self.scene, settings, wanted, effects)?;
-        self.reproject.map_or(Ok(()), |how| renderer.keep_history(how))?;
+        self.reproject.map_or(Ok(()), |how| renderer.keep_history(how, self.moves))?;
         (self.renderer, self.held) = (Some(renderer), None);
         (self.rest, self.change) = (effects, Change::default());
         Ok(())

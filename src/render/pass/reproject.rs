@@ -24,8 +24,8 @@ pub fn remember(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, 
             history: &h.records.part(part.clone())?,
             history_light: &if apart { h.light.part(part.clone())? } else { h.light.clone() },
             offered: &h.offered.part(part)?,
-            instance_now: &h.instance_now,
-            triangle_now: &h.triangle_now,
+            instance_now: &h.numbers.instance_now,
+            triangle_now: &h.numbers.triangle_now,
         };
         rec.dispatch_threads(&h.remember, bind, &h.push(c, w.start, w.end - w.start), w.end - w.start)
     })

@@ -1,17 +1,13 @@
-//! Renders frames one after another, and compares them with references.
+//! Renders frames one after another.
 use anyhow::{Context, Result};
 use tallow::allocate::policy;
 use tallow::denoise::filter::Method;
 use tallow::denoise::{Filtered, Noisy, Recipe};
 use tallow::gpu::{FrameResources, Gpu, PassTime};
-use tallow::image::{Picture, metrics};
+use tallow::image::Picture;
 use tallow::layout::Camera;
-use tallow::render::{Job, Outputs, Renderer, Reproject, Step};
+use tallow::render::{Moves, Outputs, Renderer, Reproject, Step};
 use tallow::scene::{Change, Loaded};
-use tallow::statistics::variance_of_mean;
-
-/// Share of the pixels that are left out of an error, those where it is largest: fireflies would decide it alone.
-const TRIMMED: f64 = 0.001;
 
 /// How frames are rendered.
 #[derive(Clone, Copy)]
@@ -48,7 +44,8 @@ impl Film {
         });
         let outputs = Outputs { split_light: true, guides: true, counters: false };
         let mut renderer = Renderer::new(gpu, &scene, &scene.settings, outputs)?;
-        arm.carries.map_or(Ok(()), |settings| renderer.keep_history(settings))?;
+        let moves = if scene.animation.is_empty() { Moves::Camera } else { Moves::Scene };
+        arm.carries.map_or(Ok(()), |settings| renderer.keep_history(settings, moves))?;
         let size = [scene.settings.width, scene.settings.height];
         Ok(Self { renderer, gpu: gpu.clone(), frame: FrameResources::new(gpu)?, arm, size })
     }
@@ -87,42 +84,5 @@ impl Film {
             Filtered::new(&self.gpu, Noisy::of_film(&self.renderer)?, &Recipe::new(method))?.join(&self.gpu)?;
         let pixels = r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect();
         Ok((Picture { pixels, ..picture }, milliseconds(&times, |_| true)))
-    }
-}
-
-/// A converged image, and the noise that it has itself.
-pub struct Reference {
-    picture: Picture,
-    noise: f64,
-}
-
-impl Reference {
-    pub fn render(gpu: &Gpu, scene: &Loaded, camera: Camera, spp: u32) -> Result<Self> {
-        let long = scene.clone().with(|s| (s.spp, s.seed) = (spp, 1 << 20));
-        let mut renderer = Renderer::new(gpu, &long, &long.settings, Outputs::default())?;
-        renderer.set_camera(camera)?;
-        Job::new(&renderer).run_to_end(&mut FrameResources::new(gpu)?)?;
-        let stats = renderer.film().tiles[0].stats.read()?;
-        let picture = renderer.picture()?;
-        let variance: Vec<_> = stats.iter().map(variance_of_mean).collect();
-        let noise = metrics::relative_noise(&picture, &variance);
-        Ok(Self { picture, noise })
-    }
-
-    /// The relative MSE without the largest 0.1 % of pixels.
-    pub fn error(&self, picture: &Picture) -> f64 {
-        metrics::trimmed_mean(metrics::relative_squares(picture, &self.picture), TRIMMED)
-    }
-
-    /// What of an error is the reference's own, about.
-    pub fn noise(&self) -> f64 {
-        self.noise
-    }
-
-    /// How far a picture is off, in units of the reference's brightness there.
-    pub fn off(&self, picture: &Picture) -> Vec<f64> {
-        let light = |p: &[f32; 3]| p.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0;
-        let pairs = picture.pixels.iter().zip(&self.picture.pixels);
-        pairs.map(|(a, b)| (light(a) - light(b)) / (light(b) + 0.01)).collect()
     }
 }

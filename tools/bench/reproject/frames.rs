@@ -1,11 +1,14 @@
 //! Frames of a camera that moves through a scene, or of what a scene animates: the error of each, and how much it flickers.
-use crate::film::{Arm, Film, Reference, carries, milliseconds};
+use crate::film::{Arm, Film, carries, milliseconds};
+use crate::reference::Reference;
 use crate::{View, plot};
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use glam::{Quat, Vec3};
+use std::path::{Path, PathBuf};
 use tallow::gpu::Gpu;
+use tallow::image::{self, Picture, WriteOptions};
 use tallow::layout::{Camera, vec3};
-use tallow::render::{Carriage, Reproject};
+use tallow::render::{Carriage, Reproject, ReprojectOverrides};
 use tallow::report::table;
 use tallow::scene::{Change, Loaded};
 
@@ -16,8 +19,8 @@ pub struct Args {
     #[arg(long, default_value_t = 48)]
     frames: u32,
     /// Samples a pixel of a frame
-    #[arg(long, default_value_t = 1)]
-    spp: u32,
+    #[arg(long, default_values_t = [1, 4], value_delimiter = ',')]
+    spp: Vec<u32>,
     /// Frames per second of what is animated
     #[arg(long, default_value_t = 24.0)]
     fps: f64,
@@ -30,7 +33,18 @@ pub struct Args {
     /// Filter of the arms that filter
     #[arg(long, default_value = "atrous", value_delimiter = ',')]
     filters: Vec<String>,
+    #[command(flatten)]
+    carry: ReprojectOverrides,
+    /// Folder in which references are kept for another run of the same frames
+    #[arg(long)]
+    references: Option<PathBuf>,
+    /// Folder for a picture of the last frame of each arm
+    #[arg(long)]
+    pictures: Option<PathBuf>,
 }
+
+/// Frames that fill the history; what is measured begins behind them.
+const FIRST: usize = 8;
 
 /// The camera of a frame: of the scene's own, or on its way.
 fn camera(args: &Args, scene: &Loaded, frame: u32) -> Result<Camera> {
@@ -45,6 +59,8 @@ fn camera(args: &Args, scene: &Loaded, frame: u32) -> Result<Camera> {
 
 struct Line {
     name: String,
+    /// The arm with the same filter and nothing carried.
+    base: usize,
     errors: Vec<f64>,
     flicker: f64,
     frame_ms: f64,
@@ -61,12 +77,18 @@ fn pose(args: &Args, scene: &mut Loaded, frame: u32) -> Result<Option<Change>> {
     Ok(Some(scene.apply(&pose)?))
 }
 
-fn measure(gpu: &Gpu, args: &Args, name: String, arm: Arm, references: &[Reference]) -> Result<Line> {
-    let mut scene = args.view.load()?;
-    let mut film = Film::new(gpu, &scene, arm, args.spp)?;
+/// What all arms are measured by: the scene at rest, and a reference for each frame.
+struct Sequence {
+    scene: Loaded,
+    references: Vec<Reference>,
+}
+
+fn measure(gpu: &Gpu, args: &Args, spp: u32, (name, base, arm): Named, sequence: &Sequence) -> Result<Line> {
+    let mut scene = sequence.scene.clone();
+    let mut film = Film::new(gpu, &scene, arm, spp)?;
     let (mut errors, mut offs, mut times) = (Vec::new(), Vec::new(), Vec::new());
-    let mut sum = Carriage::default();
-    for (frame, reference) in (0..).zip(references) {
+    let (mut sum, mut last) = (Carriage::default(), None);
+    for (frame, reference) in (0..).zip(&sequence.references) {
         let change = pose(args, &mut scene, frame)?;
         let camera = camera(args, &scene, frame)?;
         let passes = film.shoot(camera, change.as_ref().map(|change| (&scene, change)), frame)?;
@@ -77,71 +99,105 @@ fn measure(gpu: &Gpu, args: &Args, name: String, arm: Arm, references: &[Referen
         if arm.carries.is_some() {
             sum = film.renderer.carriage()?;
         }
+        last = Some(picture);
+    }
+    if let (Some(folder), Some(picture)) = (&args.pictures, last) {
+        save(&folder.join(format!("{spp}-{}.png", name.replace([',', ' '], "-"))), &picture)?;
     }
     // The mean absolute difference of successive error images.
     let change = |pair: &[Vec<f64>]| {
         pair[0].iter().zip(&pair[1]).map(|(a, b)| (a - b).abs()).sum::<f64>() / pair[0].len() as f64
     };
-    let flicker = offs.windows(2).skip(7).map(change).sum::<f64>() / offs.len().saturating_sub(8).max(1) as f64;
+    let flicker = mean(offs.windows(2).skip(FIRST - 1).map(change));
     let of = |column: usize| tallow::profile::median(&times.iter().skip(2).map(|t| t[column]).collect::<Vec<_>>());
-    Ok(Line { name, errors, flicker, frame_ms: of(0), carrying_ms: of(1), sum })
+    Ok(Line { name, base, errors, flicker, frame_ms: of(0), carrying_ms: of(1), sum })
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
+    sum / f64::from(count.max(1))
+}
+
+fn save(path: &Path, picture: &Picture) -> Result<()> {
+    let mut film = image::Film::new(picture.width, picture.height);
+    film.add_vec3("", ["R", "G", "B"], &picture.pixels);
+    image::write(path, &film, &WriteOptions::default()).map_err(|what| anyhow!("{}: {what}", path.display()))
+}
+
+/// Its name, its place's base ([`Line::base`]), and an arm.
+type Named = (String, usize, Arm);
+
+fn arms(filters: &[String], carries: Reproject) -> Vec<Named> {
+    let carries = Some(carries);
+    let mut arms = vec![
+        ("nothing".to_owned(), 0, Arm { policy: "uniform", carries: None, filter: None }),
+        ("reprojection".to_owned(), 0, Arm { policy: "uniform", carries, filter: None }),
+    ];
+    for filter in filters {
+        let (base, filter): (_, &'static str) = (arms.len(), filter.clone().leak());
+        let arm = |policy, carries| Arm { policy, carries, filter: Some(filter) };
+        arms.push((filter.to_owned(), base, arm("uniform", None)));
+        arms.push((format!("reprojection, {filter}"), base, arm("uniform", carries)));
+        arms.push((format!("reprojection, placed, {filter}"), base, arm("both", carries)));
+    }
+    arms
+}
+
+fn references(gpu: &Gpu, args: &Args, mut scene: Loaded) -> Result<Vec<Reference>> {
+    let folders = args.references.iter().chain(&args.pictures);
+    folders.into_iter().try_for_each(std::fs::create_dir_all)?;
+    let of = |frame: u32| {
+        pose(args, &mut scene, frame)?;
+        let file = args.references.as_ref().map(|folder| folder.join(format!("{frame:04}.exr")));
+        Reference::new(gpu, &scene, camera(args, &scene, frame)?, args.view.reference_spp, file.as_deref())
+    };
+    (0..args.frames).map(of).collect()
 }
 
 pub fn run(gpu: &Gpu, args: &Args) -> Result<()> {
     args.view.tell(gpu);
-    let mut scene = args.view.load()?;
-    let mut references = Vec::new();
-    for frame in 0..args.frames {
-        pose(args, &mut scene, frame)?;
-        references.push(Reference::render(gpu, &scene, camera(args, &scene, frame)?, args.view.reference_spp)?);
-    }
-    let noise = references.iter().map(Reference::noise).sum::<f64>() / references.len() as f64;
+    let scene = args.view.load()?;
+    let sequence = Sequence { references: references(gpu, args, scene.clone())?, scene };
+    let references = &sequence.references;
+    let noise = mean(references.iter().map(Reference::noise));
+    let flicker = mean(references.windows(2).map(|pair| pair[0].flicker(&pair[1])));
     println!(
-        "{} frames, {} samples a pixel each; relative MSE, of which the references' own noise is {noise:.4}",
-        args.frames, args.spp
+        "{} frames; of their errors {noise:.4} is the references' own noise, of flicker {flicker:.4}",
+        args.frames
     );
-    let carries = Some(Reproject::default());
-    let mut arms = vec![
-        ("nothing".to_owned(), Arm { policy: "uniform", carries: None, filter: None }),
-        ("reprojection".to_owned(), Arm { policy: "uniform", carries, filter: None }),
-    ];
-    for filter in &args.filters {
-        let filter: &'static str = filter.clone().leak();
-        let arm = |policy, carries| Arm { policy, carries, filter: Some(filter) };
-        arms.push((filter.to_owned(), arm("uniform", None)));
-        arms.push((format!("reprojection, {filter}"), arm("uniform", carries)));
-        arms.push((format!("reprojection, placed by geometry and variance, {filter}"), arm("both", carries)));
-    }
-    let lines =
-        arms.into_iter().map(|(name, arm)| measure(gpu, args, name, arm, &references)).collect::<Result<Vec<_>>>()?;
-    print(&lines, args.view.width * args.view.height);
-    if let Some(path) = &args.view.plot {
-        let series: Vec<_> = lines
-            .iter()
-            .map(|l| (l.name.clone(), (0..).map(f64::from).zip(l.errors.iter().copied()).collect()))
-            .collect();
-        plot::lines(path, "error of each frame", ["frame", "relative MSE"], &series)?;
+    let mut carries = Reproject::default();
+    args.carry.apply(&mut carries);
+    for &spp in &args.spp {
+        let of = |arm| measure(gpu, args, spp, arm, &sequence);
+        let lines = arms(&args.filters, carries).into_iter().map(of).collect::<Result<Vec<_>>>()?;
+        println!("\n{spp} samples a pixel of a frame");
+        print(&lines, args.view.width * args.view.height);
+        if let Some(path) = &args.view.plot {
+            let series: Vec<_> = lines
+                .iter()
+                .map(|l| (l.name.clone(), (0..).map(f64::from).zip(l.errors.iter().copied()).collect()))
+                .collect();
+            let path = path.with_extension(format!("{spp}.svg"));
+            plot::lines(&path, "error of each frame", ["frame", "relative MSE"], &series)?;
+        }
     }
     Ok(())
 }
 
 fn print(lines: &[Line], pixels: u32) {
-    let mean = |errors: &[f64]| errors.iter().skip(8).sum::<f64>() / errors.len().saturating_sub(8).max(1) as f64;
+    let later = |l: &Line| mean(l.errors.iter().skip(FIRST).copied());
     let row = |l: &Line| {
         let at = |k: usize| l.errors.get(k).map_or(String::new(), |e| format!("{e:.4}"));
+        let of = |value: fn(&Line, f64) -> f64| {
+            let [own, base] = [l, &lines[l.base]].map(|line| value(line, later(line)));
+            format!("{own:.4} ({:.2})", own / base)
+        };
         let [frame, carrying] = [l.frame_ms, l.carrying_ms].map(|ms| format!("{ms:.1}"));
-        vec![
-            l.name.clone(),
-            at(0),
-            at(7),
-            format!("{:.4}", mean(&l.errors)),
-            format!("{:.4}", l.flicker),
-            frame,
-            carrying,
-        ]
+        let last = at(l.errors.len() - 1);
+        vec![l.name.clone(), at(0), at(FIRST - 1), last, of(|_, error| error), of(|l, _| l.flicker), frame, carrying]
     };
-    let head = ["arm", "frame 0", "frame 7", "mean from 8 on", "flicker", "frame ms", "carrying ms"];
-    println!("\n{}", table::text(&head, &lines.iter().map(row).collect::<Vec<_>>()));
+    let head = ["arm", "frame 0", "7", "last", "8 on (of base)", "flicker (of base)", "frame ms", "carrying ms"];
+    println!("{}", table::text(&head, &lines.iter().map(row).collect::<Vec<_>>()));
     let share = |n: u64| format!("{:.1} %", 100.0 * n as f64 / f64::from(pixels));
     for line in lines.iter().filter(|l| l.sum.carried > 0) {
         let c = line.sum;

@@ -6,6 +6,7 @@
 mod film;
 mod frames;
 mod plot;
+mod reference;
 mod turn;
 
 use anyhow::Result;

@@ -1,6 +1,7 @@
 //! The experiment of Schalk 2018, 4.3: the camera turns by a total angle in steps, with so many samples for each, and rests. From then on
 //! error is measured against time.
-use crate::film::{Arm, Film, Reference, carries, milliseconds};
+use crate::film::{Arm, Film, carries, milliseconds};
+use crate::reference::Reference;
 use crate::{View, plot};
 use anyhow::Result;
 use glam::{Quat, Vec3};
@@ -102,7 +103,7 @@ pub fn run(gpu: &Gpu, args: &Args) -> Result<()> {
     let scene = args.view.load()?;
     let size = [args.view.width, args.view.height];
     let reference =
-        Reference::render(gpu, &scene, turned(&scene.camera(size)?, args.degrees), args.view.reference_spp)?;
+        Reference::new(gpu, &scene, turned(&scene.camera(size)?, args.degrees), args.view.reference_spp, None)?;
     println!(
         "{} degrees, {} samples a pixel for each step; relative MSE (the reference's own: {:.4}) of the frame after the last step and of \
          those that follow it",

@@ -1,18 +1,20 @@
 //! What is kept from frame to frame: the samples of each pixel, and the points of the scene that they are of.
+mod numbers;
+mod probes;
+
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, Gpu, Kernel, Location};
+use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{
-    AliasEntry, Camera, Effects, History as Record, HistoryLight, Light, LightChange, PathConstants, Probe,
-    ReprojectPush, SurfacePoint,
+    Camera, Effects, History as Record, HistoryLight, LightChange, PathConstants, ReprojectPush, SurfacePoint,
 };
-use crate::math::hash::pcg;
-use crate::render::buffers::{DeviceScene, most_of_one_tile};
-use crate::scene::{Change, Relit};
+use crate::render::buffers::most_of_one_tile;
+use crate::scene::{Change, Relit, Scene};
 use crate::settings::{FROM_0, entry, settings};
 use crate::shaders;
-use crate::shaders::shared::cell::CELL;
 use crate::shaders::shared::history::ERROR_PARTS;
-use crate::shaders::shared::{deal, scene, traverse};
+use crate::shaders::shared::traverse;
+use numbers::Numbers;
+pub use probes::Probes;
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -37,9 +39,17 @@ settings! {
 /// Pixels that a key has room for, see `glsl/reproject/project.comp`.
 const MOST_PIXELS: u32 = 1 << shaders::project::PIXEL_BITS;
 
+/// What may change from frame to frame where samples are carried.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moves {
+    /// The camera. Over any other change nothing is carried.
+    Camera,
+    /// All that a pose can change. How light has changed is then found by paths, whose kernel is compiled.
+    Scene,
+}
+
 /// The kernels and buffers of reprojection. `P` pixels; 64 bytes each, with [`crate::render::FilmTile::points`], and 28 more where
-/// direct and indirect light are kept apart. Where more changes than the camera, 5 more for the cells of the film in which light is
-/// probed, 4x4 pixels each.
+/// direct and indirect light are kept apart. Where more moves than the camera, 5 more for probes.
 pub struct History {
     /// Writes what pixels hand on.
     pub(super) remember: Kernel<shaders::remember::Bind<'static>>,
@@ -57,27 +67,10 @@ pub struct History {
     pub carried: Buffer<u32>,
     /// The camera of the last frame.
     pub(super) previous: Buffer<Camera>,
-    /// Finds how light has changed.
-    pub(super) probe: Kernel<shaders::probe::Bind<'static>>,
-    /// Sums it over neighbouring cells.
-    pub(super) light_change: Kernel<shaders::light_change::Bind<'static>>,
-    /// Cells across and down.
-    pub(super) cells: [u32; 2],
-    /// A path of each cell.
-    pub(super) probes: Buffer<Probe>,
-    /// How light has changed in each cell: two, of which the levels read and write one each.
-    pub(super) changes: [Buffer<LightChange>; 2],
-    /// Where lights have changed: those before and those now, as probes choose them, and the table that chooses.
-    pub(super) lights: [Buffer<Light>; 2],
-    pub(super) light_table: Buffer<AliasEntry>,
-    /// By their numbers in the last frame, those of instances and triangles in this one; unused unless `numbered` says so.
-    pub(super) instance_now: Buffer<u32>,
-    pub(super) triangle_now: Buffer<u32>,
-    /// What the paths of probes are told in place of the frame's constants; none where lights are as they were.
-    relit: Option<PathConstants>,
-    probe_seed: u32,
-    /// Whether instances and triangles are numbered anew.
-    numbered: [bool; 2],
+    pub(super) numbers: Numbers,
+    /// What finds how light has changed, where more moves than the camera.
+    pub(super) probes: Option<Probes>,
+    no_change: Buffer<LightChange>,
     /// Whether more than the camera has changed since the last frame.
     changed: AtomicBool,
     settings: Reproject,
@@ -115,14 +108,13 @@ impl History {
         stack: u32,
         size: [u32; 2],
         spp: u32,
-        settings: Reproject,
+        (settings, moves): (Reproject, Moves),
     ) -> Result<Self> {
         entry::check(&settings.entries())?;
-        let (pixels, cells) = (size[0] * size[1], size.map(|n| n.div_ceil(CELL)));
+        let pixels = size[0] * size[1];
         Self::check_room(gpu, pixels)?;
         let (thread, traverse) = (gpu.tuning().thread(), traverse::Constants { stack });
         let room = |on: bool| if on { pixels as usize } else { 1 };
-        let none = |name: &str| Buffer::from_slice(gpu, name, &[]);
         Ok(Self {
             remember: Kernel::new(gpu, &shaders::remember::Constants { effects, thread, traverse })?,
             project: Kernel::new(gpu, &shaders::project::Constants { effects, thread, traverse })?,
@@ -132,70 +124,29 @@ impl History {
             offered: Buffer::from_slice(gpu, "offered samples", &vec![0; pixels as usize])?,
             carried: Buffer::from_slice(gpu, "carried samples", &vec![0; pixels as usize])?,
             previous: Buffer::from_slice(gpu, "previous camera", &[Camera::default()])?,
-            probe: Kernel::new(
-                gpu,
-                &shaders::probe::Constants { effects, thread, traverse, deal: deal::Constants::default() },
-            )?,
-            light_change: Kernel::new(gpu, &thread.into())?,
-            cells,
-            probes: Buffer::new(gpu, "probes", 1, Location::Device)?,
-            changes: [none("changes of light")?, none("changes of light")?],
-            lights: [Buffer::from_slice(gpu, "lights", &[])?, Buffer::from_slice(gpu, "lights", &[])?],
-            light_table: Buffer::from_slice(gpu, "light_table", &[])?,
-            relit: None,
-            instance_now: Buffer::from_slice(gpu, "instances now", &[])?,
-            triangle_now: Buffer::from_slice(gpu, "triangles now", &[])?,
-            probe_seed: 0,
-            numbered: [false; 2],
+            numbers: Numbers::new(gpu)?,
+            probes: (moves == Moves::Scene).then(|| Probes::new(gpu, effects, stack, size)).transpose()?,
+            no_change: Buffer::from_slice(gpu, "no changes of light", &[])?,
             changed: AtomicBool::new(false),
             settings,
             spp,
         })
     }
 
-    /// Makes room for what changes besides the camera, once.
-    pub(super) fn follow(&mut self, gpu: &Gpu) -> Result<()> {
-        let cells = (self.cells[0] * self.cells[1]) as usize;
-        if self.probes.len() < cells {
-            let changes = || Buffer::new(gpu, "changes of light", cells, Location::Device);
-            self.changes = [changes()?, changes()?];
-            self.probes = Buffer::new(gpu, "probes", cells, Location::Device)?;
-        }
-        Ok(())
-    }
-
-    /// Notes that more than the camera changes, after a frame of these constants and this first sample.
-    pub(super) fn note(&mut self, change: &Change, relit: Option<&Relit>, c: &PathConstants, first_sample: u32) {
-        self.numbered = [&change.instance_now, &change.triangle_now].map(|now| !now.is_empty());
-        self.probe_seed = pcg(pcg(!c.seed).wrapping_add(first_sample));
-        self.relit = relit.map(|relit| PathConstants {
-            light_count: relit.table.len() as u32,
-            environment: relit.environment,
-            triangle_pdf_scale: c.triangle_pdf_scale * relit.pdf_scale,
-            ..PathConstants::default()
-        });
+    /// Gets ready for a change of more than the camera, after a frame of these constants and this first sample.
+    pub(super) fn note(
+        &mut self,
+        gpu: &Gpu,
+        rec: &mut Recorder,
+        (scene, change): (&Scene, &Change),
+        c: &PathConstants,
+        first_sample: u32,
+    ) -> Result<()> {
         self.changed.store(true, Relaxed);
-    }
-
-    /// What the paths of probes are told, before the scene changes as after it.
-    pub(super) fn probe_constants(&self, frame: &PathConstants) -> PathConstants {
-        let own = PathConstants { seed: self.probe_seed, ..*frame };
-        self.relit.map_or(own, |relit| PathConstants {
-            light_count: relit.light_count,
-            environment: relit.environment,
-            triangle_pdf_scale: relit.triangle_pdf_scale,
-            ..own
-        })
-    }
-
-    /// What they bind of a scene.
-    pub(super) fn probe_scene<'a>(&'a self, scene: &'a DeviceScene, after: bool) -> scene::Bind<'a> {
-        match self.relit {
-            None => scene.bind(),
-            Some(_) => {
-                scene::Bind { lights: &self.lights[usize::from(after)], light_table: &self.light_table, ..scene.bind() }
-            }
-        }
+        let Some(probes) = &mut self.probes else { return Ok(()) };
+        self.numbers.note(gpu, rec, change)?;
+        let relit = change.lights.then(|| Relit::of(&change.lights_before, scene)).flatten();
+        probes.note(gpu, rec, relit.as_ref(), c, first_sample)
     }
 
     /// Whether more than the camera has changed since the last frame.
@@ -209,9 +160,9 @@ impl History {
     }
 
     /// How light had changed in each cell of 4x4 pixels of the last frame at the last [`Step::Reproject`](super::Step::Reproject) that followed a
-    /// change of more than the camera.
+    /// change of more than the camera; one unused element where nothing else moves.
     pub fn light_change(&self) -> &Buffer<LightChange> {
-        &self.changes[1]
+        self.probes.as_ref().map_or(&self.no_change, Probes::found)
     }
 
     /// The error that one part of a pixel's word stands for.
@@ -221,16 +172,16 @@ impl History {
 
     /// What its kernels are told of pixels from `first_pixel` on.
     pub(super) fn push(&self, constants: &PathConstants, first_pixel: u32, pixels: u32) -> ReprojectPush {
-        let [instances, triangles] = self.numbered.map(u32::from);
-        let Reproject { reproject_error, reproject_aliasing, reproject_samples, reproject_age } = self.settings;
+        let [instances, triangles] = self.numbers.anew();
+        let s = &self.settings;
         ReprojectPush {
             size: constants.size,
             first_pixel,
             pixels,
-            max_error: reproject_error,
-            aliasing: reproject_aliasing,
-            max_samples: reproject_samples,
-            max_age: reproject_age,
+            max_error: s.reproject_error,
+            aliasing: s.reproject_aliasing,
+            max_samples: s.reproject_samples,
+            max_age: s.reproject_age,
             spp: self.spp,
             moved: self.has_changed().into(),
             instances,
