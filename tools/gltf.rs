@@ -109,8 +109,7 @@ fn render(gpu: &Gpu, path: &Path, scenario: &Scenario, args: &Args) -> anyhow::R
     description.environment = Some(EnvironmentTable { file: Some(sky), rotation: 90.0, ..Default::default() });
     description.camera = scenario.camera.clone().unwrap_or_else(|| description.camera.clone());
     let loaded = file.load()?.with(|settings| {
-        let height = (f64::from(args.width) / scenario.aspect).round().max(1.0) as u32;
-        (settings.width, settings.height) = (args.detail * args.width, args.detail * height);
+        (settings.width, settings.height) = size(args.width, scenario.aspect).map(|n| args.detail * n).into();
         settings.spp = args.spp;
     });
     loaded.warnings.iter().for_each(|line| eprintln!("{}: {line}", path.display()));
@@ -124,6 +123,14 @@ fn render(gpu: &Gpu, path: &Path, scenario: &Scenario, args: &Args) -> anyhow::R
         ours.cut_out(objects.iter().map(|&object| if object == NONE { 0.0 } else { 1.0 }).collect());
     }
     Ok(ours.smaller(args.detail))
+}
+
+/// Whole pixels of a shape, as wide as may be: a picture of another shape would show more or less at its sides.
+fn size(most: u32, aspect: f64) -> [u32; 2] {
+    let height = |width: u32| f64::from(width) / aspect;
+    let hundredths = |width: &u32| (100.0 * (height(*width) - height(*width).round()).abs()).round() as u32;
+    let best = (most - most / 4..=most).rev().min_by_key(hundredths).unwrap_or(most);
+    [best, (height(best).round() as u32).max(1)]
 }
 
 /// The environment map that there is.

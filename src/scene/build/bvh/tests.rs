@@ -283,53 +283,6 @@ fn a_refitted_tree_finds_what_has_moved() {
     assert!(compare(&geometry, &nodes, root, 0..1000, &mut random) > 0, "control: {lost:?} and others moved on");
 }
 
-/// Checks that all corners below a node lie in the boxes of its children, which reach beyond them by two cells of their grid at most;
-/// returns the corners.
-fn check_boxes(nodes: &[BvhNode], index: u32, triangles: &[Triangle]) -> Vec<DVec3> {
-    let node = &nodes[index as usize];
-    let e = node.e_imask.to_le_bytes();
-    let cell = DVec3::from([0, 1, 2].map(|a| f64::from(f32::from_bits(u32::from(e[a]) << 23))));
-    let (mut inner, mut all) = (node.child_base, Vec::new());
-    for (slot, meta) in bytes(node.meta).into_iter().enumerate().filter(|(_, meta)| *meta != 0) {
-        let corners = if e[3] >> slot & 1 == 1 {
-            inner += 1;
-            check_boxes(nodes, inner - 1, triangles)
-        } else {
-            let first = (node.primitive_base + u32::from(meta & 31)) as usize;
-            let leaf = &triangles[first..first + (meta >> 5).count_ones() as usize];
-            leaf.iter().flat_map(|t| [t.v0, t.v1, t.v2].map(|p| Vec3::from(p).as_dvec3())).collect()
-        };
-        let (low, high) = child_box(node, slot);
-        let least = corners.iter().fold(DVec3::INFINITY, |low, p| low.min(*p));
-        let most = corners.iter().fold(DVec3::NEG_INFINITY, |high, p| high.max(*p));
-        assert!(low.cmple(least).all() && most.cmple(high).all(), "a corner is outside: {low} {least} {most} {high}");
-        let spare = (least - low).max(high - most);
-        assert!(spare.cmple(2.0 * cell).all(), "a box is larger than what it holds: {spare} in cells of {cell}");
-        all.extend(corners);
-    }
-    all
-}
-
-/// Rays seldom meet what lies between a corner and a box that is a cell too small; the boxes themselves tell.
-#[test]
-fn refitted_boxes_hold_what_is_in_them_and_little_more() {
-    let mut random = Random::new(11);
-    let mut geometry = random_geometry(1000, 0.2, &mut random);
-    let mut nodes = Vec::new();
-    let (root, _) = build_mesh(&mut geometry, 0..1000, &mut nodes);
-    check_boxes(&nodes, root, &geometry.triangles);
-    for scale in [1.0, 1e-3, 3e4] {
-        let shift = random.point() * scale;
-        for v in geometry.triangles.iter_mut().flat_map(|t| [&mut t.v0, &mut t.v1, &mut t.v2]) {
-            *v = ((Vec3::from(*v).as_dvec3() + random.point() * 0.1) * scale + shift).as_vec3().to_array();
-        }
-        let boxes: Vec<_> = geometry.triangles.iter().map(Boundable::aabb).collect();
-        let all = 0..nodes.len();
-        refit(&mut nodes, all, |i| boxes[i as usize]);
-        assert_eq!(check_boxes(&nodes, root, &geometry.triangles).len(), 3000);
-    }
-}
-
 #[test]
 fn the_shallowest_tree_is_as_deep_as_its_number_needs() {
     let mut random = Random::new(9);
