@@ -1,4 +1,4 @@
-//! Characters and a machine that move on a ground: whether hierarchies, filters and samples follow.
+//! Characters that move on a ground, and a machine that stands as the control: whether hierarchies, filters and samples follow.
 use crate::cost::median;
 use anyhow::{Context, Result, anyhow};
 use std::path::Path;
@@ -22,7 +22,7 @@ const SUBJECTS: [(&str, &str); 3] = [
         "[[mesh]]\nname = 'it'\nfile = 'animation/fox_run/fox_00.obj'\n\
          [[animation]]\nmesh = 'it'\nfile = 'animation/fox_run/fox_##.obj'\nlast = 15\nrepeat = true\n",
     ),
-    ("engine, nodes", "[[mesh]]\nname = 'it'\nfile = 'gltf/2CylinderEngine.glb'\n"),
+    ("engine, at rest", "[[mesh]]\nname = 'it'\nfile = 'gltf/2CylinderEngine.glb'\n"),
 ];
 
 /// Samples of a frame, and of what it is compared with.

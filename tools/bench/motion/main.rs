@@ -1,5 +1,5 @@
 //! Measures scenes that move: what moving costs (100 instances in Crytek Sponza, a cloth of 100,000 triangles that is refitted or
-//! built anew), and whether hierarchies, filters and samples follow characters and a machine, as in the dynamic scene of
+//! built anew), and whether hierarchies, filters and samples follow characters, as in the dynamic scene of
 //! Bauszat, Eisemann and Magnor 2011 ("Guided image filtering for interactive high-quality global illumination").
 //!   TALLOW_DATA=../shared cargo run --release --example bench-motion [FRAMES [cost|follow]]
 #![allow(missing_docs)]
