@@ -55,6 +55,12 @@ fn nothing_is_created_after_the_first_frame() {
         let calls = hooks::take_calls();
         assert!(number == 0 || calls.is_empty(), "frame {number}: {calls:?}");
     }
+    // The engine's window changes its size: the renderer's kernels stay, even though nothing holds them meanwhile.
+    drop((renderer, denoiser, frame));
+    let scene = scene.with(|s| (s.width, s.height) = (48, 20));
+    let _resized = Renderer::new(&gpu, &scene, &scene.settings, outputs).unwrap();
+    let made = hooks::take_calls();
+    assert!(made.contains_key("vkCreateBuffer") && !made.contains_key("vkCreateComputePipelines"), "{made:?}");
 }
 
 #[test]
