@@ -6,32 +6,32 @@
 // Blends five images per pixel and thread: the noisy one and the results of four filters (candidates). The weights are not
 // negative, sum to 1, and minimise the mean squared error at left-out pixels that auto_error.comp estimates. Starting from
 // the best candidate alone, pairs of candidates exchange weight for ROUNDS rounds (coordinate descent). The blend comes with the
-// variance of the pixel's luminance: UNMEASURED where its samples tell none, and UNFILTERED where there is no blend.
+// variance of the pixel's luminance: UNMEASURED where its samples tell none, and UNFILTERED where there is no blend. `expected`
+// is its mean squared error over its squared luminance, and the share of the variance of samples that is noise.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer squares; // of vec4
 layout(binding = 1) uniform samplerBuffer products; // of vec4
 layout(binding = 2) uniform samplerBuffer others; // of vec4
-layout(binding = 3) uniform samplerBuffer square_sum; // of vec4, of all pixels
-layout(binding = 4) uniform samplerBuffer product_sum; // of vec4, of all pixels
-layout(binding = 5) uniform samplerBuffer other_sum; // of vec4, of all pixels
-layout(binding = 6) uniform samplerBuffer colour; // of vec4
-layout(binding = 7) uniform usamplerBuffer place; // of uvec4
-layout(binding = 8) uniform samplerBuffer wide; // of vec4
-layout(binding = 9) uniform samplerBuffer mid; // of vec4
-layout(binding = 10) uniform samplerBuffer narrow; // of vec4, of what it gets
-layout(binding = 11) uniform samplerBuffer wide_dim; // of vec4, of the same
-layout(binding = 12) uniform samplerBuffer svgf; // of vec4
-layout(binding = 13) uniform samplerBuffer variance; // of vec3
-layout(scalar, binding = 14) writeonly buffer Blend { vec4 blend[]; };
+layout(binding = 3) uniform samplerBuffer colour; // of vec4
+layout(binding = 4) uniform usamplerBuffer place; // of uvec4
+layout(binding = 5) uniform samplerBuffer wide; // of vec4
+layout(binding = 6) uniform samplerBuffer mid; // of vec4
+layout(binding = 7) uniform samplerBuffer narrow; // of vec4, of what it gets
+layout(binding = 8) uniform samplerBuffer wide_dim; // of vec4, of the same
+layout(binding = 9) uniform samplerBuffer svgf; // of vec4
+layout(binding = 10) uniform samplerBuffer variance; // of vec3
+layout(binding = 11) uniform samplerBuffer surroundings; // of vec4, of leverages
+layout(scalar, binding = 12) writeonly buffer Blend { vec4 blend[]; };
+layout(scalar, binding = 13) writeonly buffer Expected { vec2 expected[]; };
 layout(constant_id = 114) const bool MEASURED = true; // `variance` holds every pixel's
 layout(scalar, push_constant) uniform Push { PackPush push; };
 
 const uint ROUNDS = 4u;       // of exchanges between all pairs
 const float RIDGE = 0.01;     // share added to every squared error: candidates that hardly differ get like weights
+// A left-out pixel is missed by its noise at least, so that the best candidate bounds it from above. The variance of samples tells
+// more than that where they are stratified: half of a sampled pixel's may be none. No noise is less than this share of it.
+const float LEAST = 0.05;
 const float MAX_ERROR = 1e24; // is above every error
-// Largest share of the whole image's errors in those of a pixel. Local errors are uncertain where few pixels have seen light,
-// and a candidate that is good elsewhere is rarely bad here.
-const float OVERALL = 0.6;
 
 // What the pixel's samples say of the variance of their mean.
 float own_variance(uint i, float count) {
@@ -47,23 +47,19 @@ void main() {
     int at = int(i);
     vec4 c = texelFetch(colour, at);
     vec4 a = texelFetch(wide, at), b = texelFetch(mid, at), n = texelFetch(narrow, at), d = texelFetch(svgf, at);
-    // Errors are relative to the light. Those of the whole image count the more, the noisier the surroundings are. Light is at
-    // least 1 where a pixel is known.
-    vec4 here = texelFetch(others, at), all = texelFetch(other_sum, 0);
-    float light = max(here.w, 1.0), lights = max(all.w, 1.0), noisy = 0.5 * here.z / light;
-    float share = OVERALL * noisy / (1.0 + noisy);
-    vec4 square = mix(texelFetch(squares, at) / light, texelFetch(square_sum, 0) / lights, share);
-    vec4 product = mix(texelFetch(products, at) / light, texelFetch(product_sum, 0) / lights, share);
-    vec4 other = mix(here / light, all / lights, share);
+    // Errors are relative to the light, which is at least 1 where a pixel is known.
+    vec4 here = texelFetch(others, at);
+    float light = max(here.w, 1.0);
+    vec4 square = texelFetch(squares, at) / light, product = texelFetch(products, at) / light, other = here / light;
     // The variance of few samples depends on their values, so that candidates which use it (the image and svgf) would seem
     // better than they are. A filter that could not in-paint the pixel is of no use either.
     bool enough = c.w >= ENOUGH;
     bool usable[5] = bool[](enough, a.w > 0.0, b.w > 0.0, n.w > 0.0, enough && d.w > 0.0);
     // Mean products of the candidates' errors. An independent copy of the pixel misses it by the noise of both, and shares
     // the pixel's own noise with every filter's error.
-    float noise = 0.5 * other.z;
+    float told = 0.5 * other.z, noise = max(min(told, min(min(square.x, square.y), min(square.z, square.w))), LEAST * told);
     float missed[5][5] = float[][](
-        float[](other.z, noise, noise, noise, noise),
+        float[](2.0 * noise, noise, noise, noise, noise),
         float[](noise, square.x, product.x, product.y, product.z),
         float[](noise, product.x, square.y, product.w, other.x),
         float[](noise, product.y, product.w, square.z, other.y),
@@ -96,6 +92,11 @@ void main() {
             }
         }
     }
+    // What left-out pixels tell, without their noise and the ridge; at least the noise that a filter of such leverages keeps.
+    float square_of_blend = 0.0, kept = w[0] + dot(vec4(w[1], w[2], w[3], w[4]), texelFetch(surroundings, at));
+    [[unroll]] for (int k = 0; k < 5; k++) square_of_blend += w[k] * (growth[k] - w[k] * missed[k][k] * RIDGE / (1.0 + RIDGE));
+    float error = max(square_of_blend - noise, clamp(kept, 0.0, 1.0) * noise);
+    expected[i] = vec2(error, told > 0.0 ? noise / told : 1.0);
     // An unknown pixel whose centre ray meets nothing has no guide for the fits: the widest window fills it.
     bool adrift = usable[1] && c.w == 0.0 && unpacked_normal(texelFetch(place, at).w) == vec3(0.0);
     if (adrift) w = float[](0.0, 1.0, 0.0, 0.0, 0.0);

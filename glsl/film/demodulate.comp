@@ -97,21 +97,31 @@ Parts demodulated(int i) {
     return Parts(colour_at(i), vec3(1.0), vec3(0.0));
 }
 
+// Of the pixel's mean, per channel.
+vec3 variance_of_colour(int i, float count) {
+    float freedom = count > 1.0 ? count * (count - 1.0) : 0.0;
+    vec3 m2 = PixelStats_m2(stats, i);
+    return OF_FILE ? m2 : freedom > 0.0 ? m2 / freedom : vec3(0.0);
+}
+
 // Variance of the pixel's mean, per channel. That of indirect light is known for its luminance: samples of one pixel count as
 // having one colour. In files that lack it, the variance of all light stands for it: without any, `auto` had 1.04 to 4.8 times
 // the error.
 vec3 variance_of_filtered(int i, Parts p, float count) {
     vec3 factor = p.factor;
-    float freedom = count > 1.0 ? count * (count - 1.0) : 0.0;
     if (DEMODULATION == LIGHT && INDIRECT_VARIANCE) {
         PixelLight l = PixelLight_load(light, i);
-        float of_mean = freedom > 0.0 ? l.indirect_m2 / freedom : 0.0;
+        float of_mean = count > 1.0 ? l.indirect_m2 / (count * (count - 1.0)) : 0.0;
         vec3 deviation = p.filtered * number(sqrt(of_mean) / abs(luminance(colour_at(i) - l.direct)));
         return deviation * deviation;
     }
-    vec3 m2 = PixelStats_m2(stats, i);
-    vec3 of_mean = OF_FILE ? m2 : freedom > 0.0 ? m2 / freedom : vec3(0.0);
-    return mix(vec3(0.0), of_mean / (factor * factor), greaterThan(factor, vec3(0.0)));
+    return mix(vec3(0.0), variance_of_colour(i, count) / (factor * factor), greaterThan(factor, vec3(0.0)));
+}
+
+// What of the colour's variance is not that of what is filtered, mean over channels.
+float variance_of_sharp(int i, vec3 filtered, float count) {
+    vec3 rest = max(number(variance_of_colour(i, count) - filtered), vec3(0.0));
+    return (rest.r + rest.g + rest.b) / 3.0;
 }
 
 void main() {
@@ -122,7 +132,12 @@ void main() {
     // Pixels whose filtered part is not used get count 0, so that they do not reach others.
     bool known = finite(colour_at(int(i))) && any(greaterThan(p.factor, vec3(0.0)));
     radiance[i] = vec4(p.filtered, known ? count : 0.0);
-    if (MEASURED) variance[i] = variance_of_filtered(int(i), p, count);
-    factor[i] = vec4(p.factor, 0.0);
+    float rest = 0.0;
+    if (MEASURED) {
+        vec3 of_filtered = variance_of_filtered(int(i), p, count);
+        variance[i] = of_filtered;
+        rest = variance_of_sharp(int(i), p.factor * p.factor * of_filtered, count);
+    }
+    factor[i] = vec4(p.factor, rest);
     sharp[i] = vec4(p.sharp, 0.0);
 }

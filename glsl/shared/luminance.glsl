@@ -1,6 +1,6 @@
 // Luminance of linear Rec. 709 radiance, and differences of it.
 
-const float ENOUGH = 4.0;     // from this number of samples on, their own variance is trusted
+const float ENOUGH = 2.0;     // from this number of samples on, their own variance is trusted
 const float STRONGEST = 1e18; // differences are cut here, so that their squares are finite
 
 float luminance(vec3 c) {

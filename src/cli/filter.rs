@@ -57,7 +57,8 @@ pub struct Args {
     /// Filter the colour as it is: textures blur too
     #[arg(long)]
     pub no_demodulate: bool,
-    /// First cut pixels that are more than N times brighter than all but one around them, and say what that took away
+    /// First cut pixels that are more than N times brighter than all but one around them, if one sample has brought their light,
+    /// and say what that took away; 8 spares highlights
     #[arg(long, value_name = "N")]
     pub fireflies: Option<f32>,
     /// Options for the device and the output files.
@@ -216,15 +217,12 @@ fn filtered(args: &Args, gpu: &Gpu, aovs: &Aovs) -> Result<(Colour, Vec<PassTime
     if filtered.in_painted {
         notes.push("direct light of pixels without a sample is made of that of the others".to_owned());
     }
-    if let Some(cut) = &filtered.removed {
-        let share = 100.0 * cut.share;
-        notes.push(format!("fireflies: {} pixels cut, {share:.3} % of what is filtered", cut.pixels));
-    }
-    let (colour, times) = match args.supersampling.look_up(gpu, &args.image, aovs, &filtered)? {
-        Some((indirect, more)) => (filtered.join_reflected(&indirect)?, [filtered.times, more].concat()),
+    let clean = match args.supersampling.look_up(gpu, &args.image, aovs, &filtered)? {
+        Some((indirect, more)) => filtered.join_reflected(&indirect, more)?,
         None => filtered.join(gpu)?,
     };
-    Ok((colour, times, notes))
+    notes.extend(clean.notes());
+    Ok((clean.colour, clean.times, notes))
 }
 
 /// Puts the filtered colour into the file and keeps the noisy one as a layer. A single grey channel gets the mean of the

@@ -208,7 +208,7 @@ pub fn shoot<'a>(
     let seconds = host.seconds("render");
     let film = host.time("read back", || shot.film(&status, seconds))?;
     let counters = args.counters.then(|| renderer.counters()).transpose()?;
-    let outcome = Outcome { gpu, scene, film, host, status, counters, plan: None };
+    let outcome = Outcome { gpu, scene, film, host, status, counters, plan: None, notes: Vec::new() };
     Ok(Some(Taken { outcome, noisy, files, checkpoint }))
 }
 
@@ -230,7 +230,7 @@ impl Taken<'_> {
     pub fn finish(&mut self, args: &Args) -> Result<Ended> {
         let Self { outcome, noisy, files, checkpoint } = self;
         let whole = outcome.status.stopped != StopReason::Interrupted;
-        let Outcome { gpu, film, host, status, plan, .. } = &mut *outcome;
+        let Outcome { gpu, film, host, status, plan, notes, .. } = &mut *outcome;
         let mut written = host.time("write", || Ok(outputs::save(args, film, files, checkpoint.take(), whole)))?;
         // By now what took hours is safe, whatever becomes of the filter.
         if let Some((method, noisy)) = args.denoise.zip(noisy.take()).filter(|_| whole) {
@@ -238,7 +238,9 @@ impl Taken<'_> {
             if interrupt::leave_at_once(&line) {
                 interrupt::leave(&line);
             }
-            status.times.extend(host.time("denoise", || denoised(gpu, method, noisy, film))?);
+            let (times, told) = host.time("denoise", || denoised(gpu, method, noisy, film))?;
+            status.times.extend(times);
+            *notes = told;
             host.time("write", || Ok(outputs::save(args, film, files, None, true)))?;
         }
         fail_on_messages(gpu)?;
@@ -302,10 +304,11 @@ fn warn_of_broken(broken: &BrokenSamples) {
 }
 
 /// With the filter's default settings, scaled to the image.
-fn denoised(gpu: &Gpu, method: Method, noisy: Noisy, film: &mut Film) -> Result<Vec<PassTime>> {
-    let (colour, times) = Filtered::new(gpu, noisy, &Recipe::new(method))?.join(gpu)?;
-    film::replace_colour(film, colour);
-    Ok(times)
+fn denoised(gpu: &Gpu, method: Method, noisy: Noisy, film: &mut Film) -> Result<(Vec<PassTime>, Vec<String>)> {
+    let clean = Filtered::new(gpu, noisy, &Recipe::new(method))?.join(gpu)?;
+    let notes = clean.notes();
+    film::replace_colour(film, clean.colour);
+    Ok((clean.times, notes))
 }
 
 /// A system that is out of memory ends the process hours later without a word; what the filter cannot bind is told before, too.

@@ -1,10 +1,10 @@
 //! A noisy image taken apart on the device, to be filtered and put together again. Kernels: those of `glsl/film` whose names
 //! tell of modulation. Twin: [`super::twin`].
 use super::filter::Planes;
-use super::{Demodulation, Holds, Noisy};
+use super::{Demodulation, ExpectedError, Holds, Noisy};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::layout::{PackPush, SplitPush, vec3, vec4};
+use crate::layout::{PackPush, SplitPush, vec2, vec3, vec4};
 use crate::shaders::shared::noisy;
 use crate::shaders::{demodulate, demodulate_direct, remodulate, remodulate_direct};
 
@@ -110,6 +110,16 @@ impl Demodulated {
         let count = self.planes.pixels();
         let bind = remodulate::Bind { filtered: &self.planes.output, factor: &self.factor, picture: &self.picture };
         rec.dispatch_threads(&self.join, bind, &PackPush { count, ..Default::default() }, count)
+    }
+}
+
+impl Demodulated {
+    /// How far the joined picture is expected to be from the truth: see [`ExpectedError::of`].
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub fn expected_error(&self, gpu: &Gpu, expected: &Buffer<vec2>) -> Result<Option<ExpectedError>> {
+        ExpectedError::of(gpu, &self.planes, &self.factor, &self.picture, expected)
     }
 }
 

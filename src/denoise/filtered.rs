@@ -1,6 +1,7 @@
 //! One image filtered with scales of its own, as the command line does: of a film, or of a file.
 use super::demodulated::Demodulated;
 use super::demodulation::Demodulation;
+use super::expected::ExpectedError;
 use super::filter::firefly::{self, Removed};
 use super::filter::oidn;
 use super::filter::{self, FilterSettings, Method, Planes, Scales};
@@ -8,7 +9,7 @@ use super::noisy::{Holds, Noisy};
 use super::windows;
 use crate::error::Result;
 use crate::gpu::{Buffer, FrameResources, Gpu, PassTime, Recorder};
-use crate::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
+use crate::layout::{Guide, PixelLight, PixelStats, vec2, vec3, vec4};
 use crate::render::film;
 use crate::render::settings::Settings;
 
@@ -19,7 +20,7 @@ pub struct Recipe<'a> {
     /// What is kept away from the filter, where the image tells it and the filter does not want the colour whole. By default
     /// [`Holds::usual_demodulation`].
     pub demodulation: Option<Demodulation>,
-    /// Pixels so many times brighter than all but one around them are cut first.
+    /// Pixels so many times brighter than all but one around them are cut first, if one sample has brought their light.
     pub fireflies: Option<f32>,
     /// The settings for light of these scales.
     pub settings: &'a dyn Fn(&Scales) -> FilterSettings,
@@ -46,12 +47,35 @@ impl Recipe<'_> {
 /// An image whose light is filtered, still taken apart.
 pub struct Filtered {
     parts: Demodulated,
+    /// What the filter expects of its own errors, where it does.
+    expected: Option<Buffer<vec2>>,
     /// What each pass took.
     pub times: Vec<PassTime>,
     /// What was cut beforehand, if anything was to be.
     pub removed: Option<Removed>,
     /// Whether some pixels took direct light from others.
     pub in_painted: bool,
+}
+
+/// A filtered image.
+pub struct Clean {
+    /// Its light.
+    pub colour: Colour,
+    /// What each pass took.
+    pub times: Vec<PassTime>,
+    /// What was cut beforehand, if anything was to be.
+    pub removed: Option<Removed>,
+    /// How far the image is expected to be from the truth, where the filter estimates it, samples tell their variance,
+    /// and every pixel has direct light of its own.
+    pub expected: Option<ExpectedError>,
+}
+
+impl Clean {
+    /// Lines for the user.
+    pub fn notes(&self) -> Vec<String> {
+        let cut = self.removed.iter().filter(|cut| cut.pixels > 0).map(Removed::note);
+        cut.chain(self.expected.iter().map(ExpectedError::note)).collect()
+    }
 }
 
 /// Linear radiance (Rec. 709), one plane a channel, row-major.
@@ -71,37 +95,43 @@ impl Filtered {
         let mut parts = Demodulated::new(gpu, &noisy, demodulation, in_painted)?;
         let mut times = run(gpu, |rec| parts.record_split(rec, &noisy))?;
         drop(noisy);
-        let cut = |factor| firefly::cut(gpu, &mut parts.planes, factor);
-        let removed = recipe.fireflies.map(cut).transpose()?;
+        let cut = recipe.fireflies.map(|factor| firefly::cut(gpu, &mut parts.planes, factor)).transpose()?;
+        let (removed, took) = cut.unzip();
+        times.extend(took.into_iter().flatten());
         let scales = Scales::of_planes(&parts.planes)?;
-        run_filter(gpu, recipe, &scales, &parts.planes, &mut times)?;
+        let expected = run_filter(gpu, recipe, &scales, &parts.planes, &mut times)?;
         if let Some(direct) = parts.direct_planes() {
             run_filter(gpu, recipe, &scales.with_light(&direct.radiance)?, &direct, &mut times)?;
             times.extend(run(gpu, |rec| parts.record_direct_join(rec))?);
         }
-        Ok(Self { parts, times, removed, in_painted })
+        Ok(Self { parts, expected, times, removed, in_painted })
     }
 
     /// Puts the image together.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`].
-    pub fn join(mut self, gpu: &Gpu) -> Result<(Colour, Vec<PassTime>)> {
-        self.times.extend(run(gpu, |rec| self.parts.record_join(rec))?);
-        Ok((colour(&self.parts.picture)?, self.times))
+    pub fn join(self, gpu: &Gpu) -> Result<Clean> {
+        let Self { parts, expected, mut times, removed, in_painted } = self;
+        times.extend(run(gpu, |rec| parts.record_join(rec))?);
+        // Where direct light was in-painted, it lies in the place of what was filtered.
+        let expected = expected.filter(|_| !in_painted);
+        let told = expected.map(|expected| parts.expected_error(gpu, &expected)).transpose()?.flatten();
+        Ok(Clean { colour: colour(&parts.picture)?, times, removed, expected: told })
     }
 
-    /// Puts the image together from light that has been multiplied by surface colour already, as a look-up returns it; one value
-    /// per pixel.
+    /// Puts the image together from light that has been multiplied by surface colour already, as a look-up of these passes returns
+    /// it; one value per pixel.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`].
-    pub fn join_reflected(&self, light: &[vec3]) -> Result<Colour> {
+    pub fn join_reflected(self, light: &[vec3], look_up: Vec<PassTime>) -> Result<Clean> {
         let mut whole = colour(&self.parts.picture)?;
         for (c, plane) in whole.iter_mut().enumerate() {
             plane.iter_mut().zip(light).for_each(|(sharp, light)| *sharp += light[c]);
         }
-        Ok(whole)
+        let times = [self.times, look_up].concat();
+        Ok(Clean { colour: whole, times, removed: self.removed, expected: None })
     }
 
     /// The surfaces.
@@ -132,23 +162,30 @@ pub fn host_bytes(method: Method, settings: &Settings, unified: bool) -> u64 {
     film::host_bytes(settings, false) + settings.pixels() as u64 * (device + colour + method.host_bytes())
 }
 
-/// The filter's own buffers last no longer than this. What ran on the host is timed by its clock, and stands behind what the device
-/// did before.
-fn run_filter(gpu: &Gpu, recipe: &Recipe, scales: &Scales, planes: &Planes, times: &mut Vec<PassTime>) -> Result<()> {
+/// The filter's own buffers last no longer than this, but for what it expects of its errors. What ran on the host is timed by its
+/// clock, and stands behind what the device did before.
+fn run_filter(
+    gpu: &Gpu,
+    recipe: &Recipe,
+    scales: &Scales,
+    planes: &Planes,
+    times: &mut Vec<PassTime>,
+) -> Result<Option<Buffer<vec2>>> {
     let settings = (recipe.settings)(scales);
     match recipe.method {
         Method::Kernels(row) => {
             let filter = row.compile(gpu, &settings, planes.size)?;
             times.extend(run(gpu, |rec| filter.record(rec, planes))?);
+            Ok(filter.expected().cloned())
         }
         Method::Oidn => {
             for (name, took) in oidn::filter(settings.oidn, planes)? {
                 let begin_ns = times.last().map_or(0, |before| before.end_ns);
                 times.push(PassTime { name, begin_ns, end_ns: begin_ns.saturating_add(took.as_nanos() as u64) });
             }
+            Ok(None)
         }
     }
-    Ok(())
 }
 
 fn run(gpu: &Gpu, record: impl FnOnce(&mut Recorder) -> Result<()>) -> Result<Vec<PassTime>> {

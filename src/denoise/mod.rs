@@ -3,6 +3,8 @@
 mod demodulated;
 mod demodulation;
 mod denoiser;
+#[doc(hidden)]
+pub mod expected;
 pub mod file;
 pub mod filter;
 mod filtered;
@@ -13,7 +15,8 @@ pub mod twin;
 
 pub use demodulation::Demodulation;
 pub use denoiser::Denoiser;
-pub use filtered::{Colour, Filtered, Recipe, bytes_per_pixel, host_bytes};
+pub use expected::ExpectedError;
+pub use filtered::{Clean, Colour, Filtered, Recipe, bytes_per_pixel, host_bytes};
 pub use noisy::{Holds, Noisy};
 pub(crate) use timed::Chain;
 pub use timed::{Timed, timed};

@@ -32,6 +32,8 @@ pub struct Parts {
     pub sharp: Vec<vec3>,
     /// See `sharp`.
     pub factor: Vec<vec3>,
+    /// Variance of what does not go through the filter, mean over channels; 0 where none is known.
+    pub sharp_variance: Vec<f32>,
     /// Direct light before albedo, for a filter to in-paint, where some pixels (0 samples) have none of their own.
     pub direct: Option<FilterInput>,
 }
@@ -81,12 +83,17 @@ pub fn demodulate(pixels: &Pixels, demodulation: Demodulation, in_paint: bool) -
         [r, g, b, if known { pixels.count(i) } else { 0.0 }]
     };
     let measured = pixels.holds.variance_of_filtered(demodulation);
-    let variance = measured.then(|| all.clone().map(|i| variance(pixels, demodulation, i, &parts[i])).collect());
+    let variance: Option<Vec<vec3>> =
+        measured.then(|| all.clone().map(|i| variance(pixels, demodulation, i, &parts[i])).collect());
+    let of_filtered =
+        |i: usize| variance.as_ref().map(|v| Vec3::from(factor[i]) * Vec3::from(factor[i]) * Vec3::from(v[i]));
+    let rest = |i: usize| of_filtered(i).map_or(0.0, |filtered| variance_of_sharp(pixels, i, filtered));
+    let sharp_variance = all.clone().map(rest).collect();
     let [width, height] = pixels.size;
     let radiance = all.map(radiance).collect();
     let input = FilterInput { width, height, radiance, guide: pixels.guide.clone(), variance };
     let direct = in_paint.then(|| input.with_radiance(demodulate_direct(pixels)));
-    Parts { input, sharp: parts.iter().map(|p| p.sharp).collect(), factor, direct }
+    Parts { input, sharp: parts.iter().map(|p| p.sharp).collect(), factor, sharp_variance, direct }
 }
 
 /// Twin of `demodulate_direct.comp`.
@@ -156,15 +163,29 @@ fn split_light(pixels: &Pixels, i: usize) -> Part {
 
 /// Of the mean of what is filtered.
 fn variance(pixels: &Pixels, demodulation: Demodulation, i: usize, Part { filtered, factor, .. }: &Part) -> vec3 {
-    let (n, PixelStats { m2, .. }) = (pixels.count(i), pixels.stats[i]);
-    let of_mean = |m2: f32| if n > 1.0 { m2 / (n * (n - 1.0)) } else { 0.0 };
     if demodulation == Demodulation::Light && pixels.holds.indirect_variance {
         let other = Vec3::from(pixels.stats[i].mean) - Vec3::from(pixels.light[i].direct);
-        let relative = number(of_mean(pixels.light[i].indirect_m2).sqrt() / luminance(other).abs());
+        let of_mean = variance_of_mean(pixels.light[i].indirect_m2, pixels.count(i));
+        let relative = number(of_mean.sqrt() / luminance(other).abs());
         return filtered.map(|light| (light * relative).powi(2));
     }
-    let all = if pixels.holds.of_file { m2 } else { m2.map(of_mean) };
+    let all = variance_of_colour(pixels, i);
     std::array::from_fn(|c| if factor[c] > 0.0 { all[c] / (factor[c] * factor[c]) } else { 0.0 })
+}
+
+fn variance_of_mean(m2: f32, n: f32) -> f32 {
+    if n > 1.0 { m2 / (n * (n - 1.0)) } else { 0.0 }
+}
+
+fn variance_of_colour(pixels: &Pixels, i: usize) -> vec3 {
+    let m2 = pixels.stats[i].m2;
+    if pixels.holds.of_file { m2 } else { m2.map(|m2| variance_of_mean(m2, pixels.count(i))) }
+}
+
+/// What of the colour's variance is not that of what is filtered, mean over channels.
+fn variance_of_sharp(pixels: &Pixels, i: usize, filtered: Vec3) -> f32 {
+    let rest = Vec3::from(variance_of_colour(pixels, i)) - filtered;
+    rest.to_array().map(|v| number(v).max(0.0)).iter().sum::<f32>() / 3.0
 }
 
 fn factor_of_direct(albedo: &vec3) -> vec3 {

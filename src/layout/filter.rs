@@ -1,5 +1,5 @@
 //! Push constants of the kernels that filter and of those of `glsl/film` but `accumulate.comp`.
-use super::{Field, Struct, float, uint, uvec2, vec3, vec4};
+use super::{Field, Struct, float, uint, uvec2, vec2, vec3, vec4};
 use bytemuck::{Pod, Zeroable};
 
 gpu_structs! {
@@ -95,7 +95,17 @@ gpu_structs! {
         factor: float,
     }
 
-    /// Push constants of `auto_inputs.comp`, `auto_leverage.comp` and `auto_error.comp`.
+    /// Push constants of `auto_leverage.comp`.
+    struct AutoLeveragePush {
+        /// Pixels of the image.
+        count: uint,
+        /// As in [`AutoPush`].
+        floor: float,
+        /// Pixels of the narrow window over those of the wide and of the middle one.
+        shares: vec2,
+    }
+
+    /// Push constants of `auto_inputs.comp` and `auto_error.comp`.
     struct AutoPush {
         /// Pixels of the image.
         count: uint,

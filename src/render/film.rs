@@ -18,6 +18,10 @@ pub(crate) const PENDING: &str = "pending";
 
 /// Metadata: whether the layer of direct light holds none of lamps and sky, which is noisy. Filters ask for it.
 pub(crate) const SHARP_DIRECT: &str = "sharpDirect";
+/// Key of metadata: what the layer `albedo` holds, [`OF_SAMPLES`]. Earlier versions wrote another albedo and did not say so.
+pub(crate) const ALBEDO: &str = "albedo";
+/// Value of it: the mean of all samples of a pixel.
+pub(crate) const OF_SAMPLES: &str = "mean of samples";
 
 /// Sum of squared deviations of the luminance of indirect light times albedo.
 pub(crate) const INDIRECT_M2: &str = "indirect.m2";

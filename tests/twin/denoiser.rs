@@ -4,9 +4,9 @@ use crate::picture;
 use crate::support::{assert_silent, gpu, hash};
 use std::path::Path;
 use tallow::denoise::file::Layers;
-use tallow::denoise::filter::{FILTERS, FilterSettings, Scales, check_size, find};
+use tallow::denoise::filter::{FILTERS, FilterSettings, Scales, check_size, estimated, find};
 use tallow::denoise::twin::{Parts, Pixels, demodulate, split};
-use tallow::denoise::{Demodulation, Denoiser, Filtered, Holds, Noisy, Recipe};
+use tallow::denoise::{Demodulation, Denoiser, Filtered, Holds, Noisy, Recipe, expected};
 use tallow::gpu::{DeviceKind, FrameResources, Gpu};
 use tallow::image::aov::{Aovs, Names};
 use tallow::image::{Film, Samples};
@@ -211,7 +211,7 @@ fn files_are_taken_apart_and_put_together_as_their_twins() {
                     settings: &|_| settings,
                 };
                 let noisy = Layers::new(&aovs).upload(&gpu).unwrap();
-                let ([r, g, b], _) = Filtered::new(&gpu, noisy, &recipe).unwrap().join(&gpu).unwrap();
+                let [r, g, b] = Filtered::new(&gpu, noisy, &recipe).unwrap().join(&gpu).unwrap().colour;
                 let device: Vec<vec4> = (0..r.len()).map(|i| [r[i], g[i], b[i], 1.0]).collect();
                 let off = picture::apart(&device, &host, 1e-3);
                 assert!(off < 3e-4, "{demodulation:?} {size:?} without {missing:?}: {off}");
@@ -242,12 +242,59 @@ fn a_film_and_its_file_become_one_picture() {
             let [of_film, of_file] = images.map(|noisy| {
                 let filtered = Filtered::new(&gpu, noisy, &recipe).unwrap();
                 assert!(filtered.in_painted && filtered.removed.is_some());
-                filtered.join(&gpu).unwrap().0
+                filtered.join(&gpu).unwrap().colour
             });
             assert!(of_film == of_file, "{}", row.name);
         }
     }
     assert_silent(&gpu);
+}
+
+#[test]
+fn expected_errors_agree_with_their_twin() {
+    let gpu = gpu();
+    let auto = find("auto").unwrap();
+    let settings = FilterSettings::default().with(|s| s.edge.extent = 3.0);
+    for (size, demodulation) in [([31, 1], Demodulation::Albedo), (LARGEST, Demodulation::Light)] {
+        let frame = Frame::new(size, false);
+        let renderer = renderer(&gpu, size, ALL, "uniform");
+        frame.upload(&renderer);
+        let (method, fireflies) = (auto.into(), None);
+        let recipe = Recipe { method, demodulation: Some(demodulation), fireflies, settings: &|_| settings };
+        let filtered = Filtered::new(&gpu, Noisy::of_film(&renderer).unwrap(), &recipe).unwrap();
+        let device = filtered.join(&gpu).unwrap().expected.unwrap();
+        let Frame { stats, light, guide, .. } = frame;
+        let pixels = Pixels { size, holds: Holds::film(true, true), stats, light, guide };
+        let parts = demodulate(&pixels, demodulation, false);
+        let (output, expected) = estimated(&parts.input, &settings);
+        let host = expected::reference(&parts, &output, &expected).unwrap();
+        println!("{size:?} {demodulation:?}: {device:?} {host:?}");
+        for (device, host) in [(device.before, host.before), (device.after, host.after)] {
+            assert!((device - host).abs() < 1e-3 * host, "{size:?} {demodulation:?}: {device} {host}");
+        }
+    }
+    assert_silent(&gpu);
+}
+
+/// Four pixels of light 2 over albedo 1/2: 1. Half of the variance .04 that their samples tell of the light is noise, .02 / 4 of the
+/// colour; a hundredth of the square is the error that is left. Direct light adds .1 of variance where it varies around by more.
+#[test]
+fn expected_errors_solve_the_worked_example() {
+    let row = |sharp: [f32; 4], sharp_variance: f32| {
+        let mut input = picture::Picture::new(4, 1).flat().input;
+        input.radiance.fill([2.0, 2.0, 2.0, 4.0]);
+        input.variance = Some(vec![[0.04; 3]; 4]);
+        let sharp = sharp.map(|v| [v; 3]).to_vec();
+        let parts =
+            Parts { input, sharp, factor: vec![[0.5; 3]; 4], sharp_variance: vec![sharp_variance; 4], direct: None };
+        expected::reference(&parts, &[[2.0, 2.0, 2.0, 4.0]; 4], &[[0.01, 0.5]; 4]).unwrap()
+    };
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-5;
+    let plain = row([0.0; 4], 0.1);
+    assert!(near(plain.before, 0.005 / 1.01) && near(plain.after, 0.01 / 1.01), "{plain:?}");
+    let varied = row([0.0, 2.0, 0.0, 2.0], 0.1);
+    let over = (1.0 / 1.01 + 1.0 / 9.01) / 2.0;
+    assert!(near(varied.before, 0.055 * over) && near(varied.after, 0.06 * over), "{varied:?}");
 }
 
 #[test]

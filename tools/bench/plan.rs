@@ -48,12 +48,9 @@ fn rendered(gpu: &Gpu, scene: &Loaded, plan: &Plan) -> Result<(f64, Picture)> {
     let mut times = Job::new(&renderer).run_to_end(&mut FrameResources::new(gpu)?)?.times;
     let mut picture = renderer.picture()?;
     if let Some(method) = method {
-        let ([r, g, b], more) = {
-            let filtered = Filtered::new(gpu, Noisy::of_film(&renderer)?, &Recipe::new(method))?;
-            times.extend(filtered.times.iter().copied());
-            filtered.join(gpu)?
-        };
-        times.extend(more.last().copied());
+        let clean = Filtered::new(gpu, Noisy::of_film(&renderer)?, &Recipe::new(method))?.join(gpu)?;
+        times.extend(clean.times);
+        let [r, g, b] = clean.colour;
         picture.pixels = (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect();
     }
     Ok((times.iter().map(|time| time.duration_ns() as f64 * 1e-6).sum(), picture))

@@ -51,6 +51,8 @@ pub struct Summary {
     pub gpu_ms: f64,
     /// GPU time by pass.
     pub passes: Vec<PassRow>,
+    /// What the filter says of its work: pixels that were cut, the error that it expects.
+    pub notes: Vec<String>,
     /// What was repaired in the scene.
     pub warnings: Vec<String>,
 }
@@ -71,12 +73,14 @@ pub struct Outcome<'a> {
     pub counters: Option<Counters>,
     /// What was planned, where it was.
     pub plan: Option<Plan>,
+    /// What the filter says of its work.
+    pub notes: Vec<String>,
 }
 
 impl Outcome<'_> {
     /// In numbers, with the files that were written.
     pub fn summary(&self, written: &[PathBuf]) -> Summary {
-        let Self { gpu, scene, film, host, status, counters, plan } = self;
+        let Self { gpu, scene, film, host, status, counters, plan, notes } = self;
         let counts = film::counts(film, "samples").unwrap_or_default();
         Summary {
             files: written.iter().map(|f| f.display().to_string()).collect(),
@@ -97,6 +101,7 @@ impl Outcome<'_> {
             device: gpu.info().name.clone(),
             gpu_ms: status.times.iter().map(|pass| pass.duration_ns() as f64 * 1e-6).sum(),
             passes: table::summarise(&status.times),
+            notes: notes.clone(),
             warnings: scene.warnings.clone(),
         }
     }
@@ -133,6 +138,7 @@ fn text(s: &Summary) -> String {
         let per_ray = c.nodes as f64 / c.rays().max(1) as f64;
         text += &format!("{} closest-hit rays, {} any-hit rays, {per_ray:.1} nodes each\n", c.closest, c.any);
     }
+    text += &s.notes.iter().map(|note| note.clone() + "\n").collect::<String>();
     text + &table::timing_table(&s.passes)
 }
 

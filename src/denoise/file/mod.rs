@@ -8,7 +8,7 @@ use crate::gpu::{Buffer, Gpu, Location};
 use crate::image::Samples;
 use crate::image::aov::{Aov, Aovs};
 use crate::layout::{Guide, NONE, PixelLight, PixelStats};
-use crate::render::film::SHARP_DIRECT;
+use crate::render::film::{ALBEDO, SHARP_DIRECT};
 use bytemuck::Pod;
 use glam::Vec3;
 use places::Places;
@@ -30,6 +30,14 @@ impl<'a> Layers<'a> {
     /// Looks at all that must be known before the first pixel.
     pub fn new(aovs: &'a Aovs<'a>) -> Self {
         let (film, mut notes) = (aovs.film, Vec::new());
+        let apart = [Aov::Direct, Aov::Indirect, Aov::Albedo].iter().all(|aov| aovs.get(*aov).is_some());
+        if apart && !film.metadata.contains_key(ALBEDO) {
+            notes.push(
+                "an earlier version of tallow wrote this file, with another albedo: pixels that show several surfaces come out \
+                 too bright or too dark; render it anew"
+                    .to_owned(),
+            );
+        }
         let indirect_m2 = match film.channel("indirect.m2") {
             Some(Samples::F32(m2)) => Some(m2.as_slice()),
             _ => None,

@@ -14,6 +14,9 @@ settings! {
         EdgeOverrides {
             /// Scale of radiance [default: the image's largest]
             intensity: f32 = 1.0, FINITE_ABOVE_0;
+            /// Radiance that is usual: auto takes errors as relative down to a tenth of it [default: the square of the mean root of
+            /// the image's luminance]
+            usual: f32 = 0.01, FINITE_ABOVE_0;
             /// Scale of distances in world units [default: the diagonal of what is seen]
             extent: f32 = 1.0, FINITE_ABOVE_0;
             /// Radiance difference that counts as an edge, in units of --intensity; inf switches it off.

@@ -3,10 +3,11 @@ use super::pixel::known_radiance;
 use super::{FilterInput, Planes};
 use crate::denoise::windows;
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, FrameResources, Gpu, Kernel, Location, Recorder};
+use crate::gpu::{Buffer, FrameResources, Gpu, Kernel, Location, PassTime};
 use crate::layout::{FireflyPush, vec4};
 use crate::math::srgb::luminance;
-use crate::shaders::firefly::{Bind, Constants};
+use crate::shaders::firefly::{Bind, Constants, DOMINATED};
+use glam::Vec3;
 
 /// What was cut.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,40 +20,24 @@ pub struct Removed {
     pub share: f64,
 }
 
-/// The kernel.
-pub struct Fireflies(Kernel<Bind<'static>>);
-
-impl Fireflies {
-    /// # Errors
-    /// [`Error::Device`] when the driver refuses it.
-    pub fn new(gpu: &Gpu) -> Result<Self> {
-        Ok(Self(Kernel::new(gpu, &Constants::default())?))
-    }
-
-    /// radiance\[P\] -> cut\[P\]; `factor` as in [`remove_fireflies`].
-    pub fn record(
-        &self,
-        rec: &mut Recorder,
-        size: [u32; 2],
-        factor: f32,
-        radiance: &Buffer<vec4>,
-        cut: &Buffer<vec4>,
-    ) -> Result<()> {
-        let push = FireflyPush { size, factor, ..Default::default() };
-        rec.dispatch(&self.0, Bind { radiance, cut }, &push, self.0.groups(size))
+impl Removed {
+    /// One line for the user.
+    pub fn note(&self) -> String {
+        format!("fireflies: {} pixels cut, {:.3} % of what is filtered", self.pixels, 100.0 * self.share)
     }
 }
 
-/// Cuts the pixels of `input` that are more than `factor` (at least 1) times brighter than the second brightest of the
-/// 24 around them.
+/// Cuts the pixels of `input` that are more than `factor` (at least 1) times brighter than the second brightest of the 24 around
+/// them, most of which are lit, and where their variance is known, if one sample has brought their light.
 ///
 /// # Errors
 /// [`Error::Usage`] for a factor below 1 or planes of wrong sizes, [`Error::Device`] when the device fails.
 pub fn remove_fireflies(gpu: &Gpu, input: &mut FilterInput, factor: f32) -> Result<Removed> {
     input.validate()?;
     let mut planes = Planes::new(gpu, input)?;
-    let removed = cut(gpu, &mut planes, factor)?;
+    let (removed, _) = cut(gpu, &mut planes, factor)?;
     input.radiance = planes.radiance.read()?;
+    input.variance = planes.variance.map(|v| v.read()).transpose()?;
     Ok(removed)
 }
 
@@ -60,20 +45,24 @@ pub fn remove_fireflies(gpu: &Gpu, input: &mut FilterInput, factor: f32) -> Resu
 ///
 /// # Errors
 /// As [`remove_fireflies`].
-pub fn cut(gpu: &Gpu, planes: &mut Planes, factor: f32) -> Result<Removed> {
-    if !(factor >= 1.0 && factor.is_finite()) {
-        return Err(Error::Usage(format!("the firefly factor is {factor}: choose a finite number of at least 1")));
+pub fn cut(gpu: &Gpu, planes: &mut Planes, factor: f32) -> Result<(Removed, Vec<PassTime>)> {
+    if factor.is_nan() || factor < 1.0 {
+        return Err(Error::Usage(format!("the firefly factor is {factor}: choose a number of at least 1")));
     }
     let cut = Buffer::new(gpu, "cut", planes.radiance.len(), Location::Device)?;
-    let kernel = Fireflies::new(gpu)?;
-    let record = |rec: &mut Recorder| kernel.record(rec, planes.size, factor, &planes.radiance, &cut);
-    gpu.run(&mut FrameResources::new(gpu)?, record)?;
+    let none = Buffer::new(gpu, "no variance", 1, Location::Device)?;
+    let kernel = Kernel::new(gpu, &Constants { measured: planes.variance.is_some() })?;
+    let push = FireflyPush { size: planes.size, factor, ..Default::default() };
+    let variance = planes.variance.as_ref().unwrap_or(&none);
+    let bind = Bind { radiance: &planes.radiance, variance, cut: &cut };
+    let groups = kernel.groups(planes.size);
+    let times = gpu.run(&mut FrameResources::new(gpu)?, |rec| rec.dispatch(&kernel, bind, &push, groups))?;
     let mut tally = Tally::default();
     for window in windows(cut.len()) {
         tally.add(&planes.radiance.read_range(window.clone())?, &cut.read_range(window)?);
     }
     planes.radiance = cut;
-    Ok(tally.removed())
+    Ok((tally.removed(), times))
 }
 
 /// What is missing in `after`.
@@ -109,20 +98,40 @@ impl Tally {
 }
 
 /// Twin of the kernel.
-pub fn reference(input: &FilterInput, factor: f32) -> Vec<vec4> {
-    let (width, height) = (i64::from(input.width), i64::from(input.height));
-    let pixel = |at: i64| {
-        let Some(here) = known_radiance(input.radiance[at as usize]) else { return [0.0; 4] };
-        let mut around: Vec<f32> = (0..25)
-            .map(|i| (at % width + i % 5 - 2, at / width + i / 5 - 2))
-            .filter(|&(u, v)| (0..width).contains(&u) && (0..height).contains(&v) && v * width + u != at)
-            .filter_map(|(u, v)| known_radiance(input.radiance[(v * width + u) as usize]))
-            .map(|c| luminance(c).max(0.0))
-            .collect();
-        around.sort_by(|a, b| b.total_cmp(a));
+pub fn reference(input: &FilterInput, factor: f32) -> FilterInput {
+    let mut cut = input.clone();
+    for (at, radiance) in input.radiance.iter().enumerate() {
+        let Some(here) = known_radiance(*radiance) else {
+            cut.radiance[at] = [0.0; 4];
+            continue;
+        };
+        let around = around(input, at);
+        let lit = around.iter().filter(|v| **v > 0.0).count();
         let (bright, most) = (luminance(here), around.get(1).map_or(f32::INFINITY, |second| factor * second));
-        let kept = if bright > most { here * (most / bright) } else { here };
-        kept.extend(input.radiance[at as usize][3]).into()
-    };
-    (0..width * height).map(pixel).collect()
+        let outlier = 2 * lit > around.len() && bright > most && dominated(input, at, bright);
+        let kept = if outlier { most / bright } else { 1.0 };
+        cut.radiance[at] = (here * kept).extend(radiance[3]).into();
+        cut.variance.iter_mut().filter(|_| outlier).for_each(|v| v[at] = v[at].map(|v| v * kept * kept));
+    }
+    cut
+}
+
+/// Luminances of the known pixels around one, the brightest first.
+fn around(input: &FilterInput, at: usize) -> Vec<f32> {
+    let (width, height) = (i64::from(input.width), i64::from(input.height));
+    let at = at as i64;
+    let mut around: Vec<f32> = (0..25)
+        .map(|i| (at % width + i % 5 - 2, at / width + i / 5 - 2))
+        .filter(|&(u, v)| (0..width).contains(&u) && (0..height).contains(&v) && v * width + u != at)
+        .filter_map(|(u, v)| known_radiance(input.radiance[(v * width + u) as usize]))
+        .map(|c| luminance(c).max(0.0))
+        .collect();
+    around.sort_by(|a, b| b.total_cmp(a));
+    around
+}
+
+fn dominated(input: &FilterInput, at: usize, bright: f32) -> bool {
+    let Some(variance) = &input.variance else { return true };
+    let v = Vec3::from(variance[at]);
+    v.is_finite() && luminance(v.max(Vec3::ZERO).map(f32::sqrt)) > DOMINATED * bright
 }

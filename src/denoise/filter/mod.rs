@@ -21,6 +21,8 @@ mod svgf;
 mod wavelet;
 
 pub use atrous::{AtrousForm, AtrousOverrides, AtrousSettings};
+#[doc(hidden)]
+pub use auto::estimated;
 pub use edge::{EdgeOverrides, EdgeSettings};
 pub use footprint::{FootprintOverrides, FootprintSettings};
 pub use guided::{GuidedOverrides, GuidedSettings, GuidedSums};
@@ -34,7 +36,7 @@ pub use wavelet::{WaveletBasis, WaveletOverrides, WaveletSettings};
 
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, FrameResources, Gpu, Location, PassTime, Recorder};
-use crate::layout::{Guide, PixelLight, vec3, vec4};
+use crate::layout::{Guide, PixelLight, vec2, vec3, vec4};
 
 /// Every filter of our own, in the order of `--help`; the twin and stability tests run each row.
 pub const FILTERS: &[&Row] =
@@ -93,6 +95,10 @@ impl Filter for Fitted {
         }
         self.filter.record(rec, planes)
     }
+
+    fn expected(&self) -> Option<&Buffer<vec2>> {
+        self.filter.expected()
+    }
 }
 
 /// A filter on a device, for one size and one set of settings.
@@ -102,6 +108,12 @@ pub trait Filter: Send + Sync {
     /// # Errors
     /// [`Error::Usage`] for planes of another size, [`Error::Device`] when the image is too large for the device.
     fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()>;
+
+    /// Where the filter estimates its own error, what its last run left there: of each pixel the mean squared error of what came
+    /// out over its square, and the share of the variance of its samples that is noise.
+    fn expected(&self) -> Option<&Buffer<vec2>> {
+        None
+    }
 }
 
 /// The images a filter reads and the one it writes, row-major. What they hold is said at [`FilterInput`].

@@ -5,7 +5,7 @@ use crate::strip;
 use crate::view::View;
 use anyhow::{Result, anyhow};
 use tallow::denoise::filter::{FilterSettings, Method, OidnQuality, Scales};
-use tallow::denoise::{Filtered, Noisy, Recipe};
+use tallow::denoise::{Clean, ExpectedError, Filtered, Noisy, Recipe};
 use tallow::gpu::{FrameResources, Gpu, PassTime};
 use tallow::image::{Picture, metrics};
 use tallow::render::settings::Settings;
@@ -25,6 +25,7 @@ pub struct Score {
     pub ssim: f64,
     pub flip: f64,
     pub ms: Option<f64>,
+    pub expected: Option<ExpectedError>,
 }
 
 /// One noisy image.
@@ -48,9 +49,9 @@ pub fn of_view(gpu: &Gpu, args: &Args, view: &'static View, contenders: &[Conten
     let mut rows = Vec::new();
     for &spp in &args.spp {
         let (noisy, filtered) = images(gpu, args, &scene, &view.settings(&settings, spp, 0), contenders)?;
-        let pictures: Vec<&Picture> = filtered.iter().map(|(picture, _)| picture).collect();
-        let of_filters = filtered.iter().map(|(picture, ms)| score(picture, &reference, Some(*ms)));
-        let scores = [score(&noisy, &reference, None)].into_iter().chain(of_filters).collect();
+        let pictures: Vec<&Picture> = filtered.iter().map(|image| &image.picture).collect();
+        let of_filters = filtered.iter().map(|image| image.score(&reference));
+        let scores = [score(&noisy, &reference)].into_iter().chain(of_filters).collect();
         let (name, reference_spp, reference_relmse) = (view.name, reference.spp, reference.relmse);
         rows.push(Row { view: name, spp, reference_spp, reference_relmse, scores });
         let strip = strip::draw(&noisy, &pictures, &reference.picture);
@@ -59,51 +60,63 @@ pub fn of_view(gpu: &Gpu, args: &Args, view: &'static View, contenders: &[Conten
     Ok(rows)
 }
 
-/// The noisy image, and every contender's with its milliseconds.
+/// What a filter made of an image.
+struct Image {
+    picture: Picture,
+    ms: f64,
+    expected: Option<ExpectedError>,
+}
+
+impl Image {
+    fn score(&self, reference: &Reference) -> Score {
+        Score { ms: Some(self.ms), expected: self.expected, ..score(&self.picture, reference) }
+    }
+}
+
+/// The noisy image, and every contender's.
 fn images(
     gpu: &Gpu,
     args: &Args,
     scene: &Scene,
     settings: &Settings,
     contenders: &[Contender],
-) -> Result<(Picture, Vec<(Picture, f64)>)> {
+) -> Result<(Picture, Vec<Image>)> {
     let renderer = Renderer::new(gpu, scene, settings, Outputs { guides: true, split_light: true, counters: false })?;
     let job = Job::new(&renderer);
     let status = job.run_to_end(&mut FrameResources::new(gpu)?)?;
     let noisy = job.film(&status)?.picture(None).map_err(|what| anyhow!(what))?;
     let filtered = contenders.iter().map(|contender| {
-        let mut milliseconds = Vec::new();
+        let (mut milliseconds, mut expected) = (Vec::new(), None);
         let mut picture = noisy.clone();
         // The first run makes kernels and loads weights.
         for _ in 0..=args.runs {
-            let (pixels, ms) = contender.filter(gpu, Noisy::of_film(&renderer)?)?;
-            picture.pixels = pixels;
-            milliseconds.push(ms);
+            let Clean { colour: [r, g, b], times, expected: told, .. } =
+                contender.filter(gpu, Noisy::of_film(&renderer)?)?;
+            picture.pixels = r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect();
+            milliseconds.push(times.iter().map(PassTime::duration_ns).sum::<u64>() as f64 * 1e-6);
+            expected = told;
         }
         milliseconds[1..].sort_unstable_by(f64::total_cmp);
-        Ok((picture, milliseconds[1 + (milliseconds.len() - 2) / 2]))
+        Ok(Image { picture, ms: milliseconds[1 + (milliseconds.len() - 2) / 2], expected })
     });
     let filtered = filtered.collect::<Result<Vec<_>>>()?;
     Ok((noisy, filtered))
 }
 
 impl Contender {
-    /// As `tallow render --denoise` does it, and the milliseconds of its passes: by the device's clock, or for a library by the
-    /// host's.
-    fn filter(&self, gpu: &Gpu, noisy: Noisy) -> Result<(Vec<[f32; 3]>, f64)> {
+    /// As `tallow render --denoise` does it; passes are timed by the device's clock, or for a library by the host's.
+    fn filter(&self, gpu: &Gpu, noisy: Noisy) -> Result<Clean> {
         let quality = self.quality;
         let settings =
             |scales: &Scales| FilterSettings::default().scaled_by(scales).with(|s| s.oidn.oidn_quality = quality);
         let recipe = Recipe { settings: &settings, ..Recipe::new(self.method) };
-        let ([r, g, b], times) = Filtered::new(gpu, noisy, &recipe)?.join(gpu)?;
-        let pixels = r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect();
-        Ok((pixels, times.iter().map(PassTime::duration_ns).sum::<u64>() as f64 * 1e-6))
+        Ok(Filtered::new(gpu, noisy, &recipe)?.join(gpu)?)
     }
 }
 
-fn score(picture: &Picture, reference: &Reference, ms: Option<f64>) -> Score {
+fn score(picture: &Picture, reference: &Reference) -> Score {
     let m = metrics::compare(picture, &reference.picture);
-    Score { relmse: m.relmse, ssim: m.ssim.unwrap_or(f64::NAN), flip: m.flip, ms }
+    Score { relmse: m.relmse, ssim: m.ssim.unwrap_or(f64::NAN), flip: m.flip, ms: None, expected: None }
 }
 
 impl Row {

@@ -8,7 +8,7 @@ use tallow::report::table;
 
 pub const LEGEND: &str = "relMSE, FLIP and SSIM against the reference; ms of a filter behind a first run (Open Image Denoise by \
                           the wall clock).\n! the reference's own relMSE, as its samples tell, is above a tenth of the least one \
-                          of the row.";
+                          of the row.\nexpected: the relMSE of the noisy image and of its own that a filter tells of itself.";
 
 /// All rows so far.
 #[derive(Default)]
@@ -24,7 +24,8 @@ pub fn table(view: &View, rows: &[Row], contenders: &[Contender]) -> String {
     let mut text = format!("{} {width}x{height}; reference: {}\n", view.name, reference.unwrap_or_default());
     let of_filter = |name: &str| [&format!("{name}: relMSE"), "FLIP", "SSIM", "ms"].map(str::to_owned);
     let of_filters = names(contenders).into_iter().flat_map(of_filter);
-    let header: Vec<String> = ["spp", ""].map(str::to_owned).into_iter().chain(of_filters).collect();
+    let header: Vec<String> =
+        ["spp", ""].map(str::to_owned).into_iter().chain(of_filters).chain(["expected".to_owned()]).collect();
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
     text += &table::text(&header, &rows.iter().map(cells).collect::<Vec<_>>());
     text
@@ -40,19 +41,24 @@ fn cells(row: &Row) -> Vec<String> {
         let ms = score.ms.map_or("-".to_owned(), |ms| format!("{ms:.1}"));
         [format!("{:.5}", score.relmse), format!("{:.4}", score.flip), format!("{:.4}", score.ssim), ms]
     };
-    [row.spp.to_string(), mark.to_owned()].into_iter().chain(row.scores.iter().flat_map(of)).collect()
+    let told = row.scores.iter().find_map(|score| score.expected);
+    let told = told.map_or("-".to_owned(), |told| format!("{:.5}, {:.5}", told.before, told.after));
+    [row.spp.to_string(), mark.to_owned()].into_iter().chain(row.scores.iter().flat_map(of)).chain([told]).collect()
 }
 
 impl Results {
     /// Writes all figures, one line an image.
     pub fn write(&self, contenders: &[Contender], path: &Path) -> Result<()> {
-        let mut text = "scene,spp,filter,relmse,flip,ssim,ms,reference_spp,reference_relmse\n".to_owned();
+        let mut text =
+            "scene,spp,filter,relmse,flip,ssim,ms,expected_before,expected_after,reference_spp,reference_relmse\n"
+                .to_owned();
         for row in &self.rows {
             for (name, s) in names(contenders).iter().zip(&row.scores) {
                 let ms = s.ms.map_or(String::new(), |ms| ms.to_string());
+                let told = s.expected.map_or(",".to_owned(), |told| format!("{},{}", told.before, told.after));
                 let reference = format!("{},{}", row.reference_spp, row.reference_relmse);
                 let Score { relmse, flip, ssim, .. } = s;
-                writeln!(text, "{},{},{name},{relmse},{flip},{ssim},{ms},{reference}", row.view, row.spp)?;
+                writeln!(text, "{},{},{name},{relmse},{flip},{ssim},{ms},{told},{reference}", row.view, row.spp)?;
             }
         }
         Ok(std::fs::write(path, text)?)

@@ -2,6 +2,8 @@
 //! `glsl/auto*.comp`.
 mod reference;
 
+pub use reference::estimated;
+
 use super::atrous_taps::threads;
 use super::edge::{EdgeSettings, Rates};
 use super::noise_estimate::Estimate;
@@ -9,15 +11,16 @@ use super::pack::Pack;
 use super::{Filter, FilterSettings, Planes, Row, guided, svgf};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::layout::{AutoPush, AutoResidualPush, AutoSmoothPush, PackPush, vec3, vec4};
-use crate::shaders::{auto, auto_error, auto_inputs, auto_leverage, auto_residual, auto_smooth, auto_sum};
+use crate::layout::{AutoLeveragePush, AutoPush, AutoResidualPush, AutoSmoothPush, PackPush, vec2, vec3, vec4};
+use crate::shaders::{auto, auto_error, auto_inputs, auto_leverage, auto_residual, auto_smooth};
 
 /// See [`super::FILTERS`].
 pub const ROW: Row = Row {
     name: "auto",
     about: "per pixel the best blend of none, guided by wide, middle and narrow windows, and svgf, by estimated error",
-    // The pack's, those of four candidates twice, of the estimate, three inputs, the dim one, leverages and their surroundings.
-    bytes: super::pack::BYTES + (4 * 2 + 1 + 3 + 1 + 2) * 16 + 3 * guided::ROW.bytes + svgf::ROW.bytes,
+    // The pack's, those of four candidates twice, of the estimate, three inputs, the dim one, leverages and their surroundings,
+    // expected errors.
+    bytes: super::pack::BYTES + (4 * 2 + 1 + 3 + 1 + 2) * 16 + 8 + 3 * guided::ROW.bytes + svgf::ROW.bytes,
     make: |gpu, settings, size| Ok(Box::new(Auto::new(gpu, settings, size)?)),
     reference: reference::reference,
 };
@@ -27,8 +30,6 @@ const SMOOTHING: u32 = 4;
 /// How much the errors of one surface count for another, to the power of the level: neighbours fully, far pixels hardly. Where
 /// surfaces are small, as in grass, others are all there is to learn from, and few pixels seem to prove filters that keep much.
 const ACROSS: f32 = 0.4;
-/// Elements that a workgroup of `auto_sum.comp` adds up.
-const SUMMED: usize = (auto_sum::THREADS * auto_sum::EACH) as usize;
 
 /// The filters beside none, found by searching thirteen noisy images of six scenes for what leaves `auto` nearest to the best
 /// filter of each. At their defaults: windows of 65 pixels and normals alone, in which a few bright samples are spread; windows
@@ -66,6 +67,12 @@ fn candidates(s: &FilterSettings) -> [(Row, FilterSettings); 4] {
     ]
 }
 
+/// Pixels of the narrow window over those of the wide and of the middle one.
+fn shares(s: &FilterSettings) -> vec2 {
+    let [wide, middle, narrow, _] = candidates(s).map(|(_, s)| (2 * s.footprint.radius + 1) as f32);
+    [wide, middle].map(|edge| (narrow / edge).powi(2))
+}
+
 /// What counts as one surface to the estimates of errors.
 fn alike(s: &EdgeSettings) -> EdgeSettings {
     EdgeSettings { sigma_n: 2.5 * s.sigma_n, sigma_x: 1.2 * s.sigma_x, ..*s }
@@ -76,9 +83,10 @@ fn least(level: u32, across: bool) -> f32 {
     if across { ACROSS.powi(level as i32) } else { 0.0 }
 }
 
-/// Luminance below which errors count as absolute: a thousandth of the image's intensity.
+/// Luminance below which errors count as absolute: a tenth of what is usual, not a share of the brightest. Beside lamps that are
+/// seen in a gloss, all else would count as dark (Veach's plates at 2 samples: FLIP .098 instead of .076).
 fn floor(settings: &FilterSettings) -> f32 {
-    (1e-3 * settings.edge.intensity).clamp(1e-30, 1e24)
+    (0.1 * settings.edge.usual).clamp(1e-30, 1e24)
 }
 
 /// A filter, and what it makes of its image and of a probe.
@@ -108,7 +116,6 @@ struct Auto {
     inputs: Kernel<auto_inputs::Bind<'static>>,
     leverage: Kernel<auto_leverage::Bind<'static>>,
     error: Kernel<auto_error::Bind<'static>>,
-    sum: Kernel<auto_sum::Bind<'static>>,
     /// Of leverages, and of errors.
     smooth: [Kernel<auto_smooth::Bind<'static>>; 2],
     /// Without and with a variance to read.
@@ -125,8 +132,8 @@ struct Auto {
     leverages: Buffer<vec4>,
     /// Leverages, smoothed.
     surroundings: Buffer<vec4>,
-    /// Over groups of pixels, in turn.
-    sums: [[Buffer<vec4>; 3]; 2],
+    /// See [`Filter::expected`].
+    expected: Buffer<vec2>,
     settings: FilterSettings,
 }
 
@@ -140,7 +147,6 @@ impl Auto {
             Ok(Candidate { filter, result: plane("candidate")?, kept: plane("probed candidate")? })
         };
         let [wide, middle, narrow, svgf] = candidates(settings).map(candidate);
-        let sum = || Buffer::new(gpu, "sums of errors", pixels.div_ceil(SUMMED).max(1), Location::Device);
         let smooth = |three| {
             let edge = Rates::of_surfaces(&alike(&settings.edge)).constants();
             Kernel::new(gpu, &auto_smooth::Constants { edge, three })
@@ -151,7 +157,6 @@ impl Auto {
             inputs: Kernel::new(gpu, &Default::default())?,
             leverage: Kernel::new(gpu, &Default::default())?,
             error: Kernel::new(gpu, &Default::default())?,
-            sum: Kernel::new(gpu, &Default::default())?,
             smooth: [smooth(false)?, smooth(true)?],
             blend: [blend(false)?, blend(true)?],
             nothing: Buffer::from_slice(gpu, "no variance", &[])?,
@@ -168,7 +173,7 @@ impl Auto {
             wide_dim: plane("wide, dim")?,
             leverages: plane("leverages")?,
             surroundings: plane("smoothed leverages")?,
-            sums: [[sum()?, sum()?, sum()?], [sum()?, sum()?, sum()?]],
+            expected: Buffer::new(gpu, "expected errors", pixels, Location::Device)?,
             settings: *settings,
             pack,
         })
@@ -186,18 +191,20 @@ impl Auto {
         middle.record(rec, planes, &planes.radiance, &middle.result)?;
         narrow.record(rec, planes, dim, &narrow.result)?;
         svgf.record(rec, planes, &planes.radiance, &svgf.result)?;
-        for linear in [wide, middle, narrow] {
-            linear.record(rec, planes, signs, &linear.kept)?;
-        }
+        narrow.record(rec, planes, signs, &narrow.kept)?;
         svgf.record(rec, planes, probed, &svgf.kept)?;
         let bind = auto_leverage::Bind {
             wide: &wide.result,
             svgf: &svgf.result,
-            wide_kept: &wide.kept,
-            mid_kept: &middle.kept,
             narrow_kept: &narrow.kept,
             svgf_kept: &svgf.kept,
             leverages: &self.leverages,
+        };
+        let push = AutoLeveragePush {
+            count,
+            floor: floor(&self.settings),
+            shares: shares(&self.settings),
+            ..Default::default()
         };
         rec.dispatch_threads(&self.leverage, bind, &push, count)
     }
@@ -222,22 +229,6 @@ impl Auto {
         let count = planes.pixels();
         let push = AutoPush { count, floor: floor(&self.settings), size: planes.size, ..Default::default() };
         rec.dispatch_threads(&self.error, bind, &push, count)
-    }
-
-    /// Errors of all pixels -> their sums, which lie first in what is returned.
-    fn record_sums(&self, rec: &mut Recorder, planes: &Planes) -> Result<&[Buffer<vec4>; 3]> {
-        let (mut from, mut count) = (&self.planes, planes.pixels());
-        for to in self.sums.iter().cycle() {
-            let ([squares, products, others], [square_sums, product_sums, other_sums]) = (from, to);
-            let bind = auto_sum::Bind { squares, products, others, square_sums, product_sums, other_sums };
-            let blocks = count.div_ceil(SUMMED as u32);
-            rec.dispatch(&self.sum, bind, &PackPush { count, ..Default::default() }, [blocks, 1, 1])?;
-            (from, count) = (to, blocks);
-            if blocks == 1 {
-                break;
-            }
-        }
-        Ok(from)
     }
 
     /// Planes\[P\] -> others, or the same, which lie in `between` after every other level; `across` surfaces, or within alike
@@ -300,7 +291,6 @@ impl Filter for Auto {
         self.record_candidates(rec, planes)?;
         self.record_smoothing(rec, planes, [[&self.leverages; 3], [&self.surroundings; 3]], false)?;
         self.record_errors(rec, planes)?;
-        let [square_sum, product_sum, other_sum] = self.record_sums(rec, planes)?;
         self.record_smoothing(rec, planes, [self.planes.each_ref(); 2], true)?;
         let [squares, products, others] = &self.planes;
         let [wide, mid, narrow, svgf] = self.candidates.each_ref().map(|c| &c.result);
@@ -308,9 +298,6 @@ impl Filter for Auto {
             squares,
             products,
             others,
-            square_sum,
-            product_sum,
-            other_sum,
             colour: &self.pack.colour,
             place: &self.pack.place,
             wide,
@@ -319,11 +306,17 @@ impl Filter for Auto {
             wide_dim: &self.wide_dim,
             svgf,
             variance: planes.variance.as_ref().unwrap_or(&self.nothing),
+            surroundings: &self.surroundings,
             blend: &self.leverages,
+            expected: &self.expected,
         };
         let count = planes.pixels();
         let blend = &self.blend[usize::from(planes.variance.is_some())];
         rec.dispatch_threads(blend, bind, &PackPush { count, ..Default::default() }, count)?;
         self.record_residual(rec, planes)
+    }
+
+    fn expected(&self) -> Option<&Buffer<vec2>> {
+        Some(&self.expected)
     }
 }

@@ -1,18 +1,18 @@
 //! `auto` on the host: the twin of `glsl/auto*.comp`.
-use super::{SMOOTHING, alike, candidates, floor, least};
+use super::{SMOOTHING, alike, candidates, floor, least, shares};
 use crate::denoise::filter::edge::{Rates, edge_weight};
 use crate::denoise::filter::noise_estimate::{self, ENOUGH, contrast};
 use crate::denoise::filter::pack::Packed;
 use crate::denoise::filter::{FilterInput, FilterSettings};
-use crate::layout::vec4;
+use crate::layout::{vec2, vec4};
 use crate::math::hash::pcg;
 use crate::math::srgb::luminance;
-use crate::shaders::auto::{OVERALL, RIDGE, ROUNDS};
+use crate::shaders::auto::{LEAST, RIDGE, ROUNDS};
 use crate::shaders::auto_error::{LIMIT, MOST, NOISE, OWN, REACH};
 use crate::shaders::auto_residual::{self as residual, ENOUGH_SAMPLES, PRIOR_SAMPLES, SIGNIFICANT};
 use crate::shaders::shared::candidates::BRIGHT;
 use crate::shaders::shared::luminance::STRONGEST;
-use glam::{DVec4, Vec3, Vec4, Vec4Swizzles};
+use glam::{Vec3, Vec4, Vec4Swizzles};
 use std::array::from_fn;
 
 /// What is blended: none, windows (wide, middle, narrow), svgf.
@@ -46,12 +46,13 @@ impl Results {
         let dim = |i: usize| dimmed(image[i].colour, wide[i].xyz());
         let [wide_dim, narrow] = [0, 2].map(|k| run(k, pixels(&dim)));
         let added = |i: usize| probe(i, wide[i].xyz(), floor(settings));
-        let kept = [0, 1, 2].map(|k| run(k, pixels(&signs)));
+        let narrow_kept = run(2, pixels(&signs));
         let svgf_kept = run(3, pixels(&|i| image[i].colour + added(i)));
+        let [of_wide, of_middle] = shares(settings);
         let leverage = |i: usize| {
-            let [a, b, c] = kept.each_ref().map(|kept| kept[i].xyz().dot(signs(i) / 3.0));
+            let own = narrow_kept[i].xyz().dot(signs(i)) / 3.0;
             let grown = contrast(svgf_kept[i].xyz(), svgf[i].xyz()) / added(i);
-            Vec4::new(a, b, c, grown).clamp(Vec4::splat(-1.0), Vec4::ONE)
+            Vec4::new(of_wide * own, of_middle * own, own, grown).clamp(Vec4::splat(-1.0), Vec4::ONE)
         };
         let leverages = (0..image.len()).map(leverage).collect();
         Self { wide, middle, narrow, wide_dim, svgf, leverages }
@@ -77,6 +78,11 @@ impl Results {
 
 /// The twin.
 pub fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
+    estimated(input, settings).0
+}
+
+/// Also what [`Filter::expected`](super::super::Filter::expected) holds.
+pub fn estimated(input: &FilterInput, settings: &FilterSettings) -> (Vec<vec4>, Vec<vec2>) {
     let (image, floor) = (Packed::reference(input), floor(settings));
     let noise = noise_estimate::reference(input, &image, &settings.edge);
     let results = Results::new(input, &image, settings);
@@ -111,15 +117,18 @@ pub fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
         [weight * m * m, weight * m.xxxy() * m.yzwz(), others]
     };
     let planes: [Vec<Vec4>; 3] = from_fn(|k| (0..image.len()).map(|i| errors(i)[k]).collect());
-    let sums: [Vec4; 3] = from_fn(|k| planes[k].iter().map(|e| e.as_dvec4()).sum::<DVec4>().as_vec4());
     let planes = planes.map(|plane| smoothed(plane, true));
-    let expected = |i: usize| -> [Vec4; 3] {
-        let (light, lights) = (planes[2][i].w.max(1.0), sums[2].w.max(1.0));
-        let noisy = 0.5 * planes[2][i].z / light;
-        from_fn(|k| (planes[k][i] / light).lerp(sums[k] / lights, OVERALL * noisy / (1.0 + noisy)))
+    let relative = |i: usize| planes.each_ref().map(|plane| plane[i] / planes[2][i].w.max(1.0));
+    let weights = |i: usize| {
+        let (enough, [a, b, c, d]) = (image[i].count >= ENOUGH, results.usable(i));
+        let usable = [enough, a, b, c, enough && d];
+        (usable, least_square(&matrix(relative(i)), usable))
     };
-    let blended = |i: usize| blend(&image[i], &matrix(expected(i)), results.usable(i), results.blended(i));
+    let weights: Vec<_> = (0..image.len()).map(weights).collect();
+    let blended = |i: usize| blend(&image[i], weights[i], results.blended(i));
     let blend: Vec<Vec4> = (0..image.len()).map(|i| blended(i).into()).collect();
+    let expected = |i: usize| expected(relative(i), &weights[i].1, surroundings[i]);
+    let expected = (0..image.len()).map(expected).collect();
     let own: Vec<Option<f32>> = (0..image.len()).map(|i| own_variance(input, i, image[i].count)).collect();
     let residual = |i: usize| Residual {
         colour: image[i].colour - blend[i].xyz(),
@@ -128,17 +137,17 @@ pub fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
         measured: own[i].is_some(),
     };
     let residuals: Vec<_> = (0..image.len()).map(residual).collect();
-    let surroundings = |i: usize| {
+    let prior = |i: usize| {
         let level = contrast(blend[i].xyz(), Vec3::ZERO).abs().max(floor);
         0.5 * planes[2][i].z / planes[2][i].w.max(1e-20) * level * level * image[i].count
     };
     let rates = Rates::of_surfaces(&settings.edge);
     let restored = |i: usize| -> vec4 {
-        let given = restored(&image, &residuals, size, i, &rates, surroundings(i));
+        let given = restored(&image, &residuals, size, i, &rates, prior(i));
         let least = blend[i].xyz().min(image[i].colour).min(Vec3::ZERO);
         (blend[i].xyz() + given).max(least).extend(blend[i].w).into()
     };
-    (0..image.len()).map(restored).collect()
+    ((0..image.len()).map(restored).collect(), expected)
 }
 
 fn squared_deviation(variance: f32, floor: f32) -> f32 {
@@ -257,14 +266,25 @@ fn probe(pixel: usize, around: Vec3, least: f32) -> f32 {
 
 /// An independent copy of the pixel misses it by both copies' noise, and has the pixel's in common with what a filter misses.
 fn matrix([squares, products, others]: [Vec4; 3]) -> Errors {
-    let noise = 0.5 * others.z;
+    let told = 0.5 * others.z;
+    let noise = told.min(squares.min_element()).max(LEAST * told);
     [
-        [others.z, noise, noise, noise, noise],
+        [2.0 * noise, noise, noise, noise, noise],
         [noise, squares.x, products.x, products.y, products.z],
         [noise, products.x, squares.y, products.w, others.x],
         [noise, products.y, products.w, squares.z, others.y],
         [noise, products.z, others.x, others.y, squares.w],
     ]
+}
+
+/// The blend's mean squared error over its squared luminance, and the share of the samples' variance that is noise.
+fn expected(relative: [Vec4; 3], w: &[f32; BLENDED], leverages: Vec4) -> vec2 {
+    let (missed, told) = (matrix(relative), 0.5 * relative[2].z);
+    let noise = missed[0][1];
+    let products = (0..BLENDED).flat_map(|j| (0..BLENDED).map(move |k| (j, k)));
+    let square: f32 = products.map(|(j, k)| w[j] * w[k] * missed[j][k]).sum();
+    let kept = w[0] + Vec4::from_slice(&w[1..]).dot(leverages);
+    [(square - noise).max(kept.clamp(0.0, 1.0) * noise), if told > 0.0 { noise / told } else { 1.0 }]
 }
 
 fn smooth(
@@ -292,11 +312,10 @@ fn smooth(
     (0..width * height).map(pixel).collect()
 }
 
-fn blend(p: &Packed, errors: &Errors, [wide, middle, narrow, svgf]: [bool; 4], filtered: [Vec3; 4]) -> vec4 {
-    let (known, enough) = (p.count > 0.0, p.count >= ENOUGH);
-    let usable = [enough, wide, middle, narrow, enough && svgf];
-    let adrift = wide && !known && p.normal == Vec3::ZERO;
-    let w = if adrift { [0.0, 1.0, 0.0, 0.0, 0.0] } else { least_square(errors, usable) };
+fn blend(p: &Packed, (usable, w): ([bool; BLENDED], [f32; BLENDED]), filtered: [Vec3; 4]) -> vec4 {
+    let known = p.count > 0.0;
+    let adrift = usable[1] && !known && p.normal == Vec3::ZERO;
+    let w = if adrift { [0.0, 1.0, 0.0, 0.0, 0.0] } else { w };
     let base = if known { p.colour } else { filtered[0] };
     let off: Vec3 = w[1..].iter().zip(filtered).map(|(w, filtered)| w * (filtered - base)).sum();
     let count = if known { p.count } else { 1.0 };

@@ -1,0 +1,91 @@
+//! How far an image is expected to be from the truth, as a filter estimates it that knows its own errors. Kernel:
+//! `glsl/film/expected_error.comp`.
+use super::filter::Planes;
+use super::twin::Parts;
+use crate::error::Result;
+use crate::gpu::{Buffer, FrameResources, Gpu, Kernel, Location};
+use crate::layout::{SplitPush, vec2, vec3, vec4};
+use crate::shaders::expected_error::{Bind, EACH, EPSILON, THREADS};
+use glam::Vec3;
+use serde::Serialize;
+
+/// Expected [`relmse`](crate::image::metrics::Metrics::relmse) of an image.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ExpectedError {
+    /// Of the noisy image.
+    pub before: f64,
+    /// Of the filtered one.
+    pub after: f64,
+}
+
+impl ExpectedError {
+    /// One line for the user.
+    pub fn note(&self) -> String {
+        format!("estimated relMSE: {:.2e} before filtering, {:.2e} after", self.before, self.after)
+    }
+
+    /// Of an image on the device: what was filtered with its `variance` and what came out, the `factor` behind it, the whole
+    /// `picture`, and what the filter [expects](super::filter::Filter::expected). `None` where its samples tell no variance.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub(super) fn of(
+        gpu: &Gpu,
+        planes: &Planes,
+        factor: &Buffer<vec4>,
+        picture: &Buffer<vec4>,
+        expected: &Buffer<vec2>,
+    ) -> Result<Option<Self>> {
+        let Some(variance) = &planes.variance else { return Ok(None) };
+        let groups = planes.pixels().div_ceil(THREADS * EACH);
+        let sums = Buffer::new(gpu, "expected errors", groups as usize, Location::Device)?;
+        let kernel = Kernel::new(gpu, &Default::default())?;
+        let (radiance, filtered) = (&planes.radiance, &planes.output);
+        let bind = Bind { radiance, filtered, factor, variance, picture, expected, sums: &sums };
+        let push = SplitPush { size: planes.size, ..Default::default() };
+        gpu.run(&mut FrameResources::new(gpu)?, |rec| rec.dispatch(&kernel, bind, &push, [groups, 1, 1]))?;
+        Ok(Self::of_sums(&sums.read()?))
+    }
+
+    fn of_sums(sums: &[vec3]) -> Option<Self> {
+        let [before, after, pixels] = [0, 1, 2].map(|k| sums.iter().map(|sum| f64::from(sum[k])).sum::<f64>());
+        (before > 0.0).then(|| Self { before: before / pixels, after: after / pixels })
+    }
+}
+
+/// The twin: of an image taken apart, what a filter made of it and expects of that.
+pub fn reference(parts: &Parts, filtered: &[vec4], expected: &[vec2]) -> Option<ExpectedError> {
+    let (input, picture) = (&parts.input, parts.remodulate(filtered));
+    let variance = input.variance.as_ref()?;
+    let pixel = |i: usize| -> vec3 {
+        let (whole, factor) = (Vec3::from(picture[i]), Vec3::from(parts.factor[i]));
+        let light = factor * Vec3::from_slice(&filtered[i][..3]);
+        let [error, noise] = if input.radiance[i][3] > 0.0 { expected[i] } else { [0.0, 1.0] };
+        let known = if input.radiance[i][3] > 0.0 { 1.0 } else { 0.0 };
+        let sharp = noise_of_sharp(parts, i, noise * parts.sharp_variance[i]);
+        let over = (whole * whole + EPSILON).recip() / 3.0;
+        let [before, after] = [known * noise * factor * factor * Vec3::from(variance[i]), error * light * light];
+        let both = [(before + sharp).dot(over), (after + sharp).dot(over), 1.0];
+        if both.iter().all(|v| v.is_finite()) { both } else { [0.0; 3] }
+    };
+    ExpectedError::of_sums(&(0..filtered.len()).map(pixel).collect::<Vec<_>>())
+}
+
+fn noise_of_sharp(parts: &Parts, i: usize, of_samples: f32) -> f32 {
+    let [width, height] = [parts.input.width, parts.input.height].map(i64::from);
+    let factor = Vec3::from(parts.factor[i]);
+    let sharp = |i: usize| {
+        let (sharp, factor) = (Vec3::from(parts.sharp[i]), Vec3::from(parts.factor[i]));
+        Vec3::select(factor.cmpgt(Vec3::ZERO), sharp / factor, sharp)
+    };
+    let (mut sum, mut squares) = (Vec3::ZERO, Vec3::ZERO);
+    for k in 0..9 {
+        let (x, y) = (i as i64 % width + k % 3 - 1, i as i64 / width + k / 3 - 1);
+        let off = sharp((y.clamp(0, height - 1) * width + x.clamp(0, width - 1)) as usize) - sharp(i);
+        sum += off;
+        squares += off * off;
+    }
+    let scale = Vec3::select(factor.cmpgt(Vec3::ZERO), factor * factor, Vec3::ONE);
+    let around = (squares - sum * sum / 9.0) / 8.0 * scale;
+    of_samples.min((around.element_sum() / 3.0).max(0.0))
+}
