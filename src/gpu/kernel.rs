@@ -152,8 +152,9 @@ impl<B: Bindings> Kernel<B> {
         let spirv = if gpu.info().subgroup_shuffle { B::SPIRV } else { B::PLAIN_SPIRV };
         let constants: Arc<[_]> = constants.entries().into();
         let push_bytes = size_of::<B::Push>() as u32;
-        let recipe = Recipe { spirv, slots: B::SLOTS, push_bytes, constants: constants.clone() };
-        let pipeline = gpu.0.pipeline(B::NAME, &recipe)?;
+        let bindings = B::SLOTS.iter().map(|slot| (slot.binding, slot.kind.descriptor())).collect();
+        let recipe = Recipe { spirv, bindings, push_bytes, constants: constants.clone() };
+        let pipeline = pipeline(gpu, B::NAME, &recipe)?;
         let compile_time = begun.elapsed();
         Ok(Self { gpu: gpu.clone(), pipeline, spirv, constants, compile_time, local_size, of: PhantomData })
     }
@@ -173,6 +174,27 @@ impl<B: Bindings> Kernel<B> {
     pub fn folded_groups(&self, threads: u32) -> [u32; 3] {
         folded(threads.div_ceil(self.local_size[0]))
     }
+}
+
+/// Returns the pipeline of `recipe`, which is compiled if the device does not have it.
+fn pipeline(gpu: &Gpu, name: &str, recipe: &Recipe) -> Result<Arc<Pipeline>> {
+    let device = &*gpu.0;
+    if let Some(found) = device.pipelines.find(recipe) {
+        return Ok(found);
+    }
+    let mut pipeline = Pipeline::default();
+    if let Err(error) = pipeline.create(&device.device, device.cache.raw, name, recipe) {
+        // SAFETY: nobody else has it; null handles may be destroyed.
+        device.free(|device| unsafe { pipeline.destroy(device) });
+        return Err(error);
+    }
+    device.name(pipeline.raw, name);
+    let pipeline = Arc::new(pipeline);
+    device.pipelines.keep(recipe, &pipeline).into_iter().for_each(|idle| {
+        // SAFETY: neither a kernel nor a frame has it.
+        device.free(|device| unsafe { idle.destroy(device) });
+    });
+    Ok(pipeline)
 }
 
 fn folded(groups: u32) -> [u32; 3] {

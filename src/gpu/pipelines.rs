@@ -1,8 +1,7 @@
 //! The compute pipelines of a device. Kernels with the same code and constants share one, also when the first is gone before the
 //! next is made: a second renderer or filter compiles nothing, and drivers that compile on the first dispatch, such as lavapipe,
 //! do so once.
-use super::device::Inner;
-use super::{At, Slot};
+use super::At;
 use crate::error::{Error, Result};
 use ash::vk;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -14,7 +13,8 @@ const IDLE: usize = 96;
 #[derive(Clone, PartialEq)]
 pub(super) struct Recipe {
     pub spirv: &'static [u8],
-    pub slots: &'static [Slot],
+    /// Descriptors of set 0 as (binding number, kind).
+    pub bindings: Vec<(u32, vk::DescriptorType)>,
     pub push_bytes: u32,
     /// Specialisation constants as (constant id, value).
     pub constants: Arc<[(u32, u32)]>,
@@ -32,33 +32,9 @@ pub(super) struct Pipeline {
 #[derive(Default)]
 pub(super) struct Pipelines(Mutex<Vec<(Recipe, Arc<Pipeline>)>>);
 
-impl Inner {
-    /// Returns the pipeline of `recipe`, which is compiled if the device does not have it. `name` is told in errors and to debuggers.
-    ///
-    /// # Errors
-    /// [`Error::Device`] when the driver refuses it.
-    pub fn pipeline(&self, name: &str, recipe: &Recipe) -> Result<Arc<Pipeline>> {
-        if let Some(found) = self.pipelines.find(recipe) {
-            return Ok(found);
-        }
-        let mut pipeline = Pipeline::default();
-        if let Err(error) = pipeline.create(self, name, recipe) {
-            // SAFETY: nobody else has it; null handles may be destroyed.
-            self.free(|device| unsafe { pipeline.destroy(device) });
-            return Err(error);
-        }
-        self.name(pipeline.raw, name);
-        let pipeline = Arc::new(pipeline);
-        self.pipelines.keep(recipe, &pipeline).into_iter().for_each(|idle| {
-            // SAFETY: neither a kernel nor a frame has it.
-            self.free(|device| unsafe { idle.destroy(device) });
-        });
-        Ok(pipeline)
-    }
-}
-
 impl Pipelines {
-    fn find(&self, recipe: &Recipe) -> Option<Arc<Pipeline>> {
+    /// The pipeline of `recipe`, if there is one.
+    pub fn find(&self, recipe: &Recipe) -> Option<Arc<Pipeline>> {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let index = all.iter().position(|(made, _)| made == recipe)?;
         let found = all.remove(index);
@@ -68,7 +44,7 @@ impl Pipelines {
     }
 
     /// Adds a pipeline. Returns those beyond [`IDLE`] that nobody uses, for the caller to destroy.
-    fn keep(&self, recipe: &Recipe, pipeline: &Arc<Pipeline>) -> Vec<Pipeline> {
+    pub fn keep(&self, recipe: &Recipe, pipeline: &Arc<Pipeline>) -> Vec<Pipeline> {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         all.push((recipe.clone(), pipeline.clone()));
         // Nobody can take one meanwhile: it is found under this lock, and cloned only by those who have it.
@@ -90,20 +66,30 @@ impl Pipelines {
 }
 
 impl Pipeline {
-    fn create(&mut self, gpu: &Inner, name: &str, recipe: &Recipe) -> Result<()> {
-        self.create_layouts(&gpu.device, recipe).at(name)?;
-        self.compile(gpu, name, recipe)
+    /// Compiles `recipe`. `name` is told in errors. On failure there may be parts, which are to be destroyed.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when the driver refuses it.
+    pub fn create(
+        &mut self,
+        device: &ash::Device,
+        cache: vk::PipelineCache,
+        name: &str,
+        recipe: &Recipe,
+    ) -> Result<()> {
+        self.create_layouts(device, recipe).at(name)?;
+        self.compile(device, cache, name, recipe)
     }
 
     fn create_layouts(&mut self, device: &ash::Device, recipe: &Recipe) -> std::result::Result<(), vk::Result> {
-        let binding = |slot: &Slot| {
+        let binding = |&(number, kind): &(u32, vk::DescriptorType)| {
             vk::DescriptorSetLayoutBinding::default()
-                .binding(slot.binding)
-                .descriptor_type(slot.kind.descriptor())
+                .binding(number)
+                .descriptor_type(kind)
                 .descriptor_count(1)
                 .stage_flags(vk::ShaderStageFlags::COMPUTE)
         };
-        let bindings: Vec<_> = recipe.slots.iter().map(binding).collect();
+        let bindings: Vec<_> = recipe.bindings.iter().map(binding).collect();
         let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
         let stage_flags = vk::ShaderStageFlags::COMPUTE;
         let push = [vk::PushConstantRange { stage_flags, offset: 0, size: recipe.push_bytes }];
@@ -117,7 +103,7 @@ impl Pipeline {
         Ok(())
     }
 
-    fn compile(&mut self, gpu: &Inner, name: &str, recipe: &Recipe) -> Result<()> {
+    fn compile(&mut self, device: &ash::Device, cache: vk::PipelineCache, name: &str, recipe: &Recipe) -> Result<()> {
         let words = ash::util::read_spv(&mut std::io::Cursor::new(recipe.spirv))
             .map_err(|e| Error::Device(format!("{name}: its code is damaged ({e}): build again")))?;
         let values: Vec<u32> = recipe.constants.iter().map(|(_, value)| *value).collect();
@@ -126,7 +112,6 @@ impl Pipeline {
         };
         let entries: Vec<_> = recipe.constants.iter().enumerate().map(entry).collect();
         let special = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&values));
-        let device = &gpu.device;
         // SAFETY: the code was compiled for Vulkan 1.3 by the build script; the module is needed only for this call.
         unsafe {
             let module =
@@ -137,7 +122,7 @@ impl Pipeline {
                 .name(c"main")
                 .specialization_info(&special);
             let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout)];
-            let made = device.create_compute_pipelines(gpu.cache.raw, &info, None);
+            let made = device.create_compute_pipelines(cache, &info, None);
             device.destroy_shader_module(module, None);
             self.raw = made.map_err(|(_, code)| code).at(name)?[0];
         }
@@ -146,7 +131,7 @@ impl Pipeline {
 
     /// # Safety
     /// It was made on `device` and is not in use.
-    unsafe fn destroy(&self, device: &ash::Device) {
+    pub unsafe fn destroy(&self, device: &ash::Device) {
         unsafe {
             device.destroy_pipeline(self.raw, None);
             device.destroy_pipeline_layout(self.layout, None);
@@ -161,7 +146,7 @@ mod tests {
     use ash::vk::Handle;
 
     fn recipe(value: u32) -> Recipe {
-        Recipe { spirv: &[1, 2], slots: &[], push_bytes: 4, constants: [(7, value)].into() }
+        Recipe { spirv: &[1, 2], bindings: Vec::new(), push_bytes: 4, constants: [(7, value)].into() }
     }
 
     fn made(number: u64) -> Arc<Pipeline> {
@@ -177,6 +162,7 @@ mod tests {
             recipe(6),
             Recipe { spirv: &[1, 3], ..recipe(5) },
             Recipe { push_bytes: 8, ..recipe(5) },
+            Recipe { bindings: vec![(0, vk::DescriptorType::STORAGE_BUFFER)], ..recipe(5) },
             Recipe { constants: [].into(), ..recipe(5) },
         ];
         assert!(others.iter().all(|other| all.find(other).is_none()));
