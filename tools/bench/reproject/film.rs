@@ -2,7 +2,7 @@
 use anyhow::{Context, Result};
 use tallow::allocate::policy;
 use tallow::denoise::filter::Method;
-use tallow::denoise::{Filtered, Noisy, Recipe};
+use tallow::denoise::{Clean, Filtered, Noisy, Recipe};
 use tallow::gpu::{FrameResources, Gpu, PassTime};
 use tallow::image::Picture;
 use tallow::layout::Camera;
@@ -80,7 +80,7 @@ impl Film {
         let picture = Picture { width, height, pixels: stats.iter().map(|s| s.mean).collect() };
         let Some(name) = self.arm.filter else { return Ok((picture, 0.0)) };
         let method = Method::all().find(|method| method.name() == name).context("a filter of that name")?;
-        let ([r, g, b], times) =
+        let Clean { colour: [r, g, b], times, .. } =
             Filtered::new(&self.gpu, Noisy::of_film(&self.renderer)?, &Recipe::new(method))?.join(&self.gpu)?;
         let pixels = r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect();
         Ok((Picture { pixels, ..picture }, milliseconds(&times, |_| true)))
