@@ -21,7 +21,7 @@ pub struct ExpectedError {
 impl ExpectedError {
     /// One line for the user.
     pub fn note(&self) -> String {
-        format!("estimated relMSE: {:.2e} before filtering, {:.2e} after", self.before, self.after)
+        format!("estimated relMSE: {:.2e} before filtering, roughly {:.2e} after", self.before, self.after)
     }
 
     /// Of an image on the device: what was filtered with its `variance` and what came out, the `factor` behind it, the whole

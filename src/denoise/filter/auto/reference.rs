@@ -7,7 +7,7 @@ use crate::denoise::filter::{FilterInput, FilterSettings};
 use crate::layout::{vec2, vec4};
 use crate::math::hash::pcg;
 use crate::math::srgb::luminance;
-use crate::shaders::auto::{LEAST, RIDGE, ROUNDS};
+use crate::shaders::auto::{ENOUGH_FOR_SVGF, LEAST, RIDGE, ROUNDS};
 use crate::shaders::auto_error::{LIMIT, MOST, NOISE, OWN, REACH};
 use crate::shaders::auto_residual::{self as residual, ENOUGH_SAMPLES, PRIOR_SAMPLES, SIGNIFICANT};
 use crate::shaders::shared::candidates::BRIGHT;
@@ -121,7 +121,7 @@ pub fn estimated(input: &FilterInput, settings: &FilterSettings) -> (Vec<vec4>, 
     let relative = |i: usize| planes.each_ref().map(|plane| plane[i] / planes[2][i].w.max(1.0));
     let weights = |i: usize| {
         let (enough, [a, b, c, d]) = (image[i].count >= ENOUGH, results.usable(i));
-        let usable = [enough, a, b, c, enough && d];
+        let usable = [enough, a, b, c, image[i].count >= ENOUGH_FOR_SVGF && d];
         (usable, least_square(&matrix(relative(i)), usable))
     };
     let weights: Vec<_> = (0..image.len()).map(weights).collect();
