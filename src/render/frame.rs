@@ -82,18 +82,7 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
             }
         }
         Step::Reproject => {
-            let (history, tile) = (frame.history()?, &film.tiles[0]);
-            rec.copy(&scene.camera, &history.previous)?; // camera -> previous camera
-            rec.update(&scene.camera, &constants.camera)?; // camera
-            rec.fill(&film.broken, 0)?; // 0 -> broken
-            if !history.has_changed() {
-                reproject::remember(rec, history, scene, tile, &constants.path)?; // guide[P], stats[P] -> history[P]
-            } else if let Some(probes) = &history.probes {
-                light_change::after(rec, history, probes, scene, tile, &constants.path)?; // probes[cells], history[P] -> changes[cells]
-            }
-            primary_hit::record(&kernels.primary_hit, rec, scene, tile, &constants.path)?; // camera -> guide[P], points[P]
-            reproject::carry(rec, history, scene, tile, &constants.path)?; // history[P], points[P] -> stats[P], light[P]
-            history.settle();
+            begin_with_history(rec, frame)?;
             if let Some(Allocation { policy, .. }) = &frame.allocation {
                 policy.prepare(rec, &inputs(film), priority_push)?; // guide[P] -> the policy's own
             }
@@ -132,6 +121,27 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
     Ok(())
 }
 
+/// Begins a frame with the samples of the last that still hold.
+fn begin_with_history(rec: &mut Recorder, frame: &Frame) -> Result<()> {
+    let Frame { scene, film, constants, kernels, .. } = frame;
+    let (history, tile) = (frame.history()?, &film.tiles[0]);
+    rec.copy(&scene.camera, &history.previous)?; // camera -> previous camera
+    rec.update(&scene.camera, &constants.camera)?; // camera
+    rec.fill(&film.broken, 0)?; // 0 -> broken
+    match &history.probes {
+        _ if !history.has_changed() => reproject::remember(rec, history, scene, tile, &constants.path)?, // guide[P], stats[P] -> history[P]
+        None => {} // nothing is carried
+        Some(probes) => {
+            light_change::trace(rec, (history, probes), scene, tile, &constants.path, true)?; // probes[cells], history[P] -> changes[cells]
+            light_change::sum(rec, probes)?; // changes[cells] -> changes[cells]
+        }
+    }
+    primary_hit::record(&kernels.primary_hit, rec, scene, tile, &constants.path)?; // camera -> guide[P], points[P]
+    reproject::carry(rec, history, scene, tile, &constants.path)?; // history[P], points[P] -> stats[P], light[P]
+    history.settle();
+    Ok(())
+}
+
 /// Records what a history needs of the last frame before more than the camera changes: [`Step::Reproject`] does the rest.
 ///
 /// # Errors
@@ -144,7 +154,7 @@ pub fn record_change(rec: &mut Recorder, frame: &Frame) -> Result<()> {
     };
     rec.copy(&scene.camera, &history.previous)?; // camera -> previous camera
     reproject::remember(rec, history, scene, tile, &constants.path)?; // guide[P], stats[P] -> history[P]
-    light_change::before(rec, history, probes, scene, tile, &constants.path) // points[P] -> probes[cells]
+    light_change::trace(rec, (history, probes), scene, tile, &constants.path, false) // points[P] -> probes[cells]
 }
 
 /// Samples are placed on films of one tile alone.

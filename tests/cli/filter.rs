@@ -230,6 +230,21 @@ fn fireflies_are_cut_only_when_asked_and_it_is_said() {
 }
 
 #[test]
+fn files_of_earlier_versions_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = || {
+        let output = tallow(&folder, &["filter", "noisy.exr", "-o", "clean.exr", "--filter", "none"]);
+        stdout(&output).contains("an earlier version of tallow")
+    };
+    write(&folder, "noisy.exr", &noisy(true));
+    assert!(said(), "it does not tell what its albedo is");
+    write(&folder, "noisy.exr", &noisy(false));
+    assert!(!said(), "of another renderer");
+    render(&folder, concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/scene.toml"), "2");
+    assert!(!said(), "of this version");
+}
+
+#[test]
 fn lamps_do_not_leak_through_their_rims() {
     let folder = tempfile::tempdir().unwrap();
     let mut film = noisy(false);

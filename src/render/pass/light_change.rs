@@ -10,39 +10,9 @@ use crate::shaders::{light_change, probe};
 /// Distances between the cells that a level sums: windows of 3x3, 9x9 and 27x27 cells.
 pub const SPACINGS: [u32; 3] = [1, 3, 9];
 
-/// Before the scene changes: points\[P\], offered\[P\] -> probes\[cells\]
-pub fn before(
-    rec: &mut Recorder,
-    h: &History,
-    probes: &Probes,
-    s: &DeviceScene,
-    t: &FilmTile,
-    c: &PathConstants,
-) -> Result<()> {
-    trace(rec, (h, probes), s, t, c, false)
-}
-
-/// After it has changed: probes\[cells\], history\[P\] -> changes\[cells\]
-pub fn after(
-    rec: &mut Recorder,
-    h: &History,
-    probes: &Probes,
-    s: &DeviceScene,
-    t: &FilmTile,
-    c: &PathConstants,
-) -> Result<()> {
-    trace(rec, (h, probes), s, t, c, true)?;
-    let ([a, b], cells) = (&probes.changes, probes.cells);
-    let mut level = |found: &Buffer<LightChange>, sums: &Buffer<LightChange>, spacing: u32| {
-        let push = LightChangePush { cells, spacing, ..Default::default() };
-        rec.dispatch_threads(&probes.sum, light_change::Bind { found, sums }, &push, cells[0] * cells[1])
-    };
-    level(a, b, SPACINGS[0])?;
-    level(b, a, SPACINGS[1])?;
-    level(a, b, SPACINGS[2])
-}
-
-fn trace(
+/// Traces the paths of `h`'s probes `p`. Before the scene changes: points\[P\], offered\[P\] -> probes\[cells\]; `after` it has changed:
+/// probes\[cells\], history\[P\] -> changes\[cells\], each cell's own
+pub fn trace(
     rec: &mut Recorder,
     (h, p): (&History, &Probes),
     s: &DeviceScene,
@@ -67,4 +37,16 @@ fn trace(
         &ProbePush { constants, cells, after: after.into(), ..Default::default() },
         cells,
     )
+}
+
+/// changes\[cells\], each cell's own -> changes\[cells\], of windows around them
+pub fn sum(rec: &mut Recorder, probes: &Probes) -> Result<()> {
+    let ([a, b], cells) = (&probes.changes, probes.cells);
+    let mut level = |found: &Buffer<LightChange>, sums: &Buffer<LightChange>, spacing: u32| {
+        let push = LightChangePush { cells, spacing, ..Default::default() };
+        rec.dispatch_threads(&probes.sum, light_change::Bind { found, sums }, &push, cells[0] * cells[1])
+    };
+    level(a, b, SPACINGS[0])?;
+    level(b, a, SPACINGS[1])?;
+    level(a, b, SPACINGS[2])
 }

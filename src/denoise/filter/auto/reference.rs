@@ -71,6 +71,19 @@ impl Results {
         [wide, as_light(middle), as_light(narrow + (wide - wide_dim)), svgf]
     }
 
+    /// By what the four miss a pixel that they are made without: what they miss it by over what they do not keep of it.
+    fn missed(&self, i: usize, pixel: &Packed, around: Vec4, scaled: &impl Fn(Vec3, Vec3) -> f32) -> Vec4 {
+        let trust = OWN / pixel.count.max(1.0).sqrt();
+        let kept = around + trust * (self.leverages[i] - around).max(Vec4::ZERO);
+        let left = 1.0 - kept.clamp(Vec4::ZERO, Vec4::splat(MOST));
+        let ([wide, middle, narrow, svgf], wide_dim) = self.at(i);
+        let (colour, dim) = (pixel.colour, dimmed(pixel.colour, wide));
+        let whole = [(wide, colour), (middle, colour), (narrow, dim), (svgf, colour)];
+        let mut missed = Vec4::from_array(whole.map(|(filtered, pixel)| scaled(filtered, pixel))) / left;
+        missed.z += scaled(wide - wide_dim, colour - dim) / left.x;
+        missed
+    }
+
     fn usable(&self, i: usize) -> [bool; 4] {
         [&self.wide, &self.middle, &self.narrow, &self.svgf].map(|plane| plane[i].w > 0.0)
     }
@@ -95,20 +108,9 @@ pub fn estimated(input: &FilterInput, settings: &FilterSettings) -> (Vec<vec4>, 
     };
     let surroundings = smoothed(results.leverages.clone(), false);
     let scaled = |a: Vec3, b: Vec3| (contrast(a, b) / floor).clamp(-LIMIT, LIMIT);
-    let missed = |i: usize| {
-        let (own, around) = (results.leverages[i], surroundings[i]);
-        let trust = OWN / image[i].count.max(1.0).sqrt();
-        let left = 1.0 - (around + trust * (own - around).max(Vec4::ZERO)).clamp(Vec4::ZERO, Vec4::splat(MOST));
-        let ([wide, middle, narrow, svgf], wide_dim) = results.at(i);
-        let (pixel, dim) = (image[i].colour, dimmed(image[i].colour, wide));
-        let whole = [(wide, pixel), (middle, pixel), (narrow, dim), (svgf, pixel)];
-        let mut missed = Vec4::from_array(whole.map(|(filtered, pixel)| scaled(filtered, pixel))) / left;
-        missed.z += scaled(wide - wide_dim, pixel - dim) / left.x;
-        missed
-    };
     // Squares of the filters; their products; the rest of those, the square of none, and the light itself.
     let errors = |i: usize| {
-        let m = missed(i);
+        let m = results.missed(i, &image[i], surroundings[i], &scaled);
         let light = scaled(results.blended(i).iter().sum::<Vec3>() / 4.0, Vec3::ZERO).powi(2) + 1.0;
         let uncertain = light + NOISE * variance_around(&noise, size, i as i64, floor);
         let weight = if image[i].count > 0.0 { uncertain.recip() } else { 0.0 };
