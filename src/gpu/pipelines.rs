@@ -6,8 +6,9 @@ use crate::error::{Error, Result};
 use ash::vk;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Number of pipelines that are kept although no kernel uses them. A render with its filter takes some thirty.
-const IDLE: usize = 96;
+/// Number of pipelines that are kept although no kernel uses them: enough for a renderer and its filter. On lavapipe under the
+/// validation layers one of a path tracer takes some 11 MB.
+const IDLE: usize = 48;
 
 /// All that a pipeline depends on.
 #[derive(Clone, PartialEq)]
