@@ -92,6 +92,8 @@ void main() {
     vec3 difference = light - before.light;
     change.count = uint(pixel != NONE && finite(difference));
     change.sum = change.count > 0u ? difference : vec3(0.0);
-    change.squares = change.sum * change.sum;
+    change.squares = dot(change.sum, change.sum);
+    vec3 brightest = max(light, before.light);
+    change.light = change.count > 0u ? max(brightest.r, max(brightest.g, brightest.b)) : 0.0;
     changes[i] = change;
 }

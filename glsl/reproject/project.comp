@@ -101,11 +101,14 @@ uint offer(uint pixel, Surface s, vec2 film) {
 uint moved(uint pixel, Carried c) {
     Surface s = surface_of(History_triangle(history, pixel), History_instance(history, pixel), History_weights(history, pixel));
     if (c.back != (dot(s.geometric, camera.position - s.position) < 0.0)) return dropped(DROPPED_HIDDEN);
-    float light = push.moved != 0u ? LightChange_error(changes, cell_of(pixel, push.size)) : 0.0, view = 0.0;
-    if (DEPENDS_ON_VIEW)
-        view = view_error(s, pixel, normalize(previous.position - s.position), normalize(camera.position - s.position));
-    bool small = light + view <= push.max_error;
-    c.error += small ? uint(ceil((light + view) * float(ERROR_PARTS) / max(push.max_error, 1e-30))) : 0u;
+    // In shares of what is allowed.
+    float light = push.moved != 0u ? LightChange_change(changes, cell_of(pixel, push.size)) / max(push.max_change, 1e-30) : 0.0, view = 0.0;
+    if (DEPENDS_ON_VIEW) {
+        vec3 before = normalize(previous.position - s.position), after = normalize(camera.position - s.position);
+        view = view_error(s, pixel, before, after) / max(push.max_error, 1e-30);
+    }
+    bool small = light + view <= 1.0;
+    c.error += small ? uint(ceil((light + view) * float(ERROR_PARTS))) : 0u;
     if (!small || c.error > ERROR_PARTS) return dropped(light > view ? DROPPED_LIGHT : DROPPED_VIEW);
     vec3 film = film_from_point(camera, s.position, push.size);
     uint reason = film.z > 0.0 && finite(film) ? offer(pixel, s, film.xy) : DROPPED_OUTSIDE;

@@ -1,6 +1,6 @@
 // What is known of the samples that a pixel has from earlier frames, in one word: their number in the lower 16 bits, then 8 bits
-// of how many times they have moved, then 7 of the error that they are accounted, in parts of the largest one that is allowed,
-// rounded up, then one that says which side of the surface they show. Where the number is 0 the bits above it say why.
+// of how many times they have moved, then 7 of the error that they are accounted by changed view and changed light, in
+// parts of the largest that is allowed, rounded up, then one that says which side of the surface they show. Where the number is 0 the bits above it say why.
 const uint MOST_CARRIED = 65535u;
 const uint ERROR_PARTS = 127u;
 

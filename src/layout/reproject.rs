@@ -47,8 +47,10 @@ gpu_structs! {
         first_pixel: uint,
         /// Pixels of the dispatch.
         pixels: uint,
-        /// Largest error that a pixel's carried samples are accounted, W/(m^2 sr).
+        /// Largest error by changed view that carried samples may have, W/(m^2 sr).
         max_error: float,
+        /// Largest change of light, as a share of it, that they may have been through.
+        max_change: float,
         /// Largest distance of a neighbour's first hit from the plane of the pixel's own, in widths of the pixel there.
         aliasing: float,
         /// Largest number of samples that a pixel hands on.
@@ -77,12 +79,16 @@ gpu_structs! {
     struct LightChange {
         /// Sum of the differences of radiance, W/(m^2 sr).
         sum: vec3,
-        /// The largest mean change so far that is certain, W/(m^2 sr).
-        error: float,
-        /// Sum of the squares of the differences.
-        squares: vec3,
+        /// Sum of their squared lengths.
+        squares: float,
+        /// Sum of the brightest channels of radiance, before or after, whichever is more.
+        light: float,
         /// Number of paths.
         count: uint,
+        /// The largest change so far, as a share of the light.
+        change: float,
+        /// Unused.
+        pad: float,
     }
 
     /// Push constants of `probe.comp`.

@@ -12,7 +12,7 @@ use crate::shaders::shared::history::{ERROR_PARTS, MOST_CARRIED};
 const SAMPLES: &str = "carried.samples";
 /// Frames that they were carried through.
 const AGE: &str = "carried.age";
-/// Error that they are accounted, W/(m^2 sr).
+/// Error that they are accounted, as a share of the largest one that they may have.
 const ERROR: &str = "carried.error";
 /// The point that a pixel's samples are of: numbers that no pose changes, and weights of the triangle's vertices 1 and 2.
 const POINT: [&str; 4] = ["point.triangle", "point.instance", "point.u", "point.v"];
@@ -26,10 +26,9 @@ impl Renderer {
     pub fn add_history(&self, film: &mut Film, scene: &Scene) -> Result<()> {
         let history = self.frame.history()?;
         let carried: Vec<_> = history.carried.read()?.into_iter().map(Carried::of_pixel).collect();
-        let part = history.error_part();
         film.add(SAMPLES, Samples::U32(carried.iter().map(|c| c.count).collect()));
         film.add(AGE, Samples::U32(carried.iter().map(|c| c.age).collect()));
-        film.add(ERROR, Samples::F32(carried.iter().map(|c| c.error as f32 * part).collect()));
+        film.add(ERROR, Samples::F32(carried.iter().map(|c| c.error as f32 / ERROR_PARTS as f32).collect()));
         let points = self.frame.film.tiles[0].points.read()?;
         let of = |numbers: Vec<u32>, index: fn(&SurfacePoint) -> u32| {
             let number = |p| numbers.get(index(p) as usize).copied().unwrap_or(NONE);
@@ -57,12 +56,11 @@ impl Renderer {
         let pixels = film::pixels(film).map_err(lacks)?;
         let [samples, age] = [SAMPLES, AGE].map(|name| film::counts(film, name).map_err(lacks));
         let (samples, age, error) = (samples?, age?, floats(film, ERROR)?);
-        let part = history.error_part();
         // Numbers of a damaged file stay within their bits.
         let word = |i: usize| Carried {
             count: samples[i].min(MOST_CARRIED),
             age: age[i].min(255),
-            error: ((error[i] / part).round() as u32).min(ERROR_PARTS),
+            error: ((error[i] * ERROR_PARTS as f32).round() as u32).min(ERROR_PARTS),
             back: false,
         };
         let points = points(film, scene)?;

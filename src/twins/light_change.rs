@@ -1,7 +1,7 @@
 //! Twin of `glsl/reproject/probe.comp` and `glsl/reproject/light_change.comp`.
 use crate::layout::{Camera, LightChange, NONE, Probe, SurfacePoint};
 use crate::math::hash::pcg;
-use crate::shaders::light_change::CERTAIN;
+use crate::shaders::light_change::LEAST_SPACING;
 use crate::shaders::shared::cell::CELL;
 use crate::twins::path::Tracer;
 use crate::twins::reproject::Carried;
@@ -63,7 +63,8 @@ pub fn after(tracer: &Tracer, eye: &Camera, points: &[SurfacePoint], probes: &[P
         match difference.is_finite() {
             true => LightChange {
                 sum: difference.into(),
-                squares: (difference * difference).into(),
+                squares: difference.length_squared(),
+                light: light.max(probe.light.into()).max_element(),
                 count: 1,
                 ..LightChange::default()
             },
@@ -80,16 +81,18 @@ pub fn sums(found: &[LightChange], cells: [u32; 2], spacing: u32) -> Vec<LightCh
         let around =
             (0..9).map(|k| [i % width + (k % 3 - 1) * spacing as i32, i / width + (k / 3 - 1) * spacing as i32]);
         let inside = around.filter(|[x, y]| (0..width).contains(x) && (0..height).contains(y));
-        let mut all = LightChange { error: found[i as usize].error, ..LightChange::default() };
+        let mut all = LightChange::default();
         for other in inside.map(|[x, y]| &found[(y * width + x) as usize]) {
             all.sum = (Vec3::from(all.sum) + Vec3::from(other.sum)).into();
-            all.squares = (Vec3::from(all.squares) + Vec3::from(other.squares)).into();
+            all.squares += other.squares;
+            all.light += other.light;
             all.count += other.count;
         }
-        let limit = if spacing == 3 { 0.0 } else { CERTAIN };
-        let (sum, noise) = (Vec3::from(all.sum).abs(), limit * Vec3::from(all.squares).map(f32::sqrt));
-        let certain = Vec3::select(sum.cmpgt(noise), sum / all.count.max(1) as f32, Vec3::ZERO);
-        LightChange { error: all.error.max(certain.max_element()), ..all }
+        let sum = Vec3::from(all.sum);
+        let (squared, own) = (sum.length_squared(), if spacing == LEAST_SPACING { all.squares } else { 0.0 });
+        let change =
+            if squared > own { sum.abs().max_element() * (1.0 - own / squared).sqrt() / all.light } else { 0.0 };
+        LightChange { change: found[i as usize].change.max(change), ..all }
     };
     (0..width * height).map(sum).collect()
 }

@@ -217,10 +217,11 @@ impl Reprojection<'_> {
         let around: Vec3 = self.around(pixel).map(|q| Vec3::from(handed.records[q].mean)).sum();
         let view = self.view_error(&s, around / 9.0, views[0], views[1]);
         let cell = cell_of(pixel as u32, self.push.size) as usize;
-        let light = if self.push.moved != 0 { self.changes[cell].error } else { 0.0 };
-        let parts = ((light + view) * ERROR_PARTS as f32 / self.push.max_error.max(1e-30)).ceil();
+        let light = if self.push.moved != 0 { self.changes[cell].change } else { 0.0 };
+        let (light, view) = (light / self.push.max_change.max(1e-30), view / self.push.max_error.max(1e-30));
+        let parts = ((light + view) * ERROR_PARTS as f32).ceil();
         // A number that is none fails both comparisons.
-        if !(light + view <= self.push.max_error && c.error as f32 + parts <= ERROR_PARTS as f32) {
+        if !(light + view <= 1.0 && c.error as f32 + parts <= ERROR_PARTS as f32) {
             return dropped(if light > view { DROPPED_LIGHT } else { DROPPED_VIEW });
         }
         let film = film_from_point(&self.camera, s.position, self.push.size);

@@ -141,7 +141,7 @@ fn light_that_has_changed_leaves_no_ghost() {
         }
     }
     assert!(found.iter().all(|(_, _, left)| left.abs() < 0.01), "(event, camera moves, what is left): {found:?}");
-    let mut keeps_all = Stage::new(&gpu, Reproject { reproject_error: 1e9, ..Reproject::default() });
+    let mut keeps_all = Stage::new(&gpu, Reproject { reproject_light: 1e9, ..Reproject::default() });
     let left = keeps_all.ghost(&EVENTS[0], false);
     assert!(left > 0.3, "control: {left} is left where all is kept");
     assert_silent(&gpu);

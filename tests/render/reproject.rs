@@ -37,8 +37,13 @@ fn a_camera_at_rest_accumulates_to_the_bit() {
 
         let parts = scene(file, small);
         // Limits are those of samples that move.
-        let strict =
-            Reproject { reproject_samples: 1, reproject_age: 0, reproject_error: 0.0, reproject_aliasing: 0.0 };
+        let strict = Reproject {
+            reproject_samples: 1,
+            reproject_age: 0,
+            reproject_error: 0.0,
+            reproject_light: 0.0,
+            reproject_aliasing: 0.0,
+        };
         let mut film = Film::new(&gpu, &parts, strict);
         (0..3).for_each(|_| film.frame(film.camera));
         assert!(bits(&film.stats()) == bits(&expected) && bits(&film.light()) == bits(&light), "{file}");

@@ -125,7 +125,7 @@ fn moving_scenes_show_what_is_there() {
         let direct = direct(&gpu, &scene, shifted(start, [0.12, 0.0, 0.0]));
         let [wrong, off] = truth(&film.stats(), &film.carried(), &direct);
         assert!(found.carried > 100, "{found:?}");
-        // Light that changes slowly is found late: see `reproject_error`.
+        // Light that changes slowly is found late: see `reproject_light`.
         assert!(wrong < 0.015 && off.abs() < 0.035, "{wrong} of pixels wrong, off by {off}: {found:?}");
     }
     assert_silent(&gpu);

@@ -32,6 +32,7 @@ fn push(scene: &Loaded, s: Reproject) -> ReprojectPush {
         first_pixel: 0,
         pixels: settings.pixels() as u32,
         max_error: s.reproject_error,
+        max_change: s.max_change(settings.spp),
         aliasing: s.reproject_aliasing,
         max_samples: s.reproject_samples,
         max_age: s.reproject_age,
@@ -137,7 +138,7 @@ fn both_where_all_moves(
     let found = film.renderer.history().unwrap().light_change().read().unwrap();
     let alike = |(a, b): &(&LightChange, &LightChange)| {
         // One path in 81 that rounding leads elsewhere shifts the errors of all cells around it.
-        a.count == b.count && (a.error - b.error).abs() <= 0.05 + 0.1 * b.error
+        a.count == b.count && (a.change - b.change).abs() <= 0.05 + 0.1 * b.change
     };
     let cells = found.iter().zip(&changes).filter(alike).count();
     // Rounding of one path may be in the errors of all cells around: from here on those of the kernels count.
@@ -181,24 +182,24 @@ fn kernels_agree_with_their_twin_where_all_moves() {
 }
 
 #[test]
-fn certain_changes_are_those_that_noise_does_not_explain() {
-    // One cell alone: a difference of 1 of one path is within its own noise.
+fn changes_of_light_are_shares_of_it() {
+    // Paths of light 2 of which each loses or gains so much.
     let change =
-        |by: f32| LightChange { sum: [by, 0.0, 0.0], squares: [by * by, 0.0, 0.0], count: 1, ..Default::default() };
-    let error = |found: &[LightChange], spacing| light_change::sums(found, [3, 3], spacing)[4].error;
-    let mut one = vec![change(0.0); 9];
-    one[4] = change(1.0);
-    assert_eq!(error(&one, 1), 0.0);
-    // Three that agree are no chance: 3 > 1.7 sqrt(3). Two are.
-    one[0] = change(1.0);
-    assert_eq!(error(&one, 1), 0.0);
-    one[7] = change(1.0);
-    assert!((error(&one, 1) - 3.0 / 9.0).abs() < 1e-6);
-    assert_eq!(error(&[change(-1.0); 9], 1), 1.0);
-    assert_eq!(error(&[1.0, -1.0, 1.0, -1.0, 0.0, 1.0, -1.0, 1.0, 1.0].map(change), 1), 0.0);
-    // In windows of nine cells across one path is enough. Cells that are no multiple of three away belong to the sums of others.
+        |by: f32| LightChange { sum: [by, 0.0, 0.0], squares: by * by, light: 2.0, count: 1, ..Default::default() };
+    let found = |found: &[LightChange], spacing| light_change::sums(found, [3, 3], spacing)[4].change;
+    // One path of nine tells nothing: it may be alone. Of two the square of the sum, 4, loses their own, 2.
+    let mut some = vec![change(0.0); 9];
+    assert_eq!(found(&some, 1), 0.0);
+    some[4] = change(1.0);
+    assert_eq!(found(&some, 1), 0.0);
+    some[0] = change(1.0);
+    assert!((found(&some, 1) - f32::sqrt(2.0) / 18.0).abs() < 1e-6);
+    // Nine: 81 - 9.
+    assert!((found(&[change(-1.0); 9], 1) - f32::sqrt(72.0) / 18.0).abs() < 1e-6);
+    assert_eq!(found(&[1.0, -1.0, 1.0, -1.0, 0.0, 1.0, -1.0, 1.0, 1.0].map(change), 1), 0.0);
+    // In wider windows one path counts. Cells that are no multiple of three away belong to the sums of others.
     let alone = |at: usize| (0..9).map(|i| change(f32::from(u8::from(i == at)))).collect::<Vec<_>>();
-    assert_eq!([error(&alone(4), 3), error(&alone(5), 3), error(&alone(4), 9)], [1.0, 0.0, 0.0]);
+    assert_eq!([found(&alone(4), 3), found(&alone(5), 3), found(&alone(4), 9)], [0.5, 0.0, 0.5]);
     assert_eq!([light_change::cell_of(0, [9, 9]), light_change::cell_of(9 * 4 + 8, [9, 9])], [0, 5]);
 }
 

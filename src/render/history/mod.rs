@@ -11,7 +11,6 @@ use crate::render::buffers::most_of_one_tile;
 use crate::scene::{Change, Relit, Scene};
 use crate::settings::{FROM_0, entry, settings};
 use crate::shaders;
-use crate::shaders::shared::history::ERROR_PARTS;
 use crate::shaders::shared::traverse;
 use numbers::Numbers;
 pub use probes::Probes;
@@ -24,8 +23,11 @@ settings! {
     pub struct Reproject {
         /// The settings of [`Reproject`] that are given; the others are `None`.
         ReprojectOverrides {
-            /// Largest error by changed view and changed light that carried samples may have, in units of radiance.
+            /// Largest error by changed view that carried samples may have, in units of radiance.
             reproject_error: f32 = 1.0 / 256.0, FROM_0;
+            /// Largest share by which the light of carried samples may have changed, over the root of a frame's samples per pixel: their
+            /// noise hides as much.
+            reproject_light: f32 = 0.2, FROM_0;
             /// Largest distance of the hits around a pixel from its surface's plane, in widths of the pixel there.
             reproject_aliasing: f32 = 0.5, FROM_0;
             /// Samples that a pixel carries to the next frame at most.
@@ -33,6 +35,13 @@ settings! {
             /// Frames that samples are carried through at most.
             reproject_age: u32 = 64, 0..=255;
         }
+    }
+}
+
+impl Reproject {
+    /// The largest share by which light may have changed where a pixel gets `spp` samples a frame.
+    pub fn max_change(&self, spp: u32) -> f32 {
+        self.reproject_light / (spp.max(1) as f32).sqrt()
     }
 }
 
@@ -165,11 +174,6 @@ impl History {
         self.probes.as_ref().map_or(&self.no_change, Probes::found)
     }
 
-    /// The error that one part of a pixel's word stands for.
-    pub(super) fn error_part(&self) -> f32 {
-        self.settings.reproject_error.max(1e-30) / ERROR_PARTS as f32
-    }
-
     /// What its kernels are told of pixels from `first_pixel` on.
     pub(super) fn push(&self, constants: &PathConstants, first_pixel: u32, pixels: u32) -> ReprojectPush {
         let [instances, triangles] = self.numbers.anew();
@@ -179,6 +183,7 @@ impl History {
             first_pixel,
             pixels,
             max_error: s.reproject_error,
+            max_change: s.max_change(self.spp),
             aliasing: s.reproject_aliasing,
             max_samples: s.reproject_samples,
             max_age: s.reproject_age,
