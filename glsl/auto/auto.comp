@@ -20,16 +20,16 @@ layout(binding = 7) uniform samplerBuffer narrow; // of vec4, of what it gets
 layout(binding = 8) uniform samplerBuffer wide_dim; // of vec4, of the same
 layout(binding = 9) uniform samplerBuffer svgf; // of vec4
 layout(binding = 10) uniform samplerBuffer variance; // of vec3
-layout(binding = 11) uniform samplerBuffer surroundings; // of vec4, of leverages
+layout(binding = 11) uniform samplerBuffer surroundings; // of vec4, of auto_leverage.comp
 layout(scalar, binding = 12) writeonly buffer Blend { vec4 blend[]; };
 layout(scalar, binding = 13) writeonly buffer Expected { vec2 expected[]; };
 layout(constant_id = 114) const bool MEASURED = true; // `variance` holds every pixel's
-layout(scalar, push_constant) uniform Push { PackPush push; };
+layout(scalar, push_constant) uniform Push { AutoBlendPush push; };
 
 const uint ROUNDS = 4u;       // of exchanges between all pairs
 const float RIDGE = 0.01;     // share added to every squared error: candidates that hardly differ get like weights
-// A left-out pixel is missed by its noise at least, so that the best candidate bounds it from above. The variance of samples tells
-// more than that where they are stratified: half of a sampled pixel's may be none. No noise is less than this share of it.
+// A left-out pixel is missed by its noise at least, so that the best candidate bounds it from above, but for chance: no noise is less
+// than this share of what is told.
 const float LEAST = 0.05;
 // From this number of samples on svgf takes part. With it, two samples left Crytek Sponza dark and grained: FLIP .203 in place of .163.
 const float ENOUGH_FOR_SVGF = 4.0;
@@ -43,6 +43,24 @@ float own_variance(uint i, float count) {
     return measured ? deviation * deviation : UNMEASURED;
 }
 
+// Moves weight between pairs where that lessens the error. `growth` is half the derivative of the blend's mean squared error by each
+// weight.
+void exchange(inout float w[5], inout float growth[5], float missed[5][5], bool usable[5]) {
+    for (uint round = 0u; round < ROUNDS; round++) {
+        // The loops' bounds do not depend on each other: only then are they unrolled, and the arrays stay in registers.
+        [[unroll]] for (int j = 0; j < 5; j++) {
+            [[unroll]] for (int k = 0; k < 5; k++) {
+                if (j >= k) continue;
+                float bend = missed[j][j] + missed[k][k] - 2.0 * missed[j][k], gain = growth[k] - growth[j];
+                float moved = bend > 0.0 && usable[j] && usable[k] ? clamp(gain / bend, -w[j], w[k]) : 0.0;
+                w[j] += moved;
+                w[k] -= moved;
+                [[unroll]] for (int m = 0; m < 5; m++) growth[m] += moved * (missed[m][j] - missed[m][k]);
+            }
+        }
+    }
+}
+
 void main() {
     uint i = thread_index();
     if (i >= push.count) return;
@@ -50,7 +68,7 @@ void main() {
     vec4 c = texelFetch(colour, at);
     vec4 a = texelFetch(wide, at), b = texelFetch(mid, at), n = texelFetch(narrow, at), d = texelFetch(svgf, at);
     // Errors are relative to the light, which is at least 1 where a pixel is known.
-    vec4 here = texelFetch(others, at);
+    vec4 here = texelFetch(others, at), found = texelFetch(surroundings, at);
     float light = max(here.w, 1.0);
     vec4 square = texelFetch(squares, at) / light, product = texelFetch(products, at) / light, other = here / light;
     // The variance of few samples depends on their values, so that candidates which use it (the image and svgf) would seem
@@ -75,30 +93,17 @@ void main() {
         }
         missed[k][k] *= 1.0 + RIDGE;
     }
-    // Half the derivative of the blend's mean squared error by each weight.
     float growth[5];
     [[unroll]] for (int k = 0; k < 5; k++) {
         w[k] = k == best ? 1.0 : 0.0;
         [[unroll]] for (int m = 0; m < 5; m++) if (k == best) growth[m] = missed[m][k];
     }
-    for (uint round = 0u; round < ROUNDS; round++) {
-        // The loops' bounds do not depend on each other: only then are they unrolled, and the arrays stay in registers.
-        [[unroll]] for (int j = 0; j < 5; j++) {
-            [[unroll]] for (int k = 0; k < 5; k++) {
-                if (j >= k) continue;
-                float bend = missed[j][j] + missed[k][k] - 2.0 * missed[j][k], gain = growth[k] - growth[j];
-                float moved = bend > 0.0 && usable[j] && usable[k] ? clamp(gain / bend, -w[j], w[k]) : 0.0;
-                w[j] += moved;
-                w[k] -= moved;
-                [[unroll]] for (int m = 0; m < 5; m++) growth[m] += moved * (missed[m][j] - missed[m][k]);
-            }
-        }
-    }
+    exchange(w, growth, missed, usable);
     // What left-out pixels tell, without their noise and the ridge; at least the noise that a filter of such leverages keeps.
-    float square_of_blend = 0.0, kept = w[0] + dot(vec4(w[1], w[2], w[3], w[4]), texelFetch(surroundings, at));
+    float square_of_blend = 0.0, kept = w[0] + dot(vec4(w[1], w[2], w[3], w[4]), leverages_of(found, push.shares));
     [[unroll]] for (int k = 0; k < 5; k++) square_of_blend += w[k] * (growth[k] - w[k] * missed[k][k] * RIDGE / (1.0 + RIDGE));
     float error = max(square_of_blend - noise, clamp(kept, 0.0, 1.0) * noise);
-    expected[i] = vec2(error, told > 0.0 ? noise / told : 1.0);
+    expected[i] = vec2(error, told > 0.0 ? noise / told * share_of_noise(found) : 1.0);
     // An unknown pixel whose centre ray meets nothing has no guide for the fits: the widest window fills it.
     bool adrift = usable[1] && c.w == 0.0 && unpacked_normal(texelFetch(place, at).w) == vec3(0.0);
     if (adrift) w = float[](0.0, 1.0, 0.0, 0.0, 0.0);

@@ -14,12 +14,12 @@ layout(binding = 3) uniform samplerBuffer mid; // of vec4
 layout(binding = 4) uniform samplerBuffer narrow; // of vec4, of what it gets
 layout(binding = 5) uniform samplerBuffer wide_dim; // of vec4, of the same
 layout(binding = 6) uniform samplerBuffer svgf; // of vec4
-layout(binding = 7) uniform samplerBuffer leverages; // of vec4
+layout(binding = 7) uniform samplerBuffer leverages; // of vec4, of auto_leverage.comp
 layout(binding = 8) uniform samplerBuffer surroundings; // of vec4
 layout(scalar, binding = 9) writeonly buffer Squares { vec4 squares[]; };    // wide, mid, narrow, svgf
 layout(scalar, binding = 10) writeonly buffer Products { vec4 products[]; }; // wide mid, wide narrow, wide svgf, mid narrow
 layout(scalar, binding = 11) writeonly buffer Others { vec4 others[]; };     // mid svgf, narrow svgf, none, the light itself
-layout(scalar, push_constant) uniform Push { AutoPush push; };
+layout(scalar, push_constant) uniform Push { AutoErrorPush push; };
 
 const float MOST = 0.9; // largest leverage: beyond it, too little is left to judge by
 // How far the leverage used moves from the smoothed one towards the pixel's own, larger one, at one sample. Both a pixel's
@@ -31,6 +31,9 @@ const float LIMIT = 1e9; // luminance and its differences are cut here, so that 
 // the noise of bright reflections decided which candidate is taken around them (Veach's plates at 4 samples: relMSE 0.31
 // instead of 0.02). Not the pixel's own variance, which few samples tell too small where they are dark by chance.
 const float NOISE = 4.0;
+// Errors are relative to the mean of the candidates; with more samples than this, to svgf's more and more. The windows take light into
+// dark pixels (between reflections on Veach's plates), where errors would count too little.
+const float FEW = 4.0;
 const int REACH = 3; // pixels from the centre to the border of the window that the variance is taken over
 
 float scaled(vec3 a, vec3 b) {
@@ -68,16 +71,18 @@ void main() {
     vec4 e = texelFetch(estimate, at);
     vec3 a = texelFetch(wide, at).rgb, b = texelFetch(mid, at).rgb, c = texelFetch(narrow, at).rgb;
     vec3 a_dim = texelFetch(wide_dim, at).rgb, d = texelFetch(svgf, at).rgb, dim = dimmed(e.rgb, a);
-    vec4 own = texelFetch(leverages, at), around = texelFetch(surroundings, at);
+    vec4 found = texelFetch(surroundings, at);
+    vec4 own = leverages_of(texelFetch(leverages, at), push.shares), around = leverages_of(found, push.shares);
     float count = texelFetch(colour, at).w;
     vec4 left = 1.0 - clamp(around + OWN / sqrt(max(count, 1.0)) * max(own - around, 0.0), 0.0, MOST);
     // The narrow window filters the dimmed pixel, and the wide one the rest of its light: each misses its own part.
     vec4 missed = vec4(scaled(a, e.rgb), scaled(b, e.rgb), scaled(c, dim), scaled(d, e.rgb)) / left;
     missed.z += scaled(a - a_dim, e.rgb - dim) / left.x;
-    float level = scaled((a + as_light(b, a) + whole_light(c, a, a_dim) + d) / 4.0, vec3(0.0)), light = level * level + 1.0;
+    float most = max(count / FEW, 1.0);
+    float level = scaled((a + as_light(b, a) + whole_light(c, a, a_dim) + most * d) / (3.0 + most), vec3(0.0)), light = level * level + 1.0;
     float uncertain = light + NOISE * variance_around(ivec2(at % int(push.size.x), at / int(push.size.x)));
     float weight = count > 0.0 ? 1.0 / uncertain : 0.0;
     squares[i] = weight * missed * missed;
     products[i] = weight * missed.xxxy * missed.yzwz;
-    others[i] = weight * vec4(missed.yz * missed.w, 2.0 * squared_deviation(e.w), light);
+    others[i] = weight * vec4(missed.yz * missed.w, 2.0 * share_of_noise(found) * squared_deviation(e.w), light);
 }

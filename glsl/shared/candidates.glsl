@@ -18,5 +18,18 @@ vec3 whole_light(vec3 narrow, vec3 wide, vec3 wide_dim) {
     return as_light(narrow + (wide - wide_dim), wide);
 }
 
+// The leverages of wide, middle and narrow windows and of svgf, as auto_leverage.comp writes the last two. Larger windows keep next to
+// nothing: as much less than the narrow one as they are larger, by the `shares` of their pixels.
+vec4 leverages_of(vec4 found, vec2 shares) {
+    return vec4(shares * found.z, found.zw);
+}
+
+// How much of the variance that samples tell may be noise, by the second differences of a surface. They are known by chance too.
+const float TRUST = 1.25;
+const float LEAST_SHARE = 0.02;
+float share_of_noise(vec4 found) {
+    return found.y > 0.0 ? clamp(TRUST * found.x / found.y, LEAST_SHARE, 1.0) : 1.0;
+}
+
 // Instead of the variance that comes with the blend.
 const float UNMEASURED = -1.0, UNFILTERED = -2.0;

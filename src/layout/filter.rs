@@ -101,18 +101,38 @@ gpu_structs! {
         count: uint,
         /// As in [`AutoPush`].
         floor: float,
+        /// Image in pixels.
+        size: uvec2,
+        /// As in [`AtrousPush`]; that of radiance is 0.
+        rates: vec3,
+    }
+
+    /// Push constants of `auto.comp`.
+    struct AutoBlendPush {
+        /// Pixels of the image.
+        count: uint,
+        /// As in [`AutoErrorPush`].
+        shares: vec2,
+    }
+
+    /// Push constants of `auto_error.comp`.
+    struct AutoErrorPush {
+        /// Pixels of the image.
+        count: uint,
+        /// As in [`AutoPush`].
+        floor: float,
+        /// Image in pixels.
+        size: uvec2,
         /// Pixels of the narrow window over those of the wide and of the middle one.
         shares: vec2,
     }
 
-    /// Push constants of `auto_inputs.comp` and `auto_error.comp`.
+    /// Push constants of `auto_inputs.comp`.
     struct AutoPush {
         /// Pixels of the image.
         count: uint,
         /// Luminance below which errors count as absolute.
         floor: float,
-        /// Image in pixels.
-        size: uvec2,
     }
 
     /// Push constants of `auto_residual.comp`.

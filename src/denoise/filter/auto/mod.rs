@@ -11,7 +11,9 @@ use super::pack::Pack;
 use super::{Filter, FilterSettings, Planes, Row, guided, svgf};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::layout::{AutoLeveragePush, AutoPush, AutoResidualPush, AutoSmoothPush, PackPush, vec2, vec3, vec4};
+use crate::layout::{
+    AutoBlendPush, AutoErrorPush, AutoLeveragePush, AutoPush, AutoResidualPush, AutoSmoothPush, vec2, vec3, vec4,
+};
 use crate::shaders::{auto, auto_error, auto_inputs, auto_leverage, auto_residual, auto_smooth};
 
 /// See [`super::FILTERS`].
@@ -129,8 +131,9 @@ struct Auto {
     planes: [Buffer<vec4>; 3],
     /// What the wide window makes of what the narrow one gets.
     wide_dim: Buffer<vec4>,
+    /// What neighbours tell of noise, and leverages: see `glsl/auto/auto_leverage.comp`.
     leverages: Buffer<vec4>,
-    /// Leverages, smoothed.
+    /// The same, smoothed.
     surroundings: Buffer<vec4>,
     /// See [`Filter::expected`].
     expected: Buffer<vec2>,
@@ -151,19 +154,17 @@ impl Auto {
             let edge = Rates::of_surfaces(&alike(&settings.edge)).constants();
             Kernel::new(gpu, &auto_smooth::Constants { edge, three })
         };
+        let surfaces = Rates::of_surfaces(&settings.edge).constants();
         let blend = |measured| Kernel::new(gpu, &auto::Constants { measured, ..Default::default() });
         Ok(Self {
             estimate: Estimate::new(gpu, &settings.edge, size)?,
             inputs: Kernel::new(gpu, &Default::default())?,
-            leverage: Kernel::new(gpu, &Default::default())?,
+            leverage: Kernel::new(gpu, &auto_leverage::Constants { edge: surfaces, ..Default::default() })?,
             error: Kernel::new(gpu, &Default::default())?,
             smooth: [smooth(false)?, smooth(true)?],
             blend: [blend(false)?, blend(true)?],
             nothing: Buffer::from_slice(gpu, "no variance", &[])?,
-            residual: Kernel::new(
-                gpu,
-                &auto_residual::Constants { edge: Rates::of_surfaces(&settings.edge).constants() },
-            )?,
+            residual: Kernel::new(gpu, &auto_residual::Constants { edge: surfaces })?,
             candidates: [wide?, middle?, narrow?, svgf?],
             planes: [
                 plane("dim, squared errors")?,
@@ -184,7 +185,7 @@ impl Auto {
         let [wide, middle, narrow, svgf] = &self.candidates;
         let ([dim, signs, probed], count) = (&self.planes, planes.pixels());
         wide.record(rec, planes, &planes.radiance, &wide.result)?;
-        let push = AutoPush { count, floor: floor(&self.settings), size: planes.size, ..Default::default() };
+        let push = AutoPush { count, floor: floor(&self.settings), ..Default::default() };
         let bind = auto_inputs::Bind { colour: &self.pack.colour, wide: &wide.result, dim, signs, probed };
         rec.dispatch_threads(&self.inputs, bind, &push, count)?;
         wide.record(rec, planes, dim, &self.wide_dim)?;
@@ -198,12 +199,16 @@ impl Auto {
             svgf: &svgf.result,
             narrow_kept: &narrow.kept,
             svgf_kept: &svgf.kept,
+            colour: &self.pack.colour,
+            place: &self.pack.place,
+            estimate: &self.estimate.plane,
             leverages: &self.leverages,
         };
         let push = AutoLeveragePush {
             count,
             floor: floor(&self.settings),
-            shares: shares(&self.settings),
+            size: planes.size,
+            rates: Rates::of_surfaces(&self.settings.edge).as_array(),
             ..Default::default()
         };
         rec.dispatch_threads(&self.leverage, bind, &push, count)
@@ -227,7 +232,8 @@ impl Auto {
             others,
         };
         let count = planes.pixels();
-        let push = AutoPush { count, floor: floor(&self.settings), size: planes.size, ..Default::default() };
+        let (size, shares) = (planes.size, shares(&self.settings));
+        let push = AutoErrorPush { count, floor: floor(&self.settings), size, shares, ..Default::default() };
         rec.dispatch_threads(&self.error, bind, &push, count)
     }
 
@@ -312,7 +318,8 @@ impl Filter for Auto {
         };
         let count = planes.pixels();
         let blend = &self.blend[usize::from(planes.variance.is_some())];
-        rec.dispatch_threads(blend, bind, &PackPush { count, ..Default::default() }, count)?;
+        let push = AutoBlendPush { count, shares: shares(&self.settings), ..Default::default() };
+        rec.dispatch_threads(blend, bind, &push, count)?;
         self.record_residual(rec, planes)
     }
 

@@ -8,9 +8,9 @@ use crate::layout::{vec2, vec4};
 use crate::math::hash::pcg;
 use crate::math::srgb::luminance;
 use crate::shaders::auto::{ENOUGH_FOR_SVGF, LEAST, RIDGE, ROUNDS};
-use crate::shaders::auto_error::{LIMIT, MOST, NOISE, OWN, REACH};
+use crate::shaders::auto_error::{FEW, LIMIT, MOST, NOISE, OWN, REACH};
 use crate::shaders::auto_residual::{self as residual, ENOUGH_SAMPLES, PRIOR_SAMPLES, SIGNIFICANT};
-use crate::shaders::shared::candidates::BRIGHT;
+use crate::shaders::shared::candidates::{BRIGHT, LEAST_SHARE, TRUST};
 use crate::shaders::shared::luminance::STRONGEST;
 use glam::{Vec3, Vec4, Vec4Swizzles};
 use std::array::from_fn;
@@ -50,9 +50,9 @@ impl Results {
         let svgf_kept = run(3, pixels(&|i| image[i].colour + added(i)));
         let [of_wide, of_middle] = shares(settings);
         let leverage = |i: usize| {
-            let own = narrow_kept[i].xyz().dot(signs(i)) / 3.0;
+            let own = (narrow_kept[i].xyz().dot(signs(i)) / 3.0).clamp(-1.0, 1.0);
             let grown = contrast(svgf_kept[i].xyz(), svgf[i].xyz()) / added(i);
-            Vec4::new(of_wide * own, of_middle * own, own, grown).clamp(Vec4::splat(-1.0), Vec4::ONE)
+            Vec4::new(of_wide * own, of_middle * own, own, grown.clamp(-1.0, 1.0))
         };
         let leverages = (0..image.len()).map(leverage).collect();
         Self { wide, middle, narrow, wide_dim, svgf, leverages }
@@ -107,14 +107,19 @@ pub fn estimated(input: &FilterInput, settings: &FilterSettings) -> (Vec<vec4>, 
         (0..SMOOTHING).fold(plane, level)
     };
     let surroundings = smoothed(results.leverages.clone(), false);
+    let surfaces = Rates::of_surfaces(&settings.edge);
+    let differ = |i: usize| differences(&image, &noise, size, i, &surfaces, floor, results.wide[i].xyz());
+    let shares_of_noise: Vec<f32> =
+        smoothed((0..image.len()).map(differ).collect(), false).into_iter().map(share_of_noise).collect();
     let scaled = |a: Vec3, b: Vec3| (contrast(a, b) / floor).clamp(-LIMIT, LIMIT);
     // Squares of the filters; their products; the rest of those, the square of none, and the light itself.
     let errors = |i: usize| {
         let m = results.missed(i, &image[i], surroundings[i], &scaled);
-        let light = scaled(results.blended(i).iter().sum::<Vec3>() / 4.0, Vec3::ZERO).powi(2) + 1.0;
+        let ([a, b, c, d], most) = (results.blended(i), (image[i].count / FEW).max(1.0));
+        let light = scaled((a + b + c + most * d) / (3.0 + most), Vec3::ZERO).powi(2) + 1.0;
         let uncertain = light + NOISE * variance_around(&noise, size, i as i64, floor);
         let weight = if image[i].count > 0.0 { uncertain.recip() } else { 0.0 };
-        let unfiltered = 2.0 * squared_deviation(noise[i], floor);
+        let unfiltered = 2.0 * shares_of_noise[i] * squared_deviation(noise[i], floor);
         let others = weight * Vec4::new(m.y * m.w, m.z * m.w, unfiltered, light);
         [weight * m * m, weight * m.xxxy() * m.yzwz(), others]
     };
@@ -129,7 +134,7 @@ pub fn estimated(input: &FilterInput, settings: &FilterSettings) -> (Vec<vec4>, 
     let weights: Vec<_> = (0..image.len()).map(weights).collect();
     let blended = |i: usize| blend(&image[i], weights[i], results.blended(i));
     let blend: Vec<Vec4> = (0..image.len()).map(|i| blended(i).into()).collect();
-    let expected = |i: usize| expected(relative(i), &weights[i].1, surroundings[i]);
+    let expected = |i: usize| expected(relative(i), &weights[i].1, surroundings[i], shares_of_noise[i]);
     let expected = (0..image.len()).map(expected).collect();
     let own: Vec<Option<f32>> = (0..image.len()).map(|i| own_variance(input, i, image[i].count)).collect();
     let residual = |i: usize| Residual {
@@ -143,9 +148,8 @@ pub fn estimated(input: &FilterInput, settings: &FilterSettings) -> (Vec<vec4>, 
         let level = contrast(blend[i].xyz(), Vec3::ZERO).abs().max(floor);
         0.5 * planes[2][i].z / planes[2][i].w.max(1e-20) * level * level * image[i].count
     };
-    let rates = Rates::of_surfaces(&settings.edge);
     let restored = |i: usize| -> vec4 {
-        let given = restored(&image, &residuals, size, i, &rates, prior(i));
+        let given = restored(&image, &residuals, size, i, &surfaces, prior(i));
         let least = blend[i].xyz().min(image[i].colour).min(Vec3::ZERO);
         (blend[i].xyz() + given).max(least).extend(blend[i].w).into()
     };
@@ -154,6 +158,39 @@ pub fn estimated(input: &FilterInput, settings: &FilterSettings) -> (Vec<vec4>, 
 
 fn squared_deviation(variance: f32, floor: f32) -> f32 {
     (variance.max(0.0).sqrt() / floor).min(LIMIT).powi(2)
+}
+
+/// Squared second differences of luminance along both axes, what variances tell of them, over squared light.
+fn differences(
+    image: &[Packed],
+    noise: &[f32],
+    [width, height]: [i64; 2],
+    at: usize,
+    rates: &Rates,
+    floor: f32,
+    around: Vec3,
+) -> Vec4 {
+    let (x, y) = (at as i64 % width, at as i64 / width);
+    let light = (contrast(around, Vec3::ZERO).abs() / floor).min(LIMIT);
+    let mut sum = Vec4::ZERO;
+    for (step, inside) in [(1, x > 0 && x + 1 < width), (width, y > 0 && y + 1 < height)] {
+        if !inside || image[at].count == 0.0 {
+            continue;
+        }
+        let [before, after] = [at as i64 - step, at as i64 + step].map(|j| j as usize);
+        let w = [before, after].map(|j| edge_weight(&image[j], rates.exponent(&image[at], &image[j])));
+        let bend: f32 = [before, after].map(|j| contrast(image[at].colour, image[j].colour)).iter().sum();
+        let [here, before, after] = [at, before, after].map(|j| noise[j].max(0.0));
+        let found = (0.5 * bend.abs() / floor).min(LIMIT);
+        let told = ((here + 0.25 * (before + after)).sqrt() / floor).min(LIMIT);
+        sum += w[0] * w[1] * Vec4::new(found * found, told * told, 0.0, 0.0);
+    }
+    sum / (light * light + 1.0)
+}
+
+/// As `glsl/shared/candidates.glsl`.
+fn share_of_noise(found: Vec4) -> f32 {
+    if found.y > 0.0 { (TRUST * found.x / found.y).clamp(LEAST_SHARE, 1.0) } else { 1.0 }
 }
 
 fn variance_around(noise: &[f32], [width, height]: [i64; 2], at: i64, floor: f32) -> f32 {
@@ -280,13 +317,13 @@ fn matrix([squares, products, others]: [Vec4; 3]) -> Errors {
 }
 
 /// The blend's mean squared error over its squared luminance, and the share of the samples' variance that is noise.
-fn expected(relative: [Vec4; 3], w: &[f32; BLENDED], leverages: Vec4) -> vec2 {
+fn expected(relative: [Vec4; 3], w: &[f32; BLENDED], leverages: Vec4, share: f32) -> vec2 {
     let (missed, told) = (matrix(relative), 0.5 * relative[2].z);
     let noise = missed[0][1];
     let products = (0..BLENDED).flat_map(|j| (0..BLENDED).map(move |k| (j, k)));
     let square: f32 = products.map(|(j, k)| w[j] * w[k] * missed[j][k]).sum();
     let kept = w[0] + Vec4::from_slice(&w[1..]).dot(leverages);
-    [(square - noise).max(kept.clamp(0.0, 1.0) * noise), if told > 0.0 { noise / told } else { 1.0 }]
+    [(square - noise).max(kept.clamp(0.0, 1.0) * noise), if told > 0.0 { noise / told * share } else { 1.0 }]
 }
 
 fn smooth(
