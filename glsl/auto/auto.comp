@@ -7,7 +7,7 @@
 // negative, sum to 1, and minimise the mean squared error at left-out pixels that auto_error.comp estimates. Starting from
 // the best candidate alone, pairs of candidates exchange weight for ROUNDS rounds (coordinate descent). The blend comes with the
 // variance of the pixel's luminance: UNMEASURED where its samples tell none, and UNFILTERED where there is no blend. `expected`
-// is its mean squared error over its squared luminance, and the share of the variance of samples that is noise.
+// is its mean squared error over its squared luminance, the share of the variance of samples that is noise, and its own leverage.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer squares; // of vec4
 layout(binding = 1) uniform samplerBuffer products; // of vec4
@@ -21,8 +21,9 @@ layout(binding = 8) uniform samplerBuffer wide_dim; // of vec4, of the same
 layout(binding = 9) uniform samplerBuffer svgf; // of vec4
 layout(binding = 10) uniform samplerBuffer variance; // of vec3
 layout(binding = 11) uniform samplerBuffer surroundings; // of vec4, of auto_leverage.comp
-layout(scalar, binding = 12) writeonly buffer Blend { vec4 blend[]; };
-layout(scalar, binding = 13) writeonly buffer Expected { vec2 expected[]; };
+layout(binding = 12) uniform samplerBuffer leverages; // of vec4, the same, not smoothed
+layout(scalar, binding = 13) writeonly buffer Blend { vec4 blend[]; };
+layout(scalar, binding = 14) writeonly buffer Expected { vec3 expected[]; };
 layout(constant_id = 114) const bool MEASURED = true; // `variance` holds every pixel's
 layout(scalar, push_constant) uniform Push { AutoBlendPush push; };
 
@@ -100,10 +101,13 @@ void main() {
     }
     exchange(w, growth, missed, usable);
     // What left-out pixels tell, without their noise and the ridge; at least the noise that a filter of such leverages keeps.
-    float square_of_blend = 0.0, kept = w[0] + dot(vec4(w[1], w[2], w[3], w[4]), leverages_of(found, push.shares));
+    float square_of_blend = 0.0;
     [[unroll]] for (int k = 0; k < 5; k++) square_of_blend += w[k] * (growth[k] - w[k] * missed[k][k] * RIDGE / (1.0 + RIDGE));
-    float error = max(square_of_blend - noise, clamp(kept, 0.0, 1.0) * noise);
-    expected[i] = vec2(error, told > 0.0 ? noise / told * share_of_noise(found) : 1.0);
+    vec4 around = leverages_of(found, push.shares), own = leverages_of(texelFetch(leverages, at), push.shares);
+    vec4 of_filters = vec4(w[1], w[2], w[3], w[4]);
+    float error = max(square_of_blend - noise, clamp(w[0] + dot(of_filters, around), 0.0, 1.0) * noise);
+    float kept = clamp(w[0] + dot(of_filters, clamp(max(own, around), 0.0, 1.0)), 0.0, 1.0);
+    expected[i] = vec3(error, told > 0.0 ? noise / told * share_of_noise(found) : 1.0, kept);
     // An unknown pixel whose centre ray meets nothing has no guide for the fits: the widest window fills it.
     bool adrift = usable[1] && c.w == 0.0 && unpacked_normal(texelFetch(place, at).w) == vec3(0.0);
     if (adrift) w = float[](0.0, 1.0, 0.0, 0.0, 0.0);

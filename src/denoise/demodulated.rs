@@ -4,7 +4,7 @@ use super::filter::Planes;
 use super::{Demodulation, ExpectedError, Holds, Noisy};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::layout::{PackPush, SplitPush, vec2, vec3, vec4};
+use crate::layout::{PackPush, SplitPush, vec3, vec4};
 use crate::shaders::shared::noisy;
 use crate::shaders::{demodulate, demodulate_direct, remodulate, remodulate_direct};
 
@@ -118,7 +118,7 @@ impl Demodulated {
     ///
     /// # Errors
     /// [`crate::error::Error::Device`].
-    pub fn expected_error(&self, gpu: &Gpu, expected: &Buffer<vec2>) -> Result<Option<ExpectedError>> {
+    pub fn expected_error(&self, gpu: &Gpu, expected: &Buffer<vec3>) -> Result<Option<ExpectedError>> {
         ExpectedError::of(gpu, &self.planes, &self.factor, &self.picture, expected)
     }
 }

@@ -4,7 +4,7 @@ use super::filter::Planes;
 use super::twin::Parts;
 use crate::error::Result;
 use crate::gpu::{Buffer, FrameResources, Gpu, Kernel, Location};
-use crate::layout::{SplitPush, vec2, vec3, vec4};
+use crate::layout::{SplitPush, vec3, vec4};
 use crate::shaders::expected_error::{Bind, EACH, EPSILON, THREADS};
 use glam::Vec3;
 use serde::Serialize;
@@ -34,7 +34,7 @@ impl ExpectedError {
         planes: &Planes,
         factor: &Buffer<vec4>,
         picture: &Buffer<vec4>,
-        expected: &Buffer<vec2>,
+        expected: &Buffer<vec3>,
     ) -> Result<Option<Self>> {
         let Some(variance) = &planes.variance else { return Ok(None) };
         let groups = planes.pixels().div_ceil(THREADS * EACH);
@@ -47,26 +47,30 @@ impl ExpectedError {
         Ok(Self::of_sums(&sums.read()?))
     }
 
-    fn of_sums(sums: &[vec3]) -> Option<Self> {
-        let [before, after, pixels] = [0, 1, 2].map(|k| sums.iter().map(|sum| f64::from(sum[k])).sum::<f64>());
-        (before > 0.0).then(|| Self { before: before / pixels, after: after / pixels })
+    /// An unbiased estimate of a small error under much noise may be less than nothing: then the filter's own holds.
+    fn of_sums(sums: &[vec4]) -> Option<Self> {
+        let [before, after, excess, pixels] =
+            [0, 1, 2, 3].map(|k| sums.iter().map(|sum| f64::from(sum[k])).sum::<f64>());
+        (before > 0.0).then(|| Self { before: before / pixels, after: (after + excess.max(0.0)) / pixels })
     }
 }
 
 /// The twin: of an image taken apart, what a filter made of it and expects of that.
-pub fn reference(parts: &Parts, filtered: &[vec4], expected: &[vec2]) -> Option<ExpectedError> {
+pub fn reference(parts: &Parts, filtered: &[vec4], expected: &[vec3]) -> Option<ExpectedError> {
     let (input, picture) = (&parts.input, parts.remodulate(filtered));
     let variance = input.variance.as_ref()?;
-    let pixel = |i: usize| -> vec3 {
+    let pixel = |i: usize| -> vec4 {
         let (whole, factor) = (Vec3::from(picture[i]), Vec3::from(parts.factor[i]));
         let light = factor * Vec3::from_slice(&filtered[i][..3]);
-        let [error, noise] = if input.radiance[i][3] > 0.0 { expected[i] } else { [0.0, 1.0] };
+        let [error, noise, kept] = if input.radiance[i][3] > 0.0 { expected[i] } else { [0.0, 1.0, 0.0] };
         let known = if input.radiance[i][3] > 0.0 { 1.0 } else { 0.0 };
         let sharp = noise_of_sharp(parts, i, noise * parts.sharp_variance[i]);
         let over = (whole * whole + EPSILON).recip() / 3.0;
         let [before, after] = [known * noise * factor * factor * Vec3::from(variance[i]), error * light * light];
-        let both = [(before + sharp).dot(over), (after + sharp).dot(over), 1.0];
-        if both.iter().all(|v| v.is_finite()) { both } else { [0.0; 3] }
+        let off = light - factor * Vec3::from_slice(&input.radiance[i][..3]);
+        let unbiased = known * off * off - (1.0 - 2.0 * kept) * before;
+        let all = [(before + sharp).dot(over), (after + sharp).dot(over), (unbiased - after).dot(over), 1.0];
+        if all.iter().all(|v| v.is_finite()) { all } else { [0.0; 4] }
     };
     ExpectedError::of_sums(&(0..filtered.len()).map(pixel).collect::<Vec<_>>())
 }

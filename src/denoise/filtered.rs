@@ -9,7 +9,7 @@ use super::noisy::{Holds, Noisy};
 use super::windows;
 use crate::error::Result;
 use crate::gpu::{Buffer, FrameResources, Gpu, PassTime, Recorder};
-use crate::layout::{Guide, PixelLight, PixelStats, vec2, vec3, vec4};
+use crate::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
 use crate::render::film;
 use crate::render::settings::Settings;
 
@@ -48,7 +48,7 @@ impl Recipe<'_> {
 pub struct Filtered {
     parts: Demodulated,
     /// What the filter expects of its own errors, where it does.
-    expected: Option<Buffer<vec2>>,
+    expected: Option<Buffer<vec3>>,
     /// What each pass took.
     pub times: Vec<PassTime>,
     /// What was cut beforehand, if anything was to be.
@@ -170,7 +170,7 @@ fn run_filter(
     scales: &Scales,
     planes: &Planes,
     times: &mut Vec<PassTime>,
-) -> Result<Option<Buffer<vec2>>> {
+) -> Result<Option<Buffer<vec3>>> {
     let settings = (recipe.settings)(scales);
     match recipe.method {
         Method::Kernels(row) => {

@@ -69,3 +69,23 @@ fn planned_errors_are_true_ones() {
     }
     support::assert_silent(&gpu);
 }
+
+/// What `auto` tells of its own error, and of the noisy image's, is between a quarter and four times the truth.
+#[test]
+fn told_errors_are_near_true_ones() {
+    let (gpu, method) = (support::gpu(), Method::Kernels(filter::find("auto").unwrap()));
+    for (file, spp) in [("cornell-box/scene.toml", 4), ("cornell-box/glossy.toml", 16), ("veach-mis/scene.toml", 16)] {
+        let reference = rendered(&gpu, &scene(file, "uniform", 512, 1000), None);
+        let noisy = scene(file, "uniform", spp, 3);
+        let renderer = Renderer::new(&gpu, &noisy, &noisy.settings, OUTPUTS).unwrap();
+        support::render(&gpu, &renderer);
+        let clean = Filtered::new(&gpu, Noisy::of_film(&renderer).unwrap(), &Recipe::new(method));
+        let told = clean.unwrap().join(&gpu).unwrap().expected.unwrap();
+        let [before, after] =
+            [None, Some(method)].map(|filter| metrics::relmse(&rendered(&gpu, &noisy, filter), &reference));
+        println!("{file}, {spp} samples: {told:?}, truth {before:.2e} and {after:.2e}");
+        for (told, truth) in [(told.before, before), (told.after, after)] {
+            assert!((0.25..4.0).contains(&(told / truth)), "{file}, {spp} samples: {told} told, {truth} true");
+        }
+    }
+}

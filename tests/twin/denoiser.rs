@@ -277,24 +277,27 @@ fn expected_errors_agree_with_their_twin() {
 }
 
 /// Four pixels of light 2 over albedo 1/2: 1. Half of the variance .04 that their samples tell of the light is noise, .02 / 4 of the
-/// colour; a hundredth of the square is the error that is left. Direct light adds .1 of variance where it varies around by more.
+/// colour; a hundredth of the square is the error that is left. Direct light adds .1 of variance where it varies around by more. Filtered light of
+/// 2.4 is .2 of colour off, and Stein's estimate takes half of the noise from its square where a quarter of a pixel is kept.
 #[test]
 fn expected_errors_solve_the_worked_example() {
-    let row = |sharp: [f32; 4], sharp_variance: f32| {
+    let row = |sharp: [f32; 4], sharp_variance: f32, filtered: f32| {
         let mut input = picture::Picture::new(4, 1).flat().input;
         input.radiance.fill([2.0, 2.0, 2.0, 4.0]);
         input.variance = Some(vec![[0.04; 3]; 4]);
         let sharp = sharp.map(|v| [v; 3]).to_vec();
         let parts =
             Parts { input, sharp, factor: vec![[0.5; 3]; 4], sharp_variance: vec![sharp_variance; 4], direct: None };
-        expected::reference(&parts, &[[2.0, 2.0, 2.0, 4.0]; 4], &[[0.01, 0.5]; 4]).unwrap()
+        expected::reference(&parts, &[[filtered, filtered, filtered, 4.0]; 4], &[[0.01, 0.5, 0.25]; 4]).unwrap()
     };
     let near = |a: f64, b: f64| (a - b).abs() < 1e-5;
-    let plain = row([0.0; 4], 0.1);
+    let plain = row([0.0; 4], 0.1, 2.0);
     assert!(near(plain.before, 0.005 / 1.01) && near(plain.after, 0.01 / 1.01), "{plain:?}");
-    let varied = row([0.0, 2.0, 0.0, 2.0], 0.1);
+    let varied = row([0.0, 2.0, 0.0, 2.0], 0.1, 2.0);
     let over = (1.0 / 1.01 + 1.0 / 9.01) / 2.0;
     assert!(near(varied.before, 0.055 * over) && near(varied.after, 0.06 * over), "{varied:?}");
+    let off = row([0.0; 4], 0.1, 2.4);
+    assert!(near(off.after, (0.04 - 0.5 * 0.005) / 1.45), "{off:?}");
 }
 
 #[test]

@@ -36,7 +36,7 @@ pub use wavelet::{WaveletBasis, WaveletOverrides, WaveletSettings};
 
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, FrameResources, Gpu, Location, PassTime, Recorder};
-use crate::layout::{Guide, PixelLight, vec2, vec3, vec4};
+use crate::layout::{Guide, PixelLight, vec3, vec4};
 
 /// Every filter of our own, in the order of `--help`; the twin and stability tests run each row.
 pub const FILTERS: &[&Row] =
@@ -96,7 +96,7 @@ impl Filter for Fitted {
         self.filter.record(rec, planes)
     }
 
-    fn expected(&self) -> Option<&Buffer<vec2>> {
+    fn expected(&self) -> Option<&Buffer<vec3>> {
         self.filter.expected()
     }
 }
@@ -111,7 +111,7 @@ pub trait Filter: Send + Sync {
 
     /// Where the filter estimates its own error, what its last run left there: of each pixel the mean squared error of what came
     /// out over its square, and the share of the variance of its samples that is noise.
-    fn expected(&self) -> Option<&Buffer<vec2>> {
+    fn expected(&self) -> Option<&Buffer<vec3>> {
         None
     }
 }

@@ -22,7 +22,7 @@ pub const ROW: Row = Row {
     about: "per pixel the best blend of none, guided by wide, middle and narrow windows, and svgf, by estimated error",
     // The pack's, those of four candidates twice, of the estimate, three inputs, the dim one, leverages and their surroundings,
     // expected errors.
-    bytes: super::pack::BYTES + (4 * 2 + 1 + 3 + 1 + 2) * 16 + 8 + 3 * guided::ROW.bytes + svgf::ROW.bytes,
+    bytes: super::pack::BYTES + (4 * 2 + 1 + 3 + 1 + 2) * 16 + 12 + 3 * guided::ROW.bytes + svgf::ROW.bytes,
     make: |gpu, settings, size| Ok(Box::new(Auto::new(gpu, settings, size)?)),
     reference: reference::reference,
 };
@@ -136,7 +136,7 @@ struct Auto {
     /// The same, smoothed.
     surroundings: Buffer<vec4>,
     /// See [`Filter::expected`].
-    expected: Buffer<vec2>,
+    expected: Buffer<vec3>,
     settings: FilterSettings,
 }
 
@@ -273,14 +273,19 @@ impl Auto {
         })
     }
 
-    /// The blend, which lies where leverages were, and what it has lost -> output\[P\]
+    /// The blend lies where errors were smoothed.
+    fn blended(&self) -> &Buffer<vec4> {
+        &self.candidates[0].kept
+    }
+
+    /// The blend, and what it has lost -> output\[P\]
     fn record_residual(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
         let bind = auto_residual::Bind {
             colour: &self.pack.colour,
             place: &self.pack.place,
             estimate: &self.estimate.plane,
             others: &self.planes[2],
-            blend: &self.leverages,
+            blend: self.blended(),
             filtered: &planes.output,
         };
         let rates = Rates::of_surfaces(&self.settings.edge).as_array();
@@ -313,7 +318,8 @@ impl Filter for Auto {
             svgf,
             variance: planes.variance.as_ref().unwrap_or(&self.nothing),
             surroundings: &self.surroundings,
-            blend: &self.leverages,
+            leverages: &self.leverages,
+            blend: self.blended(),
             expected: &self.expected,
         };
         let count = planes.pixels();
@@ -323,7 +329,7 @@ impl Filter for Auto {
         self.record_residual(rec, planes)
     }
 
-    fn expected(&self) -> Option<&Buffer<vec2>> {
+    fn expected(&self) -> Option<&Buffer<vec3>> {
         Some(&self.expected)
     }
 }

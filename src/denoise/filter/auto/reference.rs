@@ -4,7 +4,7 @@ use crate::denoise::filter::edge::{Rates, edge_weight};
 use crate::denoise::filter::noise_estimate::{self, ENOUGH, contrast};
 use crate::denoise::filter::pack::Packed;
 use crate::denoise::filter::{FilterInput, FilterSettings};
-use crate::layout::{vec2, vec4};
+use crate::layout::{vec3, vec4};
 use crate::math::hash::pcg;
 use crate::math::srgb::luminance;
 use crate::shaders::auto::{ENOUGH_FOR_SVGF, LEAST, RIDGE, ROUNDS};
@@ -95,7 +95,7 @@ pub fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
 }
 
 /// Also what [`Filter::expected`](super::super::Filter::expected) holds.
-pub fn estimated(input: &FilterInput, settings: &FilterSettings) -> (Vec<vec4>, Vec<vec2>) {
+pub fn estimated(input: &FilterInput, settings: &FilterSettings) -> (Vec<vec4>, Vec<vec3>) {
     let (image, floor) = (Packed::reference(input), floor(settings));
     let noise = noise_estimate::reference(input, &image, &settings.edge);
     let results = Results::new(input, &image, settings);
@@ -134,7 +134,8 @@ pub fn estimated(input: &FilterInput, settings: &FilterSettings) -> (Vec<vec4>, 
     let weights: Vec<_> = (0..image.len()).map(weights).collect();
     let blended = |i: usize| blend(&image[i], weights[i], results.blended(i));
     let blend: Vec<Vec4> = (0..image.len()).map(|i| blended(i).into()).collect();
-    let expected = |i: usize| expected(relative(i), &weights[i].1, surroundings[i], shares_of_noise[i]);
+    let expected =
+        |i: usize| expected(relative(i), &weights[i].1, [results.leverages[i], surroundings[i]], shares_of_noise[i]);
     let expected = (0..image.len()).map(expected).collect();
     let own: Vec<Option<f32>> = (0..image.len()).map(|i| own_variance(input, i, image[i].count)).collect();
     let residual = |i: usize| Residual {
@@ -316,14 +317,15 @@ fn matrix([squares, products, others]: [Vec4; 3]) -> Errors {
     ]
 }
 
-/// The blend's mean squared error over its squared luminance, and the share of the samples' variance that is noise.
-fn expected(relative: [Vec4; 3], w: &[f32; BLENDED], leverages: Vec4, share: f32) -> vec2 {
+/// The blend's mean squared error over its squared luminance, the share of the samples' variance that is noise, its leverage.
+fn expected(relative: [Vec4; 3], w: &[f32; BLENDED], [own, around]: [Vec4; 2], share: f32) -> vec3 {
     let (missed, told) = (matrix(relative), 0.5 * relative[2].z);
     let noise = missed[0][1];
     let products = (0..BLENDED).flat_map(|j| (0..BLENDED).map(move |k| (j, k)));
     let square: f32 = products.map(|(j, k)| w[j] * w[k] * missed[j][k]).sum();
-    let kept = w[0] + Vec4::from_slice(&w[1..]).dot(leverages);
-    [(square - noise).max(kept.clamp(0.0, 1.0) * noise), if told > 0.0 { noise / told * share } else { 1.0 }]
+    let kept = |leverages: Vec4| (w[0] + Vec4::from_slice(&w[1..]).dot(leverages)).clamp(0.0, 1.0);
+    let error = (square - noise).max(kept(around) * noise);
+    [error, if told > 0.0 { noise / told * share } else { 1.0 }, kept(own.max(around).clamp(Vec4::ZERO, Vec4::ONE))]
 }
 
 fn smooth(
