@@ -5,6 +5,7 @@ use crate::poses::{MOMENTS, Moment, at, pose};
 use crate::support::{assert_silent, gpu};
 use glam::Vec3;
 use std::path::Path;
+use tallow::gpu::Gpu;
 use tallow::layout::{Camera, FrameConstants, Guide, LightChange, PixelLight, PixelStats, ReprojectPush, SurfacePoint};
 use tallow::math::hash::pcg;
 use tallow::render::pass::light_change::SPACINGS;
@@ -137,8 +138,8 @@ fn both_where_all_moves(
     let begun: Vec<_> = film.stats().into_iter().zip(film.light()).collect();
     let found = film.renderer.history().unwrap().light_change().read().unwrap();
     let alike = |(a, b): &(&LightChange, &LightChange)| {
-        // One path in 81 that rounding leads elsewhere shifts the errors of all cells around it.
-        a.count == b.count && (a.change - b.change).abs() <= 0.05 + 0.1 * b.change
+        // A path that rounding leads elsewhere shifts the changes of all cells around it.
+        a.count == b.count && (a.change - b.change).abs() <= 0.003 + 0.01 * b.change
     };
     let cells = found.iter().zip(&changes).filter(alike).count();
     // Rounding of one path may be in the errors of all cells around: from here on those of the kernels count.
@@ -155,30 +156,36 @@ fn both_where_all_moves(
 #[test]
 fn kernels_agree_with_their_twin_where_all_moves() {
     let gpu = gpu();
-    let settings = Reproject { reproject_error: 0.1, ..Reproject::default() };
+    // Where changed light drops most of what has moved, nothing tells whether it moved as it should: the second time it stays.
+    let (lit, _) = agree_where_all_moves(&gpu, Reproject { reproject_error: 0.1, ..Reproject::default() });
+    let (_, carried) = agree_where_all_moves(&gpu, Reproject { reproject_light: 1e9, ..Reproject::default() });
+    assert!(lit > 1000 && carried > 3000, "control: {lit} pixels' light has changed, {carried} are carried");
+    assert_silent(&gpu);
+}
+
+/// Returns how many pixels lost their samples to changed light, and how many began with some.
+fn agree_where_all_moves(gpu: &Gpu, settings: Reproject) -> (u64, u64) {
     let mut scene = at(&Moment::default()).with(|s| (s.width, s.height) = (65, 33));
-    let mut film = Film::moving(&gpu, &scene, settings);
+    let mut film = Film::moving(gpu, &scene, settings);
     film.frame(film.camera);
     let cells = 17 * 9;
-    let (mut lit, mut carried) = (0, 0);
+    let (mut lit, mut carried, mut all_alike) = (0, 0, 0);
     for (k, moment) in MOMENTS.iter().enumerate() {
         // Every other time hierarchies are built anew.
-        let pose = pose(
-            &scene,
-            &Moment { light: 1.0 + 0.02 * k as f32, ..*moment },
-            if k % 2 == 0 { 0.0 } else { f32::INFINITY },
-        );
+        let rebuild_above = if k % 2 == 0 { 0.0 } else { f32::INFINITY };
+        let pose = pose(&scene, &Moment { light: 1.0 + 0.02 * k as f32, ..*moment }, rebuild_above);
         let camera = shifted(film.camera, [0.01, 0.0, 0.02]);
         let (begun, alike) = both_where_all_moves(&mut film, &mut scene, settings, &pose, camera);
         let (n, agree) = (begun[0].0.len(), agreeing(&begun));
-        assert!(agree * 20 >= n * 19, "{moment:?}: {agree} of {n}");
-        assert!(alike * 5 >= cells * 4, "{moment:?}: {alike} of {cells} cells");
+        assert!(agree * 100 >= n * 99, "{moment:?}: {agree} of {n}");
+        all_alike += alike;
         let found = Carriage::of(&film.offered(), &film.carried());
         (lit, carried) = (lit + found.light, carried + found.carried);
         film.renderer.steps().skip(1).for_each(|step| film.step(&step));
     }
-    assert!(lit > 1000 && carried > 1000, "control: {lit} pixels' light has changed, {carried} are carried");
-    assert_silent(&gpu);
+    let all = cells * MOMENTS.len();
+    assert!(all_alike * 5 >= all * 4, "{all_alike} of {all} cells");
+    (lit, carried)
 }
 
 #[test]
