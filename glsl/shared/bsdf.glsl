@@ -1,6 +1,6 @@
 // Scattering at a surface point. Local frame: z = shading normal on the front side. `wo` points to the camera, `wi` to the
 // light; both leave the surface. Radiance is transported: refraction scales it by 1 / eta^2.
-// Needs effects.glsl and the binding `texels`, which holds the tables of rough coats.
+// Needs effects.glsl and the binding `texels`, which holds the tables of rough coats and metallic microfacets.
 #ifndef BSDF_GLSL
 #define BSDF_GLSL
 #include "shared/warp.glsl"
@@ -115,28 +115,25 @@ float coat_probability(Bsdf b, float f) {
     return specular / max(specular + (1.0 - f) * mean3(b.albedo), 1e-10);
 }
 
-// Interpolates the coat's table, see COAT_ROWS. `column` may lie between two columns of cosines. Twin: src/twins/coat.rs.
+// Interpolates the coat's table. `column` may lie between two columns of cosines. Twin: src/twins/coat.rs.
 float coat_entry(Bsdf b, float column) {
-    float row = b.coat_row;
-    int i = min(int(row), int(COAT_ROWS) - 2), j = min(int(column), int(COAT_COLUMNS) - 2);
-    int at = int(b.coat_table) + i * int(COAT_COLUMNS) + j;
-    uvec4 words = uvec4(texelFetch(texels, at).x, texelFetch(texels, at + 1).x, texelFetch(texels, at + int(COAT_COLUMNS)).x,
-                        texelFetch(texels, at + int(COAT_COLUMNS) + 1).x);
-    vec4 corners = uintBitsToFloat(words);
-    vec2 along = mix(corners.xy, corners.zw, row - float(i));
-    return mix(along.x, along.y, column - float(j));
+    TableCell cell = table_cell(b.coat_table, b.coat_row, column);
+    vec4 corners = uintBitsToFloat(cell.words);
+    vec2 along = mix(corners.xy, corners.zw, cell.within.y);
+    return mix(along.x, along.y, cell.within.x);
 }
 
 // The share of light at cosine `c` that the coat does not let in.
 float coat_outside(Bsdf b, float c) {
     if (is_smooth(b)) return fresnel_dielectric(c, b.eta.x).x;
-    return coat_entry(b, sqrt(clamp(c, 0.0, 1.0)) * float(COAT_COLUMNS - 2u));
+    return coat_entry(b, table_column(c));
 }
 
 // Must be called before a material is evaluated or sampled.
 void bsdf_view(inout Bsdf b, vec3 wo) {
+    if (is_kind(FX_METALLIC, b, BSDF_METALLIC)) metallic_view(b.metallic, wo.z);
     if (!is_kind(FX_COATED, b, BSDF_COATED)) return;
-    b.coat_row = (log2(max(b.alpha, SMOOTH_ALPHA)) * (1.0 / 6.643856189774724) + 1.0) * float(COAT_ROWS - 1u);
+    b.coat_row = table_row(b.alpha);
     b.coat_outside = coat_outside(b, wo.z);
     b.coat_inside = is_smooth(b) ? b.internal_fresnel : coat_entry(b, float(COAT_COLUMNS - 1u));
 }

@@ -1,10 +1,12 @@
 // The material of glTF 2.0, appendix B, with its extensions for specular reflection, thin transmission and a clear coat: a mixture
 // of a metal and of a dielectric above a base, which is diffuse or lets light through. Local frame and conventions: see bsdf.glsl.
 // Fresnel reflectances are Schlick's, F(c) = f0 + (f90 - f0) (1 - c)^5 at the cosine c; microfacets are GGX.
+// Needs the binding `texels`, which holds the table of what they reflect.
 #ifndef METALLIC_GLSL
 #define METALLIC_GLSL
 #include "shared/warp.glsl"
 #include "shared/microfacet.glsl"
+#include "shared/coat_table.glsl"
 
 struct Metallic {
     vec3 diffuse;    // base colour of the share that is neither metal nor transparent
@@ -16,6 +18,10 @@ struct Metallic {
     float coat;      // strength of the clear coat
     float coat_alpha;
     vec3 coat_normal; // in the local frame, above the horizon of the viewer
+    uint table;       // of what rough microfacets reflect, among the texels
+    // metallic_view computes these once:
+    vec2 reflected;    // by the microfacets, of light along the viewer: see metallic_reflected
+    float mean_let_in; // of light from everywhere
 };
 
 const float COAT_F0 = 0.04; // reflectance head on of a clear coat, of index 1.5
@@ -29,14 +35,10 @@ float schlick_weight(float c) {
     return x * x * x * x * x;
 }
 
-// Share of light at the cosine `c` that the dielectric lets in, at most: of all channels alike, so that it keeps its colour.
-float let_in(Metallic b, float c) {
+// Share of light at the cosine `c` that a microfacet of the dielectric refracts, at most: of all channels alike, so that it keeps
+// its colour.
+float refracted(Metallic b, float c) {
     return 1.0 - mix(b.dielectric.x, b.dielectric.y, schlick_weight(c));
-}
-
-// The same for the clear coat.
-float coat_lets_in(Metallic b, float c) {
-    return 1.0 - b.coat * mix(COAT_F0, 1.0, schlick_weight(c));
 }
 
 // Cosine at which the clear coat sees a direction.
@@ -48,11 +50,37 @@ bool smooth_alpha(float alpha) {
     return FX_SMOOTH && (!FX_ROUGH || alpha < SMOOTH_ALPHA);
 }
 
+vec2 microfacet_entry(uint table, float alpha, float column) {
+    TableCell cell = table_cell(table, table_row(alpha), column);
+    vec2 left = mix(unpackUnorm2x16(cell.words.x), unpackUnorm2x16(cell.words.z), cell.within.y);
+    vec2 right = mix(unpackUnorm2x16(cell.words.y), unpackUnorm2x16(cell.words.w), cell.within.y);
+    return mix(left, right, cell.within.x);
+}
+
+// Share of light at the cosine `c` that microfacets reflect above the horizon: x where F is 1 head on and 0 at grazing angles, y
+// where it is 0 and 1. All of them reflect f0 x + f90 y.
+vec2 metallic_reflected(uint table, float alpha, float c) {
+    float grazing = schlick_weight(c);
+    if (smooth_alpha(alpha)) return vec2(1.0 - grazing, grazing);
+    return microfacet_entry(table, alpha, table_column(c));
+}
+
+// Share of light at the cosine `c` that the microfacets of the dielectric let in.
+float let_in(Metallic b, float c) {
+    return 1.0 - dot(b.dielectric, metallic_reflected(b.table, b.alpha, c));
+}
+
+// The same for the clear coat.
+float coat_lets_in(Metallic b, float c) {
+    return 1.0 - b.coat * dot(vec2(COAT_F0, 1.0), metallic_reflected(b.table, b.coat_alpha, c));
+}
+
 bool has_coat(Metallic b) {
     return FX_CLEARCOAT && b.coat > 0.0;
 }
 
-Metallic metallic_layers(vec3 base, float metallic, vec3 f0, float f90, float transmission, float alpha, float coat, float coat_alpha) {
+Metallic metallic_layers(vec3 base, float metallic, vec3 f0, float f90, float transmission, float alpha, float coat, float coat_alpha,
+                         uint table) {
     Metallic b;
     b.diffuse = base * (1.0 - metallic);
     b.through = vec3(0.0);
@@ -68,15 +96,26 @@ Metallic metallic_layers(vec3 base, float metallic, vec3 f0, float f90, float tr
     b.coat = coat;
     b.coat_alpha = coat_alpha;
     b.coat_normal = vec3(0.0, 0.0, 1.0);
+    b.table = table;
+    b.reflected = vec2(0.0);
+    b.mean_let_in = 1.0;
     return b;
+}
+
+// Must be called before the material is evaluated or sampled. The mean over a diffuse hemisphere of F(c) of a smooth interface is
+// f0 + (f90 - f0) 2 Int c (1 - c)^5 dc = f0 + (f90 - f0) / 21.
+void metallic_view(inout Metallic b, float cosine) {
+    b.reflected = metallic_reflected(b.table, b.alpha, cosine);
+    vec2 means = vec2(20.0, 1.0) / 21.0;
+    if (!smooth_alpha(b.alpha)) means = microfacet_entry(b.table, b.alpha, float(COAT_COLUMNS - 1u));
+    b.mean_let_in = 1.0 - dot(b.dielectric, means);
 }
 
 // Probabilities of the lobes, about in proportion to what they reflect: the coat's, the specular one, the diffuse one, and the one
 // through a thin wall. All 0 where the material is black.
 vec4 metallic_odds(Metallic b, vec3 wo) {
-    float c = wo.z;
-    float inner = has_coat(b) ? coat_lets_in(b, coat_cosine(b, wo)) : 1.0, base = inner * let_in(b, c);
-    vec3 f = mix(b.f0, vec3(b.f90), schlick_weight(c));
+    float inner = has_coat(b) ? coat_lets_in(b, coat_cosine(b, wo)) : 1.0, base = inner * (1.0 - dot(b.dielectric, b.reflected));
+    vec3 f = b.f0 * b.reflected.x + b.f90 * b.reflected.y;
     vec4 odds = vec4(1.0 - inner, inner * (dot(f, vec3(1.0 / 3.0)) + LEAST_ODDS * b.f90), base * dot(b.diffuse, vec3(1.0 / 3.0)),
                      base * dot(b.through, vec3(1.0 / 3.0)));
     return odds / max(odds.x + odds.y + odds.z + odds.w, 1e-10);
@@ -95,11 +134,9 @@ vec3 metallic_lobe(vec3 wo, vec3 wi, float alpha) {
 // rgb = f |cos wi|, w = density with which metallic_sample picks wi; both are above the horizon, or wi lies beyond a thin wall.
 // The diffuse base is what appendix B calls fresnel_mix, but for its factor 1 - F at the half vector: with it, and a reflection
 // of F(wo.z) at grazing angles, a white dielectric would give back up to 1.7 times the light that it gets. Here light passes the
-// interface on its way in and out (Ashikhmin and Shirley 2000), scaled so that the base gives back what it is let: its
-// share of a white furnace is 1 - F(wo.z), since the mean of let_in over a diffuse hemisphere is
-// 1 - f0 - (f90 - f0) 2 Int c (1 - c)^5 dc = 1 - f0 - (f90 - f0) / 21. Microfacets reflect F(wo.z) where they are smooth, and where
-// rough at most 0.002 more for f0 up to 0.08: single scattering loses more than Schlick's curve gains by its curvature. The clear
-// coat takes its share on the way in and out, unscaled, since what is below it may reflect light into any direction.
+// microfacets on its way in and out (Ashikhmin and Shirley 2000, with the albedo of rough microfacets in place of F), scaled by the
+// mean of let_in so that the base gives back what it is let: in a white furnace a white dielectric neither loses nor gains. The
+// clear coat takes its share on the way in and out, unscaled, since what is below it may reflect light into any direction.
 vec4 metallic_evaluate(Metallic b, vec3 wo, vec3 wi) {
     bool beyond = wi.z < 0.0;
     if (beyond && !FX_THIN) return vec4(0.0);
@@ -107,12 +144,12 @@ vec4 metallic_evaluate(Metallic b, vec3 wo, vec3 wi) {
     vec4 odds = metallic_odds(b, wo);
     vec4 value = vec4(0.0);
     if (!beyond) {
-        float mean = 1.0 - b.dielectric.x - (b.dielectric.y - b.dielectric.x) * (1.0 / 21.0);
-        value = vec4(b.diffuse * (let_in(b, wo.z) * let_in(b, wi.z) / max(mean, 1e-3)), odds.z) * (wi.z * INV_PI);
+        float inside = 1.0 - dot(b.dielectric, b.reflected);
+        value = vec4(b.diffuse * (inside * let_in(b, wi.z) / max(b.mean_let_in, 1e-3)), odds.z) * (wi.z * INV_PI);
     }
     if (!smooth_alpha(b.alpha)) {
         vec3 lobe = metallic_lobe(wo, wi, b.alpha);
-        vec3 f = beyond ? b.through * let_in(b, lobe.z) : mix(b.f0, vec3(b.f90), schlick_weight(lobe.z));
+        vec3 f = beyond ? b.through * refracted(b, lobe.z) : mix(b.f0, vec3(b.f90), schlick_weight(lobe.z));
         value += vec4(f * lobe.x, (beyond ? odds.w : odds.y) * lobe.y);
     }
     if (!has_coat(b)) return value;
@@ -125,7 +162,7 @@ vec4 metallic_evaluate(Metallic b, vec3 wo, vec3 wi) {
         if (min(wo.z, wi.z) <= 1e-9) return value;
     }
     vec3 lobe = metallic_lobe(wo, wi, b.coat_alpha);
-    return value + vec4(vec3((1.0 - coat_lets_in(b, lobe.z)) * lobe.x), odds.x * lobe.y);
+    return value + vec4(vec3(b.coat * mix(COAT_F0, 1.0, schlick_weight(lobe.z)) * lobe.x), odds.x * lobe.y);
 }
 
 // Samples a direction. Returns false where the light is absorbed. A smooth lobe is a delta: then `weight` is its own, else it and
@@ -157,7 +194,7 @@ bool metallic_sample(Metallic b, vec3 wo, float u_lobe, vec2 u, out vec3 wi, out
         if (has_coat(b)) outer = coat_lets_in(b, coat_cosine(b, wi));
     }
     if (coat) weight = vec3((1.0 - inner) / odds.x);
-    else weight = (through ? b.through * let_in(b, wo.z) : mix(b.f0, vec3(b.f90), schlick_weight(wo.z))) *
+    else weight = (through ? b.through * refracted(b, wo.z) : mix(b.f0, vec3(b.f90), schlick_weight(wo.z))) *
                   (inner * outer / max(through ? odds.w : odds.y, 1e-10));
     wi.z = through ? -wi.z : wi.z;
     return above;
@@ -166,7 +203,8 @@ bool metallic_sample(Metallic b, vec3 wo, float u_lobe, vec2 u, out vec3 wi, out
 // Approximate reflectance at the cosine `c`.
 vec3 metallic_albedo(Metallic b, float c) {
     float inner = has_coat(b) ? coat_lets_in(b, c) : 1.0;
-    vec3 albedo = (b.diffuse + b.through) * let_in(b, c) + mix(b.f0, vec3(b.f90), schlick_weight(c));
+    vec2 reflected = metallic_reflected(b.table, b.alpha, c);
+    vec3 albedo = (b.diffuse + b.through) * (1.0 - dot(b.dielectric, reflected)) + b.f0 * reflected.x + b.f90 * reflected.y;
     return albedo * inner + 1.0 - inner;
 }
 

@@ -295,7 +295,7 @@ Metallic surface_metallic(Material m, vec3 base, Surface s) {
         coat.y = m.clearcoat_alpha * r * r;
     }
     return metallic_layers(base, m.metallic * factors.b, f0, scaled(m.specular_factor, m.specular_factor_texture, s), through,
-                           m.alpha * factors.g * factors.g, coat.x, coat.y);
+                           m.alpha * factors.g * factors.g, coat.x, coat.y, m.coat_table);
 }
 
 // The material with its textures looked up. The compiler drops fetches for effects that the scene does not have.

@@ -18,7 +18,7 @@ void main() {
     Bsdf b = Bsdf(m.kind, m.base_color, m.alpha, 1.0 + m.anisotropy, m.eta, m.k, m.specular, m.transmission, m.internal_fresnel, m.coat_table,
                   (m.flags & MATERIAL_NONLINEAR) != 0u, (m.flags & MATERIAL_GGX) != 0u,
                   metallic_layers(m.base_color, m.metallic, m.specular, m.specular_factor, m.transmission_factor, m.alpha,
-                                  m.clearcoat, m.clearcoat_alpha), 0.0, 0.0, 0.0);
+                                  m.clearcoat, m.clearcoat_alpha, m.coat_table), 0.0, 0.0, 0.0);
     vec3 wo = inputs[4 * i];
     bsdf_view(b, wo);
     vec3 u = inputs[4 * i + 2];

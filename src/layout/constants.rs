@@ -48,9 +48,9 @@ constants! {
     PIXEL_FILTER_GAUSSIAN: uint = 2;
     /// [`PathConstants::pixel_filter`]: the pixel's centre.
     PIXEL_FILTER_POINT: uint = 3;
-    /// Rows of the table of a rough coat, one for each roughness ([`crate::scene::coat_table`]).
+    /// Rows of the table of a rough coat or of metallic microfacets, one for each roughness ([`crate::scene::coat_table`]).
     COAT_ROWS: uint = 32;
-    /// Numbers in a row: reflectances at [`COAT_COLUMNS`] - 1 cosines, and the mean reflectance from inside.
+    /// Numbers in a row: reflectances at [`COAT_COLUMNS`] - 1 cosines, and a mean for diffuse light, which a coat gets from inside.
     COAT_COLUMNS: uint = 49;
     /// [`Texture::flags`]: RGB is stored with the sRGB curve and decoded when read.
     TEXTURE_SRGB: uint = 1;

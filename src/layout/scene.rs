@@ -159,7 +159,7 @@ gpu_structs! {
         internal_fresnel: float,
         /// One of the BSDF_ constants.
         kind: uint,
-        /// Index of the first word of a coat's table among the texels (coated, where rough); else zero.
+        /// Index of the first word of its table among the texels (coated and metallic, where rough); else zero.
         coat_table: uint,
         /// Share of metal (metallic, as the fields that follow).
         metallic: float,

@@ -2,11 +2,12 @@
 //! edit the arrays.
 use super::build::attributes::words_of;
 use super::build::bvh;
+use super::build::coat::reads_table;
 use super::{Environment, Scene};
 use crate::error::{Error, Result};
 use crate::layout::{
-    AliasEntry, BSDF_COATED, BSDF_METALLIC, BvhNode, COAT_COLUMNS, COAT_ROWS, Camera, LIGHT_SPHERE, LIGHT_TRIANGLE,
-    Light, Material, NONE, SMOOTH_ALPHA, SPHERE, Shading, TRAVERSAL_STACK, Texture, Triangle,
+    AliasEntry, BSDF_METALLIC, BvhNode, COAT_COLUMNS, COAT_ROWS, Camera, LIGHT_SPHERE, LIGHT_TRIANGLE,
+    Light, Material, NONE, SPHERE, Shading, TRAVERSAL_STACK, Texture, Triangle,
 };
 use glam::Vec3;
 
@@ -139,11 +140,10 @@ impl Scene {
             below_or_none("map", "texture", all, maps).map_err(|what| format!("material {index}: {what}"))?;
         }
         let texels = self.texels.len() as u64;
-        let coat = u64::from(COAT_ROWS * COAT_COLUMNS);
-        let lacks_table = |m: &Material| m.kind == BSDF_COATED && u64::from(m.coat_table) + coat > texels;
-        let rough = |m: &Material| m.alpha >= SMOOTH_ALPHA;
-        if let Some(index) = self.materials.iter().position(|m| rough(m) && lacks_table(m)) {
-            return Err(format!("material {index}: its coat's table ends beyond the {texels} texels"));
+        let table = u64::from(COAT_ROWS * COAT_COLUMNS);
+        let lacks_table = |m: &Material| reads_table(m) && u64::from(m.coat_table) + table > texels;
+        if let Some(index) = self.materials.iter().position(lacks_table) {
+            return Err(format!("material {index}: its table of reflectance ends beyond the {texels} texels"));
         }
         let past = |t: &Texture| {
             let end = u64::from(t.first).checked_add(u64::from(t.width) * u64::from(t.height));

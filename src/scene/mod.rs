@@ -32,7 +32,7 @@ mod relit;
 mod rig;
 
 pub use build::attributes::words_of as attribute_words;
-pub use build::coat::{CoatRow, coat_table};
+pub use build::coat::{CoatRow, coat_table, microfacet_table};
 pub use build::fresnel::mean_internal as mean_internal_fresnel;
 pub use change::{Change, Deformed};
 pub use check::check_camera;
@@ -73,7 +73,7 @@ pub struct Scene {
     /// Pictures that materials name; may be empty.
     pub textures: Vec<Texture>,
     /// RGBA8 texels of all textures, R in the low byte; after them the words of vertices' colours, second coordinates and tangents
-    /// ([`Shading::attributes`]), and the tables of rough coats, words of floats.
+    /// ([`Shading::attributes`]), and the tables of rough coats, words of floats, and of metallic microfacets.
     pub texels: Vec<u32>,
     /// Lights; without any, paths see only the emission that they hit.
     pub lights: Vec<Light>,

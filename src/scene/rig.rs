@@ -1,10 +1,11 @@
 //! What can move in a scene: what is kept of its description so that a [`Pose`](super::Pose) finds it.
 use super::Scene;
 use super::build::bvh::Bounds;
+use super::build::coat::reads_table;
 use super::build::soft::Soft;
 use super::description::Description;
 use super::fingerprint::Fingerprint;
-use crate::layout::{BSDF_COATED, Instance, Light, Material, NONE, SMOOTH_ALPHA};
+use crate::layout::{Instance, Light, Material, NONE};
 use glam::DAffine3;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
@@ -119,8 +120,7 @@ impl Rig {
 
     /// Notes what the description calls its parts.
     pub(in crate::scene) fn name(&mut self, from: &Description, materials: &[Material]) {
-        let tabled = |m: &Material| m.kind == BSDF_COATED && m.alpha >= SMOOTH_ALPHA;
-        self.tabled = (0..).zip(materials).filter(|(_, m)| tabled(m)).map(|(i, _)| i).collect();
+        self.tabled = (0..).zip(materials).filter(|(_, m)| reads_table(m)).map(|(i, _)| i).collect();
         let named = |(i, name): (usize, &Option<String>)| Some((name.clone()?, i));
         // Of several things of one name the first has it.
         self.placements.extend(from.instance.iter().map(|i| &i.name).enumerate().rev().filter_map(named));

@@ -1,8 +1,9 @@
-//! Twin of the functions of `glsl/shared/bsdf.glsl` that read the table of a rough coat, which
-//! [`coat_table`](crate::scene::coat_table) computes.
+//! Twin of `glsl/shared/coat_table.glsl` and of what reads it: the tables of rough coats, which
+//! [`coat_table`](crate::scene::coat_table) computes, and of metallic microfacets, those of [`microfacet_table`].
 use crate::layout::SMOOTH_ALPHA;
 use crate::layout::{COAT_COLUMNS, COAT_ROWS};
-use crate::scene::CoatRow;
+use crate::scene::{CoatRow, microfacet_table};
+use glam::{Vec2, vec2};
 
 const ROWS: usize = COAT_ROWS as usize;
 const COLUMNS: usize = COAT_COLUMNS as usize;
@@ -12,7 +13,7 @@ pub fn coat_row_at(table: &[u32], alpha: f32) -> CoatRow {
     if table.len() < ROWS * COLUMNS {
         return [0.0; COLUMNS];
     }
-    let (row, f) = place((alpha.max(SMOOTH_ALPHA).ln() / -SMOOTH_ALPHA.ln() + 1.0) * (ROWS - 1) as f32, ROWS);
+    let (row, f) = place(row_of(alpha), ROWS);
     let at = |row: usize, column: usize| f32::from_bits(table[row * COLUMNS + column]);
     std::array::from_fn(|column| mix(at(row, column), at(row + 1, column), f))
 }
@@ -26,6 +27,31 @@ pub fn row_outside(row: &CoatRow, c: f32) -> f32 {
 /// Mean reflectance of a rough coat for diffuse light from inside.
 pub fn row_inside(row: &CoatRow) -> f32 {
     row[COLUMNS - 1]
+}
+
+/// What GGX microfacets of roughness `alpha` reflect at cosine `c`: x where their reflectance is 1 head on and 0 at grazing angles,
+/// y where it is 0 and 1.
+pub fn microfacet_shares(alpha: f32, c: f32) -> Vec2 {
+    microfacet_entry(alpha, c.clamp(0.0, 1.0).sqrt() * (COLUMNS - 2) as f32)
+}
+
+/// The means of [`microfacet_shares`] over a diffuse hemisphere.
+pub fn microfacet_means(alpha: f32) -> Vec2 {
+    microfacet_entry(alpha, (COLUMNS - 1) as f32)
+}
+
+fn microfacet_entry(alpha: f32, column: f32) -> Vec2 {
+    let ((row, f), (column, g)) = (place(row_of(alpha), ROWS), place(column, COLUMNS));
+    let at = |row: usize, column: usize| {
+        let word = microfacet_table()[row * COLUMNS + column];
+        vec2((word & 0xffff) as f32, (word >> 16) as f32) / 65535.0
+    };
+    let along = |column| at(row, column).lerp(at(row + 1, column), f);
+    along(column).lerp(along(column + 1), g)
+}
+
+fn row_of(alpha: f32) -> f32 {
+    (alpha.max(SMOOTH_ALPHA).ln() / -SMOOTH_ALPHA.ln() + 1.0) * (ROWS - 1) as f32
 }
 
 /// The entry before `at`, of `count`, and how far it is to the next.

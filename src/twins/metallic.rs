@@ -3,7 +3,8 @@ use crate::layout::SMOOTH_ALPHA;
 use crate::math::microfacet::{microfacet_area, microfacet_d, microfacet_g1, microfacet_sample};
 use crate::math::warp::{INV_PI, basis_from_normal, warp_cosine_hemisphere};
 use crate::shaders::shared::metallic::{COAT_F0, LEAST_ODDS};
-use glam::{Vec2, Vec3, Vec4, vec3, vec4};
+use crate::twins::coat::{microfacet_means, microfacet_shares};
+use glam::{Vec2, Vec3, Vec4, vec2, vec3, vec4};
 
 /// A metallic-roughness material resolved at the hit.
 #[derive(Clone, Copy, Debug)]
@@ -68,6 +69,12 @@ fn schlick_weight(c: f32) -> f32 {
     (1.0 - c).clamp(0.0, 1.0).powi(5)
 }
 
+/// What microfacets reflect along a cosine, of reflectance 1 head on alone and 1 at grazing angles alone.
+fn reflected(alpha: f32, c: f32) -> Vec2 {
+    let grazing = schlick_weight(c);
+    if smooth(alpha) { vec2(1.0 - grazing, grazing) } else { microfacet_shares(alpha, c) }
+}
+
 /// Reflection by microfacets without its Fresnel factor.
 struct Lobe {
     /// f cos.
@@ -122,13 +129,30 @@ impl Metallic {
         self.f0.lerp(Vec3::splat(self.f90), schlick_weight(c))
     }
 
-    fn let_in(&self, c: f32) -> f32 {
+    /// What all microfacets together reflect.
+    fn reflects(&self, c: f32) -> Vec3 {
+        let shares = reflected(self.alpha, c);
+        self.f0 * shares.x + self.f90 * shares.y
+    }
+
+    /// What a microfacet of the dielectric lets through.
+    fn refracts(&self, c: f32) -> f32 {
         let [f0, f90] = self.dielectric;
         1.0 - (f0 + (f90 - f0) * schlick_weight(c))
     }
 
+    /// What all of them let in.
+    fn let_in(&self, c: f32) -> f32 {
+        1.0 - Vec2::from(self.dielectric).dot(reflected(self.alpha, c))
+    }
+
+    fn mean_let_in(&self) -> f32 {
+        let means = if smooth(self.alpha) { vec2(20.0, 1.0) / 21.0 } else { microfacet_means(self.alpha) };
+        1.0 - Vec2::from(self.dielectric).dot(means)
+    }
+
     fn coat_lets_in(&self, c: f32) -> f32 {
-        1.0 - self.coat * (COAT_F0 + (1.0 - COAT_F0) * schlick_weight(c))
+        1.0 - self.coat * vec2(COAT_F0, 1.0).dot(reflected(self.coat_alpha, c))
     }
 
     /// Probabilities of the coat's lobe, the specular, the diffuse one, and that through a thin wall.
@@ -136,7 +160,7 @@ impl Metallic {
         let (c, mean) = (wo.z, |v: Vec3| v.element_sum() / 3.0);
         let inner = self.coat_lets_in(wo.dot(self.coat_normal));
         let base = inner * self.let_in(c);
-        let specular = inner * (mean(self.fresnel(c)) + LEAST_ODDS * self.f90);
+        let specular = inner * (mean(self.reflects(c)) + LEAST_ODDS * self.f90);
         let odds = vec4(1.0 - inner, specular, base * mean(self.diffuse), base * mean(self.through));
         odds / odds.element_sum().max(1e-10)
     }
@@ -146,15 +170,13 @@ impl Metallic {
         let (beyond, wi) = (wi.z < 0.0, vec3(wi.x, wi.y, wi.z.abs()));
         let (odds, mut value) = (self.odds(wo), Vec4::ZERO);
         if !beyond {
-            let [f0, f90] = self.dielectric;
-            let mean = 1.0 - f0 - (f90 - f0) / 21.0;
-            let passes = self.let_in(wo.z) * self.let_in(wi.z) / mean.max(1e-3);
+            let passes = self.let_in(wo.z) * self.let_in(wi.z) / self.mean_let_in().max(1e-3);
             value = (self.diffuse * passes).extend(odds.z) * (wi.z * INV_PI);
         }
         if !smooth(self.alpha) {
             let lobe = lobe(wo, wi, self.alpha);
             let (f, p) = match beyond {
-                true => (self.through * self.let_in(lobe.cosine), odds.w),
+                true => (self.through * self.refracts(lobe.cosine), odds.w),
                 false => (self.fresnel(lobe.cosine), odds.y),
             };
             value += (f * lobe.value).extend(p * lobe.density);
@@ -170,7 +192,7 @@ impl Metallic {
             return value;
         }
         let lobe = lobe(wo, wi, self.coat_alpha);
-        let reflected = (1.0 - self.coat_lets_in(lobe.cosine)) * lobe.value;
+        let reflected = self.coat * (COAT_F0 + (1.0 - COAT_F0) * schlick_weight(lobe.cosine)) * lobe.value;
         value + Vec3::splat(reflected).extend(odds.x * lobe.density)
     }
 
@@ -180,7 +202,7 @@ impl Metallic {
         let inner = self.coat_lets_in(wo.dot(self.coat_normal));
         let (alpha, weight, beyond) = match u_lobe {
             x if x < odds.x => return self.sample_coat(wo, u, (1.0 - inner) / odds.x),
-            x if x < odds.x + odds.w => (self.alpha, self.through * self.let_in(wo.z) / odds.w.max(1e-10), true),
+            x if x < odds.x + odds.w => (self.alpha, self.through * self.refracts(wo.z) / odds.w.max(1e-10), true),
             x if x < odds.x + odds.w + odds.y => (self.alpha, self.fresnel(wo.z) / odds.y.max(1e-10), false),
             _ => {
                 let wi = warp_cosine_hemisphere(u);
@@ -204,7 +226,7 @@ impl Metallic {
     /// Approximate reflectance at the cosine `c`.
     pub fn albedo(&self, c: f32) -> Vec3 {
         let inner = self.coat_lets_in(c);
-        let albedo = (self.diffuse + self.through) * self.let_in(c) + self.fresnel(c);
+        let albedo = (self.diffuse + self.through) * self.let_in(c) + self.reflects(c);
         albedo * inner + 1.0 - inner
     }
 
@@ -258,7 +280,7 @@ mod tests {
         let wo = vec3(0.6, 0.0, 0.8);
         let s = b.sample(wo, 0.0, Vec2::ZERO);
         assert!(s.scattered && s.delta && (s.wi + wo).length() < 1e-6, "{s:?}");
-        let expected = b.through * b.let_in(0.8) / b.odds(wo).w;
+        let expected = b.through * b.refracts(0.8) / b.odds(wo).w;
         assert!((s.weight - expected).length() < 1e-6);
         assert!(!Metallic::new(&Parameters { alpha: 0.0, ..WHITE }).is_delta(), "a diffuse base");
     }

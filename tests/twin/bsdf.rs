@@ -8,7 +8,7 @@ use tallow::layout::{
     BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE, BSDF_METALLIC, Effects, MATERIAL_GGX,
     MATERIAL_NONLINEAR, Material, TestPush,
 };
-use tallow::scene::{coat_table, mean_internal_fresnel};
+use tallow::scene::{coat_table, mean_internal_fresnel, microfacet_table};
 use tallow::twins::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
 use tallow::twins::sampler::{sample_2d, sample_2d_bits, sampler_start};
 
@@ -26,11 +26,12 @@ fn direction(u: Vec2) -> Vec3 {
 
 const TABLES: usize = 3;
 
-/// Of rough coats, one after another, as a scene's texels hold them. Which coat gets which does not matter here.
+/// Of rough coats, one after another, and of metallic microfacets, as a scene's texels hold them. Which coat gets which does not
+/// matter here.
 fn tables() -> &'static [u32] {
     static WORDS: LazyLock<Vec<u32>> = LazyLock::new(|| {
         let tables: [_; TABLES] = [(1.5, false), (1.8, true), (0.8, true)].map(|(eta, ggx)| coat_table(eta, ggx));
-        tables.concat().into_iter().map(f32::to_bits).collect()
+        tables.concat().into_iter().map(f32::to_bits).chain(microfacet_table().iter().copied()).collect()
     });
     &WORDS
 }
@@ -61,7 +62,7 @@ fn cases(kinds: &[u32], ggx: &[u32]) -> Vec<Case> {
             transmission_factor: if (i / 11).is_multiple_of(2) { 0.0 } else { a.y },
             clearcoat: if (i / 13).is_multiple_of(2) { 0.0 } else { a.x },
             clearcoat_alpha: if (i / 17).is_multiple_of(2) { 0.0 } else { b.x },
-            coat_table: (i % TABLES * tables().len() / TABLES) as u32,
+            coat_table: (if kind == BSDF_METALLIC { TABLES } else { i % TABLES } * microfacet_table().len()) as u32,
             anisotropy: match kind {
                 BSDF_CONDUCTOR | BSDF_DIELECTRIC if i / 19 % 2 == 1 => [-0.7, 1.5][i / 38 % 2],
                 _ => 0.0,

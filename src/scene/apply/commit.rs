@@ -1,5 +1,4 @@
 //! Puts into a scene's arrays what a pose makes of it.
-use super::material::reads_table;
 use super::next::{Next, NextCopies, NextMesh};
 use crate::error::Result;
 use crate::layout::{BvhNode, Instance, Light, Material, Shading};
@@ -52,7 +51,7 @@ pub fn commit(scene: &mut Scene, next: Next, pose: &Pose) -> Result<Change> {
 fn wear(scene: &mut Scene, materials: Vec<Material>, change: &mut Change) {
     scene.materials = materials;
     for index in 0..scene.materials.len() {
-        if reads_table(&scene.materials[index]) && scene.rig.tabled.insert(index as u32) {
+        if coat::reads_table(&scene.materials[index]) && scene.rig.tabled.insert(index as u32) {
             let first = scene.texels.len();
             coat::add_tables(&mut scene.materials[index..=index], &mut scene.texels);
             change.texels.push(first..scene.texels.len());

@@ -1,5 +1,5 @@
 //! New numbers of a material, with the ranges that its table has.
-use crate::layout::{BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, MATERIAL_MASKED, Material, NONE, SMOOTH_ALPHA};
+use crate::layout::{BSDF_CONDUCTOR, BSDF_DIELECTRIC, MATERIAL_MASKED, Material, NONE};
 use crate::scene::load::material::{radiance, reflectance, within};
 use crate::scene::pose::MaterialChange;
 
@@ -35,9 +35,4 @@ pub fn changed(m: &Material, to: &MaterialChange) -> Result<Material, String> {
         m.flags = m.flags & !MATERIAL_MASKED | if masked { MATERIAL_MASKED } else { 0 };
     }
     Ok(m)
-}
-
-/// Whether it reads a table of its coat.
-pub fn reads_table(m: &Material) -> bool {
-    m.kind == BSDF_COATED && m.alpha >= SMOOTH_ALPHA
 }
