@@ -197,7 +197,7 @@ impl<'a> SceneFile<'a> {
         let mut asset = gltf::Model::default();
         let (description, sky) = match (extension.as_str(), Format::of(path)) {
             (_, Format::Gltf) => {
-                asset = gltf::load(path, path.parent().unwrap_or(Path::new("")), clip)?;
+                asset = gltf::load(path, path.parent().unwrap_or(Path::new("")), clip, Vec::new())?;
                 (std::mem::take(&mut asset.description), false)
             }
             ("toml", _) => {

@@ -112,6 +112,52 @@ fn instances_place_all_of_it_and_its_clips_can_be_chosen() {
 }
 
 #[test]
+fn keys_move_nodes_of_a_model_and_what_hangs_on_them() {
+    let folder = folder();
+    let mut json = model();
+    // The lamp hangs on the second node, which has a scale; the first has a clip of its own.
+    json["nodes"][1] = json!({ "name": "arm", "mesh": 1, "children": [2], "scale": [2, 2, 2] });
+    json["scenes"][0]["nodes"] = json!([0, 1]);
+    std::fs::write(folder.path().join("models/fox.gltf"), json.to_string()).unwrap();
+    let keys = |node: &str, to: &str| {
+        let at = |time: u32, what: &str| format!("[[animation.keys]]\ntime = {time}\n{what}\n");
+        format!("[[animation]]\nnode = '{node}'\n{}{}", at(0, "translate = [0, 0, 0]"), at(2, to))
+    };
+    let place = "transform = { translate = [0, 1, 0] }\n";
+    let text = format!("{SCENE}{place}{}", keys("fox/arm", "translate = [0, 10, 0]"));
+    let mut loaded = parse(folder.path(), &text).unwrap();
+    assert_eq!(loaded.animation.end(), 2.0);
+    let pose = loaded.animation.at(1.0).unwrap();
+    loaded.scene.apply(&pose).unwrap();
+    // Keys replace the translation alone; the clip goes on.
+    assert_eq!(corners(&loaded), [[[0, 60, 0], [20, 60, 0], [0, 80, 0]], [[20, 10, 0], [30, 10, 0], [20, 20, 0]]]);
+    let lamp = loaded.lights.iter().find(|l| l.kind == LIGHT_POINT).unwrap();
+    assert_eq!(lamp.a, [0.0, 12.0, 0.0], "it hangs on the arm: 1 + 5 + 2 x 3");
+    // Both instances follow; a node is found by the name of its mesh and by its number, and keys win over the clip.
+    let copies = "[[instance]]\nmesh = 'fox'\n[[instance]]\nmesh = 'fox'\ntransform = { translate = [100, 0, 0] }\n";
+    for node in ["fox/leaf", "fox/node 0"] {
+        let mut loaded =
+            parse(folder.path(), &format!("{SCENE}{copies}{}", keys(node, "translate = [0, 0, 8]"))).unwrap();
+        let pose = loaded.animation.at(2.0).unwrap();
+        loaded.scene.apply(&pose).unwrap();
+        let firsts: Vec<_> = corners(&loaded).into_iter().map(|t| t[0]).collect();
+        assert_eq!(firsts, [[0, 0, 0], [0, 0, 80], [1000, 0, 0], [1000, 0, 80]], "{node}");
+    }
+    let refused = |text: &str, word: &str| {
+        let error = parse(folder.path(), &format!("{SCENE}{text}")).map(|_| ()).unwrap_err();
+        assert!(error.contains(word) && !error.contains('\n'), "{error}");
+    };
+    refused(&keys("fox/arms", "scale = 1"), "node \"arms\": is not there: did you mean \"arm\"?");
+    refused(&keys("fox/node 3", "scale = 1"), "node \"node 3\"");
+    refused(&keys("hen/arm", "scale = 1"), "animation 1: no node \"hen/arm\"");
+    refused(&keys("arm", "scale = 1"), "write MESH/NODE");
+    refused(&keys("fox/arm", "fov = 1"), "unknown key \"fov\"");
+    refused(&format!("{0}{0}", keys("fox/arm", "scale = 1")), "is moved by an earlier table");
+    let instance = keys("fox/leaf", "scale = 1").replace("node =", "instance =");
+    refused(&instance, "is placed by instances without a name: a part of a glTF file is moved by `node`");
+}
+
+#[test]
 fn what_a_model_cannot_have_is_named() {
     let folder = folder();
     let refused = |text: &str, word: &str| {

@@ -13,6 +13,8 @@ pub enum Target {
     Camera(Camera),
     /// What a placement puts where.
     Placement(usize, DAffine3),
+    /// A node of a glTF file, which [`Keyed::place`] puts where it belongs.
+    Node,
     /// A light.
     Light(usize, LightTable),
     /// A material.
@@ -37,7 +39,7 @@ impl Target {
                 ("focus_distance", &[1]),
                 ("lens_radius", &[1]),
             ],
-            Self::Placement(..) => {
+            Self::Placement(..) | Self::Node => {
                 &[("translate", &[3]), ("rotate", &[3, 4]), ("scale", &[3, 1]), ("transform", &[16])]
             }
             Self::Light(..) => &[
@@ -116,15 +118,16 @@ impl Keyed {
         }
     }
 
-    fn placement(&self, rest: &DAffine3, at: f64) -> Transform {
+    /// Where keys put what otherwise is at `rest`.
+    pub fn place(&self, rest: &DAffine3, at: f64) -> DAffine3 {
         if let Some(rows) = self.find("transform", at).and_then(|rows| <[f64; 16]>::try_from(rows).ok()) {
-            return Transform::from(rows);
+            return Transform::from(rows).0;
         }
         let (scale, rotation, translation) = parts(rest).unwrap_or((DVec3::ONE, DQuat::IDENTITY, rest.translation));
         let scale = self.three("scale", at).map_or(scale, DVec3::from);
         let rotation = self.find("rotate", at).map_or(rotation, |q| DQuat::from_slice(&q));
         let translation = self.three("translate", at).map_or(translation, DVec3::from);
-        Transform(DAffine3::from_scale_rotation_translation(scale, rotation, translation))
+        DAffine3::from_scale_rotation_translation(scale, rotation, translation)
     }
 
     fn material(&self, at: f64) -> MaterialChange {
@@ -155,7 +158,10 @@ impl Mover for Keyed {
     fn pose(&self, seconds: f64, pose: &mut Pose) -> Result<()> {
         match &self.target {
             Target::Camera(rest) => pose.camera = Some(self.camera(rest, seconds)),
-            Target::Placement(number, rest) => pose.instances.push((*number, self.placement(rest, seconds))),
+            Target::Placement(number, rest) => {
+                pose.instances.push((*number, Transform(self.place(rest, seconds))))
+            }
+            Target::Node => {}
             Target::Light(number, rest) => pose.lights.push((*number, self.light(rest, seconds))),
             Target::Material(number) => pose.materials.push((*number, self.material(seconds))),
             Target::Environment => {

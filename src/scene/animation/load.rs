@@ -42,27 +42,41 @@ pub fn load(path: &Path, description: &Description, movers: &[Arc<dyn Mover>], s
         if !moved.insert(what.clone()) {
             return Err(at(format!("{what} is moved by an earlier table: put all keys into one")));
         }
-        animation.movers.push(mover);
+        animation.movers.extend(mover);
     }
     Ok(animation)
 }
 
-fn mover(path: &Path, table: &AnimationTable, from: &Description, scene: &Scene) -> Checked<(String, Arc<dyn Mover>)> {
-    let targets = [&table.instance, &table.light, &table.material, &table.mesh].map(Option::is_some);
+/// The keys of a table that moves a node of a glTF file.
+///
+/// # Errors
+/// A sentence about keys that it cannot have.
+pub fn of_node(table: &AnimationTable) -> Checked<Keyed> {
+    Ok(Keyed { curves: curves(table, &Target::Node)?, target: Target::Node })
+}
+
+/// What a table moves, and its mover; a node's file has its keys.
+type Moving = (String, Option<Arc<dyn Mover>>);
+
+fn mover(path: &Path, table: &AnimationTable, from: &Description, scene: &Scene) -> Checked<Moving> {
+    let targets = [&table.instance, &table.node, &table.light, &table.material, &table.mesh].map(Option::is_some);
     let count = targets.into_iter().chain([table.camera, table.environment]).filter(|on| *on).count();
     if count != 1 {
-        return Err("needs one of camera, instance, light, material, environment and mesh".to_owned());
+        return Err("needs one of camera, instance, node, light, material, environment and mesh".to_owned());
     }
     if let Some(name) = &table.mesh {
         let number = scene.rig.mesh(name).ok_or_else(|| unknown("mesh", name, from.mesh.iter().map(|m| &m.name)))?;
-        return Ok((format!("mesh \"{name}\""), Arc::new(frames(path, table, from, number)?)));
+        return Ok((format!("mesh \"{name}\""), Some(Arc::new(frames(path, table, from, number)?))));
     }
     if table.file.is_some() {
         return Err("has a file, which is for a mesh".to_owned());
     }
+    if let Some(name) = &table.node {
+        return Ok((format!("node \"{name}\""), None));
+    }
     let (what, target) = target(table, from, scene)?;
     let curves = curves(table, &target)?;
-    Ok((what, Arc::new(Keyed { target, curves })))
+    Ok((what, Some(Arc::new(Keyed { target, curves }))))
 }
 
 fn target(table: &AnimationTable, from: &Description, scene: &Scene) -> Checked<(String, Target)> {
@@ -70,8 +84,11 @@ fn target(table: &AnimationTable, from: &Description, scene: &Scene) -> Checked<
         return Ok(("the camera".to_owned(), Target::Camera(from.camera.clone())));
     }
     if let Some(name) = &table.instance {
-        let names = from.instance.iter().map(|i| &i.name).chain(from.mesh.iter().map(|m| &m.name));
-        let number = scene.rig.placement(name).ok_or_else(|| unknown("instance", name, names))?;
+        let names = || from.instance.iter().map(|i| &i.name).chain(from.mesh.iter().map(|m| &m.name));
+        let number = scene.rig.placement(name).ok_or_else(|| match names().any(|known| known.as_ref() == Some(name)) {
+            true => format!("mesh \"{name}\" is placed by instances without a name: a part of a glTF file is moved by `node`"),
+            false => unknown("instance", name, names()),
+        })?;
         let rest = match from.instance.get(number) {
             Some(instance) => instance.transform.0,
             None => mesh_number(from, name).map_or(DAffine3::IDENTITY, |number| from.mesh[number].transform.0),

@@ -7,7 +7,8 @@ mod turntable;
 
 use super::pose::Pose;
 use crate::error::Result;
-pub(super) use load::{load, with_freed_meshes};
+pub(super) use keyed::Keyed;
+pub(super) use load::{load, of_node, with_freed_meshes};
 use std::fmt::Debug;
 use std::sync::Arc;
 pub use turntable::Turntable;

@@ -15,8 +15,8 @@ pub enum Interpolation {
     Step,
 }
 
-/// An `[[animation]]` table. It moves one thing: the camera, an instance, a light, a material, the environment, or the vertices of a
-/// mesh.
+/// An `[[animation]]` table. It moves one thing: the camera, an instance, a node of a glTF file, a light, a material, the environment,
+/// or the vertices of a mesh.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct AnimationTable {
@@ -25,6 +25,10 @@ pub struct AnimationTable {
     /// Name of the `[[instance]]`, or of a `[[mesh]]` without instances, that it places: `translate`, `rotate`, `scale`, or
     /// `transform`.
     pub instance: Option<String>,
+    /// `"MESH/NODE"`: the node of the glTF file that the `[[mesh]]` of this name (or of this file name without its ending) names, with
+    /// all that hangs on it. NODE is its name, or that of the mesh that it shows, or `node N` by its number; of several of one name
+    /// the first is meant. Keys as for an instance, relative to the node's parent; they win over the file's own animation.
+    pub node: Option<String>,
     /// Name of the `[[light]]` that it changes: `position`, `direction`, `target`, `intensity`, `irradiance`, `cone`, `cutoff`.
     pub light: Option<String>,
     /// Name of the material that it changes: `color`, `specular`, `transmission`, `emission`, `alpha`, `opacity`.

@@ -2,7 +2,7 @@
 use super::gltf::{self, Model};
 use super::mesh_file::Format;
 use crate::error::{Error, Result};
-use crate::scene::animation::Mover;
+use crate::scene::animation::{self, Keyed, Mover};
 use crate::scene::description::{Description, InstanceTable, LightTable, MaterialTable, MeshTable, Transform};
 use crate::scene::pose::Pose;
 use glam::{DAffine3, Vec3};
@@ -20,11 +20,11 @@ pub type Included<'a> = (Cow<'a, Description>, Vec<Arc<dyn Mover>>, Vec<String>)
 /// [`Error::Input`] for what is wrong with a file, and for keys of its table that it cannot have.
 pub fn models<'a>(path: &Path, from: &'a Description) -> Result<Included<'a>> {
     let is_model = |table: &MeshTable| table.file.as_deref().is_some_and(|file| Format::of(file) == Format::Gltf);
+    let mut keys = keys_of_nodes(path, from, |name| named(from, name).is_some_and(is_model))?;
     if !from.mesh.iter().any(is_model) {
         return Ok((Cow::Borrowed(from), Vec::new(), Vec::new()));
     }
-    let named = |name: &str| from.mesh.iter().find(|table| name_of(table).as_deref() == Some(name));
-    let whole = |instance: &&InstanceTable| !named(&instance.mesh).is_some_and(is_model);
+    let whole = |instance: &&InstanceTable| !named(from, &instance.mesh).is_some_and(is_model);
     let instance = from.instance.iter().filter(whole).cloned().collect();
     let mut to = Description { mesh: Vec::new(), instance, ..from.clone() };
     let (mut movers, mut warnings) = (Vec::new(), Vec::new());
@@ -36,11 +36,33 @@ pub fn models<'a>(path: &Path, from: &'a Description) -> Result<Included<'a>> {
         let place = Place::new(path, table, from)?;
         let directory = path.parent().unwrap_or(Path::new(""));
         let file = table.file.as_ref().map(|file| file.to_string_lossy().replace('\\', "/")).unwrap_or_default();
-        let mut model = gltf::load(&directory.join(file), directory, table.clip.as_deref())?;
+        let keys = keys.remove(&place.name).unwrap_or_default();
+        let mut model = gltf::load(&directory.join(file), directory, table.clip.as_deref(), keys)?;
         warnings.append(&mut model.warnings);
         movers.extend(place.add(model, from, &mut to));
     }
     Ok((Cow::Owned(to), movers, warnings))
+}
+
+/// The first mesh of a name.
+fn named<'a>(from: &'a Description, name: &str) -> Option<&'a MeshTable> {
+    from.mesh.iter().find(|table| name_of(table).as_deref() == Some(name))
+}
+
+/// By the name of a glTF file's mesh: the keys of animation tables that move its nodes, by their names.
+type Keys = HashMap<String, Vec<(String, Keyed)>>;
+
+fn keys_of_nodes(path: &Path, from: &Description, is_model: impl Fn(&str) -> bool) -> Result<Keys> {
+    let mut keys = Keys::new();
+    for (number, table) in (1..).zip(&from.animation) {
+        let Some(name) = &table.node else { continue };
+        let at = |what: String| Error::input_at(path, format!("animation {number}"), what);
+        let none = || at(format!("no node \"{name}\": write MESH/NODE, with the name of a mesh whose file is glTF"));
+        let (mesh, node) = name.split_once('/').filter(|(mesh, _)| is_model(mesh)).ok_or_else(none)?;
+        let keyed = animation::of_node(table).map_err(at)?;
+        keys.entry(mesh.to_owned()).or_default().push((node.to_owned(), keyed));
+    }
+    Ok(keys)
 }
 
 /// What instances call a mesh of a glTF file: its table's name, or the file's.

@@ -24,13 +24,14 @@ mod uri;
 
 use crate::error::Result;
 use crate::memory;
-use crate::scene::animation::Mover;
-use crate::scene::description::{Description, EnvironmentTable};
-use asset::Asset;
+use crate::scene::animation::{Keyed, Mover};
+use crate::scene::description::{Description, EnvironmentTable, nearest};
+use asset::{Asset, one_line};
 pub use camera::Named;
+use gltf_json::Node;
 use motion::{CameraMotion, Motion, MovedLight};
 use node::Tree;
-use place::{Moved, Placer};
+use place::{Moved, Placed, Placer};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -49,11 +50,11 @@ pub struct Model {
 
 /// Reads a `.gltf` or `.glb` file. A file without lights of `KHR_lights_punctual` gets a sky of radiance 1, since glTF has no
 /// other place for the light that its models are shown in. Pictures are named relative to `base`, where they lie below it. `clip`
-/// names the animation that is played; without, all are that do not move the same as an earlier one.
+/// names the animation that is played; without, all are that do not move the same as an earlier one. `keys` move nodes of these names.
 ///
 /// # Errors
-/// [`crate::error::Error::Input`] with file, place and remedy, also for a clip that is not there; [`crate::error::Error::Memory`].
-pub fn load(path: &Path, base: &Path, clip: Option<&str>) -> Result<Model> {
+/// [`crate::error::Error::Input`] with file, place and remedy, also for a clip or node that is not there; [`crate::error::Error::Memory`].
+pub fn load(path: &Path, base: &Path, clip: Option<&str>, keys: Vec<(String, Keyed)>) -> Result<Model> {
     let asset = Asset::read(path, base)?;
     let mut model = Model::default();
     model.warnings.extend(extension::check(&asset)?);
@@ -66,7 +67,8 @@ pub fn load(path: &Path, base: &Path, clip: Option<&str>) -> Result<Model> {
     memory::need(path.display(), bytes)?;
     let (worlds, lights) = (tree.worlds(&tree.locals), light::read(&asset, &mut model.warnings)?);
     let channels = clip::read(&asset, &tree, clip, &mut model.warnings)?;
-    let moved = Moved::new(&tree, &channels);
+    let keyed = keys.into_iter().map(|(name, keys)| Ok((node_of(&asset, &name)?, keys))).collect::<Result<Vec<_>>>()?;
+    let moved = Moved::new(&tree, &channels, keyed.iter().map(|(node, _)| *node));
     let mut placer = Placer::new(&asset, &worlds, &moved);
     let mut moved_lights = Vec::new();
     for &node in &tree.shown {
@@ -80,9 +82,9 @@ pub fn load(path: &Path, base: &Path, clip: Option<&str>) -> Result<Model> {
     }
     let placed = placer.finish(&mut model.description, &mut model.warnings)?;
     let moves = moved.nodes;
-    let motion = Motion { tree, channels, instances: placed.instances, meshes: placed.meshes, lights: moved_lights };
-    let motion = Arc::new(motion);
-    if !motion.channels.is_empty() {
+    let Placed { instances, meshes } = placed;
+    let motion = Arc::new(Motion { tree, channels, keyed, instances, meshes, lights: moved_lights });
+    if !(motion.channels.is_empty() && motion.keyed.is_empty()) {
         for named in model.cameras.iter_mut().filter(|named| moves[named.node]) {
             let (motion, node, camera) = (motion.clone(), named.node, named.camera.clone());
             named.mover = Some(Arc::new(CameraMotion { motion, node, camera }));
@@ -96,4 +98,21 @@ pub fn load(path: &Path, base: &Path, clip: Option<&str>) -> Result<Model> {
         model.description.camera = first.camera.clone();
     }
     Ok(model)
+}
+
+/// The first node of a name: its own, that of its mesh, or its number.
+fn node_of(asset: &Asset, name: &str) -> Result<usize> {
+    let mesh_of = |node: &Node| node.mesh.and_then(|mesh| asset.root.meshes[mesh.value()].name.as_deref());
+    let nodes = || asset.root.nodes.iter().enumerate();
+    let named = |(index, node): (usize, &Node)| {
+        let own = node.name.as_deref().or(mesh_of(node)).map(one_line);
+        own.filter(|own| !own.is_empty()).unwrap_or_else(|| format!("node {index}"))
+    };
+    let by_number = name.strip_prefix("node ").and_then(|number| number.parse().ok());
+    let found = nodes().position(|node| named(node) == name);
+    found.or(by_number.filter(|&number: &usize| number < asset.root.nodes.len())).ok_or_else(|| {
+        let names: Vec<_> = nodes().map(named).collect();
+        let near = nearest(name, names.iter().map(String::as_str)).unwrap_or("(there are no nodes)");
+        asset.at(format!("node \"{name}\""), format!("is not there: did you mean \"{near}\"?"))
+    })
 }

@@ -2,10 +2,10 @@
 use super::clip::Channel;
 use super::deform::{Skin, deformed};
 use super::light;
-use super::node::Tree;
+use super::node::{Local, Tree};
 use super::primitive::Primitive;
 use crate::error::Result;
-use crate::scene::animation::Mover;
+use crate::scene::animation::{Keyed, Mover};
 use crate::scene::description::{Camera, LightTable, Mesh, Transform};
 use crate::scene::pose::{Pose, Vertices};
 use glam::{DAffine3, DMat4};
@@ -56,6 +56,8 @@ pub struct Motion {
     pub tree: Tree,
     /// What moves them.
     pub channels: Vec<Channel>,
+    /// Keys of the scene file, which move nodes after that.
+    pub keyed: Vec<(usize, Keyed)>,
     /// What they move.
     pub instances: Vec<MovedInstance>,
     /// What they move.
@@ -69,6 +71,9 @@ impl Motion {
     fn worlds(&self, seconds: f64) -> Vec<DAffine3> {
         let mut locals = self.tree.locals.clone();
         self.channels.iter().for_each(|channel| channel.apply(seconds, &mut locals));
+        for (node, keys) in &self.keyed {
+            locals[*node] = Local::Matrix(keys.place(&locals[*node].affine(), seconds));
+        }
         self.tree.worlds(&locals)
     }
 }
@@ -91,7 +96,8 @@ impl Mover for Motion {
     }
 
     fn end(&self) -> f64 {
-        self.channels.iter().map(Channel::end).fold(0.0, f64::max)
+        let ends = self.channels.iter().map(Channel::end).chain(self.keyed.iter().map(|(_, keys)| keys.end()));
+        ends.fold(0.0, f64::max)
     }
 }
 

@@ -32,12 +32,12 @@ pub struct Moved {
 }
 
 impl Moved {
-    /// By these channels.
-    pub fn new(tree: &Tree, channels: &[Channel]) -> Self {
+    /// By these channels, and the nodes that a scene file's keys move.
+    pub fn new(tree: &Tree, channels: &[Channel], keyed: impl Iterator<Item = usize>) -> Self {
         let mut weights = vec![false; tree.locals.len()];
         channels.iter().filter(|channel| channel.is_morph()).for_each(|channel| weights[channel.node] = true);
         let nodes = channels.iter().filter(|channel| !channel.is_morph()).map(|channel| channel.node);
-        Self { nodes: tree.moved(nodes), weights }
+        Self { nodes: tree.moved(nodes.chain(keyed)), weights }
     }
 }
 
