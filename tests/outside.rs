@@ -1,6 +1,7 @@
 //! Every OBJ and glTF file below TALLOW_DATA/scenes loads with its textures and renders.
 mod support;
 
+use glam::Vec3;
 use std::path::{Path, PathBuf};
 use tallow::gpu::Gpu;
 use tallow::render::settings::Settings;
@@ -98,4 +99,30 @@ fn every_gltf_loads_and_renders() {
     // A camera stands within a pine of a dense forest, where no one of 64 paths may find the sky.
     assert!(dark.len() <= 1, "black: {dark:?}");
     support::assert_silent(&gpu);
+}
+
+/// The frames of `animation/fox_run` were skinned by another program, in metres where the file has centimetres.
+#[test]
+#[ignore = "needs TALLOW_DATA"]
+fn a_skinned_fox_runs_as_another_program_has_it() {
+    let scenes = data().join("scenes");
+    let text = "[[mesh]]\nfile = 'gltf/Fox/Fox.glb'\nclip = 'Run'\n";
+    let fox = Scene::parse(&scenes.join("scene.toml"), text).unwrap();
+    // The largest distance of a corner from the nearest one of the other, in centimetres.
+    let distance = |frame: u32, seconds: f64| {
+        let text = std::fs::read_to_string(scenes.join(format!("animation/fox_run/fox_{frame:02}.obj"))).unwrap();
+        let numbers = |line: &str| line.split(' ').filter_map(|v| v.parse::<f32>().ok()).collect::<Vec<_>>();
+        let corner = |line: &str| Vec3::from_slice(&numbers(line)) * 100.0;
+        let theirs: Vec<_> = text.lines().filter(|line| line.starts_with("v ")).map(corner).collect();
+        let pose = fox.animation.at(seconds).unwrap();
+        let ours = pose.meshes[0].1.positions.iter().map(|p| Vec3::from(*p));
+        let nearest = |p: Vec3| theirs.iter().map(|q| p.distance(*q)).fold(f32::INFINITY, f32::min);
+        assert_eq!((theirs.len(), pose.meshes.len()), (290, 1));
+        ours.map(nearest).fold(0.0, f32::max)
+    };
+    let time = |frame: u32| f64::from(frame) / 16.0 * fox.animation.end();
+    for frame in 0..16 {
+        assert!(distance(frame, time(frame)) < 0.01, "frame {frame}: {} cm", distance(frame, time(frame)));
+    }
+    assert!(distance(4, time(5)) > 1.0, "control: another time");
 }
