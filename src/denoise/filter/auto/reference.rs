@@ -137,6 +137,23 @@ pub fn estimated(input: &FilterInput, settings: &FilterSettings) -> (Vec<vec4>, 
     let expected =
         |i: usize| expected(relative(i), &weights[i].1, [results.leverages[i], surroundings[i]], shares_of_noise[i]);
     let expected = (0..image.len()).map(expected).collect();
+    let prior = |i: usize| {
+        let level = contrast(blend[i].xyz(), Vec3::ZERO).abs().max(floor);
+        0.5 * planes[2][i].z / planes[2][i].w.max(1e-20) * level * level * image[i].count
+    };
+    (given_back(input, &image, &noise, &blend, &surfaces, prior), expected)
+}
+
+/// The blend with what it has lost, where samples show that: twin of `auto_residual.comp`. `prior` is the variance of what is lost.
+fn given_back(
+    input: &FilterInput,
+    image: &[Packed],
+    noise: &[f32],
+    blend: &[Vec4],
+    surfaces: &Rates,
+    prior: impl Fn(usize) -> f32,
+) -> Vec<vec4> {
+    let size = [input.width, input.height].map(i64::from);
     let own: Vec<Option<f32>> = (0..image.len()).map(|i| own_variance(input, i, image[i].count)).collect();
     let residual = |i: usize| Residual {
         colour: image[i].colour - blend[i].xyz(),
@@ -145,16 +162,12 @@ pub fn estimated(input: &FilterInput, settings: &FilterSettings) -> (Vec<vec4>, 
         measured: own[i].is_some(),
     };
     let residuals: Vec<_> = (0..image.len()).map(residual).collect();
-    let prior = |i: usize| {
-        let level = contrast(blend[i].xyz(), Vec3::ZERO).abs().max(floor);
-        0.5 * planes[2][i].z / planes[2][i].w.max(1e-20) * level * level * image[i].count
-    };
     let restored = |i: usize| -> vec4 {
-        let given = restored(&image, &residuals, size, i, &surfaces, prior(i));
+        let given = restored(image, &residuals, size, i, surfaces, prior(i));
         let least = blend[i].xyz().min(image[i].colour).min(Vec3::ZERO);
         (blend[i].xyz() + given).max(least).extend(blend[i].w).into()
     };
-    ((0..image.len()).map(restored).collect(), expected)
+    (0..image.len()).map(restored).collect()
 }
 
 fn squared_deviation(variance: f32, floor: f32) -> f32 {
