@@ -6,8 +6,8 @@ use super::build::coat::reads_table;
 use super::{Environment, Scene};
 use crate::error::{Error, Result};
 use crate::layout::{
-    AliasEntry, BSDF_METALLIC, BvhNode, COAT_COLUMNS, COAT_ROWS, Camera, LIGHT_SPHERE, LIGHT_TRIANGLE,
-    Light, Material, NONE, SPHERE, Shading, TRAVERSAL_STACK, Texture, Triangle,
+    AliasEntry, BSDF_METALLIC, BvhNode, COAT_COLUMNS, COAT_ROWS, Camera, LIGHT_SPHERE, LIGHT_TRIANGLE, Light, Material,
+    NONE, SPHERE, Shading, TRAVERSAL_STACK, Texture, Triangle,
 };
 use glam::Vec3;
 

@@ -156,7 +156,7 @@ fn both_where_all_moves(
 #[test]
 fn kernels_agree_with_their_twin_where_all_moves() {
     let gpu = gpu();
-    // Where changed light drops most of what has moved, nothing tells whether it moved as it should: the second time it stays.
+    // Changed light drops most of what has moved. The second time nothing is dropped for it, and more is compared.
     let (lit, _) = agree_where_all_moves(&gpu, Reproject { reproject_error: 0.1, ..Reproject::default() });
     let (_, carried) = agree_where_all_moves(&gpu, Reproject { reproject_light: 1e9, ..Reproject::default() });
     assert!(lit > 1000 && carried > 3000, "control: {lit} pixels' light has changed, {carried} are carried");

@@ -158,9 +158,7 @@ impl Mover for Keyed {
     fn pose(&self, seconds: f64, pose: &mut Pose) -> Result<()> {
         match &self.target {
             Target::Camera(rest) => pose.camera = Some(self.camera(rest, seconds)),
-            Target::Placement(number, rest) => {
-                pose.instances.push((*number, Transform(self.place(rest, seconds))))
-            }
+            Target::Placement(number, rest) => pose.instances.push((*number, Transform(self.place(rest, seconds)))),
             Target::Node => {}
             Target::Light(number, rest) => pose.lights.push((*number, self.light(rest, seconds))),
             Target::Material(number) => pose.materials.push((*number, self.material(seconds))),

@@ -84,11 +84,7 @@ fn target(table: &AnimationTable, from: &Description, scene: &Scene) -> Checked<
         return Ok(("the camera".to_owned(), Target::Camera(from.camera.clone())));
     }
     if let Some(name) = &table.instance {
-        let names = || from.instance.iter().map(|i| &i.name).chain(from.mesh.iter().map(|m| &m.name));
-        let number = scene.rig.placement(name).ok_or_else(|| match names().any(|known| known.as_ref() == Some(name)) {
-            true => format!("mesh \"{name}\" is placed by instances without a name: a part of a glTF file is moved by `node`"),
-            false => unknown("instance", name, names()),
-        })?;
+        let number = scene.rig.placement(name).ok_or_else(|| not_placed(name, from))?;
         let rest = match from.instance.get(number) {
             Some(instance) => instance.transform.0,
             None => mesh_number(from, name).map_or(DAffine3::IDENTITY, |number| from.mesh[number].transform.0),
@@ -109,6 +105,15 @@ fn target(table: &AnimationTable, from: &Description, scene: &Scene) -> Checked<
         Some(_) => Ok(("the environment".to_owned(), Target::Environment)),
         None => Err("there is no [environment]".to_owned()),
     }
+}
+
+fn not_placed(name: &String, from: &Description) -> String {
+    if mesh_number(from, name).is_some() {
+        return format!(
+            "mesh \"{name}\" is placed by instances without a name: a part of a glTF file is moved by `node`"
+        );
+    }
+    unknown("instance", name, from.instance.iter().map(|i| &i.name).chain(from.mesh.iter().map(|m| &m.name)))
 }
 
 fn unknown<'a>(kind: &str, name: &str, known: impl Iterator<Item = &'a Option<String>>) -> String {
