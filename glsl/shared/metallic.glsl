@@ -65,9 +65,9 @@ vec2 metallic_reflected(uint table, float alpha, float c) {
     return microfacet_entry(table, alpha, table_column(c));
 }
 
-// Share of light at the cosine `c` that the microfacets of the dielectric let in.
-float let_in(Metallic b, float c) {
-    return 1.0 - dot(b.dielectric, metallic_reflected(b.table, b.alpha, c));
+// Share of light that the microfacets of the dielectric let in, where they reflect so much.
+float let_in(Metallic b, vec2 reflected) {
+    return 1.0 - dot(b.dielectric, reflected);
 }
 
 // The same for the clear coat.
@@ -108,13 +108,13 @@ void metallic_view(inout Metallic b, float cosine) {
     b.reflected = metallic_reflected(b.table, b.alpha, cosine);
     vec2 means = vec2(20.0, 1.0) / 21.0;
     if (!smooth_alpha(b.alpha)) means = microfacet_entry(b.table, b.alpha, float(COAT_COLUMNS - 1u));
-    b.mean_let_in = 1.0 - dot(b.dielectric, means);
+    b.mean_let_in = let_in(b, means);
 }
 
 // Probabilities of the lobes, about in proportion to what they reflect: the coat's, the specular one, the diffuse one, and the one
 // through a thin wall. All 0 where the material is black.
 vec4 metallic_odds(Metallic b, vec3 wo) {
-    float inner = has_coat(b) ? coat_lets_in(b, coat_cosine(b, wo)) : 1.0, base = inner * (1.0 - dot(b.dielectric, b.reflected));
+    float inner = has_coat(b) ? coat_lets_in(b, coat_cosine(b, wo)) : 1.0, base = inner * let_in(b, b.reflected);
     vec3 f = b.f0 * b.reflected.x + b.f90 * b.reflected.y;
     vec4 odds = vec4(1.0 - inner, inner * (dot(f, vec3(1.0 / 3.0)) + LEAST_ODDS * b.f90), base * dot(b.diffuse, vec3(1.0 / 3.0)),
                      base * dot(b.through, vec3(1.0 / 3.0)));
@@ -144,8 +144,8 @@ vec4 metallic_evaluate(Metallic b, vec3 wo, vec3 wi) {
     vec4 odds = metallic_odds(b, wo);
     vec4 value = vec4(0.0);
     if (!beyond) {
-        float inside = 1.0 - dot(b.dielectric, b.reflected);
-        value = vec4(b.diffuse * (inside * let_in(b, wi.z) / max(b.mean_let_in, 1e-3)), odds.z) * (wi.z * INV_PI);
+        float enters = let_in(b, metallic_reflected(b.table, b.alpha, wi.z)), leaves = let_in(b, b.reflected);
+        value = vec4(b.diffuse * (leaves * enters / max(b.mean_let_in, 1e-3)), odds.z) * (wi.z * INV_PI);
     }
     if (!smooth_alpha(b.alpha)) {
         vec3 lobe = metallic_lobe(wo, wi, b.alpha);
@@ -204,7 +204,7 @@ bool metallic_sample(Metallic b, vec3 wo, float u_lobe, vec2 u, out vec3 wi, out
 vec3 metallic_albedo(Metallic b, float c) {
     float inner = has_coat(b) ? coat_lets_in(b, c) : 1.0;
     vec2 reflected = metallic_reflected(b.table, b.alpha, c);
-    vec3 albedo = (b.diffuse + b.through) * (1.0 - dot(b.dielectric, reflected)) + b.f0 * reflected.x + b.f90 * reflected.y;
+    vec3 albedo = (b.diffuse + b.through) * let_in(b, reflected) + b.f0 * reflected.x + b.f90 * reflected.y;
     return albedo * inner + 1.0 - inner;
 }
 
