@@ -1,9 +1,10 @@
 // What some meshes have at their vertices beyond normals and texture coordinates: words among the texels, in the order colours, second
 // coordinates, tangents. Needs scene.glsl's bindings.
 #include "shared/octahedral.glsl"
+#include "shared/texel_word.glsl"
 
 uint attribute_word(Shading s, uint k) {
-    return texelFetch(texels, int(s.first + k)).x;
+    return texel_word(s.first + k);
 }
 
 // Index of the first word of the second coordinates, and of the tangents.

@@ -2,6 +2,7 @@
 // Needs the binding `texels`, which holds them.
 #ifndef COAT_TABLE_GLSL
 #define COAT_TABLE_GLSL
+#include "shared/texel_word.glsl"
 
 // The entries around a place in a table, in the order (row, column), (row, column + 1), (row + 1, column), (row + 1, column + 1),
 // and how far the place is from the first: x along columns, y along rows.
@@ -20,8 +21,8 @@ float table_column(float cosine) {
 
 TableCell table_cell(uint table, float row, float column) {
     int i = min(int(row), int(COAT_ROWS) - 2), j = min(int(column), int(COAT_COLUMNS) - 2);
-    int at = int(table) + i * int(COAT_COLUMNS) + j, below = at + int(COAT_COLUMNS);
-    uvec4 words = uvec4(texelFetch(texels, at).x, texelFetch(texels, at + 1).x, texelFetch(texels, below).x, texelFetch(texels, below + 1).x);
+    uint at = table + uint(i) * COAT_COLUMNS + uint(j), below = at + COAT_COLUMNS;
+    uvec4 words = uvec4(texel_word(at), texel_word(at + 1u), texel_word(below), texel_word(below + 1u));
     return TableCell(words, vec2(column - float(j), row - float(i)));
 }
 

@@ -2,6 +2,8 @@
 // unused. There are no mip levels: a pixel's samples average a texture without the bias of a blur, and levels would cost a third
 // more memory.
 
+#include "shared/texel_word.glsl"
+
 vec3 linear_from_srgb(vec3 c) {
     return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045)));
 }
@@ -18,7 +20,7 @@ vec4 texture_texel(Texture image, ivec2 at, bool colour) {
     // Coordinates lie at most one texel outside the image, so that adding or subtracting one period wraps them.
     at = mix(at + mix(ivec2(0), edge, lessThan(at, ivec2(0))), clamp(at, ivec2(0), edge - 1), texture_keeps_border(image));
     at = mix(at, at - edge, greaterThanEqual(at, edge));
-    uint word = texelFetch(texels, int(image.first) + at.y * edge.x + at.x).x;
+    uint word = texel_word(image.first + uint(at.y * edge.x + at.x));
     if (FX_HDR_TEXTURES && (image.flags & TEXTURE_FLOAT) != 0u) return vec4(uintBitsToFloat(word));
     if (FX_HDR_TEXTURES && (image.flags & TEXTURE_RGB9E5) != 0u) {
         float unit = uintBitsToFloat(((word >> 27) + 103u) << 23); // 2^(exponent - 24)

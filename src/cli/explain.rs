@@ -272,7 +272,8 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
         | Effect::counters
         | Effect::adaptive
         | Effect::many_samples
-        | Effect::dealt_triangles => 0,
+        | Effect::dealt_triangles
+        | Effect::many_texels => 0,
     };
     bytes as u64
 }

@@ -85,7 +85,9 @@ pub struct Untyped {
     /// Size in bytes, a multiple of 4.
     pub(super) size: u64,
     /// Bytes of one element.
-    stride: usize,
+    stride: u64,
+    /// Bytes of one texel, for kernels that read it so.
+    texel: u64,
     /// `None` only during construction. The lock also serialises accesses by the host.
     memory: Mutex<Option<Allocation>>,
     views: Mutex<Vec<(vk::Format, vk::BufferView)>>,
@@ -98,13 +100,16 @@ impl<T: Pod> Buffer<T> {
     /// # Errors
     /// [`Error::Device`] with the name, the size and the limit when the device cannot hold it.
     pub fn new(gpu: &Gpu, name: &str, len: usize, location: Location) -> Result<Self> {
+        Self::with_texels(gpu, name, len, location, texel_bytes(size_of::<T>()))
+    }
+
+    fn with_texels(gpu: &Gpu, name: &str, len: usize, location: Location, texel: u64) -> Result<Self> {
         const { assert!(size_of::<T>() > 0 && size_of::<T>().is_multiple_of(4), "elements are whole words") };
         let len = len.max(1);
-        let size = len
-            .checked_mul(size_of::<T>())
-            .and_then(|bytes| bytes.checked_next_multiple_of(4))
-            .ok_or_else(|| Error::Device(format!("buffer \"{name}\": {len} elements are more than memory can hold")))?;
-        let untyped = Arc::new(Untyped::new(gpu, name, size as u64, size_of::<T>(), location)?);
+        let bytes = len.checked_mul(size_of::<T>()).and_then(|bytes| (bytes as u64).checked_next_multiple_of(texel));
+        let too_many = || Error::Device(format!("buffer \"{name}\": {len} elements are more than memory can hold"));
+        let size = bytes.ok_or_else(too_many)?;
+        let untyped = Arc::new(Untyped::new(gpu, name, size, [size_of::<T>() as u64, texel], location)?);
         Ok(Self { untyped, first: 0, len, of: PhantomData })
     }
 
@@ -126,12 +131,13 @@ impl<T: Pod> Buffer<T> {
     /// # Errors
     /// As [`Self::new`].
     pub fn from_slice(gpu: &Gpu, name: &str, values: &[T]) -> Result<Self> {
-        let buffer = Self::new(gpu, name, values.len(), Location::Device)?;
-        match values {
-            [] => buffer.write(0, &[T::zeroed()])?,
-            values => buffer.write(0, values)?,
-        }
-        Ok(buffer)
+        Self::new(gpu, name, values.len(), Location::Device)?.holding(values)
+    }
+
+    fn holding(self, values: &[T]) -> Result<Self> {
+        let zero = [T::zeroed()];
+        self.write(0, if values.is_empty() { &zero } else { values })?;
+        Ok(self)
     }
 
     /// As [`Self::from_slice`], for data that kernels read as texels: the device's limit is checked before the upload.
@@ -139,18 +145,28 @@ impl<T: Pod> Buffer<T> {
     /// # Errors
     /// As [`Self::new`].
     pub fn from_texels(gpu: &Gpu, name: &str, values: &[T]) -> Result<Self> {
-        check_texels(name, size_of_val(values) as u64, size_of::<T>(), gpu.0.info.max_texel_elements)?;
-        Self::from_slice(gpu, name, values)
+        Self::for_texels(gpu, name, values.len(), texel_bytes(size_of::<T>()))?.holding(values)
     }
 
-    /// As [`Self::new`], in [`Location::Device`], for data that kernels read as texels.
+    /// As [`Self::from_texels`], for kernels that read 16 bytes at a time whatever the size of an element: a view holds more so.
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn for_texels(gpu: &Gpu, name: &str, len: usize) -> Result<Self> {
-        let bytes = len.saturating_mul(size_of::<T>()) as u64;
-        check_texels(name, bytes, size_of::<T>(), gpu.0.info.max_texel_elements)?;
-        Self::new(gpu, name, len, Location::Device)
+    pub fn from_wide_texels(gpu: &Gpu, name: &str, values: &[T]) -> Result<Self> {
+        Self::for_texels(gpu, name, values.len(), 16)?.holding(values)
+    }
+
+    /// Makes a [`Location::Device`] buffer of `len` elements with undefined contents, whose texels are as wide as this one's.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn larger(&self, gpu: &Gpu, name: &str, len: usize) -> Result<Self> {
+        Self::for_texels(gpu, name, len, self.untyped.texel)
+    }
+
+    fn for_texels(gpu: &Gpu, name: &str, len: usize, texel: u64) -> Result<Self> {
+        check_texels(name, len.saturating_mul(size_of::<T>()) as u64, texel, gpu.0.info.max_texel_elements)?;
+        Self::with_texels(gpu, name, len, Location::Device, texel)
     }
 
     /// Number of elements, at least 1.
@@ -210,7 +226,7 @@ impl<T> Buffer<T> {
     /// The range to bind. It is public only for generated code.
     #[doc(hidden)]
     pub fn bound(&self) -> Bound<'_> {
-        let bytes = |elements: usize| (elements * self.untyped.stride) as u64;
+        let bytes = |elements: usize| elements as u64 * self.untyped.stride;
         Bound { buffer: &self.untyped, offset: bytes(self.first), size: bytes(self.len) }
     }
 }
@@ -228,26 +244,25 @@ impl Bound<'_> {
 
     /// The first element. By the contract of `Bindings` its size is within every device's limit.
     pub(super) fn uniform(&self) -> vk::DescriptorBufferInfo {
-        let range = self.buffer.stride as u64;
+        let range = self.buffer.stride;
         vk::DescriptorBufferInfo::default().buffer(self.buffer.raw).offset(self.offset).range(range)
     }
 
     /// Bytes that a kernel is shown: of a uniform block the first element, else all.
     pub(super) fn bytes(&self, uniform: bool) -> u64 {
-        if uniform { self.buffer.stride as u64 } else { self.size }
+        if uniform { self.buffer.stride } else { self.size }
     }
 
-    /// Returns a view whose texels have 16 bytes where the element size is a multiple of 16, else 8 where it is a multiple of
-    /// 8, else 4. A view is made once and then kept.
+    /// Returns a view of its texels. A view is made once and then kept.
     ///
     /// # Errors
     /// When the buffer has more texels than one view may have, or this is only a part of it.
     pub(super) fn texels(&self, floats: bool) -> Result<vk::BufferView> {
         let whole = &**self.buffer;
-        if self.offset > 0 || self.size.next_multiple_of(4) < whole.size {
+        if self.offset > 0 || self.size.next_multiple_of(whole.texel) < whole.size {
             return Err(Error::Device(format!("buffer \"{}\": a part of it cannot be read as texels", whole.name)));
         }
-        let format = match (floats, texel_bytes(whole.stride)) {
+        let format = match (floats, whole.texel) {
             (true, 16) => vk::Format::R32G32B32A32_SFLOAT,
             (true, 8) => vk::Format::R32G32_SFLOAT,
             (true, _) => vk::Format::R32_SFLOAT,
@@ -255,7 +270,7 @@ impl Bound<'_> {
             (false, 8) => vk::Format::R32G32_UINT,
             (false, _) => vk::Format::R32_UINT,
         };
-        check_texels(&whole.name, whole.size, whole.stride, whole.gpu.0.info.max_texel_elements)?;
+        check_texels(&whole.name, whole.size, whole.texel, whole.gpu.0.info.max_texel_elements)?;
         let mut views = whole.views.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, view)) = views.iter().find(|(made, _)| *made == format) {
             return Ok(*view);
@@ -269,7 +284,7 @@ impl Bound<'_> {
 }
 
 impl Untyped {
-    pub(super) fn new(gpu: &Gpu, name: &str, size: u64, stride: usize, location: Location) -> Result<Self> {
+    pub(super) fn new(gpu: &Gpu, name: &str, size: u64, [stride, texel]: [u64; 2], location: Location) -> Result<Self> {
         let limit = gpu.0.info.max_buffer_size.min(gpu.0.info.max_allocation);
         if size > limit {
             return Err(too_big(name, size, "bytes", limit, "of one buffer"));
@@ -286,7 +301,7 @@ impl Untyped {
         gpu.0.name(raw, name);
         let (memory, views) = Default::default();
         // From here on, Drop cleans up if a line below fails.
-        let buffer = Self { gpu: gpu.clone(), name: name.to_owned(), raw, size, stride, memory, views };
+        let buffer = Self { gpu: gpu.clone(), name: name.to_owned(), raw, size, stride, texel, memory, views };
         let remedy = "choose a smaller film or scene, or a device with more memory";
         buffer.allocate(location).map_err(|e| Error::Device(format!("{what}: {e}: {remedy}")))?;
         Ok(buffer)
@@ -345,7 +360,7 @@ impl Drop for Untyped {
     }
 }
 
-/// Bytes per texel in a view of elements of `stride` bytes.
+/// Bytes per texel in a view of elements of `stride` bytes: the widest texels that elements are whole numbers of.
 fn texel_bytes(stride: usize) -> u64 {
     match stride {
         n if n.is_multiple_of(16) => 16,
@@ -354,8 +369,8 @@ fn texel_bytes(stride: usize) -> u64 {
     }
 }
 
-fn check_texels(name: &str, size: u64, stride: usize, limit: u64) -> Result<()> {
-    match size / texel_bytes(stride) {
+fn check_texels(name: &str, size: u64, texel: u64, limit: u64) -> Result<()> {
+    match size / texel {
         texels if texels > limit => Err(too_big(name, texels, "texels", limit, "of one texel buffer")),
         _ => Ok(()),
     }
@@ -370,14 +385,15 @@ fn too_big(name: &str, size: u64, unit: &str, limit: u64, of: &str) -> Error {
 
 #[cfg(test)]
 mod tests {
-    use super::check_texels;
+    use super::{check_texels, texel_bytes};
 
     #[test]
     fn texels_are_as_wide_as_elements_allow() {
         // Elements of 48, 24 and 12 bytes are read 16, 8 and 4 at a time.
         for (stride, texels) in [(48, 6), (24, 12), (12, 24)] {
-            assert!(check_texels("a", 96, stride, texels).is_ok());
-            let line = check_texels("a", 96, stride, texels - 1).unwrap_err().to_string();
+            let texel = texel_bytes(stride);
+            assert!(check_texels("a", 96, texel, texels).is_ok());
+            let line = check_texels("a", 96, texel, texels - 1).unwrap_err().to_string();
             assert!(line.contains(&format!("{texels} texels")) && line.contains("choose"), "{line}");
         }
     }

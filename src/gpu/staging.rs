@@ -73,7 +73,7 @@ struct Staging {
 impl Staging {
     fn new(gpu: &Gpu, bytes: usize, location: Location) -> Result<Self> {
         let size = bytes.clamp(1, CHUNK).next_multiple_of(4);
-        Ok(Self { buffer: Untyped::new(gpu, "staging", size as u64, 4, location)?, commands: Commands::new(gpu)? })
+        Ok(Self { buffer: Untyped::new(gpu, "staging", size as u64, [4; 2], location)?, commands: Commands::new(gpu)? })
     }
 
     fn access(&self, access: impl FnOnce(&mut [u8])) -> Result<()> {

@@ -144,4 +144,6 @@ effects! {
     soft_light: FX_SOFT;
     /// A hierarchy deep enough that rays of a subgroup gain from testing each other's triangles.
     dealt_triangles: FX_DEALT;
+    /// Textures of more texels than one view of single words may have: words are fetched by four.
+    many_texels: FX_MANY_TEXELS;
 }

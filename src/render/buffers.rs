@@ -50,7 +50,10 @@ impl DeviceScene {
             instances: Buffer::from_texels(gpu, "instances", &scene.instances)?,
             materials: Buffer::from_texels(gpu, "materials", &scene.materials)?,
             textures: Buffer::from_texels(gpu, "textures", &scene.textures)?,
-            texels: Buffer::from_texels(gpu, "texels of textures", &scene.texels)?,
+            texels: match effects.many_texels {
+                true => Buffer::from_wide_texels(gpu, "texels of textures", &scene.texels)?,
+                false => Buffer::from_texels(gpu, "texels of textures", &scene.texels)?,
+            },
             lights: Buffer::from_texels(gpu, "lights", &scene.lights)?,
             light_table: Buffer::from_texels(gpu, "light_table", &scene.light_table)?,
             environment: Buffer::from_texels(gpu, "environment", environment.map_or(&[], |e| &e.texels[..]))?,

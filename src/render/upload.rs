@@ -30,7 +30,7 @@ pub fn parts<T: Pod>(
         return Ok(());
     }
     if values.len() > to.len() {
-        *to = Buffer::for_texels(gpu, name, values.len() + spare)?;
+        *to = to.larger(gpu, name, values.len() + spare)?;
         return rec.upload(to, &[(0, values)]);
     }
     let parts = joined(changed, values.len());

@@ -147,6 +147,8 @@ fn because(reasons: &mut Reasons, name: Effect, on: bool, why: String) -> bool {
 /// Triangles from which on rays gain from testing each other's. In a Cornell box of 36 most lanes have some to test at every
 /// node, so that dealing them costs a sixth; scenes of 1,650 gain a little, of 100,000 a third.
 const DEALT_FROM: usize = 1000;
+/// Most texels of textures that are read one at a time: views of more are beyond the limit of lavapipe and of NVIDIA's driver.
+const NARROW_TEXELS: usize = 1 << 27;
 
 fn scene_effects(scene: &Scene, found: &mut Effects, reasons: &mut Reasons) {
     let mut because = |name, on, why| because(reasons, name, on, why);
@@ -173,6 +175,8 @@ fn scene_effects(scene: &Scene, found: &mut Effects, reasons: &mut Reasons) {
     let triangles = scene.triangles.len();
     let dealt = triangles >= DEALT_FROM && !found.spheres;
     found.dealt_triangles = because(Effect::dealt_triangles, dealt, format!("{triangles} triangles"));
+    let texels = scene.texels.len();
+    found.many_texels = because(Effect::many_texels, texels > NARROW_TEXELS, format!("{texels} texels of textures"));
 }
 
 fn setting_effects(s: &Settings, found: &mut Effects, reasons: &mut Reasons) {

@@ -173,6 +173,8 @@ fn materials_of_gltf_agree_with_their_twins() {
     let pair = run(&gpu, &scene, effects);
     check("materials", &pair);
     check("materials, all effects", &run(&gpu, &scene, all_effects(&scene, &scene.settings)));
+    let by_four = run(&gpu, &scene, Effects { many_texels: true, ..effects });
+    assert!(by_four.samples[0] == pair.samples[0], "words that are fetched by four are the same words");
     let whole = agreement(&pair.samples);
     // Controls: the twin's samples of scenes in which one thing is another.
     let plants: [Plant; 7] = [
