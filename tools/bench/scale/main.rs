@@ -27,7 +27,7 @@ const ROWS: [Row; 6] = [
 ];
 
 /// Real scenes below the folder of outside data.
-const REAL: [&str; 2] = ["scenes/gltf/forest_instanced.gltf", "scenes/stanford/buddha_1087716_upsampled.ply.gz"];
+const REAL: [&str; 2] = ["scenes/forest/forest_instanced.gltf", "scenes/stanford/buddha_1087716_upsampled.ply.gz"];
 
 /// What a process has measured.
 #[derive(Serialize, Deserialize)]
