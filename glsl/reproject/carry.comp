@@ -3,9 +3,9 @@
 #include "shared/scene.glsl"
 #include "shared/frame.glsl"
 
-// Starts each pixel of a new frame with the samples that won it, or with none. A pixel at an edge takes none: what it shows is a
-// mixture that no sample of one surface stands for. Carried samples keep the point that they are of, so that they move on from
-// there and not from the centre of a pixel; where the new frame's samples will outnumber them, its point takes over.
+// Starts each pixel of a new frame with the samples that won it, or with none. Carried samples keep the point that they are of, so
+// that they move on from there and not from the centre of a pixel; where the new frame's samples will outnumber them, its point takes
+// over.
 layout(local_size_x_id = 100) in;
 layout(binding = 11) uniform usamplerBuffer guide; // of Guide
 layout(binding = 12) uniform usamplerBuffer history; // of History
@@ -20,34 +20,28 @@ layout(scalar, push_constant) uniform Push { ReprojectPush push; };
 
 #include "shared/surface_point.glsl"
 #include "shared/history.glsl"
-#include "shared/whole_pixel.glsl"
 
-const uint OLD_PIXEL = 67108863u; // the lower 26 bits of a key, see project.comp
 
 void main() {
     uint i = thread_index();
     if (i >= push.pixels) return;
-    uint pixel = push.first_pixel + i, key = winner[i], from = key & OLD_PIXEL, word = 0u;
+    uint pixel = push.first_pixel + i, key = winner[i], from = key & ((1u << PIXEL_BITS) - 1u), word = 0u;
+    bool still = push.moved == 0u && previous == camera;
     PixelStats s = PixelStats_zero();
     PixelLight l = PixelLight_zero();
-    if (key != NONE) {
-        word = texelFetch(offered, int(from)).x;
-        if (push.moved != 0u || previous != camera) {
-            Surface seen = surface_of(points[i]);
-            if (!is_whole(pixel, seen.geometric, pixel_width(camera, push.size))) word = dropped(DROPPED_EDGE);
-        }
-    }
+    if ((key & NO_OFFER) != NO_OFFER) word = texelFetch(offered, int(from)).x;
+    else if ((key & AT_EDGE) != 0u) word = dropped(DROPPED_EDGE);
     Carried c = carried_of(word);
     if (c.count > 0u) {
         History h = History_load(history, from);
         s.mean = h.mean;
-        s.m2 = h.m2;
+        s.m2 = still ? h.variance : h.variance * freedom(c.count);
         s.count = c.count;
         if (FX_SPLIT) {
             HistoryLight taken = HistoryLight_load(history_light, from);
             l.direct = taken.direct;
             l.albedo = taken.albedo;
-            l.indirect_m2 = taken.indirect_m2;
+            l.indirect_m2 = still ? taken.indirect_variance : taken.indirect_variance * freedom(c.count);
         }
         if (c.count >= push.spp) points[i] = SurfacePoint(h.triangle, h.instance, h.weights);
     }

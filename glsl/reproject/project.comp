@@ -26,8 +26,6 @@ layout(scalar, push_constant) uniform Push { ReprojectPush push; };
 #include "shared/history.glsl"
 #include "shared/cell.glsl"
 
-// A key's upper 6 bits are the distance from the pixel's centre, its lower 26 the old pixel.
-const uint PIXEL_BITS = 26u;
 // A hit is of the surface of a point if it lies no farther from the plane there than this, in widths of a pixel.
 const float PLANE_DISTANCE = 0.5;
 // An albedo below this does not make more of the light that arrives: the quotient would only show noise.
@@ -81,17 +79,19 @@ float view_error(Surface s, uint pixel, vec3 before, vec3 after) {
 // Lambertian reflection alone is the same in every direction.
 const bool DEPENDS_ON_VIEW = !ONE_KIND || !FX_DIFFUSE;
 
-// Offers the samples of a pixel to those around `film`, a point of the film. Returns why none takes them, or 0.
-uint offer(uint pixel, Surface s, vec2 film) {
+// Offers the samples of a pixel to those around `film`, a point of the film, of an edge to edges alone. Returns why none takes them,
+// or 0.
+uint offer(uint pixel, Surface s, vec2 film, bool edge) {
     ivec2 size = ivec2(push.size), corner = ivec2(floor(clamp(film, vec2(-2.0), vec2(size) + 2.0) - 0.5));
     uint reason = DROPPED_OUTSIDE;
     for (int k = 0; k < 4; k++) {
         ivec2 at = corner + ivec2(k & 1, k >> 1);
         if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size))) continue;
         uint to = uint(at.y * size.x + at.x);
-        bool taken = shows(to, s);
+        uint at_edge = winner[to] & AT_EDGE; // what others offer does not change it
+        bool taken = edge == (at_edge != 0u) && shows(to, s);
         vec2 off = abs(film - vec2(at) - 0.5);
-        if (taken) atomicMin(winner[to], min(uint(max(off.x, off.y) * 64.0), 63u) << PIXEL_BITS | pixel);
+        if (taken) atomicMin(winner[to], at_edge | min(uint(max(off.x, off.y) * 64.0), 63u) << PIXEL_BITS | pixel);
         reason = taken ? 0u : reason == 0u ? 0u : DROPPED_HIDDEN;
     }
     return reason;
@@ -101,18 +101,22 @@ uint offer(uint pixel, Surface s, vec2 film) {
 uint moved(uint pixel, Carried c) {
     Surface s = surface_of(History_triangle(history, pixel), History_instance(history, pixel), History_weights(history, pixel));
     if (c.back != (dot(s.geometric, camera.position - s.position) < 0.0)) return dropped(DROPPED_HIDDEN);
-    // In shares of what is allowed.
-    float light = push.moved != 0u ? LightChange_change(changes, cell_of(pixel, push.size)) / max(push.max_change, 1e-30) : 0.0, view = 0.0;
+    if (push.moved != 0u) {
+        float light = LightChange_change(changes, cell_of(pixel, push.size)) / max(push.noise, 1e-15);
+        c.count = worth(c.count, light * light);
+        if (c.count == 0u) return dropped(DROPPED_LIGHT);
+    }
+    float view = 0.0; // in shares of what is allowed
     if (DEPENDS_ON_VIEW) {
         vec3 before = normalize(previous.position - s.position), after = normalize(camera.position - s.position);
         view = view_error(s, pixel, before, after) / max(push.max_error, 1e-30);
     }
-    bool small = light + view <= 1.0;
-    c.error += small ? uint(ceil((light + view) * float(ERROR_PARTS))) : 0u;
-    if (!small || c.error > ERROR_PARTS) return dropped(light > view ? DROPPED_LIGHT : DROPPED_VIEW);
+    bool small = view <= 1.0;
+    c.error += small ? uint(ceil(view * float(ERROR_PARTS))) : 0u;
+    if (!small || c.error > ERROR_PARTS) return dropped(DROPPED_VIEW);
     vec3 film = film_from_point(camera, s.position, push.size);
-    uint reason = film.z > 0.0 && finite(film) ? offer(pixel, s, film.xy) : DROPPED_OUTSIDE;
-    return reason == 0u ? word_of(Carried(c.count, c.age + 1u, c.error, c.back)) : dropped(reason);
+    uint reason = film.z > 0.0 && finite(film) ? offer(pixel, s, film.xy, c.edge) : DROPPED_OUTSIDE;
+    return reason == 0u ? word_of(Carried(c.count, c.age + 1u, c.error, c.edge, c.back)) : dropped(reason);
 }
 
 void main() {

@@ -5,8 +5,8 @@
 
 // At the end of a frame, before anything changes, writes what each pixel hands on to the next: the point that its samples are of, and
 // their statistics.
-// Pixels of specular surfaces and of edges hand on nothing (Schalk 2018, 3.2), unless nothing has moved: then every pixel keeps
-// all that it has.
+// Pixels of specular surfaces hand on nothing (Schalk 2018, 3.2), unless nothing has moved: then every pixel keeps all that it has.
+// Departure from there: pixels of edges hand on as many samples as are worth it, to pixels of edges.
 layout(local_size_x_id = 100) in;
 layout(binding = 11) uniform usamplerBuffer guide; // of Guide
 layout(binding = 12) uniform usamplerBuffer stats; // of PixelStats
@@ -35,14 +35,45 @@ bool is_sharp(Bsdf b) {
     return is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC) || (bsdf_is_specular(b) && is_smooth(b));
 }
 
-// 0 where the pixel's samples may move. `back` says which side of the surface they show.
-uint reason_to_keep(uint pixel, SurfacePoint at, out bool back) {
-    back = false;
+// From one frame to the next a pixel moves against an edge, and the share of it that shows the other surface changes: by how far
+// the pixel's centre has moved against the point. The square of the distance of a point from the centre is 1/12 on average, and 1/2 for
+// the fifth of points that come in from outside: 1/12 before and 1/6 after.
+const float VARIANCE_OF_MOVE = 0.25;
+
+// How many of the samples of a pixel at an edge are worth handing on: so many that their mean is as good as new samples are, by
+// the variance of one and the square of what the move shifts them by, which grows with the difference of the surfaces' light. None
+// beside a lamp, whose light exceeds that of all around it.
+uint kept_of_edge(uint pixel, vec3 plane, uint count) {
+    float width = pixel_width(previous, push.size);
+    vec4 own = vec4(0.0), others = vec4(0.0); // sum of radiance, samples
+    float squares = 0.0;
+    bool lamp = false;
+    for (int k = 0; k < 9; k++) {
+        uint q = neighbour(pixel, k), material = Guide_material(guide, q);
+        PixelStats s = PixelStats_load(stats, q);
+        bool same = shows_same(pixel, q, plane, width);
+        vec4 sum = float(s.count) * vec4(s.mean, 1.0);
+        own += same ? sum : vec4(0.0);
+        others += same ? vec4(0.0) : sum;
+        squares += s.m2.r + s.m2.g + s.m2.b + dot(sum.rgb, s.mean);
+        lamp = lamp || material != NONE && Material_emission(materials, material) != vec3(0.0);
+    }
+    if (lamp || own.w == 0.0 || others.w == 0.0) return 0u;
+    vec3 mean = own.rgb / own.w, beside = others.rgb / others.w, contrast = mean - beside;
+    // Of one sample, about the mean of its surface.
+    float variance = (squares - dot(own.rgb, mean) - dot(others.rgb, beside)) / max(own.w + others.w - 2.0, 1.0);
+    return worth(count, VARIANCE_OF_MOVE * dot(contrast, contrast) / max(variance, 1e-30));
+}
+
+// 0 where the pixel's samples may move: so many, of that side of the surface, of an edge or not.
+uint reason_to_keep(uint pixel, SurfacePoint at, inout Carried c) {
     if (at.triangle == NONE) return DROPPED_SKY;
     Surface s = surface_of(at);
-    back = dot(s.geometric, previous.position - s.position) < 0.0;
+    c.back = dot(s.geometric, previous.position - s.position) < 0.0;
     if (is_sharp(surface_bsdf(s))) return DROPPED_SPECULAR;
-    return is_whole(pixel, s.geometric, pixel_width(previous, push.size)) ? 0u : DROPPED_EDGE;
+    c.edge = !is_whole(pixel, s.geometric, pixel_width(previous, push.size));
+    if (c.edge) c.count = kept_of_edge(pixel, s.geometric, c.count);
+    return c.count > 0u ? 0u : DROPPED_EDGE;
 }
 
 // The point as the new frame numbers it.
@@ -59,19 +90,18 @@ void main() {
     bool still = push.moved == 0u && previous == camera;
     PixelStats s = PixelStats_load(stats, pixel);
     SurfacePoint at = SurfacePoint_load(points, pixel);
-    bool back = false;
-    uint reason = still || s.count == 0u ? 0u : reason_to_keep(pixel, at, back);
-    uint kept = min(s.count, still ? MOST_CARRIED : push.max_samples);
-    Carried before = carried_of(carried[pixel]);
+    Carried c = carried_of(carried[pixel]);
     // A pixel that took nothing has samples of age and error 0, whatever its word says of why.
-    Carried now = Carried(kept, before.count > 0u ? before.age : 0u, before.count > 0u ? before.error : 0u, back);
-    offered[i] = reason == 0u ? word_of(now) : dropped(reason);
-    vec3 m2 = vec3(part_of_m2(s.m2.x, kept, s.count), part_of_m2(s.m2.y, kept, s.count), part_of_m2(s.m2.z, kept, s.count));
+    if (c.count == 0u) c = carried_of(0u);
+    c.count = min(s.count, still ? MOST_CARRIED : push.max_samples);
+    c.edge = c.back = false;
+    uint reason = still || s.count == 0u ? 0u : reason_to_keep(pixel, at, c);
+    offered[i] = reason == 0u ? word_of(c) : dropped(reason);
     at = numbered_anew(at);
-    history[i] = History_words(History(at.triangle, at.instance, at.weights, s.mean, m2));
+    history[i] = History_words(History(at.triangle, at.instance, at.weights, s.mean, still ? s.m2 : s.m2 / freedom(s.count)));
     if (FX_SPLIT) {
         PixelLight l = PixelLight_load(light, pixel);
         // Not as 64-bit words: seven words are no multiple of those.
-        history_light[i] = HistoryLight(l.direct, l.albedo, part_of_m2(l.indirect_m2, kept, s.count));
+        history_light[i] = HistoryLight(l.direct, l.albedo, still ? l.indirect_m2 : l.indirect_m2 / freedom(s.count));
     }
 }

@@ -1,8 +1,9 @@
 // What is known of the samples that a pixel has from earlier frames, in one word: their number in the lower 16 bits, then 8 bits
-// of how many times they have moved, then 7 of the error that they are accounted by changed view and changed light, in
-// parts of the largest that is allowed, rounded up, then one that says which side of the surface they show. Where the number is 0 the bits above it say why.
+// of how many times they have moved, then 6 of the error that they are accounted by changed view and changed light, in
+// parts of the largest that is allowed, rounded up, then one that says whether they are of an edge, then one that says which side
+// of the surface they show. Where the number is 0 the bits above it say why.
 const uint MOST_CARRIED = 65535u;
-const uint ERROR_PARTS = 127u;
+const uint ERROR_PARTS = 63u;
 
 // Reasons for a pixel not to hand on its samples, or not to take any; 0: it has none, or nobody offers any.
 const uint DROPPED_SKY = 1u;      // there is no surface
@@ -18,18 +19,27 @@ struct Carried {
     uint count;
     uint age;
     uint error; // in ERROR_PARTS
+    bool edge;  // they are of several surfaces
     bool back;  // of the side that the triangle's normal points away from
 };
 
 Carried carried_of(uint word) {
-    return Carried(word & 0xffffu, (word >> 16) & 0xffu, (word >> 24) & 0x7fu, word >> 31 != 0u);
+    return Carried(word & 0xffffu, (word >> 16) & 0xffu, (word >> 24) & 0x3fu, (word >> 30 & 1u) != 0u, word >> 31 != 0u);
 }
 
-uint word_of(Carried c) { return c.count | c.age << 16 | c.error << 24 | uint(c.back) << 31; }
+uint word_of(Carried c) { return c.count | c.age << 16 | c.error << 24 | uint(c.edge) << 30 | uint(c.back) << 31; }
 
 uint dropped(uint reason) { return reason << 16; }
 
-// A smaller part of a sum of squared deviations: that of `kept` of `count` samples of the same variance.
-float part_of_m2(float m2, uint kept, uint count) {
-    return kept < count ? m2 * (float(max(kept, 1u) - 1u) / float(count - 1u)) : m2;
-}
+// By what a sum of squared deviations is divided for the variance of one sample.
+float freedom(uint count) { return float(max(count, 2u) - 1u); }
+
+// Of `count` samples as many new ones as have a mean as far from the truth as theirs is after a change, whose square is
+// `change` times the variance of one sample.
+uint worth(uint count, float change) { return uint(float(count) / (1.0 + float(count) * change) + 0.5); }
+
+// Keys of offers: bit 31 says whether the new pixel is at an edge, then 6 bits are the distance from its centre, the lower 25 the old
+// pixel.
+const uint PIXEL_BITS = 25u;
+const uint AT_EDGE = 2147483648u;
+const uint NO_OFFER = 2147483647u; // all bits below AT_EDGE

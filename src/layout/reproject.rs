@@ -25,8 +25,8 @@ gpu_structs! {
         weights: vec2,
         /// As [`PixelStats::mean`].
         mean: vec3,
-        /// As [`PixelStats::m2`], of the samples that are handed on.
-        m2: vec3,
+        /// Variance of one sample; where nothing has moved, as [`PixelStats::m2`].
+        variance: vec3,
     }
 
     /// The light of a [`History`], where direct and indirect light are kept apart.
@@ -35,8 +35,8 @@ gpu_structs! {
         direct: vec3,
         /// As [`PixelLight::albedo`].
         albedo: vec3,
-        /// As [`PixelLight::indirect_m2`], of the samples that are handed on.
-        indirect_m2: float,
+        /// Variance of one sample; where nothing has moved, as [`PixelLight::indirect_m2`].
+        indirect_variance: float,
     }
 
     /// Push constants of `glsl/reproject`.
@@ -49,8 +49,8 @@ gpu_structs! {
         pixels: uint,
         /// Largest error by changed view that carried samples may have, W/(m^2 sr).
         max_error: float,
-        /// Largest change of light, as a share of it, that they may have been through.
-        max_change: float,
+        /// Change of light, as a share of it, that counts as much as the deviation of one sample.
+        noise: float,
         /// Largest distance of a neighbour's first hit from the plane of the pixel's own, in widths of the pixel there.
         aliasing: float,
         /// Largest number of samples that a pixel hands on.

@@ -9,8 +9,10 @@ pub struct Carried {
     pub count: u32,
     /// How many times they have moved.
     pub age: u32,
-    /// Error that they are accounted, in 127ths of the largest one.
+    /// Error that they are accounted, in 63rds of the largest one.
     pub error: u32,
+    /// Whether they are of an edge: of several surfaces.
+    pub edge: bool,
     /// Whether they show the side of the surface that its triangle's normal points away from.
     pub back: bool,
 }
@@ -18,7 +20,13 @@ pub struct Carried {
 impl Carried {
     /// Out of a word.
     pub fn of(word: u32) -> Self {
-        Self { count: word & 0xffff, age: (word >> 16) & 0xff, error: (word >> 24) & 0x7f, back: word >> 31 != 0 }
+        Self {
+            count: word & 0xffff,
+            age: (word >> 16) & 0xff,
+            error: (word >> 24) & 0x3f,
+            edge: word >> 30 & 1 != 0,
+            back: word >> 31 != 0,
+        }
     }
 
     /// Of a pixel of [`History::carried`], where a word without samples may say why.
@@ -29,7 +37,7 @@ impl Carried {
 
     /// As a word.
     pub fn word(self) -> u32 {
-        self.count | self.age << 16 | self.error << 24 | u32::from(self.back) << 31
+        self.count | self.age << 16 | self.error << 24 | u32::from(self.edge) << 30 | u32::from(self.back) << 31
     }
 }
 

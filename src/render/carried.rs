@@ -61,6 +61,7 @@ impl Renderer {
             count: samples[i].min(MOST_CARRIED),
             age: age[i].min(255),
             error: ((error[i] * ERROR_PARTS as f32).round() as u32).min(ERROR_PARTS),
+            edge: false,
             back: false,
         };
         let points = points(film, scene)?;

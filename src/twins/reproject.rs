@@ -5,15 +5,15 @@ use crate::layout::{
 };
 pub use crate::render::Carried;
 use crate::scene::Scene;
-use crate::shaders::carry::OLD_PIXEL;
-use crate::shaders::project::{LEAST_ALBEDO, PIXEL_BITS, PLANE_DISTANCE};
+use crate::shaders::project::{LEAST_ALBEDO, PLANE_DISTANCE};
+use crate::shaders::remember::VARIANCE_OF_MOVE;
 use crate::shaders::shared::history::*;
 use crate::twins::bsdf::{Bsdf, SMOOTH_ALPHA, bsdf_albedo, bsdf_evaluate, bsdf_is_specular};
 use crate::twins::camera::{film_from_point, pixel_width};
 use crate::twins::light_change::cell_of;
 use crate::twins::surface::{Surface, facing_normals, shading_basis, surface_at, surface_bsdf};
 use crate::twins::traverse::Hit;
-use glam::{Vec2, Vec3, vec2};
+use glam::{Vec2, Vec3, Vec4, vec2};
 use std::f32::consts::PI;
 
 fn dropped(reason: u32) -> u32 {
@@ -67,8 +67,15 @@ pub struct Handed {
     pub offered: Vec<u32>,
 }
 
-fn part_of_m2(m2: f32, kept: u32, count: u32) -> f32 {
-    if kept < count { m2 * ((kept.max(1) - 1) as f32 / (count - 1) as f32) } else { m2 }
+/// By what a sum of squared deviations is divided for the variance of one sample.
+fn freedom(count: u32) -> f32 {
+    (count.max(2) - 1) as f32
+}
+
+/// How many new samples have a mean as far from the truth as that of `count` after a change, whose square is `change` times the
+/// variance of one sample.
+fn worth(count: u32, change: f32) -> u32 {
+    (count as f32 / (1.0 + count as f32 * change) + 0.5) as u32
 }
 
 fn surface_of(scene: &Scene, triangle: u32, instance: u32, weights: [f32; 2]) -> Surface {
@@ -108,30 +115,54 @@ impl Reprojection<'_> {
             .map(move |k| ((y + k / 3 - 1).clamp(0, height - 1) * width + (x + k % 3 - 1).clamp(0, width - 1)) as usize)
     }
 
-    /// Whether the neighbours of a pixel show the surface that it shows.
-    pub fn is_whole(&self, guide: &[Guide], pixel: usize, plane: Vec3, width: f32) -> bool {
-        let here = &guide[pixel];
-        let limit = self.push.aliasing * width * here.depth;
-        self.around(pixel).all(|q| {
-            let off = Vec3::from(guide[q].position) - Vec3::from(here.position);
-            guide[q].object == here.object && plane.dot(off).abs() <= limit
-        })
+    /// Whether a pixel shows the surface that another shows, whose tangent plane has this normal.
+    fn shows_same(&self, [here, other]: [&Guide; 2], plane: Vec3, width: f32) -> bool {
+        let off = plane.dot(Vec3::from(other.position) - Vec3::from(here.position)).abs();
+        other.object == here.object && off <= self.push.aliasing * width * here.depth
     }
 
-    /// Why, and whether the samples show the back of the surface.
-    fn reason_to_keep(&self, left: &Left, pixel: usize) -> (u32, bool) {
+    /// Whether the neighbours of a pixel show the surface that it shows.
+    pub fn is_whole(&self, guide: &[Guide], pixel: usize, plane: Vec3, width: f32) -> bool {
+        self.around(pixel).all(|q| self.shows_same([&guide[pixel], &guide[q]], plane, width))
+    }
+
+    /// How many of `count` samples of a pixel at an edge are worth handing on.
+    fn kept_of_edge(&self, left: &Left, pixel: usize, plane: Vec3, count: u32) -> u32 {
+        let width = pixel_width(&self.previous, self.push.size);
+        let (mut sums, mut squares, mut lamp) = ([Vec4::ZERO; 2], 0.0, false);
+        for q in self.around(pixel) {
+            let (s, seen) = (&left.stats[q], &left.guide[q]);
+            let same = self.shows_same([&left.guide[pixel], seen], plane, width);
+            let (n, mean) = (s.count as f32, Vec3::from(s.mean));
+            sums[usize::from(same)] += n * mean.extend(1.0);
+            squares += s.m2[0] + s.m2[1] + s.m2[2] + (n * mean).dot(mean);
+            lamp |= seen.material != NONE && self.before.materials[seen.material as usize].emission != [0.0; 3];
+        }
+        if lamp || sums.iter().any(|sum| sum.w == 0.0) {
+            return 0;
+        }
+        let means = sums.map(|sum| sum.truncate() / sum.w);
+        let of_means: f32 = sums.iter().zip(means).map(|(sum, mean)| sum.truncate().dot(mean)).sum();
+        let variance = (squares - of_means) / (sums[0].w + sums[1].w - 2.0).max(1.0);
+        worth(count, VARIANCE_OF_MOVE * (means[1] - means[0]).length_squared() / variance.max(1e-30))
+    }
+
+    /// Why a pixel keeps its samples, or 0: what moves of them is in `c`.
+    fn reason_to_keep(&self, left: &Left, pixel: usize, c: &mut Carried) -> u32 {
         let at = left.points[pixel];
         if at.triangle == NONE {
-            return (DROPPED_SKY, false);
+            return DROPPED_SKY;
         }
         let s = surface_of(self.before, at.triangle, at.instance, at.weights);
-        let back = s.geometric.dot(Vec3::from(self.previous.position) - s.position) < 0.0;
-        let bsdf = surface_bsdf(self.before, &s);
-        if is_sharp(&bsdf) {
-            return (DROPPED_SPECULAR, back);
+        c.back = s.geometric.dot(Vec3::from(self.previous.position) - s.position) < 0.0;
+        if is_sharp(&surface_bsdf(self.before, &s)) {
+            return DROPPED_SPECULAR;
         }
-        let whole = self.is_whole(left.guide, pixel, s.geometric, pixel_width(&self.previous, self.push.size));
-        (if whole { 0 } else { DROPPED_EDGE }, back)
+        c.edge = !self.is_whole(left.guide, pixel, s.geometric, pixel_width(&self.previous, self.push.size));
+        if c.edge {
+            c.count = self.kept_of_edge(left, pixel, s.geometric, c.count);
+        }
+        if c.count > 0 { 0 } else { DROPPED_EDGE }
     }
 
     fn numbered_anew(&self, mut at: SurfacePoint) -> SurfacePoint {
@@ -149,18 +180,18 @@ impl Reprojection<'_> {
         let mut handed = Handed::default();
         for (pixel, s) in left.stats.iter().enumerate() {
             let (at, l) = (left.points[pixel], left.light[pixel]);
-            let stays = self.still() || s.count == 0;
-            let (reason, back) = if stays { (0, false) } else { self.reason_to_keep(left, pixel) };
-            let kept = s.count.min(if self.still() { MOST_CARRIED } else { self.push.max_samples });
+            let still = self.still();
             let before = Some(Carried::of(left.carried[pixel])).filter(|c| c.count > 0).unwrap_or_default();
-            let now = Carried { count: kept, back, ..before };
+            let count = s.count.min(if still { MOST_CARRIED } else { self.push.max_samples });
+            let mut now = Carried { count, edge: false, back: false, ..before };
+            let reason = if still || s.count == 0 { 0 } else { self.reason_to_keep(left, pixel, &mut now) };
             handed.offered.push(if reason == 0 { now.word() } else { dropped(reason) });
-            let m2 = s.m2.map(|m2| part_of_m2(m2, kept, s.count));
+            let of_one = |m2: f32| if still { m2 } else { m2 / freedom(s.count) };
+            let variance = s.m2.map(of_one);
             let SurfacePoint { triangle, instance, weights, .. } = self.numbered_anew(at);
-            handed.records.push(History { triangle, instance, weights, mean: s.mean, m2, ..Default::default() });
-            let indirect_m2 = part_of_m2(l.indirect_m2, kept, s.count);
-            let light = HistoryLight { direct: l.direct, albedo: l.albedo, indirect_m2, ..Default::default() };
-            handed.light.push(light);
+            handed.records.push(History { triangle, instance, weights, mean: s.mean, variance, ..Default::default() });
+            let (direct, albedo, indirect_variance) = (l.direct, l.albedo, of_one(l.indirect_m2));
+            handed.light.push(HistoryLight { direct, albedo, indirect_variance, ..Default::default() });
         }
         handed
     }
@@ -187,17 +218,17 @@ impl Reprojection<'_> {
         of(before).max(of(after))
     }
 
-    /// Offers a pixel's samples to those around a point of the film. Returns why none takes them, or 0.
-    fn offer(&self, guide: &[Guide], winner: &mut [u32], pixel: usize, s: &Surface, film: Vec2) -> u32 {
+    /// Offers a pixel's samples to those around a point of the film, of an edge to edges alone. Returns why none takes them, or 0.
+    fn offer(&self, guide: &[Guide], winner: &mut [u32], (pixel, edge): (usize, bool), s: &Surface, film: Vec2) -> u32 {
         let [width, height] = self.push.size.map(|n| n as i32);
         let (x, y) = ((film.x - 0.5).floor() as i32, (film.y - 0.5).floor() as i32);
         let around = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
         let mut reason = DROPPED_OUTSIDE;
         for (x, y) in around.into_iter().filter(|(x, y)| (0..width).contains(x) && (0..height).contains(y)) {
             let to = (y * width + x) as usize;
-            if self.shows(&guide[to], s) {
-                let off = (film - vec2(x as f32, y as f32) - 0.5).abs().max_element();
-                winner[to] = winner[to].min(((off * 64.0) as u32).min(63) << PIXEL_BITS | pixel as u32);
+            let (at_edge, off) = (winner[to] & AT_EDGE, (film - vec2(x as f32, y as f32) - 0.5).abs().max_element());
+            if edge == (at_edge != 0) && self.shows(&guide[to], s) {
+                winner[to] = winner[to].min(at_edge | ((off * 64.0) as u32).min(63) << PIXEL_BITS | pixel as u32);
                 reason = 0;
             } else if reason != 0 {
                 reason = DROPPED_HIDDEN;
@@ -207,33 +238,47 @@ impl Reprojection<'_> {
     }
 
     /// Moves a pixel's samples. Returns their word in their new pixel, or why they stay behind.
-    fn moved(&self, handed: &Handed, guide: &[Guide], winner: &mut [u32], pixel: usize, c: Carried) -> u32 {
+    fn moved(&self, handed: &Handed, guide: &[Guide], winner: &mut [u32], pixel: usize, mut c: Carried) -> u32 {
         let h = &handed.records[pixel];
         let s = surface_of(self.scene, h.triangle, h.instance, h.weights);
         if c.back != (s.geometric.dot(Vec3::from(self.camera.position) - s.position) < 0.0) {
             return dropped(DROPPED_HIDDEN);
         }
+        if self.push.moved != 0 {
+            let change = self.changes[cell_of(pixel as u32, self.push.size) as usize].change;
+            c.count = worth(c.count, (change / self.push.noise.max(1e-15)).powi(2));
+            if c.count == 0 {
+                return dropped(DROPPED_LIGHT);
+            }
+        }
         let views = [self.previous, self.camera].map(|c| (Vec3::from(c.position) - s.position).normalize());
         let around: Vec3 = self.around(pixel).map(|q| Vec3::from(handed.records[q].mean)).sum();
         let view = self.view_error(&s, around / 9.0, views[0], views[1]);
-        let cell = cell_of(pixel as u32, self.push.size) as usize;
-        let light = if self.push.moved != 0 { self.changes[cell].change } else { 0.0 };
-        let (light, view) = (light / self.push.max_change.max(1e-30), view / self.push.max_error.max(1e-30));
-        let parts = ((light + view) * ERROR_PARTS as f32).ceil();
+        let view = view / self.push.max_error.max(1e-30);
+        let parts = (view * ERROR_PARTS as f32).ceil();
         // A number that is none fails both comparisons.
-        if !(light + view <= 1.0 && c.error as f32 + parts <= ERROR_PARTS as f32) {
-            return dropped(if light > view { DROPPED_LIGHT } else { DROPPED_VIEW });
+        if !(view <= 1.0 && c.error as f32 + parts <= ERROR_PARTS as f32) {
+            return dropped(DROPPED_VIEW);
         }
         let film = film_from_point(&self.camera, s.position, self.push.size);
         let ahead = film.z > 0.0 && film.is_finite();
-        let reason = if ahead { self.offer(guide, winner, pixel, &s, film.truncate()) } else { DROPPED_OUTSIDE };
+        let reason =
+            if ahead { self.offer(guide, winner, (pixel, c.edge), &s, film.truncate()) } else { DROPPED_OUTSIDE };
         let word = Carried { age: c.age + 1, error: c.error + parts as u32, ..c }.word();
         if reason == 0 { word } else { dropped(reason) }
     }
 
-    /// Twin of `project.comp`: the winner's key of every new pixel. `guide` is that of the new frame.
-    pub fn project(&self, handed: &mut Handed, guide: &[Guide]) -> Vec<u32> {
-        let mut winner = vec![NONE; guide.len()];
+    /// Twin of `edges.comp`: a key without an offer of every new pixel. `guide` and `points` are those of the new frame.
+    fn edges(&self, guide: &[Guide], points: &[SurfacePoint]) -> Vec<u32> {
+        let width = pixel_width(&self.camera, self.push.size);
+        let plane = |at: &SurfacePoint| surface_of(self.scene, at.triangle, at.instance, at.weights).geometric;
+        let edge = |(i, at): (usize, &SurfacePoint)| at.triangle != NONE && !self.is_whole(guide, i, plane(at), width);
+        points.iter().enumerate().map(|at| if edge(at) { AT_EDGE | NO_OFFER } else { NO_OFFER }).collect()
+    }
+
+    /// Twin of `project.comp`: the winner's key of every new pixel. `guide` and `points` are those of the new frame.
+    pub fn project(&self, handed: &mut Handed, guide: &[Guide], points: &[SurfacePoint]) -> Vec<u32> {
+        let mut winner = self.edges(guide, points);
         for pixel in 0..guide.len() {
             let c = Carried::of(handed.offered[pixel]);
             match c.count {
@@ -246,25 +291,19 @@ impl Reprojection<'_> {
         winner
     }
 
-    /// Twin of `carry.comp`: what every new pixel begins with. `guide` and `points` are those of the new frame; the words of
-    /// what is carried replace the keys.
+    /// Twin of `carry.comp`: what every new pixel begins with. `points` are those of the new frame; the words of what is carried
+    /// replace the keys.
     pub fn carry(
         &self,
         handed: &Handed,
         winner: &mut [u32],
-        guide: &[Guide],
         points: &mut [SurfacePoint],
     ) -> Vec<(PixelStats, PixelLight)> {
-        let width = pixel_width(&self.camera, self.push.size);
-        let begin = |(pixel, (key, at)): (usize, (&mut u32, &mut SurfacePoint))| {
-            let from = (*key & OLD_PIXEL) as usize;
-            let mut word = if *key == NONE { 0 } else { handed.offered[from] };
-            if *key != NONE && !self.still() {
-                let seen = surface_of(self.scene, at.triangle, at.instance, at.weights);
-                word = if self.is_whole(guide, pixel, seen.geometric, width) { word } else { dropped(DROPPED_EDGE) };
-            }
-            *key = word;
-            let count = Carried::of(word).count;
+        let begin = |(key, at): (&mut u32, &mut SurfacePoint)| {
+            let from = (*key & ((1 << PIXEL_BITS) - 1)) as usize;
+            let nobody = if *key & AT_EDGE != 0 { dropped(DROPPED_EDGE) } else { 0 };
+            *key = if *key & NO_OFFER == NO_OFFER { nobody } else { handed.offered[from] };
+            let count = Carried::of(*key).count;
             if count == 0 {
                 return (PixelStats::default(), PixelLight::default());
             }
@@ -272,10 +311,11 @@ impl Reprojection<'_> {
             if count >= self.push.spp {
                 (at.triangle, at.instance, at.weights) = (h.triangle, h.instance, h.weights);
             }
-            let stats = PixelStats { mean: h.mean, m2: h.m2, count, ..Default::default() };
-            let (direct, albedo, indirect_m2) = (l.direct, l.albedo, l.indirect_m2);
+            let of_all = |variance: f32| if self.still() { variance } else { variance * freedom(count) };
+            let stats = PixelStats { mean: h.mean, m2: h.variance.map(of_all), count, ..Default::default() };
+            let (direct, albedo, indirect_m2) = (l.direct, l.albedo, of_all(l.indirect_variance));
             (stats, PixelLight { direct, albedo, indirect_m2, ..Default::default() })
         };
-        winner.iter_mut().zip(points).enumerate().map(begin).collect()
+        winner.iter_mut().zip(points).map(begin).collect()
     }
 }

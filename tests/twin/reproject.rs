@@ -3,13 +3,14 @@
 use crate::moving::{Film, shifted, turned};
 use crate::poses::{MOMENTS, Moment, at, pose};
 use crate::support::{assert_silent, gpu};
+use crate::twin::Workplace;
 use glam::Vec3;
 use std::path::Path;
 use tallow::gpu::Gpu;
 use tallow::layout::{Camera, FrameConstants, Guide, LightChange, PixelLight, PixelStats, ReprojectPush, SurfacePoint};
 use tallow::math::hash::pcg;
 use tallow::render::pass::light_change::SPACINGS;
-use tallow::render::{Carriage, Reproject, carried_samples, frame_constants};
+use tallow::render::{Carriage, Carried, Reproject, carried_samples, frame_constants};
 use tallow::scene::{Loaded, Pose, Relit, Scene};
 use tallow::twins::camera::{camera_ray, film_from_pixel, film_from_point};
 use tallow::twins::light_change;
@@ -33,7 +34,7 @@ fn push(scene: &Loaded, s: Reproject) -> ReprojectPush {
         first_pixel: 0,
         pixels: settings.pixels() as u32,
         max_error: s.reproject_error,
-        max_change: s.max_change(settings.spp),
+        noise: s.reproject_light,
         aliasing: s.reproject_aliasing,
         max_samples: s.reproject_samples,
         max_age: s.reproject_age,
@@ -59,8 +60,8 @@ fn both(film: &mut Film, scene: &Loaded, settings: Reproject, camera: Camera) ->
     let pixels = 0..scene.settings.pixels() as u32;
     let seen: Vec<Guide> = pixels.clone().map(|i| guide(scene, &frame, i)).collect();
     let mut points: Vec<_> = pixels.map(|i| point(scene, &frame, i)).collect();
-    let mut words = reprojection.project(&mut handed, &seen);
-    let twin = reprojection.carry(&handed, &mut words, &seen, &mut points);
+    let mut words = reprojection.project(&mut handed, &seen, &points);
+    let twin = reprojection.carry(&handed, &mut words, &mut points);
 
     film.begin(camera);
     film.camera = camera;
@@ -147,8 +148,8 @@ fn both_where_all_moves(
     let pixels = 0..scene.settings.pixels() as u32;
     let seen: Vec<Guide> = pixels.clone().map(|i| guide(scene, &frame, i)).collect();
     let mut points: Vec<_> = pixels.map(|i| point(scene, &frame, i)).collect();
-    let mut words = reprojection.project(&mut handed, &seen);
-    let twin = reprojection.carry(&handed, &mut words, &seen, &mut points);
+    let mut words = reprojection.project(&mut handed, &seen, &points);
+    let twin = reprojection.carry(&handed, &mut words, &mut points);
 
     ([(film.carried(), begun), (words, twin)], cells)
 }
@@ -208,6 +209,52 @@ fn changes_of_light_are_shares_of_it() {
     let alone = |at: usize| (0..9).map(|i| change(f32::from(u8::from(i == at)))).collect::<Vec<_>>();
     assert_eq!([found(&alone(4), 3), found(&alone(5), 3), found(&alone(4), 9)], [0.5, 0.0, 0.5]);
     assert_eq!([light_change::cell_of(0, [9, 9]), light_change::cell_of(9 * 4 + 8, [9, 9])], [0, 5]);
+}
+
+/// A near wall beside a far one, whose light differs by so much; every pixel has eight samples, of variance 1. How many of them
+/// those by the edge hand on.
+fn kept_beside(other: &str, contrast: f32) -> Vec<u32> {
+    let mut scene = Workplace::new().scene(&format!(
+        "[camera]\nposition = [0.0, 0.0, 6.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 45.0\n[environment]\nradiance = 1.0\n\
+         [[material]]\nname = 'lamp'\nemission = 9.0\n[[material]]\nname = 'wall'\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'wall'\ntransform = {{ scale = 20.0, translate = [-20.0, 0.0, 0.0] }}\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = '{other}'\ntransform = {{ scale = 90.0, translate = [0.0, 0.0, -3.0] }}\n",
+    ));
+    (scene.settings.width, scene.settings.height) = (16, 9);
+    let frame = frame_constants(&scene, &scene.settings).unwrap();
+    let (previous, camera) = (frame.camera, shifted(frame.camera, [0.01, 0.0, 0.0]));
+    let pixels = 0..16 * 9;
+    let guide: Vec<Guide> = pixels.clone().map(|i| guide(&scene, &frame, i)).collect();
+    let points: Vec<_> = pixels.map(|i| point(&scene, &frame, i)).collect();
+    let wall = guide[0].object;
+    let light = |g: &Guide| if g.object == wall { 1.0 } else { 1.0 + contrast };
+    let of = |g: &Guide| PixelStats { mean: [light(g); 3], m2: [7.0; 3], count: 8, ..Default::default() };
+    let stats: Vec<_> = guide.iter().map(of).collect();
+    let left = Left {
+        guide: &guide,
+        points: &points,
+        stats: &stats,
+        light: &[PixelLight::default(); 144],
+        carried: &[0; 144],
+    };
+    let push = push(&scene, Reproject::default());
+    let (before, scene, changes, now) = (&scene, &scene, &[][..], &[][..]);
+    let handed = Reprojection { before, scene, instance_now: now, triangle_now: now, changes, previous, camera, push }
+        .remember(&left);
+    let kept: Vec<_> = handed.offered.iter().map(|&word| Carried::of(word)).collect();
+    assert!(kept.iter().filter(|c| !c.edge && c.count == 8).count() >= 144 - 2 * 9, "those away from it hand on all");
+    [7, 8].map(|x| kept[4 * 16 + x].count).to_vec()
+}
+
+#[test]
+fn edges_hand_on_what_is_worth_it() {
+    // 72 samples in a window, of two means: 9 * 21 / 70 is the variance of one. A quarter of three squared differences is .278 of it,
+    // and 8 / (1 + 8 * .278) rounds to 2; a hundred times as much leaves none.
+    assert_eq!(kept_beside("wall", 0.0), [8, 8]);
+    assert_eq!(kept_beside("wall", 1.0), [2, 2]);
+    assert_eq!(kept_beside("wall", 10.0), [0, 0]);
+    // Beside a lamp none, however alike: some pixels of its rim are far brighter than those around.
+    assert_eq!(kept_beside("lamp", 0.0), [0, 0]);
 }
 
 fn agreeing([a, b]: &[Begun; 2]) -> usize {

@@ -25,9 +25,9 @@ settings! {
         ReprojectOverrides {
             /// Largest error by changed view that carried samples may have, in units of radiance.
             reproject_error: f32 = 1.0 / 256.0, FROM_0;
-            /// Largest share by which the light of carried samples may have changed, over the root of a frame's samples per pixel: their
-            /// noise hides as much.
-            reproject_light: f32 = 0.2, FROM_0;
+            /// Share by which light may change from frame to frame before carried samples count less: the deviation of one sample
+            /// that a filter leaves, about.
+            reproject_light: f32 = 0.05, FROM_0;
             /// Largest distance of the hits around a pixel from its surface's plane, in widths of the pixel there.
             reproject_aliasing: f32 = 0.5, FROM_0;
             /// Samples that a pixel carries to the next frame at most.
@@ -38,15 +38,8 @@ settings! {
     }
 }
 
-impl Reproject {
-    /// The largest share by which light may have changed where a pixel gets `spp` samples a frame.
-    pub fn max_change(&self, spp: u32) -> f32 {
-        self.reproject_light / (spp.max(1) as f32).sqrt()
-    }
-}
-
-/// Pixels that a key has room for, see `glsl/reproject/project.comp`.
-const MOST_PIXELS: u32 = 1 << shaders::project::PIXEL_BITS;
+/// Pixels that a key has room for, see `glsl/shared/history.glsl`.
+const MOST_PIXELS: u32 = (1 << shaders::shared::history::PIXEL_BITS) - 1;
 
 /// What may change from frame to frame where samples are carried.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,6 +55,8 @@ pub enum Moves {
 pub struct History {
     /// Writes what pixels hand on.
     pub(super) remember: Kernel<shaders::remember::Bind<'static>>,
+    /// Tells which pixels of the new frame are at edges.
+    pub(super) edges: Kernel<shaders::edges::Bind<'static>>,
     /// Finds where it goes to.
     pub(super) project: Kernel<shaders::project::Bind<'static>>,
     /// Starts the new pixels with it.
@@ -126,6 +121,7 @@ impl History {
         let room = |on: bool| if on { pixels as usize } else { 1 };
         Ok(Self {
             remember: Kernel::new(gpu, &shaders::remember::Constants { effects, thread, traverse })?,
+            edges: Kernel::new(gpu, &shaders::edges::Constants { effects, thread, traverse })?,
             project: Kernel::new(gpu, &shaders::project::Constants { effects, thread, traverse })?,
             carry: Kernel::new(gpu, &shaders::carry::Constants { effects, thread, traverse })?,
             records: Buffer::new(gpu, "history", room(true), Location::Device)?,
@@ -183,7 +179,7 @@ impl History {
             first_pixel,
             pixels,
             max_error: s.reproject_error,
-            max_change: s.max_change(self.spp),
+            noise: s.reproject_light,
             aliasing: s.reproject_aliasing,
             max_samples: s.reproject_samples,
             max_age: s.reproject_age,

@@ -2,10 +2,10 @@
 //! [`crate::twins::reproject`].
 use crate::error::Result;
 use crate::gpu::Recorder;
-use crate::layout::{NONE, PathConstants};
+use crate::layout::PathConstants;
 use crate::render::buffers::{DeviceScene, FilmTile};
 use crate::render::history::History;
-use crate::shaders::{carry, project, remember};
+use crate::shaders::{carry, edges, project, remember};
 
 /// Before the scene changes, and before the new frame's primary hits: guide\[P\], points\[P\], stats\[P\], light\[P\] -> history\[P\]
 pub fn remember(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, c: &PathConstants) -> Result<()> {
@@ -33,7 +33,11 @@ pub fn remember(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, 
 
 /// After them: history\[P\], guide\[P\], points\[P\], changes\[cells\] -> stats\[P\], light\[P\], carried\[P\]
 pub fn carry(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, c: &PathConstants) -> Result<()> {
-    rec.fill(&h.carried, NONE)?; // NONE -> winner[P]
+    t.windows().try_for_each(|w| {
+        let winner = &h.carried.part(w.start as usize..w.end as usize)?;
+        let bind = edges::Bind { scene: s.bind(), frame: s.bind_frame(), guide: &t.guide, points: &t.points, winner };
+        rec.dispatch_threads(&h.edges, bind, &h.push(c, w.start, w.end - w.start), w.end - w.start)
+    })?;
     let bind = project::Bind {
         scene: s.bind(),
         frame: s.bind_frame(),
