@@ -2,6 +2,7 @@
 #include "shared/luminance.glsl"
 #include "shared/sanitise.glsl"
 #include "shared/candidates.glsl"
+#include "shared/dominated.glsl"
 
 // Blends five images per pixel and thread: the noisy one and the results of four filters (candidates). The weights are not
 // negative, sum to 1, and minimise the mean squared error at left-out pixels that auto_error.comp estimates. Starting from
@@ -34,6 +35,11 @@ const float RIDGE = 0.01;     // share added to every squared error: candidates 
 const float LEAST = 0.05;
 // From this number of samples on svgf takes part. With it, two samples left Crytek Sponza dark and grained: FLIP .203 in place of .163.
 const float ENOUGH_FOR_SVGF = 4.0;
+// What one sample has brought is cut to so many times what svgf finds. Such pixels are few among those whose noise their neighbours
+// tell to be small, so that the image itself seems best for them: two of them were nine tenths of relMSE on Veach's plates.
+const float OF_ONE_SAMPLE = 3.0;
+// From this number of samples on: of fewer, one often brings most.
+const float ENOUGH_TO_TELL_ONE = 8.0;
 const float MAX_ERROR = 1e24; // is above every error
 
 // What the pixel's samples say of the variance of their mean.
@@ -115,5 +121,9 @@ void main() {
     vec3 off = w[1] * (a.rgb - base) + w[2] * (as_light(b.rgb, a.rgb) - base);
     off += w[3] * (whole_light(n.rgb, a.rgb, texelFetch(wide_dim, at).rgb) - base) + w[4] * (d.rgb - base);
     bool any_usable = usable[0] || usable[1] || usable[2] || usable[3] || usable[4];
-    blend[i] = any_usable ? vec4(base + off, own_variance(i, c.w)) : vec4(vec3(0.0), UNFILTERED);
+    vec3 all = base + off;
+    float of_mean = own_variance(i, c.w), bright = luminance(all), most = OF_ONE_SAMPLE * max(luminance(d.rgb), 0.0);
+    bool dominated = usable[4] && c.w >= ENOUGH_TO_TELL_ONE && of_mean >= 0.0 && sqrt(of_mean) > DOMINATED * abs(luminance(c.rgb));
+    if (dominated && bright > most) all *= most / bright;
+    blend[i] = any_usable ? vec4(all, of_mean) : vec4(vec3(0.0), UNFILTERED);
 }

@@ -1,5 +1,6 @@
 #include "shared/sanitise.glsl"
 #include "shared/luminance.glsl"
+#include "shared/dominated.glsl"
 
 // Cuts outliers, one pixel per thread: those of more than push.factor times the luminance of the second brightest of the 24 pixels
 // around them (a highlight does not stand alone) whose light one sample has brought, as their variance tells. The more samples,
@@ -12,8 +13,6 @@ layout(scalar, binding = 2) writeonly buffer Output { vec4 cut[]; };
 layout(scalar, push_constant) uniform Push { FireflyPush push; };
 
 layout(constant_id = 114) const bool MEASURED = true; // `variance` holds every pixel's
-// Standard deviation of the mean over the mean: 1 where one sample has brought all light, 1 / sqrt(m) where m of many have.
-const float DOMINATED = 0.5;
 
 bool dominated(int i, float bright) {
     if (!MEASURED) return true;

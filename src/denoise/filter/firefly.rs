@@ -6,7 +6,8 @@ use crate::error::{Error, Result};
 use crate::gpu::{Buffer, FrameResources, Gpu, Kernel, Location, PassTime};
 use crate::layout::{FireflyPush, vec4};
 use crate::math::srgb::luminance;
-use crate::shaders::firefly::{Bind, Constants, DOMINATED};
+use crate::shaders::firefly::{Bind, Constants};
+use crate::shaders::shared::dominated::DOMINATED;
 use glam::Vec3;
 
 /// What was cut.

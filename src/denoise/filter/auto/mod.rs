@@ -1,6 +1,7 @@
 //! Per pixel, the blend of candidates with the least estimated error: it spares the user the sweep. Kernels:
 //! `glsl/auto*.comp`.
 mod reference;
+mod residual;
 
 pub use reference::estimated;
 

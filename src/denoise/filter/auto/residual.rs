@@ -1,0 +1,116 @@
+//! What `auto` gives back of what its blend has lost: the twin of `glsl/auto/auto_residual.comp`.
+use crate::denoise::filter::FilterInput;
+use crate::denoise::filter::edge::{Rates, edge_weight};
+use crate::denoise::filter::noise_estimate::contrast;
+use crate::denoise::filter::pack::Packed;
+use crate::layout::vec4;
+use crate::math::srgb::luminance;
+use crate::shaders::auto_residual::{self, ENOUGH_SAMPLES, PRIOR_SAMPLES, SIGNIFICANT};
+use crate::shaders::shared::luminance::STRONGEST;
+use glam::{Vec3, Vec4, Vec4Swizzles};
+
+/// The blend with what it has lost, where samples show that: twin of `auto_residual.comp`. `prior` is the variance of what is lost.
+pub fn given_back(
+    input: &FilterInput,
+    image: &[Packed],
+    noise: &[f32],
+    blend: &[Vec4],
+    surfaces: &Rates,
+    prior: impl Fn(usize) -> f32,
+) -> Vec<vec4> {
+    let size = [input.width, input.height].map(i64::from);
+    let own: Vec<Option<f32>> = (0..image.len()).map(|i| own_variance(input, i, image[i].count)).collect();
+    let residual = |i: usize| Residual {
+        colour: image[i].colour - blend[i].xyz(),
+        filtered: blend[i].w > 0.0,
+        variance: own[i].unwrap_or(noise[i].max(0.0)),
+        measured: own[i].is_some(),
+    };
+    let residuals: Vec<_> = (0..image.len()).map(residual).collect();
+    let restored = |i: usize| -> vec4 {
+        let given = restored(image, &residuals, size, i, surfaces, prior(i));
+        let least = blend[i].xyz().min(image[i].colour).min(Vec3::ZERO);
+        (blend[i].xyz() + given).max(least).extend(blend[i].w).into()
+    };
+    (0..image.len()).map(restored).collect()
+}
+
+/// Sums over the like pixels of a window.
+#[derive(Clone, Copy, Default)]
+struct Window {
+    residual: Vec3,
+    weights: f32,
+    squares: f32,
+    samples: f32,
+    variance: f32,
+}
+
+impl Window {
+    fn add(&mut self, residual: Vec3, w: f32, count: f32, variance: f32) {
+        self.residual += w * residual;
+        self.weights += w;
+        self.squares += w * w;
+        self.samples += w * count;
+        self.variance += w * count * variance;
+    }
+
+    /// What of the mean residual, `given` of which is given back already, is more than noise. `prior` is the variance of one sample
+    /// by the surroundings.
+    fn significant(&self, given: Vec3, prior: f32) -> Vec3 {
+        if self.samples < ENOUGH_SAMPLES {
+            return Vec3::ZERO;
+        }
+        let residual = self.residual / self.weights - given;
+        let prior = PRIOR_SAMPLES * prior * self.weights / self.samples;
+        let variance = (self.variance + prior) / (self.samples + PRIOR_SAMPLES);
+        let noise = SIGNIFICANT * (variance * self.squares).sqrt() / self.weights;
+        let off = contrast(residual, Vec3::ZERO).abs();
+        if off > noise { residual * (1.0 - noise / off) } else { Vec3::ZERO }
+    }
+}
+
+/// What the pixel's samples say of the variance of their mean.
+pub fn own_variance(input: &FilterInput, i: usize, count: f32) -> Option<f32> {
+    let v = input.variance.as_ref().map(|v| Vec3::from(v[i])).filter(|v| v.is_finite() && v.min_element() >= 0.0)?;
+    (count >= 2.0).then(|| luminance(v.map(f32::sqrt)).min(STRONGEST).powi(2))
+}
+
+/// What the blend of a pixel differs by from its samples.
+struct Residual {
+    colour: Vec3,
+    filtered: bool,
+    /// Of the pixel's luminance.
+    variance: f32,
+    /// By its own samples.
+    measured: bool,
+}
+
+/// What a pixel is given back of what the blend has lost.
+fn restored(
+    image: &[Packed],
+    residuals: &[Residual],
+    [width, height]: [i64; 2],
+    at: usize,
+    rates: &Rates,
+    prior: f32,
+) -> Vec3 {
+    const REACH: i64 = auto_residual::REACH as i64;
+    let mut windows = [Window::default(); 3];
+    let (p, x, y) = (&image[at], at as i64 % width, at as i64 / width);
+    for (u, v) in (-REACH..=REACH).flat_map(|v| (-REACH..=REACH).map(move |u| (u, v))) {
+        if !(0..width).contains(&(x + u)) || !(0..height).contains(&(y + v)) {
+            continue;
+        }
+        let j = ((y + v) * width + x + u) as usize;
+        let (q, there) = (&image[j], &residuals[j]);
+        let w = if there.filtered { edge_weight(q, rates.exponent(p, q)) } else { 0.0 };
+        let reach = u.abs().max(v.abs());
+        let holding = windows.iter_mut().zip([REACH, 1, 0]).filter(|(_, most)| reach <= *most);
+        holding.for_each(|(window, _)| window.add(there.colour, w, q.count, there.variance));
+    }
+    if p.count == 0.0 || !residuals[at].filtered {
+        return Vec3::ZERO;
+    }
+    let used = if residuals[at].measured { 3 } else { 1 };
+    windows[..used].iter().fold(Vec3::ZERO, |given, window| given + window.significant(given, prior))
+}
