@@ -40,15 +40,17 @@ bool is_sharp(Bsdf b) {
 // the fifth of points that come in from outside: 1/12 before and 1/6 after.
 const float VARIANCE_OF_MOVE = 0.25;
 
-// How many of the samples of a pixel at an edge are worth handing on: so many that their mean is as good as new samples are, by
+// How many of the samples of a pixel are worth handing on; of one at an edge so many that their mean is as good as new samples are, by
 // the variance of one and the square of what the move shifts them by, which grows with the difference of the surfaces' light. None
 // beside a lamp, whose light exceeds that of all around it.
-uint kept_of_edge(uint pixel, vec3 plane, uint count) {
+// Most pixels are at none: lavapipe leaves a loop of no lane, and executes a branch that no lane takes.
+uint kept_of_edge(uint pixel, vec3 plane, uint count, bool edge) {
+    int neighbours = edge ? 9 : 0, k = 0;
     float width = pixel_width(previous, push.size);
     vec4 own = vec4(0.0), others = vec4(0.0); // sum of radiance, samples
     float squares = 0.0;
     bool lamp = false;
-    for (int k = 0; k < 9; k++) {
+    do {
         uint q = neighbour(pixel, k), material = Guide_material(guide, q);
         PixelStats s = PixelStats_load(stats, q);
         bool same = shows_same(pixel, q, plane, width);
@@ -57,7 +59,9 @@ uint kept_of_edge(uint pixel, vec3 plane, uint count) {
         others += same ? vec4(0.0) : sum;
         squares += s.m2.r + s.m2.g + s.m2.b + dot(sum.rgb, s.mean);
         lamp = lamp || material != NONE && Material_emission(materials, material) != vec3(0.0);
-    }
+        k++;
+    } while (k < neighbours);
+    if (!edge) return count;
     if (lamp || own.w == 0.0 || others.w == 0.0) return 0u;
     vec3 mean = own.rgb / own.w, beside = others.rgb / others.w, contrast = mean - beside;
     // Of one sample, about the mean of its surface.
@@ -72,7 +76,7 @@ uint reason_to_keep(uint pixel, SurfacePoint at, inout Carried c) {
     c.back = dot(s.geometric, previous.position - s.position) < 0.0;
     if (is_sharp(surface_bsdf(s))) return DROPPED_SPECULAR;
     c.edge = !is_whole(pixel, s.geometric, pixel_width(previous, push.size));
-    if (c.edge) c.count = kept_of_edge(pixel, s.geometric, c.count);
+    c.count = kept_of_edge(pixel, s.geometric, c.count, c.edge);
     return c.count > 0u ? 0u : DROPPED_EDGE;
 }
 
