@@ -13,8 +13,9 @@ const LEAST_ERROR: f64 = 1e-12;
 /// Time and error of a method by samples per pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Forecast {
-    /// Milliseconds that do not depend on samples.
-    fixed: f64,
+    /// Milliseconds that do not depend on samples: of the render, and of its filter.
+    start: f64,
+    filter: f64,
     /// Milliseconds of a sample of every pixel.
     per_sample: f64,
     /// Samples at which the error was measured last.
@@ -36,7 +37,8 @@ impl Forecast {
             _ => USUAL_POWER,
         };
         Self {
-            fixed: last.start_ms + last.methods[method].ms,
+            start: last.start_ms,
+            filter: last.methods[method].ms,
             per_sample: last.samples_ms / f64::from(last.spp),
             spp: f64::from(last.spp),
             error: error(last),
@@ -44,9 +46,15 @@ impl Forecast {
         }
     }
 
+    /// The same where a render of so many samples took this time, its filter not counted.
+    pub fn through(self, spp: u32, ms: f64) -> Self {
+        let per_sample = ((ms - self.start) / f64::from(spp)).max(f64::MIN_POSITIVE);
+        Self { per_sample, ..self }
+    }
+
     /// GPU time in milliseconds.
     pub fn time_of(&self, spp: u32) -> f64 {
-        self.fixed + self.per_sample * f64::from(spp)
+        self.start + self.filter + self.per_sample * f64::from(spp)
     }
 
     /// RelMSE.
@@ -56,7 +64,7 @@ impl Forecast {
 
     /// Samples that fit a time; none if not even one does.
     pub fn samples_within(&self, ms: f64) -> Option<u32> {
-        let samples = ((ms - self.fixed) / self.per_sample).floor();
+        let samples = ((ms - self.start - self.filter) / self.per_sample).floor();
         (samples >= 1.0).then(|| samples.min(f64::from(Settings::MAX_SPP)) as u32)
     }
 
@@ -84,6 +92,9 @@ mod tests {
         assert_eq!(forecast.samples_within(135.0), Some(10));
         assert_eq!((forecast.samples_within(134.9), forecast.samples_within(44.0)), (Some(9), None));
         assert!((forecast.error_of(16) - 0.025).abs() < 1e-12);
+        // 10 samples took 125 ms, of which 5 are not theirs: 12 ms each, so that 8 fit where 10 did.
+        let rehearsed = forecast.through(10, 125.0);
+        assert_eq!((rehearsed.time_of(10), rehearsed.samples_within(135.0)), (155.0, Some(8)));
         assert_eq!((forecast.samples_for(0.0251), forecast.samples_for(9.0)), (Some(16), Some(1)));
         // As fast as Sobol points, and as slow as what is blurred: the powers have ends.
         assert!((Forecast::new(&[level(1, 1.0), level(4, 1e-9)], 0).power - 1.6).abs() < 1e-12);

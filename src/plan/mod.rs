@@ -2,7 +2,8 @@
 //! scene on this device.
 //!
 //! ```text
-//! probe: two independent images of m samples a pixel, of 4 m, of 16 m ...   error and GPU time of each, filtered and not
+//! probe: two independent images of m samples a pixel, of 4 m, of 16 m ...   error and GPU time of each, filtered and not;
+//!        where samples are placed and a time is given, the render that seems to fit as well
 //! plan:  error ~ samples^-p, time = fixed + samples * t                     the method that is cheapest, or most accurate
 //! ```
 //!
@@ -82,7 +83,17 @@ pub fn plan(gpu: &Gpu, scene: &Scene, settings: &Settings, methods: &[Method], t
     check(settings, methods, target)?;
     let mut probe = Probe::new(gpu, scene, settings, methods)?;
     let levels = probe.levels(target)?;
-    let forecasts = forecasts(&levels, methods);
+    let mut forecasts = forecasts(&levels, methods);
+    if let Target::GpuMs(ms) = target
+        && !settings.allocate.is_even()
+    {
+        // Placed samples cost more than the few of a probe foretell.
+        let most = forecasts.iter().filter_map(|forecast| forecast.samples_within(ms)).max();
+        if let Some(spp) = most {
+            let took = probe.rehearse(spp)?;
+            forecasts.iter_mut().for_each(|forecast| *forecast = forecast.through(spp, took));
+        }
+    }
     let expected = |forecast: &Forecast| match target {
         Target::GpuMs(ms) => forecast.samples_within(ms),
         Target::RelMse(error) => forecast.samples_for(error),

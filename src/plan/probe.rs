@@ -178,6 +178,23 @@ impl<'a> Probe<'a> {
 }
 
 impl Probe<'_> {
+    /// Renders so many samples as a render does that has just been made, and returns its GPU milliseconds.
+    ///
+    /// # Errors
+    /// Those of [`Renderer::new`].
+    pub fn rehearse(&mut self, spp: u32) -> Result<f64> {
+        self.chains.iter_mut().for_each(|chain| *chain = None);
+        let settings = Settings { spp, ..self.renderer.settings().clone() };
+        self.renderer = Renderer::new(self.gpu, self.scene, &settings, outputs(self.methods))?;
+        let steps = self.renderer.steps().collect::<Vec<_>>();
+        let mut took = 0.0;
+        for step in steps {
+            took += milliseconds(&self.renderer.run(&mut self.frame, &step)?);
+        }
+        self.spent_ms += took;
+        Ok(took)
+    }
+
     /// The steps of an image of so many samples. Where they are placed depends on how many there are, so that each number has a
     /// renderer of its own, which runs once before it is timed.
     fn steps(&mut self, spp: u32) -> Result<Vec<Step>> {
@@ -186,12 +203,7 @@ impl Probe<'_> {
             return Ok([Step::Start].into_iter().chain(self.renderer.samples(0, spp)).collect());
         }
         if settings.spp != spp {
-            let settings = Settings { spp, ..settings.clone() };
-            self.chains.iter_mut().for_each(|chain| *chain = None);
-            self.renderer = Renderer::new(self.gpu, self.scene, &settings, outputs(self.methods))?;
-            for step in self.renderer.steps() {
-                self.spent_ms += milliseconds(&self.renderer.run(&mut self.frame, &step)?);
-            }
+            self.rehearse(spp)?;
         }
         Ok(self.renderer.steps().collect())
     }
