@@ -1,13 +1,11 @@
 #include "effects.glsl"
 #include "shared/thread.glsl"
-#include "shared/scene.glsl"
 #include "shared/frame.glsl"
 
 // Starts each pixel of a new frame with the samples that won it, or with none. Carried samples keep the point that they are of, so
 // that they move on from there and not from the centre of a pixel; where the new frame's samples will outnumber them, its point takes
 // over.
 layout(local_size_x_id = 100) in;
-layout(binding = 11) uniform usamplerBuffer guide; // of Guide
 layout(binding = 12) uniform usamplerBuffer history; // of History
 layout(binding = 13) uniform usamplerBuffer history_light; // of HistoryLight
 layout(binding = 14) uniform usamplerBuffer offered; // of uint
@@ -18,9 +16,7 @@ layout(scalar, binding = 19) buffer Points { SurfacePoint points[]; };
 layout(scalar, binding = 20) buffer Winners { uint winner[]; };
 layout(scalar, push_constant) uniform Push { ReprojectPush push; };
 
-#include "shared/surface_point.glsl"
 #include "shared/history.glsl"
-
 
 void main() {
     uint i = thread_index();

@@ -1,5 +1,5 @@
 // What is known of the samples that a pixel has from earlier frames, in one word: their number in the lower 16 bits, then 8 bits
-// of how many times they have moved, then 6 of the error that they are accounted by changed view and changed light, in
+// of how many times they have moved, then 6 of the error that they are accounted by changed view, in
 // parts of the largest that is allowed, rounded up, then one that says whether they are of an edge, then one that says which side
 // of the surface they show. Where the number is 0 the bits above it say why.
 const uint MOST_CARRIED = 65535u;
@@ -8,12 +8,12 @@ const uint ERROR_PARTS = 63u;
 // Reasons for a pixel not to hand on its samples, or not to take any; 0: it has none, or nobody offers any.
 const uint DROPPED_SKY = 1u;      // there is no surface
 const uint DROPPED_SPECULAR = 2u; // a smooth or refractive interface
-const uint DROPPED_EDGE = 3u;     // first hits around it lie on other surfaces: the aliasing limit
+const uint DROPPED_EDGE = 3u;     // at an edge, of whose samples none is worth handing on, or which no edge offers any
 const uint DROPPED_OLD = 4u;      // moved too many times
 const uint DROPPED_OUTSIDE = 5u;  // outside the film, or behind the camera
 const uint DROPPED_HIDDEN = 6u;   // another surface is in front, or the other side of it is seen
 const uint DROPPED_VIEW = 7u;     // the error by the changed view exceeds the limit
-const uint DROPPED_LIGHT = 8u;    // the error by changed light exceeds it
+const uint DROPPED_LIGHT = 8u;    // light has changed so much that no sample is worth handing on
 
 struct Carried {
     uint count;

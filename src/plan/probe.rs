@@ -186,9 +186,8 @@ impl Probe<'_> {
         self.chains.iter_mut().for_each(|chain| *chain = None);
         let settings = Settings { spp, ..self.renderer.settings().clone() };
         self.renderer = Renderer::new(self.gpu, self.scene, &settings, outputs(self.methods))?;
-        let steps = self.renderer.steps().collect::<Vec<_>>();
         let mut took = 0.0;
-        for step in steps {
+        for step in self.renderer.steps() {
             took += milliseconds(&self.renderer.run(&mut self.frame, &step)?);
         }
         self.spent_ms += took;

@@ -123,7 +123,7 @@ impl History {
             remember: Kernel::new(gpu, &shaders::remember::Constants { effects, thread, traverse })?,
             edges: Kernel::new(gpu, &shaders::edges::Constants { effects, thread, traverse })?,
             project: Kernel::new(gpu, &shaders::project::Constants { effects, thread, traverse })?,
-            carry: Kernel::new(gpu, &shaders::carry::Constants { effects, thread, traverse })?,
+            carry: Kernel::new(gpu, &shaders::carry::Constants { effects, thread })?,
             records: Buffer::new(gpu, "history", room(true), Location::Device)?,
             light: Buffer::new(gpu, "history of light", room(effects.split_light), Location::Device)?,
             offered: Buffer::from_slice(gpu, "offered samples", &vec![0; pixels as usize])?,

@@ -53,9 +53,7 @@ pub fn carry(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, c: 
         let part = w.start as usize..w.end as usize;
         let apart = h.light.len() == t.pixels as usize;
         let bind = carry::Bind {
-            scene: s.bind(),
             frame: s.bind_frame(),
-            guide: &t.guide,
             history: &h.records,
             history_light: &h.light,
             offered: &h.offered,
