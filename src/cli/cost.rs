@@ -3,19 +3,19 @@ mod filters;
 mod knobs;
 mod options;
 mod output;
+mod points;
 
 use super::{Exit, complain, fail_on_messages, interrupt, print, print_json};
 use crate::cost::document::SceneInfo;
-use crate::cost::grid::{self, Candidate};
-use crate::cost::{Document, Ended, Images, Plan, Watch, key, measure, others, reference};
-use crate::denoise::filter::{FilterSettings, Method};
+use crate::cost::grid::Candidate;
+use crate::cost::{Document, Ended, Images, Motion, Plan, Watch, key, measure, others, reference};
 use crate::error::{Error, Result};
 use crate::gpu::{self, DeviceOptions, Gpu};
 use crate::render::settings::Settings;
 use crate::scene::{Scene, SceneFile};
 pub use options::Args;
-use options::Words;
 use output::{Folder, Shown, text};
+use points::Points;
 use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -30,11 +30,12 @@ pub fn run(args: &Args) -> Result<Exit> {
         return filters::run(args, image, &folder);
     }
     let path = args.scene.as_deref().ok_or_else(no_scene)?;
-    let (scene, base, candidates) = candidates(args, path)?;
+    let gpu = open(args)?;
+    let Points { scene, motion, base, candidates } = Points::new(args, path, &gpu)?;
     if !args.quiet && !args.json {
         scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
     }
-    let (plan, gpu) = (plan(args, path, &scene, base, candidates)?, open(args)?);
+    let plan = plan(args, path, &scene, motion, base, candidates)?;
     let earlier = folder.earlier(&key(&gpu, &scene, &plan));
     let runs_before = earlier.as_ref().map_or(0, runs);
     let found = watched(args, &folder, |watch| measure(&gpu, &scene, &plan, earlier, watch))?;
@@ -42,14 +43,24 @@ pub fn run(args: &Args) -> Result<Exit> {
     finish(args, &folder, found, runs_before)
 }
 
-fn plan(args: &Args, path: &Path, scene: &Scene, base: Settings, candidates: Vec<Candidate>) -> Result<Plan> {
+fn plan(
+    args: &Args,
+    path: &Path,
+    scene: &Scene,
+    motion: Option<Motion>,
+    base: Settings,
+    candidates: Vec<Candidate>,
+) -> Result<Plan> {
     let [width, height] = [base.width, base.height];
     let given = |file: &Path| reference::read(file, [width, height], Some((scene, &base)));
     let reference = args.reference.as_deref().map(given).transpose()?;
     let settings = SceneFile::open(path)?.settings()?;
+    let judged = motion.as_ref().map(|motion| motion.judged);
+    let command = |candidate| points::command(path, judged, &settings, candidate);
     Ok(Plan {
-        scene: SceneInfo { path: path.display().to_string(), name: name(path), width, height },
-        commands: candidates.iter().map(|candidate| command(path, &settings, candidate)).collect(),
+        scene: SceneInfo { path: path.display().to_string(), name: name(path), width, height, judged },
+        commands: candidates.iter().map(command).collect(),
+        motion,
         base,
         candidates,
         others: args.points.as_deref().map_or(Ok(Vec::new()), others::read)?,
@@ -102,40 +113,6 @@ fn finish(
     }
 }
 
-/// The scene, its settings with those of the options, and the points.
-fn candidates(args: &Args, path: &Path) -> Result<(Scene, Settings, Vec<Candidate>)> {
-    let file = SceneFile::open(path)?;
-    let (mut base, mut filters) = (file.settings()?, FilterSettings::default());
-    args.film.apply(&mut base);
-    Words::parse(&args.with)?.apply(&mut base, &mut filters);
-    base.validate()?;
-    filters.validate()?;
-    let mut all = grid::grid(&base, &filters, &args.axes());
-    all.iter().try_for_each(|candidate| candidate.settings.validate())?;
-    all.extend(varied(args, &all)?);
-    Ok((file.load()?.scene, base, all))
-}
-
-/// Each point of the grid with the options of every variant, and with every step of the knobs that it has.
-fn varied(args: &Args, grid: &[Candidate]) -> Result<Vec<Candidate>> {
-    let mut all = Vec::new();
-    for text in &args.variants {
-        let words = Words::parse(text)?.checked_as_variant(text)?;
-        let before = all.len();
-        all.extend(grid.iter().filter_map(|point| point.varied(text.trim(), |s, filters| words.apply(s, filters))));
-        if all.len() == before {
-            return Err(Error::Usage(format!("\"{}\" changes no point of the grid", text.trim())));
-        }
-    }
-    for point in grid.iter().filter(|_| args.ablate) {
-        for step in knobs::steps(point) {
-            let words = Words::parse(&step)?;
-            all.extend(point.varied(&step, |s, filters| words.apply(s, filters)));
-        }
-    }
-    Ok(all)
-}
-
 fn open(args: &Args) -> Result<Gpu> {
     Gpu::open(&DeviceOptions {
         device: args.device.clone(),
@@ -147,19 +124,6 @@ fn open(args: &Args) -> Result<Gpu> {
 
 fn no_scene() -> Error {
     Error::Usage("name a scene to measure, or an image with --filter-only (see tallow cost --help)".to_owned())
-}
-
-/// The command that renders a point's first image. Unfiltered points go to .hdr: for an .exr more layers are kept, which takes
-/// longer than what was measured. Filters with settings of their own run behind the render, to the same bits.
-fn command(scene: &Path, from: &Settings, candidate: &Candidate) -> String {
-    let words = |words: Vec<String>| words.into_iter().map(|word| format!(" {word}")).collect::<String>();
-    let render = words(grid::options(&from.entries(), &candidate.settings.entries()));
-    let render = format!("tallow render {}{render}", quoted(&scene.display().to_string()));
-    let Some(filter) = candidate.filter.map(Method::name) else { return format!("{render} -o point.hdr") };
-    match &words(grid::options(&FilterSettings::default().entries(), &candidate.filter_settings.entries()))[..] {
-        "" => format!("{render} --denoise {filter} -o point.exr"),
-        own => format!("{render} -o noisy.exr && tallow filter noisy.exr --filter {filter}{own} -o point.exr"),
-    }
 }
 
 /// A word as a shell takes it.

@@ -1,5 +1,6 @@
 //! The document that a cost measurement writes as `cost.json`. It holds every raw run, so that whoever doubts a summary can
 //! compute it anew. All numbers in it are finite; what cannot be told is `null`.
+use super::motion::JudgedFrame;
 pub use super::point::*;
 use serde::{Deserialize, Serialize};
 
@@ -42,7 +43,7 @@ pub struct Software {
 }
 
 /// What was rendered or filtered.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SceneInfo {
     /// File as it was named: a scene, or with `--filter-only` an image.
     pub path: String,
@@ -52,6 +53,9 @@ pub struct SceneInfo {
     pub width: u32,
     /// Height of the film in pixels.
     pub height: u32,
+    /// The frame that is judged of a scene that moves; `None` at rest.
+    #[serde(default)]
+    pub judged: Option<JudgedFrame>,
 }
 
 /// Where it ran.

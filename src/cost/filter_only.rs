@@ -99,6 +99,7 @@ fn point(candidate: &FilterCandidate) -> Point {
         allocate: String::new(),
         filter: candidate.filter.name().to_owned(),
         rounds: None,
+        reproject: None,
         options: candidate.options.clone(),
         spp: 0,
     };

@@ -3,8 +3,8 @@
 use super::document::Method;
 use crate::allocate::{Placing, Policy};
 use crate::denoise::filter::{self, FilterSettings};
-use crate::render::Outputs;
 use crate::render::settings::Settings;
+use crate::render::{Outputs, Reproject};
 use crate::settings::entry::Entry;
 
 /// The lists that a grid is made of.
@@ -18,6 +18,8 @@ pub struct Axes {
     pub spp: Vec<u32>,
     /// Rounds of policies that learn; 0 is the policy's own choice.
     pub rounds: Vec<u32>,
+    /// How frames begin with samples of the last, if they do.
+    pub carries: Vec<Option<Reproject>>,
 }
 
 /// A point to measure.
@@ -31,6 +33,8 @@ pub struct Candidate {
     pub filter: Option<filter::Method>,
     /// Settings of the filter, which are scaled to the image.
     pub filter_settings: FilterSettings,
+    /// How samples of earlier frames are carried, if they are.
+    pub carries: Option<Reproject>,
 }
 
 /// A render that one or more points share.
@@ -40,6 +44,8 @@ pub struct Shot {
     pub settings: Settings,
     /// What the filters of its points need.
     pub outputs: Outputs,
+    /// How samples of earlier frames are carried, if they are.
+    pub carries: Option<Reproject>,
     /// Indices of the candidates.
     pub points: Vec<usize>,
 }
@@ -48,14 +54,16 @@ pub struct Shot {
 /// `filters`. Settings out of range become points that fail.
 pub fn grid(base: &Settings, filters: &FilterSettings, axes: &Axes) -> Vec<Candidate> {
     let mut all: Vec<Candidate> = Vec::new();
-    for &policy in &axes.allocate {
-        for &filter in &axes.filters {
-            for &rounds in &axes.rounds {
-                for &spp in &axes.spp {
-                    let candidate =
-                        Candidate { filter_settings: *filters, ..candidate(base, policy, filter, [rounds, spp]) };
-                    if all.iter().all(|other| other.method != candidate.method) {
-                        all.push(candidate);
+    for &carries in &axes.carries {
+        for &policy in &axes.allocate {
+            for &filter in &axes.filters {
+                for &rounds in &axes.rounds {
+                    for &spp in &axes.spp {
+                        let plain = candidate(base, policy, filter, [rounds, spp]);
+                        let candidate = Candidate { filter_settings: *filters, ..plain }.carrying(carries);
+                        if all.iter().all(|other| other.method != candidate.method) {
+                            all.push(candidate);
+                        }
                     }
                 }
             }
@@ -66,12 +74,23 @@ pub fn grid(base: &Settings, filters: &FilterSettings, axes: &Axes) -> Vec<Candi
 
 impl Candidate {
     /// The same with other settings, as `change` makes them, and named by `option`. `None` if they are no others.
-    pub fn varied(&self, option: &str, change: impl FnOnce(&mut Settings, &mut FilterSettings)) -> Option<Self> {
-        let mut varied = self.clone();
-        change(&mut varied.settings, &mut varied.filter_settings);
-        let filters_alike = self.filter.is_none() || self.filter_settings == varied.filter_settings;
+    pub fn varied(
+        &self,
+        option: &str,
+        change: impl FnOnce(&mut Settings, &mut FilterSettings, &mut Reproject),
+    ) -> Option<Self> {
+        let (mut varied, mut carries) = (self.clone(), self.carries.unwrap_or_default());
+        change(&mut varied.settings, &mut varied.filter_settings, &mut carries);
+        varied.carries = self.carries.map(|_| carries);
         varied.method.options = vec![option.to_owned()];
-        (varied.settings != self.settings || !filters_alike).then_some(varied)
+        let filters_alike = self.filter.is_none() || self.filter_settings == varied.filter_settings;
+        let alike = varied.settings == self.settings && varied.carries == self.carries && filters_alike;
+        (!alike).then_some(varied)
+    }
+
+    fn carrying(mut self, carries: Option<Reproject>) -> Self {
+        self.method.reproject = carries.map(|_| "forward".to_owned());
+        Self { carries, ..self }
     }
 }
 
@@ -84,11 +103,12 @@ fn candidate(base: &Settings, policy: &'static Policy, filter: filter::Method, [
         allocate: policy.name.to_owned(),
         filter: filter.name().to_owned(),
         rounds: Some(rounds).filter(|&rounds| learns && rounds > 0),
+        reproject: None,
         options: Vec::new(),
         spp,
     };
     let filter = Some(filter).filter(|filter| filter.name() != "none");
-    Candidate { method, settings, filter, filter_settings: FilterSettings::default() }
+    Candidate { method, settings, filter, filter_settings: FilterSettings::default(), carries: None }
 }
 
 /// The renders that the points need. Points that differ in the filter alone share one; a render without a filter is apart,
@@ -96,11 +116,12 @@ fn candidate(base: &Settings, policy: &'static Policy, filter: filter::Method, [
 pub fn shots(candidates: &[Candidate]) -> Vec<Shot> {
     let mut shots: Vec<Shot> = Vec::new();
     for (index, candidate) in candidates.iter().enumerate() {
-        let layers = candidate.filter.is_some();
-        let outputs = Outputs { split_light: layers, guides: layers, counters: false };
-        match shots.iter_mut().find(|s| s.outputs == outputs && s.settings == candidate.settings) {
+        let (layers, carries) = (candidate.filter.is_some(), candidate.carries);
+        let outputs = Outputs { split_light: layers, guides: layers || carries.is_some(), counters: false };
+        let shares = |s: &&mut Shot| s.outputs == outputs && s.settings == candidate.settings && s.carries == carries;
+        match shots.iter_mut().find(shares) {
             Some(shot) => shot.points.push(index),
-            None => shots.push(Shot { settings: candidate.settings.clone(), outputs, points: vec![index] }),
+            None => shots.push(Shot { settings: candidate.settings.clone(), outputs, carries, points: vec![index] }),
         }
     }
     shots
@@ -131,6 +152,7 @@ mod tests {
             filters: filters.iter().map(|name| filter::find(name).unwrap().into()).collect(),
             spp: vec![1, 4],
             rounds: vec![0, 2],
+            carries: vec![None],
         }
     }
 
@@ -155,7 +177,7 @@ mod tests {
         let all = made(&["both"], &["none"]);
         let from = Settings::default().entries();
         assert_eq!(options(&from, &all[3].settings.entries()), ["--spp 4", "--allocate both", "--rounds 2"]);
-        let darker = all[0].varied("", |s, _| s.allocate.variance.luminance_floor = -1.0).unwrap();
+        let darker = all[0].varied("", |s, _, _| s.allocate.variance.luminance_floor = -1.0).unwrap();
         assert_eq!(options(&all[0].settings.entries(), &darker.settings.entries()), ["--luminance-floor=-1"]);
         let changed = FilterSettings::default().with(|s| s.atrous.conserve_energy = true);
         assert_eq!(options(&FilterSettings::default().entries(), &changed.entries()), ["--conserve-energy"]);
@@ -164,10 +186,11 @@ mod tests {
     #[test]
     fn what_changes_nothing_is_no_other_point() {
         let all = made(&["uniform"], &["none", "atrous"]);
-        let fewer_levels = |_: &mut Settings, filters: &mut FilterSettings| filters.footprint.levels = 3;
+        let fewer_levels =
+            |_: &mut Settings, filters: &mut FilterSettings, _: &mut Reproject| filters.footprint.levels = 3;
         assert!(all[0].varied("--levels 3", fewer_levels).is_none(), "nothing is filtered");
         let varied = all[2].varied("--levels 3", fewer_levels).unwrap();
         assert_eq!(varied.method.label(), "uniform + atrous, levels 3, 1 spp");
-        assert!(all[2].varied("--max-depth 8", |s, _| s.max_depth = 8).is_none(), "it is 8");
+        assert!(all[2].varied("--max-depth 8", |s, _, _| s.max_depth = 8).is_none(), "it is 8");
     }
 }

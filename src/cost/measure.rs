@@ -51,7 +51,7 @@ pub fn measure(
     let outline = Outline {
         scene: &plan.scene,
         machine: machine::describe(gpu.info()),
-        seeds: seeds(&plan.base, plan.repeats),
+        seeds: seeds(plan),
         order_seed: plan.order_seed,
         budget: plan.budget,
         key: key(gpu, scene, plan),
@@ -62,7 +62,7 @@ pub fn measure(
         watch,
         outline,
         shots: &shots,
-        session: Session::new(gpu, scene, &plan.candidates, &shots)?,
+        session: Session::new(gpu, scene, plan.motion.as_ref(), &plan.candidates, &shots)?,
         deadline: plan.budget.map(|budget| begun + budget),
         points: points(plan, earlier),
         pictures: plan.candidates.iter().map(|_| None).collect(),
@@ -105,7 +105,7 @@ impl Measuring<'_> {
     /// Images of the points with most samples: the smallest error is among theirs.
     fn pilots(&mut self) -> Vec<Picture> {
         let most = self.shots.iter().map(|shot| shot.settings.spp).max().unwrap_or(0);
-        let seed = seeds(&self.plan.base, self.plan.repeats)[0];
+        let seed = seeds(self.plan)[0];
         let mut pictures = Vec::new();
         for (index, shot) in self.shots.iter().enumerate().filter(|(_, shot)| shot.settings.spp == most) {
             if self.stopped() {
@@ -128,7 +128,7 @@ impl Measuring<'_> {
     fn rounds(&mut self, reference: &Reference) {
         let ours = self.plan.candidates.len();
         let total = (ours * self.plan.repeats as usize) as u64;
-        for (round, seed) in seeds(&self.plan.base, self.plan.repeats).into_iter().enumerate() {
+        for (round, seed) in seeds(self.plan).into_iter().enumerate() {
             let mut random = fastrand::Rng::with_seed(self.plan.order_seed.wrapping_add(round as u64));
             let mut order: Vec<usize> = (0..self.shots.len()).collect();
             random.shuffle(&mut order);
@@ -184,7 +184,7 @@ impl Measuring<'_> {
         if self.points.iter().any(|point| lacks_runs(point, self.plan.repeats)) {
             return;
         }
-        let seed = seeds(&self.plan.base, self.plan.repeats)[0];
+        let seed = seeds(self.plan)[0];
         for (index, shot) in self.shots.iter().enumerate() {
             let lacks = |i: &usize| self.pictures[*i].is_none() && self.points[*i].failed.is_none();
             let points: Vec<usize> = shot.points.iter().copied().filter(lacks).collect();

@@ -20,6 +20,7 @@ pub mod interval;
 pub mod judge;
 mod machine;
 mod measure;
+mod motion;
 pub mod others;
 mod parts;
 mod plan;
@@ -33,6 +34,7 @@ pub mod words;
 pub use assemble::Ended;
 pub use document::Document;
 pub use measure::measure;
+pub use motion::{JudgedFrame, Motion};
 pub use plan::{Plan, Watch, key};
 
 use crate::image::Picture;

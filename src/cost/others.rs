@@ -54,7 +54,7 @@ pub fn read(path: &Path) -> Result<Vec<OtherRun>> {
         if !(ms.is_finite() && ms > 0.0) {
             return Err(wrong(format!("a time of {ms} ms: give a number above 0")));
         }
-        let method = Method { allocate: method, filter, rounds: None, options: Vec::new(), spp };
+        let method = Method { allocate: method, filter, rounds: None, reproject: None, options: Vec::new(), spp };
         Ok(OtherRun { method, seed, ms, image: path.parent().unwrap_or(Path::new("")).join(image) })
     };
     csv::Reader::from_reader(&text[..]).deserialize().map(run).collect()

@@ -1,6 +1,7 @@
 //! What is to be measured, and how it is watched.
 use super::document::{Document, Method, SceneInfo};
 use super::grid::Candidate;
+use super::motion::{JudgedFrame, Motion};
 use super::others::OtherRun;
 use super::reference::Reference;
 use crate::error::{Error, Result};
@@ -19,6 +20,8 @@ const MOST: usize = 1000;
 pub struct Plan {
     /// The scene, for the reader of the document.
     pub scene: SceneInfo,
+    /// How the scene moves; it shows the frame that is judged then. `None` for a scene at rest.
+    pub motion: Option<Motion>,
     /// Settings of the scene, which the candidates change.
     pub base: Settings,
     /// The points.
@@ -58,6 +61,7 @@ pub fn key(gpu: &Gpu, scene: &Scene, plan: &Plan) -> String {
     let methods: Vec<&Method> = plan.candidates.iter().map(|candidate| &candidate.method).collect();
     let filters: Vec<_> =
         plan.candidates.iter().map(|candidate| values(&candidate.filter_settings.entries())).collect();
+    let carries: Vec<_> = plan.candidates.iter().map(|candidate| candidate.carries).collect();
     let given = plan.reference.as_ref().map(|reference| &reference.info);
     let info = gpu.info();
     let parts = [
@@ -65,6 +69,7 @@ pub fn key(gpu: &Gpu, scene: &Scene, plan: &Plan) -> String {
         text(&plan.base),
         text(&methods),
         text(&filters),
+        text(&(plan.motion.as_ref().map(|motion| motion.judged), carries)),
         text(&given),
         text(&(plan.repeats, plan.order_seed)),
         text(&(&info.name, &info.driver_name, &info.driver_version)),
@@ -82,9 +87,10 @@ fn values(settings: &[Entry]) -> Vec<String> {
     settings.iter().map(|entry| entry.value.clone()).collect()
 }
 
-/// Seeds of the runs.
-pub fn seeds(base: &Settings, repeats: u32) -> Vec<u32> {
-    (0..repeats).map(|i| base.seed.wrapping_add(i)).collect()
+/// Seeds of the runs. Where a run renders several frames it needs several.
+pub fn seeds(plan: &Plan) -> Vec<u32> {
+    let each = if plan.motion.is_some() { JudgedFrame::SEEDS } else { 1 };
+    (0..plan.repeats).map(|i| plan.base.seed.wrapping_add(i * each)).collect()
 }
 
 /// There must be points, and their pictures, the reference and what judging takes must fit into memory.

@@ -40,6 +40,9 @@ pub struct Method {
     pub filter: String,
     /// Rounds that the budget is spread over; `None` is the policy's own choice.
     pub rounds: Option<u32>,
+    /// How samples of earlier frames are carried, as `--reproject` has it; `None` if they are not.
+    #[serde(default)]
+    pub reproject: Option<String>,
     /// Further options that differ from the defaults, such as "--max-depth 4".
     pub options: Vec<String>,
     /// Samples per pixel; 0 with `--filter-only`.
@@ -174,6 +177,9 @@ impl Method {
             words.push(self.filter.clone());
         }
         let mut name = words.join(" + ");
+        if self.reproject.is_some() {
+            name += ", reprojection";
+        }
         if let Some(rounds) = self.rounds {
             name += &format!(", {rounds} rounds");
         }
@@ -193,7 +199,11 @@ impl Method {
 
     /// Whether it is the method that [`Summary::speed_up`] compares with.
     pub fn is_baseline(&self) -> bool {
-        self.allocate == "uniform" && self.filter == "none" && self.rounds.is_none() && self.options.is_empty()
+        self.allocate == "uniform"
+            && self.filter == "none"
+            && self.rounds.is_none()
+            && self.reproject.is_none()
+            && self.options.is_empty()
     }
 }
 

@@ -1,13 +1,14 @@
 //! Renders the shots of a grid and filters them, with the clock on.
 use super::document::{Pass, Run, WarmUp};
 use super::grid::{Candidate, Shot};
+use super::motion::{Motion, Moving};
 use crate::denoise::{Colour, Noisy, Recipe, Timed, filter, host_bytes, timed};
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu, PassTime};
 use crate::image::Picture;
 use crate::memory;
-use crate::render::{Job, Renderer, Status, StopReason, film};
-use crate::scene::Scene;
+use crate::render::{Job, Renderer, Status, StopReason, called_for, film};
+use crate::scene::{Change, Scene};
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
@@ -18,6 +19,8 @@ const KEPT_SHARE: u64 = 4;
 pub struct Session<'a> {
     gpu: &'a Gpu,
     scene: &'a Scene,
+    /// The scene of its own, where it moves.
+    moving: Option<Moving<'a>>,
     candidates: &'a [Candidate],
     shots: &'a [Shot],
     warm: Vec<Option<Warm>>,
@@ -29,6 +32,8 @@ struct Warm {
     renderer: Renderer,
     costs: WarmUp,
     device_bytes: u64,
+    /// What has changed in the scene since it was told.
+    missed: Change,
 }
 
 /// One measured point, not judged yet.
@@ -58,14 +63,21 @@ struct Rendered {
 }
 
 impl<'a> Session<'a> {
-    /// Begins with no renderer.
+    /// Begins with no renderer. A scene with `motion` shows the frame that is judged.
     ///
     /// # Errors
-    /// [`Error::Device`], also for a device that does not tell times.
-    pub fn new(gpu: &'a Gpu, scene: &'a Scene, candidates: &'a [Candidate], shots: &'a [Shot]) -> Result<Self> {
+    /// [`Error::Device`], also for a device that does not tell times; those of [`Moving::new`].
+    pub fn new(
+        gpu: &'a Gpu,
+        scene: &'a Scene,
+        motion: Option<&'a Motion>,
+        candidates: &'a [Candidate],
+        shots: &'a [Shot],
+    ) -> Result<Self> {
         check_clock(gpu)?;
         let warm = shots.iter().map(|_| None).collect();
-        Ok(Self { gpu, scene, candidates, shots, warm, frame: FrameResources::new(gpu)? })
+        let moving = motion.map(|motion| Moving::new(scene, motion)).transpose()?;
+        Ok(Self { gpu, scene, moving, candidates, shots, warm, frame: FrameResources::new(gpu)? })
     }
 
     /// Renders a shot with a seed and filters it for its points, in the order of `points`.
@@ -74,10 +86,7 @@ impl<'a> Session<'a> {
         let rendered = match self.render(shot, seed, stop) {
             Ok(Some(rendered)) => rendered,
             Ok(None) => return Vec::new(),
-            Err(e) => {
-                self.warm[shot] = None;
-                return failed(e);
-            }
+            Err(e) => return failed(self.forget(shot).err().unwrap_or(e)),
         };
         points.iter().map(|&point| (point, self.measured(shot, seed, point, &rendered))).collect()
     }
@@ -87,9 +96,11 @@ impl<'a> Session<'a> {
         if self.warm[shot].is_none() && !self.warm_up(shot, seed, stop)? {
             return Ok(None);
         }
-        let Some(Warm { renderer, .. }) = &mut self.warm[shot] else { return Ok(None) };
-        renderer.set_seed(seed);
-        let Some((status, wall)) = trace(renderer, &mut self.frame, stop)? else { return Ok(None) };
+        let Some((status, wall)) = self.shoot(shot, seed, stop)? else {
+            self.forget(shot)?;
+            return Ok(None);
+        };
+        let Some(Warm { renderer, .. }) = &self.warm[shot] else { return Ok(None) };
         if let Some(broken) = status.broken_samples {
             return Err(Error::Device(format!("{} samples were no number", broken.count)));
         }
@@ -106,22 +117,78 @@ impl<'a> Session<'a> {
 
     /// Makes a renderer and runs it once, so that the driver has compiled everything. Returns false if it was stopped.
     fn warm_up(&mut self, shot: usize, seed: u32, stop: &dyn Fn() -> bool) -> Result<bool> {
-        let Shot { settings, outputs, .. } = &self.shots[shot];
+        let Shot { settings, outputs, carries, .. } = &self.shots[shot];
         let info = self.gpu.info();
         if self.gpu.allocated_bytes() > info.memory_heap / KEPT_SHARE {
             self.warm.iter_mut().for_each(|warm| *warm = None);
         }
         self.check_room(shot)?;
         let before = self.gpu.allocated_bytes();
+        let effects = match &mut self.moving {
+            None => called_for(self.scene, settings, *outputs),
+            Some(moving) => {
+                let (effects, change) = moving.effects(settings, *outputs)?;
+                tell(&mut self.warm, &change);
+                effects
+            }
+        };
         let begun = Instant::now();
-        let mut renderer = Renderer::new(self.gpu, self.scene, settings, *outputs)?;
-        let compile_ms = milliseconds(begun.elapsed());
-        renderer.set_seed(seed);
-        let Some((_, wall)) = trace(&renderer, &mut self.frame, stop)? else { return Ok(false) };
-        let device_bytes = self.gpu.allocated_bytes().saturating_sub(before);
-        let costs = WarmUp { compile_ms, first_run_ms: milliseconds(wall) };
-        self.warm[shot] = Some(Warm { renderer, costs, device_bytes });
+        let scene = self.moving.as_ref().map_or(self.scene, |moving| &moving.scene);
+        let mut renderer = Renderer::specialised(self.gpu, scene, settings, *outputs, effects)?;
+        if let (Some(how), Some(moving)) = (carries, &self.moving) {
+            renderer.keep_history(*how, moving.moves)?;
+        }
+        let costs = WarmUp { compile_ms: milliseconds(begun.elapsed()), first_run_ms: 0.0 };
+        self.warm[shot] = Some(Warm { renderer, costs, device_bytes: 0, missed: Change::default() });
+        let begun = Instant::now();
+        if self.shoot(shot, seed, stop)?.is_none() {
+            self.forget(shot)?;
+            return Ok(false);
+        }
+        if let Some(warm) = &mut self.warm[shot] {
+            warm.costs.first_run_ms = milliseconds(begun.elapsed());
+            warm.device_bytes = self.gpu.allocated_bytes().saturating_sub(before);
+        }
         Ok(true)
+    }
+
+    /// Drops a renderer that did not reach its end, and brings the scene to where it is between runs.
+    fn forget(&mut self, shot: usize) -> Result<()> {
+        self.warm[shot] = None;
+        let Some(moving) = &mut self.moving else { return Ok(()) };
+        tell(&mut self.warm, &moving.rest()?);
+        Ok(())
+    }
+
+    /// Renders the image of a shot, or the frames that lead to it. Returns what the last took: a scene that has moved into it is
+    /// uploaded in that time. `None` if it was stopped.
+    fn shoot(&mut self, shot: usize, seed: u32, stop: &dyn Fn() -> bool) -> Result<Option<(Status, Duration)>> {
+        let Self { gpu, moving, warm, frame, shots, .. } = self;
+        let Some(moving) = moving else {
+            let Some(Warm { renderer, .. }) = &mut warm[shot] else { return Ok(None) };
+            renderer.set_seed(seed);
+            return trace(&Job::new(renderer), frame, stop);
+        };
+        let carries = shots[shot].carries.is_some();
+        let frames = moving.frames(carries);
+        let mut last = None;
+        for number in frames.clone() {
+            tell(warm, &moving.pose(number)?);
+            let Some(Warm { renderer, missed, .. }) = &mut warm[shot] else { return Ok(None) };
+            // Frames that begin with others' samples need random numbers of their own.
+            renderer.set_seed(if carries { seed.wrapping_add(number) } else { seed });
+            let (begun, change) = (Instant::now(), std::mem::take(missed));
+            let moved = gpu.run(frame, |rec| renderer.update(rec, &moving.scene, &change))?;
+            let moving_into = begun.elapsed();
+            if !carries && number != *frames.end() {
+                continue;
+            }
+            let job = Job { carries: carries && number > *frames.start(), ..Job::new(renderer) };
+            let Some((mut status, wall)) = trace(&job, frame, stop)? else { return Ok(None) };
+            status.times.splice(..0, moved);
+            last = Some((status, moving_into + wall));
+        }
+        Ok(last)
     }
 
     fn check_room(&self, shot: usize) -> Result<()> {
@@ -134,7 +201,7 @@ impl<'a> Session<'a> {
     }
 
     fn measured(&self, shot: usize, seed: u32, point: usize, rendered: &Rendered) -> Result<Measured> {
-        let Some(Warm { renderer, costs, device_bytes }) = &self.warm[shot] else {
+        let Some(Warm { renderer, costs, device_bytes, .. }) = &self.warm[shot] else {
             return Err(Error::Device("the renderer is gone".to_owned()));
         };
         let mut run = Run {
@@ -202,15 +269,16 @@ pub fn finite(picture: Picture) -> Result<Picture> {
     }
 }
 
+/// Tells all renderers that the scene has changed.
+fn tell(warm: &mut [Option<Warm>], change: &Change) {
+    warm.iter_mut().flatten().for_each(|warm| warm.missed.add(change.clone()));
+}
+
 /// Runs a whole render, and returns its wall time. `None` if it was stopped.
-fn trace(
-    renderer: &Renderer,
-    frame: &mut FrameResources,
-    stop: &dyn Fn() -> bool,
-) -> Result<Option<(Status, Duration)>> {
+fn trace(job: &Job, frame: &mut FrameResources, stop: &dyn Fn() -> bool) -> Result<Option<(Status, Duration)>> {
     let mut between = |_: &Status| Ok(if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) });
     let begun = Instant::now();
-    let status = Job::new(renderer).run(frame, &mut between)?;
+    let status = job.run(frame, &mut between)?;
     let wall = begun.elapsed();
     Ok((status.stopped != StopReason::Interrupted).then_some((status, wall)))
 }

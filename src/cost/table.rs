@@ -2,11 +2,12 @@
 use super::document::{Document, Errors, Estimate, Point, Summary};
 
 /// Columns before the errors.
-const HEAD: [&str; 13] = [
+const HEAD: [&str; 14] = [
     "method",
     "allocate",
     "filter",
     "rounds",
+    "reproject",
     "options",
     "spp",
     "runs",
@@ -70,6 +71,7 @@ fn head(point: &Point) -> Vec<String> {
         method.allocate.clone(),
         method.filter.clone(),
         method.rounds.map(|n| n.to_string()).unwrap_or_default(),
+        method.reproject.clone().unwrap_or_default(),
         method.options.join(" "),
         method.spp.to_string(),
         point.runs.len().to_string(),

@@ -14,6 +14,11 @@ macro_rules! effects {
                 [$(self.$field,)+]
             }
 
+            /// Those that are on in either.
+            pub fn or(self, other: Self) -> Self {
+                Self { $($field: self.$field || other.$field,)+ }
+            }
+
             /// The same with one effect switched.
             pub fn toggled(mut self, effect: Effect) -> Self {
                 let switch = match effect {

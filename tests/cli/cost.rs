@@ -74,7 +74,9 @@ fn replays(folder: &TempDir, document: &Document, label: &str) {
         assert!(output.status.success(), "{words}: {output:?}");
     }
     let picture = |path: &Path| image::read(path).unwrap().picture(None).unwrap();
-    let (image, reference) = (picture(&folder.path().join("point.exr")), picture(&reference(folder)));
+    let (_, file) = point.command.rsplit_once(' ').unwrap();
+    let file = file.replace("####", "0008");
+    let (image, reference) = (picture(&folder.path().join(file)), picture(&reference(folder)));
     let error = relmse(&image, &reference) - document.reference.relmse.unwrap();
     let told = point.runs[0].errors.relmse.unwrap();
     assert!((error - told).abs() < 1e-9 * told, "{}: {error} is not {told}", point.command);
@@ -102,18 +104,42 @@ fn an_ablation_turns_every_knob_by_itself() {
     let change = |option: &str| {
         let point = point(&document, &format!("uniform, {option}, 16 spp"));
         let change = point.summary.as_ref().unwrap().change.unwrap();
-        [change.time.unwrap().value, change.relmse.unwrap().value]
+        assert!(change.time.unwrap().value > 0.0);
+        (point.runs[0].rays.unwrap(), change.relmse.unwrap().value)
     };
-    // Direct light alone takes less time, and lacks the rest of the light.
-    let [time, error] = change("max-depth 2");
-    assert!(time < 0.9 && error > 2.0, "{time} {error}");
-    assert_ne!(change("sampler independent")[1], 1.0, "other random numbers");
+    // Direct light alone takes fewer rays, and lacks the rest of the light.
     let own = &document.points[0];
+    let (rays, error) = change("max-depth 2");
+    assert!(10 * rays < 9 * own.runs[0].rays.unwrap() && error > 2.0, "{rays} {error}");
+    assert_ne!(change("sampler independent").1, 1.0, "other random numbers");
     assert!(own.method.options.is_empty() && own.summary.as_ref().unwrap().change.is_none());
     let options: Vec<_> = document.points[1..].iter().map(|point| &point.method.options).collect();
     assert!(options.iter().all(|option| option.len() == 1) && options.len() == 6 + 2 + 1, "{options:?}");
     let page = std::fs::read_to_string(folder.path().join("all/cost.html")).unwrap();
     assert!(page.contains("<h2>What options change</h2>"));
+}
+
+#[test]
+fn a_frame_of_a_scene_that_moves_is_measured_alone_and_as_the_end_of_a_sequence() {
+    let folder = tempfile::tempdir().unwrap();
+    let moving = scene().replace("cornell-box", "moving");
+    let words =
+        "--width 24 --height 16 --allocate uniform --denoise none,svgf --spp 2 --repeats 2 --reference-spp 64 -o all";
+    let mut command = within(&folder, &format!("cost {moving} {words} --validation --variant"));
+    text(&command.args(["--reproject-samples 1"]).output().unwrap(), 0);
+    let document = document(&folder, "all/cost.json");
+    let judged = document.scene.judged.unwrap();
+    assert!(document.complete && (judged.frame, judged.fps) == (8, 24.0) && document.points.len() == 6, "{document:?}");
+    let error = |label: &str| point(&document, label).summary.as_ref().unwrap().errors.relmse.unwrap().value;
+    assert!(error("uniform, reprojection, 2 spp") < 0.7 * error("uniform, 2 spp"), "samples of eight frames");
+    assert!(error("uniform, reprojection, 2 spp") < 0.9 * error("uniform, reprojection, reproject-samples 1, 2 spp"));
+    let passes = |label: &str| point(&document, label).runs[0].passes.iter().map(|pass| pass.pass.clone()).collect();
+    let [alone, carried]: [Vec<_>; 2] = ["uniform, 2 spp", "uniform, reprojection, 2 spp"].map(passes);
+    let has = |passes: &[String], name: &str| passes.iter().any(|pass| pass == name);
+    assert!(has(&alone, "upload") && has(&carried, "upload") && has(&carried, "carry") && !has(&alone, "carry"));
+    replays(&folder, &document, "uniform + svgf, 2 spp");
+    replays(&folder, &document, "uniform + svgf, reprojection, 2 spp");
+    replays(&folder, &document, "uniform + svgf, reprojection, reproject-samples 1, 2 spp");
 }
 
 #[test]
@@ -230,6 +256,8 @@ fn what_cannot_be_measured_is_one_line() {
     complains(&within(&folder, "cost --filter-only other.exr").output().unwrap(), 2, &["--reference"]);
     let output = within(&folder, &format!("cost {}", scene())).args(["--with", "--blue 4"]).output().unwrap();
     complains(&output, 2, &["\"--blue 4\"", "tallow render --help"]);
+    complains(&cost(&folder, "--reproject forward"), 2, &["nothing moves"]);
+    complains(&cost(&folder, "--frame 4"), 2, &["nothing moves"]);
     for (option, words, says) in [
         ("--variant", "--spp 3", "give --spp itself, as a list"),
         ("--with", "--allocate both", "give --allocate itself"),

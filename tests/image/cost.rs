@@ -43,8 +43,14 @@ fn run(seed: u32, gpu_ms: f64, relmse: f64) -> Run {
 }
 
 fn point(truth: Truth, spp: u32, runs: Vec<Run>) -> Point {
-    let method =
-        Method { allocate: truth.allocate.into(), filter: "none".into(), rounds: None, options: Vec::new(), spp };
+    let method = Method {
+        allocate: truth.allocate.into(),
+        filter: "none".into(),
+        rounds: None,
+        reproject: None,
+        options: Vec::new(),
+        spp,
+    };
     Point { runs, ..Point::unmeasured(method, String::new()) }
 }
 

@@ -19,8 +19,14 @@ const METHODS: [(&str, &str, f64, f64, f64); 7] = [
 pub fn document(name: &str) -> Document {
     let mut points: Vec<Point> = METHODS.iter().flat_map(|method| SPP.map(|spp| measured(*method, spp))).collect();
     points.push(shallow(points[31].clone()));
-    let method =
-        Method { allocate: "both".into(), filter: "svgf".into(), rounds: Some(3), options: Vec::new(), spp: 4 };
+    let method = Method {
+        allocate: "both".into(),
+        filter: "svgf".into(),
+        rounds: Some(3),
+        reproject: None,
+        options: Vec::new(),
+        spp: 4,
+    };
     points.push(Point { failed: Some("filter svgf: the image has no normals".into()), ..empty(method.clone()) });
     points.push(empty(Method { spp: 16, ..method }));
     let front = vec![0, 30, 31, 32, 33, 34];
@@ -39,7 +45,13 @@ pub fn nothing_measured(name: &str) -> Document {
         schema: SCHEMA,
         complete: false,
         software: Software { version: "0.1.0".into(), commit: Some("0123abc".into()) },
-        scene: SceneInfo { path: format!("scenes/{name}.toml"), name: name.into(), width: 192, height: 128 },
+        scene: SceneInfo {
+            path: format!("scenes/{name}.toml"),
+            name: name.into(),
+            width: 192,
+            height: 128,
+            judged: None,
+        },
         machine: Machine {
             device: "Imaginary GPU 9".into(),
             kind: "discrete GPU".into(),
@@ -86,7 +98,14 @@ fn estimate(value: f64, spread: f64) -> Estimate {
 }
 
 fn measured((allocate, filter, filter_ms, at_one, stays): (&str, &str, f64, f64, f64), spp: u32) -> Point {
-    let method = Method { allocate: allocate.into(), filter: filter.into(), rounds: None, options: Vec::new(), spp };
+    let method = Method {
+        allocate: allocate.into(),
+        filter: filter.into(),
+        rounds: None,
+        reproject: None,
+        options: Vec::new(),
+        spp,
+    };
     let n = f64::from(spp);
     let relmse = at_one / n + stays;
     let overhead = if allocate == "uniform" { 0.0 } else { 1.5 };

@@ -22,7 +22,13 @@ pub fn run(args: &Args, image: &Path, folder: &Folder) -> Result<Exit> {
     let plan = FilterPlan {
         path: image,
         film: &film,
-        scene: SceneInfo { path: image.display().to_string(), name: name(image), width: size[0], height: size[1] },
+        scene: SceneInfo {
+            path: image.display().to_string(),
+            name: name(image),
+            width: size[0],
+            height: size[1],
+            judged: None,
+        },
         candidates: candidates(args, image)?,
         repeats: args.repeats,
         order_seed: args.order_seed,

@@ -22,8 +22,10 @@ enum Reader {
     Policies(&'static [&'static str]),
     /// What is filtered by one of these filters.
     Filters(&'static [&'static str]),
+    /// What begins with samples of earlier frames.
+    Carried,
 }
-use Reader::{Filtered, Filters, Paths, Placed, Policies};
+use Reader::{Carried, Filtered, Filters, Paths, Placed, Policies};
 
 const fn knob(name: &'static str, values: &'static [&'static str], read_by: Reader) -> Knob {
     Knob { name, values, read_by }
@@ -55,6 +57,11 @@ const KNOBS: &[Knob] = &[
     knob("sigma-l", &["2", "4", "8"], Filters(&["svgf", "auto"])),
     knob("basis", &["cdf22", "red-black"], Filters(&["wavelet"])),
     knob("oidn-quality", &["fast", "balanced", "high"], Filters(&["oidn"])),
+    // 1, 4 and 8 of 256: Schalk 2018.
+    knob("reproject-error", &["0", "0.00390625", "0.015625", "0.03125"], Carried),
+    knob("reproject-light", &["0.02", "0.05", "0.1", "0.2"], Carried),
+    knob("reproject-samples", &["16", "64", "256"], Carried),
+    knob("reproject-age", &["4", "16", "64"], Carried),
 ];
 
 /// The options that change one knob of a point to another value, such as `--levels 4`.
@@ -64,7 +71,8 @@ pub fn steps(candidate: &Candidate) -> Vec<String> {
 
 impl Knob {
     fn steps(&self, candidate: &Candidate) -> Vec<String> {
-        let entries = [candidate.settings.entries(), candidate.filter_settings.entries()].concat();
+        let carries = candidate.carries.unwrap_or_default().entries();
+        let entries = [candidate.settings.entries(), candidate.filter_settings.entries(), carries].concat();
         let own = entries.into_iter().find(|entry| entry.name == self.name).map(|entry| entry.value);
         let allowed = |value: &str| {
             // Fewer at most than there are on average would leave samples over.
@@ -85,6 +93,7 @@ impl Reader {
             Placed => policy.placing != Placing::Even,
             Policies(names) => names.contains(&policy.name),
             Filters(names) => candidate.filter.is_some_and(|filter| names.contains(&filter.name())),
+            Carried => candidate.carries.is_some(),
         }
     }
 }
@@ -97,6 +106,7 @@ mod tests {
     use crate::cost::grid::{Axes, grid};
     use crate::denoise::filter::{FILTERS, FilterInput, FilterSettings, Method};
     use crate::layout::{Guide, vec4};
+    use crate::render::Reproject;
     use crate::render::settings::Settings;
 
     /// Far pixels count, so that every level of a filter changes something.
@@ -106,6 +116,7 @@ mod tests {
             filters: vec![filter],
             spp: vec![spp],
             rounds: vec![0],
+            carries: vec![Some(Reproject::default())],
         };
         let filters = FilterSettings::default().with(|s| s.edge.sigma_x = 2.0);
         grid(&Settings::default(), &filters, &axes).remove(0)
@@ -114,7 +125,7 @@ mod tests {
     /// The settings with one option.
     fn with(candidate: &Candidate, option: &str) -> Option<Candidate> {
         let words = Words::parse(option).unwrap();
-        candidate.varied(option, |settings, filters| words.apply(settings, filters))
+        candidate.varied(option, |settings, filters, carries| words.apply(settings, filters, carries))
     }
 
     #[test]

@@ -4,10 +4,12 @@ use crate::cli::common::with_ranges;
 use crate::cli::filter::options as filter;
 use crate::cli::finite;
 use crate::cli::overrides::Overrides;
+use crate::cli::sequence::Reprojection;
 use crate::cost::grid::Axes;
 use crate::denoise::filter::{FilterSettings, Method};
 use crate::error::{Error, Result};
 use crate::render::settings::{Film, Settings};
+use crate::render::{Reproject, ReprojectOverrides};
 use clap::Parser;
 use std::path::PathBuf;
 
@@ -17,6 +19,9 @@ use std::path::PathBuf;
 /// cost.json (with all raw runs), cost.csv and cost.html. Time is the device's own, without the first run of each kernel. Errors
 /// are measured against a reference, which is rendered and kept for the next time unless one is given. Stopped by Ctrl-C or by the
 /// budget, the same command goes on where it was.
+///
+/// Of a scene that moves the image of one frame is judged (--frame), alone and as the end of a sequence whose frames begin with
+/// samples of the last (--reproject): time and samples are that frame's.
 #[derive(clap::Args)]
 pub struct Args {
     /// Scene file (.toml, .gltf, .glb) or model (.obj, .ply)
@@ -55,7 +60,17 @@ pub struct Args {
     /// Rounds of policies that learn; 0 is their own choice
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "0")]
     pub rounds: Vec<u32>,
-    /// Options of tallow render and settings of tallow filter for all points, and of the render for the reference too, such as
+    /// Where the scene moves: whether frames begin with samples of the last [default: off,forward where the camera has no lens]
+    #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',', conflicts_with = "filter_only")]
+    pub reproject: Vec<Reprojection>,
+    /// Where the scene moves: the frame whose image is judged. Only its time is told; with --reproject forward up to eight frames are
+    /// rendered before it [default: 8]
+    #[arg(long, value_name = "N", conflicts_with = "filter_only", value_parser = clap::value_parser!(u32).range(1..))]
+    pub frame: Option<u32>,
+    /// Where the scene moves: frames per second
+    #[arg(long, default_value = "24", value_parser = rate)]
+    pub fps: f64,
+    /// Options of tallow render or tallow sequence and settings of tallow filter for all points, and of the render for the reference too, such as
     /// "--max-depth 4"; with --filter-only of tallow filter alone
     #[arg(long, value_name = "OPTIONS", allow_hyphen_values = true, default_value = "")]
     pub with: String,
@@ -122,14 +137,15 @@ impl FilmOptions {
 
 impl Args {
     /// The lists of the grid; samples in ascending order.
-    pub fn axes(&self) -> Axes {
+    pub fn axes(&self, carries: Vec<Option<Reproject>>) -> Axes {
         let mut spp = self.spp.clone();
         spp.sort_unstable();
-        Axes { allocate: self.allocate.clone(), filters: self.denoise.clone(), spp, rounds: self.rounds.clone() }
+        let (allocate, filters, rounds) = (self.allocate.clone(), self.denoise.clone(), self.rounds.clone());
+        Axes { allocate, filters, spp, rounds, carries }
     }
 }
 
-/// Options of `tallow render` and settings of `tallow filter`, parsed from one text.
+/// Options of `tallow render` and `tallow sequence` and settings of `tallow filter`, parsed from one text.
 #[derive(Parser)]
 #[command(no_binary_name = true, disable_help_flag = true)]
 pub struct Words {
@@ -137,6 +153,8 @@ pub struct Words {
     render: Overrides,
     #[command(flatten)]
     filter: filter::Overrides,
+    #[command(flatten)]
+    carry: ReprojectOverrides,
 }
 
 impl Words {
@@ -177,9 +195,10 @@ impl Words {
     }
 
     /// Replaces the settings that were given.
-    pub fn apply(&self, settings: &mut Settings, filters: &mut FilterSettings) {
+    pub fn apply(&self, settings: &mut Settings, filters: &mut FilterSettings, carries: &mut Reproject) {
         self.render.apply(settings);
         *filters = self.filter.settings(*filters);
+        self.carry.apply(carries);
     }
 }
 
@@ -188,6 +207,11 @@ pub fn refused(text: &str, command: &str, e: &clap::Error) -> Error {
     let line = e.to_string();
     let line = line.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
     Error::Usage(format!("\"{}\": {line} (see tallow {command} --help)", text.trim()))
+}
+
+fn rate(text: &str) -> std::result::Result<f64, String> {
+    let value = finite(text)?;
+    if value > 0.0 && value <= 1e6 { Ok(value) } else { Err("expected a number above 0".into()) }
 }
 
 fn minutes(text: &str) -> std::result::Result<f64, String> {

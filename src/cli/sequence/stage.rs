@@ -7,7 +7,7 @@ use crate::cli::{Exit, complain};
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu};
 use crate::image::{self, Film, NOISY};
-use crate::layout::{Effect, Effects};
+use crate::layout::Effects;
 use crate::render::settings::Settings;
 use crate::render::{Carriage, Moves, Outputs, Renderer, Reproject, all_effects, called_for, can_carry, finished};
 use crate::scene::animation::{Animation, Turntable};
@@ -95,8 +95,7 @@ impl<'a> Stage<'a> {
         render::check_room(&args.render, &settings, &gpu)?;
         let rest = called_for(&scene, &settings, args.render.wanted());
         let reproject = carrying(args, &gpu, &scene, &settings, !animation.is_empty())?;
-        // Every pose says of all that ever moves where it is.
-        let moves = if animation.at(0.0)?.is_of_camera_alone() { Moves::Camera } else { Moves::Scene };
+        let moves = Moves::of(&animation)?;
         let (renderer, change, chain, held) = (None, Change::default(), Chain::default(), None);
         Ok(Self {
             args,
@@ -241,7 +240,7 @@ impl<'a> Stage<'a> {
         let wanted = self.wanted();
         let effects = match self.args.render.effects {
             EffectChoice::All => all_effects(&self.scene, settings),
-            EffectChoice::Auto => self.union(called_for(&self.scene, settings, wanted)),
+            EffectChoice::Auto => self.rest.or(called_for(&self.scene, settings, wanted)),
         };
         let mut renderer = Renderer::specialised(&self.gpu, &self.scene, settings, wanted, effects)?;
         self.reproject.map_or(Ok(()), |how| renderer.keep_history(how, self.moves))?;
@@ -254,12 +253,6 @@ impl<'a> Stage<'a> {
     fn wanted(&self) -> Outputs {
         let wanted = self.args.render.wanted();
         Outputs { guides: wanted.guides || self.reproject.is_some(), ..wanted }
-    }
-
-    /// Effects of now and of all frames so far.
-    fn union(&self, now: Effects) -> Effects {
-        let lacks = self.rest.switches().into_iter().zip(now.switches()).map(|(rest, now)| rest && !now);
-        Effect::ALL.iter().zip(lacks).filter(|(_, lacks)| *lacks).fold(now, |all, (effect, _)| all.toggled(*effect))
     }
 
     /// The film of a frame that an earlier run has finished, by what its first file with all layers holds.

@@ -8,6 +8,7 @@ use crate::layout::{
     Camera, Effects, History as Record, HistoryLight, LightChange, PathConstants, ReprojectPush, SurfacePoint,
 };
 use crate::render::buffers::most_of_one_tile;
+use crate::scene::animation::Animation;
 use crate::scene::{Change, Relit, Scene};
 use crate::settings::{FROM_0, entry, settings};
 use crate::shaders;
@@ -48,6 +49,16 @@ pub enum Moves {
     Camera,
     /// All that a pose can change. How light has changed is then found by paths, whose kernel is compiled.
     Scene,
+}
+
+impl Moves {
+    /// What an animation moves: every pose says of all that ever moves where it is.
+    ///
+    /// # Errors
+    /// Those of [`Animation::at`].
+    pub fn of(animation: &Animation) -> Result<Self> {
+        Ok(if animation.at(0.0)?.is_of_camera_alone() { Self::Camera } else { Self::Scene })
+    }
 }
 
 /// The kernels and buffers of reprojection. `P` pixels; 64 bytes each, with [`crate::render::FilmTile::points`], and 28 more where

@@ -95,7 +95,7 @@ fn series<'a>(marks: &'a [Mark<'a>]) -> Vec<Series<'a>> {
             continue;
         }
         let colour = chart::colour(index_of(&mut filters, &method.filter));
-        let other = index_of(&mut others, &(&method.allocate, method.rounds, &method.options));
+        let other = index_of(&mut others, &(&method.allocate, method.rounds, &method.reproject, &method.options));
         all.push(Series { name, colour, shape: chart::shape(other), marks: vec![mark] });
     }
     all

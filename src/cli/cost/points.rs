@@ -1,0 +1,129 @@
+//! The points that `tallow cost` measures: the scene, how it moves, the settings of each point, and the command that renders it.
+use super::options::Words;
+use super::{Args, knobs, quoted};
+use crate::cli::sequence::Reprojection;
+use crate::cost::grid::{self, Candidate};
+use crate::cost::{JudgedFrame, Motion};
+use crate::denoise::filter::{FilterSettings, Method};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::render::settings::Settings;
+use crate::render::{Reproject, can_carry};
+use crate::scene::animation::Animation;
+use crate::scene::{Loaded, Scene, SceneFile};
+use crate::settings::entry;
+use std::path::Path;
+
+/// The frame that is judged unless another is asked for: the first with a whole history.
+const JUDGED: u32 = 8;
+
+/// What is measured.
+pub struct Points {
+    /// The scene, in the pose of the frame that is judged.
+    pub scene: Scene,
+    /// How it moves; `None` at rest.
+    pub motion: Option<Motion>,
+    /// Its settings with those of the options.
+    pub base: Settings,
+    /// The points.
+    pub candidates: Vec<Candidate>,
+}
+
+impl Points {
+    /// Those of a scene.
+    ///
+    /// # Errors
+    /// Of scene and options.
+    pub fn new(args: &Args, path: &Path, gpu: &Gpu) -> Result<Self> {
+        let file = SceneFile::open(path)?;
+        let (mut base, mut filters, mut carries) = (file.settings()?, FilterSettings::default(), Reproject::default());
+        args.film.apply(&mut base);
+        Words::parse(&args.with)?.apply(&mut base, &mut filters, &mut carries);
+        base.validate()?;
+        filters.validate()?;
+        entry::check(&carries.entries())?;
+        let Loaded { mut scene, animation, .. } = file.load()?;
+        let motion = motion(args, animation)?;
+        motion.iter().try_for_each(|motion| motion.pose(&mut scene, motion.judged.frame).map(|_| ()))?;
+        let able = motion.as_ref().map(|_| can_carry(gpu, &scene, &base));
+        let axes = args.axes(reproject(args, able)?.into_iter().map(|carried| carried.then_some(carries)).collect());
+        let mut candidates = grid::grid(&base, &filters, &axes);
+        candidates.iter().try_for_each(|candidate| candidate.settings.validate())?;
+        candidates.extend(varied(args, &candidates)?);
+        Ok(Self { scene, motion, base, candidates })
+    }
+}
+
+/// How a scene moves that is not at rest.
+fn motion(args: &Args, animation: Animation) -> Result<Option<Motion>> {
+    let asked = args.frame.is_some() || args.reproject.contains(&Reprojection::Forward);
+    match (animation.is_empty(), asked) {
+        (true, true) => Err(Error::Usage("nothing moves in the scene: leave out --frame and --reproject".to_owned())),
+        (true, false) => Ok(None),
+        (false, _) => {
+            let judged = JudgedFrame { frame: args.frame.unwrap_or(JUDGED), fps: args.fps };
+            Ok(Some(Motion { judged, animation }))
+        }
+    }
+}
+
+/// Whether samples are carried, in the order of the list; `able` says of a scene that moves whether they can be.
+fn reproject(args: &Args, able: Option<Result<()>>) -> Result<Vec<bool>> {
+    let asked: Vec<bool> = args.reproject.iter().map(|how| *how == Reprojection::Forward).collect();
+    match able {
+        Some(able) if asked.contains(&true) => able.map(|()| asked),
+        Some(Ok(())) if asked.is_empty() && args.ablate => Ok(vec![true]),
+        Some(Ok(())) if asked.is_empty() => Ok(vec![false, true]),
+        _ => Ok(vec![false]),
+    }
+}
+
+/// Each point of the grid with the options of every variant, and with every step of the knobs that it has.
+fn varied(args: &Args, grid: &[Candidate]) -> Result<Vec<Candidate>> {
+    let with = |point: &Candidate, option: &str, words: &Words| {
+        point.varied(option, |settings, filters, carries| words.apply(settings, filters, carries))
+    };
+    let mut all = Vec::new();
+    for text in &args.variants {
+        let words = Words::parse(text)?.checked_as_variant(text)?;
+        let before = all.len();
+        all.extend(grid.iter().filter_map(|point| with(point, text.trim(), &words)));
+        if all.len() == before {
+            return Err(Error::Usage(format!("\"{}\" changes no point of the grid", text.trim())));
+        }
+    }
+    for point in grid.iter().filter(|_| args.ablate) {
+        for step in knobs::steps(point) {
+            all.extend(with(point, &step, &Words::parse(&step)?));
+        }
+    }
+    Ok(all)
+}
+
+/// The command that renders a point's first image. Unfiltered points go to .hdr: for an .exr more layers are kept, which takes
+/// longer than what was measured. Filters with settings of their own run behind the render, to the same bits.
+pub fn command(scene: &Path, judged: Option<JudgedFrame>, from: &Settings, candidate: &Candidate) -> String {
+    let words = |words: Vec<String>| words.into_iter().map(|word| format!(" {word}")).collect::<String>();
+    let settings = words(grid::options(&from.entries(), &candidate.settings.entries()));
+    let scene = quoted(&scene.display().to_string());
+    let (render, number) = match judged {
+        None => (format!("tallow render {scene}{settings}"), String::new()),
+        Some(judged) => {
+            let how = candidate.carries;
+            let first = if how.is_some() { judged.first(true) } else { judged.frame };
+            let frames = format!("--frames 0..={0} --only {first}..={0} --fps {1}", judged.frame, judged.fps);
+            let options = how.map(|how| words(grid::options(&Reproject::default().entries(), &how.entries())));
+            let reproject = options.map_or(" --reproject off".to_owned(), |own| format!(" --reproject forward{own}"));
+            (format!("tallow sequence {scene}{settings} {frames}{reproject}"), format!(".{:04}", judged.frame))
+        }
+    };
+    let out = |name: &str| format!("{name}{}", if number.is_empty() { "" } else { ".####" });
+    let Some(filter) = candidate.filter.map(Method::name) else { return format!("{render} -o {}.hdr", out("point")) };
+    match &words(grid::options(&FilterSettings::default().entries(), &candidate.filter_settings.entries()))[..] {
+        "" => format!("{render} --denoise {filter} -o {}.exr", out("point")),
+        own => format!(
+            "{render} -o {}.exr && tallow filter noisy{number}.exr --filter {filter}{own} -o point{number}.exr",
+            out("noisy")
+        ),
+    }
+}
