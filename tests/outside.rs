@@ -4,8 +4,9 @@ mod support;
 use glam::Vec3;
 use std::path::{Path, PathBuf};
 use tallow::gpu::Gpu;
+use tallow::layout::Effects;
 use tallow::render::settings::Settings;
-use tallow::render::{Outputs, Renderer};
+use tallow::render::{Outputs, Renderer, all_effects, called_for};
 use tallow::scene::{Loaded, Scene};
 
 /// # Panics
@@ -29,10 +30,19 @@ fn tiny(s: &mut Settings) {
     (s.width, s.height, s.spp) = (8, 8, 1);
 }
 
+/// Loads it. All scenes get one depth of the stack, so that those with the same effects share their kernels: nearly all of the time
+/// is spent compiling them.
+fn loaded(path: &Path) -> Loaded {
+    let mut scene = Scene::load(path).map(|scene| scene.with(tiny)).unwrap_or_else(|e| panic!("{e}"));
+    scene.stack = scene.stack.max(16);
+    scene
+}
+
 /// Renders it; bytes on the device but for pictures (of textures and of the sky), and whether any light is seen.
-fn rendered(gpu: &Gpu, scene: &Loaded, name: &str) -> (u64, bool) {
-    let renderer =
-        Renderer::new(gpu, scene, &scene.settings, Outputs::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
+fn rendered(gpu: &Gpu, scene: &Loaded, effects: Effects, name: &str) -> (u64, bool) {
+    let (settings, outputs) = (&scene.settings, Outputs::default());
+    let made = Renderer::specialised(gpu, scene, settings, outputs, effects);
+    let renderer = made.unwrap_or_else(|e| panic!("{name}: {e}"));
     let sizes = renderer.scene().sizes();
     let bytes =
         sizes.iter().filter(|(part, _)| !["texels", "environment"].contains(part)).map(|(_, bytes)| bytes).sum();
@@ -51,20 +61,21 @@ fn every_obj_loads_and_renders() {
     paths.sort();
     let (mut seen, mut dark) = (Vec::new(), Vec::new());
     for path in paths {
-        let scene = Scene::load(&path).map(|scene| scene.with(tiny)).unwrap_or_else(|e| panic!("{e}"));
+        let scene = loaded(&path);
         let n = scene.triangles.len();
         let name = path.strip_prefix(&data).unwrap_or(&path).display().to_string();
         assert!(!scene.triangles.is_empty() && !scene.lights.is_empty(), "{name}");
         let missing = scene.warnings.iter().find(|w| w.contains("no such file") || w.contains("not found"));
         assert!(missing.is_none() || name.contains("gltf"), "{missing:?}");
         assert!(scene.shading.is_empty() || scene.shading.len() == n);
-        // Of the poses of an animation, which a number tells apart, one is enough: compiling takes a third of a second.
+        // Of the poses of an animation, which a number tells apart, one is enough.
         let mesh = (name.replace(|c: char| c.is_ascii_digit(), ""), n);
         if seen.contains(&mesh) {
             continue;
         }
         seen.push(mesh);
-        let (bytes, lit) = rendered(&gpu, &scene, &name);
+        let effects = called_for(&scene, &scene.settings, Outputs::default());
+        let (bytes, lit) = rendered(&gpu, &scene, effects, &name);
         // Two triangles have a node, materials and a light as well.
         assert!(bytes <= 200 * n as u64 + 256, "{name}: {bytes} bytes");
         dark.extend((!lit).then_some(name));
@@ -90,10 +101,11 @@ fn every_gltf_loads_and_renders() {
     assert!(paths.len() >= 65, "only {} glTF files below {}", paths.len(), data.display());
     for path in paths {
         let name = path.strip_prefix(&data).unwrap_or(&path).display().to_string();
-        let scene = Scene::load(&path).map(|scene| scene.with(tiny)).unwrap_or_else(|e| panic!("{e}"));
+        let scene = loaded(&path);
         let unexpected: Vec<_> = scene.warnings.iter().filter(|line| !is_expected(line)).collect();
         assert!(unexpected.is_empty() && !scene.triangles.is_empty(), "{name}: {unexpected:?}");
-        let (_, lit) = rendered(&gpu, &scene, &name);
+        // Nearly every model has effects of its own, whose kernels would take two seconds each.
+        let (_, lit) = rendered(&gpu, &scene, all_effects(&scene, &scene.settings), &name);
         dark.extend((!lit).then_some(name));
     }
     // A camera stands within a pine of a dense forest, where no one of 64 paths may find the sky.
