@@ -119,10 +119,10 @@ fn interrupted(words: &str, spp: u32) {
 
 #[test]
 fn ctrl_c_writes_what_there_is_and_resuming_completes_it() {
-    interrupted("", 250);
-    interrupted("--allocate variance --rounds 20", 250);
-    interrupted("--allocate threshold --min-spp 2 --max-spp 96", 250);
-    interrupted("--noise-threshold 0.001", 250);
+    interrupted("", 100);
+    interrupted("--allocate variance --rounds 20", 100);
+    interrupted("--allocate threshold --min-spp 2 --max-spp 96", 100);
+    interrupted("--noise-threshold 0.001", 100);
 }
 
 #[test]
