@@ -25,59 +25,7 @@ layout(scalar, push_constant) uniform Push { ReprojectPush push; };
 #include "shared/surface_point.glsl"
 #include "shared/history.glsl"
 #include "shared/cell.glsl"
-
-// A hit is of the surface of a point if it lies no farther from the plane there than this, in widths of a pixel.
-const float PLANE_DISTANCE = 0.5;
-// An albedo below this does not make more of the light that arrives: the quotient would only show noise.
-const float LEAST_ALBEDO = 0.05;
-
-bool shows(uint pixel, Surface s) {
-    float off = abs(dot(s.geometric, Guide_position(guide, pixel) - s.position));
-    bool near = off <= PLANE_DISTANCE * pixel_width(camera, push.size) * Guide_depth(guide, pixel);
-    return near && Guide_object(guide, pixel) == s.object && Guide_material(guide, pixel) == s.material;
-}
-
-// Light of the pixels around one: that of a single pixel would let noise decide, and dark samples would be kept more often.
-vec3 light_around(uint pixel) {
-    ivec2 size = ivec2(push.size), at = ivec2(pixel % push.size.x, pixel / push.size.x);
-    vec3 sum = vec3(0.0);
-    for (int k = 0; k < 9; k++) {
-        ivec2 q = clamp(at + ivec2(k % 3 - 1, k / 3 - 1), ivec2(0), size - 1);
-        sum += History_mean(history, uint(q.y * size.x + q.x));
-    }
-    return sum / 9.0;
-}
-
-// The BSDF towards `wo`, without the cosine, for light from `wi`; both in world space.
-vec3 scattered(Surface s, Bsdf bsdf, vec3 wo, vec3 wi) {
-    bool turns = (s.flags & MATERIAL_TWO_SIDED) != 0u;
-    Facing facing = facing_normals(s, wo, turns, true);
-    mat3 basis = shading_basis(s, bsdf, facing.normal);
-    vec3 towards = wo * basis, from = wi * basis;
-    if (FX_COAT_NORMALS) bsdf.metallic.coat_normal = local_coat_normal(s, facing, basis, towards);
-    bsdf_view(bsdf, towards);
-    return bsdf_evaluate(bsdf, towards, from).rgb / max(from.z, 1e-3);
-}
-
-// Largest channel of |f_r(new view) - f_r(old view)| * irradiance (Schalk 2018, equation 15, where the albedo is a factor of its
-// own). The direction that light comes from is not kept: it is taken to be the worst of the mirror images of the two views,
-// where a lobe is largest.
-float view_error(Surface s, uint pixel, vec3 before, vec3 after) {
-    Bsdf bsdf = surface_bsdf(s);
-    if (!bsdf_is_specular(bsdf)) return 0.0;
-    float side = dot(s.normal, before) < 0.0 ? -1.0 : 1.0;
-    vec3 irradiance = PI * light_around(pixel) / max(bsdf_albedo(bsdf, abs(dot(s.normal, before))), vec3(LEAST_ALBEDO));
-    float error = 0.0;
-    for (int k = 0; k < 2; k++) {
-        vec3 from = mirror(k == 0 ? before : after, side * s.normal);
-        vec3 change = abs(scattered(s, bsdf, after, from) - scattered(s, bsdf, before, from)) * irradiance;
-        error = max(error, max(change.r, max(change.g, change.b)));
-    }
-    return error;
-}
-
-// Lambertian reflection alone is the same in every direction.
-const bool DEPENDS_ON_VIEW = !ONE_KIND || !FX_DIFFUSE;
+#include "shared/held.glsl"
 
 // Offers the samples of a pixel to those around `film`, a point of the film, of an edge to edges alone. Returns why none takes them,
 // or 0.
@@ -106,11 +54,7 @@ uint moved(uint pixel, Carried c) {
         c.count = worth(c.count, light * light);
         if (c.count == 0u) return dropped(DROPPED_LIGHT);
     }
-    float view = 0.0; // in shares of what is allowed
-    if (DEPENDS_ON_VIEW) {
-        vec3 before = normalize(previous.position - s.position), after = normalize(camera.position - s.position);
-        view = view_error(s, pixel, before, after) / max(push.max_error, 1e-30);
-    }
+    float view = view_change(s, pixel);
     bool small = view <= 1.0;
     c.error += small ? uint(ceil(view * float(ERROR_PARTS))) : 0u;
     if (!small || c.error > ERROR_PARTS) return dropped(DROPPED_VIEW);

@@ -5,7 +5,7 @@ use crate::allocate::{Placing, Policy};
 use crate::denoise::filter::{self, FilterSettings};
 use crate::render::settings::Settings;
 use crate::render::{Outputs, Reproject};
-use crate::settings::entry::Entry;
+use crate::settings::entry::{Entry, Value};
 
 /// The lists that a grid is made of.
 #[derive(Clone)]
@@ -89,7 +89,7 @@ impl Candidate {
     }
 
     fn carrying(mut self, carries: Option<Reproject>) -> Self {
-        self.method.reproject = carries.map(|_| "forward".to_owned());
+        self.method.reproject = carries.map(|how| how.reproject.text());
         Self { carries, ..self }
     }
 }

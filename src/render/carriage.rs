@@ -65,7 +65,7 @@ pub struct Carriage {
     pub specular: u64,
     /// Those at an edge.
     pub edge: u64,
-    /// Those whose samples have moved too many times.
+    /// Those whose samples have moved too many times. This and what follows is of pixels of the new frame where samples come backward.
     pub old: u64,
     /// Those whose point is outside the new film.
     pub outside: u64,
@@ -81,6 +81,7 @@ impl Carriage {
     /// Counts the words of both frames.
     pub fn of(offered: &[u32], carried: &[u32]) -> Self {
         let mut sum = Self::default();
+        let reasons_of_new = |word: &&u32| carried_samples(**word) == 0 && **word >> 16 != DROPPED_EDGE;
         for &word in carried {
             match (carried_samples(word), word >> 16) {
                 (0, DROPPED_EDGE) => sum.new_edges += 1,
@@ -89,7 +90,8 @@ impl Carriage {
             }
         }
         sum.offered = offered.iter().filter(|&&word| carried_samples(word) > 0).count() as u64;
-        for &word in offered.iter().filter(|&&word| carried_samples(word) == 0) {
+        let dropped = offered.iter().filter(|&&word| carried_samples(word) == 0);
+        for &word in dropped.chain(carried.iter().filter(reasons_of_new)) {
             let reason = match word >> 16 {
                 DROPPED_SKY => &mut sum.sky,
                 DROPPED_SPECULAR => &mut sum.specular,

@@ -27,7 +27,7 @@ mod views;
 
 pub use buffers::{DeviceScene, FilmBuffers, FilmTile};
 pub use carriage::{Carriage, Carried, carried_samples};
-pub use history::{History, Moves, Reproject, ReprojectOverrides};
+pub use history::{History, Moves, Reproject, ReprojectOverrides, Reprojection};
 pub use job::{Job, Status, StopReason};
 pub use merge::{Gap, Merged, merge};
 pub use moving::can_carry;

@@ -1,6 +1,6 @@
 //! Frames that begin with the samples of the last: what a renderer needs for it, and what became of them.
 use super::carriage::{Carriage, carried_samples};
-use super::history::{History, Moves, Reproject};
+use super::history::{History, Moves, Reproject, Reprojection};
 use super::schedule::{self, Begun};
 use super::{Renderer, Step, kernels};
 use crate::error::{Error, Result};
@@ -25,6 +25,9 @@ impl Renderer {
         if !self.frame.film.tiles[0].has_guide() {
             let what = "a history needs primary hits: make the renderer with Outputs::guides";
             return Err(Error::Usage(what.into()));
+        }
+        if settings.reproject == Reprojection::Off {
+            return Ok(());
         }
         let history = History::new(&self.gpu, self.effects, self.stack, size, self.settings.spp, (settings, moves))?;
         let tile = &mut self.frame.film.tiles[0];

@@ -8,6 +8,7 @@ pub mod attributes;
 pub mod bsdf;
 pub mod camera;
 pub mod coat;
+pub mod gather;
 pub mod guide_lookup;
 pub mod light;
 pub mod light_change;

@@ -5,8 +5,8 @@ use crate::layout::{
 };
 pub use crate::render::Carried;
 use crate::scene::Scene;
-use crate::shaders::project::{LEAST_ALBEDO, PLANE_DISTANCE};
 use crate::shaders::remember::VARIANCE_OF_MOVE;
+use crate::shaders::shared::held::{LEAST_ALBEDO, PLANE_DISTANCE};
 use crate::shaders::shared::history::*;
 use crate::twins::bsdf::{Bsdf, SMOOTH_ALPHA, bsdf_albedo, bsdf_evaluate, bsdf_is_specular};
 use crate::twins::camera::{film_from_point, pixel_width};
@@ -16,7 +16,7 @@ use crate::twins::traverse::Hit;
 use glam::{Vec2, Vec3, Vec4, vec2};
 use std::f32::consts::PI;
 
-fn dropped(reason: u32) -> u32 {
+pub(super) fn dropped(reason: u32) -> u32 {
     reason << 16
 }
 
@@ -68,7 +68,7 @@ pub struct Handed {
 }
 
 /// By what a sum of squared deviations is divided for the variance of one sample.
-fn freedom(count: u32) -> f32 {
+pub(super) fn freedom(count: u32) -> f32 {
     (count.max(2) - 1) as f32
 }
 
@@ -78,7 +78,7 @@ fn worth(count: u32, change: f32) -> u32 {
     (count as f32 / (1.0 + count as f32 * change) + 0.5) as u32
 }
 
-fn surface_of(scene: &Scene, triangle: u32, instance: u32, weights: [f32; 2]) -> Surface {
+pub(super) fn surface_of(scene: &Scene, triangle: u32, instance: u32, weights: [f32; 2]) -> Surface {
     surface_at(scene, &Hit { t: 0.0, triangle, instance, barycentric: weights.into() })
 }
 
@@ -103,7 +103,7 @@ fn scattered(s: &Surface, bsdf: &Bsdf, wo: Vec3, wi: Vec3) -> Vec3 {
 }
 
 impl Reprojection<'_> {
-    fn still(&self) -> bool {
+    pub(super) fn still(&self) -> bool {
         self.push.moved == 0 && self.previous == self.camera
     }
 
@@ -196,7 +196,7 @@ impl Reprojection<'_> {
         handed
     }
 
-    fn shows(&self, seen: &Guide, s: &Surface) -> bool {
+    pub(super) fn shows(&self, seen: &Guide, s: &Surface) -> bool {
         let off = s.geometric.dot(Vec3::from(seen.position) - s.position).abs();
         let near = off <= PLANE_DISTANCE * pixel_width(&self.camera, self.push.size) * seen.depth;
         near && seen.object == s.object && seen.material == s.material
@@ -216,6 +216,22 @@ impl Reprojection<'_> {
             ((scattered(s, &bsdf, after, from) - scattered(s, &bsdf, before, from)).abs() * irradiance).max_element()
         };
         of(before).max(of(after))
+    }
+
+    /// By how much the changed view moves a surface's light, whose samples were around `pixel`, in shares of what is allowed.
+    pub(super) fn view_change(&self, records: &[History], s: &Surface, pixel: usize) -> f32 {
+        let views = [self.previous, self.camera].map(|c| (Vec3::from(c.position) - s.position).normalize());
+        let around: Vec3 = self.around(pixel).map(|q| Vec3::from(records[q].mean)).sum();
+        self.view_error(s, around / 9.0, views[0], views[1]) / self.push.max_error.max(1e-30)
+    }
+
+    /// How many of a pixel's samples the changed light leaves.
+    pub(super) fn after_change(&self, pixel: usize, count: u32) -> u32 {
+        if self.push.moved == 0 {
+            return count;
+        }
+        let change = self.changes[cell_of(pixel as u32, self.push.size) as usize].change;
+        worth(count, (change / self.push.noise.max(1e-15)).powi(2))
     }
 
     /// Offers a pixel's samples to those around a point of the film, of an edge to edges alone. Returns why none takes them, or 0.
@@ -244,17 +260,11 @@ impl Reprojection<'_> {
         if c.back != (s.geometric.dot(Vec3::from(self.camera.position) - s.position) < 0.0) {
             return dropped(DROPPED_HIDDEN);
         }
-        if self.push.moved != 0 {
-            let change = self.changes[cell_of(pixel as u32, self.push.size) as usize].change;
-            c.count = worth(c.count, (change / self.push.noise.max(1e-15)).powi(2));
-            if c.count == 0 {
-                return dropped(DROPPED_LIGHT);
-            }
+        c.count = self.after_change(pixel, c.count);
+        if c.count == 0 {
+            return dropped(DROPPED_LIGHT);
         }
-        let views = [self.previous, self.camera].map(|c| (Vec3::from(c.position) - s.position).normalize());
-        let around: Vec3 = self.around(pixel).map(|q| Vec3::from(handed.records[q].mean)).sum();
-        let view = self.view_error(&s, around / 9.0, views[0], views[1]);
-        let view = view / self.push.max_error.max(1e-30);
+        let view = self.view_change(&handed.records, &s, pixel);
         let parts = (view * ERROR_PARTS as f32).ceil();
         // A number that is none fails both comparisons.
         if !(view <= 1.0 && c.error as f32 + parts <= ERROR_PARTS as f32) {

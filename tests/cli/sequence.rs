@@ -80,9 +80,13 @@ fn a_frame_in_another_light_is_another() {
 /// Frames hold what the next one begins with, and know the ones before.
 #[test]
 fn a_sequence_that_carries_goes_on_to_the_same_bits() {
+    ["forward", "backward"].into_iter().for_each(carries_and_goes_on);
+}
+
+fn carries_and_goes_on(way: &str) {
     let folder = stage();
     let words = |more: &str| {
-        format!("--reproject forward --reproject-error 1 --frames 0..48 --only 9..=12 --fps 6 -o a.####.exr {more}")
+        format!("--reproject {way} --reproject-error 1 --frames 0..48 --only 9..=12 --fps 6 -o a.####.exr {more}")
     };
     let file = |name: &str| folder.path().join(name);
     well(&folder, &words(""));

@@ -1,6 +1,6 @@
 //! Tests that carried samples forget light that has changed: lamps that go out or move away, and what stood before them, on
 //! the screen or off it, before a camera at rest and one that moves. Frames that keep all samples are the control.
-use crate::moving::{Film, shifted, turned};
+use crate::moving::{Film, WAYS, by, shifted, turned};
 use crate::support::{self, assert_silent, gpu};
 use crate::twin::Workplace;
 use tallow::gpu::{FrameResources, Gpu};
@@ -133,10 +133,10 @@ impl Stage {
 #[test]
 fn light_that_has_changed_leaves_no_ghost() {
     let gpu = gpu();
-    let mut stage = Stage::new(&gpu, Reproject::default());
     let mut found = Vec::new();
-    for event in &EVENTS {
-        for moves in [false, true] {
+    for way in WAYS {
+        let mut stage = Stage::new(&gpu, by(way));
+        for (event, moves) in EVENTS.iter().flat_map(|event| [(event, false), (event, true)]) {
             found.push((event.0, moves, stage.ghost(event, moves)));
         }
     }

@@ -1,12 +1,12 @@
 //! Tests that carried samples move with the surfaces that they are of: instances, meshes that are deformed or whose hierarchy is
 //! built anew, and what appears, vanishes, shrinks, flips and hides itself.
-use crate::moving::{Film, shifted, truth, turned};
+use crate::moving::{Film, WAYS, by, shifted, truth, turned};
 use crate::poses::{MOMENTS, Moment, at, pose};
 use crate::support::{assert_silent, gpu};
 use crate::twin::Workplace;
 use tallow::gpu::Gpu;
 use tallow::layout::PixelStats;
-use tallow::render::{Reproject, Step, carried_samples};
+use tallow::render::{Reproject, Reprojection, Step, carried_samples};
 use tallow::scene::description::Transform;
 use tallow::scene::{Loaded, Pose, Vertices};
 
@@ -41,11 +41,10 @@ fn card_at(scene: &Loaded, frame: u32) -> Pose {
     Pose { instances: vec![(place, to)], ..Pose::default() }
 }
 
-#[test]
-fn samples_ride_on_what_moves() {
-    let gpu = gpu();
+/// Frames of the card by a way. Returns the words of its pixels at the end, and what is there.
+fn ride(gpu: &Gpu, way: Reprojection) -> (Vec<u32>, Vec<PixelStats>) {
     let mut scene = card();
-    let mut film = Film::moving(&gpu, &scene, Reproject::default());
+    let mut film = Film::moving(gpu, &scene, by(way));
     let start = film.camera;
     for k in 0..9 {
         let pose = card_at(&scene, k);
@@ -58,14 +57,22 @@ fn samples_ride_on_what_moves() {
     let on_card: Vec<usize> = (0..guide.len()).filter(|&i| guide[i].object == 1).collect();
     let carried = on_card.iter().filter(|&&i| carried_samples(words[i]) >= 8).count();
     assert!(carried * 2 > on_card.len() && on_card.len() > 200, "{carried} of the card's {} pixels", on_card.len());
-    let direct = direct(&gpu, &scene, turned(start, 1.6));
+    let direct = direct(gpu, &scene, turned(start, 1.6));
     let [wrong, off] = truth(&stats, &words, &direct);
     // Some pixels beside the card's edge keep a sample or two of a mixture, while all of their own are of the wall.
-    assert!(wrong < 0.015 && off.abs() < 0.01, "{wrong} of pixels wrong, off by {off}");
+    assert!(wrong < 0.015 && off.abs() < 0.01, "{way:?}: {wrong} of pixels wrong, off by {off}");
+    (words, direct)
+}
+
+#[test]
+fn samples_ride_on_what_moves() {
+    let gpu = gpu();
+    let [(words, direct), _] = WAYS.map(|way| ride(&gpu, way));
 
     // The naive arm: what lies on the film stays there.
-    let mut naive = Film::new(&gpu, &scene, Reproject::default());
     let mut scene = card();
+    let mut naive = Film::new(&gpu, &scene, Reproject::default());
+    let start = naive.camera;
     for k in 0..9 {
         let pose = card_at(&scene, k);
         let change = scene.apply(&pose).unwrap();
@@ -105,9 +112,9 @@ fn a_history_of_the_camera_alone_ends_where_more_moves() {
 fn moving_scenes_show_what_is_there() {
     let gpu = gpu();
     // A hierarchy that is built anew numbers its triangles anew.
-    for rebuild_above in [f32::INFINITY, 0.0] {
+    for (rebuild_above, way) in [f32::INFINITY, 0.0].into_iter().flat_map(|above| WAYS.map(|way| (above, way))) {
         let mut scene = at(&Moment::default()).with(|s| s.spp = 8);
-        let mut film = Film::moving(&gpu, &scene, Reproject::default());
+        let mut film = Film::moving(&gpu, &scene, by(way));
         let start = film.camera;
         let moment = |k: u32| Moment { turn: 0.01 * f64::from(k), wave: 0.1 + 0.01 * k as f32, ..Moment::default() };
         for k in 0..7 {
@@ -127,7 +134,7 @@ fn moving_scenes_show_what_is_there() {
         let [wrong, off] = truth(&film.stats(), &film.carried(), &direct);
         assert!(found.carried > 100, "{found:?}");
         // Light that changes slowly is found late: see `reproject_light`.
-        assert!(wrong < 0.015 && off.abs() < 0.035, "{wrong} of pixels wrong, off by {off}: {found:?}");
+        assert!(wrong < 0.015 && off.abs() < 0.035, "{way:?}: {wrong} of pixels wrong, off by {off}: {found:?}");
     }
     assert_silent(&gpu);
 }
@@ -135,8 +142,13 @@ fn moving_scenes_show_what_is_there() {
 #[test]
 fn what_appears_vanishes_and_flips_is_seen_as_it_is() {
     let gpu = gpu();
+    WAYS.into_iter().for_each(|way| appears_vanishes_and_flips(&gpu, way));
+    assert_silent(&gpu);
+}
+
+fn appears_vanishes_and_flips(gpu: &Gpu, way: Reprojection) {
     let mut scene = at(&Moment::default());
-    let mut film = Film::moving(&gpu, &scene, Reproject::default());
+    let mut film = Film::moving(gpu, &scene, by(way));
     let start = film.camera;
     let scales = [1.0, 0.0, 1.0, -1.0, 1e-9, -1e-9, 0.5, f64::from(f32::MIN_POSITIVE), 1.0]
         .map(|scale| Moment { scale, ..Moment::default() });
@@ -146,7 +158,7 @@ fn what_appears_vanishes_and_flips_is_seen_as_it_is() {
         film.record(|renderer, rec| renderer.update(rec, &scene, &change));
         film.frame(start);
         let finite = |s: &PixelStats| s.count > 0 && s.mean.iter().chain(&s.m2).all(|v| v.is_finite());
-        assert!(film.stats().iter().all(finite), "{moment:?}");
+        assert!(film.stats().iter().all(finite), "{way:?} {moment:?}");
     }
     // What has shrunk to nothing is gone, and its samples with it.
     for scale in [1.0, 0.0] {
@@ -155,7 +167,7 @@ fn what_appears_vanishes_and_flips_is_seen_as_it_is() {
         film.record(|renderer, rec| renderer.update(rec, &scene, &change));
         (0..2).for_each(|_| film.frame(start));
     }
-    let direct = direct(&gpu, &scene, start);
+    let direct = direct(gpu, &scene, start);
     let [wrong, off] = truth(&film.stats(), &vec![1; direct.len()], &direct);
     assert!(wrong < 0.015 && off.abs() < 0.02, "{wrong} of pixels wrong, off by {off}");
 
@@ -167,7 +179,6 @@ fn what_appears_vanishes_and_flips_is_seen_as_it_is() {
     }
     film.begin(start);
     assert_eq!(film.renderer.carriage().unwrap().carried, 0);
-    assert_silent(&gpu);
 }
 
 /// A sheet of two flaps, one bright and one dark, of one mesh: one slides before the other, and away.
@@ -189,35 +200,39 @@ fn a_sheet_that_passes_itself_shows_the_nearer_flap() {
         moving: true,
         ..Default::default()
     });
-    let mut scene = tallow::scene::Scene::build(&description)
+    let built = tallow::scene::Scene::build(&description)
         .unwrap()
         .with(|s| (s.width, s.height, s.spp, s.max_depth) = (49, 33, 32, 2));
-    let mut film = Film::moving(&gpu, &scene, Reproject::default());
-    let (start, mut seen) = (film.camera, 0);
-    for k in 0..12 {
-        let vertices = Vertices { positions: flaps(-2.5 + 0.45 * k as f32), ..Vertices::default() };
-        let mesh = scene.rig.mesh("sheet").unwrap();
-        let change = scene.apply(&Pose { meshes: vec![(mesh, vertices)], ..Pose::default() }).unwrap();
-        film.record(|renderer, rec| renderer.update(rec, &scene, &change));
-        film.frame(start);
-        // Of the bright flap's middle and of the dark one's.
-        let guide = film.renderer.film().tiles[0].guide.read().unwrap();
-        let (stats, words) = (film.stats(), film.carried());
-        let inside = |i: &usize| {
-            let whole = [i - 1, i + 1, i - 49, i + 49].iter().all(|&q| guide[q].position[2] == guide[*i].position[2]);
-            whole && carried_samples(words[*i]) > 0 && guide[*i].object == 0
-        };
-        let pixels: Vec<usize> = (50..49 * 32 - 50).filter(inside).collect();
-        // The bright flap has .33 at least, where the other shades it, and the dark one .06.
-        let wrong = |i: &&usize| match guide[**i].position[2] < 0.2 {
-            true => stats[**i].mean[1] < 0.25,
-            false => stats[**i].mean[1] > 0.1,
-        };
-        let wrong = pixels.iter().filter(wrong).count();
-        seen += pixels.len();
-        assert!(wrong == 0, "frame {k}: {wrong} of {}", pixels.len());
+    for way in WAYS {
+        let mut scene = built.clone();
+        let mut film = Film::moving(&gpu, &scene, by(way));
+        let (start, mut seen) = (film.camera, 0);
+        for k in 0..12 {
+            let vertices = Vertices { positions: flaps(-2.5 + 0.45 * k as f32), ..Vertices::default() };
+            let mesh = scene.rig.mesh("sheet").unwrap();
+            let change = scene.apply(&Pose { meshes: vec![(mesh, vertices)], ..Pose::default() }).unwrap();
+            film.record(|renderer, rec| renderer.update(rec, &scene, &change));
+            film.frame(start);
+            // Of the bright flap's middle and of the dark one's.
+            let guide = film.renderer.film().tiles[0].guide.read().unwrap();
+            let (stats, words) = (film.stats(), film.carried());
+            let inside = |i: &usize| {
+                let whole =
+                    [i - 1, i + 1, i - 49, i + 49].iter().all(|&q| guide[q].position[2] == guide[*i].position[2]);
+                whole && carried_samples(words[*i]) > 0 && guide[*i].object == 0
+            };
+            let pixels: Vec<usize> = (50..49 * 32 - 50).filter(inside).collect();
+            // The bright flap has .33 at least, where the other shades it, and the dark one .06.
+            let wrong = |i: &&usize| match guide[**i].position[2] < 0.2 {
+                true => stats[**i].mean[1] < 0.25,
+                false => stats[**i].mean[1] > 0.1,
+            };
+            let wrong = pixels.iter().filter(wrong).count();
+            seen += pixels.len();
+            assert!(wrong == 0, "{way:?} frame {k}: {wrong} of {}", pixels.len());
+        }
+        assert!(seen > 1000, "control: {way:?} {seen} pixels carry samples");
     }
-    assert!(seen > 1000, "control: {seen} pixels carry samples");
     assert_silent(&gpu);
 }
 

@@ -3,8 +3,16 @@
 use glam::{Quat, Vec3};
 use tallow::gpu::{FrameResources, Gpu, Recorder};
 use tallow::layout::{Camera, PixelLight, PixelStats, SurfacePoint};
-use tallow::render::{Moves, Outputs, Renderer, Reproject, Step, carried_samples};
+use tallow::render::{Moves, Outputs, Renderer, Reproject, Reprojection, Step, carried_samples};
 use tallow::scene::Loaded;
+
+/// The ways by which frames come to samples of the last.
+pub const WAYS: [Reprojection; 2] = [Reprojection::Forward, Reprojection::Backward];
+
+/// A way, and the settings that nobody asked to be others.
+pub fn by(reproject: Reprojection) -> Reproject {
+    Reproject { reproject, ..Reproject::default() }
+}
 
 /// The camera turned to the left around its own vertical axis, in degrees.
 pub fn turned(camera: Camera, degrees: f32) -> Camera {

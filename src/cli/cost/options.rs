@@ -4,12 +4,11 @@ use crate::cli::common::with_ranges;
 use crate::cli::filter::options as filter;
 use crate::cli::finite;
 use crate::cli::overrides::Overrides;
-use crate::cli::sequence::Reprojection;
 use crate::cost::grid::Axes;
 use crate::denoise::filter::{FilterSettings, Method};
 use crate::error::{Error, Result};
 use crate::render::settings::{Film, Settings};
-use crate::render::{Reproject, ReprojectOverrides};
+use crate::render::{Reproject, ReprojectOverrides, Reprojection};
 use clap::Parser;
 use std::path::PathBuf;
 

@@ -1,17 +1,16 @@
 //! The points that `tallow cost` measures: the scene, how it moves, the settings of each point, and the command that renders it.
 use super::options::Words;
 use super::{Args, knobs, quoted};
-use crate::cli::sequence::Reprojection;
 use crate::cost::grid::{self, Candidate};
 use crate::cost::{JudgedFrame, Motion};
 use crate::denoise::filter::{FilterSettings, Method};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::render::settings::Settings;
-use crate::render::{Reproject, can_carry};
+use crate::render::{Reproject, Reprojection, can_carry};
 use crate::scene::animation::Animation;
 use crate::scene::{Loaded, Scene, SceneFile};
-use crate::settings::entry;
+use crate::settings::entry::{self, Value};
 use std::path::Path;
 
 /// The frame that is judged unless another is asked for: the first with a whole history.
@@ -46,7 +45,8 @@ impl Points {
         let motion = motion(args, animation)?;
         motion.iter().try_for_each(|motion| motion.pose(&mut scene, motion.judged.frame).map(|_| ()))?;
         let able = motion.as_ref().map(|_| can_carry(gpu, &scene, &base));
-        let axes = args.axes(reproject(args, able)?.into_iter().map(|carried| carried.then_some(carries)).collect());
+        let of = |way| (way != Reprojection::Off).then_some(Reproject { reproject: way, ..carries });
+        let axes = args.axes(reproject(args, able)?.into_iter().map(of).collect());
         let mut candidates = grid::grid(&base, &filters, &axes);
         candidates.iter().try_for_each(|candidate| candidate.settings.validate())?;
         candidates.extend(varied(args, &candidates)?);
@@ -56,7 +56,7 @@ impl Points {
 
 /// How a scene moves that is not at rest.
 fn motion(args: &Args, animation: Animation) -> Result<Option<Motion>> {
-    let asked = args.frame.is_some() || args.reproject.contains(&Reprojection::Forward);
+    let asked = args.frame.is_some() || args.reproject.iter().any(|way| *way != Reprojection::Off);
     match (animation.is_empty(), asked) {
         (true, true) => Err(Error::Usage("nothing moves in the scene: leave out --frame and --reproject".to_owned())),
         (true, false) => Ok(None),
@@ -67,14 +67,14 @@ fn motion(args: &Args, animation: Animation) -> Result<Option<Motion>> {
     }
 }
 
-/// Whether samples are carried, in the order of the list; `able` says of a scene that moves whether they can be.
-fn reproject(args: &Args, able: Option<Result<()>>) -> Result<Vec<bool>> {
-    let asked: Vec<bool> = args.reproject.iter().map(|how| *how == Reprojection::Forward).collect();
+/// How samples are carried, in the order of the list; `able` says of a scene that moves whether they can be.
+fn reproject(args: &Args, able: Option<Result<()>>) -> Result<Vec<Reprojection>> {
+    use Reprojection::{Forward, Off};
     match able {
-        Some(able) if asked.contains(&true) => able.map(|()| asked),
-        Some(Ok(())) if asked.is_empty() && args.ablate => Ok(vec![true]),
-        Some(Ok(())) if asked.is_empty() => Ok(vec![false, true]),
-        _ => Ok(vec![false]),
+        Some(able) if args.reproject.iter().any(|way| *way != Off) => able.map(|()| args.reproject.clone()),
+        Some(Ok(())) if args.reproject.is_empty() && args.ablate => Ok(vec![Forward]),
+        Some(Ok(())) if args.reproject.is_empty() => Ok(vec![Off, Forward]),
+        _ => Ok(vec![Off]),
     }
 }
 
@@ -112,8 +112,11 @@ pub fn command(scene: &Path, judged: Option<JudgedFrame>, from: &Settings, candi
             let how = candidate.carries;
             let first = if how.is_some() { judged.first(true) } else { judged.frame };
             let frames = format!("--frames 0..={0} --only {first}..={0} --fps {1}", judged.frame, judged.fps);
-            let options = how.map(|how| words(grid::options(&Reproject::default().entries(), &how.entries())));
-            let reproject = options.map_or(" --reproject off".to_owned(), |own| format!(" --reproject forward{own}"));
+            let options = |how: Reproject| {
+                let from = Reproject { reproject: how.reproject, ..Reproject::default() };
+                format!("{}{}", how.reproject.text(), words(grid::options(&from.entries(), &how.entries())))
+            };
+            let reproject = format!(" --reproject {}", how.map_or("off".to_owned(), options));
             (format!("tallow sequence {scene}{settings} {frames}{reproject}"), format!(".{:04}", judged.frame))
         }
     };

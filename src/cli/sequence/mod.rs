@@ -55,11 +55,7 @@ pub struct Args {
     /// Render finished frames again
     #[arg(long)]
     pub again: bool,
-    /// Whether frames begin with the samples of the last that still hold [default: forward, where something moves, the camera has no
-    /// lens, and samples are placed by no threshold or limit]
-    #[arg(long, value_enum, value_name = "HOW")]
-    pub reproject: Option<Reprojection>,
-    /// Which samples those are.
+    /// Which samples of earlier frames.
     #[command(flatten, next_help_heading = "Samples of earlier frames")]
     pub carry: ReprojectOverrides,
     /// How each frame is rendered.
@@ -69,15 +65,6 @@ pub struct Args {
 
 /// Options for one image, which a sequence refuses.
 const OF_ONE: [&str; 5] = ["resume", "pixel", "time", "error", "plan"];
-
-/// How frames come to samples of the last.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Reprojection {
-    /// Not at all: every frame alone.
-    Off,
-    /// Samples move to where their points are now (Schalk 2018).
-    Forward,
-}
 
 impl Args {
     /// The options of one frame, whose files have its number.

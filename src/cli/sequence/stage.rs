@@ -1,7 +1,7 @@
 //! What a sequence keeps from frame to frame: the scene, its motion, and the renderer.
 use super::chain::Chain;
 use super::preview::Preview;
-use super::{Args, FrameReport, Reprojection};
+use super::{Args, FrameReport};
 use crate::cli::render::{self, EffectChoice, Spans, outputs};
 use crate::cli::{Exit, complain};
 use crate::error::{Error, Result};
@@ -9,7 +9,9 @@ use crate::gpu::{FrameResources, Gpu};
 use crate::image::{self, Film, NOISY};
 use crate::layout::Effects;
 use crate::render::settings::Settings;
-use crate::render::{Carriage, Moves, Outputs, Renderer, Reproject, all_effects, called_for, can_carry, finished};
+use crate::render::{
+    Carriage, Moves, Outputs, Renderer, Reproject, Reprojection, all_effects, called_for, can_carry, finished,
+};
 use crate::scene::animation::{Animation, Turntable};
 use crate::scene::{Change, Loaded, Scene};
 use crate::settings::entry;
@@ -291,9 +293,9 @@ fn show(preview: Option<&mut Preview>, film: &Film, args: &render::Args) -> Resu
 /// How samples are carried: as asked for, or where something moves and nothing speaks against it.
 fn carrying(args: &Args, gpu: &Gpu, scene: &Scene, settings: &Settings, moves: bool) -> Result<Option<Reproject>> {
     let able = can_carry(gpu, scene, settings);
-    let carries = match args.reproject {
+    let carries = match args.carry.reproject {
         Some(Reprojection::Off) => false,
-        Some(Reprojection::Forward) => able.map(|()| true)?,
+        Some(_) => able.map(|()| true)?,
         None => moves && able.is_ok(),
     };
     let mut how = Reproject::default();

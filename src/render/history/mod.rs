@@ -1,6 +1,7 @@
 //! What is kept from frame to frame: the samples of each pixel, and the points of the scene that they are of.
 mod numbers;
 mod probes;
+mod way;
 
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
@@ -10,13 +11,27 @@ use crate::layout::{
 use crate::render::buffers::most_of_one_tile;
 use crate::scene::animation::Animation;
 use crate::scene::{Change, Relit, Scene};
-use crate::settings::{FROM_0, entry, settings};
+use crate::settings::{FROM_0, choices, entry, settings};
 use crate::shaders;
 use crate::shaders::shared::traverse;
 use numbers::Numbers;
 pub use probes::Probes;
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+pub(super) use way::{Forward, Way};
+
+choices! {
+    /// How frames come to samples of the last.
+    pub enum Reprojection {
+        /// Not at all: every frame alone
+        Off,
+        /// Samples move to where their points are now (Schalk 2018)
+        #[default]
+        Forward,
+        /// Pixels look up where their points were, and merge the samples of the four pixels around
+        Backward,
+    }
+}
 
 settings! {
     /// Which samples of a frame are carried to the next.
@@ -24,6 +39,9 @@ settings! {
     pub struct Reproject {
         /// The settings of [`Reproject`] that are given; the others are `None`.
         ReprojectOverrides {
+            /// Whether frames begin with the samples of the last that still hold; `tallow sequence` moves them forward where something
+            /// moves, the camera has no lens, and samples are placed by no threshold or limit
+            reproject: Reprojection = Reprojection::Forward, .., [value_name = "HOW"];
             /// Largest error by changed view that carried samples may have, in units of radiance.
             reproject_error: f32 = 1.0 / 256.0, FROM_0;
             /// Share by which light may change from frame to frame before carried samples count less: the deviation of one sample
@@ -66,12 +84,8 @@ impl Moves {
 pub struct History {
     /// Writes what pixels hand on.
     pub(super) remember: Kernel<shaders::remember::Bind<'static>>,
-    /// Tells which pixels of the new frame are at edges.
-    pub(super) edges: Kernel<shaders::edges::Bind<'static>>,
-    /// Finds where it goes to.
-    pub(super) project: Kernel<shaders::project::Bind<'static>>,
-    /// Starts the new pixels with it.
-    pub(super) carry: Kernel<shaders::carry::Bind<'static>>,
+    /// Brings it to the new ones.
+    pub(super) way: Way,
     /// What each pixel of the last frame hands on.
     pub records: Buffer<Record>,
     /// Its light, where direct and indirect light are kept apart; else one unused element.
@@ -132,9 +146,7 @@ impl History {
         let room = |on: bool| if on { pixels as usize } else { 1 };
         Ok(Self {
             remember: Kernel::new(gpu, &shaders::remember::Constants { effects, thread, traverse })?,
-            edges: Kernel::new(gpu, &shaders::edges::Constants { effects, thread, traverse })?,
-            project: Kernel::new(gpu, &shaders::project::Constants { effects, thread, traverse })?,
-            carry: Kernel::new(gpu, &shaders::carry::Constants { effects, thread })?,
+            way: Way::new(gpu, effects, traverse, settings.reproject)?,
             records: Buffer::new(gpu, "history", room(true), Location::Device)?,
             light: Buffer::new(gpu, "history of light", room(effects.split_light), Location::Device)?,
             offered: Buffer::from_slice(gpu, "offered samples", &vec![0; pixels as usize])?,

@@ -1,11 +1,11 @@
 //! Carries the samples of the last frame to the pixels of a new one. Kernels: `glsl/reproject/*.comp`. Twins:
 //! [`crate::twins::reproject`].
 use crate::error::Result;
-use crate::gpu::Recorder;
+use crate::gpu::{Kernel, Recorder};
 use crate::layout::PathConstants;
 use crate::render::buffers::{DeviceScene, FilmTile};
-use crate::render::history::History;
-use crate::shaders::{carry, edges, project, remember};
+use crate::render::history::{Forward, History, Way};
+use crate::shaders::{carry, edges, gather, project, remember};
 
 /// Before the scene changes, and before the new frame's primary hits: guide\[P\], points\[P\], stats\[P\], light\[P\] -> history\[P\]
 pub fn remember(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, c: &PathConstants) -> Result<()> {
@@ -33,10 +33,22 @@ pub fn remember(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, 
 
 /// After them: history\[P\], guide\[P\], points\[P\], changes\[cells\] -> stats\[P\], light\[P\], carried\[P\]
 pub fn carry(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, c: &PathConstants) -> Result<()> {
+    match &h.way {
+        Way::Forward(way) => forward(rec, way, (h, s, t), c),
+        Way::Backward(gather) => backward(rec, gather, (h, s, t), c),
+    }
+}
+
+fn forward(
+    rec: &mut Recorder,
+    way: &Forward,
+    (h, s, t): (&History, &DeviceScene, &FilmTile),
+    c: &PathConstants,
+) -> Result<()> {
     t.windows().try_for_each(|w| {
         let winner = &h.carried.part(w.start as usize..w.end as usize)?;
         let bind = edges::Bind { scene: s.bind(), frame: s.bind_frame(), guide: &t.guide, points: &t.points, winner };
-        rec.dispatch_threads(&h.edges, bind, &h.push(c, w.start, w.end - w.start), w.end - w.start)
+        rec.dispatch_threads(&way.edges, bind, &h.push(c, w.start, w.end - w.start), w.end - w.start)
     })?;
     let bind = project::Bind {
         scene: s.bind(),
@@ -48,7 +60,7 @@ pub fn carry(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, c: 
         offered: &h.offered,
         winner: &h.carried,
     };
-    rec.dispatch_threads(&h.project, bind, &h.push(c, 0, t.pixels), t.pixels)?;
+    rec.dispatch_threads(&way.project, bind, &h.push(c, 0, t.pixels), t.pixels)?;
     t.windows().try_for_each(|w| {
         let part = w.start as usize..w.end as usize;
         let apart = h.light.len() == t.pixels as usize;
@@ -63,6 +75,33 @@ pub fn carry(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, c: 
             points: &t.points.part(part.clone())?,
             winner: &h.carried.part(part)?,
         };
-        rec.dispatch_threads(&h.carry, bind, &h.push(c, w.start, w.end - w.start), w.end - w.start)
+        rec.dispatch_threads(&way.carry, bind, &h.push(c, w.start, w.end - w.start), w.end - w.start)
+    })
+}
+
+fn backward(
+    rec: &mut Recorder,
+    gather: &Kernel<gather::Bind<'static>>,
+    (h, s, t): (&History, &DeviceScene, &FilmTile),
+    c: &PathConstants,
+) -> Result<()> {
+    t.windows().try_for_each(|w| {
+        let part = w.start as usize..w.end as usize;
+        let apart = h.light.len() == t.pixels as usize;
+        let bind = gather::Bind {
+            scene: s.bind(),
+            frame: s.bind_frame(),
+            guide: &t.guide,
+            points: &t.points,
+            history: &h.records,
+            history_light: &h.light,
+            offered: &h.offered,
+            changes: h.light_change(),
+            previous: &h.previous,
+            stats: &t.stats.part(part.clone())?,
+            light: &if apart { t.light.part(part.clone())? } else { t.light.clone() },
+            carried: &h.carried.part(part)?,
+        };
+        rec.dispatch_threads(gather, bind, &h.push(c, w.start, w.end - w.start), w.end - w.start)
     })
 }

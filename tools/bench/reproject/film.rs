@@ -32,7 +32,7 @@ pub fn milliseconds(times: &[PassTime], of: impl Fn(&str) -> bool) -> f64 {
 
 /// Passes that carry samples, and those that find how light has changed.
 pub fn carries(name: &str) -> bool {
-    ["remember", "edges", "project", "carry", "probe", "light_change"].contains(&name)
+    ["remember", "edges", "project", "carry", "gather", "probe", "light_change"].contains(&name)
 }
 
 impl Film {

@@ -1,0 +1,167 @@
+//! Twin of `glsl/reproject/gather.comp`.
+use super::reproject::{Handed, Reprojection, dropped, freedom, surface_of};
+use crate::layout::{Guide, NONE, PixelLight, PixelStats, SurfacePoint};
+use crate::math::srgb::luminance;
+use crate::render::Carried;
+use crate::shaders::gather::{MOST_M2, STEPS};
+use crate::shaders::shared::history::*;
+use crate::twins::camera::{film_from_point, pixel_width};
+use crate::twins::surface::Surface;
+use glam::{IVec2, Vec2, Vec3, ivec2, vec2};
+
+/// What a pixel begins with: its word, statistics and light.
+pub type Begun = (u32, PixelStats, PixelLight);
+
+/// Samples of several pixels, merged, and sums of their weights.
+#[derive(Default)]
+struct Merged {
+    stats: PixelStats,
+    light: PixelLight,
+    samples: f32,
+    squares: f32,
+    weight: f32,
+    age: u32,
+    error: u32,
+}
+
+fn towards(mean: [f32; 3], other: [f32; 3], part: f32) -> [f32; 3] {
+    std::array::from_fn(|k| mean[k] + (other[k] - mean[k]) * part)
+}
+
+impl Merged {
+    fn add(&mut self, handed: &Handed, from: usize, c: Carried, weight: f32) {
+        let (h, l) = (&handed.records[from], &handed.light[from]);
+        let (stats, light, count) = (&mut self.stats, &mut self.light, c.count as f32);
+        let samples = self.samples + weight * count;
+        let part = weight * count / samples;
+        let between = self.samples * part;
+        for (k, m2) in stats.m2.iter_mut().enumerate() {
+            let off = h.mean[k] - stats.mean[k];
+            *m2 += weight * (count - 1.0) * h.variance[k] + off * (off * between);
+        }
+        let other = |mean: [f32; 3], direct: [f32; 3]| luminance(Vec3::from(mean) - Vec3::from(direct));
+        let off = other(h.mean, l.direct) - other(stats.mean, light.direct);
+        light.indirect_m2 += weight * (count - 1.0) * l.indirect_variance + off * (off * between);
+        light.direct = towards(light.direct, l.direct, part);
+        light.albedo = towards(light.albedo, l.albedo, part);
+        stats.mean = towards(stats.mean, h.mean, part);
+        self.samples = samples;
+        self.squares += weight * weight * count;
+        self.weight += weight;
+        (self.age, self.error) = (self.age.max(c.age + 1), self.error.max(c.error));
+    }
+
+    fn finish(mut self, edge: bool) -> Begun {
+        let count = ((self.samples / self.weight + 0.5) as u32).min(MOST_CARRIED);
+        let scale = freedom(count) / (self.samples - self.squares / self.samples).max(1e-4 * self.samples);
+        self.stats.count = count;
+        self.stats.m2 = self.stats.m2.map(|m2| (m2 * scale).min(MOST_M2));
+        self.light.indirect_m2 = (self.light.indirect_m2 * scale).min(MOST_M2);
+        (Carried { count, age: self.age, error: self.error, edge, back: false }.word(), self.stats, self.light)
+    }
+}
+
+impl Reprojection<'_> {
+    /// Twin of `gather.comp`. `guide` and `points` are those of the new frame.
+    pub fn gather(&self, handed: &Handed, guide: &[Guide], points: &[SurfacePoint]) -> Vec<Begun> {
+        let nothing = |word| (word, PixelStats::default(), PixelLight::default());
+        let of = |pixel: usize| {
+            let (h, l, word) = (&handed.records[pixel], &handed.light[pixel], handed.offered[pixel]);
+            let count = Carried::of(word).count;
+            match self.still() {
+                true if count > 0 => {
+                    let stats = PixelStats { mean: h.mean, m2: h.variance, count, ..Default::default() };
+                    let (direct, albedo, indirect_m2) = (l.direct, l.albedo, l.indirect_variance);
+                    (word, stats, PixelLight { direct, albedo, indirect_m2, ..Default::default() })
+                }
+                true => nothing(word),
+                false => self.take(handed, guide, points[pixel], pixel).unwrap_or_else(nothing),
+            }
+        };
+        (0..guide.len()).map(of).collect()
+    }
+
+    fn was_at(&self, handed: &Handed, s: &Surface, centre: Vec2) -> Vec3 {
+        let size = Vec2::from(self.push.size.map(|n| n as f32));
+        let mut at = film_from_point(&self.previous, s.position, self.push.size);
+        for _ in 0..if self.push.moved == 0 { 0 } else { STEPS } {
+            let q = at.truncate().max(Vec2::ZERO).min(size - 0.5).floor();
+            let h = &handed.records[(q.y * size.x + q.x) as usize];
+            if h.triangle == NONE || !at.is_finite() {
+                break;
+            }
+            let point = surface_of(self.scene, h.triangle, h.instance, h.weights).position;
+            let now = film_from_point(&self.camera, point, self.push.size);
+            at = (q + 0.5 + centre - now.truncate()).extend(now.z);
+        }
+        at
+    }
+
+    fn reason_to_leave(&self, handed: &Handed, seen: &Guide, from: usize, edge: bool, c: &mut Carried) -> u32 {
+        if c.edge != edge {
+            return DROPPED_HIDDEN;
+        }
+        if c.age >= self.push.max_age {
+            return DROPPED_OLD;
+        }
+        let h = &handed.records[from];
+        let s = surface_of(self.scene, h.triangle, h.instance, h.weights);
+        let back = s.geometric.dot(Vec3::from(self.camera.position) - s.position) < 0.0;
+        if c.back != back || !self.shows(seen, &s) {
+            return DROPPED_HIDDEN;
+        }
+        c.count = self.after_change(from, c.count);
+        match c.count {
+            0 => DROPPED_LIGHT,
+            _ if c.error > ERROR_PARTS => DROPPED_VIEW,
+            _ => 0,
+        }
+    }
+
+    /// What a pixel takes, or its word with why it takes nothing.
+    fn take(&self, handed: &Handed, guide: &[Guide], at: SurfacePoint, pixel: usize) -> Result<Begun, u32> {
+        let (size, corner) = (IVec2::from(self.push.size.map(|n| n as i32)), IVec2::ZERO);
+        if at.triangle == NONE {
+            return Err(0);
+        }
+        let s = surface_of(self.scene, at.triangle, at.instance, at.weights);
+        let edge = !self.is_whole(guide, pixel, s.geometric, pixel_width(&self.camera, self.push.size));
+        let here = vec2((pixel as i32 % size.x) as f32, (pixel as i32 / size.x) as f32) + 0.5;
+        let film = self.was_at(handed, &s, here);
+        if !(film.z > 0.0 && film.is_finite()) {
+            return Err(dropped(DROPPED_OUTSIDE));
+        }
+        let at = film.truncate().clamp(Vec2::splat(-2.0), size.as_vec2() + 2.0) - 0.5;
+        let nearest = (at + 0.5).floor().as_ivec2().clamp(corner, size - 1);
+        let view = self.view_change(&handed.records, &s, (nearest.y * size.x + nearest.x) as usize);
+        if view.is_nan() || view > 1.0 {
+            return Err(dropped(DROPPED_VIEW));
+        }
+        let (mut reason, mut merged) = (DROPPED_OUTSIDE, Merged::default());
+        for k in 0..4 {
+            let q = at.floor().as_ivec2() + ivec2(k & 1, k >> 1);
+            if q.cmplt(corner).any() || q.cmpge(size).any() {
+                continue;
+            }
+            let (from, share) = ((q.y * size.x + q.x) as usize, 1.0 - (at - q.as_vec2()).abs());
+            let (mut c, weight) = (Carried::of(handed.offered[from]), share.x * share.y);
+            let why = match c.count {
+                0 if c.age > 0 => DROPPED_HIDDEN,
+                0 => 0,
+                _ => {
+                    c.error += (view * ERROR_PARTS as f32).ceil() as u32;
+                    self.reason_to_leave(handed, &guide[pixel], from, edge, &mut c)
+                }
+            };
+            if why == 0 && c.count > 0 && weight > 0.0 {
+                merged.add(handed, from, c, weight);
+            }
+            reason = if reason == 0 { 0 } else { why };
+        }
+        if merged.weight > 0.0 {
+            Ok(merged.finish(edge))
+        } else {
+            Err(dropped(if edge { DROPPED_EDGE } else { reason }))
+        }
+    }
+}
