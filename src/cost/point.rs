@@ -173,13 +173,13 @@ impl Method {
         if !self.allocate.is_empty() {
             words.push(self.allocate.clone());
         }
+        if self.reproject.is_some() {
+            words.push("reprojection".to_owned());
+        }
         if self.filter != "none" || words.is_empty() {
             words.push(self.filter.clone());
         }
         let mut name = words.join(" + ");
-        if self.reproject.is_some() {
-            name += ", reprojection";
-        }
         if let Some(rounds) = self.rounds {
             name += &format!(", {rounds} rounds");
         }

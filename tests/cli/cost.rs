@@ -131,15 +131,15 @@ fn a_frame_of_a_scene_that_moves_is_measured_alone_and_as_the_end_of_a_sequence(
     let judged = document.scene.judged.unwrap();
     assert!(document.complete && (judged.frame, judged.fps) == (8, 24.0) && document.points.len() == 6, "{document:?}");
     let error = |label: &str| point(&document, label).summary.as_ref().unwrap().errors.relmse.unwrap().value;
-    assert!(error("uniform, reprojection, 2 spp") < 0.7 * error("uniform, 2 spp"), "samples of eight frames");
-    assert!(error("uniform, reprojection, 2 spp") < 0.9 * error("uniform, reprojection, reproject-samples 1, 2 spp"));
+    assert!(error("uniform + reprojection, 2 spp") < 0.7 * error("uniform, 2 spp"), "samples of eight frames");
+    assert!(error("uniform + reprojection, 2 spp") < 0.9 * error("uniform + reprojection, reproject-samples 1, 2 spp"));
     let passes = |label: &str| point(&document, label).runs[0].passes.iter().map(|pass| pass.pass.clone()).collect();
-    let [alone, carried]: [Vec<_>; 2] = ["uniform, 2 spp", "uniform, reprojection, 2 spp"].map(passes);
+    let [alone, carried]: [Vec<_>; 2] = ["uniform, 2 spp", "uniform + reprojection, 2 spp"].map(passes);
     let has = |passes: &[String], name: &str| passes.iter().any(|pass| pass == name);
     assert!(has(&alone, "upload") && has(&carried, "upload") && has(&carried, "carry") && !has(&alone, "carry"));
     replays(&folder, &document, "uniform + svgf, 2 spp");
-    replays(&folder, &document, "uniform + svgf, reprojection, 2 spp");
-    replays(&folder, &document, "uniform + svgf, reprojection, reproject-samples 1, 2 spp");
+    replays(&folder, &document, "uniform + reprojection + svgf, 2 spp");
+    replays(&folder, &document, "uniform + reprojection + svgf, reproject-samples 1, 2 spp");
 }
 
 #[test]
