@@ -89,3 +89,23 @@ fn auto_cuts_what_one_of_stratified_samples_has_brought() {
     assert!(errors[..2].iter().all(|&error| error < 0.7 * errors[2]), "{errors:?}");
     assert_silent(&gpu);
 }
+
+/// Light of 1 on a wall, which one sample in eight finds: three of four pixels of two samples are dark and tell no variance. Trusted,
+/// they leave .032 of the noise's error.
+#[test]
+fn auto_is_not_misled_by_samples_that_are_dark_by_chance() {
+    let (gpu, auto, mut input) = (gpu(), find("auto").unwrap(), plate(2, false));
+    let found = |i: u32| (0..2).filter(|k| hash(hash(i) ^ (k + 1)).is_multiple_of(8)).count() as f32;
+    for (i, c) in (0..).zip(&mut input.radiance) {
+        *c = [4.0 * found(i), 4.0 * found(i), 4.0 * found(i), 2.0];
+    }
+    // Of the mean of 0 and 8, and of two that are the same.
+    let variance = |i: u32| [if found(i) == 1.0 { 16.0 } else { 0.0 }; 3];
+    input.variance = Some((0..SIZE[0] * SIZE[1]).map(variance).collect());
+    let settings = FilterSettings::default().scaled_to(&input);
+    let (output, twin) = (run(&gpu, auto, &input, &settings).unwrap().0, (auto.reference)(&input, &settings));
+    let errors = [&output, &twin, &input.radiance].map(|image| image.iter().map(|c| (c[0] - 1.0).powi(2)).sum::<f32>());
+    println!("kernel, twin, noisy {errors:.4?}");
+    assert!(errors[..2].iter().all(|&error| error < 0.02 * errors[2]), "{errors:?}");
+    assert_silent(&gpu);
+}

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{SvgfPush, vec3, vec4};
 use crate::math::srgb::luminance;
-use crate::shaders::noise_estimate::{self, Bind, Constants};
+use crate::shaders::noise_estimate::{self, Bind, Constants, MANY, PRIOR};
 pub use crate::shaders::shared::luminance::ENOUGH;
 use crate::shaders::shared::luminance::STRONGEST;
 use glam::Vec3;
@@ -24,13 +24,13 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// For images of (width, height).
+    /// For images of (width, height); `cautious` as in the kernel.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when it does not fit.
-    pub fn new(gpu: &Gpu, edge: &EdgeSettings, [width, height]: [u32; 2]) -> Result<Self> {
+    pub fn new(gpu: &Gpu, edge: &EdgeSettings, cautious: bool, [width, height]: [u32; 2]) -> Result<Self> {
         let rates = Rates::of_surfaces(edge);
-        let kernel = |measured| Kernel::new(gpu, &Constants { edge: rates.constants(), measured });
+        let kernel = |measured| Kernel::new(gpu, &Constants { edge: rates.constants(), measured, cautious });
         Ok(Self {
             kernels: [kernel(false)?, kernel(true)?],
             nothing: Buffer::from_slice(gpu, "no variance", &[])?,
@@ -55,34 +55,53 @@ pub fn contrast(a: Vec3, b: Vec3) -> f32 {
     (luminance(a) - luminance(b)).clamp(-STRONGEST, STRONGEST)
 }
 
-/// The variance of every pixel's luminance; -1 where nothing is known.
-pub fn reference(input: &FilterInput, image: &[Packed], edge: &EdgeSettings) -> Vec<f32> {
+/// The variance of every pixel's luminance; -1 where nothing is known. `cautious` as in the kernel.
+pub fn reference(input: &FilterInput, image: &[Packed], edge: &EdgeSettings, cautious: bool) -> Vec<f32> {
     let rates = Rates::of_surfaces(edge);
-    let variance = |at: usize| {
-        let measured = input.variance.as_ref().map(|v| Vec3::from(v[at]));
-        match measured.filter(|v| v.is_finite() && v.min_element() >= 0.0) {
-            _ if image[at].count == 0.0 => -1.0,
-            Some(v) if image[at].count >= ENOUGH => luminance(v.map(f32::sqrt)).powi(2),
-            _ => spread(input, image, at, &rates),
+    let own: Vec<Option<f32>> = (0..image.len()).map(|at| told(input, image, at)).collect();
+    let variance = |at: usize| match own[at] {
+        _ if image[at].count == 0.0 => -1.0,
+        Some(own_of_pixel) if cautious && image[at].count < MANY => {
+            let (mut total, mut sum) = (0.0, 0.0);
+            for (q, variance) in window(input, at).filter_map(|q| Some((&image[q], own[q]?))) {
+                let w = edge_weight(q, rates.exponent(&image[at], q));
+                total += w;
+                sum += if w > 0.0 { w * variance } else { 0.0 };
+            }
+            let known = image[at].count - 1.0;
+            (PRIOR * (sum / total) + known * own_of_pixel) / (PRIOR + known)
         }
+        Some(own) => own,
+        None => spread(input, image, at, &rates),
     };
     (0..image.len()).map(variance).collect()
 }
 
-fn spread(input: &FilterInput, image: &[Packed], at: usize, rates: &Rates) -> f32 {
+/// What a pixel's samples say of the variance of its luminance.
+fn told(input: &FilterInput, image: &[Packed], at: usize) -> Option<f32> {
+    let v = Vec3::from(input.variance.as_ref()?[at]);
+    let measured = image[at].count >= ENOUGH && v.is_finite() && v.min_element() >= 0.0;
+    measured.then(|| luminance(v.map(f32::sqrt)).min(STRONGEST).powi(2))
+}
+
+/// The pixels around one, and itself.
+fn window(input: &FilterInput, at: usize) -> impl Iterator<Item = usize> {
     let (width, height) = (i64::from(input.width), i64::from(input.height));
     let (x, y) = (at as i64 % width, at as i64 / width);
+    let rows = (y - REACH).max(0)..=(y + REACH).min(height - 1);
+    let columns = (x - REACH).max(0)..=(x + REACH).min(width - 1);
+    rows.flat_map(move |v| columns.clone().map(move |u| (v * width + u) as usize))
+}
+
+fn spread(input: &FilterInput, image: &[Packed], at: usize, rates: &Rates) -> f32 {
     let (mut total, mut squares, mut mean, mut m2) = (0.0, 0.0, 0.0, 0.0);
-    for v in (y - REACH).max(0)..=(y + REACH).min(height - 1) {
-        for u in (x - REACH).max(0)..=(x + REACH).min(width - 1) {
-            let q = image[(v * width + u) as usize];
-            let w = edge_weight(&q, rates.exponent(&image[at], &q));
-            let off = contrast(q.colour, image[at].colour);
-            total += w;
-            squares += w * w;
-            mean += w * off;
-            m2 += w * off * off;
-        }
+    for q in window(input, at).map(|q| &image[q]) {
+        let w = edge_weight(q, rates.exponent(&image[at], q));
+        let off = contrast(q.colour, image[at].colour);
+        total += w;
+        squares += w * w;
+        mean += w * off;
+        m2 += w * off * off;
     }
     mean /= total;
     let others = 1.0 - squares / (total * total);

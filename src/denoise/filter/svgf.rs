@@ -61,7 +61,7 @@ impl Svgf {
         let kernel = |last| Kernel::new(gpu, &Constants { edge: rates.constants(), last });
         let pack = Pack::new(gpu, size)?;
         Ok(Self {
-            estimate: Estimate::new(gpu, edge, size)?,
+            estimate: Estimate::new(gpu, edge, false, size)?,
             kernels: [kernel(false)?, kernel(true)?],
             scratch: Buffer::new(gpu, "svgf", pack.colour.len(), Location::Device)?,
             rates,
@@ -109,7 +109,7 @@ struct Level<'a> {
 
 fn reference(input: &FilterInput, edge: &EdgeSettings, own: &SvgfSettings, levels: u32) -> Vec<vec4> {
     let packed = Packed::reference(input);
-    let noise = noise_estimate::reference(input, &packed, edge);
+    let noise = noise_estimate::reference(input, &packed, edge, false);
     let mut image: Vec<Noisy> = packed.into_iter().zip(noise).collect();
     let (rates, rate_l) = (Rates::of_surfaces(edge), own.rate_l());
     for level in 0..levels {

@@ -158,7 +158,7 @@ impl Auto {
         let surfaces = Rates::of_surfaces(&settings.edge).constants();
         let blend = |measured| Kernel::new(gpu, &auto::Constants { measured, ..Default::default() });
         Ok(Self {
-            estimate: Estimate::new(gpu, &settings.edge, size)?,
+            estimate: Estimate::new(gpu, &settings.edge, true, size)?,
             inputs: Kernel::new(gpu, &Default::default())?,
             leverage: Kernel::new(gpu, &auto_leverage::Constants { edge: surfaces, ..Default::default() })?,
             error: Kernel::new(gpu, &Default::default())?,

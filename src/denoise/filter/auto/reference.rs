@@ -97,7 +97,7 @@ pub fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
 /// Also what [`Filter::expected`](super::super::Filter::expected) holds.
 pub fn estimated(input: &FilterInput, settings: &FilterSettings) -> (Vec<vec4>, Vec<vec3>) {
     let (image, floor) = (Packed::reference(input), floor(settings));
-    let noise = noise_estimate::reference(input, &image, &settings.edge);
+    let noise = noise_estimate::reference(input, &image, &settings.edge, true);
     let results = Results::new(input, &image, settings);
     let rates = Rates::of_surfaces(&alike(&settings.edge));
     let size = [input.width, input.height].map(i64::from);
