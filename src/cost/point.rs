@@ -173,8 +173,10 @@ impl Method {
         if !self.allocate.is_empty() {
             words.push(self.allocate.clone());
         }
-        if self.reproject.is_some() {
-            words.push("reprojection".to_owned());
+        match self.reproject.as_deref() {
+            Some("forward") => words.push("reprojection".to_owned()),
+            Some(way) => words.push(format!("{way} reprojection")),
+            None => {}
         }
         if self.filter != "none" || words.is_empty() {
             words.push(self.filter.clone());

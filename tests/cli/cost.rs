@@ -261,6 +261,7 @@ fn what_cannot_be_measured_is_one_line() {
     for (option, words, says) in [
         ("--variant", "--spp 3", "give --spp itself, as a list"),
         ("--with", "--allocate both", "give --allocate itself"),
+        ("--variant", "--reproject backward", "give --reproject itself"),
         ("--variant", "--width 9", "--width is the same for all points"),
         ("--variant", "--window 4", "\"--window 4\" changes no point"),
         ("--variant", "--radius 4", "\"--radius 4\" changes no point"),

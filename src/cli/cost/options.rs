@@ -164,8 +164,12 @@ impl Words {
     pub fn parse(text: &str) -> Result<Self> {
         let words = Self::try_parse_from(text.split_whitespace()).map_err(|e| refused(text, "render", &e))?;
         let Allocate { policy, rounds, .. } = &words.render.allocate;
-        let lists =
-            [("spp", words.render.render.spp.is_some()), ("allocate", policy.is_some()), ("rounds", rounds.is_some())];
+        let lists = [
+            ("spp", words.render.render.spp.is_some()),
+            ("allocate", policy.is_some()),
+            ("rounds", rounds.is_some()),
+            ("reproject", words.carry.reproject.is_some()),
+        ];
         match lists.iter().find(|(_, given)| *given) {
             Some((name, _)) => Err(Error::Usage(format!("\"{}\": give --{name} itself, as a list", text.trim()))),
             None => Ok(words),
