@@ -80,7 +80,6 @@ vec3 was_at(Surface s, vec2 centre) {
 // Why a pixel cannot take samples of an old one, or 0: those are what `c` says then.
 uint reason_to_leave(uint pixel, uint from, bool edge, uint parts, inout Carried c) {
     if (c.edge != edge) return DROPPED_HIDDEN;
-    if (c.age >= push.max_age) return DROPPED_OLD;
     Surface s = surface_of(History_triangle(history, from), History_instance(history, from), History_weights(history, from));
     if (c.back != (dot(s.geometric, camera.position - s.position) < 0.0) || !shows(pixel, s)) return DROPPED_HIDDEN;
     if (push.moved != 0u) {

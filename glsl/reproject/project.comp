@@ -70,5 +70,5 @@ void main() {
     Carried c = carried_of(offered[pixel]);
     if (c.count == 0u) return;
     if (push.moved == 0u && previous == camera) winner[pixel] = pixel;
-    else offered[pixel] = c.age < push.max_age ? moved(pixel, c) : dropped(DROPPED_OLD);
+    else offered[pixel] = moved(pixel, c);
 }

@@ -80,6 +80,17 @@ uint reason_to_keep(uint pixel, SurfacePoint at, inout Carried c) {
     return c.count > 0u ? 0u : DROPPED_EDGE;
 }
 
+// What is known of all samples of a pixel, of which it had c.count at the start of the frame. Their age is the mean of theirs. Where
+// it is at the limit fewer count, so that new ones keep it there: were all dropped at once, a whole film would begin anew in one frame.
+Carried older(Carried c, uint count, bool still) {
+    uint age = (c.age * c.count + count / 2u) / max(count, 1u);
+    c.count = min(count, still ? MOST_CARRIED : push.max_samples);
+    bool old = !still && age >= push.max_age;
+    c.count = old ? c.count * push.max_age / (age + 1u) : c.count;
+    c.age = old ? max(push.max_age, 1u) - 1u : age;
+    return c;
+}
+
 // The point as the new frame numbers it.
 SurfacePoint numbered_anew(SurfacePoint at) {
     if (FX_INSTANCES && push.instances != 0u && at.instance != NONE) at.instance = instance_now[at.instance];
@@ -97,9 +108,9 @@ void main() {
     Carried c = carried_of(carried[pixel]);
     // A pixel that took nothing has samples of age and error 0, whatever its word says of why.
     if (c.count == 0u) c = carried_of(0u);
-    c.count = min(s.count, still ? MOST_CARRIED : push.max_samples);
+    c = older(c, s.count, still);
     c.edge = c.back = false;
-    uint reason = still || s.count == 0u ? 0u : reason_to_keep(pixel, at, c);
+    uint reason = still || s.count == 0u ? 0u : c.count == 0u ? DROPPED_OLD : reason_to_keep(pixel, at, c);
     offered[i] = reason == 0u ? word_of(c) : dropped(reason);
     at = numbered_anew(at);
     history[i] = History_words(History(at.triangle, at.instance, at.weights, s.mean, still ? s.m2 : s.m2 / freedom(s.count)));

@@ -1,5 +1,5 @@
 // What is known of the samples that a pixel has from earlier frames, in one word: their number in the lower 16 bits, then 8 bits
-// of how many times they have moved, then 6 of the error that they are accounted by changed view, in
+// of how many times they have moved on average, then 6 of the error that they are accounted by changed view, in
 // parts of the largest that is allowed, rounded up, then one that says whether they are of an edge, then one that says which side
 // of the surface they show. Where the number is 0 the bits above it say why.
 const uint MOST_CARRIED = 65535u;
@@ -9,7 +9,7 @@ const uint ERROR_PARTS = 63u;
 const uint DROPPED_SKY = 1u;      // there is no surface
 const uint DROPPED_SPECULAR = 2u; // a smooth or refractive interface
 const uint DROPPED_EDGE = 3u;     // at an edge, of whose samples none is worth handing on, or which no edge offers any
-const uint DROPPED_OLD = 4u;      // moved too many times
+const uint DROPPED_OLD = 4u;      // moved too many times for any to count
 const uint DROPPED_OUTSIDE = 5u;  // outside the film, or behind the camera
 const uint DROPPED_HIDDEN = 6u;   // another surface is in front, or the other side of it is seen
 const uint DROPPED_VIEW = 7u;     // the error by the changed view exceeds the limit

@@ -7,7 +7,7 @@ use serde::Serialize;
 pub struct Carried {
     /// Their number.
     pub count: u32,
-    /// How many times they have moved.
+    /// How many times they have moved, on average.
     pub age: u32,
     /// Error that they are accounted, in 63rds of the largest one.
     pub error: u32,
@@ -65,9 +65,9 @@ pub struct Carriage {
     pub specular: u64,
     /// Those at an edge.
     pub edge: u64,
-    /// Those whose samples have moved too many times. This and what follows is of pixels of the new frame where samples come backward.
+    /// Those whose samples have moved too many times for any to count.
     pub old: u64,
-    /// Those whose point is outside the new film.
+    /// Those whose point is outside the new film. This and what follows is of pixels of the new frame where samples come backward.
     pub outside: u64,
     /// Those whose point is hidden in the new frame.
     pub hidden: u64,

@@ -101,9 +101,6 @@ impl Reprojection<'_> {
         if c.edge != edge {
             return DROPPED_HIDDEN;
         }
-        if c.age >= self.push.max_age {
-            return DROPPED_OLD;
-        }
         let h = &handed.records[from];
         let s = surface_of(self.scene, h.triangle, h.instance, h.weights);
         let back = s.geometric.dot(Vec3::from(self.camera.position) - s.position) < 0.0;

@@ -182,9 +182,12 @@ impl Reprojection<'_> {
             let (at, l) = (left.points[pixel], left.light[pixel]);
             let still = self.still();
             let before = Some(Carried::of(left.carried[pixel])).filter(|c| c.count > 0).unwrap_or_default();
-            let count = s.count.min(if still { MOST_CARRIED } else { self.push.max_samples });
-            let mut now = Carried { count, edge: false, back: false, ..before };
-            let reason = if still || s.count == 0 { 0 } else { self.reason_to_keep(left, pixel, &mut now) };
+            let mut now = self.older(before, s.count);
+            let reason = match (still || s.count == 0, now.count) {
+                (true, _) => 0,
+                (false, 0) => DROPPED_OLD,
+                (false, _) => self.reason_to_keep(left, pixel, &mut now),
+            };
             handed.offered.push(if reason == 0 { now.word() } else { dropped(reason) });
             let of_one = |m2: f32| if still { m2 } else { m2 / freedom(s.count) };
             let variance = s.m2.map(of_one);
@@ -194,6 +197,17 @@ impl Reprojection<'_> {
             handed.light.push(HistoryLight { direct, albedo, indirect_variance, ..Default::default() });
         }
         handed
+    }
+
+    fn older(&self, c: Carried, count: u32) -> Carried {
+        let (limit, still) = (self.push.max_age, self.still());
+        let age = (c.age * c.count + count / 2) / count.max(1);
+        let most = count.min(if still { MOST_CARRIED } else { self.push.max_samples });
+        let (count, age) = match !still && age >= limit {
+            true => (most * limit / (age + 1), limit.max(1) - 1),
+            false => (most, age),
+        };
+        Carried { count, age, edge: false, back: false, ..c }
     }
 
     pub(super) fn shows(&self, seen: &Guide, s: &Surface) -> bool {
@@ -294,7 +308,6 @@ impl Reprojection<'_> {
             match c.count {
                 0 => {}
                 _ if self.still() => winner[pixel] = pixel as u32,
-                _ if c.age >= self.push.max_age => handed.offered[pixel] = dropped(DROPPED_OLD),
                 _ => handed.offered[pixel] = self.moved(handed, guide, &mut winner, pixel, c),
             }
         }

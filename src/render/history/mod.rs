@@ -51,7 +51,7 @@ settings! {
             reproject_aliasing: f32 = 0.5, FROM_0;
             /// Samples that a pixel carries to the next frame at most.
             reproject_samples: u32 = 256, 1..=65535;
-            /// Frames that samples are carried through at most.
+            /// Frames that the samples of a pixel are carried through at most, on average: of older ones fewer count.
             reproject_age: u32 = 64, 0..=255;
         }
     }
