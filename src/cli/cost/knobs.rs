@@ -60,8 +60,9 @@ const KNOBS: &[Knob] = &[
     // 1, 4 and 8 of 256: Schalk 2018.
     knob("reproject-error", &["0", "0.00390625", "0.015625", "0.03125"], Carried),
     knob("reproject-light", &["0.02", "0.05", "0.1", "0.2"], Carried),
-    knob("reproject-samples", &["16", "64", "256"], Carried),
-    knob("reproject-age", &["4", "16", "64"], Carried),
+    // Of eight frames: what a longer history is worth they do not tell.
+    knob("reproject-samples", &["2", "4", "8", "256"], Carried),
+    knob("reproject-age", &["1", "2", "64"], Carried),
 ];
 
 /// The options that change one knob of a point to another value, such as `--levels 4`.
