@@ -1,6 +1,6 @@
 //! Options shared by all commands that run on a device and write pictures.
 use super::finite;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{self, DeviceOptions, Gpu};
 use crate::image::{WriteOptions, tone::ToneMap};
 use crate::settings::entry::Entry;
@@ -70,5 +70,16 @@ impl Common {
     /// How radiance is converted for PNG files.
     pub fn write_options(&self) -> WriteOptions {
         WriteOptions { exposure: self.exposure as f32, tone_map: self.tonemap }
+    }
+}
+
+/// Checks a number of frames per second.
+///
+/// # Errors
+/// [`Error::Usage`].
+pub fn check_fps(fps: f64) -> Result<()> {
+    match fps > 0.0 && fps <= 1e6 {
+        true => Ok(()),
+        false => Err(Error::Usage(format!("--fps {fps}: choose a number above 0"))),
     }
 }

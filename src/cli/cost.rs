@@ -7,11 +7,9 @@ mod points;
 
 use super::{Exit, complain, fail_on_messages, interrupt, print, print_json};
 use crate::cost::document::SceneInfo;
-use crate::cost::grid::Candidate;
-use crate::cost::{Document, Ended, Images, Motion, Plan, Watch, key, measure, others, reference};
+use crate::cost::{Document, Ended, Images, Plan, Watch, key, measure, others, reference};
 use crate::error::{Error, Result};
 use crate::gpu::{self, DeviceOptions, Gpu};
-use crate::render::settings::Settings;
 use crate::scene::{Scene, SceneFile};
 pub use options::Args;
 use output::{Folder, Shown, text};
@@ -31,11 +29,11 @@ pub fn run(args: &Args) -> Result<Exit> {
     }
     let path = args.scene.as_deref().ok_or_else(no_scene)?;
     let gpu = open(args)?;
-    let Points { scene, motion, base, candidates } = Points::new(args, path, &gpu)?;
+    let (scene, points) = Points::new(args, path, &gpu)?;
     if !args.quiet && !args.json {
         scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
     }
-    let plan = plan(args, path, &scene, motion, base, candidates)?;
+    let plan = plan(args, path, &scene, points)?;
     let earlier = folder.earlier(&key(&gpu, &scene, &plan));
     let runs_before = earlier.as_ref().map_or(0, runs);
     let found = watched(args, &folder, |watch| measure(&gpu, &scene, &plan, earlier, watch))?;
@@ -43,14 +41,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     finish(args, &folder, found, runs_before)
 }
 
-fn plan(
-    args: &Args,
-    path: &Path,
-    scene: &Scene,
-    motion: Option<Motion>,
-    base: Settings,
-    candidates: Vec<Candidate>,
-) -> Result<Plan> {
+fn plan(args: &Args, path: &Path, scene: &Scene, Points { motion, base, candidates }: Points) -> Result<Plan> {
     let [width, height] = [base.width, base.height];
     let given = |file: &Path| reference::read(file, [width, height], Some((scene, &base)));
     let reference = args.reference.as_deref().map(given).transpose()?;

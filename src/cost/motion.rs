@@ -8,9 +8,6 @@ use crate::scene::{Change, Scene};
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
-/// Frames before the one that is judged. So many fill a history: what later ones add to it is little.
-const BEFORE: u32 = 8;
-
 /// The frame that is judged.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JudgedFrame {
@@ -21,14 +18,16 @@ pub struct JudgedFrame {
 }
 
 impl JudgedFrame {
+    /// Frames before it that are rendered at most. So many fill a history: what more of them add to it is little.
+    pub const BEFORE: u32 = 8;
+    /// Seeds that a run takes: one for each of its frames.
+    pub const SEEDS: u32 = Self::BEFORE + 1;
+
     /// The first frame of those that a point renders: one before the frame that is judged where nothing is carried, so that the scene
     /// moves into it.
     pub fn first(&self, carries: bool) -> u32 {
-        self.frame.saturating_sub(if carries { BEFORE } else { 1 })
+        self.frame.saturating_sub(if carries { Self::BEFORE } else { 1 })
     }
-
-    /// Seeds that a run takes: one for each of its frames.
-    pub const SEEDS: u32 = BEFORE + 1;
 }
 
 /// How a scene moves.

@@ -67,10 +67,10 @@ pub struct Args {
     #[arg(long, value_name = "N", conflicts_with = "filter_only", value_parser = clap::value_parser!(u32).range(1..))]
     pub frame: Option<u32>,
     /// Where the scene moves: frames per second
-    #[arg(long, default_value = "24", value_parser = rate)]
+    #[arg(long, default_value = "24", value_parser = finite)]
     pub fps: f64,
-    /// Options of tallow render or tallow sequence and settings of tallow filter for all points, and of the render for the reference too, such as
-    /// "--max-depth 4"; with --filter-only of tallow filter alone
+    /// Options of tallow render or tallow sequence and settings of tallow filter for all points, and of the render for the reference
+    /// too, such as "--max-depth 4"; with --filter-only of tallow filter alone
     #[arg(long, value_name = "OPTIONS", allow_hyphen_values = true, default_value = "")]
     pub with: String,
     /// Measure everything also with these options, such as "--min-spp 4" or "--radius 12"; may be given several times
@@ -210,11 +210,6 @@ pub fn refused(text: &str, command: &str, e: &clap::Error) -> Error {
     let line = e.to_string();
     let line = line.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
     Error::Usage(format!("\"{}\": {line} (see tallow {command} --help)", text.trim()))
-}
-
-fn rate(text: &str) -> std::result::Result<f64, String> {
-    let value = finite(text)?;
-    if value > 0.0 && value <= 1e6 { Ok(value) } else { Err("expected a number above 0".into()) }
 }
 
 fn minutes(text: &str) -> std::result::Result<f64, String> {

@@ -1,6 +1,7 @@
 //! The points that `tallow cost` measures: the scene, how it moves, the settings of each point, and the command that renders it.
 use super::options::Words;
 use super::{Args, knobs, quoted};
+use crate::cli::common::check_fps;
 use crate::cost::grid::{self, Candidate};
 use crate::cost::{JudgedFrame, Motion};
 use crate::denoise::filter::{FilterSettings, Method};
@@ -13,14 +14,9 @@ use crate::scene::{Loaded, Scene, SceneFile};
 use crate::settings::entry::{self, Value};
 use std::path::Path;
 
-/// The frame that is judged unless another is asked for: the first with a whole history.
-const JUDGED: u32 = 8;
-
 /// What is measured.
 pub struct Points {
-    /// The scene, in the pose of the frame that is judged.
-    pub scene: Scene,
-    /// How it moves; `None` at rest.
+    /// How the scene moves; `None` at rest.
     pub motion: Option<Motion>,
     /// Its settings with those of the options.
     pub base: Settings,
@@ -29,11 +25,12 @@ pub struct Points {
 }
 
 impl Points {
-    /// Those of a scene.
+    /// Loads a scene, in the pose of the frame that is judged if it moves, and makes its points.
     ///
     /// # Errors
     /// Of scene and options.
-    pub fn new(args: &Args, path: &Path, gpu: &Gpu) -> Result<Self> {
+    pub fn new(args: &Args, path: &Path, gpu: &Gpu) -> Result<(Scene, Self)> {
+        check_fps(args.fps)?;
         let file = SceneFile::open(path)?;
         let (mut base, mut filters, mut carries) = (file.settings()?, FilterSettings::default(), Reproject::default());
         args.film.apply(&mut base);
@@ -50,7 +47,7 @@ impl Points {
         let mut candidates = grid::grid(&base, &filters, &axes);
         candidates.iter().try_for_each(|candidate| candidate.settings.validate())?;
         candidates.extend(varied(args, &candidates)?);
-        Ok(Self { scene, motion, base, candidates })
+        Ok((scene, Self { motion, base, candidates }))
     }
 }
 
@@ -61,7 +58,8 @@ fn motion(args: &Args, animation: Animation) -> Result<Option<Motion>> {
         (true, true) => Err(Error::Usage("nothing moves in the scene: leave out --frame and --reproject".to_owned())),
         (true, false) => Ok(None),
         (false, _) => {
-            let judged = JudgedFrame { frame: args.frame.unwrap_or(JUDGED), fps: args.fps };
+            // The first with a whole history.
+            let judged = JudgedFrame { frame: args.frame.unwrap_or(JudgedFrame::BEFORE), fps: args.fps };
             Ok(Some(Motion { judged, animation }))
         }
     }

@@ -4,6 +4,7 @@ mod preview;
 mod range;
 mod stage;
 
+use super::common::check_fps;
 use super::render::{self, outputs};
 use super::{Exit, complain, fail_on_messages, finite, interrupt, print, print_json};
 use crate::error::{Error, Result};
@@ -55,7 +56,7 @@ pub struct Args {
     /// Render finished frames again
     #[arg(long)]
     pub again: bool,
-    /// Which samples of earlier frames.
+    /// Which samples those are.
     #[command(flatten, next_help_heading = "Samples of earlier frames")]
     pub carry: ReprojectOverrides,
     /// How each frame is rendered.
@@ -117,9 +118,7 @@ impl Args {
                 "{option} is for one image: a sequence goes on where it stopped by itself"
             )));
         }
-        if !(self.fps > 0.0 && self.fps <= 1e6) {
-            return Err(Error::Usage(format!("--fps {}: choose a number above 0", self.fps)));
-        }
+        check_fps(self.fps)?;
         let first = match &self.frames {
             Some(frames) => self.numbers(frames)?.start,
             None => 0,

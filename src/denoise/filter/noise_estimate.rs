@@ -61,15 +61,9 @@ pub fn reference(input: &FilterInput, image: &[Packed], edge: &EdgeSettings, cau
     let own: Vec<Option<f32>> = (0..image.len()).map(|at| told(input, image, at)).collect();
     let variance = |at: usize| match own[at] {
         _ if image[at].count == 0.0 => -1.0,
-        Some(own_of_pixel) if cautious && image[at].count < MANY => {
-            let (mut total, mut sum) = (0.0, 0.0);
-            for (q, variance) in window(input, at).filter_map(|q| Some((&image[q], own[q]?))) {
-                let w = edge_weight(q, rates.exponent(&image[at], q));
-                total += w;
-                sum += if w > 0.0 { w * variance } else { 0.0 };
-            }
-            let known = image[at].count - 1.0;
-            (PRIOR * (sum / total) + known * own_of_pixel) / (PRIOR + known)
+        Some(of_pixel) if cautious && image[at].count < MANY => {
+            let (around, known) = (told_around(input, image, &own, at, &rates), image[at].count - 1.0);
+            (PRIOR * around + known * of_pixel) / (PRIOR + known)
         }
         Some(own) => own,
         None => spread(input, image, at, &rates),
@@ -82,6 +76,17 @@ fn told(input: &FilterInput, image: &[Packed], at: usize) -> Option<f32> {
     let v = Vec3::from(input.variance.as_ref()?[at]);
     let measured = image[at].count >= ENOUGH && v.is_finite() && v.min_element() >= 0.0;
     measured.then(|| luminance(v.map(f32::sqrt)).min(STRONGEST).powi(2))
+}
+
+/// The mean of that over like pixels.
+fn told_around(input: &FilterInput, image: &[Packed], own: &[Option<f32>], at: usize, rates: &Rates) -> f32 {
+    let (mut total, mut sum) = (0.0, 0.0);
+    for (q, variance) in window(input, at).filter_map(|q| Some((&image[q], own[q]?))) {
+        let w = edge_weight(q, rates.exponent(&image[at], q));
+        total += w;
+        sum += if w > 0.0 { w * variance } else { 0.0 };
+    }
+    sum / total
 }
 
 /// The pixels around one, and itself.
