@@ -49,6 +49,7 @@ pub mod render;
 pub mod report;
 pub mod scene;
 pub mod settings;
+mod spirv;
 pub mod statistics;
 mod threads;
 #[doc(hidden)] // nothing in a render runs them; tests compare the kernels with them

@@ -3,6 +3,7 @@
 //! do so once.
 use super::At;
 use crate::error::{Error, Result};
+use crate::spirv::specialise;
 use ash::vk;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -107,12 +108,7 @@ impl Pipeline {
     fn compile(&mut self, device: &ash::Device, cache: vk::PipelineCache, name: &str, recipe: &Recipe) -> Result<()> {
         let words = ash::util::read_spv(&mut std::io::Cursor::new(recipe.spirv))
             .map_err(|e| Error::Device(format!("{name}: its code is damaged ({e}): build again")))?;
-        let values: Vec<u32> = recipe.constants.iter().map(|(_, value)| *value).collect();
-        let entry = |(index, (id, _)): (usize, &(u32, u32))| {
-            vk::SpecializationMapEntry::default().constant_id(*id).offset(4 * index as u32).size(4)
-        };
-        let entries: Vec<_> = recipe.constants.iter().enumerate().map(entry).collect();
-        let special = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&values));
+        let words = specialise(&words, &recipe.constants);
         // SAFETY: the code was compiled for Vulkan 1.3 by the build script; the module is needed only for this call.
         unsafe {
             let module =
@@ -120,8 +116,7 @@ impl Pipeline {
             let stage = vk::PipelineShaderStageCreateInfo::default()
                 .stage(vk::ShaderStageFlags::COMPUTE)
                 .module(module)
-                .name(c"main")
-                .specialization_info(&special);
+                .name(c"main");
             let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout)];
             let made = device.create_compute_pipelines(cache, &info, None);
             device.destroy_shader_module(module, None);

@@ -4,8 +4,6 @@
 //! functions of GLSL. A multiplication with an addition in one instruction counts as two, a dot product of n components as 2n - 1.
 //! Loads, stores and moves do not count. Both sides of a branch count, unless a constant decides it. Turns of loops are found where
 //! their counter and its bounds are constants; others are told by the caller, or count once.
-mod constants;
-mod instruction;
 mod module;
 mod turns;
 

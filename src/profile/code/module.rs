@@ -1,6 +1,5 @@
 //! The part of a SPIR-V module that counting needs: its blocks, what follows on each, and values that constants decide.
-use super::constants::Constants;
-use super::instruction::{Instruction, instructions};
+use crate::spirv::{Instruction, instructions, op, specialise};
 use std::collections::BTreeMap;
 
 /// Instructions without branches.
@@ -28,7 +27,8 @@ pub struct Binary {
 /// A module with one function, as the build script's compiler makes them.
 pub struct Module {
     pub blocks: Vec<Block>,
-    pub constants: Constants,
+    /// Values of constants by id; a truth is 0 or 1.
+    pub constants: BTreeMap<u32, u32>,
     pub binaries: BTreeMap<u32, Binary>,
     places: BTreeMap<u32, usize>,
 }
@@ -36,21 +36,16 @@ pub struct Module {
 const EXT_INST: u16 = 12;
 const TYPE_VECTOR: u16 = 23;
 const TYPE_MATRIX: u16 = 24;
-const PHI: u16 = 245;
-const LOOP_MERGE: u16 = 246;
-const LABEL: u16 = 248;
-const BRANCH: u16 = 249;
-const BRANCH_CONDITIONAL: u16 = 250;
-const SWITCH: u16 = 251;
 
 impl Module {
     /// `None` for damaged code.
-    pub fn new(spirv: &[u8], specialised: &[(u32, u32)]) -> Option<Self> {
+    pub fn new(spirv: &[u8], constants: &[(u32, u32)]) -> Option<Self> {
         let words: Vec<u32> =
             spirv.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect();
+        let words = specialise(&words, constants);
         let instructions = instructions(&words)?;
-        let constants = Constants::new(&instructions, specialised);
-        let mut module = Self { blocks: Vec::new(), constants, binaries: BTreeMap::new(), places: BTreeMap::new() };
+        let (blocks, constants, binaries, places) = Default::default();
+        let mut module = Self { blocks, constants, binaries, places };
         let mut types = Types::default();
         for instruction in &instructions {
             types.note(instruction);
@@ -71,31 +66,37 @@ impl Module {
     }
 
     fn add(&mut self, Instruction { opcode, words }: &Instruction, types: &Types) -> Option<()> {
-        if *opcode == LABEL {
+        if *opcode == op::LABEL {
             self.blocks.push(Block { label: *words.first()?, ..Block::default() });
             return Some(());
         }
-        if let (126..=205, &[_, id, a, b, ..]) = (opcode, *words) {
-            self.binaries.insert(id, Binary { opcode: *opcode, operands: [a, b] });
+        match (*opcode, *words) {
+            (op::CONSTANT_TRUE, &[_, id]) => _ = self.constants.insert(id, 1),
+            (op::CONSTANT_FALSE, &[_, id]) => _ = self.constants.insert(id, 0),
+            (op::CONSTANT, &[_, id, value]) => _ = self.constants.insert(id, value),
+            (126..=205, &[_, id, a, b, ..]) => {
+                _ = self.binaries.insert(id, Binary { opcode: *opcode, operands: [a, b] });
+            }
+            _ => {}
         }
         let Some(block) = self.blocks.last_mut() else { return Some(()) };
         block.operations += types.operations(*opcode, words);
         match (*opcode, *words) {
-            (PHI, [_, id, ways @ ..]) => {
+            (op::PHI, [_, id, ways @ ..]) => {
                 let ways = ways.chunks_exact(2).map(|way| [way[0], way[1]]).collect();
                 block.phis.push((*id, ways));
             }
-            (LOOP_MERGE, [merge, ..]) => block.loop_merge = Some(*merge),
-            (BRANCH, [next, ..]) => block.successors = vec![*next],
-            (BRANCH_CONDITIONAL, [condition, yes, no, ..]) => {
+            (op::LOOP_MERGE, [merge, ..]) => block.loop_merge = Some(*merge),
+            (op::BRANCH, [next, ..]) => block.successors = vec![*next],
+            (op::BRANCH_CONDITIONAL, [condition, yes, no, ..]) => {
                 block.condition = Some(*condition);
-                block.successors = match self.constants.value(*condition) {
+                block.successors = match self.constants.get(condition) {
                     Some(0) => vec![*no],
                     Some(_) => vec![*yes],
                     None => vec![*yes, *no],
                 };
             }
-            (SWITCH, [_, default, ways @ ..]) => {
+            (op::SWITCH, [_, default, ways @ ..]) => {
                 block.successors = ways.chunks_exact(2).map(|way| way[1]).chain([*default]).collect();
             }
             _ => {}
@@ -120,7 +121,7 @@ impl Types {
                 self.components.insert(*id, components);
             }
             // Those whose operands begin with the type and the id of their result.
-            (12 | 41..=52 | 61 | 79..=87 | 95..=100 | 109..=205 | PHI, [ty, id, ..]) => {
+            (12 | 41..=52 | 61 | 79..=87 | 95..=100 | 109..=205 | op::PHI, [ty, id, ..]) => {
                 _ = self.of_value.insert(*id, *ty)
             }
             _ => {}

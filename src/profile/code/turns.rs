@@ -1,6 +1,6 @@
 //! How often a loop turns, where its counter begins, grows and ends by constants.
-use super::constants::evaluate;
 use super::module::{Binary, Block, Module};
+use crate::spirv::evaluate;
 use std::collections::BTreeSet;
 
 /// More turns than any kernel's loop with constant bounds.
@@ -26,10 +26,10 @@ pub fn of_loop(module: &Module, header: &Block, body: &BTreeSet<u32>) -> Option<
 
 fn counter(module: &Module, (id, ways): &(u32, Vec<[u32; 2]>), body: &BTreeSet<u32>) -> Option<Counter> {
     let from = |inside: bool| ways.iter().find(|[_, label]| body.contains(label) == inside).map(|[value, _]| *value);
-    let (first, next) = (module.constants.value(from(false)?)?, from(true)?);
+    let (first, next) = (*module.constants.get(&from(false)?)?, from(true)?);
     let step = *module.binaries.get(&next)?;
     let by = step.operands.iter().find(|operand| *operand != id)?;
-    module.constants.value(*by)?;
+    module.constants.get(by)?;
     step.operands.contains(id).then_some(Counter { id: *id, next, first, step })
 }
 
@@ -40,14 +40,14 @@ fn turns(module: &Module, counter: &Counter, test: &Block, body: &BTreeSet<u32>)
     let of_next = comparison.operands.contains(&counter.next);
     let value = |id: u32, counted: u32| match id == counter.id || id == counter.next {
         true => Some(counted),
-        false => module.constants.value(id),
+        false => module.constants.get(&id).copied(),
     };
     if !of_next && !comparison.operands.contains(&counter.id) {
         return None;
     }
     let apply = |binary: &Binary, counted: u32| {
         let [a, b] = binary.operands;
-        evaluate(u32::from(binary.opcode), &[value(a, counted)?, value(b, counted)?])
+        evaluate(binary.opcode, &[value(a, counted)?, value(b, counted)?])
     };
     let mut counted = counter.first;
     for turn in 0..MOST {

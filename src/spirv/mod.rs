@@ -1,0 +1,10 @@
+//! SPIR-V, the code of kernels as drivers take it: read, computed with, and specialised.
+mod evaluate;
+mod flow;
+mod instruction;
+pub mod op;
+mod specialise;
+
+pub use evaluate::evaluate;
+pub use instruction::{Instruction, instructions};
+pub use specialise::specialise;
