@@ -4,7 +4,7 @@ use crate::Args;
 use anyhow::anyhow;
 use tallow::gpu::{FrameResources, Gpu, PassTime};
 use tallow::layout::{Guide, PixelStats, vec3, vec4};
-use tallow::render::settings::Settings;
+use tallow::render::settings::{Settings, Split};
 use tallow::render::{Job, Outputs, Renderer, Step};
 use tallow::scene::{Loaded, Scene};
 use tallow::statistics::Pixel;
@@ -29,6 +29,7 @@ impl View {
     pub fn load(&self, args: &Args, change: impl Fn(&mut Settings)) -> anyhow::Result<Loaded> {
         let all = |s: &mut Settings| {
             ([s.width, s.height], s.max_depth, s.roulette_depth) = (self.size(args), self.depth, 0);
+            s.split = Split::Indirect; // as `View::render` has it: what is compared must be the same light
             change(s);
         };
         Ok(Scene::load(&self.scene_file(args)?).map(|scene| scene.with(all))?)
