@@ -47,7 +47,7 @@ pub fn label(block: &[Instruction]) -> u32 {
 
 /// What is known of a module's ids, and where control goes in it.
 pub struct Flow {
-    /// By id.
+    /// What is known of each id, at its place.
     values: Vec<Value>,
     /// The types whose values are followed: booleans and 32-bit integers.
     pub scalars: HashSet<u32>,
@@ -95,7 +95,7 @@ impl Flow {
         evaluate(opcode, &numbers).map_or(Varying, Constant)
     }
 
-    /// Is its result followed?
+    /// Is its result followed? It is where a number or a truth is computed or comes from another block.
     fn follows(&self, Instruction { opcode, words }: &Instruction) -> bool {
         let known = matches!(*opcode, op::I_ADD..=op::S_MOD | op::LOGICAL_EQUAL..=op::S_LESS_THAN_EQUAL | op::PHI);
         known && self.scalars.contains(&words[0])

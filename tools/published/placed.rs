@@ -29,7 +29,8 @@ impl View {
     pub fn load(&self, args: &Args, change: impl Fn(&mut Settings)) -> anyhow::Result<Loaded> {
         let all = |s: &mut Settings| {
             ([s.width, s.height], s.max_depth, s.roulette_depth) = (self.size(args), self.depth, 0);
-            s.split = Split::Indirect; // as `View::render` has it: what is compared must be the same light
+            // The references of `View::render` are split like this; what is compared must be the same light.
+            s.split = Split::Indirect;
             change(s);
         };
         Ok(Scene::load(&self.scene_file(args)?).map(|scene| scene.with(all))?)

@@ -33,10 +33,6 @@ pub struct Module {
     places: BTreeMap<u32, usize>,
 }
 
-const EXT_INST: u16 = 12;
-const TYPE_VECTOR: u16 = 23;
-const TYPE_MATRIX: u16 = 24;
-
 impl Module {
     /// `None` for damaged code.
     pub fn new(spirv: &[u8], constants: &[(u32, u32)]) -> Option<Self> {
@@ -115,13 +111,13 @@ struct Types {
 impl Types {
     fn note(&mut self, Instruction { opcode, words }: &Instruction) {
         match (*opcode, *words) {
-            (TYPE_VECTOR, [id, _, count, ..]) => _ = self.components.insert(*id, u64::from(*count)),
-            (TYPE_MATRIX, [id, column, count, ..]) => {
+            (op::TYPE_VECTOR, [id, _, count, ..]) => _ = self.components.insert(*id, u64::from(*count)),
+            (op::TYPE_MATRIX, [id, column, count, ..]) => {
                 let components = self.of_type(*column) * u64::from(*count);
                 self.components.insert(*id, components);
             }
             // Those whose operands begin with the type and the id of their result.
-            (12 | 41..=52 | 61 | 79..=87 | 95..=100 | 109..=205 | op::PHI, [ty, id, ..]) => {
+            (op::EXT_INST | 41..=52 | 61 | 79..=87 | 95..=100 | 109..=205 | op::PHI, [ty, id, ..]) => {
                 _ = self.of_value.insert(*id, *ty)
             }
             _ => {}
@@ -141,7 +137,7 @@ impl Types {
         let result = self.of_type(ty);
         let first = operands.first().map_or(1, |&id| self.of_id(id));
         match opcode {
-            EXT_INST => result * function(operands.get(1).copied().unwrap_or(0)),
+            op::EXT_INST => result * function(operands.get(1).copied().unwrap_or(0)),
             // A bit cast computes nothing.
             109..=115 | 126..=143 | 149..=191 | 194..=205 => {
                 result.max(if matches!(opcode, 154 | 155) { first } else { 1 })

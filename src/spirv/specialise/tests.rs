@@ -12,10 +12,6 @@ const TEN: u32 = 4;
 const TWENTY: u32 = 5;
 const ENTRY: u32 = 6;
 const BOUND_OF_IDS: u32 = 40;
-const I_EQUAL: u16 = 170;
-const U_LESS_THAN: u16 = 176;
-const RETURN: u16 = 253;
-const FUNCTION_END: u16 = 56;
 const NO_CONTRACTION: u32 = 42;
 
 type Line<'a> = (u16, &'a [u32]);
@@ -30,7 +26,7 @@ fn module(bound: u32, before: &[Line], choice: u16, more: &[Line], body: &[Line]
         (op::CONSTANT, &[UINT, TWENTY, 20]),
     ];
     let function: [Line; 1] = [(op::FUNCTION, &[30, 31, 0, 32])];
-    let end: [Line; 1] = [(FUNCTION_END, &[])];
+    let end: [Line; 1] = [(op::FUNCTION_END, &[])];
     let lines = [before, &declared, more, &function, body, &end].concat();
     let header = [0x0723_0203, 0x0001_0600, 0, bound, 0];
     let mut whole = header.to_vec();
@@ -63,7 +59,7 @@ const SELECTIONS: [Line; 16] = [
     (op::BRANCH, &[9]),
     (op::LABEL, &[9]),
     (op::PHI, &[UINT, 21, TEN, 7, 20, 8]),
-    (I_EQUAL, &[BOOL, 22, 21, TEN]),
+    (op::I_EQUAL, &[BOOL, 22, 21, TEN]),
     (op::SELECTION_MERGE, &[11, 0]),
     (op::BRANCH_CONDITIONAL, &[22, 10, 11]),
     (op::LABEL, &[10]),
@@ -73,7 +69,7 @@ const SELECTIONS: [Line; 16] = [
 
 #[test]
 fn what_a_constant_decides_by_way_of_phis_is_gone() {
-    let body = [&SELECTIONS[..], &[(RETURN, &[])]].concat();
+    let body = [&SELECTIONS[..], &[(op::RETURN, &[])]].concat();
     let chosen: [Line; 12] = [
         (op::LABEL, &[ENTRY]),
         (op::BRANCH, &[7]),
@@ -81,12 +77,12 @@ fn what_a_constant_decides_by_way_of_phis_is_gone() {
         (op::BRANCH, &[9]),
         (op::LABEL, &[9]),
         (op::PHI, &[UINT, 21, TEN, 7]),
-        (I_EQUAL, &[BOOL, 22, 21, TEN]),
+        (op::I_EQUAL, &[BOOL, 22, 21, TEN]),
         (op::BRANCH, &[10]),
         (op::LABEL, &[10]),
         (op::BRANCH, &[11]),
         (op::LABEL, &[11]),
-        (RETURN, &[]),
+        (op::RETURN, &[]),
     ];
     assert_becomes(true, &body, None, &chosen);
     let other: [Line; 11] = [
@@ -97,17 +93,17 @@ fn what_a_constant_decides_by_way_of_phis_is_gone() {
         (op::BRANCH, &[9]),
         (op::LABEL, &[9]),
         (op::PHI, &[UINT, 21, 20, 8]),
-        (I_EQUAL, &[BOOL, 22, 21, TEN]),
+        (op::I_EQUAL, &[BOOL, 22, 21, TEN]),
         (op::BRANCH, &[11]),
         (op::LABEL, &[11]),
-        (RETURN, &[]),
+        (op::RETURN, &[]),
     ];
     assert_becomes(false, &body, None, &other);
 }
 
 #[test]
 fn decorations_go_with_what_they_decorate() {
-    let body = [&SELECTIONS[..], &[(RETURN, &[])]].concat();
+    let body = [&SELECTIONS[..], &[(op::RETURN, &[])]].concat();
     let before: [Line; 2] = [(op::DECORATE, &[20, NO_CONTRACTION]), (op::DECORATE, &[21, NO_CONTRACTION])];
     let count = |choice| {
         let code = specialise(&module(BOUND_OF_IDS, &before, choice, &[], &body), &[]);
@@ -131,7 +127,7 @@ fn loops_keep_their_form() {
         (op::BRANCH, &[7]),
         (op::LABEL, &[10]),
         (op::PHI, &[UINT, 22, 20, 7]),
-        (RETURN, &[]),
+        (op::RETURN, &[]),
     ];
     let mut left = body.to_vec();
     left[3] = (op::PHI, &[UINT, 20, TEN, ENTRY, BOUND_OF_IDS, 9]);
@@ -154,7 +150,7 @@ fn loops_keep_their_form() {
         (op::BRANCH_CONDITIONAL, &[CHOICE, 7, 10]),
         (op::LABEL, &[10]),
     ];
-    let once = [&once[..], &[(RETURN, &[])]].concat();
+    let once = [&once[..], &[(op::RETURN, &[])]].concat();
     assert_becomes(false, &once, None, &once);
 }
 
@@ -174,7 +170,7 @@ fn a_selection_that_others_leave_early_stays_one() {
         (op::BRANCH, &[10]),
         (op::LABEL, &[10]),
     ];
-    let body = [&body[..], &[(RETURN, &[])]].concat();
+    let body = [&body[..], &[(op::RETURN, &[])]].concat();
     let mut left = body.clone();
     left[9] = (op::UNREACHABLE, &[]);
     assert_becomes(true, &body, None, &left);
@@ -186,7 +182,7 @@ fn numbers_are_set_and_computed_with() {
     let choice: [Line; 3] = [
         (op::SPEC_CONSTANT, &[UINT, 33, 1]),
         (op::SPEC_CONSTANT_OP, &[UINT, 34, op::I_ADD.into(), 33, TEN]),
-        (op::SPEC_CONSTANT_OP, &[BOOL, 35, U_LESS_THAN.into(), 34, TWENTY]),
+        (op::SPEC_CONSTANT_OP, &[BOOL, 35, op::U_LESS_THAN.into(), 34, TWENTY]),
     ];
     let code = specialise(&module(BOUND_OF_IDS, &before, op::CONSTANT_TRUE, &choice, &[]), &[(8, 9)]);
     let set: [Line; 3] =
