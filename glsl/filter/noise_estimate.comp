@@ -1,9 +1,10 @@
 #include "shared/edge.glsl"
+#include "shared/atrous_taps.glsl"
 #include "shared/luminance.glsl"
 
-// Writes the radiance of one pixel per thread with the variance of its luminance, or -1 where the pixel is unknown. Few samples
-// tell little of their own variance: below ENOUGH samples it is the variance over like pixels of a 7x7 window (Schied et al.
-// 2017, section 4.2). For CAUTIOUS readers, below MANY samples, what those pixels' samples tell counts too.
+// Writes the radiance of pixels with the variance of their luminance, or -1 where a pixel is unknown. Few samples tell little of
+// their own variance: below ENOUGH samples it is the variance over like pixels of a 7x7 window (Schied et al. 2017, section 4.2). For
+// CAUTIOUS readers, below MANY samples, what those pixels' samples tell counts too. A thread takes ROWS pixels of a column.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
@@ -30,61 +31,87 @@ float told(int i, float count) {
     return count >= ENOUGH && finite(v) && all(greaterThanEqual(v, vec3(0.0))) ? deviation * deviation : -1.0;
 }
 
-// The mean of that over like pixels.
-float told_around(ivec2 at, Pixel p) {
+// The means of that over like pixels.
+float[ROWS] told_around(ivec2 first, Pixel p[ROWS]) {
     ivec2 size = ivec2(push.size);
-    float total = 0.0, sum = 0.0;
+    float total[ROWS], sum[ROWS];
+    [[unroll]] for (int k = 0; k < ROWS; k++) total[k] = sum[k] = 0.0;
     // Tested at its end: see shared/traverse.glsl.
-    int j = -REACH;
+    int i = -REACH;
     do {
-        int i = -REACH;
-        do {
-            ivec2 tap = at + ivec2(i, j), inside = clamp(tap, ivec2(0), size - 1);
+        [[unroll]] for (int j = -REACH; j < ROWS + REACH; j++) {
+            ivec2 tap = first + ivec2(i, j), inside = clamp(tap, ivec2(0), size - 1);
             int there = inside.y * size.x + inside.x;
             Pixel q = pixel_at(there);
             float of_tap = told(there, q.colour.w);
-            float w = tap == inside && of_tap >= 0.0 ? edge_weight(q, edge_exponent(p, q, push.rates)) : 0.0;
-            total += w;
-            sum += w > 0.0 ? w * of_tap : 0.0;
-        } while (++i <= REACH);
-    } while (++j <= REACH);
-    return sum / total;
+            bool counts = tap == inside && of_tap >= 0.0;
+            [[unroll]] for (int k = 0; k < ROWS; k++) { // constant bounds, or it would not be unrolled
+                if (abs(j - k) <= REACH) {
+                    float w = counts ? edge_weight(q, edge_exponent(p[k], q, push.rates)) : 0.0;
+                    total[k] += w;
+                    sum[k] += w > 0.0 ? w * of_tap : 0.0;
+                }
+            }
+        }
+    } while (++i <= REACH);
+    [[unroll]] for (int k = 0; k < ROWS; k++) sum[k] /= total[k];
+    return sum;
 }
 
-float spread(ivec2 at, Pixel p) {
+// The variance of the pixels' own luminance over like pixels.
+float[ROWS] spread(ivec2 first, Pixel p[ROWS]) {
     ivec2 size = ivec2(push.size);
-    float total = 0.0, squares = 0.0, mean = 0.0, m2 = 0.0;
+    float total[ROWS], squares[ROWS], mean[ROWS], m2[ROWS];
+    [[unroll]] for (int k = 0; k < ROWS; k++) total[k] = squares[k] = mean[k] = m2[k] = 0.0;
     // Tested at its end: see shared/traverse.glsl.
-    int j = -REACH;
+    int i = -REACH;
     do {
-        int i = -REACH;
-        do {
-            ivec2 tap = at + ivec2(i, j), inside = clamp(tap, ivec2(0), size - 1);
+        [[unroll]] for (int j = -REACH; j < ROWS + REACH; j++) {
+            ivec2 tap = first + ivec2(i, j), inside = clamp(tap, ivec2(0), size - 1);
             Pixel q = pixel_at(inside.y * size.x + inside.x);
-            float w = tap == inside ? edge_weight(q, edge_exponent(p, q, push.rates)) : 0.0;
-            float off = contrast(q.colour.rgb, p.colour.rgb);
-            total += w;
-            squares += w * w;
-            mean += w * off;
-            m2 += w * off * off;
-        } while (++i <= REACH);
-    } while (++j <= REACH);
-    mean /= total;
-    // The division makes it unbiased for unequal weights; one pixel alone has no variance. The result is not negative, since
-    // the pixel itself is one of at most 49 terms, with value 0.
-    float others = 1.0 - squares / (total * total);
-    return others > 1e-3 ? (m2 / total - mean * mean) / others : 0.0;
+            [[unroll]] for (int k = 0; k < ROWS; k++) {
+                if (abs(j - k) <= REACH) {
+                    float w = tap == inside ? edge_weight(q, edge_exponent(p[k], q, push.rates)) : 0.0;
+                    float off = contrast(q.colour.rgb, p[k].colour.rgb);
+                    total[k] += w;
+                    squares[k] += w * w;
+                    mean[k] += w * off;
+                    m2[k] += w * off * off;
+                }
+            }
+        }
+    } while (++i <= REACH);
+    float found[ROWS];
+    [[unroll]] for (int k = 0; k < ROWS; k++) {
+        mean[k] /= total[k];
+        // The division makes it unbiased for unequal weights; one pixel alone has no variance. The result is not negative, since
+        // the pixel itself is one of at most 49 terms, with value 0.
+        float others = 1.0 - squares[k] / (total[k] * total[k]);
+        found[k] = others > 1e-3 ? (m2[k] / total[k] - mean[k] * mean[k]) / others : 0.0;
+    }
+    return found;
 }
 
 void main() {
-    ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(at, size))) return;
-    int i = at.y * size.x + at.x;
-    Pixel p = pixel_at(i);
-    float own = told(i, p.colour.w), v = own >= 0.0 ? own : spread(at, p);
-    if (CAUTIOUS && own >= 0.0 && p.colour.w < MANY) {
-        float known = p.colour.w - 1.0; // degrees of freedom
-        v = (PRIOR * told_around(at, p) + known * own) / (PRIOR + known);
+    ivec2 size = ivec2(push.size);
+    int x = int(gl_GlobalInvocationID.x), first = first_row(int(gl_GlobalInvocationID.y), 1);
+    if (x >= size.x || first >= size.y) return;
+    Pixel p[ROWS];
+    float own[ROWS], around[ROWS], found[ROWS];
+    bool untold = false, unsure = false;
+    [[unroll]] for (int k = 0; k < ROWS; k++) {
+        int i = min(first + k, size.y - 1) * size.x + x;
+        p[k] = pixel_at(i);
+        own[k] = told(i, p[k].colour.w);
+        untold = untold || own[k] < 0.0;
+        unsure = unsure || own[k] >= 0.0 && p[k].colour.w < MANY;
     }
-    estimate[i] = vec4(p.colour.rgb, p.colour.w > 0.0 ? v : -1.0);
+    if (untold) found = spread(ivec2(x, first), p);
+    if (CAUTIOUS && unsure) around = told_around(ivec2(x, first), p);
+    [[unroll]] for (int k = 0; k < ROWS; k++) {
+        float count = p[k].colour.w, v = own[k] >= 0.0 ? own[k] : found[k];
+        float known = count - 1.0; // degrees of freedom
+        if (CAUTIOUS && own[k] >= 0.0 && count < MANY) v = (PRIOR * around[k] + known * own[k]) / (PRIOR + known);
+        if (first + k < size.y) estimate[(first + k) * size.x + x] = vec4(p[k].colour.rgb, count > 0.0 ? v : -1.0);
+    }
 }

@@ -1,4 +1,5 @@
 //! What is known of each pixel's noise. Kernel: `glsl/filter/noise_estimate.comp`. Twin: [`reference`].
+use super::atrous_taps::threads;
 use super::edge::{EdgeSettings, Rates, edge_weight};
 use super::pack::{Pack, Packed};
 use super::{FilterInput, Planes};
@@ -46,7 +47,7 @@ impl Estimate {
         let variance = planes.variance.as_ref().unwrap_or(&self.nothing);
         let bind = Bind { colour: &pack.colour, place: &pack.place, variance, estimate: &self.plane };
         let kernel = &self.kernels[usize::from(planes.variance.is_some())];
-        rec.dispatch(kernel, bind, &push, kernel.groups(planes.size))
+        rec.dispatch(kernel, bind, &push, kernel.groups(threads(planes.size, 1)))
     }
 }
 
