@@ -80,10 +80,12 @@ uint reason_to_keep(uint pixel, SurfacePoint at, inout Carried c) {
     return c.count > 0u ? 0u : DROPPED_EDGE;
 }
 
-// What is known of all samples of a pixel, of which it had c.count at the start of the frame. Their age is the mean of theirs. Where
-// it is at the limit fewer count, so that new ones keep it there: were all dropped at once, a whole film would begin anew in one frame.
+// What is known of all samples of a pixel, of which it had c.count at the start of the frame. Their age and their error are the means of
+// theirs: new ones have none, and the error is that of the mean of all. Where the age is at the limit fewer count, so that new ones keep
+// it there: were all dropped at once, a whole film would begin anew in one frame.
 Carried older(Carried c, uint count, bool still) {
     uint age = (c.age * c.count + count / 2u) / max(count, 1u);
+    c.error = (c.error * c.count + max(count, 1u) - 1u) / max(count, 1u); // rounded up, as everywhere
     c.count = min(count, still ? MOST_CARRIED : push.max_samples);
     bool old = !still && age >= push.max_age;
     c.count = old ? c.count * push.max_age / (age + 1u) : c.count;

@@ -202,12 +202,13 @@ impl Reprojection<'_> {
     fn older(&self, c: Carried, count: u32) -> Carried {
         let (limit, still) = (self.push.max_age, self.still());
         let age = (c.age * c.count + count / 2) / count.max(1);
+        let error = (c.error * c.count).div_ceil(count.max(1));
         let most = count.min(if still { MOST_CARRIED } else { self.push.max_samples });
         let (count, age) = match !still && age >= limit {
             true => (most * limit / (age + 1), limit.max(1) - 1),
             false => (most, age),
         };
-        Carried { count, age, edge: false, back: false, ..c }
+        Carried { count, age, error, edge: false, back: false }
     }
 
     pub(super) fn shows(&self, seen: &Guide, s: &Surface) -> bool {

@@ -230,9 +230,9 @@ fn changes_of_light_are_shares_of_it() {
     assert_eq!([light_change::cell_of(0, [9, 9]), light_change::cell_of(9 * 4 + 8, [9, 9])], [0, 5]);
 }
 
-/// A near wall beside a far one, whose light differs by so much; every pixel has eight samples, of variance 1. How many of them
-/// those by the edge hand on.
-fn kept_beside(other: &str, contrast: f32) -> Vec<u32> {
+/// A near wall beside a far one, whose light differs by so much, in 16 x 9 pixels; every pixel has eight samples, of variance 1, and of
+/// those `carried`. What they hand on.
+fn handed_beside(other: &str, contrast: f32, carried: Carried) -> Vec<Carried> {
     let mut scene = Workplace::new().scene(&format!(
         "[camera]\nposition = [0.0, 0.0, 6.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 45.0\n[environment]\nradiance = 1.0\n\
          [[material]]\nname = 'lamp'\nemission = 9.0\n[[material]]\nname = 'wall'\n\
@@ -254,13 +254,18 @@ fn kept_beside(other: &str, contrast: f32) -> Vec<u32> {
         points: &points,
         stats: &stats,
         light: &[PixelLight::default(); 144],
-        carried: &[0; 144],
+        carried: &[carried.word(); 144],
     };
     let push = push(&scene, Reproject::default());
     let (before, scene, changes, now) = (&scene, &scene, &[][..], &[][..]);
     let handed = Reprojection { before, scene, instance_now: now, triangle_now: now, changes, previous, camera, push }
         .remember(&left);
-    let kept: Vec<_> = handed.offered.iter().map(|&word| Carried::of(word)).collect();
+    handed.offered.iter().map(|&word| Carried::of(word)).collect()
+}
+
+/// How many of their samples those by the edge hand on.
+fn kept_beside(other: &str, contrast: f32) -> Vec<u32> {
+    let kept = handed_beside(other, contrast, Carried::default());
     assert!(kept.iter().filter(|c| !c.edge && c.count == 8).count() >= 144 - 2 * 9, "those away from it hand on all");
     [7, 8].map(|x| kept[4 * 16 + x].count).to_vec()
 }
@@ -274,6 +279,13 @@ fn edges_hand_on_what_is_worth_it() {
     assert_eq!(kept_beside("wall", 10.0), [0, 0]);
     // Beside a lamp none, however alike: some pixels of its rim are far brighter than those around.
     assert_eq!(kept_beside("lamp", 0.0), [0, 0]);
+}
+
+#[test]
+fn new_samples_thin_age_and_error() {
+    // Four samples that have moved six times, and four new ones: both are means over eight, the error rounded up, from 4.5.
+    let handed = handed_beside("wall", 0.0, Carried { count: 4, age: 6, error: 9, ..Carried::default() });
+    assert!(handed.iter().all(|c| [c.count, c.age, c.error] == [8, 3, 5]), "{handed:?}");
 }
 
 /// Pixels that begin with the same words, and the same samples: where those of several pixels are merged, but for rounding.

@@ -54,6 +54,8 @@ const SCENES: &[(&str, Source)] = &[
     ("stanford-buddha", Source::Written(include_str!("stanford-buddha.toml"))),
     ("stanford-dragon", Source::Written(include_str!("stanford-dragon.toml"))),
     ("glass-dragon", Source::Written(include_str!("glass-dragon.toml"))),
+    ("cornell-bunny", Source::Written(include_str!("cornell-bunny.toml"))),
+    ("cornell-buddha", Source::Written(include_str!("cornell-buddha.toml"))),
     ("nefertiti", Source::Written(include_str!("nefertiti.toml"))),
     ("fox", Source::Sequence(include_str!("fox.toml"))),
     ("running-fox", Source::Written(include_str!("running-fox.toml"))),

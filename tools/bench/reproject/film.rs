@@ -1,5 +1,6 @@
 //! Renders frames one after another.
 use anyhow::{Context, Result};
+use glam::Vec3;
 use tallow::allocate::policy;
 use tallow::denoise::filter::Method;
 use tallow::denoise::{Clean, Filtered, Noisy, Recipe};
@@ -15,6 +16,8 @@ pub struct Arm {
     pub policy: &'static str,
     pub carries: Option<Reproject>,
     pub filter: Option<&'static str>,
+    /// Whether each pixel is four of a film twice as wide and high, which carry their samples each on its own.
+    pub quarters: bool,
 }
 
 /// A renderer of an arm, and what it needs.
@@ -23,7 +26,6 @@ pub struct Film {
     gpu: Gpu,
     frame: FrameResources,
     arm: Arm,
-    size: [u32; 2],
 }
 
 pub fn milliseconds(times: &[PassTime], of: impl Fn(&str) -> bool) -> f64 {
@@ -38,16 +40,16 @@ pub fn carries(name: &str) -> bool {
 impl Film {
     pub fn new(gpu: &Gpu, scene: &Loaded, arm: Arm, spp: u32) -> Result<Self> {
         let scene = scene.clone().with(|s| {
-            s.spp = spp;
+            let [wide, of] = if arm.quarters { [2, 4] } else { [1, 1] };
+            (s.width, s.height, s.spp) = (s.width * wide, s.height * wide, spp / of);
             s.allocate.policy = policy(arm.policy).unwrap_or(s.allocate.policy);
-            s.allocate.min_spp = 2.min(spp); // of one sample, no noise is known
+            s.allocate.min_spp = 2.min(s.spp); // of one sample, no noise is known
         });
         let outputs = Outputs { split_light: true, guides: true, counters: false };
         let mut renderer = Renderer::new(gpu, &scene, &scene.settings, outputs)?;
         let moves = if scene.animation.is_empty() { Moves::Camera } else { Moves::Scene };
         arm.carries.map_or(Ok(()), |settings| renderer.keep_history(settings, moves))?;
-        let size = [scene.settings.width, scene.settings.height];
-        Ok(Self { renderer, gpu: gpu.clone(), frame: FrameResources::new(gpu)?, arm, size })
+        Ok(Self { renderer, gpu: gpu.clone(), frame: FrameResources::new(gpu)?, arm })
     }
 
     /// Renders a frame from a camera, after what has changed in the scene. Returns its passes.
@@ -75,9 +77,10 @@ impl Film {
 
     /// What is shown: the mean, or what the arm's filter makes of it; and what that took.
     pub fn picture(&self) -> Result<(Picture, f64)> {
-        let stats = self.renderer.film().tiles[0].stats.read()?;
-        let [width, height] = self.size;
-        let picture = Picture { width, height, pixels: stats.iter().map(|s| s.mean).collect() };
+        let size = self.renderer.settings();
+        let pixels = self.renderer.film().tiles[0].stats.read()?.iter().map(|s| s.mean).collect();
+        let picture = Picture { width: size.width, height: size.height, pixels };
+        let picture = if self.arm.quarters { halved(&picture) } else { picture };
         let Some(name) = self.arm.filter else { return Ok((picture, 0.0)) };
         let method = Method::all().find(|method| method.name() == name).context("a filter of that name")?;
         let Clean { colour: [r, g, b], times, .. } =
@@ -85,4 +88,15 @@ impl Film {
         let pixels = r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect();
         Ok((Picture { pixels, ..picture }, milliseconds(&times, |_| true)))
     }
+}
+
+/// The means of four pixels each.
+fn halved(fine: &Picture) -> Picture {
+    let [width, height] = [fine.width / 2, fine.height / 2];
+    let mean = |i: u32| {
+        let corner = (i / width * 2 * fine.width + i % width * 2) as usize;
+        let four = [0, 1, fine.width as usize, fine.width as usize + 1].map(|k| Vec3::from(fine.pixels[corner + k]));
+        (four.into_iter().sum::<Vec3>() / 4.0).to_array()
+    };
+    Picture { width, height, pixels: (0..width * height).map(mean).collect() }
 }

@@ -129,16 +129,16 @@ type Named = (String, usize, Arm);
 
 fn arms(filters: &[String], carries: Reproject) -> Vec<Named> {
     let carries = Some(carries);
+    let arm = |policy, carries, filter| Arm { policy, carries, filter, quarters: false };
     let mut arms = vec![
-        ("nothing".to_owned(), 0, Arm { policy: "uniform", carries: None, filter: None }),
-        ("reprojection".to_owned(), 0, Arm { policy: "uniform", carries, filter: None }),
+        ("nothing".to_owned(), 0, arm("uniform", None, None)),
+        ("reprojection".to_owned(), 0, arm("uniform", carries, None)),
     ];
     for filter in filters {
         let (base, filter): (_, &'static str) = (arms.len(), filter.clone().leak());
-        let arm = |policy, carries| Arm { policy, carries, filter: Some(filter) };
-        arms.push((filter.to_owned(), base, arm("uniform", None)));
-        arms.push((format!("reprojection, {filter}"), base, arm("uniform", carries)));
-        arms.push((format!("reprojection, placed, {filter}"), base, arm("both", carries)));
+        arms.push((filter.to_owned(), base, arm("uniform", None, Some(filter))));
+        arms.push((format!("reprojection, {filter}"), base, arm("uniform", carries, Some(filter))));
+        arms.push((format!("reprojection, placed, {filter}"), base, arm("both", carries, Some(filter))));
     }
     arms
 }

@@ -7,13 +7,20 @@ use anyhow::Result;
 use glam::{Quat, Vec3};
 use tallow::gpu::Gpu;
 use tallow::layout::{Camera, vec3};
-use tallow::render::{Carriage, Reproject};
+use tallow::render::{Carriage, Reproject, ReprojectOverrides};
 use tallow::report::table;
+use tallow::scene::Loaded;
 
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
     view: View,
+    /// Where the camera stands, instead of where the scene puts it
+    #[arg(long, value_delimiter = ',', num_args = 3, allow_hyphen_values = true, value_names = ["X", "Y", "Z"])]
+    position: Option<Vec<f32>>,
+    /// Degrees that it is turned by at first
+    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+    from: f32,
     /// Degrees that the camera turns by
     #[arg(long, default_value_t = 100.0)]
     degrees: f32,
@@ -29,6 +36,20 @@ pub struct Args {
     /// Limits of the error, in 256ths
     #[arg(long, value_delimiter = ',', default_values_t = [1.0, 4.0, 8.0])]
     errors: Vec<f32>,
+    /// Measure also with four samples of a pixel that are carried each on its own
+    #[arg(long)]
+    quarters: bool,
+    #[command(flatten)]
+    carry: ReprojectOverrides,
+}
+
+impl Args {
+    /// The camera of the first frame.
+    fn start(&self, scene: &Loaded) -> Result<Camera> {
+        let first = scene.camera([self.view.width, self.view.height])?;
+        let position = self.position.as_ref().map_or(first.position, |p| [p[0], p[1], p[2]]);
+        Ok(turned(&Camera { position, ..first }, self.from))
+    }
 }
 
 fn turned(first: &Camera, degrees: f32) -> Camera {
@@ -44,22 +65,29 @@ pub struct Line {
     frame_ms: f64,
     carrying_ms: f64,
     carriage: Option<Carriage>,
+    pixels: u64,
 }
 
-fn arms(errors: &[f32]) -> Vec<(String, Arm)> {
-    let arm = |policy, carries| Arm { policy, carries, filter: None };
-    let mut arms = vec![("uniform".to_owned(), arm("uniform", None)), ("placed".to_owned(), arm("variance", None))];
-    for &error in errors {
-        let carries = Some(Reproject { reproject_error: error / 256.0, ..Reproject::default() });
-        arms.push((format!("reprojection, E = {error}/256"), arm("uniform", carries)));
-        arms.push((format!("both, E = {error}/256"), arm("variance", carries)));
+fn arms(args: &Args) -> Vec<(String, Arm)> {
+    let arm = |policy, carries, quarters| Arm { policy, carries, filter: None, quarters };
+    let alone = |policy| arm(policy, None, false);
+    let mut arms = vec![("uniform".to_owned(), alone("uniform")), ("placed".to_owned(), alone("variance"))];
+    let mut carries = Reproject::default();
+    args.carry.apply(&mut carries);
+    for &error in &args.errors {
+        let carries = Some(Reproject { reproject_error: error / 256.0, ..carries });
+        for &quarters in if args.quarters { &[false, true][..] } else { &[false] } {
+            let each = if quarters { ", four each" } else { "" };
+            let of = |name, policy| (format!("{name}, E = {error}/256{each}"), arm(policy, carries, quarters));
+            arms.extend([of("reprojection", "uniform"), of("both", "variance")]);
+        }
     }
     arms
 }
 
 fn measure(gpu: &Gpu, args: &Args, step: f32, name: String, arm: Arm, reference: &Reference) -> Result<Line> {
     let scene = args.view.load()?;
-    let first = scene.camera([args.view.width, args.view.height])?;
+    let first = args.start(&scene)?;
     let mut film = Film::new(gpu, &scene, arm, args.spp)?;
     let count = (args.degrees / step).round() as u32;
     let (mut points, mut clock, mut carriage, mut frame_ms, mut carrying_ms) = (Vec::new(), 0.0, None, 0.0, 0.0);
@@ -87,7 +115,9 @@ fn measure(gpu: &Gpu, args: &Args, step: f32, name: String, arm: Arm, reference:
         }
         frame_ms = ms;
     }
-    Ok(Line { name, points, frame_ms, carrying_ms, carriage })
+    let size = film.renderer.settings();
+    let pixels = u64::from(size.width) * u64::from(size.height);
+    Ok(Line { name, points, frame_ms, carrying_ms, carriage, pixels })
 }
 
 fn accumulated(means: Vec<vec3>, new: &[vec3], weight: f32) -> Vec<vec3> {
@@ -101,9 +131,8 @@ fn accumulated(means: Vec<vec3>, new: &[vec3], weight: f32) -> Vec<vec3> {
 pub fn run(gpu: &Gpu, args: &Args) -> Result<()> {
     args.view.tell(gpu);
     let scene = args.view.load()?;
-    let size = [args.view.width, args.view.height];
-    let reference =
-        Reference::new(gpu, &scene, turned(&scene.camera(size)?, args.degrees), args.view.reference_spp, None)?;
+    let end = turned(&args.start(&scene)?, args.degrees);
+    let reference = Reference::new(gpu, &scene, end, args.view.reference_spp, None)?;
     println!(
         "{} degrees, {} samples a pixel for each step; relative MSE (the reference's own: {:.4}) of the frame after the last step and of \
          those that follow it",
@@ -112,11 +141,11 @@ pub fn run(gpu: &Gpu, args: &Args) -> Result<()> {
         reference.noise()
     );
     for &step in &args.steps {
-        let lines = arms(&args.errors)
+        let lines = arms(args)
             .into_iter()
             .map(|(name, arm)| measure(gpu, args, step, name, arm, &reference))
             .collect::<Result<Vec<_>>>()?;
-        print(step, &lines, size[0] * size[1]);
+        print(step, &lines);
         if let Some(path) = &args.view.plot {
             let path = path.with_extension(format!("{step}.svg"));
             let series: Vec<_> = lines.iter().map(|l| (l.name.clone(), l.points.clone())).collect();
@@ -131,10 +160,10 @@ pub fn run(gpu: &Gpu, args: &Args) -> Result<()> {
     Ok(())
 }
 
-fn print(step: f32, lines: &[Line], pixels: u32) {
+fn print(step: f32, lines: &[Line]) {
     let base = &lines[0].points;
-    let share = |n: u64| format!("{:.0} %", 100.0 * n as f64 / f64::from(pixels));
     let row = |line: &Line| {
+        let share = |n: u64| format!("{:.0} %", 100.0 * n as f64 / line.pixels as f64);
         let at =
             |k: usize| line.points.get(k).map_or(String::new(), |p| format!("{:.4} ({:.2})", p.1, p.1 / base[k].1));
         let last = line.points.len() - 1;

@@ -5,6 +5,7 @@ use crate::published::placed::{indirect, mean, render};
 use crate::published::report::Sheet;
 use crate::published::view::View;
 use crate::published::{Section, push};
+use anyhow::ensure;
 use tallow::denoise::Demodulation;
 use tallow::denoise::filter::{self, AtrousForm, FilterInput, FilterSettings};
 use tallow::gpu::Gpu;
@@ -80,6 +81,22 @@ impl Truth {
         let off = |x: f32, y: f32| 255.0 * f64::from(srgb_from_linear(x) - srgb_from_linear(y));
         let of = |i: usize| (0..3).map(|c| off(image[i][c], a[i][c]) * off(image[i][c], b[i][c])).sum::<f64>() / 3.0;
         (0..image.len()).filter(|&i| self.surface[i]).map(of).collect()
+    }
+
+    /// Errors tell nothing where images and references are not of the same light: split otherwise, they differ by several times.
+    fn check(&self, images: &[Image]) -> anyhow::Result<()> {
+        let brightness = |light: &[vec4]| {
+            let shown = light.iter().zip(&self.surface).filter(|(_, surface)| **surface);
+            shown.map(|(v, _)| v[..3].iter().map(|&c| f64::from(c)).sum::<f64>()).sum::<f64>()
+        };
+        let of_images = images.iter().map(|image| brightness(&image.light)).sum::<f64>() / images.len() as f64;
+        let of_references = self.halves.iter().map(|half| brightness(half)).sum::<f64>() / 2.0;
+        let ratio = of_images / of_references;
+        ensure!(
+            (0.9..1.1).contains(&ratio),
+            "images have {ratio:.2} of the references' indirect light: are they split alike?"
+        );
+        Ok(())
     }
 }
 
@@ -160,6 +177,7 @@ fn one(gpu: &Gpu, args: &Args, case: &Case, table: &mut Table, sheets: &mut Vec<
     let uniform = images(gpu, args, case, "uniform")?;
     let surface = uniform[0].guide.iter().map(|g| g.depth > 0.0).collect();
     let truth = Truth { halves: [half(view, args, 0)?, half(view, args, view.reference)?], surface };
+    truth.check(&uniform)?;
     let kinds = [("importance's", &[SIGMA_NORMAL][..]), ("searched", &[0.1, 0.2, 0.3, 0.5])];
     let search = |(kind, normals)| Ok((kind, best(gpu, &uniform[0], &truth, size, normals)?));
     let filters = kinds.into_iter().map(search).collect::<anyhow::Result<Vec<_>>>()?;
