@@ -43,10 +43,10 @@ fn explain_tells_what_effects_cost() {
         assert!(with > 0.0 && without > 0.0, "{row}");
     }
     assert_eq!(adaptive["gpu_ms_with"], Value::Null);
-    // The lamp's two triangles, 64 bytes each and 8 in the alias table; 48 bytes for each of 256 x 256 primary hits, and 28
+    // The lamp's two triangles, 64 bytes each and 8 in the alias table; 48 bytes for each of 128 x 128 primary hits, and 28
     // where samples are placed: weight, count, offset, path and priority. Where they are not, buffers have one element.
     assert_eq!(emissive["bytes"], 144);
-    let pixels = 256 * 256;
+    let pixels = 128 * 128;
     for (row, bytes) in [(guides, 48 * pixels), (adaptive, 28 * pixels)] {
         assert!(row["bytes"].as_u64().unwrap().abs_diff(bytes) < 1024, "{row}");
     }

@@ -16,8 +16,8 @@ pub struct Args {
     #[command(flatten)]
     view: View,
     /// Where the camera stands, instead of where the scene puts it
-    #[arg(long, value_delimiter = ',', num_args = 3, allow_hyphen_values = true, value_names = ["X", "Y", "Z"])]
-    position: Option<Vec<f32>>,
+    #[arg(long, allow_hyphen_values = true, value_name = "X,Y,Z", value_parser = point)]
+    position: Option<vec3>,
     /// Degrees that it is turned by at first
     #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
     from: f32,
@@ -43,11 +43,16 @@ pub struct Args {
     carry: ReprojectOverrides,
 }
 
+fn point(text: &str) -> Result<vec3, String> {
+    let numbers: Result<Vec<f32>, _> = text.split(',').map(str::parse).collect();
+    numbers.ok().and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| "expected X,Y,Z".to_owned())
+}
+
 impl Args {
     /// The camera of the first frame.
     fn start(&self, scene: &Loaded) -> Result<Camera> {
         let first = scene.camera([self.view.width, self.view.height])?;
-        let position = self.position.as_ref().map_or(first.position, |p| [p[0], p[1], p[2]]);
+        let position = self.position.unwrap_or(first.position);
         Ok(turned(&Camera { position, ..first }, self.from))
     }
 }
