@@ -1,10 +1,11 @@
 #include "shared/edge.glsl"
+#include "shared/atrous_taps.glsl"
 #include "shared/luminance.glsl"
 #include "shared/candidates.glsl"
 
-// Gives back, per pixel and thread, what the blend has lost: where its mean difference from the noisy pixels around is more than
-// their noise explains, the rest of the difference is added (twicing: Tukey 1977; soft threshold: Donoho 1995). Windows of
-// like pixels, of 7x7, 3x3 and one pixel, follow each other. A blend that fits the pixels stays as it is.
+// Gives back what the blend has lost: where its mean difference from the noisy pixels around is more than their noise explains, the
+// rest of the difference is added (twicing: Tukey 1977; soft threshold: Donoho 1995). Windows of like pixels, of 7x7, 3x3 and one
+// pixel, follow each other. A blend that fits the pixels stays as it is. A thread takes ROWS pixels of a column.
 layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
@@ -32,12 +33,32 @@ struct Window {
     float variance; // of a pixel
 };
 
-void add(inout Window sum, vec3 residual, float w, float count, float variance) {
-    sum.residual += w * residual;
+const Window NO_WINDOW = Window(vec3(0.0), 0.0, 0.0, 0.0, 0.0);
+
+// A pixel of windows, and what the blend has lost of it.
+struct Tap {
+    Pixel pixel;
+    vec3 residual;
+    float variance;
+    bool counts;
+};
+
+Tap tap_at(ivec2 at) {
+    ivec2 size = ivec2(push.size), inside = clamp(at, ivec2(0), size - 1);
+    int i = inside.y * size.x + inside.x;
+    vec4 blended = texelFetch(blend, i);
+    float variance = blended.w >= 0.0 ? blended.w : max(texelFetch(estimate, i).w, 0.0);
+    Pixel q = pixel_at(i);
+    return Tap(q, q.colour.rgb - blended.rgb, variance, at == inside && blended.w != UNFILTERED);
+}
+
+void add(inout Window sum, Tap tap, float w) {
+    float count = tap.pixel.colour.w;
+    sum.residual += w * tap.residual;
     sum.total += w;
     sum.squares += w * w;
     sum.count += w * count;
-    sum.variance += w * count * variance;
+    sum.variance += w * count * tap.variance;
 }
 
 // What of a window's mean residual, `given` of which is given back already, is more than noise. `prior` is the variance of one
@@ -51,45 +72,53 @@ vec3 significant(Window sum, vec3 given, float prior) {
     return off > noise ? residual * (1.0 - noise / off) : vec3(0.0);
 }
 
-void main() {
-    ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(at, size))) return;
-    int i = at.y * size.x + at.x;
-    Pixel p = pixel_at(i);
-    vec4 blended = texelFetch(blend, i);
+// The pixel's light with what its windows, from the widest on, give back.
+vec4 with_residual(int i, Pixel p, vec4 blended, Window windows[3]) {
     float count = p.colour.w;
-    if (count == 0.0 || blended.w == UNFILTERED) {
-        filtered[i] = vec4(blended.rgb, blended.w == UNFILTERED ? 0.0 : 1.0);
-        return;
-    }
-    Window windows[3];
-    for (int k = 0; k < 3; k++) windows[k] = Window(vec3(0.0), 0.0, 0.0, 0.0, 0.0);
-    // Tested at its end: see shared/traverse.glsl.
-    int v = -REACH;
-    do {
-        int u = -REACH;
-        do {
-            ivec2 tap = at + ivec2(u, v), inside = clamp(tap, ivec2(0), size - 1);
-            int j = inside.y * size.x + inside.x;
-            Pixel q = pixel_at(j);
-            float w = tap == inside ? edge_weight(q, edge_exponent(p, q, push.rates)) : 0.0;
-            vec4 there = texelFetch(blend, j);
-            vec3 residual = q.colour.rgb - there.rgb;
-            float variance = there.w >= 0.0 ? there.w : max(texelFetch(estimate, j).w, 0.0);
-            if (there.w == UNFILTERED) w = 0.0;
-            add(windows[0], residual, w, q.colour.w, variance);
-            if (max(abs(u), abs(v)) <= 1) add(windows[1], residual, w, q.colour.w, variance);
-            if (u == 0 && v == 0) add(windows[2], residual, w, q.colour.w, variance);
-        } while (++u <= REACH);
-    } while (++v <= REACH);
+    if (count == 0.0 || blended.w == UNFILTERED) return vec4(blended.rgb, blended.w == UNFILTERED ? 0.0 : 1.0);
     vec4 other = texelFetch(others, i);
     float level = max(abs(contrast(blended.rgb, vec3(0.0))), push.floor);
     float prior = 0.5 * other.z / max(other.w, 1e-20) * level * level * count;
+    vec3 given = significant(windows[0], vec3(0.0), prior);
     // An estimate over 7x7 pixels tells nothing of smaller windows.
-    int used = blended.w >= 0.0 ? 3 : 1;
-    vec3 given = vec3(0.0);
-    for (int k = 0; k < used; k++) given += significant(windows[k], given, prior);
+    if (blended.w >= 0.0) {
+        given += significant(windows[1], given, prior);
+        given += significant(windows[2], given, prior);
+    }
     // No light becomes negative.
     vec3 least = min(min(blended.rgb, p.colour.rgb), vec3(0.0));
-    filtered[i] = vec4(max(blended.rgb + given, least), count);
+    return vec4(max(blended.rgb + given, least), count);
+}
+
+void main() {
+    ivec2 size = ivec2(push.size);
+    int x = int(gl_GlobalInvocationID.x), first = first_row(int(gl_GlobalInvocationID.y), 1);
+    if (x >= size.x || first >= size.y) return;
+    Pixel p[ROWS];
+    Window wide[ROWS], near[ROWS];
+    [[unroll]] for (int k = 0; k < ROWS; k++) {
+        p[k] = pixel_at(min(first + k, size.y - 1) * size.x + x);
+        wide[k] = near[k] = NO_WINDOW;
+    }
+    // Tested at its end: see shared/traverse.glsl.
+    int i = -REACH;
+    do {
+        [[unroll]] for (int j = -REACH; j < ROWS + REACH; j++) {
+            Tap tap = tap_at(ivec2(x + i, first + j));
+            [[unroll]] for (int k = 0; k < ROWS; k++) { // constant bounds, or it would not be unrolled
+                if (abs(j - k) <= REACH) {
+                    float w = tap.counts ? edge_weight(tap.pixel, edge_exponent(p[k], tap.pixel, push.rates)) : 0.0;
+                    add(wide[k], tap, w);
+                    if (abs(j - k) <= 1) add(near[k], tap, abs(i) <= 1 ? w : 0.0);
+                }
+            }
+        }
+    } while (++i <= REACH);
+    [[unroll]] for (int k = 0; k < ROWS; k++) {
+        int row = min(first + k, size.y - 1), at = row * size.x + x;
+        Window own = NO_WINDOW;
+        add(own, tap_at(ivec2(x, row)), 1.0);
+        vec4 result = with_residual(at, p[k], texelFetch(blend, at), Window[](wide[k], near[k], own));
+        if (first + k < size.y) filtered[at] = result;
+    }
 }

@@ -1,12 +1,13 @@
 #include "shared/moments.glsl"
 #include "shared/tiled_index.glsl"
+#include "shared/window_blocks.glsl"
 #define SUM Moments
 #define NO_SUM NO_MOMENTS
 #include "shared/windows.glsl"
 
 // Second pass of the guided filter: solves for the linear model a . I + b of every window (He et al. 2010, equation 19) from
-// the moments of its columns. In place of b it keeps the model's value at the window's centre. A thread walks along SEGMENT
-// pixels of a row.
+// the moments of its columns. In place of b it keeps the model's value at the guide of its block's first pixel. A thread walks along
+// SEGMENT blocks of a row.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer columns; // of vec4
 layout(binding = 1) uniform samplerBuffer channels; // of vec4
@@ -18,16 +19,13 @@ layout(scalar, push_constant) uniform Push { GuidedPush push; };
 
 #define FETCH_COLUMN(at) texelFetch(columns, at)
 
-int pixel_at(int row, int x) {
-    return tiled_index(clamp(x, 0, int(push.size.x) - 1), int(push.first_row) + row, int(push.size.y));
-}
-
 vec4 point_at(int row, int x) {
-    return texelFetch(channels, pixel_at(row, x));
+    int first = clamp(x, 0, blocks_of(push.size).x - 1) * STEP;
+    return texelFetch(channels, tiled_index(first, (int(push.first_row) + row) * STEP, int(push.size.y)));
 }
 
 void merge_element(inout Moments m, vec4 point, int row, int x) {
-    int width = int(push.size.x);
+    int width = blocks_of(push.size).x;
     int at = strip_index(clamp(x, 0, width - 1), row, width, MOMENTS);
     Moments column = MOMENTS_LOAD(at, 8, FETCH_COLUMN);
     column.mean += point_at(row, x) - point;
@@ -37,7 +35,7 @@ void merge_element(inout Moments m, vec4 point, int row, int x) {
 void store(int row, int x, Moments whole, vec4 point) {
     vec4 r, g, b, off = point_at(row, x) - point - whole.mean;
     solve(whole, whole.head.x * push.eps, r, g, b);
-    int at = pixel_at(row, x);
+    int at = tiled_index(x, int(push.first_row) + row, blocks_of(push.size).y);
     vec3 here = whole.head.yzw + vec3(dot(r, off), dot(g, off), dot(b, off));
     slope_r[at] = pack64(r);
     slope_g[at] = pack64(g);
@@ -48,5 +46,5 @@ void store(int row, int x, Moments whole, vec4 point) {
 void main() {
     int row = int(gl_GlobalInvocationID.x), from = int(gl_GlobalInvocationID.y) * SEGMENT;
     if (row >= int(push.rows)) return;
-    walk(row, from, min(from + SEGMENT, int(push.size.x)));
+    walk(row, from, min(from + SEGMENT, blocks_of(push.size).x));
 }

@@ -81,7 +81,7 @@ fn guided_holds_in_single_precision() {
             let device = run(&gpu, row, &input, &settings).unwrap().0;
             let host = (row.reference)(&input, &settings);
             let off = apart(&device, &host, 1e-3);
-            assert!(off < 1e-4, "{name}, {size:?}, radius {radius}, {channels} channels: {off}");
+            assert!(off < 2e-4, "{name}, {size:?}, radius {radius}, {channels} channels: {off}");
         }
     }
     // Two equal channels and a constant one, with an eps of 0: a matrix of rank 1.
@@ -98,7 +98,7 @@ fn guided_holds_in_single_precision() {
         assert!(off < 1e-4, "rank 1, radius {radius}: {off}");
     }
     let device = run(&gpu, row, &input, &settings).unwrap().0;
-    let other = settings.with(|s| s.footprint.radius = 8);
+    let other = settings.with(|s| s.footprint.radius = 11);
     assert!(apart(&device, &(row.reference)(&input, &other), 1e-3) > 1e-3, "control: another radius");
     // A channel that varies less than rounding counts as constant.
     input.guide.iter_mut().zip(0..).for_each(|(g, i)| g.normal[2] = 1e-11 * (i % 70) as f32);

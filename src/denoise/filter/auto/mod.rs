@@ -292,7 +292,7 @@ impl Auto {
         let rates = Rates::of_surfaces(&self.settings.edge).as_array();
         let (size, floor) = (planes.size, floor(&self.settings));
         let push = AutoResidualPush { size, floor, rates, ..Default::default() };
-        rec.dispatch(&self.residual, bind, &push, self.residual.groups(planes.size))
+        rec.dispatch(&self.residual, bind, &push, self.residual.groups(threads(planes.size, 1)))
     }
 }
 

@@ -65,6 +65,12 @@ settings! {
     }
 }
 
+/// Pixels from one window's centre to the next, and along the edges of the blocks that windows consist of: see
+/// `glsl/shared/window_blocks.glsl`. Blocks of 4 x 4 pixels took longer.
+fn step(radius: u32) -> u32 {
+    if radius < 8 { 1 } else { 2 }
+}
+
 /// One number for all channels, or four.
 #[cfg(feature = "cli")]
 fn per_channel(text: &str) -> std::result::Result<vec4, String> {
@@ -89,7 +95,7 @@ struct Guided {
     down: Walk,
     along: Walk,
     strip_rows: u32,
-    radius: u32,
+    step: u32,
     eps: vec4,
 }
 
@@ -136,18 +142,22 @@ impl Walk {
 }
 
 impl Guided {
-    fn new(gpu: &Gpu, pack: Packed, radius: u32, eps: vec4, [width, height]: [u32; 2]) -> Result<Self> {
-        let [down, along] = [height, width].map(|edge| Walk::new(gpu, radius, edge));
+    fn new(gpu: &Gpu, pack: Packed, radius: u32, eps: vec4, size: [u32; 2]) -> Result<Self> {
+        let step = step(radius);
+        let [width, height] = size.map(|edge| edge.div_ceil(step));
+        let [down, along] = [height, width].map(|edge| Walk::new(gpu, radius / step, edge));
         let strip_rows =
             strip_rows(gpu.tuning().strip_bytes, gpu.info().max_storage_range, down.window, [width, height]);
-        let plane = |name| Buffer::new(gpu, name, pack.colour.len(), Location::Device);
+        let models = width.next_multiple_of(BESIDE) as usize * height as usize;
+        let plane = |name| Buffer::new(gpu, name, models, Location::Device);
         let records = u64::from(strip_rows.next_multiple_of(BESIDE)) * u64::from(width) * RECORD;
+        let window_blocks = shared::window_blocks::Constants { step: step as i32 };
         let (local_size_x, windows) = (down.lines, down.constants());
-        let columns = Kernel::new(gpu, &guided_columns::Constants { windows, local_size_x })?;
-        let mean_columns = Kernel::new(gpu, &guided_mean_columns::Constants { windows, local_size_x })?;
+        let columns = Kernel::new(gpu, &guided_columns::Constants { windows, window_blocks, local_size_x })?;
+        let mean_columns = Kernel::new(gpu, &guided_mean_columns::Constants { windows, window_blocks, local_size_x })?;
         let (local_size_x, windows) = (along.lines, along.constants());
-        let rows = Kernel::new(gpu, &guided_rows::Constants { windows, local_size_x })?;
-        let mean_rows = Kernel::new(gpu, &guided_mean_rows::Constants { windows, local_size_x })?;
+        let rows = Kernel::new(gpu, &guided_rows::Constants { windows, window_blocks, local_size_x })?;
+        let mean_rows = Kernel::new(gpu, &guided_mean_rows::Constants { windows, window_blocks, local_size_x })?;
         Ok(Self {
             columns,
             rows,
@@ -158,7 +168,7 @@ impl Guided {
             down,
             along,
             strip_rows,
-            radius,
+            step,
             eps,
             pack,
         })
@@ -166,10 +176,10 @@ impl Guided {
 
     /// Columns, then rows of every strip: (push, workgroups of the two).
     fn strips(&self, size: [u32; 2]) -> impl Iterator<Item = (GuidedPush, [[u32; 3]; 2])> {
-        let ([width, height], radius, eps, strip) = (size, self.radius, self.eps, self.strip_rows);
+        let ([width, height], eps, strip) = (size.map(|edge| edge.div_ceil(self.step)), self.eps, self.strip_rows);
         (0..height).step_by(strip as usize).map(move |first_row| {
             let rows = strip.min(height - first_row);
-            let push = GuidedPush { size, first_row, rows, radius, eps, ..Default::default() };
+            let push = GuidedPush { size, first_row, rows, eps, ..Default::default() };
             (push, [self.down.groups(width, rows), self.along.groups(rows, width)])
         })
     }

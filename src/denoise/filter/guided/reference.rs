@@ -1,5 +1,5 @@
 //! The guided filter on the host, window by window: the twin of both of its forms on a device.
-use super::GuidedSettings;
+use super::{GuidedSettings, GuidedSums, step};
 use crate::denoise::filter::FilterInput;
 use crate::denoise::filter::pixel::{known_channel, known_radiance};
 use crate::layout::{Guide, vec4};
@@ -28,11 +28,20 @@ pub fn reference(input: &FilterInput, own: &GuidedSettings, radius: u32, extent:
         guide: channels(g, own.channels, extent),
     };
     let pixels: Vec<Pixel> = input.radiance.iter().zip(&input.guide).map(pixel).collect();
-    let size = [input.width, input.height];
-    let models: Vec<Option<Model>> =
-        (0..pixels.len()).into_par_iter().map(|at| model(&pixels, window(size, at, radius), &own.eps)).collect();
+    let (size, step) = ([input.width, input.height], if own.sums == GuidedSums::Table { 1 } else { step(radius) });
+    let (blocks, radius) = (size.map(|edge| edge.div_ceil(step)), radius / step);
+    let pixels_of = |block: usize| {
+        let corner = [block as u32 % blocks[0] * step, block as u32 / blocks[0] * step];
+        let [across, down] = [0, 1].map(|k| corner[k]..(corner[k] + step).min(size[k]));
+        down.flat_map(move |v| across.clone().map(move |u| (v * size[0] + u) as usize))
+    };
+    let models: Vec<Option<Model>> = (0..(blocks[0] * blocks[1]) as usize)
+        .into_par_iter()
+        .map(|at| model(&pixels, window(blocks, at, radius).flat_map(pixels_of), &own.eps))
+        .collect();
     let mean = |at: usize| {
-        let values = window(size, at, radius).filter_map(|k| models[k]).map(|m| {
+        let block = at as u32 / size[0] / step * blocks[0] + at as u32 % size[0] / step;
+        let values = window(blocks, block as usize, radius).filter_map(|k| models[k]).map(|m| {
             let off = pixels[at].guide - m.mean_guide;
             m.mean + DVec3::from(m.slopes.map(|slope| slope.dot(off)))
         });
@@ -59,7 +68,7 @@ fn channels(g: &Guide, channels: u32, extent: f32) -> DVec4 {
     .as_dvec4()
 }
 
-/// Indices of the pixels of a window, clipped to the image.
+/// Indices of the blocks of a window, clipped to the image.
 fn window([width, height]: [u32; 2], at: usize, radius: u32) -> impl Iterator<Item = usize> {
     let (x, y) = (at as u32 % width, at as u32 / width);
     let around = move |v: u32, edge: u32| -> Range<u32> { v.saturating_sub(radius)..(v + radius + 1).min(edge) };
