@@ -81,7 +81,9 @@ fn guided_holds_in_single_precision() {
             let device = run(&gpu, row, &input, &settings).unwrap().0;
             let host = (row.reference)(&input, &settings);
             let off = apart(&device, &host, 1e-3);
-            assert!(off < 2e-4, "{name}, {size:?}, radius {radius}, {channels} channels: {off}");
+            // A model is stated at its block's first pixel, and depths of six magnitudes lose digits on the way to the others.
+            let most = if name == "guide of high dynamic range" { 2e-4 } else { 1e-4 };
+            assert!(off < most, "{name}, {size:?}, radius {radius}, {channels} channels: {off}");
         }
     }
     // Two equal channels and a constant one, with an eps of 0: a matrix of rank 1.
