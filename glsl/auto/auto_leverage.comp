@@ -4,16 +4,16 @@
 #include "shared/perturbation.glsl"
 
 // Estimates, per pixel and thread, the leverage of a pixel in each candidate: the derivative of its filtered value by its own
-// value, the diagonal of the matrix of a linear filter (Ramani, Blu, Unser 2008). The estimate also holds what the noise
-// brings from neighbours, which is 0 on average.
+// value, the diagonal of the matrix of a linear filter. svgf's is estimated by a probe (Ramani, Blu, Unser 2008), and also holds what
+// the probe brings from neighbours, which is 0 on average.
 //
 // Samples that are stratified over lamps have far less noise than their variance tells. Neighbours tell it as well: by their second
 // differences (Gasser, Sroka, Jennen-Steinmetz 1986), which light that changes linearly does not enter.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer wide; // of vec4, of the image
 layout(binding = 1) uniform samplerBuffer svgf; // of vec4, of the image
-layout(binding = 2) uniform samplerBuffer narrow_kept; // of vec4, of the signs
-layout(binding = 3) uniform samplerBuffer svgf_kept; // of vec4, of the probed image
+layout(binding = 2) uniform samplerBuffer narrow; // of float, leverages
+layout(binding = 3) uniform samplerBuffer probed; // of vec4, what svgf makes of the probed image
 layout(binding = 4) uniform samplerBuffer colour; // of vec4
 layout(binding = 5) uniform usamplerBuffer place; // of uvec4
 layout(binding = 6) uniform samplerBuffer estimate; // of vec4
@@ -43,11 +43,10 @@ void main() {
     uint i = thread_index();
     if (i >= push.count) return;
     int at = int(i);
-    float narrow = dot(texelFetch(narrow_kept, at).rgb, signs_of(i)) / 3.0;
     float added = perturbation(i, texelFetch(wide, at).rgb, push.floor);
-    float grown = contrast(texelFetch(svgf_kept, at).rgb, texelFetch(svgf, at).rgb);
+    float grown = contrast(texelFetch(probed, at).rgb, texelFetch(svgf, at).rgb);
     ivec2 pixel = ivec2(i % push.size.x, i / push.size.x);
     float light = min(abs(contrast(texelFetch(wide, at).rgb, vec3(0.0))) / push.floor, LIMIT);
     vec2 differ = (differences(pixel, ivec2(1, 0)) + differences(pixel, ivec2(0, 1))) / (light * light + 1.0);
-    leverages[i] = vec4(differ, clamp(vec2(narrow, grown / added), -1.0, 1.0));
+    leverages[i] = vec4(differ, clamp(vec2(texelFetch(narrow, at).x, grown / added), -1.0, 1.0));
 }

@@ -7,7 +7,7 @@
 
 // Second pass of the guided filter: solves for the linear model a . I + b of every window (He et al. 2010, equation 19) from
 // the moments of its columns. In place of b it keeps the model's value at the guide of its block's first pixel. A thread walks along
-// SEGMENT blocks of a row.
+// SEGMENT blocks of a row. With LEVERAGES it writes the leverage of every pixel in the window around its own block too.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer columns; // of vec4
 layout(binding = 1) uniform samplerBuffer channels; // of vec4
@@ -15,6 +15,8 @@ layout(scalar, binding = 2) writeonly buffer SlopeR { u64vec2 slope_r[]; }; // o
 layout(scalar, binding = 3) writeonly buffer SlopeG { u64vec2 slope_g[]; }; // of vec4
 layout(scalar, binding = 4) writeonly buffer SlopeB { u64vec2 slope_b[]; }; // of vec4
 layout(scalar, binding = 5) writeonly buffer Values { u64vec2 value[]; }; // of vec4
+layout(scalar, binding = 6) writeonly buffer Leverages { float leverages[]; };
+layout(constant_id = 114) const bool LEVERAGES = false;
 layout(scalar, push_constant) uniform Push { GuidedPush push; };
 
 #define FETCH_COLUMN(at) texelFetch(columns, at)
@@ -32,9 +34,26 @@ void merge_element(inout Moments m, vec4 point, int row, int x) {
     merge(m, column, x >= 0 && x < width);
 }
 
+// The derivative of a pixel's fitted value by its own value, averaged over the windows that hold it: that of the window around it
+// or, as most windows do not have it in their middle, what their pixels have on average, if that is more.
+void store_leverages(int row, int x, Moments whole, Factors f, vec4 point) {
+    ivec2 size = ivec2(push.size), first = ivec2(x, int(push.first_row) + row) * STEP;
+    float mean = fitted_channels(f, whole) / max(whole.head.x, 1.0);
+    [[unroll]] for (int j = 0; j < STEP; j++) {
+        [[unroll]] for (int i = 0; i < STEP; i++) {
+            ivec2 at = first + ivec2(i, j);
+            if (any(greaterThanEqual(at, size))) continue;
+            vec4 off = texelFetch(channels, tiled_index(at.x, at.y, size.y)) - point - whole.mean;
+            leverages[at.y * size.x + at.x] = 1.0 / max(whole.head.x, 1.0) + max(dot(off, solved(f, off)), mean);
+        }
+    }
+}
+
 void store(int row, int x, Moments whole, vec4 point) {
-    vec4 r, g, b, off = point_at(row, x) - point - whole.mean;
-    solve(whole, whole.head.x * push.eps, r, g, b);
+    vec4 off = point_at(row, x) - point - whole.mean;
+    Factors f = factorised(whole, whole.head.x * push.eps);
+    vec4 r = solved(f, whole.r), g = solved(f, whole.g), b = solved(f, whole.b);
+    if (LEVERAGES) store_leverages(row, x, whole, f, point);
     int at = tiled_index(x, int(push.first_row) + row, blocks_of(push.size).y);
     vec3 here = whole.head.yzw + vec3(dot(r, off), dot(g, off), dot(b, off));
     slope_r[at] = pack64(r);

@@ -36,8 +36,8 @@ void main() {
     m.r -= n.r * m.mean;
     m.g -= n.g * m.mean;
     m.b -= n.b * m.mean;
-    vec4 r, g, b;
-    solve(m, count * push.eps, r, g, b);
+    Factors f = factorised(m, count * push.eps);
+    vec4 r = solved(f, m.r), g = solved(f, m.g), b = solved(f, m.b);
     int to = tiled_index(at.x, at.y, size.y);
     slope_r[to] = pack64(r);
     slope_g[to] = pack64(g);

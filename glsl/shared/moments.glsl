@@ -71,11 +71,18 @@ float reciprocal_pivot(float pivot, float diagonal, float count) {
     return pivot > 1e-5 * diagonal && pivot > 1e-20 * count ? 1.0 / pivot : 0.0;
 }
 
-// Solves (I-I co-moments + ridge) a = co-moments of N with I, for the three channels, by L D L^T.
-void solve(Moments m, vec4 ridge, out vec4 r, out vec4 g, out vec4 b) {
+// I-I co-moments with a ridge as L D L^T: columns of L below the diagonal, and the reciprocals of D.
+struct Factors {
+    vec3 l0;
+    vec2 l1;
+    float l2;
+    vec4 d;
+};
+
+Factors factorised(Moments m, vec4 ridge) {
     vec4 diagonal = vec4(m.xx.x, m.yy.x, m.zz.x, m.zz.z) + ridge, d;
     d.x = reciprocal_pivot(diagonal.x, diagonal.x, m.head.x);
-    vec3 l0 = m.xx.yzw * d.x; // column 0 of L, below the diagonal
+    vec3 l0 = m.xx.yzw * d.x;
     d.y = reciprocal_pivot(diagonal.y - l0.x * m.xx.y, diagonal.y, m.head.x);
     vec2 u1 = m.yy.yz - l0.x * m.xx.zw;
     vec2 l1 = u1 * d.y;
@@ -83,19 +90,24 @@ void solve(Moments m, vec4 ridge, out vec4 r, out vec4 g, out vec4 b) {
     float u2 = m.zz.y - l0.y * m.xx.w - l1.x * u1.y;
     float l2 = u2 * d.z;
     d.w = reciprocal_pivot(diagonal.w - l0.z * m.xx.w - l1.y * u1.y - l2 * u2, diagonal.w, m.head.x);
-    mat3x4 rhs = mat3x4(m.r, m.g, m.b);
-    for (int c = 0; c < 3; c++) {
-        vec4 v = rhs[c];
-        v.y -= l0.x * v.x;
-        v.z -= l0.y * v.x + l1.x * v.y;
-        v.w -= l0.z * v.x + l1.y * v.y + l2 * v.z;
-        v *= d;
-        v.z -= l2 * v.w;
-        v.y -= l1.x * v.z + l1.y * v.w;
-        v.x -= l0.x * v.y + l0.y * v.z + l0.z * v.w;
-        rhs[c] = v;
-    }
-    r = rhs[0];
-    g = rhs[1];
-    b = rhs[2];
+    return Factors(l0, l1, l2, d);
+}
+
+// Solves (I-I co-moments + ridge) a = v; with co-moments of N with I, a is the slope of a linear model.
+vec4 solved(Factors f, vec4 v) {
+    v.y -= f.l0.x * v.x;
+    v.z -= f.l0.y * v.x + f.l1.x * v.y;
+    v.w -= f.l0.z * v.x + f.l1.y * v.y + f.l2 * v.z;
+    v *= f.d;
+    v.z -= f.l2 * v.w;
+    v.y -= f.l1.x * v.z + f.l1.y * v.w;
+    v.x -= f.l0.x * v.y + f.l0.y * v.z + f.l0.z * v.w;
+    return v;
+}
+
+// Channels of the guide that a model has a slope along, each counting for the less, the larger its ridge is: the trace of
+// (I-I co-moments + ridge)^-1 (I-I co-moments).
+float fitted_channels(Factors f, Moments m) {
+    return solved(f, m.xx).x + solved(f, vec4(m.xx.y, m.yy)).y + solved(f, vec4(m.xx.z, m.yy.y, m.zz.xy)).z +
+           solved(f, vec4(m.xx.w, m.yy.z, m.zz.yz)).w;
 }

@@ -129,8 +129,8 @@ gpu_structs! {
 
     /// Push constants of `auto_inputs.comp`.
     struct AutoPush {
-        /// Pixels of the image.
-        count: uint,
+        /// Image in pixels.
+        size: uvec2,
         /// Luminance below which errors count as absolute.
         floor: float,
     }
@@ -145,11 +145,25 @@ gpu_structs! {
         rates: vec3,
     }
 
+    /// Push constants of `auto_cells.comp`.
+    struct AutoCellsPush {
+        /// Image in pixels.
+        size: uvec2,
+    }
+
+    /// Push constants of `auto_spread.comp`.
+    struct AutoSpreadPush {
+        /// Image in pixels.
+        size: uvec2,
+        /// As in [`AtrousPush`]; that of radiance is 0.
+        rates: vec3,
+    }
+
     /// Push constants of `auto_smooth.comp`.
     struct AutoSmoothPush {
         /// Image in pixels.
         size: uvec2,
-        /// Pixels from one tap to the next.
+        /// Cells from one tap to the next, or pixels at the first level.
         spacing: uint,
         /// As in [`AtrousPush`]; that of radiance is 0.
         rates: vec3,

@@ -1,10 +1,10 @@
 //! À-Trous wavelets steered by each pixel's variance: the spatial half of SVGF (Schied et al., HPG 2017). Kernel:
 //! `glsl/filter/svgf.comp`.
 use super::atrous_taps::threads;
-use super::edge::{EdgeSettings, Rates, edge_weight};
+use super::edge::{Rates, edge_weight};
 use super::noise_estimate::{self, Estimate, contrast};
 use super::pack::{Pack, Packed};
-use super::{Filter, FilterInput, Planes, Row};
+use super::{Filter, FilterInput, FilterSettings, Planes, Row};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{SvgfPush, vec4};
@@ -18,8 +18,8 @@ pub const ROW: Row = Row {
     name: "svgf",
     about: "À-Trous wavelets whose radiance weight counts in each pixel's standard deviations",
     bytes: super::pack::BYTES + 32, // estimate and scratch
-    make: |gpu, s, size| Ok(Box::new(Svgf::new(gpu, &s.edge, &s.svgf, s.footprint.levels, size)?)),
-    reference: |input, s| reference(input, &s.edge, &s.svgf, s.footprint.levels),
+    make: |gpu, s, size| Ok(Box::new(Svgf::new(gpu, s, size)?)),
+    reference,
 };
 
 /// Stands for 0, so that equal pixels are alike where nothing varies.
@@ -37,9 +37,15 @@ settings! {
     }
 }
 
+/// Alone, it packs what it reads and estimates its noise.
 struct Svgf {
     pack: Pack,
     estimate: Estimate,
+    levels: Levels,
+}
+
+/// The levels of the filter, on what is packed and estimated already.
+pub struct Levels {
     /// All levels but the last, and the last.
     kernels: [Kernel<Bind<'static>>; 2],
     scratch: Buffer<vec4>,
@@ -55,19 +61,60 @@ impl SvgfSettings {
     }
 }
 
-impl Svgf {
-    fn new(gpu: &Gpu, edge: &EdgeSettings, own: &SvgfSettings, levels: u32, size: [u32; 2]) -> Result<Self> {
-        let rates = Rates::of_surfaces(edge);
+impl Levels {
+    /// For images of (width, height).
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when it does not fit.
+    pub fn new(gpu: &Gpu, s: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
+        let rates = Rates::of_surfaces(&s.edge);
         let kernel = |last| Kernel::new(gpu, &Constants { edge: rates.constants(), last });
-        let pack = Pack::new(gpu, size)?;
         Ok(Self {
-            estimate: Estimate::new(gpu, edge, false, size)?,
             kernels: [kernel(false)?, kernel(true)?],
-            scratch: Buffer::new(gpu, "svgf", pack.colour.len(), Location::Device)?,
+            scratch: Buffer::new(gpu, "svgf", width as usize * height as usize, Location::Device)?,
             rates,
-            rate_l: own.rate_l(),
-            levels,
-            pack,
+            rate_l: s.svgf.rate_l(),
+            levels: s.footprint.levels,
+        })
+    }
+
+    /// estimate\[P\], which is lost, as [`Estimate`] has it, and what is packed -> output\[P\]
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when the image is too large for the device.
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        size: [u32; 2],
+        pack: &Pack,
+        estimate: &Buffer<vec4>,
+        output: &Buffer<vec4>,
+    ) -> Result<()> {
+        let mut from = estimate;
+        for level in 0..self.levels {
+            let last = level + 1 == self.levels;
+            let to = match last {
+                true => output,
+                false if level % 2 == 0 => &self.scratch,
+                false => estimate,
+            };
+            let (spacing, rates) = (1 << level, self.rates.as_array());
+            let push = SvgfPush { size, spacing, rate_l: self.rate_l, rates, ..Default::default() };
+            let bind = Bind { estimate: from, place: &pack.place, colour: &pack.colour, filtered: to };
+            let kernel = &self.kernels[usize::from(last)];
+            rec.dispatch(kernel, bind, &push, kernel.groups(threads(size, spacing)))?;
+            from = to;
+        }
+        Ok(())
+    }
+}
+
+impl Svgf {
+    fn new(gpu: &Gpu, s: &FilterSettings, size: [u32; 2]) -> Result<Self> {
+        Ok(Self {
+            pack: Pack::new(gpu, size)?,
+            estimate: Estimate::new(gpu, &s.edge, false, size)?,
+            levels: Levels::new(gpu, s, size)?,
         })
     }
 }
@@ -76,27 +123,12 @@ impl Filter for Svgf {
     fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
         self.pack.record(rec, planes)?;
         self.estimate.record(rec, planes, &self.pack)?;
-        let mut from = &self.estimate.plane;
-        for level in 0..self.levels {
-            let last = level + 1 == self.levels;
-            let to = match last {
-                true => &planes.output,
-                false if level % 2 == 0 => &self.scratch,
-                false => &self.estimate.plane,
-            };
-            let (spacing, rates) = (1 << level, self.rates.as_array());
-            let push = SvgfPush { size: planes.size, spacing, rate_l: self.rate_l, rates, ..Default::default() };
-            let bind = Bind { estimate: from, place: &self.pack.place, colour: &self.pack.colour, filtered: to };
-            let kernel = &self.kernels[usize::from(last)];
-            rec.dispatch(kernel, bind, &push, kernel.groups(threads(planes.size, spacing)))?;
-            from = to;
-        }
-        Ok(())
+        self.levels.record(rec, planes.size, &self.pack, &self.estimate.plane, &planes.output)
     }
 }
 
 /// A pixel with the variance of its luminance, -1 where it is unknown.
-type Noisy = (Packed, f32);
+pub type Noisy = (Packed, f32);
 
 /// One level over an image.
 struct Level<'a> {
@@ -107,13 +139,16 @@ struct Level<'a> {
     rate_l: f32,
 }
 
-fn reference(input: &FilterInput, edge: &EdgeSettings, own: &SvgfSettings, levels: u32) -> Vec<vec4> {
-    let packed = Packed::reference(input);
-    let noise = noise_estimate::reference(input, &packed, edge, false);
-    let mut image: Vec<Noisy> = packed.into_iter().zip(noise).collect();
-    let (rates, rate_l) = (Rates::of_surfaces(edge), own.rate_l());
-    for level in 0..levels {
-        let size = [i64::from(input.width), i64::from(input.height)];
+fn reference(input: &FilterInput, s: &FilterSettings) -> Vec<vec4> {
+    let image = Packed::reference(input);
+    let noise = noise_estimate::reference(input, &image, &s.edge, false);
+    levels([input.width, input.height], image.into_iter().zip(noise).collect(), s)
+}
+
+/// The levels on an image whose noise is known.
+pub fn levels(size: [u32; 2], mut image: Vec<Noisy>, s: &FilterSettings) -> Vec<vec4> {
+    let (size, rates, rate_l) = (size.map(i64::from), Rates::of_surfaces(&s.edge), s.svgf.rate_l());
+    for level in 0..s.footprint.levels {
         let filter = Level { image: &image, size, spacing: 1 << level, rates, rate_l };
         image = (0..image.len()).map(|at| filter.filtered(at)).collect();
     }

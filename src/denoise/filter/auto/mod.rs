@@ -2,88 +2,75 @@
 //! `glsl/auto*.comp`.
 mod reference;
 mod residual;
+mod smoothing;
 
 pub use reference::estimated;
+use smoothing::Smoothing;
 
 use super::atrous_taps::threads;
 use super::edge::{EdgeSettings, Rates};
+use super::guided::{self, GuidedSums, Packed, Windows};
 use super::noise_estimate::Estimate;
 use super::pack::Pack;
-use super::{Filter, FilterSettings, Planes, Row, guided, svgf};
+use super::svgf::Levels;
+use super::{Filter, FilterSettings, Planes, Row};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::layout::{
-    AutoBlendPush, AutoErrorPush, AutoLeveragePush, AutoPush, AutoResidualPush, AutoSmoothPush, vec2, vec3, vec4,
-};
-use crate::shaders::{auto, auto_error, auto_inputs, auto_leverage, auto_residual, auto_smooth};
+use crate::layout::{AutoBlendPush, AutoErrorPush, AutoLeveragePush, AutoPush, AutoResidualPush, vec2, vec3, vec4};
+use crate::shaders::{auto, auto_error, auto_inputs, auto_leverage, auto_residual};
 
 /// See [`super::FILTERS`].
 pub const ROW: Row = Row {
     name: "auto",
     about: "per pixel the best blend of none, guided by wide, middle and narrow windows, and svgf, by estimated error",
-    // The pack's, those of four candidates twice, of the estimate, three inputs, the dim one, leverages and their surroundings,
-    // expected errors.
-    bytes: super::pack::BYTES + (4 * 2 + 1 + 3 + 1 + 2) * 16 + 12 + 3 * guided::ROW.bytes + svgf::ROW.bytes,
+    // The packs', three windows', what four candidates make, two estimates, svgf's scratch, errors and smoothed ones, three of what is
+    // dim or probed, leverages and their surroundings; leverages of narrow windows, surfaces of cells, expected errors.
+    bytes: super::pack::BYTES + 32 + 3 * (guided::ROW.bytes - 32) + (4 + 2 + 1 + 3 + 3 + 3 + 2) * 16 + 4 + 4 + 12,
     make: |gpu, settings, size| Ok(Box::new(Auto::new(gpu, settings, size)?)),
     reference: reference::reference,
 };
-
-/// Levels of smoothing of what is estimated, a footprint of 61 pixels. Even: see `Auto::record_smoothing`.
-const SMOOTHING: u32 = 4;
-/// How much the errors of one surface count for another, to the power of the level: neighbours fully, far pixels hardly. Where
-/// surfaces are small, as in grass, others are all there is to learn from, and few pixels seem to prove filters that keep much.
-const ACROSS: f32 = 0.4;
 
 /// The filters beside none, found by searching thirteen noisy images of six scenes for what leaves `auto` nearest to the best
 /// filter of each. At their defaults: windows of 65 pixels and normals alone, in which a few bright samples are spread; windows
 /// of 33 and of 9 pixels, both held more tightly than alone, depth above all; and 3 levels of `svgf`, which light and positions
 /// hold more tightly and normals hardly.
-fn candidates(s: &FilterSettings) -> [(Row, FilterSettings); 4] {
-    let windows = |radius: u32, depth: f32| {
-        let [x, y, z, w] = s.guided.eps;
+fn candidates(s: &FilterSettings) -> [FilterSettings; 4] {
+    let windows = |radius: u32, eps: vec4| {
         s.with(|s| {
             s.footprint.radius = radius;
-            s.guided.eps = [0.1 * x, 0.1 * y, 0.1 * z, depth * w];
+            s.guided.eps = eps;
+            s.guided.sums = GuidedSums::Blocks;
         })
     };
+    let [x, y, z, w] = s.guided.eps;
+    let tight = |depth: f32| [0.1 * x, 0.1 * y, 0.1 * z, depth * w];
     let (sigma_l, sigma_n, sigma_x) = (0.75 * s.svgf.sigma_l, 4.0 * s.edge.sigma_n, 0.6 * s.edge.sigma_x);
     [
-        (
-            guided::ROW,
-            s.with(|s| {
-                s.footprint.radius = (4 * s.footprint.radius).div_ceil(3);
-                s.guided.channels = s.guided.channels.min(3);
-            }),
-        ),
-        (guided::ROW, windows((2 * s.footprint.radius).div_ceil(3), 5e-3)),
+        windows((4 * s.footprint.radius).div_ceil(3), [x, y, z, UNUSED]),
+        windows((2 * s.footprint.radius).div_ceil(3), tight(5e-3)),
         // Fewer than 5 x 5 pixels do not determine a model of four channels: little of a pixel is left to judge it by.
-        (guided::ROW, windows(s.footprint.radius.div_ceil(6).max(2), 5e-5)),
-        (
-            svgf::ROW,
-            s.with(|s| {
-                s.footprint.levels = s.footprint.levels.min(3);
-                s.svgf.sigma_l = sigma_l;
-                s.edge.sigma_n = sigma_n;
-                s.edge.sigma_x = sigma_x;
-            }),
-        ),
+        windows(s.footprint.radius.div_ceil(6).max(2), tight(5e-5)),
+        s.with(|s| {
+            s.footprint.levels = s.footprint.levels.min(3);
+            s.svgf.sigma_l = sigma_l;
+            s.edge.sigma_n = sigma_n;
+            s.edge.sigma_x = sigma_x;
+        }),
     ]
 }
 
 /// Pixels of the narrow window over those of the wide and of the middle one.
 fn shares(s: &FilterSettings) -> vec2 {
-    let [wide, middle, narrow, _] = candidates(s).map(|(_, s)| (2 * s.footprint.radius + 1) as f32);
+    let [wide, middle, narrow, _] = candidates(s).map(|s| (2 * s.footprint.radius + 1) as f32);
     [wide, middle].map(|edge| (narrow / edge).powi(2))
 }
+
+/// Eps of a channel that no model shall have a slope along: the same guide serves all windows.
+const UNUSED: f32 = 1e30;
 
 /// What counts as one surface to the estimates of errors.
 fn alike(s: &EdgeSettings) -> EdgeSettings {
     EdgeSettings { sigma_n: 2.5 * s.sigma_n, sigma_x: 1.2 * s.sigma_x, ..*s }
-}
-
-/// Weight of what is not alike.
-fn least(level: u32, across: bool) -> f32 {
-    if across { ACROSS.powi(level as i32) } else { 0.0 }
 }
 
 /// Luminance below which errors count as absolute: a tenth of what is usual, not a share of the brightest. Beside lamps that are
@@ -92,46 +79,35 @@ fn floor(settings: &FilterSettings) -> f32 {
     (0.1 * settings.edge.usual).clamp(1e-30, 1e24)
 }
 
-/// A filter, and what it makes of its image and of a probe.
-struct Candidate {
-    filter: Box<dyn Filter>,
-    result: Buffer<vec4>,
-    kept: Buffer<vec4>,
-}
-
-impl Candidate {
-    fn record(
-        &self,
-        rec: &mut Recorder,
-        planes: &Planes,
-        radiance: &Buffer<vec4>,
-        output: &Buffer<vec4>,
-    ) -> Result<()> {
-        let (radiance, guide, variance) = (radiance.clone(), planes.guide.clone(), planes.variance.clone());
-        let (size, output) = (planes.size, output.clone());
-        self.filter.record(rec, &Planes { size, radiance, guide, light: None, variance, output })
-    }
-}
-
 struct Auto {
     pack: Pack,
     estimate: Estimate,
     inputs: Kernel<auto_inputs::Bind<'static>>,
     leverage: Kernel<auto_leverage::Bind<'static>>,
     error: Kernel<auto_error::Bind<'static>>,
-    /// Of leverages, and of errors.
-    smooth: [Kernel<auto_smooth::Bind<'static>>; 2],
+    smoothing: Smoothing,
     /// Without and with a variance to read.
     blend: [Kernel<auto::Bind<'static>>; 2],
     nothing: Buffer<vec3>,
     residual: Kernel<auto_residual::Bind<'static>>,
-    /// Wide, middle and narrow windows, svgf.
-    candidates: [Candidate; 4],
-    /// What candidates are run on besides the image: see `glsl/auto/auto_inputs.comp`. Then squares and products of what is missed:
-    /// see `glsl/auto/auto_error.comp`.
-    planes: [Buffer<vec4>; 3],
-    /// What the wide window makes of what the narrow one gets.
+    /// What all windows read of the image.
+    windows_pack: Packed,
+    /// Wide, middle and narrow.
+    windows: [Windows; 3],
+    svgf: Levels,
+    svgf_estimate: Estimate,
+    /// What those four make of the image; narrow windows get the dim one.
+    results: [Buffer<vec4>; 4],
+    /// The image as the narrow windows get it, ordered as in `windows_pack`.
+    dim: Buffer<vec4>,
+    /// What the wide windows make of that.
     wide_dim: Buffer<vec4>,
+    /// What svgf makes of the probe.
+    svgf_probed: Buffer<vec4>,
+    /// Squares and products of what is missed: see `glsl/auto/auto_error.comp`. The first holds the probe before, the blend after.
+    planes: [Buffer<vec4>; 3],
+    /// The same, smoothed.
+    smoothed: [Buffer<vec4>; 3],
     /// What neighbours tell of noise, and leverages: see `glsl/auto/auto_leverage.comp`.
     leverages: Buffer<vec4>,
     /// The same, smoothed.
@@ -146,15 +122,8 @@ impl Auto {
         let pack = Pack::new(gpu, size)?;
         let pixels = pack.colour.len();
         let plane = |name| Buffer::new(gpu, name, pixels, Location::Device);
-        let candidate = |(row, settings): (Row, FilterSettings)| {
-            let filter = (row.make)(gpu, &settings, size)?;
-            Ok(Candidate { filter, result: plane("candidate")?, kept: plane("probed candidate")? })
-        };
-        let [wide, middle, narrow, svgf] = candidates(settings).map(candidate);
-        let smooth = |three| {
-            let edge = Rates::of_surfaces(&alike(&settings.edge)).constants();
-            Kernel::new(gpu, &auto_smooth::Constants { edge, three })
-        };
+        let [wide, middle, narrow, of_svgf] = candidates(settings);
+        let windows_pack = Packed::new(gpu, settings, size)?;
         let surfaces = Rates::of_surfaces(&settings.edge).constants();
         let blend = |measured| Kernel::new(gpu, &auto::Constants { measured, ..Default::default() });
         Ok(Self {
@@ -162,17 +131,24 @@ impl Auto {
             inputs: Kernel::new(gpu, &Default::default())?,
             leverage: Kernel::new(gpu, &auto_leverage::Constants { edge: surfaces, ..Default::default() })?,
             error: Kernel::new(gpu, &Default::default())?,
-            smooth: [smooth(false)?, smooth(true)?],
+            smoothing: Smoothing::new(gpu, &settings.edge, size)?,
             blend: [blend(false)?, blend(true)?],
             nothing: Buffer::from_slice(gpu, "no variance", &[])?,
             residual: Kernel::new(gpu, &auto_residual::Constants { edge: surfaces })?,
-            candidates: [wide?, middle?, narrow?, svgf?],
-            planes: [
-                plane("dim, squared errors")?,
-                plane("signs, products of errors")?,
-                plane("probed, other errors")?,
+            windows: [
+                Windows::new(gpu, &wide, false, size)?,
+                Windows::new(gpu, &middle, false, size)?,
+                Windows::new(gpu, &narrow, true, size)?,
             ],
+            svgf: Levels::new(gpu, &of_svgf, size)?,
+            svgf_estimate: Estimate::new(gpu, &of_svgf.edge, false, size)?,
+            results: [plane("wide")?, plane("middle")?, plane("narrow")?, plane("svgf")?],
+            dim: Buffer::new(gpu, "dim", windows_pack.colour.len(), Location::Device)?,
             wide_dim: plane("wide, dim")?,
+            svgf_probed: plane("svgf, probed")?,
+            planes: [plane("probe, squared errors, blend")?, plane("products of errors")?, plane("other errors")?],
+            smoothed: [plane("smoothed errors")?, plane("smoothed products")?, plane("smoothed others")?],
+            windows_pack,
             leverages: plane("leverages")?,
             surroundings: plane("smoothed leverages")?,
             expected: Buffer::new(gpu, "expected errors", pixels, Location::Device)?,
@@ -183,23 +159,27 @@ impl Auto {
 
     /// What every candidate makes of the image, and how much of it each keeps.
     fn record_candidates(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
-        let [wide, middle, narrow, svgf] = &self.candidates;
-        let ([dim, signs, probed], count) = (&self.planes, planes.pixels());
-        wide.record(rec, planes, &planes.radiance, &wide.result)?;
-        let push = AutoPush { count, floor: floor(&self.settings), ..Default::default() };
-        let bind = auto_inputs::Bind { colour: &self.pack.colour, wide: &wide.result, dim, signs, probed };
+        let ([wide, middle, narrow], size, count) = (&self.windows, planes.size, planes.pixels());
+        let [of_wide, of_middle, of_narrow, of_svgf] = &self.results;
+        let Packed { colour, channels, .. } = &self.windows_pack;
+        let (estimate, probe) = (&self.svgf_estimate.plane, &self.planes[0]);
+        self.windows_pack.record(rec, planes)?;
+        wide.record(rec, size, [colour, channels], of_wide)?;
+        let push = AutoPush { size, floor: floor(&self.settings), ..Default::default() };
+        self.svgf_estimate.record(rec, planes, &self.pack)?;
+        let bind =
+            auto_inputs::Bind { colour: &self.pack.colour, wide: of_wide, estimate, dim: &self.dim, probed: probe };
         rec.dispatch_threads(&self.inputs, bind, &push, count)?;
-        wide.record(rec, planes, dim, &self.wide_dim)?;
-        middle.record(rec, planes, &planes.radiance, &middle.result)?;
-        narrow.record(rec, planes, dim, &narrow.result)?;
-        svgf.record(rec, planes, &planes.radiance, &svgf.result)?;
-        narrow.record(rec, planes, signs, &narrow.kept)?;
-        svgf.record(rec, planes, probed, &svgf.kept)?;
+        wide.record(rec, size, [&self.dim, channels], &self.wide_dim)?;
+        middle.record(rec, size, [colour, channels], of_middle)?;
+        narrow.record(rec, size, [&self.dim, channels], of_narrow)?;
+        self.svgf.record(rec, size, &self.pack, estimate, of_svgf)?;
+        self.svgf.record(rec, size, &self.pack, probe, &self.svgf_probed)?;
         let bind = auto_leverage::Bind {
-            wide: &wide.result,
-            svgf: &svgf.result,
-            narrow_kept: &narrow.kept,
-            svgf_kept: &svgf.kept,
+            wide: of_wide,
+            svgf: of_svgf,
+            narrow: &narrow.leverages,
+            probed: &self.svgf_probed,
             colour: &self.pack.colour,
             place: &self.pack.place,
             estimate: &self.estimate.plane,
@@ -216,7 +196,7 @@ impl Auto {
     }
 
     fn record_errors(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
-        let [wide, mid, narrow, svgf] = self.candidates.each_ref().map(|c| &c.result);
+        let [wide, mid, narrow, svgf] = &self.results;
         let [squares, products, others] = &self.planes;
         let bind = auto_error::Bind {
             estimate: &self.estimate.plane,
@@ -238,45 +218,9 @@ impl Auto {
         rec.dispatch_threads(&self.error, bind, &push, count)
     }
 
-    /// Planes\[P\] -> others, or the same, which lie in `between` after every other level; `across` surfaces, or within alike
-    /// ones. One plane comes thrice.
-    fn record_smoothing<'a>(
-        &'a self,
-        rec: &mut Recorder,
-        planes: &Planes,
-        [from, to]: [[&'a Buffer<vec4>; 3]; 2],
-        across: bool,
-    ) -> Result<()> {
-        let rates = Rates::of_surfaces(&alike(&self.settings.edge)).as_array();
-        // What the candidates made of the probes is not needed any more.
-        let between = [0, 1, 2].map(|k| &self.candidates[k].kept);
-        let smooth = &self.smooth[usize::from(across)];
-        (0..SMOOTHING).try_for_each(|level| {
-            let ([first, second, third], [first_smoothed, second_smoothed, third_smoothed]) = match level {
-                0 => (from, between),
-                level if level % 2 == 0 => (to, between),
-                _ => (between, to),
-            };
-            let (colour, place) = (&self.pack.colour, &self.pack.place);
-            let bind = auto_smooth::Bind {
-                colour,
-                place,
-                first,
-                second,
-                third,
-                first_smoothed,
-                second_smoothed,
-                third_smoothed,
-            };
-            let (spacing, least) = (1 << level, least(level, across));
-            let push = AutoSmoothPush { size: planes.size, spacing, rates, least, ..Default::default() };
-            rec.dispatch(smooth, bind, &push, smooth.groups(threads(planes.size, spacing)))
-        })
-    }
-
-    /// The blend lies where errors were smoothed.
+    /// The blend lies where what it is made by has come from.
     fn blended(&self) -> &Buffer<vec4> {
-        &self.candidates[0].kept
+        &self.planes[0]
     }
 
     /// The blend, and what it has lost -> output\[P\]
@@ -285,7 +229,7 @@ impl Auto {
             colour: &self.pack.colour,
             place: &self.pack.place,
             estimate: &self.estimate.plane,
-            others: &self.planes[2],
+            others: &self.smoothed[2],
             blend: self.blended(),
             filtered: &planes.output,
         };
@@ -301,11 +245,14 @@ impl Filter for Auto {
         self.pack.record(rec, planes)?;
         self.estimate.record(rec, planes, &self.pack)?;
         self.record_candidates(rec, planes)?;
-        self.record_smoothing(rec, planes, [[&self.leverages; 3], [&self.surroundings; 3]], false)?;
+        let (smoothing, errors, smoothed) = (&self.smoothing, self.planes.each_ref(), self.smoothed.each_ref());
+        smoothing.record_cells(rec, &self.pack, planes.size)?;
+        let of_leverages = [&self.leverages, smoothed[0], &self.surroundings].map(|plane| [plane; 3]);
+        smoothing.record(rec, &self.pack, planes.size, of_leverages, false)?;
         self.record_errors(rec, planes)?;
-        self.record_smoothing(rec, planes, [self.planes.each_ref(); 2], true)?;
-        let [squares, products, others] = &self.planes;
-        let [wide, mid, narrow, svgf] = self.candidates.each_ref().map(|c| &c.result);
+        smoothing.record(rec, &self.pack, planes.size, [errors, errors, smoothed], true)?;
+        let [squares, products, others] = smoothed;
+        let [wide, mid, narrow, svgf] = &self.results;
         let bind = auto::Bind {
             squares,
             products,

@@ -1,10 +1,11 @@
 //! `auto` on the host: the twin of `glsl/auto*.comp`.
 use super::residual::{given_back, own_variance};
-use super::{SMOOTHING, alike, candidates, floor, least, shares};
+use super::smoothing::Cells;
+use super::{candidates, floor, shares};
 use crate::denoise::filter::edge::{Rates, edge_weight};
 use crate::denoise::filter::noise_estimate::{self, ENOUGH, contrast};
 use crate::denoise::filter::pack::Packed;
-use crate::denoise::filter::{FilterInput, FilterSettings};
+use crate::denoise::filter::{FilterInput, FilterSettings, guided, svgf};
 use crate::layout::{vec3, vec4};
 use crate::math::hash::pcg;
 use crate::math::srgb::luminance;
@@ -35,23 +36,29 @@ impl Results {
     fn new(input: &FilterInput, image: &[Packed], settings: &FilterSettings) -> Self {
         let rows = candidates(settings);
         let run = |k: usize, radiance: Vec<vec4>| -> Vec<Vec4> {
-            let (row, settings) = &rows[k];
-            let output = (row.reference)(&FilterInput { radiance, ..input.clone() }, settings);
+            let output = (guided::ROW.reference)(&input.with_radiance(radiance), &rows[k]);
             output.into_iter().map(Vec4::from).collect()
         };
         let pixels = |colour: &dyn Fn(usize) -> Vec3| -> Vec<vec4> {
             (0..image.len()).map(|i| colour(i).extend(image[i].count).into()).collect()
         };
-        let [wide, middle, svgf] = [0, 1, 3].map(|k| run(k, input.radiance.clone()));
+        let [wide, middle] = [0, 1].map(|k| run(k, input.radiance.clone()));
         let dim = |i: usize| dimmed(image[i].colour, wide[i].xyz());
         let [wide_dim, narrow] = [0, 2].map(|k| run(k, pixels(&dim)));
         let added = |i: usize| probe(i, wide[i].xyz(), floor(settings));
-        let narrow_kept = run(2, pixels(&signs));
-        let svgf_kept = run(3, pixels(&|i| image[i].colour + added(i)));
+        let of_narrow = guided::leverages(&input.with_radiance(pixels(&dim)), &rows[2]);
+        // The probe does not change what is known of noise.
+        let noise = noise_estimate::reference(input, image, &rows[3].edge, false);
+        let svgf = |added: &dyn Fn(usize) -> f32| -> Vec<Vec4> {
+            let pixel = |i: usize| (Packed { colour: image[i].colour + added(i), ..image[i] }, noise[i]);
+            let output = svgf::levels([input.width, input.height], (0..image.len()).map(pixel).collect(), &rows[3]);
+            output.into_iter().map(Vec4::from).collect()
+        };
+        let (svgf, probed) = (svgf(&|_| 0.0), svgf(&added));
         let [of_wide, of_middle] = shares(settings);
         let leverage = |i: usize| {
-            let own = (narrow_kept[i].xyz().dot(signs(i)) / 3.0).clamp(-1.0, 1.0);
-            let grown = contrast(svgf_kept[i].xyz(), svgf[i].xyz()) / added(i);
+            let own = of_narrow[i].clamp(-1.0, 1.0);
+            let grown = contrast(probed[i].xyz(), svgf[i].xyz()) / added(i);
             Vec4::new(of_wide * own, of_middle * own, own, grown.clamp(-1.0, 1.0))
         };
         let leverages = (0..image.len()).map(leverage).collect();
@@ -99,13 +106,9 @@ pub fn estimated(input: &FilterInput, settings: &FilterSettings) -> (Vec<vec4>, 
     let (image, floor) = (Packed::reference(input), floor(settings));
     let noise = noise_estimate::reference(input, &image, &settings.edge, true);
     let results = Results::new(input, &image, settings);
-    let rates = Rates::of_surfaces(&alike(&settings.edge));
+    let cells = Cells::new(&image, [input.width, input.height], &settings.edge);
+    let smoothed = |plane: Vec<Vec4>, across: bool| cells.smoothed(&plane, across);
     let size = [input.width, input.height].map(i64::from);
-    let smoothed = |plane: Vec<Vec4>, across: bool| {
-        let level =
-            |plane: Vec<Vec4>, level: u32| smooth(&plane, &image, size, 1i64 << level, &rates, least(level, across));
-        (0..SMOOTHING).fold(plane, level)
-    };
     let surroundings = smoothed(results.leverages.clone(), false);
     let surfaces = Rates::of_surfaces(&settings.edge);
     let differ = |i: usize| differences(&image, &noise, size, i, &surfaces, floor, results.wide[i].xyz());
@@ -207,13 +210,9 @@ fn dimmed(colour: Vec3, around: Vec3) -> Vec3 {
 }
 
 /// As `glsl/shared/perturbation.glsl`.
-fn signs(pixel: usize) -> Vec3 {
-    let bits = pcg(pixel as u32);
-    Vec3::from_array([31, 30, 29].map(|bit| 1.0 - 2.0 * (bits >> bit & 1) as f32))
-}
-
 fn probe(pixel: usize, around: Vec3, least: f32) -> f32 {
-    signs(pixel).x * 0.02 * (contrast(around, Vec3::ZERO).abs() + least)
+    let random_sign = 1.0 - 2.0 * (pcg(pixel as u32) >> 31) as f32;
+    random_sign * 0.02 * (contrast(around, Vec3::ZERO).abs() + least)
 }
 
 /// An independent copy of the pixel misses it by both copies' noise, and has the pixel's in common with what a filter misses.
@@ -238,31 +237,6 @@ fn expected(relative: [Vec4; 3], w: &[f32; BLENDED], [own, around]: [Vec4; 2], s
     let kept = |leverages: Vec4| (w[0] + Vec4::from_slice(&w[1..]).dot(leverages)).clamp(0.0, 1.0);
     let error = (square - noise).max(kept(around) * noise);
     [error, if told > 0.0 { noise / told * share } else { 1.0 }, kept(own.max(around).clamp(Vec4::ZERO, Vec4::ONE))]
-}
-
-fn smooth(
-    estimates: &[Vec4],
-    image: &[Packed],
-    [width, height]: [i64; 2],
-    spacing: i64,
-    rates: &Rates,
-    least: f32,
-) -> Vec<Vec4> {
-    const B3: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
-    let pixel = |at: i64| {
-        let (mut sum, mut total) = (Vec4::ZERO, 0.0);
-        for (i, j) in (-2..=2i64).flat_map(|j| (-2..=2i64).map(move |i| (i, j))) {
-            let u = (at % width + i * spacing).clamp(0, width - 1);
-            let v = (at / width + j * spacing).clamp(0, height - 1);
-            let (p, q) = (&image[at as usize], &image[(v * width + u) as usize]);
-            let w = B3[i.unsigned_abs() as usize] * B3[j.unsigned_abs() as usize];
-            let w = if q.count > 0.0 { w * edge_weight(q, rates.exponent(p, q)).max(least) } else { 0.0 };
-            sum += w * estimates[(v * width + u) as usize];
-            total += w;
-        }
-        if total > 0.0 { sum / total } else { Vec4::ZERO }
-    };
-    (0..width * height).map(pixel).collect()
 }
 
 fn blend(p: &Packed, (usable, w): ([bool; BLENDED], [f32; BLENDED]), filtered: [Vec3; 4]) -> vec4 {

@@ -4,13 +4,14 @@ mod pack;
 mod reference;
 mod table;
 
-use super::{Filter, Planes, Row};
+use super::{Filter, FilterSettings, Planes, Row};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
-use crate::layout::{GuidedPush, vec4};
+use crate::layout::{GuidedPush, float, vec4};
 use crate::settings::{Is, choices, settings};
 use crate::shaders::{guided_columns, guided_mean_columns, guided_mean_rows, guided_rows, shared};
-use pack::{BESIDE, Packed};
+pub use pack::{BESIDE, Packed};
+pub use reference::leverages;
 use table::GuidedTable;
 
 /// See [`super::FILTERS`].
@@ -19,14 +20,13 @@ pub const ROW: Row = Row {
     about: "guided image filter: light as a local linear function of normal and depth",
     bytes: 96, // colours, channels and four planes of models; tables are of small images
     make: |gpu, s, size| {
-        let pack = Packed::new(gpu, s.guided.channels, s.edge.extent, size)?;
-        let (radius, eps) = (s.footprint.radius, s.guided.eps);
+        let pack = Packed::new(gpu, s, size)?;
         Ok(match s.guided.sums {
-            GuidedSums::Blocks => Box::new(Guided::new(gpu, pack, radius, eps, size)?),
-            GuidedSums::Table => Box::new(GuidedTable::new(gpu, pack, radius, eps, size)?),
+            GuidedSums::Blocks => Box::new(Guided { windows: Windows::new(gpu, s, false, size)?, pack }),
+            GuidedSums::Table => Box::new(GuidedTable::new(gpu, pack, s, size)?),
         })
     },
-    reference: |input, s| reference::reference(input, &s.guided, s.footprint.radius, s.edge.extent),
+    reference: reference::reference,
 };
 
 /// `vec4`s of a pixel's record in a strip.
@@ -82,14 +82,30 @@ fn per_channel(text: &str) -> std::result::Result<vec4, String> {
     }
 }
 
+/// Alone, it packs what it reads.
 struct Guided {
     pack: Packed,
+    windows: Windows,
+}
+
+impl Filter for Guided {
+    fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
+        self.pack.record(rec, planes)?;
+        let Packed { colour, channels, .. } = &self.pack;
+        self.windows.record(rec, planes.size, [colour, channels], &planes.output)
+    }
+}
+
+/// The filter of one radius, on what is packed already.
+pub struct Windows {
     columns: Kernel<guided_columns::Bind<'static>>,
     rows: Kernel<guided_rows::Bind<'static>>,
     mean_columns: Kernel<guided_mean_columns::Bind<'static>>,
     mean_rows: Kernel<guided_mean_rows::Bind<'static>>,
     /// Slopes of the three colours, then the value at the window's centre with the number of its windows.
     model: [Buffer<vec4>; 4],
+    /// How much of a pixel's own value the window around it keeps, row-major, if that is wanted; else one number.
+    pub leverages: Buffer<float>,
     /// A strip's sums over columns.
     strip: Buffer<vec4>,
     down: Walk,
@@ -141,14 +157,20 @@ impl Walk {
     }
 }
 
-impl Guided {
-    fn new(gpu: &Gpu, pack: Packed, radius: u32, eps: vec4, size: [u32; 2]) -> Result<Self> {
+impl Windows {
+    /// For images of (width, height).
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when its buffers do not fit.
+    pub fn new(gpu: &Gpu, s: &FilterSettings, leverages: bool, size: [u32; 2]) -> Result<Self> {
+        let (radius, eps) = (s.footprint.radius, s.guided.eps);
         let step = step(radius);
         let [width, height] = size.map(|edge| edge.div_ceil(step));
         let [down, along] = [height, width].map(|edge| Walk::new(gpu, radius / step, edge));
         let strip_rows =
             strip_rows(gpu.tuning().strip_bytes, gpu.info().max_storage_range, down.window, [width, height]);
         let models = width.next_multiple_of(BESIDE) as usize * height as usize;
+        let pixels = size[0] as usize * size[1] as usize;
         let plane = |name| Buffer::new(gpu, name, models, Location::Device);
         let records = u64::from(strip_rows.next_multiple_of(BESIDE)) * u64::from(width) * RECORD;
         let window_blocks = shared::window_blocks::Constants { step: step as i32 };
@@ -156,7 +178,7 @@ impl Guided {
         let columns = Kernel::new(gpu, &guided_columns::Constants { windows, window_blocks, local_size_x })?;
         let mean_columns = Kernel::new(gpu, &guided_mean_columns::Constants { windows, window_blocks, local_size_x })?;
         let (local_size_x, windows) = (along.lines, along.constants());
-        let rows = Kernel::new(gpu, &guided_rows::Constants { windows, window_blocks, local_size_x })?;
+        let rows = Kernel::new(gpu, &guided_rows::Constants { windows, window_blocks, leverages, local_size_x })?;
         let mean_rows = Kernel::new(gpu, &guided_mean_rows::Constants { windows, window_blocks, local_size_x })?;
         Ok(Self {
             columns,
@@ -164,13 +186,13 @@ impl Guided {
             mean_columns,
             mean_rows,
             model: [plane("slope_r")?, plane("slope_g")?, plane("slope_b")?, plane("value")?],
+            leverages: Buffer::new(gpu, "leverages", if leverages { pixels } else { 1 }, Location::Device)?,
             strip: Buffer::new(gpu, "columns", records as usize, Location::Device)?,
             down,
             along,
             strip_rows,
             step,
             eps,
-            pack,
         })
     }
 
@@ -184,24 +206,44 @@ impl Guided {
         })
     }
 
-    fn record_models(&self, rec: &mut Recorder, size: [u32; 2]) -> Result<()> {
+    /// colour\[P\], channels\[P\] as [`Packed`] has them -> filtered\[P\], row-major
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when the image is too large for the device.
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        size: [u32; 2],
+        packed: [&Buffer<vec4>; 2],
+        filtered: &Buffer<vec4>,
+    ) -> Result<()> {
+        self.record_models(rec, size, packed)?;
+        self.record_means(rec, size, packed, filtered)
+    }
+
+    fn record_models(&self, rec: &mut Recorder, size: [u32; 2], [colour, channels]: [&Buffer<vec4>; 2]) -> Result<()> {
         let [slope_r, slope_g, slope_b, value] = &self.model;
-        let (colour, channels, columns) = (&self.pack.colour, &self.pack.channels, &self.strip);
+        let (columns, leverages) = (&self.strip, &self.leverages);
         for (push, [down, along]) in self.strips(size) {
             rec.dispatch(&self.columns, guided_columns::Bind { colour, channels, sums: columns }, &push, down)?;
-            let bind = guided_rows::Bind { columns, channels, slope_r, slope_g, slope_b, value };
+            let bind = guided_rows::Bind { columns, channels, slope_r, slope_g, slope_b, value, leverages };
             rec.dispatch(&self.rows, bind, &push, along)?;
         }
         Ok(())
     }
 
-    fn record_means(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
-        let [slope_r, slope_g, slope_b, value] = &self.model;
-        let (colour, channels, columns) = (&self.pack.colour, &self.pack.channels, &self.strip);
-        for (push, [down, along]) in self.strips(planes.size) {
+    fn record_means(
+        &self,
+        rec: &mut Recorder,
+        size: [u32; 2],
+        [colour, channels]: [&Buffer<vec4>; 2],
+        filtered: &Buffer<vec4>,
+    ) -> Result<()> {
+        let ([slope_r, slope_g, slope_b, value], columns) = (&self.model, &self.strip);
+        for (push, [down, along]) in self.strips(size) {
             let bind = guided_mean_columns::Bind { slope_r, slope_g, slope_b, value, channels, sums: columns };
             rec.dispatch(&self.mean_columns, bind, &push, down)?;
-            let bind = guided_mean_rows::Bind { columns, channels, colour, filtered: &planes.output };
+            let bind = guided_mean_rows::Bind { columns, channels, colour, filtered };
             rec.dispatch(&self.mean_rows, bind, &push, along)?;
         }
         Ok(())
@@ -214,14 +256,6 @@ fn strip_rows(target: u64, limit: u64, window: u32, [width, height]: [u32; 2]) -
     let (row, beside) = (RECORD * 16 * u64::from(width), u64::from(BESIDE));
     let wanted = (target / row).max(4 * u64::from(window));
     wanted.min((limit / row / beside).max(1) * beside).min(u64::from(height)) as u32
-}
-
-impl Filter for Guided {
-    fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
-        self.pack.record(rec, planes)?;
-        self.record_models(rec, planes.size)?;
-        self.record_means(rec, planes)
-    }
 }
 
 #[cfg(test)]

@@ -1,0 +1,24 @@
+#include "shared/edge.glsl"
+#include "shared/cells.glsl"
+
+// Finds the surface that each cell stands for, one per thread.
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(binding = 0) uniform samplerBuffer colour; // of vec4
+layout(binding = 1) uniform usamplerBuffer place; // of uvec4
+layout(scalar, binding = 2) writeonly buffer Cells { uvec4 cells[]; };
+layout(scalar, push_constant) uniform Push { AutoCellsPush push; };
+
+void main() {
+    ivec2 size = ivec2(push.size), grid = cells_of(push.size), cell = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(cell, grid))) return;
+    int stands = CELL * (cell.y * size.x + cell.x);
+    bool known = false;
+    [[unroll]] for (int k = 0; k < CELL * CELL; k++) {
+        ivec2 at = CELL * cell + ivec2(k % CELL, k / CELL);
+        int i = at.y * size.x + at.x;
+        if (known || any(greaterThanEqual(at, size)) || texelFetch(colour, i).w == 0.0) continue;
+        known = true;
+        stands = i;
+    }
+    cells[cell.y * grid.x + cell.x] = pack_cell(texelFetch(place, stands), known);
+}
