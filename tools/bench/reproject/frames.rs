@@ -1,7 +1,8 @@
-//! Frames of a camera that moves through a scene, or of what a scene animates: the error of each, and how much it flickers.
+//! Frames of a camera that moves through a scene, or of what a scene animates: the error of each, how much it flickers,
+//! and how different all look.
 use crate::film::{Arm, Film, carries, milliseconds};
 use crate::reference::Reference;
-use crate::{View, plot};
+use crate::{View, plot, seen};
 use anyhow::{Result, anyhow};
 use glam::{Quat, Vec3};
 use std::path::{Path, PathBuf};
@@ -16,7 +17,7 @@ use tallow::scene::{Change, Loaded};
 pub struct Args {
     #[command(flatten)]
     view: View,
-    #[arg(long, default_value_t = 48)]
+    #[arg(long, default_value_t = 48, value_parser = clap::value_parser!(u32).range(FIRST as i64 + 1..))]
     frames: u32,
     /// Samples a pixel of a frame
     #[arg(long, default_values_t = [1, 4], value_delimiter = ',')]
@@ -63,6 +64,7 @@ struct Line {
     base: usize,
     errors: Vec<f64>,
     flicker: f64,
+    jod: f64,
     frame_ms: f64,
     carrying_ms: f64,
     sum: Carriage,
@@ -87,7 +89,7 @@ fn measure(gpu: &Gpu, args: &Args, spp: u32, (name, base, arm): Named, sequence:
     let mut scene = sequence.scene.clone();
     let mut film = Film::new(gpu, &scene, arm, spp)?;
     let (mut errors, mut offs, mut times) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut sum, mut last) = (Carriage::default(), None);
+    let (mut sum, mut pictures) = (Carriage::default(), Vec::new());
     for (frame, reference) in (0..).zip(&sequence.references) {
         let change = pose(args, &mut scene, frame)?;
         let camera = camera(args, &scene, frame)?;
@@ -99,18 +101,20 @@ fn measure(gpu: &Gpu, args: &Args, spp: u32, (name, base, arm): Named, sequence:
         if arm.carries.is_some() {
             sum = film.renderer.carriage()?;
         }
-        last = Some(picture);
+        pictures.push(picture);
     }
-    if let (Some(folder), Some(picture)) = (&args.pictures, last) {
-        save(&folder.join(format!("{spp}-{}.png", name.replace([',', ' '], "-"))), &picture)?;
+    if let (Some(folder), Some(picture)) = (&args.pictures, pictures.last()) {
+        save(&folder.join(format!("{spp}-{}.png", name.replace([',', ' '], "-"))), picture)?;
     }
     // The mean absolute difference of successive error images.
     let change = |pair: &[Vec<f64>]| {
         pair[0].iter().zip(&pair[1]).map(|(a, b)| (a - b).abs()).sum::<f64>() / pair[0].len() as f64
     };
     let flicker = mean(offs.windows(2).skip(FIRST - 1).map(change));
+    let truth: Vec<&Picture> = sequence.references.iter().skip(FIRST).map(|reference| &reference.picture).collect();
+    let jod = seen::jod(&pictures[FIRST.min(pictures.len())..], &truth, args.fps as f32)?;
     let of = |column: usize| tallow::profile::median(&times.iter().skip(2).map(|t| t[column]).collect::<Vec<_>>());
-    Ok(Line { name, base, errors, flicker, frame_ms: of(0), carrying_ms: of(1), sum })
+    Ok(Line { name, base, errors, flicker, jod, frame_ms: of(0), carrying_ms: of(1), sum })
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
@@ -194,9 +198,10 @@ fn print(lines: &[Line], pixels: u32) {
         };
         let [frame, carrying] = [l.frame_ms, l.carrying_ms].map(|ms| format!("{ms:.1}"));
         let last = at(l.errors.len() - 1);
-        vec![l.name.clone(), at(0), at(FIRST - 1), last, of(|_, error| error), of(|l, _| l.flicker), frame, carrying]
+        let (error, flicker, jod) = (of(|_, error| error), of(|l, _| l.flicker), format!("{:.2}", l.jod));
+        vec![l.name.clone(), at(0), at(FIRST - 1), last, error, flicker, jod, frame, carrying]
     };
-    let head = ["arm", "frame 0", "7", "last", "8 on (of base)", "flicker (of base)", "frame ms", "carrying ms"];
+    let head = ["arm", "frame 0", "7", "last", "8 on (of base)", "flicker (of base)", "JOD", "frame ms", "carrying ms"];
     println!("{}", table::text(&head, &lines.iter().map(row).collect::<Vec<_>>()));
     let share = |n: u64| format!("{:.1} %", 100.0 * n as f64 / f64::from(pixels));
     for line in lines.iter().filter(|l| l.sum.carried > 0) {

@@ -12,7 +12,7 @@ const TRIMMED: f64 = 0.001;
 
 /// A converged image, and the variance of its pixels' means.
 pub struct Reference {
-    picture: Picture,
+    pub picture: Picture,
     variance: Vec<vec3>,
 }
 
