@@ -53,7 +53,7 @@ const KNOBS: &[Knob] = &[
     knob("conserve-energy", &[], Filters(&["atrous"])),
     knob("channels", &["1", "3", "4"], Filters(&["guided", "auto"])),
     knob("eps", &["0.001", "0.003", "0.03", "0.1"], Filters(&["guided", "auto"])),
-    knob("sums", &["blocks", "table"], Filters(&["guided", "auto"])),
+    knob("sums", &["blocks", "table"], Filters(&["guided"])),
     knob("sigma-l", &["2", "4", "8"], Filters(&["svgf", "auto"])),
     knob("basis", &["cdf22", "red-black"], Filters(&["wavelet"])),
     knob("oidn-quality", &["fast", "balanced", "high"], Filters(&["oidn"])),
