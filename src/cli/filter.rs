@@ -6,6 +6,7 @@ use super::common::Common;
 use super::compare::{self, check_sizes};
 use super::files::{Files, Item, check_distinct};
 use super::{Exit, fail_on_messages, print, print_json, readable};
+use crate::denoise::filter::firefly::Fireflies;
 use crate::denoise::filter::{self, FilterSettings, Method};
 use crate::denoise::{self, Colour, Demodulation, Filtered, Recipe, file};
 use crate::error::{Error, Result};
@@ -58,9 +59,9 @@ pub struct Args {
     #[arg(long)]
     pub no_demodulate: bool,
     /// First cut pixels that are more than N times brighter than all but one around them, if one sample has brought their light,
-    /// and say what that took away; 8 spares highlights
+    /// and say what that took away, or `off` [default: 8 where the image tells its variance]
     #[arg(long, value_name = "N")]
-    pub fireflies: Option<f32>,
+    pub fireflies: Option<Fireflies>,
     /// Options for the device and the output files.
     #[command(flatten)]
     pub common: Common,
@@ -208,7 +209,7 @@ fn filtered(args: &Args, gpu: &Gpu, aovs: &Aovs) -> Result<(Colour, Vec<PassTime
     let recipe = Recipe {
         method: args.filter,
         demodulation: demodulation(args),
-        fireflies: args.fireflies,
+        fireflies: args.fireflies.unwrap_or_default(),
         settings: &|scales| args.overrides.settings(FilterSettings::default().scaled_by(scales)),
     };
     let filtered = Filtered::new(gpu, layers.upload(gpu)?, &recipe)?;

@@ -1,6 +1,7 @@
 //! A noisy image taken apart on the device, to be filtered and put together again. Kernels: those of `glsl/film` whose names
 //! tell of modulation. Twin: [`super::twin`].
 use super::filter::Planes;
+use super::filter::firefly::{Cut, Fireflies, Removed};
 use super::{Demodulation, ExpectedError, Holds, Noisy};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
@@ -20,6 +21,7 @@ pub struct Demodulated {
     /// What is not filtered; [`Demodulated::record_join`] makes it the whole image.
     pub picture: Buffer<vec4>,
     direct: Option<Direct>,
+    cut: Option<Cut>,
 }
 
 /// Direct light before albedo, where some pixels have none of their own: a filter in-paints it.
@@ -30,11 +32,18 @@ struct Direct {
 }
 
 impl Demodulated {
-    /// For `noisy` and images that hold the same. With `in_paint`, pixels without direct light take it from the others.
+    /// For `noisy` and images that hold the same. With `in_paint`, pixels without direct light take it from the others. Of what is
+    /// filtered, `fireflies` are cut.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when the planes do not fit.
-    pub fn new(gpu: &Gpu, noisy: &Noisy, demodulation: Demodulation, in_paint: bool) -> Result<Self> {
+    pub fn new(
+        gpu: &Gpu,
+        noisy: &Noisy,
+        demodulation: Demodulation,
+        in_paint: bool,
+        fireflies: Fireflies,
+    ) -> Result<Self> {
         let (holds, pixels) = (noisy.holds, noisy.stats.len());
         let measured = holds.variance_of_filtered(demodulation);
         let constants = demodulate::Constants {
@@ -46,17 +55,19 @@ impl Demodulated {
         };
         let plane = |name| Buffer::new(gpu, name, pixels, Location::Device);
         let variance = Buffer::new(gpu, "variance", if measured { pixels } else { 1 }, Location::Device)?;
+        let planes = Planes {
+            size: noisy.size,
+            radiance: plane("radiance")?,
+            guide: noisy.guide.clone(),
+            light: noisy.holds.light.then(|| noisy.light.clone()),
+            variance: measured.then(|| variance.clone()),
+            output: plane("filtered")?,
+        };
         Ok(Self {
             split: Kernel::new(gpu, &constants)?,
             join: Kernel::new(gpu, &Default::default())?,
-            planes: Planes {
-                size: noisy.size,
-                radiance: plane("radiance")?,
-                guide: noisy.guide.clone(),
-                light: noisy.holds.light.then(|| noisy.light.clone()),
-                variance: measured.then(|| variance.clone()),
-                output: plane("filtered")?,
-            },
+            cut: fireflies.factor(measured).map(|factor| Cut::new(gpu, &planes, factor)).transpose()?,
+            planes,
             variance,
             factor: plane("factor")?,
             picture: plane("picture")?,
@@ -70,12 +81,13 @@ impl Demodulated {
         let image = noisy::Bind { stats: &noisy.stats, light: &noisy.light, guide: &noisy.guide };
         let bind = demodulate::Bind {
             noisy: image,
-            radiance: &planes.radiance,
+            radiance: self.cut.as_ref().map_or(&planes.radiance, |cut| &cut.whole),
             variance: &self.variance,
             factor: &self.factor,
             sharp: &self.picture,
         };
         rec.dispatch_threads(&self.split, bind, &SplitPush { size: planes.size, ..Default::default() }, count)?;
+        self.cut.as_ref().map_or(Ok(()), |cut| cut.record(rec, planes))?;
         let Some(direct) = &self.direct else { return Ok(()) };
         let image = noisy::Bind { stats: &noisy.stats, light: &noisy.light, guide: &noisy.guide };
         let bind = demodulate_direct::Bind { noisy: image, direct: &direct.plane };
@@ -114,6 +126,14 @@ impl Demodulated {
 }
 
 impl Demodulated {
+    /// What the last split has cut, if anything was to be.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub fn removed(&self) -> Result<Option<Removed>> {
+        self.cut.as_ref().map(|cut| cut.removed(&self.planes)).transpose()
+    }
+
     /// How far the joined picture is expected to be from the truth: see [`ExpectedError::of`].
     ///
     /// # Errors

@@ -2,6 +2,7 @@
 use super::demodulated::Demodulated;
 use super::demodulation::Demodulation;
 use super::noisy::Noisy;
+use crate::denoise::filter::firefly::Fireflies;
 use crate::denoise::filter::{self, Filter, FilterSettings, Row};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Gpu, PixelFormat, Recorder};
@@ -47,7 +48,7 @@ impl Denoiser {
         let allocate = &renderer.settings().allocate;
         let in_paint = apart && !allocate.is_even() && allocate.min_spp == 0;
         Ok(Self {
-            parts: Demodulated::new(gpu, &noisy, demodulation, in_paint)?,
+            parts: Demodulated::new(gpu, &noisy, demodulation, in_paint, Fireflies::Off)?,
             filter: row.compile(gpu, settings, noisy.size)?,
             noisy,
         })

@@ -2,7 +2,7 @@
 use super::demodulated::Demodulated;
 use super::demodulation::Demodulation;
 use super::expected::ExpectedError;
-use super::filter::firefly::{self, Removed};
+use super::filter::firefly::{Fireflies, Removed};
 use super::filter::oidn;
 use super::filter::{self, FilterSettings, Method, Planes, Scales};
 use super::noisy::{Holds, Noisy};
@@ -20,8 +20,8 @@ pub struct Recipe<'a> {
     /// What is kept away from the filter, where the image tells it and the filter does not want the colour whole. By default
     /// [`Holds::usual_demodulation`].
     pub demodulation: Option<Demodulation>,
-    /// Pixels so many times brighter than all but one around them are cut first, if one sample has brought their light.
-    pub fireflies: Option<f32>,
+    /// What is cut first, where the filter does not want the colour whole.
+    pub fireflies: Fireflies,
     /// The settings for light of these scales.
     pub settings: &'a dyn Fn(&Scales) -> FilterSettings,
 }
@@ -30,7 +30,13 @@ impl Recipe<'_> {
     /// By this filter at its default settings, as `tallow render --denoise` uses it.
     pub fn new(method: Method) -> Self {
         let settings = &|scales: &Scales| FilterSettings::default().scaled_by(scales);
-        Self { method, demodulation: None, fireflies: None, settings }
+        Self { method, demodulation: None, fireflies: Fireflies::Usual, settings }
+    }
+
+    /// What is cut. Unless it is asked for, nothing where nothing is filtered, nor for Open Image Denoise, which is used to more.
+    pub fn fireflies(&self) -> Fireflies {
+        let takes_apart = matches!(self.method, Method::Kernels(row) if row.name != "none");
+        if self.fireflies == Fireflies::Usual && !takes_apart { Fireflies::Off } else { self.fireflies }
     }
 
     /// What is kept away from the filter of an image that holds this.
@@ -92,12 +98,10 @@ impl Filtered {
         filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
         let demodulation = recipe.demodulation(noisy.holds());
         let in_painted = demodulation == Demodulation::Light && noisy.lacks_direct_light()?;
-        let mut parts = Demodulated::new(gpu, &noisy, demodulation, in_painted)?;
+        let parts = Demodulated::new(gpu, &noisy, demodulation, in_painted, recipe.fireflies())?;
         let mut times = run(gpu, |rec| parts.record_split(rec, &noisy))?;
         drop(noisy);
-        let cut = recipe.fireflies.map(|factor| firefly::cut(gpu, &mut parts.planes, factor)).transpose()?;
-        let (removed, took) = cut.unzip();
-        times.extend(took.into_iter().flatten());
+        let removed = parts.removed()?;
         let scales = Scales::of_planes(&parts.planes)?;
         let expected = run_filter(gpu, recipe, &scales, &parts.planes, &mut times)?;
         if let Some(direct) = parts.direct_planes() {
@@ -145,10 +149,10 @@ impl Filtered {
     }
 }
 
-/// Device memory that a pixel takes at most while [`Filtered`] is made: its guide, the six planes of an image taken apart, and what
+/// Device memory that a pixel takes at most while [`Filtered`] is made: its guide, the seven planes of an image taken apart, and what
 /// it was taken from or, later, the filter's own. The host holds a window.
 pub fn bytes_per_pixel(method: Method) -> u64 {
-    let planes = size_of::<Guide>() + 5 * size_of::<vec4>() + size_of::<vec3>();
+    let planes = size_of::<Guide>() + 6 * size_of::<vec4>() + size_of::<vec3>();
     let taken_from = size_of::<PixelStats>() + size_of::<PixelLight>();
     planes as u64 + method.device_bytes().max(taken_from as u64)
 }

@@ -35,7 +35,7 @@ pub(crate) struct Chain<'a> {
     gpu: &'a Gpu,
 }
 
-/// Filters `noisy` twice and times the second run. Fireflies are not cut.
+/// Filters `noisy` twice and times the second run.
 ///
 /// # Errors
 /// [`crate::error::Error::Usage`] for settings out of range, [`crate::error::Error::Device`] when the image is too large or the
@@ -59,7 +59,7 @@ pub fn timed(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Timed> {
 fn timed_on_host(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Timed> {
     let before = gpu.allocated_bytes();
     let begun = Instant::now();
-    let parts = Demodulated::new(gpu, &noisy, recipe.demodulation(noisy.holds()), false)?;
+    let parts = Demodulated::new(gpu, &noisy, recipe.demodulation(noisy.holds()), false, recipe.fireflies())?;
     let compile = begun.elapsed();
     let device_bytes = gpu.allocated_bytes().saturating_sub(before);
     let once = || -> Result<(Vec<PassTime>, Duration)> {
@@ -92,7 +92,7 @@ impl<'a> Chain<'a> {
         filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
         let demodulation = recipe.demodulation(noisy.holds());
         let in_paint = demodulation == Demodulation::Light && noisy.lacks_direct_light()?;
-        let parts = Demodulated::new(gpu, &noisy, demodulation, in_paint)?;
+        let parts = Demodulated::new(gpu, &noisy, demodulation, in_paint, recipe.fireflies())?;
         // The scales that settings count in are those of the light that is filtered.
         gpu.run(&mut FrameResources::new(gpu)?, |rec| parts.record_split(rec, &noisy))?;
         let scales = Scales::of_planes(&parts.planes)?;

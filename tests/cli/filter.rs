@@ -221,20 +221,35 @@ fn broken_pixels_are_filled_in_from_their_neighbours() {
 }
 
 #[test]
-fn fireflies_are_cut_only_when_asked_and_it_is_said() {
+fn fireflies_are_cut_where_samples_tell_or_when_asked_and_it_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let mut film = noisy(false);
+    let at = (16 * SIZE + 16) as usize;
     for channel in &mut film.channels[..3] {
         let Samples::F32(values) = &mut channel.samples else { continue };
-        values[(16 * SIZE + 16) as usize] = 400.0;
+        values[at] = 400.0;
     }
+    let off_by = |options: &[&str]| error(&filter(&folder, &[&["--filter", "atrous"], options].concat()), checker);
+    let said = |name: &str, options: &[&str]| {
+        let words = [&["filter", "noisy.exr", "-o", "clean.exr", "--filter", name], options].concat();
+        stdout(&tallow(&folder, &words)).contains("fireflies: 1 pixels cut")
+    };
+    // Nothing tells that one sample has brought it.
     write(&folder, "noisy.exr", &film);
-    let kept = error(&filter(&folder, &["--filter", "atrous"]), checker);
-    let cut = error(&filter(&folder, &["--filter", "atrous", "--fireflies", "2"]), checker);
+    let (kept, cut) = (off_by(&[]), off_by(&["--fireflies", "2"]));
     assert!(cut < 0.1 && kept > 2.0 * cut, "{kept} {cut}");
-    let words = ["filter", "noisy.exr", "-o", "clean.exr", "--filter", "none", "--fireflies", "2"];
-    let text = stdout(&tallow(&folder, &words));
-    assert!(text.contains("fireflies: 1 pixels cut"), "{text}");
+    assert!(said("none", &["--fireflies", "2"]) && !said("none", &[]));
+    // One of sixteen samples has: the variance of their mean is its square.
+    let mut variance = vec![[0.005; 3]; (SIZE * SIZE) as usize];
+    variance[at] = [400.0 * 400.0; 3];
+    film.add_vec3("variance", ["R", "G", "B"], &variance);
+    film.add("samples", Samples::F32(vec![16.0; variance.len()]));
+    write(&folder, "noisy.exr", &film);
+    let (cut, kept) = (off_by(&[]), off_by(&["--fireflies", "off"]));
+    assert!(cut < 0.1 && kept > 2.0 * cut, "{kept} {cut}");
+    assert!(said("atrous", &[]) && !said("atrous", &["--fireflies", "off"]) && !said("none", &[]));
+    let refused = tallow(&folder, &["filter", "noisy.exr", "-o", "clean.exr", "--fireflies", "0.5"]);
+    complains(&refused, 2, &["--fireflies", "off, or a number of at least 1"]);
 }
 
 #[test]

@@ -4,6 +4,7 @@ use crate::picture;
 use crate::support::{assert_silent, gpu, hash};
 use std::path::Path;
 use tallow::denoise::file::Layers;
+use tallow::denoise::filter::firefly::Fireflies;
 use tallow::denoise::filter::{FILTERS, FilterSettings, Scales, check_size, estimated, find};
 use tallow::denoise::twin::{Parts, Pixels, demodulate, split};
 use tallow::denoise::{Demodulation, Denoiser, Filtered, Holds, Noisy, Recipe, expected};
@@ -207,7 +208,7 @@ fn files_are_taken_apart_and_put_together_as_their_twins() {
                 let recipe = Recipe {
                     method: find("svgf").unwrap().into(),
                     demodulation: Some(demodulation),
-                    fireflies: None,
+                    fireflies: Fireflies::Off,
                     settings: &|_| settings,
                 };
                 let noisy = Layers::new(&aovs).upload(&gpu).unwrap();
@@ -235,7 +236,7 @@ fn a_film_and_its_file_become_one_picture() {
             let recipe = Recipe {
                 method: (*row).into(),
                 demodulation: Some(Demodulation::Light),
-                fireflies: Some(3.0),
+                fireflies: Fireflies::Above(3.0),
                 settings: &settings,
             };
             let images = [Noisy::of_film(&renderer).unwrap(), Layers::new(&aovs).upload(&gpu).unwrap()];
@@ -259,7 +260,7 @@ fn expected_errors_agree_with_their_twin() {
         let frame = Frame::new(size, false);
         let renderer = renderer(&gpu, size, ALL, "uniform");
         frame.upload(&renderer);
-        let (method, fireflies) = (auto.into(), None);
+        let (method, fireflies) = (auto.into(), Fireflies::Off);
         let recipe = Recipe { method, demodulation: Some(demodulation), fireflies, settings: &|_| settings };
         let filtered = Filtered::new(&gpu, Noisy::of_film(&renderer).unwrap(), &recipe).unwrap();
         let device = filtered.join(&gpu).unwrap().expected.unwrap();

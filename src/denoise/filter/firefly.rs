@@ -1,14 +1,55 @@
-//! Outliers cut before filtering, as a step of its own that says what it took away. Kernel: `glsl/filter/firefly.comp`.
+//! Outliers cut before filtering, as a step of its own that says what it took away. Kernel: `glsl/filter/firefly.comp`. Twin:
+//! [`reference`].
 use super::pixel::known_radiance;
 use super::{FilterInput, Planes};
 use crate::denoise::windows;
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, FrameResources, Gpu, Kernel, Location, PassTime};
-use crate::layout::{FireflyPush, vec4};
+use crate::gpu::{Buffer, FrameResources, Gpu, Kernel, Location, Recorder};
+use crate::layout::{FireflyPush, vec3, vec4};
 use crate::math::srgb::luminance;
 use crate::shaders::firefly::{Bind, Constants};
 use crate::shaders::shared::dominated::DOMINATED;
 use glam::Vec3;
+use std::str::FromStr;
+
+/// Which outliers are cut: pixels so many times brighter than the second brightest of the 24 around them, if one sample has brought
+/// their light.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Fireflies {
+    /// None.
+    Off,
+    /// Those above [`Fireflies::USUAL`] times where the variance of samples is known: without it, a star looks like one.
+    #[default]
+    Usual,
+    /// Those above so many times, at least 1, in any image.
+    Above(f32),
+}
+
+impl Fireflies {
+    /// Spares highlights: 4 takes a little of Crytek Sponza's sunlit leaves, 20 leaves some in glass (2 samples).
+    pub const USUAL: f32 = 8.0;
+
+    /// The factor for an image whose variance is `measured` or not; none where nothing is cut.
+    pub fn factor(self, measured: bool) -> Option<f32> {
+        match self {
+            Self::Off => None,
+            Self::Usual => measured.then_some(Self::USUAL),
+            Self::Above(factor) => Some(factor),
+        }
+    }
+}
+
+impl FromStr for Fireflies {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match text.parse() {
+            _ if text == "off" => Ok(Self::Off),
+            Ok(factor) if factor >= 1.0 => Ok(Self::Above(factor)),
+            _ => Err("expected off, or a number of at least 1".to_owned()),
+        }
+    }
+}
 
 /// What was cut.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +69,56 @@ impl Removed {
     }
 }
 
+/// The kernel, and the light as it was.
+pub struct Cut {
+    kernel: Kernel<Bind<'static>>,
+    /// Of every pixel, to be cut into [`Planes::radiance`].
+    pub whole: Buffer<vec4>,
+    nothing: Buffer<vec3>,
+    factor: f32,
+}
+
+impl Cut {
+    /// For images such as `planes`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a factor below 1, [`Error::Device`] when it does not fit.
+    pub fn new(gpu: &Gpu, planes: &Planes, factor: f32) -> Result<Self> {
+        if factor.is_nan() || factor < 1.0 {
+            return Err(Error::Usage(format!("the firefly factor is {factor}: choose a number of at least 1")));
+        }
+        Ok(Self {
+            kernel: Kernel::new(gpu, &Constants { measured: planes.variance.is_some() })?,
+            whole: Buffer::new(gpu, "radiance", planes.radiance.len(), Location::Device)?,
+            nothing: Buffer::new(gpu, "no variance", 1, Location::Device)?,
+            factor,
+        })
+    }
+
+    /// whole\[P\], variance\[P\] -> radiance\[P\], variance\[P\]
+    ///
+    /// # Errors
+    /// [`Error::Device`].
+    pub fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
+        let push = FireflyPush { size: planes.size, factor: self.factor, ..Default::default() };
+        let variance = planes.variance.as_ref().unwrap_or(&self.nothing);
+        let bind = Bind { radiance: &self.whole, variance, cut: &planes.radiance };
+        rec.dispatch(&self.kernel, bind, &push, self.kernel.groups(planes.size))
+    }
+
+    /// What the last run has cut.
+    ///
+    /// # Errors
+    /// [`Error::Device`].
+    pub fn removed(&self, planes: &Planes) -> Result<Removed> {
+        let mut tally = Tally::default();
+        for window in windows(self.whole.len()) {
+            tally.add(&self.whole.read_range(window.clone())?, &planes.radiance.read_range(window)?);
+        }
+        Ok(tally.removed())
+    }
+}
+
 /// Cuts the pixels of `input` that are more than `factor` (at least 1) times brighter than the second brightest of the 24 around
 /// them, most of which are lit, and where their variance is known, if one sample has brought their light.
 ///
@@ -35,35 +126,13 @@ impl Removed {
 /// [`Error::Usage`] for a factor below 1 or planes of wrong sizes, [`Error::Device`] when the device fails.
 pub fn remove_fireflies(gpu: &Gpu, input: &mut FilterInput, factor: f32) -> Result<Removed> {
     input.validate()?;
-    let mut planes = Planes::new(gpu, input)?;
-    let (removed, _) = cut(gpu, &mut planes, factor)?;
+    let planes = Planes::new(gpu, input)?;
+    let cut = Cut { whole: planes.radiance.clone(), ..Cut::new(gpu, &planes, factor)? };
+    let planes = Planes { radiance: Buffer::new(gpu, "cut", cut.whole.len(), Location::Device)?, ..planes };
+    gpu.run(&mut FrameResources::new(gpu)?, |rec| cut.record(rec, &planes))?;
     input.radiance = planes.radiance.read()?;
-    input.variance = planes.variance.map(|v| v.read()).transpose()?;
-    Ok(removed)
-}
-
-/// The same on the device.
-///
-/// # Errors
-/// As [`remove_fireflies`].
-pub fn cut(gpu: &Gpu, planes: &mut Planes, factor: f32) -> Result<(Removed, Vec<PassTime>)> {
-    if factor.is_nan() || factor < 1.0 {
-        return Err(Error::Usage(format!("the firefly factor is {factor}: choose a number of at least 1")));
-    }
-    let cut = Buffer::new(gpu, "cut", planes.radiance.len(), Location::Device)?;
-    let none = Buffer::new(gpu, "no variance", 1, Location::Device)?;
-    let kernel = Kernel::new(gpu, &Constants { measured: planes.variance.is_some() })?;
-    let push = FireflyPush { size: planes.size, factor, ..Default::default() };
-    let variance = planes.variance.as_ref().unwrap_or(&none);
-    let bind = Bind { radiance: &planes.radiance, variance, cut: &cut };
-    let groups = kernel.groups(planes.size);
-    let times = gpu.run(&mut FrameResources::new(gpu)?, |rec| rec.dispatch(&kernel, bind, &push, groups))?;
-    let mut tally = Tally::default();
-    for window in windows(cut.len()) {
-        tally.add(&planes.radiance.read_range(window.clone())?, &cut.read_range(window)?);
-    }
-    planes.radiance = cut;
-    Ok((tally.removed(), times))
+    input.variance = planes.variance.as_ref().map(Buffer::read).transpose()?;
+    cut.removed(&planes)
 }
 
 /// What is missing in `after`.

@@ -1,10 +1,10 @@
 //! À-Trous wavelets steered by each pixel's variance: the spatial half of SVGF (Schied et al., HPG 2017). Kernel:
 //! `glsl/filter/svgf.comp`.
 use super::atrous_taps::threads;
-use super::edge::{Rates, edge_weight};
+use super::edge::{EdgeSettings, Rates, edge_weight};
 use super::noise_estimate::{self, Estimate, contrast};
 use super::pack::{Pack, Packed};
-use super::{Filter, FilterInput, FilterSettings, Planes, Row};
+use super::{Filter, FilterInput, Planes, Row};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{SvgfPush, vec4};
@@ -18,8 +18,8 @@ pub const ROW: Row = Row {
     name: "svgf",
     about: "À-Trous wavelets whose radiance weight counts in each pixel's standard deviations",
     bytes: super::pack::BYTES + 32, // estimate and scratch
-    make: |gpu, s, size| Ok(Box::new(Svgf::new(gpu, s, size)?)),
-    reference,
+    make: |gpu, s, size| Ok(Box::new(Svgf::new(gpu, &s.edge, &s.svgf, s.footprint.levels, size)?)),
+    reference: |input, s| reference(input, &s.edge, &s.svgf, s.footprint.levels),
 };
 
 /// Stands for 0, so that equal pixels are alike where nothing varies.
@@ -66,15 +66,21 @@ impl Levels {
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when it does not fit.
-    pub fn new(gpu: &Gpu, s: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
-        let rates = Rates::of_surfaces(&s.edge);
+    pub fn new(
+        gpu: &Gpu,
+        edge: &EdgeSettings,
+        own: &SvgfSettings,
+        levels: u32,
+        [width, height]: [u32; 2],
+    ) -> Result<Self> {
+        let rates = Rates::of_surfaces(edge);
         let kernel = |last| Kernel::new(gpu, &Constants { edge: rates.constants(), last });
         Ok(Self {
             kernels: [kernel(false)?, kernel(true)?],
             scratch: Buffer::new(gpu, "svgf", width as usize * height as usize, Location::Device)?,
             rates,
-            rate_l: s.svgf.rate_l(),
-            levels: s.footprint.levels,
+            rate_l: own.rate_l(),
+            levels,
         })
     }
 
@@ -110,11 +116,11 @@ impl Levels {
 }
 
 impl Svgf {
-    fn new(gpu: &Gpu, s: &FilterSettings, size: [u32; 2]) -> Result<Self> {
+    fn new(gpu: &Gpu, edge: &EdgeSettings, own: &SvgfSettings, levels: u32, size: [u32; 2]) -> Result<Self> {
         Ok(Self {
             pack: Pack::new(gpu, size)?,
-            estimate: Estimate::new(gpu, &s.edge, false, size)?,
-            levels: Levels::new(gpu, s, size)?,
+            estimate: Estimate::new(gpu, edge, false, size)?,
+            levels: Levels::new(gpu, edge, own, levels, size)?,
         })
     }
 }
@@ -139,16 +145,22 @@ struct Level<'a> {
     rate_l: f32,
 }
 
-fn reference(input: &FilterInput, s: &FilterSettings) -> Vec<vec4> {
+fn reference(input: &FilterInput, edge: &EdgeSettings, own: &SvgfSettings, levels: u32) -> Vec<vec4> {
     let image = Packed::reference(input);
-    let noise = noise_estimate::reference(input, &image, &s.edge, false);
-    levels([input.width, input.height], image.into_iter().zip(noise).collect(), s)
+    let noise = noise_estimate::reference(input, &image, edge, false);
+    filtered([input.width, input.height], image.into_iter().zip(noise).collect(), edge, own, levels)
 }
 
 /// The levels on an image whose noise is known.
-pub fn levels(size: [u32; 2], mut image: Vec<Noisy>, s: &FilterSettings) -> Vec<vec4> {
-    let (size, rates, rate_l) = (size.map(i64::from), Rates::of_surfaces(&s.edge), s.svgf.rate_l());
-    for level in 0..s.footprint.levels {
+pub fn filtered(
+    size: [u32; 2],
+    mut image: Vec<Noisy>,
+    edge: &EdgeSettings,
+    own: &SvgfSettings,
+    levels: u32,
+) -> Vec<vec4> {
+    let (size, rates, rate_l) = (size.map(i64::from), Rates::of_surfaces(edge), own.rate_l());
+    for level in 0..levels {
         let filter = Level { image: &image, size, spacing: 1 << level, rates, rate_l };
         image = (0..image.len()).map(|at| filter.filtered(at)).collect();
     }

@@ -123,7 +123,9 @@ impl Auto {
         let pixels = pack.colour.len();
         let plane = |name| Buffer::new(gpu, name, pixels, Location::Device);
         let [wide, middle, narrow, of_svgf] = candidates(settings);
-        let windows_pack = Packed::new(gpu, settings, size)?;
+        let windows_pack = Packed::new(gpu, settings.guided.channels, settings.edge.extent, size)?;
+        let windows =
+            |s: &FilterSettings, leverages| Windows::new(gpu, s.footprint.radius, s.guided.eps, leverages, size);
         let surfaces = Rates::of_surfaces(&settings.edge).constants();
         let blend = |measured| Kernel::new(gpu, &auto::Constants { measured, ..Default::default() });
         Ok(Self {
@@ -135,12 +137,8 @@ impl Auto {
             blend: [blend(false)?, blend(true)?],
             nothing: Buffer::from_slice(gpu, "no variance", &[])?,
             residual: Kernel::new(gpu, &auto_residual::Constants { edge: surfaces })?,
-            windows: [
-                Windows::new(gpu, &wide, false, size)?,
-                Windows::new(gpu, &middle, false, size)?,
-                Windows::new(gpu, &narrow, true, size)?,
-            ],
-            svgf: Levels::new(gpu, &of_svgf, size)?,
+            windows: [windows(&wide, false)?, windows(&middle, false)?, windows(&narrow, true)?],
+            svgf: Levels::new(gpu, &of_svgf.edge, &of_svgf.svgf, of_svgf.footprint.levels, size)?,
             svgf_estimate: Estimate::new(gpu, &of_svgf.edge, false, size)?,
             results: [plane("wide")?, plane("middle")?, plane("narrow")?, plane("svgf")?],
             dim: Buffer::new(gpu, "dim", windows_pack.colour.len(), Location::Device)?,

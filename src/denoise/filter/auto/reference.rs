@@ -46,12 +46,19 @@ impl Results {
         let dim = |i: usize| dimmed(image[i].colour, wide[i].xyz());
         let [wide_dim, narrow] = [0, 2].map(|k| run(k, pixels(&dim)));
         let added = |i: usize| probe(i, wide[i].xyz(), floor(settings));
-        let of_narrow = guided::leverages(&input.with_radiance(pixels(&dim)), &rows[2]);
+        let of_narrow = guided::leverages(
+            &input.with_radiance(pixels(&dim)),
+            &rows[2].guided,
+            rows[2].footprint.radius,
+            rows[2].edge.extent,
+        );
         // The probe does not change what is known of noise.
         let noise = noise_estimate::reference(input, image, &rows[3].edge, false);
+        let (size, s) = ([input.width, input.height], &rows[3]);
         let svgf = |added: &dyn Fn(usize) -> f32| -> Vec<Vec4> {
             let pixel = |i: usize| (Packed { colour: image[i].colour + added(i), ..image[i] }, noise[i]);
-            let output = svgf::levels([input.width, input.height], (0..image.len()).map(pixel).collect(), &rows[3]);
+            let output =
+                svgf::filtered(size, (0..image.len()).map(pixel).collect(), &s.edge, &s.svgf, s.footprint.levels);
             output.into_iter().map(Vec4::from).collect()
         };
         let (svgf, probed) = (svgf(&|_| 0.0), svgf(&added));

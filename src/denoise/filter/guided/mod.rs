@@ -4,7 +4,7 @@ mod pack;
 mod reference;
 mod table;
 
-use super::{Filter, FilterSettings, Planes, Row};
+use super::{Filter, Planes, Row};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{GuidedPush, float, vec4};
@@ -20,13 +20,14 @@ pub const ROW: Row = Row {
     about: "guided image filter: light as a local linear function of normal and depth",
     bytes: 96, // colours, channels and four planes of models; tables are of small images
     make: |gpu, s, size| {
-        let pack = Packed::new(gpu, s, size)?;
-        Ok(match s.guided.sums {
-            GuidedSums::Blocks => Box::new(Guided { windows: Windows::new(gpu, s, false, size)?, pack }),
-            GuidedSums::Table => Box::new(GuidedTable::new(gpu, pack, s, size)?),
+        let (own, radius) = (&s.guided, s.footprint.radius);
+        let pack = Packed::new(gpu, own.channels, s.edge.extent, size)?;
+        Ok(match own.sums {
+            GuidedSums::Blocks => Box::new(Guided { windows: Windows::new(gpu, radius, own.eps, false, size)?, pack }),
+            GuidedSums::Table => Box::new(GuidedTable::new(gpu, pack, radius, own.eps, size)?),
         })
     },
-    reference: reference::reference,
+    reference: |input, s| reference::reference(input, &s.guided, s.footprint.radius, s.edge.extent),
 };
 
 /// `vec4`s of a pixel's record in a strip.
@@ -158,12 +159,11 @@ impl Walk {
 }
 
 impl Windows {
-    /// For images of (width, height).
+    /// For images of (width, height); with `leverages` it leaves those too.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when its buffers do not fit.
-    pub fn new(gpu: &Gpu, s: &FilterSettings, leverages: bool, size: [u32; 2]) -> Result<Self> {
-        let (radius, eps) = (s.footprint.radius, s.guided.eps);
+    pub fn new(gpu: &Gpu, radius: u32, eps: vec4, leverages: bool, size: [u32; 2]) -> Result<Self> {
         let step = step(radius);
         let [width, height] = size.map(|edge| edge.div_ceil(step));
         let [down, along] = [height, width].map(|edge| Walk::new(gpu, radius / step, edge));

@@ -1,5 +1,5 @@
 //! What both forms of `guided` read of an image. Kernel: `glsl/guided/guided_pack.comp`.
-use crate::denoise::filter::{FilterSettings, Planes};
+use crate::denoise::filter::Planes;
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{GuidedPackPush, vec4};
@@ -19,17 +19,17 @@ pub struct Packed {
 }
 
 impl Packed {
-    /// For images of (width, height).
+    /// For images of (width, height), whose guide has 1, 3 or 4 `channels` and depths in units of `extent`.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when they do not fit.
-    pub fn new(gpu: &Gpu, s: &FilterSettings, [width, height]: [u32; 2]) -> Result<Self> {
+    pub fn new(gpu: &Gpu, channels: u32, extent: f32, [width, height]: [u32; 2]) -> Result<Self> {
         let pixels = width.next_multiple_of(BESIDE) as usize * height as usize;
         Ok(Self {
-            kernel: Kernel::new(gpu, &guided_pack::Constants { channels: s.guided.channels })?,
+            kernel: Kernel::new(gpu, &guided_pack::Constants { channels })?,
             colour: Buffer::new(gpu, "colour", pixels, Location::Device)?,
             channels: Buffer::new(gpu, "channels", pixels, Location::Device)?,
-            depth_scale: 1.0 / s.edge.extent,
+            depth_scale: 1.0 / extent,
         })
     }
 

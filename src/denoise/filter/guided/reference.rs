@@ -1,7 +1,7 @@
 //! The guided filter on the host, window by window: the twin of both of its forms on a device.
-use super::{GuidedSums, step};
+use super::{GuidedSettings, GuidedSums, step};
+use crate::denoise::filter::FilterInput;
 use crate::denoise::filter::pixel::{known_channel, known_radiance};
-use crate::denoise::filter::{FilterInput, FilterSettings};
 use crate::layout::{Guide, vec4};
 use glam::{DVec3, DVec4};
 use rayon::prelude::*;
@@ -34,16 +34,16 @@ struct Image<'a> {
 }
 
 impl<'a> Image<'a> {
-    fn new(input: &'a FilterInput, s: &'a FilterSettings) -> Self {
+    fn new(input: &'a FilterInput, own: &'a GuidedSettings, radius: u32, extent: f32) -> Self {
         let pixel = |(c, g): (&vec4, &Guide)| Pixel {
             colour: known_radiance(*c).map(|c| c.as_dvec3()),
-            guide: channels(g, s.guided.channels, s.edge.extent),
+            guide: channels(g, own.channels, extent),
         };
         let pixels = input.radiance.iter().zip(&input.guide).map(pixel).collect();
-        let (size, radius) = ([input.width, input.height], s.footprint.radius);
-        let step = if s.guided.sums == GuidedSums::Table { 1 } else { step(radius) };
+        let size = [input.width, input.height];
+        let step = if own.sums == GuidedSums::Table { 1 } else { step(radius) };
         let blocks = size.map(|edge| edge.div_ceil(step));
-        Self { input, pixels, size, blocks, step, radius: radius / step, eps: &s.guided.eps }
+        Self { input, pixels, size, blocks, step, radius: radius / step, eps: &own.eps }
     }
 
     fn block_of(&self, at: usize) -> usize {
@@ -64,8 +64,8 @@ impl<'a> Image<'a> {
 }
 
 /// Window by window, in double precision: the definition.
-pub fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
-    let image = Image::new(input, settings);
+pub fn reference(input: &FilterInput, own: &GuidedSettings, radius: u32, extent: f32) -> Vec<vec4> {
+    let image = Image::new(input, own, radius, extent);
     let model = |block: usize| image.sums(block).map(Sums::model);
     let models: Vec<Option<Model>> =
         (0..(image.blocks[0] * image.blocks[1]) as usize).into_par_iter().map(model).collect();
@@ -89,8 +89,8 @@ pub fn reference(input: &FilterInput, settings: &FilterSettings) -> Vec<vec4> {
 
 /// The derivative of every pixel's value in the model of the window around it by its own value; at least the mean of that of the
 /// window's pixels.
-pub fn leverages(input: &FilterInput, settings: &FilterSettings) -> Vec<f32> {
-    let image = Image::new(input, settings);
+pub fn leverages(input: &FilterInput, own: &GuidedSettings, radius: u32, extent: f32) -> Vec<f32> {
+    let image = Image::new(input, own, radius, extent);
     let leverage = |at: usize| {
         image.sums(image.block_of(at)).map_or(1.0, |sums| {
             let off = image.pixels[at].guide - sums.mean_guide;
@@ -192,11 +192,7 @@ mod tests {
     fn in_threes(depth: impl Fn(usize) -> f32, eps: f32) -> Vec<f32> {
         let guide = (0..5).map(|i| Guide { depth: depth(i), ..Default::default() }).collect();
         let input = FilterInput { width: 5, height: 1, radiance: vec![[1.0; 4]; 5], guide, variance: None };
-        let settings = FilterSettings::default().with(|s| {
-            s.footprint.radius = 1;
-            s.guided.eps = [eps; 4];
-        });
-        leverages(&input, &settings)
+        leverages(&input, &GuidedSettings { eps: [eps; 4], ..Default::default() }, 1, 1.0)
     }
 
     fn close(found: &[f32], right: [f32; 5]) -> bool {

@@ -1,7 +1,7 @@
 //! The guided filter by summed-area tables, as Bauszat, Eisemann and Magnor (EGSR 2011) have it: kept to be measured
 //! against [`super::guided`], whose sums keep their digits. Kernels: `glsl/guided_table_*.comp`.
 use super::pack::Packed;
-use crate::denoise::filter::{Filter, FilterSettings, Planes};
+use crate::denoise::filter::{Filter, Planes};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{GuidedPush, vec4};
@@ -33,7 +33,7 @@ impl GuidedTable {
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when the tables, 128 bytes per pixel, do not fit.
-    pub fn new(gpu: &Gpu, pack: Packed, s: &FilterSettings, size: [u32; 2]) -> Result<Self> {
+    pub fn new(gpu: &Gpu, pack: Packed, radius: u32, eps: vec4, size: [u32; 2]) -> Result<Self> {
         let plane = |name| Buffer::new(gpu, name, pack.colour.len(), Location::Device);
         let table =
             |name| Buffer::new(gpu, name, size[0] as usize * size[1] as usize * MOMENTS as usize, Location::Device);
@@ -46,8 +46,8 @@ impl GuidedTable {
             model: [plane("slope_r")?, plane("slope_g")?, plane("slope_b")?, plane("value")?],
             rows: table("rows")?,
             table: table("table")?,
-            radius: s.footprint.radius,
-            eps: s.guided.eps,
+            radius,
+            eps,
             pack,
         })
     }
