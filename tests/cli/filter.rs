@@ -238,6 +238,7 @@ fn fireflies_are_cut_where_samples_tell_or_when_asked_and_it_is_said() {
     write(&folder, "noisy.exr", &film);
     let (kept, cut) = (off_by(&[]), off_by(&["--fireflies", "2"]));
     assert!(cut < 0.1 && kept > 2.0 * cut, "{kept} {cut}");
+    assert_eq!(kept, off_by(&["--fireflies", "off"]));
     assert!(said("none", &["--fireflies", "2"]) && !said("none", &[]));
     // One of sixteen samples has: the variance of their mean is its square.
     let mut variance = vec![[0.005; 3]; (SIZE * SIZE) as usize];
