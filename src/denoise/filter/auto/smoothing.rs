@@ -24,7 +24,7 @@ fn least(level: u32, across: bool) -> f32 {
 }
 
 /// Cells across and down an image.
-fn cells([width, height]: [u32; 2]) -> [u32; 2] {
+fn grid([width, height]: [u32; 2]) -> [u32; 2] {
     [width, height].map(|edge| edge.div_ceil(CELL as u32))
 }
 
@@ -62,7 +62,7 @@ impl Smoothing {
     /// # Errors
     /// [`crate::error::Error::Device`] when it does not fit.
     pub fn new(gpu: &Gpu, edge: &EdgeSettings, size: [u32; 2]) -> Result<Self> {
-        let (rates, [across, down]) = (Rates::of_surfaces(&alike(edge)), cells(size));
+        let (rates, [across, down]) = (Rates::of_surfaces(&alike(edge)), grid(size));
         Ok(Self {
             cells: Kernel::new(gpu, &Default::default())?,
             kernels: [Kernels::new(gpu, &rates, false)?, Kernels::new(gpu, &rates, true)?],
@@ -74,7 +74,7 @@ impl Smoothing {
     /// colour\[P\], place\[P\] -> the surfaces of cells, for all that follows
     pub fn record_cells(&self, rec: &mut Recorder, pack: &Pack, size: [u32; 2]) -> Result<()> {
         let bind = auto_cells::Bind { colour: &pack.colour, place: &pack.place, cells: &self.surfaces };
-        rec.dispatch(&self.cells, bind, &AutoCellsPush { size, ..Default::default() }, self.cells.groups(cells(size)))
+        rec.dispatch(&self.cells, bind, &AutoCellsPush { size, ..Default::default() }, self.cells.groups(grid(size)))
     }
 
     /// from\[P\] -> to\[P\]; `between` holds every other level, and may be `from`. `across` surfaces, three planes; or within alike
@@ -88,14 +88,13 @@ impl Smoothing {
         across: bool,
     ) -> Result<()> {
         let (Kernels { smooth, spread }, rates) = (&self.kernels[usize::from(across)], self.rates);
-        let (Pack { colour, place, .. }, cells_of) = (pack, &self.surfaces);
+        let (Pack { colour, place, .. }, cells) = (pack, &self.surfaces);
         for level in 0..LEVELS {
             let ([first, second, third], [first_smoothed, second_smoothed, third_smoothed]) = match level {
                 0 => (from, to),
                 level if level % 2 == 0 => (between, to),
                 _ => (to, between),
             };
-            let cells = cells_of;
             let bind = auto_smooth::Bind {
                 colour,
                 place,
@@ -107,14 +106,13 @@ impl Smoothing {
                 second_smoothed,
                 third_smoothed,
             };
-            // Pixels, then cells, apart.
+            // The first level's taps are pixels, those of the others cells.
             let (smooth, spacing) =
                 (&smooth[usize::from(level > 0)], if level == 0 { 1 } else { (1 << level) / CELL as u32 });
             let push = AutoSmoothPush { size, spacing, rates, least: least(level, across), ..Default::default() };
-            rec.dispatch(smooth, bind, &push, smooth.groups(threads(self::cells(size), spacing)))?;
+            rec.dispatch(smooth, bind, &push, smooth.groups(threads(grid(size), spacing)))?;
         }
         let ([first, second, third], [first_spread, second_spread, third_spread]) = (between, to);
-        let cells = cells_of;
         let bind =
             auto_spread::Bind { colour, place, cells, first, second, third, first_spread, second_spread, third_spread };
         rec.dispatch(spread, bind, &AutoSpreadPush { size, rates, ..Default::default() }, spread.groups(size))
@@ -134,7 +132,7 @@ pub struct Cells<'a> {
 impl<'a> Cells<'a> {
     /// Of an image of (width, height).
     pub fn new(image: &'a [Packed], size: [u32; 2], edge: &EdgeSettings) -> Self {
-        let (grid, [width, height]) = (cells(size), size);
+        let (grid, [width, height]) = (grid(size), size);
         let surface = |cell: u32| {
             let [x, y] = [cell % grid[0], cell / grid[0]].map(|first| first * CELL as u32);
             let inside =
