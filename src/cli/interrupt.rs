@@ -77,10 +77,10 @@ pub fn exit(code: i32) -> ! {
     std::process::exit(code)
 }
 
-/// Begins to listen for signals, at the start of the command line. Signals that the caller ignores (`nohup`, `&` in a
+/// Begins to listen for signals, which end the process with this line. Signals that the caller ignores (`nohup`, `&` in a
 /// script) stay ignored. If no thread can be started, signals have their default effect.
-pub fn install() {
-    leave_at_once("interrupted: nothing was written");
+pub fn install(line: &str) {
+    leave_at_once(line);
     #[cfg(unix)]
     signals::listen(|ctrl_c| {
         let mut listener = listener();

@@ -77,9 +77,11 @@ pub enum Exit {
 /// Runs the command line and returns its exit code. An error is printed in one line on stderr.
 pub fn main() -> ExitCode {
     crash::report_panics();
-    interrupt::install();
     let result = match parse(std::env::args_os()) {
-        Ok(cli) => run(cli.command),
+        Ok(cli) => {
+            interrupt::install(&interruption(&cli.command));
+            run(cli.command)
+        }
         Err(e) => usage(&e),
     };
     match result {
@@ -99,6 +101,14 @@ fn parse(words: impl IntoIterator<Item = OsString>) -> std::result::Result<Cli, 
     };
     let command = Cli::command().mut_subcommands(|command| command.mut_args(numbers));
     Cli::from_arg_matches(&command.try_get_matches_from(words)?)
+}
+
+/// What an interruption says until the command has more to say.
+fn interruption(command: &Command) -> String {
+    match command {
+        Command::Sequence(_) => sequence::interruption("before the first frame"),
+        _ => "interrupted: nothing was written".to_owned(),
+    }
 }
 
 fn run(command: Command) -> Result<Exit> {

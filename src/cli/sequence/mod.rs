@@ -164,7 +164,6 @@ struct Summary {
 /// What fails before the first frame, and the loss of the device.
 pub fn run(args: &Args) -> Result<Exit> {
     args.check()?;
-    interrupt::leave_at_once(&interruption("before the first frame"));
     let begun = Instant::now();
     let mut stage = Stage::new(args)?;
     let mut preview = args.preview.as_ref().map(|_| Preview::default());
@@ -198,7 +197,8 @@ pub fn run(args: &Args) -> Result<Exit> {
     Ok(if failed == 0 { Exit::Done } else { Exit::PartlyFailed })
 }
 
-fn interruption(place: &str) -> String {
+/// What an interruption at this place says.
+pub fn interruption(place: &str) -> String {
     format!("interrupted {place}: finished frames stay, and the same command goes on there")
 }
 
