@@ -66,7 +66,10 @@ impl Demodulated {
         Ok(Self {
             split: Kernel::new(gpu, &constants)?,
             join: Kernel::new(gpu, &Default::default())?,
-            cut: fireflies.factor(measured).map(|factor| Cut::new(gpu, &planes, factor)).transpose()?,
+            cut: fireflies
+                .factor(measured)
+                .map(|factor| Cut::new(gpu, plane("whole")?, &planes, factor))
+                .transpose()?,
             planes,
             variance,
             factor: plane("factor")?,
@@ -87,7 +90,9 @@ impl Demodulated {
             sharp: &self.picture,
         };
         rec.dispatch_threads(&self.split, bind, &SplitPush { size: planes.size, ..Default::default() }, count)?;
-        self.cut.as_ref().map_or(Ok(()), |cut| cut.record(rec, planes))?;
+        if let Some(cut) = &self.cut {
+            cut.record(rec, planes)?;
+        }
         let Some(direct) = &self.direct else { return Ok(()) };
         let image = noisy::Bind { stats: &noisy.stats, light: &noisy.light, guide: &noisy.guide };
         let bind = demodulate_direct::Bind { noisy: image, direct: &direct.plane };

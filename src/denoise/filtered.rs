@@ -20,7 +20,7 @@ pub struct Recipe<'a> {
     /// What is kept away from the filter, where the image tells it and the filter does not want the colour whole. By default
     /// [`Holds::usual_demodulation`].
     pub demodulation: Option<Demodulation>,
-    /// What is cut first, where the filter does not want the colour whole.
+    /// What is cut first: see [`Recipe::fireflies`].
     pub fireflies: Fireflies,
     /// The settings for light of these scales.
     pub settings: &'a dyn Fn(&Scales) -> FilterSettings,
@@ -33,7 +33,7 @@ impl Recipe<'_> {
         Self { method, demodulation: None, fireflies: Fireflies::Usual, settings }
     }
 
-    /// What is cut. Unless it is asked for, nothing where nothing is filtered, nor for Open Image Denoise, which is used to more.
+    /// What is cut. Unless it is asked for, nothing where nothing is filtered, nor for Open Image Denoise, which wants the colour whole.
     pub fn fireflies(&self) -> Fireflies {
         let takes_apart = matches!(self.method, Method::Kernels(row) if row.name != "none");
         if self.fireflies == Fireflies::Usual && !takes_apart { Fireflies::Off } else { self.fireflies }

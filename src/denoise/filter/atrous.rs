@@ -1,5 +1,5 @@
 //! Edge-avoiding À-Trous wavelet filter (Dammertz, Sewtz, Hanika, Lensch, HPG 2010). Kernel: `glsl/filter/atrous.comp`.
-use super::atrous_taps::threads;
+use super::atrous_taps::{b3_spline, threads};
 use super::edge::{EdgeSettings, Rates, edge_weight};
 use super::footprint::FootprintSettings;
 use super::pack::{Pack, Packed};
@@ -133,7 +133,6 @@ fn reference(input: &FilterInput, edge: &EdgeSettings, own: &AtrousSettings, lev
 
 impl Level<'_> {
     fn filtered(&self, at: usize) -> Packed {
-        const B3: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
         let ([width, height], p) = (self.size, self.image[at]);
         let (x, y) = (at as i64 % width, at as i64 / width);
         let (mut sum, mut total) = (Vec3::ZERO, 0.0);
@@ -141,7 +140,7 @@ impl Level<'_> {
             let (u, v) = (x + i * self.spacing, y + j * self.spacing);
             if (0..width).contains(&u) && (0..height).contains(&v) {
                 let q = self.image[(v * width + u) as usize];
-                let h = B3[i.unsigned_abs() as usize] * B3[j.unsigned_abs() as usize];
+                let h = b3_spline(i) * b3_spline(j);
                 let trust = if self.conserve { 1.0 } else { q.count.min(MOST_SAMPLES).sqrt() };
                 let w = h * trust * edge_weight(&q, self.rates.exponent(&p, &q));
                 sum += w * (q.colour - p.colour);

@@ -1,6 +1,6 @@
 //! À-Trous wavelets steered by each pixel's variance: the spatial half of SVGF (Schied et al., HPG 2017). Kernel:
 //! `glsl/filter/svgf.comp`.
-use super::atrous_taps::threads;
+use super::atrous_taps::{b3_spline, threads};
 use super::edge::{EdgeSettings, Rates, edge_weight};
 use super::noise_estimate::{self, Estimate, contrast};
 use super::pack::{Pack, Packed};
@@ -185,14 +185,13 @@ impl Level<'_> {
     }
 
     fn filtered(&self, at: usize) -> Noisy {
-        const B3: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
         let ((p, noise), rate) = (self.image[at], self.rate_at(at));
         let (mut sum, mut total, mut spread) = (Vec3::ZERO, 0.0, 0.0);
         for (i, j) in around(2) {
             let Some((q, variance)) = self.tap(at, i * self.spacing, j * self.spacing) else { continue };
             let steps = if noise >= 0.0 { rate * contrast(q.colour, p.colour).abs() } else { 0.0 };
             let exponent = self.rates.exponent(&p, q) - steps;
-            let w = B3[i.unsigned_abs() as usize] * B3[j.unsigned_abs() as usize] * edge_weight(q, exponent);
+            let w = b3_spline(i) * b3_spline(j) * edge_weight(q, exponent);
             sum += w * (q.colour - p.colour);
             total += w;
             spread += w * w * variance;

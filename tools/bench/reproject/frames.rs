@@ -112,7 +112,7 @@ fn measure(gpu: &Gpu, args: &Args, spp: u32, (name, base, arm): Named, sequence:
     };
     let flicker = mean(offs.windows(2).skip(FIRST - 1).map(change));
     let truth: Vec<&Picture> = sequence.references.iter().skip(FIRST).map(|reference| &reference.picture).collect();
-    let jod = seen::jod(&pictures[FIRST.min(pictures.len())..], &truth, args.fps as f32)?;
+    let jod = seen::jod(&pictures[FIRST..], &truth, args.fps as f32)?;
     let of = |column: usize| tallow::profile::median(&times.iter().skip(2).map(|t| t[column]).collect::<Vec<_>>());
     Ok(Line { name, base, errors, flicker, jod, frame_ms: of(0), carrying_ms: of(1), sum })
 }

@@ -1,7 +1,7 @@
 //! Smoothing of what `auto` estimates, over cells of pixels. Kernels: `glsl/auto/auto_cells.comp`, `auto_smooth.comp`,
-//! `auto_spread.comp`. Twin: [`smoothed`].
+//! `auto_spread.comp`. Twin: [`Cells`].
 use super::alike;
-use crate::denoise::filter::atrous_taps::threads;
+use crate::denoise::filter::atrous_taps::{b3_spline, threads};
 use crate::denoise::filter::edge::{EdgeSettings, Rates, edge_weight};
 use crate::denoise::filter::pack::{Pack, Packed};
 use crate::error::Result;
@@ -156,7 +156,6 @@ impl<'a> Cells<'a> {
     }
 
     fn level(&self, estimates: &[Vec4], of_pixels: bool, spacing: i64, least: f32) -> Vec<Vec4> {
-        const B3: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
         let (taps, [width, height], stride) = match of_pixels {
             true => (self.image, self.size, i64::from(CELL)),
             false => (&*self.surfaces, self.grid, 1),
@@ -167,7 +166,7 @@ impl<'a> Cells<'a> {
                 let u = (stride * (at % self.grid[0]) + i * spacing).clamp(0, width - 1);
                 let v = (stride * (at / self.grid[0]) + j * spacing).clamp(0, height - 1);
                 let (p, q) = (&self.surfaces[at as usize], &taps[(v * width + u) as usize]);
-                let w = B3[i.unsigned_abs() as usize] * B3[j.unsigned_abs() as usize];
+                let w = b3_spline(i) * b3_spline(j);
                 let alike = edge_weight(q, self.rates.exponent(p, q));
                 let w = if q.count > 0.0 { w * alike.max(least) } else { 0.0 };
                 sum += w * estimates[(v * width + u) as usize];
