@@ -65,7 +65,7 @@ vec3 light_from(SurfacePoint at, uint index) {
     Path path = Path(previous.position, off / max(depth, 1e-37), vec3(1.0), 0.0, true, 1.0);
     Hit hit = Hit(depth, at.triangle, at.instance, at.weights.x, at.weights.y);
     vec3 albedo;
-    SplitLight light = trace_path(path, true, hit, sampler_start(0u, index, push.constants.seed), path_seed(0u, index), albedo);
+    SplitLight light = trace_path(path, true, false, hit, sampler_start(0u, index, push.constants.seed), path_seed(0u, index), albedo);
     return light.direct + light.indirect;
 }
 

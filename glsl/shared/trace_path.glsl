@@ -123,7 +123,8 @@ bool arrive(inout SplitLight sum, Path path, Hit hit, uint kind, out Surface s) 
 }
 
 // The light of a path whose first ray has found `hit`. One that is not `on` keeps the other lanes company where triangles are dealt.
-SplitLight trace_path(Path path, bool on, Hit hit, Sampler random, uint seed, out vec3 albedo) {
+// One that is `sharp_only` ends where no light but such as a filter takes can come any more: the filter fills that in.
+SplitLight trace_path(Path path, bool on, bool sharp_only, Hit hit, Sampler random, uint seed, out vec3 albedo) {
     SplitLight sum = SplitLight(vec3(0.0), vec3(0.0), vec3(0.0));
     albedo = vec3(0.0);
     closest_rays++;
@@ -157,6 +158,10 @@ SplitLight trace_path(Path path, bool on, Hit hit, Sampler random, uint seed, ou
         bool shadowed = going && push.constants.light_count > 0u && !smooth_here && max(sampled.r, max(sampled.g, sampled.b)) > 0.0;
         bool alive = scatter(path, s, bsdf, facing, basis, wo, random, pair) && going;
         scattered += smooth_here ? 0u : 1u;
+        // From here on comes nothing but what a filter takes; with FX_SOFT already from the first surface, but for its delta lights.
+        bool ends = FX_SPARSE && sharp_only && scattered > (FX_SOFT ? 0u : 1u);
+        shadowed = shadowed && (!ends || (FX_SOFT && delta));
+        alive = alive && !ends;
         bool roulette = FX_ROULETTE && push.constants.roulette_depth > 0u && bounce + 1u >= push.constants.roulette_depth;
         if (roulette) alive = survives_roulette(path, random, pair) && alive;
         bounce++;
@@ -175,5 +180,6 @@ SplitLight trace_path(Path path, bool on, Hit hit, Sampler random, uint seed, ou
     } while (any_lane(going));
     if (FX_CLAMP) sum.indirect = clamped(sum.indirect);
     if (FX_SOFT) sum.indirect += sum.soft;
+    if (FX_SPARSE && sharp_only) sum.indirect = vec3(0.0);
     return sum;
 }

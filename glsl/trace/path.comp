@@ -4,6 +4,7 @@
 #include "shared/frame.glsl"
 #include "shared/finite.glsl"
 #include "shared/store64.glsl"
+#include "shared/stride.glsl"
 
 // Traces one camera path per thread.
 // Thread i traces sample first_sample + i / pixels of pixel first_pixel + i % pixels, or path i of a list. It writes one vec4
@@ -38,12 +39,21 @@ void count(uint slot, uint n) {
     if (before + n < before) atomicAdd(counters[2u * slot + 1u], 1u);
 }
 
+// A permutation of indices that deals SPREAD threads in turn to pixels a stride apart, so that lanes side by side trace alike: paths of
+// different lengths would wait for each other. Indices without a whole run around them stay as they are.
+const uint SPREAD = 32u;
+uint sparse_index(uint i, uint count) {
+    uint run = SPREAD * push.constants.indirect_stride, at = i % run, first = i - at;
+    return first + run > count ? i : first + at % SPREAD * push.constants.indirect_stride + at / SPREAD;
+}
+
 void main() {
     bool listed = FX_ADAPTIVE && push.samples == 0u;
     uint i = listed ? striped_index() : thread_index(); // lists are ordered by pixel: stripes spread the work
     bool on = i < push.pixels * (listed ? 1u : push.samples);
     if (!DEALT && !on) return;
     i = on ? i : 0u;
+    if (FX_SPARSE && !listed) i = sparse_index(i, push.pixels * push.samples);
     uint pixel = push.first_pixel + i % push.pixels;
     uint index = push.first_sample + i / push.pixels;
     if (listed) {
@@ -54,13 +64,14 @@ void main() {
         if (!DEALT && !on) return;
         pixel = on ? pixel : push.first_pixel;
     }
+    bool sharp_only = FX_SPARSE && !on_stride(pixel, push.constants.size.x, push.constants.indirect_stride);
     Sampler random = sampler_start(pixel, index, push.constants.seed);
     Ray ray = eye_ray(film_sample(pixel, random), random);
     Path path = Path(ray.origin, ray.direction, vec3(1.0), 0.0, true, 1.0);
     uint seed = path_seed(pixel, index);
     Hit first = traverse(Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed)), push.constants.root);
     vec3 albedo;
-    SplitLight light = trace_path(path, on, first, random, seed, albedo);
+    SplitLight light = trace_path(path, on, sharp_only, first, random, seed, albedo);
     if (!on) return;
     float rays = float(closest_rays + any_rays);
     if (!finite(light.direct + light.indirect)) {

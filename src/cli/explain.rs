@@ -280,6 +280,7 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
         | Effect::pixel_filter
         | Effect::split_light
         | Effect::soft_light
+        | Effect::sparse_light
         | Effect::independent_sampler
         | Effect::counters
         | Effect::adaptive

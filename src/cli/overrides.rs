@@ -75,7 +75,7 @@ mod tests {
         apply("", &mut settings);
         assert_eq!(settings, Settings { spp: 7, ..Settings::default() });
         let words = "--width 1 --height 2 --budget-spp 3 --first-sample 10 --max-depth 4 --roulette-depth 5 \
-            --clamp-indirect 6 --seed 8 --filter tent --sampler independent --split soft --allocate both --min-spp 11 --max-spp 12 \
+            --clamp-indirect 6 --indirect-stride 2 --seed 8 --filter tent --sampler independent --split soft --allocate both --min-spp 11 --max-spp 12 \
             --rounds 13 --window 9 --sigma-normal 0.1 --sigma-position 0.2 --luminance-floor=-1 \
             --noise-threshold 0.3 --filtered 0.4";
         apply(words, &mut settings);
@@ -97,6 +97,7 @@ mod tests {
             max_depth: 4,
             roulette_depth: 5,
             clamp_indirect: 6.0,
+            indirect_stride: 2,
             seed: 8,
             split: Split::Soft,
             filter: PixelFilter::Tent,

@@ -134,6 +134,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     }
     let gpu = host.time("open device", || args.common.open())?;
     check_room(args, &settings, &gpu)?;
+    check_filling(args, &settings)?;
     let plan = match plan {
         Some(plan) => Some(plan),
         None => host.time("plan", || planned::make(args, &gpu, &scene, &settings))?,
@@ -322,6 +323,23 @@ pub fn check_room(args: &Args, settings: &Settings, gpu: &Gpu) -> Result<()> {
     let refused = |what| format!("a film of {} x {} {what}: choose a smaller film", size[0], size[1]);
     memory::check(bytes).map_err(|what| Error::Device(refused(what)))?;
     args.denoise.map_or(Ok(()), |_| filter::check_size(gpu, size, filter::GUIDE_TEXELS))
+}
+
+/// Of light that is not traced for every pixel a picture can be made by some filters alone.
+///
+/// # Errors
+/// [`Error::Usage`] for another filter; without any a line tells what is left to do.
+pub fn check_filling(args: &Args, settings: &Settings) -> Result<()> {
+    let stride = settings.indirect_stride;
+    match args.denoise {
+        Some(method) => method.check_filling(stride)?,
+        None if stride > 1 && args.common.talkative() => complain(&format!(
+            "warning: with indirect_stride {stride} most pixels lack indirect light until a filter fills it in: add --denoise, or use \
+             tallow filter on the .exr"
+        )),
+        None => {}
+    }
+    Ok(())
 }
 
 #[cfg(test)]

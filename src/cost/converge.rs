@@ -41,6 +41,7 @@ impl Converging {
             spp: PART_SPP,
             seed: FIRST_SEED,
             first_sample: 0,
+            indirect_stride: 1,
             allocate: Allocate::default(),
             ..settings.clone()
         };

@@ -3,6 +3,7 @@
 use super::document::Method;
 use crate::allocate::{Placing, Policy};
 use crate::denoise::filter::{self, FilterSettings};
+use crate::error::Result;
 use crate::render::settings::Settings;
 use crate::render::{Outputs, Reproject};
 use crate::settings::entry::{Entry, Value};
@@ -73,6 +74,15 @@ pub fn grid(base: &Settings, filters: &FilterSettings, axes: &Axes) -> Vec<Candi
 }
 
 impl Candidate {
+    /// Whether it makes an image of the whole light.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Usage`] where no filter fills in light that is not traced.
+    pub fn check_filling(&self) -> Result<()> {
+        let none = || filter::find("none").map(filter::Method::Kernels);
+        self.filter.or_else(none).map_or(Ok(()), |filter| filter.check_filling(self.settings.indirect_stride))
+    }
+
     /// The same with other settings, as `change` makes them, and named by `option`. `None` if they are no others.
     pub fn varied(
         &self,

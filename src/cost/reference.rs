@@ -82,5 +82,5 @@ fn differences(of_file: &serde_json::Value, settings: &Settings) -> Vec<String> 
         let (theirs, ours) = (&of_file[key], &ours[key]);
         format!("the reference was rendered with {} {theirs} instead of {ours}", key.replace('_', "-"))
     };
-    ["filter", "max_depth", "clamp_indirect"].into_iter().filter(differs).map(note).collect()
+    ["filter", "max_depth", "clamp_indirect", "indirect_stride"].into_iter().filter(differs).map(note).collect()
 }

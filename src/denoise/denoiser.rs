@@ -44,6 +44,7 @@ impl Denoiser {
             let lack = "direct light apart: make the renderer with Outputs::split_light";
             return Err(Error::Usage(format!("a frame cannot be filtered without {lack}")));
         }
+        row.check_filling(noisy.holds().indirect_stride)?;
         filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
         let allocate = &renderer.settings().allocate;
         let in_paint = apart && !allocate.is_even() && allocate.min_spp == 0;

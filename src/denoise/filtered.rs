@@ -96,6 +96,7 @@ impl Filtered {
     /// device fails.
     pub fn new(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Self> {
         filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
+        recipe.method.check_filling(noisy.holds().indirect_stride)?;
         let demodulation = recipe.demodulation(noisy.holds());
         let in_painted = demodulation == Demodulation::Light && noisy.lacks_direct_light()?;
         let parts = Demodulated::new(gpu, &noisy, demodulation, in_painted, recipe.fireflies())?;

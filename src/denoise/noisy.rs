@@ -21,13 +21,28 @@ pub struct Holds {
     pub indirect_variance: bool,
     /// Direct light holds none of lamps and sky.
     pub sharp_direct: bool,
+    /// Distance along both axes between pixels whose indirect light is known: see
+    /// [`Settings::indirect_stride`](crate::render::settings::Settings::indirect_stride).
+    pub indirect_stride: u32,
 }
 
 impl Holds {
     /// What a renderer leaves.
-    pub fn film(split_light: bool, sharp_direct: bool) -> Self {
-        let (albedo, variance) = (true, true);
-        Self { of_file: false, albedo, light: split_light, variance, indirect_variance: split_light, sharp_direct }
+    pub fn film(split_light: bool, sharp_direct: bool, indirect_stride: u32) -> Self {
+        Self {
+            of_file: false,
+            albedo: true,
+            light: split_light,
+            variance: true,
+            indirect_variance: split_light,
+            sharp_direct,
+            indirect_stride,
+        }
+    }
+
+    /// Whether the indirect light of a pixel is known, if that of any is.
+    pub fn has_indirect(&self, pixel: [u32; 2]) -> bool {
+        pixel.iter().all(|at| at.is_multiple_of(self.indirect_stride))
     }
 
     /// What is best kept away from a filter: direct light of delta lights, whose shadows are sharp and no guide shows them. Lamps and
@@ -36,10 +51,11 @@ impl Holds {
         self.demodulation(if self.sharp_direct { Demodulation::Light } else { Demodulation::Albedo })
     }
 
-    /// What of `wanted` the planes allow.
+    /// What of `wanted` the planes allow. Pixels without indirect light have some of their light alone, which does not count as all.
     pub fn demodulation(&self, wanted: Demodulation) -> Demodulation {
         match wanted {
             _ if !self.albedo => Demodulation::Off,
+            _ if self.light && self.indirect_stride > 1 => Demodulation::Light,
             Demodulation::Light if !self.light => Demodulation::Albedo,
             wanted => wanted,
         }
@@ -47,7 +63,7 @@ impl Holds {
 
     /// For kernels that read the planes.
     pub(super) fn constants(&self) -> noisy::Constants {
-        noisy::Constants { of_file: self.of_file, apart: self.light }
+        noisy::Constants { of_file: self.of_file, apart: self.light, indirect_stride: self.indirect_stride }
     }
 
     /// Whether the variance of what is filtered is known.
@@ -78,6 +94,7 @@ impl Noisy {
         let (outputs, settings, tiles) = (renderer.outputs(), renderer.settings(), &renderer.film().tiles);
         let lacks = [
             (outputs.guides, "its guides: make the renderer with Outputs::guides"),
+            (outputs.split_light || settings.indirect_stride == 1, "direct light apart: set Outputs::split_light"),
             (tiles.len() == 1, "a film in one piece: choose a smaller one"),
         ];
         if let Some((_, what)) = lacks.iter().find(|(there, _)| !there) {
@@ -88,7 +105,7 @@ impl Noisy {
             stats: tiles[0].stats.clone(),
             light: tiles[0].light.clone(),
             guide: if tiles[0].has_seen() { &tiles[0].seen } else { &tiles[0].guide }.clone(),
-            holds: Holds::film(outputs.split_light, renderer.sharp_direct()),
+            holds: Holds::film(outputs.split_light, renderer.sharp_direct(), settings.indirect_stride),
         })
     }
 

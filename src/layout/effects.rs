@@ -147,6 +147,8 @@ effects! {
     spheres: FX_SPHERES;
     /// What lamps and sky bring to the first hit goes with indirect light.
     soft_light: FX_SOFT;
+    /// Light that a filter takes is traced for some pixels only.
+    sparse_light: FX_SPARSE;
     /// A hierarchy deep enough that rays of a subgroup gain from testing each other's triangles.
     dealt_triangles: FX_DEALT;
     /// Textures of more texels than one view of single words may have: words are fetched by four.

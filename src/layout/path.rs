@@ -18,6 +18,8 @@ gpu_structs! {
         roulette_depth: uint,
         /// Limit of an indirect sample's largest channel; 0 is off.
         clamp_indirect: float,
+        /// Distance along both axes between pixels whose filtered light is traced; 1 is all.
+        indirect_stride: uint,
         /// One of the PIXEL_FILTER_ constants.
         pixel_filter: uint,
         /// Number of lights in the alias table.
@@ -32,7 +34,7 @@ gpu_structs! {
         root: uint,
     }
 
-    /// Push constants of `path.comp`, `primary_hit.comp` and `guide_lookup.comp`, 64 of the 128 bytes that every device has.
+    /// Push constants of `path.comp`, `primary_hit.comp` and `guide_lookup.comp`, 68 of the 128 bytes that every device has.
     struct PathPush {
         /// What stays the same during the frame.
         constants: PathConstants,

@@ -18,6 +18,8 @@ pub(crate) const PENDING: &str = "pending";
 
 /// Metadata: whether the layer of direct light holds none of lamps and sky, which is noisy. Filters ask for it.
 pub(crate) const SHARP_DIRECT: &str = "sharpDirect";
+/// Metadata: [`Settings::indirect_stride`]. Filters ask for it.
+pub(crate) const INDIRECT_STRIDE: &str = "indirectStride";
 /// Key of metadata: what the layer `albedo` holds, [`OF_SAMPLES`]. Earlier versions wrote another albedo and did not say so.
 pub(crate) const ALBEDO: &str = "albedo";
 /// Value of it: the mean of all samples of a pixel.

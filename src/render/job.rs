@@ -135,6 +135,7 @@ impl<'a> Job<'a> {
         film.metadata.insert(SOFTWARE.to_owned(), format!("tallow {}", env!("CARGO_PKG_VERSION")));
         film.metadata.insert(film::ALBEDO.to_owned(), film::OF_SAMPLES.to_owned());
         film.metadata.insert(film::SHARP_DIRECT.to_owned(), self.renderer.sharp_direct().to_string());
+        film.metadata.insert(film::INDIRECT_STRIDE.to_owned(), self.renderer.settings().indirect_stride.to_string());
         if self.pixel.is_none() {
             film.metadata.extend(provenance::metadata(self.renderer, &film)?);
         }

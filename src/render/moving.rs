@@ -127,6 +127,10 @@ pub(super) fn check_camera(camera: &Camera) -> Result<()> {
 }
 
 fn check_placing(settings: &Settings) -> Result<()> {
+    if settings.indirect_stride > 1 {
+        let what = "carried samples hold all light of their pixels: set indirect_stride to 1 to reproject";
+        return Err(Error::Usage(what.into()));
+    }
     match schedule::list_may_be_short(settings) || settings.allocate.max_spp > 0 {
         true => Err(Error::Usage(
             "carried samples count where a budget is placed: set neither noise_threshold nor max_spp, and choose one of the policies \

@@ -43,6 +43,7 @@ fn path_constants(scene: &Scene, settings: &Settings) -> PathConstants {
         max_depth: settings.max_depth,
         roulette_depth: settings.roulette_depth,
         clamp_indirect: settings.clamp_indirect,
+        indirect_stride: settings.indirect_stride,
         pixel_filter: settings.filter.code(),
         light_count: scene.lights.len() as u32,
         triangle_pdf_scale: scene.triangle_pdf_scale,

@@ -184,6 +184,8 @@ fn setting_effects(s: &Settings, found: &mut Effects, reasons: &mut Reasons) {
     found.indirect = because(Effect::indirect, s.max_depth > 2, format!("max_depth {}", s.max_depth));
     found.roulette = because(Effect::roulette, s.roulette_depth > 0, format!("roulette_depth {}", s.roulette_depth));
     found.clamp = because(Effect::clamp, s.clamp_indirect > 0.0, format!("clamp_indirect {}", s.clamp_indirect));
+    let stride = s.indirect_stride;
+    found.sparse_light = because(Effect::sparse_light, stride > 1, format!("indirect_stride {stride}"));
     found.pixel_filter = because(Effect::pixel_filter, s.filter != PixelFilter::Box, format!("filter {:?}", s.filter));
     let independent = s.sampler == Sampler::Independent;
     found.independent_sampler = because(Effect::independent_sampler, independent, "sampler independent".into());

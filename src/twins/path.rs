@@ -1,5 +1,5 @@
 //! Twin of `glsl/trace/path.comp` and of `glsl/shared/trace_path.glsl`.
-use crate::layout::{BSDF_DIELECTRIC, BSDF_METALLIC, Effects, FrameConstants, MATERIAL_TWO_SIDED, NONE, SurfacePoint};
+use crate::layout::{BSDF_DIELECTRIC, BSDF_METALLIC, Effects, FrameConstants, MATERIAL_TWO_SIDED, NONE, PathConstants, SurfacePoint};
 use crate::math::hash::pcg;
 use crate::scene::Scene;
 use crate::shaders::shared::trace_path::{
@@ -239,8 +239,8 @@ impl Tracer<'_> {
         Shade { bsdf, surface, facing, basis, wo, pair, from }
     }
 
-    /// `first` is what the path's first ray finds.
-    fn trace_path(&self, mut path: Path, first: Hit, random: Sampler, seed: u32) -> PathSample {
+    /// `first` is what the path's first ray finds. A path that is `sharp_only` ends where only light can come that a filter takes.
+    fn trace_path(&self, mut path: Path, sharp_only: bool, first: Hit, random: Sampler, seed: u32) -> PathSample {
         let (mut sum, mut rays, mut seen) = (Sum::default(), 0, Seen::default());
         let mut from = [NONE; 2];
         for bounce in 0u32.. {
@@ -270,13 +270,16 @@ impl Tracer<'_> {
                 seen.albedo = path.throughput.min(Vec3::ONE) * albedo;
             }
             seen.scattered += u32::from(!smooth_here);
+            let soft = self.effects.soft_light;
+            let ends = sharp_only && seen.scattered > u32::from(!soft);
             if self.frame.path.light_count > 0 && !smooth_here {
                 let light = self.light_from_nee(&p, random, mask_seed.wrapping_add(1));
+                let light = light.filter(|&(_, delta)| !ends || (soft && delta));
                 rays += u32::from(light.is_some());
                 let (light, delta) = light.unwrap_or_default();
                 self.add_light(&mut sum, path.throughput * light, kind_of_light(&seen, delta));
             }
-            if !self.scatter(&mut path, &p, random) {
+            if !self.scatter(&mut path, &p, random) || ends {
                 break;
             }
             let from = self.frame.path.roulette_depth;
@@ -285,9 +288,10 @@ impl Tracer<'_> {
                 break;
             }
         }
+        let filtered = self.clamped(sum.indirect) + sum.soft;
         PathSample {
             direct: sum.direct,
-            indirect: self.clamped(sum.indirect) + sum.soft,
+            indirect: if sharp_only { Vec3::ZERO } else { filtered },
             albedo: seen.albedo,
             rays,
             broken: false,
@@ -301,7 +305,9 @@ impl Tracer<'_> {
         let ray = eye_ray(&self.frame, &self.effects, film, random);
         let seed = path_seed(&self.frame, pixel, index);
         let first = traverse(self.scene, ray.origin, ray.direction, INFINITE_DISTANCE, false, pcg(seed));
-        let sample = self.trace_path(Path::new(ray.origin, ray.direction), first, random, seed);
+        let PathConstants { size: [width, _], indirect_stride, .. } = self.frame.path;
+        let sharp_only = [pixel % width, pixel / width].iter().any(|at| !at.is_multiple_of(indirect_stride.max(1)));
+        let sample = self.trace_path(Path::new(ray.origin, ray.direction), sharp_only, first, random, seed);
         match sample.radiance().is_finite() {
             true => sample,
             false => PathSample { direct: Vec3::ZERO, indirect: Vec3::ZERO, broken: true, ..sample },
@@ -314,6 +320,6 @@ impl Tracer<'_> {
         hit.t = off.length();
         let random = sampler_start(0, index, self.frame.path.seed, self.effects.independent_sampler);
         let path = Path::new(eye, off / hit.t.max(1e-37));
-        self.trace_path(path, hit, random, path_seed(&self.frame, 0, index)).radiance()
+        self.trace_path(path, false, hit, random, path_seed(&self.frame, 0, index)).radiance()
     }
 }

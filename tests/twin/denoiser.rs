@@ -107,10 +107,11 @@ impl Frame {
         settings: &FilterSettings,
         demodulation: Demodulation,
         in_paint: bool,
+        stride: u32,
     ) -> Vec<vec4> {
         let Self { size, stats, light, guide } = self;
         let (stats, light, guide) = (stats.clone(), light.clone(), guide.clone());
-        let pixels = Pixels { size: *size, holds: Holds::film(true, true), stats, light, guide };
+        let pixels = Pixels { size: *size, holds: Holds::film(true, true, stride), stats, light, guide };
         twins(demodulate(&pixels, demodulation, in_paint), filter, settings)
     }
 
@@ -148,7 +149,12 @@ fn twins(mut parts: Parts, filter: &str, settings: &FilterSettings) -> Vec<vec4>
 }
 
 fn renderer(gpu: &Gpu, size: [u32; 2], outputs: Outputs, policy: &str) -> Renderer {
+    renderer_of(gpu, size, outputs, policy, 1)
+}
+
+fn renderer_of(gpu: &Gpu, size: [u32; 2], outputs: Outputs, policy: &str, stride: u32) -> Renderer {
     let small = |s: &mut Settings| {
+        s.indirect_stride = stride;
         [s.width, s.height] = size;
         (s.spp, s.max_depth) = (4, 3);
         (s.allocate.policy, s.allocate.min_spp) = (tallow::allocate::policy(policy).unwrap(), 0);
@@ -172,7 +178,7 @@ fn frames_are_taken_apart_and_put_together_as_their_twins() {
                 let of = |filter, demodulation| {
                     let device = frame.on_the_device(&gpu, &renderer, filter, &settings, demodulation);
                     let in_paint = policy != "uniform" && demodulation == Demodulation::Light;
-                    let host = frame.on_the_host(filter, &settings, demodulation, in_paint);
+                    let host = frame.on_the_host(filter, &settings, demodulation, in_paint, 1);
                     let off = picture::apart(&device, &host, 1e-3);
                     assert!(off < 3e-4, "{filter} {demodulation:?} {policy} {size:?}: {off}");
                     assert!(device.iter().flatten().all(|v| v.is_finite()), "{filter} {demodulation:?} {size:?}");
@@ -184,6 +190,26 @@ fn frames_are_taken_apart_and_put_together_as_their_twins() {
                 let differ = |i: usize| picture::apart(&pictures[i], &pictures[i + 1], 1e-3) > 1e-2;
                 assert!(size == [1, 1] || (0..4).all(differ), "control: filters and demodulations differ");
             }
+        }
+    }
+    assert_silent(&gpu);
+}
+
+/// Of which indirect light is traced in every third column and row.
+#[test]
+fn sparse_frames_are_filled_in_as_by_their_twins() {
+    let gpu = gpu();
+    let settings = FilterSettings::default().with(|s| s.edge.extent = 3.0);
+    for size in SIZES {
+        for policy in ["uniform", "geometry"] {
+            let renderer = renderer_of(&gpu, size, ALL, policy, 3);
+            let frame = Frame::new(size, false);
+            let device = frame.on_the_device(&gpu, &renderer, "svgf", &settings, Demodulation::Light);
+            let in_paint = policy != "uniform";
+            let host = |stride| frame.on_the_host("svgf", &settings, Demodulation::Light, in_paint, stride);
+            let off = picture::apart(&device, &host(3), 1e-3);
+            assert!(off < 3e-4, "{policy} {size:?}: {off}");
+            assert!(size == [1, 1] || picture::apart(&device, &host(1), 1e-3) > 1e-2, "control: a whole frame differs");
         }
     }
     assert_silent(&gpu);
@@ -265,7 +291,7 @@ fn expected_errors_agree_with_their_twin() {
         let filtered = Filtered::new(&gpu, Noisy::of_film(&renderer).unwrap(), &recipe).unwrap();
         let device = filtered.join(&gpu).unwrap().expected.unwrap();
         let Frame { stats, light, guide, .. } = frame;
-        let pixels = Pixels { size, holds: Holds::film(true, true), stats, light, guide };
+        let pixels = Pixels { size, holds: Holds::film(true, true, 1), stats, light, guide };
         let parts = demodulate(&pixels, demodulation, false);
         let (output, expected) = estimated(&parts.input, &settings);
         let host = expected::reference(&parts, &output, &expected).unwrap();

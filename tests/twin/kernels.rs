@@ -239,6 +239,10 @@ fn renders_agree_with_their_twins() {
         let largest = samples.chunks(3).map(|s| s[1].max_element()).fold(0.0, f32::max);
         assert!((largest - 1.0).abs() < 1e-5, "indirect light of {largest}, clamped to 1");
     }
+    for split in [Split::Soft, Split::Indirect] {
+        let sparse = scene.clone().with(|s| (s.split, s.indirect_stride) = (split, 3));
+        check("pictures, sparse", &run(&gpu, &sparse, called_for(&sparse, &sparse.settings, outputs)));
+    }
     // Control: the twin's samples of the neighbouring pixels.
     pair.samples[1].rotate_right(3);
     assert!(agreement(&pair.samples) < 0.5, "control: other samples are told apart");

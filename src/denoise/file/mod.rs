@@ -8,7 +8,7 @@ use crate::gpu::{Buffer, Gpu, Location};
 use crate::image::Samples;
 use crate::image::aov::{Aov, Aovs};
 use crate::layout::{Guide, NONE, PixelLight, PixelStats};
-use crate::render::film::{ALBEDO, SHARP_DIRECT};
+use crate::render::film::{ALBEDO, INDIRECT_STRIDE, SHARP_DIRECT};
 use bytemuck::Pod;
 use glam::Vec3;
 use places::Places;
@@ -62,7 +62,12 @@ impl<'a> Layers<'a> {
             variance: has(Aov::Variance),
             indirect_variance: self.indirect_m2.is_some(),
             sharp_direct: self.aovs.film.metadata.get(SHARP_DIRECT).is_none_or(|said| said != "false"),
+            indirect_stride: self.indirect_stride(),
         }
+    }
+
+    fn indirect_stride(&self) -> u32 {
+        self.aovs.film.metadata.get(INDIRECT_STRIDE).and_then(|n| n.parse().ok()).unwrap_or(1).max(1)
     }
 
     /// Copies the file's pixels to the device.

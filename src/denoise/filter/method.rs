@@ -1,5 +1,5 @@
 //! What a user can choose to filter an image by.
-use super::{FILTERS, Row, oidn};
+use super::{FILTERS, Row, cannot_fill, oidn};
 use crate::error::Result;
 use crate::gpu::Oidn;
 
@@ -44,6 +44,17 @@ impl Method {
         match self {
             Self::Kernels(_) => Ok(()),
             Self::Oidn => Oidn::open().map(drop),
+        }
+    }
+
+    /// As [`Row::check_filling`].
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Usage`].
+    pub fn check_filling(self, stride: u32) -> Result<()> {
+        match self {
+            Self::Kernels(row) => row.check_filling(stride),
+            Self::Oidn => cannot_fill(self.name(), stride),
         }
     }
 

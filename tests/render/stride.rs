@@ -1,0 +1,120 @@
+//! Tests renders whose indirect light is traced for pixels a stride apart: what is traced is that of a whole render, to the bit, and
+//! filters fill in the rest.
+use crate::support::{self, assert_silent, gpu};
+use std::path::Path;
+use tallow::denoise::filter::{Method, find};
+use tallow::denoise::{Filtered, Noisy, Recipe};
+use tallow::gpu::Gpu;
+use tallow::layout::{PixelLight, PixelStats, vec3};
+use tallow::render::settings::{Settings, Split};
+use tallow::render::{Job, Outputs, Renderer};
+use tallow::scene::{Loaded, Scene};
+
+const ALL: Outputs = Outputs { split_light: true, guides: true, counters: false };
+
+/// A sphere on a floor below a sky, a lamp and a point light.
+fn scene(change: impl Fn(&mut Settings)) -> Loaded {
+    let text = "[camera]\nposition = [0.0, 2.0, 5.0]\ntarget = [0.0, 0.5, 0.0]\nfov = 45.0\n[film]\nwidth = 33\nheight = 18\n\
+         [environment]\nradiance = 0.5\n[render]\nspp = 4\nmax_depth = 5\n\
+         [[light]]\ntype = 'point'\nposition = [2.0, 3.0, 1.0]\nintensity = 8.0\n\
+         [[material]]\nname = 'lamp'\ncolor = 0\nemission = 2\n[[material]]\nname = 'grey'\ncolor = 0.6\n\
+         [[material]]\nname = 'glass'\ntype = 'dielectric'\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'grey'\ntransform = { rotate = [-90.0, 0.0, 0.0], scale = 6.0 }\n\
+         [[mesh]]\nshape = 'cube'\nmaterial = 'grey'\ntransform = { scale = 0.5, translate = [-1.0, 0.5, 0.0] }\n\
+         [[mesh]]\nshape = 'sphere'\nmaterial = 'glass'\ntransform = { scale = 0.5, translate = [0.8, 0.5, 0.5] }\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'lamp'\ntransform = { rotate = [90.0, 0.0, 0.0], translate = [-1.0, 3.0, 0.0] }\n";
+    Scene::parse(Path::new("stride.toml"), text).map(|scene| scene.with(change)).unwrap()
+}
+
+/// The statistics that are left, and the rays that were traced.
+fn rendered(gpu: &Gpu, scene: &Loaded, paths_at_once: u32) -> (Vec<PixelStats>, Vec<PixelLight>, u64) {
+    let outputs = Outputs { counters: true, ..ALL };
+    let renderer = Renderer::new(gpu, scene, &scene.settings, outputs).unwrap();
+    let job = Job { paths_at_once, ..Job::new(&renderer) };
+    job.run_to_end(&mut tallow::gpu::FrameResources::new(gpu).unwrap()).unwrap();
+    let tile = &renderer.film().tiles[0];
+    (tile.stats.read().unwrap(), tile.light.read().unwrap(), renderer.counters().unwrap().rays())
+}
+
+#[test]
+fn what_is_traced_is_that_of_a_whole_render() {
+    let gpu = gpu();
+    for split in [Split::Soft, Split::Indirect] {
+        let (whole, light, rays) = rendered(&gpu, &scene(|s| s.split = split), u32::MAX);
+        for (stride, paths_at_once) in [(2, u32::MAX), (3, 100), (8, u32::MAX)] {
+            let sparse = scene(|s| (s.split, s.indirect_stride) = (split, stride));
+            let (found, direct, fewer) = rendered(&gpu, &sparse, paths_at_once);
+            let mut lacking = 0;
+            for i in 0..found.len() {
+                let traced = (i as u32 % 33).is_multiple_of(stride) && (i as u32 / 33).is_multiple_of(stride);
+                assert_eq!((direct[i].direct, direct[i].albedo), (light[i].direct, light[i].albedo), "{stride}: {i}");
+                if traced {
+                    assert_eq!((found[i], direct[i]), (whole[i], light[i]), "{stride}: pixel {i}");
+                } else {
+                    assert_eq!((found[i].mean, direct[i].indirect_m2), (light[i].direct, 0.0), "{stride}: pixel {i}");
+                    lacking += usize::from(whole[i].mean != light[i].direct);
+                }
+            }
+            assert!(lacking > 30, "control: {lacking} pixels lack light");
+            let share = fewer as f64 / rays as f64;
+
+            assert!(share < 0.97, "{stride}, {split:?}: {share} of the rays");
+        }
+    }
+    assert_silent(&gpu);
+}
+
+/// A floor below a sky that lights all of it alike, and a wall in whose place the light is another: pixels that are filled in get the
+/// light of their surface.
+#[test]
+fn filters_fill_in_what_is_not_traced() {
+    let gpu = gpu();
+    let filled = |filter: &str, stride: u32| -> (Vec<vec3>, Vec<vec3>) {
+        let picture = |stride: u32, spp: u32, filter: &str| {
+            let scene = scene(|s| (s.indirect_stride, s.spp, s.max_depth) = (stride, spp, 3));
+            let renderer = Renderer::new(&gpu, &scene, &scene.settings, ALL).unwrap();
+            support::render(&gpu, &renderer);
+            let method = Method::Kernels(find(filter).unwrap());
+            let clean = Filtered::new(&gpu, Noisy::of_film(&renderer).unwrap(), &Recipe::new(method))?.join(&gpu)?;
+            let [r, g, b] = clean.colour;
+            tallow::error::Result::Ok((0..r.len()).map(|i| [r[i], g[i], b[i]]).collect())
+        };
+        (picture(stride, 64, filter).unwrap(), picture(1, 256, "none").unwrap())
+    };
+    for filter in ["atrous", "bilateral", "guided", "svgf", "wavelet"] {
+        let (found, expected) = filled(filter, 2);
+        // The floor before the bodies, in the lowest rows.
+        let mean = |image: &[vec3], odd: bool| {
+            let row = 33 * if odd { 17 } else { 16 };
+            let pixels = (usize::from(odd)..33).step_by(2);
+            let (sum, count) = pixels.fold((0.0, 0), |(sum, n), x| (sum + image[row + x][1], n + 1));
+            sum / count as f32
+        };
+        for odd in [false, true] {
+            let ratio = mean(&found, odd) / mean(&expected, odd);
+            assert!((0.9..1.1).contains(&ratio), "{filter}, odd {odd}: {ratio}");
+        }
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn what_needs_the_light_of_every_pixel_is_refused() {
+    let gpu = gpu();
+    let scene = scene(|s| s.indirect_stride = 2);
+    let refused = |outputs, method| {
+        let renderer = Renderer::new(&gpu, &scene, &scene.settings, outputs).unwrap();
+        support::render(&gpu, &renderer);
+        let noisy = Noisy::of_film(&renderer);
+        noisy.and_then(|noisy| Filtered::new(&gpu, noisy, &Recipe::new(method))).map(drop).unwrap_err().to_string()
+    };
+    let kernels = |name| Method::Kernels(find(name).unwrap());
+    for method in [kernels("auto"), kernels("none"), Method::Oidn] {
+        let told = refused(ALL, method);
+        assert!(told.contains(method.name()) && told.contains("atrous, bilateral, guided"), "{told}");
+    }
+    let told = refused(Outputs { split_light: false, ..ALL }, kernels("atrous"));
+    assert!(told.contains("split_light"), "{told}");
+    let told = tallow::render::can_carry(&gpu, &scene, &scene.settings).unwrap_err().to_string();
+    assert!(told.contains("indirect_stride"), "{told}");
+}
