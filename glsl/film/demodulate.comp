@@ -2,7 +2,6 @@
 #include "shared/noisy.glsl"
 #include "shared/albedo.glsl"
 #include "shared/luminance.glsl"
-#include "shared/stride.glsl"
 
 // Takes one pixel per thread of a noisy image apart for a filter: colour = sharp + factor * filtered, where `sharp` is not
 // filtered and `filtered` is light before albedo. Twin: denoise::twin::demodulate.
@@ -98,11 +97,6 @@ Parts demodulated(int i) {
     return Parts(colour_at(i), vec3(1.0), vec3(0.0));
 }
 
-// Whether what is filtered of a pixel was traced.
-bool has_filtered(uint i) {
-    return DEMODULATION != LIGHT || INDIRECT_STRIDE <= 1u || on_stride(i, push.size.x, INDIRECT_STRIDE);
-}
-
 // Of the pixel's mean, per channel.
 vec3 variance_of_colour(int i, float count) {
     float freedom = count > 1.0 ? count * (count - 1.0) : 0.0;
@@ -136,7 +130,7 @@ void main() {
     float count = count_at(int(i));
     Parts p = demodulated(int(i));
     // Pixels whose filtered part is not used get count 0, so that they do not reach others.
-    bool known = finite(colour_at(int(i))) && any(greaterThan(p.factor, vec3(0.0))) && has_filtered(i);
+    bool known = finite(colour_at(int(i))) && any(greaterThan(p.factor, vec3(0.0)));
     radiance[i] = vec4(p.filtered, known ? count : 0.0);
     float rest = 0.0;
     if (MEASURED) {

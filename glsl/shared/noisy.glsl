@@ -2,7 +2,6 @@
 // denoise::twin::Pixels.
 layout(constant_id = 111) const bool OF_FILE = false; // counts are floats, and m2 is the variance of the mean
 layout(constant_id = 115) const bool APART = false; // `light` holds a record of every pixel
-layout(constant_id = 116) const uint INDIRECT_STRIDE = 1u; // distance along both axes between pixels whose indirect light is known
 layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
 layout(binding = 1) uniform usamplerBuffer light; // of PixelLight
 layout(binding = 2) uniform usamplerBuffer guide; // of Guide

@@ -4,7 +4,6 @@
 #include "shared/frame.glsl"
 #include "shared/finite.glsl"
 #include "shared/store64.glsl"
-#include "shared/stride.glsl"
 
 // Traces one camera path per thread.
 // Thread i traces sample first_sample + i / pixels of pixel first_pixel + i % pixels, or path i of a list. It writes one vec4
@@ -39,6 +38,11 @@ void count(uint slot, uint n) {
     if (before + n < before) atomicAdd(counters[2u * slot + 1u], 1u);
 }
 
+bool is_traced_whole(uint pixel) {
+    uvec2 at = uvec2(pixel % push.constants.size.x, pixel / push.constants.size.x);
+    return all(equal(at % push.constants.indirect_stride, uvec2(0u)));
+}
+
 // A permutation of indices that deals SPREAD threads in turn to pixels a stride apart, so that lanes side by side trace alike: paths of
 // different lengths would wait for each other. Indices without a whole run around them stay as they are.
 const uint SPREAD = 32u;
@@ -64,7 +68,7 @@ void main() {
         if (!DEALT && !on) return;
         pixel = on ? pixel : push.first_pixel;
     }
-    bool sharp_only = FX_SPARSE && !on_stride(pixel, push.constants.size.x, push.constants.indirect_stride);
+    bool sharp_only = FX_SPARSE && !is_traced_whole(pixel);
     Sampler random = sampler_start(pixel, index, push.constants.seed);
     Ray ray = eye_ray(film_sample(pixel, random), random);
     Path path = Path(ray.origin, ray.direction, vec3(1.0), 0.0, true, 1.0);

@@ -134,7 +134,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     }
     let gpu = host.time("open device", || args.common.open())?;
     check_room(args, &settings, &gpu)?;
-    check_filling(args, &settings)?;
+    check_stride(args, &settings)?;
     let plan = match plan {
         Some(plan) => Some(plan),
         None => host.time("plan", || planned::make(args, &gpu, &scene, &settings))?,
@@ -329,17 +329,15 @@ pub fn check_room(args: &Args, settings: &Settings, gpu: &Gpu) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Usage`] for another filter; without any a line tells what is left to do.
-pub fn check_filling(args: &Args, settings: &Settings) -> Result<()> {
+pub fn check_stride(args: &Args, settings: &Settings) -> Result<()> {
     let stride = settings.indirect_stride;
-    match args.denoise {
-        Some(method) => method.check_filling(stride)?,
-        None if stride > 1 && args.common.talkative() => complain(&format!(
+    if args.denoise.is_none() && stride > 1 && args.common.talkative() {
+        complain(&format!(
             "warning: with indirect_stride {stride} most pixels lack indirect light until a filter fills it in: add --denoise, or use \
              tallow filter on the .exr"
-        )),
-        None => {}
+        ));
     }
-    Ok(())
+    args.denoise.map_or(Ok(()), |method| method.check_stride(stride))
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::document::Method;
 use crate::allocate::{Placing, Policy};
 use crate::denoise::filter::{self, FilterSettings};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::render::settings::Settings;
 use crate::render::{Outputs, Reproject};
 use crate::settings::entry::{Entry, Value};
@@ -77,10 +77,16 @@ impl Candidate {
     /// Whether it makes an image of the whole light.
     ///
     /// # Errors
-    /// [`crate::error::Error::Usage`] where no filter fills in light that is not traced.
-    pub fn check_filling(&self) -> Result<()> {
-        let none = || filter::find("none").map(filter::Method::Kernels);
-        self.filter.or_else(none).map_or(Ok(()), |filter| filter.check_filling(self.settings.indirect_stride))
+    /// [`Error::Usage`] where no filter fills in light that is not traced.
+    pub fn check_stride(&self) -> Result<()> {
+        let stride = self.settings.indirect_stride;
+        match self.filter {
+            Some(filter) => filter.check_stride(stride),
+            None if stride > 1 => Err(Error::Usage(format!(
+                "with indirect_stride {stride} most pixels lack indirect light until a filter fills it in: leave out the filter none"
+            ))),
+            None => Ok(()),
+        }
     }
 
     /// The same with other settings, as `change` makes them, and named by `option`. `None` if they are no others.

@@ -2,6 +2,7 @@
 //! tell of modulation. Twin: [`super::twin`].
 use super::filter::Planes;
 use super::filter::firefly::{Cut, Fireflies, Removed};
+use super::sparse::Sparse;
 use super::{Demodulation, ExpectedError, Holds, Noisy};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
@@ -13,8 +14,10 @@ use crate::shaders::{demodulate, demodulate_direct, remodulate, remodulate_direc
 pub struct Demodulated {
     split: Kernel<demodulate::Bind<'static>>,
     join: Kernel<remodulate::Bind<'static>>,
-    /// What goes through the filter, and what comes out.
+    /// What goes through the filter, and what comes out; of a sparse image, the traced pixels.
     pub planes: Planes,
+    /// All pixels, where some are not traced.
+    sparse: Option<Sparse>,
     /// One element where none is known, and then no part of the planes.
     variance: Buffer<vec3>,
     factor: Buffer<vec4>,
@@ -55,7 +58,7 @@ impl Demodulated {
         };
         let plane = |name| Buffer::new(gpu, name, pixels, Location::Device);
         let variance = Buffer::new(gpu, "variance", if measured { pixels } else { 1 }, Location::Device)?;
-        let planes = Planes {
+        let whole = Planes {
             size: noisy.size,
             radiance: plane("radiance")?,
             guide: noisy.guide.clone(),
@@ -63,14 +66,20 @@ impl Demodulated {
             variance: measured.then(|| variance.clone()),
             output: plane("filtered")?,
         };
+        let (sparse, planes) = match holds.indirect_stride {
+            1 => (None, whole),
+            stride => Sparse::new(gpu, whole, stride).map(|(sparse, traced)| (Some(sparse), traced))?,
+        };
+        let cut = |factor| {
+            let whole = Buffer::new(gpu, "whole", planes.radiance.len(), Location::Device)?;
+            Cut::new(gpu, whole, &planes, factor)
+        };
         Ok(Self {
             split: Kernel::new(gpu, &constants)?,
             join: Kernel::new(gpu, &Default::default())?,
-            cut: fireflies
-                .factor(measured)
-                .map(|factor| Cut::new(gpu, plane("whole")?, &planes, factor))
-                .transpose()?,
+            cut: fireflies.factor(measured).map(cut).transpose()?,
             planes,
+            sparse,
             variance,
             factor: plane("factor")?,
             picture: plane("picture")?,
@@ -80,16 +89,20 @@ impl Demodulated {
 
     /// stats\[P\], light\[P\], guide\[P\] -> radiance\[P\], variance\[P\], factor\[P\], picture\[P\], direct\[P\]
     pub fn record_split(&self, rec: &mut Recorder, noisy: &Noisy) -> Result<()> {
-        let (planes, count) = (&self.planes, self.planes.pixels());
+        let (planes, size, count) = (&self.planes, self.whole().size, self.whole().pixels());
         let image = noisy::Bind { stats: &noisy.stats, light: &noisy.light, guide: &noisy.guide };
+        let uncut = self.cut.as_ref().map_or(&planes.radiance, |cut| &cut.whole);
         let bind = demodulate::Bind {
             noisy: image,
-            radiance: self.cut.as_ref().map_or(&planes.radiance, |cut| &cut.whole),
+            radiance: self.sparse.as_ref().map_or(uncut, |sparse| &sparse.whole.radiance),
             variance: &self.variance,
             factor: &self.factor,
             sharp: &self.picture,
         };
-        rec.dispatch_threads(&self.split, bind, &SplitPush { size: planes.size, ..Default::default() }, count)?;
+        rec.dispatch_threads(&self.split, bind, &SplitPush { size, ..Default::default() }, count)?;
+        if let Some(sparse) = &self.sparse {
+            sparse.record_decimate(rec, planes, uncut)?;
+        }
         if let Some(cut) = &self.cut {
             cut.record(rec, planes)?;
         }
@@ -99,10 +112,20 @@ impl Demodulated {
         rec.dispatch_threads(&direct.split, bind, &PackPush { count, ..Default::default() }, count)
     }
 
+    /// All pixels: what is filtered of them, once [`Demodulated::record_fill`] has run.
+    pub fn whole(&self) -> &Planes {
+        self.sparse.as_ref().map_or(&self.planes, |sparse| &sparse.whole)
+    }
+
+    /// filtered\[T\] of the traced pixels -> filtered\[P\], where not all are
+    pub fn record_fill(&self, rec: &mut Recorder) -> Result<()> {
+        self.sparse.as_ref().map_or(Ok(()), |sparse| sparse.record_upsample(rec, &self.planes))
+    }
+
     /// Direct light for a filter, where it is to be in-painted: what comes out takes the place of the radiance, which must have
     /// been filtered by then.
     pub fn direct_planes(&self) -> Option<Planes> {
-        let Planes { size, radiance, guide, .. } = &self.planes;
+        let Planes { size, radiance, guide, .. } = self.whole();
         let (guide, output) = (guide.clone(), radiance.clone());
         let planes = |radiance| Planes { size: *size, radiance, guide, light: None, variance: None, output };
         self.direct.as_ref().map(|d| planes(d.plane.clone()))
@@ -111,7 +134,7 @@ impl Demodulated {
     /// direct\[P\], and what a filter made of it -> picture\[P\] of the pixels that lack it
     pub fn record_direct_join(&self, rec: &mut Recorder) -> Result<()> {
         let Some(direct) = &self.direct else { return Ok(()) };
-        let (planes, count) = (&self.planes, self.planes.pixels());
+        let (planes, count) = (self.whole(), self.whole().pixels());
         let bind = remodulate_direct::Bind {
             guide: &planes.guide,
             direct: &direct.plane,
@@ -124,8 +147,8 @@ impl Demodulated {
     /// filtered\[P\], factor\[P\] -> picture\[P\]: once for each split, since the picture takes the place of the light that was
     /// not filtered.
     pub fn record_join(&self, rec: &mut Recorder) -> Result<()> {
-        let count = self.planes.pixels();
-        let bind = remodulate::Bind { filtered: &self.planes.output, factor: &self.factor, picture: &self.picture };
+        let (whole, count) = (self.whole(), self.whole().pixels());
+        let bind = remodulate::Bind { filtered: &whole.output, factor: &self.factor, picture: &self.picture };
         rec.dispatch_threads(&self.join, bind, &PackPush { count, ..Default::default() }, count)
     }
 }
@@ -144,6 +167,9 @@ impl Demodulated {
     /// # Errors
     /// [`crate::error::Error::Device`].
     pub fn expected_error(&self, gpu: &Gpu, expected: &Buffer<vec3>) -> Result<Option<ExpectedError>> {
+        if self.sparse.is_some() {
+            return Ok(None); // of pixels that are filled in nobody knows
+        }
         ExpectedError::of(gpu, &self.planes, &self.factor, &self.picture, expected)
     }
 }

@@ -44,15 +44,15 @@ impl Denoiser {
             let lack = "direct light apart: make the renderer with Outputs::split_light";
             return Err(Error::Usage(format!("a frame cannot be filtered without {lack}")));
         }
-        row.check_filling(noisy.holds().indirect_stride)?;
         filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
         let allocate = &renderer.settings().allocate;
         let in_paint = apart && !allocate.is_even() && allocate.min_spp == 0;
-        Ok(Self {
-            parts: Demodulated::new(gpu, &noisy, demodulation, in_paint, Fireflies::Off)?,
-            filter: row.compile(gpu, settings, noisy.size)?,
-            noisy,
-        })
+        if in_paint && noisy.holds().indirect_stride > 1 {
+            let what = "a frame with an indirect_stride needs samples in every pixel: set min_spp to 1 or more";
+            return Err(Error::Usage(what.to_owned()));
+        }
+        let parts = Demodulated::new(gpu, &noisy, demodulation, in_paint, Fireflies::Off)?;
+        Ok(Self { filter: row.compile(gpu, settings, parts.planes.size)?, parts, noisy })
     }
 
     /// stats\[P\], light\[P\], guide\[P\] -> picture\[P\]: to be recorded behind the renderer's steps. The renderer's own
@@ -63,6 +63,7 @@ impl Denoiser {
     pub fn record(&self, rec: &mut Recorder) -> Result<()> {
         self.parts.record_split(rec, &self.noisy)?;
         self.filter.record(rec, &self.parts.planes)?;
+        self.parts.record_fill(rec)?;
         if let Some(direct) = self.parts.direct_planes() {
             self.filter.record(rec, &direct)?;
             self.parts.record_direct_join(rec)?;
@@ -77,7 +78,7 @@ impl Denoiser {
             offset: 0,
             stride: size_of::<vec4>() as u32,
             format: PixelFormat::R32G32B32A32Sfloat,
-            pixels: self.parts.planes.pixels(),
+            pixels: self.parts.whole().pixels(),
         }
     }
 

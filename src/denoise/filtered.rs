@@ -96,7 +96,7 @@ impl Filtered {
     /// device fails.
     pub fn new(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Self> {
         filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
-        recipe.method.check_filling(noisy.holds().indirect_stride)?;
+        recipe.method.check_stride(noisy.holds().indirect_stride)?;
         let demodulation = recipe.demodulation(noisy.holds());
         let in_painted = demodulation == Demodulation::Light && noisy.lacks_direct_light()?;
         let parts = Demodulated::new(gpu, &noisy, demodulation, in_painted, recipe.fireflies())?;
@@ -105,6 +105,7 @@ impl Filtered {
         let removed = parts.removed()?;
         let scales = Scales::of_planes(&parts.planes)?;
         let expected = run_filter(gpu, recipe, &scales, &parts.planes, &mut times)?;
+        times.extend(run(gpu, |rec| parts.record_fill(rec))?);
         if let Some(direct) = parts.direct_planes() {
             run_filter(gpu, recipe, &scales.with_light(&direct.radiance)?, &direct, &mut times)?;
             times.extend(run(gpu, |rec| parts.record_direct_join(rec))?);
@@ -120,8 +121,10 @@ impl Filtered {
         let Self { parts, expected, mut times, removed, in_painted } = self;
         times.extend(run(gpu, |rec| parts.record_join(rec))?);
         // Where direct light was in-painted, it lies in the place of what was filtered.
-        let expected = expected.filter(|_| !in_painted);
-        let told = expected.map(|expected| parts.expected_error(gpu, &expected)).transpose()?.flatten();
+        let told = match expected.filter(|_| !in_painted) {
+            Some(expected) => parts.expected_error(gpu, &expected)?,
+            None => None,
+        };
         Ok(Clean { colour: colour(&parts.picture)?, times, removed, expected: told })
     }
 
@@ -141,12 +144,12 @@ impl Filtered {
 
     /// The surfaces.
     pub fn guide(&self) -> &Buffer<Guide> {
-        &self.parts.planes.guide
+        &self.parts.whole().guide
     }
 
     /// What the filter returned.
     pub fn light(&self) -> &Buffer<vec4> {
-        &self.parts.planes.output
+        &self.parts.whole().output
     }
 }
 

@@ -9,6 +9,8 @@ pub mod file;
 pub mod filter;
 mod filtered;
 mod noisy;
+#[doc(hidden)]
+pub mod sparse;
 mod timed;
 #[doc(hidden)]
 pub mod twin;

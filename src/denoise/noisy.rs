@@ -40,11 +40,6 @@ impl Holds {
         }
     }
 
-    /// Whether the indirect light of a pixel is known, if that of any is.
-    pub fn has_indirect(&self, pixel: [u32; 2]) -> bool {
-        pixel.iter().all(|at| at.is_multiple_of(self.indirect_stride))
-    }
-
     /// What is best kept away from a filter: direct light of delta lights, whose shadows are sharp and no guide shows them. Lamps and
     /// skies leave noise in direct light: where it holds any of theirs, it is filtered with all the rest.
     pub fn usual_demodulation(&self) -> Demodulation {
@@ -63,7 +58,7 @@ impl Holds {
 
     /// For kernels that read the planes.
     pub(super) fn constants(&self) -> noisy::Constants {
-        noisy::Constants { of_file: self.of_file, apart: self.light, indirect_stride: self.indirect_stride }
+        noisy::Constants { of_file: self.of_file, apart: self.light }
     }
 
     /// Whether the variance of what is filtered is known.

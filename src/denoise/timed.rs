@@ -96,13 +96,13 @@ impl<'a> Chain<'a> {
         // The scales that settings count in are those of the light that is filtered.
         gpu.run(&mut FrameResources::new(gpu)?, |rec| parts.record_split(rec, &noisy))?;
         let scales = Scales::of_planes(&parts.planes)?;
-        let compiled = |scales: &Scales| row.compile(gpu, &(recipe.settings)(scales), parts.planes.size);
+        let compiled = |scales: &Scales, size| row.compile(gpu, &(recipe.settings)(scales), size);
         let of_direct = |planes: Planes| {
-            let filter = compiled(&scales.with_light(&planes.radiance)?)?;
+            let filter = compiled(&scales.with_light(&planes.radiance)?, planes.size)?;
             Ok((planes, filter))
         };
         let direct = parts.direct_planes().map(of_direct).transpose()?;
-        Ok(Self { filter: compiled(&scales)?, direct, parts, noisy, gpu })
+        Ok(Self { filter: compiled(&scales, parts.planes.size)?, direct, parts, noisy, gpu })
     }
 
     /// All passes in one command buffer, as an engine would record them.
@@ -127,6 +127,7 @@ impl<'a> Chain<'a> {
     fn record(&self, rec: &mut Recorder) -> Result<()> {
         self.parts.record_split(rec, &self.noisy)?;
         self.filter.record(rec, &self.parts.planes)?;
+        self.parts.record_fill(rec)?;
         if let Some((planes, filter)) = &self.direct {
             filter.record(rec, planes)?;
             self.parts.record_direct_join(rec)?;

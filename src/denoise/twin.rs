@@ -79,10 +79,7 @@ pub fn demodulate(pixels: &Pixels, demodulation: Demodulation, in_paint: bool) -
     let factor: Vec<vec3> = parts.iter().map(|p| p.factor).collect();
     let radiance = |i: usize| {
         let [r, g, b] = parts[i].filtered;
-        let at = [i as u32 % pixels.size[0], i as u32 / pixels.size[0]];
-        let traced = demodulation != Demodulation::Light || pixels.holds.has_indirect(at);
-        let finite = pixels.stats[i].mean.iter().all(|v| v.is_finite());
-        let known = finite && factor[i].iter().any(|&f| f > 0.0) && traced;
+        let known = pixels.stats[i].mean.iter().all(|v| v.is_finite()) && factor[i].iter().any(|&f| f > 0.0);
         [r, g, b, if known { pixels.count(i) } else { 0.0 }]
     };
     let measured = pixels.holds.variance_of_filtered(demodulation);

@@ -9,6 +9,14 @@ gpu_structs! {
         size: uvec2,
     }
 
+    /// Push constants of `decimate.comp` and `upsample.comp`.
+    struct SparsePush {
+        /// Film in pixels.
+        size: uvec2,
+        /// Distance along both axes between pixels whose light was traced.
+        stride: uint,
+    }
+
     /// Push constants of `pack.comp` and of other kernels that look at no neighbours.
     struct PackPush {
         /// Pixels of the image.

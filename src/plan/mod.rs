@@ -140,7 +140,7 @@ fn check(settings: &Settings, methods: &[Method], target: Target) -> Result<()> 
     if methods.is_empty() {
         return Err(Error::Usage("no method to choose among: name a filter, or none".to_owned()));
     }
-    methods.iter().try_for_each(|method| method.check_filling(settings.indirect_stride))?;
+    methods.iter().try_for_each(|method| method.check_stride(settings.indirect_stride))?;
     settings.validate()
 }
 

@@ -6,12 +6,13 @@ use std::path::Path;
 use tallow::denoise::file::Layers;
 use tallow::denoise::filter::firefly::Fireflies;
 use tallow::denoise::filter::{FILTERS, FilterSettings, Scales, check_size, estimated, find};
+use tallow::denoise::sparse::{decimated, upsampled};
 use tallow::denoise::twin::{Parts, Pixels, demodulate, split};
 use tallow::denoise::{Demodulation, Denoiser, Filtered, Holds, Noisy, Recipe, expected};
 use tallow::gpu::{DeviceKind, FrameResources, Gpu};
 use tallow::image::aov::{Aovs, Names};
 use tallow::image::{Film, Samples};
-use tallow::layout::{Guide, PixelLight, PixelStats, vec3, vec4};
+use tallow::layout::{Guide, NONE, PixelLight, PixelStats, vec3, vec4};
 use tallow::render::settings::Settings;
 use tallow::render::{Outputs, Renderer};
 use tallow::scene::Scene;
@@ -112,7 +113,13 @@ impl Frame {
         let Self { size, stats, light, guide } = self;
         let (stats, light, guide) = (stats.clone(), light.clone(), guide.clone());
         let pixels = Pixels { size: *size, holds: Holds::film(true, true, stride), stats, light, guide };
-        twins(demodulate(&pixels, demodulation, in_paint), filter, settings)
+        let parts = demodulate(&pixels, demodulation, in_paint);
+        if stride == 1 {
+            return twins(parts, filter, settings);
+        }
+        let filtered = (find(filter).unwrap().reference)(&decimated(&parts.input, stride), settings);
+        let whole = parts.remodulate(&upsampled(&filtered, &parts.input.guide, *size, stride));
+        whole.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()
     }
 
     fn upload(&self, renderer: &Renderer) {
@@ -195,24 +202,45 @@ fn frames_are_taken_apart_and_put_together_as_their_twins() {
     assert_silent(&gpu);
 }
 
-/// Of which indirect light is traced in every third column and row.
+/// Of which indirect light is traced in every third column and row; broken ones hold what no frame should.
 #[test]
 fn sparse_frames_are_filled_in_as_by_their_twins() {
     let gpu = gpu();
     let settings = FilterSettings::default().with(|s| s.edge.extent = 3.0);
     for size in SIZES {
-        for policy in ["uniform", "geometry"] {
-            let renderer = renderer_of(&gpu, size, ALL, policy, 3);
-            let frame = Frame::new(size, false);
-            let device = frame.on_the_device(&gpu, &renderer, "svgf", &settings, Demodulation::Light);
-            let in_paint = policy != "uniform";
-            let host = |stride| frame.on_the_host("svgf", &settings, Demodulation::Light, in_paint, stride);
+        let renderer = renderer_of(&gpu, size, ALL, "uniform", 3);
+        for (frame, filter) in [(Frame::new(size, false), "svgf"), (Frame::new(size, true), "none")] {
+            let device = frame.on_the_device(&gpu, &renderer, filter, &settings, Demodulation::Light);
+            let host = |stride| frame.on_the_host(filter, &settings, Demodulation::Light, false, stride);
             let off = picture::apart(&device, &host(3), 1e-3);
-            assert!(off < 3e-4, "{policy} {size:?}: {off}");
-            assert!(size == [1, 1] || picture::apart(&device, &host(1), 1e-3) > 1e-2, "control: a whole frame differs");
+            assert!(off < 3e-4, "{filter} {size:?}: {off}");
+            assert!(device.iter().flatten().all(|v| v.is_finite()), "{filter} {size:?}");
+            assert!(size == [1, 1] || picture::apart(&device, &host(2), 1e-3) > 1e-2, "control: another stride");
         }
     }
     assert_silent(&gpu);
+}
+
+#[test]
+fn upsampling_solves_the_worked_example() {
+    // Two traced pixels, of 1 and 4, two columns apart; the plane that they lie in faces the camera.
+    let on_plane = |x: f32| Guide { normal: [0.0, 0.0, 1.0], position: [x, 0.0, 0.0], depth: 1.0, ..Guide::default() };
+    let mut guide = [0.0, 1.0, 2.0, 3.0].map(on_plane);
+    let traced = [[1.0, 1.0, 1.0, 2.0], [4.0, 4.0, 4.0, 2.0]];
+    let red = |guide: &[Guide], traced: &[vec4]| -> Vec<f32> {
+        upsampled(traced, guide, [4, 1], 2).iter().map(|pixel| pixel[0]).collect()
+    };
+    // The mean between them, and the last beyond them.
+    assert_eq!(red(&guide, &traced), [1.0, 2.5, 4.0, 4.0]);
+    // A pixel half a length in front of the second's plane, whose sine towards it is 1 / sqrt(1.25): 2^(-16 * 0.2) of the weight.
+    guide[2].position[2] = 0.5;
+    let w = (-16.0f32 * 0.2).exp2();
+    assert!((red(&guide, &traced)[1] - (1.0 + 4.0 * w) / (1.0 + w)).abs() < 1e-5);
+    // What nothing reached fills in nothing, and of unlike surfaces the one most alike counts.
+    assert_eq!(red(&guide, &[[9.0, 9.0, 9.0, 0.0], traced[1]]), [0.0, 4.0, 4.0, 4.0]);
+    guide[0].normal = [0.0, 1.0, 0.0];
+    guide[2].object = NONE;
+    assert!((red(&guide, &traced)[1] - 1.0).abs() < 1e-4);
 }
 
 /// Whatever a file lacks of what Tallow writes.

@@ -47,7 +47,7 @@ impl Points {
         let mut candidates = grid::grid(&base, &filters, &axes);
         candidates.iter().try_for_each(|candidate| candidate.settings.validate())?;
         candidates.extend(varied(args, &candidates)?);
-        candidates.iter().try_for_each(Candidate::check_filling)?;
+        candidates.iter().try_for_each(Candidate::check_stride)?;
         Ok((scene, Self { motion, base, candidates }))
     }
 }

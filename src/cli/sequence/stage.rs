@@ -95,7 +95,7 @@ impl<'a> Stage<'a> {
         }
         let gpu = args.render.common.open()?;
         render::check_room(&args.render, &settings, &gpu)?;
-        render::check_filling(&args.render, &settings)?;
+        render::check_stride(&args.render, &settings)?;
         let rest = called_for(&scene, &settings, args.render.wanted());
         let reproject = carrying(args, &gpu, &scene, &settings, !animation.is_empty())?;
         let moves = Moves::of(&animation)?;

@@ -15,7 +15,6 @@ use glam::Vec3;
 pub const ROW: Row = Row {
     name: "atrous",
     about: "edge-avoiding À-Trous wavelets, steered by radiance, normal and position",
-    fills_in: true,
     bytes: super::pack::BYTES + 16,
     make: |gpu, s, size| Ok(Box::new(Atrous::new(gpu, &s.edge, &s.atrous, s.footprint.levels, size)?)),
     reference: |input, s| reference(input, &s.edge, &s.atrous, s.footprint.levels),

@@ -13,7 +13,6 @@ use glam::Vec3;
 pub const ROW: Row = Row {
     name: "bilateral",
     about: "exact bilateral filter, joint with normal and position",
-    fills_in: true,
     bytes: super::pack::BYTES + 16,
     make: |gpu, s, size| Ok(Box::new(Bilateral::new(gpu, Rates::new(&s.edge), s.footprint.radius, size)?)),
     reference: |input, s| reference(input, &Rates::new(&s.edge), s.footprint.radius),

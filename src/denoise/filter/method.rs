@@ -1,6 +1,6 @@
 //! What a user can choose to filter an image by.
-use super::{FILTERS, Row, cannot_fill, oidn};
-use crate::error::Result;
+use super::{FILTERS, Row, oidn};
+use crate::error::{Error, Result};
 use crate::gpu::Oidn;
 
 /// What filters an image: kernels of the renderer's device, or a library of the host.
@@ -39,7 +39,7 @@ impl Method {
     /// To be asked before long work: whether it can run here.
     ///
     /// # Errors
-    /// [`crate::error::Error::Device`] where Open Image Denoise is chosen but not installed, with how to get it.
+    /// [`Error::Device`] where Open Image Denoise is chosen but not installed, with how to get it.
     pub fn check(self) -> Result<()> {
         match self {
             Self::Kernels(_) => Ok(()),
@@ -47,14 +47,17 @@ impl Method {
         }
     }
 
-    /// As [`Row::check_filling`].
+    /// Whether it can filter light that was traced for pixels `stride` apart.
     ///
     /// # Errors
-    /// [`crate::error::Error::Usage`].
-    pub fn check_filling(self, stride: u32) -> Result<()> {
+    /// [`Error::Usage`] where it wants the colour whole.
+    pub fn check_stride(self, stride: u32) -> Result<()> {
         match self {
-            Self::Kernels(row) => row.check_filling(stride),
-            Self::Oidn => cannot_fill(self.name(), stride),
+            Self::Oidn if stride > 1 => Err(Error::Usage(format!(
+                "oidn wants the colour whole, but indirect_stride {stride} leaves most pixels without indirect light: choose another \
+                 filter"
+            ))),
+            _ => Ok(()),
         }
     }
 

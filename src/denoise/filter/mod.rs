@@ -51,8 +51,6 @@ pub struct Row {
     pub name: &'static str,
     /// One line of help.
     pub about: &'static str,
-    /// Whether it fills in images of which every few pixels alone are known.
-    pub fills_in: bool,
     /// Bytes of device memory a pixel that its own buffers take, beside the [`Planes`].
     pub(crate) bytes: u64,
     /// On a device: see [`Row::compile`].
@@ -62,14 +60,6 @@ pub struct Row {
 }
 
 impl Row {
-    /// Whether it can filter light that was traced for pixels `stride` apart.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] if not, with those that can.
-    pub fn check_filling(&self, stride: u32) -> Result<()> {
-        if self.fills_in { Ok(()) } else { cannot_fill(self.name, stride) }
-    }
-
     /// Compiles the filter's kernels and makes its own buffers, for images of (width, height).
     ///
     /// # Errors
@@ -162,18 +152,6 @@ impl Planes {
     /// Pixels.
     pub fn pixels(&self) -> u32 {
         self.size[0].saturating_mul(self.size[1])
-    }
-}
-
-/// Refuses a stride above 1 for what fills in no pixels.
-fn cannot_fill(name: &str, stride: u32) -> Result<()> {
-    let able: Vec<_> = FILTERS.iter().filter(|row| row.fills_in).map(|row| row.name).collect();
-    let able = able.join(", ");
-    match stride {
-        1 => Ok(()),
-        _ => Err(Error::Usage(format!(
-            "{name} cannot fill in the pixels that indirect_stride {stride} leaves without indirect light: choose one of {able}"
-        ))),
     }
 }
 

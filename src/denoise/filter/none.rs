@@ -8,7 +8,6 @@ use crate::gpu::Recorder;
 pub const ROW: Row = Row {
     name: "none",
     about: "the image as it is; unusable pixels become 0",
-    fills_in: false,
     bytes: super::pack::BYTES,
     make: |gpu, _, size| Ok(Box::new(None(Pack::new(gpu, size)?))),
     reference: |input, _| Packed::reference(input).iter().map(Packed::output).collect(),

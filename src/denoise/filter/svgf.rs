@@ -17,7 +17,6 @@ use std::f32::consts::LOG2_E;
 pub const ROW: Row = Row {
     name: "svgf",
     about: "À-Trous wavelets whose radiance weight counts in each pixel's standard deviations",
-    fills_in: true,
     bytes: super::pack::BYTES + 32, // estimate and scratch
     make: |gpu, s, size| Ok(Box::new(Svgf::new(gpu, &s.edge, &s.svgf, s.footprint.levels, size)?)),
     reference: |input, s| reference(input, &s.edge, &s.svgf, s.footprint.levels),

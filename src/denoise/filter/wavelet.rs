@@ -18,7 +18,6 @@ use glam::Vec3;
 pub const ROW: Row = Row {
     name: "wavelet",
     about: "decimated wavelets, CDF(2,2) or red-black, edge-avoiding where there are weights",
-    fills_in: true,
     bytes: super::pack::BYTES + 16,
     make: |gpu, s, size| {
         let steps = steps(s.footprint.levels, s.wavelet.basis);

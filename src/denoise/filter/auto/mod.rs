@@ -23,8 +23,6 @@ use crate::shaders::{auto, auto_error, auto_inputs, auto_leverage, auto_residual
 pub const ROW: Row = Row {
     name: "auto",
     about: "per pixel the best blend of none, guided by wide, middle and narrow windows, and svgf, by estimated error",
-    // What it judges svgf and the image by counts on noise in every pixel: filled in, those between stand out as a grid.
-    fills_in: false,
     // The packs', three windows', what four candidates make, two estimates, svgf's scratch, errors and smoothed ones, three of what is
     // dim or probed, leverages and their surroundings; leverages of narrow windows, surfaces of cells, expected errors.
     bytes: super::pack::BYTES + 32 + 3 * (guided::ROW.bytes - 32) + (4 + 2 + 1 + 3 + 3 + 3 + 2) * 16 + 4 + 4 + 12,

@@ -18,7 +18,6 @@ use table::GuidedTable;
 pub const ROW: Row = Row {
     name: "guided",
     about: "guided image filter: light as a local linear function of normal and depth",
-    fills_in: true,
     bytes: 96, // colours, channels and four planes of models; tables are of small images
     make: |gpu, s, size| {
         let (own, radius) = (&s.guided, s.footprint.radius);
