@@ -19,6 +19,8 @@ enum Part {
     EawFrame,
     /// EAW's figures 10 and 12: errors of the filters behind one path per pixel.
     EawErrors,
+    /// EAW's figure 9: light traced for some pixels only.
+    EawStride,
     /// How much light EAW's filter keeps.
     EawEnergy,
     /// EAW's table 2 and GIF's table 2: times of the filters.
@@ -74,6 +76,7 @@ impl Part {
         match self {
             Self::EawFrame => eaw::frame(gpu, args),
             Self::EawErrors => ranking::eaw(gpu, args),
+            Self::EawStride => eaw::stride(gpu, args),
             Self::EawEnergy => eaw::energy(gpu, args),
             Self::FilterTimes => filter_times::measure(gpu),
             Self::GeoTimes => geo::times(gpu, args),

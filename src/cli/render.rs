@@ -134,12 +134,12 @@ pub fn run(args: &Args) -> Result<Exit> {
     }
     let gpu = host.time("open device", || args.common.open())?;
     check_room(args, &settings, &gpu)?;
-    check_stride(args, &settings)?;
     let plan = match plan {
         Some(plan) => Some(plan),
         None => host.time("plan", || planned::make(args, &gpu, &scene, &settings))?,
     };
     let (args, settings) = &planned::applied(args, settings, plan.as_ref())?;
+    check_stride(args, settings)?;
     let renderer = host.time("upload and compile", || renderer(args, &gpu, &scene, settings))?;
     let begun = Begun { earlier: earlier.as_ref(), carries: false };
     let mut taken = shoot(args, &gpu, &scene, &renderer, begun, host)?;

@@ -71,8 +71,7 @@ impl Sparse {
     /// # Errors
     /// [`crate::error::Error::Device`].
     pub fn record_upsample(&self, rec: &mut Recorder, traced: &Planes) -> Result<()> {
-        let bind =
-            upsample::Bind { traced: &traced.output, guide: &self.whole.guide, filtered: &self.whole.output };
+        let bind = upsample::Bind { traced: &traced.output, guide: &self.whole.guide, filtered: &self.whole.output };
         rec.dispatch_threads(&self.upsample, bind, &self.push(), self.whole.pixels())
     }
 

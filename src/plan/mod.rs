@@ -140,7 +140,11 @@ fn check(settings: &Settings, methods: &[Method], target: Target) -> Result<()> 
     if methods.is_empty() {
         return Err(Error::Usage("no method to choose among: name a filter, or none".to_owned()));
     }
-    methods.iter().try_for_each(|method| method.check_stride(settings.indirect_stride))?;
+    if settings.indirect_stride > 1 {
+        let what =
+            "the error of pixels that are filled in cannot be planned: set indirect_stride to 1, or give the samples";
+        return Err(Error::Usage(what.to_owned()));
+    }
     settings.validate()
 }
 

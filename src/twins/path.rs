@@ -1,5 +1,7 @@
 //! Twin of `glsl/trace/path.comp` and of `glsl/shared/trace_path.glsl`.
-use crate::layout::{BSDF_DIELECTRIC, BSDF_METALLIC, Effects, FrameConstants, MATERIAL_TWO_SIDED, NONE, PathConstants, SurfacePoint};
+use crate::layout::{
+    BSDF_DIELECTRIC, BSDF_METALLIC, Effects, FrameConstants, MATERIAL_TWO_SIDED, NONE, PathConstants, SurfacePoint,
+};
 use crate::math::hash::pcg;
 use crate::scene::Scene;
 use crate::shaders::shared::trace_path::{

@@ -20,3 +20,4 @@ mod resume_merge;
 mod sequence;
 mod signals;
 mod statistical;
+mod stride;

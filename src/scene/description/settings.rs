@@ -80,8 +80,8 @@ settings! {
             /// Limit of a sample's indirect light, largest channel; 0 is off, others bias the image.
             clamp_indirect: f32 = 0.0, FINITE_FROM_0;
             // Dammertz et al. 2010: 2 or 4.
-            /// Trace light that a filter takes (the layer `indirect`) for every N-th pixel along both axes only, and let the filter
-            /// fill in the others.
+            /// Trace the light that a filter takes (the layer `indirect`) for every N-th pixel along both axes only; --denoise fills
+            /// in the others.
             indirect_stride: u32 = 1, 1..=Self::MAX_STRIDE;
             /// Chooses the random sequence.
             seed: u32 = 0, ..;
@@ -106,7 +106,7 @@ impl Settings {
     pub const MAX_SPP: u32 = Allocate::MAX_SPP;
     /// The longest path in edges.
     pub const MAX_DEPTH: u32 = 1024;
-    /// The largest distance between pixels whose indirect light is traced: À-Trous filters of usual depth bridge it.
+    /// The largest distance between pixels whose indirect light is traced.
     pub const MAX_STRIDE: u32 = 8;
 
     /// # Errors

@@ -1,9 +1,11 @@
 //! EAW: Dammertz, Sewtz, Hanika and Lensch, Edge-avoiding À-Trous wavelet transform for fast global illumination filtering, 2010.
 mod energy;
 mod frame;
+mod stride;
 
 pub use energy::measure as energy;
 pub use frame::measure as frame;
+pub use stride::measure as stride;
 
 use super::view::View;
 
