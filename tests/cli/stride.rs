@@ -40,5 +40,5 @@ fn what_cannot_be_sparse_is_one_line() {
     complains(&tallow(&folder, &cost), 2, &["leave out the filter none"]);
     let planned = [&["render", SCENE, "--time", "50ms"], &STRIDE[..]].concat();
     complains(&tallow(&folder, &planned), 2, &["set indirect_stride to 1"]);
-    assert_eq!(folder.path().read_dir().unwrap().count(), 0, "nothing is written");
+    assert!(!folder.path().join("scene.exr").exists());
 }
