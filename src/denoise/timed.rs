@@ -41,6 +41,7 @@ pub(crate) struct Chain<'a> {
 /// [`crate::error::Error::Usage`] for settings out of range, [`crate::error::Error::Device`] when the image is too large or the
 /// device fails.
 pub fn timed(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Timed> {
+    recipe.method.check_stride(noisy.holds().indirect_stride)?;
     let before = gpu.allocated_bytes();
     let begun = Instant::now();
     let row = match recipe.method {
