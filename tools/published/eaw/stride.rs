@@ -57,7 +57,7 @@ pub fn measure(gpu: &Gpu, args: &Args) -> anyhow::Result<Section> {
                 let all = *whole.get_or_insert(render + filtering);
                 let name = match stride {
                     1 => format!("{policy}, {spp}"),
-                    _ => format!("{policy}, {spp}, of {stride}x{stride} pixels one"),
+                    _ => format!("{policy}, {spp}, one of {stride}x{stride} pixels"),
                 };
                 let times = format!("{render:.1} + {filtering:.1}");
                 let share = format!("{:.2}", (render + filtering) / all);
@@ -87,6 +87,7 @@ fn one(
         ([s.width, s.height], s.max_depth, s.spp, s.indirect_stride) = (view.size(args), view.depth, spp, stride);
         s.split = Split::Soft;
         s.allocate.policy = tallow::allocate::policy(policy).expect("a row of the table");
+        s.allocate.min_spp = 1; // of two samples one is placed
     };
     let scene = view.load(args, change)?;
     let mut renderer = Renderer::new(gpu, &scene, &scene.settings, ALL)?;
