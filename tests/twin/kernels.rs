@@ -378,7 +378,12 @@ impl Traversal {
         let (count, any_hit) = (rays.len() as u32, u32::from(any_hit));
         let push = TraversePush { count, root: *root, any_hit, ..Default::default() };
         gpu.run(&mut FrameResources::new(gpu).unwrap(), |rec| {
-            let bind = traverse_kernel::Bind { scene: renderer.scene().bind(), rays: &queries, hits: &hits };
+            let bind = traverse_kernel::Bind {
+                scene: renderer.scene().bind(),
+                ray_query: renderer.scene().bind_world(),
+                rays: &queries,
+                hits: &hits,
+            };
             rec.dispatch_threads(kernel, bind, &push, count.div_ceil(3)) // some threads have fewer than 3
         })
         .unwrap();

@@ -93,7 +93,7 @@ impl<'a> Stage<'a> {
                 "warning: nothing moves in the scene: all frames are alike (add [[animation]] tables, or --turntable)",
             );
         }
-        let gpu = args.render.common.open()?;
+        let gpu = args.render.common.open(args.render.tracing)?;
         render::check_room(&args.render, &settings, &gpu)?;
         let rest = called_for(&scene, &settings, args.render.wanted());
         let reproject = carrying(args, &gpu, &scene, &settings, !animation.is_empty())?;
