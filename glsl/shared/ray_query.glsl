@@ -2,6 +2,7 @@
 // structures that it built of the same triangles: see src/render/world.rs. What it cannot decide comes back as a candidate: a
 // surface with a mask, a sphere, and the triangle that the ray leaves.
 #extension GL_EXT_ray_query : require
+#include "shared/finite.glsl"
 layout(binding = 19) uniform accelerationStructureEXT world;
 
 rayQueryEXT query;
@@ -56,8 +57,11 @@ Hit committed_hit(Segment ray, uint root, vec2 normal) {
 }
 
 // The closest hit of a ray, or with `any_hit` some hit. Where no surface has a mask, the device decides alone, and only a ray that
-// meets the triangle which it leaves is traced again, with a look at every candidate: such rays are few.
+// meets the triangle which it leaves is traced again, with a look at every candidate: such rays are few. Vulkan leaves open what
+// becomes of numbers that make no ray, which here meet nothing.
 Hit query_hit(Segment ray, bool any_hit, uint root, uvec2 from) {
+    bool is_ray = finite(ray.origin) && finite(ray.direction) && ray.t_max > 0.0;
+    if (!is_ray) return Hit(ray.t_max, NONE, NONE, 0.0, 0.0);
     uint end = any_hit ? gl_RayFlagsTerminateOnFirstHitEXT : gl_RayFlagsNoneEXT;
     bool every = EVERY_CANDIDATE, again;
     Hit hit;

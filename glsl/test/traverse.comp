@@ -7,6 +7,7 @@
 layout(local_size_x_id = 100) in;
 layout(binding = 11) uniform usamplerBuffer rays; // of RayQuery
 layout(scalar, binding = 12) writeonly buffer Hits { RayHit hits[]; };
+layout(constant_id = 110) const bool BEHIND = false; // finds what a ray meets that leaves its first hit
 layout(scalar, push_constant) uniform Push { TraversePush push; };
 
 uint nodes_visited = 0u;
@@ -29,11 +30,23 @@ void write_hit(uint i, Hit hit) {
     hits[i].barycentric = vec2(hit.b1, hit.b2);
 }
 
+Hit behind(Segment ray, bool any_hit) {
+    Hit first = traverse(ray, push.root);
+    bool blocked = any_hit;
+    Hit hit = trace_shadow_then_closest(ray, blocked, ray, !any_hit, push.root, uvec2(first.triangle, first.instance));
+    if (blocked) hit.triangle = 0u; // or any other
+    return hit;
+}
+
 void main() {
     bool any_hit = push.any_hit != 0u;
     uint i = thread_index(), stride = gl_NumWorkGroups.x * gl_NumWorkGroups.y * WORKGROUP;
     bool on = i < push.count;
     if (!DEALT && !on) return;
+    if (BEHIND) {
+        for (; i < push.count; i += stride) write_hit(i, behind(ray_at(i), any_hit));
+        return;
+    }
 #ifdef RAY_QUERY
     for (; i < push.count; i += stride) write_hit(i, query_hit(ray_at(i), any_hit, push.root, uvec2(NONE)));
 #else

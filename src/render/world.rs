@@ -89,7 +89,7 @@ fn parts(scene: &Scene, has_spheres: bool) -> Vec<Part> {
         let runs: Vec<_> = runs.filter(|(spheres, _)| *spheres && has_spheres).map(|(_, run)| run).collect();
         let all_spheres = runs.first() == Some(&range);
         // What spheres are told by is no triangle that is seen, and lies among those of the mesh.
-        let triangles = (!all_spheres).then(|| Mesh { range, of_boxes: false });
+        let triangles = (!all_spheres).then_some(Mesh { range, of_boxes: false });
         let shapes = triangles.into_iter().chain(runs.into_iter().map(|range| Mesh { range, of_boxes: true }));
         shapes.map(|shapes| Part { mesh, shapes }).collect::<Vec<_>>()
     };

@@ -24,10 +24,11 @@ fn rays(scene: &Loaded) -> Vec<RayQuery> {
     words(6 * RAYS as usize, 5).chunks_exact(6).enumerate().map(ray).collect()
 }
 
-fn trace(gpu: &Gpu, scene: &Loaded, rays: &[RayQuery], any_hit: bool) -> Vec<RayHit> {
+/// `behind`: what rays meet that leave their first hits.
+fn trace(gpu: &Gpu, scene: &Loaded, rays: &[RayQuery], any_hit: bool, behind: bool) -> Vec<RayHit> {
     let effects = render::called_for(scene, &scene.settings, Outputs::default());
     let renderer = Renderer::specialised(gpu, scene, &scene.settings, Outputs::default(), effects).unwrap();
-    let mut constants = kernel::Constants { effects, thread: gpu.tuning().thread(), ..Default::default() };
+    let mut constants = kernel::Constants { effects, thread: gpu.tuning().thread(), behind, ..Default::default() };
     constants.traverse.stack = scene.stack;
     let kernel = Kernel::<kernel::Bind>::new(gpu, &constants).unwrap();
     let hits = Buffer::new(gpu, "hits", rays.len(), Location::Device).unwrap();
@@ -60,7 +61,7 @@ fn rays_from_anywhere_hit_the_same() {
     let Some(gpus) = both() else { return };
     for (name, scene) in scenes() {
         let rays = rays(&scene);
-        let [ours, theirs] = gpus.each_ref().map(|gpu| trace(gpu, &scene, &rays, false));
+        let [ours, theirs] = gpus.each_ref().map(|gpu| trace(gpu, &scene, &rays, false, false));
         let hit = ours.iter().filter(|hit| hit.triangle != NONE).count() as f64 / f64::from(RAYS);
         let other = share(&ours, &theirs, |a, b| (a.triangle, a.instance) == (b.triangle, b.instance));
         let off = share(&ours, &theirs, agree);
@@ -68,8 +69,31 @@ fn rays_from_anywhere_hit_the_same() {
         assert!(hit > 0.1 && other < 1e-3 && off < 1e-3, "{name}: {hit} hit, {other} another surface, {off} off");
         // Control: the comparison tells a ray from the next.
         assert!(share(&ours[1..], &theirs[..theirs.len() - 1], agree) > 0.1, "{name}");
-        let [ours, theirs] = gpus.each_ref().map(|gpu| trace(gpu, &scene, &rays, true));
-        let off = share(&ours, &theirs, |a, b| (a.triangle == NONE) == (b.triangle == NONE));
+        let [ours, theirs] = gpus.each_ref().map(|gpu| trace(gpu, &scene, &rays, true, false));
+        let off = share(&ours, &theirs, blocked_alike);
+        assert!(off < 1e-3, "{name}: of rays that look for any hit {off} disagree");
+    }
+    gpus.iter().for_each(assert_silent);
+}
+
+fn blocked_alike(a: &RayHit, b: &RayHit) -> bool {
+    (a.triangle == NONE) == (b.triangle == NONE)
+}
+
+/// From where they start, they would meet that surface again.
+#[test]
+fn rays_pass_the_surface_that_they_leave() {
+    let Some(gpus) = both() else { return };
+    for (name, scene) in scenes() {
+        let rays = rays(&scene);
+        let first = trace(&gpus[0], &scene, &rays, false, false);
+        let [ours, theirs] = gpus.each_ref().map(|gpu| trace(gpu, &scene, &rays, false, true));
+        let off = share(&ours, &theirs, agree);
+        println!("{name}: {off:.1e} off");
+        assert!(off < 1e-3, "{name}: {off} off");
+        assert!(share(&first, &ours, agree) > 0.05, "{name}: control, a ray that meets the same again");
+        let [ours, theirs] = gpus.each_ref().map(|gpu| trace(gpu, &scene, &rays, true, true));
+        let off = share(&ours, &theirs, blocked_alike);
         assert!(off < 1e-3, "{name}: of rays that look for any hit {off} disagree");
     }
     gpus.iter().for_each(assert_silent);

@@ -57,7 +57,7 @@ fn masked(mut scene: Loaded) -> Loaded {
     scene
 }
 
-/// One of each kind: a single level, instances with a sphere among them, masks on both, spheres in a box.
+/// One of each kind: a single level, a sphere among its triangles, instances with a sphere among them, and masks on such.
 fn scenes() -> [(&'static str, Loaded); 5] {
     let moving = || poses::at(&poses::MOMENTS[2]).with(|s| s.spp = 16);
     [

@@ -364,7 +364,8 @@ impl Traversal {
         let renderer = Renderer::specialised(gpu, scene, &scene.settings, Outputs::default(), effects).unwrap();
         let traverse = shared::traverse::Constants { stack: scene.stack };
         let thread = shared::thread::Constants { workgroup: 32, stripes: 1 };
-        let constants = traverse_kernel::Constants { effects, thread, traverse, deal: dealing(gpu) };
+        let constants =
+            traverse_kernel::Constants { effects, thread, traverse, deal: dealing(gpu), ..Default::default() };
         let kernel = Kernel::new(gpu, &constants).unwrap();
         let root = frame_constants(scene, &scene.settings).unwrap().path.root;
         Self { gpu: gpu.clone(), renderer, kernel, root }

@@ -132,7 +132,8 @@ impl Device {
         // obvhs does not support masks, so neither side tests them.
         let effects = Effects { dealt_triangles: true, ..Effects::default() };
         let traverse = shared::traverse::Constants { stack: scene.stack };
-        let constants = Constants { effects, traverse, thread: gpu.tuning().thread(), deal: gpu.deal() };
+        let thread = gpu.tuning().thread();
+        let constants = Constants { effects, traverse, thread, deal: gpu.deal(), ..Default::default() };
         Ok(Self {
             frame: FrameResources::new(&gpu)?,
             kernel: Kernel::new(&gpu, &constants)?,
