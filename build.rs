@@ -15,6 +15,7 @@
 //! layout(scalar, binding = 3) writeonly buffer Dst { u64vec2 dst[]; }; // of vec4, which it stores two floats at a time
 //! layout(binding = 0) uniform usamplerBuffer nodes; // of BvhNode   // or samplerBuffer of floats
 //! layout(scalar, binding = 3) uniform Frame { FrameConstants frame; }; // the first of a buffer
+//! layout(binding = 19) uniform accelerationStructureEXT world;      // in a form that traces by ray queries: see `gpu::Acceleration`
 //! layout(scalar, push_constant) uniform Push { PathPush push; };    // once per kernel
 //! ```
 //! Structs of `src/layout` that a kernel binds come with functions, so that no kernel knows where their fields lie: see
@@ -40,7 +41,7 @@ mod interface;
 #[path = "tools/build/structs.rs"]
 mod structs;
 
-use emit::Group;
+use emit::{Binaries, Group};
 use interface::{EFFECTS, Interface, Source};
 
 /// The first lines of every kernel.
@@ -53,6 +54,9 @@ const HEADER: &str = "#version 460
 
 /// Kernels that mention it are compiled once more with it defined, for devices whose subgroups cannot shuffle.
 const PLAIN: &str = "NO_SHUFFLE";
+
+/// Likewise, for devices that trace rays by ray queries. Lanes then have no triangles to deal to each other.
+const RAY_QUERY: &str = "RAY_QUERY";
 
 fn main() {
     if let Err(error) = build() {
@@ -104,8 +108,12 @@ struct Kernel<'a> {
     name: &'a str,
     file: &'a Path,
     interface: Interface,
-    /// Its code, and once more for devices whose subgroups cannot shuffle if that differs.
-    code: Vec<Code<'a>>,
+    /// Its code for most devices.
+    usual: Code<'a>,
+    /// That for devices whose subgroups cannot shuffle, if it differs.
+    plain: Option<Code<'a>>,
+    /// That for devices that trace rays by ray queries, if it traces any.
+    ray_query: Option<Code<'a>>,
 }
 
 struct Code<'a> {
@@ -125,8 +133,14 @@ impl<'a> Kernel<'a> {
             let binary = compiled.join(format!("{name}-{:016x}.spv", xxh3_64(whole.as_bytes())));
             Code { file, whole, binary }
         };
-        let plain = text.contains(PLAIN).then(|| code(&format!("#define {PLAIN}\n")));
-        Ok(Self { name, file, code: [code("")].into_iter().chain(plain).collect(), interface })
+        let defining = |names: &[&str]| code(&names.iter().map(|name| format!("#define {name}\n")).collect::<String>());
+        let plain = text.contains(PLAIN).then(|| defining(&[PLAIN]));
+        let ray_query = text.contains(RAY_QUERY).then(|| defining(&[RAY_QUERY, PLAIN]));
+        Ok(Self { name, file, usual: code(""), plain, ray_query, interface })
+    }
+
+    fn code(&self) -> impl Iterator<Item = &Code<'a>> {
+        [Some(&self.usual), self.plain.as_ref(), self.ray_query.as_ref()].into_iter().flatten()
     }
 }
 
@@ -159,14 +173,19 @@ fn generate(files: &[PathBuf], root: &str, target: &Path) -> Result<()> {
     let (mut code, mut hash) = (String::new(), Xxh3Default::new());
     let folder = target.with_file_name("spirv");
     let kernels = files.iter().map(|file| Kernel::read(file, &folder)).collect::<Result<Vec<_>>>()?;
-    compile_all(&kernels.iter().flat_map(|kernel| &kernel.code).collect::<Vec<_>>())?;
+    compile_all(&kernels.iter().flat_map(Kernel::code).collect::<Vec<_>>())?;
     let mut groups = BTreeMap::new();
-    for Kernel { name, file, interface, code: compiled } in &kernels {
-        for compiled in compiled {
+    for kernel in &kernels {
+        for compiled in kernel.code() {
             hash.update(&fs::read(&compiled.binary)?);
         }
-        let [usual, plain] = [compiled.first(), compiled.last()].map(|code| &code.expect("one at least").binary);
-        code += &emit::module(name, file, interface, root, [usual, plain])?;
+        let Kernel { name, file, interface, usual, plain, ray_query } = kernel;
+        let binaries = Binaries {
+            usual: &usual.binary,
+            plain: &plain.as_ref().unwrap_or(usual).binary,
+            ray_query: ray_query.as_ref().map(|code| &*code.binary),
+        };
+        code += &emit::module(name, file, interface, root, &binaries)?;
         groups.extend(interface.groups().into_iter().map(|group| (group.clone(), declared(interface, group))));
     }
     // The integration tests take these from the crate.

@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# Sourced by tools/tallow, tools/test and tools/package: finds out what is missing, installs it or says how, and finds cargo.
+# Sourced by tools/tallow, tools/test, tools/package and tools/with-ray-query: finds out what is missing, installs it or says how, and finds cargo.
 # Everything that is said goes to stderr, because stdout belongs to the program that is started in the end.
 set -euo pipefail
 
@@ -85,6 +85,33 @@ install_with_apt() {
     export DEBIAN_FRONTEND=noninteractive
     apt-get update -qq >&2 || die "apt-get update failed: is there a network? Needed: $*"
     apt-get install -y -qq --no-install-recommends "$@" >&2 || die "apt-get could not install: $*"
+}
+
+# ray_query_driver: downloads a Mesa whose lavapipe traces by VK_KHR_ray_query into the folder that it prints, once. It comes from
+# the backports of Debian 12, whose own Mesa is too old; nothing is installed, and lists and packages stay in that folder.
+ray_query_driver() {
+    local folder=$target/ray-query-driver
+    local library=$folder/root/usr/lib/$(uname -m)-linux-gnu/libvulkan_lvp.so
+    local source="deb [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] http://deb.debian.org/debian bookworm-backports main"
+    if [[ ! -e $folder/driver.json ]]; then
+        grep -q 'VERSION_CODENAME=bookworm' /etc/os-release 2>/dev/null ||
+            die "only for Debian 12 is it known where to get a driver with ray queries: install one, and set VK_DRIVER_FILES"
+        say "downloading a driver with ray queries"
+        rm -rf "$folder"
+        mkdir -p "$folder"/{lists/partial,cache/archives/partial,root}
+        echo "$source" >"$folder/sources.list"
+        local options=(-qq -o "Dir::Etc::SourceList=$folder/sources.list" -o Dir::Etc::SourceParts=- -o "Dir::State::Lists=$folder/lists"
+            -o "Dir::Cache=$folder/cache" -o APT::Sandbox::User= -o Acquire::Languages=none)
+        apt-get "${options[@]}" update >&2 || die "apt-get update failed: is there a network?"
+        (cd "$folder" && apt-get "${options[@]}" download mesa-vulkan-drivers libdrm2 libdrm-amdgpu1 >&2) ||
+            die "apt-get could not download the driver"
+        local package
+        for package in "$folder"/*.deb; do dpkg-deb -x "$package" "$folder/root"; done
+        [[ -e $library ]] || die "the packages hold no $library"
+        rm -rf "$folder"/{lists,cache} "$folder"/*.deb
+        printf '{"file_format_version": "1.0.0", "ICD": {"library_path": "%s", "api_version": "1.3.0"}}\n' "$library" >"$folder/driver.json"
+    fi
+    echo "$folder"
 }
 
 # Sets `cargo`. A fresh rustup leaves it off the path until the next login.

@@ -28,6 +28,7 @@ uint nodes_visited = 0u;
 #include "shared/texture.glsl"
 #include "shared/camera.glsl"
 #include "shared/traverse.glsl"
+#include "shared/trace.glsl"
 #include "shared/deal.glsl"
 #include "shared/surface.glsl"
 #include "shared/light.glsl"

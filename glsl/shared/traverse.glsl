@@ -1,6 +1,6 @@
 // Closest hit and any hit of a ray through eight-way compressed nodes (Ylitie, Karras, Laine, HPG 2017), as obvhs builds them,
 // with a watertight triangle test. The including kernel binds `nodes`, `triangles`, `instances`, and for masks `shading`,
-// `materials`, `textures`, `texels`.
+// `materials`, `textures`, `texels`. Kernels that trace include trace.glsl behind it.
 //
 // The code is shaped for lavapipe, which executes all of it under masks for every node: few instructions and few variables that
 // live from step to step count for more than early exits. A loop that tests at its head would run its body once more with no
@@ -324,35 +324,4 @@ bool traversal_step(inout Traversal t, RaySpace world, bool any_hit, uint root, 
     bool last = visit_node(t, world, true, root, leaves);
     intersect_leaves(t.hit, leaves, any_hit, mask_seed, from);
     return last || (any_hit && t.hit.triangle != NONE);
-}
-
-// The closest hit of a ray that leaves no triangle.
-Hit traverse(Segment ray, uint root) {
-    RaySpace space = ray_space(ray.origin, ray.direction);
-    Traversal t = traversal_start(ray.t_max, root);
-    bool done;
-    do {
-        done = traversal_step(t, space, false, root, ray.mask_seed, uvec2(NONE));
-    } while (!done);
-    return t.hit;
-}
-
-// Finds out first, where `shadowed`, whether anything blocks `shadow`, which replaces `shadowed`; then, where `alive`, the closest
-// hit of `ray`. Both rays leave the same triangle. In one loop, no lane waits for the slowest shadow ray.
-Hit trace_shadow_then_closest(Segment shadow, inout bool shadowed, Segment ray, bool alive, uint root, uvec2 from) {
-    RaySpace first = ray_space(shadow.origin, shadow.direction), second = ray_space(ray.origin, ray.direction);
-    bool any_hit = shadowed, done;
-    shadowed = false;
-    Traversal t = traversal_start(any_hit ? shadow.t_max : ray.t_max, root);
-    do {
-        uint mask_seed = any_hit ? shadow.mask_seed : ray.mask_seed;
-        done = traversal_step(t, select_ray(any_hit, first, second), any_hit, root, mask_seed, from);
-        if (done && any_hit) {
-            shadowed = t.hit.triangle != NONE;
-            t = traversal_start(ray.t_max, root);
-            any_hit = false;
-            done = !alive;
-        }
-    } while (!done);
-    return t.hit;
 }

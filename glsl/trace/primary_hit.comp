@@ -22,6 +22,7 @@ uint nodes_visited = 0u;
 #include "shared/texture.glsl"
 #include "shared/camera.glsl"
 #include "shared/traverse.glsl"
+#include "shared/trace.glsl"
 #include "shared/surface.glsl"
 #include "shared/first_hit.glsl"
 #include "shared/seen_hit.glsl"

@@ -1,7 +1,7 @@
 //! Options shared by all commands that run on a device and write pictures.
 use super::finite;
 use crate::error::{Error, Result};
-use crate::gpu::{self, DeviceOptions, Gpu};
+use crate::gpu::{self, DeviceOptions, Gpu, Tracing};
 use crate::image::{WriteOptions, tone::ToneMap};
 use crate::settings::entry::Entry;
 use clap::{Arg, ArgAction};
@@ -54,16 +54,17 @@ impl Common {
         !self.quiet && !self.json
     }
 
-    /// Opens the device that the options select.
+    /// Opens the device that the options select, to trace rays as `tracing` says.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`].
-    pub fn open(&self) -> Result<Gpu> {
+    pub fn open(&self, tracing: Tracing) -> Result<Gpu> {
         Gpu::open(&DeviceOptions {
             device: self.device.clone(),
             validation: self.validation,
             cache: gpu::cache_folder(),
             wait_limit: None,
+            tracing,
         })
     }
 

@@ -30,6 +30,8 @@ pub struct Device {
     pub limits: Vec<(String, u64)>,
     /// Required features and versions that it lacks; empty if it can be used.
     pub missing: Vec<String>,
+    /// Extensions and features that it lacks for `--tracing ray-query`; empty if it can trace so.
+    pub ray_query_lacks: Vec<String>,
 }
 
 /// Runs the subcommand.
@@ -68,6 +70,7 @@ fn device(index: usize, info: gpu::DeviceInfo) -> Device {
         api: info.api_version,
         limits: limits.map(|(name, value)| (name.to_owned(), value)).into(),
         missing: info.missing.into_iter().map(str::to_owned).collect(),
+        ray_query_lacks: info.ray_query_lacks.into_iter().map(str::to_owned).collect(),
     }
 }
 
@@ -83,10 +86,12 @@ fn text(devices: &[Device]) -> String {
 }
 
 fn details(device: &Device) -> String {
-    let missing = if device.missing.is_empty() { "nothing".to_owned() } else { device.missing.join(", ") };
+    let or = |list: &[String], none: &str| if list.is_empty() { none.to_owned() } else { list.join(", ") };
+    let missing = or(&device.missing, "nothing");
+    let lacks = or(&device.ray_query_lacks, "nothing");
     let limits: Vec<_> =
         device.limits.iter().map(|(name, value)| vec![format!("  {name}"), value.to_string()]).collect();
-    let head = format!("\n{} {}: missing: {missing}\n", device.index, device.name);
+    let head = format!("\n{} {}: missing: {missing}; for ray queries: {lacks}\n", device.index, device.name);
     head + &table::text(&["  limit", "value"], &limits)
 }
 
@@ -104,10 +109,13 @@ mod tests {
             api: "1.3.230".to_owned(),
             limits: vec![("maxStorageBufferRange".to_owned(), 134_217_728)],
             missing: vec![],
+            ray_query_lacks: vec![],
         };
         assert!(text(&[device.clone()]).contains("yes\n"));
         device.missing = vec!["shaderInt64".to_owned()];
+        device.ray_query_lacks = vec!["VK_KHR_ray_query".to_owned()];
         let lacking = text(&[device]);
         assert!(lacking.contains("no\n") && lacking.contains("missing: shaderInt64"), "{lacking}");
+        assert!(lacking.contains("for ray queries: VK_KHR_ray_query"), "{lacking}");
     }
 }

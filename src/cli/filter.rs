@@ -10,7 +10,7 @@ use crate::denoise::filter::firefly::Fireflies;
 use crate::denoise::filter::{self, FilterSettings, Method};
 use crate::denoise::{self, Colour, Demodulation, Filtered, Recipe, file};
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, PassTime};
+use crate::gpu::{Gpu, PassTime, Tracing};
 use crate::image::aov::Aovs;
 use crate::image::metrics::{self, Metrics};
 use crate::image::source::{Source, Unread};
@@ -109,7 +109,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     check_outputs(args)?;
     check_filter(args)?;
     let file = Unread::open(&args.image)?;
-    let gpu = args.common.open()?;
+    let gpu = args.common.open(Tracing::Auto)?;
     check_room(args, &gpu, &file.claim)?;
     let source = file.decode()?;
     let aovs = Aovs::find(&source.film, &args.layers.names()).map_err(|what| Error::input(&args.image, what))?;

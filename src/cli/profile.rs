@@ -7,6 +7,7 @@ use super::overrides::Overrides;
 use super::{Exit, print, print_json};
 use crate::denoise::filter::Method;
 use crate::error::{Error, Result};
+use crate::gpu::Tracing;
 use crate::image::output;
 use crate::profile::{Comparison, Profile, Verdict};
 use serde::Serialize;
@@ -40,6 +41,9 @@ pub struct Args {
     /// Device, by index or part of its name [default: the best one]
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
+    /// Who finds what rays meet
+    #[arg(long, value_enum, default_value_t)]
+    pub tracing: Tracing,
     /// Run under the Vulkan validation layers and fail on any message; times mean little then
     #[arg(long)]
     pub validation: bool,

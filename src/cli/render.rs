@@ -13,7 +13,7 @@ use super::{Exit, complain, fail_on_messages, interrupt};
 use crate::denoise::filter::{self, Method};
 use crate::denoise::{self, Filtered, Noisy, Recipe};
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, PassTime};
+use crate::gpu::{Gpu, PassTime, Tracing};
 use crate::image::{self, Film};
 use crate::memory;
 use crate::render::settings::{Allocate, Settings};
@@ -87,9 +87,12 @@ pub struct Args {
     /// Play only this animation of a glTF file [default: all that do not move the same as an earlier one]
     #[arg(long, value_name = "NAME")]
     pub clip: Option<String>,
-    /// Count rays and visited nodes
+    /// Count rays and visited nodes; those that ray queries visit, nobody counts
     #[arg(long)]
     pub counters: bool,
+    /// Who finds what rays meet
+    #[arg(long, value_enum, default_value_t)]
+    pub tracing: Tracing,
     /// Device and output.
     #[command(flatten)]
     pub common: Common,
@@ -132,7 +135,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     if args.common.talkative() {
         scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
     }
-    let gpu = host.time("open device", || args.common.open())?;
+    let gpu = host.time("open device", || args.common.open(args.tracing))?;
     check_room(args, &settings, &gpu)?;
     let plan = match plan {
         Some(plan) => Some(plan),

@@ -21,9 +21,16 @@ pub enum Access {
     CopySource,
     /// Target of a copy, a fill or an update.
     CopyTarget,
+    /// What acceleration structures are built of.
+    BuildRead,
+    /// Acceleration structures, and the scratch memory of builds.
+    BuildWrite,
+    /// Acceleration structures that rays are traced through.
+    Trace,
 }
 
-const ALL: [Access; 7] = [
+/// Those of every device.
+const COMMON: [Access; 7] = [
     Access::Read,
     Access::Write,
     Access::ReadWrite,
@@ -32,6 +39,9 @@ const ALL: [Access; 7] = [
     Access::CopySource,
     Access::CopyTarget,
 ];
+
+/// Those of devices that trace by ray queries. Others know no such stages.
+const OF_RAY_QUERIES: [Access; 3] = [Access::BuildRead, Access::BuildWrite, Access::Trace];
 
 /// Returns (stage, reads, writes) of an access. No other code maps accesses to masks.
 fn masks(access: Access) -> (vk::PipelineStageFlags2, vk::AccessFlags2, vk::AccessFlags2) {
@@ -44,6 +54,15 @@ fn masks(access: Access) -> (vk::PipelineStageFlags2, vk::AccessFlags2, vk::Acce
         Access::UniformRead => (S::COMPUTE_SHADER, A::UNIFORM_READ, A::NONE),
         Access::CopySource => (S::ALL_TRANSFER, A::TRANSFER_READ, A::NONE),
         Access::CopyTarget => (S::ALL_TRANSFER, A::NONE, A::TRANSFER_WRITE),
+        Access::BuildRead => {
+            (S::ACCELERATION_STRUCTURE_BUILD_KHR, A::SHADER_READ | A::ACCELERATION_STRUCTURE_READ_KHR, A::NONE)
+        }
+        Access::BuildWrite => (
+            S::ACCELERATION_STRUCTURE_BUILD_KHR,
+            A::ACCELERATION_STRUCTURE_READ_KHR,
+            A::ACCELERATION_STRUCTURE_WRITE_KHR,
+        ),
+        Access::Trace => (S::COMPUTE_SHADER, A::ACCELERATION_STRUCTURE_READ_KHR, A::NONE),
     }
 }
 
@@ -59,10 +78,11 @@ impl Access {
 
 /// A barrier between all accesses that passes can make. Because it covers every kind of access, a later pass of another
 /// kind needs no second barrier for the same earlier work.
-fn between_passes() -> vk::MemoryBarrier2<'static> {
+fn between_passes(ray_queries: bool) -> vk::MemoryBarrier2<'static> {
     let (mut stages, mut reads, mut writes) =
         (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE, vk::AccessFlags2::NONE);
-    for (stage, read, write) in ALL.map(masks) {
+    let more = if ray_queries { &OF_RAY_QUERIES[..] } else { &[] };
+    for (stage, read, write) in COMMON.iter().chain(more).copied().map(masks) {
         (stages, reads, writes) = (stages | stage, reads | read, writes | write);
     }
     vk::MemoryBarrier2::default()
@@ -88,9 +108,9 @@ pub(super) unsafe fn whole_barrier(device: &ash::Device, commands: vk::CommandBu
 }
 
 /// # Safety
-/// `commands` is recording on `device`.
-pub(super) unsafe fn pass_barrier(device: &ash::Device, commands: vk::CommandBuffer) {
-    unsafe { emit(device, commands, between_passes()) };
+/// `commands` is recording on `device`, which was opened for `ray_queries` if that is set.
+pub(super) unsafe fn pass_barrier(device: &ash::Device, commands: vk::CommandBuffer, ray_queries: bool) {
+    unsafe { emit(device, commands, between_passes(ray_queries)) };
 }
 
 unsafe fn emit(device: &ash::Device, commands: vk::CommandBuffer, barrier: vk::MemoryBarrier2<'_>) {
@@ -167,6 +187,9 @@ mod tests {
         assert_eq!(barriers(&[&[(1, Write)], &[(1, Write)]]), [false, true], "write after write");
         assert_eq!(barriers(&[&[(1, TexelRead)], &[(1, Write)]]), [false, true], "write after read");
         assert_eq!(barriers(&[&[(1, ReadWrite)], &[(1, ReadWrite)]]), [false, true], "update after update");
+        assert_eq!(barriers(&[&[(1, CopyTarget)], &[(1, BuildRead)]]), [false, true], "build after copy");
+        assert_eq!(barriers(&[&[(1, BuildWrite)], &[(1, BuildWrite)]]), [false, true], "copies after meshes");
+        assert_eq!(barriers(&[&[(1, BuildWrite)], &[(1, Trace)], &[(1, BuildWrite)]]), [false, true, true], "rays");
     }
 
     #[test]

@@ -84,6 +84,7 @@ pub struct Untyped {
     pub(super) raw: vk::Buffer,
     /// Size in bytes, a multiple of 4.
     pub(super) size: u64,
+    pub(super) location: Location,
     /// Bytes of one element.
     stride: u64,
     /// Bytes of one texel, for kernels that read it so.
@@ -289,19 +290,15 @@ impl Untyped {
         if size > limit {
             return Err(too_big(name, size, "bytes", limit, "of one buffer"));
         }
-        let usage = vk::BufferUsageFlags::STORAGE_BUFFER
-            | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
-            | vk::BufferUsageFlags::UNIFORM_BUFFER
-            | vk::BufferUsageFlags::TRANSFER_SRC
-            | vk::BufferUsageFlags::TRANSFER_DST;
-        let info = vk::BufferCreateInfo::default().size(size).usage(usage);
+        let info = vk::BufferCreateInfo::default().size(size).usage(usage(gpu, location));
         let what = format!("buffer \"{name}\" of {size} bytes");
         // SAFETY: `info` is complete; the device outlives every buffer.
         let raw = unsafe { gpu.0.device.create_buffer(&info, None) }.at(&what)?;
         gpu.0.name(raw, name);
         let (memory, views) = Default::default();
         // From here on, Drop cleans up if a line below fails.
-        let buffer = Self { gpu: gpu.clone(), name: name.to_owned(), raw, size, stride, texel, memory, views };
+        let (name, gpu) = (name.to_owned(), gpu.clone());
+        let buffer = Self { gpu, name, raw, size, location, stride, texel, memory, views };
         let remedy = "choose a smaller film or scene, or a device with more memory";
         buffer.allocate(location).map_err(|e| Error::Device(format!("{what}: {e}: {remedy}")))?;
         Ok(buffer)
@@ -357,6 +354,24 @@ impl Drop for Untyped {
                 let _ = allocator.free(memory);
             }
         });
+    }
+}
+
+/// All that kernels and copies may do with a buffer. Where rays are traced by ray queries, those in device memory may also be what
+/// acceleration structures are built of and lie in.
+fn usage(gpu: &Gpu, location: Location) -> vk::BufferUsageFlags {
+    use vk::BufferUsageFlags as Usage;
+    let usual = Usage::STORAGE_BUFFER
+        | Usage::UNIFORM_TEXEL_BUFFER
+        | Usage::UNIFORM_BUFFER
+        | Usage::TRANSFER_SRC
+        | Usage::TRANSFER_DST;
+    let built = Usage::SHADER_DEVICE_ADDRESS
+        | Usage::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR
+        | Usage::ACCELERATION_STRUCTURE_STORAGE_KHR;
+    match location {
+        Location::Device if gpu.traces_by_ray_query() => usual | built,
+        _ => usual,
     }
 }
 

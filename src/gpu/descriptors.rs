@@ -40,11 +40,18 @@ impl Descriptors {
         Ok(())
     }
 
-    /// Allocates a descriptor set of `pipeline` and writes `buffers` into it, one for each of `slots`.
+    /// Allocates a descriptor set of `pipeline` and writes `buffers` into it, one for each of `slots`, and what rays are traced through
+    /// into the binding beside it.
     ///
     /// # Errors
     /// When a buffer is too large to be bound in its slot, or memory is out.
-    pub fn set(&mut self, pipeline: &Pipeline, slots: &[Slot], buffers: &[Bound]) -> Result<vk::DescriptorSet> {
+    pub fn set(
+        &mut self,
+        pipeline: &Pipeline,
+        slots: &[Slot],
+        buffers: &[Bound],
+        world: Option<(u32, vk::AccelerationStructureKHR)>,
+    ) -> Result<vk::DescriptorSet> {
         let resource = |(slot, bound): (&Slot, &Bound)| {
             Ok(match slot.kind {
                 SlotKind::Storage => Resource::Buffer([bound.storage()?]),
@@ -54,7 +61,9 @@ impl Descriptors {
         };
         let resources = slots.iter().zip(buffers).map(resource).collect::<Result<Vec<_>>>()?;
         let set = self.allocate(pipeline.set_layout)?;
-        let writes: Vec<_> = slots
+        let structures: Vec<_> = world.iter().map(|(_, structure)| *structure).collect();
+        let mut traced = vk::WriteDescriptorSetAccelerationStructureKHR::default().acceleration_structures(&structures);
+        let mut writes: Vec<_> = slots
             .iter()
             .zip(&resources)
             .map(|(slot, resource)| {
@@ -68,7 +77,15 @@ impl Descriptors {
                 }
             })
             .collect();
-        // SAFETY: a fresh set; the buffers are kept by the frame that owns this.
+        if let Some((binding, _)) = world {
+            let write = vk::WriteDescriptorSet::default()
+                .dst_set(set)
+                .dst_binding(binding)
+                .descriptor_type(vk::DescriptorType::ACCELERATION_STRUCTURE_KHR)
+                .descriptor_count(1);
+            writes.push(write.push_next(&mut traced));
+        }
+        // SAFETY: a fresh set; the buffers and the structure are kept by the frame that owns this.
         unsafe { self.gpu.0.device.update_descriptor_sets(&writes, &[]) };
         Ok(set)
     }
@@ -106,12 +123,18 @@ impl Drop for Descriptors {
 
 fn create_pool(gpu: &Gpu) -> Result<vk::DescriptorPool> {
     let size = |ty| vk::DescriptorPoolSize { ty, descriptor_count: SETS * PER_SET };
+    let structures = vk::DescriptorPoolSize {
+        ty: vk::DescriptorType::ACCELERATION_STRUCTURE_KHR,
+        descriptor_count: SETS, // one a set at most
+    };
     let sizes = [
         size(vk::DescriptorType::STORAGE_BUFFER),
         size(vk::DescriptorType::UNIFORM_TEXEL_BUFFER),
         size(vk::DescriptorType::UNIFORM_BUFFER),
+        structures,
     ];
-    let info = vk::DescriptorPoolCreateInfo::default().max_sets(SETS).pool_sizes(&sizes);
+    let sizes = if gpu.traces_by_ray_query() { &sizes[..] } else { &sizes[..3] };
+    let info = vk::DescriptorPoolCreateInfo::default().max_sets(SETS).pool_sizes(sizes);
     // SAFETY: a complete info.
     unsafe { gpu.0.device.create_descriptor_pool(&info, None) }.at("descriptors")
 }

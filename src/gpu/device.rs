@@ -5,11 +5,12 @@ use super::calibrated::{self, CalibratedClock, CalibratedExtension};
 use super::info::{self, Candidate, DeviceInfo, DeviceKind, Features};
 use super::instance::{Instance, Messages};
 use super::pipelines::Pipelines;
+use super::ray_query::{self, RayFeatures, RayQueries, Tracing};
 use crate::error::{Error, Result};
 use ash::vk::Handle;
 use ash::{ext, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
-use std::ffi::CString;
+use std::ffi::{CStr, CString};
 use std::mem::ManuallyDrop;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -35,6 +36,8 @@ pub struct DeviceOptions {
     /// 10 minutes on GPUs and without limit on CPUs, whose drivers end endless loops by themselves and whose passes can take
     /// hours.
     pub wait_limit: Option<Duration>,
+    /// Who finds what rays meet.
+    pub tracing: Tracing,
 }
 
 /// An open device. Clones share it. It closes when the last clone, buffer, kernel and frame made with it is dropped.
@@ -52,6 +55,8 @@ pub(super) struct Inner {
     pub debug: Option<ext::debug_utils::Device>,
     pub info: DeviceInfo,
     pub calibrated: Option<CalibratedClock>,
+    /// `None` where rays are traced by compute kernels alone.
+    pub ray_queries: Option<RayQueries>,
     queue: Mutex<vk::Queue>,
     /// Each submission holds a read lock until it is complete; accesses to device memory by the host take the write lock.
     running: RwLock<()>,
@@ -73,6 +78,7 @@ pub(super) struct Opened {
     pub queue: vk::Queue,
     pub debug: Option<ext::debug_utils::Device>,
     pub calibrated: Option<CalibratedClock>,
+    pub ray_queries: Option<RayQueries>,
 }
 
 impl Gpu {
@@ -80,26 +86,28 @@ impl Gpu {
     ///
     /// # Errors
     /// [`Error::Device`] naming the remedy: no loader, no driver, no device of that name, a required feature is
-    /// missing, or the validation layers are asked for and not installed.
+    /// missing, ray queries or the validation layers are asked for and not there.
     pub fn open(options: &DeviceOptions) -> Result<Self> {
         let instance = Instance::new(options.validation)?;
         let candidate = choose(info::candidates(&instance.raw)?, options.device.as_deref())?;
         let queue_family = usable(&candidate)?;
+        let by_ray_query = is_by_ray_query(options.tracing, &candidate.info)?;
         let calibrated = calibrated::offered(&instance, candidate.physical)?;
         let alone = one_at_a_time();
-        let device = create_device(&instance.raw, candidate.physical, queue_family, calibrated)?;
+        let device = create_device(&instance.raw, candidate.physical, queue_family, calibrated, by_ray_query)?;
         let debug = instance.debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &device));
         let calibrated = calibrated.map(|extension| CalibratedClock::new(extension, &instance.raw, &device));
+        let ray_queries = by_ray_query.then(|| RayQueries::new(&instance.raw, candidate.physical, &device));
         drop(alone);
         // SAFETY: the device was made with one queue of this family.
         let queue = unsafe { device.get_device_queue(queue_family, 0) };
-        let opened = Opened { instance, candidate, queue_family, device, queue, debug, calibrated };
+        let opened = Opened { instance, candidate, queue_family, device, queue, debug, calibrated, ray_queries };
         Self::assemble(opened, options.cache.clone(), options.wait_limit)
     }
 
     /// Puts the parts together. On failure an owned device is destroyed.
     pub(super) fn assemble(opened: Opened, cache: Option<PathBuf>, wait_limit: Option<Duration>) -> Result<Self> {
-        let Opened { instance, candidate, queue_family, device, queue, debug, calibrated } = opened;
+        let Opened { instance, candidate, queue_family, device, queue, debug, calibrated, ray_queries } = opened;
         let limit =
             wait_limit.unwrap_or(if candidate.info.kind == DeviceKind::Cpu { Duration::MAX } else { WAIT_LIMIT });
         // From here on, Drop cleans up if a line below fails.
@@ -112,6 +120,7 @@ impl Gpu {
             debug,
             info: candidate.info.clone(),
             calibrated,
+            ray_queries,
             queue: Mutex::new(queue),
             running: RwLock::new(()),
             wait_limit: limit.as_nanos().try_into().unwrap_or(u64::MAX),
@@ -126,7 +135,7 @@ impl Gpu {
             device: inner.device.clone(),
             physical_device: inner.physical,
             debug_settings: Default::default(),
-            buffer_device_address: false,
+            buffer_device_address: inner.ray_queries.is_some(),
             allocation_sizes: Default::default(),
         });
         *inner.lock_allocator() = Some(allocator.map_err(|e| Error::Device(format!("memory allocator: {e}")))?);
@@ -141,6 +150,18 @@ impl Gpu {
     /// Bytes of device memory held by all buffers that exist on the device.
     pub fn allocated_bytes(&self) -> u64 {
         self.0.lock_allocator().as_ref().map_or(0, |a| a.generate_report().total_allocated_bytes)
+    }
+
+    /// Whether rays are traced by ray queries: see [`DeviceOptions::tracing`].
+    pub fn traces_by_ray_query(&self) -> bool {
+        self.0.ray_queries.is_some()
+    }
+
+    /// # Errors
+    /// [`Error::Device`] on a device that traces otherwise.
+    pub(super) fn ray_queries(&self) -> Result<&RayQueries> {
+        let none = || Error::Device("this device was not opened to trace by ray queries".into());
+        self.0.ray_queries.as_ref().ok_or_else(none)
     }
 
     /// # Errors
@@ -316,23 +337,47 @@ pub(super) fn usable(candidate: &Candidate) -> Result<u32> {
     candidate.queue_family.ok_or_else(|| Error::Device(format!("{name} has no compute queue: choose another device")))
 }
 
+/// Whether rays are traced by ray queries then.
+///
+/// # Errors
+/// [`Error::Device`] with what the device lacks for it.
+fn is_by_ray_query(tracing: Tracing, info: &DeviceInfo) -> Result<bool> {
+    let DeviceInfo { name, driver_name, driver_version, ray_query_lacks, .. } = info;
+    match tracing {
+        Tracing::Auto | Tracing::Compute => Ok(false),
+        Tracing::RayQuery if ray_query_lacks.is_empty() => Ok(true),
+        Tracing::RayQuery => Err(Error::Device(format!(
+            "{name} (driver {driver_name} {driver_version}) cannot trace by ray queries, since it lacks {}: choose the \
+             tracing \"compute\", or a device or a driver that has it (`tallow devices` tells)",
+            ray_query_lacks.join(", ")
+        ))),
+    }
+}
+
 fn create_device(
     instance: &ash::Instance,
     physical: vk::PhysicalDevice,
     queue_family: u32,
     calibrated: Option<CalibratedExtension>,
+    by_ray_query: bool,
 ) -> Result<ash::Device> {
     let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&[1.0])];
-    let extensions: Vec<_> = calibrated.iter().map(|extension| extension.name().as_ptr()).collect();
-    let mut features = Features::required();
+    let more = if by_ray_query { &ray_query::EXTENSIONS[..] } else { &[] };
+    let names = calibrated.iter().map(|extension| extension.name()).chain(more.iter().copied());
+    let extensions: Vec<_> = names.map(CStr::as_ptr).collect();
+    let (mut features, mut of_rays) = (Features::required(), RayFeatures::required());
+    features.v12.buffer_device_address = by_ray_query.into();
     // Every device supports it.
     features.core.robust_buffer_access = vk::TRUE;
-    let info = vk::DeviceCreateInfo::default()
+    let mut info = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_extension_names(&extensions)
         .enabled_features(&features.core)
         .push_next(&mut features.v12)
         .push_next(&mut features.v13);
-    // SAFETY: `physical` was found to have the features and the extension; `info` lives through the call.
+    if by_ray_query {
+        info = info.push_next(&mut of_rays.structures).push_next(&mut of_rays.queries);
+    }
+    // SAFETY: `physical` was found to have the features and extensions; `info` lives through the call.
     unsafe { instance.create_device(physical, &info, None) }.at("opening the device")
 }

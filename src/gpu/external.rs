@@ -39,7 +39,7 @@ pub struct RawDevice {
 impl Gpu {
     /// Uses a device made elsewhere and destroys only what it makes itself. Passes carry debug labels if the instance has
     /// VK_EXT_debug_utils enabled; [`Gpu::calibrate`] works if the device has VK_KHR_calibrated_timestamps or
-    /// VK_EXT_calibrated_timestamps enabled.
+    /// VK_EXT_calibrated_timestamps enabled. Rays are traced by compute kernels, whatever else the device can.
     ///
     /// # Safety
     /// - The handles are valid, belong together, and outlive everything made from the returned `Gpu`.
@@ -86,7 +86,8 @@ impl Gpu {
         let queue = vk::Queue::from_raw(raw.queue);
         let instance = Instance::borrowed(entry, instance);
         let queue_family = raw.queue_family;
-        let opened = Opened { instance, candidate, queue_family, device, queue, debug, calibrated };
+        let ray_queries = None;
+        let opened = Opened { instance, candidate, queue_family, device, queue, debug, calibrated, ray_queries };
         Self::assemble(opened, raw.cache, raw.wait_limit)
     }
 }

@@ -1,4 +1,5 @@
 //! The resources that recording a frame needs. They are reused by later frames, so that only the first ones create any.
+use super::acceleration::Handles;
 use super::access::Hazards;
 use super::commands::Commands;
 use super::descriptors::Descriptors;
@@ -20,6 +21,7 @@ pub struct FrameResources {
     pub(super) hazards: Hazards,
     pub(super) uploads: Uploads,
     pipelines: Vec<Arc<Pipeline>>,
+    structures: Vec<Arc<Handles>>,
     /// One for each pass of the last recording.
     pub(super) shapes: Vec<PassShape>,
     observer: Option<PassObserver>,
@@ -36,6 +38,7 @@ impl FrameResources {
             hazards: Hazards::default(),
             uploads: Uploads::default(),
             pipelines: Vec::new(),
+            structures: Vec::new(),
             shapes: Vec::new(),
             observer: None,
         })
@@ -102,6 +105,7 @@ impl FrameResources {
         self.hazards.clear();
         self.uploads.reset();
         self.pipelines.clear();
+        self.structures.clear();
         self.shapes.clear();
         self.descriptors.reset()
     }
@@ -121,6 +125,13 @@ impl FrameResources {
     pub(super) fn keep<B>(&mut self, kernel: &Kernel<B>) {
         if !self.pipelines.iter().any(|kept| Arc::ptr_eq(kept, &kernel.pipeline)) {
             self.pipelines.push(kernel.pipeline.clone());
+        }
+    }
+
+    /// Keeps acceleration structures until the next reset.
+    pub(super) fn keep_structures(&mut self, handles: &Arc<Handles>) {
+        if !self.structures.iter().any(|kept| Arc::ptr_eq(kept, handles)) {
+            self.structures.push(handles.clone());
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The properties of devices, and the features that Tallow requires of them.
 use super::At;
 use super::instance::Instance;
+use super::ray_query;
 use crate::error::{Error, Result};
 use ash::vk;
 use serde::Serialize;
@@ -153,6 +154,8 @@ pub struct DeviceInfo {
     pub robust_buffer_access: bool,
     /// Names of required features that the device lacks.
     pub missing: Vec<&'static str>,
+    /// Names of what it lacks to trace by ray queries, extensions and features: see [`super::Tracing`].
+    pub ray_query_lacks: Vec<&'static str>,
 }
 
 /// A device with its description and all that is needed to open it.
@@ -221,6 +224,10 @@ pub(super) fn describe(instance: &ash::Instance, physical: vk::PhysicalDevice, q
         timestamp_period: basic.limits.timestamp_period,
         robust_buffer_access: true,
         missing: Features::supported(instance, physical, basic.api_version).missing(),
+        ray_query_lacks: match basic.api_version >= vk::API_VERSION_1_3 {
+            true => ray_query::lacks(instance, physical),
+            false => vec!["Vulkan 1.3"],
+        },
     };
     let (cache_uuid, limits) = (basic.pipeline_cache_uuid, basic.limits);
     Candidate { physical, info, limits, cache_uuid, queue_family }

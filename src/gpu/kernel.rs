@@ -2,7 +2,7 @@
 //! specialisation constants.
 use super::access::Access;
 use super::pipelines::{Pipeline, Recipe};
-use super::{Bound, Gpu};
+use super::{Acceleration, Bound, Gpu};
 use crate::error::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;
@@ -51,6 +51,7 @@ pub struct Slot {
 /// # Safety
 /// - [`Self::SPIRV`] and [`Self::PLAIN_SPIRV`] are valid code for Vulkan 1.3 and the features in [`super::REQUIRED_FEATURES`],
 ///   with an entry point `main` for compute; [`Self::SLOTS`] are their descriptors, all in set 0, with numbers that differ.
+///   [`Self::RAY_QUERY`] is the same with VK_KHR_ray_query, and has an acceleration structure as one more descriptor.
 /// - [`Self::Push`] is its push constants: at most 128 bytes, a multiple of 4. Elements of [`SlotKind::Uniform`] have at most
 ///   16384 bytes.
 /// - [`Self::buffers`] returns one buffer per slot.
@@ -99,10 +100,25 @@ pub unsafe trait Bindings {
     const SPIRV: &'static [u8];
     /// The code for devices whose subgroups cannot.
     const PLAIN_SPIRV: &'static [u8] = Self::SPIRV;
+    /// The code for devices that trace by ray queries; none for a kernel that traces no rays.
+    const RAY_QUERY: Option<RayQueryCode> = None;
     /// The slots, in the order of the fields of the `Bind` struct.
     const SLOTS: &'static [Slot];
     /// The buffers to bind, one for each of [`Self::SLOTS`].
     fn buffers(&self) -> Vec<Bound<'_>>;
+    /// What the code of [`Self::RAY_QUERY`] traces rays through.
+    fn acceleration(&self) -> Option<&Acceleration> {
+        None
+    }
+}
+
+/// The form of a kernel that traces by ray queries.
+#[derive(Clone, Copy, Debug)]
+pub struct RayQueryCode {
+    /// The compiled code.
+    pub spirv: &'static [u8],
+    /// Number of its binding of an acceleration structure.
+    pub binding: u32,
 }
 
 /// Specialisation constants. The build script implements it for the `Constants` struct of every kernel.
@@ -135,6 +151,8 @@ pub struct Kernel<B> {
     pub(super) constants: Arc<[(u32, u32)]>,
     compile_time: Duration,
     pub(super) local_size: [u32; 2],
+    /// The binding of what rays are traced through, if they are traced by ray queries.
+    pub(super) world: Option<u32>,
     /// Covariant, so that a kernel kept as `Kernel<Bind<'static>>` takes shorter borrows.
     of: PhantomData<fn() -> B>,
 }
@@ -149,14 +167,17 @@ impl<B: Bindings> Kernel<B> {
         let begun = Instant::now();
         let local_size = constants.local_size();
         check_workgroup(B::NAME, local_size, &gpu.0.limits)?;
-        let spirv = if gpu.info().subgroup_shuffle { B::SPIRV } else { B::PLAIN_SPIRV };
+        let ray_query = B::RAY_QUERY.filter(|_| gpu.traces_by_ray_query());
+        let usual = if gpu.info().subgroup_shuffle { B::SPIRV } else { B::PLAIN_SPIRV };
+        let (spirv, world) = (ray_query.map_or(usual, |code| code.spirv), ray_query.map(|code| code.binding));
         let constants: Arc<[_]> = constants.entries().into();
         let push_bytes = size_of::<B::Push>() as u32;
-        let bindings = B::SLOTS.iter().map(|slot| (slot.binding, slot.kind.descriptor())).collect();
+        let traced = world.map(|binding| (binding, vk::DescriptorType::ACCELERATION_STRUCTURE_KHR));
+        let bindings = B::SLOTS.iter().map(|slot| (slot.binding, slot.kind.descriptor())).chain(traced).collect();
         let recipe = Recipe { spirv, bindings, push_bytes, constants: constants.clone() };
         let pipeline = pipeline(gpu, B::NAME, &recipe)?;
         let compile_time = begun.elapsed();
-        Ok(Self { gpu: gpu.clone(), pipeline, spirv, constants, compile_time, local_size, of: PhantomData })
+        Ok(Self { gpu: gpu.clone(), pipeline, spirv, constants, compile_time, local_size, world, of: PhantomData })
     }
 
     /// Time that creating the pipeline took. Some drivers, such as lavapipe, compile more on the first dispatch.
@@ -232,5 +253,16 @@ mod tests {
         assert!(declares(SPIRV, GROUP_NON_UNIFORM_SHUFFLE));
         assert!(!declares(PLAIN_SPIRV, GROUP_NON_UNIFORM_SHUFFLE) && !declares(PLAIN_SPIRV, GROUP_NON_UNIFORM));
         assert!(declares(PLAIN_SPIRV, 1), "control: every kernel declares Shader");
+    }
+
+    #[test]
+    fn only_code_for_ray_queries_declares_them() {
+        use crate::gpu::Bindings;
+        use crate::shaders::{accumulate, path};
+        const RAY_QUERY: u32 = 4472;
+        let code = <path::Bind as Bindings>::RAY_QUERY.unwrap().spirv;
+        assert!(declares(code, RAY_QUERY));
+        assert!(!declares(path::SPIRV, RAY_QUERY) && !declares(path::PLAIN_SPIRV, RAY_QUERY));
+        assert!(<accumulate::Bind as Bindings>::RAY_QUERY.is_none(), "it traces no rays");
     }
 }

@@ -13,9 +13,11 @@
 //! In return, a caller that hands over raw handles must keep the contracts of [`Gpu::from_raw`] and
 //! [`Recorder::external`].
 #![allow(unsafe_code)]
+mod acceleration;
 mod access;
 mod blocks;
 mod buffer;
+mod builds;
 mod cache;
 mod calibrated;
 mod commands;
@@ -28,6 +30,7 @@ mod instance;
 mod kernel;
 mod oidn;
 mod pipelines;
+mod ray_query;
 mod recorder;
 mod shape;
 mod staging;
@@ -35,6 +38,7 @@ mod timing;
 mod tuning;
 mod upload;
 
+pub use acceleration::{Aabb, Acceleration, Mesh, Placement, Shapes};
 pub use access::Access;
 pub use blocks::{PerBlock, block_count, thread_items};
 use buffer::Untyped;
@@ -44,8 +48,9 @@ pub use device::{DeviceOptions, Gpu};
 pub use external::RawDevice;
 pub use frame::FrameResources;
 pub use info::{DeviceInfo, DeviceKind, Feature, REQUIRED_FEATURES, survey};
-pub use kernel::{Bindings, Kernel, Slot, SlotKind, Specialise};
+pub use kernel::{Bindings, Kernel, RayQueryCode, Slot, SlotKind, Specialise};
 pub use oidn::{OIDN_VARIABLE, Oidn, OidnInput, Texels};
+pub use ray_query::Tracing;
 pub use recorder::Recorder;
 pub use shape::{BoundRange, KernelCode, Pass, PassObserver, PassShape};
 pub use timing::{Calibration, PassTime, host_ns};

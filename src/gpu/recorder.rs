@@ -1,6 +1,9 @@
 //! Recording of work. Every pass gets its barrier, debug label and timestamps here, and kernels are bound and dispatched.
+use super::acceleration::Handles;
 use super::shape::{KernelCode, PassShape};
-use super::{Access, Bindings, Bound, Buffer, FrameResources, Gpu, Kernel, PassTime, SlotKind, Untyped, access};
+use super::{
+    Acceleration, Access, Bindings, Bound, Buffer, FrameResources, Gpu, Kernel, PassTime, SlotKind, Untyped, access,
+};
 use crate::error::{Error, Result};
 use ash::vk;
 use ash::vk::Handle;
@@ -109,8 +112,10 @@ impl<'a> Recorder<'a> {
         self.gpu.owns(B::NAME, &kernel.gpu)?;
         let buffers = bind.buffers();
         self.owns(&buffers)?;
-        let set = self.frame.descriptors.set(&kernel.pipeline, B::SLOTS, &buffers)?;
-        let accesses: Vec<_> = buffers.iter().map(|b| b.buffer).zip(B::SLOTS.iter().map(|slot| slot.access)).collect();
+        let world = self.world(kernel, bind.acceleration())?;
+        let set = self.frame.descriptors.set(&kernel.pipeline, B::SLOTS, &buffers, world.map(|(at, w)| (at, w.top)))?;
+        let slots = buffers.iter().map(|b| b.buffer).zip(B::SLOTS.iter().map(|slot| slot.access));
+        let accesses: Vec<_> = slots.chain(world.map(|(_, w)| (w.storage.bound().buffer, Access::Trace))).collect();
         self.frame.keep(kernel);
         let (pipeline, layout, push) = (kernel.pipeline.raw, kernel.pipeline.layout, bytemuck::bytes_of(push));
         let compute = vk::PipelineBindPoint::COMPUTE;
@@ -124,6 +129,20 @@ impl<'a> Recorder<'a> {
             device.cmd_push_constants(commands, layout, vk::ShaderStageFlags::COMPUTE, 0, push);
             device.cmd_dispatch(commands, groups[0], groups[1], groups[2]);
         })
+    }
+
+    /// What a kernel that traces by ray queries traces through, and the binding for it.
+    fn world<'b, B: Bindings>(
+        &mut self,
+        kernel: &Kernel<B>,
+        world: Option<&'b Acceleration>,
+    ) -> Result<Option<(u32, &'b Arc<Handles>)>> {
+        let Some(binding) = kernel.world else { return Ok(None) };
+        let none = || Error::Device(format!("{}: the scene has no acceleration structures", B::NAME));
+        let handles = &world.ok_or_else(none)?.handles;
+        self.gpu.owns("the acceleration structures", &handles.gpu)?;
+        self.frame.keep_structures(handles);
+        Ok(Some((binding, handles)))
     }
 
     /// Copies all of `src` over `dst`, which has the same length.
@@ -222,7 +241,17 @@ impl<'a> Recorder<'a> {
         buffers.iter().try_for_each(|bound| self.gpu.owns(&bound.buffer.name, &bound.buffer.gpu))
     }
 
-    fn pass(
+    pub(super) fn gpu(&self) -> &Gpu {
+        self.gpu
+    }
+
+    /// Keeps acceleration structures until the work is done.
+    pub(super) fn keep_structures(&mut self, handles: &Arc<Handles>) {
+        self.frame.keep_structures(handles);
+    }
+
+    /// Records a pass with what must come before and after it.
+    pub(super) fn pass(
         &mut self,
         name: &'static str,
         accesses: &[(&Arc<Untyped>, Access)],
@@ -242,7 +271,7 @@ impl<'a> Recorder<'a> {
         };
         if self.frame.hazards.note(accesses) && self.barriers {
             // SAFETY: the command buffer is recording.
-            unsafe { access::pass_barrier(&inner.device, commands) };
+            unsafe { access::pass_barrier(&inner.device, commands, self.gpu.traces_by_ray_query()) };
         }
         self.label(name, || {
             stamp(0);

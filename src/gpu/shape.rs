@@ -5,7 +5,7 @@ use std::sync::Arc;
 /// A range of a buffer that a pass accesses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BoundRange {
-    /// Name of the binding in the GLSL source; `source` or `target` of a copy, a fill or an update.
+    /// Name of the binding in the GLSL source; `source` or `target` of a copy, a fill, an update or a build.
     pub name: &'static str,
     /// How the pass accesses it.
     pub access: Access,
@@ -25,13 +25,13 @@ pub struct KernelCode {
 /// The shape of a pass: what is known of its work when it is recorded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PassShape {
-    /// Workgroups along x, y and z; all 0 for a copy, a fill or an update.
+    /// Workgroups along x, y and z; all 0 for a copy, a fill, an update or a build.
     pub groups: [u32; 3],
     /// Threads of all workgroups.
     pub threads: u64,
     /// What it accesses.
     pub ranges: Vec<BoundRange>,
-    /// The kernel; none for a copy, a fill or an update.
+    /// The kernel; none for a copy, a fill, an update or a build.
     pub code: Option<KernelCode>,
 }
 
@@ -49,9 +49,10 @@ impl PassShape {
         Self { groups, threads, ranges: slots.iter().zip(bytes).map(range).collect(), code: Some(code) }
     }
 
-    /// Of a copy, a fill or an update.
+    /// Of a copy, a fill, an update, or a build of acceleration structures.
     pub(super) fn of_transfer(accesses: &[Access], bytes: u64) -> Self {
-        let name = |access| if access == Access::CopySource { "source" } else { "target" };
+        let is_source = |access| matches!(access, Access::CopySource | Access::BuildRead);
+        let name = |access| if is_source(access) { "source" } else { "target" };
         let range = |&access: &Access| BoundRange { name: name(access), access, bytes };
         Self { groups: [0; 3], threads: 0, ranges: accesses.iter().map(range).collect(), code: None }
     }

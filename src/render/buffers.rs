@@ -4,6 +4,7 @@ use crate::gpu::{Buffer, DeviceInfo, Gpu, Location, PART, thread_items};
 use crate::layout::*;
 use crate::render::pass::counts::Counts;
 use crate::render::schedule::Batch;
+use crate::render::world::World;
 use crate::scene::Scene;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -34,6 +35,8 @@ pub struct DeviceScene {
     pub environment_table: Buffer<AliasEntry>,
     /// One: what paths are told. [`Step::Start`](crate::render::Step::Start) writes it.
     pub camera: Buffer<Camera>,
+    /// What rays are traced through where that is done by ray queries.
+    pub world: Option<World>,
 }
 
 impl DeviceScene {
@@ -43,9 +46,11 @@ impl DeviceScene {
     /// [`crate::error::Error::Device`] when it does not fit.
     pub fn new(gpu: &Gpu, scene: &Scene, effects: &Effects) -> Result<Self> {
         let environment = scene.environment.as_ref();
+        let triangles = Buffer::from_texels(gpu, "triangles", &scene.triangles)?;
         Ok(Self {
+            world: World::new(gpu, scene, &triangles, effects)?,
             nodes: Buffer::from_texels(gpu, "nodes", &scene.nodes)?,
-            triangles: Buffer::from_texels(gpu, "triangles", &scene.triangles)?,
+            triangles,
             shading: Buffer::from_texels(gpu, "shading", &shading(scene, effects))?,
             instances: Buffer::from_texels(gpu, "instances", &scene.instances)?,
             materials: Buffer::from_texels(gpu, "materials", &scene.materials)?,
@@ -88,6 +93,11 @@ impl DeviceScene {
         crate::shaders::shared::frame::Bind { camera: &self.camera }
     }
 
+    /// What kernels bind that trace by ray queries.
+    pub fn bind_world(&self) -> crate::shaders::shared::ray_query::Bind<'_> {
+        crate::shaders::shared::ray_query::Bind { world: self.world.as_ref().map(World::acceleration) }
+    }
+
     /// Bytes of each part, largest first.
     pub fn sizes(&self) -> Vec<(&'static str, u64)> {
         let mut sizes = vec![
@@ -101,6 +111,7 @@ impl DeviceScene {
             ("lights", self.lights.raw().size + self.light_table.raw().size),
             ("environment", self.environment.raw().size + self.environment_table.raw().size),
         ];
+        sizes.extend(self.world.iter().map(|world| ("acceleration", world.acceleration().bytes())));
         sizes.sort_by_key(|s| std::cmp::Reverse(s.1));
         sizes
     }

@@ -24,6 +24,7 @@ mod supersampling;
 mod update;
 mod upload;
 mod views;
+mod world;
 
 pub use buffers::{DeviceScene, FilmBuffers, FilmTile};
 pub use carriage::{Carriage, Carried, carried_samples};
@@ -38,3 +39,4 @@ pub use renderer::*;
 pub use resume::{Checkpoint, finished, is_frame};
 pub use schedule::{Batch, Choice, PathRange, Plan, Progress, Share, Step};
 pub use views::{Layer, OutputView};
+pub use world::World;

@@ -57,9 +57,10 @@ impl Renderer {
                 ..Default::default()
             };
             times.extend(gpu.run(&mut frame, |rec| {
-                let (scene, frame) = (self.frame.scene.bind(), self.frame.scene.bind_frame());
+                let s = &self.frame.scene;
+                let (scene, frame, ray_query) = (s.bind(), s.bind_frame(), s.bind_world());
                 let (guides, filtered, indirect) = (&guide, &filtered, &indirect);
-                guide_lookup::record(&kernel, rec, Bind { scene, frame, guides, filtered, indirect }, &push)
+                guide_lookup::record(&kernel, rec, Bind { scene, frame, ray_query, guides, filtered, indirect }, &push)
             })?);
         }
         let light = indirect.read()?.into_iter().map(|sum| sum.map(|v| v / eye_rays as f32));

@@ -95,6 +95,9 @@ fn upload(gpu: &Gpu, rec: &mut Recorder, to: &mut DeviceScene, scene: &Scene, ch
         whole(gpu, rec, "materials", &mut to.materials, &scene.materials)?;
     }
     parts(gpu, rec, "texels of textures", &mut to.texels, &scene.texels, &change.texels, 0)?;
+    if let Some(world) = &to.world {
+        world.update(rec, scene, &to.triangles, change)?;
+    }
     if change.lights {
         whole(gpu, rec, "lights", &mut to.lights, &scene.lights)?;
         whole(gpu, rec, "light_table", &mut to.light_table, &scene.light_table)?;

@@ -5,6 +5,7 @@ use super::build::coat::reads_table;
 use super::build::soft::Soft;
 use super::description::Description;
 use super::fingerprint::Fingerprint;
+use crate::error::{Error, Result};
 use crate::layout::{Instance, Light, Material, NONE};
 use glam::DAffine3;
 use std::collections::{HashMap, HashSet};
@@ -83,6 +84,36 @@ impl Tree {
         if let Some(soft) = &self.soft {
             self.lit.sort_unstable_by_key(|&i| soft.order[i as usize - self.range.start]);
         }
+    }
+}
+
+impl Scene {
+    /// The triangles of each hierarchy over triangles: of a scene of one level, all of them.
+    pub fn meshes(&self) -> Vec<Range<usize>> {
+        let whole = || Some(0..self.triangles.len()).filter(|all| !all.is_empty());
+        match self.rig.trees.is_empty() {
+            true => whole().into_iter().collect(),
+            false => self.rig.trees.iter().map(|tree| tree.range.clone()).filter(|range| !range.is_empty()).collect(),
+        }
+    }
+
+    /// The mesh that each instance places, as its number among [`Scene::meshes`].
+    ///
+    /// # Errors
+    /// [`Error::Scene`] for one that leads to none.
+    pub fn meshes_of_instances(&self) -> Result<Vec<usize>> {
+        let trees = self.rig.trees.iter().filter(|tree| !tree.range.is_empty());
+        let mesh_at: HashMap<usize, usize> = trees.map(|tree| tree.nodes.start).zip(0..).collect();
+        let lost = |i: usize, root: u32| Error::Scene(format!("instance {i}: no mesh begins at node {root}"));
+        let mesh_of = |(i, instance): (usize, &Instance)| {
+            mesh_at.get(&(instance.root as usize)).copied().ok_or_else(|| lost(i, instance.root))
+        };
+        self.instances.iter().enumerate().map(mesh_of).collect()
+    }
+
+    /// How many instances are seen. Those that are hidden come last.
+    pub fn seen_instances(&self) -> usize {
+        self.instances.len() - self.rig.hidden.len().min(self.instances.len())
     }
 }
 

@@ -71,6 +71,7 @@ impl<'a> Specialised<'a> {
                 self.numbers.insert(id, number);
                 return None;
             }
+            (op::TYPE_RAY_QUERY | op::TYPE_ACCELERATION_STRUCTURE, &[id]) => _ = self.types.insert(id),
             (op::TYPE_VOID..=op::TYPE_FUNCTION, &[id, ref of @ ..]) => {
                 self.types.insert(id);
                 if *opcode == op::TYPE_BOOL {

@@ -133,6 +133,7 @@ fn devices_are_listed_as_vulkan_has_them() {
         assert!(device["name"] == info.name.as_str() && device["kind"] == info.kind.to_string(), "{device}");
         assert_eq!(device["api"], info.api_version.as_str());
         assert_eq!(device["missing"], Value::from(info.missing.clone()));
+        assert_eq!(device["ray_query_lacks"], Value::from(info.ray_query_lacks.clone()));
         let limits = device["limits"].as_array().unwrap();
         let range = limits.iter().find(|l| l[0].as_str().unwrap().contains("storage buffer range")).unwrap();
         assert_eq!(range[1], info.max_storage_range);

@@ -368,7 +368,8 @@ impl Traversal {
         let renderer = Renderer::specialised(gpu, scene, &scene.settings, Outputs::default(), effects).unwrap();
         let traverse = shared::traverse::Constants { stack: scene.stack };
         let thread = shared::thread::Constants { workgroup: 32, stripes: 1 };
-        let constants = traverse_kernel::Constants { effects, thread, traverse, deal: dealing(gpu) };
+        let constants =
+            traverse_kernel::Constants { effects, thread, traverse, deal: dealing(gpu), ..Default::default() };
         let kernel = Kernel::new(gpu, &constants).unwrap();
         let root = frame_constants(scene, &scene.settings).unwrap().path.root;
         Self { gpu: gpu.clone(), renderer, kernel, root }
@@ -382,7 +383,12 @@ impl Traversal {
         let (count, any_hit) = (rays.len() as u32, u32::from(any_hit));
         let push = TraversePush { count, root: *root, any_hit, ..Default::default() };
         gpu.run(&mut FrameResources::new(gpu).unwrap(), |rec| {
-            let bind = traverse_kernel::Bind { scene: renderer.scene().bind(), rays: &queries, hits: &hits };
+            let bind = traverse_kernel::Bind {
+                scene: renderer.scene().bind(),
+                ray_query: renderer.scene().bind_world(),
+                rays: &queries,
+                hits: &hits,
+            };
             rec.dispatch_threads(kernel, bind, &push, count.div_ceil(3)) // some threads have fewer than 3
         })
         .unwrap();

@@ -1,7 +1,8 @@
 //! Compares the rays per second of the traversal kernel with those of obvhs's own traversal on two threads, alternating,
 //! over the same tree and the same incoherent rays of Crytek Sponza: on a CPU a quarter of a million, on a GPU four millions.
-//!   TALLOW_DATA=../shared cargo run --release --example bench-traverse [ROUNDS] [cpu|gpu]
-//! The last word chooses how many rays there are and how they are launched; else the kind of the device does.
+//!   TALLOW_DATA=../shared cargo run --release --example bench-traverse [ROUNDS] [cpu|gpu] [compute|ray-query]
+//! The second word chooses how many rays there are and how they are launched; else the kind of the device does. The third leaves the
+//! rays to the device.
 #![allow(missing_docs)]
 use anyhow::{Context, Result, bail, ensure};
 use glam::{Vec3, Vec3A, vec2};
@@ -11,7 +12,7 @@ use obvhs::rt_triangle::RtTriangle;
 use rayon::prelude::*;
 use std::path::Path;
 use std::time::Instant;
-use tallow::gpu::{Buffer, DeviceKind, DeviceOptions, FrameResources, Gpu, Location};
+use tallow::gpu::{Buffer, DeviceKind, DeviceOptions, FrameResources, Gpu, Location, Tracing};
 use tallow::layout::{self, Effects, NONE, RayHit, RayQuery, TraversePush};
 use tallow::math::warp::{basis_from_normal, warp_cosine_hemisphere};
 use tallow::render::settings::Settings;
@@ -131,7 +132,8 @@ impl Device {
         // obvhs does not support masks, so neither side tests them.
         let effects = Effects { dealt_triangles: true, ..Effects::default() };
         let traverse = shared::traverse::Constants { stack: scene.stack };
-        let constants = Constants { effects, traverse, thread: gpu.tuning().thread(), deal: gpu.deal() };
+        let thread = gpu.tuning().thread();
+        let constants = Constants { effects, traverse, thread, deal: gpu.deal(), ..Default::default() };
         Ok(Self {
             frame: FrameResources::new(&gpu)?,
             kernel: Kernel::new(&gpu, &constants)?,
@@ -155,7 +157,7 @@ impl Device {
         let s = self.renderer.scene();
         let threads = self.threads();
         let times = self.gpu.run(&mut self.frame, |rec| {
-            let bind = Bind { scene: s.bind(), rays: &self.rays, hits: &self.hits };
+            let bind = Bind { scene: s.bind(), ray_query: s.bind_world(), rays: &self.rays, hits: &self.hits };
             rec.dispatch_threads(&self.kernel, bind, &push, threads)
         })?;
         let pass = times.first().context("the device has no timestamps")?;
@@ -199,7 +201,13 @@ fn main() -> Result<()> {
         return Ok(());
     };
     let rounds = std::env::args().nth(1).map_or(Ok(7), |n| n.parse()).context("ROUNDS is a number")?;
-    let gpu = Gpu::open(&DeviceOptions { device: std::env::var("TALLOW_DEVICE").ok(), ..DeviceOptions::default() })?;
+    let tracing = match std::env::args().nth(3).as_deref() {
+        None | Some("compute") => Tracing::Compute,
+        Some("ray-query") => Tracing::RayQuery,
+        Some(other) => bail!("\"{other}\" is neither compute nor ray-query"),
+    };
+    let device = std::env::var("TALLOW_DEVICE").ok();
+    let gpu = Gpu::open(&DeviceOptions { device, tracing, ..DeviceOptions::default() })?;
     let Launch { side, per_thread } = match std::env::args().nth(2).as_deref() {
         Some("cpu") => CPU,
         Some("gpu") => GPU,

@@ -1,6 +1,6 @@
 //! Generates the Rust code for kernels and for the GLSL files that they share: typed bindings, specialisation constants and
 //! numbers.
-use crate::interface::{Binding, Constant, Interface, LocalSizeX, Number};
+use crate::interface::{Binding, Constant, Interface, LocalSizeX, Number, STRUCTURE};
 use anyhow::Result;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -13,10 +13,25 @@ pub struct Group {
     pub numbers: Vec<Number>,
 }
 
+/// The code of a kernel, by the devices that it is for.
+pub struct Binaries<'a> {
+    /// Most devices.
+    pub usual: &'a Path,
+    /// Those whose subgroups cannot shuffle.
+    pub plain: &'a Path,
+    /// Those that trace rays by ray queries; none for a kernel that traces no rays.
+    pub ray_query: Option<&'a Path>,
+}
+
 /// Returns the fields of a `Bind` struct and the list of their buffers, both as Rust code.
 fn members(bindings: &[Binding]) -> Result<(String, String)> {
     let (mut fields, mut list) = (String::new(), String::new());
     for Binding { number, field, element, kind, access, .. } in bindings {
+        if *kind == STRUCTURE {
+            writeln!(fields, "        /// Binding {number}, where rays are traced by ray queries.")?;
+            writeln!(fields, "        pub {field}: Option<&'a Acceleration>,")?;
+            continue;
+        }
         writeln!(fields, "        /// Binding {number}, {kind}, {access}.")?;
         writeln!(fields, "        pub {field}: &'a Buffer<{element}>,")?;
         write!(list, "self.{field}.bound(), ")?;
@@ -104,7 +119,7 @@ pub fn group_module(group: &Group) -> Result<String> {
     let Group { name, .. } = group;
     let (fields, list) = members(&group.bindings)?;
     let mut code = format!("/// What `glsl/shared/{name}.glsl` declares.\n#[allow(clippy::all)]\npub mod {name} {{\n");
-    code += "    #[allow(unused_imports)]\n    use crate::gpu::{Bound, Buffer};\n    #[allow(unused_imports)]\n    use crate::layout::*;\n";
+    code += "    #[allow(unused_imports)]\n    use crate::gpu::{Acceleration, Bound, Buffer};\n    #[allow(unused_imports)]\n    use crate::layout::*;\n";
     code += &numbers(&group.numbers)?;
     code += &assert_sizes(&group.bindings);
     if !group.bindings.is_empty() {
@@ -186,14 +201,25 @@ fn constants(interface: &Interface, root: &str) -> Result<String> {
     Ok(code)
 }
 
-/// The Rust module of one kernel, compiled for most devices and for those whose subgroups cannot shuffle.
-pub fn module(
-    name: &str,
-    file: &Path,
-    interface: &Interface,
-    root: &str,
-    [usual, plain]: [&Path; 2],
-) -> Result<String> {
+/// What the `Bindings` of a kernel say of ray queries.
+fn ray_query(interface: &Interface, binaries: &Binaries) -> String {
+    let structure = interface.bindings.iter().find(|b| b.kind == STRUCTURE);
+    let (Some(Binding { group, number, field, .. }), Some(code)) = (structure, binaries.ray_query) else {
+        return String::new();
+    };
+    let of = group.iter().map(|group| format!("{group}.")).collect::<String>();
+    format!(
+        r#"        const RAY_QUERY: Option<RayQueryCode> = Some(RayQueryCode {{ spirv: include_bytes!({code:?}), binding: {number} }});
+        fn acceleration(&self) -> Option<&Acceleration> {{
+            self.{of}{field}
+        }}
+"#
+    )
+}
+
+/// The Rust module of one kernel.
+pub fn module(name: &str, file: &Path, interface: &Interface, root: &str, binaries: &Binaries) -> Result<String> {
+    let Binaries { usual, plain, .. } = binaries;
     let push = &interface.push;
     let (mut fields, list) = members(&interface.bindings_of(None))?;
     let (mut slots, mut groups, mut order) = (String::new(), String::new(), interface.bindings_of(None));
@@ -203,14 +229,14 @@ pub fn module(
         writeln!(groups, "            all.extend(self.{group}.buffers());")?;
         order.extend(interface.bindings_of(Some(&group)));
     }
-    for Binding { number, field, kind, access, .. } in order {
+    for Binding { number, field, kind, access, .. } in order.iter().filter(|b| b.kind != STRUCTURE) {
         writeln!(
             slots,
             "            Slot {{ name: {field:?}, binding: {number}, kind: SlotKind::{kind}, access: Access::{access} }},"
         )?;
     }
     let numbers = numbers(&interface.numbers_of(None))?;
-    let constants = constants(interface, root)?;
+    let (constants, ray_query) = (constants(interface, root)?, ray_query(interface, binaries));
     let asserts = assert_sizes(&interface.bindings_of(None));
     let file = file.display();
     // Code that can name a kernel can run it with any numbers, so the crate's kernels are not visible outside.
@@ -220,7 +246,7 @@ pub fn module(
 #[allow(clippy::all)]
 {visible} mod {name} {{
     #[allow(unused_imports)]
-    use {root}::gpu::{{Access, Bindings, Bound, Buffer, Slot, SlotKind, Specialise}};
+    use {root}::gpu::{{Acceleration, Access, Bindings, Bound, Buffer, RayQueryCode, Slot, SlotKind, Specialise}};
     #[allow(unused_imports)]
     use {root}::layout::*;
     /// Basename of the file, label of the pass.
@@ -242,7 +268,7 @@ pub fn module(
         const NAME: &'static str = NAME;
         const SPIRV: &'static [u8] = SPIRV;
         const PLAIN_SPIRV: &'static [u8] = PLAIN_SPIRV;
-        const SLOTS: &'static [Slot] = &[
+{ray_query}        const SLOTS: &'static [Slot] = &[
 {slots}        ];
         fn buffers(&self) -> Vec<Bound<'_>> {{
             #[allow(unused_mut)]

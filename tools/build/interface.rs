@@ -9,7 +9,10 @@ pub type Source = (String, String);
 /// The file whose constants are generated from Rust.
 pub const EFFECTS: &str = "glsl/effects.glsl";
 
-/// A buffer that the kernel binds.
+/// [`Binding::kind`] of an acceleration structure, which is no buffer: only the form of a kernel that traces by ray queries binds it.
+pub const STRUCTURE: &str = "Structure";
+
+/// A buffer that the kernel binds, or an acceleration structure.
 #[derive(Clone)]
 pub struct Binding {
     /// Basename of the shared file that declares it; `None` for the kernel itself.
@@ -20,7 +23,7 @@ pub struct Binding {
     pub element: String,
     /// GLSL name of the element type; empty for texels.
     pub in_glsl: String,
-    /// Name of the variant of `gpu::SlotKind`.
+    /// Name of the variant of `gpu::SlotKind`, or [`STRUCTURE`].
     pub kind: &'static str,
     /// Name of the variant of `gpu::Access`.
     pub access: &'static str,
@@ -248,7 +251,8 @@ fn parse_local_size(line: &str) -> Result<(LocalSizeX, u32)> {
 }
 
 fn parse_binding(line: &str) -> Result<Binding> {
-    parse_storage(line).or_else(|| parse_texels(line)).or_else(|| parse_uniform(line)).context(
+    let buffer = parse_storage(line).or_else(|| parse_texels(line)).or_else(|| parse_uniform(line));
+    buffer.or_else(|| parse_structure(line)).context(
         "expected `layout(scalar, binding = 0) readonly buffer Name { type field[]; };`, \
          `layout(binding = 0) uniform usamplerBuffer field; // of Type` or \
          `layout(scalar, binding = 0) uniform Name { Type field; };`",
@@ -309,5 +313,19 @@ fn parse_uniform(line: &str) -> Option<Binding> {
         in_glsl: element.to_owned(),
         kind: "Uniform",
         access: "UniformRead",
+    })
+}
+
+fn parse_structure(line: &str) -> Option<Binding> {
+    let (number, rest) = line.trim().strip_prefix("layout(binding = ")?.split_once(')')?;
+    let field = rest.trim().strip_prefix("uniform accelerationStructureEXT ")?.strip_suffix(';')?;
+    Some(Binding {
+        group: None,
+        number: number.parse().ok()?,
+        field: field.to_owned(),
+        element: String::new(),
+        in_glsl: String::new(),
+        kind: STRUCTURE,
+        access: "",
     })
 }

@@ -32,6 +32,7 @@ pub fn profile(args: &Args) -> Result<(Profile, Option<String>)> {
         validation: args.validation,
         cache: gpu::cache_folder(),
         wait_limit: None,
+        tracing: args.tracing,
     })?;
     check_room(args, &settings, &gpu)?;
     let count = usize::from(args.frames);

@@ -93,7 +93,7 @@ impl<'a> Stage<'a> {
                 "warning: nothing moves in the scene: all frames are alike (add [[animation]] tables, or --turntable)",
             );
         }
-        let gpu = args.render.common.open()?;
+        let gpu = args.render.common.open(args.render.tracing)?;
         render::check_room(&args.render, &settings, &gpu)?;
         render::check_stride(&args.render, &settings)?;
         let rest = called_for(&scene, &settings, args.render.wanted());

@@ -23,6 +23,7 @@ pub fn trace(
     let bind = probe::Bind {
         scene: p.scene(s, after),
         frame: s.bind_frame(),
+        ray_query: s.bind_world(),
         points: &t.points,
         history: &h.records,
         offered: &h.offered,

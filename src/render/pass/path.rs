@@ -32,6 +32,7 @@ pub fn record(k: &Path, rec: &mut Recorder, s: &DeviceScene, f: &FilmBuffers, pu
     let bind = Bind {
         scene: s.bind(),
         frame: s.bind_frame(),
+        ray_query: s.bind_world(),
         samples: &f.samples,
         counters: &f.counters,
         paths: &f.paths,

@@ -23,6 +23,7 @@ pub fn record(
         let points = &if tile.has_points() { tile.points.part(part.clone())? } else { tile.points.clone() };
         let seen = &if tile.has_seen() { tile.seen.part(part)? } else { tile.seen.clone() };
         let push = PathPush { constants: *constants, first_pixel, pixels, ..PathPush::default() };
-        rec.dispatch_threads(k, Bind { scene: s.bind(), frame: s.bind_frame(), guides, points, seen }, &push, pixels)
+        let (scene, frame, ray_query) = (s.bind(), s.bind_frame(), s.bind_world());
+        rec.dispatch_threads(k, Bind { scene, frame, ray_query, guides, points, seen }, &push, pixels)
     })
 }

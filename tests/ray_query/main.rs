@@ -1,0 +1,104 @@
+//! Tests rays that the device traces by itself (VK_KHR_ray_query) against those of the kernels. A device that cannot do so has to say
+//! what it lacks, and the other tests end there; with TALLOW_RAY_QUERY=required they fail instead: `tools/with-ray-query` sets it, and
+//! brings a driver that can.
+#[path = "../support/alike.rs"]
+mod alike;
+#[allow(dead_code)]
+#[cfg(feature = "cli")]
+#[path = "../support/command.rs"]
+mod command;
+mod hits;
+mod pictures;
+#[path = "../support/poses.rs"]
+mod poses;
+#[path = "../support/statistics.rs"]
+mod statistics;
+#[path = "../support/mod.rs"]
+mod support;
+
+use std::path::Path;
+use tallow::error::{Error, Result};
+use tallow::gpu::{DeviceOptions, Gpu, Tracing};
+use tallow::layout::MATERIAL_MASKED;
+use tallow::render::settings::Settings;
+use tallow::scene::{Loaded, Scene};
+
+fn open(tracing: Tracing) -> Result<Gpu> {
+    let device = std::env::var("TALLOW_DEVICE").ok();
+    Gpu::open(&DeviceOptions { device, validation: true, tracing, ..DeviceOptions::default() })
+}
+
+/// A device that traces by its kernels, and one that does so by itself; none where that cannot be, and need not.
+fn both() -> Option<[Gpu; 2]> {
+    let compute = open(Tracing::Compute).unwrap_or_else(|e| panic!("this test needs a Vulkan device: {e}"));
+    match open(Tracing::RayQuery) {
+        Ok(rays) => Some([compute, rays]),
+        Err(error) => {
+            assert!(std::env::var("TALLOW_RAY_QUERY").as_deref() != Ok("required"), "{error}");
+            println!("not tested here: {error}");
+            None
+        }
+    }
+}
+
+/// A scene that the repository ships, on a small film.
+fn shipped(file: &str) -> Loaded {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file);
+    let small = |s: &mut Settings| (s.width, s.height, s.spp, s.max_depth) = (48, 32, 16, 4);
+    Scene::load(&path).unwrap().with(small)
+}
+
+/// The same with surfaces that let some rays pass.
+fn masked(mut scene: Loaded) -> Loaded {
+    for material in &mut scene.materials {
+        material.opacity = 0.6;
+        material.flags |= MATERIAL_MASKED;
+    }
+    scene
+}
+
+/// One of each kind: a single level, a sphere among its triangles, instances with a sphere among them, and masks on such.
+fn scenes() -> [(&'static str, Loaded); 5] {
+    let moving = || poses::at(&poses::MOMENTS[2]).with(|s| s.spp = 16);
+    [
+        ("Cornell box", shipped("cornell-box/scene.toml")),
+        ("box with a ball", shipped("cornell-box/glass.toml")),
+        ("instances", moving()),
+        ("masked box", masked(shipped("cornell-box/scene.toml"))),
+        ("masked instances", masked(moving())),
+    ]
+}
+
+#[test]
+fn a_device_without_it_says_what_it_lacks() {
+    let gpu = open(Tracing::Compute).unwrap();
+    assert!(!gpu.traces_by_ray_query());
+    assert!(!open(Tracing::Auto).unwrap().traces_by_ray_query(), "not before it was measured");
+    match (open(Tracing::RayQuery), &gpu.info().ray_query_lacks[..]) {
+        (Ok(rays), []) => assert!(rays.traces_by_ray_query()),
+        (Err(Error::Device(text)), lacks @ [first, ..]) => {
+            assert!(lacks.iter().all(|name| text.contains(name)), "{text}");
+            assert!(text.contains(&gpu.info().name) && text.contains("choose the tracing \"compute\""), "{text}");
+            assert!(first.starts_with("VK_KHR_") || gpu.info().kind != tallow::gpu::DeviceKind::Cpu, "{first}");
+        }
+        (other, lacks) => panic!("{:?}, and it lacks {lacks:?}", other.map(|_| ())),
+    }
+    support::assert_silent(&gpu);
+}
+
+/// The words of the option, and how the program ends.
+#[cfg(feature = "cli")]
+#[test]
+fn the_program_renders_or_says_why_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/scene.toml");
+    let small = ["--width", "16", "--height", "16", "--spp", "1", "--quiet", "--validation", "-o", "a.exr"];
+    let render = |tracing| command::tallow(&folder, &[&["render", scene, "--tracing", tracing], &small[..]].concat());
+    assert!(render("compute").status.success() && render("auto").status.success());
+    let by_ray_query = render("ray-query");
+    match both() {
+        Some(_) => assert!(by_ray_query.status.success(), "{by_ray_query:?}"),
+        None => command::complains(&by_ray_query, 4, &["cannot trace by ray queries", "lacks", "compute"]),
+    }
+    command::complains(&render("embree"), 2, &["embree", "ray-query"]);
+}
