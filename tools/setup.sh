@@ -87,31 +87,34 @@ install_with_apt() {
     apt-get install -y -qq --no-install-recommends "$@" >&2 || die "apt-get could not install: $*"
 }
 
-# ray_query_driver: downloads a Mesa whose lavapipe traces by VK_KHR_ray_query into the folder that it prints, once. It comes from
-# the backports of Debian 12, whose own Mesa is too old; nothing is installed, and lists and packages stay in that folder.
-ray_query_driver() {
-    local folder=$target/ray-query-driver
-    local library=$folder/root/usr/lib/$(uname -m)-linux-gnu/libvulkan_lvp.so
+# use_ray_query_driver: has what is started later use a lavapipe that traces by VK_KHR_ray_query. That of Debian 12 is too old; a newer
+# one is downloaded from its backports, once. Nothing is installed: lists and packages stay in a folder of the build. Elsewhere the
+# system's own driver serves, as that of Debian 13.
+use_ray_query_driver() {
+    grep -q 'VERSION_CODENAME=bookworm' /etc/os-release 2>/dev/null || return 0
+    local folder=$target/ray-query-driver libraries=usr/lib/$(uname -m)-linux-gnu
+    [[ -e $folder/driver.json ]] || download_ray_query_driver "$folder" "$folder/root/$libraries"
+    export VK_DRIVER_FILES=$folder/driver.json
+    # Loaders before 1.3.207 know the other name.
+    export VK_ICD_FILENAMES=$VK_DRIVER_FILES LD_LIBRARY_PATH=$folder/root/$libraries${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
+}
+
+download_ray_query_driver() {
+    local folder=$1 library=$2/libvulkan_lvp.so package
     local source="deb [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] http://deb.debian.org/debian bookworm-backports main"
-    if [[ ! -e $folder/driver.json ]]; then
-        grep -q 'VERSION_CODENAME=bookworm' /etc/os-release 2>/dev/null ||
-            die "only for Debian 12 is it known where to get a driver with ray queries: install one, and set VK_DRIVER_FILES"
-        say "downloading a driver with ray queries"
-        rm -rf "$folder"
-        mkdir -p "$folder"/{lists/partial,cache/archives/partial,root}
-        echo "$source" >"$folder/sources.list"
-        local options=(-qq -o "Dir::Etc::SourceList=$folder/sources.list" -o Dir::Etc::SourceParts=- -o "Dir::State::Lists=$folder/lists"
-            -o "Dir::Cache=$folder/cache" -o APT::Sandbox::User= -o Acquire::Languages=none)
-        apt-get "${options[@]}" update >&2 || die "apt-get update failed: is there a network?"
-        (cd "$folder" && apt-get "${options[@]}" download mesa-vulkan-drivers libdrm2 libdrm-amdgpu1 >&2) ||
-            die "apt-get could not download the driver"
-        local package
-        for package in "$folder"/*.deb; do dpkg-deb -x "$package" "$folder/root"; done
-        [[ -e $library ]] || die "the packages hold no $library"
-        rm -rf "$folder"/{lists,cache} "$folder"/*.deb
-        printf '{"file_format_version": "1.0.0", "ICD": {"library_path": "%s", "api_version": "1.3.0"}}\n' "$library" >"$folder/driver.json"
-    fi
-    echo "$folder"
+    say "downloading a driver with ray queries"
+    rm -rf "$folder"
+    mkdir -p "$folder"/{lists/partial,cache/archives/partial,root}
+    echo "$source" >"$folder/sources.list"
+    local options=(-qq -o "Dir::Etc::SourceList=$folder/sources.list" -o Dir::Etc::SourceParts=- -o "Dir::State::Lists=$folder/lists"
+        -o "Dir::Cache=$folder/cache" -o APT::Sandbox::User= -o Acquire::Languages=none)
+    apt-get "${options[@]}" update >&2 || die "apt-get update failed: is there a network?"
+    (cd "$folder" && apt-get "${options[@]}" download mesa-vulkan-drivers libdrm2 libdrm-amdgpu1 >&2) ||
+        die "apt-get could not download the driver"
+    for package in "$folder"/*.deb; do dpkg-deb -x "$package" "$folder/root"; done
+    [[ -e $library ]] || die "the packages hold no $library"
+    rm -rf "$folder"/{lists,cache} "$folder"/*.deb
+    printf '{"file_format_version": "1.0.0", "ICD": {"library_path": "%s", "api_version": "1.3.0"}}\n' "$library" >"$folder/driver.json"
 }
 
 # Sets `cargo`. A fresh rustup leaves it off the path until the next login.

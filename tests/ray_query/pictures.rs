@@ -14,7 +14,7 @@ fn renderer(gpu: &Gpu, scene: &Loaded) -> Renderer {
 
 #[test]
 fn pictures_are_alike() {
-    let Some(gpus) = both() else { return };
+    let gpus = both();
     let all = scenes();
     for (name, scene) in &all {
         let [ours, theirs] = gpus.each_ref().map(|gpu| render(gpu, &renderer(gpu, scene)));
@@ -30,7 +30,7 @@ fn pictures_are_alike() {
 /// order.
 #[test]
 fn pictures_of_what_moves_are_alike() {
-    let Some(gpus) = both() else { return };
+    let gpus = both();
     let hidden = Moment { scale: 0.0, ..Moment::default() };
     let moments: Vec<_> = MOMENTS.into_iter().chain([hidden]).collect();
     for rebuild_above in [f32::INFINITY, 0.0] {
@@ -57,7 +57,7 @@ fn pictures_of_what_moves_are_alike() {
 
 #[test]
 fn nothing_is_left_when_the_device_closes() {
-    let Some([_, gpu]) = both() else { return };
+    let [_, gpu] = both();
     let log = gpu.validation_log();
     let scene = at(&Moment::default());
     let renderer = renderer(&gpu, &scene);
