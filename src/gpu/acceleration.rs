@@ -49,7 +49,7 @@ impl Acceleration {
     ///
     /// # Errors
     /// [`Error::Device`] on a device that traces otherwise, for more than 2^24 copies, and when memory is out.
-    pub fn new(gpu: &Gpu, shapes: Shapes, meshes: Vec<Mesh>, copies: usize) -> Result<Self> {
+    pub(crate) fn new(gpu: &Gpu, shapes: Shapes, meshes: Vec<Mesh>, copies: usize) -> Result<Self> {
         let queries = gpu.ray_queries()?;
         if copies > MOST {
             return Err(too_many(copies, "instances"));

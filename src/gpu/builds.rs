@@ -13,7 +13,7 @@ impl Recorder<'_> {
     /// # Errors
     /// [`Error::Device`] when there are more copies than there is room for, a mesh of theirs begins beyond triangle 2^24, or memory
     /// is out.
-    pub fn build(
+    pub(crate) fn build(
         &mut self,
         acceleration: &Acceleration,
         shapes: Shapes,

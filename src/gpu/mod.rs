@@ -38,7 +38,8 @@ mod timing;
 mod tuning;
 mod upload;
 
-pub use acceleration::{Aabb, Acceleration, Mesh, Placement, Shapes};
+pub use acceleration::Acceleration;
+pub(crate) use acceleration::{Aabb, Mesh, Placement, Shapes};
 pub use access::Access;
 pub use blocks::{PerBlock, block_count, thread_items};
 use buffer::Untyped;
