@@ -19,7 +19,7 @@ fn take_apart(film: &Film, demodulation: Demodulation) -> Parts {
 #[test]
 fn lamps_and_their_rims_reach_no_other_pixel() {
     let parts = take_apart(&film(), Demodulation::Light);
-    assert_eq!(parts.input.radiance, [[2.0, 2.0, 2.0, 1.0], [2.0, 2.0, 2.0, 1.0], [0.0; 4], [0.0; 4]]);
+    assert_eq!(parts.input.radiance, [[2.0, 2.0, 2.0, 4.0], [2.0, 2.0, 2.0, 4.0], [0.0; 4], [0.0; 4]]);
     let joined = parts.remodulate(&[[3.0, 3.0, 3.0, 1.0]; 4]);
     assert_eq!(joined, [[1.5; 3], [1.5; 3], [25.0; 3], [50.0; 3]]);
     // The albedo of pixel centres does not show that the third pixel is a rim; its light does.
@@ -28,7 +28,7 @@ fn lamps_and_their_rims_reach_no_other_pixel() {
     centre.add_vec3("albedo", RGB, &[[0.5; 3], [0.5; 3], [0.5; 3], [0.0; 3]]);
     assert_eq!(take_apart(&centre, Demodulation::Light).input.radiance[2], [0.0; 4]);
     // Control: in plain order all of it is filtered.
-    assert!(take_apart(&film(), Demodulation::Off).input.radiance.iter().all(|c| c[3] == 1.0));
+    assert!(take_apart(&film(), Demodulation::Off).input.radiance.iter().all(|c| c[3] == 4.0));
 }
 
 /// Three columns of glass, one of a wall, two of a lamp and its rim to the left, three of noisy sky. The middle of the glass is black by chance.
@@ -70,7 +70,7 @@ fn direct_light_is_left_out_also_where_pixels_lack_it() {
     let red = film.channels.iter_mut().filter(|c| ["R", "direct.R"].contains(&c.name.as_str()));
     red.for_each(|c| c.samples = Samples::F32(vec![1.0, f32::NAN, 25.0, 50.0]));
     let parts = take_apart(&film, Demodulation::Light);
-    assert_eq!(parts.input.radiance.iter().map(|c| c[3]).collect::<Vec<_>>(), [1.0, 0.0, 1.0, 0.0]);
+    assert_eq!(parts.input.radiance.iter().map(|c| c[3]).collect::<Vec<_>>(), [4.0, 0.0, 4.0, 0.0]);
     assert_eq!(parts.remodulate(&[[1.0; 4]; 4])[1], [0.5, 1.0, 1.0]);
     assert_eq!(parts.direct.unwrap().radiance[1], [0.0; 4]);
 }
@@ -131,6 +131,22 @@ fn the_variance_of_a_pbrt_file_is_that_of_one_sample() {
     film.add_vec3("RelativeVariance", RGB, &[[8.0; 3]; 4]);
     film.metadata.insert("samplesPerPixel".to_owned(), "16".to_owned());
     assert_eq!(first(&film), 2.0);
+}
+
+#[test]
+fn samples_are_those_that_the_head_of_a_file_tells_or_taken_for_some() {
+    let mut film = Film::new(4, 1);
+    film.add_vec3("Night.Combined", RGB, &[[1.0; 3]; 4]);
+    let count = |film: &Film| take_apart(film, Demodulation::Off).input.radiance[0][3];
+    assert_eq!(count(&film), 4.0);
+    film.metadata.insert("cycles.Day.samples".to_owned(), "99".to_owned());
+    assert_eq!(count(&film), 4.0, "of another view layer");
+    film.metadata.insert("cycles.Night.samples".to_owned(), "64".to_owned());
+    assert_eq!(count(&film), 64.0);
+    film.metadata.insert("samplesPerPixel".to_owned(), "NaN".to_owned());
+    assert_eq!(count(&film), 64.0);
+    film.add("samples", Samples::U32(vec![7; 4]));
+    assert_eq!(count(&film), 7.0, "a pixel's own");
 }
 
 #[test]
