@@ -6,7 +6,7 @@ use crate::layout::*;
 use crate::render::settings::{Allocate, Settings};
 use crate::render::{Job, Outputs, Renderer};
 use crate::report::table::{self, milliseconds};
-use crate::scene::{self, Loaded, Scene};
+use crate::scene::{self, Loaded, Scene, SceneFile};
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -141,7 +141,9 @@ impl Variant {
 fn rows(args: &Args) -> Result<Vec<EffectRow>> {
     let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), ..DeviceOptions::default() })?;
     let pixels = PIXELS_BY_KIND[usize::from(gpu.info().kind != DeviceKind::Cpu)];
-    let scene = Scene::load(&args.scene)?.with(|s| shrink(s, pixels));
+    let mut file = SceneFile::open(&args.scene)?;
+    file.stays_still();
+    let scene = file.load()?.with(|s| shrink(s, pixels));
     let outputs = Outputs { split_light: true, guides: true, counters: false };
     let (base, reasons) = scene::effects(&scene, &scene.settings, outputs.split_light, outputs.counters);
     let called_for_by = |effect| reasons.iter().find(|(of, _)| *of == effect).map_or("", |(_, by)| by).to_owned();

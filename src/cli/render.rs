@@ -266,6 +266,7 @@ impl Taken<'_> {
 pub fn load(args: &Args) -> Result<(Loaded, Settings)> {
     let mut file = SceneFile::open_clip(&args.scene, args.clip.as_deref())?;
     args.camera.as_deref().map_or(Ok(()), |name| file.look_through(name))?;
+    file.stays_still();
     let mut settings = file.settings()?;
     args.overrides.apply(&mut settings);
     if let Some([x, y]) = args.pixel {

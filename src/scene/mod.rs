@@ -9,7 +9,7 @@ use crate::layout::{LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT};
 use crate::scene::description::settings::Settings;
 use crate::threads;
 use animation::{Animation, Mover};
-use build::assemble::assemble;
+use build::assemble::{Choices, assemble};
 use description::Description;
 use load::mesh_file::Format;
 use load::{gltf, include};
@@ -163,8 +163,7 @@ impl std::ops::DerefMut for Loaded {
 pub struct SceneFile<'a> {
     path: PathBuf,
     description: Cow<'a, Description>,
-    /// Whether a scene without light gets a sky of radiance 1.
-    sky: bool,
+    choices: Choices,
     /// The cameras that a glTF file holds, and the number of the one that is looked through.
     cameras: Vec<gltf::Named>,
     through: usize,
@@ -177,7 +176,7 @@ pub struct SceneFile<'a> {
 impl<'a> SceneFile<'a> {
     fn of(path: &Path, description: Cow<'a, Description>) -> Self {
         let (cameras, through, warnings, movers) = Default::default();
-        Self { path: path.to_owned(), description, sky: false, cameras, through, warnings, movers }
+        Self { path: path.to_owned(), description, choices: Choices::default(), cameras, through, warnings, movers }
     }
 
     /// Reads a scene file (`.toml`, `.gltf`, `.glb`), or takes a model (`.obj`, `.ply`, `.ply.gz`) for one.
@@ -221,7 +220,7 @@ impl<'a> SceneFile<'a> {
         Ok(Self {
             path: path.to_owned(),
             description: Cow::Owned(description),
-            sky,
+            choices: Choices { sky, still: false },
             cameras,
             through,
             warnings,
@@ -245,6 +244,12 @@ impl<'a> SceneFile<'a> {
             false => format!("is not there: choose one of {}", names.join(", ")),
         };
         Err(Error::Usage(format!("{}: camera \"{name}\" {what}", self.path.display())))
+    }
+
+    /// Promises that no [`Pose`] will place anything elsewhere or deform it. Instances of few triangles are then stored as meshes of
+    /// their own, through which rays take about half the time. A scene with animations keeps its instances.
+    pub fn stays_still(&mut self) {
+        self.choices.still = true;
     }
 
     /// The file's settings over the defaults.
@@ -271,12 +276,13 @@ impl<'a> SceneFile<'a> {
         let mut scene = Scene { view: self.description.camera.clone(), ..Scene::default() };
         let (description, included, warnings) = include::models(&self.path, &self.description)?;
         let description = animation::with_freed_meshes(&description);
-        threads::within(|| assemble(&self.path, &description, self.sky, &mut scene))?;
+        let carried = self.cameras.get(self.through).and_then(|camera| camera.mover.clone());
+        let movers: Vec<_> = self.movers.iter().cloned().chain(included).chain(carried).collect();
+        let still = self.choices.still && movers.is_empty() && description.animation.is_empty();
+        threads::within(|| assemble(&self.path, &description, Choices { still, ..self.choices }, &mut scene))?;
         scene.warnings.splice(0..0, self.warnings.iter().chain(&warnings).cloned());
         let camera = scene.view.build([settings.width, settings.height], scene.bounds);
         camera.map_err(|what| Error::input_at(&self.path, "[camera]", what))?;
-        let carried = self.cameras.get(self.through).and_then(|camera| camera.mover.clone());
-        let movers: Vec<_> = self.movers.iter().cloned().chain(included).chain(carried).collect();
         let animation = animation::load(&self.path, &description, &movers, &scene)?;
         if !animation.is_empty() {
             scene.view.framed = Some(scene.bounds);

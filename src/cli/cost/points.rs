@@ -31,7 +31,8 @@ impl Points {
     /// Of scene and options.
     pub fn new(args: &Args, path: &Path, gpu: &Gpu) -> Result<(Scene, Self)> {
         check_fps(args.fps)?;
-        let file = SceneFile::open(path)?;
+        let mut file = SceneFile::open(path)?;
+        file.stays_still();
         let (mut base, mut filters, mut carries) = (file.settings()?, FilterSettings::default(), Reproject::default());
         args.film.apply(&mut base);
         Words::parse(&args.with)?.apply(&mut base, &mut filters, &mut carries);

@@ -7,7 +7,7 @@ use crate::layout::vec3;
 use crate::render::provenance::Provenance;
 use crate::render::settings::{Allocate, Settings};
 use crate::render::{Outputs, Renderer};
-use crate::scene::{Loaded, Scene};
+use crate::scene::{Loaded, SceneFile};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -42,7 +42,9 @@ impl Supersampling {
         let provenance = Provenance::of(aovs.film).map_err(of_image)?;
         let settings = settings(aovs, &provenance).map_err(of_image)?;
         settings.validate()?;
-        let Loaded { scene, .. } = Scene::load(path)?;
+        let mut file = SceneFile::open(path)?;
+        file.stays_still(); // as the render did
+        let Loaded { scene, .. } = file.load()?;
         provenance.shows(&scene, &settings).map_err(of_image)?;
         let renderer = Renderer::new(gpu, &scene, &settings, Outputs::default())?;
         let (guide, light) = (filtered.guide().read()?, filtered.light().read()?);

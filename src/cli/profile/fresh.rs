@@ -18,7 +18,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget};
 /// As a render of the scene.
 pub fn profile(args: &Args) -> Result<(Profile, Option<String>)> {
     let filter = args.denoise.map(row).transpose()?;
-    let file = SceneFile::open(&args.scene)?;
+    let mut file = SceneFile::open(&args.scene)?;
+    file.stays_still();
     let mut settings = file.settings()?;
     args.overrides.apply(&mut settings);
     settings.validate()?;

@@ -1,5 +1,6 @@
 //! Calls the steps from a description to the flat arrays: it reads files, places meshes, builds BVHs, decodes textures and makes the
 //! table of lights.
+use super::bake;
 use super::coat;
 use super::environment;
 use super::geometry::Geometry;
@@ -20,15 +21,24 @@ use std::path::Path;
 /// Height of an MTL's bump map without `-bm`, as a share of the scene's diagonal.
 const DEFAULT_BUMP: f32 = 0.0005;
 
-/// Fills a scene's arrays. `sky`: a scene without any light gets a constant environment of radiance 1.
+/// What a scene file may leave open.
+#[derive(Clone, Copy, Default)]
+pub struct Choices {
+    /// A scene without any light gets a constant environment of radiance 1.
+    pub sky: bool,
+    /// Nothing will be placed elsewhere or deformed.
+    pub still: bool,
+}
+
+/// Fills a scene's arrays.
 ///
 /// # Errors
 /// [`Error::Input`](crate::error::Error::Input) for what cannot be repaired.
-pub fn assemble(path: &Path, description: &Description, sky: bool, scene: &mut Scene) -> Result<()> {
+pub fn assemble(path: &Path, description: &Description, choices: Choices, scene: &mut Scene) -> Result<()> {
     let mut sources = Sources::new(path, description)?;
     // Textures are decoded while geometry is read: on two cores Crytek Sponza is ready a quarter sooner.
     let early = sources.library.materials.textures.clone();
-    let (decoded, done) = rayon::join(|| early.decode(), || geometry(&mut sources, scene));
+    let (decoded, done) = rayon::join(|| early.decode(), || geometry(&mut sources, choices.still, scene));
     done?;
     let textures = &sources.library.materials.textures;
     let decoded = if textures.len() == early.len() { decoded? } else { textures.decode()? };
@@ -37,7 +47,7 @@ pub fn assemble(path: &Path, description: &Description, sky: bool, scene: &mut S
     add_attributes(path, attributes, scene)?;
     let mut warnings = add_materials(sources.library, scene);
     let emits = |t: &Triangle| scene.materials[t.material as usize].emission != [0.0; 3];
-    if sky && scene.lights.is_empty() && !scene.triangles.iter().any(emits) {
+    if choices.sky && scene.lights.is_empty() && !scene.triangles.iter().any(emits) {
         scene.lights.push(environment::light([1.0; 3], DMat3::IDENTITY));
     }
     add_appearance(scene);
@@ -72,10 +82,11 @@ fn add_attributes(path: &Path, words: Vec<u32>, scene: &mut Scene) -> Result<()>
 }
 
 /// Everything but textures.
-fn geometry(sources: &mut Sources, scene: &mut Scene) -> Result<()> {
+fn geometry(sources: &mut Sources, still: bool, scene: &mut Scene) -> Result<()> {
     sources.read_files()?;
     environment::add_lights(sources, scene)?;
     let plan = plan::plan(sources)?;
+    let plan = if still { bake::bake(sources, plan) } else { plan };
     let mut geometry = Geometry::default();
     let stored = store::store(sources, &plan, &mut geometry)?;
     scene.content.add(&geometry.triangles);

@@ -2,6 +2,7 @@
 pub mod alias;
 pub mod assemble;
 pub mod attributes;
+pub mod bake;
 pub mod bvh;
 pub mod coat;
 pub mod encode;

@@ -70,7 +70,7 @@ pub fn store(sources: &mut Sources, plan: &Plan, geometry: &mut Geometry) -> Res
 }
 
 /// How many triangles a mesh has before any is dropped.
-fn triangles_of(sources: &Sources, job: &Job) -> u64 {
+pub fn triangles_of(sources: &Sources, job: &Job) -> u64 {
     let table = &sources.description.mesh[job.mesh];
     let file = sources.file_of(table).and_then(|path| sources.files.get(&path));
     if job.exact { 1 } else { triangles(table, file) }
