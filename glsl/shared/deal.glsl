@@ -150,45 +150,55 @@ struct Walk {
     Leaves leaves; // of the last node
     bool last;     // no node is left
     bool again;    // a mask let the ray pass a triangle of `leaves`, the others are tested again
+    Hit next;      // the nearest of `leaves`
+    bool masked;   // `next` counts only if its mask says so
 };
 
 Walk walk_start(Segment ray, RaySpace world, bool on, bool any_hit, uint root) {
-    return Walk(traversal_start(ray.t_max, root), world, on, any_hit, ray.mask_seed, Leaves(world, 0u, 0u, NONE), false, false);
+    Traversal t = traversal_start(ray.t_max, root);
+    return Walk(t, world, on, any_hit, ray.mask_seed, Leaves(world, 0u, 0u, NONE), false, false, t.hit, false);
 }
 
-bool has_ended(Walk w) { return (w.last && !w.again) || (w.any_hit && w.t.hit.triangle != NONE); }
+bool has_ended(Walk w) { return !w.masked && ((w.last && !w.again) || (w.any_hit && w.t.hit.triangle != NONE)); }
 
-// Looks up the mask of the nearest triangle, which `next` hits.
-void decide_mask(inout Walk w, Hit next) {
-    bool blocks = mask_blocks(next.triangle, w.leaves.instance, vec2(next.b1, next.b2), w.mask_seed);
-    if (blocks) w.t.hit = next;
-    else w.leaves.bits &= ~(1u << (next.triangle - w.leaves.first));
+// Looks up the mask of the nearest triangle.
+void decide_mask(inout Walk w) {
+    bool blocks = mask_blocks(w.next.triangle, w.leaves.instance, vec2(w.next.b1, w.next.b2), w.mask_seed);
+    if (blocks) w.t.hit = w.next;
+    else w.leaves.bits &= ~(1u << (w.next.triangle - w.leaves.first));
     w.again = !blocks && w.leaves.bits != 0u;
+    w.masked = false;
 }
 
-// Goes on until the ray of some lane ends, and returns whether this lane's did. Some lane must have a ray. lavapipe executes the
-// code of a branch that no lane takes, but leaves a loop: what is rare stands behind the loop of what is frequent.
-bool walk_on(inout Walk w, uint root, uvec2 from) {
+// Goes on until the ray of some lane ends or meets a mask. Some lane must have a ray.
+void walk_on(inout Walk w, uint root, uvec2 from) {
     do {
-        Hit next;
-        bool masked;
         do {
-            do {
-                if (!w.again) w.last = visit_node(w.t, w.world, w.on, root, w.leaves) && w.on;
-            } while (!any_lane(w.last || w.leaves.bits != 0u));
-            next = w.t.hit;
-            masked = deal_triangles(next, w.leaves, from);
-            if (!masked) {
-                w.t.hit = next;
-                w.again = false;
-            }
-        } while (!any_lane(masked || has_ended(w)));
-        if (FX_ALPHA_MASKS && masked) decide_mask(w, next);
-    } while (!any_lane(has_ended(w)));
-    return has_ended(w);
+            if (!w.again) w.last = visit_node(w.t, w.world, w.on, root, w.leaves) && w.on;
+        } while (!any_lane(w.last || w.leaves.bits != 0u));
+        w.next = w.t.hit;
+        w.masked = deal_triangles(w.next, w.leaves, from);
+        if (!w.masked) {
+            w.t.hit = w.next;
+            w.again = false;
+        }
+    } while (!any_lane(w.masked || has_ended(w)));
 }
 
-// trace_shadow_then_closest where DEALT.
+// A shadow ray that has ended gives way to the ray behind it.
+void follow(inout Walk w, inout bool shadowed, Segment ray, RaySpace space, bool alive, uint root) {
+    bool ends = has_ended(w);
+    if (ends && w.any_hit) {
+        shadowed = w.t.hit.triangle != NONE;
+        w = walk_start(ray, space, alive, false, root);
+    } else if (ends) {
+        w.on = false;
+    }
+}
+
+// trace_shadow_then_closest where DEALT. lavapipe executes the code of a branch that no lane takes, but leaves a loop: what is rare
+// stands behind the loop of what is frequent. A node is visited most often, then triangles are tested, rays end, and last masks
+// are looked up.
 Hit deal_shadow_then_closest(Segment shadow, inout bool shadowed, Segment ray, bool alive, uint root, uvec2 from) {
     RaySpace second = ray_space(ray.origin, ray.direction);
     RaySpace first = select_ray(shadowed, ray_space(shadow.origin, shadow.direction), second);
@@ -196,13 +206,20 @@ Hit deal_shadow_then_closest(Segment shadow, inout bool shadowed, Segment ray, b
     Walk w = walk_start(shadow, first, shadowed || alive, shadowed, root);
     shadowed = false;
     if (any_lane(w.on)) do {
-        bool ends = walk_on(w, root, from);
-        if (ends && w.any_hit) {
-            shadowed = w.t.hit.triangle != NONE;
-            w = walk_start(ray, second, alive, false, root);
-        } else if (ends) {
-            w.on = false;
+        do {
+            walk_on(w, root, from);
+            follow(w, shadowed, ray, second, alive, root);
+        } while (any_lane(w.on) && !(FX_ALPHA_MASKS && any_lane(w.masked)));
+        if (FX_ALPHA_MASKS) {
+            if (w.masked) decide_mask(w);
+            follow(w, shadowed, ray, second, alive, root);
         }
     } while (any_lane(w.on));
     return w.t.hit;
+}
+
+// traverse where DEALT, of a ray that is `on`.
+Hit deal_closest(Segment ray, bool on, uint root) {
+    bool shadowed = false;
+    return deal_shadow_then_closest(ray, shadowed, ray, on, root, uvec2(NONE));
 }

@@ -54,8 +54,11 @@ void main() {
     Walk w = walk_start(ray, ray_space(ray.origin, ray.direction), on, any_hit, push.root);
     if (any_lane(on)) do {
         bool ends;
-        if (DEALT) ends = walk_on(w, push.root, uvec2(NONE));
-        else ends = traversal_step(w.t, w.world, any_hit, push.root, w.mask_seed, uvec2(NONE));
+        if (DEALT) {
+            walk_on(w, push.root, uvec2(NONE));
+            if (FX_ALPHA_MASKS && w.masked) decide_mask(w);
+            ends = has_ended(w);
+        } else ends = traversal_step(w.t, w.world, any_hit, push.root, w.mask_seed, uvec2(NONE));
         if (ends) {
             write_hit(i, w.t.hit);
             i += stride;

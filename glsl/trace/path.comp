@@ -74,7 +74,11 @@ void main() {
     Ray ray = eye_ray(film_sample(pixel, random), random);
     Path path = Path(ray.origin, ray.direction, vec3(1.0), 0.0, true, 1.0);
     uint seed = path_seed(pixel, index);
-    Hit first = traverse(Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed)), push.constants.root);
+    Segment eye = Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed));
+    Hit first;
+    // The rays of neighbours meet the same triangles, so that dealing them would not pay; masks are looked up less often.
+    if (DEALT && FX_ALPHA_MASKS) first = deal_closest(eye, on, push.constants.root);
+    else first = traverse(eye, push.constants.root);
     vec3 albedo;
     SplitLight light = trace_path(path, on, sharp_only, first, random, seed, albedo);
     if (!on) return;
