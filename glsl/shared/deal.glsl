@@ -174,8 +174,12 @@ void decide_mask(inout Walk w) {
 void walk_on(inout Walk w, uint root, uvec2 from) {
     do {
         do {
-            if (!w.again) w.last = visit_node(w.t, w.world, w.on, root, w.leaves) && w.on;
-        } while (!any_lane(w.last || w.leaves.bits != 0u));
+            uvec2 met = uvec2(0u);
+            do {
+                if (!w.again) w.last = visit_node(w.t, w.world, w.on, root, w.leaves, met) && w.on;
+            } while (!any_lane(w.last || w.leaves.bits != 0u || (FX_INSTANCES && met.y != 0u)));
+            if (FX_INSTANCES && met.y != 0u) enter_instance(w.t, w.world, met);
+        } while (FX_INSTANCES && !any_lane(w.last || w.leaves.bits != 0u));
         w.next = w.t.hit;
         w.masked = deal_triangles(w.next, w.leaves, from);
         if (!w.masked) {

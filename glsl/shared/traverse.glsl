@@ -277,8 +277,8 @@ void intersect_leaves(inout Hit hit, Leaves leaves, bool any_hit, uint mask_seed
 }
 
 // Visits one node below `root` (with ROOT_OF_INSTANCES, a level of instances) of a ray that is `on`. Returns true when no node is
-// left.
-bool visit_node(inout Traversal t, RaySpace world, bool on, uint root, out Leaves leaves) {
+// left. Where `met` is not empty, the ray goes on only by enter_instance.
+bool visit_node(inout Traversal t, RaySpace world, bool on, uint root, out Leaves leaves, out uvec2 met) {
     bool two_levels = FX_INSTANCES && (root & ROOT_OF_INSTANCES) != 0u;
     RaySpace ray = world;
     if (FX_INSTANCES) ray = select_ray(t.instance != NONE, t.inside, world);
@@ -298,13 +298,14 @@ bool visit_node(inout Traversal t, RaySpace world, bool on, uint root, out Leave
         t.bits = 0u;
     }
     group.y = on ? group.y : 0u;
-    if (two_levels && t.instance == NONE && group.y != 0u) {
-        enter_instance(t, world, group);
+    met = uvec2(0u);
+    if (two_levels && t.instance == NONE) {
+        met = group;
         group.y = 0u;
     }
     leaves = Leaves(ray, group.x, group.y, t.instance);
-    bool last = t.bits <= 0x00ffffffu && t.depth == 0u;
-    if (t.bits <= 0x00ffffffu && !last) {
+    bool left = t.bits <= 0x00ffffffu && met.y == 0u, last = left && t.depth == 0u;
+    if (left && !last) {
         if (FX_INSTANCES && t.depth == t.bottom) {
             t.instance = NONE;
             t.bottom = 0u;
@@ -321,7 +322,9 @@ bool visit_node(inout Traversal t, RaySpace world, bool on, uint root, out Leave
 // of the origin can be smaller than the error of the distance.
 bool traversal_step(inout Traversal t, RaySpace world, bool any_hit, uint root, uint mask_seed, uvec2 from) {
     Leaves leaves;
-    bool last = visit_node(t, world, true, root, leaves);
+    uvec2 met;
+    bool last = visit_node(t, world, true, root, leaves, met);
+    if (FX_INSTANCES && met.y != 0u) enter_instance(t, world, met);
     intersect_leaves(t.hit, leaves, any_hit, mask_seed, from);
     return last || (any_hit && t.hit.triangle != NONE);
 }
