@@ -13,7 +13,9 @@ uint this_lane() { return gl_SubgroupInvocationID; }
 uint from_lane(uint x, uint lane) { return subgroupShuffle(x, lane); }
 #endif
 
-const bool DEALT = FX_DEALT && LANES > 0u && !FX_SPHERES;
+const bool DEALT = FX_DEALT && LANES > 0u;
+// Whether some of what rays meet is looked at apart.
+const bool APART = FX_ALPHA_MASKS || FX_SPHERES;
 const uint LAST_LANE = LANES - 1u;
 
 float from_lane(float x, uint lane) { return uintBitsToFloat(from_lane(floatBitsToUint(x), lane)); }
@@ -85,23 +87,33 @@ void take_nearer(uint by, uint ray_lane, inout uint distance, inout uint winner)
     winner = nearer ? its : winner;
 }
 
+// All bits of this lane and of the lane `by` further on, where that is for the same ray.
+uint joined(uint by, uint ray_lane, uint bits) {
+    uint at = min(this_lane() + by, LAST_LANE), its = from_lane(bits, at);
+    return from_lane(ray_lane, at) == ray_lane ? bits | its : bits;
+}
+
 bool is_masked(uint triangle, uint instance) {
     return FX_ALPHA_MASKS && (Material_flags(materials, material_of(triangle, instance)) & MATERIAL_MASKED) != 0u;
 }
 
 // Tests the triangles of all lanes' `leaves`. Returns whether the nearest that this lane's ray meets before `hit`, which it
-// becomes, has a mask. Bits go from the highest down, so that of two triangles at one distance the same counts as for a ray alone.
-bool deal_triangles(inout Hit hit, Leaves leaves, uvec2 from) {
+// becomes, has a mask; `spheres` are the bits of this lane's that are none. Bits go from the highest down, so that of two triangles
+// at one distance the same counts as for a ray alone.
+bool deal_triangles(inout Hit hit, Leaves leaves, uvec2 from, out uint spheres) {
     uint lane = this_lane();
     uint n = uint(bitCount(leaves.bits)), ends = inclusive_sum(n), begin = ends - n;
     uint total = from_lane(ends, LAST_LANE), first = 0u;
     uint axis = uint(leaves.ray.along_x) | uint(leaves.ray.along_y) << 1;
     bool masked = false;
+    spheres = 0u;
     do {
         uint k = first + lane, owner = lane_of(ends, k);
         bool dealt = k < total;
         uint rank = from_lane(ends, owner) - 1u - k;
-        uint index = dealt ? from_lane(leaves.first, owner) + select_bit(from_lane(leaves.bits, owner), rank) : 0u;
+        uint bit = dealt ? select_bit(from_lane(leaves.bits, owner), rank) : 0u;
+        uint index = dealt ? from_lane(leaves.first, owner) + bit : 0u;
+        bool sphere = FX_SPHERES && dealt && is_sphere(index);
         RaySpace ray;
         ray.origin = from_lane(leaves.ray.origin, owner);
         ray.shear = from_lane(leaves.ray.shear, owner);
@@ -111,7 +123,7 @@ bool deal_triangles(inout Hit hit, Leaves leaves, uvec2 from) {
         uint instance = FX_INSTANCES ? from_lane(leaves.instance, owner) : NONE;
         float t;
         vec2 barycentric;
-        bool meets = intersect_triangle(ray, index, from_lane(hit.t, owner), t, barycentric) && dealt &&
+        bool meets = intersect_triangle(ray, index, from_lane(hit.t, owner), t, barycentric) && dealt && !sphere &&
                      (index != from_lane(from.x, owner) || (FX_INSTANCES && instance != from_lane(from.y, owner)));
         uint distance = meets ? floatBitsToUint(t) : 0xffffffffu, winner = lane;
         take_nearer(1u, owner, distance, winner);
@@ -131,6 +143,15 @@ bool deal_triangles(inout Hit hit, Leaves leaves, uvec2 from) {
         if (FX_INSTANCES) hit.instance = better ? leaves.instance : hit.instance;
         hit.b1 = better ? b1 : hit.b1;
         hit.b2 = better ? b2 : hit.b2;
+        if (FX_SPHERES) {
+            uint found = joined(1u, owner, sphere ? 1u << bit : 0u);
+            found = joined(2u, owner, found);
+            if (LANES > 4u) found = joined(4u, owner, found);
+            if (LANES > 8u) found = joined(8u, owner, found);
+            if (LANES > 16u) found = joined(16u, owner, found);
+            found = from_lane(found, at);
+            spheres |= tested ? found : 0u;
+        }
         if (FX_ALPHA_MASKS) {
             bool its_mask = from_lane(uint(is_masked(index, instance)), by) != 0u;
             masked = better ? its_mask : masked;
@@ -152,14 +173,18 @@ struct Walk {
     bool again;    // a mask let the ray pass a triangle of `leaves`, the others are tested again
     Hit next;      // the nearest of `leaves`
     bool masked;   // `next` counts only if its mask says so
+    uint spheres;  // bits of `leaves` that are spheres still to be tested
 };
 
 Walk walk_start(Segment ray, RaySpace world, bool on, bool any_hit, uint root) {
     Traversal t = traversal_start(ray.t_max, root);
-    return Walk(t, world, on, any_hit, ray.mask_seed, Leaves(world, 0u, 0u, NONE), false, false, t.hit, false);
+    return Walk(t, world, on, any_hit, ray.mask_seed, Leaves(world, 0u, 0u, NONE), false, false, t.hit, false, 0u);
 }
 
-bool has_ended(Walk w) { return !w.masked && ((w.last && !w.again) || (w.any_hit && w.t.hit.triangle != NONE)); }
+// Whether the ray has met what is looked at apart.
+bool is_apart(Walk w) { return (FX_ALPHA_MASKS && w.masked) || (FX_SPHERES && w.spheres != 0u); }
+
+bool has_ended(Walk w) { return !is_apart(w) && ((w.last && !w.again) || (w.any_hit && w.t.hit.triangle != NONE)); }
 
 // Looks up the mask of the nearest triangle.
 void decide_mask(inout Walk w) {
@@ -170,7 +195,27 @@ void decide_mask(inout Walk w) {
     w.masked = false;
 }
 
-// Goes on until the ray of some lane ends or meets a mask. Some lane must have a ray.
+// Tests the spheres of `leaves`, which decide by themselves about masks.
+void meet_spheres(inout Walk w, uvec2 from) {
+    do {
+        uint index = w.leaves.first + take_highest(w.spheres), instance = w.leaves.instance;
+        bool inside = index == from.x && (!FX_INSTANCES || instance == from.y);
+        float t;
+        vec2 normal;
+        if (intersect_sphere(w.leaves.ray, index, instance, w.t.hit.t, inside, w.mask_seed, t, normal))
+            w.t.hit = Hit(t, index, instance, normal.x, normal.y);
+        if (w.any_hit && w.t.hit.triangle != NONE) w.spheres = 0u;
+    } while (w.spheres != 0u);
+}
+
+// Looks at what a ray has met apart. Lanes whose rays have met nothing such keep the others company.
+void look_apart(inout Walk w, uvec2 from) {
+    w.leaves.bits &= ~w.spheres; // where a mask lets a ray pass, the others are tested again
+    if (FX_ALPHA_MASKS && w.masked) decide_mask(w);
+    if (FX_SPHERES && w.spheres != 0u) meet_spheres(w, from);
+}
+
+// Goes on until the ray of some lane ends or meets what is looked at apart. Some lane must have a ray.
 void walk_on(inout Walk w, uint root, uvec2 from) {
     do {
         do {
@@ -181,12 +226,12 @@ void walk_on(inout Walk w, uint root, uvec2 from) {
             if (FX_INSTANCES && met.y != 0u) enter_instance(w.t, w.world, met);
         } while (FX_INSTANCES && !any_lane(w.last || w.leaves.bits != 0u));
         w.next = w.t.hit;
-        w.masked = deal_triangles(w.next, w.leaves, from);
+        w.masked = deal_triangles(w.next, w.leaves, from, w.spheres);
         if (!w.masked) {
             w.t.hit = w.next;
             w.again = false;
         }
-    } while (!any_lane(w.masked || has_ended(w)));
+    } while (!any_lane(is_apart(w) || has_ended(w)));
 }
 
 // A shadow ray that has ended gives way to the ray behind it.
@@ -201,8 +246,8 @@ void follow(inout Walk w, inout bool shadowed, Segment ray, RaySpace space, bool
 }
 
 // trace_shadow_then_closest where DEALT. lavapipe executes the code of a branch that no lane takes, but leaves a loop: what is rare
-// stands behind the loop of what is frequent. A node is visited most often, then triangles are tested, rays end, and last masks
-// are looked up.
+// stands behind the loop of what is frequent. A node is visited most often, then triangles are tested, rays end, and last
+// masks and spheres are met.
 Hit deal_shadow_then_closest(Segment shadow, inout bool shadowed, Segment ray, bool alive, uint root, uvec2 from) {
     RaySpace second = ray_space(ray.origin, ray.direction);
     RaySpace first = select_ray(shadowed, ray_space(shadow.origin, shadow.direction), second);
@@ -213,9 +258,9 @@ Hit deal_shadow_then_closest(Segment shadow, inout bool shadowed, Segment ray, b
         do {
             walk_on(w, root, from);
             follow(w, shadowed, ray, second, alive, root);
-        } while (any_lane(w.on) && !(FX_ALPHA_MASKS && any_lane(w.masked)));
-        if (FX_ALPHA_MASKS) {
-            if (w.masked) decide_mask(w);
+        } while (any_lane(w.on) && !(APART && any_lane(is_apart(w))));
+        if (APART) {
+            look_apart(w, from);
             follow(w, shadowed, ray, second, alive, root);
         }
     } while (any_lane(w.on));

@@ -56,7 +56,7 @@ void main() {
         bool ends;
         if (DEALT) {
             walk_on(w, push.root, uvec2(NONE));
-            if (FX_ALPHA_MASKS && w.masked) decide_mask(w);
+            look_apart(w, uvec2(NONE));
             ends = has_ended(w);
         } else ends = traversal_step(w.t, w.world, any_hit, push.root, w.mask_seed, uvec2(NONE));
         if (ends) {

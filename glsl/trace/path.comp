@@ -76,8 +76,8 @@ void main() {
     uint seed = path_seed(pixel, index);
     Segment eye = Segment(path.origin, path.direction, INFINITE_DISTANCE, pcg(seed));
     Hit first;
-    // The rays of neighbours meet the same triangles, so that dealing them would not pay; masks are looked up less often.
-    if (DEALT && FX_ALPHA_MASKS) first = deal_closest(eye, on, push.constants.root);
+    // The rays of neighbours meet the same triangles, so that dealing them would not pay; masks and spheres are looked at less often.
+    if (DEALT && APART) first = deal_closest(eye, on, push.constants.root);
     else first = traverse(eye, push.constants.root);
     vec3 albedo;
     SplitLight light = trace_path(path, on, sharp_only, first, random, seed, albedo);

@@ -173,7 +173,7 @@ fn scene_effects(scene: &Scene, found: &mut Effects, reasons: &mut Reasons) {
     let instances = scene.instances.len();
     found.instances = because(Effect::instances, instances > 0, format!("{instances} instances"));
     let triangles = scene.triangles.len();
-    let dealt = triangles >= DEALT_FROM && !found.spheres;
+    let dealt = triangles >= DEALT_FROM;
     found.dealt_triangles = because(Effect::dealt_triangles, dealt, format!("{triangles} triangles"));
     let texels = scene.texels.len();
     found.many_texels = because(Effect::many_texels, texels > NARROW_TEXELS, format!("{texels} texels of textures"));

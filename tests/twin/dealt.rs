@@ -5,11 +5,31 @@ use tallow::allocate::policy as policy_of;
 use tallow::gpu::DeviceKind;
 use tallow::layout::*;
 use tallow::render::{Outputs, Renderer, called_for};
-use tallow::scene::Loaded;
+use std::path::Path;
+use tallow::scene::{Loaded, Scene};
 
-/// A hierarchy of many triangles, and one with instances and masks.
-fn scenes() -> [(&'static str, Loaded); 2] {
-    [("bust", shipped("bust/scene.toml")), ("pictures", pictures())]
+/// A hierarchy of many triangles, one with instances and masks, and spheres among triangles.
+fn scenes() -> [(&'static str, Loaded); 3] {
+    [("bust", shipped("bust/scene.toml")), ("pictures", pictures()), ("balls", balls())]
+}
+
+/// Spheres, some of them instances or masked, in and around triangles that are masked or not.
+fn balls() -> Loaded {
+    let mut text = "[camera]\nposition = [0.0, 0.5, 4.0]\ntarget = [0.0, 0.0, 0.0]\n[environment]\n\
+                    [[material]]\nname = 'veil'\nopacity = 0.6\n[[material]]\nname = 'glass'\ntype = 'dielectric'\n\
+                    [[mesh]]\nname = 'copied'\nshape = 'sphere'\ntransform = { scale = 0.3 }\n\
+                    [[mesh]]\nname = 'shell'\nshape = 'sphere'\nsegments = 24\nmaterial = 'veil'\ntransform = { scale = 1.2 }\n"
+        .to_owned();
+    for i in 0..12 {
+        let (angle, material) = (f64::from(i) * 0.55, ["veil", "glass", "default"][i as usize % 3]);
+        let place = format!("translate = [{:.3}, {:.3}, {:.3}]", angle.cos(), 0.1 * angle, angle.sin());
+        text += &match i % 4 {
+            0 => format!("[[instance]]\nmesh = 'copied'\ntransform = {{ {place} }}\n"),
+            _ => format!("[[mesh]]\nshape = 'sphere'\nmaterial = '{material}'\ntransform = {{ scale = 0.3, {place} }}\n"),
+        };
+    }
+    text += "[[material]]\nname = 'default'\n";
+    Scene::parse(Path::new("balls.toml"), &text).unwrap().with(|s| (s.max_depth, s.spp) = (5, 4))
 }
 
 fn bits(hit: &RayHit) -> [u32; 5] {
