@@ -19,6 +19,7 @@ mod scattering;
 mod significance;
 #[path = "../support/statistics.rs"]
 mod statistics;
+mod still;
 mod stride;
 #[path = "../support/mod.rs"]
 mod support;

@@ -1,11 +1,11 @@
 //! Rays that test each other's triangles find the bits that each finds alone.
 use crate::kernels::{Traversal, pictures, queries, shipped};
 use crate::support::{assert_silent, gpu, render};
+use std::path::Path;
 use tallow::allocate::policy as policy_of;
 use tallow::gpu::DeviceKind;
 use tallow::layout::*;
 use tallow::render::{Outputs, Renderer, called_for};
-use std::path::Path;
 use tallow::scene::{Loaded, Scene};
 
 /// A hierarchy of many triangles, one with instances and masks, and spheres among triangles.
@@ -25,7 +25,9 @@ fn balls() -> Loaded {
         let place = format!("translate = [{:.3}, {:.3}, {:.3}]", angle.cos(), 0.1 * angle, angle.sin());
         text += &match i % 4 {
             0 => format!("[[instance]]\nmesh = 'copied'\ntransform = {{ {place} }}\n"),
-            _ => format!("[[mesh]]\nshape = 'sphere'\nmaterial = '{material}'\ntransform = {{ scale = 0.3, {place} }}\n"),
+            _ => {
+                format!("[[mesh]]\nshape = 'sphere'\nmaterial = '{material}'\ntransform = {{ scale = 0.3, {place} }}\n")
+            }
         };
     }
     text += "[[material]]\nname = 'default'\n";
