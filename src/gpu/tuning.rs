@@ -1,10 +1,11 @@
 //! Sizes into which work is divided, for CPUs and for GPUs. Every such choice is made here, with its reason.
 use super::Gpu;
 use super::info::DeviceKind;
+use crate::error::{Error, Result};
 use crate::shaders::shared;
 
 /// The sizes that suit a kind of device. No choice changes a bit of any image.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tuning {
     /// Threads in a workgroup that traces rays. lavapipe is fastest with 32 (against 16 and 64); GPUs get two subgroups of
     /// the most common width.
@@ -31,31 +32,57 @@ pub struct Tuning {
     pub longest_edge: u64,
 }
 
-const CPU: Tuning = Tuning {
-    workgroup: 32,
-    stripes: 16,
-    paths_in_flight: 1 << 20,
-    thread_items: 64,
-    strip_bytes: 32 << 20,
-    whole_lines: true,
-    lines: 8,
-    deals: true,
-    longest_edge: 60_000,
-};
-
-const GPU: Tuning = Tuning {
-    workgroup: 64,
-    stripes: 1,
-    paths_in_flight: 1 << 22,
-    thread_items: 16,
-    strip_bytes: 256 << 20,
-    whole_lines: false,
-    lines: 32,
-    deals: false,
-    longest_edge: u64::MAX,
-};
-
 impl Tuning {
+    /// For drivers that run on a CPU.
+    pub const CPU: Self = Self {
+        workgroup: 32,
+        stripes: 16,
+        paths_in_flight: 1 << 20,
+        thread_items: 64,
+        strip_bytes: 32 << 20,
+        whole_lines: true,
+        lines: 8,
+        deals: true,
+        longest_edge: 60_000,
+    };
+
+    /// For all others.
+    pub const GPU: Self = Self {
+        workgroup: 64,
+        stripes: 1,
+        paths_in_flight: 1 << 22,
+        thread_items: 16,
+        strip_bytes: 256 << 20,
+        whole_lines: false,
+        lines: 32,
+        deals: false,
+        longest_edge: u64::MAX,
+    };
+
+    /// # Errors
+    /// [`Error::Usage`] naming a size that cannot be.
+    pub(super) fn check(self) -> Result<Self> {
+        let Self { workgroup, stripes, paths_in_flight, thread_items, strip_bytes, lines, longest_edge, .. } = self;
+        let sizes = [
+            ("workgroup", workgroup.into()),
+            ("stripes", stripes.into()),
+            ("paths_in_flight", paths_in_flight),
+            ("thread_items", thread_items.into()),
+            ("strip_bytes", strip_bytes),
+            ("lines", lines.into()),
+            ("longest_edge", longest_edge),
+        ];
+        match sizes.iter().find(|(_, size)| *size == 0) {
+            Some((name, _)) => Err(Error::Usage(format!("tuning: {name} is 0: choose at least 1"))),
+            None => Ok(self),
+        }
+    }
+
+    /// What suits a kind of device.
+    pub(super) fn of(kind: DeviceKind) -> Self {
+        if kind == DeviceKind::Cpu { Self::CPU } else { Self::GPU }
+    }
+
     /// Constants of kernels that number their threads with `glsl/shared/thread.glsl`.
     pub fn thread(&self) -> shared::thread::Constants {
         shared::thread::Constants { workgroup: self.workgroup, stripes: self.stripes }
@@ -72,8 +99,8 @@ impl Gpu {
         shared::deal::Constants { lanes: if tuning.deals && info.subgroup_shuffle && whole { lanes } else { 0 } }
     }
 
-    /// The sizes into which work is divided for this device.
-    pub fn tuning(&self) -> &'static Tuning {
-        if self.info().kind == DeviceKind::Cpu { &CPU } else { &GPU }
+    /// The sizes into which work is divided: see [`DeviceOptions::tuning`](super::DeviceOptions::tuning).
+    pub fn tuning(&self) -> &Tuning {
+        &self.0.tuning
     }
 }

@@ -22,6 +22,7 @@ mod statistics;
 mod stride;
 #[path = "../support/mod.rs"]
 mod support;
+mod tuning;
 #[path = "../support/twin.rs"]
 mod twin;
 mod whole;

@@ -1,0 +1,87 @@
+//! Tests that pictures have the same bits whatever sizes work is divided into: those that suit a GPU render, place samples and
+//! filter here as those that suit a CPU.
+use crate::support::{assert_silent, render, tuned_gpu};
+use std::path::Path;
+use tallow::denoise::filter::{FILTERS, FilterSettings};
+use tallow::denoise::{Demodulation, Denoiser};
+use tallow::error::Error;
+use tallow::gpu::{DeviceOptions, FrameResources, Gpu, Tuning};
+use tallow::layout::vec4;
+use tallow::render::settings::Settings;
+use tallow::render::{Outputs, Renderer};
+use tallow::scene::{Loaded, Scene};
+
+const OUTPUTS: Outputs = Outputs { split_light: true, guides: true, counters: true };
+
+fn scene(file: &str, policy: &str) -> Loaded {
+    let small = |s: &mut Settings| {
+        (s.width, s.height, s.spp) = (65, 33, 4);
+        s.allocate.policy = tallow::allocate::policy(policy).unwrap();
+    };
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file);
+    Scene::load(&file).unwrap().with(small)
+}
+
+fn bits<T: bytemuck::Pod>(values: &[T]) -> Vec<u32> {
+    bytemuck::cast_slice(values).to_vec()
+}
+
+/// Every word that a render leaves: pixels, light, primary hits and counters.
+fn film(gpu: &Gpu, scene: &Loaded) -> Vec<Vec<u32>> {
+    let renderer = Renderer::new(gpu, scene, &scene.settings, OUTPUTS).unwrap();
+    let stats = render(gpu, &renderer);
+    let tile = &renderer.film().tiles[0];
+    let (light, guide) = (tile.light.read().unwrap(), tile.guide.read().unwrap());
+    let counters = format!("{:?}", renderer.counters().unwrap()).into_bytes().into_iter().map(u32::from).collect();
+    vec![bits(&stats), bits(&light), bits(&guide), counters]
+}
+
+fn filtered(gpu: &Gpu, scene: &Loaded) -> Vec<(&'static str, Vec<vec4>)> {
+    let renderer = Renderer::new(gpu, scene, &scene.settings, OUTPUTS).unwrap();
+    render(gpu, &renderer);
+    let filter = |row: &&tallow::denoise::filter::Row| {
+        let denoiser =
+            Denoiser::new(gpu, &renderer, row, &FilterSettings::default(), Demodulation::Light).unwrap();
+        gpu.run(&mut FrameResources::new(gpu).unwrap(), |rec| denoiser.record(rec)).unwrap();
+        (row.name, denoiser.picture().read().unwrap())
+    };
+    FILTERS.iter().map(filter).collect()
+}
+
+#[test]
+fn a_gpus_sizes_leave_the_bits_of_renders() {
+    let [cpu, gpu] = [Tuning::CPU, Tuning::GPU].map(tuned_gpu);
+    for (file, policy) in [
+        ("cornell-box/glass.toml", "both"),
+        ("cornell-box/scene.toml", "geometry"),
+        ("grass/scene.toml", "uniform"),
+        ("bust/scene.toml", "variance"),
+        ("moving/scene.toml", "threshold"),
+    ] {
+        let scene = scene(file, policy);
+        assert!(film(&cpu, &scene) == film(&gpu, &scene), "{file}, {policy}");
+    }
+    [cpu, gpu].iter().for_each(|gpu| assert_silent(gpu));
+}
+
+#[test]
+fn a_gpus_sizes_leave_the_bits_of_filters() {
+    let [cpu, gpu] = [Tuning::CPU, Tuning::GPU].map(tuned_gpu);
+    let scene = scene("cornell-box/scene.toml", "uniform");
+    for ((filter, one), (_, other)) in filtered(&cpu, &scene).into_iter().zip(filtered(&gpu, &scene)) {
+        assert!(bits(&one) == bits(&other), "{filter}");
+    }
+    [cpu, gpu].iter().for_each(|gpu| assert_silent(gpu));
+}
+
+#[test]
+fn sizes_that_cannot_be_are_refused() {
+    for (name, tuning) in [
+        ("workgroup", Tuning { workgroup: 0, ..Tuning::GPU }),
+        ("thread_items", Tuning { thread_items: 0, ..Tuning::CPU }),
+        ("lines", Tuning { lines: 0, ..Tuning::GPU }),
+    ] {
+        let refused = Gpu::open(&DeviceOptions { tuning: Some(tuning), ..DeviceOptions::default() }).err();
+        assert!(matches!(&refused, Some(Error::Usage(why)) if why.contains(name)), "{refused:?}");
+    }
+}
