@@ -107,13 +107,15 @@ impl Gpu {
         drop(alone);
         // SAFETY: the device was made with one queue of this family.
         let queue = unsafe { device.get_device_queue(queue_family, 0) };
-        let opened = Opened { instance, candidate, queue_family, device, queue, debug, calibrated, ray_queries, tuning };
+        let opened =
+            Opened { instance, candidate, queue_family, device, queue, debug, calibrated, ray_queries, tuning };
         Self::assemble(opened, options.cache.clone(), options.wait_limit)
     }
 
     /// Puts the parts together. On failure an owned device is destroyed.
     pub(super) fn assemble(opened: Opened, cache: Option<PathBuf>, wait_limit: Option<Duration>) -> Result<Self> {
-        let Opened { instance, candidate, queue_family, device, queue, debug, calibrated, ray_queries, tuning } = opened;
+        let Opened { instance, candidate, queue_family, device, queue, debug, calibrated, ray_queries, tuning } =
+            opened;
         let limit =
             wait_limit.unwrap_or(if candidate.info.kind == DeviceKind::Cpu { Duration::MAX } else { WAIT_LIMIT });
         // From here on, Drop cleans up if a line below fails.

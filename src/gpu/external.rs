@@ -88,7 +88,8 @@ impl Gpu {
         let instance = Instance::borrowed(entry, instance);
         let queue_family = raw.queue_family;
         let (ray_queries, tuning) = (None, Tuning::of(candidate.info.kind));
-        let opened = Opened { instance, candidate, queue_family, device, queue, debug, calibrated, ray_queries, tuning };
+        let opened =
+            Opened { instance, candidate, queue_family, device, queue, debug, calibrated, ray_queries, tuning };
         Self::assemble(opened, raw.cache, raw.wait_limit)
     }
 }

@@ -4,7 +4,7 @@ use super::info::DeviceKind;
 use crate::error::{Error, Result};
 use crate::shaders::shared;
 
-/// The sizes that suit a kind of device. No choice changes a bit of any image.
+/// The sizes that suit a kind of device. No choice changes a bit of any image, but for [`Self::whole_lines`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tuning {
     /// Threads in a workgroup that traces rays. lavapipe is fastest with 32 (against 16 and 64); GPUs get two subgroups of
@@ -22,7 +22,8 @@ pub struct Tuning {
     /// Bytes in a strip of the guided filter's sums. On a CPU most of it fits into the caches; a GPU needs more to be busy.
     pub strip_bytes: u64,
     /// Whether a thread sums the windows of a whole line of the guided filter. Shorter segments each sum their first window
-    /// anew, but a GPU needs the additional threads.
+    /// anew, but a GPU needs the additional threads. Floats are then added in another order: pictures of `guided`, and of
+    /// `auto`, which uses it, differ by some 1e-6 of their values.
     pub whole_lines: bool,
     /// Lines of the guided filter's windows per workgroup.
     pub lines: u32,

@@ -40,8 +40,7 @@ fn filtered(gpu: &Gpu, scene: &Loaded) -> Vec<(&'static str, Vec<vec4>)> {
     let renderer = Renderer::new(gpu, scene, &scene.settings, OUTPUTS).unwrap();
     render(gpu, &renderer);
     let filter = |row: &&tallow::denoise::filter::Row| {
-        let denoiser =
-            Denoiser::new(gpu, &renderer, row, &FilterSettings::default(), Demodulation::Light).unwrap();
+        let denoiser = Denoiser::new(gpu, &renderer, row, &FilterSettings::default(), Demodulation::Light).unwrap();
         gpu.run(&mut FrameResources::new(gpu).unwrap(), |rec| denoiser.record(rec)).unwrap();
         (row.name, denoiser.picture().read().unwrap())
     };
@@ -64,14 +63,29 @@ fn a_gpus_sizes_leave_the_bits_of_renders() {
     [cpu, gpu].iter().for_each(|gpu| assert_silent(gpu));
 }
 
+/// Filters with windows that [`Tuning::whole_lines`] lets begin elsewhere.
+const WINDOWED: [&str; 2] = ["guided", "auto"];
+
+/// Where windows begin decides in which order a window's few hundred floats are added, each of which rounds by 2^-24. The
+/// largest difference seen was 1e-6 of a value, or 1.5e-8 of a dark one.
+fn alike(one: &[vec4], other: &[vec4]) -> bool {
+    one.iter()
+        .flatten()
+        .zip(other.iter().flatten())
+        .all(|(a, b)| (a - b).abs() <= 4e-6 * a.abs().max(b.abs()).max(0.02))
+}
+
 #[test]
 fn a_gpus_sizes_leave_the_bits_of_filters() {
-    let [cpu, gpu] = [Tuning::CPU, Tuning::GPU].map(tuned_gpu);
+    let same_windows = Tuning { whole_lines: true, ..Tuning::GPU };
+    let gpus = [Tuning::CPU, same_windows, Tuning::GPU].map(tuned_gpu);
     let scene = scene("cornell-box/scene.toml", "uniform");
-    for ((filter, one), (_, other)) in filtered(&cpu, &scene).into_iter().zip(filtered(&gpu, &scene)) {
-        assert!(bits(&one) == bits(&other), "{filter}");
+    let [cpu, same, gpu] = gpus.each_ref().map(|gpu| filtered(gpu, &scene));
+    for (((filter, cpu), (_, same)), (_, gpu)) in cpu.iter().zip(&same).zip(&gpu) {
+        assert!(bits(cpu) == bits(same), "{filter}");
+        assert!(bits(cpu) == bits(gpu) || WINDOWED.contains(filter) && alike(cpu, gpu), "{filter}");
     }
-    [cpu, gpu].iter().for_each(|gpu| assert_silent(gpu));
+    gpus.iter().for_each(assert_silent);
 }
 
 #[test]
