@@ -133,6 +133,15 @@ bool intersect_sphere(RaySpace r, uint index, uint instance, float t_max, bool l
     return squared >= 0.0 && t > 0.0 && t < t_max;
 }
 
+layout(constant_id = 106) const bool NATIVE_BITS = false; // instructions for bits, and none that convert integers to floats
+
+// Bytes as floats. A float of 2^23 to 2^24 has the units of its fraction, so that the byte is its lowest bits, and the difference
+// is exact.
+vec3 floats_of(uvec3 bytes) {
+    if (NATIVE_BITS) return uintBitsToFloat(bytes | 0x4b000000u) - 8388608.0;
+    return vec3(bytes);
+}
+
 // Near and far distances round at 2^-24 in four steps each; boxes that share a face must not leave a gap (Ize 2013).
 const int SLAB_ROUNDING = 8; // units in the last place
 
@@ -145,8 +154,8 @@ uint intersect_children(uint meta, uint octant, uvec3 near_q, uvec3 far_q, vec3 
     uint child_bits = (meta >> 5) & 0x07070707u;
     uint mask = 0u;
     for (int i = 0; i < 32; i += 8) {
-        ivec3 t_near = floatBitsToInt(vec3((near_q >> i) & 0xffu) * scale + origin);
-        ivec3 t_far = floatBitsToInt(vec3((far_q >> i) & 0xffu) * scale + origin);
+        ivec3 t_near = floatBitsToInt(floats_of((near_q >> i) & 0xffu) * scale + origin);
+        ivec3 t_far = floatBitsToInt(floats_of((far_q >> i) & 0xffu) * scale + origin);
         int enter = max(max(t_near.x, t_near.y), max(t_near.z, 0));
         int leave = min(min(t_far.x, t_far.y), min(t_far.z, t_max));
         mask |= enter <= leave + SLAB_ROUNDING ? ((child_bits >> i) & 0xffu) << ((bit_index >> i) & 0xffu) : 0u;
@@ -173,16 +182,22 @@ uint intersect_node(RaySpace r, uint index, float t_max, out uvec3 children) {
 }
 
 // Removes the highest of `bits`, which are below 2^24, and returns its index; 0 for no bits, see `intersect_triangles`. It reads a
-// float's exponent, since findMSB is a long sequence on lavapipe; on a GPU findMSB would be faster.
+// float's exponent, since findMSB is a long sequence on lavapipe.
 uint take_highest(inout uint bits) {
+    if (NATIVE_BITS) {
+        uint highest = uint(max(findMSB(bits), 0));
+        bits &= ~(1u << highest);
+        return highest;
+    }
     uint f = floatBitsToUint(float(int(bits)));
     bits ^= uint(int(uintBitsToFloat(f & 0xff800000u)));
     return max(f >> 23, 127u) - 127u;
 }
 
 // Number of bits set in a byte: the first product copies each to a nibble of its own, the second sums the nibbles. It replaces
-// bitCount for lavapipe; on a GPU bitCount would be faster.
+// bitCount for lavapipe.
 uint count_bits(uint byte) {
+    if (NATIVE_BITS) return uint(bitCount(byte));
     return ((((byte * 0x08040201u) >> 3) & 0x11111111u) * 0x11111111u) >> 28;
 }
 

@@ -29,6 +29,9 @@ pub struct Tuning {
     pub lines: u32,
     /// Whether lanes test the triangles of each other's rays, see `glsl/shared/deal.glsl`. Not tried on a GPU.
     pub deals: bool,
+    /// Whether traversal uses instructions that find and count bits, and makes floats of bytes without converting them, which
+    /// many GPUs do slowly. It takes lavapipe longer. Not tried on a GPU.
+    pub native_bits: bool,
     /// Longest edge of a filtered image in pixels; see `glsl/shared/loop_limit.glsl`.
     pub longest_edge: u64,
 }
@@ -44,6 +47,7 @@ impl Tuning {
         whole_lines: true,
         lines: 8,
         deals: true,
+        native_bits: false,
         longest_edge: 60_000,
     };
 
@@ -57,6 +61,7 @@ impl Tuning {
         whole_lines: false,
         lines: 32,
         deals: false,
+        native_bits: false,
         longest_edge: u64::MAX,
     };
 
@@ -87,6 +92,11 @@ impl Tuning {
     /// Constants of kernels that number their threads with `glsl/shared/thread.glsl`.
     pub fn thread(&self) -> shared::thread::Constants {
         shared::thread::Constants { workgroup: self.workgroup, stripes: self.stripes }
+    }
+
+    /// Constants of kernels that trace rays; `stack` is the depth that the scene's traversal needs.
+    pub fn traverse(&self, stack: u32) -> shared::traverse::Constants {
+        shared::traverse::Constants { stack, native_bits: self.native_bits }
     }
 }
 

@@ -88,6 +88,31 @@ fn a_gpus_sizes_leave_the_bits_of_filters() {
     gpus.iter().for_each(assert_silent);
 }
 
+/// Every switch of its own, and all together, none of which changes a bit.
+fn switches() -> Vec<(&'static str, Tuning)> {
+    vec![("native_bits", Tuning { native_bits: true, ..Tuning::CPU })]
+}
+
+#[test]
+fn switches_leave_the_bits_of_renders() {
+    let cpu = tuned_gpu(Tuning::CPU);
+    let scenes = [
+        ("cornell-box/glass.toml", "both"),
+        ("grass/scene.toml", "uniform"),
+        ("bust/scene.toml", "variance"),
+        ("moving/scene.toml", "threshold"),
+    ]
+    .map(|(file, policy)| (file, scene(file, policy)));
+    let films = scenes.each_ref().map(|(_, scene)| film(&cpu, scene));
+    for (switch, tuning) in switches() {
+        let gpu = tuned_gpu(tuning);
+        for ((file, scene), usual) in scenes.iter().zip(&films) {
+            assert!(film(&gpu, scene) == *usual, "{switch}: {file}");
+        }
+        assert_silent(&gpu);
+    }
+}
+
 #[test]
 fn sizes_that_cannot_be_are_refused() {
     for (name, tuning) in [
