@@ -210,6 +210,9 @@ struct Traversal {
     uint bottom;     // depth at which `instance` was entered
     uint instance;   // NONE in the top (or only) level
     RaySpace inside; // the ray in the space of `instance`
+    // With TRIANGLES_A_STEP, those of the last node that are still to test, as in `Leaves`, and whether no node is left.
+    uint kept_first, kept_bits, kept_instance;
+    bool last;
 };
 
 Traversal traversal_start(float t_max, uint root) {
@@ -220,6 +223,10 @@ Traversal traversal_start(float t_max, uint root) {
     t.depth = 0u;
     t.bottom = 0u;
     t.instance = NONE;
+    t.kept_first = 0u;
+    t.kept_bits = 0u;
+    t.kept_instance = NONE;
+    t.last = false;
     return t;
 }
 
@@ -331,10 +338,37 @@ bool visit_node(inout Traversal t, RaySpace world, bool on, uint root, out Leave
     return last;
 }
 
+// Most triangles that a ray tests between two nodes, 0 for all of a node's: rays that have many hold up fewer of their neighbours.
+layout(constant_id = 107) const uint TRIANGLES_A_STEP = 0u;
+
+// Removes the highest TRIANGLES_A_STEP of `bits`, and returns them.
+uint take_some(inout uint bits) {
+    uint all = bits;
+    for (uint i = 0u; i < TRIANGLES_A_STEP; i++) take_highest(bits);
+    return all ^ bits;
+}
+
+// Tests some triangles, of the last node if it has any left, else of the next. The order of tests is that of all at once.
+bool bounded_step(inout Traversal t, RaySpace world, bool any_hit, uint root, uint mask_seed, uvec2 from) {
+    if (t.kept_bits == 0u) {
+        Leaves all;
+        t.last = visit_node(t, world, true, root, all);
+        t.kept_first = all.first;
+        t.kept_bits = all.bits;
+        t.kept_instance = all.instance;
+    }
+    RaySpace ray = world;
+    if (FX_INSTANCES) ray = select_ray(t.kept_instance != NONE, t.inside, world);
+    Leaves some = Leaves(ray, t.kept_first, take_some(t.kept_bits), t.kept_instance);
+    intersect_leaves(t.hit, some, any_hit, mask_seed, from);
+    return (t.last && t.kept_bits == 0u) || (any_hit && t.hit.triangle != NONE);
+}
+
 // Visits a node and its triangles. Returns true when no node is left, or with `any_hit` when a triangle is found. `from` is the
 // triangle that the ray leaves, and its instance. That triangle, or the near side of that sphere, is not tested, since the offset
 // of the origin can be smaller than the error of the distance.
 bool traversal_step(inout Traversal t, RaySpace world, bool any_hit, uint root, uint mask_seed, uvec2 from) {
+    if (TRIANGLES_A_STEP > 0u) return bounded_step(t, world, any_hit, root, mask_seed, from);
     Leaves leaves;
     bool last = visit_node(t, world, true, root, leaves);
     intersect_leaves(t.hit, leaves, any_hit, mask_seed, from);

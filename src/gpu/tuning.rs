@@ -32,6 +32,10 @@ pub struct Tuning {
     /// Whether traversal uses instructions that find and count bits, and makes floats of bytes without converting them, which
     /// many GPUs do slowly. It takes lavapipe longer. Not tried on a GPU.
     pub native_bits: bool,
+    /// Most triangles that a ray tests before it visits its next node; 0 for all. Rays of a subgroup wait for the one with the
+    /// most triangles. Where triangles are dealt, only rays from the eye have such a limit. Not tried on a GPU, where
+    /// a simulation promised 2 the most.
+    pub triangles_a_step: u32,
     /// Longest edge of a filtered image in pixels; see `glsl/shared/loop_limit.glsl`.
     pub longest_edge: u64,
 }
@@ -48,6 +52,7 @@ impl Tuning {
         lines: 8,
         deals: true,
         native_bits: false,
+        triangles_a_step: 0,
         longest_edge: 60_000,
     };
 
@@ -62,6 +67,7 @@ impl Tuning {
         lines: 32,
         deals: false,
         native_bits: false,
+        triangles_a_step: 0,
         longest_edge: u64::MAX,
     };
 
@@ -96,7 +102,8 @@ impl Tuning {
 
     /// Constants of kernels that trace rays; `stack` is the depth that the scene's traversal needs.
     pub fn traverse(&self, stack: u32) -> shared::traverse::Constants {
-        shared::traverse::Constants { stack, native_bits: self.native_bits }
+        let Self { native_bits, triangles_a_step, .. } = *self;
+        shared::traverse::Constants { stack, native_bits, triangles_a_step }
     }
 }
 

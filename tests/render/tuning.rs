@@ -90,7 +90,12 @@ fn a_gpus_sizes_leave_the_bits_of_filters() {
 
 /// Every switch of its own, and all together, none of which changes a bit.
 fn switches() -> Vec<(&'static str, Tuning)> {
-    vec![("native_bits", Tuning { native_bits: true, ..Tuning::CPU })]
+    let own = Tuning { deals: false, ..Tuning::CPU };
+    vec![
+        ("native_bits", Tuning { native_bits: true, ..own }),
+        ("triangles_a_step", Tuning { triangles_a_step: 2, ..own }),
+        ("triangles_a_step and deals", Tuning { triangles_a_step: 1, ..Tuning::CPU }),
+    ]
 }
 
 #[test]
