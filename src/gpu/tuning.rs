@@ -36,6 +36,10 @@ pub struct Tuning {
     /// most triangles. Where triangles are dealt, only rays from the eye have such a limit. Not tried on a GPU, where
     /// a simulation promised 2 the most.
     pub triangles_a_step: u32,
+    /// Whether kernels that trace rays read storage buffers in place of texel buffers, which some GPUs read through the slower
+    /// path of textures. Where a device's kernels can bind too few of them, they keep texel buffers. A scene's arrays
+    /// may then be as large as one storage binding. Not tried on a GPU.
+    pub storage_buffers: bool,
     /// Longest edge of a filtered image in pixels; see `glsl/shared/loop_limit.glsl`.
     pub longest_edge: u64,
 }
@@ -53,6 +57,7 @@ impl Tuning {
         deals: true,
         native_bits: false,
         triangles_a_step: 0,
+        storage_buffers: false,
         longest_edge: 60_000,
     };
 
@@ -68,6 +73,7 @@ impl Tuning {
         deals: false,
         native_bits: false,
         triangles_a_step: 0,
+        storage_buffers: false,
         longest_edge: u64::MAX,
     };
 

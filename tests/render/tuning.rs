@@ -94,6 +94,8 @@ fn switches() -> Vec<(&'static str, Tuning)> {
     vec![
         ("native_bits", Tuning { native_bits: true, ..own }),
         ("triangles_a_step", Tuning { triangles_a_step: 2, ..own }),
+        ("storage_buffers", Tuning { storage_buffers: true, ..own }),
+        ("storage_buffers and deals", Tuning { storage_buffers: true, ..Tuning::CPU }),
         ("triangles_a_step and deals", Tuning { triangles_a_step: 1, ..Tuning::CPU }),
     ]
 }
