@@ -40,6 +40,9 @@ pub struct Tuning {
     /// path of textures. Where a device's kernels can bind too few of them, they keep texel buffers. A scene's arrays
     /// may then be as large as one storage binding. Not tried on a GPU.
     pub storage_buffers: bool,
+    /// Threads in a workgroup of a filter that looks at pixels around its own, all in one row. In larger ones neighbours share
+    /// more of what they read, which a GPU may gain from; not tried on one.
+    pub filter_workgroup: u32,
     /// Longest edge of a filtered image in pixels; see `glsl/shared/loop_limit.glsl`.
     pub longest_edge: u64,
 }
@@ -58,6 +61,7 @@ impl Tuning {
         native_bits: false,
         triangles_a_step: 0,
         storage_buffers: false,
+        filter_workgroup: 32,
         longest_edge: 60_000,
     };
 
@@ -74,13 +78,24 @@ impl Tuning {
         native_bits: false,
         triangles_a_step: 0,
         storage_buffers: false,
+        filter_workgroup: 32,
         longest_edge: u64::MAX,
     };
 
     /// # Errors
     /// [`Error::Usage`] naming a size that cannot be.
     pub(super) fn check(self) -> Result<Self> {
-        let Self { workgroup, stripes, paths_in_flight, thread_items, strip_bytes, lines, longest_edge, .. } = self;
+        let Self {
+            workgroup,
+            stripes,
+            paths_in_flight,
+            thread_items,
+            strip_bytes,
+            lines,
+            filter_workgroup,
+            longest_edge,
+            ..
+        } = self;
         let sizes = [
             ("workgroup", workgroup.into()),
             ("stripes", stripes.into()),
@@ -88,6 +103,7 @@ impl Tuning {
             ("thread_items", thread_items.into()),
             ("strip_bytes", strip_bytes),
             ("lines", lines.into()),
+            ("filter_workgroup", filter_workgroup.into()),
             ("longest_edge", longest_edge),
         ];
         match sizes.iter().find(|(_, size)| *size == 0) {
@@ -104,6 +120,11 @@ impl Tuning {
     /// Constants of kernels that number their threads with `glsl/shared/thread.glsl`.
     pub fn thread(&self) -> shared::thread::Constants {
         shared::thread::Constants { workgroup: self.workgroup, stripes: self.stripes }
+    }
+
+    /// Constants of filters that number their threads with `glsl/shared/filter_thread.glsl`.
+    pub fn filter_thread(&self) -> shared::filter_thread::Constants {
+        shared::filter_thread::Constants { workgroup: self.filter_workgroup }
     }
 
     /// Constants of kernels that trace rays; `stack` is the depth that the scene's traversal needs.

@@ -88,6 +88,20 @@ fn a_gpus_sizes_leave_the_bits_of_filters() {
     gpus.iter().for_each(assert_silent);
 }
 
+#[test]
+fn workgroups_leave_the_bits_of_filters() {
+    let scene = scene("cornell-box/scene.toml", "uniform");
+    let [usual, others @ ..] = [32, 64, 256].map(|filter_workgroup| {
+        let gpu = tuned_gpu(Tuning { filter_workgroup, ..Tuning::CPU });
+        let pictures = filtered(&gpu, &scene);
+        assert_silent(&gpu);
+        pictures
+    });
+    for ((filter, usual), (_, other)) in others.iter().flat_map(|other| usual.iter().zip(other)) {
+        assert!(bits(usual) == bits(other), "{filter}");
+    }
+}
+
 /// Every switch of its own, and all together, none of which changes a bit.
 fn switches() -> Vec<(&'static str, Tuning)> {
     let own = Tuning { deals: false, ..Tuning::CPU };
