@@ -60,7 +60,7 @@ const RAY_QUERY: &str = "RAY_QUERY";
 
 /// Kernels that include it are compiled once more with storage buffers in place of texel buffers, for devices that read those
 /// sooner.
-const TRACES: &str = "glsl/shared/traverse.glsl";
+const TRACES: &str = "glsl/shared/trace.glsl";
 
 fn main() {
     if let Err(error) = build() {

@@ -340,6 +340,7 @@ bool visit_node(inout Traversal t, RaySpace world, bool on, uint root, out Leave
 
 // Most triangles that a ray tests between two nodes, 0 for all of a node's: rays that have many hold up fewer of their neighbours.
 layout(constant_id = 107) const uint TRIANGLES_A_STEP = 0u;
+const bool BOUNDED = TRIANGLES_A_STEP > 0u;
 
 // Removes the highest TRIANGLES_A_STEP of `bits`, and returns them.
 uint take_some(inout uint bits) {
@@ -348,29 +349,32 @@ uint take_some(inout uint bits) {
     return all ^ bits;
 }
 
-// Tests some triangles, of the last node if it has any left, else of the next. The order of tests is that of all at once.
-bool bounded_step(inout Traversal t, RaySpace world, bool any_hit, uint root, uint mask_seed, uvec2 from) {
-    if (t.kept_bits == 0u) {
-        Leaves all;
-        t.last = visit_node(t, world, true, root, all);
-        t.kept_first = all.first;
-        t.kept_bits = all.bits;
-        t.kept_instance = all.instance;
+// The triangles to test now, of those kept; where the step has `visited` a node, `found` are kept first. The order of tests is that of
+// all at once.
+Leaves some_leaves(inout Traversal t, RaySpace world, bool visited, Leaves found) {
+    if (visited) {
+        t.kept_first = found.first;
+        t.kept_bits = found.bits;
+        t.kept_instance = found.instance;
     }
     RaySpace ray = world;
     if (FX_INSTANCES) ray = select_ray(t.kept_instance != NONE, t.inside, world);
-    Leaves some = Leaves(ray, t.kept_first, take_some(t.kept_bits), t.kept_instance);
-    intersect_leaves(t.hit, some, any_hit, mask_seed, from);
-    return (t.last && t.kept_bits == 0u) || (any_hit && t.hit.triangle != NONE);
+    return Leaves(ray, t.kept_first, take_some(t.kept_bits), t.kept_instance);
 }
 
-// Visits a node and its triangles. Returns true when no node is left, or with `any_hit` when a triangle is found. `from` is the
-// triangle that the ray leaves, and its instance. That triangle, or the near side of that sphere, is not tested, since the offset
-// of the origin can be smaller than the error of the distance.
+// Visits a node and its triangles, or goes on with those of the last. Returns true when nothing is left, or with `any_hit` when a
+// triangle is found. `from` is the triangle that the ray leaves, and its instance. That triangle, or the near side of that sphere,
+// is not tested, since the offset of the origin can be smaller than the error of the distance.
 bool traversal_step(inout Traversal t, RaySpace world, bool any_hit, uint root, uint mask_seed, uvec2 from) {
-    if (TRIANGLES_A_STEP > 0u) return bounded_step(t, world, any_hit, root, mask_seed, from);
     Leaves leaves;
-    bool last = visit_node(t, world, true, root, leaves);
+    bool visits = true, last = false;
+    if (BOUNDED) visits = t.kept_bits == 0u;
+    if (visits) last = visit_node(t, world, true, root, leaves);
+    if (BOUNDED) {
+        if (visits) t.last = last;
+        leaves = some_leaves(t, world, visits, leaves);
+        last = t.last && t.kept_bits == 0u;
+    }
     intersect_leaves(t.hit, leaves, any_hit, mask_seed, from);
     return last || (any_hit && t.hit.triangle != NONE);
 }
