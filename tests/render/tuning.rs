@@ -102,7 +102,7 @@ fn workgroups_leave_the_bits_of_filters() {
     }
 }
 
-/// Every switch of its own, and all together, none of which changes a bit.
+/// Every switch of traversal by itself, and all together, none of which changes a bit.
 fn switches() -> Vec<(&'static str, Tuning)> {
     let own = Tuning { deals: false, ..Tuning::CPU };
     vec![
@@ -111,6 +111,7 @@ fn switches() -> Vec<(&'static str, Tuning)> {
         ("storage_buffers", Tuning { storage_buffers: true, ..own }),
         ("storage_buffers and deals", Tuning { storage_buffers: true, ..Tuning::CPU }),
         ("triangles_a_step and deals", Tuning { triangles_a_step: 1, ..Tuning::CPU }),
+        ("all", Tuning { native_bits: true, triangles_a_step: 2, storage_buffers: true, ..Tuning::GPU }),
     ]
 }
 
@@ -140,6 +141,7 @@ fn sizes_that_cannot_be_are_refused() {
         ("workgroup", Tuning { workgroup: 0, ..Tuning::GPU }),
         ("thread_items", Tuning { thread_items: 0, ..Tuning::CPU }),
         ("lines", Tuning { lines: 0, ..Tuning::GPU }),
+        ("filter_workgroup", Tuning { filter_workgroup: 0, ..Tuning::GPU }),
     ] {
         let refused = Gpu::open(&DeviceOptions { tuning: Some(tuning), ..DeviceOptions::default() }).err();
         assert!(matches!(&refused, Some(Error::Usage(why)) if why.contains(name)), "{refused:?}");
