@@ -138,8 +138,10 @@ layout(constant_id = 106) const bool NATIVE_BITS = false; // instructions for bi
 // Bytes as floats. A float of 2^23 to 2^24 has the units of its fraction, so that the byte is its lowest bits, and the difference
 // is exact.
 vec3 floats_of(uvec3 bytes) {
-    if (NATIVE_BITS) return uintBitsToFloat(bytes | 0x4b000000u) - 8388608.0;
-    return vec3(bytes);
+    vec3 floats;
+    if (NATIVE_BITS) floats = uintBitsToFloat(bytes | 0x4b000000u) - 8388608.0;
+    else floats = vec3(bytes);
+    return floats;
 }
 
 // Near and far distances round at 2^-24 in four steps each; boxes that share a face must not leave a gap (Ize 2013).
@@ -184,21 +186,25 @@ uint intersect_node(RaySpace r, uint index, float t_max, out uvec3 children) {
 // Removes the highest of `bits`, which are below 2^24, and returns its index; 0 for no bits, see `intersect_triangles`. It reads a
 // float's exponent, since findMSB is a long sequence on lavapipe.
 uint take_highest(inout uint bits) {
+    uint highest;
     if (NATIVE_BITS) {
-        uint highest = uint(max(findMSB(bits), 0));
+        highest = uint(max(findMSB(bits), 0));
         bits &= ~(1u << highest);
-        return highest;
+    } else {
+        uint f = floatBitsToUint(float(int(bits)));
+        bits ^= uint(int(uintBitsToFloat(f & 0xff800000u)));
+        highest = max(f >> 23, 127u) - 127u;
     }
-    uint f = floatBitsToUint(float(int(bits)));
-    bits ^= uint(int(uintBitsToFloat(f & 0xff800000u)));
-    return max(f >> 23, 127u) - 127u;
+    return highest;
 }
 
 // Number of bits set in a byte: the first product copies each to a nibble of its own, the second sums the nibbles. It replaces
 // bitCount for lavapipe.
 uint count_bits(uint byte) {
-    if (NATIVE_BITS) return uint(bitCount(byte));
-    return ((((byte * 0x08040201u) >> 3) & 0x11111111u) * 0x11111111u) >> 28;
+    uint count;
+    if (NATIVE_BITS) count = uint(bitCount(byte));
+    else count = ((((byte * 0x08040201u) >> 3) & 0x11111111u) * 0x11111111u) >> 28;
+    return count;
 }
 
 // The state of a ray's traversal between two steps.

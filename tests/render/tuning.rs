@@ -90,7 +90,8 @@ fn a_gpus_sizes_leave_the_bits_of_filters() {
 
 #[test]
 fn workgroups_leave_the_bits_of_filters() {
-    let scene = scene("cornell-box/scene.toml", "uniform");
+    let large = |s: &mut Settings| (s.width, s.height, s.spp) = (300, 300, 1); // two of the largest in a row
+    let scene = scene("cornell-box/scene.toml", "uniform").with(large);
     let [usual, others @ ..] = [32, 64, 256].map(|filter_workgroup| {
         let gpu = tuned_gpu(Tuning { filter_workgroup, ..Tuning::CPU });
         let pictures = filtered(&gpu, &scene);
