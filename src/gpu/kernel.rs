@@ -164,7 +164,7 @@ pub struct Kernel<B> {
     pub(super) pipeline: Arc<Pipeline>,
     pub(super) spirv: &'static [u8],
     /// One for each buffer of `B`.
-    pub(super) slots: Vec<Slot>,
+    pub(super) slots: Box<[Slot]>,
     pub(super) constants: Arc<[(u32, u32)]>,
     compile_time: Duration,
     pub(super) local_size: [u32; 2],
@@ -225,7 +225,7 @@ impl<B: Bindings> Kernel<B> {
 /// A form of a kernel.
 struct Form {
     spirv: &'static [u8],
-    slots: Vec<Slot>,
+    slots: Box<[Slot]>,
     /// The binding of what rays are traced through, if they are traced by ray queries.
     world: Option<u32>,
 }
@@ -233,7 +233,7 @@ struct Form {
 /// The form that a device runs of a kernel. It has no storage buffers for texel buffers where they would be too many.
 fn form<B: Bindings>(gpu: &Gpu) -> Form {
     if let Some(code) = B::RAY_QUERY.filter(|_| gpu.traces_by_ray_query()) {
-        return Form { spirv: code.spirv, slots: B::SLOTS.to_vec(), world: Some(code.binding) };
+        return Form { spirv: code.spirv, slots: B::SLOTS.into(), world: Some(code.binding) };
     }
     let shuffles = gpu.info().subgroup_shuffle;
     let room = gpu.0.limits.max_per_stage_descriptor_storage_buffers as usize;
@@ -241,7 +241,7 @@ fn form<B: Bindings>(gpu: &Gpu) -> Form {
     if let Some(spirv) = B::STORAGE_SPIRV.filter(|_| fits) {
         return Form { spirv, slots: B::SLOTS.iter().map(|slot| slot.without_texels()).collect(), world: None };
     }
-    Form { spirv: if shuffles { B::SPIRV } else { B::PLAIN_SPIRV }, slots: B::SLOTS.to_vec(), world: None }
+    Form { spirv: if shuffles { B::SPIRV } else { B::PLAIN_SPIRV }, slots: B::SLOTS.into(), world: None }
 }
 
 /// Returns the pipeline of `recipe`, which is compiled if the device does not have it.

@@ -1,5 +1,4 @@
 //! Sizes into which work is divided, for CPUs and for GPUs. Every such choice is made here, with its reason.
-use super::Gpu;
 use super::info::DeviceKind;
 use crate::error::{Error, Result};
 use crate::shaders::shared;
@@ -30,15 +29,16 @@ pub struct Tuning {
     /// Whether lanes test the triangles of each other's rays, see `glsl/shared/deal.glsl`. Not tried on a GPU.
     pub deals: bool,
     /// Whether traversal uses instructions that find and count bits, and makes floats of bytes without converting them, which
-    /// many GPUs do slowly. It takes lavapipe longer. Not tried on a GPU.
+    /// many GPUs do slowly. lavapipe takes as long. Not tried on a GPU.
     pub native_bits: bool,
     /// Most triangles that a ray tests before it visits its next node; 0 for all. Rays of a subgroup wait for the one with the
-    /// most triangles. Where triangles are dealt, only rays from the eye have such a limit. Not tried on a GPU, where
-    /// a simulation promised 2 the most.
+    /// most triangles. Where triangles are dealt, only rays from the eye have such a limit. With 2 paths in the Cornell box
+    /// take lavapipe a quarter longer. Not tried on a GPU; in a simulation of one, incoherent rays gained most from 2.
     pub triangles_a_step: u32,
     /// Whether kernels that trace rays read storage buffers in place of texel buffers, which some GPUs read through the slower
-    /// path of textures. Where a device's kernels can bind too few of them, they keep texel buffers. A scene's arrays
-    /// may then be as large as one storage binding. Not tried on a GPU.
+    /// path of textures. An array of a scene can then have at most the bytes of one storage binding. Devices whose kernels can
+    /// bind too few of them, and those that trace by ray queries, keep texel buffers. lavapipe takes twice as long. Not tried
+    /// on a GPU.
     pub storage_buffers: bool,
     /// Threads in a workgroup of a filter that looks at pixels around its own, all in one row. In larger ones neighbours share
     /// more of what they read, which a GPU may gain from; not tried on one.
@@ -85,26 +85,15 @@ impl Tuning {
     /// # Errors
     /// [`Error::Usage`] naming a size that cannot be.
     pub(super) fn check(self) -> Result<Self> {
-        let Self {
-            workgroup,
-            stripes,
-            paths_in_flight,
-            thread_items,
-            strip_bytes,
-            lines,
-            filter_workgroup,
-            longest_edge,
-            ..
-        } = self;
         let sizes = [
-            ("workgroup", workgroup.into()),
-            ("stripes", stripes.into()),
-            ("paths_in_flight", paths_in_flight),
-            ("thread_items", thread_items.into()),
-            ("strip_bytes", strip_bytes),
-            ("lines", lines.into()),
-            ("filter_workgroup", filter_workgroup.into()),
-            ("longest_edge", longest_edge),
+            ("workgroup", self.workgroup.into()),
+            ("stripes", self.stripes.into()),
+            ("paths_in_flight", self.paths_in_flight),
+            ("thread_items", self.thread_items.into()),
+            ("strip_bytes", self.strip_bytes),
+            ("lines", self.lines.into()),
+            ("filter_workgroup", self.filter_workgroup.into()),
+            ("longest_edge", self.longest_edge),
         ];
         match sizes.iter().find(|(_, size)| *size == 0) {
             Some((name, _)) => Err(Error::Usage(format!("tuning: {name} is 0: choose at least 1"))),
@@ -131,21 +120,5 @@ impl Tuning {
     pub fn traverse(&self, stack: u32) -> shared::traverse::Constants {
         let Self { native_bits, triangles_a_step, .. } = *self;
         shared::traverse::Constants { stack, native_bits, triangles_a_step }
-    }
-}
-
-impl Gpu {
-    /// Among how many lanes kernels deal triangles; none where they do not.
-    pub fn deal(&self) -> shared::deal::Constants {
-        let (info, tuning) = (self.info(), self.tuning());
-        let lanes = info.subgroup_size;
-        let whole =
-            info.subgroup_size_fixed && matches!(lanes, 4 | 8 | 16 | 32) && tuning.workgroup.is_multiple_of(lanes);
-        shared::deal::Constants { lanes: if tuning.deals && info.subgroup_shuffle && whole { lanes } else { 0 } }
-    }
-
-    /// The sizes into which work is divided: see [`DeviceOptions::tuning`](super::DeviceOptions::tuning).
-    pub fn tuning(&self) -> &Tuning {
-        &self.0.tuning
     }
 }

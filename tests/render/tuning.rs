@@ -60,7 +60,7 @@ fn a_gpus_sizes_leave_the_bits_of_renders() {
         let scene = scene(file, policy);
         assert!(film(&cpu, &scene) == film(&gpu, &scene), "{file}, {policy}");
     }
-    [cpu, gpu].iter().for_each(|gpu| assert_silent(gpu));
+    [cpu, gpu].iter().for_each(assert_silent);
 }
 
 /// Filters with windows that [`Tuning::whole_lines`] lets begin elsewhere.
