@@ -58,6 +58,10 @@ const PLAIN: &str = "NO_SHUFFLE";
 /// Likewise, for devices that trace rays by ray queries. Lanes then have no triangles to deal to each other.
 const RAY_QUERY: &str = "RAY_QUERY";
 
+/// Kernels that include it are compiled once more with storage buffers in place of texel buffers, for devices that read those
+/// sooner.
+const TRACES: &str = "glsl/shared/trace.glsl";
+
 fn main() {
     if let Err(error) = build() {
         eprintln!("{error:#}");
@@ -114,6 +118,8 @@ struct Kernel<'a> {
     plain: Option<Code<'a>>,
     /// That for devices that trace rays by ray queries, if it traces any.
     ray_query: Option<Code<'a>>,
+    /// The usual one with storage buffers in place of texel buffers, if it traces rays.
+    storage: Option<Code<'a>>,
 }
 
 struct Code<'a> {
@@ -128,19 +134,23 @@ impl<'a> Kernel<'a> {
         let (text, sources) = preprocess(file)?;
         let interface = Interface::of(&sources)?;
         let text = structs::glsl(&interface.bindings) + &text;
-        let code = |defines: &str| {
-            let whole = [HEADER, defines, &text].concat();
+        let code = |defines: &str, text: &str| {
+            let whole = [HEADER, defines, text].concat();
             let binary = compiled.join(format!("{name}-{:016x}.spv", xxh3_64(whole.as_bytes())));
             Code { file, whole, binary }
         };
-        let defining = |names: &[&str]| code(&names.iter().map(|name| format!("#define {name}\n")).collect::<String>());
+        let define = |name: &&str| format!("#define {name}\n");
+        let defining = |names: &[&str]| code(&names.iter().map(define).collect::<String>(), &text);
         let plain = text.contains(PLAIN).then(|| defining(&[PLAIN]));
         let ray_query = text.contains(RAY_QUERY).then(|| defining(&[RAY_QUERY, PLAIN]));
-        Ok(Self { name, file, usual: code(""), plain, ray_query, interface })
+        let traces = sources.iter().any(|(file, _)| file == TRACES);
+        let storage = traces.then(|| code("", &structs::storage_form(&text)));
+        Ok(Self { name, file, usual: code("", &text), plain, ray_query, storage, interface })
     }
 
     fn code(&self) -> impl Iterator<Item = &Code<'a>> {
-        [Some(&self.usual), self.plain.as_ref(), self.ray_query.as_ref()].into_iter().flatten()
+        let more = [&self.plain, &self.ray_query, &self.storage];
+        [&self.usual].into_iter().chain(more.into_iter().flatten())
     }
 }
 
@@ -179,11 +189,12 @@ fn generate(files: &[PathBuf], root: &str, target: &Path) -> Result<()> {
         for compiled in kernel.code() {
             hash.update(&fs::read(&compiled.binary)?);
         }
-        let Kernel { name, file, interface, usual, plain, ray_query } = kernel;
+        let Kernel { name, file, interface, usual, plain, ray_query, storage } = kernel;
         let binaries = Binaries {
             usual: &usual.binary,
             plain: &plain.as_ref().unwrap_or(usual).binary,
             ray_query: ray_query.as_ref().map(|code| &*code.binary),
+            storage: storage.as_ref().map(|code| &*code.binary),
         };
         code += &emit::module(name, file, interface, root, &binaries)?;
         groups.extend(interface.groups().into_iter().map(|group| (group.clone(), declared(interface, group))));

@@ -1,11 +1,11 @@
 #include "shared/edge.glsl"
 #include "shared/atrous_taps.glsl"
 #include "shared/luminance.glsl"
+#include "shared/filter_thread.glsl"
 
 // Filters by one level of A-Trous wavelets whose luminance weight is relative to the pixel's standard deviation (Schied et al.
 // 2017, section 4.4). It filters the variance (w) too; the last level writes the number of samples in its place. A thread filters
 // ROWS pixels of a column.
-layout(local_size_x = 32) in;
 layout(binding = 0) uniform samplerBuffer estimate; // of vec4
 layout(binding = 1) uniform usamplerBuffer place; // of uvec4
 layout(binding = 2) uniform samplerBuffer colour; // of vec4

@@ -9,12 +9,19 @@ struct LightSample {
 
 const float INFINITE_DISTANCE = 3e38; // stands for the distance of lights at infinity
 
-// Chooses an entry of an alias table by the word `random`, and replaces that by its position within the entry's share of the
-// slot: a word independent of the choice and as well stratified. A hash fills up the bits that the choice used.
-uint alias_choose(usamplerBuffer table, uint n, inout uint random) {
+// The slot of an alias table of `n` that the word `random` chooses.
+uint alias_slot(uint n, uint random) {
     uint slot, low;
     umulExtended(random, n, slot, low);
-    AliasEntry entry = AliasEntry_load(table, slot);
+    return slot;
+}
+
+// Chooses the slot that `random` does or its alias, where `entry` is that slot's. Replaces `random` by its position within the
+// choice's share of the slot: a word independent of the choice and as well stratified. A hash fills up the bits that the
+// choice used.
+uint alias_choose(AliasEntry entry, uint n, inout uint random) {
+    uint slot, low;
+    umulExtended(random, n, slot, low);
     bool stays = low < entry.threshold;
     uint hash = pcg(random);
     float into = float(stays ? low : low - entry.threshold) + float(hash) * (float(n) / 4294967296.0);
@@ -81,7 +88,8 @@ void sample_environment(uint light, float chosen, uint word, vec2 u, inout Light
         s.pdf = chosen * (0.25 / PI);
     } else {
         uvec2 size = environment_extent();
-        uint texel = alias_choose(environment_table, size.x * size.y, word);
+        uint count = size.x * size.y;
+        uint texel = alias_choose(AliasEntry_load(environment_table, alias_slot(count, word)), count, word);
         vec2 uv = (vec2(texel % size.x, texel / size.x) + u) / vec2(size);
         float phi = 2.0 * PI * uv.x, theta = PI * uv.y;
         float sine = sin(theta);
@@ -196,7 +204,8 @@ void sample_sphere_light(vec3 p, Light light, vec2 u, inout LightSample s) {
 // Samples one light for the surface point `p`. The radiance is 0 when the light cannot reach the point.
 LightSample light_sample(vec3 p, uint word, vec2 u) {
     LightSample s = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0);
-    uint index = push.constants.light_count == 1u ? 0u : alias_choose(light_table, push.constants.light_count, word);
+    uint count = push.constants.light_count, index = 0u;
+    if (count != 1u) index = alias_choose(AliasEntry_load(light_table, alias_slot(count, word)), count, word);
     Light light = Light_load(lights, index);
     if (FX_EMISSIVE && light.kind == LIGHT_TRIANGLE) {
         sample_triangle_light(p, light, u, s);

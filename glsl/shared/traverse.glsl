@@ -133,6 +133,17 @@ bool intersect_sphere(RaySpace r, uint index, uint instance, float t_max, bool l
     return squared >= 0.0 && t > 0.0 && t < t_max;
 }
 
+layout(constant_id = 106) const bool NATIVE_BITS = false; // instructions for bits, and none that convert integers to floats
+
+// Bytes as floats. A float of 2^23 to 2^24 has the units of its fraction, so that the byte is its lowest bits, and the difference
+// is exact.
+vec3 floats_of(uvec3 bytes) {
+    vec3 floats;
+    if (NATIVE_BITS) floats = uintBitsToFloat(bytes | 0x4b000000u) - 8388608.0;
+    else floats = vec3(bytes);
+    return floats;
+}
+
 // Near and far distances round at 2^-24 in four steps each; boxes that share a face must not leave a gap (Ize 2013).
 const int SLAB_ROUNDING = 8; // units in the last place
 
@@ -145,8 +156,8 @@ uint intersect_children(uint meta, uint octant, uvec3 near_q, uvec3 far_q, vec3 
     uint child_bits = (meta >> 5) & 0x07070707u;
     uint mask = 0u;
     for (int i = 0; i < 32; i += 8) {
-        ivec3 t_near = floatBitsToInt(vec3((near_q >> i) & 0xffu) * scale + origin);
-        ivec3 t_far = floatBitsToInt(vec3((far_q >> i) & 0xffu) * scale + origin);
+        ivec3 t_near = floatBitsToInt(floats_of((near_q >> i) & 0xffu) * scale + origin);
+        ivec3 t_far = floatBitsToInt(floats_of((far_q >> i) & 0xffu) * scale + origin);
         int enter = max(max(t_near.x, t_near.y), max(t_near.z, 0));
         int leave = min(min(t_far.x, t_far.y), min(t_far.z, t_max));
         mask |= enter <= leave + SLAB_ROUNDING ? ((child_bits >> i) & 0xffu) << ((bit_index >> i) & 0xffu) : 0u;
@@ -173,17 +184,27 @@ uint intersect_node(RaySpace r, uint index, float t_max, out uvec3 children) {
 }
 
 // Removes the highest of `bits`, which are below 2^24, and returns its index; 0 for no bits, see `intersect_triangles`. It reads a
-// float's exponent, since findMSB is a long sequence on lavapipe; on a GPU findMSB would be faster.
+// float's exponent, since findMSB is a long sequence on lavapipe.
 uint take_highest(inout uint bits) {
-    uint f = floatBitsToUint(float(int(bits)));
-    bits ^= uint(int(uintBitsToFloat(f & 0xff800000u)));
-    return max(f >> 23, 127u) - 127u;
+    uint highest;
+    if (NATIVE_BITS) {
+        highest = uint(max(findMSB(bits), 0));
+        bits &= ~(1u << highest);
+    } else {
+        uint f = floatBitsToUint(float(int(bits)));
+        bits ^= uint(int(uintBitsToFloat(f & 0xff800000u)));
+        highest = max(f >> 23, 127u) - 127u;
+    }
+    return highest;
 }
 
 // Number of bits set in a byte: the first product copies each to a nibble of its own, the second sums the nibbles. It replaces
-// bitCount for lavapipe; on a GPU bitCount would be faster.
+// bitCount for lavapipe.
 uint count_bits(uint byte) {
-    return ((((byte * 0x08040201u) >> 3) & 0x11111111u) * 0x11111111u) >> 28;
+    uint count;
+    if (NATIVE_BITS) count = uint(bitCount(byte));
+    else count = ((((byte * 0x08040201u) >> 3) & 0x11111111u) * 0x11111111u) >> 28;
+    return count;
 }
 
 // The state of a ray's traversal between two steps.
@@ -195,6 +216,9 @@ struct Traversal {
     uint bottom;     // depth at which `instance` was entered
     uint instance;   // NONE in the top (or only) level
     RaySpace inside; // the ray in the space of `instance`
+    // With TRIANGLES_A_STEP, those of the last node that are still to test, as in `Leaves`, and whether no node is left.
+    uint kept_first, kept_bits, kept_instance;
+    bool last;
 };
 
 Traversal traversal_start(float t_max, uint root) {
@@ -205,6 +229,10 @@ Traversal traversal_start(float t_max, uint root) {
     t.depth = 0u;
     t.bottom = 0u;
     t.instance = NONE;
+    t.kept_first = 0u;
+    t.kept_bits = 0u;
+    t.kept_instance = NONE;
+    t.last = false;
     return t;
 }
 
@@ -317,14 +345,47 @@ bool visit_node(inout Traversal t, RaySpace world, bool on, uint root, out Leave
     return last;
 }
 
-// Visits a node and its triangles. Returns true when no node is left, or with `any_hit` when a triangle is found. `from` is the
-// triangle that the ray leaves, and its instance. That triangle, or the near side of that sphere, is not tested, since the offset
-// of the origin can be smaller than the error of the distance.
+// Most triangles that a ray tests between two nodes, 0 for all of a node's: rays that have many hold up fewer of their neighbours.
+layout(constant_id = 107) const uint TRIANGLES_A_STEP = 0u;
+const bool BOUNDED = TRIANGLES_A_STEP > 0u;
+
+// Removes the highest TRIANGLES_A_STEP of `bits`, and returns them.
+uint take_some(inout uint bits) {
+    uint all = bits;
+    for (uint i = 0u; i < TRIANGLES_A_STEP; i++) take_highest(bits);
+    return all ^ bits;
+}
+
+// The triangles to test now, of those kept; where the step has `visited` a node, `found` are kept first. The order of tests is that of
+// all at once.
+Leaves some_leaves(inout Traversal t, RaySpace world, bool visited, Leaves found) {
+    if (visited) {
+        t.kept_first = found.first;
+        t.kept_bits = found.bits;
+        t.kept_instance = found.instance;
+    }
+    RaySpace ray = world;
+    if (FX_INSTANCES) ray = select_ray(t.kept_instance != NONE, t.inside, world);
+    return Leaves(ray, t.kept_first, take_some(t.kept_bits), t.kept_instance);
+}
+
+// Visits a node and its triangles, or goes on with those of the last. Returns true when nothing is left, or with `any_hit` when a
+// triangle is found. `from` is the triangle that the ray leaves, and its instance. That triangle, or the near side of that sphere,
+// is not tested, since the offset of the origin can be smaller than the error of the distance.
 bool traversal_step(inout Traversal t, RaySpace world, bool any_hit, uint root, uint mask_seed, uvec2 from) {
     Leaves leaves;
     uvec2 met;
-    bool last = visit_node(t, world, true, root, leaves, met);
-    if (FX_INSTANCES && met.y != 0u) enter_instance(t, world, met);
+    bool visits = true, last = false;
+    if (BOUNDED) visits = t.kept_bits == 0u;
+    if (visits) {
+        last = visit_node(t, world, true, root, leaves, met);
+        if (FX_INSTANCES && met.y != 0u) enter_instance(t, world, met);
+    }
+    if (BOUNDED) {
+        if (visits) t.last = last;
+        leaves = some_leaves(t, world, visits, leaves);
+        last = t.last && t.kept_bits == 0u;
+    }
     intersect_leaves(t.hit, leaves, any_hit, mask_seed, from);
     return last || (any_hit && t.hit.triangle != NONE);
 }

@@ -65,6 +65,7 @@ impl Common {
             cache: gpu::cache_folder(),
             wait_limit: None,
             tracing,
+            tuning: None,
         })
     }
 

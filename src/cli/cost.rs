@@ -111,6 +111,7 @@ fn open(args: &Args) -> Result<Gpu> {
         cache: gpu::cache_folder(),
         wait_limit: None,
         tracing: Tracing::Auto,
+        tuning: None,
     })
 }
 

@@ -6,6 +6,7 @@ use super::info::{self, Candidate, DeviceInfo, DeviceKind, Features};
 use super::instance::{Instance, Messages};
 use super::pipelines::Pipelines;
 use super::ray_query::{self, RayFeatures, RayQueries, Tracing};
+use super::tuning::Tuning;
 use crate::error::{Error, Result};
 use ash::vk::Handle;
 use ash::{ext, vk};
@@ -38,6 +39,8 @@ pub struct DeviceOptions {
     pub wait_limit: Option<Duration>,
     /// Who finds what rays meet.
     pub tracing: Tracing,
+    /// Sizes into which work is divided. `None` takes [`Tuning::CPU`] or [`Tuning::GPU`] by the kind of the device.
+    pub tuning: Option<Tuning>,
 }
 
 /// An open device. Clones share it. It closes when the last clone, buffer, kernel and frame made with it is dropped.
@@ -54,6 +57,7 @@ pub(super) struct Inner {
     pub pipelines: Pipelines,
     pub debug: Option<ext::debug_utils::Device>,
     pub info: DeviceInfo,
+    pub tuning: Tuning,
     pub calibrated: Option<CalibratedClock>,
     /// `None` where rays are traced by compute kernels alone.
     pub ray_queries: Option<RayQueries>,
@@ -79,6 +83,7 @@ pub(super) struct Opened {
     pub debug: Option<ext::debug_utils::Device>,
     pub calibrated: Option<CalibratedClock>,
     pub ray_queries: Option<RayQueries>,
+    pub tuning: Tuning,
 }
 
 impl Gpu {
@@ -86,11 +91,12 @@ impl Gpu {
     ///
     /// # Errors
     /// [`Error::Device`] naming the remedy: no loader, no driver, no device of that name, a required feature is
-    /// missing, ray queries or the validation layers are asked for and not there.
+    /// missing, ray queries or the validation layers are asked for and not there. [`Error::Usage`] for a tuning that cannot be.
     pub fn open(options: &DeviceOptions) -> Result<Self> {
         let instance = Instance::new(options.validation)?;
         let candidate = choose(info::candidates(&instance.raw)?, options.device.as_deref())?;
         let queue_family = usable(&candidate)?;
+        let tuning = options.tuning.unwrap_or(Tuning::of(candidate.info.kind)).check()?;
         let by_ray_query = is_by_ray_query(options.tracing, &candidate.info)?;
         let calibrated = calibrated::offered(&instance, candidate.physical)?;
         let alone = one_at_a_time();
@@ -101,13 +107,15 @@ impl Gpu {
         drop(alone);
         // SAFETY: the device was made with one queue of this family.
         let queue = unsafe { device.get_device_queue(queue_family, 0) };
-        let opened = Opened { instance, candidate, queue_family, device, queue, debug, calibrated, ray_queries };
+        let opened =
+            Opened { instance, candidate, queue_family, device, queue, debug, calibrated, ray_queries, tuning };
         Self::assemble(opened, options.cache.clone(), options.wait_limit)
     }
 
     /// Puts the parts together. On failure an owned device is destroyed.
     pub(super) fn assemble(opened: Opened, cache: Option<PathBuf>, wait_limit: Option<Duration>) -> Result<Self> {
-        let Opened { instance, candidate, queue_family, device, queue, debug, calibrated, ray_queries } = opened;
+        let Opened { instance, candidate, queue_family, device, queue, debug, calibrated, ray_queries, tuning } =
+            opened;
         let limit =
             wait_limit.unwrap_or(if candidate.info.kind == DeviceKind::Cpu { Duration::MAX } else { WAIT_LIMIT });
         // From here on, Drop cleans up if a line below fails.
@@ -119,6 +127,7 @@ impl Gpu {
             pipelines: Pipelines::default(),
             debug,
             info: candidate.info.clone(),
+            tuning,
             calibrated,
             ray_queries,
             queue: Mutex::new(queue),

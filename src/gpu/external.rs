@@ -5,6 +5,7 @@ use super::calibrated::{CalibratedClock, CalibratedExtension};
 use super::device::{Opened, one_at_a_time, usable};
 use super::info;
 use super::instance::Instance;
+use super::tuning::Tuning;
 use crate::error::{Error, Result};
 use ash::vk::Handle;
 use ash::{ext, vk};
@@ -86,8 +87,9 @@ impl Gpu {
         let queue = vk::Queue::from_raw(raw.queue);
         let instance = Instance::borrowed(entry, instance);
         let queue_family = raw.queue_family;
-        let ray_queries = None;
-        let opened = Opened { instance, candidate, queue_family, device, queue, debug, calibrated, ray_queries };
+        let (ray_queries, tuning) = (None, Tuning::of(candidate.info.kind));
+        let opened =
+            Opened { instance, candidate, queue_family, device, queue, debug, calibrated, ray_queries, tuning };
         Self::assemble(opened, raw.cache, raw.wait_limit)
     }
 }

@@ -46,12 +46,25 @@ pub struct Slot {
     pub access: Access,
 }
 
+impl Slot {
+    /// In the form of a kernel that has storage buffers in place of texel buffers.
+    fn without_texels(self) -> Self {
+        match self.kind {
+            SlotKind::UintTexels | SlotKind::FloatTexels => {
+                Self { kind: SlotKind::Storage, access: Access::Read, ..self }
+            }
+            SlotKind::Storage | SlotKind::Uniform => self,
+        }
+    }
+}
+
 /// The interface of a kernel. The build script implements it for the `Bind` struct of every kernel.
 ///
 /// # Safety
 /// - [`Self::SPIRV`] and [`Self::PLAIN_SPIRV`] are valid code for Vulkan 1.3 and the features in [`super::REQUIRED_FEATURES`],
 ///   with an entry point `main` for compute; [`Self::SLOTS`] are their descriptors, all in set 0, with numbers that differ.
 ///   [`Self::RAY_QUERY`] is the same with VK_KHR_ray_query, and has an acceleration structure as one more descriptor.
+///   [`Self::STORAGE_SPIRV`] is the same with storage buffers for texel buffers.
 /// - [`Self::Push`] is its push constants: at most 128 bytes, a multiple of 4. Elements of [`SlotKind::Uniform`] have at most
 ///   16384 bytes.
 /// - [`Self::buffers`] returns one buffer per slot.
@@ -102,6 +115,8 @@ pub unsafe trait Bindings {
     const PLAIN_SPIRV: &'static [u8] = Self::SPIRV;
     /// The code for devices that trace by ray queries; none for a kernel that traces no rays.
     const RAY_QUERY: Option<RayQueryCode> = None;
+    /// The code with storage buffers in place of texel buffers, whose subgroups may shuffle; none for a kernel that traces no rays.
+    const STORAGE_SPIRV: Option<&'static [u8]> = None;
     /// The slots, in the order of the fields of the `Bind` struct.
     const SLOTS: &'static [Slot];
     /// The buffers to bind, one for each of [`Self::SLOTS`].
@@ -148,6 +163,8 @@ pub struct Kernel<B> {
     pub(super) gpu: Gpu,
     pub(super) pipeline: Arc<Pipeline>,
     pub(super) spirv: &'static [u8],
+    /// One for each buffer of `B`.
+    pub(super) slots: Box<[Slot]>,
     pub(super) constants: Arc<[(u32, u32)]>,
     compile_time: Duration,
     pub(super) local_size: [u32; 2],
@@ -167,17 +184,25 @@ impl<B: Bindings> Kernel<B> {
         let begun = Instant::now();
         let local_size = constants.local_size();
         check_workgroup(B::NAME, local_size, &gpu.0.limits)?;
-        let ray_query = B::RAY_QUERY.filter(|_| gpu.traces_by_ray_query());
-        let usual = if gpu.info().subgroup_shuffle { B::SPIRV } else { B::PLAIN_SPIRV };
-        let (spirv, world) = (ray_query.map_or(usual, |code| code.spirv), ray_query.map(|code| code.binding));
+        let Form { spirv, slots, world } = form::<B>(gpu);
         let constants: Arc<[_]> = constants.entries().into();
         let push_bytes = size_of::<B::Push>() as u32;
         let traced = world.map(|binding| (binding, vk::DescriptorType::ACCELERATION_STRUCTURE_KHR));
-        let bindings = B::SLOTS.iter().map(|slot| (slot.binding, slot.kind.descriptor())).chain(traced).collect();
+        let bindings = slots.iter().map(|slot| (slot.binding, slot.kind.descriptor())).chain(traced).collect();
         let recipe = Recipe { spirv, bindings, push_bytes, constants: constants.clone() };
         let pipeline = pipeline(gpu, B::NAME, &recipe)?;
         let compile_time = begun.elapsed();
-        Ok(Self { gpu: gpu.clone(), pipeline, spirv, constants, compile_time, local_size, world, of: PhantomData })
+        Ok(Self {
+            gpu: gpu.clone(),
+            pipeline,
+            spirv,
+            slots,
+            constants,
+            compile_time,
+            local_size,
+            world,
+            of: PhantomData,
+        })
     }
 
     /// Time that creating the pipeline took. Some drivers, such as lavapipe, compile more on the first dispatch.
@@ -195,6 +220,28 @@ impl<B: Bindings> Kernel<B> {
     pub fn folded_groups(&self, threads: u32) -> [u32; 3] {
         folded(threads.div_ceil(self.local_size[0]))
     }
+}
+
+/// A form of a kernel.
+struct Form {
+    spirv: &'static [u8],
+    slots: Box<[Slot]>,
+    /// The binding of what rays are traced through, if they are traced by ray queries.
+    world: Option<u32>,
+}
+
+/// The form that a device runs of a kernel. It has no storage buffers for texel buffers where they would be too many.
+fn form<B: Bindings>(gpu: &Gpu) -> Form {
+    if let Some(code) = B::RAY_QUERY.filter(|_| gpu.traces_by_ray_query()) {
+        return Form { spirv: code.spirv, slots: B::SLOTS.into(), world: Some(code.binding) };
+    }
+    let shuffles = gpu.info().subgroup_shuffle;
+    let room = gpu.0.limits.max_per_stage_descriptor_storage_buffers as usize;
+    let fits = gpu.tuning().storage_buffers && shuffles && B::SLOTS.len() <= room;
+    if let Some(spirv) = B::STORAGE_SPIRV.filter(|_| fits) {
+        return Form { spirv, slots: B::SLOTS.iter().map(|slot| slot.without_texels()).collect(), world: None };
+    }
+    Form { spirv: if shuffles { B::SPIRV } else { B::PLAIN_SPIRV }, slots: B::SLOTS.into(), world: None }
 }
 
 /// Returns the pipeline of `recipe`, which is compiled if the device does not have it.
@@ -253,6 +300,16 @@ mod tests {
         assert!(declares(SPIRV, GROUP_NON_UNIFORM_SHUFFLE));
         assert!(!declares(PLAIN_SPIRV, GROUP_NON_UNIFORM_SHUFFLE) && !declares(PLAIN_SPIRV, GROUP_NON_UNIFORM));
         assert!(declares(PLAIN_SPIRV, 1), "control: every kernel declares Shader");
+    }
+
+    #[test]
+    fn a_form_of_kernels_that_trace_has_no_texels() {
+        use crate::gpu::Bindings;
+        use crate::shaders::{accumulate, path};
+        const SAMPLED_BUFFER: u32 = 46;
+        let code = <path::Bind as Bindings>::STORAGE_SPIRV.unwrap();
+        assert!(!declares(code, SAMPLED_BUFFER) && declares(path::SPIRV, SAMPLED_BUFFER));
+        assert!(<accumulate::Bind as Bindings>::STORAGE_SPIRV.is_none(), "it traces no rays");
     }
 
     #[test]

@@ -35,6 +35,7 @@ mod recorder;
 mod shape;
 mod staging;
 mod timing;
+mod tuned;
 mod tuning;
 mod upload;
 

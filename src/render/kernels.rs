@@ -9,7 +9,6 @@ use crate::render::pass::{accumulate, choose, path, primary_hit, sample_list};
 use crate::render::schedule;
 use crate::render::settings::Settings;
 use crate::shaders;
-use crate::shaders::shared::traverse;
 
 /// The kernels of every render.
 pub struct Kernels {
@@ -27,7 +26,7 @@ impl Kernels {
     /// # Errors
     /// [`crate::error::Error::Device`] when the driver refuses one.
     pub fn new(gpu: &Gpu, effects: Effects, stack: u32) -> Result<Self> {
-        let (thread, traverse) = (gpu.tuning().thread(), traverse::Constants { stack });
+        let (thread, traverse) = (gpu.tuning().thread(), gpu.tuning().traverse(stack));
         Ok(Self {
             primary_hit: Kernel::new(
                 gpu,
@@ -44,7 +43,7 @@ impl Kernels {
 /// # Errors
 /// [`crate::error::Error::Device`] when the driver refuses it.
 pub fn primary_points(gpu: &Gpu, effects: Effects, stack: u32) -> Result<primary_hit::Guides> {
-    let (thread, traverse) = (gpu.tuning().thread(), traverse::Constants { stack });
+    let (thread, traverse) = (gpu.tuning().thread(), gpu.tuning().traverse(stack));
     Kernel::new(gpu, &shaders::primary_hit::Constants { effects, thread, traverse, points: true })
 }
 

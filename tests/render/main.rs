@@ -23,6 +23,7 @@ mod still;
 mod stride;
 #[path = "../support/mod.rs"]
 mod support;
+mod tuning;
 #[path = "../support/twin.rs"]
 mod twin;
 mod whole;

@@ -1,7 +1,7 @@
 //! Functions that several tests share.
 #![allow(dead_code)]
 use std::sync::Mutex;
-use tallow::gpu::{DeviceOptions, FrameResources, Gpu};
+use tallow::gpu::{DeviceOptions, FrameResources, Gpu, Tuning};
 use tallow::layout::PixelStats;
 use tallow::render::{Job, Renderer, Step};
 
@@ -45,8 +45,20 @@ impl Drop for Lent {
 /// # Panics
 /// With the remedy when there is no device or the layers are missing: a test that needs a GPU never passes without.
 pub fn own_gpu() -> Gpu {
+    open(None)
+}
+
+/// One that divides work into such sizes.
+///
+/// # Panics
+/// As [`own_gpu`].
+pub fn tuned_gpu(tuning: Tuning) -> Gpu {
+    open(Some(tuning))
+}
+
+fn open(tuning: Option<Tuning>) -> Gpu {
     let device = std::env::var("TALLOW_DEVICE").ok();
-    Gpu::open(&DeviceOptions { device, validation: true, ..DeviceOptions::default() })
+    Gpu::open(&DeviceOptions { device, validation: true, tuning, ..DeviceOptions::default() })
         .unwrap_or_else(|e| panic!("this test needs a Vulkan device and the validation layers: {e}"))
 }
 

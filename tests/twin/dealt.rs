@@ -1,9 +1,9 @@
-//! Rays that test each other's triangles find the bits that each finds alone.
+//! Rays that test each other's triangles find the bits that each finds alone, and so do rays whose traversal is tuned otherwise.
 use crate::kernels::{Traversal, pictures, queries, shipped};
-use crate::support::{assert_silent, gpu, render};
+use crate::support::{assert_silent, gpu, render, tuned_gpu};
 use std::path::Path;
 use tallow::allocate::policy as policy_of;
-use tallow::gpu::DeviceKind;
+use tallow::gpu::{DeviceKind, Tuning};
 use tallow::layout::*;
 use tallow::render::{Outputs, Renderer, called_for};
 use tallow::scene::{Loaded, Scene};
@@ -58,6 +58,32 @@ fn rays_find_the_same_hits_together() {
         }
     }
     assert_silent(&gpu);
+}
+
+#[test]
+fn rays_find_the_same_hits_however_they_are_tuned() {
+    let usual = gpu();
+    let switches = [
+        ("native_bits", Tuning { native_bits: true, ..Tuning::CPU }),
+        ("1 triangle a step", Tuning { triangles_a_step: 1, ..Tuning::CPU }),
+        ("2 triangles a step", Tuning { triangles_a_step: 2, ..Tuning::CPU }),
+        ("storage_buffers", Tuning { storage_buffers: true, ..Tuning::CPU }),
+    ];
+    let switches = switches.map(|(name, tuning)| (name, tuned_gpu(tuning)));
+    for (scene_name, scene) in scenes() {
+        let effects = Effects { dealt_triangles: false, ..called_for(&scene, &scene.settings, Outputs::default()) };
+        let rays = queries(&scene, 5000);
+        let stopped = |hits: &[RayHit]| hits.iter().map(|hit| hit.triangle != NONE).collect::<Vec<_>>();
+        let usual = Traversal::new(&usual, &scene, effects);
+        let (closest, any) = (usual.hits(&rays, false), usual.hits(&rays, true));
+        for (switch, gpu) in &switches {
+            let tuned = Traversal::new(gpu, &scene, effects);
+            let same = closest.iter().map(bits).eq(tuned.hits(&rays, false).iter().map(bits));
+            assert!(same, "{scene_name}, {switch}: closest hits");
+            assert_eq!(stopped(&any), stopped(&tuned.hits(&rays, true)), "{scene_name}, {switch}: any hits");
+        }
+    }
+    switches.iter().for_each(|(_, gpu)| assert_silent(gpu));
 }
 
 #[test]

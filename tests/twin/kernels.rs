@@ -366,7 +366,7 @@ pub struct Traversal {
 impl Traversal {
     pub fn new(gpu: &Gpu, scene: &Loaded, effects: Effects) -> Self {
         let renderer = Renderer::specialised(gpu, scene, &scene.settings, Outputs::default(), effects).unwrap();
-        let traverse = shared::traverse::Constants { stack: scene.stack };
+        let traverse = gpu.tuning().traverse(scene.stack);
         let thread = shared::thread::Constants { workgroup: 32, stripes: 1 };
         let constants =
             traverse_kernel::Constants { effects, thread, traverse, deal: dealing(gpu), ..Default::default() };

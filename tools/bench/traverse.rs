@@ -18,7 +18,6 @@ use tallow::math::warp::{basis_from_normal, warp_cosine_hemisphere};
 use tallow::render::settings::Settings;
 use tallow::render::{Outputs, Renderer};
 use tallow::scene::{Loaded, Scene};
-use tallow::shaders::shared;
 use tallow::twins::light::INFINITE_DISTANCE;
 use tallow::twins::sampler::{sample_2d, sampler_start};
 use tallow::twins::surface::surface_at;
@@ -131,7 +130,7 @@ impl Device {
     fn new(gpu: Gpu, scene: &Loaded, rays: &[RayQuery], per_thread: u32) -> Result<Self> {
         // obvhs does not support masks, so neither side tests them.
         let effects = Effects { dealt_triangles: true, ..Effects::default() };
-        let traverse = shared::traverse::Constants { stack: scene.stack };
+        let traverse = gpu.tuning().traverse(scene.stack);
         let thread = gpu.tuning().thread();
         let constants = Constants { effects, traverse, thread, deal: gpu.deal(), ..Default::default() };
         Ok(Self {

@@ -21,6 +21,8 @@ pub struct Binaries<'a> {
     pub plain: &'a Path,
     /// Those that trace rays by ray queries; none for a kernel that traces no rays.
     pub ray_query: Option<&'a Path>,
+    /// Those that read storage buffers sooner than texel buffers; none for a kernel that traces no rays.
+    pub storage: Option<&'a Path>,
 }
 
 /// Returns the fields of a `Bind` struct and the list of their buffers, both as Rust code.
@@ -217,6 +219,12 @@ fn ray_query(interface: &Interface, binaries: &Binaries) -> String {
     )
 }
 
+/// What the `Bindings` of a kernel say of storage buffers.
+fn storage(binaries: &Binaries) -> String {
+    let line = |code| format!("        const STORAGE_SPIRV: Option<&'static [u8]> = Some(include_bytes!({code:?}));\n");
+    binaries.storage.map(line).unwrap_or_default()
+}
+
 /// The Rust module of one kernel.
 pub fn module(name: &str, file: &Path, interface: &Interface, root: &str, binaries: &Binaries) -> Result<String> {
     let Binaries { usual, plain, .. } = binaries;
@@ -237,6 +245,7 @@ pub fn module(name: &str, file: &Path, interface: &Interface, root: &str, binari
     }
     let numbers = numbers(&interface.numbers_of(None))?;
     let (constants, ray_query) = (constants(interface, root)?, ray_query(interface, binaries));
+    let storage = storage(binaries);
     let asserts = assert_sizes(&interface.bindings_of(None));
     let file = file.display();
     // Code that can name a kernel can run it with any numbers, so the crate's kernels are not visible outside.
@@ -268,7 +277,7 @@ pub fn module(name: &str, file: &Path, interface: &Interface, root: &str, binari
         const NAME: &'static str = NAME;
         const SPIRV: &'static [u8] = SPIRV;
         const PLAIN_SPIRV: &'static [u8] = PLAIN_SPIRV;
-{ray_query}        const SLOTS: &'static [Slot] = &[
+{storage}{ray_query}        const SLOTS: &'static [Slot] = &[
 {slots}        ];
         fn buffers(&self) -> Vec<Bound<'_>> {{
             #[allow(unused_mut)]

@@ -34,6 +34,7 @@ pub fn profile(args: &Args) -> Result<(Profile, Option<String>)> {
         cache: gpu::cache_folder(),
         wait_limit: None,
         tracing: args.tracing,
+        tuning: None,
     })?;
     check_room(args, &settings, &gpu)?;
     let count = usize::from(args.frames);

@@ -87,8 +87,9 @@ impl Cut {
         if factor.is_nan() || factor < 1.0 {
             return Err(Error::Usage(format!("the firefly factor is {factor}: choose a number of at least 1")));
         }
+        let (measured, filter_thread) = (planes.variance.is_some(), gpu.tuning().filter_thread());
         Ok(Self {
-            kernel: Kernel::new(gpu, &Constants { measured: planes.variance.is_some() })?,
+            kernel: Kernel::new(gpu, &Constants { filter_thread, measured })?,
             whole,
             nothing: Buffer::new(gpu, "no variance", 1, Location::Device)?,
             factor,

@@ -31,7 +31,8 @@ impl Estimate {
     /// [`crate::error::Error::Device`] when it does not fit.
     pub fn new(gpu: &Gpu, edge: &EdgeSettings, cautious: bool, [width, height]: [u32; 2]) -> Result<Self> {
         let rates = Rates::of_surfaces(edge);
-        let kernel = |measured| Kernel::new(gpu, &Constants { edge: rates.constants(), measured, cautious });
+        let (edge, filter_thread) = (rates.constants(), gpu.tuning().filter_thread());
+        let kernel = |measured| Kernel::new(gpu, &Constants { edge, filter_thread, measured, cautious });
         Ok(Self {
             kernels: [kernel(false)?, kernel(true)?],
             nothing: Buffer::from_slice(gpu, "no variance", &[])?,

@@ -74,7 +74,8 @@ impl Levels {
         [width, height]: [u32; 2],
     ) -> Result<Self> {
         let rates = Rates::of_surfaces(edge);
-        let kernel = |last| Kernel::new(gpu, &Constants { edge: rates.constants(), last });
+        let (edge, filter_thread) = (rates.constants(), gpu.tuning().filter_thread());
+        let kernel = |last| Kernel::new(gpu, &Constants { edge, filter_thread, last });
         Ok(Self {
             kernels: [kernel(false)?, kernel(true)?],
             scratch: Buffer::new(gpu, "svgf", width as usize * height as usize, Location::Device)?,

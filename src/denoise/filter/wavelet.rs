@@ -82,7 +82,8 @@ struct Wavelet {
 
 impl Wavelet {
     fn new(gpu: &Gpu, rates: Rates, steps: Vec<Lifting>, size: [u32; 2]) -> Result<Self> {
-        let kernel = |inverse| Kernel::new(gpu, &Constants { edge: rates.constants(), inverse });
+        let (edge, filter_thread) = (rates.constants(), gpu.tuning().filter_thread());
+        let kernel = |inverse| Kernel::new(gpu, &Constants { edge, filter_thread, inverse });
         let pack = Pack::new(gpu, size)?;
         let scratch = Buffer::new(gpu, "wavelet", pack.colour.len(), Location::Device)?;
         Ok(Self { pack, kernels: [kernel(false)?, kernel(true)?], scratch, rates, steps })

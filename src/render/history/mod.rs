@@ -13,7 +13,6 @@ use crate::scene::animation::Animation;
 use crate::scene::{Change, Relit, Scene};
 use crate::settings::{FROM_0, choices, entry, settings};
 use crate::shaders;
-use crate::shaders::shared::traverse;
 use numbers::Numbers;
 pub use probes::Probes;
 use serde::Serialize;
@@ -142,7 +141,7 @@ impl History {
         entry::check(&settings.entries())?;
         let pixels = size[0] * size[1];
         Self::check_room(gpu, pixels)?;
-        let (thread, traverse) = (gpu.tuning().thread(), traverse::Constants { stack });
+        let (thread, traverse) = (gpu.tuning().thread(), gpu.tuning().traverse(stack));
         let room = |on: bool| if on { pixels as usize } else { 1 };
         Ok(Self {
             remember: Kernel::new(gpu, &shaders::remember::Constants { effects, thread, traverse })?,

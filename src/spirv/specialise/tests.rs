@@ -190,11 +190,11 @@ fn numbers_are_set_and_computed_with() {
     assert_eq!(code, module(BOUND_OF_IDS, &[], op::CONSTANT_TRUE, &set, &[]));
 }
 
-/// What a scene lacks leaves nothing in the path tracer: without effects it is a ninth of what it is with all.
+/// What a scene lacks leaves nothing in the path tracer: without effects it is less than an eighth of what it is with all.
 #[test]
 fn the_path_tracer_without_effects_is_small() {
     let code: Vec<u32> = bytemuck::pod_collect_to_vec(path::Bind::SPIRV);
     let size = |effects| specialise(&code, &path::Constants { effects, ..path::Constants::default() }.entries()).len();
     let [none, all] = [Effects::default(), Effects::ALL].map(size);
-    assert!(9 * none < all && all <= code.len(), "{none} {all} {}", code.len());
+    assert!(8 * none < all && all <= code.len(), "{none} {all} {}", code.len());
 }

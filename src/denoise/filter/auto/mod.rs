@@ -127,6 +127,7 @@ impl Auto {
         let windows =
             |s: &FilterSettings, leverages| Windows::new(gpu, s.footprint.radius, s.guided.eps, leverages, size);
         let surfaces = Rates::of_surfaces(&settings.edge).constants();
+        let filter_thread = gpu.tuning().filter_thread();
         let blend = |measured| Kernel::new(gpu, &auto::Constants { measured, ..Default::default() });
         Ok(Self {
             estimate: Estimate::new(gpu, &settings.edge, true, size)?,
@@ -136,7 +137,7 @@ impl Auto {
             smoothing: Smoothing::new(gpu, &settings.edge, size)?,
             blend: [blend(false)?, blend(true)?],
             nothing: Buffer::from_slice(gpu, "no variance", &[])?,
-            residual: Kernel::new(gpu, &auto_residual::Constants { edge: surfaces })?,
+            residual: Kernel::new(gpu, &auto_residual::Constants { edge: surfaces, filter_thread })?,
             windows: [windows(&wide, false)?, windows(&middle, false)?, windows(&narrow, true)?],
             svgf: Levels::new(gpu, &of_svgf.edge, &of_svgf.svgf, of_svgf.footprint.levels, size)?,
             svgf_estimate: Estimate::new(gpu, &of_svgf.edge, false, size)?,

@@ -37,8 +37,8 @@ struct Kernels {
 
 impl Kernels {
     fn new(gpu: &Gpu, surfaces: &Rates, three: bool) -> Result<Self> {
-        let edge = surfaces.constants();
-        let smooth = |of_pixels| Kernel::new(gpu, &auto_smooth::Constants { edge, three, of_pixels });
+        let (edge, filter_thread) = (surfaces.constants(), gpu.tuning().filter_thread());
+        let smooth = |of_pixels| Kernel::new(gpu, &auto_smooth::Constants { edge, filter_thread, three, of_pixels });
         Ok(Self {
             smooth: [smooth(true)?, smooth(false)?],
             spread: Kernel::new(gpu, &auto_spread::Constants { edge, three })?,

@@ -1,0 +1,150 @@
+//! Tests that pictures have the same bits whatever sizes work is divided into: those that suit a GPU render, place samples and
+//! filter here as those that suit a CPU.
+use crate::support::{assert_silent, render, tuned_gpu};
+use std::path::Path;
+use tallow::denoise::filter::{FILTERS, FilterSettings};
+use tallow::denoise::{Demodulation, Denoiser};
+use tallow::error::Error;
+use tallow::gpu::{DeviceOptions, FrameResources, Gpu, Tuning};
+use tallow::layout::vec4;
+use tallow::render::settings::Settings;
+use tallow::render::{Outputs, Renderer};
+use tallow::scene::{Loaded, Scene};
+
+const OUTPUTS: Outputs = Outputs { split_light: true, guides: true, counters: true };
+
+fn scene(file: &str, policy: &str) -> Loaded {
+    let small = |s: &mut Settings| {
+        (s.width, s.height, s.spp) = (65, 33, 4);
+        s.allocate.policy = tallow::allocate::policy(policy).unwrap();
+    };
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file);
+    Scene::load(&file).unwrap().with(small)
+}
+
+fn bits<T: bytemuck::Pod>(values: &[T]) -> Vec<u32> {
+    bytemuck::cast_slice(values).to_vec()
+}
+
+/// Every word that a render leaves: pixels, light, primary hits and counters.
+fn film(gpu: &Gpu, scene: &Loaded) -> Vec<Vec<u32>> {
+    let renderer = Renderer::new(gpu, scene, &scene.settings, OUTPUTS).unwrap();
+    let stats = render(gpu, &renderer);
+    let tile = &renderer.film().tiles[0];
+    let (light, guide) = (tile.light.read().unwrap(), tile.guide.read().unwrap());
+    let counters = format!("{:?}", renderer.counters().unwrap()).into_bytes().into_iter().map(u32::from).collect();
+    vec![bits(&stats), bits(&light), bits(&guide), counters]
+}
+
+fn filtered(gpu: &Gpu, scene: &Loaded) -> Vec<(&'static str, Vec<vec4>)> {
+    let renderer = Renderer::new(gpu, scene, &scene.settings, OUTPUTS).unwrap();
+    render(gpu, &renderer);
+    let filter = |row: &&tallow::denoise::filter::Row| {
+        let denoiser = Denoiser::new(gpu, &renderer, row, &FilterSettings::default(), Demodulation::Light).unwrap();
+        gpu.run(&mut FrameResources::new(gpu).unwrap(), |rec| denoiser.record(rec)).unwrap();
+        (row.name, denoiser.picture().read().unwrap())
+    };
+    FILTERS.iter().map(filter).collect()
+}
+
+#[test]
+fn a_gpus_sizes_leave_the_bits_of_renders() {
+    let [cpu, gpu] = [Tuning::CPU, Tuning::GPU].map(tuned_gpu);
+    for (file, policy) in [
+        ("cornell-box/glass.toml", "both"),
+        ("cornell-box/scene.toml", "geometry"),
+        ("grass/scene.toml", "uniform"),
+        ("bust/scene.toml", "variance"),
+        ("moving/scene.toml", "threshold"),
+    ] {
+        let scene = scene(file, policy);
+        assert!(film(&cpu, &scene) == film(&gpu, &scene), "{file}, {policy}");
+    }
+    [cpu, gpu].iter().for_each(assert_silent);
+}
+
+/// Filters with windows that [`Tuning::whole_lines`] lets begin elsewhere.
+const WINDOWED: [&str; 2] = ["guided", "auto"];
+
+/// Where windows begin decides in which order a window's few hundred floats are added, each of which rounds by 2^-24. The
+/// largest difference seen was 1e-6 of a value, or 1.5e-8 of a dark one.
+fn alike(one: &[vec4], other: &[vec4]) -> bool {
+    one.iter()
+        .flatten()
+        .zip(other.iter().flatten())
+        .all(|(a, b)| (a - b).abs() <= 4e-6 * a.abs().max(b.abs()).max(0.02))
+}
+
+#[test]
+fn a_gpus_sizes_leave_the_bits_of_filters() {
+    let same_windows = Tuning { whole_lines: true, ..Tuning::GPU };
+    let gpus = [Tuning::CPU, same_windows, Tuning::GPU].map(tuned_gpu);
+    let scene = scene("cornell-box/scene.toml", "uniform");
+    let [cpu, same, gpu] = gpus.each_ref().map(|gpu| filtered(gpu, &scene));
+    for (((filter, cpu), (_, same)), (_, gpu)) in cpu.iter().zip(&same).zip(&gpu) {
+        assert!(bits(cpu) == bits(same), "{filter}");
+        assert!(bits(cpu) == bits(gpu) || WINDOWED.contains(filter) && alike(cpu, gpu), "{filter}");
+    }
+    gpus.iter().for_each(assert_silent);
+}
+
+#[test]
+fn workgroups_leave_the_bits_of_filters() {
+    let large = |s: &mut Settings| (s.width, s.height, s.spp) = (300, 300, 1); // two of the largest in a row
+    let scene = scene("cornell-box/scene.toml", "uniform").with(large);
+    let [usual, others @ ..] = [32, 64, 256].map(|filter_workgroup| {
+        let gpu = tuned_gpu(Tuning { filter_workgroup, ..Tuning::CPU });
+        let pictures = filtered(&gpu, &scene);
+        assert_silent(&gpu);
+        pictures
+    });
+    for ((filter, usual), (_, other)) in others.iter().flat_map(|other| usual.iter().zip(other)) {
+        assert!(bits(usual) == bits(other), "{filter}");
+    }
+}
+
+/// Every switch of traversal by itself, and all together, none of which changes a bit.
+fn switches() -> Vec<(&'static str, Tuning)> {
+    let own = Tuning { deals: false, ..Tuning::CPU };
+    vec![
+        ("native_bits", Tuning { native_bits: true, ..own }),
+        ("triangles_a_step", Tuning { triangles_a_step: 2, ..own }),
+        ("storage_buffers", Tuning { storage_buffers: true, ..own }),
+        ("storage_buffers and deals", Tuning { storage_buffers: true, ..Tuning::CPU }),
+        ("triangles_a_step and deals", Tuning { triangles_a_step: 1, ..Tuning::CPU }),
+        ("all", Tuning { native_bits: true, triangles_a_step: 2, storage_buffers: true, ..Tuning::GPU }),
+    ]
+}
+
+#[test]
+fn switches_leave_the_bits_of_renders() {
+    let cpu = tuned_gpu(Tuning::CPU);
+    let scenes = [
+        ("cornell-box/glass.toml", "both"),
+        ("grass/scene.toml", "uniform"),
+        ("bust/scene.toml", "variance"),
+        ("moving/scene.toml", "threshold"),
+    ]
+    .map(|(file, policy)| (file, scene(file, policy)));
+    let films = scenes.each_ref().map(|(_, scene)| film(&cpu, scene));
+    for (switch, tuning) in switches() {
+        let gpu = tuned_gpu(tuning);
+        for ((file, scene), usual) in scenes.iter().zip(&films) {
+            assert!(film(&gpu, scene) == *usual, "{switch}: {file}");
+        }
+        assert_silent(&gpu);
+    }
+}
+
+#[test]
+fn sizes_that_cannot_be_are_refused() {
+    for (name, tuning) in [
+        ("workgroup", Tuning { workgroup: 0, ..Tuning::GPU }),
+        ("thread_items", Tuning { thread_items: 0, ..Tuning::CPU }),
+        ("lines", Tuning { lines: 0, ..Tuning::GPU }),
+        ("filter_workgroup", Tuning { filter_workgroup: 0, ..Tuning::GPU }),
+    ] {
+        let refused = Gpu::open(&DeviceOptions { tuning: Some(tuning), ..DeviceOptions::default() }).err();
+        assert!(matches!(&refused, Some(Error::Usage(why)) if why.contains(name)), "{refused:?}");
+    }
+}

@@ -1,0 +1,139 @@
+//! Times the choices of `gpu::Tuning` on a device: each alone, in turn with what suits devices of its kind, whose time is 1.
+//!   cargo run --release --example bench-tuning -- [--rounds N] [--width N] [--height N] [--spp N] SCENE...
+#![allow(missing_docs)]
+use anyhow::{Context, Result};
+use clap::Parser;
+use std::path::PathBuf;
+use tallow::denoise::filter::{FILTERS, FilterSettings};
+use tallow::denoise::{Demodulation, Denoiser};
+use tallow::gpu::{DeviceOptions, FrameResources, Gpu, PassTime, Tuning};
+use tallow::profile::median;
+use tallow::render::settings::Settings;
+use tallow::render::{Job, Outputs, Renderer};
+use tallow::scene::{Loaded, Scene};
+
+#[derive(Parser)]
+struct Args {
+    /// Scenes, at their own settings but for the film's size and the samples
+    #[arg(required = true)]
+    scenes: Vec<PathBuf>,
+    /// How often each is timed
+    #[arg(long, default_value_t = 7)]
+    rounds: usize,
+    #[arg(long, default_value_t = 640)]
+    width: u32,
+    #[arg(long, default_value_t = 360)]
+    height: u32,
+    /// Samples per pixel
+    #[arg(long, default_value_t = 16)]
+    spp: u32,
+}
+
+/// Filters whose kernels [`Tuning::filter_workgroup`] is for.
+const TIMED: [&str; 5] = ["atrous", "svgf", "wavelet", "bilateral", "auto"];
+
+/// A choice by its name, on a device that was opened for it.
+type Choice = (String, Gpu);
+
+/// What runs some passes, and returns their GPU time in milliseconds.
+type Run = Box<dyn FnMut() -> Result<f64>>;
+
+/// Choices that paths depend on. Where triangles are dealt, few rays have a limit of them a step.
+fn of_paths(own: Tuning) -> Vec<(String, Tuning)> {
+    let dealt = |name: &str| if own.deals { format!("{name}, not dealt") } else { name.to_owned() };
+    let alone = Tuning { deals: false, ..own };
+    let steps = [1, 2, 4].map(|n| (dealt(&format!("triangles_a_step {n}")), Tuning { triangles_a_step: n, ..alone }));
+    let mut all = vec![
+        ("own".to_owned(), own),
+        (format!("deals {}", !own.deals), Tuning { deals: !own.deals, ..own }),
+        ("native_bits".to_owned(), Tuning { native_bits: true, ..own }),
+        ("storage_buffers".to_owned(), Tuning { storage_buffers: true, ..own }),
+    ];
+    all.extend(steps);
+    all.extend([32, 64, 128].map(|n| (format!("workgroup {n}"), Tuning { workgroup: n, ..own })));
+    let together = Tuning { native_bits: true, storage_buffers: true, triangles_a_step: 2, ..alone };
+    all.push((dealt("native_bits, storage_buffers, triangles_a_step 2"), together));
+    differing(all)
+}
+
+/// Choices that filters depend on.
+fn of_filters(own: Tuning) -> Vec<(String, Tuning)> {
+    let mut all = vec![("own".to_owned(), own)];
+    all.extend([32, 64, 128, 256].map(|n| (format!("filter_workgroup {n}"), Tuning { filter_workgroup: n, ..own })));
+    differing(all)
+}
+
+/// The first, and those that differ from it.
+fn differing(all: Vec<(String, Tuning)>) -> Vec<(String, Tuning)> {
+    let own = all[0].1;
+    all.into_iter().enumerate().filter(|(i, (_, tuning))| *i == 0 || *tuning != own).map(|(_, choice)| choice).collect()
+}
+
+fn open(tuning: Option<Tuning>) -> Result<Gpu> {
+    let device = std::env::var("TALLOW_DEVICE").ok();
+    Ok(Gpu::open(&DeviceOptions { device, tuning, ..DeviceOptions::default() })?)
+}
+
+fn choices(all: Vec<(String, Tuning)>) -> Result<Vec<Choice>> {
+    all.into_iter().map(|(name, tuning)| Ok((name, open(Some(tuning))?))).collect()
+}
+
+fn milliseconds<'a>(passes: impl Iterator<Item = &'a PassTime>) -> f64 {
+    passes.map(|pass| pass.duration_ns() as f64 * 1e-6).sum()
+}
+
+fn paths(gpu: &Gpu, scene: &Loaded) -> Result<Run> {
+    let renderer = Renderer::new(gpu, scene, &scene.settings, Outputs::default())?;
+    let mut frame = FrameResources::new(gpu)?;
+    Ok(Box::new(move || {
+        let times = Job::new(&renderer).run_to_end(&mut frame)?.times;
+        Ok(milliseconds(times.iter().filter(|pass| pass.name == "path")))
+    }))
+}
+
+fn filter(gpu: &Gpu, scene: &Loaded, name: &str) -> Result<Run> {
+    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    let renderer = Renderer::new(gpu, scene, &scene.settings, outputs)?;
+    let mut frame = FrameResources::new(gpu)?;
+    Job::new(&renderer).run_to_end(&mut frame)?;
+    let row = FILTERS.iter().find(|row| row.name == name).context("no such filter")?;
+    let denoiser = Denoiser::new(gpu, &renderer, row, &FilterSettings::default(), Demodulation::Light)?;
+    let gpu = gpu.clone();
+    Ok(Box::new(move || Ok(milliseconds(gpu.run(&mut frame, |rec| denoiser.record(rec))?.iter()))))
+}
+
+/// Prints the median time of each choice, and its ratio to the first's.
+fn compare(what: &str, choices: &[Choice], rounds: usize, run: impl Fn(&Gpu) -> Result<Run>) -> Result<()> {
+    let mut runs = choices.iter().map(|(_, gpu)| run(gpu)).collect::<Result<Vec<_>>>()?;
+    runs.iter_mut().try_for_each(|run| run().map(drop))?; // drivers may compile more on the first dispatch
+    let mut times = vec![Vec::new(); runs.len()];
+    for _ in 0..rounds {
+        for (run, times) in runs.iter_mut().zip(&mut times) {
+            times.push(run()?);
+        }
+    }
+    let own = median(&times[0]);
+    println!("{what}, median of {rounds}:");
+    for ((name, _), times) in choices.iter().zip(&times) {
+        let ms = median(times);
+        println!("  {name:64} {ms:10.3} ms {:7.3}", ms / own);
+    }
+    Ok(())
+}
+
+fn main() -> Result<()> {
+    let Args { scenes, rounds, width, height, spp } = Args::parse();
+    let device = open(None)?;
+    println!("{}", device.info().name);
+    let (for_paths, for_filters) = (choices(of_paths(*device.tuning()))?, choices(of_filters(*device.tuning()))?);
+    let small = |s: &mut Settings| (s.width, s.height, s.spp) = (width, height, spp);
+    for file in scenes {
+        let scene = Scene::load(&file)?.with(small);
+        println!("{}, {width} x {height}, {spp} samples", file.display());
+        compare("paths", &for_paths, rounds, |gpu| paths(gpu, &scene))?;
+        for name in TIMED {
+            compare(name, &for_filters, rounds, |gpu| filter(gpu, &scene, name))?;
+        }
+    }
+    Ok(())
+}
