@@ -350,7 +350,7 @@ pub(super) fn usable(candidate: &Candidate) -> Result<u32> {
 ///
 /// # Errors
 /// [`Error::Device`] with what the device lacks for it.
-fn is_by_ray_query(tracing: Tracing, info: &DeviceInfo) -> Result<bool> {
+pub(super) fn is_by_ray_query(tracing: Tracing, info: &DeviceInfo) -> Result<bool> {
     let DeviceInfo { name, driver_name, driver_version, ray_query_lacks, .. } = info;
     match tracing {
         Tracing::Auto | Tracing::Compute => Ok(false),

@@ -2,9 +2,10 @@
 //! another version of them.
 use super::Gpu;
 use super::calibrated::{CalibratedClock, CalibratedExtension};
-use super::device::{Opened, one_at_a_time, usable};
+use super::device::{Opened, is_by_ray_query, one_at_a_time, usable};
 use super::info;
 use super::instance::Instance;
+use super::ray_query::{RayQueries, Tracing};
 use super::tuning::Tuning;
 use crate::error::{Error, Result};
 use ash::vk::Handle;
@@ -35,16 +36,21 @@ pub struct RawDevice {
     pub cache: Option<PathBuf>,
     /// How long to wait for a device that stands still; see [`super::DeviceOptions::wait_limit`].
     pub wait_limit: Option<Duration>,
+    /// Who finds what rays meet. For [`Tracing::RayQuery`] the device was made with VK_KHR_ray_query, VK_KHR_acceleration_structure and
+    /// VK_KHR_deferred_host_operations, and with `rayQuery`, `accelerationStructure` and `bufferDeviceAddress`.
+    pub tracing: Tracing,
+    /// Sizes into which work is divided; see [`super::DeviceOptions::tuning`].
+    pub tuning: Option<Tuning>,
 }
 
 impl Gpu {
     /// Uses a device made elsewhere and destroys only what it makes itself. Passes carry debug labels if the instance has
     /// VK_EXT_debug_utils enabled; [`Gpu::calibrate`] works if the device has VK_KHR_calibrated_timestamps or
-    /// VK_EXT_calibrated_timestamps enabled. Rays are traced by compute kernels, whatever else the device can.
+    /// VK_EXT_calibrated_timestamps enabled.
     ///
     /// # Safety
     /// - The handles are valid, belong together, and outlive everything made from the returned `Gpu`.
-    /// - The device was made with every one of [`super::REQUIRED_FEATURES`] enabled.
+    /// - The device was made with every one of [`super::REQUIRED_FEATURES`] enabled, and with what [`RawDevice::tracing`] takes.
     /// - Nobody else uses the queue while [`Gpu::run`] or a [`super::Buffer`]'s reads and writes do.
     /// - Without `robust_buffer_access`, kernels read only what a [`Renderer`](crate::render::Renderer), a
     ///   [`Denoiser`](crate::denoise::Denoiser) and [`filter::run`](crate::denoise::filter::run) give them, which is checked:
@@ -54,6 +60,7 @@ impl Gpu {
     ///
     /// # Errors
     /// [`Error::Device`] when a handle is null, the device cannot do what is required, or the family cannot compute.
+    /// [`Error::Usage`] for a tuning that cannot be.
     pub unsafe fn from_raw(raw: RawDevice) -> Result<Self> {
         let handles = [raw.instance, raw.physical_device, raw.device, raw.queue];
         if raw.get_instance_proc_addr.is_null() || handles.contains(&0) {
@@ -83,11 +90,17 @@ impl Gpu {
         let debug = has(&labels).then(|| ext::debug_utils::Device::new(&instance, &device));
         let calibrated = CalibratedExtension::BY_PREFERENCE.into_iter().find(|extension| has(&[extension.function()]));
         let calibrated = calibrated.map(|extension| CalibratedClock::new(extension, &instance, &device));
+        let by_ray_query = is_by_ray_query(raw.tracing, &candidate.info)?;
+        if by_ray_query && !has(&[c"vkCreateAccelerationStructureKHR"]) {
+            let what = "the device cannot trace by ray queries: enable VK_KHR_acceleration_structure when you make it";
+            return Err(Error::Device(what.to_owned()));
+        }
+        let ray_queries = by_ray_query.then(|| RayQueries::new(&instance, physical, &device));
+        let tuning = raw.tuning.unwrap_or(Tuning::of(candidate.info.kind)).check()?;
         drop(alone);
         let queue = vk::Queue::from_raw(raw.queue);
         let instance = Instance::borrowed(entry, instance);
         let queue_family = raw.queue_family;
-        let (ray_queries, tuning) = (None, Tuning::of(candidate.info.kind));
         let opened =
             Opened { instance, candidate, queue_family, device, queue, debug, calibrated, ray_queries, tuning };
         Self::assemble(opened, raw.cache, raw.wait_limit)

@@ -6,6 +6,7 @@ mod alike;
 #[cfg(feature = "cli")]
 #[path = "../support/command.rs"]
 mod command;
+mod engine;
 mod hits;
 mod pictures;
 #[path = "../support/poses.rs"]

@@ -4,7 +4,7 @@ use ash::vk;
 use ash::vk::Handle;
 use std::ffi::{CStr, c_void};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use tallow::gpu::RawDevice;
+use tallow::gpu::{RawDevice, Tracing};
 
 /// What an engine has: everything here is made and destroyed with plain ash.
 pub struct Engine {
@@ -17,6 +17,7 @@ pub struct Engine {
     pool: vk::CommandPool,
     messenger: (ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT),
     messages: Box<Mutex<Vec<String>>>,
+    tracing: Tracing,
     /// The loader may read its list of devices while another thread changes it (Vulkan-Loader's issue 2018); it is for
     /// whoever makes devices to see to that, and the tests of one program run side by side.
     alone: Option<MutexGuard<'static, ()>>,
@@ -60,7 +61,12 @@ unsafe fn instance(entry: &ash::Entry) -> ash::Instance {
     unsafe { entry.create_instance(&info, None) }.expect("install vulkan-validationlayers and mesa-vulkan-drivers")
 }
 
-unsafe fn device(instance: &ash::Instance, physical: vk::PhysicalDevice) -> ash::Device {
+/// What a device that traces by ray queries is made with.
+const RAY_EXTENSIONS: [&CStr; 3] =
+    [ash::khr::ray_query::NAME, ash::khr::acceleration_structure::NAME, ash::khr::deferred_host_operations::NAME];
+
+unsafe fn device(instance: &ash::Instance, physical: vk::PhysicalDevice, tracing: Tracing) -> ash::Device {
+    let rays = tracing == Tracing::RayQuery;
     let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
     let core = vk::PhysicalDeviceFeatures::default().shader_int64(true).robust_buffer_access(true);
     let mut v12 = vk::PhysicalDeviceVulkan12Features::default().scalar_block_layout(true).host_query_reset(true);
@@ -68,20 +74,31 @@ unsafe fn device(instance: &ash::Instance, physical: vk::PhysicalDevice) -> ash:
     let offered = unsafe { instance.enumerate_device_extension_properties(physical) }.unwrap();
     let calibrated = [ash::khr::calibrated_timestamps::NAME, ash::ext::calibrated_timestamps::NAME];
     let is_offered = |name: &CStr| offered.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
-    let extensions: Vec<_> =
-        calibrated.into_iter().find(|name| is_offered(name)).map(CStr::as_ptr).into_iter().collect();
-    let info = vk::DeviceCreateInfo::default()
+    let names = calibrated.into_iter().find(|name| is_offered(name)).into_iter();
+    let extensions: Vec<_> = names.chain(RAY_EXTENSIONS.into_iter().filter(|_| rays)).map(CStr::as_ptr).collect();
+    let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
+    let mut queries = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
+    v12.buffer_device_address = rays.into();
+    let mut info = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_extension_names(&extensions)
         .enabled_features(&core)
         .push_next(&mut v12)
         .push_next(&mut v13);
+    if rays {
+        info = info.push_next(&mut structures).push_next(&mut queries);
+    }
     unsafe { instance.create_device(physical, &info, None) }.unwrap()
 }
 
 impl Engine {
     /// A device under core and synchronization validation.
     pub fn new() -> Self {
+        Self::tracing(Tracing::Compute)
+    }
+
+    /// One that was made to trace rays so.
+    pub fn tracing(tracing: Tracing) -> Self {
         let alone = ENGINES.lock().unwrap_or_else(PoisonError::into_inner);
         unsafe {
             let entry = ash::Entry::load().expect("install libvulkan1");
@@ -97,11 +114,12 @@ impl Engine {
                 .user_data((&raw const *messages).cast_mut().cast());
             let messenger = utils.create_debug_utils_messenger(&info, None).unwrap();
             let physical = instance.enumerate_physical_devices().unwrap()[0];
-            let device = device(&instance, physical);
+            let device = device(&instance, physical, tracing);
             let queue = device.get_device_queue(0, 0);
             let pool = device.create_command_pool(&vk::CommandPoolCreateInfo::default(), None).unwrap();
             let messenger = (utils, messenger);
-            Self { _entry: entry, instance, physical, device, queue, pool, messenger, messages, alone: Some(alone) }
+            let alone = Some(alone);
+            Self { _entry: entry, instance, physical, device, queue, pool, messenger, messages, tracing, alone }
         }
     }
 
@@ -117,6 +135,8 @@ impl Engine {
             robust_buffer_access: true,
             cache: None,
             wait_limit: None,
+            tracing: self.tracing,
+            tuning: None,
         }
     }
 
