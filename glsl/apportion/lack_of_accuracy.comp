@@ -13,10 +13,10 @@ layout(scalar, push_constant) uniform Push { ApportionPush push; };
 const uint INITIAL_SAMPLES = 4u;
 
 void main() {
-    uint first = first_item(), items = item_count(first, push.pixels);
+    uint first = first_unordered(), items = unordered_count(first, push.pixels);
     uint64_t per_sample = uint64_t(push.threshold) * push.threshold, total = 0UL;
     for (uint k = 0u; k < items; k++) {
-        uint i = first + k, w = weight[i], have = PixelStats_count(stats, i);
+        uint i = first + k * UNORDERED_STEP, w = weight[i], have = PixelStats_count(stats, i);
         uint64_t squared = uint64_t(w) * w, wanted = squared / per_sample;
         wanted += wanted * per_sample < squared ? 1UL : 0UL; // rounded up
         uint most = min(max(have, INITIAL_SAMPLES), push.enough - min(push.enough, have));

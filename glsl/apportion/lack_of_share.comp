@@ -13,13 +13,13 @@ layout(scalar, push_constant) uniform Push { ApportionPush push; };
 #include "shared/proportion.glsl"
 
 void main() {
-    uint first = first_item(), items = item_count(first, push.pixels);
+    uint first = first_unordered(), items = unordered_count(first, push.pixels);
     Apportionment s = Apportionment_load(state, 0u);
     bool equal = s.equal != 0u;
     Proportion share_of = proportion_of(s);
     uint64_t total = 0UL;
     for (uint k = 0u; k < items; k++) {
-        uint i = first + k;
+        uint i = first + k * UNORDERED_STEP;
         uint64_t share, rest;
         multiply_divide(share_of, equal ? 1u : weight[i], share, rest);
         uint have = PixelStats_count(stats, i);

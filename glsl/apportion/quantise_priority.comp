@@ -20,11 +20,11 @@ const float FIXED_POINT = 1048576.0; // 2^20: the product is exact
 const float MAX_PRIORITY = 4095.0;
 
 void main() {
-    uint first = first_item(), items = item_count(first, push.pixels);
+    uint first = first_unordered(), items = unordered_count(first, push.pixels);
     uint64_t total = 0UL;
     uint broken = 0u, positive = 0u;
     for (uint k = 0u; k < items; k++) {
-        uint i = first + k;
+        uint i = first + k * UNORDERED_STEP;
         float p = texelFetch(priority, int(i)).x;
         uint w = finite(p) && p > 0.0 ? uint(min(p, MAX_PRIORITY) * FIXED_POINT) : 0u;
         weight[i] = w;

@@ -20,13 +20,13 @@ layout(scalar, push_constant) uniform Push { ApportionPush push; };
 void main() {
     Apportionment s = Apportionment_load(state, 0u);
     if (s.settled != 0u) return; // safe: the same for all threads
-    uint first = first_item(), items = item_count(first, push.pixels);
+    uint first = first_unordered(), items = unordered_count(first, push.pixels);
     Proportion share_of = proportion_of(s);
     bool equal = s.equal != 0u;
     uint64_t weights = 0UL, filled = 0UL, floors = 0UL;
     uint settled = 0u, open = 0u;
     for (uint k = 0u; k < items; k++) {
-        uint i = first + k;
+        uint i = first + k * UNORDERED_STEP;
         if (push.step > 0u && is_full(unpackUint2x32(key[i]))) continue;
         uint w = equal ? 1u : texelFetch(weight, int(i)).x, room = room_of(i);
         uint64_t quota, rest;

@@ -16,11 +16,11 @@ void main() {
     if (s.selected != 0u) return; // safe: the same for all threads
     for (uint b = gl_LocalInvocationIndex; b < 256u; b += BLOCK_THREADS) bins[b] = 0u;
     barrier();
-    uint first = first_item(), items = item_count(first, push.pixels);
+    uint first = first_unordered(), items = unordered_count(first, push.pixels);
     uint shift = 24u - 8u * (push.step % 4u);
     bool high = push.step < 4u; // the high word has the first four digits
     for (uint k = 0u; k < items; k++) {
-        uvec2 word = texelFetch(key, int(first + k)).xy;
+        uvec2 word = texelFetch(key, int(first + k * UNORDERED_STEP)).xy;
         if ((word & s.mask) == s.prefix) atomicAdd(bins[((high ? word.y : word.x) >> shift) & 255u], 1u);
     }
     barrier();

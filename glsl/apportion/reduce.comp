@@ -8,9 +8,9 @@ layout(scalar, binding = 1) writeonly buffer Blocks { uint64_t blocks[]; }; // o
 layout(scalar, push_constant) uniform Push { ScanPush push; };
 
 void main() {
-    uint first = first_item(), items = item_count(first, push.pixels);
+    uint first = first_unordered(), items = unordered_count(first, push.pixels);
     uint64_t sum = 0UL;
-    for (uint k = 0u; k < items; k++) sum += texelFetch(counts, int(first + k)).x;
+    for (uint k = 0u; k < items; k++) sum += texelFetch(counts, int(first + k * UNORDERED_STEP)).x;
     sum = block_sum(sum);
     if (gl_LocalInvocationIndex == 0u) blocks[gl_WorkGroupID.x] = sum;
 }

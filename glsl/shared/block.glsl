@@ -6,12 +6,27 @@ layout(constant_id = 103) const uint THREAD_ITEMS = 64u;
 
 shared uint64_t block_words[BLOCK_THREADS];
 
+// Whether neighbouring threads take neighbouring items, so that a GPU reads them together, where their order does not matter.
+layout(constant_id = 108) const bool INTERLEAVED = false;
+const uint UNORDERED_STEP = INTERLEAVED ? BLOCK_THREADS : 1u; // from one of a thread's items to its next
+
 uint first_item() { return (gl_WorkGroupID.x * BLOCK_THREADS + gl_LocalInvocationIndex) * THREAD_ITEMS; }
 
 uint block_count(uint all) { return (all + BLOCK_THREADS * THREAD_ITEMS - 1u) / (BLOCK_THREADS * THREAD_ITEMS); }
 
 // Number of items of a thread. Since it is not a constant, compilers for CPUs do not unroll loops over the items under masks.
 uint item_count(uint first, uint all) { return first < all ? min(THREAD_ITEMS, all - first) : 0u; }
+
+// The same where the order of a block's items does not matter.
+uint first_unordered() {
+    if (!INTERLEAVED) return first_item();
+    return gl_WorkGroupID.x * BLOCK_THREADS * THREAD_ITEMS + gl_LocalInvocationIndex;
+}
+
+uint unordered_count(uint first, uint all) {
+    if (!INTERLEAVED) return item_count(first, all);
+    return first < all ? min(THREAD_ITEMS, (all - first + BLOCK_THREADS - 1u) / BLOCK_THREADS) : 0u;
+}
 
 // Sum over the workgroup, in every thread. All threads must call it.
 uint64_t block_sum(uint64_t value) {

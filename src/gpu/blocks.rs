@@ -19,7 +19,8 @@ impl<B: Bindings<Constants: From<block::Constants>>> PerBlock<B> {
         if !(1..=MOST_ITEMS).contains(&thread_items) {
             return Err(Error::Usage(format!("{thread_items} pixels of a thread: choose 1 to {MOST_ITEMS}")));
         }
-        Ok(Self { kernel: Kernel::new(gpu, &block::Constants { thread_items }.into())?, thread_items })
+        let constants = block::Constants { thread_items, interleaved: gpu.tuning().interleaves };
+        Ok(Self { kernel: Kernel::new(gpu, &constants.into())?, thread_items })
     }
 
     /// Records one workgroup for every block of a film of `pixels` pixels.

@@ -18,6 +18,9 @@ pub struct Tuning {
     /// Pixels per thread of a [`PerBlock`](super::PerBlock) kernel. A few threads keep a CPU busy, and long runs need fewer
     /// barriers; a GPU needs tens of thousands of threads to hide the latency of its memory.
     pub thread_items: u32,
+    /// Whether neighbouring threads of such a kernel take neighbouring pixels in turn, where their order does not matter. A GPU reads
+    /// these together, while lavapipe is fastest where each thread has a run; not tried on a GPU.
+    pub interleaves: bool,
     /// Bytes in a strip of the guided filter's sums. On a CPU most of it fits into the caches; a GPU needs more to be busy.
     pub strip_bytes: u64,
     /// Whether a thread sums the windows of a whole line of the guided filter. Shorter segments each sum their first window
@@ -54,6 +57,7 @@ impl Tuning {
         stripes: 16,
         paths_in_flight: 1 << 20,
         thread_items: 64,
+        interleaves: false,
         strip_bytes: 32 << 20,
         whole_lines: true,
         lines: 8,
@@ -71,6 +75,7 @@ impl Tuning {
         stripes: 1,
         paths_in_flight: 1 << 22,
         thread_items: 16,
+        interleaves: false,
         strip_bytes: 256 << 20,
         whole_lines: false,
         lines: 32,

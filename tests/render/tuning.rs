@@ -103,7 +103,7 @@ fn workgroups_leave_the_bits_of_filters() {
     }
 }
 
-/// Every switch of traversal by itself, and all together, none of which changes a bit.
+/// Every switch of renders by itself, and all together, none of which changes a bit.
 fn switches() -> Vec<(&'static str, Tuning)> {
     let own = Tuning { deals: false, ..Tuning::CPU };
     vec![
@@ -112,7 +112,11 @@ fn switches() -> Vec<(&'static str, Tuning)> {
         ("storage_buffers", Tuning { storage_buffers: true, ..own }),
         ("storage_buffers and deals", Tuning { storage_buffers: true, ..Tuning::CPU }),
         ("triangles_a_step and deals", Tuning { triangles_a_step: 1, ..Tuning::CPU }),
-        ("all", Tuning { native_bits: true, triangles_a_step: 2, storage_buffers: true, ..Tuning::GPU }),
+        ("interleaves", Tuning { interleaves: true, thread_items: 5, ..Tuning::CPU }),
+        (
+            "all",
+            Tuning { native_bits: true, triangles_a_step: 2, storage_buffers: true, interleaves: true, ..Tuning::GPU },
+        ),
     ]
 }
 

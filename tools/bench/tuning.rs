@@ -32,6 +32,9 @@ struct Args {
 /// Filters whose kernels [`Tuning::filter_workgroup`] is for.
 const TIMED: [&str; 5] = ["atrous", "svgf", "wavelet", "bilateral", "auto"];
 
+/// Passes that place samples and depend on [`Tuning::interleaves`].
+const PLACING: [&str; 6] = ["quantise_priority", "lack_of_share", "lack_of_accuracy", "quota", "radix_count", "reduce"];
+
 /// A choice by its name, on a device that was opened for it.
 type Choice = (String, Gpu);
 
@@ -54,6 +57,15 @@ fn of_paths(own: Tuning) -> Vec<(String, Tuning)> {
     let together = Tuning { native_bits: true, storage_buffers: true, triangles_a_step: 2, ..alone };
     all.push((dealt("native_bits, storage_buffers, triangles_a_step 2"), together));
     differing(all)
+}
+
+/// Choices that the placing of samples depends on.
+fn of_placing(own: Tuning) -> Vec<(String, Tuning)> {
+    let items = |interleaves: bool| {
+        let name = move |n: u32| format!("thread_items {n}{}", if interleaves { ", interleaved" } else { "" });
+        [4, 16, 64].map(|thread_items| (name(thread_items), Tuning { thread_items, interleaves, ..own }))
+    };
+    differing([("own".to_owned(), own)].into_iter().chain(items(false)).chain(items(true)).collect())
 }
 
 /// Choices that filters depend on.
@@ -91,6 +103,19 @@ fn paths(gpu: &Gpu, scene: &Loaded) -> Result<Run> {
     }))
 }
 
+/// What order-free passes take of a render that places its samples by noise and geometry.
+fn placing(gpu: &Gpu, scene: &Loaded) -> Result<Run> {
+    let mut settings = scene.settings.clone();
+    settings.allocate.policy = tallow::allocate::policy("both").context("no such policy")?;
+    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    let renderer = Renderer::new(gpu, scene, &settings, outputs)?;
+    let mut frame = FrameResources::new(gpu)?;
+    Ok(Box::new(move || {
+        let times = Job::new(&renderer).run_to_end(&mut frame)?.times;
+        Ok(milliseconds(times.iter().filter(|pass| PLACING.contains(&pass.name))))
+    }))
+}
+
 fn filter(gpu: &Gpu, scene: &Loaded, name: &str) -> Result<Run> {
     let outputs = Outputs { split_light: true, guides: true, counters: false };
     let renderer = Renderer::new(gpu, scene, &scene.settings, outputs)?;
@@ -125,12 +150,15 @@ fn main() -> Result<()> {
     let Args { scenes, rounds, width, height, spp } = Args::parse();
     let device = open(None)?;
     println!("{}", device.info().name);
-    let (for_paths, for_filters) = (choices(of_paths(*device.tuning()))?, choices(of_filters(*device.tuning()))?);
+    let own = *device.tuning();
+    let [for_paths, for_placing, for_filters] = [of_paths(own), of_placing(own), of_filters(own)].map(choices);
+    let (for_paths, for_placing, for_filters) = (for_paths?, for_placing?, for_filters?);
     let small = |s: &mut Settings| (s.width, s.height, s.spp) = (width, height, spp);
     for file in scenes {
         let scene = Scene::load(&file)?.with(small);
         println!("{}, {width} x {height}, {spp} samples", file.display());
         compare("paths", &for_paths, rounds, |gpu| paths(gpu, &scene))?;
+        compare("placing", &for_placing, rounds, |gpu| placing(gpu, &scene))?;
         for name in TIMED {
             compare(name, &for_filters, rounds, |gpu| filter(gpu, &scene, name))?;
         }
