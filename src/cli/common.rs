@@ -63,9 +63,8 @@ impl Common {
             device: self.device.clone(),
             validation: self.validation,
             cache: gpu::cache_folder(),
-            wait_limit: None,
             tracing,
-            tuning: None,
+            ..DeviceOptions::default()
         })
     }
 

@@ -9,7 +9,7 @@ use super::{Exit, complain, fail_on_messages, interrupt, print, print_json};
 use crate::cost::document::SceneInfo;
 use crate::cost::{Document, Ended, Images, Plan, Watch, key, measure, others, reference};
 use crate::error::{Error, Result};
-use crate::gpu::{self, DeviceOptions, Gpu, Tracing};
+use crate::gpu::{self, DeviceOptions, Gpu};
 use crate::scene::{Scene, SceneFile};
 pub use options::Args;
 use output::{Folder, Shown, text};
@@ -109,9 +109,7 @@ fn open(args: &Args) -> Result<Gpu> {
         device: args.device.clone(),
         validation: args.validation,
         cache: gpu::cache_folder(),
-        wait_limit: None,
-        tracing: Tracing::Auto,
-        tuning: None,
+        ..DeviceOptions::default()
     })
 }
 

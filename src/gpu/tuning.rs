@@ -35,8 +35,9 @@ pub struct Tuning {
     /// many GPUs do slowly. lavapipe takes as long. Not tried on a GPU.
     pub native_bits: bool,
     /// Most triangles that a ray tests before it visits its next node; 0 for all. Rays of a subgroup wait for the one with the
-    /// most triangles. Where triangles are dealt, only rays from the eye have such a limit. With 2 paths in the Cornell box
-    /// take lavapipe a quarter longer. Not tried on a GPU; in a simulation of one, incoherent rays gained most from 2.
+    /// most triangles. Where triangles are dealt, only rays from the eye have such a limit, in scenes without masks and spheres.
+    /// With 2 paths in the Cornell box take lavapipe a quarter longer. Not tried on a GPU; in a simulation of one, incoherent
+    /// rays gained most from 2.
     pub triangles_a_step: u32,
     /// Whether kernels that trace rays read storage buffers in place of texel buffers, which some GPUs read through the slower
     /// path of textures. An array of a scene can then have at most the bytes of one storage binding. Devices whose kernels can
@@ -69,7 +70,7 @@ impl Tuning {
         longest_edge: 60_000,
     };
 
-    /// For all others.
+    /// For GPUs, and whatever else is no CPU.
     pub const GPU: Self = Self {
         workgroup: 64,
         stripes: 1,

@@ -2,13 +2,13 @@
 //! filter here as those that suit a CPU.
 use crate::support::{assert_silent, render, tuned_gpu};
 use std::path::Path;
-use tallow::denoise::filter::{FILTERS, FilterSettings};
+use tallow::denoise::filter::{FILTERS, FilterSettings, Row};
 use tallow::denoise::{Demodulation, Denoiser};
 use tallow::error::Error;
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu, Tuning};
 use tallow::layout::vec4;
 use tallow::render::settings::Settings;
-use tallow::render::{Outputs, Renderer};
+use tallow::render::{Counters, Outputs, Renderer};
 use tallow::scene::{Loaded, Scene};
 
 const OUTPUTS: Outputs = Outputs { split_light: true, guides: true, counters: true };
@@ -27,19 +27,18 @@ fn bits<T: bytemuck::Pod>(values: &[T]) -> Vec<u32> {
 }
 
 /// Every word that a render leaves: pixels, light, primary hits and counters.
-fn film(gpu: &Gpu, scene: &Loaded) -> Vec<Vec<u32>> {
+fn film(gpu: &Gpu, scene: &Loaded) -> ([Vec<u32>; 3], Counters) {
     let renderer = Renderer::new(gpu, scene, &scene.settings, OUTPUTS).unwrap();
     let stats = render(gpu, &renderer);
     let tile = &renderer.film().tiles[0];
     let (light, guide) = (tile.light.read().unwrap(), tile.guide.read().unwrap());
-    let counters = format!("{:?}", renderer.counters().unwrap()).into_bytes().into_iter().map(u32::from).collect();
-    vec![bits(&stats), bits(&light), bits(&guide), counters]
+    ([bits(&stats), bits(&light), bits(&guide)], renderer.counters().unwrap())
 }
 
 fn filtered(gpu: &Gpu, scene: &Loaded) -> Vec<(&'static str, Vec<vec4>)> {
     let renderer = Renderer::new(gpu, scene, &scene.settings, OUTPUTS).unwrap();
     render(gpu, &renderer);
-    let filter = |row: &&tallow::denoise::filter::Row| {
+    let filter = |row: &&Row| {
         let denoiser = Denoiser::new(gpu, &renderer, row, &FilterSettings::default(), Demodulation::Light).unwrap();
         gpu.run(&mut FrameResources::new(gpu).unwrap(), |rec| denoiser.record(rec)).unwrap();
         (row.name, denoiser.picture().read().unwrap())

@@ -32,9 +32,8 @@ pub fn profile(args: &Args) -> Result<(Profile, Option<String>)> {
         device: args.device.clone(),
         validation: args.validation,
         cache: gpu::cache_folder(),
-        wait_limit: None,
         tracing: args.tracing,
-        tuning: None,
+        ..DeviceOptions::default()
     })?;
     check_room(args, &settings, &gpu)?;
     let count = usize::from(args.frames);
