@@ -29,7 +29,8 @@ pub struct Tuning {
     pub whole_lines: bool,
     /// Lines of the guided filter's windows per workgroup.
     pub lines: u32,
-    /// Whether lanes test the triangles of each other's rays, see `glsl/shared/deal.glsl`. Not tried on a GPU.
+    /// Whether lanes test the triangles of each other's rays, see `glsl/shared/deal.glsl`. Not tried on a GPU. On a CPU they do so
+    /// only where its driver has an instruction by which they read each other's values: with AVX2 and eight lanes.
     pub deals: bool,
     /// Whether traversal uses instructions that find and count bits, and makes floats of bytes without converting them, which
     /// many GPUs do slowly. lavapipe takes as long. Not tried on a GPU.

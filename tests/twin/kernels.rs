@@ -397,7 +397,7 @@ impl Traversal {
 }
 
 /// All lanes of this device's subgroups, whether or not it gains from dealing triangles to them.
-fn dealing(gpu: &Gpu) -> shared::deal::Constants {
+pub fn dealing(gpu: &Gpu) -> shared::deal::Constants {
     let info = gpu.info();
     let able = info.subgroup_shuffle && info.subgroup_size_fixed && matches!(info.subgroup_size, 4 | 8 | 16 | 32);
     shared::deal::Constants { lanes: if able { info.subgroup_size } else { 0 } }
