@@ -3,12 +3,16 @@
 
 // Replaces each weight by the samples that the pixel lacks to reach the error threshold t. The error of a mean of n samples
 // is w / sqrt(n), so that it lacks ceil((w / t)^2) - n. It gets at most as many as it has (or INITIAL_SAMPLES), because its
-// n samples are all that the noise is known from. A thread has THREAD_ITEMS pixels, a workgroup sums one block.
+// n samples are all that the noise is known from. A thread has THREAD_ITEMS pixels, a workgroup sums one block; the
+// last one starts the apportionment by these.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
 layout(scalar, binding = 1) buffer Weights { uint weight[]; };
-layout(scalar, binding = 2) writeonly buffer Sums { BlockSums sums[]; };
+layout(scalar, binding = 2) coherent buffer Sums { BlockSums sums[]; };
+layout(scalar, binding = 3) buffer States { Apportionment state[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
+
+#include "shared/start_apportionment.glsl"
 
 const uint INITIAL_SAMPLES = 4u;
 
@@ -30,4 +34,5 @@ void main() {
         sum.weights = unpackUint2x32(weights);
         sums[gl_WorkGroupID.x] = sum;
     }
+    start_apportionment(true);
 }

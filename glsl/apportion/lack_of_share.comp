@@ -2,19 +2,20 @@
 #include "shared/block.glsl"
 
 // Replaces each weight w, a share of all samples past and next, by the samples that the pixel lacks of that share:
-// max(0, floor(total * w / W) - count), W the sum of the weights. A thread has THREAD_ITEMS pixels, a workgroup sums one block.
+// max(0, floor(total * w / W) - count), W the sum of the weights. A thread has THREAD_ITEMS pixels, a workgroup sums one block;
+// the last one starts the apportionment by these.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
-layout(binding = 1) uniform usamplerBuffer state; // of Apportionment
+layout(scalar, binding = 1) buffer States { Apportionment state[]; };
 layout(scalar, binding = 2) buffer Weights { uint weight[]; };
-layout(scalar, binding = 3) writeonly buffer Sums { BlockSums sums[]; };
+layout(scalar, binding = 3) coherent buffer Sums { BlockSums sums[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
 
-#include "shared/proportion.glsl"
+#include "shared/start_apportionment.glsl"
 
 void main() {
     uint first = first_unordered(), items = unordered_count(first, push.pixels);
-    Apportionment s = Apportionment_load(state, 0u);
+    Apportionment s = state[0];
     bool equal = s.equal != 0u;
     Proportion share_of = proportion_of(s);
     uint64_t total = 0UL;
@@ -33,4 +34,5 @@ void main() {
         sum.weights = unpackUint2x32(weights);
         sums[gl_WorkGroupID.x] = sum;
     }
+    start_apportionment(true);
 }

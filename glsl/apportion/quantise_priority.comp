@@ -3,18 +3,20 @@
 #include "shared/finite.glsl"
 
 // First pass of an apportionment: turns priorities into integer weights, 12.20 fixed point, so that all that follows is
-// exact. A priority that is not finite gets weight 0 and is counted. A workgroup sums one block.
+// exact. A priority that is not finite gets weight 0 and is counted. A workgroup sums one block; the last one starts the
+// apportionment.
 //
-// The passes in order: quantise_priority, sum_weights; then, where weights are shares or errors, lack_of_share or
-// lack_of_accuracy, and sum_weights again; quota and redistribute, repeated; radix_count and radix_select for each of the
-// remainders' 8 digits; tie_sums, scan_block_sums, give_remainders. The scan of the counts follows: reduce,
-// scan_block_sums, offsets; and sample_list for every batch. The method is Hamilton's (largest remainders), with an upper
-// limit for every pixel.
+// The passes in order: quantise_priority; then, where weights are shares or errors, lack_of_share or lack_of_accuracy; quota,
+// repeated; radix_select for each of the remainders' 8 digits; tie_sums, give_remainders. The scan of the counts follows: reduce,
+// offsets; and sample_list for every batch. The method is Hamilton's (largest remainders), with an upper limit for every pixel.
 layout(local_size_x = 64) in;
 layout(binding = 0) uniform samplerBuffer priority; // of float
 layout(scalar, binding = 1) writeonly buffer Weights { uint weight[]; };
-layout(scalar, binding = 2) writeonly buffer Sums { BlockSums sums[]; };
+layout(scalar, binding = 2) coherent buffer Sums { BlockSums sums[]; };
+layout(scalar, binding = 3) buffer States { Apportionment state[]; };
 layout(scalar, push_constant) uniform Push { ApportionPush push; };
+
+#include "shared/start_apportionment.glsl"
 
 const float FIXED_POINT = 1048576.0; // 2^20: the product is exact
 const float MAX_PRIORITY = 4095.0;
@@ -41,4 +43,5 @@ void main() {
         sum.open = counts.y;
         sums[gl_WorkGroupID.x] = sum;
     }
+    start_apportionment(false);
 }

@@ -43,11 +43,10 @@ gpu_structs! {
         pixels: uint,
         /// Largest number of samples of a pixel, those it has included; NONE when the budget can fill none.
         limit: uint,
-        /// How often the same kernel ran before in this apportionment. In `quota` and `redistribute` it is the repetition, in
-        /// `radix_count` and `radix_select` the digit, 0 the highest; in `sum_weights` 0 follows `quantise_priority`, and 1
-        /// `lack_of_share` or `lack_of_accuracy`.
+        /// How often the same kernel ran before in this apportionment. In `quota` it is the repetition, in `radix_select` the
+        /// digit, 0 the highest.
         step: uint,
-        /// Largest number of repetitions of `quota` and `redistribute`, at least 1.
+        /// Largest number of repetitions of `quota`, at least 1.
         repetitions: uint,
         /// Samples to place, 64 bits.
         budget: uvec2,

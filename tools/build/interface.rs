@@ -264,7 +264,7 @@ fn parse_storage(line: &str) -> Option<Binding> {
     let access = match rest.split_once(" buffer ")?.0.trim() {
         "readonly" => "Read",
         "writeonly" => "Write",
-        "" => "ReadWrite",
+        "" | "coherent" => "ReadWrite",
         _ => return None,
     };
     let (in_glsl, field) = member(rest)?;

@@ -2,32 +2,29 @@
 //! Kernels: `glsl/apportion/*.comp`. Twin: [`crate::twins::apportion`].
 //!
 //! ```text
-//! priority -> quantise_priority -> sum_weights          weights in fixed point, and their sum
+//! priority -> quantise_priority       weights in fixed point, and their sum
 //!                  |
-//!          lack_of_share or lack_of_accuracy            only where past samples count: what is missing of a share of
-//!                  |                                    all samples, or of an accuracy; then
-//!             sum_weights                               the sum of that
+//!          lack_of_share or           only where past samples count: what is missing of a share of all samples,
+//!          lack_of_accuracy           or of an accuracy, and the sum of that
 //!                  |
-//!       +-----> quota ------> redistribute --+          whole samples: floor(budget * weight / sum). What full pixels
-//!       +------- `rounds` times -------------+          leave is apportioned again
+//!       +-----> quota -----+          whole samples: floor(budget * weight / sum). What full pixels leave is apportioned again
+//!       +-- `rounds` times-+
 //!                  |
-//!       +--> radix_count --> radix_select ---+          the rest, one sample each for the largest remainders: a digit of
-//!       +------- 8 digits -------------------+          the smallest of them at a time
+//!       +--> radix_select -+          the rest, one sample each for the largest remainders: a digit of the smallest of them at
+//!       +---- 8 digits ----+          a time
 //!                  |
-//!       tie_sums -> scan_block_sums -> give_remainders  of equal ones, those of the lowest pixels
+//!       tie_sums -> give_remainders   of equal ones, those of the lowest pixels
 //!                  |
 //!                count
 //! ```
 use super::counts::Counts;
-use super::scan::Blocks;
 use crate::error::Result;
 use crate::gpu::PerBlock;
 use crate::gpu::{Buffer, Gpu, Recorder};
 use crate::layout::{ApportionPush, NONE, PixelStats};
 use crate::render::schedule::{Plan, Share};
 use crate::shaders::{
-    give_remainders, lack_of_accuracy, lack_of_share, quantise_priority, quota, radix_count, radix_select,
-    redistribute, sum_weights, tie_sums,
+    give_remainders, lack_of_accuracy, lack_of_share, quantise_priority, quota, radix_select, tie_sums,
 };
 
 /// Digits of a remainder, and the values of each.
@@ -36,15 +33,11 @@ const DIGITS: u32 = 8;
 /// The kernels.
 pub struct Apportion {
     weigh: PerBlock<quantise_priority::Bind<'static>>,
-    total: PerBlock<sum_weights::Bind<'static>>,
     deficit: PerBlock<lack_of_share::Bind<'static>>,
     need: PerBlock<lack_of_accuracy::Bind<'static>>,
     quota: PerBlock<quota::Bind<'static>>,
-    settle: PerBlock<redistribute::Bind<'static>>,
-    digit: PerBlock<radix_count::Bind<'static>>,
     pick: PerBlock<radix_select::Bind<'static>>,
     ties: PerBlock<tie_sums::Bind<'static>>,
-    blocks: Blocks,
     spread: PerBlock<give_remainders::Bind<'static>>,
 }
 
@@ -56,15 +49,11 @@ impl Apportion {
     pub fn new(gpu: &Gpu, thread_items: u32) -> Result<Self> {
         Ok(Self {
             weigh: PerBlock::new(gpu, thread_items)?,
-            total: PerBlock::new(gpu, thread_items)?,
             deficit: PerBlock::new(gpu, thread_items)?,
             need: PerBlock::new(gpu, thread_items)?,
             quota: PerBlock::new(gpu, thread_items)?,
-            settle: PerBlock::new(gpu, thread_items)?,
-            digit: PerBlock::new(gpu, thread_items)?,
             pick: PerBlock::new(gpu, thread_items)?,
             ties: PerBlock::new(gpu, thread_items)?,
-            blocks: Blocks::new(gpu, thread_items)?,
             spread: PerBlock::new(gpu, thread_items)?,
         })
     }
@@ -75,50 +64,38 @@ impl Apportion {
     /// [`crate::error::Error::Device`].
     pub fn record(&self, rec: &mut Recorder, stats: &Buffer<PixelStats>, c: &Counts, plan: &Plan) -> Result<()> {
         let (push, n) = (|round| push(plan, round), plan.pixels);
-        let bind = quantise_priority::Bind { priority: &c.priority, weight: &c.weight, sums: &c.sums };
+        let (sums, state, last_block) = (&c.sums, &c.state, c.last_block());
+        let bind = quantise_priority::Bind { priority: &c.priority, weight: &c.weight, sums, state, last_block };
         self.weigh.record(rec, bind, &push(0), n)?;
-        self.total.record_one(rec, sum_weights::Bind { sums: &c.sums, state: &c.state }, &push(0))?;
         match plan.share {
             Share::Next => {}
             Share::All(_) => {
-                let bind = lack_of_share::Bind { stats, state: &c.state, weight: &c.weight, sums: &c.sums };
+                let bind = lack_of_share::Bind { stats, state, weight: &c.weight, sums, last_block };
                 self.deficit.record(rec, bind, &push(0), n)?;
             }
             Share::Need { .. } => {
-                let bind = lack_of_accuracy::Bind { stats, weight: &c.weight, sums: &c.sums };
+                let bind = lack_of_accuracy::Bind { stats, weight: &c.weight, sums, state, last_block };
                 self.need.record(rec, bind, &push(0), n)?;
             }
         }
-        if plan.share != Share::Next {
-            self.total.record_one(rec, sum_weights::Bind { sums: &c.sums, state: &c.state }, &push(1))?;
-        }
         for round in 0..plan.rounds {
-            let bind = quota::Bind {
-                weight: &c.weight,
-                stats,
-                state: &c.state,
-                key: &c.offset,
-                count: &c.count,
-                sums: &c.sums,
-            };
+            let (weight, key, count) = (&c.weight, &c.offset, &c.count);
+            let bind = quota::Bind { weight, stats, state, key, count, sums, last_block };
             self.quota.record(rec, bind, &push(round), n)?;
-            self.settle.record_one(rec, redistribute::Bind { sums: &c.sums, state: &c.state }, &push(round))?;
         }
         self.record_remainders(rec, stats, c, plan)
     }
 
     fn record_remainders(&self, rec: &mut Recorder, stats: &Buffer<PixelStats>, c: &Counts, plan: &Plan) -> Result<()> {
-        for round in 0..DIGITS {
-            let push = push(plan, round);
-            let bind = radix_count::Bind { key: &c.offset, state: &c.state, histogram: &c.histogram };
-            self.digit.record(rec, bind, &push, plan.pixels)?;
-            self.pick.record_one(rec, radix_select::Bind { state: &c.state, histogram: &c.histogram }, &push)?;
+        let (key, state, blocks, last_block) = (&c.offset, &c.state, &c.blocks, c.last_block());
+        for digit in 0..DIGITS {
+            let bind = radix_select::Bind { key, state, histogram: &c.histogram, last_block };
+            self.pick.record(rec, bind, &push(plan, digit), plan.pixels)?;
         }
         let push = push(plan, 0);
-        let bind = tie_sums::Bind { key: &c.offset, stats, counts: &c.count, state: &c.state, blocks: &c.blocks };
+        let bind = tie_sums::Bind { key, stats, counts: &c.count, state, blocks, last_block };
         self.ties.record(rec, bind, &push, plan.pixels)?;
-        self.blocks.record(rec, &c.blocks, plan.pixels)?;
-        let bind = give_remainders::Bind { key: &c.offset, stats, state: &c.state, blocks: &c.blocks, count: &c.count };
+        let bind = give_remainders::Bind { key, stats, state, blocks, count: &c.count };
         self.spread.record(rec, bind, &push, plan.pixels)
     }
 }

@@ -2,6 +2,7 @@
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Location, block_count};
 use crate::layout::{Apportionment, BlockSums, uvec2};
+use crate::shaders::shared::last_block;
 
 /// Values of a digit of a remainder.
 pub const BINS: usize = 256;
@@ -21,6 +22,8 @@ pub struct Counts {
     pub(super) sums: Buffer<BlockSums>,
     pub(super) blocks: Buffer<uvec2>,
     pub(super) histogram: Buffer<u32>,
+    /// Workgroups that a dispatch has ended.
+    ended: Buffer<u32>,
 }
 
 impl Counts {
@@ -42,10 +45,11 @@ impl Counts {
             sums: Buffer::new(gpu, "sums", of_blocks, Location::Device)?,
             blocks: Buffer::new(gpu, "blocks", of_blocks, Location::Device)?,
             histogram: Buffer::from_slice(gpu, "histogram", &[0; BINS])?,
+            ended: Buffer::from_slice(gpu, "ended", &[0])?,
         })
     }
 
-    pub(super) fn blocks(&self) -> &Buffer<uvec2> {
-        &self.blocks
+    pub(super) fn last_block(&self) -> last_block::Bind<'_> {
+        last_block::Bind { ended: &self.ended }
     }
 }

@@ -1,11 +1,9 @@
-#include "shared/block.glsl"
+// Replaces the sums of blocks in `blocks` by the sums before them. Needs `blocks` and `push`.
+#include "shared/last_block.glsl"
 
-// Replaces the blocks' sums by their exclusive scan. One workgroup runs, each thread with consecutive blocks.
-layout(local_size_x = 64) in;
-layout(scalar, binding = 0) buffer Blocks { uint64_t blocks[]; }; // of uvec2
-layout(scalar, push_constant) uniform Push { ScanPush push; };
-
-void main() {
+// To be called by all threads once their block's sum is written; the last workgroup does it, each thread with consecutive blocks.
+void scan_blocks() {
+    if (!is_last_block()) return; // safe: the same for all threads
     uint count = block_count(push.pixels), run = (count + BLOCK_THREADS - 1u) / BLOCK_THREADS;
     uint first = gl_LocalInvocationIndex * run, end = min(first + run, count);
     uint64_t mine = 0UL, total;
