@@ -52,10 +52,8 @@ const HEADER: &str = "#version 460
 #extension GL_GOOGLE_include_directive : require
 ";
 
-/// Kernels that mention it are compiled once more with it defined, for devices whose subgroups cannot shuffle.
-const PLAIN: &str = "NO_SHUFFLE";
-
-/// Likewise, for devices that trace rays by ray queries. Lanes then have no triangles to deal to each other.
+/// Kernels that mention it are compiled once more with it defined, for devices that trace rays by ray queries. Lanes then have no
+/// triangles to deal to each other.
 const RAY_QUERY: &str = "RAY_QUERY";
 
 /// Kernels that include it are compiled once more with storage buffers in place of texel buffers, for devices that read those
@@ -114,8 +112,6 @@ struct Kernel<'a> {
     interface: Interface,
     /// Its code for most devices.
     usual: Code<'a>,
-    /// That for devices whose subgroups cannot shuffle, if it differs.
-    plain: Option<Code<'a>>,
     /// That for devices that trace rays by ray queries, if it traces any.
     ray_query: Option<Code<'a>>,
     /// The usual one with storage buffers in place of texel buffers, if it traces rays.
@@ -139,17 +135,14 @@ impl<'a> Kernel<'a> {
             let binary = compiled.join(format!("{name}-{:016x}.spv", xxh3_64(whole.as_bytes())));
             Code { file, whole, binary }
         };
-        let define = |name: &&str| format!("#define {name}\n");
-        let defining = |names: &[&str]| code(&names.iter().map(define).collect::<String>(), &text);
-        let plain = text.contains(PLAIN).then(|| defining(&[PLAIN]));
-        let ray_query = text.contains(RAY_QUERY).then(|| defining(&[RAY_QUERY, PLAIN]));
+        let ray_query = text.contains(RAY_QUERY).then(|| code(&format!("#define {RAY_QUERY}\n"), &text));
         let traces = sources.iter().any(|(file, _)| file == TRACES);
         let storage = traces.then(|| code("", &structs::storage_form(&text)));
-        Ok(Self { name, file, usual: code("", &text), plain, ray_query, storage, interface })
+        Ok(Self { name, file, usual: code("", &text), ray_query, storage, interface })
     }
 
     fn code(&self) -> impl Iterator<Item = &Code<'a>> {
-        let more = [&self.plain, &self.ray_query, &self.storage];
+        let more = [&self.ray_query, &self.storage];
         [&self.usual].into_iter().chain(more.into_iter().flatten())
     }
 }
@@ -189,10 +182,9 @@ fn generate(files: &[PathBuf], root: &str, target: &Path) -> Result<()> {
         for compiled in kernel.code() {
             hash.update(&fs::read(&compiled.binary)?);
         }
-        let Kernel { name, file, interface, usual, plain, ray_query, storage } = kernel;
+        let Kernel { name, file, interface, usual, ray_query, storage } = kernel;
         let binaries = Binaries {
             usual: &usual.binary,
-            plain: &plain.as_ref().unwrap_or(usual).binary,
             ray_query: ray_query.as_ref().map(|code| &*code.binary),
             storage: storage.as_ref().map(|code| &*code.binary),
         };

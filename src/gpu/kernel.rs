@@ -61,8 +61,9 @@ impl Slot {
 /// The interface of a kernel. The build script implements it for the `Bind` struct of every kernel.
 ///
 /// # Safety
-/// - [`Self::SPIRV`] and [`Self::PLAIN_SPIRV`] are valid code for Vulkan 1.3 and the features in [`super::REQUIRED_FEATURES`],
-///   with an entry point `main` for compute; [`Self::SLOTS`] are their descriptors, all in set 0, with numbers that differ.
+/// - [`Self::SPIRV`] is valid code for Vulkan 1.3 and the features in [`super::REQUIRED_FEATURES`], with an entry point `main` for
+///   compute; subgroups do nothing in it unless a constant asks for it; [`Self::SLOTS`] are its descriptors, all in set 0, with
+///   numbers that differ.
 ///   [`Self::RAY_QUERY`] is the same with VK_KHR_ray_query, and has an acceleration structure as one more descriptor.
 ///   [`Self::STORAGE_SPIRV`] is the same with storage buffers for texel buffers.
 /// - [`Self::Push`] is its push constants: at most 128 bytes, a multiple of 4. Elements of [`SlotKind::Uniform`] have at most
@@ -109,13 +110,11 @@ pub unsafe trait Bindings {
     type Constants: Specialise;
     /// Basename of the GLSL file, which is also the label of the pass.
     const NAME: &'static str;
-    /// The compiled code of the kernel. Its subgroups may shuffle.
+    /// The compiled code of the kernel.
     const SPIRV: &'static [u8];
-    /// The code for devices whose subgroups cannot.
-    const PLAIN_SPIRV: &'static [u8] = Self::SPIRV;
     /// The code for devices that trace by ray queries; none for a kernel that traces no rays.
     const RAY_QUERY: Option<RayQueryCode> = None;
-    /// The code with storage buffers in place of texel buffers, whose subgroups may shuffle; none for a kernel that traces no rays.
+    /// The code with storage buffers in place of texel buffers; none for a kernel that traces no rays.
     const STORAGE_SPIRV: Option<&'static [u8]> = None;
     /// The slots, in the order of the fields of the `Bind` struct.
     const SLOTS: &'static [Slot];
@@ -235,13 +234,12 @@ fn form<B: Bindings>(gpu: &Gpu) -> Form {
     if let Some(code) = B::RAY_QUERY.filter(|_| gpu.traces_by_ray_query()) {
         return Form { spirv: code.spirv, slots: B::SLOTS.into(), world: Some(code.binding) };
     }
-    let shuffles = gpu.info().subgroup_shuffle;
     let room = gpu.0.limits.max_per_stage_descriptor_storage_buffers as usize;
-    let fits = gpu.tuning().storage_buffers && shuffles && B::SLOTS.len() <= room;
+    let fits = gpu.tuning().storage_buffers && B::SLOTS.len() <= room;
     if let Some(spirv) = B::STORAGE_SPIRV.filter(|_| fits) {
         return Form { spirv, slots: B::SLOTS.iter().map(|slot| slot.without_texels()).collect(), world: None };
     }
-    Form { spirv: if shuffles { B::SPIRV } else { B::PLAIN_SPIRV }, slots: B::SLOTS.into(), world: None }
+    Form { spirv: B::SPIRV, slots: B::SLOTS.into(), world: None }
 }
 
 /// Returns the pipeline of `recipe`, which is compiled if the device does not have it.
@@ -293,13 +291,24 @@ mod tests {
     }
 
     #[test]
-    fn plain_code_runs_where_subgroups_cannot_shuffle() {
-        use crate::shaders::path::{PLAIN_SPIRV, SPIRV};
+    fn code_runs_where_subgroups_cannot_shuffle_unless_triangles_are_dealt() {
+        use crate::gpu::Bindings;
+        use crate::layout::Effects;
+        use crate::shaders::{path, shared::deal};
         const GROUP_NON_UNIFORM: u32 = 61;
-        const GROUP_NON_UNIFORM_SHUFFLE: u32 = 65;
-        assert!(declares(SPIRV, GROUP_NON_UNIFORM_SHUFFLE));
-        assert!(!declares(PLAIN_SPIRV, GROUP_NON_UNIFORM_SHUFFLE) && !declares(PLAIN_SPIRV, GROUP_NON_UNIFORM));
-        assert!(declares(PLAIN_SPIRV, 1), "control: every kernel declares Shader");
+        const SHUFFLE: u32 = 65;
+        for code in [path::SPIRV, <path::Bind as Bindings>::STORAGE_SPIRV.unwrap()] {
+            let code: Vec<u32> = bytemuck::pod_collect_to_vec(code);
+            let [alone, dealt] = [0, 8].map(|lanes| {
+                let deal = deal::Constants { lanes };
+                let constants = path::Constants { effects: Effects::ALL, deal, ..Default::default() };
+                let code = crate::spirv::specialise(&code, &constants.entries());
+                bytemuck::cast_slice::<u32, u8>(&code).to_vec()
+            });
+            assert!(declares(&dealt, GROUP_NON_UNIFORM) && declares(&dealt, SHUFFLE));
+            assert!(!declares(&alone, GROUP_NON_UNIFORM) && !declares(&alone, SHUFFLE));
+            assert!(declares(&alone, 1), "control: every kernel declares Shader");
+        }
     }
 
     #[test]
@@ -319,7 +328,7 @@ mod tests {
         const RAY_QUERY: u32 = 4472;
         let code = <path::Bind as Bindings>::RAY_QUERY.unwrap().spirv;
         assert!(declares(code, RAY_QUERY));
-        assert!(!declares(path::SPIRV, RAY_QUERY) && !declares(path::PLAIN_SPIRV, RAY_QUERY));
+        assert!(!declares(path::SPIRV, RAY_QUERY));
         assert!(<accumulate::Bind as Bindings>::RAY_QUERY.is_none(), "it traces no rays");
     }
 }

@@ -2,6 +2,8 @@
 pub const UNDEF: u16 = 1;
 pub const NAME: u16 = 5;
 pub const EXT_INST: u16 = 12;
+pub const ENTRY_POINT: u16 = 15;
+pub const CAPABILITY: u16 = 17;
 /// The first and the last of those that declare types.
 pub const TYPE_VOID: u16 = 19;
 pub const TYPE_FUNCTION: u16 = 33;
@@ -21,6 +23,8 @@ pub const SPEC_CONSTANT_OP: u16 = 52;
 pub const FUNCTION: u16 = 54;
 #[cfg(test)]
 pub const FUNCTION_END: u16 = 56;
+pub const VARIABLE: u16 = 59;
+pub const LOAD: u16 = 61;
 pub const DECORATE: u16 = 71;
 pub const I_ADD: u16 = 128;
 pub const I_SUB: u16 = 130;
@@ -55,3 +59,6 @@ pub const SWITCH: u16 = 251;
 #[cfg(test)]
 pub const RETURN: u16 = 253;
 pub const UNREACHABLE: u16 = 255;
+/// The first and the last of those of subgroups.
+pub const GROUP_NON_UNIFORM_ELECT: u16 = 333;
+pub const GROUP_NON_UNIFORM_QUAD_SWAP: u16 = 366;

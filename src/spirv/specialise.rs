@@ -5,10 +5,17 @@
 use super::flow::{Blocks, Flow, Value, label};
 use super::instruction::{BOUND, HEADER, Instruction, instructions};
 use super::op;
+use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// The decoration that names a specialisation constant by a number.
 const SPEC_ID: u32 = 1;
+/// The decoration of what the device provides, and of that the number of a thread within its subgroup.
+const BUILT_IN: u32 = 11;
+const SUBGROUP_LOCAL_INVOCATION_ID: u32 = 41;
+/// Capabilities of subgroups, the first and the last.
+const GROUP_NON_UNIFORM: u32 = 61;
+const GROUP_NON_UNIFORM_QUAD: u32 = 68;
 
 /// `module` with its specialisation constants set to `constants`, given as (constant id, value); others keep their defaults. What is no
 /// module is returned as it is, for the driver to refuse.
@@ -23,11 +30,8 @@ pub fn specialise(module: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
     }
     let mut whole = module[..HEADER].to_vec();
     whole[BOUND] = specialised.bound;
-    let is_left = |(opcode, words): &&(u16, Vec<u32>)| {
-        !matches!(*opcode, op::NAME | op::DECORATE) || !specialised.removed.contains(&words[0])
-    };
-    for (opcode, words) in declared.iter().filter(is_left) {
-        Instruction { opcode: *opcode, words }.write(&mut whole);
+    for (opcode, words) in declared.iter().filter_map(|declaration| specialised.left_of(declaration)) {
+        Instruction { opcode, words: &words }.write(&mut whole);
     }
     for (&kind, &id) in &specialised.undefined {
         Instruction { opcode: op::UNDEF, words: &[kind, id] }.write(&mut whole);
@@ -52,6 +56,10 @@ struct Specialised<'a> {
     body: Vec<u32>,
     /// Results of instructions that were left out.
     removed: HashSet<u32>,
+    /// Variables that hold the number of a thread within its subgroup.
+    lanes: HashSet<u32>,
+    /// Whether something is left that subgroups do together.
+    by_subgroups: bool,
     /// Undefined values by their type, for the edges from [`Stubs`].
     undefined: BTreeMap<u32, u32>,
     /// All ids are below it.
@@ -60,8 +68,26 @@ struct Specialised<'a> {
 
 impl<'a> Specialised<'a> {
     fn new(bound: u32, constants: &'a [(u32, u32)]) -> Self {
-        let (numbers, types, boolean, body, removed, undefined) = Default::default();
-        Self { constants, numbers, types, boolean, flow: Flow::new(bound), body, removed, undefined, bound }
+        let (numbers, types, boolean, body, removed, lanes, by_subgroups, undefined) = Default::default();
+        let flow = Flow::new(bound);
+        Self { constants, numbers, types, boolean, flow, body, removed, lanes, by_subgroups, undefined, bound }
+    }
+
+    /// What is left of a declaration once the functions are written: neither names of what is gone nor, where subgroups do nothing,
+    /// what only devices with such subgroups understand.
+    fn left_of<'b>(&self, (opcode, words): &'b (u16, Vec<u32>)) -> Option<(u16, Cow<'b, [u32]>)> {
+        let of_subgroups = |id| !self.by_subgroups && self.lanes.contains(id);
+        let stays = match (*opcode, &words[..]) {
+            (op::NAME | op::DECORATE, [id, ..]) => !self.removed.contains(id) && !of_subgroups(id),
+            (op::VARIABLE, [_, id, ..]) => !of_subgroups(id),
+            (op::CAPABILITY, [GROUP_NON_UNIFORM..=GROUP_NON_UNIFORM_QUAD]) => self.by_subgroups,
+            _ => true,
+        };
+        let words = match *opcode {
+            op::ENTRY_POINT => words.iter().filter(|id| !of_subgroups(id)).copied().collect(),
+            _ => Cow::Borrowed(&words[..]),
+        };
+        stays.then_some((*opcode, words))
     }
 
     /// Learns from a declaration, and returns what becomes of it: specialisation constants become constants, and their numbers go.
@@ -71,6 +97,7 @@ impl<'a> Specialised<'a> {
                 self.numbers.insert(id, number);
                 return None;
             }
+            (op::DECORATE, &[id, BUILT_IN, SUBGROUP_LOCAL_INVOCATION_ID]) => _ = self.lanes.insert(id),
             (op::TYPE_RAY_QUERY | op::TYPE_ACCELERATION_STRUCTURE, &[id]) => _ = self.types.insert(id),
             (op::TYPE_VOID..=op::TYPE_FUNCTION, &[id, ref of @ ..]) => {
                 self.types.insert(id);
@@ -162,6 +189,11 @@ impl<'a> Specialised<'a> {
     fn reached(&mut self, block: &[Instruction], blocks: &Blocks, stubs: &Stubs) {
         let decided = self.flow.decided(block, blocks).filter(|_| !self.flow.is_left_early(block));
         for instruction in block {
+            self.by_subgroups |= match instruction.opcode {
+                op::GROUP_NON_UNIFORM_ELECT..=op::GROUP_NON_UNIFORM_QUAD_SWAP => true,
+                op::LOAD => self.lanes.contains(&instruction.words[2]),
+                _ => false,
+            };
             match (instruction.opcode, decided) {
                 (op::PHI, _) => self.phi(instruction.words, label(block), stubs),
                 (op::SELECTION_MERGE, Some(_)) => {}

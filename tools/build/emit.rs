@@ -17,8 +17,6 @@ pub struct Group {
 pub struct Binaries<'a> {
     /// Most devices.
     pub usual: &'a Path,
-    /// Those whose subgroups cannot shuffle.
-    pub plain: &'a Path,
     /// Those that trace rays by ray queries; none for a kernel that traces no rays.
     pub ray_query: Option<&'a Path>,
     /// Those that read storage buffers sooner than texel buffers; none for a kernel that traces no rays.
@@ -227,7 +225,7 @@ fn storage(binaries: &Binaries) -> String {
 
 /// The Rust module of one kernel.
 pub fn module(name: &str, file: &Path, interface: &Interface, root: &str, binaries: &Binaries) -> Result<String> {
-    let Binaries { usual, plain, .. } = binaries;
+    let usual = binaries.usual;
     let push = &interface.push;
     let (mut fields, list) = members(&interface.bindings_of(None))?;
     let (mut slots, mut groups, mut order) = (String::new(), String::new(), interface.bindings_of(None));
@@ -262,8 +260,6 @@ pub fn module(name: &str, file: &Path, interface: &Interface, root: &str, binari
     pub const NAME: &str = {name:?};
     /// The compiled code.
     pub static SPIRV: &[u8] = include_bytes!({usual:?});
-    /// The same for devices whose subgroups cannot shuffle.
-    pub static PLAIN_SPIRV: &[u8] = include_bytes!({plain:?});
     /// This kernel, specialised.
     pub type Kernel = {root}::gpu::Kernel<Bind<'static>>;
 {numbers}{asserts}{constants}    /// What the kernel reads and writes.
@@ -276,7 +272,6 @@ pub fn module(name: &str, file: &Path, interface: &Interface, root: &str, binari
         type Constants = Constants;
         const NAME: &'static str = NAME;
         const SPIRV: &'static [u8] = SPIRV;
-        const PLAIN_SPIRV: &'static [u8] = PLAIN_SPIRV;
 {storage}{ray_query}        const SLOTS: &'static [Slot] = &[
 {slots}        ];
         fn buffers(&self) -> Vec<Bound<'_>> {{

@@ -190,6 +190,45 @@ fn numbers_are_set_and_computed_with() {
     assert_eq!(code, module(BOUND_OF_IDS, &[], op::CONSTANT_TRUE, &set, &[]));
 }
 
+/// `if (choice) shuffle(10, gl_SubgroupInvocationID);`
+#[test]
+fn what_only_subgroups_need_goes_with_them() {
+    const SHADER: u32 = 1;
+    const SHUFFLE: u16 = 345;
+    const VARIABLE: u32 = 33;
+    const NAME_OF_MAIN: u32 = 0x6e69_616d;
+    let before = |lanes: bool| {
+        let of_lanes: [Line; 4] = [
+            (op::CAPABILITY, &[GROUP_NON_UNIFORM]),
+            (op::ENTRY_POINT, &[5, 31, NAME_OF_MAIN, 0, 34, VARIABLE]),
+            (op::NAME, &[VARIABLE, 0]),
+            (op::DECORATE, &[VARIABLE, BUILT_IN, SUBGROUP_LOCAL_INVOCATION_ID]),
+        ];
+        let without: [Line; 1] = [(op::ENTRY_POINT, &[5, 31, NAME_OF_MAIN, 0, 34])];
+        let used: [Line; 1] = [(op::CAPABILITY, &[SHADER])];
+        [&used[..], if lanes { &of_lanes } else { &without }].concat()
+    };
+    let variables: [Line; 2] = [(op::VARIABLE, &[35, VARIABLE, 1]), (op::VARIABLE, &[35, 34, 1])];
+    let body: [Line; 8] = [
+        (op::LABEL, &[ENTRY]),
+        (op::SELECTION_MERGE, &[8, 0]),
+        (op::BRANCH_CONDITIONAL, &[CHOICE, 7, 8]),
+        (op::LABEL, &[7]),
+        (op::LOAD, &[UINT, 20, VARIABLE]),
+        (SHUFFLE, &[UINT, 21, TEN, TEN, 20]),
+        (op::BRANCH, &[8]),
+        (op::LABEL, &[8]),
+    ];
+    let code = module(BOUND_OF_IDS, &before(true), op::SPEC_CONSTANT_FALSE, &variables, &body);
+    let left: [Line; 3] = [(op::LABEL, &[ENTRY]), (op::BRANCH, &[8]), (op::LABEL, &[8])];
+    let alone = module(BOUND_OF_IDS, &before(false), op::CONSTANT_FALSE, &variables[1..], &left);
+    assert_eq!(specialise(&code, &[]), alone);
+    let code = module(BOUND_OF_IDS, &before(true), op::SPEC_CONSTANT_TRUE, &variables, &body);
+    let kept = specialise(&code, &[]);
+    let naming = instructions(&kept).unwrap().iter().filter(|i| i.words.contains(&VARIABLE)).count();
+    assert_eq!(naming, 5, "named, decorated, declared, an interface, loaded");
+}
+
 /// What a scene lacks leaves nothing in the path tracer: without effects it is less than an eighth of what it is with all.
 #[test]
 fn the_path_tracer_without_effects_is_small() {
