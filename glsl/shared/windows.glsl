@@ -20,7 +20,7 @@
 // The including kernel defines SUM, the type of sums, its zero NO_SUM, and the functions that are declared here.
 layout(constant_id = 110) const int WINDOW = 49;
 layout(constant_id = 111) const int TILE = 8;     // at most WINDOW
-layout(constant_id = 112) const int SEGMENT = 64; // windows that a thread takes in turn
+layout(constant_id = 112) const int SEGMENT = 64; // windows that a thread takes in turn; up to MOST_AT_ONCE, it takes them at once
 
 const int GROUPS = WINDOW > TILE ? (WINDOW - 1) / TILE - 1 : 0;
 const int REST = WINDOW - (GROUPS + 1) * TILE;
@@ -31,6 +31,10 @@ const int SLOTS = GROUPS > 0 ? GROUPS : 1;
 // slower (1.35 of the whole time at radius 24): lavapipe reads an array at an index unknown to the compiler lane by lane.
 const bool MANY = GROUPS > 8;
 const int TURN = MANY ? GROUPS : 1; // length of a turn in tiles
+
+const int MOST_AT_ONCE = 4;
+const bool AT_ONCE = SEGMENT <= MOST_AT_ONCE && SEGMENT <= WINDOW;
+const int AT_A_TIME = AT_ONCE ? SEGMENT : 1;
 
 // A sum of groups, and the point that its guides are relative to.
 struct Part {
@@ -111,9 +115,33 @@ void walk_tile(int line, int tile, int end, int left, int at) {
     }
 }
 
+// Stores the windows around `first` to `end` - 1, at most SEGMENT; the first one begins at `left`. What all of them hold is summed
+// once, element by element. That is for a GPU, which needs many threads with few registers each.
+void take_at_once(int line, int first, int end, int left) {
+    vec4 here = point_at(line, min(first + AT_A_TIME / 2, end - 1));
+    SUM sum = NO_SUM, tail[AT_A_TIME];
+    for (int i = AT_A_TIME - 1; i < WINDOW; i++) merge_element(sum, here, line, left + i);
+    [[unroll]] for (int j = AT_A_TIME - 1; j >= 0; j--) {
+        tail[j] = sum;
+        if (j > 0) merge_element(sum, here, line, left + j - 1);
+    }
+    SUM ahead = NO_SUM;
+    [[unroll]] for (int j = 0; j < AT_A_TIME; j++) {
+        if (j > 0) {
+            merge_element(ahead, here, line, left + WINDOW + j - 1);
+            merge(tail[j], ahead, true);
+        }
+        if (first + j < end) store(line, first + j, tail[j], here);
+    }
+}
+
 // Stores the windows around `first` to `end` - 1.
 void walk(int line, int first, int end) {
     int left = first - WINDOW / 2;
+    if (AT_ONCE) {
+        take_at_once(line, first, end, left);
+        return;
+    }
     // `append` moves groups before all have a value. Without initial values an NVIDIA H100 (driver 580.159) computed wrong sums of
     // three and more groups.
     if (!MANY) {

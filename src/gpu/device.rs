@@ -96,7 +96,7 @@ impl Gpu {
         let instance = Instance::new(options.validation)?;
         let candidate = choose(info::candidates(&instance.raw)?, options.device.as_deref())?;
         let queue_family = usable(&candidate)?;
-        let tuning = options.tuning.unwrap_or(Tuning::of(candidate.info.kind)).check()?;
+        let tuning = options.tuning.unwrap_or(Tuning::of(&candidate.info)).check()?;
         let by_ray_query = is_by_ray_query(options.tracing, &candidate.info)?;
         let calibrated = calibrated::offered(&instance, candidate.physical)?;
         let alone = one_at_a_time();

@@ -1,9 +1,9 @@
 //! Compares the guided filter with its twin, which is in double precision, and the twin with examples worked by hand.
 use crate::picture::{Picture, SIZES, apart, line, red};
 use crate::support::kernels::merge;
-use crate::support::{assert_silent, gpu, hash};
+use crate::support::{assert_silent, gpu, hash, tuned_gpu};
 use tallow::denoise::filter::{FilterInput, FilterSettings, GuidedSums, find, run};
-use tallow::gpu::{Buffer, FrameResources, Gpu, Location};
+use tallow::gpu::{Buffer, FrameResources, Gpu, Location, Tuning};
 use tallow::layout::vec4;
 
 /// A constant guide leaves `guided` nothing but box means, and box means of those.
@@ -107,6 +107,25 @@ fn guided_holds_in_single_precision() {
     let faint = run(&gpu, row, &input, &settings).unwrap().0;
     assert!(apart(&faint, &(row.reference)(&input, &settings), 1e-3) < 1e-4);
     assert_silent(&gpu);
+}
+
+/// However many windows a thread takes, at once or in turn: narrow ones, wide ones, and wider ones than a GPU's threads take at once.
+#[test]
+fn windows_hold_however_threads_share_them() {
+    let row = find("guided").unwrap();
+    for windows in [0, 1, 2, 3, 4] {
+        let gpu = tuned_gpu(Tuning { windows, ..Tuning::GPU });
+        for (size, radius) in
+            [((31, 5), 0), ((31, 5), 1), ((65, 33), 7), ((64, 31), 30), ((700, 2), 300), ((2, 700), 300)]
+        {
+            let input = Picture::new(size.0, size.1).noisy().input;
+            let settings = FilterSettings::default().with(|s| s.footprint.radius = radius);
+            let device = run(&gpu, row, &input, &settings).unwrap().0;
+            let off = apart(&device, &(row.reference)(&input, &settings), 1e-3);
+            assert!(off < 1e-4, "{windows} windows a thread, {size:?}, radius {radius}: {off}");
+        }
+        assert_silent(&gpu);
+    }
 }
 
 /// The published sums agree where they can, and lose digits where the others do not.

@@ -11,7 +11,7 @@ use obvhs::ray::{Ray, RayHit as HostHit};
 use obvhs::rt_triangle::RtTriangle;
 use rayon::prelude::*;
 use std::path::Path;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use tallow::gpu::{Buffer, DeviceKind, DeviceOptions, FrameResources, Gpu, Location, Tracing};
 use tallow::layout::{self, Effects, NONE, RayHit, RayQuery, TraversePush};
 use tallow::math::warp::{basis_from_normal, warp_cosine_hemisphere};
@@ -47,6 +47,10 @@ struct Launch {
 const CPU: Launch = Launch { side: 512, per_thread: 128 };
 /// A GPU hides the latency of its memory by hundreds of thousands of threads, and schedules the next ones by itself.
 const GPU: Launch = Launch { side: 2048, per_thread: 1 };
+
+/// How long the device traces untimed before each round: GPUs lower their clocks while the host traces, and take a while to raise them.
+/// After 200 ms an H200 was back in one case and not in another.
+const WARM_UP: Duration = Duration::from_secs(1);
 
 /// A hit: distance and triangle in leaf order, or [`NONE`] on a miss. For any-hit rays a hit can have any values.
 type Found = (f32, u32);
@@ -149,8 +153,8 @@ impl Device {
         (self.rays.len() as u32).div_ceil(self.per_thread)
     }
 
-    /// Traces all rays and returns the seconds by the device's timestamps, and the hits.
-    fn run(&mut self, any_hit: bool) -> Result<(f64, Vec<Found>)> {
+    /// Traces all rays and returns the seconds by the device's timestamps.
+    fn trace(&mut self, any_hit: bool) -> Result<f64> {
         let count = self.rays.len() as u32;
         let push = TraversePush { count, root: self.root, any_hit: u32::from(any_hit), ..Default::default() };
         let s = self.renderer.scene();
@@ -160,8 +164,21 @@ impl Device {
             rec.dispatch_threads(&self.kernel, bind, &push, threads)
         })?;
         let pass = times.first().context("the device has no timestamps")?;
-        let found = self.hits.read()?.iter().map(|h| (h.t, h.triangle)).collect();
-        Ok((pass.duration_ns() as f64 * 1e-9, found))
+        Ok(pass.duration_ns() as f64 * 1e-9)
+    }
+
+    /// The hits of the last rays.
+    fn found(&self) -> Result<Vec<Found>> {
+        Ok(self.hits.read()?.iter().map(|h| (h.t, h.triangle)).collect())
+    }
+
+    /// Rays per second of a device that has been busy for [`WARM_UP`].
+    fn rate(&mut self, any_hit: bool) -> Result<f64> {
+        let begun = Instant::now();
+        while begun.elapsed() < WARM_UP {
+            self.trace(any_hit)?;
+        }
+        Ok(self.rays.len() as f64 / self.trace(any_hit)?)
     }
 }
 
@@ -181,13 +198,14 @@ fn median(values: &mut [f64]) -> f64 {
 
 /// Prints a row per side and their ratio.
 fn compare(name: &str, host: &Host, device: &mut Device, rounds: usize, any_hit: bool) -> Result<()> {
-    let differ = differing(&host.run(any_hit).1, &device.run(any_hit)?.1, any_hit); // and warm both up
+    device.trace(any_hit)?;
+    let differ = differing(&host.run(any_hit).1, &device.found()?, any_hit); // the host is warm now
     let share = differ as f64 / host.rays.len() as f64;
     ensure!(share < 1e-3, "{name}: the two sides differ on {differ} rays");
     let (mut ours, mut theirs) = (Vec::new(), Vec::new());
     for _ in 0..rounds {
         theirs.push(host.rays.len() as f64 / host.run(any_hit).0 * 1e-6);
-        ours.push(host.rays.len() as f64 / device.run(any_hit)?.0 * 1e-6);
+        ours.push(device.rate(any_hit)? * 1e-6);
     }
     let (ours, theirs) = (median(&mut ours), median(&mut theirs));
     println!("{name:8} {ours:8.2} Mray/s, obvhs {theirs:8.2} Mray/s, ratio {:.2}; {differ} rays differ", ours / theirs);

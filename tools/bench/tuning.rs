@@ -1,8 +1,8 @@
 //! Times the choices of `gpu::Tuning` on a device: each alone, in turn with what suits devices of its kind, whose time is 1.
-//!   cargo run --release --example bench-tuning -- [--rounds N] [--width N] [--height N] [--spp N] SCENE...
+//!   cargo run --release --example bench-tuning -- [--rounds N] [--width N] [--height N] [--spp N] [--only WHAT] SCENE...
 #![allow(missing_docs)]
 use anyhow::{Context, Result};
-use clap::Parser;
+use clap::{Parser, ValueEnum};
 use std::path::PathBuf;
 use tallow::denoise::filter::{FILTERS, FilterSettings};
 use tallow::denoise::{Demodulation, Denoiser};
@@ -27,13 +27,24 @@ struct Args {
     /// Samples per pixel
     #[arg(long, default_value_t = 16)]
     spp: u32,
+    /// Time the choices of these alone
+    #[arg(long)]
+    only: Option<What>,
 }
 
-/// Filters whose kernels [`Tuning::filter_workgroup`] is for.
-const TIMED: [&str; 5] = ["atrous", "svgf", "wavelet", "bilateral", "auto"];
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum What {
+    Paths,
+    Placing,
+    Filters,
+}
+
+/// Filters whose kernels [`Tuning::filter_workgroup`] or [`Tuning::windows`] is for.
+const TIMED: [&str; 6] = ["atrous", "svgf", "wavelet", "bilateral", "guided", "auto"];
 
 /// Passes that place samples and depend on [`Tuning::interleaves`].
-const PLACING: [&str; 6] = ["quantise_priority", "lack_of_share", "lack_of_accuracy", "quota", "radix_count", "reduce"];
+const PLACING: [&str; 6] =
+    ["quantise_priority", "lack_of_share", "lack_of_accuracy", "quota", "radix_select", "reduce"];
 
 /// A choice by its name, on a device that was opened for it.
 type Choice = (String, Gpu);
@@ -45,17 +56,20 @@ type Run = Box<dyn FnMut() -> Result<f64>>;
 fn of_paths(own: Tuning) -> Vec<(String, Tuning)> {
     let dealt = |name: &str| if own.deals { format!("{name}, not dealt") } else { name.to_owned() };
     let alone = Tuning { deals: false, ..own };
-    let steps = [1, 2, 4].map(|n| (dealt(&format!("triangles_a_step {n}")), Tuning { triangles_a_step: n, ..alone }));
+    let (native_bits, storage_buffers) = (!own.native_bits, !own.storage_buffers);
     let mut all = vec![
         ("own".to_owned(), own),
         (format!("deals {}", !own.deals), Tuning { deals: !own.deals, ..own }),
-        ("native_bits".to_owned(), Tuning { native_bits: true, ..own }),
-        ("storage_buffers".to_owned(), Tuning { storage_buffers: true, ..own }),
+        (format!("native_bits {native_bits}"), Tuning { native_bits, ..own }),
+        (format!("storage_buffers {storage_buffers}"), Tuning { storage_buffers, ..own }),
     ];
-    all.extend(steps);
+    for triangles_a_step in [0, 1, 2, 4] {
+        let name = dealt(&format!("triangles_a_step {triangles_a_step}"));
+        let steps = Tuning { triangles_a_step, ..alone };
+        all.push((name.clone(), steps));
+        all.push((format!("{name}, storage_buffers {storage_buffers}"), Tuning { storage_buffers, ..steps }));
+    }
     all.extend([32, 64, 128].map(|n| (format!("workgroup {n}"), Tuning { workgroup: n, ..own })));
-    let together = Tuning { native_bits: true, storage_buffers: true, triangles_a_step: 2, ..alone };
-    all.push((dealt("native_bits, storage_buffers, triangles_a_step 2"), together));
     differing(all)
 }
 
@@ -72,6 +86,7 @@ fn of_placing(own: Tuning) -> Vec<(String, Tuning)> {
 fn of_filters(own: Tuning) -> Vec<(String, Tuning)> {
     let mut all = vec![("own".to_owned(), own)];
     all.extend([32, 64, 128, 256].map(|n| (format!("filter_workgroup {n}"), Tuning { filter_workgroup: n, ..own })));
+    all.extend([0, 1, 2, 3, 4].map(|n| (format!("windows {n}"), Tuning { windows: n, ..own })));
     differing(all)
 }
 
@@ -129,6 +144,9 @@ fn filter(gpu: &Gpu, scene: &Loaded, name: &str) -> Result<Run> {
 
 /// Prints the median time of each choice, and its ratio to the first's.
 fn compare(what: &str, choices: &[Choice], rounds: usize, run: impl Fn(&Gpu) -> Result<Run>) -> Result<()> {
+    if choices.is_empty() {
+        return Ok(());
+    }
     let mut runs = choices.iter().map(|(_, gpu)| run(gpu)).collect::<Result<Vec<_>>>()?;
     runs.iter_mut().try_for_each(|run| run().map(drop))?; // drivers may compile more on the first dispatch
     let mut times = vec![Vec::new(); runs.len()];
@@ -147,12 +165,13 @@ fn compare(what: &str, choices: &[Choice], rounds: usize, run: impl Fn(&Gpu) -> 
 }
 
 fn main() -> Result<()> {
-    let Args { scenes, rounds, width, height, spp } = Args::parse();
+    let Args { scenes, rounds, width, height, spp, only } = Args::parse();
     let device = open(None)?;
     println!("{}", device.info().name);
     let own = *device.tuning();
-    let [for_paths, for_placing, for_filters] = [of_paths(own), of_placing(own), of_filters(own)].map(choices);
-    let (for_paths, for_placing, for_filters) = (for_paths?, for_placing?, for_filters?);
+    let of = |what, all: Vec<_>| choices(if only.is_none_or(|only| only == what) { all } else { Vec::new() });
+    let (for_paths, for_placing) = (of(What::Paths, of_paths(own))?, of(What::Placing, of_placing(own))?);
+    let for_filters = of(What::Filters, of_filters(own))?;
     let small = |s: &mut Settings| (s.width, s.height, s.spp) = (width, height, spp);
     for file in scenes {
         let scene = Scene::load(&file)?.with(small);

@@ -116,12 +116,15 @@ pub struct Windows {
     eps: vec4,
 }
 
+/// Widest windows that a thread of a GPU takes at once, element by element, in a time that grows with the width.
+const WIDEST_AT_ONCE: u32 = 255;
+
 /// How windows along a line are summed, by `glsl/shared/windows.glsl`.
 #[derive(Clone, Copy)]
 struct Walk {
     /// Elements of a window.
     window: u32,
-    /// Windows that a thread takes in turn.
+    /// Windows that a thread takes in turn, or at once if they are few.
     segment: u32,
     /// Lines of a workgroup.
     lines: u32,
@@ -131,7 +134,12 @@ impl Walk {
     fn new(gpu: &Gpu, radius: u32, edge: u32) -> Self {
         let window = 2 * radius.min(edge - 1) + 1;
         let tuning = gpu.tuning();
-        Self { window, segment: if tuning.whole_lines { edge } else { window }, lines: tuning.lines }
+        let segment = match tuning.windows {
+            0 => edge,
+            n if window <= WIDEST_AT_ONCE => n.min(window),
+            _ => window,
+        };
+        Self { window, segment, lines: tuning.lines }
     }
 
     /// Windows that are taken at a time, each of which costs registers. Wide windows are worth more, lest their groups
