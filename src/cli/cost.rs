@@ -23,9 +23,8 @@ use std::time::Duration;
 /// # Errors
 /// What keeps every point from being measured, and errors of writing.
 pub fn run(args: &Args) -> Result<Exit> {
-    let folder = Folder::open(&args.output)?;
     if let Some(image) = &args.filter_only {
-        return filters::run(args, image, &folder);
+        return filters::run(args, image);
     }
     let path = args.scene.as_deref().ok_or_else(no_scene)?;
     let gpu = open(args)?;
@@ -34,6 +33,7 @@ pub fn run(args: &Args) -> Result<Exit> {
         scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
     }
     let plan = plan(args, path, &scene, points)?;
+    let folder = Folder::open(&args.output)?;
     let earlier = folder.earlier(&key(&gpu, &scene, &plan));
     let runs_before = earlier.as_ref().map_or(0, runs);
     let found = watched(args, &folder, |watch| measure(&gpu, &scene, &plan, earlier, watch))?;

@@ -1,10 +1,9 @@
 //! Dispatches of kernels whose workgroups each process one block of consecutive pixels.
-use super::{Bindings, Gpu, Kernel, Recorder};
+use super::{Bindings, Gpu, Kernel, MAX_GROUPS, Recorder};
 use crate::error::{Error, Result};
 use crate::shaders::shared::block;
 
-/// A kernel whose workgroups each process one block of pixels and whose threads each process a run of pixels within it;
-/// or the single-workgroup kernel that combines the results of the blocks.
+/// A kernel whose workgroups each process one block of pixels and whose threads each process a run of pixels within it.
 pub struct PerBlock<B> {
     kernel: Kernel<B>,
     thread_items: u32,
@@ -30,18 +29,7 @@ impl<B: Bindings<Constants: From<block::Constants>>> PerBlock<B> {
     pub fn record(&self, rec: &mut Recorder, bind: B, push: &B::Push, pixels: u32) -> Result<()> {
         rec.dispatch(&self.kernel, bind, push, [block_count(pixels, self.thread_items), 1, 1])
     }
-
-    /// Records a single workgroup.
-    ///
-    /// # Errors
-    /// [`crate::error::Error::Device`].
-    pub fn record_one(&self, rec: &mut Recorder, bind: B, push: &B::Push) -> Result<()> {
-        rec.dispatch(&self.kernel, bind, push, [1; 3])
-    }
 }
-
-/// Number of workgroups along one axis that every Vulkan device supports.
-const MAX_GROUPS: u32 = 65_535;
 
 /// Largest number of pixels per thread of a [`PerBlock`] kernel.
 const MOST_ITEMS: u32 = 1024;

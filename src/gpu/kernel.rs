@@ -155,7 +155,7 @@ impl Specialise for () {
 }
 
 /// Number of workgroups along one axis that every Vulkan device supports.
-const MAX_GROUPS: u32 = 65_535;
+pub const MAX_GROUPS: u32 = 65_535;
 
 /// A compiled kernel, specialised by its constants. `B` is the kernel's `Bind` struct.
 pub struct Kernel<B> {

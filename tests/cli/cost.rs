@@ -45,6 +45,15 @@ fn reference(folder: &TempDir) -> PathBuf {
 }
 
 #[test]
+fn what_is_refused_leaves_no_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    for (words, code) in [("cost missing.toml", 3), ("cost --filter-only missing.exr --reference missing.exr", 3)] {
+        text(&within(&folder, &format!("{words} -o results")).output().unwrap(), code);
+        assert!(!folder.path().join("results").exists(), "{words}");
+    }
+}
+
+#[test]
 fn a_grid_is_measured_and_each_point_can_be_rendered_again() {
     let folder = tempfile::tempdir().unwrap();
     let words = "--allocate uniform,both --denoise none,atrous --spp 1,4 --repeats 2 -o all --variant";

@@ -15,7 +15,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// What keeps every filter from being measured, and errors of writing.
-pub fn run(args: &Args, image: &Path, folder: &Folder) -> Result<Exit> {
+pub fn run(args: &Args, image: &Path) -> Result<Exit> {
     let film = image::read(image)?;
     let file = args.reference.as_deref().ok_or_else(|| Error::Usage("--filter-only needs --reference".to_owned()))?;
     let size = [film.width, film.height];
@@ -36,9 +36,10 @@ pub fn run(args: &Args, image: &Path, folder: &Folder) -> Result<Exit> {
         reference: reference::read(file, size, None)?,
     };
     let gpu = open(args)?;
-    let found = watched(args, folder, |watch| measure_filters(&gpu, &plan, watch))?;
+    let folder = Folder::open(&args.output)?;
+    let found = watched(args, &folder, |watch| measure_filters(&gpu, &plan, watch))?;
     fail_on_messages(&gpu)?;
-    finish(args, folder, found, 0)
+    finish(args, &folder, found, 0)
 }
 
 /// Every filter, with its defaults and with the options of each variant.

@@ -6,7 +6,7 @@ mod table;
 
 use super::{Filter, Planes, Row};
 use crate::error::Result;
-use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
+use crate::gpu::{Buffer, Gpu, Kernel, Location, MAX_GROUPS, Recorder};
 use crate::layout::{GuidedPush, float, vec4};
 use crate::settings::{Is, choices, settings};
 use crate::shaders::{guided_columns, guided_mean_columns, guided_mean_rows, guided_rows, shared};
@@ -139,7 +139,7 @@ impl Walk {
             n if window <= WIDEST_AT_ONCE => n.min(window),
             _ => window,
         };
-        Self { window, segment, lines: tuning.lines }
+        Self { window, segment: segment.max(edge.div_ceil(MAX_GROUPS)), lines: tuning.lines }
     }
 
     /// Windows that are taken at a time, each of which costs registers. Wide windows are worth more, lest their groups
