@@ -126,6 +126,15 @@ fn windows_hold_however_threads_share_them() {
         }
         assert_silent(&gpu);
     }
+    // More windows than an axis of a dispatch has workgroups.
+    let gpu = tuned_gpu(Tuning::GPU);
+    for (size, radius) in [((70_000, 1), 0), ((70_000, 1), 3), ((1, 70_000), 3)] {
+        let input = Picture::new(size.0, size.1).noisy().input;
+        let settings = FilterSettings::default().with(|s| s.footprint.radius = radius);
+        let off = apart(&run(&gpu, row, &input, &settings).unwrap().0, &(row.reference)(&input, &settings), 1e-3);
+        assert!(off < 1e-4, "{size:?}, radius {radius}: {off}");
+    }
+    assert_silent(&gpu);
 }
 
 /// The published sums agree where they can, and lose digits where the others do not.
