@@ -109,10 +109,14 @@ impl Tuning {
     }
 
     /// What suits a device. One that binds small storage buffers alone keeps texel buffers, which show more of a scene.
-    pub(super) fn of(info: &DeviceInfo) -> Self {
+    pub(super) fn of(&DeviceInfo { kind, max_storage_range, .. }: &DeviceInfo) -> Self {
+        Self::suited(kind, max_storage_range)
+    }
+
+    fn suited(kind: DeviceKind, max_storage_range: u64) -> Self {
         const LARGE: u64 = 1 << 30;
-        let storage_buffers = Self::GPU.storage_buffers && info.max_storage_range >= LARGE;
-        if info.kind == DeviceKind::Cpu { Self::CPU } else { Self { storage_buffers, ..Self::GPU } }
+        let storage_buffers = Self::GPU.storage_buffers && max_storage_range >= LARGE;
+        if kind == DeviceKind::Cpu { Self::CPU } else { Self { storage_buffers, ..Self::GPU } }
     }
 
     /// Constants of kernels that number their threads with `glsl/shared/thread.glsl`.
@@ -132,5 +136,24 @@ impl Tuning {
         let Self { native_bits, triangles_a_step, .. } = *self;
         let stack = if stack <= IN_REGISTERS { IN_REGISTERS } else { stack.next_multiple_of(8) };
         shared::traverse::Constants { stack, native_bits, triangles_a_step }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn devices_that_bind_small_storage_buffers_keep_texel_buffers() {
+        let least = 1 << 27; // of any device
+        assert_eq!(Tuning::suited(DeviceKind::DiscreteGpu, 1 << 32), Tuning::GPU);
+        assert_eq!(Tuning::suited(DeviceKind::DiscreteGpu, least), Tuning { storage_buffers: false, ..Tuning::GPU });
+        assert_eq!(Tuning::suited(DeviceKind::Cpu, 1 << 32), Tuning::CPU);
+    }
+
+    #[test]
+    fn stacks_are_of_few_sizes() {
+        let sizes = [1, 2, 3, 8, 9, 32].map(|stack| Tuning::CPU.traverse(stack).stack);
+        assert_eq!(sizes, [2, 2, 8, 8, 16, 32]);
     }
 }
