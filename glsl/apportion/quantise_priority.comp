@@ -3,8 +3,8 @@
 #include "shared/finite.glsl"
 
 // First pass of an apportionment: turns priorities into integer weights, 12.20 fixed point, so that all that follows is
-// exact. A priority that is not finite gets weight 0 and is counted. A workgroup sums one block; the last one starts the
-// apportionment.
+// exact. A priority that is not finite gets weight 0 and is counted. A workgroup sums one block; the last
+// one starts the apportionment by the sums of all.
 //
 // The passes in order: quantise_priority; then, where weights are shares or errors, lack_of_share or lack_of_accuracy; quota,
 // repeated; radix_select for each of the remainders' 8 digits; tie_sums, give_remainders. The scan of the counts follows: reduce,

@@ -62,9 +62,9 @@ impl Slot {
 ///
 /// # Safety
 /// - [`Self::SPIRV`] is valid code for Vulkan 1.3 and the features in [`super::REQUIRED_FEATURES`], with an entry point `main` for
-///   compute; subgroups do nothing in it unless a constant asks for it; [`Self::SLOTS`] are its descriptors, all in set 0, with
-///   numbers that differ.
-///   [`Self::RAY_QUERY`] is the same with VK_KHR_ray_query, and has an acceleration structure as one more descriptor.
+///   compute; its subgroups shuffle only where a specialisation constant asks for it. [`Self::SLOTS`] are its descriptors, all
+///   in set 0, with numbers that differ. [`Self::RAY_QUERY`] is the same with VK_KHR_ray_query, and has an acceleration structure as
+///   one more descriptor.
 ///   [`Self::STORAGE_SPIRV`] is the same with storage buffers for texel buffers.
 /// - [`Self::Push`] is its push constants: at most 128 bytes, a multiple of 4. Elements of [`SlotKind::Uniform`] have at most
 ///   16384 bytes.

@@ -1,5 +1,5 @@
 //! Sizes into which work is divided, for CPUs and for GPUs. Every such choice is made here, with its reason.
-use super::info::{DeviceInfo, DeviceKind};
+use super::info::DeviceKind;
 use crate::error::{Error, Result};
 use crate::shaders::shared;
 
@@ -108,12 +108,8 @@ impl Tuning {
         }
     }
 
-    /// What suits a device. One that binds small storage buffers alone keeps texel buffers, which show more of a scene.
-    pub(super) fn of(&DeviceInfo { kind, max_storage_range, .. }: &DeviceInfo) -> Self {
-        Self::suited(kind, max_storage_range)
-    }
-
-    fn suited(kind: DeviceKind, max_storage_range: u64) -> Self {
+    /// What suits a device. One that binds storage buffers of few bytes only keeps texel buffers, which show more of a scene.
+    pub(super) fn of(kind: DeviceKind, max_storage_range: u64) -> Self {
         const LARGE: u64 = 1 << 30;
         let storage_buffers = Self::GPU.storage_buffers && max_storage_range >= LARGE;
         if kind == DeviceKind::Cpu { Self::CPU } else { Self { storage_buffers, ..Self::GPU } }
@@ -146,9 +142,9 @@ mod tests {
     #[test]
     fn devices_that_bind_small_storage_buffers_keep_texel_buffers() {
         let least = 1 << 27; // of any device
-        assert_eq!(Tuning::suited(DeviceKind::DiscreteGpu, 1 << 32), Tuning::GPU);
-        assert_eq!(Tuning::suited(DeviceKind::DiscreteGpu, least), Tuning { storage_buffers: false, ..Tuning::GPU });
-        assert_eq!(Tuning::suited(DeviceKind::Cpu, 1 << 32), Tuning::CPU);
+        assert_eq!(Tuning::of(DeviceKind::DiscreteGpu, 1 << 32), Tuning::GPU);
+        assert_eq!(Tuning::of(DeviceKind::DiscreteGpu, least), Tuning { storage_buffers: false, ..Tuning::GPU });
+        assert_eq!(Tuning::of(DeviceKind::Cpu, 1 << 32), Tuning::CPU);
     }
 
     #[test]

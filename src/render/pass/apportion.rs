@@ -8,7 +8,7 @@
 //!          lack_of_accuracy           or of an accuracy, and the sum of that
 //!                  |
 //!       +-----> quota -----+          whole samples: floor(budget * weight / sum). What full pixels leave is apportioned again
-//!       +-- `rounds` times-+
+//!       +- `rounds` times -+
 //!                  |
 //!       +--> radix_select -+          the rest, one sample each for the largest remainders: a digit of the smallest of them at
 //!       +---- 8 digits ----+          a time
