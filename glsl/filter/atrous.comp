@@ -41,10 +41,9 @@ void main() {
         float across = tap_x >= 0 && tap_x < size.x ? b3_spline(i) : 0.0;
         tap_x = clamp(tap_x, 0, size.x - 1);
         [[unroll]] for (int j = -2; j < ROWS + 2; j++) {
-            int y = first + j * spacing;
-            float h = y >= 0 && y < size.y ? across : 0.0; // pixels beyond the image do not count
-            Pixel q = pixel_at(clamp(y, 0, size.y - 1) * size.x + tap_x);
-            h *= trust(q);
+            int y = first + j * spacing, inside = clamp(y, 0, size.y - 1);
+            Pixel q = pixel_at(inside * size.x + tap_x);
+            float h = y == inside ? across * trust(q) : 0.0; // pixels beyond the image do not count
             [[unroll]] for (int k = 0; k < ROWS; k++) { // constant bounds, or it would not be unrolled
                 if (abs(j - k) <= 2) {
                     float w = h * b3_spline(j - k) * edge_weight(q, edge_exponent(centre[k], q, push.rates));

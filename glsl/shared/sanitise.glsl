@@ -19,7 +19,8 @@ uint packed_normal(vec3 n) {
 }
 
 vec3 unpacked_normal(uint bits) {
-    return bits == NO_NORMAL ? vec3(0.0) : octahedral_decode(bits);
+    vec3 n = octahedral_decode(bits);
+    return bits == NO_NORMAL ? vec3(0.0) : n;
 }
 
 float known_channel(float v) {
