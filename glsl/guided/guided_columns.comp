@@ -6,7 +6,7 @@
 #include "shared/windows.glsl"
 
 // First pass of the guided filter (guided_columns, guided_rows, guided_mean_columns, guided_mean_rows) over a strip of rows of
-// blocks: sums the moments of the 1 x WINDOW blocks above and below every block. A thread walks down SEGMENT blocks of a column.
+// blocks: sums the moments of the 1 x WINDOW blocks above and below every block. A thread walks down a column.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer colour; // of vec4
 layout(binding = 1) uniform samplerBuffer channels; // of vec4
@@ -40,7 +40,6 @@ void store(int x, int y, Moments whole, vec4 point) {
 }
 
 void main() {
-    int x = int(gl_GlobalInvocationID.x), from = int(gl_GlobalInvocationID.y) * SEGMENT;
-    if (x >= blocks_of(push.size).x) return;
-    walk(x, int(push.first_row) + from, int(push.first_row) + min(from + SEGMENT, int(push.rows)));
+    int x = int(gl_GlobalInvocationID.x);
+    if (x < blocks_of(push.size).x) walk(x, int(push.first_row), int(push.rows));
 }

@@ -6,7 +6,7 @@
 #include "shared/windows.glsl"
 
 // Third pass of the guided filter: averages the models of all windows that cover a block and are centred in its column. A
-// thread walks down SEGMENT blocks of a column of the strip.
+// thread walks down a column of the strip.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer slope_r; // of vec4
 layout(binding = 1) uniform samplerBuffer slope_g; // of vec4
@@ -35,7 +35,6 @@ void store(int x, int y, Fit whole, vec4 point) {
 }
 
 void main() {
-    int x = int(gl_GlobalInvocationID.x), from = int(gl_GlobalInvocationID.y) * SEGMENT;
-    if (x >= blocks_of(push.size).x) return;
-    walk(x, int(push.first_row) + from, int(push.first_row) + min(from + SEGMENT, int(push.rows)));
+    int x = int(gl_GlobalInvocationID.x);
+    if (x < blocks_of(push.size).x) walk(x, int(push.first_row), int(push.rows));
 }

@@ -7,7 +7,7 @@
 #include "shared/windows.glsl"
 
 // Last pass of the guided filter: averages the models of all windows that cover a block and evaluates the mean at the guides of
-// its pixels. A thread walks along SEGMENT blocks of a row.
+// its pixels. A thread walks along a row.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer columns; // of vec4
 layout(binding = 1) uniform samplerBuffer channels; // of vec4
@@ -46,7 +46,6 @@ void store(int row, int x, Fit whole, vec4 point) {
 }
 
 void main() {
-    int row = int(gl_GlobalInvocationID.x), from = int(gl_GlobalInvocationID.y) * SEGMENT;
-    if (row >= int(push.rows)) return;
-    walk(row, from, min(from + SEGMENT, blocks_of(push.size).x));
+    int row = int(gl_GlobalInvocationID.x);
+    if (row < int(push.rows)) walk(row, 0, blocks_of(push.size).x);
 }

@@ -7,7 +7,7 @@
 
 // Second pass of the guided filter: solves for the linear model a . I + b of every window (He et al. 2010, equation 19) from
 // the moments of its columns. In place of b it keeps the model's value at the guide of its block's first pixel. A thread walks along
-// SEGMENT blocks of a row. With LEVERAGES it writes the leverage of every pixel in the window around its own block too.
+// a row. With LEVERAGES it writes the leverage of every pixel in the window around its own block too.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform samplerBuffer columns; // of vec4
 layout(binding = 1) uniform samplerBuffer channels; // of vec4
@@ -63,7 +63,6 @@ void store(int row, int x, Moments whole, vec4 point) {
 }
 
 void main() {
-    int row = int(gl_GlobalInvocationID.x), from = int(gl_GlobalInvocationID.y) * SEGMENT;
-    if (row >= int(push.rows)) return;
-    walk(row, from, min(from + SEGMENT, blocks_of(push.size).x));
+    int row = int(gl_GlobalInvocationID.x);
+    if (row < int(push.rows)) walk(row, 0, blocks_of(push.size).x);
 }

@@ -20,7 +20,7 @@
 // The including kernel defines SUM, the type of sums, its zero NO_SUM, and the functions that are declared here.
 layout(constant_id = 110) const int WINDOW = 49;
 layout(constant_id = 111) const int TILE = 8;     // at most WINDOW
-layout(constant_id = 112) const int SEGMENT = 64; // windows that a thread takes in turn; up to MOST_AT_ONCE, it takes them at once
+layout(constant_id = 112) const int AT_ONCE = 0;  // windows that a thread takes together, at most WINDOW; 0: it takes more, tile by tile
 
 const int GROUPS = WINDOW > TILE ? (WINDOW - 1) / TILE - 1 : 0;
 const int REST = WINDOW - (GROUPS + 1) * TILE;
@@ -32,9 +32,7 @@ const int SLOTS = GROUPS > 0 ? GROUPS : 1;
 const bool MANY = GROUPS > 8;
 const int TURN = MANY ? GROUPS : 1; // length of a turn in tiles
 
-const int MOST_AT_ONCE = 4;
-const bool AT_ONCE = SEGMENT <= MOST_AT_ONCE && SEGMENT <= WINDOW;
-const int AT_A_TIME = AT_ONCE ? SEGMENT : 1;
+const int AT_A_TIME = AT_ONCE > 0 ? AT_ONCE : 1;
 
 // A sum of groups, and the point that its guides are relative to.
 struct Part {
@@ -115,7 +113,7 @@ void walk_tile(int line, int tile, int end, int left, int at) {
     }
 }
 
-// Stores the windows around `first` to `end` - 1, at most SEGMENT; the first one begins at `left`. What all of them hold is summed
+// Stores the windows around `first` to `end` - 1, at most AT_ONCE; the first one begins at `left`. What all of them hold is summed
 // once, element by element. That is for a GPU, which needs many threads with few registers each.
 void take_at_once(int line, int first, int end, int left) {
     vec4 here = point_at(line, min(first + AT_A_TIME / 2, end - 1));
@@ -135,10 +133,13 @@ void take_at_once(int line, int first, int end, int left) {
     }
 }
 
-// Stores the windows around `first` to `end` - 1.
-void walk(int line, int first, int end) {
+// Stores the thread's share of the `count` windows of a line, the first of which is around `origin`.
+void walk(int line, int origin, int count) {
+    int threads = int(gl_NumWorkGroups.y), share = AT_ONCE > 0 ? AT_ONCE : (count + threads - 1) / threads;
+    int first = origin + int(gl_GlobalInvocationID.y) * share, end = min(first + share, origin + count);
+    if (first >= end) return;
     int left = first - WINDOW / 2;
-    if (AT_ONCE) {
+    if (AT_ONCE > 0) {
         take_at_once(line, first, end, left);
         return;
     }

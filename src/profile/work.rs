@@ -133,28 +133,26 @@ impl FrameWork {
         let threads = pass.shape.threads.max(1);
         let constant =
             |id: u32| code.constants.iter().find(|(n, _)| *n == id).map(|(_, value)| u64::from((*value).max(1)));
-        let windows = windows::Constants { tile: TILE_MARK, segment: SEGMENT_MARK, ..Default::default() }.entries();
+        let windows = windows::Constants { tile: TILE_MARK, ..Default::default() }.entries();
         let marks = [&windows[..], &window_blocks::Constants { step: STEP_MARK }.entries()].concat();
         let id = |mark: i32| marks.iter().find(|(_, value)| *value == mark as u32).map(|(id, _)| *id);
         match pass.time.name {
             // The samples of a pixel, in one of two loops.
             "accumulate" => vec![paths / threads, 0],
-            // A thread takes the windows of its segment in tiles.
+            // A thread takes its windows in tiles.
             name if name.starts_with("guided_") => {
                 let of = |mark| id(mark).and_then(constant);
                 let windows = self.pixels / of(STEP_MARK).unwrap_or(1).pow(2);
-                let tiles = |(tile, segment): (u64, u64)| segment.min(windows.div_ceil(threads)).div_ceil(tile);
-                of(TILE_MARK).zip(of(SEGMENT_MARK)).map(tiles).into_iter().collect()
+                of(TILE_MARK).map(|tile| windows.div_ceil(threads).div_ceil(tile)).into_iter().collect()
             }
             _ => Vec::new(),
         }
     }
 }
 
-/// Values by which the ids of three constants are found, as the build script knows only their names.
+/// Values by which the ids of two constants are found, as the build script knows only their names.
 const TILE_MARK: i32 = i32::MAX;
-const SEGMENT_MARK: i32 = i32::MAX - 1;
-const STEP_MARK: i32 = i32::MAX - 2;
+const STEP_MARK: i32 = i32::MAX - 1;
 
 type Key = (usize, Vec<(u32, u32)>);
 

@@ -116,7 +116,7 @@ fn windows_hold_however_threads_share_them() {
     for windows in [0, 1, 2, 3, 4] {
         let gpu = tuned_gpu(Tuning { windows, ..Tuning::GPU });
         for (size, radius) in
-            [((31, 5), 0), ((31, 5), 1), ((65, 33), 7), ((64, 31), 30), ((700, 2), 300), ((2, 700), 300)]
+            [((31, 5), 0), ((31, 5), 1), ((65, 33), 7), ((64, 31), 30), ((701, 2), 300), ((2, 701), 300)]
         {
             let input = Picture::new(size.0, size.1).noisy().input;
             let settings = FilterSettings::default().with(|s| s.footprint.radius = radius);

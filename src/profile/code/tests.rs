@@ -30,11 +30,11 @@ fn taps_of_filters_are_all_counted() {
 
 #[test]
 fn constants_decide_branches_and_bounds() {
-    let count = |window: i32, tile: i32, segment: i32| {
-        let windows = shared::windows::Constants { window, tile, segment };
+    let count = |window: i32, tile: i32| {
+        let windows = shared::windows::Constants { window, tile, ..Default::default() };
         code::<shaders::guided_rows::Bind>(&windows.entries()).per_thread(&[1]).count
     };
-    let (narrow, wide) = (count(17, 8, 64), count(33, 8, 64));
+    let (narrow, wide) = (count(17, 8), count(33, 8));
     assert!(narrow < wide && wide < 2 * narrow, "two groups more add to every window: {narrow} {wide}");
     let told = |tiles| code::<shaders::guided_rows::Bind>(&[]).per_thread(&[tiles]).count;
     assert_eq!(told(3) - told(2), told(2) - told(1));

@@ -6,7 +6,7 @@ mod table;
 
 use super::{Filter, Planes, Row};
 use crate::error::Result;
-use crate::gpu::{Buffer, Gpu, Kernel, Location, MAX_GROUPS, Recorder};
+use crate::gpu::{Buffer, Gpu, Kernel, Location, MAX_GROUPS, Recorder, Tuning};
 use crate::layout::{GuidedPush, float, vec4};
 use crate::settings::{Is, choices, settings};
 use crate::shaders::{guided_columns, guided_mean_columns, guided_mean_rows, guided_rows, shared};
@@ -118,22 +118,23 @@ pub struct Windows {
 
 /// Widest windows that a thread of a GPU takes at once, element by element, in a time that grows with the width.
 const WIDEST_AT_ONCE: u32 = 255;
+/// Most windows that a thread takes at once.
+const MOST_AT_ONCE: u32 = 4;
 
 /// How windows along a line are summed, by `glsl/shared/windows.glsl`.
 #[derive(Clone, Copy)]
 struct Walk {
     /// Elements of a window.
     window: u32,
-    /// Windows that a thread takes in turn, or at once if they are few.
+    /// Windows that a thread takes.
     segment: u32,
     /// Lines of a workgroup.
     lines: u32,
 }
 
 impl Walk {
-    fn new(gpu: &Gpu, radius: u32, edge: u32) -> Self {
+    fn new(tuning: &Tuning, radius: u32, edge: u32) -> Self {
         let window = 2 * radius.min(edge - 1) + 1;
-        let tuning = gpu.tuning();
         let segment = match tuning.windows {
             0 => edge,
             n if window <= WIDEST_AT_ONCE => n.min(window),
@@ -142,10 +143,10 @@ impl Walk {
         Self { window, segment: segment.max(edge.div_ceil(MAX_GROUPS)), lines: tuning.lines }
     }
 
-    /// Windows that are taken at a time, each of which costs registers. Wide windows are worth more, lest their groups
-    /// become many.
+    /// Windows that are taken at a time, each of which costs registers, and the driver time to compile. Wide windows are worth more,
+    /// lest their groups become many. Twice as many take .97 of the time on lavapipe, and 1.3 times as long to compile.
     fn tile(self) -> u32 {
-        let most = if self.window > 64 { 16 } else { 8 };
+        let most = if self.window > 40 { 8 } else { 4 };
         // Elements and groups, per window, that are added besides those of the tile itself.
         let besides = |tile: u32| {
             let whole = ((self.window - 1) / tile).max(1);
@@ -156,8 +157,9 @@ impl Walk {
     }
 
     fn constants(self) -> shared::windows::Constants {
-        let [window, tile, segment] = [self.window, self.tile(), self.segment].map(|n| n as i32);
-        shared::windows::Constants { window, tile, segment }
+        let at_once = if self.segment <= MOST_AT_ONCE.min(self.window) { self.segment } else { 0 };
+        let [window, tile, at_once] = [self.window, self.tile(), at_once].map(|n| n as i32);
+        shared::windows::Constants { window, tile, at_once }
     }
 
     /// Workgroups for `windows` of each of `lines`.
@@ -174,7 +176,7 @@ impl Windows {
     pub fn new(gpu: &Gpu, radius: u32, eps: vec4, leverages: bool, size: [u32; 2]) -> Result<Self> {
         let step = step(radius);
         let [width, height] = size.map(|edge| edge.div_ceil(step));
-        let [down, along] = [height, width].map(|edge| Walk::new(gpu, radius / step, edge));
+        let [down, along] = [height, width].map(|edge| Walk::new(gpu.tuning(), radius / step, edge));
         let strip_rows =
             strip_rows(gpu.tuning().strip_bytes, gpu.info().max_storage_range, down.window, [width, height]);
         let models = width.next_multiple_of(BESIDE) as usize * height as usize;
@@ -269,6 +271,18 @@ fn strip_rows(target: u64, limit: u64, window: u32, [width, height]: [u32; 2]) -
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Or a driver would compile them for each size of an image.
+    #[test]
+    fn images_of_all_sizes_share_kernels() {
+        for tuning in [Tuning::CPU, Tuning::GPU] {
+            for radius in [0, 4, 30, 300] {
+                let of = |edge| Walk::new(&tuning, radius, edge).constants().entries();
+                assert_eq!(of(301), of(60_000), "{tuning:?}, radius {radius}");
+                assert!(radius == 0 || of(radius) != of(301), "control: a window beyond the image");
+            }
+        }
+    }
 
     #[test]
     fn strips_fit_a_storage_binding() {
