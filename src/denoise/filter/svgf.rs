@@ -48,7 +48,8 @@ struct Svgf {
 pub struct Levels {
     /// All levels but the last, and the last.
     kernels: [Kernel<Bind<'static>>; 2],
-    scratch: Buffer<vec4>,
+    /// One for each image.
+    scratch: Vec<Buffer<vec4>>,
     rates: Rates,
     rate_l: f32,
     levels: u32,
@@ -62,7 +63,7 @@ impl SvgfSettings {
 }
 
 impl Levels {
-    /// For images of (width, height).
+    /// For images of (width, height), one or two of which are filtered together.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when it does not fit.
@@ -72,42 +73,46 @@ impl Levels {
         own: &SvgfSettings,
         levels: u32,
         [width, height]: [u32; 2],
+        two: bool,
     ) -> Result<Self> {
         let rates = Rates::of_surfaces(edge);
         let (edge, filter_thread) = (rates.constants(), gpu.tuning().filter_thread());
-        let kernel = |last| Kernel::new(gpu, &Constants { edge, filter_thread, last });
+        let kernel = |last| Kernel::new(gpu, &Constants { edge, filter_thread, last, two });
+        let scratch = |_| Buffer::new(gpu, "svgf", width as usize * height as usize, Location::Device);
         Ok(Self {
             kernels: [kernel(false)?, kernel(true)?],
-            scratch: Buffer::new(gpu, "svgf", width as usize * height as usize, Location::Device)?,
+            scratch: (0..if two { 2 } else { 1 }).map(scratch).collect::<Result<_>>()?,
             rates,
             rate_l: own.rate_l(),
             levels,
         })
     }
 
-    /// estimate\[P\], which is lost, as [`Estimate`] has it, and what is packed -> output\[P\]
+    /// Of each image: estimate\[P\], which is lost, as [`Estimate`] has it, and what is packed -> output\[P\]
     ///
     /// # Errors
     /// [`crate::error::Error::Device`] when the image is too large for the device.
-    pub fn record(
-        &self,
-        rec: &mut Recorder,
-        size: [u32; 2],
-        pack: &Pack,
-        estimate: &Buffer<vec4>,
-        output: &Buffer<vec4>,
-    ) -> Result<()> {
-        let mut from = estimate;
+    pub fn record(&self, rec: &mut Recorder, size: [u32; 2], pack: &Pack, images: &[[&Buffer<vec4>; 2]]) -> Result<()> {
+        // A kernel of one image binds it twice.
+        let each = [0, images.len() - 1];
+        let mut from = each.map(|image| images[image][0]);
         for level in 0..self.levels {
             let last = level + 1 == self.levels;
-            let to = match last {
-                true => output,
-                false if level % 2 == 0 => &self.scratch,
-                false => estimate,
-            };
+            let to = each.map(|image| match last {
+                true => images[image][1],
+                false if level % 2 == 0 => &self.scratch[image],
+                false => images[image][0],
+            });
             let (spacing, rates) = (1 << level, self.rates.as_array());
             let push = SvgfPush { size, spacing, rate_l: self.rate_l, rates, ..Default::default() };
-            let bind = Bind { estimate: from, place: &pack.place, colour: &pack.colour, filtered: to };
+            let bind = Bind {
+                estimate: from[0],
+                second: from[1],
+                place: &pack.place,
+                colour: &pack.colour,
+                filtered: to[0],
+                second_filtered: to[1],
+            };
             let kernel = &self.kernels[usize::from(last)];
             rec.dispatch(kernel, bind, &push, kernel.groups(threads(size, spacing)))?;
             from = to;
@@ -121,7 +126,7 @@ impl Svgf {
         Ok(Self {
             pack: Pack::new(gpu, size)?,
             estimate: Estimate::new(gpu, edge, false, size)?,
-            levels: Levels::new(gpu, edge, own, levels, size)?,
+            levels: Levels::new(gpu, edge, own, levels, size, false)?,
         })
     }
 }
@@ -130,7 +135,7 @@ impl Filter for Svgf {
     fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
         self.pack.record(rec, planes)?;
         self.estimate.record(rec, planes, &self.pack)?;
-        self.levels.record(rec, planes.size, &self.pack, &self.estimate.plane, &planes.output)
+        self.levels.record(rec, planes.size, &self.pack, &[[&self.estimate.plane, &planes.output]])
     }
 }
 

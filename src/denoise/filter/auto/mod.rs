@@ -23,9 +23,9 @@ use crate::shaders::{auto, auto_error, auto_inputs, auto_leverage, auto_residual
 pub const ROW: Row = Row {
     name: "auto",
     about: "per pixel the best blend of none, guided by wide, middle and narrow windows, and svgf, by estimated error",
-    // The packs', three windows', what four candidates make, two estimates, svgf's scratch, errors and smoothed ones, three of what is
-    // dim or probed, leverages and their surroundings; leverages of narrow windows, surfaces of cells, expected errors.
-    bytes: super::pack::BYTES + 32 + 3 * (guided::ROW.bytes - 32) + (4 + 2 + 1 + 3 + 3 + 3 + 2) * 16 + 4 + 4 + 12,
+    // The packs', three windows', what four candidates make, two estimates, two for levels of svgf, errors and smoothed ones, three
+    // of what is dim or probed, leverages and their surroundings; leverages of narrow windows, surfaces of cells, expected errors.
+    bytes: super::pack::BYTES + 32 + 3 * (guided::ROW.bytes - 32) + (4 + 2 + 2 + 3 + 3 + 3 + 2) * 16 + 4 + 4 + 12,
     make: |gpu, settings, size| Ok(Box::new(Auto::new(gpu, settings, size)?)),
     reference: reference::reference,
 };
@@ -139,7 +139,7 @@ impl Auto {
             nothing: Buffer::from_slice(gpu, "no variance", &[])?,
             residual: Kernel::new(gpu, &auto_residual::Constants { edge: surfaces, filter_thread })?,
             windows: [windows(&wide, false)?, windows(&middle, false)?, windows(&narrow, true)?],
-            svgf: Levels::new(gpu, &of_svgf.edge, &of_svgf.svgf, of_svgf.footprint.levels, size)?,
+            svgf: Levels::new(gpu, &of_svgf.edge, &of_svgf.svgf, of_svgf.footprint.levels, size, true)?,
             svgf_estimate: Estimate::new(gpu, &of_svgf.edge, false, size)?,
             results: [plane("wide")?, plane("middle")?, plane("narrow")?, plane("svgf")?],
             dim: Buffer::new(gpu, "dim", windows_pack.colour.len(), Location::Device)?,
@@ -172,8 +172,7 @@ impl Auto {
         wide.record(rec, size, [&self.dim, channels], &self.wide_dim)?;
         middle.record(rec, size, [colour, channels], of_middle)?;
         narrow.record(rec, size, [&self.dim, channels], of_narrow)?;
-        self.svgf.record(rec, size, &self.pack, estimate, of_svgf)?;
-        self.svgf.record(rec, size, &self.pack, probe, &self.svgf_probed)?;
+        self.svgf.record(rec, size, &self.pack, &[[estimate, of_svgf], [probe, &self.svgf_probed]])?;
         let bind = auto_leverage::Bind {
             wide: of_wide,
             svgf: of_svgf,
