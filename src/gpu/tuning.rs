@@ -25,7 +25,7 @@ pub struct Tuning {
     pub strip_bytes: u64,
     /// Windows of the guided filter that a thread takes, 0 for those of a whole line, which share most of their sums. A GPU needs
     /// more threads, with fewer registers: on an H200 1 takes .33 of the time of segments as long as a window. With 2 to 4 windows
-    /// share sums too; not tried on a GPU. In any case the widest windows are taken in segments of their length. Floats are
+    /// share sums too; not tried on a GPU. In any case the widest windows are taken in segments of at most their length. Floats are
     /// then added in another order: pictures of `guided`, and of `auto`, which uses it, differ by some 1e-6 of their values.
     pub windows: u32,
     /// Lines of the guided filter's windows per workgroup.
