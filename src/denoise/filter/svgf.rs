@@ -48,8 +48,8 @@ struct Svgf {
 pub struct Levels {
     /// All levels but the last, and the last.
     kernels: [Kernel<Bind<'static>>; 2],
-    /// One for each image.
-    scratch: Vec<Buffer<vec4>>,
+    /// One for each image; of one pixel where there is no second.
+    scratch: [Buffer<vec4>; 2],
     rates: Rates,
     rate_l: f32,
     levels: u32,
@@ -78,10 +78,11 @@ impl Levels {
         let rates = Rates::of_surfaces(edge);
         let (edge, filter_thread) = (rates.constants(), gpu.tuning().filter_thread());
         let kernel = |last| Kernel::new(gpu, &Constants { edge, filter_thread, last, two });
-        let scratch = |_| Buffer::new(gpu, "svgf", width as usize * height as usize, Location::Device);
+        let pixels = width as usize * height as usize;
+        let scratch = |pixels| Buffer::new(gpu, "svgf", pixels, Location::Device);
         Ok(Self {
             kernels: [kernel(false)?, kernel(true)?],
-            scratch: (0..if two { 2 } else { 1 }).map(scratch).collect::<Result<_>>()?,
+            scratch: [scratch(pixels)?, scratch(if two { pixels } else { 1 })?],
             rates,
             rate_l: own.rate_l(),
             levels,
@@ -93,12 +94,12 @@ impl Levels {
     /// # Errors
     /// [`crate::error::Error::Device`] when the image is too large for the device.
     pub fn record(&self, rec: &mut Recorder, size: [u32; 2], pack: &Pack, images: &[[&Buffer<vec4>; 2]]) -> Result<()> {
-        // A kernel of one image binds it twice.
-        let each = [0, images.len() - 1];
-        let mut from = each.map(|image| images[image][0]);
+        // A kernel of one image needs something to bind.
+        let images = [images[0], images.get(1).copied().unwrap_or([&self.scratch[1]; 2])];
+        let mut from = images.map(|[estimate, _]| estimate);
         for level in 0..self.levels {
             let last = level + 1 == self.levels;
-            let to = each.map(|image| match last {
+            let to = [0, 1].map(|image| match last {
                 true => images[image][1],
                 false if level % 2 == 0 => &self.scratch[image],
                 false => images[image][0],
