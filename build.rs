@@ -60,6 +60,9 @@ const RAY_QUERY: &str = "RAY_QUERY";
 /// sooner.
 const TRACES: &str = "glsl/shared/trace.glsl";
 
+/// The compiled kernels that a packaged crate carries.
+const PACKAGED: &str = "spirv";
+
 fn main() {
     if let Err(error) = build() {
         eprintln!("{error:#}");
@@ -72,8 +75,8 @@ fn build() -> Result<()> {
     println!("cargo:rerun-if-changed=src/layout");
     println!("cargo:rerun-if-changed=tools/build");
     println!("cargo:rerun-if-changed=glsl");
-    if Path::new("spirv").exists() {
-        println!("cargo:rerun-if-changed=spirv");
+    if Path::new(PACKAGED).exists() {
+        println!("cargo:rerun-if-changed={PACKAGED}");
     }
     let out = PathBuf::from(env::var("OUT_DIR")?);
     let compiled = out.join("spirv");
@@ -81,12 +84,30 @@ fn build() -> Result<()> {
         fs::remove_dir_all(&compiled)?; // kernels of earlier sources
     }
     fs::create_dir(&compiled)?;
+    let store = store(&out)?;
     let (tests, own) =
         kernels(Path::new("glsl"))?.into_iter().partition::<Vec<_>, _>(|file| file.starts_with("glsl/test"));
-    generate(&own, "crate", &out.join("shaders.rs"))?;
+    generate(&own, "crate", &store, &out.join("shaders.rs"))?;
     let alone = ["glsl/film/accumulate.comp", "glsl/profile/ceiling_arithmetic.comp", "glsl/profile/ceiling_copy.comp"];
     let tested = [&tests[..], &alone.map(PathBuf::from)].concat();
-    generate(&tested, "tallow", &out.join("test_shaders.rs"))
+    generate(&tested, "tallow", &store, &out.join("test_shaders.rs"))?;
+    for entry in fs::read_dir(&store)? {
+        let entry = entry?;
+        if !compiled.join(entry.file_name()).exists() {
+            fs::remove_file(entry.path())?; // of earlier sources
+        }
+    }
+    Ok(())
+}
+
+/// Where compiled kernels stay for later builds of the same sources, in the profile's folder: clippy runs a build script of its own, and
+/// most edits change few kernels. A packaged crate, which carries its kernels, leaves nothing there. `cargo clean` forgets them, as is
+/// due after a change of `glslc`.
+fn store(out: &Path) -> Result<PathBuf> {
+    let parent = if Path::new(PACKAGED).exists() { Some(out) } else { out.ancestors().nth(3) };
+    let store = parent.context("OUT_DIR lies in the target folder")?.join("compiled");
+    fs::create_dir_all(&store).with_context(|| format!("{}: cannot be made", store.display()))?;
+    Ok(store)
 }
 
 /// The kernels below `folder`, by name.
@@ -148,19 +169,26 @@ impl<'a> Kernel<'a> {
 }
 
 impl Code<'_> {
-    fn compile(&self) -> Result<()> {
-        let packaged = Path::new("spirv").join(self.binary.file_name().context("a file")?);
-        let spirv = fs::read(packaged).or_else(|_| compile(self.file, &self.whole))?;
-        Ok(fs::write(&self.binary, &spirv)?)
+    fn compile(&self, store: &Path) -> Result<()> {
+        let name = self.binary.file_name().context("a file")?;
+        let (packaged, stored) = (Path::new(PACKAGED).join(name), store.join(name));
+        let from = if packaged.exists() { packaged } else { stored };
+        if !from.exists() {
+            let partial = from.with_extension("partial"); // a build can be interrupted
+            fs::write(&partial, compile(self.file, &self.whole)?)?;
+            fs::rename(&partial, &from)?;
+        }
+        fs::copy(&from, &self.binary)?;
+        Ok(())
     }
 }
 
 /// Compiles on all cores: each thread takes the next one until none is left.
-fn compile_all(code: &[&Code]) -> Result<()> {
+fn compile_all(code: &[&Code], store: &Path) -> Result<()> {
     let next = AtomicUsize::new(0);
     let work = || {
         while let Some(code) = code.get(next.fetch_add(1, Ordering::Relaxed)) {
-            code.compile()?;
+            code.compile(store)?;
         }
         anyhow::Ok(())
     };
@@ -171,12 +199,12 @@ fn compile_all(code: &[&Code]) -> Result<()> {
     })
 }
 
-/// Compiles `files`; `root` is the path by which the generated code reaches the crate.
-fn generate(files: &[PathBuf], root: &str, target: &Path) -> Result<()> {
+/// Compiles `files`, but for what `store` has; `root` is the path by which the generated code reaches the crate.
+fn generate(files: &[PathBuf], root: &str, store: &Path, target: &Path) -> Result<()> {
     let (mut code, mut hash) = (String::new(), Xxh3Default::new());
     let folder = target.with_file_name("spirv");
     let kernels = files.iter().map(|file| Kernel::read(file, &folder)).collect::<Result<Vec<_>>>()?;
-    compile_all(&kernels.iter().flat_map(Kernel::code).collect::<Vec<_>>())?;
+    compile_all(&kernels.iter().flat_map(Kernel::code).collect::<Vec<_>>(), store)?;
     let mut groups = BTreeMap::new();
     for kernel in &kernels {
         for compiled in kernel.code() {
