@@ -56,9 +56,9 @@ const HEADER: &str = "#version 460
 /// triangles to deal to each other.
 const RAY_QUERY: &str = "RAY_QUERY";
 
-/// Kernels that include it are compiled once more with storage buffers in place of texel buffers, for devices that read those
+/// Kernels that include one of them are compiled once more with storage buffers in place of texel buffers, for devices that read those
 /// sooner.
-const TRACES: &str = "glsl/shared/trace.glsl";
+const TRACES: [&str; 2] = ["glsl/shared/trace.glsl", "glsl/shared/path_step.glsl"];
 
 /// The compiled kernels that a packaged crate carries.
 const PACKAGED: &str = "spirv";
@@ -157,7 +157,7 @@ impl<'a> Kernel<'a> {
             Code { file, whole, binary }
         };
         let ray_query = text.contains(RAY_QUERY).then(|| code(&format!("#define {RAY_QUERY}\n"), &text));
-        let traces = sources.iter().any(|(file, _)| file == TRACES);
+        let traces = sources.iter().any(|(file, _)| TRACES.contains(&file.as_str()));
         let storage = traces.then(|| code("", &structs::storage_form(&text)));
         Ok(Self { name, file, usual: code("", &text), ray_query, storage, interface })
     }

@@ -32,6 +32,8 @@ uint nodes_visited = 0u;
 #include "shared/deal.glsl"
 #include "shared/surface.glsl"
 #include "shared/light.glsl"
+#include "shared/path_state.glsl"
+#include "shared/path_step.glsl"
 #include "shared/trace_path.glsl"
 #include "shared/history.glsl"
 #include "shared/cell.glsl"
@@ -63,10 +65,10 @@ vec3 light_from(SurfacePoint at, uint index) {
     if (at.triangle == NONE) return vec3(0.0);
     vec3 off = surface_at(Hit(0.0, at.triangle, at.instance, at.weights.x, at.weights.y)).position - previous.position;
     float depth = length(off);
-    Path path = Path(previous.position, off / max(depth, 1e-37), vec3(1.0), 0.0, true, 1.0);
-    Hit hit = Hit(depth, at.triangle, at.instance, at.weights.x, at.weights.y);
-    vec3 albedo;
-    SplitLight light = trace_path(path, true, false, hit, sampler_start(0u, index, push.constants.seed), path_seed(0u, index), albedo);
+    PathState p = path_state(previous.position, off / max(depth, 1e-37), false, path_seed(0u, index));
+    p.hit = Hit(depth, at.triangle, at.instance, at.weights.x, at.weights.y);
+    trace_path(p, true, sampler_start(0u, index, push.constants.seed));
+    SplitLight light = light_of(p);
     return light.direct + light.indirect;
 }
 

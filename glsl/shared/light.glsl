@@ -1,4 +1,5 @@
 // Choice of a light by an alias table in proportion to power, sampling of a point on it, and the densities for MIS.
+#include "shared/segment.glsl"
 
 struct LightSample {
     vec3 direction; // unit, from the surface to the light
@@ -6,8 +7,6 @@ struct LightSample {
     vec3 radiance;  // already divided by the probability of the sample
     float pdf;      // per solid angle, for MIS; 0 for lights that no BSDF sample can hit
 };
-
-const float INFINITE_DISTANCE = 3e38; // stands for the distance of lights at infinity
 
 // The slot of an alias table of `n` that the word `random` chooses.
 uint alias_slot(uint n, uint random) {

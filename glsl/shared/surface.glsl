@@ -1,5 +1,6 @@
 // Computes what shading needs of a hit: position, normals, the resolved BSDF, emission.
 #include "shared/octahedral.glsl"
+#include "shared/segment.glsl"
 
 struct Surface {
     vec3 position;  // world, interpolated from the vertices: more exact than origin + t * direction

@@ -6,20 +6,7 @@
 // live from step to step count for more than early exits. A loop that tests at its head would run its body once more with no
 // lane active, so loops test at their end. A GPU would gain from early exits, and loses a little by both.
 
-struct Hit {
-    float t;          // distance in lengths of the ray's direction
-    uint triangle;    // index in leaf order; NONE on a miss
-    uint instance;    // NONE without instances
-    float b1, b2;     // weights of vertices 1 and 2; of a sphere, see sphere.glsl
-};
-
-// A ray whose hits count before `t_max`, in lengths of `direction`.
-struct Segment {
-    vec3 origin;
-    vec3 direction;
-    float t_max;
-    uint mask_seed; // decides hits on partly transparent surfaces
-};
+#include "shared/segment.glsl"
 
 // Number of groups that a ray of this scene can leave on its stack (scene/build/bvh.rs). Two stay in registers. lavapipe writes
 // to an array lane by lane, with a branch each, so that an unconditional write, useless where no group is left, costs less.

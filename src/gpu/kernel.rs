@@ -314,10 +314,15 @@ mod tests {
     #[test]
     fn a_form_of_kernels_that_trace_has_no_texels() {
         use crate::gpu::Bindings;
-        use crate::shaders::{accumulate, path};
+        use crate::shaders::{accumulate, path, path_extend, path_shade};
         const SAMPLED_BUFFER: u32 = 46;
-        let code = <path::Bind as Bindings>::STORAGE_SPIRV.unwrap();
-        assert!(!declares(code, SAMPLED_BUFFER) && declares(path::SPIRV, SAMPLED_BUFFER));
+        for (code, usual) in [
+            (<path::Bind as Bindings>::STORAGE_SPIRV, path::SPIRV),
+            (<path_extend::Bind as Bindings>::STORAGE_SPIRV, path_extend::SPIRV),
+            (<path_shade::Bind as Bindings>::STORAGE_SPIRV, path_shade::SPIRV),
+        ] {
+            assert!(!declares(code.unwrap(), SAMPLED_BUFFER) && declares(usual, SAMPLED_BUFFER));
+        }
         assert!(<accumulate::Bind as Bindings>::STORAGE_SPIRV.is_none(), "it traces no rays");
     }
 

@@ -3,6 +3,12 @@ use super::info::DeviceKind;
 use crate::error::{Error, Result};
 use crate::shaders::shared;
 
+/// Depth of a stack that stays in registers.
+const IN_REGISTERS: u32 = 2;
+
+/// Edges of a path that a wavefront has stages for. Each is two dispatches for all paths, however few have got so far.
+const MOST_STAGES: u32 = 32;
+
 /// The sizes that suit a kind of device. No choice changes a bit of any image, but for [`Self::windows`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tuning {
@@ -45,6 +51,10 @@ pub struct Tuning {
     /// bind too few of them, and those that trace by ray queries, keep texel buffers. lavapipe takes twice as long;
     /// an H200 .88 of the time for the Stanford dragon under a picture of a sky, .99 to 1.00 in a bare Sponza and the Cornell box.
     pub storage_buffers: bool,
+    /// Whether paths are traced by a wavefront, see `render::pass::wavefront`, in scenes of more than a few nodes and where they have
+    /// at most 32 edges. Not tried on a GPU yet, where tracing alone needs half of the registers of whole paths. lavapipe takes
+    /// 1.6 to 3.8 of the time.
+    pub wavefront: bool,
     /// Threads in a workgroup of a filter that looks at pixels around its own, all in one row. In larger ones neighbours share
     /// more of what they read, from which an H200 gains nothing.
     pub filter_workgroup: u32,
@@ -67,6 +77,7 @@ impl Tuning {
         native_bits: false,
         triangles_a_step: 0,
         storage_buffers: false,
+        wavefront: false,
         filter_workgroup: 32,
         longest_edge: 60_000,
     };
@@ -85,6 +96,7 @@ impl Tuning {
         native_bits: true,
         triangles_a_step: 2,
         storage_buffers: true,
+        wavefront: false,
         filter_workgroup: 32,
         longest_edge: u64::MAX,
     };
@@ -115,6 +127,11 @@ impl Tuning {
         if kind == DeviceKind::Cpu { Self::CPU } else { Self { storage_buffers, ..Self::GPU } }
     }
 
+    /// Whether paths of at most `max_depth` edges are traced by a wavefront; `stack` is the depth that the scene's traversal needs.
+    pub fn has_wavefront(&self, stack: u32, max_depth: u32) -> bool {
+        self.wavefront && stack > IN_REGISTERS && max_depth <= MOST_STAGES
+    }
+
     /// Constants of kernels that number their threads with `glsl/shared/thread.glsl`.
     pub fn thread(&self) -> shared::thread::Constants {
         shared::thread::Constants { workgroup: self.workgroup, stripes: self.stripes }
@@ -128,7 +145,6 @@ impl Tuning {
     /// Constants of kernels that trace rays; `stack` is the depth that the scene's traversal needs. It is rounded up, so that most scenes
     /// of the same effects share what the driver has compiled.
     pub fn traverse(&self, stack: u32) -> shared::traverse::Constants {
-        const IN_REGISTERS: u32 = 2;
         let Self { native_bits, triangles_a_step, .. } = *self;
         let stack = if stack <= IN_REGISTERS { IN_REGISTERS } else { stack.next_multiple_of(8) };
         shared::traverse::Constants { stack, native_bits, triangles_a_step }

@@ -34,7 +34,8 @@ gpu_structs! {
         root: uint,
     }
 
-    /// Push constants of `path.comp`, `primary_hit.comp` and `guide_lookup.comp`, 68 of the 128 bytes that every device has.
+    /// Push constants of `path.comp`, `primary_hit.comp`, `guide_lookup.comp` and the kernels of a wavefront, 72 of the 128 bytes
+    /// that every device has.
     struct PathPush {
         /// What stays the same during the frame.
         constants: PathConstants,
@@ -46,6 +47,8 @@ gpu_structs! {
         first_sample: uint,
         /// Samples of every pixel in the batch; 0 when the sample-to-pixel buffer lists the paths.
         samples: uint,
+        /// Of a wavefront: surfaces that all of its paths have met.
+        stage: uint,
     }
 
     /// Push constants of `accumulate.comp`.

@@ -1,8 +1,9 @@
 //! How much the passes of a frame do, counted from what they were recorded with.
 //!
 //! Bytes: every byte of every buffer that a pass binds counts once where the kernel reads it and once where it writes it, as if a
-//! cache held all that is read twice. Three kernels bind more than they touch. `path` reads nodes of the scene's hierarchy at
-//! random: counted are the nodes that rays visited, and its samples. `accumulate` touches the samples that `path` left, and its
+//! cache held all that is read twice. Some kernels bind more than they touch. `path` reads nodes of the scene's hierarchy at
+//! random: counted are the nodes that rays visited, and its samples. Of a wavefront only the nodes of `path_extend` are counted, as
+//! nobody counts the paths that still go on. `accumulate` touches the samples that `path` left, and its
 //! share of the film. `primary_hit` counts what it writes, as nobody counts its nodes. Triangles, textures and lights do not count.
 //!
 //! Operations: see [`super::code`]. Those of `path` are its steps through the hierarchy, one for each node; shading does not count.
@@ -69,7 +70,7 @@ impl FrameWork {
                 all.push((name.to_owned(), Work::default()));
                 all.len() - 1
             });
-            if name == "path" {
+            if matches!(name, "path" | "path_generate") {
                 paths = pass.shape.threads;
             }
             self.add(&mut all[at].1, pass, paths, &mut codes);
@@ -89,7 +90,7 @@ impl FrameWork {
         let Some(code) = &shape.code else { return };
         let count = codes.entry(key(code)).or_insert_with(|| Code::new(code.spirv, &code.constants));
         let Some(count) = count else { return work.operations.add(0, true) };
-        if pass.time.name == "path" {
+        if matches!(pass.time.name, "path" | "path_extend") {
             // The counters are of the whole frame.
             let nodes = if is_first { self.counters.nodes } else { 0 };
             work.bytes.add(nodes * size_of::<BvhNode>() as u64, true);
@@ -105,6 +106,7 @@ impl FrameWork {
         let sum = |of: &dyn Fn(&BoundRange) -> u64| ranges.iter().map(|range| moves(range) * of(range)).sum();
         match pass.time.name {
             "path" => (paths * record, true),
+            "path_extend" | "path_shade" => (0, true),
             "primary_hit" => (sum(&|range| if range.name == "guides" { range.bytes } else { 0 }), true),
             "accumulate" => {
                 let share = |bytes: u64| bytes.min(bytes.saturating_mul(pass.shape.threads) / self.pixels.max(1));
@@ -123,7 +125,7 @@ impl FrameWork {
         let ranges = &pass.shape.ranges;
         let nodes = ranges.iter().filter(|range| range.name == "nodes").map(|range| range.bytes).sum::<u64>();
         match pass.time.name {
-            "path" | "primary_hit" => self.bytes(pass, paths).0 + nodes,
+            "path" | "path_extend" | "path_shade" | "primary_hit" => self.bytes(pass, paths).0 + nodes,
             _ => ranges.iter().map(|range| range.bytes).sum(),
         }
     }

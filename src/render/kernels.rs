@@ -15,24 +15,25 @@ pub struct Kernels {
     /// Finds what lies behind the centre of each pixel.
     pub primary_hit: primary_hit::Guides,
     /// Traces paths.
-    pub path: path::Path,
+    pub path: path::Paths,
     /// Adds samples to the statistics of their pixels.
     pub accumulate: accumulate::Fold,
 }
 
 impl Kernels {
-    /// Compiles them with these effects; `stack` is the depth that traversal needs, [`crate::scene::Scene::stack`].
+    /// Compiles them with these effects, for at most `paths` paths at once of at most `max_depth` edges; `stack` is the depth that
+    /// traversal needs, [`crate::scene::Scene::stack`].
     ///
     /// # Errors
-    /// [`crate::error::Error::Device`] when the driver refuses one.
-    pub fn new(gpu: &Gpu, effects: Effects, stack: u32) -> Result<Self> {
+    /// [`crate::error::Error::Device`] when the driver refuses one, or the paths do not fit.
+    pub fn new(gpu: &Gpu, effects: Effects, stack: u32, max_depth: u32, paths: u32) -> Result<Self> {
         let (thread, traverse) = (gpu.tuning().thread(), gpu.tuning().traverse(stack));
         Ok(Self {
             primary_hit: Kernel::new(
                 gpu,
                 &shaders::primary_hit::Constants { effects, thread, traverse, points: false },
             )?,
-            path: Kernel::new(gpu, &shaders::path::Constants { effects, thread, traverse, deal: gpu.deal() })?,
+            path: path::Paths::new(gpu, effects, stack, max_depth, paths)?,
             accumulate: Kernel::new(gpu, &shaders::accumulate::Constants { effects, thread })?,
         })
     }

@@ -8,6 +8,7 @@ use crate::layout::{Apportionment, Camera, Effects, PixelStats, PriorityPush};
 use crate::render::buffers::{DeviceScene, FilmBuffers};
 use crate::render::frame::{self, Frame};
 use crate::render::kernels::{Allocation, Kernels};
+use crate::render::pass::wavefront;
 use crate::render::push::{frame_constants, priority_push};
 use crate::render::schedule::{self, Cut, Step};
 use crate::render::settings::{Sampler, Settings};
@@ -94,10 +95,10 @@ impl Renderer {
         let policy = settings.allocate.policy;
         let split_light = outputs.split_light || policy.split_light;
         let effects = Effects { split_light, counters: outputs.counters, ..effects };
-        let kernels = Kernels::new(gpu, effects, scene.stack)?;
         let pixels = settings.pixels() as u32;
         let allocation = effects.adaptive.then(|| Allocation::new(gpu, policy, settings)).transpose()?;
-        let paths = paths_in_flight(gpu, settings, &effects);
+        let paths = paths_in_flight(gpu, scene, settings, &effects);
+        let kernels = Kernels::new(gpu, effects, scene.stack, settings.max_depth, paths)?;
         let film = FilmBuffers::new(gpu, pixels, paths, &effects, outputs.guides || policy.guides)?;
         // Offsets are the widest records that are bound whole.
         let most = (gpu.info().max_storage_range / 8 - 1).min(film.tiles[0].pixels.into());
@@ -318,9 +319,11 @@ pub fn all_effects(scene: &Scene, settings: &Settings) -> Effects {
     Effects { independent_sampler, large_lamps: scene.large_lamps, soft_light, ..Effects::ALL }
 }
 
-/// Paths per dispatch, whose samples fit a storage buffer.
-fn paths_in_flight(gpu: &Gpu, settings: &Settings, effects: &Effects) -> u32 {
-    let bytes = if effects.split_light { 48 } else { 16 };
+/// Paths per dispatch, whose samples, or what a wavefront keeps of them, fit a storage buffer.
+fn paths_in_flight(gpu: &Gpu, scene: &Scene, settings: &Settings, effects: &Effects) -> u32 {
+    let wavefront = gpu.tuning().has_wavefront(scene.stack, settings.max_depth);
+    let samples = if effects.split_light { 48 } else { 16 };
+    let bytes = if wavefront { wavefront::BYTES_PER_PATH } else { samples };
     let room = gpu.info().max_storage_range / bytes;
     let all = settings.pixels() as u64 * u64::from(settings.spp);
     gpu.tuning().paths_in_flight.min(room).min(all).max(1) as u32

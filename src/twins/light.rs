@@ -23,7 +23,7 @@ pub struct LightSample {
     pub pdf: f32,
 }
 
-pub use crate::shaders::shared::light::INFINITE_DISTANCE;
+pub use crate::shaders::shared::segment::INFINITE_DISTANCE;
 
 /// The entry that a random word chooses, and a word that is independent of it and as well stratified.
 pub fn alias_choose(table: &[AliasEntry], random: u32) -> (u32, u32) {

@@ -1,10 +1,10 @@
-//! Twin of `glsl/trace/path.comp` and of `glsl/shared/trace_path.glsl`.
+//! Twin of `glsl/trace/path.comp` and of `glsl/shared/path_step.glsl`.
 use crate::layout::{
     BSDF_DIELECTRIC, BSDF_METALLIC, Effects, FrameConstants, MATERIAL_TWO_SIDED, NONE, PathConstants, SurfacePoint,
 };
 use crate::math::hash::pcg;
 use crate::scene::Scene;
-use crate::shaders::shared::trace_path::{
+use crate::shaders::shared::path_step::{
     MAX_SURVIVAL, PAIR_BSDF, PAIR_CHOICE, PAIR_FIRST_BOUNCE, PAIR_LIGHT, PAIR_ROULETTE, PAIRS_PER_BOUNCE,
 };
 use crate::twins::bsdf::{
@@ -20,7 +20,7 @@ use crate::twins::surface::{
 use crate::twins::traverse::{Hit, traverse, traverse_from};
 use glam::{Mat3, Vec3};
 
-pub use crate::shaders::shared::trace_path::SHADOW_END;
+pub use crate::shaders::shared::path_step::SHADOW_END;
 
 /// What one path returns, linear Rec. 709. Without [`Effects::indirect`] and [`Effects::soft_light`] all light is in `direct`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -18,14 +18,18 @@ mod support;
 
 use std::path::Path;
 use tallow::error::{Error, Result};
-use tallow::gpu::{DeviceOptions, Gpu, Tracing};
+use tallow::gpu::{DeviceOptions, Gpu, Tracing, Tuning};
 use tallow::layout::MATERIAL_MASKED;
 use tallow::render::settings::Settings;
 use tallow::scene::{Loaded, Scene};
 
 fn open(tracing: Tracing) -> Result<Gpu> {
+    open_tuned(tracing, None)
+}
+
+fn open_tuned(tracing: Tracing, tuning: Option<Tuning>) -> Result<Gpu> {
     let device = std::env::var("TALLOW_DEVICE").ok();
-    Gpu::open(&DeviceOptions { device, validation: true, tracing, ..DeviceOptions::default() })
+    Gpu::open(&DeviceOptions { device, validation: true, tracing, tuning, ..DeviceOptions::default() })
 }
 
 /// A device that traces by its kernels, and one that does so by itself.

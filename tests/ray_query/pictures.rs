@@ -2,8 +2,8 @@
 use crate::alike::alike;
 use crate::poses::{MOMENTS, Moment, at, pose};
 use crate::support::{assert_silent, render};
-use crate::{both, scenes};
-use tallow::gpu::{FrameResources, Gpu};
+use crate::{both, open_tuned, scenes};
+use tallow::gpu::{FrameResources, Gpu, Tracing, Tuning};
 use tallow::layout::PixelStats;
 use tallow::render::{Outputs, Renderer};
 use tallow::scene::Loaded;
@@ -53,6 +53,18 @@ fn pictures_of_what_moves_are_alike() {
         }
     }
     gpus.iter().for_each(assert_silent);
+}
+
+#[test]
+fn a_wavefront_leaves_the_bits_of_pictures() {
+    let [_, usual] = both();
+    let tuning = Some(Tuning { wavefront: true, ..*usual.tuning() });
+    let wavefront = open_tuned(Tracing::RayQuery, tuning).unwrap();
+    for (name, scene) in &scenes() {
+        let [one, other] = [&usual, &wavefront].map(|gpu| render(gpu, &renderer(gpu, scene)));
+        assert!(one == other, "{name}");
+    }
+    [usual, wavefront].iter().for_each(assert_silent);
 }
 
 #[test]

@@ -26,4 +26,5 @@ mod support;
 mod tuning;
 #[path = "../support/twin.rs"]
 mod twin;
+mod wavefront;
 mod whole;

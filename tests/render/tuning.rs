@@ -11,9 +11,11 @@ use tallow::render::settings::Settings;
 use tallow::render::{Counters, Outputs, Renderer};
 use tallow::scene::{Loaded, Scene};
 
-const OUTPUTS: Outputs = Outputs { split_light: true, guides: true, counters: true };
+/// Everything.
+pub const OUTPUTS: Outputs = Outputs { split_light: true, guides: true, counters: true };
 
-fn scene(file: &str, policy: &str) -> Loaded {
+/// A scene that the repository ships, on a small film.
+pub fn scene(file: &str, policy: &str) -> Loaded {
     let small = |s: &mut Settings| {
         (s.width, s.height, s.spp) = (65, 33, 4);
         s.allocate.policy = tallow::allocate::policy(policy).unwrap();
@@ -22,12 +24,13 @@ fn scene(file: &str, policy: &str) -> Loaded {
     Scene::load(&file).unwrap().with(small)
 }
 
-fn bits<T: bytemuck::Pod>(values: &[T]) -> Vec<u32> {
+/// The words that values are made of.
+pub fn bits<T: bytemuck::Pod>(values: &[T]) -> Vec<u32> {
     bytemuck::cast_slice(values).to_vec()
 }
 
 /// Every word that a render leaves: pixels, light, primary hits and counters.
-fn film(gpu: &Gpu, scene: &Loaded) -> ([Vec<u32>; 3], Counters) {
+pub fn film(gpu: &Gpu, scene: &Loaded) -> ([Vec<u32>; 3], Counters) {
     let renderer = Renderer::new(gpu, scene, &scene.settings, OUTPUTS).unwrap();
     let stats = render(gpu, &renderer);
     let tile = &renderer.film().tiles[0];
@@ -113,6 +116,7 @@ fn switches() -> Vec<(&'static str, Tuning)> {
         ("storage_buffers", Tuning { storage_buffers: true, ..own }),
         ("storage_buffers and deals", Tuning { storage_buffers: true, ..Tuning::CPU }),
         ("triangles_a_step and deals", Tuning { triangles_a_step: 1, ..Tuning::CPU }),
+        ("wavefront", Tuning { wavefront: true, triangles_a_step: 2, ..own }),
         ("interleaves", Tuning { interleaves: true, thread_items: 5, ..Tuning::CPU }),
         (
             "all",

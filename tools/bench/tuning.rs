@@ -70,6 +70,10 @@ fn of_paths(own: Tuning) -> Vec<(String, Tuning)> {
         all.push((format!("{name}, storage_buffers {storage_buffers}"), Tuning { storage_buffers, ..steps }));
     }
     all.extend([32, 64, 128].map(|n| (format!("workgroup {n}"), Tuning { workgroup: n, ..own })));
+    for triangles_a_step in [0, 2] {
+        let name = format!("wavefront, triangles_a_step {triangles_a_step}");
+        all.push((name, Tuning { wavefront: true, triangles_a_step, ..own }));
+    }
     differing(all)
 }
 
@@ -114,7 +118,7 @@ fn paths(gpu: &Gpu, scene: &Loaded) -> Result<Run> {
     let mut frame = FrameResources::new(gpu)?;
     Ok(Box::new(move || {
         let times = Job::new(&renderer).run_to_end(&mut frame)?.times;
-        Ok(milliseconds(times.iter().filter(|pass| pass.name == "path")))
+        Ok(milliseconds(times.iter().filter(|pass| pass.name.starts_with("path"))))
     }))
 }
 
@@ -142,24 +146,30 @@ fn filter(gpu: &Gpu, scene: &Loaded, name: &str) -> Result<Run> {
     Ok(Box::new(move || Ok(milliseconds(gpu.run(&mut frame, |rec| denoiser.record(rec))?.iter()))))
 }
 
-/// Prints the median time of each choice, and its ratio to the first's.
+/// Prints the median time of each choice, and its ratio to the first's, or why a device refuses it.
 fn compare(what: &str, choices: &[Choice], rounds: usize, run: impl Fn(&Gpu) -> Result<Run>) -> Result<()> {
     if choices.is_empty() {
         return Ok(());
     }
-    let mut runs = choices.iter().map(|(_, gpu)| run(gpu)).collect::<Result<Vec<_>>>()?;
-    runs.iter_mut().try_for_each(|run| run().map(drop))?; // drivers may compile more on the first dispatch
+    let warm = |mut run: Run| run().map(|_| run); // drivers may compile more on the first dispatch
+    let mut runs: Vec<_> = choices.iter().map(|(_, gpu)| run(gpu).and_then(warm)).collect();
     let mut times = vec![Vec::new(); runs.len()];
     for _ in 0..rounds {
         for (run, times) in runs.iter_mut().zip(&mut times) {
-            times.push(run()?);
+            if let Ok(run) = run {
+                times.push(run()?);
+            }
         }
     }
-    let own = median(&times[0]);
     println!("{what}, median of {rounds}:");
-    for ((name, _), times) in choices.iter().zip(&times) {
-        let ms = median(times);
-        println!("  {name:64} {ms:10.3} ms {:7.3}", ms / own);
+    for (((name, _), run), taken) in choices.iter().zip(&runs).zip(&times) {
+        match run {
+            Ok(_) => {
+                let ms = median(taken);
+                println!("  {name:64} {ms:10.3} ms {:7.3}", ms / median(&times[0]));
+            }
+            Err(why) => println!("  {name:64} {why}"),
+        }
     }
     Ok(())
 }

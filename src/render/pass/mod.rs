@@ -10,6 +10,7 @@ pub(crate) mod primary_hit;
 pub mod reproject;
 pub mod sample_list;
 pub mod scan;
+pub(crate) mod wavefront;
 
 /// A 64-bit number as buffers and push constants hold it, low word first.
 fn pair(n: u64) -> [u32; 2] {

@@ -1,13 +1,43 @@
-//! Traces one path per thread. Kernel: `glsl/trace/path.comp`. Twin: [`crate::twins::path`].
+//! Traces paths. Kernel: `glsl/trace/path.comp`, or those of [`wavefront`](super::wavefront). Twin: [`crate::twins::path`].
+use super::wavefront::Wavefront;
 use crate::error::Result;
-use crate::gpu::{Kernel, Recorder};
-use crate::layout::{PathConstants, PathPush};
+use crate::gpu::{Gpu, Kernel, Recorder};
+use crate::layout::{Effects, PathConstants, PathPush};
 use crate::render::buffers::{DeviceScene, FilmBuffers};
 use crate::render::schedule::Batch;
-use crate::shaders::path::Bind;
+use crate::shaders::path::{self, Bind};
+use crate::shaders::shared;
+use std::time::Duration;
 
-/// The specialised kernel.
-pub type Path = Kernel<Bind<'static>>;
+/// The specialised kernels that trace paths.
+pub enum Paths {
+    /// A thread traces a path from end to end.
+    Whole(Kernel<Bind<'static>>),
+    /// Kernels for the parts of all paths in turn.
+    Wavefront(Box<Wavefront>),
+}
+
+impl Paths {
+    /// For at most `paths` paths at once, of at most `max_depth` edges; `stack` is the depth that traversal needs.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`] when the driver refuses a kernel, or the paths do not fit.
+    pub fn new(gpu: &Gpu, effects: Effects, stack: u32, max_depth: u32, paths: u32) -> Result<Self> {
+        if gpu.tuning().has_wavefront(stack, max_depth) {
+            return Ok(Self::Wavefront(Box::new(Wavefront::new(gpu, effects, stack, paths)?)));
+        }
+        let (thread, traverse) = (gpu.tuning().thread(), gpu.tuning().traverse(stack));
+        Ok(Self::Whole(Kernel::new(gpu, &path::Constants { effects, thread, traverse, deal: gpu.deal() })?))
+    }
+
+    /// Time that the pipelines took to create.
+    pub fn compile_time(&self) -> Duration {
+        match self {
+            Self::Whole(kernel) => kernel.compile_time(),
+            Self::Wavefront(kernels) => kernels.compile_time(),
+        }
+    }
+}
 
 /// The same number of samples for every pixel of a run.
 pub fn push_of_batch(constants: &PathConstants, b: &Batch) -> PathPush {
@@ -28,15 +58,18 @@ pub fn push_of_list(constants: &PathConstants, paths: u32) -> PathPush {
 }
 
 /// scene, and paths\[batch\] where they are listed -> samples\[batch\]
-pub fn record(k: &Path, rec: &mut Recorder, s: &DeviceScene, f: &FilmBuffers, push: &PathPush) -> Result<()> {
+pub fn record(k: &Paths, rec: &mut Recorder, s: &DeviceScene, f: &FilmBuffers, push: &PathPush) -> Result<()> {
+    let kernel = match k {
+        Paths::Whole(kernel) => kernel,
+        Paths::Wavefront(kernels) => return kernels.record(rec, s, f, push),
+    };
     let bind = Bind {
         scene: s.bind(),
         frame: s.bind_frame(),
         ray_query: s.bind_world(),
-        samples: &f.samples,
-        counters: &f.counters,
-        paths: &f.paths,
-        broken: &f.broken,
+        which_path: shared::which_path::Bind { paths: &f.paths },
+        sample: shared::sample::Bind { samples: &f.samples, broken: &f.broken },
+        counters: shared::counters::Bind { counters: &f.counters },
     };
-    rec.dispatch_threads(k, bind, push, push.pixels * push.samples.max(1))
+    rec.dispatch_threads(kernel, bind, push, push.pixels * push.samples.max(1))
 }

@@ -1,0 +1,102 @@
+// Paths that wait between the kernels of a wavefront: words of one kind of all paths lie together, so that neighbouring threads read
+// neighbouring words. Needs path_state.glsl and which_path.glsl before it.
+layout(scalar, binding = 16) buffer Memory { uvec4 memory[]; };
+
+// What is kept of a path: a vector, and with it a word.
+const uint ORIGIN = 0u;         // density of the direction
+const uint DIRECTION = 1u;      // scale of the refractive index
+const uint THROUGHPUT = 2u;     // state, by the bits below
+const uint SHADOW_ORIGIN = 3u;  // end of the shadow ray
+const uint SHADOW = 4u;         // seed of masks
+const uint SAMPLED = 5u;        // any-hit rays
+const uint HIT = 6u;            // four words of the hit
+const uint DIRECT_LIGHT = 7u;   // closest-hit rays
+const uint INDIRECT_LIGHT = 8u; // distance of the hit
+const uint ALBEDO = 9u;
+const uint SOFT_LIGHT = 10u;
+const uint KINDS = 11u;
+
+const uint SHADOWED = 1u, ALIVE = 2u, SMOOTH = 4u, CHOSEN = 8u, SHARP = 16u, SCATTERED_AT = 5u, BOUNCE_AT = 8u;
+
+uint place_of(uint kind, uint i) { return kind * path_count() + i; }
+
+void keep(uint kind, uint i, vec3 v, uint word) { memory[place_of(kind, i)] = uvec4(floatBitsToUint(v), word); }
+
+vec3 kept(uint kind, uint i, out uint word) {
+    uvec4 v = memory[place_of(kind, i)];
+    word = v.w;
+    return uintBitsToFloat(v.xyz);
+}
+
+vec3 kept(uint kind, uint i) {
+    uint word;
+    return kept(kind, i, word);
+}
+
+void save_hit(uint i, Hit hit) {
+    memory[place_of(HIT, i)] = uvec4(hit.triangle, hit.instance, floatBitsToUint(vec2(hit.b1, hit.b2)));
+    memory[place_of(INDIRECT_LIGHT, i)].w = floatBitsToUint(hit.t);
+}
+
+void save_path(uint i, PathState p, Departure d) {
+    uint state = (d.shadowed ? SHADOWED : 0u) | (d.alive ? ALIVE : 0u) | (p.path.delta ? SMOOTH : 0u) | (p.chosen ? CHOSEN : 0u) |
+                 (d.delta ? SHARP : 0u) | min(p.scattered, 2u) << SCATTERED_AT | p.bounce << BOUNCE_AT;
+    keep(ORIGIN, i, p.path.origin, floatBitsToUint(p.path.bsdf_pdf));
+    keep(DIRECTION, i, p.path.direction, floatBitsToUint(p.path.eta_scale));
+    keep(THROUGHPUT, i, p.path.throughput, state);
+    keep(SHADOW_ORIGIN, i, d.shadow.origin, floatBitsToUint(d.shadow.t_max));
+    keep(SHADOW, i, d.shadow.direction, p.seed);
+    keep(SAMPLED, i, d.sampled, p.any_rays);
+    keep(DIRECT_LIGHT, i, p.light.direct, p.closest_rays);
+    keep(INDIRECT_LIGHT, i, p.light.indirect, 0u);
+    save_hit(i, p.hit);
+    if (FX_SPLIT) keep(ALBEDO, i, p.albedo, 0u);
+    if (FX_SOFT) keep(SOFT_LIGHT, i, p.light.soft, 0u);
+}
+
+// The path, but for `sharp_only`; of how it departed, what it needs to know once its rays are traced.
+PathState saved_path(uint i, out Departure d) {
+    PathState p;
+    uint pdf, scale, state, t;
+    p.path.origin = kept(ORIGIN, i, pdf);
+    p.path.direction = kept(DIRECTION, i, scale);
+    p.path.throughput = kept(THROUGHPUT, i, state);
+    p.path.bsdf_pdf = uintBitsToFloat(pdf);
+    p.path.eta_scale = uintBitsToFloat(scale);
+    p.path.delta = (state & SMOOTH) != 0u;
+    p.chosen = (state & CHOSEN) != 0u;
+    p.scattered = state >> SCATTERED_AT & 3u;
+    p.bounce = state >> BOUNCE_AT;
+    p.light.direct = kept(DIRECT_LIGHT, i, p.closest_rays);
+    p.light.indirect = kept(INDIRECT_LIGHT, i, t);
+    p.light.soft = FX_SOFT ? kept(SOFT_LIGHT, i) : vec3(0.0);
+    p.albedo = FX_SPLIT ? kept(ALBEDO, i) : vec3(0.0);
+    uvec4 hit = memory[place_of(HIT, i)];
+    p.hit = Hit(uintBitsToFloat(t), hit.x, hit.y, uintBitsToFloat(hit.z), uintBitsToFloat(hit.w));
+    p.seed = memory[place_of(SHADOW, i)].w;
+    d.sampled = kept(SAMPLED, i, p.any_rays);
+    d.shadowed = (state & SHADOWED) != 0u;
+    d.alive = (state & ALIVE) != 0u;
+    d.delta = (state & SHARP) != 0u;
+    return p;
+}
+
+// Whether a path waits for a shadow ray, and for one to its next surface.
+bvec2 waits_for(uint i) {
+    uint state = memory[place_of(THROUGHPUT, i)].w;
+    return bvec2((state & SHADOWED) != 0u, (state & ALIVE) != 0u);
+}
+
+// The shadow ray of a path, or the one to its next surface.
+Segment saved_ray(uint i, bool shadow) {
+    uint end, seed = memory[place_of(SHADOW, i)].w, bounce = memory[place_of(THROUGHPUT, i)].w >> BOUNCE_AT;
+    vec3 origin = kept(shadow ? SHADOW_ORIGIN : ORIGIN, i, end), direction = kept(shadow ? SHADOW : DIRECTION, i);
+    if (shadow) return Segment(origin, direction, uintBitsToFloat(end), shadow_mask_seed(seed, bounce - 1u));
+    return Segment(origin, direction, INFINITE_DISTANCE, mask_seed(seed, bounce));
+}
+
+// The triangle that a path leaves, and its instance.
+uvec2 saved_from(uint i) { return memory[place_of(HIT, i)].xy; }
+
+// Light that something blocks is not added.
+void block_light(uint i) { memory[place_of(THROUGHPUT, i)].w &= ~SHADOWED; }

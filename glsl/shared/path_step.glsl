@@ -1,0 +1,121 @@
+// A path's way from one surface to the next: next event estimation and BSDF sampling joined by the balance heuristic (Veach 1997).
+// Needs `push` (PathPush), and sampler.glsl, surface.glsl, light.glsl and path_state.glsl before it.
+
+// Dimension pairs of the sampler: the camera uses the first two, every scattering event these.
+const uint PAIR_FIRST_BOUNCE = 2u, PAIRS_PER_BOUNCE = 4u;
+const uint PAIR_CHOICE = 0u, PAIR_LIGHT = 1u, PAIR_BSDF = 2u, PAIR_ROULETTE = 3u;
+
+// Shadow rays to a lamp end at this share of the distance, since the distance at which they would hit the lamp has an error of
+// about 2^-24 over the cosine there.
+const float SHADOW_END = 0.99999;
+
+const float MAX_SURVIVAL = 0.95; // largest survival probability of roulette
+
+// Weight of the strategy that was used, by the balance heuristic. Two densities of 0 give 0, not 0 / 0.
+float balance(float taken, float other) { return taken / max(taken + other, 1e-37); }
+
+vec3 light_from_miss(Path path) {
+    if (!FX_ENVIRONMENT || push.constants.environment == NONE) return vec3(0.0);
+    float pdf;
+    vec3 radiance = environment_radiance(path.direction, pdf);
+    return radiance * (path.delta ? 1.0 : balance(path.bsdf_pdf, pdf));
+}
+
+vec3 light_from_hit(Path path, Surface s, float t) {
+    float cosine = -dot(s.geometric, path.direction);
+    float weight = path.delta ? 1.0 : balance(path.bsdf_pdf, triangle_light_pdf(s, path.origin, t, cosine));
+    return FX_EMISSIVE && cosine > 0.0 ? surface_emission(s) * weight : vec3(0.0);
+}
+
+// Direct light at `s` by light sampling, which counts if nothing blocks `shadow`; where it is 0, no ray is needed. The columns
+// of `basis` are the shading frame.
+vec3 light_from_nee(Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sampler random, uint pair, uint mask_seed,
+                    out Segment shadow, out bool delta) {
+    uint word = sample_2d_bits(random, pair + PAIR_CHOICE).x;
+    LightSample light = light_sample(s.position, word, sample_2d(random, pair + PAIR_LIGHT));
+    delta = light.pdf == 0.0;
+    vec3 wi = light.direction * basis; // row vector times matrix: into the frame
+    vec4 f = bsdf_evaluate(bsdf, wo, wi);
+    f.rgb *= light_share(s, facing, light.direction, wi.z);
+    shadow = Segment(ray_origin(s, light.direction), light.direction, light.distance, mask_seed);
+    if (light.distance < INFINITE_DISTANCE) { // aim again from the offset origin, so that the segment ends on the light
+        shadow.direction = s.position + light.distance * light.direction - shadow.origin;
+        shadow.t_max = SHADOW_END;
+    }
+    return f.rgb * light.radiance * (light.pdf > 0.0 ? balance(light.pdf, f.w) : 1.0);
+}
+
+// Samples the next direction. Returns false when the path ends.
+bool scatter(inout Path path, Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sampler random, uint pair) {
+    BsdfSample next;
+    float lobe = sample_2d(random, pair + PAIR_CHOICE).y;
+    bool scattered = bsdf_sample(bsdf, wo, lobe, sample_2d(random, pair + PAIR_BSDF), next);
+    path.direction = basis * next.wi;
+    path.throughput *= next.weight * light_share(s, facing, path.direction, next.wi.z);
+    path.origin = ray_origin(s, path.direction);
+    path.bsdf_pdf = next.pdf;
+    path.delta = next.delta;
+    if (FX_ROULETTE && is_kind(FX_DIELECTRIC, bsdf, BSDF_DIELECTRIC) && wo.z * next.wi.z < 0.0) {
+        float eta = relative_index(bsdf, wo.z);
+        path.eta_scale *= eta * eta;
+    }
+    return scattered && max(path.throughput.r, max(path.throughput.g, path.throughput.b)) > 0.0;
+}
+
+// Russian roulette. The survival probability leaves out the factors 1 / eta^2 that refraction scales radiance by, since they
+// cancel when the path leaves the glass.
+bool survives_roulette(inout Path path, Sampler random, uint pair) {
+    float q = min(max(path.throughput.r, max(path.throughput.g, path.throughput.b)) * path.eta_scale, MAX_SURVIVAL);
+    if (sample_2d(random, pair + PAIR_ROULETTE).x >= q) return false;
+    path.throughput /= q;
+    return true;
+}
+
+// Adds the light that the path meets at its hit. Returns whether it can go on from the surface `s`: the last one samples no light.
+bool arrive(inout PathState p, out Surface s) {
+    uint kind = kind_of_light(p.scattered, false, p.chosen);
+    if (p.hit.triangle == NONE) {
+        add_light(p.light, p.path.throughput * light_from_miss(p.path), kind);
+        return false;
+    }
+    s = surface_at(p.hit);
+    add_light(p.light, p.path.throughput * light_from_hit(p.path, s, p.hit.t), kind);
+    return p.bounce + 1u < push.constants.max_depth;
+}
+
+// Scatters light at the surface `s`, where the path is `going`. Light sampled there counts once its shadow ray is traced, see
+// `add_sampled`.
+Departure leave(inout PathState p, Surface s, bool going, Sampler random) {
+    Departure d;
+    uint pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * p.bounce;
+    Bsdf bsdf = surface_bsdf(s);
+    // The normal of a dielectric stays on its outside, since its two sides differ.
+    bool turns = (s.flags & MATERIAL_TWO_SIDED) != 0u && !is_kind(FX_DIELECTRIC, bsdf, BSDF_DIELECTRIC);
+    Facing facing = facing_normals(s, -p.path.direction, turns, bsdf_is_specular(bsdf));
+    if (is_kind(FX_METALLIC, bsdf, BSDF_METALLIC))
+        facing = facing_of_metal(s, facing, -p.path.direction, metallic_specular(bsdf.metallic));
+    mat3 basis = shading_basis(s, bsdf, facing.normal);
+    vec3 wo = -p.path.direction * basis;
+    if (FX_COAT_NORMALS) bsdf.metallic.coat_normal = local_coat_normal(s, facing, basis, wo);
+    bsdf_view(bsdf, wo);
+    bool smooth_here = bsdf_is_delta(bsdf);
+    if (p.scattered == 0u && !p.chosen && going) {
+        p.chosen = smooth_here && bsdf_chooses(bsdf);
+        p.albedo = min(p.path.throughput, vec3(1.0)) * (p.chosen ? vec3(1.0) : bsdf_albedo(bsdf, wo.z)); // roulette may exceed 1
+    }
+    uint seed = shadow_mask_seed(p.seed, p.bounce);
+    d.sampled = p.path.throughput * light_from_nee(s, bsdf, facing, basis, wo, random, pair, seed, d.shadow, d.delta);
+    d.shadowed = going && push.constants.light_count > 0u && !smooth_here && max(d.sampled.r, max(d.sampled.g, d.sampled.b)) > 0.0;
+    d.alive = scatter(p.path, s, bsdf, facing, basis, wo, random, pair) && going;
+    p.scattered += smooth_here ? 0u : 1u;
+    // From here on comes nothing but what a filter takes; with FX_SOFT already from the first surface, but for its delta lights.
+    bool ends = FX_SPARSE && p.sharp_only && p.scattered > (FX_SOFT ? 0u : 1u);
+    d.shadowed = d.shadowed && (!ends || (FX_SOFT && d.delta));
+    d.alive = d.alive && !ends;
+    bool roulette = FX_ROULETTE && push.constants.roulette_depth > 0u && p.bounce + 1u >= push.constants.roulette_depth;
+    if (roulette) d.alive = survives_roulette(p.path, random, pair) && d.alive;
+    p.bounce++;
+    p.closest_rays += uint(d.alive);
+    p.any_rays += uint(d.shadowed);
+    return d;
+}

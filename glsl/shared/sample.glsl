@@ -1,0 +1,28 @@
+// What a path leaves behind: one vec4 (radiance), or three with FX_SPLIT (direct, indirect, the albedo to divide indirect by). With
+// FX_SOFT what lamps and sky bring to the first hit goes with indirect light, since it is as noisy. w of the first is the number of
+// rays, negated where the light was not finite: such a sample is black. Needs finite.glsl and path_state.glsl before it.
+#include "shared/counters.glsl"
+#include "shared/store64.glsl"
+layout(scalar, binding = 11) writeonly buffer Samples { u64vec2 samples[]; }; // of vec4
+layout(scalar, binding = 14) buffer Broken { BrokenTally broken[]; };
+
+void store_sample(uint i, uint pixel, PathState p) {
+    SplitLight light = light_of(p);
+    float rays = float(p.closest_rays + p.any_rays);
+    if (!finite(light.direct + light.indirect)) {
+        light = SplitLight(vec3(0.0), vec3(0.0), vec3(0.0));
+        rays = -rays;
+        atomicMax(broken[0].lowest, ~pixel);
+    }
+    if (FX_SPLIT) {
+        samples[3u * i] = pack64(vec4(light.direct, rays));
+        samples[3u * i + 1u] = pack64(vec4(light.indirect, 0.0));
+        samples[3u * i + 2u] = pack64(vec4(p.albedo, 0.0));
+    } else {
+        samples[i] = pack64(vec4(light.direct + light.indirect, rays));
+    }
+    if (FX_COUNTERS) {
+        count_up(0u, p.closest_rays);
+        count_up(1u, p.any_rays);
+    }
+}
