@@ -102,7 +102,7 @@ void fold(inout PixelStats s, inout PixelLight l, inout uint broken_count, inout
     if (FX_SPLIT) l.indirect_m2 = clamp(l.indirect_m2 + square(off_other, other - luminance(s.mean - l.direct)), 0.0, MAX_M2);
 }
 
-// path.comp has found the lowest pixel with a broken sample; that pixel's thread alone writes which sample it was.
+// store_sample has found the lowest pixel with a broken sample; that pixel's thread alone writes which sample it was.
 void report(uint pixel, uint broken_count, uint first_broken) {
     if (broken[0].count < 0x80000000u) atomicAdd(broken[0].count, broken_count);
     if (broken[0].lowest != ~pixel || broken[0].pixel == ~pixel) return;

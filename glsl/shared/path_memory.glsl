@@ -16,6 +16,8 @@ const uint ALBEDO = 9u;
 const uint SOFT_LIGHT = 10u;
 const uint KINDS = 11u;
 
+// Bits of the state: the path waits for a shadow ray, and for one to its next surface; it leaves a smooth surface; one before let it
+// take one of two ways; the light of its shadow ray has no extent. Then surfaces that are not smooth, up to 2, and all surfaces.
 const uint SHADOWED = 1u, ALIVE = 2u, SMOOTH = 4u, CHOSEN = 8u, SHARP = 16u, SCATTERED_AT = 5u, BOUNCE_AT = 8u;
 
 uint place_of(uint kind, uint i) { return kind * path_count() + i; }

@@ -83,8 +83,8 @@ bool arrive(inout PathState p, out Surface s) {
     return p.bounce + 1u < push.constants.max_depth;
 }
 
-// Scatters light at the surface `s`, where the path is `going`. Light sampled there counts once its shadow ray is traced, see
-// `add_sampled`.
+// Scatters light at the surface `s`, where the path is `going`. Light sampled there is added once its shadow ray is traced, by
+// `add_sampled`, and together with what the next ray meets.
 Departure leave(inout PathState p, Surface s, bool going, Sampler random) {
     Departure d;
     uint pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * p.bounce;

@@ -11,7 +11,7 @@ use tallow::render::settings::Settings;
 use tallow::render::{Counters, Outputs, Renderer};
 use tallow::scene::{Loaded, Scene};
 
-/// Everything.
+/// All layers that a renderer keeps, and its counters.
 pub const OUTPUTS: Outputs = Outputs { split_light: true, guides: true, counters: true };
 
 /// A scene that the repository ships, on a small film.
