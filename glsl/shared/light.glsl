@@ -39,12 +39,8 @@ mat3 environment_rotation(uint light) { // environment_from_world
     return transpose(mat3(Light_a(lights, light), Light_b(lights, light), Light_c(lights, light)));
 }
 
-uvec2 environment_extent() {
-    return uvec2(push.constants.environment_width, uint(textureSize(environment)) / push.constants.environment_width);
-}
-
 vec3 environment_lookup(vec2 uv) {
-    ivec2 size = ivec2(environment_extent());
+    ivec2 size = ivec2(push.constants.environment_size);
     vec2 at = uv * vec2(size) - 0.5;
     ivec2 p = ivec2(floor(at));
     vec2 f = at - vec2(p);
@@ -58,7 +54,7 @@ vec3 environment_lookup(vec2 uv) {
 
 // Density per solid angle of a texel, given the sine of the polar angle.
 float environment_pdf(uint light, uint texel, float sine) {
-    uvec2 size = environment_extent();
+    uvec2 size = push.constants.environment_size;
     float chosen = Light_probability(lights, light);
     float p = texelFetch(environment, int(texel)).w;
     return chosen * p * float(size.x) * float(size.y) / (2.0 * PI * PI * max(sine, 1e-6));
@@ -68,8 +64,8 @@ float environment_pdf(uint light, uint texel, float sine) {
 vec3 environment_radiance(vec3 direction, out float pdf) {
     vec3 scale = Light_value(lights, push.constants.environment);
     pdf = Light_probability(lights, push.constants.environment) * (0.25 / PI);
-    if (!FX_ENVIRONMENT_MAP || push.constants.environment_width == 0u) return scale;
-    uvec2 size = environment_extent();
+    if (!FX_ENVIRONMENT_MAP || push.constants.environment_size.x == 0u) return scale;
+    uvec2 size = push.constants.environment_size;
     vec3 d = environment_rotation(push.constants.environment) * direction;
     float sine = length(d.xz);
     vec2 uv = environment_uv(d, sine);
@@ -82,11 +78,11 @@ vec3 environment_radiance(vec3 direction, out float pdf) {
 void sample_environment(uint light, float chosen, uint word, vec2 u, inout LightSample s) {
     s.distance = INFINITE_DISTANCE;
     s.radiance = Light_value(lights, light);
-    if (!FX_ENVIRONMENT_MAP || push.constants.environment_width == 0u) {
+    if (!FX_ENVIRONMENT_MAP || push.constants.environment_size.x == 0u) {
         s.direction = warp_sphere(u);
         s.pdf = chosen * (0.25 / PI);
     } else {
-        uvec2 size = environment_extent();
+        uvec2 size = push.constants.environment_size;
         uint count = size.x * size.y;
         uint texel = alias_choose(AliasEntry_load(environment_table, alias_slot(count, word)), count, word);
         vec2 uv = (vec2(texel % size.x, texel / size.x) + u) / vec2(size);

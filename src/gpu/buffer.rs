@@ -1,5 +1,5 @@
 //! Typed, named buffers in device memory: allocation, binding, and element access from the host.
-use super::{At, Gpu};
+use super::{At, DeviceKind, Gpu};
 use crate::error::{Error, Result};
 use ash::vk;
 use ash::vk::Handle;
@@ -84,6 +84,8 @@ pub struct Untyped {
     pub(super) raw: vk::Buffer,
     /// Size in bytes, a multiple of 4.
     pub(super) size: u64,
+    /// Bytes that views of its texels show, those beyond `size` being 0.
+    shown: u64,
     pub(super) location: Location,
     /// Bytes of one element.
     stride: u64,
@@ -276,7 +278,8 @@ impl Bound<'_> {
         if let Some((_, view)) = views.iter().find(|(made, _)| *made == format) {
             return Ok(*view);
         }
-        let info = vk::BufferViewCreateInfo::default().buffer(whole.raw).format(format).range(vk::WHOLE_SIZE);
+        let shown = whole.shown.min(whole.gpu.0.info.max_texel_elements * whole.texel);
+        let info = vk::BufferViewCreateInfo::default().buffer(whole.raw).format(format).range(shown);
         // SAFETY: a live buffer with texel usage; every device supports these formats for it.
         let view = unsafe { whole.gpu.0.device.create_buffer_view(&info, None) }.at(&whole.name)?;
         views.push((format, view));
@@ -290,7 +293,8 @@ impl Untyped {
         if size > limit {
             return Err(too_big(name, size, "bytes", limit, "of one buffer"));
         }
-        let info = vk::BufferCreateInfo::default().size(size).usage(usage(gpu, location));
+        let [shown, made] = shown_and_made(size, limit, gpu.0.info.kind);
+        let info = vk::BufferCreateInfo::default().size(made).usage(usage(gpu, location));
         let what = format!("buffer \"{name}\" of {size} bytes");
         // SAFETY: `info` is complete; the device outlives every buffer.
         let raw = unsafe { gpu.0.device.create_buffer(&info, None) }.at(&what)?;
@@ -298,9 +302,11 @@ impl Untyped {
         let (memory, views) = Default::default();
         // From here on, Drop cleans up if a line below fails.
         let (name, gpu) = (name.to_owned(), gpu.clone());
-        let buffer = Self { gpu, name, raw, size, location, stride, texel, memory, views };
+        let buffer = Self { gpu, name, raw, size, shown, location, stride, texel, memory, views };
         let remedy = "choose a smaller film or scene, or a device with more memory";
         buffer.allocate(location).map_err(|e| Error::Device(format!("{what}: {e}: {remedy}")))?;
+        let no_more = vk::MemoryPropertyFlags::empty();
+        buffer.mapped(no_more, |bytes| bytes[size as usize..shown as usize].fill(0));
         Ok(buffer)
     }
 
@@ -357,6 +363,19 @@ impl Drop for Untyped {
     }
 }
 
+/// Bytes that views of a buffer of `size` bytes show, and bytes that it is made with, both at most `limit`. On a CPU they are more than
+/// `size`, so that buffers of all sizes are alike to llvmpipe. That of Mesa 22.3, but not of 25.0, compiles a kernel anew for other values of
+/// two bits of each buffer that the kernel reads by texels, though they mean something for pictures alone: whether the size of
+/// the buffer is a power of two, and whether bits 8 to 15 of the view's are 0, which is where pictures have their number of levels.
+fn shown_and_made(size: u64, limit: u64, kind: DeviceKind) -> [u64; 2] {
+    if kind != DeviceKind::Cpu {
+        return [size; 2];
+    }
+    let shown = if size >> 8 & 0xff == 0 { size + 256 } else { size }.min(limit);
+    let made = if shown.is_power_of_two() { shown + 16 } else { shown }.min(limit);
+    [shown, made]
+}
+
 /// All that kernels and copies may do with a buffer. Where rays are traced by ray queries, those in device memory may also be what
 /// acceleration structures are built of and lie in.
 fn usage(gpu: &Gpu, location: Location) -> vk::BufferUsageFlags {
@@ -400,7 +419,20 @@ fn too_big(name: &str, size: u64, unit: &str, limit: u64, of: &str) -> Error {
 
 #[cfg(test)]
 mod tests {
-    use super::{check_texels, texel_bytes};
+    use super::{check_texels, shown_and_made, texel_bytes};
+    use crate::gpu::DeviceKind;
+
+    #[test]
+    fn buffers_of_all_sizes_are_alike_to_llvmpipe() {
+        for size in [4, 16, 240, 256, 260, 512, 1 << 16, (1 << 16) + 128, 640 * 360 * 16, 1 << 22] {
+            let [shown, made] = shown_and_made(size, 1 << 30, DeviceKind::Cpu);
+            assert!(size <= shown && shown <= made && made <= size + 272, "{size}: {shown}, {made}");
+            assert!(shown >> 8 & 0xff != 0 && !made.is_power_of_two(), "{size}: {shown}, {made}");
+            assert!((shown - size).is_multiple_of(16), "whole texels");
+            assert_eq!(shown_and_made(size, 1 << 30, DeviceKind::DiscreteGpu), [size; 2]);
+        }
+        assert_eq!(shown_and_made(1 << 20, 1 << 20, DeviceKind::Cpu), [1 << 20; 2], "the largest");
+    }
 
     #[test]
     fn texels_are_as_wide_as_elements_allow() {

@@ -28,13 +28,13 @@ gpu_structs! {
         triangle_pdf_scale: float,
         /// Index of the environment among the lights, or NONE.
         environment: uint,
-        /// Columns of the environment image; 0 without one.
-        environment_width: uint,
+        /// Columns and rows of the environment image; 0 without one.
+        environment_size: uvec2,
         /// Node where traversal starts, with ROOT_OF_INSTANCES.
         root: uint,
     }
 
-    /// Push constants of `path.comp`, `primary_hit.comp`, `guide_lookup.comp` and the kernels of a wavefront, 72 of the 128 bytes
+    /// Push constants of `path.comp`, `primary_hit.comp`, `guide_lookup.comp` and the kernels of a wavefront, 76 of the 128 bytes
     /// that every device has.
     struct PathPush {
         /// What stays the same during the frame.

@@ -48,7 +48,7 @@ fn path_constants(scene: &Scene, settings: &Settings) -> PathConstants {
         light_count: scene.lights.len() as u32,
         triangle_pdf_scale: scene.triangle_pdf_scale,
         environment: environment.map_or(NONE, |i| i as u32),
-        environment_width: scene.environment.as_ref().map_or(0, |e| e.width),
+        environment_size: scene.environment.as_ref().map_or([0; 2], |e| [e.width, e.height]),
         root: scene.root | if scene.instances.is_empty() { 0 } else { ROOT_OF_INSTANCES },
         ..Default::default()
     }

@@ -1,5 +1,6 @@
 //! Tests the built program's messages without a Vulkan loader, driver or device, and when it loses its device while it renders.
 #![cfg(target_os = "linux")]
+use crate::child::{command, scene};
 use crate::command::complains;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -92,6 +93,31 @@ fn compiled_pipelines_are_kept_in_a_folder_of_the_users_own() {
     assert!(kept.len() == 1 && kept[0].extension().is_some_and(|e| e == "bin"), "{kept:?}");
     let mode = std::fs::metadata(caches.join("tallow")).unwrap().permissions().mode();
     assert_eq!(mode & 0o777, 0o700, "{mode:o}");
+}
+
+/// Number of files below a folder.
+fn files(folder: &Path) -> usize {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().map(|e| e.unwrap().path());
+    entries.map(|path| if path.is_dir() { files(&path) } else { 1 }).sum()
+}
+
+/// llvmpipe keeps a file for each kernel that it has compiled. Buffers have less than 256 bytes, a power of two, both, and neither.
+#[test]
+fn films_of_all_sizes_share_what_llvmpipe_has_compiled() {
+    let folder = tempfile::tempdir().unwrap();
+    let kept = |[width, height]: [u32; 2]| {
+        let words = format!("render {} --spp 2 --denoise atrous -o a.exr --quiet", scene());
+        let mut command = command(folder.path(), &format!("{words} --width {width} --height {height}"));
+        command.env("MESA_SHADER_CACHE_DIR", folder.path().join("mesa"));
+        let output = command.output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+        files(&folder.path().join("mesa"))
+    };
+    let sizes = [[31, 17], [32, 32], [64, 64], [3, 2], [2, 2]];
+    let counts = sizes.map(kept);
+    assert!(counts.iter().all(|count| *count == counts[0]), "{counts:?}");
+    let is_llvmpipe = Gpu::open(&DeviceOptions::default()).unwrap().info().name.contains("llvmpipe");
+    assert!(counts[0] >= 5 || !is_llvmpipe, "control: {counts:?}");
 }
 
 #[test]
