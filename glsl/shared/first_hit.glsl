@@ -1,15 +1,15 @@
-// The first hit of a camera ray, as a Guide. Needs frame.glsl, bsdf.glsl, camera.glsl, traverse.glsl and surface.glsl before it.
+// What a camera ray meets and shows. Needs frame.glsl, bsdf.glsl, camera.glsl, traverse.glsl and surface.glsl before it.
 
-// `delta` becomes true for a smooth surface, which shows what is behind it.
-Guide first_hit(Ray ray, uint mask_seed, out bool delta, out Hit hit) {
-    hit = traverse(Segment(ray.origin, ray.direction, 3e38, mask_seed), push.constants.root);
-    delta = false;
+// A ray on its way through smooth surfaces.
+struct Sight {
+    Ray way;
+    float walked;    // length of the way until its last surface
+    vec3 throughput; // what the light from the end of the way is multiplied by
+};
+
+// The hit of `ray` at the surface `s`, as a Guide.
+Guide guide_of(Ray ray, Hit hit, Surface s, Bsdf bsdf) {
     Guide guide = Guide_zero();
-    guide.object = guide.material = NONE;
-    if (hit.triangle == NONE) return guide;
-    Surface s = surface_at(hit);
-    Bsdf bsdf = surface_bsdf(s);
-    delta = bsdf_is_delta(bsdf);
     guide.normal = side_of(s, -ray.direction) * s.normal;
     guide.depth = hit.t + camera.near;
     guide.position = s.position;
@@ -17,4 +17,58 @@ Guide first_hit(Ray ray, uint mask_seed, out bool delta, out Hit hit) {
     guide.albedo = bsdf_albedo(bsdf, -dot(s.normal, ray.direction));
     guide.material = s.material;
     return guide;
+}
+
+// Goes on from a smooth surface by the stronger way wherever light may take two. Returns false where none goes on.
+bool look_on(inout Sight sight, Surface s, Bsdf bsdf) {
+    bool turns = (s.flags & MATERIAL_TWO_SIDED) != 0u && !is_kind(FX_DIELECTRIC, bsdf, BSDF_DIELECTRIC);
+    Facing facing = facing_normals(s, -sight.way.direction, turns, true);
+    mat3 basis = shading_basis(s, bsdf, facing.normal);
+    vec3 wo = -sight.way.direction * basis;
+    if (FX_COAT_NORMALS) bsdf.metallic.coat_normal = local_coat_normal(s, facing, basis, wo);
+    BsdfSample next;
+    bool goes_on = bsdf_sample(bsdf, wo, 0.5, vec2(0.5), next);
+    sight.way.direction = basis * next.wi;
+    sight.way.origin = ray_origin(s, sight.way.direction);
+    sight.throughput *= next.weight;
+    return goes_on;
+}
+
+// The first surface that `ray` shows, behind smooth ones, or the sky. Depth and position are as if the way had been straight, so
+// that they change as the image does; a normal that points back along the way tells where in the sky it ends. The albedo is what
+// the light from there is multiplied by on its way. `first` becomes the first hit, smooth or not.
+Guide seen_hit(Ray ray, uint mask_seed, out Guide first, out Hit first_hit) {
+    Sight sight = Sight(ray, 0.0, vec3(1.0));
+    Guide seen;
+    bool on = false;
+    uint bounce = 0u;
+    // Rays are traced and surfaces read in one place of the code, whose size decides how long the kernels take to compile.
+    do {
+        uint seed = bounce == 0u ? mask_seed : pcg(mask_seed + bounce);
+        Hit hit = traverse(Segment(sight.way.origin, sight.way.direction, 3e38, seed), push.constants.root);
+        seen = Guide_zero();
+        seen.object = seen.material = NONE;
+        bool sky = hit.triangle == NONE;
+        vec3 towards = sight.way.direction, throughput = sight.throughput;
+        float from_start = sight.walked + (sky ? 0.0 : hit.t);
+        on = false;
+        if (!sky) {
+            Surface s = surface_at(hit);
+            Bsdf bsdf = surface_bsdf(s);
+            seen = guide_of(sight.way, hit, s, bsdf);
+            if (FX_SMOOTH && bsdf_is_delta(bsdf) && bounce + 1u < push.constants.max_depth) on = look_on(sight, s, bsdf);
+        }
+        if (bounce == 0u) {
+            first = seen;
+            first_hit = hit;
+        } else {
+            seen.normal = sky ? -towards : seen.normal;
+            seen.depth = from_start + camera.near;
+            seen.position = ray.origin + from_start * ray.direction;
+            seen.albedo = throughput * (sky ? vec3(1.0) : seen.albedo);
+        }
+        sight.walked = from_start;
+        bounce++;
+    } while (FX_SMOOTH && on);
+    return seen;
 }

@@ -26,7 +26,6 @@ uint nodes_visited = 0u;
 #include "shared/trace.glsl"
 #include "shared/surface.glsl"
 #include "shared/first_hit.glsl"
-#include "shared/seen_hit.glsl"
 
 // Departure from the paper, whose quotients are 0 / 0 on one plane: the largest difference counts as at least this, so that
 // rounding decides nothing. The first is between unit normals, the second relative to the depth.
@@ -77,12 +76,11 @@ void main() {
         uint index = push.first_sample + k;
         Sampler random = sampler_start(pixel, index, push.constants.seed);
         vec2 film = film_sample(pixel, random);
-        bool delta;
         uint mask_seed = pcg(path_seed(pixel, index));
         Ray ray = eye_ray(film, random);
+        Guide first;
         Hit hit;
-        Guide eye = first_hit(ray, mask_seed, delta, hit);
-        if (FX_SMOOTH && delta) eye = seen_hit(ray, hit, eye, mask_seed);
+        Guide eye = seen_hit(ray, mask_seed, first, hit);
         if (eye.albedo == vec3(0.0)) continue;
         uint chosen = most_similar(eye, film);
         if (chosen != NONE) sum += eye.albedo * known_radiance(texelFetch(filtered, int(chosen))).rgb;

@@ -25,7 +25,6 @@ uint nodes_visited = 0u;
 #include "shared/trace.glsl"
 #include "shared/surface.glsl"
 #include "shared/first_hit.glsl"
-#include "shared/seen_hit.glsl"
 
 void main() {
     uint i = thread_index();
@@ -35,13 +34,10 @@ void main() {
     Camera pinhole = camera;
     pinhole.lens_radius = 0.0;
     Ray ray = camera_ray(pinhole, film_from_pixel(centre, push.constants.size), vec2(0.5));
-    bool delta;
+    Guide guide;
     Hit hit;
-    Guide guide = first_hit(ray, pcg(pixel), delta, hit);
+    Guide shown = seen_hit(ray, pcg(pixel), guide, hit);
     guides[i] = guide;
-    if (FX_SMOOTH) {
-        if (delta) guide = seen_hit(ray, hit, guide, pcg(pixel));
-        seen[i] = guide;
-    }
+    if (FX_SMOOTH) seen[i] = shown;
     if (POINTS) points[i] = SurfacePoint(hit.triangle, hit.instance, vec2(hit.b1, hit.b2));
 }

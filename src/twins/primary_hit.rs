@@ -1,4 +1,4 @@
-//! Twin of `glsl/trace/primary_hit.comp`, of `glsl/shared/first_hit.glsl` and of `glsl/shared/seen_hit.glsl`.
+//! Twin of `glsl/trace/primary_hit.comp` and of `glsl/shared/first_hit.glsl`.
 use crate::layout::{BSDF_DIELECTRIC, Camera, FrameConstants, Guide, MATERIAL_TWO_SIDED, NONE, SurfacePoint};
 use crate::math::hash::pcg;
 use crate::scene::Scene;
