@@ -32,7 +32,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     if !args.quiet && !args.json {
         scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
     }
-    let plan = plan(args, path, &scene, points)?;
+    let plan = plan(args, path, &scene, points, &gpu)?;
     let folder = Folder::open(&args.output)?;
     let earlier = folder.earlier(&key(&gpu, &scene, &plan));
     let runs_before = earlier.as_ref().map_or(0, runs);
@@ -41,13 +41,14 @@ pub fn run(args: &Args) -> Result<Exit> {
     finish(args, &folder, found, runs_before)
 }
 
-fn plan(args: &Args, path: &Path, scene: &Scene, Points { motion, base, candidates }: Points) -> Result<Plan> {
+fn plan(args: &Args, path: &Path, scene: &Scene, points: Points, gpu: &Gpu) -> Result<Plan> {
+    let Points { motion, base, candidates } = points;
     let [width, height] = [base.width, base.height];
     let given = |file: &Path| reference::read(file, [width, height], Some((scene, &base)));
     let reference = args.reference.as_deref().map(given).transpose()?;
     let settings = SceneFile::open(path)?.settings()?;
     let judged = motion.as_ref().map(|motion| motion.judged);
-    let command = |candidate| points::command(path, judged, &settings, candidate);
+    let command = |candidate| points::command(path, judged, &settings, candidate, gpu.traces_by_ray_query());
     Ok(Plan {
         scene: SceneInfo { path: path.display().to_string(), name: name(path), width, height, judged },
         commands: candidates.iter().map(command).collect(),
@@ -109,6 +110,7 @@ fn open(args: &Args) -> Result<Gpu> {
         device: args.device.clone(),
         validation: args.validation,
         cache: gpu::cache_folder(),
+        tracing: args.tracing,
         ..DeviceOptions::default()
     })
 }

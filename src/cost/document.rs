@@ -67,6 +67,9 @@ pub struct Machine {
     pub kind: String,
     /// Driver and its version.
     pub driver: String,
+    /// Whether the device found by ray queries what rays meet.
+    #[serde(default)]
+    pub ray_queries: bool,
     /// Model of the host's processor.
     pub cpu: String,
     /// Logical cores that this process may use.

@@ -62,7 +62,7 @@ pub fn measure_filters(gpu: &Gpu, plan: &FilterPlan, watch: &Watch) -> Result<(D
     let mut pictures: Vec<Option<Picture>> = plan.candidates.iter().map(|_| None).collect();
     let in_time = || plan.budget.is_none_or(|budget| begun.elapsed() < budget) && !(watch.stop)();
     let total = points.len() as u64 * u64::from(plan.repeats);
-    let mut machine = machine::describe(gpu.info());
+    let mut machine = machine::describe(gpu);
     for round in 0..plan.repeats {
         let mut order: Vec<usize> = (0..points.len()).filter(|&i| points[i].failed.is_none()).collect();
         fastrand::Rng::with_seed(plan.order_seed.wrapping_add(round.into())).shuffle(&mut order);

@@ -1,14 +1,16 @@
 //! What a measurement ran on.
 use super::document::{Machine, Software};
-use crate::gpu::DeviceInfo;
+use crate::gpu::{DeviceInfo, Gpu};
 use crate::machine::{cpu, cpu_mhz, device_mhz};
 
 /// Describes a device and this host; no clock was seen yet.
-pub fn describe(info: &DeviceInfo) -> Machine {
+pub fn describe(gpu: &Gpu) -> Machine {
+    let info = gpu.info();
     Machine {
         device: info.name.clone(),
         kind: info.kind.to_string(),
         driver: format!("{} {} {}", info.driver_name, info.driver_version, info.driver_info).trim().to_owned(),
+        ray_queries: gpu.traces_by_ray_query(),
         cpu: cpu(),
         cores: std::thread::available_parallelism().map_or(1, usize::from),
         cpu_mhz: None,

@@ -50,7 +50,7 @@ pub fn measure(
     let shots = shots(&plan.candidates);
     let outline = Outline {
         scene: &plan.scene,
-        machine: machine::describe(gpu.info()),
+        machine: machine::describe(gpu),
         seeds: seeds(plan),
         order_seed: plan.order_seed,
         budget: plan.budget,

@@ -72,7 +72,7 @@ pub fn key(gpu: &Gpu, scene: &Scene, plan: &Plan) -> String {
         text(&(plan.motion.as_ref().map(|motion| motion.judged), carries)),
         text(&given),
         text(&(plan.repeats, plan.order_seed)),
-        text(&(&info.name, &info.driver_name, &info.driver_version)),
+        text(&(&info.name, &info.driver_name, &info.driver_version, gpu.traces_by_ray_query())),
     ];
     parts.iter().for_each(|part| key.add(part.as_bytes()));
     key.add(&crate::shaders::HASH.to_le_bytes());

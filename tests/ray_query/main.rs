@@ -99,3 +99,28 @@ fn the_program_renders_or_says_why_not() {
     }
     command::complains(&render("embree"), 2, &["embree", "ray-query"]);
 }
+
+/// A measurement tells who traced, and so do the commands that render its points again; one by the kernels is not continued by it.
+#[cfg(feature = "cli")]
+#[test]
+fn a_measurement_tells_who_found_what_rays_meet() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/scene.toml");
+    let words = "--allocate uniform --denoise none --spp 1 --repeats 3 --width 16 --height 16 --reference-spp 64 --quiet -o all";
+    let cost = |tracing| {
+        let words = ["cost", scene, "--tracing", tracing].into_iter().chain(words.split(' ')).collect::<Vec<_>>();
+        let output = command::tallow(&folder, &words);
+        assert!(output.status.success(), "{output:?}");
+        let text = std::fs::read(folder.path().join("all/cost.json")).unwrap();
+        serde_json::from_slice::<tallow::cost::Document>(&text).unwrap()
+    };
+    let [kernels, queries] = ["compute", "ray-query"].map(cost);
+    let told = |document: &tallow::cost::Document| {
+        let point = &document.points[0];
+        let in_command = point.command.contains("--tracing ray-query");
+        assert_eq!(in_command, document.machine.ray_queries, "{:?}", point.command);
+        in_command
+    };
+    assert_eq!([&kernels, &queries].map(told), [false, true]);
+    assert_ne!(kernels.measurement.key, queries.measurement.key);
+}

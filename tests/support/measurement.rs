@@ -56,6 +56,7 @@ pub fn nothing_measured(name: &str) -> Document {
             device: "Imaginary GPU 9".into(),
             kind: "discrete GPU".into(),
             driver: "driver 1.2.3".into(),
+            ray_queries: false,
             cpu: "Imaginary CPU".into(),
             cores: 2,
             cpu_mhz: Some([3000, 3000]),

@@ -7,6 +7,7 @@ use crate::cli::overrides::Overrides;
 use crate::cost::grid::Axes;
 use crate::denoise::filter::{FilterSettings, Method};
 use crate::error::{Error, Result};
+use crate::gpu::Tracing;
 use crate::render::settings::{Film, Settings};
 use crate::render::{Reproject, ReprojectOverrides, Reprojection};
 use clap::Parser;
@@ -104,6 +105,9 @@ pub struct Args {
     /// Device, by index or part of its name [default: the best one]
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
+    /// Who finds what rays meet
+    #[arg(long, value_enum, default_value_t)]
+    pub tracing: Tracing,
     /// Run under the Vulkan validation layers and fail on any message
     #[arg(long)]
     pub validation: bool,

@@ -102,9 +102,16 @@ fn varied(args: &Args, grid: &[Candidate]) -> Result<Vec<Candidate>> {
 
 /// The command that renders a point's first image. Unfiltered points go to .hdr: for an .exr more layers are kept, which takes
 /// longer than what was measured. Filters with settings of their own run behind the render, to the same bits.
-pub fn command(scene: &Path, judged: Option<JudgedFrame>, from: &Settings, candidate: &Candidate) -> String {
+pub fn command(
+    scene: &Path,
+    judged: Option<JudgedFrame>,
+    from: &Settings,
+    candidate: &Candidate,
+    ray_queries: bool,
+) -> String {
     let words = |words: Vec<String>| words.into_iter().map(|word| format!(" {word}")).collect::<String>();
-    let settings = words(grid::options(&from.entries(), &candidate.settings.entries()));
+    let tracing = if ray_queries { " --tracing ray-query" } else { "" };
+    let settings = words(grid::options(&from.entries(), &candidate.settings.entries())) + tracing;
     let scene = quoted(&scene.display().to_string());
     let (render, number) = match judged {
         None => (format!("tallow render {scene}{settings}"), String::new()),

@@ -71,10 +71,11 @@ fn facts(document: &Document) -> Vec<(String, String)> {
     let commit = software.commit.as_ref().map(|commit| format!(", commit {commit}")).unwrap_or_default();
     let runs = format!("{} runs of each point, {} % intervals", runs(document), percent(measurement.confidence));
     let cores = if machine.cores == 1 { "1 core".to_owned() } else { format!("{} cores", machine.cores) };
+    let rays = if machine.ray_queries { ", rays by ray queries" } else { "" };
     let frame = scene.judged.map(|judged| format!(", frame {} at {} a second", judged.frame, judged.fps));
     let mut facts = vec![
         ("scene", format!("{}, {} x {} pixels{}", scene.path, scene.width, scene.height, frame.unwrap_or_default())),
-        ("device", format!("{} ({}), {}", machine.device, machine.kind, machine.driver)),
+        ("device", format!("{} ({}), {}{rays}", machine.device, machine.kind, machine.driver)),
         ("processor", format!("{}, {cores}", machine.cpu)),
         ("reference", reference(&document.reference)),
         ("measured", runs),
