@@ -151,6 +151,33 @@ fn edit(scene: &mut Loaded, part: u32, at: usize, value: u32, resize: bool) {
 /// Of the scenes that are taken, so many go to the device, which compiles kernels for each.
 static RENDERED: AtomicU32 = AtomicU32::new(0);
 
+/// The twin looks every index up in a slice: what it survives leads nowhere else in a kernel either.
+fn trace_by_twin(scene: &Loaded) {
+    let tracer = Tracer {
+        scene,
+        frame: frame_constants(scene, &scene.settings).unwrap(),
+        effects: Effects::ALL,
+        strategy: Ways::Both,
+    };
+    (0..scene.settings.pixels() as u32).for_each(|pixel| assert!(tracer.sample(pixel, 0).rays > 0));
+}
+
+/// Each word of the small arrays in turn becomes an index that leads nowhere.
+#[test]
+fn no_index_goes_unchecked() {
+    let mut refused = 0;
+    // The numbers by which `edit` knows instances, materials, textures and lights.
+    for (part, at) in [5, 7, 8, 10].into_iter().flat_map(|part| (0..200).map(move |at| (part, at))) {
+        let mut scene = SCENE.clone();
+        edit(&mut scene, part, at, NONE - 1, false);
+        match scene.check() {
+            Ok(()) => trace_by_twin(&scene),
+            Err(_) => refused += 1,
+        }
+    }
+    assert!(refused > 20, "{refused}");
+}
+
 fn try_scene(scene: &Loaded) {
     called_for(scene, &scene.settings, Outputs::default());
     let camera = || frame_constants(scene, &scene.settings).map(|_| ());
@@ -160,15 +187,8 @@ fn try_scene(scene: &Loaded) {
         assert!(Renderer::new(&GPU, scene, &scene.settings, Outputs::default()).is_err());
         return;
     }
-    // The twin looks every index up in a slice: what it survives leads nowhere else in a kernel either.
     let scene = &scene.clone().with(|s| s.max_depth = s.max_depth.min(4));
-    let tracer = Tracer {
-        scene,
-        frame: frame_constants(scene, &scene.settings).unwrap(),
-        effects: Effects::ALL,
-        strategy: Ways::Both,
-    };
-    (0..scene.settings.pixels() as u32).for_each(|pixel| assert!(tracer.sample(pixel, 0).rays > 0));
+    trace_by_twin(scene);
     if RENDERED.fetch_add(1, Relaxed) < number().div_ceil(10) {
         let outputs = Outputs { split_light: true, guides: true, counters: true };
         let renderer = Renderer::new(&GPU, scene, &scene.settings, outputs).expect("a scene that fits");
