@@ -92,25 +92,38 @@ fn is_expected(line: &str) -> bool {
     ["in material", "in mesh", "not rendered", "is orthographic", "not played"].iter().any(|part| line.contains(part))
 }
 
+/// Loads a file of `data` and renders it. Its name, if no light is seen.
+fn dark_gltf(gpu: &Gpu, data: &Path, path: &Path) -> Option<String> {
+    let name = path.strip_prefix(data).unwrap_or(path).display().to_string();
+    let scene = loaded(path);
+    let unexpected: Vec<_> = scene.warnings.iter().filter(|line| !is_expected(line)).collect();
+    assert!(unexpected.is_empty() && !scene.triangles.is_empty(), "{name}: {unexpected:?}");
+    // Nearly every model has effects of its own, whose kernels would take two seconds each.
+    let (_, lit) = rendered(gpu, &scene, all_effects(&scene, &scene.settings), &name);
+    (!lit).then_some(name)
+}
+
 #[test]
 #[ignore = "needs TALLOW_DATA"]
 fn every_gltf_loads_and_renders() {
-    let (data, gpu) = (data(), support::gpu());
-    let (mut paths, mut dark) = (Vec::new(), Vec::new());
+    let data = data();
+    let mut paths = Vec::new();
     files(&data.join("scenes"), &["gltf", "glb"], &mut paths);
     assert!(paths.len() >= 65, "only {} glTF files below {}", paths.len(), data.display());
-    for path in paths {
-        let name = path.strip_prefix(&data).unwrap_or(&path).display().to_string();
-        let scene = loaded(&path);
-        let unexpected: Vec<_> = scene.warnings.iter().filter(|line| !is_expected(line)).collect();
-        assert!(unexpected.is_empty() && !scene.triangles.is_empty(), "{name}: {unexpected:?}");
-        // Nearly every model has effects of its own, whose kernels would take two seconds each.
-        let (_, lit) = rendered(&gpu, &scene, all_effects(&scene, &scene.settings), &name);
-        dark.extend((!lit).then_some(name));
-    }
+    let half = |paths: &[PathBuf]| {
+        let gpu = support::gpu();
+        let dark: Vec<_> = paths.iter().filter_map(|path| dark_gltf(&gpu, &data, path)).collect();
+        support::assert_silent(&gpu);
+        dark
+    };
+    // Most of the time pictures are decoded and kernels compiled, each by one thread.
+    let (first, second) = paths.split_at(paths.len() / 2);
+    let dark = std::thread::scope(|scope| {
+        let other = scope.spawn(|| half(second));
+        [half(first), other.join().unwrap()].concat()
+    });
     // A camera stands within a pine of a dense forest, where no one of 64 paths may find the sky.
     assert!(dark.len() <= 1, "black: {dark:?}");
-    support::assert_silent(&gpu);
 }
 
 /// The frames of `animation/fox_run` were skinned by another program, in metres where the file has centimetres.
