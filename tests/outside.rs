@@ -116,7 +116,7 @@ fn every_gltf_loads_and_renders() {
         support::assert_silent(&gpu);
         dark
     };
-    // Most of the time pictures are decoded and kernels compiled, each by one thread.
+    // Most of the time kernels are compiled, each by one thread.
     let (first, second) = paths.split_at(paths.len() / 2);
     let dark = std::thread::scope(|scope| {
         let other = scope.spawn(|| half(second));

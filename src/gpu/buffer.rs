@@ -364,9 +364,9 @@ impl Drop for Untyped {
 }
 
 /// Bytes that views of a buffer of `size` bytes show, and bytes that it is made with, both at most `limit`. On a CPU they are more than
-/// `size`, so that buffers of all sizes are alike to llvmpipe. That of Mesa 22.3, but not of 25.0, compiles a kernel anew for other values of
-/// two bits of each buffer that the kernel reads by texels, though they mean something for pictures alone: whether the size of
-/// the buffer is a power of two, and whether bits 8 to 15 of the view's are 0, which is where pictures have their number of levels.
+/// `size`, so that buffers of all sizes are alike to llvmpipe. That of Mesa 22.3, but not of 25.0, compiles a kernel anew for other
+/// values of two bits of each buffer that the kernel reads by texels, though they mean something for pictures alone: whether the
+/// size of the buffer is a power of two, and whether bits 8 to 15 of the view's are 0, where pictures have their number of levels.
 fn shown_and_made(size: u64, limit: u64, kind: DeviceKind) -> [u64; 2] {
     if kind != DeviceKind::Cpu {
         return [size; 2];
