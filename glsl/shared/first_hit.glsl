@@ -40,12 +40,12 @@ bool look_on(inout Sight sight, Surface s, Bsdf bsdf) {
 Guide seen_hit(Ray ray, uint mask_seed, out Guide first, out Hit first_hit) {
     Sight sight = Sight(ray, 0.0, vec3(1.0));
     Guide seen;
-    bool on = false;
+    bool on;
     uint bounce = 0u;
     // Rays are traced and surfaces read in one place of the code, whose size decides how long the kernels take to compile.
     do {
         uint seed = bounce == 0u ? mask_seed : pcg(mask_seed + bounce);
-        Hit hit = traverse(Segment(sight.way.origin, sight.way.direction, 3e38, seed), push.constants.root);
+        Hit hit = traverse(Segment(sight.way.origin, sight.way.direction, INFINITE_DISTANCE, seed), push.constants.root);
         seen = Guide_zero();
         seen.object = seen.material = NONE;
         bool sky = hit.triangle == NONE;

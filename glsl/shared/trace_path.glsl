@@ -1,7 +1,6 @@
 // A path traced as a whole, by the thread that begins it. Needs path_step.glsl, trace.glsl and deal.glsl before it.
 
-// Follows a path that has come to its first hit to its end. Where triangles are dealt, one that is not `on` keeps the other lanes
-// company.
+// Follows a path that has come to its first hit to its end. One that is not `on` keeps others company where triangles are dealt.
 void trace_path(inout PathState p, bool on, Sampler random) {
     Surface s;
     // A turn of the loop leads from one surface to the next.

@@ -59,19 +59,22 @@ impl Common {
     /// # Errors
     /// [`crate::error::Error::Device`].
     pub fn open(&self, tracing: Tracing) -> Result<Gpu> {
-        Gpu::open(&DeviceOptions {
-            device: self.device.clone(),
-            validation: self.validation,
-            cache: gpu::cache_folder(),
-            tracing,
-            ..DeviceOptions::default()
-        })
+        open(self.device.as_ref(), self.validation, tracing)
     }
 
     /// How radiance is converted for PNG files.
     pub fn write_options(&self) -> WriteOptions {
         WriteOptions { exposure: self.exposure as f32, tone_map: self.tonemap }
     }
+}
+
+/// Opens a device, which keeps what it compiles for the next run.
+///
+/// # Errors
+/// [`crate::error::Error::Device`].
+pub fn open(device: Option<&String>, validation: bool, tracing: Tracing) -> Result<Gpu> {
+    let (device, cache) = (device.cloned(), gpu::cache_folder());
+    Gpu::open(&DeviceOptions { device, validation, cache, tracing, ..DeviceOptions::default() })
 }
 
 /// Checks a number of frames per second.

@@ -5,11 +5,11 @@ mod options;
 mod output;
 mod points;
 
-use super::{Exit, complain, fail_on_messages, interrupt, print, print_json};
+use super::{Exit, common, complain, fail_on_messages, interrupt, print, print_json};
 use crate::cost::document::SceneInfo;
 use crate::cost::{Document, Ended, Images, Plan, Watch, key, measure, others, reference};
 use crate::error::{Error, Result};
-use crate::gpu::{self, DeviceOptions, Gpu};
+use crate::gpu::{self, Gpu};
 use crate::scene::{Scene, SceneFile};
 pub use options::Args;
 use output::{Folder, Shown, text};
@@ -106,13 +106,7 @@ fn finish(
 }
 
 fn open(args: &Args) -> Result<Gpu> {
-    Gpu::open(&DeviceOptions {
-        device: args.device.clone(),
-        validation: args.validation,
-        cache: gpu::cache_folder(),
-        tracing: args.tracing,
-        ..DeviceOptions::default()
-    })
+    common::open(args.device.as_ref(), args.validation, args.tracing)
 }
 
 fn no_scene() -> Error {

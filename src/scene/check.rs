@@ -124,9 +124,9 @@ impl Scene {
     fn textures_fit(&self) -> Checked {
         let all = self.textures.len();
         let of = |m: &Material| {
-            let colours = [m.base_texture, m.specular_texture, m.emission_texture];
-            let others = [m.opacity_texture, m.roughness_texture, m.bump_texture, m.clearcoat_normal_texture];
-            colours.into_iter().chain(others)
+            let shown =
+                [m.base_texture, m.specular_texture, m.roughness_texture, m.opacity_texture, m.emission_texture];
+            shown.into_iter().chain([m.bump_texture, m.clearcoat_normal_texture])
         };
         let layers = |m: &Material| {
             let coat = [m.clearcoat_texture, m.clearcoat_roughness_texture];

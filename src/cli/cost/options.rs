@@ -106,7 +106,7 @@ pub struct Args {
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
     /// Who finds what rays meet
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, conflicts_with = "filter_only")]
     pub tracing: Tracing,
     /// Run under the Vulkan validation layers and fail on any message
     #[arg(long)]

@@ -1,9 +1,9 @@
 //! Runs the frames of a profile.
 use super::Args;
-use crate::cli::{complain, fail_on_messages};
+use crate::cli::{common, complain, fail_on_messages};
 use crate::denoise::{self, filter, filter::Method, filter::Row};
 use crate::error::{Error, Result};
-use crate::gpu::{self, DeviceOptions, Gpu, PassTime};
+use crate::gpu::{Gpu, PassTime};
 use crate::memory;
 use crate::profile::{Measured, Profile, measure};
 use crate::render::film;
@@ -28,13 +28,7 @@ pub fn profile(args: &Args) -> Result<(Profile, Option<String>)> {
     if is_talkative {
         scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
     }
-    let gpu = Gpu::open(&DeviceOptions {
-        device: args.device.clone(),
-        validation: args.validation,
-        cache: gpu::cache_folder(),
-        tracing: args.tracing,
-        ..DeviceOptions::default()
-    })?;
+    let gpu = common::open(args.device.as_ref(), args.validation, args.tracing)?;
     check_room(args, &settings, &gpu)?;
     let count = usize::from(args.frames);
     let bar = ProgressBar::new(2 * count as u64 + 1);
