@@ -234,6 +234,16 @@ struct Leaves {
     uint instance;
 };
 
+// Intersects a triangle or sphere, unless it is what the ray leaves: see `traversal_step`.
+bool intersect_primitive(RaySpace r, uint index, uint instance, float t_max, uint mask_seed, uvec2 from, out float t,
+                         out vec2 barycentric) {
+    bool leaves = index == from.x && (!FX_INSTANCES || instance == from.y);
+    bool meets = intersect_triangle(r, index, t_max, t, barycentric) && !leaves;
+    if (FX_SPHERES && is_sphere(index))
+        meets = intersect_sphere(r, index, instance, t_max, leaves, mask_seed, t, barycentric);
+    return meets;
+}
+
 // Tests all `leaves`; returns whether one is hit. For lavapipe, which fetches for masked lanes too, a lane without triangles keeps
 // the index that it tested last, or the scene's first, so that it misses no cache. An any hit ends the loop one triangle late, so
 // that the next fetch waits for no test and tests overlap. Variables that live from turn to turn are scalar, since vectors would
@@ -246,13 +256,8 @@ bool intersect_triangles(inout Hit hit, Leaves leaves, bool any_hit, uint mask_s
         if (found && any_hit) left = 0u;
         float distance;
         vec2 barycentric;
-        bool meets = intersect_triangle(leaves.ray, index, hit.t, distance, barycentric) && !(found && any_hit) &&
-                     (index != from.x || (FX_INSTANCES && instance != from.y));
-        if (FX_SPHERES && is_sphere(index)) {
-            bool inside = index == from.x && (!FX_INSTANCES || instance == from.y);
-            meets = intersect_sphere(leaves.ray, index, instance, hit.t, inside, mask_seed, distance, barycentric) &&
-                    !(found && any_hit);
-        }
+        bool meets = intersect_primitive(leaves.ray, index, instance, hit.t, mask_seed, from, distance, barycentric) &&
+                     !(found && any_hit);
         if (meets) {
             hit.t = distance;
             hit.triangle = index;
@@ -328,24 +333,27 @@ bool visit_node(inout Traversal t, RaySpace world, bool on, uint root, out Leave
 layout(constant_id = 107) const uint TRIANGLES_A_STEP = 0u;
 const bool BOUNDED = TRIANGLES_A_STEP > 0u && !SHALLOW;
 
-// Removes the highest TRIANGLES_A_STEP of `bits`, and returns them.
-uint take_some(inout uint bits) {
-    uint all = bits;
-    for (uint i = 0u; i < TRIANGLES_A_STEP; i++) take_highest(bits);
-    return all ^ bits;
+void keep(inout Traversal t, Leaves leaves, bool last) {
+    t.kept_first = leaves.first;
+    t.kept_bits = leaves.bits;
+    t.kept_instance = leaves.instance;
+    t.last = last;
 }
 
-// The triangles to test now, of those kept; where the step has `visited` a node, `found` are kept first. The order of tests is that of
-// all at once.
-Leaves some_leaves(inout Traversal t, RaySpace world, bool visited, Leaves found) {
-    if (visited) {
-        t.kept_first = found.first;
-        t.kept_bits = found.bits;
-        t.kept_instance = found.instance;
-    }
+// Tests the next TRIANGLES_A_STEP triangles that are kept, each with its mask, in the order of tests of all at once.
+void intersect_kept(inout Traversal t, RaySpace world, uint mask_seed, uvec2 from) {
     RaySpace ray = world;
     if (FX_INSTANCES) ray = select_ray(t.kept_instance != NONE, t.inside, world);
-    return Leaves(ray, t.kept_first, take_some(t.kept_bits), t.kept_instance);
+    [[unroll]] for (uint i = 0u; i < TRIANGLES_A_STEP; i++) {
+        if (t.kept_bits == 0u) break;
+        uint index = t.kept_first + take_highest(t.kept_bits);
+        float distance;
+        vec2 barycentric;
+        bool meets = intersect_primitive(ray, index, t.kept_instance, t.hit.t, mask_seed, from, distance, barycentric);
+        if (FX_ALPHA_MASKS && meets && !(FX_SPHERES && is_sphere(index))) // spheres have tested their mask
+            meets = mask_blocks(index, t.kept_instance, barycentric, mask_seed);
+        if (meets) t.hit = Hit(distance, index, t.kept_instance, barycentric.x, barycentric.y);
+    }
 }
 
 // Visits a node and its triangles, or goes on with those of the last. Returns true when nothing is left, or with `any_hit` when a
@@ -354,17 +362,17 @@ Leaves some_leaves(inout Traversal t, RaySpace world, bool visited, Leaves found
 bool traversal_step(inout Traversal t, RaySpace world, bool any_hit, uint root, uint mask_seed, uvec2 from) {
     Leaves leaves;
     uvec2 met;
-    bool visits = true, last = false;
-    if (BOUNDED) visits = t.kept_bits == 0u;
-    if (visits) {
+    bool last = false;
+    if (!BOUNDED || t.kept_bits == 0u) {
         last = visit_node(t, world, true, root, leaves, met);
         if (FX_INSTANCES && met.y != 0u) enter_instance(t, world, met);
+        if (BOUNDED) keep(t, leaves, last);
     }
     if (BOUNDED) {
-        if (visits) t.last = last;
-        leaves = some_leaves(t, world, visits, leaves);
+        intersect_kept(t, world, mask_seed, from);
         last = t.last && t.kept_bits == 0u;
+    } else {
+        intersect_leaves(t.hit, leaves, any_hit, mask_seed, from);
     }
-    intersect_leaves(t.hit, leaves, any_hit, mask_seed, from);
     return last || (any_hit && t.hit.triangle != NONE);
 }

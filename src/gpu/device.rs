@@ -96,9 +96,8 @@ impl Gpu {
         let instance = Instance::new(options.validation)?;
         let candidate = choose(info::candidates(&instance.raw)?, options.device.as_deref())?;
         let queue_family = usable(&candidate)?;
-        let (kind, max_storage_range) = (candidate.info.kind, candidate.info.max_storage_range);
-        let tuning = options.tuning.unwrap_or(Tuning::of(kind, max_storage_range)).check()?;
         let by_ray_query = is_by_ray_query(options.tracing, &candidate.info)?;
+        let tuning = options.tuning.unwrap_or(Tuning::of(candidate.info.kind, by_ray_query)).check()?;
         let calibrated = calibrated::offered(&instance, candidate.physical)?;
         let alone = one_at_a_time();
         let device = create_device(&instance.raw, candidate.physical, queue_family, calibrated, by_ray_query)?;

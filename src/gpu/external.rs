@@ -96,8 +96,7 @@ impl Gpu {
             return Err(Error::Device(what.to_owned()));
         }
         let ray_queries = by_ray_query.then(|| RayQueries::new(&instance, physical, &device));
-        let (kind, max_storage_range) = (candidate.info.kind, candidate.info.max_storage_range);
-        let tuning = raw.tuning.unwrap_or(Tuning::of(kind, max_storage_range)).check()?;
+        let tuning = raw.tuning.unwrap_or(Tuning::of(candidate.info.kind, by_ray_query)).check()?;
         drop(alone);
         let queue = vk::Queue::from_raw(raw.queue);
         let instance = Instance::borrowed(entry, instance);

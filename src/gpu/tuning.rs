@@ -9,7 +9,8 @@ const IN_REGISTERS: u32 = 2;
 /// Edges of a path that a wavefront has stages for. Each is two dispatches for all paths, however few have got so far.
 const MOST_STAGES: u32 = 32;
 
-/// The sizes that suit a kind of device. No choice changes a bit of any image, but for [`Self::windows`].
+/// The sizes that suit a kind of device. On lavapipe no choice changes a bit of any image, but for [`Self::windows`]. NVIDIA's driver
+/// fuses products and sums of one kernel otherwise than those of another, so that some pictures differ by rounding there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tuning {
     /// Threads in a workgroup that traces rays. lavapipe is fastest with 32 (against 16 and 64); GPUs get two subgroups of
@@ -30,8 +31,8 @@ pub struct Tuning {
     /// Bytes in a strip of the guided filter's sums. On a CPU most of it fits into the caches; a GPU needs more to be busy.
     pub strip_bytes: u64,
     /// Windows of the guided filter that a thread takes, 0 for those of a whole line, which share most of their sums. A GPU needs
-    /// more threads, with fewer registers: on an H200 1 takes .33 of the time of segments as long as a window. With 2 to 4 windows
-    /// share sums too; not tried on a GPU. In any case the widest windows are taken in segments of at most their length. Floats are
+    /// more threads, with fewer registers: on an H200 `guided` takes 4.4 of the time with 0, .64, .52 and .46 with 2 to 4, which
+    /// share sums too, of that with 1. In any case the widest windows are taken in segments of at most their length. Floats are
     /// then added in another order: pictures of `guided`, and of `auto`, which uses it, differ by some 1e-6 of their values.
     pub windows: u32,
     /// Lines of the guided filter's windows per workgroup.
@@ -44,19 +45,19 @@ pub struct Tuning {
     pub native_bits: bool,
     /// Most triangles that a ray tests before it visits its next node; 0 for all. Rays of a subgroup wait for the one with the
     /// most triangles. Where triangles are dealt, only rays from the eye have such a limit, in scenes without masks and spheres.
-    /// Scenes of a few nodes have none. With 2 paths in a bare Sponza take an H200 .91 of the time.
+    /// Scenes of a few nodes have none. With 2 paths take an H200 .85 (bare Sponza) to .92 (pine grove) of the time of 0.
     pub triangles_a_step: u32,
     /// Whether kernels that trace rays read storage buffers in place of texel buffers, which some GPUs read through the slower
     /// path of textures. An array of a scene can then have at most the bytes of one storage binding. Devices whose kernels can
-    /// bind too few of them, and those that trace by ray queries, keep texel buffers. lavapipe takes twice as long;
-    /// an H200 .88 of the time for the Stanford dragon under a picture of a sky, .99 to 1.00 in a bare Sponza and the Cornell box.
+    /// bind too few of them, and those that trace by ray queries, keep texel buffers. lavapipe takes twice as long; an H200 1.04
+    /// (bare Sponza), 1.02 (Crytek Sponza, Stanford dragon) and .99 (pine grove) of the time by a wavefront.
     pub storage_buffers: bool,
     /// Whether paths are traced by a wavefront, see `render::pass::wavefront`, in scenes of more than a few nodes and where they have
-    /// at most 32 edges. Not tried on a GPU yet, where tracing alone needs half of the registers of whole paths. lavapipe takes
-    /// 1.6 to 3.8 of the time.
+    /// at most 32 edges. Tracing alone needs half of the registers of whole paths. An H200 takes .89 (bare Sponza) to .45 (pine grove)
+    /// of the time; lavapipe takes 1.6 to 3.8 of it. Not with ray queries, by which no GPU was measured.
     pub wavefront: bool,
     /// Threads in a workgroup of a filter that looks at pixels around its own, all in one row. In larger ones neighbours share
-    /// more of what they read, from which an H200 gains nothing.
+    /// more of what they read. With 128 in place of 32 an H200 takes .85 (`wavelet`), .97 (`svgf`) and .99 to 1.00 of the time.
     pub filter_workgroup: u32,
     /// Longest edge of a filtered image in pixels; see `glsl/shared/loop_limit.glsl`.
     pub longest_edge: u64,
@@ -90,14 +91,14 @@ impl Tuning {
         thread_items: 16,
         interleaves: true,
         strip_bytes: 256 << 20,
-        windows: 1,
+        windows: 4,
         lines: 32,
         deals: false,
         native_bits: true,
         triangles_a_step: 2,
-        storage_buffers: true,
-        wavefront: false,
-        filter_workgroup: 32,
+        storage_buffers: false,
+        wavefront: true,
+        filter_workgroup: 128,
         longest_edge: u64::MAX,
     };
 
@@ -120,11 +121,10 @@ impl Tuning {
         }
     }
 
-    /// What suits a device. One that binds storage buffers of few bytes only keeps texel buffers, which show more of a scene.
-    pub(super) fn of(kind: DeviceKind, max_storage_range: u64) -> Self {
-        const LARGE: u64 = 1 << 30;
-        let storage_buffers = Self::GPU.storage_buffers && max_storage_range >= LARGE;
-        if kind == DeviceKind::Cpu { Self::CPU } else { Self { storage_buffers, ..Self::GPU } }
+    /// What suits a device, which traces by ray queries or not.
+    pub(super) fn of(kind: DeviceKind, by_ray_query: bool) -> Self {
+        let wavefront = Self::GPU.wavefront && !by_ray_query;
+        if kind == DeviceKind::Cpu { Self::CPU } else { Self { wavefront, ..Self::GPU } }
     }
 
     /// Whether paths of at most `max_depth` edges are traced by a wavefront; `stack` is the depth that the scene's traversal needs.
@@ -156,11 +156,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn devices_that_bind_small_storage_buffers_keep_texel_buffers() {
-        let least = 1 << 27; // of any device
-        assert_eq!(Tuning::of(DeviceKind::DiscreteGpu, 1 << 32), Tuning::GPU);
-        assert_eq!(Tuning::of(DeviceKind::DiscreteGpu, least), Tuning { storage_buffers: false, ..Tuning::GPU });
-        assert_eq!(Tuning::of(DeviceKind::Cpu, 1 << 32), Tuning::CPU);
+    fn gpus_trace_whole_paths_by_ray_queries() {
+        assert_eq!(Tuning::of(DeviceKind::IntegratedGpu, false), Tuning::GPU);
+        assert_eq!(Tuning::of(DeviceKind::IntegratedGpu, true), Tuning { wavefront: false, ..Tuning::GPU });
+        assert_eq!([false, true].map(|by_ray_query| Tuning::of(DeviceKind::Cpu, by_ray_query)), [Tuning::CPU; 2]);
     }
 
     #[test]

@@ -319,12 +319,13 @@ pub fn all_effects(scene: &Scene, settings: &Settings) -> Effects {
     Effects { independent_sampler, large_lamps: scene.large_lamps, soft_light, ..Effects::ALL }
 }
 
-/// Paths per dispatch, whose samples, or what a wavefront keeps of them, fit a storage buffer.
+/// Paths per dispatch, whose samples, or what a wavefront keeps of them, fit a storage buffer and a small part of the memory.
 fn paths_in_flight(gpu: &Gpu, scene: &Scene, settings: &Settings, effects: &Effects) -> u32 {
     let wavefront = gpu.tuning().has_wavefront(scene.stack, settings.max_depth);
     let samples = if effects.split_light { 48 } else { 16 };
     let bytes = if wavefront { wavefront::BYTES_PER_PATH } else { samples };
-    let room = gpu.info().max_storage_range / bytes;
+    const SMALL_PART: u64 = 8;
+    let room = gpu.info().max_storage_range.min(gpu.info().memory_heap / SMALL_PART) / bytes;
     let all = settings.pixels() as u64 * u64::from(settings.spp);
     gpu.tuning().paths_in_flight.min(room).min(all).max(1) as u32
 }

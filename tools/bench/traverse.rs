@@ -45,8 +45,8 @@ struct Launch {
 
 /// A CPU has few lanes to keep busy: those that finish a ray early take the next one.
 const CPU: Launch = Launch { side: 512, per_thread: 128 };
-/// A GPU hides the latency of its memory by hundreds of thousands of threads, and schedules the next ones by itself.
-const GPU: Launch = Launch { side: 2048, per_thread: 1 };
+/// A GPU hides the latency of its memory by hundreds of thousands of threads. Each takes as many as those of `path_extend.comp`.
+const GPU: Launch = Launch { side: 2048, per_thread: 8 };
 
 /// How long the device traces untimed before each round: GPUs lower their clocks while the host traces, and take a while to raise them.
 /// After 200 ms an H200 was back in one case and not in another.

@@ -56,7 +56,7 @@ type Run = Box<dyn FnMut() -> Result<f64>>;
 fn of_paths(own: Tuning) -> Vec<(String, Tuning)> {
     let dealt = |name: &str| if own.deals { format!("{name}, not dealt") } else { name.to_owned() };
     let alone = Tuning { deals: false, ..own };
-    let (native_bits, storage_buffers) = (!own.native_bits, !own.storage_buffers);
+    let (native_bits, storage_buffers, wavefront) = (!own.native_bits, !own.storage_buffers, !own.wavefront);
     let mut all = vec![
         ("own".to_owned(), own),
         (format!("deals {}", !own.deals), Tuning { deals: !own.deals, ..own }),
@@ -71,8 +71,8 @@ fn of_paths(own: Tuning) -> Vec<(String, Tuning)> {
     }
     all.extend([32, 64, 128].map(|n| (format!("workgroup {n}"), Tuning { workgroup: n, ..own })));
     for triangles_a_step in [0, 2] {
-        let name = format!("wavefront, triangles_a_step {triangles_a_step}");
-        all.push((name, Tuning { wavefront: true, triangles_a_step, ..own }));
+        let name = format!("wavefront {wavefront}, triangles_a_step {triangles_a_step}");
+        all.push((name, Tuning { wavefront, triangles_a_step, ..own }));
     }
     differing(all)
 }

@@ -63,7 +63,9 @@ impl Wavefront {
                 path_queue: path_queue(),
                 counters: counters(),
             };
-            rec.dispatch_threads(&self.extend, bind, &push, paths.div_ceil(PATHS_A_THREAD))?; // memory, queue -> memory
+            // Rays from the eye are alike: where each has its thread, neighbours end together.
+            let threads = if stage == 0 { paths } else { paths.div_ceil(PATHS_A_THREAD) };
+            rec.dispatch_threads(&self.extend, bind, &push, threads)?; // memory, queue -> memory
             let bind = path_shade::Bind {
                 scene: s.bind(),
                 which_path: which_path(),

@@ -1,5 +1,5 @@
 //! Measures what it is worth to carry samples from frame to frame.
-//!   cargo run --release --example bench-reproject -- turn scenes/cornell-box/scene.toml
+//!   cargo run --release --example bench-reproject -- turn scenes/cornell-box/scene.toml --degrees 20
 //!   cargo run --release --example bench-reproject -- frames sponza.toml
 //! Both print tables; `--plot` writes what they show as .svg.
 #![allow(missing_docs)]
