@@ -6,8 +6,8 @@ use super::{Ceilings, FrameRun};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Pass, PassTime};
 use crate::machine;
-use crate::render::Counters;
 use crate::render::settings::Settings;
+use crate::render::{Counters, traces_paths};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -139,7 +139,7 @@ impl Profile {
             PassProfile::new(pass, ms, work, frame_ms.median, ceilings)
         };
         let passes: Vec<_> = work.into_iter().map(of).collect();
-        let path_ms: f64 = passes.iter().filter(|p| p.pass.starts_with("path")).map(|p| p.ms.median).sum();
+        let path_ms: f64 = passes.iter().filter(|p| traces_paths(&p.pass)).map(|p| p.ms.median).sum();
         Ok(Self {
             schema: SCHEMA,
             tallow: env!("CARGO_PKG_VERSION").to_owned(),

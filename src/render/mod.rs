@@ -32,6 +32,7 @@ pub use history::{History, Moves, Reproject, ReprojectOverrides, Reprojection};
 pub use job::{Job, Status, StopReason};
 pub use merge::{Gap, Merged, merge};
 pub use moving::can_carry;
+pub use pass::path::traces_paths;
 pub use provenance::{HISTORY, of_frame as metadata_of_frame};
 #[doc(hidden)] // a renderer tells its kernels; tests tell the same to their CPU twins
 pub use push::{frame_constants, priority_push};

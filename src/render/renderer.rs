@@ -319,17 +319,34 @@ pub fn all_effects(scene: &Scene, settings: &Settings) -> Effects {
     Effects { independent_sampler, large_lamps: scene.large_lamps, soft_light, ..Effects::ALL }
 }
 
-/// Paths per dispatch, whose samples, or what a wavefront keeps of them, fit a storage buffer and a small part of the memory.
+/// Paths per dispatch, whose samples, or what a wavefront keeps of them, have room.
 fn paths_in_flight(gpu: &Gpu, scene: &Scene, settings: &Settings, effects: &Effects) -> u32 {
     let wavefront = gpu.tuning().has_wavefront(scene.stack, settings.max_depth);
     let samples = if effects.split_light { 48 } else { 16 };
     let bytes = if wavefront { wavefront::BYTES_PER_PATH } else { samples };
-    const SMALL_PART: u64 = 8;
-    let room = gpu.info().max_storage_range.min(gpu.info().memory_heap / SMALL_PART) / bytes;
+    let room = room_for_a_batch(gpu.info().max_storage_range, gpu.info().memory_heap) / bytes;
     let all = settings.pixels() as u64 * u64::from(settings.spp);
     gpu.tuning().paths_in_flight.min(room).min(all).max(1) as u32
 }
 
+/// Bytes that the largest buffer for a batch of paths may have: those of a storage binding, in a small part of the device's memory.
+fn room_for_a_batch(max_storage_range: u64, memory_heap: u64) -> u64 {
+    const PART: u64 = 8;
+    max_storage_range.min(memory_heap / PART)
+}
+
 fn milliseconds(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
+}
+
+#[cfg(test)]
+mod tests {
+    use super::room_for_a_batch;
+
+    #[test]
+    fn batches_leave_most_of_a_small_devices_memory() {
+        const GIB: u64 = 1 << 30;
+        assert_eq!(room_for_a_batch(4 * GIB, 4 * GIB), GIB / 2);
+        assert_eq!(room_for_a_batch(GIB / 8, 80 * GIB), GIB / 8);
+    }
 }

@@ -5,7 +5,7 @@ use crate::tuning::{OUTPUTS, bits, film, scene};
 use tallow::gpu::{FrameResources, Gpu, Tuning};
 use tallow::layout::{BSDF_DIELECTRIC, MATERIAL_MASKED, Material};
 use tallow::render::settings::{Sampler, Settings};
-use tallow::render::{Job, Outputs, Renderer};
+use tallow::render::{Job, Outputs, Renderer, traces_paths};
 use tallow::scene::Loaded;
 
 /// A bust of smooth glass, where paths take one of two ways, on stone that lets some rays pass.
@@ -80,7 +80,10 @@ fn it_is_used_where_scenes_are_large_and_paths_are_short() {
         let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
         let times = Job::new(&renderer).run_to_end(&mut FrameResources::new(&gpu).unwrap()).unwrap().times;
         let count = |name: &str| times.iter().filter(|t| t.name == name).count();
-        ["path", "path_generate", "path_extend", "path_shade"].map(count)
+        let counts = ["path", "path_generate", "path_extend", "path_shade"].map(count);
+        let all = times.iter().filter(|t| traces_paths(t.name)).count();
+        assert_eq!(all, counts.iter().sum(), "no other pass traces paths");
+        counts
     };
     assert_eq!(passes("grass/scene.toml", 32), [0, 1, 32, 32]);
     assert_eq!(passes("grass/scene.toml", 33), [1, 0, 0, 0]);

@@ -9,7 +9,7 @@ use tallow::denoise::{Demodulation, Denoiser};
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu, PassTime, Tuning};
 use tallow::profile::median;
 use tallow::render::settings::Settings;
-use tallow::render::{Job, Outputs, Renderer};
+use tallow::render::{Job, Outputs, Renderer, traces_paths};
 use tallow::scene::{Loaded, Scene};
 
 #[derive(Parser)]
@@ -118,7 +118,7 @@ fn paths(gpu: &Gpu, scene: &Loaded) -> Result<Run> {
     let mut frame = FrameResources::new(gpu)?;
     Ok(Box::new(move || {
         let times = Job::new(&renderer).run_to_end(&mut frame)?.times;
-        Ok(milliseconds(times.iter().filter(|pass| pass.name.starts_with("path"))))
+        Ok(milliseconds(times.iter().filter(|pass| traces_paths(pass.name))))
     }))
 }
 

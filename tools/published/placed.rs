@@ -5,7 +5,7 @@ use anyhow::anyhow;
 use tallow::gpu::{FrameResources, Gpu, PassTime};
 use tallow::layout::{Guide, PixelStats, vec3, vec4};
 use tallow::render::settings::{Settings, Split};
-use tallow::render::{Job, Outputs, Renderer, Step};
+use tallow::render::{Job, Outputs, Renderer, Step, traces_paths};
 use tallow::scene::{Loaded, Scene};
 use tallow::statistics::Pixel;
 
@@ -67,7 +67,7 @@ pub fn render(gpu: &Gpu, scene: &Loaded) -> anyhow::Result<Rendered> {
         let ns: u64 = times.iter().filter(|pass| counts(pass.name)).map(PassTime::duration_ns).sum();
         ns as f64 * 1e-6
     };
-    let (ms, path_ms) = (took(|name| name != "primary_hit"), took(|name| matches!(name, "path" | "accumulate")));
+    let (ms, path_ms) = (took(|name| name != "primary_hit"), took(|name| traces_paths(name) || name == "accumulate"));
     let tile = &renderer.film().tiles[0];
     let (stats, light) = (tile.stats.read()?, tile.light.read()?);
     let pixels = stats.into_iter().zip(light).map(|(stats, light)| Pixel { stats, light }).collect();

@@ -39,6 +39,11 @@ impl Paths {
     }
 }
 
+/// Whether a pass of this name traces paths: `path`, or a stage of a wavefront.
+pub fn traces_paths(pass: &str) -> bool {
+    matches!(pass, "path" | "path_generate" | "path_extend" | "path_shade")
+}
+
 /// The same number of samples for every pixel of a run.
 pub fn push_of_batch(constants: &PathConstants, b: &Batch) -> PathPush {
     let (first_pixel, first_sample) = (b.first_pixel, b.first_sample);

@@ -3,7 +3,7 @@ use anyhow::{Context, Result};
 use std::path::Path;
 use std::time::Instant;
 use tallow::gpu::{FrameResources, Gpu};
-use tallow::render::{Outputs, Renderer};
+use tallow::render::{Outputs, Renderer, traces_paths};
 use tallow::report::table;
 use tallow::scene::description::*;
 use tallow::scene::{Loaded, Pose, Scene, Vertices};
@@ -54,8 +54,10 @@ fn measure(
         for step in renderer.steps() {
             passes.extend(renderer.run(&mut frame, &step)?);
         }
-        let of = |name| passes.iter().filter(|p| p.name == name).map(|p| p.duration_ns() as f64 * 1e-6).sum::<f64>();
-        let all = [posed, recorded, of("upload"), of("path")];
+        let of = |counts: fn(&str) -> bool| {
+            passes.iter().filter(|p| counts(p.name)).map(|p| p.duration_ns() as f64 * 1e-6).sum::<f64>()
+        };
+        let all = [posed, recorded, of(|name| name == "upload"), of(traces_paths)];
         times.iter_mut().zip(all).filter(|_| number > 0).for_each(|(times, ms)| times.push(ms));
         let s = renderer.scene();
         handles.push([s.nodes.raw().handle, s.triangles.raw().handle, s.instances.raw().handle, s.lights.raw().handle]);

@@ -10,7 +10,7 @@ use tallow::gpu::{FrameResources, Gpu};
 use tallow::image::{Film, Picture, Samples, metrics};
 use tallow::layout::NONE;
 use tallow::render::settings::Settings;
-use tallow::render::{Job, Outputs, Renderer};
+use tallow::render::{Job, Outputs, Renderer, traces_paths};
 use tallow::report::table;
 use tallow::scene::{Loaded, Scene};
 
@@ -115,7 +115,7 @@ fn hierarchies(gpu: &Gpu, name: &str, loaded: &Loaded, frames: u32) -> Result<Ve
             for step in renderer.steps() {
                 let times = renderer.run(&mut frame, &step)?;
                 path_ms +=
-                    times.iter().filter(|t| t.name == "path").map(|t| t.duration_ns() as f64 * 1e-6).sum::<f64>();
+                    times.iter().filter(|t| traces_paths(t.name)).map(|t| t.duration_ns() as f64 * 1e-6).sum::<f64>();
             }
             poses.push(ms);
             speeds.push(renderer.counters()?.rays() as f64 * 1e-3 / path_ms);

@@ -5,7 +5,7 @@ use crate::published::{Section, placed, push};
 use std::collections::BTreeMap;
 use tallow::allocate::geometry;
 use tallow::gpu::{FrameResources, Gpu, PassTime};
-use tallow::render::{Job, Outputs, Renderer, Step};
+use tallow::render::{Job, Outputs, Renderer, Step, traces_paths};
 use tallow::report::html::Table;
 
 /// The paper's resolution, which software devices render in time too: what is placed does not depend on the scene.
@@ -105,7 +105,7 @@ fn share(gpu: &Gpu, args: &Args) -> anyhow::Result<String> {
     for t in Job::new(&placed).run_to_end(&mut FrameResources::new(gpu)?)?.times {
         let ms = t.duration_ns() as f64 * 1e-6;
         lists += if t.name == "sample_list" { ms } else { 0.0 };
-        traced += if matches!(t.name, "path" | "accumulate") { ms } else { 0.0 };
+        traced += if traces_paths(t.name) || t.name == "accumulate" { ms } else { 0.0 };
     }
     let uniform = placed::render(gpu, &VIEW.load(args, |s| s.spp = 4)?)?;
     let all = importance + counts + lists;
