@@ -237,10 +237,10 @@ struct Leaves {
 // Intersects a triangle or sphere, unless it is what the ray leaves: see `traversal_step`.
 bool intersect_primitive(RaySpace r, uint index, uint instance, float t_max, uint mask_seed, uvec2 from, out float t,
                          out vec2 barycentric) {
-    bool leaves = index == from.x && (!FX_INSTANCES || instance == from.y);
-    bool meets = intersect_triangle(r, index, t_max, t, barycentric) && !leaves;
+    bool is_left = index == from.x && (!FX_INSTANCES || instance == from.y);
+    bool meets = intersect_triangle(r, index, t_max, t, barycentric) && !is_left;
     if (FX_SPHERES && is_sphere(index))
-        meets = intersect_sphere(r, index, instance, t_max, leaves, mask_seed, t, barycentric);
+        meets = intersect_sphere(r, index, instance, t_max, is_left, mask_seed, t, barycentric);
     return meets;
 }
 

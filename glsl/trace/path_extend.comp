@@ -3,9 +3,9 @@
 #include "shared/scene.glsl"
 
 // Traces the rays of a wavefront: of each path that waits the shadow ray, then the one to its next surface. A thread takes paths one
-// after the other, so that none waits for the slowest of its neighbours. On an H200 that takes longer where a
-// subgroup takes paths once a quarter of its rays have ended (1.02 of the time), where shadow rays have a dispatch of their own (1.07),
-// or where paths are listed by the octant of their direction (1.46); listed in tiles of pixels they take as long.
+// after the other, so that none waits for the slowest of its neighbours. An H200 takes longer where a subgroup takes paths once a
+// quarter of its rays have ended (1.02 of the time), where shadow rays have a dispatch of their own (1.07), or where paths are listed
+// by the octant of their direction (1.46); where they are listed in tiles of pixels it takes as long.
 layout(local_size_x_id = 100) in;
 layout(scalar, push_constant) uniform Push { PathPush push; };
 

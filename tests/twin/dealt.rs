@@ -86,6 +86,24 @@ fn rays_find_the_same_hits_however_they_are_tuned() {
     switches.iter().for_each(|(_, gpu)| assert_silent(gpu));
 }
 
+/// From where they start, they would meet that surface again.
+#[test]
+fn rays_pass_the_surface_that_they_leave() {
+    let gpus = [0, 2].map(|triangles_a_step| tuned_gpu(Tuning { triangles_a_step, ..Tuning::CPU }));
+    for (name, scene) in scenes() {
+        let effects = Effects { dealt_triangles: false, ..called_for(&scene, &scene.settings, Outputs::default()) };
+        let rays = queries(&scene, 5000);
+        let first = Traversal::new(&gpus[0], &scene, effects).hits(&rays, false);
+        let [all, in_twos] = gpus.each_ref().map(|gpu| Traversal::behind(gpu, &scene, effects).hits(&rays, false));
+        assert!(all.iter().map(bits).eq(in_twos.iter().map(bits)), "{name}");
+        let surface = |hit: &RayHit| (hit.triangle, hit.instance);
+        let met = first.iter().zip(&all).filter(|(first, _)| first.triangle != NONE);
+        let again = met.filter(|(first, next)| surface(first) == surface(next)).count();
+        assert!(if name == "balls" { again > 0 } else { again == 0 }, "{name}: {again}, which only spheres may be");
+    }
+    gpus.iter().for_each(assert_silent);
+}
+
 #[test]
 fn pictures_have_the_same_bits_together() {
     let gpu = gpu();

@@ -365,11 +365,19 @@ pub struct Traversal {
 
 impl Traversal {
     pub fn new(gpu: &Gpu, scene: &Loaded, effects: Effects) -> Self {
+        Self::with(gpu, scene, effects, false)
+    }
+
+    /// For what rays meet that leave their first hits.
+    pub fn behind(gpu: &Gpu, scene: &Loaded, effects: Effects) -> Self {
+        Self::with(gpu, scene, effects, true)
+    }
+
+    fn with(gpu: &Gpu, scene: &Loaded, effects: Effects, behind: bool) -> Self {
         let renderer = Renderer::specialised(gpu, scene, &scene.settings, Outputs::default(), effects).unwrap();
         let traverse = gpu.tuning().traverse(scene.stack);
         let thread = shared::thread::Constants { workgroup: 32, stripes: 1 };
-        let constants =
-            traverse_kernel::Constants { effects, thread, traverse, deal: dealing(gpu), ..Default::default() };
+        let constants = traverse_kernel::Constants { effects, thread, traverse, deal: dealing(gpu), behind };
         let kernel = Kernel::new(gpu, &constants).unwrap();
         let root = frame_constants(scene, &scene.settings).unwrap().path.root;
         Self { gpu: gpu.clone(), renderer, kernel, root }
