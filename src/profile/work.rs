@@ -2,15 +2,17 @@
 //!
 //! Bytes: every byte of every buffer that a pass binds counts once where the kernel reads it and once where it writes it, as if a
 //! cache held all that is read twice. Some kernels bind more than they touch. `path` reads nodes of the scene's hierarchy at
-//! random: counted are the nodes that rays visited, and its samples. Of a wavefront only the nodes of `path_extend` are counted, as
-//! nobody counts the paths that still go on. `accumulate` touches the samples that `path` left, and its
-//! share of the film. `primary_hit` counts what it writes, as nobody counts its nodes. Triangles, textures and lights do not count.
+//! random: counted are the nodes that rays visited, and its samples. Of a wavefront count the nodes of `path_extend`, and what either stage
+//! reads and writes of the paths whose closest hits were looked for; those that waited for a shadow ray alone are more.
+//! `accumulate` touches the samples that `path` left, and its share of the film. `primary_hit` counts what it writes, as nobody
+//! counts its nodes. Triangles, textures and lights do not count.
 //!
 //! Operations: see [`super::code`]. Those of `path` are its steps through the hierarchy, one for each node; shading does not count.
 use super::code::Code;
 use crate::gpu::{Access, BoundRange, KernelCode, Pass};
 use crate::layout::{BvhNode, vec4};
 use crate::render::Counters;
+use crate::render::pass::wavefront::{BYTES_OF_HIT, BYTES_OF_RAY, BYTES_PER_PATH};
 use crate::shaders::shared::{window_blocks, windows};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -64,6 +66,8 @@ impl FrameWork {
     pub fn of(&self, passes: &[Pass]) -> Vec<(String, Work)> {
         let mut all: Vec<(String, Work)> = Vec::new();
         let (mut codes, mut paths) = (HashMap::new(), 0);
+        let generated =
+            passes.iter().filter(|pass| pass.time.name == "path_generate").map(|pass| pass.shape.threads).sum();
         for pass in passes {
             let name = pass.time.name;
             let at = all.iter().position(|(known, _)| known == name).unwrap_or_else(|| {
@@ -73,7 +77,11 @@ impl FrameWork {
             if matches!(name, "path" | "path_generate") {
                 paths = pass.shape.threads;
             }
-            self.add(&mut all[at].1, pass, paths, &mut codes);
+            let work = &mut all[at].1;
+            if work.calls == 0 {
+                work.bytes.add(self.bytes_of_waiting(name, generated), false);
+            }
+            self.add(work, pass, paths, &mut codes);
         }
         all
     }
@@ -100,9 +108,29 @@ impl FrameWork {
         work.operations.add(each.count.saturating_mul(shape.threads), each.is_least);
     }
 
+    /// Of a sample that `path` leaves.
+    fn bytes_of_sample(&self) -> u64 {
+        size_of::<vec4>() as u64 * if self.split_light { 3 } else { 1 }
+    }
+
+    /// What a stage of a wavefront reads and writes of its paths in all calls, `paths` of which leave the eye. Each path that waits for
+    /// a closest hit is shaded behind it, and all of them but those from the eye were written by shading.
+    fn bytes_of_waiting(&self, stage: &str, paths: u64) -> u64 {
+        let Counters { closest, any, .. } = self.counters;
+        match stage {
+            "path_extend" => (closest + any) * BYTES_OF_RAY + closest * BYTES_OF_HIT,
+            "path_shade" => {
+                let vector = size_of::<vec4>() as u64;
+                let kept = BYTES_PER_PATH - vector * if self.split_light { 1 } else { 2 }; // soft light may be kept, and albedo
+                let read = kept - 2 * vector; // all but the shadow ray
+                closest * read + closest.saturating_sub(paths) * kept + paths * self.bytes_of_sample()
+            }
+            _ => 0,
+        }
+    }
+
     fn bytes(&self, pass: &Pass, paths: u64) -> (u64, bool) {
-        let ranges = &pass.shape.ranges;
-        let record = size_of::<vec4>() as u64 * if self.split_light { 3 } else { 1 };
+        let (ranges, record) = (&pass.shape.ranges, self.bytes_of_sample());
         let sum = |of: &dyn Fn(&BoundRange) -> u64| ranges.iter().map(|range| moves(range) * of(range)).sum();
         match pass.time.name {
             "path" => (paths * record, true),

@@ -4,6 +4,8 @@ use crate::support::{assert_silent, render_steps, tuned_gpu};
 use crate::tuning::{OUTPUTS, bits, film, scene};
 use tallow::gpu::{FrameResources, Gpu, Tuning};
 use tallow::layout::{BSDF_DIELECTRIC, MATERIAL_MASKED, Material};
+use tallow::profile::work::FrameWork;
+use tallow::profile::{Amount, Workload};
 use tallow::render::settings::{Sampler, Settings};
 use tallow::render::{Job, Outputs, Renderer, traces_paths};
 use tallow::scene::Loaded;
@@ -82,11 +84,36 @@ fn it_is_used_where_scenes_are_large_and_paths_are_short() {
         let count = |name: &str| times.iter().filter(|t| t.name == name).count();
         let counts = ["path", "path_generate", "path_extend", "path_shade"].map(count);
         let all = times.iter().filter(|t| traces_paths(t.name)).count();
-        assert_eq!(all, counts.iter().sum(), "no other pass traces paths");
+        assert_eq!(all, counts.iter().sum::<usize>(), "no other pass traces paths");
         counts
     };
     assert_eq!(passes("grass/scene.toml", 32), [0, 1, 32, 32]);
     assert_eq!(passes("grass/scene.toml", 33), [1, 0, 0, 0]);
     assert_eq!(passes("cornell-box/scene.toml", 4), [1, 0, 0, 0], "few nodes");
+    assert_silent(&gpu);
+}
+
+/// Paths of one edge look for one closest hit each; those of two that leave a surface are written once more.
+#[test]
+fn a_profile_counts_what_waits() {
+    // Two batches that fill their workgroups, whose threads are what a profile knows of paths.
+    let gpu = tuned_gpu(Tuning { wavefront: true, paths_in_flight: 128, deals: false, ..Tuning::CPU });
+    for max_depth in [1, 2] {
+        let scene = scene("grass/scene.toml", "uniform")
+            .with(|s| (s.width, s.height, s.spp, s.max_depth) = (16, 8, 2, max_depth));
+        let outputs = Outputs { counters: true, ..Outputs::default() };
+        let renderer = Renderer::new(&gpu, &scene, &scene.settings, outputs).unwrap();
+        Job::new(&renderer).run_to_end(&mut FrameResources::new(&gpu).unwrap()).unwrap();
+        let counters = renderer.counters().unwrap();
+        let frames = Workload { gpu: &gpu, renderer: &renderer, denoiser: None }.run(1, &mut || {}).unwrap();
+        let work = FrameWork { pixels: 128, split_light: false, counters }.of(&frames.timed[0].passes);
+        let bytes = |name: &str| work.iter().find(|(pass, _)| pass == name).unwrap().1.bytes;
+        let (paths, closest) = (256, counters.closest);
+        assert!(if max_depth == 1 { closest == paths } else { closest > paths && closest < 2 * paths }, "{counters:?}");
+        let shaded = 112 * closest + 144 * (closest - paths) + 16 * paths;
+        assert_eq!(bytes("path_shade"), Amount { count: shaded, is_least: true });
+        let traced = 80 * counters.nodes + 40 * counters.rays() + 20 * closest;
+        assert_eq!(bytes("path_extend"), Amount { count: traced, is_least: true });
+    }
     assert_silent(&gpu);
 }

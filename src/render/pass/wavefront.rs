@@ -12,6 +12,10 @@ use std::time::Duration;
 
 /// Bytes that a path takes while it waits.
 pub const BYTES_PER_PATH: u64 = KINDS as u64 * size_of::<uvec4>() as u64;
+/// Those that tracing a ray reads of it: origin, direction, state, seed, and the surface that the ray leaves.
+pub const BYTES_OF_RAY: u64 = 40;
+/// Those that a closest hit takes: triangle, instance, coordinates, distance.
+pub const BYTES_OF_HIT: u64 = 20;
 
 /// The kernels, and the paths that wait between them.
 pub struct Wavefront {
