@@ -3,7 +3,7 @@
 use crate::film::{Arm, Film, carries, milliseconds};
 use crate::reference::Reference;
 use crate::{View, plot};
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use glam::{Quat, Vec3};
 use tallow::gpu::Gpu;
 use tallow::layout::{Camera, vec3};
@@ -138,6 +138,8 @@ pub fn run(gpu: &Gpu, args: &Args) -> Result<()> {
     let scene = args.view.load()?;
     let end = turned(&args.start(&scene)?, args.degrees);
     let reference = Reference::new(gpu, &scene, end, args.view.reference_spp, None)?;
+    let is_lit = reference.picture.pixels.iter().flatten().any(|&value| value > 0.0);
+    ensure!(is_lit, "the camera sees no light once it has turned by {} degrees: choose fewer --degrees", args.degrees);
     println!(
         "{} degrees, {} samples a pixel for each step; relative MSE (the reference's own: {:.4}) of the frame after the last step and of \
          those that follow it",
@@ -172,7 +174,7 @@ fn print(step: f32, lines: &[Line]) {
         let at =
             |k: usize| line.points.get(k).map_or(String::new(), |p| format!("{:.4} ({:.2})", p.1, p.1 / base[k].1));
         let last = line.points.len() - 1;
-        let times = [line.frame_ms, line.carrying_ms].map(|ms| format!("{ms:.1}"));
+        let times = [line.frame_ms, line.carrying_ms].map(|ms| format!("{ms:.2}"));
         let what = line.carriage.map_or([String::new(), String::new()], |c| {
             [share(c.carried), format!("{:.1}", c.samples as f64 / c.carried.max(1) as f64)]
         });
