@@ -56,10 +56,6 @@ const HEADER: &str = "#version 460
 /// triangles to deal to each other.
 const RAY_QUERY: &str = "RAY_QUERY";
 
-/// Kernels that include one of them are compiled once more with storage buffers in place of texel buffers, for devices that read those
-/// sooner.
-const TRACES: [&str; 2] = ["glsl/shared/trace.glsl", "glsl/shared/path_step.glsl"];
-
 /// The compiled kernels that a packaged crate carries.
 const PACKAGED: &str = "spirv";
 
@@ -135,8 +131,6 @@ struct Kernel<'a> {
     usual: Code<'a>,
     /// That for devices that trace rays by ray queries, if it traces any.
     ray_query: Option<Code<'a>>,
-    /// The usual one with storage buffers in place of texel buffers, if it traces rays.
-    storage: Option<Code<'a>>,
 }
 
 struct Code<'a> {
@@ -151,20 +145,17 @@ impl<'a> Kernel<'a> {
         let (text, sources) = preprocess(file)?;
         let interface = Interface::of(&sources)?;
         let text = structs::glsl(&interface.bindings) + &text;
-        let code = |defines: &str, text: &str| {
-            let whole = [HEADER, defines, text].concat();
+        let code = |defines: &str| {
+            let whole = [HEADER, defines, &text].concat();
             let binary = compiled.join(format!("{name}-{:016x}.spv", xxh3_64(whole.as_bytes())));
             Code { file, whole, binary }
         };
-        let ray_query = text.contains(RAY_QUERY).then(|| code(&format!("#define {RAY_QUERY}\n"), &text));
-        let traces = sources.iter().any(|(file, _)| TRACES.contains(&file.as_str()));
-        let storage = traces.then(|| code("", &structs::storage_form(&text)));
-        Ok(Self { name, file, usual: code("", &text), ray_query, storage, interface })
+        let ray_query = text.contains(RAY_QUERY).then(|| code(&format!("#define {RAY_QUERY}\n")));
+        Ok(Self { name, file, usual: code(""), ray_query, interface })
     }
 
     fn code(&self) -> impl Iterator<Item = &Code<'a>> {
-        let more = [&self.ray_query, &self.storage];
-        [&self.usual].into_iter().chain(more.into_iter().flatten())
+        [&self.usual].into_iter().chain(&self.ray_query)
     }
 }
 
@@ -210,12 +201,8 @@ fn generate(files: &[PathBuf], root: &str, store: &Path, target: &Path) -> Resul
         for compiled in kernel.code() {
             hash.update(&fs::read(&compiled.binary)?);
         }
-        let Kernel { name, file, interface, usual, ray_query, storage } = kernel;
-        let binaries = Binaries {
-            usual: &usual.binary,
-            ray_query: ray_query.as_ref().map(|code| &*code.binary),
-            storage: storage.as_ref().map(|code| &*code.binary),
-        };
+        let Kernel { name, file, interface, usual, ray_query } = kernel;
+        let binaries = Binaries { usual: &usual.binary, ray_query: ray_query.as_ref().map(|code| &*code.binary) };
         code += &emit::module(name, file, interface, root, &binaries)?;
         groups.extend(interface.groups().into_iter().map(|group| (group.clone(), declared(interface, group))));
     }

@@ -4,14 +4,10 @@
 #define TEXEL_WORD_GLSL
 
 uint texel_word(uint at) {
-#ifdef STORAGE_BUFFERS
-    return texels[at];
-#else
     if (!FX_MANY_TEXELS) return texelFetch(texels, int(at)).x;
     uvec4 four = texelFetch(texels, int(at >> 2));
     uvec2 two = (at & 2u) != 0u ? four.zw : four.xy;
     return (at & 1u) != 0u ? two.y : two.x;
-#endif
 }
 
 #endif

@@ -46,18 +46,6 @@ pub struct Slot {
     pub access: Access,
 }
 
-impl Slot {
-    /// In the form of a kernel that has storage buffers in place of texel buffers.
-    fn without_texels(self) -> Self {
-        match self.kind {
-            SlotKind::UintTexels | SlotKind::FloatTexels => {
-                Self { kind: SlotKind::Storage, access: Access::Read, ..self }
-            }
-            SlotKind::Storage | SlotKind::Uniform => self,
-        }
-    }
-}
-
 /// The interface of a kernel. The build script implements it for the `Bind` struct of every kernel.
 ///
 /// # Safety
@@ -65,7 +53,6 @@ impl Slot {
 ///   compute; its subgroups shuffle only where a specialisation constant asks for it. [`Self::SLOTS`] are its descriptors, all
 ///   in set 0, with numbers that differ. [`Self::RAY_QUERY`] is the same with VK_KHR_ray_query, and has an acceleration structure as
 ///   one more descriptor.
-///   [`Self::STORAGE_SPIRV`] is the same with storage buffers for texel buffers.
 /// - [`Self::Push`] is its push constants: at most 128 bytes, a multiple of 4. Elements of [`SlotKind::Uniform`] have at most
 ///   16384 bytes.
 /// - [`Self::buffers`] returns one buffer per slot.
@@ -114,8 +101,6 @@ pub unsafe trait Bindings {
     const SPIRV: &'static [u8];
     /// The code for devices that trace by ray queries; none for a kernel that traces no rays.
     const RAY_QUERY: Option<RayQueryCode> = None;
-    /// The code with storage buffers in place of texel buffers; none for a kernel that traces no rays.
-    const STORAGE_SPIRV: Option<&'static [u8]> = None;
     /// The slots, in the order of the fields of the `Bind` struct.
     const SLOTS: &'static [Slot];
     /// The buffers to bind, one for each of [`Self::SLOTS`].
@@ -162,8 +147,6 @@ pub struct Kernel<B> {
     pub(super) gpu: Gpu,
     pub(super) pipeline: Arc<Pipeline>,
     pub(super) spirv: &'static [u8],
-    /// One for each buffer of `B`.
-    pub(super) slots: Box<[Slot]>,
     pub(super) constants: Arc<[(u32, u32)]>,
     compile_time: Duration,
     pub(super) local_size: [u32; 2],
@@ -183,25 +166,16 @@ impl<B: Bindings> Kernel<B> {
         let begun = Instant::now();
         let local_size = constants.local_size();
         check_workgroup(B::NAME, local_size, &gpu.0.limits)?;
-        let Form { spirv, slots, world } = form::<B>(gpu);
+        let ray_query = B::RAY_QUERY.filter(|_| gpu.traces_by_ray_query());
+        let (spirv, world) = ray_query.map_or((B::SPIRV, None), |code| (code.spirv, Some(code.binding)));
         let constants: Arc<[_]> = constants.entries().into();
         let push_bytes = size_of::<B::Push>() as u32;
         let traced = world.map(|binding| (binding, vk::DescriptorType::ACCELERATION_STRUCTURE_KHR));
-        let bindings = slots.iter().map(|slot| (slot.binding, slot.kind.descriptor())).chain(traced).collect();
+        let bindings = B::SLOTS.iter().map(|slot| (slot.binding, slot.kind.descriptor())).chain(traced).collect();
         let recipe = Recipe { spirv, bindings, push_bytes, constants: constants.clone() };
         let pipeline = pipeline(gpu, B::NAME, &recipe)?;
         let compile_time = begun.elapsed();
-        Ok(Self {
-            gpu: gpu.clone(),
-            pipeline,
-            spirv,
-            slots,
-            constants,
-            compile_time,
-            local_size,
-            world,
-            of: PhantomData,
-        })
+        Ok(Self { gpu: gpu.clone(), pipeline, spirv, constants, compile_time, local_size, world, of: PhantomData })
     }
 
     /// Time that creating the pipeline took. Some drivers, such as lavapipe, compile more on the first dispatch.
@@ -219,27 +193,6 @@ impl<B: Bindings> Kernel<B> {
     pub fn folded_groups(&self, threads: u32) -> [u32; 3] {
         folded(threads.div_ceil(self.local_size[0]))
     }
-}
-
-/// A form of a kernel.
-struct Form {
-    spirv: &'static [u8],
-    slots: Box<[Slot]>,
-    /// The binding of what rays are traced through, if they are traced by ray queries.
-    world: Option<u32>,
-}
-
-/// The form that a device runs of a kernel. It has no storage buffers for texel buffers where they would be too many.
-fn form<B: Bindings>(gpu: &Gpu) -> Form {
-    if let Some(code) = B::RAY_QUERY.filter(|_| gpu.traces_by_ray_query()) {
-        return Form { spirv: code.spirv, slots: B::SLOTS.into(), world: Some(code.binding) };
-    }
-    let room = gpu.0.limits.max_per_stage_descriptor_storage_buffers as usize;
-    let fits = gpu.tuning().storage_buffers && B::SLOTS.len() <= room;
-    if let Some(spirv) = B::STORAGE_SPIRV.filter(|_| fits) {
-        return Form { spirv, slots: B::SLOTS.iter().map(|slot| slot.without_texels()).collect(), world: None };
-    }
-    Form { spirv: B::SPIRV, slots: B::SLOTS.into(), world: None }
 }
 
 /// Returns the pipeline of `recipe`, which is compiled if the device does not have it.
@@ -297,33 +250,16 @@ mod tests {
         use crate::shaders::{path, shared::deal};
         const GROUP_NON_UNIFORM: u32 = 61;
         const SHUFFLE: u32 = 65;
-        for code in [path::SPIRV, <path::Bind as Bindings>::STORAGE_SPIRV.unwrap()] {
-            let code: Vec<u32> = bytemuck::pod_collect_to_vec(code);
-            let [alone, dealt] = [0, 8].map(|lanes| {
-                let deal = deal::Constants { lanes };
-                let constants = path::Constants { effects: Effects::ALL, deal, ..Default::default() };
-                let code = crate::spirv::specialise(&code, &constants.entries());
-                bytemuck::cast_slice::<u32, u8>(&code).to_vec()
-            });
-            assert!(declares(&dealt, GROUP_NON_UNIFORM) && declares(&dealt, SHUFFLE));
-            assert!(!declares(&alone, GROUP_NON_UNIFORM) && !declares(&alone, SHUFFLE));
-            assert!(declares(&alone, 1), "control: every kernel declares Shader");
-        }
-    }
-
-    #[test]
-    fn a_form_of_kernels_that_trace_has_no_texels() {
-        use crate::gpu::Bindings;
-        use crate::shaders::{accumulate, path, path_extend, path_shade};
-        const SAMPLED_BUFFER: u32 = 46;
-        for (code, usual) in [
-            (<path::Bind as Bindings>::STORAGE_SPIRV, path::SPIRV),
-            (<path_extend::Bind as Bindings>::STORAGE_SPIRV, path_extend::SPIRV),
-            (<path_shade::Bind as Bindings>::STORAGE_SPIRV, path_shade::SPIRV),
-        ] {
-            assert!(!declares(code.unwrap(), SAMPLED_BUFFER) && declares(usual, SAMPLED_BUFFER));
-        }
-        assert!(<accumulate::Bind as Bindings>::STORAGE_SPIRV.is_none(), "it traces no rays");
+        let code: Vec<u32> = bytemuck::pod_collect_to_vec(path::SPIRV);
+        let [alone, dealt] = [0, 8].map(|lanes| {
+            let deal = deal::Constants { lanes };
+            let constants = path::Constants { effects: Effects::ALL, deal, ..Default::default() };
+            let code = crate::spirv::specialise(&code, &constants.entries());
+            bytemuck::cast_slice::<u32, u8>(&code).to_vec()
+        });
+        assert!(declares(&dealt, GROUP_NON_UNIFORM) && declares(&dealt, SHUFFLE));
+        assert!(!declares(&alone, GROUP_NON_UNIFORM) && !declares(&alone, SHUFFLE));
+        assert!(declares(&alone, 1), "control: every kernel declares Shader");
     }
 
     #[test]

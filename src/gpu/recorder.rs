@@ -113,16 +113,15 @@ impl<'a> Recorder<'a> {
         let buffers = bind.buffers();
         self.owns(&buffers)?;
         let world = self.world(kernel, bind.acceleration())?;
-        let set =
-            self.frame.descriptors.set(&kernel.pipeline, &kernel.slots, &buffers, world.map(|(at, w)| (at, w.top)))?;
-        let slots = buffers.iter().map(|b| b.buffer).zip(kernel.slots.iter().map(|slot| slot.access));
+        let set = self.frame.descriptors.set(&kernel.pipeline, B::SLOTS, &buffers, world.map(|(at, w)| (at, w.top)))?;
+        let slots = buffers.iter().map(|b| b.buffer).zip(B::SLOTS.iter().map(|slot| slot.access));
         let accesses: Vec<_> = slots.chain(world.map(|(_, w)| (w.storage.bound().buffer, Access::Trace))).collect();
         self.frame.keep(kernel);
         let (pipeline, layout, push) = (kernel.pipeline.raw, kernel.pipeline.layout, bytemuck::bytes_of(push));
         let compute = vk::PipelineBindPoint::COMPUTE;
         let code = KernelCode { spirv: kernel.spirv, constants: kernel.constants.clone() };
-        let bytes = kernel.slots.iter().zip(&buffers).map(|(slot, bound)| bound.bytes(slot.kind == SlotKind::Uniform));
-        let shape = PassShape::of_kernel(groups, kernel.local_size, &kernel.slots, bytes, code);
+        let bytes = B::SLOTS.iter().zip(&buffers).map(|(slot, bound)| bound.bytes(slot.kind == SlotKind::Uniform));
+        let shape = PassShape::of_kernel(groups, kernel.local_size, B::SLOTS, bytes, code);
         // SAFETY: the frame keeps the kernel, the set and every buffer until the work is complete.
         self.pass(B::NAME, &accesses, shape, |device, commands| unsafe {
             device.cmd_bind_pipeline(commands, compute, pipeline);

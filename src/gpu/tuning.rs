@@ -47,11 +47,6 @@ pub struct Tuning {
     /// most triangles. Where triangles are dealt, only rays from the eye have such a limit, in scenes without masks and spheres.
     /// Scenes of a few nodes have none. With 2 paths take an H200 .85 (bare Sponza) to .92 (pine grove) of the time of 0.
     pub triangles_a_step: u32,
-    /// Whether kernels that trace rays read storage buffers in place of texel buffers, which some GPUs read through the slower
-    /// path of textures. An array of a scene can then have at most the bytes of one storage binding. Devices whose kernels can
-    /// bind too few of them, and those that trace by ray queries, keep texel buffers. lavapipe takes twice as long; an H200 1.04
-    /// (bare Sponza), 1.02 (Crytek Sponza, Stanford dragon) and .99 (pine grove) of the time by a wavefront.
-    pub storage_buffers: bool,
     /// Whether paths are traced by a wavefront, see `render::pass::wavefront`, in scenes of more than a few nodes and where they have
     /// at most 32 edges. Tracing alone needs half of the registers of whole paths; a path takes 176 bytes. An H200 takes .89 (bare
     /// Sponza) to .45 (pine grove) of the time; lavapipe takes 1.6 to 3.8 of it. Not with ray queries, by which no GPU was measured.
@@ -77,7 +72,6 @@ impl Tuning {
         deals: true,
         native_bits: false,
         triangles_a_step: 0,
-        storage_buffers: false,
         wavefront: false,
         filter_workgroup: 32,
         longest_edge: 60_000,
@@ -96,7 +90,6 @@ impl Tuning {
         deals: false,
         native_bits: true,
         triangles_a_step: 2,
-        storage_buffers: false,
         wavefront: true,
         filter_workgroup: 128,
         longest_edge: u64::MAX,

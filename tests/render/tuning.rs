@@ -113,15 +113,10 @@ fn switches() -> Vec<(&'static str, Tuning)> {
     vec![
         ("native_bits", Tuning { native_bits: true, ..own }),
         ("triangles_a_step", Tuning { triangles_a_step: 2, ..own }),
-        ("storage_buffers", Tuning { storage_buffers: true, ..own }),
-        ("storage_buffers and deals", Tuning { storage_buffers: true, ..Tuning::CPU }),
         ("triangles_a_step and deals", Tuning { triangles_a_step: 1, ..Tuning::CPU }),
         ("wavefront", Tuning { wavefront: true, triangles_a_step: 2, ..own }),
         ("interleaves", Tuning { interleaves: true, thread_items: 5, ..Tuning::CPU }),
-        (
-            "all",
-            Tuning { native_bits: true, triangles_a_step: 2, storage_buffers: true, interleaves: true, ..Tuning::GPU },
-        ),
+        ("all", Tuning { native_bits: true, triangles_a_step: 2, interleaves: true, ..Tuning::GPU }),
     ]
 }
 

@@ -67,7 +67,6 @@ fn rays_find_the_same_hits_however_they_are_tuned() {
         ("native_bits", Tuning { native_bits: true, ..Tuning::CPU }),
         ("1 triangle a step", Tuning { triangles_a_step: 1, ..Tuning::CPU }),
         ("2 triangles a step", Tuning { triangles_a_step: 2, ..Tuning::CPU }),
-        ("storage_buffers", Tuning { storage_buffers: true, ..Tuning::CPU }),
     ];
     let switches = switches.map(|(name, tuning)| (name, tuned_gpu(tuning)));
     for (scene_name, scene) in scenes() {

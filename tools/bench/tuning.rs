@@ -56,18 +56,15 @@ type Run = Box<dyn FnMut() -> Result<f64>>;
 fn of_paths(own: Tuning) -> Vec<(String, Tuning)> {
     let dealt = |name: &str| if own.deals { format!("{name}, not dealt") } else { name.to_owned() };
     let alone = Tuning { deals: false, ..own };
-    let (native_bits, storage_buffers, wavefront) = (!own.native_bits, !own.storage_buffers, !own.wavefront);
+    let (native_bits, wavefront) = (!own.native_bits, !own.wavefront);
     let mut all = vec![
         ("own".to_owned(), own),
         (format!("deals {}", !own.deals), Tuning { deals: !own.deals, ..own }),
         (format!("native_bits {native_bits}"), Tuning { native_bits, ..own }),
-        (format!("storage_buffers {storage_buffers}"), Tuning { storage_buffers, ..own }),
     ];
     for triangles_a_step in [0, 1, 2, 4] {
         let name = dealt(&format!("triangles_a_step {triangles_a_step}"));
-        let steps = Tuning { triangles_a_step, ..alone };
-        all.push((name.clone(), steps));
-        all.push((format!("{name}, storage_buffers {storage_buffers}"), Tuning { storage_buffers, ..steps }));
+        all.push((name, Tuning { triangles_a_step, ..alone }));
     }
     all.extend([32, 64, 128].map(|n| (format!("workgroup {n}"), Tuning { workgroup: n, ..own })));
     for triangles_a_step in [0, 2] {

@@ -19,8 +19,6 @@ pub struct Binaries<'a> {
     pub usual: &'a Path,
     /// Those that trace rays by ray queries; none for a kernel that traces no rays.
     pub ray_query: Option<&'a Path>,
-    /// Those that read storage buffers sooner than texel buffers; none for a kernel that traces no rays.
-    pub storage: Option<&'a Path>,
 }
 
 /// Returns the fields of a `Bind` struct and the list of their buffers, both as Rust code.
@@ -217,12 +215,6 @@ fn ray_query(interface: &Interface, binaries: &Binaries) -> String {
     )
 }
 
-/// What the `Bindings` of a kernel say of storage buffers.
-fn storage(binaries: &Binaries) -> String {
-    let line = |code| format!("        const STORAGE_SPIRV: Option<&'static [u8]> = Some(include_bytes!({code:?}));\n");
-    binaries.storage.map(line).unwrap_or_default()
-}
-
 /// The Rust module of one kernel.
 pub fn module(name: &str, file: &Path, interface: &Interface, root: &str, binaries: &Binaries) -> Result<String> {
     let usual = binaries.usual;
@@ -243,7 +235,6 @@ pub fn module(name: &str, file: &Path, interface: &Interface, root: &str, binari
     }
     let numbers = numbers(&interface.numbers_of(None))?;
     let (constants, ray_query) = (constants(interface, root)?, ray_query(interface, binaries));
-    let storage = storage(binaries);
     let asserts = assert_sizes(&interface.bindings_of(None));
     let file = file.display();
     // Code that can name a kernel can run it with any numbers, so the crate's kernels are not visible outside.
@@ -272,7 +263,7 @@ pub fn module(name: &str, file: &Path, interface: &Interface, root: &str, binari
         type Constants = Constants;
         const NAME: &'static str = NAME;
         const SPIRV: &'static [u8] = SPIRV;
-{storage}{ray_query}        const SLOTS: &'static [Slot] = &[
+{ray_query}        const SLOTS: &'static [Slot] = &[
 {slots}        ];
         fn buffers(&self) -> Vec<Bound<'_>> {{
             #[allow(unused_mut)]

@@ -281,8 +281,7 @@ fn parse_storage(line: &str) -> Option<Binding> {
     })
 }
 
-/// A texel buffer, if the line declares one.
-pub fn parse_texels(line: &str) -> Option<Binding> {
+fn parse_texels(line: &str) -> Option<Binding> {
     let (number, rest) = line.trim().strip_prefix("layout(binding = ")?.split_once(')')?;
     let (kind, rest) = rest.trim().strip_prefix("uniform ")?.split_once(' ')?;
     let kind = match kind {

@@ -1,6 +1,6 @@
 //! Generates GLSL for the structs in `src/layout` and for the functions with which kernels read and write them, so that no
 //! kernel depends on the offset of a field.
-use crate::interface::{Binding, parse_texels};
+use crate::interface::Binding;
 use crate::layout::{Field, GLSL_CONSTANTS, STRUCTS, Struct};
 use std::ops::Range;
 
@@ -38,57 +38,26 @@ fn is_float(ty: &str) -> bool {
     ty == "float" || ty.starts_with("vec")
 }
 
-/// Number of words in one texel of a buffer of elements of so many bytes, as `texel_bytes` in `src/gpu/buffer.rs` chooses it.
-fn texel_words(bytes: usize) -> usize {
-    if bytes.is_multiple_of(16) {
+/// Number of words in one texel of a buffer of these structs, as `texel_bytes` in `src/gpu/buffer.rs` chooses it.
+fn texel_words(s: &Struct) -> usize {
+    if s.size.is_multiple_of(16) {
         4
-    } else if bytes.is_multiple_of(8) {
+    } else if s.size.is_multiple_of(8) {
         2
     } else {
         1
     }
 }
 
-/// A kernel with storage buffers in place of texel buffers.
-pub fn storage_form(kernel: &str) -> String {
-    let line = |line| parse_texels(line).map_or(format!("{line}\n"), |binding| storage_block(&binding));
-    STORAGE_READS.to_owned() + &kernel.lines().map(line).collect::<String>()
-}
-
-/// How the kernel reads them, in the words of texel buffers.
-const STORAGE_READS: &str = "#define STORAGE_BUFFERS
-#define texelFetch(source, at) source[at]
-#define textureSize(source) source.length()
-";
-
-/// A storage buffer whose elements are what a texel buffer has as texels.
-fn storage_block(binding: &Binding) -> String {
-    let Binding { number, field, element, kind, .. } = binding;
-    let bytes = structs().find(|s| s.name == *element).map_or(4 * word_count(element), |s| s.size);
-    let texel = texel_type(texel_words(bytes), *kind == "FloatTexels");
-    format!("layout(scalar, binding = {number}) readonly buffer Texels{number} {{ {texel} {field}[]; }};\n")
-}
-
-fn texel_type(words: usize, floats: bool) -> &'static str {
-    match (floats, words) {
-        (true, 1) => "float",
-        (true, 2) => "vec2",
-        (true, _) => "vec4",
-        (false, 1) => "uint",
-        (false, 2) => "uvec2",
-        (false, _) => "uvec4",
-    }
-}
-
 /// The texels of the struct that hold a field.
 fn texels_of(s: &Struct, field: &Field) -> Range<usize> {
-    let (first, wide) = (field.offset / 4, texel_words(s.size));
+    let (first, wide) = (field.offset / 4, texel_words(s));
     first / wide..(first + word_count(field.ty)).div_ceil(wide)
 }
 
 /// GLSL expression for a field's value, where `texel(i)` is the i-th texel of the struct.
 fn value(s: &Struct, field: &Field, texel: impl Fn(usize) -> String) -> String {
-    let (wide, first, count) = (texel_words(s.size), field.offset / 4, word_count(field.ty));
+    let (wide, first, count) = (texel_words(s), field.offset / 4, word_count(field.ty));
     let part = |i: usize| {
         let range = first.max(i * wide)..(first + count).min((i + 1) * wide);
         let swizzle: String = range.map(|word| ["x", "y", "z", "w"][word % wide]).collect();
@@ -103,27 +72,30 @@ fn value(s: &Struct, field: &Field, texel: impl Fn(usize) -> String) -> String {
 }
 
 /// Generates `Type_field(buffer, index)`, which fetches only the texels of the field, and `Type_load(buffer, index)`, which
-/// fetches every texel once: macros, since no function can be given a storage buffer.
+/// fetches every texel once.
 fn readers(s: &Struct) -> String {
-    let (name, wide) = (s.name, texel_words(s.size));
-    let texels = s.size / 4 / wide;
+    let (name, texels) = (s.name, s.size / 4 / texel_words(s));
     let fetch = |i: usize| match i {
-        0 => format!("texelFetch(source, int({texels}u * (index)))"),
-        i => format!("texelFetch(source, int({texels}u * (index)) + {i})"),
+        0 => format!("texelFetch(source, int({texels}u * index))"),
+        i => format!("texelFetch(source, int({texels}u * index) + {i})"),
     };
-    let (of_texel, swizzle) = (texel_type(wide, false), &"xyzw"[..wide]);
-    let (mut readers, mut fields) = (String::new(), String::new());
+    let (of_texel, swizzle) = match texel_words(s) {
+        1 => ("uint", "x"),
+        2 => ("uvec2", "xy"),
+        _ => ("uvec4", "xyzw"),
+    };
+    let (mut readers, mut fetches, mut fields) = (String::new(), String::new(), String::new());
+    for i in 0..texels {
+        fetches += &format!("    {of_texel} t{i} = {}.{swizzle};\n", fetch(i));
+    }
     for field in s.fields {
-        let of = field.name;
-        readers += &format!("#define {name}_{of}(source, index) {}\n", value(s, field, fetch));
+        let Field { name: of, ty, .. } = field;
+        let read = value(s, field, fetch);
+        readers += &format!("{ty} {name}_{of}(usamplerBuffer source, uint index) {{ return {read}; }}\n");
         fields += &format!("    s.{of} = {};\n", value(s, field, |i| format!("t{i}")));
     }
-    let list = |part: &dyn Fn(usize) -> String| (0..texels).map(part).collect::<Vec<_>>().join(", ");
-    let parameters = list(&|i| format!("{of_texel} t{i}"));
-    let fetches = list(&|i| format!("{}.{swizzle}", fetch(i)));
     format!(
-        "{readers}{name} {name}_of({parameters}) {{\n    {name} s;\n{fields}    return s;\n}}\n\
-         #define {name}_load(source, index) {name}_of({fetches})\n"
+        "{readers}{name} {name}_load(usamplerBuffer source, uint index) {{\n{fetches}    {name} s;\n{fields}    return s;\n}}\n"
     )
 }
 
