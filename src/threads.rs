@@ -1,5 +1,7 @@
 //! The thread pool for work on the host, with as many threads as the machine has cores or as the system will start.
+use crate::error::Result;
 use rayon::ThreadPoolBuilder;
+use rayon::prelude::*;
 
 /// Runs `work` in the caller's thread pool if it is in one, else in a new pool. That has one thread per core, fewer if the
 /// system refuses so many, and in the last resort only the caller's thread. Rayon's global pool would panic instead.
@@ -19,9 +21,44 @@ pub fn within<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     }
 }
 
+/// Makes two things side by side, such as kernels: a driver compiles as many at a time as it is asked for.
+///
+/// # Errors
+/// Those of the first, then those of the second.
+pub fn both<A: Send, B: Send>(
+    first: impl FnOnce() -> Result<A> + Send,
+    second: impl FnOnce() -> Result<B> + Send,
+) -> Result<(A, B)> {
+    let (a, b) = within(|| rayon::join(first, second));
+    Ok((a?, b?))
+}
+
+/// Makes one thing of each item, likewise.
+///
+/// # Errors
+/// Those of the first that fails.
+pub fn each<T: Send, U: Send, const N: usize>(
+    items: [T; N],
+    make: impl Fn(T) -> Result<U> + Sync + Send,
+) -> Result<[U; N]> {
+    let made: Vec<_> = within(|| items.into_par_iter().map(make).collect());
+    let made = made.into_iter().collect::<Result<Vec<_>>>()?;
+    Ok(made.try_into().unwrap_or_else(|_| unreachable!("one thing of each item")))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Error;
+
+    #[test]
+    fn things_made_side_by_side_keep_their_order_and_the_first_error_is_told() {
+        let odd = |n: u32| if n % 2 == 1 { Ok(10 * n) } else { Err(Error::Usage(format!("{n} is even"))) };
+        assert_eq!(each([3, 5, 1], odd).unwrap(), [30, 50, 10]);
+        assert_eq!(each([3, 4, 6], odd).unwrap_err().to_string(), "4 is even");
+        assert_eq!(both(|| odd(3), || odd(7)).unwrap(), (30, 70));
+        assert_eq!(both(|| odd(4), || odd(6)).unwrap_err().to_string(), "4 is even");
+    }
 
     #[test]
     fn the_callers_pool_is_kept_and_a_caller_without_one_gets_one() {

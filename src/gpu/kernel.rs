@@ -208,8 +208,8 @@ fn pipeline(gpu: &Gpu, name: &str, recipe: &Recipe) -> Result<Arc<Pipeline>> {
         return Err(error);
     }
     device.name(pipeline.raw, name);
-    let pipeline = Arc::new(pipeline);
-    device.pipelines.keep(recipe, &pipeline).into_iter().for_each(|idle| {
+    let (pipeline, idle) = device.pipelines.keep(recipe, pipeline);
+    idle.into_iter().for_each(|idle| {
         // SAFETY: neither a kernel nor a frame has it.
         device.free(|device| unsafe { idle.destroy(device) });
     });
@@ -245,7 +245,6 @@ mod tests {
 
     #[test]
     fn code_runs_where_subgroups_cannot_shuffle_unless_triangles_are_dealt() {
-        use crate::gpu::Bindings;
         use crate::layout::Effects;
         use crate::shaders::{path, shared::deal};
         const GROUP_NON_UNIFORM: u32 = 61;

@@ -45,9 +45,14 @@ impl Pipelines {
         Some(pipeline)
     }
 
-    /// Adds a pipeline. Returns those beyond [`IDLE`] that nobody uses, for the caller to destroy.
-    pub fn keep(&self, recipe: &Recipe, pipeline: &Arc<Pipeline>) -> Vec<Pipeline> {
+    /// Adds a pipeline. Returns the one to use, which another thread may have made meanwhile, and those that nobody does, beyond
+    /// [`IDLE`], for the caller to destroy.
+    pub fn keep(&self, recipe: &Recipe, pipeline: Pipeline) -> (Arc<Pipeline>, Vec<Pipeline>) {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, first)) = all.iter().find(|(made, _)| made == recipe) {
+            return (first.clone(), vec![pipeline]);
+        }
+        let pipeline = Arc::new(pipeline);
         all.push((recipe.clone(), pipeline.clone()));
         // Nobody can take one meanwhile: it is found under this lock, and cloned only by those who have it.
         let mut excess = all.iter().filter(|(_, p)| Arc::strong_count(p) == 1).count().saturating_sub(IDLE);
@@ -56,7 +61,8 @@ impl Pipelines {
             excess -= usize::from(goes);
             goes
         });
-        idle.filter_map(|(_, pipeline)| Arc::into_inner(pipeline)).collect()
+        let idle = idle.filter_map(|(_, pipeline)| Arc::into_inner(pipeline)).collect();
+        (pipeline, idle)
     }
 
     /// # Safety
@@ -145,14 +151,19 @@ mod tests {
         Recipe { spirv: &[1, 2], bindings: Vec::new(), push_bytes: 4, constants: [(7, value)].into() }
     }
 
-    fn made(number: u64) -> Arc<Pipeline> {
-        Arc::new(Pipeline { raw: vk::Pipeline::from_raw(number), ..Pipeline::default() })
+    fn made(number: u64) -> Pipeline {
+        Pipeline { raw: vk::Pipeline::from_raw(number), ..Pipeline::default() }
+    }
+
+    /// Numbers of those that go when number `n` is kept as recipe `n`.
+    fn gone(all: &Pipelines, n: u32) -> Vec<u64> {
+        all.keep(&recipe(n), made(n.into())).1.iter().map(|pipeline| pipeline.raw.as_raw()).collect()
     }
 
     #[test]
     fn a_pipeline_is_found_by_all_that_it_depends_on() {
         let all = Pipelines::default();
-        assert!(all.keep(&recipe(5), &made(9)).is_empty());
+        assert!(all.keep(&recipe(5), made(9)).1.is_empty());
         assert_eq!(all.find(&recipe(5)).unwrap().raw.as_raw(), 9);
         let others = [
             recipe(6),
@@ -167,15 +178,21 @@ mod tests {
     #[test]
     fn those_that_idle_longest_go_and_used_ones_stay() {
         let all = Pipelines::default();
-        let used = made(0);
-        assert!(all.keep(&recipe(0), &used).is_empty());
-        assert!((1..=IDLE as u32).all(|n| all.keep(&recipe(n), &made(n.into())).is_empty()));
+        let _used = all.keep(&recipe(0), made(0));
+        assert!((1..=IDLE as u32).all(|n| gone(&all, n).is_empty()));
         // The one that is added has an owner, and the first has just been used: the second goes.
         all.find(&recipe(1)).unwrap();
-        let gone: Vec<_> = [IDLE as u32 + 1, IDLE as u32 + 2].map(|n| all.keep(&recipe(n), &made(n.into()))).into();
-        assert_eq!(gone.iter().map(Vec::len).collect::<Vec<_>>(), [0, 1]);
-        assert_eq!(gone[1][0].raw.as_raw(), 2);
+        assert_eq!([1, 2].map(|n| gone(&all, IDLE as u32 + n)), [vec![], vec![2]]);
         assert!([0, 1, 3].iter().all(|&n| all.find(&recipe(n)).is_some()));
         assert!(all.find(&recipe(2)).is_none());
+    }
+
+    #[test]
+    fn threads_that_make_the_same_use_one() {
+        let all = Pipelines::default();
+        let (first, none) = all.keep(&recipe(5), made(1));
+        let (second, gone) = all.keep(&recipe(5), made(2));
+        assert!(none.is_empty() && Arc::ptr_eq(&first, &second));
+        assert_eq!(gone[0].raw.as_raw(), 2);
     }
 }

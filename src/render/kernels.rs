@@ -9,6 +9,7 @@ use crate::render::pass::{accumulate, choose, path, primary_hit, sample_list};
 use crate::render::schedule;
 use crate::render::settings::Settings;
 use crate::shaders;
+use crate::threads::both;
 
 /// The kernels of every render.
 pub struct Kernels {
@@ -28,14 +29,12 @@ impl Kernels {
     /// [`crate::error::Error::Device`] when the driver refuses one, or the paths do not fit.
     pub fn new(gpu: &Gpu, effects: Effects, stack: u32, max_depth: u32, paths: u32) -> Result<Self> {
         let (thread, traverse) = (gpu.tuning().thread(), gpu.tuning().traverse(stack));
-        Ok(Self {
-            primary_hit: Kernel::new(
-                gpu,
-                &shaders::primary_hit::Constants { effects, thread, traverse, points: false },
-            )?,
-            path: path::Paths::new(gpu, effects, stack, max_depth, paths)?,
-            accumulate: Kernel::new(gpu, &shaders::accumulate::Constants { effects, thread })?,
-        })
+        let path = || path::Paths::new(gpu, effects, stack, max_depth, paths);
+        let points = false;
+        let primary_hit = || Kernel::new(gpu, &shaders::primary_hit::Constants { effects, thread, traverse, points });
+        let accumulate = || Kernel::new(gpu, &shaders::accumulate::Constants { effects, thread });
+        let (path, (primary_hit, accumulate)) = both(path, || both(primary_hit, accumulate))?;
+        Ok(Self { primary_hit, path, accumulate })
     }
 }
 

@@ -10,6 +10,7 @@ use crate::math::srgb::luminance;
 use crate::shaders::noise_estimate::{self, Bind, Constants, MANY, PRIOR};
 pub use crate::shaders::shared::luminance::ENOUGH;
 use crate::shaders::shared::luminance::STRONGEST;
+use crate::threads::each;
 use glam::Vec3;
 
 /// Pixels from the centre to the border of the window over which the others' variance is taken.
@@ -34,7 +35,7 @@ impl Estimate {
         let (edge, filter_thread) = (rates.constants(), gpu.tuning().filter_thread());
         let kernel = |measured| Kernel::new(gpu, &Constants { edge, filter_thread, measured, cautious });
         Ok(Self {
-            kernels: [kernel(false)?, kernel(true)?],
+            kernels: each([false, true], kernel)?,
             nothing: Buffer::from_slice(gpu, "no variance", &[])?,
             plane: Buffer::new(gpu, "estimate", width as usize * height as usize, Location::Device)?,
             rates,

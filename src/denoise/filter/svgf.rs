@@ -10,6 +10,7 @@ use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{SvgfPush, vec4};
 use crate::settings::{FROM_0, settings};
 use crate::shaders::svgf::{Bind, Constants};
+use crate::threads::each;
 use glam::Vec3;
 use std::f32::consts::LOG2_E;
 
@@ -81,7 +82,7 @@ impl Levels {
         let pixels = width as usize * height as usize;
         let scratch = |pixels| Buffer::new(gpu, "svgf", pixels, Location::Device);
         Ok(Self {
-            kernels: [kernel(false)?, kernel(true)?],
+            kernels: each([false, true], kernel)?,
             scratch: [scratch(pixels)?, scratch(if two { pixels } else { 1 })?],
             rates,
             rate_l: own.rate_l(),

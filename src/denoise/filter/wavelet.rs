@@ -12,6 +12,7 @@ use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{WaveletPush, vec4};
 use crate::settings::{choices, settings};
 use crate::shaders::wavelet::{Bind, Constants};
+use crate::threads::each;
 use glam::Vec3;
 
 /// See [`super::FILTERS`].
@@ -86,7 +87,7 @@ impl Wavelet {
         let kernel = |inverse| Kernel::new(gpu, &Constants { edge, filter_thread, inverse });
         let pack = Pack::new(gpu, size)?;
         let scratch = Buffer::new(gpu, "wavelet", pack.colour.len(), Location::Device)?;
-        Ok(Self { pack, kernels: [kernel(false)?, kernel(true)?], scratch, rates, steps })
+        Ok(Self { pack, kernels: each([false, true], kernel)?, scratch, rates, steps })
     }
 }
 

@@ -13,6 +13,7 @@ use crate::scene::animation::Animation;
 use crate::scene::{Change, Relit, Scene};
 use crate::settings::{FROM_0, choices, entry, settings};
 use crate::shaders;
+use crate::threads::both;
 use numbers::Numbers;
 pub use probes::Probes;
 use serde::Serialize;
@@ -143,16 +144,20 @@ impl History {
         Self::check_room(gpu, pixels)?;
         let (thread, traverse) = (gpu.tuning().thread(), gpu.tuning().traverse(stack));
         let room = |on: bool| if on { pixels as usize } else { 1 };
+        let remember = || Kernel::new(gpu, &shaders::remember::Constants { effects, thread, traverse });
+        let way = || Way::new(gpu, effects, traverse, settings.reproject);
+        let probes = || (moves == Moves::Scene).then(|| Probes::new(gpu, effects, stack, size)).transpose();
+        let (probes, (remember, way)) = both(probes, || both(remember, way))?;
         Ok(Self {
-            remember: Kernel::new(gpu, &shaders::remember::Constants { effects, thread, traverse })?,
-            way: Way::new(gpu, effects, traverse, settings.reproject)?,
+            remember,
+            way,
             records: Buffer::new(gpu, "history", room(true), Location::Device)?,
             light: Buffer::new(gpu, "history of light", room(effects.split_light), Location::Device)?,
             offered: Buffer::from_slice(gpu, "offered samples", &vec![0; pixels as usize])?,
             carried: Buffer::from_slice(gpu, "carried samples", &vec![0; pixels as usize])?,
             previous: Buffer::from_slice(gpu, "previous camera", &[Camera::default()])?,
             numbers: Numbers::new(gpu)?,
-            probes: (moves == Moves::Scene).then(|| Probes::new(gpu, effects, stack, size)).transpose()?,
+            probes,
             no_change: Buffer::from_slice(gpu, "no changes of light", &[])?,
             changed: AtomicBool::new(false),
             settings,

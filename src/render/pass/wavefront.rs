@@ -8,6 +8,7 @@ use crate::render::buffers::{DeviceScene, FilmBuffers};
 use crate::shaders::path_extend::PATHS_A_THREAD;
 use crate::shaders::shared::path_memory::KINDS;
 use crate::shaders::{path_extend, path_generate, path_shade, shared};
+use crate::threads::both;
 use std::time::Duration;
 
 /// Bytes that a path takes while it waits.
@@ -33,11 +34,15 @@ impl Wavefront {
     /// [`crate::error::Error::Device`] when the driver refuses a kernel, or the paths do not fit.
     pub fn new(gpu: &Gpu, effects: Effects, stack: u32, paths: u32) -> Result<Self> {
         let (thread, traverse) = (gpu.tuning().thread(), gpu.tuning().traverse(stack));
+        let generate = || Kernel::new(gpu, &path_generate::Constants { effects, thread });
+        let extend = || Kernel::new(gpu, &path_extend::Constants { effects, thread, traverse });
+        let shade = || Kernel::new(gpu, &path_shade::Constants { effects, thread });
+        let (shade, (extend, generate)) = both(shade, || both(extend, generate))?;
         let paths = paths as usize;
         Ok(Self {
-            generate: Kernel::new(gpu, &path_generate::Constants { effects, thread })?,
-            extend: Kernel::new(gpu, &path_extend::Constants { effects, thread, traverse })?,
-            shade: Kernel::new(gpu, &path_shade::Constants { effects, thread })?,
+            generate,
+            extend,
+            shade,
             memory: Buffer::new(gpu, "waiting paths", paths * KINDS as usize, Location::Device)?,
             queue: Buffer::new(gpu, "queue of paths", 2 + 2 * paths, Location::Device)?,
         })

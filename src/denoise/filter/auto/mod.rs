@@ -18,6 +18,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{AutoBlendPush, AutoErrorPush, AutoLeveragePush, AutoPush, AutoResidualPush, vec2, vec3, vec4};
 use crate::shaders::{auto, auto_error, auto_inputs, auto_leverage, auto_residual};
+use crate::threads::{both, each};
 
 /// See [`super::FILTERS`].
 pub const ROW: Row = Row {
@@ -124,23 +125,26 @@ impl Auto {
         let plane = |name| Buffer::new(gpu, name, pixels, Location::Device);
         let [wide, middle, narrow, of_svgf] = candidates(settings);
         let windows_pack = Packed::new(gpu, settings.guided.channels, settings.edge.extent, size)?;
-        let windows =
-            |s: &FilterSettings, leverages| Windows::new(gpu, s.footprint.radius, s.guided.eps, leverages, size);
         let surfaces = Rates::of_surfaces(&settings.edge).constants();
         let filter_thread = gpu.tuning().filter_thread();
+        let windows =
+            |(s, leverages): (&FilterSettings, _)| Windows::new(gpu, s.footprint.radius, s.guided.eps, leverages, size);
+        let windows = || each([(&wide, false), (&middle, false), (&narrow, true)], windows);
+        let smoothing = || Smoothing::new(gpu, &settings.edge, size);
+        let levels = || Levels::new(gpu, &of_svgf.edge, &of_svgf.svgf, of_svgf.footprint.levels, size, true);
+        let estimate = |(edge, cautious)| Estimate::new(gpu, edge, cautious, size);
+        let estimates = || each([(&settings.edge, true), (&of_svgf.edge, false)], estimate);
         let blend = |measured| Kernel::new(gpu, &auto::Constants { measured, ..Default::default() });
+        let residual = || Kernel::new(gpu, &auto_residual::Constants { edge: surfaces, filter_thread });
+        let ((windows, smoothing), ((svgf, [estimate, svgf_estimate]), (blend, residual))) = both(
+            || both(windows, smoothing),
+            || both(|| both(levels, estimates), || both(|| each([false, true], blend), residual)),
+        )?;
         Ok(Self {
-            estimate: Estimate::new(gpu, &settings.edge, true, size)?,
             inputs: Kernel::new(gpu, &Default::default())?,
             leverage: Kernel::new(gpu, &auto_leverage::Constants { edge: surfaces, ..Default::default() })?,
             error: Kernel::new(gpu, &Default::default())?,
-            smoothing: Smoothing::new(gpu, &settings.edge, size)?,
-            blend: [blend(false)?, blend(true)?],
             nothing: Buffer::from_slice(gpu, "no variance", &[])?,
-            residual: Kernel::new(gpu, &auto_residual::Constants { edge: surfaces, filter_thread })?,
-            windows: [windows(&wide, false)?, windows(&middle, false)?, windows(&narrow, true)?],
-            svgf: Levels::new(gpu, &of_svgf.edge, &of_svgf.svgf, of_svgf.footprint.levels, size, true)?,
-            svgf_estimate: Estimate::new(gpu, &of_svgf.edge, false, size)?,
             results: [plane("wide")?, plane("middle")?, plane("narrow")?, plane("svgf")?],
             dim: Buffer::new(gpu, "dim", windows_pack.colour.len(), Location::Device)?,
             wide_dim: plane("wide, dim")?,
@@ -153,6 +157,13 @@ impl Auto {
             expected: Buffer::new(gpu, "expected errors", pixels, Location::Device)?,
             settings: *settings,
             pack,
+            windows,
+            smoothing,
+            svgf,
+            estimate,
+            svgf_estimate,
+            blend,
+            residual,
         })
     }
 

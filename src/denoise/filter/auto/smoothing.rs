@@ -10,6 +10,7 @@ use crate::layout::{AutoCellsPush, AutoSmoothPush, AutoSpreadPush, uvec4, vec3, 
 use crate::shaders::auto_spread::{OTHER, UNKNOWN};
 use crate::shaders::shared::cells::CELL;
 use crate::shaders::{auto_cells, auto_smooth, auto_spread};
+use crate::threads::each;
 use glam::Vec4;
 
 /// Levels of smoothing, a footprint of 61 pixels. Even: see [`Smoothing::record`].
@@ -40,7 +41,7 @@ impl Kernels {
         let (edge, filter_thread) = (surfaces.constants(), gpu.tuning().filter_thread());
         let smooth = |of_pixels| Kernel::new(gpu, &auto_smooth::Constants { edge, filter_thread, three, of_pixels });
         Ok(Self {
-            smooth: [smooth(true)?, smooth(false)?],
+            smooth: each([true, false], smooth)?,
             spread: Kernel::new(gpu, &auto_spread::Constants { edge, three })?,
         })
     }
@@ -65,7 +66,7 @@ impl Smoothing {
         let (rates, [across, down]) = (Rates::of_surfaces(&alike(edge)), grid(size));
         Ok(Self {
             cells: Kernel::new(gpu, &Default::default())?,
-            kernels: [Kernels::new(gpu, &rates, false)?, Kernels::new(gpu, &rates, true)?],
+            kernels: each([false, true], |three| Kernels::new(gpu, &rates, three))?,
             surfaces: Buffer::new(gpu, "cells", across as usize * down as usize, Location::Device)?,
             rates: rates.as_array(),
         })

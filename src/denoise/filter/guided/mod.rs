@@ -10,6 +10,7 @@ use crate::gpu::{Buffer, Gpu, Kernel, Location, MAX_GROUPS, Recorder, Tuning};
 use crate::layout::{GuidedPush, float, vec4};
 use crate::settings::{Is, choices, settings};
 use crate::shaders::{guided_columns, guided_mean_columns, guided_mean_rows, guided_rows, shared};
+use crate::threads::both;
 pub use pack::{BESIDE, Packed};
 pub use reference::leverages;
 use table::GuidedTable;
@@ -185,11 +186,14 @@ impl Windows {
         let records = u64::from(strip_rows.next_multiple_of(BESIDE)) * u64::from(width) * RECORD;
         let window_blocks = shared::window_blocks::Constants { step: step as i32 };
         let (local_size_x, windows) = (down.lines, down.constants());
-        let columns = Kernel::new(gpu, &guided_columns::Constants { windows, window_blocks, local_size_x })?;
-        let mean_columns = Kernel::new(gpu, &guided_mean_columns::Constants { windows, window_blocks, local_size_x })?;
+        let columns = || Kernel::new(gpu, &guided_columns::Constants { windows, window_blocks, local_size_x });
+        let mean_columns =
+            || Kernel::new(gpu, &guided_mean_columns::Constants { windows, window_blocks, local_size_x });
         let (local_size_x, windows) = (along.lines, along.constants());
-        let rows = Kernel::new(gpu, &guided_rows::Constants { windows, window_blocks, leverages, local_size_x })?;
-        let mean_rows = Kernel::new(gpu, &guided_mean_rows::Constants { windows, window_blocks, local_size_x })?;
+        let rows = || Kernel::new(gpu, &guided_rows::Constants { windows, window_blocks, leverages, local_size_x });
+        let mean_rows = || Kernel::new(gpu, &guided_mean_rows::Constants { windows, window_blocks, local_size_x });
+        let ((columns, rows), (mean_columns, mean_rows)) =
+            both(|| both(columns, rows), || both(mean_columns, mean_rows))?;
         Ok(Self {
             columns,
             rows,
