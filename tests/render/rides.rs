@@ -139,6 +139,31 @@ fn moving_scenes_show_what_is_there() {
     assert_silent(&gpu);
 }
 
+/// The tables that say so are of one change: a frame without another has numbers that stay.
+#[test]
+fn surfaces_are_numbered_anew_once() {
+    let gpu = gpu();
+    for way in WAYS {
+        let mut scene = at(&Moment::default()).with(|s| s.spp = 4);
+        let mut film = Film::moving(&gpu, &scene, by(way));
+        let camera = film.camera;
+        film.frame(camera);
+        let waved = pose(&scene, &Moment { wave: 0.12, ..Moment::default() }, 0.0);
+        let change = scene.apply(&waved).unwrap();
+        assert!(!change.triangle_now.is_empty(), "control");
+        film.record(|renderer, rec| renderer.update(rec, &scene, &change));
+        film.frame(camera);
+        let surfaces = |film: &Film| film.points().iter().map(|p| (p.triangle, p.instance)).collect::<Vec<_>>();
+        let after = surfaces(&film);
+        for frame in 0..2 {
+            film.frame(camera);
+            let others = surfaces(&film).iter().zip(&after).filter(|(now, then)| now != then).count();
+            assert_eq!(others, 0, "{way:?}: pixels that show another surface in frame {frame}");
+        }
+    }
+    assert_silent(&gpu);
+}
+
 #[test]
 fn what_appears_vanishes_and_flips_is_seen_as_it_is() {
     let gpu = gpu();

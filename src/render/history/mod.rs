@@ -199,7 +199,8 @@ impl History {
 
     /// What its kernels are told of pixels from `first_pixel` on.
     pub(super) fn push(&self, constants: &PathConstants, first_pixel: u32, pixels: u32) -> ReprojectPush {
-        let [instances, triangles] = self.numbers.anew();
+        // Those of an earlier change have been renumbered by then.
+        let [instances, triangles] = if self.has_changed() { self.numbers.anew() } else { [0; 2] };
         let s = &self.settings;
         ReprojectPush {
             size: constants.size,
