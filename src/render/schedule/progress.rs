@@ -52,6 +52,20 @@ mod tests {
         assert_eq!(rest[3..], rounds(&s, &CUT, 1).collect::<Vec<_>>());
     }
 
+    /// Also with more rounds than there are samples to place, most of which place none.
+    #[test]
+    fn a_render_that_goes_on_makes_the_allocations_that_are_left() {
+        for count in [1, 4, 300] {
+            let s = settings("variance", 2, 1, 0, count);
+            let all: Vec<_> = rounds(&s, &CUT, 0).collect();
+            let made: Vec<_> = (0..all.len()).filter(|&i| matches!(all[i], Step::Allocate(_))).collect();
+            for (done, &first) in made.iter().enumerate() {
+                let left: Vec<_> = rounds(&s, &CUT, done as u32).collect();
+                assert_eq!(left, all[first..], "{done} of {count} rounds are done");
+            }
+        }
+    }
+
     #[test]
     fn pending_is_what_was_not_dealt_yet() {
         // Paths 0 1 2 | 3 | 4 5 6 of pixels 0, 1, 2 and 3 (which has none), dealt to two rounds: 0 2 4 6, then 1 3 5.

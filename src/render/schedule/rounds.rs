@@ -119,8 +119,9 @@ fn allocated(
     let limit = limit(settings);
     let room = u64::from(limit) * u64::from(pixels);
     let upto = move |round: u32| ((rest as u128 * u128::from(round) / u128::from(all)) as u64 + first).min(room);
-    let budgets = (done..all).map(move |round| (upto(round + 1) - upto(round), upto(round + 1)));
-    budgets.filter(|&(budget, _)| budget > 0).flat_map(move |(budget, total)| {
+    let budgets = (0..all).map(move |round| (upto(round + 1) - upto(round), upto(round + 1)));
+    // Rounds that place nothing are not made, nor counted among those that are done.
+    budgets.filter(|&(budget, _)| budget > 0).skip(done as usize).flat_map(move |(budget, total)| {
         let fills = u64::from(limit) < total; // one pixel might take them all
         let plan = Plan {
             pixels,
