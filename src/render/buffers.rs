@@ -130,6 +130,9 @@ fn shading<'a>(scene: &'a Scene, effects: &Effects) -> Cow<'a, [Shading]> {
 /// Bytes of the largest record of a pixel.
 const WIDEST: u64 = size_of::<Guide>() as u64;
 const _: () = assert!(size_of::<PixelStats>() as u64 <= WIDEST && size_of::<PixelLight>() as u64 <= WIDEST);
+// A history is of a film of one tile, whose views of 16-byte texels have room for it too.
+const _: () = assert!(size_of::<History>() as u64 <= WIDEST && size_of::<HistoryLight>() as u64 <= WIDEST);
+const _: () = assert!(size_of::<History>().is_multiple_of(16) && size_of::<HistoryLight>().is_multiple_of(16));
 
 /// Pixels of the largest tile, whose records fit one buffer and one view of texels, and of a window.
 fn extents(info: &DeviceInfo) -> [u32; 2] {
@@ -167,6 +170,16 @@ pub struct FilmTile {
     pub seen: Buffer<Guide>,
     /// Per pixel, where a history is kept: the points that its samples are of.
     pub points: Buffer<SurfacePoint>,
+    kept: Kept,
+}
+
+/// Which buffers of a tile have a record for each pixel. Of one pixel their lengths would not tell.
+#[derive(Clone, Copy)]
+struct Kept {
+    light: bool,
+    guide: bool,
+    seen: bool,
+    points: bool,
 }
 
 impl FilmTile {
@@ -176,33 +189,46 @@ impl FilmTile {
         (0..pixels).step_by(window as usize).map(move |first| first..pixels.min(first + window))
     }
 
+    /// Whether it holds direct and indirect light apart.
+    pub fn has_light(&self) -> bool {
+        self.kept.light
+    }
+
     /// Whether it holds primary hits.
     pub fn has_guide(&self) -> bool {
-        self.guide.len() == self.pixels as usize
+        self.kept.guide
     }
 
     /// Whether it holds what is seen in smooth surfaces.
     pub fn has_seen(&self) -> bool {
-        self.seen.len() == self.pixels as usize
+        self.kept.seen
     }
 
     /// Whether it holds the points of primary hits.
     pub fn has_points(&self) -> bool {
-        self.points.len() == self.pixels as usize
+        self.kept.points
+    }
+
+    /// Holds `points`, one for each pixel, from now on.
+    pub(super) fn keep_points(&mut self, points: Buffer<SurfacePoint>) {
+        self.points = points;
+        self.kept.points = true;
     }
 
     fn new(gpu: &Gpu, range: Range<u32>, window: u32, effects: &Effects, guides: bool) -> Result<Self> {
         let pixels = range.end - range.start;
         let room = |on: bool| if on { pixels as usize } else { 1 };
+        let (light, seen) = (effects.split_light, guides && effects.smooth_interface);
         Ok(Self {
             first_pixel: range.start,
             pixels,
             window,
             stats: Buffer::new(gpu, "stats", pixels as usize, Location::Device)?,
-            light: Buffer::new(gpu, "light", room(effects.split_light), Location::Device)?,
+            light: Buffer::new(gpu, "light", room(light), Location::Device)?,
             guide: Buffer::new(gpu, "guide", room(guides), Location::Device)?,
-            seen: Buffer::new(gpu, "seen", room(guides && effects.smooth_interface), Location::Device)?,
+            seen: Buffer::new(gpu, "seen", room(seen), Location::Device)?,
             points: Buffer::new(gpu, "points", 1, Location::Device)?, // Renderer::keep_history makes room
+            kept: Kept { light, guide: guides, seen, points: false },
         })
     }
 }

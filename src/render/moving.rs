@@ -32,7 +32,7 @@ impl Renderer {
         let history = History::new(&self.gpu, self.effects, self.stack, size, self.settings.spp, (settings, moves))?;
         let tile = &mut self.frame.film.tiles[0];
         let none = SurfacePoint { triangle: NONE, instance: NONE, ..SurfacePoint::default() };
-        tile.points = Buffer::from_slice(&self.gpu, "points", &vec![none; pixels])?;
+        tile.keep_points(Buffer::from_slice(&self.gpu, "points", &vec![none; pixels])?);
         tile.stats.write(0, &vec![PixelStats::default(); pixels])?;
         self.frame.kernels.primary_hit = kernels::primary_points(&self.gpu, self.effects, self.stack)?;
         self.frame.history = Some(history);

@@ -68,13 +68,12 @@ impl Renderer {
 fn view(tile: &FilmTile, layer: Layer) -> OutputView {
     use PixelFormat::{R32G32B32Sfloat, R32Sfloat, R32Uint};
     let (stats, light, guide) = (&tile.stats, &tile.light, &tile.guide);
-    let apart = light.len() == stats.len();
     match layer {
         Layer::Radiance => within(tile, stats, offset_of!(PixelStats, mean), R32G32B32Sfloat),
         Layer::M2 => within(tile, stats, offset_of!(PixelStats, m2), R32G32B32Sfloat),
         Layer::Samples => within(tile, stats, offset_of!(PixelStats, count), R32Uint),
         Layer::Direct => within(tile, light, offset_of!(PixelLight, direct), R32G32B32Sfloat),
-        Layer::Albedo if apart => within(tile, light, offset_of!(PixelLight, albedo), R32G32B32Sfloat),
+        Layer::Albedo if tile.has_light() => within(tile, light, offset_of!(PixelLight, albedo), R32G32B32Sfloat),
         Layer::Albedo => within(tile, guide, offset_of!(Guide, albedo), R32G32B32Sfloat),
         Layer::Normal => within(tile, guide, offset_of!(Guide, normal), R32G32B32Sfloat),
         Layer::Position => within(tile, guide, offset_of!(Guide, position), R32G32B32Sfloat),

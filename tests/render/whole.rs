@@ -41,6 +41,25 @@ fn scenes() -> Vec<String> {
     all
 }
 
+/// Its buffers are as long as those of layers that nobody asked for.
+#[test]
+fn a_film_of_one_pixel_has_the_layers_of_any_other() {
+    let gpu = support::gpu();
+    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    for file in ["cornell-box/scene.toml", "cornell-box/glass.toml"] {
+        let layers = [1, 2].map(|width| {
+            let scene = scene(file, |s| (s.width, s.height, s.spp) = (width, 1, 1));
+            let renderer = Renderer::new(&gpu, &scene, &scene.settings, outputs).unwrap();
+            let job = Job::new(&renderer);
+            let status = job.run_to_end(&mut FrameResources::new(&gpu).unwrap()).unwrap();
+            let film = job.film(&status).unwrap();
+            film.channels.into_iter().map(|channel| channel.name).collect::<Vec<_>>()
+        });
+        assert_eq!(layers[0], layers[1], "{file}");
+    }
+    support::assert_silent(&gpu);
+}
+
 /// The samples' rays against the counters, which atomics make.
 #[test]
 fn samples_know_their_rays() {

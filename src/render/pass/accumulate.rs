@@ -46,7 +46,7 @@ fn fold(k: &Fold, rec: &mut Recorder, f: &FilmBuffers, tile: &FilmTile, push: &F
     let end = tile.pixels.min(push.window + tile.window);
     let bound = push.window as usize..end as usize;
     let folded_stats = &tile.stats.part(bound.clone())?;
-    let apart = tile.light.len() == tile.pixels as usize; // else one unused element
+    let apart = tile.has_light();
     let folded_light = &if apart { tile.light.part(bound)? } else { tile.light.clone() };
     let (samples, offset) = (&f.samples, &f.counts.offset);
     let (stats, light, broken) = (&tile.stats, &tile.light, &f.broken);

@@ -11,7 +11,7 @@ use crate::shaders::{carry, edges, gather, project, remember};
 pub fn remember(rec: &mut Recorder, h: &History, s: &DeviceScene, t: &FilmTile, c: &PathConstants) -> Result<()> {
     t.windows().try_for_each(|w| {
         let part = w.start as usize..w.end as usize;
-        let apart = h.light.len() == t.pixels as usize; // else one unused element
+        let apart = t.has_light();
         let bind = remember::Bind {
             scene: s.bind(),
             frame: s.bind_frame(),
@@ -63,7 +63,7 @@ fn forward(
     rec.dispatch_threads(&way.project, bind, &h.push(c, 0, t.pixels), t.pixels)?;
     t.windows().try_for_each(|w| {
         let part = w.start as usize..w.end as usize;
-        let apart = h.light.len() == t.pixels as usize;
+        let apart = t.has_light();
         let bind = carry::Bind {
             frame: s.bind_frame(),
             history: &h.records,
@@ -87,7 +87,7 @@ fn backward(
 ) -> Result<()> {
     t.windows().try_for_each(|w| {
         let part = w.start as usize..w.end as usize;
-        let apart = h.light.len() == t.pixels as usize;
+        let apart = t.has_light();
         let bind = gather::Bind {
             scene: s.bind(),
             frame: s.bind_frame(),
