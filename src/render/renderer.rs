@@ -2,9 +2,9 @@
 //! it, and frames recorded batch by batch into command buffers.
 use crate::allocate::HostInputs;
 use crate::error::{Error, Result};
-use crate::gpu::{FrameResources, Gpu, PassTime, Recorder};
+use crate::gpu::{DeviceInfo, FrameResources, Gpu, PassTime, Recorder};
 use crate::image::Picture;
-use crate::layout::{Apportionment, Camera, Effects, PixelStats, PriorityPush};
+use crate::layout::{Apportionment, Camera, Effects, PixelStats, PriorityPush, vec4};
 use crate::render::buffers::{DeviceScene, FilmBuffers};
 use crate::render::frame::{self, Frame};
 use crate::render::kernels::{Allocation, Kernels};
@@ -322,17 +322,20 @@ pub fn all_effects(scene: &Scene, settings: &Settings) -> Effects {
 /// Paths per dispatch, whose samples, or what a wavefront keeps of them, have room.
 fn paths_in_flight(gpu: &Gpu, scene: &Scene, settings: &Settings, effects: &Effects) -> u32 {
     let wavefront = gpu.tuning().has_wavefront(scene.stack, settings.max_depth);
-    let samples = if effects.split_light { 48 } else { 16 };
-    let bytes = if wavefront { wavefront::BYTES_PER_PATH } else { samples };
-    let room = room_for_a_batch(gpu.info().max_storage_range, gpu.info().memory_heap) / bytes;
+    let records = if effects.split_light { 3 } else { 1 };
+    let waiting = if wavefront { wavefront::BYTES_PER_PATH } else { 0 };
+    let DeviceInfo { max_storage_range, max_texel_elements, memory_heap, .. } = *gpu.info();
+    let room = room_for_paths(records, waiting, [max_storage_range, max_texel_elements, memory_heap]);
     let all = settings.pixels() as u64 * u64::from(settings.spp);
     gpu.tuning().paths_in_flight.min(room).min(all).max(1) as u32
 }
 
-/// Bytes that the largest buffer for a batch of paths may have: those of a storage binding, in a small part of the device's memory.
-fn room_for_a_batch(max_storage_range: u64, memory_heap: u64) -> u64 {
+/// Paths of a batch, whose samples have `records` of a texel each, and that take so many bytes while they wait: the largest buffer of
+/// theirs is one storage binding, in a small part of the device's memory, and samples are read as texels.
+fn room_for_paths(records: u64, waiting: u64, [binding, texels, heap]: [u64; 3]) -> u64 {
     const PART: u64 = 8;
-    max_storage_range.min(memory_heap / PART)
+    const TEXEL: u64 = size_of::<vec4>() as u64;
+    (binding.min(heap / PART) / waiting.max(records * TEXEL)).min(texels / records)
 }
 
 fn milliseconds(time: Duration) -> f64 {
@@ -341,12 +344,14 @@ fn milliseconds(time: Duration) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::room_for_a_batch;
+    use super::room_for_paths;
 
     #[test]
-    fn batches_leave_most_of_a_small_devices_memory() {
+    fn batches_fit_the_limits_of_a_device_and_leave_most_of_its_memory() {
         const GIB: u64 = 1 << 30;
-        assert_eq!(room_for_a_batch(4 * GIB, 4 * GIB), GIB / 2);
-        assert_eq!(room_for_a_batch(GIB / 8, 80 * GIB), GIB / 8);
+        assert_eq!(room_for_paths(1, 0, [4 * GIB, 1 << 27, 4 * GIB]), GIB / 2 / 16);
+        assert_eq!(room_for_paths(3, 0, [GIB / 8, 1 << 27, 80 * GIB]), GIB / 8 / 48);
+        assert_eq!(room_for_paths(3, 176, [GIB / 8, 1 << 27, 80 * GIB]), GIB / 8 / 176);
+        assert_eq!(room_for_paths(3, 176, [GIB / 8, 65_536, 80 * GIB]), 65_536 / 3, "the least that Vulkan asks for");
     }
 }
