@@ -15,7 +15,7 @@ layout(binding = 14) uniform usamplerBuffer points; // of SurfacePoint
 layout(scalar, binding = 16) uniform Previous { Camera previous; };
 layout(scalar, binding = 17) readonly buffer CarriedWords { uint carried[]; };
 layout(scalar, binding = 18) writeonly buffer Histories { HistoryWords history[]; }; // of History
-layout(scalar, binding = 19) writeonly buffer HistoryLights { HistoryLight history_light[]; };
+layout(scalar, binding = 19) writeonly buffer HistoryLights { HistoryLightWords history_light[]; }; // of HistoryLight
 layout(scalar, binding = 20) writeonly buffer Offers { uint offered[]; };
 // By its number in the last frame, that in the new one, of instances and of triangles.
 layout(scalar, binding = 21) readonly buffer InstanceNow { uint instance_now[]; };
@@ -115,10 +115,11 @@ void main() {
     uint reason = still || s.count == 0u ? 0u : c.count == 0u ? DROPPED_OLD : reason_to_keep(pixel, at, c);
     offered[i] = reason == 0u ? word_of(c) : dropped(reason);
     at = numbered_anew(at);
-    history[i] = History_words(History(at.triangle, at.instance, at.weights, s.mean, still ? s.m2 : s.m2 / freedom(s.count)));
+    // Where nothing moves sums are handed on as they are, but for samples that MOST_CARRIED leaves out.
+    float share = still ? freedom(c.count) / freedom(s.count) : 1.0, divisor = still ? 1.0 : freedom(s.count);
+    history[i] = History_words(History(at.triangle, at.instance, at.weights, s.mean, s.m2 * share / divisor, uvec2(0u)));
     if (FX_SPLIT) {
         PixelLight l = PixelLight_load(light, pixel);
-        // Not as 64-bit words: seven words are no multiple of those.
-        history_light[i] = HistoryLight(l.direct, l.albedo, still ? l.indirect_m2 : l.indirect_m2 / freedom(s.count));
+        history_light[i] = HistoryLight_words(HistoryLight(l.direct, l.albedo, l.indirect_m2 * share / divisor, 0u));
     }
 }

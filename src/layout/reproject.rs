@@ -15,7 +15,7 @@ gpu_structs! {
         weights: vec2,
     }
 
-    /// What a pixel of the last frame hands on. Their number is in a word of its own (`glsl/shared/history.glsl`).
+    /// What a pixel of the last frame hands on. Their number is in a word of its own (`glsl/shared/history.glsl`). 3 texels.
     struct History {
         /// The point that the samples are of, as [`SurfacePoint::triangle`], numbered as in the new frame.
         triangle: uint,
@@ -27,9 +27,11 @@ gpu_structs! {
         mean: vec3,
         /// Variance of one sample; where nothing has moved, as [`PixelStats::m2`].
         variance: vec3,
+        /// Unused.
+        pad: uvec2,
     }
 
-    /// The light of a [`History`], where direct and indirect light are kept apart.
+    /// The light of a [`History`], where direct and indirect light are kept apart. 2 texels.
     struct HistoryLight {
         /// As [`PixelLight::direct`].
         direct: vec3,
@@ -37,6 +39,8 @@ gpu_structs! {
         albedo: vec3,
         /// Variance of one sample; where nothing has moved, as [`PixelLight::indirect_m2`].
         indirect_variance: float,
+        /// Unused.
+        pad: uint,
     }
 
     /// Push constants of `glsl/reproject`.

@@ -189,7 +189,8 @@ impl Reprojection<'_> {
                 (false, _) => self.reason_to_keep(left, pixel, &mut now),
             };
             handed.offered.push(if reason == 0 { now.word() } else { dropped(reason) });
-            let of_one = |m2: f32| if still { m2 } else { m2 / freedom(s.count) };
+            let share = if still { freedom(now.count) / freedom(s.count) } else { 1.0 };
+            let of_one = |m2: f32| m2 * share / if still { 1.0 } else { freedom(s.count) };
             let variance = s.m2.map(of_one);
             let SurfacePoint { triangle, instance, weights, .. } = self.numbered_anew(at);
             handed.records.push(History { triangle, instance, weights, mean: s.mean, variance, ..Default::default() });

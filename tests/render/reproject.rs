@@ -6,7 +6,7 @@ use crate::support::{self, assert_silent, gpu};
 use crate::twin::Workplace;
 use std::path::Path;
 use tallow::gpu::Gpu;
-use tallow::layout::{Camera, PixelStats};
+use tallow::layout::{Camera, PixelLight, PixelStats};
 use tallow::render::settings::Settings;
 use tallow::render::{Carriage, Carried, Moves, Outputs, Renderer, Reproject, Reprojection, Step, carried_samples};
 use tallow::scene::{Loaded, Scene};
@@ -60,6 +60,33 @@ fn a_camera_at_rest_accumulates_to_the_bit() {
             repeats.frame(repeats.camera);
         });
         assert!(bits(&repeats.stats()) != bits(&expected), "control: the same samples three times");
+    }
+    assert_silent(&gpu);
+}
+
+/// The word of a pixel has room for so many samples; the others leave with their share of the sums.
+#[test]
+fn a_view_at_rest_has_the_variance_of_the_samples_that_count() {
+    let gpu = gpu();
+    for way in WAYS {
+        let mut film = Film::new(&gpu, &scene("cornell-box/scene.toml", small), by(way));
+        let camera = film.camera;
+        film.frame(camera);
+        let many = |s: PixelStats| PixelStats { count: 100_001, m2: [5e4; 3], ..s };
+        let stats: Vec<_> = film.stats().into_iter().map(many).collect();
+        let light: Vec<_> = film.light().into_iter().map(|l| PixelLight { indirect_m2: 1e4, ..l }).collect();
+        let tile = &film.renderer.film().tiles[0];
+        tile.stats.write(0, &stats).unwrap();
+        tile.light.write(0, &light).unwrap();
+        film.begin(camera);
+        for (s, l) in film.stats().iter().zip(&film.light()) {
+            assert_eq!(s.count, 65_535);
+            let [of_all, of_indirect] = [s.m2[1], l.indirect_m2].map(|m2| m2 / 65_534.0);
+            assert!(
+                (of_all - 0.5).abs() < 1e-6 && (of_indirect - 0.1).abs() < 1e-6,
+                "{way:?}: {of_all}, {of_indirect}"
+            );
+        }
     }
     assert_silent(&gpu);
 }

@@ -79,7 +79,7 @@ impl Moves {
     }
 }
 
-/// The kernels and buffers of reprojection. `P` pixels; 64 bytes each, with [`crate::render::FilmTile::points`], and 28 more where
+/// The kernels and buffers of reprojection. `P` pixels; 72 bytes each, with [`crate::render::FilmTile::points`], and 32 more where
 /// direct and indirect light are kept apart. Where more moves than the camera, 5 more for probes.
 pub struct History {
     /// Writes what pixels hand on.
