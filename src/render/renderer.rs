@@ -4,7 +4,7 @@ use crate::allocate::HostInputs;
 use crate::error::{Error, Result};
 use crate::gpu::{DeviceInfo, FrameResources, Gpu, PassTime, Recorder};
 use crate::image::Picture;
-use crate::layout::{Apportionment, Camera, Effects, PixelStats, PriorityPush, vec4};
+use crate::layout::{Apportionment, Camera, Effects, PixelStats, PriorityPush, uvec2, vec4};
 use crate::render::buffers::{DeviceScene, FilmBuffers};
 use crate::render::frame::{self, Frame};
 use crate::render::kernels::{Allocation, Kernels};
@@ -72,10 +72,34 @@ impl Renderer {
     /// by itself; one that spreads them evenly gets the kernels and the buffers that give each pixel what it lacks.
     ///
     /// # Errors
-    /// As [`Renderer::new`].
+    /// As [`Renderer::new`], and [`crate::error::Error::Usage`] for a film of more pixels than the device can bind offsets of: see
+    /// [`Renderer::can_resume`].
     pub fn resumable(gpu: &Gpu, scene: &Scene, settings: &Settings, outputs: Outputs) -> Result<Self> {
         let effects = Effects { adaptive: true, ..called_for(scene, settings, outputs) };
-        Self::specialised(gpu, scene, settings, outputs, effects)
+        let renderer = Self::specialised(gpu, scene, settings, outputs, effects)?;
+        renderer.check_offsets("go on with", "")?;
+        Ok(renderer)
+    }
+
+    /// Whether a render like this one can go on from a checkpoint on this device: most devices have room for that of films of some
+    /// 44 million pixels, software ones for 16 million.
+    pub fn can_resume(&self) -> bool {
+        self.settings.pixels() as u64 <= self.most_offsets()
+    }
+
+    /// Pixels whose offsets in a list of paths one storage binding holds, the widest records that are bound whole, in a film of one tile.
+    fn most_offsets(&self) -> u64 {
+        (self.gpu.info().max_storage_range / size_of::<uvec2>() as u64 - 1).min(self.frame.film.tiles[0].pixels.into())
+    }
+
+    fn check_offsets(&self, to: &str, or: &str) -> Result<()> {
+        let (pixels, most) = (self.settings.pixels(), self.most_offsets());
+        match self.can_resume() {
+            true => Ok(()),
+            false => Err(Error::Usage(format!(
+                "a film of {pixels} pixels is too large to {to} on this device: choose at most {most} pixels{or}"
+            ))),
+        }
     }
 
     /// [`Renderer::new`] with other effects compiled in: more of them change nothing but the speed, fewer leave things
@@ -100,14 +124,6 @@ impl Renderer {
         let paths = paths_in_flight(gpu, scene, settings, &effects);
         let kernels = Kernels::new(gpu, effects, scene.stack, settings.max_depth, paths)?;
         let film = FilmBuffers::new(gpu, pixels, paths, &effects, outputs.guides || policy.guides)?;
-        // Offsets are the widest records that are bound whole.
-        let most = (gpu.info().max_storage_range / 8 - 1).min(film.tiles[0].pixels.into());
-        if !settings.allocate.is_even() && u64::from(pixels) > most {
-            return Err(Error::Usage(format!(
-                "a film of {pixels} pixels is too large to place samples on this device: choose at most {most} pixels, \
-                 or --allocate uniform"
-            )));
-        }
         let (constants, priority_push) = (frame_constants(scene, settings)?, priority_push(scene, settings));
         let (soft_lights, stack) = (scene.has_soft_lights(), scene.stack);
         let fingerprint = Some(scene.fingerprint([settings.width, settings.height])?);
@@ -115,7 +131,12 @@ impl Renderer {
         let (settings, first_sample) = (settings.clone(), settings.first_sample);
         let history = None;
         let frame = Frame { scene, film, kernels, allocation, history, constants, first_sample, priority_push };
-        Ok(Self { gpu: gpu.clone(), frame, effects, outputs, settings, paths, stack, soft_lights, fingerprint })
+        let renderer =
+            Self { gpu: gpu.clone(), frame, effects, outputs, settings, paths, stack, soft_lights, fingerprint };
+        if !renderer.settings.allocate.is_even() {
+            renderer.check_offsets("place samples of", ", or --allocate uniform")?;
+        }
+        Ok(renderer)
     }
 
     /// Whether direct light, where it is kept apart, holds none of lamps and sky: their shadows are soft and noisy.

@@ -67,10 +67,10 @@ pub fn items<'a>(args: &'a Args, film: &'a Film) -> Vec<Item<'a>> {
     images.chain(args.heatmap.iter().map(heatmap)).collect()
 }
 
-/// Says where what there is was written.
-pub fn interruption(written: &[PathBuf]) -> String {
+/// Says where what there is was written, and how to go on where a device can.
+pub fn interruption(written: &[PathBuf], can_resume: bool) -> String {
     let names = written.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
-    let resumable = written.iter().find(|path| image::has_layers(path));
+    let resumable = written.iter().find(|path| can_resume && image::has_layers(path));
     let how = resumable.map(|path| format!("; --resume {} continues it", path.display())).unwrap_or_default();
     format!("interrupted: what there is was written to {names}{how}")
 }
