@@ -4,14 +4,21 @@ use crate::error::{Error, Result};
 use std::fmt::Display;
 use sysinfo::{MemoryRefreshKind, System};
 
+/// Less than this is there, or nothing is: asking the system takes a hundred microseconds.
+const SMALL: u64 = 1 << 20;
+
 /// Checks that `needed` bytes are free on the machine, in the process's control group and in its address space.
 ///
 /// # Errors
 /// A message with the needed and the free amount.
 pub fn check(needed: u64) -> std::result::Result<(), String> {
+    if needed < SMALL {
+        return Ok(());
+    }
     let mut system = System::new();
     system.refresh_memory_specifics(MemoryRefreshKind::nothing().with_ram());
-    let group = system.cgroup_limits().map_or(u64::MAX, |limits| limits.free_memory);
+    // What is free of a group's memory leaves out files that the system keeps there, and gives up for processes.
+    let group = system.cgroup_limits().map_or(u64::MAX, |limits| limits.total_memory.saturating_sub(limits.rss));
     // 0 means that the system does not tell.
     let machine = Some(system.available_memory()).filter(|&bytes| bytes > 0).unwrap_or(u64::MAX);
     let free = machine.min(group).min(free_addresses().unwrap_or(u64::MAX));

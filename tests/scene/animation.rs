@@ -83,6 +83,23 @@ keys = [{ time = 0, radiance = 1 }, { time = 1, radiance = [3, 2, 1] }]
     assert_eq!(at.environment.unwrap().radiance, Some([2.0, 1.5, 1.0]));
 }
 
+/// A table of rows that no scale and rotation make.
+#[test]
+fn a_place_with_shear_keeps_it_where_keys_move_it() {
+    let tables = |keys: &str| {
+        format!(
+            "[[instance]]\nname = \"bent\"\nmesh = \"cube\"\ntransform = [2,1,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]\n\
+             [[animation]]\ninstance = \"bent\"\nkeys = [{keys}]"
+        )
+    };
+    let at = pose(&tables("{ time = 0, translate = [0, 0, 4] }"), 0.0).instances[0].1.0;
+    assert_eq!((at.translation.z, at.matrix3.y_axis), (4.0, glam::dvec3(1.0, 1.0, 0.0)));
+    let line = error(&tables("{ time = 0, rotate = [0, 0, 90] }"));
+    assert!(line.contains("shear") && line.contains("give both"), "{line}");
+    let whole = pose(&tables("{ time = 0, rotate = [0, 0, 90], scale = 1 }"), 0.0).instances[0].1.0;
+    assert!(whole.matrix3.x_axis.abs_diff_eq(glam::DVec3::Y, 1e-12), "{whole:?}");
+}
+
 /// A frame alone cannot know how large a lamp is in the others.
 #[test]
 fn lamps_that_may_grow_are_sampled_as_large_ones() {

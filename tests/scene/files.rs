@@ -97,6 +97,16 @@ fn what_is_no_obj_is_an_error() {
     assert!(load(&folder, "m.obj").unwrap_err().to_string().ends_with("m.mtl: is UTF-16 text: save it as UTF-8"));
 }
 
+/// It is let go of after its last use, by whatever name.
+#[test]
+fn a_file_may_be_spelled_in_two_ways() {
+    let mesh = |file: &str| format!("[[mesh]]\nfile = '{file}'\n");
+    let folder = folder(&[("s.toml", &(mesh("sub\\a.obj") + &mesh("sub/a.obj") + &mesh("sub\\a.obj")))]);
+    std::fs::create_dir(folder.path().join("sub")).unwrap();
+    std::fs::write(folder.path().join("sub/a.obj"), format!("{TRIANGLE}f 1//1 2//1 3//1")).unwrap();
+    assert_eq!(load(&folder, "s.toml").unwrap().triangles.len(), 3);
+}
+
 #[test]
 fn lines_end_in_any_way() {
     let text = format!("# one\n\n{TRIANGLE}f 1//1 \\\n2//1 3//1\n");

@@ -30,6 +30,14 @@ fn refused_with(pointer: &str, value: Value, word: &str) {
     refused(with(pointer, value).to_string().as_bytes(), "a.gltf", word);
 }
 
+/// Its buffer without content says less than its name.
+#[test]
+fn an_extension_that_is_needed_is_named_before_the_buffers_that_it_leaves_out() {
+    let mut json = with("/extensionsRequired", json!(["EXT_meshopt_compression"]));
+    json["buffers"].as_array_mut().unwrap().push(json!({ "byteLength": 4 }));
+    refused(json.to_string().as_bytes(), "a.gltf", "needs EXT_meshopt_compression, which cannot be read");
+}
+
 #[test]
 fn counts_and_offsets_that_leave_their_buffer() {
     let huge = json!(1u64 << 62);

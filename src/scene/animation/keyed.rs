@@ -123,10 +123,14 @@ impl Keyed {
         if let Some(rows) = self.find("transform", at).and_then(|rows| <[f64; 16]>::try_from(rows).ok()) {
             return Transform::from(rows).0;
         }
-        let (scale, rotation, translation) = parts(rest).unwrap_or((DVec3::ONE, DQuat::IDENTITY, rest.translation));
-        let scale = self.three("scale", at).map_or(scale, DVec3::from);
-        let rotation = self.find("rotate", at).map_or(rotation, |q| DQuat::from_slice(&q));
-        let translation = self.three("translate", at).map_or(translation, DVec3::from);
+        let translation = self.three("translate", at).map_or(rest.translation, DVec3::from);
+        let [scale, rotation] = [self.find("scale", at), self.find("rotate", at)];
+        if scale.is_none() && rotation.is_none() {
+            return DAffine3 { translation, ..*rest }; // which may have shear
+        }
+        let (was, turned, _) = parts(rest).unwrap_or((DVec3::ONE, DQuat::IDENTITY, rest.translation));
+        let scale = self.three("scale", at).map_or(was, DVec3::from);
+        let rotation = rotation.map_or(turned, |q| DQuat::from_slice(&q));
         DAffine3::from_scale_rotation_translation(scale, rotation, translation)
     }
 

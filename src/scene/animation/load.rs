@@ -191,9 +191,13 @@ fn check(key: &Key, target: &Target) -> Checked<()> {
             return Err("the last row of transform is not 0 0 0 1".to_owned());
         }
     }
-    let splits = ["translate", "rotate", "scale"].iter().any(|name| key.values.contains_key(*name));
-    match splits && key.values.contains_key("transform") {
-        true => Err("has a transform and parts of one: choose".to_owned()),
+    let [moves, turns, scales] = ["translate", "rotate", "scale"].map(|name| key.values.contains_key(name));
+    if (moves || turns || scales) && key.values.contains_key("transform") {
+        return Err("has a transform and parts of one: choose".to_owned());
+    }
+    let sheared = matches!(target, Target::Placement(_, rest) if parts(rest).is_none());
+    match sheared && turns != scales {
+        true => Err("its table's transform has shear, which has no rotate or scale to keep: give both".to_owned()),
         false => Ok(()),
     }
 }

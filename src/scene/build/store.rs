@@ -48,9 +48,9 @@ pub fn store(sources: &mut Sources, plan: &Plan, geometry: &mut Geometry) -> Res
     memory::need(format!("{}: {triangles} triangles", sources.path.display()), bytes)?;
     warn_of_grey(sources, plan)?;
     let description = sources.description;
-    let file = |job: &Job| description.mesh[job.mesh].file.as_ref();
-    let latest: HashMap<_, _> = jobs.iter().enumerate().map(|(i, job)| (file(job), i)).collect();
-    let last: Vec<bool> = jobs.iter().enumerate().map(|(i, job)| latest[&file(job)] == i).collect();
+    let files: Vec<_> = jobs.iter().map(|job| sources.file_of(&description.mesh[job.mesh])).collect();
+    let latest: HashMap<_, _> = files.iter().enumerate().map(|(i, file)| (file, i)).collect();
+    let last: Vec<bool> = files.iter().enumerate().map(|(i, file)| latest[file] == i).collect();
     let mut stored = vec![Stored { mesh: None, range: 0..0, objects: Vec::new(), soft: None }];
     for (i, job) in jobs.into_iter().enumerate() {
         let start = geometry.triangles.len();

@@ -1,5 +1,6 @@
 //! MTL files through tobj: in any case and spelling, with the line of every mistake, options of maps and file names with
 //! spaces. What the statements mean for a material is decided in `mtl_material.rs`.
+use super::blocks::Statements;
 use super::mapping::Mapping;
 use crate::error::{Error, Result};
 use crate::scene::description::texture::Wrap;
@@ -103,7 +104,7 @@ const OPTIONS: [(&str, usize); 13] = [
 /// [`Error::Input`] with the line of a statement whose numbers are missing, not numbers, or not finite.
 pub fn parse(path: &Path, text: &str) -> Result<Vec<Mtl>> {
     let (mut checked, mut within) = (String::new(), false);
-    for (number, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
+    for (number, line) in Statements::of(text.trim_start_matches('\u{feff}')) {
         let line = line.trim();
         let (key, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         let rest = rest.trim();
@@ -111,7 +112,7 @@ pub fn parse(path: &Path, text: &str) -> Result<Vec<Mtl>> {
             within = !rest.is_empty(); // a material without a name cannot be used
             checked.extend(within.then(|| format!("newmtl {rest}\n")));
         } else if within {
-            let place = || format!("line {}", number + 1);
+            let place = || format!("line {number}");
             checked += &statement(key, rest).map_err(|what| Error::input_at(path, place(), what))?;
         }
     }
@@ -210,6 +211,11 @@ mod tests {
     #[test]
     fn statements_are_read_in_any_case_and_form() {
         assert_eq!(parse(Path::new("a.mtl"), "\u{feff}newmtl a").unwrap().len(), 1);
+        assert_eq!(
+            one("Ns 3\rKd 0 1 \\\r0").block.diffuse,
+            Some([0.0, 1.0, 0.0]),
+            "lines of old Macintoshes, and long ones"
+        );
         let m = one("  Kd 0.1 0.2 0.3\r\nKs 0.5\nNs 10\nTr 0.25\nillum 2\nkE 1 2 3\nunknown x\n# Kd 9 9 9");
         assert_eq!((m.name(), m.directory.as_path()), ("a b", Path::new("dir")));
         assert_eq!(m.block.diffuse, Some([0.1, 0.2, 0.3]));

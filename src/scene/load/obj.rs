@@ -85,7 +85,7 @@ struct Parser<'a> {
     /// Materials by name: the scene file's own, and those of the libraries read so far.
     names: HashMap<String, u32>,
     /// Material names after `usemtl`.
-    worn: BTreeSet<String>,
+    unknown: BTreeSet<String>,
     /// `mtllib` statements, and the true paths of what they name: each is read once.
     statements: HashSet<String>,
     libraries: HashSet<PathBuf>,
@@ -111,7 +111,7 @@ impl<'a> Parser<'a> {
             parts: Vec::new(),
             part: PartBuilder::default(),
             corners: Vec::new(),
-            worn: BTreeSet::new(),
+            unknown: BTreeSet::new(),
             statements: HashSet::new(),
             libraries: HashSet::new(),
             missing: BTreeSet::new(),
@@ -191,7 +191,9 @@ impl<'a> Parser<'a> {
 
     fn wear(&mut self, name: String) {
         let material = self.names.get(&name).copied().unwrap_or(NONE);
-        self.worn.insert(name);
+        if material == NONE {
+            self.unknown.insert(name);
+        }
         if self.part.material != material {
             self.end_part();
             self.part.material = material;
@@ -247,12 +249,14 @@ impl<'a> Parser<'a> {
 
     /// The warning about material names that are used but not defined.
     fn grey(&self) -> Option<String> {
-        let unknown: Vec<_> = self.worn.iter().filter(|name| !self.names.contains_key(*name)).collect();
+        let unknown: Vec<_> = self.unknown.iter().collect();
         let libraries = match self.missing.is_empty() {
             true => String::new(),
             false => format!(" (no such library: {})", few(&self.missing.iter().collect::<Vec<_>>())),
         };
-        let what = || format!("grey is used for materials defined nowhere: {}{libraries}", few(&unknown));
+        let late = unknown.iter().any(|name| self.names.contains_key(*name));
+        let nowhere = if late { "defined nowhere, or only below their use" } else { "defined nowhere" };
+        let what = || format!("grey is used for materials {nowhere}: {}{libraries}", few(&unknown));
         (!unknown.is_empty()).then(|| format!("{}: {}", self.path.display(), what()))
     }
 }

@@ -63,7 +63,11 @@ impl ObjBlock {
         let statement = match key {
             "v" => return self.vertex(rest),
             "vt" => {
-                self.uvs.push(numbers(rest, "a texture coordinate needs two numbers after vt")?);
+                let what = "a texture coordinate needs one or two numbers after vt";
+                let [u] = numbers(rest, what)?;
+                let second = rest.split_ascii_whitespace().nth(1).filter(|word| !word.starts_with('#'));
+                let [v] = second.map_or(Ok([0.0]), |word| numbers(word, what))?;
+                self.uvs.push([u, v]);
                 return Ok(());
             }
             "vn" => {
@@ -99,7 +103,7 @@ impl ObjBlock {
 
     fn face(&mut self, rest: &str) -> Checked<Statement> {
         let before = self.corners.len();
-        for word in rest.split_ascii_whitespace() {
+        for word in rest.split_ascii_whitespace().take_while(|word| !word.starts_with('#')) {
             self.corners.push(indices(word)?);
         }
         let defined = [self.positions.len(), self.uvs.len(), self.normals.len()].map(|count| count as u32);

@@ -178,7 +178,8 @@ impl Vertex {
             Property::UChar(_) => Some(number / 255.0),
             Property::UShort(_) => Some(number / 65535.0),
             Property::Float(_) | Property::Double(_) => None,
-            _ => return PropertyAccessResult::UnsupportedType,
+            // Wider numbers count to 255 as well.
+            _ => Some(number / 255.0),
         };
         let linear = code.map_or(number, linear_from_srgb);
         match name {

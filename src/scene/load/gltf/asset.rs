@@ -1,4 +1,5 @@
 //! A glTF file in memory: what its JSON says, and its buffers.
+use super::extension;
 use super::glb;
 use super::uri::{self, Target};
 use crate::error::{Error, Result};
@@ -19,6 +20,8 @@ pub struct Asset<'a> {
     pub root: Root,
     /// Contents of the buffers, each as long as the JSON says.
     pub buffers: Vec<Vec<u8>>,
+    /// What is not rendered, if anything.
+    pub warning: Option<String>,
 }
 
 /// Most bytes that the objects and list entries of the JSON take when they are parsed.
@@ -36,8 +39,10 @@ impl<'a> Asset<'a> {
         let count = |byte: u8| json.iter().filter(|&&b| b == byte).count() as u64;
         let parsed = BYTES_OF_OBJECT * count(b'{') + BYTES_OF_ENTRY * count(b',');
         memory::need(path.display(), parsed + 2 * json.len() as u64)?;
-        let mut asset = Self { path, base, root: parse(path, json)?, buffers: Vec::new() };
+        let mut asset = Self { path, base, root: parse(path, json)?, buffers: Vec::new(), warning: None };
         asset.check_version()?;
+        // Extensions may leave out buffers.
+        asset.warning = extension::check(&asset)?;
         for index in 0..asset.root.buffers.len() {
             let content = asset.buffer(index, binary)?;
             asset.buffers.push(content);

@@ -57,7 +57,7 @@ pub struct Model {
 pub fn load(path: &Path, base: &Path, clip: Option<&str>, keys: Vec<(String, Keyed)>) -> Result<Model> {
     let asset = Asset::read(path, base)?;
     let mut model = Model::default();
-    model.warnings.extend(extension::check(&asset)?);
+    model.warnings.extend(asset.warning.clone());
     check::check(&asset)?;
     let tree = Tree::new(&asset)?;
     let surfaces = asset.root.meshes.iter().flat_map(|mesh| &mesh.primitives);

@@ -80,6 +80,23 @@ fn tables_stand_in_for_materials_and_unknown_ones_are_grey() {
     assert!(said.ends_with("defined nowhere: what (no such library: none.mtl)"), "{said}");
 }
 
+/// Names are looked up where they are used.
+#[test]
+fn grey_for_materials_that_a_later_library_defines_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.mtl"), "newmtl red\nKd 1 0 0").unwrap();
+    let text = format!("{SQUARE}usemtl red\nmtllib a.mtl\nf 1 2 3");
+    let file = parse(&folder.path().join("x.obj"), text.as_bytes(), &mut Library::default()).unwrap();
+    let said = file.grey.unwrap();
+    assert!(said.ends_with("defined nowhere, or only below their use: red"), "{said}");
+}
+
+#[test]
+fn statements_may_lack_a_second_coordinate_and_end_in_a_comment() {
+    let mesh = &read("vt 0.5 # half\nvt 0.25\nf 1/5 2/6 3/1 # one face").unwrap().parts[0].mesh;
+    assert_eq!((mesh.indices.len(), &mesh.uvs[..2]), (3, &[[0.5, 0.0], [0.25, 0.0]][..]));
+}
+
 #[test]
 fn several_libraries_and_names_with_spaces() {
     let dir = tempfile::tempdir().unwrap();

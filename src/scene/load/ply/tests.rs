@@ -125,6 +125,15 @@ fn every_form_is_the_same_mesh() {
 }
 
 #[test]
+fn colors_of_whole_numbers_count_to_255_however_wide_they_are() {
+    let header = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty int red\nproperty int green\nproperty short blue\n\
+                  element face 1\nproperty list uchar int vertex_indices\n";
+    let mesh = read(text(header, "0 0 0 255 0 0\n1 0 0 188 0 0\n0 1 0 0 0 0\n3 0 1 2\n").as_bytes(), "a.ply").unwrap();
+    let red: Vec<_> = mesh.colors.iter().map(|c| c[0]).collect();
+    assert!(red[0] == 1.0 && (red[1] - 0.5).abs() < 0.01 && red[2] == 0.0, "{red:?}");
+}
+
+#[test]
 fn strips_keep_their_side() {
     let header = "element vertex 4\nproperty double x\nproperty double y\nproperty double z\nelement tristrips 1\n\
                   property list int int vertex_indices\n";
