@@ -5,6 +5,8 @@ struct Sight {
     Ray way;
     float walked;    // length of the way until its last surface
     vec3 throughput; // what the light from the end of the way is multiplied by
+    vec3 albedo;     // as a path keeps it that goes the same way: see path_step.glsl
+    bool chosen;     // whether a surface on the way lets light take one of two, behind which a path keeps its albedo
 };
 
 // The hit of `ray` at the surface `s`, as a Guide.
@@ -19,26 +21,34 @@ Guide guide_of(Ray ray, Hit hit, Surface s, Bsdf bsdf) {
     return guide;
 }
 
-// Goes on from a smooth surface by the stronger way wherever light may take two. Returns false where none goes on.
+// Takes the albedo of the surface `s`, and goes on from a smooth one by the stronger way wherever light may take two. Returns false
+// where none goes on.
 bool look_on(inout Sight sight, Surface s, Bsdf bsdf) {
-    bool turns = (s.flags & MATERIAL_TWO_SIDED) != 0u && !is_kind(FX_DIELECTRIC, bsdf, BSDF_DIELECTRIC);
-    Facing facing = facing_normals(s, -sight.way.direction, turns, true);
+    Facing facing = facing_of(s, bsdf, -sight.way.direction);
     mat3 basis = shading_basis(s, bsdf, facing.normal);
     vec3 wo = -sight.way.direction * basis;
     if (FX_COAT_NORMALS) bsdf.metallic.coat_normal = local_coat_normal(s, facing, basis, wo);
+    bsdf_view(bsdf, wo);
+    bool smooth_here = FX_SMOOTH && bsdf_is_delta(bsdf);
+    if (!sight.chosen) {
+        sight.chosen = smooth_here && bsdf_chooses(bsdf);
+        sight.albedo = min(sight.throughput, vec3(1.0)) * (sight.chosen ? vec3(1.0) : bsdf_albedo(bsdf, wo.z));
+    }
+    if (!smooth_here) return false;
     BsdfSample next;
     bool goes_on = bsdf_sample(bsdf, wo, 0.5, vec2(0.5), next);
     sight.way.direction = basis * next.wi;
     sight.way.origin = ray_origin(s, sight.way.direction);
-    sight.throughput *= next.weight;
-    return goes_on;
+    sight.throughput *= next.weight * light_share(s, facing, sight.way.direction, next.wi.z);
+    return goes_on && max(sight.throughput.r, max(sight.throughput.g, sight.throughput.b)) > 0.0;
 }
 
 // The first surface that `ray` shows, behind smooth ones, or the sky. Depth and position are as if the way had been straight, so
 // that they change as the image does; a normal that points back along the way tells where in the sky it ends. The albedo is what
-// the light from there is multiplied by on its way. `first` becomes the first hit, smooth or not.
-Guide seen_hit(Ray ray, uint mask_seed, out Guide first, out Hit first_hit) {
-    Sight sight = Sight(ray, 0.0, vec3(1.0));
+// the light from there is multiplied by on its way. `first` becomes the first hit, smooth or not, and `kept` the albedo that paths
+// keep which begin like this: 1 times the throughput where they choose a way, since their light is then that of either.
+Guide seen_hit(Ray ray, uint mask_seed, out Guide first, out Hit first_hit, out vec3 kept) {
+    Sight sight = Sight(ray, 0.0, vec3(1.0), vec3(0.0), false);
     Guide seen;
     bool on;
     uint bounce = 0u;
@@ -56,7 +66,7 @@ Guide seen_hit(Ray ray, uint mask_seed, out Guide first, out Hit first_hit) {
             Surface s = surface_at(hit);
             Bsdf bsdf = surface_bsdf(s);
             seen = guide_of(sight.way, hit, s, bsdf);
-            if (FX_SMOOTH && bsdf_is_delta(bsdf) && bounce + 1u < push.constants.max_depth) on = look_on(sight, s, bsdf);
+            if (bounce + 1u < push.constants.max_depth) on = look_on(sight, s, bsdf);
         }
         if (bounce == 0u) {
             first = seen;
@@ -70,5 +80,6 @@ Guide seen_hit(Ray ray, uint mask_seed, out Guide first, out Hit first_hit) {
         sight.walked = from_start;
         bounce++;
     } while (FX_SMOOTH && on);
+    kept = sight.albedo;
     return seen;
 }

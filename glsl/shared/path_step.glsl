@@ -89,11 +89,7 @@ Departure leave(inout PathState p, Surface s, bool going, Sampler random) {
     Departure d;
     uint pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * p.bounce;
     Bsdf bsdf = surface_bsdf(s);
-    // The normal of a dielectric stays on its outside, since its two sides differ.
-    bool turns = (s.flags & MATERIAL_TWO_SIDED) != 0u && !is_kind(FX_DIELECTRIC, bsdf, BSDF_DIELECTRIC);
-    Facing facing = facing_normals(s, -p.path.direction, turns, bsdf_is_specular(bsdf));
-    if (is_kind(FX_METALLIC, bsdf, BSDF_METALLIC))
-        facing = facing_of_metal(s, facing, -p.path.direction, metallic_specular(bsdf.metallic));
+    Facing facing = facing_of(s, bsdf, -p.path.direction);
     mat3 basis = shading_basis(s, bsdf, facing.normal);
     vec3 wo = -p.path.direction * basis;
     if (FX_COAT_NORMALS) bsdf.metallic.coat_normal = local_coat_normal(s, facing, basis, wo);

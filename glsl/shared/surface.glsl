@@ -229,6 +229,14 @@ Facing facing_of_metal(Surface s, Facing f, vec3 wo, float specular) {
     return f;
 }
 
+// The normals for a material at `s`. That of a dielectric stays on its outside, since its two sides differ.
+Facing facing_of(Surface s, Bsdf b, vec3 wo) {
+    bool turns = (s.flags & MATERIAL_TWO_SIDED) != 0u && !is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC);
+    Facing facing = facing_normals(s, wo, turns, bsdf_is_specular(b));
+    if (is_kind(FX_METALLIC, b, BSDF_METALLIC)) facing = facing_of_metal(s, facing, wo, metallic_specular(b.metallic));
+    return facing;
+}
+
 // The frame of lobes around `n`: x leads along the tangent where roughness depends on the direction.
 mat3 shading_basis(Surface s, Bsdf b, vec3 n) {
     if (FX_ANISOTROPIC && b.stretch != 1.0) {

@@ -80,10 +80,11 @@ void main() {
         Ray ray = eye_ray(film, random);
         Guide first;
         Hit hit;
-        Guide eye = seen_hit(ray, mask_seed, first, hit);
-        if (eye.albedo == vec3(0.0)) continue;
+        vec3 albedo;
+        Guide eye = seen_hit(ray, mask_seed, first, hit, albedo);
+        if (albedo == vec3(0.0)) continue;
         uint chosen = most_similar(eye, film);
-        if (chosen != NONE) sum += eye.albedo * known_radiance(texelFetch(filtered, int(chosen))).rgb;
+        if (chosen != NONE) sum += albedo * known_radiance(texelFetch(filtered, int(chosen))).rgb;
     } while (++k < push.samples);
     indirect[pixel] += sum;
 }

@@ -36,7 +36,8 @@ void main() {
     Ray ray = camera_ray(pinhole, film_from_pixel(centre, push.constants.size), vec2(0.5));
     Guide guide;
     Hit hit;
-    Guide shown = seen_hit(ray, pcg(pixel), guide, hit);
+    vec3 kept;
+    Guide shown = seen_hit(ray, pcg(pixel), guide, hit, kept);
     guides[i] = guide;
     if (FX_SMOOTH) seen[i] = shown;
     if (POINTS) points[i] = SurfacePoint(hit.triangle, hit.instance, vec2(hit.b1, hit.b2));

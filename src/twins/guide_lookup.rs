@@ -5,7 +5,7 @@ use crate::shaders::guide_lookup::{MIN_DEPTH_DIFFERENCE, MIN_NORMAL_DIFFERENCE};
 use crate::shaders::shared::sanitise::LARGEST;
 use crate::twins::camera::{eye_ray, film_sample, path_seed};
 use crate::twins::path::Tracer;
-use crate::twins::primary_hit::seen_hit;
+use crate::twins::primary_hit::{SeenHit, seen_hit};
 use crate::twins::sampler::sampler_start;
 use glam::{IVec2, Vec2, Vec3, ivec2};
 use std::ops::Range;
@@ -61,23 +61,23 @@ impl GuideRays<'_> {
     }
 }
 
-/// What sample `index` of `pixel` shows, and where it passes the film (pixels); none for the sky.
-pub fn eye_hit(tracer: &Tracer, pixel: u32, index: u32) -> Option<(Guide, Vec2)> {
+/// What sample `index` of `pixel` shows, and where it passes the film (pixels); none where a path keeps no albedo, as of the sky.
+pub fn eye_hit(tracer: &Tracer, pixel: u32, index: u32) -> Option<(SeenHit, Vec2)> {
     let Tracer { scene, frame, effects, .. } = tracer;
     let random = sampler_start(pixel, index, frame.path.seed, effects.independent_sampler);
     let film = film_sample(frame, effects, pixel, random);
     let ray = eye_ray(frame, effects, film, random);
     let eye = seen_hit(scene, frame, &ray, pcg(path_seed(frame, pixel, index)));
-    (eye.albedo != [0.0; 3]).then_some((eye, film))
+    (eye.kept != Vec3::ZERO).then_some((eye, film))
 }
 
 /// Mean over the eye rays of these samples, one at least, of albedo times the light of the guide ray that is most alike.
 pub fn look_up(tracer: &Tracer, guides: &GuideRays, pixel: u32, samples: Range<u32>) -> vec3 {
     let seen = |index: u32| {
         let Some((eye, film)) = eye_hit(tracer, pixel, index) else { return Vec3::ZERO };
-        let Some(q) = guides.most_similar(&eye, film) else { return Vec3::ZERO };
+        let Some(q) = guides.most_similar(&eye.guide, film) else { return Vec3::ZERO };
         let [r, g, b, _] = guides.filtered[q];
-        Vec3::from(eye.albedo) * Vec3::new(r, g, b).clamp(Vec3::splat(-LARGEST), Vec3::splat(LARGEST))
+        eye.kept * Vec3::new(r, g, b).clamp(Vec3::splat(-LARGEST), Vec3::splat(LARGEST))
     };
     (samples.clone().map(seen).sum::<Vec3>() / samples.len() as f32).into()
 }

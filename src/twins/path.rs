@@ -1,21 +1,17 @@
 //! Twin of `glsl/trace/path.comp` and of `glsl/shared/path_step.glsl`.
-use crate::layout::{
-    BSDF_DIELECTRIC, BSDF_METALLIC, Effects, FrameConstants, MATERIAL_TWO_SIDED, NONE, PathConstants, SurfacePoint,
-};
+use crate::layout::{BSDF_DIELECTRIC, Effects, FrameConstants, NONE, PathConstants, SurfacePoint};
 use crate::math::hash::pcg;
 use crate::scene::Scene;
 use crate::shaders::shared::path_step::{
     MAX_SURVIVAL, PAIR_BSDF, PAIR_CHOICE, PAIR_FIRST_BOUNCE, PAIR_LIGHT, PAIR_ROULETTE, PAIRS_PER_BOUNCE,
 };
-use crate::twins::bsdf::{
-    Bsdf, bsdf_albedo, bsdf_chooses, bsdf_evaluate, bsdf_is_delta, bsdf_is_specular, bsdf_sample, relative_index,
-};
+use crate::twins::bsdf::{Bsdf, bsdf_albedo, bsdf_chooses, bsdf_evaluate, bsdf_is_delta, bsdf_sample, relative_index};
 use crate::twins::camera::{eye_ray, film_sample, path_seed};
 use crate::twins::light::*;
 use crate::twins::sampler::{Sampler, sample_2d, sample_2d_bits, sampler_start};
 use crate::twins::surface::{
-    Facing, Surface, facing_normals, facing_of_metal, light_share, local_coat_normal, shading_basis, surface_at,
-    surface_bsdf, surface_emission,
+    Facing, Surface, facing_of, light_share, local_coat_normal, shading_basis, surface_at, surface_bsdf,
+    surface_emission,
 };
 use crate::twins::traverse::{Hit, traverse, traverse_from};
 use glam::{Mat3, Vec3};
@@ -228,11 +224,7 @@ impl Tracer<'_> {
 
     fn shade(&self, surface: Surface, direction: Vec3, pair: u32, from: [u32; 2]) -> Shade {
         let mut bsdf = surface_bsdf(self.scene, &surface);
-        let turns = surface.flags & MATERIAL_TWO_SIDED != 0 && bsdf.kind != BSDF_DIELECTRIC;
-        let mut facing = facing_normals(&surface, -direction, turns, bsdf_is_specular(&bsdf));
-        if bsdf.kind == BSDF_METALLIC {
-            facing = facing_of_metal(&surface, facing, -direction, bsdf.metallic.specular());
-        }
+        let facing = facing_of(&surface, &bsdf, -direction);
         let basis = shading_basis(&surface, &bsdf, facing.normal);
         let wo = basis.transpose() * -direction;
         if self.effects.coat_normals {

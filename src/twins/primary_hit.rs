@@ -1,11 +1,13 @@
 //! Twin of `glsl/trace/primary_hit.comp` and of `glsl/shared/first_hit.glsl`.
-use crate::layout::{BSDF_DIELECTRIC, Camera, FrameConstants, Guide, MATERIAL_TWO_SIDED, NONE, SurfacePoint};
+use crate::layout::{Camera, FrameConstants, Guide, NONE, SurfacePoint};
 use crate::math::hash::pcg;
 use crate::scene::Scene;
-use crate::twins::bsdf::{bsdf_albedo, bsdf_is_delta, bsdf_sample};
+use crate::twins::bsdf::{bsdf_albedo, bsdf_chooses, bsdf_is_delta, bsdf_sample};
 use crate::twins::camera::{Ray, camera_ray, film_from_pixel};
 use crate::twins::light::INFINITE_DISTANCE;
-use crate::twins::surface::{facing_normals, local_coat_normal, shading_basis, side_of, surface_at, surface_bsdf};
+use crate::twins::surface::{
+    facing_of, light_share, local_coat_normal, shading_basis, side_of, surface_at, surface_bsdf,
+};
 use crate::twins::traverse::{Hit, traverse};
 use glam::{Vec2, Vec3, vec2};
 
@@ -18,7 +20,7 @@ pub fn guide(scene: &Scene, frame: &FrameConstants, pixel: u32) -> Guide {
 /// What the ray through the centre of `pixel` shows: that hit or, where it is smooth, what is seen in it.
 pub fn seen(scene: &Scene, frame: &FrameConstants, pixel: u32) -> Guide {
     let ray = centre_ray(frame, pixel);
-    seen_hit(scene, frame, &ray, pcg(pixel))
+    seen_hit(scene, frame, &ray, pcg(pixel)).guide
 }
 
 /// The point of that hit.
@@ -36,19 +38,16 @@ fn centre_ray(frame: &FrameConstants, pixel: u32) -> Ray {
 }
 
 /// What a ray meets first.
-pub struct FirstHit {
+struct FirstHit {
     /// As the kernel writes it.
-    pub guide: Guide,
-    /// Whether it is a smooth surface, which shows what is behind it.
-    pub delta: bool,
+    guide: Guide,
     hit: Hit,
 }
 
-/// What a primary ray meets.
-pub fn first_hit(scene: &Scene, frame: &FrameConstants, ray: &Ray, mask_seed: u32) -> FirstHit {
+fn first_hit(scene: &Scene, frame: &FrameConstants, ray: &Ray, mask_seed: u32) -> FirstHit {
     let hit = traverse(scene, ray.origin, ray.direction, INFINITE_DISTANCE, false, mask_seed);
     if !hit.any() {
-        return FirstHit { guide: Guide { object: NONE, material: NONE, ..Guide::default() }, delta: false, hit };
+        return FirstHit { guide: Guide { object: NONE, material: NONE, ..Guide::default() }, hit };
     }
     let s = surface_at(scene, &hit);
     let bsdf = surface_bsdf(scene, &s);
@@ -62,41 +61,71 @@ pub fn first_hit(scene: &Scene, frame: &FrameConstants, ray: &Ray, mask_seed: u3
         material: s.material,
         ..Default::default()
     };
-    FirstHit { guide, delta: bsdf_is_delta(&bsdf), hit }
+    FirstHit { guide, hit }
 }
 
 /// What a primary ray shows.
-pub fn seen_hit(scene: &Scene, frame: &FrameConstants, ray: &Ray, mask_seed: u32) -> Guide {
-    let FirstHit { mut guide, mut delta, mut hit } = first_hit(scene, frame, ray, mask_seed);
-    let mut way = Ray { origin: ray.origin, direction: ray.direction };
-    let (mut length, mut throughput) = (0.0, Vec3::ONE);
+pub struct SeenHit {
+    /// As the kernel writes it.
+    pub guide: Guide,
+    /// The albedo that a path keeps which begins like this.
+    pub kept: Vec3,
+}
+
+/// A ray on its way through smooth surfaces.
+struct Sight {
+    way: Ray,
+    throughput: Vec3,
+    albedo: Vec3,
+    /// Whether a surface on the way lets light take one of two, behind which a path keeps its albedo.
+    chosen: bool,
+}
+
+impl Sight {
+    /// Takes the albedo of the surface that is hit, and goes on from a smooth one by the stronger way. False where none goes on.
+    fn look_on(&mut self, scene: &Scene, hit: &Hit) -> bool {
+        let s = surface_at(scene, hit);
+        let mut bsdf = surface_bsdf(scene, &s);
+        let facing = facing_of(&s, &bsdf, -self.way.direction);
+        let basis = shading_basis(&s, &bsdf, facing.normal);
+        let wo = basis.transpose() * -self.way.direction;
+        bsdf.metallic.coat_normal = local_coat_normal(&s, &facing, &basis, wo);
+        let smooth_here = bsdf_is_delta(&bsdf);
+        if !self.chosen {
+            self.chosen = smooth_here && bsdf_chooses(&bsdf);
+            let own = if self.chosen { Vec3::ONE } else { bsdf_albedo(&bsdf, wo.z) };
+            self.albedo = self.throughput.min(Vec3::ONE) * own;
+        }
+        if !smooth_here {
+            return false;
+        }
+        let (sampled, next) = bsdf_sample(&bsdf, wo, 0.5, Vec2::splat(0.5));
+        let direction = basis * next.wi;
+        self.way = Ray { origin: s.ray_origin(direction), direction };
+        self.throughput *= next.weight * light_share(&s, &facing, direction, next.wi.z);
+        sampled && self.throughput.max_element() > 0.0
+    }
+}
+
+/// What a primary ray shows, behind smooth surfaces.
+pub fn seen_hit(scene: &Scene, frame: &FrameConstants, ray: &Ray, mask_seed: u32) -> SeenHit {
+    let FirstHit { mut guide, mut hit } = first_hit(scene, frame, ray, mask_seed);
+    let way = Ray { origin: ray.origin, direction: ray.direction };
+    let mut sight = Sight { way, throughput: Vec3::ONE, albedo: Vec3::ZERO, chosen: false };
+    let mut length = 0.0;
     for bounce in 1..frame.path.max_depth {
-        if !delta {
+        if !hit.any() || !sight.look_on(scene, &hit) {
             break;
         }
         length += hit.t;
-        let s = surface_at(scene, &hit);
-        let mut bsdf = surface_bsdf(scene, &s);
-        let turns = s.flags & MATERIAL_TWO_SIDED != 0 && bsdf.kind != BSDF_DIELECTRIC;
-        let facing = facing_normals(&s, -way.direction, turns, true);
-        let basis = shading_basis(&s, &bsdf, facing.normal);
-        let wo = basis.transpose() * -way.direction;
-        bsdf.metallic.coat_normal = local_coat_normal(&s, &facing, &basis, wo);
-        let (sampled, next) = bsdf_sample(&bsdf, wo, 0.5, Vec2::splat(0.5));
-        if !sampled {
-            break;
-        }
-        let direction = basis * next.wi;
-        way = Ray { origin: s.ray_origin(direction), direction };
-        throughput *= next.weight;
-        FirstHit { guide, delta, hit } = first_hit(scene, frame, &way, pcg(mask_seed.wrapping_add(bounce)));
+        FirstHit { guide, hit } = first_hit(scene, frame, &sight.way, pcg(mask_seed.wrapping_add(bounce)));
         let (sky, behind) = (!hit.any(), if hit.any() { hit.t } else { 0.0 });
         if sky {
-            guide.normal = (-direction).into();
+            guide.normal = (-sight.way.direction).into();
         }
         guide.depth = length + behind + frame.camera.near;
         guide.position = (ray.origin + (length + behind) * ray.direction).into();
-        guide.albedo = (throughput * if sky { Vec3::ONE } else { Vec3::from(guide.albedo) }).into();
+        guide.albedo = (sight.throughput * if sky { Vec3::ONE } else { Vec3::from(guide.albedo) }).into();
     }
-    guide
+    SeenHit { guide, kept: sight.albedo }
 }

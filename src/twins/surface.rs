@@ -1,11 +1,13 @@
 //! Twin of `glsl/shared/surface.glsl` and `glsl/shared/normal_map.glsl`.
-use crate::layout::{BSDF_METALLIC, MATERIAL_NORMAL_MAP, MATERIAL_UNLIT, Material, NONE};
+use crate::layout::{
+    BSDF_DIELECTRIC, BSDF_METALLIC, MATERIAL_NORMAL_MAP, MATERIAL_TWO_SIDED, MATERIAL_UNLIT, Material, NONE,
+};
 use crate::math::octahedral::{octahedral_decode, octahedral_vector};
 use crate::math::warp::basis_from_normal;
 use crate::scene::Scene;
 use crate::shaders::shared::surface::{CLEARANCE, MIN_ELEVATION};
 use crate::twins::attributes::Attributes;
-use crate::twins::bsdf::Bsdf;
+use crate::twins::bsdf::{Bsdf, bsdf_is_specular};
 use crate::twins::metallic::{Metallic, Parameters};
 use crate::twins::scene::{material_of, object_from_world, reads_second, triangle_vertices, world_from_object};
 use crate::twins::sphere::Sphere;
@@ -303,6 +305,16 @@ pub fn facing_of_metal(s: &Surface, facing: Facing, wo: Vec3, specular: f32) -> 
     }
     let between = wo + image - 2.0 * height * plane;
     Facing { normal: between / between.length_squared().max(1e-30).sqrt(), ..turned }
+}
+
+/// The normals for a material at `s`. That of a dielectric stays on its outside, since its two sides differ.
+pub fn facing_of(s: &Surface, b: &Bsdf, wo: Vec3) -> Facing {
+    let turns = s.flags & MATERIAL_TWO_SIDED != 0 && b.kind != BSDF_DIELECTRIC;
+    let facing = facing_normals(s, wo, turns, bsdf_is_specular(b));
+    match b.kind {
+        BSDF_METALLIC => facing_of_metal(s, facing, wo, b.metallic.specular()),
+        _ => facing,
+    }
 }
 
 /// The frame of lobes around `n`: x leads along the tangent where roughness depends on the direction.

@@ -1,6 +1,8 @@
 //! Tests the lookup of filtered light along eye rays: the choice among four guide rays by hand, the kernel against its twin, and
 //! guide rays with invalid values.
+use crate::kernels::pictures;
 use crate::support::{assert_silent, gpu, hash};
+use crate::twin::Workplace;
 use glam::{Vec2, vec2};
 use std::path::Path;
 use tallow::gpu::Gpu;
@@ -152,18 +154,64 @@ fn the_kernel_agrees_with_its_twin() {
     assert_silent(&gpu);
 }
 
-/// Under light of 1 what is left is the albedo of the eye rays, which are those of the pixel's samples.
+/// Plates whose light may take two ways, slopes that mirror into their own surface, and a mirror that shows walls and the sky.
+fn plates() -> Loaded {
+    let plate = |material: &str, x: f32, turn: &str| {
+        format!(
+            "[[mesh]]\nshape = 'rectangle'\nmaterial = '{material}'\n\
+             transform = {{ rotate = {turn}, translate = [{x}, 0.0, 0.0], scale = 0.9 }}\n"
+        )
+    };
+    let plates = [
+        plate("glass", -3.0, "[-75, 0, 0]"),
+        plate("pane", -1.0, "[-80, 0, 0]"),
+        plate("gold", 1.0, "[0, -60, 0]"),
+        plate("silver", 3.0, "[0, -60, 0]"),
+        plate("mirror", 5.0, "[-40, 30, 0]"),
+    ];
+    let scene = Workplace::new().picture("slope.png", 8, |_, _| [191, 128, 238]).scene(&format!(
+        "[camera]\nposition = [1.0, 0.0, 9.0]\ntarget = [1.0, 0.0, 0.0]\nfov = 50.0\n[render]\nmax_depth = 6\n\
+         [environment]\nradiance = 0.3\n[[material]]\nname = 'glass'\ntype = 'dielectric'\n\
+         [[material]]\nname = 'pane'\ntype = 'metallic-roughness'\nmetallic = 0\nroughness = 0\ntransmission_factor = 1\n\
+         [[material]]\nname = 'gold'\ntype = 'metallic-roughness'\nmetallic = 1\nroughness = 0\ncolor = [0.9, 0.7, 0.3]\n\
+         normal_map = 'slope.png'\n[[material]]\nname = 'silver'\ntype = 'conductor'\nnormal_map = 'slope.png'\n\
+         [[material]]\nname = 'mirror'\ntype = 'conductor'\n[[material]]\nname = 'red'\ncolor = [0.8, 0.1, 0.1]\n\
+         [[mesh]]\nshape = 'rectangle'\nmaterial = 'red'\ntransform = {{ translate = [0.0, 0.0, -3.0], scale = 20.0 }}\n\
+         [[mesh]]\nshape = 'cube'\nmaterial = 'red'\ntransform = {{ translate = [6.0, 6.0, 4.0], scale = 3.0 }}\n{}",
+        plates.concat()
+    ));
+    scene.with(|s| [s.width, s.height] = [65, 33])
+}
+
+/// Under light of 1 what is left is the albedo that paths keep, which the same light was divided by.
 #[test]
-fn eye_rays_are_those_of_the_samples() {
-    let scene = scene("cornell-box/scene.toml", [31, 33], PixelFilter::Box);
-    let effects = Effects { indirect: true, ..Effects::default() };
-    let (guide, _) = guides(&scene);
-    let seen = twin(&scene, &effects, &guide, &vec![LIT; guide.len()]);
-    let tracer = tracer(&scene, effects);
-    let albedo = |p: u32| (0..EYE_RAYS).map(|k| tracer.sample(p, k).albedo).sum::<glam::Vec3>() / EYE_RAYS as f32;
-    let expected: Vec<vec3> = (0..seen.len() as u32).map(|p| albedo(p).into()).collect();
-    assert_eq!(differing(&seen, &expected), 0);
-    assert!(differing(&seen[1..], &expected[..seen.len() - 1]) > 100, "control: other pixels");
+fn eye_rays_multiply_light_by_the_albedo_of_the_samples() {
+    let gpu = gpu();
+    let mut failures = Vec::new();
+    let cornell = |file: &str| scene(&format!("cornell-box/{file}.toml"), [31, 33], PixelFilter::Box);
+    for (name, scene) in [
+        ("walls", cornell("scene")),
+        ("mirror", cornell("mirror")),
+        ("glass", cornell("glass")),
+        ("bumps", pictures()),
+        ("plates", plates()),
+        ("plates, no further bounce", plates().with(|s| s.max_depth = 2)),
+    ] {
+        let pixels = scene.settings.pixels();
+        let found = both(&gpu, &scene, &vec![surface(Z, 1.0); pixels], &vec![LIT; pixels]);
+        let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
+        // Roulette divides what the throughput of a path would be.
+        let tracer = tracer(&scene, Effects { roulette: false, ..*renderer.effects() });
+        let albedo = |p: u32| (0..EYE_RAYS).map(|k| tracer.sample(p, k).albedo).sum::<glam::Vec3>() / EYE_RAYS as f32;
+        let expected: Vec<vec3> = (0..pixels as u32).map(|p| albedo(p).into()).collect();
+        let wrong = found.each_ref().map(|seen| differing(seen, &expected));
+        if wrong.iter().any(|&n| n > pixels / 100) {
+            failures.push(format!("{name}: {wrong:?} of {pixels} pixels of kernel and twin differ"));
+        }
+        assert!(differing(&found[0][1..], &expected[..pixels - 1]) > 50, "{name}, control: other pixels");
+    }
+    assert_eq!(failures, Vec::<String>::new());
+    assert_silent(&gpu);
 }
 
 #[test]

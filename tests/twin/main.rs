@@ -18,6 +18,7 @@ mod picture;
 #[path = "../support/poses.rs"]
 mod poses;
 mod reproject;
+mod shown;
 mod sphere;
 mod stability;
 #[path = "../support/mod.rs"]
