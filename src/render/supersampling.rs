@@ -16,7 +16,8 @@ impl Renderer {
     /// Indirect light of every pixel, row-major, and what each pass took. The guide rays through the pixels' centres, which
     /// meet `guide`, carry `filtered` (light before albedo; w = 0 where there is none); `eye_rays` further rays per pixel,
     /// those of the pixel's first samples, take the light of the guide ray that is most alike in normal and depth among
-    /// the four nearest, times the albedo that they meet themselves. Rays to the sky bring none.
+    /// the four nearest, times the albedo that the samples keep ([`PixelLight::albedo`](crate::layout::PixelLight::albedo)). Rays to
+    /// the sky bring none.
     ///
     /// Source: Bauszat, Eisemann and Magnor, "Guided Image Filtering for Interactive High-quality Global Illumination",
     /// EGSR 2011.
