@@ -15,7 +15,8 @@ vec2 fresnel_dielectric(float c, float eta) {
     return g2 > 0.0 ? vec2(0.5 * (rs * rs + rp * rp), min(g / eta, 1.0)) : vec2(1.0, 0.0);
 }
 
-// Reflectance of a conductor per channel. Adding `c2` last makes it exactly 0 for eta = 1, k = 0.
+// Reflectance of a conductor per channel. Adding `c2` last makes it exactly 0 for eta = 1, k = 0. The lower limit of `p` prevents
+// 0 / 0 head on for eta = k = 0, which reflects all.
 vec3 fresnel_conductor(float c, vec3 eta, vec3 k) {
     c = clamp(c, 1e-8, 1.0);
     float c2 = c * c;
@@ -24,7 +25,7 @@ vec3 fresnel_conductor(float c, vec3 eta, vec3 k) {
     vec3 m = sqrt(t * t + 4.0 * eta * eta * k * k);       // a^2 + b^2 for a + ib = sqrt(eta_complex^2 - s2)
     vec3 ac = 2.0 * c * sqrt(max(0.5 * (m + t), 0.0));
     vec3 rs = (m + c2 - ac) / (m + c2 + ac);
-    vec3 p = c2 * m + s2 * s2;
+    vec3 p = max(c2 * m + s2 * s2, 1e-30);
     vec3 rp = rs * (p - ac * s2) / (p + ac * s2);
     return 0.5 * (rs + rp);
 }

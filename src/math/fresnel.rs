@@ -21,7 +21,7 @@ pub fn fresnel_conductor(c: f32, eta: Vec3, k: Vec3) -> Vec3 {
     let m = (t * t + 4.0 * eta * eta * k * k).map(f32::sqrt);
     let ac = 2.0 * c * (0.5 * (m + t)).max(Vec3::ZERO).map(f32::sqrt);
     let rs = (m + c2 - ac) / (m + c2 + ac);
-    let p = c2 * m + s2 * s2;
+    let p = (c2 * m + s2 * s2).max(Vec3::splat(1e-30));
     let rp = rs * (p - ac * s2) / (p + ac * s2);
     0.5 * (rs + rp)
 }
@@ -53,5 +53,13 @@ mod tests {
         // Normal incidence: ((n - 1)^2 + k^2) / ((n + 1)^2 + k^2).
         let gold = fresnel_conductor(1.0, vec3(0.2, 0.92, 1.1), vec3(3.9, 2.45, 2.14));
         assert!((gold.x - (0.64 + 15.21) / (1.44 + 15.21)).abs() < 1e-6, "{gold}");
+    }
+
+    #[test]
+    fn a_conductor_of_index_zero_reflects_all() {
+        for c in [0.0, 1e-7, 0.3, 0.8, 1.0 - 6e-8, 1.0] {
+            let r = fresnel_conductor(c, Vec3::ZERO, vec3(0.0, 1e-30, 1.0));
+            assert!((r - 1.0).abs().max_element() < 1e-6, "cos {c}: {r}");
+        }
     }
 }

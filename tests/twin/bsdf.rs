@@ -210,6 +210,28 @@ fn bsdfs_equal_their_twins() -> Result<()> {
     Ok(())
 }
 
+/// Of an index of zero, whose amplitudes are 0 / 0 head on.
+#[test]
+fn a_conductor_of_index_zero_reflects_all_on_the_device_too() -> Result<()> {
+    let case = |i: usize| {
+        let z = [1.0f32, 0.9, 1e-4][i % 3];
+        let wo = vec3((1.0 - z * z).sqrt(), 0.0, z);
+        let (alpha, specular) = ([0.0, 0.3][i / 3 % 2], [1.0; 3]);
+        let (eta, k) = ([0.0, 0.0, 1.0], [0.0, 1e-30, 0.0]);
+        let material = Material { kind: BSDF_CONDUCTOR, alpha, specular, eta, k, ..Material::default() };
+        (material, [wo, vec3(-wo.x, 0.0, z), numbers(i, 0).extend(numbers(i, 1).x), Vec3::Z])
+    };
+    let cases: Vec<Case> = (0..60).map(case).collect();
+    let found = on_device(&Gpu::open(&DeviceOptions::default())?, &only(&[BSDF_CONDUCTOR], true, false), &cases)?;
+    let finite = |r: &[Vec4; 5]| r[0].is_finite() && (r[1].w == 0.0 || r[1..].iter().all(|v| v.is_finite()));
+    assert!(found.iter().all(finite), "{found:?}");
+    assert_eq!(disagreements(&found, &cases), [0; 0]);
+    for (r, (m, _)) in found.iter().zip(&cases).filter(|(r, (m, _))| m.alpha == 0.0 && r[1].w == 1.0) {
+        assert!((r[2].truncate() - vec3(1.0, 1.0, 0.0)).abs().max_element() < 1e-5, "{m:?} {r:?}");
+    }
+    Ok(())
+}
+
 #[test]
 fn random_words_equal_their_twin() -> Result<()> {
     let gpu = Gpu::open(&DeviceOptions::default())?;
