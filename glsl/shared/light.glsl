@@ -156,14 +156,16 @@ void sample_triangle_light(vec3 p, Light light, vec2 u, inout LightSample s) {
     s.direction = to_light / s.distance;
     float cosine = -dot(n, s.direction);
     vec3 radiance = light.value;
+    // What belongs to corners is stored in the order of the triangle.
+    vec2 stored = light.kind == LIGHT_MIRRORED ? bary.yx : bary;
     if (FX_TEXTURES) {
         uint image = Material_emission_texture(materials, light.material);
-        if (image != NONE) radiance *= texture_sample(image, texture_coordinates(image, light.triangle, bary), true).rgb;
+        if (image != NONE) radiance *= texture_sample(image, texture_coordinates(image, light.triangle, stored), true).rgb;
     }
     if (FX_VERTEX_COLORS && (Material_flags(materials, light.material) & MATERIAL_UNLIT) != 0u)
-        radiance *= vertex_color(Shading_load(shading, light.triangle), bary).rgb;
+        radiance *= vertex_color(Shading_load(shading, light.triangle), stored).rgb;
     // The shadow ray ends before the light, so that the light's own mask counts here.
-    if (FX_ALPHA_MASKS) radiance *= surface_opacity(light.material, light.triangle, bary);
+    if (FX_ALPHA_MASKS) radiance *= surface_opacity(light.material, light.triangle, stored);
     bool lit = cosine > 0.0 && d2 > 0.0;
     s.pdf = lit ? light.probability * 2.0 * d2 / (cosine * doubled_area) : 0.0;
     if (lit && by_solid_angle(solid_angle)) s.pdf = light.probability / solid_angle;
@@ -202,7 +204,7 @@ LightSample light_sample(vec3 p, uint word, vec2 u) {
     uint count = push.constants.light_count, index = 0u;
     if (count != 1u) index = alias_choose(AliasEntry_load(light_table, alias_slot(count, word)), count, word);
     Light light = Light_load(lights, index);
-    if (FX_EMISSIVE && light.kind == LIGHT_TRIANGLE) {
+    if (FX_EMISSIVE && (light.kind == LIGHT_TRIANGLE || light.kind == LIGHT_MIRRORED)) {
         sample_triangle_light(p, light, u, s);
     } else if (FX_EMISSIVE && FX_SPHERES && light.kind == LIGHT_SPHERE) {
         sample_sphere_light(p, light, u, s);

@@ -250,7 +250,7 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
         Effect::environment_map => {
             scene.environment.as_ref().map_or(0, |e| size_of_val(&e.texels[..]) + size_of_val(&e.table[..]))
         }
-        Effect::emissive => lights(LIGHT_TRIANGLE),
+        Effect::emissive => lights(LIGHT_TRIANGLE) + lights(LIGHT_MIRRORED),
         Effect::point_lights => lights(LIGHT_POINT),
         Effect::spot_lights => lights(LIGHT_SPOT),
         Effect::directional_lights => lights(LIGHT_DIRECTIONAL),

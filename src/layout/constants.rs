@@ -94,4 +94,6 @@ constants! {
     LIGHT_ENVIRONMENT: uint = 4;
     /// [`Light::kind`]: sphere around `a` of radius `b.x` (world units), emits radiance `value` outward.
     LIGHT_SPHERE: uint = 5;
+    /// [`Light::kind`]: as [`LIGHT_TRIANGLE`], of a mirrored instance: `b` is the third corner of the stored triangle, `c` the second.
+    LIGHT_MIRRORED: uint = 6;
 }

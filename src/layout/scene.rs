@@ -126,7 +126,8 @@ gpu_structs! {
         flags: uint,
         /// Emitted radiance of the front side, W/(m^2 sr); 0 emits nothing.
         emission: vec3,
-        /// Luminance of the mean emission times the mean opacity. Emissive triangles are chosen in proportion to it times their area.
+        /// Luminance of the mean emission times the mean opacity, in units of a power of two that is 1 unless all lamps of the scene are
+        /// dimmer. Emissive triangles are chosen in proportion to it times their area.
         emission_weight: float,
         /// Index of refraction per channel (conductor), or interior / exterior in `x` (dielectric, coated).
         eta: vec3,
@@ -225,11 +226,11 @@ gpu_structs! {
         probability: float,
         /// See the LIGHT_ constants.
         c: vec3,
-        /// Index of the triangle in leaf order (LIGHT_TRIANGLE, LIGHT_SPHERE), else [`NONE`].
+        /// Index of the triangle in leaf order (LIGHT_TRIANGLE, LIGHT_MIRRORED, LIGHT_SPHERE), else [`NONE`].
         triangle: uint,
         /// Radiance, intensity or irradiance, linear Rec. 709.
         value: vec3,
-        /// Index of the material (LIGHT_TRIANGLE, LIGHT_SPHERE), else [`NONE`].
+        /// Index of the material (LIGHT_TRIANGLE, LIGHT_MIRRORED, LIGHT_SPHERE), else [`NONE`].
         material: uint,
     }
 

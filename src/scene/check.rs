@@ -6,8 +6,8 @@ use super::build::coat::reads_table;
 use super::{Environment, Scene};
 use crate::error::{Error, Result};
 use crate::layout::{
-    AliasEntry, BSDF_METALLIC, BvhNode, COAT_COLUMNS, COAT_ROWS, Camera, LIGHT_SPHERE, LIGHT_TRIANGLE, Light, Material,
-    NONE, SPHERE, Shading, TRAVERSAL_STACK, Texture, Triangle,
+    AliasEntry, BSDF_METALLIC, BvhNode, COAT_COLUMNS, COAT_ROWS, Camera, LIGHT_MIRRORED, LIGHT_SPHERE, LIGHT_TRIANGLE,
+    Light, Material, NONE, SPHERE, Shading, TRAVERSAL_STACK, Texture, Triangle,
 };
 use glam::Vec3;
 
@@ -154,7 +154,7 @@ impl Scene {
     }
 
     fn lights_fit(&self) -> Checked {
-        let on_surface = |light: &Light| matches!(light.kind, LIGHT_TRIANGLE | LIGHT_SPHERE);
+        let on_surface = |light: &Light| matches!(light.kind, LIGHT_TRIANGLE | LIGHT_MIRRORED | LIGHT_SPHERE);
         let emissive = || self.lights.iter().enumerate().filter(|(_, light)| on_surface(light));
         for (index, light) in emissive() {
             let of = |what| format!("light {index}: {what}");

@@ -109,11 +109,12 @@ pub fn light_effects(scene: &Scene) -> Effects {
 }
 
 fn add_light_effects(scene: &Scene, found: &mut Effects, reasons: &mut Vec<(Effect, String)>) {
-    let mut light = |name, kind| {
-        let first = scene.lights.iter().position(|l| l.kind == kind);
+    let mut any = |name, of: &dyn Fn(u32) -> bool| {
+        let first = scene.lights.iter().position(|l| of(l.kind));
         first.inspect(|&i| reasons.push((name, light_name(scene, i)))).is_some()
     };
-    let panels = light(Effect::emissive, LIGHT_TRIANGLE);
+    let panels = any(Effect::emissive, &|kind| matches!(kind, LIGHT_TRIANGLE | LIGHT_MIRRORED));
+    let mut light = |name, kind| any(name, &|of| of == kind);
     found.emissive = panels || light(Effect::emissive, LIGHT_SPHERE);
     found.point_lights = light(Effect::point_lights, LIGHT_POINT);
     found.spot_lights = light(Effect::spot_lights, LIGHT_SPOT);

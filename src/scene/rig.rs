@@ -35,6 +35,8 @@ pub struct Rig {
     pub(in crate::scene) light_numbers: Vec<u64>,
     /// Mean luminance of the environment's image, or 1.
     pub(in crate::scene) sky: f64,
+    /// [`Material::emission_weight`] is counted in 2 to the power of minus this.
+    pub(in crate::scene) dimness: i32,
     /// Mean colours of pictures that emit or mask, by first texel and transfer curve.
     pub(in crate::scene) means: HashMap<(u32, u32), [f32; 3]>,
     /// Materials that have a table of their coat.

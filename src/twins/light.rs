@@ -7,7 +7,7 @@ use crate::shaders::shared::light::{MAX_SOLID_ANGLE, MIN_SOLID_ANGLE};
 use crate::twins::scene::texture_coordinates;
 use crate::twins::surface::{Surface, plane_clearance, unit_vector};
 use crate::twins::texture::{surface_opacity, texture_sample, vertex_color};
-use glam::{Mat3, Vec2, Vec3, Vec3Swizzles, vec2, vec3};
+use glam::{Mat3, Vec2, Vec2Swizzles, Vec3, Vec3Swizzles, vec2, vec3};
 use std::f32::consts::PI;
 
 /// One light, seen from a surface point.
@@ -153,6 +153,7 @@ fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> Ligh
     let direction = to_light / distance;
     let cosine = -n.dot(direction);
     let mut radiance = Vec3::from(light.value);
+    let bary = if light.kind == LIGHT_MIRRORED { bary.yx() } else { bary };
     let image = scene.materials[light.material as usize].emission_texture;
     if image != NONE {
         let uv = texture_coordinates(scene, image, light.triangle, bary);
@@ -214,7 +215,7 @@ pub fn light_sample(scene: &Scene, p: Vec3, word: u32, u: Vec2) -> LightSample {
     let (chosen, word) = if scene.lights.len() == 1 { (0, word) } else { alias_choose(&scene.light_table, word) };
     let light = &scene.lights[chosen as usize];
     match light.kind {
-        LIGHT_TRIANGLE => sample_triangle_light(scene, light, p, u),
+        LIGHT_TRIANGLE | LIGHT_MIRRORED => sample_triangle_light(scene, light, p, u),
         LIGHT_SPHERE => sample_sphere_light(light, p, u),
         LIGHT_POINT | LIGHT_SPOT => sample_point_light(light, p),
         LIGHT_DIRECTIONAL => LightSample {

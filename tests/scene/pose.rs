@@ -3,7 +3,7 @@
 use crate::poses::{MOMENTS, Moment, at, pose};
 use bytemuck::{Pod, cast_slice};
 use glam::{DVec3, Vec3};
-use tallow::layout::Instance;
+use tallow::layout::{Instance, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT};
 use tallow::scene::description::Transform;
 use tallow::scene::{Pose, Scene, Vertices};
 
@@ -120,6 +120,25 @@ fn refitted_boxes_hold_what_is_in_them_and_little_more() {
         let meshes = vec![(mesh, Vertices { positions, ..Vertices::default() })];
         scene.apply(&Pose { meshes, rebuild_above: f32::INFINITY, ..Pose::default() }).unwrap();
         check(&scene);
+    }
+}
+
+#[test]
+fn sun_and_sky_shine_where_all_is_hidden() {
+    let text = "[[mesh]]\nname = 'a'\nshape = 'cube'\nmoving = true\n[environment]\nradiance = 0.5\n\
+                [[light]]\ntype = 'directional'\ndirection = [0, -1, 0]\nirradiance = 1\n";
+    let mut scene = Scene::parse(std::path::Path::new("scene.toml"), text).unwrap().scene;
+    let before = scene.lights.clone();
+    assert_eq!(before.iter().map(|l| l.kind).collect::<Vec<_>>(), [LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT]);
+    let sized = |scale: f64| {
+        let mut rows = [0.0; 16];
+        [0, 5, 10].iter().for_each(|&i| rows[i] = scale);
+        rows[15] = 1.0;
+        Pose { instances: vec![(0, Transform::from(rows))], ..Pose::default() }
+    };
+    for scale in [0.0, 1.0, 0.0] {
+        scene.apply(&sized(scale)).unwrap();
+        assert_eq!((scene.seen_instances(), &scene.lights), (usize::from(scale > 0.0), &before));
     }
 }
 

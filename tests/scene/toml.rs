@@ -161,6 +161,49 @@ fn one_constant_turns_emission_into_the_density_of_every_emissive_triangle() {
 }
 
 #[test]
+fn small_dim_lamps_have_a_density() {
+    let small =
+        BOX.replace("emission = 5", "emission = 1e-15").replace("translate = [0, 0, 2]", "translate = [0, 0, 2e-12]");
+    let small = small.replace("scale = 0.5", "scale = 5e-13").replace("[0, 0, 5]", "[0, 0, 5e-12]");
+    let scene = parse(&small.replacen("\"rectangle\"", "\"rectangle\"\ntransform = { scale = 1e-12 }", 1)).unwrap();
+    assert_eq!(scene.lights.len(), 2);
+    for l in &scene.lights {
+        let [a, b, c] = [l.a, l.b, l.c].map(|p| glam::Vec3::from(p) * 1e12);
+        let area = (b - a).cross(c - a).length() / 2.0 * 1e-24;
+        let density = scene.materials[l.material as usize].emission_weight * scene.triangle_pdf_scale;
+        assert!((l.probability / area / density - 1.0).abs() < 2e-5, "{l:?} {density}");
+    }
+}
+
+#[test]
+fn lamps_in_the_same_place_are_one_light() {
+    let scene = |more: &str| parse(&format!("{BOX}{more}")).unwrap();
+    let placed = |moving: bool, second: &str| {
+        let one = "[[instance]]\nmesh = \"a\"\ntransform = { rotate = [0, 40, 0], translate = [5, 0, 0] }\n";
+        let mesh = "[[mesh]]\nname = \"a\"\nshape = \"rectangle\"\nmaterial = \"lamp\"\n";
+        scene(&format!("{mesh}{}\n{one}{}", if moving { "moving = true" } else { "" }, one.replace("5, 0, 0]", second)))
+    };
+    let lamp = "[[mesh]]\nshape = \"rectangle\"\nmaterial = \"lamp\"\n";
+    let more = |s: &Loaded| s.lights.len() - 2;
+    for moving in [false, true] {
+        let found = placed(moving, "5, 0, 0]");
+        assert_eq!((found.instances.iter().filter(|i| i.world0[3] == 5.0).count(), more(&found)), (2, 2));
+        assert!((found.lights[2].probability / found.lights[0].probability - 4.0).abs() < 1e-4);
+        assert_eq!(more(&placed(moving, "5, 0, 1e-6]")), 4, "control: beside it");
+        found.check().unwrap();
+    }
+    assert_eq!(more(&scene(&format!("{lamp}{lamp}"))), 2, "meshes");
+    // The other side shines too, and so does a lamp of another material, of which rays may meet either.
+    assert_eq!(more(&scene(&format!("{lamp}{lamp}flip_normals = true"))), 4, "control: back to back");
+    // A sphere is one.
+    let ball = "[[mesh]]\nshape = \"sphere\"\nmaterial = \"lamp\"\n";
+    assert_eq!(more(&scene(&format!("{ball}{ball}"))), 1);
+    // Point lights are not surfaces: both of them shine.
+    let point = "[[light]]\ntype = \"point\"\nposition = [0, 1, 1]\nintensity = 3\n";
+    assert_eq!(more(&scene(&format!("{point}{point}"))), 2);
+}
+
+#[test]
 fn instances_make_two_levels_and_carry_their_lights() {
     let more = "
 [[mesh]]\nname = \"ball\"\nshape = \"sphere\"\nsegments = 8\nmaterial = \"lamp\"
@@ -171,7 +214,7 @@ fn instances_make_two_levels_and_carry_their_lights() {
     assert_eq!((scene.instances.len(), scene.triangles.len()), (4, 4 + 48), "three balls share their triangles");
     assert_eq!(scene.instances.iter().filter(|i| i.mirrored == 1).count(), 1);
     assert_eq!(scene.names.objects.len(), 2 + 3);
-    let lamps: Vec<_> = scene.lights.iter().filter(|l| l.kind == LIGHT_TRIANGLE).collect();
+    let lamps: Vec<_> = scene.lights.iter().filter(|l| l.triangle != NONE).collect();
     assert_eq!(lamps.len(), 2 + 2 * 48, "the third ball wears the wall");
     for l in lamps.iter().filter(|l| l.a[0].abs() > 3.0) {
         // Outward of its ball, mirrored or not.

@@ -55,6 +55,11 @@ impl Workplace {
         self
     }
 
+    pub fn file(self, name: &str, text: &str) -> Self {
+        std::fs::write(self.0.path().join(name), text).unwrap();
+        self
+    }
+
     /// A grey environment image.
     pub fn sky(self, name: &str, width: u32, height: u32, light: impl Fn(u32, u32) -> f32) -> Self {
         let mut film = Film::new(width, height);
@@ -181,3 +186,37 @@ pub fn mean(scene: &Loaded, strategy: Strategy, samples: u32) -> Estimate {
     let n = f64::from(pixels);
     Estimate { mean: mean / n, error: variance.sqrt() / n }
 }
+
+/// A square whose corners have colours and opacities of their own.
+const SQUARE: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+                      property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\nelement face 2\n\
+                      property list uchar int vertex_indices\nend_header\n-1 -1 0 20 90 200 255\n1 -1 0 250 10 30 0\n\
+                      1 1 0 90 240 60 255\n-1 1 0 10 50 120 90\n3 0 1 2\n3 0 2 3\n";
+
+/// A patterned lamp above a floor: `lamp` is its material, and `table` places its square.
+pub fn patterned_lamp(lamp: &str, table: &str) -> Loaded {
+    let place = Workplace::new()
+        .picture("ramp.png", 16, |x, y| [(x * 15) as u8, (y * 15) as u8, 40])
+        .picture("mask.png", 16, |x, y| [if (x / 4 + y / 4).is_multiple_of(2) { 255 } else { 0 }; 3])
+        .file("square.ply", SQUARE);
+    place.scene(&format!(
+        "[film]\nwidth = 16\nheight = 16\n[camera]\nposition = [0.0, 3.0, 4.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 40.0\n\
+         [render]\nmax_depth = 2\n[[material]]\nname = 'floor'\ncolor = 0.7\n[[material]]\nname = 'lamp'\n{lamp}\n\
+         [[mesh]]\nname = 'floor'\nshape = 'rectangle'\nmaterial = 'floor'\n\
+         transform = {{ rotate = [-90.0, 0.0, 0.0], scale = 3.0 }}\n[[mesh]]\nname = 'lamp'\nmaterial = 'lamp'\n{table}\n"
+    ))
+}
+
+/// Materials of lamps whose corners differ, each with the mesh that it needs.
+pub const PATTERNS: [[&str; 2]; 4] = [
+    ["emission = 9.0\nemission_texture = { file = 'ramp.png', filter = 'nearest' }", "shape = 'rectangle'"],
+    ["emission = 9.0\nopacity_texture = { file = 'mask.png', filter = 'nearest' }", "shape = 'rectangle'"],
+    ["type = 'metallic-roughness'\nunlit = true", "file = 'square.ply'"],
+    ["type = 'metallic-roughness'\nemission = 9.0\nalpha_mode = 'mask'\nalpha_cutoff = 0.5", "file = 'square.ply'"],
+];
+
+/// Places of such a lamp that mirror it: by an instance, and by a mesh that moves.
+pub const MIRRORS: [&str; 2] = [
+    "[[instance]]\nmesh = 'lamp'\ntransform = { scale = [-0.8, 1.0, 1.0], rotate = [90.0, 0.0, 0.0], translate = [0.1, 1.5, 0.0] }",
+    "moving = true\ntransform = { scale = [-0.8, 1.0, 1.0], rotate = [90.0, 0.0, 0.0], translate = [0.1, 1.5, 0.0] }",
+];

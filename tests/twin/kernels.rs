@@ -2,7 +2,9 @@
 //! edge), and a driver's arc tangent moves lookups beside a small sun: nearly all samples must agree closely, but none has to.
 use crate::support::kernels::{accumulate as fold_kernel, traverse as traverse_kernel};
 use crate::support::{self, assert_silent, gpu};
-use crate::twin::{Aim, BALL, Random, Workplace, aimed_at_seam, ball, instanced_ball, under_a_panel};
+use crate::twin::{
+    Aim, BALL, MIRRORS, PATTERNS, Random, Workplace, aimed_at_seam, ball, instanced_ball, patterned_lamp, under_a_panel,
+};
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use std::path::Path;
@@ -248,6 +250,18 @@ fn renders_agree_with_their_twins() {
     assert!(agreement(&pair.samples) < 0.5, "control: other samples are told apart");
     pair.guides[1].rotate_right(1);
     assert!(!pair.guides[0].iter().zip(&pair.guides[1]).all(|(a, b)| guides_agree(a, b)));
+    assert_silent(&gpu);
+}
+
+#[test]
+fn renders_of_mirrored_lamps_agree_with_their_twins() {
+    let gpu = gpu();
+    let outputs = Outputs { split_light: true, guides: true, counters: false };
+    for [material, mesh] in PATTERNS {
+        let mut lamp = patterned_lamp(material, &format!("{mesh}\n{}", MIRRORS[0]));
+        small(&mut lamp.settings);
+        check(material, &run(&gpu, &lamp, called_for(&lamp, &lamp.settings, outputs)));
+    }
     assert_silent(&gpu);
 }
 

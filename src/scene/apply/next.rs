@@ -1,6 +1,6 @@
 //! What a scene becomes by a pose, found and checked before anything is changed.
 use super::material::changed;
-use crate::layout::{Instance, LIGHT_ENVIRONMENT, Light, MATERIAL_MASKED, Material, NONE, SPHERE};
+use crate::layout::{Instance, LIGHT_ENVIRONMENT, Light, Material, NONE, SPHERE};
 use crate::scene::build::bvh::{self, Bounds};
 use crate::scene::build::environment::{self, rotation};
 use crate::scene::build::hierarchy::{instance, is_lost, reach};
@@ -94,9 +94,7 @@ fn next_copies(scene: &Scene, pose: &Pose, meshes: &[NextMesh], materials: &[Mat
             ));
         };
         if copy == NONE {
-            return Err(format!(
-                "instance {number} is fixed: it has no triangles, or is a mirrored lamp with a texture"
-            ));
+            return Err(format!("instance {number} is fixed: it has no triangles"));
         }
         let affine = scene.rig.own.get(&copy).map_or(transform.0, |own| transform.0 * *own);
         if !affine.is_finite() {
@@ -124,25 +122,16 @@ fn next_copies(scene: &Scene, pose: &Pose, meshes: &[NextMesh], materials: &[Mat
     Ok(NextCopies { all: copies, hidden, world })
 }
 
-/// Lamps are sampled where they are hit: a sphere as a sphere, and a texture by corners whose order a mirror would swap.
+/// Lamps are sampled where they are hit: a sphere as a sphere.
 fn shines_right(scene: &Scene, copy: u32, at: &Instance, affine: &DAffine3, materials: &[Material]) -> Checked<()> {
-    let even = is_even(affine);
-    if even && at.mirrored == 0 {
+    if is_even(affine) {
         return Ok(());
     }
     let tree = &scene.rig.trees[scene.rig.tree_of[copy as usize] as usize];
     for triangle in &scene.triangles[tree.range.clone()] {
         let worn = if at.material == NONE { triangle.material } else { at.material };
-        let m = &materials[worn as usize];
-        if m.emission == [0.0; 3] {
-            continue;
-        }
-        if !even && triangle.primitive & SPHERE != 0 {
+        if triangle.primitive & SPHERE != 0 && materials[worn as usize].emission != [0.0; 3] {
             return Err("stretches a lamp that is a sphere: give its mesh segments".to_owned());
-        }
-        let textured = m.emission_texture != NONE || m.opacity_texture != NONE && m.flags & MATERIAL_MASKED != 0;
-        if at.mirrored != 0 && textured {
-            return Err("mirrors a lamp with a texture: mirror its mesh instead".to_owned());
         }
     }
     Ok(())

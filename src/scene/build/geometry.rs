@@ -188,18 +188,12 @@ impl Geometry {
     pub fn drop_copies(&mut self, start: usize) -> usize {
         let shading = |i: usize| self.shading.get(i).map(|s| Shading { first: 0, ..*s });
         let all = |i: usize| (Triangle { primitive: 0, object: 0, ..self.triangles[i] }, shading(i));
-        let key = |i: usize| {
-            let (triangle, shading) = all(i);
+        let hash = |i: usize| {
+            let (triangle, shading) = all(start + i);
             let seed = shading.map_or(0, |s| xxh3_64(bytemuck::bytes_of(&s)));
-            (xxh3_64_with_seed(bytemuck::bytes_of(&triangle), seed), i as u32)
+            xxh3_64_with_seed(bytemuck::bytes_of(&triangle), seed)
         };
-        let mut keys: Vec<_> = (start..self.triangles.len()).into_par_iter().map(key).collect();
-        keys.par_sort_unstable();
-        let mut keep = vec![true; self.triangles.len() - start];
-        for alike in keys.chunk_by(|a, b| a.0 == b.0) {
-            let first = all(alike[0].1 as usize);
-            alike[1..].iter().for_each(|&(_, i)| keep[i as usize - start] = all(i as usize) != first);
-        }
+        let keep = firsts(self.triangles.len() - start, hash, |i| all(start + i));
         let dropped = keep.iter().filter(|keep| !**keep).count();
         if dropped > 0 {
             retain(&mut self.triangles, start, &keep);
@@ -241,6 +235,18 @@ impl Geometry {
         let first = if attributes == 0 { 0 } else { first };
         self.shading.push(Shading { normal, uv0, uv1, uv2, attributes, first, ..Default::default() });
     }
+}
+
+/// Which of `count` things are the first of their kind; those that are alike have the same hash.
+pub fn firsts<T: PartialEq>(count: usize, hash: impl Fn(usize) -> u64 + Sync, of: impl Fn(usize) -> T) -> Vec<bool> {
+    let mut keys: Vec<_> = (0..count).into_par_iter().map(|i| (hash(i), i as u32)).collect();
+    keys.par_sort_unstable();
+    let mut first = vec![true; count];
+    for alike in keys.chunk_by(|a, b| a.0 == b.0).filter(|alike| alike.len() > 1) {
+        let one = of(alike[0].1 as usize);
+        alike[1..].iter().for_each(|&(_, i)| first[i as usize] = of(i as usize) != one);
+    }
+    first
 }
 
 /// Drops what is not kept from `start` on; `items` may be empty.

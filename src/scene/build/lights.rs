@@ -14,6 +14,7 @@ use crate::scene::load::texture;
 use crate::scene::rig::Tree;
 use glam::{Mat4, Vec3, Vec4};
 use std::f64::consts::PI;
+use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 
 /// Adds the emissive triangles to the scene's lights (which hold the others), drops lights without power, and builds
 /// the table. Sets [`Material::emission_weight`], [`Light::probability`], [`Scene::triangle_pdf_scale`] and [`Scene::large_lamps`].
@@ -24,6 +25,7 @@ pub fn finish(scene: &mut Scene) -> Result<()> {
     scene.rig.lights = std::mem::take(&mut scene.lights);
     scene.rig.sky = scene.environment.as_ref().map_or(1.0, mean_luminance);
     weigh(scene);
+    choose_unit(scene);
     list(scene)?;
     scene.large_lamps = scene.lights.iter().any(|l| is_large(scene, l));
     Ok(())
@@ -31,6 +33,7 @@ pub fn finish(scene: &mut Scene) -> Result<()> {
 
 /// Sets [`Material::emission_weight`] of all materials, and finds the triangles that emit.
 pub fn weigh(scene: &mut Scene) {
+    let unit = unit(scene);
     let (textures, texels, means) = (&scene.textures, &scene.texels, &mut scene.rig.means);
     // Many materials may share a picture.
     let mut mean = |image: u32| match textures.get(image as usize) {
@@ -44,13 +47,33 @@ pub fn weigh(scene: &mut Scene) {
         let emission: [f32; 3] = std::array::from_fn(|c| m.emission[c] * mean_emission[c]);
         let masked = m.flags & MATERIAL_MASKED != 0;
         let opacity = if masked { m.opacity * mean(m.opacity_texture)[0] } else { 1.0 };
-        m.emission_weight = luminance(emission) * opacity;
+        m.emission_weight = (f64::from(luminance(emission) * opacity) / unit) as f32;
     }
     let (triangles, materials) = (&scene.triangles, &scene.materials);
     for tree in &mut scene.rig.trees {
         let lit = |&i: &usize| materials[triangles[i].material as usize].emission_weight > 0.0;
         tree.lit = tree.range.clone().filter(lit).map(|i| i as u32).collect();
         tree.sort_lit();
+    }
+}
+
+/// What [`Material::emission_weight`] is counted in.
+fn unit(scene: &Scene) -> f64 {
+    2f64.powi(-scene.rig.dimness)
+}
+
+/// Lamps that are dimmer when the scene is loaded may still come to be brighter than any real one.
+const MOST_DIMNESS: i32 = 64;
+
+/// Counts weights in a smaller unit where all lamps are dim: by 1, the density of small dim lamps per power would exceed what a number
+/// of 32 bits holds. A power of two rounds nothing, and a scene keeps it, so that lamps that do not change keep their weights.
+fn choose_unit(scene: &mut Scene) {
+    let most = scene.materials.iter().map(|m| m.emission_weight).fold(0.0, f32::max);
+    if most > 0.0 && most < 1.0 {
+        scene.rig.dimness = (-most.log2().floor() as i32).min(MOST_DIMNESS);
+        let factor = 1.0 / unit(scene);
+        let counted = |weight: f32| (f64::from(weight) * factor) as f32;
+        scene.materials.iter_mut().for_each(|m| m.emission_weight = counted(m.emission_weight));
     }
 }
 
@@ -62,13 +85,14 @@ pub fn list(scene: &mut Scene) -> Result<()> {
     let mut lights = scene.rig.lights.clone();
     let mut numbers: Vec<u64> = (0..lights.len() as u64).collect();
     add_triangles(scene, &mut lights, &mut numbers)?;
+    drop_copies(scene.rig.lights.len(), &mut lights, &mut numbers);
     let mut powers: Vec<f64> = lights.iter().map(|l| weight(l) * power(scene, l)).collect();
     let (mut kept, mut named) = (powers.iter(), powers.iter());
     lights.retain(|_| kept.next().is_some_and(|&p| p > 0.0));
     numbers.retain(|_| named.next().is_some_and(|&p| p > 0.0));
     powers.retain(|&p| p > 0.0);
     let total: f64 = powers.iter().sum();
-    scene.triangle_pdf_scale = if total > 0.0 { (PI / total) as f32 } else { 0.0 };
+    scene.triangle_pdf_scale = if total > 0.0 { (PI * unit(scene) / total) as f32 } else { 0.0 };
     scene.light_table = alias::build(&powers);
     let probabilities = alias::probabilities(&scene.light_table);
     lights.iter_mut().zip(probabilities).for_each(|(l, p)| l.probability = p as f32);
@@ -112,6 +136,27 @@ fn add_triangles(scene: &Scene, lights: &mut Vec<Light>, numbers: &mut Vec<u64>)
     Ok(())
 }
 
+/// Drops lamps that lie on an earlier one, from `start` on: rays meet one of them, so that sampling must not add them up. Those of the
+/// same triangle have the same corners, wherever they begin, and the same front.
+fn drop_copies(start: usize, lights: &mut Vec<Light>, numbers: &mut Vec<u64>) {
+    let place = |i: usize| {
+        let light = &lights[start + i];
+        // Adding 0 makes -0 the same.
+        let corners = [light.a, light.b, light.c].map(|p| p.map(|x| (x + 0.0).to_bits()));
+        let turned = [0, 1, 2].map(|first| [0, 1, 2].map(|i| corners[(first + i) % 3]));
+        let least = turned.into_iter().min().unwrap_or(corners);
+        (least, [light.material, u32::from(light.kind == LIGHT_SPHERE)])
+    };
+    let hash = |i: usize| {
+        let (corners, rest) = place(i);
+        xxh3_64_with_seed(bytemuck::bytes_of(&corners), xxh3_64(bytemuck::bytes_of(&rest)))
+    };
+    let first = geometry::firsts(lights.len() - start, hash, place);
+    let [mut kept, mut named] = [(); 2].map(|()| std::iter::repeat_n(&true, start).chain(&first));
+    lights.retain(|_| kept.next().is_some_and(|first| *first));
+    numbers.retain(|_| named.next().is_some_and(|first| *first));
+}
+
 /// Makes room for `more` lights, and checks memory for twice that: their table, powers and probabilities take as much again.
 fn reserve(lights: &mut Vec<Light>, more: usize) -> Result<()> {
     memory::need(format!("{more} emissive triangles"), 2 * (more * size_of::<Light>()) as u64)?;
@@ -124,11 +169,13 @@ fn surface_light(scene: &Scene, index: usize, at: Option<(Mat4, bool)>, material
     let material = material.unwrap_or(t.material);
     let [a, mut b, mut c] =
         [t.v0, t.v1, t.v2].map(|p| at.map_or(p, |(world, _)| world.transform_point3(p.into()).to_array()));
+    let mut kind = LIGHT_TRIANGLE;
     if at.is_some_and(|(_, mirrored)| mirrored) {
         std::mem::swap(&mut b, &mut c); // the front of the mesh stays in front
+        kind = LIGHT_MIRRORED;
     }
     let value = scene.materials[material as usize].emission;
-    let light = Light { kind: LIGHT_TRIANGLE, a, b, c, triangle: index as u32, value, material, ..Light::default() };
+    let light = Light { kind, a, b, c, triangle: index as u32, value, material, ..Light::default() };
     if geometry::radius(t).is_none() {
         return light;
     }
@@ -142,7 +189,8 @@ const LARGE: f64 = 0.01;
 /// Whether a lamp is so large that, seen from points near it, its nearest parts outshine the others.
 pub fn is_large(scene: &Scene, light: &Light) -> bool {
     let [low, high] = scene.bounds.map(|b| Vec3::from(b).as_dvec3());
-    light.kind == LIGHT_TRIANGLE && geometry::area([light.a, light.b, light.c]) > LARGE * (high - low).length_squared()
+    matches!(light.kind, LIGHT_TRIANGLE | LIGHT_MIRRORED)
+        && geometry::area([light.a, light.b, light.c]) > LARGE * (high - low).length_squared()
 }
 
 /// How much more often than by their power delta lights are chosen. Lamps and sky are found by BSDF sampling as well, delta lights by
@@ -157,17 +205,13 @@ fn weight(light: &Light) -> f64 {
 /// Power of a light, by the formulas of the module documentation.
 fn power(scene: &Scene, light: &Light) -> f64 {
     let [low, high] = scene.bounds.map(|b| Vec3::from(b).as_dvec3());
-    let radius = ((high - low).length() / 2.0).max(if scene.triangles.is_empty() { 1.0 } else { 0.0 });
+    // The sky is there too where nothing else is, or nothing that is seen.
+    let radius = Some((high - low).length() / 2.0).filter(|r| *r > 0.0).unwrap_or(1.0);
     let value = f64::from(luminance(light.value));
+    let emitted = || f64::from(scene.materials[light.material as usize].emission_weight) * unit(scene);
     match light.kind {
-        LIGHT_TRIANGLE => {
-            let weight = scene.materials[light.material as usize].emission_weight;
-            PI * geometry::area([light.a, light.b, light.c]) * f64::from(weight)
-        }
-        LIGHT_SPHERE => {
-            let weight = scene.materials[light.material as usize].emission_weight;
-            4.0 * (PI * f64::from(light.b[0])).powi(2) * f64::from(weight)
-        }
+        LIGHT_TRIANGLE | LIGHT_MIRRORED => PI * geometry::area([light.a, light.b, light.c]) * emitted(),
+        LIGHT_SPHERE => 4.0 * (PI * f64::from(light.b[0])).powi(2) * emitted(),
         LIGHT_POINT => 4.0 * PI * value,
         LIGHT_SPOT => 2.0 * PI * value * (1.0 - f64::from(light.c[0] + light.c[1]) / 2.0),
         LIGHT_DIRECTIONAL => PI * radius * radius * value,

@@ -1,7 +1,7 @@
 //! Decides for each mesh whether it is baked into world space or stored in its own space for instances.
 use super::sources::{Sources, mesh_name};
 use crate::error::Result;
-use crate::layout::{MATERIAL_MASKED, MATERIAL_UNLIT, Material, NONE};
+use crate::layout::{MATERIAL_MASKED, Material, NONE};
 use crate::scene::description::shape::Shape;
 use crate::scene::description::{self, InstanceTable, MeshTable};
 use glam::{DAffine3, DMat3};
@@ -75,15 +75,12 @@ struct Planner<'s, 'a> {
     next: u32,
     /// Of a name, the first mesh.
     named: HashMap<&'a str, usize>,
-    /// By mesh: whether an instance names it, and whether one of them is a copy.
+    /// By mesh: whether an instance names it.
     instanced: Vec<bool>,
-    copied: Vec<bool>,
     /// By mesh: whether it is stored as a sphere so far, and whether its instances stretch it, since rays meet a sphere in its
     /// own space.
     exact: Vec<bool>,
     stretched: Vec<bool>,
-    /// By mesh and material: whether it is a textured light.
-    textured: HashMap<(usize, Option<u32>), bool>,
 }
 
 impl<'s, 'a> Planner<'s, 'a> {
@@ -96,10 +93,8 @@ impl<'s, 'a> Planner<'s, 'a> {
             next: sources.description.instance.len() as u32,
             named: named.collect(),
             instanced: vec![false; meshes.len()],
-            copied: vec![false; meshes.len()],
             exact: meshes.iter().map(is_sphere).collect(),
             stretched: meshes.iter().map(|m| is_sphere(m) && !is_even(&m.transform.0)).collect(),
-            textured: HashMap::new(),
         }
     }
 
@@ -117,15 +112,11 @@ impl<'s, 'a> Planner<'s, 'a> {
         let material = table.material.as_ref().map(|m| sources.material(m, place)).transpose()?;
         let own = invertible(sources, meshes[mesh].transform.0, place)?;
         let whole = Job { material, placement: number, own, ..Job::new(mesh, affine * own) };
-        // Textures of a light are looked up by the corners' order, which a mirrored light has to swap: bake it.
-        let baked = affine.matrix3.determinant() < 0.0 && self.is_textured_light(&whole)?;
         self.exact[mesh] = self.exact[mesh] && may_be_exact(sources, &whole)?;
-        match baked {
-            true => self.plan.baked.push(whole),
-            false if self.stretched[mesh] => self.plan.copies.push(whole),
-            false => self.plan.copies.push(Job { affine, own: DAffine3::IDENTITY, ..whole }),
-        }
-        self.copied[mesh] |= !baked;
+        self.plan.copies.push(match self.stretched[mesh] {
+            true => whole,
+            false => Job { affine, own: DAffine3::IDENTITY, ..whole },
+        });
         Ok(())
     }
 
@@ -145,31 +136,11 @@ impl<'s, 'a> Planner<'s, 'a> {
                 }
                 false => self.plan.baked.push(Job { exact, ..job }),
             }
-        } else if self.copied[mesh] {
+        } else {
             let affine = if stretched { DAffine3::IDENTITY } else { affine };
             self.plan.stored.push(Job { affine, exact, ..job });
         }
         Ok(())
-    }
-
-    fn is_textured_light(&mut self, job: &Job) -> Result<bool> {
-        if let Some(&known) = self.textured.get(&(job.mesh, job.material)) {
-            return Ok(known);
-        }
-        let sources = self.sources;
-        let textured = |i: u32| {
-            let m = &sources.library.materials.list[i as usize];
-            let varies = m.emission_texture != NONE || m.opacity_texture != NONE;
-            m.emission != [0.0; 3] && (varies || m.flags & MATERIAL_UNLIT != 0)
-        };
-        let file = sources.file_of(&sources.description.mesh[job.mesh]).and_then(|path| sources.files.get(&path));
-        let found = match (override_of(sources, job)?, file) {
-            (Some(index), _) => textured(index),
-            (None, Some(file)) => file.parts.iter().any(|part| textured(part.material)),
-            (None, None) => false,
-        };
-        self.textured.insert((job.mesh, job.material), found);
-        Ok(found)
     }
 }
 
