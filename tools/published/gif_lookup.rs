@@ -106,7 +106,7 @@ fn lost(scene: &Loaded, effects: &Effects, guide: &[Guide], filtered: &[vec4]) -
     let guides = GuideRays { size: frame.path.size, guide, filtered };
     let is_lost = |pixel: u32, index: u32| {
         let Some((eye, film)) = eye_hit(&tracer, pixel, index) else { return false };
-        guides.most_similar(&eye, film).is_none_or(|q| !stands_for(&guide[q], &eye))
+        guides.most_similar(&eye.guide, film).is_none_or(|q| !stands_for(&guide[q], &eye.guide))
     };
     let share = |pixel| (0..EYE_RAYS[1]).filter(|&k| is_lost(pixel, k)).count() as f32 / EYE_RAYS[1] as f32;
     (0..guide.len() as u32).into_par_iter().map(share).collect()
