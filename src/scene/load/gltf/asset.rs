@@ -1,5 +1,4 @@
 //! A glTF file in memory: what its JSON says, and its buffers.
-use super::extension;
 use super::glb;
 use super::uri::{self, Target};
 use crate::error::{Error, Result};
@@ -20,8 +19,6 @@ pub struct Asset<'a> {
     pub root: Root,
     /// Contents of the buffers, each as long as the JSON says.
     pub buffers: Vec<Vec<u8>>,
-    /// What is not rendered, if anything.
-    pub warning: Option<String>,
 }
 
 /// Most bytes that the objects and list entries of the JSON take when they are parsed.
@@ -29,25 +26,25 @@ const BYTES_OF_OBJECT: u64 = 800;
 const BYTES_OF_ENTRY: u64 = 72;
 
 impl<'a> Asset<'a> {
-    /// Reads a `.gltf` or `.glb` file and its buffers, but not its pictures.
+    /// Reads a `.gltf` or `.glb` file and its buffers, but not its pictures. What it says is checked before its buffers are read, which
+    /// extensions may leave out.
     ///
     /// # Errors
-    /// [`Error::Input`] for a file that is no glTF 2.0, and for a buffer that is missing or too short; [`Error::Memory`].
-    pub fn read(path: &'a Path, base: &'a Path) -> Result<Self> {
+    /// [`Error::Input`] for a file that is no glTF 2.0, and for a buffer that is missing or too short; [`Error::Memory`]; those of `check`.
+    pub fn read<T>(path: &'a Path, base: &'a Path, check: impl FnOnce(&Self) -> Result<T>) -> Result<(Self, T)> {
         let bytes = input::read(path)?;
         let (json, binary) = glb::split(&bytes).map_err(|what| Error::input(path, what))?;
         let count = |byte: u8| json.iter().filter(|&&b| b == byte).count() as u64;
         let parsed = BYTES_OF_OBJECT * count(b'{') + BYTES_OF_ENTRY * count(b',');
         memory::need(path.display(), parsed + 2 * json.len() as u64)?;
-        let mut asset = Self { path, base, root: parse(path, json)?, buffers: Vec::new(), warning: None };
+        let mut asset = Self { path, base, root: parse(path, json)?, buffers: Vec::new() };
         asset.check_version()?;
-        // Extensions may leave out buffers.
-        asset.warning = extension::check(&asset)?;
+        let told = check(&asset)?;
         for index in 0..asset.root.buffers.len() {
             let content = asset.buffer(index, binary)?;
             asset.buffers.push(content);
         }
-        Ok(asset)
+        Ok((asset, told))
     }
 
     /// An error at a place in the file.

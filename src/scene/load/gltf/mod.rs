@@ -55,9 +55,9 @@ pub struct Model {
 /// # Errors
 /// [`crate::error::Error::Input`] with file, place and remedy, also for a clip or node that is not there; [`crate::error::Error::Memory`].
 pub fn load(path: &Path, base: &Path, clip: Option<&str>, keys: Vec<(String, Keyed)>) -> Result<Model> {
-    let asset = Asset::read(path, base)?;
+    let (asset, left_out) = Asset::read(path, base, extension::check)?;
     let mut model = Model::default();
-    model.warnings.extend(asset.warning.clone());
+    model.warnings.extend(left_out);
     check::check(&asset)?;
     let tree = Tree::new(&asset)?;
     let surfaces = asset.root.meshes.iter().flat_map(|mesh| &mesh.primitives);
