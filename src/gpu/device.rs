@@ -25,7 +25,7 @@ const WAIT_LIMIT: Duration = Duration::from_secs(600);
 /// Which device to open, and how to use it.
 #[derive(Clone, Debug, Default)]
 pub struct DeviceOptions {
-    /// Index in [`super::survey`], or a part of the device's name in any case. `None` prefers discrete over
+    /// Index in [`super::survey`], as a number below 100 is, or a part of the device's name in any case. `None` prefers discrete over
     /// integrated over virtual GPUs over CPUs, among those that lack nothing.
     pub device: Option<String>,
     /// Run under the validation layers with synchronization validation; see [`Gpu::validation_messages`].
@@ -321,16 +321,22 @@ fn choose(mut candidates: Vec<Candidate>, wanted: Option<&str>) -> Result<Candid
     let best =
         || (0..candidates.len()).min_by_key(|&i| (!candidates[i].info.missing.is_empty(), candidates[i].info.kind));
     let index = wanted.map_or_else(best, |wanted| find(&candidates, wanted)).ok_or_else(|| {
-        let list = candidates.iter().enumerate().map(|(i, c)| format!("\n  {i}: {}", c.info.name)).collect::<String>();
-        Error::Device(format!("no device is called \"{}\"; choose one of{list}", wanted.unwrap_or_default()))
+        let list = candidates.iter().enumerate().map(|(i, c)| format!("{i}: {}", c.info.name)).collect::<Vec<_>>();
+        let (wanted, list) = (wanted.unwrap_or_default(), list.join("; "));
+        Error::Device(format!("no device is called \"{wanted}\": choose one of {list}"))
     })?;
     Ok(candidates.swap_remove(index))
 }
 
+/// Numbers below this are indices and no parts of names: a "1" is in the version of many a driver that a name ends in.
+const INDICES: usize = 100;
+
 fn find(candidates: &[Candidate], wanted: &str) -> Option<usize> {
-    let by_index = wanted.parse().ok().filter(|&index: &usize| index < candidates.len());
+    if let Some(index) = wanted.parse().ok().filter(|&index: &usize| index < INDICES) {
+        return Some(index).filter(|&index| index < candidates.len());
+    }
     let wanted = wanted.to_lowercase();
-    by_index.or_else(|| candidates.iter().position(|c| c.info.name.to_lowercase().contains(&wanted)))
+    candidates.iter().position(|c| c.info.name.to_lowercase().contains(&wanted))
 }
 
 /// Returns the queue family if the device has all required features.

@@ -145,6 +145,25 @@ fn devices_are_listed_as_vulkan_has_them() {
     }
 }
 
+/// The version of a driver is often a part of its device's name, and holds many small numbers.
+#[test]
+fn a_small_number_is_the_index_of_a_device_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/scene.toml");
+    let on = |device: &str| {
+        let small = ["--width", "8", "--height", "8", "--spp", "1", "--quiet", "-o", "a.exr", "--device", device];
+        tallow(&folder, &[&["render", scene], &small[..]].concat())
+    };
+    let found = tallow::gpu::survey().unwrap();
+    let beyond = found.len()..found.len() + 20;
+    for index in beyond.map(|index| index.to_string()) {
+        complains(&on(&index), 4, &[&format!("no device is called \"{index}\": choose one of 0: {}", found[0].name)]);
+    }
+    let usable = found.iter().position(|device| device.missing.is_empty()).unwrap();
+    assert_eq!(on(&usable.to_string()).status.code(), Some(0), "control: an index that exists");
+    assert_eq!(on(&found[usable].name[..4].to_uppercase()).status.code(), Some(0), "control: a part of a name");
+}
+
 /// Events of a thread of the trace: name, begin and end in microseconds.
 fn spans(trace: &Value, thread: &str) -> Vec<(String, f64, f64)> {
     let events = trace["traceEvents"].as_array().unwrap();
