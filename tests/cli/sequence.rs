@@ -136,6 +136,21 @@ fn a_turntable_comes_around() {
     assert!((1..4).all(|n| all[n] != all[n - 1]));
 }
 
+/// Seconds are whole numbers here, so that angles have the same bits.
+#[test]
+fn a_turn_is_over_all_frames_whichever_is_the_first() {
+    let folder = stage();
+    let scene = fs::read_to_string(folder.path().join("s.toml")).unwrap();
+    fs::write(folder.path().join("s.toml"), scene.split("[[animation]]").next().unwrap()).unwrap();
+    let words = "--turntable 360 --fps 1 --reproject off --quiet";
+    well(&folder, &format!("{words} --frames 0..4 -o a.#.exr"));
+    well(&folder, &format!("{words} --frames 3..7 --only 3..6 -o b.#.exr"));
+    for frame in 0..3 {
+        let [a, b] = [format!("a.{frame}.exr"), format!("b.{}.exr", frame + 3)].map(|name| bits(&folder, &name));
+        assert!(a == b, "frame {frame}");
+    }
+}
+
 #[test]
 fn a_frame_that_fails_does_not_stop_the_others() {
     let folder = stage();

@@ -47,7 +47,7 @@ pub struct Args {
     /// all, noise stands still where nothing moves
     #[arg(long)]
     pub seed_per_frame: bool,
-    /// Turn the camera about what it looks at, by so many degrees over all of --frames
+    /// Turn the camera about what it looks at, by so many degrees over all of --frames, from the first one
     #[arg(long, value_name = "DEGREES", value_parser = finite)]
     pub turntable: Option<f64>,
     /// Write a small animated .gif of all frames

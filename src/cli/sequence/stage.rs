@@ -85,8 +85,8 @@ impl<'a> Stage<'a> {
         let frames = args.frames.clone().map_or_else(|| whole(&animation, args.fps), Ok)?;
         if let Some(degrees) = args.turntable {
             let size = [settings.width, settings.height];
-            let period = f64::from(frames.end) / args.fps;
-            animation.movers.push(Arc::new(Turntable::new(&scene, size, degrees, period)));
+            let span = f64::from(frames.start) / args.fps..f64::from(frames.end) / args.fps;
+            animation.movers.push(Arc::new(Turntable::new(&scene, size, degrees, span)));
         }
         if animation.is_empty() && args.render.common.talkative() {
             complain(

@@ -5,24 +5,26 @@ use crate::scene::Scene;
 use crate::scene::description::Camera;
 use crate::scene::pose::Pose;
 use glam::{DQuat, DVec3, Vec3};
+use std::ops::Range;
 
-/// Turns the camera about its target, or the middle of the scene, around its `up`: the whole of `degrees` in `period` seconds,
-/// counter-clockwise seen from above. Where others move the camera, it turns what they make of it: let it be the last mover.
+/// Turns the camera about its target, or the middle of the scene, around its `up`: the whole of `degrees` over a span of seconds,
+/// at whose begin it is not turned yet, counter-clockwise seen from above. Where others move the camera, it turns what they make of
+/// it: let it be the last mover.
 #[derive(Clone, Debug)]
 pub struct Turntable {
     camera: Camera,
     bounds: [[f32; 3]; 2],
     size: [u32; 2],
     degrees: f64,
-    period: f64,
+    span: Range<f64>,
 }
 
 impl Turntable {
     /// Around a scene as it is now, for a film of (width, height) pixels.
-    pub fn new(scene: &Scene, size: [u32; 2], degrees: f64, period: f64) -> Self {
+    pub fn new(scene: &Scene, size: [u32; 2], degrees: f64, span: Range<f64>) -> Self {
         let bounds = scene.view.framed.unwrap_or(scene.bounds);
         let camera = Camera { framed: Some(swept(bounds)), ..scene.view.clone() };
-        Self { camera, bounds: scene.bounds, size, degrees, period }
+        Self { camera, bounds: scene.bounds, size, degrees, span }
     }
 
     fn turned(&self, camera: &Camera, angle: f64) -> std::result::Result<Camera, String> {
@@ -51,7 +53,8 @@ fn swept([low, high]: [[f32; 3]; 2]) -> [[f32; 3]; 2] {
 impl Mover for Turntable {
     fn pose(&self, seconds: f64, pose: &mut Pose) -> Result<()> {
         let camera = pose.camera.as_ref().unwrap_or(&self.camera);
-        let angle = (self.degrees * seconds / self.period).to_radians();
+        let Range { start, end } = self.span;
+        let angle = (self.degrees * (seconds - start) / (end - start)).to_radians();
         let turned =
             self.turned(camera, angle).map_err(|what| Error::Usage(format!("the turntable's camera: {what}")))?;
         pose.camera = Some(turned);
@@ -59,7 +62,7 @@ impl Mover for Turntable {
     }
 
     fn end(&self) -> f64 {
-        self.period
+        self.span.end
     }
 }
 
@@ -71,7 +74,7 @@ mod tests {
     fn all_is_in_view_from_every_side() {
         let bounds = [[-4.0, 0.0, 2.0], [6.0, 1.0, 3.0]];
         let (size, scene) = ([100, 100], Scene { bounds, ..Scene::default() });
-        let table = Turntable::new(&scene, size, 360.0, 8.0);
+        let table = Turntable::new(&scene, size, 360.0, 0.0..8.0);
         let mut reach: f32 = 0.0;
         for second in 0..8 {
             let mut pose = Pose::default();
@@ -87,5 +90,20 @@ mod tests {
         }
         // The corners of the box around the circle that is swept are 1.41 times as far as the circle, which leaves a third empty.
         assert!(reach > 0.6 && reach <= 1.0, "the farthest corner is at {reach} of the film");
+    }
+
+    #[test]
+    fn a_turn_is_the_same_whenever_it_begins() {
+        let (size, bounds) = ([100, 100], [[-1.0; 3], [1.0; 3]]);
+        let scene = Scene { bounds, ..Scene::default() };
+        let position = |begin: f64, seconds: f64| {
+            let mut pose = Pose::default();
+            Turntable::new(&scene, size, 360.0, begin..begin + 4.0).pose(begin + seconds, &mut pose).unwrap();
+            pose.camera.unwrap().build(size, bounds).unwrap().position
+        };
+        for seconds in [0.0, 1.0, 3.0] {
+            assert_eq!(position(0.0, seconds), position(2.0, seconds), "after {seconds} s");
+        }
+        assert_ne!(position(2.0, 0.0), position(2.0, 1.0), "control");
     }
 }
