@@ -152,6 +152,15 @@ fn a_turn_is_over_all_frames_whichever_is_the_first() {
 }
 
 #[test]
+fn help_leaves_out_what_a_sequence_refuses() {
+    let help = stdout(&tallow(&stage(), &["sequence", "--help"]));
+    for option in ["--checkpoint ", "--resume ", "--pixel ", "--plan "] {
+        assert!(!help.contains(option), "{option}: {help}");
+    }
+    assert!(help.contains("--heatmap "), "control: {help}");
+}
+
+#[test]
 fn a_frame_that_fails_does_not_stop_the_others() {
     let folder = stage();
     fs::create_dir(folder.path().join("f.0001.exr")).unwrap();
@@ -173,6 +182,7 @@ fn options_that_cannot_be_are_one_line() {
         ("--frames 0..3 --only 5", "none of the frames"),
         ("--frames 0..3 --fps 0", "--fps 0: choose a number above 0"),
         ("--frames 0..3 --pixel 1,1", "--pixel is for one image"),
+        ("--frames 0..3 --checkpoint 1", "--checkpoint is for one image"),
         ("--frames 0..3 --preview a.png", "a preview goes to a .gif"),
         ("--only 99999", "none of the frames"),
         ("--frames 0..3 --reproject forward --max-spp 9", "set neither noise_threshold nor max_spp"),

@@ -65,7 +65,7 @@ pub struct Args {
 }
 
 /// Options for one image, which a sequence refuses.
-const OF_ONE: [&str; 5] = ["resume", "pixel", "time", "error", "plan"];
+const OF_ONE: [&str; 6] = ["resume", "checkpoint", "pixel", "time", "error", "plan"];
 
 impl Args {
     /// The options of one frame, whose files have its number.
@@ -108,6 +108,7 @@ impl Args {
         let render = &self.render;
         let of_one = [
             ("--resume", render.resume.is_some()),
+            ("--checkpoint", render.checkpoint.is_some()),
             ("--pixel", render.pixel.is_some()),
             ("--time", render.time.is_some()),
             ("--error", render.error.is_some()),
