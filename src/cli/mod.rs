@@ -106,7 +106,7 @@ fn parse(words: impl IntoIterator<Item = OsString>) -> std::result::Result<Cli, 
 /// What an interruption says until the command has more to say.
 fn interruption(command: &Command) -> String {
     match command {
-        Command::Sequence(_) => sequence::interruption("before the first frame"),
+        Command::Sequence(args) => sequence::interruption(args, "before the first frame"),
         _ => "interrupted: nothing was written".to_owned(),
     }
 }

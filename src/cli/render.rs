@@ -161,7 +161,7 @@ pub fn run(args: &Args) -> Result<Exit> {
         complain("interrupted before the first sample: nothing was written");
         return Ok(Exit::Interrupted);
     };
-    let Ended { exit, written } = taken.finish(args)?;
+    let Ended { exit, written } = taken.finish(args, true)?;
     if exit == Exit::Interrupted {
         complain(&outputs::interruption(&written, can_resume));
     }
@@ -223,6 +223,11 @@ pub fn shoot<'a>(
 }
 
 impl Taken<'_> {
+    /// Whether all of its samples were taken.
+    pub fn is_whole(&self) -> bool {
+        self.outcome.status.stopped != StopReason::Interrupted
+    }
+
     /// What was rendered, filtered once [`Taken::finish`] has done so.
     pub fn film(&self) -> &Film {
         &self.outcome.film
@@ -233,19 +238,22 @@ impl Taken<'_> {
         &mut self.outcome.film
     }
 
-    /// Writes what was rendered, filters it, and tells how it went.
+    /// Writes what was rendered, filters it, and tells how it went. Where the noisy image is written `first`, it is there whatever
+    /// becomes of the filter, which a signal ends.
     ///
     /// # Errors
     /// Of every kind; an output that fails keeps no other from being written.
-    pub fn finish(&mut self, args: &Args) -> Result<Ended> {
+    pub fn finish(&mut self, args: &Args, first: bool) -> Result<Ended> {
+        let whole = self.is_whole();
         let Self { outcome, noisy, files, checkpoint } = self;
-        let whole = outcome.status.stopped != StopReason::Interrupted;
         let Outcome { gpu, film, host, status, plan, notes, .. } = &mut *outcome;
-        let mut written = host.time("write", || Ok(outputs::save(args, film, files, checkpoint.take(), whole)))?;
-        // By now what took hours is safe, whatever becomes of the filter.
-        if let Some((method, noisy)) = args.denoise.zip(noisy.take()).filter(|_| whole) {
+        let (filter, mut written) = (args.denoise.zip(noisy.take()).filter(|_| whole), Vec::new());
+        if first || filter.is_none() {
+            written = host.time("write", || Ok(outputs::save(args, film, files, checkpoint.take(), whole)))?;
+        }
+        if let Some((method, noisy)) = filter {
             let line = files.with_failures("interrupted: the noisy image was written, --denoise was not finished");
-            if interrupt::leave_at_once(&line) {
+            if first && interrupt::leave_at_once(&line) {
                 interrupt::leave(&line);
             }
             let planned = plan.is_some();

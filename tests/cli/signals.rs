@@ -4,7 +4,7 @@ use crate::child::{LONG, OFTEN, Running, SMALL, command, scene};
 use crate::command::complains;
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Output};
 use tallow::image::{self, Film, Samples, WriteOptions};
 use tempfile::TempDir;
 
@@ -147,6 +147,53 @@ fn an_interrupted_sequence_says_that_finished_frames_stay() {
     running.send(&["INT"]);
     complains(&running.end(), 130, &["finished frames stay"]);
     assert!(before.iter().all(|name| folder.path().join(name).is_file()));
+}
+
+/// A sequence that is stopped when its first frame is there, and what it printed.
+fn stopped_after_a_frame(folder: &TempDir, words: &str, first: &str) -> (Output, serde_json::Value) {
+    let words = format!("sequence {} {SMALL} --spp 300 --frames 0..10000 --json {words}", scene());
+    let mut shell = Command::new("sh");
+    let script = format!("exec env --default-signal=INT,HUP,TERM \"$0\" {words} > told");
+    shell.args(["-c", &script, env!("CARGO_BIN_EXE_tallow")]).current_dir(folder.path());
+    let mut running = Running::start(shell, folder.path());
+    running.until_there_is(first);
+    running.send(&["INT"]);
+    let output = running.end();
+    let told = std::fs::read(folder.path().join("told")).unwrap();
+    (output, serde_json::from_slice(&told).unwrap_or_default())
+}
+
+/// Nothing goes on with samples of a frame that was stopped, and a picture of it would look like a finished one.
+#[test]
+fn an_interrupted_frame_is_not_written_and_the_ones_before_are_told() {
+    for (kind, more, line) in [
+        ("png", "", "rendered anew unless -o NAME.####.exr is given too"),
+        ("exr", "", "the same command goes on there"),
+        ("exr", "--again", "the same command without --again goes on there"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let (words, first) = (format!("-o a.####.{kind} {more}"), format!("a.0000.{kind}"));
+        let (output, told) = stopped_after_a_frame(&folder, &words, &first);
+        let files: Vec<_> = names(folder.path()).into_iter().filter(|name| name != "told").collect();
+        let finished = files.len();
+        complains(&output, 130, &[&format!("interrupted in frame {finished}: finished frames stay"), line]);
+        assert_eq!(told["frames"].as_array().map(Vec::len), Some(finished), "{files:?}: {told}");
+        assert_eq!(files.last(), Some(&format!("a.{:04}.{kind}", finished - 1)), "{files:?}");
+    }
+}
+
+/// A noisy picture under the name of a frame would look like a finished one.
+#[test]
+fn a_frame_is_written_when_it_is_filtered_and_not_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = format!("sequence {} --width 512 --height 512 --max-depth 2 --spp 1 --quiet", scene());
+    let mut running = start(&folder, &format!("{words} --frames 0..10000 --denoise auto -o a.####.exr"));
+    running.until_there_is("a.0000.exr");
+    running.send(&["INT"]);
+    complains(&running.end(), 130, &["interrupted in frame "]);
+    let frames = names(folder.path());
+    let is_filtered = |name: &String| film(&folder, name).channel("Noisy Image.R").is_some();
+    assert!(frames.iter().all(is_filtered), "{frames:?}");
 }
 
 #[test]

@@ -8,6 +8,7 @@ use super::common::check_fps;
 use super::render::{self, outputs};
 use super::{Exit, complain, fail_on_messages, finite, interrupt, print, print_json};
 use crate::error::{Error, Result};
+use crate::image;
 use crate::render::{Carriage, ReprojectOverrides};
 use crate::scene::description::numbered;
 use preview::Preview;
@@ -15,6 +16,7 @@ use serde::Serialize;
 use stage::Stage;
 use std::ops::Range;
 use std::path::PathBuf;
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// Render the frames of an animation
@@ -162,31 +164,16 @@ struct Summary {
 /// Runs the subcommand.
 ///
 /// # Errors
-/// What fails before the first frame, and the loss of the device.
+/// What fails before the first frame, the loss of the device, and a preview that cannot be written.
 pub fn run(args: &Args) -> Result<Exit> {
     args.check()?;
     let begun = Instant::now();
     let mut stage = Stage::new(args)?;
     let mut preview = args.preview.as_ref().map(|_| Preview::default());
     let (numbers, mut reports) = (args.numbers(stage.frames())?, Vec::new());
-    for number in numbers.clone() {
-        let line = interruption(&format!("in frame {number}"));
-        if interrupt::leave_at_once(&line) {
-            interrupt::leave(&line);
-        }
-        let frame = stage.frame(number, preview.as_mut());
-        if let Err(error @ Error::DeviceLost(_)) = frame.result {
-            return Err(error);
-        }
-        if matches!(frame.result, Ok(Exit::Interrupted)) {
-            complain(&line);
-            return Ok(Exit::Interrupted);
-        }
-        let report = frame.report();
-        tell(args, &report, numbers.end - number - 1, &reports);
-        reports.push(report);
-    }
-    if let (Some(preview), Some(path)) = (&preview, &args.preview) {
+    let interrupted = render_frames(args, &mut stage, numbers, preview.as_mut(), &mut reports)?;
+    interrupt::leave_at_once(interrupted.as_deref().unwrap_or("interrupted: all frames are finished"));
+    if let (None, Some(preview), Some(path)) = (&interrupted, &preview, &args.preview) {
         preview.write(path, args.fps)?;
     }
     fail_on_messages(stage.gpu())?;
@@ -195,12 +182,55 @@ pub fn run(args: &Args) -> Result<Exit> {
     if args.render.common.json {
         print_json(&Summary { frames: reports, failed, seconds, device })?;
     }
-    Ok(if failed == 0 { Exit::Done } else { Exit::PartlyFailed })
+    interrupted.iter().for_each(|line| complain(line));
+    Ok(match interrupted {
+        Some(_) => Exit::Interrupted,
+        None if failed == 0 => Exit::Done,
+        None => Exit::PartlyFailed,
+    })
+}
+
+/// Renders frames until all are there or a signal comes: what is said of that then.
+///
+/// # Errors
+/// The loss of the device.
+fn render_frames(
+    args: &Args,
+    stage: &mut Stage,
+    numbers: Range<u32>,
+    mut preview: Option<&mut Preview>,
+    reports: &mut Vec<FrameReport>,
+) -> Result<Option<String>> {
+    for number in numbers.clone() {
+        let line = interruption(args, &format!("in frame {number}"));
+        match reports.is_empty() {
+            // Nothing is there to be told yet, and to compile the first frame's kernels may take long.
+            true if interrupt::leave_at_once(&line) => interrupt::leave(&line),
+            false if interrupt::flag().load(Ordering::SeqCst) => return Ok(Some(line)),
+            _ => {}
+        }
+        let frame = stage.frame(number, preview.as_deref_mut());
+        match frame.result {
+            Err(error @ Error::DeviceLost(_)) => return Err(error),
+            Ok(Exit::Interrupted) => return Ok(Some(line)),
+            _ => {}
+        }
+        let report = frame.report();
+        tell(args, &report, numbers.end - number - 1, reports);
+        reports.push(report);
+    }
+    Ok(None)
 }
 
 /// What an interruption at this place says.
-pub fn interruption(place: &str) -> String {
-    format!("interrupted {place}: finished frames stay, and the same command goes on there")
+pub fn interruption(args: &Args, place: &str) -> String {
+    let how = match args.render.output_files().iter().any(|path| image::has_layers(path)) {
+        // Of other files nothing tells which samples they hold.
+        false => "finished frames stay, but are rendered anew unless -o NAME.####.exr is given too",
+        true if args.again => "finished frames stay, and the same command without --again goes on there",
+        true => "finished frames stay, and the same command goes on there",
+    };
+    format!("interrupted {place}: {how}")
 }
 
 /// One line for a frame; a failure is always told.

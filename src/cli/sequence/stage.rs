@@ -3,7 +3,7 @@ use super::chain::Chain;
 use super::preview::Preview;
 use super::{Args, FrameReport};
 use crate::cli::render::{self, EffectChoice, Spans, outputs};
-use crate::cli::{Exit, complain};
+use crate::cli::{Exit, complain, interrupt};
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu};
 use crate::image::{self, Film, NOISY};
@@ -161,16 +161,17 @@ impl<'a> Stage<'a> {
             self.chain = Chain::default();
         }
         let shot = self.shoot(&args, &settings, carries)?;
-        let Some(mut shot) = shot else { return Ok(Exit::Interrupted) };
+        // What is there of an interrupted frame is of no use: it begins anew, and a .png of it would look like a finished one.
+        let Some(mut shot) = shot.filter(render::Taken::is_whole) else { return Ok(Exit::Interrupted) };
         if carries {
             end.carriage = self.renderer.as_ref().map(Renderer::carriage).transpose()?;
         }
-        let exit = shot.finish(&args)?.exit;
-        if exit == Exit::Done {
-            show(preview, shot.film(), &args)?;
-            self.chain = self.chain.with(&self.scene, &settings, self.reproject)?;
-            self.held = self.reproject.map(|_| number);
-        }
+        let exit = shot.finish(&args, false)?.exit;
+        // A signal is heard before the next frame begins, so that this one is told.
+        interrupt::flag();
+        show(preview, shot.film(), &args)?;
+        self.chain = self.chain.with(&self.scene, &settings, self.reproject)?;
+        self.held = self.reproject.map(|_| number);
         Ok(exit)
     }
 
