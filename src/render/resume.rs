@@ -1,5 +1,5 @@
 //! Taking up a render where it stopped: everything that it needs is in the EXR file that it wrote.
-use super::provenance::{self, Provenance};
+use super::provenance;
 use super::rendered::Rendered;
 use super::{PathRange, Progress, Renderer, Step, film};
 use crate::error::{Error, Result};
@@ -36,15 +36,30 @@ impl Checkpoint {
     /// fewer of them.
     ///
     /// # Errors
-    /// [`Error::Input`] when it is no such file.
+    /// [`Error::Input`] when it is no such file; [`Error::Usage`] when it has more samples than `settings` ask for.
     pub fn read(path: &Path, scene: &Scene, settings: &Settings) -> Result<Self> {
         let film = image::read(path)?;
-        Self::of(&film, scene, settings).map_err(|what| Error::input(path, what))
+        let checkpoint = Self::of(&film, scene, settings).map_err(|what| Error::input(path, what))?;
+        match checkpoint.most_samples() {
+            // The image would have the former samples, and its metadata would say fewer.
+            most if settings.allocate.is_even() && most > settings.spp => {
+                let (name, spp) = (path.display(), settings.spp);
+                Err(Error::Usage(format!(
+                    "{name}: has {most} samples a pixel, more than --spp {spp}: choose {most} or more"
+                )))
+            }
+            _ => Ok(checkpoint),
+        }
+    }
+
+    /// Of the pixel that has most.
+    fn most_samples(&self) -> u32 {
+        self.pixels.iter().map(|pixel| next_sample(&pixel.stats)).max().unwrap_or(0)
     }
 
     fn of(film: &Film, scene: &Scene, settings: &Settings) -> std::result::Result<Self, String> {
         let rendered = Rendered::of(film)?;
-        check(&rendered.provenance, scene, settings)?;
+        check(&rendered, scene, settings)?;
         let priority = rendered.priority(film)?;
         let Rendered { pixels, broken, pending, .. } = rendered;
         let pending = match pending {
@@ -101,7 +116,7 @@ impl Renderer {
 pub fn finished(path: &Path, scene: &Scene, settings: &Settings) -> Option<Film> {
     let film = image::read(path).ok()?;
     let rendered = Rendered::of(&film).ok()?;
-    check(&rendered.provenance, scene, settings).ok()?;
+    check(&rendered, scene, settings).ok()?;
     let done = match settings.allocate.is_even() {
         true => rendered.pixels.iter().all(|pixel| pixel.stats.count == settings.spp),
         false => rendered.pending.is_none(),
@@ -118,8 +133,8 @@ pub fn is_frame(film: &Film, scene: &Scene, settings: &Settings, history: &str) 
 }
 
 /// Whether a render of this scene can go on where the file's ended.
-fn check(provenance: &Provenance, scene: &Scene, settings: &Settings) -> std::result::Result<(), String> {
-    let uniform = settings.allocate.is_even();
+fn check(rendered: &Rendered, scene: &Scene, settings: &Settings) -> std::result::Result<(), String> {
+    let (Rendered { provenance, settings: former, .. }, uniform) = (rendered, settings.allocate.is_even());
     // By way of text: a number's shortest decimal is not its value in double precision.
     let text = serde_json::to_string(settings).map_err(|e| e.to_string())?;
     let mut wanted: Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
@@ -131,7 +146,8 @@ fn check(provenance: &Provenance, scene: &Scene, settings: &Settings) -> std::re
     }
     if wanted != had {
         let free = if uniform { "; only spp may differ" } else { "" };
-        return Err(format!("was rendered with other settings{free}: {}", provenance.settings));
+        let former = Settings { spp: if uniform { settings.spp } else { former.spp }, ..former.clone() };
+        return Err(format!("was rendered with other settings{free}: {}", settings.differences(&former)));
     }
     provenance.shows(scene, settings)?;
     // A pixel goes on at the index of its first sample plus their number.

@@ -165,6 +165,30 @@ fn what_placed_samples_lack_is_within_their_budget() {
 }
 
 #[test]
+fn a_render_that_has_more_samples_than_are_asked_for_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    well(render(&folder, "--spp 6 -o a.exr"));
+    let before = std::fs::read(folder.path().join("a.exr")).unwrap();
+    let fewer = render(&folder, "--spp 5 --resume a.exr -o a.exr");
+    complains(&fewer, 2, &["a.exr", "has 6 samples a pixel, more than --spp 5"]);
+    assert!(std::fs::read(folder.path().join("a.exr")).unwrap() == before, "it was replaced");
+    well(render(&folder, "--spp 6 --resume a.exr -o b.exr"));
+    assert_eq!(counts(&mut read(&folder, "b.exr"), "samples"), &[6; 64], "as many are no contradiction");
+}
+
+#[test]
+fn settings_that_keep_a_render_from_going_on_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    well(render(&folder, "--spp 2 -o a.exr"));
+    let other = render(&folder, "--spp 4 --clamp-indirect 1.1 --filter tent --resume a.exr -o b.exr");
+    let parts = ["only spp may differ: filter was box, now tent; clamp-indirect was 0, now 1.1"];
+    complains(&other, 3, &parts);
+    assert!(String::from_utf8_lossy(&other.stderr).trim_end().ends_with(parts[0]), "{other:?}");
+    let placed = render(&folder, "--spp 4 --allocate geometry --resume a.exr -o b.exr");
+    complains(&placed, 3, &["other settings: spp was 2, now 4; policy was uniform, now geometry"]);
+}
+
+#[test]
 fn light_that_is_not_kept_apart_is_not_halved() {
     let folder = tempfile::tempdir().unwrap();
     well(render(&folder, "--spp 2 -o a.exr"));

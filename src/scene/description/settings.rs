@@ -116,6 +116,14 @@ impl Settings {
         self.allocate.check_together()
     }
 
+    /// In what they differ from others: the names, and both values.
+    pub fn differences(&self, old: &Self) -> String {
+        let pairs = old.entries().into_iter().zip(self.entries());
+        let differ = pairs.filter(|(old, new)| old.value != new.value);
+        let said = differ.map(|(old, new)| format!("{} was {}, now {}", old.name, old.value, new.value));
+        said.collect::<Vec<_>>().join("; ")
+    }
+
     /// Number of pixels of the film.
     pub fn pixels(&self) -> usize {
         self.width as usize * self.height as usize
