@@ -34,7 +34,7 @@ Exit codes:
   4    device or memory: no Vulkan, no usable device, it was lost, or memory is out
   5    output: a file cannot be written
   6    some points of a measurement, or frames of a sequence, failed; the others are written
-  7    too noisy to say: compare --statistical finds no difference, but could have missed one, or profiles cannot be compared
+  7    too noisy to say: compare --statistical finds no difference, but could have missed one, or profiles are of other devices or clocks
   70   internal error: a bug, please report it
   130  interrupted (Ctrl-C)";
 
@@ -68,7 +68,7 @@ pub enum Exit {
     LimitExceeded = 1,
     /// Some points of a measurement, or frames of a sequence, failed; the others are there.
     PartlyFailed = 6,
-    /// A test found nothing, and would have missed what it was to find; or profiles cannot be compared.
+    /// A test found nothing, and would have missed what it was to find; or profiles are of devices or clocks that differ.
     Undecided = 7,
     /// The command was stopped by Ctrl-C or another signal.
     Interrupted = 130,

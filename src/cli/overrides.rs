@@ -6,7 +6,7 @@ use clap::ValueEnum;
 use clap::builder::PossibleValue;
 
 /// Settings given on the command line.
-#[derive(clap::Args, Clone, Debug, Default)]
+#[derive(clap::Args, Clone, Debug, Default, PartialEq)]
 #[command(next_help_heading = "Settings", mut_args(with_ranges(Settings::default().entries())))]
 pub struct Overrides {
     /// Settings of the film.

@@ -22,11 +22,11 @@ use std::path::PathBuf;
 pub struct Args {
     /// Scene file (.toml, .gltf, .glb), model (.obj, .ply), or the .json of an earlier profile, to compare it without another run
     pub scene: PathBuf,
-    /// Frames to time, and as many more without timestamps; 20 and more for a 95th percentile
-    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u16).range(1..=10_000))]
-    pub frames: u16,
-    /// Compare with an earlier profile that --json printed: exit code 1 when something changed by more than
-    /// its noise, 7 when that cannot be said
+    /// Frames to time, and as many more without timestamps; 20 and more for a 95th percentile [default: 20]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=10_000))]
+    pub frames: Option<u16>,
+    /// Compare with an earlier profile of the scene and the settings that --json printed: exit code 1 when something changed by
+    /// more than its noise, 7 when that cannot be said
     #[arg(long, value_name = "FILE")]
     pub compare: Option<PathBuf>,
     /// Write the times of every frame to a .csv
@@ -41,9 +41,9 @@ pub struct Args {
     /// Device, by index or part of its name [default: the best one]
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
-    /// Who finds what rays meet
-    #[arg(long, value_enum, default_value_t)]
-    pub tracing: Tracing,
+    /// Who finds what rays meet [default: auto]
+    #[arg(long, value_enum)]
+    pub tracing: Option<Tracing>,
     /// Run under the Vulkan validation layers and fail on any message; times mean little then
     #[arg(long)]
     pub validation: bool,
@@ -71,13 +71,14 @@ struct Report<'a> {
 /// Runs the subcommand.
 ///
 /// # Errors
-/// As a render of the scene, [`Error::Input`] for a profile that cannot be read, [`Error::Output`].
+/// As a render of the scene, [`Error::Input`] for a profile that cannot be read, [`Error::Usage`] for one of something else,
+/// [`Error::Output`].
 pub fn run(args: &Args) -> Result<Exit> {
     check_outputs(args)?;
     let old = args.compare.as_deref().map(Profile::read).transpose()?;
     let (profile, trace) = match args.is_earlier() {
         true => (Profile::read(&args.scene)?, None),
-        false => fresh::profile(args)?,
+        false => fresh::profile(args, old.as_ref())?,
     };
     let comparison = old.map(|old| Comparison::new(&old, &profile)).transpose()?;
     let csv = args.csv.iter().map(|path| Item::bytes(path.clone(), text::csv(&profile).into_bytes()));
@@ -100,12 +101,26 @@ impl Args {
     fn is_earlier(&self) -> bool {
         self.scene.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"))
     }
+
+    /// Whether an option is given that only frames which run now can follow.
+    fn says_how_to_render(&self) -> bool {
+        let Self { frames, denoise, device, tracing, validation, overrides, .. } = self;
+        let options = [frames.is_some(), denoise.is_some(), device.is_some(), tracing.is_some(), *validation];
+        options.contains(&true) || *overrides != Overrides::default()
+    }
 }
 
-/// What cannot be written is told before frames are run.
+/// What cannot be written or followed is told before frames are run.
 fn check_outputs(args: &Args) -> Result<()> {
     if args.is_earlier() && args.trace.is_some() {
         return Err(Error::Usage("a trace is of frames that run now: give --trace with a scene".to_owned()));
+    }
+    if args.is_earlier() && args.says_how_to_render() {
+        return Err(Error::Usage(format!(
+            "{}: of an earlier profile no frames run: leave out --frames, --denoise, --device, --tracing, --validation and settings \
+             such as --spp, or give the scene",
+            args.scene.display()
+        )));
     }
     let csv = args.csv.iter().map(|path| ("--csv", path.as_path()));
     let outputs: Vec<_> = csv.chain(args.trace.iter().map(|path| ("--trace", path.as_path()))).collect();

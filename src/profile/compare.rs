@@ -1,7 +1,7 @@
 //! Two profiles of one scene, told apart where the difference is more than their noise.
 use super::record::Profile;
 use super::spread::Spread;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use serde::Serialize;
 
 /// What a change must exceed: this many times the range of repeats, this many steps of the clock, milliseconds, and a share of the
@@ -54,7 +54,7 @@ pub enum Verdict {
     Same,
     /// Something did.
     Changed,
-    /// The profiles cannot be compared.
+    /// Devices, drivers or clocks differ, or there are too few frames.
     Inconclusive,
 }
 
@@ -73,9 +73,9 @@ impl Comparison {
     /// Compares.
     ///
     /// # Errors
-    /// [`Error::Usage`] for profiles of another scene, other settings or another filter.
+    /// Those of [`Subject::check_beside`](super::Subject::check_beside).
     pub fn new(old: &Profile, new: &Profile) -> Result<Self> {
-        check_alike(old, new)?;
+        new.subject().check_beside(old)?;
         let noise = Noise { quantum_ms: QUANTA * quantum_ms(old, new), frame_ms: old.frame_ms.median };
         let mut rows = vec![noise.row("frame", Some(&old.frame_ms), Some(&new.frame_ms))];
         let of = |profile: &Profile, pass: &str| profile.passes.iter().find(|p| p.pass == pass).map(|p| p.ms.clone());
@@ -124,19 +124,6 @@ impl Noise {
 
 fn quantum_ms(old: &Profile, new: &Profile) -> f64 {
     old.timer.quantum_ns.max(new.timer.quantum_ns) as f64 * 1e-6
-}
-
-fn check_alike(old: &Profile, new: &Profile) -> Result<()> {
-    let filter = |profile: &Profile| profile.denoise.clone().unwrap_or_else(|| "none".to_owned());
-    let what = match () {
-        () if old.scene_fingerprint != new.scene_fingerprint => {
-            format!("it is of another scene, {}, or the scene was changed", old.scene)
-        }
-        () if old.settings != new.settings => "the settings differ".to_owned(),
-        () if old.denoise != new.denoise => format!("filters differ: {} and {}", filter(old), filter(new)),
-        () => return Ok(()),
-    };
-    Err(Error::Usage(format!("the old profile cannot be compared: {what}: profile both alike")))
 }
 
 /// Why times of the two mean nothing side by side.

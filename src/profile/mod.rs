@@ -14,6 +14,6 @@ pub use ceilings::Ceilings;
 pub use compare::{Change, Comparison, Row, Verdict};
 pub use frames::{FrameRun, Frames, Workload};
 pub use measure::{Measured, denoiser, measure};
-pub use record::{Host, Limit, Overhead, PassProfile, Profile, SCHEMA, Timer};
+pub use record::{Host, Limit, Overhead, PassProfile, Profile, SCHEMA, Subject, Timer};
 pub use spread::{Spread, median};
 pub use work::{Amount, Work};

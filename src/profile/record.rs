@@ -56,6 +56,40 @@ pub struct Profile {
     pub overhead: Overhead,
 }
 
+/// What a profile is of. Times of two that are not of the same say nothing side by side.
+#[derive(Clone, Copy, Debug)]
+pub struct Subject<'a> {
+    /// What is rendered.
+    pub settings: &'a Settings,
+    /// [`crate::scene::Scene::fingerprint`].
+    pub scene_fingerprint: &'a str,
+    /// Name of the filter behind it.
+    pub denoise: Option<&'a str>,
+}
+
+impl Subject<'_> {
+    /// Checks that an older profile is of the same, which is known before frames are run.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with what differs.
+    pub fn check_beside(&self, old: &Profile) -> Result<()> {
+        let before = old.subject();
+        let [former, filter] = [before.denoise, self.denoise].map(|name| name.unwrap_or("none"));
+        let what = match () {
+            // Before the scene, whose fingerprint depends on the film's size.
+            () if before.settings != self.settings => {
+                format!("the settings differ: {}", self.settings.differences(before.settings))
+            }
+            () if before.scene_fingerprint != self.scene_fingerprint => {
+                format!("it is of another scene, {}, or the scene was changed", old.scene)
+            }
+            () if before.denoise != self.denoise => format!("filters differ: {former} and {filter}"),
+            () => return Ok(()),
+        };
+        Err(Error::Usage(format!("the old profile cannot be compared: {what}: profile both alike")))
+    }
+}
+
 /// A device, its driver and its processor.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Host {
@@ -162,6 +196,12 @@ impl Profile {
             mrays_s: frame_work.counters.rays() as f64 * 1e-3 / path_ms.max(1e-9),
             overhead: Overhead::of(&frames.timed, &frames.untimed),
         })
+    }
+
+    /// What it is of.
+    pub fn subject(&self) -> Subject<'_> {
+        let Self { settings, scene_fingerprint, denoise, .. } = self;
+        Subject { settings, scene_fingerprint, denoise: denoise.as_deref() }
     }
 
     /// Reads what `tallow profile --json` printed.

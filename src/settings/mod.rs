@@ -92,7 +92,7 @@ macro_rules! settings {
 
         $(
             $(#[$part_meta])*
-            #[derive(Clone, Debug, Default)]
+            #[derive(Clone, Debug, Default, PartialEq)]
             #[cfg_attr(feature = "cli", derive(clap::Args))]
             pub struct $Part {
                 $(

@@ -134,6 +134,43 @@ fn a_profile_is_the_same_as_itself_and_a_slower_one_is_not() {
     assert!(stdout(&unknown).starts_with("inconclusive: devices differ"), "{}", stdout(&unknown));
 }
 
+/// Frames of this size would take hours.
+#[test]
+fn a_profile_of_something_else_is_told_before_frames_run() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "old.json", &profile(&folder, &[]));
+    let long = ["profile", BOX, "--compare", "old.json", "--frames", "10000", "--height", "16", "--spp", "2"];
+    let run = |words: &[&str]| tallow(&folder, &[&long, words].concat());
+    complains(&run(&["--width", "4096"]), 2, &["the settings differ: width was 24, now 4096: profile both alike"]);
+    complains(&run(&["--width", "24", "--denoise", "atrous"]), 2, &["filters differ: none and atrous"]);
+    let other = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/moving/scene.toml");
+    let mut words = long;
+    words[1] = other;
+    let settings = ["--width", "24", "--max-depth", "8"];
+    let told = tallow(&folder, &[&words[..], &settings].concat());
+    complains(&told, 2, &["another scene"]);
+}
+
+#[test]
+fn an_earlier_profile_takes_no_options_of_a_render() {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder, "old.json", &steady(profile(&folder, &[])));
+    let run = |words: &[&str]| tallow(&folder, &[&["profile", "old.json", "--compare", "old.json"], words].concat());
+    for words in [
+        &["--spp", "8"][..],
+        &["--spp", "64"],
+        &["--allocate", "uniform"],
+        &["--frames", "20"],
+        &["--denoise", "atrous"],
+        &["--device", "0"],
+        &["--tracing", "auto"],
+        &["--validation"],
+    ] {
+        complains(&run(words), 2, &["old.json", "leave out"]);
+    }
+    assert_eq!(run(&["--csv", "a.csv", "--json"]).status.code(), Some(0), "control");
+}
+
 #[test]
 fn bad_profiles_and_options_are_one_line() {
     let folder = tempfile::tempdir().unwrap();

@@ -5,18 +5,21 @@ use crate::denoise::{self, filter, filter::Method, filter::Row};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, PassTime};
 use crate::memory;
-use crate::profile::{Measured, Profile, measure};
+use crate::profile::{Measured, Profile, Subject, measure};
 use crate::render::film;
 use crate::render::settings::Settings;
 use crate::report::trace::chrome_trace;
-use crate::scene::SceneFile;
+use crate::scene::{Scene, SceneFile};
 use indicatif::{ProgressBar, ProgressDrawTarget};
 
-/// The profile of a scene, and the trace of its frames.
+/// Frames that are timed unless a number is given.
+const FRAMES: u16 = 20;
+
+/// The profile of a scene, to be compared with an old one if there is one, and the trace of its frames.
 ///
 /// # Errors
-/// As a render of the scene.
-pub fn profile(args: &Args) -> Result<(Profile, Option<String>)> {
+/// As a render of the scene; [`Error::Usage`] for an old profile of something else.
+pub fn profile(args: &Args, old: Option<&Profile>) -> Result<(Profile, Option<String>)> {
     let filter = args.denoise.map(row).transpose()?;
     let mut file = SceneFile::open(&args.scene)?;
     file.stays_still();
@@ -28,9 +31,10 @@ pub fn profile(args: &Args) -> Result<(Profile, Option<String>)> {
     if is_talkative {
         scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
     }
-    let gpu = common::open(args.device.as_ref(), args.validation, args.tracing)?;
+    old.map_or(Ok(()), |old| check_beside(old, &scene, &settings, filter))?;
+    let gpu = common::open(args.device.as_ref(), args.validation, args.tracing.unwrap_or_default())?;
     check_room(args, &settings, &gpu)?;
-    let count = usize::from(args.frames);
+    let count = usize::from(args.frames.unwrap_or(FRAMES));
     let bar = ProgressBar::new(2 * count as u64 + 1);
     if !is_talkative {
         bar.set_draw_target(ProgressDrawTarget::hidden());
@@ -41,6 +45,12 @@ pub fn profile(args: &Args) -> Result<(Profile, Option<String>)> {
     let denoise = filter.map(|row| row.name.to_owned());
     let profile = Profile { denoise, ..Profile::new(&gpu, &args.scene, &scene, &settings, &measured)? };
     Ok((profile, args.trace.is_some().then(|| trace(&measured))))
+}
+
+/// Frames may run for long; what they cannot be compared with is told before.
+fn check_beside(old: &Profile, scene: &Scene, settings: &Settings, filter: Option<&Row>) -> Result<()> {
+    let scene_fingerprint = &scene.fingerprint([settings.width, settings.height])?.to_string();
+    Subject { settings, scene_fingerprint, denoise: filter.map(|row| row.name) }.check_beside(old)
 }
 
 /// The kernels of a filter.
