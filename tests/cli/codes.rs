@@ -164,6 +164,36 @@ fn a_small_number_is_the_index_of_a_device_and_nothing_else() {
     assert_eq!(on(&found[usable].name[..4].to_uppercase()).status.code(), Some(0), "control: a part of a name");
 }
 
+/// Options of a command's help, each with all that is said of it.
+fn options(help: &str) -> Vec<String> {
+    let mut options: Vec<String> = Vec::new();
+    for line in help.lines() {
+        match options.last_mut() {
+            _ if line.trim_start().starts_with('-') => options.push(line.trim().to_owned()),
+            Some(option) => *option += &format!(" {}", line.trim()),
+            None => {}
+        }
+    }
+    options
+}
+
+#[test]
+fn no_option_has_two_defaults() {
+    let folder = tempfile::tempdir().unwrap();
+    for command in ["render", "sequence", "filter", "compare", "cost", "merge", "explain", "profile", "devices"] {
+        let help = stdout(&tallow(&folder, &[command, "--help"]));
+        let options = options(&help);
+        assert!(options.iter().any(|option| option.contains("--help")), "control: {help}");
+        let twice = options.iter().find(|option| option.matches("[default: ").count() > 1);
+        assert_eq!(twice, None, "{command}");
+    }
+    let help = stdout(&tallow(&folder, &["cost", "--help"]));
+    for (option, default) in [("--spp <LIST>", "1,2,4,8,16"), ("--rounds <LIST>", "0"), ("--width <N>", "512")] {
+        let said = options(&help).into_iter().find(|said| said.starts_with(option)).unwrap_or_else(|| panic!("{help}"));
+        assert!(said.contains(&format!("[default: {default}]")), "{said}");
+    }
+}
+
 /// Events of a thread of the trace: name, begin and end in microseconds.
 fn spans(trace: &Value, thread: &str) -> Vec<(String, f64, f64)> {
     let events = trace["traceEvents"].as_array().unwrap();

@@ -10,7 +10,8 @@ use crate::error::{Error, Result};
 use crate::gpu::Tracing;
 use crate::render::settings::{Film, Settings};
 use crate::render::{Reproject, ReprojectOverrides, Reprojection};
-use clap::Parser;
+use crate::settings::entry::Entry;
+use clap::{Arg, Args as _, Parser};
 use std::path::PathBuf;
 
 /// Measure how much time buys how much accuracy, by which method
@@ -124,11 +125,18 @@ pub struct Args {
 
 /// Settings of the film, with their ranges in the help.
 #[derive(clap::Args)]
-#[command(next_help_heading = "Film", mut_args(with_ranges(Settings::default().entries())))]
+#[command(next_help_heading = "Film", mut_args(with_ranges_of_film()))]
 pub struct FilmOptions {
     /// Settings of the film.
     #[command(flatten)]
     film: Film,
+}
+
+/// Ranges of the film's settings and no others: this reaches the options of the grid too, and its lists have names of settings.
+fn with_ranges_of_film() -> impl FnMut(Arg) -> Arg {
+    let film = Film::augment_args(clap::Command::new("film"));
+    let is_of_film = |entry: &Entry| film.get_arguments().any(|arg| arg.get_long() == Some(&*entry.name));
+    with_ranges(Settings::default().entries().into_iter().filter(is_of_film).collect())
 }
 
 impl FilmOptions {
