@@ -292,6 +292,10 @@ pub fn load(args: &Args) -> Result<(Loaded, Settings)> {
         }
     }
     settings.validate()?;
+    // A plan chooses the samples, and says itself what it cannot keep to.
+    if args.time.is_none() && args.error.is_none() {
+        settings.check_most()?;
+    }
     Ok((file.load()?, settings))
 }
 

@@ -77,8 +77,8 @@ pub struct Plan {
 /// among, [`filter::find`] of `none` standing for no filter.
 ///
 /// # Errors
-/// [`Error::Usage`] for a target out of range or out of reach, for settings with a noise threshold, and for an empty list of methods;
-/// [`Error::Device`].
+/// [`Error::Usage`] for a target out of range or out of reach, for settings with a noise threshold or with a largest number of samples
+/// that their policy does not place by, and for an empty list of methods; [`Error::Device`].
 pub fn plan(gpu: &Gpu, scene: &Scene, settings: &Settings, methods: &[Method], target: Target) -> Result<Plan> {
     check(settings, methods, target)?;
     let mut probe = Probe::new(gpu, scene, settings, methods)?;
@@ -135,6 +135,10 @@ fn check(settings: &Settings, methods: &[Method], target: Target) -> Result<()> 
     }
     if settings.allocate.noise_threshold > 0.0 {
         let what = "a noise threshold ends a render by itself: give it, or a time or an error";
+        return Err(Error::Usage(what.to_owned()));
+    }
+    if settings.allocate.is_even() && settings.allocate.max_spp > 0 {
+        let what = "the samples of a policy that spreads them evenly are what is planned: leave out max_spp, or choose another policy";
         return Err(Error::Usage(what.to_owned()));
     }
     if methods.is_empty() {

@@ -115,6 +115,7 @@ impl Renderer {
         effects: Effects,
     ) -> Result<Self> {
         settings.validate()?;
+        settings.check_most()?;
         scene.check()?;
         let policy = settings.allocate.policy;
         let split_light = outputs.split_light || policy.split_light;

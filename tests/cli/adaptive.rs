@@ -260,9 +260,12 @@ fn what_cannot_be_done_is_one_line() {
     complains(&fails("--allocate everywhere"), 2, &["everywhere", "geometry"]);
     complains(&fails("--allocate both --window 11"), 2, &["window", "2 to 10"]);
     complains(&fails("--allocate both --min-spp 5 --max-spp 4"), 2, &["min-spp", "max-spp"]);
+    complains(&fails("--min-spp 1 --max-spp 1"), 2, &["max-spp is 1", "uniform", "spp, 2"]);
     complains(&fails("--noise-threshold 0.1 --allocate uniform"), 2, &["noise-threshold", "variance or both"]);
     complains(&fails("--resume none.exr"), 3, &["none.exr"]);
     assert!(fails("").status.success());
+    assert!(fails("--max-spp 2").status.success(), "no pixel exceeds that");
+    assert!(fails("--allocate geometry --min-spp 1 --max-spp 3").status.success());
     complains(&fails("--resume x.exr --seed 3"), 3, &["x.exr", "other settings"]);
     let mut bare = Film::new(8, 8);
     bare.add_vec3("", ["R", "G", "B"], &[[0.0; 3]; 64]);

@@ -64,6 +64,8 @@ fn what_cannot_be_planned_is_told_in_one_line() {
     complains(&small("--error=-1"), 2, &["an error of -1", "above 0"]);
     complains(&small("--error 1e-30"), 2, &["relMSE", "samples a pixel"]);
     complains(&small("--time 1s --noise-threshold 0.1"), 2, &["a noise threshold ends a render by itself"]);
+    complains(&small("--time 1s --max-spp 9"), 2, &["leave out max_spp", "another policy"]);
+    complains(&small("--error 0.5 --max-spp 9000"), 2, &["leave out max_spp"]);
     complains(&small("--time 1s --spp 4"), 2, &["--spp"]);
     complains(&small("--plan none.json"), 3, &["none.json"]);
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();

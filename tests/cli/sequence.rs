@@ -183,6 +183,7 @@ fn options_that_cannot_be_are_one_line() {
         ("--frames 0..3 --fps 0", "--fps 0: choose a number above 0"),
         ("--frames 0..3 --pixel 1,1", "--pixel is for one image"),
         ("--frames 0..3 --checkpoint 1", "--checkpoint is for one image"),
+        ("--frames 0..3 --min-spp 1 --max-spp 1", "max-spp is 1: the policy uniform"),
         ("--frames 0..3 --preview a.png", "a preview goes to a .gif"),
         ("--only 99999", "none of the frames"),
         ("--frames 0..3 --reproject forward --max-spp 9", "set neither noise_threshold nor max_spp"),

@@ -1,7 +1,7 @@
 //! Every choice a user makes about a render. The command line and the tables of a scene file fill the same struct;
 //! [`Settings::validate`] is the only check.
 pub use crate::allocate::{Allocate, AllocateOverrides, Placing};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::layout::{PIXEL_FILTER_BOX, PIXEL_FILTER_GAUSSIAN, PIXEL_FILTER_POINT, PIXEL_FILTER_TENT};
 use crate::settings::{FINITE_FROM_0, choices, entry, settings};
 use serde::{Deserialize, Serialize};
@@ -114,6 +114,22 @@ impl Settings {
     pub fn validate(&self) -> Result<()> {
         entry::check(&self.entries())?;
         self.allocate.check_together()
+    }
+
+    /// Checks that no pixel is to get more samples than `max_spp`, which policies that place samples see to by themselves. The
+    /// settings of a file need not pass, since options may choose another policy.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Usage`].
+    pub fn check_most(&self) -> Result<()> {
+        let (most, spp, policy) = (self.allocate.max_spp, self.spp, self.allocate.policy.name);
+        match self.allocate.is_even() && (1..spp).contains(&most) {
+            true => Err(Error::Usage(format!(
+                "max-spp is {most}: the policy {policy} gives every pixel the samples of spp, {spp}: lower that, or choose \
+                 another policy"
+            ))),
+            false => Ok(()),
+        }
     }
 
     /// In what they differ from others: the names, and both values.
