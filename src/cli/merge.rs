@@ -1,6 +1,6 @@
 //! `tallow merge`: combines renders of the same picture with different samples into one.
 use super::{Exit, complain};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::image::{self, WriteOptions};
 use crate::render::{self, Gap, Merged};
 use std::path::PathBuf;
@@ -24,9 +24,13 @@ pub struct Args {
 /// Runs the subcommand.
 ///
 /// # Errors
-/// As [`render::merge()`], and [`crate::error::Error::Output`].
+/// As [`render::merge()`], [`Error::Usage`] for a file that cannot hold all layers, and [`Error::Output`].
 pub fn run(args: &Args) -> Result<Exit> {
     image::check_writable(&args.output)?;
+    if !image::has_layers(&args.output) {
+        let name = args.output.display();
+        return Err(Error::Usage(format!("{name}: a merged render keeps all of its layers: choose a name with .exr")));
+    }
     let Merged { film, gaps } = render::merge(&args.files)?;
     image::write(&args.output, &film, &WriteOptions::default())?;
     for Gap { seed, first, last } in gaps {

@@ -189,6 +189,18 @@ fn settings_that_keep_a_render_from_going_on_are_named() {
 }
 
 #[test]
+fn a_file_without_layers_takes_no_merged_render() {
+    let folder = tempfile::tempdir().unwrap();
+    well(render(&folder, "--spp 2 -o a.exr"));
+    well(render(&folder, "--spp 2 --first-sample 2 -o b.exr"));
+    for name in ["m.png", "m.hdr"] {
+        complains(&run(&folder, &format!("merge a.exr b.exr -o {name}")), 2, &[name, ".exr"]);
+        assert!(!folder.path().join(name).exists());
+    }
+    well(run(&folder, "merge a.exr b.exr -o m.EXR"));
+}
+
+#[test]
 fn light_that_is_not_kept_apart_is_not_halved() {
     let folder = tempfile::tempdir().unwrap();
     well(render(&folder, "--spp 2 -o a.exr"));
