@@ -1,5 +1,5 @@
 //! Every choice a user makes about a render. The command line and the tables of a scene file fill the same struct;
-//! [`Settings::validate`] is the only check.
+//! [`Settings::validate`] checks each by itself and together, [`Settings::check_most`] what only a render can say.
 pub use crate::allocate::{Allocate, AllocateOverrides, Placing};
 use crate::error::{Error, Result};
 use crate::layout::{PIXEL_FILTER_BOX, PIXEL_FILTER_GAUSSIAN, PIXEL_FILTER_POINT, PIXEL_FILTER_TENT};
