@@ -62,9 +62,9 @@ impl<'a> Recorder<'a> {
     ///   [`Buffer::read_range`] or [`Buffer::write`], by [`Gpu::run`], by what calls any of these, or by another such submission,
     ///   unless a semaphore orders the two. What calls them is all that returns what the device has found or gives the device what
     ///   the host has: of a [`Renderer`](crate::render::Renderer) `picture`, `counters`, `broken_samples`, `apportionment`,
-    ///   `listed`, `priorities_of`, `carriage`, `resume`, `take_up`, `add_history`, `keep_history`, `begin_frame`, `look_up` and `run`, every function of a
-    ///   [`Job`](crate::render::Job), and of a [`Denoiser`](crate::denoise::Denoiser) `scales`. All of these are safe functions,
-    ///   and nothing but this promise keeps them from memory that the device is writing.
+    ///   `listed`, `priorities_of`, `carriage`, `resume`, `take_up`, `add_history`, `keep_history`, `begin_frame`, `look_up` and
+    ///   `run`, every function of a [`Job`](crate::render::Job), and of a [`Denoiser`](crate::denoise::Denoiser) `scales`. All of
+    ///   these are safe functions, and nothing but this promise keeps them from memory that the device is writing.
     /// - The recorder is dropped before the command buffer is ended.
     ///
     /// # Errors
