@@ -86,14 +86,19 @@ impl Files {
         files.filter_map(|item| self.save_one(item, whole)).collect()
     }
 
-    /// Writes the items that are pipes or devices and returns their paths. A pipe may have no reader, so from here on a signal
-    /// ends the process at once. So does one that came while the other files were written, unless it is the reason why they
-    /// are not `whole`.
+    /// Writes the items that are pipes or devices and returns their paths. A pipe may have no reader, so a signal ends the
+    /// process at once where there is one. So does one that came while the other files were written, unless it is the reason
+    /// why they are not `whole`.
     pub fn pipe(&mut self, items: &[Item], whole: bool) -> Vec<PathBuf> {
         let pipes = items.iter().filter(|item| output::is_special(&item.path));
         let written = pipes.filter_map(|item| self.pipe_one(item, whole)).collect();
-        interrupt::leave_at_once("interrupted: all files are written");
+        interrupt::flag();
         written
+    }
+
+    /// From here on a signal ends the process at once: the last of its files is written, and what it prints may have no reader.
+    pub fn end(&self) {
+        interrupt::leave_at_once("interrupted: all files are written");
     }
 
     /// All failures so far as one error.

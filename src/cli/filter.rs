@@ -191,6 +191,7 @@ fn write<'a>(args: &'a Args, clean: &'a Source) -> (Vec<String>, Files) {
     let mut files = Files::default();
     let mut written = files.save(&items, true);
     written.extend(files.pipe(&items, true));
+    files.end();
     (written.iter().map(|path| path.display().to_string()).collect(), files)
 }
 

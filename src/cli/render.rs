@@ -238,22 +238,22 @@ impl Taken<'_> {
         &mut self.outcome.film
     }
 
-    /// Writes what was rendered, filters it, and tells how it went. Where the noisy image is written `first`, it is there whatever
-    /// becomes of the filter, which a signal ends.
+    /// Writes what was rendered, filters it, and tells how it went. One that is `alone`, and no frame of many, is written before it
+    /// is filtered, too: the noisy image is there whatever becomes of the filter, which a signal ends. So does one at the end.
     ///
     /// # Errors
     /// Of every kind; an output that fails keeps no other from being written.
-    pub fn finish(&mut self, args: &Args, first: bool) -> Result<Ended> {
+    pub fn finish(&mut self, args: &Args, alone: bool) -> Result<Ended> {
         let whole = self.is_whole();
         let Self { outcome, noisy, files, checkpoint } = self;
         let Outcome { gpu, film, host, status, plan, notes, .. } = &mut *outcome;
         let (filter, mut written) = (args.denoise.zip(noisy.take()).filter(|_| whole), Vec::new());
-        if first || filter.is_none() {
+        if alone || filter.is_none() {
             written = host.time("write", || Ok(outputs::save(args, film, files, checkpoint.take(), whole)))?;
         }
         if let Some((method, noisy)) = filter {
             let line = files.with_failures("interrupted: the noisy image was written, --denoise was not finished");
-            if first && interrupt::leave_at_once(&line) {
+            if alone && interrupt::leave_at_once(&line) {
                 interrupt::leave(&line);
             }
             let planned = plan.is_some();
@@ -268,6 +268,9 @@ impl Taken<'_> {
         files.save(&more, whole);
         written.extend(files.pipe(&outputs::items(args, film), whole));
         files.pipe(&more, whole);
+        if alone {
+            files.end();
+        }
         report(args, &outcome.summary(&written))?;
         files.failure().map_or(Ok(()), Err)?;
         Ok(Ended { exit: if whole { Exit::Done } else { Exit::Interrupted }, written })

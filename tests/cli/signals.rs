@@ -1,6 +1,6 @@
 //! Tests signals to the built program: which ones it obeys or ignores, and what it saves.
 #![cfg(target_os = "linux")]
-use crate::child::{LONG, OFTEN, Running, SMALL, command, scene};
+use crate::child::{LONG, OFTEN, Running, SMALL, command, scene, spp_of_steps};
 use crate::command::complains;
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
@@ -35,7 +35,7 @@ fn mkfifo(folder: &TempDir, name: &str) {
 #[test]
 fn what_the_caller_has_switched_off_stays_off() {
     let folder = tempfile::tempdir().unwrap();
-    let words = format!("render {} {SMALL} {OFTEN} --spp 400 -o a.exr", scene());
+    let words = format!("render {} {SMALL} {OFTEN} --spp {} -o a.exr", scene(), spp_of_steps(96 * 80));
     let mut nohup = Command::new("sh");
     let script = format!("trap '' HUP INT; exec \"$0\" {words}");
     nohup.args(["-c", &script, env!("CARGO_BIN_EXE_tallow")]).current_dir(folder.path());
@@ -49,7 +49,9 @@ fn what_the_caller_has_switched_off_stays_off() {
 
 #[test]
 fn signals_that_come_together_ask_once() {
-    for volley in [&["TERM", "HUP"][..], &["INT", "INT", "INT"], &["HUP", "INT", "TERM", "HUP"]] {
+    // Those of a stopped process come at once when it goes on, each once.
+    let at_once = ["STOP", "HUP", "INT", "TERM", "CONT"];
+    for volley in [&["TERM", "HUP"][..], &["INT", "INT", "INT"], &at_once] {
         let folder = tempfile::tempdir().unwrap();
         let mut running = start(&folder, &format!("render {} {LONG} {OFTEN} -o a.exr", scene()));
         running.until_there_is("a.partial.exr");
@@ -222,15 +224,21 @@ fn explain_is_one_process() {
 
 #[test]
 fn nothing_hidden_stays_whatever_ends_it() {
-    let folder = in_memory();
     for signal in ["KILL", "QUIT", "KILL"] {
-        let mut running = start(&folder, &format!("render {} {LONG} {OFTEN} -o a.exr", scene()));
+        let folder = in_memory();
+        let mut shell = Command::new("sh");
+        // QUIT may leave an image of the process's memory.
+        let script =
+            format!("ulimit -c 0; exec env --default-signal=QUIT \"$0\" render {} {LONG} {OFTEN} -o a.exr", scene());
+        shell.args(["-c", &script, env!("CARGO_BIN_EXE_tallow")]).current_dir(folder.path());
+        let mut running = Running::start(shell, folder.path());
         running.until("a checkpoint", |folder| names(folder).iter().any(|name| name.ends_with(".exr")));
         running.send(&[signal]);
         assert!(running.end().status.signal().is_some());
         assert!(names(folder.path()).iter().all(|name| name.ends_with(".exr")), "{:?}", names(folder.path()));
     }
     // Control: a file that is being written cannot be seen, whenever that is.
+    let folder = in_memory();
     let path = folder.path().join("b.exr");
     let before = names(folder.path());
     image::output::write_with(&path, |stream| {
@@ -243,9 +251,9 @@ fn nothing_hidden_stays_whatever_ends_it() {
 }
 
 /// Kills a render that writes checkpoints, and resumes it.
-fn killed(words: &str) {
+fn killed(words: &str, spp: u64) {
     let folder = tempfile::tempdir().unwrap();
-    let words = format!("render {} {SMALL} --spp 400 {words}", scene());
+    let words = format!("render {} {SMALL} --spp {spp} {words}", scene());
     let mut running = start(&folder, &format!("{words} {OFTEN} -o a.exr"));
     running.until_there_is("a.partial.exr");
     running.send(&["KILL"]);
@@ -268,8 +276,8 @@ fn killed(words: &str) {
 
 #[test]
 fn a_killed_render_goes_on_from_its_checkpoint() {
-    killed("");
-    killed("--allocate variance --rounds 20");
+    killed("", spp_of_steps(96 * 80));
+    killed("--allocate variance --rounds 20", 100);
 }
 
 #[test]

@@ -3,7 +3,7 @@ use super::chain::Chain;
 use super::preview::Preview;
 use super::{Args, FrameReport};
 use crate::cli::render::{self, EffectChoice, Spans, outputs};
-use crate::cli::{Exit, complain, interrupt};
+use crate::cli::{Exit, complain};
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu};
 use crate::image::{self, Film, NOISY};
@@ -167,8 +167,6 @@ impl<'a> Stage<'a> {
             end.carriage = self.renderer.as_ref().map(Renderer::carriage).transpose()?;
         }
         let exit = shot.finish(&args, false)?.exit;
-        // A signal is heard before the next frame begins, so that this one is told.
-        interrupt::flag();
         show(preview, shot.film(), &args)?;
         self.chain = self.chain.with(&self.scene, &settings, self.reproject)?;
         self.held = self.reproject.map(|_| number);
