@@ -4,6 +4,7 @@ use crate::child::{command, scene};
 use crate::command::complains;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::LazyLock;
 use tallow::gpu::{DeviceOptions, Gpu};
 use tempfile::TempDir;
 
@@ -53,8 +54,13 @@ fn compile(source: &Path, library: &Path) {
 
 /// Puts `support/lost_loader.rs` before the loader, and says where that lies.
 fn stand_in(folder: &TempDir) -> PathBuf {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/support/lost_loader.rs");
-    compile(&source, &folder.path().join("libvulkan.so.1"));
+    static LIBRARY: LazyLock<Vec<u8>> = LazyLock::new(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let library = folder.path().join("libvulkan.so.1");
+        compile(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/support/lost_loader.rs"), &library);
+        std::fs::read(library).unwrap()
+    });
+    std::fs::write(folder.path().join("libvulkan.so.1"), &*LIBRARY).unwrap();
     loader()
 }
 

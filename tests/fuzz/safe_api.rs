@@ -104,6 +104,11 @@ fn word() -> impl Strategy<Value = u32> {
     ]
 }
 
+/// Of five of which each has a range, seldom all are right by chance.
+fn mostly_valid() -> impl Strategy<Value = f32> {
+    prop_oneof![9 => 0.01f32..1.0, 1 => any::<f32>()]
+}
+
 /// Overwrites a word of an array, or changes its length.
 fn scribble<T: bytemuck::Pod>(array: &mut Vec<T>, at: usize, value: u32, resize: bool) {
     if resize {
@@ -251,7 +256,7 @@ proptest! {
     }
 
     #[test]
-    fn settings(numbers in [word(), word(), word(), word(), word(), word(), word(), word()], floats in [any::<f32>(); 5]) {
+    fn settings(numbers in [word(), word(), word(), word(), word(), word(), word(), word()], floats in [mostly_valid(), mostly_valid(), mostly_valid(), mostly_valid(), mostly_valid()]) {
         let mut scene = SCENE.clone();
         let s = &mut scene.settings;
         // Films of a size that memory holds, or of one that is refused.
@@ -262,8 +267,12 @@ proptest! {
         (a.min_spp, a.max_spp, a.rounds, a.geometry.window) = (numbers[7], numbers[0], numbers[1], numbers[2]);
         (a.geometry.sigma_normal, a.geometry.sigma_position, a.noise_threshold, a.both.filtered) = (floats[1], floats[2], floats[3], floats[4]);
         a.policy = tallow::allocate::POLICIES[numbers[3] as usize % tallow::allocate::POLICIES.len()];
+        let renderer = Renderer::new(&GPU, &scene, &scene.settings, Outputs::default());
+        let s = &scene.settings;
         if s.validate().is_err() {
-            prop_assert!(Renderer::new(&GPU, &scene, &scene.settings, Outputs::default()).is_err());
+            prop_assert!(renderer.is_err());
+        } else if [s.width, s.height, s.spp.max(s.allocate.max_spp), s.max_depth, 1].iter().map(|&n| u64::from(n)).product::<u64>() < 1 << 14 {
+            prop_assert!(Job::new(&renderer.unwrap()).run_to_end(&mut FrameResources::new(&GPU).unwrap()).is_ok());
         }
     }
 

@@ -2,13 +2,22 @@
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
+use tallow::gpu::{DeviceOptions, Gpu};
 
 /// Options of a small render.
 pub const SMALL: &str = "--width 96 --height 80 --max-depth 3 --quiet";
-/// A render that ends by itself only after days.
-pub const LONG: &str = "--width 96 --height 80 --max-depth 3 --quiet --spp 10000000";
+/// A render that ends by itself only after days, of paths that end at once: what waits for its steps waits for less.
+pub const LONG: &str = "--width 96 --height 80 --max-depth 1 --quiet --spp 10000000";
 /// Writes checkpoints all the time.
 pub const OFTEN: &str = "--checkpoint 0.000001";
+
+/// Samples for each of so many pixels that take the device of the tests more than two steps, between which checkpoints are
+/// written and signals are heard. A step takes a GPU but milliseconds: there it is given many.
+pub fn spp_of_steps(pixels: u64) -> u64 {
+    let gpu = Gpu::open(&DeviceOptions::default()).unwrap();
+    let steps = if gpu.info().unified { 2.5 } else { 16.0 };
+    (steps * gpu.tuning().paths_in_flight as f64 / pixels as f64) as u64
+}
 
 /// Path of the scene that is rendered.
 pub fn scene() -> String {
@@ -57,7 +66,9 @@ impl Running {
     #[track_caller]
     pub fn until_it_listens(&mut self) {
         let status = format!("/proc/{}/status", self.id());
-        let caught = |line: &str| u64::from_str_radix(line.trim(), 16).unwrap() & (1 << 1) != 0;
+        // HUP, INT and TERM, which it installs one after the other.
+        const ALL: u64 = 1 | 1 << 1 | 1 << 14;
+        let caught = |line: &str| u64::from_str_radix(line.trim(), 16).unwrap() & ALL == ALL;
         self.until("it listened", |_| {
             let status = std::fs::read_to_string(&status).unwrap_or_default();
             status.lines().find_map(|line| line.strip_prefix("SigCgt:")).is_some_and(caught)

@@ -113,7 +113,12 @@ impl Engine {
                 .pfn_user_callback(Some(collect))
                 .user_data((&raw const *messages).cast_mut().cast());
             let messenger = utils.create_debug_utils_messenger(&info, None).unwrap();
-            let physical = instance.enumerate_physical_devices().unwrap()[0];
+            // The one that the program takes, too.
+            let name = super::own_gpu().info().name.clone();
+            let of_name = |&d: &vk::PhysicalDevice| {
+                instance.get_physical_device_properties(d).device_name_as_c_str().unwrap().to_str() == Ok(&name)
+            };
+            let physical = instance.enumerate_physical_devices().unwrap().into_iter().find(of_name).unwrap();
             let device = device(&instance, physical, tracing);
             let queue = device.get_device_queue(0, 0);
             let pool = device.create_command_pool(&vk::CommandPoolCreateInfo::default(), None).unwrap();

@@ -117,7 +117,7 @@ pub fn under_a_panel() -> Loaded {
 }
 
 /// A ray towards a point where triangles meet, `distance` away.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Aim {
     pub origin: Vec3,
     pub direction: Vec3,

@@ -22,7 +22,8 @@ fn plate(spp: u32, stratified: bool) -> FilterInput {
         let place = |k: u32| if stratified { (k as f32 + random(k)) / spp as f32 } else { random(k) };
         (0..spp).filter(|&k| place(k) < chance(i)).count() as f32
     };
-    let mean = |i: u32| BRIGHT * found(i) / spp as f32;
+    let means: Vec<f32> = (0..pixels).map(|i| BRIGHT * found(i) / spp as f32).collect();
+    let mean = |i: u32| means[i as usize];
     // Of the mean of `spp` values that are 0 or BRIGHT.
     let variance = |i: u32| mean(i) * (BRIGHT - mean(i)) / (spp - 1) as f32;
     let at = |i: u32| [(i % SIZE[0]) as f32, (i / SIZE[0]) as f32, 0.0];

@@ -411,8 +411,9 @@ fn mirrored_lamps_shine_as_rays_find_them() {
 #[test]
 fn either_way_to_find_light_gives_the_same_picture() {
     let compared = |scene: &Loaded| {
-        let strategies = [Strategy::Both, Strategy::Light, Strategy::Bsdf];
-        let [both, light, bsdf] = strategies.map(|strategy| mean(scene, strategy, 1024));
+        // Chance finds a small sun seldom.
+        let strategies = [(Strategy::Both, 256), (Strategy::Light, 256), (Strategy::Bsdf, 1024)];
+        let [both, light, bsdf] = strategies.map(|(strategy, samples)| mean(scene, strategy, samples));
         assert!(both.agrees(&light) && both.agrees(&bsdf), "both {both:?}\nlight {light:?}\nBSDF {bsdf:?}");
         [both, light, bsdf]
     };
@@ -422,7 +423,11 @@ fn either_way_to_find_light_gives_the_same_picture() {
     let mut scene = room("", 0.8);
     let [both, light, bsdf] = compared(&scene);
     assert!(!both.agrees(&dimmed), "control: the mask is seen");
-    assert!(both.error < light.error.min(bsdf.error), "joined, they are the least noisy: {both:?} {light:?} {bsdf:?}");
+    // As of as many samples.
+    assert!(
+        both.error < light.error.min(2.0 * bsdf.error),
+        "joined, they are the least noisy: {both:?} {light:?} {bsdf:?}"
+    );
     // Control: densities that do not belong together count some light twice.
     scene.triangle_pdf_scale *= 0.25;
     let wrong = mean(&scene, Strategy::Both, 1024);

@@ -118,6 +118,10 @@ fn spheres_are_what_fine_meshes_approach() {
     for (i, place) in PLACES.iter().enumerate() {
         for more in ["", "flip_normals = true"] {
             for instance in [false, true] {
+                // Each place once as it is and once turned inside out, the last in all ways: fine meshes take long.
+                if i < PLACES.len() - 1 && instance != (more.is_empty() == (i % 2 == 0)) {
+                    continue;
+                }
                 let exact = placed(place, instance, more);
                 let mesh = placed(place, instance, &format!("{more}\nsegments = 512"));
                 assert_eq!(

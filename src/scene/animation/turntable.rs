@@ -104,6 +104,12 @@ mod tests {
         for seconds in [0.0, 1.0, 3.0] {
             assert_eq!(position(0.0, seconds), position(2.0, seconds), "after {seconds} s");
         }
-        assert_ne!(position(2.0, 0.0), position(2.0, 1.0), "control");
+        // A quarter of the turn in each of the four seconds, counter-clockwise seen from above: from +x by way of -z.
+        let places = [0.0, 1.0, 2.0].map(|seconds| Vec3::from(position(2.0, seconds)));
+        let quarter = |p: Vec3| Vec3::new(p.z, p.y, -p.x);
+        for p in [quarter(places[0]).distance(places[1]), quarter(places[1]).distance(places[2])] {
+            assert!(p < 1e-5, "{places:?}");
+        }
+        assert!(places[0].distance(places[1]) > 1.0, "control: {places:?}");
     }
 }
