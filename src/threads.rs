@@ -6,6 +6,25 @@ use rayon::prelude::*;
 /// Runs `work` in the caller's thread pool if it is in one, else in a new pool. That has one thread per core, fewer if the
 /// system refuses so many, and in the last resort only the caller's thread. Rayon's global pool would panic instead.
 pub fn within<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    let mut made = None;
+    run(&mut once(work, &mut made));
+    made.unwrap_or_else(|| unreachable!("the work is done"))
+}
+
+/// A job that any number of types share, so that what Rayon makes of it is compiled once: `work`, and where its result goes.
+fn once<T: Send>(work: impl FnOnce() -> T + Send, made: &mut Option<T>) -> impl FnMut() + Send {
+    let mut work = Some(work);
+    move || *made = work.take().map(|work| work())
+}
+
+type Job<'a> = Box<dyn FnMut() + Send + 'a>;
+
+/// Does all jobs, side by side.
+fn all(jobs: &mut [Job]) {
+    run(&mut || jobs.par_iter_mut().for_each(|job| job()));
+}
+
+fn run(work: &mut (dyn FnMut() + Send)) {
     if rayon::current_thread_index().is_some() {
         return work();
     }
@@ -29,8 +48,9 @@ pub fn both<A: Send, B: Send>(
     first: impl FnOnce() -> Result<A> + Send,
     second: impl FnOnce() -> Result<B> + Send,
 ) -> Result<(A, B)> {
-    let (a, b) = within(|| rayon::join(first, second));
-    Ok((a?, b?))
+    let (mut a, mut b) = (None, None);
+    all(&mut [Box::new(once(first, &mut a)), Box::new(once(second, &mut b))]);
+    a.zip(b).map_or_else(|| unreachable!("both are made"), |(a, b)| Ok((a?, b?)))
 }
 
 /// Makes one thing of each item, likewise.
@@ -41,8 +61,10 @@ pub fn each<T: Send, U: Send, const N: usize>(
     items: [T; N],
     make: impl Fn(T) -> Result<U> + Sync + Send,
 ) -> Result<[U; N]> {
-    let made: Vec<_> = within(|| items.into_par_iter().map(make).collect());
-    let made = made.into_iter().collect::<Result<Vec<_>>>()?;
+    let mut made = [const { None }; N];
+    let jobs = items.into_iter().zip(&mut made);
+    all(&mut jobs.map(|(item, made)| -> Job { Box::new(once(|| make(item), made)) }).collect::<Vec<_>>());
+    let made = made.into_iter().flatten().collect::<Result<Vec<_>>>()?;
     Ok(made.try_into().unwrap_or_else(|_| unreachable!("one thing of each item")))
 }
 

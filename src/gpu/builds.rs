@@ -69,7 +69,7 @@ impl Recorder<'_> {
         let shape = PassShape::of_transfer(&kinds, acceleration.bytes());
         self.keep_structures(&acceleration.handles);
         // SAFETY: the frame keeps the structures and all buffers; addresses are of these and ranges within them.
-        self.pass(name, &accesses, shape, |_, commands| unsafe {
+        self.pass(name, &accesses, shape, &|_, commands| unsafe {
             queries.structures.cmd_build_acceleration_structures(commands, &infos, &ranges);
         })
     }

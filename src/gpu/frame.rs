@@ -1,13 +1,14 @@
 //! The resources that recording a frame needs. They are reused by later frames, so that only the first ones create any.
+use super::Gpu;
 use super::acceleration::Handles;
 use super::access::Hazards;
 use super::commands::Commands;
 use super::descriptors::Descriptors;
+use super::kernel::Compiled;
 use super::pipelines::Pipeline;
 use super::shape::{Pass, PassObserver, PassShape};
 use super::timing::{PassTime, Timer};
 use super::upload::Uploads;
-use super::{Gpu, Kernel};
 use crate::error::Result;
 use ash::vk;
 use std::sync::Arc;
@@ -122,7 +123,7 @@ impl FrameResources {
     }
 
     /// Keeps a kernel until the next reset.
-    pub(super) fn keep<B>(&mut self, kernel: &Kernel<B>) {
+    pub(super) fn keep(&mut self, kernel: &Compiled) {
         if !self.pipelines.iter().any(|kept| Arc::ptr_eq(kept, &kernel.pipeline)) {
             self.pipelines.push(kernel.pipeline.clone());
         }

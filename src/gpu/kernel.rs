@@ -144,16 +144,49 @@ pub const MAX_GROUPS: u32 = 65_535;
 
 /// A compiled kernel, specialised by its constants. `B` is the kernel's `Bind` struct.
 pub struct Kernel<B> {
-    pub(super) gpu: Gpu,
-    pub(super) pipeline: Arc<Pipeline>,
-    pub(super) spirv: &'static [u8],
-    pub(super) constants: Arc<[(u32, u32)]>,
-    compile_time: Duration,
-    pub(super) local_size: [u32; 2],
-    /// The binding of what rays are traced through, if they are traced by ray queries.
-    pub(super) world: Option<u32>,
+    pub(super) compiled: Compiled,
     /// Covariant, so that a kernel kept as `Kernel<Bind<'static>>` takes shorter borrows.
     of: PhantomData<fn() -> B>,
+}
+
+/// A kernel of any type, so that what makes and records kernels is compiled once and not for each.
+pub(super) struct Compiled {
+    pub name: &'static str,
+    pub slots: &'static [Slot],
+    pub gpu: Gpu,
+    pub pipeline: Arc<Pipeline>,
+    pub spirv: &'static [u8],
+    pub constants: Arc<[(u32, u32)]>,
+    compile_time: Duration,
+    pub local_size: [u32; 2],
+    /// The binding of what rays are traced through, if they are traced by ray queries.
+    pub world: Option<u32>,
+}
+
+/// The parts of [`Bindings`] that are no types.
+struct Interface {
+    name: &'static str,
+    spirv: &'static [u8],
+    ray_query: Option<RayQueryCode>,
+    slots: &'static [Slot],
+    push_bytes: usize,
+}
+
+impl Compiled {
+    fn new(gpu: &Gpu, interface: &Interface, constants: Vec<(u32, u32)>, local_size: [u32; 2]) -> Result<Self> {
+        let begun = Instant::now();
+        let &Interface { name, slots, push_bytes, .. } = interface;
+        check_workgroup(name, local_size, &gpu.0.limits)?;
+        let ray_query = interface.ray_query.filter(|_| gpu.traces_by_ray_query());
+        let (spirv, world) = ray_query.map_or((interface.spirv, None), |code| (code.spirv, Some(code.binding)));
+        let constants: Arc<[_]> = constants.into();
+        let traced = world.map(|binding| (binding, vk::DescriptorType::ACCELERATION_STRUCTURE_KHR));
+        let bindings = slots.iter().map(|slot| (slot.binding, slot.kind.descriptor())).chain(traced).collect();
+        let recipe = Recipe { spirv, bindings, push_bytes: push_bytes as u32, constants: constants.clone() };
+        let pipeline = pipeline(gpu, name, &recipe)?;
+        let compile_time = begun.elapsed();
+        Ok(Self { name, slots, gpu: gpu.clone(), pipeline, spirv, constants, compile_time, local_size, world })
+    }
 }
 
 impl<B: Bindings> Kernel<B> {
@@ -163,35 +196,32 @@ impl<B: Bindings> Kernel<B> {
     /// # Errors
     /// [`Error::Device`] when the driver refuses it, or a workgroup exceeds the device's limit.
     pub fn new(gpu: &Gpu, constants: &B::Constants) -> Result<Self> {
-        let begun = Instant::now();
-        let local_size = constants.local_size();
-        check_workgroup(B::NAME, local_size, &gpu.0.limits)?;
-        let ray_query = B::RAY_QUERY.filter(|_| gpu.traces_by_ray_query());
-        let (spirv, world) = ray_query.map_or((B::SPIRV, None), |code| (code.spirv, Some(code.binding)));
-        let constants: Arc<[_]> = constants.entries().into();
-        let push_bytes = size_of::<B::Push>() as u32;
-        let traced = world.map(|binding| (binding, vk::DescriptorType::ACCELERATION_STRUCTURE_KHR));
-        let bindings = B::SLOTS.iter().map(|slot| (slot.binding, slot.kind.descriptor())).chain(traced).collect();
-        let recipe = Recipe { spirv, bindings, push_bytes, constants: constants.clone() };
-        let pipeline = pipeline(gpu, B::NAME, &recipe)?;
-        let compile_time = begun.elapsed();
-        Ok(Self { gpu: gpu.clone(), pipeline, spirv, constants, compile_time, local_size, world, of: PhantomData })
+        let interface = Interface {
+            name: B::NAME,
+            spirv: B::SPIRV,
+            ray_query: B::RAY_QUERY,
+            slots: B::SLOTS,
+            push_bytes: size_of::<B::Push>(),
+        };
+        let compiled = Compiled::new(gpu, &interface, constants.entries(), constants.local_size())?;
+        Ok(Self { compiled, of: PhantomData })
     }
 
     /// Time that creating the pipeline took. Some drivers, such as lavapipe, compile more on the first dispatch.
     pub fn compile_time(&self) -> Duration {
-        self.compile_time
+        self.compiled.compile_time
     }
 
     /// Number of workgroups that cover a grid of x times y threads.
     pub fn groups(&self, [x, y]: [u32; 2]) -> [u32; 3] {
-        [x.div_ceil(self.local_size[0]), y.div_ceil(self.local_size[1]), 1]
+        let [across, down] = self.compiled.local_size;
+        [x.div_ceil(across), y.div_ceil(down), 1]
     }
 
     /// Number of workgroups that cover a row of threads. A row too long for the device is folded into several rows of groups,
     /// which `thread_index()` in `glsl/shared/thread.glsl` unfolds.
     pub fn folded_groups(&self, threads: u32) -> [u32; 3] {
-        folded(threads.div_ceil(self.local_size[0]))
+        folded(threads.div_ceil(self.compiled.local_size[0]))
     }
 }
 

@@ -1,5 +1,6 @@
 //! Recording of work. Every pass gets its barrier, debug label and timestamps here, and kernels are bound and dispatched.
 use super::acceleration::Handles;
+use super::kernel::Compiled;
 use super::shape::{KernelCode, PassShape};
 use super::{
     Acceleration, Access, Bindings, Bound, Buffer, FrameResources, Gpu, Kernel, PassTime, SlotKind, Untyped, access,
@@ -110,22 +111,33 @@ impl<'a> Recorder<'a> {
         push: &B::Push,
         groups: [u32; 3],
     ) -> Result<()> {
-        check_groups(B::NAME, groups, self.gpu.0.limits.max_compute_work_group_count)?;
-        self.gpu.owns(B::NAME, &kernel.gpu)?;
-        let buffers = bind.buffers();
-        self.owns(&buffers)?;
-        let world = self.world(kernel, bind.acceleration())?;
-        let set = self.frame.descriptors.set(&kernel.pipeline, B::SLOTS, &buffers, world.map(|(at, w)| (at, w.top)))?;
-        let slots = buffers.iter().map(|b| b.buffer).zip(B::SLOTS.iter().map(|slot| slot.access));
-        let accesses: Vec<_> = slots.chain(world.map(|(_, w)| (w.storage.bound().buffer, Access::Trace))).collect();
+        self.bind(&kernel.compiled, &bind.buffers(), bind.acceleration(), bytemuck::bytes_of(push), groups)
+    }
+
+    fn bind(
+        &mut self,
+        kernel: &Compiled,
+        buffers: &[Bound],
+        world: Option<&Acceleration>,
+        push: &[u8],
+        groups: [u32; 3],
+    ) -> Result<()> {
+        let &Compiled { name, slots, .. } = kernel;
+        check_groups(name, groups, self.gpu.0.limits.max_compute_work_group_count)?;
+        self.gpu.owns(name, &kernel.gpu)?;
+        self.owns(buffers)?;
+        let world = self.world(kernel, world)?;
+        let set = self.frame.descriptors.set(&kernel.pipeline, slots, buffers, world.map(|(at, w)| (at, w.top)))?;
+        let bound = buffers.iter().map(|b| b.buffer).zip(slots.iter().map(|slot| slot.access));
+        let accesses: Vec<_> = bound.chain(world.map(|(_, w)| (w.storage.bound().buffer, Access::Trace))).collect();
         self.frame.keep(kernel);
-        let (pipeline, layout, push) = (kernel.pipeline.raw, kernel.pipeline.layout, bytemuck::bytes_of(push));
+        let (pipeline, layout) = (kernel.pipeline.raw, kernel.pipeline.layout);
         let compute = vk::PipelineBindPoint::COMPUTE;
         let code = KernelCode { spirv: kernel.spirv, constants: kernel.constants.clone() };
-        let bytes = B::SLOTS.iter().zip(&buffers).map(|(slot, bound)| bound.bytes(slot.kind == SlotKind::Uniform));
-        let shape = PassShape::of_kernel(groups, kernel.local_size, B::SLOTS, bytes, code);
+        let bytes = slots.iter().zip(buffers).map(|(slot, bound)| bound.bytes(slot.kind == SlotKind::Uniform));
+        let shape = PassShape::of_kernel(groups, kernel.local_size, slots, bytes, code);
         // SAFETY: the frame keeps the kernel, the set and every buffer until the work is complete.
-        self.pass(B::NAME, &accesses, shape, |device, commands| unsafe {
+        self.pass(name, &accesses, shape, &|device, commands| unsafe {
             device.cmd_bind_pipeline(commands, compute, pipeline);
             device.cmd_bind_descriptor_sets(commands, compute, layout, 0, &[set], &[]);
             device.cmd_push_constants(commands, layout, vk::ShaderStageFlags::COMPUTE, 0, push);
@@ -134,13 +146,13 @@ impl<'a> Recorder<'a> {
     }
 
     /// What a kernel that traces by ray queries traces through, and the binding for it.
-    fn world<'b, B: Bindings>(
+    fn world<'b>(
         &mut self,
-        kernel: &Kernel<B>,
+        kernel: &Compiled,
         world: Option<&'b Acceleration>,
     ) -> Result<Option<(u32, &'b Arc<Handles>)>> {
         let Some(binding) = kernel.world else { return Ok(None) };
-        let none = || Error::Device(format!("{}: the scene has no acceleration structures", B::NAME));
+        let none = || Error::Device(format!("{}: the scene has no acceleration structures", kernel.name));
         let handles = &world.ok_or_else(none)?.handles;
         self.gpu.owns("the acceleration structures", &handles.gpu)?;
         self.frame.keep_structures(handles);
@@ -163,7 +175,7 @@ impl<'a> Recorder<'a> {
         let accesses = [(from, Access::CopySource), (to, Access::CopyTarget)];
         // SAFETY: two live buffers of one size, kept by the frame.
         let shape = PassShape::of_transfer(&accesses.map(|(_, access)| access), source.size);
-        self.pass("copy", &accesses, shape, |device, commands| unsafe {
+        self.pass("copy", &accesses, shape, &|device, commands| unsafe {
             device.cmd_copy_buffer(commands, from.raw, to.raw, &region);
         })
     }
@@ -173,11 +185,15 @@ impl<'a> Recorder<'a> {
     /// # Errors
     /// [`Error::Device`] when memory is out.
     pub fn fill<T: Pod>(&mut self, buffer: &Buffer<T>, value: u32) -> Result<()> {
-        let Bound { buffer: target, offset, size } = buffer.bound();
-        self.owns(&[buffer.bound()])?;
+        self.fill_all(buffer.bound(), value)
+    }
+
+    fn fill_all(&mut self, all: Bound, value: u32) -> Result<()> {
+        let Bound { buffer: target, offset, size } = all;
+        self.owns(&[all])?;
         // SAFETY: a live buffer whose size is a multiple of four, kept by the frame.
         let shape = PassShape::of_transfer(&[Access::CopyTarget], size);
-        self.pass("fill", &[(target, Access::CopyTarget)], shape, |device, commands| unsafe {
+        self.pass("fill", &[(target, Access::CopyTarget)], shape, &|device, commands| unsafe {
             device.cmd_fill_buffer(commands, target.raw, offset, size, value);
         })
     }
@@ -192,7 +208,7 @@ impl<'a> Recorder<'a> {
         self.owns(&[buffer.bound()])?;
         // SAFETY: a live buffer of one element or more, whole words, kept by the frame.
         let shape = PassShape::of_transfer(&[Access::CopyTarget], size_of::<T>() as u64);
-        self.pass("update", &[(target, Access::CopyTarget)], shape, |device, commands| unsafe {
+        self.pass("update", &[(target, Access::CopyTarget)], shape, &|device, commands| unsafe {
             device.cmd_update_buffer(commands, target.raw, offset, bytemuck::bytes_of(value));
         })
     }
@@ -228,7 +244,7 @@ impl<'a> Recorder<'a> {
         let accesses = [(source, Access::CopySource), (target, Access::CopyTarget)];
         // SAFETY: two live buffers that hold the regions, kept by the frame.
         let shape = PassShape::of_transfer(&accesses.map(|(_, access)| access), bytes as u64);
-        self.pass("upload", &accesses, shape, |device, commands| unsafe {
+        self.pass("upload", &accesses, shape, &|device, commands| unsafe {
             device.cmd_copy_buffer(commands, source.raw, target.raw, &regions);
         })
     }
@@ -258,7 +274,7 @@ impl<'a> Recorder<'a> {
         name: &'static str,
         accesses: &[(&Arc<Untyped>, Access)],
         shape: PassShape,
-        record: impl FnOnce(&ash::Device, vk::CommandBuffer),
+        record: &dyn Fn(&ash::Device, vk::CommandBuffer),
     ) -> Result<()> {
         let times = self.frame.timer.open(name)?;
         self.frame.shapes.push(shape);
@@ -275,7 +291,7 @@ impl<'a> Recorder<'a> {
             // SAFETY: the command buffer is recording.
             unsafe { access::pass_barrier(&inner.device, commands, self.gpu.traces_by_ray_query()) };
         }
-        self.label(name, || {
+        self.label(name, &|| {
             stamp(0);
             record(&inner.device, commands);
             stamp(1);
@@ -284,7 +300,7 @@ impl<'a> Recorder<'a> {
     }
 
     /// Calls `record` under a debug label for capture tools, if labels are available.
-    fn label(&self, name: &str, record: impl FnOnce()) {
+    fn label(&self, name: &str, record: &dyn Fn()) {
         let (Some(debug), Ok(name)) = (&self.gpu.0.debug, CString::new(name)) else { return record() };
         let label = vk::DebugUtilsLabelEXT::default().label_name(&name);
         // SAFETY: the command buffer is recording; the label is closed below.
