@@ -73,9 +73,11 @@ vec3 significant(Window sum, vec3 given, float prior) {
 }
 
 // The pixel's light with what its windows, from the widest on, give back.
-vec4 with_residual(int i, Pixel p, vec4 blended, Window windows[3]) {
+vec4 with_residual(int i, Pixel p, vec4 blended, Window windows[3], vec3 least) {
     float count = p.colour.w;
-    if (count == 0.0 || blended.w == UNFILTERED) return vec4(blended.rgb, blended.w == UNFILTERED ? 0.0 : 1.0);
+    // No light becomes less than the least of the noisy pixels around, or negative if none of these is.
+    vec3 light = max(blended.rgb, least);
+    if (count == 0.0 || blended.w == UNFILTERED) return vec4(light, blended.w == UNFILTERED ? 0.0 : 1.0);
     vec4 other = texelFetch(others, i);
     float level = max(abs(contrast(blended.rgb, vec3(0.0))), push.floor);
     float prior = 0.5 * other.z / max(other.w, 1e-20) * level * level * count;
@@ -85,8 +87,6 @@ vec4 with_residual(int i, Pixel p, vec4 blended, Window windows[3]) {
         given += significant(windows[1], given, prior);
         given += significant(windows[2], given, prior);
     }
-    // No light becomes negative.
-    vec3 least = min(min(blended.rgb, p.colour.rgb), vec3(0.0));
     return vec4(max(blended.rgb + given, least), count);
 }
 
@@ -96,9 +96,11 @@ void main() {
     if (x >= size.x || first >= size.y) return;
     Pixel p[ROWS];
     Window wide[ROWS], near[ROWS];
+    vec3 least[ROWS];
     [[unroll]] for (int k = 0; k < ROWS; k++) {
         p[k] = pixel_at(min(first + k, size.y - 1) * size.x + x);
         wide[k] = near[k] = NO_WINDOW;
+        least[k] = vec3(0.0);
     }
     // Tested at its end: see shared/traverse.glsl.
     int i = -REACH;
@@ -109,6 +111,7 @@ void main() {
                 if (abs(j - k) <= REACH) {
                     float w = tap.counts ? edge_weight(tap.pixel, edge_exponent(p[k], tap.pixel, push.rates)) : 0.0;
                     add(wide[k], tap, w);
+                    least[k] = min(least[k], tap.pixel.colour.rgb);
                     if (abs(j - k) <= 1) add(near[k], tap, abs(i) <= 1 ? w : 0.0);
                 }
             }
@@ -118,7 +121,7 @@ void main() {
         int row = min(first + k, size.y - 1), at = row * size.x + x;
         Window own = NO_WINDOW;
         add(own, tap_at(ivec2(x, row)), 1.0);
-        vec4 result = with_residual(at, p[k], texelFetch(blend, at), Window[](wide[k], near[k], own));
+        vec4 result = with_residual(at, p[k], texelFetch(blend, at), Window[](wide[k], near[k], own), least[k]);
         if (first + k < size.y) filtered[at] = result;
     }
 }

@@ -113,15 +113,6 @@ fn no_scene() -> Error {
     Error::Usage("name a scene to measure, or an image with --filter-only (see tallow cost --help)".to_owned())
 }
 
-/// A word as a shell takes it.
-fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:,@%".contains(c);
-    match !word.is_empty() && word.chars().all(plain) {
-        true => word.to_owned(),
-        false => format!("'{}'", word.replace('\'', r"'\''")),
-    }
-}
-
 /// A scene's name: that of its folder if the file itself is called "scene".
 fn name(path: &Path) -> String {
     let text = |part: Option<&std::ffi::OsStr>| part.map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
@@ -144,11 +135,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn scenes_have_names_and_words_are_quoted() {
+    fn scenes_have_names() {
         assert_eq!(
             ["scenes/bust/scene.toml", "a/room.toml", "scene.toml"].map(|p| name(Path::new(p))),
             ["bust", "room", "scene"]
         );
-        assert_eq!(["a/b.toml", "my scene", "it's"].map(quoted), ["a/b.toml", "'my scene'", r"'it'\''s'"]);
     }
 }

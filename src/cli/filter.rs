@@ -11,10 +11,10 @@ use crate::denoise::filter::{self, FilterSettings, Method};
 use crate::denoise::{self, Colour, Demodulation, Filtered, Recipe, file};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, PassTime, Tracing};
-use crate::image::aov::Aovs;
+use crate::image::aov::{Aovs, is_noisy};
 use crate::image::metrics::{self, Metrics};
 use crate::image::source::{Source, Unread};
-use crate::image::{self, Claim, Picture};
+use crate::image::{self, Claim, NOISY, Picture};
 use crate::layout::vec3;
 use crate::memory;
 use crate::report::table::{self, PassRow};
@@ -120,7 +120,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let clean = replaced(args, &source, &aovs, colour)?;
     fail_on_messages(&gpu)?;
     let (written, files) = write(args, &clean);
-    let distance = |image: &Source| reference.as_ref().map_or(Ok(None), |r| distance(args, image, r));
+    let distance = |image: &Source, layer| reference.as_ref().map_or(Ok(None), |r| distance(args, image, layer, r));
     let summary = Summary {
         files: written,
         filter: args.filter.name(),
@@ -130,8 +130,8 @@ pub fn run(args: &Args) -> Result<Exit> {
         seconds,
         device: gpu.info().name.clone(),
         passes: table::summarise(&times),
-        before: distance(&source)?,
-        after: distance(&clean)?,
+        before: distance(&source, noisy_layer(args, &source))?,
+        after: distance(&clean, result_layer(args))?,
     };
     report(args, &summary)?;
     files.failure().map_or(Ok(()), Err)?;
@@ -185,7 +185,7 @@ fn write<'a>(args: &'a Args, clean: &'a Source) -> (Vec<String>, Files) {
     let options = args.common.write_options();
     let item = |path: &'a PathBuf| Item {
         path: path.clone(),
-        fill: Box::new(move |stream| clean.encode(path, &options, stream)),
+        fill: Box::new(move |stream| clean.encode(path, result_layer(args), &options, stream)),
     };
     let items: Vec<_> = args.outputs.iter().map(item).collect();
     let mut files = Files::default();
@@ -243,16 +243,26 @@ fn replaced(args: &Args, source: &Source, aovs: &Aovs, mut colour: Colour) -> Re
 fn reference(args: &Args, source: &Source) -> Result<Option<Picture>> {
     let Some(path) = &args.reference else { return Ok(None) };
     let reference = compare::load(path, None)?;
-    check_sizes((&args.image, &shown(args, source)?), (path, &reference))?;
+    check_sizes((&args.image, &shown(args, source, result_layer(args))?), (path, &reference))?;
     Ok(Some(reference))
 }
 
-fn shown(args: &Args, image: &Source) -> Result<Picture> {
-    image.shown()?.picture(args.layers.colour.as_deref()).map_err(|what| Error::input(&args.image, what))
+/// The layer that is filtered; none for the colour.
+fn noisy_layer<'a>(args: &'a Args, image: &Source) -> Option<&'a str> {
+    args.layers.colour.as_deref().or_else(|| image.film.find(Some(NOISY)).map(|_| NOISY))
 }
 
-fn distance(args: &Args, image: &Source, reference: &Picture) -> Result<Option<Metrics>> {
-    let picture = shown(args, image)?;
+/// The layer that holds the result; none for the colour.
+fn result_layer(args: &Args) -> Option<&str> {
+    args.layers.colour.as_deref().filter(|name| !is_noisy(name))
+}
+
+fn shown(args: &Args, image: &Source, layer: Option<&str>) -> Result<Picture> {
+    image.shown()?.picture(layer).map_err(|what| Error::input(&args.image, what))
+}
+
+fn distance(args: &Args, image: &Source, layer: Option<&str>, reference: &Picture) -> Result<Option<Metrics>> {
+    let picture = shown(args, image, layer)?;
     Ok((picture.non_finite() == 0).then(|| metrics::compare(&picture, reference)))
 }
 

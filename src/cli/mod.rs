@@ -210,9 +210,23 @@ fn finite(text: &str) -> std::result::Result<f64, String> {
     }
 }
 
+/// A word that a POSIX shell takes as it is.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:,@%".contains(c);
+    match !word.is_empty() && word.chars().all(plain) {
+        true => word.to_owned(),
+        false => format!("'{}'", word.replace('\'', r"'\''")),
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::readable;
+    use super::{quoted, readable};
+
+    #[test]
+    fn a_shell_takes_quoted_words_as_they_are() {
+        assert_eq!(["a/b.toml", "my scene", "it's"].map(quoted), ["a/b.toml", "'my scene'", r"'it'\''s'"]);
+    }
 
     #[test]
     fn nothing_that_a_terminal_obeys_is_printed() {

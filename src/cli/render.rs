@@ -21,6 +21,7 @@ use crate::render::{Checkpoint, Job, Outputs, Renderer, StopReason, all_effects,
 use crate::scene::{Loaded, Scene, SceneFile};
 use crate::statistics::BrokenSamples;
 use shot::Shot;
+pub use shot::{CHOICES, FRAME};
 pub use spans::Spans;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -341,7 +342,7 @@ fn denoised(
     let mut clean = Filtered::new(gpu, noisy, &Recipe::new(method))?.join(gpu)?;
     clean.expected = clean.expected.filter(|_| !planned);
     let notes = clean.notes();
-    film::replace_colour(film, clean.colour);
+    film::replace_colour(film, clean.colour, method.name());
     Ok((clean.times, notes))
 }
 

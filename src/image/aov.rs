@@ -24,6 +24,8 @@ pub enum Aov {
     Variance,
     /// Number of samples per pixel.
     Samples,
+    /// Number of samples per pixel over that which the head of the file tells, as Blender has it.
+    ShareOfSamples,
 }
 
 /// An AOV, its name in messages, and the layer names that renderers give it, the best first.
@@ -48,7 +50,8 @@ const KNOWN: &[Known] = &[
     Known { aov: Aov::Position, label: "position", names: &["denoising position", "p", "position", "pos"] },
     Known { aov: Aov::Depth, label: "depth", names: &["denoising depth", "z", "depth", "dd.y", "dd"] },
     Known { aov: Aov::Variance, label: "variance", names: &["variance"] },
-    Known { aov: Aov::Samples, label: "samples", names: &["samples", "debug sample count", "sample count"] },
+    Known { aov: Aov::Samples, label: "samples", names: &["samples", "sample count"] },
+    Known { aov: Aov::ShareOfSamples, label: "share of the samples", names: &["debug sample count"] },
 ];
 
 /// Layer names given by the user, which replace the known ones.
@@ -111,7 +114,7 @@ impl<'a> Aovs<'a> {
 
     fn take(&mut self, known: &Known, channels: Option<[&'a Channel; 3]>) -> Result<(), String> {
         let Some(channels) = channels else {
-            if !known.is_tallow_s_own() {
+            if !known.is_tallow_s_own() && known.aov != Aov::ShareOfSamples {
                 self.notes.push(format!("{}: not there", known.label));
             }
             return Ok(());
@@ -171,7 +174,8 @@ impl Known {
     }
 }
 
-fn is_noisy(layer: &str) -> bool {
+/// Whether a layer is that of the noisy image, which a filter reads and never replaces.
+pub fn is_noisy(layer: &str) -> bool {
     layer.eq_ignore_ascii_case(NOISY)
 }
 
@@ -250,7 +254,7 @@ mod tests {
              View.Position.X View.Position.Y View.Position.Z View.DiffCol.R View.DiffCol.G View.DiffCol.B \
              View.Debug_Sample_Count.X Other.Normal.X Other.Normal.Y Other.Normal.Z",
         );
-        let depth = [(Aov::Normal, 4.0), (Aov::Position, 7.0), (Aov::Depth, 3.0), (Aov::Samples, 13.0)];
+        let depth = [(Aov::Normal, 4.0), (Aov::Position, 7.0), (Aov::Depth, 3.0), (Aov::ShareOfSamples, 13.0)];
         assert_eq!(found(&file), [&[(Aov::Colour, 0.0), (Aov::Albedo, 10.0)], &depth[..]].concat());
     }
 

@@ -97,7 +97,8 @@ pub fn check_writable(path: &Path) -> Result<()> {
     output::check(path)
 }
 
-/// Reads an EXR, PNG, JPEG or HDR file, recognised by its content, into linear Rec. 709.
+/// Reads an EXR, PNG, JPEG or HDR file, recognised by its content, into linear values. Those of EXR and HDR are as they are stored, and
+/// count as Rec. 709 whatever primaries a file names.
 ///
 /// # Errors
 /// [`Error::Input`] when the file cannot be read, is of another kind, or is damaged; [`Error::Memory`].
@@ -124,7 +125,7 @@ pub(crate) fn claim(bytes: &[u8]) -> std::result::Result<Claim, String> {
 
 /// Whether a file holds floats, as EXR and HDR do.
 pub(crate) fn holds_floats(bytes: &[u8]) -> bool {
-    is_exr(bytes) || matches!(::image::guess_format(bytes), Ok(::image::ImageFormat::Hdr))
+    is_exr(bytes) || photo::format(bytes) == Some(::image::ImageFormat::Hdr)
 }
 
 /// Checks that there is memory to decode an image. A damaged file passes and is reported by the decoder.
@@ -160,7 +161,7 @@ fn decode_frame(bytes: &[u8], frame: Frame) -> std::result::Result<Film, String>
 
 /// Whether a file with this beginning may be an image.
 fn is_image(head: &[u8]) -> bool {
-    is_exr(head) || ::image::guess_format(head).is_ok()
+    is_exr(head) || photo::format(head).is_some()
 }
 
 fn is_exr(bytes: &[u8]) -> bool {

@@ -10,6 +10,7 @@ use image::{
     ColorType, DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, ImageFormat, ImageReader,
     Limits, Rgb,
 };
+use std::borrow::Cow;
 use std::io::{Cursor, ErrorKind};
 
 /// Largest number of pixels that one byte of a file can hold. PNG packs 8 pixels into a byte, and deflate packs 1032 bytes
@@ -33,12 +34,16 @@ pub fn encode_png(picture: &Picture, options: &WriteOptions) -> Result<Vec<u8>, 
     Ok(out)
 }
 
-/// Encodes RGBE, which has no sign and no infinities: negative values and NaN become 0, and values are limited to the
-/// largest that it holds.
+/// Encodes RGBE, which has no sign and no infinities: negative values and NaN become 0, values are limited to the largest that it
+/// holds, and pixels below its smallest exponent become black (the encoder would let that wrap around).
 pub(super) fn encode_hdr(picture: &Picture) -> Result<Vec<u8>, String> {
     const LARGEST: f32 = 1.7e38;
-    let pixels: Vec<_> =
-        picture.pixels.iter().map(|p| Rgb(p.map(|v| if v > 0.0 { v.min(LARGEST) } else { 0.0 }))).collect();
+    const SMALLEST: f32 = 1e-38;
+    let held = |p: &[f32; 3]| {
+        let light = p.map(|v| if v > 0.0 { v.min(LARGEST) } else { 0.0 });
+        Rgb(if light.iter().any(|&v| v >= SMALLEST) { light } else { [0.0; 3] })
+    };
+    let pixels: Vec<_> = picture.pixels.iter().map(held).collect();
     let mut out = Vec::new();
     HdrEncoder::new(&mut out)
         .encode(&pixels, picture.width as usize, picture.height as usize)
@@ -46,13 +51,17 @@ pub(super) fn encode_hdr(picture: &Picture) -> Result<Vec<u8>, String> {
     Ok(out)
 }
 
+/// How the HDR files of Radiance begin, and those of other programs, which the decoder does not know.
+const RADIANCE: &[u8] = b"#?RADIANCE\n";
+const RGBE: &[u8] = b"#?RGBE\n";
+
 /// The memory that decoding a file takes, from its header alone.
 ///
 /// # Errors
 /// A message about what is wrong with the header.
 pub fn claim(bytes: &[u8]) -> Result<Claim, String> {
     const KNOWN: [ImageFormat; 3] = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Hdr];
-    if !image::guess_format(bytes).is_ok_and(|format| KNOWN.contains(&format)) {
+    if !format(bytes).is_some_and(|format| KNOWN.contains(&format)) {
         return Err("is no EXR, PNG, JPEG or HDR file".to_owned());
     }
     check_end(bytes)?;
@@ -82,7 +91,19 @@ pub fn picture(bytes: &[u8]) -> Result<DynamicImage, String> {
     reader(bytes, TEXTS + claim.bytes)?.decode().map_err(plain)
 }
 
-fn reader(bytes: &[u8], memory: u64) -> Result<ImageReader<Cursor<&[u8]>>, String> {
+/// What the first bytes say that a picture is.
+pub fn format(bytes: &[u8]) -> Option<ImageFormat> {
+    match bytes.starts_with(RGBE) {
+        true => Some(ImageFormat::Hdr),
+        false => image::guess_format(bytes).ok(),
+    }
+}
+
+fn reader(bytes: &[u8], memory: u64) -> Result<ImageReader<Cursor<Cow<'_, [u8]>>>, String> {
+    let bytes = match bytes.strip_prefix(RGBE) {
+        Some(rest) => Cow::Owned([RADIANCE, rest].concat()),
+        None => Cow::Borrowed(bytes),
+    };
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| plain(e.into()))?;
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(memory);
@@ -96,7 +117,9 @@ fn plain(e: ImageError) -> String {
     match e {
         ImageError::IoError(e) if e.kind() != ErrorKind::UnexpectedEof => damaged("it cannot be read to its end"),
         ImageError::IoError(_) => damaged("it ends too early"),
-        ImageError::Unsupported(_) => "is of a rare kind, which is not supported: save it as a plain PNG".to_owned(),
+        ImageError::Unsupported(_) => {
+            "is of a rare kind, which is not supported: save it as a plain PNG, or as EXR if it holds floats".to_owned()
+        }
         ImageError::Limits(_) => "holds more than 64 MiB of texts or profiles: save it without".to_owned(),
         ImageError::Decoding(_) | ImageError::Encoding(_) | ImageError::Parameter(_) => damaged("its data are damaged"),
     }
@@ -107,7 +130,7 @@ fn plain(e: ImageError) -> String {
 /// # Errors
 /// A message that the end of the file is missing.
 pub fn check_end(bytes: &[u8]) -> Result<(), String> {
-    match image::guess_format(bytes).is_ok_and(|f| f == ImageFormat::Jpeg) && jpeg_is_cut(bytes) {
+    match format(bytes) == Some(ImageFormat::Jpeg) && jpeg_is_cut(bytes) {
         true => Err("is a JPEG without its end: get the complete file".to_owned()),
         false => Ok(()),
     }

@@ -87,18 +87,27 @@ impl Source {
     /// As [`super::write`].
     pub fn write(&self, path: &Path, options: &WriteOptions) -> Result<()> {
         super::format_of(path)?;
-        output::write_with(path, |stream| self.encode(path, options, stream))
+        output::write_with(path, |stream| self.encode(path, None, options, stream))
     }
 
-    /// Writes to `stream` what [`Source::write`] would write to a file of this name.
+    /// Writes to `stream` what [`Source::write`] would write to a file of this name, or instead of the colour another layer.
     ///
     /// # Errors
     /// As [`super::encode`].
-    pub fn encode(&self, path: &Path, options: &WriteOptions, stream: &mut dyn Stream) -> std::io::Result<()> {
+    pub fn encode(
+        &self,
+        path: &Path,
+        layer: Option<&str>,
+        options: &WriteOptions,
+        stream: &mut dyn Stream,
+    ) -> std::io::Result<()> {
         if super::has_layers(path) {
             return stream.write_all(&self.bytes);
         }
-        let shown = self.shown().map_err(|e| std::io::Error::new(ErrorKind::InvalidData, e.to_string()))?;
-        super::encode(path, &shown, options, stream)
+        let invalid = |what: String| std::io::Error::new(ErrorKind::InvalidData, what);
+        let shown = self.shown().map_err(|e| invalid(e.to_string()))?;
+        let mut colour = Film::new(shown.width, shown.height);
+        colour.add_vec3("", ["R", "G", "B"], &shown.picture(layer).map_err(invalid)?.pixels);
+        super::encode(path, &colour, options, stream)
     }
 }

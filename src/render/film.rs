@@ -233,9 +233,10 @@ pub(crate) fn replace_pixels(film: &mut Film, pixels: &[Pixel]) {
     film.channels.extend(fresh.channels);
 }
 
-/// Makes `colour`, a plane a channel, the picture of a film. What it showed, the mean of its samples, stays as the layer
-/// [`NOISY`].
-pub fn replace_colour(film: &mut Film, colour: [Vec<f32>; 3]) {
+/// Makes `colour`, a plane a channel, the picture of a film, by a filter of this name. What it showed, the mean of its samples,
+/// stays as the layer [`NOISY`].
+pub fn replace_colour(film: &mut Film, colour: [Vec<f32>; 3], filter: &str) {
+    film.metadata.insert(FILTERED.to_owned(), filter.to_owned());
     for channel in film.channels.iter_mut().filter(|c| RGB.contains(&c.name.as_str())) {
         channel.name = format!("{NOISY}.{}", channel.name);
     }
@@ -289,7 +290,7 @@ mod tests {
     fn a_filtered_colour_leaves_the_noisy_one_beside_it() {
         let mut film = Film::new(1, 1);
         add_pixels(&mut film, &[PixelStats { mean: [1.0, 2.0, 3.0], ..PixelStats::default() }], &[]);
-        replace_colour(&mut film, [4.0, 5.0, 6.0].map(|v| vec![v]));
+        replace_colour(&mut film, [4.0, 5.0, 6.0].map(|v| vec![v]), "atrous");
         assert_eq!(rgb(&film, "").unwrap(), [[4.0], [5.0], [6.0]]);
         assert_eq!(rgb(&film, NOISY).unwrap(), [[1.0], [2.0], [3.0]]);
     }

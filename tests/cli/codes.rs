@@ -187,6 +187,9 @@ fn no_option_has_two_defaults() {
         let twice = options.iter().find(|option| option.matches("[default: ").count() > 1);
         assert_eq!(twice, None, "{command}");
     }
+    let help = stdout(&tallow(&folder, &["sequence", "--help"]));
+    let carry: Vec<_> = options(&help).into_iter().filter(|said| said.starts_with("--reproject")).collect();
+    assert!(carry.len() > 5 && carry.iter().all(|said| said.contains("[default: ")), "{carry:?}");
     let help = stdout(&tallow(&folder, &["cost", "--help"]));
     for (option, default) in [("--spp <LIST>", "1,2,4,8,16"), ("--rounds <LIST>", "0"), ("--width <N>", "512")] {
         let said = options(&help).into_iter().find(|said| said.starts_with(option)).unwrap_or_else(|| panic!("{help}"));

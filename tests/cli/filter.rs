@@ -170,6 +170,55 @@ fn layers_of_any_name_are_taken_when_named() {
 
 /// What a mirror shows is filtered by what is seen in it: noise goes, edges stay.
 #[test]
+fn a_named_layer_is_what_other_formats_hold() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut film = noisy(false);
+    let pixels = film.picture(None).unwrap().pixels;
+    film.channels.retain(|channel| !["R", "G", "B"].contains(&channel.name.as_str()));
+    film.add_vec3("spec", ["R", "G", "B"], &pixels);
+    film.add_vec3("diff", ["R", "G", "B"], &[[0.5, 0.0, 0.0]; (SIZE * SIZE) as usize]);
+    write(&folder, "noisy.exr", &film);
+    let filtered = filter(&folder, &["--filter", "atrous", "--colour", "spec", "-o", "clean.hdr"]);
+    let [exr, hdr] = [(filtered, Some("spec")), (read(&folder, "clean.hdr"), None)]
+        .map(|(film, layer)| film.picture(layer).unwrap().pixels.concat());
+    assert!(exr != pixels.concat() && exr.iter().zip(&hdr).all(|(a, b)| (a - b).abs() < 0.01));
+}
+
+#[test]
+fn images_without_negative_light_are_filtered_without() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/veach-mis/scene.toml");
+    let size = ["--width", "96", "--height", "64", "--spp", "1", "--max-depth", "4"];
+    let words = ["render", scene, "--quiet", "--denoise", "auto", "-o", "a.exr"];
+    assert_eq!(tallow(&folder, &[&words[..], &size].concat()).status.code(), Some(0));
+    let film = read(&folder, "a.exr");
+    for layer in [None, Some("Noisy Image")] {
+        let least = film.picture(layer).unwrap().pixels.concat().into_iter().fold(f32::INFINITY, f32::min);
+        assert!(least >= 0.0, "{layer:?}: {least}");
+    }
+}
+
+/// Light is looked up through the camera that the image was rendered through.
+#[test]
+fn a_view_of_a_gltf_file_is_that_of_its_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let gltf = r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1, 2]}], "nodes": [{"mesh": 0},
+        {"name": "near", "camera": 0, "translation": [0.3, 0.3, 2]}, {"name": "far", "camera": 0, "translation": [0.3, 0.3, 4]}],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36,
+        "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
+    std::fs::write(folder.path().join("two.gltf"), gltf).unwrap();
+    for camera in ["near", "far"] {
+        let words = ["render", "two.gltf", "--camera", camera, "-o", "noisy.exr", "--spp", "2", "--quiet"];
+        let output = tallow(&folder, &[&words[..], &["--width", "16", "--height", "16"]].concat());
+        assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &b""[..]));
+        filter(&folder, &["--filter", "none", "--scene", "two.gltf"]);
+    }
+}
+
+#[test]
 fn mirrors_stay_sharp() {
     let folder = tempfile::tempdir().unwrap();
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/mirror.toml");
@@ -314,6 +363,14 @@ fn a_reference_gives_metrics_before_and_after() {
     let compared = stdout(&tallow(&folder, &["compare", "a.exr", "reference.exr", "--json"]));
     let compared: serde_json::Value = serde_json::from_str(&compared).unwrap();
     assert_eq!(compared["metrics"]["mse"], json["after"]["mse"], "what is printed is what is written");
+    // Of a file that was filtered before, the noisy image is what is filtered and compared, by its name as well.
+    for words in [&[][..], &["--colour", "Noisy Image"]] {
+        let again = ["filter", "a.exr", "--filter", "none", "-o", "b.exr", "--reference", "reference.exr", "--json"];
+        let again = stdout(&tallow(&folder, &[&again[..], words].concat()));
+        let again: serde_json::Value = serde_json::from_str(&again).unwrap();
+        assert_eq!(again["before"]["mse"], json["before"]["mse"], "{words:?}");
+        assert!((again["after"]["mse"].as_f64().unwrap() / mse("before") - 1.0).abs() < 1e-3, "{words:?}: {again}");
+    }
     let text = run(&[]);
     let expected =
         ["albedo: albedo.R albedo.G albedo.B", "variance: not there", "position: made of the depth", "median ms"];

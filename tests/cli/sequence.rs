@@ -64,6 +64,22 @@ fn a_frame_alone_is_that_of_the_sequence_and_a_finished_one_is_kept() {
 }
 
 #[test]
+fn a_frame_of_another_filter_is_another_and_pictures_are_written_as_they_are_asked_for() {
+    let folder = stage();
+    let words = "--reproject off --frames 0..2 -o f.#.exr -o f.#.png";
+    let read = |file: &str| fs::read(folder.path().join(file)).unwrap();
+    well(&folder, &format!("{words} --denoise atrous"));
+    let (filtered, picture) = (bits(&folder, "f.1.exr"), read("f.1.png"));
+    let told = well(&folder, &format!("{words} --denoise atrous --exposure 3 --heatmap h.#.png"));
+    assert!(told.contains("frame 1: is finished") && filtered == bits(&folder, "f.1.exr"), "{told}");
+    assert!(read("f.1.png") != picture && read("h.1.png").starts_with(b"\x89PNG"));
+    let told = well(&folder, &format!("{words} --denoise bilateral"));
+    assert!(!told.contains("is finished") && filtered != bits(&folder, "f.1.exr"), "{told}");
+    let told = well(&folder, &format!("{words} --denoise bilateral"));
+    assert!(told.contains("frame 1: is finished"), "control: {told}");
+}
+
+#[test]
 fn a_frame_in_another_light_is_another() {
     let folder = stage();
     let file = folder.path().join("s.toml");

@@ -226,6 +226,28 @@ fn png_holds_srgb_code_values() {
     assert_eq!(codes(f32::INFINITY, &aces), 255);
 }
 
+/// Radiance's own files begin otherwise than those that Mitsuba writes.
+#[test]
+fn both_signatures_of_hdr_are_read_alike() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.hdr");
+    let mut film = Film::new(9, 2);
+    film.add_vec3("", ["R", "G", "B"], &std::array::from_fn::<_, 18, _>(|i| [i as f32, 0.25, 2.0]));
+    image::write(&path, &film, &WriteOptions::default()).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let other = [b"#?RGBE\n", bytes.strip_prefix(b"#?RADIANCE\n").unwrap()].concat();
+    let [a, b] = [&bytes, &other].map(|bytes| image::decode(bytes).unwrap().picture(None).unwrap().pixels);
+    assert!(a == b && a[17][0] > 16.0, "{a:?} {b:?}");
+    std::fs::write(&path, other).unwrap();
+    assert!(image::read(&path).unwrap().picture(None).unwrap().pixels == a);
+}
+
+#[test]
+fn light_too_little_for_hdr_is_black() {
+    let read = write_and_read("a.hdr", &[[1e-40; 3], [1e-44, 0.0, 0.0], [1.0; 3]], &WriteOptions::default());
+    assert!(read[..2].iter().flatten().all(|&v| v <= 1e-38) && (read[2][0] - 1.0).abs() < 0.01, "{read:?}");
+}
+
 #[test]
 fn png_and_hdr_come_back_as_linear_values() {
     let pixels = [[0.0, 0.18, 1.0], [0.5, 0.25, 0.75]];

@@ -531,18 +531,3 @@ fn filters_and_samplers_agree_on_the_mean() {
     }
     support::assert_silent(&gpu);
 }
-
-#[test]
-fn an_effect_that_is_called_for_and_left_out_shows() {
-    // Control of the bit comparison above: without indirect light the box must differ.
-    let gpu = support::gpu();
-    let scene = scene("cornell-box/scene.toml", small);
-    let effects = render::called_for(&scene, &scene.settings, Outputs::default());
-    let without = Effects { emissive: false, ..effects };
-    let a = support::render(&gpu, &Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap());
-    let b = support::render(
-        &gpu,
-        &Renderer::specialised(&gpu, &scene, &scene.settings, Outputs::default(), without).unwrap(),
-    );
-    assert!(bits(&a) != bits(&b));
-}

@@ -1,4 +1,6 @@
 //! Command lines that render a pixel of a file again.
+use crate::cli::quoted;
+use crate::cli::render::{CHOICES, FRAME};
 use crate::image::Film;
 use crate::render::provenance::{Provenance, SampleRange};
 use crate::render::settings::Settings;
@@ -10,6 +12,14 @@ use serde_json::Value;
 /// What the file does not tell.
 pub fn commands(film: &Film, [x, y]: [u32; 2], stem: &str) -> Result<Vec<String>, String> {
     let scene = film.metadata.get("scene").ok_or("its metadata do not name the scene")?;
+    if let Some(frame) = film.metadata.get(FRAME) {
+        return Err(format!(
+            "it is a frame of a sequence, which tallow sequence --only {frame} renders again as a whole"
+        ));
+    }
+    let chosen =
+        |key: &str| film.metadata.get(key).map(|name| format!("--{key} {} ", quoted(name))).unwrap_or_default();
+    let view = CHOICES.map(chosen).concat();
     let Provenance { settings, samples: ranges, .. } = Provenance::of(film)?;
     let taken = film.channel("samples").map(|counts| counts.at(y as usize * film.width as usize + x as usize) as u32);
     let command = |(i, range): (usize, &SampleRange)| {
@@ -19,7 +29,7 @@ pub fn commands(film: &Film, [x, y]: [u32; 2], stem: &str) -> Result<Vec<String>
         let spp = taken.filter(|_| alone).unwrap_or(range.count);
         let SampleRange { seed, first, .. } = range;
         format!(
-            "tallow render {} {}--seed {seed} --first-sample {first} --spp {spp} --pixel {x},{y} -o {stem}-{x}-{y}{part}.exr",
+            "tallow render {} {view}{}--seed {seed} --first-sample {first} --spp {spp} --pixel {x},{y} -o {stem}-{x}-{y}{part}.exr",
             quoted(scene),
             options(&settings),
         )
@@ -40,15 +50,6 @@ fn options(settings: &Value) -> String {
 
 fn is_option(key: &str) -> bool {
     Settings::default().entries().iter().any(|entry| entry.name == key.replace('_', "-"))
-}
-
-/// A word that a POSIX shell takes as it is.
-fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+,=:".contains(c);
-    match !word.is_empty() && word.chars().all(plain) {
-        true => word.to_owned(),
-        false => format!("'{}'", word.replace('\'', r"'\''")),
-    }
 }
 
 #[cfg(test)]
@@ -76,6 +77,11 @@ mod tests {
             words
         };
         assert_eq!(one.iter().map(|l| sorted(l)).collect::<Vec<_>>(), [sorted(expected)]);
+        film.metadata.insert("camera".to_owned(), "from above".to_owned());
+        assert!(commands(&film, [2, 1], "a").unwrap()[0].contains(" --camera 'from above' "));
+        film.metadata.insert("frame".to_owned(), "7".to_owned());
+        assert!(commands(&film, [2, 1], "a").unwrap_err().contains("--only 7"));
+        film.metadata.remove("frame");
         ranges(&mut film, r#"[{"seed":5,"first":7,"count":4},{"seed":6,"first":0,"count":5}]"#);
         let two = commands(&film, [2, 1], "a").unwrap();
         assert!(two.len() == 2 && two[1].contains("--seed 6 --first-sample 0 --spp 5 ") && two[1].ends_with("-1.exr"));

@@ -1,7 +1,7 @@
 //! `tallow cost --filter-only`: filters on a given image.
-use super::{Args, Folder, finish, name, open, quoted, watched};
+use super::{Args, Folder, finish, name, open, watched};
 use crate::cli::filter::options::Overrides;
-use crate::cli::{Exit, fail_on_messages};
+use crate::cli::{Exit, fail_on_messages, quoted};
 use crate::cost::document::SceneInfo;
 use crate::cost::filter_only::{FilterCandidate, FilterPlan, measure_filters};
 use crate::cost::reference;

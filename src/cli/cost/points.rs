@@ -1,7 +1,8 @@
 //! The points that `tallow cost` measures: the scene, how it moves, the settings of each point, and the command that renders it.
 use super::options::Words;
-use super::{Args, knobs, quoted};
+use super::{Args, knobs};
 use crate::cli::common::check_fps;
+use crate::cli::quoted;
 use crate::cost::grid::{self, Candidate};
 use crate::cost::{JudgedFrame, Motion};
 use crate::denoise::filter::{FilterSettings, Method};

@@ -1,4 +1,5 @@
 //! `filter --scene`: the filtered light is looked up along several eye rays per pixel.
+use crate::cli::render::{CHOICES, FRAME};
 use crate::denoise::Filtered;
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, PassTime};
@@ -39,10 +40,17 @@ impl Supersampling {
     ) -> Result<Option<(Vec<vec3>, Vec<PassTime>)>> {
         let Some(path) = &self.scene else { return Ok(None) };
         let of_image = |what| Error::input(image, what);
+        let said = |key: &str| aovs.film.metadata.get(key).map(String::as_str);
+        if let Some(frame) = said(FRAME) {
+            let what = format!("is frame {frame} of a sequence: --scene knows a scene only as tallow render shows it");
+            return Err(of_image(what));
+        }
         let provenance = Provenance::of(aovs.film).map_err(of_image)?;
         let settings = settings(aovs, &provenance).map_err(of_image)?;
         settings.validate()?;
-        let mut file = SceneFile::open(path)?;
+        let [camera, clip] = CHOICES.map(said);
+        let mut file = SceneFile::open_clip(path, clip)?;
+        camera.map_or(Ok(()), |name| file.look_through(name))?;
         file.stays_still(); // as the render did
         let Loaded { scene, .. } = file.load()?;
         provenance.shows(&scene, &settings).map_err(of_image)?;

@@ -2,7 +2,7 @@
 use super::{Args, planned};
 use crate::cli::checkpoint::{self, CheckpointFile};
 use crate::cli::files::{Files, Item, check_distinct};
-use crate::cli::{check_png, complain};
+use crate::cli::{check_png, complain, quoted};
 use crate::error::Result;
 use crate::image::difference::false_colours;
 use crate::image::output::{self, Stream};
@@ -59,6 +59,19 @@ pub fn save(
     written
 }
 
+/// Writes what a finished film can be written to again and is no file of layers that is there: its colours may be asked for otherwise.
+///
+/// # Errors
+/// [`crate::error::Error::Output`].
+pub fn save_pictures(args: &Args, film: &Film) -> Result<()> {
+    let mut items = items(args, film);
+    items.retain(|item| !image::has_layers(&item.path) || !item.path.exists());
+    let mut files = Files::default();
+    files.save(&items, true);
+    files.pipe(&items, true);
+    files.failure().map_or(Ok(()), Err)
+}
+
 /// The images: a film's own, and that of its samples.
 pub fn items<'a>(args: &'a Args, film: &'a Film) -> Vec<Item<'a>> {
     let options = args.common.write_options();
@@ -71,7 +84,8 @@ pub fn items<'a>(args: &'a Args, film: &'a Film) -> Vec<Item<'a>> {
 pub fn interruption(written: &[PathBuf], can_resume: bool) -> String {
     let names = written.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
     let resumable = written.iter().find(|path| can_resume && image::has_layers(path));
-    let how = resumable.map(|path| format!("; --resume {} continues it", path.display())).unwrap_or_default();
+    let how = resumable.map(|path| format!("; --resume {} continues it", quoted(&path.display().to_string())));
+    let how = how.unwrap_or_default();
     format!("interrupted: what there is was written to {names}{how}")
 }
 

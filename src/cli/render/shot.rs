@@ -66,6 +66,11 @@ impl Shot<'_> {
     }
 }
 
+/// Options that choose what of a glTF file is seen, by which an image's metadata name them too.
+pub const CHOICES: [&str; 2] = ["camera", "clip"];
+/// Of an image's metadata: which frame of a sequence it is.
+pub const FRAME: &str = "frame";
+
 fn metadata(args: &Args, gpu: &Gpu, seconds: f64) -> BTreeMap<String, String> {
     let info = gpu.info();
     let since_epoch = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
@@ -77,5 +82,7 @@ fn metadata(args: &Args, gpu: &Gpu, seconds: f64) -> BTreeMap<String, String> {
         ("renderSeconds", format!("{seconds:.3}")),
         ("dateUnix", since_epoch.as_secs().to_string()),
     ];
-    entries.map(|(k, v)| (k.to_owned(), v)).into()
+    let named = CHOICES.into_iter().zip([&args.camera, &args.clip]);
+    let chosen = named.filter_map(|(key, name)| Some((key, name.clone()?)));
+    entries.into_iter().chain(chosen).map(|(k, v)| (k.to_owned(), v)).collect()
 }

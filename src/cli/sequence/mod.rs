@@ -4,12 +4,12 @@ mod preview;
 mod range;
 mod stage;
 
-use super::common::check_fps;
+use super::common::{check_fps, with_ranges};
 use super::render::{self, outputs};
 use super::{Exit, complain, fail_on_messages, finite, interrupt, print, print_json};
 use crate::error::{Error, Result};
 use crate::image;
-use crate::render::{Carriage, ReprojectOverrides};
+use crate::render::{Carriage, Reproject, ReprojectOverrides};
 use crate::scene::description::numbered;
 use preview::Preview;
 use serde::Serialize;
@@ -22,8 +22,8 @@ use std::time::{Duration, Instant};
 /// Render the frames of an animation
 ///
 /// Frame n shows the scene n / fps seconds after the start of its [[animation]] tables. Files have `####` for the number of the
-/// frame, with that many digits. A frame whose .exr file holds all samples of this scene, pose and settings is not rendered
-/// again. A frame that fails does not stop the others: the exit code is 6 then.
+/// frame, with that many digits. A frame whose .exr file holds all samples of this scene, pose, settings and filter is not rendered
+/// again; its other pictures are written anew. A frame that fails does not stop the others: the exit code is 6 then.
 ///
 /// With --reproject forward a frame begins with samples of the one before, and so depends on all before it. The first frame that is
 /// asked for, and one after a frame that failed, begins anew: --only 40..48 is the same sequence begun at frame 40. A run that goes
@@ -31,6 +31,7 @@ use std::time::{Duration, Instant};
 /// say how many samples of a pixel are of earlier frames, through how many they came on average, and what error they are accounted.
 #[derive(clap::Args)]
 #[command(
+    mut_args(with_ranges(Reproject::default().entries())),
     mut_arg("outputs", |arg| arg.help("Image to write: .exr (all layers), .png or .hdr, with #### for the number of the frame; may be \
         given several times [default: the scene's name + .####.exr]")),
     mut_args(|arg| { let hide = OF_ONE.contains(&arg.get_id().as_str()); if hide { arg.hide(true) } else { arg } }),

@@ -4,9 +4,10 @@ use super::preview::Preview;
 use super::{Args, FrameReport};
 use crate::cli::render::{self, EffectChoice, Spans, outputs};
 use crate::cli::{Exit, complain};
+use crate::denoise::filter::Method;
 use crate::error::{Error, Result};
 use crate::gpu::{FrameResources, Gpu};
-use crate::image::{self, Film, NOISY};
+use crate::image::{self, FILTERED, Film};
 use crate::layout::Effects;
 use crate::render::settings::Settings;
 use crate::render::{
@@ -148,6 +149,7 @@ impl<'a> Stage<'a> {
         end.pose_seconds = begun.elapsed().as_secs_f64();
         if let Some(film) = self.finished_film(&args, &settings).filter(|_| !self.args.again) {
             end.skipped = true;
+            outputs::save_pictures(&args, &film)?;
             self.chain = self.chain.or_of(&film).with(&self.scene, &settings, self.reproject)?;
             return show(preview, &film, &args).map(|()| Exit::Done);
         }
@@ -160,7 +162,10 @@ impl<'a> Stage<'a> {
         if !carries {
             self.chain = Chain::default();
         }
-        let shot = self.shoot(&args, &settings, carries)?;
+        let mut shot = self.shoot(&args, &settings, carries)?;
+        if let Some(shot) = &mut shot {
+            shot.film_mut().metadata.insert(render::FRAME.to_owned(), number.to_string());
+        }
         // What is there of an interrupted frame is of no use: it begins anew, and a .png of it would look like a finished one.
         let Some(mut shot) = shot.filter(render::Taken::is_whole) else { return Ok(Exit::Interrupted) };
         if carries {
@@ -265,8 +270,7 @@ impl<'a> Stage<'a> {
             Some(_) => image::read(first).ok().filter(|film| self.chain.ends_in(film, &self.scene, settings))?,
             None => finished(first, &self.scene, settings)?,
         };
-        let filtered = film.channels.iter().any(|channel| channel.name.starts_with(NOISY));
-        (files.iter().all(|path| path.exists()) && filtered == args.denoise.is_some()).then_some(film)
+        (film.metadata.get(FILTERED).map(String::as_str) == args.denoise.map(Method::name)).then_some(film)
     }
 }
 

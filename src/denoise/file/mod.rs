@@ -88,7 +88,8 @@ impl<'a> Layers<'a> {
     /// Colour and variance with their samples: those of the pixel, or of all; [`UNTOLD`] where the file does not say; 0 where it
     /// holds nothing.
     pub fn stats(&self, i: usize) -> PixelStats {
-        let said = self.aovs.scalar(Aov::Samples, i).or(self.samples_of_all);
+        let share = || self.aovs.scalar(Aov::ShareOfSamples, i).unwrap_or(1.0);
+        let said = self.aovs.scalar(Aov::Samples, i).or_else(|| Some(share() * self.samples_of_all?));
         let count = if self.aovs.holds(i) { said.unwrap_or(UNTOLD) } else { 0.0 };
         let stored = self.aovs.get(Aov::Variance).map_or([0.0; 3], |plane| plane.at(i));
         let m2 = if self.of_one_sample { stored.map(|v| v / said.unwrap_or(1.0).max(1.0)) } else { stored };

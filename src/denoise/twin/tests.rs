@@ -145,6 +145,8 @@ fn samples_are_those_that_the_head_of_a_file_tells_or_taken_for_some() {
     assert_eq!(count(&film), 64.0);
     film.metadata.insert("samplesPerPixel".to_owned(), "NaN".to_owned());
     assert_eq!(count(&film), 64.0);
+    film.add("Night.Debug Sample Count.X", Samples::F32(vec![0.25; 4]));
+    assert_eq!(count(&film), 16.0, "a share of them");
     film.add("samples", Samples::U32(vec![7; 4]));
     assert_eq!(count(&film), 7.0, "a pixel's own");
 }

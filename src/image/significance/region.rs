@@ -1,5 +1,6 @@
 //! The regions of an image at one scale. Regions of a scale share no pixel.
 use super::{Estimate, MIN_PIXELS};
+use crate::layout::NONE;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::fmt::{self, Display};
@@ -74,6 +75,7 @@ impl Display for Where {
         match (self.scale, self.object) {
             (Scale::Pixel, _) => write!(f, "pixel ({x}, {y})"),
             (Scale::Image, _) => f.write_str("the whole image"),
+            (_, Some(NONE)) => write!(f, "what no object covers in ({x}, {y}) to ({right}, {bottom})"),
             (_, Some(object)) => write!(f, "object {object} in ({x}, {y}) to ({right}, {bottom})"),
             (_, None) => write!(f, "block ({x}, {y}) to ({right}, {bottom})"),
         }

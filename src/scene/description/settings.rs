@@ -47,7 +47,7 @@ choices! {
 choices! {
     /// What the layers `direct` and `indirect` hold, and so what a filter gets where direct light is kept from it.
     pub enum Split {
-        /// `indirect` holds light of two bounces and more.
+        /// `indirect` holds light of two bounces and more, over the albedo of what is seen first.
         Indirect,
         /// `indirect` also holds what lamps and sky bring directly, which is noisy; `direct` the emission that is seen and what
         /// point, spot and directional lights bring, whose shadows are sharp.
@@ -87,7 +87,7 @@ settings! {
             seed: u32 = 0, ..;
             /// Random numbers.
             sampler: Sampler = Sampler::Sobol, ..;
-            /// What the layers `direct` and `indirect` hold.
+            /// What the layers `direct` and `indirect` hold: the colour is `direct` + `albedo` x `indirect`.
             split: Split = Split::Soft, ..;
         }
         /// Where in its sequence a pixel begins, which no scene file says.

@@ -9,10 +9,31 @@ mi.set_variant("llvm_ad_rgb")
 T = mi.ScalarTransform4f
 
 
+KEYS = {
+    "camera": {"position", "target", "up", "fov", "fov_axis"},
+    "environment": {"radiance", "file", "scale"},
+    "light": {"type", "direction", "irradiance"},
+    "material": {"name", "type", "color", "emission", "ior", "nonlinear", "alpha", "distribution"},
+    "mesh": {"name", "shape", "file", "material", "flat", "transform"},
+    "instance": {"mesh", "transform"},
+}
+
+
+def check(table):
+    """Nothing is left out in silence. Film and render are for whoever calls."""
+    assert not (tables := set(table) - set(KEYS) - {"film", "render"}), f"tables that are not told yet: {tables}"
+    for name, known in KEYS.items():
+        rows = table.get(name, [])
+        for row in rows if isinstance(rows, list) else [rows]:
+            assert not (keys := set(row) - known), f"keys of [{name}] that are not told yet: {keys}"
+    assert "file" in table.get("environment", {}) or "scale" not in table.get("environment", {}), "scale without a file"
+
+
 def load(path, width, height):
     """The scene of a file, on a film of so many pixels."""
     file = Path(path)
     table = tomllib.loads(file.read_text())
+    check(table)
     scene = {"type": "scene", "sensor": sensor(table["camera"], width, height)}
     if "environment" in table:
         scene["sky"] = environment(table["environment"], file.parent)

@@ -28,8 +28,7 @@ pub fn given_back(
     };
     let residuals: Vec<_> = (0..image.len()).map(residual).collect();
     let restored = |i: usize| -> vec4 {
-        let given = restored(image, &residuals, size, i, surfaces, prior(i));
-        let least = blend[i].xyz().min(image[i].colour).min(Vec3::ZERO);
+        let (given, least) = restored(image, &residuals, size, i, surfaces, prior(i));
         (blend[i].xyz() + given).max(least).extend(blend[i].w).into()
     };
     (0..image.len()).map(restored).collect()
@@ -85,7 +84,7 @@ struct Residual {
     measured: bool,
 }
 
-/// What a pixel is given back of what the blend has lost.
+/// What a pixel is given back of what the blend has lost, and the least light that it may have: of the noisy pixels around, or none.
 fn restored(
     image: &[Packed],
     residuals: &[Residual],
@@ -93,9 +92,9 @@ fn restored(
     at: usize,
     rates: &Rates,
     prior: f32,
-) -> Vec3 {
+) -> (Vec3, Vec3) {
     const REACH: i64 = auto_residual::REACH as i64;
-    let mut windows = [Window::default(); 3];
+    let (mut windows, mut least) = ([Window::default(); 3], Vec3::ZERO);
     let (p, x, y) = (&image[at], at as i64 % width, at as i64 / width);
     for (u, v) in (-REACH..=REACH).flat_map(|v| (-REACH..=REACH).map(move |u| (u, v))) {
         if !(0..width).contains(&(x + u)) || !(0..height).contains(&(y + v)) {
@@ -103,14 +102,16 @@ fn restored(
         }
         let j = ((y + v) * width + x + u) as usize;
         let (q, there) = (&image[j], &residuals[j]);
+        least = least.min(q.colour);
         let w = if there.filtered { edge_weight(q, rates.exponent(p, q)) } else { 0.0 };
         let reach = u.abs().max(v.abs());
         let holding = windows.iter_mut().zip([REACH, 1, 0]).filter(|(_, most)| reach <= *most);
         holding.for_each(|(window, _)| window.add(there.colour, w, q.count, there.variance));
     }
     if p.count == 0.0 || !residuals[at].filtered {
-        return Vec3::ZERO;
+        return (Vec3::ZERO, least);
     }
     let used = if residuals[at].measured { 3 } else { 1 };
-    windows[..used].iter().fold(Vec3::ZERO, |given, window| given + window.significant(given, prior))
+    let given = windows[..used].iter().fold(Vec3::ZERO, |given, window| given + window.significant(given, prior));
+    (given, least)
 }
