@@ -59,7 +59,7 @@ fn tables(report: &Report) -> Vec<Table> {
         "A difference from there on would have been seen nine times in ten, in nine of ten regions.".to_owned();
     report.outcome.levels.iter().for_each(|level| scales.push(scale(level)));
     let mut regions = Table::new("Where they differ", &HEADER);
-    regions.note = format!("The surest regions of every scale; {}", words::RELATIVE);
+    regions.note = format!("The surest regions of every scale. {}", words::RELATIVE);
     report.outcome.levels.iter().rev().flat_map(|level| &level.worst).for_each(|found| regions.push(row(found)));
     let [a, b] = report.sides.each_ref().map(|side| &side.estimate);
     let mut pixels = Table::new("Pixels to look at", &HEADER);

@@ -7,7 +7,8 @@ use crate::report::table;
 pub const CHANNELS: [&str; 3] = ["R", "G", "B"];
 
 /// What differences in the tables are relative to.
-pub const RELATIVE: &str = "differences are relative to B, where B is darker than the mean of all of it to that mean.";
+pub const RELATIVE: &str =
+    "Differences are relative to B or, where B is darker than the mean of all of it, to that mean.";
 
 /// Most rows of the table of regions.
 const ROWS: usize = 8;
@@ -119,8 +120,7 @@ pub fn tables(outcome: &Outcome) -> String {
         true => scales,
         false => {
             let header = ["differs", "channel", "A", "B", "difference", "standard error", "p"];
-            let [first, rest] = RELATIVE.split_at(1).into();
-            format!("{scales}\n{}{}{rest}\n", table::text(&header, &worst), first.to_uppercase())
+            format!("{scales}\n{}{RELATIVE}\n", table::text(&header, &worst))
         }
     }
 }
