@@ -144,7 +144,7 @@ pub const MAX_GROUPS: u32 = 65_535;
 
 /// A compiled kernel, specialised by its constants. `B` is the kernel's `Bind` struct.
 pub struct Kernel<B> {
-    pub(super) compiled: Compiled,
+    pub(super) compiled: Box<Compiled>,
     /// Covariant, so that a kernel kept as `Kernel<Bind<'static>>` takes shorter borrows.
     of: PhantomData<fn() -> B>,
 }
@@ -204,7 +204,7 @@ impl<B: Bindings> Kernel<B> {
             push_bytes: size_of::<B::Push>(),
         };
         let compiled = Compiled::new(gpu, &interface, constants.entries(), constants.local_size())?;
-        Ok(Self { compiled, of: PhantomData })
+        Ok(Self { compiled: Box::new(compiled), of: PhantomData })
     }
 
     /// Time that creating the pipeline took. Some drivers, such as lavapipe, compile more on the first dispatch.
