@@ -29,10 +29,15 @@ impl Candidate {
         self.curves.values().map(|curve| read(curve).ln()).sum::<f64>() / self.curves.len() as f64
     }
 
-    /// Logarithms of the quotient of what `read` finds for this method and for another one, seed by seed.
+    /// Logarithms of the quotient of what `read` finds for this method and for another one, seed by seed. Runs of another renderer may
+    /// have seeds of their own: they are independent of ours, so that each may stand beside any, and the first stands beside the first.
     pub(super) fn against(&self, other: &Self, read: &dyn Fn(&Curve) -> f64) -> Vec<f64> {
-        let both = |(seed, curve): (&u32, &Curve)| Some((read(curve) / read(other.curves.get(seed)?)).ln());
-        self.curves.iter().filter_map(both).collect()
+        let both = |(one, other): (&Curve, &Curve)| (read(one) / read(other)).ln();
+        let shared = self.curves.iter().filter_map(|(seed, curve)| Some((curve, other.curves.get(seed)?)));
+        let shared: Vec<f64> = shared.map(both).collect();
+        // One pair tells nothing of the noise.
+        let is_enough = shared.len() > 1;
+        if is_enough { shared } else { self.curves.values().zip(other.curves.values()).map(both).collect() }
     }
 }
 

@@ -7,6 +7,8 @@ use super::words::{factor, milliseconds, number};
 
 /// Number of times at which methods are compared, evenly spaced on a logarithmic axis.
 const LEVELS: usize = 16;
+/// Upper end of an interval over its lower end, up to which a factor is told even if it may be 1.
+const NARROW: f64 = 1.5;
 
 /// What the best method gains at a time.
 struct Gain<'a> {
@@ -23,8 +25,12 @@ pub fn finding(candidates: &[Candidate], confidence: f64) -> Option<Finding> {
     // Times of few samples may vary more between seeds than between numbers of samples.
     let [first, last] = Some(baseline.times()).filter(|[first, last]| first < last)?;
     let time = |i: usize| first * (last / first).powf(i as f64 / (LEVELS - 1) as f64);
+    // The best of many methods, at the least of many times, is chosen by the very runs that its interval is of: only what holds for all
+    // of them together holds for it.
+    let compared = LEVELS * candidates.len().saturating_sub(1).max(1);
+    let each = 1.0 - (1.0 - confidence) / compared as f64;
     let gains: Vec<Gain> =
-        (0..LEVELS).filter_map(|i| gain(candidates, baseline, time(i).clamp(first, last), confidence)).collect();
+        (0..LEVELS).filter_map(|i| gain(candidates, baseline, time(i).clamp(first, last), each)).collect();
     let by_factor = |a: &&Gain, b: &&Gain| a.factor.value.total_cmp(&b.factor.value);
     let (least, most) = (gains.iter().min_by(by_factor)?, gains.iter().max_by(by_factor)?);
     let text = format!(
@@ -39,9 +45,15 @@ pub fn finding(candidates: &[Candidate], confidence: f64) -> Option<Finding> {
         most.by,
         milliseconds(most.time)
     );
-    // Of a single seed nobody knows how far another would be off.
-    let verdict = if least.factor.low.is_some() { Verdict::Clear } else { Verdict::TooNoisy };
+    let verdict = if is_told(&least.factor) { Verdict::Clear } else { Verdict::TooNoisy };
     Some(Finding { verdict, text })
+}
+
+/// Whether an interval says on which side of 1 a factor is, or that it is near. Of a single seed nobody knows how far another would be
+/// off.
+fn is_told(factor: &Estimate) -> bool {
+    let Some((low, high)) = factor.low.zip(factor.high) else { return false };
+    low > 1.0 || high < 1.0 || high < NARROW * low
 }
 
 /// What is gained at a time by the best of the methods that have begun. One that ends before keeps its last image.

@@ -40,7 +40,7 @@ pub fn median(values: &[f64], confidence: f64) -> Estimate {
 }
 
 /// Whether the mean of the values differs from 0, by a two-sided t test at the level `alpha`. Values that are all the same
-/// differ if they are not 0.
+/// differ if they are not 0. A single value, or none, tells nothing.
 pub fn differs_from_0(values: &[f64], alpha: f64) -> bool {
     let Some(error) = standard_error(values) else { return false };
     let mean = average(values);
@@ -52,11 +52,14 @@ fn average(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// `None` for a single value, whose error nobody knows.
+/// `None` for fewer than two values, whose error nobody knows.
 fn standard_error(values: &[f64]) -> Option<f64> {
+    if values.len() < 2 {
+        return None;
+    }
     let (n, mean) = (values.len() as f64, average(values));
     let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
-    (values.len() > 1).then(|| (squares / (n - 1.0) / n).sqrt())
+    Some((squares / (n - 1.0) / n).sqrt())
 }
 
 fn t_quantile(runs: usize, confidence: f64) -> f64 {
@@ -112,5 +115,6 @@ mod tests {
         assert!(
             differs_from_0(&[2.0, 2.0], 0.001) && !differs_from_0(&[0.0, 0.0], 0.05) && !differs_from_0(&[9.0], 0.05)
         );
+        assert!(!differs_from_0(&[], 0.05), "nothing differs from nothing");
     }
 }
