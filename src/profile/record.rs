@@ -141,7 +141,7 @@ pub struct PassProfile {
     pub gop_s: f64,
     /// `gb_s` of what a copy of [`Work::working_set`] bytes reaches.
     pub memory_share: f64,
-    /// `gop_s` of what arithmetic reaches.
+    /// `gop_s` of what arithmetic reaches, before the frames or after them, whichever is faster.
     pub arithmetic_share: f64,
     /// Which of the two it is nearer to.
     pub limit: Limit,
@@ -164,13 +164,14 @@ impl Profile {
     /// # Errors
     /// [`Error::Scene`] when the scene's camera is broken.
     pub fn new(gpu: &Gpu, path: &Path, scene: &Scene, settings: &Settings, measured: &Measured) -> Result<Self> {
-        let Measured { frames, frame_work, ceilings, .. } = measured;
+        let Measured { frames, frame_work, ceilings, arithmetic_gop_s_after, .. } = measured;
+        let fastest = fastest(ceilings, *arithmetic_gop_s_after);
         let timed: Vec<&[Pass]> = frames.timed.iter().map(|run| &run.passes[..]).collect();
         let frame_ms = Spread::of(timed.iter().map(|passes| milliseconds_of(passes, None)).collect());
         let work = timed.first().map(|passes| frame_work.of(passes)).unwrap_or_default();
         let of = |(pass, work): (String, Work)| {
             let ms = Spread::of(timed.iter().map(|passes| milliseconds_of(passes, Some(&pass))).collect());
-            PassProfile::new(pass, ms, work, frame_ms.median, ceilings)
+            PassProfile::new(pass, ms, work, frame_ms.median, &fastest)
         };
         let passes: Vec<_> = work.into_iter().map(of).collect();
         let path_ms: f64 = passes.iter().filter(|p| traces_paths(&p.pass)).map(|p| p.ms.median).sum();
@@ -188,7 +189,7 @@ impl Profile {
                 calibration_deviation_ns: measured.calibration.map(|moment| moment.deviation_ns),
             },
             ceilings: ceilings.clone(),
-            arithmetic_gop_s_after: measured.arithmetic_gop_s_after,
+            arithmetic_gop_s_after: *arithmetic_gop_s_after,
             device_mhz: measured.device_mhz,
             frame_ms,
             passes,
@@ -271,6 +272,11 @@ impl Overhead {
     }
 }
 
+/// The most that the device was seen to do, of which passes have their shares: clocks may have risen since the ceilings were measured.
+fn fastest(before: &Ceilings, arithmetic_gop_s_after: f64) -> Ceilings {
+    Ceilings { arithmetic_gop_s: before.arithmetic_gop_s.max(arithmetic_gop_s_after), ..before.clone() }
+}
+
 /// Of all passes, or of one.
 fn milliseconds_of(passes: &[Pass], name: Option<&str>) -> f64 {
     let of = passes.iter().filter(|pass| name.is_none_or(|name| pass.time.name == name));
@@ -322,8 +328,13 @@ mod tests {
         assert_eq!([1000, 1001, 9999].map(|bytes| ceilings.copy_gb_s(bytes)), [20.0, 10.0, 10.0]);
         let mut work = Work::default();
         (work.bytes.count, work.operations.count, work.working_set) = (8_000_000, 20_000_000, 2000);
-        let row = PassProfile::new("a".into(), Spread::of(vec![2.0]), work, 8.0, &ceilings);
+        let row = PassProfile::new("a".into(), Spread::of(vec![2.0]), work.clone(), 8.0, &ceilings);
         assert_eq!((row.share, row.gb_s, row.gop_s), (0.25, 4.0, 10.0));
         assert_eq!((row.memory_share, row.arithmetic_share, row.limit), (0.4, 0.1, Limit::Memory));
+        let share = |after: f64| {
+            PassProfile::new("a".into(), Spread::of(vec![2.0]), work.clone(), 8.0, &fastest(&ceilings, after))
+                .arithmetic_share
+        };
+        assert_eq!((share(500.0), share(20.0)), (0.02, 0.1), "of the faster one");
     }
 }

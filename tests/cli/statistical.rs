@@ -165,8 +165,11 @@ fn one_percent_of_one_material_is_found_and_its_pixels_render_again_to_the_same_
     render(&folder, &scene, "3", "c.exr");
     let same = compare(&folder, "c.exr b.exr --evidence nothing --json");
     assert_eq!(same.status.code(), Some(0), "{same:?}");
+    let json: Value = serde_json::from_slice(&same.stdout).unwrap();
+    assert!(json["evidence"].is_null(), "nothing is written: {json}");
     let found = compare(&folder, "changed.exr b.exr --evidence found --json");
     let json: Value = serde_json::from_slice(&found.stdout).unwrap();
+    assert_eq!(json["evidence"], "found");
     assert_eq!(json["outcome"]["verdict"], "different");
     let objects =
         json["outcome"]["levels"].as_array().unwrap().iter().find(|level| level["scale"] == "object").unwrap();

@@ -64,7 +64,7 @@ pub fn run(a: &Path, b: &Path, json: bool, args: &Args) -> Result<Exit> {
     let full = args.map.as_ref().map(|path| report.write_map(path)).transpose()?;
     args.junit.as_ref().map_or(Ok(()), |path| output::write(path, junit::text(&report)?.as_bytes()))?;
     args.html.as_ref().map_or(Ok(()), |path| output::write(path, page::html(&report).as_bytes()))?;
-    let failed = !matches!(report.outcome.verdict, Verdict::Same { .. });
+    let failed = failed(&report);
     let folder = args.evidence.as_ref().filter(|_| failed);
     folder.map_or(Ok(()), |folder| evidence::write(folder, &report))?;
     match json {
@@ -79,6 +79,11 @@ pub fn run(a: &Path, b: &Path, json: bool, args: &Args) -> Result<Exit> {
         Verdict::Different => Exit::LimitExceeded,
         Verdict::TooNoisy { .. } => Exit::Undecided,
     })
+}
+
+/// Whether the images are not known to be the same, so that evidence is written.
+fn failed(report: &Report) -> bool {
+    !matches!(report.outcome.verdict, Verdict::Same { .. })
 }
 
 /// Bytes per pixel that a test takes in addition to the images: p-values, errors and a map for every scale.
@@ -105,7 +110,7 @@ fn check_outputs(a: &Path, b: &Path, args: &Args) -> Result<()> {
 fn summary(report: &Report, args: &Args, full: Option<f32>) -> Value {
     let mut figures = report.figures();
     figures["map"] = json!(args.map.as_ref().zip(full).map(|(path, full)| json!({ "file": path, "full": full })));
-    figures["evidence"] = json!(args.evidence);
+    figures["evidence"] = json!(args.evidence.as_ref().filter(|_| failed(report)));
     figures
 }
 
