@@ -63,9 +63,9 @@ impl Files {
         Self { own, failures: Vec::new() }
     }
 
-    /// From now on these files may be replaced, because an earlier run of the same work wrote them.
-    pub fn own(&mut self, paths: impl IntoIterator<Item = PathBuf>) {
-        self.own.extend(paths.into_iter().map(|path| (key(&path), path)));
+    /// From now on what is written to `path` goes to `place`, because an earlier run of the same work put it there.
+    pub fn go_on(&mut self, path: &Path, place: PathBuf) {
+        self.own.insert(key(path), place);
     }
 
     /// Removes the incomplete files that this run owns, once the items are whole.

@@ -1,5 +1,5 @@
 //! The points of a document as a table of comma-separated values, one row per point.
-use super::document::{Document, Errors, Estimate, Point, Summary};
+use super::document::{Document, Errors, Estimate, Factor, Point, Summary};
 
 /// Columns before the errors.
 const HEAD: [&str; 14] = [
@@ -18,21 +18,25 @@ const HEAD: [&str; 14] = [
     "compile_ms",
     "first_run_ms",
 ];
-/// Columns behind the errors.
-const TAIL: [&str; 14] = [
+/// Columns behind the errors. A factor is extrapolated where uniform unfiltered rendering was not measured that far and its curve was
+/// continued. A row that `is_other` is of another renderer: its times are wall times that were given.
+const TAIL: [&str; 17] = [
     "inefficiency",
     "inefficiency_low",
     "inefficiency_high",
     "speed_up",
     "speed_up_low",
     "speed_up_high",
+    "speed_up_extrapolated",
     "error_gain",
     "error_gain_low",
     "error_gain_high",
+    "error_gain_extrapolated",
     "samples",
     "rays",
     "device_bytes",
     "on_front",
+    "is_other",
     "failed",
 ];
 /// Names of the errors; each has three columns.
@@ -86,12 +90,18 @@ fn head(point: &Point) -> Vec<String> {
 
 fn tail(point: &Point, summary: Option<&Summary>, on_front: bool) -> Vec<String> {
     let first = point.runs.first();
-    let factors = summary
-        .map_or([None; 3], |s| [s.inefficiency, s.speed_up.map(|f| f.estimate), s.error_gain.map(|f| f.estimate)]);
+    let [speed_up, error_gain] = [summary.and_then(|s| s.speed_up), summary.and_then(|s| s.error_gain)].map(factor);
+    let inefficiency = estimate(summary.and_then(|s| s.inefficiency));
     let counts = [first.map(|run| run.samples), first.and_then(|run| run.rays), point.device_bytes];
     let counts = counts.map(|count| count.map(|n| n.to_string()).unwrap_or_default());
-    let ends = [on_front.to_string(), point.failed.clone().unwrap_or_default()];
-    factors.into_iter().flat_map(estimate).chain(counts).chain(ends).collect()
+    let ends = [on_front.to_string(), point.is_other.to_string(), point.failed.clone().unwrap_or_default()];
+    inefficiency.into_iter().chain(speed_up).chain(error_gain).chain(counts).chain(ends).collect()
+}
+
+/// A factor with its interval, and whether it is extrapolated.
+fn factor(factor: Option<Factor>) -> [String; 4] {
+    let [value, low, high] = estimate(factor.map(|factor| factor.estimate));
+    [value, low, high, factor.map(|factor| factor.extrapolated.to_string()).unwrap_or_default()]
 }
 
 /// Value, lower and upper end; empty where they are unknown.

@@ -1,6 +1,7 @@
 //! Pages of reports, made of a document that nothing was measured for.
 use crate::measurement;
 use tallow::cost::document::{Document, Estimate, Verdict};
+use tallow::cost::table as cost_table;
 use tallow::report::html;
 use tallow::report::html::viewer::{Image, Viewer};
 use tallow::report::html::{Cell, Page, Section, Table};
@@ -49,6 +50,24 @@ fn every_point_is_in_plots_tables_and_viewer_or_has_a_reason() {
     let change = "<td>both + auto, 4 spp</td><td>max-depth 4</td><td data-order=\"0.7\" class=\"number\">0.700 ×<small>0.636 to 0.770</small>";
     assert!(page.contains(change), "no row of what options change");
     assert!(page.contains("<title>both + auto, max-depth 4, 4 spp\nGPU time 0.700 × (0.636 to 0.770)\nrelMSE 1.20 ×"));
+}
+
+#[test]
+fn the_table_tells_extrapolated_factors_and_other_renderers() {
+    let mut document = measurement::document("box");
+    document.points[0].is_other = true;
+    let bytes = cost_table::csv(&document);
+    let mut reader = csv::Reader::from_reader(&bytes[..]);
+    let head = reader.headers().unwrap().clone();
+    let place = |name: &str| head.iter().position(|column| column == name).unwrap();
+    let columns = ["speed_up_extrapolated", "error_gain_extrapolated", "is_other"].map(place);
+    for (i, (row, point)) in reader.records().zip(&document.points).enumerate() {
+        let row = row.unwrap();
+        let extrapolated =
+            point.summary.as_ref().map_or("", |_| if point.method.spp == 256 { "true" } else { "false" });
+        let told = [extrapolated, extrapolated, if i == 0 { "true" } else { "false" }];
+        assert_eq!(columns.map(|column| &row[column]), told, "{row:?}");
+    }
 }
 
 #[test]

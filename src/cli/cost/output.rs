@@ -11,6 +11,7 @@ use crate::image::{input, output};
 use crate::report::{html, table as text_table};
 use serde_json::Value;
 use std::cell::RefCell;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Names of the results.
@@ -34,7 +35,7 @@ impl Folder {
         NAMES.iter().try_for_each(|name| output::check(&path.join(name)))?;
         let json = path.join(NAMES[0]);
         let mut begun = Vec::new();
-        for file in [json.clone(), partial_name(&json)].into_iter().filter(|file| file.exists()) {
+        for file in std::iter::once(json.clone()).chain(partial_files(&json)).filter(|file| file.exists()) {
             let document = read(&file)?;
             if !document.complete {
                 begun.push((file, document));
@@ -43,10 +44,17 @@ impl Folder {
         Ok(Self { path: path.to_owned(), files: RefCell::default(), begun })
     }
 
-    /// A measurement of this key that is not complete yet. Its files may be replaced.
+    /// A measurement of this key that is not complete yet, of several the one with most runs. It goes on in its files.
     pub fn earlier(&self, key: &str) -> Option<Document> {
-        let (file, document) = self.begun.iter().find(|(_, document)| document.measurement.key == key)?;
-        self.files.borrow_mut().own(["json", "csv", "html"].map(|extension| file.with_extension(extension)));
+        let of_key = self.begun.iter().filter(|(_, document)| document.measurement.key == key);
+        // The first of those that have as many.
+        let (file, document) = of_key.rev().max_by_key(|(_, document)| super::runs(document))?;
+        for extension in ["json", "csv", "html"] {
+            let place = file.with_extension(extension);
+            let whole = self.path.join(NAMES[0]).with_extension(extension);
+            let path = if *file == self.path.join(NAMES[0]) { whole } else { partial_name(&whole) };
+            self.files.borrow_mut().go_on(&path, place);
+        }
         Some(document.clone())
     }
 
@@ -74,6 +82,26 @@ impl Folder {
     pub fn failure(&self) -> Option<Error> {
         self.files.borrow().failure()
     }
+}
+
+/// Files that this result has beside it while it is not whole: `cost.partial.json`, and `cost.partial-2.json` and so on where that was
+/// another measurement's. Sorted by name.
+fn partial_files(json: &Path) -> Vec<PathBuf> {
+    let partial = partial_name(json);
+    let (Some(folder), Some(stem)) = (json.parent(), partial.file_stem().and_then(OsStr::to_str)) else {
+        return Vec::new();
+    };
+    let is_one = |path: &PathBuf| {
+        let behind = path.file_stem().and_then(OsStr::to_str).and_then(|name| name.strip_prefix(stem));
+        let is_number = |n: &str| !n.is_empty() && n.bytes().all(|c| c.is_ascii_digit());
+        let is_named_so =
+            behind.is_some_and(|behind| behind.is_empty() || behind.strip_prefix('-').is_some_and(is_number));
+        is_named_so && path.extension() == json.extension()
+    };
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(is_one).collect();
+    files.sort();
+    files
 }
 
 fn json(document: &Document) -> Vec<u8> {
@@ -131,6 +159,7 @@ pub fn text(document: &Document, written: &[PathBuf]) -> String {
     let head = ["point", "GPU time", "relMSE", "+-", "FLIP", "speed-up", "on the front"];
     let rows: Vec<_> = (0..document.points.len()).filter_map(|i| row(document, i)).collect();
     let mut text = text_table::text(&head, &rows);
+    text += &legend(document);
     let changes: Vec<_> = document.points.iter().filter_map(|point| change(document, point)).collect();
     if !changes.is_empty() {
         let head = ["without the option", "option", "GPU time", "relMSE", "relMSE x time"];
@@ -150,6 +179,22 @@ pub fn text(document: &Document, written: &[PathBuf]) -> String {
     }
     let files: Vec<_> = written.iter().map(|path| readable(&path.display().to_string())).collect();
     text + &format!("written: {}\n", files.join(", "))
+}
+
+/// What the marks in the table of the points mean, and which of its times are no GPU times.
+fn legend(document: &Document) -> String {
+    let mut text = String::new();
+    let speed_up = |point: &Point| point.summary.as_ref()?.speed_up;
+    if document.points.iter().filter_map(speed_up).any(|factor| factor.extrapolated) {
+        text += "*: uniform unfiltered rendering was not measured that far, and its curve was continued\n";
+    }
+    let others = document.points.iter().filter(|point| point.is_other && point.summary.is_some());
+    let mut others: Vec<_> = others.map(|point| readable(&point.method.name())).collect();
+    others.dedup();
+    if !others.is_empty() {
+        text += &format!("wall time instead of GPU time: {}\n", others.join("; "));
+    }
+    text
 }
 
 /// What the option of a point changes.
@@ -184,4 +229,90 @@ fn row(document: &Document, index: usize) -> Option<Vec<String>> {
         speed_up.unwrap_or_else(unknown),
         on_front.to_owned(),
     ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Picture;
+    use serde_json::json as value;
+
+    /// A document of two runs of one point.
+    fn document(key: &str) -> Document {
+        let run = |seed| value!({ "seed": seed, "gpu_ms": 2.0, "wall_ms": 3.0, "passes": [], "samples": 4, "rays": 8, "errors": { "relmse": 0.1 } });
+        let method = value!({ "allocate": "uniform", "filter": "none", "rounds": null, "options": [], "spp": 4 });
+        let machine =
+            value!({ "device": "none", "kind": "CPU", "driver": "none", "cpu": "none", "cores": 1, "cpu_mhz": null });
+        let value = value!({
+            "schema": SCHEMA, "complete": false, "software": { "version": "0", "commit": null },
+            "scene": { "path": "a.toml", "name": "a", "width": 2, "height": 2 }, "machine": machine,
+            "reference": { "source": "given", "path": null, "spp": null, "noise": "unknown", "mse": null, "relmse": null, "notes": [] },
+            "measurement": {
+                "repeats": 4, "seeds": [0, 1, 2, 3], "order_seed": 0, "budget_minutes": null, "confidence": 0.95, "key": key,
+            },
+            "points": [{
+                "method": method, "command": "", "runs": [run(0), run(1)], "warm_up": null, "device_bytes": null, "summary": null,
+                "failed": null,
+            }],
+            "front": [], "findings": [],
+        });
+        let mut document: Document = serde_json::from_value(value).unwrap();
+        crate::cost::summary::summarise(&mut document.points, 0.95);
+        document
+    }
+
+    #[test]
+    fn marks_and_wall_times_are_explained() {
+        let mut document = document("");
+        let plain = text(&document, &[]);
+        assert!(!plain.contains('*') && !plain.contains("wall time"), "{plain}");
+        let mut other = document.points[0].clone();
+        other.method.allocate = "Other".to_owned();
+        other.is_other = true;
+        let factor = other.summary.as_mut().unwrap().speed_up.as_mut().unwrap();
+        factor.extrapolated = true;
+        document.points.push(other);
+        let marked = text(&document, &[]);
+        assert!(
+            marked.contains(" *") && marked.contains("\n*: uniform unfiltered rendering was not measured that far"),
+            "{marked}"
+        );
+        assert!(marked.contains("wall time instead of GPU time: Other\n"), "{marked}");
+    }
+
+    #[test]
+    fn every_measurement_of_a_folder_goes_on_where_it_ended() {
+        let folder = tempfile::tempdir().unwrap();
+        let inside = |name: &str| folder.path().join(name);
+        let whole = Document { complete: true, ..document("whole") };
+        let pictures =
+            Images { reference: Picture { width: 1, height: 1, pixels: vec![[0.0; 3]] }, points: Vec::new() };
+        Folder::open(folder.path()).unwrap().write(&whole, &pictures, true);
+        for key in ["first", "second", "third"] {
+            let open = Folder::open(folder.path()).unwrap();
+            assert!(open.earlier(key).is_none());
+            open.keep(&document(key));
+            open.write(&document(key), &pictures, false);
+        }
+        let files = ["cost.partial.json", "cost.partial-2.json", "cost.partial-3.json"].map(inside);
+        let of = |file: &Path| read(file).unwrap().measurement.key;
+        assert_eq!(files.each_ref().map(|file| of(file)), ["first", "second", "third"]);
+        let count = || std::fs::read_dir(folder.path()).unwrap().count();
+        let before = count();
+        let open = Folder::open(folder.path()).unwrap();
+        let mut more = open.earlier("third").unwrap();
+        let run = more.points[0].runs[0].clone();
+        more.points[0].runs.push(run);
+        open.keep(&more);
+        let written = open.write(&more, &pictures, false);
+        assert_eq!((count(), &written[0]), (before, &files[2]), "it goes on in its own files");
+        assert_eq!(files.each_ref().map(|file| of(file)), ["first", "second", "third"]);
+        // Of two with one key, the one with more runs.
+        std::fs::write(inside("cost.partial-12.json"), json(&document("third"))).unwrap();
+        let open = Folder::open(folder.path()).unwrap();
+        assert_eq!(open.earlier("third").as_ref(), Some(&more));
+        open.write(&Document { complete: true, ..more }, &pictures, true);
+        assert!(!files[2].exists() && files[0].exists() && files[1].exists(), "only its own are removed");
+        assert_eq!(of(&inside("cost.json")), "third");
+    }
 }
