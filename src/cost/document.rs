@@ -134,7 +134,8 @@ pub struct Measurement {
     pub order_seed: u64,
     /// Limit of the whole measurement in minutes; `None` without limit.
     pub budget_minutes: Option<f64>,
-    /// Confidence level of all intervals, such as 0.95.
+    /// Confidence level of all intervals, such as 0.95. Median times reach it from six runs on: those of fewer have the range of the
+    /// runs instead, which covers the median with 1 - 2 / 2^n.
     pub confidence: f64,
     /// Identifies scene, settings, grid, device and driver: only a measurement with the same key is continued.
     pub key: String,

@@ -39,6 +39,11 @@ pub fn median(values: &[f64], confidence: f64) -> Estimate {
     Estimate { value, low: Some(sorted[outside]), high: Some(sorted[n - 1 - outside]) }
 }
 
+/// Whether [`median`] of so many values has an interval that covers the median at `confidence`, and not merely their range.
+pub fn median_is_covered(values: usize, confidence: f64) -> bool {
+    1.0 - 2.0 * 0.5_f64.powi(values.min(1000) as i32) >= confidence
+}
+
 /// Whether the mean of the values differs from 0, by a two-sided t test at the level `alpha`. Values that are all the same
 /// differ if they are not 0. A single value, or none, tells nothing.
 pub fn differs_from_0(values: &[f64], alpha: f64) -> bool {
@@ -106,6 +111,7 @@ mod tests {
         assert_eq!(of(5), (3.0, Some(1.0), Some(5.0)));
         assert_eq!(of(8), (4.5, Some(1.0), Some(8.0)), "0.992; one less on either side has 0.930");
         assert_eq!(of(10), (5.5, Some(2.0), Some(9.0)), "0.979 by the tables");
+        assert_eq!([1, 5, 6, 1000].map(|n| median_is_covered(n, 0.95)), [false, false, true, true]);
     }
 
     #[test]

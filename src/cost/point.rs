@@ -135,7 +135,8 @@ pub struct Factor {
 /// Summary of the runs of one point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
-    /// Median GPU time in milliseconds, and an interval from order statistics.
+    /// Median GPU time in milliseconds, and an interval from order statistics: for fewer than six runs the range of them all, which is
+    /// less than an interval of 95 %.
     pub gpu_ms: Estimate,
     /// Median wall time in milliseconds, in the same way.
     pub wall_ms: Estimate,

@@ -71,6 +71,26 @@ fn the_table_tells_extrapolated_factors_and_other_renderers() {
 }
 
 #[test]
+fn times_of_few_runs_have_ranges_and_no_intervals() {
+    let mut document = measurement::document("box");
+    let mut says = |runs: usize, words: &[&str], not: &[&str]| {
+        document.measurement.repeats = runs as u32;
+        document.complete = true;
+        for point in document.points.iter_mut().filter(|point| !point.runs.is_empty()) {
+            let first = point.runs[0].clone();
+            point.runs.resize(runs, first);
+        }
+        let page = page(&document);
+        assert!(words.iter().all(|word| content(&page).contains(word)), "{runs} runs lack {words:?}");
+        assert!(not.iter().all(|word| !content(&page).contains(word)), "{runs} runs have {not:?}");
+    };
+    let ranges =
+        ["2 runs of each point, 95 % intervals of errors and factors, ranges of times", "those of times are the range"];
+    says(2, &ranges, &["Bars are 95 %", "% intervals<"]);
+    says(6, &["6 runs of each point, 95 % intervals<", "Bars are 95 % intervals."], &["range"]);
+}
+
+#[test]
 fn a_page_asks_nothing_of_the_network() {
     let page = page(&measurement::document("box"));
     assert!(page.contains("default-src 'none'"));

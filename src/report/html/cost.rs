@@ -7,6 +7,7 @@ use super::viewer::{Image, Viewer};
 use super::{Frame, changes, pass_table, point_table};
 use crate::cost::Images;
 use crate::cost::document::{Document, Machine, NoiseKind, Point, ReferenceInfo, ReferenceSource, Verdict};
+use crate::cost::interval::median_is_covered;
 use askama::Template;
 
 /// What `cost.html` shows.
@@ -16,7 +17,7 @@ struct CostPage<'a> {
     frame: Frame<'a>,
     document: &'a Document,
     facts: Vec<(String, String)>,
-    confidence: String,
+    bars: String,
     open_findings: usize,
     reference_notes: &'a [String],
     charts: Vec<Chart>,
@@ -40,7 +41,7 @@ pub fn cost(document: &Document, images: Option<&Images>) -> String {
         frame: Frame::new(&title),
         document,
         facts: facts(document),
-        confidence: percent(document.measurement.confidence),
+        bars: bars(document),
         open_findings: document.findings.iter().filter(|finding| CostPage::is_open(&finding.verdict)).count(),
         reference_notes: &document.reference.notes,
         charts: METRICS.iter().map(|&metric| error_chart::draw(document, metric)).collect(),
@@ -69,7 +70,12 @@ impl CostPage<'_> {
 fn facts(document: &Document) -> Vec<(String, String)> {
     let Document { scene, machine, measurement, software, .. } = document;
     let commit = software.commit.as_ref().map(|commit| format!(", commit {commit}")).unwrap_or_default();
-    let runs = format!("{} runs of each point, {} % intervals", runs(document), percent(measurement.confidence));
+    let confidence = percent(measurement.confidence);
+    let intervals = match has_ranges(document) {
+        false => format!("{confidence} % intervals"),
+        true => format!("{confidence} % intervals of errors and factors, ranges of times"),
+    };
+    let runs = format!("{} runs of each point, {intervals}", runs(document));
     let cores = if machine.cores == 1 { "1 core".to_owned() } else { format!("{} cores", machine.cores) };
     let rays = if machine.ray_queries { ", rays by ray queries" } else { "" };
     let frame = scene.judged.map(|judged| format!(", frame {} at {} a second", judged.frame, judged.fps));
@@ -85,6 +91,24 @@ fn facts(document: &Document) -> Vec<(String, String)> {
         facts.push(("clocks", clocks));
     }
     facts.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+}
+
+/// What the bars of the plots are.
+fn bars(document: &Document) -> String {
+    let confidence = percent(document.measurement.confidence);
+    match has_ranges(document) {
+        false => format!("Bars are {confidence} % intervals."),
+        true => format!(
+            "Bars of errors are {confidence} % intervals; those of times are the range of the runs, which are too few for such an interval."
+        ),
+    }
+}
+
+/// Whether a time has the range of its runs in place of an interval.
+fn has_ranges(document: &Document) -> bool {
+    let confidence = document.measurement.confidence;
+    let runs = document.points.iter().map(|point| point.runs.len()).filter(|&runs| runs > 0);
+    runs.min().is_some_and(|fewest| !median_is_covered(fewest, confidence))
 }
 
 /// How many runs each point has, and should have.
