@@ -1,6 +1,6 @@
 //! From a plan to its points, and from their runs to a document.
 use super::Images;
-use super::document::{Document, Machine, Measurement, Point, SCHEMA, SceneInfo};
+use super::document::{Document, Machine, Measurement, Method, Point, SCHEMA, SceneInfo};
 use super::findings::findings;
 use super::machine;
 use super::reference::Reference;
@@ -37,6 +37,14 @@ pub struct Outline<'a> {
     pub budget: Option<Duration>,
     /// See [`Measurement::key`].
     pub key: String,
+}
+
+/// A point to measure, with the runs that an earlier measurement made. What failed is tried again.
+pub fn taken_up(earlier: &[Point], method: Method, command: String) -> Point {
+    match earlier.iter().find(|known| known.method == method) {
+        Some(known) => Point { failed: None, summary: None, command, ..known.clone() },
+        None => Point::unmeasured(method, command),
+    }
 }
 
 /// Why a point failed, in one line.

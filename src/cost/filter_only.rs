@@ -1,10 +1,10 @@
 //! The same for filters alone, on a given image of any renderer: its noise is what it is, so only times vary between runs.
 use super::Images;
-use super::assemble::{Ended, Outline, document, failure, images};
+use super::assemble::{Ended, Outline, document, failure, images, lacks_runs, taken_up};
 use super::document::{Document, Method, Point, Run, SceneInfo, WarmUp};
 use super::judge::judge;
 use super::machine;
-use super::plan::Watch;
+use super::plan::{Watch, device, text, values};
 use super::reference::Reference;
 use super::session::{add_filter, check_clock, finite, interleaved};
 use crate::denoise::filter::{self, FilterSettings};
@@ -12,7 +12,8 @@ use crate::denoise::{Recipe, file, timed};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::image::aov::{Aovs, Names};
-use crate::image::{Film, Picture};
+use crate::image::{Film, Picture, Samples};
+use crate::scene::Fingerprint;
 use crate::threads;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -49,61 +50,151 @@ pub struct FilterPlan<'a> {
     pub reference: Reference,
 }
 
-/// Measures filters on an image.
+/// A measurement that is under way.
+struct Measuring<'a> {
+    gpu: &'a Gpu,
+    plan: &'a FilterPlan<'a>,
+    watch: &'a Watch<'a>,
+    layers: file::Layers<'a>,
+    outline: Outline<'a>,
+    deadline: Option<Instant>,
+    points: Vec<Point>,
+    pictures: Vec<Option<Picture>>,
+}
+
+/// Identifies what is measured, where and how.
+pub fn key(gpu: &Gpu, plan: &FilterPlan) -> String {
+    let mut key = Fingerprint::default();
+    let settings = |candidate: &FilterCandidate| (method(candidate), values(&candidate.settings.entries()));
+    let candidates: Vec<_> = plan.candidates.iter().map(settings).collect();
+    let size = [plan.film.width, plan.film.height];
+    let parts = [
+        text(&(size, &plan.film.metadata)),
+        text(&candidates),
+        text(&plan.reference.info),
+        text(&(plan.repeats, plan.order_seed)),
+        text(&device(gpu)),
+    ];
+    parts.iter().for_each(|part| key.add(part.as_bytes()));
+    for channel in &plan.film.channels {
+        key.add(channel.name.as_bytes());
+        match &channel.samples {
+            Samples::F32(samples) => key.add(samples),
+            Samples::U32(samples) => key.add(samples),
+        }
+    }
+    key.add(&plan.reference.picture.pixels);
+    key.add(&crate::shaders::HASH.to_le_bytes());
+    key.to_string()
+}
+
+/// Measures filters on an image, or goes on where `earlier` ended, a document of the same [`key`].
 ///
 /// # Errors
 /// What keeps every filter from being measured. The failure of one is in the document.
-pub fn measure_filters(gpu: &Gpu, plan: &FilterPlan, watch: &Watch) -> Result<(Document, Images, Ended)> {
+pub fn measure_filters(
+    gpu: &Gpu,
+    plan: &FilterPlan,
+    earlier: Option<Document>,
+    watch: &Watch,
+) -> Result<(Document, Images, Ended)> {
     let begun = Instant::now();
     check_clock(gpu)?;
     let aovs = Aovs::find(plan.film, &Names::new()).map_err(|what| Error::input(plan.path, what))?;
-    let layers = file::Layers::new(&aovs);
-    let mut points: Vec<Point> = plan.candidates.iter().map(point).collect();
-    let mut pictures: Vec<Option<Picture>> = plan.candidates.iter().map(|_| None).collect();
-    let in_time = || plan.budget.is_none_or(|budget| begun.elapsed() < budget) && !(watch.stop)();
-    let total = points.len() as u64 * u64::from(plan.repeats);
-    let mut machine = machine::describe(gpu);
-    for round in 0..plan.repeats {
-        let mut order: Vec<usize> = (0..points.len()).filter(|&i| points[i].failed.is_none()).collect();
-        fastrand::Rng::with_seed(plan.order_seed.wrapping_add(round.into())).shuffle(&mut order);
-        for index in order.into_iter().filter(|_| in_time()) {
-            match filtered(gpu, plan, &layers, index, round) {
-                Ok((run, warm_up, bytes, picture)) => {
-                    let errors = || judge(&picture, &plan.reference.picture, plan.reference.noise);
-                    let errors = points[index].runs.first().map_or_else(|| threads::within(errors), |run| run.errors);
-                    points[index].runs.push(Run { errors, ..run });
-                    points[index].warm_up.get_or_insert(warm_up);
-                    points[index].device_bytes = Some(bytes);
-                    pictures[index].get_or_insert(picture);
-                }
-                Err(e) => points[index].failed = Some(failure(&e)),
-            }
-            machine.see_clocks(gpu.info());
-            (watch.progress)("runs", points.iter().map(|point| point.runs.len() as u64).sum(), total);
-        }
-    }
-    let outline = Outline {
-        scene: &plan.scene,
-        machine,
-        seeds: (0..plan.repeats).collect(),
-        order_seed: plan.order_seed,
-        budget: plan.budget,
-        key: String::new(),
+    let earlier = earlier.map(|document| document.points).unwrap_or_default();
+    let point = |candidate: &FilterCandidate| taken_up(&earlier, method(candidate), candidate.command.clone());
+    let mut measuring = Measuring {
+        gpu,
+        plan,
+        watch,
+        layers: file::Layers::new(&aovs),
+        outline: Outline {
+            scene: &plan.scene,
+            machine: machine::describe(gpu),
+            seeds: (0..plan.repeats).collect(),
+            order_seed: plan.order_seed,
+            budget: plan.budget,
+            key: key(gpu, plan),
+        },
+        deadline: plan.budget.map(|budget| begun + budget),
+        points: plan.candidates.iter().map(point).collect(),
+        pictures: plan.candidates.iter().map(|_| None).collect(),
     };
+    measuring.rounds();
+    measuring.missing_pictures();
+    let Measuring { points, pictures, outline, .. } = measuring;
     let (document, ended) = document(&outline, points, &plan.reference, (watch.stop)());
     Ok((document, images(pictures, &plan.reference), ended))
 }
 
-fn point(candidate: &FilterCandidate) -> Point {
-    let method = Method {
+impl Measuring<'_> {
+    fn stopped(&self) -> bool {
+        (self.watch.stop)() || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
+    }
+
+    fn rounds(&mut self) {
+        let total = self.points.len() as u64 * u64::from(self.plan.repeats);
+        for round in 0..self.plan.repeats {
+            let mut order: Vec<usize> = (0..self.points.len()).collect();
+            fastrand::Rng::with_seed(self.plan.order_seed.wrapping_add(round.into())).shuffle(&mut order);
+            for index in order {
+                let point = &self.points[index];
+                if point.failed.is_some() || point.runs.iter().any(|run| run.seed == round) {
+                    continue;
+                }
+                if self.stopped() {
+                    return;
+                }
+                self.measure(index, round);
+                let done = self.points.iter().map(|point| point.runs.len() as u64).sum();
+                (self.watch.progress)("runs", done, total);
+            }
+            let (so_far, _) = document(&self.outline, self.points.clone(), &self.plan.reference, true);
+            (self.watch.keep)(&so_far);
+        }
+    }
+
+    /// Runs a filter once more. Its image is that of its first run, and has the same errors.
+    fn measure(&mut self, index: usize, round: u32) {
+        let Self { gpu, plan, layers, points, pictures, .. } = self;
+        match filtered(gpu, plan, layers, index, round) {
+            Ok((run, warm_up, bytes, picture)) => {
+                let errors = || judge(&picture, &plan.reference.picture, plan.reference.noise);
+                let point = &mut points[index];
+                let errors = point.runs.first().map_or_else(|| threads::within(errors), |run| run.errors);
+                point.runs.push(Run { errors, ..run });
+                point.warm_up.get_or_insert(warm_up);
+                point.device_bytes = point.device_bytes.max(Some(bytes));
+                pictures[index].get_or_insert(picture);
+            }
+            Err(e) => points[index].failed = Some(failure(&e)),
+        }
+        self.outline.machine.see_clocks(self.gpu.info());
+    }
+
+    /// Pictures of points all of whose runs were made before this program was started.
+    fn missing_pictures(&mut self) {
+        if self.points.iter().any(|point| lacks_runs(point, self.plan.repeats)) {
+            return;
+        }
+        for index in 0..self.points.len() {
+            if self.pictures[index].is_none() && self.points[index].failed.is_none() && !(self.watch.stop)() {
+                let found = filtered(self.gpu, self.plan, &self.layers, index, 0);
+                self.pictures[index] = found.ok().map(|(_, _, _, picture)| picture);
+            }
+        }
+    }
+}
+
+fn method(candidate: &FilterCandidate) -> Method {
+    Method {
         allocate: String::new(),
         filter: candidate.filter.name().to_owned(),
         rounds: None,
         reproject: None,
         options: candidate.options.clone(),
         spp: 0,
-    };
-    Point::unmeasured(method, candidate.command.clone())
+    }
 }
 
 /// One run: times without errors, costs of the first use, memory, and the image.

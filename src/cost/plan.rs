@@ -63,7 +63,6 @@ pub fn key(gpu: &Gpu, scene: &Scene, plan: &Plan) -> String {
         plan.candidates.iter().map(|candidate| values(&candidate.filter_settings.entries())).collect();
     let carries: Vec<_> = plan.candidates.iter().map(|candidate| candidate.carries).collect();
     let given = plan.reference.as_ref().map(|reference| &reference.info);
-    let info = gpu.info();
     let parts = [
         scene,
         text(&plan.base),
@@ -72,18 +71,28 @@ pub fn key(gpu: &Gpu, scene: &Scene, plan: &Plan) -> String {
         text(&(plan.motion.as_ref().map(|motion| motion.judged), carries)),
         text(&given),
         text(&(plan.repeats, plan.order_seed)),
-        text(&(&info.name, &info.driver_name, &info.driver_version, gpu.traces_by_ray_query())),
+        text(&(device(gpu), gpu.traces_by_ray_query())),
     ];
     parts.iter().for_each(|part| key.add(part.as_bytes()));
+    // A file may be replaced by another of its name.
+    plan.reference.iter().for_each(|reference| key.add(&reference.picture.pixels));
     key.add(&crate::shaders::HASH.to_le_bytes());
     key.to_string()
 }
 
-fn text(value: &impl serde::Serialize) -> String {
+/// The device and its driver.
+pub fn device(gpu: &Gpu) -> [&str; 3] {
+    let info = gpu.info();
+    [&info.name, &info.driver_name, &info.driver_version]
+}
+
+/// A value as a part of a key.
+pub fn text(value: &impl serde::Serialize) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }
 
-fn values(settings: &[Entry]) -> Vec<String> {
+/// The values of settings, as a part of a key.
+pub fn values(settings: &[Entry]) -> Vec<String> {
     settings.iter().map(|entry| entry.value.clone()).collect()
 }
 

@@ -1,10 +1,10 @@
 //! `tallow cost --filter-only`: filters on a given image.
-use super::{Args, Folder, finish, name, open, watched};
+use super::{Args, Folder, finish, name, open, runs, watched};
 use crate::cli::filter::options::Overrides;
 use crate::cli::{Exit, fail_on_messages, quoted};
 use crate::cost::document::SceneInfo;
-use crate::cost::filter_only::{FilterCandidate, FilterPlan, measure_filters};
-use crate::cost::reference;
+use crate::cost::filter_only::{FilterCandidate, FilterPlan, key, measure_filters};
+use crate::cost::{grid, reference};
 use crate::denoise::filter::{FilterSettings, Method};
 use crate::error::{Error, Result};
 use crate::image;
@@ -37,31 +37,39 @@ pub fn run(args: &Args, image: &Path) -> Result<Exit> {
     };
     let gpu = open(args)?;
     let folder = Folder::open(&args.output)?;
-    let found = watched(args, &folder, |watch| measure_filters(&gpu, &plan, watch))?;
+    let earlier = folder.earlier(&key(&gpu, &plan));
+    let runs_before = earlier.as_ref().map_or(0, runs);
+    let found = watched(args, &folder, |watch| measure_filters(&gpu, &plan, earlier, watch))?;
     fail_on_messages(&gpu)?;
-    finish(args, &folder, found, 0)
+    finish(args, &folder, found, runs_before)
 }
 
-/// Every filter, with its defaults and with the options of each variant.
+/// Every filter, with its defaults and with the options of each variant that changes it.
 fn candidates(args: &Args, image: &Path) -> Result<Vec<FilterCandidate>> {
-    let mut all = Vec::new();
-    let own = (!args.with.trim().is_empty()).then_some(args.with.as_str());
-    for variant in std::iter::once(None).chain(args.variants.iter().map(Some)) {
-        for &filter in &args.denoise {
-            let words = [own.unwrap_or_default(), variant.map_or("", String::as_str)].map(str::trim);
-            all.push(candidate(image, filter, words)?);
+    let of = |filter: &Method, variant: &str| candidate(image, *filter, [args.with.trim(), variant.trim()]);
+    let plain: Vec<_> = args.denoise.iter().map(|filter| of(filter, "")).collect::<Result<_>>()?;
+    let mut varied = Vec::new();
+    for variant in &args.variants {
+        let before = varied.len();
+        for (filter, plain) in args.denoise.iter().zip(&plain).filter(|(filter, _)| filter.name() != "none") {
+            let candidate = of(filter, variant)?;
+            varied.extend((candidate.settings != plain.settings).then_some(candidate));
+        }
+        if varied.len() == before {
+            overrides(variant)?;
+            return Err(Error::Usage(format!("\"{}\" changes no filter of the list", variant.trim())));
         }
     }
-    Ok(all)
+    Ok(plain.into_iter().chain(varied).collect())
 }
 
 fn candidate(image: &Path, filter: Method, [shared, variant]: [&str; 2]) -> Result<FilterCandidate> {
-    let words = format!("{shared} {variant}");
-    let settings = overrides(&words)?.settings(FilterSettings::default());
+    let settings = overrides(variant)?.settings(overrides(shared)?.settings(FilterSettings::default()));
     settings.validate()?;
     let options = Some(variant.to_owned()).filter(|variant| !variant.is_empty());
     let path = quoted(&image.display().to_string());
-    let words = words.split_whitespace().map(|word| format!(" {word}")).collect::<String>();
+    let words = grid::options(&FilterSettings::default().entries(), &settings.entries());
+    let words = words.into_iter().map(|word| format!(" {word}")).collect::<String>();
     let command = format!("tallow filter {path} --filter {}{words} -o point.exr", filter.name());
     Ok(FilterCandidate { filter, settings, options: options.into_iter().collect(), command })
 }
@@ -76,4 +84,40 @@ fn overrides(text: &str) -> Result<Overrides> {
     }
     let parsed = Words::try_parse_from(text.split_whitespace());
     Ok(parsed.map_err(|e| super::options::refused(text, "filter", &e))?.overrides)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    fn made(words: &[&str]) -> Result<Vec<String>> {
+        let fixed = ["cost", "--filter-only", "a.exr", "--reference", "b.exr"];
+        let line = Line::try_parse_from(fixed.iter().chain(words)).unwrap();
+        let all = candidates(&line.args, Path::new("a.exr"))?;
+        let name = |candidate: &FilterCandidate| {
+            [&[candidate.filter.name().to_owned()], &candidate.options[..]].concat().join(" ")
+        };
+        Ok(all.iter().map(name).collect())
+    }
+
+    #[test]
+    fn what_changes_nothing_is_no_other_point() {
+        let all = made(&["--denoise", "none,atrous", "--variant", "--levels 3"]).unwrap();
+        assert_eq!(all, ["none", "atrous", "atrous --levels 3"], "nothing is filtered by none");
+        for words in [
+            ["--denoise", "none", "--with", "", "--variant", "--levels 3"],
+            ["--denoise", "none,atrous", "--with", "--levels 3", "--variant", "--levels 3 "],
+        ] {
+            let line = made(&words).unwrap_err().to_string();
+            assert!(line.contains("\"--levels 3\" changes no filter of the list"), "{line}");
+        }
+        let line = made(&["--denoise", "none", "--variant", "--levles 3"]).unwrap_err().to_string();
+        assert!(line.contains("--levles"), "{line}");
+    }
 }
