@@ -120,8 +120,9 @@ fn name(path: &Path) -> String {
     if stem == "scene" && !folder.is_empty() { folder } else { stem }
 }
 
+/// Runs that were measured: those of other renderers are read anew each time.
 fn runs(document: &Document) -> usize {
-    document.points.iter().map(|point| point.runs.len()).sum()
+    document.points.iter().filter(|point| !point.is_other).map(|point| point.runs.len()).sum()
 }
 
 impl Args {

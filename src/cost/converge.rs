@@ -85,6 +85,27 @@ impl Converging {
         }
     }
 
+    /// The reference of `spp` samples per pixel that an earlier measurement had, to the same bits: errors against a better one are no
+    /// errors of the same kind. What was kept with more is left alone and made anew with fewer. It is incomplete only if the user stops
+    /// it.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Device`].
+    pub fn again(&mut self, spp: u32, notes: &[String], watch: &Watch) -> Result<Reference> {
+        let parts = spp / PART_SPP;
+        if self.parts.count > parts {
+            (self.parts, self.file) = (Parts::new(self.parts.size), None);
+        }
+        let was = self.parts.count;
+        self.grow_to(parts, None, watch)?;
+        if self.parts.count > was {
+            self.keep();
+        }
+        let mut reference = self.reference();
+        reference.info.notes = notes.to_vec();
+        Ok(reference)
+    }
+
     /// Returns false if time was up before, or the user stopped it.
     fn grow_to(&mut self, parts: u32, limit: Option<Instant>, watch: &Watch) -> Result<bool> {
         while self.parts.count < parts {

@@ -1,8 +1,8 @@
 //! Measures a grid: the reference first, then rounds in which every point runs once, in an order that is random anew each time.
 use super::Images;
-use super::assemble::{Ended, Outline, document, failure, images, lacks_runs};
+use super::assemble::{Ended, Outline, document, failure, images, lacks_runs, taken_up};
 use super::converge::Converging;
-use super::document::{Document, Point, Run};
+use super::document::{Document, Point, ReferenceInfo, Run};
 use super::grid::{Candidate, Shot, shots};
 use super::judge::judge;
 use super::machine;
@@ -47,6 +47,7 @@ pub fn measure(
 ) -> Result<(Document, Images, Ended)> {
     let begun = Instant::now();
     plan::check(plan)?;
+    let judged_by = earlier.as_ref().and_then(judged_by);
     let shots = shots(&plan.candidates);
     let outline = Outline {
         scene: &plan.scene,
@@ -70,10 +71,15 @@ pub fn measure(
     let reference = match &plan.reference {
         Some(reference) => reference.clone(),
         None => {
-            let limit = plan.budget.map(|budget| begun + budget / REFERENCE_SHARE);
-            let pilots = measuring.pilots();
             let mut growing = Converging::new(gpu, scene, &plan.base, plan.cache.as_deref())?;
-            growing.grow_below(&pilots, plan.reference_spp, limit, watch)?
+            match judged_by {
+                Some(ReferenceInfo { spp: Some(spp), notes, .. }) => growing.again(spp, &notes, watch)?,
+                _ => {
+                    let limit = plan.budget.map(|budget| begun + budget / REFERENCE_SHARE);
+                    let pilots = measuring.pilots();
+                    growing.grow_below(&pilots, plan.reference_spp, limit, watch)?
+                }
+            }
         }
     };
     measuring.add_others(&reference);
@@ -84,16 +90,17 @@ pub fn measure(
     Ok((document, images(pictures, &reference), ended))
 }
 
-/// The points of the plan, with what an earlier measurement found. What failed is tried again.
+/// The reference that runs of an earlier measurement were judged by; `None` if there are none.
+fn judged_by(earlier: &Document) -> Option<ReferenceInfo> {
+    let has_runs = earlier.points.iter().any(|point| !point.is_other && !point.runs.is_empty());
+    has_runs.then(|| earlier.reference.clone())
+}
+
+/// The points of the plan, with what an earlier measurement found.
 fn points(plan: &Plan, earlier: Option<Document>) -> Vec<Point> {
     let earlier = earlier.map(|document| document.points).unwrap_or_default();
-    let point = |(candidate, command): (&Candidate, &String)| {
-        let (method, command) = (candidate.method.clone(), command.clone());
-        match earlier.iter().find(|known| known.method == method) {
-            Some(known) => Point { failed: None, summary: None, command, ..known.clone() },
-            None => Point::unmeasured(method, command),
-        }
-    };
+    let point =
+        |(candidate, command): (&Candidate, &String)| taken_up(&earlier, candidate.method.clone(), command.clone());
     plan.candidates.iter().zip(&plan.commands).map(point).collect()
 }
 

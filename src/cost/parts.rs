@@ -13,7 +13,8 @@ const PARTS: &str = "parts";
 
 /// Mean and squared deviations of independent renders.
 pub struct Parts {
-    size: [u32; 2],
+    /// Width and height.
+    pub size: [u32; 2],
     /// Number of renders.
     pub count: u32,
     mean: Vec<[f64; 3]>,

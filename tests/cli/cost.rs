@@ -21,7 +21,11 @@ fn within(folder: &TempDir, words: &str) -> Command {
 }
 
 fn cost(folder: &TempDir, words: &str) -> Output {
-    within(folder, &format!("cost {} {FILM} {words}", scene())).output().unwrap()
+    cost_with(folder, FILM, words)
+}
+
+fn cost_with(folder: &TempDir, film: &str, words: &str) -> Output {
+    within(folder, &format!("cost {} {film} {words}", scene())).output().unwrap()
 }
 
 #[track_caller]
@@ -60,6 +64,7 @@ fn a_grid_is_measured_and_each_point_can_be_rendered_again() {
     let mut command = within(&folder, &format!("cost {} {FILM} {words}", scene()));
     let printed = text(&command.args(["--levels 2 --sigma-n inf"]).output().unwrap(), 0);
     assert!(printed.contains("uniform + atrous, 4 spp") && printed.contains("halve relMSE"), "{printed}");
+    assert_eq!(printed.contains(" *"), printed.contains("\n*: uniform unfiltered"), "{printed}");
     let document = document(&folder, "all/cost.json");
     assert!(document.complete && document.points.len() == 8 + 4, "what is not filtered has no levels: {document:?}");
     for point in &document.points {
@@ -164,8 +169,13 @@ fn what_is_missing_is_completed_and_nothing_else_is_measured_again() {
         std::fs::write(folder.path().join("all/cost.json"), serde_json::to_vec(document).unwrap()).unwrap();
     };
     write(&partial);
-    text(&cost(&folder, words), 0);
+    // Meanwhile the reference that is kept has become better, and more of it is allowed.
+    let better = |words: &str| cost_with(&folder, &FILM.replace("spp 64", "spp 512"), words);
+    text(&better(&words.replace("--spp 1,2", "--spp 64").replace("-o all", "-o other")), 0);
+    assert!(document(&folder, "other/cost.json").reference.spp > whole.reference.spp);
+    text(&better(words), 0);
     let again = document(&folder, "all/cost.json");
+    assert_eq!((again.reference.spp, again.reference.relmse), (whole.reference.spp, whole.reference.relmse));
     assert!(again.complete && again.points[0].runs == whole.points[0].runs, "kept to the last digit of their times");
     assert_eq!(again.points[1].runs[..2], whole.points[1].runs[..2]);
     assert_eq!(again.points[1].runs[2].errors, whole.points[1].runs[2].errors);
@@ -175,6 +185,25 @@ fn what_is_missing_is_completed_and_nothing_else_is_measured_again() {
     let printed = text(&cost(&folder, other), 0);
     assert!(printed.contains("not complete: 8 runs are missing") && printed.contains("cost.partial.json"), "{printed}");
     assert_eq!(document(&folder, "all/cost.json"), again);
+}
+
+#[test]
+fn a_reference_that_was_replaced_begins_another_measurement() {
+    let folder = tempfile::tempdir().unwrap();
+    let render = |seed| {
+        let words = format!("render {} --width 24 --height 24 --quiet --spp 4 --seed {seed} -o clean.hdr", scene());
+        assert!(within(&folder, &words).status().unwrap().success());
+    };
+    let key = |name: &str| {
+        let grid = "--allocate uniform --denoise none --spp 1 --reference clean.hdr --budget-minutes 0.000001 --quiet";
+        text(&cost(&folder, &format!("{grid} -o {name}")), 0);
+        document(&folder, &format!("{name}/cost.json")).measurement.key
+    };
+    render(1);
+    let first = key("first");
+    assert_eq!(key("again"), first);
+    render(2);
+    assert_ne!(key("other"), first, "the file has the same name and another image");
 }
 
 #[test]
@@ -229,10 +258,20 @@ fn filters_are_measured_on_a_given_image() {
         "cost --filter-only noisy.exr --reference clean.exr --denoise none,atrous,auto --repeats 2 --validation";
     let printed = text(&within(&folder, words).output().unwrap(), 0);
     assert!(printed.contains("has the lowest relMSE"), "{printed}");
-    let document = document(&folder, "cost/cost.json");
+    let document = self::document(&folder, "cost/cost.json");
     assert!(document.complete && document.reference.noise == NoiseKind::Bound, "{document:?}");
     let error = |i: usize| document.points[i].runs[0].errors.relmse.unwrap();
     assert!(error(1) < error(0) && error(2) < error(0), "{} {} {}", error(0), error(1), error(2));
+    // What is missing is measured, and nothing else again.
+    let mut partial = document.clone();
+    partial.complete = false;
+    partial.points[1].runs.pop();
+    std::fs::write(folder.path().join("cost/cost.json"), serde_json::to_vec(&partial).unwrap()).unwrap();
+    text(&within(&folder, words).output().unwrap(), 0);
+    let again = self::document(&folder, "cost/cost.json");
+    assert!(again.complete && again.points[1].runs.len() == 2);
+    assert_eq!(again.points[1].runs[..1], document.points[1].runs[..1]);
+    assert_eq!([0, 2].map(|i| &again.points[i].runs), [0, 2].map(|i| &document.points[i].runs), "kept");
     // The filter's own command line has the same error.
     let words = document.points[2].command.strip_prefix("tallow ").unwrap();
     assert!(within(&folder, &format!("{words} --quiet")).status().unwrap().success());

@@ -94,7 +94,7 @@ pub struct Args {
     /// Image to measure errors against, of the scene and the size [default: rendered]
     #[arg(long, value_name = "FILE")]
     pub reference: Option<PathBuf>,
-    /// Most samples per pixel of a reference that is rendered
+    /// Most samples per pixel of a reference that is rendered; a measurement that goes on keeps the reference that it began with
     #[arg(long, value_name = "N", default_value = "4096", value_parser = clap::value_parser!(u32).range(64..=1 << 24))]
     pub reference_spp: u32,
     /// Chooses the random order of the runs
