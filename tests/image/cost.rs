@@ -152,11 +152,20 @@ fn the_best_of_many_copies_is_rarely_said_to_gain() {
     let names = ["a", "b", "c", "d", "e", "f", "g", "h", "i", "j"];
     let copies = names.map(|allocate| Truth { allocate, ..UNIFORM });
     let truths = [&[UNIFORM], &copies[..]].concat();
+    let exact = points(&truths, Spread { time: 0.0, error: 0.0 }, true, 0);
     let gains = |seed: &u64| {
-        let points = points(&truths, Spread { time: 0.01, error: 0.1 }, false, 100_000 * (seed + 1));
+        let mut noise = Normal(fastrand::Rng::with_seed(*seed));
+        let mut points = exact.clone();
+        // A seed is as lucky at any number of samples, so that no time makes up for another.
+        for method in points.chunks_mut(SPP.len()) {
+            let factors: [f64; 5] = std::array::from_fn(|_| noise.factor(0.1));
+            let runs = method.iter_mut().flat_map(|point| point.runs.iter_mut().zip(factors));
+            runs.for_each(|(run, factor)| run.errors.relmse = run.errors.relmse.map(|relmse| relmse * factor));
+        }
         least_gain(gain(&findings(&points, CONFIDENCE))) > 1.0
     };
-    // The interval of the truth, which is 1, may end above it in 2.5 % of the trials, give or take 0.8 %.
+    // The truth is 1. Its interval may begin above that in 2.5 % of the trials, give or take 0.8 %; by each method's own interval it is
+    // 8 %.
     let wrong = (0..TRIALS).filter(gains).count();
     assert!(wrong <= 20, "{wrong} of {TRIALS}");
 }
