@@ -174,6 +174,29 @@ fn accessors_may_be_interleaved_normalized_or_sparse() {
     assert_eq!(corners(&load(&sparse)), expected);
 }
 
+/// A thousand primitives with three each of a million vertices, which would take 100 GB where each has them all.
+#[test]
+fn of_vertices_that_primitives_share_each_has_its_own() {
+    let mut json = triangle();
+    let places = [1000u32, 1 << 19].iter().chain(&[1 << 19, 5, 1000]).flat_map(|i| i.to_le_bytes());
+    let bytes = [places.collect(), triangle_bytes()[12..36].to_vec()].concat();
+    json["buffers"].as_array_mut().unwrap().push(json!({ "byteLength": 44, "uri": data(&bytes) }));
+    for (first, length) in [(0, 8), (8, 12), (20, 24)] {
+        let view = json!({ "buffer": 1, "byteOffset": first, "byteLength": length });
+        json["bufferViews"].as_array_mut().unwrap().push(view);
+    }
+    json["accessors"].as_array_mut().unwrap().extend([
+        json!({ "componentType": 5126, "count": 1 << 20, "type": "VEC3", "sparse": { "count": 2,
+            "indices": { "bufferView": 3, "componentType": 5125 }, "values": { "bufferView": 5 } } }),
+        json!({ "bufferView": 4, "componentType": 5125, "count": 3, "type": "SCALAR" }),
+    ]);
+    let primitive = json!({ "attributes": { "POSITION": 3 }, "indices": 4, "targets": [{ "POSITION": 3 }] });
+    json["meshes"][0]["primitives"] = Value::Array(vec![primitive; 1000]);
+    json["meshes"][0]["weights"] = json!([1.0]);
+    let found = corners(&load(&json));
+    assert_eq!((found.len(), found[0]), (1000, [[0, 2000, 0], [0, 0, 0], [2000, 0, 0]]));
+}
+
 #[test]
 fn lights_shine_along_minus_z_in_the_files_own_units() {
     let mut json = triangle();

@@ -117,6 +117,17 @@ impl<'a> Elements<'a> {
     /// # Errors
     /// A sentence, when elements do not have N numbers or memory is short.
     pub fn numbers<const N: usize>(&self) -> std::result::Result<Vec<[f32; N]>, String> {
+        self.numbers_of(0..self.count)
+    }
+
+    /// As [`Self::numbers`], of these elements alone, whose numbers are below the count.
+    ///
+    /// # Errors
+    /// Likewise.
+    pub fn numbers_of<const N: usize>(
+        &self,
+        chosen: impl ExactSizeIterator<Item = usize>,
+    ) -> std::result::Result<Vec<[f32; N]>, String> {
         if self.width != N {
             return Err(format!("has elements of {} numbers where {N} are needed", self.width));
         }
@@ -124,7 +135,7 @@ impl<'a> Elements<'a> {
             let mut parts = bytes.chunks_exact(self.kind.size());
             std::array::from_fn(|_| parts.next().map_or(0.0, |part| number(part, self.kind, self.normalized)))
         };
-        self.all([0.0; N], one)
+        self.read(chosen, [0.0; N], one)
     }
 
     /// All elements as indices.
@@ -134,21 +145,28 @@ impl<'a> Elements<'a> {
     pub fn indices(&self) -> std::result::Result<Vec<u32>, String> {
         match self.kind {
             ComponentType::U8 | ComponentType::U16 | ComponentType::U32 if self.width == 1 => {
-                self.all(0, |bytes| integer(bytes, self.kind))
+                self.read(0..self.count, 0, |bytes| integer(bytes, self.kind))
             }
             _ => Err("has no unsigned integers, as indices are".into()),
         }
     }
 
-    fn all<T: Copy>(&self, zero: T, one: impl Fn(&[u8]) -> T) -> std::result::Result<Vec<T>, String> {
+    fn read<T: Copy>(
+        &self,
+        chosen: impl ExactSizeIterator<Item = usize>,
+        zero: T,
+        one: impl Fn(&[u8]) -> T,
+    ) -> std::result::Result<Vec<T>, String> {
         let size = self.size();
-        let mut list = memory::reserved(self.count)?;
-        match self.bytes {
-            Some(bytes) => list.extend((0..self.count).map(|i| one(&bytes[i * self.stride..][..size]))),
-            None => list.resize(self.count, zero),
-        }
-        let replaced = self.sparse.iter().flat_map(|(places, values)| places.iter().zip(values.chunks_exact(size)));
-        replaced.for_each(|(&place, bytes)| list[place as usize] = one(bytes));
+        let element = |i: usize| {
+            let replaced = self.sparse.as_ref().and_then(|(places, values)| {
+                let at = places.binary_search(&(i as u32)).ok()?;
+                Some(one(&values[at * size..][..size]))
+            });
+            replaced.unwrap_or_else(|| self.bytes.map_or(zero, |bytes| one(&bytes[i * self.stride..][..size])))
+        };
+        let mut list = memory::reserved(chosen.len())?;
+        list.extend(chosen.map(element));
         Ok(list)
     }
 

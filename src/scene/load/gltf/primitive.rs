@@ -55,10 +55,12 @@ pub fn has_surface(primitive: &Json) -> bool {
 
 /// Bytes that reading a primitive takes, at most. Its accessors must have been checked.
 pub fn bytes(asset: &Asset, primitive: &Json) -> u64 {
-    let vertices = count(asset, attribute(primitive, Semantic::Positions));
+    let (vertices, corners) = (count(asset, attribute(primitive, Semantic::Positions)), corners(asset, primitive));
+    // A corner of a strip has up to three corners of triangles.
+    let read = vertices.min(corners.saturating_mul(3));
     let targets = primitive.targets.as_ref().map_or(0, |targets| targets.len() as u64);
-    let of_vertices = vertices.saturating_mul(BYTES_OF_VERTEX + targets.saturating_mul(BYTES_OF_TARGET));
-    of_vertices.saturating_add(corners(asset, primitive).saturating_mul(BYTES_OF_CORNERS))
+    let of_vertices = read.saturating_mul(BYTES_OF_VERTEX + targets.saturating_mul(BYTES_OF_TARGET));
+    of_vertices.saturating_add(corners.saturating_mul(BYTES_OF_CORNERS))
 }
 
 /// Number of corners that a primitive's triangles have, or strips and fans share.
@@ -78,7 +80,8 @@ fn count(asset: &Asset, index: Option<&Index<Accessor>>) -> u64 {
 pub fn read(asset: &Asset, primitive: &Json, place: &str) -> Result<Option<Primitive>> {
     let Some(positions) = attribute(primitive, Semantic::Positions) else { return Ok(None) };
     let vertices = Elements::of(asset, positions.value())?.count();
-    let reader = Reader { asset, primitive, place, vertices };
+    let mut reader = Reader { asset, primitive, place, vertices, used: None };
+    let indices = reader.used_triangles()?;
     let uv_up = |uvs: Vec<[f32; 2]>| uvs.into_iter().map(|[u, v]| [u, 1.0 - v]).collect();
     let mut mesh = Mesh {
         positions: reader.numbers(Semantic::Positions)?,
@@ -87,7 +90,7 @@ pub fn read(asset: &Asset, primitive: &Json, place: &str) -> Result<Option<Primi
         uvs2: uv_up(reader.numbers(Semantic::TexCoords(1))?),
         colors: reader.colors()?,
         tangents: reader.numbers(Semantic::Tangents)?,
-        indices: reader.triangles()?,
+        indices,
     };
     let joints = reader.joints()?;
     // What moves may part corners that rest at one place.
@@ -115,6 +118,8 @@ struct Reader<'a> {
     primitive: &'a Json,
     place: &'a str,
     vertices: usize,
+    /// The vertices that are read, in ascending order; all if there are none.
+    used: Option<Vec<u32>>,
 }
 
 impl Reader<'_> {
@@ -125,7 +130,11 @@ impl Reader<'_> {
 
     fn accessor<const N: usize>(&self, index: &Index<Accessor>) -> Result<Vec<[f32; N]>> {
         let elements = self.elements(index)?;
-        elements.numbers().map_err(|what| self.asset.at(format!("{}, accessor {index}", self.place), what))
+        let numbers = match &self.used {
+            Some(used) => elements.numbers_of(used.iter().map(|&vertex| vertex as usize)),
+            None => elements.numbers(),
+        };
+        numbers.map_err(|what| self.asset.at(format!("{}, accessor {index}", self.place), what))
     }
 
     fn elements(&self, index: &Index<Accessor>) -> Result<Elements<'_>> {
@@ -168,6 +177,21 @@ impl Reader<'_> {
             sets.push(Influence { joints, weights });
         }
         Ok(sets)
+    }
+
+    /// Corners of the triangles. Where a primitive has few of the vertices that it shares with others, those alone are read.
+    fn used_triangles(&mut self) -> Result<Vec<u32>> {
+        let triangles = self.triangles()?;
+        if triangles.is_empty() || triangles.len() >= self.vertices {
+            return Ok(triangles);
+        }
+        let mut used = triangles.clone();
+        used.sort_unstable();
+        used.dedup();
+        let place = |vertex: &u32| used.binary_search(vertex).map_or(0, |place| place as u32);
+        let placed = triangles.iter().map(place).collect();
+        self.used = Some(used);
+        Ok(placed)
     }
 
     /// Corners of the triangles. glTF 2.0, section 3.7.2.1: of a strip and of a fan each corner but two makes a triangle, and
