@@ -16,6 +16,7 @@ struct Part {
     broken: Option<BrokenSamples>,
     splits_light: bool,
     is_full: bool,
+    settings: Settings,
     /// Its settings are all but [`FREE`].
     provenance: Provenance,
 }
@@ -31,11 +32,11 @@ impl Part {
 
     fn of(rendered: Rendered) -> Self {
         let is_full = rendered.is_full();
-        let Rendered { mut provenance, pixels, broken, splits_light, .. } = rendered;
+        let Rendered { mut provenance, settings: own, pixels, broken, splits_light, .. } = rendered;
         if let Some(settings) = provenance.settings.as_object_mut() {
             settings.retain(|key, _| !FREE.contains(&key.as_str()));
         }
-        Self { pixels, broken, splits_light, is_full, provenance }
+        Self { pixels, broken, splits_light, is_full, settings: own, provenance }
     }
 
     /// By this the parts are sorted: no two that may be merged have the same.
@@ -46,7 +47,7 @@ impl Part {
     /// Why they cannot be merged.
     fn conflict(&self, other: &Self) -> Option<String> {
         if self.provenance.settings != other.provenance.settings {
-            return Some("was rendered with other settings".into());
+            return Some(format!("was rendered with other settings: {}", differences(other, self)));
         }
         if self.provenance.scene != other.provenance.scene {
             return Some("shows another scene, or the same one changed".into());
@@ -59,6 +60,14 @@ impl Part {
         let SampleRange { seed, first, .. } = again;
         Some(format!("has samples {first} to {} of seed {seed} as well: they would count twice", again.last()))
     }
+}
+
+/// The settings in which the first differs from the second, each with both values.
+fn differences(first: &Part, second: &Part) -> String {
+    let pairs = first.settings.entries().into_iter().zip(second.settings.entries());
+    let pairs = pairs.filter(|(a, b)| a.value != b.value && !FREE.contains(&a.name.replace('-', "_").as_str()));
+    let said: Vec<_> = pairs.map(|(a, b)| format!("{} is {}, and {} in another", a.name, a.value, b.value)).collect();
+    said.join("; ")
 }
 
 /// Several renders as one.
@@ -164,7 +173,14 @@ mod tests {
     fn part(ranges: &[(u32, u32, u32)], is_full: bool) -> Part {
         let samples = ranges.iter().map(|&(seed, first, count)| SampleRange { seed, first, count }).collect();
         let provenance = Provenance { settings: serde_json::Value::Null, scene: String::new(), samples };
-        Part { pixels: Vec::new(), broken: None, splits_light: true, is_full, provenance }
+        Part {
+            pixels: Vec::new(),
+            broken: None,
+            splits_light: true,
+            is_full,
+            settings: Settings::default(),
+            provenance,
+        }
     }
 
     fn closed(parts: &[Part]) -> Vec<(u32, u32, u32)> {

@@ -178,6 +178,7 @@ fn a_frame_that_fails_does_not_stop_the_others() {
     assert!(folder.path().join("f.0002.exr").is_file());
     let summary: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
     assert_eq!((&summary["failed"], summary["frames"].as_array().unwrap().len()), (&1.into(), 3));
+    assert_eq!(summary["interrupted"], false);
 }
 
 #[test]

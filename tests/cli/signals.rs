@@ -180,6 +180,7 @@ fn an_interrupted_frame_is_not_written_and_the_ones_before_are_told() {
         let finished = files.len();
         complains(&output, 130, &[&format!("interrupted in frame {finished}: finished frames stay"), line]);
         assert_eq!(told["frames"].as_array().map(Vec::len), Some(finished), "{files:?}: {told}");
+        assert_eq!(told["interrupted"], true);
         assert_eq!(files.last(), Some(&format!("a.{:04}.{kind}", finished - 1)), "{files:?}");
     }
 }

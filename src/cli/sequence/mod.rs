@@ -158,6 +158,8 @@ pub struct FrameReport {
 struct Summary {
     frames: Vec<FrameReport>,
     failed: usize,
+    /// Whether a signal came before all frames were there.
+    interrupted: bool,
     seconds: f64,
     device: String,
 }
@@ -181,7 +183,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let failed = reports.iter().filter(|report| report.error.is_some()).count();
     let (seconds, device) = (begun.elapsed().as_secs_f64(), stage.gpu().info().name.clone());
     if args.render.common.json {
-        print_json(&Summary { frames: reports, failed, seconds, device })?;
+        print_json(&Summary { frames: reports, failed, interrupted: interrupted.is_some(), seconds, device })?;
     }
     interrupted.iter().for_each(|line| complain(line));
     Ok(match interrupted {
