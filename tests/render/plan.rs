@@ -41,7 +41,7 @@ fn planned_errors_are_true_ones() {
         ("bust/scene.toml", 0.02, &[("uniform", both), ("both", &both[..1])]),
     ];
     for (file, error, methods) in cases {
-        let reference = rendered(&gpu, &scene(file, "uniform", 1024, 1000), None);
+        let reference = rendered(&gpu, &scene(file, "uniform", 512, 1000), None);
         let methods = methods.iter().flat_map(|&(policy, names)| names.iter().map(move |&name| (policy, name)));
         for (policy, name) in methods {
             let method = Method::Kernels(filter::find(name).unwrap());
