@@ -230,7 +230,8 @@ fn declared(interface: &Interface, name: String) -> Group {
 
 /// The kernel with all that it includes, and the files it was made from: itself first.
 fn preprocess(file: &Path) -> Result<(String, Vec<Source>)> {
-    let label = file.display().to_string();
+    // The same on every system: a packaged crate finds its kernels by the whole text.
+    let label = file.display().to_string().replace('\\', "/");
     let text = fs::read_to_string(file).with_context(|| label.clone())?;
     let mut sources = vec![(label.clone(), text.clone())];
     let whole = format!("#line 1 \"{label}\"\n{}", expand(&label, &text, &mut sources)?);

@@ -28,7 +28,7 @@ pub struct FramePacer {
 
 impl FramePacer {
     /// For frames of `budget` and at most `most` samples a pixel, which count as 1 if they are 0. What else a frame does, such as a filter,
-    /// is told by [`Self::with_fixed`] or learned together with the samples.
+    /// is told by [`Self::with_fixed`].
     pub fn new(budget: Duration, most: u32) -> Self {
         Self { budget: milliseconds(budget), most: most.max(1), fixed: 0.0, per_sample: None }
     }
@@ -55,8 +55,11 @@ impl FramePacer {
         });
     }
 
-    /// [`Self::observe`] by the passes of a frame.
+    /// [`Self::observe`] by the passes of a frame. Without any, as on a queue without timestamps, nothing is learned.
     pub fn observe_passes(&mut self, samples: u32, passes: &[PassTime]) {
+        if passes.is_empty() {
+            return;
+        }
         self.observe(samples, Duration::from_nanos(passes.iter().map(PassTime::duration_ns).sum()));
     }
 }
@@ -105,5 +108,8 @@ mod tests {
         fast.observe(1, Duration::ZERO);
         assert_eq!(fast.samples(), 8);
         assert_eq!(FramePacer::new(Duration::ZERO, 0).samples(), 1);
+        let mut untold = FramePacer::new(Duration::from_millis(16), 8);
+        untold.observe_passes(1, &[]);
+        assert_eq!(untold.samples(), 1);
     }
 }

@@ -48,9 +48,8 @@ impl Frame {
     /// What is carried from frame to frame.
     ///
     /// # Errors
-    /// [`Error::Usage`] when nothing is, or when the camera has a lens or is orthographic.
+    /// [`Error::Usage`] when nothing is.
     pub fn history(&self) -> Result<&History> {
-        check_camera(&self.constants.camera)?;
         let without = || Error::Usage("this renderer keeps no history: call Renderer::keep_history first".into());
         self.history.as_ref().ok_or_else(without)
     }
@@ -64,19 +63,7 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
     let Frame { scene, film, kernels, constants, priority_push, .. } = frame;
     match step {
         Step::Start => {
-            rec.update(&scene.camera, &constants.camera)?; // camera
-            rec.fill(&film.broken, 0)?; // 0 -> broken
-            if let Some(history) = &frame.history {
-                rec.fill(&history.carried, 0)?; // 0 -> carried[P]
-                history.settle();
-            }
-            for tile in &film.tiles {
-                rec.fill(&tile.stats, 0)?; // 0 -> stats[P]
-                rec.fill(&tile.light, 0)?; // 0 -> light[P]
-                if tile.has_guide() {
-                    primary_hit::record(&kernels.primary_hit, rec, scene, tile, &constants.path)?; // camera -> guide[P]
-                }
-            }
+            begin_anew(rec, frame)?;
             if let Some(Allocation { policy, .. }) = &frame.allocation {
                 policy.prepare(rec, &inputs(film), priority_push)?; // guide[P] -> the policy's own
             }
@@ -121,10 +108,33 @@ pub fn record(rec: &mut Recorder, frame: &Frame, step: &Step) -> Result<()> {
     Ok(())
 }
 
-/// Begins a frame with the samples of the last that still hold.
+/// Begins a frame without samples.
+fn begin_anew(rec: &mut Recorder, frame: &Frame) -> Result<()> {
+    let Frame { scene, film, constants, kernels, .. } = frame;
+    rec.update(&scene.camera, &constants.camera)?; // camera
+    rec.fill(&film.broken, 0)?; // 0 -> broken
+    if let Some(history) = &frame.history {
+        rec.fill(&history.carried, 0)?; // 0 -> carried[P]
+        history.settle(check_camera(&constants.camera).is_ok());
+    }
+    for tile in &film.tiles {
+        rec.fill(&tile.stats, 0)?; // 0 -> stats[P]
+        rec.fill(&tile.light, 0)?; // 0 -> light[P]
+        if tile.has_guide() {
+            primary_hit::record(&kernels.primary_hit, rec, scene, tile, &constants.path)?; // camera -> guide[P]
+        }
+    }
+    Ok(())
+}
+
+/// Begins a frame with the samples of the last that still hold; without any where either was seen otherwise than from a point.
 fn begin_with_history(rec: &mut Recorder, frame: &Frame) -> Result<()> {
     let Frame { scene, film, constants, kernels, .. } = frame;
     let (history, tile) = (frame.history()?, &film.tiles[0]);
+    if !history.is_of_points() || check_camera(&constants.camera).is_err() {
+        rec.fill(&history.offered, 0)?; // 0 -> offered[P]
+        return begin_anew(rec, frame);
+    }
     rec.copy(&scene.camera, &history.previous)?; // camera -> previous camera
     rec.update(&scene.camera, &constants.camera)?; // camera
     rec.fill(&film.broken, 0)?; // 0 -> broken
@@ -138,7 +148,7 @@ fn begin_with_history(rec: &mut Recorder, frame: &Frame) -> Result<()> {
     }
     primary_hit::record(&kernels.primary_hit, rec, scene, tile, &constants.path)?; // camera -> guide[P], points[P]
     reproject::carry(rec, history, scene, tile, &constants.path)?; // history[P], points[P] -> stats[P], light[P]
-    history.settle();
+    history.settle(true);
     Ok(())
 }
 
@@ -149,7 +159,7 @@ fn begin_with_history(rec: &mut Recorder, frame: &Frame) -> Result<()> {
 pub fn record_change(rec: &mut Recorder, frame: &Frame) -> Result<()> {
     let Frame { scene, film, constants, .. } = frame;
     let (history, tile) = (frame.history()?, &film.tiles[0]);
-    let Some(probes) = &history.probes else {
+    let Some(probes) = history.probes.as_ref().filter(|_| history.is_of_points()) else {
         return rec.fill(&history.offered, 0); // 0 -> offered[P]
     };
     rec.copy(&scene.camera, &history.previous)?; // camera -> previous camera

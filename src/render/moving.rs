@@ -12,13 +12,14 @@ use crate::scene::Scene;
 impl Renderer {
     /// From now on frames can begin with [`Step::Reproject`] in place of [`Step::Start`]: with the samples of the last frame that
     /// show the same surface from the new camera. Call it once, before anything is recorded; the renderer must have been made with
-    /// [`super::Outputs::guides`]. The first [`Step::Reproject`] of all carries nothing. `moves` says what may change between frames.
+    /// [`super::Outputs::guides`]. The first [`Step::Reproject`] of all carries nothing, nor does one of a camera with a lens or parallel
+    /// rays, or after such a one. `moves` says what may change between frames.
     ///
     /// Carried samples count in the mean, in its variance and in the number of samples of a pixel. They are no part of the
     /// sequence that new samples come from: give each frame its own by [`Self::set_first_sample`], or its own seed.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a setting out of range, for a renderer without guides and for a film that is too large;
+    /// [`Error::Usage`] for a setting out of range or `indirect_stride`, for a renderer without guides and for a film that is too large;
     /// [`Error::Device`].
     pub fn keep_history(&mut self, settings: Reproject, moves: Moves) -> Result<()> {
         let (pixels, size) = (self.settings.pixels(), [self.settings.width, self.settings.height]);
@@ -29,6 +30,7 @@ impl Renderer {
         if settings.reproject == Reprojection::Off {
             return Ok(());
         }
+        check_stride(&self.settings)?;
         let history = History::new(&self.gpu, self.effects, self.stack, size, self.settings.spp, (settings, moves))?;
         let tile = &mut self.frame.film.tiles[0];
         let none = SurfacePoint { triangle: NONE, instance: NONE, ..SurfacePoint::default() };
@@ -126,11 +128,17 @@ pub(super) fn check_camera(camera: &Camera) -> Result<()> {
     Err(Error::Usage(what.into()))
 }
 
-fn check_placing(settings: &Settings) -> Result<()> {
-    if settings.indirect_stride > 1 {
-        let what = "carried samples hold all light of their pixels: set indirect_stride to 1 to reproject";
-        return Err(Error::Usage(what.into()));
+fn check_stride(settings: &Settings) -> Result<()> {
+    match settings.indirect_stride {
+        0 | 1 => Ok(()),
+        _ => Err(Error::Usage(
+            "carried samples hold all light of their pixels: set indirect_stride to 1 to reproject".into(),
+        )),
     }
+}
+
+fn check_placing(settings: &Settings) -> Result<()> {
+    check_stride(settings)?;
     match schedule::list_may_be_short(settings) || settings.allocate.max_spp > 0 {
         true => Err(Error::Usage(
             "carried samples count where a budget is placed: set neither noise_threshold nor max_spp, and choose one of the policies \

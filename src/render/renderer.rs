@@ -102,8 +102,8 @@ impl Renderer {
         }
     }
 
-    /// [`Renderer::new`] with other effects compiled in: more of them change nothing but the speed, fewer leave things
-    /// out of the picture. The effects that the outputs stand for are taken from `outputs`.
+    /// [`Renderer::new`] with other effects compiled in: more of them, up to [`crate::render::all_effects`], change nothing but the speed, fewer
+    /// leave things out of the picture. The effects that the outputs stand for are taken from `outputs`.
     ///
     /// # Errors
     /// As [`Renderer::new`].

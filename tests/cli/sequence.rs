@@ -79,6 +79,23 @@ fn a_frame_of_another_filter_is_another_and_pictures_are_written_as_they_are_ask
     assert!(told.contains("frame 1: is finished"), "control: {told}");
 }
 
+/// What lies before and after a frame with a lens begins anew, and is rendered.
+#[test]
+fn frames_through_a_lens_are_rendered_among_others() {
+    let folder = stage();
+    let scene = fs::read_to_string(folder.path().join("s.toml")).unwrap();
+    let keys = "[[animation]]\ncamera = true\nkeys = [{ time = 0, lens_radius = 0 }, { time = 1, lens_radius = 0 }, \
+                { time = 2, lens_radius = 0.2 }, { time = 3, lens_radius = 0 }]\n";
+    let still = scene.split("[[animation]]").next().unwrap();
+    fs::write(folder.path().join("s.toml"), format!("{still}{keys}")).unwrap();
+    well(&folder, "--frames 0..5 --fps 1 --reproject forward -o l.#.exr --quiet");
+    let carried = |frame: usize| {
+        let film = image::read(&folder.path().join(format!("l.{frame}.exr"))).unwrap();
+        matches!(film.channel("carried.samples"), Some(Samples::U32(counts)) if counts.iter().any(|&n| n > 0))
+    };
+    assert_eq!([0, 1, 2, 3, 4].map(carried), [false, true, false, false, true]);
+}
+
 #[test]
 fn a_frame_in_another_light_is_another() {
     let folder = stage();

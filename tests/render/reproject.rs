@@ -238,6 +238,26 @@ fn nothing_is_carried(gpu: &Gpu, way: Reprojection) {
     }
 }
 
+/// Samples through a lens show many points, of which none is the pixel's.
+#[test]
+fn nothing_is_carried_from_or_to_a_lens() {
+    let gpu = gpu();
+    for way in WAYS {
+        let mut scene = scene("cornell-box/scene.toml", small);
+        scene.view.lens_radius = 0.2;
+        let mut film = Film::new(&gpu, &scene, by(way));
+        let lens = film.camera;
+        let point = Camera { lens_radius: 0.0, ..lens };
+        let carried = [lens, lens, point, point, lens, point].map(|camera| {
+            film.frame(camera);
+            film.renderer.carriage().unwrap().carried
+        });
+        let [none @ .., last] = [0, 1, 2, 4, 5].map(|i| carried[i]);
+        assert!(none == [0; 4] && last == 0 && carried[3] > 1000, "{way:?}: {carried:?}");
+    }
+    assert_silent(&gpu);
+}
+
 #[test]
 fn limits_hold() {
     let gpu = gpu();

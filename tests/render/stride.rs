@@ -112,4 +112,7 @@ fn what_needs_the_light_of_every_pixel_is_refused() {
     assert!(told.contains("split_light"), "{told}");
     let told = tallow::render::can_carry(&gpu, &scene, &scene.settings).unwrap_err().to_string();
     assert!(told.contains("indirect_stride"), "{told}");
+    let mut renderer = Renderer::new(&gpu, &scene, &scene.settings, ALL).unwrap();
+    let told = renderer.keep_history(Default::default(), tallow::render::Moves::Camera).unwrap_err().to_string();
+    assert!(told.contains("set indirect_stride to 1"), "{told}");
 }

@@ -102,6 +102,8 @@ pub struct History {
     no_change: Buffer<LightChange>,
     /// Whether more than the camera has changed since the last frame.
     changed: AtomicBool,
+    /// Whether every pixel of the last frame was seen from one point: samples through a lens show many.
+    of_points: AtomicBool,
     settings: Reproject,
     spp: u32,
 }
@@ -160,6 +162,7 @@ impl History {
             probes,
             no_change: Buffer::from_slice(gpu, "no changes of light", &[])?,
             changed: AtomicBool::new(false),
+            of_points: AtomicBool::new(false),
             settings,
             spp,
         })
@@ -186,9 +189,15 @@ impl History {
         self.changed.load(Relaxed)
     }
 
-    /// Notes that a frame has begun with what there is now.
-    pub(super) fn settle(&self) {
+    /// Whether every pixel of the last frame was seen from one point.
+    pub(super) fn is_of_points(&self) -> bool {
+        self.of_points.load(Relaxed)
+    }
+
+    /// Notes that a frame has begun with what there is now, seen from one point or not.
+    pub(super) fn settle(&self, of_points: bool) {
         self.changed.store(false, Relaxed);
+        self.of_points.store(of_points, Relaxed);
     }
 
     /// How light had changed in each cell of 4x4 pixels of the last frame at the last [`Step::Reproject`](super::Step::Reproject) that followed a

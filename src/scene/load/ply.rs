@@ -37,10 +37,13 @@ pub fn load(path: &Path, library: &mut Library) -> Result<ObjFile<'static>> {
     let file = input::open(path)?;
     let size = file.metadata().map_or(u64::MAX, |m| m.len());
     let packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
-    let file = BufReader::with_capacity(1 << 18, file);
-    let read = || match packed {
-        true => parse(path, BufReader::with_capacity(1 << 18, GzDecoder::new(file)), size.saturating_mul(DEFLATE)),
-        false => parse(path, file, size),
+    let mut file = BufReader::with_capacity(1 << 18, file);
+    let mut read = || match packed {
+        true => {
+            let unpacked = &mut BufReader::with_capacity(1 << 18, GzDecoder::new(&mut file));
+            parse(path, unpacked, size.saturating_mul(DEFLATE))
+        }
+        false => parse(path, &mut file, size),
     };
     // The memory that is missing is found before the crate is asked for anything.
     let mesh = contained(|| Ok(read())).map_err(|what| Error::input(path, what))??;
@@ -49,7 +52,7 @@ pub fn load(path: &Path, library: &mut Library) -> Result<ObjFile<'static>> {
     Ok(ObjFile { parts: vec![part], grey: None })
 }
 
-fn parse(path: &Path, mut reader: impl BufRead, size: u64) -> Result<Mesh> {
+fn parse(path: &Path, reader: &mut dyn BufRead, size: u64) -> Result<Mesh> {
     if !reader.fill_buf().is_ok_and(|head| head.starts_with(b"ply")) {
         return Err(Error::input(path, "is no PLY file"));
     }
@@ -86,11 +89,12 @@ fn has(element: &ElementDef, names: &[&str]) -> bool {
     names.iter().all(|name| element.properties.contains_key(*name))
 }
 
-struct File<R: BufRead> {
-    reader: Reader<R>,
+/// Of any reader, so that the crate's parser is compiled once.
+struct File<'a> {
+    reader: Reader<&'a mut dyn BufRead>,
 }
 
-impl<R: BufRead> File<R> {
+impl File<'_> {
     fn damaged(&self, e: &ParseError) -> String {
         let line = e.line().map_or_else(String::new, |line| format!(" in line {line}"));
         format!("is damaged or ends too early{line}: save it again as PLY 1.0")
