@@ -1,5 +1,5 @@
 //! Tests of `tallow sequence`: frames alone and in a row, finished ones, and those that fail.
-use crate::command::{stdout, tallow};
+use crate::command::{complains, stdout, tallow};
 use std::fs;
 use std::process::Output;
 use tallow::image::{self, Film, Samples};
@@ -77,6 +77,25 @@ fn a_frame_of_another_filter_is_another_and_pictures_are_written_as_they_are_ask
     assert!(!told.contains("is finished") && filtered != bits(&folder, "f.1.exr"), "{told}");
     let told = well(&folder, &format!("{words} --denoise bilateral"));
     assert!(told.contains("frame 1: is finished"), "control: {told}");
+}
+
+/// A sky may come from black. The last key lies on frame 29, which no number in binary says; the camera's matrix keeps it from moving.
+#[test]
+fn keys_on_frames_are_reached_and_a_black_sky_may_light_up() {
+    let folder = stage();
+    let write = |text: &str| fs::write(folder.path().join("s.toml"), text).unwrap();
+    let sky = "[environment]\nradiance = 0\n[[mesh]]\nshape = 'cube'\n[[animation]]\nenvironment = true\n\
+               interpolation = 'step'\nkeys = [{ time = 0, radiance = 0 }, { time = 1.16, radiance = 1 }]\n";
+    write(sky);
+    // It warns that there is no light in the scene as it is loaded.
+    let told = stdout(&run(&folder, "--fps 25 --reproject off -o k.##.exr"));
+    assert!(told.contains("frame 29: ") && !told.contains("frame 30: "), "{told}");
+    let light = |frame: &str| image::read(&folder.path().join(frame)).unwrap().picture(None).unwrap().pixels.concat();
+    assert!(light("k.28.exr").iter().all(|&v| v == 0.0) && light("k.29.exr").iter().any(|&v| v > 0.0));
+    let matrix = "[camera]\nworld_from_camera = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 5, 0, 0, 0, 1]\n";
+    let keys = "[[animation]]\ncamera = true\nkeys = [{ time = 0, position = [0, 0, 5] }, { time = 1, position = [1, 0, 5] }]\n";
+    write(&format!("{matrix}[[mesh]]\nshape = 'cube'\n{keys}"));
+    complains(&run(&folder, "-o m.##.exr"), 3, &["world_from_camera"]);
 }
 
 /// What lies before and after a frame with a lens begins anew, and is rendered.

@@ -1,4 +1,5 @@
 //! Numbers that change with time.
+use super::time::{reaches, within};
 use crate::scene::description::Interpolation;
 use glam::DQuat;
 
@@ -49,13 +50,14 @@ impl Curve {
 
     /// The value at a time; before the first and after the last key, theirs.
     pub fn at(&self, seconds: f64) -> Vec<f64> {
-        let seconds = self.period.map_or(seconds, |period| seconds.rem_euclid(period));
-        let after = self.times.partition_point(|&time| time <= seconds);
+        let seconds = self.period.map_or(seconds, |period| within(seconds, period));
+        let after = self.times.partition_point(|&time| reaches(seconds, time));
         let (Some(a), Some(b)) = (after.checked_sub(1), self.values.get(after)) else {
             let end = if after == 0 { self.values.first() } else { self.values.last() };
             return end.cloned().unwrap_or_default();
         };
-        let (from, share) = (&self.values[a], (seconds - self.times[a]) / (self.times[after] - self.times[a]));
+        let (from, share) =
+            (&self.values[a], ((seconds - self.times[a]) / (self.times[after] - self.times[a])).max(0.0));
         match (self.interpolation, self.turns) {
             (Interpolation::Step, _) => from.clone(),
             (_, false) => from.iter().zip(b).map(|(a, b)| a + (b - a) * share).collect(),

@@ -1,5 +1,6 @@
 //! Meshes that have a file, OBJ or PLY, for each pose.
 use super::Mover;
+use super::time::within;
 use crate::error::{Error, Result};
 use crate::scene::build::store::joined;
 use crate::scene::description::{Interpolation, Mesh, MeshTable, numbered};
@@ -57,8 +58,11 @@ impl Frames {
     /// The file before a time, the one after it, and how far it is to that.
     fn around(&self, seconds: f64) -> (u32, u32, f32) {
         let last = f64::from(self.count - 1);
-        let at = seconds * self.fps;
-        let at = if self.repeat { at.rem_euclid(f64::from(self.count)) } else { at.clamp(0.0, last) };
+        let seconds = if self.repeat { within(seconds, f64::from(self.count) / self.fps) } else { seconds };
+        let at = (seconds * self.fps).clamp(0.0, f64::from(self.count));
+        let nearest = at.round();
+        let at = if (at - nearest).abs() < 1e-6 * at.max(1.0) { nearest } else { at };
+        let at = if self.repeat { at } else { at.min(last) };
         let before = at.floor().min(last) as u32;
         let after = if before + 1 < self.count {
             before + 1

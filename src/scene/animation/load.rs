@@ -6,7 +6,7 @@ use super::{Animation, Mover};
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::scene::description::{
-    self, AnimationTable, Description, Interpolation, mesh_number, meshes_to_free, numbered, rotation,
+    self, AnimationTable, Camera, Description, Interpolation, mesh_number, meshes_to_free, numbered, rotation,
 };
 use crate::scene::description::{Key, Transform};
 use glam::DAffine3;
@@ -76,6 +76,14 @@ fn mover(path: &Path, table: &AnimationTable, from: &Description, scene: &Scene)
     }
     let (what, target) = target(table, from, scene)?;
     let curves = curves(table, &target)?;
+    let stands = ["position", "target", "up"];
+    if let Target::Camera(Camera { world_from_camera: Some(_), .. }) = &target
+        && curves.iter().any(|(name, _)| stands.contains(name))
+    {
+        return Err(
+            "the camera stands by its world_from_camera: give it position and target instead, to move them".to_owned()
+        );
+    }
     Ok((what, Some(Arc::new(Keyed { target, curves }))))
 }
 

@@ -3,6 +3,7 @@ mod curve;
 mod frames;
 mod keyed;
 mod load;
+pub(super) mod time;
 mod turntable;
 
 use super::pose::Pose;
@@ -54,6 +55,12 @@ impl Animation {
     /// Seconds until the last key of all.
     pub fn end(&self) -> f64 {
         self.movers.iter().map(|mover| mover.end()).fold(0.0, f64::max)
+    }
+
+    /// Number of the last frame that is not after the last key of all.
+    pub fn last_frame(&self, fps: f64) -> f64 {
+        let nearest = (self.end() * fps).round();
+        if time::reaches(self.end(), nearest / fps) { nearest } else { (self.end() * fps).floor() }
     }
 
     /// Whether more moves than cameras, lights without surface and materials. Where a file is missing, the frame that needs it says so.

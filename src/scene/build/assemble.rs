@@ -53,7 +53,8 @@ pub fn assemble(path: &Path, description: &Description, choices: Choices, scene:
     add_appearance(scene);
     coat::add_tables(&mut scene.materials, &mut scene.texels);
     lights::finish(scene)?;
-    if !scene.lights.iter().any(|l| l.kind == LIGHT_ENVIRONMENT) {
+    // A constant sky without light may be given some by a pose.
+    if scene.environment.is_some() && !scene.lights.iter().any(|l| l.kind == LIGHT_ENVIRONMENT) {
         scene.environment = None;
         scene.rig.lights.retain(|l| l.kind != LIGHT_ENVIRONMENT);
     }

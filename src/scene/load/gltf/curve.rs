@@ -3,6 +3,7 @@ use super::accessor::Elements;
 use super::asset::Asset;
 use crate::error::Result;
 use crate::memory;
+use crate::scene::animation::time::reaches;
 use glam::DQuat;
 use gltf_json::animation::{Interpolation, Sampler};
 use gltf_json::validation::Checked;
@@ -83,7 +84,7 @@ impl Curve {
 
     /// The value at a time; before the first and after the last key, theirs. Quaternions are of length 1 unless they vanish.
     pub fn at(&self, seconds: f64) -> Vec<f64> {
-        let after = self.times.partition_point(|&time| f64::from(time) <= seconds);
+        let after = self.times.partition_point(|&time| reaches(seconds, f64::from(time)));
         let value = match after {
             0 => self.key(0, 0),
             after if after == self.times.len() => self.key(after - 1, 0),
@@ -98,7 +99,7 @@ impl Curve {
     /// The value between key `a` and the next.
     fn between(&self, a: usize, seconds: f64) -> Vec<f64> {
         let [from, to] = [a, a + 1].map(|key| f64::from(self.times[key]));
-        let (length, t) = (to - from, (seconds - from) / (to - from));
+        let (length, t) = (to - from, ((seconds - from) / (to - from)).max(0.0));
         let (start, end) = (self.key(a, 0), self.key(a + 1, 0));
         match self.interpolation {
             Interpolation::Step => start,
