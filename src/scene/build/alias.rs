@@ -1,5 +1,6 @@
 //! Alias tables (Walker 1977; construction after Vose 1991) in integer arithmetic: what a table returns is known
-//! exactly, so the probability that an estimator divides by is the one that the kernel draws with.
+//! exactly, so the probability that an estimator divides by is the one that the kernel draws with. In a slot of a table of 2^k entries the
+//! kernel's word takes steps of 2^k out of 2^32: a sky of 8192 x 4096 texels is off by up to .1 % there.
 use crate::layout::AliasEntry;
 
 /// Units of probability that one slot holds.
