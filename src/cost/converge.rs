@@ -86,8 +86,8 @@ impl Converging {
     }
 
     /// The reference of `spp` samples per pixel that an earlier measurement had, to the same bits: errors against a better one are no
-    /// errors of the same kind. What was kept with more is left alone and made anew with fewer. It is incomplete only if the user stops
-    /// it.
+    /// errors of the same kind. What was kept with more is left alone and made anew with fewer. Only a user who stops it leaves it
+    /// incomplete.
     ///
     /// # Errors
     /// [`crate::error::Error::Device`].

@@ -49,8 +49,8 @@ pub fn finding(candidates: &[Candidate], confidence: f64) -> Option<Finding> {
     Some(Finding { verdict, text })
 }
 
-/// Whether an interval says on which side of 1 a factor is, or that it is near. Of a single seed nobody knows how far another would be
-/// off.
+/// Whether an interval says on which side of 1 a factor is, or that it is near. A single seed has none: nobody knows how far another
+/// would be off.
 fn is_told(factor: &Estimate) -> bool {
     let Some((low, high)) = factor.low.zip(factor.high) else { return false };
     low > 1.0 || high < 1.0 || high < NARROW * low

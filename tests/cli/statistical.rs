@@ -42,7 +42,10 @@ fn each_verdict_has_its_exit_code() {
     assert!(same.status.code() == Some(0) && same.stderr.is_empty(), "{same:?}");
     // 1024 pixels of 0.02 sqrt 2: 0.0009, of which four and a half can be seen.
     assert!(stdout(&same).starts_with("same: a difference of the whole image would have been seen from 0.4"));
-    complains(&compare(&folder, "bright.exr b.exr"), 1, &["different: the whole image", "by +2.", "%"]);
+    let different = compare(&folder, "bright.exr b.exr");
+    complains(&different, 1, &["different: the whole image", "by +2.", "%"]);
+    assert!(stdout(&different).contains("Differences are relative to B or, where B is darker"));
+    assert!(!stdout(&same).contains("relative to B"), "control");
     complains(&compare(&folder, "a.exr b.exr --resolve 0.001"), 7, &["too noisy to say", "0.10 %", "times", "a pixel"]);
     complains(&compare(&folder, "a.exr b.exr --at 16x16"), 7, &["a block of 16x16 pixels"]);
     assert_eq!(compare(&folder, "bright.exr b.exr --accept 0.1").status.code(), Some(0));

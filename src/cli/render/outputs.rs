@@ -99,3 +99,15 @@ fn heatmap(film: &Film, stream: &mut dyn Stream) -> std::io::Result<()> {
     map.add_vec3("", ["R", "G", "B"], &picture.pixels);
     image::encode(Path::new("map.png"), &map, &WriteOptions::default(), stream)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_told_of_an_interruption_can_be_typed() {
+        let line = interruption(&[PathBuf::from("a.png"), PathBuf::from("my out.exr")], true);
+        assert!(line.ends_with("written to a.png, my out.exr; --resume 'my out.exr' continues it"), "{line}");
+        assert!(!interruption(&[PathBuf::from("my out.exr")], false).contains("--resume"));
+    }
+}

@@ -187,6 +187,12 @@ mod tests {
     }
 
     #[test]
+    fn the_sky_is_no_object() {
+        let of = |object| Where { scale: Scale::Object, first: [1, 2], last: [3, 4], object: Some(object) }.to_string();
+        assert_eq!([of(7), of(NONE)], ["object 7 in (1, 2) to (3, 4)", "what no object covers in (1, 2) to (3, 4)"]);
+    }
+
+    #[test]
     fn blocks_cover_the_image_and_are_where_they_say() {
         let image = image(37, 21, None);
         let all = Partition::all(&image, &image);
