@@ -5,9 +5,9 @@ use crate::error::{Error, Result};
 use crate::scene::build::store::joined;
 use crate::scene::description::{Interpolation, Mesh, MeshTable, numbered};
 use crate::scene::load::library::Library;
-use crate::scene::load::mesh_file;
+use crate::scene::load::mesh_file::{self, Numbering};
 use crate::scene::pose::{Pose, Vertices};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Files that are kept: the two around a time, and the next.
@@ -32,27 +32,58 @@ pub struct Frames {
     pub interpolation: Interpolation,
     /// Whether the first follows the last.
     pub repeat: bool,
-    /// Those read last.
-    pub read: Mutex<Vec<(u32, Arc<Mesh>)>>,
+    /// The file of the mesh itself.
+    pub base: PathBuf,
+    /// What was read.
+    pub read: Mutex<Read>,
+}
+
+/// What was read of the files.
+#[derive(Debug, Default)]
+pub struct Read {
+    /// The mesh itself.
+    base: Option<Arc<Mesh>>,
+    /// The poses read last.
+    poses: Vec<(u32, Arc<Mesh>)>,
 }
 
 impl Frames {
+    /// A pose, whose triangles are those of the mesh itself: materials and texture coordinates belong to them, while the shape of a face in this
+    /// pose may ask for others.
+    ///
     /// # Errors
     /// [`Error::Input`] of its file.
     fn load(&self, index: u32) -> Result<Arc<Mesh>> {
         let mut read = self.read.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, mesh)) = read.iter().find(|(number, _)| *number == index) {
+        if let Some((_, mesh)) = read.poses.iter().find(|(number, _)| *number == index) {
             return Ok(mesh.clone());
         }
+        let base = match &read.base {
+            Some(base) => base.clone(),
+            None => read.base.insert(Arc::new(self.corners(&self.base)?)).clone(),
+        };
         let name = numbered(&self.pattern.to_string_lossy(), self.first + index).unwrap_or_default();
-        let file = mesh_file::load(name.as_ref(), &mut Library::default())?;
-        let mesh = Arc::new(joined(&self.table, &file));
-        if mesh.positions.is_empty() {
-            return Err(Error::input(name, "has no triangles of this mesh: every file has to have all"));
+        let mut mesh = self.corners(name.as_ref())?;
+        if mesh.positions.len() != base.positions.len() {
+            let [corners, own] = [&mesh, &base].map(|mesh| mesh.positions.len());
+            return Err(Error::input(
+                name,
+                format!(
+                    "has {corners} corners of faces where {} has {own}: every file has to have the same faces",
+                    self.base.display()
+                ),
+            ));
         }
-        read.truncate(KEPT - 1);
-        read.insert(0, (index, mesh.clone()));
+        mesh.indices.clone_from(&base.indices);
+        let mesh = Arc::new(mesh);
+        read.poses.truncate(KEPT - 1);
+        read.poses.insert(0, (index, mesh.clone()));
         Ok(mesh)
+    }
+
+    /// What a file has of this mesh, with a vertex for each corner of its faces.
+    fn corners(&self, path: &Path) -> Result<Mesh> {
+        Ok(joined(&self.table, &mesh_file::load(path, Numbering::Corners, &mut Library::default())?))
     }
 
     /// The file before a time, the one after it, and how far it is to that.
@@ -81,9 +112,6 @@ impl Mover for Frames {
         let a = self.load(before)?;
         let still = share == 0.0 || self.interpolation == Interpolation::Step;
         let b = if still { a.clone() } else { self.load(after)? };
-        // Only what has the same triangles has anything between.
-        let alike = a.indices == b.indices && a.positions.len() == b.positions.len();
-        let b = if alike { b } else { a.clone() };
         let mix = |a: &[[f32; 3]], b: &[[f32; 3]]| -> Vec<[f32; 3]> {
             let between = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| a[c] + (b[c] - a[c]) * share);
             a.iter().zip(b).map(between).collect()

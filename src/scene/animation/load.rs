@@ -12,7 +12,7 @@ use crate::scene::description::{Key, Transform};
 use glam::DAffine3;
 use std::borrow::Cow;
 use std::collections::HashSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 type Checked<T> = std::result::Result<T, String>;
@@ -213,7 +213,8 @@ fn check(key: &Key, target: &Target) -> Checked<()> {
 fn frames(path: &Path, table: &AnimationTable, from: &Description, mesh: usize) -> Checked<Frames> {
     let file =
         table.file.as_ref().ok_or("deforms a mesh, which takes a file of every pose: file = \"pose.####.obj\"")?;
-    let pattern = path.parent().unwrap_or(Path::new("")).join(file.to_string_lossy().replace('\\', "/"));
+    let beside = |file: &Path| path.parent().unwrap_or(Path::new("")).join(file.to_string_lossy().replace('\\', "/"));
+    let pattern = beside(file);
     let fps = table.fps.unwrap_or(24.0);
     if !table.keys.is_empty() {
         return Err("has keys and files: choose".to_owned());
@@ -231,5 +232,7 @@ fn frames(path: &Path, table: &AnimationTable, from: &Description, mesh: usize) 
     let count = (table.last - table.first).saturating_add(1);
     let (first, interpolation, repeat) = (table.first, table.interpolation, table.repeat);
     let (table, read) = (from.mesh[mesh].clone(), Mutex::default());
-    Ok(Frames { mesh, table, pattern, first, count, fps, interpolation, repeat, read })
+    let first_pose = || PathBuf::from(numbered(&pattern.to_string_lossy(), first).unwrap_or_default());
+    let base = table.file.as_ref().map_or_else(first_pose, |file| beside(file));
+    Ok(Frames { mesh, table, pattern, first, count, fps, interpolation, repeat, base, read })
 }

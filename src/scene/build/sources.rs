@@ -3,7 +3,7 @@ use crate::error::{Error, Result};
 use crate::scene::description::mesh::Mesh;
 use crate::scene::description::{self, Description, MeshTable};
 use crate::scene::load::library::Library;
-use crate::scene::load::mesh_file::{self, Format};
+use crate::scene::load::mesh_file::{self, Format, Numbering};
 use crate::scene::load::obj::ObjFile;
 use std::collections::{BTreeSet, HashMap};
 use std::fmt::Display;
@@ -93,7 +93,7 @@ impl<'a> Sources<'a> {
             self.check(mesh)?;
             let Some(path) = self.file_of(mesh) else { continue };
             if !self.files.contains_key(&path) {
-                let parsed = mesh_file::load(&path, &mut self.library)?;
+                let parsed = mesh_file::load(&path, Numbering::Shared, &mut self.library)?;
                 self.files.insert(path, parsed);
             }
         }

@@ -29,13 +29,23 @@ impl Format {
     }
 }
 
+/// What counts as a vertex.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Numbering {
+    /// Corners of the same indices.
+    #[default]
+    Shared,
+    /// Every corner of a face, in the order of the file, so that files of the same faces number theirs alike.
+    Corners,
+}
+
 /// Reads the parts of a PLY file or an OBJ file.
 ///
 /// # Errors
 /// Those of [`ply::load`] and [`obj::load`].
-pub fn load(path: &Path, library: &mut Library) -> Result<ObjFile<'static>> {
+pub fn load(path: &Path, numbering: Numbering, library: &mut Library) -> Result<ObjFile<'static>> {
     match Format::of(path) {
-        Format::Ply => ply::load(path, library),
-        _ => obj::load(path, library),
+        Format::Ply => ply::load(path, numbering, library),
+        _ => obj::load(path, numbering, library),
     }
 }

@@ -1,6 +1,7 @@
 //! OBJ files: blocks of statements, parsed in parallel, become meshes in the order of the file. Every mistake has its line.
 use super::blocks::Blocks;
 use super::library::{self, Library};
+use super::mesh_file::Numbering;
 use super::obj_block::{Checked, Indices, NO_INDEX, ObjBlock, Statement};
 use super::obj_part::{Corner, NO_EXTRA, Part, PartBuilder};
 use crate::error::{Error, Result};
@@ -28,16 +29,23 @@ pub struct ObjFile<'a> {
 ///
 /// # Errors
 /// [`Error::Input`] with file, line, what is wrong and what to do; [`Error::Memory`].
-pub fn load(path: &Path, library: &mut Library) -> Result<ObjFile<'static>> {
-    parse(path, input::open(path)?, library)
+pub fn load(path: &Path, numbering: Numbering, library: &mut Library) -> Result<ObjFile<'static>> {
+    parse(path, input::open(path)?, numbering, library)
 }
 
 /// [`load`] from any reader; `path` is for messages and for finding the MTL files.
 ///
 /// # Errors
 /// See [`load`].
-pub fn parse(path: &Path, reader: impl Read + Send, library: &mut Library) -> Result<ObjFile<'static>> {
-    threads::within(|| read(Blocks::new(reader), Parser::new(path, library)))
+pub fn parse(
+    path: &Path,
+    reader: impl Read + Send,
+    numbering: Numbering,
+    library: &mut Library,
+) -> Result<ObjFile<'static>> {
+    let mut parser = Parser::new(path, library);
+    parser.part.numbering = numbering;
+    threads::within(|| read(Blocks::new(reader), parser))
 }
 
 fn read(mut blocks: Blocks<impl Read + Send>, mut parser: Parser) -> Result<ObjFile<'static>> {

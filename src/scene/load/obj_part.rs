@@ -1,5 +1,6 @@
 //! Collects a part of an OBJ file: corners, which index positions, texture coordinates and normals separately, become vertices
 //! that have all three.
+use super::mesh_file::Numbering;
 use super::triangulate::Triangulator;
 use crate::layout::NONE;
 use crate::scene::description::mesh::Mesh;
@@ -29,6 +30,8 @@ const UNNAMED: &str = "unnamed_object";
 
 /// Collects the faces of one part.
 pub struct PartBuilder {
+    /// What counts as a vertex.
+    pub numbering: Numbering,
     name: String,
     /// Scene material, or [`NONE`] before the first known one.
     pub material: u32,
@@ -46,6 +49,7 @@ pub struct PartBuilder {
 impl Default for PartBuilder {
     fn default() -> Self {
         Self {
+            numbering: Numbering::Shared,
             name: UNNAMED.into(),
             material: NONE,
             mesh: Mesh::default(),
@@ -91,7 +95,8 @@ impl PartBuilder {
         self.face.clear();
         for &[position, uv, normal] in corners {
             let corner = [position, if has[0] { uv } else { NO_EXTRA }, if has[1] { normal } else { NO_EXTRA }];
-            let vertex = self.known(corner).unwrap_or_else(|| {
+            let known = if self.numbering == Numbering::Shared { self.known(corner) } else { None };
+            let vertex = known.unwrap_or_else(|| {
                 self.mesh.positions.push(points[0][position as usize]);
                 self.mesh.uvs.extend(has[0].then(|| uvs[uv as usize]));
                 self.mesh.normals.extend(has[1].then(|| points[1][normal as usize]));

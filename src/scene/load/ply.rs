@@ -4,6 +4,7 @@
 //! Of vertices `x y z`, `nx ny nz`, `u v` (or `s t`, `texture_u texture_v`), and `red green blue alpha` are read; integers are
 //! sRGB code values, as scanners and modellers write them, and floats are linear. Faces are polygons, or strips of triangles.
 use super::library::Library;
+use super::mesh_file::Numbering;
 use super::obj::ObjFile;
 use super::obj_part::Part;
 use super::triangulate::Triangulator;
@@ -33,7 +34,7 @@ const DEFLATE: u64 = 1032;
 ///
 /// # Errors
 /// [`Error::Input`] with file, what is wrong and what to do; [`Error::Memory`].
-pub fn load(path: &Path, library: &mut Library) -> Result<ObjFile<'static>> {
+pub fn load(path: &Path, numbering: Numbering, library: &mut Library) -> Result<ObjFile<'static>> {
     let file = input::open(path)?;
     let size = file.metadata().map_or(u64::MAX, |m| m.len());
     let packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
@@ -41,9 +42,9 @@ pub fn load(path: &Path, library: &mut Library) -> Result<ObjFile<'static>> {
     let mut read = || match packed {
         true => {
             let unpacked = &mut BufReader::with_capacity(1 << 18, GzDecoder::new(&mut file));
-            parse(path, unpacked, size.saturating_mul(DEFLATE))
+            parse(path, unpacked, size.saturating_mul(DEFLATE), numbering)
         }
-        false => parse(path, &mut file, size),
+        false => parse(path, &mut file, size, numbering),
     };
     // The memory that is missing is found before the crate is asked for anything.
     let mesh = contained(|| Ok(read())).map_err(|what| Error::input(path, what))??;
@@ -52,7 +53,7 @@ pub fn load(path: &Path, library: &mut Library) -> Result<ObjFile<'static>> {
     Ok(ObjFile { parts: vec![part], grey: None })
 }
 
-fn parse(path: &Path, reader: &mut dyn BufRead, size: u64) -> Result<Mesh> {
+fn parse(path: &Path, reader: &mut dyn BufRead, size: u64, numbering: Numbering) -> Result<Mesh> {
     if !reader.fill_buf().is_ok_and(|head| head.starts_with(b"ply")) {
         return Err(Error::input(path, "is no PLY file"));
     }
@@ -63,7 +64,7 @@ fn parse(path: &Path, reader: &mut dyn BufRead, size: u64) -> Result<Mesh> {
     let count = |name| header.elements.get(name).map_or(0, |e| e.count as u64);
     let bytes = count("vertex") * BYTES_OF_VERTEX + (count("face") + count("tristrips")) * BYTES_OF_FACE;
     memory::need(path.display(), bytes)?;
-    file.mesh(&header).map_err(about)
+    file.mesh(&header, numbering).map_err(about)
 }
 
 /// Compares the header with the bytes that there can be: every property of an element takes at least one.
@@ -105,7 +106,7 @@ impl File<'_> {
         rows.map_err(|e| self.damaged(&e))
     }
 
-    fn mesh(&mut self, header: &Header) -> Checked<Mesh> {
+    fn mesh(&mut self, header: &Header, numbering: Numbering) -> Checked<Mesh> {
         let (mut mesh, mut faces, mut strips) = (Mesh::default(), Vec::<Face>::new(), Vec::<Face>::new());
         for (name, element) in &header.elements {
             match name.as_str() {
@@ -118,16 +119,50 @@ impl File<'_> {
         if faces.is_empty() && strips.is_empty() {
             return Err("has no faces: points alone have no surface".to_owned());
         }
-        let mut triangulator = Triangulator::default();
+        let vertices = mesh.positions.len();
+        let (mesh, vertices_of) = match numbering {
+            Numbering::Shared => (mesh, None),
+            Numbering::Corners => (Mesh::default(), Some(mesh)),
+        };
+        let mut faces_of = Faces { mesh, vertices_of, triangulator: Triangulator::default() };
         for face in faces {
-            let corners = face.corners(mesh.positions.len(), &face.0)?;
-            if corners.len() >= 3 {
-                triangulator.add(&mesh.positions, &corners, &mut mesh.indices);
-            }
+            faces_of.add(face.corners(vertices, &face.0)?);
         }
-        strips.iter().try_for_each(|strip| strip.add_strips(&mut mesh))?;
-        Ok(mesh)
+        for strip in strips {
+            strip.triangles(vertices)?.into_iter().for_each(|triangle| faces_of.add(triangle.to_vec()));
+        }
+        Ok(faces_of.mesh)
     }
+}
+
+/// Collects faces.
+struct Faces {
+    mesh: Mesh,
+    /// Where each corner becomes a vertex: those of the file.
+    vertices_of: Option<Mesh>,
+    triangulator: Triangulator,
+}
+
+impl Faces {
+    fn add(&mut self, mut corners: Vec<u32>) {
+        if corners.len() < 3 {
+            return;
+        }
+        let mesh = &mut self.mesh;
+        if let Some(from) = &self.vertices_of {
+            corners.iter_mut().for_each(|corner| *corner = copy_vertex(from, *corner as usize, mesh));
+        }
+        self.triangulator.add(&mesh.positions, &corners, &mut mesh.indices);
+    }
+}
+
+/// Returns the number of the copy.
+fn copy_vertex(from: &Mesh, vertex: usize, to: &mut Mesh) -> u32 {
+    to.positions.push(from.positions[vertex]);
+    to.normals.extend(from.normals.get(vertex));
+    to.uvs.extend(from.uvs.get(vertex));
+    to.colors.extend(from.colors.get(vertex));
+    to.positions.len() as u32 - 1
 }
 
 fn add_vertices(rows: Vec<Vertex>, element: &ElementDef, mesh: &mut Mesh) {
@@ -233,15 +268,14 @@ impl Face {
     }
 
     /// Every other triangle of a strip is turned around.
-    fn add_strips(&self, mesh: &mut Mesh) -> Checked<()> {
+    fn triangles(&self, vertices: usize) -> Checked<Vec<[u32; 3]>> {
+        let mut triangles = Vec::new();
         for strip in self.0.split(|&corner| corner == -1) {
-            let corners = self.corners(mesh.positions.len(), strip)?;
-            for (i, three) in corners.windows(3).enumerate() {
-                let turned = i % 2;
-                mesh.indices.extend([three[0], three[1 + turned], three[2 - turned]]);
-            }
+            let corners = self.corners(vertices, strip)?;
+            let turned = |(i, three): (usize, &[u32])| [three[0], three[1 + i % 2], three[2 - i % 2]];
+            triangles.extend(corners.windows(3).enumerate().map(turned));
         }
-        Ok(())
+        Ok(triangles)
     }
 }
 

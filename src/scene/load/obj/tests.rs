@@ -5,7 +5,7 @@ use crate::scene::load::material::Materials;
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n";
 
 fn read(text: &str) -> Result<ObjFile<'static>> {
-    parse(Path::new("a.obj"), format!("{SQUARE}{text}").as_bytes(), &mut Library::default())
+    parse(Path::new("a.obj"), format!("{SQUARE}{text}").as_bytes(), Numbering::Shared, &mut Library::default())
 }
 
 fn error(text: &str) -> String {
@@ -19,7 +19,12 @@ fn polygons_become_fans_and_negative_indices_count_back() {
     assert_eq!(quad.parts[0].mesh.positions[..2], [[0.0; 3], [1.0, 0.0, 0.0]]);
     let penta = read("v 0.5 2 0\nf 1 2 3 5 4").unwrap();
     assert_eq!(penta.parts[0].mesh.indices.len(), 9);
-    let marked = parse(Path::new("a.obj"), format!("\u{feff}{SQUARE}f 1 2 4").as_bytes(), &mut Library::default());
+    let marked = parse(
+        Path::new("a.obj"),
+        format!("\u{feff}{SQUARE}f 1 2 4").as_bytes(),
+        Numbering::Shared,
+        &mut Library::default(),
+    );
     assert_eq!(marked.unwrap().parts[0].mesh.indices.len(), 3, "a byte order mark is no part of the first line");
     assert!(read("l 1 2\np 1").unwrap().parts.iter().all(|m| m.mesh.indices.is_empty()));
 }
@@ -28,7 +33,8 @@ fn polygons_become_fans_and_negative_indices_count_back() {
 fn faces_without_area_for_want_of_corners_are_counted() {
     let warnings = |text: &str| {
         let mut library = Library::default();
-        let file = parse(Path::new("a.obj"), format!("{SQUARE}{text}").as_bytes(), &mut library).unwrap();
+        let file =
+            parse(Path::new("a.obj"), format!("{SQUARE}{text}").as_bytes(), Numbering::Shared, &mut library).unwrap();
         assert_eq!(file.parts.iter().map(|m| m.mesh.indices.len()).sum::<usize>(), 3, "the whole face is kept");
         library.warnings
     };
@@ -47,7 +53,7 @@ fn corners_with_and_without_normals_stay_apart() {
 #[test]
 fn lines_may_continue_and_carry_colours_or_foreign_letters() {
     let bytes = [SQUARE.as_bytes(), b"# caf\xe9\nv 9 9 9 1 0 0\nf 1 2 \\\n 3\n"].concat();
-    let file = parse(Path::new("a.obj"), &bytes[..], &mut Library::default()).unwrap();
+    let file = parse(Path::new("a.obj"), &bytes[..], Numbering::Shared, &mut Library::default()).unwrap();
     assert_eq!(file.parts[0].mesh.indices.len(), 3);
 }
 
@@ -74,7 +80,7 @@ fn tables_stand_in_for_materials_and_unknown_ones_are_grey() {
     let red = library.materials.push("red", Materials::plain([1.0, 0.0, 0.0]));
     library.tables.insert("red".into(), red);
     let text = format!("mtllib none.mtl\n{SQUARE}usemtl red\nf 1 2 3\nusemtl what\nf 1 2 3");
-    let file = parse(Path::new("a.obj"), text.as_bytes(), &mut library).unwrap();
+    let file = parse(Path::new("a.obj"), text.as_bytes(), Numbering::Shared, &mut library).unwrap();
     assert_eq!([0, 1].map(|i: usize| file.parts[i].material), [red, library.grey()]);
     let said = file.grey.unwrap();
     assert!(said.ends_with("defined nowhere: what (no such library: none.mtl)"), "{said}");
@@ -86,7 +92,8 @@ fn grey_for_materials_that_a_later_library_defines_is_told() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a.mtl"), "newmtl red\nKd 1 0 0").unwrap();
     let text = format!("{SQUARE}usemtl red\nmtllib a.mtl\nf 1 2 3");
-    let file = parse(&folder.path().join("x.obj"), text.as_bytes(), &mut Library::default()).unwrap();
+    let file =
+        parse(&folder.path().join("x.obj"), text.as_bytes(), Numbering::Shared, &mut Library::default()).unwrap();
     let said = file.grey.unwrap();
     assert!(said.ends_with("defined nowhere, or only below their use: red"), "{said}");
 }
@@ -104,7 +111,7 @@ fn several_libraries_and_names_with_spaces() {
     std::fs::write(dir.path().join("two.mtl"), "newmtl b c\nKd 0 1 0").unwrap();
     let text = format!("mtllib one a.mtl two.mtl\n{SQUARE}usemtl b c\nf 1 2 3\nusemtl a\nf 1 2 3");
     let mut library = Library::default();
-    let file = parse(&dir.path().join("x.obj"), text.as_bytes(), &mut library).unwrap();
+    let file = parse(&dir.path().join("x.obj"), text.as_bytes(), Numbering::Shared, &mut library).unwrap();
     let colors: Vec<_> = file.parts.iter().map(|p| library.materials.list[p.material as usize].base_color).collect();
     assert_eq!((colors, library.warnings.len()), (vec![[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]], 0));
 }

@@ -82,7 +82,7 @@ fn read(bytes: &[u8], name: &str) -> Result<Mesh> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     std::fs::write(&path, bytes).unwrap();
-    Ok(load(&path, &mut Library::default())?.parts.remove(0).mesh.into_owned())
+    Ok(load(&path, Numbering::Shared, &mut Library::default())?.parts.remove(0).mesh.into_owned())
 }
 
 fn refusal(bytes: &[u8]) -> String {
