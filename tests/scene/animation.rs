@@ -1,7 +1,7 @@
 //! Tests of the `[[animation]]` tables: where they put things, and the messages about mistakes.
 use std::fs;
 use std::path::Path;
-use tallow::scene::{Loaded, Pose, Scene, effects};
+use tallow::scene::{Loaded, MaterialChange, Pose, Scene, effects};
 
 const STAGE: &str = "
 [camera]
@@ -126,6 +126,60 @@ transform = { scale = 0.01 }
     let dark = grows.replace("panel", "box");
     assert!(!large(&load(&dark)), "without lamps there is nothing to sample");
     assert!(large(&load(&PANEL.replace("0.01", "2"))), "control: one that is large and stays");
+}
+
+/// Spheres are lamps where they are of even radiance and shine outward; keys may leave neither.
+#[test]
+fn spheres_that_keys_make_lamps_of_another_kind_are_meshes() {
+    let scene = |ball: &str, material: &str, keys: &str| {
+        let text = format!(
+            "[camera]\nposition = [0, 0, 9]\n[environment]\nradiance = 1\n[[material]]\nname = \"glow\"\n{material}\n\
+             [[mesh]]\nname = \"ball\"\nshape = \"sphere\"\nmaterial = \"glow\"\n{ball}\n[[instance]]\nname = \"one\"\nmesh = \"ball\"\n{keys}"
+        );
+        Scene::parse(Path::new("s.toml"), &text).unwrap()
+    };
+    let material = |keys: &str| format!("[[animation]]\nmaterial = \"glow\"\nkeys = [{keys}]\n");
+    let place = |keys: &str| format!("[[animation]]\ninstance = \"one\"\nkeys = [{keys}]\n");
+    let glows = &material("{ time = 0, emission = 0 }, { time = 1, emission = 5 }");
+    let fades = &material("{ time = 0, opacity = 1 }, { time = 1, opacity = 0.5 }");
+    let glows_and_fades = &material("{ time = 0, emission = 0 }, { time = 1, emission = 5, opacity = 0.5 }");
+    let stretches = &place("{ time = 0, scale = 1 }, { time = 1, scale = [1, 2, 1] }");
+    let bends = &place("{ time = 0, transform = [1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1] }");
+    let grows = &place("{ time = 0, scale = 1 }, { time = 1, scale = [2, 2, 2] }");
+    let both = |a: &String, b: &String| format!("{a}{b}");
+    let long = "transform = { scale = [1, 2, 1] }";
+    let cases = [
+        ("", "", glows.clone(), true),
+        ("", "", both(glows, grows), true),
+        ("", "", glows_and_fades.clone(), false),
+        ("", "", both(glows, stretches), false),
+        ("", "", both(glows, bends), false),
+        (long, "", glows.clone(), false),
+        ("flip_normals = true", "", glows.clone(), false),
+        ("", "opacity = 0.5", glows.clone(), false),
+        ("", "emission = 1", fades.clone(), false),
+        ("", "emission = 1", stretches.clone(), false),
+        (long, "opacity = 0.5", both(fades, stretches), true),
+    ];
+    for (ball, own, keys, expected) in cases {
+        let Loaded { mut scene, animation, .. } = scene(ball, own, &keys);
+        assert_eq!(scene.triangles.len() == 1, expected, "{ball} {own} {keys}");
+        scene.apply(&animation.at(1.0).unwrap()).unwrap();
+    }
+    let change = |color: Option<[f32; 3]>, opacity| MaterialChange { emission: color, opacity, ..Default::default() };
+    for (ball, own, to, what) in [
+        (long, "", change(Some([1.0; 3]), None), "is stretched"),
+        ("flip_normals = true", "", change(Some([1.0; 3]), None), "shines inward"),
+        ("", "opacity = 0.5", change(Some([1.0; 3]), None), "is not opaque"),
+        ("", "emission = 1", change(None, Some(0.5)), "is not opaque"),
+    ] {
+        let mut scene = scene(ball, own, "").scene;
+        let number = scene.names.materials.iter().position(|name| name == "glow").unwrap();
+        let change = |to| Pose { materials: vec![(number, to)], ..Pose::default() };
+        let line = scene.apply(&change(to)).unwrap_err().to_string();
+        assert!(line.contains(what) && line.contains("give its mesh segments"), "{line}");
+        scene.apply(&change(MaterialChange { color: Some([0.5; 3]), ..Default::default() })).unwrap();
+    }
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! What a scene becomes by a pose, found and checked before anything is changed.
 use super::material::changed;
-use crate::layout::{Instance, LIGHT_ENVIRONMENT, Light, Material, NONE, SPHERE};
+use crate::layout::{
+    Instance, LIGHT_ENVIRONMENT, Light, MATERIAL_MASKED, Material, NONE, SPHERE, SPHERE_INWARD, Triangle,
+};
 use crate::scene::build::bvh::{self, Bounds};
 use crate::scene::build::environment::{self, rotation};
 use crate::scene::build::hierarchy::{instance, is_lost, reach};
@@ -9,7 +11,7 @@ use crate::scene::build::soft::Placed;
 use crate::scene::load::material::radiance;
 use crate::scene::pose::{EnvironmentChange, Pose, Vertices};
 use crate::scene::{Fingerprint, Scene};
-use glam::{DAffine3, DMat3, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
 use std::collections::HashSet;
 
 type Checked<T> = Result<T, String>;
@@ -58,6 +60,9 @@ impl Next {
             true => Some(next_copies(scene, pose, &meshes, materials.as_deref().unwrap_or(&scene.materials))?),
             false => None,
         };
+        if let Some(materials) = &materials {
+            new_lamps_hold(scene, copies.as_ref(), materials)?;
+        }
         if let Some(camera) = &pose.camera {
             let bounds = copies.as_ref().map_or(scene.bounds, |copies| copies.world);
             camera.build([1, 1], bounds).map_err(|what| format!("camera: {what}"))?;
@@ -83,9 +88,7 @@ fn next_mesh(scene: &Scene, mesh: usize, to: &Vertices) -> Checked<NextMesh> {
 }
 
 fn next_copies(scene: &Scene, pose: &Pose, meshes: &[NextMesh], materials: &[Material]) -> Checked<NextCopies> {
-    let (mut hidden, tree_of) = (scene.rig.hidden.clone(), &scene.rig.tree_of);
-    let mut copies = scene.instances.clone();
-    scene.rig.order.iter().zip(&scene.instances).for_each(|(&copy, instance)| copies[copy as usize] = *instance);
+    let (mut hidden, tree_of, mut copies) = (scene.rig.hidden.clone(), &scene.rig.tree_of, copies(scene));
     for (number, transform) in &pose.instances {
         let Some(&copy) = scene.rig.placed.get(*number) else {
             let count = scene.rig.placed.len();
@@ -107,8 +110,10 @@ fn next_copies(scene: &Scene, pose: &Pose, meshes: &[NextMesh], materials: &[Mat
         hidden.remove(&copy);
         let Instance { root, material, object, .. } = copies[copy as usize];
         copies[copy as usize] = Instance { material, object, ..instance(&affine, root) };
-        shines_right(scene, copy, &copies[copy as usize], &affine, materials)
-            .map_err(|what| format!("instance {number} {what}"))?;
+        if !is_even(&affine) {
+            spheres_shine(scene, copy, &copies[copy as usize], materials)
+                .map_err(|what| format!("instance {number} {what}"))?;
+        }
     }
     let mut bounds: Vec<_> = scene.rig.trees.iter().map(|tree| tree.bounds).collect();
     meshes.iter().for_each(|mesh| bounds[mesh.tree] = mesh.bounds);
@@ -122,19 +127,57 @@ fn next_copies(scene: &Scene, pose: &Pose, meshes: &[NextMesh], materials: &[Mat
     Ok(NextCopies { all: copies, hidden, world })
 }
 
-/// Lamps are sampled where they are hit: a sphere as a sphere.
-fn shines_right(scene: &Scene, copy: u32, at: &Instance, affine: &DAffine3, materials: &[Material]) -> Checked<()> {
-    if is_even(affine) {
+/// Checks what only now emits light or has holes, which the scene could not know when it chose spheres or meshes.
+fn new_lamps_hold(scene: &Scene, next: Option<&NextCopies>, materials: &[Material]) -> Checked<()> {
+    let newly = |(m, before): (&Material, &Material)| {
+        let lit = m.emission != [0.0; 3];
+        lit && (before.emission == [0.0; 3] || m.flags & MATERIAL_MASKED > before.flags & MATERIAL_MASKED)
+    };
+    if !materials.iter().zip(&scene.materials).any(newly) {
         return Ok(());
     }
-    let tree = &scene.rig.trees[scene.rig.tree_of[copy as usize] as usize];
-    for triangle in &scene.triangles[tree.range.clone()] {
-        let worn = if at.material == NONE { triangle.material } else { at.material };
-        if triangle.primitive & SPHERE != 0 && materials[worn as usize].emission != [0.0; 3] {
-            return Err("stretches a lamp that is a sphere: give its mesh segments".to_owned());
-        }
+    let world = scene.rig.trees.iter().filter(|tree| tree.mesh.is_none());
+    world
+        .flat_map(|tree| &scene.triangles[tree.range.clone()])
+        .try_for_each(|t| sphere_shines(t, true, &materials[t.material as usize]))?;
+    let hidden = next.map_or(&scene.rig.hidden, |next| &next.hidden);
+    let all = copies(scene);
+    for (copy, at) in (0..).zip(next.map_or(&all, |next| &next.all)).filter(|(copy, _)| !hidden.contains(copy)) {
+        spheres_shine(scene, copy, at, materials)?;
     }
     Ok(())
+}
+
+/// The copies by their numbers.
+fn copies(scene: &Scene) -> Vec<Instance> {
+    let mut copies = scene.instances.clone();
+    scene.rig.order.iter().zip(&scene.instances).for_each(|(&copy, instance)| copies[copy as usize] = *instance);
+    copies
+}
+
+/// [`sphere_shines`] for all triangles of a copy.
+fn spheres_shine(scene: &Scene, copy: u32, at: &Instance, materials: &[Material]) -> Checked<()> {
+    let [x, y, z] =
+        [at.world0, at.world1, at.world2].map(|row| DVec3::new(row[0].into(), row[1].into(), row[2].into()));
+    let even = is_even(&DAffine3::from_mat3(DMat3::from_cols(x, y, z).transpose()));
+    let tree = &scene.rig.trees[scene.rig.tree_of[copy as usize] as usize];
+    let worn = |triangle: &Triangle| if at.material == NONE { triangle.material } else { at.material };
+    scene.triangles[tree.range.clone()].iter().try_for_each(|t| sphere_shines(t, even, &materials[worn(t) as usize]))
+}
+
+/// Lamps are sampled where they are hit: a sphere as one of even radiance that shines outward.
+fn sphere_shines(triangle: &Triangle, even: bool, worn: &Material) -> Checked<()> {
+    if triangle.primitive & SPHERE == 0 || worn.emission == [0.0; 3] {
+        return Ok(());
+    }
+    let what = match () {
+        () if !even => "is stretched",
+        () if triangle.primitive & SPHERE_INWARD != 0 => "shines inward",
+        () if worn.emission_texture != NONE => "shines by a texture",
+        () if worn.flags & MATERIAL_MASKED != 0 => "is not opaque",
+        () => return Ok(()),
+    };
+    Err(format!("has a lamp that is a sphere and {what}: give its mesh segments"))
 }
 
 fn next_materials(scene: &Scene, pose: &Pose) -> Checked<Option<Vec<Material>>> {

@@ -1,9 +1,10 @@
 //! Decides for each mesh whether it is baked into world space or stored in its own space for instances.
 use super::sources::{Sources, mesh_name};
 use crate::error::Result;
-use crate::layout::{MATERIAL_MASKED, Material, NONE};
+use crate::layout::{MATERIAL_MASKED, NONE};
 use crate::scene::description::shape::Shape;
-use crate::scene::description::{self, InstanceTable, MeshTable};
+use crate::scene::description::{self, Description, InstanceTable, Key, MeshTable, Numbers, Transform};
+use crate::scene::load::material::Materials;
 use glam::{DAffine3, DMat3};
 use std::collections::HashMap;
 
@@ -145,13 +146,34 @@ impl<'s, 'a> Planner<'s, 'a> {
 }
 
 /// Whether a sphere can be stored as one, where `job` places it in the world. Lamps are chosen by the cone in which they are
-/// seen: that takes a sphere of even radiance which emits outward.
+/// seen: that takes a sphere of even radiance which emits outward, also as animations have it.
 fn may_be_exact(sources: &Sources, job: &Job) -> Result<bool> {
     let table = &sources.description.mesh[job.mesh];
-    let even = |m: &Material| m.emission_texture == NONE && m.flags & MATERIAL_MASKED == 0;
-    let lamp = override_of(sources, job)?.map(|m| &sources.library.materials.list[m as usize]);
-    let lamp = lamp.filter(|m| m.emission != [0.0; 3]);
-    Ok(is_sphere(table) && lamp.is_none_or(|m| even(m) && is_even(&job.affine) && !table.flip_normals))
+    let Some(worn) = override_of(sources, job)? else { return Ok(is_sphere(table)) };
+    let Materials { list, names, .. } = &sources.library.materials;
+    let (m, name) = (&list[worn as usize], &names[worn as usize]);
+    let keyed = |key: &str| {
+        let tables = sources.description.animation.iter().filter(|t| t.material.as_ref() == Some(name));
+        tables.flat_map(|t| &t.keys).any(|k| k.values.contains_key(key))
+    };
+    let lamp = m.emission != [0.0; 3] || keyed("emission");
+    let opaque = m.flags & MATERIAL_MASKED == 0 && !keyed("opacity");
+    let even = m.emission_texture == NONE && opaque && is_even(&job.affine) && !is_stretched(sources.description, job);
+    Ok(is_sphere(table) && (!lamp || even && !table.flip_normals))
+}
+
+/// Whether an animation scales what `job` places by other factors along other axes.
+fn is_stretched(description: &Description, job: &Job) -> bool {
+    let instance = description.instance.get(job.placement as usize);
+    let name = instance.map_or(&description.mesh[job.mesh].name, |instance| &instance.name);
+    let tables = description.animation.iter().filter(|t| t.instance.is_some() && t.instance == *name);
+    let is_uneven = |key: &Key| {
+        let numbers = |name: &str| key.values.get(name).map(Numbers::list);
+        let scale = numbers("scale").is_some_and(|s| s.windows(2).any(|two| two[0] != two[1]));
+        let matrix = numbers("transform").and_then(|n| Some(Transform::from(<[f64; 16]>::try_from(n).ok()?).0));
+        scale || matrix.is_some_and(|affine| !is_even(&affine))
+    };
+    tables.flat_map(|t| &t.keys).any(is_uneven)
 }
 
 fn invertible(sources: &Sources, affine: DAffine3, place: &str) -> Result<DAffine3> {
