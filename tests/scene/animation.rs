@@ -204,6 +204,10 @@ fn mistakes_are_one_line_with_the_table_and_the_key() {
         ("[[animation]]\nmesh = \"lid\"".into(), "takes a file of every pose"),
         ("[[animation]]\nmesh = \"lid\"\nfile = \"a.obj\"".into(), "give `#` for the number"),
         (
+            "[[animation]]\nlight = \"bulb\"\nkeys = [{ time = 0, irradiance = 1 }]".into(),
+            "unknown key \"irradiance\": choose from position, intensity",
+        ),
+        (
             instance("{ time = 0, scale = 1 }") + "\n" + &instance("{ time = 0, scale = 1 }"),
             "animation 2: instance \"box\"",
         ),

@@ -2,7 +2,7 @@
 use super::Mover;
 use super::curve::Curve;
 use crate::error::Result;
-use crate::scene::description::{Camera, LightTable, Rgb, Transform};
+use crate::scene::description::{Camera, LightTable, LightType, Rgb, Transform};
 use crate::scene::pose::{EnvironmentChange, MaterialChange, Pose};
 use glam::{DAffine3, DQuat, DVec3};
 
@@ -42,12 +42,15 @@ impl Target {
             Self::Placement(..) | Self::Node => {
                 &[("translate", &[3]), ("rotate", &[3, 4]), ("scale", &[3, 1]), ("transform", &[16])]
             }
-            Self::Light(..) => &[
+            Self::Light(_, LightTable { kind: LightType::Point, .. }) => &[("position", &[3]), ("intensity", &[3, 1])],
+            Self::Light(_, LightTable { kind: LightType::Directional, .. }) => {
+                &[("direction", &[3]), ("irradiance", &[3, 1])]
+            }
+            Self::Light(_, LightTable { kind: LightType::Spot, .. }) => &[
                 ("position", &[3]),
                 ("direction", &[3]),
                 ("target", &[3]),
                 ("intensity", &[3, 1]),
-                ("irradiance", &[3, 1]),
                 ("cone", &[1]),
                 ("cutoff", &[1]),
             ],
