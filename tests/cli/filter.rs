@@ -490,6 +490,23 @@ fn a_denoised_render_is_the_filtered_file_and_keeps_its_samples() {
     complains(&merge("lost.exr"), 3, &["lost.exr", "was filtered (guided)", "before"]);
 }
 
+#[test]
+fn what_a_filter_took_is_told_beside_the_render() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/scene.toml");
+    let render = |more: &[&str]| {
+        let words = ["render", scene, "-o", "a.exr", "--width", "8", "--height", "8", "--spp", "1"];
+        stdout(&tallow(&folder, &[&words, more].concat()))
+    };
+    let seconds = |more: &[&str]| {
+        let told: serde_json::Value = serde_json::from_str(&render(&[&["--json"], more].concat())).unwrap();
+        told["filter_seconds"].as_f64().unwrap()
+    };
+    assert!(seconds(&["--denoise", "atrous"]) > 0.0 && seconds(&[]) == 0.0);
+    let first = |text: String| text.lines().next().unwrap().contains(", filtered in ");
+    assert!(first(render(&["--denoise", "atrous"])) && !first(render(&[])));
+}
+
 /// As other programs write it: one part, a view layer, half floats.
 #[test]
 fn the_noisy_image_stays_in_the_view_of_its_colour() {

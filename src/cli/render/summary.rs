@@ -43,8 +43,10 @@ pub struct Summary {
     pub load_seconds: f64,
     /// Wall time of the upload and of making pipelines.
     pub compile_seconds: f64,
-    /// Wall time of the render without loading and writing.
+    /// Wall time of the render without loading, filtering and writing.
     pub seconds: f64,
+    /// Wall time of `--denoise`, its pipelines made and its images moved; 0 without.
+    pub filter_seconds: f64,
     /// Name of the device.
     pub device: String,
     /// GPU time of all passes in milliseconds.
@@ -98,6 +100,7 @@ impl Outcome<'_> {
             load_seconds: host.seconds("load scene"),
             compile_seconds: host.seconds("upload and compile"),
             seconds: host.seconds("render"),
+            filter_seconds: host.seconds("denoise"),
             device: gpu.info().name.clone(),
             gpu_ms: status.times.iter().map(|pass| pass.duration_ns() as f64 * 1e-6).sum(),
             passes: table::summarise(&status.times),
@@ -121,8 +124,10 @@ pub fn report(args: &Args, summary: &Summary) -> Result<()> {
 
 fn text(s: &Summary) -> String {
     let speed = s.traced as f64 * 1e-6 / s.seconds.max(1e-9);
+    let filtered =
+        if s.filter_seconds > 0.0 { format!(", filtered in {:.2} s", s.filter_seconds) } else { String::new() };
     let mut text = format!(
-        "{} x {}, {} samples in {:.2} s ({speed:.2} Msamples/s) on {}; loaded in {:.2} s, compiled in {:.2} s\n",
+        "{} x {}, {} samples in {:.2} s ({speed:.2} Msamples/s) on {}; loaded in {:.2} s, compiled in {:.2} s{filtered}\n",
         s.width, s.height, s.traced, s.seconds, s.device, s.load_seconds, s.compile_seconds
     );
     if s.least_samples != s.most_samples {
