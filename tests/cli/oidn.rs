@@ -142,10 +142,11 @@ fn what_it_cannot_do_is_told() {
     complains(&with(&FAKE, &folder, &words), 2, &["--scene", "oidn"]);
 }
 
-/// Only where TALLOW_OIDN names Open Image Denoise itself.
+/// TALLOW_OIDN names Open Image Denoise itself.
 #[test]
+#[ignore = "needs TALLOW_OIDN"]
 fn the_library_itself_takes_noise_away_and_the_same_image_gives_the_same_bits() {
-    let Some(library) = std::env::var_os("TALLOW_OIDN") else { return };
+    let library = std::env::var_os("TALLOW_OIDN").expect("TALLOW_OIDN names the library");
     let folder = tempfile::tempdir().unwrap();
     let render = |spp: &str, file: &str, more: &[&str]| {
         let words = ["render", &scene(), "--quiet", "--width", "64", "--height", "64", "--spp", spp, "-o", file];
