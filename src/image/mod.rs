@@ -9,6 +9,7 @@ pub mod input;
 pub mod metrics;
 pub mod output;
 mod photo;
+pub(crate) mod primaries;
 pub mod significance;
 mod sorted_head;
 pub mod source;
@@ -97,8 +98,8 @@ pub fn check_writable(path: &Path) -> Result<()> {
     output::check(path)
 }
 
-/// Reads an EXR, PNG, JPEG or HDR file, recognised by its content, into linear values. Those of EXR and HDR are as they are stored, and
-/// count as Rec. 709 whatever primaries a file names.
+/// Reads an EXR, PNG, JPEG or HDR file, recognised by its content, into linear values. Those of EXR and HDR are as they are stored,
+/// whatever primaries a file names: pictures of a scene are brought to Rec. 709, films stay as they are.
 ///
 /// # Errors
 /// [`Error::Input`] when the file cannot be read, is of another kind, or is damaged; [`Error::Memory`].

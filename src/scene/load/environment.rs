@@ -14,7 +14,10 @@ pub fn load(path: &Path) -> Result<Picture> {
 /// [`load`] from bytes; `path` is for messages.
 fn decode(path: &Path, bytes: &[u8]) -> Result<Picture> {
     image::check_room(path, bytes)?;
-    image::decode(bytes).and_then(|film| film.picture(None)).map_err(|what| unusable(path, &what))
+    let picture = image::decode(bytes).and_then(|film| film.picture(None));
+    let mut picture = picture.map_err(|what| unusable(path, &what))?;
+    image::primaries::to_rec709(bytes, &mut picture);
+    Ok(picture)
 }
 
 /// The error for a damaged image.
@@ -25,6 +28,14 @@ pub fn unusable(path: &Path, what: &str) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn colours_are_those_of_rec_709() {
+        use crate::image::primaries::tests::{AP1, file};
+        let red = |primaries| decode(Path::new("a.exr"), &file(primaries, [4.0, 0.0, 0.0])).unwrap().pixels[0][0];
+        assert_eq!(red(None), 4.0);
+        assert!((red(Some(AP1)) - 6.8202).abs() < 1e-3, "{}", red(Some(AP1)));
+    }
 
     #[test]
     fn damage_is_one_line_with_a_remedy() {

@@ -2,7 +2,7 @@
 use super::find::find_file;
 use super::mapping::Mapping;
 use crate::error::{Error, Result};
-use crate::image::{BAND, bands, check_end, claim, contained, decode, holds_floats, input, picture};
+use crate::image::{BAND, bands, check_end, claim, contained, decode, holds_floats, input, picture, primaries};
 use crate::layout::{NONE, TEXTURE_FLOAT, TEXTURE_RGB9E5, TEXTURE_SRGB, Texture};
 use crate::math::rgb9e5;
 use crate::math::srgb::linear_from_srgb_f64;
@@ -263,8 +263,11 @@ fn fill_floats(space: &mut [u32], bytes: &[u8], size: [u32; 2], kind: Kind) -> s
     if [film.width, film.height] != size {
         return Err("its header says another size".to_owned());
     }
-    let (colour, alpha) = (film.picture(None)?.pixels, film.channel("A"));
-    for (i, (texel, rgb)) in space.iter_mut().zip(colour).enumerate() {
+    let (mut colour, alpha) = (film.picture(None)?, film.channel("A"));
+    if matches!(kind, Kind::Color | Kind::Light) {
+        primaries::to_rec709(bytes, &mut colour);
+    }
+    for (i, (texel, rgb)) in space.iter_mut().zip(colour.pixels).enumerate() {
         *texel = kind.word(rgb, alpha.map(|alpha| alpha.at(i)));
     }
     Ok(())

@@ -47,6 +47,16 @@ fn channels_are_picked_by_kind() {
 }
 
 #[test]
+fn colours_are_those_of_rec_709_and_numbers_stay_as_they_are() {
+    use primaries::tests::{AP1, file};
+    for (kind, expected) in [(Kind::Color, 0.68667), (Kind::Light, 0.68667), (Kind::Data, 0.5)] {
+        let found = decode(&file(Some(AP1), [0.5, 0.25, 0.125]), "a.exr", kind).unwrap();
+        let red = rgb9e5::unpack(found.texels[0])[0];
+        assert!((red - expected).abs() < 0.002, "{kind:?}: {red}");
+    }
+}
+
+#[test]
 fn damage_is_an_error_with_the_file() {
     let whole = png(40, 40, &[7; 4800]);
     for bytes in [&whole[..whole.len() / 2], &whole[..20], b"not a picture"] {
