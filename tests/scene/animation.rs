@@ -224,19 +224,24 @@ fn mistakes_are_one_line_with_the_table_and_the_key() {
 #[test]
 fn corners_of_faces_are_followed_through_files() {
     let folder = tempfile::tempdir().unwrap();
-    let obj = |x: f32, normals: &str, face: &str| {
-        format!("v 0 0 0\nv 1 0 0\nv {x} {x} 0\nv 0 1 0\n{normals}vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf {face}\n")
+    let obj = |x: f32, normals: &str, faces: &str| {
+        format!("v 0 0 0\nv 1 0 0\nv {x} {x} 0\nv 0 1 0\nv -1 1 0\n{normals}{faces}\n")
     };
-    let two = obj(1.0, "vn 0 0 1\nvn 0 .6 .8\n", "1/1/1 2/2/2 3/3/1 4/4/2");
-    let one = obj(0.25, "vn 0 0 1\n", "1/1/1 2/2/1 3/3/1 4/4/1");
-    let ply = |x: f32, face: &str| {
-        let rows = format!("0 0 0\n1 0 0\n{x} {x} 0\n0 1 0\n0 1 0\n");
+    let two = obj(1.0, "vn 0 0 1\nvn 0 .6 .8\n", "f 1//1 2//1 3//1 4//1\nf 4//2 3//2 5//2");
+    let one = obj(0.25, "vn 0 0 1\n", "f 1//1 2//1 3//1 4//1\nf 4//1 3//1 5//1");
+    let ply = |x: f32, faces: &str| {
+        let rows = format!("0 0 0\n1 0 0\n{x} {x} 0\n0 1 0\n-1 1 0\n0 1 0\n");
         format!(
-            "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n\
-             property list uchar int vertex_indices\nend_header\n{rows}{face}\n"
+            "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\nelement face 2\n\
+             property list uchar int vertex_indices\nend_header\n{rows}{faces}\n"
         )
     };
-    let files = [("0.obj", two), ("1.obj", one), ("0.ply", ply(1.0, "4 0 1 2 3")), ("1.ply", ply(0.25, "4 0 1 2 4"))];
+    let files = [
+        ("0.obj", two),
+        ("1.obj", one),
+        ("0.ply", ply(1.0, "4 0 1 2 3\n3 3 2 4")),
+        ("1.ply", ply(0.25, "4 0 1 2 5\n3 3 2 4")),
+    ];
     for (name, text) in files {
         fs::write(folder.path().join(name), text).unwrap();
     }
@@ -250,7 +255,8 @@ fn corners_of_faces_are_followed_through_files() {
             let mut triangles = loaded.scene.triangles.clone();
             triangles.sort_by_key(|t| t.primitive);
             let corners: Vec<_> = triangles.iter().map(|t| [t.v0, t.v1, t.v2].map(|v| [v[0], v[1]])).collect();
-            let expected = [[[0.0, 0.0], [1.0, 0.0], [x, x]], [[0.0, 0.0], [x, x], [0.0, 1.0]]];
+            let square = [[[0.0, 0.0], [1.0, 0.0], [x, x]], [[0.0, 0.0], [x, x], [0.0, 1.0]]];
+            let expected = [square[0], square[1], [[0.0, 1.0], [x, x], [-1.0, 1.0]]];
             assert_eq!(corners, expected, "{ending} at {seconds} s");
         }
     }
