@@ -124,7 +124,6 @@ impl Variant {
         let cost = Cost { gpu_ms: f64::INFINITY, compile_ms: created, bytes: gpu.allocated_bytes() };
         let mut variant = Self { renderer, frame: FrameResources::new(&gpu)?, cost };
         let first = variant.run()?;
-        variant.cost.gpu_ms = f64::INFINITY;
         variant.cost.compile_ms += (first - variant.run()?).max(0.0);
         Ok(variant)
     }
@@ -132,9 +131,7 @@ impl Variant {
     /// Renders once and returns the GPU time in milliseconds.
     fn run(&mut self) -> Result<f64> {
         let times = Job::new(&self.renderer).run_to_end(&mut self.frame)?.times;
-        let ms = times.iter().map(PassTime::duration_ns).sum::<u64>() as f64 * 1e-6;
-        self.cost.gpu_ms = self.cost.gpu_ms.min(ms);
-        Ok(ms)
+        Ok(times.iter().map(PassTime::duration_ns).sum::<u64>() as f64 * 1e-6)
     }
 }
 
@@ -191,8 +188,11 @@ fn rows(args: &Args) -> Result<Vec<EffectRow>> {
     Ok(rows)
 }
 
-/// Times that each variant runs beside the usual one.
-const RUNS: usize = 4;
+/// Times that each variant runs beside the usual one, at least and at most: where other programs use the machine, until its two
+/// least times are [`ALIKE`].
+const RUNS: [usize; 2] = [4, 40];
+/// Times that differ by less than this share.
+const ALIKE: f64 = 0.02;
 /// Pixels that are enough to compare costs: where processors render, a quarter of what fills a graphics card.
 const PIXELS_BY_KIND: [f64; 2] = [16_384.0, 65_536.0];
 
@@ -214,12 +214,20 @@ fn beside(usual: &mut Variant, other: impl Fn() -> Result<Variant>) -> Result<(C
         found = other()?;
         found.cost.compile_ms = found.cost.compile_ms.min(first);
     }
-    (usual.cost.gpu_ms, found.cost.gpu_ms) = (f64::INFINITY, f64::INFINITY);
-    for _ in 0..RUNS {
-        usual.run()?;
-        found.run()?;
+    let mut times = [Vec::new(), Vec::new()];
+    while times[0].len() < RUNS[0] || times[0].len() < RUNS[1] && !times.iter_mut().all(|ms| is_settled(ms)) {
+        times[0].push(usual.run()?);
+        times[1].push(found.run()?);
     }
+    let [usual_ms, found_ms] = times.map(|ms| ms.into_iter().fold(f64::INFINITY, f64::min));
+    (usual.cost.gpu_ms, found.cost.gpu_ms) = (usual_ms, found_ms);
     Ok((usual.cost, found.cost))
+}
+
+/// Whether the two least times are alike: one alone may be chance.
+fn is_settled(ms: &mut [f64]) -> bool {
+    ms.sort_by(f64::total_cmp);
+    ms[1] - ms[0] <= ALIKE * ms[0]
 }
 
 /// Bytes of the scene's records that only this effect reads. Every new effect needs an entry here.
