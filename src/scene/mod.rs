@@ -77,7 +77,7 @@ pub struct Scene {
     pub texels: Vec<u32>,
     /// Lights; without any, paths see only the emission that they hit.
     pub lights: Vec<Light>,
-    /// Alias table over `lights`, in proportion to power; same length.
+    /// Alias table over `lights`, by power, see `scene/build/lights.rs`; same length.
     pub light_table: Vec<AliasEntry>,
     /// For emissive triangles, `Light::probability / area = Material::emission_weight * triangle_pdf_scale`: the density
     /// per square world unit of drawing a point by [`Scene::light_table`] that a path has hit otherwise. 0 without

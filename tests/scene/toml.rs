@@ -160,6 +160,31 @@ fn one_constant_turns_emission_into_the_density_of_every_emissive_triangle() {
     assert_eq!(by_kind(LIGHT_DIRECTIONAL).b, [0.0, -1.0, 0.0]);
 }
 
+/// The power of a sky grows with the ground, while a lamp is as bright near itself; a sky in which a lamp outshines all is not forgotten either.
+#[test]
+fn neither_lamps_nor_lights_at_infinity_are_chosen_by_hardly_any_sample() {
+    let scene = |scale: f32, sky: f32, sun: f32| {
+        let ground = format!("[[mesh]]\nshape = \"rectangle\"\ntransform = {{ scale = {scale} }}\n");
+        let sun = format!("[[light]]\ntype = \"directional\"\ndirection = [0, 0, -1]\nirradiance = {sun}\n");
+        parse(&format!("{BOX}{ground}{}[environment]\nradiance = {sky}", if scale > 1.0 { &sun } else { "" })).unwrap()
+    };
+    let near = |l: &Light| matches!(l.kind, LIGHT_TRIANGLE | LIGHT_POINT);
+    let share = |scene: &Loaded| scene.lights.iter().filter(|l| near(l)).map(|l| l.probability).sum::<f32>();
+    let close = |a: f32, b: f32| (a - b).abs() < 1e-5;
+    assert!(close(share(&scene(1e4, 0.1, 1.0)), 0.25) && close(share(&scene(1.0, 1e-6, 0.0)), 0.75));
+    let even = share(&scene(1.0, 0.1, 0.0));
+    assert!((0.3..0.7).contains(&even), "control: shares between are as power has them: {even}");
+    // Among those at infinity power decides, and the density of lamps follows.
+    let wide = scene(1e4, 0.1, 1.0);
+    let [sun, sky] = [LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT]
+        .map(|kind| wide.lights.iter().find(|l| l.kind == kind).unwrap().probability);
+    assert!((sun / sky / (8.0 * 1.0 / (4.0 * std::f32::consts::PI * 0.1)) - 1.0).abs() < 1e-4, "{sun} {sky}");
+    for l in wide.lights.iter().filter(|l| l.kind == LIGHT_TRIANGLE) {
+        let density = wide.materials[l.material as usize].emission_weight * wide.triangle_pdf_scale;
+        assert!((l.probability / area(l) / density - 1.0).abs() < 2e-5);
+    }
+}
+
 #[test]
 fn small_dim_lamps_have_a_density() {
     let small =
