@@ -6,7 +6,11 @@ struct LightSample {
     float distance; // to the offset point on the light, world units; huge for lights at infinity
     vec3 radiance;  // already divided by the probability of the sample
     float pdf;      // per solid angle, for MIS; 0 for lights that no BSDF sample can hit
+    bool sharp;     // of a light without extent that nearly every sample chooses: sharp shadows, and little noise
 };
+
+// A light without extent that is chosen less often brings the noise of that choice: a filter takes it with what is soft.
+const float SHARP_PROBABILITY = 0.7;
 
 // The slot of an alias table of `n` that the word `random` chooses.
 uint alias_slot(uint n, uint random) {
@@ -200,10 +204,11 @@ void sample_sphere_light(vec3 p, Light light, vec2 u, inout LightSample s) {
 
 // Samples one light for the surface point `p`. The radiance is 0 when the light cannot reach the point.
 LightSample light_sample(vec3 p, uint word, vec2 u) {
-    LightSample s = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0);
+    LightSample s = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, false);
     uint count = push.constants.light_count, index = 0u;
     if (count != 1u) index = alias_choose(AliasEntry_load(light_table, alias_slot(count, word)), count, word);
     Light light = Light_load(lights, index);
+    bool often = light.probability >= SHARP_PROBABILITY;
     if (FX_EMISSIVE && (light.kind == LIGHT_TRIANGLE || light.kind == LIGHT_MIRRORED)) {
         sample_triangle_light(p, light, u, s);
     } else if (FX_EMISSIVE && FX_SPHERES && light.kind == LIGHT_SPHERE) {
@@ -214,6 +219,7 @@ LightSample light_sample(vec3 p, uint word, vec2 u) {
         s.distance = sqrt(d2);
         s.direction = to_light / s.distance;
         s.radiance = light.value / (d2 * light.probability);
+        s.sharp = often;
         if (FX_SPOT && light.kind == LIGHT_SPOT) { // smooth fall-off between the two angles, linear in the angle
             float angle = acos(clamp(-dot(light.b, s.direction), -1.0, 1.0));
             float full = acos(light.c.x), cut = acos(light.c.y);
@@ -223,6 +229,7 @@ LightSample light_sample(vec3 p, uint word, vec2 u) {
         s.direction = -light.b;
         s.distance = INFINITE_DISTANCE;
         s.radiance = light.value / light.probability;
+        s.sharp = often;
     } else if (FX_ENVIRONMENT && light.kind == LIGHT_ENVIRONMENT) {
         sample_environment(index, light.probability, word, u, s);
     }

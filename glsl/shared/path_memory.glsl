@@ -42,7 +42,7 @@ void save_hit(uint i, Hit hit) {
 
 void save_path(uint i, PathState p, Departure d) {
     uint state = (d.shadowed ? SHADOWED : 0u) | (d.alive ? ALIVE : 0u) | (p.path.delta ? SMOOTH : 0u) | (p.chosen ? CHOSEN : 0u) |
-                 (d.delta ? SHARP : 0u) | min(p.scattered, 2u) << SCATTERED_AT | p.bounce << BOUNCE_AT;
+                 (d.sharp ? SHARP : 0u) | min(p.scattered, 2u) << SCATTERED_AT | p.bounce << BOUNCE_AT;
     keep(ORIGIN, i, p.path.origin, floatBitsToUint(p.path.bsdf_pdf));
     keep(DIRECTION, i, p.path.direction, floatBitsToUint(p.path.eta_scale));
     keep(THROUGHPUT, i, p.path.throughput, state);
@@ -79,7 +79,7 @@ PathState saved_path(uint i, out Departure d) {
     d.sampled = kept(SAMPLED, i, p.any_rays);
     d.shadowed = (state & SHADOWED) != 0u;
     d.alive = (state & ALIVE) != 0u;
-    d.delta = (state & SHARP) != 0u;
+    d.sharp = (state & SHARP) != 0u;
     return p;
 }
 

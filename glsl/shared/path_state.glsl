@@ -27,9 +27,9 @@ void add_light(inout SplitLight sum, vec3 light, uint kind) {
 
 // What light is that comes to a path by way of `scattered` surfaces that are not smooth. Smooth ones show light as it is, with
 // noise where `chosen`: where the path took one of two ways.
-uint kind_of_light(uint scattered, bool delta, bool chosen) {
+uint kind_of_light(uint scattered, bool sharp, bool chosen) {
     if (scattered == 0u) return chosen ? SOFT : DIRECT;
-    return scattered >= 2u ? INDIRECT : delta ? DIRECT : SOFT;
+    return scattered >= 2u ? INDIRECT : sharp ? DIRECT : SOFT;
 }
 
 // Clamps the largest channel of a whole sample, not of each bounce: the limit is that of the values which a pixel averages.
@@ -58,7 +58,7 @@ struct Departure {
     Segment shadow;
     vec3 sampled;
     bool shadowed;
-    bool delta; // a light without extent, which alone brings sharp shadows
+    bool sharp; // of a light that brings sharp shadows and little noise
     bool alive;
 };
 
@@ -79,8 +79,8 @@ Segment next_segment(PathState p) {
 }
 
 // Adds what was sampled at the surface that the path has left, where nothing blocks it.
-void add_sampled(inout PathState p, vec3 sampled, bool lit, bool delta) {
-    add_light(p.light, lit ? sampled : vec3(0.0), kind_of_light(p.scattered, delta, p.chosen));
+void add_sampled(inout PathState p, vec3 sampled, bool lit, bool sharp) {
+    add_light(p.light, lit ? sampled : vec3(0.0), kind_of_light(p.scattered, sharp, p.chosen));
 }
 
 // The light of a path that has ended.

@@ -30,10 +30,10 @@ vec3 light_from_hit(Path path, Surface s, float t) {
 // Direct light at `s` by light sampling, which counts if nothing blocks `shadow`; where it is 0, no ray is needed. The columns
 // of `basis` are the shading frame.
 vec3 light_from_nee(Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sampler random, uint pair, uint mask_seed,
-                    out Segment shadow, out bool delta) {
+                    out Segment shadow, out bool sharp) {
     uint word = sample_2d_bits(random, pair + PAIR_CHOICE).x;
     LightSample light = light_sample(s.position, word, sample_2d(random, pair + PAIR_LIGHT));
-    delta = light.pdf == 0.0;
+    sharp = light.sharp;
     vec3 wi = light.direction * basis; // row vector times matrix: into the frame
     vec4 f = bsdf_evaluate(bsdf, wo, wi);
     f.rgb *= light_share(s, facing, light.direction, wi.z);
@@ -100,13 +100,13 @@ Departure leave(inout PathState p, Surface s, bool going, Sampler random) {
         p.albedo = min(p.path.throughput, vec3(1.0)) * (p.chosen ? vec3(1.0) : bsdf_albedo(bsdf, wo.z)); // roulette may exceed 1
     }
     uint seed = shadow_mask_seed(p.seed, p.bounce);
-    d.sampled = p.path.throughput * light_from_nee(s, bsdf, facing, basis, wo, random, pair, seed, d.shadow, d.delta);
+    d.sampled = p.path.throughput * light_from_nee(s, bsdf, facing, basis, wo, random, pair, seed, d.shadow, d.sharp);
     d.shadowed = going && push.constants.light_count > 0u && !smooth_here && max(d.sampled.r, max(d.sampled.g, d.sampled.b)) > 0.0;
     d.alive = scatter(p.path, s, bsdf, facing, basis, wo, random, pair) && going;
     p.scattered += smooth_here ? 0u : 1u;
-    // From here on comes nothing but what a filter takes; with FX_SOFT already from the first surface, but for its delta lights.
+    // From here on comes nothing but what a filter takes; with FX_SOFT already from the first surface, but for what is sharp there.
     bool ends = FX_SPARSE && p.sharp_only && p.scattered > (FX_SOFT ? 0u : 1u);
-    d.shadowed = d.shadowed && (!ends || (FX_SOFT && d.delta));
+    d.shadowed = d.shadowed && (!ends || (FX_SOFT && d.sharp));
     d.alive = d.alive && !ends;
     bool roulette = FX_ROULETTE && push.constants.roulette_depth > 0u && p.bounce + 1u >= push.constants.roulette_depth;
     if (roulette) d.alive = survives_roulette(p.path, random, pair) && d.alive;

@@ -30,7 +30,7 @@ void main() {
     Departure d;
     PathState p = saved_path(i, d);
     p.sharp_only = FX_SPARSE && !is_traced_whole(pixel);
-    add_sampled(p, d.sampled, d.shadowed, d.delta);
+    add_sampled(p, d.sampled, d.shadowed, d.sharp);
     Surface s;
     bool going = d.alive && arrive(p, s);
     if (going) d = leave(p, s, true, path_sampler(pixel, index));

@@ -51,8 +51,8 @@ pub struct Args {
     /// Print how far the image is from this one, before and after
     #[arg(long, value_name = "FILE")]
     pub reference: Option<PathBuf>,
-    /// Light to filter, where the file holds direct light apart (Tallow's own do) [default: all, but indirect where point,
-    /// spot or directional lights cast sharp shadows]
+    /// Light to filter, where the file holds direct light apart (Tallow's own do) [default: all, but indirect where
+    /// direct light holds no noise of lamps, sky, or a choice among lights]
     #[arg(long, value_enum, conflicts_with = "no_demodulate")]
     pub light: Option<Light>,
     /// Filter the colour as it is: textures blur too

@@ -40,8 +40,8 @@ impl Holds {
         }
     }
 
-    /// What is best kept away from a filter: direct light of delta lights, whose shadows are sharp and no guide shows them. Lamps and
-    /// skies leave noise in direct light: where it holds any of theirs, it is filtered with all the rest.
+    /// What is best kept away from a filter: direct light of a delta light that most samples choose, whose shadows are sharp and no
+    /// guide shows them. Other lights leave noise in direct light: where it holds any of theirs, it is filtered with all the rest.
     pub fn usual_demodulation(&self) -> Demodulation {
         self.demodulation(if self.sharp_direct { Demodulation::Light } else { Demodulation::Albedo })
     }

@@ -36,7 +36,7 @@ gpu_structs! {
 
     /// Running means of one pixel that the filters read; the count is that of its [`PixelStats`]. 2 texels.
     struct PixelLight {
-        /// Radiance that needs no filter: emission that is seen, and direct light (with FX_SOFT that of delta lights alone).
+        /// Radiance that needs no filter: emission that is seen, and direct light (with FX_SOFT that of a delta light that most samples choose).
         direct: vec3,
         /// Sum of squared deviations of the luminance of all other light, as [`PixelStats::m2`].
         indirect_m2: float,

@@ -311,9 +311,13 @@ impl Scene {
         SceneFile::of(path, description).load()
     }
 
-    /// Whether lamps or a sky shine: they have an extent, and their shadows are soft. Point, spot and directional lights have none.
+    /// Whether some light may bring noise to what is lit by it alone: lamps and a sky, which have an extent, and one of several point, spot
+    /// and directional lights, of which a sample chooses one.
     pub fn has_soft_lights(&self) -> bool {
-        !self.lights.iter().all(|light| matches!(light.kind, LIGHT_POINT | LIGHT_SPOT | LIGHT_DIRECTIONAL))
+        let delta = |light: &&Light| matches!(light.kind, LIGHT_POINT | LIGHT_SPOT | LIGHT_DIRECTIONAL);
+        let count = |lights: &[Light]| lights.iter().filter(delta).count();
+        // Those that are dark now are in the rig.
+        count(&self.lights) < self.lights.len() || count(&self.lights).max(count(&self.rig.lights)) > 1
     }
 
     /// A scene from memory: the tables of a scene file, whose meshes, textures and environment may be data. What files they

@@ -3,7 +3,7 @@ use crate::layout::*;
 use crate::math::hash::pcg;
 use crate::math::warp::{basis_from_normal, warp_cone, warp_sphere, warp_triangle};
 use crate::scene::{Environment, Scene};
-use crate::shaders::shared::light::{MAX_SOLID_ANGLE, MIN_SOLID_ANGLE};
+use crate::shaders::shared::light::{MAX_SOLID_ANGLE, MIN_SOLID_ANGLE, SHARP_PROBABILITY};
 use crate::twins::scene::texture_coordinates;
 use crate::twins::surface::{Surface, plane_clearance, unit_vector};
 use crate::twins::texture::{surface_opacity, texture_sample, vertex_color};
@@ -21,6 +21,8 @@ pub struct LightSample {
     pub radiance: Vec3,
     /// Density per solid angle; 0 for lights that no BSDF sample can hit.
     pub pdf: f32,
+    /// Whether it is of a light without extent that nearly every sample chooses: sharp shadows, and little noise.
+    pub sharp: bool,
 }
 
 pub use crate::shaders::shared::segment::INFINITE_DISTANCE;
@@ -97,7 +99,7 @@ fn sample_environment(scene: &Scene, light: &Light, word: u32, u: Vec2) -> Light
         }
     };
     let radiance = if pdf > 0.0 { radiance / pdf } else { Vec3::ZERO };
-    LightSample { direction, distance: INFINITE_DISTANCE, radiance, pdf }
+    LightSample { direction, distance: INFINITE_DISTANCE, radiance, pdf, sharp: false }
 }
 
 /// A triangle seen from a point: unit vectors to its corners, and its solid angle in steradians.
@@ -169,7 +171,7 @@ fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> Ligh
         false => light.probability * 2.0 * d2 / (cosine * doubled_area),
     };
     let pdf = if lit { density } else { 0.0 };
-    LightSample { direction, distance, radiance: if lit { radiance / pdf } else { Vec3::ZERO }, pdf }
+    LightSample { direction, distance, radiance: if lit { radiance / pdf } else { Vec3::ZERO }, pdf, sharp: false }
 }
 
 /// 1 - cosine of half the angle that a sphere takes up, seen from outside; 0 from inside.
@@ -193,7 +195,17 @@ fn sample_sphere_light(light: &Light, p: Vec3, u: Vec2) -> LightSample {
     let direction = to_light / distance;
     let lit = cap > 0.0 && distance > 0.0 && n.dot(direction) < 0.0;
     let pdf = if lit { light.probability / (2.0 * PI * cap) } else { 0.0 };
-    LightSample { direction, distance, radiance: if lit { Vec3::from(light.value) / pdf } else { Vec3::ZERO }, pdf }
+    LightSample {
+        direction,
+        distance,
+        radiance: if lit { Vec3::from(light.value) / pdf } else { Vec3::ZERO },
+        pdf,
+        sharp: false,
+    }
+}
+
+fn is_sharp(light: &Light) -> bool {
+    light.probability >= SHARP_PROBABILITY
 }
 
 fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
@@ -207,7 +219,7 @@ fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
         let (full, cut) = (light.c[0].acos(), light.c[1].acos());
         radiance *= ((cut - angle) / (cut - full).max(1e-6)).clamp(0.0, 1.0);
     }
-    LightSample { direction, distance, radiance, pdf: 0.0 }
+    LightSample { direction, distance, radiance, pdf: 0.0, sharp: is_sharp(light) }
 }
 
 /// One light for the surface point `p`. Radiance is 0 when the light cannot reach the point.
@@ -223,6 +235,7 @@ pub fn light_sample(scene: &Scene, p: Vec3, word: u32, u: Vec2) -> LightSample {
             distance: INFINITE_DISTANCE,
             radiance: Vec3::from(light.value) / light.probability,
             pdf: 0.0,
+            sharp: is_sharp(light),
         },
         _ => sample_environment(scene, light, word, u),
     }

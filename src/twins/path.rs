@@ -60,11 +60,11 @@ enum Kind {
 }
 
 /// As `kind_of_light` of the kernel.
-fn kind_of_light(seen: &Seen, delta: bool) -> Kind {
+fn kind_of_light(seen: &Seen, sharp: bool) -> Kind {
     match seen.scattered {
         0 if seen.chosen => Kind::Soft,
         0 => Kind::Direct,
-        1 if delta => Kind::Direct,
+        1 if sharp => Kind::Direct,
         1 => Kind::Soft,
         _ => Kind::Indirect,
     }
@@ -170,7 +170,7 @@ impl Tracer<'_> {
         surface_emission(self.scene, s) * weight
     }
 
-    /// The light, and whether it is of a delta light; `None` where no shadow ray is needed.
+    /// The light, and whether it is sharp; `None` where no shadow ray is needed.
     fn light_from_nee(&self, p: &Shade, random: Sampler, mask_seed: u32) -> Option<(Vec3, bool)> {
         let s = &p.surface;
         let word = sample_2d_bits(random, p.pair + PAIR_CHOICE)[0];
@@ -193,7 +193,7 @@ impl Tracer<'_> {
             distance = SHADOW_END;
         }
         let blocker = traverse_from(self.scene, p.from, origin, direction, distance, true, mask_seed);
-        Some((if blocker.any() { Vec3::ZERO } else { contribution }, light.pdf == 0.0))
+        Some((if blocker.any() { Vec3::ZERO } else { contribution }, light.sharp))
     }
 
     fn scatter(&self, path: &mut Path, p: &Shade, random: Sampler) -> bool {
@@ -268,10 +268,10 @@ impl Tracer<'_> {
             let ends = sharp_only && seen.scattered > u32::from(!soft);
             if self.frame.path.light_count > 0 && !smooth_here {
                 let light = self.light_from_nee(&p, random, mask_seed.wrapping_add(1));
-                let light = light.filter(|&(_, delta)| !ends || (soft && delta));
+                let light = light.filter(|&(_, sharp)| !ends || (soft && sharp));
                 rays += u32::from(light.is_some());
-                let (light, delta) = light.unwrap_or_default();
-                self.add_light(&mut sum, path.throughput * light, kind_of_light(&seen, delta));
+                let (light, sharp) = light.unwrap_or_default();
+                self.add_light(&mut sum, path.throughput * light, kind_of_light(&seen, sharp));
             }
             if !self.scatter(&mut path, &p, random) || ends {
                 break;

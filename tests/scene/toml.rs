@@ -160,6 +160,22 @@ fn one_constant_turns_emission_into_the_density_of_every_emissive_triangle() {
     assert_eq!(by_kind(LIGHT_DIRECTIONAL).b, [0.0, -1.0, 0.0]);
 }
 
+#[test]
+fn one_of_several_lights_without_extent_is_noisy_and_one_alone_is_not() {
+    let light = |watts: f32| format!("[[light]]\ntype = \"point\"\nposition = [0, 1, 1]\nintensity = {watts}\n");
+    let scene = |lights: &[f32], more: &str| {
+        let lights: String = lights.iter().map(|&watts| light(watts)).collect();
+        parse(&format!("[camera]\nposition = [0, 0, 5]\n{lights}[[mesh]]\nshape = \"rectangle\"\n{more}")).unwrap()
+    };
+    assert!(!scene(&[1.0], "").has_soft_lights());
+    assert!(scene(&[1.0, 1.0], "").has_soft_lights());
+    assert!(
+        scene(&[1.0, 0.0], "").has_soft_lights() && scene(&[0.0, 0.0], "").has_soft_lights(),
+        "they may come to shine"
+    );
+    assert!(scene(&[1.0], "[environment]\nradiance = 1\n").has_soft_lights());
+}
+
 /// The power of a sky grows with the ground, while a lamp is as bright near itself; a sky in which a lamp outshines all is not forgotten either.
 #[test]
 fn neither_lamps_nor_lights_at_infinity_are_chosen_by_hardly_any_sample() {

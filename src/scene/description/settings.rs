@@ -49,8 +49,8 @@ choices! {
     pub enum Split {
         /// `indirect` holds light of two bounces and more, over the albedo of what is seen first.
         Indirect,
-        /// `indirect` also holds what lamps and sky bring directly, which is noisy; `direct` the emission that is seen and what
-        /// point, spot and directional lights bring, whose shadows are sharp.
+        /// `indirect` also holds what lamps and sky bring directly, which is noisy; `direct` the emission that is seen and what a point, spot
+        /// or directional light brings that most samples choose: its shadows are sharp, and it is free of noise.
         #[default]
         Soft,
     }
