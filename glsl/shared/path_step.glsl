@@ -23,8 +23,11 @@ vec3 light_from_miss(Path path) {
 
 vec3 light_from_hit(Path path, Surface s, float t) {
     float cosine = -dot(s.geometric, path.direction);
-    float weight = path.delta ? 1.0 : balance(path.bsdf_pdf, triangle_light_pdf(s, path.origin, t, cosine));
-    return FX_EMISSIVE && cosine > 0.0 ? surface_emission(s) * weight : vec3(0.0);
+    // Light sampling does not choose what shines from behind: of a closed lamp, as many are in glTF files, that is its inside.
+    bool front = cosine > 0.0, shines = front || (s.flags & MATERIAL_EMITS_BEHIND) != 0u;
+    bool certain = path.delta || !front;
+    float weight = certain ? 1.0 : balance(path.bsdf_pdf, triangle_light_pdf(s, path.origin, t, cosine));
+    return FX_EMISSIVE && shines ? surface_emission(s) * weight : vec3(0.0);
 }
 
 // Direct light at `s` by light sampling, which counts if nothing blocks `shadow`; where it is 0, no ray is needed. The columns

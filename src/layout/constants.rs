@@ -40,6 +40,8 @@ constants! {
     MATERIAL_NONLINEAR: uint = 16;
     /// [`Material::flags`]: the colours of vertices multiply `emission`.
     MATERIAL_UNLIT: uint = 32;
+    /// [`Material::flags`]: it shines from behind, too, which light sampling does not choose.
+    MATERIAL_EMITS_BEHIND: uint = 64;
     /// [`PathConstants::pixel_filter`]: uniform over the pixel.
     PIXEL_FILTER_BOX: uint = 0;
     /// [`PathConstants::pixel_filter`]: triangle of radius 1 pixel.

@@ -1,5 +1,7 @@
 //! Twin of `glsl/trace/path.comp` and of `glsl/shared/path_step.glsl`.
-use crate::layout::{BSDF_DIELECTRIC, Effects, FrameConstants, NONE, PathConstants, SurfacePoint};
+use crate::layout::{
+    BSDF_DIELECTRIC, Effects, FrameConstants, MATERIAL_EMITS_BEHIND, NONE, PathConstants, SurfacePoint,
+};
 use crate::math::hash::pcg;
 use crate::scene::Scene;
 use crate::shaders::shared::path_step::{
@@ -163,7 +165,8 @@ impl Tracer<'_> {
     fn light_from_hit(&self, path: &Path, s: &Surface, t: f32) -> Vec3 {
         let cosine = -s.geometric.dot(path.direction);
         if cosine <= 0.0 {
-            return Vec3::ZERO;
+            let behind = self.scene.materials[s.material as usize].flags & MATERIAL_EMITS_BEHIND != 0;
+            return if behind { surface_emission(self.scene, s) } else { Vec3::ZERO };
         }
         let pdf = triangle_light_pdf(self.scene, s, path.origin, t, cosine);
         let weight = if path.delta { 1.0 } else { self.balance(path.bsdf_pdf, pdf, Strategy::Bsdf) };

@@ -187,3 +187,19 @@ fn rough_sheets_show_what_single_scattering_leaves_of_a_white_sky() {
         assert!((mean - smoother).abs() > tolerance, "control: {degrees} degrees, {material}");
     }
 }
+
+/// Inside a cube that faces outward, emits E = 1 to both sides and reflects rho = 0.5, radiance after d = 4 edges is
+/// E (1 - rho^d) / (1 - rho) = 1.875, in every sample: light sampling chooses nothing that shines from behind.
+#[test]
+fn what_shines_from_behind_lights_what_lies_there() {
+    let inside = |more: &str| {
+        rendered(&Workplace::new().scene(&format!(
+            "[film]\nwidth = {SIDE}\nheight = {SIDE}\n[camera]\nposition = [0.1, 0.2, 0.3]\ntarget = [0.4, -0.3, -0.5]\nfov = 90.0\n\
+             [render]\nspp = 2\nmax_depth = 4\n[[material]]\nname = 'glow'\ncolor = 0.5\nemission = 1.0\n{more}\n\
+             [[mesh]]\nshape = 'cube'\nmaterial = 'glow'\n"
+        )))
+    };
+    let both = inside("emission_two_sided = true");
+    assert!(both.iter().all(|s| s.mean.iter().all(|v| (v - 1.875).abs() < 1e-5)), "{:?}", both[0]);
+    assert!(inside("").iter().all(|s| s.mean == [0.0; 3]), "control: the front alone");
+}

@@ -2,7 +2,9 @@
 use crate::gltf_file::{data, floats, glb, triangle, triangle_bytes};
 use serde_json::{Value, json};
 use std::path::PathBuf;
-use tallow::layout::{ATTRIBUTE_TANGENTS, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT};
+use tallow::layout::{
+    ATTRIBUTE_TANGENTS, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, MATERIAL_EMITS_BEHIND,
+};
 use tallow::scene::{Loaded, Scene, SceneFile};
 
 fn save(bytes: &[u8], name: &str) -> (tempfile::TempDir, PathBuf) {
@@ -244,6 +246,18 @@ fn cameras_are_chosen_by_name() {
     assert_eq!((flat.orthographic, flat.right, flat.up), (1, [4.0, 0.0, 0.0], [0.0, 2.0, 0.0]));
     file.look_through("camera 0").unwrap();
     assert_eq!(file.load().unwrap().camera([8, 8]).unwrap().position, [9.0, 0.0, 0.0]);
+}
+
+#[test]
+fn what_shines_from_behind_is_double_sided_or_unlit() {
+    let behind = |material: serde_json::Value| {
+        let mut json = triangle();
+        json["materials"][0] = material;
+        load(&json).materials[0].flags & MATERIAL_EMITS_BEHIND != 0
+    };
+    assert!(behind(json!({ "emissiveFactor": [1, 1, 1], "doubleSided": true })));
+    assert!(behind(json!({ "extensions": { "KHR_materials_unlit": {} } })));
+    assert!(!behind(json!({ "emissiveFactor": [1, 1, 1] })) && !behind(json!({ "doubleSided": true })));
 }
 
 #[test]

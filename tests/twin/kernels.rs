@@ -103,7 +103,7 @@ fn spheres() -> Loaded {
         .picture("bumps.png", 32, bumps);
     let mut scene = place.scene(
         "[camera]\nposition = [0.0, 1.4, 5.0]\ntarget = [0.0, 0.7, 0.0]\nfov = 45.0\n[render]\nmax_depth = 4\n\
-         [environment]\nradiance = 0.3\n[[material]]\nname = 'lamp'\nemission = 9.0\n\
+         [environment]\nradiance = 0.3\n[[material]]\nname = 'lamp'\nemission = 9.0\nemission_two_sided = true\n\
          [[material]]\nname = 'glass'\ntype = 'dielectric'\n[[material]]\nname = 'bumpy'\ntype = 'coated'\nalpha = 0.2\n\
          color_texture = 'checks.png'\nbump = 'checks.png'\nbump_scale = 0.05\n\
          [[material]]\nname = 'mapped'\nnormal_map = 'bumps.png'\nopacity = 0.8\nopacity_texture = 'checks.png'\n\

@@ -100,6 +100,8 @@ pub struct MaterialTable {
     pub roughness_texture: Option<TextureTable>,
     /// Whether both sides scatter light; default true.
     pub two_sided: Option<bool>,
+    /// Whether it shines from behind, too; default false. Light sampling chooses the front alone, so that what lies behind has more noise.
+    pub emission_two_sided: bool,
     /// Coated: light that is reflected below the coat takes on the base's colour each time; default false.
     pub nonlinear: bool,
     /// Factor of `emission`, from 0; default 1.
@@ -137,6 +139,6 @@ pub struct MaterialTable {
     pub alpha_mode: Option<AlphaMode>,
     /// Metallic-roughness, `alpha_mode = "mask"`: the least alpha that stops rays; default 0.5.
     pub alpha_cutoff: Option<f32>,
-    /// Metallic-roughness: the surface shows `color` in any light: it emits it and scatters none; default false.
+    /// Metallic-roughness: the surface shows `color` in any light: it emits it to both sides and scatters none; default false.
     pub unlit: bool,
 }

@@ -98,6 +98,9 @@ impl Materials {
         if t.distribution == Distribution::Ggx {
             m.flags |= MATERIAL_GGX;
         }
+        if t.emission_two_sided {
+            m.flags |= MATERIAL_EMITS_BEHIND;
+        }
         if t.nonlinear {
             m.flags |= MATERIAL_NONLINEAR;
         }

@@ -45,6 +45,9 @@ impl Materials {
         if table.two_sided == Some(false) && m.transmission_factor == 0.0 {
             m.flags &= !MATERIAL_TWO_SIDED;
         }
+        if table.emission_two_sided {
+            m.flags |= MATERIAL_EMITS_BEHIND;
+        }
         if table.unlit {
             make_unlit(&mut m);
         }
@@ -113,9 +116,9 @@ impl Materials {
     }
 }
 
-/// The surface emits its base colour, and scatters no light.
+/// The surface emits its base colour to both sides, and scatters no light.
 fn make_unlit(m: &mut Material) {
     (m.emission, m.emission_texture) = (m.base_color, m.base_texture);
     (m.base_color, m.base_texture, m.kind) = ([0.0; 3], NONE, BSDF_DIFFUSE);
-    m.flags |= MATERIAL_UNLIT;
+    m.flags |= MATERIAL_UNLIT | MATERIAL_EMITS_BEHIND;
 }

@@ -143,6 +143,7 @@ impl Reader<'_> {
             normal_map: self.texture(normal.map(of_normal))?,
             normal_scale: normal.map(|normal| normal.scale.clamp(-LARGEST_SPECULAR, LARGEST_SPECULAR)),
             emission: emission.map(Rgb),
+            emission_two_sided: material.double_sided && emission.is_some(),
             emission_texture: self.texture(emissive.map(plain))?,
             alpha_mode: Some(match mode {
                 Mode::Opaque => AlphaMode::Opaque,
