@@ -11,7 +11,7 @@ use crate::render::kernels::{Allocation, Kernels};
 use crate::render::pass::wavefront;
 use crate::render::push::{frame_constants, priority_push};
 use crate::render::schedule::{self, Cut, Step};
-use crate::render::settings::{Sampler, Settings};
+use crate::render::settings::{Sampler, Settings, Split};
 use crate::scene::{self, Fingerprint, Scene};
 use crate::statistics::BrokenSamples;
 use std::time::Duration;
@@ -337,7 +337,8 @@ pub fn called_for(scene: &Scene, settings: &Settings, outputs: Outputs) -> Effec
 /// Every effect of light and matter; random numbers and layers stay those that the settings chose.
 pub fn all_effects(scene: &Scene, settings: &Settings) -> Effects {
     let independent_sampler = settings.sampler == Sampler::Independent;
-    let soft_light = scene::keeps_soft_light_apart(scene, settings);
+    // Lamps and sky may come to shine later.
+    let soft_light = settings.split == Split::Soft;
     Effects { independent_sampler, large_lamps: scene.large_lamps, soft_light, ..Effects::ALL }
 }
 

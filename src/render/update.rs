@@ -7,7 +7,7 @@ use super::upload::{parts, whole};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Recorder};
 use crate::layout::{Effect, Effects};
-use crate::scene::{Change, Scene, light_effects};
+use crate::scene::{Change, Scene, keeps_soft_light_apart, light_effects};
 
 impl Renderer {
     /// Records the upload of what a pose has changed: see [`Scene::apply`]. Frames that were recorded before keep the scene as it was,
@@ -65,7 +65,9 @@ impl Renderer {
             true => called_for(scene, &self.settings, self.outputs),
             false => light_effects(scene),
         };
-        let called = Effects { split_light: false, ..called };
+        // Where light is not split, what is soft of it makes no difference.
+        let soft_light = self.effects.split_light && keeps_soft_light_apart(scene, &self.settings);
+        let called = Effects { split_light: false, soft_light, ..called };
         let lacks = |(_, (calls, has)): &(&Effect, (bool, bool))| *calls && !has;
         let both = called.switches().into_iter().zip(self.effects.switches());
         match Effect::ALL.iter().zip(both).find(lacks) {

@@ -3,8 +3,8 @@ use crate::poses::{MOMENTS, Moment, at, pose};
 use crate::support::{assert_silent, gpu, render};
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::layout::{Effects, PixelStats};
-use tallow::render::{Outputs, Renderer};
-use tallow::scene::{Loaded, MaterialChange, Pose};
+use tallow::render::{Outputs, Renderer, all_effects};
+use tallow::scene::{EnvironmentChange, Loaded, MaterialChange, Pose, Scene};
 
 const OUTPUTS: Outputs = Outputs { split_light: false, guides: true, counters: false };
 
@@ -70,4 +70,46 @@ fn an_effect_that_was_not_compiled_is_named() {
     let effects = Effects { alpha_masks: true, ..*renderer.effects() };
     let mut able = Renderer::specialised(&gpu, &scene, &scene.settings, OUTPUTS, effects).unwrap();
     gpu.run(&mut frame, |rec| able.update(rec, &scene, &change)).unwrap();
+}
+
+/// A panel above a cube and a dark sky, neither of which shines yet, and a light without soft shadows.
+const DARK: &str = "[environment]\nradiance = 0\n[[material]]\nname = 'panel'\n[[material]]\nname = 'grey'\n\
+    [[mesh]]\nshape = 'rectangle'\nmaterial = 'panel'\ntransform = { rotate = [90, 0, 0], translate = [0, 3, 0] }\n\
+    [[mesh]]\nshape = 'cube'\nmaterial = 'grey'\nmoving = true\n\
+    [[light]]\ntype = 'point'\nposition = [2, 3, 1]\nintensity = 4\n";
+
+#[test]
+fn lamps_and_sky_that_come_to_shine_stay_out_of_sharp_direct_light() {
+    let (gpu, split) = (gpu(), Outputs { split_light: true, ..OUTPUTS });
+    let load = || {
+        let loaded = Scene::parse(std::path::Path::new("scene.toml"), DARK).unwrap();
+        loaded.with(|s| (s.width, s.height, s.spp) = (24, 16, 2))
+    };
+    let direct = |renderer: &Renderer| {
+        render(&gpu, renderer);
+        renderer.film().tiles[0].light.read().unwrap().iter().map(|light| light.direct).collect::<Vec<_>>()
+    };
+    let dawn = EnvironmentChange { radiance: Some([1.0; 3]), rotation: None };
+    let glow = MaterialChange { emission: Some([9.0; 3]), ..MaterialChange::default() };
+    let poses =
+        [Pose { environment: Some(dawn), ..Pose::default() }, Pose { materials: vec![(0, glow)], ..Pose::default() }];
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    for pose in poses {
+        let mut scene = load();
+        let all = all_effects(&scene, &scene.settings);
+        let with = |effects, outputs| Renderer::specialised(&gpu, &scene, &scene.settings, outputs, effects).unwrap();
+        let without = Effects { soft_light: false, ..all };
+        let (mut able, mut unable, mut whole) = (with(all, split), with(without, split), with(without, OUTPUTS));
+        let change = scene.apply(&pose).unwrap();
+        let mut update = |renderer: &mut Renderer| gpu.run(&mut frame, |rec| renderer.update(rec, &scene, &change));
+        update(&mut able).unwrap();
+        update(&mut whole).unwrap();
+        let error = update(&mut unable).unwrap_err().to_string();
+        assert!(error.contains("\"soft_light\""), "{error}");
+        let new = Renderer::specialised(&gpu, &scene, &scene.settings, split, all).unwrap();
+        assert!(able.sharp_direct() && direct(&able) == direct(&new));
+        let mixed = Renderer::specialised(&gpu, &scene, &scene.settings, split, without).unwrap();
+        assert!(direct(&mixed) != direct(&new), "control: what shines now is soft");
+    }
+    assert_silent(&gpu);
 }
