@@ -50,6 +50,7 @@ impl Gpu {
     ///
     /// # Safety
     /// - The handles are valid, belong together, and outlive everything made from the returned `Gpu`.
+    /// - The instance was made with an `apiVersion` of 1.3 or newer; an older one is an error where the driver tells.
     /// - The device was made with every one of [`super::REQUIRED_FEATURES`] enabled, and with what [`RawDevice::tracing`] takes.
     /// - Nobody else uses the queue while [`Gpu::run`] or a [`super::Buffer`]'s reads and writes do.
     /// - Without `robust_buffer_access`, kernels read only what a [`Renderer`](crate::render::Renderer), a
@@ -81,6 +82,10 @@ impl Gpu {
         let alone = one_at_a_time();
         let device = unsafe { ash::Device::load(instance.fp_v1_0(), vk::Device::from_raw(raw.device)) };
         let physical = vk::PhysicalDevice::from_raw(raw.physical_device);
+        if !enabled(&instance, &device, &[c"vkCmdPipelineBarrier2"]) {
+            let what = "the instance was made for an older Vulkan: set apiVersion to 1.3 or newer";
+            return Err(Error::Device(what.to_owned()));
+        }
         check_family(&instance, physical, raw.queue_family)?;
         let mut candidate = info::describe(&instance, physical, Some(raw.queue_family));
         candidate.info.robust_buffer_access = raw.robust_buffer_access;
@@ -117,7 +122,8 @@ fn check_family(instance: &ash::Instance, physical: vk::PhysicalDevice, family: 
     }
 }
 
-/// Whether the functions of an extension are there; the loader returns them only if the extension is enabled.
+/// Whether the functions of an extension or a version are there; they are returned only if the extension is enabled, or the instance
+/// made for the version.
 fn enabled(instance: &ash::Instance, device: &ash::Device, names: &[&CStr]) -> bool {
     // SAFETY: valid handles by the contract of `from_raw`.
     names.iter().all(|name| unsafe { instance.get_device_proc_addr(device.handle(), name.as_ptr()) }.is_some())

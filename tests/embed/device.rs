@@ -114,3 +114,13 @@ fn bad_handles_are_errors() {
     let mut frame = FrameResources::new(&gpu).unwrap();
     assert!(unsafe { Recorder::external(&gpu, &mut frame, 0) }.is_err());
 }
+
+#[test]
+fn an_instance_of_an_older_vulkan_is_refused() {
+    for version in [vk::API_VERSION_1_0, vk::API_VERSION_1_1, vk::API_VERSION_1_2] {
+        let engine = Engine::of_version(version);
+        let error = unsafe { Gpu::from_raw(engine.raw()) }.err().unwrap();
+        assert!(error.to_string().contains("set apiVersion to 1.3") && error.exit_code() == 4, "{error}");
+        assert_eq!(engine.messages(), Vec::<String>::new());
+    }
+}

@@ -38,8 +38,8 @@ unsafe extern "system" fn collect(
     vk::FALSE
 }
 
-unsafe fn instance(entry: &ash::Entry) -> ash::Instance {
-    let app = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
+unsafe fn instance(entry: &ash::Entry, version: u32) -> ash::Instance {
+    let app = vk::ApplicationInfo::default().api_version(version);
     let mut extensions = vec![ash::ext::debug_utils::NAME.as_ptr(), ash::ext::validation_features::NAME.as_ptr()];
     let layers = [LAYER.as_ptr()];
     let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
@@ -65,7 +65,18 @@ unsafe fn instance(entry: &ash::Entry) -> ash::Instance {
 const RAY_EXTENSIONS: [&CStr; 3] =
     [ash::khr::ray_query::NAME, ash::khr::acceleration_structure::NAME, ash::khr::deferred_host_operations::NAME];
 
-unsafe fn device(instance: &ash::Instance, physical: vk::PhysicalDevice, tracing: Tracing) -> ash::Device {
+/// One that has what the renderer needs, but for an instance that is too old for that.
+unsafe fn device(
+    instance: &ash::Instance,
+    physical: vk::PhysicalDevice,
+    tracing: Tracing,
+    version: u32,
+) -> ash::Device {
+    if version < vk::API_VERSION_1_3 {
+        let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
+        let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues);
+        return unsafe { instance.create_device(physical, &info, None) }.unwrap();
+    }
     let rays = tracing == Tracing::RayQuery;
     let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
     let core = vk::PhysicalDeviceFeatures::default().shader_int64(true).robust_buffer_access(true);
@@ -99,10 +110,19 @@ impl Engine {
 
     /// One that was made to trace rays so.
     pub fn tracing(tracing: Tracing) -> Self {
+        Self::made(tracing, vk::API_VERSION_1_3)
+    }
+
+    /// One whose instance was made for this version of Vulkan.
+    pub fn of_version(version: u32) -> Self {
+        Self::made(Tracing::Compute, version)
+    }
+
+    fn made(tracing: Tracing, version: u32) -> Self {
         let alone = ENGINES.lock().unwrap_or_else(PoisonError::into_inner);
         unsafe {
             let entry = ash::Entry::load().expect("install libvulkan1");
-            let instance = instance(&entry);
+            let instance = instance(&entry, version);
             let messages = Box::new(Mutex::new(Vec::new()));
             let utils = ash::ext::debug_utils::Instance::new(&entry, &instance);
             let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
@@ -119,7 +139,7 @@ impl Engine {
                 instance.get_physical_device_properties(d).device_name_as_c_str().unwrap().to_str() == Ok(&name)
             };
             let physical = instance.enumerate_physical_devices().unwrap().into_iter().find(of_name).unwrap();
-            let device = device(&instance, physical, tracing);
+            let device = device(&instance, physical, tracing, version);
             let queue = device.get_device_queue(0, 0);
             let pool = device.create_command_pool(&vk::CommandPoolCreateInfo::default(), None).unwrap();
             let messenger = (utils, messenger);
