@@ -13,7 +13,7 @@ pub struct Pose {
     /// Placements by number, see [`Rig::placements`](super::Rig::placements): their `transform` anew. One without inverse, as of
     /// scale 0, hides what it places until another comes.
     pub instances: Vec<(usize, Transform)>,
-    /// Meshes that are `moving`, by number of their `[[mesh]]`.
+    /// Meshes that are `moving`, by number of their `[[mesh]]`, each once.
     pub meshes: Vec<(usize, Vertices)>,
     /// Materials by their index in [`Scene::materials`](super::Scene::materials).
     pub materials: Vec<(usize, MaterialChange)>,

@@ -216,6 +216,7 @@ fn poses_that_cannot_be_are_one_line_and_change_nothing() {
         ..Pose::default()
     };
     let still = vec![[0.0; 3]; 576];
+    let twice = (mesh, Vertices { positions: still.clone(), ..Vertices::default() });
     let mut broken = still.clone();
     broken[99][1] = f32::NAN;
     let mut far = still.clone();
@@ -228,6 +229,7 @@ fn poses_that_cannot_be_are_one_line_and_change_nothing() {
         (deform(mesh, broken, Vec::new()), "a vertex with a NaN"),
         (deform(mesh, far, Vec::new()), "the limit is 1e12"),
         (deform(0, still, Vec::new()), "mesh 0 cannot be deformed"),
+        (Pose { meshes: vec![twice.clone(), twice], ..Pose::default() }, "mesh 4 is posed twice: keep one"),
         (Pose { materials: vec![(7, Default::default())], ..Pose::default() }, "material 7 of"),
         (Pose { lights: vec![(0, Default::default())], ..Pose::default() }, "light 0: needs intensity"),
         (Pose { lights: vec![(1, Default::default())], ..Pose::default() }, "light 1"),

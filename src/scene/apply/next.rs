@@ -54,6 +54,7 @@ impl Next {
         if scene.rig.trees.is_empty() && (moves || shines) {
             return Err("the scene was neither loaded nor built from a description: only its camera can move".into());
         }
+        each_once(pose.meshes.iter().map(|(mesh, _)| *mesh))?;
         let meshes = pose.meshes.iter().map(|(mesh, to)| next_mesh(scene, *mesh, to)).collect::<Checked<Vec<_>>>()?;
         let materials = next_materials(scene, pose)?;
         let copies = match moves {
@@ -68,6 +69,15 @@ impl Next {
             camera.build([1, 1], bounds).map_err(|what| format!("camera: {what}"))?;
         }
         Ok(Self { meshes, copies, materials, lights: next_lights(scene, pose)? })
+    }
+}
+
+/// The vertices of a mesh are put in the order that its hierarchy has before the pose: a second time, that may be another.
+fn each_once(meshes: impl Iterator<Item = usize>) -> Checked<()> {
+    let mut seen = HashSet::new();
+    match meshes.into_iter().find(|mesh| !seen.insert(*mesh)) {
+        Some(mesh) => Err(format!("mesh {mesh} is posed twice: keep one")),
+        None => Ok(()),
     }
 }
 
