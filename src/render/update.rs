@@ -17,6 +17,9 @@ impl Renderer {
     /// two updates between frames the second carries nothing: [`Change::add`] makes them one. `scene` is that of [`Renderer::new`] in
     /// another pose.
     ///
+    /// What is recorded has to be submitted, in this order: later updates bring only what changed since. After a recording that was thrown
+    /// away, update with [`Change::everything`].
+    ///
     /// Nothing is compiled. Memory is allocated where there is more of something than ever before, such as nodes of a hierarchy or
     /// lights, with room for more.
     ///
@@ -52,6 +55,10 @@ impl Renderer {
     /// Before the scene changes: what frames that begin with samples of the last need of it as it was.
     fn remember(&mut self, rec: &mut Recorder, scene: &Scene, change: &Change) -> Result<()> {
         let Some(history) = &mut self.frame.history else { return Ok(()) };
+        if change.everything {
+            history.forget(); // what the device has may be nothing that paths can be traced in
+            return Ok(());
+        }
         if history.has_changed() {
             return rec.fill(&history.offered, 0); // nothing is handed on
         }

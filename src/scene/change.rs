@@ -1,10 +1,13 @@
 //! What a pose has changed in a scene's arrays.
+use super::Scene;
 use crate::layout::Light;
 use std::ops::Range;
 
 /// What [`Scene::apply`](super::Scene::apply) has changed, for those who copy it to a device.
 #[derive(Clone, Debug, Default)]
 pub struct Change {
+    /// All that a pose can change, whatever the device has of it: see [`Change::everything`].
+    pub everything: bool,
     /// The camera.
     pub camera: bool,
     /// Parts of [`Scene::nodes`](super::Scene::nodes).
@@ -41,15 +44,33 @@ pub struct Deformed {
 }
 
 impl Change {
+    /// All that a pose can change in this scene, its camera too. A renderer that it is brought to has the scene as it is, whatever
+    /// became of earlier updates, and its next frame begins with no samples of others.
+    pub fn everything(scene: &Scene) -> Self {
+        let whole = |len: usize| std::iter::once(0..len).collect();
+        Self {
+            everything: true,
+            camera: true,
+            nodes: whole(scene.nodes.len()),
+            triangles: whole(scene.triangles.len()),
+            instances: true,
+            materials: true,
+            texels: whole(scene.texels.len()),
+            lights: true,
+            ..Self::default()
+        }
+    }
+
     /// Whether nothing but the camera has changed.
     pub fn is_of_camera_alone(&self) -> bool {
-        let Self { camera: _, nodes, triangles, instances, materials, texels, lights, deformed, .. } = self;
+        let Self { everything, camera: _, nodes, triangles, instances, materials, texels, lights, deformed, .. } = self;
         let arrays = nodes.is_empty() && triangles.is_empty() && texels.is_empty() && deformed.is_empty();
-        arrays && !(*instances || *materials || *lights) // without these, no numbers are new
+        arrays && !(*everything || *instances || *materials || *lights) // without these, no numbers are new
     }
 
     /// Adds what a later pose has changed.
     pub fn add(&mut self, later: Self) {
+        self.everything |= later.everything;
         self.camera |= later.camera;
         self.nodes.extend(later.nodes);
         self.triangles.extend(later.triangles);

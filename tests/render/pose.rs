@@ -1,10 +1,11 @@
 //! Tests that the picture of a pose is that of a scene which was loaded in it, bit for bit, whether trees were refitted or built.
 use crate::poses::{MOMENTS, Moment, at, pose};
-use crate::support::{assert_silent, gpu, render};
+use crate::support::{assert_silent, gpu, render, stats};
+use tallow::error::Error;
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::layout::{Effects, PixelStats};
-use tallow::render::{Outputs, Renderer, all_effects};
-use tallow::scene::{EnvironmentChange, Loaded, MaterialChange, Pose, Scene};
+use tallow::render::{Moves, Outputs, Renderer, Reproject, all_effects};
+use tallow::scene::{Change, EnvironmentChange, Loaded, MaterialChange, Pose, Scene};
 
 const OUTPUTS: Outputs = Outputs { split_light: false, guides: true, counters: false };
 
@@ -111,5 +112,38 @@ fn lamps_and_sky_that_come_to_shine_stay_out_of_sharp_direct_light() {
         let mixed = Renderer::specialised(&gpu, &scene, &scene.settings, split, without).unwrap();
         assert!(direct(&mixed) != direct(&new), "control: what shines now is soft");
     }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn a_recording_that_was_thrown_away_is_made_up_for() {
+    let gpu = gpu();
+    let mut scene = at(&Moment::default());
+    let mut renderer = renderer(&gpu, &scene);
+    renderer.keep_history(Reproject::default(), Moves::Scene).unwrap();
+    render(&gpu, &renderer);
+    let (mut frame, before) = (FrameResources::new(&gpu).unwrap(), handles(&renderer));
+    for moment in &MOMENTS[1..3] {
+        let pose = pose(&scene, moment, 0.0);
+        let change = scene.apply(&pose).unwrap();
+        let thrown_away = gpu.run(&mut frame, |rec| {
+            renderer.update(rec, &scene, &change)?;
+            renderer.steps_on().try_for_each(|step| renderer.record(rec, &step))?;
+            Err(Error::Usage("thrown away".into()))
+        });
+        assert!(thrown_away.is_err_and(|e| e.to_string() == "thrown away"));
+    }
+    assert_ne!(handles(&renderer)[0], before[0], "control: the nodes have outgrown their buffer");
+    gpu.run(&mut frame, |rec| {
+        renderer.update(rec, &scene, &Change::everything(&scene))?;
+        renderer.steps_on().try_for_each(|step| renderer.record(rec, &step))
+    })
+    .unwrap();
+    assert!(stats(&renderer) == fresh(&gpu, &scene), "the frame is that of a new renderer, and carries nothing");
+    // From here on changes are enough again.
+    let pose = pose(&scene, &MOMENTS[5], f32::INFINITY);
+    let change = scene.apply(&pose).unwrap();
+    gpu.run(&mut frame, |rec| renderer.update(rec, &scene, &change)).unwrap();
+    assert!(render(&gpu, &renderer) == fresh(&gpu, &scene));
     assert_silent(&gpu);
 }

@@ -194,6 +194,11 @@ impl History {
         self.of_points.load(Relaxed)
     }
 
+    /// Notes that nothing of the last frame may be carried, nor its scene be looked at.
+    pub(super) fn forget(&self) {
+        self.settle(false);
+    }
+
     /// Notes that a frame has begun with what there is now, seen from one point or not.
     pub(super) fn settle(&self, of_points: bool) {
         self.changed.store(false, Relaxed);
