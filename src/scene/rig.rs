@@ -120,6 +120,11 @@ impl Scene {
 }
 
 impl Rig {
+    /// Whether the scene was loaded or built from a description: trees have levels even where there are none of them.
+    pub(in crate::scene) fn is_built(&self) -> bool {
+        self.levels != [0; 2]
+    }
+
     /// Number of the instance of this name, or of the mesh of this name that is `moving` and has no instance.
     pub fn placement(&self, name: &str) -> Option<usize> {
         self.placements.get(name).copied()

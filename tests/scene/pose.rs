@@ -242,6 +242,29 @@ fn poses_that_cannot_be_are_one_line_and_change_nothing() {
     }
 }
 
+#[test]
+fn the_light_changes_where_all_meshes_are_empty() {
+    use tallow::scene::EnvironmentChange;
+    use tallow::scene::description::{Description, EnvironmentTable, LightTable, Mesh, MeshTable, Rgb};
+    let light = |strength| LightTable {
+        position: Some([0.0; 3]),
+        intensity: Some(Rgb([strength; 3])),
+        ..LightTable::default()
+    };
+    for moving in [false, true] {
+        let empty = MeshTable { data: Some(Mesh::default()), moving, ..MeshTable::default() };
+        let environment = Some(EnvironmentTable::default());
+        let description =
+            Description { mesh: vec![empty], environment, light: vec![light(1.0)], ..Description::default() };
+        let mut scene = Scene::build(&description).unwrap().scene;
+        let environment = Some(EnvironmentChange { radiance: Some([2.0; 3]), rotation: None });
+        scene.apply(&Pose { environment, lights: vec![(0, light(3.0))], ..Pose::default() }).unwrap();
+        assert_eq!(scene.lights.iter().map(|light| light.value[0]).collect::<Vec<_>>(), [3.0, 2.0]);
+    }
+    let said = Scene::default().apply(&Pose { lights: vec![(0, light(1.0))], ..Pose::default() }).unwrap_err();
+    assert!(said.to_string().contains("neither loaded nor built"), "{said}");
+}
+
 /// A square with tangents that turn by `angle` about its normal.
 fn mapped(angle: f32) -> (Scene, Vertices) {
     use tallow::scene::description::{Bitmap, Description, MaterialTable, Mesh, MeshTable};

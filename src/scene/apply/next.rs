@@ -51,7 +51,7 @@ impl Next {
     pub fn of(scene: &Scene, pose: &Pose) -> Checked<Self> {
         let moves = !(pose.instances.is_empty() && pose.meshes.is_empty());
         let shines = !(pose.materials.is_empty() && pose.lights.is_empty()) || pose.environment.is_some();
-        if scene.rig.trees.is_empty() && (moves || shines) {
+        if !scene.rig.is_built() && (moves || shines) {
             return Err("the scene was neither loaded nor built from a description: only its camera can move".into());
         }
         each_once(pose.meshes.iter().map(|(mesh, _)| *mesh))?;
