@@ -162,7 +162,7 @@ impl Profile {
     /// Judges what was measured of the scene in this file.
     ///
     /// # Errors
-    /// [`Error::Scene`] when the scene's camera is broken.
+    /// [`Error::Usage`] when the scene's camera is broken.
     pub fn new(gpu: &Gpu, path: &Path, scene: &Scene, settings: &Settings, measured: &Measured) -> Result<Self> {
         let Measured { frames, frame_work, ceilings, arithmetic_gop_s_after, .. } = measured;
         let fastest = fastest(ceilings, *arithmetic_gop_s_after);

@@ -239,9 +239,8 @@ impl Renderer {
     /// before keep theirs, done or not.
     ///
     /// # Errors
-    /// [`crate::error::Error::Scene`] for a number that is not finite, and
-    /// [`crate::error::Error::Usage`] for a lens when the scene was loaded with a pinhole: the kernels have no lens then.
-    /// Ask [`Renderer::specialised`] for the effect `lens`, or load the scene with one. Likewise for parallel rays and the effect
+    /// [`crate::error::Error::Usage`] for a number that is not finite, and for a lens when the scene was loaded with a pinhole: the
+    /// kernels have no lens then. Ask [`Renderer::specialised`] for the effect `lens`, or load the scene with one. Likewise for parallel rays and the effect
     /// `orthographic`.
     pub fn set_camera(&mut self, camera: Camera) -> Result<()> {
         scene::check_camera(&camera)?;

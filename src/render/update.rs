@@ -25,7 +25,7 @@ impl Renderer {
     ///
     /// # Errors
     /// [`Error::Usage`] with the first effect that the scene calls for now and that was not compiled: make the renderer with it, by
-    /// [`Renderer::specialised`]. Nothing has changed then. [`Error::Device`]; [`Error::Scene`] for a camera that cannot be.
+    /// [`Renderer::specialised`]. Nothing has changed then. [`Error::Usage`] also for a camera that cannot be; [`Error::Device`].
     pub fn update(&mut self, rec: &mut Recorder, scene: &Scene, change: &Change) -> Result<()> {
         self.check_effects(scene, change)?;
         if scene.stack > self.stack {

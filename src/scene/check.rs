@@ -207,11 +207,11 @@ fn below_or_none(which: &str, what: &str, count: usize, indices: impl IntoIterat
 /// Checks that a camera consists of finite numbers.
 ///
 /// # Errors
-/// [`Error::Scene`].
+/// [`Error::Usage`].
 pub fn check_camera(camera: &Camera) -> Result<()> {
     let numbers: &[f32] = bytemuck::cast_slice(std::slice::from_ref(camera));
     match numbers.iter().all(|number| number.is_finite()) {
         true => Ok(()),
-        false => Err(Error::Scene(format!("the camera has a number that is not finite: {camera:?}"))),
+        false => Err(Error::Usage(format!("camera: give finite numbers alone, not {camera:?}"))),
     }
 }

@@ -332,9 +332,9 @@ impl Scene {
     /// The camera for a film of (width, height) pixels, in world space.
     ///
     /// # Errors
-    /// [`Error::Scene`] with the key of the `[camera]` table that is at fault.
+    /// [`Error::Usage`] with the key of the `[camera]` table that is at fault.
     pub fn camera(&self, size: [u32; 2]) -> Result<Camera> {
-        self.view.build(size, self.bounds).map_err(|what| Error::Scene(format!("[camera]: {what}")))
+        self.view.build(size, self.bounds).map_err(|what| Error::Usage(format!("camera: {what}")))
     }
 
     /// Fingerprint of all that decides the picture but the settings.

@@ -432,7 +432,10 @@ fn stacks_indices_and_cycles_that_were_believed_once() {
         (coat.kind, coat.alpha, coat.coat_table) = (BSDF_COATED, 0.5, 1 << 30);
     });
     refused("no nodes", &|s| s.nodes.clear());
-    refused("a camera nowhere", &|s| s.view.position = Some([f64::NAN; 3]));
+    let mut nowhere = SCENE.clone();
+    nowhere.view.position = Some([f64::NAN; 3]);
+    let error = Renderer::new(&GPU, &nowhere, &nowhere.settings, Outputs::default()).err();
+    assert!(matches!(error, Some(Error::Usage(_))), "a camera is no array: {error:?}");
     assert!(Renderer::new(&GPU, &SCENE, &SCENE.settings, Outputs::default()).is_ok(), "control");
     let mut renderer = Renderer::new(&GPU, &SCENE, &SCENE.settings, Outputs::default()).unwrap();
     let camera = SCENE.camera([16, 16]).unwrap();

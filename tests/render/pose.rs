@@ -147,3 +147,15 @@ fn a_recording_that_was_thrown_away_is_made_up_for() {
     assert!(render(&gpu, &renderer) == fresh(&gpu, &scene));
     assert_silent(&gpu);
 }
+
+#[test]
+fn a_camera_that_is_no_number_is_a_fault_of_its_own() {
+    let gpu = gpu();
+    let scene = at(&Moment::default());
+    let mut renderer = renderer(&gpu, &scene);
+    let mut camera = scene.camera([48, 32]).unwrap();
+    camera.position[1] = f32::NAN;
+    let error = renderer.set_camera(camera).unwrap_err();
+    let said = error.to_string();
+    assert!(said.starts_with("camera: ") && !said.contains("arrays") && error.exit_code() == 2, "{said}");
+}

@@ -265,6 +265,25 @@ fn the_light_changes_where_all_meshes_are_empty() {
     assert!(said.to_string().contains("neither loaded nor built"), "{said}");
 }
 
+#[test]
+fn a_scene_whose_centre_comes_to_lie_on_its_camera_is_refused() {
+    let text = "[camera]\nposition = [0, 0, 5]\n[[mesh]]\nshape = 'cube'\nmoving = true\n";
+    let mut scene = Scene::parse(std::path::Path::new("scene.toml"), text).unwrap().scene;
+    let before = arrays(&scene);
+    let at = |z: f64| {
+        let rows = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., z, 0., 0., 0., 1.];
+        Pose { instances: vec![(0, Transform::from(rows))], ..Pose::default() }
+    };
+    let error = scene.apply(&at(5.0)).unwrap_err();
+    let said = error.to_string();
+    assert!(said.contains("camera: position and target are the same point") && error.exit_code() == 2, "{said}");
+    assert!(arrays(&scene) == before);
+    scene.apply(&at(4.0)).unwrap();
+    scene.view.position = Some([0.0, 0.0, 4.0]);
+    let error = scene.camera([4, 3]).unwrap_err();
+    assert!(error.to_string().starts_with("camera: ") && error.exit_code() == 2, "{error}");
+}
+
 /// A square with tangents that turn by `angle` about its normal.
 fn mapped(angle: f32) -> (Scene, Vertices) {
     use tallow::scene::description::{Bitmap, Description, MaterialTable, Mesh, MeshTable};

@@ -64,8 +64,9 @@ impl Next {
         if let Some(materials) = &materials {
             new_lamps_hold(scene, copies.as_ref(), materials)?;
         }
-        if let Some(camera) = &pose.camera {
+        if pose.camera.is_some() || copies.is_some() {
             let bounds = copies.as_ref().map_or(scene.bounds, |copies| copies.world);
+            let camera = pose.camera.as_ref().unwrap_or(&scene.view);
             camera.build([1, 1], bounds).map_err(|what| format!("camera: {what}"))?;
         }
         Ok(Self { meshes, copies, materials, lights: next_lights(scene, pose)? })
