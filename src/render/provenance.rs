@@ -86,7 +86,10 @@ impl Provenance {
 
 fn check_ranges(samples: &[SampleRange]) -> std::result::Result<(), String> {
     let wrong = |what: &str| Err(format!("{SAMPLES} {what}: take the file as tallow wrote it"));
-    if samples.is_empty() || samples.iter().any(|r| r.count == 0 || r.first.checked_add(r.count).is_none()) {
+    if samples.is_empty() {
+        return Err("holds no samples yet: render anew".to_owned());
+    }
+    if samples.iter().any(|r| r.count == 0 || r.first.checked_add(r.count).is_none()) {
         return wrong("are empty, or end beyond 32 bits");
     }
     if samples.iter().map(|r| u64::from(r.count)).sum::<u64>() > Settings::MAX_SPP.into() {
@@ -163,7 +166,7 @@ mod tests {
         assert_eq!(check(&[(0, 0, 4), (0, 4, 1), (1, 0, 4)]), Ok(()));
         assert_eq!(check(&[(7, u32::MAX - 1, 1)]), Ok(()));
         for (ranges, part) in [
-            (&[][..], "empty"),
+            (&[][..], "no samples yet: render anew"),
             (&[(0, 0, 0)], "empty"),
             (&[(0, u32::MAX, 1)], "32 bits"),
             (&[(0, 0, 4), (1, 0, 4), (0, 3, 1)], "overlap"),
