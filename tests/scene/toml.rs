@@ -202,6 +202,20 @@ fn neither_lamps_nor_lights_at_infinity_are_chosen_by_hardly_any_sample() {
 }
 
 #[test]
+fn a_smooth_pane_that_stops_a_lamp_without_extent_is_named() {
+    let told = |more: &str| {
+        let pane =
+            "[[material]]\nname = \"pane\"\ntype = \"metallic-roughness\"\nmetallic = 0\ntransmission_factor = 1\n";
+        let glass = "[[mesh]]\nshape = \"rectangle\"\nmaterial = \"pane\"\n";
+        let scene = parse(&format!("{BOX}{glass}{pane}{more}")).unwrap();
+        scene.warnings.iter().any(|line| line.starts_with("material \"pane\" is smooth and transmits"))
+    };
+    let sun = "[[light]]\ntype = \"directional\"\ndirection = [0, 0, -1]\nirradiance = 1\n";
+    assert!(told(&format!("roughness = 0\n{sun}")));
+    assert!(!told(&format!("roughness = 0.3\n{sun}")) && !told("roughness = 0\n"));
+}
+
+#[test]
 fn small_dim_lamps_have_a_density() {
     let small =
         BOX.replace("emission = 5", "emission = 1e-15").replace("translate = [0, 0, 2]", "translate = [0, 0, 2e-12]");

@@ -10,7 +10,7 @@ use super::plan;
 use super::sources::Sources;
 use super::store;
 use crate::error::{Error, Result};
-use crate::layout::{LIGHT_ENVIRONMENT, Triangle};
+use crate::layout::*;
 use crate::memory;
 use crate::scene::Scene;
 use crate::scene::description::Description;
@@ -61,10 +61,23 @@ pub fn assemble(path: &Path, description: &Description, choices: Choices, scene:
     if scene.lights.is_empty() {
         warnings.push("the scene has no light: its image will be black".into());
     }
+    warnings.extend(warn_of_panes(scene));
     scene.warnings = warnings;
     scene.rig.name(description, &scene.materials);
     scene.rig.content = scene.content.clone();
     Ok(())
+}
+
+/// Light of no extent goes straight through smooth panes, where no path finds it: that it is dark behind them looks like a mistake.
+fn warn_of_panes(scene: &Scene) -> Option<String> {
+    let delta = |light: &Light| matches!(light.kind, LIGHT_POINT | LIGHT_SPOT | LIGHT_DIRECTIONAL);
+    let pane = |m: &Material| m.kind == BSDF_METALLIC && m.transmission_factor > 0.0 && m.alpha < SMOOTH_ALPHA;
+    let found = scene.materials.iter().position(pane).filter(|_| scene.lights.iter().any(delta))?;
+    Some(format!(
+        "material \"{}\" is smooth and transmits: point, spot and directional lights cast a full shadow behind it; an opacity below 1, \
+         or some roughness, lets their light pass",
+        scene.names.materials[found]
+    ))
 }
 
 /// Puts the words of vertices' attributes after the texels of textures.
