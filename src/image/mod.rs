@@ -23,7 +23,7 @@ use frame::Frame;
 use output::Stream;
 #[cfg(feature = "cli")]
 pub(crate) use photo::encode_png;
-pub(crate) use photo::{BAND, bands, check_end, picture};
+pub(crate) use photo::{BAND, bands, check_end, has_16_bits, picture};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;

@@ -99,6 +99,11 @@ pub fn format(bytes: &[u8]) -> Option<ImageFormat> {
     }
 }
 
+/// Whether a file is a PNG of 16 bits a channel, which its first chunk says behind the size.
+pub fn has_16_bits(bytes: &[u8]) -> bool {
+    format(bytes) == Some(ImageFormat::Png) && bytes.get(24) == Some(&16)
+}
+
 fn reader(bytes: &[u8], memory: u64) -> Result<ImageReader<Cursor<Cow<'_, [u8]>>>, String> {
     let bytes = match bytes.strip_prefix(RGBE) {
         Some(rest) => Cow::Owned([RADIANCE, rest].concat()),

@@ -65,7 +65,7 @@ effects! {
     bump_maps: FX_BUMP_MAPS;
     /// A texture that is mirrored, clamped along one axis, turned, or not interpolated.
     texture_modes: FX_TEXTURE_MODES;
-    /// A texture of a file that holds floats.
+    /// A texture of a file that holds floats, or numbers of 16 bits that are no colours.
     hdr_textures: FX_HDR_TEXTURES;
     /// A texture that reads the second set of coordinates.
     second_uv: FX_SECOND_UV;

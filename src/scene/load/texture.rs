@@ -1,14 +1,17 @@
-//! Decodes pictures to RGBA8 texels, on all cores and straight into the one texel array.
+//! Decodes pictures to texels of 32 bits, on all cores and straight into the one texel array.
+mod source;
+
 use super::find::find_file;
 use super::mapping::Mapping;
 use crate::error::{Error, Result};
-use crate::image::{BAND, bands, check_end, claim, contained, decode, holds_floats, input, picture, primaries};
+use crate::image::contained;
 use crate::layout::{NONE, TEXTURE_FLOAT, TEXTURE_RGB9E5, TEXTURE_SRGB, Texture};
 use crate::math::rgb9e5;
 use crate::math::srgb::linear_from_srgb_f64;
 use crate::memory;
 use crate::scene::description::mesh::Bitmap;
 use rayon::prelude::*;
+use source::Source;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -35,6 +38,12 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// Whether it is one number, which 16 bits of a file are kept of. Three of them in one word would be cut to 9 bits at most,
+    /// and where a normal points out of the surface to 8, as bytes are.
+    fn is_number(self) -> bool {
+        matches!(self, Self::Height | Self::Mask | Self::Alpha | Self::Red | Self::Roughness)
+    }
+
     /// The TEXTURE_ bits of a picture of bytes.
     fn of_bytes(self) -> u32 {
         if matches!(self, Self::Color | Self::Light) { TEXTURE_SRGB } else { 0 }
@@ -42,7 +51,7 @@ impl Kind {
 
     /// The TEXTURE_ bits of a picture of floats.
     fn of_floats(self) -> u32 {
-        if matches!(self, Self::Color | Self::Light | Self::Data) { TEXTURE_RGB9E5 } else { TEXTURE_FLOAT }
+        if self.is_number() { TEXTURE_FLOAT } else { TEXTURE_RGB9E5 }
     }
 
     /// The texel of a picture of floats.
@@ -78,7 +87,7 @@ pub struct TextureSet {
 pub struct Decoded {
     /// Records of the pictures, in order of request.
     pub textures: Vec<Texture>,
-    /// Texels of all pictures, RGBA8.
+    /// Texels of all pictures, in the forms that the records' flags say.
     pub texels: Vec<u32>,
 }
 
@@ -139,7 +148,7 @@ impl TextureSet {
     pub fn decode(&self) -> Result<Decoded> {
         let sources: Vec<_> = self.pictures.par_iter().map(|(path, _)| self.source(path)).collect::<Result<_>>()?;
         let sizes: Vec<_> = sources.iter().map(Source::size).collect();
-        let floats: Vec<_> = sources.iter().map(|source| matches!(source, Source::Floats(..))).collect();
+        let forms: Vec<_> = sources.iter().zip(&self.pictures).map(|(source, (_, kind))| source.form(*kind)).collect();
         let mut firsts = Vec::with_capacity(sizes.len());
         let mut total = 0u64;
         for ([width, height], (path, _)) in sizes.iter().zip(&self.pictures) {
@@ -150,9 +159,7 @@ impl TextureSet {
             return Err(too_many(&self.pictures[0].0));
         }
         let texture = |&(picture, mapping): &(usize, Mapping)| {
-            let kind = self.pictures[picture].1;
-            let form = if floats[picture] { kind.of_floats() } else { kind.of_bytes() };
-            let (flags, Mapping { scale, shear, offset, .. }) = (form | mapping.flags(), mapping);
+            let (flags, Mapping { scale, shear, offset, .. }) = (forms[picture] | mapping.flags(), mapping);
             let [width, height] = sizes[picture];
             Texture { first: firsts[picture], width, height, flags, scale, shear, offset, ..Default::default() }
         };
@@ -176,7 +183,7 @@ impl TextureSet {
     }
 }
 
-/// Bytes that the largest pictures take while each thread decodes one: as decoded (at most 8 per texel) and as RGBA8.
+/// Bytes that the largest pictures take while each thread decodes one: as decoded (at most 8 per texel) and as texels.
 fn while_decoded(sizes: &[[u32; 2]]) -> u64 {
     let mut texels: Vec<_> = sizes.iter().map(|&[width, height]| u64::from(width) * u64::from(height)).collect();
     texels.sort_unstable_by(|a, b| b.cmp(a));
@@ -207,82 +214,6 @@ fn check_size(width: u32, height: u32) -> std::result::Result<(), String> {
     match [width, height].iter().all(|n| (1..=1 << 16).contains(n)) {
         true => Ok(()),
         false => Err(format!("is {width} x {height} texels: 1 to 65536 each way can be used")),
-    }
-}
-
-/// A picture to be decoded.
-enum Source {
-    /// The bytes of a file, and the size that its header says.
-    File(Vec<u8>, [u32; 2]),
-    /// The same of an EXR or HDR file.
-    Floats(Vec<u8>, [u32; 2]),
-    Bitmap(Bitmap),
-}
-
-impl Source {
-    fn read(path: &Path) -> Result<Self> {
-        let bytes = input::read(path)?;
-        check_end(&bytes).map_err(|what| Error::input(path, what))?;
-        let [width, height] = claim(&bytes).map_err(|what| damaged(path, what))?.size;
-        check_size(width, height).map_err(|what| Error::input(path, what))?;
-        let floats = holds_floats(&bytes);
-        Ok(if floats { Self::Floats(bytes, [width, height]) } else { Self::File(bytes, [width, height]) })
-    }
-
-    fn size(&self) -> [u32; 2] {
-        match self {
-            Self::File(_, size) | Self::Floats(_, size) => *size,
-            Self::Bitmap(bitmap) => [bitmap.width, bitmap.height],
-        }
-    }
-
-    fn decode(self, kind: Kind, space: &mut [u32]) -> std::result::Result<(), String> {
-        let (bytes, size) = match self {
-            Self::Bitmap(bitmap) => {
-                fill(space, bitmap.rgba.iter().copied(), kind, true);
-                return Ok(());
-            }
-            Self::Floats(bytes, size) => return fill_floats(space, &bytes, size, kind),
-            Self::File(bytes, size) => (bytes, size),
-        };
-        let picture = picture(&bytes)?;
-        if [picture.width(), picture.height()] != size {
-            return Err("its header says another size".to_owned());
-        }
-        let has_alpha = picture.color().has_alpha();
-        let rows = space.chunks_mut(BAND as usize * size[0] as usize);
-        for (space, band) in rows.zip(bands(&picture)) {
-            fill(space, band.into_rgba8().pixels().map(|p| p.0), kind, has_alpha);
-        }
-        Ok(())
-    }
-}
-
-fn fill_floats(space: &mut [u32], bytes: &[u8], size: [u32; 2], kind: Kind) -> std::result::Result<(), String> {
-    let film = decode(bytes)?;
-    if [film.width, film.height] != size {
-        return Err("its header says another size".to_owned());
-    }
-    let (mut colour, alpha) = (film.picture(None)?, film.channel("A"));
-    if matches!(kind, Kind::Color | Kind::Light) {
-        primaries::to_rec709(bytes, &mut colour);
-    }
-    for (i, (texel, rgb)) in space.iter_mut().zip(colour.pixels).enumerate() {
-        *texel = kind.word(rgb, alpha.map(|alpha| alpha.at(i)));
-    }
-    Ok(())
-}
-
-fn fill(space: &mut [u32], texels: impl Iterator<Item = [u8; 4]>, kind: Kind, has_alpha: bool) {
-    let same = |v: u8| u32::from_le_bytes([v; 4]);
-    for (texel, rgba) in space.iter_mut().zip(texels) {
-        *texel = match kind {
-            Kind::Color | Kind::Light | Kind::Data | Kind::Height => u32::from_le_bytes(rgba),
-            Kind::Mask => same(if has_alpha { rgba[3] } else { rgba[0] }),
-            Kind::Red => same(rgba[0]),
-            Kind::Alpha => same(if has_alpha { rgba[3] } else { 255 }),
-            Kind::Roughness => same(rgba[1]),
-        };
     }
 }
 

@@ -48,7 +48,7 @@ fn channels_are_picked_by_kind() {
 
 #[test]
 fn colours_are_those_of_rec_709_and_numbers_stay_as_they_are() {
-    use primaries::tests::{AP1, file};
+    use crate::image::primaries::tests::{AP1, file};
     for (kind, expected) in [(Kind::Color, 0.68667), (Kind::Light, 0.68667), (Kind::Data, 0.5)] {
         let found = decode(&file(Some(AP1), [0.5, 0.25, 0.125]), "a.exr", kind).unwrap();
         let red = rgb9e5::unpack(found.texels[0])[0];
@@ -85,6 +85,38 @@ fn large_pictures_are_decoded_where_memory_allows() {
         .unwrap();
     let found = decode(&bytes, "a.png", Kind::Color).unwrap();
     assert!(found.texels.len() == SIDE as usize * SIDE as usize && found.texels.iter().all(|&t| t == 0));
+}
+
+/// A grey PNG of 16 bits.
+fn deep(width: u32, height: u32, values: Vec<u16>) -> Vec<u8> {
+    let picture = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(width, height, values).unwrap();
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    bytes.into_inner()
+}
+
+#[test]
+fn numbers_of_16_bits_keep_them() {
+    // A ramp of 4096 steps over a tenth of the range, more rows than are converted at a time.
+    let ramp = |_: u32| (0..4096u32).map(|x| (x * 1638 / 1024) as u16);
+    let bytes = deep(4096, 70, (0..70).flat_map(ramp).collect());
+    for kind in [Kind::Height, Kind::Mask, Kind::Red, Kind::Roughness] {
+        let found = decode(&bytes, "a.png", kind).unwrap();
+        assert_eq!((found.textures[0].flags, found.texels.len()), (TEXTURE_FLOAT, 4096 * 70), "{kind:?}");
+        for row in found.texels.chunks(4096) {
+            let heights: Vec<_> = row.iter().map(|&word| f32::from_bits(word)).collect();
+            assert_eq!(heights[4095], 6550.0 / 65535.0);
+            let slope = |x: usize| (heights[x + 64] - heights[x]) * 65535.0 / 102.375;
+            assert!((0..4032).all(|x| (slope(x) - 1.0).abs() < 0.02), "{kind:?}: terraces");
+        }
+    }
+    for kind in [Kind::Color, Kind::Light, Kind::Data] {
+        let found = decode(&bytes, "a.png", kind).unwrap();
+        assert_eq!(found.textures[0].flags, kind.of_bytes());
+        assert_eq!(found.texels[4095].to_le_bytes(), [25, 25, 25, 255], "{kind:?}");
+    }
+    let alpha = decode(&bytes, "a.png", Kind::Alpha).unwrap();
+    assert_eq!(f32::from_bits(alpha.texels[7]), 1.0, "the file has none");
 }
 
 #[test]

@@ -1,0 +1,118 @@
+//! Pictures that are still to be decoded, and how their texels are filled.
+use super::{Kind, check_size, damaged};
+use crate::error::{Error, Result};
+use crate::image::{BAND, bands, check_end, claim, decode, has_16_bits, holds_floats, input, picture, primaries};
+use crate::layout::TEXTURE_FLOAT;
+use crate::scene::description::mesh::Bitmap;
+use std::path::Path;
+
+/// A picture to be decoded.
+pub enum Source {
+    /// The bytes of a file, and the size that its header says.
+    File(Vec<u8>, [u32; 2]),
+    /// The same of a PNG of 16 bits a channel.
+    Deep(Vec<u8>, [u32; 2]),
+    /// The same of an EXR or HDR file.
+    Floats(Vec<u8>, [u32; 2]),
+    Bitmap(Bitmap),
+}
+
+impl Source {
+    /// Reads a file and checks what its header says.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for what is no picture of a usable size.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = input::read(path)?;
+        check_end(&bytes).map_err(|what| Error::input(path, what))?;
+        let [width, height] = claim(&bytes).map_err(|what| damaged(path, what))?.size;
+        check_size(width, height).map_err(|what| Error::input(path, what))?;
+        let form = match () {
+            () if holds_floats(&bytes) => Self::Floats,
+            () if has_16_bits(&bytes) => Self::Deep,
+            () => Self::File,
+        };
+        Ok(form(bytes, [width, height]))
+    }
+
+    /// The TEXTURE_ bits of its texels.
+    pub fn form(&self, kind: Kind) -> u32 {
+        match self {
+            Self::Floats(..) => kind.of_floats(),
+            Self::Deep(..) if kind.is_number() => TEXTURE_FLOAT,
+            _ => kind.of_bytes(),
+        }
+    }
+
+    /// Width and height.
+    pub fn size(&self) -> [u32; 2] {
+        match self {
+            Self::File(_, size) | Self::Deep(_, size) | Self::Floats(_, size) => *size,
+            Self::Bitmap(bitmap) => [bitmap.width, bitmap.height],
+        }
+    }
+
+    /// Fills the texels.
+    ///
+    /// # Errors
+    /// What is wrong with the picture.
+    pub fn decode(self, kind: Kind, space: &mut [u32]) -> std::result::Result<(), String> {
+        let deep = matches!(self, Self::Deep(..)) && kind.is_number();
+        let (bytes, size) = match self {
+            Self::Bitmap(bitmap) => {
+                fill(space, bitmap.rgba.iter().copied(), kind, true);
+                return Ok(());
+            }
+            Self::Floats(bytes, size) => return fill_floats(space, &bytes, size, kind),
+            Self::File(bytes, size) | Self::Deep(bytes, size) => (bytes, size),
+        };
+        let picture = picture(&bytes)?;
+        if [picture.width(), picture.height()] != size {
+            return Err("its header says another size".to_owned());
+        }
+        let has_alpha = picture.color().has_alpha();
+        let rows = space.chunks_mut(BAND as usize * size[0] as usize);
+        for (space, band) in rows.zip(bands(&picture)) {
+            match deep {
+                true => fill_deep(space, band.into_rgba16().pixels().map(|p| p.0), kind, has_alpha),
+                false => fill(space, band.into_rgba8().pixels().map(|p| p.0), kind, has_alpha),
+            }
+        }
+        Ok(())
+    }
+}
+
+fn fill_floats(space: &mut [u32], bytes: &[u8], size: [u32; 2], kind: Kind) -> std::result::Result<(), String> {
+    let film = decode(bytes)?;
+    if [film.width, film.height] != size {
+        return Err("its header says another size".to_owned());
+    }
+    let (mut colour, alpha) = (film.picture(None)?, film.channel("A"));
+    if matches!(kind, Kind::Color | Kind::Light) {
+        primaries::to_rec709(bytes, &mut colour);
+    }
+    for (i, (texel, rgb)) in space.iter_mut().zip(colour.pixels).enumerate() {
+        *texel = kind.word(rgb, alpha.map(|alpha| alpha.at(i)));
+    }
+    Ok(())
+}
+
+fn fill_deep(space: &mut [u32], texels: impl Iterator<Item = [u16; 4]>, kind: Kind, has_alpha: bool) {
+    for (texel, rgba) in space.iter_mut().zip(texels) {
+        let [r, g, b, alpha] = rgba.map(|v| f32::from(v) / 65535.0);
+        *texel = kind.word([r, g, b], has_alpha.then_some(alpha));
+    }
+}
+
+fn fill(space: &mut [u32], texels: impl Iterator<Item = [u8; 4]>, kind: Kind, has_alpha: bool) {
+    let same = |v: u8| u32::from_le_bytes([v; 4]);
+    for (texel, rgba) in space.iter_mut().zip(texels) {
+        *texel = match kind {
+            Kind::Color | Kind::Light | Kind::Data | Kind::Height => u32::from_le_bytes(rgba),
+            Kind::Mask => same(if has_alpha { rgba[3] } else { rgba[0] }),
+            Kind::Red => same(rgba[0]),
+            Kind::Alpha => same(if has_alpha { rgba[3] } else { 255 }),
+            Kind::Roughness => same(rgba[1]),
+        };
+    }
+}
