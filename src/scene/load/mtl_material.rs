@@ -10,7 +10,8 @@
 //!
 //! Roughness: alpha = Pr^2; without Pr, sqrt(2 / (Ns + 2)) for coats and conductors, and smooth for 2 and 3.
 //! d (or 1 - Tr) and map_d are opacity except on dielectrics. `norm` wins over a bump map. Bump heights are `-bm` world
-//! units; without -bm, 0.0005 of the scene's diagonal. A black Kd under a map_Kd counts as white.
+//! units; without -bm, 0.0005 of the scene's diagonal. A bump map whose colours are those of a normal map is read as one, with `-bm`
+//! as the factor of its x and y. A black Kd under a map_Kd counts as white.
 use super::material::{Materials, radiance, reflectance};
 use super::metal;
 use super::mtl::{Map, Mtl, map};
@@ -74,11 +75,28 @@ impl Materials {
         if m.emission != [0.0; 3] {
             m.emission_texture = ask(mtl.map("map_Ke"), Kind::Light);
         }
+        self.mtl_relief(m, mtl, warn);
+    }
+
+    /// The bump or normal map. Blender writes normal maps as bump maps, with their strength as `-bm`.
+    fn mtl_relief(&mut self, m: &mut Material, mtl: &Mtl, warn: &mut Vec<String>) {
+        let textures = &mut self.textures;
         let (norm, bump) = (mtl.map("norm"), bump(mtl));
-        m.bump_scale = bump.as_ref().and_then(|b| b.bump).unwrap_or(1.0);
-        let normal_map = norm.is_some();
-        m.bump_texture = ask(norm.or(bump), if normal_map { Kind::Data } else { Kind::Height });
-        if m.bump_texture != NONE && normal_map {
+        let height = bump.as_ref().and_then(|b| b.bump).unwrap_or(1.0);
+        let said = norm.is_some();
+        let Some(Map { file, mapping, .. }) = norm.or(bump) else { return };
+        let seen = !said && textures.holds_normals(&mtl.directory, &file);
+        let kind = if said || seen { Kind::Data } else { Kind::Height };
+        m.bump_texture = textures.request(&mtl.directory, &file, kind, mapping, warn);
+        m.bump_scale = height;
+        if seen {
+            m.normal_scale = height;
+            let name = mtl.name();
+            let what =
+                "is read as a normal map, as its colours say: name it by norm, or save it in grey if it holds heights";
+            warn.push(format!("material \"{name}\": bump map {file} {what}"));
+        }
+        if m.bump_texture != NONE && kind == Kind::Data {
             m.flags |= MATERIAL_NORMAL_MAP;
         }
     }
@@ -136,4 +154,36 @@ fn mtl_interface(m: &mut Material, mtl: &Mtl, kind: Type, ks: [f32; 3], warn: &m
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::TEXTURE_SRGB;
+    use crate::scene::load::mtl;
+    use std::path::Path;
+
+    #[test]
+    fn bump_maps_that_hold_normals_are_read_as_normal_maps() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, color) in [("nrm.png", [128, 128, 255]), ("grey.png", [128; 3])] {
+            image::RgbImage::from_pixel(4, 4, image::Rgb(color)).save(folder.path().join(name)).unwrap();
+        }
+        let read = |text: &str| {
+            let block = &mtl::parse(&folder.path().join("a.mtl"), &format!("newmtl a\n{text}")).unwrap()[0];
+            let (mut materials, mut warnings) = (Materials::default(), Vec::new());
+            materials.push_mtl(block, &mut warnings).unwrap();
+            let textures = materials.textures.decode().unwrap().textures;
+            assert!(textures.len() == 1 && textures[0].flags & TEXTURE_SRGB == 0, "{text}");
+            let m = materials.list[0];
+            (m.flags & MATERIAL_NORMAL_MAP != 0, m.normal_scale, m.bump_scale, warnings)
+        };
+        let (normals, scale, _, said) = read("map_Bump -bm 0.25 nrm.png");
+        assert_eq!((normals, scale, said.len()), (true, 0.25, 1));
+        assert!(said[0].starts_with("material \"a\": bump map nrm.png is read as a normal map"), "{said:?}");
+        assert_eq!(read("map_Bump nrm.png").1, 1.0);
+        assert_eq!(read("map_Bump -bm 0.25 grey.png"), (false, 1.0, 0.25, Vec::new()));
+        assert_eq!(read("norm nrm.png\nmap_Bump -bm 0.25 nrm.png"), (true, 1.0, 0.25, Vec::new()));
+        assert!(read("norm grey.png").0, "control");
+    }
 }

@@ -1,4 +1,5 @@
 //! Decodes pictures to texels of 32 bits, on all cores and straight into the one texel array.
+mod normals;
 mod source;
 
 use super::find::find_file;
@@ -26,7 +27,7 @@ pub enum Kind {
     Data,
     /// Heights: the red channel, of floats without limits.
     Height,
-    /// Opacity: the alpha channel where the file has one, else red; copied to all channels.
+    /// Opacity: the alpha channel where the file has one and says something, else red; copied to all channels.
     Mask,
     /// Opacity: the alpha channel where the file has one, else 1; copied to all channels.
     Alpha,
@@ -80,6 +81,8 @@ pub struct TextureSet {
     /// Index of the picture and how it is mapped.
     wanted: Vec<(usize, Mapping)>,
     index: HashMap<(PathBuf, Kind, [u32; 7]), u32>,
+    /// Whether pictures that were asked about are normal maps.
+    normals: HashMap<PathBuf, bool>,
 }
 
 /// Device arrays of all pictures.
@@ -129,6 +132,19 @@ impl TextureSet {
             self.wanted.push((picture, mapping));
             next
         })
+    }
+
+    /// Whether the colours of a picture are those of a normal map in tangent space. False for what cannot be read, which is
+    /// reported when all are decoded.
+    pub fn holds_normals(&mut self, dir: &Path, file: &str) -> bool {
+        let in_memory = self.bitmaps.contains_key(Path::new(file)).then(|| file.into());
+        let Some(path) = in_memory.or_else(|| find_file(dir, file).map(|(path, _)| path)) else { return false };
+        if let Some(&known) = self.normals.get(&path) {
+            return known;
+        }
+        let found = self.source(&path).is_ok_and(|source| contained(|| normals::are_in(source)).unwrap_or(false));
+        self.normals.insert(path, found);
+        found
     }
 
     /// Whether a texture is read at the second set of coordinates.

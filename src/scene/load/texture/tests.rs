@@ -120,6 +120,34 @@ fn numbers_of_16_bits_keep_them() {
 }
 
 #[test]
+fn normal_maps_are_told_from_heights_by_their_colours() {
+    let seen = |name: &str, bytes: &[u8]| {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join(name), bytes).unwrap();
+        TextureSet::default().holds_normals(dir.path(), name)
+    };
+    let code = |v: f32| (127.5 + 127.5 * v).round() as u8;
+    let waves = |steep: f32, green: f32| -> Vec<u8> {
+        let texel = |i: u32| {
+            let (x, y) = (steep * (i as f32).sin(), green * steep * (1.7 * i as f32).cos());
+            [x, y, 1.0].map(|v| code(v / (x * x + y * y + 1.0).sqrt()))
+        };
+        (0..1600).flat_map(texel).collect()
+    };
+    for steep in [0.0, 0.3, 1.0] {
+        assert!(seen("a.png", &png(40, 40, &waves(steep, 1.0))) && seen("b.png", &png(40, 40, &waves(steep, -1.0))));
+    }
+    let map = image::RgbImage::from_raw(40, 40, waves(0.3, 1.0)).unwrap();
+    assert!(seen("a.jpg", &encoded(&map, image::ImageFormat::Jpeg)));
+    let grey: Vec<u8> = (0..1600u32).flat_map(|i| [(i * 7919 % 256) as u8; 3]).collect();
+    let noise: Vec<u8> = (0..4800u32).map(|i| (i * 7919 % 251) as u8).collect();
+    for heights in [grey, [40, 60, 240].repeat(1600), noise, vec![230; 4800]] {
+        assert!(!seen("a.png", &png(40, 40, &heights)));
+    }
+    assert!(!seen("a.png", b"not a picture") && !TextureSet::default().holds_normals(Path::new(""), "no.png"));
+}
+
+#[test]
 fn a_missing_file_is_a_warning_and_case_is_mended() {
     let dir = tempfile::tempdir().unwrap();
     std::fs::create_dir(dir.path().join("Tex")).unwrap();
