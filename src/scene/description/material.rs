@@ -88,7 +88,7 @@ pub struct MaterialTable {
     pub emission_texture: Option<TextureTable>,
     /// Opacity in [0, 1]; default 1.
     pub opacity: Option<f32>,
-    /// Picture that masks the surface by its alpha channel, or by its red channel where it has none.
+    /// Picture that masks the surface by its alpha channel, or by its red channel where it has none or is grey with full alpha throughout.
     pub opacity_texture: Option<TextureTable>,
     /// Height map that perturbs normals.
     pub bump: Option<TextureTable>,

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::image::{BAND, bands, check_end, claim, decode, has_16_bits, holds_floats, input, picture, primaries};
 use crate::layout::TEXTURE_FLOAT;
 use crate::scene::description::mesh::Bitmap;
+use image::DynamicImage;
 use std::path::Path;
 
 /// A picture to be decoded.
@@ -60,7 +61,8 @@ impl Source {
         let deep = matches!(self, Self::Deep(..)) && kind.is_number();
         let (bytes, size) = match self {
             Self::Bitmap(bitmap) => {
-                fill(space, bitmap.rgba.iter().copied(), kind, true);
+                let texels = || bitmap.rgba.iter().copied();
+                fill(space, texels(), kind, kind != Kind::Mask || !texels().all(|rgba| is_idle(rgba, 255)));
                 return Ok(());
             }
             Self::Floats(bytes, size) => return fill_floats(space, &bytes, size, kind),
@@ -70,7 +72,8 @@ impl Source {
         if [picture.width(), picture.height()] != size {
             return Err("its header says another size".to_owned());
         }
-        let has_alpha = picture.color().has_alpha();
+        let idle = |band: DynamicImage| band.into_rgba16().pixels().all(|p| is_idle(p.0, u16::MAX));
+        let has_alpha = picture.color().has_alpha() && (kind != Kind::Mask || !bands(&picture).all(idle));
         let rows = space.chunks_mut(BAND as usize * size[0] as usize);
         for (space, band) in rows.zip(bands(&picture)) {
             match deep {
@@ -82,12 +85,22 @@ impl Source {
     }
 }
 
+/// Whether a texel's alpha is full and its colour grey. A mask of such texels alone was saved with an alpha channel that says
+/// nothing, and red is the mask.
+fn is_idle<T: PartialEq>([r, g, b, alpha]: [T; 4], full: T) -> bool {
+    alpha == full && r == g && g == b
+}
+
 fn fill_floats(space: &mut [u32], bytes: &[u8], size: [u32; 2], kind: Kind) -> std::result::Result<(), String> {
     let film = decode(bytes)?;
     if [film.width, film.height] != size {
         return Err("its header says another size".to_owned());
     }
-    let (mut colour, alpha) = (film.picture(None)?, film.channel("A"));
+    let (mut colour, mut alpha) = (film.picture(None)?, film.channel("A"));
+    if let (Kind::Mask, Some(a)) = (kind, alpha) {
+        let idle = |(i, &[r, g, b]): (usize, &[f32; 3])| is_idle([r, g, b, a.at(i)], 1.0);
+        alpha = alpha.filter(|_| !colour.pixels.iter().enumerate().all(idle));
+    }
     if matches!(kind, Kind::Color | Kind::Light) {
         primaries::to_rec709(bytes, &mut colour);
     }

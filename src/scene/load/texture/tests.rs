@@ -120,6 +120,55 @@ fn numbers_of_16_bits_keep_them() {
 }
 
 #[test]
+fn masks_in_grey_are_read_from_red_where_alpha_says_nothing() {
+    use crate::image::{Film, Samples, WriteOptions, encode};
+    type Texels = [[u8; 4]; 2];
+    let bytes = |texels: Texels| {
+        let picture = image::RgbaImage::from_raw(2, 1, texels.concat()).unwrap();
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        picture.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+        bytes.into_inner()
+    };
+    let deep = |texels: Texels| {
+        let wide: Vec<_> = texels.concat().into_iter().map(|v| 257 * u16::from(v)).collect();
+        let picture = image::ImageBuffer::<image::Rgba<u16>, _>::from_raw(2, 1, wide).unwrap();
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        picture.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+        bytes.into_inner()
+    };
+    let floats = |texels: Texels| {
+        let mut film = Film::new(2, 1);
+        for (c, name) in ["R", "G", "B", "A"].into_iter().enumerate() {
+            film.add(name, Samples::F32(texels.iter().map(|rgba| f32::from(rgba[c]) / 255.0).collect()));
+        }
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        encode(Path::new("a.exr"), &film, &WriteOptions::default(), &mut bytes).unwrap();
+        bytes.into_inner()
+    };
+    let bitmap = |texels: Texels| {
+        let mut set = TextureSet::default();
+        set.add_bitmap(&Bitmap { name: "a".into(), width: 2, height: 1, rgba: texels.into() }).unwrap();
+        set.request(Path::new(""), "a", Kind::Mask, Mapping::default(), &mut Vec::new());
+        crate::threads::within(|| set.decode()).unwrap()
+    };
+    let cases = [
+        ([[51, 51, 51, 255], [204, 204, 204, 255]], [51, 204]),
+        ([[51, 51, 51, 255], [204, 204, 203, 255]], [255, 255]), // it has colour
+        ([[51, 51, 51, 255], [204, 204, 204, 102]], [255, 102]), // alpha says something
+    ];
+    for (texels, expected) in cases {
+        let words = |found: Decoded| found.texels.into_iter().map(|word| word.to_le_bytes()[0]).collect::<Vec<_>>();
+        assert_eq!(words(decode(&bytes(texels), "a.png", Kind::Mask).unwrap()), expected);
+        assert_eq!(words(bitmap(texels)), expected);
+        let expected = expected.map(|v| f32::from(v) / 255.0);
+        for (name, file) in [("a.png", deep(texels)), ("a.exr", floats(texels))] {
+            let found = decode(&file, name, Kind::Mask).unwrap();
+            assert_eq!([0, 1].map(|i| f32::from_bits(found.texels[i])), expected, "{name}");
+        }
+    }
+}
+
+#[test]
 fn normal_maps_are_told_from_heights_by_their_colours() {
     let seen = |name: &str, bytes: &[u8]| {
         let dir = tempfile::tempdir().unwrap();
