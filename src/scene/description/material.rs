@@ -48,6 +48,7 @@ pub enum Distribution {
 }
 
 /// A `[[material]]` table. Colours are linear Rec. 709, one number or `[r, g, b]`; files are relative to the scene file.
+/// Keys that the type does not read are named in a warning.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MaterialTable {

@@ -7,6 +7,7 @@
 //! [`Description::bitmap`] and [`EnvironmentTable::picture`] in place of files.
 pub(super) mod animation;
 pub(super) mod camera;
+pub(super) mod keys;
 pub(super) mod light;
 pub(super) mod material;
 pub(super) mod mesh;

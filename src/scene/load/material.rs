@@ -3,6 +3,7 @@ use super::mapping::Mapping;
 use super::metal;
 use super::texture::{Kind, TextureSet};
 use crate::layout::*;
+use crate::scene::description::keys;
 use crate::scene::description::material::{Distribution, MaterialTable, Type};
 use crate::scene::description::texture::TextureTable;
 use crate::scene::description::value::Rgb;
@@ -68,6 +69,7 @@ impl Materials {
     /// # Errors
     /// A sentence that names the key at fault.
     pub fn push_table(&mut self, t: &MaterialTable, directory: &Path, warn: &mut Vec<String>) -> Result<u32, String> {
+        warn.extend(keys::warning(t));
         let mut m = Self::plain([0.5; 3]);
         let named = |key: &str| format!("material \"{}\": {key}", t.name);
         let tint = |v: Option<Rgb>, or: f32, key: &str, warn: &mut Vec<String>| {

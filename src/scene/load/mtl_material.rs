@@ -161,7 +161,6 @@ mod tests {
     use super::*;
     use crate::layout::TEXTURE_SRGB;
     use crate::scene::load::mtl;
-    use std::path::Path;
 
     #[test]
     fn bump_maps_that_hold_normals_are_read_as_normal_maps() {
