@@ -323,6 +323,28 @@ fn what_is_legal_but_odd_is_a_warning() {
 }
 
 #[test]
+fn lamps_that_lie_on_others_are_told() {
+    let lamp = |name: &str, emission: u32| format!("[[material]]\nname = '{name}'\nemission = {emission}\n");
+    let placed =
+        |material: &str, more: &str| format!("[[mesh]]\nshape = 'rectangle'\nmaterial = '{material}'\n{more}\n");
+    let load = |second: String| {
+        let text = lamp("dim", 1) + &lamp("bright", 3) + &lamp("dark", 0) + &placed("dim", "") + &second;
+        Scene::parse(Path::new("scene.toml"), &text).unwrap().scene
+    };
+    for (material, more) in [("bright", ""), ("dim", "flip_normals = true"), ("bright", "flip_normals = true")] {
+        let said = load(placed(material, more)).warnings;
+        let expected = format!("lamps that lie on others: 2, the first of material \"{material}\" on one of \"dim\";");
+        assert!(said.len() == 1 && said[0].starts_with(&expected), "{said:?}");
+    }
+    for (material, more, lights) in
+        [("dim", "", 2), ("dark", "", 2), ("bright", "transform = { translate = [0, 0, 1] }", 4)]
+    {
+        let scene = load(placed(material, more));
+        assert_eq!((scene.warnings, scene.lights.len()), (Vec::new(), lights), "{material} {more}");
+    }
+}
+
+#[test]
 fn missing_normals_are_counted_unless_they_are_meant_to_be() {
     let dir = tempfile::tempdir().unwrap();
     let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\nvn 0 0 1\nvn 0 1 0\n";

@@ -62,6 +62,7 @@ pub fn assemble(path: &Path, description: &Description, choices: Choices, scene:
         warnings.push("the scene has no light: its image will be black".into());
     }
     warnings.extend(warn_of_panes(scene));
+    warnings.extend(lights::coincident(scene));
     scene.warnings = warnings;
     scene.rig.name(description, &scene.materials);
     scene.rig.content = scene.content.clone();

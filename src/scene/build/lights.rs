@@ -143,8 +143,7 @@ fn add_triangles(scene: &Scene, lights: &mut Vec<Light>, numbers: &mut Vec<u64>)
 fn drop_copies(start: usize, lights: &mut Vec<Light>, numbers: &mut Vec<u64>) {
     let place = |i: usize| {
         let light = &lights[start + i];
-        // Adding 0 makes -0 the same.
-        let corners = [light.a, light.b, light.c].map(|p| p.map(|x| (x + 0.0).to_bits()));
+        let corners = corners(light);
         let turned = [0, 1, 2].map(|first| [0, 1, 2].map(|i| corners[(first + i) % 3]));
         let least = turned.into_iter().min().unwrap_or(corners);
         (least, [light.material, u32::from(light.kind == LIGHT_SPHERE)])
@@ -157,6 +156,31 @@ fn drop_copies(start: usize, lights: &mut Vec<Light>, numbers: &mut Vec<u64>) {
     let [mut kept, mut named] = [(); 2].map(|()| std::iter::repeat_n(&true, start).chain(&first));
     lights.retain(|_| kept.next().is_some_and(|first| *first));
     numbers.retain(|_| named.next().is_some_and(|first| *first));
+}
+
+/// Bits of a lamp's corners. Adding 0 makes -0 the same.
+fn corners(light: &Light) -> [[u32; 3]; 3] {
+    [light.a, light.b, light.c].map(|p| p.map(|x| (x + 0.0).to_bits()))
+}
+
+/// A warning about lamps that lie on others of another material or front. None of them can be dropped: which of two rays meet depends
+/// on their direction and on how the hierarchy is walked.
+pub fn coincident(scene: &Scene) -> Option<String> {
+    let has_surface = |l: &&Light| matches!(l.kind, LIGHT_TRIANGLE | LIGHT_MIRRORED | LIGHT_SPHERE);
+    let lamps: Vec<_> = scene.lights.iter().filter(has_surface).collect();
+    let place = |i: usize| {
+        let mut corners = corners(lamps[i]);
+        corners.sort_unstable(); // whichever side is in front
+        corners
+    };
+    let first = geometry::firsts(lamps.len(), |i| xxh3_64(bytemuck::bytes_of(&place(i))), place);
+    let upper = first.iter().position(|first| !first)?;
+    let lower = (0..upper).find(|&i| place(i) == place(upper))?;
+    let count = first.iter().filter(|first| !**first).count();
+    let [lower, upper] =
+        [lower, upper].map(|i| scene.names.materials.get(lamps[i].material as usize).map_or("", |n| n));
+    let what = "rays meet either, while both are sampled: remove one, or move it";
+    Some(format!("lamps that lie on others: {count}, the first of material \"{upper}\" on one of \"{lower}\"; {what}"))
 }
 
 /// Makes room for `more` lights, and checks memory for twice that: their table, powers and probabilities take as much again.

@@ -13,7 +13,7 @@ const SPECULAR: &[Type] = &[Conductor, Dielectric, Mirror, Coated, MetallicRough
 const METALLIC: &[Type] = &[MetallicRoughness];
 
 /// All keys but `name` and `type`.
-const KEYS: [Key; 40] = [
+const KEYS: [Key; 41] = [
     ("color", |t| t.color.is_some(), OPAQUE),
     ("color_texture", |t| t.color_texture.is_some(), ALL),
     ("alpha", |t| t.alpha != 0.0, MICROFACETS),
@@ -29,6 +29,7 @@ const KEYS: [Key; 40] = [
     ("emission", |t| t.emission.is_some(), ALL),
     ("emission_texture", |t| t.emission_texture.is_some(), ALL),
     ("emission_strength", |t| t.emission_strength.is_some(), ALL),
+    ("emission_two_sided", |t| t.emission_two_sided, ALL),
     ("opacity", |t| t.opacity.is_some(), OPAQUE),
     ("opacity_texture", |t| t.opacity_texture.is_some(), OPAQUE),
     ("bump", |t| t.bump.is_some(), BUMPED),
@@ -97,7 +98,7 @@ mod tests {
             "distribution" => "ggx".into(),
             "metal" => "Au".into(),
             "alpha_mode" => "mask".into(),
-            "nonlinear" | "unlit" => true.into(),
+            "emission_two_sided" | "nonlinear" | "unlit" => true.into(),
             "two_sided" => false.into(),
             "bump" => "a.png".into(),
             key if key.ends_with("_texture") || key.ends_with("_map") => "a.png".into(),
