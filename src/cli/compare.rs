@@ -168,8 +168,9 @@ fn write_diff(path: &Path, a: &Picture, b: &Picture) -> Result<f32> {
 
 fn report(args: &Args, m: &Metrics, scale: Option<f32>, exceeded: &[String]) -> Result<()> {
     if args.json {
-        let diff = args.diff.as_ref().zip(scale).map(|(path, top)| json!({ "file": path, "scale": [0.0, top] }));
-        let (a, b, layer) = (&args.a, &args.b, &args.layer);
+        let text = |path: &Path| path.display().to_string();
+        let diff = args.diff.as_ref().zip(scale).map(|(path, top)| json!({ "file": text(path), "scale": [0.0, top] }));
+        let (a, b, layer) = (text(&args.a), text(&args.b), &args.layer);
         return print_json(
             &json!({ "a": a, "b": b, "layer": layer, "metrics": m, "diff": diff, "exceeded": exceeded }),
         );

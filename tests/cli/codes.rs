@@ -91,6 +91,26 @@ fn pipes_and_folders_are_refused_and_odd_names_are_not() {
 }
 
 #[test]
+#[cfg(target_os = "linux")]
+fn documents_of_compare_name_files_that_are_not_utf_8() {
+    use std::os::unix::ffi::OsStringExt;
+    let folder = tempfile::tempdir().unwrap();
+    let odd = std::ffi::OsString::from_vec(b"caf\xe9.exr".to_vec());
+    let run = |words: &str| {
+        let words = words.split(' ').map(|word| if word == "ODD" { odd.as_os_str() } else { word.as_ref() });
+        Command::new(env!("CARGO_BIN_EXE_tallow")).args(words).current_dir(folder.path()).output().unwrap()
+    };
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/scene.toml");
+    assert!(run(&format!("render {scene} --width 16 --height 16 --spp 4 --quiet -o ODD")).status.success());
+    for words in ["compare ODD ODD --diff d.png --json", "compare ODD ODD --statistical --map m.png --json"] {
+        let output = run(words);
+        let json: Value = serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{words}: {output:?}"));
+        let name = if json["a"].is_string() { &json["a"] } else { &json["a"]["file"] };
+        assert_eq!(name, "caf\u{fffd}.exr", "{words}");
+    }
+}
+
+#[test]
 fn limits_set_the_exit_code() {
     let folder = tempfile::tempdir().unwrap();
     write(&folder, "a.exr", 12, 0.5);

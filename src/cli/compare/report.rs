@@ -54,7 +54,7 @@ impl Side {
             ["software", "scene", "sceneFingerprint", "device", "driver", "cpu", "sampleRanges", "settings"];
         let said = |key: &str| Some((key.to_owned(), Value::from(self.film.metadata.get(key)?.clone())));
         let mut origin: serde_json::Map<_, _> = KEYS.iter().filter_map(|key| said(key)).collect();
-        origin.insert("file".to_owned(), json!(self.path));
+        origin.insert("file".to_owned(), json!(self.path.display().to_string()));
         Value::Object(origin)
     }
 }

@@ -109,8 +109,10 @@ fn check_outputs(a: &Path, b: &Path, args: &Args) -> Result<()> {
 
 fn summary(report: &Report, args: &Args, full: Option<f32>) -> Value {
     let mut figures = report.figures();
-    figures["map"] = json!(args.map.as_ref().zip(full).map(|(path, full)| json!({ "file": path, "full": full })));
-    figures["evidence"] = json!(args.evidence.as_ref().filter(|_| failed(report)));
+    let text = |path: &Path| path.display().to_string();
+    let map = args.map.as_ref().zip(full).map(|(path, full)| json!({ "file": text(path), "full": full }));
+    figures["map"] = json!(map);
+    figures["evidence"] = json!(args.evidence.as_deref().filter(|_| failed(report)).map(text));
     figures
 }
 
