@@ -166,6 +166,35 @@ fn carries_and_goes_on(way: &str) {
     }
 }
 
+/// Keys call for an effect now and then; a renderer that is made anew for it has no samples to carry.
+#[test]
+fn effects_of_frames_that_are_not_rendered_change_no_bit() {
+    let folder = stage();
+    let scene = "[environment]\n[[mesh]]\nshape = 'cube'\nmaterial = 'm'\n\
+                 [[material]]\nname = 'm'\ntype = 'conductor'\nalpha = 0.3\n[camera]\nposition = [0, 1, 4]\ntarget = [0, 0, 0]\n\
+                 [[animation]]\ncamera = true\nkeys = [{ time = 0, position = [0, 1, 4] }, { time = 8, position = [1, 1, 4] }]\n\
+                 [[animation]]\nmaterial = 'm'\ninterpolation = 'step'\nkeys = [{ time = 0, alpha = 0.001 }, \
+                 { time = 2, alpha = 0.3 }, { time = 5, alpha = 0.001 }]\n";
+    fs::write(folder.path().join("s.toml"), scene).unwrap();
+    let words = |more: &str| format!("--fps 1 --reproject forward --reproject-error 1 --quiet {more}");
+    let check = |whole: &str, parts: &str, numbers: std::ops::Range<u32>| {
+        for n in numbers {
+            let [a, b] = [whole, parts].map(|name| bits(&folder, &name.replace('#', &n.to_string())));
+            assert!(a == b, "frame {n} of {parts}");
+        }
+    };
+    well(&folder, &words("--frames 0..7 -o a.#.exr"));
+    well(&folder, &words("--frames 0..3 -o b.#.exr"));
+    well(&folder, &words("--frames 0..7 -o b.#.exr"));
+    check("a.#.exr", "b.#.exr", 0..7);
+    let carried = |(name, samples): &(String, Vec<u32>)| name == "carried.samples" && samples.iter().any(|&n| n > 0);
+    assert!(bits(&folder, "a.5.exr").iter().any(carried), "control: the frame of the last key carries samples");
+    // Only the first frames call for a smooth interface before the last key.
+    [5, 6].iter().for_each(|n| fs::remove_file(folder.path().join(format!("a.{n}.exr"))).unwrap());
+    well(&folder, &words("--frames 0..7 --only 3..7 -o a.#.exr"));
+    check("b.#.exr", "a.#.exr", 5..7);
+}
+
 #[test]
 fn without_frames_all_of_the_animation_is_rendered() {
     let folder = stage();

@@ -3,6 +3,7 @@ mod chain;
 mod preview;
 mod range;
 mod stage;
+mod survey;
 
 use super::common::{check_fps, with_ranges};
 use super::render::{self, outputs};

@@ -1,6 +1,7 @@
 //! What a sequence keeps from frame to frame: the scene, its motion, and the renderer.
 use super::chain::Chain;
 use super::preview::Preview;
+use super::survey::Survey;
 use super::{Args, FrameReport};
 use crate::cli::render::{self, EffectChoice, Spans, outputs};
 use crate::cli::{Exit, complain};
@@ -29,7 +30,7 @@ pub struct Stage<'a> {
     /// Numbers of all frames.
     frames: Range<u32>,
     settings: Settings,
-    /// Effects of the scene as it was loaded, and of all frames so far.
+    /// Effects of all frames that were looked at: see [`Survey::effects`].
     rest: Effects,
     renderer: Option<Renderer>,
     /// What the renderer has not been told of.
@@ -97,7 +98,8 @@ impl<'a> Stage<'a> {
         let gpu = args.render.common.open(args.render.tracing)?;
         render::check_room(&args.render, &settings, &gpu)?;
         render::check_stride(&args.render, &settings)?;
-        let rest = called_for(&scene, &settings, args.render.wanted());
+        let survey = Survey { scene: &scene, animation: &animation, frames: &frames, fps: args.fps };
+        let rest = survey.effects(&settings, args.render.wanted());
         let reproject = carrying(args, &gpu, &scene, &settings, !animation.is_empty())?;
         let moves = Moves::of(&animation)?;
         let (renderer, change, chain, held) = (None, Change::default(), Chain::default(), None);
@@ -150,6 +152,8 @@ impl<'a> Stage<'a> {
         if let Some(film) = self.finished_film(&args, &settings).filter(|_| !self.args.again) {
             end.skipped = true;
             outputs::save_pictures(&args, &film)?;
+            // A run that was not interrupted has compiled in what this frame calls for.
+            self.rest = self.rest.or(called_for(&self.scene, &settings, self.wanted()));
             self.chain = self.chain.or_of(&film).with(&self.scene, &settings, self.reproject)?;
             return show(preview, &film, &args).map(|()| Exit::Done);
         }
@@ -246,7 +250,7 @@ impl<'a> Stage<'a> {
         }
         let wanted = self.wanted();
         let effects = match self.args.render.effects {
-            EffectChoice::All => all_effects(&self.scene, settings),
+            EffectChoice::All => self.rest.or(all_effects(&self.scene, settings)),
             EffectChoice::Auto => self.rest.or(called_for(&self.scene, settings, wanted)),
         };
         let mut renderer = Renderer::specialised(&self.gpu, &self.scene, settings, wanted, effects)?;

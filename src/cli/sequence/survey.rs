@@ -1,0 +1,91 @@
+//! What the frames of a sequence have in common, found before the first: a frame is the same whichever others are rendered.
+use crate::layout::Effects;
+use crate::render::Outputs;
+use crate::render::called_for;
+use crate::render::settings::Settings;
+use crate::scene::animation::Animation;
+use crate::scene::{Pose, Scene};
+use std::ops::Range;
+
+/// Frames that are looked at for effects: of more, some that are spread evenly.
+const FOR_EFFECTS: u32 = 256;
+
+/// The frames of a sequence.
+pub struct Survey<'a> {
+    /// As it was loaded.
+    pub scene: &'a Scene,
+    /// What moves it.
+    pub animation: &'a Animation,
+    /// Their numbers.
+    pub frames: &'a Range<u32>,
+    /// Frames per second.
+    pub fps: f64,
+}
+
+impl Survey<'_> {
+    /// The effects that any frame calls for. A frame that lacked one would get a new renderer, which has no samples to carry.
+    pub fn effects(&self, settings: &Settings, outputs: Outputs) -> Effects {
+        let mut effects = called_for(self.scene, settings, outputs);
+        let mut scene = None;
+        // The vertices of skins and files take longer to find than all else of a pose, and call for nothing.
+        let looks = |pose: &Pose| pose.camera.is_some() || shines(pose);
+        for pose in self.poses(FOR_EFFECTS, looks) {
+            if let Some(camera) = &pose.camera {
+                effects.lens |= camera.lens_radius > 0.0;
+                effects.orthographic |= camera.orthographic.is_some();
+            }
+            let pose = Pose { camera: None, instances: Vec::new(), meshes: Vec::new(), ..pose };
+            if !shines(&pose) {
+                continue;
+            }
+            let scene = scene.get_or_insert_with(|| self.scene.clone());
+            if scene.apply(&pose).is_ok() {
+                effects = effects.or(called_for(scene, settings, outputs));
+            }
+        }
+        effects
+    }
+
+    /// Some of the poses, of those movers whose first one is `wanted`. What cannot be posed is left out: its frame says so.
+    fn poses(&self, most: u32, wanted: impl Fn(&Pose) -> bool) -> impl Iterator<Item = Pose> {
+        let mut movers = self.animation.movers.clone();
+        movers.retain(|mover| {
+            let mut pose = Pose::default();
+            mover.pose(self.seconds(self.frames.start), &mut pose).is_ok() && wanted(&pose)
+        });
+        let most = if movers.is_empty() { 0 } else { most };
+        let animation = Animation { movers };
+        spread(self.frames, most).filter_map(move |number| animation.at(self.seconds(number)).ok())
+    }
+
+    fn seconds(&self, number: u32) -> f64 {
+        f64::from(number) / self.fps
+    }
+}
+
+/// Whether it changes light or matter.
+fn shines(pose: &Pose) -> bool {
+    !(pose.materials.is_empty() && pose.lights.is_empty()) || pose.environment.is_some()
+}
+
+/// So many of the frames, evenly, with the first and the last; or all.
+fn spread(frames: &Range<u32>, most: u32) -> impl Iterator<Item = u32> {
+    let (first, steps) = (frames.start, frames.end - frames.start - 1);
+    let count = most.min(steps.saturating_add(1));
+    let at = move |i: u32| (u64::from(i) * u64::from(steps) / u64::from(count.max(2) - 1)) as u32;
+    (0..count).map(move |i| first + at(i))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::spread;
+
+    #[test]
+    fn frames_are_spread_from_the_first_to_the_last() {
+        let of = |frames, most| spread(&frames, most).collect::<Vec<_>>();
+        assert_eq!((of(7..8, 4), of(3..7, 4)), (vec![7], vec![3, 4, 5, 6]));
+        assert!(of(3..7, 0).is_empty());
+        assert_eq!(of(10..20, 4), [10, 13, 16, 19]);
+        assert_eq!(of(0..u32::MAX, 3), [0, (u32::MAX - 1) / 2, u32::MAX - 1]);
+    }
+}
