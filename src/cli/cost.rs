@@ -14,6 +14,7 @@ use crate::scene::{Scene, SceneFile};
 pub use options::Args;
 use output::{Folder, Shown, text};
 use points::Points;
+use serde::Serialize;
 use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -38,7 +39,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let runs_before = earlier.as_ref().map_or(0, runs);
     let found = watched(args, &folder, |watch| measure(&gpu, &scene, &plan, earlier, watch))?;
     fail_on_messages(&gpu)?;
-    finish(args, &folder, found, runs_before)
+    finish(args, &folder, found, runs_before, &scene.warnings)
 }
 
 fn plan(args: &Args, path: &Path, scene: &Scene, points: Points, gpu: &Gpu) -> Result<Plan> {
@@ -76,12 +77,22 @@ fn watched<T>(args: &Args, folder: &Folder, measure: impl FnOnce(&Watch) -> Resu
     found
 }
 
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report<'a> {
+    #[serde(flatten)]
+    document: &'a Document,
+    /// What was repaired in the scene.
+    warnings: &'a [String],
+}
+
 /// Writes and prints what was found.
 fn finish(
     args: &Args,
     folder: &Folder,
     (document, images, ended): (Document, Images, Ended),
     runs_before: usize,
+    warnings: &[String],
 ) -> Result<Exit> {
     if ended == Ended::Stopped && runs(&document) == runs_before {
         complain("interrupted before a run was complete: nothing was written");
@@ -90,7 +101,7 @@ fn finish(
     let (document, images) = (&document, &images);
     let written = folder.write(document, images, ended == Ended::Complete);
     match (args.json, args.quiet) {
-        (true, _) => print_json(document)?,
+        (true, _) => print_json(&Report { document, warnings })?,
         (false, true) => {}
         (false, false) => print(&text(document, &written))?,
     }

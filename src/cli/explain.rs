@@ -1,5 +1,5 @@
 //! `tallow explain`: lists the effects that a scene needs and measures what each of them costs.
-use super::{Exit, print, print_json, readable};
+use super::{Exit, complain, print, print_json, readable};
 use crate::error::{Error, Result};
 use crate::gpu::{DeviceKind, DeviceOptions, FrameResources, Gpu, PassTime};
 use crate::layout::*;
@@ -24,9 +24,17 @@ pub struct Args {
     /// Device, by index or part of its name [default: the best one]
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
-    /// Print one JSON array
+    /// Print one JSON object
     #[arg(long)]
     pub json: bool,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report {
+    effects: Vec<EffectRow>,
+    /// What was repaired in the scene.
+    warnings: Vec<String>,
 }
 
 /// One effect of a render that writes an EXR file. Costs that were not measured are `None`.
@@ -57,11 +65,19 @@ pub fn run(args: &Args) -> Result<Exit> {
     if COLD.iter().any(|(name, value)| std::env::var(name).as_deref() != Ok(*value)) {
         return run_cold();
     }
-    let rows = rows(args)?;
-    if args.json {
-        print_json(&rows)?;
-    } else {
-        print(&text(&rows))?;
+    let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), ..DeviceOptions::default() })?;
+    let pixels = PIXELS_BY_KIND[usize::from(gpu.info().kind != DeviceKind::Cpu)];
+    let mut file = SceneFile::open(&args.scene)?;
+    file.stays_still();
+    let scene = file.load()?.with(|s| shrink(s, pixels));
+    let warnings = scene.warnings.clone();
+    if !args.json {
+        warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
+    }
+    let effects = rows(args, &scene)?;
+    match args.json {
+        true => print_json(&Report { effects, warnings })?,
+        false => print(&text(&effects))?,
     }
     Ok(Exit::Done)
 }
@@ -135,14 +151,9 @@ impl Variant {
     }
 }
 
-fn rows(args: &Args) -> Result<Vec<EffectRow>> {
-    let gpu = Gpu::open(&DeviceOptions { device: args.device.clone(), ..DeviceOptions::default() })?;
-    let pixels = PIXELS_BY_KIND[usize::from(gpu.info().kind != DeviceKind::Cpu)];
-    let mut file = SceneFile::open(&args.scene)?;
-    file.stays_still();
-    let scene = file.load()?.with(|s| shrink(s, pixels));
+fn rows(args: &Args, scene: &Loaded) -> Result<Vec<EffectRow>> {
     let outputs = Outputs { split_light: true, guides: true, counters: false };
-    let (base, reasons) = scene::effects(&scene, &scene.settings, outputs.split_light, outputs.counters);
+    let (base, reasons) = scene::effects(scene, &scene.settings, outputs.split_light, outputs.counters);
     let called_for_by = |effect| reasons.iter().find(|(of, _)| *of == effect).map_or("", |(_, by)| by).to_owned();
     let names: Vec<_> = Effect::ALL.iter().map(|effect| effect.name()).chain([GUIDES]).collect();
     if let Some(unknown) = args.effects.iter().find(|name| !names.contains(&name.as_str())) {
@@ -150,12 +161,12 @@ fn rows(args: &Args) -> Result<Vec<EffectRow>> {
     }
     let wanted = |name: &str| args.effects.is_empty() || args.effects.iter().any(|effect| effect == name);
     let bar = ProgressBar::new(names.iter().filter(|name| wanted(name)).count() as u64);
-    let usual = || Variant::new(args, &scene, outputs, base);
+    let usual = || Variant::new(args, scene, outputs, base);
     let first = usual()?.cost.compile_ms;
     let mut usual = usual()?;
     usual.cost.compile_ms = usual.cost.compile_ms.min(first);
     let mut price = |(effect, on): (&'static str, bool), outputs_then, effects_then| {
-        let (usual, other) = beside(&mut usual, || Variant::new(args, &scene, outputs_then, effects_then))?;
+        let (usual, other) = beside(&mut usual, || Variant::new(args, scene, outputs_then, effects_then))?;
         let (with, without) = if on { (usual, other) } else { (other, usual) };
         bar.inc(1);
         Ok::<_, Error>(EffectRow {
@@ -174,7 +185,7 @@ fn rows(args: &Args) -> Result<Vec<EffectRow>> {
         let then = base.toggled(effect);
         let outputs_then = Outputs { split_light: then.split_light, counters: then.counters, ..outputs };
         let row = price((effect.name(), on), outputs_then, then)?;
-        let bytes = row.bytes + scene_bytes(effect, &scene);
+        let bytes = row.bytes + scene_bytes(effect, scene);
         let row = EffectRow { called_for_by: called_for_by(effect), bytes, ..row };
         // With and without it are different renders and not one picture at two costs; `tools/papers policies` compares them.
         let unknown = EffectRow { gpu_ms_with: None, gpu_ms_without: None, compile_ms: None, ..row.clone() };

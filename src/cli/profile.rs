@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::gpu::Tracing;
 use crate::image::output;
 use crate::profile::{Comparison, Profile, Verdict};
+use fresh::Fresh;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -63,6 +64,8 @@ pub struct Args {
 struct Report<'a> {
     #[serde(flatten)]
     profile: &'a Profile,
+    /// What was repaired in the scene; empty for an earlier profile.
+    warnings: &'a [String],
     /// Only with `--compare`.
     #[serde(skip_serializing_if = "Option::is_none")]
     comparison: Option<&'a Comparison>,
@@ -76,8 +79,8 @@ struct Report<'a> {
 pub fn run(args: &Args) -> Result<Exit> {
     check_outputs(args)?;
     let old = args.compare.as_deref().map(Profile::read).transpose()?;
-    let (profile, trace) = match args.is_earlier() {
-        true => (Profile::read(&args.scene)?, None),
+    let Fresh { profile, trace, warnings } = match args.is_earlier() {
+        true => Fresh { profile: Profile::read(&args.scene)?, trace: None, warnings: Vec::new() },
         false => fresh::profile(args, old.as_ref())?,
     };
     let comparison = old.map(|old| Comparison::new(&old, &profile)).transpose()?;
@@ -86,7 +89,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let items: Vec<_> = csv.chain(trace).collect();
     let mut files = Files::default();
     files.save(&items, true);
-    report(args, &profile, comparison.as_ref())?;
+    report(args, &profile, &warnings, comparison.as_ref())?;
     files.pipe(&items, true);
     files.failure().map_or(Ok(()), Err)?;
     Ok(match comparison.map(|found| found.verdict) {
@@ -130,9 +133,9 @@ fn check_outputs(args: &Args) -> Result<()> {
     check_distinct(&outputs, &inputs)
 }
 
-fn report(args: &Args, profile: &Profile, comparison: Option<&Comparison>) -> Result<()> {
+fn report(args: &Args, profile: &Profile, warnings: &[String], comparison: Option<&Comparison>) -> Result<()> {
     if args.json {
-        return print_json(&Report { profile, comparison });
+        return print_json(&Report { profile, warnings, comparison });
     }
     let of_profile = if args.quiet { String::new() } else { text::of_profile(profile) };
     let of_comparison = comparison.map_or_else(String::new, |found| text::of_comparison(found, args.quiet));

@@ -30,7 +30,8 @@ fn primary_hits_are_found_only_for_files_that_keep_them() {
 #[test]
 fn explain_tells_what_effects_cost() {
     let folder = tempfile::tempdir().unwrap();
-    let rows = json(&folder, &["explain", BOX, "textures", "emissive", "adaptive", "guides", "--json"]);
+    let document = json(&folder, &["explain", BOX, "textures", "emissive", "adaptive", "guides", "--json"]);
+    let rows = &document["effects"];
     let names: Vec<_> = rows.as_array().unwrap().iter().map(|row| row["effect"].as_str().unwrap()).collect();
     assert_eq!(names, ["textures", "emissive", "adaptive", "guides"]);
     let [textures, emissive, adaptive, guides] = [0, 1, 2, 3].map(|i| &rows[i]);
@@ -39,7 +40,7 @@ fn explain_tells_what_effects_cost() {
     // All that reads surfaces, lights and maps is compiled: a fifth of the pipelines' time, several times what it varies by
     // where nothing else takes it.
     let compiles = |row: &Value| row["compile_ms"].as_f64().unwrap() > 0.0;
-    let again = || compiles(&json(&folder, &["explain", BOX, "textures", "--json"])[0]);
+    let again = || compiles(&json(&folder, &["explain", BOX, "textures", "--json"])["effects"][0]);
     assert!(compiles(textures) || again() || again(), "{textures}");
     for row in [textures, emissive, guides] {
         let [with, without] = ["gpu_ms_with", "gpu_ms_without"].map(|name| row[name].as_f64().unwrap());
@@ -60,4 +61,29 @@ fn explain_knows_its_effects() {
     let folder = tempfile::tempdir().unwrap();
     complains(&tallow(&folder, &["explain", BOX, "texture"]), 2, &["\"texture\"", "textures", "guides"]);
     complains(&tallow(&folder, &["explain", "nope.toml"]), 3, &["nope.toml"]);
+}
+
+#[test]
+fn what_was_repaired_in_a_scene_is_in_every_document() {
+    let folder = tempfile::tempdir().unwrap();
+    let dark =
+        "[film]\nwidth = 8\nheight = 8\n[render]\nspp = 1\n[[mesh]]\nshape = 'cube'\n[environment]\nradiance = 0\n";
+    std::fs::write(folder.path().join("dark.toml"), dark).unwrap();
+    for words in [
+        "explain dark.toml lens",
+        "profile dark.toml --frames 2",
+        "sequence dark.toml --frames 0..2 -o f.#.png",
+        "cost dark.toml --spp 1 --denoise none --repeats 2 --reference-spp 64 -o results",
+    ] {
+        let plain: Vec<_> = words.split(' ').collect();
+        let document = json(&folder, &[&plain[..], &["--json"]].concat());
+        let warnings: Vec<_> =
+            document["warnings"].as_array().unwrap_or_else(|| panic!("{words}: {document}")).iter().collect();
+        assert!(warnings.iter().any(|w| w.as_str().unwrap().contains("has no light")), "{words}: {document}");
+        let moves = warnings.iter().any(|w| w.as_str().unwrap().contains("nothing moves"));
+        assert_eq!(moves, words.starts_with("sequence"), "{words}: {document}");
+    }
+    let told = tallow(&folder, &["explain", "dark.toml", "lens"]);
+    let line = String::from_utf8(told.stderr).unwrap();
+    assert!(line.starts_with("warning: ") && line.contains("has no light"), "{line}");
 }

@@ -41,7 +41,7 @@ pub fn run(args: &Args, image: &Path) -> Result<Exit> {
     let runs_before = earlier.as_ref().map_or(0, runs);
     let found = watched(args, &folder, |watch| measure_filters(&gpu, &plan, earlier, watch))?;
     fail_on_messages(&gpu)?;
-    finish(args, &folder, found, runs_before)
+    finish(args, &folder, found, runs_before, &[])
 }
 
 /// Every filter, with its defaults and with the options of each variant that changes it.

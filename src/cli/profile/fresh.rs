@@ -15,11 +15,21 @@ use indicatif::{ProgressBar, ProgressDrawTarget};
 /// Frames that are timed unless a number is given.
 const FRAMES: u16 = 20;
 
-/// The profile of a scene, to be compared with an old one if there is one, and the trace of its frames.
+/// A profile, with what is told beside it.
+pub struct Fresh {
+    /// What its frames took.
+    pub profile: Profile,
+    /// Of its frames, where it is asked for.
+    pub trace: Option<String>,
+    /// What was repaired in the scene.
+    pub warnings: Vec<String>,
+}
+
+/// The profile of a scene, to be compared with an old one if there is one.
 ///
 /// # Errors
 /// As a render of the scene; [`Error::Usage`] for an old profile of something else.
-pub fn profile(args: &Args, old: Option<&Profile>) -> Result<(Profile, Option<String>)> {
+pub fn profile(args: &Args, old: Option<&Profile>) -> Result<Fresh> {
     let filter = args.denoise.map(row).transpose()?;
     let mut file = SceneFile::open(&args.scene)?;
     file.stays_still();
@@ -44,7 +54,7 @@ pub fn profile(args: &Args, old: Option<&Profile>) -> Result<(Profile, Option<St
     fail_on_messages(&gpu)?;
     let denoise = filter.map(|row| row.name.to_owned());
     let profile = Profile { denoise, ..Profile::new(&gpu, &args.scene, &scene, &settings, &measured)? };
-    Ok((profile, args.trace.is_some().then(|| trace(&measured))))
+    Ok(Fresh { profile, trace: args.trace.is_some().then(|| trace(&measured)), warnings: scene.warnings })
 }
 
 /// Frames may run for long; what they cannot be compared with is told before.

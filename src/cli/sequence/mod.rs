@@ -163,6 +163,8 @@ struct Summary {
     interrupted: bool,
     seconds: f64,
     device: String,
+    /// What was repaired in the scene, and what else is odd.
+    warnings: Vec<String>,
 }
 
 /// Runs the subcommand.
@@ -184,7 +186,8 @@ pub fn run(args: &Args) -> Result<Exit> {
     let failed = reports.iter().filter(|report| report.error.is_some()).count();
     let (seconds, device) = (begun.elapsed().as_secs_f64(), stage.gpu().info().name.clone());
     if args.render.common.json {
-        print_json(&Summary { frames: reports, failed, interrupted: interrupted.is_some(), seconds, device })?;
+        let (warnings, interrupted) = (stage.warnings().to_vec(), interrupted.is_some());
+        print_json(&Summary { frames: reports, failed, interrupted, seconds, device, warnings })?;
     }
     interrupted.iter().for_each(|line| complain(line));
     Ok(match interrupted {

@@ -30,6 +30,8 @@ pub struct Stage<'a> {
     /// Numbers of all frames.
     frames: Range<u32>,
     settings: Settings,
+    /// What was repaired in the scene, and what else is odd.
+    warnings: Vec<String>,
     /// Effects of all frames that were looked at: see [`Survey::effects`].
     rest: Effects,
     renderer: Option<Renderer>,
@@ -81,19 +83,19 @@ impl<'a> Stage<'a> {
     /// Of every kind.
     pub fn new(args: &'a Args) -> Result<Self> {
         let (Loaded { scene, mut animation, .. }, settings) = render::load(&args.render)?;
-        if args.render.common.talkative() {
-            scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
-        }
         let frames = args.frames.clone().map_or_else(|| whole(&animation, args.fps), Ok)?;
         if let Some(degrees) = args.turntable {
             let size = [settings.width, settings.height];
             let span = f64::from(frames.start) / args.fps..f64::from(frames.end) / args.fps;
             animation.movers.push(Arc::new(Turntable::new(&scene, size, degrees, span)));
         }
-        if animation.is_empty() && args.render.common.talkative() {
-            complain(
-                "warning: nothing moves in the scene: all frames are alike (add [[animation]] tables, or --turntable)",
-            );
+        let mut warnings = scene.warnings.clone();
+        if animation.is_empty() {
+            let what = "nothing moves in the scene: all frames are alike (add [[animation]] tables, or --turntable)";
+            warnings.push(what.to_owned());
+        }
+        if args.render.common.talkative() {
+            warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
         }
         let gpu = args.render.common.open(args.render.tracing)?;
         render::check_room(&args.render, &settings, &gpu)?;
@@ -110,6 +112,7 @@ impl<'a> Stage<'a> {
             animation,
             frames,
             settings,
+            warnings,
             rest,
             renderer,
             change,
@@ -123,6 +126,11 @@ impl<'a> Stage<'a> {
     /// Numbers of all frames.
     pub fn frames(&self) -> &Range<u32> {
         &self.frames
+    }
+
+    /// What was repaired in the scene, and what else is odd.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     /// The device.
