@@ -224,6 +224,21 @@ fn a_turn_is_over_all_frames_whichever_is_the_first() {
 }
 
 #[test]
+#[cfg(unix)]
+fn a_name_that_is_no_text_is_refused() {
+    use std::os::unix::ffi::OsStringExt;
+    let folder = stage();
+    let odd = |name: &[u8]| std::ffi::OsString::from_vec(name.to_vec());
+    fs::copy(folder.path().join("s.toml"), folder.path().join(odd(b"s\xe9.toml"))).unwrap();
+    for (scene, more) in [("s.toml".into(), vec!["-o".into(), odd(b"f\xe9.##.exr")]), (odd(b"s\xe9.toml"), Vec::new())]
+    {
+        let mut sequence = std::process::Command::new(env!("CARGO_BIN_EXE_tallow"));
+        sequence.arg("sequence").arg(scene).args(SMALL.split(' ')).args(["--frames", "0..2"]).args(more);
+        complains(&sequence.current_dir(folder.path()).output().unwrap(), 2, &["\u{fffd}", "UTF-8"]);
+    }
+}
+
+#[test]
 fn help_leaves_out_what_a_sequence_refuses() {
     let help = stdout(&tallow(&stage(), &["sequence", "--help"]));
     for option in ["--checkpoint ", "--resume ", "--pixel ", "--plan "] {

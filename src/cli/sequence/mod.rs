@@ -75,13 +75,18 @@ impl Args {
     /// The options of one frame, whose files have its number.
     fn of_frame(&self, number: u32) -> Result<render::Args> {
         let mut args = self.render.clone();
-        let default = || self.render.scene.with_extension("").file_name().map(|s| s.to_string_lossy().into_owned());
         if args.outputs.is_empty() {
-            args.outputs = vec![format!("{}.####.exr", default().unwrap_or_else(|| "frame".to_owned())).into()];
+            let scene = self.render.scene.with_extension("");
+            let mut name = scene.file_name().unwrap_or("frame".as_ref()).to_owned();
+            name.push(".####.exr");
+            args.outputs = vec![name.into()];
         }
         let files = args.outputs.iter_mut().chain(&mut args.heatmap).chain(&mut args.profile);
         for file in files {
-            let name = numbered(&file.to_string_lossy(), number).ok_or_else(|| {
+            let text = file.to_str().ok_or_else(|| {
+                Error::Usage(format!("{}: is not UTF-8: choose another name, as by -o NAME.####.exr", file.display()))
+            })?;
+            let name = numbered(text, number).ok_or_else(|| {
                 let stem = file.with_extension("");
                 let example = format!("{}.####.{}", stem.display(), file.extension().unwrap_or_default().display());
                 Error::Usage(format!(
