@@ -200,6 +200,8 @@ fn without_frames_all_of_the_animation_is_rendered() {
     let folder = stage();
     let told = well(&folder, "--fps 1 -o n.#.png");
     assert!(told.contains("frame 2: ") && !told.contains("frame 3"), "{told}");
+    let told = well(&folder, "--fps 0.1 -o long.#.png");
+    assert!(told.contains("frame 0: ") && !told.contains("frame 1"), "a frame may last longer than all keys: {told}");
     let still = "[[mesh]]\nshape = \"cube\"\n[environment]\n";
     fs::write(folder.path().join("s.toml"), still).unwrap();
     let output = run(&folder, "-o n.#.png --turntable 90 --quiet");

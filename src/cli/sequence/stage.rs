@@ -292,7 +292,7 @@ const MOST_FRAMES: f64 = 1e6;
 /// The frames up to the last key.
 fn whole(animation: &Animation, fps: f64) -> Result<Range<u32>> {
     let last = animation.last_frame(fps);
-    if last < 1.0 {
+    if animation.end() == 0.0 {
         return Err(Error::Usage("how many frames there are is not known: nothing moves; give --frames 0..96".into()));
     }
     if last > MOST_FRAMES {
