@@ -240,6 +240,27 @@ fn a_name_that_is_no_text_is_refused() {
     }
 }
 
+/// A matrix says where the camera stands and not what it looks at: that is what lies before it.
+#[test]
+fn a_turn_is_about_what_the_camera_looks_at() {
+    let folder = stage();
+    let scene = "[environment]\n[[mesh]]\nname = 's'\nshape = 'cube'\n\
+                 [[instance]]\nmesh = 's'\ntransform = { translate = [5, 0, 0], rotate = [0, 20, 0] }\n\
+                 [[instance]]\nmesh = 's'\ntransform = { translate = [-5, 0, 0] }\n[camera]\n";
+    let turned = |camera: &str, name: &str| {
+        fs::write(folder.path().join("s.toml"), format!("{scene}{camera}\n")).unwrap();
+        well(&folder, &format!("--turntable 360 --frames 0..4 --fps 1 --reproject off --quiet -o {name}.#.exr"));
+        let film = |n: u32| image::read(&folder.path().join(format!("{name}.{n}.exr"))).unwrap();
+        (0..4).map(|n| film(n).picture(Some("Z")).unwrap().pixels).collect::<Vec<_>>()
+    };
+    let at = turned("position = [5, 0, 6]\ntarget = [5, 0, 0]", "t");
+    let through = turned("world_from_camera = [1, 0, 0, 5, 0, 1, 0, 0, 0, 0, 1, 6, 0, 0, 0, 1]", "m");
+    let middle = |depths: &[[f32; 3]]| depths[12 * 40 + 20][0];
+    for (n, (a, b)) in at.iter().zip(&through).enumerate() {
+        assert!((middle(a) - middle(b)).abs() < 0.01 && middle(a) < 6.0, "frame {n}: {} {}", middle(a), middle(b));
+    }
+}
+
 #[test]
 fn help_leaves_out_what_a_sequence_refuses() {
     let help = stdout(&tallow(&stage(), &["sequence", "--help"]));

@@ -1,15 +1,16 @@
 //! A camera that goes around what it looks at.
 use super::Mover;
 use crate::error::{Error, Result};
+use crate::layout;
 use crate::scene::Scene;
 use crate::scene::description::Camera;
 use crate::scene::pose::Pose;
 use glam::{DQuat, DVec3, Vec3};
 use std::ops::Range;
 
-/// Turns the camera about its target, or the middle of the scene, around its `up`: the whole of `degrees` over a span of seconds,
-/// at whose begin it is not turned yet, counter-clockwise seen from above. Where others move the camera, it turns what they make of
-/// it: let it be the last mover.
+/// Turns the camera about its target, or about the point in the middle of its image that is nearest to the middle of the scene, around
+/// its `up`: the whole of `degrees` over a span of seconds, at whose begin it is not turned yet, counter-clockwise seen from above.
+/// Where others move the camera, it turns what they make of it: let it be the last mover.
 #[derive(Clone, Debug)]
 pub struct Turntable {
     camera: Camera,
@@ -24,13 +25,21 @@ impl Turntable {
     pub fn new(scene: &Scene, size: [u32; 2], degrees: f64, span: Range<f64>) -> Self {
         let bounds = scene.view.framed.unwrap_or(scene.bounds);
         let camera = Camera { framed: Some(swept(bounds)), ..scene.view.clone() };
-        Self { camera, bounds: scene.bounds, size, degrees, span }
+        Self { camera, bounds, size, degrees, span }
+    }
+
+    /// What a camera without target looks at. One that has the scene behind it goes around the middle of that.
+    fn pivot(&self, camera: &layout::Camera) -> DVec3 {
+        let [low, high] = self.bounds.map(|b| DVec3::from(b.map(f64::from)));
+        let [position, forward] = [camera.position, camera.forward].map(|v| Vec3::from(v).as_dvec3());
+        let middle = (low + high) / 2.0;
+        let depth = (middle - position).dot(forward);
+        if depth > 0.0 { position + forward * depth } else { middle }
     }
 
     fn turned(&self, camera: &Camera, angle: f64) -> std::result::Result<Camera, String> {
         let built = camera.build(self.size, self.bounds)?;
-        let [low, high] = self.bounds.map(|b| DVec3::from(b.map(f64::from)));
-        let pivot = camera.target.map_or((low + high) / 2.0, DVec3::from);
+        let pivot = camera.target.map_or_else(|| self.pivot(&built), DVec3::from);
         let around = camera.up.and_then(|up| DVec3::from(up).try_normalize()).unwrap_or(DVec3::Y);
         let turn = DQuat::from_axis_angle(around, angle);
         let axis = |v: [f32; 3]| turn * Vec3::from(v).as_dvec3().normalize();
@@ -90,6 +99,21 @@ mod tests {
         }
         // The corners of the box around the circle that is swept are 1.41 times as far as the circle, which leaves a third empty.
         assert!(reach > 0.6 && reach <= 1.0, "the farthest corner is at {reach} of the film");
+    }
+
+    #[test]
+    fn a_matrix_turns_about_what_lies_before_it() {
+        let (size, bounds) = ([100, 100], [[-6.0, -1.0, -1.0], [6.0, 1.0, 1.0]]);
+        let half_a_turn = |z: f64| {
+            let rows = [1.0, 0.0, 0.0, 5.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0];
+            let view = Camera { world_from_camera: Some(rows), ..Camera::default() };
+            let scene = Scene { bounds, view, ..Scene::default() };
+            let mut pose = Pose::default();
+            Turntable::new(&scene, size, 180.0, 0.0..1.0).pose(1.0, &mut pose).unwrap();
+            Vec3::from(pose.camera.unwrap().build(size, bounds).unwrap().position)
+        };
+        assert!(half_a_turn(6.0).distance(Vec3::new(5.0, 0.0, -6.0)) < 1e-5, "{}", half_a_turn(6.0));
+        assert!(half_a_turn(-6.0).distance(Vec3::new(-5.0, 0.0, 6.0)) < 1e-5, "{}", half_a_turn(-6.0));
     }
 
     #[test]
