@@ -261,6 +261,30 @@ fn a_turn_is_about_what_the_camera_looks_at() {
     }
 }
 
+/// What moves stays in view of a camera that the scene does not place, whichever frames are rendered.
+#[test]
+fn a_camera_without_position_has_what_moves_in_view() {
+    let folder = stage();
+    let scene = "[environment]\n[[mesh]]\nname = 'c'\nshape = 'cube'\nmaterial = 'm'\n[[material]]\nname = 'm'\ncolor = 0\n\
+                 [[animation]]\ninstance = 'c'\nkeys = [{ time = 0, translate = [0, 0, 0] }, { time = 3, translate = [9, 6, 0] }]\n";
+    let write = |more: &str| fs::write(folder.path().join("s.toml"), format!("{scene}{more}")).unwrap();
+    let words = "--frames 0..4 --fps 1 --reproject off --quiet";
+    write("");
+    well(&folder, &format!("{words} -o a.#.exr"));
+    for n in 0..4 {
+        let pixels = image::read(&folder.path().join(format!("a.{n}.exr"))).unwrap().picture(None).unwrap().pixels;
+        let black = |i: &usize| pixels[*i] == [0.0; 3];
+        let edge = |i: &usize| [0, 24].contains(&(i / 40)) || [0, 39].contains(&(i % 40));
+        assert!((0..1000).any(|i| black(&i)) && !(0..1000).filter(edge).any(|i| black(&i)), "frame {n}");
+    }
+    well(&folder, &format!("{words} --only 2 -o b.#.exr"));
+    assert!(bits(&folder, "a.2.exr") == bits(&folder, "b.2.exr"));
+    // Nor does one breathe whose field of view has keys.
+    write("[[animation]]\ncamera = true\nkeys = [{ time = 0, fov = 40 }]\n");
+    well(&folder, &format!("{words} --only 2 -o k.#.exr"));
+    assert!(bits(&folder, "a.2.exr") == bits(&folder, "k.2.exr"));
+}
+
 #[test]
 fn help_leaves_out_what_a_sequence_refuses() {
     let help = stdout(&tallow(&stage(), &["sequence", "--help"]));

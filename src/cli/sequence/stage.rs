@@ -32,6 +32,8 @@ pub struct Stage<'a> {
     settings: Settings,
     /// What was repaired in the scene, and what else is odd.
     warnings: Vec<String>,
+    /// What a camera without position has in view in every frame.
+    framed: Option<[[f32; 3]; 2]>,
     /// Effects of all frames that were looked at: see [`Survey::effects`].
     rest: Effects,
     renderer: Option<Renderer>,
@@ -82,8 +84,11 @@ impl<'a> Stage<'a> {
     /// # Errors
     /// Of every kind.
     pub fn new(args: &'a Args) -> Result<Self> {
-        let (Loaded { scene, mut animation, .. }, settings) = render::load(&args.render)?;
+        let (Loaded { mut scene, mut animation, .. }, settings) = render::load(&args.render)?;
         let frames = args.frames.clone().map_or_else(|| whole(&animation, args.fps), Ok)?;
+        let survey = Survey { scene: &scene, animation: &animation, frames: &frames, fps: args.fps };
+        scene.view.framed = survey.bounds().or(scene.view.framed);
+        let framed = scene.view.framed;
         if let Some(degrees) = args.turntable {
             let size = [settings.width, settings.height];
             let span = f64::from(frames.start) / args.fps..f64::from(frames.end) / args.fps;
@@ -113,6 +118,7 @@ impl<'a> Stage<'a> {
             frames,
             settings,
             warnings,
+            framed,
             rest,
             renderer,
             change,
@@ -233,7 +239,10 @@ impl<'a> Stage<'a> {
 
     /// Moves the scene to where it is in a frame.
     fn pose(&mut self, number: u32, end: &mut FrameEnd) -> Result<()> {
-        let pose = self.animation.at(f64::from(number) / self.args.fps)?;
+        let mut pose = self.animation.at(f64::from(number) / self.args.fps)?;
+        if let Some(camera) = &mut pose.camera {
+            camera.framed = camera.framed.or(self.framed);
+        }
         let change = self.scene.apply(&pose)?;
         end.refit_cost = change.deformed.iter().map(|d| d.cost).reduce(f32::max);
         end.rebuilt = change.deformed.iter().filter(|d| d.rebuilt).count();

@@ -9,6 +9,8 @@ use std::ops::Range;
 
 /// Frames that are looked at for effects: of more, some that are spread evenly.
 const FOR_EFFECTS: u32 = 256;
+/// Frames whose bounds are taken: each moves all surfaces.
+const FOR_BOUNDS: u32 = 64;
 
 /// The frames of a sequence.
 pub struct Survey<'a> {
@@ -46,6 +48,25 @@ impl Survey<'_> {
         effects
     }
 
+    /// What surfaces reach in all frames, where some move and the camera has no place of its own.
+    pub fn bounds(&self) -> Option<Bounds> {
+        let keyed = self.animation.at(self.seconds(self.frames.start)).ok().and_then(|pose| pose.camera);
+        let camera = keyed.as_ref().unwrap_or(&self.scene.view);
+        if camera.position.is_some() || camera.world_from_camera.is_some() {
+            return None;
+        }
+        let moves = |pose: &Pose| !(pose.instances.is_empty() && pose.meshes.is_empty());
+        let (mut scene, mut found) = (None, None);
+        for pose in self.poses(FOR_BOUNDS, moves) {
+            let scene = scene.get_or_insert_with(|| self.scene.clone());
+            let pose = Pose { camera: None, rebuild_above: f32::INFINITY, ..pose };
+            if scene.apply(&pose).is_ok() && scene.bounds != Bounds::default() {
+                found = Some(found.map_or(scene.bounds, |all| union(all, scene.bounds)));
+            }
+        }
+        found
+    }
+
     /// Some of the poses, of those movers whose first one is `wanted`. What cannot be posed is left out: its frame says so.
     fn poses(&self, most: u32, wanted: impl Fn(&Pose) -> bool) -> impl Iterator<Item = Pose> {
         let mut movers = self.animation.movers.clone();
@@ -61,6 +82,13 @@ impl Survey<'_> {
     fn seconds(&self, number: u32) -> f64 {
         f64::from(number) / self.fps
     }
+}
+
+type Bounds = [[f32; 3]; 2];
+
+fn union(a: Bounds, b: Bounds) -> Bounds {
+    let join = |end: usize, of: fn(f32, f32) -> f32| [0, 1, 2].map(|axis| of(a[end][axis], b[end][axis]));
+    [join(0, f32::min), join(1, f32::max)]
 }
 
 /// Whether it changes light or matter.

@@ -62,6 +62,7 @@ fn swept([low, high]: [[f32; 3]; 2]) -> [[f32; 3]; 2] {
 impl Mover for Turntable {
     fn pose(&self, seconds: f64, pose: &mut Pose) -> Result<()> {
         let camera = pose.camera.as_ref().unwrap_or(&self.camera);
+        let camera = &Camera { framed: camera.framed.or(self.camera.framed), ..camera.clone() };
         let Range { start, end } = self.span;
         let angle = (self.degrees * (seconds - start) / (end - start)).to_radians();
         let turned =

@@ -44,8 +44,8 @@ pub struct Camera {
     pub focus_distance: Option<f32>,
     /// Nothing nearer than this along a ray is seen; default 0.
     pub near: f32,
-    /// What a camera without position has in view; default the bounds of the scene. A scene that moves is framed as it was loaded:
-    /// a frame that followed its bounds would make the camera breathe.
+    /// What a camera without position has in view; default the bounds of the scene. A scene that moves is framed as it was loaded,
+    /// and by `tallow sequence` with all that its frames reach: a frame that followed its bounds would make the camera breathe.
     #[serde(skip)]
     pub framed: Option<[[f32; 3]; 2]>,
 }
