@@ -225,21 +225,6 @@ fn a_turn_is_over_all_frames_whichever_is_the_first() {
     }
 }
 
-#[test]
-#[cfg(unix)]
-fn a_name_that_is_no_text_is_refused() {
-    use std::os::unix::ffi::OsStringExt;
-    let folder = stage();
-    let odd = |name: &[u8]| std::ffi::OsString::from_vec(name.to_vec());
-    fs::copy(folder.path().join("s.toml"), folder.path().join(odd(b"s\xe9.toml"))).unwrap();
-    for (scene, more) in [("s.toml".into(), vec!["-o".into(), odd(b"f\xe9.##.exr")]), (odd(b"s\xe9.toml"), Vec::new())]
-    {
-        let mut sequence = std::process::Command::new(env!("CARGO_BIN_EXE_tallow"));
-        sequence.arg("sequence").arg(scene).args(SMALL.split(' ')).args(["--frames", "0..2"]).args(more);
-        complains(&sequence.current_dir(folder.path()).output().unwrap(), 2, &["\u{fffd}", "UTF-8"]);
-    }
-}
-
 /// A matrix says where the camera stands and not what it looks at: that is what lies before it.
 #[test]
 fn a_turn_is_about_what_the_camera_looks_at() {
@@ -286,6 +271,21 @@ fn a_camera_without_position_has_what_moves_in_view() {
 }
 
 #[test]
+#[cfg(unix)]
+fn a_name_that_is_no_text_is_refused() {
+    use std::os::unix::ffi::OsStringExt;
+    let folder = stage();
+    let odd = |name: &[u8]| std::ffi::OsString::from_vec(name.to_vec());
+    fs::copy(folder.path().join("s.toml"), folder.path().join(odd(b"s\xe9.toml"))).unwrap();
+    for (scene, more) in [("s.toml".into(), vec!["-o".into(), odd(b"f\xe9.##.exr")]), (odd(b"s\xe9.toml"), Vec::new())]
+    {
+        let mut sequence = std::process::Command::new(env!("CARGO_BIN_EXE_tallow"));
+        sequence.arg("sequence").arg(scene).args(SMALL.split(' ')).args(["--frames", "0..2"]).args(more);
+        complains(&sequence.current_dir(folder.path()).output().unwrap(), 2, &["\u{fffd}", "UTF-8"]);
+    }
+}
+
+#[test]
 fn help_leaves_out_what_a_sequence_refuses() {
     let help = stdout(&tallow(&stage(), &["sequence", "--help"]));
     for option in ["--checkpoint ", "--resume ", "--pixel ", "--plan "] {
@@ -298,8 +298,12 @@ fn help_leaves_out_what_a_sequence_refuses() {
 fn a_frame_that_fails_does_not_stop_the_others() {
     let folder = stage();
     fs::create_dir(folder.path().join("f.0001.exr")).unwrap();
+    let output = run(&folder, "--frames 0..3 -o f.####.exr --preview f.gif");
+    let line = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(line.starts_with("error: frame 1: f.0001.exr") && line.contains("f.gif lacks it"), "{line}");
     let output = run(&folder, "--frames 0..3 -o f.####.exr --json");
     let line = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!line.contains("lacks it"), "{line}");
     assert_eq!(output.status.code(), Some(6), "{line}");
     assert!(line.starts_with("error: frame 1: f.0001.exr") && line.lines().count() == 1, "{line}");
     assert!(folder.path().join("f.0002.exr").is_file());

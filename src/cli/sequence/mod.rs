@@ -249,7 +249,8 @@ pub fn interruption(args: &Args, place: &str) -> String {
 /// One line for a frame; a failure is always told.
 fn tell(args: &Args, report: &FrameReport, left: u32, before: &[FrameReport]) {
     if let Some(error) = &report.error {
-        complain(&format!("error: frame {}: {error}", report.frame));
+        let preview = args.preview.as_ref().map(|path| format!("; {} lacks it", path.display()));
+        complain(&format!("error: frame {}: {error}{}", report.frame, preview.unwrap_or_default()));
         return;
     }
     if !args.render.common.talkative() {
