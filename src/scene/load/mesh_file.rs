@@ -1,6 +1,7 @@
 //! Files of one mesh, by the endings of their names.
 use super::library::Library;
 use super::obj::{self, ObjFile};
+use super::obj_part::Numbering;
 use super::ply;
 use crate::error::Result;
 use std::path::Path;
@@ -27,16 +28,6 @@ impl Format {
             () => Self::Obj,
         }
     }
-}
-
-/// What counts as a vertex.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Numbering {
-    /// Corners of the same indices.
-    #[default]
-    Shared,
-    /// Every corner of a face, in the order of the file, so that files of the same faces number theirs alike.
-    Corners,
 }
 
 /// Reads the parts of a PLY file or an OBJ file.

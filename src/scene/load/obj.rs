@@ -1,9 +1,8 @@
 //! OBJ files: blocks of statements, parsed in parallel, become meshes in the order of the file. Every mistake has its line.
 use super::blocks::Blocks;
 use super::library::{self, Library};
-use super::mesh_file::Numbering;
 use super::obj_block::{Checked, Indices, NO_INDEX, ObjBlock, Statement};
-use super::obj_part::{Corner, NO_EXTRA, Part, PartBuilder};
+use super::obj_part::{Corner, NO_EXTRA, Numbering, Part, PartBuilder};
 use crate::error::{Error, Result};
 use crate::image::input;
 use crate::layout::NONE;

@@ -1,10 +1,19 @@
 //! Collects a part of an OBJ file: corners, which index positions, texture coordinates and normals separately, become vertices
 //! that have all three.
-use super::mesh_file::Numbering;
 use super::triangulate::Triangulator;
 use crate::layout::NONE;
 use crate::scene::description::mesh::Mesh;
 use std::borrow::Cow;
+
+/// What counts as a vertex.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Numbering {
+    /// Corners of the same indices.
+    #[default]
+    Shared,
+    /// Every corner of a face, in the order of the file, so that files of the same faces number theirs alike.
+    Corners,
+}
 
 /// Triangles of one object and one material.
 #[derive(Clone, Debug, Default)]

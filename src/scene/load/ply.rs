@@ -4,9 +4,8 @@
 //! Of vertices `x y z`, `nx ny nz`, `u v` (or `s t`, `texture_u texture_v`), and `red green blue alpha` are read; integers are
 //! sRGB code values, as scanners and modellers write them, and floats are linear. Faces are polygons, or strips of triangles.
 use super::library::Library;
-use super::mesh_file::Numbering;
 use super::obj::ObjFile;
-use super::obj_part::Part;
+use super::obj_part::{Numbering, Part};
 use super::triangulate::Triangulator;
 use crate::error::{Error, Result};
 use crate::image::{contained, input};
