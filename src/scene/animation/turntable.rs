@@ -8,9 +8,9 @@ use crate::scene::pose::Pose;
 use glam::{DQuat, DVec3, Vec3};
 use std::ops::Range;
 
-/// Turns the camera about its target, or about the point in the middle of its image that is nearest to the middle of the scene, around
-/// its `up`: the whole of `degrees` over a span of seconds, at whose begin it is not turned yet, counter-clockwise seen from above.
-/// Where others move the camera, it turns what they make of it: let it be the last mover.
+/// Turns the camera about its target, or about the point in the middle of its image that is nearest to the middle of the scene,
+/// around its `up`: the whole of `degrees` over a span of seconds, at whose begin it is not turned yet, counter-clockwise seen from
+/// above. Where others move the camera, it turns what they make of it: let it be the last mover.
 #[derive(Clone, Debug)]
 pub struct Turntable {
     camera: Camera,
