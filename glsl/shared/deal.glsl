@@ -94,7 +94,8 @@ uint joined(uint by, uint ray_lane, uint bits) {
 }
 
 bool is_masked(uint triangle, uint instance) {
-    return FX_ALPHA_MASKS && (Material_flags(materials, material_of(triangle, instance)) & MATERIAL_MASKED) != 0u;
+    const uint MASKS = MATERIAL_MASKED | (FX_CLEAR_WALLS ? MATERIAL_CLEAR_WALL : 0u);
+    return FX_ALPHA_MASKS && (Material_flags(materials, material_of(triangle, instance)) & MASKS) != 0u;
 }
 
 // Tests the triangles of all lanes' `leaves`. Returns whether the nearest that this lane's ray meets before `hit`, which it
@@ -188,7 +189,8 @@ bool has_ended(Walk w) { return !is_apart(w) && ((w.last && !w.again) || (w.any_
 
 // Looks up the mask of the nearest triangle.
 void decide_mask(inout Walk w) {
-    bool blocks = mask_blocks(w.next.triangle, w.leaves.instance, vec2(w.next.b1, w.next.b2), w.mask_seed);
+    vec2 barycentric = vec2(w.next.b1, w.next.b2);
+    bool blocks = mask_blocks(w.next.triangle, w.leaves.instance, barycentric, w.leaves.ray.direction, w.mask_seed);
     if (blocks) w.t.hit = w.next;
     else w.leaves.bits &= ~(1u << (w.next.triangle - w.leaves.first));
     w.again = !blocks && w.leaves.bits != 0u;

@@ -55,7 +55,7 @@ Guide seen_hit(Ray ray, uint mask_seed, out Guide first, out Hit first_hit, out 
     // Rays are traced and surfaces read in one place of the code, whose size decides how long the kernels take to compile.
     do {
         uint seed = bounce == 0u ? mask_seed : pcg(mask_seed + bounce);
-        Hit hit = traverse(Segment(sight.way.origin, sight.way.direction, INFINITE_DISTANCE, seed), push.constants.root);
+        Hit hit = traverse(Segment(sight.way.origin, sight.way.direction, INFINITE_DISTANCE, mask_bits(seed)), push.constants.root);
         seen = Guide_zero();
         seen.object = seen.material = NONE;
         bool sky = hit.triangle == NONE;

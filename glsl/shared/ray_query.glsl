@@ -29,7 +29,8 @@ bool is_left(uvec2 surface, uvec2 from) { return surface.x == from.x && (!FX_INS
 bool triangle_stops(uvec2 surface, uint mask_seed, uvec2 from) {
     if (is_left(surface, from) || (FX_SPHERES && is_sphere(surface.x))) return false;
     vec2 barycentric = rayQueryGetIntersectionBarycentricsEXT(query, false);
-    return !FX_ALPHA_MASKS || mask_blocks(surface.x, surface.y, barycentric, mask_seed);
+    vec3 direction = rayQueryGetIntersectionObjectRayDirectionEXT(query, false);
+    return !FX_ALPHA_MASKS || mask_blocks(surface.x, surface.y, barycentric, direction, mask_seed);
 }
 
 // Tests the sphere in the box that the ray meets; `normal` is that of the nearest sphere so far.

@@ -7,6 +7,11 @@ struct Hit {
     float b1, b2;     // weights of vertices 1 and 2; of a sphere, see sphere.glsl
 };
 
+// Seeds of masks are even, but for shadow rays of lights without extent, which pass clear walls.
+const uint PASSES_WALLS = 1u;
+
+uint mask_bits(uint word) { return word & ~PASSES_WALLS; }
+
 // A ray whose hits count before `t_max`, in lengths of `direction`.
 struct Segment {
     vec3 origin;

@@ -2,6 +2,7 @@
 // unused. There are no mip levels: a pixel's samples average a texture without the bias of a blur, and levels would cost a third
 // more memory.
 
+#include "shared/segment.glsl"
 #include "shared/texel_word.glsl"
 
 vec3 linear_from_srgb(vec3 c) {
@@ -65,10 +66,26 @@ float surface_opacity(uint material, uint triangle, vec2 barycentric) {
     return opacity;
 }
 
+// Share of light that a smooth clear wall lets straight through, as metallic_sample does: nothing else brings the light of a source
+// without extent behind it. `direction` is that of the ray in the space of the triangle; the normal is that of the triangle itself.
+float clear_wall_passes(uint material, uint triangle, vec2 barycentric, vec3 direction) {
+    Material m = Material_load(materials, material);
+    Triangle t = Triangle_load(triangles, triangle);
+    vec3 n = cross(t.v1 - t.v0, t.v2 - t.v0);
+    if (FX_SPHERES && is_sphere(triangle)) n = octahedral_vector(barycentric);
+    float c = abs(dot(n, direction)) * inversesqrt(max(dot(n, n) * dot(direction, direction), 1e-37));
+    float grazing = 1.0 - min(c, 1.0), squared = grazing * grazing;
+    float f90 = m.specular_factor, f0 = min(max(m.specular.r, max(m.specular.g, m.specular.b)), 1.0) * f90;
+    return m.base_color.g * (1.0 - m.metallic) * m.transmission_factor * (1.0 - mix(f0, f90, squared * squared * grazing));
+}
+
 // Whether a partly transparent surface stops a ray. A ray passes with the probability 1 - opacity, decided by a hash, so that the
 // light that passes is right on average, and a cut-out mask (0 or 1) is exact.
-bool mask_blocks(uint triangle, uint instance, vec2 barycentric, uint seed) {
-    float opacity = surface_opacity(material_of(triangle, instance), triangle, barycentric);
+bool mask_blocks(uint triangle, uint instance, vec2 barycentric, vec3 direction, uint seed) {
+    uint material = material_of(triangle, instance);
+    float opacity = surface_opacity(material, triangle, barycentric);
+    if (FX_CLEAR_WALLS && (seed & PASSES_WALLS) != 0u && (Material_flags(materials, material) & MATERIAL_CLEAR_WALL) != 0u)
+        opacity *= 1.0 - clear_wall_passes(material, triangle, barycentric, direction);
     // Two copies of a triangle on one ray decide independently.
     uint surface = triangle * 0x9e3779b9u ^ instance * 0x85ebca6bu;
     return opacity > unit_interval(pcg(seed ^ surface));

@@ -110,11 +110,12 @@ bool intersect_sphere(RaySpace r, uint index, uint instance, float t_max, bool l
     bool enters = !leaves && -along - chord > 0.0;
     normal = octahedral_point(nearest + (enters ? -chord : chord) * d);
     if (FX_ALPHA_MASKS) {
-        if (enters && squared >= 0.0 && !mask_blocks(index, instance, normal, mask_seed)) {
+        if (enters && squared >= 0.0 && !mask_blocks(index, instance, normal, r.direction, mask_seed)) {
             enters = false;
             normal = octahedral_point(nearest + chord * d);
         }
-        if (!enters && squared >= 0.0 && !mask_blocks(index, instance, normal, ~mask_seed)) return false;
+        bool passes = !enters && squared >= 0.0 && !mask_blocks(index, instance, normal, r.direction, mask_seed ^ mask_bits(~0u));
+        if (passes) return false;
     }
     t = ((enters ? -chord : chord) - along) * inverse;
     return squared >= 0.0 && t > 0.0 && t < t_max;
@@ -280,7 +281,7 @@ void intersect_leaves(inout Hit hit, Leaves leaves, bool any_hit, uint mask_seed
     if (leaves.bits != 0u) do {
         Hit next = hit;
         bool found = intersect_triangles(next, leaves, any_hit, mask_seed, from);
-        passes = found && !mask_blocks(next.triangle, leaves.instance, vec2(next.b1, next.b2), mask_seed);
+        passes = found && !mask_blocks(next.triangle, leaves.instance, vec2(next.b1, next.b2), leaves.ray.direction, mask_seed);
         if (FX_SPHERES && found) passes = passes && !is_sphere(next.triangle); // spheres have tested their mask
         if (passes) leaves.bits &= ~(1u << (next.triangle - leaves.first));
         else hit = next;
@@ -351,7 +352,7 @@ void intersect_kept(inout Traversal t, RaySpace world, uint mask_seed, uvec2 fro
         vec2 barycentric;
         bool meets = intersect_primitive(ray, index, t.kept_instance, t.hit.t, mask_seed, from, distance, barycentric);
         if (FX_ALPHA_MASKS && meets && !(FX_SPHERES && is_sphere(index))) // spheres have tested their mask
-            meets = mask_blocks(index, t.kept_instance, barycentric, mask_seed);
+            meets = mask_blocks(index, t.kept_instance, barycentric, ray.direction, mask_seed);
         if (meets) t.hit = Hit(distance, index, t.kept_instance, barycentric.x, barycentric.y);
     }
 }

@@ -288,6 +288,7 @@ fn scene_bytes(effect: Effect, scene: &Scene) -> u64 {
         | Effect::coat_normals
         | Effect::anisotropic
         | Effect::thin_walls
+        | Effect::clear_walls
         | Effect::rough
         | Effect::smooth_interface
         | Effect::beckmann

@@ -46,6 +46,9 @@ pub fn effects(
         let coat = coated(m) && m.clearcoat_alpha >= SMOOTH_ALPHA;
         interface(m) && m.alpha >= SMOOTH_ALPHA || coat
     };
+    // Shadow rays pass them as they pass masks.
+    let sharp = scene.has_delta_lights();
+    let clear_wall = |m: &Material| sharp && m.flags & MATERIAL_CLEAR_WALL != 0;
     let mut found = Effects {
         textures: material(Effect::textures, &|m| {
             let maps = [m.base_texture, m.specular_texture, m.roughness_texture, m.emission_texture];
@@ -57,7 +60,7 @@ pub fn effects(
         alpha_cutoff: material(Effect::alpha_cutoff, &|m| m.flags & MATERIAL_MASKED != 0 && m.alpha_cutoff > 0.0),
         bump_maps: material(Effect::bump_maps, &|m| bumped(m, false)),
         normal_maps: material(Effect::normal_maps, &|m| bumped(m, true)),
-        alpha_masks: material(Effect::alpha_masks, &|m| m.flags & MATERIAL_MASKED != 0),
+        alpha_masks: material(Effect::alpha_masks, &|m| m.flags & MATERIAL_MASKED != 0 || clear_wall(m)),
         diffuse: material(Effect::diffuse, &|m| matches!(m.kind, BSDF_DIFFUSE | BSDF_COATED)),
         conductor: material(Effect::conductor, &|m| m.kind == BSDF_CONDUCTOR),
         dielectric: material(Effect::dielectric, &|m| m.kind == BSDF_DIELECTRIC),
@@ -66,6 +69,7 @@ pub fn effects(
         clearcoat: material(Effect::clearcoat, &coated),
         coat_normals: material(Effect::coat_normals, &|m| coated(m) && has_normal_map(m)),
         thin_walls: material(Effect::thin_walls, &|m| m.kind == BSDF_METALLIC && m.transmission_factor > 0.0),
+        clear_walls: material(Effect::clear_walls, &clear_wall),
         anisotropic: material(Effect::anisotropic, &|m| m.anisotropy != 0.0),
         rough: material(Effect::rough, &rough),
         smooth_interface: material(Effect::smooth_interface, &smooth),

@@ -311,11 +311,15 @@ impl Scene {
         SceneFile::of(path, description).load()
     }
 
+    /// Whether there are point, spot or directional lights, be they dark now.
+    pub fn has_delta_lights(&self) -> bool {
+        self.lights.iter().chain(&self.rig.lights).any(is_delta)
+    }
+
     /// Whether some light may bring noise to what is lit by it alone: lamps and a sky, which have an extent, and one of several point, spot
     /// and directional lights, of which a sample chooses one.
     pub fn has_soft_lights(&self) -> bool {
-        let delta = |light: &&Light| matches!(light.kind, LIGHT_POINT | LIGHT_SPOT | LIGHT_DIRECTIONAL);
-        let count = |lights: &[Light]| lights.iter().filter(delta).count();
+        let count = |lights: &[Light]| lights.iter().filter(|light| is_delta(light)).count();
         // Those that are dark now are in the rig.
         count(&self.lights) < self.lights.len() || count(&self.lights).max(count(&self.rig.lights)) > 1
     }
@@ -354,4 +358,9 @@ fn model(path: &Path) -> Description {
     let name = path.file_stem().map(|s| s.to_string_lossy().into_owned());
     let mesh = description::MeshTable { name, file, ..Default::default() };
     Description { mesh: vec![mesh], ..Default::default() }
+}
+
+/// Whether a light has no extent.
+fn is_delta(light: &Light) -> bool {
+    matches!(light.kind, LIGHT_POINT | LIGHT_SPOT | LIGHT_DIRECTIONAL)
 }

@@ -19,6 +19,8 @@ use crate::twins::traverse::{Hit, traverse, traverse_from};
 use glam::{Mat3, Vec3};
 
 pub use crate::shaders::shared::path_step::SHADOW_END;
+use crate::shaders::shared::segment::PASSES_WALLS;
+use crate::twins::texture::mask_bits;
 
 /// What one path returns, linear Rec. 709. Without [`Effects::indirect`] and [`Effects::soft_light`] all light is in `direct`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -195,6 +197,7 @@ impl Tracer<'_> {
             direction = s.position + light.distance * light.direction - origin;
             distance = SHADOW_END;
         }
+        let mask_seed = mask_seed | if light.pdf == 0.0 { PASSES_WALLS } else { 0 };
         let blocker = traverse_from(self.scene, p.from, origin, direction, distance, true, mask_seed);
         Some((if blocker.any() { Vec3::ZERO } else { contribution }, light.sharp))
     }
@@ -242,7 +245,7 @@ impl Tracer<'_> {
         let mut from = [NONE; 2];
         for bounce in 0u32.. {
             let pair = PAIR_FIRST_BOUNCE + PAIRS_PER_BOUNCE * bounce;
-            let mask_seed = pcg(seed.wrapping_add(2 * bounce));
+            let mask_seed = mask_bits(pcg(seed.wrapping_add(2 * bounce)));
             rays += 1;
             let hit = match bounce {
                 0 => first,
@@ -270,7 +273,7 @@ impl Tracer<'_> {
             let soft = self.effects.soft_light;
             let ends = sharp_only && seen.scattered > u32::from(!soft);
             if self.frame.path.light_count > 0 && !smooth_here {
-                let light = self.light_from_nee(&p, random, mask_seed.wrapping_add(1));
+                let light = self.light_from_nee(&p, random, mask_seed.wrapping_add(2));
                 let light = light.filter(|&(_, sharp)| !ends || (soft && sharp));
                 rays += u32::from(light.is_some());
                 let (light, sharp) = light.unwrap_or_default();
@@ -301,7 +304,7 @@ impl Tracer<'_> {
         let film = film_sample(&self.frame, &self.effects, pixel, random);
         let ray = eye_ray(&self.frame, &self.effects, film, random);
         let seed = path_seed(&self.frame, pixel, index);
-        let first = traverse(self.scene, ray.origin, ray.direction, INFINITE_DISTANCE, false, pcg(seed));
+        let first = traverse(self.scene, ray.origin, ray.direction, INFINITE_DISTANCE, false, mask_bits(pcg(seed)));
         let PathConstants { size: [width, _], indirect_stride, .. } = self.frame.path;
         let sharp_only = [pixel % width, pixel / width].iter().any(|at| !at.is_multiple_of(indirect_stride.max(1)));
         let sample = self.trace_path(Path::new(ray.origin, ray.direction), sharp_only, first, random, seed);

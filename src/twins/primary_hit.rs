@@ -8,6 +8,7 @@ use crate::twins::light::INFINITE_DISTANCE;
 use crate::twins::surface::{
     facing_of, light_share, local_coat_normal, shading_basis, side_of, surface_at, surface_bsdf,
 };
+use crate::twins::texture::mask_bits;
 use crate::twins::traverse::{Hit, traverse};
 use glam::{Vec2, Vec3, vec2};
 
@@ -26,7 +27,7 @@ pub fn seen(scene: &Scene, frame: &FrameConstants, pixel: u32) -> Guide {
 /// The point of that hit.
 pub fn point(scene: &Scene, frame: &FrameConstants, pixel: u32) -> SurfacePoint {
     let ray = centre_ray(frame, pixel);
-    let hit = traverse(scene, ray.origin, ray.direction, INFINITE_DISTANCE, false, pcg(pixel));
+    let hit = traverse(scene, ray.origin, ray.direction, INFINITE_DISTANCE, false, mask_bits(pcg(pixel)));
     let weights = hit.barycentric.into();
     SurfacePoint { triangle: hit.triangle, instance: hit.instance, weights, ..Default::default() }
 }
@@ -45,7 +46,7 @@ struct FirstHit {
 }
 
 fn first_hit(scene: &Scene, frame: &FrameConstants, ray: &Ray, mask_seed: u32) -> FirstHit {
-    let hit = traverse(scene, ray.origin, ray.direction, INFINITE_DISTANCE, false, mask_seed);
+    let hit = traverse(scene, ray.origin, ray.direction, INFINITE_DISTANCE, false, mask_bits(mask_seed));
     if !hit.any() {
         return FirstHit { guide: Guide { object: NONE, material: NONE, ..Guide::default() }, hit };
     }

@@ -1,12 +1,15 @@
 //! Twin of `glsl/shared/texture.glsl`.
 use crate::layout::{
-    MATERIAL_MASKED, NONE, TEXTURE_CLAMP, TEXTURE_CLAMP_U, TEXTURE_CLAMP_V, TEXTURE_FLOAT, TEXTURE_MIRROR_U,
-    TEXTURE_MIRROR_V, TEXTURE_NEAREST, TEXTURE_RGB9E5, TEXTURE_SHEARED, TEXTURE_SRGB, Texture,
+    MATERIAL_CLEAR_WALL, MATERIAL_MASKED, Material, NONE, SPHERE, TEXTURE_CLAMP, TEXTURE_CLAMP_U, TEXTURE_CLAMP_V,
+    TEXTURE_FLOAT, TEXTURE_MIRROR_U, TEXTURE_MIRROR_V, TEXTURE_NEAREST, TEXTURE_RGB9E5, TEXTURE_SHEARED, TEXTURE_SRGB,
+    Texture,
 };
 use crate::math::hash::pcg;
+use crate::math::octahedral::octahedral_vector;
 use crate::math::rgb9e5;
 use crate::math::srgb::linear_from_srgb;
 use crate::scene::Scene;
+use crate::shaders::shared::segment::PASSES_WALLS;
 use crate::twins::attributes::Attributes;
 use crate::twins::scene::{material_of, texture_coordinates};
 use glam::{IVec2, Vec2, Vec2Swizzles, Vec3, Vec4, ivec2, vec2};
@@ -95,9 +98,31 @@ pub fn vertex_color(scene: &Scene, triangle: u32, barycentric: Vec2) -> Vec4 {
     scene.shading.get(triangle as usize).map_or(Vec4::ONE, |s| Attributes::of(scene, s).color(barycentric))
 }
 
-/// Whether a partly transparent surface stops a ray, decided by a hash of `seed`.
-pub fn mask_blocks(scene: &Scene, triangle: u32, instance: u32, barycentric: Vec2, seed: u32) -> bool {
-    let opacity = surface_opacity(scene, material_of(scene, triangle, instance), triangle, barycentric);
+/// Share of light that a smooth clear wall lets straight through.
+fn clear_wall_passes(scene: &Scene, material: &Material, triangle: u32, barycentric: Vec2, direction: Vec3) -> f32 {
+    let t = &scene.triangles[triangle as usize];
+    let [a, b, c] = [t.v0, t.v1, t.v2].map(Vec3::from);
+    let n = if t.primitive & SPHERE != 0 { octahedral_vector(barycentric) } else { (b - a).cross(c - a) };
+    let cosine = n.dot(direction).abs() / (n.length_squared() * direction.length_squared()).max(1e-37).sqrt();
+    let f90 = material.specular_factor;
+    let f0 = Vec3::from(material.specular).max_element().min(1.0) * f90;
+    let reflected = f0 + (f90 - f0) * (1.0 - cosine.min(1.0)).powi(5);
+    material.base_color[1] * (1.0 - material.metallic) * material.transmission_factor * (1.0 - reflected)
+}
+
+/// Of a seed of masks, without the bit of shadow rays that pass clear walls.
+pub fn mask_bits(word: u32) -> u32 {
+    word & !PASSES_WALLS
+}
+
+/// Whether a partly transparent surface stops a ray, decided by a hash of `seed`. `direction` is that of the ray in the space of the triangle.
+pub fn mask_blocks(scene: &Scene, triangle: u32, instance: u32, barycentric: Vec2, direction: Vec3, seed: u32) -> bool {
+    let number = material_of(scene, triangle, instance);
+    let mut opacity = surface_opacity(scene, number, triangle, barycentric);
+    let material = &scene.materials[number as usize];
+    if seed & PASSES_WALLS != 0 && material.flags & MATERIAL_CLEAR_WALL != 0 {
+        opacity *= 1.0 - clear_wall_passes(scene, material, triangle, barycentric, direction);
+    }
     let surface = triangle.wrapping_mul(0x9e3779b9) ^ instance.wrapping_mul(0x85ebca6b);
     opacity > (pcg(seed ^ surface) >> 8) as f32 * 5.9604645e-8
 }

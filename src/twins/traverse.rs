@@ -5,7 +5,7 @@ use crate::scene::Scene;
 use crate::shaders::shared::traverse::SLAB_ROUNDING;
 use crate::twins::scene::{object_from_world, triangle_vertices};
 use crate::twins::sphere::Sphere;
-use crate::twins::texture::mask_blocks;
+use crate::twins::texture::{mask_bits, mask_blocks};
 use glam::{Vec2, Vec3, vec2, vec3};
 
 /// Where a ray meets the scene.
@@ -199,11 +199,11 @@ impl Traversal<'_> {
         let leaves = [index, self.instance] == self.from;
         let blocks = |(_, point): (f32, Vec3), seed: u32| {
             let (scene, place) = (self.scene, octahedral_point(point));
-            mask_blocks(scene, index, self.instance, place, seed)
+            mask_blocks(scene, index, self.instance, place, self.ray.direction, seed)
         };
         let (t, point) = match !leaves && near.0 > 0.0 && blocks(near, self.mask_seed) {
             true => near,
-            false if blocks(far, !self.mask_seed) => far,
+            false if blocks(far, self.mask_seed ^ mask_bits(u32::MAX)) => far,
             false => return false,
         };
         let meets = t > 0.0 && t < self.hit.t;
@@ -228,7 +228,7 @@ impl Traversal<'_> {
             }
             let vertices = triangle_vertices(self.scene, index);
             let Some((t, barycentric)) = intersect_triangle(&self.ray, vertices, self.hit.t) else { continue };
-            if mask_blocks(self.scene, index, self.instance, barycentric, self.mask_seed) {
+            if mask_blocks(self.scene, index, self.instance, barycentric, self.ray.direction, self.mask_seed) {
                 self.hit = Hit { t, triangle: index, instance: self.instance, barycentric };
                 if any_hit {
                     return true;

@@ -79,7 +79,7 @@ const FAULTS: [Fault; 23] = [
     ("allow 2", |f| f.add("pending", Samples::U32([vec![0; 63], vec![1]].concat()))),
     ("allow 2", |f| f.add("pending", Samples::U32(vec![u32::MAX; 64]))),
     ("pending", |f| f.add("pending", Samples::F32(vec![0.0; 64]))),
-    ("empty", |f| ranges(f, "[]")),
+    ("no samples yet", |f| ranges(f, "[]")),
     ("empty", |f| ranges(f, r#"[{"seed":0,"first":0,"count":0}]"#)),
     ("32 bits", |f| ranges(f, r#"[{"seed":0,"first":4294967295,"count":2}]"#)),
     ("overlap", |f| ranges(f, r#"[{"seed":0,"first":0,"count":2},{"seed":0,"first":1,"count":2}]"#)),

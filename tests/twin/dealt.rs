@@ -1,5 +1,6 @@
 //! Rays that test each other's triangles find the bits that each finds alone, and so do rays whose traversal is tuned otherwise.
 use crate::kernels::{Traversal, dealing, pictures, queries, shipped};
+use crate::panes::panes;
 use crate::support::{assert_silent, gpu, render, tuned_gpu};
 use std::path::Path;
 use tallow::allocate::policy as policy_of;
@@ -8,9 +9,9 @@ use tallow::layout::*;
 use tallow::render::{Outputs, Renderer, called_for};
 use tallow::scene::{Loaded, Scene};
 
-/// A hierarchy of many triangles, one with instances and masks, and spheres among triangles.
-fn scenes() -> [(&'static str, Loaded); 3] {
-    [("bust", shipped("bust/scene.toml")), ("pictures", pictures()), ("balls", balls())]
+/// A hierarchy of many triangles, one with instances and masks, spheres among triangles, and panes.
+fn scenes() -> [(&'static str, Loaded); 4] {
+    [("bust", shipped("bust/scene.toml")), ("pictures", pictures()), ("balls", balls()), ("panes", panes())]
 }
 
 /// Spheres, some of them instances or masked, in and around triangles that are masked or not.
@@ -98,7 +99,7 @@ fn rays_pass_the_surface_that_they_leave() {
         let surface = |hit: &RayHit| (hit.triangle, hit.instance);
         let met = first.iter().zip(&all).filter(|(first, _)| first.triangle != NONE);
         let again = met.filter(|(first, next)| surface(first) == surface(next)).count();
-        assert!(if name == "balls" { again > 0 } else { again == 0 }, "{name}: {again}, which only spheres may be");
+        assert!(if effects.spheres { again > 0 } else { again == 0 }, "{name}: {again}, which only spheres may be");
     }
     gpus.iter().for_each(assert_silent);
 }

@@ -12,6 +12,7 @@ mod lookup;
 mod materials;
 #[path = "../support/moving.rs"]
 mod moving;
+mod panes;
 mod path;
 #[path = "../support/picture.rs"]
 mod picture;

@@ -89,6 +89,7 @@ fn materials() -> Vec<MaterialTable> {
             alpha: 0.5,
             alpha_v: Some(0.1),
             distribution: Distribution::Ggx,
+            roughness: None,
             ..metallic("brushed")
         },
         MaterialTable {
@@ -335,7 +336,7 @@ fn a_cutoff_masks_all_or_nothing() {
     assert_eq!(opacities(leaf(AlphaMode::Mask, Some(0.0))), [1.0, 1.0]);
     assert_eq!(opacities(leaf(AlphaMode::Opaque, None)), [1.0, 1.0]);
     let scene = one(leaf(AlphaMode::Blend, None), patch(), place([0.0; 3], 1.0), false);
-    let passed = (0..2000).filter(|&seed| !mask_blocks(&scene, 0, u32::MAX, vec2(0.1, 0.1), seed)).count();
+    let passed = (0..2000).filter(|&seed| !mask_blocks(&scene, 0, u32::MAX, vec2(0.1, 0.1), Vec3::Z, 2 * seed)).count();
     let opacity = surface_opacity(&scene, 0, 0, vec2(0.1, 0.1));
     assert!((passed as f32 / 2000.0 - (1.0 - opacity)).abs() < 0.05, "{passed} of 2000 pass {opacity}");
 }

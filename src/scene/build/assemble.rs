@@ -15,6 +15,7 @@ use crate::memory;
 use crate::scene::Scene;
 use crate::scene::description::Description;
 use crate::scene::load::library::Library;
+use crate::scene::load::material::mark_clear_wall;
 use glam::{DMat3, Vec3};
 use std::path::Path;
 
@@ -69,14 +70,14 @@ pub fn assemble(path: &Path, description: &Description, choices: Choices, scene:
     Ok(())
 }
 
-/// Light of no extent goes straight through smooth panes, where no path finds it: that it is dark behind them looks like a mistake.
+/// That it is dark behind them looks like a mistake.
 fn warn_of_panes(scene: &Scene) -> Option<String> {
-    let delta = |light: &Light| matches!(light.kind, LIGHT_POINT | LIGHT_SPOT | LIGHT_DIRECTIONAL);
-    let pane = |m: &Material| m.kind == BSDF_METALLIC && m.transmission_factor > 0.0 && m.alpha < SMOOTH_ALPHA;
-    let found = scene.materials.iter().position(pane).filter(|_| scene.lights.iter().any(delta))?;
+    let smooth = |m: &Material| m.kind == BSDF_METALLIC && m.transmission_factor > 0.0 && m.alpha < SMOOTH_ALPHA;
+    let stops = |m: &Material| smooth(m) && m.flags & MATERIAL_CLEAR_WALL == 0;
+    let found = scene.materials.iter().position(stops).filter(|_| scene.has_delta_lights())?;
     Some(format!(
-        "material \"{}\" is smooth and transmits: point, spot and directional lights cast a full shadow behind it; an opacity below 1, \
-         or some roughness, lets their light pass",
+        "material \"{}\" is smooth, transmits, and has colour, textures or a coat: point, spot and directional lights cast a full \
+         shadow behind it; without those, with some roughness, or an opacity below 1 their light passes",
         scene.names.materials[found]
     ))
 }
@@ -123,6 +124,7 @@ fn add_materials(mut library: Library, scene: &mut Scene) -> Vec<String> {
         materials.list[i as usize].bump_scale = (high - low).length() * DEFAULT_BUMP;
     }
     coat::add_means(&mut materials.list);
+    materials.list.iter_mut().for_each(mark_clear_wall);
     (scene.materials, scene.names.materials) = (materials.list, materials.names);
     warnings
 }

@@ -24,6 +24,18 @@ pub struct Materials {
     pub vertices_have_alpha: bool,
 }
 
+/// Marks smooth thin walls without colour, textures and coat, which shadow rays of lights without extent pass. (The colours of their vertices are
+/// not looked at.) Others would need the light's colour changed on the way, and stop it.
+pub fn mark_clear_wall(m: &mut Material) {
+    let textures =
+        [m.base_texture, m.roughness_texture, m.specular_texture, m.specular_factor_texture, m.transmission_texture];
+    let plain = m.clearcoat == 0.0 && textures.iter().all(|&texture| texture == NONE);
+    let [r, g, b] = m.base_color;
+    let smooth = m.kind == BSDF_METALLIC && m.transmission_factor > 0.0 && m.alpha < SMOOTH_ALPHA;
+    m.flags =
+        m.flags & !MATERIAL_CLEAR_WALL | if smooth && plain && r == g && g == b { MATERIAL_CLEAR_WALL } else { 0 };
+}
+
 impl Materials {
     /// A diffuse grey with nothing else on.
     pub fn plain(color: [f32; 3]) -> Material {
