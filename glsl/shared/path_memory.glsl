@@ -17,7 +17,8 @@ const uint SOFT_LIGHT = 10u;
 const uint KINDS = 11u;
 
 // Bits of the state: the path waits for a shadow ray, and for one to its next surface; it leaves a smooth surface; one before let it
-// take one of two ways; the light of its shadow ray is sharp; that ray passes clear walls. Then surfaces that are not smooth, up to 2, and all surfaces.
+// take one of two ways; the light of its shadow ray is sharp; that ray passes clear walls. Then surfaces that are not smooth, up to
+// 2, and all surfaces.
 const uint SHADOWED = 1u, ALIVE = 2u, SMOOTH = 4u, CHOSEN = 8u, SHARP = 16u, PASSING = 32u, SCATTERED_AT = 6u, BOUNCE_AT = 8u;
 
 uint place_of(uint kind, uint i) { return kind * path_count() + i; }
@@ -42,7 +43,8 @@ void save_hit(uint i, Hit hit) {
 
 void save_path(uint i, PathState p, Departure d) {
     uint state = (d.shadowed ? SHADOWED : 0u) | (d.alive ? ALIVE : 0u) | (p.path.delta ? SMOOTH : 0u) | (p.chosen ? CHOSEN : 0u) |
-                 (d.sharp ? SHARP : 0u) | ((d.shadow.mask_seed & PASSES_WALLS) != 0u ? PASSING : 0u) | min(p.scattered, 2u) << SCATTERED_AT | p.bounce << BOUNCE_AT;
+                 (d.sharp ? SHARP : 0u) | ((d.shadow.mask_seed & PASSES_WALLS) != 0u ? PASSING : 0u) |
+                 min(p.scattered, 2u) << SCATTERED_AT | p.bounce << BOUNCE_AT;
     keep(ORIGIN, i, p.path.origin, floatBitsToUint(p.path.bsdf_pdf));
     keep(DIRECTION, i, p.path.direction, floatBitsToUint(p.path.eta_scale));
     keep(THROUGHPUT, i, p.path.throughput, state);

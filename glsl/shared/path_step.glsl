@@ -40,7 +40,8 @@ vec3 light_from_nee(Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sa
     vec3 wi = light.direction * basis; // row vector times matrix: into the frame
     vec4 f = bsdf_evaluate(bsdf, wo, wi);
     f.rgb *= light_share(s, facing, light.direction, wi.z);
-    shadow = Segment(ray_origin(s, light.direction), light.direction, light.distance, shadow_mask_seed(seed_bounce.x, seed_bounce.y, light.pdf == 0.0));
+    uint mask_seed = shadow_mask_seed(seed_bounce.x, seed_bounce.y, light.pdf == 0.0);
+    shadow = Segment(ray_origin(s, light.direction), light.direction, light.distance, mask_seed);
     if (light.distance < INFINITE_DISTANCE) { // aim again from the offset origin, so that the segment ends on the light
         shadow.direction = s.position + light.distance * light.direction - shadow.origin;
         shadow.t_max = SHADOW_END;
@@ -102,7 +103,8 @@ Departure leave(inout PathState p, Surface s, bool going, Sampler random) {
         p.chosen = smooth_here && bsdf_chooses(bsdf);
         p.albedo = min(p.path.throughput, vec3(1.0)) * (p.chosen ? vec3(1.0) : bsdf_albedo(bsdf, wo.z)); // roulette may exceed 1
     }
-    d.sampled = p.path.throughput * light_from_nee(s, bsdf, facing, basis, wo, random, pair, uvec2(p.seed, p.bounce), d.shadow, d.sharp);
+    uvec2 seed_bounce = uvec2(p.seed, p.bounce);
+    d.sampled = p.path.throughput * light_from_nee(s, bsdf, facing, basis, wo, random, pair, seed_bounce, d.shadow, d.sharp);
     d.shadowed = going && push.constants.light_count > 0u && !smooth_here && max(d.sampled.r, max(d.sampled.g, d.sampled.b)) > 0.0;
     d.alive = scatter(p.path, s, bsdf, facing, basis, wo, random, pair) && going;
     p.scattered += smooth_here ? 0u : 1u;

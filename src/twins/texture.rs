@@ -115,7 +115,8 @@ pub fn mask_bits(word: u32) -> u32 {
     word & !PASSES_WALLS
 }
 
-/// Whether a partly transparent surface stops a ray, decided by a hash of `seed`. `direction` is that of the ray in the space of the triangle.
+/// Whether a partly transparent surface stops a ray, decided by a hash of `seed`. `direction` is that of the ray in the space of the
+/// triangle.
 pub fn mask_blocks(scene: &Scene, triangle: u32, instance: u32, barycentric: Vec2, direction: Vec3, seed: u32) -> bool {
     let number = material_of(scene, triangle, instance);
     let mut opacity = surface_opacity(scene, number, triangle, barycentric);

@@ -49,8 +49,8 @@ pub struct Read {
 }
 
 impl Frames {
-    /// A pose, whose triangles are those of the mesh itself: materials and texture coordinates belong to them, while the shape of a face in this
-    /// pose may ask for others.
+    /// A pose, whose triangles are those of the mesh itself: materials and texture coordinates belong to them, while the shape of a face
+    /// in this pose may ask for others.
     ///
     /// # Errors
     /// [`Error::Input`] of its file.

@@ -24,8 +24,8 @@ pub struct Materials {
     pub vertices_have_alpha: bool,
 }
 
-/// Marks smooth thin walls without colour, textures and coat, which shadow rays of lights without extent pass. (The colours of their vertices are
-/// not looked at.) Others would need the light's colour changed on the way, and stop it.
+/// Marks smooth thin walls without colour, textures and coat, which shadow rays of lights without extent pass. (The colours of their
+/// vertices are not looked at.) Others would need the light's colour changed on the way, and stop it.
 pub fn mark_clear_wall(m: &mut Material) {
     let textures =
         [m.base_texture, m.roughness_texture, m.specular_texture, m.specular_factor_texture, m.transmission_texture];
