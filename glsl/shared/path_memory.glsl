@@ -95,8 +95,8 @@ bvec2 waits_for(uint i) {
 Segment saved_ray(uint i, bool shadow) {
     uint end, seed = memory[place_of(SHADOW, i)].w, state = memory[place_of(THROUGHPUT, i)].w, bounce = state >> BOUNCE_AT;
     vec3 origin = kept(shadow ? SHADOW_ORIGIN : ORIGIN, i, end), direction = kept(shadow ? SHADOW : DIRECTION, i);
-    bool passing = (state & PASSING) != 0u;
-    if (shadow) return Segment(origin, direction, uintBitsToFloat(end), shadow_mask_seed(seed, bounce - 1u, passing));
+    uint passes = (state & PASSING) != 0u ? PASSES_WALLS : 0u;
+    if (shadow) return Segment(origin, direction, uintBitsToFloat(end), shadow_mask_seed(seed, bounce - 1u) | passes);
     return Segment(origin, direction, INFINITE_DISTANCE, mask_seed(seed, bounce));
 }
 

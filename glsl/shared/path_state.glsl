@@ -71,9 +71,7 @@ PathState path_state(vec3 origin, vec3 direction, bool sharp_only, uint seed) {
 
 // What decides about masks on the way to the surface number `bounce`, and on that from there to a light.
 uint mask_seed(uint seed, uint bounce) { return mask_bits(pcg(seed + 2u * bounce)); }
-uint shadow_mask_seed(uint seed, uint bounce, bool passes_walls) {
-    return mask_seed(seed, bounce) + 2u + (passes_walls ? PASSES_WALLS : 0u);
-}
+uint shadow_mask_seed(uint seed, uint bounce) { return mask_seed(seed, bounce) + 2u; }
 
 // The ray from the camera, or to the next surface.
 Segment next_segment(PathState p) {

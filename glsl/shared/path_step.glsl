@@ -32,7 +32,7 @@ vec3 light_from_hit(Path path, Surface s, float t) {
 
 // Direct light at `s` by light sampling, which counts if nothing blocks `shadow`; where it is 0, no ray is needed. The columns
 // of `basis` are the shading frame.
-vec3 light_from_nee(Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sampler random, uint pair, uvec2 seed_bounce,
+vec3 light_from_nee(Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sampler random, uint pair, uint mask_seed,
                     out Segment shadow, out bool sharp) {
     uint word = sample_2d_bits(random, pair + PAIR_CHOICE).x;
     LightSample light = light_sample(s.position, word, sample_2d(random, pair + PAIR_LIGHT));
@@ -40,7 +40,7 @@ vec3 light_from_nee(Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sa
     vec3 wi = light.direction * basis; // row vector times matrix: into the frame
     vec4 f = bsdf_evaluate(bsdf, wo, wi);
     f.rgb *= light_share(s, facing, light.direction, wi.z);
-    uint mask_seed = shadow_mask_seed(seed_bounce.x, seed_bounce.y, light.pdf == 0.0);
+    mask_seed |= light.pdf == 0.0 ? PASSES_WALLS : 0u;
     shadow = Segment(ray_origin(s, light.direction), light.direction, light.distance, mask_seed);
     if (light.distance < INFINITE_DISTANCE) { // aim again from the offset origin, so that the segment ends on the light
         shadow.direction = s.position + light.distance * light.direction - shadow.origin;
@@ -103,8 +103,8 @@ Departure leave(inout PathState p, Surface s, bool going, Sampler random) {
         p.chosen = smooth_here && bsdf_chooses(bsdf);
         p.albedo = min(p.path.throughput, vec3(1.0)) * (p.chosen ? vec3(1.0) : bsdf_albedo(bsdf, wo.z)); // roulette may exceed 1
     }
-    uvec2 seed_bounce = uvec2(p.seed, p.bounce);
-    d.sampled = p.path.throughput * light_from_nee(s, bsdf, facing, basis, wo, random, pair, seed_bounce, d.shadow, d.sharp);
+    uint seed = shadow_mask_seed(p.seed, p.bounce);
+    d.sampled = p.path.throughput * light_from_nee(s, bsdf, facing, basis, wo, random, pair, seed, d.shadow, d.sharp);
     d.shadowed = going && push.constants.light_count > 0u && !smooth_here && max(d.sampled.r, max(d.sampled.g, d.sampled.b)) > 0.0;
     d.alive = scatter(p.path, s, bsdf, facing, basis, wo, random, pair) && going;
     p.scattered += smooth_here ? 0u : 1u;

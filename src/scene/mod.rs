@@ -5,11 +5,11 @@
 use crate::error::{Error, Result};
 use crate::image::input;
 use crate::layout::{AliasEntry, BvhNode, Camera, Instance, Light, Material, Shading, Texture, Triangle};
-use crate::layout::{LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT};
 use crate::scene::description::settings::Settings;
 use crate::threads;
 use animation::{Animation, Mover};
 use build::assemble::{Choices, assemble};
+use build::lights::is_delta;
 use description::Description;
 use load::mesh_file::Format;
 use load::{gltf, include};
@@ -358,9 +358,4 @@ fn model(path: &Path) -> Description {
     let name = path.file_stem().map(|s| s.to_string_lossy().into_owned());
     let mesh = description::MeshTable { name, file, ..Default::default() };
     Description { mesh: vec![mesh], ..Default::default() }
-}
-
-/// Whether a light has no extent.
-fn is_delta(light: &Light) -> bool {
-    matches!(light.kind, LIGHT_POINT | LIGHT_SPOT | LIGHT_DIRECTIONAL)
 }

@@ -7,6 +7,8 @@ mod alike;
 #[path = "../support/command.rs"]
 mod command;
 mod engine;
+#[path = "../support/glazed.rs"]
+mod glazed;
 mod hits;
 mod pictures;
 #[path = "../support/poses.rs"]
@@ -19,7 +21,7 @@ mod support;
 use std::path::Path;
 use tallow::error::{Error, Result};
 use tallow::gpu::{DeviceOptions, Gpu, Tracing, Tuning};
-use tallow::layout::{BSDF_METALLIC, MATERIAL_CLEAR_WALL, MATERIAL_MASKED, Material};
+use tallow::layout::MATERIAL_MASKED;
 use tallow::render::settings::Settings;
 use tallow::scene::{Loaded, Scene};
 
@@ -54,16 +56,6 @@ fn masked(mut scene: Loaded) -> Loaded {
     scene
 }
 
-/// Blades of clear glass in the sun.
-fn panes() -> Loaded {
-    let mut scene = shipped("grass/scene.toml");
-    let blade = &mut scene.materials[0];
-    let (kind, flags, base_color) = (BSDF_METALLIC, blade.flags | MATERIAL_CLEAR_WALL, [0.9; 3]);
-    let pane = Material { kind, flags, base_color, alpha: 0.0, metallic: 0.0, ..*blade };
-    *blade = Material { transmission_factor: 0.8, specular: [0.04; 3], specular_factor: 1.0, ..pane };
-    scene
-}
-
 /// One of each kind: a single level, a sphere among its triangles, instances with a sphere among them, masks on such, and panes.
 fn scenes() -> [(&'static str, Loaded); 6] {
     let moving = || poses::at(&poses::MOMENTS[2]).with(|s| s.spp = 16);
@@ -73,7 +65,7 @@ fn scenes() -> [(&'static str, Loaded); 6] {
         ("instances", moving()),
         ("masked box", masked(shipped("cornell-box/scene.toml"))),
         ("masked instances", masked(moving())),
-        ("panes", panes()),
+        ("panes", glazed::glazed(shipped("grass/scene.toml"))),
     ]
 }
 

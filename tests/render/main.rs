@@ -4,6 +4,8 @@ mod adaptive;
 mod alike;
 mod analytic;
 mod ghosts;
+#[path = "../support/glazed.rs"]
+mod glazed;
 #[path = "../support/moving.rs"]
 mod moving;
 mod plan;

@@ -1,9 +1,10 @@
 //! Tests that paths traced by a wavefront have the bits of those that a thread traces from end to end, at sizes that fill neither
 //! workgroups nor batches, and where it is used.
+use crate::glazed::glazed;
 use crate::support::{assert_silent, render_steps, tuned_gpu};
 use crate::tuning::{OUTPUTS, bits, film, scene};
 use tallow::gpu::{FrameResources, Gpu, Tuning};
-use tallow::layout::{BSDF_DIELECTRIC, BSDF_METALLIC, MATERIAL_CLEAR_WALL, MATERIAL_MASKED, Material};
+use tallow::layout::{BSDF_DIELECTRIC, MATERIAL_MASKED, Material};
 use tallow::profile::work::FrameWork;
 use tallow::profile::{Amount, Workload};
 use tallow::render::settings::{Sampler, Settings};
@@ -20,16 +21,6 @@ fn glass() -> Loaded {
         (stone.opacity, stone.flags) = (0.6, stone.flags | MATERIAL_MASKED);
     }
     scene.with(|s| s.max_depth = 8)
-}
-
-/// Blades of clear glass in the sun.
-fn panes() -> Loaded {
-    let mut scene = scene("grass/scene.toml", "uniform");
-    let blade = &mut scene.materials[0];
-    let (kind, flags, base_color) = (BSDF_METALLIC, blade.flags | MATERIAL_CLEAR_WALL, [0.9; 3]);
-    let pane = Material { kind, flags, base_color, alpha: 0.0, metallic: 0.0, ..*blade };
-    *blade = Material { transmission_factor: 0.8, specular: [0.04; 3], specular_factor: 1.0, ..pane };
-    scene
 }
 
 /// Batches of a hundred paths, of which a thread traces up to eight.
@@ -64,7 +55,7 @@ fn settings_of_all_kinds_have_the_same_bits() {
     let scenes = changes
         .into_iter()
         .map(|(what, change)| (what, grass().with(change)))
-        .chain([("glass and holes", glass()), ("panes", panes())]);
+        .chain([("glass and holes", glass()), ("panes", glazed(grass()))]);
     for (what, scene) in scenes {
         let scene = scene.with(|s| (s.width, s.height, s.spp) = (20, 15, 4));
         assert!(film(&whole, &scene) == film(&wavefront, &scene), "{what}");

@@ -64,7 +64,8 @@ impl Frames {
             None => read.base.insert(Arc::new(self.corners(&self.base)?)).clone(),
         };
         let name = numbered(&self.pattern.to_string_lossy(), self.first + index).unwrap_or_default();
-        let mut mesh = self.corners(name.as_ref())?;
+        let path = Path::new(&name);
+        let mut mesh = if path == self.base { (*base).clone() } else { self.corners(path)? };
         if mesh.positions.len() != base.positions.len() {
             let [corners, own] = [&mesh, &base].map(|mesh| mesh.positions.len());
             return Err(Error::input(

@@ -15,7 +15,7 @@ use crate::memory;
 use crate::scene::Scene;
 use crate::scene::description::Description;
 use crate::scene::load::library::Library;
-use crate::scene::load::material::mark_clear_wall;
+use crate::scene::load::material::{is_smooth_wall, mark_clear_wall};
 use glam::{DMat3, Vec3};
 use std::path::Path;
 
@@ -70,10 +70,9 @@ pub fn assemble(path: &Path, description: &Description, choices: Choices, scene:
     Ok(())
 }
 
-/// That it is dark behind them looks like a mistake.
+/// A warning about smooth panes that stop shadow rays: that it is dark behind them looks like a mistake.
 fn warn_of_panes(scene: &Scene) -> Option<String> {
-    let smooth = |m: &Material| m.kind == BSDF_METALLIC && m.transmission_factor > 0.0 && m.alpha < SMOOTH_ALPHA;
-    let stops = |m: &Material| smooth(m) && m.flags & MATERIAL_CLEAR_WALL == 0;
+    let stops = |m: &Material| is_smooth_wall(m) && m.flags & MATERIAL_CLEAR_WALL == 0;
     let found = scene.materials.iter().position(stops).filter(|_| scene.has_delta_lights())?;
     Some(format!(
         "material \"{}\" is smooth, transmits, and has colour, textures or a coat: point, spot and directional lights cast a full \

@@ -225,7 +225,12 @@ pub fn is_large(scene: &Scene, light: &Light) -> bool {
 const DELTA_WEIGHT: f64 = 8.0;
 
 fn weight(light: &Light) -> f64 {
-    if matches!(light.kind, LIGHT_POINT | LIGHT_SPOT | LIGHT_DIRECTIONAL) { DELTA_WEIGHT } else { 1.0 }
+    if is_delta(light) { DELTA_WEIGHT } else { 1.0 }
+}
+
+/// Whether a light has no extent.
+pub fn is_delta(light: &Light) -> bool {
+    matches!(light.kind, LIGHT_POINT | LIGHT_SPOT | LIGHT_DIRECTIONAL)
 }
 
 /// Least share of the choices that lights at infinity get beside those in the scene, and these beside them. Measured at 64 samples a pixel

@@ -31,9 +31,13 @@ pub fn mark_clear_wall(m: &mut Material) {
         [m.base_texture, m.roughness_texture, m.specular_texture, m.specular_factor_texture, m.transmission_texture];
     let plain = m.clearcoat == 0.0 && textures.iter().all(|&texture| texture == NONE);
     let [r, g, b] = m.base_color;
-    let smooth = m.kind == BSDF_METALLIC && m.transmission_factor > 0.0 && m.alpha < SMOOTH_ALPHA;
-    m.flags =
-        m.flags & !MATERIAL_CLEAR_WALL | if smooth && plain && r == g && g == b { MATERIAL_CLEAR_WALL } else { 0 };
+    let clear = is_smooth_wall(m) && plain && r == g && g == b;
+    m.flags = m.flags & !MATERIAL_CLEAR_WALL | if clear { MATERIAL_CLEAR_WALL } else { 0 };
+}
+
+/// Whether it is a thin wall that lets light straight through.
+pub fn is_smooth_wall(m: &Material) -> bool {
+    m.kind == BSDF_METALLIC && m.transmission_factor > 0.0 && m.alpha < SMOOTH_ALPHA
 }
 
 impl Materials {
