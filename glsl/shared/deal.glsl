@@ -256,6 +256,7 @@ Hit deal_shadow_then_closest(Segment shadow, inout bool shadowed, Segment ray, b
     if (!shadowed) shadow = ray;
     Walk w = walk_start(shadow, first, shadowed || alive, shadowed, root);
     shadowed = false;
+    if (FX_CLEAR_WALLS) wall_depth = uvec3(0u);
     if (any_lane(w.on)) do {
         do {
             walk_on(w, root, from);

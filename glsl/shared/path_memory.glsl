@@ -105,3 +105,10 @@ uvec2 saved_from(uint i) { return memory[place_of(HIT, i)].xy; }
 
 // Light that something blocks is not added.
 void block_light(uint i) { memory[place_of(THROUGHPUT, i)].w &= ~SHADOWED; }
+
+// Of light that passes walls, what they leave.
+void dim_light(uint i) {
+    uint rays;
+    vec3 sampled = kept(SAMPLED, i, rays);
+    if (FX_CLEAR_WALLS && wall_depth != uvec3(0u)) keep(SAMPLED, i, behind_walls(sampled), rays);
+}

@@ -89,6 +89,7 @@ Hit traverse(Segment ray, uint root) { return query_hit(ray, false, root, uvec2(
 // Finds out first, where `shadowed`, whether anything blocks `shadow`, which replaces `shadowed`; then, where `alive`, the closest
 // hit of `ray`. Both rays leave the same triangle.
 Hit trace_shadow_then_closest(Segment shadow, inout bool shadowed, Segment ray, bool alive, uint root, uvec2 from) {
+    if (FX_CLEAR_WALLS) wall_depth = uvec3(0u);
     if (shadowed) shadowed = query_hit(shadow, true, root, from).triangle != NONE;
     Hit hit = Hit(ray.t_max, NONE, NONE, 0.0, 0.0);
     if (alive) hit = query_hit(ray, false, root, from);

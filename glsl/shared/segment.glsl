@@ -21,3 +21,22 @@ struct Segment {
 };
 
 const float INFINITE_DISTANCE = 3e38; // stands for the distance of lights at infinity
+
+// Optical depth of the walls that a shadow ray has passed, by channel, in 2^-20 of a halving. Integers have the same sum in whatever
+// order a ray meets walls.
+uvec3 wall_depth = uvec3(0u);
+const float WALL_HALVING = 1048576.0; // units of `wall_depth`
+const uint WALL_END = 25165824u;      // 24 halvings: what they leave counts as nothing
+
+// Dims the light of a shadow ray to `share` of it. Returns whether any is left.
+bool pass_wall(vec3 share) {
+    vec3 halvings = clamp(-log2(max(share, 1e-9)), 0.0, 24.0);
+    wall_depth = min(wall_depth + uvec3(halvings * WALL_HALVING + 0.5), WALL_END);
+    return any(lessThan(wall_depth, uvec3(WALL_END)));
+}
+
+// What is left of `light` behind the walls.
+vec3 behind_walls(vec3 light) {
+    if (!FX_CLEAR_WALLS) return light;
+    return mix(light * exp2(-vec3(wall_depth) / WALL_HALVING), vec3(0.0), equal(wall_depth, uvec3(WALL_END)));
+}

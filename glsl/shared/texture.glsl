@@ -66,26 +66,39 @@ float surface_opacity(uint material, uint triangle, vec2 barycentric) {
     return opacity;
 }
 
-// Share of light that a smooth clear wall lets straight through, as metallic_sample does: nothing else brings the light of a source
+// What a picture makes of `constant` at a point of a triangle.
+vec3 textured_at(vec3 constant, uint image, uint triangle, vec2 barycentric, bool color) {
+    if (!FX_TEXTURES || image == NONE) return constant;
+    return constant * texture_sample(image, texture_coordinates(image, triangle, barycentric), color).rgb;
+}
+
+// Share of light that a smooth wall lets straight through, as metallic_sample does: nothing else brings the light of a source
 // without extent behind it. `direction` is that of the ray in the space of the triangle; the normal is that of the triangle itself.
-float clear_wall_passes(uint material, uint triangle, vec2 barycentric, vec3 direction) {
+vec3 clear_wall_passes(uint material, uint triangle, vec2 barycentric, vec3 direction) {
     Material m = Material_load(materials, material);
     Triangle t = Triangle_load(triangles, triangle);
     vec3 n = cross(t.v1 - t.v0, t.v2 - t.v0);
     if (FX_SPHERES && is_sphere(triangle)) n = octahedral_vector(barycentric);
     float c = abs(dot(n, direction)) * inversesqrt(max(dot(n, n) * dot(direction, direction), 1e-37));
     float grazing = 1.0 - min(c, 1.0), squared = grazing * grazing;
-    float f90 = m.specular_factor, f0 = min(max(m.specular.r, max(m.specular.g, m.specular.b)), 1.0) * f90;
-    return m.base_color.g * (1.0 - m.metallic) * m.transmission_factor * (1.0 - mix(f0, f90, squared * squared * grazing));
+    vec3 base = textured_at(m.base_color, m.base_texture, triangle, barycentric, true);
+    if (FX_VERTEX_COLORS) base *= vertex_color(Shading_load(shading, triangle), barycentric).rgb;
+    float metallic = textured_at(vec3(m.metallic), m.roughness_texture, triangle, barycentric, false).b;
+    float through = textured_at(vec3(m.transmission_factor), m.transmission_texture, triangle, barycentric, false).r;
+    float f90 = textured_at(vec3(m.specular_factor), m.specular_factor_texture, triangle, barycentric, false).r;
+    vec3 specular = textured_at(m.specular, m.specular_texture, triangle, barycentric, true);
+    float f0 = min(max(specular.r, max(specular.g, specular.b)), 1.0) * f90;
+    return base * (through * (1.0 - metallic) * (1.0 - mix(f0, f90, squared * squared * grazing)));
 }
 
 // Whether a partly transparent surface stops a ray. A ray passes with the probability 1 - opacity, decided by a hash, so that the
-// light that passes is right on average, and a cut-out mask (0 or 1) is exact.
+// light that passes is right on average, and a cut-out mask (0 or 1) is exact. A clear wall dims the light of a shadow ray, without
+// noise, and must be asked once only.
 bool mask_blocks(uint triangle, uint instance, vec2 barycentric, vec3 direction, uint seed) {
     uint material = material_of(triangle, instance);
     float opacity = surface_opacity(material, triangle, barycentric);
     if (FX_CLEAR_WALLS && (seed & PASSES_WALLS) != 0u && (Material_flags(materials, material) & MATERIAL_CLEAR_WALL) != 0u)
-        opacity *= 1.0 - clear_wall_passes(material, triangle, barycentric, direction);
+        return !pass_wall(1.0 - opacity * (1.0 - clear_wall_passes(material, triangle, barycentric, direction)));
     // Two copies of a triangle on one ray decide independently.
     uint surface = triangle * 0x9e3779b9u ^ instance * 0x85ebca6bu;
     return opacity > unit_interval(pcg(seed ^ surface));

@@ -19,6 +19,7 @@ Hit trace_shadow_then_closest(Segment shadow, inout bool shadowed, Segment ray, 
     RaySpace first = ray_space(shadow.origin, shadow.direction), second = ray_space(ray.origin, ray.direction);
     bool any_hit = shadowed, done;
     shadowed = false;
+    if (FX_CLEAR_WALLS) wall_depth = uvec3(0u);
     Traversal t = traversal_start(any_hit ? shadow.t_max : ray.t_max, root);
     do {
         uint mask_seed = any_hit ? shadow.mask_seed : ray.mask_seed;

@@ -13,7 +13,7 @@ void trace_path(inout PathState p, bool on, Sampler random) {
         Segment next = next_segment(p);
         if (DEALT) p.hit = deal_shadow_then_closest(d.shadow, d.shadowed, next, d.alive, push.constants.root, from);
         else p.hit = trace_shadow_then_closest(d.shadow, d.shadowed, next, d.alive, push.constants.root, from);
-        add_sampled(p, d.sampled, lit && !d.shadowed, d.sharp);
+        add_sampled(p, behind_walls(d.sampled), lit && !d.shadowed, d.sharp);
         going = d.alive && arrive(p, s);
     } while (any_lane(going));
 }

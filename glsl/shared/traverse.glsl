@@ -110,11 +110,14 @@ bool intersect_sphere(RaySpace r, uint index, uint instance, float t_max, bool l
     bool enters = !leaves && -along - chord > 0.0;
     normal = octahedral_point(nearest + (enters ? -chord : chord) * d);
     if (FX_ALPHA_MASKS) {
-        if (enters && squared >= 0.0 && !mask_blocks(index, instance, normal, r.direction, mask_seed)) {
+        if (enters && squared >= 0.0 && (-chord - along) * inverse < t_max &&
+            !mask_blocks(index, instance, normal, r.direction, mask_seed)) {
             enters = false;
             normal = octahedral_point(nearest + chord * d);
         }
-        bool passes = !enters && squared >= 0.0 && !mask_blocks(index, instance, normal, r.direction, mask_seed ^ mask_bits(~0u));
+        float far = (chord - along) * inverse;
+        bool passes = !enters && squared >= 0.0 && far > 0.0 && far < t_max &&
+                      !mask_blocks(index, instance, normal, r.direction, mask_seed ^ mask_bits(~0u));
         if (passes) return false;
     }
     t = ((enters ? -chord : chord) - along) * inverse;
@@ -271,10 +274,28 @@ bool intersect_triangles(inout Hit hit, Leaves leaves, bool any_hit, uint mask_s
     return found;
 }
 
+// Tests a triangle or sphere together with its mask.
+void intersect_masked(inout Hit hit, RaySpace ray, uint index, uint instance, uint mask_seed, uvec2 from) {
+    float t;
+    vec2 barycentric;
+    bool meets = intersect_primitive(ray, index, instance, hit.t, mask_seed, from, t, barycentric);
+    if (FX_ALPHA_MASKS && meets && !(FX_SPHERES && is_sphere(index))) // spheres have tested their mask
+        meets = mask_blocks(index, instance, barycentric, ray.direction, mask_seed);
+    if (meets) hit = Hit(t, index, instance, barycentric.x, barycentric.y);
+}
+
 // Tests the triangles of `leaves`. Only the nearest one's mask is looked up; where the ray passes it, the others are tested again.
+// Not where walls count how often they are asked.
 void intersect_leaves(inout Hit hit, Leaves leaves, bool any_hit, uint mask_seed, uvec2 from) {
     if (!FX_ALPHA_MASKS) {
         intersect_triangles(hit, leaves, any_hit, mask_seed, from);
+        return;
+    }
+    if (FX_CLEAR_WALLS) {
+        if (leaves.bits != 0u) do {
+            uint index = leaves.first + take_highest(leaves.bits);
+            intersect_masked(hit, leaves.ray, index, leaves.instance, mask_seed, from);
+        } while (leaves.bits != 0u && !(any_hit && hit.triangle != NONE));
         return;
     }
     bool passes;
@@ -347,13 +368,7 @@ void intersect_kept(inout Traversal t, RaySpace world, uint mask_seed, uvec2 fro
     if (FX_INSTANCES) ray = select_ray(t.kept_instance != NONE, t.inside, world);
     [[unroll]] for (uint i = 0u; i < TRIANGLES_A_STEP; i++) {
         if (t.kept_bits == 0u) break;
-        uint index = t.kept_first + take_highest(t.kept_bits);
-        float distance;
-        vec2 barycentric;
-        bool meets = intersect_primitive(ray, index, t.kept_instance, t.hit.t, mask_seed, from, distance, barycentric);
-        if (FX_ALPHA_MASKS && meets && !(FX_SPHERES && is_sphere(index))) // spheres have tested their mask
-            meets = mask_blocks(index, t.kept_instance, barycentric, ray.direction, mask_seed);
-        if (meets) t.hit = Hit(distance, index, t.kept_instance, barycentric.x, barycentric.y);
+        intersect_masked(t.hit, ray, t.kept_first + take_highest(t.kept_bits), t.kept_instance, mask_seed, from);
     }
 }
 

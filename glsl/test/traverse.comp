@@ -18,9 +18,11 @@ uint nodes_visited = 0u;
 #include "shared/trace.glsl"
 #include "shared/deal.glsl"
 
+// Of rays, shadow rays alone pass walls.
 Segment ray_at(uint i) {
     RayQuery ray = RayQuery_load(rays, i);
-    return Segment(ray.origin, ray.direction, ray.t_max, ray.mask_seed);
+    wall_depth = uvec3(0u);
+    return Segment(ray.origin, ray.direction, ray.t_max, push.any_hit != 0u ? ray.mask_seed : mask_bits(ray.mask_seed));
 }
 
 void write_hit(uint i, Hit hit) {

@@ -38,6 +38,7 @@ void trace_rays(uint item, uint stride, uint count) {
         Segment shadow = saved_ray(i, true), next = saved_ray(i, false);
         Hit hit = trace_shadow_then_closest(shadow, blocked, next, waits.y, push.constants.root, saved_from(i));
         if (blocked) block_light(i);
+        else if (waits.x) dim_light(i);
         save_hit(i, hit);
     }
 }
@@ -54,6 +55,8 @@ void trace_rays(uint item, uint stride, uint count) {
         if (traversal_step(t, space, any_hit, push.constants.root, ray.mask_seed, from)) {
             if (!any_hit) save_hit(i, t.hit);
             else if (t.hit.triangle != NONE) block_light(i);
+            else dim_light(i);
+            if (FX_CLEAR_WALLS) wall_depth = uvec3(0u);
             if (any_hit && waits.y) {
                 any_hit = false;
             } else {

@@ -42,7 +42,7 @@ constants! {
     MATERIAL_UNLIT: uint = 32;
     /// [`Material::flags`]: it shines from behind, too, which light sampling does not choose.
     MATERIAL_EMITS_BEHIND: uint = 64;
-    /// [`Material::flags`]: a smooth thin wall without colour or textures, which shadow rays of lights without extent pass.
+    /// [`Material::flags`]: a smooth thin wall without a coat, which shadow rays of lights without extent pass.
     MATERIAL_CLEAR_WALL: uint = 128;
     /// [`PathConstants::pixel_filter`]: uniform over the pixel.
     PIXEL_FILTER_BOX: uint = 0;

@@ -95,7 +95,7 @@ effects! {
     coat_normals: FX_COAT_NORMALS;
     /// One that lets light through as a thin wall.
     thin_walls: FX_THIN;
-    /// Smooth thin walls without colour that let the light of point, spot and directional lights pass.
+    /// Smooth thin walls that let the light of point, spot and directional lights pass.
     clear_walls: FX_CLEAR_WALLS;
     /// A conductor or dielectric whose roughness depends on the direction.
     anisotropic: FX_ANISOTROPIC;

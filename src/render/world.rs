@@ -34,7 +34,7 @@ impl World {
         }
         let boxes = || Buffer::from_slice(gpu, "boxes of spheres", &boxes(&scene.triangles));
         let boxes = effects.spheres.then(boxes).transpose()?;
-        let (shapes, parts) = (shapes(triangles, boxes.as_ref())?, parts(scene, boxes.is_some()));
+        let (shapes, parts) = (shapes(triangles, boxes.as_ref())?, parts(scene, effects));
         let all: Vec<_> = (0..parts.len()).collect();
         let meshes = parts.iter().map(|part| part.shapes.clone()).collect();
         let room = placements(scene, &parts, scene.instances.len())?.len();
@@ -79,18 +79,19 @@ fn shapes<'a>(triangles: &'a Buffer<Triangle>, boxes: Option<&'a Buffer<Aabb>>) 
     Shapes::new(triangles, corners, boxes)
 }
 
-fn parts(scene: &Scene, has_spheres: bool) -> Vec<Part> {
+fn parts(scene: &Scene, effects: &Effects) -> Vec<Part> {
+    let once = effects.clear_walls; // they dim light each time that a ray comes to them
     let of_mesh = |(mesh, range): (usize, Range<usize>)| {
         let mut first = range.start;
         let runs = scene.triangles[range.clone()].chunk_by(|a, b| is_sphere(a) == is_sphere(b)).map(move |run| {
             first += run.len();
             (is_sphere(&run[0]), first - run.len()..first)
         });
-        let runs: Vec<_> = runs.filter(|(spheres, _)| *spheres && has_spheres).map(|(_, run)| run).collect();
+        let runs: Vec<_> = runs.filter(|(spheres, _)| *spheres && effects.spheres).map(|(_, run)| run).collect();
         let all_spheres = runs.first() == Some(&range);
         // What spheres are told by is no triangle that is seen, and lies among those of the mesh.
-        let triangles = (!all_spheres).then_some(Mesh { range, of_boxes: false });
-        let shapes = triangles.into_iter().chain(runs.into_iter().map(|range| Mesh { range, of_boxes: true }));
+        let triangles = (!all_spheres).then_some(Mesh { range, of_boxes: false, once });
+        let shapes = triangles.into_iter().chain(runs.into_iter().map(|range| Mesh { range, of_boxes: true, once }));
         shapes.map(|shapes| Part { mesh, shapes }).collect::<Vec<_>>()
     };
     scene.meshes().into_iter().enumerate().flat_map(of_mesh).collect()

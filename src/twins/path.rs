@@ -15,7 +15,7 @@ use crate::twins::surface::{
     Facing, Surface, facing_of, light_share, local_coat_normal, shading_basis, surface_at, surface_bsdf,
     surface_emission,
 };
-use crate::twins::traverse::{Hit, traverse, traverse_from};
+use crate::twins::traverse::{Hit, light_left, traverse, traverse_from};
 use glam::{Mat3, Vec3};
 
 pub use crate::shaders::shared::path_step::SHADOW_END;
@@ -198,8 +198,8 @@ impl Tracer<'_> {
             distance = SHADOW_END;
         }
         let mask_seed = mask_seed | if light.pdf == 0.0 { PASSES_WALLS } else { 0 };
-        let blocker = traverse_from(self.scene, p.from, origin, direction, distance, true, mask_seed);
-        Some((if blocker.any() { Vec3::ZERO } else { contribution }, light.sharp))
+        let left = light_left(self.scene, p.from, origin, direction, distance, mask_seed);
+        Some((contribution * left, light.sharp))
     }
 
     fn scatter(&self, path: &mut Path, p: &Shade, random: Sampler) -> bool {
@@ -249,7 +249,7 @@ impl Tracer<'_> {
             rays += 1;
             let hit = match bounce {
                 0 => first,
-                _ => traverse_from(self.scene, from, path.origin, path.direction, INFINITE_DISTANCE, false, mask_seed),
+                _ => traverse_from(self.scene, from, path.origin, path.direction, mask_seed),
             };
             let kind = kind_of_light(&seen, false);
             if !hit.any() {

@@ -99,15 +99,23 @@ pub fn vertex_color(scene: &Scene, triangle: u32, barycentric: Vec2) -> Vec4 {
 }
 
 /// Share of light that a smooth clear wall lets straight through.
-fn clear_wall_passes(scene: &Scene, material: &Material, triangle: u32, barycentric: Vec2, direction: Vec3) -> f32 {
+fn clear_wall_passes(scene: &Scene, m: &Material, triangle: u32, barycentric: Vec2, direction: Vec3) -> Vec3 {
     let t = &scene.triangles[triangle as usize];
     let [a, b, c] = [t.v0, t.v1, t.v2].map(Vec3::from);
     let n = if t.primitive & SPHERE != 0 { octahedral_vector(barycentric) } else { (b - a).cross(c - a) };
     let cosine = n.dot(direction).abs() / (n.length_squared() * direction.length_squared()).max(1e-37).sqrt();
-    let f90 = material.specular_factor;
-    let f0 = Vec3::from(material.specular).max_element().min(1.0) * f90;
+    let picture = |image: u32| match image {
+        NONE => Vec4::ONE,
+        image => texture_sample(scene, image, texture_coordinates(scene, image, triangle, barycentric)),
+    };
+    let tint = picture(m.base_texture) * vertex_color(scene, triangle, barycentric);
+    let base = Vec3::from(m.base_color) * tint.truncate();
+    let through = m.transmission_factor * picture(m.transmission_texture).x;
+    let metallic = m.metallic * picture(m.roughness_texture).z;
+    let f90 = m.specular_factor * picture(m.specular_factor_texture).x;
+    let f0 = (Vec3::from(m.specular) * picture(m.specular_texture).truncate()).max_element().min(1.0) * f90;
     let reflected = f0 + (f90 - f0) * (1.0 - cosine.min(1.0)).powi(5);
-    material.base_color[1] * (1.0 - material.metallic) * material.transmission_factor * (1.0 - reflected)
+    base * (through * (1.0 - metallic) * (1.0 - reflected))
 }
 
 /// Of a seed of masks, without the bit of shadow rays that pass clear walls.
@@ -115,15 +123,16 @@ pub fn mask_bits(word: u32) -> u32 {
     word & !PASSES_WALLS
 }
 
-/// Whether a partly transparent surface stops a ray, decided by a hash of `seed`. `direction` is that of the ray in the space of the
-/// triangle.
-pub fn mask_blocks(scene: &Scene, triangle: u32, instance: u32, barycentric: Vec2, direction: Vec3, seed: u32) -> bool {
+/// What a partly transparent surface leaves of a ray's light. It stops a ray or lets it pass, decided by a hash of `seed`, but for
+/// clear walls, which dim the light of shadow rays. `direction` is that of the ray in the space of the triangle.
+pub fn mask_leaves(scene: &Scene, triangle: u32, instance: u32, barycentric: Vec2, direction: Vec3, seed: u32) -> Vec3 {
     let number = material_of(scene, triangle, instance);
-    let mut opacity = surface_opacity(scene, number, triangle, barycentric);
     let material = &scene.materials[number as usize];
+    let opacity = surface_opacity(scene, number, triangle, barycentric);
     if seed & PASSES_WALLS != 0 && material.flags & MATERIAL_CLEAR_WALL != 0 {
-        opacity *= 1.0 - clear_wall_passes(scene, material, triangle, barycentric, direction);
+        return 1.0 - opacity * (1.0 - clear_wall_passes(scene, material, triangle, barycentric, direction));
     }
     let surface = triangle.wrapping_mul(0x9e3779b9) ^ instance.wrapping_mul(0x85ebca6b);
-    opacity > (pcg(seed ^ surface) >> 8) as f32 * 5.9604645e-8
+    let blocks = opacity > (pcg(seed ^ surface) >> 8) as f32 * 5.9604645e-8;
+    if blocks { Vec3::ZERO } else { Vec3::ONE }
 }

@@ -2,11 +2,12 @@
 use crate::layout::{BvhNode, NONE, TRAVERSAL_STACK};
 use crate::math::octahedral::octahedral_point;
 use crate::scene::Scene;
+use crate::shaders::shared::segment::{INFINITE_DISTANCE, WALL_END, WALL_HALVING};
 use crate::shaders::shared::traverse::SLAB_ROUNDING;
 use crate::twins::scene::{object_from_world, triangle_vertices};
 use crate::twins::sphere::Sphere;
-use crate::twins::texture::{mask_bits, mask_blocks};
-use glam::{Vec2, Vec3, vec2, vec3};
+use crate::twins::texture::{mask_bits, mask_leaves};
+use glam::{UVec3, Vec2, Vec3, vec2, vec3};
 
 /// Where a ray meets the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -155,9 +156,22 @@ struct Traversal<'a> {
     instance: u32,
     mask_seed: u32,
     from: [u32; 2],
+    /// Optical depth of the walls that a shadow ray has passed, by channel.
+    wall_depth: UVec3,
 }
 
 impl Traversal<'_> {
+    /// Whether what the ray meets leaves nothing of its light.
+    fn is_stopped(&mut self, index: u32, place: Vec2, seed: u32) -> bool {
+        let left = mask_leaves(self.scene, index, self.instance, place, self.ray.direction, seed);
+        if left == Vec3::ZERO || left == Vec3::ONE {
+            return left == Vec3::ZERO;
+        }
+        let depth = left.map(|share| (-share.max(1e-9).log2()).clamp(0.0, 24.0) * WALL_HALVING + 0.5).as_uvec3();
+        self.wall_depth = (self.wall_depth + depth).min(UVec3::splat(WALL_END));
+        self.wall_depth == UVec3::splat(WALL_END)
+    }
+
     fn push(&mut self, group: Group) {
         assert!(self.stack.len() < STACK_SIZE, "the kernel's stack would overflow");
         self.stack.push(group);
@@ -197,20 +211,18 @@ impl Traversal<'_> {
     fn test_sphere(&mut self, index: u32, sphere: &Sphere) -> bool {
         let Some([near, far]) = intersect_sphere(&self.ray, sphere) else { return false };
         let leaves = [index, self.instance] == self.from;
-        let blocks = |(_, point): (f32, Vec3), seed: u32| {
-            let (scene, place) = (self.scene, octahedral_point(point));
-            mask_blocks(scene, index, self.instance, place, self.ray.direction, seed)
-        };
-        let (t, point) = match !leaves && near.0 > 0.0 && blocks(near, self.mask_seed) {
-            true => near,
-            false if blocks(far, self.mask_seed ^ mask_bits(u32::MAX)) => far,
+        let before_end = |t: f32| t > 0.0 && t < self.hit.t;
+        let (enters, ends) = (!leaves && before_end(near.0), before_end(far.0));
+        let seeds = [self.mask_seed, self.mask_seed ^ mask_bits(u32::MAX)];
+        let places = [near.1, far.1].map(octahedral_point);
+        let side = match enters && self.is_stopped(index, places[0], seeds[0]) {
+            true => 0,
+            false if ends && self.is_stopped(index, places[1], seeds[1]) => 1,
             false => return false,
         };
-        let meets = t > 0.0 && t < self.hit.t;
-        if meets {
-            self.hit = Hit { t, triangle: index, instance: self.instance, barycentric: octahedral_point(point) };
-        }
-        meets
+        let t = [near.0, far.0][side];
+        self.hit = Hit { t, triangle: index, instance: self.instance, barycentric: places[side] };
+        true
     }
 
     /// Tests triangles; returns true when any hit suffices and one is found.
@@ -228,7 +240,7 @@ impl Traversal<'_> {
             }
             let vertices = triangle_vertices(self.scene, index);
             let Some((t, barycentric)) = intersect_triangle(&self.ray, vertices, self.hit.t) else { continue };
-            if mask_blocks(self.scene, index, self.instance, barycentric, self.ray.direction, self.mask_seed) {
+            if self.is_stopped(index, barycentric, self.mask_seed) {
                 self.hit = Hit { t, triangle: index, instance: self.instance, barycentric };
                 if any_hit {
                     return true;
@@ -237,54 +249,68 @@ impl Traversal<'_> {
         }
         false
     }
+
+    /// Goes through the scene until nothing is left, or with `any_hit` until something is found.
+    fn run(&mut self, origin: Vec3, direction: Vec3, any_hit: bool) {
+        let two_levels = !self.scene.instances.is_empty();
+        let mut bottom = 0; // stack depth at which the current instance was entered
+        let mut group = (self.scene.root, 0x80000000);
+        loop {
+            let mut leaves = (0, 0);
+            if group.1 > 0x00ffffff {
+                (group, leaves) = self.visit(group);
+            } else if two_levels {
+                leaves = std::mem::take(&mut group);
+            }
+            if two_levels && self.instance == NONE && leaves.1 != 0 {
+                group = self.enter(group, leaves, origin, direction);
+                bottom = self.stack.len();
+                continue;
+            }
+            if self.test(leaves, any_hit) {
+                return;
+            }
+            if group.1 <= 0x00ffffff {
+                if self.instance != NONE && self.stack.len() == bottom {
+                    self.instance = NONE;
+                    bottom = 0;
+                    self.ray = ray_space(origin, direction);
+                }
+                match self.stack.pop() {
+                    Some(next) => group = next,
+                    None => return,
+                }
+            }
+        }
+    }
 }
 
 /// The closest hit before `t_max`, or with `any_hit` the first one found.
 pub fn traverse(scene: &Scene, origin: Vec3, direction: Vec3, t_max: f32, any_hit: bool, mask_seed: u32) -> Hit {
-    traverse_from(scene, [NONE; 2], origin, direction, t_max, any_hit, mask_seed)
+    let mut t = start(scene, [NONE; 2], [origin, direction], t_max, mask_seed);
+    t.run(origin, direction, any_hit);
+    t.hit
 }
 
-/// [`traverse`] for a ray that leaves the triangle `from[0]` of the instance `from[1]`, and does not meet it again.
-pub fn traverse_from(
-    scene: &Scene,
-    from: [u32; 2],
-    origin: Vec3,
-    direction: Vec3,
-    t_max: f32,
-    any_hit: bool,
-    mask_seed: u32,
-) -> Hit {
-    let hit = Hit { t: t_max, triangle: NONE, instance: NONE, barycentric: Vec2::ZERO };
-    let ray = ray_space(origin, direction);
-    let mut t = Traversal { scene, ray, stack: Vec::with_capacity(STACK_SIZE), hit, instance: NONE, mask_seed, from };
-    let two_levels = !scene.instances.is_empty();
-    let mut bottom = 0; // stack depth at which the current instance was entered
-    let mut group = (scene.root, 0x80000000);
-    loop {
-        let mut leaves = (0, 0);
-        if group.1 > 0x00ffffff {
-            (group, leaves) = t.visit(group);
-        } else if two_levels {
-            leaves = std::mem::take(&mut group);
-        }
-        if two_levels && t.instance == NONE && leaves.1 != 0 {
-            group = t.enter(group, leaves, origin, direction);
-            bottom = t.stack.len();
-            continue;
-        }
-        if t.test(leaves, any_hit) {
-            return t.hit;
-        }
-        if group.1 <= 0x00ffffff {
-            if t.instance != NONE && t.stack.len() == bottom {
-                t.instance = NONE;
-                bottom = 0;
-                t.ray = ray_space(origin, direction);
-            }
-            match t.stack.pop() {
-                Some(next) => group = next,
-                None => return t.hit,
-            }
-        }
+/// The closest hit of a ray that leaves the triangle `from[0]` of the instance `from[1]`, and does not meet it again.
+pub fn traverse_from(scene: &Scene, from: [u32; 2], origin: Vec3, direction: Vec3, mask_seed: u32) -> Hit {
+    let mut t = start(scene, from, [origin, direction], INFINITE_DISTANCE, mask_seed);
+    t.run(origin, direction, false);
+    t.hit
+}
+
+/// Share of light that is left of what comes along a shadow ray from `t_max`, by channel.
+pub fn light_left(scene: &Scene, from: [u32; 2], origin: Vec3, direction: Vec3, t_max: f32, mask_seed: u32) -> Vec3 {
+    let mut t = start(scene, from, [origin, direction], t_max, mask_seed);
+    t.run(origin, direction, true);
+    if t.hit.any() {
+        return Vec3::ZERO;
     }
+    Vec3::from(t.wall_depth.to_array().map(|d| if d == WALL_END { 0.0 } else { (-(d as f32) / WALL_HALVING).exp2() }))
+}
+
+fn start(scene: &Scene, from: [u32; 2], [origin, direction]: [Vec3; 2], t_max: f32, mask_seed: u32) -> Traversal<'_> {
+    let hit = Hit { t: t_max, triangle: NONE, instance: NONE, barycentric: Vec2::ZERO };
+    let (ray, stack) = (ray_space(origin, direction), Vec::with_capacity(STACK_SIZE));
+    Traversal { scene, ray, stack, hit, instance: NONE, mask_seed, from, wall_depth: UVec3::ZERO }
 }

@@ -17,6 +17,7 @@ use tallow::shaders::shared;
 use tallow::twins::accumulate::fold;
 use tallow::twins::path::{Strategy, Tracer};
 use tallow::twins::primary_hit::{guide, seen};
+use tallow::twins::texture::mask_bits;
 use tallow::twins::traverse::traverse;
 
 const SIDE: u32 = 48;
@@ -454,7 +455,8 @@ pub fn queries(scene: &Loaded, count: usize) -> Vec<RayQuery> {
 /// Rays on which kernel and twin differ.
 fn differing(scene: &Loaded, rays: &[RayQuery], hits: &[RayHit], any_hit: bool) -> usize {
     let differs = |(ray, hit): (&RayQuery, &RayHit)| {
-        let twin = traverse(scene, ray.origin.into(), ray.direction.into(), ray.t_max, any_hit, ray.mask_seed);
+        let seed = if any_hit { ray.mask_seed } else { mask_bits(ray.mask_seed) };
+        let twin = traverse(scene, ray.origin.into(), ray.direction.into(), ray.t_max, any_hit, seed);
         if any_hit {
             return (twin.triangle == NONE) != (hit.triangle == NONE); // of several triangles any may stop a ray
         }

@@ -11,7 +11,7 @@ use tallow::scene::{Loaded, Scene};
 use tallow::twins::surface::{
     Facing, Surface, facing_normals, facing_of_metal, shading_basis, surface_at, surface_bsdf,
 };
-use tallow::twins::texture::{mask_blocks, surface_opacity, texture_sample};
+use tallow::twins::texture::{mask_leaves, surface_opacity, texture_sample};
 use tallow::twins::traverse::traverse;
 
 /// A change, and its name.
@@ -336,7 +336,9 @@ fn a_cutoff_masks_all_or_nothing() {
     assert_eq!(opacities(leaf(AlphaMode::Mask, Some(0.0))), [1.0, 1.0]);
     assert_eq!(opacities(leaf(AlphaMode::Opaque, None)), [1.0, 1.0]);
     let scene = one(leaf(AlphaMode::Blend, None), patch(), place([0.0; 3], 1.0), false);
-    let passed = (0..2000).filter(|&seed| !mask_blocks(&scene, 0, u32::MAX, vec2(0.1, 0.1), Vec3::Z, 2 * seed)).count();
+    let passed = (0..2000)
+        .filter(|&seed| mask_leaves(&scene, 0, u32::MAX, vec2(0.1, 0.1), Vec3::Z, 2 * seed) == Vec3::ONE)
+        .count();
     let opacity = surface_opacity(&scene, 0, 0, vec2(0.1, 0.1));
     assert!((passed as f32 / 2000.0 - (1.0 - opacity)).abs() < 0.05, "{passed} of 2000 pass {opacity}");
 }

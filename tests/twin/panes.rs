@@ -1,4 +1,4 @@
-//! Smooth panes without colour, which the light of lamps without extent passes although no path finds it there.
+//! Smooth panes, which the light of lamps without extent passes although no path finds it there.
 use crate::kernels::{check, run};
 use crate::support;
 use crate::twin::Workplace;
@@ -8,18 +8,21 @@ use tallow::scene::Loaded;
 const PANE: &str = "[[material]]\nname = 'pane'\ntype = 'metallic-roughness'\nmetallic = 0.0\nroughness = 0.0\n\
                     transmission_factor = 0.9\n";
 
-/// Panes in the world and in instances, one of them mirrored and stretched, a bulb around a point light, a pane of colour, and a veil.
+/// Panes in the world and in instances, one of them mirrored and stretched, a bulb around a point light, one of colour on the sun's
+/// way, a pane of colour, and a veil.
 pub fn panes() -> Loaded {
-    let mut scene = Workplace::new().scene(&format!(
+    let workplace = Workplace::new().picture("stained.png", 4, |x, y| [255 - 40 * x as u8, 160, 60 * y as u8]);
+    let mut scene = workplace.scene(&format!(
         "[camera]\nposition = [0.0, 1.4, 5.0]\ntarget = [0.0, 0.7, 0.0]\nfov = 45.0\n[render]\nmax_depth = 4\n\
          [environment]\nradiance = 0.2\n[[light]]\ntype = 'directional'\ndirection = [0.3, -1.0, -0.4]\nirradiance = 3.0\n\
          [[light]]\ntype = 'point'\nposition = [-1.2, 0.8, 0.0]\nintensity = 4.0\n{PANE}color = 0.95\n\
          [[material]]\nname = 'red'\ntype = 'metallic-roughness'\nmetallic = 0.0\nroughness = 0.0\ntransmission_factor = 1.0\n\
-         color = [0.9, 0.3, 0.3]\n[[material]]\nname = 'veil'\nopacity = 0.5\n\
+         color = [0.9, 0.3, 0.3]\ncolor_texture = 'stained.png'\ntransmission_texture = 'stained.png'\n[[material]]\nname = 'veil'\nopacity = 0.5\n\
          [[mesh]]\nshape = 'rectangle'\ntransform = {{ rotate = [-90.0, 0.0, 0.0], scale = 4.0 }}\n\
          [[mesh]]\nshape = 'rectangle'\nmaterial = 'pane'\n\
          transform = {{ translate = [1.2, 1.5, 0.5], rotate = [-60.0, 0.0, 0.0], scale = 0.8 }}\n\
          [[mesh]]\nshape = 'sphere'\nmaterial = 'pane'\ntransform = {{ translate = [-1.2, 0.8, 0.0], scale = 0.4 }}\n\
+         [[mesh]]\nshape = 'sphere'\nmaterial = 'red'\ntransform = {{ translate = [0.9, 0.5, -0.8], scale = 0.3 }}\n\
          [[mesh]]\nshape = 'rectangle'\nmaterial = 'red'\ntransform = {{ translate = [-0.3, 1.2, -1.0], rotate = [-40.0, 0.0, 0.0] }}\n\
          [[mesh]]\nshape = 'rectangle'\nmaterial = 'veil'\ntransform = {{ translate = [0.5, 0.6, 1.5], scale = 0.4 }}\n\
          [[mesh]]\nname = 'window'\nshape = 'rectangle'\nmaterial = 'pane'\n\
@@ -42,10 +45,14 @@ fn panes_agree_with_their_twin() {
     support::assert_silent(&gpu);
 }
 
-/// Mean of what a camera sees of the floor, 0.9 below it, by direct light.
-fn floor(tables: &str) -> f64 {
+/// Mean of what a camera sees of the floor, 0.9 below it, by direct light: red, green and blue.
+fn floor(tables: &str) -> [f64; 3] {
+    floor_in(&Workplace::new(), tables)
+}
+
+fn floor_in(workplace: &Workplace, tables: &str) -> [f64; 3] {
     let gpu = support::gpu();
-    let scene = Workplace::new().scene(&format!(
+    let scene = workplace.scene(&format!(
         "[film]\nwidth = 64\nheight = 64\n[camera]\nposition = [0.0, 0.9, 0.0]\ntarget = [0.0, 0.0, 0.0]\nup = [0.0, 0.0, -1.0]\n\
          [render]\nspp = 64\nmax_depth = 2\n[[mesh]]\nshape = 'rectangle'\ntransform = {{ rotate = [-90.0, 0.0, 0.0], scale = 9.0 }}\n\
          {tables}"
@@ -53,15 +60,24 @@ fn floor(tables: &str) -> f64 {
     let renderer = Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap();
     let stats = support::render(&gpu, &renderer);
     support::assert_silent(&gpu);
-    stats.iter().map(|s| f64::from(s.mean[1])).sum::<f64>() / stats.len() as f64
+    [0, 1, 2].map(|c| stats.iter().map(|s| f64::from(s.mean[c])).sum::<f64>() / stats.len() as f64)
 }
 
-/// A pane lets pass what appendix B of glTF 2.0 says: base colour times transmission times 1 - F(c), F of index 1.5. The standard error
-/// is less than .1 % of the mean.
+/// Whether `lit` is the share `of` of `open`, by channel, to within `by` of it.
+fn check_share(lit: [f64; 3], open: [f64; 3], of: impl Fn(usize) -> f64, by: f64, what: &str) {
+    for c in 0..3 {
+        assert!((lit[c] / open[c] / of(c) - 1.0).abs() < by, "{what}, channel {c}: {} of {}", lit[c] / open[c], of(c));
+    }
+}
+
+/// A pane lets pass what appendix B of glTF 2.0 says: base colour times transmission times 1 - F(c), F of index 1.5, without
+/// noise.
 #[test]
 fn sun_and_bulb_shine_through_panes() {
-    let passes = |c: f64| 0.8 * 0.9 * (1.0 - (0.04 + 0.96 * (1.0 - c).powi(5)));
+    let color = [0.9, 0.8, 0.6];
+    let passes = |c: f64, channel: usize| color[channel] * 0.9 * (1.0 - (0.04 + 0.96 * (1.0 - c).powi(5)));
     let pane = |more: &str| format!("{PANE}{more}\n[[mesh]]\nmaterial = 'pane'\n");
+    let tinted = pane(&format!("color = {color:?}"));
     let window =
         "shape = 'rectangle'\ntransform = { translate = [0.0, 2.0, 0.0], rotate = [-90.0, 0.0, 0.0], scale = 9.0 }\n";
     let two = "[[mesh]]\nmaterial = 'pane'\nshape = 'rectangle'\n\
@@ -69,23 +85,42 @@ fn sun_and_bulb_shine_through_panes() {
     for degrees in [0.0f64, 60.0, 70.0] {
         let (sin, c) = degrees.to_radians().sin_cos();
         let sun = format!("[[light]]\ntype = 'directional'\nirradiance = 1.0\ndirection = [{sin:?}, {:?}, 0.0]\n", -c);
-        let [open, one] = [floor(&sun), floor(&format!("{sun}{}{window}", pane("color = 0.8")))];
-        assert!((one / open / passes(c) - 1.0).abs() < 0.005, "{degrees} degrees: {} of {}", one / open, passes(c));
-        let both = floor(&format!("{sun}{}{window}{two}", pane("color = 0.8")));
-        assert!((both / open / passes(c).powi(2) - 1.0).abs() < 0.01, "{degrees} degrees: {} through two", both / open);
-        for stops in ["color = [0.8, 0.7, 0.8]", "color = 0.8\nclearcoat = 0.5"] {
-            assert_eq!(floor(&format!("{sun}{}{window}", pane(stops))), 0.0, "{stops}");
-        }
+        let open = floor(&sun);
+        let what = format!("{degrees} degrees");
+        check_share(floor(&format!("{sun}{tinted}{window}")), open, |i| passes(c, i), 1e-4, &what);
+        let both = floor(&format!("{sun}{tinted}{window}{two}"));
+        check_share(both, open, |i| passes(c, i).powi(2), 1e-4, &format!("{what}, two panes"));
+        assert_eq!(floor(&format!("{sun}{}{window}", pane("color = 0.8\nclearcoat = 0.5"))), [0.0; 3], "a coat");
     }
     // Rays to the middle of a bulb meet it head on.
     let bulb = "shape = 'sphere'\ntransform = { translate = [0.0, 2.0, 0.0], scale = 0.5 }\n";
     let light = "[[light]]\ntype = 'point'\nposition = [0.0, 2.0, 0.0]\nintensity = 1.0\n";
-    let [open, one] = [floor(light), floor(&format!("{light}{}{bulb}", pane("color = 0.8")))];
-    assert!((one / open / passes(1.0) - 1.0).abs() < 0.005, "a bulb: {}", one / open);
-    let meshed = floor(&format!("{light}{}segments = 64\n{bulb}", pane("color = 0.8")));
-    assert!((meshed / open / passes(1.0) - 1.0).abs() < 0.006, "a bulb of triangles: {}", meshed / open);
+    let open = floor(light);
+    check_share(floor(&format!("{light}{tinted}{bulb}")), open, |i| passes(1.0, i), 1e-3, "a bulb");
+    let meshed = floor(&format!("{light}{tinted}segments = 64\n{bulb}"));
+    check_share(meshed, open, |i| passes(1.0, i), 2e-3, "a bulb of triangles");
+    // What lies behind the lamp, or behind the floor, takes nothing from its light.
+    for height in [3.0, -1.0] {
+        let beyond = format!("shape = 'sphere'\ntransform = {{ translate = [0.0, {height:?}, 0.0], scale = 0.5 }}\n");
+        assert_eq!(floor(&format!("{light}{tinted}{beyond}")), open, "a ball at {height}");
+    }
     // Lamps and sky are found behind a pane by paths: their shadow rays stop there, or they would count twice.
     let lamp = "[[material]]\nname = 'lamp'\ncolor = 0\nemission = 1\n[[mesh]]\nshape = 'rectangle'\nmaterial = 'lamp'\n\
                 transform = { translate = [0.0, 3.0, 0.0], rotate = [90.0, 0.0, 0.0], scale = 2.0 }\n";
-    assert_eq!(floor(&format!("{lamp}{}{window}", pane("color = 0.8"))), 0.0);
+    assert_eq!(floor(&format!("{lamp}{tinted}{window}")), [0.0; 3]);
+}
+
+/// Half of a window is red, half is blue; the sun shines through both onto what the camera sees.
+#[test]
+fn the_picture_of_a_pane_colours_what_passes() {
+    let sun = "[[light]]\ntype = 'directional'\nirradiance = 1.0\ndirection = [0.0, -1.0, 0.0]\n";
+    let stained = Workplace::new().picture("stained.png", 64, |x, _| if x < 32 { [255, 0, 0] } else { [0, 0, 255] });
+    let window = format!(
+        "{PANE}color_texture = 'stained.png'\n[[mesh]]\nmaterial = 'pane'\nshape = 'rectangle'\n\
+         transform = {{ translate = [0.0, 2.0, 0.0], rotate = [-90.0, 0.0, 0.0], scale = 9.0 }}\n"
+    );
+    let [red, green, blue] = floor_in(&stained, &format!("{sun}{window}"));
+    let open = floor(sun)[0] * 0.9 * 0.96;
+    assert!((red / open - 0.5).abs() < 0.01 && (blue / open - 0.5).abs() < 0.01, "{red} and {blue} of {open}");
+    assert!(green / open < 0.01, "{green} of {open}");
 }

@@ -210,7 +210,7 @@ fn copies_met(scene: &Loaded, count: usize, times: f32, upward: bool) -> usize {
         s.clearance *= times;
         let away = random.point().normalize();
         let direction = if upward { s.geometric } else { away };
-        traverse_from(scene, [triangle, instance], s.ray_origin(direction), direction, FAR, false, 0).any()
+        traverse_from(scene, [triangle, instance], s.ray_origin(direction), direction, 0).any()
     };
     (0..count).into_par_iter().filter(meets).count()
 }

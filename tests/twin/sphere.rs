@@ -155,8 +155,8 @@ fn self_hits(centre: Vec3, radius: f32, error: f32) -> usize {
         }
         let (s, w) = (surface_at(&scene, &hit), random.point().normalize());
         let w = if w.dot(s.geometric) < 0.0 { -w } else { w };
-        let leave = |w: Vec3| traverse_from(&scene, [0, NONE], s.ray_origin(w), w, FAR, false, 0);
-        let plain = traverse(&scene, s.ray_origin(w), w, FAR, false, 0);
+        let leave = |w: Vec3| traverse_from(&scene, [0, NONE], s.ray_origin(w), w, 0);
+        let plain = traverse_from(&scene, [NONE; 2], s.ray_origin(w), w, 0);
         let (out, through, cosine) = (leave(w), leave(-w), w.dot(s.geometric));
         let chord = (through.t / (2.0 * radius * cosine) - 1.0).abs();
         wrong += usize::from(out.any() || plain.any() || cosine > 0.2 && !(through.any() && chord < error));

@@ -67,6 +67,8 @@ pub struct Mesh {
     pub range: Range<usize>,
     /// Whether it is of the boxes.
     pub of_boxes: bool,
+    /// Whether a ray must come to each shape once only; else the device may split shapes, to trace faster.
+    pub once: bool,
 }
 
 /// The input of a build: what of which kind there is, and how much.
@@ -82,7 +84,9 @@ impl Input {
         let part = |of: Bound, first: u64, record: u64| vk::DeviceOrHostAddressConstKHR {
             device_address: address(gpu, of.buffer) + of.offset + first + mesh.range.start as u64 * record,
         };
-        let geometry = vk::AccelerationStructureGeometryKHR::default();
+        let once = vk::GeometryFlagsKHR::NO_DUPLICATE_ANY_HIT_INVOCATION;
+        let flags = if mesh.once { once } else { vk::GeometryFlagsKHR::empty() };
+        let geometry = vk::AccelerationStructureGeometryKHR::default().flags(flags);
         let geometry = match shapes.boxes.filter(|_| mesh.of_boxes) {
             Some(boxes) => {
                 let stride = size_of::<Aabb>() as u64;

@@ -75,8 +75,8 @@ fn warn_of_panes(scene: &Scene) -> Option<String> {
     let stops = |m: &Material| is_smooth_wall(m) && m.flags & MATERIAL_CLEAR_WALL == 0;
     let found = scene.materials.iter().position(stops).filter(|_| scene.has_delta_lights())?;
     Some(format!(
-        "material \"{}\" is smooth, transmits, and has colour, textures or a coat: point, spot and directional lights cast a full \
-         shadow behind it; without those, with some roughness, or an opacity below 1 their light passes",
+        "material \"{}\" is smooth, transmits, and has a coat: point, spot and directional lights cast a full shadow behind it; \
+         without the coat, with some roughness, or an opacity below 1 their light passes",
         scene.names.materials[found]
     ))
 }

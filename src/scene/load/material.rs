@@ -24,14 +24,9 @@ pub struct Materials {
     pub vertices_have_alpha: bool,
 }
 
-/// Marks smooth thin walls without colour, textures and coat, which shadow rays of lights without extent pass. (The colours of their
-/// vertices are not looked at.) Others would need the light's colour changed on the way, and stop it.
+/// Marks smooth thin walls without a coat, which shadow rays of lights without extent pass.
 pub fn mark_clear_wall(m: &mut Material) {
-    let textures =
-        [m.base_texture, m.roughness_texture, m.specular_texture, m.specular_factor_texture, m.transmission_texture];
-    let plain = m.clearcoat == 0.0 && textures.iter().all(|&texture| texture == NONE);
-    let [r, g, b] = m.base_color;
-    let clear = is_smooth_wall(m) && plain && r == g && g == b;
+    let clear = is_smooth_wall(m) && m.clearcoat == 0.0;
     m.flags = m.flags & !MATERIAL_CLEAR_WALL | if clear { MATERIAL_CLEAR_WALL } else { 0 };
 }
 
