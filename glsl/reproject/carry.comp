@@ -3,8 +3,8 @@
 #include "shared/frame.glsl"
 
 // Starts each pixel of a new frame with the samples that won it, or with none. Carried samples keep the point that they are of, so
-// that they move on from there and not from the centre of a pixel; where the new frame's samples will outnumber them, its point takes
-// over.
+// that they move on from there and not from the centre of a pixel. The point of the new frame's samples takes over where those will
+// outnumber them, and where they come from beyond the pixel: what moved on from there would take new samples along to a neighbour.
 layout(local_size_x_id = 100) in;
 layout(binding = 12) uniform usamplerBuffer history; // of History
 layout(binding = 13) uniform usamplerBuffer history_light; // of HistoryLight
@@ -39,7 +39,8 @@ void main() {
             l.albedo = taken.albedo;
             l.indirect_m2 = still ? taken.indirect_variance : taken.indirect_variance * freedom(c.count);
         }
-        if (c.count >= push.spp) points[i] = SurfacePoint(h.triangle, h.instance, h.weights);
+        bool inside = (key >> PIXEL_BITS & FARTHEST) <= FARTHEST / 2u;
+        if (c.count >= push.spp && inside) points[i] = SurfacePoint(h.triangle, h.instance, h.weights);
     }
     stats[i] = PixelStats_words(s);
     if (FX_SPLIT) light[i] = PixelLight_words(l);

@@ -12,7 +12,11 @@
 // Of several offers the one nearest to the pixel's centre wins, then that of the lowest old pixel: an atomic minimum of integers,
 // whose result does not depend on the order of threads. A point within a pixel is nearer than one outside, which so comes in where
 // there is no other: departure from the paper, which offers to one pixel alone. Where the image grows or shrinks by 1 % a frame, a
-// quarter of all pixels would find no point within them, and after 16 frames a pixel would have two samples, not 17.
+// quarter of all pixels would find no point within them, and after 16 frames a pixel would have two samples, not 17. Where so few
+// samples are worth it that new ones outnumber them, points farther than this, from the centre along either axis, would bring the other
+// side of an edge of a texture.
+const float FARTHEST_OF_FEW = 0.75;
+
 layout(local_size_x_id = 100) in;
 layout(binding = 11) uniform usamplerBuffer history; // of History
 layout(binding = 12) uniform usamplerBuffer guide; // of Guide
@@ -29,7 +33,7 @@ layout(scalar, push_constant) uniform Push { ReprojectPush push; };
 
 // Offers the samples of a pixel to those around `film`, a point of the film, of an edge to edges alone. Returns why none takes them,
 // or 0.
-uint offer(uint pixel, Surface s, vec2 film, bool edge) {
+uint offer(uint pixel, Surface s, vec2 film, bool edge, bool few) {
     ivec2 size = ivec2(push.size), corner = ivec2(floor(clamp(film, vec2(-2.0), vec2(size) + 2.0) - 0.5));
     uint reason = DROPPED_OUTSIDE;
     for (int k = 0; k < 4; k++) {
@@ -37,9 +41,11 @@ uint offer(uint pixel, Surface s, vec2 film, bool edge) {
         if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size))) continue;
         uint to = uint(at.y * size.x + at.x);
         uint at_edge = winner[to] & AT_EDGE; // what others offer does not change it
-        bool taken = edge == (at_edge != 0u) && shows(to, s);
         vec2 off = abs(film - vec2(at) - 0.5);
-        if (taken) atomicMin(winner[to], at_edge | min(uint(max(off.x, off.y) * 64.0), 63u) << PIXEL_BITS | pixel);
+        float distance = max(off.x, off.y);
+        if (few && distance > FARTHEST_OF_FEW) continue;
+        bool taken = edge == (at_edge != 0u) && shows(to, s);
+        if (taken) atomicMin(winner[to], at_edge | min(uint(distance * float(FARTHEST + 1u)), FARTHEST) << PIXEL_BITS | pixel);
         reason = taken ? 0u : reason == 0u ? 0u : DROPPED_HIDDEN;
     }
     return reason;
@@ -59,7 +65,7 @@ uint moved(uint pixel, Carried c) {
     c.error += small ? uint(ceil(view * float(ERROR_PARTS))) : 0u;
     if (!small || c.error > ERROR_PARTS) return dropped(DROPPED_VIEW);
     vec3 film = film_from_point(camera, s.position, push.size);
-    uint reason = film.z > 0.0 && finite(film) ? offer(pixel, s, film.xy, c.edge) : DROPPED_OUTSIDE;
+    uint reason = film.z > 0.0 && finite(film) ? offer(pixel, s, film.xy, c.edge, c.count < push.spp) : DROPPED_OUTSIDE;
     return reason == 0u ? word_of(Carried(c.count, c.age + 1u, c.error, c.edge, c.back)) : dropped(reason);
 }
 

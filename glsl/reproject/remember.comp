@@ -6,7 +6,8 @@
 // At the end of a frame, before anything changes, writes what each pixel hands on to the next: the point that its samples are of, and
 // their statistics.
 // Pixels of specular surfaces hand on nothing (Schalk 2018, 3.2), unless nothing has moved: then every pixel keeps all that it has.
-// Departure from there: pixels of edges hand on as many samples as are worth it, to pixels of edges.
+// Departures from there: pixels hand on as many samples as are worth it by what their neighbours show, and those of edges hand them
+// on to pixels of edges.
 layout(local_size_x_id = 100) in;
 layout(binding = 11) uniform usamplerBuffer guide; // of Guide
 layout(binding = 12) uniform usamplerBuffer stats; // of PixelStats
@@ -69,6 +70,41 @@ uint kept_of_edge(uint pixel, vec3 plane, uint count, bool edge) {
     return worth(count, VARIANCE_OF_MOVE * dot(contrast, contrast) / max(variance, 1e-30));
 }
 
+// Textures, shadows and thin things make pixels differ that lie near each other. A pixel that moves by less than its width shows
+// something else altogether where they are finer than that, and then its squared difference is twice the variance among pixels.
+const float SHARE_OF_SPREAD = 2.0;
+const float SHARE_AT_EDGE = 0.5; // a straight edge is coarse
+// That variance counts from so many times on what noise alone would give: that of 18 means has a standard deviation of a third of it.
+const float SURE_SPREAD = 1.5;
+const float LEAST_SPREAD = 1.52587890625e-5; // 2^-16: of the square of a pixel's radiance, a difference of 1/256 is let be
+const int NEAR = 18; // the squares of nine pixels, and of nine that lie two apart
+
+// How many of the samples of a pixel are worth handing on by what the means of pixels around differ by, beyond their noise. New
+// samples are stratified within the pixel, where they take in without noise what varies so: only what else is in the variance of one
+// counts. Away from edges other surfaces do not.
+uint kept_by_spread(uint pixel, vec3 plane, uint count, bool edge) {
+    ivec2 size = ivec2(push.size), at = ivec2(pixel % push.size.x, pixel / push.size.x);
+    vec3 sum = vec3(0.0), origin = PixelStats_mean(stats, pixel);
+    float squares = 0.0, within = 0.0, degrees = 0.0, inverse = 0.0, n = 0.0, width = pixel_width(previous, push.size);
+    for (int k = 0; k < NEAR; k++) {
+        ivec2 q = clamp(at + (k < 9 ? 1 : 2) * ivec2(k % 3 - 1, k % 9 / 3 - 1), ivec2(0), size - 1);
+        uint other = uint(q.y * size.x + q.x);
+        if (!edge && k >= 9 && !shows_same(pixel, other, plane, width)) continue;
+        PixelStats s = PixelStats_load(stats, other);
+        vec3 off = s.mean - origin;
+        n += 1.0;
+        sum += off;
+        squares += dot(off, off);
+        within += s.m2.r + s.m2.g + s.m2.b;
+        degrees += float(max(s.count, 1u) - 1u);
+        inverse += 1.0 / float(max(s.count, 1u));
+    }
+    float variance = within / max(degrees, 1.0), spread = (squares - dot(sum, sum) / n) / (n - 1.0);
+    float beyond = max(spread - SURE_SPREAD * variance * inverse / n - LEAST_SPREAD * dot(origin, origin), 0.0);
+    // Single samples do not tell their noise.
+    return degrees > 0.0 ? worth(count, (edge ? SHARE_AT_EDGE : SHARE_OF_SPREAD) * beyond / max(variance - beyond, 1e-30)) : count;
+}
+
 // 0 where the pixel's samples may move: so many, of that side of the surface, of an edge or not.
 uint reason_to_keep(uint pixel, SurfacePoint at, inout Carried c) {
     if (at.triangle == NONE) return DROPPED_SKY;
@@ -76,7 +112,7 @@ uint reason_to_keep(uint pixel, SurfacePoint at, inout Carried c) {
     c.back = dot(s.geometric, previous.position - s.position) < 0.0;
     if (is_sharp(surface_bsdf(s))) return DROPPED_SPECULAR;
     c.edge = !is_whole(pixel, s.geometric, pixel_width(previous, push.size));
-    c.count = kept_of_edge(pixel, s.geometric, c.count, c.edge);
+    c.count = min(kept_by_spread(pixel, s.geometric, c.count, c.edge), kept_of_edge(pixel, s.geometric, c.count, c.edge));
     return c.count > 0u ? 0u : DROPPED_EDGE;
 }
 

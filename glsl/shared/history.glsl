@@ -41,5 +41,6 @@ uint worth(uint count, float change) { return uint(float(count) / (1.0 + float(c
 // Keys of offers: bit 31 says whether the new pixel is at an edge, then 6 bits are the distance from its centre, the lower 25 the old
 // pixel.
 const uint PIXEL_BITS = 25u;
+const uint FARTHEST = 63u; // a pixel's width
 const uint AT_EDGE = 2147483648u;
 const uint NO_OFFER = 2147483647u; // all bits below AT_EDGE

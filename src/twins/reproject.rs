@@ -5,7 +5,8 @@ use crate::layout::{
 };
 pub use crate::render::Carried;
 use crate::scene::Scene;
-use crate::shaders::remember::VARIANCE_OF_MOVE;
+use crate::shaders::project::FARTHEST_OF_FEW;
+use crate::shaders::remember::{LEAST_SPREAD, NEAR, SHARE_AT_EDGE, SHARE_OF_SPREAD, SURE_SPREAD, VARIANCE_OF_MOVE};
 use crate::shaders::shared::held::{LEAST_ALBEDO, PLANE_DISTANCE};
 use crate::shaders::shared::history::*;
 use crate::twins::bsdf::{Bsdf, SMOOTH_ALPHA, bsdf_albedo, bsdf_evaluate, bsdf_is_specular};
@@ -147,6 +148,35 @@ impl Reprojection<'_> {
         worth(count, VARIANCE_OF_MOVE * (means[1] - means[0]).length_squared() / variance.max(1e-30))
     }
 
+    /// Pixels whose means tell how much pixels near each other differ.
+    fn near(&self, pixel: usize) -> impl Iterator<Item = usize> + use<> {
+        let [width, height] = self.push.size.map(|n| n as i32);
+        let (x, y) = (pixel as i32 % width, pixel as i32 / width);
+        (0..NEAR).map(move |k| {
+            let step = if k < 9 { 1 } else { 2 };
+            let at = [x + step * (k % 3 - 1), y + step * (k % 9 / 3 - 1)];
+            (at[1].clamp(0, height - 1) * width + at[0].clamp(0, width - 1)) as usize
+        })
+    }
+
+    /// How many of `count` samples of a pixel are worth handing on by what the means of pixels around differ by.
+    fn kept_by_spread(&self, left: &Left, pixel: usize, plane: Vec3, count: u32, edge: bool) -> u32 {
+        let width = pixel_width(&self.previous, self.push.size);
+        let same = |q: usize| self.shows_same([&left.guide[pixel], &left.guide[q]], plane, width);
+        let near = self.near(pixel).enumerate().filter(|&(k, q)| edge || k < 9 || same(q));
+        let near: Vec<_> = near.map(|(_, q)| &left.stats[q]).collect();
+        let (n, origin) = (near.len() as f32, Vec3::from(left.stats[pixel].mean));
+        let offs = near.iter().map(|s| Vec3::from(s.mean) - origin);
+        let (sum, squares) = offs.fold((Vec3::ZERO, 0.0), |(sum, squares), off| (sum + off, squares + off.dot(off)));
+        let degrees: f32 = near.iter().map(|s| s.count.saturating_sub(1) as f32).sum();
+        let variance = near.iter().map(|s| s.m2.iter().sum::<f32>()).sum::<f32>() / degrees.max(1.0);
+        let inverse: f32 = near.iter().map(|s| 1.0 / s.count.max(1) as f32).sum();
+        let spread = (squares - sum.dot(sum) / n) / (n - 1.0);
+        let share = if edge { SHARE_AT_EDGE } else { SHARE_OF_SPREAD };
+        let beyond = (spread - SURE_SPREAD * variance * inverse / n - LEAST_SPREAD * origin.dot(origin)).max(0.0);
+        if degrees > 0.0 { worth(count, share * beyond / (variance - beyond).max(1e-30)) } else { count }
+    }
+
     /// Why a pixel keeps its samples, or 0: what moves of them is in `c`.
     fn reason_to_keep(&self, left: &Left, pixel: usize, c: &mut Carried) -> u32 {
         let at = left.points[pixel];
@@ -159,9 +189,11 @@ impl Reprojection<'_> {
             return DROPPED_SPECULAR;
         }
         c.edge = !self.is_whole(left.guide, pixel, s.geometric, pixel_width(&self.previous, self.push.size));
-        if c.edge {
-            c.count = self.kept_of_edge(left, pixel, s.geometric, c.count);
-        }
+        let worth = self.kept_by_spread(left, pixel, s.geometric, c.count, c.edge);
+        c.count = match c.edge {
+            true => self.kept_of_edge(left, pixel, s.geometric, c.count).min(worth),
+            false => worth,
+        };
         if c.count > 0 { 0 } else { DROPPED_EDGE }
     }
 
@@ -251,7 +283,8 @@ impl Reprojection<'_> {
     }
 
     /// Offers a pixel's samples to those around a point of the film, of an edge to edges alone. Returns why none takes them, or 0.
-    fn offer(&self, guide: &[Guide], winner: &mut [u32], (pixel, edge): (usize, bool), s: &Surface, film: Vec2) -> u32 {
+    fn offer(&self, guide: &[Guide], winner: &mut [u32], pixel: usize, c: Carried, s: &Surface, film: Vec2) -> u32 {
+        let few = c.count < self.push.spp;
         let [width, height] = self.push.size.map(|n| n as i32);
         let (x, y) = ((film.x - 0.5).floor() as i32, (film.y - 0.5).floor() as i32);
         let around = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
@@ -259,8 +292,12 @@ impl Reprojection<'_> {
         for (x, y) in around.into_iter().filter(|(x, y)| (0..width).contains(x) && (0..height).contains(y)) {
             let to = (y * width + x) as usize;
             let (at_edge, off) = (winner[to] & AT_EDGE, (film - vec2(x as f32, y as f32) - 0.5).abs().max_element());
-            if edge == (at_edge != 0) && self.shows(&guide[to], s) {
-                winner[to] = winner[to].min(at_edge | ((off * 64.0) as u32).min(63) << PIXEL_BITS | pixel as u32);
+            if few && off > FARTHEST_OF_FEW {
+                continue;
+            }
+            if c.edge == (at_edge != 0) && self.shows(&guide[to], s) {
+                let off = ((off * (FARTHEST + 1) as f32) as u32).min(FARTHEST);
+                winner[to] = winner[to].min(at_edge | off << PIXEL_BITS | pixel as u32);
                 reason = 0;
             } else if reason != 0 {
                 reason = DROPPED_HIDDEN;
@@ -288,8 +325,7 @@ impl Reprojection<'_> {
         }
         let film = film_from_point(&self.camera, s.position, self.push.size);
         let ahead = film.z > 0.0 && film.is_finite();
-        let reason =
-            if ahead { self.offer(guide, winner, (pixel, c.edge), &s, film.truncate()) } else { DROPPED_OUTSIDE };
+        let reason = if ahead { self.offer(guide, winner, pixel, c, &s, film.truncate()) } else { DROPPED_OUTSIDE };
         let word = Carried { age: c.age + 1, error: c.error + parts as u32, ..c }.word();
         if reason == 0 { word } else { dropped(reason) }
     }
@@ -327,13 +363,14 @@ impl Reprojection<'_> {
         let begin = |(key, at): (&mut u32, &mut SurfacePoint)| {
             let from = (*key & ((1 << PIXEL_BITS) - 1)) as usize;
             let nobody = if *key & AT_EDGE != 0 { dropped(DROPPED_EDGE) } else { 0 };
+            let inside = *key >> PIXEL_BITS & FARTHEST <= FARTHEST / 2;
             *key = if *key & NO_OFFER == NO_OFFER { nobody } else { handed.offered[from] };
             let count = Carried::of(*key).count;
             if count == 0 {
                 return (PixelStats::default(), PixelLight::default());
             }
             let (h, l) = (&handed.records[from], &handed.light[from]);
-            if count >= self.push.spp {
+            if count >= self.push.spp && inside {
                 (at.triangle, at.instance, at.weights) = (h.triangle, h.instance, h.weights);
             }
             let of_all = |variance: f32| if self.still() { variance } else { variance * freedom(count) };

@@ -56,7 +56,8 @@ fn ride(gpu: &Gpu, way: Reprojection) -> (Vec<u32>, Vec<PixelStats>) {
     let (stats, words) = (film.stats(), film.carried());
     let on_card: Vec<usize> = (0..guide.len()).filter(|&i| guide[i].object == 1).collect();
     let carried = on_card.iter().filter(|&&i| carried_samples(words[i]) >= 8).count();
-    assert!(carried * 2 > on_card.len() && on_card.len() > 200, "{carried} of the card's {} pixels", on_card.len());
+    // Two pixels from the border, and from where the shades meet, nearly none are worth it beside eight samples of an even sky.
+    assert!(carried * 5 > on_card.len() && on_card.len() > 200, "{carried} of the card's {} pixels", on_card.len());
     let direct = direct(gpu, &scene, turned(start, 1.6));
     let [wrong, off] = truth(&stats, &words, &direct);
     // Some pixels beside the card's edge keep a sample or two of a mixture, while all of their own are of the wall.
