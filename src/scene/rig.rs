@@ -23,8 +23,10 @@ pub struct Rig {
     pub(in crate::scene) tree_of: Vec<u32>,
     /// Of copies that do not place a mesh as it is stored, what comes before their transform.
     pub(in crate::scene) own: HashMap<u32, DAffine3>,
-    /// Copies that are not seen.
+    /// Copies that are not seen: `flat` ones, and those that are too small in this pose.
     pub(in crate::scene) hidden: HashSet<u32>,
+    /// Copies whose transform has no inverse. They have no other one until a pose places them again.
+    pub(in crate::scene) flat: HashSet<u32>,
     /// Copies by the numbers that a pose calls them; [`NONE`] for one that is fixed.
     pub(in crate::scene) placed: Vec<u32>,
     /// Levels of the top and of the deepest tree, which kernels are compiled for.

@@ -206,6 +206,48 @@ fn what_is_hidden_comes_back() {
     assert_eq!(differing(&scene, &whole), none());
 }
 
+/// A cube of this transform, and one that a pose moves.
+fn beside(cube: &str, edge: f64) -> Scene {
+    let text = format!(
+        "[camera]\nposition = [0, 1, 4]\ntarget = [0, 0, 0]\n[[mesh]]\nname = 'large'\nshape = 'cube'\n\
+         transform = {{ scale = {edge:?} }}\n[[mesh]]\nname = 'small'\nshape = 'cube'\n[[instance]]\nmesh = 'large'\n\
+         transform = {{ {cube} }}\n[[instance]]\nmesh = 'small'\n"
+    );
+    Scene::parse(std::path::Path::new("scene.toml"), &text).unwrap().scene
+}
+
+/// The second cube this far away.
+fn away(x: f64) -> Pose {
+    let rows = [1., 0., 0., x, 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
+    Pose { instances: vec![(1, Transform::from(rows))], ..Pose::default() }
+}
+
+/// Such a pose hides what it makes too small to see, and no later one does.
+#[test]
+fn a_scene_that_grows_and_shrinks_again_is_as_before() {
+    let mut scene = beside("scale = 1e-10", 1.0);
+    scene.apply(&away(2.0)).unwrap();
+    let (before, known) = (arrays(&scene), scene.fingerprint([4, 3]).unwrap());
+    scene.apply(&away(1e4)).unwrap();
+    assert_eq!(scene.seen_instances(), 1, "control: less than a 1e-13 of the scene");
+    scene.apply(&away(2.0)).unwrap();
+    assert!(arrays(&scene) == before && scene.fingerprint([4, 3]).unwrap() == known);
+}
+
+/// In nanometres: it fills the picture.
+#[test]
+fn what_is_large_and_out_of_reach_is_refused_as_by_the_loader() {
+    let mut scene = beside("scale = 1e-9", 1e9);
+    scene.apply(&away(2.0)).unwrap();
+    let before = arrays(&scene);
+    let said = scene.apply(&away(1e4)).unwrap_err().to_string();
+    assert!(
+        said.contains("an instance of \"large\": seen from it, the scene reaches beyond the limit of 1e12"),
+        "{said}"
+    );
+    assert!(arrays(&scene) == before);
+}
+
 #[test]
 fn poses_that_cannot_be_are_one_line_and_change_nothing() {
     let mut scene = at(&Moment::default()).scene;

@@ -23,8 +23,8 @@ pub fn commit(scene: &mut Scene, next: Next, pose: &Pose) -> Result<Change> {
     if let Some(copies) = &mut copies {
         next.meshes.into_iter().for_each(|mesh| deform(scene, mesh, &mut copies.all, pose.rebuild_above, &mut change));
     }
-    if let Some(NextCopies { all, hidden, world }) = copies {
-        (scene.bounds, scene.rig.hidden) = (world, hidden);
+    if let Some(NextCopies { all, flat, hidden, world }) = copies {
+        (scene.bounds, scene.rig.flat, scene.rig.hidden) = (world, flat, hidden);
         scene.nodes.truncate(scene.root as usize);
         let before = std::mem::take(&mut scene.rig.order);
         hierarchy::place(scene, all, scene.rig.levels[0]);

@@ -5,7 +5,7 @@ use crate::layout::{
 };
 use crate::scene::build::bvh::{self, Bounds};
 use crate::scene::build::environment::{self, rotation};
-use crate::scene::build::hierarchy::{instance, is_lost, reach};
+use crate::scene::build::hierarchy::{check_none_lost, instance, is_speck, reach};
 use crate::scene::build::plan::{has_inverse, is_even};
 use crate::scene::build::soft::Placed;
 use crate::scene::load::material::radiance;
@@ -29,6 +29,8 @@ pub struct Next {
 pub struct NextCopies {
     /// In the order of their numbers.
     pub all: Vec<Instance>,
+    /// Numbers of those whose transform has no inverse.
+    pub flat: HashSet<u32>,
     /// Numbers of those that are not seen.
     pub hidden: HashSet<u32>,
     /// What the others reach.
@@ -99,7 +101,7 @@ fn next_mesh(scene: &Scene, mesh: usize, to: &Vertices) -> Checked<NextMesh> {
 }
 
 fn next_copies(scene: &Scene, pose: &Pose, meshes: &[NextMesh], materials: &[Material]) -> Checked<NextCopies> {
-    let (mut hidden, tree_of, mut copies) = (scene.rig.hidden.clone(), &scene.rig.tree_of, copies(scene));
+    let (mut flat, tree_of, mut copies) = (scene.rig.flat.clone(), &scene.rig.tree_of, copies(scene));
     for (number, transform) in &pose.instances {
         let Some(&copy) = scene.rig.placed.get(*number) else {
             let count = scene.rig.placed.len();
@@ -115,10 +117,10 @@ fn next_copies(scene: &Scene, pose: &Pose, meshes: &[NextMesh], materials: &[Mat
             return Err(format!("instance {number} gets a transform with NaN or infinite numbers"));
         }
         if !has_inverse(&affine) {
-            hidden.insert(copy);
+            flat.insert(copy);
             continue;
         }
-        hidden.remove(&copy);
+        flat.remove(&copy);
         let Instance { root, material, object, .. } = copies[copy as usize];
         copies[copy as usize] = Instance { material, object, ..instance(&affine, root) };
         if !is_even(&affine) {
@@ -128,14 +130,17 @@ fn next_copies(scene: &Scene, pose: &Pose, meshes: &[NextMesh], materials: &[Mat
     }
     let mut bounds: Vec<_> = scene.rig.trees.iter().map(|tree| tree.bounds).collect();
     meshes.iter().for_each(|mesh| bounds[mesh.tree] = mesh.bounds);
-    let mut world = reach(&bounds, tree_of, &hidden, &copies).map_err(|what| format!("instances {what}"))?;
-    // What has shrunk to less than a 1e-12 of the scene cannot be seen.
-    let lost: Vec<u32> = (0..).zip(&copies).filter(|(_, i)| is_lost(i, world)).map(|(copy, _)| copy).collect();
-    if !lost.is_empty() {
-        hidden.extend(lost);
-        world = reach(&bounds, tree_of, &hidden, &copies).map_err(|what| format!("instances {what}"))?;
+    let reach =
+        |hidden: &HashSet<u32>| reach(&bounds, tree_of, hidden, &copies).map_err(|what| format!("instances {what}"));
+    let (mut hidden, mut world) = (flat.clone(), reach(&flat)?);
+    let bounds_of = |copy: usize| bounds[tree_of[copy] as usize];
+    let specks: Vec<_> = (0..copies.len()).filter(|&copy| is_speck(&copies[copy], bounds_of(copy), world)).collect();
+    if !specks.is_empty() {
+        hidden.extend(specks.into_iter().map(|copy| copy as u32));
+        world = reach(&hidden)?;
     }
-    Ok(NextCopies { all: copies, hidden, world })
+    check_none_lost(scene, &copies, &hidden, world).map_err(|[place, what]| format!("{place}: {what}"))?;
+    Ok(NextCopies { all: copies, flat, hidden, world })
 }
 
 /// Checks what only now emits light or has holes, which the scene could not know when it chose spheres or meshes.

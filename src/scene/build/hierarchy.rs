@@ -148,12 +148,8 @@ fn top_level(sources: &Sources, scene: &mut Scene) -> Result<()> {
     let bounds: Vec<_> = scene.rig.trees.iter().map(|tree| tree.bounds).collect();
     let reached = reach(&bounds, &scene.rig.tree_of, &scene.rig.hidden, &copies);
     scene.bounds = reached.map_err(|what| sources.at("instances", what))?;
-    if let Some(i) = copies.iter().find(|i| is_lost(i, scene.bounds)) {
-        let name = &scene.names.objects[i.object as usize];
-        let what =
-            format!("seen from it, the scene reaches beyond the limit of {MAX_COORDINATE:e}: choose a larger scale");
-        return Err(sources.at(format!("an instance of \"{name}\""), what));
-    }
+    check_none_lost(scene, &copies, &scene.rig.hidden, scene.bounds)
+        .map_err(|[place, what]| sources.at(place, what))?;
     place(scene, copies, bvh::LEVELS);
     Ok(())
 }
@@ -182,11 +178,39 @@ pub fn reach(
     }
 }
 
-/// Whether a copy is so small that the world, in its space, is too large: rays are transformed to the space of each instance that
-/// they meet.
-pub fn is_lost(copy: &Instance, world: Bounds) -> bool {
-    let seen = bvh::world_bounds(&turned(copy), world);
-    is_too_far(seen.as_flattened().iter().map(|v| v.abs()).fold(0.0, f32::max))
+/// Checks that the world, in the space of each copy that is not `hidden`, is not too large: rays are transformed to the
+/// space of each instance that they meet.
+///
+/// # Errors
+/// For a copy that is too small: which, and a sentence.
+pub fn check_none_lost(
+    scene: &Scene,
+    copies: &[Instance],
+    hidden: &HashSet<u32>,
+    world: Bounds,
+) -> std::result::Result<(), [String; 2]> {
+    match (0..).zip(copies).find(|(copy, at)| !hidden.contains(copy) && is_lost(at, world)) {
+        Some((_, lost)) => Err([
+            format!("an instance of \"{}\"", scene.names.objects[lost.object as usize]),
+            format!("seen from it, the scene reaches beyond the limit of {MAX_COORDINATE:e}: choose a larger scale"),
+        ]),
+        None => Ok(()),
+    }
+}
+
+fn is_lost(copy: &Instance, world: Bounds) -> bool {
+    is_too_far(farthest(bvh::world_bounds(&turned(copy), world)))
+}
+
+/// What is no larger than this, as a part of how far the world reaches, cannot be seen: a micrometre in a kilometre.
+const SPECK: f32 = 1e-9;
+
+/// Whether a copy of something of these bounds is too small to be seen, and for rays to be transformed to its space.
+pub fn is_speck(copy: &Instance, bounds: Bounds, world: Bounds) -> bool {
+    let [low, high] = bounds.map(Vec3::from);
+    let edge = |row: [f32; 4]| Vec3::from_slice(&row).abs().dot(high - low);
+    let largest = [copy.world0, copy.world1, copy.world2].map(edge).into_iter().fold(0.0, f32::max);
+    largest <= SPECK * farthest(world) && is_lost(copy, world)
 }
 
 /// Builds the top level over the copies that are seen, of so many levels at most; those that are hidden come last among the
@@ -200,6 +224,11 @@ pub fn place(scene: &mut Scene, copies: Vec<Instance>, levels: usize) {
     instances.extend(hidden.iter().map(|&copy| copies[copy as usize]));
     rig.order = order.into_iter().map(|slot| seen[slot as usize]).chain(hidden).collect();
     (scene.root, scene.instances) = (root, instances);
+}
+
+/// The largest coordinate.
+fn farthest(bounds: Bounds) -> f32 {
+    bounds.as_flattened().iter().map(|v| v.abs()).fold(0.0, f32::max)
 }
 
 fn is_too_far(coordinate: f32) -> bool {
