@@ -1,7 +1,7 @@
 //! Tests the built program's messages without a Vulkan loader, driver or device, and when it loses its device while it renders.
 #![cfg(target_os = "linux")]
 use crate::child::{command, scene};
-use crate::command::complains;
+use crate::command::{complains, stdout};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::LazyLock;
@@ -137,4 +137,51 @@ fn a_lost_device_is_one_line_and_keeps_the_old_file() {
     let control = render(&folder, &[real]);
     assert!(control.status.success(), "nothing fails without the loss: {control:?}");
     assert_ne!(std::fs::read(folder.path().join("a.exr")).unwrap(), b"old");
+}
+
+/// Three frames, in the second of which there is more than ever before.
+fn sequence(folder: &TempDir, environment: &[(&str, &str)]) -> Output {
+    let cube = |i: usize| {
+        format!(
+            "[[instance]]\nname = 'i{i}'\nmesh = 'cube'\ntransform = {{ translate = [{}, {}, 0], scale = 0.1 }}\n\
+             [[animation]]\ninstance = 'i{i}'\ninterpolation = 'step'\n\
+             keys = [{{ time = 0, scale = 0 }}, {{ time = 1, scale = 0.15 }}]\n",
+            (i % 6) as f32 * 0.4 - 1.0,
+            (i / 6) as f32 * 0.4 - 1.0
+        )
+    };
+    let text = "[camera]\nposition = [0, 0, 5]\ntarget = [0, 0, 0]\n[environment]\nradiance = 1\n\
+                [[mesh]]\nname = 'cube'\nshape = 'cube'\n";
+    let text = (0..36).map(cube).fold(text.to_owned(), |text, cube| text + &cube);
+    std::fs::write(folder.path().join("s.toml"), text).unwrap();
+    let words = "sequence s.toml --width 24 --height 24 --spp 1 --frames 0..3 --fps 1 --reproject off --again \
+                 -o f.#.exr --json";
+    let mut command = command(folder.path(), words);
+    command.env("LD_LIBRARY_PATH", folder.path()).envs(environment.iter().copied()).output().unwrap()
+}
+
+/// Frame 0 takes two submissions, as a picture does, and the third brings the changes of frame 1.
+#[test]
+fn a_frame_after_one_that_failed_is_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let real = stand_in(&folder);
+    let real = ("REAL_LOADER", real.to_str().unwrap());
+    let last = || tallow::image::read(&folder.path().join("f.2.exr")).unwrap().picture(None).unwrap().pixels;
+    let control = sequence(&folder, &[real]);
+    assert!(control.status.success(), "{control:?}");
+    let whole = last();
+    complains(&sequence(&folder, &[real, ("FAIL_AT", "3")]), 6, &["error: frame 1: ", "out of memory"]);
+    assert!(last() == whole);
+}
+
+#[test]
+fn a_lost_device_leaves_the_reports_of_the_frames_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let real = stand_in(&folder);
+    let lost = sequence(&folder, &[("REAL_LOADER", real.to_str().unwrap()), ("LOSE_AT", "4")]);
+    complains(&lost, 4, &["the device was lost", "run again"]);
+    let summary: serde_json::Value = serde_json::from_str(&stdout(&lost)).unwrap();
+    let errors: Vec<_> = summary["frames"].as_array().unwrap().iter().map(|frame| frame["error"].as_str()).collect();
+    assert_eq!((errors.len(), errors[0], &summary["failed"]), (2, None, &1.into()), "{summary}");
+    assert!(errors[1].is_some_and(|error| error.contains("the device was lost")), "{summary}");
 }

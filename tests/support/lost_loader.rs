@@ -1,6 +1,7 @@
 //! Stands in for Vulkan's loader in front of a program that opens it: `REAL_LOADER` names the real one, submission
-//! number `LOSE_AT`, counted from 1, loses the device, and with `NO_DEVICE` its drivers have none. With `NO_CACHE` no
-//! pipeline cache can be made; an instance that is destroyed before its device aborts the program.
+//! number `LOSE_AT`, counted from 1, loses the device, number `FAIL_AT` finds no memory, and with `NO_DEVICE` its drivers
+//! have no device. With `NO_CACHE` no pipeline cache can be made; an instance that is destroyed before its device aborts
+//! the program.
 //! `tests/cli/device.rs` compiles it, with std alone.
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::mem::transmute;
@@ -102,9 +103,10 @@ unsafe extern "system" fn destroy_instance(instance: *mut c_void, allocator: *co
 }
 
 unsafe extern "system" fn submit(queue: *mut c_void, count: u32, what: *const c_void, fence: u64) -> c_int {
-    let lose_at = std::env::var("LOSE_AT").ok().and_then(|n| n.parse().ok());
+    let named = |name: &str| std::env::var(name).ok().and_then(|n| n.parse::<usize>().ok());
     match SUBMITTED.fetch_add(1, SeqCst) + 1 {
-        number if lose_at.is_some_and(|at: usize| number >= at) => ERROR_DEVICE_LOST,
+        number if named("LOSE_AT").is_some_and(|at| number >= at) => ERROR_DEVICE_LOST,
+        number if named("FAIL_AT") == Some(number) => ERROR_OUT_OF_HOST_MEMORY,
         _ => unsafe { SUBMIT.get().unwrap()(queue, count, what, fence) },
     }
 }

@@ -183,18 +183,22 @@ pub fn run(args: &Args) -> Result<Exit> {
     let mut stage = Stage::new(args)?;
     let mut preview = args.preview.as_ref().map(|_| Preview::default());
     let (numbers, mut reports) = (args.numbers(stage.frames())?, Vec::new());
-    let interrupted = render_frames(args, &mut stage, numbers, preview.as_mut(), &mut reports)?;
-    interrupt::leave_at_once(interrupted.as_deref().unwrap_or("interrupted: all frames are finished"));
-    if let (None, Some(preview), Some(path)) = (&interrupted, &preview, &args.preview) {
+    let ended = render_frames(args, &mut stage, numbers, preview.as_mut(), &mut reports);
+    let interrupted = ended.as_ref().is_ok_and(Option::is_some);
+    if let Ok(line) = &ended {
+        interrupt::leave_at_once(line.as_deref().unwrap_or("interrupted: all frames are finished"));
+    }
+    if let (Ok(None), Some(preview), Some(path)) = (&ended, &preview, &args.preview) {
         preview.write(path, args.fps)?;
     }
-    fail_on_messages(stage.gpu())?;
     let failed = reports.iter().filter(|report| report.error.is_some()).count();
     let (seconds, device) = (begun.elapsed().as_secs_f64(), stage.gpu().info().name.clone());
     if args.render.common.json {
-        let (warnings, interrupted) = (stage.warnings().to_vec(), interrupted.is_some());
+        let warnings = stage.warnings().to_vec();
         print_json(&Summary { frames: reports, failed, interrupted, seconds, device, warnings })?;
     }
+    let interrupted = ended?;
+    fail_on_messages(stage.gpu())?;
     interrupted.iter().for_each(|line| complain(line));
     Ok(match interrupted {
         Some(_) => Exit::Interrupted,
@@ -223,8 +227,12 @@ fn render_frames(
             _ => {}
         }
         let frame = stage.frame(number, preview.as_deref_mut());
-        match frame.result {
-            Err(error @ Error::DeviceLost(_)) => return Err(error),
+        match &frame.result {
+            Err(Error::DeviceLost(what)) => {
+                let lost = Error::DeviceLost(what.clone());
+                reports.push(frame.report());
+                return Err(lost);
+            }
             Ok(Exit::Interrupted) => return Ok(Some(line)),
             _ => {}
         }

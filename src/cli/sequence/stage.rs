@@ -252,15 +252,17 @@ impl<'a> Stage<'a> {
 
     /// Tells the renderer of what has changed, or makes one with the effects that this frame calls for too.
     fn prepare(&mut self, settings: &Settings) -> Result<()> {
-        if let Some(renderer) = &mut self.renderer {
+        // After an update that failed, nobody knows what the device has of the scene: the next frame makes another
+        // renderer.
+        if let Some(mut renderer) = self.renderer.take() {
             renderer.set_seed(settings.seed);
             let (scene, change) = (&self.scene, &self.change);
             let mut frame = FrameResources::new(&self.gpu)?;
             match self.gpu.run(&mut frame, |rec| renderer.update(rec, scene, change)) {
-                Err(Error::Usage(_)) => self.renderer = None,
+                Err(Error::Usage(_)) => {}
                 other => {
                     other?;
-                    self.change = Change::default();
+                    (self.renderer, self.change) = (Some(renderer), Change::default());
                     return Ok(());
                 }
             }
