@@ -34,8 +34,13 @@ impl Relit {
             return None;
         }
         let (mut before, mut after) = joined(before.iter().copied(), now()).into_iter().unzip::<_, _, Vec<_>, Vec<_>>();
-        let weights: Vec<f32> = before.iter().zip(&after).map(|(a, b)| a.probability.max(b.probability)).collect();
         let changed: Vec<bool> = before.iter().zip(&after).map(|(a, b)| has_changed(a, b)).collect();
+        // Densities of lamps that a path meets are those before, times a factor: so are the choices of those that stay.
+        let weight = |((a, b), changed): ((&Light, &Light), &bool)| match changed {
+            true => a.probability.max(b.probability),
+            false => a.probability,
+        };
+        let weights: Vec<f32> = before.iter().zip(&after).zip(&changed).map(weight).collect();
         let sum = |of: bool| weights.iter().zip(&changed).filter(|(_, c)| **c == of).map(|(w, _)| w).sum::<f32>();
         let scale = match [sum(false), sum(true)] {
             [kept, new] if kept > 0.0 && new > 0.0 => [(1.0 - CHANGED) / kept, CHANGED / new],
@@ -110,6 +115,22 @@ mod tests {
             assert!(found.iter().all(|f| (f - p).abs() < 1e-6), "{i}: {found:?}");
         }
         assert!((relit.pdf_scale - 0.5 / 0.7).abs() < 1e-6 && relit.table.len() == 5);
+    }
+
+    /// A path that meets a kept lamp counts on the density of the scene before, times that factor.
+    #[test]
+    fn kept_lights_are_chosen_as_their_density_says() {
+        // The first goes out, so that the others are chosen more often; or it lights up, and they are less often.
+        let many = [(0, light(6.0, 0.6)), (1, light(3.0, 0.3)), (2, light(1.0, 0.1))];
+        let few = [(1, light(3.0, 0.75)), (2, light(1.0, 0.25))];
+        for (before, after) in [(&many[..], &few[..]), (&few[..], &many[..])] {
+            let relit = Relit::of(before, &scene(after)).unwrap();
+            assert!((relit.after[0].probability - 0.5).abs() < 1e-6);
+            for (number, was) in before.iter().filter(|(number, _)| *number > 0) {
+                let (now, said) = (relit.after[*number as usize].probability, was.probability * relit.pdf_scale);
+                assert!((now - said).abs() < 1e-6, "light {number}: {now}, not {said}");
+            }
+        }
     }
 
     #[test]
