@@ -153,6 +153,8 @@ fn keys_move_nodes_of_a_model_and_what_hangs_on_them() {
     refused(&keys("arm", "scale = 1"), "write MESH/NODE");
     refused(&keys("fox/arm", "fov = 1"), "unknown key \"fov\"");
     refused(&format!("{0}{0}", keys("fox/arm", "scale = 1")), "is moved by an earlier table");
+    let twice = ["fox/arm", "fox/node 1"].map(|node| keys(node, "scale = 1")).concat();
+    refused(&twice, "node \"node 1\": is moved by an earlier table");
     let instance = keys("fox/leaf", "scale = 1").replace("node =", "instance =");
     refused(&instance, "is placed by instances without a name: a part of a glTF file is moved by `node`");
 }

@@ -67,7 +67,7 @@ pub fn load(path: &Path, base: &Path, clip: Option<&str>, keys: Vec<(String, Key
     memory::need(path.display(), bytes)?;
     let (worlds, lights) = (tree.worlds(&tree.locals), light::read(&asset, &mut model.warnings)?);
     let channels = clip::read(&asset, &tree, clip, &mut model.warnings)?;
-    let keyed = keys.into_iter().map(|(name, keys)| Ok((node_of(&asset, &name)?, keys))).collect::<Result<Vec<_>>>()?;
+    let keyed = nodes_of(&asset, keys)?;
     let moved = Moved::new(&tree, &channels, keyed.iter().map(|(node, _)| *node));
     let mut placer = Placer::new(&asset, &worlds, &moved);
     let mut moved_lights = Vec::new();
@@ -98,6 +98,20 @@ pub fn load(path: &Path, base: &Path, clip: Option<&str>, keys: Vec<(String, Key
         model.description.camera = first.camera.clone();
     }
     Ok(model)
+}
+
+/// The nodes that keys move. Several names may be those of one.
+fn nodes_of(asset: &Asset, keys: Vec<(String, Keyed)>) -> Result<Vec<(usize, Keyed)>> {
+    let mut keyed: Vec<(usize, Keyed)> = Vec::new();
+    for (name, keys) in keys {
+        let node = node_of(asset, &name)?;
+        if keyed.iter().any(|(earlier, _)| *earlier == node) {
+            let what = "is moved by an earlier table: put all keys into one";
+            return Err(asset.at(format!("node \"{name}\""), what));
+        }
+        keyed.push((node, keys));
+    }
+    Ok(keyed)
 }
 
 /// The first node of a name: its own, that of its mesh, or its number.
