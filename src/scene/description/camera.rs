@@ -30,7 +30,8 @@ pub struct Camera {
     pub target: Option<[f64; 3]>,
     /// A direction that is up in the image; default +y.
     pub up: Option<[f64; 3]>,
-    /// Row-major 4 x 4; the camera looks along -z, +x is right, +y is up. Scales are dropped, a mirror is kept.
+    /// Row-major 4 x 4; the camera looks along -z, +x is right, +y is up. Scales and shear are
+    /// dropped, a mirror is kept: the view keeps its axis, and up its plane with it.
     pub world_from_camera: Option<[f64; 16]>,
     /// Degrees along `fov_axis`, above 0 and below 180; default 40.
     pub fov: Option<f64>,
@@ -148,14 +149,25 @@ fn overview(target: DVec3, low: DVec3, high: DVec3, tan: [f64; 2]) -> DVec3 {
 }
 
 fn frame_from_matrix(rows: &[f64; 16]) -> Result<Frame, String> {
+    let refused = || "world_from_camera is not an invertible row-major affine matrix (last row 0 0 0 1)".to_owned();
     let m = DMat4::from_cols_array(rows).transpose();
     if !m.is_finite() || m.row(3).truncate() != DVec3::ZERO || m.determinant().abs() < 1e-30 {
-        return Err("world_from_camera is not an invertible row-major affine matrix (last row 0 0 0 1)".into());
+        return Err(refused());
     }
-    let axis = |i: usize| m.col(i).truncate().normalize();
-    let (position, forward) = (m.w_axis.truncate() / m.w_axis.w, -axis(2));
+    let position = m.w_axis.truncate() / m.w_axis.w;
     finite(position)?;
-    Ok((position, [axis(0), axis(1), forward]))
+    Ok((position, axes(&m).ok_or_else(refused)?))
+}
+
+/// Right, up and forward; `None` where they are no three directions. Uneven scales of a node's parents bring shear.
+fn axes(m: &DMat4) -> Option<[DVec3; 3]> {
+    let axis = |i: usize, across: &[DVec3]| {
+        let column = m.col(i).truncate();
+        across.iter().fold(column, |v, other| v.reject_from_normalized(*other)).try_normalize()
+    };
+    let back = axis(2, &[])?;
+    let up = axis(1, &[back])?;
+    Some([axis(0, &[back, up])?, up, -back])
 }
 
 fn finite(position: DVec3) -> Result<(), String> {
@@ -228,6 +240,22 @@ mod tests {
                 reach = reach.max(film[0]).max(film[1]);
             }
             assert!(reach > 0.85, "{size:?} {high:?}: the scene reaches {reach} of the way to the edge");
+        }
+    }
+
+    /// The axis of view stays, then the plane that it spans with up. `mirror` is that of +x.
+    #[test]
+    fn a_sheared_matrix_gives_axes_at_right_angles() {
+        for mirror in [1.0, -1.0] {
+            let rows = [2.0 * mirror, 0.5, 0.3, 1.0, 0.2, 3.0, -0.4, 2.0, 0.7, 0.6, 0.5, 3.0, 0.0, 0.0, 0.0, 1.0];
+            let camera = Camera { world_from_camera: Some(rows), fov: Some(90.0), ..Camera::default() };
+            let found = camera.build([8, 8], [[0.0; 3]; 2]).unwrap();
+            let [right, up, forward] = [found.right, found.up, found.forward].map(glam::Vec3::from);
+            let back = glam::Vec3::new(0.3, -0.4, 0.5).normalize();
+            assert!((forward + back).length() < 1e-6, "{forward}");
+            assert!(up.dot(back.cross(glam::Vec3::new(0.5, 3.0, 0.6))).abs() < 1e-6 && up.y > 0.0, "{up}");
+            assert!((right - mirror as f32 * up.cross(back)).length() < 1e-6, "{right}");
+            assert!(up.dot(forward).abs() < 1e-6 && (up.length() - 1.0).abs() < 1e-6, "{up}");
         }
     }
 
