@@ -41,7 +41,7 @@ impl BrokenSamples {
         let (Some(x), Some(y)) = (a, b) else { return a.or(b) };
         let place = |s: &Self| (s.pixel[1], s.pixel[0], s.sample, s.seed);
         let first = if place(&y) < place(&x) { y } else { x };
-        Some(Self { count: x.count + y.count, ..first })
+        Some(Self { count: x.count.saturating_add(y.count), ..first })
     }
 }
 
@@ -138,6 +138,8 @@ mod tests {
         let of = |count, pixel, sample, seed| Some(BrokenSamples { count, pixel, sample, seed });
         let (a, b) = (of(2, [9, 1], 3, 0), of(5, [1, 2], 0, 1));
         assert_eq!([BrokenSamples::join(a, b), BrokenSamples::join(b, a)], [of(7, [9, 1], 3, 0); 2]);
+        let all = of(u64::MAX, [9, 1], 3, 0);
+        assert_eq!(BrokenSamples::join(all, b), all, "counts come from files");
         assert_eq!(
             [BrokenSamples::join(a, None), BrokenSamples::join(None, b), BrokenSamples::join(None, None)],
             [a, b, None]
