@@ -11,7 +11,7 @@ pub struct Blocks<R> {
     begun: bool,
     ended: bool,
     /// Why nothing more can be read.
-    broken: Option<&'static str>,
+    broken: Option<String>,
 }
 
 /// Bytes that are read at a time.
@@ -19,7 +19,6 @@ const SIZE: usize = 1 << 19;
 /// Most bytes of a statement.
 const LONGEST: usize = 1 << 26;
 const TOO_LONG: &str = "64 MiB without a line feed: is this an OBJ file?";
-const CUT: &str = "the file could not be read to its end: mend the line or export the file again";
 const WIDE: &str = "the file is UTF-16 text: save it as UTF-8";
 
 impl<R: Read> Blocks<R> {
@@ -42,15 +41,15 @@ impl<R: Read> Blocks<R> {
     }
 
     /// Why nothing more can be read: a statement of more than 64 MiB, UTF-16, or what the system says.
-    pub fn broken(&self) -> Option<&'static str> {
-        self.broken
+    pub fn broken(&self) -> Option<&str> {
+        self.broken.as_deref()
     }
 
-    fn next(&mut self) -> Result<Option<Vec<u8>>, &'static str> {
+    fn next(&mut self) -> Result<Option<Vec<u8>>, String> {
         let mut block = std::mem::take(&mut self.rest);
         while !self.ended {
             let before = block.len();
-            let read = self.inner.by_ref().take(SIZE as u64).read_to_end(&mut block).map_err(|_| CUT)?;
+            let read = self.inner.by_ref().take(SIZE as u64).read_to_end(&mut block).map_err(unread)?;
             self.ended = read < SIZE;
             self.begin(&mut block)?;
             if let Some(end) = end_of_statements(&block, before).filter(|_| !self.ended) {
@@ -58,24 +57,28 @@ impl<R: Read> Blocks<R> {
                 break;
             }
             if block.len() > LONGEST + 2 {
-                return Err(TOO_LONG);
+                return Err(TOO_LONG.to_owned());
             }
         }
         Ok((!block.is_empty()).then_some(block))
     }
 
-    fn begin(&mut self, block: &mut Vec<u8>) -> Result<(), &'static str> {
+    fn begin(&mut self, block: &mut Vec<u8>) -> Result<(), String> {
         if std::mem::replace(&mut self.begun, true) {
             return Ok(());
         }
         if block.starts_with(&[0xff, 0xfe]) || block.starts_with(&[0xfe, 0xff]) {
-            return Err(WIDE);
+            return Err(WIDE.to_owned());
         }
         if block.starts_with("\u{feff}".as_bytes()) {
             block.drain(..3);
         }
         Ok(())
     }
+}
+
+fn unread(error: std::io::Error) -> String {
+    format!("the file could not be read to its end: {error}: copy or export it again")
 }
 
 /// Where the last whole statement ends, if that is behind the first `known` bytes. The line feed that belongs to a carriage return at the
@@ -148,6 +151,20 @@ mod tests {
             lines += statements.lines;
         }
         all
+    }
+
+    #[test]
+    fn what_the_system_says_of_a_file_is_told() {
+        struct Failing;
+        impl Read for Failing {
+            fn read(&mut self, _: &mut [u8]) -> std::io::Result<usize> {
+                Err(std::io::Error::other("the disk is gone"))
+            }
+        }
+        let mut blocks = Blocks::new((&b"v 1 2 3\n"[..]).chain(Failing));
+        assert!(blocks.take(2).is_empty());
+        let said = blocks.broken().unwrap();
+        assert!(said.contains("the disk is gone") && !said.contains("mend"), "{said}");
     }
 
     #[test]
