@@ -18,7 +18,7 @@ pub enum Type {
     Directional,
 }
 
-/// A `[[light]]` table. Positions in world units.
+/// A `[[light]]` table. Positions in world units, with coordinates of up to 1e12 in absolute value.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LightTable {
@@ -33,13 +33,15 @@ pub struct LightTable {
     pub direction: Option<[f32; 3]>,
     /// A point on the axis of a spot light, in place of `direction`.
     pub target: Option<[f32; 3]>,
-    /// Radiant intensity of a point or spot light (of a spot on its axis), W/sr.
+    /// Radiant intensity of a point or spot light (of a spot on its axis), W/sr, from 0 to 1e30.
     pub intensity: Option<Rgb>,
-    /// Irradiance of a directional light on a facing plane, W/m^2.
+    /// Irradiance of a directional light on a facing plane, W/m^2, from 0 to 1e30.
     pub irradiance: Option<Rgb>,
-    /// Degrees from a spot light's axis up to which its intensity is full; default three quarters of `cutoff`.
+    /// Degrees from a spot light's axis up to which its intensity is full, from 0 to `cutoff`; default three quarters
+    /// of that.
     pub cone: Option<f32>,
-    /// Degrees from a spot light's axis beyond which it is dark; default 20. In between it falls linearly with the angle.
+    /// Degrees from a spot light's axis beyond which it is dark, above 0 and up to 180; default 20. In between it falls
+    /// linearly with the angle.
     pub cutoff: Option<f32>,
 }
 

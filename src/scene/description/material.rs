@@ -47,7 +47,9 @@ pub enum Distribution {
     Ggx,
 }
 
-/// A `[[material]]` table. Colours are linear Rec. 709, one number or `[r, g, b]`; files are relative to the scene file.
+/// A `[[material]]` table. Colours are linear Rec. 709, one number or `[r, g, b]`, which is clamped to [0, 1] with a
+/// warning where no other range is given; numbers are finite, and outside their range an error; files are relative to
+/// the scene file.
 /// Keys that the type does not read are named in a warning.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -64,26 +66,27 @@ pub struct MaterialTable {
     pub color_texture: Option<TextureTable>,
     /// Microfacet roughness in [0, 1]; below 0.01 smooth; default 0.
     pub alpha: f32,
-    /// Conductor, dielectric: roughness along v of the texture coordinates, where it differs from `alpha`, which is that along u
-    /// then; the mesh's tangents, where it has some, take the place of u.
+    /// Conductor, dielectric: roughness in [0, 1] along v of the texture coordinates, where it differs from `alpha`,
+    /// which is that along u then; the mesh's tangents, where it has some, take the place of u.
     pub alpha_v: Option<f32>,
     /// Microfacet distribution; default Beckmann.
     pub distribution: Distribution,
-    /// Index of refraction of a conductor.
+    /// Index of refraction of a conductor, from 0 to 100; default 1 where `k` is given, and without `k` and `metal` 0.
     pub eta: Option<Rgb>,
-    /// Extinction of a conductor.
+    /// Extinction of a conductor, from 0 to 100; default 0 where `eta` is given, and without `eta` and `metal` 1.
     pub k: Option<Rgb>,
     /// Name of the metal that gives a conductor's `eta` and `k`.
     pub metal: Option<String>,
-    /// Interior over exterior index of a dielectric, a coat or the dielectric part of metallic-roughness; default 1.5.
+    /// Interior over exterior index of a dielectric, a coat or the dielectric part of metallic-roughness, from 0.1 to
+    /// 10 (metallic-roughness: to 1000); default 1.5.
     pub ior: Option<f32>,
-    /// Tint of specular reflection; default 1.
+    /// Tint of specular reflection; default 1. Metallic-roughness: from 0 to 1e6.
     pub specular: Option<Rgb>,
     /// sRGB picture that multiplies `specular`.
     pub specular_texture: Option<TextureTable>,
     /// Tint of transmission; default 1.
     pub transmission: Option<Rgb>,
-    /// Radiance of the front side, W/(m^2 sr).
+    /// Radiance of the front side, W/(m^2 sr), from 0 to 1e18 once it is multiplied by `emission_strength`; default 0.
     pub emission: Option<Rgb>,
     /// sRGB picture that multiplies `emission` (default then 1).
     pub emission_texture: Option<TextureTable>,
@@ -105,7 +108,7 @@ pub struct MaterialTable {
     pub emission_two_sided: bool,
     /// Coated: light that is reflected below the coat takes on the base's colour each time; default false.
     pub nonlinear: bool,
-    /// Factor of `emission`, from 0; default 1.
+    /// Factor of `emission`, from 0, so that the product is no more than 1e18; default 1.
     pub emission_strength: Option<f32>,
     /// Factor of the x and y components of `normal_map`; default 1.
     pub normal_scale: Option<f32>,
@@ -138,7 +141,8 @@ pub struct MaterialTable {
     pub clearcoat_normal_scale: Option<f32>,
     /// Metallic-roughness: what alpha does; without it alpha is ignored, but `opacity` and `opacity_texture` count.
     pub alpha_mode: Option<AlphaMode>,
-    /// Metallic-roughness, `alpha_mode = "mask"`: the least alpha that stops rays; default 0.5.
+    /// Metallic-roughness, `alpha_mode = "mask"`: the least alpha that stops rays, from 0 to 1e6; default 0.5. Above 1
+    /// none does.
     pub alpha_cutoff: Option<f32>,
     /// Metallic-roughness: the surface shows `color` in any light: it emits it to both sides and scatters none; default false.
     pub unlit: bool,
