@@ -97,7 +97,7 @@ impl Gpu {
         let candidate = choose(info::candidates(&instance.raw)?, options.device.as_deref())?;
         let queue_family = usable(&candidate)?;
         let by_ray_query = is_by_ray_query(options.tracing, &candidate.info)?;
-        let tuning = options.tuning.unwrap_or(Tuning::of(candidate.info.kind, by_ray_query)).check()?;
+        let tuning = options.tuning.unwrap_or(Tuning::of(candidate.info.kind, by_ray_query)).on(candidate.info.kind)?;
         let calibrated = calibrated::offered(&instance, candidate.physical)?;
         let alone = one_at_a_time();
         let device = create_device(&instance.raw, candidate.physical, queue_family, calibrated, by_ray_query)?;

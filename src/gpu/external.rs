@@ -101,7 +101,7 @@ impl Gpu {
             return Err(Error::Device(what.to_owned()));
         }
         let ray_queries = by_ray_query.then(|| RayQueries::new(&instance, physical, &device));
-        let tuning = raw.tuning.unwrap_or(Tuning::of(candidate.info.kind, by_ray_query)).check()?;
+        let tuning = raw.tuning.unwrap_or(Tuning::of(candidate.info.kind, by_ray_query)).on(candidate.info.kind)?;
         drop(alone);
         let queue = vk::Queue::from_raw(raw.queue);
         let instance = Instance::borrowed(entry, instance);

@@ -9,8 +9,11 @@ const IN_REGISTERS: u32 = 2;
 /// Edges of a path that a wavefront has stages for. Each is two dispatches for all paths, however few have got so far.
 const MOST_STAGES: u32 = 32;
 
-/// The sizes that suit a kind of device. On lavapipe no choice changes a bit of any image, but for [`Self::windows`]. NVIDIA's driver
-/// fuses products and sums of one kernel otherwise than those of another, so that some pictures differ by rounding there.
+/// The sizes that suit a kind of device. On lavapipe no choice changes a bit of any image, but for [`Self::windows`] and
+/// too long a [`Self::longest_edge`]. NVIDIA's driver fuses products and sums of one kernel otherwise than those of
+/// another, so that some pictures differ by rounding there. Drivers that run on a CPU may end long loops early
+/// (`glsl/shared/loop_limit.glsl`): a device of theirs takes no more than [`Self::CPU`] has of [`Self::paths_in_flight`]
+/// and [`Self::thread_items`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tuning {
     /// Threads in a workgroup that traces rays. lavapipe is fastest with 32 (against 16 and 64); GPUs get two subgroups of
@@ -54,7 +57,8 @@ pub struct Tuning {
     /// Threads in a workgroup of a filter that looks at pixels around its own, all in one row. In larger ones neighbours share
     /// more of what they read. With 128 in place of 32 an H200 takes .85 (`wavelet`), .97 (`svgf`) and .99 to 1.00 of the time.
     pub filter_workgroup: u32,
-    /// Longest edge of a filtered image in pixels; see `glsl/shared/loop_limit.glsl`.
+    /// Longest edge of a filtered image in pixels. Threads of some filters walk along a whole one, which drivers that run
+    /// on a CPU may end early behind as many as [`Self::CPU`] has.
     pub longest_edge: u64,
 }
 
@@ -95,9 +99,11 @@ impl Tuning {
         longest_edge: u64::MAX,
     };
 
+    /// These sizes as a device of this kind takes them: see [`Tuning`].
+    ///
     /// # Errors
     /// [`Error::Usage`] naming a size that cannot be.
-    pub(super) fn check(self) -> Result<Self> {
+    pub(super) fn on(self, kind: DeviceKind) -> Result<Self> {
         let sizes = [
             ("workgroup", self.workgroup.into()),
             ("stripes", self.stripes.into()),
@@ -110,6 +116,11 @@ impl Tuning {
         ];
         match sizes.iter().find(|(_, size)| *size == 0) {
             Some((name, _)) => Err(Error::Usage(format!("tuning: {name} is 0: choose at least 1"))),
+            None if kind == DeviceKind::Cpu => Ok(Self {
+                paths_in_flight: self.paths_in_flight.min(Self::CPU.paths_in_flight),
+                thread_items: self.thread_items.min(Self::CPU.thread_items),
+                ..self
+            }),
             None => Ok(self),
         }
     }

@@ -140,6 +140,27 @@ fn switches_leave_the_bits_of_renders() {
     }
 }
 
+/// Software devices end loops after 65,535 turns, and what is left of a pixel's samples would be lost: see
+/// `glsl/shared/loop_limit.glsl`.
+#[test]
+fn no_sizes_lose_samples_of_a_pixel_with_many() {
+    const SPP: u32 = (1 << 20) + (1 << 18);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/sky.toml");
+    let text = "[environment]\nradiance = [1, 1, 1]\n[[mesh]]\nshape = \"rectangle\"\n";
+    let one_pixel = |s: &mut Settings| {
+        (s.width, s.height, s.spp, s.max_depth) = (1, 1, SPP, 1);
+        s.allocate.policy = tallow::allocate::policy("geometry").unwrap();
+    };
+    let scene = Scene::parse(&path, text).unwrap().with(one_pixel);
+    let [usual, large] = [Tuning::CPU, Tuning { thread_items: 1024, ..Tuning::GPU }].map(|tuning| {
+        let gpu = tuned_gpu(tuning);
+        let stats = render(&gpu, &Renderer::new(&gpu, &scene, &scene.settings, Outputs::default()).unwrap());
+        assert_silent(&gpu);
+        stats
+    });
+    assert_eq!((large[0].count, bits(&large)), (SPP, bits(&usual)));
+}
+
 #[test]
 fn sizes_that_cannot_be_are_refused() {
     for (name, tuning) in [
