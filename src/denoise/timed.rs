@@ -58,6 +58,7 @@ pub fn timed(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Timed> {
 
 /// The same for Open Image Denoise: its own pass is timed by the host's clock, and loading the library is part of the first run.
 fn timed_on_host(gpu: &Gpu, noisy: Noisy, recipe: &Recipe) -> Result<Timed> {
+    filter::check_size(gpu, noisy.size, filter::GUIDE_TEXELS)?;
     let before = gpu.allocated_bytes();
     let begun = Instant::now();
     let parts = Demodulated::new(gpu, &noisy, recipe.demodulation(noisy.holds()), false, recipe.fireflies())?;

@@ -2,8 +2,8 @@
 //! filter here as those that suit a CPU.
 use crate::support::{assert_silent, render, tuned_gpu};
 use std::path::Path;
-use tallow::denoise::filter::{FILTERS, FilterSettings, Row};
-use tallow::denoise::{Demodulation, Denoiser};
+use tallow::denoise::filter::{FILTERS, FilterSettings, Method, Row};
+use tallow::denoise::{Demodulation, Denoiser, Noisy, Recipe, timed};
 use tallow::error::Error;
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu, Tuning};
 use tallow::layout::vec4;
@@ -159,6 +159,19 @@ fn no_sizes_lose_samples_of_a_pixel_with_many() {
         stats
     });
     assert_eq!((large[0].count, bits(&large)), (SPP, bits(&usual)));
+}
+
+/// Open Image Denoise need not be there: the size is looked at first.
+#[test]
+fn every_method_refuses_an_image_with_too_long_an_edge_before_it_is_timed() {
+    let scene = scene("cornell-box/scene.toml", "uniform");
+    let gpu = tuned_gpu(Tuning { longest_edge: 64, ..Tuning::CPU });
+    let renderer = Renderer::new(&gpu, &scene, &scene.settings, OUTPUTS).unwrap();
+    for method in [Method::Oidn, Method::Kernels(FILTERS[1])] {
+        let noisy = Noisy::of_film(&renderer).unwrap();
+        let why = timed(&gpu, noisy, &Recipe::new(method)).err().map(|why| why.to_string()).unwrap_or_default();
+        assert!(why.contains("65 x 33 is too large to filter"), "{}: {why}", method.name());
+    }
 }
 
 #[test]
