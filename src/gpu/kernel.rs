@@ -177,6 +177,7 @@ impl Compiled {
         let begun = Instant::now();
         let &Interface { name, slots, push_bytes, .. } = interface;
         check_workgroup(name, local_size, &gpu.0.limits)?;
+        check_slots(name, slots, &gpu.0.limits)?;
         let ray_query = interface.ray_query.filter(|_| gpu.traces_by_ray_query());
         let (spirv, world) = ray_query.map_or((interface.spirv, None), |code| (code.spirv, Some(code.binding)));
         let constants: Arc<[_]> = constants.into();
@@ -194,7 +195,7 @@ impl<B: Bindings> Kernel<B> {
     /// when the first is dropped.
     ///
     /// # Errors
-    /// [`Error::Device`] when the driver refuses it, or a workgroup exceeds the device's limit.
+    /// [`Error::Device`] when the driver refuses it, or its workgroups or its buffers exceed the device's limits.
     pub fn new(gpu: &Gpu, constants: &B::Constants) -> Result<Self> {
         let interface = Interface {
             name: B::NAME,
@@ -251,15 +252,65 @@ fn folded(groups: u32) -> [u32; 3] {
 }
 
 fn check_workgroup(kernel: &str, [x, y]: [u32; 2], limits: &vk::PhysicalDeviceLimits) -> Result<()> {
-    let most = limits.max_compute_work_group_size[0].min(limits.max_compute_work_group_invocations);
-    if (1..=most).contains(&x.saturating_mul(y)) {
+    let [most_x, most_y, _] = limits.max_compute_work_group_size;
+    let most = most_x.min(limits.max_compute_work_group_invocations);
+    if (1..=most).contains(&x.saturating_mul(y)) && y <= most_y {
         return Ok(());
     }
-    Err(Error::Device(format!("{kernel}: a workgroup of {x} x {y} threads: choose 1 to {most}")))
+    Err(Error::Device(format!("{kernel}: a workgroup of {x} x {y} threads: choose 1 to {most}, and {most_y} down")))
+}
+
+/// Vulkan promises room for 4 storage buffers, 16 texel buffers and 12 uniform blocks in a kernel, and some kernels need
+/// more. Their shared memory stays within the 16 KiB that it promises.
+fn check_slots(kernel: &str, slots: &[Slot], limits: &vk::PhysicalDeviceLimits) -> Result<()> {
+    use vk::DescriptorType as Type;
+    let kinds = [
+        (Type::STORAGE_BUFFER, "StorageBuffers", limits.max_per_stage_descriptor_storage_buffers),
+        (Type::UNIFORM_TEXEL_BUFFER, "SampledImages", limits.max_per_stage_descriptor_sampled_images),
+        (Type::UNIFORM_BUFFER, "UniformBuffers", limits.max_per_stage_descriptor_uniform_buffers),
+    ];
+    for (kind, limit, most) in kinds {
+        let count = slots.iter().filter(|slot| slot.kind.descriptor() == kind).count();
+        if count > most as usize {
+            return Err(Error::Device(format!(
+                "{kernel}: it binds {count} buffers that count as maxPerStageDescriptor{limit}, of which this device \
+                 has {most}: choose another device"
+            )));
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
+    #[test]
+    fn a_kernel_that_a_device_has_no_room_for_is_refused_with_the_limit() {
+        use crate::gpu::Bindings;
+        use crate::shaders::{gather, path_shade};
+        let least = ash::vk::PhysicalDeviceLimits {
+            max_per_stage_descriptor_storage_buffers: 4,
+            max_per_stage_descriptor_sampled_images: 16,
+            max_per_stage_descriptor_uniform_buffers: 12,
+            max_compute_work_group_size: [128, 4, 1],
+            max_compute_work_group_invocations: 128,
+            ..Default::default()
+        };
+        let why = super::check_slots("path_shade", path_shade::Bind::SLOTS, &least).unwrap_err().to_string();
+        assert!(
+            why.contains("path_shade: it binds 5") && why.contains("StorageBuffers, of which this device has 4"),
+            "{why}"
+        );
+        let why = super::check_slots("gather", gather::Bind::SLOTS, &least).unwrap_err().to_string();
+        assert!(
+            why.contains("gather: it binds 17") && why.contains("SampledImages, of which this device has 16"),
+            "{why}"
+        );
+        let more = ash::vk::PhysicalDeviceLimits { max_per_stage_descriptor_sampled_images: 17, ..least };
+        super::check_slots("gather", gather::Bind::SLOTS, &more).unwrap();
+        super::check_workgroup("auto_cells", [8, 4], &least).unwrap();
+        super::check_workgroup("auto_cells", [8, 8], &least).unwrap_err();
+    }
+
     #[test]
     fn large_dispatches_fold_into_rows() {
         assert_eq!(super::folded(2), [2, 1, 1]);
