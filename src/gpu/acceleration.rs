@@ -2,7 +2,7 @@
 //! and one over the places where meshes are.
 mod input;
 
-use super::ray_query::RayQueries;
+use super::ray_query::{MOST_NUMBERS, RayQueries};
 use super::{Buffer, Gpu, Location};
 use crate::error::{Error, Result};
 use ash::vk;
@@ -11,8 +11,6 @@ pub use input::{Aabb, Mesh, Shapes};
 pub(super) use input::{Input, address};
 use std::sync::Arc;
 
-/// Vulkan's records keep numbers of copies, and of the first triangles of their meshes, in 24 bits.
-const MOST: usize = 1 << 24;
 /// Structures begin at multiples of so many bytes.
 const ALIGNMENT: u64 = 256;
 
@@ -48,12 +46,13 @@ impl Acceleration {
     /// Makes room for the structures of these meshes, runs of `shapes`, and of at most so many copies of them.
     ///
     /// # Errors
-    /// [`Error::Device`] on a device that traces otherwise, for more than 2^24 copies, and when memory is out.
+    /// [`Error::Device`] on a device that traces otherwise, for more copies or larger meshes than it allows, and when
+    /// memory is out.
     pub(crate) fn new(gpu: &Gpu, shapes: Shapes, meshes: Vec<Mesh>, copies: usize) -> Result<Self> {
         let queries = gpu.ray_queries()?;
-        if copies > MOST {
-            return Err(too_many(copies, "instances"));
-        }
+        check_most(copies, "instances", queries.most_copies)?;
+        let largest = meshes.iter().map(|mesh| mesh.range.len()).max().unwrap_or(0);
+        check_most(largest, "triangles in one mesh", queries.most_shapes)?;
         shapes.check(gpu, &meshes)?;
         let records = Buffer::new(gpu, "copies of meshes", copies, Location::Device)?;
         let inputs = meshes.iter().map(|mesh| Input::of_mesh(gpu, shapes, mesh));
@@ -88,9 +87,7 @@ impl Acceleration {
     pub(super) fn record_of(&self, queries: &RayQueries, copy: &Placement) -> Result<Record> {
         const EVERY_RAY: u32 = 0xff << 24;
         let (first, structure) = (self.meshes[copy.mesh].range.start, self.handles.meshes[copy.mesh]);
-        if first >= MOST {
-            return Err(too_many(first, "triangles"));
-        }
+        check_most(first, "triangles before those of a mesh", MOST_NUMBERS - 1)?;
         let info = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(structure);
         // SAFETY: a live structure of this device.
         let address = unsafe { queries.structures.get_acceleration_structure_device_address(&info) };
@@ -112,8 +109,24 @@ impl Drop for Handles {
     }
 }
 
-fn too_many(found: usize, what: &str) -> Error {
-    Error::Device(format!(
-        "{found} {what} in a scene of instances, where ray queries number at most 2^24: choose the tracing \"compute\""
-    ))
+/// # Errors
+/// [`Error::Device`] where more were found than ray queries take.
+fn check_most(found: usize, what: &str, most: u64) -> Result<()> {
+    match found as u64 <= most {
+        true => Ok(()),
+        false => Err(Error::Device(format!(
+            "{found} {what}, of which ray queries take at most {most} on this device: choose the tracing \"compute\""
+        ))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn what_ray_queries_have_no_room_for_is_refused() {
+        let guaranteed = (1 << 24) - 1;
+        super::check_most(guaranteed, "instances", guaranteed as u64).unwrap();
+        let why = super::check_most(guaranteed + 1, "instances", guaranteed as u64).unwrap_err().to_string();
+        assert!(why.contains("16777216 instances") && why.contains("at most 16777215"), "{why}");
+    }
 }

@@ -37,11 +37,18 @@ impl RayFeatures {
     }
 }
 
+/// Vulkan's records keep numbers of copies, and of the first triangles of their meshes, in 24 bits.
+pub(super) const MOST_NUMBERS: u64 = 1 << 24;
+
 /// The functions and limits of a device that traces by ray queries.
 pub(super) struct RayQueries {
     pub structures: khr::acceleration_structure::Device,
     /// The scratch memory of a build begins at a multiple of it.
     pub scratch_alignment: u64,
+    /// Copies in a scene at most.
+    pub most_copies: u64,
+    /// Triangles or boxes of a mesh at most.
+    pub most_shapes: u64,
 }
 
 impl RayQueries {
@@ -52,7 +59,12 @@ impl RayQueries {
         // SAFETY: `physical` belongs to `instance` and has the extension.
         unsafe { instance.get_physical_device_properties2(physical, &mut all) };
         let scratch_alignment = u64::from(limits.min_acceleration_structure_scratch_offset_alignment.max(1));
-        Self { structures: khr::acceleration_structure::Device::new(instance, device), scratch_alignment }
+        Self {
+            structures: khr::acceleration_structure::Device::new(instance, device),
+            scratch_alignment,
+            most_copies: limits.max_instance_count.min(MOST_NUMBERS),
+            most_shapes: limits.max_primitive_count,
+        }
     }
 }
 
