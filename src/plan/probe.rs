@@ -103,14 +103,14 @@ impl<'a> Probe<'a> {
     /// # Errors
     /// [`Error::Device`], also for pixels that are no numbers.
     pub fn levels(&mut self, target: Target) -> Result<Vec<Level>> {
-        let mut pairs: Vec<(u32, [Image; 2])> = Vec::new();
+        let (mut pairs, mut spp) = (Vec::<(u32, [Image; 2])>::new(), 1);
         loop {
-            let spp = pairs.last().map_or(1, |(spp, _)| spp * GROWTH);
             let [first, second] = self.seeds;
             pairs.push((spp, [self.image(first, spp)?, self.image(second, spp)?]));
             let levels = self.judged(&pairs);
-            if pairs.len() >= LEAST_LEVELS && !self.wants_more(&levels, target) {
-                return Ok(levels);
+            match next_spp(spp).filter(|_| pairs.len() < LEAST_LEVELS || self.wants_more(&levels, target)) {
+                Some(next) => spp = next,
+                None => return Ok(levels),
             }
         }
     }
@@ -233,6 +233,11 @@ impl Probe<'_> {
     }
 }
 
+/// Samples per pixel of the level after one of so many; none where a render may not have them.
+fn next_spp(spp: u32) -> Option<u32> {
+    spp.checked_mul(GROWTH).filter(|next| *next <= Settings::MAX_SPP)
+}
+
 fn finite(pixels: Vec<[f32; 3]>) -> Result<Vec<[f32; 3]>> {
     match pixels.iter().filter(|pixel| !pixel.iter().all(|v| v.is_finite())).count() {
         0 => Ok(pixels),
@@ -242,4 +247,16 @@ fn finite(pixels: Vec<[f32; 3]>) -> Result<Vec<[f32; 3]>> {
 
 fn milliseconds(times: &[PassTime]) -> f64 {
     times.iter().map(|time| time.duration_ns() as f64 * 1e-6).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_end_where_renders_do() {
+        let levels: Vec<_> = std::iter::successors(Some(1), |spp| next_spp(*spp)).take(20).collect();
+        assert_eq!((levels.len(), levels.last()), (13, Some(&Settings::MAX_SPP)));
+        assert_eq!(next_spp(u32::MAX), None);
+    }
 }
