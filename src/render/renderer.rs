@@ -154,7 +154,7 @@ impl Renderer {
     /// Steps behind [`Step::Start`] that give every pixel `count` samples, from its sample `first` on ([`Settings::first_sample`] not
     /// counted). Who renders so decides from frame to frame how many there are; the buffers are those for [`Settings::spp`].
     pub fn samples(&self, first: u32, count: u32) -> impl Iterator<Item = Step> + use<> {
-        schedule::uniform(&self.cut(), self.settings.first_sample.saturating_add(first), count).map(Step::Uniform)
+        schedule::uniform(&self.cut(), self.settings.first_sample.wrapping_add(first), count).map(Step::Uniform)
     }
 
     /// Reads back the mean radiance of every pixel.

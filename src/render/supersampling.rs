@@ -35,8 +35,8 @@ impl Renderer {
             )));
         }
         let gpu = &self.gpu;
-        let (effects, thread) = (self.effects, gpu.tuning().thread());
-        let kernel = Kernel::new(gpu, &shaders::guide_lookup::Constants { effects, thread, ..Default::default() })?;
+        let (effects, thread, traverse) = (self.effects, gpu.tuning().thread(), gpu.tuning().traverse(self.stack));
+        let kernel = Kernel::new(gpu, &shaders::guide_lookup::Constants { effects, thread, traverse })?;
         let guide = Buffer::from_slice(gpu, "guide rays", guide)?;
         let filtered = Buffer::from_slice(gpu, "filtered", filtered)?;
         let indirect = Buffer::new(gpu, "indirect", pixels, Location::Device)?;
@@ -48,7 +48,7 @@ impl Renderer {
         let at_once = (RAYS_AT_ONCE / pixels as u32).clamp(1, RAYS_OF_A_PIXEL);
         for first_sample in (0..eye_rays).step_by(at_once as usize) {
             let samples = at_once.min(eye_rays - first_sample);
-            let first_sample = self.settings.first_sample + first_sample;
+            let first_sample = self.settings.first_sample.wrapping_add(first_sample);
             let push = PathPush {
                 constants: self.frame.constants.path,
                 first_pixel: 0,

@@ -41,6 +41,17 @@ fn scenes() -> Vec<String> {
     all
 }
 
+/// Kernels add to indices without a limit, and so does the host.
+#[test]
+fn the_sequence_of_samples_goes_on_from_its_start_behind_its_end() {
+    let scene = scene("cornell-box/scene.toml", small);
+    let mut renderer = Renderer::new(&support::gpu(), &scene, &scene.settings, Outputs::default()).unwrap();
+    renderer.set_first_sample(u32::MAX);
+    let first = |step: Step| if let Step::Uniform(batch) = step { Some(batch.first_sample) } else { None };
+    let firsts = [0, 1, 2].map(|sample| renderer.samples(sample, 1).find_map(first));
+    assert_eq!(firsts, [Some(u32::MAX), Some(0), Some(1)]);
+}
+
 /// Its buffers are as long as those of layers that nobody asked for.
 #[test]
 fn a_film_of_one_pixel_has_the_layers_of_any_other() {

@@ -60,7 +60,7 @@ pub fn uniform(cut: &Cut, first: u32, samples: u32) -> impl Iterator<Item = Batc
         successors(Some(0), runs).map(move |first_pixel| Batch {
             first_pixel,
             pixels: run.min(tile - first_pixel % tile).min(pixels - first_pixel),
-            first_sample: first + sample,
+            first_sample: first.wrapping_add(sample),
             samples: depth.min(samples - sample),
         })
     })
