@@ -121,7 +121,7 @@ void main() {
     PixelLight l = PixelLight_zero();
     uint broken_count = 0u, first_broken = 0u;
     if (FX_SPLIT) l = PixelLight_load(light, pixel);
-    uint plain = FX_ADAPTIVE ? min(count, PLAIN) : count; // else at most SAMPLES_AT_ONCE (schedule.rs)
+    uint plain = FX_ADAPTIVE ? min(count, PLAIN) : count; // else at most SAMPLES_AT_ONCE (src/render/schedule/cut.rs)
     for (uint k = 0u; k < plain; k++) fold(s, l, broken_count, first_broken, int(at + k * step));
     for (uint k = plain; FX_ADAPTIVE && k < count; k += STRIDE) {
         [[unroll]] for (uint j = 0u; j < STRIDE; j++) {

@@ -74,8 +74,8 @@ gpu_structs! {
         object: uint,
     }
 
-    /// Vertex normals and texture coordinates of the [`Triangle`] of the same index. 3 texels.
-    /// Present only when a mesh of the scene has vertex normals or texture coordinates.
+    /// Vertex normals, texture coordinates and further attributes of the [`Triangle`] of the same index. 3 texels.
+    /// Present only when a mesh of the scene has any of them.
     struct Shading {
         /// Octahedral unit normals of the three vertices, snorm 2 x 16, x in the low half. All three 0xffffffff: flat.
         normal: uvec3,

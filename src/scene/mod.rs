@@ -64,7 +64,7 @@ pub struct Scene {
     pub stack: u32,
     /// Triangles, and spheres among them, in leaf order.
     pub triangles: Vec<Triangle>,
-    /// Shading records in the order of `triangles`; empty when no mesh has vertex normals or texture coordinates.
+    /// Shading records in the order of `triangles`; empty when no mesh has vertex normals or other attributes.
     pub shading: Vec<Shading>,
     /// Instances in leaf order of the top level; empty when the scene has one level.
     pub instances: Vec<Instance>,

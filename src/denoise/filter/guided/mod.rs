@@ -1,5 +1,5 @@
 //! Guided image filter (He, Sun, Tang, ECCV 2010) on normals and depth, as Bauszat, Eisemann and Magnor (EGSR 2011) use
-//! it. Kernels: `glsl/guided_*.comp`. Its time hardly depends on the radius.
+//! it. Kernels: `glsl/guided/`. Its time hardly depends on the radius.
 mod pack;
 mod reference;
 mod table;
