@@ -14,9 +14,9 @@ layout(scalar, push_constant) uniform Push { PriorityPush push; };
 
 #include "shared/likeness_bits.glsl"
 #include "shared/pixel_noise.glsl"
-const float MIN_LEFT = 0.01;   // two pixels leave at least 0.27, so that less is rounding
-const float APART = 1e17;      // differences of means are cut here, so that their squares are finite
-const float MAX_TINT = 100.0;  // indirect light's colour over its luminance, per channel
+const float MIN_LEFT = 0.01;      // two pixels leave at least 0.27, so that less is rounding
+const float MAX_DEVIATION = 1e17; // differences of means are cut here, so that their squares are finite
+const float MAX_TINT = 100.0;     // indirect light's colour over its luminance, per channel
 
 const int ROWS = 4;
 
@@ -42,7 +42,7 @@ float indirect_squares(uint pixel, vec3 mean, float squares) {
 
 // Adds a pixel of weight `kin`. `mean` is its mean less that of the centre: squares of such small numbers keep their digits.
 void merge(inout Surroundings s, float kin, vec4 m, float indirect, vec3 mean) {
-    mean = clamp(mean, -APART, APART);
+    mean = clamp(mean, -MAX_DEVIATION, MAX_DEVIATION);
     s.around += kin * m;
     s.indirect += kin * indirect;
     s.offsets += kin * vec4(mean, 1.0);

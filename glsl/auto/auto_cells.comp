@@ -1,5 +1,5 @@
 #include "shared/edge.glsl"
-#include "shared/cells.glsl"
+#include "shared/smoothing_cell.glsl"
 
 // Finds the surface that each cell stands for, one per thread.
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -9,12 +9,12 @@ layout(scalar, binding = 2) writeonly buffer Cells { uvec4 cells[]; };
 layout(scalar, push_constant) uniform Push { AutoCellsPush push; };
 
 void main() {
-    ivec2 size = ivec2(push.size), grid = cells_of(push.size), cell = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 size = ivec2(push.size), grid = smoothing_cells_of(push.size), cell = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(cell, grid))) return;
-    int stands = CELL * (cell.y * size.x + cell.x);
+    int stands = SMOOTHING_CELL * (cell.y * size.x + cell.x);
     bool known = false;
-    [[unroll]] for (int k = 0; k < CELL * CELL; k++) {
-        ivec2 at = CELL * cell + ivec2(k % CELL, k / CELL);
+    [[unroll]] for (int k = 0; k < SMOOTHING_CELL * SMOOTHING_CELL; k++) {
+        ivec2 at = SMOOTHING_CELL * cell + ivec2(k % SMOOTHING_CELL, k / SMOOTHING_CELL);
         int i = at.y * size.x + at.x;
         if (known || any(greaterThanEqual(at, size)) || texelFetch(colour, i).w == 0.0) continue;
         known = true;

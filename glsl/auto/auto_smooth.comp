@@ -1,6 +1,6 @@
 #include "shared/edge.glsl"
 #include "shared/atrous_taps.glsl"
-#include "shared/cells.glsl"
+#include "shared/smoothing_cell.glsl"
 #include "shared/filter_thread.glsl"
 
 // One level of A-Trous smoothing of one plane of estimates or three, which are right on average only. Cells of like surfaces
@@ -21,10 +21,10 @@ layout(scalar, push_constant) uniform Push { AutoSmoothPush push; };
 
 layout(constant_id = 114) const bool THREE = true; // false: the first plane alone
 layout(constant_id = 115) const bool OF_PIXELS = false; // the first level
-const int STRIDE = OF_PIXELS ? CELL : 1; // taps from one cell to the next
+const int STRIDE = OF_PIXELS ? SMOOTHING_CELL : 1; // taps from one cell to the next
 
 void main() {
-    ivec2 grid = cells_of(push.size), taps = OF_PIXELS ? ivec2(push.size) : grid;
+    ivec2 grid = smoothing_cells_of(push.size), taps = OF_PIXELS ? ivec2(push.size) : grid;
     int spacing = int(push.spacing), x = int(gl_GlobalInvocationID.x), column = int(gl_GlobalInvocationID.y);
     int first_y = first_row(column, spacing);
     if (x >= grid.x || first_y >= grid.y) return;

@@ -1,5 +1,5 @@
 #include "shared/edge.glsl"
-#include "shared/cells.glsl"
+#include "shared/smoothing_cell.glsl"
 
 // Gives every pixel the smoothed estimates of the four cells around it: between their first pixels linearly, those of like
 // surfaces first. One pixel per thread.
@@ -22,15 +22,15 @@ layout(constant_id = 114) const bool THREE = true; // false: the first plane alo
 const float OTHER = 0.01, UNKNOWN = 1e-6;
 
 void main() {
-    ivec2 size = ivec2(push.size), grid = cells_of(push.size), at = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 size = ivec2(push.size), grid = smoothing_cells_of(push.size), at = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(at, size))) return;
     int here = at.y * size.x + at.x;
     Pixel p = pixel_at(here);
     vec4 sum_1 = vec4(0.0), sum_2 = vec4(0.0), sum_3 = vec4(0.0);
     float total = 0.0;
-    vec2 between = vec2(at % CELL) / float(CELL);
+    vec2 between = vec2(at % SMOOTHING_CELL) / float(SMOOTHING_CELL);
     [[unroll]] for (int k = 0; k < 4; k++) {
-        ivec2 step = ivec2(k % 2, k / 2), cell = min(at / CELL + step, grid - 1);
+        ivec2 step = ivec2(k % 2, k / 2), cell = min(at / SMOOTHING_CELL + step, grid - 1);
         int there = cell.y * grid.x + cell.x;
         Pixel q = unpack_cell(texelFetch(cells, there));
         vec2 near = mix(1.0 - between, between, equal(step, ivec2(1)));

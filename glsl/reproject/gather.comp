@@ -24,7 +24,7 @@ layout(scalar, push_constant) uniform Push { ReprojectPush push; };
 #include "shared/surface_point.glsl"
 #include "shared/history.glsl"
 #include "shared/whole_pixel.glsl"
-#include "shared/cell.glsl"
+#include "shared/probe_cell.glsl"
 #include "shared/held.glsl"
 
 // Steps towards where a point was on the last film. Where nothing but the camera moves the first place is exact.
@@ -83,7 +83,7 @@ uint reason_to_leave(uint pixel, uint from, bool edge, uint parts, inout Carried
     Surface s = surface_of(History_triangle(history, from), History_instance(history, from), History_weights(history, from));
     if (c.back != (dot(s.geometric, camera.position - s.position) < 0.0) || !shows(pixel, s)) return DROPPED_HIDDEN;
     if (push.moved != 0u) {
-        float light = LightChange_change(changes, cell_of(from, push.size)) / max(push.noise, 1e-15);
+        float light = LightChange_change(changes, probe_cell_of(from, push.size)) / max(push.noise, 1e-15);
         c.count = worth(c.count, light * light);
         if (c.count == 0u) return DROPPED_LIGHT;
     }

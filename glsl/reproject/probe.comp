@@ -36,16 +36,16 @@ uint nodes_visited = 0u;
 #include "shared/path_step.glsl"
 #include "shared/trace_path.glsl"
 #include "shared/history.glsl"
-#include "shared/cell.glsl"
+#include "shared/probe_cell.glsl"
 
 // One of the cell's pixels that hand on samples, the first from a random one on; NONE where none does.
 uint chosen_pixel(uint cell) {
-    uvec2 size = push.constants.size, cells = cells_of(size);
-    uvec2 corner = CELL * uvec2(cell % cells.x, cell / cells.x);
+    uvec2 size = push.constants.size, cells = probe_cells_of(size);
+    uvec2 corner = PROBE_CELL * uvec2(cell % cells.x, cell / cells.x);
     uint first = pcg(cell + pcg(push.constants.seed)), chosen = NONE;
-    for (uint k = 0u; k < CELL * CELL && chosen == NONE; k++) {
-        uint place = (first + k) % (CELL * CELL);
-        uvec2 at = corner + uvec2(place % CELL, place / CELL);
+    for (uint k = 0u; k < PROBE_CELL * PROBE_CELL && chosen == NONE; k++) {
+        uint place = (first + k) % (PROBE_CELL * PROBE_CELL);
+        uvec2 at = corner + uvec2(place % PROBE_CELL, place / PROBE_CELL);
         uint pixel = at.y * size.x + at.x;
         if (all(lessThan(at, size)) && carried_of(texelFetch(offered, int(pixel)).x).count > 0u) chosen = pixel;
     }
@@ -55,7 +55,7 @@ uint chosen_pixel(uint cell) {
 // Index of a cell's sample in the sequence that all cells share: such that those of any window of light_change.comp are spread
 // evenly over lights and directions, or nearly so. Cells 27 apart have the same.
 uint sample_of(uint cell) {
-    uint across = cells_of(push.constants.size).x, x = cell % across, y = cell / across, index = 0u;
+    uint across = probe_cells_of(push.constants.size).x, x = cell % across, y = cell / across, index = 0u;
     for (uint part = 9u; part > 0u; part /= 3u) index = 9u * index + 3u * (y / part % 3u) + x / part % 3u;
     return index;
 }

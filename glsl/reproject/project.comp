@@ -28,7 +28,7 @@ layout(scalar, push_constant) uniform Push { ReprojectPush push; };
 
 #include "shared/surface_point.glsl"
 #include "shared/history.glsl"
-#include "shared/cell.glsl"
+#include "shared/probe_cell.glsl"
 #include "shared/held.glsl"
 
 // Offers the samples of a pixel to those around `film`, a point of the film, of an edge to edges alone. Returns why none takes them,
@@ -56,7 +56,7 @@ uint moved(uint pixel, Carried c) {
     Surface s = surface_of(History_triangle(history, pixel), History_instance(history, pixel), History_weights(history, pixel));
     if (c.back != (dot(s.geometric, camera.position - s.position) < 0.0)) return dropped(DROPPED_HIDDEN);
     if (push.moved != 0u) {
-        float light = LightChange_change(changes, cell_of(pixel, push.size)) / max(push.noise, 1e-15);
+        float light = LightChange_change(changes, probe_cell_of(pixel, push.size)) / max(push.noise, 1e-15);
         c.count = worth(c.count, light * light);
         if (c.count == 0u) return dropped(DROPPED_LIGHT);
     }

@@ -1,7 +1,7 @@
 // The bindings of a noisy image that is to be demodulated: the film of a render, or the layers of any renderer's file. Twin:
 // denoise::twin::Pixels.
 layout(constant_id = 111) const bool OF_FILE = false; // counts are floats, and m2 is the variance of the mean
-layout(constant_id = 115) const bool APART = false; // `light` holds a record of every pixel
+layout(constant_id = 115) const bool HAS_LIGHT = false; // `light` holds a record of every pixel
 layout(binding = 0) uniform usamplerBuffer stats; // of PixelStats
 layout(binding = 1) uniform usamplerBuffer light; // of PixelLight
 layout(binding = 2) uniform usamplerBuffer guide; // of Guide
@@ -16,5 +16,5 @@ float count_at(int i) {
 
 // What the samples say of it or, without samples, the ray through the pixel's centre.
 vec3 albedo_at(int i) {
-    return APART && count_at(i) > 0.0 ? PixelLight_albedo(light, i) : Guide_albedo(guide, i);
+    return HAS_LIGHT && count_at(i) > 0.0 ? PixelLight_albedo(light, i) : Guide_albedo(guide, i);
 }

@@ -10,7 +10,7 @@ use crate::layout::{Guide, NONE, PixelLight, PixelStats, PriorityPush, vec3};
 use crate::math::portable::{exp_negative, squared_distance};
 use crate::math::srgb::luminance;
 use crate::settings::settings;
-use crate::shaders::both::{APART, MAX_TINT, MIN_LEFT};
+use crate::shaders::both::{MAX_DEVIATION, MAX_TINT, MIN_LEFT};
 use crate::shaders::shared::likeness_bits::{GATHERED_UNIT, MIN_KINSHIP, SEVENTHS};
 use crate::shaders::{both, likeness};
 use glam::Vec3;
@@ -103,7 +103,7 @@ fn surroundings(inputs: &HostInputs, pixel: usize) -> ([f32; 4], f32) {
     for j in square(push, pixel).filter(|&j| stats[j].count > 0) {
         let (kin, m) = (kinship(&guide[pixel], &guide[j], push), moments(&stats[j]));
         let offset = Vec3::from(stats[j].mean) - Vec3::from(stats[pixel].mean);
-        let offset = offset.clamp(Vec3::splat(-APART), Vec3::splat(APART));
+        let offset = offset.clamp(Vec3::splat(-MAX_DEVIATION), Vec3::splat(MAX_DEVIATION));
         around = std::array::from_fn(|k| around[k] + kin * m[k]);
         indirect += kin * indirect_squares(&stats[j], &light[j]);
         offsets += kin * offset;

@@ -58,7 +58,7 @@ impl Holds {
 
     /// For kernels that read the planes.
     pub(super) fn constants(&self) -> noisy::Constants {
-        noisy::Constants { of_file: self.of_file, apart: self.light }
+        noisy::Constants { of_file: self.of_file, has_light: self.light }
     }
 
     /// Whether the variance of what is filtered is known.

@@ -2,24 +2,24 @@
 use crate::layout::{Camera, LightChange, NONE, Probe, SurfacePoint};
 use crate::math::hash::pcg;
 use crate::shaders::light_change::LEAST_SPACING;
-use crate::shaders::shared::cell::CELL;
+use crate::shaders::shared::probe_cell::PROBE_CELL;
 use crate::twins::path::Tracer;
 use crate::twins::reproject::Carried;
 use glam::Vec3;
 
 /// Cells across and down of a film.
-pub fn cells_of(size: [u32; 2]) -> [u32; 2] {
-    size.map(|n| n.div_ceil(CELL))
+pub fn probe_cells_of(size: [u32; 2]) -> [u32; 2] {
+    size.map(|n| n.div_ceil(PROBE_CELL))
 }
 
 /// The cell of a pixel, row-major.
-pub fn cell_of(pixel: u32, size: [u32; 2]) -> u32 {
-    pixel / size[0] / CELL * cells_of(size)[0] + pixel % size[0] / CELL
+pub fn probe_cell_of(pixel: u32, size: [u32; 2]) -> u32 {
+    pixel / size[0] / PROBE_CELL * probe_cells_of(size)[0] + pixel % size[0] / PROBE_CELL
 }
 
 /// Index of a cell's sample in the sequence that all share.
 fn sample_of(cell: u32, size: [u32; 2]) -> u32 {
-    let across = cells_of(size)[0];
+    let across = probe_cells_of(size)[0];
     let digit = |of: u32| of % 3;
     let [x, y] = [cell % across, cell / across];
     [9, 3, 1].iter().fold(0, |index, part| 9 * index + 3 * digit(y / part) + digit(x / part))
@@ -27,12 +27,13 @@ fn sample_of(cell: u32, size: [u32; 2]) -> u32 {
 
 /// The pixel whose point a cell's path starts at, or [`NONE`].
 pub fn chosen_pixel(cell: u32, size: [u32; 2], seed: u32, offered: &[u32]) -> u32 {
-    let across = cells_of(size)[0];
-    let (x, y) = (CELL * (cell % across), CELL * (cell / across));
+    let across = probe_cells_of(size)[0];
+    let (x, y) = (PROBE_CELL * (cell % across), PROBE_CELL * (cell / across));
     let first = pcg(cell.wrapping_add(pcg(seed)));
-    let places = (0..CELL * CELL).map(|k| first.wrapping_add(k) % (CELL * CELL));
-    let pixels =
-        places.map(|place| [x + place % CELL, y + place / CELL]).filter(|at| at[0] < size[0] && at[1] < size[1]);
+    let places = (0..PROBE_CELL * PROBE_CELL).map(|k| first.wrapping_add(k) % (PROBE_CELL * PROBE_CELL));
+    let pixels = places
+        .map(|place| [x + place % PROBE_CELL, y + place / PROBE_CELL])
+        .filter(|at| at[0] < size[0] && at[1] < size[1]);
     let mut pixels = pixels.map(|[x, y]| y * size[0] + x);
     pixels.find(|&pixel| Carried::of(offered[pixel as usize]).count > 0).unwrap_or(NONE)
 }
@@ -40,7 +41,7 @@ pub fn chosen_pixel(cell: u32, size: [u32; 2], seed: u32, offered: &[u32]) -> u3
 /// Paths of all cells before the scene changes. The tracer's seed is that of the probes.
 pub fn before(tracer: &Tracer, eye: &Camera, points: &[SurfacePoint], offered: &[u32]) -> Vec<Probe> {
     let (size, seed) = (tracer.frame.path.size, tracer.frame.path.seed);
-    let [across, down] = cells_of(size);
+    let [across, down] = probe_cells_of(size);
     let probe = |cell| match chosen_pixel(cell, size, seed, offered) {
         NONE => Probe { pixel: NONE, ..Probe::default() },
         pixel => {

@@ -11,7 +11,7 @@ use crate::shaders::shared::held::{LEAST_ALBEDO, PLANE_DISTANCE};
 use crate::shaders::shared::history::*;
 use crate::twins::bsdf::{Bsdf, SMOOTH_ALPHA, bsdf_albedo, bsdf_evaluate, bsdf_is_specular};
 use crate::twins::camera::{film_from_point, pixel_width};
-use crate::twins::light_change::cell_of;
+use crate::twins::light_change::probe_cell_of;
 use crate::twins::surface::{Surface, facing_normals, shading_basis, surface_at, surface_bsdf};
 use crate::twins::traverse::Hit;
 use glam::{Vec2, Vec3, Vec4, vec2};
@@ -278,7 +278,7 @@ impl Reprojection<'_> {
         if self.push.moved == 0 {
             return count;
         }
-        let change = self.changes[cell_of(pixel as u32, self.push.size) as usize].change;
+        let change = self.changes[probe_cell_of(pixel as u32, self.push.size) as usize].change;
         worth(count, (change / self.push.noise.max(1e-15)).powi(2))
     }
 

@@ -145,7 +145,7 @@ fn both_where_all_moves(
         .collect();
     let mut changes = light_change::after(&tracer(&new, new_frame, effects), &previous, &moved, &probes);
     for spacing in SPACINGS {
-        changes = light_change::sums(&changes, light_change::cells_of(push.size), spacing);
+        changes = light_change::sums(&changes, light_change::probe_cells_of(push.size), spacing);
     }
     let frame = frame_of(scene, camera);
     film.record(|renderer, rec| renderer.update(rec, scene, &change));
@@ -227,7 +227,7 @@ fn changes_of_light_are_shares_of_it() {
     // In wider windows one path counts. Cells that are no multiple of three away belong to the sums of others.
     let alone = |at: usize| (0..9).map(|i| change(f32::from(u8::from(i == at)))).collect::<Vec<_>>();
     assert_eq!([found(&alone(4), 3), found(&alone(5), 3), found(&alone(4), 9)], [0.5, 0.0, 0.5]);
-    assert_eq!([light_change::cell_of(0, [9, 9]), light_change::cell_of(9 * 4 + 8, [9, 9])], [0, 5]);
+    assert_eq!([light_change::probe_cell_of(0, [9, 9]), light_change::probe_cell_of(9 * 4 + 8, [9, 9])], [0, 5]);
 }
 
 /// A near wall beside a far one, whose light differs by so much, in 16 x 9 pixels; every pixel has eight samples, of variance 1, and of

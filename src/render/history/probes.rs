@@ -7,7 +7,7 @@ use crate::render::buffers::DeviceScene;
 use crate::render::upload::whole;
 use crate::scene::Relit;
 use crate::shaders;
-use crate::shaders::shared::cell::CELL;
+use crate::shaders::shared::probe_cell::PROBE_CELL;
 use crate::shaders::shared::{deal, scene};
 
 /// The kernels and buffers of probes: one path for each cell of 4x4 pixels, 5 bytes a pixel.
@@ -38,7 +38,7 @@ impl Probes {
     pub fn new(gpu: &Gpu, effects: Effects, stack: u32, size: [u32; 2]) -> Result<Self> {
         let (thread, traverse, deal) =
             (gpu.tuning().thread(), gpu.tuning().traverse(stack), deal::Constants::default());
-        let cells = size.map(|n| n.div_ceil(CELL));
+        let cells = size.map(|n| n.div_ceil(PROBE_CELL));
         let count = (cells[0] * cells[1]) as usize;
         let changes = || Buffer::new(gpu, "changes of light", count, Location::Device);
         let lights = || Buffer::from_slice(gpu, "lights", &[]);

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, Recorder};
 use crate::layout::{AutoCellsPush, AutoSmoothPush, AutoSpreadPush, uvec4, vec3, vec4};
 use crate::shaders::auto_spread::{OTHER, UNKNOWN};
-use crate::shaders::shared::cells::CELL;
+use crate::shaders::shared::smoothing_cell::SMOOTHING_CELL;
 use crate::shaders::{auto_cells, auto_smooth, auto_spread};
 use crate::threads::each;
 use glam::Vec4;
@@ -26,7 +26,7 @@ fn least(level: u32, across: bool) -> f32 {
 
 /// Cells across and down an image.
 fn grid([width, height]: [u32; 2]) -> [u32; 2] {
-    [width, height].map(|edge| edge.div_ceil(CELL as u32))
+    [width, height].map(|edge| edge.div_ceil(SMOOTHING_CELL as u32))
 }
 
 /// The kernels of one or three planes.
@@ -109,7 +109,7 @@ impl Smoothing {
             };
             // The first level's taps are pixels, those of the others cells.
             let (smooth, spacing) =
-                (&smooth[usize::from(level > 0)], if level == 0 { 1 } else { (1 << level) / CELL as u32 });
+                (&smooth[usize::from(level > 0)], if level == 0 { 1 } else { (1 << level) / SMOOTHING_CELL as u32 });
             let push = AutoSmoothPush { size, spacing, rates, least: least(level, across), ..Default::default() };
             rec.dispatch(smooth, bind, &push, smooth.groups(threads(grid(size), spacing)))?;
         }
@@ -135,7 +135,7 @@ impl<'a> Cells<'a> {
     pub fn new(image: &'a [Packed], size: [u32; 2], edge: &EdgeSettings) -> Self {
         let (grid, [width, height]) = (grid(size), size);
         let surface = |cell: u32| {
-            let [x, y] = [cell % grid[0], cell / grid[0]].map(|first| first * CELL as u32);
+            let [x, y] = [cell % grid[0], cell / grid[0]].map(|first| first * SMOOTHING_CELL as u32);
             let inside =
                 |(i, j): (u32, u32)| (x + i < width && y + j < height).then(|| ((y + j) * width + x + i) as usize);
             let pixels = [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().filter_map(inside).map(|at| image[at]);
@@ -151,14 +151,14 @@ impl<'a> Cells<'a> {
     pub fn smoothed(&self, plane: &[Vec4], across: bool) -> Vec<Vec4> {
         let first = self.level(plane, true, 1, least(0, across));
         let of_cells = (1..LEVELS).fold(first, |plane, level| {
-            self.level(&plane, false, (1 << level) / i64::from(CELL), least(level, across))
+            self.level(&plane, false, (1 << level) / i64::from(SMOOTHING_CELL), least(level, across))
         });
         self.spread(&of_cells)
     }
 
     fn level(&self, estimates: &[Vec4], of_pixels: bool, spacing: i64, least: f32) -> Vec<Vec4> {
         let (taps, [width, height], stride) = match of_pixels {
-            true => (self.image, self.size, i64::from(CELL)),
+            true => (self.image, self.size, i64::from(SMOOTHING_CELL)),
             false => (&*self.surfaces, self.grid, 1),
         };
         let cell = |at: i64| {
@@ -182,7 +182,7 @@ impl<'a> Cells<'a> {
         let [width, height] = self.size;
         let pixel = |at: i64| {
             let (p, [x, y]) = (&self.image[at as usize], [at % width, at / width]);
-            let cell = i64::from(CELL);
+            let cell = i64::from(SMOOTHING_CELL);
             let between = [x, y].map(|v| (v % cell) as f32 / cell as f32);
             let (mut sum, mut total) = (Vec4::ZERO, 0.0);
             for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {

@@ -1,10 +1,10 @@
-// Estimates are smoothed over cells of CELL x CELL pixels: they vary slowly, and a quarter of the sums suffices. A cell stands for
-// the surface of its first known pixel, or of its first pixel if none is. Needs edge.glsl.
-const int CELL = 2;
+// Estimates are smoothed over square cells: they vary slowly, and a quarter of the sums suffices. A cell stands for the surface of its
+// first known pixel, or of its first pixel if none is. Needs edge.glsl.
+const int SMOOTHING_CELL = 2; // pixels along an edge
 
 // Cells across and down an image; those at the right and the lower border may lack pixels.
-ivec2 cells_of(uvec2 size) {
-    return (ivec2(size) + CELL - 1) / CELL;
+ivec2 smoothing_cells_of(uvec2 size) {
+    return (ivec2(size) + SMOOTHING_CELL - 1) / SMOOTHING_CELL;
 }
 
 // The lowest bit of the first coordinate tells whether a pixel of the cell is known.
