@@ -28,6 +28,8 @@ layout(scalar, binding = 14) writeonly buffer Expected { vec3 expected[]; };
 layout(constant_id = 114) const bool MEASURED = true; // `variance` holds every pixel's
 layout(scalar, push_constant) uniform Push { AutoBlendPush push; };
 
+#include "shared/variance_at.glsl"
+
 const uint ROUNDS = 4u;       // of exchanges between all pairs
 const float RIDGE = 0.01;     // share added to every squared error: candidates that hardly differ get like weights
 // A left-out pixel is missed by its noise at least, so that the best candidate bounds it from above, but for chance: no noise is less
@@ -44,7 +46,7 @@ const float MAX_ERROR = 1e24; // is above every error
 
 // What the pixel's samples say of the variance of their mean.
 float own_variance(uint i, float count) {
-    vec3 v = MEASURED ? vec3(texelFetch(variance, int(3u * i)).x, texelFetch(variance, int(3u * i + 1u)).x, texelFetch(variance, int(3u * i + 2u)).x) : vec3(-1.0);
+    vec3 v = MEASURED ? variance_at(int(i)) : vec3(-1.0);
     bool measured = count >= 2.0 && finite(v) && all(greaterThanEqual(v, vec3(0.0)));
     float deviation = min(luminance(sqrt(v)), STRONGEST); // as in noise_estimate.comp
     return measured ? deviation * deviation : UNMEASURED;

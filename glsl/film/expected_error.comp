@@ -13,6 +13,8 @@ layout(binding = 5) uniform samplerBuffer expected; // of vec3
 layout(scalar, binding = 6) writeonly buffer Sums { vec4 sums[]; };
 layout(scalar, push_constant) uniform Push { SplitPush push; };
 
+#include "shared/variance_at.glsl"
+
 const uint THREADS = 64u, EACH = 64u;
 const float EPSILON = 0.01; // of relMSE, image::metrics
 
@@ -43,7 +45,7 @@ vec4 share(uint i) {
     int at = int(i);
     vec4 f = texelFetch(factor, at);
     vec3 whole = texelFetch(picture, at).rgb, over = 1.0 / (whole * whole + EPSILON) / 3.0;
-    vec3 v = vec3(texelFetch(variance, 3 * at).x, texelFetch(variance, 3 * at + 1).x, texelFetch(variance, 3 * at + 2).x);
+    vec3 v = variance_at(at);
     vec3 e = vec3(texelFetch(expected, 3 * at).x, texelFetch(expected, 3 * at + 1).x, texelFetch(expected, 3 * at + 2).x);
     bool known = texelFetch(radiance, at).w > 0.0;
     vec3 light = f.rgb * texelFetch(filtered, at).rgb, off = light - f.rgb * texelFetch(radiance, at).rgb;

@@ -13,6 +13,7 @@ layout(scalar, binding = 3) writeonly buffer Estimates { vec4 estimate[]; };
 layout(scalar, push_constant) uniform Push { SvgfPush push; };
 
 #include "shared/packed_pixels.glsl"
+#include "shared/variance_at.glsl"
 
 layout(constant_id = 114) const bool MEASURED = true; // `variance` holds every pixel's
 layout(constant_id = 115) const bool CAUTIOUS = true;
@@ -25,7 +26,7 @@ const float MANY = 16.0;
 
 // What a pixel's samples say of the variance of its luminance; -1 where they say nothing.
 float told(int i, float count) {
-    vec3 v = MEASURED ? vec3(texelFetch(variance, 3 * i).x, texelFetch(variance, 3 * i + 1).x, texelFetch(variance, 3 * i + 2).x) : vec3(-1.0);
+    vec3 v = MEASURED ? variance_at(i) : vec3(-1.0);
     // Channels of one path rise and fall together: their deviations add, not their variances.
     float deviation = min(luminance(sqrt(v)), STRONGEST);
     return count >= ENOUGH && finite(v) && all(greaterThanEqual(v, vec3(0.0))) ? deviation * deviation : -1.0;

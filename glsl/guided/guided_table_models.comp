@@ -1,5 +1,4 @@
 #include "shared/moments.glsl"
-#include "shared/summed_area.glsl"
 #include "shared/tiled_index.glsl"
 
 // Solves for the linear model of one window per thread, from the corners of a summed-area table. Covariances are
@@ -12,15 +11,8 @@ layout(scalar, binding = 3) writeonly buffer SlopeB { u64vec2 slope_b[]; }; // o
 layout(scalar, binding = 4) writeonly buffer Values { u64vec2 value[]; }; // of vec4
 layout(scalar, push_constant) uniform Push { GuidedPush push; };
 
-vec4 corner(int pixel, int member) {
-    return pixel < 0 ? vec4(0.0) : texelFetch(table, MOMENTS * pixel + member);
-}
-
-vec4 sum(ivec4 c, int member) {
-    return corner(c.x, member) - corner(c.y, member) - corner(c.z, member) + corner(c.w, member);
-}
-
-#define SUM(member) sum(c, member)
+#include "shared/summed_area.glsl"
+#define SUM(member) window_sum(c, MOMENTS, member)
 
 void main() {
     ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);

@@ -1,5 +1,4 @@
 #include "shared/linear_model.glsl"
-#include "shared/summed_area.glsl"
 #include "shared/sanitise.glsl"
 #include "shared/tiled_index.glsl"
 
@@ -12,15 +11,8 @@ layout(binding = 2) uniform samplerBuffer colour; // of vec4
 layout(scalar, binding = 3) writeonly buffer Output { u64vec2 filtered[]; }; // of vec4
 layout(scalar, push_constant) uniform Push { GuidedPush push; };
 
-vec4 corner(int pixel, int member) {
-    return pixel < 0 ? vec4(0.0) : texelFetch(table, FIT * pixel + member);
-}
-
-vec4 sum(ivec4 c, int member) {
-    return corner(c.x, member) - corner(c.y, member) - corner(c.z, member) + corner(c.w, member);
-}
-
-#define SUM(member) sum(c, member)
+#include "shared/summed_area.glsl"
+#define SUM(member) window_sum(c, FIT, member)
 
 void main() {
     ivec2 size = ivec2(push.size), at = ivec2(gl_GlobalInvocationID.xy);

@@ -1,6 +1,6 @@
 #include "effects.glsl"
-#include "test/hash.glsl"
-#include "test/hash.glsl" // the build includes a file once
+#include "shared/pcg.glsl"
+#include "shared/pcg.glsl" // the build includes a file once
 
 // Mixes what it reads through every kind of binding, in integers, so that the CPU twin is equal.
 layout(local_size_x_id = 100) in;
@@ -26,5 +26,5 @@ void main() {
     uvec3 e = words[i];
     uint sum = sums[i] + (FX_TEXTURES ? a.w : 1u) + ADDEND;
     sums[i] = sum;
-    result[i] = uvec2(hash(a.x ^ b ^ c ^ d ^ e.z ^ block.y ^ push.y), sum);
+    result[i] = uvec2(pcg(a.x ^ b ^ c ^ d ^ e.z ^ block.y ^ push.y), sum);
 }

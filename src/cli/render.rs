@@ -137,7 +137,7 @@ pub fn run(args: &Args) -> Result<Exit> {
         scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
     }
     let gpu = host.time("open device", || args.common.open(args.tracing))?;
-    check_room(args, &settings, &gpu)?;
+    check_room(args.denoise, &settings, &gpu)?;
     let plan = match plan {
         Some(plan) => Some(plan),
         None => host.time("plan", || planned::make(args, &gpu, &scene, &settings))?,
@@ -350,13 +350,13 @@ fn denoised(
 ///
 /// # Errors
 /// [`Error::Device`].
-pub fn check_room(args: &Args, settings: &Settings, gpu: &Gpu) -> Result<()> {
+pub fn check_room(denoise: Option<Method>, settings: &Settings, gpu: &Gpu) -> Result<()> {
     let (size, unified) = ([settings.width, settings.height], gpu.info().unified);
-    let while_filtered = args.denoise.map_or(0, |method| denoise::host_bytes(method, settings, unified));
+    let while_filtered = denoise.map_or(0, |method| denoise::host_bytes(method, settings, unified));
     let bytes = film::host_bytes(settings, unified).max(while_filtered);
     let refused = |what| format!("a film of {} x {} {what}: choose a smaller film", size[0], size[1]);
     memory::check(bytes).map_err(|what| Error::Device(refused(what)))?;
-    args.denoise.map_or(Ok(()), |_| filter::check_size(gpu, size, filter::GUIDE_TEXELS))
+    denoise.map_or(Ok(()), |_| filter::check_size(gpu, size, filter::GUIDE_TEXELS))
 }
 
 /// Of light that is not traced for every pixel a picture can be made by some filters alone.

@@ -16,6 +16,11 @@ use tallow::twins::sampler::{sample_2d, sampler_start};
 pub const ALPHAS: [f32; 5] = [0.01, 0.05, 0.2, 0.5, 1.0];
 pub const DEGREES: [f32; 5] = [0.0, 35.0, 60.0, 86.0, 89.5];
 
+/// Name, material, and the direction that light leaves in.
+pub type Case = (String, Bsdf, Vec3);
+/// Observed and expected samples, by direction.
+pub type Counts = (Vec<f64>, Vec<f64>);
+
 /// At one roughness, of coats that are asked for again and again.
 fn coat(alpha: f32, ggx: bool, eta: f32) -> CoatRow {
     static TABLES: Mutex<BTreeMap<(u32, bool), Vec<u32>>> = Mutex::new(BTreeMap::new());
@@ -43,7 +48,7 @@ pub fn bsdf(kind: u32, alpha: f32, ggx: bool, eta: f32) -> Bsdf {
 }
 
 /// Metal and glass that are smoother along y.
-fn brushed() -> Vec<(String, Bsdf, Vec3)> {
+fn brushed() -> Vec<Case> {
     let glass = |alpha, ggx| bsdf(BSDF_DIELECTRIC, alpha, ggx, 1.5);
     let kinds = [
         ("brushed Beckmann metal", Bsdf { stretch: 0.25, ..conductor(0.2, false) }),
@@ -72,7 +77,7 @@ fn tinted(alpha: f32, ggx: bool) -> Bsdf {
 }
 
 /// Smooth coats, and tinted ones.
-fn coats() -> Vec<(String, Bsdf, Vec3)> {
+fn coats() -> Vec<Case> {
     let coats = [
         ("smooth coat", bsdf(BSDF_COATED, 0.0, false, 1.5)),
         ("tinted smooth coat", tinted(0.0, false)),
@@ -89,7 +94,7 @@ fn coats() -> Vec<(String, Bsdf, Vec3)> {
 }
 
 /// Every rough kind, glass from both sides, and a bubble (index below 1); `inside` means wo.z < 0.
-fn rough_cases() -> Vec<(String, Bsdf, Vec3)> {
+fn rough_cases() -> Vec<Case> {
     let mut cases = Vec::new();
     for (alpha, ggx, degrees) in
         ALPHAS.iter().flat_map(|&a| [false, true].map(|g| (a, g))).flat_map(|(a, g)| DEGREES.map(|d| (a, g, d)))
@@ -141,7 +146,7 @@ pub fn join_what_cannot_be_told(observed: &mut Vec<f64>, expected: &mut Vec<f64>
 }
 
 /// Observed and expected counts; the last cell holds what is absorbed or a delta.
-fn counts(b: &Bsdf, wo: Vec3, count: u32, seed: u32) -> (Vec<f64>, Vec<f64>) {
+fn counts(b: &Bsdf, wo: Vec3, count: u32, seed: u32) -> Counts {
     let grids = grids(b, wo);
     let cells = RINGS * SECTORS;
     let pdf = |wi: Vec3| f64::from(bsdf_evaluate(b, wo, wi).w);
@@ -167,8 +172,13 @@ fn samples_follow_the_pdf() {
     }
     cases.extend(coats());
     cases.extend(brushed());
+    follow_the_pdf(&cases, counts);
+}
+
+/// Judges what `counts` finds for each case, of so many samples with a seed.
+pub fn follow_the_pdf(cases: &[Case], counts: fn(&Bsdf, Vec3, u32, u32) -> Counts) {
     let level = sidak(cases.len());
-    let judge = |(seed, (name, b, wo)): (usize, &(String, Bsdf, Vec3))| {
+    let judge = |(seed, (name, b, wo)): (usize, &Case)| {
         let (observed, expected) = counts(b, *wo, 200_000, seed as u32);
         // Control: 5 % more density everywhere.
         let planted: Vec<f64> = expected.iter().map(|e| 1.05 * e).collect();

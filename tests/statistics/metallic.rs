@@ -1,10 +1,8 @@
 //! Statistics of the metallic-roughness material on its CPU twin: its value is that of glTF 2.0's appendix B where the two have to
 //! agree, samples follow the pdf, and no light is made.
-use crate::bsdf::{ALPHAS, DEGREES, bsdf, energy, join_what_cannot_be_told, samples};
+use crate::bsdf::{ALPHAS, Case, Counts, DEGREES, bsdf, energy, follow_the_pdf, join_what_cannot_be_told, samples};
 use crate::scattering::{RINGS, SECTORS, d, g1, grids};
-use crate::statistics::{chi_square, sidak};
 use glam::{DVec2, DVec3, Vec3, vec3};
-use rayon::prelude::*;
 use tallow::layout::BSDF_METALLIC;
 use tallow::twins::bsdf::{Bsdf, bsdf_albedo, bsdf_evaluate, bsdf_is_delta, bsdf_sample};
 use tallow::twins::metallic::{Metallic, Parameters};
@@ -36,7 +34,7 @@ fn along(degrees: f32) -> Vec3 {
     vec3(0.8 * s, -0.6 * s, c)
 }
 
-fn cases() -> Vec<(String, Bsdf, Vec3)> {
+fn cases() -> Vec<Case> {
     let base = vec3(0.9, 0.5, 0.1);
     let kinds = [
         ("metal", Parameters { metallic: 1.0, base, ..WHITE }),
@@ -69,7 +67,7 @@ fn cases() -> Vec<(String, Bsdf, Vec3)> {
 }
 
 /// Observed and expected counts, above the horizon and then beyond the wall; the last cell holds what is absorbed or a delta.
-fn counts(b: &Bsdf, wo: Vec3, count: u32, seed: u32) -> (Vec<f64>, Vec<f64>) {
+fn counts(b: &Bsdf, wo: Vec3, count: u32, seed: u32) -> Counts {
     let (grid, cells) = (&grids(b, wo)[0], RINGS * SECTORS);
     let mirrored = |w: Vec3, side: f32| vec3(w.x, w.y, w.z * side);
     let pdf = |side: f32| move |wi: Vec3| f64::from(bsdf_evaluate(b, wo, mirrored(wi, side)).w);
@@ -88,18 +86,7 @@ fn counts(b: &Bsdf, wo: Vec3, count: u32, seed: u32) -> (Vec<f64>, Vec<f64>) {
 
 #[test]
 fn samples_follow_the_pdf() {
-    let cases = cases();
-    let level = sidak(cases.len());
-    let judge = |(seed, (name, b, wo)): (usize, &(String, Bsdf, Vec3))| {
-        let (observed, expected) = counts(b, *wo, 200_000, seed as u32);
-        // Control: 5 % more density everywhere.
-        let planted: Vec<f64> = expected.iter().map(|e| 1.05 * e).collect();
-        assert!(chi_square(&observed, &planted) < level, "{name}: the test cannot see a pdf that is 5 % off");
-        let p = chi_square(&observed, &expected);
-        (p < level).then(|| format!("{name}: p = {p:.1e}"))
-    };
-    let failures: Vec<_> = cases.par_iter().enumerate().filter_map(judge).collect();
-    assert!(failures.is_empty(), "{} of {} rejected:\n{}", failures.len(), cases.len(), failures.join("\n"));
+    follow_the_pdf(&cases(), counts);
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use std::sync::Mutex;
 use tallow::gpu::{DeviceOptions, FrameResources, Gpu, Tuning};
 use tallow::layout::PixelStats;
+pub use tallow::math::hash::pcg as hash;
 use tallow::render::{Job, Renderer, Step};
 
 pub mod engine;
@@ -71,13 +72,6 @@ pub fn assert_silent(gpu: &Gpu) {
 /// Words that depend on nothing but `seed`.
 pub fn words(count: usize, seed: u32) -> Vec<u32> {
     (0..count as u32).map(|i| hash(i ^ seed.rotate_left(16))).collect()
-}
-
-/// Twin of `glsl/test/hash.glsl`.
-pub fn hash(v: u32) -> u32 {
-    let state = v.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
-    (word >> 22) ^ word
 }
 
 /// Statistics of all pixels.

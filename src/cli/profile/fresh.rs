@@ -1,12 +1,10 @@
 //! Runs the frames of a profile.
 use super::Args;
-use crate::cli::{common, complain, fail_on_messages};
-use crate::denoise::{self, filter, filter::Method, filter::Row};
+use crate::cli::{common, complain, fail_on_messages, render};
+use crate::denoise::filter::{Method, Row};
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, PassTime};
-use crate::memory;
+use crate::gpu::PassTime;
 use crate::profile::{Measured, Profile, Subject, measure};
-use crate::render::film;
 use crate::render::settings::Settings;
 use crate::report::trace::chrome_trace;
 use crate::scene::{Scene, SceneFile};
@@ -43,7 +41,7 @@ pub fn profile(args: &Args, old: Option<&Profile>) -> Result<Fresh> {
     }
     old.map_or(Ok(()), |old| check_beside(old, &scene, &settings, filter))?;
     let gpu = common::open(args.device.as_ref(), args.validation, args.tracing.unwrap_or_default())?;
-    check_room(args, &settings, &gpu)?;
+    render::check_room(args.denoise, &settings, &gpu)?;
     let count = usize::from(args.frames.unwrap_or(FRAMES));
     let bar = ProgressBar::new(2 * count as u64 + 1);
     if !is_talkative {
@@ -76,13 +74,4 @@ fn trace(measured: &Measured) -> String {
     let host: Vec<PassTime> = frames.timed.iter().chain(&frames.untimed).map(|run| run.wall).collect();
     let passes: Vec<PassTime> = frames.timed.iter().flat_map(|run| &run.passes).map(|pass| pass.time).collect();
     chrome_trace(&host, &passes, measured.calibration)
-}
-
-/// As for a render: what takes more memory than there is, is told before.
-fn check_room(args: &Args, settings: &Settings, gpu: &Gpu) -> Result<()> {
-    let (size, unified) = ([settings.width, settings.height], gpu.info().unified);
-    let filtered = args.denoise.map_or(0, |method| denoise::host_bytes(method, settings, unified));
-    let refused = |what| Error::Device(format!("a film of {} x {} {what}: choose a smaller film", size[0], size[1]));
-    memory::check(film::host_bytes(settings, unified).max(filtered)).map_err(refused)?;
-    args.denoise.map_or(Ok(()), |_| filter::check_size(gpu, size, filter::GUIDE_TEXELS))
 }

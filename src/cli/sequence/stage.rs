@@ -103,7 +103,7 @@ impl<'a> Stage<'a> {
             warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
         }
         let gpu = args.render.common.open(args.render.tracing)?;
-        render::check_room(&args.render, &settings, &gpu)?;
+        render::check_room(args.render.denoise, &settings, &gpu)?;
         render::check_stride(&args.render, &settings)?;
         let survey = Survey { scene: &scene, animation: &animation, frames: &frames, fps: args.fps };
         let rest = survey.effects(&settings, args.render.wanted());
