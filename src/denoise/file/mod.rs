@@ -1,4 +1,5 @@
 //! Image files of any renderer as noisy images: which AOV fills which plane, and what has to be made up.
+mod albedo;
 mod places;
 
 use super::noisy::{Holds, Noisy};
@@ -17,6 +18,8 @@ use places::Places;
 pub struct Layers<'a> {
     aovs: &'a Aovs<'a>,
     places: Places,
+    /// Whether the file tells what surfaces reflect.
+    reflects: bool,
     indirect_m2: Option<&'a [f32]>,
     /// pbrt and Cycles write the samples of all pixels into the file's head.
     samples_of_all: Option<f32>,
@@ -42,14 +45,17 @@ impl<'a> Layers<'a> {
             Some(Samples::F32(m2)) => Some(m2.as_slice()),
             _ => None,
         };
-        Self {
+        let mut layers = Self {
             aovs,
             places: Places::new(aovs, &mut notes),
+            reflects: false,
             indirect_m2,
             samples_of_all: samples_of_all(aovs),
             of_one_sample: film.channels.iter().any(|c| c.name.starts_with("RelativeVariance.")),
             notes,
-        }
+        };
+        layers.reflects = layers.judge_albedo();
+        layers
     }
 
     /// What the planes will hold.
@@ -57,7 +63,7 @@ impl<'a> Layers<'a> {
         let has = |aov| self.aovs.get(aov).is_some();
         Holds {
             of_file: true,
-            albedo: has(Aov::Albedo),
+            albedo: self.reflects,
             light: has(Aov::Direct) && has(Aov::Indirect),
             variance: has(Aov::Variance),
             indirect_variance: self.indirect_m2.is_some(),
@@ -103,7 +109,7 @@ impl<'a> Layers<'a> {
         PixelLight {
             direct: at(Aov::Direct),
             indirect_m2: self.indirect_m2.map_or(0.0, |m2| m2[i]),
-            albedo: at(Aov::Albedo),
+            albedo: self.albedo(i),
             ..Default::default()
         }
     }
@@ -121,7 +127,7 @@ impl<'a> Layers<'a> {
             depth,
             position: position.into(),
             object: if hit || normal != Vec3::ZERO { 0 } else { NONE },
-            albedo: self.aovs.get(Aov::Albedo).map_or([0.0; 3], |plane| plane.at(i)),
+            albedo: self.albedo(i),
             material: NONE,
             ..Default::default()
         }
