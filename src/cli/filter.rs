@@ -58,8 +58,9 @@ pub struct Args {
     /// Filter the colour as it is: textures blur too
     #[arg(long)]
     pub no_demodulate: bool,
-    /// First cut pixels that are more than N times brighter than all but one around them, if one sample has brought their light,
-    /// and say what that took away, or `off` [default: 8 where the image tells its variance]
+    /// First cut pixels that are more than N times brighter than all but one around them, if one sample has brought
+    /// their light as far as the image tells its variance, and say what that took away, or `off` [default: 8; off for
+    /// none and oidn]
     #[arg(long, value_name = "N")]
     pub fireflies: Option<Fireflies>,
     /// Options for the device and the output files.

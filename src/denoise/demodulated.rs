@@ -77,7 +77,7 @@ impl Demodulated {
         Ok(Self {
             split: Kernel::new(gpu, &constants)?,
             join: Kernel::new(gpu, &Default::default())?,
-            cut: fireflies.factor(measured).map(cut).transpose()?,
+            cut: fireflies.factor().map(cut).transpose()?,
             planes,
             sparse,
             variance,

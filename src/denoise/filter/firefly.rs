@@ -13,27 +13,29 @@ use glam::Vec3;
 use std::str::FromStr;
 
 /// Which outliers are cut: pixels so many times brighter than the second brightest of the 24 around them, if one sample has brought
-/// their light.
+/// their light. Without the variance of samples nothing tells, and stars and glints count as outliers too.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Fireflies {
     /// None.
     Off,
-    /// Those above [`Fireflies::USUAL`] times where the variance of samples is known: without it, a star looks like one.
+    /// Those above [`Fireflies::USUAL`] times.
     #[default]
     Usual,
-    /// Those above so many times, at least 1, in any image.
+    /// Those above so many times, at least 1.
     Above(f32),
 }
 
 impl Fireflies {
-    /// Of 4, 8 and 20, at 2 samples 4 raises FLIP of Crytek Sponza by .4 %, and 20 leaves 4 % more error in a glass Cornell box than 8.
+    /// Of 4, 8 and 20, at 2 samples 4 raises FLIP of Crytek Sponza by .4 %, and 20 leaves 4 % more error in a glass
+    /// Cornell box than 8. Without variance, at 4 and 32 samples of two scenes of Mitsuba, `auto` has .94 to 1.005
+    /// times the error with 8, .99 to 1 with 16.
     pub const USUAL: f32 = 8.0;
 
-    /// The factor for an image whose variance is `measured` or not; none where nothing is cut.
-    pub fn factor(self, measured: bool) -> Option<f32> {
+    /// None where nothing is cut.
+    pub fn factor(self) -> Option<f32> {
         match self {
             Self::Off => None,
-            Self::Usual => measured.then_some(Self::USUAL),
+            Self::Usual => Some(Self::USUAL),
             Self::Above(factor) => Some(factor),
         }
     }
