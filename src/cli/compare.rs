@@ -28,7 +28,7 @@ pub struct Args {
     a: PathBuf,
     /// Its reference
     b: PathBuf,
-    /// Layer to compare, such as albedo, N or Z [default: the colour]
+    /// Layer to compare, such as albedo, N or Z, as it is stored [default: the colour, as Rec. 709]
     #[arg(long, value_name = "NAME")]
     layer: Option<String>,
     /// Write |A - B| in false colours to a .png
@@ -79,7 +79,8 @@ pub fn run(args: &Args) -> Result<Exit> {
         check_png("--diff", diff)?;
         check_distinct(&[("--diff", diff)], &[("A", &args.a), ("B", &args.b)])?;
     }
-    let (a, b) = (load(&args.a, args.layer.as_deref())?, load(&args.b, args.layer.as_deref())?);
+    let load = |path| load(path, args.layer.as_deref(), "name a layer with --layer");
+    let (a, b) = (load(&args.a)?, load(&args.b)?);
     check_sizes((&args.a, &a), (&args.b, &b))?;
     image::check_memory(&args.a, a.pixels.len() as u64 * BYTES_PER_PIXEL)?;
     let metrics = metrics::compare(&a, &b);
@@ -92,14 +93,19 @@ pub fn run(args: &Args) -> Result<Exit> {
     Ok(if exceeded.is_empty() { Exit::Done } else { Exit::LimitExceeded })
 }
 
-/// Reads a layer of an image and checks that every pixel is finite, as metrics need it.
+/// Reads a layer of an image, as Rec. 709 if it is the colour, and checks that every pixel is finite, as metrics need
+/// it. `remedy` is for files without a colour.
 ///
 /// # Errors
 /// [`Error::Input`].
-pub fn load(path: &Path, layer: Option<&str>) -> Result<Picture> {
+pub fn load(path: &Path, layer: Option<&str>, remedy: &str) -> Result<Picture> {
     let film = image::read(path)?;
     image::check_memory(path, (film.pixels() * size_of::<[f32; 3]>()) as u64)?;
-    let picture = film.picture(layer).map_err(|what| Error::input(path, what))?;
+    let picture = match layer {
+        Some(_) => film.picture(layer),
+        None => film.rec709(None).map_err(|what| format!("{what}; {remedy}")),
+    };
+    let picture = picture.map_err(|what| Error::input(path, what))?;
     drop(film);
     match picture.non_finite() {
         0 => Ok(picture),

@@ -113,7 +113,7 @@ pub fn run(args: &Args) -> Result<Exit> {
     let gpu = args.common.open(Tracing::Auto)?;
     check_room(args, &gpu, &file.claim)?;
     let source = file.decode()?;
-    let aovs = Aovs::find(&source.film, &args.layers.names()).map_err(|what| Error::input(&args.image, what))?;
+    let aovs = aovs(args, &source)?;
     let reference = reference(args, &source)?;
     let start = Instant::now();
     let (colour, times, notes) = filtered(args, &gpu, &aovs)?;
@@ -137,6 +137,12 @@ pub fn run(args: &Args) -> Result<Exit> {
     report(args, &summary)?;
     files.failure().map_or(Ok(()), Err)?;
     Ok(Exit::Done)
+}
+
+fn aovs<'a>(args: &Args, source: &'a Source) -> Result<Aovs<'a>> {
+    let unnamed = args.layers.colour.is_none() && source.film.find(None).is_none();
+    let remedy = if unnamed { "; name the layer to filter with --colour" } else { "" };
+    Aovs::find(&source.film, &args.layers.names()).map_err(|what| Error::input(&args.image, what + remedy))
 }
 
 /// Bytes of host memory that filtering takes besides the file itself: the file's channels and the filtered colour, and then
@@ -243,7 +249,7 @@ fn replaced(args: &Args, source: &Source, aovs: &Aovs, mut colour: Colour) -> Re
 /// Reads the reference, before any long work, and checks that it has the size of the image.
 fn reference(args: &Args, source: &Source) -> Result<Option<Picture>> {
     let Some(path) = &args.reference else { return Ok(None) };
-    let reference = compare::load(path, None)?;
+    let reference = compare::load(path, None, "save its colour as R, G, B")?;
     check_sizes((&args.image, &shown(args, source, result_layer(args))?), (path, &reference))?;
     Ok(Some(reference))
 }
@@ -259,7 +265,7 @@ fn result_layer(args: &Args) -> Option<&str> {
 }
 
 fn shown(args: &Args, image: &Source, layer: Option<&str>) -> Result<Picture> {
-    image.shown()?.picture(layer).map_err(|what| Error::input(&args.image, what))
+    image.shown()?.rec709(layer).map_err(|what| Error::input(&args.image, what))
 }
 
 fn distance(args: &Args, image: &Source, layer: Option<&str>, reference: &Picture) -> Result<Option<Metrics>> {

@@ -3,6 +3,7 @@ use super::claim::{self, Claim};
 use super::film::{Channel, Film, Samples, split};
 use super::frame::{Frame, held, shown, union};
 use super::output::Stream;
+use super::primaries::{from_exr, to_exr};
 use super::sorted_head::SortedHead;
 use crate::memory;
 use exr::block::lines::LineRefMut;
@@ -31,6 +32,7 @@ pub(super) fn encode(film: &Film, out: &mut dyn Stream) -> std::io::Result<()> {
     let size = (film.width as usize, film.height as usize);
     let layer = Layer::new(size, LayerAttributes::default(), ENCODING, channels);
     let mut attributes = ImageAttributes::with_size(size);
+    attributes.chromaticities = film.primaries.map(to_exr);
     let attribute = |(key, value): (&String, &String)| (text(&format!("{PREFIX}{key}")), text(value));
     attributes.other = film.metadata.iter().map(attribute).map(|(k, v)| (k, AttributeValue::Text(v))).collect();
     let image = Image::empty(attributes).with_layer(layer);
@@ -233,6 +235,7 @@ fn film_from(image: FlatImage, frame: IntegerBounds) -> Result<Film, String> {
         film.metadata.extend(texts(&part.attributes.other));
     }
     film.metadata.extend(texts(&image.attributes.other));
+    film.primaries = image.attributes.chromaticities.map(from_exr);
     Ok(film)
 }
 

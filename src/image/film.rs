@@ -1,5 +1,6 @@
 //! The film, which is the result of a render and the content of an image file: planes of samples with dotted names, as in
 //! EXR files.
+use super::primaries::{self, Primaries};
 use crate::memory;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -54,6 +55,9 @@ pub struct Film {
     /// Named texts, such as scene, settings, seed and device. In EXR files they are attributes like `tallow:scene`; those of
     /// other programs are read too.
     pub metadata: BTreeMap<String, String>,
+    /// Chromaticities x, y of red, green, blue and white, where the file names them; else they count as those of Rec.
+    /// 709.
+    pub primaries: Option<Primaries>,
 }
 
 /// Three values per pixel: what metrics, PNG and HDR work on.
@@ -63,7 +67,7 @@ pub struct Picture {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// `width * height` values, row-major, row 0 at the top. Colours are linear Rec. 709.
+    /// `width * height` values, row-major, row 0 at the top. Colours are linear.
     pub pixels: Vec<[f32; 3]>,
 }
 
@@ -150,6 +154,17 @@ impl Film {
         let mut pixels = memory::reserved(self.pixels())?;
         pixels.extend(a.iter().zip(b.iter()).zip(c.iter()).map(|((&a, &b), &c)| [a, b, c]));
         Ok(Picture { width: self.width, height: self.height, pixels })
+    }
+
+    /// [`Film::picture`] of a layer that holds colour, brought from the film's primaries to those of Rec. 709, which
+    /// metrics, PNG and HDR take. What Rec. 709 cannot show is cut at 0.
+    ///
+    /// # Errors
+    /// As [`Film::picture`].
+    pub fn rec709(&self, layer: Option<&str>) -> Result<Picture, String> {
+        let mut picture = self.picture(layer)?;
+        self.primaries.iter().for_each(|own| primaries::to_rec709(own, &mut picture.pixels));
+        Ok(picture)
     }
 
     /// The channels that [`Film::picture`] takes, the same one three times for grey.

@@ -81,7 +81,7 @@ pub fn write(path: &Path, film: &Film, options: &WriteOptions) -> Result<()> {
 /// [`std::io::ErrorKind::InvalidData`] when the film has no colour or the extension is unknown, and those of the stream.
 pub fn encode(path: &Path, film: &Film, options: &WriteOptions, stream: &mut dyn Stream) -> std::io::Result<()> {
     let invalid = |what: String| std::io::Error::new(std::io::ErrorKind::InvalidData, what);
-    let colour = || film.picture(None).map_err(invalid);
+    let colour = || film.rec709(None).map_err(invalid);
     match format_of(path).map_err(|e| invalid(e.to_string()))? {
         Format::Exr => exr::encode(film, stream),
         Format::Png => stream.write_all(&photo::encode_png(&colour()?, options).map_err(invalid)?),
@@ -99,7 +99,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
 }
 
 /// Reads an EXR, PNG, JPEG or HDR file, recognised by its content, into linear values. Those of EXR and HDR are as they are stored,
-/// whatever primaries a file names: pictures of a scene are brought to Rec. 709, films stay as they are.
+/// whatever primaries a file names: [`Film::rec709`] converts them.
 ///
 /// # Errors
 /// [`Error::Input`] when the file cannot be read, is of another kind, or is damaged; [`Error::Memory`].

@@ -1,39 +1,37 @@
 //! Colours of other primaries than Rec. 709's: what an EXR file says its red, green, blue and white are.
-use super::{Picture, contained, is_exr};
-use exr::meta::MetaData;
 use exr::meta::attribute::Chromaticities;
 use exr::prelude::Vec2;
 use glam::{DMat3, DVec3};
-use std::io::Cursor;
 
 /// Chromaticities x, y of red, green, blue and white.
-type Primaries = [[f64; 2]; 4];
+pub type Primaries = [[f32; 2]; 4];
 
 /// Those of ITU-R BT.709, which are sRGB's.
 const REC709: Primaries = [[0.64, 0.33], [0.3, 0.6], [0.15, 0.06], [0.3127, 0.329]];
 
 /// Chromaticities closer than this are the same: files round them.
-const ALIKE: f64 = 2e-3;
+const ALIKE: f32 = 2e-3;
 
-/// Brings the colour of an image to Rec. 709, if it is an EXR file that names other primaries. White becomes white. What Rec. 709 cannot
-/// show is cut at 0.
-pub fn to_rec709(bytes: &[u8], picture: &mut Picture) {
-    let Some(matrix) = primaries(bytes).filter(|p| !is_rec709(p)).and_then(|p| matrix(&p)) else { return };
-    for pixel in &mut picture.pixels {
-        let rgb = DVec3::from(pixel.map(f64::from));
+/// Brings colours of these primaries to Rec. 709, if they are others. White becomes white. What Rec. 709 cannot show is
+/// cut at 0.
+pub fn to_rec709(primaries: &Primaries, colours: &mut [[f32; 3]]) {
+    let Some(matrix) = matrix(primaries).filter(|_| !is_rec709(primaries)) else { return };
+    for colour in colours {
+        let rgb = DVec3::from(colour.map(f64::from));
         // A comparison with NaN is false, which stays what it was.
-        *pixel = (matrix * rgb).to_array().map(|v| if v < 0.0 { 0.0 } else { v as f32 });
+        *colour = (matrix * rgb).to_array().map(|v| if v < 0.0 { 0.0 } else { v as f32 });
     }
 }
 
-/// Those that the head of an EXR file names.
-fn primaries(bytes: &[u8]) -> Option<Primaries> {
-    if !is_exr(bytes) {
-        return None;
-    }
-    let meta = contained(|| MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| e.to_string()));
-    let Chromaticities { red, green, blue, white } = meta.ok()?.headers.first()?.shared_attributes.chromaticities?;
-    Some([red, green, blue, white].map(|Vec2(x, y)| [x.into(), y.into()]))
+/// As EXR files name them.
+pub(super) fn from_exr(named: Chromaticities) -> Primaries {
+    [named.red, named.green, named.blue, named.white].map(|Vec2(x, y)| [x, y])
+}
+
+/// As EXR files name them.
+pub(super) fn to_exr(primaries: Primaries) -> Chromaticities {
+    let [red, green, blue, white] = primaries.map(|[x, y]| Vec2(x, y));
+    Chromaticities { red, green, blue, white }
 }
 
 fn is_rec709(primaries: &Primaries) -> bool {
@@ -59,7 +57,8 @@ fn xyz_from_rgb(primaries: &Primaries) -> DMat3 {
 }
 
 /// Of luminance 1.
-fn xyz([x, y]: [f64; 2]) -> DVec3 {
+fn xyz(chromaticity: [f32; 2]) -> DVec3 {
+    let [x, y] = chromaticity.map(f64::from);
     DVec3::new(x / y, 1.0, (1.0 - x - y) / y)
 }
 
@@ -68,6 +67,7 @@ pub(crate) mod tests {
     use super::*;
     use exr::image::write::WritableImage;
     use exr::prelude::{Image, SpecificChannels};
+    use std::io::Cursor;
 
     /// Those of ACEScg (Academy S-2014-004).
     pub const AP1: Primaries = [[0.713, 0.293], [0.165, 0.83], [0.128, 0.044], [0.32168, 0.33767]];
@@ -75,17 +75,14 @@ pub(crate) mod tests {
     pub fn file(primaries: Option<Primaries>, pixel: [f32; 3]) -> Vec<u8> {
         let channels = SpecificChannels::rgb(|_: Vec2<usize>| (pixel[0], pixel[1], pixel[2]));
         let mut image = Image::from_channels((2, 1), channels);
-        let [red, green, blue, white] = primaries.unwrap_or_default().map(|[x, y]| Vec2(x as f32, y as f32));
-        image.attributes.chromaticities = primaries.map(|_| Chromaticities { red, green, blue, white });
+        image.attributes.chromaticities = primaries.map(to_exr);
         let mut bytes = Cursor::new(Vec::new());
         image.write().to_buffered(&mut bytes).unwrap();
         bytes.into_inner()
     }
 
     fn read(primaries: Option<Primaries>, pixel: [f32; 3]) -> [f32; 3] {
-        let bytes = file(primaries, pixel);
-        let mut picture = super::super::decode(&bytes).unwrap().picture(None).unwrap();
-        to_rec709(&bytes, &mut picture);
+        let picture = super::super::decode(&file(primaries, pixel)).unwrap().rec709(None).unwrap();
         assert_eq!(picture.pixels[0].map(f32::to_bits), picture.pixels[1].map(f32::to_bits));
         picture.pixels[0]
     }

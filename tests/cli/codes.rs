@@ -140,6 +140,49 @@ fn compare_prints_json_and_writes_the_difference() {
 }
 
 #[test]
+fn colours_are_those_of_rec_709_whatever_primaries_a_file_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, colour: [f32; 3], primaries| {
+        let mut film = Film { primaries, ..Film::new(12, 12) };
+        film.add_vec3("", ["R", "G", "B"], &[colour; 144]);
+        film.add_vec3("albedo", ["R", "G", "B"], &[[0.5; 3]; 144]);
+        image::write(&folder.path().join(name), &film, &WriteOptions::default()).unwrap();
+    };
+    // ACEScg and the same colour by the matrix of OpenColorIO.
+    let ap1 = [[0.713, 0.293], [0.165, 0.83], [0.128, 0.044], [0.32168, 0.33767]];
+    file("a.exr", [0.5, 0.25, 0.125], Some(ap1));
+    file("b.exr", [0.68667, 0.21876, 0.09988], None);
+    let filter =
+        ["filter", "a.exr", "--filter", "none", "-o", "c.exr", "-o", "c.png", "-o", "c.hdr", "--reference", "b.exr"];
+    let output = stdout(&tallow(&folder, &[&filter[..], &["--json"]].concat()));
+    let json: Value = serde_json::from_str(&output).unwrap();
+    assert!(["before", "after"].iter().all(|when| json[when]["mse"].as_f64().unwrap() < 1e-8), "{json}");
+    for (same, limit) in [("a.exr", "1e-8"), ("c.exr", "1e-8"), ("c.png", "1e-4"), ("c.hdr", "1e-4")] {
+        let output = tallow(&folder, &["compare", same, "b.exr", "--max-mse", limit]);
+        assert_eq!(output.status.code(), Some(0), "{same}: {}", stdout(&output));
+    }
+    assert_eq!(image::read(&folder.path().join("c.exr")).unwrap().primaries, Some(ap1));
+    let stored = tallow(&folder, &["compare", "a.exr", "b.exr", "--layer", "albedo", "--max-mse", "0"]);
+    assert_eq!(stored.status.code(), Some(0), "numbers stay");
+}
+
+#[test]
+fn a_file_without_colour_is_told_which_option_names_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut film = Film::new(12, 12);
+    ["a", "b"].iter().for_each(|layer| film.add_vec3(layer, ["R", "G", "B"], &[[0.5; 3]; 144]));
+    image::write(&folder.path().join("a.exr"), &film, &WriteOptions::default()).unwrap();
+    complains(&tallow(&folder, &["compare", "a.exr", "a.exr"]), 3, &["no colour", "b.R", "--layer"]);
+    complains(&tallow(&folder, &["filter", "a.exr", "-o", "c.exr"]), 3, &["no colour", "b.R", "--colour"]);
+    write(&folder, "b.exr", 12, 0.5);
+    complains(
+        &tallow(&folder, &["filter", "b.exr", "-o", "c.exr", "--reference", "a.exr"]),
+        3,
+        &["a.exr", "as R, G, B"],
+    );
+}
+
+#[test]
 fn devices_are_listed_as_vulkan_has_them() {
     let folder = tempfile::tempdir().unwrap();
     let found = tallow::gpu::survey().unwrap();

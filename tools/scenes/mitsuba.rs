@@ -39,7 +39,7 @@ pub fn grey_mask(place: &Place, filename: &str) -> anyhow::Result<PathBuf> {
 pub fn environment(place: &Place, filename: &str) -> anyhow::Result<PathBuf> {
     const FINER: usize = 4;
     let Picture { width, height, pixels } =
-        tallow::image::read(&place.folder.join(filename))?.picture(None).map_err(anyhow::Error::msg)?;
+        tallow::image::read(&place.folder.join(filename))?.rec709(None).map_err(anyhow::Error::msg)?;
     let (columns, last) = (width as usize, height as usize - 1);
     let pixel = |i: usize| {
         let at = (i / columns) as f32 + 0.5;

@@ -14,10 +14,7 @@ pub fn load(path: &Path) -> Result<Picture> {
 /// [`load`] from bytes; `path` is for messages.
 fn decode(path: &Path, bytes: &[u8]) -> Result<Picture> {
     image::check_room(path, bytes)?;
-    let picture = image::decode(bytes).and_then(|film| film.picture(None));
-    let mut picture = picture.map_err(|what| unusable(path, &what))?;
-    image::primaries::to_rec709(bytes, &mut picture);
-    Ok(picture)
+    image::decode(bytes).and_then(|film| film.rec709(None)).map_err(|what| unusable(path, &what))
 }
 
 /// The error for a damaged image.

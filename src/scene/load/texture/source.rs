@@ -1,7 +1,7 @@
 //! Pictures that are still to be decoded, and how their texels are filled.
 use super::{Kind, check_size, damaged};
 use crate::error::{Error, Result};
-use crate::image::{BAND, bands, check_end, claim, decode, has_16_bits, holds_floats, input, picture, primaries};
+use crate::image::{BAND, bands, check_end, claim, decode, has_16_bits, holds_floats, input, picture};
 use crate::layout::TEXTURE_FLOAT;
 use crate::scene::description::mesh::Bitmap;
 use image::DynamicImage;
@@ -96,13 +96,11 @@ fn fill_floats(space: &mut [u32], bytes: &[u8], size: [u32; 2], kind: Kind) -> s
     if [film.width, film.height] != size {
         return Err("its header says another size".to_owned());
     }
-    let (mut colour, mut alpha) = (film.picture(None)?, film.channel("A"));
+    let colour = if matches!(kind, Kind::Color | Kind::Light) { film.rec709(None)? } else { film.picture(None)? };
+    let mut alpha = film.channel("A");
     if let (Kind::Mask, Some(a)) = (kind, alpha) {
         let idle = |(i, &[r, g, b]): (usize, &[f32; 3])| is_idle([r, g, b, a.at(i)], 1.0);
         alpha = alpha.filter(|_| !colour.pixels.iter().enumerate().all(idle));
-    }
-    if matches!(kind, Kind::Color | Kind::Light) {
-        primaries::to_rec709(bytes, &mut colour);
     }
     for (i, (texel, rgb)) in space.iter_mut().zip(colour.pixels).enumerate() {
         *texel = kind.word(rgb, alpha.map(|alpha| alpha.at(i)));
