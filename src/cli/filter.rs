@@ -35,9 +35,10 @@ pub enum Light {
 
 /// Filter a noisy image, of this renderer or another
 ///
-/// Takes albedo, normals, positions, depth and variance from the layers of an EXR file, as Tallow, Blender, Mitsuba 3 and
-/// pbrt-v4 name them, and does without those that are missing. Surface colour is divided out before and multiplied back
-/// after. In Tallow's own files of scenes with point, spot or directional lights, direct light stays as it is.
+/// Takes albedo, normals, positions, depth and variance from the layers of an EXR file, as Tallow, Blender, Mitsuba 3,
+/// pbrt-v4, V-Ray, Arnold, Octane and Unreal name them, and does without those that are missing. Surface colour is
+/// divided out before and multiplied back after. In Tallow's own files of scenes with point, spot or directional
+/// lights, direct light stays as it is.
 #[derive(clap::Args)]
 pub struct Args {
     /// Image to filter (EXR; PNG, JPEG and HDR hold no layers)

@@ -1,5 +1,5 @@
 //! The layers of an image that filters use (AOVs, arbitrary output variables). They are found by the channel names of
-//! Tallow, Blender (Cycles), Mitsuba 3 and pbrt-v4.
+//! Tallow, Blender (Cycles), Mitsuba 3, pbrt-v4, V-Ray, Arnold, Octane and Unreal.
 use super::film::{Channel, Film, NOISY, SOFTWARE, Samples, Window, split};
 use std::collections::BTreeMap;
 
@@ -35,26 +35,57 @@ struct Known {
     names: &'static [&'static str],
 }
 
-/// Blender names channels `ViewLayer.NAME.R`; its "Denoising" passes are made for filters. In Mitsuba the user chooses the
-/// names; these are the ones in its documentation. pbrt has `Albedo.R`, `Ns.X`, `P.X`, `Variance.R`.
+/// Blender names channels `ViewLayer.NAME.R`; its "Denoising" passes are made for filters. In Mitsuba the user chooses
+/// the names; these are the ones in its documentation. pbrt has `Albedo.R`, `Ns.X`, `P.X`, `Variance.R`; Octane
+/// `Denoiser_albedo.R`; V-Ray `diffuseFilter.R`; Arnold `diffuse_albedo.R`; Unreal `FinalImageBaseColor.R`.
 const KNOWN: &[Known] = &[
     Known { aov: Aov::Colour, label: "colour", names: &[NOISY] },
     Known { aov: Aov::Direct, label: "direct light", names: &["direct"] },
     Known { aov: Aov::Indirect, label: "indirect light", names: &["indirect"] },
-    Known { aov: Aov::Albedo, label: "albedo", names: &["denoising albedo", "albedo", "diffcol", "diffuse color"] },
+    Known {
+        aov: Aov::Albedo,
+        label: "albedo",
+        names: &[
+            "denoising albedo",
+            "denoiser_albedo",
+            "albedo",
+            "diffcol",
+            "diffuse color",
+            "diffuse_albedo",
+            "diffusefilter",
+            "finalimagebasecolor",
+        ],
+    },
     Known {
         aov: Aov::Normal,
         label: "normal",
-        names: &["denoising normal", "ns", "n", "sh_normal", "normal", "normals", "nn", "geo_normal", "ng"],
+        names: &[
+            "denoising normal",
+            "denoiser_normal",
+            "ns",
+            "n",
+            "sh_normal",
+            "normal",
+            "normals",
+            "nn",
+            "geo_normal",
+            "ng",
+            "finalimageworldnormal",
+        ],
     },
     Known { aov: Aov::Position, label: "position", names: &["denoising position", "p", "position", "pos"] },
-    Known { aov: Aov::Depth, label: "depth", names: &["denoising depth", "z", "depth", "dd.y", "dd"] },
+    Known {
+        aov: Aov::Depth,
+        label: "depth",
+        names: &["denoising depth", "z", "depth", "dd.y", "dd", "finalimageworlddepth"],
+    },
     Known { aov: Aov::Variance, label: "variance", names: &["variance"] },
     Known { aov: Aov::Samples, label: "samples", names: &["samples", "sample count"] },
     Known { aov: Aov::ShareOfSamples, label: "share of the samples", names: &["debug sample count"] },
 ];
 
-/// Layer names given by the user, which replace the known ones.
+/// Layer names given by the user, which replace the known ones. That of [`Aov::Samples`] may be a number instead, of at
+/// least 1, which all pixels have.
 pub type Names = BTreeMap<Aov, String>;
 
 /// Three values per pixel, borrowed from a film; a single channel is repeated three times.
@@ -76,7 +107,10 @@ pub struct Aovs<'a> {
     pub colour: [&'a str; 3],
     planes: BTreeMap<Aov, Plane<'a>>,
     window: Option<Window>,
-    /// One line per AOV: the name under which it was found, or that it is missing.
+    /// Samples of every pixel, where the user has told a number.
+    pub samples_of_all: Option<f32>,
+    /// One line per AOV, with the name under which it was found, or that it is missing; and what is wrong with the
+    /// colour.
     pub notes: Vec<String>,
 }
 
@@ -84,8 +118,8 @@ impl<'a> Aovs<'a> {
     /// Finds all known AOVs of a film, by the user's names first.
     ///
     /// # Errors
-    /// When there is no colour, when a layer named by the user is missing, or when a layer covers other pixels than the
-    /// colour.
+    /// When there is no colour or no pixel of it is a finite number, when a layer named by the user is missing, or when
+    /// a layer covers other pixels than the colour.
     pub fn find(film: &'a Film, names: &Names) -> Result<Self, String> {
         let given = names.get(&Aov::Colour).map(String::as_str);
         // The noisy image is the input of the filter and is never replaced.
@@ -98,9 +132,14 @@ impl<'a> Aovs<'a> {
             colour: shown.map(|c| c.name.as_str()),
             planes: BTreeMap::new(),
             window: shown[0].window,
+            samples_of_all: names.get(&Aov::Samples).and_then(|told| number(told)),
             notes: Vec::new(),
         };
         for known in KNOWN {
+            if let (Aov::Samples, Some(number)) = (known.aov, found.samples_of_all) {
+                found.notes.push(format!("samples: {number} in every pixel, as given"));
+                continue;
+            }
             let channels = match names.get(&known.aov) {
                 Some(name) => Some(film.find(Some(name)).ok_or_else(|| absent(film, known, name))?),
                 None if known.is_tallow_s_own() && !is_tallow_s(film) => None,
@@ -109,7 +148,23 @@ impl<'a> Aovs<'a> {
             let channels = channels.or_else(|| (known.aov == Aov::Colour).then_some(shown));
             found.take(known, channels)?;
         }
+        found.check_colour()?;
         Ok(found)
+    }
+
+    /// Says how many pixels hold no colour that a filter can use.
+    fn check_colour(&mut self) -> Result<(), String> {
+        let held = || (0..self.film.pixels()).filter(|&i| self.holds(i));
+        let broken = |i: &usize| !self.planes[&Aov::Colour].at(*i).iter().all(|v| v.is_finite());
+        let (all, count) = (held().count(), held().filter(broken).count());
+        if count > 0 && count == all {
+            return Err(format!("holds NaN or infinity in each of its {all} pixels: render it anew"));
+        }
+        if count > 0 {
+            let what = "which filters fill in from those around them";
+            self.notes.push(format!("colour: NaN or infinite in {count} of {all} pixels, {what}"));
+        }
+        Ok(())
     }
 
     fn take(&mut self, known: &Known, channels: Option<[&'a Channel; 3]>) -> Result<(), String> {
@@ -188,6 +243,11 @@ fn is_tallow_s(film: &Film) -> bool {
 fn find<'a>(film: &'a Film, view: &str, name: &str) -> Option<[&'a Channel; 3]> {
     let own = (!view.is_empty()).then(|| film.find(Some(&format!("{view}.{name}")))).flatten();
     own.or_else(|| film.find(Some(name)))
+}
+
+/// A number of samples; all else is the name of a layer.
+fn number(told: &str) -> Option<f32> {
+    told.parse().ok().filter(|n: &f32| n.is_finite() && *n >= 1.0)
 }
 
 fn absent(film: &Film, known: &Known, name: &str) -> String {
@@ -288,6 +348,43 @@ mod tests {
         let expected =
             [(Aov::Colour, 0.0), (Aov::Albedo, 3.0), (Aov::Normal, 14.0), (Aov::Position, 6.0), (Aov::Variance, 19.0)];
         assert_eq!(found(&file), expected);
+    }
+
+    #[test]
+    fn layers_of_other_renderers_are_found_by_their_names() {
+        let file = |layers: &[&str]| {
+            let mut film = Film::new(1, 1);
+            let mut values = (0..).map(|i| (i * 3) as f32);
+            layers.iter().zip(&mut values).for_each(|(layer, v)| film.add_vec3(layer, ["R", "G", "B"], &[[v; 3]]));
+            film
+        };
+        let both = [(Aov::Colour, 0.0), (Aov::Albedo, 3.0), (Aov::Normal, 6.0)];
+        for (colour, albedo, normal) in [
+            ("", "diffuseFilter", "normals"),
+            ("", "diffuse_albedo", "N"),
+            ("Beauty", "Denoiser_albedo", "Denoiser_normal"),
+            ("", "FinalImageBaseColor", "FinalImageWorldNormal"),
+            ("rgba.main", "albedo.main.albedo", "N.main.N"),
+            ("C", "albedo", "N"),
+            ("Ci", "albedo", "normal"),
+            ("RGB_IMAGEPIPELINE", "ALBEDO", "N"),
+        ] {
+            assert_eq!(found(&file(&[colour, albedo, normal])), both, "{colour} {albedo}");
+        }
+        assert_eq!(found(&file(&["", "FinalImageWorldDepth"])), [(Aov::Colour, 0.0), (Aov::Depth, 3.0)]);
+    }
+
+    #[test]
+    fn samples_are_a_layer_or_a_number() {
+        let file = film("R G B samples");
+        let find = |told: &str| Aovs::find(&file, &Names::from([(Aov::Samples, told.to_owned())]));
+        let aovs = find("32").unwrap();
+        assert!(aovs.samples_of_all == Some(32.0) && aovs.get(Aov::Samples).is_none());
+        assert!(aovs.notes.contains(&"samples: 32 in every pixel, as given".to_owned()), "{:?}", aovs.notes);
+        assert_eq!(find("samples").unwrap().scalar(Aov::Samples, 0), Some(3.0));
+        for wrong in ["0", "-1", "inf", "nan", "spp"] {
+            assert!(find(wrong).is_err_and(|line| line.contains(wrong)), "{wrong}");
+        }
     }
 
     #[test]

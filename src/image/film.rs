@@ -182,10 +182,14 @@ impl Film {
     }
 
     fn colour(&self) -> Option<[&Channel; 3]> {
-        const USUAL: [&str; 6] = ["", "combined", "beauty", "rgba", "rgb", "color"];
+        // Those behind "color" are Karma's, RenderMan's and LuxCore's.
+        const USUAL: [&str; 9] = ["", "combined", "beauty", "rgba", "rgb", "color", "c", "ci", "rgb_imagepipeline"];
         let coloured: Vec<_> =
             self.layers().into_iter().filter(|l| self.triple(l, ["R", "G", "B"]).is_some()).collect();
-        let usual = |l: &&&str| USUAL.contains(&split(l).1.to_lowercase().as_str());
+        let usual = |l: &&&str| {
+            let name = l.to_lowercase();
+            USUAL.contains(&split(name.strip_suffix(".main").unwrap_or(&name)).1) // Nuke names parts `rgba.main`
+        };
         let clean = |l: &&&str| !split(l).1.eq_ignore_ascii_case(NOISY);
         let only = || coloured.iter().find(clean).filter(|_| coloured.iter().filter(clean).count() == 1);
         match coloured.iter().find(usual).or_else(only) {

@@ -267,6 +267,12 @@ fn broken_pixels_are_filled_in_from_their_neighbours() {
     write(&folder, "noisy.exr", &film);
     let after = error(&filter(&folder, &["--filter", "atrous"]), checker);
     assert!(after < 0.1, "{after}");
+    let run = || tallow(&folder, &["filter", "noisy.exr", "-o", "clean.exr"]);
+    let said = stdout(&run());
+    assert!(said.contains("colour: NaN or infinite in 1 of 1024 pixels"), "{said}");
+    film.channels[0].samples = Samples::F32(vec![f32::INFINITY; film.pixels()]);
+    write(&folder, "noisy.exr", &film);
+    complains(&run(), 3, &["noisy.exr", "NaN or infinity in each of its 1024 pixels"]);
 }
 
 #[test]

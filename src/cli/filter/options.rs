@@ -28,8 +28,8 @@ pub struct Layers {
     /// Variance of each pixel's mean
     #[arg(long, value_name = "NAME")]
     pub variance: Option<String>,
-    /// Samples per pixel
-    #[arg(long, value_name = "NAME")]
+    /// Samples per pixel, or a number, which all pixels have
+    #[arg(long, value_name = "NAME or N")]
     pub samples: Option<String>,
 }
 

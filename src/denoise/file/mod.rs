@@ -21,7 +21,7 @@ pub struct Layers<'a> {
     /// Whether the file tells what surfaces reflect.
     reflects: bool,
     indirect_m2: Option<&'a [f32]>,
-    /// pbrt and Cycles write the samples of all pixels into the file's head.
+    /// Told by the user, or by the file's head, into which pbrt and Cycles write it.
     samples_of_all: Option<f32>,
     /// pbrt stores the variance of one sample, others that of each pixel's mean.
     of_one_sample: bool,
@@ -138,12 +138,14 @@ impl<'a> Layers<'a> {
 /// 64 samples, taken for one, came out with more error than it had.
 const UNTOLD: f32 = 4.0;
 
-/// What the head of a file tells of the samples of every pixel, by pbrt's name or that of Cycles for the view layer of the colour.
+/// What the user or the head of a file tells of the samples of every pixel; a head by pbrt's name or that of Cycles for
+/// the view layer of the colour.
 fn samples_of_all(aovs: &Aovs) -> Option<f32> {
     let of_view = |view: &str| format!("cycles.{view}.samples");
     let view = aovs.colour[0].rsplitn(3, '.').nth(2).map(of_view);
     let told = ["samplesPerPixel".to_owned()].into_iter().chain(view);
-    told.filter_map(|key| aovs.film.metadata.get(&key)?.parse().ok()).find(|n: &f32| n.is_finite() && *n > 0.0)
+    let of_head = || told.filter_map(|key| aovs.film.metadata.get(&key)?.parse().ok());
+    aovs.samples_of_all.or_else(|| of_head().find(|n: &f32| n.is_finite() && *n > 0.0))
 }
 
 /// 0 where there is none, or what there is is no number.

@@ -1,5 +1,5 @@
 use super::*;
-use crate::image::aov::Names;
+use crate::image::aov::{Aov, Names};
 use crate::image::{Film, Samples};
 
 const RGB: [&str; 3] = ["R", "G", "B"];
@@ -149,6 +149,8 @@ fn samples_are_those_that_the_head_of_a_file_tells_or_taken_for_some() {
     assert_eq!(count(&film), 16.0, "a share of them");
     film.add("samples", Samples::U32(vec![7; 4]));
     assert_eq!(count(&film), 7.0, "a pixel's own");
+    let told = Aovs::find(&film, &Names::from([(Aov::Samples, "100".to_owned())])).unwrap();
+    assert_eq!(split(&told, Demodulation::Off).input.radiance[0][3], 25.0, "the user's number goes first");
 }
 
 #[test]
