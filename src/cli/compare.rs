@@ -15,6 +15,7 @@ use crate::image::metrics::{self, Metrics};
 use crate::image::{self, Film, Picture, WriteOptions};
 use crate::report::table;
 use serde_json::json;
+use statistical::from_0;
 use std::path::{Path, PathBuf};
 
 /// Compare an image with its reference: MSE, relMSE, PSNR, SSIM and FLIP
@@ -34,7 +35,8 @@ pub struct Args {
     /// Write |A - B| in false colours to a .png
     #[arg(long, value_name = "FILE")]
     diff: Option<PathBuf>,
-    /// Print one JSON object
+    /// Print one JSON object. Of equal images PSNR is infinite, which JSON cannot hold: "psnr" is null, and so is
+    /// "ssim" of images under 11x11 pixels
     #[arg(long)]
     json: bool,
     #[command(flatten)]
@@ -48,20 +50,28 @@ pub struct Args {
 #[command(next_help_heading = "Limits (exit code 1 when exceeded)")]
 struct Limits {
     /// Largest mean squared error
-    #[arg(long, value_name = "N", value_parser = finite)]
+    #[arg(long, value_name = "N", value_parser = from_0)]
     max_mse: Option<f64>,
     /// Largest relative mean squared error
-    #[arg(long, value_name = "N", value_parser = finite)]
+    #[arg(long, value_name = "N", value_parser = from_0)]
     max_relmse: Option<f64>,
     /// Largest mean FLIP error, 0 to 1
-    #[arg(long, value_name = "N", value_parser = finite)]
+    #[arg(long, value_name = "N", value_parser = flip)]
     max_flip: Option<f64>,
     /// Smallest peak signal-to-noise ratio in dB
     #[arg(long, value_name = "DB", value_parser = finite)]
     min_psnr: Option<f64>,
-    /// Smallest structural similarity, up to 1
-    #[arg(long, value_name = "N", value_parser = finite)]
+    /// Smallest structural similarity, -1 to 1
+    #[arg(long, value_name = "N", value_parser = ssim)]
     min_ssim: Option<f64>,
+}
+
+fn flip(text: &str) -> std::result::Result<f64, String> {
+    finite(text).ok().filter(|v| (0.0..=1.0).contains(v)).ok_or_else(|| "expected a number from 0 to 1".to_owned())
+}
+
+fn ssim(text: &str) -> std::result::Result<f64, String> {
+    finite(text).ok().filter(|v| (-1.0..=1.0).contains(v)).ok_or_else(|| "expected a number from -1 to 1".to_owned())
 }
 
 /// Bytes per pixel that the metrics take in addition to the two pictures; 75 were measured at 2048 x 2048.

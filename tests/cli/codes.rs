@@ -35,7 +35,7 @@ fn usage_errors_are_one_line_and_exit_2() {
     complains(&run(&[]), 2, &["error: name a command"]);
     complains(&run(&["compare", "a.exr"]), 2, &["<B>"]);
     complains(&run(&["compare", "a.exr", "b.exr", "--max-mes", "1"]), 2, &["'--max-mes'", "tip:", "'--max-mse'"]);
-    complains(&run(&["compare", "a.exr", "b.exr", "--max-mse", "nan"]), 2, &["finite"]);
+    complains(&run(&["compare", "a.exr", "b.exr", "--min-psnr", "nan"]), 2, &["finite"]);
     complains(&run(&["compare", "a.exr", "b.exr", "--diff", "d.exr"]), 2, &["d.exr", ".png"]);
     complains(&run(&["render", "s.toml", "-o", "a.tif"]), 2, &["a.tif", ".exr", ".png", ".hdr"]);
     complains(&run(&["render", "s.toml", "--sampler", "x"]), 2, &["sobol"]);
@@ -122,6 +122,10 @@ fn limits_set_the_exit_code() {
     complains(&run(&["--max-flip", "0"]), 1, &["flip"]);
     complains(&run(&["--min-psnr", "90"]), 1, &["psnr"]);
     complains(&run(&["--min-ssim", "0.9999"]), 1, &["ssim"]);
+    complains(&run(&["--max-mse", "nan"]), 2, &["--max-mse", "0 or more"]);
+    complains(&run(&["--max-relmse", "-1"]), 2, &["--max-relmse", "0 or more"]);
+    complains(&run(&["--max-flip", "-1"]), 2, &["--max-flip", "from 0 to 1"]);
+    complains(&run(&["--min-ssim", "2"]), 2, &["--min-ssim", "from -1 to 1"]);
     let within = ["--max-mse", "0.007", "--max-relmse", "1", "--max-flip", "1", "--min-psnr", "5", "--min-ssim", "0.5"];
     assert_eq!(run(&within).status.code(), Some(0));
     assert_eq!(run(&["--max-mse", "0", "--layer", "albedo"]).status.code(), Some(0), "the albedo is the same");

@@ -148,6 +148,6 @@ fn above_0(text: &str) -> std::result::Result<f64, String> {
     finite(text).ok().filter(|share| *share > 0.0).ok_or_else(|| "expected a number above 0".to_owned())
 }
 
-fn from_0(text: &str) -> std::result::Result<f64, String> {
+pub(super) fn from_0(text: &str) -> std::result::Result<f64, String> {
     finite(text).ok().filter(|share| *share >= 0.0).ok_or_else(|| "expected a number of 0 or more".to_owned())
 }
