@@ -167,6 +167,12 @@ mod owner {
     }
 }
 
+/// Whether the process, or the system, has as many files open as it may. An error of the crate `tempfile` does not keep
+/// its code.
+fn out_of_files() -> bool {
+    cfg!(unix) && std::fs::File::open("/").is_err_and(|e| matches!(e.raw_os_error(), Some(23 | 24))) // ENFILE, EMFILE
+}
+
 fn remedy(path: &Path, e: &std::io::Error) -> String {
     let (folder, exists) = (folder(path).display(), folder(path).is_dir());
     match e.kind() {
@@ -186,6 +192,7 @@ fn remedy(path: &Path, e: &std::io::Error) -> String {
             format!("cannot be written: {e}; free some space or choose another folder")
         }
         ErrorKind::InvalidData => format!("cannot be encoded: {e}"),
+        _ if out_of_files() => format!("cannot be written: {e}; close other programs, or raise the limit (ulimit -n)"),
         _ => format!("cannot be written: {e}; choose another folder"),
     }
 }

@@ -322,6 +322,7 @@ fn full_disk(folder: &TempDir) {
         command.args(["-c", &script, env!("CARGO_BIN_EXE_tallow")]).current_dir(folder.path()).output().unwrap()
     };
     complains(&shell("ulimit -f 0;"), 5, &["d.png", "free some space"]);
+    complains(&shell("ulimit -n 5;"), 5, &["d.png", "raise the limit (ulimit -n)"]);
     assert_eq!(std::fs::read(&old).unwrap(), b"old");
     assert_eq!(names(folder.path()), ["a.exr", "d.png"], "no temporary file stays");
     // Control: without the limit the file is replaced.
