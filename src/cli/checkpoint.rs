@@ -40,9 +40,9 @@ pub fn minutes(text: &str) -> std::result::Result<Duration, String> {
 }
 
 impl CheckpointFile {
-    /// Starts the first interval now.
-    pub fn new(every: Duration, path: PathBuf) -> Self {
-        Self { every, last: Instant::now(), path, written: None, complained: false }
+    /// Starts the first interval now. `resumed`: the file at `path` that this render continues, if it is the one.
+    pub fn new(every: Duration, path: PathBuf, resumed: Option<PathBuf>) -> Self {
+        Self { every, last: Instant::now(), path, written: resumed, complained: false }
     }
 
     /// Whether the interval since the last checkpoint is over.
@@ -89,7 +89,7 @@ mod tests {
         assert_eq!(minutes("0.5"), Ok(Duration::from_secs(30)));
         assert_eq!(minutes("1e300"), Ok(Duration::MAX));
         assert!(["0", "-1", "nan", "x"].into_iter().all(|text| minutes(text).is_err()));
-        assert!(CheckpointFile::new(Duration::ZERO, PathBuf::new()).is_due());
-        assert!(!CheckpointFile::new(Duration::MAX, PathBuf::new()).is_due());
+        assert!(CheckpointFile::new(Duration::ZERO, PathBuf::new(), None).is_due());
+        assert!(!CheckpointFile::new(Duration::MAX, PathBuf::new(), None).is_due());
     }
 }

@@ -68,6 +68,11 @@ impl Files {
         self.own.insert(key(path), place);
     }
 
+    /// Where what is written to `path` goes, if that is a file of this work.
+    pub fn place_of(&self, path: &Path) -> Option<PathBuf> {
+        self.own.get(&key(path)).cloned()
+    }
+
     /// Removes the incomplete files that this run owns, once the items are whole.
     pub fn remove_partial(&mut self, items: &[Item]) {
         for partial in items.iter().map(|item| partial_name(&item.path)) {

@@ -41,8 +41,11 @@ impl Shot<'_> {
     /// [`crate::error::Error::Device`].
     pub fn trace(&self, files: &mut Files) -> Result<(Status, Option<CheckpointFile>)> {
         let Shot { args, gpu, job } = *self;
-        let place = || checkpoint::path(&args.output_files(), &args.scene);
-        let mut checkpoint = args.checkpoint.map(|every| CheckpointFile::new(every, place()));
+        let mut checkpoint = args.checkpoint.map(|every| {
+            let path = checkpoint::path(&args.output_files(), &args.scene);
+            let resumed = files.place_of(&path);
+            CheckpointFile::new(every, path, resumed)
+        });
         let (begun, mut progress) = (Instant::now(), None);
         // Until here there is nothing to keep, and a signal ends the process.
         let stop = interrupt::flag();
