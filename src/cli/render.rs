@@ -193,6 +193,9 @@ pub struct Begun<'a> {
     pub carries: bool,
 }
 
+/// A signal and a checkpoint wait for a step.
+const STEP_TIME: Duration = Duration::from_secs(1);
+
 /// Takes the samples; none when it was interrupted before the first.
 ///
 /// # Errors
@@ -208,7 +211,7 @@ pub fn shoot<'a>(
     let noisy = args.denoise.map(|_| Noisy::of_film(renderer)).transpose()?;
     let pixel = args.pixel.map(|[x, y]| y * renderer.settings().width + x);
     let Begun { earlier: checkpoint, carries } = begun;
-    let job = Job { checkpoint, pixel, carries, ..Job::new(renderer) };
+    let job = Job { checkpoint, step_time: Some(STEP_TIME), pixel, carries, ..Job::new(renderer) };
     let shot = Shot { args, gpu, job };
     let mut files = Files::new(args.resume.as_deref());
     let (status, checkpoint) = host.time("render", || shot.trace(&mut files))?;

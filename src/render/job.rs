@@ -1,4 +1,5 @@
 //! The loop of a render: it runs the steps until they end, the image is good enough, or the caller has seen enough.
+use super::pace::Pace;
 use super::{Checkpoint, PathRange, Renderer, Step, film, provenance, resume};
 use crate::error::Result;
 use crate::gpu::{FrameResources, PassTime};
@@ -7,6 +8,7 @@ use crate::render::schedule::Cut;
 use crate::statistics::BrokenSamples;
 use serde::Serialize;
 use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
 
 /// A render to run.
 #[derive(Clone, Copy)]
@@ -18,6 +20,10 @@ pub struct Job<'a> {
     /// Paths that one step traces at most, at least 1; the renderer's own limit where that is lower. Fewer paths make
     /// shorter steps, and change no bit of the result.
     pub paths_at_once: u32,
+    /// Time that a step takes, about, so that the caller is asked as often: steps are cut by what the last ones took,
+    /// the first of all are short, and none is so short that the render becomes slower by much. It changes no bit of
+    /// the result either. None: steps are as long as [`Job::paths_at_once`] lets them be.
+    pub step_time: Option<Duration>,
     /// The only pixel to render, by its row-major index; all pixels if none. It gets [`Settings::spp`] samples, those that it has
     /// in the whole render, however its renderer places them. Such a film can be neither resumed nor merged.
     ///
@@ -71,7 +77,7 @@ pub struct Status {
 impl<'a> Job<'a> {
     /// A render from its beginning to its end.
     pub fn new(renderer: &'a Renderer) -> Self {
-        Self { renderer, checkpoint: None, paths_at_once: u32::MAX, pixel: None, carries: false }
+        Self { renderer, checkpoint: None, paths_at_once: u32::MAX, step_time: None, pixel: None, carries: false }
     }
 
     /// Runs it. Before each step `between` is told how far it is, may read the renderer's buffers (the renderer waits), and
@@ -89,14 +95,18 @@ impl<'a> Job<'a> {
         self.checkpoint.map_or(Ok(()), |checkpoint| renderer.resume(frame, checkpoint))?;
         let (begun, steps) = self.begin(frame)?;
         let (mut status, mut steps, mut listed) = (self.at_start(), steps.peekable(), u64::MAX);
+        let (mut pace, mut left) = (Pace::new(self.step_time), Vec::new());
         status.times.extend(begun);
-        while let Some(planned) = steps.next() {
+        while let Some(planned) = pace.next(&mut left, &mut steps) {
             if between(&status)?.is_break() {
                 return self.ended(status);
             }
             let step = planned.within(listed);
             if let Some(step) = &step {
-                status.times.extend(renderer.run(frame, step)?);
+                let begin = Instant::now();
+                let times = renderer.run(frame, step)?;
+                pace.observe(step, begin.elapsed(), &times);
+                status.times.extend(times);
             }
             status.count(&planned, step.as_ref());
             if let Some(Step::Allocate(_) | Step::Choose(_)) = step {

@@ -10,6 +10,7 @@ mod job;
 mod kernels;
 mod merge;
 mod moving;
+mod pace;
 #[doc(hidden)] // Renderer::record runs the passes; tests and benches run them one by one
 pub mod pass;
 pub(crate) mod provenance;

@@ -282,6 +282,15 @@ fn a_killed_render_goes_on_from_its_checkpoint() {
     killed("--allocate variance --rounds 20", 100);
 }
 
+/// Of paths that would all fit one step.
+#[test]
+fn a_render_of_few_paths_writes_checkpoints_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut running = start(&folder, &format!("render {} {SMALL} {OFTEN} --spp 100 -o a.exr", scene()));
+    running.until_there_is("a.partial.exr");
+    assert!(running.end().status.success());
+}
+
 #[test]
 fn what_was_finished_is_not_replaced_by_what_was_interrupted() {
     let folder = tempfile::tempdir().unwrap();

@@ -3,11 +3,12 @@
 use crate::support::{assert_silent, gpu};
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::time::Duration;
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::image::{self, Film, Samples, WriteOptions};
 use tallow::layout::Camera;
 use tallow::render::settings::Settings;
-use tallow::render::{Checkpoint, Gap, Job, Outputs, Renderer, Status, StopReason, merge};
+use tallow::render::{Checkpoint, Gap, Job, Outputs, Renderer, Status, StopReason, merge, traces_paths};
 use tallow::scene::{Loaded, Scene};
 
 const OUTPUTS: Outputs = Outputs { split_light: true, guides: true, counters: false };
@@ -78,6 +79,32 @@ fn an_engine_renders_to_a_threshold_and_resumes_where_it_was_interrupted() {
             "{policy}: other bits than those of the render that never stopped"
         );
         assert!(channels(&part) != channels(&whole), "{policy}: control");
+    }
+    assert_silent(&gpu);
+}
+
+#[test]
+fn steps_of_a_given_time_change_no_bit() {
+    let gpu = gpu();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("a.exr");
+    for (policy, even) in [("to a threshold", false), ("evenly", true)] {
+        // The first step has 4096 paths.
+        let scene = scene(|s| {
+            (s.width, s.height) = (99, 51);
+            if !even {
+                to_a_threshold(s);
+            }
+        });
+        let renderer = Renderer::resumable(&gpu, &scene, &scene.settings, OUTPUTS).unwrap();
+        let rendered = |step_time: Option<Duration>| {
+            let job = Job { step_time, ..Job::new(&renderer) };
+            let status = run(&gpu, &job, &file, u64::MAX);
+            (status.times.iter().filter(|pass| traces_paths(pass.name)).count(), image::read(&file).unwrap())
+        };
+        let ((few, whole), (many, cut)) = (rendered(None), rendered(Some(Duration::from_nanos(1))));
+        assert!(many > few, "{policy}: {few} and {many} steps");
+        assert!(channels(&whole) == channels(&cut), "{policy}");
     }
     assert_silent(&gpu);
 }

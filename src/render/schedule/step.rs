@@ -103,4 +103,72 @@ impl Step {
             Self::Listed(r) => u64::from(r.paths),
         }
     }
+    /// Cuts one of more than `most` paths, which is at least 1, in two, the first of which may still be too large:
+    /// first between the samples of all pixels, so that the picture is refined evenly. Pieces of pieces are of about
+    /// one size.
+    pub(in crate::render) fn split(self, most: u64) -> Option<(Self, Self)> {
+        if self.paths() <= most {
+            return None;
+        }
+        // The first of the fewest pieces that are small enough.
+        let first = |all: u32, most: u64| u64::from(all).div_ceil(u64::from(all).div_ceil(most)) as u32;
+        Some(match self {
+            Self::Uniform(b) if b.samples > 1 => {
+                let samples = first(b.samples, (most / u64::from(b.pixels)).max(1));
+                let rest = Batch { first_sample: b.first_sample + samples, samples: b.samples - samples, ..b };
+                (Self::Uniform(Batch { samples, ..b }), Self::Uniform(rest))
+            }
+            Self::Uniform(b) => {
+                let pixels = first(b.pixels, most);
+                let rest = Batch { first_pixel: b.first_pixel + pixels, pixels: b.pixels - pixels, ..b };
+                (Self::Uniform(Batch { pixels, ..b }), Self::Uniform(rest))
+            }
+            Self::Listed(r) => {
+                let paths = first(r.paths, most);
+                let rest = PathRange { first: r.first + u64::from(paths), paths: r.paths - paths, ..r };
+                (Self::Listed(PathRange { paths, ..r }), Self::Listed(rest))
+            }
+            Self::Start | Self::Reproject | Self::Allocate(_) | Self::Choose(_) => return None,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The pieces of at most so many paths, in order.
+    fn pieces(step: Step, most: u64) -> Vec<Step> {
+        match step.split(most) {
+            Some((head, rest)) => [pieces(head, most), pieces(rest, most)].concat(),
+            None => vec![step],
+        }
+    }
+
+    #[test]
+    fn pieces_are_small_enough_and_together_the_whole_in_order() {
+        let batch = Batch { first_pixel: 5, pixels: 30, first_sample: 2, samples: 7 };
+        let list = PathRange { first: 1 << 33, paths: 210, round: 1, rounds: 3 };
+        for most in [1, 7, 29, 30, 31, 61, 100, 209, 210, u64::MAX] {
+            let (mut next, mut end) = ([2; 30], 1 << 33);
+            for piece in pieces(Step::Uniform(batch), most) {
+                let Step::Uniform(b) = piece else { panic!("{piece:?}") };
+                assert!(piece.paths() <= most, "{most}: {piece:?}");
+                for at in &mut next[b.first_pixel as usize - 5..][..b.pixels as usize] {
+                    assert_eq!(*at, b.first_sample, "{most}: {piece:?}");
+                    *at += b.samples;
+                }
+            }
+            assert_eq!(next, [9; 30], "{most}");
+            for piece in pieces(Step::Listed(list), most) {
+                assert!(matches!(piece, Step::Listed(r) if r == PathRange { first: end, paths: r.paths, ..list }));
+                assert!((1..=most).contains(&piece.paths()), "{most}: {piece:?}");
+                end += piece.paths();
+            }
+            assert_eq!(end, (1 << 33) + 210);
+        }
+        let sizes = |most| pieces(Step::Listed(list), most).iter().map(Step::paths).collect::<Vec<_>>();
+        assert_eq!([sizes(209), sizes(100)], [vec![105, 105], vec![70, 70, 70]]);
+        assert_eq!(Step::Start.split(1), None);
+    }
 }
