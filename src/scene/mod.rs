@@ -42,6 +42,10 @@ pub use pose::{EnvironmentChange, MaterialChange, Pose, REBUILD_ABOVE, Vertices}
 pub use relit::Relit;
 pub use rig::Rig;
 
+/// Bytes that a triangle takes while the hierarchy over it is built, with what it is made of and its shading: 316 to
+/// build.
+const BYTES_OF_TRIANGLE: u64 = 400;
+
 /// Largest coordinate M of triangles, of points that rays start from and of lights. With it, all numbers of the triangle test
 /// fit a 32-bit float (3.4e38): seen from the ray's origin a corner is within 2 M, and sheared along the ray within 4 M; an edge
 /// function is within 2 (4 M)^2 = 32 M^2, and the numerator of the distance, three of them times a depth, within

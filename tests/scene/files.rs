@@ -215,6 +215,11 @@ fn without_memory_the_end_is_one_line() {
     for name in ["sparse.toml", "sparse.obj", "sparse.mtl"] {
         File::create(folder.path().join(name)).unwrap().set_len(3 << 30).unwrap();
     }
+    let head = "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 20000000\nproperty list uchar int vertex_indices\nend_header\n";
+    std::fs::write(folder.path().join("sparse.ply"), head).unwrap();
+    let ply = File::options().append(true).open(folder.path().join("sparse.ply")).unwrap();
+    ply.set_len(1 << 28).unwrap();
     std::fs::write(folder.path().join("library.obj"), format!("mtllib sparse.mtl\n{mapped}")).unwrap();
     let fails = |scene: &str, kib: u32, parts: &[&str]| complains(&render(&folder, scene, kib, ""), 4, parts);
     fails("sphere.toml", 4_000_000, &["sphere.toml: 16769024 triangles: needs 6.2 GiB of memory, "]);
@@ -223,8 +228,14 @@ fn without_memory_the_end_is_one_line() {
     fails("sky.toml", 1_500_000, &["sky.png: needs "]);
     fails("sparse.toml", 4_000_000, &["sparse.toml: needs 120.0 GiB of memory, "]);
     fails("library.obj", 4_000_000, &["sparse.mtl: needs 12.0 GiB of memory, "]);
+    // Reading its faces would take less.
+    fails("sparse.ply", 4_000_000, &["sparse.ply: 20000000 faces: needs 7.5 GiB of memory, "]);
     complains(&render(&folder, "sparse.obj", 4_000_000, ""), 3, &["sparse.obj, line 1: 64 MiB without a line feed"]);
     assert!(render(&folder, "mapped.obj", 4_000_000, "").status.success(), "control");
+    // A driver that runs out of addresses ends the process.
+    for kib in [300_000, 410_000, 470_000, 520_000, 560_000, 640_000, 720_000] {
+        fails("bare.toml", kib, &["the limit of the address space (ulimit -v)"]);
+    }
 }
 
 #[cfg(target_os = "linux")]

@@ -6,19 +6,16 @@ use super::soft::Soft;
 use super::sources::{Sources, mesh_name};
 use crate::error::{Error, Result};
 use crate::memory;
-use crate::scene::MAX_COORDINATE;
 use crate::scene::description::mesh::Mesh;
 use crate::scene::description::{self, MeshTable};
 use crate::scene::load::material::has_normal_map;
 use crate::scene::load::obj::ObjFile;
 use crate::scene::load::obj_part::Part;
+use crate::scene::{BYTES_OF_TRIANGLE, MAX_COORDINATE};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
-
-/// Bytes that a triangle takes while the hierarchy over it is built, with what it is made of and its shading: 316 to build.
-const BYTES_OF_TRIANGLE: u64 = 400;
 
 /// Triangles that a thread places at a time, and how many such parts are placed before they are put together.
 const PART: usize = 1 << 14;

@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::image::{contained, input};
 use crate::math::srgb::linear_from_srgb;
 use crate::memory;
+use crate::scene::BYTES_OF_TRIANGLE;
 use crate::scene::description::mesh::Mesh;
 use flate2::read::GzDecoder;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
@@ -61,8 +62,10 @@ fn parse(path: &Path, reader: &mut dyn BufRead, size: u64, numbering: Numbering)
     let header = Parser::<Vertex>::new().read_header(&mut file.reader).map_err(|e| about(file.damaged(&e)))?;
     check(&header, size).map_err(about)?;
     let count = |name| header.elements.get(name).map_or(0, |e| e.count as u64);
-    let bytes = count("vertex") * BYTES_OF_VERTEX + (count("face") + count("tristrips")) * BYTES_OF_FACE;
-    memory::need(path.display(), bytes)?;
+    let (vertices, faces) = (count("vertex"), count("face") + count("tristrips"));
+    let read = vertices * BYTES_OF_VERTEX + faces * BYTES_OF_FACE;
+    // A face is a triangle or more, and what those need is known before minutes are spent on reading them.
+    memory::need(format!("{}: {faces} faces", path.display()), read.max(faces * BYTES_OF_TRIANGLE))?;
     file.mesh(&header, numbering).map_err(about)
 }
 
