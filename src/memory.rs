@@ -7,6 +7,12 @@ use sysinfo::{MemoryRefreshKind, System};
 /// Less than this is there, or nothing is: asking the system takes a hundred microseconds.
 const SMALL: u64 = 1 << 20;
 
+/// Addresses that lavapipe takes on two cores from its start to its first kernel, 700 MiB with heaps for threads, of
+/// which it can do without some; with less than this it ends the process.
+const DRIVER: u64 = 512 << 20;
+/// Those of them that it may take once its device is open.
+const OPEN_DRIVER: u64 = 256 << 20;
+
 /// Checks that `needed` bytes are free on the machine, in the process's control group and in its address space.
 ///
 /// # Errors
@@ -21,11 +27,41 @@ pub fn check(needed: u64) -> std::result::Result<(), String> {
     let group = system.cgroup_limits().map_or(u64::MAX, |limits| limits.total_memory.saturating_sub(limits.rss));
     // 0 means that the system does not tell.
     let machine = Some(system.available_memory()).filter(|&bytes| bytes > 0).unwrap_or(u64::MAX);
-    let free = machine.min(group).min(free_addresses().unwrap_or(u64::MAX));
-    if needed > free {
-        return Err(format!("needs {} of memory, {} are free", readable(needed), readable(free)));
+    let (free, addresses) = (machine.min(group), free_addresses().unwrap_or(u64::MAX));
+    if needed <= free.min(addresses) {
+        return Ok(());
     }
-    Ok(())
+    let limit = if addresses < free { " within the limit of the address space (ulimit -v)" } else { "" };
+    Err(format!("needs {} of memory, {} are free{limit}", readable(needed), readable(free.min(addresses))))
+}
+
+/// As [`check`] once a device is open. Drivers that run out of addresses end the process, so that what one still takes
+/// is left to it.
+///
+/// # Errors
+/// As [`check`].
+pub fn check_beside_driver(needed: u64) -> std::result::Result<(), String> {
+    check(needed.saturating_add(free_addresses().map_or(0, |_| OPEN_DRIVER)))
+}
+
+/// Checks, under a limit of the address space, that a driver on the CPU can start.
+///
+/// # Errors
+/// [`Error::Memory`].
+pub fn check_driver() -> Result<()> {
+    match free_addresses() {
+        Some(free) if free < DRIVER => Err(Error::Memory(format!(
+            "opening a device needs {} of addresses, {} are free: raise the limit of the address space (ulimit -v)",
+            readable(DRIVER),
+            readable(free)
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// What else may be wrong where a driver does not start: nothing without a limit of the address space.
+pub fn or_out_of_addresses() -> &'static str {
+    if free_addresses().is_some() { "; or memory is out: raise the limit of the address space (ulimit -v)" } else { "" }
 }
 
 /// As [`check`], with an error about `what`, such as a file.

@@ -164,7 +164,7 @@ fn check_room(args: &Args, gpu: &Gpu, claim: &Claim) -> Result<()> {
     let bytes = bytes_needed(args, claim, gpu.info().unified);
     let refused =
         |what| format!("{}: filtering its {} x {} pixels {what}", args.image.display(), claim.size[0], claim.size[1]);
-    memory::check(bytes).map_err(|what| Error::Memory(refused(what)))
+    memory::check_beside_driver(bytes).map_err(|what| Error::Memory(refused(what)))
 }
 
 /// Checks the paths of the outputs. They may include the image itself.

@@ -358,7 +358,7 @@ pub fn check_room(denoise: Option<Method>, settings: &Settings, gpu: &Gpu) -> Re
     let while_filtered = denoise.map_or(0, |method| denoise::host_bytes(method, settings, unified));
     let bytes = film::host_bytes(settings, unified).max(while_filtered);
     let refused = |what| format!("a film of {} x {} {what}: choose a smaller film", size[0], size[1]);
-    memory::check(bytes).map_err(|what| Error::Device(refused(what)))?;
+    memory::check_beside_driver(bytes).map_err(|what| Error::Device(refused(what)))?;
     denoise.map_or(Ok(()), |_| filter::check_size(gpu, size, filter::GUIDE_TEXELS))
 }
 

@@ -197,7 +197,8 @@ impl<'a> Session<'a> {
         let filters = points.iter().filter_map(|&point| self.candidates[point].filter);
         let filtered = filters.map(|filter| host_bytes(filter, settings, unified)).max().unwrap_or(0);
         let bytes = film::host_bytes(settings, unified).max(filtered);
-        memory::check(bytes).map_err(|what| Error::Memory(format!("rendering {what}: choose a smaller film")))
+        memory::check_beside_driver(bytes)
+            .map_err(|what| Error::Memory(format!("rendering {what}: choose a smaller film")))
     }
 
     fn measured(&self, shot: usize, seed: u32, point: usize, rendered: &Rendered) -> Result<Measured> {

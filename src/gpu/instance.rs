@@ -1,6 +1,7 @@
 //! The Vulkan loader and instance, with the validation layers if they are requested.
 use super::At;
 use crate::error::{Error, Result};
+use crate::memory;
 use ash::{ext, vk};
 use std::ffi::{CStr, c_void};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -24,8 +25,9 @@ pub(super) struct Instance {
 
 impl Instance {
     /// # Errors
-    /// No loader, no Vulkan 1.3, or `validation` without the layers installed.
+    /// No loader, no Vulkan 1.3, `validation` without the layers installed, or too small an address space.
     pub fn new(validation: bool) -> Result<Self> {
+        memory::check_driver()?;
         let entry = load()?;
         let debug_utils = offers(&entry, None, ext::debug_utils::NAME)?;
         if validation && !(debug_utils && has_validation(&entry)?) {

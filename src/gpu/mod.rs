@@ -59,6 +59,7 @@ pub use timing::{Calibration, PassTime, host_ns};
 pub use tuning::Tuning;
 
 use crate::error::{Error, Result};
+use crate::memory::or_out_of_addresses;
 use ash::vk;
 
 /// Adds to a Vulkan error what was being done when it occurred.
@@ -90,7 +91,8 @@ fn explain(what: &str, code: vk::Result) -> Error {
             format!("{what}: out of memory: choose a smaller film or scene, or a device with more memory")
         }
         vk::Result::ERROR_INITIALIZATION_FAILED => {
-            format!("{what}: the driver failed to start: check that it matches the running system")
+            let or = or_out_of_addresses();
+            format!("{what}: the driver failed to start: check that it matches the running system{or}")
         }
         other => format!("{what}: Vulkan returned {other:?}"),
     })

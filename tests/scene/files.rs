@@ -203,7 +203,13 @@ fn without_memory_the_end_is_one_line() {
     let lamps = (0..4000).fold(lit.to_owned(), |text, _| text + "[[instance]]\nmesh = \"m\"\n");
     let pictures: String = (0..2).map(|i| format!("newmtl m{i}\nmap_Kd {i}.png\n")).collect();
     let mapped = format!("mtllib m.mtl\n{TRIANGLE}usemtl m0\nf 1//1 2//1 3//1\nusemtl m1\nf 1//1 2//1 3//1\n");
-    let files = [("sphere.toml", sphere), ("lamps.toml", &lamps), ("m.mtl", &pictures), ("mapped.obj", &mapped)];
+    let files = [
+        ("sphere.toml", sphere),
+        ("lamps.toml", &lamps),
+        ("m.mtl", &pictures),
+        ("mapped.obj", &mapped),
+        ("bare.toml", "[environment]"),
+    ];
     let folder = folder(&files);
     std::fs::write(folder.path().join("sky.toml"), "[environment]\nfile = \"sky.png\"\n").unwrap();
     let sky = image::GrayImage::new(16_384, 8192);
