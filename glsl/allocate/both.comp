@@ -1,7 +1,7 @@
 #include "shared/thread.glsl"
 
-// Computes the priority of ROWS pixels of a column per thread (they share most of their neighbours), from the pixel
-// statistics and the words of likeness.comp. The priority is the noise of the samples, estimated over the neighbours that
+// Computes the priority of ROWS pixels of a column per thread, a stride apart (they share most of their neighbours, which are a
+// stride apart too), from the pixel statistics and the words of likeness.comp. The priority is the noise of the samples, estimated over the neighbours that
 // look alike, less what a geometry-aware filter will remove. A filter that gathers a share W of its window divides the
 // variance of indirect light, which is all that it filters, by about 1 + W (pixels - 1). The deviation that remains needs
 // samples. While the noise is unknown, geometry alone decides.
@@ -63,21 +63,22 @@ vec4 with_means(Surroundings s) {
 
 void main() {
     ivec2 size = ivec2(push.size);
-    int thread = int(thread_index()), x = thread % size.x, first = thread / size.x * ROWS;
+    int stride = int(push.stride), thread = int(thread_index()), x = thread % size.x, run = thread / size.x;
+    int first = run / stride * ROWS * stride + run % stride;
     if (first >= size.y) return;
     uint word[ROWS];
     vec4 own[ROWS];
     vec3 mean[ROWS];
     Surroundings s[ROWS];
     [[unroll]] for (int k = 0; k < ROWS; k++) {
-        int i = min(first + k, size.y - 1) * size.x + x;
+        int i = min(first + k * stride, size.y - 1) * size.x + x;
         word[k] = texelFetch(words, i).x;
         own[k] = moments(uint(i), mean[k]);
         s[k] = Surroundings(vec4(0.0), vec4(0.0), 0.0, 0.0, 0.0, 0.0);
     }
     [[unroll]] for (int row = -1; row <= ROWS; row++) {
         for (int column = -1; column <= 1; column++) {
-            ivec2 at = ivec2(x + column, first + row), q = clamp(at, ivec2(0), size - 1);
+            ivec2 at = ivec2(x, first) + ivec2(column, row) * stride, q = clamp(at, ivec2(0), size - 1);
             vec3 their_mean;
             uint pixel = uint(q.y * size.x + q.x);
             vec4 m = moments(pixel, their_mean);
@@ -95,6 +96,7 @@ void main() {
         // All noise counts as indirect while it is unknown.
         float indirect = s[k].around.x > 0.0 ? s[k].indirect / s[k].around.x : 1.0;
         float left = sqrt(max(1.0 - push.filtered * gathered_of(word[k]) * indirect, 0.0));
-        if (first + k < size.y) priority[(first + k) * size.x + x] = noise(own[k], with_means(s[k])) * left;
+        int y = first + k * stride;
+        if (y < size.y) priority[y * size.x + x] = noise(own[k], with_means(s[k])) * left;
     }
 }

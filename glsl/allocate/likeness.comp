@@ -1,7 +1,7 @@
 #include "shared/thread.glsl"
 
 // Packs one word per pixel and thread out of the guides (likeness_bits.glsl): the share of its window that a filter will
-// gather, and how alike each of the eight neighbours is. Where a filter will follow, geometry.comp has left the pixel's
+// gather, and how alike each of the eight neighbours is, which are a stride apart. Where a filter will follow, geometry.comp has left the pixel's
 // importance, a float, in the word.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform usamplerBuffer guides; // of Guide
@@ -41,7 +41,7 @@ void main() {
     uint word = uint(rounded);
     Appearance here = appearance_at(i);
     for (int n = 0; n < 9; n++) {
-        ivec2 q = clamp(at + ivec2(n % 3, n / 3) - 1, ivec2(0), size - 1);
+        ivec2 q = clamp(at + (ivec2(n % 3, n / 3) - 1) * int(push.stride), ivec2(0), size - 1);
         word |= kinship(here, appearance_at(uint(q.y * size.x + q.x))) << kinship_bit(n);
     }
     words[i] = word;

@@ -71,7 +71,8 @@ impl PolicyPass for Both {
 
     fn record(&self, rec: &mut Recorder, b: &Inputs, push: &PriorityPush) -> Result<()> {
         let bind = both::Bind { stats: b.stats, words: &self.words, priority: b.priority, light: b.light };
-        rec.dispatch_threads(&self.join, bind, push, push.size[0] * push.size[1].div_ceil(both::ROWS as u32))
+        let rows = push.stride * push.size[1].div_ceil(push.stride * both::ROWS as u32);
+        rec.dispatch_threads(&self.join, bind, push, push.size[0] * rows)
     }
 }
 
@@ -139,8 +140,14 @@ mod tests {
     fn a_filter_removes_the_noise_of_indirect_light_alone() {
         // One pixel: gathered is 1, so that a filter of share 0.5 leaves half of the variance of indirect light. Radiance 3 of
         // which 1 is direct; of the squared deviations 8, indirect light has 4.
-        let push =
-            PriorityPush { size: [1, 1], window: 2, luminance_floor: -1.0, limit: 99, ..PriorityPush::default() };
+        let push = PriorityPush {
+            size: [1, 1],
+            window: 2,
+            luminance_floor: -1.0,
+            limit: 99,
+            stride: 1,
+            ..PriorityPush::default()
+        };
         let of = |indirect_m2: f32, filtered: f32| {
             let light =
                 [PixelLight { direct: [1.0; 3], albedo: [0.5; 3], indirect_m2, remainder: 0, ..Default::default() }];
@@ -159,7 +166,14 @@ mod tests {
 
     /// Noise of two pixels in one row whose albedos differ by `albedo`.
     fn pair(stats: [PixelStats; 2], albedo: f32) -> [f32; 2] {
-        let push = PriorityPush { size: [2, 1], window: 2, luminance_floor: 0.0, limit: 99, ..PriorityPush::default() };
+        let push = PriorityPush {
+            size: [2, 1],
+            window: 2,
+            luminance_floor: 0.0,
+            limit: 99,
+            stride: 1,
+            ..PriorityPush::default()
+        };
         let guide = [0.0, albedo].map(|albedo| Guide { albedo: [albedo; 3], ..Guide::default() });
         let light = [PixelLight::default(); 2];
         reference(&HostInputs { guide: &guide, stats: &stats, light: &light, priority: &[], push }).try_into().unwrap()

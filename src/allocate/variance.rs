@@ -50,11 +50,13 @@ pub(super) fn moments(s: &PixelStats) -> [f32; 4] {
     [(s.m2[0] + s.m2[1] + s.m2[2]) / 3.0, n - 1.0, luminance(s.mean).min(MAX_LUMINANCE) * n, n]
 }
 
-/// The pixels of the 3 x 3 square around one that lie on the film, row by row.
+/// One pixel and the eight around it, a stride apart, that lie on the film, row by row.
 pub(super) fn square(push: &PriorityPush, pixel: usize) -> impl Iterator<Item = usize> {
-    let [width, height] = push.size.map(|n| n as usize);
+    let [width, height, stride] = [push.size[0], push.size[1], push.stride].map(|n| n as usize);
     let [x, y] = [pixel % width, pixel / width];
-    let beside = |at: usize, end: usize| at.saturating_sub(1)..=(at + 1).min(end - 1);
+    let beside = move |at: usize, end: usize| {
+        (0..3).filter_map(move |k| (at + k * stride).checked_sub(stride)).filter(move |&at| at < end)
+    };
     beside(y, height).flat_map(move |y| beside(x, width).map(move |x| y * width + x))
 }
 
@@ -93,6 +95,7 @@ mod tests {
             position_scale: 1.0,
             luminance_floor: 1.0,
             limit: 100,
+            stride: 1,
             ..Default::default()
         }
     }

@@ -23,6 +23,8 @@ gpu_structs! {
         filtered: float,
         /// Rounds before this one, each of which gives a pixel one sample or none; `threshold.comp` alone reads it.
         round: uint,
+        /// Distance in pixels, along both axes, of the pixels whose samples tell of one's noise: `indirect_stride`, at least 1.
+        stride: uint,
     }
 
     /// Push constants of `choose.comp`, which gives pixels one sample or none.

@@ -20,6 +20,7 @@ pub fn priority_push(scene: &Scene, s: &Settings) -> PriorityPush {
         threshold: a.noise_threshold,
         filtered: a.both.filtered,
         round: 0,
+        stride: s.indirect_stride,
         ..Default::default()
     }
 }

@@ -64,6 +64,31 @@ fn what_is_traced_is_that_of_a_whole_render() {
     assert_silent(&gpu);
 }
 
+/// Pixels that get samples by their noise keep the mean light of those that get them evenly: what a path rarely finds is not missed
+/// because pixels around, which trace none of it, show no noise.
+#[test]
+fn placed_samples_lose_no_light_of_the_pixels_that_are_traced() {
+    let gpu = gpu();
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.toml");
+    let indirect = |policy: &str, stride: u32| {
+        let scene = Scene::load(&file).unwrap().with(|s| {
+            ([s.width, s.height], s.spp, s.max_depth, s.indirect_stride) = ([48, 48], 16, 3, stride);
+            s.allocate.policy = tallow::allocate::policy(policy).unwrap();
+        });
+        let (stats, light, _) = rendered(&gpu, &scene, u32::MAX);
+        let one = |(stats, light): (&PixelStats, &PixelLight)| f64::from(stats.mean[1] - light.direct[1]);
+        stats.iter().zip(&light).map(one).sum::<f64>()
+    };
+    for stride in [2, 4] {
+        let expected = indirect("uniform", stride);
+        for policy in ["variance", "both"] {
+            let ratio = indirect(policy, stride) / expected;
+            assert!((0.98..1.02).contains(&ratio), "{policy}, stride {stride}: {ratio}");
+        }
+    }
+    assert_silent(&gpu);
+}
+
 /// A floor below a sky that lights all of it alike, and a wall in whose place the light is another: pixels that are filled in get the
 /// light of their surface.
 #[test]

@@ -308,7 +308,9 @@ fn policies_agree_with_their_references() {
         let lights = Buffer::from_slice(&gpu, "light", &light).unwrap();
         let priority = Buffer::new(&gpu, "priority", pixels, Location::Device).unwrap();
         let mut frame = FrameResources::new(&gpu).unwrap();
-        for (window, luminance_floor, threshold) in [(2, 0.05, 0.0), (4, -1.0, 0.0), (5, 0.1, 0.3), (10, 1.0, 0.1)] {
+        for (window, luminance_floor, threshold, stride) in
+            [(2, 0.05, 0.0, 1), (4, -1.0, 0.0, 2), (5, 0.1, 0.3, 3), (10, 1.0, 0.1, 8)]
+        {
             let push = PriorityPush {
                 size: [width, height],
                 window,
@@ -319,6 +321,7 @@ fn policies_agree_with_their_references() {
                 threshold,
                 filtered: 0.9,
                 round: 0,
+                stride,
                 ..Default::default()
             };
             for row in POLICIES {
