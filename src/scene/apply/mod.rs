@@ -11,6 +11,8 @@ impl Scene {
     /// Changes what the pose names. Rigid motion builds the top level of the hierarchy anew and nothing else. A deformed mesh keeps
     /// the shape of its hierarchy, whose boxes are fitted to it, until that costs too much: see [`Pose::rebuild_above`].
     ///
+    /// What is named and is as it was counts as unchanged, a camera aside: a scene at rest changes nothing.
+    ///
     /// The scene is that of the same description loaded in this pose, up to the order of triangles in a hierarchy that was not
     /// built anew. Other edits of the arrays that a pose changes are lost. [`Renderer::update`](crate::render::Renderer::update)
     /// brings it to the device.

@@ -16,7 +16,7 @@ use std::collections::HashSet;
 
 type Checked<T> = Result<T, String>;
 
-/// What is new.
+/// What is new: what a pose names that is as it was is left out, so that nothing counts as changed that is at rest.
 #[derive(Default)]
 pub struct Next {
     pub meshes: Vec<NextMesh>,
@@ -37,6 +37,12 @@ pub struct NextCopies {
     pub world: Bounds,
 }
 
+impl NextCopies {
+    fn are_new(&self, scene: &Scene) -> bool {
+        self.hidden != scene.rig.hidden || self.all != copies(scene)
+    }
+}
+
 /// A mesh in another pose.
 pub struct NextMesh {
     /// Index of its tree.
@@ -45,6 +51,12 @@ pub struct NextMesh {
     pub bounds: Bounds,
     /// What identifies the vertices.
     pub pose: String,
+}
+
+impl NextMesh {
+    fn is_new(&self, scene: &Scene) -> bool {
+        scene.rig.trees[self.tree].soft.as_ref().is_none_or(|soft| soft.pose != self.pose)
+    }
 }
 
 impl Next {
@@ -57,7 +69,9 @@ impl Next {
             return Err("the scene was neither loaded nor built from a description: only its camera can move".into());
         }
         each_once(pose.meshes.iter().map(|(mesh, _)| *mesh))?;
-        let meshes = pose.meshes.iter().map(|(mesh, to)| next_mesh(scene, *mesh, to)).collect::<Checked<Vec<_>>>()?;
+        let mut meshes =
+            pose.meshes.iter().map(|(mesh, to)| next_mesh(scene, *mesh, to)).collect::<Checked<Vec<_>>>()?;
+        meshes.retain(|mesh| pose.rebuild_above == 0.0 || mesh.is_new(scene));
         let materials = next_materials(scene, pose)?;
         let copies = match moves {
             true => Some(next_copies(scene, pose, &meshes, materials.as_deref().unwrap_or(&scene.materials))?),
@@ -71,6 +85,7 @@ impl Next {
             let camera = pose.camera.as_ref().unwrap_or(&scene.view);
             camera.build([1, 1], bounds).map_err(|what| format!("camera: {what}"))?;
         }
+        let copies = copies.filter(|copies| !meshes.is_empty() || copies.are_new(scene));
         Ok(Self { meshes, copies, materials, lights: next_lights(scene, pose)? })
     }
 }
@@ -206,7 +221,7 @@ fn next_materials(scene: &Scene, pose: &Pose) -> Checked<Option<Vec<Material>>> 
         let m = materials.get_mut(*index).ok_or_else(|| format!("material {index} of {count}: there is none"))?;
         *m = changed(m, to).map_err(|what| format!("material {index}: {what}"))?;
     }
-    Ok(Some(materials))
+    Ok((materials != scene.materials).then_some(materials))
 }
 
 fn next_lights(scene: &Scene, pose: &Pose) -> Checked<Option<Vec<Light>>> {
@@ -224,7 +239,7 @@ fn next_lights(scene: &Scene, pose: &Pose) -> Checked<Option<Vec<Light>>> {
         let sky = sky.ok_or("the scene has no environment that could change")?;
         lights[sky] = next_sky(&lights[sky], to)?;
     }
-    Ok(Some(lights))
+    Ok((lights != scene.rig.lights).then_some(lights))
 }
 
 fn next_sky(sky: &Light, to: &EnvironmentChange) -> Checked<Light> {
