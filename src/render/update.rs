@@ -25,13 +25,15 @@ impl Renderer {
     ///
     /// # Errors
     /// [`Error::Usage`] with the first effect that the scene calls for now and that was not compiled: make the renderer with it, by
-    /// [`Renderer::specialised`]. Nothing has changed then. [`Error::Usage`] also for a camera that cannot be; [`Error::Device`].
+    /// [`Renderer::specialised`]. Nothing has changed then. [`Error::Usage`] also for a camera that cannot be, and for a scene of its own
+    /// whose hierarchy is deeper, such as one that was loaded in another pose; [`Error::Device`].
     pub fn update(&mut self, rec: &mut Recorder, scene: &Scene, change: &Change) -> Result<()> {
         self.check_effects(scene, change)?;
         if scene.stack > self.stack {
             let (needs, has) = (scene.stack, self.stack);
             return Err(Error::Usage(format!(
-                "this renderer was made for a stack of {has}, and the scene needs {needs}"
+                "the scene's hierarchy needs a stack of {needs}, and this renderer was made for another scene, with one of {has}: \
+                 make a new renderer, or apply the pose to the scene that it was made for"
             )));
         }
         let mut constants = frame_constants(scene, &self.settings)?;

@@ -1,6 +1,7 @@
 //! Tests that the picture of a pose is that of a scene which was loaded in it, bit for bit, whether trees were refitted or built.
 use crate::poses::{MOMENTS, Moment, at, pose};
 use crate::support::{assert_silent, gpu, render, stats};
+use std::path::Path;
 use tallow::error::Error;
 use tallow::gpu::{FrameResources, Gpu};
 use tallow::layout::{Effects, PixelStats};
@@ -146,6 +147,20 @@ fn a_recording_that_was_thrown_away_is_made_up_for() {
     gpu.run(&mut frame, |rec| renderer.update(rec, &scene, &change)).unwrap();
     assert!(render(&gpu, &renderer) == fresh(&gpu, &scene));
     assert_silent(&gpu);
+}
+
+#[test]
+fn a_scene_that_needs_a_deeper_stack_is_told_what_to_do() {
+    let gpu = gpu();
+    let text = "[film]\nwidth = 8\nheight = 8\n[environment]\nradiance = 1\n[[mesh]]\nshape = 'rectangle'\n";
+    let (small, other) = (Scene::parse(Path::new("small.toml"), text).unwrap(), at(&Moment::default()));
+    assert!(other.stack > small.stack, "control");
+    let effects = all_effects(&other, &small.settings);
+    let mut renderer = Renderer::specialised(&gpu, &small, &small.settings, OUTPUTS, effects).unwrap();
+    let mut frame = FrameResources::new(&gpu).unwrap();
+    let told = gpu.run(&mut frame, |rec| renderer.update(rec, &other, &Change::everything(&other))).unwrap_err();
+    let told = told.to_string();
+    assert!(told.contains("make a new renderer, or apply the pose to the scene that it was made for"), "{told}");
 }
 
 #[test]
