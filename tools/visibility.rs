@@ -2,17 +2,16 @@
 //! alike, in which nothing lies within a given distance of the first hit. This is not light transport, so no kernel
 //! computes it; the CPU twins of the kernels do.
 use crate::compare::Picture;
-use glam::{Vec3, vec2};
+use glam::vec2;
 use rayon::prelude::*;
 use std::path::Path;
 use tallow::layout::{Camera, NONE};
 use tallow::math::warp::warp_sphere;
 use tallow::scene::Scene;
 use tallow::twins::camera::{camera_ray, film_from_pixel};
-use tallow::twins::light::INFINITE_DISTANCE;
 use tallow::twins::sampler::{sample_2d, sampler_start};
 use tallow::twins::surface::surface_at;
-use tallow::twins::traverse::traverse_from;
+use tallow::twins::traverse::{light_left, traverse_from};
 
 /// Renders the scene's film with `spp` samples per pixel. `reach` is the distance in world units.
 ///
@@ -34,9 +33,7 @@ fn sample(scene: &Scene, camera: &Camera, size: [u32; 2], pixel: u32, index: u32
     let random = sampler_start(pixel, index, 0, false);
     let at = vec2((pixel % size[0]) as f32, (pixel / size[0]) as f32) + sample_2d(random, 0);
     let ray = camera_ray(camera, film_from_pixel(at, size), vec2(0.5, 0.5));
-    let meets =
-        |from, origin: Vec3, direction, t_max, any| traverse_from(scene, from, origin, direction, t_max, any, 0);
-    let hit = meets([NONE; 2], ray.origin, ray.direction, INFINITE_DISTANCE, false);
+    let hit = traverse_from(scene, [NONE; 2], ray.origin, ray.direction, 0);
     if !hit.any() {
         return 1.0;
     }
@@ -44,6 +41,5 @@ fn sample(scene: &Scene, camera: &Camera, size: [u32; 2], pixel: u32, index: u32
     let normal = if s.geometric.dot(ray.direction) > 0.0 { -s.geometric } else { s.geometric };
     let sphere = warp_sphere(sample_2d(random, 1));
     let direction = if sphere.dot(normal) < 0.0 { -sphere } else { sphere };
-    let blocker = meets([hit.triangle, hit.instance], s.ray_origin(normal), direction, reach, true);
-    f32::from(!blocker.any())
+    light_left(scene, [hit.triangle, hit.instance], s.ray_origin(normal), direction, reach, 0).x
 }

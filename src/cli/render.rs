@@ -66,8 +66,8 @@ pub struct Args {
     /// Filter the image as `tallow filter` does with the file; the noisy one stays as the layer "Noisy Image"
     #[arg(long, value_name = "FILTER")]
     pub denoise: Option<Method>,
-    /// Render the best image within a GPU time, such as 200ms, 2s or "1m 30s": a short probe of the scene on this device tells how many
-    /// samples fit, and whether to filter (with --denoise, that filter is taken)
+    /// Render the best image within a GPU time, such as 200ms, 2s or "1m 30s": a probe of the scene on this device, which is not part of
+    /// that time and may take longer, tells how many samples fit, and whether to filter (with --denoise, that filter is taken)
     #[arg(long, value_name = "DURATION", value_parser = planned::duration,
           conflicts_with_all = ["error", "spp", "resume", "pixel"])]
     pub time: Option<Duration>,

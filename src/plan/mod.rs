@@ -25,6 +25,9 @@ use forecast::Forecast;
 use probe::{Level, Probe};
 use serde::{Deserialize, Serialize};
 
+/// Share of the planned time by which a render may be off before that is told.
+const MISS: f64 = 0.25;
+
 /// Version of a plan's file.
 const VERSION: u32 = 1;
 
@@ -229,6 +232,17 @@ impl Plan {
         known.map(Some).ok_or_else(|| Error::Usage(format!("the plan's filter \"{name}\" is not known")))
     }
 
+    /// A line on a render that took so many milliseconds of GPU time, where that is far from the planned time.
+    pub fn missed(&self, took_ms: f64) -> Option<String> {
+        let (planned, device) = (self.chosen.gpu_ms, &self.device);
+        ((took_ms - planned).abs() > MISS * planned).then(|| {
+            format!(
+                "the render took {took_ms:.1} ms of GPU time, where {planned:.1} ms were planned on {device}: times are kept where no \
+                 other program uses the device"
+            )
+        })
+    }
+
     /// What was chosen and why, in one line each.
     pub fn reasons(&self) -> Vec<String> {
         let of = |e: &Expected| {
@@ -248,4 +262,28 @@ impl Plan {
 /// What a render chooses among that names no filter: none, and `auto`.
 pub fn usual_methods() -> Vec<Method> {
     ["none", "auto"].iter().filter_map(|name| filter::find(name)).map(Method::Kernels).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_is_missed_by_more_than_a_quarter() {
+        let chosen = Expected { denoise: None, spp: 1, gpu_ms: 100.0, relmse: 0.1 };
+        let plan = Plan {
+            version: VERSION,
+            target: Target::GpuMs(110.0),
+            scene: String::new(),
+            device: "a device".to_owned(),
+            settings: Settings::default(),
+            chosen,
+            others: Vec::new(),
+            probe_ms: 1.0,
+        };
+        let told = [70.0, 80.0, 120.0, 130.0].map(|ms| plan.missed(ms).is_some());
+        assert_eq!(told, [true, false, false, true]);
+        let line = plan.missed(130.0).unwrap();
+        assert!(line.contains("130.0 ms") && line.contains("100.0 ms were planned on a device"), "{line}");
+    }
 }

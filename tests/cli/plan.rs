@@ -33,6 +33,13 @@ fn a_plan_is_rendered_and_rendered_again_to_the_same_bits() {
     assert_eq!(json["samples"].as_u64().unwrap(), 33 * 32 * plan["chosen"]["spp"].as_u64().unwrap());
     let picture = |name: &str| image::read(&folder.path().join(name)).unwrap().picture(None).unwrap().pixels;
     assert!(picture("a.exr") == picture("b.exr"));
+    // A time that is far from the planned one is told.
+    let long = plan["chosen"]["gpu_ms"].as_f64().unwrap() * 1000.0;
+    let mut slow = plan.clone();
+    slow["chosen"]["gpu_ms"] = long.into();
+    std::fs::write(folder.path().join("slow.json"), slow.to_string()).unwrap();
+    let missed = stdout(&render(&folder, SCENE, "--plan slow.json -o b.exr"));
+    assert!(missed.contains(&format!("where {long:.1} ms were planned")), "{missed}");
     // Control: other samples are other bits.
     assert!(render(&folder, SCENE, &format!("{SMALL} --error 0.02 --seed 7 -o c.exr")).status.success());
     assert!(picture("a.exr") != picture("c.exr"));

@@ -484,7 +484,7 @@ fn highlights_do_not_smear() {
 #[test]
 fn textures_do_not_smear() {
     let gpu = gpu();
-    let picture = |x: u32, y: u32| [if (x / 3 + y / 5) % 2 == 0 { 230 } else { 20 }, 120, 60];
+    let picture = |x: u32, y: u32| [if (x / 3 + y / 5).is_multiple_of(2) { 230 } else { 20 }, 120, 60];
     let mut scene = Workplace::new().picture("stripes.png", 64, picture).scene(
         "[camera]\nposition = [0.0, 0.4, 3.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 45.0\n[environment]\nradiance = 1.0\n\
          [[material]]\nname = 'striped'\ncolor_texture = 'stripes.png'\n\

@@ -53,7 +53,7 @@ pub struct Summary {
     pub gpu_ms: f64,
     /// GPU time by pass.
     pub passes: Vec<PassRow>,
-    /// What the filter says of its work: pixels that were cut, the error that it expects.
+    /// What the filter says of its work: pixels that were cut, the error that it expects. Whether the time was far from the planned one.
     pub notes: Vec<String>,
     /// What was repaired in the scene.
     pub warnings: Vec<String>,
@@ -84,6 +84,9 @@ impl Outcome<'_> {
     pub fn summary(&self, written: &[PathBuf]) -> Summary {
         let Self { gpu, scene, film, host, status, counters, plan, notes } = self;
         let counts = film::counts(film, "samples").unwrap_or_default();
+        let gpu_ms = status.times.iter().map(|pass| pass.duration_ns() as f64 * 1e-6).sum();
+        let whole = status.stopped != StopReason::Interrupted;
+        let missed = plan.as_ref().filter(|_| whole).and_then(|plan| plan.missed(gpu_ms));
         Summary {
             files: written.iter().map(|f| f.display().to_string()).collect(),
             width: film.width,
@@ -102,9 +105,9 @@ impl Outcome<'_> {
             seconds: host.seconds("render"),
             filter_seconds: host.seconds("denoise"),
             device: gpu.info().name.clone(),
-            gpu_ms: status.times.iter().map(|pass| pass.duration_ns() as f64 * 1e-6).sum(),
+            gpu_ms,
             passes: table::summarise(&status.times),
-            notes: notes.clone(),
+            notes: notes.iter().cloned().chain(missed).collect(),
             warnings: scene.warnings.clone(),
         }
     }
