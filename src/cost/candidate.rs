@@ -1,6 +1,7 @@
 //! Methods that are compared, each with its curves of error against time.
 use super::curve::Curve;
 use super::document::{Method, Point};
+use super::interval;
 use super::summary::curves;
 use std::collections::BTreeMap;
 
@@ -13,15 +14,15 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    /// Times that the curves of all seeds cover.
+    /// When the first and the last image are ready: medians over the seeds, because one slow run says nothing of a method.
     pub(super) fn times(&self) -> [f64; 2] {
-        let covered = |[low, high]: [f64; 2], [first, last]: [f64; 2]| [low.max(first), high.min(last)];
-        self.curves.values().map(Curve::times).fold([0.0, f64::INFINITY], covered)
+        [0, 1].map(|end| {
+            interval::median(&self.curves.values().map(|curve| curve.times()[end]).collect::<Vec<_>>(), 0.0).value
+        })
     }
 
-    pub(super) fn covers(&self, time: f64) -> bool {
-        let [first, last] = self.times();
-        (first..=last).contains(&time)
+    pub(super) fn begins_by(&self, time: f64) -> bool {
+        self.times()[0] <= time
     }
 
     /// Mean logarithm of what `read` finds on every curve.
@@ -45,8 +46,7 @@ impl Candidate {
 /// same point without them.
 pub(super) fn candidates(points: &[Point]) -> Vec<Candidate> {
     let mut groups: Vec<(Method, Vec<&Point>)> = Vec::new();
-    let is_measured = |point: &&Point| point.failed.is_none() && point.method.spp > 0 && !point.runs.is_empty();
-    for point in points.iter().filter(is_measured) {
+    for point in points.iter().filter(|point| point.is_compared() && !point.ends_at_0()) {
         let method = Method { spp: 0, ..point.method.clone() };
         match groups.iter_mut().find(|(found, _)| *found == method) {
             Some((_, points)) => points.push(point),

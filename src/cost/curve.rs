@@ -56,7 +56,36 @@ impl Curve {
         }
     }
 
-    /// The earliest time at which the error is reached, in the same way.
+    /// Error at a time between the ends; before the first image it is the first one's, and behind the last image the last one's.
+    pub fn kept_at(&self, time: f64) -> f64 {
+        let [first, last] = self.times();
+        self.error_at(time.clamp(first, last)).value
+    }
+
+    /// The same curve without rises, which fireflies make: neighbours whose errors rise are level at their mean (isotonic regression by
+    /// pooling adjacent violators).
+    pub fn falling(&self) -> Self {
+        // Mean logarithm of the error, and how many places share it.
+        let mut levels: Vec<(f64, usize)> = Vec::new();
+        for place in &self.places {
+            let (mut error, mut n) = (place[1], 1);
+            while let Some((before, m)) = levels.pop_if(|(before, _)| *before < error) {
+                error = (before * m as f64 + error * n as f64) / (m + n) as f64;
+                n += m;
+            }
+            levels.push((error, n));
+        }
+        let errors = levels.into_iter().flat_map(|(error, n)| std::iter::repeat_n(error, n));
+        Self { places: self.places.iter().zip(errors).map(|(place, error)| [place[0], error]).collect() }
+    }
+
+    /// Logarithm of the first error over the last.
+    pub fn fall(&self) -> f64 {
+        let [first, last] = self.ends();
+        first[1] - last[1]
+    }
+
+    /// The earliest time at which the error is reached; beyond the ends as in [`Curve::error_at`].
     pub fn time_of(&self, error: f64) -> Reading {
         let (wanted, [first, last]) = (error.ln(), self.ends());
         if wanted == first[1] {
@@ -130,6 +159,18 @@ mod tests {
         close(single.time_of(3.0), 2.0, false);
         close(single.time_of(1.0), 6.0, true);
         assert_eq!(single.halving(), None);
+    }
+
+    #[test]
+    fn a_rise_is_levelled_at_its_mean() {
+        let rising = Curve::new(&[(1.0, 2.0), (2.0, 1.0), (3.0, 4.0), (4.0, 0.5), (5.0, 1.0)]).unwrap();
+        let (falling, half) = (rising.falling(), 0.5_f64.sqrt());
+        for (time, error) in [(1.0, 2.0), (2.0, 2.0), (3.0, 2.0), (4.0, half), (5.0, half), (0.1, 2.0), (9.0, half)] {
+            assert!((falling.kept_at(time) / error - 1.0).abs() < 1e-9, "{time}: {}", falling.kept_at(time));
+        }
+        close(falling.time_of(2.0), 1.0, false);
+        close(falling.time_of(half), 4.0, false);
+        assert_eq!(falling.falling(), falling);
     }
 
     #[test]

@@ -5,6 +5,7 @@ use super::curve::Curve;
 use super::document::{Estimate, Finding, Point, Verdict};
 use super::gain;
 use super::interval;
+use super::scatter;
 use super::words::{factor, list, milliseconds, number, percent};
 
 /// Number of times at which methods are compared.
@@ -17,7 +18,7 @@ const GOALS: usize = 4;
 struct Ranking {
     /// The lowest one, and then those that cannot be told from it.
     best: Vec<usize>,
-    /// Those that were not measured that far, and that might be as good if they went on as unbiased methods do.
+    /// Those that were not measured that far, and that might be as good if all went on as unbiased methods do.
     open: Vec<usize>,
 }
 
@@ -31,6 +32,7 @@ pub fn findings(points: &[Point], confidence: f64) -> Vec<Finding> {
     all.extend(goals(&candidates, confidence));
     all.extend(singles(points, confidence));
     all.extend(changes::findings(points, confidence));
+    all.extend(scatter::findings(points));
     all
 }
 
@@ -66,10 +68,11 @@ fn best_by_time(candidates: &[Candidate], confidence: f64) -> Vec<Finding> {
     let times = levels(candidates);
     let alpha = level(confidence, times.len(), candidates.len());
     let rank = |&time: &f64| {
-        let is_there = |c: &Candidate| c.covers(time);
-        // What begins later is no choice at this time.
-        let begins_later = |c: &Candidate| c.times()[0] > time;
-        ranking(candidates, &is_there, &begins_later, &|curve| curve.error_at(time).value, alpha)
+        // What begins later is no choice at this time, and what has ended keeps its last image.
+        let begins = |c: &Candidate| c.begins_by(time);
+        let has_ended = |c: &Candidate| c.times()[1] < time;
+        let continued = |curve: &Curve| curve.error_at(time).value;
+        ranking(candidates, [&begins, &has_ended], [&|curve| curve.kept_at(time), &continued], alpha)
     };
     let rankings: Vec<Ranking> = times.iter().map(rank).collect();
     let mut found = Vec::new();
@@ -105,22 +108,25 @@ fn best_between(candidates: &[Candidate], ranking: &Ranking, times: &[f64]) -> F
     };
     let middle = (first * last).sqrt();
     let best = &candidates[ranking.best[0]];
-    let error = number(best.mean(&|curve| curve.error_at(middle).value).exp());
+    let error = number(best.mean(&|curve| curve.kept_at(middle)).exp());
     let at = if first == last { String::new() } else { format!(" at {}", milliseconds(middle)) };
     match ranking.best[..] {
-        [_] => with_open(candidates, ranking, format!("{when}, {} has the lowest relMSE ({error}{at})", best.name)),
-        _ => noisy(format!(
-            "{when}, the data cannot tell between {}: the lowest relMSE is about {error}{at}.",
-            names(candidates, &ranking.best)
-        )),
+        [_] => {
+            with_open(candidates, ranking, format!("{when}, {} has the lowest relMSE ({error}{at})", best.name), clear)
+        }
+        _ => {
+            let tied = names(candidates, &ranking.best);
+            let text = format!("{when}, the data cannot tell between {tied}: the lowest relMSE is about {error}{at}");
+            with_open(candidates, ranking, text, noisy)
+        }
     }
 }
 
-/// A statement about one method, with those that were not measured far enough to contest it.
-fn with_open(candidates: &[Candidate], ranking: &Ranking, text: String) -> Finding {
+/// A statement, with the methods that were not measured far enough to contest it. Those leave it open.
+fn with_open(candidates: &[Candidate], ranking: &Ranking, text: String, finding: fn(String) -> Finding) -> Finding {
     match ranking.open[..] {
-        [] => clear(text + "."),
-        _ => noisy(format!("{text}, but {} may do as well and end before that.", names(candidates, &ranking.open))),
+        [] => finding(text + "."),
+        _ => noisy(format!("{text}, but {} might do as well if measured that far.", names(candidates, &ranking.open))),
     }
 }
 
@@ -128,38 +134,38 @@ fn names(candidates: &[Candidate], indices: &[usize]) -> String {
     list(&indices.iter().map(|&i| candidates[i].name.as_str()).collect::<Vec<_>>())
 }
 
-/// Times that at least two methods cover, evenly spaced on a logarithmic axis.
+/// Times at which at least two methods have begun and, if possible, have not ended, evenly spaced on a logarithmic axis.
 fn levels(candidates: &[Candidate]) -> Vec<f64> {
-    let mut ends: Vec<f64> = candidates.iter().flat_map(Candidate::times).collect();
-    ends.sort_by(f64::total_cmp);
-    let contested = |time: &f64| candidates.iter().filter(|c| c.covers(*time)).count() > 1;
-    let all: Vec<f64> = ends.iter().copied().filter(contested).collect();
-    let (Some(&low), Some(&high)) = (all.first(), all.last()) else { return Vec::new() };
-    let at = |i: usize| low * (high / low).powf(i as f64 / (LEVELS - 1) as f64);
-    let times = if low < high { (0..LEVELS).map(at).collect() } else { vec![low] };
-    times.into_iter().map(|time: f64| time.clamp(low, high)).filter(contested).collect()
+    let [mut firsts, mut lasts] = [0, 1].map(|end| candidates.iter().map(|c| c.times()[end]).collect::<Vec<_>>());
+    firsts.sort_by(f64::total_cmp);
+    lasts.sort_by(|a, b| b.total_cmp(a));
+    let (Some(&low), Some(&high)) = (firsts.get(1), lasts.get(1)) else { return Vec::new() };
+    let at = |i: usize| (low * (high / low).powf(i as f64 / (LEVELS - 1) as f64)).clamp(low, high);
+    if low < high { (0..LEVELS).map(at).collect() } else { vec![low] }
 }
 
-/// The lowest of what `read` finds, and all that a test at the level `alpha` cannot tell from it. Candidates for which neither
-/// `is_there` nor `is_out` holds are read where their curves are continued.
+/// The lowest of what the first of `reads` finds among those that are `there`, and all that a test at the level `alpha` cannot tell
+/// from it. Candidates for which `goes_on` holds are open where the second of `reads`, which continues curves, does not tell them from
+/// it.
 fn ranking(
     candidates: &[Candidate],
-    is_there: &dyn Fn(&Candidate) -> bool,
-    is_out: &dyn Fn(&Candidate) -> bool,
-    read: &dyn Fn(&Curve) -> f64,
+    [there, goes_on]: [&dyn Fn(&Candidate) -> bool; 2],
+    [read, continued]: [&dyn Fn(&Curve) -> f64; 2],
     alpha: f64,
 ) -> Ranking {
-    let (there, others): (Vec<usize>, Vec<usize>) = (0..candidates.len()).partition(|&i| is_there(&candidates[i]));
+    let all = || 0..candidates.len();
     let value = |i: usize| candidates[i].mean(read);
-    let Some(first) = there.iter().copied().min_by(|&a, &b| value(a).total_cmp(&value(b))) else {
+    let is_there = |i: &usize| there(&candidates[*i]);
+    let Some(first) = all().filter(is_there).min_by(|&a, &b| value(a).total_cmp(&value(b))) else {
         return Ranking::default();
     };
-    let is_worse = |i: usize| {
-        value(i) > value(first) && interval::differs_from_0(&candidates[i].against(&candidates[first], read), alpha)
+    let is_worse = |i: usize, read: &dyn Fn(&Curve) -> f64| {
+        candidates[i].mean(read) > candidates[first].mean(read)
+            && interval::differs_from_0(&candidates[i].against(&candidates[first], read), alpha)
     };
-    let ties = there.iter().copied().filter(|&i| i != first && !is_worse(i));
-    let best = std::iter::once(first).chain(ties).collect();
-    let open = others.into_iter().filter(|&i| !is_out(&candidates[i]) && !is_worse(i)).collect();
+    let ties = all().filter(|&i| i != first && is_there(&i) && !is_worse(i, read));
+    let best: Vec<usize> = std::iter::once(first).chain(ties).collect();
+    let open = all().filter(|i| !best.contains(i) && goes_on(&candidates[*i]) && !is_worse(*i, continued)).collect();
     Ranking { best, open }
 }
 
@@ -173,18 +179,30 @@ fn goals(candidates: &[Candidate], confidence: f64) -> Vec<Finding> {
 fn goal(candidates: &[Candidate], error: f64, alpha: f64, confidence: f64) -> Option<Finding> {
     // A method whose first point is better than the goal reaches it there.
     let read = |curve: &Curve| curve.time_of(error).value.max(curve.times()[0]);
-    let reaches = |c: &Candidate| c.curves.values().all(|curve| curve.errors()[0] <= error);
-    let ranking = ranking(candidates, &reaches, &|_| false, &read, alpha);
+    let reaches = |c: &Candidate| range(c)[0] <= error;
+    let ranking = ranking(candidates, [&reaches, &|c| !reaches(c)], [&read, &read], alpha);
     let fastest = &candidates[*ranking.best.first()?];
     let times: Vec<f64> = fastest.curves.values().map(read).collect();
     let Estimate { value, low, high } = interval::geometric_mean(&times, confidence);
     let between = low.zip(high).map(|(l, h)| format!(" ({} to {})", milliseconds(l), milliseconds(h)));
     let text = format!("relMSE {} takes {}{}", number(error), milliseconds(value), between.unwrap_or_default());
-    Some(match ranking.best[..] {
+    let mut finding = match ranking.best[..] {
         [_] if candidates.len() == 1 => clear(format!("{text} with {}.", fastest.name)),
-        [_] => with_open(candidates, &ranking, format!("{text} with {}, the fastest", fastest.name)),
-        _ => noisy(format!("{text} at least; the data cannot tell between {}.", names(candidates, &ranking.best))),
-    })
+        [_] => with_open(candidates, &ranking, format!("{text} with {}, the fastest", fastest.name), clear),
+        _ => {
+            let tied = names(candidates, &ranking.best);
+            with_open(candidates, &ranking, format!("{text} at least; the data cannot tell between {tied}"), noisy)
+        }
+    };
+    finding.text.extend(ranking.best.iter().filter_map(|&i| missed(&candidates[i], error)));
+    Some(finding)
+}
+
+/// In how many of its seeds a method reaches an error; `None` for all.
+fn missed(candidate: &Candidate, error: f64) -> Option<String> {
+    let Candidate { name, curves, .. } = candidate;
+    let reached = curves.values().filter(|curve| curve.errors()[0] <= error).count();
+    (reached < curves.len()).then(|| format!(" {name} reaches it in {reached} of its {} seeds.", curves.len()))
 }
 
 /// Errors of the series 1, 2, 5 that some method reaches and does not begin with.

@@ -9,6 +9,8 @@ use super::words::{factor, milliseconds, number};
 const LEVELS: usize = 16;
 /// Upper end of an interval over its lower end, up to which a factor is told even if it may be 1.
 const NARROW: f64 = 1.5;
+/// Upper end of an interval over its lower end, above which a factor is not printed.
+const MAGNITUDE: f64 = 10.0;
 
 /// What the best method gains at a time.
 struct Gain<'a> {
@@ -16,6 +18,8 @@ struct Gain<'a> {
     by: &'a str,
     /// relMSE of uniform unfiltered rendering over that of the best method.
     factor: Estimate,
+    /// Its logarithm by seed.
+    logarithms: Vec<f64>,
 }
 
 /// The least and the most that is gained over the times that uniform unfiltered rendering was measured at. `None` without it, and
@@ -33,6 +37,10 @@ pub fn finding(candidates: &[Candidate], confidence: f64) -> Option<Finding> {
         (0..LEVELS).filter_map(|i| gain(candidates, baseline, time(i).clamp(first, last), each)).collect();
     let by_factor = |a: &&Gain, b: &&Gain| a.factor.value.total_cmp(&b.factor.value);
     let (least, most) = (gains.iter().min_by(by_factor)?, gains.iter().max_by(by_factor)?);
+    let verdict = if is_told(&least.factor) { Verdict::Clear } else { Verdict::TooNoisy };
+    if verdict == Verdict::TooNoisy && !has_magnitude(&least.factor) {
+        return Some(Finding { verdict, text: unknown(least, [gains[0].time, last], each) });
+    }
     let text = format!(
         "From {} to {}, uniform unfiltered rendering has at least {} times the relMSE of the best other method in the same time ({} at \
          {}), and at most {} times ({} at {}).",
@@ -45,8 +53,26 @@ pub fn finding(candidates: &[Candidate], confidence: f64) -> Option<Finding> {
         most.by,
         milliseconds(most.time)
     );
-    let verdict = if is_told(&least.factor) { Verdict::Clear } else { Verdict::TooNoisy };
     Some(Finding { verdict, text })
+}
+
+/// What is said where the runs are too few to tell even the magnitude of what is gained at least.
+fn unknown(least: &Gain, [first, last]: [f64; 2], confidence: f64) -> String {
+    // With an interval of this half width it is told on which side of 1 the factor is, or that it is near.
+    let half = least.factor.value.ln().abs().max(0.5 * NARROW.ln());
+    format!(
+        "How many times the relMSE of the best other method uniform unfiltered rendering has in the same time, from {} to {}, cannot be \
+         told from {} runs: at least {} are needed.",
+        milliseconds(first),
+        milliseconds(last),
+        least.logarithms.len(),
+        interval::runs_needed(&least.logarithms, half, confidence)
+    )
+}
+
+/// Whether an interval tells the magnitude of a factor.
+fn has_magnitude(factor: &Estimate) -> bool {
+    factor.low.zip(factor.high).is_some_and(|(low, high)| high <= MAGNITUDE * low)
 }
 
 /// Whether an interval says on which side of 1 a factor is, or that it is near. A single seed has none: nobody knows how far another
@@ -58,9 +84,15 @@ fn is_told(factor: &Estimate) -> bool {
 
 /// What is gained at a time by the best of the methods that have begun. One that ends before keeps its last image.
 fn gain<'a>(candidates: &'a [Candidate], baseline: &Candidate, time: f64, confidence: f64) -> Option<Gain<'a>> {
-    let error = |curve: &Curve| curve.error_at(time.min(curve.times()[1])).value;
-    let others = candidates.iter().filter(|candidate| !candidate.is_baseline && candidate.times()[0] <= time);
+    let error = |curve: &Curve| curve.kept_at(time);
+    let others = candidates.iter().filter(|candidate| !candidate.is_baseline && candidate.begins_by(time));
     let best = others.min_by(|a, b| a.mean(&error).total_cmp(&b.mean(&error)))?;
-    let factors: Vec<f64> = baseline.against(best, &error).into_iter().map(f64::exp).collect();
-    (!factors.is_empty()).then(|| Gain { time, by: &best.name, factor: interval::geometric_mean(&factors, confidence) })
+    let logarithms = baseline.against(best, &error);
+    let factors: Vec<f64> = logarithms.iter().map(|l| l.exp()).collect();
+    (!factors.is_empty()).then(|| Gain {
+        time,
+        by: &best.name,
+        factor: interval::geometric_mean(&factors, confidence),
+        logarithms,
+    })
 }

@@ -22,6 +22,26 @@ pub fn geometric_mean(values: &[f64], confidence: f64) -> Estimate {
     Estimate { value: value.exp(), low: low.map(f64::exp), high: high.map(f64::exp) }
 }
 
+/// Geometric mean of errors, and its interval, which is above 0: errors scatter by factors. Where one is 0 and has no logarithm, it is
+/// their plain mean, and an interval that is cut at 0.
+///
+/// # Panics
+/// Without a value.
+pub fn mean_error(values: &[f64], confidence: f64) -> Estimate {
+    if values.iter().all(|&v| v > 0.0) {
+        return geometric_mean(values, confidence);
+    }
+    let plain = mean(values, confidence);
+    Estimate { low: plain.low.map(|low| low.max(0.0)), ..plain }
+}
+
+/// The least number of values, up to 1000, whose mean has an interval of this half width or less if they scatter like these.
+pub fn runs_needed(values: &[f64], half: f64, confidence: f64) -> usize {
+    let deviation = standard_error(values).unwrap_or(0.0) * (values.len() as f64).sqrt();
+    let is_enough = |runs: &usize| t_quantile(*runs, confidence) * deviation <= half * (*runs as f64).sqrt();
+    (2..1000).find(is_enough).unwrap_or(1000)
+}
+
 /// Median of the values, and the narrowest symmetric pair of order statistics that covers it at `confidence`. Fewer than six
 /// values do not reach 0.95: their interval is the whole range, which covers the median with 1 - 2 / 2^n.
 ///
@@ -99,6 +119,10 @@ mod tests {
         assert!((value - 2.0).abs() < 1e-12);
         // Logarithms 0 and ln 4: standard error ln 2, and t(0.975, 1) = 12.706.
         close(low, 2.0 * (-12.706 * 2.0_f64.ln()).exp());
+        let Estimate { value, low, high } = mean_error(&[0.0, 1.0, 0.2], 0.95);
+        assert!((value - 0.4).abs() < 1e-12 && low == Some(0.0) && high.is_some_and(|high| high > 1.0));
+        // Deviation 1: t(0.975, 17) = 2.110 over the root of 18 is 0.497, t(0.975, 16) = 2.120 over the root of 17 is 0.514.
+        assert_eq!(runs_needed(&[0.0, 1.0, 2.0], 0.5, 0.95), 18);
     }
 
     #[test]

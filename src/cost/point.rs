@@ -29,6 +29,16 @@ impl Point {
         let (runs, warm_up, device_bytes, summary) = (Vec::new(), None, None, None);
         Self { method, command, runs, warm_up, device_bytes, summary, failed: None, is_other: false }
     }
+
+    /// Whether it belongs on a curve of error against time: it has runs, and samples per pixel.
+    pub fn is_compared(&self) -> bool {
+        self.failed.is_none() && self.method.spp > 0 && !self.runs.is_empty()
+    }
+
+    /// Whether a run has no error above the noise of the reference, so that nothing tells by which factor it differs from others.
+    pub fn ends_at_0(&self) -> bool {
+        self.runs.iter().any(|run| run.errors.relmse == Some(0.0))
+    }
 }
 
 /// The settings of a point. Points that differ only in `spp` belong to one method.
@@ -122,6 +132,15 @@ pub struct Estimate {
     pub high: Option<f64>,
 }
 
+impl Estimate {
+    /// Both ends of the interval in words; `None` without one. Ends that are a factor of 1000 apart tell not even a magnitude.
+    pub fn interval(&self, number: fn(f64) -> String) -> Option<String> {
+        let (low, high) = self.low.zip(self.high)?;
+        let is_vague = low > 0.0 && high > 1000.0 * low;
+        Some(if is_vague { "too few runs to tell".to_owned() } else { format!("{} to {}", number(low), number(high)) })
+    }
+}
+
 /// A factor relative to uniform unfiltered rendering.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Factor {
@@ -142,9 +161,10 @@ pub struct Summary {
     pub wall_ms: Estimate,
     /// Median time by pass.
     pub passes: Vec<Pass>,
-    /// Mean of every error, and its interval by Student's t over the seeds.
+    /// Mean of every error over the seeds, and its interval by Student's t. Both are of logarithms, so that they are of a typical run, but
+    /// for PSNR, SSIM, and errors that are 0 in a run.
     pub errors: Errors<Estimate>,
-    /// relMSE times GPU time in seconds: lower is better, and the same for any number of samples of an unbiased method.
+    /// relMSE times GPU time in seconds, a mean as of errors: lower is better, and the same for any number of samples of an unbiased method.
     pub inefficiency: Option<Estimate>,
     /// GPU time that uniform unfiltered rendering needs for this point's relMSE, divided by this point's GPU time.
     pub speed_up: Option<Factor>,

@@ -12,7 +12,7 @@ type Baseline = BTreeMap<u32, Curve>;
 pub fn summarise(points: &mut [Point], confidence: f64) {
     let baseline = baseline(points);
     for point in points.iter_mut().filter(|point| !point.runs.is_empty()) {
-        point.summary = Some(summary(&point.runs, &baseline, confidence));
+        point.summary = Some(summary(point, &baseline, confidence));
     }
     changes::fill_in(points, confidence);
 }
@@ -39,11 +39,17 @@ fn place(point: &Point) -> Option<(f64, f64)> {
     Some((summary.gpu_ms.value, summary.errors.relmse?.value))
 }
 
-/// The curves that factors refer to. Seeds that not all of its points have run yet are left out, so that every seed has the same
-/// points.
+/// The curves that factors refer to. Seeds that not all of its points have run yet are left out, so that every seed has
+/// the same points.
 fn baseline(points: &[Point]) -> Baseline {
-    let usable = |point: &&Point| point.method.is_baseline() && point.failed.is_none() && !point.runs.is_empty();
+    let usable = |point: &&Point| point.method.is_baseline() && point.is_compared() && !point.ends_at_0();
     curves(&points.iter().filter(usable).collect::<Vec<_>>())
+}
+
+/// Whether errors of uniform unfiltered rendering tell a time: of several points they must fall.
+fn tells_times(baseline: &Baseline) -> bool {
+    let is_single = |curve: &Curve| curve.times()[0] == curve.times()[1];
+    baseline.values().all(is_single) || baseline.values().map(Curve::fall).sum::<f64>() > 0.0
 }
 
 /// Curves through the runs of some points, by seed, where all points have run it and have an error above 0.
@@ -56,7 +62,8 @@ pub(super) fn curves(points: &[&Point]) -> Baseline {
     places.into_iter().filter_map(|(seed, places)| Some((seed, Curve::new(&places)?))).collect()
 }
 
-fn summary(runs: &[Run], baseline: &Baseline, confidence: f64) -> Summary {
+fn summary(point: &Point, baseline: &Baseline, confidence: f64) -> Summary {
+    let runs = &point.runs[..];
     let median = |of: fn(&Run) -> f64| interval::median(&runs.iter().map(of).collect::<Vec<_>>(), confidence);
     let inefficiency = |run: &Run| Some(run.errors.relmse? * run.gpu_ms * 1e-3);
     Summary {
@@ -64,12 +71,13 @@ fn summary(runs: &[Run], baseline: &Baseline, confidence: f64) -> Summary {
         wall_ms: median(|run| run.wall_ms),
         passes: passes(runs),
         errors: errors(runs, confidence),
-        inefficiency: mean_of_all(runs, confidence, inefficiency),
-        speed_up: factor(runs, baseline, confidence, |curve, run, error| {
+        inefficiency: of_all(runs, inefficiency).map(|values| interval::mean_error(&values, confidence)),
+        speed_up: factor(point, baseline, confidence, |curve, run, error| {
             let Reading { value, extrapolated } = curve.time_of(error);
             Reading { value: value / run.gpu_ms, extrapolated }
-        }),
-        error_gain: factor(runs, baseline, confidence, |curve, run, error| {
+        })
+        .filter(|_| point.method.is_baseline() || tells_times(baseline)),
+        error_gain: factor(point, baseline, confidence, |curve, run, error| {
             let Reading { value, extrapolated } = curve.error_at(run.gpu_ms);
             Reading { value: value / error, extrapolated }
         }),
@@ -87,30 +95,39 @@ fn passes(runs: &[Run]) -> Vec<Pass> {
     runs[0].passes.iter().map(median).collect()
 }
 
+/// PSNR is a logarithm already, and SSIM is no error.
 fn errors(runs: &[Run], confidence: f64) -> Errors<Estimate> {
-    let metric = |i: usize| mean_of_all(runs, confidence, |run| run.errors.values()[i]);
+    let metric = |i: usize| {
+        let values = of_all(runs, |run| run.errors.values()[i])?;
+        let mean =
+            if matches!(Errors::<f64>::NAMES[i], "PSNR" | "SSIM") { interval::mean } else { interval::mean_error };
+        Some(mean(&values, confidence))
+    };
     Errors::from_values(std::array::from_fn(metric))
 }
 
-/// The mean over all runs; `None` if one of them has no value.
-fn mean_of_all(runs: &[Run], confidence: f64, of: impl Fn(&Run) -> Option<f64>) -> Option<Estimate> {
-    let values: Option<Vec<f64>> = runs.iter().map(of).collect();
-    values.map(|values| interval::mean(&values, confidence))
+/// The values of all runs; `None` if one of them has none.
+fn of_all(runs: &[Run], of: impl Fn(&Run) -> Option<f64>) -> Option<Vec<f64>> {
+    runs.iter().map(of).collect()
 }
 
-/// A factor of every run relative to the curve of its own seed, and the geometric mean of these factors.
+/// A factor of every run relative to the curve of its own seed, without rises, and the geometric mean of these factors. Uniform unfiltered rendering is
+/// as good as itself. Runs without an error above the noise of the reference tell no factor, and the others alone would be biased.
 fn factor(
-    runs: &[Run],
+    point: &Point,
     baseline: &Baseline,
     confidence: f64,
     of: impl Fn(&Curve, &Run, f64) -> Reading,
 ) -> Option<Factor> {
-    let reading = |run: &Run| {
-        let error = run.errors.relmse.filter(|&error| error > 0.0)?;
-        Some(of(baseline.get(&run.seed)?, run, error))
-    };
-    let readings: Vec<Reading> = runs.iter().filter_map(reading).collect();
-    if readings.is_empty() {
+    if point.method.is_baseline() {
+        return Some(Factor {
+            estimate: Estimate { value: 1.0, low: Some(1.0), high: Some(1.0) },
+            extrapolated: false,
+        });
+    }
+    let reading = |run: &Run| Some(of(&baseline.get(&run.seed)?.falling(), run, run.errors.relmse?));
+    let readings: Vec<Reading> = point.runs.iter().filter_map(reading).collect();
+    if readings.is_empty() || point.ends_at_0() {
         return None;
     }
     let values: Vec<f64> = readings.iter().map(|reading| reading.value).collect();

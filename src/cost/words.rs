@@ -21,11 +21,10 @@ pub fn milliseconds(ms: f64) -> String {
     }
 }
 
-/// A factor with its interval.
+/// A factor or an error with its interval.
 pub fn factor(estimate: &Estimate) -> String {
-    let Estimate { value, low, high } = estimate;
-    let interval = low.zip(*high).map(|(l, h)| format!(" ({} to {})", number(l), number(h)));
-    format!("{}{}", number(*value), interval.unwrap_or_default())
+    let interval = estimate.interval(number).map(|interval| format!(" ({interval})"));
+    format!("{}{}", number(estimate.value), interval.unwrap_or_default())
 }
 
 /// A share as a percentage.
@@ -54,5 +53,7 @@ mod tests {
         assert_eq!(list(&["a", "b", "c"]), "a, b and c");
         let estimate = Estimate { value: 2.0, low: Some(1.9), high: Some(2.1) };
         assert_eq!(factor(&estimate), "2.00 (1.90 to 2.10)");
+        let of_two_runs = Estimate { value: 0.8, low: Some(2.1e-10), high: Some(3e9) };
+        assert_eq!(factor(&of_two_runs), "0.80 (too few runs to tell)");
     }
 }

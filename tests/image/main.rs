@@ -9,5 +9,6 @@ mod limits;
 mod measurement;
 mod metrics;
 mod report;
+mod scattered;
 mod significance;
 mod source;

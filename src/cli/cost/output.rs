@@ -156,7 +156,7 @@ impl Shown {
 
 /// A table of the points, the findings, and where the results are.
 pub fn text(document: &Document, written: &[PathBuf]) -> String {
-    let head = ["point", "GPU time", "relMSE", "+-", "FLIP", "speed-up", "on the front"];
+    let head = ["point", "GPU time", "relMSE", "FLIP", "speed-up", "on the front"];
     let rows: Vec<_> = (0..document.points.len()).filter_map(|i| row(document, i)).collect();
     let mut text = text_table::text(&head, &rows);
     text += &legend(document);
@@ -216,15 +216,13 @@ fn row(document: &Document, index: usize) -> Option<Vec<String>> {
     let summary = point.summary.as_ref()?;
     let errors = &summary.errors;
     let unknown = || "-".to_owned();
-    let half = errors.relmse.and_then(|e| Some(e.high? - e.value));
     let speed_up =
         summary.speed_up.map(|f| format!("{}{}", factor(&f.estimate), if f.extrapolated { " *" } else { "" }));
     let on_front = if document.front.contains(&index) { "yes" } else { "" };
     Some(vec![
         point.method.label(),
         milliseconds(summary.gpu_ms.value),
-        errors.relmse.map_or_else(unknown, |e| number(e.value)),
-        half.map_or_else(unknown, number),
+        errors.relmse.map_or_else(unknown, |e| factor(&e)),
         errors.flip.map_or_else(unknown, |e| number(e.value)),
         speed_up.unwrap_or_else(unknown),
         on_front.to_owned(),

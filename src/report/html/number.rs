@@ -35,9 +35,9 @@ pub fn count(n: u64) -> String {
     out
 }
 
-/// Both ends of the interval, such as "0.011 to 0.013"; `None` if either is unknown.
+/// Both ends of the interval, such as "0.011 to 0.013", or that it is too wide; `None` if either is unknown.
 pub fn interval(estimate: &Estimate) -> Option<String> {
-    Some(format!("{} to {}", short(estimate.low?), short(estimate.high?)))
+    estimate.interval(short)
 }
 
 #[cfg(test)]
