@@ -30,8 +30,9 @@ pub fn run(args: &Args) -> Result<Exit> {
     let path = args.scene.as_deref().ok_or_else(no_scene)?;
     let gpu = open(args)?;
     let (scene, points) = Points::new(args, path, &gpu)?;
+    let warnings = [&scene.warnings[..], &points.notes].concat();
     if !args.quiet && !args.json {
-        scene.warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
+        warnings.iter().for_each(|w| complain(&format!("warning: {w}")));
     }
     let plan = plan(args, path, &scene, points, &gpu)?;
     let folder = Folder::open(&args.output)?;
@@ -39,11 +40,11 @@ pub fn run(args: &Args) -> Result<Exit> {
     let runs_before = earlier.as_ref().map_or(0, runs);
     let found = watched(args, &folder, |watch| measure(&gpu, &scene, &plan, earlier, watch))?;
     fail_on_messages(&gpu)?;
-    finish(args, &folder, found, runs_before, &scene.warnings)
+    finish(args, &folder, found, runs_before, &warnings)
 }
 
 fn plan(args: &Args, path: &Path, scene: &Scene, points: Points, gpu: &Gpu) -> Result<Plan> {
-    let Points { motion, base, candidates } = points;
+    let Points { motion, base, candidates, .. } = points;
     let [width, height] = [base.width, base.height];
     let given = |file: &Path| reference::read(file, [width, height], Some((scene, &base)));
     let reference = args.reference.as_deref().map(given).transpose()?;
@@ -82,7 +83,7 @@ fn watched<T>(args: &Args, folder: &Folder, measure: impl FnOnce(&Watch) -> Resu
 struct Report<'a> {
     #[serde(flatten)]
     document: &'a Document,
-    /// What was repaired in the scene.
+    /// What was repaired in the scene, and what was left out of the grid.
     warnings: &'a [String],
 }
 

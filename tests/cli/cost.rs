@@ -318,3 +318,22 @@ fn what_cannot_be_measured_is_one_line() {
         complains(&command.args([option, words]).output().unwrap(), 2, &[says]);
     }
 }
+
+#[test]
+fn a_variant_that_a_method_cannot_have_or_does_not_read_is_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = within(&folder, &format!("cost {} {FILM} -o all --repeats 2", scene()));
+    command.args("--allocate uniform,both --denoise none,auto --spp 2".split(' '));
+    let output = command.args(["--variant", "--indirect-stride 2", "--variant", "--min-spp 1"]).output().unwrap();
+    text(&output, 0);
+    let told = String::from_utf8(output.stderr.clone()).unwrap();
+    assert!(
+        told.contains("warning: left out uniform, indirect-stride 2: with indirect_stride 2 most pixels"),
+        "{told}"
+    );
+    let document = document(&folder, "all/cost.json");
+    let labels: Vec<_> = document.points.iter().map(|point| point.method.name()).collect();
+    let grid = ["uniform", "uniform + auto", "both", "both + auto"];
+    let stride = ["uniform + auto, indirect-stride 2", "both + auto, indirect-stride 2"];
+    assert_eq!(labels, [&grid[..], &stride, &["both, min-spp 1", "both + auto, min-spp 1"]].concat());
+}

@@ -1,6 +1,7 @@
 //! The knobs that `tallow cost --ablate` turns, one at a time.
 use crate::allocate::Placing;
 use crate::cost::grid::Candidate;
+use crate::settings::entry::Entry;
 
 /// A knob, and the values that are tried of it: what a user would write behind `--`.
 struct Knob {
@@ -70,11 +71,21 @@ pub fn steps(candidate: &Candidate) -> Vec<String> {
     KNOBS.iter().filter(|knob| knob.read_by.holds(candidate)).flat_map(|knob| knob.steps(candidate)).collect()
 }
 
+/// Whether a point reads a setting that another one changes. What no knob names is read by all.
+pub fn reads_change(point: &Candidate, other: &Candidate) -> bool {
+    let changed = |(own, others): (Entry, Entry)| (own.value != others.value).then_some(own.name);
+    let mut changed = entries(point).into_iter().zip(entries(other)).filter_map(changed);
+    changed.any(|name| KNOBS.iter().filter(|knob| knob.name == name).all(|knob| knob.read_by.holds(point)))
+}
+
+fn entries(candidate: &Candidate) -> Vec<Entry> {
+    let carries = candidate.carries.unwrap_or_default().entries();
+    [candidate.settings.entries(), candidate.filter_settings.entries(), carries].concat()
+}
+
 impl Knob {
     fn steps(&self, candidate: &Candidate) -> Vec<String> {
-        let carries = candidate.carries.unwrap_or_default().entries();
-        let entries = [candidate.settings.entries(), candidate.filter_settings.entries(), carries].concat();
-        let own = entries.into_iter().find(|entry| entry.name == self.name).map(|entry| entry.value);
+        let own = entries(candidate).into_iter().find(|entry| entry.name == self.name).map(|entry| entry.value);
         let allowed = |value: &str| {
             // Fewer at most than there are on average would leave samples over.
             self.name != "max-spp" || value.parse().is_ok_and(|most: u32| most == 0 || most > candidate.settings.spp)
@@ -143,6 +154,18 @@ mod tests {
         }
         let of_16 = steps(&candidate("both", Method::all().next().unwrap(), 16));
         assert!(of_16.contains(&"--max-spp 32".to_owned()) && !of_16.contains(&"--max-spp 16".to_owned()));
+    }
+
+    #[test]
+    fn what_a_point_does_not_read_changes_nothing() {
+        let atrous = Method::all().find(|filter| filter.name() == "atrous").unwrap();
+        let reads = |policy: &str, option: &str| {
+            let point = candidate(policy, atrous, 4);
+            reads_change(&point, &with(&point, option).unwrap())
+        };
+        assert!(!reads("uniform", "--min-spp 1 --luminance-floor 0.2") && !reads("uniform", "--radius 9"));
+        assert!(reads("geometry", "--min-spp 1 --luminance-floor 0.2") && reads("uniform", "--min-spp 1 --levels 3"));
+        assert!(reads("uniform", "--indirect-stride 2"), "no knob, so that all may read it");
     }
 
     /// Noise on two walls that meet at an edge.

@@ -23,6 +23,8 @@ pub struct Points {
     pub base: Settings,
     /// The points.
     pub candidates: Vec<Candidate>,
+    /// What was left out of them, and why.
+    pub notes: Vec<String>,
 }
 
 impl Points {
@@ -48,9 +50,10 @@ impl Points {
         let axes = args.axes(reproject(args, able)?.into_iter().map(of).collect());
         let mut candidates = grid::grid(&base, &filters, &axes);
         candidates.iter().try_for_each(|candidate| candidate.settings.validate())?;
-        candidates.extend(varied(args, &candidates)?);
         candidates.iter().try_for_each(Candidate::check_stride)?;
-        Ok((scene, Self { motion, base, candidates }))
+        let mut notes = Vec::new();
+        candidates.extend(varied(args, &candidates, &mut notes)?);
+        Ok((scene, Self { motion, base, candidates, notes }))
     }
 }
 
@@ -79,19 +82,20 @@ fn reproject(args: &Args, able: Option<Result<()>>) -> Result<Vec<Reprojection>>
     }
 }
 
-/// Each point of the grid with the options of every variant, and with every step of the knobs that it has.
-fn varied(args: &Args, grid: &[Candidate]) -> Result<Vec<Candidate>> {
+/// Each point of the grid with the options of every variant that it reads, and with every step of the knobs that it has.
+fn varied(args: &Args, grid: &[Candidate], notes: &mut Vec<String>) -> Result<Vec<Candidate>> {
     let with = |point: &Candidate, option: &str, words: &Words| {
         point.varied(option, |settings, filters, carries| words.apply(settings, filters, carries))
     };
     let mut all = Vec::new();
     for text in &args.variants {
         let words = Words::parse(text)?.checked_as_variant(text)?;
-        let before = all.len();
-        all.extend(grid.iter().filter_map(|point| with(point, text.trim(), &words)));
-        if all.len() == before {
+        let reading = |point| with(point, text.trim(), &words).filter(|varied| knobs::reads_change(point, varied));
+        let variants: Vec<Candidate> = grid.iter().filter_map(reading).collect();
+        if variants.is_empty() {
             return Err(Error::Usage(format!("\"{}\" changes no point of the grid", text.trim())));
         }
+        all.extend(possible(variants, notes)?);
     }
     for point in grid.iter().filter(|_| args.ablate) {
         for step in knobs::steps(point) {
@@ -99,6 +103,19 @@ fn varied(args: &Args, grid: &[Candidate]) -> Result<Vec<Candidate>> {
         }
     }
     Ok(all)
+}
+
+/// Those of some variants that make an image of the whole light, and a note for each method whose do not.
+fn possible(variants: Vec<Candidate>, notes: &mut Vec<String>) -> Result<Vec<Candidate>> {
+    let (able, unable): (Vec<_>, Vec<_>) = variants.into_iter().partition(|variant| variant.check_stride().is_ok());
+    if able.is_empty() {
+        unable.iter().try_for_each(Candidate::check_stride)?;
+    }
+    let why =
+        |variant: &Candidate| Some(format!("left out {}: {}", variant.method.name(), variant.check_stride().err()?));
+    notes.extend(unable.iter().filter_map(why));
+    notes.dedup();
+    Ok(able)
 }
 
 /// The command that renders a point's first image. Unfiltered points go to .hdr: for an .exr more layers are kept, which takes
