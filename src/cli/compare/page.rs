@@ -56,7 +56,8 @@ fn texts(report: &Report) -> Vec<String> {
 fn tables(report: &Report) -> Vec<Table> {
     let mut scales = Table::new("Scales", &["scale", "regions", "different", "seen from"]);
     scales.note =
-        "A difference from there on would have been seen nine times in ten, in nine of ten regions.".to_owned();
+        "A difference of any one channel from there on would have been seen nine times in ten, in nine of ten regions."
+            .to_owned();
     report.outcome.levels.iter().for_each(|level| scales.push(scale(level)));
     let mut regions = Table::new("Where they differ", &HEADER);
     regions.note = format!("The surest regions of every scale. {}", words::RELATIVE);

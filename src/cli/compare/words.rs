@@ -31,13 +31,13 @@ pub fn verdict(report: &Report) -> String {
     match report.outcome.verdict {
         Verdict::Same { visible } => {
             format!(
-                "same: a difference of {place} would have been seen from {} on, nine times in ten",
+                "same: a difference of {place} would have been seen from {} on, even in one channel alone, nine times in ten",
                 percent(visible)
             )
         }
         Verdict::Different => format!("different: {}", different(&report.outcome)),
         Verdict::TooNoisy { visible, samples } => format!(
-            "too noisy to say: no difference is found, but one of {place} is seen only from {} on; {} takes about {} times the \
+            "too noisy to say: no difference is found, but one of {place}, if in one channel alone, is seen only from {} on; {} takes about {} times the \
              samples{}",
             percent(visible),
             percent(report.options.resolve),

@@ -91,7 +91,8 @@ impl Default for Options {
 pub enum Verdict {
     /// No difference was found, and one of [`Options::resolve`] would have been.
     Same {
-        /// Relative difference that would have been found nine times in ten, at the scale [`Options::at`].
+        /// Relative difference that would have been found nine times in ten, at the scale [`Options::at`], even if it were in the noisiest
+        /// channel alone: less is enough for one of all channels.
         visible: f64,
     },
     /// At least one region differs.
@@ -131,7 +132,7 @@ pub struct Level {
     pub regions: usize,
     /// Regions that differ.
     pub different: usize,
-    /// Relative difference that would have been found nine times in ten, in nine of ten regions.
+    /// Relative difference that would have been found nine times in ten, in nine of ten regions, in any single channel.
     pub visible: f64,
     /// The regions that differ most surely, at most [`WORST`] of them, the smallest p-value first.
     pub worst: Vec<Finding>,
