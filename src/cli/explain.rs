@@ -1,5 +1,7 @@
 //! `tallow explain`: lists the effects that a scene needs and measures what each of them costs.
 use super::{Exit, complain, print, print_json, readable};
+use crate::cost::document::Estimate;
+use crate::cost::interval;
 use crate::error::{Error, Result};
 use crate::gpu::{DeviceKind, DeviceOptions, FrameResources, Gpu, PassTime};
 use crate::layout::*;
@@ -50,6 +52,9 @@ pub struct EffectRow {
     pub gpu_ms_with: Option<f64>,
     /// GPU time in ms without it.
     pub gpu_ms_without: Option<f64>,
+    /// What the effect adds to the GPU time in ms: ends of a 95 % interval of the median difference of runs in turn. If it holds 0, the
+    /// difference may be chance.
+    pub gpu_ms_added: Option<[f64; 2]>,
     /// Time in ms to compile the pipelines with the effect, less that without it; 0 if there is no measurable difference.
     pub compile_ms: Option<f64>,
     /// Bytes of device memory that the effect adds: records of the scene that nothing else reads, and buffers of the render.
@@ -166,8 +171,10 @@ fn rows(args: &Args, scene: &Loaded) -> Result<Vec<EffectRow>> {
     let mut usual = usual()?;
     usual.cost.compile_ms = usual.cost.compile_ms.min(first);
     let mut price = |(effect, on): (&'static str, bool), outputs_then, effects_then| {
-        let (usual, other) = beside(&mut usual, || Variant::new(args, scene, outputs_then, effects_then))?;
+        let (usual, other, pairs) = beside(&mut usual, || Variant::new(args, scene, outputs_then, effects_then))?;
         let (with, without) = if on { (usual, other) } else { (other, usual) };
+        let added = |[usual, other]: [f64; 2]| if on { usual - other } else { other - usual };
+        let Estimate { low, high, .. } = interval::median(&pairs.into_iter().map(added).collect::<Vec<_>>(), 0.95);
         bar.inc(1);
         Ok::<_, Error>(EffectRow {
             effect,
@@ -175,6 +182,7 @@ fn rows(args: &Args, scene: &Loaded) -> Result<Vec<EffectRow>> {
             called_for_by: String::new(),
             gpu_ms_with: Some(with.gpu_ms),
             gpu_ms_without: Some(without.gpu_ms),
+            gpu_ms_added: low.zip(high).map(<[f64; 2]>::from),
             compile_ms: Some((with.compile_ms - without.compile_ms).max(0.0)),
             bytes: with.bytes.saturating_sub(without.bytes),
         })
@@ -188,7 +196,8 @@ fn rows(args: &Args, scene: &Loaded) -> Result<Vec<EffectRow>> {
         let bytes = row.bytes + scene_bytes(effect, scene);
         let row = EffectRow { called_for_by: called_for_by(effect), bytes, ..row };
         // With and without it are different renders and not one picture at two costs; `tools/papers policies` compares them.
-        let unknown = EffectRow { gpu_ms_with: None, gpu_ms_without: None, compile_ms: None, ..row.clone() };
+        let unknown =
+            EffectRow { gpu_ms_with: None, gpu_ms_without: None, gpu_ms_added: None, compile_ms: None, ..row.clone() };
         rows.push(if effect == Effect::adaptive { unknown } else { row });
     }
     if wanted(GUIDES) {
@@ -200,8 +209,8 @@ fn rows(args: &Args, scene: &Loaded) -> Result<Vec<EffectRow>> {
 }
 
 /// Times that each variant runs beside the usual one, at least and at most: where other programs use the machine, until its two
-/// least times are [`ALIKE`].
-const RUNS: [usize; 2] = [4, 40];
+/// least times are [`ALIKE`]. Six differences are the fewest that give their median an interval of 95 %.
+const RUNS: [usize; 2] = [6, 40];
 /// Times that differ by less than this share.
 const ALIKE: f64 = 0.02;
 /// Pixels that are enough to compare costs: where processors render, a quarter of what fills a graphics card.
@@ -217,28 +226,28 @@ fn shrink(settings: &mut Settings, most: f64) {
 }
 
 /// Measures a variant beside the usual one: both run in turn, so that changes in the machine's speed affect both, and the least times
-/// count. What seems to take longer to compile is compiled again, lest that be chance.
-fn beside(usual: &mut Variant, other: impl Fn() -> Result<Variant>) -> Result<(Cost, Cost)> {
+/// count; all are returned in pairs. What seems to take longer to compile is compiled again, lest that be chance.
+fn beside(usual: &mut Variant, other: impl Fn() -> Result<Variant>) -> Result<(Cost, Cost, Vec<[f64; 2]>)> {
     let mut found = other()?;
     if found.cost.compile_ms > usual.cost.compile_ms {
         let first = found.cost.compile_ms;
         found = other()?;
         found.cost.compile_ms = found.cost.compile_ms.min(first);
     }
-    let mut times = [Vec::new(), Vec::new()];
-    while times[0].len() < RUNS[0] || times[0].len() < RUNS[1] && !times.iter_mut().all(|ms| is_settled(ms)) {
-        times[0].push(usual.run()?);
-        times[1].push(found.run()?);
+    let mut pairs: Vec<[f64; 2]> = Vec::new();
+    let two_least = |pairs: &[[f64; 2]], which: usize| {
+        let mut ms: Vec<f64> = pairs.iter().map(|pair| pair[which]).collect();
+        ms.sort_by(f64::total_cmp);
+        [ms[0], ms[1]]
+    };
+    // One alone may be chance.
+    let is_settled = |[least, next]: [f64; 2]| next - least <= ALIKE * least;
+    let all_settled = |pairs: &[[f64; 2]]| [0, 1].into_iter().all(|which| is_settled(two_least(pairs, which)));
+    while pairs.len() < RUNS[0] || pairs.len() < RUNS[1] && !all_settled(&pairs) {
+        pairs.push([usual.run()?, found.run()?]);
     }
-    let [usual_ms, found_ms] = times.map(|ms| ms.into_iter().fold(f64::INFINITY, f64::min));
-    (usual.cost.gpu_ms, found.cost.gpu_ms) = (usual_ms, found_ms);
-    Ok((usual.cost, found.cost))
-}
-
-/// Whether the two least times are alike: one alone may be chance.
-fn is_settled(ms: &mut [f64]) -> bool {
-    ms.sort_by(f64::total_cmp);
-    ms[1] - ms[0] <= ALIKE * ms[0]
+    [usual.cost.gpu_ms, found.cost.gpu_ms] = [0, 1].map(|which| two_least(&pairs, which)[0]);
+    Ok((usual.cost, found.cost, pairs))
 }
 
 /// Bytes of the scene's records that only this effect reads. Every new effect needs an entry here.
@@ -322,12 +331,15 @@ pub fn text(rows: &[EffectRow]) -> String {
             if r.on { "on" } else { "off" }.to_owned(),
             ms(r.gpu_ms_with),
             ms(r.gpu_ms_without),
+            r.gpu_ms_added
+                .map_or("-".to_owned(), |[low, high]| format!("{} to {}", milliseconds(low), milliseconds(high))),
             ms(r.compile_ms),
             r.bytes.to_string(),
             readable(&r.called_for_by),
         ]
     };
-    let header = ["effect", "", "GPU ms with", "GPU ms without", "compile ms", "bytes", "called for by"];
+    let header =
+        ["effect", "", "GPU ms with", "GPU ms without", "GPU ms added", "compile ms", "bytes", "called for by"];
     table::text(&header, &rows.iter().map(cells).collect::<Vec<_>>())
 }
 
@@ -341,7 +353,7 @@ mod tests {
             EffectRow { effect: "ggx", on: true, called_for_by: "vase".to_owned(), bytes: 64, ..EffectRow::default() };
         let table = text(&[on, EffectRow { effect: "lens", ..EffectRow::default() }]);
         let last = |line: usize| table.lines().nth(line).unwrap().split_whitespace().collect::<Vec<_>>();
-        assert_eq!(last(1), ["ggx", "on", "-", "-", "-", "64", "vase"]);
-        assert_eq!(last(2), ["lens", "off", "-", "-", "-", "0"]);
+        assert_eq!(last(1), ["ggx", "on", "-", "-", "-", "-", "64", "vase"]);
+        assert_eq!(last(2), ["lens", "off", "-", "-", "-", "-", "0"]);
     }
 }

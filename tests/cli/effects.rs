@@ -44,9 +44,10 @@ fn explain_tells_what_effects_cost() {
     assert!(compiles(textures) || again() || again(), "{textures}");
     for row in [textures, emissive, guides] {
         let [with, without] = ["gpu_ms_with", "gpu_ms_without"].map(|name| row[name].as_f64().unwrap());
-        assert!(with > 0.0 && without > 0.0, "{row}");
+        let [low, high] = [0, 1].map(|end| row["gpu_ms_added"][end].as_f64().unwrap());
+        assert!(with > 0.0 && without > 0.0 && low <= high, "{row}");
     }
-    assert_eq!(adaptive["gpu_ms_with"], Value::Null);
+    assert_eq!([&adaptive["gpu_ms_with"], &adaptive["gpu_ms_added"]], [&Value::Null; 2]);
     // The lamp's two triangles, 64 bytes each and 8 in the alias table; 48 bytes for each of 128 x 128 primary hits, and 28
     // where samples are placed: weight, count, offset, path and priority. Where they are not, buffers have one element.
     assert_eq!(emissive["bytes"], 144);
