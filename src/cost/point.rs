@@ -164,7 +164,8 @@ pub struct Summary {
     /// Mean of every error over the seeds, and its interval by Student's t. Both are of logarithms, so that they are of a typical run, but
     /// for PSNR, SSIM, and errors that are 0 in a run.
     pub errors: Errors<Estimate>,
-    /// relMSE times GPU time in seconds, a mean as of errors: lower is better, and the same for any number of samples of an unbiased method.
+    /// relMSE times GPU time in seconds, a mean as of errors: lower is better, and the same for any number of samples of an unbiased
+    /// method.
     pub inefficiency: Option<Estimate>,
     /// GPU time that uniform unfiltered rendering needs for this point's relMSE, divided by this point's GPU time.
     pub speed_up: Option<Factor>,

@@ -111,8 +111,9 @@ fn of_all(runs: &[Run], of: impl Fn(&Run) -> Option<f64>) -> Option<Vec<f64>> {
     runs.iter().map(of).collect()
 }
 
-/// A factor of every run relative to the curve of its own seed, without rises, and the geometric mean of these factors. Uniform unfiltered rendering is
-/// as good as itself. Runs without an error above the noise of the reference tell no factor, and the others alone would be biased.
+/// A factor of every run relative to the curve of its own seed, without rises, and the geometric mean of these factors. Uniform
+/// unfiltered rendering is as good as itself. Runs without an error above the noise of the reference tell no factor, and the others
+/// alone would be biased.
 fn factor(
     point: &Point,
     baseline: &Baseline,

@@ -10,7 +10,7 @@
 //! Operations: see [`super::code`]. Those of `path` are its steps through the hierarchy, one for each node; shading does not count.
 use super::code::Code;
 use crate::gpu::{Access, BoundRange, KernelCode, Pass};
-use crate::layout::{BvhNode, vec4};
+use crate::layout::{BvhNode, Effect, vec4};
 use crate::render::Counters;
 use crate::render::pass::wavefront::{BYTES_OF_HIT, BYTES_OF_RAY, BYTES_PER_PATH};
 use crate::shaders::shared::{window_blocks, windows};
@@ -96,7 +96,7 @@ impl FrameWork {
         let (bytes, is_least) = self.bytes(pass, paths);
         work.bytes.add(bytes, is_least);
         let Some(code) = &shape.code else { return };
-        let count = codes.entry(key(code)).or_insert_with(|| Code::new(code.spirv, &code.constants));
+        let count = codes.entry(key(code)).or_insert_with(|| Code::new(code.spirv, &without_walls(&code.constants)));
         let Some(count) = count else { return work.operations.add(0, true) };
         if matches!(pass.time.name, "path" | "path_extend") {
             // The counters are of the whole frame.
@@ -189,6 +189,12 @@ type Key = (usize, Vec<(u32, u32)>);
 /// Each kernel's code lies at an address of its own.
 fn key(code: &KernelCode) -> Key {
     (code.spirv.as_ptr() as usize, code.constants.to_vec())
+}
+
+/// The code of clear walls lies in the loop of the traversal, but few of a ray's steps meet any.
+fn without_walls(constants: &[(u32, u32)]) -> Vec<(u32, u32)> {
+    let walls = |id: u32| id == Effect::clear_walls as u32;
+    constants.iter().map(|&(id, value)| (id, if walls(id) { 0 } else { value })).collect()
 }
 
 /// How often the bytes of a range move: once in each direction.

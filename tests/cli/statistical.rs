@@ -119,7 +119,7 @@ fn what_cannot_be_tested_is_one_line() {
     once.add("samples", Samples::U32(vec![1; 1024]));
     save(&once, "once.exr");
     complains(&compare(&folder, "a.exr small.exr"), 3, &["32x32", "16x16"]);
-    complains(&compare(&folder, "a.exr nan.exr"), 3, &["nan.exr", "1024 of 1024 pixels"]);
+    complains(&compare(&folder, "a.exr nan.exr"), 3, &["nan.exr", "each of its 1024 pixels"]);
     complains(&compare(&folder, "a.exr bare.exr"), 3, &["bare.exr", "does not say how noisy", "--errors"]);
     complains(&compare(&folder, "a.exr bare.png"), 3, &["bare.png", "--errors"]);
     complains(&compare(&folder, "a.exr once.exr"), 3, &["once.exr", "--spp 2"]);

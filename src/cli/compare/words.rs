@@ -37,8 +37,8 @@ pub fn verdict(report: &Report) -> String {
         }
         Verdict::Different => format!("different: {}", different(&report.outcome)),
         Verdict::TooNoisy { visible, samples } => format!(
-            "too noisy to say: no difference is found, but one of {place}, if in one channel alone, is seen only from {} on; {} takes about {} times the \
-             samples{}",
+            "too noisy to say: no difference is found, but one of {place}, if in one channel alone, is seen only from {} on; {} takes \
+             about {} times the samples{}",
             percent(visible),
             percent(report.options.resolve),
             rounded_up(samples),

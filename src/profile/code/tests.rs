@@ -1,6 +1,7 @@
 //! Operations of kernels whose loops are known.
 use super::*;
 use crate::gpu::Bindings;
+use crate::layout::Effects;
 use crate::shaders::{self, ceiling_arithmetic, shared};
 
 fn code<B: Bindings>(constants: &[(u32, u32)]) -> Code {
@@ -43,7 +44,7 @@ fn constants_decide_branches_and_bounds() {
 
 #[test]
 fn a_step_through_the_hierarchy_tests_eight_children() {
-    let step = code::<shaders::path::Bind>(&[]).largest_step();
+    let step = code::<shaders::path::Bind>(&Effects { clear_walls: false, ..Effects::ALL }.entries()).largest_step();
     // About forty operations for each box.
     assert!((8 * 30..8 * 300).contains(&step), "{step}");
 }
