@@ -188,7 +188,7 @@ fn what_does_not_tell_its_noise_is_refused() {
     let good = film(1.0, 0.01, 16);
     assert!(Estimate::of_film(&good).is_ok());
     refused(&film(1.0, 0.0, 1), "--spp 2");
-    refused(&film(f32::NAN, 0.01, 16), "20 of 20 pixels");
+    refused(&film(f32::NAN, 0.01, 16), "each of its 20 pixels");
     refused(&film(1.0, f32::INFINITY, 16), "infinite");
     let mut bare = good.clone();
     bare.channels.retain(|c| !c.name.starts_with("m2"));
