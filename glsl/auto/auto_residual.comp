@@ -22,6 +22,8 @@ const float SIGNIFICANT = 3.0; // standard deviations that noise explains
 // The relative variance of the surroundings counts as that of this many samples. Where all samples are dark, their own variance
 // says nothing of the bright ones that may have been missed by chance.
 const float PRIOR_SAMPLES = 4.0;
+// With fewer known pixels in the largest window all may be bright by chance: light is then kept from being negative alone.
+const int ENOUGH_PIXELS = 16;
 const float ENOUGH_SAMPLES = 16.0; // of a window: fewer may all be dark by chance
 
 // Sums over the like pixels of a window.
@@ -41,6 +43,7 @@ struct Tap {
     vec3 residual;
     float variance;
     bool counts;
+    bool known;
 };
 
 Tap tap_at(ivec2 at) {
@@ -49,7 +52,8 @@ Tap tap_at(ivec2 at) {
     vec4 blended = texelFetch(blend, i);
     float variance = blended.w >= 0.0 ? blended.w : max(texelFetch(estimate, i).w, 0.0);
     Pixel q = pixel_at(i);
-    return Tap(q, q.colour.rgb - blended.rgb, variance, at == inside && blended.w != UNFILTERED);
+    bool exists = at == inside;
+    return Tap(q, q.colour.rgb - blended.rgb, variance, exists && blended.w != UNFILTERED, exists && q.colour.w > 0.0);
 }
 
 void add(inout Window sum, Tap tap, float w) {
@@ -75,7 +79,6 @@ vec3 significant(Window sum, vec3 given, float prior) {
 // The pixel's light with what its windows, from the widest on, give back.
 vec4 with_residual(int i, Pixel p, vec4 blended, Window windows[3], vec3 least) {
     float count = p.colour.w;
-    // No light becomes less than the least of the noisy pixels around, or negative if none of these is.
     vec3 light = max(blended.rgb, least);
     if (count == 0.0 || blended.w == UNFILTERED) return vec4(light, blended.w == UNFILTERED ? 0.0 : 1.0);
     vec4 other = texelFetch(others, i);
@@ -96,11 +99,14 @@ void main() {
     if (x >= size.x || first >= size.y) return;
     Pixel p[ROWS];
     Window wide[ROWS], near[ROWS];
+    // No light becomes less than the least of the noisy pixels around: linear fits overshoot into the dark beside bright edges.
     vec3 least[ROWS];
+    int known[ROWS];
     [[unroll]] for (int k = 0; k < ROWS; k++) {
         p[k] = pixel_at(min(first + k, size.y - 1) * size.x + x);
         wide[k] = near[k] = NO_WINDOW;
-        least[k] = vec3(0.0);
+        least[k] = vec3(LARGEST);
+        known[k] = 0;
     }
     // Tested at its end: see shared/traverse.glsl.
     int i = -REACH;
@@ -111,7 +117,8 @@ void main() {
                 if (abs(j - k) <= REACH) {
                     float w = tap.counts ? edge_weight(tap.pixel, edge_exponent(p[k], tap.pixel, push.rates)) : 0.0;
                     add(wide[k], tap, w);
-                    least[k] = min(least[k], tap.pixel.colour.rgb);
+                    if (tap.known) least[k] = min(least[k], tap.pixel.colour.rgb);
+                    known[k] += int(tap.known);
                     if (abs(j - k) <= 1) add(near[k], tap, abs(i) <= 1 ? w : 0.0);
                 }
             }
@@ -119,6 +126,7 @@ void main() {
     } while (++i <= REACH);
     [[unroll]] for (int k = 0; k < ROWS; k++) {
         int row = min(first + k, size.y - 1), at = row * size.x + x;
+        if (known[k] < ENOUGH_PIXELS) least[k] = min(least[k], vec3(0.0));
         Window own = NO_WINDOW;
         add(own, tap_at(ivec2(x, row)), 1.0);
         vec4 result = with_residual(at, p[k], texelFetch(blend, at), Window[](wide[k], near[k], own), least[k]);

@@ -3,7 +3,7 @@ use super::{Field, Struct, float, uint, uvec2, vec2, vec3, vec4};
 use bytemuck::{Pod, Zeroable};
 
 gpu_structs! {
-    /// Push constants of `demodulate.comp`.
+    /// Push constants of `demodulate.comp` and `as_light.comp`.
     struct SplitPush {
         /// Film in pixels.
         size: uvec2,

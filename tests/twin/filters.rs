@@ -237,9 +237,11 @@ fn bilateral_and_wavelets_solve_the_worked_examples() {
 
     let reference = find("wavelet").unwrap().reference;
     // CDF(2,2), 0 0 8 0 0: odd pixels miss by -4 each, the middle becomes 8 - 4/2 = 6, the ends, with one neighbour,
-    // 0 - 4/2 = -2; without details the odd ones come back as 2.
-    let row = red(&reference(&line(&[0.0, 0.0, 8.0, 0.0, 0.0]), &plain));
-    assert_eq!(row, [-2.0, 2.0, 6.0, 2.0, -2.0]);
+    // 0 - 4/2 = -2; without details the odd ones come back as 2. Light is not negative, unless that around is: 100 less of all.
+    for (base, ends) in [(0.0, 0.0), (-100.0, -100.0), (-1.0, -1.0), (5.0, 3.0)] {
+        let row = red(&reference(&line(&[0.0, 0.0, 8.0, 0.0, 0.0].map(|v| v + base)), &plain));
+        assert_eq!(row, [ends, 2.0 + base, 6.0 + base, 2.0 + base, ends], "{base}");
+    }
     // Red-black on 3x3 with 8 in the middle, which is red: each black pixel predicts (8 + 0 + 0) / 3 and misses by that,
     // the middle becomes 8 - 4/3 and corners -4/3; on the diagonals the middle is odd and comes back as their mean.
     let mut input = Picture::new(3, 3).flat().input;
@@ -373,6 +375,41 @@ fn auto_trusts_variances_of_two_samples() {
             found.iter().zip(right).all(|(a, b)| (a - b).abs() < 1e-6 * value),
             "{samples} {variance} {value}: {found:?}"
         );
+    }
+    assert_silent(&gpu);
+}
+
+/// A sphere without noise in light of 300 from the side and of .1 from all around.
+fn terminator() -> FilterInput {
+    let mut input = Picture::new(32, 32).flat().input;
+    input.variance = Some(vec![[1e-12; 3]; input.radiance.len()]);
+    for (i, (c, g)) in input.radiance.iter_mut().zip(&mut input.guide).enumerate() {
+        let [x, y] = [i % 32, i / 32].map(|k| (k as f32 - 15.5) / 11.0);
+        let seen = x * x + y * y < 1.0;
+        let z = (1.0 - x * x - y * y).max(0.0).sqrt();
+        let light = 0.1 + 300.0 * (0.8 * x - 0.6 * z).max(0.0);
+        *c = if seen { [light, light, light, 4.0] } else { [0.0; 4] };
+        g.normal = if seen { [x, y, z] } else { [0.0; 3] };
+        g.position = if seen { [x, y, z] } else { [0.0; 3] };
+        g.depth = if seen { 4.0 - z } else { 0.0 };
+    }
+    input
+}
+
+#[test]
+fn light_beside_bright_edges_stays_light() {
+    let gpu = gpu();
+    for (name, least) in [("guided", 0.0), ("wavelet", 0.0), ("auto", 0.0999)] {
+        let input = terminator();
+        let settings = FilterSettings::default().scaled_to(&input);
+        let row = find(name).unwrap();
+        let device = run(&gpu, row, &input, &settings).unwrap().0;
+        let host = (row.reference)(&input, &settings);
+        for (made, by) in [(&device, "device"), (&host, "twin")] {
+            let seen = || made.iter().zip(&input.radiance).filter(|(_, c)| c[3] > 0.0).map(|(v, _)| v[0]);
+            let dark = seen().fold(f32::INFINITY, f32::min);
+            assert!(dark >= least, "{name}, {by}: {dark}");
+        }
     }
     assert_silent(&gpu);
 }

@@ -1,5 +1,6 @@
 //! Reconstructing the light between the samples. A filter is a row of [`FILTERS`]: a Rust file that records its kernels
 //! and has their CPU twin, and GLSL files of the same names.
+mod as_light;
 mod atrous;
 mod atrous_taps;
 mod auto;

@@ -4,6 +4,10 @@
 //! Predictions are weighted means, and updates half of such means, as Fattal has them. The weights are EAW's, of guides too,
 //! not 1 / (|a - b|^alpha + eps) of the image alone; and on the way back, that of radiance compares with the smoothed
 //! neighbours, where Fattal keeps the weights of the way down.
+//!
+//! Updates keep the mean of the image where all weights are equal and all pixels known. Beside edges and unknown pixels they do not,
+//! and a few coarse coefficients stand for all of a small image: a sphere beside a sky in 64 x 64 pixels lost two fifths of its light.
+use super::as_light::{AsLight, as_light};
 use super::edge::{Rates, edge_weight};
 use super::pack::{Pack, Packed};
 use super::{Filter, FilterInput, Planes, Row};
@@ -24,7 +28,9 @@ pub const ROW: Row = Row {
         let steps = steps(s.footprint.levels, s.wavelet.basis);
         Ok(Box::new(Wavelet::new(gpu, Rates::new(&s.edge), steps, size)?))
     },
-    reference: |input, s| reference(input, Rates::new(&s.edge), steps(s.footprint.levels, s.wavelet.basis)),
+    reference: |input, s| {
+        as_light(input, reference(input, Rates::new(&s.edge), steps(s.footprint.levels, s.wavelet.basis)))
+    },
 };
 
 /// Neighbours by stencil: along rows, along columns, side by side, diagonally.
@@ -79,6 +85,7 @@ struct Wavelet {
     scratch: Buffer<vec4>,
     rates: Rates,
     steps: Vec<Lifting>,
+    light: AsLight,
 }
 
 impl Wavelet {
@@ -87,7 +94,8 @@ impl Wavelet {
         let kernel = |inverse| Kernel::new(gpu, &Constants { edge, filter_thread, inverse });
         let pack = Pack::new(gpu, size)?;
         let scratch = Buffer::new(gpu, "wavelet", pack.colour.len(), Location::Device)?;
-        Ok(Self { pack, kernels: each([false, true], kernel)?, scratch, rates, steps })
+        let light = AsLight::new(gpu)?;
+        Ok(Self { pack, kernels: each([false, true], kernel)?, scratch, rates, steps, light })
     }
 }
 
@@ -108,7 +116,7 @@ impl Filter for Wavelet {
             rec.dispatch(kernel, bind, &push, kernel.groups(planes.size))?;
             from = to;
         }
-        Ok(())
+        self.light.record(rec, planes)
     }
 }
 

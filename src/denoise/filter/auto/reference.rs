@@ -36,7 +36,8 @@ impl Results {
     fn new(input: &FilterInput, image: &[Packed], settings: &FilterSettings) -> Self {
         let rows = candidates(settings);
         let run = |k: usize, radiance: Vec<vec4>| -> Vec<Vec4> {
-            let output = (guided::ROW.reference)(&input.with_radiance(radiance), &rows[k]);
+            let FilterSettings { guided, footprint, edge, .. } = &rows[k];
+            let output = guided::fits(&input.with_radiance(radiance), guided, footprint.radius, edge.extent);
             output.into_iter().map(Vec4::from).collect()
         };
         let pixels = |colour: &dyn Fn(usize) -> Vec3| -> Vec<vec4> {

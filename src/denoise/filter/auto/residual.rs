@@ -5,7 +5,7 @@ use crate::denoise::filter::noise_estimate::contrast;
 use crate::denoise::filter::pack::Packed;
 use crate::layout::vec4;
 use crate::math::srgb::luminance;
-use crate::shaders::auto_residual::{self, ENOUGH_SAMPLES, PRIOR_SAMPLES, SIGNIFICANT};
+use crate::shaders::auto_residual::{self, ENOUGH_PIXELS, ENOUGH_SAMPLES, PRIOR_SAMPLES, SIGNIFICANT};
 use crate::shaders::shared::luminance::STRONGEST;
 use glam::{Vec3, Vec4, Vec4Swizzles};
 
@@ -84,7 +84,7 @@ struct Residual {
     measured: bool,
 }
 
-/// What a pixel is given back of what the blend has lost, and the least light that it may have: of the noisy pixels around, or none.
+/// What a pixel is given back of what the blend has lost, and the least light that it may have.
 fn restored(
     image: &[Packed],
     residuals: &[Residual],
@@ -94,7 +94,7 @@ fn restored(
     prior: f32,
 ) -> (Vec3, Vec3) {
     const REACH: i64 = auto_residual::REACH as i64;
-    let (mut windows, mut least) = ([Window::default(); 3], Vec3::ZERO);
+    let (mut windows, mut least, mut known) = ([Window::default(); 3], Vec3::INFINITY, 0);
     let (p, x, y) = (&image[at], at as i64 % width, at as i64 / width);
     for (u, v) in (-REACH..=REACH).flat_map(|v| (-REACH..=REACH).map(move |u| (u, v))) {
         if !(0..width).contains(&(x + u)) || !(0..height).contains(&(y + v)) {
@@ -102,12 +102,16 @@ fn restored(
         }
         let j = ((y + v) * width + x + u) as usize;
         let (q, there) = (&image[j], &residuals[j]);
-        least = least.min(q.colour);
+        if q.count > 0.0 {
+            least = least.min(q.colour);
+            known += 1;
+        }
         let w = if there.filtered { edge_weight(q, rates.exponent(p, q)) } else { 0.0 };
         let reach = u.abs().max(v.abs());
         let holding = windows.iter_mut().zip([REACH, 1, 0]).filter(|(_, most)| reach <= *most);
         holding.for_each(|(window, _)| window.add(there.colour, w, q.count, there.variance));
     }
+    least = if known < ENOUGH_PIXELS { least.min(Vec3::ZERO) } else { least };
     if p.count == 0.0 || !residuals[at].filtered {
         return (Vec3::ZERO, least);
     }

@@ -4,6 +4,7 @@ mod pack;
 mod reference;
 mod table;
 
+use super::as_light::{AsLight, as_light};
 use super::{Filter, Planes, Row};
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu, Kernel, Location, MAX_GROUPS, Recorder, Tuning};
@@ -12,7 +13,7 @@ use crate::settings::{Is, choices, settings};
 use crate::shaders::{guided_columns, guided_mean_columns, guided_mean_rows, guided_rows, shared};
 use crate::threads::both;
 pub use pack::{BESIDE, Packed};
-pub use reference::leverages;
+pub use reference::{fits, leverages};
 use table::GuidedTable;
 
 /// See [`super::FILTERS`].
@@ -23,12 +24,13 @@ pub const ROW: Row = Row {
     make: |gpu, s, size| {
         let (own, radius) = (&s.guided, s.footprint.radius);
         let pack = Packed::new(gpu, own.channels, s.edge.extent, size)?;
-        Ok(match own.sums {
-            GuidedSums::Blocks => Box::new(Guided { windows: Windows::new(gpu, radius, own.eps, false, size)?, pack }),
+        let fits: Box<dyn Filter> = match own.sums {
+            GuidedSums::Blocks => Box::new(Fits { windows: Windows::new(gpu, radius, own.eps, false, size)?, pack }),
             GuidedSums::Table => Box::new(GuidedTable::new(gpu, pack, radius, own.eps, size)?),
-        })
+        };
+        Ok(Box::new(Guided { fits, light: AsLight::new(gpu)? }))
     },
-    reference: |input, s| reference::reference(input, &s.guided, s.footprint.radius, s.edge.extent),
+    reference: |input, s| as_light(input, fits(input, &s.guided, s.footprint.radius, s.edge.extent)),
 };
 
 /// `vec4`s of a pixel's record in a strip.
@@ -84,13 +86,26 @@ fn per_channel(text: &str) -> std::result::Result<vec4, String> {
     }
 }
 
-/// Alone, it packs what it reads.
+/// Alone, it leaves no light negative.
 struct Guided {
+    fits: Box<dyn Filter>,
+    light: AsLight,
+}
+
+impl Filter for Guided {
+    fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
+        self.fits.record(rec, planes)?;
+        self.light.record(rec, planes)
+    }
+}
+
+/// Packs what it reads.
+struct Fits {
     pack: Packed,
     windows: Windows,
 }
 
-impl Filter for Guided {
+impl Filter for Fits {
     fn record(&self, rec: &mut Recorder, planes: &Planes) -> Result<()> {
         self.pack.record(rec, planes)?;
         let Packed { colour, channels, .. } = &self.pack;

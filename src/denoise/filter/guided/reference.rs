@@ -63,8 +63,8 @@ impl<'a> Image<'a> {
     }
 }
 
-/// Window by window, in double precision: the definition.
-pub fn reference(input: &FilterInput, own: &GuidedSettings, radius: u32, extent: f32) -> Vec<vec4> {
+/// Window by window, in double precision: the definition. Beside edges fits may be negative.
+pub fn fits(input: &FilterInput, own: &GuidedSettings, radius: u32, extent: f32) -> Vec<vec4> {
     let image = Image::new(input, own, radius, extent);
     let model = |block: usize| image.sums(block).map(Sums::model);
     let models: Vec<Option<Model>> =
