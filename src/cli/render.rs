@@ -68,7 +68,7 @@ pub struct Args {
     pub denoise: Option<Method>,
     /// Render the best image within a GPU time, such as 200ms, 2s or "1m 30s": a probe of the scene on this device, which is not part of
     /// that time and may take longer, tells how many samples fit, and whether to filter (with --denoise, that filter is taken)
-    #[arg(long, value_name = "DURATION", value_parser = planned::duration,
+    #[arg(long, value_name = "DURATION", value_parser = planned::duration, allow_hyphen_values = true,
           conflicts_with_all = ["error", "spp", "resume", "pixel"])]
     pub time: Option<Duration>,
     /// Render in the least time an image of this relMSE, which is estimated without a reference
@@ -79,7 +79,7 @@ pub struct Args {
     pub plan: Option<PathBuf>,
     /// Render only the pixel in this column and row, with the samples that it has in the whole image, wherever those were
     /// placed: --spp says how many
-    #[arg(long, value_name = "X,Y", value_parser = pixel,
+    #[arg(long, value_name = "X,Y", value_parser = pixel, allow_hyphen_values = true,
           conflicts_with_all = ["resume", "checkpoint", "denoise"])]
     pub pixel: Option<[u32; 2]>,
     /// Look through this camera of a glTF file [default: its first one, or one that frames it]

@@ -67,7 +67,9 @@ fn what_cannot_be_planned_is_told_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let small = |words: &str| render(&folder, SCENE, &format!("{SMALL} -o a.exr {words}"));
     complains(&small("--time 1us"), 2, &["one sample a pixel takes", "0.001 ms were given", "smaller film"]);
-    complains(&small("--time 5"), 2, &["--time", "200ms"]);
+    for time in ["5", "0s", "-1s"] {
+        complains(&small(&format!("--time {time}")), 2, &["--time", "a time above 0 with its unit", "200ms"]);
+    }
     complains(&small("--error=-1"), 2, &["an error of -1", "above 0"]);
     complains(&small("--error 1e-30"), 2, &["relMSE", "samples a pixel"]);
     complains(&small("--time 1s --noise-threshold 0.1"), 2, &["a noise threshold ends a render by itself"]);

@@ -40,10 +40,10 @@ use std::time::{Duration, Instant};
 )]
 pub struct Args {
     /// Frames: 0..96 are 96 frames, 0..=96 one more, 7 is one [default: up to the last key of all that moves]
-    #[arg(long, value_name = "FIRST..END", value_parser = range::parse)]
+    #[arg(long, value_name = "FIRST..END", value_parser = range::parse, allow_hyphen_values = true)]
     pub frames: Option<Range<u32>>,
     /// Of them, render only these; what they show stays the same
-    #[arg(long, value_name = "FIRST..END", value_parser = range::parse)]
+    #[arg(long, value_name = "FIRST..END", value_parser = range::parse, allow_hyphen_values = true)]
     pub only: Option<Range<u32>>,
     /// Frames per second
     #[arg(long, default_value = "24", value_parser = finite)]

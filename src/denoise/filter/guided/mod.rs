@@ -62,7 +62,7 @@ settings! {
             channels: u32 = 4, CHANNELS;
             // Normals are halved, depths in units of the extent.
             /// Variance of the guide below which guided sees no edge: one number, or one per channel.
-            eps: vec4 = [0.01, 0.01, 0.01, 0.02], EPS, [value_parser = per_channel];
+            eps: vec4 = [0.01, 0.01, 0.01, 0.02], EPS, [value_parser = per_channel, allow_hyphen_values = true];
             /// How guided sums over windows.
             sums: GuidedSums = GuidedSums::Blocks, ..;
         }
