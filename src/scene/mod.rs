@@ -52,6 +52,10 @@ const BYTES_OF_TRIANGLE: u64 = 400;
 /// 3 * 32 M^2 * 2 M = 192 M^3, which is 1.9e38.
 pub const MAX_COORDINATE: f64 = 1e12;
 
+/// Largest radiance of surfaces and sky, W/(m^2 sr), and irradiance of directional lights, W/m^2. It is how far a sample may lie from
+/// its pixel's mean before the variances that are kept of it saturate.
+pub const MAX_RADIANCE: f32 = crate::shaders::accumulate::MAX_DEVIATION;
+
 /// Most bytes of memory that a byte of a scene file takes while it is read.
 const BYTES_OF_TOML: u64 = 40;
 

@@ -6,8 +6,9 @@ use crate::layout::{
 use crate::scene::build::bvh::{self, Bounds};
 use crate::scene::build::environment::{self, rotation};
 use crate::scene::build::hierarchy::{check_none_lost, instance, is_speck, reach};
-use crate::scene::build::plan::{has_inverse, is_even};
+use crate::scene::build::plan::is_even;
 use crate::scene::build::soft::Placed;
+use crate::scene::description::Transform;
 use crate::scene::load::material::radiance;
 use crate::scene::pose::{EnvironmentChange, Pose, Vertices};
 use crate::scene::{Fingerprint, Scene};
@@ -131,7 +132,7 @@ fn next_copies(scene: &Scene, pose: &Pose, meshes: &[NextMesh], materials: &[Mat
         if !affine.is_finite() {
             return Err(format!("instance {number} gets a transform with NaN or infinite numbers"));
         }
-        if !has_inverse(&affine) {
+        if !Transform(affine).has_inverse() {
             flat.insert(copy);
             continue;
         }

@@ -12,7 +12,7 @@ use crate::layout::{LIGHT_ENVIRONMENT, Light, NONE};
 use crate::math::srgb::luminance;
 use crate::scene::description::EnvironmentTable;
 use crate::scene::load::environment::{load, unusable};
-use crate::scene::{Environment, Scene};
+use crate::scene::{Environment, MAX_RADIANCE, Scene};
 use glam::DMat3;
 
 /// Adds the lights without surface and the environment, with its image.
@@ -29,8 +29,8 @@ pub fn add_lights(sources: &mut Sources, scene: &mut Scene) -> Result<()> {
     let scale = table.scale.map_or([1.0; 3], |s| s.0);
     let constant = table.radiance.map_or([1.0; 3], |r| r.0);
     let radiance: [f32; 3] = std::array::from_fn(|c| scale[c] * constant[c]);
-    if !radiance.iter().all(|v| (0.0..=1e18).contains(v)) || !table.rotation.is_finite() {
-        return Err(at("radiance times scale must lie from 0 to 1e18, rotation be finite".to_owned()));
+    if !radiance.iter().all(|v| (0.0..=MAX_RADIANCE).contains(v)) || !table.rotation.is_finite() {
+        return Err(at(format!("radiance times scale must lie from 0 to {MAX_RADIANCE:e}, rotation be finite")));
     }
     let rotation = rotation(table.rotation, table.world_from_environment).map_err(at)?;
     let light = light(radiance, rotation);
@@ -38,7 +38,8 @@ pub fn add_lights(sources: &mut Sources, scene: &mut Scene) -> Result<()> {
         scene.lights.push(light);
         return Ok(());
     }
-    scene.environment = image_of(sources, table)?;
+    let brightest = MAX_RADIANCE / radiance.into_iter().fold(1.0, f32::max);
+    scene.environment = image_of(sources, table, brightest)?;
     scene.lights.extend(scene.environment.is_some().then_some(light));
     Ok(())
 }
@@ -53,7 +54,8 @@ pub fn light(radiance: [f32; 3], world_from_environment: DMat3) -> Light {
     Light { kind: LIGHT_ENVIRONMENT, a, b, c, triangle: NONE, value: radiance, material: NONE, ..Light::default() }
 }
 
-fn image_of(sources: &mut Sources, table: &EnvironmentTable) -> Result<Option<Environment>> {
+/// `brightest`: radiance that texels are clamped to.
+fn image_of(sources: &mut Sources, table: &EnvironmentTable, brightest: f32) -> Result<Option<Environment>> {
     let directory = sources.directory();
     let at = |what: String| Error::input_at(sources.path, PLACE, what);
     let warnings = &mut sources.library.warnings;
@@ -63,11 +65,11 @@ fn image_of(sources: &mut Sources, table: &EnvironmentTable) -> Result<Option<En
         (Some(file), None) => {
             let path = directory.join(file.to_string_lossy().replace('\\', "/"));
             let picture = load(&path)?;
-            from_picture(&path.display().to_string(), &picture, warnings).map_err(|what| unusable(&path, &what))
+            from_picture(&path.display().to_string(), &picture, brightest, warnings)
+                .map_err(|what| unusable(&path, &what))
         }
-        (None, Some(picture)) => {
-            from_picture(PLACE, picture, warnings).map_err(|what| at(format!("its picture is unusable: {what}")))
-        }
+        (None, Some(picture)) => from_picture(PLACE, picture, brightest, warnings)
+            .map_err(|what| at(format!("its picture is unusable: {what}"))),
         (None, None) => Ok(None),
     }
 }
@@ -77,32 +79,40 @@ fn row_sine(row: u32, height: u32) -> f64 {
     ((f64::from(row) + 0.5) / f64::from(height) * std::f64::consts::PI).sin()
 }
 
-/// An image of linear radiance with its alias table; `None` for one that is black throughout. `name` is for warnings.
+/// An image of linear radiance with its alias table; `None` for one that is black throughout. Channels are clamped to
+/// `brightest`; `name` is for warnings.
 ///
 /// # Errors
 /// A sentence, for a picture without pixels, or with others than its size says.
 pub fn from_picture(
     name: &str,
     picture: &Picture,
+    brightest: f32,
     warn: &mut Vec<String>,
 ) -> std::result::Result<Option<Environment>, String> {
     let &Picture { width, height, ref pixels } = picture;
     if pixels.is_empty() || pixels.len() != width as usize * height as usize {
         return Err(format!("it has {} pixels for {width} x {height}", pixels.len()));
     }
-    let mut repaired = 0usize;
-    let texels = pixels.iter().map(|&p| sane(p, &mut repaired)).collect();
+    let [mut repaired, mut clamped] = [0usize; 2];
+    let texels = pixels.iter().map(|&p| sane(p, brightest, [&mut repaired, &mut clamped])).collect();
     if repaired > 0 {
         warn.push(format!("{name}: {repaired} NaN, infinite or negative channels set to 0"));
+    }
+    if clamped > 0 {
+        warn.push(format!(
+            "{name}: {clamped} channels are above {brightest:e}, the brightest that can be rendered: clamped"
+        ));
     }
     Ok(with_table(width, height, texels))
 }
 
-fn sane(rgb: [f32; 3], repaired: &mut usize) -> [f32; 4] {
+fn sane(rgb: [f32; 3], brightest: f32, [repaired, clamped]: [&mut usize; 2]) -> [f32; 4] {
     let [r, g, b] = rgb.map(|v| {
         let usable = v.is_finite() && v >= 0.0;
         *repaired += usize::from(!usable);
-        if usable { v } else { 0.0 }
+        *clamped += usize::from(usable && v > brightest);
+        if usable { v.min(brightest) } else { 0.0 }
     });
     [r, g, b, 0.0]
 }
@@ -194,8 +204,9 @@ mod tests {
     #[test]
     fn black_images_are_none_and_damaged_pixels_are_mended() {
         assert!(with_table(2, 1, vec![[0.0; 4]; 2]).is_none());
-        let mut repaired = 0;
-        assert_eq!(sane([f32::NAN, -1.0, 2.0], &mut repaired), [0.0, 0.0, 2.0, 0.0]);
-        assert_eq!(repaired, 2);
+        let [mut repaired, mut clamped] = [0; 2];
+        assert_eq!(sane([f32::NAN, -1.0, 2.0], 2.0, [&mut repaired, &mut clamped]), [0.0, 0.0, 2.0, 0.0]);
+        assert_eq!(sane([f32::INFINITY, 3e38, 1.0], 2.0, [&mut repaired, &mut clamped]), [0.0, 2.0, 1.0, 0.0]);
+        assert_eq!((repaired, clamped), (3, 1));
     }
 }

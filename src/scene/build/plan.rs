@@ -109,9 +109,9 @@ impl<'s, 'a> Planner<'s, 'a> {
             return Err(sources.at(place, format!("no such mesh: did you mean \"{near}\"?")));
         };
         self.instanced[mesh] = true;
-        let affine = invertible(sources, table.transform.0, place)?;
+        let affine = invertible(sources, table.transform, place)?;
         let material = table.material.as_ref().map(|m| sources.material(m, place)).transpose()?;
-        let own = invertible(sources, meshes[mesh].transform.0, place)?;
+        let own = invertible(sources, meshes[mesh].transform, place)?;
         let whole = Job { material, placement: number, own, ..Job::new(mesh, affine * own) };
         self.exact[mesh] = self.exact[mesh] && may_be_exact(sources, &whole)?;
         self.plan.copies.push(match self.stretched[mesh] {
@@ -124,7 +124,7 @@ impl<'s, 'a> Planner<'s, 'a> {
     /// Stores a mesh for its instances, or where it has none, bakes it.
     fn keep(&mut self, mesh: usize) -> Result<()> {
         let table = &self.sources.description.mesh[mesh];
-        let affine = invertible(self.sources, table.transform.0, &format!("mesh \"{}\"", mesh_name(table)))?;
+        let affine = invertible(self.sources, table.transform, &format!("mesh \"{}\"", mesh_name(table)))?;
         let job = Job::new(mesh, affine);
         let (exact, stretched) = (self.exact[mesh], self.stretched[mesh]);
         if !self.instanced[mesh] {
@@ -176,16 +176,11 @@ fn is_stretched(description: &Description, job: &Job) -> bool {
     tables.flat_map(|t| &t.keys).any(is_uneven)
 }
 
-fn invertible(sources: &Sources, affine: DAffine3, place: &str) -> Result<DAffine3> {
-    match has_inverse(&affine) {
-        true => Ok(affine),
-        false => Err(sources.at(place, "its transform has no inverse: choose scales other than 0")),
+fn invertible(sources: &Sources, transform: Transform, place: &str) -> Result<DAffine3> {
+    match transform.has_inverse() {
+        true => Ok(transform.0),
+        false => Err(sources.at(place, "its transform has no inverse: choose scales other than 0, of 1e-18 or more")),
     }
-}
-
-/// Whether rays can be brought to the space of what it places.
-pub fn has_inverse(affine: &DAffine3) -> bool {
-    affine.is_finite() && affine.matrix3.determinant().abs() > 1e-60 && affine.inverse().is_finite()
 }
 
 /// A sphere that need not be tessellated: nobody asks for its segments or facets.

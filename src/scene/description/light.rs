@@ -1,7 +1,7 @@
 //! The `[[light]]` tables.
 use super::value::Rgb;
 use crate::layout::{LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT, Light, NONE};
-use crate::scene::MAX_COORDINATE;
+use crate::scene::{MAX_COORDINATE, MAX_RADIANCE};
 use glam::Vec3;
 use serde::Deserialize;
 
@@ -35,7 +35,7 @@ pub struct LightTable {
     pub target: Option<[f32; 3]>,
     /// Radiant intensity of a point or spot light (of a spot on its axis), W/sr, from 0 to 1e30.
     pub intensity: Option<Rgb>,
-    /// Irradiance of a directional light on a facing plane, W/m^2, from 0 to 1e30.
+    /// Irradiance of a directional light on a facing plane, W/m^2, from 0 to 1e17.
     pub irradiance: Option<Rgb>,
     /// Degrees from a spot light's axis up to which its intensity is full, from 0 to `cutoff`; default three quarters
     /// of that.
@@ -55,11 +55,11 @@ impl LightTable {
         let light = Light { triangle: NONE, material: NONE, ..Light::default() };
         match self.kind {
             Type::Point => {
-                let value = emitted(self.intensity, "intensity")?;
+                let value = emitted(self.intensity, "intensity", MAX_INTENSITY)?;
                 Ok(Light { kind: LIGHT_POINT, a: position()?, value, ..light })
             }
             Type::Directional => {
-                let value = emitted(self.irradiance, "irradiance")?;
+                let value = emitted(self.irradiance, "irradiance", MAX_RADIANCE)?;
                 Ok(Light { kind: LIGHT_DIRECTIONAL, b: self.axis(Vec3::ZERO)?, value, ..light })
             }
             Type::Spot => {
@@ -70,7 +70,7 @@ impl LightTable {
                     return Err(format!("cone {cone} and cutoff {cutoff}: need 0 <= cone <= cutoff <= 180 degrees"));
                 }
                 let c = [cone.to_radians().cos(), cutoff.to_radians().cos(), 0.0];
-                let value = emitted(self.intensity, "intensity")?;
+                let value = emitted(self.intensity, "intensity", MAX_INTENSITY)?;
                 Ok(Light { kind: LIGHT_SPOT, a, b: self.axis(a.into())?, c, value, ..light })
             }
         }
@@ -95,10 +95,13 @@ fn finite(v: [f32; 3], key: &str) -> Result<[f32; 3], String> {
     }
 }
 
-fn emitted(v: Option<Rgb>, key: &str) -> Result<[f32; 3], String> {
+/// Largest intensity of a point or spot light, W/sr: at a distance of [`MAX_COORDINATE`] it is little.
+const MAX_INTENSITY: f32 = 1e30;
+
+fn emitted(v: Option<Rgb>, key: &str, most: f32) -> Result<[f32; 3], String> {
     let v = v.ok_or_else(|| format!("needs {key}"))?.0;
-    match v.iter().all(|v| (0.0..=1e30).contains(v)) {
+    match v.iter().all(|v| (0.0..=most).contains(v)) {
         true => Ok(v),
-        false => Err(format!("{key} {v:?} is negative, NaN or above 1e30")),
+        false => Err(format!("{key} {v:?} is negative, NaN or above {most:e}")),
     }
 }

@@ -86,7 +86,7 @@ pub struct MaterialTable {
     pub specular_texture: Option<TextureTable>,
     /// Tint of transmission; default 1.
     pub transmission: Option<Rgb>,
-    /// Radiance of the front side, W/(m^2 sr), from 0 to 1e18 once it is multiplied by `emission_strength`; default 0.
+    /// Radiance of the front side, W/(m^2 sr), from 0 to 1e17 once it is multiplied by `emission_strength`; default 0.
     pub emission: Option<Rgb>,
     /// sRGB picture that multiplies `emission` (default then 1).
     pub emission_texture: Option<TextureTable>,
@@ -108,7 +108,7 @@ pub struct MaterialTable {
     pub emission_two_sided: bool,
     /// Coated: light that is reflected below the coat takes on the base's colour each time; default false.
     pub nonlinear: bool,
-    /// Factor of `emission`, from 0, so that the product is no more than 1e18; default 1.
+    /// Factor of `emission`, from 0, so that the product is no more than 1e17; default 1.
     pub emission_strength: Option<f32>,
     /// Factor of the x and y components of `normal_map`; default 1.
     pub normal_scale: Option<f32>,

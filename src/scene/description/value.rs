@@ -91,6 +91,19 @@ impl<'de> Deserialize<'de> for Scale {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Transform(pub DAffine3);
 
+impl Transform {
+    /// Largest factor by which the space of what is placed may be larger than the world: 1e18, whose square a 32-bit float holds.
+    const MAX_GROWTH: f64 = 1e18;
+
+    /// Whether rays can be brought to the space of what it places.
+    pub fn has_inverse(&self) -> bool {
+        let inverse = self.0.inverse();
+        let fits = |column: DVec3| column.abs().max_element() <= Self::MAX_GROWTH;
+        let m = inverse.matrix3;
+        self.0.is_finite() && inverse.is_finite() && [m.x_axis, m.y_axis, m.z_axis].into_iter().all(fits)
+    }
+}
+
 /// Row-major, as in a scene file; the last row counts as 0 0 0 1.
 impl From<[f64; 16]> for Transform {
     fn from(rows: [f64; 16]) -> Self {

@@ -7,6 +7,7 @@ use crate::scene::description::keys;
 use crate::scene::description::material::{Distribution, MaterialTable, Type};
 use crate::scene::description::texture::TextureTable;
 use crate::scene::description::value::Rgb;
+use crate::scene::{MAX_COORDINATE, MAX_RADIANCE};
 use std::path::Path;
 
 /// The materials of a scene and the textures they ask for.
@@ -184,9 +185,12 @@ impl Materials {
         }
         m.normal_scale = t.normal_scale.unwrap_or(1.0);
         m.bump_scale = t.bump_scale.unwrap_or(1.0);
-        match m.bump_scale.is_finite() && m.normal_scale.is_finite() {
+        if m.bump_scale.is_nan() || m.bump_scale.abs() > MAX_COORDINATE as f32 {
+            return Err(format!("bump_scale is {:e}: choose a height within {MAX_COORDINATE:e}", m.bump_scale));
+        }
+        match m.normal_scale.is_finite() {
             true => Ok(()),
-            false => Err("bump_scale or normal_scale is not a finite number".into()),
+            false => Err("normal_scale is not a finite number".into()),
         }
     }
 }
@@ -257,14 +261,14 @@ pub fn reflectance(color: [f32; 3], what: &str, warn: &mut Vec<String>) -> Resul
     Ok(clamped)
 }
 
-/// A colour from 0 to 1e18.
+/// A colour from 0 to [`MAX_RADIANCE`].
 ///
 /// # Errors
 /// With the colour, for another one.
 pub fn radiance(color: [f32; 3]) -> Result<[f32; 3], String> {
-    match color.iter().all(|v| v.is_finite() && (0.0..=1e18).contains(v)) {
+    match color.iter().all(|v| (0.0..=MAX_RADIANCE).contains(v)) {
         true => Ok(color),
-        false => Err(format!("emission {color:?} is negative, NaN or above 1e18")),
+        false => Err(format!("emission {color:?} is negative, NaN or above {MAX_RADIANCE:e}")),
     }
 }
 

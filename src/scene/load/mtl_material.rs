@@ -17,6 +17,7 @@ use super::metal;
 use super::mtl::{Map, Mtl, map};
 use super::texture::Kind;
 use crate::layout::{BSDF_COATED, BSDF_CONDUCTOR, BSDF_DIELECTRIC, BSDF_DIFFUSE, MATERIAL_NORMAL_MAP, Material, NONE};
+use crate::scene::MAX_COORDINATE;
 use crate::scene::description::material::Type;
 
 impl Materials {
@@ -88,7 +89,7 @@ impl Materials {
         let seen = !said && textures.holds_normals(&mtl.directory, &file);
         let kind = if said || seen { Kind::Data } else { Kind::Height };
         m.bump_texture = textures.request(&mtl.directory, &file, kind, mapping, warn);
-        m.bump_scale = height;
+        m.bump_scale = height.clamp(-MAX_COORDINATE as f32, MAX_COORDINATE as f32);
         if seen {
             m.normal_scale = height;
             let name = mtl.name();

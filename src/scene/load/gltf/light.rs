@@ -7,6 +7,7 @@
 use super::asset::{Asset, one_line};
 use super::extension::{self, Light, Spot};
 use crate::error::Result;
+use crate::scene::MAX_RADIANCE;
 use crate::scene::description::{LightTable, LightType, Rgb};
 use glam::{DAffine3, DVec3};
 use std::f32::consts::FRAC_PI_2;
@@ -26,8 +27,9 @@ pub fn read(asset: &Asset, warnings: &mut Vec<String>) -> Result<Vec<Light>> {
     Ok(lights)
 }
 
-/// Brightest light, and the narrowest cone in radians.
+/// Brightest light, its largest colour, and the narrowest cone in radians.
 const BRIGHTEST: f32 = 1e15;
+const LARGEST_COLOR: f32 = MAX_RADIANCE / BRIGHTEST;
 const NARROWEST: f32 = 1e-3;
 
 /// Whether anything had to be changed.
@@ -36,7 +38,7 @@ fn clamp(light: &mut Light) -> bool {
     let outer = sane(light.spot.outer_cone_angle, NARROWEST, FRAC_PI_2);
     let spot = Spot { inner_cone_angle: sane(light.spot.inner_cone_angle, 0.0, outer), outer_cone_angle: outer };
     let spot = if light.kind == "spot" { spot } else { light.spot };
-    let color = light.color.map(|c| sane(c, 0.0, BRIGHTEST));
+    let color = light.color.map(|c| sane(c, 0.0, LARGEST_COLOR));
     let new = Light { kind: light.kind.clone(), color, intensity: sane(light.intensity, 0.0, BRIGHTEST), spot };
     let changed = new != *light;
     *light = new;

@@ -3,6 +3,7 @@ use super::asset::Asset;
 use super::extension;
 use super::picture::{Pictures, TextureInfo};
 use crate::error::Result;
+use crate::scene::MAX_RADIANCE;
 use crate::scene::description::{AlphaMode, MaterialTable, MaterialType, Rgb, TextureTable};
 use gltf_json::material::{AlphaMode as Mode, Material, NormalTexture};
 use gltf_json::texture::Info;
@@ -115,8 +116,7 @@ struct Reader<'a> {
     clamped: &'a mut Vec<String>,
 }
 
-/// Largest radiance of an emissive surface, largest factor of a specular colour, and largest index of refraction.
-const LARGEST_EMISSION: f32 = 1e18;
+/// Largest factor of a specular colour, and largest index of refraction.
 const LARGEST_SPECULAR: f32 = 1e6;
 const LARGEST_INDEX: f32 = 1000.0;
 
@@ -128,7 +128,7 @@ impl Reader<'_> {
         let Checked::Valid(mode) = material.alpha_mode else {
             return Err(self.asset.at(&self.place, "has an alphaMode other than OPAQUE, MASK and BLEND"));
         };
-        let emission = self.within("emissiveFactor", material.emissive_factor.0, LARGEST_EMISSION);
+        let emission = self.within("emissiveFactor", material.emissive_factor.0, MAX_RADIANCE);
         let emission = Some(emission).filter(|factor| *factor != [0.0; 3]);
         let emissive = material.emissive_texture.as_ref().filter(|_| emission.is_some());
         Ok(MaterialTable {
@@ -161,7 +161,7 @@ impl Reader<'_> {
         let strength = self.extension::<EmissiveStrength>(all, "KHR_materials_emissive_strength")?;
         if let (Some(found), Some(Rgb(emission))) = (strength, &mut table.emission) {
             let strong = emission.map(|v| v * found.emissive_strength);
-            *emission = self.within("emissiveStrength", strong, LARGEST_EMISSION);
+            *emission = self.within("emissiveStrength", strong, MAX_RADIANCE);
         }
         if let Some(found) = self.extension::<Ior>(all, "KHR_materials_ior")? {
             // 0 stands for an index that reflects everything, which no finite index does.

@@ -235,7 +235,7 @@ impl<'a> Placer<'a> {
         let owns = several.unwrap_or_else(|| vec![DAffine3::IDENTITY]);
         let mut copies: Vec<_> = owns.into_iter().map(|own| Copy { node, own }).collect();
         // What moves may be flat at rest alone.
-        copies.retain(|copy| self.moved.nodes[node] || has_inverse(&self.world(copy)));
+        copies.retain(|copy| self.moved.nodes[node] || Transform(self.world(copy)).has_inverse());
         self.flat += usize::from(copies.is_empty());
         Ok(copies)
     }
@@ -262,8 +262,8 @@ impl<'a> Placer<'a> {
         for copy in copies {
             let (number, Copy { node, own }) = (self.instances.len(), *copy);
             self.found.instances.extend(self.moved.nodes[node].then_some(MovedInstance { number, node, own }));
-            let world = self.world(copy);
-            let transform = Transform(if has_inverse(&world) { world } else { speck(&world) });
+            let world = Transform(self.world(copy));
+            let transform = if world.has_inverse() { world } else { speck(&world.0) };
             self.instances.push(InstanceTable { mesh: mesh.clone(), transform, ..InstanceTable::default() });
         }
         Ok(())
@@ -317,13 +317,8 @@ impl Names {
     }
 }
 
-/// Whether a mesh can be placed so.
-fn has_inverse(affine: &DAffine3) -> bool {
-    affine.is_finite() && affine.matrix3.determinant().abs() > 1e-60 && affine.inverse().is_finite()
-}
-
 /// Stands in at rest for what is flat then, and moves: so small that it is not seen.
-fn speck(affine: &DAffine3) -> DAffine3 {
+fn speck(affine: &DAffine3) -> Transform {
     const SIZE: f64 = 1e-6;
-    DAffine3 { translation: affine.translation, ..DAffine3::from_scale(DVec3::splat(SIZE)) }
+    Transform(DAffine3 { translation: affine.translation, ..DAffine3::from_scale(DVec3::splat(SIZE)) })
 }
