@@ -95,7 +95,7 @@ impl<'a> Job<'a> {
         self.checkpoint.map_or(Ok(()), |checkpoint| renderer.resume(frame, checkpoint))?;
         let (begun, steps) = self.begin(frame)?;
         let (mut status, mut steps, mut listed) = (self.at_start(), steps.peekable(), u64::MAX);
-        let (mut pace, mut left) = (Pace::new(self.step_time), Vec::new());
+        let (mut pace, mut left) = (Pace::new(self.step_time, renderer.gpu.info().kind), Vec::new());
         status.times.extend(begun);
         while let Some(planned) = pace.next(&mut left, &mut steps) {
             if between(&status)?.is_break() {

@@ -1,11 +1,15 @@
 //! Steps of about a given time: how many paths the next one may have, from what the last ones took.
 use super::Step;
 use super::pass::path::traces_paths;
-use crate::gpu::PassTime;
+use crate::gpu::{DeviceKind, PassTime};
 use std::time::Duration;
 
-/// Paths of the first step, of which nothing is known: a scene of 100,000 instances takes a CPU a second.
-const FIRST: u64 = 1 << 12;
+/// Paths of the first step, of which nothing is known: a scene of 100,000 instances takes a CPU a second. A graphics card traces
+/// more in some milliseconds, and would idle at the end of every short step.
+const fn first(kind: DeviceKind) -> u64 {
+    if matches!(kind, DeviceKind::Cpu) { 1 << 12 } else { 1 << 20 }
+}
+
 /// Fewer would not keep a device busy.
 const LEAST: u64 = 1 << 10;
 /// A step may have so many times the paths of the last at most: other pixels may see what takes longer.
@@ -21,9 +25,9 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// For steps of about this time; none: they stay as they are.
-    pub fn new(step_time: Option<Duration>) -> Self {
-        Self { step_time, most: step_time.map_or(u64::MAX, |_| FIRST) }
+    /// For steps of about this time on such a device; none: they stay as they are.
+    pub fn new(step_time: Option<Duration>, kind: DeviceKind) -> Self {
+        Self { step_time, most: step_time.map_or(u64::MAX, |_| first(kind)) }
     }
 
     /// What is to be done next of `left`, whose last comes first, or else of `steps`; the rest of it goes to the end of
@@ -71,7 +75,7 @@ mod tests {
 
     #[test]
     fn steps_come_to_take_their_time_and_little_else() {
-        let mut pace = Pace::new(Some(Duration::from_secs(1)));
+        let mut pace = Pace::new(Some(Duration::from_secs(1)), DeviceKind::Cpu);
         let times = steps(&mut pace, 1 << 23, 4e-6, 0.001);
         assert!(times.is_sorted_by(|a, b| a <= &(1.01 * b)) && times.len() < 45, "{times:?}");
         assert!((0.9..1.01).contains(&times[5]), "{times:?}");
@@ -87,7 +91,7 @@ mod tests {
     #[test]
     fn a_queue_that_tells_no_times_and_a_step_of_few_paths_are_no_harm() {
         let step = |paths| Step::Listed(PathRange { first: 0, paths, round: 0, rounds: 1 });
-        let mut pace = Pace::new(Some(Duration::from_secs(1)));
+        let mut pace = Pace::new(Some(Duration::from_secs(1)), DeviceKind::Cpu);
         pace.observe(&step(1 << 12), Duration::from_secs(2), &[]);
         assert_eq!(pace.most, 1 << 11);
         pace.observe(&step(1), Duration::from_secs(2), &[]);
