@@ -95,7 +95,7 @@ fn finite(v: [f32; 3], key: &str) -> Result<[f32; 3], String> {
     }
 }
 
-/// Largest intensity of a point or spot light, W/sr: at a distance of [`MAX_COORDINATE`] it is little.
+/// Largest intensity of a point or spot light, W/sr: in large units of length it is spread over the squares of large distances.
 const MAX_INTENSITY: f32 = 1e30;
 
 fn emitted(v: Option<Rgb>, key: &str, most: f32) -> Result<[f32; 3], String> {
