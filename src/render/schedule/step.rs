@@ -86,6 +86,10 @@ pub enum Step {
     Listed(PathRange),
 }
 
+/// Samples of a pixel that are traced by neighbouring threads, where a step has as many: their rays go alike, and lavapipe takes a tenth
+/// longer where they are fewer.
+const TOGETHER: u32 = 8;
+
 impl Step {
     /// What there is to do of it when the list has `listed` paths, which after [`Step::Choose`] and for
     /// [`Share::Need`] only the device knows.
@@ -103,9 +107,8 @@ impl Step {
             Self::Listed(r) => u64::from(r.paths),
         }
     }
-    /// Cuts one of more than `most` paths, which is at least 1, in two, the first of which may still be too large:
-    /// first between the samples of all pixels, so that the picture is refined evenly. Pieces of pieces are of about
-    /// one size.
+    /// Cuts one of more than `most` paths in two, the first of which may still be too large: first between the samples
+    /// of all pixels, so that the picture is refined evenly, and those of one pixel last. Pieces of pieces are of about one size.
     pub(in crate::render) fn split(self, most: u64) -> Option<(Self, Self)> {
         if self.paths() <= most {
             return None;
@@ -113,13 +116,15 @@ impl Step {
         // The first of the fewest pieces that are small enough.
         let first = |all: u32, most: u64| u64::from(all).div_ceil(u64::from(all).div_ceil(most)) as u32;
         Some(match self {
-            Self::Uniform(b) if b.samples > 1 => {
-                let samples = first(b.samples, (most / u64::from(b.pixels)).max(1));
+            Self::Uniform(b) if b.samples > TOGETHER || b.pixels == 1 => {
+                let together = TOGETHER.min(b.samples - 1);
+                let groups = (most / (u64::from(b.pixels) * u64::from(together))).max(1);
+                let samples = first(b.samples.div_ceil(together), groups) * together;
                 let rest = Batch { first_sample: b.first_sample + samples, samples: b.samples - samples, ..b };
                 (Self::Uniform(Batch { samples, ..b }), Self::Uniform(rest))
             }
             Self::Uniform(b) => {
-                let pixels = first(b.pixels, most);
+                let pixels = first(b.pixels, (most / u64::from(b.samples)).max(1));
                 let rest = Batch { first_pixel: b.first_pixel + pixels, pixels: b.pixels - pixels, ..b };
                 (Self::Uniform(Batch { pixels, ..b }), Self::Uniform(rest))
             }
@@ -147,7 +152,7 @@ mod tests {
 
     #[test]
     fn pieces_are_small_enough_and_together_the_whole_in_order() {
-        let batch = Batch { first_pixel: 5, pixels: 30, first_sample: 2, samples: 7 };
+        let batch = Batch { first_pixel: 5, pixels: 30, first_sample: 2, samples: 21 };
         let list = PathRange { first: 1 << 33, paths: 210, round: 1, rounds: 3 };
         for most in [1, 7, 29, 30, 31, 61, 100, 209, 210, u64::MAX] {
             let (mut next, mut end) = ([2; 30], 1 << 33);
@@ -159,7 +164,7 @@ mod tests {
                     *at += b.samples;
                 }
             }
-            assert_eq!(next, [9; 30], "{most}");
+            assert_eq!(next, [23; 30], "{most}");
             for piece in pieces(Step::Listed(list), most) {
                 assert!(matches!(piece, Step::Listed(r) if r == PathRange { first: end, paths: r.paths, ..list }));
                 assert!((1..=most).contains(&piece.paths()), "{most}: {piece:?}");
