@@ -1,8 +1,8 @@
 #include "shared/thread.glsl"
 
 // Packs one word per pixel and thread out of the guides (likeness_bits.glsl): the share of its window that a filter will
-// gather, and how alike each of the eight neighbours is, which are a stride apart. Where a filter will follow, geometry.comp has left the pixel's
-// importance, a float, in the word.
+// gather, and how alike each of the eight neighbours is, which are a stride apart. Where a filter will follow, geometry.comp has left
+// the pixel's importance, a float, in the word.
 layout(local_size_x_id = 100) in;
 layout(binding = 0) uniform usamplerBuffer guides; // of Guide
 layout(scalar, binding = 1) buffer Words { uint words[]; }; // of float

@@ -67,11 +67,16 @@ struct Limits {
 }
 
 fn flip(text: &str) -> std::result::Result<f64, String> {
-    finite(text).ok().filter(|v| (0.0..=1.0).contains(v)).ok_or_else(|| "expected a number from 0 to 1".to_owned())
+    up_to_1(text, 0.0)
 }
 
 fn ssim(text: &str) -> std::result::Result<f64, String> {
-    finite(text).ok().filter(|v| (-1.0..=1.0).contains(v)).ok_or_else(|| "expected a number from -1 to 1".to_owned())
+    up_to_1(text, -1.0)
+}
+
+fn up_to_1(text: &str, least: f64) -> std::result::Result<f64, String> {
+    let number = finite(text).ok().filter(|v| (least..=1.0).contains(v));
+    number.ok_or_else(|| format!("expected a number from {least} to 1"))
 }
 
 /// Bytes per pixel that the metrics take in addition to the two pictures; 75 were measured at 2048 x 2048.

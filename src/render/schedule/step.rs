@@ -107,6 +107,7 @@ impl Step {
             Self::Listed(r) => u64::from(r.paths),
         }
     }
+
     /// Cuts one of more than `most` paths in two, the first of which may still be too large: first between the samples
     /// of all pixels, so that the picture is refined evenly, and those of one pixel last. Pieces of pieces are of about one size.
     pub(in crate::render) fn split(self, most: u64) -> Option<(Self, Self)> {

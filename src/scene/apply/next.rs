@@ -40,7 +40,7 @@ pub struct NextCopies {
 
 impl NextCopies {
     fn are_new(&self, scene: &Scene) -> bool {
-        self.hidden != scene.rig.hidden || self.all != copies(scene)
+        self.flat != scene.rig.flat || self.hidden != scene.rig.hidden || self.all != copies(scene)
     }
 }
 
