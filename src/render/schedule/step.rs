@@ -175,6 +175,9 @@ mod tests {
         }
         let sizes = |most| pieces(Step::Listed(list), most).iter().map(Step::paths).collect::<Vec<_>>();
         assert_eq!([sizes(209), sizes(100)], [vec![105, 105], vec![70, 70, 70]]);
+        let samples = |step| if let Step::Uniform(b) = step { b.samples } else { 0 };
+        let together: Vec<_> = pieces(Step::Uniform(batch), 250).into_iter().map(samples).collect();
+        assert_eq!(together, [8, 8, 5]);
         assert_eq!(Step::Start.split(1), None);
     }
 }
