@@ -1,5 +1,6 @@
 //! Tests the GPU layer on a real device under Vulkan's validation layers: any of their messages fails a test.
 mod support;
+use std::process::Command;
 use support::kernels::{far, mix, next};
 use support::{assert_silent, hash, words};
 use tallow::gpu::{Buffer, DeviceOptions, FrameResources, Gpu, Location, PassTime};
@@ -390,4 +391,25 @@ fn parts_of_another_device_are_refused() {
     run(&gpu, &here, &kernel).unwrap();
     assert_silent(&gpu);
     assert_silent(&other);
+}
+
+/// The loader finds a device among all of them when an object is named. The test runs in a process of its own, where the C library
+/// fills what is freed, so that whoever reads it crashes.
+#[test]
+fn objects_are_named_while_other_devices_come_and_go() {
+    const FILL: &str = "MALLOC_PERTURB_";
+    if std::env::var_os(FILL).is_none() {
+        let mut alone = Command::new(std::env::current_exe().unwrap());
+        let alone = alone.args(["--exact", "objects_are_named_while_other_devices_come_and_go"]).env(FILL, "165");
+        let done = alone.output().unwrap();
+        assert!(done.status.success(), "{}: {}", done.status, String::from_utf8_lossy(&done.stdout));
+        return;
+    }
+    let gpu = Gpu::open(&DeviceOptions::default()).unwrap();
+    std::thread::scope(|scope| {
+        let others = scope.spawn(|| (0..40).for_each(|_| drop(Gpu::open(&DeviceOptions::default()).unwrap())));
+        while !others.is_finished() {
+            Buffer::<u32>::new(&gpu, "named", 1, Location::Device).unwrap();
+        }
+    });
 }

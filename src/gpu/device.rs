@@ -3,7 +3,7 @@ use super::At;
 use super::cache::PipelineCache;
 use super::calibrated::{self, CalibratedClock, CalibratedExtension};
 use super::info::{self, Candidate, DeviceInfo, DeviceKind, Features};
-use super::instance::{Instance, Messages};
+use super::instance::{Instance, Messages, change_loader_lists, walk_loader_lists};
 use super::pipelines::Pipelines;
 use super::ray_query::{self, RayFeatures, RayQueries, Tracing};
 use super::tuning::Tuning;
@@ -99,7 +99,7 @@ impl Gpu {
         let by_ray_query = is_by_ray_query(options.tracing, &candidate.info)?;
         let tuning = options.tuning.unwrap_or(Tuning::of(candidate.info.kind, by_ray_query)).on(candidate.info.kind)?;
         let calibrated = calibrated::offered(&instance, candidate.physical)?;
-        let alone = one_at_a_time();
+        let alone = change_loader_lists();
         let device = create_device(&instance.raw, candidate.physical, queue_family, calibrated, by_ray_query)?;
         let debug = instance.debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &device));
         let calibrated = calibrated.map(|extension| CalibratedClock::new(extension, &instance.raw, &device));
@@ -281,6 +281,7 @@ impl Inner {
     pub fn name(&self, object: impl Handle, name: &str) {
         let (Some(debug), Ok(name)) = (&self.debug, CString::new(name)) else { return };
         let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
+        let _unchanged = walk_loader_lists();
         // SAFETY: a live object of this device. A name that cannot be set is no loss.
         let _ = unsafe { debug.set_debug_utils_object_name(&info) };
     }
@@ -301,19 +302,12 @@ impl Drop for Inner {
             self.cache.store_and_destroy(&self.device);
             *self.lock_allocator() = None;
             if self.instance.owned {
-                let _alone = one_at_a_time();
+                let _alone = change_loader_lists();
                 self.device.destroy_device(None);
             }
             ManuallyDrop::drop(&mut self.instance);
         }
     }
-}
-
-/// Returns a lock to hold while a device is created, destroyed or asked for its functions: the loader walks its list of
-/// devices for the last of these without protection against changes by other threads (issue 2018 of Vulkan-Loader).
-pub(super) fn one_at_a_time() -> MutexGuard<'static, ()> {
-    static DEVICES: Mutex<()> = Mutex::new(());
-    DEVICES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Chooses a device by index or name, or the best one. `candidates` must not be empty.

@@ -2,9 +2,9 @@
 //! another version of them.
 use super::Gpu;
 use super::calibrated::{CalibratedClock, CalibratedExtension};
-use super::device::{Opened, is_by_ray_query, one_at_a_time, usable};
+use super::device::{Opened, is_by_ray_query, usable};
 use super::info;
-use super::instance::Instance;
+use super::instance::{Instance, walk_loader_lists};
 use super::ray_query::{RayQueries, Tracing};
 use super::tuning::Tuning;
 use crate::error::{Error, Result};
@@ -79,7 +79,7 @@ impl Gpu {
                 ash::Instance::load(&table, vk::Instance::from_raw(raw.instance)),
             )
         };
-        let alone = one_at_a_time();
+        let unchanged = walk_loader_lists();
         let device = unsafe { ash::Device::load(instance.fp_v1_0(), vk::Device::from_raw(raw.device)) };
         let physical = vk::PhysicalDevice::from_raw(raw.physical_device);
         if !enabled(&instance, &device, &[c"vkCmdPipelineBarrier2"]) {
@@ -102,7 +102,7 @@ impl Gpu {
         }
         let ray_queries = by_ray_query.then(|| RayQueries::new(&instance, physical, &device));
         let tuning = raw.tuning.unwrap_or(Tuning::of(candidate.info.kind, by_ray_query)).on(candidate.info.kind)?;
-        drop(alone);
+        drop(unchanged);
         let queue = vk::Queue::from_raw(raw.queue);
         let instance = Instance::borrowed(entry, instance);
         let queue_family = raw.queue_family;

@@ -4,12 +4,28 @@ use crate::error::{Error, Result};
 use crate::memory;
 use ash::{ext, vk};
 use std::ffi::{CStr, c_void};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
 /// Messages of the validation layers, shared with the callback and with code that outlives the device.
 pub(super) type Messages = Arc<Mutex<Vec<String>>>;
+
+/// The loader walks its lists of instances and devices when it is asked for the functions of a device and when an object is named,
+/// without protection against changes of these lists by other threads (issue 2018 of Vulkan-Loader).
+static LOADER_LISTS: RwLock<()> = RwLock::new(());
+
+/// Returns a lock to hold while an instance or a device is created or destroyed, so that no other thread has the loader find one. An
+/// engine that does so on one thread while another renders, with VK_EXT_debug_utils enabled, needs it too. Nothing else of this crate
+/// may be called by the thread that holds it.
+pub fn change_loader_lists() -> RwLockWriteGuard<'static, ()> {
+    LOADER_LISTS.write().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Returns a lock to hold while the loader finds a device.
+pub(super) fn walk_loader_lists() -> RwLockReadGuard<'static, ()> {
+    LOADER_LISTS.read().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// An instance. It is destroyed on drop only if it was made here.
 pub(super) struct Instance {
@@ -75,6 +91,7 @@ impl Drop for Instance {
             unsafe { loader.destroy_debug_utils_messenger(*messenger, None) };
         }
         if self.owned {
+            let _alone = change_loader_lists();
             // SAFETY: the device, the only other child, is destroyed before its instance is dropped.
             unsafe { self.raw.destroy_instance(None) };
         }
@@ -153,6 +170,7 @@ fn create(entry: &ash::Entry, debug_utils: bool, validation: bool) -> Result<ash
     if validation {
         info = if configurable { info.push_next(&mut settings) } else { info.push_next(&mut features) };
     }
+    let _alone = change_loader_lists();
     // SAFETY: `info` and all it points to live through the call.
     unsafe { entry.create_instance(&info, None) }.map_err(|code| match code {
         vk::Result::ERROR_INCOMPATIBLE_DRIVER => Error::Device(

@@ -50,6 +50,7 @@ pub use device::{DeviceOptions, Gpu};
 pub use external::RawDevice;
 pub use frame::FrameResources;
 pub use info::{DeviceInfo, DeviceKind, Feature, REQUIRED_FEATURES, survey};
+pub use instance::change_loader_lists;
 pub use kernel::{Bindings, Kernel, MAX_GROUPS, RayQueryCode, Slot, SlotKind, Specialise};
 pub use oidn::{OIDN_VARIABLE, Oidn, OidnInput, Texels};
 pub use ray_query::Tracing;

@@ -3,8 +3,8 @@
 use ash::vk;
 use ash::vk::Handle;
 use std::ffi::{CStr, c_void};
-use std::sync::{Mutex, MutexGuard, PoisonError};
-use tallow::gpu::{RawDevice, Tracing};
+use std::sync::Mutex;
+use tallow::gpu::{RawDevice, Tracing, change_loader_lists};
 
 /// What an engine has: everything here is made and destroyed with plain ash.
 pub struct Engine {
@@ -18,12 +18,7 @@ pub struct Engine {
     messenger: (ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT),
     messages: Box<Mutex<Vec<String>>>,
     tracing: Tracing,
-    /// The loader may read its list of devices while another thread changes it (Vulkan-Loader's issue 2018); it is for
-    /// whoever makes devices to see to that, and the tests of one program run side by side.
-    alone: Option<MutexGuard<'static, ()>>,
 }
-
-static ENGINES: Mutex<()> = Mutex::new(());
 
 const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -58,6 +53,7 @@ unsafe fn instance(entry: &ash::Entry, version: u32) -> ash::Instance {
         info = info.push_next(&mut settings);
     }
     info = info.enabled_extension_names(&extensions).enabled_layer_names(&layers);
+    let _alone = change_loader_lists();
     unsafe { entry.create_instance(&info, None) }.expect("install vulkan-validationlayers and mesa-vulkan-drivers")
 }
 
@@ -119,7 +115,6 @@ impl Engine {
     }
 
     fn made(tracing: Tracing, version: u32) -> Self {
-        let alone = ENGINES.lock().unwrap_or_else(PoisonError::into_inner);
         unsafe {
             let entry = ash::Entry::load().expect("install libvulkan1");
             let instance = instance(&entry, version);
@@ -139,12 +134,13 @@ impl Engine {
                 instance.get_physical_device_properties(d).device_name_as_c_str().unwrap().to_str() == Ok(&name)
             };
             let physical = instance.enumerate_physical_devices().unwrap().into_iter().find(of_name).unwrap();
+            let alone = change_loader_lists();
             let device = device(&instance, physical, tracing, version);
+            drop(alone);
             let queue = device.get_device_queue(0, 0);
             let pool = device.create_command_pool(&vk::CommandPoolCreateInfo::default(), None).unwrap();
             let messenger = (utils, messenger);
-            let alone = Some(alone);
-            Self { _entry: entry, instance, physical, device, queue, pool, messenger, messages, tracing, alone }
+            Self { _entry: entry, instance, physical, device, queue, pool, messenger, messages, tracing }
         }
     }
 
@@ -204,8 +200,7 @@ impl Engine {
     }
 
     /// Leaves the device as it is for ever, with what was left on it.
-    pub fn abandon(mut self) {
-        self.alone = None;
+    pub fn abandon(self) {
         std::mem::forget(self);
     }
 
@@ -219,11 +214,15 @@ impl Drop for Engine {
     fn drop(&mut self) {
         unsafe {
             self.device.destroy_command_pool(self.pool, None);
+            let alone = change_loader_lists();
             self.device.destroy_device(None);
+            drop(alone);
             // Whatever the layer above forgot is reported here.
             let left = self.messages();
             self.messenger.0.destroy_debug_utils_messenger(self.messenger.1, None);
+            let alone = change_loader_lists();
             self.instance.destroy_instance(None);
+            drop(alone);
             assert!(left.is_empty() || std::thread::panicking(), "{left:#?}");
         }
     }
