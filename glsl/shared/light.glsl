@@ -153,7 +153,9 @@ void sample_triangle_light(vec3 p, Light light, vec2 u, inout LightSample s) {
         if (by_solid_angle(solid_angle)) bary = at;
     }
     vec3 on_light = a + bary.x * e1 + bary.y * e2;
-    // Only the front side emits, so that the point is offset to that side.
+    // The point is offset to the side that emits towards `p`.
+    bool two_sided = FX_TWO_SIDED_LAMPS && (Material_flags(materials, light.material) & MATERIAL_EMITS_BEHIND) != 0u;
+    if (two_sided && dot(n, a - p) > 0.0) n = -n;
     vec3 to_light = on_light + plane_clearance(n, abs(a), e1, e2) * n - p;
     float d2 = dot(to_light, to_light);
     s.distance = sqrt(d2);

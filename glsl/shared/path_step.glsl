@@ -23,10 +23,9 @@ vec3 light_from_miss(Path path) {
 
 vec3 light_from_hit(Path path, Surface s, float t) {
     float cosine = -dot(s.geometric, path.direction);
-    // Light sampling does not choose what shines from behind: of a closed lamp, as many are in glTF files, that is its inside.
-    bool front = cosine > 0.0, shines = front || (s.flags & MATERIAL_EMITS_BEHIND) != 0u;
-    bool certain = path.delta || !front;
-    float weight = certain ? 1.0 : balance(path.bsdf_pdf, triangle_light_pdf(s, path.origin, t, cosine));
+    bool front = cosine > 0.0, shines = front || (FX_TWO_SIDED_LAMPS && (s.flags & MATERIAL_EMITS_BEHIND) != 0u);
+    bool certain = path.delta || (FX_SPHERES && s.radius > 0.0 && !front); // light sampling does not choose a sphere's inside
+    float weight = certain ? 1.0 : balance(path.bsdf_pdf, triangle_light_pdf(s, path.origin, t, abs(cosine)));
     return FX_EMISSIVE && shines ? surface_emission(s) * weight : vec3(0.0);
 }
 

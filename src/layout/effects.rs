@@ -145,6 +145,8 @@ effects! {
     many_samples: FX_MANY_SAMPLES;
     /// Emissive triangles large enough to be sampled by solid angle.
     large_lamps: FX_LARGE_LAMPS;
+    /// Lamps that shine from both sides.
+    two_sided_lamps: FX_TWO_SIDED_LAMPS;
     /// Exact spheres among the triangles.
     spheres: FX_SPHERES;
     /// What lamps and sky bring to the first hit goes with indirect light.

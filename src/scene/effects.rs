@@ -70,6 +70,7 @@ pub fn effects(
         coat_normals: material(Effect::coat_normals, &|m| coated(m) && has_normal_map(m)),
         thin_walls: material(Effect::thin_walls, &|m| m.kind == BSDF_METALLIC && m.transmission_factor > 0.0),
         clear_walls: material(Effect::clear_walls, &clear_wall),
+        two_sided_lamps: material(Effect::two_sided_lamps, &|m| m.flags & MATERIAL_EMITS_BEHIND != 0),
         anisotropic: material(Effect::anisotropic, &|m| m.anisotropy != 0.0),
         rough: material(Effect::rough, &rough),
         smooth_interface: material(Effect::smooth_interface, &smooth),

@@ -140,7 +140,7 @@ fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> Ligh
     let [a, b, c] = [light.a, light.b, light.c].map(Vec3::from);
     let mut bary = warp_triangle(u);
     let (e1, e2) = (b - a, c - a);
-    let (n, doubled_area) = unit_vector(e1.cross(e2));
+    let (mut n, doubled_area) = unit_vector(e1.cross(e2));
     let seen = SphericalTriangle::new([a - p, e1, e2]);
     if seen.by_solid_angle(scene) {
         let w = seen.sample(u);
@@ -149,6 +149,9 @@ fn sample_triangle_light(scene: &Scene, light: &Light, p: Vec3, u: Vec2) -> Ligh
         bary = bary.clamp(Vec2::ZERO, Vec2::ONE);
     }
     let on_light = a + bary.x * e1 + bary.y * e2;
+    if scene.materials[light.material as usize].flags & MATERIAL_EMITS_BEHIND != 0 && n.dot(a - p) > 0.0 {
+        n = -n;
+    }
     let to_light = on_light + plane_clearance(n, a.abs(), e1, e2) * n - p;
     let d2 = to_light.dot(to_light);
     let distance = d2.sqrt();

@@ -166,12 +166,13 @@ impl Tracer<'_> {
 
     fn light_from_hit(&self, path: &Path, s: &Surface, t: f32) -> Vec3 {
         let cosine = -s.geometric.dot(path.direction);
-        if cosine <= 0.0 {
-            let behind = self.scene.materials[s.material as usize].flags & MATERIAL_EMITS_BEHIND != 0;
-            return if behind { surface_emission(self.scene, s) } else { Vec3::ZERO };
+        let front = cosine > 0.0;
+        if !front && self.scene.materials[s.material as usize].flags & MATERIAL_EMITS_BEHIND == 0 {
+            return Vec3::ZERO;
         }
-        let pdf = triangle_light_pdf(self.scene, s, path.origin, t, cosine);
-        let weight = if path.delta { 1.0 } else { self.balance(path.bsdf_pdf, pdf, Strategy::Bsdf) };
+        let certain = path.delta || (s.radius > 0.0 && !front);
+        let pdf = triangle_light_pdf(self.scene, s, path.origin, t, cosine.abs());
+        let weight = if certain { 1.0 } else { self.balance(path.bsdf_pdf, pdf, Strategy::Bsdf) };
         surface_emission(self.scene, s) * weight
     }
 

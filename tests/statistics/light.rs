@@ -4,7 +4,7 @@ use crate::statistics::{chi_square, sidak};
 use crate::twin::{Random, Workplace};
 use glam::{Mat3, Vec3, dvec3, vec3};
 use std::f64::consts::{PI, TAU};
-use tallow::layout::{LIGHT_ENVIRONMENT, Light, NONE};
+use tallow::layout::{LIGHT_ENVIRONMENT, Light, MATERIAL_EMITS_BEHIND, NONE};
 use tallow::scene::Loaded;
 use tallow::twins::light::*;
 use tallow::twins::sampler::{sample_2d, sample_2d_bits, sampler_start};
@@ -60,7 +60,7 @@ impl Grid {
     }
 }
 
-/// Of the sky, and of every emissive triangle whose front lies in that direction.
+/// Of the sky, and of every emissive triangle that shines from that direction.
 fn density(scene: &Loaded, direction: Vec3) -> f64 {
     let sky = scene.lights.iter().find(|l| l.kind == LIGHT_ENVIRONMENT);
     let sky = sky.map_or(0.0, |l| environment_radiance(scene, l, direction).1);
@@ -69,7 +69,8 @@ fn density(scene: &Loaded, direction: Vec3) -> f64 {
         let (t, barycentric) = intersect_triangle(&ray, triangle_vertices(scene, i as u32), INFINITE_DISTANCE)?;
         let s = surface_at(scene, &Hit { t, triangle: i as u32, instance: NONE, barycentric });
         let cosine = -s.geometric.dot(direction);
-        (cosine > 0.0).then(|| triangle_light_pdf(scene, &s, HERE, t, cosine))
+        let behind = scene.materials[s.material as usize].flags & MATERIAL_EMITS_BEHIND != 0;
+        (cosine > 0.0 || behind).then(|| triangle_light_pdf(scene, &s, HERE, t, cosine.abs()))
     };
     f64::from(sky) + (0..scene.triangles.len()).filter_map(lamp).map(f64::from).sum::<f64>()
 }
@@ -106,7 +107,7 @@ fn image_sky(width: u32, height: u32) -> Loaded {
     place.scene("[environment]\nfile = 'sky.exr'\nrotation = 70.0\nscale = 0.5\n")
 }
 
-/// Triangles of three strengths, half of which face away, below an image, with lights that no ray can hit.
+/// Triangles of three strengths, half of which face away and some shine from both sides, below an image, with lights that no ray can hit.
 fn many_lights() -> Loaded {
     // Some seeds make a triangle that is seen nearly edge-on, for which the grid's quadrature is too coarse (5 does).
     let mut random = Random::new(6);
@@ -116,7 +117,9 @@ fn many_lights() -> Loaded {
     };
     let mut place = Workplace::new().sky("sky.exr", 16, 8, |x, y| 0.02 * (1 + x + 3 * y) as f32);
     let mut text = "[environment]\nfile = 'sky.exr'\nrotation = 25.0\n".to_owned();
-    for (name, emission) in [("a", "1.0"), ("b", "[9.0, 2.0, 1.0]"), ("c", "30.0"), ("dark", "0.0")] {
+    for (name, emission) in
+        [("a", "1.0"), ("b", "[9.0, 2.0, 1.0]\nemission_two_sided = true"), ("c", "30.0"), ("dark", "0.0")]
+    {
         place = place.obj(&format!("{name}.obj"), &[0; 9].map(|_| triangle()));
         text += &format!("[[material]]\nname = '{name}'\nemission = {emission}\n");
         text += &format!("[[mesh]]\nfile = '{name}.obj'\nmaterial = '{name}'\n");

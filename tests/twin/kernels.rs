@@ -46,7 +46,7 @@ pub fn shipped(file: &str) -> Loaded {
         .unwrap()
 }
 
-/// Textures of every use, masks (of the lamp too), a normal map, an environment image, a spot light, a lens, a mirrored
+/// Textures of every use, masks (of the lamp too, which shines from behind), a normal map, an environment image, a spot light, a lens, a mirrored
 /// instance, roulette and a clamp.
 pub fn pictures() -> Loaded {
     let checks = |x: u32, y: u32| if (x / 4 + y / 4).is_multiple_of(2) { [230, 120, 40] } else { [60, 150, 220] };
@@ -66,13 +66,13 @@ pub fn pictures() -> Loaded {
          normal_map = 'bumps.png'\nspecular_texture = 'checks.png'\n\
          [[material]]\nname = 'leaf'\nopacity = 0.6\nopacity_texture = 'checks.png'\n\
          [[material]]\nname = 'lamp'\nemission = 100.0\nemission_texture = 'checks.png'\n\
-         opacity = 0.8\nopacity_texture = 'checks.png'\n\
+         emission_two_sided = true\nopacity = 0.8\nopacity_texture = 'checks.png'\n\
          [[mesh]]\nname = 'floor'\nshape = 'rectangle'\nmaterial = 'floor'\n\
          transform = { rotate = [-90.0, 0.0, 0.0], scale = 4.0 }\n\
          [[mesh]]\nname = 'ball'\nshape = 'sphere'\nsegments = 32\nmaterial = 'ball'\n\
          [[mesh]]\nname = 'leaf'\nshape = 'rectangle'\nmaterial = 'leaf'\ntransform = { translate = [0.0, 1.2, 1.2] }\n\
          [[mesh]]\nname = 'lamp'\nshape = 'rectangle'\nmaterial = 'lamp'\n\
-         transform = { translate = [0.0, 3.0, 0.5], rotate = [90.0, 0.0, 0.0], scale = 0.6 }\n\
+         transform = { translate = [0.0, 3.0, 0.5], rotate = [-90.0, 0.0, 0.0], scale = 0.6 }\n\
          [[instance]]\nmesh = 'ball'\ntransform = { translate = [-1.2, 0.7, 0.0], scale = [0.7, 0.7, -0.7] }\n\
          [[instance]]\nmesh = 'ball'\ntransform = { translate = [1.2, 0.8, -0.5], rotate = [20.0, 50.0, 0.0], scale = 0.8 }\n",
     );
