@@ -74,12 +74,17 @@ vec3 textured_at(vec3 constant, uint image, uint triangle, vec2 barycentric, boo
 
 // Share of light that a smooth wall lets straight through, as metallic_sample does: nothing else brings the light of a source
 // without extent behind it. `direction` is that of the ray in the space of the triangle; the normal is that of the triangle itself.
-vec3 clear_wall_passes(uint material, uint triangle, vec2 barycentric, vec3 direction) {
+vec3 clear_wall_passes(uint material, uint triangle, uint instance, vec2 barycentric, vec3 direction) {
     Material m = Material_load(materials, material);
     Triangle t = Triangle_load(triangles, triangle);
     vec3 n = cross(t.v1 - t.v0, t.v2 - t.v0);
     if (FX_SPHERES && is_sphere(triangle)) n = octahedral_vector(barycentric);
-    float c = abs(dot(n, direction)) * inversesqrt(max(dot(n, n) * dot(direction, direction), 1e-37));
+    float along = abs(dot(n, direction)); // the same in the world, which the lengths are not
+    if (FX_INSTANCES && instance != NONE) {
+        n *= mat3(object_from_world(instance)); // row vector times matrix
+        direction = mat3(world_from_object(instance)) * direction;
+    }
+    float c = along * inversesqrt(max(dot(n, n) * dot(direction, direction), 1e-37));
     float grazing = 1.0 - min(c, 1.0), squared = grazing * grazing;
     vec3 base = textured_at(m.base_color, m.base_texture, triangle, barycentric, true);
     if (FX_VERTEX_COLORS) base *= vertex_color(Shading_load(shading, triangle), barycentric).rgb;
@@ -98,7 +103,7 @@ bool mask_blocks(uint triangle, uint instance, vec2 barycentric, vec3 direction,
     uint material = material_of(triangle, instance);
     float opacity = surface_opacity(material, triangle, barycentric);
     if (FX_CLEAR_WALLS && (seed & PASSES_WALLS) != 0u && (Material_flags(materials, material) & MATERIAL_CLEAR_WALL) != 0u)
-        return !pass_wall(1.0 - opacity * (1.0 - clear_wall_passes(material, triangle, barycentric, direction)));
+        return !pass_wall(1.0 - opacity * (1.0 - clear_wall_passes(material, triangle, instance, barycentric, direction)));
     // Two copies of a triangle on one ray decide independently.
     uint surface = triangle * 0x9e3779b9u ^ instance * 0x85ebca6bu;
     return opacity > unit_interval(pcg(seed ^ surface));

@@ -11,7 +11,7 @@ use crate::math::srgb::linear_from_srgb;
 use crate::scene::Scene;
 use crate::shaders::shared::segment::PASSES_WALLS;
 use crate::twins::attributes::Attributes;
-use crate::twins::scene::{material_of, texture_coordinates};
+use crate::twins::scene::{material_of, object_from_world, texture_coordinates, world_from_object};
 use glam::{IVec2, Vec2, Vec2Swizzles, Vec3, Vec4, ivec2, vec2};
 
 /// One coordinate brought into `0..edge`, at most one period away.
@@ -99,11 +99,22 @@ pub fn vertex_color(scene: &Scene, triangle: u32, barycentric: Vec2) -> Vec4 {
 }
 
 /// Share of light that a smooth clear wall lets straight through.
-fn clear_wall_passes(scene: &Scene, m: &Material, triangle: u32, barycentric: Vec2, direction: Vec3) -> Vec3 {
+fn clear_wall_passes(
+    scene: &Scene,
+    m: &Material,
+    (triangle, instance): (u32, u32),
+    barycentric: Vec2,
+    direction: Vec3,
+) -> Vec3 {
     let t = &scene.triangles[triangle as usize];
     let [a, b, c] = [t.v0, t.v1, t.v2].map(Vec3::from);
     let n = if t.primitive & SPHERE != 0 { octahedral_vector(barycentric) } else { (b - a).cross(c - a) };
-    let cosine = n.dot(direction).abs() / (n.length_squared() * direction.length_squared()).max(1e-37).sqrt();
+    let along = n.dot(direction).abs(); // the same in the world, which the lengths are not
+    let (n, direction) = match scene.instances.get(instance as usize) {
+        Some(i) => (object_from_world(i).normal(n), world_from_object(i).vector(direction)),
+        None => (n, direction),
+    };
+    let cosine = along / (n.length_squared() * direction.length_squared()).max(1e-37).sqrt();
     let picture = |image: u32| match image {
         NONE => Vec4::ONE,
         image => texture_sample(scene, image, texture_coordinates(scene, image, triangle, barycentric)),
@@ -130,7 +141,8 @@ pub fn mask_leaves(scene: &Scene, triangle: u32, instance: u32, barycentric: Vec
     let material = &scene.materials[number as usize];
     let opacity = surface_opacity(scene, number, triangle, barycentric);
     if seed & PASSES_WALLS != 0 && material.flags & MATERIAL_CLEAR_WALL != 0 {
-        return 1.0 - opacity * (1.0 - clear_wall_passes(scene, material, triangle, barycentric, direction));
+        return 1.0
+            - opacity * (1.0 - clear_wall_passes(scene, material, (triangle, instance), barycentric, direction));
     }
     let surface = triangle.wrapping_mul(0x9e3779b9) ^ instance.wrapping_mul(0x85ebca6b);
     let blocks = opacity > (pcg(seed ^ surface) >> 8) as f32 * 5.9604645e-8;

@@ -82,6 +82,10 @@ fn sun_and_bulb_shine_through_panes() {
         "shape = 'rectangle'\ntransform = { translate = [0.0, 2.0, 0.0], rotate = [-90.0, 0.0, 0.0], scale = 9.0 }\n";
     let two = "[[mesh]]\nmaterial = 'pane'\nshape = 'rectangle'\n\
                transform = { translate = [0.0, 2.5, 0.0], rotate = [90.0, 0.0, 0.0], scale = 9.0 }\n";
+    // In their own space, rays and normals of these have other angles.
+    let stretched = "moving = true\nshape = 'rectangle'\n\
+                     transform = { translate = [0.0, 2.0, 0.0], rotate = [-90.0, 0.0, 0.0], scale = [9.0, 9.0, 0.3] }\n";
+    let flat = "shape = 'sphere'\ntransform = { translate = [0.0, 2.0, 0.0], scale = [9.0, 0.01, 9.0] }\n";
     for degrees in [0.0f64, 60.0, 70.0] {
         let (sin, c) = degrees.to_radians().sin_cos();
         let sun = format!("[[light]]\ntype = 'directional'\nirradiance = 1.0\ndirection = [{sin:?}, {:?}, 0.0]\n", -c);
@@ -90,6 +94,10 @@ fn sun_and_bulb_shine_through_panes() {
         check_share(floor(&format!("{sun}{tinted}{window}")), open, |i| passes(c, i), 1e-4, &what);
         let both = floor(&format!("{sun}{tinted}{window}{two}"));
         check_share(both, open, |i| passes(c, i).powi(2), 1e-4, &format!("{what}, two panes"));
+        let moving = floor(&format!("{sun}{tinted}{stretched}"));
+        check_share(moving, open, |i| passes(c, i), 1e-4, &format!("{what}, a pane that moves"));
+        let lens = floor(&format!("{sun}{tinted}{flat}"));
+        check_share(lens, open, |i| passes(c, i).powi(2), 2e-3, &format!("{what}, a flat ball"));
         assert_eq!(floor(&format!("{sun}{}{window}", pane("color = 0.8\nclearcoat = 0.5"))), [0.0; 3], "a coat");
     }
     // Rays to the middle of a bulb meet it head on.
