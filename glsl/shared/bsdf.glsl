@@ -264,6 +264,12 @@ bool bsdf_chooses(Bsdf b) {
     return is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC);
 }
 
+// Whether some lobe leaves on the other side.
+bool bsdf_lets_light_through(Bsdf b) {
+    if (is_kind(FX_METALLIC, b, BSDF_METALLIC)) return b.metallic.through != vec3(0.0);
+    return is_kind(FX_DIELECTRIC, b, BSDF_DIELECTRIC);
+}
+
 // Approximate reflectance at the cosine `wo_z`: light is divided by it before it is filtered. Mirrors and clear glass, which show
 // what is behind them, have none of their own.
 vec3 bsdf_albedo(Bsdf b, float wo_z) {

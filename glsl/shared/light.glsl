@@ -1,5 +1,6 @@
-// Choice of a light by an alias table in proportion to power, sampling of a point on it, and the densities for MIS.
+// Choice of a light by an alias table in proportion to power, or of some without extent by what they bring, sampling of a point on it, and the densities for MIS.
 #include "shared/segment.glsl"
+#include "shared/luminance.glsl"
 
 struct LightSample {
     vec3 direction; // unit, from the surface to the light
@@ -9,8 +10,19 @@ struct LightSample {
     bool sharp;     // of a light without extent that nearly every sample chooses: sharp shadows, and little noise
 };
 
+// What light is sampled for.
+struct Receiver {
+    vec3 position;
+    vec3 normal;     // of the lobes, on the viewer's side
+    bool lets_light_through;
+    float odds_beyond_cosine; // added to the cosine in the odds of a light, for lobes that reflect more than the cosine says
+};
+
 // A light without extent that is chosen less often brings the noise of that choice: a filter takes it with what is soft.
 const float SHARP_PROBABILITY = 0.7;
+
+const float MAX_ODDS = 1e30;        // so that sums of odds stay finite
+const float BELOW_ONE = 0.99999994; // the largest number below 1
 
 // The slot of an alias table of `n` that the word `random` chooses.
 uint alias_slot(uint n, uint random) {
@@ -204,12 +216,62 @@ void sample_sphere_light(vec3 p, Light light, vec2 u, inout LightSample s) {
     s.radiance = lit ? light.value / s.pdf : vec3(0.0);
 }
 
-// Samples one light for the surface point `p`. The radiance is 0 when the light cannot reach the point.
-LightSample light_sample(vec3 p, uint word, vec2 u) {
+// Share of a spot's intensity along `w`, from the point that it lights: it falls off smoothly between the two angles, linear in the
+// angle.
+float spot_share(Light light, vec3 w) {
+    float angle = acos(clamp(-dot(light.b, w), -1.0, 1.0));
+    float full = acos(light.c.x), cut = acos(light.c.y);
+    return clamp((cut - angle) / max(cut - full, 1e-6), 0.0, 1.0);
+}
+
+bool has_extent(uint kind) { return kind == LIGHT_TRIANGLE || kind == LIGHT_MIRRORED || kind == LIGHT_SPHERE || kind == LIGHT_ENVIRONMENT; }
+
+// What a light without extent brings to a receiver from which it is seen, up to a factor that all have.
+float unshadowed(Light light, Receiver r) {
+    vec3 to_light = FX_DIRECTIONAL && light.kind == LIGHT_DIRECTIONAL ? -light.b : light.a - r.position;
+    float d2 = max(dot(to_light, to_light), 1e-30);
+    vec3 w = to_light * inversesqrt(d2);
+    float cosine = dot(r.normal, w);
+    if (r.lets_light_through) cosine = abs(cosine);
+    float share = FX_SPOT && light.kind == LIGHT_SPOT ? spot_share(light, w) : 1.0;
+    float brings = min(share * (cosine + r.odds_beyond_cosine) * luminance(light.value) / d2, MAX_ODDS);
+    return cosine > 0.0 || r.lets_light_through ? brings : 0.0;
+}
+
+// Chooses anew among the lights without extent, one of which the table has chosen: by what each would bring if nothing were in its
+// way (resampling of all candidates: Talbot, Cline and Egbert 2005). They lie before those with a surface.
+Light choose_by_share(Receiver r, float u) {
+    Light chosen = Light_load(lights, 0u);
+    float sum = 0.0, odds = 0.0, group = 0.0;
+    for (uint i = 0u; i < push.constants.light_count; i++) {
+        Light light = Light_load(lights, i);
+        if (light.kind == LIGHT_ENVIRONMENT) continue;
+        if (has_extent(light.kind)) break;
+        group += light.probability;
+        float brings = unshadowed(light, r);
+        sum += brings;
+        float share = brings > 0.0 ? brings / sum : 0.0;
+        bool takes = u < share;
+        if (takes) {
+            chosen = light;
+            odds = brings;
+        }
+        u = min(takes ? u / share : (u - share) / (1.0 - share), BELOW_ONE); // its place within the interval that it fell into
+    }
+    chosen.probability = group;
+    if (sum > 0.0) chosen.probability *= odds / sum;
+    else chosen.value = vec3(0.0);
+    return chosen;
+}
+
+// Samples one light for a receiver. The radiance is 0 when the light cannot reach the point.
+LightSample light_sample(Receiver r, uint word, vec2 u) {
+    vec3 p = r.position;
     LightSample s = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, false);
     uint count = push.constants.light_count, index = 0u;
     if (count != 1u) index = alias_choose(AliasEntry_load(light_table, alias_slot(count, word)), count, word);
     Light light = Light_load(lights, index);
+    if (FX_WEIGHED_LIGHTS && !has_extent(light.kind)) light = choose_by_share(r, u.x);
     bool often = light.probability >= SHARP_PROBABILITY;
     if (FX_EMISSIVE && (light.kind == LIGHT_TRIANGLE || light.kind == LIGHT_MIRRORED)) {
         sample_triangle_light(p, light, u, s);
@@ -222,11 +284,7 @@ LightSample light_sample(vec3 p, uint word, vec2 u) {
         s.direction = to_light / s.distance;
         s.radiance = light.value / (d2 * light.probability);
         s.sharp = often;
-        if (FX_SPOT && light.kind == LIGHT_SPOT) { // smooth fall-off between the two angles, linear in the angle
-            float angle = acos(clamp(-dot(light.b, s.direction), -1.0, 1.0));
-            float full = acos(light.c.x), cut = acos(light.c.y);
-            s.radiance *= clamp((cut - angle) / max(cut - full, 1e-6), 0.0, 1.0);
-        }
+        if (FX_SPOT && light.kind == LIGHT_SPOT) s.radiance *= spot_share(light, s.direction);
     } else if (FX_DIRECTIONAL && light.kind == LIGHT_DIRECTIONAL) {
         s.direction = -light.b;
         s.distance = INFINITE_DISTANCE;

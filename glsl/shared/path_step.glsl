@@ -9,6 +9,8 @@ const uint PAIR_CHOICE = 0u, PAIR_LIGHT = 1u, PAIR_BSDF = 2u, PAIR_ROULETTE = 3u
 // about 2^-24 over the cosine there.
 const float SHADOW_END = 0.99999;
 
+const float ODDS_BEYOND_COSINE = 0.05; // see Receiver: for lobes that reflect much at grazing angles
+
 const float MAX_SURVIVAL = 0.95; // largest survival probability of roulette
 
 // Weight of the strategy that was used, by the balance heuristic. Two densities of 0 give 0, not 0 / 0.
@@ -34,7 +36,9 @@ vec3 light_from_hit(Path path, Surface s, float t) {
 vec3 light_from_nee(Surface s, Bsdf bsdf, Facing facing, mat3 basis, vec3 wo, Sampler random, uint pair, uint mask_seed,
                     out Segment shadow, out bool sharp) {
     uint word = sample_2d_bits(random, pair + PAIR_CHOICE).x;
-    LightSample light = light_sample(s.position, word, sample_2d(random, pair + PAIR_LIGHT));
+    float beyond_cosine = is_kind(FX_DIFFUSE, bsdf, BSDF_DIFFUSE) ? 0.0 : ODDS_BEYOND_COSINE;
+    Receiver receiver = Receiver(s.position, facing.normal, bsdf_lets_light_through(bsdf), beyond_cosine);
+    LightSample light = light_sample(receiver, word, sample_2d(random, pair + PAIR_LIGHT));
     sharp = light.sharp;
     vec3 wi = light.direction * basis; // row vector times matrix: into the frame
     vec4 f = bsdf_evaluate(bsdf, wo, wi);

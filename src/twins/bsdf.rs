@@ -332,6 +332,14 @@ pub fn bsdf_chooses(b: &Bsdf) -> bool {
     }
 }
 
+/// Whether some lobe leaves on the other side.
+pub fn bsdf_lets_light_through(b: &Bsdf) -> bool {
+    match b.kind {
+        BSDF_METALLIC => b.metallic.through != Vec3::ZERO,
+        _ => b.kind == BSDF_DIELECTRIC,
+    }
+}
+
 /// Reflectance, roughly, seen at the cosine `wo_z`: what light is divided by before it is filtered. Mirrors and clear glass have
 /// none of their own.
 pub fn bsdf_albedo(b: &Bsdf, wo_z: f32) -> Vec3 {

@@ -1,14 +1,35 @@
 //! Twin of `glsl/shared/light.glsl`.
 use crate::layout::*;
 use crate::math::hash::pcg;
+use crate::math::srgb::luminance;
 use crate::math::warp::{basis_from_normal, warp_cone, warp_sphere, warp_triangle};
 use crate::scene::{Environment, Scene};
-use crate::shaders::shared::light::{MAX_SOLID_ANGLE, MIN_SOLID_ANGLE, SHARP_PROBABILITY};
+use crate::shaders::shared::light::{BELOW_ONE, MAX_ODDS, MAX_SOLID_ANGLE, MIN_SOLID_ANGLE, SHARP_PROBABILITY};
 use crate::twins::scene::texture_coordinates;
 use crate::twins::surface::{Surface, plane_clearance, unit_vector};
 use crate::twins::texture::{surface_opacity, texture_sample, vertex_color};
 use glam::{Mat3, Vec2, Vec2Swizzles, Vec3, Vec3Swizzles, vec2, vec3};
 use std::f32::consts::PI;
+
+/// What light is sampled for.
+#[derive(Clone, Copy, Debug)]
+pub struct Receiver {
+    /// World units.
+    pub position: Vec3,
+    /// Unit normal of the lobes, on the viewer's side.
+    pub normal: Vec3,
+    /// Whether light from the other side counts, too.
+    pub lets_light_through: bool,
+    /// Added to the cosine in the odds of a light, for lobes that reflect more than the cosine says.
+    pub odds_beyond_cosine: f32,
+}
+
+impl Receiver {
+    /// A point that light from everywhere reaches alike.
+    pub fn point(position: Vec3) -> Self {
+        Self { position, normal: Vec3::ZERO, lets_light_through: true, odds_beyond_cosine: 1.0 }
+    }
+}
 
 /// One light, seen from a surface point.
 #[derive(Clone, Copy, Debug)]
@@ -211,6 +232,56 @@ fn is_sharp(light: &Light) -> bool {
     light.probability >= SHARP_PROBABILITY
 }
 
+/// Share of a spot's intensity along `w`, from the point that it lights.
+fn spot_share(light: &Light, w: Vec3) -> f32 {
+    let angle = (-Vec3::from(light.b).dot(w)).clamp(-1.0, 1.0).acos();
+    let (full, cut) = (light.c[0].acos(), light.c[1].acos());
+    ((cut - angle) / (cut - full).max(1e-6)).clamp(0.0, 1.0)
+}
+
+/// What a light without extent brings to a receiver from which it is seen, up to a factor that all have.
+fn unshadowed(light: &Light, r: &Receiver) -> f32 {
+    let to_light = match light.kind {
+        LIGHT_DIRECTIONAL => -Vec3::from(light.b),
+        _ => Vec3::from(light.a) - r.position,
+    };
+    let d2 = to_light.dot(to_light).max(1e-30);
+    let w = to_light / d2.sqrt();
+    let cosine = r.normal.dot(w);
+    let cosine = if r.lets_light_through { cosine.abs() } else { cosine };
+    let share = if light.kind == LIGHT_SPOT { spot_share(light, w) } else { 1.0 };
+    let brings = (share * (cosine + r.odds_beyond_cosine) * luminance(light.value) / d2).min(MAX_ODDS);
+    if cosine > 0.0 || r.lets_light_through { brings } else { 0.0 }
+}
+
+fn is_delta(light: &Light) -> bool {
+    matches!(light.kind, LIGHT_POINT | LIGHT_SPOT | LIGHT_DIRECTIONAL)
+}
+
+/// Chooses anew among the lights without extent, which lie before those with a surface: by what each would bring if nothing were in
+/// its way.
+fn choose_by_share(scene: &Scene, r: &Receiver, mut u: f32) -> Light {
+    let (mut chosen, mut sum, mut odds, mut group) = (scene.lights[0], 0.0, 0.0, 0.0);
+    let beside_sky = scene.lights.iter().filter(|l| l.kind != LIGHT_ENVIRONMENT);
+    for light in beside_sky.take_while(|l| is_delta(l)) {
+        group += light.probability;
+        let brings = unshadowed(light, r);
+        sum += brings;
+        let share = if brings > 0.0 { brings / sum } else { 0.0 };
+        let takes = u < share;
+        if takes {
+            (chosen, odds) = (*light, brings);
+        }
+        u = if takes { u / share } else { (u - share) / (1.0 - share) }.min(BELOW_ONE);
+    }
+    chosen.probability = group;
+    match sum > 0.0 {
+        true => chosen.probability *= odds / sum,
+        false => chosen.value = [0.0; 3],
+    }
+    chosen
+}
+
 fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
     let to_light = Vec3::from(light.a) - p;
     let d2 = to_light.dot(to_light).max(1e-30);
@@ -218,17 +289,20 @@ fn sample_point_light(light: &Light, p: Vec3) -> LightSample {
     let direction = to_light / distance;
     let mut radiance = Vec3::from(light.value) / (d2 * light.probability);
     if light.kind == LIGHT_SPOT {
-        let angle = (-Vec3::from(light.b).dot(direction)).clamp(-1.0, 1.0).acos();
-        let (full, cut) = (light.c[0].acos(), light.c[1].acos());
-        radiance *= ((cut - angle) / (cut - full).max(1e-6)).clamp(0.0, 1.0);
+        radiance *= spot_share(light, direction);
     }
     LightSample { direction, distance, radiance, pdf: 0.0, sharp: is_sharp(light) }
 }
 
-/// One light for the surface point `p`. Radiance is 0 when the light cannot reach the point.
-pub fn light_sample(scene: &Scene, p: Vec3, word: u32, u: Vec2) -> LightSample {
+/// One light for a receiver. Radiance is 0 when the light cannot reach the point.
+pub fn light_sample(scene: &Scene, r: &Receiver, word: u32, u: Vec2) -> LightSample {
     let (chosen, word) = if scene.lights.len() == 1 { (0, word) } else { alias_choose(&scene.light_table, word) };
-    let light = &scene.lights[chosen as usize];
+    let (mut light, p) = (&scene.lights[chosen as usize], r.position);
+    let weighed;
+    if scene.weighed_lights && is_delta(light) {
+        weighed = choose_by_share(scene, r, u.x);
+        light = &weighed;
+    }
     match light.kind {
         LIGHT_TRIANGLE | LIGHT_MIRRORED => sample_triangle_light(scene, light, p, u),
         LIGHT_SPHERE => sample_sphere_light(light, p, u),

@@ -1,13 +1,16 @@
 //! Twin of `glsl/trace/path.comp` and of `glsl/shared/path_step.glsl`.
 use crate::layout::{
-    BSDF_DIELECTRIC, Effects, FrameConstants, MATERIAL_EMITS_BEHIND, NONE, PathConstants, SurfacePoint,
+    BSDF_DIELECTRIC, BSDF_DIFFUSE, Effects, FrameConstants, MATERIAL_EMITS_BEHIND, NONE, PathConstants, SurfacePoint,
 };
 use crate::math::hash::pcg;
 use crate::scene::Scene;
 use crate::shaders::shared::path_step::{
-    MAX_SURVIVAL, PAIR_BSDF, PAIR_CHOICE, PAIR_FIRST_BOUNCE, PAIR_LIGHT, PAIR_ROULETTE, PAIRS_PER_BOUNCE,
+    MAX_SURVIVAL, ODDS_BEYOND_COSINE, PAIR_BSDF, PAIR_CHOICE, PAIR_FIRST_BOUNCE, PAIR_LIGHT, PAIR_ROULETTE,
+    PAIRS_PER_BOUNCE,
 };
-use crate::twins::bsdf::{Bsdf, bsdf_albedo, bsdf_chooses, bsdf_evaluate, bsdf_is_delta, bsdf_sample, relative_index};
+use crate::twins::bsdf::{
+    Bsdf, bsdf_albedo, bsdf_chooses, bsdf_evaluate, bsdf_is_delta, bsdf_lets_light_through, bsdf_sample, relative_index,
+};
 use crate::twins::camera::{eye_ray, film_sample, path_seed};
 use crate::twins::light::*;
 use crate::twins::sampler::{Sampler, sample_2d, sample_2d_bits, sampler_start};
@@ -180,7 +183,13 @@ impl Tracer<'_> {
     fn light_from_nee(&self, p: &Shade, random: Sampler, mask_seed: u32) -> Option<(Vec3, bool)> {
         let s = &p.surface;
         let word = sample_2d_bits(random, p.pair + PAIR_CHOICE)[0];
-        let light = light_sample(self.scene, s.position, word, sample_2d(random, p.pair + PAIR_LIGHT));
+        let receiver = Receiver {
+            position: s.position,
+            normal: p.facing.normal,
+            lets_light_through: bsdf_lets_light_through(&p.bsdf),
+            odds_beyond_cosine: if p.bsdf.kind == BSDF_DIFFUSE { 0.0 } else { ODDS_BEYOND_COSINE },
+        };
+        let light = light_sample(self.scene, &receiver, word, sample_2d(random, p.pair + PAIR_LIGHT));
         if light.radiance == Vec3::ZERO {
             return None;
         }

@@ -5,6 +5,7 @@ use crate::twin::Workplace;
 use glam::{DVec2, DVec3, dvec2, dvec3, vec3};
 use std::f64::consts::PI;
 use tallow::layout::{BSDF_COATED, PixelStats};
+use tallow::math::srgb::luminance;
 use tallow::render::{Outputs, Renderer};
 use tallow::scene::Loaded;
 use tallow::twins::bsdf::Bsdf;
@@ -210,6 +211,32 @@ fn what_shines_from_behind_lights_what_lies_there() {
     let error = (variance / f64::from(16 * SIDE * SIDE)).sqrt();
     assert!((mean - 1.875).abs() < 4.0 * error && error < 1e-3, "{mean} with a standard error of {error}");
     assert!(inside("").iter().all(|s| s.mean == [0.0; 3]), "control: the front alone");
+}
+
+/// Of lights without extent, light sampling weighs what each brings: what a matt floor gets of a spot, a bulb and two suns, one of them
+/// from below, has no more noise than pixels of the film have width, and that of all is the sum of that of each.
+#[test]
+fn several_lights_without_extent_bring_no_noise() {
+    let lights = [
+        "type = 'spot'\nposition = [0.5, 3.0, 0.2]\ntarget = [0.0, 0.0, 0.0]\nintensity = 40.0\ncone = 10.0\ncutoff = 25.0\n",
+        "type = 'point'\nposition = [-1.0, 1.5, 0.5]\nintensity = [9.0, 3.0, 1.0]\n",
+        "type = 'directional'\ndirection = [0.3, -1.0, 0.4]\nirradiance = 2.0\n",
+        "type = 'directional'\ndirection = [0.3, 1.0, 0.4]\nirradiance = 50.0\n",
+    ];
+    let floor = |lights: &[&str]| {
+        let lights: String = lights.iter().map(|light| format!("[[light]]\n{light}")).collect();
+        rendered(&Workplace::new().scene(&format!(
+            "[film]\nwidth = {SIDE}\nheight = {SIDE}\nfilter = 'point'\n[camera]\nposition = [0.0, 4.0, 0.0]\n\
+             target = [0.0, 0.0, 0.0]\nup = [0.0, 0.0, -1.0]\nfov = 53.13010235\n[render]\nspp = 4\nmax_depth = 2\n{lights}\
+             [[mesh]]\nshape = 'rectangle'\ntransform = {{ rotate = [-90.0, 0.0, 0.0], scale = 9.0 }}\n"
+        )))
+    };
+    let (all, each) = (floor(&lights), lights.map(|light| floor(&[light])));
+    for (i, s) in all.iter().enumerate() {
+        let sum: f32 = each.iter().map(|one| luminance(one[i].mean)).sum();
+        // Rounding of odds and sums. Lights of another colour than white leave the noise of which of them was chosen.
+        assert!((luminance(s.mean) / sum - 1.0).abs() < 1e-5, "pixel {i}: {} of {sum}", luminance(s.mean));
+    }
 }
 
 /// Light sampling chooses both sides of such a lamp, whether by area or by solid angle: what lies behind it has no more noise.

@@ -78,7 +78,7 @@ fn density(scene: &Loaded, direction: Vec3) -> f64 {
 fn samples(scene: &Loaded, count: u32, seed: u32) -> impl Iterator<Item = LightSample> {
     (0..count).map(move |i| {
         let s = sampler_start(0, i, seed, true);
-        light_sample(scene, HERE, sample_2d_bits(s, 0)[0], sample_2d(s, 1))
+        light_sample(scene, &Receiver::point(HERE), sample_2d_bits(s, 0)[0], sample_2d(s, 1))
     })
 }
 
@@ -249,7 +249,7 @@ fn variance(scene: &Loaded, independent: bool) -> f64 {
     let irradiance = |pixel: u32| {
         let sample = |i| {
             let s = sampler_start(pixel, i, 1, independent);
-            let light = light_sample(scene, HERE, sample_2d_bits(s, 0)[0], sample_2d(s, 1));
+            let light = light_sample(scene, &Receiver::point(HERE), sample_2d_bits(s, 0)[0], sample_2d(s, 1));
             f64::from(light.radiance.x * light.direction.y.max(0.0))
         };
         (0..64).map(sample).sum::<f64>() / 64.0

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use tallow::layout::{Light, NONE};
 use tallow::scene::description::Transform;
 use tallow::scene::{Loaded, Pose};
-use tallow::twins::light::light_sample;
+use tallow::twins::light::{Receiver, light_sample};
 use tallow::twins::path::{SHADOW_END, Strategy};
 use tallow::twins::surface::{surface_at, surface_emission};
 use tallow::twins::traverse::{Hit, traverse, traverse_from};
@@ -248,7 +248,7 @@ fn shadow_rays_end_before_the_lamp() {
             let light = |i: usize, end: f32| {
                 let mut random = Random::stream(i);
                 let p = from_origin + size * distance * random.point();
-                let s = light_sample(&scene, p, 0, vec2(random.unit(), random.unit()));
+                let s = light_sample(&scene, &Receiver::point(p), 0, vec2(random.unit(), random.unit()));
                 let light = if s.pdf > 0.0 { f64::from(s.radiance.x * s.distance * s.distance) } else { 0.0 };
                 let blocked = light > 0.0 && occluded(&scene, p, s.distance * s.direction, end);
                 [light, if blocked { light } else { 0.0 }]
@@ -378,7 +378,7 @@ fn other_light(scene: &Loaded) -> f64 {
         let mut random = Random::stream(*i);
         let p = vec3(0.0, 0.3, 0.0) + 0.2 * random.point();
         let word = (random.unit() * 4_294_967_296.0) as u32;
-        let s = light_sample(scene, p, word, vec2(random.unit(), random.unit()));
+        let s = light_sample(scene, &Receiver::point(p), word, vec2(random.unit(), random.unit()));
         let hit = closest(scene, p, s.direction);
         let met = if hit.any() { surface_emission(scene, &surface_at(scene, &hit)) } else { Vec3::ZERO };
         let seen = if s.pdf > 0.0 { s.radiance * s.pdf } else { Vec3::ZERO };

@@ -15,10 +15,12 @@ use crate::scene::load::texture;
 use crate::scene::rig::Tree;
 use glam::{Mat4, Vec3, Vec4};
 use std::f64::consts::PI;
+use std::ops::RangeInclusive;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 
 /// Adds the emissive triangles to the scene's lights (which hold the others), drops lights without power, and builds
-/// the table. Sets [`Material::emission_weight`], [`Light::probability`], [`Scene::triangle_pdf_scale`] and [`Scene::large_lamps`].
+/// the table. Sets [`Material::emission_weight`], [`Light::probability`], [`Scene::triangle_pdf_scale`], [`Scene::large_lamps`]
+/// and [`Scene::weighed_lights`].
 ///
 /// # Errors
 /// [`Error::Memory`](crate::error::Error::Memory).
@@ -29,6 +31,7 @@ pub fn finish(scene: &mut Scene) -> Result<()> {
     choose_unit(scene);
     list(scene)?;
     scene.large_lamps = scene.lights.iter().any(|l| is_large(scene, l));
+    scene.weighed_lights = WEIGHED.contains(&scene.rig.lights.iter().filter(|l| is_delta(l)).count());
     Ok(())
 }
 
@@ -218,6 +221,9 @@ pub fn is_large(scene: &Scene, light: &Light) -> bool {
     matches!(light.kind, LIGHT_TRIANGLE | LIGHT_MIRRORED)
         && geometry::area([light.a, light.b, light.c]) > LARGE * (high - low).length_squared()
 }
+
+/// How many lights without extent are weighed at every point: it takes time in proportion to their number.
+const WEIGHED: RangeInclusive<usize> = 2..=32;
 
 /// How much more often than by their power delta lights are chosen. Lamps and sky are found by BSDF sampling as well, delta lights by
 /// light sampling alone. Measured at 8 samples a pixel (`scenes/grass`, sun and sky): weights of 1, 4, 8 and 16 leave a relMSE of .0216, .0135,
