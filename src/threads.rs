@@ -1,7 +1,8 @@
 //! The thread pool for work on the host, with as many threads as the machine has cores or as the system will start.
 use crate::error::Result;
-use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::sync::OnceLock;
 
 /// Runs `work` in the caller's thread pool if it is in one, else in a new pool. That has one thread per core, fewer if the
 /// system refuses so many, and in the last resort only the caller's thread. Rayon's global pool would panic instead.
@@ -9,6 +10,19 @@ pub fn within<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     let mut made = None;
     run(&mut once(work, &mut made));
     made.unwrap_or_else(|| unreachable!("the work is done"))
+}
+
+/// As [`within`], in a pool that the process keeps: for work of every frame. It must neither hold a lock while threads share it nor wait
+/// for others, since a thread of the pool may take up what another caller waits for.
+pub fn within_kept<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    static POOL: OnceLock<Option<ThreadPool>> = OnceLock::new();
+    if rayon::current_thread_index().is_some() {
+        return work();
+    }
+    match POOL.get_or_init(pool) {
+        Some(pool) => pool.install(work),
+        None => within(work),
+    }
 }
 
 /// A job that any number of types share, so that what Rayon makes of it is compiled once: `work`, and where its result goes.
@@ -28,16 +42,20 @@ fn run(work: &mut (dyn FnMut() + Send)) {
     if rayon::current_thread_index().is_some() {
         return work();
     }
+    let alone = || ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
+    match pool().map_or_else(alone, Ok) {
+        Ok(pool) => pool.install(work),
+        Err(e) => unreachable!("the caller's thread, which is in no pool, needs no starting: {e}"),
+    }
+}
+
+/// A pool of as many threads as the system will start; `None` if that is none.
+fn pool() -> Option<ThreadPool> {
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     // 0 is Rayon's default, which an environment variable may set.
     let counts =
         std::iter::once(0).chain(std::iter::successors(Some(cores / 2), |n| Some(n / 2)).take_while(|&n| n > 0));
-    let pool = counts.into_iter().find_map(|threads| ThreadPoolBuilder::new().num_threads(threads).build().ok());
-    let alone = || ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
-    match pool.map_or_else(alone, Ok) {
-        Ok(pool) => pool.install(work),
-        Err(e) => unreachable!("the caller's thread, which is in no pool, needs no starting: {e}"),
-    }
+    counts.into_iter().find_map(|threads| ThreadPoolBuilder::new().num_threads(threads).build().ok())
 }
 
 /// Makes two things side by side, such as kernels: a driver compiles as many at a time as it is asked for.
@@ -72,6 +90,7 @@ pub fn each<T: Send, U: Send, const N: usize>(
 mod tests {
     use super::*;
     use crate::error::Error;
+    use std::collections::BTreeSet;
 
     #[test]
     fn things_made_side_by_side_keep_their_order_and_the_first_error_is_told() {
@@ -88,5 +107,14 @@ mod tests {
         assert_eq!(pool.install(|| within(rayon::current_num_threads)), 3);
         assert!(rayon::current_thread_index().is_none(), "control");
         assert!(within(|| rayon::current_thread_index().is_some()));
+    }
+
+    #[test]
+    fn work_of_every_frame_finds_the_threads_of_the_last_one() {
+        let ids =
+            || rayon::broadcast(|_| format!("{:?}", std::thread::current().id())).into_iter().collect::<BTreeSet<_>>();
+        let (kept, made) = (|| within_kept(ids), || within(ids));
+        assert_eq!(kept(), kept());
+        assert_ne!(made(), made(), "control");
     }
 }

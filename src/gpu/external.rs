@@ -32,6 +32,8 @@ pub struct RawDevice {
     pub queue_family: u32,
     /// Whether the device was made with `robustBufferAccess` enabled, which every device has; see [`Gpu::from_raw`].
     pub robust_buffer_access: bool,
+    /// Whether the instance was made with VK_EXT_debug_utils enabled: passes carry labels then, and objects names.
+    pub debug_utils: bool,
     /// Folder for compiled pipelines; see [`super::DeviceOptions::cache`].
     pub cache: Option<PathBuf>,
     /// How long to wait for a device that stands still; see [`super::DeviceOptions::wait_limit`].
@@ -44,14 +46,15 @@ pub struct RawDevice {
 }
 
 impl Gpu {
-    /// Uses a device made elsewhere and destroys only what it makes itself. Passes carry debug labels if the instance has
-    /// VK_EXT_debug_utils enabled; [`Gpu::calibrate`] works if the device has VK_KHR_calibrated_timestamps or
+    /// Uses a device made elsewhere and destroys only what it makes itself. [`Gpu::calibrate`] works if the device has VK_KHR_calibrated_timestamps or
     /// VK_EXT_calibrated_timestamps enabled.
     ///
     /// # Safety
     /// - The handles are valid, belong together, and outlive everything made from the returned `Gpu`.
     /// - The instance was made with an `apiVersion` of 1.3 or newer; an older one is an error where the driver tells.
     /// - The device was made with every one of [`super::REQUIRED_FEATURES`] enabled, and with what [`RawDevice::tracing`] takes.
+    /// - Whoever creates or destroys an instance or a device on another thread while this runs, or, with [`RawDevice::debug_utils`], as
+    ///   long as the returned `Gpu` is used, holds [`super::change_loader_lists`].
     /// - Nobody else uses the queue while [`Gpu::run`] or a [`super::Buffer`]'s reads and writes do.
     /// - Without `robust_buffer_access`, kernels read only what a [`Renderer`](crate::render::Renderer), a
     ///   [`Denoiser`](crate::denoise::Denoiser) and [`filter::run`](crate::denoise::filter::run) give them, which is checked:
@@ -92,7 +95,7 @@ impl Gpu {
         usable(&candidate)?;
         let labels = [c"vkCmdBeginDebugUtilsLabelEXT", c"vkCmdEndDebugUtilsLabelEXT", c"vkSetDebugUtilsObjectNameEXT"];
         let has = |names: &[&CStr]| enabled(&instance, &device, names);
-        let debug = has(&labels).then(|| ext::debug_utils::Device::new(&instance, &device));
+        let debug = (raw.debug_utils && has(&labels)).then(|| ext::debug_utils::Device::new(&instance, &device));
         let calibrated = CalibratedExtension::BY_PREFERENCE.into_iter().find(|extension| has(&[extension.function()]));
         let calibrated = calibrated.map(|extension| CalibratedClock::new(extension, &instance, &device));
         let by_ray_query = is_by_ray_query(raw.tracing, &candidate.info)?;
@@ -122,8 +125,8 @@ fn check_family(instance: &ash::Instance, physical: vk::PhysicalDevice, family: 
     }
 }
 
-/// Whether the functions of an extension or a version are there; they are returned only if the extension is enabled, or the instance
-/// made for the version.
+/// Whether the functions of an extension of the device or of a version are there; they are returned only if the extension is enabled,
+/// or the instance made for the version.
 fn enabled(instance: &ash::Instance, device: &ash::Device, names: &[&CStr]) -> bool {
     // SAFETY: valid handles by the contract of `from_raw`.
     names.iter().all(|name| unsafe { instance.get_device_proc_addr(device.handle(), name.as_ptr()) }.is_some())

@@ -16,8 +16,9 @@ pub(super) type Messages = Arc<Mutex<Vec<String>>>;
 static LOADER_LISTS: RwLock<()> = RwLock::new(());
 
 /// Returns a lock to hold while an instance or a device is created or destroyed, so that no other thread has the loader find one. An
-/// engine that does so on one thread while another renders, with VK_EXT_debug_utils enabled, needs it too. Nothing else of this crate
-/// may be called by the thread that holds it.
+/// engine needs it that does so on one thread while another calls this crate, which names its objects: always on devices that the crate
+/// opened, with [`RawDevice::debug_utils`](super::RawDevice::debug_utils) on the engine's own. The thread that holds it calls nothing else
+/// of this crate.
 pub fn change_loader_lists() -> RwLockWriteGuard<'static, ()> {
     LOADER_LISTS.write().unwrap_or_else(PoisonError::into_inner)
 }

@@ -3,7 +3,7 @@
 use ash::vk;
 use ash::vk::Handle;
 use std::ffi::{CStr, c_void};
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use tallow::gpu::{RawDevice, Tracing, change_loader_lists};
 
 /// What an engine has: everything here is made and destroyed with plain ash.
@@ -18,7 +18,11 @@ pub struct Engine {
     messenger: (ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT),
     messages: Box<Mutex<Vec<String>>>,
     tracing: Tracing,
+    /// The tests of one program run side by side, and hooks hear of the calls of one engine.
+    alone: Option<MutexGuard<'static, ()>>,
 }
+
+static ENGINES: Mutex<()> = Mutex::new(());
 
 const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -115,6 +119,7 @@ impl Engine {
     }
 
     fn made(tracing: Tracing, version: u32) -> Self {
+        let turn = ENGINES.lock().unwrap_or_else(PoisonError::into_inner);
         unsafe {
             let entry = ash::Entry::load().expect("install libvulkan1");
             let instance = instance(&entry, version);
@@ -140,7 +145,18 @@ impl Engine {
             let queue = device.get_device_queue(0, 0);
             let pool = device.create_command_pool(&vk::CommandPoolCreateInfo::default(), None).unwrap();
             let messenger = (utils, messenger);
-            Self { _entry: entry, instance, physical, device, queue, pool, messenger, messages, tracing }
+            Self {
+                _entry: entry,
+                instance,
+                physical,
+                device,
+                queue,
+                pool,
+                messenger,
+                messages,
+                tracing,
+                alone: Some(turn),
+            }
         }
     }
 
@@ -154,6 +170,7 @@ impl Engine {
             queue: self.queue.as_raw(),
             queue_family: 0,
             robust_buffer_access: true,
+            debug_utils: true,
             cache: None,
             wait_limit: None,
             tracing: self.tracing,
@@ -200,7 +217,8 @@ impl Engine {
     }
 
     /// Leaves the device as it is for ever, with what was left on it.
-    pub fn abandon(self) {
+    pub fn abandon(mut self) {
+        self.alone = None;
         std::mem::forget(self);
     }
 

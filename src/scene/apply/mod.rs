@@ -21,7 +21,7 @@ impl Scene {
     /// [`Error::Usage`] with the first thing that cannot be, such as a vertex that is no number; the scene is as before then.
     /// [`Error::Memory`].
     pub fn apply(&mut self, pose: &Pose) -> Result<Change> {
-        threads::within(|| {
+        threads::within_kept(|| {
             let next = next::Next::of(self, pose).map_err(|what| Error::Usage(format!("pose: {what}")))?;
             commit::commit(self, next, pose)
         })
