@@ -71,6 +71,24 @@ fn grey_is_not_spoken_of_where_the_scene_gives_a_material() {
 }
 
 #[test]
+fn pictures_of_materials_that_the_scene_replaces_are_not_read() {
+    let obj = format!("mtllib m.mtl\n{TRIANGLE}usemtl a\nf 1//1 2//1 3//1\n");
+    let mtl = "newmtl a\nmap_Kd damaged.png\nmap_Bump damaged.png\n";
+    let folder = folder(&[("a.obj", &obj), ("m.mtl", mtl), ("damaged.png", "no picture")]);
+    let read = |rest: &str| {
+        let worn = "[[material]]\nname = \"red\"\n[[mesh]]\nfile = \"a.obj\"\nmaterial = \"red\"\n";
+        Scene::parse(&folder.path().join("s.toml"), &format!("{worn}{rest}\n[environment]"))
+    };
+    let scene = read("").unwrap().scene;
+    assert_eq!((scene.textures.len(), scene.warnings.len()), (0, 0));
+    assert_eq!(scene.names.materials[scene.triangles[0].material as usize], "red");
+    // Another mesh wears them; and the vertices of one that moves are numbered from material to material.
+    for rest in ["[[mesh]]\nfile = \"a.obj\"", "moving = true"] {
+        assert!(read(rest).unwrap_err().to_string().contains("damaged.png"), "{rest}");
+    }
+}
+
+#[test]
 fn what_is_no_obj_is_an_error() {
     let folder = folder(&[
         ("empty.obj", ""),

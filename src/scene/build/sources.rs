@@ -32,6 +32,12 @@ pub fn mesh_name(mesh: &MeshTable) -> String {
     }
 }
 
+/// Whether the materials of a mesh's file matter: where one of the scene replaces them they do not, but the vertices of a mesh that
+/// moves are numbered from material to material.
+fn wears_own(mesh: &MeshTable) -> bool {
+    mesh.material.is_none() || mesh.moving
+}
+
 impl<'a> Sources<'a> {
     /// Takes the bitmaps and materials of a description, and reads the MTL files that OBJ files name near their beginning;
     /// others are read when an OBJ file reaches them.
@@ -42,9 +48,13 @@ impl<'a> Sources<'a> {
         let mut sources = Self { path, description, library: Library::default(), files: HashMap::new() };
         sources.add_bitmaps()?;
         sources.add_materials()?;
-        let of_obj = |path: &PathBuf| Format::of(path) == Format::Obj;
-        let paths: BTreeSet<_> = description.mesh.iter().filter_map(|m| sources.file_of(m)).filter(of_obj).collect();
-        paths.iter().try_for_each(|path| sources.library.read_ahead(path))?;
+        let obj_files = |worn: bool| -> BTreeSet<PathBuf> {
+            let meshes = description.mesh.iter().filter(|m| wears_own(m) == worn);
+            meshes.filter_map(|m| sources.file_of(m)).filter(|path| Format::of(path) == Format::Obj).collect()
+        };
+        let (worn, covered) = (obj_files(true), obj_files(false));
+        worn.iter().try_for_each(|path| sources.library.read_ahead(path))?;
+        sources.library.unworn = covered.difference(&worn).cloned().collect();
         Ok(sources)
     }
 

@@ -105,7 +105,8 @@ pub struct MeshTable {
     pub segments: Option<u32>,
     /// Transform from object to world space.
     pub transform: Transform,
-    /// Name of a `[[material]]` that replaces the mesh's own.
+    /// Name of a `[[material]]` that replaces the mesh's own. Where all meshes of an OBJ file have one and none is `moving`, the file's
+    /// MTL files are not read.
     pub material: Option<String>,
     /// Whether vertex normals are ignored; a file without any is then no reason for a warning.
     pub flat: bool,

@@ -208,7 +208,7 @@ impl<'a> Parser<'a> {
     }
 
     fn read_libraries(&mut self, statement: String) -> Result<()> {
-        if self.statements.contains(&statement) {
+        if self.statements.contains(&statement) || self.library.unworn.contains(self.path) {
             return Ok(());
         }
         let (found, missing) = library::find(self.path, &statement);
