@@ -41,8 +41,7 @@ pub fn assemble(path: &Path, description: &Description, choices: Choices, scene:
     let early = sources.library.materials.textures.clone();
     let (decoded, done) = rayon::join(|| early.decode(), || geometry(&mut sources, choices.still, scene));
     done?;
-    let textures = &sources.library.materials.textures;
-    let decoded = if textures.len() == early.len() { decoded? } else { textures.decode()? };
+    let decoded = sources.library.materials.textures.decode_after(decoded?)?;
     let attributes = std::mem::replace(&mut scene.texels, decoded.texels);
     scene.textures = decoded.textures;
     add_attributes(path, attributes, scene)?;

@@ -142,7 +142,7 @@ impl<'a> Addition<'a> {
         // Meshes from memory without normals are flat on purpose: there all vertices have one, or none has.
         let meant = table.data.as_ref().is_some_and(|mesh| mesh.normals.is_empty());
         let stretched = sources.library.materials.list.iter().any(|m| m.anisotropy != 0.0);
-        let uvs = stretched || sources.library.materials.textures.len() > 0;
+        let uvs = stretched || !sources.library.materials.textures.is_empty();
         let (affine, flat, keep) = (job.affine, table.flat || meant, table.moving);
         let placement = Placement { affine, flat, flip: table.flip_normals, uvs, keep };
         let materials = &sources.library.materials;

@@ -88,6 +88,8 @@ pub struct TextureSet {
 /// Device arrays of all pictures.
 #[derive(Debug, Default)]
 pub struct Decoded {
+    /// The pictures, as a texture that shows each with nothing else said.
+    pictures: Vec<Texture>,
     /// Records of the pictures, in order of request.
     pub textures: Vec<Texture>,
     /// Texels of all pictures, in the forms that the records' flags say.
@@ -152,9 +154,9 @@ impl TextureSet {
         self.wanted.iter().any(|(_, mapping)| mapping.second)
     }
 
-    /// Number of textures so far.
-    pub fn len(&self) -> usize {
-        self.wanted.len()
+    /// Whether no texture is there so far.
+    pub fn is_empty(&self) -> bool {
+        self.wanted.is_empty()
     }
 
     /// Reads every picture.
@@ -162,33 +164,41 @@ impl TextureSet {
     /// # Errors
     /// [`Error::Input`] with the file that is truncated, damaged, or in a form other than PNG, JPEG, EXR and HDR.
     pub fn decode(&self) -> Result<Decoded> {
-        let sources: Vec<_> = self.pictures.par_iter().map(|(path, _)| self.source(path)).collect::<Result<_>>()?;
-        let sizes: Vec<_> = sources.iter().map(Source::size).collect();
-        let forms: Vec<_> = sources.iter().zip(&self.pictures).map(|(source, (_, kind))| source.form(*kind)).collect();
-        let mut firsts = Vec::with_capacity(sizes.len());
-        let mut total = 0u64;
-        for ([width, height], (path, _)) in sizes.iter().zip(&self.pictures) {
-            firsts.push(u32::try_from(total).map_err(|_| too_many(path))?);
-            total += u64::from(*width) * u64::from(*height);
+        self.decode_after(Decoded::default())
+    }
+
+    /// As [`Self::decode`], but keeps what was decoded when fewer had been requested.
+    ///
+    /// # Errors
+    /// As [`Self::decode`].
+    pub fn decode_after(&self, Decoded { mut pictures, mut texels, .. }: Decoded) -> Result<Decoded> {
+        let (before, requested) = (texels.len(), &self.pictures[pictures.len()..]);
+        let sources: Vec<_> = requested.par_iter().map(|(path, _)| self.source(path)).collect::<Result<_>>()?;
+        let mut total = before as u64;
+        for (source, (path, kind)) in sources.iter().zip(requested) {
+            let ([width, height], flags) = (source.size(), source.form(*kind));
+            let first = u32::try_from(total).map_err(|_| too_many(path))?;
+            pictures.push(Texture { first, width, height, flags, ..Default::default() });
+            total += u64::from(width) * u64::from(height);
         }
         if total > u64::from(u32::MAX) {
             return Err(too_many(&self.pictures[0].0));
         }
         let texture = |&(picture, mapping): &(usize, Mapping)| {
-            let (flags, Mapping { scale, shear, offset, .. }) = (forms[picture] | mapping.flags(), mapping);
-            let [width, height] = sizes[picture];
-            Texture { first: firsts[picture], width, height, flags, scale, shear, offset, ..Default::default() }
+            let (picture, Mapping { scale, shear, offset, .. }) = (pictures[picture], mapping);
+            Texture { flags: picture.flags | mapping.flags(), scale, shear, offset, ..picture }
         };
         let textures = self.wanted.iter().map(texture).collect();
-        memory::need(format!("textures of {total} texels"), 4 * total + while_decoded(&sizes))?;
-        let mut texels = memory::vector("textures", total as usize)?;
+        let more = total as usize - before;
+        memory::need(format!("textures of {total} texels"), 4 * more as u64 + while_decoded(&sources))?;
+        memory::reserve("textures", &mut texels, more)?;
         texels.resize(total as usize, 0u32);
-        jobs(sources, &mut texels).into_par_iter().zip(&self.pictures).try_for_each(
+        jobs(sources, &mut texels[before..]).into_par_iter().zip(requested).try_for_each(
             |((source, space), (path, kind))| {
                 contained(|| source.decode(*kind, space)).map_err(|what| damaged(path, what))
             },
         )?;
-        Ok(Decoded { textures, texels })
+        Ok(Decoded { pictures, textures, texels })
     }
 
     fn source(&self, path: &Path) -> Result<Source> {
@@ -200,8 +210,9 @@ impl TextureSet {
 }
 
 /// Bytes that the largest pictures take while each thread decodes one: as decoded (at most 8 per texel) and as texels.
-fn while_decoded(sizes: &[[u32; 2]]) -> u64 {
-    let mut texels: Vec<_> = sizes.iter().map(|&[width, height]| u64::from(width) * u64::from(height)).collect();
+fn while_decoded(sources: &[Source]) -> u64 {
+    let sizes = sources.iter().map(Source::size);
+    let mut texels: Vec<_> = sizes.map(|[width, height]| u64::from(width) * u64::from(height)).collect();
     texels.sort_unstable_by(|a, b| b.cmp(a));
     12 * texels.iter().take(rayon::current_num_threads()).sum::<u64>()
 }

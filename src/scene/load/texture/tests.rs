@@ -47,6 +47,47 @@ fn channels_are_picked_by_kind() {
 }
 
 #[test]
+fn pictures_of_all_forms_become_texels() {
+    use image::DynamicImage;
+    // More rows than are converted at a time.
+    let picture = image::RgbaImage::from_fn(3, 70, |x, y| image::Rgba([3 * y as u8, x as u8, 9, 100 + y as u8]));
+    let picture = DynamicImage::ImageRgba8(picture);
+    let grey = DynamicImage::ImageLumaA8(picture.to_luma_alpha8());
+    for form in [picture.clone(), picture.to_rgb8().into(), grey, picture.to_luma8().into()] {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        form.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+        let rgba = form.to_rgba8();
+        let words =
+            |of: fn([u8; 4]) -> [u8; 4]| -> Vec<_> { rgba.pixels().map(|p| u32::from_le_bytes(of(p.0))).collect() };
+        let found = |kind| decode(bytes.get_ref(), "a.png", kind).unwrap().texels;
+        let color = form.color();
+        assert_eq!(found(Kind::Color), words(|rgba| rgba), "{color:?}");
+        assert_eq!(found(Kind::Red), words(|[r, ..]| [r; 4]), "{color:?}");
+        assert_eq!(found(Kind::Roughness), words(|[_, g, ..]| [g; 4]), "{color:?}");
+        assert_eq!(found(Kind::Alpha), words(|[.., a]| [a; 4]), "{color:?}");
+        let mask = if color.has_alpha() { words(|[.., a]| [a; 4]) } else { words(|[r, ..]| [r; 4]) };
+        assert_eq!(found(Kind::Mask), mask, "{color:?}");
+    }
+}
+
+#[test]
+fn what_was_decoded_is_kept_when_more_is_requested() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name);
+    std::fs::write(path("a.png"), png(1, 2, &[1, 2, 3, 4, 5, 6])).unwrap();
+    std::fs::write(path("b.png"), png(1, 1, &[7, 8, 9])).unwrap();
+    let mut set = TextureSet::default();
+    set.request(dir.path(), "a.png", Kind::Color, Mapping::default(), &mut Vec::new());
+    let early = crate::threads::within(|| set.decode()).unwrap();
+    std::fs::remove_file(path("a.png")).unwrap();
+    set.request(dir.path(), "b.png", Kind::Data, Mapping::default(), &mut Vec::new());
+    let all = crate::threads::within(|| set.decode_after(early)).unwrap();
+    assert_eq!(all.texels, [0xff030201, 0xff060504, 0xff090807]);
+    let records: Vec<_> = all.textures.iter().map(|t| (t.first, t.width, t.height, t.flags)).collect();
+    assert_eq!(records, [(0, 1, 2, TEXTURE_SRGB), (2, 1, 1, 0)]);
+}
+
+#[test]
 fn colours_are_those_of_rec_709_and_numbers_stay_as_they_are() {
     use crate::image::primaries::tests::{AP1, file};
     for (kind, expected) in [(Kind::Color, 0.68667), (Kind::Light, 0.68667), (Kind::Data, 0.5)] {
