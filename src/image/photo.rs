@@ -64,7 +64,6 @@ pub fn claim(bytes: &[u8]) -> Result<Claim, String> {
     if !format(bytes).is_some_and(|format| KNOWN.contains(&format)) {
         return Err("is no EXR, PNG, JPEG or HDR file".to_owned());
     }
-    check_end(bytes)?;
     let decoder = reader(bytes, TEXTS)?.into_decoder().map_err(plain)?;
     let (width, height) = decoder.dimensions();
     let pixels = u64::from(width) * u64::from(height);
@@ -87,6 +86,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Film, String> {
 /// A message about what is wrong with the data, or that they need more memory than is free.
 pub fn picture(bytes: &[u8]) -> Result<DynamicImage, String> {
     let claim = claim(bytes)?;
+    check_end(bytes)?;
     memory::check(claim.bytes)?;
     reader(bytes, TEXTS + claim.bytes)?.decode().map_err(plain)
 }
@@ -148,14 +148,17 @@ fn jpeg_is_cut(bytes: &[u8]) -> bool {
     let mut rest = bytes;
     // In the data of a scan, each 0xff is followed by 0 or a restart marker. These, 1 and the start of the image have no
     // length.
-    let is_segment = |pair: &[u8]| pair[0] == 0xff && !matches!(pair[1], 0 | 1 | 0xd0..=0xd8 | 0xff);
-    while let Some(at) = rest.windows(2).position(is_segment) {
-        if rest[at + 1] == END_OF_IMAGE {
-            return false;
+    while let Some(at) = rest.iter().position(|&byte| byte == 0xff) {
+        rest = &rest[at + 1..];
+        match *rest {
+            [END_OF_IMAGE, ..] => return false,
+            [0 | 1 | 0xd0..=0xd8 | 0xff, ..] => {}
+            [_, high, low, ..] => {
+                let behind = 1 + usize::from(u16::from_be_bytes([high, low]));
+                rest = rest.get(behind..).unwrap_or_default();
+            }
+            _ => return true,
         }
-        let Some(&[high, low]) = rest[at + 2..].first_chunk() else { return true };
-        let behind = at + 2 + usize::from(u16::from_be_bytes([high, low]));
-        rest = rest.get(behind..).unwrap_or_default();
     }
     true
 }

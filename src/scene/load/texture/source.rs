@@ -72,16 +72,37 @@ impl Source {
         if [picture.width(), picture.height()] != size {
             return Err("its header says another size".to_owned());
         }
-        let idle = |band: DynamicImage| band.into_rgba16().pixels().all(|p| is_idle(p.0, u16::MAX));
-        let has_alpha = picture.color().has_alpha() && (kind != Kind::Mask || !bands(&picture).all(idle));
-        let rows = space.chunks_mut(BAND as usize * size[0] as usize);
-        for (space, band) in rows.zip(bands(&picture)) {
-            match deep {
-                true => fill_deep(space, band.into_rgba16().pixels().map(|p| p.0), kind, has_alpha),
-                false => fill(space, band.into_rgba8().pixels().map(|p| p.0), kind, has_alpha),
-            }
+        let has_alpha = picture.color().has_alpha() && (kind != Kind::Mask || !all_idle(&picture));
+        match &picture {
+            DynamicImage::ImageLuma8(grey) => fill(space, grey.pixels().map(|p| opaque([p.0[0]; 3])), kind, has_alpha),
+            DynamicImage::ImageRgb8(rgb) => fill(space, rgb.pixels().map(|p| opaque(p.0)), kind, has_alpha),
+            DynamicImage::ImageRgba8(rgba) => fill(space, rgba.pixels().map(|p| p.0), kind, has_alpha),
+            rare => fill_by_bands(space, rare, kind, has_alpha, deep),
         }
         Ok(())
+    }
+}
+
+fn opaque([r, g, b]: [u8; 3]) -> [u8; 4] {
+    [r, g, b, 255]
+}
+
+/// Whether all texels are [idle](is_idle).
+fn all_idle(picture: &DynamicImage) -> bool {
+    let idle = |band: DynamicImage| band.into_rgba16().pixels().all(|p| is_idle(p.0, u16::MAX));
+    match picture {
+        DynamicImage::ImageRgba8(rgba) => rgba.pixels().all(|p| is_idle(p.0, 255)),
+        rare => bands(rare).all(idle),
+    }
+}
+
+fn fill_by_bands(space: &mut [u32], picture: &DynamicImage, kind: Kind, has_alpha: bool, deep: bool) {
+    let rows = space.chunks_mut(BAND as usize * picture.width() as usize);
+    for (space, band) in rows.zip(bands(picture)) {
+        match deep {
+            true => fill_deep(space, band.into_rgba16().pixels().map(|p| p.0), kind, has_alpha),
+            false => fill(space, band.into_rgba8().pixels().map(|p| p.0), kind, has_alpha),
+        }
     }
 }
 
@@ -117,13 +138,15 @@ fn fill_deep(space: &mut [u32], texels: impl Iterator<Item = [u16; 4]>, kind: Ki
 
 fn fill(space: &mut [u32], texels: impl Iterator<Item = [u8; 4]>, kind: Kind, has_alpha: bool) {
     let same = |v: u8| u32::from_le_bytes([v; 4]);
-    for (texel, rgba) in space.iter_mut().zip(texels) {
-        *texel = match kind {
-            Kind::Color | Kind::Light | Kind::Data | Kind::Height => u32::from_le_bytes(rgba),
-            Kind::Mask => same(if has_alpha { rgba[3] } else { rgba[0] }),
-            Kind::Red => same(rgba[0]),
-            Kind::Alpha => same(if has_alpha { rgba[3] } else { 255 }),
-            Kind::Roughness => same(rgba[1]),
-        };
+    match kind {
+        Kind::Color | Kind::Light | Kind::Data | Kind::Height => put(space, texels, u32::from_le_bytes),
+        Kind::Mask | Kind::Alpha if has_alpha => put(space, texels, |rgba| same(rgba[3])),
+        Kind::Mask | Kind::Red => put(space, texels, |rgba| same(rgba[0])),
+        Kind::Alpha => space.fill(same(255)),
+        Kind::Roughness => put(space, texels, |rgba| same(rgba[1])),
     }
+}
+
+fn put(space: &mut [u32], texels: impl Iterator<Item = [u8; 4]>, word: impl Fn([u8; 4]) -> u32) {
+    space.iter_mut().zip(texels).for_each(|(texel, rgba)| *texel = word(rgba));
 }
