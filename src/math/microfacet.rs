@@ -36,10 +36,10 @@ pub fn microfacet_area(ggx: bool, w: Vec3, alpha: f32) -> f32 {
     if ggx { 0.5 * (w.z + (w.z * w.z + t * t).sqrt()) } else { 0.5 * beckmann_area(w.z, t) }
 }
 
-/// Spherical caps (Dupuy and Benyoub 2023); `w` stretched to alpha 1.
-fn ggx_visible_normal(w: Vec3, u: Vec2) -> Vec3 {
-    let t = u.y * (1.0 + w.z);
-    ((t * (2.0 - t)).sqrt() * circle_point(u.x) + w.xy()).extend((1.0 - t + w.z).max(1e-6))
+/// Spherical caps (Dupuy and Benyoub 2023); `w` stretched to alpha 1, `azimuth` on the unit circle.
+fn ggx_visible_normal(w: Vec3, azimuth: Vec2, v: f32) -> Vec3 {
+    let t = v * (1.0 + w.z);
+    ((t * (2.0 - t)).sqrt() * azimuth + w.xy()).extend((1.0 - t + w.z).max(1e-6))
 }
 
 /// One Halley step towards the slope whose visible area is `target`; `mass` = 1 + erf(b).
@@ -63,20 +63,53 @@ pub fn beckmann_slope(c: f32, s: f32, u: f32) -> f32 {
     beckmann_step(b, if b < 0.0 { tail } else { 2.0 - tail }, c, s, target).clamp(-4.0, cot)
 }
 
-fn beckmann_visible_normal(w: Vec3, u: Vec2) -> Vec3 {
+/// `along` and `across` are slopes in and across the azimuth of `w`.
+fn beckmann_visible_normal(w: Vec3, along: f32, across: f32) -> Vec3 {
     let s2 = w.xy().length_squared();
-    let s = s2.sqrt();
-    let azimuth = if s2 > 1e-14 { w.xy() / s } else { vec2(1.0, 0.0) };
-    let along = beckmann_slope(w.z, s, u.x);
-    let across = erf_inverse(2.0 * u.y - 1.0);
+    let azimuth = if s2 > 1e-14 { w.xy() / s2.sqrt() } else { vec2(1.0, 0.0) };
     (-along * azimuth + across * vec2(azimuth.y, -azimuth.x)).extend(1.0)
 }
 
 /// A normal visible from w: density D(m) max(w.m, 0) / `microfacet_area(w)`.
 pub fn microfacet_sample(ggx: bool, w: Vec3, alpha: f32, u: Vec2) -> Vec3 {
-    let stretched = vec3(alpha * w.x, alpha * w.y, w.z).normalize();
-    let m = if ggx { ggx_visible_normal(stretched, u) } else { beckmann_visible_normal(stretched, u) };
-    vec3(alpha * m.x, alpha * m.y, m.z).normalize()
+    let normals = VisibleNormals::new(ggx, w, alpha);
+    normals.at(normals.first(u.x), normals.second(u.y))
+}
+
+/// [`microfacet_sample`] in steps: for a grid of random numbers, what follows from one of them alone is computed once.
+pub struct VisibleNormals {
+    ggx: bool,
+    alpha: f32,
+    /// The direction that they are visible from, stretched to alpha 1.
+    w: Vec3,
+}
+
+impl VisibleNormals {
+    /// Of those visible from w.
+    pub fn new(ggx: bool, w: Vec3, alpha: f32) -> Self {
+        Self { ggx, alpha, w: vec3(alpha * w.x, alpha * w.y, w.z).normalize() }
+    }
+
+    /// What follows from the first random number: with GGX a point of the unit circle, else a slope in x.
+    pub fn first(&self, u: f32) -> Vec2 {
+        let w = self.w;
+        if self.ggx { circle_point(u) } else { vec2(beckmann_slope(w.z, w.xy().length_squared().sqrt(), u), 0.0) }
+    }
+
+    /// What follows from the second random number: with GGX itself, else a slope.
+    pub fn second(&self, v: f32) -> f32 {
+        if self.ggx { v } else { erf_inverse(2.0 * v - 1.0) }
+    }
+
+    /// The normal, of what [`Self::first`] and [`Self::second`] return.
+    pub fn at(&self, first: Vec2, second: f32) -> Vec3 {
+        let (w, alpha) = (self.w, self.alpha);
+        let m = match self.ggx {
+            true => ggx_visible_normal(w, first, second),
+            false => beckmann_visible_normal(w, first.x, second),
+        };
+        vec3(alpha * m.x, alpha * m.y, m.z).normalize()
+    }
 }
 
 #[cfg(test)]

@@ -4,8 +4,8 @@ use super::fresnel;
 use crate::layout::SMOOTH_ALPHA;
 use crate::layout::{BSDF_COATED, BSDF_METALLIC, COAT_COLUMNS, COAT_ROWS, MATERIAL_GGX, Material};
 use crate::math::fresnel::fresnel_dielectric;
-use crate::math::microfacet::{microfacet_area, microfacet_g1, microfacet_sample};
-use glam::{Vec3, vec2, vec3};
+use crate::math::microfacet::{VisibleNormals, microfacet_area, microfacet_g1};
+use glam::{Vec3, vec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::sync::LazyLock;
@@ -137,13 +137,18 @@ fn over_visible_normals(ggx: bool, alpha: f32, c: f32, of_normal: impl Fn(Vec3, 
     let masking = microfacet_g1(ggx, wo, alpha) * microfacet_area(ggx, wo, alpha) / c;
     // Steps in u = v^2 (3 - 2 v), which vanish at both ends: there normals run off into the tails of the distribution.
     let [u, width] = [|v: f32| v * v * (3.0 - 2.0 * v), |v: f32| 6.0 * v * (1.0 - v)];
-    let at = |i: usize| (i as f32 + 0.5) / POINTS as f32;
+    let steps: [f32; POINTS] = std::array::from_fn(|i| (i as f32 + 0.5) / POINTS as f32);
+    let normals = VisibleNormals::new(ggx, wo, alpha);
+    let firsts = steps.map(|x| normals.first(u(x)));
     let (mut sum, mut all) = ([0.0; 2], 0.0);
-    for (x, y) in (0..POINTS * POINTS).map(|i| (at(i % POINTS), at(i / POINTS))) {
-        let weight = f64::from(width(x) * width(y));
-        let shares = of_normal(wo, microfacet_sample(ggx, wo, alpha, vec2(u(x), u(y))));
-        sum = [0, 1].map(|i| sum[i] + weight * f64::from(shares[i] * masking));
-        all += weight;
+    for y in steps {
+        let second = normals.second(u(y));
+        for (x, first) in steps.into_iter().zip(firsts) {
+            let weight = f64::from(width(x) * width(y));
+            let shares = of_normal(wo, normals.at(first, second));
+            sum = [0, 1].map(|i| sum[i] + weight * f64::from(shares[i] * masking));
+            all += weight;
+        }
     }
     sum.map(|s| (s / all).min(1.0) as f32)
 }
